@@ -1,0 +1,50 @@
+// Jobs: durable background work on a map.
+#ifndef STRATA_CORE_API_JOBS_H_
+#define STRATA_CORE_API_JOBS_H_
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/api/call.h"
+#include "core/world/job.h"
+
+namespace strata::api {
+
+// Thread-safe. Jobs of a map run one at a time in the order of their ids, survive a restart, and
+// leave the world as it was when they fail or are cancelled.
+class Jobs {
+ public:
+  virtual ~Jobs() = default;
+
+  // Kinds: "rebuild" (all derived data again from truth), "verify" (everything checked; a mismatch
+  // fails the job). INVALID_ARGUMENT for an unknown kind or parameter.
+  virtual absl::StatusOr<JobInfo> Start(const Call& call,
+                                        absl::string_view map,
+                                        absl::string_view kind,
+                                        const std::map<std::string, std::string>& parameters) = 0;
+  virtual absl::StatusOr<JobInfo> Get(const Call& call,
+                                      absl::string_view map,
+                                      std::uint64_t id) = 0;
+  virtual absl::StatusOr<std::vector<JobInfo>> List(const Call& call, absl::string_view map) = 0;
+  // Asks a queued or running job to end; one that has ended stays as it is.
+  virtual absl::StatusOr<JobInfo> Cancel(const Call& call,
+                                         absl::string_view map,
+                                         std::uint64_t id) = 0;
+  // Delivers the job's state now and after every change, at most ten times a second, until it has
+  // ended.
+  virtual absl::Status Watch(const Call& call,
+                             absl::string_view map,
+                             std::uint64_t id,
+                             absl::FunctionRef<absl::Status(const JobInfo&)> sink) = 0;
+};
+
+}  // namespace strata::api
+
+#endif  // STRATA_CORE_API_JOBS_H_

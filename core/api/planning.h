@@ -1,0 +1,48 @@
+// Planning: paths, surfaces at a place, robot profiles.
+#ifndef STRATA_CORE_API_PLANNING_H_
+#define STRATA_CORE_API_PLANNING_H_
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include <Eigen/Core>
+
+#include "core/api/call.h"
+#include "core/world/plan.h"
+#include "core/world/robot_profile.h"
+
+namespace strata::api {
+
+// The name under which a map's default profile is listed and changed.
+inline constexpr absl::string_view kDefaultProfile = "default";
+
+// Thread-safe.
+class Planning {
+ public:
+  virtual ~Planning() = default;
+
+  // A path or the reason why there is none; both are OK. INVALID_ARGUMENT for a bad query (not
+  // finite, profile out of range); CANCELLED and DEADLINE_EXCEEDED from inside the search.
+  virtual absl::StatusOr<PlanResult> PlanPath(const Call& call,
+                                              absl::string_view map,
+                                              const PlanQuery& query) = 0;
+  // All levels at each place, in the order asked; a place without surfaces has an empty column.
+  virtual absl::StatusOr<std::vector<SurfaceColumn>> SampleSurfaces(
+      const Call& call, absl::string_view map, const std::vector<Eigen::Vector2d>& places) = 0;
+
+  // Creates or replaces. Changing kDefaultProfile re-annotates the tiles.
+  virtual absl::Status SetProfile(const Call& call,
+                                  absl::string_view map,
+                                  absl::string_view name,
+                                  const RobotProfile& profile) = 0;
+  virtual absl::StatusOr<std::map<std::string, RobotProfile>> ListProfiles(
+      const Call& call, absl::string_view map) = 0;
+};
+
+}  // namespace strata::api
+
+#endif  // STRATA_CORE_API_PLANNING_H_

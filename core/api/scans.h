@@ -1,0 +1,89 @@
+// Scans: upload, look up, fetch back and delete.
+#ifndef STRATA_CORE_API_SCANS_H_
+#define STRATA_CORE_API_SCANS_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/time/time.h"
+#include <Eigen/Geometry>
+
+#include "core/api/call.h"
+#include "core/cloud/point_cloud.h"
+#include "core/world/scan.h"
+
+namespace strata::api {
+
+// Largest number of points in one piece of a scan, so that a piece stays below 1 MiB on the wire
+// (21 bytes a point with every column).
+inline constexpr std::size_t kMaxPointsPerChunk = 40'000;
+
+// An upload under way. Not thread-safe; destroying it before Finish() abandons the scan without a
+// trace.
+class ScanUpload {
+ public:
+  virtual ~ScanUpload() = default;
+
+  // The next points of the scan, in order: at most kMaxPointsPerChunk, with the columns the header
+  // announced; rows, columns and origin of `chunk` are ignored (its origin must be zero). Blocks
+  // while the server is busy. INVALID_ARGUMENT for points that are not finite (but NaN in organised
+  // scans), too many, or in other columns.
+  virtual absl::Status Write(const PointCloud& chunk) = 0;
+
+  // Returns once the scan is durable. The same scan again is OK with `already_present`; the same id
+  // with other content is ALREADY_EXISTS; fewer points than announced is INVALID_ARGUMENT; a full
+  // queue is RESOURCE_EXHAUSTED.
+  virtual absl::StatusOr<ScanAck> Finish() = 0;
+};
+
+// Which scans; every given condition must hold.
+struct ScanFilter {
+  std::optional<std::string> trajectory;
+  std::optional<ScanState> state;
+  std::optional<absl::Time> from, until;  // half-open
+  // Scans whose footprint (the box of their points in the map) meets this box [m].
+  std::optional<Eigen::AlignedBox2d> box;
+};
+
+// Thread-safe.
+class Scans {
+ public:
+  virtual ~Scans() = default;
+
+  // Begins an upload. The header is checked here: INVALID_ARGUMENT; RESOURCE_EXHAUSTED beyond the
+  // limits.
+  virtual absl::StatusOr<std::unique_ptr<ScanUpload>> Upload(const Call& call,
+                                                             absl::string_view map,
+                                                             const ScanHeader& header) = 0;
+  // What is committed of a trajectory; an unknown trajectory has `exists` false.
+  virtual absl::StatusOr<UploadState> GetUploadState(const Call& call,
+                                                     absl::string_view map,
+                                                     absl::string_view trajectory) = 0;
+  virtual absl::StatusOr<ScanInfo> Get(const Call& call,
+                                       absl::string_view map,
+                                       const ScanId& id) = 0;
+  // In commit order. The sink may end the listing by returning a status, which is handed back.
+  virtual absl::Status List(const Call& call,
+                            absl::string_view map,
+                            const ScanFilter& filter,
+                            absl::FunctionRef<absl::Status(const ScanInfo&)> sink) = 0;
+  // The points as uploaded, in pieces of at most kMaxPointsPerChunk. FAILED_PRECONDITION if the map
+  // dropped them; DATA_LOSS if a stored piece is damaged.
+  virtual absl::Status GetPoints(const Call& call,
+                                 absl::string_view map,
+                                 const ScanId& id,
+                                 absl::FunctionRef<absl::Status(const PointCloud&)> sink) = 0;
+  // Takes the scan, its points and its contribution out of the map.
+  virtual absl::Status Delete(const Call& call, absl::string_view map, const ScanId& id) = 0;
+};
+
+}  // namespace strata::api
+
+#endif  // STRATA_CORE_API_SCANS_H_

@@ -1,0 +1,79 @@
+// Tiles: the world in squares.
+#ifndef STRATA_CORE_API_TILES_H_
+#define STRATA_CORE_API_TILES_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/api/call.h"
+#include "core/mls/tile_key.h"
+
+namespace strata::api {
+
+// A served tile: core/codec's surface-tile bytes (DecodeSurfaceTile reads them).
+struct EncodedTile {
+  TileKey key;
+  std::uint64_t version = 0;
+  std::uint64_t epoch = 0;
+  std::string bytes;
+};
+
+struct TileInfo {
+  TileKey key;
+  std::uint64_t version = 0;
+  std::uint64_t bytes = 0;
+  std::uint64_t patches = 0;
+};
+
+// Tiles x_min ≤ x < x_max, y_min ≤ y < y_max of one level of detail.
+struct TileArea {
+  std::int32_t level = 0;
+  std::int64_t x_min = -(std::int64_t{1} << 31), x_max = std::int64_t{1} << 31;
+  std::int64_t y_min = -(std::int64_t{1} << 31), y_max = std::int64_t{1} << 31;
+};
+
+// A tile the reader has already.
+struct HeldTile {
+  TileKey key;
+  std::uint64_t version = 0;
+};
+
+// One message of Fetch.
+struct TileUpdate {
+  enum class Kind : std::uint8_t { kNew = 1, kChanged = 2, kGone = 3 };
+  Kind kind = Kind::kNew;
+  EncodedTile tile;  // of a tile that is gone: key and epoch only
+};
+
+// Thread-safe. Every answer is of one epoch.
+class Tiles {
+ public:
+  virtual ~Tiles() = default;
+
+  // NOT_FOUND where the map has nothing; DATA_LOSS if the stored tile is damaged (others are
+  // served).
+  virtual absl::StatusOr<EncodedTile> Get(const Call& call,
+                                          absl::string_view map,
+                                          const TileKey& key) = 0;
+  // By key. INVALID_ARGUMENT for a level outside 0 to kMaxLevel.
+  virtual absl::StatusOr<std::vector<TileInfo>> List(const Call& call,
+                                                     absl::string_view map,
+                                                     const TileArea& area) = 0;
+  // What is new, changed or gone in the area against what the reader holds; nothing else is sent. A
+  // sink's error ends the stream and is handed back.
+  virtual absl::Status Fetch(const Call& call,
+                             absl::string_view map,
+                             const TileArea& area,
+                             const std::vector<HeldTile>& held,
+                             absl::FunctionRef<absl::Status(const TileUpdate&)> sink) = 0;
+};
+
+}  // namespace strata::api
+
+#endif  // STRATA_CORE_API_TILES_H_

@@ -1,0 +1,84 @@
+// One surface in one cell, with the statistics that make joins exact (thesis 6.5.1–6.5.3).
+#ifndef STRATA_CORE_MLS_PATCH_H_
+#define STRATA_CORE_MLS_PATCH_H_
+
+#include <cstdint>
+
+#include "core/mls/mls_parameters.h"
+
+namespace strata {
+
+// The standard deviation of a measurement, coded in 8 bits on a logarithmic scale from 2 mm (code
+// 0) to 512 mm (code 255); steps of 2.2 %. Values outside are clamped.
+std::uint8_t SigmaCode(double sigma_m);
+double SigmaOfCode(std::uint8_t code);
+// 1/σ² in fixed point: 65536 at 2 mm, 1 at 512 mm. 1/σ² = weight · kPrecisionPerWeight [1/m²].
+std::uint32_t WeightOfCode(std::uint8_t code);
+inline constexpr double kPrecisionPerWeight = 1.0 / (65536.0 * 0.002 * 0.002);
+
+// The statistics of one height interval, 32 bytes. A pure function of the multiset of its
+// measurements (height in ticks, σ code), so that joining is commutative and associative, bit for
+// bit:
+//   z_min, z_max   lowest and highest height
+//   top_sigma_code σ of the highest measurement; the smallest σ wins a tie
+//   count          number of measurements, saturating at kMaxCount
+//   sum_w, sum_wz, sum_wzz   Σw, Σw(z − z_min), Σw(z − z_min)² with w = WeightOfCode(σ code), while
+//   the interval is
+//                  horizontal (z_max − z_min ≤ τ); all zero once it is vertical, where only the
+//                  highest measurement counts (6.5.2). A patch whose Σw reaches MaxWeightSum(τ) is
+//                  *full*: sum_w stays there and the other sums are zero; its height is the middle
+//                  of the interval.
+// Widths: with τ ≤ 1 m, (z − z_min) ≤ 2¹² and MaxWeightSum keeps every sum inside its field.
+struct Patch {
+  std::uint64_t sum_wzz = 0;
+  std::uint64_t sum_wz : 54 = 0;
+  std::uint64_t top_sigma_code : 8 = 0;
+  std::uint64_t : 2;
+  std::uint64_t sum_w : 44 = 0;
+  std::uint64_t count : 20 = 0;
+  std::uint64_t cell : 16 = 0;  // CellInTile
+  std::int64_t z_min : 24 = 0;  // ticks
+  std::int64_t z_max : 24 = 0;  // ticks
+
+  static constexpr std::uint32_t kMaxCount = (1U << 20) - 1;
+
+  // Taller than τ: stands for a wall, a trunk, or a deck seen from both sides. Steers matching,
+  // sampling and drawing only; the top of every patch may be driven on.
+  bool vertical() const { return sum_w == 0; }
+  std::int32_t height_ticks() const { return static_cast<std::int32_t>(z_max - z_min); }
+
+  // Height of the surface [m]: the fused mean (eq. 6.1), or of a vertical patch its highest
+  // measurement.
+  double mean_m() const;
+  // σ of mean_m() [m]: √(1/Σ1/σ²) (eq. 6.2), or of a vertical patch that of its highest
+  // measurement.
+  double sigma_m() const;
+  // Length of a vertical interval [m]; 0 for a horizontal one (6.5.1).
+  double depth_m() const { return vertical() ? height_ticks() / double{kTicksPerMetre} : 0.0; }
+  double bottom_m() const { return static_cast<double>(z_min) / kTicksPerMetre; }
+  double top_m() const { return static_cast<double>(z_max) / kTicksPerMetre; }
+  // Weighted standard deviation of the heights around their mean [m]: roughness and crispness; 0
+  // when vertical.
+  double spread_m() const;
+
+  // `x == y` compares every field.
+  friend bool operator==(const Patch&, const Patch&) = default;
+};
+static_assert(sizeof(Patch) == 32);
+
+// The bound of Patch::sum_w for a thickness of `thickness_ticks`: the largest 2^k − 1 < 2⁴⁴ with
+// which Σw(z − z_min)² fits 64 bits.
+std::uint64_t MaxWeightSum(std::int32_t thickness_ticks);
+
+// One measurement as a patch.
+Patch PatchOfMeasurement(std::uint16_t cell, std::int32_t z_ticks, std::uint8_t sigma_code);
+
+// True if the two intervals of one cell are one: they overlap or are closer than γ (6.5.2).
+bool Touching(const Patch& a, const Patch& b, const MlsParameters& parameters);
+
+// The patch of the union of the two multisets. REQUIRES: same cell, Touching().
+Patch Join(const Patch& a, const Patch& b, const MlsParameters& parameters);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_MLS_PATCH_H_

@@ -1,0 +1,59 @@
+// What readers of a map see: surfaces without the statistics behind them. Planners, pictures and
+// clients use these.
+#ifndef STRATA_CORE_MLS_SURFACE_TILE_H_
+#define STRATA_CORE_MLS_SURFACE_TILE_H_
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/mls/mls_map.h"
+#include "core/mls/tile_key.h"
+
+namespace strata {
+
+// What a patch's top is for a robot (thesis 6.5.4, 6.5.5): kUnknown before annotation.
+enum class Traversability : std::uint8_t {  // stored in tiles
+  kUnknown = 0,
+  kTraversable = 1,
+  kNonTraversable = 2,
+};
+
+// One patch as served, 20 bytes.
+struct Surface {
+  std::uint16_t cell = 0;  // CellInTile
+  Traversability traversability = Traversability::kUnknown;
+  std::uint8_t class_id = 0;  // class with the most votes, the smaller id on a tie; 0 = none
+  float z_m = 0.0F;           // Patch::mean_m()
+  float sigma_m = 0.0F;       // Patch::sigma_m()
+  float depth_m = 0.0F;       // Patch::depth_m(); > 0 means vertical
+  float cost = 0.0F;  // path cost factor of the default profile, ≥ 0 (6.2.2); see traversability.h
+
+  bool vertical() const { return depth_m > 0.0F; }
+  // Underside of what stands below this surface.
+  float bottom_m() const { return z_m - depth_m; }
+
+  friend bool operator==(const Surface&, const Surface&) = default;
+};
+
+// Surfaces sorted by (cell, z).
+struct SurfaceTile {
+  TileKey key;
+  // Commit sequence of the content; a tile with the same key and version has the same bytes.
+  std::uint64_t version = 0;
+  std::vector<Surface> surfaces;
+  std::array<std::uint32_t, kTileCells + 1> row_begin{};
+
+  void IndexRows();
+  std::span<const Surface> Cell(std::uint16_t cell_in_tile) const;
+
+  friend bool operator==(const SurfaceTile&, const SurfaceTile&) = default;
+};
+
+// The surfaces of a tile, not annotated: traversability kUnknown, cost 0.
+SurfaceTile SurfacesOf(const MlsTile& tile);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_MLS_SURFACE_TILE_H_

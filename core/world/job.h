@@ -1,0 +1,38 @@
+// Durable background work.
+#ifndef STRATA_CORE_WORLD_JOB_H_
+#define STRATA_CORE_WORLD_JOB_H_
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "absl/time/time.h"
+
+namespace strata {
+
+enum class JobState : std::uint8_t {  // stored
+  kQueued = 1,
+  kRunning = 2,
+  kSucceeded = 3,
+  kFailed = 4,
+  kCancelled = 5,
+};
+
+inline bool IsFinal(JobState state) { return state >= JobState::kSucceeded; }
+
+struct JobInfo {
+  std::uint64_t id = 0;  // unique in the map
+  std::string kind;      // "rebuild", "verify"
+  std::map<std::string, std::string> parameters;
+  JobState state = JobState::kQueued;
+  double progress = 0.0;                  // in [0, 1]
+  std::string phase;                      // what it does now, for people
+  std::string message;                    // result in one line, or why it failed
+  std::map<std::string, double> metrics;  // numbers of the result, such as "tiles_checked"
+  absl::Time created;
+  absl::Time updated;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_WORLD_JOB_H_

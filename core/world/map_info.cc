@@ -1,0 +1,35 @@
+#include "core/world/map_info.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/cloud/sensor_model.h"
+#include "core/common/status.h"
+#include "core/mls/mls_parameters.h"
+#include "core/world/robot_profile.h"
+
+namespace strata {
+
+absl::Status ValidateMapParameters(const MapParameters& parameters) {
+  STRATA_RETURN_IF_ERROR(ValidateMlsParameters(parameters.mls));
+  STRATA_RETURN_IF_ERROR(ValidateSensorModel(parameters.sensor));
+  STRATA_RETURN_IF_ERROR(ValidateRobotProfile(parameters.default_profile));
+  if (!parameters.origin.has_value()) return absl::OkStatus();
+  const GeodeticOrigin& origin = *parameters.origin;
+  if (std::abs(origin.latitude_rad) <= std::numbers::pi / 2 &&
+      std::abs(origin.longitude_rad) <= std::numbers::pi && std::abs(origin.altitude_m) <= 1e5) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(absl::StrCat("origin: latitude ",
+                                                 origin.latitude_rad,
+                                                 " rad, longitude ",
+                                                 origin.longitude_rad,
+                                                 " rad, altitude ",
+                                                 origin.altitude_m,
+                                                 " m is not on earth"));
+}
+
+}  // namespace strata

@@ -1,0 +1,99 @@
+// Questions of planners and their answers.
+#ifndef STRATA_CORE_WORLD_PLAN_H_
+#define STRATA_CORE_WORLD_PLAN_H_
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/strings/string_view.h"
+#include <Eigen/Core>
+
+#include "core/mls/surface_tile.h"
+#include "core/mls/tile_key.h"
+#include "core/world/robot_profile.h"
+
+namespace strata {
+
+// A place on a surface: the one nearest in height to `z_m`, or the `level`-th from below (0 =
+// lowest). Neither: the lowest.
+struct PlanEndpoint {
+  double x_m = 0.0;
+  double y_m = 0.0;
+  std::optional<double> z_m;
+  std::optional<int> level;
+};
+
+struct PlanQuery {
+  PlanEndpoint from;
+  PlanEndpoint to;
+  RobotProfile profile;
+  std::uint64_t max_expanded = 50'000'000;  // search limit
+};
+
+enum class PlanReason : std::uint8_t {
+  kFound = 0,
+  kStartNotOnSurface = 1,  // nearest: where a robot could stand
+  kGoalNotOnSurface = 2,
+  kBlocked = 3,        // where and by what the search came to an end closest to the goal
+  kUnknownGround = 4,  // the way out of the reached region leads over unobserved cells only
+  kSearchLimit = 5,
+};
+
+// What stops the robot at a place.
+enum class Obstruction : std::uint8_t {
+  kNone = 0,
+  kStep = 1,       // value: height of the step [m]
+  kSlope = 2,      // value: angle [rad]
+  kClearance = 3,  // value: height that is free [m]
+  kDrop = 4,       // value: depth of the drop within the radius [m]
+  kObstacle = 5,   // value: height of what stands within the radius [m]
+  kRoughness = 6,  // value: σ around the local plane [m]
+  kUnknown = 7,    // value: width of the unobserved stretch [m]
+};
+
+// A stretch of unobserved cells that the path bridges.
+struct PlanGap {
+  Eigen::Vector3d from;
+  Eigen::Vector3d to;
+  double length_m = 0.0;
+};
+
+// A path, or why there is none.
+struct PlanResult {
+  PlanReason reason = PlanReason::kFound;
+  std::string message;                     // for people, with numbers
+  std::vector<Eigen::Vector3d> waypoints;  // on the surfaces, in the map frame; empty unless found
+  double length_m = 0.0;
+  double cost = 0.0;  // Σ length · (1 + danger)
+  std::vector<PlanGap> gaps;
+  std::uint64_t expanded = 0;
+  double elapsed_ms = 0.0;
+  std::uint64_t epoch = 0;
+  std::vector<TileKey> tiles;  // that the path stands on
+  // If not found: where the trouble is, of what kind and how much (see Obstruction), and for an
+  // endpoint that is not on a surface the nearest place where a robot could stand.
+  std::optional<Eigen::Vector3d> where;
+  Obstruction obstruction = Obstruction::kNone;
+  double obstruction_value = 0.0;
+  std::optional<Eigen::Vector3d> nearest;
+
+  bool found() const { return reason == PlanReason::kFound; }
+};
+
+// All surfaces at one place, lowest first.
+struct SurfaceColumn {
+  double x_m = 0.0;
+  double y_m = 0.0;
+  std::vector<Surface> surfaces;
+};
+
+// Lower-case words as in the API and the CLI: "found", "start_not_on_surface", …; "step", "slope",
+// …
+absl::string_view ToString(PlanReason reason);
+absl::string_view ToString(Obstruction obstruction);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_WORLD_PLAN_H_

@@ -1,0 +1,65 @@
+#include "core/world/scan.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+
+#include "core/cloud/sensor_model.h"
+#include "core/common/status.h"
+#include "core/geometry/pose.h"
+#include "core/world/names.h"
+
+namespace strata {
+
+std::string ScanId::ToString() const { return absl::StrCat(trajectory, "/", sequence); }
+
+absl::Status ParseScanId(absl::string_view text, ScanId& id) {
+  const std::size_t slash = text.rfind('/');
+  if (slash == absl::string_view::npos || !absl::SimpleAtoi(text.substr(slash + 1), &id.sequence)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("scan '", text.substr(0, 200), "': write TRAJECTORY/SEQUENCE, as in run1/42"));
+  }
+  id.trajectory = std::string(text.substr(0, slash));
+  return ValidateName("trajectory name", id.trajectory);
+}
+
+absl::Status ValidateScanHeader(const ScanHeader& header) {
+  STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", header.id.trajectory));
+  const std::string what = absl::StrCat("scan ", header.id.ToString());
+  if (header.id.sequence > (std::uint64_t{1} << 62)) {
+    return absl::InvalidArgumentError(absl::StrCat(what, ": sequence is beyond 2^62"));
+  }
+  if (const absl::Status pose = ValidatePose(header.T_map_scan); !pose.ok()) {
+    return Annotate(pose, what);
+  }
+  if (header.sensor.has_value()) {
+    if (const absl::Status sensor = ValidateSensorModel(*header.sensor); !sensor.ok()) {
+      return Annotate(sensor, what);
+    }
+  }
+  if (!(header.sensor_origin.cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <= 1e6F)) {
+    return absl::InvalidArgumentError(absl::StrCat(what, ": sensor_origin is not within ±1e6 m"));
+  }
+  if (header.time < absl::UnixEpoch() || header.time > absl::FromUnixSeconds(253402300799)) {
+    return absl::InvalidArgumentError(absl::StrCat(what, ": time is not within 1970 to 9999"));
+  }
+  const std::uint64_t grid = std::uint64_t{header.rows} * header.columns;
+  if ((header.rows != 0 || header.columns != 0) && grid != header.point_count) {
+    return absl::InvalidArgumentError(absl::StrCat(what,
+                                                   ": a grid of ",
+                                                   header.rows,
+                                                   " × ",
+                                                   header.columns,
+                                                   " does not hold ",
+                                                   header.point_count,
+                                                   " points"));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace strata

@@ -1,0 +1,73 @@
+# How every folder of Strata becomes one target. Sources are listed by hand; dependencies are direct ones only.
+
+add_library(strata_build_options INTERFACE)
+target_compile_features(strata_build_options INTERFACE cxx_std_20)
+target_compile_options(
+  strata_build_options
+  INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+            $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety> $<$<BOOL:${STRATA_WARNINGS_AS_ERRORS}>:-Werror>
+)
+if(STRATA_SANITIZER)
+  target_compile_options(strata_build_options INTERFACE -fsanitize=${STRATA_SANITIZER} -fno-omit-frame-pointer)
+  target_link_options(strata_build_options INTERFACE -fsanitize=${STRATA_SANITIZER})
+  if(STRATA_SANITIZER MATCHES "undefined")
+    target_compile_options(strata_build_options INTERFACE -fno-sanitize-recover=undefined)
+  endif()
+endif()
+
+# strata_library(NAME [NO_INSTALL] SOURCES... HEADERS... DEPS... [PRIVATE_DEPS...])
+#
+# Makes the static library strata_NAME with the alias strata::NAME. HEADERS are public, are installed, and are
+# proved self-contained by the target all_verify_interface_header_sets. Includes start at the repository root.
+function(strata_library name)
+  cmake_parse_arguments(ARG "NO_INSTALL" "" "SOURCES;HEADERS;DEPS;PRIVATE_DEPS" ${ARGN})
+  set(target strata_${name})
+  if(ARG_SOURCES)
+    add_library(${target} STATIC ${ARG_SOURCES})
+    set(scope PUBLIC)
+    target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:strata_build_options> ${ARG_PRIVATE_DEPS})
+  else()
+    add_library(${target} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(strata::${name} ALIAS ${target})
+  target_compile_features(${target} ${scope} cxx_std_20)
+  target_link_libraries(${target} ${scope} ${ARG_DEPS})
+  target_sources(${target} ${scope} FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${ARG_HEADERS})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} VERIFY_INTERFACE_HEADER_SETS ON)
+  if(NOT ARG_NO_INSTALL)
+    install(
+      TARGETS ${target}
+      EXPORT strata
+      FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/strata
+    )
+  endif()
+endfunction()
+
+# strata_executable(NAME OUTPUT SOURCES... DEPS...)
+function(strata_executable name output)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  set_target_properties(${name} PROPERTIES OUTPUT_NAME ${output})
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${name} PRIVATE strata_build_options ${ARG_DEPS})
+endfunction()
+
+# strata_test(NAME SOURCES... DEPS... [LABELS...] [TIMEOUT seconds])
+#
+# A GoogleTest program; every TEST becomes a ctest test with the labels (default: unit).
+function(strata_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
+  if(NOT ARG_LABELS)
+    set(ARG_LABELS unit)
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  strata_executable(${name} ${name} SOURCES ${ARG_SOURCES} DEPS ${ARG_DEPS} GTest::gmock_main)
+  gtest_discover_tests(
+    ${name}
+    DISCOVERY_TIMEOUT 60
+    PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT}
+  )
+endfunction()
