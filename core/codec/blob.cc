@@ -63,11 +63,10 @@ absl::StatusOr<absl::string_view> OpenBlob(BlobKind kind,
   const auto oldest_reader = reader.Fixed<std::uint16_t>();
   const auto body_size = reader.Fixed<std::uint32_t>();
   if (body_size != bytes.size() - kBlobOverheadBytes) {
-    return Damaged(kind,
-                   absl::StrCat("announces ",
-                                body_size,
-                                " bytes of content, has ",
-                                bytes.size() - kBlobOverheadBytes));
+    return Damaged(
+        kind,
+        absl::StrCat(
+            "announces ", body_size, " bytes of content, has ", bytes.size() - kBlobOverheadBytes));
   }
   const absl::string_view body = reader.Take(body_size);
   if (reader.Fixed<std::uint64_t>() != Checksum64(bytes.substr(0, kHeaderBytes + body_size))) {

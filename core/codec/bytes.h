@@ -1,4 +1,5 @@
-// Little-endian numbers in byte strings, whatever the machine; the reader treats its input as hostile.
+// Little-endian numbers in byte strings, whatever the machine; the reader treats its input as
+// hostile.
 #ifndef STRATA_CORE_CODEC_BYTES_H_
 #define STRATA_CORE_CODEC_BYTES_H_
 
@@ -44,7 +45,8 @@ constexpr std::int64_t WrappingSubtract(std::int64_t a, std::int64_t b) {
 }
 
 // Reads what the functions above wrote. Beyond the end it returns zeros and ok() turns false for
-// good, so that a caller may check once after several reads. Keeps a view: the bytes must outlive it.
+// good, so that a caller may check once after several reads. Keeps a view: the bytes must outlive
+// it.
 class ByteReader {
  public:
   explicit ByteReader(absl::string_view bytes) : bytes_(bytes) {}

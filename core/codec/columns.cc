@@ -60,8 +60,8 @@ void PutColumn(std::string& out, absl::string_view bytes) {
     return;
   }
   std::string packed(ZSTD_compressBound(bytes.size()), '\0');
-  const std::size_t size = ZSTD_compress2(
-      Compressor(), packed.data(), packed.size(), bytes.data(), bytes.size());
+  const std::size_t size =
+      ZSTD_compress2(Compressor(), packed.data(), packed.size(), bytes.data(), bytes.size());
   if (ZSTD_isError(size) != 0 || size + 2 >= bytes.size()) {
     PutPacked(out, Packing::kStored, bytes.size(), bytes);
   } else {

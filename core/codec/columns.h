@@ -2,9 +2,9 @@
 //
 // A number becomes a one-byte token and, when large, raw bits. Tokens of one column go to one zstd
 // frame (entropy coding pays there); the raw bits of all columns share one bit string (they are
-// noise, and compressing noise only costs time). Encoder and decoder have the same calls: each takes
-// the value to write and hands back the value written or read, so that one templated walk over a
-// tile does both.
+// noise, and compressing noise only costs time). Encoder and decoder have the same calls: each
+// takes the value to write and hands back the value written or read, so that one templated walk
+// over a tile does both.
 #ifndef STRATA_CORE_CODEC_COLUMNS_H_
 #define STRATA_CORE_CODEC_COLUMNS_H_
 
@@ -25,7 +25,8 @@ namespace strata {
 // Appends `bytes` compressed at zstd level 3, or stored, or as one repeated byte, whichever is
 // smallest.
 void PutColumn(std::string& out, absl::string_view bytes);
-// Reads what PutColumn wrote; `max_size` bounds what a hostile input may make it allocate. DATA_LOSS.
+// Reads what PutColumn wrote; `max_size` bounds what a hostile input may make it allocate.
+// DATA_LOSS.
 absl::Status TakeColumn(ByteReader& reader, std::size_t max_size, std::string& bytes);
 
 // Token of a number: 0–127 stand for themselves; above, exponent and next bit are in the token and

@@ -50,9 +50,7 @@ std::int64_t LengthCode(float metres) {
   return std::lround(metres * kStepsPerMetre);
 }
 
-std::int64_t ByteCode(float value) {
-  return std::lround(std::clamp(value, 0.0F, 255.0F));
-}
+std::int64_t ByteCode(float value) { return std::lround(std::clamp(value, 0.0F, 255.0F)); }
 
 std::int64_t SigmaCodeOf(float sigma_m) {
   if (!(sigma_m > 0.0F)) return 0;
@@ -93,15 +91,15 @@ Surface Restored(const Codes& codes) {
 // Columns. Heights and the like go to one of several columns by what is known of their
 // surroundings, because a zstd frame has one table of frequencies.
 enum Column : std::uint8_t {
-  kKind,         // traversability and vertical: context-free, spatially coherent
+  kKind,  // traversability and vertical: context-free, spatially coherent
   kClass,
-  kHeight,       // + HeightContext
+  kHeight,  // + HeightContext
   kHeightLast = kHeight + 3,
-  kDepth,        // + 1 where the prediction comes from a vertical neighbour
+  kDepth,  // + 1 where the prediction comes from a vertical neighbour
   kDepthLast = kDepth + 1,
-  kSigma,        // + vertical
+  kSigma,  // + vertical
   kSigmaLast = kSigma + 1,
-  kCost,         // + traversability
+  kCost,  // + traversability
   kCostLast = kCost + 3,
   kColumnCount
 };
@@ -162,7 +160,8 @@ Codes CodeSurface(Coder& coder,
   if (vertical) {
     // Undersides continue better than lengths.
     const std::int64_t expected =
-        known ? WrappingAdd(codes.height, around.Mean(&Codes::depth) - around.Mean(&Codes::height)) : 0;
+        known ? WrappingAdd(codes.height, around.Mean(&Codes::depth) - around.Mean(&Codes::height))
+              : 0;
     codes.depth = coder.CodeRelative(kDepth + known, codes.depth, expected);
   }
   codes.sigma = coder.CodeRelative(kSigma + vertical, codes.sigma, around.Mean(&Codes::sigma));
@@ -192,7 +191,8 @@ std::string EncodeSurfaceTile(const SurfaceTile& tile) {
     CodeSurface(encoder, neighbours[i], surfaces, surfaces[i]);
   }
   std::string body;
-  PutTileHeader(body, tile.key, tile.version);
+  PutTileHeader(body, tile.key);
+  PutFixed(body, tile.version);
   PutCells(body, cells);
   encoder.Finish(body);
   return SealBlob(BlobKind::kSurfaceTile, kSurfaceTileVersion, body);
@@ -203,7 +203,8 @@ absl::StatusOr<SurfaceTile> DecodeSurfaceTile(absl::string_view bytes) {
                           OpenBlob(BlobKind::kSurfaceTile, kSurfaceTileVersion, bytes));
   ByteReader reader(body);
   SurfaceTile tile;
-  STRATA_RETURN_IF_ERROR(TakeTileHeader(reader, tile.key, tile.version));
+  STRATA_RETURN_IF_ERROR(TakeTileHeader(reader, tile.key));
+  tile.version = reader.Fixed<std::uint64_t>();
   STRATA_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> cells, TakeCells(reader));
   STRATA_ASSIGN_OR_RETURN(ColumnDecoder decoder,
                           ColumnDecoder::Open(reader, kColumnCount, cells.size()));

@@ -1,4 +1,4 @@
-// What both kinds of tile begin with: their address and the version of their content.
+// What both kinds of tile begin with: their address.
 #ifndef STRATA_CORE_CODEC_TILE_HEADER_H_
 #define STRATA_CORE_CODEC_TILE_HEADER_H_
 
@@ -13,18 +13,16 @@
 
 namespace strata {
 
-inline void PutTileHeader(std::string& out, const TileKey& key, std::uint64_t version) {
+inline void PutTileHeader(std::string& out, const TileKey& key) {
   PutFixed(out, static_cast<std::uint8_t>(key.level));
   PutFixed(out, key.x);
   PutFixed(out, key.y);
-  PutFixed(out, version);
 }
 
-inline absl::Status TakeTileHeader(ByteReader& reader, TileKey& key, std::uint64_t& version) {
+inline absl::Status TakeTileHeader(ByteReader& reader, TileKey& key) {
   key.level = reader.Fixed<std::uint8_t>();
   key.x = reader.Fixed<std::int32_t>();
   key.y = reader.Fixed<std::int32_t>();
-  version = reader.Fixed<std::uint64_t>();
   if (reader.ok() && key.level <= kMaxLevel) return absl::OkStatus();
   return absl::DataLossError(absl::StrCat("tile: level ", key.level, " or header cut short"));
 }
