@@ -57,7 +57,9 @@ std::optional<LocalPlane> LocalPlaneFit::Solve() const {
   const Eigen::Vector2d g((xz * yy - yz * xy) / det, (yz * xx - xz * xy) / det);  // a cell
   const double squared = g.squaredNorm();
   const double bend = g.x() * g.x() * yy - 2.0 * g.x() * g.y() * xy + g.y() * g.y() * xx;
-  const double gradient_variance = squared > 0.0 ? bend / (det * squared) : (xx + yy) / det;
+  // The inverse of the moments, times the part of the weights' variance that is σ.
+  const double gradient_variance =
+      (squared > 0.0 ? bend / (det * squared) : (xx + yy) / det) * wv_ / count_;
   const double sum = std::max(0.0, zz - g.x() * xz - g.y() * yz);
 
   LocalPlane plane;

@@ -30,7 +30,7 @@ HeightSample SampleOf(const Surface& surface, double cell_size_m);
 struct LocalPlane {
   double height_m = 0.0;  // at (0, 0)
   Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
-  double gradient_sigma = 0.0;  // σ of the gradient in its own direction
+  double gradient_sigma = 0.0;  // σ of the gradient in its own direction, by the σ of the heights
   double residual_m = 0.0;      // root of the weighted mean squared residual, n/(n − 3)-corrected
   double noise_m = 0.0;  // the residual that the σ of the heights explain, together with the
                          // unknown place of a measurement in its cell: cell·|gradient|/√12
