@@ -49,6 +49,8 @@ class StorageReader {
                                                                    std::uint64_t epoch) = 0;
   virtual absl::StatusOr<UploadState> GetUploadState(absl::string_view trajectory) = 0;
   virtual absl::StatusOr<ScanTotals> GetScanTotals() = 0;
+  // Largest upload number in use, of scans and of chunks without one.
+  virtual absl::StatusOr<std::uint64_t> LastUpload() = 0;
   virtual absl::StatusOr<std::string> GetChunk(std::uint64_t upload, std::uint32_t ordinal) = 0;
   // Of a scan whose points were dropped.
   virtual absl::StatusOr<std::string> GetLocalMap(ScanNumber number) = 0;
