@@ -41,7 +41,8 @@ TEST(SceneTest, OrientedBoxIsHitWhereItsTurnedFaceIs) {
 TEST(SceneTest, RampRisesLinearlyEitherWay) {
   const Scene up = Of(RampX(0, 10, -1, 1, 0.0, 2.0));
   const Scene down = Of(RampX(10, 0, -1, 1, 0.0, 2.0));
-  for (double x = 0.5; x < 10; x += 0.5) {
+  for (int half = 1; half < 20; ++half) {
+    const double x = 0.5 * half;
     EXPECT_NEAR(up.GroundBelow(x, 0, 5).value(), 0.2 * x, 1e-12);
     EXPECT_NEAR(down.GroundBelow(x, 0, 5).value(), 2.0 - 0.2 * x, 1e-12);
   }

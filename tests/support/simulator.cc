@@ -109,8 +109,9 @@ std::vector<Pose> Drive(const Scene& scene,
     heading /= length;
     // Follows the surface in small steps, so that the level is never lost on a slope.
     constexpr double kFollow = 0.1;
-    for (double way = 0.0; way < length; way += kFollow) {
-      Vector3d place = waypoints[i] + way * heading;
+    const int steps = static_cast<int>(std::ceil(length / kFollow - 1e-9));
+    for (int step = 0; step < steps; ++step) {
+      Vector3d place = waypoints[i] + step * kFollow * heading;
       z = GroundAt(scene, place.x(), place.y(), z);
       place.z() = z;
       if (poses.empty() || carry >= step_m - 1e-9) {
