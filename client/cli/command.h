@@ -6,8 +6,8 @@
 #include <functional>
 #include <string>
 
-#include <CLI/CLI.hpp>
 #include "absl/status/status.h"
+#include <CLI/CLI.hpp>
 
 #include "client/cli/output.h"
 #include "core/api/call.h"

@@ -12,9 +12,7 @@ namespace {
 // A float without the digits that only its conversion to double adds.
 double Short(float value) { return std::round(static_cast<double>(value) * 1e6) / 1e6; }
 
-double Seconds(absl::Time time) {
-  return static_cast<double>(absl::ToUnixMicros(time)) * 1e-6;
-}
+double Seconds(absl::Time time) { return static_cast<double>(absl::ToUnixMicros(time)) * 1e-6; }
 
 Json Alignment(const AlignmentReport& report) {
   return {{"aligned", report.aligned},
@@ -30,31 +28,42 @@ std::string TimeText(absl::Time time) {
   return absl::FormatTime("%Y-%m-%dT%H:%M:%E6SZ", time, absl::UTCTimeZone());
 }
 
-absl::string_view ToString(ScanState state) {
+std::string ToString(ScanState state) {
   switch (state) {
-    case ScanState::kPending: return "pending";
-    case ScanState::kIntegrated: return "integrated";
-    case ScanState::kFailed: return "failed";
+    case ScanState::kPending:
+      return "pending";
+    case ScanState::kIntegrated:
+      return "integrated";
+    case ScanState::kFailed:
+      return "failed";
   }
   return "unknown";
 }
 
-absl::string_view ToString(JobState state) {
+std::string ToString(JobState state) {
   switch (state) {
-    case JobState::kQueued: return "queued";
-    case JobState::kRunning: return "running";
-    case JobState::kSucceeded: return "succeeded";
-    case JobState::kFailed: return "failed";
-    case JobState::kCancelled: return "cancelled";
+    case JobState::kQueued:
+      return "queued";
+    case JobState::kRunning:
+      return "running";
+    case JobState::kSucceeded:
+      return "succeeded";
+    case JobState::kFailed:
+      return "failed";
+    case JobState::kCancelled:
+      return "cancelled";
   }
   return "unknown";
 }
 
-absl::string_view ToString(Traversability traversability) {
+std::string ToString(Traversability traversability) {
   switch (traversability) {
-    case Traversability::kUnknown: return "unknown";
-    case Traversability::kTraversable: return "traversable";
-    case Traversability::kNonTraversable: return "non_traversable";
+    case Traversability::kUnknown:
+      return "unknown";
+    case Traversability::kTraversable:
+      return "traversable";
+    case Traversability::kNonTraversable:
+      return "non_traversable";
   }
   return "unknown";
 }
@@ -173,12 +182,13 @@ Json ToJson(const PlanResult& plan) {
   for (const Eigen::Vector3d& waypoint : plan.waypoints) waypoints.push_back(ToJson(waypoint));
   Json gaps = Json::array();
   for (const PlanGap& gap : plan.gaps) {
-    gaps.push_back({{"from", ToJson(gap.from)}, {"to", ToJson(gap.to)}, {"length_m", gap.length_m}});
+    gaps.push_back(
+        {{"from", ToJson(gap.from)}, {"to", ToJson(gap.to)}, {"length_m", gap.length_m}});
   }
   Json tiles = Json::array();
   for (const TileKey& tile : plan.tiles) tiles.push_back(tile.ToString());
   Json json = {{"found", plan.found()},
-               {"reason", strata::ToString(plan.reason)},
+               {"reason", std::string(strata::ToString(plan.reason))},
                {"message", plan.message},
                {"length_m", plan.length_m},
                {"cost", plan.cost},
@@ -189,7 +199,7 @@ Json ToJson(const PlanResult& plan) {
                {"gaps", gaps},
                {"tiles", tiles}};
   if (plan.obstruction != Obstruction::kNone) {
-    json["obstruction"] = strata::ToString(plan.obstruction);
+    json["obstruction"] = std::string(strata::ToString(plan.obstruction));
     json["obstruction_value"] = plan.obstruction_value;
   }
   if (plan.where.has_value()) json["where"] = ToJson(*plan.where);

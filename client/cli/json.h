@@ -17,8 +17,8 @@
 
 namespace strata::cli {
 
-Json ToJson(const Eigen::Vector3d& point);    // [x, y, z]
-Json ToJson(const Pose& pose);                // [x, y, z, qx, qy, qz, qw]
+Json ToJson(const Eigen::Vector3d& point);  // [x, y, z]
+Json ToJson(const Pose& pose);              // [x, y, z, qx, qy, qz, qw]
 Json ToJson(const RobotProfile& profile);
 Json ToJson(const MapInfo& info);
 Json ToJson(const MapInfo& info, const MapStats& stats);
@@ -33,9 +33,9 @@ Json ToJson(const api::TileInfo& tile);
 // UTC, RFC 3339 with microseconds.
 std::string TimeText(absl::Time time);
 
-absl::string_view ToString(ScanState state);
-absl::string_view ToString(JobState state);
-absl::string_view ToString(Traversability traversability);
+std::string ToString(ScanState state);
+std::string ToString(JobState state);
+std::string ToString(Traversability traversability);
 
 }  // namespace strata::cli
 
