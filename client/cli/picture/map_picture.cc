@@ -142,7 +142,7 @@ class BlockPainter {
  private:
   double Light(double z) const {
     const double share = (z - heights_.first) / std::max(heights_.second - heights_.first, 0.5);
-    return 0.74 + 0.42 * std::clamp(share, 0.0, 1.0);
+    return 0.86 + 0.3 * std::clamp(share, 0.0, 1.0);
   }
 
   // Tall sides get lighter with height in pieces of a metre.
@@ -225,7 +225,7 @@ Picture DrawMap(const std::vector<SurfaceTile>& tiles,
   for (const Block& block : blocks) {
     painter.Paint(block);
   }
-  raster.ShadeByDepth(1.6);
+  raster.ShadeByDepth(2.2);
   for (std::size_t i = 0; i < paths.size(); ++i) {
     raster.DrawLine(paths[i],
                     kPathWidthPixels,

@@ -103,9 +103,9 @@ void Raster::FillTriangle(const Vector3d& a, const Vector3d& b, const Vector3d& 
 
 void Raster::ShadeByDepth(double strength) {
   constexpr int kReach = kOversampling;
-  constexpr std::array<std::pair<int, int>, 8> kAround = {
-      {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
-  // A neighbour that stands this far in front gives full shade.
+  // Opposite neighbours together, so that a plane has no shade however it is tilted.
+  constexpr std::array<std::pair<int, int>, 4> kDirections = {{{1, 0}, {1, 1}, {0, 1}, {-1, 1}}};
+  // A pair that stands this far in front gives full shade.
   const double full_m = std::max(0.4, 6.0 * camera_.metres_per_pixel);
   std::vector<Colour> shaded = image_.pixels;
   for (int y = 0; y < image_.height; ++y) {
@@ -114,13 +114,16 @@ void Raster::ShadeByDepth(double strength) {
       if (depth == kFar) {
         continue;
       }
+      const auto in_front = [&](int dx, int dy) {
+        const float other = depth_[Index(std::clamp(x + dx * kReach, 0, image_.width - 1),
+                                         std::clamp(y + dy * kReach, 0, image_.height - 1))];
+        return std::clamp<double>(depth - other, -full_m, full_m);
+      };
       double shade = 0.0;
-      for (const auto& [dx, dy] : kAround) {
-        const int nx = std::clamp(x + dx * kReach, 0, image_.width - 1);
-        const int ny = std::clamp(y + dy * kReach, 0, image_.height - 1);
-        const double front = depth - depth_[Index(nx, ny)];
-        shade += std::clamp(front / full_m, 0.0, 1.0) / kAround.size();
+      for (const auto& [dx, dy] : kDirections) {
+        shade += std::max(0.0, in_front(dx, dy) + in_front(-dx, -dy)) / full_m;
       }
+      shade /= kDirections.size();
       shaded[Index(x, y)] = Scaled(image_.At(x, y), std::exp(-strength * shade));
     }
   }
