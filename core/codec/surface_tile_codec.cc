@@ -105,7 +105,9 @@ Surface Restored(const Codes& codes) {
 // Columns. Heights and the like go to one of several columns by what is known of their
 // surroundings, because a zstd frame has one table of frequencies.
 enum Column : std::uint8_t {
-  kKind,  // traversability and vertical: context-free, spatially coherent
+  kSameKind,  // bits, + KindContext
+  kSameKindLast = kSameKind + 3,
+  kKind,  // where not the same
   kClass,
   kHeight,  // + HeightContext
   kHeightLast = kHeight + 3,
@@ -137,7 +139,7 @@ std::int32_t MeanOf(std::int32_t sum, int count) {
 // vertical or not as it is; without any, the first one around; without that, zeros.
 struct Surroundings {
   int alike = 0;  // how many
-  std::int32_t height = 0, depth = 0, sigma = 0, cost = 0;
+  std::int32_t height = 0, depth = 0, sigma = 0;
 
   Surroundings(std::span<const Codes> surfaces, const Neighbours& n, bool vertical) {
     for (const std::uint32_t index : {n.left, n.up, n.up_right, n.up_left}) {
@@ -151,7 +153,6 @@ struct Surroundings {
     height = MeanOf(height, alike);
     depth = MeanOf(depth, alike);
     sigma = MeanOf(sigma, alike);
-    cost = MeanOf(cost, alike);
   }
 
  private:
@@ -159,7 +160,6 @@ struct Surroundings {
     height += codes.height;
     depth += codes.depth;
     sigma += codes.sigma;
-    cost += codes.cost;
   }
 };
 
@@ -188,13 +188,46 @@ std::uint8_t KindOf(const Codes& codes) {
   return static_cast<std::uint8_t>(codes.traversability << 1 | (codes.depth > 0 ? 1 : 0));
 }
 
+// The mean cost of the surfaces around that are as traversable; 0 without any.
+std::int32_t ExpectedCost(std::span<const Codes> surfaces,
+                          const Neighbours& n,
+                          std::uint8_t traversability) {
+  std::int32_t sum = 0;
+  int count = 0;
+  for (const std::uint32_t index : {n.left, n.up, n.up_right, n.up_left}) {
+    if (index == Neighbours::kNone || surfaces[index].traversability != traversability) continue;
+    sum += surfaces[index].cost;
+    ++count;
+  }
+  return MeanOf(sum, count);
+}
+
+// The kind of the surface to the left or else above, and how many of those around share it.
+struct ExpectedKind {
+  std::uint8_t kind = 0;
+  int others = 0;
+
+  ExpectedKind(std::span<const Codes> surfaces, const Neighbours& n) {
+    const std::uint32_t first = n.left != Neighbours::kNone ? n.left : n.up;
+    if (first == Neighbours::kNone) return;
+    kind = KindOf(surfaces[first]);
+    for (const std::uint32_t index : {n.up, n.up_left, n.up_right}) {
+      if (index != Neighbours::kNone && KindOf(surfaces[index]) == kind) ++others;
+    }
+  }
+};
+
 // One surface, in either direction; false if what was read is none. `codes.cell` is known.
 template <typename Coder>
 bool CodeSurface(Coder& coder,
                  const Neighbours& neighbours,
                  std::span<const Codes> surfaces,
                  Codes& codes) {
-  const std::uint8_t kind = coder.CodeByte(kKind, KindOf(codes));
+  const ExpectedKind expected_kind(surfaces, neighbours);
+  std::uint8_t kind = expected_kind.kind;
+  if (!coder.CodeBit(kSameKind + expected_kind.others, KindOf(codes) == kind)) {
+    kind = coder.CodeByte(kKind, KindOf(codes));
+  }
   codes.traversability = kind >> 1;
   if (codes.traversability > kMaxTraversability) return false;
   codes.class_id = coder.CodeByte(kClass, codes.class_id);
@@ -215,7 +248,12 @@ bool CodeSurface(Coder& coder,
     if (!CodeWithin(coder, kDepth + known, expected, 1, kMaxHeightCode, codes.depth)) return false;
   }
   return CodeWithin(coder, kSigma + vertical, around.sigma, 0, 255, codes.sigma) &&
-         CodeWithin(coder, kCost + codes.traversability, around.cost, 0, kInfiniteCost, codes.cost);
+         CodeWithin(coder,
+                    kCost + codes.traversability,
+                    ExpectedCost(surfaces, neighbours, codes.traversability),
+                    0,
+                    kInfiniteCost,
+                    codes.cost);
 }
 
 }  // namespace
