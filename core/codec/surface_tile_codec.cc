@@ -116,7 +116,7 @@ enum Column : std::uint8_t {
   kSigma,  // + vertical
   kSigmaLast = kSigma + 1,
   kCost,  // + traversability
-  kCostLast = kCost + 3,
+  kCostLast = kCost + 2,
   kColumnCount
 };
 
