@@ -46,7 +46,7 @@ struct MlsRegistrationOptions {
   double normal_sigma_m = 0.03;
   double tangent_sigma_m = 0.5;
   // Cauchy kernel on residuals in units of their σ: larger ones count less; in (0, 1e6].
-  double robust_width = 1.5;
+  double robust_width = 3.0;
   double min_overlap = 0.3;  // smaller: kTooLittleOverlap; in [0, 1]
   int min_inliers = 30;      // fewer: kTooLittleOverlap; in [6, 1000000]
   // Farther from the guess: kDiverged.
