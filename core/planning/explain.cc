@@ -50,7 +50,7 @@ class TileReasons {
   Explanation WhyNotStand(std::uint32_t i) const {
     const WindowSurface& surface = window_.surface(i);
     const auto cell = static_cast<int>(surface.cell);
-    const GroundEdge* edge = ground_.NearestEdge(cell, surface.z_m, checks_.footprint_m);
+    const GroundEdge* edge = ground_.BlockingEdge(cell, surface.z_m);
     if (edge != nullptr) return OfEdge(*edge, surface.z_m);
     const GroundFit fit = FitGround(window_, i);
     if (fit.certain_slope_tan > checks_.slope_tan) {
@@ -76,7 +76,7 @@ class TileReasons {
     if (reason.kind != Obstruction::kNone) return reason;
     for (int n = 1; n < cells; ++n) {
       const int cell = static_cast<int>(surface.cell) + n * window_.Step(direction);
-      const GroundEdge* edge = ground_.NearestEdge(cell, surface.z_m, checks_.footprint_m);
+      const GroundEdge* edge = ground_.BlockingEdge(cell, surface.z_m);
       if (edge != nullptr) return OfEdge(*edge, surface.z_m);
     }
     return reason;

@@ -223,18 +223,20 @@ void GroundChecks::MarkNearCells() {
   }
 }
 
-const GroundEdge* GroundChecks::NearestEdge(int cell, float z, float within_m) const {
-  if (near_edge_[cell] == 0) return nullptr;
+const GroundEdge* GroundChecks::BlockingEdge(int cell, float z) const {
+  const GroundEdge* other_level = nullptr;
   for (std::size_t k = 0; k < disc_step_.size(); ++k) {
     const DiscCell& d = checks_.disc[k];
-    if (d.distance_m >= within_m) return nullptr;
+    if (d.distance_m >= checks_.footprint_m) break;
     const int at = cell + disc_step_[k];
     for (std::uint32_t e = edge_first_[at]; e < edge_first_[at + 1]; ++e) {
       const GroundEdge& edge = edges_[e];
-      if (edge.z_low_m - z <= d.level_m && z - edge.z_high_m <= d.level_m) return &edge;
+      const float off = std::max(edge.z_low_m - z, z - edge.z_high_m);
+      if (off <= checks_.step_m) return &edge;
+      if (off <= d.level_m && other_level == nullptr) other_level = &edge;
     }
   }
-  return nullptr;
+  return other_level;
 }
 
 float GroundChecks::EdgeDistance(int cell, float z) const {

@@ -56,8 +56,9 @@ class GroundChecks {
 
   // Distance [m] from the centre of `cell` to the nearest edge of level z, at most reach_m.
   float EdgeDistance(int cell, float z) const;
-  // That edge.
-  const GroundEdge* NearestEdge(int cell, float z, float within_m) const;
+  // The edge that keeps the footprint from being there: the nearest that is seen from within a step
+  // of z, otherwise the nearest; nullptr if none.
+  const GroundEdge* BlockingEdge(int cell, float z) const;
   // True if the disc is clear of edges all along a move over a gap.
   bool GapIsClear(std::uint32_t from, std::uint32_t to, int direction, int cells) const;
 

@@ -21,8 +21,8 @@ namespace strata {
 struct PlanEndpoint {
   double x_m = 0.0;
   double y_m = 0.0;
-  std::optional<double> z_m;
-  std::optional<int> level;
+  std::optional<double> z_m = std::nullopt;
+  std::optional<int> level = std::nullopt;
 };
 
 struct PlanQuery {
