@@ -225,15 +225,17 @@ void GroundChecks::MarkNearCells() {
 
 const GroundEdge* GroundChecks::BlockingEdge(int cell, float z) const {
   const GroundEdge* other_level = nullptr;
+  const float behind = checks_.footprint_m + 1.5F * static_cast<float>(checks_.cell_size_m);
   for (std::size_t k = 0; k < disc_step_.size(); ++k) {
     const DiscCell& d = checks_.disc[k];
-    if (d.distance_m >= checks_.footprint_m) break;
+    const bool within = d.distance_m < checks_.footprint_m;
+    if (!within && (other_level == nullptr || d.distance_m >= behind)) break;
     const int at = cell + disc_step_[k];
     for (std::uint32_t e = edge_first_[at]; e < edge_first_[at + 1]; ++e) {
       const GroundEdge& edge = edges_[e];
       const float off = std::max(edge.z_low_m - z, z - edge.z_high_m);
       if (off <= checks_.step_m) return &edge;
-      if (off <= d.level_m && other_level == nullptr) other_level = &edge;
+      if (within && off <= d.level_m && other_level == nullptr) other_level = &edge;
     }
   }
   return other_level;

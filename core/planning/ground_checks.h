@@ -56,8 +56,9 @@ class GroundChecks {
 
   // Distance [m] from the centre of `cell` to the nearest edge of level z, at most reach_m.
   float EdgeDistance(int cell, float z) const;
-  // The edge that keeps the footprint from being there: the nearest that is seen from within a step
-  // of z, otherwise the nearest; nullptr if none.
+  // The edge that keeps the footprint from being there; nullptr if none. Of a step just over the
+  // limit the lower side feels the drop that the upper side sees; the step right behind it is
+  // named.
   const GroundEdge* BlockingEdge(int cell, float z) const;
   // True if the disc is clear of edges all along a move over a gap.
   bool GapIsClear(std::uint32_t from, std::uint32_t to, int direction, int cells) const;
