@@ -19,16 +19,18 @@ class BucketQueue {
   void Clear() {
     for (std::vector<std::uint32_t>& bucket : ring_) bucket.clear();
     size_ = 0;
-    current_ = 0;
+    begun_ = false;
   }
   bool empty() const { return size_ == 0; }
   // No queued priority is lower.
   std::uint32_t lower_bound() const { return current_ << shift_; }
 
+  // A priority below lower_bound() counts as lower_bound(). The first one after Clear() sets it.
   void Push(std::uint32_t priority, std::uint32_t value) {
     std::uint32_t bucket = priority >> shift_;
-    if (size_ == 0) current_ = bucket;
-    if (bucket < current_) bucket = current_;  // an inconsistency of rounding: expand at once
+    if (!begun_) current_ = bucket;
+    begun_ = true;
+    if (bucket < current_) bucket = current_;
     if (bucket - current_ >= ring_.size()) Grow(bucket);
     ring_[bucket & (ring_.size() - 1)].push_back(value);
     ++size_;
@@ -56,6 +58,7 @@ class BucketQueue {
   }
 
   int shift_;
+  bool begun_ = false;
   std::uint32_t current_ = 0;
   std::size_t size_ = 0;
   std::vector<std::vector<std::uint32_t>> ring_;

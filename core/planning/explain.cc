@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <tuple>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -128,16 +129,19 @@ PatchId NearestFrontier(const SearchSpace& space,
                         const SearchWorkspace& workspace,
                         const Eigen::Vector3d& goal) {
   PatchId best = kNoPatchId;
-  double best_distance = std::numeric_limits<double>::infinity();
+  // Ties go by place, not by the order in which tiles were touched.
+  std::tuple<double, double, double, double> best_rank(
+      std::numeric_limits<double>::infinity(), 0, 0, 0);
   for (std::size_t slot = 0; slot < space.slots().size(); ++slot) {
     const SearchNode* nodes = workspace.NodesIfAny(static_cast<int>(slot));
     if (nodes == nullptr) continue;
     const SearchSpace::Slot& s = space.slots()[slot];
     for (std::uint32_t i = 0; i < s.tile->size(); ++i) {
       if (!workspace.Reached(nodes[i])) continue;
-      const double distance = (space.Position(s.base + i) - goal).squaredNorm();
-      if (distance >= best_distance || !HasRefusedMove(*s.tile, i)) continue;
-      best_distance = distance;
+      const Eigen::Vector3d p = space.Position(s.base + i);
+      const std::tuple rank((p - goal).squaredNorm(), p.x(), p.y(), p.z());
+      if (rank >= best_rank || !HasRefusedMove(*s.tile, i)) continue;
+      best_rank = rank;
       best = s.base + i;
     }
   }
