@@ -53,8 +53,9 @@ class LocalPlaneFit {
  public:
   explicit LocalPlaneFit(double cell_size_m) : cell_size_m_(cell_size_m) {}
 
-  // `dz_m` is the height of the sample above a reference of the caller's choice, the same for all.
-  void Add(int dx, int dy, double dz_m, const HeightSample& sample) {
+  // `dx`, `dy` in cells; `dz_m` is the height of the sample above a reference of the caller's
+  // choice, the same for all.
+  void Add(double dx, double dy, double dz_m, const HeightSample& sample) {
     const double w = sample.weight;
     const double wx = w * dx;
     const double wy = w * dy;

@@ -43,10 +43,10 @@ class PaddedTile {
     while (next_cell < begin_.size()) begin_[next_cell++] = size();
   }
 
-  // The samples of a cell; x, y in [−kMargin, kTileCells + kMargin).
-  std::span<const HeightSample> Cell(int x, int y) const {
-    const int cell = (y + kMargin) * kPaddedCells + x + kMargin;
-    return {samples_.data() + begin_[cell], begin_[cell + 1] - begin_[cell]};
+  // Index of cell (x, y) of the tile; x, y in [−kMargin, kTileCells + kMargin).
+  static int IndexOf(int x, int y) { return (y + kMargin) * kPaddedCells + x + kMargin; }
+  std::span<const HeightSample> Cell(int index) const {
+    return {samples_.data() + begin_[index], begin_[index + 1] - begin_[index]};
   }
 
  private:
@@ -58,7 +58,7 @@ class PaddedTile {
     for (std::uint32_t i = source.row_begin[row]; i < source.row_begin[row + 1]; ++i) {
       const int x = (source.surfaces[i].cell & (kTileCells - 1)) + dx * kTileCells;
       if (x < -kMargin || x >= kTileCells + kMargin) continue;
-      const std::size_t cell = (y + kMargin) * kPaddedCells + x + kMargin;
+      const std::size_t cell = IndexOf(x, y);
       while (next_cell <= cell) begin_[next_cell++] = size();
       samples_.push_back(SampleOf(source.surfaces[i], cell_size_m));
     }
@@ -70,11 +70,12 @@ class PaddedTile {
 
 // A cell of the window around a surface.
 struct Offset {
-  int dx = 0;
-  int dy = 0;
-  double reach_m = 0.0;  // largest height difference that still belongs to the same ground
-  double step_m = 0.0;   // largest one a robot takes at once; for the eight cells around
-  bool adjacent() const { return std::max(std::abs(dx), std::abs(dy)) == 1; }
+  double dx = 0.0;
+  double dy = 0.0;
+  int cells = 0;          // in the padded tile
+  bool adjacent = false;  // one of the eight cells around
+  double reach_m = 0.0;   // largest height difference that still belongs to the same ground
+  double step_m = 0.0;    // largest one a robot takes at once
 };
 
 std::vector<Offset> MakeWindow(double cell_size_m, const TraversabilityLimits& limits) {
@@ -86,8 +87,10 @@ std::vector<Offset> MakeWindow(double cell_size_m, const TraversabilityLimits& l
       const double cells = std::sqrt(squared);
       const double ramp = cells * cell_size_m * std::tan(limits.max_slope_rad);
       const double stairs = std::min(cells * limits.max_step_m, 0.5 * limits.clearance_m);
-      window.push_back({.dx = dx,
-                        .dy = dy,
+      window.push_back({.dx = static_cast<double>(dx),
+                        .dy = static_cast<double>(dy),
+                        .cells = dy * kPaddedCells + dx,
+                        .adjacent = squared <= 2,
                         .reach_m = std::max(stairs, ramp),
                         .step_m = std::max(limits.max_step_m, ramp)});
     }
@@ -107,19 +110,20 @@ const HeightSample& Nearest(std::span<const HeightSample> column, float z_m) {
   return *nearest;
 }
 
-// What the plane and the step rule have to say about one surface.
-struct Support {
+// What the rules say about one surface.
+struct Finding {
   std::optional<LocalPlane> plane;
   double step_m = 0.0;
-  bool step_too_high = false;
+  Traversability traversability = Traversability::kUnknown;
+  double danger = 0.0;
 };
 
-class Assessor {
+class Judge {
  public:
-  Assessor(const SurfaceTile& tile,
-           const SurfaceNeighbourhood& neighbours,
-           double cell_size_m,
-           const TraversabilityLimits& limits)
+  Judge(const SurfaceTile& tile,
+        const SurfaceNeighbourhood& neighbours,
+        double cell_size_m,
+        const TraversabilityLimits& limits)
       : padded_(tile, neighbours, cell_size_m),
         window_(MakeWindow(cell_size_m, limits)),
         cell_size_m_(cell_size_m),
@@ -127,111 +131,100 @@ class Assessor {
         tan_limit_(std::tan(limits.max_slope_rad)) {}
 
   // Surface number `level` of cell (x, y).
-  SurfaceAssessment Assess(int x, int y, std::size_t level) const {
-    const std::span<const HeightSample> column = padded_.Cell(x, y);
+  Finding Examine(int x, int y, std::size_t level) const {
+    const int cell = PaddedTile::IndexOf(x, y);
+    const std::span<const HeightSample> column = padded_.Cell(cell);
     const HeightSample& self = column[level];
-    const Support support = Examine(x, y, self);
-    const double headroom = level + 1 < column.size()
-                                ? double{column[level + 1].bottom_m} - self.z_m
-                                : std::numeric_limits<double>::infinity();
-    SurfaceAssessment result;
-    result.step_m = static_cast<float>(support.step_m);
+    Finding finding;
+    FitAndCheckSteps(cell, self, finding);
+    const bool too_low = level + 1 < column.size() &&
+                         double{column[level + 1].bottom_m} - self.z_m < limits_.clearance_m;
     double slope = limits_.max_slope_rad;
     double roughness = limits_.max_roughness_m;
-    if (support.plane.has_value()) {
-      slope = support.plane->slope_rad();
-      roughness = support.plane->roughness_m();
-      result.normal = support.plane->Normal().cast<float>();
-      result.slope_rad = static_cast<float>(slope);
-      result.roughness_m = static_cast<float>(roughness);
+    if (finding.plane.has_value()) {
+      slope = finding.plane->slope_rad();
+      roughness = finding.plane->roughness_m();
     }
-    result.traversability = Judge(self, support, roughness, headroom);
-    result.danger = static_cast<float>(
-        Danger(slope, roughness, support.step_m, std::sqrt(double{self.variance_m2}), limits_));
-    return result;
+    finding.traversability = Decide(self, finding, roughness, too_low);
+    const double sigma = std::sqrt(double{self.variance_m2});
+    finding.danger = Danger(slope, roughness, finding.step_m, sigma, limits_);
+    return finding;
   }
 
  private:
-  Traversability Judge(const HeightSample& self,
-                       const Support& support,
-                       double roughness_m,
-                       double headroom_m) const {
-    if (support.step_too_high || headroom_m < limits_.clearance_m) {
-      return Traversability::kNonTraversable;
-    }
-    if (!support.plane.has_value()) {
+  Traversability Decide(const HeightSample& self,
+                        const Finding& finding,
+                        double roughness_m,
+                        bool too_low) const {
+    const bool fits = !too_low && std::isfinite(finding.step_m);
+    if (!fits) return Traversability::kNonTraversable;
+    if (!finding.plane.has_value()) {
       const bool vertical = self.bottom_m < self.z_m;
       return vertical ? Traversability::kNonTraversable : Traversability::kUnknown;
     }
-    const bool fits =
-        !support.plane->SteeperThan(tan_limit_) && roughness_m <= limits_.max_roughness_m;
-    return fits ? Traversability::kTraversable : Traversability::kNonTraversable;
+    const bool smooth =
+        !finding.plane->SteeperThan(tan_limit_) && roughness_m <= limits_.max_roughness_m;
+    return smooth ? Traversability::kTraversable : Traversability::kNonTraversable;
   }
 
-  Support Examine(int x, int y, const HeightSample& self) const {
-    Support support;
+  void FitAndCheckSteps(int cell, const HeightSample& self, Finding& finding) const {
     LocalPlaneFit fit(cell_size_m_);
-    fit.Add(0, 0, 0.0, self);
+    fit.Add(0.0, 0.0, 0.0, self);
     for (const Offset& offset : window_) {
-      const std::span<const HeightSample> column = padded_.Cell(x + offset.dx, y + offset.dy);
+      const std::span<const HeightSample> column = padded_.Cell(cell + offset.cells);
       if (column.empty()) continue;
       const HeightSample& sample = Nearest(column, self.z_m);
       const double dz = double{sample.z_m} - self.z_m;
-      if (WithinReach(dz, offset.reach_m, self, sample)) fit.Add(offset.dx, offset.dy, dz, sample);
-      if (offset.adjacent()) CheckStep(column, offset, dz, self, sample, support);
+      if (WithinReach(dz, offset, self, sample)) fit.Add(offset.dx, offset.dy, dz, sample);
+      if (offset.adjacent && std::abs(dz) > finding.step_m) {
+        finding.step_m = std::max(finding.step_m, StepTo(column, offset, dz, self, sample));
+      }
     }
-    support.plane = fit.Solve();
-    if (support.plane.has_value() && support.plane->SteeperThan(tan_limit_) &&
-        support.plane->roughness_m() > 0.0) {
-      StandBesideStep(x, y, self, *support.plane);
+    finding.plane = fit.Solve();
+    if (finding.plane.has_value() && finding.plane->SteeperThan(tan_limit_) &&
+        finding.plane->roughness_m() > 0.0) {
+      StandBesideStep(cell, self, *finding.plane);
     }
-    return support;
   }
 
   static bool WithinReach(double dz,
-                          double reach,
+                          const Offset& offset,
                           const HeightSample& self,
                           const HeightSample& sample) {
-    return std::abs(dz) <= reach || std::abs(dz) <= reach + Noise(self, sample);
+    return std::abs(dz) <= offset.reach_m || std::abs(dz) <= offset.reach_m + Noise(self, sample);
   }
 
-  void CheckStep(std::span<const HeightSample> column,
-                 const Offset& offset,
-                 double dz,
-                 const HeightSample& self,
-                 const HeightSample& nearest,
-                 Support& support) const {
+  // Height of the step to an adjacent column beyond noise; infinite next to a wall or a drop.
+  double StepTo(std::span<const HeightSample> column,
+                const Offset& offset,
+                double dz,
+                const HeightSample& self,
+                const HeightSample& nearest) const {
     const double beyond_noise = std::abs(dz) - Noise(self, nearest);
-    if (beyond_noise <= offset.step_m) {
-      support.step_m = std::max(support.step_m, beyond_noise);
-      return;
-    }
+    if (beyond_noise <= offset.step_m) return beyond_noise;
     for (const HeightSample& sample : column) {
       const bool drop = sample.z_m < self.z_m;
       if (drop || sample.bottom_m - self.z_m < limits_.clearance_m) {
-        support.step_too_high = true;
-        support.step_m = std::numeric_limits<double>::infinity();
-        return;
+        return std::numeric_limits<double>::infinity();
       }
     }
+    return 0.0;
   }
 
   // Puts the plane of the quarter window with the smallest residual in place of `plane`, if noise
   // explains that residual.
-  void StandBesideStep(int x, int y, const HeightSample& self, LocalPlane& plane) const {
+  void StandBesideStep(int cell, const HeightSample& self, LocalPlane& plane) const {
     std::optional<LocalPlane> best;
     for (const auto& [sx, sy] : kQuarters) {
       LocalPlaneFit fit(cell_size_m_);
-      fit.Add(0, 0, 0.0, self);
+      fit.Add(0.0, 0.0, 0.0, self);
       for (const Offset& offset : window_) {
-        if (offset.dx * sx < 0 || offset.dy * sy < 0) continue;
-        const std::span<const HeightSample> column = padded_.Cell(x + offset.dx, y + offset.dy);
+        if (offset.dx * sx < 0.0 || offset.dy * sy < 0.0) continue;
+        const std::span<const HeightSample> column = padded_.Cell(cell + offset.cells);
         if (column.empty()) continue;
         const HeightSample& sample = Nearest(column, self.z_m);
         const double dz = double{sample.z_m} - self.z_m;
-        if (WithinReach(dz, offset.reach_m, self, sample)) {
-          fit.Add(offset.dx, offset.dy, dz, sample);
-        }
+        if (WithinReach(dz, offset, self, sample)) fit.Add(offset.dx, offset.dy, dz, sample);
       }
       const std::optional<LocalPlane> quarter = fit.Solve();
       if (!quarter.has_value() || quarter->roughness_m() > 0.0) continue;
@@ -247,15 +240,27 @@ class Assessor {
   double tan_limit_;
 };
 
-// Calls visit(i, assessment) for every surface of the tile.
+// Calls visit(i, finding) for every surface of the tile.
 template <typename Visit>
-void ForEachSurface(const SurfaceTile& tile, const Assessor& assessor, Visit visit) {
+void ForEachSurface(const SurfaceTile& tile, const Judge& judge, Visit visit) {
   std::size_t level = 0;
   for (std::size_t i = 0; i < tile.surfaces.size(); ++i) {
     const std::uint16_t cell = tile.surfaces[i].cell;
     level = i > 0 && tile.surfaces[i - 1].cell == cell ? level + 1 : 0;
-    visit(i, assessor.Assess(cell & (kTileCells - 1), cell >> kTileShift, level));
+    visit(i, judge.Examine(cell & (kTileCells - 1), cell >> kTileShift, level));
   }
+}
+
+SurfaceAssessment AssessmentOf(const Finding& finding) {
+  SurfaceAssessment result = {.traversability = finding.traversability,
+                              .step_m = static_cast<float>(finding.step_m),
+                              .danger = static_cast<float>(finding.danger)};
+  if (finding.plane.has_value()) {
+    result.normal = finding.plane->Normal().cast<float>();
+    result.slope_rad = static_cast<float>(finding.plane->slope_rad());
+    result.roughness_m = static_cast<float>(finding.plane->roughness_m());
+  }
+  return result;
 }
 
 }  // namespace
@@ -280,9 +285,10 @@ std::vector<SurfaceAssessment> AssessSurfaces(const SurfaceTile& tile,
                                               double cell_size_m,
                                               const TraversabilityLimits& limits) {
   std::vector<SurfaceAssessment> result(tile.surfaces.size());
-  ForEachSurface(tile,
-                 Assessor(tile, neighbours, cell_size_m, limits),
-                 [&](std::size_t i, const SurfaceAssessment& a) { result[i] = a; });
+  const Judge judge(tile, neighbours, cell_size_m, limits);
+  ForEachSurface(tile, judge, [&result](std::size_t i, const Finding& finding) {
+    result[i] = AssessmentOf(finding);
+  });
   return result;
 }
 
@@ -290,22 +296,22 @@ void AnnotateTraversability(SurfaceTile& tile,
                             const SurfaceNeighbourhood& neighbours,
                             double cell_size_m,
                             const TraversabilityLimits& limits) {
-  ForEachSurface(tile,
-                 Assessor(tile, neighbours, cell_size_m, limits),
-                 [&](std::size_t i, const SurfaceAssessment& a) {
-                   tile.surfaces[i].traversability = a.traversability;
-                   tile.surfaces[i].cost = a.danger;
-                 });
+  const Judge judge(tile, neighbours, cell_size_m, limits);
+  ForEachSurface(tile, judge, [&tile](std::size_t i, const Finding& finding) {
+    tile.surfaces[i].traversability = finding.traversability;
+    tile.surfaces[i].cost = static_cast<float>(finding.danger);
+  });
 }
 
 std::vector<Eigen::Vector3f> EstimateNormals(const SurfaceTile& tile,
                                              const SurfaceNeighbourhood& neighbours,
                                              double cell_size_m,
                                              const TraversabilityLimits& limits) {
-  std::vector<Eigen::Vector3f> normals(tile.surfaces.size());
-  ForEachSurface(tile,
-                 Assessor(tile, neighbours, cell_size_m, limits),
-                 [&](std::size_t i, const SurfaceAssessment& a) { normals[i] = a.normal; });
+  std::vector<Eigen::Vector3f> normals(tile.surfaces.size(), Eigen::Vector3f::Zero());
+  const Judge judge(tile, neighbours, cell_size_m, limits);
+  ForEachSurface(tile, judge, [&normals](std::size_t i, const Finding& finding) {
+    if (finding.plane.has_value()) normals[i] = finding.plane->Normal().cast<float>();
+  });
   return normals;
 }
 
