@@ -46,7 +46,7 @@ inline Token TokenOf(std::uint64_t value) {
 
 class ColumnEncoder {
  public:
-  explicit ColumnEncoder(int columns) : columns_(columns) {}
+  explicit ColumnEncoder(int columns) : columns_(columns), bit_bytes_(columns) {}
 
   std::uint64_t Code(int column, std::uint64_t value) {
     const Token token = TokenOf(value);
@@ -65,13 +65,26 @@ class ColumnEncoder {
     return value;
   }
 
+  // A yes or no; eight of them share a byte, so that their column may take less than a bit each.
+  bool CodeBit(int column, bool bit) {
+    BitByte& byte = bit_bytes_[column];
+    if (byte.used == 0) columns_[column].push_back('\0');
+    columns_[column].back() = static_cast<char>(columns_[column].back() | (bit << byte.used));
+    byte.used = (byte.used + 1) & 7;
+    return bit;
+  }
+
   // Appends all columns and the raw bits.
   void Finish(std::string& out);
 
  private:
   void PutBits(std::uint64_t value, int count);
 
+  struct BitByte {
+    int used = 0;  // bits of the last byte, of 8
+  };
   std::vector<std::string> columns_;
+  std::vector<BitByte> bit_bytes_;
   std::string raw_;
   std::uint64_t pending_ = 0;  // bits not yet in raw_
   int pending_count_ = 0;      // < 8
@@ -102,6 +115,18 @@ class ColumnDecoder {
   }
   std::uint8_t CodeByte(int column, std::uint8_t /*value*/) { return NextByte(column); }
 
+  bool CodeBit(int column, bool /*bit*/) {
+    Column& c = columns_[column];
+    if (c.bits_left == 0) {
+      c.bit_byte = NextByte(column);
+      c.bits_left = 8;
+    }
+    const bool bit = (c.bit_byte & 1) != 0;
+    c.bit_byte >>= 1;
+    --c.bits_left;
+    return bit;
+  }
+
   // OK if every column and the raw bits were read to their end, no further.
   absl::Status Finish() const;
 
@@ -119,6 +144,8 @@ class ColumnDecoder {
   struct Column {
     std::string bytes;
     std::size_t position = 0;
+    std::uint8_t bit_byte = 0;
+    int bits_left = 0;
   };
   std::vector<Column> columns_;
   std::string raw_;

@@ -30,8 +30,8 @@ enum Column : std::uint8_t {
   kBottomLast = kBottom + 1,
   kTop,  // of vertical patches, from neighbours; 1: alone
   kTopLast = kTop + 1,
-  kHeight,  // + shape, of the others
-  kHeightLast = kHeight + 4,
+  kHeight,  // of pairs, triples and sums
+  kHeightLast = kHeight + 2,
   kTopSigma,  // + whether vertical
   kTopSigmaLast = kTopSigma + 1,
   kCount,  // + whether vertical
@@ -109,7 +109,8 @@ void CodeMeasurements(Coder& coder, PatchShape shape, const Surroundings& around
   } else if (shape == PatchShape::kSingle) {
     n.z_max = n.z_min;
   } else {
-    n.z_max = coder.CodeRelative(kHeight + static_cast<int>(shape), n.z_max, n.z_min);
+    n.z_max = coder.CodeRelative(
+        kHeight + static_cast<int>(shape) - static_cast<int>(PatchShape::kPair), n.z_max, n.z_min);
   }
   n.top_sigma = coder.CodeRelative(kTopSigma + vertical, n.top_sigma, around.top_sigma);
   if (shape == PatchShape::kVertical || shape == PatchShape::kSums) {

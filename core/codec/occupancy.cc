@@ -23,6 +23,12 @@ constexpr int kCells = kTileCells * kTileCells;
 constexpr unsigned kManyCode = 3;  // this many or more; the rest follows as a varint
 constexpr std::size_t kMaxVarintBytes = 5;
 
+// Four cells in a square share a byte: neighbours in both directions tell about each other.
+int BlockOf(int cell) {
+  return (cell >> (kTileShift + 1)) * (kTileCells / 2) + (cell % kTileCells) / 2;
+}
+int ShiftInBlock(int cell) { return 2 * ((cell >> kTileShift & 1) * 2 + (cell & 1)); }
+
 }  // namespace
 
 void PutCells(std::string& out, std::span<const std::uint16_t> cells) {
@@ -33,7 +39,8 @@ void PutCells(std::string& out, std::span<const std::uint16_t> cells) {
     while (end < cells.size() && cells[end] == cells[i]) ++end;
     const std::size_t count = end - i;
     const auto code = static_cast<unsigned>(std::min<std::size_t>(count, kManyCode));
-    codes[cells[i] >> 2] = static_cast<char>(codes[cells[i] >> 2] | code << 2 * (cells[i] & 3));
+    char& block = codes[BlockOf(cells[i])];
+    block = static_cast<char>(block | code << ShiftInBlock(cells[i]));
     if (code == kManyCode) PutVarint(rest, count - kManyCode);
     i = end;
   }
@@ -52,7 +59,8 @@ absl::StatusOr<std::vector<std::uint16_t>> TakeCells(ByteReader& reader) {
   std::vector<std::uint16_t> cells;
   ByteReader rest_reader(rest);
   for (int cell = 0; cell < kCells; ++cell) {
-    std::uint64_t count = static_cast<std::uint8_t>(codes[cell >> 2]) >> 2 * (cell & 3) & 3U;
+    std::uint64_t count =
+        static_cast<std::uint8_t>(codes[BlockOf(cell)]) >> ShiftInBlock(cell) & 3U;
     if (count == 0) continue;
     if (count == kManyCode) count += rest_reader.Varint();
     if (!rest_reader.ok() || count > kMaxTilePatches - cells.size()) {

@@ -25,11 +25,12 @@ namespace strata {
 namespace {
 
 constexpr float kStepsPerMetre = 512.0F;
-constexpr std::int64_t kMaxHeightCode = (1 << 24) - 1;  // exact in a float
+constexpr std::int32_t kMaxHeightCode = (1 << 24) - 1;  // exact in a float
 constexpr float kSigmaCodesPerOctave = 7.5F;            // steps of 9.7 %
 constexpr float kMinSigmaOctave = -24.0F;
-constexpr float kCostCodesPerOctave = 8.0F;  // steps of 9.1 %
-constexpr std::int64_t kInfiniteCost = 255;
+constexpr float kCostCodesPerOctave = 6.0F;        // steps of 12 %, where a robot can drive
+constexpr float kCoarseCostCodesPerOctave = 2.0F;  // steps of 41 %, elsewhere
+constexpr std::int32_t kInfiniteCost = 255;
 constexpr int kMaxTraversability = static_cast<int>(Traversability::kNonTraversable);
 
 // A surface in whole numbers, as it is stored.
@@ -37,30 +38,41 @@ struct Codes {
   std::uint16_t cell = 0;
   std::uint8_t traversability = 0;
   std::uint8_t class_id = 0;
-  std::int64_t height = 0;
-  std::int64_t depth = 0;  // > 0: vertical
-  std::int64_t sigma = 0;
-  std::int64_t cost = 0;
+  std::int32_t height = 0;
+  std::int32_t depth = 0;  // > 0: vertical
+  std::int32_t sigma = 0;
+  std::int32_t cost = 0;
 };
 
-std::int64_t LengthCode(float metres) {
-  if (!(std::abs(metres) <= kMaxHeightCode / kStepsPerMetre)) {
-    return std::isnan(metres) ? 0 : std::signbit(metres) ? -kMaxHeightCode : kMaxHeightCode;
-  }
-  return std::lround(metres * kStepsPerMetre);
+// Rounds to nearest; |value| < 2^30.
+std::int32_t Rounded(double value) {
+  constexpr double kShift = 1 << 30;  // makes it positive, so that truncating rounds down
+  return static_cast<std::int32_t>(static_cast<std::int64_t>(value + kShift + 0.5) - (1 << 30));
 }
 
-std::int64_t ByteCode(float value) { return std::lround(std::clamp(value, 0.0F, 255.0F)); }
+std::int32_t LengthCode(float metres) {
+  if (std::isnan(metres)) return 0;
+  constexpr double kMax = kMaxHeightCode;
+  return Rounded(std::clamp(double{metres} * kStepsPerMetre, -kMax, kMax));
+}
 
-std::int64_t SigmaCodeOf(float sigma_m) {
+std::int32_t SigmaCodeOf(float sigma_m) {
   if (!(sigma_m > 0.0F)) return 0;
-  return ByteCode((std::log2(sigma_m) - kMinSigmaOctave) * kSigmaCodesPerOctave);
+  const float code = (std::log2(sigma_m) - kMinSigmaOctave) * kSigmaCodesPerOctave;
+  return Rounded(std::clamp(code, 0.0F, 255.0F));
 }
 
-std::int64_t CostCodeOf(float cost) {
+float CostCodesPerOctave(std::uint8_t traversability) {
+  return traversability == static_cast<std::uint8_t>(Traversability::kTraversable)
+             ? kCostCodesPerOctave
+             : kCoarseCostCodesPerOctave;
+}
+
+std::int32_t CostCodeOf(float cost, std::uint8_t traversability) {
   if (!(cost > 0.0F)) return 0;
   if (std::isinf(cost)) return kInfiniteCost;
-  return std::min(ByteCode(std::log2(1.0F + cost) * kCostCodesPerOctave), kInfiniteCost - 1);
+  const float code = std::log2(1.0F + cost) * CostCodesPerOctave(traversability);
+  return Rounded(std::min(code, kInfiniteCost - 1.0F));
 }
 
 Codes Quantised(const Surface& surface) {
@@ -68,9 +80,9 @@ Codes Quantised(const Surface& surface) {
               .traversability = static_cast<std::uint8_t>(surface.traversability),
               .class_id = surface.class_id,
               .height = LengthCode(surface.z_m),
-              .sigma = SigmaCodeOf(surface.sigma_m),
-              .cost = CostCodeOf(surface.cost)};
-  if (surface.vertical()) codes.depth = std::max<std::int64_t>(1, LengthCode(surface.depth_m));
+              .sigma = SigmaCodeOf(surface.sigma_m)};
+  codes.cost = CostCodeOf(surface.cost, codes.traversability);
+  if (surface.vertical()) codes.depth = std::max(1, LengthCode(surface.depth_m));
   return codes;
 }
 
@@ -82,16 +94,20 @@ Surface Restored(const Codes& codes) {
                   .depth_m = static_cast<float>(codes.depth) / kStepsPerMetre};
   surface.sigma_m =
       std::exp2(static_cast<float>(codes.sigma) / kSigmaCodesPerOctave + kMinSigmaOctave);
-  surface.cost = codes.cost == kInfiniteCost
-                     ? std::numeric_limits<float>::infinity()
-                     : std::exp2(static_cast<float>(codes.cost) / kCostCodesPerOctave) - 1.0F;
+  surface.cost =
+      codes.cost == kInfiniteCost
+          ? std::numeric_limits<float>::infinity()
+          : std::exp2(static_cast<float>(codes.cost) / CostCodesPerOctave(codes.traversability)) -
+                1.0F;
   return surface;
 }
 
 // Columns. Heights and the like go to one of several columns by what is known of their
 // surroundings, because a zstd frame has one table of frequencies.
 enum Column : std::uint8_t {
-  kKind,  // traversability and vertical: context-free, spatially coherent
+  kSameKind,  // bits, + KindContext
+  kSameKindLast = kSameKind + 3,
+  kKind,  // where not the same
   kClass,
   kHeight,  // + HeightContext
   kHeightLast = kHeight + 3,
@@ -100,80 +116,144 @@ enum Column : std::uint8_t {
   kSigma,  // + vertical
   kSigmaLast = kSigma + 1,
   kCost,  // + traversability
-  kCostLast = kCost + 3,
+  kCostLast = kCost + 2,
   kColumnCount
 };
 
-std::int64_t FloorDivide(std::int64_t a, std::int64_t b) { return a / b - (a % b < 0 ? 1 : 0); }
+// Rounded sum / count for a count of 1 to 4; each division is by a constant.
+std::int32_t MeanOf(std::int32_t sum, int count) {
+  constexpr std::int32_t kShift = 3 << 27;  // makes it positive; a multiple of 3
+  switch (count) {
+    case 2:
+      return (sum + 1) >> 1;
+    case 3:
+      return (sum + 1 + kShift) / 3 - kShift / 3;
+    case 4:
+      return (sum + 2) >> 2;
+    default:
+      return sum;
+  }
+}
 
-// Known surfaces beside one that is being coded.
-class Surroundings {
- public:
+// What is known beside a surface that is being coded: the mean of the surfaces around that are
+// vertical or not as it is; without any, the first one around; without that, zeros.
+struct Surroundings {
+  int alike = 0;  // how many
+  std::int32_t height = 0, depth = 0, sigma = 0;
+
   Surroundings(std::span<const Codes> surfaces, const Neighbours& n, bool vertical) {
     for (const std::uint32_t index : {n.left, n.up, n.up_right, n.up_left}) {
-      if (index == Neighbours::kNone) continue;
-      const Codes& beside = surfaces[index];
-      if (nearest_ == nullptr) nearest_ = &beside;
-      if ((beside.depth > 0) != vertical) continue;
-      alike_[alike_count_++] = &beside;
+      if (index == Neighbours::kNone || (surfaces[index].depth > 0) != vertical) continue;
+      Add(surfaces[index]);
+      ++alike;
     }
-  }
-
-  int alike_count() const { return alike_count_; }
-
-  // Rounded mean of those alike; without any, the nearest; without surroundings, 0.
-  std::int64_t Mean(std::int64_t Codes::*field) const {
-    if (alike_count_ == 0) return nearest_ == nullptr ? 0 : nearest_->*field;
-    std::int64_t sum = 0;
-    for (int i = 0; i < alike_count_; ++i) sum += alike_[i]->*field;
-    return FloorDivide(2 * sum + alike_count_, 2 * alike_count_);
+    if (alike == 0 && (n.left & n.up) != Neighbours::kNone) {
+      Add(surfaces[n.left != Neighbours::kNone ? n.left : n.up]);
+    }
+    height = MeanOf(height, alike);
+    depth = MeanOf(depth, alike);
+    sigma = MeanOf(sigma, alike);
   }
 
  private:
-  const Codes* nearest_ = nullptr;
-  const Codes* alike_[4] = {};
-  int alike_count_ = 0;
+  void Add(const Codes& codes) {
+    height += codes.height;
+    depth += codes.depth;
+    sigma += codes.sigma;
+  }
 };
 
 int HeightColumn(const Surroundings& around, bool vertical) {
-  if (around.alike_count() == 0) return kHeight;
+  if (around.alike == 0) return kHeight;
   if (vertical) return kHeight + 1;
-  return around.alike_count() == 1 ? kHeight + 2 : kHeight + 3;
+  return around.alike == 1 ? kHeight + 2 : kHeight + 3;
 }
 
-// One surface, in either direction.
+// Reads or writes a number; false if what was read is not within [low, high].
 template <typename Coder>
-Codes CodeSurface(Coder& coder,
-                  const Neighbours& neighbours,
-                  std::span<const Codes> surfaces,
-                  Codes codes) {
-  const auto kind = coder.CodeByte(
-      kKind, static_cast<std::uint8_t>(codes.traversability << 1 | (codes.depth > 0)));
+bool CodeWithin(Coder& coder,
+                int column,
+                std::int32_t expected,
+                std::int32_t low,
+                std::int32_t high,
+                std::int32_t& value) {
+  const std::int64_t coded = coder.CodeRelative(column, value, expected);
+  if (coded < low || coded > high) return false;
+  value = static_cast<std::int32_t>(coded);
+  return true;
+}
+
+// What a surface is: all its yes and no in one number.
+std::uint8_t KindOf(const Codes& codes) {
+  return static_cast<std::uint8_t>(codes.traversability << 1 | (codes.depth > 0 ? 1 : 0));
+}
+
+// The mean cost of the surfaces around that are as traversable; 0 without any.
+std::int32_t ExpectedCost(std::span<const Codes> surfaces,
+                          const Neighbours& n,
+                          std::uint8_t traversability) {
+  std::int32_t sum = 0;
+  int count = 0;
+  for (const std::uint32_t index : {n.left, n.up, n.up_right, n.up_left}) {
+    if (index == Neighbours::kNone || surfaces[index].traversability != traversability) continue;
+    sum += surfaces[index].cost;
+    ++count;
+  }
+  return MeanOf(sum, count);
+}
+
+// The kind of the surface to the left or else above, and how many of those around share it.
+struct ExpectedKind {
+  std::uint8_t kind = 0;
+  int others = 0;
+
+  ExpectedKind(std::span<const Codes> surfaces, const Neighbours& n) {
+    const std::uint32_t first = n.left != Neighbours::kNone ? n.left : n.up;
+    if (first == Neighbours::kNone) return;
+    kind = KindOf(surfaces[first]);
+    for (const std::uint32_t index : {n.up, n.up_left, n.up_right}) {
+      if (index != Neighbours::kNone && KindOf(surfaces[index]) == kind) ++others;
+    }
+  }
+};
+
+// One surface, in either direction; false if what was read is none. `codes.cell` is known.
+template <typename Coder>
+bool CodeSurface(Coder& coder,
+                 const Neighbours& neighbours,
+                 std::span<const Codes> surfaces,
+                 Codes& codes) {
+  const ExpectedKind expected_kind(surfaces, neighbours);
+  std::uint8_t kind = expected_kind.kind;
+  if (!coder.CodeBit(kSameKind + expected_kind.others, KindOf(codes) == kind)) {
+    kind = coder.CodeByte(kKind, KindOf(codes));
+  }
   codes.traversability = kind >> 1;
+  if (codes.traversability > kMaxTraversability) return false;
+  codes.class_id = coder.CodeByte(kClass, codes.class_id);
   const bool vertical = (kind & 1) != 0;
   const Surroundings around(surfaces, neighbours, vertical);
-  const bool known = around.alike_count() > 0;
-
-  codes.class_id = coder.CodeByte(kClass, codes.class_id);
-  codes.height =
-      coder.CodeRelative(HeightColumn(around, vertical), codes.height, around.Mean(&Codes::height));
+  if (!CodeWithin(coder,
+                  HeightColumn(around, vertical),
+                  around.height,
+                  -kMaxHeightCode,
+                  kMaxHeightCode,
+                  codes.height)) {
+    return false;
+  }
   if (vertical) {
     // Undersides continue better than lengths.
-    const std::int64_t expected =
-        known ? WrappingAdd(codes.height, around.Mean(&Codes::depth) - around.Mean(&Codes::height))
-              : 0;
-    codes.depth = coder.CodeRelative(kDepth + known, codes.depth, expected);
+    const bool known = around.alike > 0;
+    const std::int32_t expected = known ? around.depth + codes.height - around.height : 0;
+    if (!CodeWithin(coder, kDepth + known, expected, 1, kMaxHeightCode, codes.depth)) return false;
   }
-  codes.sigma = coder.CodeRelative(kSigma + vertical, codes.sigma, around.Mean(&Codes::sigma));
-  codes.cost = coder.CodeRelative(
-      kCost + std::min<int>(codes.traversability, 3), codes.cost, around.Mean(&Codes::cost));
-  return codes;
-}
-
-bool InRange(const Codes& codes) {
-  return codes.traversability <= kMaxTraversability && std::abs(codes.height) <= kMaxHeightCode &&
-         codes.depth >= 0 && codes.depth <= kMaxHeightCode && codes.sigma >= 0 &&
-         codes.sigma <= 255 && codes.cost >= 0 && codes.cost <= kInfiniteCost;
+  return CodeWithin(coder, kSigma + vertical, around.sigma, 0, 255, codes.sigma) &&
+         CodeWithin(coder,
+                    kCost + codes.traversability,
+                    ExpectedCost(surfaces, neighbours, codes.traversability),
+                    0,
+                    kInfiniteCost,
+                    codes.cost);
 }
 
 }  // namespace
@@ -214,8 +294,9 @@ absl::StatusOr<SurfaceTile> DecodeSurfaceTile(absl::string_view bytes) {
   tile.surfaces.reserve(cells.size());
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     surfaces[i].cell = cells[i];
-    surfaces[i] = CodeSurface(decoder, neighbours[i], surfaces, surfaces[i]);
-    if (!InRange(surfaces[i])) return absl::DataLossError("surface tile: value out of range");
+    if (!CodeSurface(decoder, neighbours[i], surfaces, surfaces[i])) {
+      return absl::DataLossError(absl::StrCat("surface tile: surface ", i, " is out of range"));
+    }
     tile.surfaces.push_back(Restored(surfaces[i]));
   }
   STRATA_RETURN_IF_ERROR(decoder.Finish());
