@@ -44,7 +44,7 @@ PointCloud ChunkOf(const PointCloud& cloud, std::size_t begin, std::size_t end) 
   return chunk;
 }
 
-ScanHeader HeaderOf(const ScanSource& source, const PointCloud& cloud) {
+ScanHeader HeaderOf(const UploadSource& source, const PointCloud& cloud) {
   ScanHeader header = source.header;
   header.T_map_scan.translate(cloud.origin);
   header.sensor_origin = cloud.sensor_origin;
@@ -62,7 +62,7 @@ class Uploader {
   Uploader(api::Database& database,
            const api::Call& call,
            const std::string& map,
-           const std::vector<ScanSource>& sources)
+           const std::vector<UploadSource>& sources)
       : database_(database), call_(call), map_(map), sources_(sources), results_(sources.size()) {}
 
   void Work() {
@@ -167,7 +167,7 @@ class Uploader {
   api::Database& database_;
   const api::Call& call_;
   const std::string& map_;
-  const std::vector<ScanSource>& sources_;
+  const std::vector<UploadSource>& sources_;
 
   std::mutex mutex_;  // guards what follows
   std::condition_variable changed_;
@@ -182,7 +182,7 @@ class Uploader {
 std::vector<UploadResult> UploadScans(api::Database& database,
                                       const api::Call& call,
                                       const std::string& map,
-                                      const std::vector<ScanSource>& sources,
+                                      const std::vector<UploadSource>& sources,
                                       int workers,
                                       const std::function<void(const UploadProgress&)>& report) {
   Uploader uploader(database, call, map, sources);

@@ -18,7 +18,7 @@ namespace strata::cli {
 
 // A scan to upload. `header` has id, time, alignment and the pose of the points as `read` returns
 // them; what depends on the points is filled in by the uploader.
-struct ScanSource {
+struct UploadSource {
   std::string file;
   ScanHeader header;
   std::function<absl::StatusOr<PointCloud>()> read;
@@ -41,7 +41,7 @@ struct UploadProgress {
 std::vector<UploadResult> UploadScans(api::Database& database,
                                       const api::Call& call,
                                       const std::string& map,
-                                      const std::vector<ScanSource>& sources,
+                                      const std::vector<UploadSource>& sources,
                                       int workers,
                                       const std::function<void(const UploadProgress&)>& report);
 
