@@ -22,8 +22,8 @@ absl::StatusOr<Eigen::Quaterniond> UnitQuaternion(absl::string_view what, const 
   const double norm = rotation.norm();
   // The negated comparison also catches NaN.
   if (!(std::abs(norm - 1.0) <= kQuaternionNormTolerance)) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        what, ".rotation: norm ", norm, " is not 1 to ", kQuaternionNormTolerance));
+    return absl::InvalidArgumentError(
+        absl::StrCat(what, ".rotation: norm ", norm, " is not 1 to ", kQuaternionNormTolerance));
   }
   return rotation.normalized();
 }

@@ -7,11 +7,11 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
+#include "google/protobuf/timestamp.pb.h"
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
 #include "core/geometry/pose.h"
-#include "google/protobuf/timestamp.pb.h"
 #include "strata/v1/geometry.pb.h"
 
 namespace strata::translate {

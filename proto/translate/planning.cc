@@ -44,8 +44,8 @@ absl::StatusOr<PlanEndpoint> EndpointFromProto(const char* what, const v1::PlanE
   if (proto.has_level()) endpoint.level = proto.level();
   const double z = endpoint.z_m.value_or(0.0);
   if (!std::isfinite(endpoint.x_m) || !std::isfinite(endpoint.y_m) || !std::isfinite(z)) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        what, ": (", endpoint.x_m, ", ", endpoint.y_m, ", ", z, ") is not finite"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(what, ": (", endpoint.x_m, ", ", endpoint.y_m, ", ", z, ") is not finite"));
   }
   if (endpoint.level.value_or(0) < 0) {
     return absl::InvalidArgumentError(
@@ -98,8 +98,7 @@ absl::StatusOr<Surface> SurfaceFromProto(const v1::Surface& proto) {
 }
 
 absl::Status ReasonsFromProto(const v1::PlanPathResponse& proto, PlanResult& result) {
-  if (!v1::PlanReason_IsValid(proto.reason()) ||
-      proto.reason() == v1::PLAN_REASON_UNSPECIFIED ||
+  if (!v1::PlanReason_IsValid(proto.reason()) || proto.reason() == v1::PLAN_REASON_UNSPECIFIED ||
       !v1::Obstruction_IsValid(proto.obstruction())) {
     return absl::InvalidArgumentError(absl::StrCat("plan: reason ",
                                                    static_cast<int>(proto.reason()),

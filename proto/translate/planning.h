@@ -14,7 +14,8 @@ v1::PlanPathRequest ToProto(absl::string_view map, const PlanQuery& query);
 v1::PlanPathResponse ToProto(const PlanResult& result);
 v1::SurfaceColumn ToProto(const SurfaceColumn& column);
 
-// INVALID_ARGUMENT for coordinates that are not finite, a negative level, or a profile out of range.
+// INVALID_ARGUMENT for coordinates that are not finite, a negative level, or a profile out of
+// range.
 absl::StatusOr<PlanQuery> FromProto(const v1::PlanPathRequest& request);
 absl::StatusOr<PlanResult> FromProto(const v1::PlanPathResponse& result);
 absl::StatusOr<SurfaceColumn> FromProto(const v1::SurfaceColumn& column);

@@ -101,8 +101,8 @@ absl::Status CheckChunk(const PointCloud& chunk, const ScanHeader& header, std::
   const std::size_t n = chunk.size();
   STRATA_RETURN_IF_ERROR(CheckPointCount(n));
   if (first > header.point_count || n > header.point_count - first) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        first + n, " points arrived, the header announced ", header.point_count));
+    return absl::InvalidArgumentError(
+        absl::StrCat(first + n, " points arrived, the header announced ", header.point_count));
   }
   STRATA_RETURN_IF_ERROR(CheckColumn("intensity", chunk.intensity.size(), header.has_intensity, n));
   STRATA_RETURN_IF_ERROR(CheckColumn("colour", chunk.colour.size(), header.has_colour, n));

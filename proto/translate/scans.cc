@@ -154,9 +154,7 @@ v1::GetUploadStateResponse ToProto(const UploadState& state) {
 }
 
 UploadState FromProto(const v1::GetUploadStateResponse& proto) {
-  return {.exists = proto.exists(),
-          .last_sequence = proto.last_sequence(),
-          .scans = proto.scans()};
+  return {.exists = proto.exists(), .last_sequence = proto.last_sequence(), .scans = proto.scans()};
 }
 
 v1::ListScansRequest ToProto(absl::string_view map, const api::ScanFilter& filter) {

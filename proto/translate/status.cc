@@ -99,8 +99,8 @@ v1::ScanError ToScanError(const absl::Status& status, absl::string_view request_
 }
 
 absl::Status FromScanError(const v1::ScanError& error) {
-  return WithDetail(
-      absl::Status(static_cast<absl::StatusCode>(error.code()), error.message()), error.detail());
+  return WithDetail(absl::Status(static_cast<absl::StatusCode>(error.code()), error.message()),
+                    error.detail());
 }
 
 }  // namespace strata::translate
