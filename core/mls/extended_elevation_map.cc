@@ -23,16 +23,19 @@ ExtendedElevationCell Analyse(std::span<const Patch> intervals, double clearance
     return ExtendedElevationCell{.cell = static_cast<std::uint16_t>(patch.cell),
                                  .elevation_class = elevation_class,
                                  .z_m = static_cast<float>(patch.mean_m()),
-                                 .sigma_m = static_cast<float>(patch.sigma_m())};
+                                 .sigma_m = static_cast<float>(patch.sigma_m()),
+                                 .depth_m = static_cast<float>(patch.depth_m())};
   };
   for (std::size_t i = 0; i + 1 < intervals.size(); ++i) {
     if (intervals[i + 1].bottom_m() - intervals[i].top_m() >= clearance_m) {
       return of(intervals[i], ElevationClass::kGap);
     }
   }
-  const bool vertical = intervals.size() > 1 || intervals.front().vertical();
-  return of(intervals.back(),
-            vertical ? ElevationClass::kVertical : ElevationClass::kNonTraversable);
+  const Patch& top = intervals.back();
+  if (intervals.size() == 1 && !top.vertical()) return of(top, ElevationClass::kNonTraversable);
+  ExtendedElevationCell result = of(top, ElevationClass::kVertical);
+  result.depth_m = static_cast<float>(top.mean_m() - intervals.front().bottom_m());
+  return result;
 }
 
 ExtendedElevationTile AnalyseTile(const MlsTile& tile, double clearance_m) {
@@ -52,7 +55,8 @@ SurfaceTile SurfacesOf(const ExtendedElevationTile& tile) {
   SurfaceTile result;
   result.key = tile.key;
   for (const ExtendedElevationCell& cell : tile.cells) {
-    result.surfaces.push_back({.cell = cell.cell, .z_m = cell.z_m, .sigma_m = cell.sigma_m});
+    result.surfaces.push_back(
+        {.cell = cell.cell, .z_m = cell.z_m, .sigma_m = cell.sigma_m, .depth_m = cell.depth_m});
   }
   result.IndexRows();
   return result;

@@ -27,6 +27,9 @@ struct ExtendedElevationCell {
   // several intervals the highest.
   float z_m = 0.0F;
   float sigma_m = 0.0F;
+  // How far below z the cell is filled: the interval's length, of a vertical cell down to the
+  // lowest measurement, 0 of a horizontal one.
+  float depth_m = 0.0F;
 
   // Whether a robot may be on it.
   bool passable() const {
