@@ -9,9 +9,14 @@ namespace strata::cli {
 
 absl::StatusOr<std::unique_ptr<api::Database>> OpenDatabase(const Target& target) {
   if (!target.embedded.empty()) {
-    return OpenEngine({.directory = target.embedded});
+    EngineOptions options;
+    options.directory = target.embedded;
+    return OpenEngine(options);
   }
-  return sdk::Connect({.target = target.server});
+  ClientOptions options;
+  options.target = target.server;
+  options.connect_timeout = absl::Seconds(3);
+  return Connect(options);
 }
 
 }  // namespace strata::cli

@@ -34,10 +34,12 @@ struct ExportOptions {
 
 Colour ColourOf(const Surface& surface) {
   switch (surface.traversability) {
-    case Traversability::kTraversable: return picture::kTraversableColour;
+    case Traversability::kTraversable:
+      return picture::kTraversableColour;
     case Traversability::kNonTraversable:
       return surface.vertical() ? picture::kVerticalColour : picture::kNonTraversableColour;
-    case Traversability::kUnknown: break;
+    case Traversability::kUnknown:
+      break;
   }
   return surface.vertical() ? picture::kVerticalColour : picture::kUnknownColour;
 }
@@ -60,7 +62,8 @@ Geometry GeometryOf(const std::vector<SurfaceTile>& tiles, SurfaceMesh mesh) {
   for (const SurfaceMesh::VerticalSegment& segment : mesh.verticals) {
     Eigen::Vector3d foot = geometry.vertices[segment.vertex];
     foot.z() = segment.bottom_m;
-    geometry.lines.push_back({segment.vertex, static_cast<std::uint32_t>(geometry.vertices.size())});
+    geometry.lines.push_back(
+        {segment.vertex, static_cast<std::uint32_t>(geometry.vertices.size())});
     geometry.vertices.push_back(foot);
     geometry.colour.push_back(picture::kVerticalColour);
   }
@@ -84,8 +87,8 @@ absl::StatusOr<Geometry> PointsOf(Context& context, const ExportOptions& options
   std::vector<ScanInfo> scans;
   api::ScanFilter filter;
   filter.state = ScanState::kIntegrated;
-  STRATA_RETURN_IF_ERROR(context.database.scans().List(
-      context.call, options.map, filter, [&](const ScanInfo& info) {
+  STRATA_RETURN_IF_ERROR(
+      context.database.scans().List(context.call, options.map, filter, [&](const ScanInfo& info) {
         scans.push_back(info);
         return absl::OkStatus();
       }));
@@ -109,7 +112,7 @@ absl::Status Export(Context& context, const ExportOptions& options) {
   STRATA_ASSIGN_OR_RETURN(const Geometry geometry,
                           points ? PointsOf(context, options) : MeshOf(context, options));
   STRATA_ASSIGN_OR_RETURN(const std::string bytes,
-                          points                     ? PcdBytes(geometry)
+                          points                    ? PcdBytes(geometry)
                           : options.format == "ply" ? PlyBytes(geometry)
                                                     : ObjText(geometry));
   STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, bytes));

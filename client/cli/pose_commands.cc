@@ -1,6 +1,5 @@
 // strata pose list|export|set
 #include <algorithm>
-#include <fstream>
 #include <memory>
 #include <string>
 #include <tuple>
@@ -13,7 +12,8 @@
 #include "client/cli/arguments.h"
 #include "client/cli/command.h"
 #include "client/cli/json.h"
-#include "client/formats/trajectory.h"
+#include "client/formats/file_bytes.h"
+#include "client/formats/pose_writer.h"
 #include "core/common/status.h"
 
 namespace strata::cli {
@@ -60,13 +60,12 @@ absl::Status Export(Context& context, const PoseOptions& options) {
   std::sort(nodes.begin(), nodes.end(), [](const PoseNode& a, const PoseNode& b) {
     return std::tie(a.time, a.id) < std::tie(b.time, b.id);
   });
-  std::vector<formats::StampedPose> poses;
+  std::vector<TimedPose> poses;
   for (const PoseNode& node : nodes) {
     poses.push_back(
-        {.time = node.time,
-         .pose = options.which == "current" ? node.T_map_scan : node.T_map_scan_uploaded});
+        {node.time, options.which == "current" ? node.T_map_scan : node.T_map_scan_uploaded});
   }
-  STRATA_RETURN_IF_ERROR(formats::WriteTum(options.out, poses));
+  STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, TumText(poses)));
   context.output.Object({{"file", options.out}, {"which", options.which}, {"poses", nodes.size()}});
   return absl::OkStatus();
 }

@@ -114,8 +114,8 @@ void AddList(Commands& commands, CLI::App* noun, const std::shared_ptr<ScanOptio
       4,
       4,
       [options](const std::vector<double>& n) {
-        options->filter.box = Eigen::AlignedBox2d(Eigen::Vector2d(n[0], n[1]),
-                                                  Eigen::Vector2d(n[2], n[3]));
+        options->filter.box =
+            Eigen::AlignedBox2d(Eigen::Vector2d(n[0], n[1]), Eigen::Vector2d(n[2], n[3]));
       },
       "Only scans whose points reach into this box [m]");
 }
@@ -145,13 +145,17 @@ void AddScanCommands(Commands& commands) {
   AddScanImport(commands, noun);
   AddList(commands, noun, options);
   const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
-    CLI::App* app = commands.Verb(noun, name, description, example, [options, run](Context& context) {
-      return run(context, *options);
-    });
+    CLI::App* app =
+        commands.Verb(noun, name, description, example, [options, run](Context& context) {
+          return run(context, *options);
+        });
     AddMapName(app, options->map);
     AddScanId(app, options->id);
   };
-  verb("show", "One scan, its state and how it was aligned", "strata scan show campus segway/12", Show);
+  verb("show",
+       "One scan, its state and how it was aligned",
+       "strata scan show campus segway/12",
+       Show);
   AddExport(commands, noun, options);
   verb("delete",
        "Take a scan and its contribution out of the map",

@@ -92,8 +92,8 @@ absl::StatusOr<std::set<std::uint64_t>> SequencesThere(Context& context,
   std::set<std::uint64_t> sequences;
   api::ScanFilter filter;
   filter.trajectory = options.trajectory;
-  STRATA_RETURN_IF_ERROR(context.database.scans().List(
-      context.call, options.map, filter, [&](const ScanInfo& info) {
+  STRATA_RETURN_IF_ERROR(
+      context.database.scans().List(context.call, options.map, filter, [&](const ScanInfo& info) {
         sequences.insert(info.header.id.sequence);
         return absl::OkStatus();
       }));
@@ -188,16 +188,17 @@ absl::Status Wait(Context& context, const ImportOptions& options, Summary& summa
 }
 
 void Print(const ImportOptions& options, const Summary& summary, Output& output) {
-  Json json = {{"map", options.map},
-               {"trajectory", options.trajectory},
-               {"files", summary.files},
-               {"uploaded", summary.uploaded},
-               {"skipped", summary.skipped},
-               {"failed", summary.errors.size()},
-               {"points", summary.points},
-               {"seconds", summary.seconds},
-               {"points_per_second",
-                summary.seconds > 0.0 ? static_cast<double>(summary.points) / summary.seconds : 0.0}};
+  Json json = {
+      {"map", options.map},
+      {"trajectory", options.trajectory},
+      {"files", summary.files},
+      {"uploaded", summary.uploaded},
+      {"skipped", summary.skipped},
+      {"failed", summary.errors.size()},
+      {"points", summary.points},
+      {"seconds", summary.seconds},
+      {"points_per_second",
+       summary.seconds > 0.0 ? static_cast<double>(summary.points) / summary.seconds : 0.0}};
   if (options.wait) {
     json["integrated"] = summary.integrated;
     json["aligned"] = summary.aligned;
@@ -205,10 +206,8 @@ void Print(const ImportOptions& options, const Summary& summary, Output& output)
   }
   json["errors"] = summary.errors;
   for (const Json& error : summary.errors) {
-    output.Talk(absl::StrCat("error: ",
-                             error["scan"].get<std::string>(),
-                             ": ",
-                             error["error"].get<std::string>()));
+    output.Talk(absl::StrCat(
+        "error: ", error["scan"].get<std::string>(), ": ", error["error"].get<std::string>()));
   }
   if (!output.json()) {
     json.erase("errors");
@@ -247,12 +246,12 @@ absl::Status Import(Context& context, ImportOptions options) {
 
 void AddScanImport(Commands& commands, CLI::App* noun) {
   auto options = std::make_shared<ImportOptions>();
-  CLI::App* import = commands.Verb(
-      noun,
-      "import",
-      "Upload files or folders of scans; what the trajectory already has is skipped",
-      "strata scan import campus scans/ --poses poses.txt --trajectory segway --wait",
-      [options](Context& context) { return Import(context, *options); });
+  CLI::App* import =
+      commands.Verb(noun,
+                    "import",
+                    "Upload files or folders of scans; what the trajectory already has is skipped",
+                    "strata scan import campus scans/ --poses poses.txt --trajectory segway --wait",
+                    [options](Context& context) { return Import(context, *options); });
   AddMapName(import, options->map);
   import->add_option("PATH", options->paths, "Files or folders of scans")->required();
   import->add_option("--format", options->format, "Format of the scans")
@@ -264,7 +263,8 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
       ->capture_default_str();
   import->add_option("--trajectory", options->trajectory, "Its name; default: that of the folder");
   import
-      ->add_option("--align", options->align, "on: register each scan to the map; off: take its pose")
+      ->add_option(
+          "--align", options->align, "on: register each scan to the map; off: take its pose")
       ->check(CLI::IsMember({"on", "off"}))
       ->capture_default_str();
   import->add_flag("--level", options->level, "Turn all poses so that the dominant floor is level");

@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include <CLI/CLI.hpp>
 
 #include "client/formats/file_bytes.h"
 #include "client/formats/geometry_writer.h"
@@ -53,13 +53,25 @@ std::string IndexTum(const std::vector<Pose>& poses, const std::string& comment)
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const Eigen::Vector3d t = poses[i].translation();
     const Eigen::Quaterniond q(poses[i].linear());
-    absl::StrAppendFormat(&text, "%d %.6f %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", i,
-                          static_cast<double>(i), t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+    absl::StrAppendFormat(&text,
+                          "%d %.6f %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n",
+                          i,
+                          static_cast<double>(i),
+                          t.x(),
+                          t.y(),
+                          t.z(),
+                          q.x(),
+                          q.y(),
+                          q.z(),
+                          q.w());
   }
   return text;
 }
 
-absl::Status WriteRobot(const World& world, const Robot& robot, std::uint64_t seed, const Options& options) {
+absl::Status WriteRobot(const World& world,
+                        const Robot& robot,
+                        std::uint64_t seed,
+                        const Options& options) {
   const std::filesystem::path folder = options.out / robot.name;
   std::filesystem::create_directories(folder / "scans");
   const std::vector<Pose> truth =
@@ -78,8 +90,8 @@ absl::Status WriteRobot(const World& world, const Robot& robot, std::uint64_t se
     STRATA_RETURN_IF_ERROR(
         WriteFileBytes(folder / "scans" / absl::StrFormat("scan%04d.pcd", i), bytes));
   }
-  std::cout << "robot " << robot.name << ": " << truth.size() << " scans, " << points << " points in "
-            << folder.string() << std::endl;
+  std::cout << "robot " << robot.name << ": " << truth.size() << " scans, " << points
+            << " points in " << folder.string() << std::endl;
   return absl::OkStatus();
 }
 
