@@ -1,9 +1,5 @@
 #include "core/engine/directory.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
@@ -18,6 +14,9 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include "core/common/status.h"
 #include "core/storage/sqlite/sqlite_storage.h"
@@ -114,7 +113,7 @@ absl::StatusOr<std::vector<std::string>> MapDirectory::ListNames() const {
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : fs::directory_iterator(path_, error)) {
     const std::string name = entry.path().stem().string();
-    if (entry.path().extension() == kSuffix && ValidateName("map name", name).ok()) {
+    if (entry.path().extension().string() == kSuffix && ValidateName("map name", name).ok()) {
       names.push_back(name);
     }
   }

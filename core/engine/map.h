@@ -10,6 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/engine/job_board.h"
 #include "core/engine/map_core.h"
 #include "core/engine/worker.h"
 
@@ -24,6 +25,7 @@ class Map {
   ~Map() { Close(); }
 
   MapCore& core() { return *core_; }
+  JobBoard& jobs() { return *jobs_; }
   Worker& worker() { return *worker_; }
 
   // RESOURCE_EXHAUSTED while too many scans wait for integration.
@@ -35,9 +37,10 @@ class Map {
   void Close();
 
  private:
-  explicit Map(std::unique_ptr<MapCore> core);
+  Map() = default;
 
   std::unique_ptr<MapCore> core_;
+  std::unique_ptr<JobBoard> jobs_;
   std::unique_ptr<Worker> worker_;
 };
 

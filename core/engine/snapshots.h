@@ -28,8 +28,7 @@ class Snapshots {
     ~Pin() {
       if (owner_ != nullptr) owner_->Release(view_);
     }
-    Pin(Pin&& other) noexcept
-        : owner_(std::exchange(other.owner_, nullptr)), view_(other.view_) {}
+    Pin(Pin&& other) noexcept : owner_(std::exchange(other.owner_, nullptr)), view_(other.view_) {}
     Pin& operator=(Pin&&) = delete;
     const MapView& view() const { return view_; }
 

@@ -42,7 +42,9 @@ float QuietNan(float value) { return std::isnan(value) ? kNan : value; }
 
 }  // namespace
 
-EngineUpload::EngineUpload(std::shared_ptr<Map> map, const api::Call& call, const ScanHeader& header)
+EngineUpload::EngineUpload(std::shared_ptr<Map> map,
+                           const api::Call& call,
+                           const ScanHeader& header)
     : map_(std::move(map)), call_(call) {
   record_.header = header;
   record_.upload = map_->core().NextUpload();
@@ -90,8 +92,8 @@ absl::Status EngineUpload::CheckChunk(const PointCloud& chunk) const {
     return absl::InvalidArgumentError("piece with an origin; fold it into the pose");
   }
   if (points_ + size > header.point_count) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        points_ + size, " points, but the header announced ", header.point_count));
+    return absl::InvalidArgumentError(
+        absl::StrCat(points_ + size, " points, but the header announced ", header.point_count));
   }
   STRATA_RETURN_IF_ERROR(
       CheckColumn("intensity", chunk.intensity.size(), header.has_intensity, size));
@@ -145,8 +147,8 @@ absl::Status EngineUpload::SealPiece() {
 absl::Status EngineUpload::StagePieces() {
   const auto put = [this](StorageWriter& writer) -> absl::Status {
     for (std::size_t i = 0; i < pieces_.size(); ++i) {
-      STRATA_RETURN_IF_ERROR(writer.PutChunk(
-          record_.upload, staged_ + static_cast<std::uint32_t>(i), pieces_[i]));
+      STRATA_RETURN_IF_ERROR(
+          writer.PutChunk(record_.upload, staged_ + static_cast<std::uint32_t>(i), pieces_[i]));
     }
     return absl::OkStatus();
   };

@@ -26,9 +26,9 @@ class WriterThread {
   ~WriterThread();
 
   // Runs `work` inside a commit on the writer's thread and returns when it is committed with that
-  // durability. kFull goes before kRelaxed; all kFull that wait share one commit, in which work that
-  // fails is undone alone. `bytes`: how much memory the work holds; with a full queue the call waits
-  // (CANCELLED, DEADLINE_EXCEEDED by `stop`). Once queued, the work is carried out.
+  // durability. kFull goes before kRelaxed; all kFull that wait share one commit, in which work
+  // that fails is undone alone. `bytes`: how much memory the work holds; with a full queue the call
+  // waits (CANCELLED, DEADLINE_EXCEEDED by `stop`). Once queued, the work is carried out.
   absl::Status Run(Durability durability, std::size_t bytes, const Stop& stop, Work work);
 
   // Carries out what is queued, then refuses everything with CANCELLED. Safe to call again.
