@@ -48,7 +48,7 @@ absl::Status FeatureOptions::Validate() const {
   OptionChecks checks("feature options");
   checks.InRange("samples_per_metre", samples_per_metre, 0.1, 100.0);
   checks.InRange("max_range_m", max_range_m, 1.0, 1e4);
-  checks.InRange("sample_count", sample_count, 10, 1000000);
+  checks.InRange("sample_count", sample_count, 0, 1000000);
   checks.InRange("neighbours", neighbours, 4, ColumnGrid::kMaxNeighbours);
   checks.InRange("neighbour_radius_m", neighbour_radius_m, 0.01, 100.0);
   return checks.status();
@@ -102,6 +102,7 @@ ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const FeatureOptions& 
   ScanFeatures features;
   features.points_ = std::move(points);
   std::array<ColumnGrid, kFeatureClasses> grids;
+  if (options.sample_count == 0) return features;
   for (int c = 0; c < kFeatureClasses; ++c) {
     grids[c] = ColumnGrid(features.points_[c], kColumnSizeM);
   }
