@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -40,6 +41,16 @@ void AppendPatch(const Patch& patch,
   for (int i = 0; i < n; ++i) {
     points[1].emplace_back(x, y, static_cast<float>(patch.bottom_m() + (i + 0.5) * depth / n));
   }
+}
+
+std::uint64_t ContentHash(const ClassPoints& points) {
+  std::uint64_t hash = 0;
+  for (const auto& list : points) {
+    for (const Eigen::Vector3f& p : list) {
+      hash = SplitMix64(hash ^ std::bit_cast<std::uint32_t>(p.z())).Next();
+    }
+  }
+  return hash;
 }
 
 }  // namespace
@@ -107,10 +118,12 @@ ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const FeatureOptions& 
     grids[c] = ColumnGrid(features.points_[c], kColumnSizeM);
   }
   const auto horizontal = static_cast<std::uint32_t>(features.points_[0].size());
+  // Not the same places in every scan, or their bias would add up along a chain of scans.
+  SplitMix64 random(options.seed ^ ContentHash(features.points_));
   const std::vector<std::uint32_t> chosen =
       SampleIndices(static_cast<std::uint32_t>(features.size()),
                     static_cast<std::uint32_t>(options.sample_count),
-                    options.seed);
+                    random);
   features.sample_.resize(chosen.size());
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     const int c = chosen[i] < horizontal ? 0 : 1;
