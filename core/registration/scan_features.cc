@@ -65,13 +65,14 @@ absl::Status FeatureOptions::Validate() const {
   return checks.status();
 }
 
-Eigen::Vector3f SurfaceNormal(const ColumnGrid& grid,
-                              const Eigen::Vector3f& p,
-                              int neighbours,
-                              float radius_m) {
+SurfaceElement FitSurfaceElement(const ColumnGrid& grid,
+                                 const Eigen::Vector3f& p,
+                                 int neighbours,
+                                 float radius_m) {
+  SurfaceElement element{p, Eigen::Vector3f::Zero()};
   std::array<std::uint32_t, ColumnGrid::kMaxNeighbours> indices;
   const int n = grid.Nearest(p, neighbours, radius_m, indices.data());
-  if (n < 4) return Eigen::Vector3f::Zero();
+  if (n < 4) return element;
   Eigen::Vector3f sum = Eigen::Vector3f::Zero();
   Eigen::Matrix3f moments = Eigen::Matrix3f::Zero();
   for (int i = 0; i < n; ++i) {
@@ -79,12 +80,14 @@ Eigen::Vector3f SurfaceNormal(const ColumnGrid& grid,
     sum += d;
     moments += d * d.transpose();
   }
-  const Eigen::Matrix3d covariance =
-      (moments - sum * sum.transpose() / static_cast<float>(n)).cast<double>();
+  const Eigen::Vector3f mean = sum / static_cast<float>(n);
+  const Eigen::Matrix3d covariance = (moments - sum * mean.transpose()).cast<double>();
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
   eigen.computeDirect(covariance);
-  if (eigen.eigenvalues()[1] < 1e-3 * eigen.eigenvalues()[2]) return Eigen::Vector3f::Zero();
-  return eigen.eigenvectors().col(0).cast<float>();
+  if (eigen.eigenvalues()[1] < 1e-3 * eigen.eigenvalues()[2]) return element;
+  element.normal = eigen.eigenvectors().col(0).cast<float>();
+  element.point += element.normal.dot(mean) * element.normal;
+  return element;
 }
 
 ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const FeatureOptions& options) {
@@ -129,11 +132,10 @@ ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const FeatureOptions& 
     const int c = chosen[i] < horizontal ? 0 : 1;
     SampledFeature& sampled = features.sample_[i];
     sampled.feature_class = static_cast<FeatureClass>(c);
-    sampled.point = features.points_[c][chosen[i] - (c == 0 ? 0 : horizontal)];
-    sampled.normal = SurfaceNormal(grids[c],
-                                   sampled.point,
-                                   options.neighbours,
-                                   static_cast<float>(options.neighbour_radius_m));
+    sampled.element = FitSurfaceElement(grids[c],
+                                        features.points_[c][chosen[i] - (c == 0 ? 0 : horizontal)],
+                                        options.neighbours,
+                                        static_cast<float>(options.neighbour_radius_m));
   }
   return features;
 }

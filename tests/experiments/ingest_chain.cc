@@ -231,6 +231,7 @@ int Main(int argc, char** argv) {
   app.add_option("--range", settings.features.max_range_m);
   CLI11_PARSE(app, argc, argv);
   settings.features.sample_count = settings.registration.max_samples;
+  settings.features.neighbours = settings.registration.neighbours;
 
   const auto wanted = [&](const std::string& name) { return only.empty() || only == name; };
   if (const auto f = testing::FindData("kitti_city_drive"); f.has_value() && wanted("kitti_city_drive")) {
