@@ -91,8 +91,8 @@ void RunEncode(benchmark::State& state, const Items& items, Encode encode) {
   }
   const World& world = TheWorld();
   const auto total = static_cast<double>(bytes);
-  state.counters["ms_per_item"] = benchmark::Counter(
-      static_cast<double>(items.size()) / 1e3,
+  state.counters["per_item"] = benchmark::Counter(
+      static_cast<double>(items.size()),
       benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
   state.counters["bytes_per_patch"] = total / static_cast<double>(world.map.patch_count());
   state.counters["bytes_per_cell"] = total / static_cast<double>(world.map.occupied_cell_count());
@@ -109,8 +109,8 @@ void RunDecode(benchmark::State& state, const Items& items, Encode encode, Decod
       benchmark::DoNotOptimize(decoded);
     }
   }
-  state.counters["ms_per_item"] = benchmark::Counter(
-      static_cast<double>(items.size()) / 1e3,
+  state.counters["per_item"] = benchmark::Counter(
+      static_cast<double>(items.size()),
       benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
