@@ -22,7 +22,7 @@ struct ScanListOptions {
   ScanFormat format = ScanFormat::kAuto;
   // The file of poses; empty: none, but 3DTK scans read the .pose files beside them if any is
   // there.
-  std::filesystem::path poses;
+  std::filesystem::path poses = {};
   PoseFormat pose_format = PoseFormat::kAuto;
 };
 
