@@ -85,7 +85,7 @@ Round RoundSolver::PointToPoint(const Pose& T_local_source, double gate_m) {
   };
   if (options_.max_samples > 0) {
     for (int i = 0; i < options_.max_samples && i < static_cast<int>(source_.sample().size()); ++i) {
-      match(source_.sample()[i].point, source_.sample()[i].feature_class);
+      match(source_.sample()[i].element.point, source_.sample()[i].feature_class);
     }
   } else {
     for (const FeatureClass c : {FeatureClass::kHorizontal, FeatureClass::kVertical}) {

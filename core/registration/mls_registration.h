@@ -38,13 +38,13 @@ struct MlsRegistrationOptions {
   // Source features used while the gate is wide, and then. kPointToPoint uses `max_samples` too, or
   // all features when it is 0. In [0, 1000000].
   int coarse_samples = 500;
-  int max_samples = 1500;
+  int max_samples = 2000;
   // Converged once the last step is below both.
   double rotation_tolerance_rad = 2e-4;
   double translation_tolerance_m = 1e-3;
   // Noise of a surface along its normal and reach of a feature within it [m]; in (0, 10].
   double normal_sigma_m = 0.03;
-  double tangent_sigma_m = 0.5;
+  double tangent_sigma_m = 0.2;
   // Cauchy kernel on residuals in units of their σ: larger ones count less; in (0, 1e6].
   double robust_width = 3.0;
   double min_overlap = 0.3;  // smaller: kTooLittleOverlap; in [0, 1]
@@ -54,7 +54,7 @@ struct MlsRegistrationOptions {
   double max_rotation_rad = 0.5;
   double min_eigenvalue_ratio = 1e-3;  // see SolveNormalEquations; in [0, 1]
   // Target side of the surface elements, as FeatureOptions has them for the source.
-  int neighbours = 20;
+  int neighbours = 16;
   double neighbour_radius_m = 1.5;
 
   // INVALID_ARGUMENT naming every field out of its range.

@@ -27,21 +27,21 @@ PlaneToPlaneMatcher::PlaneToPlaneMatcher(const ScanFeatures& source,
                                          const MlsRegistrationOptions& options)
     : source_(source), target_(target), options_(options) {
   for (int c = 0; c < kFeatureClasses; ++c) {
-    normal_index_[c].assign(target.grid(static_cast<FeatureClass>(c)).points().size(), 0);
+    element_index_[c].assign(target.grid(static_cast<FeatureClass>(c)).points().size(), 0);
   }
 }
 
-const Eigen::Vector3f& PlaneToPlaneMatcher::TargetNormal(FeatureClass c, std::uint32_t index) {
-  std::uint32_t& known = normal_index_[static_cast<std::size_t>(c)][index];
+const SurfaceElement& PlaneToPlaneMatcher::TargetElement(FeatureClass c, std::uint32_t index) {
+  std::uint32_t& known = element_index_[static_cast<std::size_t>(c)][index];
   if (known == 0) {
     const ColumnGrid& grid = target_.grid(c);
-    normals_.push_back(SurfaceNormal(grid,
+    elements_.push_back(FitSurfaceElement(grid,
                                      grid.points()[index],
                                      options_.neighbours,
                                      static_cast<float>(options_.neighbour_radius_m)));
-    known = static_cast<std::uint32_t>(normals_.size());
+    known = static_cast<std::uint32_t>(elements_.size());
   }
-  return normals_[known - 1];
+  return elements_[known - 1];
 }
 
 PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
@@ -59,15 +59,16 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
   sums.selected = static_cast<int>(n);
   for (std::size_t i = 0; i < n; ++i) {
     const SampledFeature& sampled = source_.sample()[i];
-    const Eigen::Vector3d p = sampled.point.cast<double>();
+    const Eigen::Vector3d p = sampled.element.point.cast<double>();
     const ColumnGrid& grid = target_.grid(sampled.feature_class);
     const Eigen::Vector3d p_target = R * p + t;
     const std::uint32_t j = grid.Nearest(p_target.cast<float>(), static_cast<float>(gate_m));
     if (j == ColumnGrid::kNone) continue;
-    const Eigen::Vector3d r = R.transpose() * (grid.points()[j].cast<double>() - p_target);
-    const Eigen::Vector3d normal_p = sampled.normal.cast<double>();
-    const Eigen::Vector3d normal_q =
-        fine ? R.transpose() * TargetNormal(sampled.feature_class, j).cast<double>() : normal_p;
+    const SurfaceElement q = fine ? TargetElement(sampled.feature_class, j)
+                                  : SurfaceElement{grid.points()[j], R.cast<float>() * sampled.element.normal};
+    const Eigen::Vector3d r = R.transpose() * (q.point.cast<double>() - p_target);
+    const Eigen::Vector3d normal_p = sampled.element.normal.cast<double>();
+    const Eigen::Vector3d normal_q = R.transpose() * q.normal.cast<double>();
     const Eigen::Matrix3d C = 2.0 * tangent2 * Eigen::Matrix3d::Identity() -
                               flattening * (normal_p * normal_p.transpose() +
                                             normal_q * normal_q.transpose());

@@ -42,13 +42,13 @@ class PlaneToPlaneMatcher {
   PlaneToPlaneSums Linearise(const Pose& T_target_source, double gate_m, bool fine);
 
  private:
-  const Eigen::Vector3f& TargetNormal(FeatureClass c, std::uint32_t index);
+  const SurfaceElement& TargetElement(FeatureClass c, std::uint32_t index);
 
   const ScanFeatures& source_;
   const RegistrationTarget& target_;
   const MlsRegistrationOptions& options_;
-  std::array<std::vector<std::uint32_t>, kFeatureClasses> normal_index_;  // 0: not computed yet
-  std::vector<Eigen::Vector3f> normals_;
+  std::array<std::vector<std::uint32_t>, kFeatureClasses> element_index_;  // 0: not computed yet
+  std::vector<SurfaceElement> elements_;
 };
 
 }  // namespace strata

@@ -3,7 +3,6 @@
 #define STRATA_CORE_REGISTRATION_RANDOM_H_
 
 #include <cstdint>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -30,18 +29,20 @@ class SplitMix64 {
   std::uint64_t state_;
 };
 
-// `count` different numbers out of [0, size) in random order; all of them when count ≥ size.
+// `count` different numbers out of [0, size), one out of each of `count` equal stretches, in random
+// order; all of them when count ≥ size. Even along the order of what they index, which for the
+// features of a map means even over its area.
 inline std::vector<std::uint32_t> SampleIndices(std::uint32_t size,
                                                 std::uint32_t count,
-                                                std::uint64_t seed) {
-  std::vector<std::uint32_t> indices(size);
-  std::iota(indices.begin(), indices.end(), 0U);
-  SplitMix64 random(seed);
+                                                SplitMix64& random) {
   if (count > size) count = size;
+  std::vector<std::uint32_t> indices(count);
   for (std::uint32_t i = 0; i < count; ++i) {
-    std::swap(indices[i], indices[i + random.Below(size - i)]);
+    const auto begin = static_cast<std::uint32_t>(std::uint64_t{i} * size / count);
+    const auto end = static_cast<std::uint32_t>((std::uint64_t{i} + 1) * size / count);
+    indices[i] = begin + random.Below(end - begin);
   }
-  indices.resize(count);
+  for (std::uint32_t i = count; i > 1; --i) std::swap(indices[i - 1], indices[random.Below(i)]);
   return indices;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -42,25 +43,36 @@ void AppendPatch(const Patch& patch,
   }
 }
 
+std::uint64_t ContentHash(const ClassPoints& points) {
+  std::uint64_t hash = 0;
+  for (const auto& list : points) {
+    for (const Eigen::Vector3f& p : list) {
+      hash = SplitMix64(hash ^ std::bit_cast<std::uint32_t>(p.z())).Next();
+    }
+  }
+  return hash;
+}
+
 }  // namespace
 
 absl::Status FeatureOptions::Validate() const {
   OptionChecks checks("feature options");
   checks.InRange("samples_per_metre", samples_per_metre, 0.1, 100.0);
   checks.InRange("max_range_m", max_range_m, 1.0, 1e4);
-  checks.InRange("sample_count", sample_count, 10, 1000000);
+  checks.InRange("sample_count", sample_count, 0, 1000000);
   checks.InRange("neighbours", neighbours, 4, ColumnGrid::kMaxNeighbours);
   checks.InRange("neighbour_radius_m", neighbour_radius_m, 0.01, 100.0);
   return checks.status();
 }
 
-Eigen::Vector3f SurfaceNormal(const ColumnGrid& grid,
-                              const Eigen::Vector3f& p,
-                              int neighbours,
-                              float radius_m) {
+SurfaceElement FitSurfaceElement(const ColumnGrid& grid,
+                                 const Eigen::Vector3f& p,
+                                 int neighbours,
+                                 float radius_m) {
+  SurfaceElement element{p, Eigen::Vector3f::Zero()};
   std::array<std::uint32_t, ColumnGrid::kMaxNeighbours> indices;
   const int n = grid.Nearest(p, neighbours, radius_m, indices.data());
-  if (n < 4) return Eigen::Vector3f::Zero();
+  if (n < 4) return element;
   Eigen::Vector3f sum = Eigen::Vector3f::Zero();
   Eigen::Matrix3f moments = Eigen::Matrix3f::Zero();
   for (int i = 0; i < n; ++i) {
@@ -68,12 +80,14 @@ Eigen::Vector3f SurfaceNormal(const ColumnGrid& grid,
     sum += d;
     moments += d * d.transpose();
   }
-  const Eigen::Matrix3d covariance =
-      (moments - sum * sum.transpose() / static_cast<float>(n)).cast<double>();
+  const Eigen::Vector3f mean = sum / static_cast<float>(n);
+  const Eigen::Matrix3d covariance = (moments - sum * mean.transpose()).cast<double>();
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
   eigen.computeDirect(covariance);
-  if (eigen.eigenvalues()[1] < 1e-3 * eigen.eigenvalues()[2]) return Eigen::Vector3f::Zero();
-  return eigen.eigenvectors().col(0).cast<float>();
+  if (eigen.eigenvalues()[1] < 1e-3 * eigen.eigenvalues()[2]) return element;
+  element.normal = eigen.eigenvectors().col(0).cast<float>();
+  element.point += element.normal.dot(mean) * element.normal;
+  return element;
 }
 
 ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const FeatureOptions& options) {
@@ -102,24 +116,26 @@ ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const FeatureOptions& 
   ScanFeatures features;
   features.points_ = std::move(points);
   std::array<ColumnGrid, kFeatureClasses> grids;
+  if (options.sample_count == 0) return features;
   for (int c = 0; c < kFeatureClasses; ++c) {
     grids[c] = ColumnGrid(features.points_[c], kColumnSizeM);
   }
   const auto horizontal = static_cast<std::uint32_t>(features.points_[0].size());
+  // Not the same places in every scan, or their bias would add up along a chain of scans.
+  SplitMix64 random(options.seed ^ ContentHash(features.points_));
   const std::vector<std::uint32_t> chosen =
       SampleIndices(static_cast<std::uint32_t>(features.size()),
                     static_cast<std::uint32_t>(options.sample_count),
-                    options.seed);
+                    random);
   features.sample_.resize(chosen.size());
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     const int c = chosen[i] < horizontal ? 0 : 1;
     SampledFeature& sampled = features.sample_[i];
     sampled.feature_class = static_cast<FeatureClass>(c);
-    sampled.point = features.points_[c][chosen[i] - (c == 0 ? 0 : horizontal)];
-    sampled.normal = SurfaceNormal(grids[c],
-                                   sampled.point,
-                                   options.neighbours,
-                                   static_cast<float>(options.neighbour_radius_m));
+    sampled.element = FitSurfaceElement(grids[c],
+                                        features.points_[c][chosen[i] - (c == 0 ? 0 : horizontal)],
+                                        options.neighbours,
+                                        static_cast<float>(options.neighbour_radius_m));
   }
   return features;
 }

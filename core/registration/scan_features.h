@@ -24,30 +24,36 @@ struct FeatureOptions {
   // Features farther than this from the scan's origin are left out; in [1, 10000]. They hold few of
   // a scan's points but spread its search structure.
   double max_range_m = 120.0;
-  // Size of the random sample that is matched when the scan is a source; in [10, 1000000]. Costs
-  // about 2 µs each here and 5 µs in a registration.
-  int sample_count = 1500;
+  // Size of the random sample that is matched when the scan is a source; in [0, 1000000], 0 for a
+  // scan that is only ever a target. Costs about 1.5 µs each here and 4 µs in a registration.
+  int sample_count = 2000;
   std::uint64_t seed = 1;
-  int neighbours = 20;                // that span a surface element; in [4, 32]
+  int neighbours = 16;                // that span a surface element; in [4, 32]
   double neighbour_radius_m = 1.5;    // farther ones do not count; in [0.01, 100]
 
   // INVALID_ARGUMENT naming every field out of its range.
   absl::Status Validate() const;
 };
 
-// A point of the sample with the normal of the surface around it.
-struct SampledFeature {
+// A feature and the surface around it.
+struct SurfaceElement {
+  // The feature, moved along the normal into the plane of its neighbours: evens out the noise of the
+  // measurements and of the cells' width across the surface.
   Eigen::Vector3f point = Eigen::Vector3f::Zero();
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();  // unit, sign arbitrary; zero: no surface there
+};
+
+struct SampledFeature {
+  SurfaceElement element;
   FeatureClass feature_class = FeatureClass::kHorizontal;
 };
 
-// The unit normal of the plane through up to `neighbours` points of `grid` around `p`; zero when
-// fewer than four lie within `radius_m` or they do not span a plane.
-Eigen::Vector3f SurfaceNormal(const ColumnGrid& grid,
-                              const Eigen::Vector3f& p,
-                              int neighbours,
-                              float radius_m);
+// The plane through up to `neighbours` points of `grid` around its feature `p`. When fewer than four
+// lie within `radius_m`, or they do not span a plane, the normal is zero and the point `p`.
+SurfaceElement FitSurfaceElement(const ColumnGrid& grid,
+                                 const Eigen::Vector3f& p,
+                                 int neighbours,
+                                 float radius_m);
 
 // Registration features of one local map in its scan frame: one point per horizontal patch (cell
 // centre, mean height), evenly spaced points along each vertical one, and a sample of both with

@@ -17,12 +17,13 @@
 
 #include <CLI/CLI.hpp>
 
+#include "core/cloud/sensor_model.h"
+#include "core/mls/build.h"
 #include "core/registration/mls_registration.h"
 #include "tests/bench/registration_peers.h"
 #include "tests/bench/simulated_bridge.h"
 #include "tests/support/data_dir.h"
 #include "tests/support/pcd.h"
-#include "tests/support/tiny_map.h"
 
 namespace strata::bench {
 namespace {
@@ -159,14 +160,16 @@ int Main(int argc, char** argv) {
   features.neighbours = options.neighbours;
   features.neighbour_radius_m = options.neighbour_radius_m;
 
+  FeatureOptions target_only = features;
+  target_only.sample_count = 0;
   double feat_ms = 0, target_ms = 0, reg_ms = 0; int its=0, n=0; double nf=0;
   const auto now = [] { return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count(); };
-  std::map<const Pair*, std::pair<MlsMap, MlsMap>> maps;
+  MlsScratch scratch;
+  const auto build = [&](const PointCloud& c) { return BuildMlsMap(c, Pose::Identity(), SensorModel(), mls, scratch).value().map; };
   const auto ours = [&](const Pair& pair, const Pose& guess, const MlsRegistrationOptions& o) {
-    const auto& [source_map, target_map] = maps.at(&pair);
     double t0 = now();
-    const ScanFeatures source = ScanFeatures::FromMap(source_map, features);
-    const ScanFeatures target_features = ScanFeatures::FromMap(target_map, features);
+    const ScanFeatures source = ScanFeatures::FromMap(build(pair.source), features);
+    const ScanFeatures target_features = ScanFeatures::FromMap(build(pair.target), target_only);
     double t1 = now();
     const PlacedScan placed[] = {{&target_features, Pose::Identity()}};
     const RegistrationTarget target(placed);
@@ -191,8 +194,7 @@ int Main(int argc, char** argv) {
                        }});
   }
   auto run = [&](const char* name, const std::vector<Pair>& ps) {
-    maps.clear(); feat_ms = target_ms = reg_ms = 0; its = n = 0; nf = 0;
-    for (auto& p : ps) maps[&p] = {testing::TinyMap(p.source, mls), testing::TinyMap(p.target, mls)};
+    feat_ms = target_ms = reg_ms = 0; its = n = 0; nf = 0;
     Print(name, ps, methods, seed);
     if (ours_only && n) std::printf("    features %.2f target %.2f register %.2f ms; iterations %.1f features %.0f\n", feat_ms / n, target_ms / n, reg_ms / n, double(its) / n, nf / n);
   };

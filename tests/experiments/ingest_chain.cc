@@ -18,12 +18,13 @@
 
 #include <CLI/CLI.hpp>
 
+#include "core/cloud/sensor_model.h"
+#include "core/mls/build.h"
 #include "core/registration/mls_registration.h"
 #include "core/registration/neighbours.h"
 #include "core/registration/umeyama.h"
 #include "tests/support/data_dir.h"
 #include "tests/support/pcd.h"
-#include "tests/support/tiny_map.h"
 
 namespace strata {
 namespace {
@@ -98,6 +99,7 @@ void WriteTum(const std::filesystem::path& path, const std::vector<Pose>& poses)
 }
 
 std::vector<Pose> Place(const Recording& recording, const Settings& settings) {
+  MlsScratch scratch;
   std::vector<ScanFeatures> features;
   std::vector<Pose> poses;
   std::map<Termination, int> outcomes;
@@ -111,8 +113,11 @@ std::vector<Pose> Place(const Recording& recording, const Settings& settings) {
         .count();
   };
   for (std::size_t i = 0; i < recording.clouds.size(); ++i) {
-    const MlsMap map = testing::TinyMap(recording.clouds[i], settings.mls);
     const double start = now();
+    const MlsMap map =
+        BuildMlsMap(recording.clouds[i], Pose::Identity(), SensorModel(), settings.mls, scratch)
+            .value()
+            .map;
     features.push_back(ScanFeatures::FromMap(map, settings.features));
     features_ms += now() - start;
     if (i == 0) {
@@ -190,9 +195,13 @@ void PrintClosure(const std::vector<Pose>& poses, const std::filesystem::path& f
     for (int column = 0; column < 4; ++column) in >> T_900_0.matrix()(row, column);
   }
   const Pose error = poses.back().inverse() * poses.front() * T_900_0.inverse();
-  std::printf("%-18s closure %.3f m %.3f deg\n",
+  const Eigen::Vector3d t = error.translation();
+  std::printf("%-18s closure %.3f m (%.3f %.3f %.3f) %.3f deg\n",
               "",
-              error.translation().norm(),
+              t.norm(),
+              t.x(),
+              t.y(),
+              t.z(),
               RotationAngleRad(error) * kDegrees);
 }
 
@@ -215,10 +224,14 @@ int Main(int argc, char** argv) {
   app.add_option("--normal-sigma", settings.registration.normal_sigma_m);
   app.add_option("--tangent-sigma", settings.registration.tangent_sigma_m);
   app.add_option("--min-overlap", settings.registration.min_overlap);
+  app.add_option("--seed", settings.features.seed);
+  app.add_option("--neighbour-count", settings.registration.neighbours);
+  app.add_option("--neighbour-radius", settings.registration.neighbour_radius_m);
   app.add_option("--thinning", settings.target.thinning_m);
   app.add_option("--range", settings.features.max_range_m);
   CLI11_PARSE(app, argc, argv);
   settings.features.sample_count = settings.registration.max_samples;
+  settings.features.neighbours = settings.registration.neighbours;
 
   const auto wanted = [&](const std::string& name) { return only.empty() || only == name; };
   if (const auto f = testing::FindData("kitti_city_drive"); f.has_value() && wanted("kitti_city_drive")) {

@@ -32,7 +32,7 @@ struct PictureOptions {
   double azimuth_rad = -1.5707963267948966;
   double elevation_rad = 1.5707963267948966;
   // Only what lies between these heights; vertical patches are cut.
-  std::optional<std::pair<double, double>> slice_m;
+  std::optional<std::pair<double, double>> slice_m = std::nullopt;
 };
 
 struct Picture {

@@ -115,24 +115,42 @@ std::vector<Eigen::Vector3f> ReadPlainPcd(const std::filesystem::path& file) {
   return points;
 }
 
-MlsMap NcltMap(const std::filesystem::path& folder, int stride) {
-  const MlsParameters parameters;
-  const SensorModel sensor;
-  std::vector<Measurement> measurements;
+namespace {
+
+// Calls visit(p_map, range) for every point of the scans whose index is a multiple of `stride`.
+template <typename Visit>
+void ForEachNcltPoint(const std::filesystem::path& folder, int stride, Visit visit) {
   for (const auto& [index, T_map_scan] : ReadPoses(folder / "poses_reference.txt")) {
     const std::filesystem::path file = folder / "scans" / absl::StrFormat("s%03d.pcd", index);
     if (index % stride != 0 || !std::filesystem::exists(file)) continue;
     for (const Eigen::Vector3f& p_scan : ReadPlainPcd(file)) {
-      const Eigen::Vector3d p = T_map_scan * p_scan.cast<double>();
-      const CellIndex cell{static_cast<std::int32_t>(std::floor(p.x() / parameters.cell_size_m)),
-                           static_cast<std::int32_t>(std::floor(p.y() / parameters.cell_size_m))};
-      measurements.push_back({TileOfCell(cell),
-                              CellInTile(cell),
-                              static_cast<std::int32_t>(std::lround(p.z() * kTicksPerMetre)),
-                              SigmaCode(sensor.SigmaAt(p_scan.norm()))});
+      visit(T_map_scan * p_scan.cast<double>(), p_scan.norm());
     }
   }
+}
+
+}  // namespace
+
+MlsMap NcltMap(const std::filesystem::path& folder, int stride) {
+  const MlsParameters parameters;
+  const SensorModel sensor;
+  std::vector<Measurement> measurements;
+  ForEachNcltPoint(folder, stride, [&](const Eigen::Vector3d& p, float range_m) {
+    const CellIndex cell{static_cast<std::int32_t>(std::floor(p.x() / parameters.cell_size_m)),
+                         static_cast<std::int32_t>(std::floor(p.y() / parameters.cell_size_m))};
+    measurements.push_back({TileOfCell(cell),
+                            CellInTile(cell),
+                            static_cast<std::int32_t>(std::lround(p.z() * kTicksPerMetre)),
+                            SigmaCode(sensor.SigmaAt(range_m))});
+  });
   return JoinAll(std::move(measurements), parameters);
+}
+
+std::vector<Eigen::Vector3d> NcltPointsInMap(const std::filesystem::path& folder) {
+  std::vector<Eigen::Vector3d> points;
+  ForEachNcltPoint(
+      folder, 1, [&](const Eigen::Vector3d& p, float /*range_m*/) { points.push_back(p); });
+  return points;
 }
 
 }  // namespace strata::testing

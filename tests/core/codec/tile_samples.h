@@ -21,6 +21,9 @@ std::vector<Eigen::Vector3f> ReadPlainPcd(const std::filesystem::path& file);
 // built in the plainest way: all measurements sorted, joined one by one.
 MlsMap NcltMap(const std::filesystem::path& folder, int stride);
 
+// The points of all NCLT scans at reference poses.
+std::vector<Eigen::Vector3d> NcltPointsInMap(const std::filesystem::path& folder);
+
 }  // namespace strata::testing
 
 #endif  // STRATA_TESTS_CORE_CODEC_TILE_SAMPLES_H_
