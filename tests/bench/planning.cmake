@@ -1,0 +1,8 @@
+find_package(Boost 1.74 REQUIRED)
+strata_executable(
+  planning_benchmark planning_benchmark
+  SOURCES planning_benchmark.cc
+  DEPS strata::planning strata::test_support Boost::headers
+)
+# g++ 12 sees writes out of bounds in Boost 1.74's CSR constructor where there are none.
+target_compile_options(planning_benchmark PRIVATE -Wno-array-bounds -Wno-stringop-overflow)
