@@ -45,6 +45,7 @@ float FirstSquaredRange(const SensorModel& model, std::uint8_t code) {
 // machine.
 using Float4 [[gnu::vector_size(16)]] = float;
 using Int4 [[gnu::vector_size(16)]] = std::int32_t;  // of a comparison: 0 or −1 (all bits)
+using Uint4 [[gnu::vector_size(16)]] = std::uint32_t;
 
 Int4 Bits(Float4 v) { return std::bit_cast<Int4>(v); }
 Float4 Where(Int4 mask, Float4 v) { return std::bit_cast<Float4>(mask & Bits(v)); }
@@ -157,7 +158,7 @@ void Quantize(const Eigen::Vector3f* points,
   const auto far2 = static_cast<float>(sensor.max_range_m * sensor.max_range_m);
   const Bounds bounds(frame);
   const ScanFrame f = frame;  // a copy that the stores below cannot alias
-  const auto base_z = static_cast<std::int32_t>(static_cast<std::uint32_t>(f.base_z));
+  const std::uint32_t z_bias = static_cast<std::uint32_t>(f.base_z) + (1U << 23);
   Tally tally;
   const auto quantize4 = [&](const float* p, std::size_t i) {
     const Points4 points4 = Load(p);
@@ -180,21 +181,21 @@ void Quantize(const Eigen::Vector3f* points,
     const Int4 bits = Bits(Where(in_range, r2));
     constexpr auto kFirst = static_cast<std::int32_t>(RangeSigmaTable::kFirstBits);
     const Int4 first = {kFirst, kFirst, kFirst, kFirst};
-    const Int4 x_window = x + 32768;
-    const Int4 y_window = y + 32768;
-    // Unsigned shifts: heights in ticks fill 24 bits, the window's cells 16.
+    // Unsigned from here: dropped points may wrap.
+    const Uint4 x_window = std::bit_cast<Uint4>(x) + 32768U;
+    const Uint4 y_window = std::bit_cast<Uint4>(y) + 32768U;
     Store(block.x, i, x);
     Store(block.y, i, y);
     Store(block.cell,
           i,
-          ((x_window & 0xFF00) << 16) | ((y_window & 0xFFFF) << 8) | (x_window & 0xFF));
-    Store(block.height, i, ((z + base_z + (1 << 23)) << 8) | 0xFF);
+          ((x_window & 0xFF00U) << 16) | ((y_window & 0xFFFFU) << 8) | (x_window & 0xFFU));
+    Store(block.height, i, ((std::bit_cast<Uint4>(z) + z_bias) << 8) | 0xFFU);
     Store(block.squared_range, i, Select(bits > first, bits, first));
     Store(block.kept, i, kept & 1);
     tally.finite += finite;
     tally.in_range += in_range;
     tally.kept += kept;
-    tally.spread |= kept & (x_window | y_window);
+    tally.spread |= kept & std::bit_cast<Int4>(x_window | y_window);
   };
   const std::size_t whole = count & ~std::size_t{3};
   const float* const p = points->data();
