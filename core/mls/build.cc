@@ -501,6 +501,7 @@ absl::StatusOr<MlsBuildResult> BuildMlsMap(const PointCloud& cloud,
   const auto build = [&]<typename Item>() {
     const std::size_t near_count = CollectItems<Item>(cloud, frame, buffers, result.dropped);
     result.map.tiles = EmitTiles<Item>(cloud, frame, parameters, near_count, buffers);
+    result.map.tiles.shrink_to_fit();
   };
   if (cloud.colour.empty() && cloud.label.empty()) {
     build.operator()<Measurement>();
