@@ -25,7 +25,7 @@ bool Before(const Patch& a, const Patch& b) {
 void Append(std::vector<Patch>& joined, const Patch& patch, const MlsParameters& parameters) {
   if (!joined.empty() && joined.back().cell == patch.cell &&
       Touching(joined.back(), patch, parameters)) {
-    joined.back() = Join(joined.back(), patch, parameters);
+    JoinInto(joined.back(), patch, parameters);
   } else {
     joined.push_back(patch);
   }

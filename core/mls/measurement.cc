@@ -1,10 +1,12 @@
 #include "core/mls/measurement.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 
 #include "core/mls/patch.h"
@@ -23,13 +25,13 @@ std::int64_t TileCornerBelow(double cells) {
 }
 
 // The smallest float r² whose σ code is at least `code`; infinity when there is none.
-float FirstSquaredRange(const SensorModel& model, int code, double sigma_m) {
+float FirstSquaredRange(const SensorModel& model, std::uint8_t code) {
   const auto reached = [&](float squared_range) {
-    const double range_m = std::sqrt(static_cast<double>(squared_range));
-    return SigmaCode(model.SigmaAt(range_m)) >= code;
+    return SigmaCode(model.SigmaAt(std::sqrt(double{squared_range}))) >= code;
   };
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  const double range_m = std::max(0.0, (sigma_m - model.sigma_m) / model.sigma_per_metre);
+  const double range_m =
+      std::max(0.0, (SigmaCodeBoundary(code) - model.sigma_m) / model.sigma_per_metre);
   if (!(range_m <= 1e6)) return kInfinity;
   float squared_range = static_cast<float>(range_m * range_m);
   while (!reached(squared_range)) squared_range = std::nextafter(squared_range, kInfinity);
@@ -39,27 +41,86 @@ float FirstSquaredRange(const SensorModel& model, int code, double sigma_m) {
   return squared_range;
 }
 
-}  // namespace
+// Four points side by side. The vector extension of g++ and clang is the same arithmetic on every
+// machine.
+using Float4 [[gnu::vector_size(16)]] = float;
+using Int4 [[gnu::vector_size(16)]] = std::int32_t;  // of a comparison: 0 or −1 (all bits)
+using Uint4 [[gnu::vector_size(16)]] = std::uint32_t;
 
-std::size_t RangeSigmaTable::BinOf(float squared_range) {
-  const std::uint32_t bits = std::bit_cast<std::uint32_t>(squared_range) >> kBinShift;
-  return bits < kFirstBin ? 0 : bits - kFirstBin;
+Int4 Bits(Float4 v) { return std::bit_cast<Int4>(v); }
+Float4 Where(Int4 mask, Float4 v) { return std::bit_cast<Float4>(mask & Bits(v)); }
+Int4 Select(Int4 mask, Int4 a, Int4 b) { return (mask & a) | (~mask & b); }
+
+Int4 Floor(Float4 v) {
+  const Int4 truncated = __builtin_convertvector(v, Int4);
+  return truncated + (__builtin_convertvector(truncated, Float4) > v);
 }
 
-RangeSigmaTable::RangeSigmaTable(const SensorModel& model) : model_(model) {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  std::uint32_t code = SigmaCode(model.SigmaAt(0.0));
-  std::size_t filled = 0;
-  for (int next = static_cast<int>(code) + 1; next < 256; ++next) {
-    const float step =
-        FirstSquaredRange(model, next, SigmaCodeBoundary(static_cast<std::uint8_t>(next)));
-    if (step == kInfinity) break;
-    const std::size_t bin = BinOf(step);
-    while (filled < bin) bins_[filled++] = {kInfinity, code};
-    bins_[filled++] = {step, code};
-    code = static_cast<std::uint32_t>(next);
+template <typename Vector, typename Array>
+void Store(Array& array, std::size_t i, Vector v) {
+  std::memcpy(&array[i], &v, sizeof(v));
+}
+
+struct Points4 {
+  Float4 x, y, z;
+};
+
+Points4 Load(const float* p) {
+  Float4 a, b, c;  // x y z x | y z x y | z x y z
+  std::memcpy(&a, p, sizeof(a));
+  std::memcpy(&b, p + 4, sizeof(b));
+  std::memcpy(&c, p + 8, sizeof(c));
+  const Float4 x01_y23 = __builtin_shufflevector(a, b, 0, 3, 4, 7);
+  return {
+      .x = __builtin_shufflevector(__builtin_shufflevector(a, b, 0, 3, 6, 6), c, 0, 1, 2, 5),
+      .y = __builtin_shufflevector(__builtin_shufflevector(a, x01_y23, 1, 6, 7, 7), c, 0, 1, 2, 6),
+      .z = __builtin_shufflevector(__builtin_shufflevector(a, b, 2, 5, 5, 5), c, 0, 1, 4, 7)};
+}
+
+struct Bounds {
+  explicit Bounds(const ScanFrame& frame)
+      : x_low(ClampToInt32(-std::int64_t{kMaxCellIndex} - frame.base_x)),
+        x_high(ClampToInt32(std::int64_t{kMaxCellIndex} - 1 - frame.base_x)),
+        y_low(ClampToInt32(-std::int64_t{kMaxCellIndex} - frame.base_y)),
+        y_high(ClampToInt32(std::int64_t{kMaxCellIndex} - 1 - frame.base_y)),
+        z_low(ClampToInt32(-std::int64_t{kMaxZTicks} - frame.base_z)),
+        z_high(ClampToInt32(std::int64_t{kMaxZTicks} - frame.base_z)) {}
+
+  Int4 Contain(Int4 x, Int4 y, Int4 z) const {
+    return (x >= x_low) & (x <= x_high) & (y >= y_low) & (y <= y_high) & (z >= z_low) &
+           (z <= z_high);
   }
-  while (filled < kBins) bins_[filled++] = {kInfinity, code};
+
+  std::int32_t x_low, x_high, y_low, y_high, z_low, z_high;
+};
+
+// Per lane, how many points passed each test (negative: sums of masks), and where they lie.
+struct Tally {
+  Int4 finite = {0, 0, 0, 0};
+  Int4 in_range = {0, 0, 0, 0};
+  Int4 kept = {0, 0, 0, 0};
+  Int4 spread = {0, 0, 0, 0};
+};
+
+std::size_t Total(Int4 masks) {
+  return static_cast<std::size_t>(-(masks[0] + masks[1] + masks[2] + masks[3]));
+}
+
+}  // namespace
+
+RangeSigmaTable::RangeSigmaTable(const SensorModel& model) : model_(model) {
+  const double first_range_m = std::sqrt(double{std::bit_cast<float>(kFirstBits)});
+  std::uint32_t code = SigmaCode(model.SigmaAt(first_range_m));
+  std::size_t filled = 0;
+  for (std::uint32_t next = code + 1; next < 256; ++next) {
+    const float step = FirstSquaredRange(model, static_cast<std::uint8_t>(next));
+    if (step == std::numeric_limits<float>::infinity()) break;
+    const std::uint32_t bits = std::bit_cast<std::uint32_t>(step) - kFirstBits;
+    while (filled < bits >> kBinShift) bins_[filled++] = code << kBinShift;
+    bins_[filled++] = (code << kBinShift) + (kBelowBin + 1 - (bits & kBelowBin));
+    code = next;
+  }
+  while (filled < kBins) bins_[filled++] = code << kBinShift;
 }
 
 ScanFrame::ScanFrame(const PointCloud& cloud,
@@ -91,66 +152,65 @@ void Quantize(const Eigen::Vector3f* points,
               const SensorModel& sensor,
               QuantizedBlock& block,
               DroppedPoints& dropped) {
-  const ScanFrame f = frame;  // a copy the stores below cannot alias
+  constexpr float kLargest = std::numeric_limits<float>::max();
+  constexpr Float4 kTickBound = {0x1p30F, 0x1p30F, 0x1p30F, 0x1p30F};  // still an int
   const auto near2 = static_cast<float>(sensor.min_range_m * sensor.min_range_m);
   const auto far2 = static_cast<float>(sensor.max_range_m * sensor.max_range_m);
-  const std::int32_t x_low = ClampToInt32(-std::int64_t{kMaxCellIndex} - f.base_x);
-  const std::int32_t x_high = ClampToInt32(std::int64_t{kMaxCellIndex} - 1 - f.base_x);
-  const std::int32_t y_low = ClampToInt32(-std::int64_t{kMaxCellIndex} - f.base_y);
-  const std::int32_t y_high = ClampToInt32(std::int64_t{kMaxCellIndex} - 1 - f.base_y);
-  const std::int32_t z_low = ClampToInt32(-std::int64_t{kMaxZTicks} - f.base_z);
-  const std::int32_t z_high = ClampToInt32(std::int64_t{kMaxZTicks} - f.base_z);
-  const auto base_z = static_cast<std::uint32_t>(f.base_z);
-  constexpr float kLargest = std::numeric_limits<float>::max();
-  constexpr float kTickBound = 1 << 30;  // beyond every bound above, and an int
-
-  std::int32_t finite_count = 0;
-  std::int32_t in_range_count = 0;
-  std::int32_t kept_count = 0;
-  std::uint32_t spread = 0;
-  const float* p = points->data();
-  for (std::size_t i = 0; i < count; ++i) {
-    float dx = p[3 * i] - f.sensor[0];
-    float dy = p[3 * i + 1] - f.sensor[1];
-    float dz = p[3 * i + 2] - f.sensor[2];
-    const float r2 = dx * dx + dy * dy + dz * dz;
-    const std::int32_t finite = r2 <= kLargest ? 1 : 0;
-    const std::int32_t in_range = (r2 >= near2 ? 1 : 0) & (r2 <= far2 ? 1 : 0) & finite;
-    dx = in_range != 0 ? dx : 0.0F;
-    dy = in_range != 0 ? dy : 0.0F;
-    dz = in_range != 0 ? dz : 0.0F;
-    const float ux = f.A[0][0] * dx + f.A[0][1] * dy + f.A[0][2] * dz + f.t[0];
-    const float uy = f.A[1][0] * dx + f.A[1][1] * dy + f.A[1][2] * dz + f.t[1];
-    float uz = f.A[2][0] * dx + f.A[2][1] * dy + f.A[2][2] * dz + f.t[2];
+  const Bounds bounds(frame);
+  const ScanFrame f = frame;  // a copy that the stores below cannot alias
+  const std::uint32_t z_bias = static_cast<std::uint32_t>(f.base_z) + (1U << 23);
+  Tally tally;
+  const auto quantize4 = [&](const float* p, std::size_t i) {
+    const Points4 points4 = Load(p);
+    Float4 dx = points4.x - f.sensor[0];
+    Float4 dy = points4.y - f.sensor[1];
+    Float4 dz = points4.z - f.sensor[2];
+    const Float4 r2 = dx * dx + dy * dy + dz * dz;
+    const Int4 finite = r2 <= kLargest;
+    const Int4 in_range = (r2 >= near2) & (r2 <= far2) & finite;
+    dx = Where(in_range, dx);  // so that the conversions below are defined
+    dy = Where(in_range, dy);
+    dz = Where(in_range, dz);
+    const Int4 x = Floor(f.A[0][0] * dx + f.A[0][1] * dy + f.A[0][2] * dz + f.t[0]);
+    const Int4 y = Floor(f.A[1][0] * dx + f.A[1][1] * dy + f.A[1][2] * dz + f.t[1]);
+    Float4 uz = f.A[2][0] * dx + f.A[2][1] * dy + f.A[2][2] * dz + f.t[2];
     uz = uz < kTickBound ? uz : kTickBound;
     uz = uz > -kTickBound ? uz : -kTickBound;
-    // Truncation, one less where it went up, is the floor.
-    std::int32_t x = static_cast<std::int32_t>(ux);
-    std::int32_t y = static_cast<std::int32_t>(uy);
-    std::int32_t z = static_cast<std::int32_t>(uz);
-    x -= static_cast<float>(x) > ux ? 1 : 0;
-    y -= static_cast<float>(y) > uy ? 1 : 0;
-    z -= static_cast<float>(z) > uz ? 1 : 0;
-    const std::int32_t inside = (x >= x_low ? 1 : 0) & (x <= x_high ? 1 : 0) &
-                                (y >= y_low ? 1 : 0) & (y <= y_high ? 1 : 0) &
-                                (z >= z_low ? 1 : 0) & (z <= z_high ? 1 : 0);
-    const std::int32_t kept = in_range & inside;
-    const std::uint32_t mask = 0U - static_cast<std::uint32_t>(kept);
-    spread |= mask &
-              ((static_cast<std::uint32_t>(x) + 32768U) | (static_cast<std::uint32_t>(y) + 32768U));
-    block.x[i] = x;
-    block.y[i] = y;
-    block.z[i] = static_cast<std::int32_t>(static_cast<std::uint32_t>(z) + base_z);
-    block.squared_range[i] = r2;
-    block.kept[i] = kept;
-    finite_count += finite;
-    in_range_count += in_range;
-    kept_count += kept;
+    const Int4 z = Floor(uz);
+    const Int4 kept = in_range & bounds.Contain(x, y, z);
+    const Int4 bits = Bits(Where(in_range, r2));
+    constexpr auto kFirst = static_cast<std::int32_t>(RangeSigmaTable::kFirstBits);
+    const Int4 first = {kFirst, kFirst, kFirst, kFirst};
+    // Unsigned from here: dropped points may wrap.
+    const Uint4 x_window = std::bit_cast<Uint4>(x) + 32768U;
+    const Uint4 y_window = std::bit_cast<Uint4>(y) + 32768U;
+    Store(block.x, i, x);
+    Store(block.y, i, y);
+    Store(block.cell,
+          i,
+          ((x_window & 0xFF00U) << 16) | ((y_window & 0xFFFFU) << 8) | (x_window & 0xFFU));
+    Store(block.height, i, ((std::bit_cast<Uint4>(z) + z_bias) << 8) | 0xFFU);
+    Store(block.squared_range, i, Select(bits > first, bits, first));
+    Store(block.kept, i, kept & 1);
+    tally.finite += finite;
+    tally.in_range += in_range;
+    tally.kept += kept;
+    tally.spread |= kept & std::bit_cast<Int4>(x_window | y_window);
+  };
+  const std::size_t whole = count & ~std::size_t{3};
+  const float* const p = points->data();
+  for (std::size_t i = 0; i < whole; i += 4) quantize4(p + 3 * i, i);
+  if (whole != count) {
+    std::array<float, 12> rest;
+    rest.fill(std::numeric_limits<float>::quiet_NaN());
+    std::copy(p + 3 * whole, p + 3 * count, rest.begin());
+    quantize4(rest.data(), whole);
   }
-  block.all_near = spread < 65536U;
-  dropped.not_finite += count - static_cast<std::size_t>(finite_count);
-  dropped.out_of_range += static_cast<std::size_t>(finite_count - in_range_count);
-  dropped.outside_map += static_cast<std::size_t>(in_range_count - kept_count);
+  const Int4 far = (tally.spread >> 16) != 0;
+  block.all_near = Total(far) == 0;
+  dropped.not_finite += count - Total(tally.finite);
+  dropped.out_of_range += Total(tally.finite) - Total(tally.in_range);
+  dropped.outside_map += Total(tally.in_range) - Total(tally.kept);
 }
 
 }  // namespace strata

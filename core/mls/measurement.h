@@ -16,36 +16,35 @@
 
 namespace strata {
 
-// SigmaCode(model.SigmaAt(√r²)) for every float r² ≥ 0 up to (10⁶ m)², exactly, without logarithm
-// or root: bins of 1/32 octave, each with at most one step of the code inside.
+// SigmaCode(model.SigmaAt(√r²)) for every float r² from (1 µm)² to (10⁶ m)², exactly, without
+// logarithm or root: bins of 1/32 octave, each with at most one step of the code inside.
 class RangeSigmaTable {
  public:
+  // Nearer than this (r², as bits of a float) the code is that of this r².
+  static constexpr std::uint32_t kFirstBits = std::uint32_t{127 - 40} << 23;  // 2⁻⁴⁰ m²
+
   explicit RangeSigmaTable(const SensorModel& model);
 
-  std::uint8_t Code(float squared_range) const {
-    const std::uint32_t bits = std::bit_cast<std::uint32_t>(squared_range) >> kBinShift;
-    const Bin& bin = bins_[bits < kFirstBin ? 0 : bits - kFirstBin];
-    return static_cast<std::uint8_t>(bin.code + (squared_range >= bin.step ? 1 : 0));
+  // `bits` are the bits of a float r² in [2⁻⁴⁰, 2⁴¹).
+  std::uint32_t Code(std::uint32_t bits) const {
+    return (bins_[(bits - kFirstBits) >> kBinShift] + (bits & kBelowBin)) >> kBinShift;
   }
   const SensorModel& model() const { return model_; }
 
  private:
-  static constexpr int kBinShift = 18;  // keeps exponent and 5 bits of mantissa
-  static constexpr std::uint32_t kFirstBin = (127 - 40) << 5;  // r² = 2⁻⁴⁰ m²
-  static constexpr std::size_t kBins = (40 + 41) << 5;         // to r² = 2⁴¹ m²
-  struct Bin {
-    float step;          // the code goes up by one from here
-    std::uint32_t code;  // below the step
-  };
-  static std::size_t BinOf(float squared_range);
+  static constexpr int kBinShift = 18;  // a bin has the same exponent and 5 bits of mantissa
+  static constexpr std::uint32_t kBelowBin = (1U << kBinShift) - 1;
+  static constexpr std::size_t kBins = (40 + 41) << 5;
 
   SensorModel model_;
-  std::array<Bin, kBins> bins_;
+  // The code at the bin's start · 2¹⁸, plus what makes the low bits of r² carry into it from the
+  // step on.
+  std::array<std::uint32_t, kBins> bins_;
 };
 
 // The key of a measurement sorts by tile, by cell in the tile, by height and, at one height, by
 // falling σ, so that the last of an interval is the one a vertical patch keeps:
-//   63…56 tile x + 128, 55…48 tile y + 128   relative to MeasurementSet::base_tile
+//   63…56 tile x + 128, 55…48 tile y + 128   relative to the tile of the frame's base
 //   47…32 CellInTile
 //   31…8  height in ticks + 2²³
 //    7…0  255 − σ code
@@ -91,15 +90,18 @@ struct ScanFrame {
   std::int64_t base_z;          // ticks
 };
 
-// Quantises `count` points from `points` on. `out` gets one measurement a kept point, in order.
+// A block of quantised points, one array a quantity.
 struct QuantizedBlock {
   static constexpr std::size_t kSize = 512;
-  std::array<std::int32_t, kSize> x, y;  // cell relative to the frame's base
-  std::array<std::int32_t, kSize> z;     // ticks, absolute
-  std::array<float, kSize> squared_range;
-  std::array<std::int32_t, kSize> kept;  // 1 or 0
-  bool all_near;                         // every kept cell is within ±2¹⁵ of the base
+  std::array<std::int32_t, kSize> x, y;            // cell relative to the frame's base
+  std::array<std::uint32_t, kSize> cell;           // CellOfKey within the window of x and y
+  std::array<std::uint32_t, kSize> height;         // low half of the key for σ code 0
+  std::array<std::uint32_t, kSize> squared_range;  // for RangeSigmaTable::Code
+  std::array<std::uint32_t, kSize> kept;  // 1 or 0; the rest of a dropped point is arbitrary
+  bool all_near;  // every kept cell is within the window around the base, [-2¹⁵, 2¹⁵)
 };
+
+// Quantises `count` ≤ QuantizedBlock::kSize points and counts those it drops.
 void Quantize(const Eigen::Vector3f* points,
               std::size_t count,
               const ScanFrame& frame,

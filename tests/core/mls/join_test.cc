@@ -72,5 +72,82 @@ TEST(JoinTest, JoinOfMapsIsMapOfUnionInAnyOrderAndAssociation) {
   }
 }
 
+TEST(JoinTest, ColourOfOneSideOnlyStays) {
+  const MlsParameters parameters;
+  const std::vector<ReferenceMeasurement> measurements = {
+      {.cell = {0, 0}, .z = 5, .sigma_code = 9, .colour = {1, 2, 3}, .label = 4}};
+  const MlsMap with = ReferenceMap(measurements, parameters, true);
+  const MlsMap without = ReferenceMap(measurements, parameters, false);
+  const MlsMap joined = JoinMaps(without, with);
+  ASSERT_EQ(joined.tiles[0].colour.size(), 1U);
+  EXPECT_EQ(joined.tiles[0].colour[0], (ColourSum{.r = 1, .g = 2, .b = 3, .count = 1}));
+  EXPECT_EQ(joined.tiles[0].votes[0], (ClassVotes{.patch = 0, .class_id = 4, .count = 2}));
+  EXPECT_TRUE(JoinMaps(with, without) == joined);
+}
+
+TEST(JoinTest, VotesSaturate) {
+  MlsMap map = ReferenceMap({{.cell = {0, 0}, .label = 1}}, MlsParameters{});
+  map.tiles[0].votes[0].count = 0xFFFFFFF0U;
+  EXPECT_EQ(JoinMaps(map, map).tiles[0].votes[0].count, 0xFFFFFFFFU);
+}
+
+// The definition in join.h, patch by patch, then the reference's join of measurements.
+TEST(TransformContributionTest, WholeCellsAndTicksAreExact) {
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937_64 random(seed);
+    const bool annotated = seed % 2 == 0;
+    const MlsParameters parameters = RandomParameters(random);
+    auto measurements = RandomMeasurements(random, annotated);
+    const MlsMap local = ReferenceMap(measurements, parameters, annotated);
+    const std::int32_t dx = static_cast<std::int32_t>(random() % 2000) - 1000;
+    const std::int32_t dy = static_cast<std::int32_t>(random() % 2000) - 1000;
+    const std::int32_t dz = static_cast<std::int32_t>(random() % 2000) - 1000;
+    for (ReferenceMeasurement& m : measurements) {  // a quarter turn about z, then a shift
+      m.cell = {-m.cell.y - 1 + dx, m.cell.x + dy};
+      m.z += dz;
+    }
+    const Pose T =
+        MakePose(Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ())),
+                 {0.1 * dx, 0.1 * dy, dz / 4096.0});
+    ASSERT_TRUE(TransformContribution(local, T) ==
+                ReferenceMap(measurements, parameters, annotated));
+  }
+}
+
+TEST(TransformContributionTest, KeepsEveryMeasurementAndStaysClose) {
+  std::mt19937_64 random(4);
+  std::vector<ReferenceMeasurement> measurements(3000);
+  for (ReferenceMeasurement& m : measurements) {
+    m.cell = {static_cast<std::int32_t>(random() % 60) - 30,
+              static_cast<std::int32_t>(random() % 60) - 30};
+    m.z = static_cast<std::int64_t>(random() % 200);
+    m.sigma_code = 80;
+  }
+  const MlsMap local = ReferenceMap(measurements, MlsParameters{});
+  const Pose T = RandomPose(random, 50);
+  const MlsMap moved = TransformContribution(local, T);
+  std::uint64_t count = 0;
+  for (const MlsTile& tile : moved.tiles) {
+    for (const Patch& patch : tile.patches) count += patch.count;
+    for (const Patch& patch : tile.patches) {
+      const CellIndex cell = CellOf(tile.key, static_cast<std::uint16_t>(patch.cell));
+      const Eigen::Vector3d back =
+          T.inverse() * Eigen::Vector3d(0.1 * (cell.x + 0.5), 0.1 * (cell.y + 0.5), patch.mean_m());
+      EXPECT_LT(std::abs(back.x()), 3.2);  // still in the square it came from
+      EXPECT_LT(std::abs(back.y()), 3.2);
+    }
+  }
+  EXPECT_EQ(count, 3000U);
+}
+
+TEST(TransformContributionTest, LeavingTheMapDropsThePatch) {
+  const MlsMap local = ReferenceMap({{.cell = {0, 0}, .z = 100}}, MlsParameters{});
+  const Pose T = MakePose(Eigen::Quaterniond::Identity(), {0, 0, 2048});
+  EXPECT_TRUE(TransformContribution(local, T).tiles.empty());
+  const Pose far = MakePose(Eigen::Quaterniond::Identity(), {1.1e8, 0, 0});
+  EXPECT_TRUE(TransformContribution(local, far).tiles.empty());
+}
+
 }  // namespace
 }  // namespace strata

@@ -26,7 +26,7 @@ struct ReferenceMeasurement {
   CellIndex cell;
   std::int64_t z = 0;  // ticks
   std::uint8_t sigma_code = 0;
-  Colour colour;
+  Colour colour = {};
   std::uint16_t label = 0;
 };
 
