@@ -102,11 +102,11 @@ absl::StatusOr<LinesPlaneFit> FitPlaneToLines(std::span<const Line> lines,
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   const Eigen::Vector3d reference = lines.front().origin;
   for (const Line& line : lines) {
-    const Eigen::Matrix3d vvT = line.direction * line.direction.transpose();
-    const Eigen::Matrix3d M_i = Eigen::Matrix3d::Identity() - vvT;
-    MtM += vvT;
-    A += M_i;
-    b += M_i * (line.origin - reference);
+    const Eigen::Matrix3d outer = line.direction * line.direction.transpose();
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - outer;
+    MtM += outer;
+    A += across;
+    b += across * (line.origin - reference);
   }
   if (!MtM.allFinite() || !b.allFinite()) {
     return absl::InvalidArgumentError("plane fit: a line is not finite");

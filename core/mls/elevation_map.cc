@@ -165,8 +165,12 @@ void DrawFacet(const Facet& facet, ElevationMap& map) {
   const auto [x_low, x_high] = std::minmax({a->x, b->x, c->x});
   const auto [y_low, y_high] = std::minmax({a->y, b->y, c->y});
   // Middles are at whole numbers plus a half.
-  for (double y = std::ceil(y_low - 0.5) + 0.5; y <= y_high; y += 1.0) {
-    for (double x = std::ceil(x_low - 0.5) + 0.5; x <= x_high; x += 1.0) {
+  const auto first_x = static_cast<std::int64_t>(std::ceil(x_low - 0.5));
+  const auto first_y = static_cast<std::int64_t>(std::ceil(y_low - 0.5));
+  for (std::int64_t row = first_y; static_cast<double>(row) + 0.5 <= y_high; ++row) {
+    const double y = static_cast<double>(row) + 0.5;
+    for (std::int64_t column = first_x; static_cast<double>(column) + 0.5 <= x_high; ++column) {
+      const double x = static_cast<double>(column) + 0.5;
       const double wa = Cross(*b, *c, x, y) / area;
       const double wb = Cross(*c, *a, x, y) / area;
       const double wc = Cross(*a, *b, x, y) / area;

@@ -152,6 +152,7 @@ TEST(PlaneFitTest, LinesInAPlaneGiveThatPlane) {
 TEST(PlaneFitTest, NormalAndPointMinimiseTheirSums) {
   std::mt19937 random(4);
   std::vector<Line> lines;
+  lines.reserve(12);
   for (int i = 0; i < 8; ++i) {
     lines.push_back(MakeLine(RandomVector(random, 3.0),
                              RandomVector(random).cwiseProduct(Eigen::Vector3d(1, 1, 0.2)))
