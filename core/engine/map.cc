@@ -25,6 +25,7 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
     STRATA_ASSIGN_OR_RETURN(const ScanTotals totals, reader->GetScanTotals());
     pending = totals.pending;
   }
+  map->planner_ = std::make_unique<MapPlanner>(*map->core_);
   map->worker_ = std::make_unique<Worker>(*map->core_, *map->jobs_, pending);
   return map;
 }

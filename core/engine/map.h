@@ -12,6 +12,7 @@
 
 #include "core/engine/job_board.h"
 #include "core/engine/map_core.h"
+#include "core/engine/map_planner.h"
 #include "core/engine/worker.h"
 
 namespace strata {
@@ -26,6 +27,7 @@ class Map {
 
   MapCore& core() { return *core_; }
   JobBoard& jobs() { return *jobs_; }
+  MapPlanner& planner() { return *planner_; }
   Worker& worker() { return *worker_; }
 
   // RESOURCE_EXHAUSTED while too many scans wait for integration.
@@ -41,6 +43,7 @@ class Map {
 
   std::unique_ptr<MapCore> core_;
   std::unique_ptr<JobBoard> jobs_;
+  std::unique_ptr<MapPlanner> planner_;
   std::unique_ptr<Worker> worker_;
 };
 

@@ -15,16 +15,18 @@
 namespace strata {
 
 absl::StatusOr<PlanResult> EnginePlanning::PlanPath(const api::Call& call,
-                                                    absl::string_view,
-                                                    const PlanQuery&) {
+                                                    absl::string_view map,
+                                                    const PlanQuery& query) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  return absl::UnimplementedError("planning");
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  return found->planner().Plan(query, call.stop);
 }
 
 absl::StatusOr<std::vector<SurfaceColumn>> EnginePlanning::SampleSurfaces(
-    const api::Call& call, absl::string_view, const std::vector<Eigen::Vector2d>&) {
+    const api::Call& call, absl::string_view map, const std::vector<Eigen::Vector2d>& places) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  return absl::UnimplementedError("planning");
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  return found->planner().Sample(places, call.stop);
 }
 
 absl::Status EnginePlanning::SetProfile(const api::Call& call,

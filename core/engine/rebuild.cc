@@ -1,10 +1,158 @@
 #include "core/engine/rebuild.h"
 
-namespace strata {
+#include <cstdint>
+#include <string>
+#include <utility>
 
-absl::Status RunRebuildJob(Integrator&, const JobInfo&, JobContext&) {
-  return absl::UnimplementedError("rebuild");
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+
+#include "core/common/status.h"
+#include "core/engine/derived_pass.h"
+#include "core/engine/staged_tiles.h"
+#include "core/engine/truth_check.h"
+
+namespace strata {
+namespace {
+
+int ThreadsOf(const JobInfo& job, int threads) {
+  const auto it = job.parameters.find("threads");
+  if (it != job.parameters.end() && !absl::SimpleAtoi(it->second, &threads)) return 1;
+  return threads;
 }
-absl::Status RecoverDerived(Integrator&, const Stop&) { return absl::OkStatus(); }
+
+// Counts mismatches and keeps the first for the message.
+class Findings final : public DerivedSink {
+ public:
+  absl::Status Differs(const DerivedDifferences& differences) override {
+    for (const auto& [key, tile] : differences.tiles) {
+      Add(absl::StrCat("tile ", key.ToString(), " (statistics)"));
+    }
+    for (const SurfaceTileRow& row : differences.surfaces) {
+      Add(absl::StrCat("tile ", row.key.ToString(), " (served)"));
+    }
+    for (const ScanNumber number : differences.scans) {
+      Add(absl::StrCat("indexes of scan number ", number));
+    }
+    return absl::OkStatus();
+  }
+  void Add(const std::string& what) {
+    ++count_;
+    if (count_ <= kNamed) absl::StrAppend(&named_, named_.empty() ? "" : ", ", what);
+  }
+  std::uint64_t count() const { return count_; }
+  absl::Status Verdict() const {
+    if (count_ == 0) return absl::OkStatus();
+    return absl::DataLossError(absl::StrCat(
+        count_, " mismatches: ", named_, count_ > kNamed ? ", …" : "", "; a rebuild mends tiles"));
+  }
+
+ private:
+  static constexpr std::uint64_t kNamed = 5;
+  std::uint64_t count_ = 0;
+  std::string named_;
+};
+
+// Stores differences until they are published.
+class Repairs final : public DerivedSink {
+ public:
+  explicit Repairs(StagedTiles& staged) : staged_(staged) {}
+  absl::Status Differs(const DerivedDifferences& differences) override {
+    return staged_.Put(differences.tiles, differences.surfaces);
+  }
+
+ private:
+  StagedTiles& staged_;
+};
+
+absl::Status PutIndexes(StorageWriter& writer, const ScanIndexes& indexes) {
+  STRATA_RETURN_IF_ERROR(writer.DeleteOrphanIndexes());
+  for (const auto& [number, index] : indexes) {
+    STRATA_RETURN_IF_ERROR(writer.SetTilesOfScan(number, index.tiles));
+    STRATA_RETURN_IF_ERROR(writer.SetFootprint(number, index.footprint));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Rebuild(Integrator& integrator, int threads, JobContext& context) {
+  integrator.store().Clear();
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, integrator.ReserveVersion());
+  StagedTiles staged(integrator.core(), version);
+  Repairs repairs(staged);
+  DerivedPass pass(integrator, version, threads, context);
+  STRATA_RETURN_IF_ERROR(pass.Run(repairs));
+  const absl::Status published =
+      staged.Publish([&](StorageWriter& writer) { return PutIndexes(writer, pass.indexes()); });
+  integrator.store().Clear();
+  STRATA_RETURN_IF_ERROR(published);
+  context.SetMetric("scans", static_cast<double>(pass.scans()));
+  context.SetMetric("tiles", static_cast<double>(pass.tiles()));
+  context.SetMetric("tiles_changed", static_cast<double>(staged.changed()));
+  context.SetMessage(absl::StrCat("rebuilt ",
+                                  pass.tiles(),
+                                  " tiles from ",
+                                  pass.scans(),
+                                  " scans, ",
+                                  staged.changed(),
+                                  " changed"));
+  return absl::OkStatus();
+}
+
+absl::Status Verify(Integrator& integrator, int threads, JobContext& context) {
+  MapCore& core = integrator.core();
+  integrator.store().Clear();
+  Findings findings;
+  TruthCheck truth(core, context);
+  STRATA_RETURN_IF_ERROR(truth.Run([&](const std::string& what) { findings.Add(what); }));
+  // Without sound points nothing can be said about what follows from them.
+  if (findings.count() == 0) {
+    DerivedPass pass(integrator, core.snapshots().current().tile_version, threads, context);
+    STRATA_RETURN_IF_ERROR(pass.Run(findings));
+    context.SetMetric("tiles_checked", static_cast<double>(pass.tiles()));
+  }
+  integrator.store().Clear();
+  context.SetMetric("scans_checked", static_cast<double>(truth.scans()));
+  context.SetMetric("pieces_checked", static_cast<double>(truth.pieces()));
+  context.SetMetric("mismatches", static_cast<double>(findings.count()));
+  context.SetMessage(absl::StrCat(truth.scans(), " scans and all tiles are as they should be"));
+  return findings.Verdict();
+}
+
+// Recovery has nobody to report to.
+class SilentContext final : public JobContext {
+ public:
+  explicit SilentContext(const Stop& stop) : stop_(stop) {}
+  absl::Status Progress(double, absl::string_view) override { return stop_.status(); }
+  const Stop& stop() const override { return stop_; }
+  void SetMetric(const std::string&, double) override {}
+  void SetMessage(std::string) override {}
+
+ private:
+  const Stop& stop_;
+};
+
+}  // namespace
+
+absl::Status RunRebuildJob(Integrator& integrator, const JobInfo& job, JobContext& context) {
+  const int threads = ThreadsOf(job, integrator.core().options().worker_threads);
+  if (job.kind == kRebuildJob) return Rebuild(integrator, threads, context);
+  if (job.kind == kVerifyJob) return Verify(integrator, threads, context);
+  return absl::InvalidArgumentError(absl::StrCat("job kind '", job.kind, "' is unknown"));
+}
+
+absl::Status RecoverDerived(Integrator& integrator, const Stop& closing) {
+  MapCore& core = integrator.core();
+  MapClock clock;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+    STRATA_ASSIGN_OR_RETURN(clock, reader->GetClock());
+  }
+  if (clock.derived_complete) return absl::OkStatus();
+  SilentContext context(closing);
+  return Rebuild(integrator, core.options().worker_threads, context);
+}
 
 }  // namespace strata

@@ -10,6 +10,7 @@
 
 #include "absl/container/btree_map.h"
 #include "absl/container/btree_set.h"
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
@@ -56,8 +57,9 @@ class SurfaceTileMaker {
   // Every level above the tiles `keys` of level 0, as far as changes reach. `rows` gets them.
   absl::Status MakePyramid(const Rows& base, Rows& rows, const Stop& stop);
 
-  // Forgets rows made so far; call once they are stored.
+  // Forgets rows made so far; call once they are stored or if they will never be.
   void ForgetRows() { made_.clear(); }
+  std::uint64_t version() const { return options_.version; }
 
  private:
   using SurfacePtr = std::shared_ptr<const SurfaceTile>;
@@ -85,6 +87,19 @@ class SurfaceTileMaker {
   absl::btree_map<TileKey, SurfacePtr> plain_;
   absl::btree_map<TileKey, SurfaceTileRow> made_;
 };
+
+// Groups keys of one level into squares of a few tiles: as much as is made at a time.
+std::vector<absl::btree_set<TileKey>> TileBlocks(const absl::btree_set<TileKey>& keys);
+
+// All levels over the level-0 tiles `keys` and over whatever is stored, block by block. `progress`
+// gets the share done and may end it; `sink` gets the rows that differ, and stores them at once or
+// never.
+absl::Status MakeAllSurfaces(SurfaceTileMaker& maker,
+                             StorageReader& reader,
+                             absl::btree_set<TileKey> keys,
+                             const Stop& stop,
+                             absl::FunctionRef<absl::Status(double)> progress,
+                             absl::FunctionRef<absl::Status(SurfaceTileMaker::Rows)> sink);
 
 }  // namespace strata
 

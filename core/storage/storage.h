@@ -140,8 +140,8 @@ class StorageWriter {
   virtual absl::Status DiscardUnpublished() = 0;
   virtual absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) = 0;
   virtual absl::Status SetFootprint(ScanNumber number, const Eigen::AlignedBox2d& footprint) = 0;
-  // Removes every relation and footprint, before they are put again.
-  virtual absl::Status ClearScanIndexes() = 0;
+  // Removes relations and footprints of scans that are not there.
+  virtual absl::Status DeleteOrphanIndexes() = 0;
   // Makes `version` the current one and, if `complete`, the derived data usable.
   virtual absl::Status PublishTiles(std::uint64_t version, bool complete) = 0;
   // Drops all derived data; MapClock::derived_complete becomes false.

@@ -120,9 +120,10 @@ absl::Status SqliteWriter::SetFootprint(ScanNumber number, const Eigen::AlignedB
       footprint.max().y());
 }
 
-absl::Status SqliteWriter::ClearScanIndexes() {
-  STRATA_RETURN_IF_ERROR(RunSql("DELETE FROM derived_scan_tile"));
-  return RunSql("DELETE FROM derived_footprint");
+absl::Status SqliteWriter::DeleteOrphanIndexes() {
+  STRATA_RETURN_IF_ERROR(RunSql(
+      "DELETE FROM derived_scan_tile WHERE scan NOT IN (SELECT number FROM truth_scan)"));
+  return RunSql("DELETE FROM derived_footprint WHERE scan NOT IN (SELECT number FROM truth_scan)");
 }
 
 absl::Status SqliteWriter::PublishTiles(std::uint64_t version, bool complete) {

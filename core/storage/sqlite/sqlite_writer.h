@@ -53,7 +53,7 @@ class SqliteWriter final : public StorageWriter {
   absl::Status DiscardUnpublished() override;
   absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) override;
   absl::Status SetFootprint(ScanNumber number, const Eigen::AlignedBox2d& footprint) override;
-  absl::Status ClearScanIndexes() override;
+  absl::Status DeleteOrphanIndexes() override;
   absl::Status PublishTiles(std::uint64_t version, bool complete) override;
   absl::Status DropDerived() override;
 

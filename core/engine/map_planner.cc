@@ -1,0 +1,131 @@
+#include "core/engine/map_planner.h"
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/synchronization/mutex.h"
+
+#include "core/codec/surface_tile_codec.h"
+#include "core/common/status.h"
+
+namespace strata {
+
+// The tiles of one pinned state.
+class MapPlanner::Source final : public TileSource {
+ public:
+  Source(MapPlanner& planner, Snapshots::Pin pin, std::shared_ptr<const Versions> versions)
+      : planner_(planner), pin_(std::move(pin)), versions_(std::move(versions)) {}
+
+  absl::StatusOr<std::shared_ptr<const SurfaceTile>> Load(const TileKey& key) override {
+    const std::uint64_t version = Version(key);
+    if (version == 0) return std::shared_ptr<const SurfaceTile>();
+    return planner_.LoadTile(key, version);
+  }
+  std::uint64_t Version(const TileKey& key) override {
+    const auto it = versions_->find(key);
+    return it == versions_->end() ? 0 : it->second;
+  }
+  std::uint64_t epoch() const { return pin_.view().epoch; }
+
+  static absl::StatusOr<Source> OfNow(MapPlanner& planner) {
+    Snapshots::Pin pin = planner.core_.snapshots().PinCurrent();
+    STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const Versions> versions,
+                            planner.VersionsOf(pin.view()));
+    return Source(planner, std::move(pin), std::move(versions));
+  }
+
+ private:
+  MapPlanner& planner_;
+  Snapshots::Pin pin_;
+  std::shared_ptr<const Versions> versions_;
+};
+
+MapPlanner::MapPlanner(MapCore& core)
+    : core_(core),
+      planner_({.cell_size_m = core.info().parameters.mls.cell_size_m,
+                .cache_bytes = core.options().planner_cache_bytes}),
+      tiles_(core.options().cache_bytes) {}
+
+absl::StatusOr<std::shared_ptr<const MapPlanner::Versions>> MapPlanner::VersionsOf(
+    const MapView& view) {
+  {
+    absl::MutexLock lock(&mutex_);
+    if (versions_ != nullptr && versions_view_ == view) return versions_;
+  }
+  auto versions = std::make_shared<Versions>();
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> rows,
+                            reader->ListSurfaceTiles(TileRange{}, view.tile_version));
+    for (const SurfaceTileRow& row : rows) (*versions)[row.key] = row.version;
+  }
+  absl::MutexLock lock(&mutex_);
+  versions_view_ = view;
+  versions_ = versions;
+  return versions_;
+}
+
+absl::StatusOr<std::shared_ptr<const SurfaceTile>> MapPlanner::LoadTile(const TileKey& key,
+                                                                        std::uint64_t version) {
+  {
+    absl::MutexLock lock(&mutex_);
+    if (auto held = tiles_.Find({key, version}); held != nullptr) return held;
+  }
+  std::optional<SurfaceTileRow> row;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    STRATA_ASSIGN_OR_RETURN(row, reader->FindSurfaceTile(key, version));
+  }
+  if (!row.has_value()) return std::shared_ptr<const SurfaceTile>();
+  absl::StatusOr<SurfaceTile> decoded = DecodeSurfaceTile(row->bytes);
+  if (!decoded.ok()) return Annotate(decoded.status(), absl::StrCat("tile ", key.ToString()));
+  auto tile = std::make_shared<const SurfaceTile>(*std::move(decoded));
+  absl::MutexLock lock(&mutex_);
+  tiles_.Put(
+      {key, version}, tile, sizeof(SurfaceTile) + tile->surfaces.capacity() * sizeof(Surface));
+  return tile;
+}
+
+absl::StatusOr<PlanResult> MapPlanner::Plan(const PlanQuery& query, const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this));
+  STRATA_ASSIGN_OR_RETURN(PlanResult result, planner_.Plan(source, query, stop));
+  result.epoch = source.epoch();
+  return result;
+}
+
+absl::StatusOr<std::vector<SurfaceColumn>> MapPlanner::Sample(
+    const std::vector<Eigen::Vector2d>& places, const Stop& stop) {
+  constexpr std::size_t kStopInterval = 1024;
+  const double cell_size_m = core_.info().parameters.mls.cell_size_m;
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this));
+  std::vector<SurfaceColumn> columns;
+  columns.reserve(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (i % kStopInterval == 0) STRATA_RETURN_IF_ERROR(stop.status());
+    if (!places[i].allFinite()) {
+      return absl::InvalidArgumentError(absl::StrCat("place ", i, " is not finite"));
+    }
+    SurfaceColumn& column = columns.emplace_back();
+    column.x_m = places[i].x();
+    column.y_m = places[i].y();
+    const Eigen::Vector2d cell = (places[i] / cell_size_m).array().floor();
+    if (cell.cwiseAbs().maxCoeff() >= kMaxCellIndex) continue;
+    const CellIndex index{static_cast<std::int32_t>(cell.x()), static_cast<std::int32_t>(cell.y())};
+    STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<const SurfaceTile> tile,
+                            source.Load(TileOfCell(index)));
+    if (tile == nullptr) continue;
+    const auto surfaces = tile->Cell(CellInTile(index));
+    column.surfaces.assign(surfaces.begin(), surfaces.end());
+  }
+  return columns;
+}
+
+}  // namespace strata

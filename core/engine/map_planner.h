@@ -1,0 +1,54 @@
+// Planning on one map: the planner and what is kept of tiles between queries.
+#ifndef STRATA_CORE_ENGINE_MAP_PLANNER_H_
+#define STRATA_CORE_ENGINE_MAP_PLANNER_H_
+
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/container/flat_hash_map.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+#include <Eigen/Core>
+
+#include "core/common/stop.h"
+#include "core/engine/lru_cache.h"
+#include "core/engine/map_core.h"
+#include "core/mls/surface_tile.h"
+#include "core/planning/planner.h"
+#include "core/world/plan.h"
+
+namespace strata {
+
+// Thread-safe. Every query reads one pinned state of the map.
+class MapPlanner {
+ public:
+  explicit MapPlanner(MapCore& core);
+
+  absl::StatusOr<PlanResult> Plan(const PlanQuery& query, const Stop& stop);
+  // INVALID_ARGUMENT for a place that is not finite.
+  absl::StatusOr<std::vector<SurfaceColumn>> Sample(const std::vector<Eigen::Vector2d>& places,
+                                                    const Stop& stop);
+
+ private:
+  class Source;
+  // Versions of all level-0 tiles of one state.
+  using Versions = absl::flat_hash_map<TileKey, std::uint64_t>;
+
+  absl::StatusOr<std::shared_ptr<const Versions>> VersionsOf(const MapView& view);
+  absl::StatusOr<std::shared_ptr<const SurfaceTile>> LoadTile(const TileKey& key,
+                                                              std::uint64_t version);
+
+  MapCore& core_;
+  Planner planner_;
+  absl::Mutex mutex_;
+  MapView versions_view_ ABSL_GUARDED_BY(mutex_);
+  std::shared_ptr<const Versions> versions_ ABSL_GUARDED_BY(mutex_);
+  LruCache<std::pair<TileKey, std::uint64_t>, SurfaceTile> tiles_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_MAP_PLANNER_H_

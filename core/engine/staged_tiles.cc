@@ -1,0 +1,75 @@
+#include "core/engine/staged_tiles.h"
+
+#include <cstdint>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/common/status.h"
+
+namespace strata {
+
+StagedTiles::~StagedTiles() {
+  if (published_) return;
+  core_.writer()
+      .Run(Durability::kRelaxed,
+           0,
+           Stop(),
+           [](StorageWriter& writer) { return writer.DiscardUnpublished(); })
+      .IgnoreError();
+}
+
+absl::Status StagedTiles::Put(const MlsTileMap& tiles, const SurfaceTileMaker::Rows& surfaces) {
+  const double cell_size_m = core_.info().parameters.mls.cell_size_m;
+  std::vector<MlsTileRow> rows;
+  for (const auto& [key, tile] : tiles) {
+    changed_.insert(key);
+    if (tile == nullptr) {
+      gone_.insert(key);
+    } else {
+      rows.push_back(MakeMlsTileRow(*tile, version_, cell_size_m));
+    }
+  }
+  for (const SurfaceTileRow& row : surfaces) served_.insert(row.key);
+  if (rows.empty() && surfaces.empty()) return absl::OkStatus();
+  return core_.writer().Run(
+      Durability::kRelaxed, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
+        for (const MlsTileRow& row : rows) STRATA_RETURN_IF_ERROR(writer.PutMlsTile(row));
+        for (const SurfaceTileRow& row : surfaces) {
+          STRATA_RETURN_IF_ERROR(writer.PutSurfaceTile(row));
+        }
+        return absl::OkStatus();
+      });
+}
+
+absl::Status StagedTiles::RetireOld(StorageWriter& writer, std::uint64_t floor) const {
+  for (const TileKey& key : changed_) {
+    STRATA_RETURN_IF_ERROR(gone_.contains(key) ? writer.DeleteMlsTile(key)
+                                               : writer.DeleteOlderMlsTiles(key, version_));
+  }
+  for (const TileKey& key : served_) {
+    STRATA_RETURN_IF_ERROR(writer.CollectSurfaceTile(key, floor));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status StagedTiles::Publish(absl::FunctionRef<absl::Status(StorageWriter&)> decision) {
+  const std::uint64_t floor = core_.snapshots().Floor();
+  MapClock clock;
+  const absl::Status done =
+      core_.writer().Run(Durability::kFull, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
+        STRATA_RETURN_IF_ERROR(RetireOld(writer, floor));
+        STRATA_RETURN_IF_ERROR(writer.PublishTiles(version_, true));
+        STRATA_RETURN_IF_ERROR(decision(writer));
+        STRATA_ASSIGN_OR_RETURN(clock, writer.reader().GetClock());
+        return absl::OkStatus();
+      });
+  STRATA_RETURN_IF_ERROR(done);
+  published_ = true;
+  core_.snapshots().Publish({clock.epoch, clock.tile_version});
+  return absl::OkStatus();
+}
+
+}  // namespace strata

@@ -1,0 +1,48 @@
+// Tiles that are written beside the current ones, in small commits, and switched to at once.
+#ifndef STRATA_CORE_ENGINE_STAGED_TILES_H_
+#define STRATA_CORE_ENGINE_STAGED_TILES_H_
+
+#include <cstddef>
+#include <cstdint>
+
+#include "absl/container/btree_set.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+
+#include "core/engine/map_core.h"
+#include "core/engine/mls_tiles.h"
+#include "core/engine/surface_tiles.h"
+
+namespace strata {
+
+// One thread at a time. What is not published is discarded with it, or by the next start.
+class StagedTiles {
+ public:
+  // `version`: newer than the current one; of all rows.
+  StagedTiles(MapCore& core, std::uint64_t version) : core_(core), version_(version) {}
+  ~StagedTiles();
+  StagedTiles(const StagedTiles&) = delete;
+  StagedTiles& operator=(const StagedTiles&) = delete;
+
+  absl::Status Put(const MlsTileMap& tiles, const SurfaceTileMaker::Rows& surfaces);
+
+  // Makes all of it what readers see, together with what `decision` writes. Durable.
+  absl::Status Publish(absl::FunctionRef<absl::Status(StorageWriter&)> decision);
+
+  // Tiles that were put, of either kind.
+  std::size_t changed() const { return changed_.size() + served_.size(); }
+
+ private:
+  absl::Status RetireOld(StorageWriter& writer, std::uint64_t floor) const;
+
+  MapCore& core_;
+  const std::uint64_t version_;
+  bool published_ = false;
+  absl::btree_set<TileKey> changed_;
+  absl::btree_set<TileKey> gone_;
+  absl::btree_set<TileKey> served_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_STAGED_TILES_H_

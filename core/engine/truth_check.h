@@ -1,0 +1,43 @@
+// Checks truth itself: every piece of every scan, every pose, every constraint.
+#ifndef STRATA_CORE_ENGINE_TRUTH_CHECK_H_
+#define STRATA_CORE_ENGINE_TRUTH_CHECK_H_
+
+#include <cstdint>
+#include <string>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+
+#include "core/engine/job_board.h"
+#include "core/engine/map_core.h"
+#include "core/storage/storage.h"
+
+namespace strata {
+
+class TruthCheck {
+ public:
+  using Report = absl::FunctionRef<void(const std::string&)>;
+
+  TruthCheck(MapCore& core, JobContext& context) : core_(core), context_(context) {}
+
+  // Calls `report` with every thing that is not as it was written. An error is one of the store or
+  // of the job being ended.
+  absl::Status Run(Report report);
+
+  std::uint64_t scans() const { return scans_; }
+  std::uint64_t pieces() const { return pieces_; }
+
+ private:
+  // Why the scan is not what was uploaded; OK if it is.
+  absl::Status CheckScan(StorageReader& reader, const PosedScan& posed);
+  absl::Status CheckPoints(StorageReader& reader, const ScanRecord& scan);
+
+  MapCore& core_;
+  JobContext& context_;
+  std::uint64_t scans_ = 0;
+  std::uint64_t pieces_ = 0;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_TRUTH_CHECK_H_
