@@ -12,20 +12,26 @@ namespace strata {
 namespace {
 
 constexpr double kMinSigmaM = 0.002;
-constexpr double kCodesPerOctave = 255.0 / 8.0;
+constexpr double kHalfStep = 1.0109322217097118;  // 2^(4/255)
 
+// Everything here comes from products and quotients, which every machine rounds alike; exp2 and
+// log2 may differ in the last bit, and one bit decides a code.
 struct CodeTable {
   std::array<double, 256> sigma_m;
+  std::array<double, 256> boundary_m;  // from here on, code c and not c − 1
   std::array<std::uint32_t, 256> weight;
 };
 
 const CodeTable& Codes() {
   static const CodeTable table = [] {
     CodeTable t;
+    double sigma = kMinSigmaM;
     for (int code = 0; code < 256; ++code) {
-      const double octaves = code / kCodesPerOctave;
-      t.sigma_m[code] = kMinSigmaM * std::exp2(octaves);
-      t.weight[code] = static_cast<std::uint32_t>(std::lround(65536.0 * std::exp2(-2.0 * octaves)));
+      const double ratio = kMinSigmaM / sigma;
+      t.sigma_m[code] = sigma;
+      t.boundary_m[code] = code == 0 ? 0.0 : sigma / kHalfStep;
+      t.weight[code] = static_cast<std::uint32_t>(std::lround(65536.0 * (ratio * ratio)));
+      sigma = sigma * (kHalfStep * kHalfStep);
     }
     return t;
   }();
@@ -47,10 +53,12 @@ void MakeVertical(Patch& patch) {
 }  // namespace
 
 std::uint8_t SigmaCode(double sigma_m) {
-  if (!(sigma_m > kMinSigmaM)) return 0;
-  const double code = std::log2(sigma_m / kMinSigmaM) * kCodesPerOctave;
-  return static_cast<std::uint8_t>(std::lround(std::min(code, 255.0)));
+  const auto& boundary = Codes().boundary_m;
+  const auto above = std::upper_bound(boundary.begin() + 1, boundary.end(), sigma_m);
+  return static_cast<std::uint8_t>(above - boundary.begin() - 1);
 }
+
+double SigmaCodeBoundary(std::uint8_t code) { return Codes().boundary_m[code]; }
 
 double SigmaOfCode(std::uint8_t code) { return Codes().sigma_m[code]; }
 

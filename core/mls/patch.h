@@ -12,6 +12,8 @@ namespace strata {
 // 0) to 512 mm (code 255); steps of 2.2 %. Values outside are clamped.
 std::uint8_t SigmaCode(double sigma_m);
 double SigmaOfCode(std::uint8_t code);
+// The smallest σ whose code is `code`; 0 for code 0.
+double SigmaCodeBoundary(std::uint8_t code);
 // 1/σ² in fixed point: 65536 at 2 mm, 1 at 512 mm. 1/σ² = weight · kPrecisionPerWeight [1/m²].
 std::uint32_t WeightOfCode(std::uint8_t code);
 inline constexpr double kPrecisionPerWeight = 1.0 / (65536.0 * 0.002 * 0.002);

@@ -21,8 +21,8 @@ namespace strata {
 struct PlanEndpoint {
   double x_m = 0.0;
   double y_m = 0.0;
-  std::optional<double> z_m;
-  std::optional<int> level;
+  std::optional<double> z_m = std::nullopt;
+  std::optional<int> level = std::nullopt;
 };
 
 struct PlanQuery {
@@ -66,7 +66,9 @@ struct PlanResult {
   std::string message;                     // for people, with numbers
   std::vector<Eigen::Vector3d> waypoints;  // on the surfaces, in the map frame; empty unless found
   double length_m = 0.0;
-  double cost = 0.0;  // Σ length · (1 + danger)
+  double cost = 0.0;  // Σ length · (1 + danger) [m]
+  // Cost of the cheapest path from patch to patch, before it was pulled straight; ≥ cost.
+  double graph_cost = 0.0;
   std::vector<PlanGap> gaps;
   std::uint64_t expanded = 0;
   double elapsed_ms = 0.0;

@@ -5,8 +5,15 @@ target_compile_features(strata_build_options INTERFACE cxx_std_20)
 target_compile_options(
   strata_build_options
   INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+            -ffp-contract=off # derived bytes must not depend on whether a machine fuses a · b + c
             $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety> $<$<BOOL:${STRATA_WARNINGS_AS_ERRORS}>:-Werror>
 )
+set(STRATA_SANITIZER_KIND "")
+if(STRATA_SANITIZER MATCHES "address")
+  set(STRATA_SANITIZER_KIND asan)
+elseif(STRATA_SANITIZER MATCHES "thread")
+  set(STRATA_SANITIZER_KIND tsan)
+endif()
 if(STRATA_SANITIZER)
   target_compile_options(strata_build_options INTERFACE -fsanitize=${STRATA_SANITIZER} -fno-omit-frame-pointer)
   target_link_options(strata_build_options INTERFACE -fsanitize=${STRATA_SANITIZER})
@@ -55,7 +62,8 @@ endfunction()
 
 # strata_test(NAME SOURCES... DEPS... [LABELS...] [TIMEOUT seconds])
 #
-# A GoogleTest program; every TEST becomes a ctest test with the labels (default: unit).
+# A GoogleTest program; every TEST becomes a ctest test with the labels (default: unit). The labels asan and tsan also
+# make it part of what tests/run_sanitizers.sh builds and runs.
 function(strata_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
   if(NOT ARG_LABELS)
@@ -65,6 +73,11 @@ function(strata_test name)
     set(ARG_TIMEOUT 120)
   endif()
   strata_executable(${name} ${name} SOURCES ${ARG_SOURCES} DEPS ${ARG_DEPS} GTest::gmock_main)
+  foreach(kind asan tsan)
+    if(kind IN_LIST ARG_LABELS AND STRATA_SANITIZER_KIND STREQUAL kind)
+      add_dependencies(sanitized_tests ${name})
+    endif()
+  endforeach()
   gtest_discover_tests(
     ${name}
     DISCOVERY_TIMEOUT 60

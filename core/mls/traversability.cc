@@ -1,0 +1,318 @@
+#include "core/mls/traversability.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/mls/local_plane.h"
+#include "core/mls/surface_tile.h"
+#include "core/mls/tile_key.h"
+
+namespace strata {
+namespace {
+
+constexpr int kMargin = kPlaneRadiusCells;
+constexpr int kPaddedCells = kTileCells + 2 * kMargin;
+constexpr double kMaxRatio = 4.0;
+constexpr std::array<std::array<int, 2>, 4> kQuarters = {{{1, 1}, {-1, 1}, {1, -1}, {-1, -1}}};
+
+// The samples of a tile and of the margin around it, cell by cell in one array.
+class PaddedTile {
+ public:
+  PaddedTile(const SurfaceTile& tile, const SurfaceNeighbourhood& neighbours, double cell_size_m)
+      : begin_(kPaddedCells * kPaddedCells + 1) {
+    samples_.reserve(tile.surfaces.size() + tile.surfaces.size() / 16 + 64);
+    std::size_t next_cell = 0;
+    for (int y = -kMargin; y < kTileCells + kMargin; ++y) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const int dy = y < 0 ? -1 : y / kTileCells;
+        const bool middle = dx == 0 && dy == 0;
+        const SurfaceTile* source = middle ? &tile : neighbours[(dy + 1) * 3 + dx + 1];
+        if (source != nullptr) AppendRow(*source, y, dx, cell_size_m, next_cell);
+      }
+    }
+    while (next_cell < begin_.size()) begin_[next_cell++] = size();
+  }
+
+  // Index of cell (x, y) of the tile; x, y in [−kMargin, kTileCells + kMargin).
+  static int IndexOf(int x, int y) { return (y + kMargin) * kPaddedCells + x + kMargin; }
+  std::span<const HeightSample> Cell(int index) const {
+    return {samples_.data() + begin_[index], begin_[index + 1] - begin_[index]};
+  }
+
+ private:
+  std::uint32_t size() const { return static_cast<std::uint32_t>(samples_.size()); }
+
+  void AppendRow(
+      const SurfaceTile& source, int y, int dx, double cell_size_m, std::size_t& next_cell) {
+    const int row = y & (kTileCells - 1);
+    for (std::uint32_t i = source.row_begin[row]; i < source.row_begin[row + 1]; ++i) {
+      const int x = (source.surfaces[i].cell & (kTileCells - 1)) + dx * kTileCells;
+      if (x < -kMargin || x >= kTileCells + kMargin) continue;
+      const std::size_t cell = IndexOf(x, y);
+      while (next_cell <= cell) begin_[next_cell++] = size();
+      samples_.push_back(SampleOf(source.surfaces[i], cell_size_m));
+    }
+  }
+
+  std::vector<HeightSample> samples_;
+  std::vector<std::uint32_t> begin_;  // of each cell, and the end
+};
+
+// A cell of the window around a surface.
+struct Offset {
+  double dx = 0.0;
+  double dy = 0.0;
+  int cells = 0;          // in the padded tile
+  bool adjacent = false;  // one of the eight cells around
+  double reach_m = 0.0;   // largest height difference that still belongs to the same ground
+  double step_m = 0.0;    // largest one a robot takes at once
+};
+
+std::vector<Offset> MakeWindow(double cell_size_m, const TraversabilityLimits& limits) {
+  std::vector<Offset> window;
+  for (int dy = -kPlaneRadiusCells; dy <= kPlaneRadiusCells; ++dy) {
+    for (int dx = -kPlaneRadiusCells; dx <= kPlaneRadiusCells; ++dx) {
+      const int squared = dx * dx + dy * dy;
+      if (squared == 0 || squared > kPlaneRadiusCells * kPlaneRadiusCells + 1) continue;
+      const double cells = std::sqrt(squared);
+      const double ramp = cells * cell_size_m * std::tan(limits.max_slope_rad);
+      const double stairs = std::min(cells * limits.max_step_m, 0.5 * limits.clearance_m);
+      window.push_back({.dx = static_cast<double>(dx),
+                        .dy = static_cast<double>(dy),
+                        .cells = dy * kPaddedCells + dx,
+                        .adjacent = squared <= 2,
+                        .reach_m = std::max(stairs, ramp),
+                        .step_m = std::max(limits.max_step_m, ramp)});
+    }
+  }
+  return window;
+}
+
+double Noise(const HeightSample& a, const HeightSample& b) {
+  return kNoiseGate * std::sqrt(double{a.variance_m2} + b.variance_m2);
+}
+
+const HeightSample& Nearest(std::span<const HeightSample> column, float z_m) {
+  const HeightSample* nearest = &column.front();
+  for (const HeightSample& sample : column.subspan(1)) {
+    if (std::abs(sample.z_m - z_m) < std::abs(nearest->z_m - z_m)) nearest = &sample;
+  }
+  return *nearest;
+}
+
+// What the rules say about one surface.
+struct Finding {
+  std::optional<LocalPlane> plane;
+  double step_m = 0.0;
+  Traversability traversability = Traversability::kUnknown;
+  double danger = 0.0;
+};
+
+class Judge {
+ public:
+  Judge(const SurfaceTile& tile,
+        const SurfaceNeighbourhood& neighbours,
+        double cell_size_m,
+        const TraversabilityLimits& limits)
+      : padded_(tile, neighbours, cell_size_m),
+        window_(MakeWindow(cell_size_m, limits)),
+        cell_size_m_(cell_size_m),
+        limits_(limits),
+        tan_limit_(std::tan(limits.max_slope_rad)) {}
+
+  // Surface number `level` of cell (x, y).
+  Finding Examine(int x, int y, std::size_t level) const {
+    const int cell = PaddedTile::IndexOf(x, y);
+    const std::span<const HeightSample> column = padded_.Cell(cell);
+    const HeightSample& self = column[level];
+    Finding finding;
+    FitAndCheckSteps(cell, self, finding);
+    const bool too_low = level + 1 < column.size() &&
+                         double{column[level + 1].bottom_m} - self.z_m < limits_.clearance_m;
+    double slope = limits_.max_slope_rad;
+    double roughness = limits_.max_roughness_m;
+    if (finding.plane.has_value()) {
+      slope = finding.plane->slope_rad();
+      roughness = finding.plane->roughness_m();
+    }
+    finding.traversability = Decide(self, finding, roughness, too_low);
+    const double sigma = std::sqrt(double{self.variance_m2});
+    finding.danger = Danger(slope, roughness, finding.step_m, sigma, limits_);
+    return finding;
+  }
+
+ private:
+  Traversability Decide(const HeightSample& self,
+                        const Finding& finding,
+                        double roughness_m,
+                        bool too_low) const {
+    const bool fits = !too_low && std::isfinite(finding.step_m);
+    if (!fits) return Traversability::kNonTraversable;
+    if (!finding.plane.has_value()) {
+      const bool vertical = self.bottom_m < self.z_m;
+      return vertical ? Traversability::kNonTraversable : Traversability::kUnknown;
+    }
+    const bool smooth =
+        !finding.plane->SteeperThan(tan_limit_) && roughness_m <= limits_.max_roughness_m;
+    return smooth ? Traversability::kTraversable : Traversability::kNonTraversable;
+  }
+
+  void FitAndCheckSteps(int cell, const HeightSample& self, Finding& finding) const {
+    LocalPlaneFit fit(cell_size_m_);
+    fit.Add(0.0, 0.0, 0.0, self);
+    for (const Offset& offset : window_) {
+      const std::span<const HeightSample> column = padded_.Cell(cell + offset.cells);
+      if (column.empty()) continue;
+      const HeightSample& sample = Nearest(column, self.z_m);
+      const double dz = double{sample.z_m} - self.z_m;
+      if (WithinReach(dz, offset, self, sample)) fit.Add(offset.dx, offset.dy, dz, sample);
+      if (offset.adjacent && std::abs(dz) > finding.step_m) {
+        finding.step_m = std::max(finding.step_m, StepTo(column, offset, dz, self, sample));
+      }
+    }
+    finding.plane = fit.Solve();
+    if (finding.plane.has_value() && finding.plane->SteeperThan(tan_limit_) &&
+        finding.plane->roughness_m() > 0.0) {
+      StandBesideStep(cell, self, *finding.plane);
+    }
+  }
+
+  static bool WithinReach(double dz,
+                          const Offset& offset,
+                          const HeightSample& self,
+                          const HeightSample& sample) {
+    return std::abs(dz) <= offset.reach_m || std::abs(dz) <= offset.reach_m + Noise(self, sample);
+  }
+
+  // Height of the step to an adjacent column beyond noise; infinite next to a wall or a drop.
+  double StepTo(std::span<const HeightSample> column,
+                const Offset& offset,
+                double dz,
+                const HeightSample& self,
+                const HeightSample& nearest) const {
+    const double beyond_noise = std::abs(dz) - Noise(self, nearest);
+    if (beyond_noise <= offset.step_m) return beyond_noise;
+    for (const HeightSample& sample : column) {
+      const bool drop = sample.z_m < self.z_m;
+      if (drop || sample.bottom_m - self.z_m < limits_.clearance_m) {
+        return std::numeric_limits<double>::infinity();
+      }
+    }
+    return 0.0;
+  }
+
+  // Puts the plane of the quarter window with the smallest residual in place of `plane`, if noise
+  // explains that residual.
+  void StandBesideStep(int cell, const HeightSample& self, LocalPlane& plane) const {
+    std::optional<LocalPlane> best;
+    for (const auto& [sx, sy] : kQuarters) {
+      LocalPlaneFit fit(cell_size_m_);
+      fit.Add(0.0, 0.0, 0.0, self);
+      for (const Offset& offset : window_) {
+        if (offset.dx * sx < 0.0 || offset.dy * sy < 0.0) continue;
+        const std::span<const HeightSample> column = padded_.Cell(cell + offset.cells);
+        if (column.empty()) continue;
+        const HeightSample& sample = Nearest(column, self.z_m);
+        const double dz = double{sample.z_m} - self.z_m;
+        if (WithinReach(dz, offset, self, sample)) fit.Add(offset.dx, offset.dy, dz, sample);
+      }
+      const std::optional<LocalPlane> quarter = fit.Solve();
+      if (!quarter.has_value() || quarter->roughness_m() > 0.0) continue;
+      if (!best.has_value() || quarter->residual_m < best->residual_m) best = quarter;
+    }
+    if (best.has_value()) plane = *best;
+  }
+
+  PaddedTile padded_;
+  std::vector<Offset> window_;
+  double cell_size_m_;
+  TraversabilityLimits limits_;
+  double tan_limit_;
+};
+
+// Calls visit(i, finding) for every surface of the tile.
+template <typename Visit>
+void ForEachSurface(const SurfaceTile& tile, const Judge& judge, Visit visit) {
+  std::size_t level = 0;
+  for (std::size_t i = 0; i < tile.surfaces.size(); ++i) {
+    const std::uint16_t cell = tile.surfaces[i].cell;
+    level = i > 0 && tile.surfaces[i - 1].cell == cell ? level + 1 : 0;
+    visit(i, judge.Examine(cell & (kTileCells - 1), cell >> kTileShift, level));
+  }
+}
+
+SurfaceAssessment AssessmentOf(const Finding& finding) {
+  SurfaceAssessment result = {.traversability = finding.traversability,
+                              .step_m = static_cast<float>(finding.step_m),
+                              .danger = static_cast<float>(finding.danger)};
+  if (finding.plane.has_value()) {
+    result.normal = finding.plane->Normal().cast<float>();
+    result.slope_rad = static_cast<float>(finding.plane->slope_rad());
+    result.roughness_m = static_cast<float>(finding.plane->roughness_m());
+  }
+  return result;
+}
+
+}  // namespace
+
+double Danger(double slope_rad,
+              double roughness_m,
+              double step_m,
+              double sigma_m,
+              const TraversabilityLimits& limits) {
+  const auto squared_ratio = [](double value, double limit) {
+    if (value <= 0.0) return 0.0;
+    const double ratio = value < kMaxRatio * limit ? value / limit : kMaxRatio;
+    return ratio * ratio;
+  };
+  return squared_ratio(slope_rad, limits.max_slope_rad) +
+         squared_ratio(roughness_m, limits.max_roughness_m) +
+         squared_ratio(step_m, limits.max_step_m) + squared_ratio(sigma_m, limits.max_step_m);
+}
+
+std::vector<SurfaceAssessment> AssessSurfaces(const SurfaceTile& tile,
+                                              const SurfaceNeighbourhood& neighbours,
+                                              double cell_size_m,
+                                              const TraversabilityLimits& limits) {
+  std::vector<SurfaceAssessment> result(tile.surfaces.size());
+  const Judge judge(tile, neighbours, cell_size_m, limits);
+  ForEachSurface(tile, judge, [&result](std::size_t i, const Finding& finding) {
+    result[i] = AssessmentOf(finding);
+  });
+  return result;
+}
+
+void AnnotateTraversability(SurfaceTile& tile,
+                            const SurfaceNeighbourhood& neighbours,
+                            double cell_size_m,
+                            const TraversabilityLimits& limits) {
+  const Judge judge(tile, neighbours, cell_size_m, limits);
+  ForEachSurface(tile, judge, [&tile](std::size_t i, const Finding& finding) {
+    tile.surfaces[i].traversability = finding.traversability;
+    tile.surfaces[i].cost = static_cast<float>(finding.danger);
+  });
+}
+
+std::vector<Eigen::Vector3f> EstimateNormals(const SurfaceTile& tile,
+                                             const SurfaceNeighbourhood& neighbours,
+                                             double cell_size_m,
+                                             const TraversabilityLimits& limits) {
+  std::vector<Eigen::Vector3f> normals(tile.surfaces.size(), Eigen::Vector3f::Zero());
+  const Judge judge(tile, neighbours, cell_size_m, limits);
+  ForEachSurface(tile, judge, [&normals](std::size_t i, const Finding& finding) {
+    if (finding.plane.has_value()) normals[i] = finding.plane->Normal().cast<float>();
+  });
+  return normals;
+}
+
+}  // namespace strata

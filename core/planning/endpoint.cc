@@ -1,0 +1,152 @@
+#include "core/planning/endpoint.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <optional>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/string_view.h"
+#include <Eigen/Core>
+
+#include "core/common/status.h"
+#include "core/mls/tile_key.h"
+#include "core/planning/explain.h"
+#include "core/planning/search_space.h"
+#include "core/world/plan.h"
+
+namespace strata {
+namespace {
+
+constexpr double kMaxCell = 1 << 30;
+
+CellIndex CellAt(const PlanEndpoint& endpoint, double cell_size_m) {
+  return {static_cast<std::int32_t>(std::floor(endpoint.x_m / cell_size_m)),
+          static_cast<std::int32_t>(std::floor(endpoint.y_m / cell_size_m))};
+}
+
+// The patch of [first, first + count) that is meant; kNoPatchId if the level does not exist.
+PatchId Choose(const SearchSpace& space,
+               const PlanEndpoint& endpoint,
+               PatchId first,
+               std::uint32_t count) {
+  if (endpoint.level.has_value()) {
+    const auto level = static_cast<std::int64_t>(*endpoint.level);
+    return level >= 0 && level < count ? first + static_cast<PatchId>(level) : kNoPatchId;
+  }
+  if (count == 0) return kNoPatchId;
+  PatchId best = first;
+  if (!endpoint.z_m.has_value()) return best;
+  for (PatchId patch = first + 1; patch < first + count; ++patch) {
+    if (std::abs(space.Height(patch) - *endpoint.z_m) <
+        std::abs(space.Height(best) - *endpoint.z_m)) {
+      best = patch;
+    }
+  }
+  return best;
+}
+
+// Nearest place to stand, ring by ring; in height too where the endpoint names one.
+std::optional<Eigen::Vector3d> NearestStandable(SearchSpace& space,
+                                                const PlanEndpoint& endpoint,
+                                                std::optional<double> z) {
+  const double cell_size = space.checks().cell_size_m;
+  const CellIndex middle = CellAt(endpoint, cell_size);
+  const int reach = std::max(1, static_cast<int>(std::min(kNearestReachM / cell_size, 256.0)));
+  std::optional<Eigen::Vector3d> best;
+  double best_distance = std::numeric_limits<double>::infinity();
+  const auto look_at = [&](int dx, int dy) {
+    PatchId first = 0;
+    const std::uint32_t count = space.FindCell({middle.x + dx, middle.y + dy}, &first);
+    for (PatchId patch = first; patch < first + count; ++patch) {
+      if (space.Danger(patch) < 0.0F) continue;
+      const Eigen::Vector3d p = space.Position(patch);
+      const Eigen::Vector3d wanted(endpoint.x_m, endpoint.y_m, z.value_or(p.z()));
+      const double distance = (p - wanted).norm();
+      if (distance >= best_distance) continue;
+      best_distance = distance;
+      best = p;
+    }
+  };
+  for (int r = 0; r <= reach && (r - 1) * cell_size < best_distance; ++r) {
+    for (int d = -r; d <= r; ++d) {
+      look_at(d, -r);
+      if (r > 0) look_at(d, r);
+      if (std::abs(d) == r) continue;
+      look_at(-r, d);
+      look_at(r, d);
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+absl::Status ValidateEndpoint(absl::string_view name,
+                              const PlanEndpoint& endpoint,
+                              double cell_size_m) {
+  const double bound = kMaxCell * cell_size_m;
+  if (!(std::abs(endpoint.x_m) < bound && std::abs(endpoint.y_m) < bound)) {
+    return absl::InvalidArgumentError(absl::StrCat(name,
+                                                   " = (",
+                                                   endpoint.x_m,
+                                                   ", ",
+                                                   endpoint.y_m,
+                                                   ") is not within ",
+                                                   bound,
+                                                   " m of the origin"));
+  }
+  if (endpoint.z_m.has_value() && !std::isfinite(*endpoint.z_m)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(name, ": z_m = ", *endpoint.z_m, " is not finite"));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<EndpointMatch> MatchEndpoint(SearchSpace& space, const PlanEndpoint& endpoint) {
+  EndpointMatch match;
+  PatchId first = 0;
+  const CellIndex cell = CellAt(endpoint, space.checks().cell_size_m);
+  const std::uint32_t count = space.FindCell(cell, &first);
+  STRATA_RETURN_IF_ERROR(space.status());
+  const PatchId patch = Choose(space, endpoint, first, count);
+  if (patch != kNoPatchId && space.Danger(patch) >= 0.0F) {
+    match.patch = patch;
+    return match;
+  }
+  std::optional<double> z = endpoint.z_m;
+  const std::string place = absl::StrFormat("(%.2f, %.2f)", endpoint.x_m, endpoint.y_m);
+  if (patch == kNoPatchId) {
+    match.reason = {
+        Obstruction::kUnknown, 0.0, Eigen::Vector3d(endpoint.x_m, endpoint.y_m, z.value_or(0.0))};
+    match.message =
+        count == 0
+            ? absl::StrCat("no surface at ", place)
+            : absl::StrCat(
+                  "no level ", *endpoint.level, " at ", place, ", which has ", count, " surfaces");
+  } else {
+    STRATA_ASSIGN_OR_RETURN(match.reason, WhyNotStand(space, patch));
+    match.message = absl::StrFormat("cannot stand at (%.2f, %.2f, %.2f): %s",
+                                    endpoint.x_m,
+                                    endpoint.y_m,
+                                    space.Height(patch),
+                                    match.reason.ToString());
+    z = space.Height(patch);
+  }
+  match.nearest = NearestStandable(space, endpoint, z);
+  STRATA_RETURN_IF_ERROR(space.status());
+  if (match.nearest.has_value()) {
+    match.message += absl::StrFormat("; nearest place to stand (%.2f, %.2f, %.2f)",
+                                     match.nearest->x(),
+                                     match.nearest->y(),
+                                     match.nearest->z());
+  }
+  return match;
+}
+
+}  // namespace strata

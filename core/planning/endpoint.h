@@ -1,0 +1,39 @@
+// From a place in a query to the patch that is meant.
+#ifndef STRATA_CORE_PLANNING_ENDPOINT_H_
+#define STRATA_CORE_PLANNING_ENDPOINT_H_
+
+#include <optional>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include <Eigen/Core>
+
+#include "core/planning/explain.h"
+#include "core/planning/search_space.h"
+#include "core/world/plan.h"
+
+namespace strata {
+
+// How far around an endpoint a place to stand is looked for [m].
+inline constexpr double kNearestReachM = 10.0;
+
+struct EndpointMatch {
+  PatchId patch = kNoPatchId;  // kNoPatchId: the robot cannot be there, and
+  Explanation reason;          //   why (kUnknown: no surface there at all)
+  std::string message;         //   for people
+  std::optional<Eigen::Vector3d> nearest;
+};
+
+// INVALID_ARGUMENT unless the coordinates are finite and their cell is within ±2^30.
+absl::Status ValidateEndpoint(absl::string_view name,
+                              const PlanEndpoint& endpoint,
+                              double cell_size_m);
+
+// The surface of the endpoint's cell that `endpoint` names, if the robot can stand there.
+absl::StatusOr<EndpointMatch> MatchEndpoint(SearchSpace& space, const PlanEndpoint& endpoint);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_PLANNING_ENDPOINT_H_

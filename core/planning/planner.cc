@@ -1,0 +1,177 @@
+#include "core/planning/planner.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+
+#include "core/common/status.h"
+#include "core/common/stop.h"
+#include "core/planning/endpoint.h"
+#include "core/planning/explain.h"
+#include "core/planning/landmarks.h"
+#include "core/planning/prepared_tile.h"
+#include "core/planning/profile_checks.h"
+#include "core/planning/route.h"
+#include "core/planning/search.h"
+#include "core/planning/search_space.h"
+#include "core/world/plan.h"
+
+namespace strata {
+namespace {
+
+PlanResult NotOnSurface(PlanReason reason, absl::string_view end, const EndpointMatch& match) {
+  PlanResult result;
+  result.reason = reason;
+  result.message = absl::StrCat(end, ": ", match.message);
+  result.where = match.reason.where;
+  result.obstruction = match.reason.kind;
+  result.obstruction_value = match.reason.value;
+  result.nearest = match.nearest;
+  return result;
+}
+
+absl::Status FillRefusal(SearchSpace& space,
+                         const SearchWorkspace& workspace,
+                         PatchId goal,
+                         PlanResult* result) {
+  STRATA_ASSIGN_OR_RETURN(const Explanation why, WhyNoFurther(space, workspace, goal));
+  result->reason =
+      why.kind == Obstruction::kUnknown ? PlanReason::kUnknownGround : PlanReason::kBlocked;
+  result->message = absl::StrCat(
+      result->reason == PlanReason::kBlocked ? "blocked by " : "no observed ground to go on: ",
+      why.ToString());
+  result->where = why.where;
+  result->obstruction = why.kind;
+  result->obstruction_value = why.value;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<PlanResult> Answer(SearchSpace& space,
+                                  const PlanQuery& query,
+                                  const Landmarks* landmarks,
+                                  SearchWorkspace& workspace,
+                                  const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(const EndpointMatch from, MatchEndpoint(space, query.from));
+  if (from.patch == kNoPatchId) return NotOnSurface(PlanReason::kStartNotOnSurface, "start", from);
+  STRATA_ASSIGN_OR_RETURN(const EndpointMatch to, MatchEndpoint(space, query.to));
+  if (to.patch == kNoPatchId) return NotOnSurface(PlanReason::kGoalNotOnSurface, "goal", to);
+  STRATA_ASSIGN_OR_RETURN(
+      const SearchOutcome outcome,
+      FindPath(space, from.patch, to.patch, landmarks, query.max_expanded, workspace, stop));
+  PlanResult result;
+  result.expanded = outcome.expanded;
+  switch (outcome.end) {
+    case SearchOutcome::End::kLimit:
+      result.reason = PlanReason::kSearchLimit;
+      result.message = absl::StrCat("no path within ", query.max_expanded, " expanded patches");
+      break;
+    case SearchOutcome::End::kExhausted:
+      STRATA_RETURN_IF_ERROR(FillRefusal(space, workspace, to.patch, &result));
+      break;
+    case SearchOutcome::End::kFound: {
+      Route route = MakeRoute(space, outcome.path);
+      STRATA_RETURN_IF_ERROR(space.status());
+      result.waypoints = std::move(route.waypoints);
+      result.length_m = route.length_m;
+      result.cost = route.cost_m;
+      result.graph_cost = outcome.cost * space.checks().cell_size_m / kCostPerCell;
+      result.gaps = std::move(route.gaps);
+      result.tiles = std::move(route.tiles);
+      result.message = "found";
+      break;
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+// A workspace for one query, given back at its end.
+class Planner::WorkspaceLoan {
+ public:
+  explicit WorkspaceLoan(Planner& planner) : planner_(planner) {
+    absl::MutexLock lock(&planner.mutex_);
+    if (planner.idle_.empty()) {
+      workspace_ = std::make_unique<SearchWorkspace>();
+    } else {
+      workspace_ = std::move(planner.idle_.back());
+      planner.idle_.pop_back();
+    }
+  }
+  ~WorkspaceLoan() {
+    absl::MutexLock lock(&planner_.mutex_);
+    planner_.idle_.push_back(std::move(workspace_));
+  }
+  WorkspaceLoan(const WorkspaceLoan&) = delete;
+  WorkspaceLoan& operator=(const WorkspaceLoan&) = delete;
+
+  SearchWorkspace& workspace() { return *workspace_; }
+
+ private:
+  Planner& planner_;
+  std::unique_ptr<SearchWorkspace> workspace_;
+};
+
+Planner::Planner(const PlannerOptions& options) : options_(options), cache_(options.cache_bytes) {}
+
+absl::StatusOr<PlanResult> Planner::Plan(TileSource& source,
+                                         const PlanQuery& query,
+                                         const Stop& stop) {
+  const absl::Time begin = absl::Now();
+  STRATA_RETURN_IF_ERROR(stop.status());
+  STRATA_RETURN_IF_ERROR(ValidateEndpoint("from", query.from, options_.cell_size_m));
+  STRATA_RETURN_IF_ERROR(ValidateEndpoint("to", query.to, options_.cell_size_m));
+  STRATA_ASSIGN_OR_RETURN(const ProfileChecks checks,
+                          MakeProfileChecks(query.profile, options_.cell_size_m));
+  const std::shared_ptr<const Landmarks> landmarks = LandmarksFor(source, query.profile);
+  WorkspaceLoan loan(*this);
+  SearchSpace space(cache_, source, checks);
+  absl::StatusOr<PlanResult> result = Answer(space, query, landmarks.get(), loan.workspace(), stop);
+  if (result.ok()) result->elapsed_ms = absl::ToDoubleMilliseconds(absl::Now() - begin);
+  return result;
+}
+
+absl::Status Planner::PrepareLandmarks(TileSource& source,
+                                       const RobotProfile& profile,
+                                       const std::vector<TileKey>& tiles,
+                                       int count,
+                                       const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(const ProfileChecks checks,
+                          MakeProfileChecks(profile, options_.cell_size_m));
+  WorkspaceLoan loan(*this);
+  SearchSpace space(cache_, source, checks);
+  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const Landmarks> made,
+                          Landmarks::Make(space, tiles, count, loan.workspace(), stop));
+  absl::MutexLock lock(&mutex_);
+  landmarks_.erase(std::remove_if(landmarks_.begin(),
+                                  landmarks_.end(),
+                                  [&profile](const std::shared_ptr<const Landmarks>& landmarks) {
+                                    return landmarks->profile() == profile;
+                                  }),
+                   landmarks_.end());
+  landmarks_.push_back(std::move(made));
+  if (landmarks_.size() > kMaxLandmarkSets) landmarks_.erase(landmarks_.begin());
+  return absl::OkStatus();
+}
+
+std::shared_ptr<const Landmarks> Planner::LandmarksFor(TileSource& source,
+                                                       const RobotProfile& profile) {
+  std::shared_ptr<const Landmarks> found;
+  {
+    absl::MutexLock lock(&mutex_);
+    for (const std::shared_ptr<const Landmarks>& landmarks : landmarks_) {
+      if (landmarks->profile() == profile) found = landmarks;
+    }
+  }
+  return found != nullptr && found->Fits(source) ? found : nullptr;
+}
+
+}  // namespace strata

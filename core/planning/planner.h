@@ -1,0 +1,84 @@
+// Paths for robots over the surfaces of a map (thesis 6.2.2): which level is which, what a robot of
+// some size can take, and what the safest short way is.
+//
+// A patch (its top, that of a vertical one too) is a state. A robot may stand on it if
+//   - slope and roughness of the local plane hold (core/planning/ground_fit.h),
+//   - no edge of its level (core/planning/ground_checks.h: obstacle, step, drop, too little
+//     clearance, unknown ground wider than max_gap) comes within its radius.
+// It moves to the eight neighbouring cells over steps of at most max_step, and over up to max_gap
+// of unobserved cells between fitting rims. A move of length l costs l · (1 + danger), the mean of
+// both ends' danger (core/planning/profile_checks.h), plus kGapDanger over unobserved ground.
+//
+// What is prepared, when a query first touches a tile, and kept while it fits the cache:
+//   - per tile: local planes (12 bytes a patch), shared by all profiles;
+//   - per tile and profile: all of the above as moves with their costs (45 bytes a patch).
+// A preparation is a pure function of the tile and its eight neighbours and is keyed by their
+// versions: unchanged tiles are prepared once, changed ones never used stale.
+#ifndef STRATA_CORE_PLANNING_PLANNER_H_
+#define STRATA_CORE_PLANNING_PLANNER_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+
+#include "core/common/stop.h"
+#include "core/mls/tile_key.h"
+#include "core/planning/landmarks.h"
+#include "core/planning/search.h"
+#include "core/planning/tile_cache.h"
+#include "core/planning/tile_source.h"
+#include "core/world/plan.h"
+#include "core/world/robot_profile.h"
+
+namespace strata {
+
+struct PlannerOptions {
+  double cell_size_m = 0.1;                        // of the map
+  std::size_t cache_bytes = std::size_t{1} << 30;  // of prepared tiles
+};
+
+// Plans in one map, in any of its epochs. Thread-safe; queries run in their callers' threads.
+class Planner {
+ public:
+  explicit Planner(const PlannerOptions& options);
+
+  // A path, or why there is none; both are OK. Fills all of PlanResult but `epoch`.
+  //   INVALID_ARGUMENT    query not finite or beyond the map's range, profile out of range
+  //   CANCELLED, DEADLINE_EXCEEDED   by `stop`
+  //   errors of `source`
+  absl::StatusOr<PlanResult> Plan(TileSource& source, const PlanQuery& query, const Stop& stop);
+
+  // Measures landmarks for one profile over everything connected to `tiles` (usually all tiles of
+  // the map), `count` in [1, 16]. Later queries of that profile use them as long as the source has
+  // the same tiles; results do not change, only time. Replaces those of the same profile. Takes
+  // about a second per million patches and 6 landmarks, and 4 · count bytes a patch.
+  absl::Status PrepareLandmarks(TileSource& source,
+                                const RobotProfile& profile,
+                                const std::vector<TileKey>& tiles,
+                                int count,
+                                const Stop& stop);
+
+  TileCache::Statistics cache_statistics() const { return cache_.statistics(); }
+
+ private:
+  class WorkspaceLoan;
+
+  std::shared_ptr<const Landmarks> LandmarksFor(TileSource& source, const RobotProfile& profile);
+
+  static constexpr std::size_t kMaxLandmarkSets = 4;
+
+  const PlannerOptions options_;
+  TileCache cache_;
+  absl::Mutex mutex_;
+  std::vector<std::unique_ptr<SearchWorkspace>> idle_ ABSL_GUARDED_BY(mutex_);
+  std::vector<std::shared_ptr<const Landmarks>> landmarks_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_PLANNING_PLANNER_H_

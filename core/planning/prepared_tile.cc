@@ -1,0 +1,199 @@
+#include "core/planning/prepared_tile.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <tuple>
+#include <vector>
+
+#include "core/mls/tile_key.h"
+#include "core/planning/ground_checks.h"
+#include "core/planning/ground_fit.h"
+#include "core/planning/ground_window.h"
+#include "core/planning/profile_checks.h"
+
+namespace strata {
+namespace {
+
+constexpr int kCells = kTileCells * kTileCells;
+
+// Every second bit of a 16-bit number.
+std::uint32_t EvenBits(std::uint32_t v) {
+  v &= 0x5555;
+  v = (v | (v >> 1)) & 0x3333;
+  v = (v | (v >> 2)) & 0x0F0F;
+  return (v | (v >> 4)) & 0x00FF;
+}
+std::uint32_t SpreadBits(std::uint32_t v) {
+  v = (v | (v << 4)) & 0x0F0F;
+  v = (v | (v << 2)) & 0x3333;
+  return (v | (v << 1)) & 0x5555;
+}
+std::uint16_t CellOfMorton(std::uint32_t morton) {
+  return static_cast<std::uint16_t>((EvenBits(morton >> 1) << kTileShift) | EvenBits(morton));
+}
+std::uint32_t MortonOfCell(std::uint16_t cell) {
+  return (SpreadBits(cell >> kTileShift) << 1) | SpreadBits(cell & (kTileCells - 1));
+}
+
+// Builds one PreparedTile; holds what is known of the window's surfaces while it does.
+class Preparation {
+ public:
+  Preparation(const GroundWindow& window, const ProfileChecks& checks)
+      : window_(window), checks_(checks), ground_(window, checks) {}
+
+  PreparedTile Run(const TileKey& key, const std::vector<GroundFit>& fits) {
+    tile_.key = key;
+    CheckSurfaces(fits);
+    NumberPatches();
+    tile_.moves.resize(tile_.size());
+    for (std::uint32_t patch = 0; patch < tile_.size(); ++patch) {
+      if (!tile_.CanStand(patch)) continue;
+      for (int k = 0; k < 8; ++k) AddMove(patch, k);
+    }
+    tile_.far_moves.shrink_to_fit();
+    return std::move(tile_);
+  }
+
+ private:
+  bool InTile(int x, int y) const {
+    const int m = window_.margin();
+    return x >= m && y >= m && x < m + kTileCells && y < m + kTileCells;
+  }
+
+  // Danger and distance of all surfaces of the tile and of the ring that moves lead to.
+  void CheckSurfaces(const std::vector<GroundFit>& fits) {
+    danger_.assign(window_.surface_count(), -1.0F);
+    distance_.assign(window_.surface_count(), 0.0F);
+    const int ring = checks_.gap_cells[0] + 1;
+    const int low = window_.margin() - ring;
+    const int high = window_.margin() + kTileCells + ring;
+    std::size_t fit = 0;
+    for (int y = low; y < high; ++y) {
+      for (int x = low; x < high; ++x) {
+        const int cell = y * window_.width() + x;
+        const bool own = InTile(x, y);
+        for (std::uint32_t i = window_.begin(cell); i < window_.begin(cell + 1); ++i) {
+          CheckSurface(i, own ? &fits[fit++] : nullptr);
+        }
+      }
+    }
+  }
+
+  void CheckSurface(std::uint32_t i, const GroundFit* known) {
+    const WindowSurface& surface = window_.surface(i);
+    const float distance = ground_.EdgeDistance(static_cast<int>(surface.cell), surface.z_m);
+    distance_[i] = distance;
+    if (distance < checks_.footprint_m) return;
+    const GroundFit fit = known != nullptr ? *known : FitGround(window_, i);
+    if (fit.certain_slope_tan > checks_.slope_tan || fit.roughness_m > checks_.roughness_m) return;
+    danger_[i] = static_cast<float>(checks_.Danger(fit, std::sqrt(surface.variance_m2), distance));
+  }
+
+  void NumberPatches() {
+    number_.assign(window_.surface_count(), PreparedTile::kNoPatch);
+    for (std::uint32_t morton = 0; morton < kCells; ++morton) {
+      if (morton % 64 == 0) tile_.block_begin[morton / 64] = tile_.size();
+      const std::uint16_t cell = CellOfMorton(morton);
+      const int at = window_.CellOfTile(cell);
+      for (std::uint32_t i = window_.begin(at); i < window_.begin(at + 1); ++i) {
+        number_[i] = tile_.size();
+        surface_.push_back(i);
+        tile_.cell.push_back(cell);
+        tile_.z_m.push_back(window_.surface(i).z_m);
+        tile_.danger.push_back(danger_[i]);
+        tile_.edge_distance.push_back(
+            static_cast<std::uint8_t>(distance_[i] / checks_.reach_m * 255.0F));
+      }
+    }
+    tile_.block_begin[kCells / 64] = tile_.size();
+  }
+
+  void AddMove(std::uint32_t patch, int k) {
+    const std::uint32_t from = surface_[patch];
+    int cells = 0;
+    const std::uint32_t to = ground_.Target(from, k, &cells);
+    if (to == GroundChecks::kNoSurface || danger_[to] < 0.0F) return;
+    double danger = 0.5 * (static_cast<double>(danger_[from]) + danger_[to]);
+    if (cells > 1) {
+      if (!ground_.GapIsClear(from, to, k, cells)) return;
+      danger += kGapDanger * (cells - 1) / cells;
+    }
+    const double rise = window_.surface(to).z_m - window_.surface(from).z_m;
+    const std::uint32_t cost =
+        MoveCost(cells * checks_.StepLength(k), rise, danger, checks_.cell_size_m);
+    Move& move = tile_.moves[patch][k];
+    const std::int64_t delta = static_cast<std::int64_t>(number_[to]) - patch;
+    const bool near = number_[to] != PreparedTile::kNoPatch && cells == 1 && cost < Move::kFar &&
+                      std::abs(delta) <= INT16_MAX;
+    if (near) {
+      move = {static_cast<std::int16_t>(delta), static_cast<std::uint16_t>(cost)};
+      return;
+    }
+    move.cost = Move::kFar;
+    const auto level = to - window_.begin(static_cast<int>(window_.surface(to).cell));
+    tile_.far_moves.push_back({patch,
+                               static_cast<std::uint8_t>(k),
+                               static_cast<std::uint8_t>(level),
+                               static_cast<std::uint16_t>(cells),
+                               cost});
+  }
+
+  const GroundWindow& window_;
+  const ProfileChecks& checks_;
+  const GroundChecks ground_;
+  PreparedTile tile_;
+  // Per surface of the window.
+  std::vector<float> danger_;
+  std::vector<float> distance_;
+  std::vector<std::uint32_t> number_;
+  std::vector<std::uint32_t> surface_;  // per patch
+};
+
+}  // namespace
+
+void PreparedTile::FindCell(std::uint16_t cell_in_tile,
+                            std::uint32_t* first,
+                            std::uint32_t* count) const {
+  const std::uint32_t block = MortonOfCell(cell_in_tile) / 64;
+  std::uint32_t i = block_begin[block];
+  const std::uint32_t end = block_begin[block + 1];
+  while (i < end && cell[i] != cell_in_tile) ++i;
+  *first = i;
+  while (i < end && cell[i] == cell_in_tile) ++i;
+  *count = i - *first;
+}
+
+const FarMove& PreparedTile::Far(std::uint32_t patch, int direction) const {
+  return *std::lower_bound(
+      far_moves.begin(), far_moves.end(), direction, [patch](const FarMove& move, int k) {
+        return std::tuple<std::uint32_t, int>(move.patch, move.direction) <
+               std::tuple<std::uint32_t, int>(patch, k);
+      });
+}
+
+std::size_t PreparedTile::memory_bytes() const {
+  return sizeof(*this) + moves.capacity() * sizeof(moves[0]) +
+         far_moves.capacity() * sizeof(FarMove) + cell.capacity() * sizeof(cell[0]) +
+         z_m.capacity() * sizeof(float) + danger.capacity() * sizeof(float) +
+         edge_distance.capacity();
+}
+
+std::uint32_t MoveCost(double run_m, double rise_m, double danger, double cell_size_m) {
+  const double length_cells = std::sqrt(run_m * run_m + rise_m * rise_m) / cell_size_m;
+  const double cost = std::round(kCostPerCell * length_cells * (1.0 + danger));
+  // Never below what the search's heuristic takes for the same stretch.
+  return static_cast<std::uint32_t>(
+      std::min(cost, static_cast<double>(std::numeric_limits<std::int32_t>::max())));
+}
+
+PreparedTile PrepareTile(const TileKey& key,
+                         const GroundWindow& window,
+                         const std::vector<GroundFit>& fits,
+                         const ProfileChecks& checks) {
+  return Preparation(window, checks).Run(key, fits);
+}
+
+}  // namespace strata

@@ -1,0 +1,74 @@
+// One tile as one robot profile sees it: which surfaces it may stand on and what every move costs.
+#ifndef STRATA_CORE_PLANNING_PREPARED_TILE_H_
+#define STRATA_CORE_PLANNING_PREPARED_TILE_H_
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/mls/tile_key.h"
+#include "core/planning/ground_fit.h"
+#include "core/planning/ground_window.h"
+#include "core/planning/profile_checks.h"
+
+namespace strata {
+
+// Costs are whole numbers: a move of one cell over ground without danger costs kCostPerCell.
+inline constexpr std::uint32_t kCostPerCell = 2048;
+inline constexpr std::uint32_t kCostPerDiagonal = 2896;  // ⌊2048 √2⌋
+
+// A move in one of the eight directions: target = own number + delta, in the same tile.
+struct Move {
+  std::int16_t delta = 0;
+  std::uint16_t cost = kNone;
+
+  static constexpr std::uint16_t kNone = 0;      // no such move
+  static constexpr std::uint16_t kFar = 0xFFFF;  // see PreparedTile::far_moves
+};
+
+// A move into another tile, over a gap, or one that does not fit into a Move.
+struct FarMove {
+  std::uint32_t patch = 0;  // from
+  std::uint8_t direction = 0;
+  std::uint8_t level = 0;   // of the target among the surfaces of its cell, 0 = lowest
+  std::uint16_t cells = 0;  // length; > 1: over a gap
+  std::uint32_t cost = 0;
+};
+
+// Patches are numbered along a Morton curve over the tile's cells, lowest first within a cell, so
+// that what a search touches together lies together. 45 bytes a patch. Immutable.
+struct PreparedTile {
+  TileKey key;
+  std::vector<std::array<Move, 8>> moves;
+  std::vector<FarMove> far_moves;   // by (patch, direction)
+  std::vector<std::uint16_t> cell;  // CellInTile
+  std::vector<float> z_m;
+  std::vector<float> danger;                      // < 0: the robot cannot stand there
+  std::vector<std::uint8_t> edge_distance;        // ⌊255 · EdgeDistance / reach⌋
+  std::array<std::uint32_t, 1025> block_begin{};  // first patch of each 8 × 8 block of cells
+
+  static constexpr std::uint32_t kNoPatch = 0xFFFFFFFFU;
+
+  std::uint32_t size() const { return static_cast<std::uint32_t>(cell.size()); }
+  bool CanStand(std::uint32_t patch) const { return danger[patch] >= 0.0F; }
+  // Patches of a cell: [first, first + count).
+  void FindCell(std::uint16_t cell_in_tile, std::uint32_t* first, std::uint32_t* count) const;
+  const FarMove& Far(std::uint32_t patch, int direction) const;
+  std::size_t memory_bytes() const;
+};
+
+// Cost of a move of `run_m` sideways and `rise_m` up or down between patches of two dangers.
+// kGapDanger comes on top over unobserved ground.
+inline constexpr double kGapDanger = 1.0;
+std::uint32_t MoveCost(double run_m, double rise_m, double danger, double cell_size_m);
+
+// `fits` are those of FitTile over the same tile. REQUIRES: window.margin() == checks.margin.
+PreparedTile PrepareTile(const TileKey& key,
+                         const GroundWindow& window,
+                         const std::vector<GroundFit>& fits,
+                         const ProfileChecks& checks);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_PLANNING_PREPARED_TILE_H_

@@ -1,0 +1,280 @@
+#include "core/planning/search.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/common/status.h"
+#include "core/common/stop.h"
+#include "core/mls/tile_key.h"
+#include "core/planning/ground_window.h"
+#include "core/planning/landmarks.h"
+#include "core/planning/prepared_tile.h"
+#include "core/planning/search_space.h"
+
+namespace strata {
+namespace {
+
+constexpr std::uint32_t kClosed = 8;
+constexpr std::uint64_t kExpansionsPerLook = 4096;  // at the clock
+constexpr std::uint32_t kMaxCost = 0xF0000000U;
+
+// Cost of the shortest way over cells without danger; consistent, since a move of any length costs
+// at least as much.
+struct OctileBound {
+  CellIndex goal;
+
+  void Enter(const SearchSpace::Slot& /*slot*/) {}
+  std::uint32_t operator()(std::int32_t x, std::int32_t y, std::uint32_t /*local*/) const {
+    const auto dx = static_cast<std::uint32_t>(std::abs(x - goal.x));
+    const auto dy = static_cast<std::uint32_t>(std::abs(y - goal.y));
+    return kCostPerCell * (std::max(dx, dy) - std::min(dx, dy)) +
+           kCostPerDiagonal * std::min(dx, dy);
+  }
+};
+
+struct NoBound {
+  void Enter(const SearchSpace::Slot& /*slot*/) {}
+  std::uint32_t operator()(std::int32_t /*x*/, std::int32_t /*y*/, std::uint32_t /*local*/) const {
+    return 0;
+  }
+};
+
+// |d(landmark, patch) − d(landmark, goal)| never exceeds the cost between patch and goal.
+class LandmarkBound {
+ public:
+  LandmarkBound(CellIndex goal, const Landmarks& landmarks, const std::uint32_t* goal_costs)
+      : octile_{goal}, landmarks_(landmarks), goal_costs_(goal_costs) {}
+
+  void Enter(const SearchSpace::Slot& slot) { costs_ = landmarks_.Tile(slot.tile->key); }
+  std::uint32_t operator()(std::int32_t x, std::int32_t y, std::uint32_t local) const {
+    std::uint32_t bound = octile_(x, y, local);
+    if (costs_ == nullptr) return bound;
+    const int count = landmarks_.count();
+    const std::uint32_t* costs = costs_ + static_cast<std::size_t>(local) * count;
+    for (int l = 0; l < count; ++l) {
+      const std::uint32_t a = costs[l];
+      const std::uint32_t b = goal_costs_[l];
+      if (a == Landmarks::kUnreached || b == Landmarks::kUnreached) continue;
+      bound = std::max(bound, a > b ? a - b : b - a);
+    }
+    return bound;
+  }
+
+ private:
+  OctileBound octile_;
+  const Landmarks& landmarks_;
+  const std::uint32_t* goal_costs_;
+  const std::uint32_t* costs_ = nullptr;  // of the tile entered
+};
+
+template <typename Bound>
+class Search {
+ public:
+  Search(SearchSpace& space, SearchWorkspace& workspace, Bound bound, const Stop& stop)
+      : space_(space), workspace_(workspace), bound_(bound), stop_(stop) {}
+
+  // Expands until `goal` (kNoPatchId: nothing) is settled or the queue is empty.
+  absl::StatusOr<SearchOutcome> Run(PatchId start, PatchId goal, std::uint64_t max_expanded) {
+    workspace_.Begin();
+    goal_ = goal;
+    EnterSlot(space_.SlotOf(start));
+    const CellIndex cell = space_.CellOfPatch(start);
+    Relax(start - base_, 0, 0, cell.x, cell.y);
+    if (start == goal) goal_cost_ = 0;
+    BucketQueue& queue = workspace_.queue();
+    SearchOutcome outcome;
+    while (!queue.empty()) {
+      const PatchId patch = queue.Pop();
+      if (goal_cost_ <= queue.lower_bound()) break;
+      if (!Expand(patch)) continue;
+      ++outcome.expanded;
+      if (outcome.expanded % kExpansionsPerLook == 0) STRATA_RETURN_IF_ERROR(stop_.status());
+      if (outcome.expanded >= max_expanded) {
+        outcome.end = SearchOutcome::End::kLimit;
+        return outcome;
+      }
+    }
+    STRATA_RETURN_IF_ERROR(space_.status());
+    if (goal_cost_ != kMaxCost) {
+      outcome.end = SearchOutcome::End::kFound;
+      outcome.cost = goal_cost_;
+      outcome.path = Backtrack(start, goal);
+      STRATA_RETURN_IF_ERROR(space_.status());
+    }
+    return outcome;
+  }
+
+  PatchId dearest() const { return dearest_; }
+
+ private:
+  void EnterSlot(int slot) {
+    if (slot == slot_) return;
+    slot_ = slot;
+    const SearchSpace::Slot& s = space_.slots()[slot];
+    tile_ = s.tile.get();
+    base_ = s.base;
+    x0_ = s.x0;
+    y0_ = s.y0;
+    nodes_ = workspace_.Nodes(slot, tile_->size());
+    bound_.Enter(s);
+  }
+
+  // Offers a way to patch `local` of the slot entered.
+  void Relax(
+      std::uint32_t local, std::uint32_t cost, int direction, std::int32_t x, std::int32_t y) {
+    SearchNode& node = nodes_[local];
+    if (!workspace_.Reached(node)) {
+      node.remaining = bound_(x, y, local);
+    } else if (cost >= node.cost) {
+      return;
+    }
+    node.cost = cost;
+    node.stamp = workspace_.Stamp(direction);
+    const PatchId patch = base_ + local;
+    if (patch == goal_) goal_cost_ = cost;
+    const std::uint32_t total = cost + node.remaining;
+    if (total < goal_cost_ && total < kMaxCost) workspace_.queue().Push(total, patch);
+  }
+
+  // False if the patch was expanded before or cannot be on a better path.
+  bool Expand(PatchId patch) {
+    EnterSlot(space_.SlotOf(patch));
+    const std::uint32_t local = patch - base_;
+    SearchNode& node = nodes_[local];
+    if ((node.stamp & kClosed) != 0 || node.cost + node.remaining >= goal_cost_) return false;
+    node.stamp |= kClosed;
+    if (node.cost >= dearest_cost_) {
+      dearest_cost_ = node.cost;
+      dearest_ = patch;
+    }
+    const std::uint32_t cost = node.cost;
+    const std::uint16_t cell = tile_->cell[local];
+    const std::int32_t x = x0_ + (cell & (kTileCells - 1));
+    const std::int32_t y = y0_ + (cell >> kTileShift);
+    const std::array<Move, 8>& moves = tile_->moves[local];
+    unsigned far = 0;
+    for (int k = 0; k < 8; ++k) {
+      const Move move = moves[k];
+      if (move.cost == Move::kNone) continue;
+      if (move.cost == Move::kFar) {
+        far |= 1U << k;
+        continue;
+      }
+      Relax(local + move.delta, cost + move.cost, k, x + kStepX[k], y + kStepY[k]);
+    }
+    if (far != 0) ExpandFar(local, cost, far);
+    return true;
+  }
+
+  void ExpandFar(std::uint32_t local, std::uint32_t cost, unsigned directions) {
+    const int own_slot = slot_;
+    const PreparedTile& tile = *tile_;
+    for (int k = 0; k < 8; ++k) {
+      if ((directions >> k & 1U) == 0) continue;
+      const FarMove& move = tile.Far(local, k);
+      const PatchId target = space_.Resolve(space_.slots()[own_slot], move);
+      if (target == kNoPatchId) continue;
+      EnterSlot(space_.SlotOf(target));
+      const CellIndex cell = space_.CellOfPatch(target);
+      Relax(target - base_, cost + move.cost, k, cell.x, cell.y);
+    }
+  }
+
+  // Moves are symmetric: back by the opposite of the direction a patch was reached by.
+  std::vector<PatchId> Backtrack(PatchId start, PatchId goal) {
+    std::vector<PatchId> path = {goal};
+    while (path.back() != start) {
+      EnterSlot(space_.SlotOf(path.back()));
+      const int direction = static_cast<int>(nodes_[path.back() - base_].stamp & 7U);
+      std::uint32_t cost = 0;
+      int cells = 0;
+      path.push_back(space_.Follow(path.back(), direction ^ 4, &cost, &cells));
+    }
+    std::reverse(path.begin(), path.end());
+    return path;
+  }
+
+  SearchSpace& space_;
+  SearchWorkspace& workspace_;
+  Bound bound_;
+  const Stop& stop_;
+  PatchId goal_ = kNoPatchId;
+  std::uint32_t goal_cost_ = kMaxCost;
+  PatchId dearest_ = kNoPatchId;
+  std::uint32_t dearest_cost_ = 0;
+  // The slot entered.
+  int slot_ = -1;
+  const PreparedTile* tile_ = nullptr;
+  PatchId base_ = 0;
+  std::int32_t x0_ = 0;
+  std::int32_t y0_ = 0;
+  SearchNode* nodes_ = nullptr;
+};
+
+}  // namespace
+
+void SearchWorkspace::Begin() {
+  // 28 bits of generations; then all memories are wiped once.
+  if (++generation_ >= 1U << 28) {
+    for (std::vector<SearchNode>& nodes : nodes_)
+      std::fill(nodes.begin(), nodes.end(), SearchNode{});
+    generation_ = 1;
+  }
+  queue_.Clear();
+}
+
+SearchNode* SearchWorkspace::Nodes(int slot, std::uint32_t size) {
+  if (static_cast<std::size_t>(slot) >= nodes_.size()) nodes_.resize(slot + 1);
+  std::vector<SearchNode>& nodes = nodes_[slot];
+  if (nodes.size() < size) nodes.resize(size);
+  return nodes.data();
+}
+
+const SearchNode* SearchWorkspace::NodesIfAny(int slot) const {
+  return static_cast<std::size_t>(slot) < nodes_.size() && !nodes_[slot].empty()
+             ? nodes_[slot].data()
+             : nullptr;
+}
+
+std::size_t SearchWorkspace::memory_bytes() const {
+  std::size_t bytes = 0;
+  for (const std::vector<SearchNode>& nodes : nodes_)
+    bytes += nodes.capacity() * sizeof(SearchNode);
+  return bytes;
+}
+
+absl::StatusOr<SearchOutcome> FindPath(SearchSpace& space,
+                                       PatchId start,
+                                       PatchId goal,
+                                       const Landmarks* landmarks,
+                                       std::uint64_t max_expanded,
+                                       SearchWorkspace& workspace,
+                                       const Stop& stop) {
+  const CellIndex cell = space.CellOfPatch(goal);
+  if (landmarks != nullptr) {
+    const SearchSpace::Slot& slot = space.SlotOfPatch(goal);
+    if (const std::uint32_t* costs = landmarks->Tile(slot.tile->key); costs != nullptr) {
+      costs += static_cast<std::size_t>(goal - slot.base) * landmarks->count();
+      return Search(space, workspace, LandmarkBound(cell, *landmarks, costs), stop)
+          .Run(start, goal, max_expanded);
+    }
+  }
+  return Search(space, workspace, OctileBound{cell}, stop).Run(start, goal, max_expanded);
+}
+
+absl::StatusOr<PatchId> ReachAll(SearchSpace& space,
+                                 PatchId start,
+                                 SearchWorkspace& workspace,
+                                 const Stop& stop) {
+  Search search(space, workspace, NoBound{}, stop);
+  STRATA_RETURN_IF_ERROR(search.Run(start, kNoPatchId, UINT64_MAX).status());
+  return search.dearest();
+}
+
+}  // namespace strata

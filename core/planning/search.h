@@ -1,0 +1,79 @@
+// Shortest paths over the patches of a SearchSpace: A* and, without a goal, Dijkstra's algorithm.
+#ifndef STRATA_CORE_PLANNING_SEARCH_H_
+#define STRATA_CORE_PLANNING_SEARCH_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+#include "core/common/stop.h"
+#include "core/planning/bucket_queue.h"
+#include "core/planning/search_space.h"
+
+namespace strata {
+
+class Landmarks;
+
+// What a search knows of a patch.
+struct SearchNode {
+  std::uint32_t cost = 0;       // from the start
+  std::uint32_t remaining = 0;  // lower bound to the goal
+  std::uint32_t stamp = 0;      // generation << 4 | closed << 3 | direction it was reached by
+  std::uint32_t reserved = 0;   // keeps four nodes in a cache line
+};
+
+// Memory of searches, kept between them: nodes of an earlier search are told by their generation
+// and never cleared. One search at a time.
+class SearchWorkspace {
+ public:
+  // Starts anew.
+  void Begin();
+  // Nodes of a slot, at least `size` of them.
+  SearchNode* Nodes(int slot, std::uint32_t size);
+  const SearchNode* NodesIfAny(int slot) const;
+  bool Reached(const SearchNode& node) const { return node.stamp >> 4 == generation_; }
+  std::uint32_t Stamp(int direction) const {
+    return generation_ << 4 | static_cast<std::uint32_t>(direction);
+  }
+  BucketQueue& queue() { return queue_; }
+  std::size_t memory_bytes() const;
+
+ private:
+  static constexpr int kBucketShift = 9;  // a quarter of the cheapest move
+
+  std::uint32_t generation_ = 0;
+  std::vector<std::vector<SearchNode>> nodes_;  // per slot
+  BucketQueue queue_{kBucketShift};
+};
+
+struct SearchOutcome {
+  enum class End : std::uint8_t { kFound, kExhausted, kLimit };
+  End end = End::kExhausted;
+  std::uint64_t expanded = 0;
+  std::uint32_t cost = 0;     // of the path
+  std::vector<PatchId> path;  // start to goal
+};
+
+// The cheapest path from `start` to `goal`, both places where the robot can stand. `landmarks`
+// (optional) must fit the space's source and profile. CANCELLED and DEADLINE_EXCEEDED by `stop`;
+// errors of the source.
+absl::StatusOr<SearchOutcome> FindPath(SearchSpace& space,
+                                       PatchId start,
+                                       PatchId goal,
+                                       const Landmarks* landmarks,
+                                       std::uint64_t max_expanded,
+                                       SearchWorkspace& workspace,
+                                       const Stop& stop);
+
+// Costs from `start` to everything that can be reached, left in `workspace`; returns the patch that
+// is the most expensive to reach.
+absl::StatusOr<PatchId> ReachAll(SearchSpace& space,
+                                 PatchId start,
+                                 SearchWorkspace& workspace,
+                                 const Stop& stop);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_PLANNING_SEARCH_H_

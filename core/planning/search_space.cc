@@ -1,0 +1,105 @@
+#include "core/planning/search_space.h"
+
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include <Eigen/Core>
+
+#include "core/mls/tile_key.h"
+#include "core/planning/ground_window.h"
+#include "core/planning/prepared_tile.h"
+
+namespace strata {
+namespace {
+
+constexpr int kMaxSlots = 65535;
+
+}  // namespace
+
+int SearchSpace::SlotOf(const TileKey& key) {
+  const auto [found, inserted] = slot_of_.try_emplace(key, -1);
+  if (!inserted || !status_.ok()) return found->second;
+  absl::StatusOr<std::shared_ptr<const PreparedTile>> tile = cache_.Get(source_, key, checks_);
+  if (tile.ok() && slots_.size() >= kMaxSlots) {
+    tile =
+        absl::ResourceExhaustedError(absl::StrCat("a query touches at most ", kMaxSlots, " tiles"));
+  }
+  if (!tile.ok()) {
+    status_ = tile.status();
+    return -1;
+  }
+  if (*tile == nullptr) return -1;
+  const auto slot = static_cast<int>(slots_.size());
+  slots_.push_back({*tile, end(), key.x << kTileShift, key.y << kTileShift});
+  const std::uint32_t pages = ((*tile)->size() >> kPageShift) + 1;
+  page_slot_.insert(page_slot_.end(), pages, static_cast<std::uint16_t>(slot));
+  found->second = slot;
+  return slot;
+}
+
+std::uint32_t SearchSpace::FindCell(CellIndex cell, PatchId* first) {
+  const int slot = SlotOf(TileOfCell(cell));
+  if (slot < 0) return 0;
+  std::uint32_t local = 0;
+  std::uint32_t count = 0;
+  slots_[slot].tile->FindCell(CellInTile(cell), &local, &count);
+  *first = slots_[slot].base + local;
+  return count;
+}
+
+PatchId SearchSpace::Resolve(const Slot& slot, const FarMove& move) {
+  const std::uint16_t from = slot.tile->cell[move.patch];
+  const CellIndex cell = {slot.x0 + (from & (kTileCells - 1)) + move.cells * kStepX[move.direction],
+                          slot.y0 + (from >> kTileShift) + move.cells * kStepY[move.direction]};
+  PatchId first = 0;
+  const std::uint32_t count = FindCell(cell, &first);
+  return move.level < count ? first + move.level : kNoPatchId;
+}
+
+PatchId SearchSpace::Follow(PatchId patch, int direction, std::uint32_t* cost, int* cells) {
+  const Slot& slot = SlotOfPatch(patch);
+  const Move move = slot.tile->moves[patch - slot.base][direction];
+  if (move.cost == Move::kNone) return kNoPatchId;
+  if (move.cost != Move::kFar) {
+    *cost = move.cost;
+    *cells = 1;
+    return patch + move.delta;
+  }
+  const FarMove& far = slot.tile->Far(patch - slot.base, direction);
+  *cost = far.cost;
+  *cells = far.cells;
+  return Resolve(slot, far);
+}
+
+CellIndex SearchSpace::CellOfPatch(PatchId patch) const {
+  const Slot& slot = SlotOfPatch(patch);
+  const std::uint16_t cell = slot.tile->cell[patch - slot.base];
+  return {slot.x0 + (cell & (kTileCells - 1)), slot.y0 + (cell >> kTileShift)};
+}
+
+float SearchSpace::Height(PatchId patch) const {
+  const Slot& slot = SlotOfPatch(patch);
+  return slot.tile->z_m[patch - slot.base];
+}
+
+float SearchSpace::Danger(PatchId patch) const {
+  const Slot& slot = SlotOfPatch(patch);
+  return slot.tile->danger[patch - slot.base];
+}
+
+float SearchSpace::EdgeDistance(PatchId patch) const {
+  const Slot& slot = SlotOfPatch(patch);
+  return static_cast<float>(slot.tile->edge_distance[patch - slot.base]) / 255.0F * checks_.reach_m;
+}
+
+Eigen::Vector3d SearchSpace::Position(PatchId patch) const {
+  const CellIndex cell = CellOfPatch(patch);
+  return {
+      (cell.x + 0.5) * checks_.cell_size_m, (cell.y + 0.5) * checks_.cell_size_m, Height(patch)};
+}
+
+}  // namespace strata

@@ -1,0 +1,80 @@
+// The graph of patches as one query sees it: tiles are prepared when the search first touches them.
+#ifndef STRATA_CORE_PLANNING_SEARCH_SPACE_H_
+#define STRATA_CORE_PLANNING_SEARCH_SPACE_H_
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/status/status.h"
+#include <Eigen/Core>
+
+#include "core/mls/tile_key.h"
+#include "core/planning/prepared_tile.h"
+#include "core/planning/profile_checks.h"
+#include "core/planning/tile_cache.h"
+#include "core/planning/tile_source.h"
+
+namespace strata {
+
+// A patch in a query: numbers of one tile are contiguous.
+using PatchId = std::uint32_t;
+inline constexpr PatchId kNoPatchId = 0xFFFFFFFFU;
+
+// For the thread of one query. After the first error of the source, status() holds it and lookups
+// find nothing.
+class SearchSpace {
+ public:
+  struct Slot {
+    std::shared_ptr<const PreparedTile> tile;
+    PatchId base = 0;
+    std::int32_t x0 = 0;  // map cell of the tile's corner
+    std::int32_t y0 = 0;
+  };
+
+  SearchSpace(TileCache& cache, TileSource& source, const ProfileChecks& checks)
+      : cache_(cache), source_(source), checks_(checks) {}
+
+  const absl::Status& status() const { return status_; }
+  const ProfileChecks& checks() const { return checks_; }
+  TileSource& source() const { return source_; }
+  const std::vector<Slot>& slots() const { return slots_; }
+  PatchId end() const { return static_cast<PatchId>(page_slot_.size()) << kPageShift; }
+
+  // Number of the slot of a tile, prepared now if need be; -1 where the map has nothing.
+  int SlotOf(const TileKey& key);
+  int SlotOf(PatchId patch) const { return page_slot_[patch >> kPageShift]; }
+  const Slot& SlotOfPatch(PatchId patch) const { return slots_[SlotOf(patch)]; }
+
+  // Patches of a cell: [*first, *first + count), lowest first; returns the count.
+  std::uint32_t FindCell(CellIndex cell, PatchId* first);
+
+  // Where a far move leads; kNoPatchId if its tile cannot be had.
+  PatchId Resolve(const Slot& slot, const FarMove& move);
+  // Where a move in `direction` leads and what it costs; kNoPatchId if there is none.
+  PatchId Follow(PatchId patch, int direction, std::uint32_t* cost, int* cells);
+
+  CellIndex CellOfPatch(PatchId patch) const;
+  float Height(PatchId patch) const;
+  float Danger(PatchId patch) const;  // < 0: the robot cannot stand there
+  // Lower bound of the distance to the nearest edge [m].
+  float EdgeDistance(PatchId patch) const;
+  // Centre of the cell at the surface.
+  Eigen::Vector3d Position(PatchId patch) const;
+
+ private:
+  static constexpr int kPageShift = 12;
+
+  TileCache& cache_;
+  TileSource& source_;
+  const ProfileChecks& checks_;
+  absl::Status status_;
+  std::vector<Slot> slots_;
+  std::vector<std::uint16_t> page_slot_;  // of each page of patch numbers
+  absl::flat_hash_map<TileKey, int> slot_of_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_PLANNING_SEARCH_SPACE_H_

@@ -1,0 +1,117 @@
+#include "core/planning/tile_cache.h"
+
+#include <cstddef>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/synchronization/mutex.h"
+
+#include "core/common/status.h"
+#include "core/mls/tile_key.h"
+#include "core/planning/ground_fit.h"
+#include "core/planning/ground_window.h"
+#include "core/planning/prepared_tile.h"
+#include "core/planning/profile_checks.h"
+#include "core/planning/tile_source.h"
+
+namespace strata {
+namespace {
+
+TileKey Neighbour(const TileKey& key, int index) {
+  return {key.level, key.x + index % 3 - 1, key.y + index / 3 - 1};
+}
+
+}  // namespace
+
+TileVersions VersionsAround(TileSource& source, const TileKey& key) {
+  TileVersions versions;
+  for (int i = 0; i < 9; ++i) versions[i] = source.Version(Neighbour(key, i));
+  return versions;
+}
+
+absl::StatusOr<TileNeighbourhood> LoadAround(TileSource& source, const TileKey& key) {
+  TileNeighbourhood tiles;
+  for (int i = 0; i < 9; ++i) {
+    const TileKey neighbour = Neighbour(key, i);
+    if (source.Version(neighbour) == 0) continue;
+    STRATA_ASSIGN_OR_RETURN(tiles[i], source.Load(neighbour));
+    if (tiles[i] != nullptr && tiles[i]->key != neighbour) {
+      return absl::InternalError(absl::StrCat(
+          "tile ", neighbour.ToString(), " came with the key ", tiles[i]->key.ToString()));
+    }
+  }
+  return tiles;
+}
+
+absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Get(TileSource& source,
+                                                                   const TileKey& key,
+                                                                   const ProfileChecks& checks) {
+  const TileVersions versions = VersionsAround(source, key);
+  if (versions[kMiddleTile] == 0) return nullptr;
+  const RobotProfile& p = checks.profile;
+  const Key cache_key = {
+      key,
+      versions,
+      {p.radius_m, p.height_m, p.max_step_m, p.max_slope_rad, p.max_gap_m, p.max_roughness_m}};
+  const std::shared_ptr<Entry> entry = FindOrInsert(cache_key);
+  absl::MutexLock lock(&entry->mutex);
+  if (entry->tile != nullptr) return entry->tile;
+  STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles, LoadAround(source, key));
+  if (tiles[kMiddleTile] == nullptr) return nullptr;
+  const GroundWindow window(tiles, checks.margin, checks.cell_size_m);
+  const auto fits = Fits({key, versions, {}}, window);
+  auto tile = std::make_shared<PreparedTile>(PrepareTile(key, window, *fits, checks));
+  entry->tile = tile;
+  Account(cache_key, *entry, tile->memory_bytes(), false);
+  return tile;
+}
+
+std::shared_ptr<const std::vector<GroundFit>> TileCache::Fits(Key key, const GroundWindow& window) {
+  const std::shared_ptr<Entry> entry = FindOrInsert(key);
+  absl::MutexLock lock(&entry->mutex);
+  if (entry->fits == nullptr) {
+    entry->fits = std::make_shared<const std::vector<GroundFit>>(FitTile(window));
+    Account(key, *entry, entry->fits->size() * sizeof(GroundFit), true);
+  }
+  return entry->fits;
+}
+
+std::shared_ptr<TileCache::Entry> TileCache::FindOrInsert(const Key& key) {
+  absl::MutexLock lock(&mutex_);
+  std::shared_ptr<Entry>& entry = entries_[key];
+  if (entry == nullptr) {
+    entry = std::make_shared<Entry>();
+    by_age_.push_front(key);
+    entry->age = by_age_.begin();
+  } else {
+    by_age_.splice(by_age_.begin(), by_age_, entry->age);
+  }
+  return entry;
+}
+
+// Counts what was made and lets go of the oldest. Who still uses an evicted tile keeps it alive.
+void TileCache::Account(const Key& key, const Entry& entry, std::size_t bytes, bool fits) {
+  absl::MutexLock lock(&mutex_);
+  ++(fits ? statistics_.fitted : statistics_.prepared);
+  const auto found = entries_.find(key);
+  if (found == entries_.end() || found->second.get() != &entry) return;  // evicted meanwhile
+  found->second->bytes = bytes;
+  statistics_.bytes += bytes;
+  while (statistics_.bytes > max_bytes_ && by_age_.size() > 1) {
+    const auto oldest = entries_.find(by_age_.back());
+    statistics_.bytes -= oldest->second->bytes;
+    entries_.erase(oldest);
+    by_age_.pop_back();
+  }
+}
+
+TileCache::Statistics TileCache::statistics() const {
+  absl::MutexLock lock(&mutex_);
+  return statistics_;
+}
+
+}  // namespace strata

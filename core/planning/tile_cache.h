@@ -1,0 +1,85 @@
+// Prepared tiles, kept as long as they fit.
+#ifndef STRATA_CORE_PLANNING_TILE_CACHE_H_
+#define STRATA_CORE_PLANNING_TILE_CACHE_H_
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/container/flat_hash_map.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+
+#include "core/mls/tile_key.h"
+#include "core/planning/ground_fit.h"
+#include "core/planning/ground_window.h"
+#include "core/planning/prepared_tile.h"
+#include "core/planning/profile_checks.h"
+#include "core/planning/tile_source.h"
+
+namespace strata {
+
+// What one tile's preparation was made of: the versions of the tile and of its eight neighbours.
+using TileVersions = std::array<std::uint64_t, 9>;
+TileVersions VersionsAround(TileSource& source, const TileKey& key);
+// The tiles themselves; INTERNAL if the source gives another tile than asked for.
+absl::StatusOr<TileNeighbourhood> LoadAround(TileSource& source, const TileKey& key);
+
+// Thread-safe. A tile of unchanged versions is prepared once, however many threads ask for it at
+// the same time; a changed one has another key and the old falls out by age.
+class TileCache {
+ public:
+  struct Statistics {
+    std::uint64_t prepared = 0;  // preparations made so far, for any profile
+    std::uint64_t fitted = 0;    // plane fits of a tile made so far
+    std::size_t bytes = 0;       // held now
+  };
+
+  explicit TileCache(std::size_t max_bytes) : max_bytes_(max_bytes) {}
+
+  // nullptr where the map has nothing. Errors are those of the source, and INTERNAL for a tile that
+  // breaks its contract.
+  absl::StatusOr<std::shared_ptr<const PreparedTile>> Get(TileSource& source,
+                                                          const TileKey& key,
+                                                          const ProfileChecks& checks);
+  Statistics statistics() const;
+
+ private:
+  struct Key {
+    TileKey tile;
+    TileVersions versions{};
+    std::array<double, 6> profile{};  // all zero: the fits, which know no profile
+    friend bool operator==(const Key&, const Key&) = default;
+    template <typename H>
+    friend H AbslHashValue(H h, const Key& key) {
+      return H::combine(std::move(h), key.tile, key.versions, key.profile);
+    }
+  };
+  struct Entry {
+    absl::Mutex mutex;  // held while the content is made
+    std::shared_ptr<const PreparedTile> tile ABSL_GUARDED_BY(mutex);
+    std::shared_ptr<const std::vector<GroundFit>> fits ABSL_GUARDED_BY(mutex);
+    std::size_t bytes = 0;  // guarded by TileCache::mutex_
+    std::list<Key>::iterator age;
+  };
+
+  std::shared_ptr<Entry> FindOrInsert(const Key& key);
+  void Account(const Key& key, const Entry& entry, std::size_t bytes, bool fits);
+  std::shared_ptr<const std::vector<GroundFit>> Fits(Key key, const GroundWindow& window);
+
+  const std::size_t max_bytes_;
+  mutable absl::Mutex mutex_;
+  absl::flat_hash_map<Key, std::shared_ptr<Entry>> entries_ ABSL_GUARDED_BY(mutex_);
+  std::list<Key> by_age_ ABSL_GUARDED_BY(mutex_);  // the latest used first
+  Statistics statistics_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_PLANNING_TILE_CACHE_H_

@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# Installs what Strata needs from Debian 12's packages; as root or with sudo. Does nothing where all is there.
+#   deploy/install-packages.sh          to build and run
+#   deploy/install-packages.sh --dev    and to test, lint and measure
+set -euo pipefail
+
+packages=(
+  ca-certificates ccache cmake g++ git mold ninja-build pkg-config
+  libabsl-dev libboost-dev libcli11-dev libeigen3-dev libgoogle-glog-dev libgrpc++-dev libnanoflann-dev
+  libpng-dev libprotobuf-dev libsqlite3-dev libxxhash-dev libzstd-dev nlohmann-json3-dev
+  protobuf-compiler protobuf-compiler-grpc
+  libgmock-dev libgtest-dev
+)
+if [[ "${1:-}" == --dev ]]; then
+  packages+=(clang clang-format clang-tidy libbenchmark-dev liboctomap-dev libpcl-dev python3 python3-numpy sqlite3)
+fi
+
+missing=()
+for package in "${packages[@]}"; do
+  dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
+done
+[[ ${#missing[@]} -gt 0 ]] || exit 0
+
+as_root=()
+if [[ $EUID -ne 0 ]]; then
+  command -v sudo >/dev/null || { echo "install-packages: run as root or install sudo" >&2; exit 1; }
+  as_root=(sudo)
+fi
+echo "installing: ${missing[*]}" >&2
+"${as_root[@]}" apt-get update -qq
+DEBIAN_FRONTEND=noninteractive "${as_root[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}" >&2

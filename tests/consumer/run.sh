@@ -1,0 +1,14 @@
+#!/usr/bin/env bash
+# Installs a build into a temporary prefix and builds and runs a stranger's program against it.
+#   tests/consumer/run.sh BUILD_DIR
+set -euo pipefail
+build=$(realpath "${1:?usage: tests/consumer/run.sh BUILD_DIR}")
+here=$(cd "$(dirname "$0")" && pwd)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cmake --install "$build" --prefix "$work/prefix" >/dev/null
+cmake -S "$here" -B "$work/build" -G Ninja -DCMAKE_PREFIX_PATH="$work/prefix" -DCMAKE_BUILD_TYPE=Release >/dev/null
+cmake --build "$work/build"
+output=$("$work/build/consumer")
+[[ "$output" == "2 patches" ]] || { echo "consumer printed '$output', expected '2 patches'" >&2; exit 1; }
+echo "consumer: $output"

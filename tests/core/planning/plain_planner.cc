@@ -1,0 +1,317 @@
+#include "tests/core/planning/plain_planner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <queue>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_format.h"
+
+#include "core/mls/local_plane.h"
+#include "core/mls/traversability.h"
+#include "core/planning/prepared_tile.h"
+#include "core/planning/profile_checks.h"
+
+namespace strata::testing {
+namespace {
+
+constexpr double kTolerance = 1e-4;
+
+double DistanceToSquare(double dx, double dy, double cell_size) {
+  const double x = std::max(0.0, std::abs(dx) - 0.5 * cell_size);
+  const double y = std::max(0.0, std::abs(dy) - 0.5 * cell_size);
+  return std::hypot(x, y);
+}
+
+}  // namespace
+
+PlainPlanner::PlainPlanner(const DrawnMap& map, const RobotProfile& profile, double cell_size_m)
+    : profile_(profile),
+      cell_size_(cell_size_m),
+      footprint_(std::hypot(profile.radius_m, cell_size_m / std::sqrt(2.0))) {
+  for (const auto& [cell, column] : map.columns()) {
+    for (const DrawnSurface& s : column) {
+      columns_[cell].push_back(static_cast<int>(patches_.size()));
+      patches_.push_back({cell,
+                          static_cast<float>(s.z_m),
+                          static_cast<float>(s.z_m) - static_cast<float>(s.depth_m),
+                          static_cast<float>(s.sigma_m),
+                          -1.0,
+                          {}});
+    }
+  }
+  for (const Patch& patch : patches_) FindEdges(patch);
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    const double distance = EdgeDistance(patches_[i].cell, patches_[i].z);
+    if (distance >= footprint_) patches_[i].danger = DangerAt(static_cast<int>(i), distance);
+  }
+  for (std::size_t i = 0; i < patches_.size(); ++i) FindMoves(static_cast<int>(i));
+}
+
+double PlainPlanner::Rise(double cells) const {
+  return std::max(profile_.max_step_m, cells * cell_size_ * std::tan(profile_.max_slope_rad)) +
+         kTolerance;
+}
+
+PlainPlanner::Meeting PlainPlanner::Meet(CellIndex cell, double z, double rise, int* which) const {
+  const auto column = columns_.find(cell);
+  if (column == columns_.end()) return Meeting::kHole;
+  bool obstacle = false;
+  bool below = false;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const int i : column->second) {
+    const double dz = patches_[i].z - z;
+    if (std::abs(dz) <= rise) {
+      if (std::abs(dz) < nearest) {
+        nearest = std::abs(dz);
+        if (which != nullptr) *which = i;
+      }
+    } else if (dz < 0) {
+      below = true;
+    } else if (patches_[i].bottom < z + profile_.height_m - kTolerance) {
+      obstacle = true;
+    }
+  }
+  if (nearest <= rise) return Meeting::kGround;
+  return obstacle ? Meeting::kObstacle : below ? Meeting::kDrop : Meeting::kHole;
+}
+
+// Holes from `hole` on, itself included; 999 if the row does not end within max_gap.
+int PlainPlanner::Run(CellIndex hole, double z, int dx, int dy) const {
+  const double unit = std::hypot(dx, dy);
+  for (int n = 1; n * unit * cell_size_ <= profile_.max_gap_m + 1e-6 + unit * cell_size_; ++n) {
+    const CellIndex cell = {hole.x + n * dx, hole.y + n * dy};
+    if (Meet(cell, z, Rise((n + 1) * unit), nullptr) != Meeting::kHole) return n;
+  }
+  return 999;
+}
+
+bool PlainPlanner::Tolerated(CellIndex hole, double z) const {
+  constexpr int kAxes[4][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}};
+  for (const auto& axis : kAxes) {
+    const int cells = Run(hole, z, axis[0], axis[1]) + Run(hole, z, -axis[0], -axis[1]) - 1;
+    if (cells * std::hypot(axis[0], axis[1]) * cell_size_ <= profile_.max_gap_m + 1e-6) return true;
+  }
+  return false;
+}
+
+void PlainPlanner::FindEdges(const Patch& patch) {
+  for (const int other : columns_[patch.cell]) {
+    const Patch& above = patches_[other];
+    if (above.z > patch.z && above.bottom - patch.z < profile_.height_m - kTolerance) {
+      edges_.push_back({patch.cell, patch.z});
+      break;
+    }
+  }
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      if (dx == 0 && dy == 0) continue;
+      CellIndex cell = {patch.cell.x + dx, patch.cell.y + dy};
+      Meeting meeting = Meet(cell, patch.z, profile_.max_step_m + kTolerance, nullptr);
+      if (meeting == Meeting::kHole) {
+        if (!Tolerated(cell, patch.z)) {
+          edges_.push_back({cell, patch.z});
+          continue;
+        }
+        const double unit = std::hypot(dx, dy);
+        for (int n = 2; (n - 1) * unit * cell_size_ <= profile_.max_gap_m + 1e-6; ++n) {
+          cell = {patch.cell.x + n * dx, patch.cell.y + n * dy};
+          meeting = Meet(cell, patch.z, Rise(n * unit), nullptr);
+          if (meeting != Meeting::kHole) break;
+        }
+      }
+      if (meeting == Meeting::kObstacle || meeting == Meeting::kDrop) {
+        edges_.push_back({cell, patch.z});
+      }
+    }
+  }
+}
+
+double PlainPlanner::EdgeDistance(CellIndex cell, double z) const {
+  double nearest = footprint_ + kDangerReachM;
+  for (const Edge& edge : edges_) {
+    const double dx = (edge.cell.x - cell.x) * cell_size_;
+    const double dy = (edge.cell.y - cell.y) * cell_size_;
+    const double d = DistanceToSquare(dx, dy, cell_size_);
+    if (d >= nearest) continue;
+    const double run = std::hypot(dx, dy) + cell_size_;
+    const double level =
+        profile_.max_step_m + kTolerance + run * (std::tan(profile_.max_slope_rad) + 1e-4);
+    if (std::abs(edge.z - z) <= level) nearest = d;
+  }
+  return nearest;
+}
+
+double PlainPlanner::DangerAt(int i, double distance) const {
+  const Patch& patch = patches_[i];
+  // Whole window first, then the four quadrants.
+  constexpr int kSquares[5][4] = {
+      {-2, 2, -2, 2}, {-2, 0, -2, 0}, {0, 2, -2, 0}, {-2, 0, 0, 2}, {0, 2, 0, 2}};
+  std::optional<LocalPlane> plane;
+  double bound = 0.0;
+  for (const auto& square : kSquares) {
+    LocalPlaneFit fit(cell_size_);
+    for (int dy = square[2]; dy <= square[3]; ++dy) {
+      for (int dx = square[0]; dx <= square[1]; ++dx) {
+        const auto column = columns_.find({patch.cell.x + dx, patch.cell.y + dy});
+        if (column == columns_.end()) continue;
+        const Patch* nearest = nullptr;
+        for (const int k : column->second) {
+          const Patch& other = patches_[k];
+          if (nearest == nullptr || std::abs(other.z - patch.z) <= std::abs(nearest->z - patch.z)) {
+            nearest = &other;
+          }
+        }
+        const double dz = nearest->z - patch.z;
+        if (std::abs(dz) > 2.0 * std::hypot(dx, dy) * cell_size_ + 0.05) continue;
+        const Surface surface = {.z_m = static_cast<float>(nearest->z),
+                                 .sigma_m = static_cast<float>(nearest->sigma)};
+        fit.Add(dx, dy, dz, SampleOf(surface, cell_size_));
+      }
+    }
+    const std::optional<LocalPlane> solved = fit.Solve();
+    if (&square == &kSquares[0]) {
+      if (!solved.has_value()) break;
+      plane = solved;
+      bound = 0.5 * solved->residual_m;
+      if (solved->roughness_m() <= 0.0) break;
+    } else if (solved.has_value() && solved->residual_m < bound) {
+      plane = solved;
+      bound = solved->residual_m;
+    }
+  }
+  double slope = 0.0;
+  double roughness = 0.0;
+  if (plane.has_value()) {
+    slope = plane->slope_rad();
+    roughness = plane->roughness_m();
+    if (plane->gradient.norm() - kNoiseGate * plane->gradient_sigma >
+        std::tan(profile_.max_slope_rad) + 1e-4) {
+      return -1.0;
+    }
+    if (roughness > profile_.max_roughness_m) return -1.0;
+  }
+  const double nearness = 1.0 - (distance - footprint_) / kDangerReachM;
+  return Danger(slope,
+                roughness,
+                0.0,
+                patch.sigma,
+                {.max_slope_rad = profile_.max_slope_rad,
+                 .max_step_m = profile_.max_step_m,
+                 .max_roughness_m = profile_.max_roughness_m,
+                 .clearance_m = profile_.height_m}) +
+         2.0 * nearness * nearness;
+}
+
+int PlainPlanner::OneWay(int i, int dx, int dy, int* cells) const {
+  const Patch& patch = patches_[i];
+  const double unit = std::hypot(dx, dy);
+  for (*cells = 1; (*cells - 1) * unit * cell_size_ <= profile_.max_gap_m + 1e-6; ++*cells) {
+    const CellIndex cell = {patch.cell.x + *cells * dx, patch.cell.y + *cells * dy};
+    const double rise = *cells == 1 ? profile_.max_step_m + kTolerance : Rise(*cells * unit);
+    int which = -1;
+    const Meeting meeting = Meet(cell, patch.z, rise, &which);
+    if (meeting == Meeting::kGround) return which;
+    if (meeting != Meeting::kHole) return -1;
+  }
+  return -1;
+}
+
+void PlainPlanner::FindMoves(int i) {
+  Patch& patch = patches_[i];
+  if (patch.danger < 0.0) return;
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      if (dx == 0 && dy == 0) continue;
+      int cells = 0;
+      int back = 0;
+      const int to = OneWay(i, dx, dy, &cells);
+      if (to < 0 || OneWay(to, -dx, -dy, &back) != i || patches_[to].danger < 0.0) continue;
+      bool clear = true;
+      for (int n = 1; n < cells; ++n) {
+        const double z = patch.z + (patches_[to].z - patch.z) * n / cells;
+        clear &= EdgeDistance({patch.cell.x + n * dx, patch.cell.y + n * dy}, z) >= footprint_;
+      }
+      if (!clear) continue;
+      const double run = cells * std::hypot(dx, dy) * cell_size_;
+      const double danger =
+          0.5 * (patch.danger + patches_[to].danger) + kGapDanger * (cells - 1.0) / cells;
+      patch.moves.emplace_back(to, std::hypot(run, patches_[to].z - patch.z) * (1.0 + danger));
+    }
+  }
+}
+
+double PlainPlanner::Cost(int from, int to) const {
+  if (patches_[from].danger < 0.0 || patches_[to].danger < 0.0) return -1.0;
+  std::vector<double> cost(patches_.size(), std::numeric_limits<double>::infinity());
+  std::priority_queue<std::pair<double, int>> queue;
+  cost[from] = 0.0;
+  queue.emplace(0.0, from);
+  while (!queue.empty()) {
+    const auto [negative, i] = queue.top();
+    queue.pop();
+    if (-negative > cost[i]) continue;
+    if (i == to) break;
+    for (const auto& [target, price] : patches_[i].moves) {
+      if (cost[i] + price >= cost[target]) continue;
+      cost[target] = cost[i] + price;
+      queue.emplace(-cost[target], target);
+    }
+  }
+  return cost[to];
+}
+
+std::string Collision(const DrawnMap& map,
+                      const std::vector<Eigen::Vector3d>& waypoints,
+                      const RobotProfile& profile,
+                      double cell_size_m) {
+  const double slope = std::tan(profile.max_slope_rad);
+  for (std::size_t w = 1; w < waypoints.size(); ++w) {
+    const Eigen::Vector3d along = waypoints[w] - waypoints[w - 1];
+    const int steps = static_cast<int>(std::ceil(along.norm() / 0.01)) + 1;
+    for (int s = 0; s <= steps; ++s) {
+      const Eigen::Vector3d p = waypoints[w - 1] + along * s / steps;
+      const int reach = static_cast<int>(profile.radius_m / cell_size_m) + 1;
+      const int cx = static_cast<int>(std::floor(p.x() / cell_size_m));
+      const int cy = static_cast<int>(std::floor(p.y() / cell_size_m));
+      for (int y = cy - reach; y <= cy + reach; ++y) {
+        for (int x = cx - reach; x <= cx + reach; ++x) {
+          const double dx = (x + 0.5) * cell_size_m - p.x();
+          const double dy = (y + 0.5) * cell_size_m - p.y();
+          if (DistanceToSquare(dx, dy, cell_size_m) >= profile.radius_m - 1e-6) continue;
+          const auto column = map.columns().find({x, y});
+          if (column == map.columns().end() || column->second.empty()) continue;
+          // What the ground may do under the disc: a step, slope, and what waypoints leave out.
+          const double allowed =
+              profile.max_step_m + slope * (std::hypot(dx, dy) + cell_size_m) + 0.06;
+          bool all_below = true;
+          for (const DrawnSurface& surface : column->second) {
+            const double top = surface.z_m - p.z();
+            const double bottom = top - surface.depth_m;
+            all_below &= top < -allowed;
+            if (top > allowed && bottom < profile.height_m - allowed) {
+              return absl::StrFormat("(%.3f, %.3f, %.3f) hits %.3f m at cell (%d, %d)",
+                                     p.x(),
+                                     p.y(),
+                                     p.z(),
+                                     top,
+                                     x,
+                                     y);
+            }
+          }
+          if (all_below) {
+            return absl::StrFormat(
+                "(%.3f, %.3f, %.3f) hangs over cell (%d, %d)", p.x(), p.y(), p.z(), x, y);
+          }
+        }
+      }
+    }
+  }
+  return "";
+}
+
+}  // namespace strata::testing

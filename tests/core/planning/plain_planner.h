@@ -1,0 +1,68 @@
+// The planner's definitions written down once more, without tiles, windows, queues or tables: slow
+// and plain, to compare with.
+#ifndef STRATA_TESTS_CORE_PLANNING_PLAIN_PLANNER_H_
+#define STRATA_TESTS_CORE_PLANNING_PLAIN_PLANNER_H_
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/mls/tile_key.h"
+#include "core/world/plan.h"
+#include "core/world/robot_profile.h"
+#include "tests/support/drawing.h"
+
+namespace strata::testing {
+
+class PlainPlanner {
+ public:
+  PlainPlanner(const DrawnMap& map, const RobotProfile& profile, double cell_size_m);
+
+  struct Patch {
+    CellIndex cell;
+    double z = 0.0;
+    double bottom = 0.0;
+    double sigma = 0.0;
+    double danger = -1.0;                       // < 0: cannot stand
+    std::vector<std::pair<int, double>> moves;  // target, cost [m]
+  };
+  const std::vector<Patch>& patches() const { return patches_; }
+  // Cost of the cheapest path, infinity if none; -1 if an end is no place to stand. Dijkstra.
+  double Cost(int from, int to) const;
+
+ private:
+  enum class Meeting { kGround, kObstacle, kDrop, kHole };
+  struct Edge {
+    CellIndex cell;
+    double z;
+  };
+  // What lies in `cell` for a robot at z; *which is the ground's patch.
+  Meeting Meet(CellIndex cell, double z, double rise, int* which) const;
+  bool Tolerated(CellIndex hole, double z) const;
+  int Run(CellIndex hole, double z, int dx, int dy) const;
+  void FindEdges(const Patch& patch);
+  double EdgeDistance(CellIndex cell, double z) const;
+  double DangerAt(int i, double distance) const;  // < 0: too steep or rough
+  int OneWay(int i, int dx, int dy, int* cells) const;
+  void FindMoves(int i);
+  double Rise(double cells) const;
+
+  RobotProfile profile_;
+  double cell_size_;
+  double footprint_;
+  std::vector<Patch> patches_;
+  std::map<CellIndex, std::vector<int>> columns_;
+  std::vector<Edge> edges_;
+};
+
+// Moves a disc along the path in steps of a centimetre and compares it with every surface; empty if
+// nothing is in its way, otherwise what is where.
+std::string Collision(const DrawnMap& map,
+                      const std::vector<Eigen::Vector3d>& waypoints,
+                      const RobotProfile& profile,
+                      double cell_size_m);
+
+}  // namespace strata::testing
+
+#endif  // STRATA_TESTS_CORE_PLANNING_PLAIN_PLANNER_H_

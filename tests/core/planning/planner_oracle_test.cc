@@ -1,0 +1,156 @@
+// Random worlds: costs against a plain Dijkstra over the definitions, paths against every surface.
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/planning/planner.h"
+#include "tests/core/planning/memory_tiles.h"
+#include "tests/core/planning/plain_planner.h"
+#include "tests/support/drawing.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata {
+namespace {
+
+using ::strata::testing::Collision;
+using ::strata::testing::DrawnMap;
+using ::strata::testing::MemoryTiles;
+using ::strata::testing::PlainPlanner;
+
+constexpr double kCell = 0.1;
+constexpr int kWidth = 56;
+
+struct World {
+  DrawnMap map;
+  RobotProfile profile;
+};
+
+// Rolling ground with noise, kerbs, walls, poles, holes, a platform over part of it and a ramp up
+// to it, across tile borders of either sign.
+World RandomWorld(std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> noise(0.0, 0.008);
+  const auto pick = [&random](int n) { return static_cast<int>(random() % n); };
+  const auto uniform = [&random](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  World world;
+  const CellIndex corner = {256 * (pick(5) - 2) - pick(kWidth), 256 * (pick(5) - 2) - pick(kWidth)};
+  const double amplitude = uniform(0.0, 0.3);
+  const double wave = uniform(2.0, 5.0);
+  for (int y = 0; y < kWidth; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const double z = amplitude * std::sin(x * kCell / wave) * std::cos(y * kCell / wave);
+      world.map[{corner.x + x, corner.y + y}] = {{z + noise(random), 0.0, uniform(0.002, 0.02)}};
+    }
+  }
+  const auto at = [&](int x, int y) -> std::vector<testing::DrawnSurface>& {
+    return world.map[{corner.x + x, corner.y + y}];
+  };
+  for (int k = 0; k < 4; ++k) {  // kerbs, walls
+    const double height = k < 2 ? uniform(0.05, 0.25) : uniform(0.3, 2.0);
+    const int x0 = pick(kWidth - 10);
+    const int y0 = pick(kWidth - 10);
+    const int w = k < 2 ? 10 + pick(12) : 2 + pick(25);
+    const int h = k < 2 ? 10 + pick(12) : 1 + pick(2);
+    for (int y = y0; y < std::min(kWidth, y0 + h); ++y) {
+      for (int x = x0; x < std::min(kWidth, x0 + w); ++x) {
+        at(x, y)[0].z_m += height;
+        at(x, y)[0].depth_m = height;
+      }
+    }
+  }
+  const double deck = uniform(0.9, 1.6);  // sometimes too low to pass under
+  for (int y = 20; y < 20 + 14; ++y) {
+    for (int x = 15; x < 35; ++x) at(x, y).push_back({deck + noise(random), 0.2});
+    const int run = static_cast<int>(deck / 0.03);
+    for (int i = 0; i < run && 35 + i < kWidth; ++i) at(35 + i, y) = {{deck - 0.03 * (i + 1), 0.3}};
+  }
+  for (int k = 0; k < 14; ++k) {  // holes
+    const int x0 = pick(kWidth - 8);
+    const int y0 = pick(kWidth - 8);
+    const int w = 1 + pick(k < 3 ? 7 : 3);
+    const int h = 1 + pick(k < 7 ? 3 : 1);
+    for (int y = y0; y < y0 + h; ++y) {
+      for (int x = x0; x < x0 + w; ++x) world.map.Erase({corner.x + x, corner.y + y});
+    }
+  }
+  for (int k = 0, x = pick(kWidth); k < pick(3); ++k, x = pick(kWidth)) {  // cracks
+    for (int y = 0; y < kWidth; ++y) world.map.Erase({corner.x + x, corner.y + y});
+  }
+  world.profile = {.radius_m = uniform(0.0, 0.3),
+                   .height_m = uniform(0.6, 1.4),
+                   .max_step_m = uniform(0.06, 0.2),
+                   .max_slope_rad = uniform(0.3, 0.6),
+                   .max_gap_m = uniform(0.0, 0.4),
+                   .max_roughness_m = uniform(0.03, 0.1)};
+  return world;
+}
+
+PlanEndpoint EndpointOf(const PlainPlanner::Patch& patch) {
+  return {.x_m = (patch.cell.x + 0.5) * kCell, .y_m = (patch.cell.y + 0.5) * kCell, .z_m = patch.z};
+}
+
+struct Tally {
+  int found = 0, none = 0, off = 0, gaps = 0, pulled = 0;
+};
+
+void CompareOneWorld(std::uint64_t seed, Tally* tally) {
+  SCOPED_TRACE(::testing::Message() << "seed " << seed);
+  const World world = RandomWorld(seed);
+  const PlainPlanner plain(world.map, world.profile, kCell);
+  MemoryTiles source(world.map.Tiles());
+  Planner planner({.cell_size_m = kCell});
+  Planner with_landmarks({.cell_size_m = kCell});
+  STRATA_ASSERT_OK(
+      with_landmarks.PrepareLandmarks(source, world.profile, source.Keys(), 4, Stop()));
+  std::mt19937_64 random(seed + 1);
+  for (int q = 0; q < 12; ++q) {
+    const int from = static_cast<int>(random() % plain.patches().size());
+    const int to = static_cast<int>(random() % plain.patches().size());
+    const PlanQuery query = {.from = EndpointOf(plain.patches()[from]),
+                             .to = EndpointOf(plain.patches()[to]),
+                             .profile = world.profile};
+    STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult result, planner.Plan(source, query, Stop()));
+    STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult same, with_landmarks.Plan(source, query, Stop()));
+    EXPECT_EQ(same.graph_cost, result.graph_cost);
+    EXPECT_EQ(same.reason, result.reason);
+    EXPECT_EQ(plain.patches()[from].danger < 0.0, result.reason == PlanReason::kStartNotOnSurface);
+    const double expected = plain.Cost(from, to);
+    if (expected < 0.0) {
+      ++tally->off;
+      EXPECT_FALSE(result.found());
+      continue;
+    }
+    ASSERT_EQ(result.found(), std::isfinite(expected)) << result.message;
+    if (!result.found()) {
+      ++tally->none;
+      EXPECT_NE(result.obstruction, Obstruction::kNone);
+      continue;
+    }
+    ++tally->found;
+    tally->gaps += static_cast<int>(result.gaps.size());
+    tally->pulled += result.cost < 0.999 * result.graph_cost ? 1 : 0;
+    EXPECT_NEAR(result.graph_cost, expected, 2e-4 * expected + 1e-9);
+    EXPECT_LE(result.cost, result.graph_cost * 1.0002);
+    EXPECT_EQ(Collision(world.map, result.waypoints, world.profile, kCell), "");
+  }
+}
+
+TEST(PlannerOracleTest, CostsAreThoseOfDijkstraAndPathsHitNothing) {
+  Tally tally;
+  for (std::uint64_t seed = 1; seed <= 24; ++seed) CompareOneWorld(seed, &tally);
+  // The worlds are hard enough and not too hard.
+  EXPECT_GT(tally.found, 30);
+  EXPECT_GT(tally.none, 5);
+  EXPECT_GT(tally.gaps, 3);
+  EXPECT_GT(tally.pulled, 5);
+}
+
+}  // namespace
+}  // namespace strata

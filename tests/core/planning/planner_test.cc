@@ -1,0 +1,336 @@
+// Drawn worlds: what a robot may do and what it is told when it may not.
+#include "core/planning/planner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/core/planning/memory_tiles.h"
+#include "tests/support/drawing.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata {
+namespace {
+
+using ::strata::testing::DrawnMap;
+using ::strata::testing::Legend;
+using ::strata::testing::MapFromDrawing;
+using ::strata::testing::MemoryTiles;
+using ::strata::testing::StatusIs;
+using ::testing::HasSubstr;
+
+constexpr double kCell = 0.1;
+
+// A robot small enough for drawings in half metres.
+RobotProfile SmallRobot() {
+  return {.radius_m = 0.2, .height_m = 1.0, .max_step_m = 0.15, .max_slope_rad = 0.35};
+}
+
+PlanEndpoint At(double x, double y, double z) { return {.x_m = x, .y_m = y, .z_m = z}; }
+
+PlanResult PlanIn(const DrawnMap& map, const PlanQuery& query) {
+  MemoryTiles source(map.Tiles());
+  Planner planner({.cell_size_m = kCell});
+  absl::StatusOr<PlanResult> result = planner.Plan(source, query, Stop());
+  STRATA_EXPECT_OK(result);
+  return result.ok() ? *std::move(result) : PlanResult();
+}
+
+PlanResult PlanIn(const DrawnMap& map, const PlanEndpoint& from, const PlanEndpoint& to) {
+  return PlanIn(map, {.from = from, .to = to, .profile = SmallRobot()});
+}
+
+double HighestPoint(const PlanResult& result) {
+  double z = -1e9;
+  for (const Eigen::Vector3d& p : result.waypoints) z = std::max(z, p.z());
+  return z;
+}
+
+// A road under a bridge: '.' road, a to e the ramp up, '=' deck at 1.5 m over the road, seen from
+// both sides and so a thick interval.
+Legend BridgeLegend(double deck_z, double deck_depth) {
+  return {{'.', {{0.0}}},
+          {'=', {{0.0}, {deck_z, deck_depth}}},
+          {'#', {{0.0}, {deck_z + 1.0, deck_depth + 1.0}}}};
+}
+
+// The deck runs west to east at y in [2.5, 4.5], with ramps of 0.25 rad at both ends.
+DrawnMap Bridge(double deck_z, double deck_depth, char side) {
+  std::string row(28, '=');
+  std::string side_row(28, side);
+  const std::string road(28, '.');
+  std::string drawing;
+  for (int i = 0; i < 5; ++i) drawing += road + "\n";
+  drawing += side_row + "\n" + row + "\n" + row + "\n" + row + "\n" + side_row + "\n";
+  for (int i = 0; i < 5; ++i) drawing += road + "\n";
+  DrawnMap map = MapFromDrawing(drawing, BridgeLegend(deck_z, deck_depth), 5);
+  const int ramp_cells = static_cast<int>(deck_z / 0.025);
+  for (int y = 25; y < 50; ++y) {
+    const bool parapet = side == '#' && (y < 30 || y >= 45);
+    for (int i = 0; i < ramp_cells; ++i) {
+      const double z = deck_z - 0.025 * (i + 1);
+      for (const int x : {-1 - i, 140 + i}) map[{x, y}] = {{parapet ? z + 1.0 : z, z + 1.0}};
+    }
+  }
+  return map;
+}
+
+TEST(PlannerTest, CrossesABridgeAndPassesUnderItAtTheSamePlace) {
+  for (const char side : {'=', '#'}) {
+    SCOPED_TRACE(side);
+    const DrawnMap map = Bridge(1.5, 0.3, side);
+    const PlanResult over = PlanIn(map, At(1.05, 3.75, 1.5), At(13.05, 3.75, 1.5));
+    ASSERT_TRUE(over.found()) << over.message;
+    EXPECT_NEAR(over.length_m, 12.0, 0.01);
+    EXPECT_GE(over.cost, over.length_m - 1e-9);
+    EXPECT_LE(over.cost, over.graph_cost * 1.0002);
+    const PlanResult under = PlanIn(map, At(7.05, 1.05, 0), At(7.05, 6.45, 0));
+    ASSERT_TRUE(under.found()) << under.message;
+    EXPECT_NEAR(under.length_m, 5.4, 0.01);
+    EXPECT_NEAR(HighestPoint(under), 0.0, 1e-6);
+  }
+}
+
+TEST(PlannerTest, ReachesTheDeckByTheRampAndNotOverItsEdge) {
+  for (const char side : {'=', '#'}) {
+    SCOPED_TRACE(side);
+    DrawnMap map = Bridge(1.5, 0.3, side);
+    const int toe = 60;  // cells of ramp
+    for (int y = 0; y < 75; ++y) {
+      for (int x = -toe - 20; x < -toe; ++x) map[{x, y}] = {{0.0}};
+      for (int x = -toe; x < 0; ++x) {
+        if (y < 25 || y >= 50) map[{x, y}] = {{0.0}};
+      }
+    }
+    const PlanResult result = PlanIn(map, At(7.05, 1.05, 0), At(7.05, 3.75, 1.5));
+    ASSERT_TRUE(result.found()) << result.message;
+    EXPECT_GT(result.length_m, 2 * 13.0);  // out to the toe at x = -6 and back
+  }
+}
+
+TEST(PlannerTest, NamesTheClearanceThatIsTooLow) {
+  const DrawnMap map = Bridge(1.1, 0.3, '=');
+  const PlanResult result = PlanIn(map, At(7.05, 1.05, 0), At(7.05, 6.45, 0));
+  EXPECT_EQ(result.reason, PlanReason::kBlocked);
+  EXPECT_EQ(result.obstruction, Obstruction::kClearance);
+  EXPECT_NEAR(result.obstruction_value, 0.8, 1e-5);
+  ASSERT_TRUE(result.where.has_value());
+  EXPECT_NEAR(result.where->y(), 2.55, 0.051);
+  EXPECT_THAT(result.message, HasSubstr("clearance of 0.80 m"));
+}
+
+// Two terraces, the northern one `rise` higher.
+DrawnMap Terraces(double rise) {
+  return MapFromDrawing("hhhhhhhh\nhhhhhhhh\nhhhhhhhh\nllllllll\nllllllll\nllllllll",
+                        {{'l', {{0.0}}}, {'h', {{rise, rise}}}},
+                        5);
+}
+
+TEST(PlannerTest, TakesAStepAtTheLimitAndRefusesOneJustOver) {
+  const PlanResult up = PlanIn(Terraces(0.15), At(2.05, 0.55, 0), At(2.05, 2.55, 0.15));
+  ASSERT_TRUE(up.found()) << up.message;
+  EXPECT_NEAR(up.waypoints.back().z(), 0.15, 1e-6);
+  const PlanResult over = PlanIn(Terraces(0.16), At(2.05, 0.55, 0), At(2.05, 2.55, 0.16));
+  EXPECT_EQ(over.reason, PlanReason::kBlocked);
+  EXPECT_EQ(over.obstruction, Obstruction::kStep);
+  EXPECT_NEAR(over.obstruction_value, 0.16, 1e-5);
+  EXPECT_THAT(PlanIn(Terraces(0.31), At(2.05, 0.55, 0), At(2.05, 2.55, 0.31)).message,
+              HasSubstr("step of 0.31 m"));
+  const PlanResult down = PlanIn(Terraces(0.16), At(2.05, 2.55, 0.16), At(2.05, 0.55, 0));
+  EXPECT_EQ(down.obstruction, Obstruction::kDrop);
+  EXPECT_NEAR(down.obstruction_value, 0.16, 1e-5);
+}
+
+TEST(PlannerTest, GoesAroundAWallAndNamesTheOneThatClosesTheWay) {
+  const Legend legend = {{'.', {{0.0}}}, {'#', {{2.0, 2.0}}}};
+  const DrawnMap open = MapFromDrawing("........\n........\n.######.\n........", legend, 5);
+  const PlanResult around = PlanIn(open, At(2.05, 0.25, 0), At(2.05, 1.75, 0));
+  ASSERT_TRUE(around.found()) << around.message;
+  EXPECT_GT(around.length_m, 3.0);
+  const DrawnMap closed = MapFromDrawing("........\n........\n########\n........", legend, 5);
+  const PlanResult blocked = PlanIn(closed, At(2.05, 0.25, 0), At(2.05, 1.75, 0));
+  EXPECT_EQ(blocked.reason, PlanReason::kBlocked);
+  EXPECT_EQ(blocked.obstruction, Obstruction::kObstacle);
+  EXPECT_NEAR(blocked.obstruction_value, 2.0, 1e-5);
+}
+
+TEST(PlannerTest, RampsBetweenStoreysByTheirSlope) {
+  const auto storeys = [](double slope_tan) {
+    DrawnMap map = MapFromDrawing("....\n....", {{'.', {{0.0}}}}, 10, {-40, 0});
+    const int cells = static_cast<int>(std::lround(2.5 / (slope_tan * kCell)));
+    for (int y = 0; y < 20; ++y) {
+      for (int x = 0; x < cells; ++x) map[{x, y}] = {{slope_tan * kCell * (x + 1)}};
+      for (int x = cells; x < cells + 40; ++x) map[{x, y}] = {{slope_tan * kCell * cells}};
+    }
+    return map;
+  };
+  const PlanResult gentle = PlanIn(storeys(0.3), At(-3.05, 1.05, 0), At(10.05, 1.05, 2.5));
+  ASSERT_TRUE(gentle.found()) << gentle.message;
+  EXPECT_NEAR(gentle.waypoints.back().z(), 2.5, 0.02);
+  const PlanResult steep = PlanIn(storeys(0.6), At(-3.05, 1.05, 0), At(6.05, 1.05, 2.5));
+  EXPECT_EQ(steep.reason, PlanReason::kBlocked);
+  EXPECT_EQ(steep.obstruction, Obstruction::kSlope);
+  // At the toe the planes lie between the floor and the ramp.
+  EXPECT_GT(steep.obstruction_value, SmallRobot().max_slope_rad);
+  EXPECT_LE(steep.obstruction_value, std::atan(0.6) + 1e-4);
+}
+
+TEST(PlannerTest, BridgesAnUnobservedStretchUpToTheLimitAndListsIt) {
+  const auto split = [](int hole_cells) {
+    DrawnMap map = MapFromDrawing("........\n........", {{'.', {{0.0}}}}, 10);
+    for (int y = 0; y < 20; ++y) {
+      for (int x = 40; x < 40 + hole_cells; ++x) map.Erase({x, y});
+    }
+    return map;
+  };
+  const PlanResult bridged = PlanIn(split(3), At(1.05, 1.05, 0), At(7.05, 1.05, 0));
+  ASSERT_TRUE(bridged.found()) << bridged.message;
+  ASSERT_EQ(bridged.gaps.size(), 1U);
+  EXPECT_NEAR(bridged.gaps[0].length_m, 0.4, 1e-6);
+  EXPECT_NEAR(bridged.gaps[0].from.x(), 3.95, 1e-6);
+  EXPECT_NEAR(bridged.cost, 6.0 + 0.3 * kGapDanger, 0.05);
+  const PlanResult wide = PlanIn(split(4), At(1.05, 1.05, 0), At(7.05, 1.05, 0));
+  EXPECT_EQ(wide.reason, PlanReason::kUnknownGround);
+  EXPECT_EQ(wide.obstruction, Obstruction::kUnknown);
+  EXPECT_NEAR(wide.obstruction_value, 0.4, 1e-6);
+}
+
+TEST(PlannerTest, StartAndGoalOffTheMapNameTheNearestPlace) {
+  const DrawnMap map = MapFromDrawing("....\n....", {{'.', {{0.0}}}}, 10);
+  const PlanResult start = PlanIn(map, At(-1.0, 1.05, 0), At(2.05, 1.05, 0));
+  EXPECT_EQ(start.reason, PlanReason::kStartNotOnSurface);
+  ASSERT_TRUE(start.nearest.has_value());
+  EXPECT_NEAR(start.nearest->x(), 0.25, 0.051);  // a radius away from unknown ground
+  EXPECT_NEAR(start.nearest->y(), 1.05, 0.051);
+  const PlanResult goal = PlanIn(map, At(2.05, 1.05, 0), At(100.0, 1.05, 0));
+  EXPECT_EQ(goal.reason, PlanReason::kGoalNotOnSurface);
+  EXPECT_FALSE(goal.nearest.has_value());
+}
+
+TEST(PlannerTest, TakesStartAndGoalByLevel) {
+  const DrawnMap map = Bridge(1.5, 0.3, '=');
+  PlanQuery query = {.from = {.x_m = 3.05, .y_m = 3.75, .level = 1},
+                     .to = {.x_m = 11.05, .y_m = 3.75, .level = 1},
+                     .profile = SmallRobot()};
+  EXPECT_NEAR(HighestPoint(PlanIn(map, query)), 1.5, 1e-6);
+  query.from.level = 0;
+  query.to.level.reset();  // the lowest
+  EXPECT_NEAR(HighestPoint(PlanIn(map, query)), 0.0, 1e-6);
+  query.to.level = 2;
+  const PlanResult none = PlanIn(map, query);
+  EXPECT_EQ(none.reason, PlanReason::kGoalNotOnSurface);
+  EXPECT_THAT(none.message, HasSubstr("no level 2"));
+}
+
+TEST(PlannerTest, AnswersDoNotDependOnWhereTheTileBordersLie) {
+  const Legend legend = {{'.', {{0.0}}}, {'#', {{2.0, 2.0}}}};
+  const char* const drawing = "..........\n..####....\n.....#....\n.....#.##.\n..........";
+  std::vector<double> costs;
+  for (const CellIndex corner : {CellIndex{20, 20}, {-25, -25}, {-281, 231}, {230, -26}}) {
+    const DrawnMap map = MapFromDrawing(drawing, legend, 5, corner);
+    const double x = corner.x * kCell;
+    const double y = corner.y * kCell;
+    const PlanResult result = PlanIn(map, At(x + 0.55, y + 0.75, 0), At(x + 4.45, y + 2.05, 0));
+    ASSERT_TRUE(result.found()) << result.message;
+    costs.push_back(result.graph_cost);
+  }
+  for (const double cost : costs) EXPECT_DOUBLE_EQ(cost, costs[0]);
+}
+
+TEST(PlannerTest, ChangedTilesAreNeverUsedStaleAndUnchangedOnesPreparedOnce) {
+  const Legend legend = {{'.', {{0.0}}}, {'#', {{2.0, 2.0}}}};
+  MemoryTiles open(MapFromDrawing("......\n......\n......", legend, 5).Tiles(7));
+  MemoryTiles closed(MapFromDrawing("...#..\n...#..\n...#..", legend, 5).Tiles(8));
+  Planner planner({.cell_size_m = kCell});
+  const PlanQuery query = {
+      .from = At(0.55, 0.75, 0), .to = At(2.45, 0.75, 0), .profile = SmallRobot()};
+  for (int i = 0; i < 3; ++i) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult free, planner.Plan(open, query, Stop()));
+    EXPECT_TRUE(free.found());
+    STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult blocked, planner.Plan(closed, query, Stop()));
+    EXPECT_EQ(blocked.reason, PlanReason::kBlocked);
+  }
+  EXPECT_EQ(planner.cache_statistics().prepared, 2U);
+  PlanQuery other = query;
+  other.profile.radius_m = 0.3;
+  STRATA_EXPECT_OK(planner.Plan(open, other, Stop()));
+  EXPECT_EQ(planner.cache_statistics().prepared, 3U);
+  EXPECT_EQ(planner.cache_statistics().fitted, 2U);
+}
+
+TEST(PlannerTest, WorksWithACacheThatHoldsNothing) {
+  MemoryTiles source(Bridge(1.5, 0.3, '=').Tiles());
+  Planner planner({.cell_size_m = kCell, .cache_bytes = 1});
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const PlanResult result,
+      planner.Plan(
+          source,
+          {.from = At(1.05, 3.75, 1.5), .to = At(13.05, 3.75, 1.5), .profile = SmallRobot()},
+          Stop()));
+  EXPECT_TRUE(result.found());
+}
+
+TEST(PlannerTest, LimitsStopsAndFailuresAreAnswered) {
+  MemoryTiles source(Terraces(0.0).Tiles());
+  Planner planner({.cell_size_m = kCell});
+  PlanQuery query = {.from = At(0.55, 0.55, 0), .to = At(3.45, 2.45, 0), .profile = SmallRobot()};
+  query.max_expanded = 3;
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult limited, planner.Plan(source, query, Stop()));
+  EXPECT_EQ(limited.reason, PlanReason::kSearchLimit);
+  const Stop stop;
+  stop.Request();
+  EXPECT_THAT(planner.Plan(source, query, stop),
+              StatusIs(absl::StatusCode::kCancelled, ::testing::_));
+  EXPECT_THAT(planner.Plan(source, query, Stop(absl::InfinitePast())),
+              StatusIs(absl::StatusCode::kDeadlineExceeded, ::testing::_));
+  query.from.x_m = std::nan("");
+  EXPECT_THAT(planner.Plan(source, query, Stop()),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("from")));
+  query.from.x_m = 0.55;
+  query.profile.radius_m = -1.0;
+  EXPECT_THAT(planner.Plan(source, query, Stop()),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("radius_m")));
+  query.profile = SmallRobot();
+  query.profile.max_gap_m = 10.0;
+  EXPECT_THAT(planner.Plan(source, query, Stop()),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("cells")));
+  MemoryTiles broken(Terraces(0.0).Tiles(2));
+  broken.failure = absl::DataLossError("tile 0/0/0: checksum");
+  query.profile = SmallRobot();
+  EXPECT_THAT(planner.Plan(broken, query, Stop()),
+              StatusIs(absl::StatusCode::kDataLoss, HasSubstr("checksum")));
+}
+
+TEST(PlannerTest, ManyThreadsGetTheSameAnswers) {
+  const DrawnMap map = Bridge(1.5, 0.3, '#');
+  const PlanQuery query = {
+      .from = At(1.05, 3.75, 1.5), .to = At(13.05, 3.75, 1.5), .profile = SmallRobot()};
+  Planner planner({.cell_size_m = kCell});
+  std::vector<double> costs(4, -1.0);
+  std::vector<std::thread> threads;
+  for (double& cost : costs) {
+    threads.emplace_back([&planner, &map, &query, &cost] {
+      MemoryTiles source(map.Tiles());
+      for (int i = 0; i < 5; ++i) {
+        const auto result = planner.Plan(source, query, Stop());
+        cost = result.ok() ? result->cost : -2.0;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const double cost : costs) EXPECT_DOUBLE_EQ(cost, costs[0]);
+  EXPECT_LE(planner.cache_statistics().prepared, map.Tiles().size());
+}
+
+}  // namespace
+}  // namespace strata

@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# Strata's tests: installs what they need, builds, checks and runs them. A second run skips what is there.
+#   tests/run.sh            everything the gate runs
+#   tests/run.sh --quick    release build and its tests only
+# Recorded data are read from $STRATA_DATA (default ../shared/data); tests that need them skip where they are absent.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+[[ "${1:-}" == "" || "${1:-}" == --quick ]] || { sed -n '2,5p' "$0" >&2; exit 2; }
+
+stage() { printf '\n== %s (%s s)\n' "$1" "$SECONDS"; }
+
+stage "packages"
+deploy/install-packages.sh --dev
+
+stage "include arrows"
+python3 tests/check_includes.py
+
+if [[ "${1:-}" != --quick ]]; then
+  stage "format"
+  git ls-files '*.h' '*.cc' '*.proto' | xargs clang-format --dry-run --Werror
+fi
+
+stage "release build"
+cmake --preset release >/dev/null
+cmake --build --preset release
+
+stage "self-contained headers"
+cmake --build --preset release --target all_verify_interface_header_sets
+
+stage "tests"
+ctest --preset release
+
+stage "install and consumer"
+tests/consumer/run.sh build/release
+
+if [[ "${1:-}" != --quick ]]; then
+  stage "sanitizers"
+  tests/run_sanitizers.sh
+
+  stage "clang-tidy and thread-safety"
+  tests/run_tidy.sh
+fi
+
+stage "passed"
