@@ -34,7 +34,9 @@ RemoteUpload::RemoteUpload(Connection& connection,
 
 RemoteUpload::~RemoteUpload() {
   if (stream_ == nullptr) return;
-  stream_->context.get()->TryCancel();
+  // A cancelled stream looks to the server like one that ended, and it may have every point; an
+  // empty message is refused in its turn, whatever came before.
+  stream_->writer->Write(v1::UploadScanRequest());
   stream_->writer->Finish();
 }
 

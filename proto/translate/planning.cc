@@ -146,6 +146,7 @@ v1::PlanPathResponse ToProto(const PlanResult& result) {
   }
   proto.set_length_m(result.length_m);
   proto.set_cost(result.cost);
+  proto.set_graph_cost(result.graph_cost);
   for (const PlanGap& gap : result.gaps) {
     v1::PlanGap& added = *proto.add_gaps();
     *added.mutable_from() = ToProto(gap.from);
@@ -173,6 +174,7 @@ absl::StatusOr<PlanResult> FromProto(const v1::PlanPathResponse& proto) {
   }
   result.length_m = proto.length_m();
   result.cost = proto.cost();
+  result.graph_cost = proto.graph_cost();
   for (const v1::PlanGap& gap : proto.gaps()) {
     STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d from, FromProto("gap.from", gap.from()));
     STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d to, FromProto("gap.to", gap.to()));

@@ -1,5 +1,6 @@
 #include <limits>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -48,8 +49,12 @@ class IngestTest : public ServedMock {
     return absl::StrCat(
         answer.id().sequence(), " ", answer.has_ack() ? "ok" : absl::StatusCodeToString(code));
   }
+  void EndSending() {
+    if (!sending_ended_) stream_->WritesDone();
+    sending_ended_ = true;
+  }
   absl::Status End() {
-    stream_->WritesDone();
+    EndSending();
     v1::IngestScansResponse answer;
     while (stream_->Read(&answer)) {
     }
@@ -62,6 +67,7 @@ class IngestTest : public ServedMock {
   std::unique_ptr<grpc::ClientReaderWriter<v1::IngestScansRequest, v1::IngestScansResponse>>
       stream_;
   std::string last_error_;
+  bool sending_ended_ = false;
 };
 
 TEST_F(IngestTest, AnswersScansWhileTheStreamGoesOn) {
@@ -82,7 +88,7 @@ TEST_F(IngestTest, ManyScansAreCommittedAndAnsweredInOrder) {
       ASSERT_TRUE(Send(Points(2)));
       ASSERT_TRUE(Send(Points(1)));
     }
-    stream_->WritesDone();
+    EndSending();
   });
   for (int i = 1; i <= kScans; ++i) EXPECT_EQ(Next(), absl::StrCat(i, " ok"));
   EXPECT_EQ(Next(), "end");
@@ -128,7 +134,7 @@ TEST_F(IngestTest, AnIncompleteScanIsAnErrorOfThatScan) {
   ASSERT_TRUE(Send(StartOf(2, 1)));
   EXPECT_EQ(Next(), "1 INVALID_ARGUMENT");
   EXPECT_THAT(last_error_, HasSubstr("3 points arrived, the header announced 5"));
-  stream_->WritesDone();
+  EndSending();
   EXPECT_EQ(Next(), "2 INVALID_ARGUMENT");
   EXPECT_THAT(End(), IsOk());
   EXPECT_THAT(sink_.committed(), IsEmpty());

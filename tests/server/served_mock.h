@@ -27,6 +27,9 @@ class ServedMock : public ::testing::Test {
     channel_ = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
   }
 
+  // Before what the test's own answers use.
+  void TearDown() override { server_.reset(); }
+
   // The status of a call on a service's stub as the core knows it.
   template <typename Service, typename Method, typename In, typename Out>
   absl::Status Call(Method method, const In& in, Out* out, grpc::ClientContext* context = nullptr) {

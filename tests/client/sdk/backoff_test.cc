@@ -1,0 +1,58 @@
+#include "client/sdk/backoff.h"
+
+#include <gtest/gtest.h>
+
+#include "proto/translate/status.h"
+
+namespace strata::sdk {
+namespace {
+
+absl::Status WithDelay(const char* milliseconds) {
+  v1::ErrorDetail detail;
+  (*detail.mutable_metadata())["retry_delay_ms"] = milliseconds;
+  return translate::WithDetail(absl::ResourceExhaustedError("full"), detail);
+}
+
+const BackoffOptions kOptions = {
+    .max_attempts = 5, .initial = absl::Milliseconds(100), .max = absl::Milliseconds(350)};
+
+TEST(BackoffTest, PausesDoubleUpToTheirBoundAndEnd) {
+  Backoff backoff(kOptions, [] { return 0.0; });
+  const absl::Status away = absl::UnavailableError("away");
+  EXPECT_EQ(backoff.NextPause(away), absl::Milliseconds(100));
+  EXPECT_EQ(backoff.NextPause(away), absl::Milliseconds(200));
+  EXPECT_EQ(backoff.NextPause(away), absl::Milliseconds(350));
+  EXPECT_EQ(backoff.NextPause(away), absl::Milliseconds(350));
+  EXPECT_EQ(backoff.NextPause(away), std::nullopt);
+}
+
+TEST(BackoffTest, ChanceShortensAPauseByUpToAHalf) {
+  Backoff backoff(kOptions, [] { return 0.5; });
+  EXPECT_EQ(backoff.NextPause(absl::UnavailableError("away")), absl::Milliseconds(75));
+}
+
+TEST(BackoffTest, TheServersLongerPauseCounts) {
+  Backoff backoff(kOptions, [] { return 0.0; });
+  EXPECT_EQ(backoff.NextPause(WithDelay("900")), absl::Milliseconds(900));
+  EXPECT_EQ(backoff.NextPause(WithDelay("1")), absl::Milliseconds(200));
+}
+
+TEST(BackoffTest, OtherErrorsAreNotRepeated) {
+  Backoff backoff(kOptions, [] { return 0.0; });
+  EXPECT_EQ(backoff.NextPause(absl::NotFoundError("x")), std::nullopt);
+  EXPECT_EQ(backoff.NextPause(absl::InternalError("x")), std::nullopt);
+  // A message that is too large stays so.
+  EXPECT_EQ(backoff.NextPause(absl::ResourceExhaustedError("x")), std::nullopt);
+}
+
+TEST(BackoffTest, NoPauseOutlivesItsCall) {
+  Backoff backoff(kOptions, [] { return 0.0; });
+  const absl::Status away = absl::UnavailableError("away");
+  EXPECT_FALSE(backoff.Wait(away, Stop(absl::UnixEpoch())));
+  const Stop stopped;
+  stopped.Request();
+  EXPECT_FALSE(backoff.Wait(away, stopped));
+}
+
+}  // namespace
+}  // namespace strata::sdk

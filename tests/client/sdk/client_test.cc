@@ -1,0 +1,178 @@
+#include "client/sdk/client.h"
+
+#include <memory>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/synchronization/notification.h"
+#include "absl/time/clock.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/server.h"
+#include "tests/support/mock_database.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata {
+namespace {
+
+using ::strata::testing::IsOk;
+using ::strata::testing::StatusIs;
+using ::testing::_;
+using ::testing::HasSubstr;
+using ::testing::Return;
+using Code = absl::StatusCode;
+
+class ClientTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    server::ServerOptions server_options;
+    server_options.listen = "127.0.0.1:0";
+    auto server = server::Server::Start(behind_, server_options);
+    ASSERT_THAT(server, IsOk());
+    server_ = *std::move(server);
+    ClientOptions options;
+    options.target = server_->address();
+    options.backoff.initial = absl::Milliseconds(1);
+    auto client = Connect(options);
+    ASSERT_THAT(client, IsOk());
+    client_ = *std::move(client);
+  }
+  void TearDown() override {
+    client_.reset();
+    server_.reset();
+  }
+
+  ::strata::testing::MockDatabase behind_;
+  std::unique_ptr<server::Server> server_;
+  std::unique_ptr<api::Database> client_;
+};
+
+TEST_F(ClientTest, LookupsAreRepeatedUntilTheServerIsBack) {
+  EXPECT_CALL(behind_.maps(), List(_))
+      .WillOnce(Return(absl::UnavailableError("starting")))
+      .WillOnce(Return(absl::UnavailableError("starting")))
+      .WillOnce(Return(std::vector<MapInfo>()));
+  EXPECT_THAT(client_->maps().List({}), IsOk());
+}
+
+TEST_F(ClientTest, WhatMayHaveHappenedIsNotRepeated) {
+  const absl::Status away = absl::UnavailableError("away");
+  EXPECT_CALL(behind_.maps(), Create(_, _, _)).WillOnce(Return(away));
+  EXPECT_CALL(behind_.maps(), Delete(_, _)).WillOnce(Return(away));
+  EXPECT_CALL(behind_.jobs(), Start(_, _, _, _)).WillOnce(Return(away));
+  EXPECT_CALL(behind_.scans(), Delete(_, _, _)).WillOnce(Return(away));
+  EXPECT_THAT(client_->maps().Create({}, "m", {}), StatusIs(Code::kUnavailable, "away"));
+  EXPECT_THAT(client_->maps().Delete({}, "m"), StatusIs(Code::kUnavailable, "away"));
+  EXPECT_THAT(client_->jobs().Start({}, "m", "verify", {}), StatusIs(Code::kUnavailable, "away"));
+  EXPECT_THAT(client_->scans().Delete({}, "m", {"r", 1}), StatusIs(Code::kUnavailable, "away"));
+}
+
+TEST_F(ClientTest, AStreamIsNotRepeatedOnceItDelivered) {
+  EXPECT_CALL(behind_.scans(), GetPoints(_, _, _, _))
+      .WillOnce(Return(absl::UnavailableError("starting")))
+      .WillOnce([](auto&, auto, auto&, ::strata::testing::Sink<PointCloud> sink) {
+        PointCloud piece;
+        piece.points.resize(3);
+        STRATA_EXPECT_OK(sink(piece));
+        return absl::UnavailableError("gone");
+      });
+  int points = 0;
+  const auto count = [&points](const PointCloud& piece) {
+    points += static_cast<int>(piece.size());
+    return absl::OkStatus();
+  };
+  EXPECT_THAT(client_->scans().GetPoints({}, "m", {"r", 1}, count),
+              StatusIs(Code::kUnavailable, "gone"));
+  EXPECT_EQ(points, 3);
+}
+
+TEST_F(ClientTest, AnUploadIsSentAgainFromItsStart) {
+  int attempts = 0;
+  ON_CALL(behind_.scans(), Upload(_, _, _))
+      .WillByDefault([&attempts](auto&, auto, const ScanHeader& header)
+                         -> absl::StatusOr<std::unique_ptr<api::ScanUpload>> {
+        auto upload = std::make_unique<::testing::NiceMock<::strata::testing::MockScanUpload>>();
+        EXPECT_CALL(*upload, Write(_)).Times(2);
+        ++attempts;
+        EXPECT_CALL(*upload, Finish())
+            .WillOnce(Return(attempts == 1
+                                 ? absl::StatusOr<ScanAck>(absl::ResourceExhaustedError("full"))
+                                 : absl::StatusOr<ScanAck>(ScanAck{header.id, 5, false})));
+        return upload;
+      });
+  PointCloud chunk;
+  chunk.points.resize(4);
+  ScanHeader header;
+  header.id = {"run", 3};
+  header.point_count = 8;
+  auto upload = client_->scans().Upload({}, "m", header);
+  ASSERT_THAT(upload, IsOk());
+  STRATA_ASSERT_OK((*upload)->Write(chunk));
+  STRATA_ASSERT_OK((*upload)->Write(chunk));
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanAck ack, (*upload)->Finish());
+  EXPECT_EQ(ack.commit_sequence, 5U);
+  EXPECT_EQ(attempts, 2);
+}
+
+TEST_F(ClientTest, CancellationReachesTheWorkOnTheServer) {
+  absl::Notification planning;
+  ON_CALL(behind_.planning(), PlanPath(_, _, _))
+      .WillByDefault([&planning](const api::Call& call, auto, auto&) {
+        planning.Notify();
+        while (call.stop.status().ok()) absl::SleepFor(absl::Milliseconds(1));
+        return absl::StatusOr<PlanResult>(call.stop.status());
+      });
+  const api::Call call;
+  std::thread canceller([&] {
+    planning.WaitForNotification();
+    call.stop.Request();
+  });
+  EXPECT_THAT(client_->planning().PlanPath(call, "m", {}), StatusIs(Code::kCancelled, _));
+  canceller.join();
+}
+
+TEST_F(ClientTest, TheCallsIdAndDeadlineTravel) {
+  const api::Call call{Stop(absl::Now() + absl::Minutes(5)), "tour-1", ""};
+  api::Call seen;
+  ON_CALL(behind_.maps(), List(_)).WillByDefault([&seen](const api::Call& received) {
+    seen = received;
+    return absl::StatusOr<std::vector<MapInfo>>(std::vector<MapInfo>());
+  });
+  STRATA_ASSERT_OK(client_->maps().List(call));
+  EXPECT_EQ(seen.request_id, "tour-1");
+  EXPECT_LT(absl::AbsDuration(seen.stop.deadline() - call.stop.deadline()), absl::Seconds(60));
+}
+
+TEST_F(ClientTest, ManyPlacesAreAskedInParts) {
+  std::vector<std::size_t> parts;
+  ON_CALL(behind_.planning(), SampleSurfaces(_, _, _))
+      .WillByDefault([&parts](auto&, auto, const std::vector<Eigen::Vector2d>& places) {
+        parts.push_back(places.size());
+        std::vector<SurfaceColumn> columns;
+        for (const Eigen::Vector2d& place : places) columns.push_back({place.x(), place.y(), {}});
+        return absl::StatusOr<std::vector<SurfaceColumn>>(columns);
+      });
+  std::vector<Eigen::Vector2d> places;
+  for (int i = 0; i < 25'000; ++i) places.emplace_back(i, -i);
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto columns,
+                              client_->planning().SampleSurfaces({}, "m", places));
+  EXPECT_THAT(parts, ::testing::ElementsAre(10'000U, 10'000U, 5'000U));
+  ASSERT_EQ(columns.size(), places.size());
+  EXPECT_EQ(columns[24'999].x_m, 24'999.0);
+}
+
+TEST(ConnectTest, SaysWhatIsWrong) {
+  ClientOptions options;
+  options.target = "127.0.0.1:1";
+  options.connect_timeout = absl::Milliseconds(100);
+  EXPECT_THAT(Connect(options).status(), StatusIs(Code::kUnavailable, HasSubstr("127.0.0.1:1")));
+  options.target = "";
+  options.backoff.max_attempts = 0;
+  EXPECT_THAT(Connect(options).status(),
+              StatusIs(Code::kInvalidArgument, HasSubstr("max_attempts = 0")));
+}
+
+}  // namespace
+}  // namespace strata

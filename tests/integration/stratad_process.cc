@@ -1,0 +1,67 @@
+#include "tests/integration/stratad_process.h"
+
+#include <array>
+#include <csignal>
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace strata::testing {
+
+StratadProcess::StratadProcess(const std::vector<std::string>& arguments) {
+  std::vector<std::string> words = {STRATA_STRATAD};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  std::array<int, 2> ends{};
+  EXPECT_EQ(pipe(ends.data()), 0);
+  pid_ = fork();
+  if (pid_ == 0) {  // only async-signal-safe calls until exec
+    dup2(ends[1], STDOUT_FILENO);
+    close(ends[0]);
+    close(ends[1]);
+    execv(argv[0], argv.data());
+    _exit(127);
+  }
+  close(ends[1]);
+  stdout_ = fdopen(ends[0], "r");
+}
+
+StratadProcess::~StratadProcess() {
+  if (pid_ > 0) {
+    Signal(SIGKILL);
+    Wait();
+  }
+  std::fclose(stdout_);
+}
+
+std::string StratadProcess::ReadLine() {
+  std::string line;
+  for (int c = std::fgetc(stdout_); c != EOF && c != '\n'; c = std::fgetc(stdout_)) {
+    line.push_back(static_cast<char>(c));
+  }
+  return line;
+}
+
+const std::string& StratadProcess::Address() {
+  const std::string prefix = "listening ";
+  if (address_.empty()) {
+    const std::string line = ReadLine();
+    EXPECT_EQ(line.substr(0, prefix.size()), prefix);
+    if (line.size() > prefix.size()) address_ = line.substr(prefix.size());
+  }
+  return address_;
+}
+
+void StratadProcess::Signal(int signal) const { kill(pid_, signal); }
+
+int StratadProcess::Wait() {
+  int status = 0;
+  EXPECT_EQ(waitpid(pid_, &status, 0), pid_);
+  pid_ = -1;
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+}  // namespace strata::testing

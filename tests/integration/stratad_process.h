@@ -1,0 +1,38 @@
+// A real stratad of its own process.
+#ifndef STRATA_TESTS_INTEGRATION_STRATAD_PROCESS_H_
+#define STRATA_TESTS_INTEGRATION_STRATAD_PROCESS_H_
+
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include <sys/types.h>
+
+namespace strata::testing {
+
+// Runs stratad with `arguments`; its log goes to the test's stderr.
+class StratadProcess {
+ public:
+  explicit StratadProcess(const std::vector<std::string>& arguments);
+  // Kills what still runs.
+  ~StratadProcess();
+  StratadProcess(const StratadProcess&) = delete;
+  StratadProcess& operator=(const StratadProcess&) = delete;
+
+  // The next line of its stdout without the newline; empty at its end.
+  std::string ReadLine();
+  // HOST:PORT out of "listening HOST:PORT", read once.
+  const std::string& Address();
+  void Signal(int signal) const;
+  // Waits for its end: its exit code, or minus the signal that ended it.
+  int Wait();
+
+ private:
+  pid_t pid_ = -1;
+  std::FILE* stdout_ = nullptr;
+  std::string address_;
+};
+
+}  // namespace strata::testing
+
+#endif  // STRATA_TESTS_INTEGRATION_STRATAD_PROCESS_H_
