@@ -87,7 +87,8 @@ void AddParameters(CLI::App* verb, JobOptions& options) {
             }
           },
           "Parameter of the job; may be given several times")
-      ->type_name("KEY=VALUE");
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
 }
 
 }  // namespace

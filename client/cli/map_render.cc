@@ -149,8 +149,7 @@ void AddMapRender(Commands& commands, CLI::App* noun) {
       ->add_option(
           "--path", options->path_files, "PLY file of a path to draw; may be given several times")
       ->type_name("FILE.ply")
-      ->expected(1)
-      ->take_all();
+      ->allow_extra_args(false);
   AddViewOptions(render, options);
 }
 

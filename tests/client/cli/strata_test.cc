@@ -1,0 +1,247 @@
+// The program as its users have it, on a database in a temporary directory.
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "client/formats/geometry_writer.h"
+#include "tests/client/cli/run_strata.h"
+#include "tests/support/simulator.h"
+#include "tests/support/temp_dir.h"
+#include "tests/support/worlds.h"
+
+namespace strata::cli {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+class StrataTest : public ::testing::Test {
+ protected:
+  // `arguments` on the embedded database with JSON output.
+  Ran Run(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.end(), {"--embedded", database_, "--output", "json"});
+    return RunStrata(arguments);
+  }
+  json RunOk(const std::vector<std::string>& arguments) const {
+    const Ran ran = Run(arguments);
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    return json::parse(ran.out, nullptr, false);
+  }
+  std::string Write(const std::string& name, const std::string& bytes) const {
+    const std::filesystem::path path = dir_.path() / name;
+    std::filesystem::create_directories(path.parent_path());
+    std::ofstream(path, std::ios::binary) << bytes;
+    return path.string();
+  }
+  // A drive over a floor between walls as scans/scan0.pcd … and poses.txt (index-tum, exact).
+  void WriteDrive(int scans) {
+    testing::Scene scene;
+    scene.Add(testing::Box({-20, -20, -1}, {20, 20, 0}));
+    scene.Add(testing::Box({-12, 6, 0}, {12, 7, 3}));
+    scene.Add(testing::Box({-12, -7, 0}, {12, -6, 3}));
+    scene.Add(testing::Box({9, -6, 0}, {10, 6, 3}));
+    scene.Build();
+    std::string poses = "# index time x y z qx qy qz qw\n";
+    for (int i = 0; i < scans; ++i) {
+      Pose T = Pose::Identity();
+      T.translation() = Eigen::Vector3d(-4.0 + i, 0.0, 1.0);
+      const PointCloud cloud = testing::SimulateScan(scene, {}, T, static_cast<std::uint64_t>(i));
+      Write("scans/scan" + std::to_string(i) + ".pcd", *PcdBytes(GeometryOf(cloud)));
+      poses += std::to_string(i) + " " + std::to_string(100 + i) + ".25 " +
+               std::to_string(T.translation().x()) + " 0 1 0 0 0 1\n";
+    }
+    poses_ = Write("poses.txt", poses);
+    scans_ = (dir_.path() / "scans").string();
+  }
+  json Import(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments = {
+        "scan", "import", "m", scans_, "--poses", poses_, "--trajectory", "t", "--wait"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunOk(arguments);
+  }
+
+  testing::TempDir dir_;
+  std::string database_ = (dir_.path() / "db").string();
+  std::string scans_;
+  std::string poses_;
+};
+
+TEST_F(StrataTest, EveryCommandHasHelpWithAnExample) {
+  const std::vector<std::string> commands = {
+      "map create",  "map list",   "map show",    "map delete",   "map verify", "map rebuild",
+      "map export",  "map render", "scan import", "scan list",    "scan show",  "scan export",
+      "scan delete", "pose list",  "pose export", "pose set",     "tile list",  "tile get",
+      "surface",     "plan",       "profile set", "profile list", "job start",  "job list",
+      "job show",    "job watch",  "job cancel"};
+  for (const std::string& command : commands) {
+    std::vector<std::string> words;
+    std::istringstream stream(command);
+    for (std::string word; stream >> word;) {
+      words.push_back(word);
+    }
+    words.emplace_back("--help");
+    const Ran ran = RunStrata(words);
+    EXPECT_EQ(ran.exit_code, 0) << command;
+    EXPECT_THAT(ran.out, HasSubstr("Example:\n  strata " + command));
+  }
+}
+
+TEST_F(StrataTest, WrongUsageExitsWithTwo) {
+  const std::vector<std::vector<std::string>> wrong = {
+      {},
+      {"fly"},
+      {"map"},
+      {"map", "create"},
+      {"plan", "m"},
+      {"plan", "m", "--from", "1,2,3"},
+      {"plan", "m", "--from", "1,x", "--to", "1,2"},
+      {"surface", "m"},
+      {"map", "list", "--output", "yaml"},
+      {"scan", "show", "m", "no-number"}};
+  for (const auto& words : wrong) {
+    const Ran ran = RunStrata(words);
+    EXPECT_EQ(ran.exit_code, 2) << ran.err;
+    EXPECT_EQ(ran.out, "");
+  }
+}
+
+TEST_F(StrataTest, UnknownMapExitsWithOneAndKeepsStdoutEmpty) {
+  const Ran ran = Run({"map", "show", "nowhere"});
+  EXPECT_EQ(ran.exit_code, 1);
+  EXPECT_EQ(ran.out, "");
+  EXPECT_THAT(ran.err, HasSubstr("nowhere"));
+}
+
+TEST_F(StrataTest, GlobalOptionsWorkBeforeAndAfterTheVerb) {
+  RunOk({"map", "create", "m"});
+  const std::vector<std::string> global = {"--embedded", database_, "--output", "json"};
+  for (int position = 0; position <= 2; ++position) {
+    std::vector<std::string> words = {"map", "list"};
+    words.insert(words.begin() + position, global.begin(), global.end());
+    const Ran ran = RunStrata(words);
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    EXPECT_EQ(json::parse(ran.out).at(0).at("name"), "m");
+  }
+}
+
+TEST_F(StrataTest, MapShowHasTheKeysThatScriptsRead) {
+  RunOk({"map", "create", "m", "--cell-size", "0.2", "--gap-size", "0.8"});
+  const json shown = RunOk({"map", "show", "m"});
+  for (const char* key : {"scans",
+                          "points",
+                          "patches",
+                          "occupied_cells",
+                          "tiles",
+                          "tile_bytes",
+                          "point_bytes",
+                          "epoch",
+                          "content_digest"}) {
+    EXPECT_TRUE(shown.contains(key)) << key;
+  }
+  EXPECT_EQ(shown.at("cell_size_m"), 0.2);
+  EXPECT_EQ(RunOk({"map", "delete", "m"}).at("deleted"), "m");
+  EXPECT_EQ(RunOk({"map", "list"}).size(), 0U);
+}
+
+TEST_F(StrataTest, ImportSkipsWhatIsThereAndReportsABadFile) {
+  WriteDrive(3);
+  RunOk({"map", "create", "m"});
+  const json first = Import({"--align", "off"});
+  EXPECT_EQ(first.at("uploaded"), 3);
+  EXPECT_EQ(first.at("integrated"), 3);
+  const json second = Import({"--align", "off"});
+  EXPECT_EQ(second.at("uploaded"), 0);
+  EXPECT_EQ(second.at("skipped"), 3);
+  const std::string bad = Write("scans/scan3.pcd", "# .PCD v0.7\nFIELDS x y z\nnonsense\n");
+  const Ran ran =
+      Run({"scan", "import", "m", scans_, "--poses", poses_, "--trajectory", "u", "--wait"});
+  EXPECT_EQ(ran.exit_code, 1);
+  const json third = json::parse(ran.out);
+  EXPECT_EQ(third.at("uploaded"), 3);
+  EXPECT_EQ(third.at("failed"), 1);
+  EXPECT_EQ(third.at("errors").at(0).at("scan"), bad);
+}
+
+TEST_F(StrataTest, PosesComeBackByTimeAsTheyWereUploaded) {
+  WriteDrive(3);
+  RunOk({"map", "create", "m"});
+  Import({"--align", "off"});
+  const std::string file = (dir_.path() / "tum.txt").string();
+  RunOk({"pose", "export", "m", "--format", "tum", "--which", "uploaded", "--out", file});
+  std::ifstream poses(file);
+  for (int i = 0; i < 3; ++i) {
+    double time = 0;
+    double x = 0;
+    std::string line;
+    ASSERT_TRUE(std::getline(poses, line));
+    std::istringstream(line) >> time >> x;
+    EXPECT_NEAR(time, 100.25 + i, 1e-6);
+    EXPECT_NEAR(x, -4.0 + i, 1e-9);
+  }
+}
+
+TEST_F(StrataTest, SurfacePlanRenderAndExportOfADrive) {
+  WriteDrive(8);
+  RunOk({"map", "create", "m"});
+  Import();
+  const json column = RunOk({"surface", "m", "--at", "-2.05,0.05"});
+  ASSERT_EQ(column.at("surfaces").size(), 1U);
+  EXPECT_NEAR(column.at("surfaces").at(0).at("z").get<double>(), 0.0, 0.05);
+
+  const std::string path = (dir_.path() / "path.ply").string();
+  const json plan = RunOk({"plan", "m", "--from", "-4,0.5,0", "--to", "3,-0.5,0", "--out", path});
+  ASSERT_EQ(plan.at("found"), true) << plan.dump();
+  EXPECT_NEAR(plan.at("length_m").get<double>(), 7.07, 0.5);
+  EXPECT_EQ(plan.at("waypoints").at(0).size(), 3U);
+
+  const json blocked = RunOk({"plan", "m", "--from", "-4,0,0", "--to", "900,0,0"});
+  EXPECT_EQ(blocked.at("found"), false);
+
+  const std::string queries = Write("queries.csv", "-4,0,0,3,0,0\n-4,0,0,900,0,0\n");
+  const Ran many = Run({"plan", "m", "--queries", queries});
+  EXPECT_EQ(many.exit_code, 0);
+  std::istringstream lines(many.out);
+  std::string line;
+  ASSERT_TRUE(std::getline(lines, line));
+  EXPECT_EQ(json::parse(line).at("found"), true);
+  ASSERT_TRUE(std::getline(lines, line));
+  EXPECT_EQ(json::parse(line).at("found"), false);
+
+  const std::string png = (dir_.path() / "map.png").string();
+  EXPECT_EQ(RunOk({"map", "render", "m", png, "--path", path}).at("paths"), 1);
+  EXPECT_GT(std::filesystem::file_size(png), 5000U);
+  for (const std::string format : {"ply", "obj", "pcd"}) {
+    const std::string file = (dir_.path() / ("map." + format)).string();
+    const json written = RunOk({"map", "export", "m", "--format", format, "--out", file});
+    EXPECT_EQ(std::filesystem::file_size(file), written.at("bytes").get<std::size_t>());
+    EXPECT_GT(written.at("vertices").get<std::size_t>(), 1000U);
+  }
+}
+
+TEST_F(StrataTest, VerifyAndRebuildKeepTheContent) {
+  WriteDrive(2);
+  RunOk({"map", "create", "m"});
+  Import({"--align", "off"});
+  const json before = RunOk({"map", "show", "m"});
+  EXPECT_EQ(RunOk({"map", "verify", "m"}).at("state"), "succeeded");
+  EXPECT_EQ(RunOk({"map", "rebuild", "m"}).at("state"), "succeeded");
+  EXPECT_EQ(RunOk({"map", "show", "m"}).at("content_digest"), before.at("content_digest"));
+  EXPECT_EQ(RunOk({"job", "list", "m"}).size(), 2U);
+}
+
+TEST_F(StrataTest, ProfilesKeepWhatIsNotGiven) {
+  RunOk({"map", "create", "m", "--height", "1.7"});
+  RunOk({"profile", "set", "m", "cart", "--radius", "0.5"});
+  for (const json& profile : RunOk({"profile", "list", "m"})) {
+    EXPECT_EQ(profile.at("height_m"), 1.7);
+    EXPECT_EQ(profile.at("radius_m"), profile.at("name") == "cart" ? 0.5 : 0.3);
+  }
+}
+
+}  // namespace
+}  // namespace strata::cli
