@@ -61,11 +61,10 @@ ColumnGrid::ColumnGrid(std::span<const Eigen::Vector3f> points, float column_siz
 void ColumnGrid::SortColumns() {
   for (std::size_t c = 0; c + 1 < begin_.size(); ++c) {
     if (begin_[c + 1] - begin_[c] < kLongRun) continue;
-    std::stable_sort(points_.begin() + begin_[c],
-                     points_.begin() + begin_[c + 1],
-                     [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
-                       return a.z() < b.z();
-                     });
+    std::stable_sort(
+        points_.begin() + begin_[c],
+        points_.begin() + begin_[c + 1],
+        [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) { return a.z() < b.z(); });
   }
 }
 
@@ -105,8 +104,8 @@ std::uint32_t ColumnGrid::Nearest(const Eigen::Vector3f& p, float max_distance_m
     if (end - begin >= kLongRun) {
       const float reach = std::sqrt(best_m2);
       const auto below = [](const Eigen::Vector3f& a, float z) { return a.z() < z; };
-      const auto first = std::lower_bound(
-          points_.begin() + begin, points_.begin() + end, p.z() - reach, below);
+      const auto first =
+          std::lower_bound(points_.begin() + begin, points_.begin() + end, p.z() - reach, below);
       begin = static_cast<std::uint32_t>(first - points_.begin());
       for (; begin < end && points_[begin].z() <= p.z() + reach; ++begin) {
         const float d = (points_[begin] - p).squaredNorm();
@@ -162,8 +161,7 @@ int ColumnGrid::Nearest(const Eigen::Vector3f& p,
         const auto below = [](const Eigen::Vector3f& a, float z) { return a.z() < z; };
         const float reach = std::sqrt(bound_m2);
         begin = static_cast<std::uint32_t>(
-            std::lower_bound(
-                points_.begin() + begin, points_.begin() + end, p.z() - reach, below) -
+            std::lower_bound(points_.begin() + begin, points_.begin() + end, p.z() - reach, below) -
             points_.begin());
         for (; begin < end && points_[begin].z() <= p.z() + reach; ++begin) offer(begin);
         return;

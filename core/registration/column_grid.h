@@ -43,8 +43,8 @@ class ColumnGrid {
 
  private:
   struct Place {
-    int x, y;           // column, clamped to the grid
-    float inside_m;     // distance to the nearest edge of that column, ≤ 0 outside of it
+    int x, y;        // column, clamped to the grid
+    float inside_m;  // distance to the nearest edge of that column, ≤ 0 outside of it
   };
   Place PlaceOf(const Eigen::Vector3f& p) const;
   // Calls visit(begin, end) for the runs of points in the ring of columns `ring` around `place`.

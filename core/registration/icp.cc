@@ -57,9 +57,8 @@ std::vector<Eigen::Vector3d> Select(std::vector<Eigen::Vector3d> points,
     return selected;
   }
   SplitMix64 random(options.seed);
-  for (const std::uint32_t i : SampleIndices(static_cast<std::uint32_t>(points.size()),
-                                             static_cast<std::uint32_t>(count),
-                                             random)) {
+  for (const std::uint32_t i : SampleIndices(
+           static_cast<std::uint32_t>(points.size()), static_cast<std::uint32_t>(count), random)) {
     selected.push_back(points[i]);
   }
   return selected;
@@ -101,11 +100,11 @@ Icp::Icp(const PointCloud& source, const PointCloud& target, const IcpOptions& o
   if (compares_normals || options.metric == IcpMetric::kPointToPlane) {
     target_normals_ = EstimateNormals(target_, options.normal_neighbours);
   }
-  target_index_ = options.matching == IcpMatching::kClosestPoint
-                      ? MakeClosestPointIndex(target_)
-                      : MakeProjectionIndex(target_,
-                                            target.sensor_origin.cast<double>(),
-                                            options.projection_cell_rad);
+  target_index_ =
+      options.matching == IcpMatching::kClosestPoint
+          ? MakeClosestPointIndex(target_)
+          : MakeProjectionIndex(
+                target_, target.sensor_origin.cast<double>(), options.projection_cell_rad);
   if (options.mutual) source_index_ = MakeClosestPointIndex(source_);
   double squared = 0.0;
   for (const Eigen::Vector3d& p : source_) squared += p.squaredNorm();
@@ -144,17 +143,18 @@ void Icp::Trim(std::vector<IcpPair>& pairs) const {
   std::stable_sort(pairs.begin(), pairs.end(), [](const IcpPair& a, const IcpPair& b) {
     return a.distance_m < b.distance_m;
   });
-  pairs.resize(static_cast<std::size_t>(
-      std::ceil(options_.keep_share * static_cast<double>(pairs.size()))));
+  pairs.resize(
+      static_cast<std::size_t>(std::ceil(options_.keep_share * static_cast<double>(pairs.size()))));
 }
 
 void Icp::Weigh(const Pose& T, std::vector<IcpPair>& pairs) const {
   if (options_.weighting == IcpWeighting::kUniform) return;
   for (IcpPair& pair : pairs) {
-    pair.weight = options_.weighting == IcpWeighting::kDistance
-                      ? 1.0 - pair.distance_m / options_.max_distance_m
-                      : std::abs((T.linear() * source_normals_[pair.source])
-                                     .dot(target_normals_[pair.target]));
+    pair.weight =
+        options_.weighting == IcpWeighting::kDistance
+            ? 1.0 - pair.distance_m / options_.max_distance_m
+            : std::abs(
+                  (T.linear() * source_normals_[pair.source]).dot(target_normals_[pair.target]));
   }
 }
 
@@ -225,9 +225,9 @@ RegistrationResult Icp::Run(const Pose& T_guess) {
   for (result.iterations = 1;; ++result.iterations) {
     const std::vector<IcpPair> pairs = Match(T);
     result.inliers = static_cast<int>(pairs.size());
-    result.overlap = source_.empty() ? 0.0
-                                     : static_cast<double>(pairs.size()) /
-                                           static_cast<double>(source_.size());
+    result.overlap = source_.empty()
+                         ? 0.0
+                         : static_cast<double>(pairs.size()) / static_cast<double>(source_.size());
     if (pairs.size() < 3 || result.overlap < options_.min_overlap) {
       result.termination = Termination::kTooLittleOverlap;
       result.T_target_source = T_guess;
@@ -291,7 +291,8 @@ absl::StatusOr<RegistrationResult> RegisterClouds(const PointCloud& source,
   const Pose origin_source(Eigen::Translation3d(source.origin));
   const Pose origin_target(Eigen::Translation3d(target.origin));
   Icp icp(source, target, options);
-  RegistrationResult result = icp.Run(origin_target.inverse() * T_target_source_guess * origin_source);
+  RegistrationResult result =
+      icp.Run(origin_target.inverse() * T_target_source_guess * origin_source);
   result.T_target_source = origin_target * result.T_target_source * origin_source.inverse();
   return result;
 }

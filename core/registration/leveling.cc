@@ -41,8 +41,7 @@ std::vector<Eigen::Vector3d> ThinnedPoints(const PointCloud& cloud, int max_poin
   };
   for (const Eigen::Vector3f& p : cloud.points) {
     if (!p.allFinite() || p.cwiseAbs().maxCoeff() > 1e5F) continue;
-    const std::uint64_t key =
-        coordinate(p.x()) | coordinate(p.y()) << 21 | coordinate(p.z()) << 42;
+    const std::uint64_t key = coordinate(p.x()) | coordinate(p.y()) << 21 | coordinate(p.z()) << 42;
     if (seen.insert(key).second) points.push_back(p.cast<double>());
   }
   const auto limit = static_cast<std::size_t>(max_points);

@@ -27,9 +27,9 @@ struct Leveling {
   // Turns the scan's frame level: R_level_scan * p has the floor's normal along +z. The smallest
   // such rotation; heading is kept.
   Eigen::Matrix3d R_level_scan = Eigen::Matrix3d::Identity();
-  double tilt_rad = 0.0;      // how far that is
-  double floor_z_m = 0.0;     // height of the floor in the level frame, relative to the cloud's origin
-  double support = 0.0;       // share of the points on the floor, in [0, 1]
+  double tilt_rad = 0.0;   // how far that is
+  double floor_z_m = 0.0;  // height of the floor in the level frame, relative to the cloud's origin
+  double support = 0.0;    // share of the points on the floor, in [0, 1]
 };
 
 // The dominant plane whose normal is within `max_tilt_rad` of z: random triples, most points of a

@@ -38,9 +38,8 @@ class RoundSolver {
 
   // `T_local_source`: into the grids' coordinates.
   Round Solve(const Pose& T_local_source, double gate_m) {
-    return options_.metric == MlsErrorMetric::kPlaneToPlane
-               ? PlaneToPlane(T_local_source, gate_m)
-               : PointToPoint(T_local_source, gate_m);
+    return options_.metric == MlsErrorMetric::kPlaneToPlane ? PlaneToPlane(T_local_source, gate_m)
+                                                            : PointToPoint(T_local_source, gate_m);
   }
 
  private:
@@ -61,8 +60,10 @@ Round RoundSolver::PlaneToPlane(const Pose& T_local_source, double gate_m) {
   round.inliers = sums.inliers;
   if (sums.inliers == 0) return round;
   round.rms_m = std::sqrt(sums.squared_distance_m2 / sums.inliers);
-  round.solution = SolveNormalEquations(
-      sums.H, sums.b, std::sqrt(sums.squared_radius_m2 / sums.inliers), options_.min_eigenvalue_ratio);
+  round.solution = SolveNormalEquations(sums.H,
+                                        sums.b,
+                                        std::sqrt(sums.squared_radius_m2 / sums.inliers),
+                                        options_.min_eigenvalue_ratio);
   // Residuals larger than the assumed σ take their share from the information.
   const double variance_factor = std::max(1.0, sums.squared_error / sums.inliers);
   round.information = sums.H / variance_factor;
@@ -84,7 +85,8 @@ Round RoundSolver::PointToPoint(const Pose& T_local_source, double gate_m) {
     to.push_back(T_local_source.inverse() * grid.points()[j].cast<double>());
   };
   if (options_.max_samples > 0) {
-    for (int i = 0; i < options_.max_samples && i < static_cast<int>(source_.sample().size()); ++i) {
+    for (int i = 0; i < options_.max_samples && i < static_cast<int>(source_.sample().size());
+         ++i) {
       match(source_.sample()[i].element.point, source_.sample()[i].feature_class);
     }
   } else {

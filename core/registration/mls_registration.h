@@ -61,9 +61,9 @@ struct MlsRegistrationOptions {
   absl::Status Validate() const;
 };
 
-// Moves `source` onto `target`, starting at the guess. `options` must be valid. Deterministic, holds
-// no state, safe to call from several threads. Frames may be anywhere: the work is done relative to
-// the target's origin. A guess that is not finite answers kDiverged.
+// Moves `source` onto `target`, starting at the guess. `options` must be valid. Deterministic,
+// holds no state, safe to call from several threads. Frames may be anywhere: the work is done
+// relative to the target's origin. A guess that is not finite answers kDiverged.
 RegistrationResult RegisterScan(const ScanFeatures& source,
                                 const RegistrationTarget& target,
                                 const Pose& T_target_source_guess,

@@ -36,9 +36,9 @@ const SurfaceElement& PlaneToPlaneMatcher::TargetElement(FeatureClass c, std::ui
   if (known == 0) {
     const ColumnGrid& grid = target_.grid(c);
     elements_.push_back(FitSurfaceElement(grid,
-                                     grid.points()[index],
-                                     options_.neighbours,
-                                     static_cast<float>(options_.neighbour_radius_m)));
+                                          grid.points()[index],
+                                          options_.neighbours,
+                                          static_cast<float>(options_.neighbour_radius_m)));
     known = static_cast<std::uint32_t>(elements_.size());
   }
   return elements_[known - 1];
@@ -64,14 +64,15 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
     const Eigen::Vector3d p_target = R * p + t;
     const std::uint32_t j = grid.Nearest(p_target.cast<float>(), static_cast<float>(gate_m));
     if (j == ColumnGrid::kNone) continue;
-    const SurfaceElement q = fine ? TargetElement(sampled.feature_class, j)
-                                  : SurfaceElement{grid.points()[j], R.cast<float>() * sampled.element.normal};
+    const SurfaceElement q =
+        fine ? TargetElement(sampled.feature_class, j)
+             : SurfaceElement{grid.points()[j], R.cast<float>() * sampled.element.normal};
     const Eigen::Vector3d r = R.transpose() * (q.point.cast<double>() - p_target);
     const Eigen::Vector3d normal_p = sampled.element.normal.cast<double>();
     const Eigen::Vector3d normal_q = R.transpose() * q.normal.cast<double>();
-    const Eigen::Matrix3d C = 2.0 * tangent2 * Eigen::Matrix3d::Identity() -
-                              flattening * (normal_p * normal_p.transpose() +
-                                            normal_q * normal_q.transpose());
+    const Eigen::Matrix3d C =
+        2.0 * tangent2 * Eigen::Matrix3d::Identity() -
+        flattening * (normal_p * normal_p.transpose() + normal_q * normal_q.transpose());
     const Eigen::Matrix3d M = C.inverse();
     const Eigen::Vector3d Mr = M * r;
     const double error = r.dot(Mr);

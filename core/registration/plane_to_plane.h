@@ -17,8 +17,8 @@ struct MlsRegistrationOptions;
 
 // Sums over the matches of one iteration.
 struct PlaneToPlaneSums {
-  Matrix6d H = Matrix6d::Zero();  // Σ w JᵀMJ
-  Vector6d b = Vector6d::Zero();  // Σ w JᵀM r
+  Matrix6d H = Matrix6d::Zero();     // Σ w JᵀMJ
+  Vector6d b = Vector6d::Zero();     // Σ w JᵀM r
   double squared_error = 0.0;        // Σ w rᵀM r
   double squared_distance_m2 = 0.0;  // Σ (distance along the normal)²
   double squared_radius_m2 = 0.0;    // Σ |p|², p in the scan frame
@@ -29,7 +29,8 @@ struct PlaneToPlaneSums {
 // A match pairs p (scan frame) with q (target). With r = T⁻¹q − p and a right-hand step
 // T·Exp([ω, v]) its error is rᵀM r, its Jacobian J = [−[p]ₓ, I], and
 //   M = (C_p + Rᵀ C_q R)⁻¹,   C = σt² I − (σt² − σn²) n nᵀ
-// with n the normal of the surface element, so that a surface is known to σn across and to σt along.
+// with n the normal of the surface element, so that a surface is known to σn across and to σt
+// along.
 class PlaneToPlaneMatcher {
  public:
   // Keeps references.

@@ -27,8 +27,10 @@ struct PointsView {
     return false;
   }
 };
-using Tree = nanoflann::
-    KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointsView>, PointsView, 3, std::size_t>;
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointsView>,
+                                                 PointsView,
+                                                 3,
+                                                 std::size_t>;
 
 class ClosestPointIndex : public PointIndex {
  public:
@@ -91,9 +93,9 @@ class ProjectionIndex : public PointIndex {
     const Eigen::Vector3d d = p - sensor_;
     const double azimuth = std::atan2(d.y(), d.x()) + std::numbers::pi;
     const double polar = std::atan2(d.head<2>().norm(), d.z());
-    return {std::min(static_cast<int>(polar / std::numbers::pi * rows_), rows_ - 1),
-            std::min(static_cast<int>(azimuth / (2.0 * std::numbers::pi) * columns_),
-                     columns_ - 1)};
+    return {
+        std::min(static_cast<int>(polar / std::numbers::pi * rows_), rows_ - 1),
+        std::min(static_cast<int>(azimuth / (2.0 * std::numbers::pi) * columns_), columns_ - 1)};
   }
   std::size_t At(int row, int column) const {
     return static_cast<std::size_t>(row) * columns_ + column;

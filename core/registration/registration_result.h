@@ -15,8 +15,8 @@ enum class Termination {
   kConverged,         // the last step was below the tolerances
   kMaxIterations,     // still moving: the pose is the best so far
   kTooLittleOverlap,  // not enough of the source found a partner; the pose is the guess
-  kDegenerate,        // a direction is not determined by the matches; the pose was not moved along it
-  kDiverged,          // left the allowed distance from the guess, or became infinite; the pose is the guess
+  kDegenerate,  // a direction is not determined by the matches; the pose was not moved along it
+  kDiverged,  // left the allowed distance from the guess, or became infinite; the pose is the guess
 };
 
 // "converged", "max iterations", "too little overlap", "degenerate", "diverged".
@@ -27,8 +27,8 @@ struct RegistrationResult {
   Pose T_target_source = Pose::Identity();
   Termination termination = Termination::kTooLittleOverlap;
   int iterations = 0;
-  double rms_m = 0.0;   // of the error metric over the inliers of the last iteration
-  int inliers = 0;      // matches of the last iteration that were not rejected
+  double rms_m = 0.0;    // of the error metric over the inliers of the last iteration
+  int inliers = 0;       // matches of the last iteration that were not rejected
   double overlap = 0.0;  // inliers / selected source points, in [0, 1]
   // Of a right-hand step on T_target_source, tangent order [rotation, translation]; 1/rad², 1/m².
   Matrix6d information = Matrix6d::Zero();

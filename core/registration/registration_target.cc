@@ -36,8 +36,7 @@ std::vector<Eigen::Vector3f> AverageInCubes(const std::vector<Eigen::Vector3f>& 
     return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(v / cube_m))) & 0x1FFFFF;
   };
   for (const Eigen::Vector3f& p : points) {
-    const std::uint64_t key =
-        coordinate(p.x()) | coordinate(p.y()) << 21 | coordinate(p.z()) << 42;
+    const std::uint64_t key = coordinate(p.x()) | coordinate(p.y()) << 21 | coordinate(p.z()) << 42;
     std::size_t slot = (key * 0x9E3779B97F4A7C15U) >> shift;
     while (table[slot] != ColumnGrid::kNone && keys[table[slot]] != key) {
       slot = (slot + 1) & (slots - 1);

@@ -27,11 +27,8 @@ constexpr float kColumnSizeM = 0.4F;
 
 using ClassPoints = std::array<std::vector<Eigen::Vector3f>, kFeatureClasses>;
 
-void AppendPatch(const Patch& patch,
-                 float x,
-                 float y,
-                 double samples_per_metre,
-                 ClassPoints& points) {
+void AppendPatch(
+    const Patch& patch, float x, float y, double samples_per_metre, ClassPoints& points) {
   if (!patch.vertical()) {
     points[0].emplace_back(x, y, static_cast<float>(patch.mean_m()));
     return;
@@ -101,11 +98,8 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const FeatureOptions
       const double x = (cell.x + 0.5) * cell_size;
       const double y = (cell.y + 0.5) * cell_size;
       if (x * x + y * y > max_range_m2) continue;
-      AppendPatch(patch,
-                  static_cast<float>(x),
-                  static_cast<float>(y),
-                  options.samples_per_metre,
-                  points);
+      AppendPatch(
+          patch, static_cast<float>(x), static_cast<float>(y), options.samples_per_metre, points);
     }
   }
   for (auto& list : points) list.shrink_to_fit();

@@ -28,8 +28,8 @@ struct FeatureOptions {
   // scan that is only ever a target. Costs about 1.5 µs each here and 4 µs in a registration.
   int sample_count = 2000;
   std::uint64_t seed = 1;
-  int neighbours = 16;                // that span a surface element; in [4, 32]
-  double neighbour_radius_m = 1.5;    // farther ones do not count; in [0.01, 100]
+  int neighbours = 16;              // that span a surface element; in [4, 32]
+  double neighbour_radius_m = 1.5;  // farther ones do not count; in [0.01, 100]
 
   // INVALID_ARGUMENT naming every field out of its range.
   absl::Status Validate() const;
@@ -37,8 +37,8 @@ struct FeatureOptions {
 
 // A feature and the surface around it.
 struct SurfaceElement {
-  // The feature, moved along the normal into the plane of its neighbours: evens out the noise of the
-  // measurements and of the cells' width across the surface.
+  // The feature, moved along the normal into the plane of its neighbours: evens out the noise of
+  // the measurements and of the cells' width across the surface.
   Eigen::Vector3f point = Eigen::Vector3f::Zero();
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();  // unit, sign arbitrary; zero: no surface there
 };
@@ -48,8 +48,8 @@ struct SampledFeature {
   FeatureClass feature_class = FeatureClass::kHorizontal;
 };
 
-// The plane through up to `neighbours` points of `grid` around its feature `p`. When fewer than four
-// lie within `radius_m`, or they do not span a plane, the normal is zero and the point `p`.
+// The plane through up to `neighbours` points of `grid` around its feature `p`. When fewer than
+// four lie within `radius_m`, or they do not span a plane, the normal is zero and the point `p`.
 SurfaceElement FitSurfaceElement(const ColumnGrid& grid,
                                  const Eigen::Vector3f& p,
                                  int neighbours,
@@ -65,9 +65,8 @@ class ScanFeatures {
   // without points, which overlap with nothing.
   static ScanFeatures FromMap(const MlsMap& local_map, const FeatureOptions& options = {});
   // The same of ready points of each class; for features that come from elsewhere.
-  static ScanFeatures FromPoints(
-      std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points,
-      const FeatureOptions& options = {});
+  static ScanFeatures FromPoints(std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points,
+                                 const FeatureOptions& options = {});
 
   const std::vector<Eigen::Vector3f>& points(FeatureClass c) const {
     return points_[static_cast<std::size_t>(c)];

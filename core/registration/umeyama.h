@@ -13,11 +13,11 @@ namespace strata {
 
 // How far the points x spread; it decides how much of a rotation they determine.
 enum class PointSpread {
-  kVolume,     // everything determined
-  kPlane,      // everything determined; the sign S of eq. 7.8 excludes the mirror image
-  kLine,       // rotation about the line is not: the smallest one that fits is taken
-  kPoint,      // translation only: the rotation is the identity
-  kNothing,    // no point of positive weight: the identity
+  kVolume,   // everything determined
+  kPlane,    // everything determined; the sign S of eq. 7.8 excludes the mirror image
+  kLine,     // rotation about the line is not: the smallest one that fits is taken
+  kPoint,    // translation only: the rotation is the identity
+  kNothing,  // no point of positive weight: the identity
 };
 
 struct UmeyamaResult {

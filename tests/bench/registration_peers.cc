@@ -31,7 +31,6 @@ Pose Align(Method& method,
   method.setInputSource(Thinned(source));
   method.setInputTarget(Thinned(target));
   method.setMaxCorrespondenceDistance(2.0);
-  method.setMaximumIterations(50);
   Cloud aligned;
   method.align(aligned, T_target_source_guess.matrix().cast<float>());
   Pose T = Pose::Identity();
@@ -47,7 +46,8 @@ Pose RegisterWithPcl(Peer peer,
                      const Pose& T_target_source_guess) {
   if (peer == Peer::kIcp) {
     pcl::IterativeClosestPoint<pcl::PointXYZ, pcl::PointXYZ> icp;
-    icp.setTransformationEpsilon(1e-6);
+    icp.setMaximumIterations(100);
+    icp.setTransformationEpsilon(1e-8);  // squared metres
     return Align(icp, source, target, T_target_source_guess);
   }
   pcl::GeneralizedIterativeClosestPoint<pcl::PointXYZ, pcl::PointXYZ> gicp;

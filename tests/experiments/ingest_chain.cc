@@ -140,40 +140,44 @@ std::vector<Pose> Place(const Recording& recording, const Settings& settings) {
         RegisterScan(features.back(), target, guess, settings.registration);
     register_ms += now() - register_start;
     ++outcomes[r.termination];
-    const bool accepted =
-        r.termination == Termination::kConverged || r.termination == Termination::kMaxIterations ||
-        r.termination == Termination::kDegenerate;
+    const bool accepted = r.termination == Termination::kConverged ||
+                          r.termination == Termination::kMaxIterations ||
+                          r.termination == Termination::kDegenerate;
     poses.push_back(accepted ? r.T_target_source : guess);
     worst_overlap = std::min(worst_overlap, r.overlap);
     if (settings.verbose) {
       const Pose moved = guess.inverse() * r.T_target_source;
-      std::printf("%6d %-18s scans %zu it %d overlap %.2f rms %.3f moved %.3f m %.3f deg, ref %.3f m %.3f deg\n",
-                  recording.index[i],
-                  std::string(ToString(r.termination)).c_str(),
-                  placed.size(),
-                  r.iterations,
-                  r.overlap,
-                  r.rms_m,
-                  moved.translation().norm(),
-                  RotationAngleRad(moved) * kDegrees,
-                  (recording.reference[i - 1].inverse() * recording.reference[i] *
-                   (poses[i - 1].inverse() * poses[i]).inverse())
-                      .translation()
-                      .norm(),
-                  RotationAngleRad((poses[i - 1].inverse() * poses[i]).inverse() *
-                                   recording.reference[i - 1].inverse() * recording.reference[i]) *
-                      kDegrees);
+      std::printf(
+          "%6d %-18s scans %zu it %d overlap %.2f rms %.3f moved %.3f m %.3f deg, ref %.3f m %.3f "
+          "deg\n",
+          recording.index[i],
+          std::string(ToString(r.termination)).c_str(),
+          placed.size(),
+          r.iterations,
+          r.overlap,
+          r.rms_m,
+          moved.translation().norm(),
+          RotationAngleRad(moved) * kDegrees,
+          (recording.reference[i - 1].inverse() * recording.reference[i] *
+           (poses[i - 1].inverse() * poses[i]).inverse())
+              .translation()
+              .norm(),
+          RotationAngleRad((poses[i - 1].inverse() * poses[i]).inverse() *
+                           recording.reference[i - 1].inverse() * recording.reference[i]) *
+              kDegrees);
     }
   }
   const double n = static_cast<double>(recording.clouds.size());
-  std::printf("%-18s ATE %.4f m (uploaded %.4f m); features %.1f target %.1f register %.1f ms a scan; least overlap %.2f;",
-              recording.name.c_str(),
-              AbsoluteTrajectoryError(poses, recording.reference),
-              AbsoluteTrajectoryError(recording.uploaded, recording.reference),
-              features_ms / n,
-              target_ms / n,
-              register_ms / n,
-              worst_overlap);
+  std::printf(
+      "%-18s ATE %.4f m (uploaded %.4f m); features %.1f target %.1f register %.1f ms a scan; "
+      "least overlap %.2f;",
+      recording.name.c_str(),
+      AbsoluteTrajectoryError(poses, recording.reference),
+      AbsoluteTrajectoryError(recording.uploaded, recording.reference),
+      features_ms / n,
+      target_ms / n,
+      register_ms / n,
+      worst_overlap);
   for (const auto& [termination, count] : outcomes) {
     std::printf(" %s %d", std::string(ToString(termination)).c_str(), count);
   }
@@ -234,7 +238,8 @@ int Main(int argc, char** argv) {
   settings.features.neighbours = settings.registration.neighbours;
 
   const auto wanted = [&](const std::string& name) { return only.empty() || only == name; };
-  if (const auto f = testing::FindData("kitti_city_drive"); f.has_value() && wanted("kitti_city_drive")) {
+  if (const auto f = testing::FindData("kitti_city_drive");
+      f.has_value() && wanted("kitti_city_drive")) {
     Recording r = Load(*f, "poses_reference_icp.txt", "poses_reference_icp.txt");
     for (const std::uint64_t seed : {1, 2, 3}) {
       r.uploaded = WithStepNoise(r.reference, seed);
@@ -246,7 +251,8 @@ int Main(int argc, char** argv) {
       Place(Load(*f, "poses_initial.txt", "poses_reference.txt"), settings);
     }
   }
-  if (const auto f = testing::FindData("nclt_campus_loop"); f.has_value() && wanted("nclt_campus_loop")) {
+  if (const auto f = testing::FindData("nclt_campus_loop");
+      f.has_value() && wanted("nclt_campus_loop")) {
     PrintClosure(Place(Load(*f, "poses_initial.txt", "poses_reference.txt"), settings),
                  *f / "loop_edge_0_900.txt");
   }

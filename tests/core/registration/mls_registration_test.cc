@@ -1,0 +1,262 @@
+#include "core/registration/mls_registration.h"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/cloud/sensor_model.h"
+#include "core/mls/build.h"
+#include "tests/support/data_dir.h"
+#include "tests/support/pcd.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using testing::StatusIs;
+
+// A yard: ground, two walls at a right angle, a shed and posts, drawn once and scanned with noise.
+PointCloud Yard(const Pose& T_world_scan, std::uint64_t seed, bool walls = true) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> wide(-15.0, 15.0);
+  std::uniform_real_distribution<double> tall(0.0, 4.0);
+  std::normal_distribution<double> noise(0.0, 0.01);
+  const Pose T_scan_world = T_world_scan.inverse();
+  PointCloud cloud;
+  const auto add = [&](double x, double y, double z) {
+    cloud.points.push_back((T_scan_world * Eigen::Vector3d(x, y, z)).cast<float>());
+  };
+  for (int i = 0; i < 60000; ++i) add(wide(random), wide(random), noise(random));
+  for (int i = 0; walls && i < 60000; ++i) {
+    const double along = wide(random);
+    const double z = tall(random);
+    switch (i % 4) {
+      case 0:
+        add(along, 12.0 + noise(random), z);
+        break;
+      case 1:
+        add(-11.0 + noise(random), along, z);
+        break;
+      case 2:  // shed
+        add(4.0 + noise(random), 0.2 * along, 0.6 * z);
+        break;
+      default:  // posts
+        add(std::round(along / 5.0) * 5.0 + noise(random), -6.0 + noise(random), z);
+    }
+  }
+  return cloud;
+}
+
+ScanFeatures Features(const PointCloud& cloud, const FeatureOptions& options = {}) {
+  return ScanFeatures::FromMap(
+      BuildMlsMap(cloud, Pose::Identity(), SensorModel(), MlsParameters())->map, options);
+}
+
+RegistrationTarget TargetOf(const ScanFeatures& features, const Pose& T = Pose::Identity()) {
+  const PlacedScan placed[] = {{&features, T}};
+  return RegistrationTarget(placed, {.centre = T.translation()});
+}
+
+Pose Step(double roll, double pitch, double yaw, double x, double y, double z) {
+  Vector6d step;
+  step << roll, pitch, yaw, x, y, z;
+  return Retract(Pose::Identity(), step);
+}
+
+const Pose kTruth = Step(0.01, -0.02, 0.1, 0.8, -0.5, 0.05);
+const Pose kOff = Step(0.03, 0.02, -0.04, 0.3, 0.3, -0.25);
+
+TEST(ScanFeaturesTest, OneFeatureAPatchAndFourAMetreOfWall) {
+  MlsMap map;
+  const std::uint8_t sigma = SigmaCode(0.01);
+  map.tiles.resize(1);
+  const std::uint16_t cell = CellInTile({3, 5});
+  Patch wall = PatchOfMeasurement(cell, 0, sigma);
+  for (int z = 0; z <= 2 * kTicksPerMetre; z += kTicksPerMetre / 2) {
+    wall = Join(wall, PatchOfMeasurement(cell, z, sigma), map.parameters);
+  }
+  map.tiles[0].patches = {wall, PatchOfMeasurement(cell, 4 * kTicksPerMetre, sigma)};
+  map.tiles[0].IndexRows();
+  const ScanFeatures features = ScanFeatures::FromMap(map);
+  ASSERT_EQ(features.points(FeatureClass::kHorizontal).size(), 1U);
+  EXPECT_TRUE(features.points(FeatureClass::kHorizontal)[0].isApprox(
+      Eigen::Vector3f(0.35F, 0.55F, 4.0F), 1e-6F));
+  ASSERT_EQ(features.points(FeatureClass::kVertical).size(), 8U);
+  EXPECT_NEAR(features.points(FeatureClass::kVertical)[0].z(), 0.125, 1e-6);
+  EXPECT_NEAR(features.points(FeatureClass::kVertical)[7].z(), 1.875, 1e-6);
+}
+
+TEST(ScanFeaturesTest, SampleIsReproducedAndHasNormals) {
+  const PointCloud yard = Yard(Pose::Identity(), 1);
+  const ScanFeatures a = Features(yard);
+  const ScanFeatures b = Features(yard);
+  ASSERT_EQ(a.sample().size(), 2000U);
+  int upright = 0;
+  int horizontal = 0;
+  for (std::size_t i = 0; i < a.sample().size(); ++i) {
+    EXPECT_EQ(a.sample()[i].element.point, b.sample()[i].element.point);
+    EXPECT_EQ(a.sample()[i].element.normal, b.sample()[i].element.normal);
+    if (a.sample()[i].feature_class != FeatureClass::kHorizontal) continue;
+    ++horizontal;
+    upright += static_cast<int>(std::abs(a.sample()[i].element.normal.z()) > 0.95F);
+  }
+  EXPECT_GT(upright, 0.9 * horizontal);
+}
+
+TEST(ScanFeaturesTest, FarFeaturesAreLeftOut) {
+  FeatureOptions options;
+  options.max_range_m = 5.0;
+  const ScanFeatures features = Features(Yard(Pose::Identity(), 1), options);
+  for (const auto c : {FeatureClass::kHorizontal, FeatureClass::kVertical}) {
+    for (const Eigen::Vector3f& p : features.points(c)) EXPECT_LE(p.head<2>().norm(), 5.0F);
+  }
+}
+
+class MlsMetricTest : public ::testing::TestWithParam<MlsErrorMetric> {};
+
+TEST_P(MlsMetricTest, PlantedPoseIsFoundBothWays) {
+  const ScanFeatures target = Features(Yard(Pose::Identity(), 1));
+  const ScanFeatures source = Features(Yard(kTruth, 2));
+  MlsRegistrationOptions options;
+  options.metric = GetParam();
+  options.max_iterations = 100;
+  const double bound = GetParam() == MlsErrorMetric::kPlaneToPlane ? 0.01 : 0.1;
+  const auto there = RegisterScan(source, TargetOf(target), kTruth * kOff, options);
+  EXPECT_LT((kTruth.inverse() * there.T_target_source).translation().norm(), bound);
+  EXPECT_LT(RotationAngleRad(kTruth.inverse() * there.T_target_source), 0.2 * bound);
+  EXPECT_GT(there.overlap, 0.8);
+  const auto back = RegisterScan(target, TargetOf(source), kTruth.inverse() * kOff, options);
+  EXPECT_LT((kTruth * back.T_target_source).translation().norm(), bound);
+}
+
+INSTANTIATE_TEST_SUITE_P(Metrics,
+                         MlsMetricTest,
+                         ::testing::Values(MlsErrorMetric::kPlaneToPlane,
+                                           MlsErrorMetric::kPointToPoint));
+
+TEST(RegisterScanTest, ConvergesAndSaysSo) {
+  const ScanFeatures target = Features(Yard(Pose::Identity(), 1));
+  const auto r = RegisterScan(Features(Yard(kTruth, 2)), TargetOf(target), kTruth * kOff);
+  EXPECT_EQ(r.termination, Termination::kConverged);
+  EXPECT_LT(r.rms_m, 0.1);
+  EXPECT_THAT(r.degenerate_directions, IsEmpty());
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(r.information).eigenvalues()[0], 0.0);
+}
+
+TEST(RegisterScanTest, SeveralScansMakeOneTarget) {
+  std::vector<ScanFeatures> scans;
+  std::vector<Pose> poses;
+  for (int i = 0; i < 4; ++i) {
+    poses.push_back(Step(0, 0, 0.2 * i, i - 1.5, 0.5 * i, 0));
+    scans.push_back(Features(Yard(poses.back(), 10 + i)));
+  }
+  std::vector<PlacedScan> placed;
+  for (int i = 0; i < 4; ++i) placed.push_back({&scans[i], poses[i]});
+  const RegistrationTarget target(placed);
+  EXPECT_LT(target.size(), scans[0].size() + scans[1].size() + scans[2].size() + scans[3].size());
+  const auto r = RegisterScan(Features(Yard(kTruth, 2)), target, kTruth * kOff);
+  EXPECT_EQ(r.termination, Termination::kConverged);
+  EXPECT_LT((kTruth.inverse() * r.T_target_source).translation().norm(), 0.01);
+}
+
+TEST(RegisterScanTest, FarFromTheOriginGivesTheSame) {
+  const ScanFeatures target = Features(Yard(Pose::Identity(), 1));
+  const ScanFeatures source = Features(Yard(kTruth, 2));
+  const Pose T_map_local = MakePose(Eigen::Quaterniond::Identity(), {4.5e5, 5.4e6, 300.0});
+  const auto near = RegisterScan(source, TargetOf(target), kTruth * kOff);
+  const auto far = RegisterScan(source, TargetOf(target, T_map_local), T_map_local * kTruth * kOff);
+  const Pose difference = (T_map_local * near.T_target_source).inverse() * far.T_target_source;
+  EXPECT_LT(difference.translation().norm(), 1e-3);
+}
+
+TEST(RegisterScanTest, BareGroundIsDegenerateAndDoesNotSlide) {
+  const ScanFeatures ground = Features(Yard(Pose::Identity(), 1, /*walls=*/false));
+  MlsRegistrationOptions options;
+  options.tangent_sigma_m = 2.0;  // or cell centres would pull sideways
+  const Pose guess = Step(0, 0, 0, 0, 0, 0.3);
+  const auto r = RegisterScan(ground, TargetOf(ground), guess, options);
+  EXPECT_EQ(r.termination, Termination::kDegenerate);
+  EXPECT_THAT(r.degenerate_directions, Not(IsEmpty()));
+  EXPECT_NEAR(r.T_target_source.translation().z(), 0.0, 0.02);
+  EXPECT_NEAR(r.T_target_source.translation().head<2>().norm(), 0.0, 0.05);
+}
+
+TEST(RegisterScanTest, ElsewhereIsTooLittleOverlap) {
+  const ScanFeatures yard = Features(Yard(Pose::Identity(), 1));
+  const Pose guess = Step(0, 0, 0, 28, 28, 0);
+  const auto r = RegisterScan(yard, TargetOf(yard), guess);
+  EXPECT_EQ(r.termination, Termination::kTooLittleOverlap);
+  EXPECT_TRUE(r.T_target_source.isApprox(guess));
+}
+
+TEST(RegisterScanTest, NothingOverlapsWithNothing) {
+  const ScanFeatures none;
+  const ScanFeatures yard = Features(Yard(Pose::Identity(), 1));
+  for (const MlsErrorMetric metric :
+       {MlsErrorMetric::kPlaneToPlane, MlsErrorMetric::kPointToPoint}) {
+    MlsRegistrationOptions options;
+    options.metric = metric;
+    EXPECT_EQ(RegisterScan(none, TargetOf(yard), Pose::Identity(), options).termination,
+              Termination::kTooLittleOverlap);
+    EXPECT_EQ(RegisterScan(yard, RegistrationTarget(), Pose::Identity(), options).termination,
+              Termination::kTooLittleOverlap);
+  }
+}
+
+TEST(RegisterScanTest, TooFarAMoveIsDiverged) {
+  const ScanFeatures target = Features(Yard(Pose::Identity(), 1));
+  MlsRegistrationOptions options;
+  options.max_translation_m = 0.05;
+  const auto r = RegisterScan(Features(Yard(kTruth, 2)), TargetOf(target), kTruth * kOff, options);
+  EXPECT_EQ(r.termination, Termination::kDiverged);
+  EXPECT_TRUE(r.T_target_source.isApprox(kTruth * kOff));
+}
+
+TEST(RegisterScanTest, InfiniteGuessIsDiverged) {
+  const ScanFeatures yard = Features(Yard(Pose::Identity(), 1));
+  Pose guess = Pose::Identity();
+  guess.translation().x() = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(RegisterScan(yard, TargetOf(yard), guess).termination, Termination::kDiverged);
+}
+
+TEST(RegistrationOptionsTest, ValidateNamesEveryViolation) {
+  STRATA_EXPECT_OK(MlsRegistrationOptions().Validate());
+  STRATA_EXPECT_OK(FeatureOptions().Validate());
+  STRATA_EXPECT_OK(TargetOptions().Validate());
+  MlsRegistrationOptions options;
+  options.final_gate_m = 3.0;
+  options.min_inliers = 1;
+  EXPECT_THAT(options.Validate(),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       AllOf(HasSubstr("final_gate_m is 3, must be in [0.001, 2]"),
+                             HasSubstr("min_inliers is 1"))));
+  FeatureOptions features;
+  features.neighbours = 100;
+  EXPECT_THAT(features.Validate(),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("neighbours is 100")));
+}
+
+TEST(RegisterScanTest, RecordedDriveAgreesWithItsReference) {
+  STRATA_REQUIRE_DATA(path, "kitti_city_drive");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto poses,
+                              testing::ReadIndexedPoses(path / "poses_reference_icp.txt"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto a, testing::ReadBinaryPcd(path / "scans" / "003.pcd"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto b, testing::ReadBinaryPcd(path / "scans" / "006.pcd"));
+  const Pose truth = poses.at(3).T_world_scan.inverse() * poses.at(6).T_world_scan;
+  const auto r = RegisterScan(Features(b), TargetOf(Features(a)), truth * kOff);
+  EXPECT_EQ(r.termination, Termination::kConverged);
+  EXPECT_LT((truth.inverse() * r.T_target_source).translation().norm(), 0.03);
+}
+
+}  // namespace
+}  // namespace strata
