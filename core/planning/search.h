@@ -18,10 +18,8 @@ class Landmarks;
 
 // What a search knows of a patch.
 struct SearchNode {
-  std::uint32_t cost = 0;       // from the start
-  std::uint32_t remaining = 0;  // lower bound to the goal
-  std::uint32_t stamp = 0;      // generation << 4 | closed << 3 | direction it was reached by
-  std::uint32_t reserved = 0;   // keeps four nodes in a cache line
+  std::uint32_t cost = 0;   // from the start
+  std::uint32_t stamp = 0;  // generation << 4 | closed << 3 | direction it was reached by
 };
 
 // Memory of searches, kept between them: nodes of an earlier search are told by their generation
@@ -32,6 +30,8 @@ class SearchWorkspace {
   void Begin();
   // Nodes of a slot, at least `size` of them.
   SearchNode* Nodes(int slot, std::uint32_t size);
+  // Lower bounds to the goal beside them, for searches whose bound is worth keeping.
+  std::uint32_t* Bounds(int slot, std::uint32_t size);
   const SearchNode* NodesIfAny(int slot) const;
   bool Reached(const SearchNode& node) const { return node.stamp >> 4 == generation_; }
   std::uint32_t Stamp(int direction) const {
@@ -47,6 +47,7 @@ class SearchWorkspace {
 
   std::uint32_t generation_ = 0;
   std::vector<std::vector<SearchNode>> nodes_;  // per slot
+  std::vector<std::vector<std::uint32_t>> bounds_;
   BucketQueue queue_{kBucketShift};
 };
 
