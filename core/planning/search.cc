@@ -22,12 +22,17 @@ namespace {
 
 constexpr std::uint32_t kClosed = 8;
 constexpr std::uint64_t kExpansionsPerLook = 4096;  // at the clock
+// Widths of buckets, measured: wide ones stay in the processor's cache, but expand again what a bad
+// order within a bucket made too dear; the tighter the bound, the more that is.
+constexpr int kWideBuckets = 6;
+constexpr int kNarrowBuckets = 2;
 constexpr std::uint32_t kMaxCost = 0xF0000000U;
 
 // Cost of the shortest way over cells without danger; consistent, since a move of any length costs
 // at least as much.
 struct OctileBound {
   static constexpr bool kKeep = false;  // as fast to compute as to read
+  static constexpr int kBucketShift = kWideBuckets;
   CellIndex goal;
 
   void Enter(int /*slot*/, const SearchSpace::Slot& /*s*/) {}
@@ -41,6 +46,7 @@ struct OctileBound {
 
 struct NoBound {
   static constexpr bool kKeep = false;
+  static constexpr int kBucketShift = kWideBuckets;
   void Enter(int /*slot*/, const SearchSpace::Slot& /*s*/) {}
   std::uint32_t operator()(std::int32_t /*x*/, std::int32_t /*y*/, std::uint32_t /*local*/) const {
     return 0;
@@ -51,6 +57,7 @@ struct NoBound {
 class LandmarkBound {
  public:
   static constexpr bool kKeep = true;
+  static constexpr int kBucketShift = kNarrowBuckets;
 
   LandmarkBound(CellIndex goal, const Landmarks& landmarks, const std::uint32_t* goal_costs)
       : octile_{goal}, landmarks_(landmarks), goal_costs_(goal_costs) {}
@@ -90,7 +97,7 @@ class Search {
 
   // Expands until `goal` (kNoPatchId: nothing) is settled or the queue is empty.
   absl::StatusOr<SearchOutcome> Run(PatchId start, PatchId goal, std::uint64_t max_expanded) {
-    workspace_.Begin();
+    workspace_.Begin(Bound::kBucketShift);
     goal_ = goal;
     EnterSlot(space_.SlotOf(start));
     const CellIndex cell = space_.CellOfPatch(start);
@@ -247,14 +254,14 @@ class Search {
 
 }  // namespace
 
-void SearchWorkspace::Begin() {
+void SearchWorkspace::Begin(int bucket_shift) {
   // 28 bits of generations; then all memories are wiped once.
   if (++generation_ >= 1U << 28) {
     for (std::vector<SearchNode>& nodes : nodes_)
       std::fill(nodes.begin(), nodes.end(), SearchNode{});
     generation_ = 1;
   }
-  queue_.Clear();
+  queue_.Clear(bucket_shift);
 }
 
 SearchNode* SearchWorkspace::Nodes(int slot, std::uint32_t size) {

@@ -26,8 +26,8 @@ struct SearchNode {
 // and never cleared. One search at a time.
 class SearchWorkspace {
  public:
-  // Starts anew.
-  void Begin();
+  // Starts anew, with a queue of buckets of 2^bucket_shift.
+  void Begin(int bucket_shift);
   // Nodes of a slot, at least `size` of them.
   SearchNode* Nodes(int slot, std::uint32_t size);
   // Lower bounds to the goal beside them, for searches whose bound is worth keeping.
@@ -41,14 +41,10 @@ class SearchWorkspace {
   std::size_t memory_bytes() const;
 
  private:
-  // Wide buckets expand again what a bad order within a bucket made too dear, landmarks' bounds
-  // make it many; 2^3 of 2048 a cell measured best.
-  static constexpr int kBucketShift = 3;
-
   std::uint32_t generation_ = 0;
   std::vector<std::vector<SearchNode>> nodes_;  // per slot
   std::vector<std::vector<std::uint32_t>> bounds_;
-  BucketQueue queue_{kBucketShift};
+  BucketQueue queue_;
 };
 
 struct SearchOutcome {
