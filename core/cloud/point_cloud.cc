@@ -27,7 +27,8 @@ absl::Status ValidateCloud(const PointCloud& cloud) {
   STRATA_RETURN_IF_ERROR(CheckColumn("intensity", cloud.intensity.size(), n));
   STRATA_RETURN_IF_ERROR(CheckColumn("colour", cloud.colour.size(), n));
   STRATA_RETURN_IF_ERROR(CheckColumn("label", cloud.label.size(), n));
-  if (std::uint64_t{cloud.rows} * cloud.columns != (cloud.organised() ? n : 0)) {
+  const bool half_a_grid = (cloud.rows == 0) != (cloud.columns == 0);
+  if (half_a_grid || std::uint64_t{cloud.rows} * cloud.columns != (cloud.organised() ? n : 0)) {
     return absl::InvalidArgumentError(absl::StrCat(
         "cloud: grid of ", cloud.rows, " × ", cloud.columns, " does not hold ", n, " points"));
   }

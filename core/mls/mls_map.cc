@@ -12,8 +12,12 @@ namespace strata {
 
 void MlsTile::IndexRows() {
   row_begin.fill(0);
-  for (const Patch& patch : patches) ++row_begin[(patch.cell >> kTileShift) + 1];
-  for (int row = 0; row < kTileCells; ++row) row_begin[row + 1] += row_begin[row];
+  std::uint32_t count = 0;
+  for (const Patch& patch : patches) row_begin[(patch.cell >> kTileShift) + 1] = ++count;
+  // Rows without a patch end where the row before ends.
+  for (int row = 0; row < kTileCells; ++row) {
+    row_begin[row + 1] = std::max(row_begin[row], row_begin[row + 1]);
+  }
 }
 
 std::span<const Patch> MlsTile::Cell(std::uint16_t cell_in_tile) const {
@@ -57,9 +61,9 @@ std::size_t MlsMap::occupied_cell_count() const {
 }
 
 std::size_t MlsMap::memory_bytes() const {
-  std::size_t bytes = sizeof(*this);
+  std::size_t bytes = sizeof(*this) + tiles.capacity() * sizeof(MlsTile);
   for (const MlsTile& tile : tiles) {
-    bytes += sizeof(tile) + tile.patches.capacity() * sizeof(Patch) +
+    bytes += tile.patches.capacity() * sizeof(Patch) +
              tile.colour.capacity() * sizeof(ColourSum) +
              tile.votes.capacity() * sizeof(ClassVotes);
   }

@@ -12,45 +12,41 @@ namespace strata {
 namespace {
 
 constexpr double kMinSigmaM = 0.002;
-constexpr double kCodesPerOctave = 255.0 / 8.0;
+constexpr double kHalfStep = 1.0109322217097118;  // 2^(4/255)
 
+// Everything here comes from products and quotients, which every machine rounds alike; exp2 and
+// log2 may differ in the last bit, and one bit decides a code.
 struct CodeTable {
   std::array<double, 256> sigma_m;
+  std::array<double, 256> boundary_m;  // from here on, code c and not c − 1
   std::array<std::uint32_t, 256> weight;
 };
 
 const CodeTable& Codes() {
   static const CodeTable table = [] {
     CodeTable t;
+    double sigma = kMinSigmaM;
     for (int code = 0; code < 256; ++code) {
-      const double octaves = code / kCodesPerOctave;
-      t.sigma_m[code] = kMinSigmaM * std::exp2(octaves);
-      t.weight[code] = static_cast<std::uint32_t>(std::lround(65536.0 * std::exp2(-2.0 * octaves)));
+      const double ratio = kMinSigmaM / sigma;
+      t.sigma_m[code] = sigma;
+      t.boundary_m[code] = code == 0 ? 0.0 : sigma / kHalfStep;
+      t.weight[code] = static_cast<std::uint32_t>(std::lround(65536.0 * (ratio * ratio)));
+      sigma = sigma * (kHalfStep * kHalfStep);
     }
     return t;
   }();
   return table;
 }
 
-// Moves the reference of the sums down by `shift` ticks: Σw(z+s), Σw(z+s)².
-void ShiftReference(Patch& patch, std::uint64_t shift) {
-  patch.sum_wzz += 2 * shift * patch.sum_wz + shift * shift * patch.sum_w;
-  patch.sum_wz = patch.sum_wz + shift * patch.sum_w;
-}
-
-void MakeVertical(Patch& patch) {
-  patch.sum_w = 0;
-  patch.sum_wz = 0;
-  patch.sum_wzz = 0;
-}
-
 }  // namespace
 
 std::uint8_t SigmaCode(double sigma_m) {
-  if (!(sigma_m > kMinSigmaM)) return 0;
-  const double code = std::log2(sigma_m / kMinSigmaM) * kCodesPerOctave;
-  return static_cast<std::uint8_t>(std::lround(std::min(code, 255.0)));
+  const auto& boundary = Codes().boundary_m;
+  const auto above = std::upper_bound(boundary.begin() + 1, boundary.end(), sigma_m);
+  return static_cast<std::uint8_t>(above - boundary.begin() - 1);
 }
+
+double SigmaCodeBoundary(std::uint8_t code) { return Codes().boundary_m[code]; }
 
 double SigmaOfCode(std::uint8_t code) { return Codes().sigma_m[code]; }
 
@@ -84,12 +80,13 @@ std::uint64_t MaxWeightSum(std::int32_t thickness_ticks) {
 
 Patch PatchOfMeasurement(std::uint16_t cell, std::int32_t z_ticks, std::uint8_t sigma_code) {
   Patch patch;
-  patch.cell = cell;
-  patch.z_min = z_ticks;
-  patch.z_max = z_ticks;
-  patch.top_sigma_code = sigma_code;
-  patch.count = 1;
-  patch.sum_w = WeightOfCode(sigma_code);
+  StorePatch({.sum_w = WeightOfCode(sigma_code),
+              .count = 1,
+              .z_min = z_ticks,
+              .z_max = z_ticks,
+              .cell = cell,
+              .top_sigma_code = sigma_code},
+             patch);
   return patch;
 }
 
@@ -98,32 +95,33 @@ bool Touching(const Patch& a, const Patch& b, const MlsParameters& parameters) {
   return gap < parameters.gap_ticks();
 }
 
-Patch Join(const Patch& a, const Patch& b, const MlsParameters& parameters) {
-  Patch low = a.z_min <= b.z_min ? a : b;
-  Patch high = a.z_min <= b.z_min ? b : a;
+void JoinInto(Patch& a, const Patch& b, const MlsParameters& parameters) {
+  const Patch& low = a.z_min <= b.z_min ? a : b;
+  const Patch& high = a.z_min <= b.z_min ? b : a;
+  const Patch& top = a.z_max >= b.z_max ? a : b;
 
-  Patch joined;
-  joined.cell = a.cell;
-  joined.z_min = low.z_min;
-  joined.z_max = std::max(a.z_max, b.z_max);
-  joined.count = std::min<std::uint64_t>(a.count + b.count, Patch::kMaxCount);
-  if (a.z_max == b.z_max) {
-    joined.top_sigma_code = std::min(a.top_sigma_code, b.top_sigma_code);
-  } else {
-    joined.top_sigma_code = a.z_max > b.z_max ? a.top_sigma_code : b.top_sigma_code;
-  }
+  PatchFields joined;
+  joined.cell = static_cast<std::uint16_t>(a.cell);
+  joined.z_min = static_cast<std::int32_t>(low.z_min);
+  joined.z_max = static_cast<std::int32_t>(top.z_max);
+  joined.count = static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(std::uint64_t{a.count} + b.count, Patch::kMaxCount));
+  joined.top_sigma_code = static_cast<std::uint8_t>(
+      a.z_max == b.z_max ? std::min(a.top_sigma_code, b.top_sigma_code) : top.top_sigma_code);
+
   const std::int32_t thickness = parameters.thickness_ticks();
-  if (a.vertical() || b.vertical() || joined.height_ticks() > thickness) {
-    MakeVertical(joined);
-    return joined;
+  if (low.vertical() || high.vertical() || joined.z_max - joined.z_min > thickness) {
+    return StorePatch(joined, a);
   }
   const std::uint64_t bound = MaxWeightSum(thickness);
   joined.sum_w = std::min<std::uint64_t>(std::uint64_t{a.sum_w} + b.sum_w, bound);
-  if (joined.sum_w == bound) return joined;  // full
-  ShiftReference(high, static_cast<std::uint64_t>(high.z_min - low.z_min));
-  joined.sum_wz = low.sum_wz + high.sum_wz;
-  joined.sum_wzz = low.sum_wzz + high.sum_wzz;
-  return joined;
+  if (joined.sum_w == bound) return StorePatch(joined, a);  // full
+  // The sums of the higher one, taken from the lower reference: Σw(z + s), Σw(z + s)².
+  const auto shift = static_cast<std::uint64_t>(high.z_min - low.z_min);
+  const std::uint64_t shifted_w = shift * high.sum_w;
+  joined.sum_wz = low.sum_wz + high.sum_wz + shifted_w;
+  joined.sum_wzz = low.sum_wzz + high.sum_wzz + 2 * shift * high.sum_wz + shift * shifted_w;
+  StorePatch(joined, a);
 }
 
 }  // namespace strata

@@ -5,6 +5,7 @@ target_compile_features(strata_build_options INTERFACE cxx_std_20)
 target_compile_options(
   strata_build_options
   INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+            -ffp-contract=off # derived bytes must not depend on whether a machine fuses a · b + c
             $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety> $<$<BOOL:${STRATA_WARNINGS_AS_ERRORS}>:-Werror>
 )
 set(STRATA_SANITIZER_KIND "")

@@ -8,12 +8,14 @@
 
 namespace strata::testing {
 
-// `folder` under $STRATA_DATA (default: ../shared/data beside the source tree); nullopt where it is absent.
+// `folder` under $STRATA_DATA (default: ../shared/data beside the source tree); nullopt where it is
+// absent.
 std::optional<std::filesystem::path> FindData(const std::string& folder);
 
 }  // namespace strata::testing
 
-// Skips the test with a clear message where the data folder is absent; otherwise `path` is its place.
+// Skips the test with a clear message where the data folder is absent; otherwise `path` is its
+// place.
 #define STRATA_REQUIRE_DATA(path, folder)                                                  \
   const auto path##_found = ::strata::testing::FindData(folder);                           \
   if (!path##_found.has_value()) {                                                         \

@@ -1,15 +1,14 @@
-// Matchers for absl::Status and absl::StatusOr (Abseil 20220623 has none). There is deliberately no "not ok": name
-// the code.
+// Matchers for absl::Status and absl::StatusOr (Abseil 20220623 has none). There is deliberately no
+// "not ok": name the code.
 #ifndef STRATA_TESTS_SUPPORT_STATUS_MATCHERS_H_
 #define STRATA_TESTS_SUPPORT_STATUS_MATCHERS_H_
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <string>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
 namespace strata::testing {
 

@@ -1,0 +1,53 @@
+// How the commands of `strata` are put together: a noun file adds its verbs to the parser, the
+// parser selects one action, main() runs it against a database.
+#ifndef STRATA_CLIENT_CLI_COMMAND_H_
+#define STRATA_CLIENT_CLI_COMMAND_H_
+
+#include <functional>
+#include <string>
+
+#include "absl/status/status.h"
+#include <CLI/CLI.hpp>
+
+#include "client/cli/output.h"
+#include "core/api/call.h"
+#include "core/api/database.h"
+
+namespace strata::cli {
+
+// What a running command has at hand.
+struct Context {
+  api::Database& database;
+  api::Call call;  // stops on the first Ctrl-C
+  Output& output;
+};
+
+// OK: exit 0. Any other status: its message on stderr and exit 1.
+using Action = std::function<absl::Status(Context&)>;
+
+// The parser's root and the action that the verb on the command line chose.
+struct Commands {
+  CLI::App& root;
+  Action selected;
+
+  CLI::App* Noun(const std::string& name, const std::string& description);
+  // A verb under `noun` (the root for `surface` and `plan`); `example` appears below its --help.
+  CLI::App* Verb(CLI::App* noun,
+                 const std::string& name,
+                 const std::string& description,
+                 const std::string& example,
+                 Action action);
+};
+
+void AddMapCommands(Commands& commands);
+void AddScanCommands(Commands& commands);
+void AddPoseCommands(Commands& commands);
+void AddTileCommands(Commands& commands);
+void AddSurfaceCommand(Commands& commands);
+void AddPlanCommand(Commands& commands);
+void AddProfileCommands(Commands& commands);
+void AddJobCommands(Commands& commands);
+
+}  // namespace strata::cli
+
+#endif  // STRATA_CLIENT_CLI_COMMAND_H_

@@ -1,0 +1,23 @@
+// Which database a command talks to.
+#ifndef STRATA_CLIENT_CLI_CONNECT_H_
+#define STRATA_CLIENT_CLI_CONNECT_H_
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+
+#include "core/api/database.h"
+
+namespace strata::cli {
+
+struct Target {
+  std::string server = "127.0.0.1:50051";
+  std::string embedded;  // a directory: the database runs in this process
+};
+
+absl::StatusOr<std::unique_ptr<api::Database>> OpenDatabase(const Target& target);
+
+}  // namespace strata::cli
+
+#endif  // STRATA_CLIENT_CLI_CONNECT_H_

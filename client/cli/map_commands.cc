@@ -1,0 +1,140 @@
+// strata map create|list|show|delete|verify|rebuild; export and render have files of their own.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+
+#include "client/cli/arguments.h"
+#include "client/cli/command.h"
+#include "client/cli/job_runner.h"
+#include "client/cli/json.h"
+#include "client/cli/map_files.h"
+#include "core/common/status.h"
+
+namespace strata::cli {
+namespace {
+
+struct MapOptions {
+  std::string map;
+  MapParameters parameters;
+  ProfileOverrides profile;
+  bool drop_points = false;
+};
+
+absl::Status Create(Context& context, MapOptions options) {
+  options.parameters.keep_points = !options.drop_points;
+  options.parameters.default_profile = options.profile.Over(options.parameters.default_profile);
+  STRATA_ASSIGN_OR_RETURN(
+      const MapInfo info,
+      context.database.maps().Create(context.call, options.map, options.parameters));
+  context.output.Object(ToJson(info));
+  return absl::OkStatus();
+}
+
+absl::Status List(Context& context) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MapInfo> maps,
+                          context.database.maps().List(context.call));
+  Json rows = Json::array();
+  for (const MapInfo& map : maps) {
+    rows.push_back(ToJson(map));
+  }
+  context.output.List(rows,
+                      {{"name", "NAME"},
+                       {"cell_size_m", "CELL SIZE"},
+                       {"gap_size_m", "GAP SIZE"},
+                       {"thickness_m", "THICKNESS"},
+                       {"created", "CREATED"}});
+  return absl::OkStatus();
+}
+
+absl::Status Show(Context& context, const MapOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const MapInfo info,
+                          context.database.maps().Get(context.call, options.map));
+  STRATA_ASSIGN_OR_RETURN(const MapStats stats,
+                          context.database.maps().Stats(context.call, options.map));
+  context.output.Object(ToJson(info, stats));
+  return absl::OkStatus();
+}
+
+absl::Status Delete(Context& context, const MapOptions& options) {
+  STRATA_RETURN_IF_ERROR(context.database.maps().Delete(context.call, options.map));
+  context.output.Object({{"deleted", options.map}});
+  return absl::OkStatus();
+}
+
+void AddCreate(Commands& commands, CLI::App* noun, const std::shared_ptr<MapOptions>& options) {
+  CLI::App* create =
+      commands.Verb(noun,
+                    "create",
+                    "Create a map",
+                    "strata map create campus --cell-size 0.1",
+                    [options](Context& context) { return Create(context, *options); });
+  AddMapName(create, options->map);
+  MapParameters& parameters = options->parameters;
+  create->add_option("--cell-size", parameters.mls.cell_size_m, "Edge of a cell [m]")
+      ->capture_default_str();
+  create
+      ->add_option(
+          "--gap-size", parameters.mls.gap_size_m, "Heights closer than this are one surface [m]")
+      ->capture_default_str();
+  create->add_option("--thickness", parameters.mls.thickness_m, "Taller surfaces are vertical [m]")
+      ->capture_default_str();
+  create->add_option("--sigma", parameters.sensor.sigma_m, "Range noise of the sensor at 0 m [m]")
+      ->capture_default_str();
+  create
+      ->add_option(
+          "--sigma-per-metre", parameters.sensor.sigma_per_metre, "Growth of the noise with range")
+      ->capture_default_str();
+  create->add_option("--min-range", parameters.sensor.min_range_m, "Closer returns are ignored [m]")
+      ->capture_default_str();
+  create
+      ->add_option("--max-range", parameters.sensor.max_range_m, "Farther returns are ignored [m]")
+      ->capture_default_str();
+  create->add_flag("--drop-points", options->drop_points, "Drop points once a scan is integrated");
+  AddNumbers(
+      create,
+      "--origin",
+      "LAT,LON,ALT",
+      3,
+      3,
+      [options](const std::vector<double>& n) {
+        options->parameters.origin = {
+            .latitude_rad = n[0], .longitude_rad = n[1], .altitude_m = n[2]};
+      },
+      "Where the map's origin is on earth (WGS 84) [rad, rad, m]");
+  AddProfileOptions(create, options->profile);
+}
+
+}  // namespace
+
+void AddMapCommands(Commands& commands) {
+  auto options = std::make_shared<MapOptions>();
+  CLI::App* noun = commands.Noun("map", "Whole worlds");
+  AddCreate(commands, noun, options);
+  commands.Verb(noun, "list", "All maps", "strata map list", List);
+  const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
+    CLI::App* app =
+        commands.Verb(noun, name, description, example, [options, run](Context& context) {
+          return run(context, *options);
+        });
+    AddMapName(app, options->map);
+  };
+  verb("show",
+       "Parameters, counts and content digest",
+       "strata map show campus --output json",
+       Show);
+  verb("delete", "Delete a map and its file", "strata map delete campus", Delete);
+  verb("verify",
+       "Check every checksum, count and derived thing; exit 1 on a mismatch",
+       "strata map verify campus",
+       [](Context& context, const MapOptions& o) { return RunJob(context, o.map, "verify", {}); });
+  verb("rebuild",
+       "Make all derived data again from the scans",
+       "strata map rebuild campus",
+       [](Context& context, const MapOptions& o) { return RunJob(context, o.map, "rebuild", {}); });
+  AddMapExport(commands, noun);
+  AddMapRender(commands, noun);
+}
+
+}  // namespace strata::cli

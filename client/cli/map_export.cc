@@ -1,0 +1,148 @@
+// strata map export
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+
+#include "client/cli/arguments.h"
+#include "client/cli/command.h"
+#include "client/cli/json.h"
+#include "client/cli/map_files.h"
+#include "client/cli/picture/map_picture.h"
+#include "client/cli/tile_source.h"
+#include "client/formats/file_bytes.h"
+#include "client/formats/geometry_writer.h"
+#include "core/common/status.h"
+#include "core/mls/surface_mesh.h"
+
+namespace strata::cli {
+namespace {
+
+struct ExportOptions {
+  std::string map;
+  std::string format;
+  std::string out;
+  std::int32_t level = 0;
+};
+
+Colour ColourOf(const Surface& surface) {
+  switch (surface.traversability) {
+    case Traversability::kTraversable:
+      return picture::kTraversableColour;
+    case Traversability::kNonTraversable:
+      return surface.vertical() ? picture::kVerticalColour : picture::kNonTraversableColour;
+    case Traversability::kUnknown:
+      break;
+  }
+  return surface.vertical() ? picture::kVerticalColour : picture::kUnknownColour;
+}
+
+// Vertical segments become lines down to a vertex of their own.
+Geometry GeometryOf(const std::vector<SurfaceTile>& tiles, SurfaceMesh mesh) {
+  Geometry geometry;
+  geometry.vertices = std::move(mesh.vertices);
+  geometry.triangles = std::move(mesh.triangles);
+  geometry.lines = std::move(mesh.lines);
+  for (const SurfaceTile& tile : tiles) {
+    for (const Surface& surface : tile.surfaces) {
+      geometry.colour.push_back(ColourOf(surface));
+    }
+  }
+  for (const auto& [a, b, c, d] : mesh.quads) {
+    geometry.triangles.push_back({a, b, c});
+    geometry.triangles.push_back({a, c, d});
+  }
+  for (const SurfaceMesh::VerticalSegment& segment : mesh.verticals) {
+    Eigen::Vector3d foot = geometry.vertices[segment.vertex];
+    foot.z() = segment.bottom_m;
+    geometry.lines.push_back(
+        {segment.vertex, static_cast<std::uint32_t>(geometry.vertices.size())});
+    geometry.vertices.push_back(foot);
+    geometry.colour.push_back(picture::kVerticalColour);
+  }
+  return geometry;
+}
+
+absl::StatusOr<Geometry> MeshOf(Context& context, const ExportOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const MapInfo info,
+                          context.database.maps().Get(context.call, options.map));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTile> tiles,
+                          FetchTiles(context, options.map, options.level));
+  std::vector<const SurfaceTile*> pointers;
+  for (const SurfaceTile& tile : tiles) {
+    pointers.push_back(&tile);
+  }
+  return GeometryOf(tiles, MakeSurfaceMesh(pointers, info.parameters.mls.cell_size_m));
+}
+
+// Every integrated scan's points at their poses.
+absl::StatusOr<Geometry> PointsOf(Context& context, const ExportOptions& options) {
+  std::vector<ScanInfo> scans;
+  api::ScanFilter filter;
+  filter.state = ScanState::kIntegrated;
+  STRATA_RETURN_IF_ERROR(
+      context.database.scans().List(context.call, options.map, filter, [&](const ScanInfo& info) {
+        scans.push_back(info);
+        return absl::OkStatus();
+      }));
+  Geometry geometry;
+  for (const ScanInfo& scan : scans) {
+    STRATA_RETURN_IF_ERROR(context.database.scans().GetPoints(
+        context.call, options.map, scan.header.id, [&](const PointCloud& chunk) {
+          for (const Eigen::Vector3f& p : chunk.points) {
+            if (std::isfinite(p.x())) {
+              geometry.vertices.emplace_back(scan.T_map_scan * p.cast<double>());
+            }
+          }
+          return absl::OkStatus();
+        }));
+  }
+  return geometry;
+}
+
+absl::Status Export(Context& context, const ExportOptions& options) {
+  const bool points = options.format == "pcd";
+  STRATA_ASSIGN_OR_RETURN(const Geometry geometry,
+                          points ? PointsOf(context, options) : MeshOf(context, options));
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes,
+                          points                    ? PcdBytes(geometry)
+                          : options.format == "ply" ? PlyBytes(geometry)
+                                                    : ObjText(geometry));
+  STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, bytes));
+  context.output.Object({{"file", options.out},
+                         {"format", options.format},
+                         {"vertices", geometry.vertices.size()},
+                         {"triangles", geometry.triangles.size()},
+                         {"lines", geometry.lines.size()},
+                         {"bytes", bytes.size()}});
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddMapExport(Commands& commands, CLI::App* noun) {
+  auto options = std::make_shared<ExportOptions>();
+  CLI::App* app = commands.Verb(noun,
+                                "export",
+                                "Write a map for other programs: its surfaces as a mesh (ply, obj) "
+                                "or the points of its scans (pcd)",
+                                "strata map export campus --format ply --out campus.ply",
+                                [options](Context& context) { return Export(context, *options); });
+  AddMapName(app, options->map);
+  app->add_option("--format", options->format, "ply or obj: surfaces; pcd: points")
+      ->check(CLI::IsMember({"ply", "obj", "pcd"}))
+      ->required();
+  app->add_option("--out", options->out, "The file to write")->required();
+  app->add_option("--level", options->level, "Level of detail of the mesh, 0 = finest")
+      ->check(CLI::Range(0, kMaxLevel))
+      ->capture_default_str();
+}
+
+}  // namespace strata::cli

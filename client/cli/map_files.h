@@ -1,0 +1,14 @@
+// The verbs of `map` that write files.
+#ifndef STRATA_CLIENT_CLI_MAP_FILES_H_
+#define STRATA_CLIENT_CLI_MAP_FILES_H_
+
+#include "client/cli/command.h"
+
+namespace strata::cli {
+
+void AddMapExport(Commands& commands, CLI::App* noun);
+void AddMapRender(Commands& commands, CLI::App* noun);
+
+}  // namespace strata::cli
+
+#endif  // STRATA_CLIENT_CLI_MAP_FILES_H_

@@ -1,0 +1,157 @@
+// strata map render
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_split.h"
+
+#include "client/cli/arguments.h"
+#include "client/cli/command.h"
+#include "client/cli/json.h"
+#include "client/cli/map_files.h"
+#include "client/cli/path_file.h"
+#include "client/cli/picture/map_picture.h"
+#include "client/cli/tile_source.h"
+#include "core/common/status.h"
+
+namespace strata::cli {
+namespace {
+
+struct RenderOptions {
+  std::string map;
+  std::string out;
+  std::vector<std::string> path_files;
+  std::string view = "top";
+  double azimuth_rad = -1.0;
+  double elevation_rad = 0.6;
+  std::optional<int> level;
+  picture::PictureOptions picture;
+};
+
+// The coarsest level whose cells are no larger than a pixel.
+std::int32_t LevelFor(const MapStats& stats,
+                      double cell_size_m,
+                      const picture::PictureOptions& options) {
+  const Eigen::Vector3d size = stats.box_max - stats.box_min;
+  const double metres_per_pixel = std::max(size.x() / options.width, size.y() / options.height);
+  const double ratio = metres_per_pixel / cell_size_m;
+  return ratio < 2.0 ? 0 : std::min(static_cast<int>(std::log2(ratio)), kMaxLevel);
+}
+
+absl::Status Render(Context& context, RenderOptions options) {
+  if (options.view == "oblique") {
+    options.picture.azimuth_rad = options.azimuth_rad;
+    options.picture.elevation_rad = options.elevation_rad;
+  }
+  std::vector<picture::Path> paths;
+  for (const std::string& file : options.path_files) {
+    STRATA_ASSIGN_OR_RETURN(picture::Path path, ReadPath(file));
+    paths.push_back(std::move(path));
+  }
+  STRATA_ASSIGN_OR_RETURN(const MapInfo info,
+                          context.database.maps().Get(context.call, options.map));
+  STRATA_ASSIGN_OR_RETURN(const MapStats stats,
+                          context.database.maps().Stats(context.call, options.map));
+  const double cell = info.parameters.mls.cell_size_m;
+  const std::int32_t level = options.level.value_or(LevelFor(stats, cell, options.picture));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTile> tiles,
+                          FetchTiles(context, options.map, level));
+  const picture::Picture picture =
+      picture::DrawMap(tiles, cell * static_cast<double>(1 << level), paths, options.picture);
+  STRATA_RETURN_IF_ERROR(picture::WritePng(picture.image, options.out));
+  const picture::Camera& camera = picture.camera;
+  context.output.Object({{"file", options.out},
+                         {"view", options.view},
+                         {"width", picture.image.width},
+                         {"height", picture.image.height},
+                         {"legend_height", picture::kLegendPixels},
+                         {"metres_per_pixel", camera.metres_per_pixel},
+                         {"centre", ToJson(camera.centre)},
+                         {"right", ToJson(camera.right)},
+                         {"up", ToJson(camera.up)},
+                         {"level", level},
+                         {"tiles", tiles.size()},
+                         {"paths", paths.size()}});
+  return absl::OkStatus();
+}
+
+void SetSize(const std::string& text, picture::PictureOptions& options) {
+  const std::vector<std::string> parts = absl::StrSplit(text, 'x');
+  constexpr int kLeast = 200;
+  constexpr int kMost = 8000;
+  int width = 0;
+  int height = 0;
+  if (parts.size() != 2 || !absl::SimpleAtoi(parts[0], &width) ||
+      !absl::SimpleAtoi(parts[1], &height) || std::min(width, height) < kLeast ||
+      std::max(width, height) > kMost) {
+    throw CLI::ValidationError("--size",
+                               "expected WIDTHxHEIGHT of 200 to 8000 pixels, got " + text);
+  }
+  options.width = width;
+  options.height = height;
+}
+
+void AddViewOptions(CLI::App* render, const std::shared_ptr<RenderOptions>& options) {
+  render->add_option("--view", options->view, "top, or oblique from above and aside")
+      ->check(CLI::IsMember({"top", "oblique"}))
+      ->capture_default_str();
+  render->add_option("--azimuth", options->azimuth_rad, "Where an oblique view looks from [rad]")
+      ->capture_default_str();
+  render->add_option("--elevation", options->elevation_rad, "Its angle above the ground [rad]")
+      ->check(CLI::Range(0.05, 1.57))
+      ->capture_default_str();
+  render
+      ->add_option_function<std::string>(
+          "--size",
+          [options](const std::string& text) { SetSize(text, options->picture); },
+          "Size of the picture in pixels")
+      ->type_name("WIDTHxHEIGHT")
+      ->default_str("1600x1100");
+  render->add_option("--level", options->level, "Level of detail; default: as fine as the pixels")
+      ->check(CLI::Range(0, kMaxLevel));
+}
+
+}  // namespace
+
+void AddMapRender(Commands& commands, CLI::App* noun) {
+  auto options = std::make_shared<RenderOptions>();
+  CLI::App* render = commands.Verb(
+      noun,
+      "render",
+      "Draw a map: traversable yellow, horizontal but not traversable red, vertical blue",
+      "strata map render campus campus.png --view oblique --path route.ply",
+      [options](Context& context) { return Render(context, *options); });
+  AddMapName(render, options->map);
+  render->add_option("OUT", options->out, "The PNG file to write")->required();
+  AddNumbers(
+      render,
+      "--slice",
+      "Z0,Z1",
+      2,
+      2,
+      [options](const std::vector<double>& n) {
+        if (n[0] >= n[1]) {
+          throw CLI::ValidationError("--slice", "expected Z0 < Z1");
+        }
+        options->picture.slice_m = {n[0], n[1]};
+      },
+      "Only what lies between these heights [m]");
+  render
+      ->add_option(
+          "--path", options->path_files, "PLY file of a path to draw; may be given several times")
+      ->type_name("FILE.ply")
+      ->expected(1)
+      ->take_all();
+  AddViewOptions(render, options);
+}
+
+}  // namespace strata::cli

@@ -1,0 +1,242 @@
+#include "client/cli/picture/map_picture.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include <Eigen/Geometry>
+
+namespace strata::picture {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr Colour kBackground = {250, 250, 247};
+constexpr Colour kInk = {40, 42, 46};
+constexpr std::array<Colour, 4> kPathColours = {
+    {{16, 24, 32}, {0, 150, 90}, {200, 0, 170}, {0, 160, 200}}};
+constexpr double kPathWidthPixels = 4.0;
+
+// A surface cut to the slice, in map coordinates.
+struct Block {
+  double x = 0.0, y = 0.0;  // lower left corner of the cell
+  double top = 0.0, bottom = 0.0;
+  bool vertical = false;
+  bool cut = false;  // the top is where the slice ends
+  Traversability traversability = Traversability::kUnknown;
+};
+
+std::vector<Block> BlocksOf(const std::vector<SurfaceTile>& tiles,
+                            double cell,
+                            const PictureOptions& options) {
+  const auto [low, high] = options.slice_m.value_or(std::make_pair(-1e9, 1e9));
+  std::vector<Block> blocks;
+  for (const SurfaceTile& tile : tiles) {
+    for (const Surface& surface : tile.surfaces) {
+      if (surface.z_m < low || surface.bottom_m() > high ||
+          (!surface.vertical() && surface.z_m > high)) {
+        continue;
+      }
+      const CellIndex index = CellOf(tile.key, surface.cell);
+      blocks.push_back({.x = index.x * cell,
+                        .y = index.y * cell,
+                        .top = std::min<double>(surface.z_m, high),
+                        .bottom = std::max<double>(surface.bottom_m(), low),
+                        .vertical = surface.vertical(),
+                        .cut = surface.z_m > high,
+                        .traversability = surface.traversability});
+    }
+  }
+  return blocks;
+}
+
+// The values between which all but `share` of the numbers lie at either end; all of them if the
+// strays are not far out.
+std::pair<double, double> Bulk(std::vector<double> values, double share) {
+  if (values.empty()) {
+    return {-1.0, 1.0};
+  }
+  std::sort(values.begin(), values.end());
+  const auto skip = static_cast<std::size_t>(share * static_cast<double>(values.size()));
+  const double low = values[skip];
+  const double high = values[values.size() - 1 - skip];
+  if (values.back() - values.front() < 1.25 * (high - low)) {
+    return {values.front(), values.back()};
+  }
+  return {low, high};
+}
+
+Camera Frame(const std::vector<Block>& blocks, double cell, const PictureOptions& options) {
+  Camera camera = Camera::From(options.azimuth_rad, options.elevation_rad);
+  camera.metres_per_pixel = 1.0;
+  constexpr double kStrays = 0.001;
+  std::array<std::vector<double>, 3> projected;
+  for (const Block& block : blocks) {
+    const Vector3d p(block.x + 0.5 * cell, block.y + 0.5 * cell, block.top);
+    projected[0].push_back(camera.right.dot(p));
+    projected[1].push_back(camera.up.dot(p));
+    projected[2].push_back(camera.forward.dot(p));
+  }
+  const auto [left, right] = Bulk(std::move(projected[0]), kStrays);
+  const auto [down, up] = Bulk(std::move(projected[1]), kStrays);
+  const auto [near, far] = Bulk(std::move(projected[2]), kStrays);
+  camera.centre = 0.5 * ((left + right) * camera.right + (down + up) * camera.up +
+                         (near + far) * camera.forward);
+  constexpr double kMargin = 1.04;
+  const int height = options.height - kLegendPixels;
+  camera.metres_per_pixel = kMargin * std::max({(right - left + 2.0 * cell) / options.width,
+                                                (up - down + 2.0 * cell) / height,
+                                                1e-4});
+  return camera;
+}
+
+Colour Lit(Colour colour, double factor) {
+  return factor <= 1.0 ? Blend({0, 0, 0}, colour, factor)
+                       : Blend(colour, {255, 255, 255}, std::min(factor - 1.0, 1.0));
+}
+
+Colour TopColour(const Block& block) {
+  if (block.cut) {
+    return kVerticalColour;
+  }
+  switch (block.traversability) {
+    case Traversability::kTraversable:
+      return kTraversableColour;
+    case Traversability::kNonTraversable:
+      return block.vertical ? kVerticalColour : kNonTraversableColour;
+    case Traversability::kUnknown:
+      break;
+  }
+  return block.vertical ? kVerticalColour : kUnknownColour;
+}
+
+// Draws cells as boxes: the top, and the two sides that face the viewer.
+class BlockPainter {
+ public:
+  BlockPainter(Raster& raster, const Camera& camera, double cell, std::pair<double, double> heights)
+      : raster_(raster), camera_(camera), cell_(cell), heights_(heights) {}
+
+  void Paint(const Block& block) {
+    const double x0 = block.x;
+    const double y0 = block.y;
+    const double x1 = x0 + cell_;
+    const double y1 = y0 + cell_;
+    const double top = block.top;
+    const Colour colour = TopColour(block);
+    const double light = Light(top);
+    raster_.FillQuad({{{x0, y0, top}, {x1, y0, top}, {x1, y1, top}, {x0, y1, top}}},
+                     Lit(colour, light));
+    // A horizontal patch gets sides too, so that slopes have no cracks.
+    const double bottom = block.vertical ? block.bottom : top - 0.6 * cell_;
+    const Colour side = block.vertical ? kVerticalColour : colour;
+    const double x = camera_.forward.x() < 0.0 ? x1 : x0;
+    const double y = camera_.forward.y() < 0.0 ? y1 : y0;
+    PaintSide({x, y0, 0.0}, {x, y1, 0.0}, bottom, top, block.vertical, Lit(side, 0.92), light);
+    PaintSide({x0, y, 0.0}, {x1, y, 0.0}, bottom, top, block.vertical, Lit(side, 0.78), light);
+  }
+
+ private:
+  double Light(double z) const {
+    const double share = (z - heights_.first) / std::max(heights_.second - heights_.first, 0.5);
+    return 0.86 + 0.3 * std::clamp(share, 0.0, 1.0);
+  }
+
+  // Tall sides get lighter with height in pieces of a metre.
+  void PaintSide(Vector3d a,
+                 Vector3d b,
+                 double bottom,
+                 double top,
+                 bool vertical,
+                 Colour colour,
+                 double light) {
+    const int pieces = vertical ? std::clamp(static_cast<int>(top - bottom), 1, 64) : 1;
+    for (int piece = 0; piece < pieces; ++piece) {
+      const double low = bottom + (top - bottom) * piece / pieces;
+      const double high = bottom + (top - bottom) * (piece + 1) / pieces;
+      const double factor = vertical ? Light(0.5 * (low + high)) : light;
+      raster_.FillQuad(
+          {{{a.x(), a.y(), low}, {b.x(), b.y(), low}, {b.x(), b.y(), high}, {a.x(), a.y(), high}}},
+          Lit(colour, factor));
+    }
+  }
+
+  Raster& raster_;
+  const Camera& camera_;
+  double cell_;
+  std::pair<double, double> heights_;
+};
+
+// The longest 1, 2 or 5 · 10^n metres within `limit_m`.
+double RoundLength(double limit_m) {
+  const double power = std::pow(10.0, std::floor(std::log10(limit_m)));
+  for (const double digit : {5.0, 2.0}) {
+    if (digit * power <= limit_m) {
+      return digit * power;
+    }
+  }
+  return power;
+}
+
+void DrawLegend(Image& image, const Camera& camera) {
+  constexpr int kScale = 2;
+  constexpr int kText = 7 * kScale;
+  const int y = image.height - kLegendPixels + (kLegendPixels - kText) / 2;
+  int x = 20;
+  const std::array<std::pair<Colour, const char*>, 4> entries = {
+      {{kTraversableColour, "traversable"},
+       {kNonTraversableColour, "not traversable"},
+       {kVerticalColour, "vertical"},
+       {kUnknownColour, "unknown"}}};
+  for (const auto& [colour, text] : entries) {
+    FillRectangle(image, x, y - 2, 18, 18, colour);
+    x = DrawText(image, x + 26, y, kScale, text, kInk) + 26;
+  }
+  const double length = RoundLength(0.2 * image.width * camera.metres_per_pixel);
+  const int pixels = static_cast<int>(std::lround(length / camera.metres_per_pixel));
+  const std::string label = absl::StrCat(length, " m");
+  const int text_width = static_cast<int>(label.size()) * 6 * kScale;
+  const int bar = image.width - 24 - text_width - 12 - pixels;
+  FillRectangle(image, bar, y + kText / 2 - 1, pixels, 3, kInk);
+  FillRectangle(image, bar, y, 3, kText, kInk);
+  FillRectangle(image, bar + pixels - 3, y, 3, kText, kInk);
+  DrawText(image, bar + pixels + 12, y, kScale, label, kInk);
+}
+
+}  // namespace
+
+Picture DrawMap(const std::vector<SurfaceTile>& tiles,
+                double cell_size_m,
+                const std::vector<Path>& paths,
+                const PictureOptions& options) {
+  const std::vector<Block> blocks = BlocksOf(tiles, cell_size_m, options);
+  Picture picture;
+  picture.camera = Frame(blocks, cell_size_m, options);
+  std::vector<double> heights;
+  heights.reserve(blocks.size());
+  for (const Block& block : blocks) {
+    heights.push_back(block.top);
+  }
+  Raster raster(options.width, options.height - kLegendPixels, picture.camera, kBackground);
+  BlockPainter painter(raster, picture.camera, cell_size_m, Bulk(std::move(heights), 0.02));
+  for (const Block& block : blocks) {
+    painter.Paint(block);
+  }
+  raster.ShadeByDepth(2.2);
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    raster.DrawLine(paths[i],
+                    kPathWidthPixels,
+                    kPathColours[i % kPathColours.size()],
+                    std::max(0.4, 2.0 * cell_size_m));
+  }
+  const Image map = raster.Finish();
+  picture.image = Image(options.width, options.height, kBackground);
+  std::copy(map.pixels.begin(), map.pixels.end(), picture.image.pixels.begin());
+  DrawLegend(picture.image, picture.camera);
+  return picture;
+}
+
+}  // namespace strata::picture

@@ -1,0 +1,54 @@
+// Maps as pictures, in the colours of the thesis (Fig. 6.6): traversable yellow, horizontal but not
+// traversable red, vertical blue; surfaces that nobody judged are grey.
+#ifndef STRATA_CLIENT_CLI_PICTURE_MAP_PICTURE_H_
+#define STRATA_CLIENT_CLI_PICTURE_MAP_PICTURE_H_
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "client/cli/picture/image.h"
+#include "client/cli/picture/raster.h"
+#include "core/mls/surface_tile.h"
+
+namespace strata::picture {
+
+inline constexpr Colour kTraversableColour = {255, 214, 48};
+inline constexpr Colour kNonTraversableColour = {222, 62, 50};
+inline constexpr Colour kVerticalColour = {62, 104, 214};
+inline constexpr Colour kUnknownColour = {176, 176, 172};
+// Pixels at the lower edge that belong to the legend.
+inline constexpr int kLegendPixels = 44;
+
+// A path and its name in the legend.
+using Path = std::vector<Eigen::Vector3d>;
+
+struct PictureOptions {
+  int width = 1600;
+  int height = 1100;
+  // Where the viewer stands (see Camera::From); the default is the plan.
+  double azimuth_rad = -1.5707963267948966;
+  double elevation_rad = 1.5707963267948966;
+  // Only what lies between these heights; vertical patches are cut.
+  std::optional<std::pair<double, double>> slice_m = std::nullopt;
+};
+
+struct Picture {
+  Image image;
+  Camera camera;  // the map's point `centre` is in the middle of the part above the legend
+};
+
+// Tiles are of one level of detail with cells of `cell_size_m`. The view holds all surfaces but a
+// few stray ones. Without surfaces it shows a metre around the origin.
+//   A traversable top is yellow even on a vertical patch (a deck seen from both sides); the sides
+//   are blue then. Higher surfaces are lighter.
+Picture DrawMap(const std::vector<SurfaceTile>& tiles,
+                double cell_size_m,
+                const std::vector<Path>& paths,
+                const PictureOptions& options);
+
+}  // namespace strata::picture
+
+#endif  // STRATA_CLIENT_CLI_PICTURE_MAP_PICTURE_H_

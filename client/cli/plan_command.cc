@@ -1,0 +1,176 @@
+// strata plan
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+#include "client/cli/arguments.h"
+#include "client/cli/command.h"
+#include "client/cli/json.h"
+#include "client/cli/number_file.h"
+#include "client/cli/path_file.h"
+#include "core/common/status.h"
+
+namespace strata::cli {
+namespace {
+
+struct PlanOptions {
+  std::string map;
+  PlanQuery query;
+  std::optional<int> from_level, to_level;
+  std::string queries_file;
+  std::string profile = std::string(api::kDefaultProfile);
+  ProfileOverrides overrides;
+  std::string out;
+};
+
+absl::StatusOr<RobotProfile> ProfileOf(Context& context, const PlanOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const auto profiles,
+                          context.database.planning().ListProfiles(context.call, options.map));
+  const auto profile = profiles.find(options.profile);
+  if (profile == profiles.end()) {
+    return absl::NotFoundError(absl::StrCat("map ", options.map, ": no profile ", options.profile));
+  }
+  return options.overrides.Over(profile->second);
+}
+
+void PrintText(const PlanResult& plan, Output& output) {
+  if (!plan.found()) {
+    output.Text(absl::StrCat("no path: ",
+                             plan.message.empty() ? absl::string_view(strata::ToString(plan.reason))
+                                                  : absl::string_view(plan.message)));
+    return;
+  }
+  output.Text(absl::StrFormat("path of %.2f m, cost %.2f, %d waypoints (%.1f ms, %d expanded)",
+                              plan.length_m,
+                              plan.cost,
+                              plan.waypoints.size(),
+                              plan.elapsed_ms,
+                              plan.expanded));
+  for (const Eigen::Vector3d& p : plan.waypoints) {
+    output.Text(absl::StrFormat("  %.3f  %.3f  %.3f", p.x(), p.y(), p.z()));
+  }
+  for (const PlanGap& gap : plan.gaps) {
+    output.Text(absl::StrFormat("  unobserved for %.2f m from %.2f, %.2f, %.2f",
+                                gap.length_m,
+                                gap.from.x(),
+                                gap.from.y(),
+                                gap.from.z()));
+  }
+}
+
+absl::Status PlanOne(Context& context, PlanOptions options) {
+  STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options));
+  options.query.from.level = options.from_level;
+  options.query.to.level = options.to_level;
+  STRATA_ASSIGN_OR_RETURN(
+      const PlanResult plan,
+      context.database.planning().PlanPath(context.call, options.map, options.query));
+  if (!options.out.empty() && plan.found()) {
+    STRATA_RETURN_IF_ERROR(WritePath(options.out, plan.waypoints));
+    context.output.Talk(absl::StrCat("wrote ", options.out));
+  }
+  if (context.output.json()) {
+    context.output.Object(ToJson(plan));
+  } else {
+    PrintText(plan, context.output);
+  }
+  return absl::OkStatus();
+}
+
+// A JSON line for each query; one that is refused has "error" instead and the rest goes on.
+absl::Status PlanMany(Context& context, PlanOptions options) {
+  STRATA_ASSIGN_OR_RETURN(const auto rows, ReadNumberFile(options.queries_file, 6, 6));
+  STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options));
+  absl::Status first_error;
+  for (const std::vector<double>& row : rows) {
+    options.query.from = {.x_m = row[0], .y_m = row[1], .z_m = row[2], .level = {}};
+    options.query.to = {.x_m = row[3], .y_m = row[4], .z_m = row[5], .level = {}};
+    const auto plan =
+        context.database.planning().PlanPath(context.call, options.map, options.query);
+    if (!plan.ok()) {
+      first_error.Update(plan.status());
+      context.output.JsonLine({{"error", std::string(plan.status().message())}});
+      if (context.call.stop.requested() || absl::IsUnavailable(plan.status())) {
+        break;
+      }
+      continue;
+    }
+    context.output.JsonLine(ToJson(*plan));
+  }
+  return first_error;
+}
+
+PlanEndpoint EndpointOf(const std::vector<double>& numbers) {
+  PlanEndpoint endpoint{.x_m = numbers[0], .y_m = numbers[1], .z_m = {}, .level = {}};
+  if (numbers.size() == 3) {
+    endpoint.z_m = numbers[2];
+  }
+  return endpoint;
+}
+
+void AddEndpoints(CLI::App* verb, const std::shared_ptr<PlanOptions>& options) {
+  CLI::Option* from = AddNumbers(
+      verb,
+      "--from",
+      "X,Y[,Z]",
+      2,
+      3,
+      [options](const std::vector<double>& n) { options->query.from = EndpointOf(n); },
+      "Start [m]; the surface nearest to Z, without Z the lowest");
+  CLI::Option* to = AddNumbers(
+      verb,
+      "--to",
+      "X,Y[,Z]",
+      2,
+      3,
+      [options](const std::vector<double>& n) { options->query.to = EndpointOf(n); },
+      "Goal [m]");
+  from->needs(to);
+  to->needs(from);
+  verb->add_option("--from-level", options->from_level, "Start on this surface, 0 = lowest")
+      ->needs(from)
+      ->check(CLI::NonNegativeNumber);
+  verb->add_option("--to-level", options->to_level, "End on this surface, 0 = lowest")
+      ->needs(to)
+      ->check(CLI::NonNegativeNumber);
+  verb->add_option("--queries", options->queries_file, "File with X,Y,Z,X,Y,Z on each line")
+      ->excludes(from)
+      ->excludes(to);
+}
+
+}  // namespace
+
+void AddPlanCommand(Commands& commands) {
+  auto options = std::make_shared<PlanOptions>();
+  CLI::App* verb =
+      commands.Verb(&commands.root,
+                    "plan",
+                    "A path for a robot, or the reason why there is none",
+                    "strata plan campus --from -14,0,0 --to 20,5,0 --radius 0.4 --out path.ply",
+                    [options](Context& context) {
+                      return options->queries_file.empty() ? PlanOne(context, *options)
+                                                           : PlanMany(context, *options);
+                    });
+  AddMapName(verb, options->map);
+  AddEndpoints(verb, options);
+  verb->add_option("--profile", options->profile, "The map's robot profile to start from")
+      ->capture_default_str();
+  AddProfileOptions(verb, options->overrides);
+  verb->add_option("--max-expanded", options->query.max_expanded, "Search limit")
+      ->capture_default_str();
+  verb->add_option("--out", options->out, "Write the path as a PLY polyline");
+  verb->parse_complete_callback([verb] {
+    if (verb->count("--from") == 0 && verb->count("--queries") == 0) {
+      throw CLI::RequiredError("--from and --to, or --queries");
+    }
+  });
+}
+
+}  // namespace strata::cli

@@ -1,0 +1,144 @@
+// strata pose list|export|set
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include <Eigen/Geometry>
+
+#include "client/cli/arguments.h"
+#include "client/cli/command.h"
+#include "client/cli/json.h"
+#include "client/formats/file_bytes.h"
+#include "client/formats/pose_writer.h"
+#include "core/common/status.h"
+
+namespace strata::cli {
+namespace {
+
+struct PoseOptions {
+  std::string map;
+  std::string trajectory;
+  std::string format = "tum";
+  std::string which = "current";
+  std::string out;
+  ScanId id;
+  Pose T_map_scan = Pose::Identity();
+};
+
+absl::StatusOr<std::vector<PoseNode>> Nodes(Context& context, const PoseOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(api::PoseGraphState state,
+                          context.database.posegraph().Get(context.call, options.map));
+  if (!options.trajectory.empty()) {
+    std::erase_if(state.nodes,
+                  [&](const PoseNode& node) { return node.id.trajectory != options.trajectory; });
+  }
+  return std::move(state.nodes);
+}
+
+absl::Status List(Context& context, const PoseOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<PoseNode> nodes, Nodes(context, options));
+  Json rows = Json::array();
+  for (const PoseNode& node : nodes) {
+    rows.push_back(ToJson(node));
+  }
+  context.output.List(rows,
+                      {{"id", "ID"},
+                       {"state", "STATE"},
+                       {"time_s", "TIME"},
+                       {"correction_m", "CORRECTION"},
+                       {"correction_rad", "TURN"},
+                       {"pose", "X, Y, Z, QX, QY, QZ, QW"}});
+  return absl::OkStatus();
+}
+
+absl::Status Export(Context& context, const PoseOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(std::vector<PoseNode> nodes, Nodes(context, options));
+  std::sort(nodes.begin(), nodes.end(), [](const PoseNode& a, const PoseNode& b) {
+    return std::tie(a.time, a.id) < std::tie(b.time, b.id);
+  });
+  std::vector<TimedPose> poses;
+  for (const PoseNode& node : nodes) {
+    poses.push_back(
+        {node.time, options.which == "current" ? node.T_map_scan : node.T_map_scan_uploaded});
+  }
+  STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, TumText(poses)));
+  context.output.Object({{"file", options.out}, {"which", options.which}, {"poses", nodes.size()}});
+  return absl::OkStatus();
+}
+
+absl::Status Set(Context& context, const PoseOptions& options) {
+  STRATA_RETURN_IF_ERROR(context.database.posegraph().SetPose(
+      context.call, options.map, options.id, options.T_map_scan));
+  context.output.Object({{"id", options.id.ToString()}, {"pose", ToJson(options.T_map_scan)}});
+  return absl::OkStatus();
+}
+
+// X,Y,Z keeps the axes of the map; seven numbers bring a quaternion, which is normalised.
+void SetPoseOption(const std::vector<double>& n, Pose& T_map_scan) {
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  if (n.size() == 7) {
+    rotation = Eigen::Quaterniond(n[6], n[3], n[4], n[5]);
+    if (rotation.norm() < 1e-6) {
+      throw CLI::ValidationError("--pose", "the quaternion is zero");
+    }
+    rotation.normalize();
+  } else if (n.size() != 3) {
+    throw CLI::ValidationError("--pose", "expected 3 or 7 numbers");
+  }
+  T_map_scan = MakePose(rotation, {n[0], n[1], n[2]});
+}
+
+void AddExport(Commands& commands, CLI::App* noun, const std::shared_ptr<PoseOptions>& options) {
+  CLI::App* app =
+      commands.Verb(noun,
+                    "export",
+                    "Write poses of the scans in the map, by time",
+                    "strata pose export campus --format tum --which current --out poses.txt",
+                    [options](Context& context) { return Export(context, *options); });
+  AddMapName(app, options->map);
+  app->add_option("--format", options->format, "tum: time x y z qx qy qz qw")
+      ->check(CLI::IsMember({"tum"}))
+      ->capture_default_str();
+  app->add_option("--which", options->which, "uploaded, or those of the current epoch")
+      ->check(CLI::IsMember({"uploaded", "current"}))
+      ->capture_default_str();
+  app->add_option("--trajectory", options->trajectory, "Only this trajectory");
+  app->add_option("--out", options->out, "The file to write")->required();
+}
+
+}  // namespace
+
+void AddPoseCommands(Commands& commands) {
+  auto options = std::make_shared<PoseOptions>();
+  CLI::App* noun = commands.Noun("pose", "Where scans are in the map");
+  CLI::App* list = commands.Verb(noun,
+                                 "list",
+                                 "Poses of all scans and how far they are from the uploaded ones",
+                                 "strata pose list campus --trajectory segway",
+                                 [options](Context& context) { return List(context, *options); });
+  AddMapName(list, options->map);
+  list->add_option("--trajectory", options->trajectory, "Only this trajectory");
+  AddExport(commands, noun, options);
+  CLI::App* set = commands.Verb(noun,
+                                "set",
+                                "Move a scan by hand",
+                                "strata pose set campus segway/12 --pose 3.5,-1,0,0,0,0,1",
+                                [options](Context& context) { return Set(context, *options); });
+  AddMapName(set, options->map);
+  AddScanId(set, options->id);
+  AddNumbers(
+      set,
+      "--pose",
+      "X,Y,Z[,QX,QY,QZ,QW]",
+      3,
+      7,
+      [options](const std::vector<double>& n) { SetPoseOption(n, options->T_map_scan); },
+      "Where the scan's frame is in the map [m]")
+      ->required();
+}
+
+}  // namespace strata::cli

@@ -1,0 +1,166 @@
+// strata scan list|show|export|delete; import has files of its own.
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+
+#include "client/cli/arguments.h"
+#include "client/cli/command.h"
+#include "client/cli/json.h"
+#include "client/cli/scan_import.h"
+#include "client/formats/file_bytes.h"
+#include "client/formats/geometry_writer.h"
+#include "core/common/status.h"
+
+namespace strata::cli {
+namespace {
+
+struct ScanOptions {
+  std::string map;
+  ScanId id;
+  api::ScanFilter filter;
+  std::string format = "pcd";
+  std::string frame = "scan";
+  std::string out;
+};
+
+absl::Status List(Context& context, const ScanOptions& options) {
+  Json rows = Json::array();
+  STRATA_RETURN_IF_ERROR(context.database.scans().List(
+      context.call, options.map, options.filter, [&](const ScanInfo& info) {
+        rows.push_back(ToJson(info));
+        return absl::OkStatus();
+      }));
+  context.output.List(rows,
+                      {{"id", "ID"},
+                       {"state", "STATE"},
+                       {"points", "POINTS"},
+                       {"point_bytes", "BYTES"},
+                       {"time", "TIME"},
+                       {"message", "MESSAGE"}});
+  return absl::OkStatus();
+}
+
+absl::Status Show(Context& context, const ScanOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const ScanInfo info,
+                          context.database.scans().Get(context.call, options.map, options.id));
+  context.output.Object(ToJson(info));
+  return absl::OkStatus();
+}
+
+// The points with their columns; a grid is not kept, since no writer of ours has one.
+absl::Status Export(Context& context, const ScanOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const ScanInfo info,
+                          context.database.scans().Get(context.call, options.map, options.id));
+  Geometry all;
+  STRATA_RETURN_IF_ERROR(context.database.scans().GetPoints(
+      context.call, options.map, options.id, [&](const PointCloud& chunk) {
+        const Geometry piece = GeometryOf(chunk);
+        const auto append = [](auto& to, const auto& from) {
+          to.insert(to.end(), from.begin(), from.end());
+        };
+        append(all.vertices, piece.vertices);
+        append(all.colour, piece.colour);
+        append(all.intensity, piece.intensity);
+        append(all.label, piece.label);
+        return absl::OkStatus();
+      }));
+  if (options.frame == "map") {
+    for (Eigen::Vector3d& p : all.vertices) {
+      p = info.T_map_scan * p;
+    }
+  }
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes,
+                          options.format == "pcd" ? PcdBytes(all) : PlyBytes(all));
+  STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, bytes));
+  context.output.Object({{"file", options.out},
+                         {"id", options.id.ToString()},
+                         {"frame", options.frame},
+                         {"points", all.vertices.size()},
+                         {"bytes", bytes.size()}});
+  return absl::OkStatus();
+}
+
+absl::Status Delete(Context& context, const ScanOptions& options) {
+  STRATA_RETURN_IF_ERROR(context.database.scans().Delete(context.call, options.map, options.id));
+  context.output.Object({{"deleted", options.id.ToString()}});
+  return absl::OkStatus();
+}
+
+void AddList(Commands& commands, CLI::App* noun, const std::shared_ptr<ScanOptions>& options) {
+  CLI::App* list = commands.Verb(noun,
+                                 "list",
+                                 "Scans of a map in the order in which they were committed",
+                                 "strata scan list campus --trajectory segway --state failed",
+                                 [options](Context& context) { return List(context, *options); });
+  AddMapName(list, options->map);
+  list->add_option("--trajectory", options->filter.trajectory, "Only this trajectory");
+  list->add_option_function<std::string>(
+          "--state",
+          [options](const std::string& text) {
+            options->filter.state = text == "pending"      ? ScanState::kPending
+                                    : text == "integrated" ? ScanState::kIntegrated
+                                                           : ScanState::kFailed;
+          },
+          "Only scans in this state")
+      ->check(CLI::IsMember({"pending", "integrated", "failed"}));
+  AddNumbers(
+      list,
+      "--box",
+      "X0,Y0,X1,Y1",
+      4,
+      4,
+      [options](const std::vector<double>& n) {
+        options->filter.box =
+            Eigen::AlignedBox2d(Eigen::Vector2d(n[0], n[1]), Eigen::Vector2d(n[2], n[3]));
+      },
+      "Only scans whose points reach into this box [m]");
+}
+
+void AddExport(Commands& commands, CLI::App* noun, const std::shared_ptr<ScanOptions>& options) {
+  CLI::App* app = commands.Verb(noun,
+                                "export",
+                                "Write the points of a scan as they were uploaded",
+                                "strata scan export campus segway/12 --format pcd --out scan.pcd",
+                                [options](Context& context) { return Export(context, *options); });
+  AddMapName(app, options->map);
+  AddScanId(app, options->id);
+  app->add_option("--format", options->format, "pcd or ply")
+      ->check(CLI::IsMember({"pcd", "ply"}))
+      ->capture_default_str();
+  app->add_option("--frame", options->frame, "scan: as uploaded; map: at its current pose")
+      ->check(CLI::IsMember({"scan", "map"}))
+      ->capture_default_str();
+  app->add_option("--out", options->out, "The file to write")->required();
+}
+
+}  // namespace
+
+void AddScanCommands(Commands& commands) {
+  auto options = std::make_shared<ScanOptions>();
+  CLI::App* noun = commands.Noun("scan", "Uploads of robots");
+  AddScanImport(commands, noun);
+  AddList(commands, noun, options);
+  const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
+    CLI::App* app =
+        commands.Verb(noun, name, description, example, [options, run](Context& context) {
+          return run(context, *options);
+        });
+    AddMapName(app, options->map);
+    AddScanId(app, options->id);
+  };
+  verb("show",
+       "One scan, its state and how it was aligned",
+       "strata scan show campus segway/12",
+       Show);
+  AddExport(commands, noun, options);
+  verb("delete",
+       "Take a scan and its contribution out of the map",
+       "strata scan delete campus segway/12",
+       Delete);
+}
+
+}  // namespace strata::cli

@@ -1,0 +1,50 @@
+// Uploads many scans, several at once, and commits them in their order.
+#ifndef STRATA_CLIENT_CLI_SCAN_UPLOADER_H_
+#define STRATA_CLIENT_CLI_SCAN_UPLOADER_H_
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/api/database.h"
+#include "core/cloud/point_cloud.h"
+#include "core/world/scan.h"
+
+namespace strata::cli {
+
+// A scan to upload. `header` has id, time, alignment and the pose of the points as `read` returns
+// them; what depends on the points is filled in by the uploader.
+struct UploadSource {
+  std::string file;
+  ScanHeader header;
+  std::function<absl::StatusOr<PointCloud>()> read;
+};
+
+struct UploadResult {
+  absl::Status status;  // of reading and uploading
+  std::uint64_t points = 0;
+};
+
+struct UploadProgress {
+  std::uint64_t scans = 0;  // done, with or without success
+  std::uint64_t points = 0;
+};
+
+// One result a source, in the same order. Scans are read and sent by `workers` threads but finished
+// one after the other, so that their commit order, and with it what alignment makes of them, is
+// that of the sources. A busy or unreachable server is tried again for a minute without progress;
+// after that the rest fails at once. `report` is called some ten times a second on this thread.
+std::vector<UploadResult> UploadScans(api::Database& database,
+                                      const api::Call& call,
+                                      const std::string& map,
+                                      const std::vector<UploadSource>& sources,
+                                      int workers,
+                                      const std::function<void(const UploadProgress&)>& report);
+
+}  // namespace strata::cli
+
+#endif  // STRATA_CLIENT_CLI_SCAN_UPLOADER_H_

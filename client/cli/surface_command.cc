@@ -1,0 +1,91 @@
+// strata surface
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include <Eigen/Core>
+
+#include "client/cli/arguments.h"
+#include "client/cli/command.h"
+#include "client/cli/json.h"
+#include "client/cli/number_file.h"
+#include "core/common/status.h"
+
+namespace strata::cli {
+namespace {
+
+struct SurfaceOptions {
+  std::string map;
+  std::vector<Eigen::Vector2d> at;
+  std::string points_file;
+};
+
+void Print(const SurfaceColumn& column, Output& output) {
+  Json json = ToJson(column);
+  if (output.json()) {
+    output.JsonLine(json);
+    return;
+  }
+  for (Json& surface : json["surfaces"]) {
+    surface["x"] = column.x_m;
+    surface["y"] = column.y_m;
+  }
+  output.List(json["surfaces"],
+              {{"x", "X"},
+               {"y", "Y"},
+               {"level", "LEVEL"},
+               {"z", "Z"},
+               {"sigma_m", "SIGMA"},
+               {"depth_m", "DEPTH"},
+               {"traversability", "TRAVERSABILITY"},
+               {"class", "CLASS"},
+               {"cost", "COST"}});
+}
+
+absl::Status Run(Context& context, const SurfaceOptions& options) {
+  std::vector<Eigen::Vector2d> places = options.at;
+  if (!options.points_file.empty()) {
+    STRATA_ASSIGN_OR_RETURN(const auto rows, ReadNumberFile(options.points_file, 2, 3));
+    for (const std::vector<double>& row : rows) {
+      places.emplace_back(row[0], row[1]);
+    }
+  }
+  STRATA_ASSIGN_OR_RETURN(
+      const std::vector<SurfaceColumn> columns,
+      context.database.planning().SampleSurfaces(context.call, options.map, places));
+  for (const SurfaceColumn& column : columns) {
+    Print(column, context.output);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddSurfaceCommand(Commands& commands) {
+  auto options = std::make_shared<SurfaceOptions>();
+  CLI::App* verb =
+      commands.Verb(&commands.root,
+                    "surface",
+                    "All surfaces at a place, lowest first: height, sigma, class, cost",
+                    "strata surface campus --at -14.2,3.5",
+                    [options](Context& context) { return Run(context, *options); });
+  AddMapName(verb, options->map);
+  CLI::Option_group* where = verb->add_option_group("where");
+  AddNumbers(
+      where,
+      "--at",
+      "X,Y",
+      2,
+      2,
+      [options](const std::vector<double>& n) {
+        options->at = {{n[0], n[1]}};
+      },
+      "The place [m]");
+  where->add_option("--points", options->points_file, "File with a place X,Y on each line");
+  where->require_option(1);
+}
+
+}  // namespace strata::cli

@@ -1,0 +1,81 @@
+// Collects the points of a file, whatever its fields are called, and makes a PointCloud of them.
+#ifndef STRATA_CLIENT_FORMATS_CLOUD_BUILDER_H_
+#define STRATA_CLIENT_FORMATS_CLOUD_BUILDER_H_
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include <Eigen/Core>
+
+#include "core/cloud/point_cloud.h"
+
+namespace strata {
+
+// What a field of a point means to us.
+enum class Meaning : std::uint8_t {
+  kX,
+  kY,
+  kZ,
+  kIntensity,
+  kRed,
+  kGreen,
+  kBlue,
+  kPackedColour,  // 0x00RRGGBB, as the number or as the bits of a float
+  kLabel,
+  kIgnored,
+};
+inline constexpr std::size_t kMeanings = 10;
+
+// By the names in use, whatever their case: x, intensity, reflectance, scalar_intensity, red, r,
+// rgb, label, class, classification, ….
+Meaning MeaningOf(absl::string_view field_name);
+
+class CloudBuilder {
+ public:
+  // `meanings`: of each field of a point, in order. INVALID_ARGUMENT naming what is missing of x, y
+  // and z.
+  static absl::StatusOr<CloudBuilder> Create(std::vector<Meaning> meanings);
+
+  void Reserve(std::size_t points);
+  // The values of the fields; a packed colour as its 24 bits. REQUIRES: one for each meaning.
+  void Add(const double* values);
+
+  void SetGrid(std::uint32_t rows, std::uint32_t columns);
+  // Where the file says the sensor stood, in the file's coordinates; zero stands for not saying.
+  void SetSensorOrigin(const Eigen::Vector3d& position) { sensor_origin_ = position; }
+
+  // The cloud. Without a grid points that are not finite are left out; in one they become NaN.
+  // Along an axis where all points lie on one side of zero and their middle beyond 1000 m, `origin`
+  // is that middle rounded to 100 m: floats inside are then as fine as those of a local cloud, and
+  // the difference to a float of the file is exact. `sensor_origin` is what was set; else the zero
+  // of the file's coordinates, or, with an origin, the origin itself (nobody knows then). Colours
+  // come in 0–255, 0–65535 or, with fractions, 0–1, and are scaled to 8 bits; labels outside
+  // 0–65535 become 0. INVALID_ARGUMENT without any finite point, or as ValidateCloud.
+  absl::StatusOr<PointCloud> Build() &&;
+
+ private:
+  explicit CloudBuilder(std::vector<Meaning> meanings);
+  bool Has(Meaning meaning) const { return has_[static_cast<std::size_t>(meaning)]; }
+  Eigen::Vector3d ChooseOrigin() const;
+  double ColourScale() const;
+
+  std::vector<Meaning> meanings_;
+  std::array<bool, kMeanings> has_{};
+  bool has_colour_ = false;
+  std::vector<Eigen::Vector3d> points_;
+  std::vector<float> intensity_;
+  std::vector<Eigen::Vector3f> colour_;
+  std::vector<std::uint16_t> label_;
+  std::uint32_t rows_ = 0;
+  std::uint32_t columns_ = 0;
+  Eigen::Vector3d sensor_origin_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CLIENT_FORMATS_CLOUD_BUILDER_H_

@@ -1,0 +1,23 @@
+// Whole files in memory.
+#ifndef STRATA_CLIENT_FORMATS_FILE_BYTES_H_
+#define STRATA_CLIENT_FORMATS_FILE_BYTES_H_
+
+#include <filesystem>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+namespace strata {
+
+// NOT_FOUND if there is no such file, INVALID_ARGUMENT for a folder, RESOURCE_EXHAUSTED beyond 16
+// GiB, UNAVAILABLE if it cannot be read. Messages name the file.
+absl::StatusOr<std::string> ReadFileBytes(const std::filesystem::path& path);
+
+// Replaces the file. UNAVAILABLE, naming the file, if that fails.
+absl::Status WriteFileBytes(const std::filesystem::path& path, absl::string_view bytes);
+
+}  // namespace strata
+
+#endif  // STRATA_CLIENT_FORMATS_FILE_BYTES_H_

@@ -1,0 +1,47 @@
+// Points, paths and meshes as PLY, PCD and OBJ files.
+#ifndef STRATA_CLIENT_FORMATS_GEOMETRY_WRITER_H_
+#define STRATA_CLIENT_FORMATS_GEOMETRY_WRITER_H_
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include <Eigen/Core>
+
+#include "core/cloud/point_cloud.h"
+
+namespace strata {
+
+// What is to be drawn. Columns are empty or as long as `vertices`; faces and lines hold indices of
+// vertices. A path is vertices and the lines between them.
+struct Geometry {
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<Colour> colour;
+  std::vector<float> intensity;
+  std::vector<std::uint16_t> label;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::vector<std::array<std::uint32_t, 2>> lines;
+};
+
+// The finite points of a cloud with its columns, `origin` added.
+Geometry GeometryOf(const PointCloud& cloud);
+// The points one after the other, joined by lines.
+Geometry PathGeometry(const std::vector<Eigen::Vector3d>& waypoints);
+
+// The bytes of a file. INVALID_ARGUMENT if a column's length or an index does not fit.
+// Coordinates are float where that is fine to 0.1 mm (all within ±1 km), else double.
+//
+// PLY: binary_little_endian; vertex x y z, then intensity, red green blue, label where given;
+// elements face (list uchar int vertex_indices) and edge (vertex1, vertex2) where there are any.
+absl::StatusOr<std::string> PlyBytes(const Geometry& geometry);
+// PCD 0.7, DATA binary; x y z, intensity, rgb, label. Triangles and lines are left out.
+absl::StatusOr<std::string> PcdBytes(const Geometry& geometry);
+// Wavefront OBJ, text with 6 decimals; colour as three numbers after x y z, as MeshLab and Blender
+// read it; without faces or lines every vertex is a point element. No intensity, no label.
+absl::StatusOr<std::string> ObjText(const Geometry& geometry);
+
+}  // namespace strata
+
+#endif  // STRATA_CLIENT_FORMATS_GEOMETRY_WRITER_H_

@@ -1,0 +1,56 @@
+#include "client/formats/lzf.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+
+namespace strata {
+namespace {
+
+constexpr std::size_t kLongestCopy = 264;  // made of 3 bytes
+
+absl::Status Broken(std::size_t position) {
+  return absl::InvalidArgumentError(
+      absl::StrCat("compressed data do not decompress at their byte ", position));
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> DecompressLzf(absl::string_view packed, std::size_t size) {
+  if (size / kLongestCopy > packed.size()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        packed.size(), " compressed bytes cannot hold the ", size, " bytes announced"));
+  }
+  std::string out;
+  out.reserve(size);
+  for (std::size_t i = 0; i < packed.size();) {
+    const auto byte = [&](std::size_t k) -> std::size_t {
+      return static_cast<std::uint8_t>(packed[i + k]);
+    };
+    const std::size_t control = byte(0);
+    if (control < 32) {
+      const std::size_t length = control + 1;
+      if (length > packed.size() - i - 1 || length > size - out.size()) return Broken(i);
+      out.append(packed.data() + i + 1, length);
+      i += 1 + length;
+      continue;
+    }
+    const bool is_long = control >> 5 == 7;
+    const std::size_t used = is_long ? 3 : 2;
+    if (used > packed.size() - i) return Broken(i);
+    const std::size_t length = (control >> 5) + 2 + (is_long ? byte(1) : 0);
+    const std::size_t back = (control & 31) * 256 + byte(used - 1) + 1;
+    if (back > out.size() || length > size - out.size()) return Broken(i);
+    for (std::size_t k = 0; k < length; ++k) out.push_back(out[out.size() - back]);
+    i += used;
+  }
+  if (out.size() != size) return Broken(packed.size());
+  return out;
+}
+
+}  // namespace strata

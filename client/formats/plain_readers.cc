@@ -1,0 +1,206 @@
+#include "client/formats/plain_readers.h"
+
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include <Eigen/Geometry>
+
+#include "client/formats/cloud_builder.h"
+#include "client/formats/point_fields.h"
+#include "client/formats/scalar.h"
+#include "client/formats/text_cursor.h"
+#include "core/common/status.h"
+
+namespace strata {
+namespace {
+
+constexpr double kMetresPerCentimetre = 0.01;
+
+// The axes of 3DTK's left-handed frame in ours.
+Eigen::Matrix3d AxesOf3dtk() {
+  Eigen::Matrix3d axes;
+  axes << 0, 0, 1,  //
+      -1, 0, 0,     //
+      0, 1, 0;
+  return axes;
+}
+
+std::vector<Meaning> UnnamedColumns(std::size_t columns) {
+  using enum Meaning;
+  switch (columns) {
+    case 4:
+      return {kX, kY, kZ, kIntensity};
+    case 6:
+      return {kX, kY, kZ, kRed, kGreen, kBlue};
+    case 7:
+      return {kX, kY, kZ, kIntensity, kRed, kGreen, kBlue};
+    default: {
+      std::vector<Meaning> meanings(columns, kIgnored);
+      for (std::size_t k = 0; k < 3 && k < columns; ++k) meanings[k] = std::vector{kX, kY, kZ}[k];
+      return meanings;
+    }
+  }
+}
+
+std::vector<Meaning> NamedColumns(const std::vector<absl::string_view>& names, std::size_t first) {
+  std::vector<Meaning> meanings;
+  for (std::size_t i = first; i < names.size(); ++i) meanings.push_back(MeaningOf(names[i]));
+  return meanings;
+}
+
+// Where "x y z" stand in a row of words; none if nowhere.
+std::optional<std::size_t> FindXyz(const std::vector<absl::string_view>& words) {
+  for (std::size_t i = 0; i + 2 < words.size(); ++i) {
+    if (MeaningOf(words[i]) == Meaning::kX && MeaningOf(words[i + 1]) == Meaning::kY &&
+        MeaningOf(words[i + 2]) == Meaning::kZ) {
+      return i;
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<std::vector<double>> Numbers(const std::vector<absl::string_view>& words) {
+  std::vector<double> numbers;
+  for (const absl::string_view word : words) {
+    const std::optional<double> number = ParseNumber(word);
+    if (!number.has_value()) return std::nullopt;
+    numbers.push_back(*number);
+  }
+  return numbers;
+}
+
+// Reads the points of a text, finding out at its beginning what the columns are.
+class ColumnText {
+ public:
+  explicit ColumnText(absl::string_view bytes) : cursor_(bytes) {}
+
+  absl::StatusOr<PointCloud> Read() {
+    while (const std::optional<absl::string_view> line = cursor_.NextLine()) {
+      STRATA_RETURN_IF_ERROR(ReadLine(*line));
+    }
+    if (!builder_.has_value()) return cursor_.Error("expected points, found the end of the file");
+    return std::move(*builder_).Build();
+  }
+
+ private:
+  absl::Status ReadLine(absl::string_view line) {
+    const bool comment = absl::StartsWith(line, "#") || absl::StartsWith(line, "//");
+    if (comment)
+      line.remove_prefix(line.find_first_not_of("#/") == absl::string_view::npos
+                             ? line.size()
+                             : line.find_first_not_of("#/"));
+    const std::vector<absl::string_view> words = SplitWords(line, true);
+    if (words.empty()) return absl::OkStatus();
+    if (comment) {
+      if (const auto first = FindXyz(words); first && !builder_) {
+        meanings_ = NamedColumns(words, *first);
+      }
+      return absl::OkStatus();
+    }
+    const std::optional<std::vector<double>> numbers = Numbers(words);
+    if (!numbers.has_value() && !builder_.has_value() && meanings_.empty()) {
+      meanings_ = NamedColumns(words, 0);
+      return absl::OkStatus();
+    }
+    return numbers.has_value() ? AddPoint(*numbers) : cursor_.Error("expected numbers only");
+  }
+
+  absl::Status AddPoint(const std::vector<double>& numbers) {
+    if (!builder_.has_value()) {
+      if (meanings_.empty()) meanings_ = UnnamedColumns(numbers.size());
+      absl::StatusOr<CloudBuilder> builder = CloudBuilder::Create(meanings_);
+      if (!builder.ok()) return cursor_.Error(builder.status().message());
+      builder_ = *std::move(builder);
+    }
+    if (numbers.size() != meanings_.size()) {
+      return cursor_.Error(
+          absl::StrCat("expected ", meanings_.size(), " numbers, found ", numbers.size()));
+    }
+    builder_->Add(numbers.data());
+    return absl::OkStatus();
+  }
+
+  TextCursor cursor_;
+  std::vector<Meaning> meanings_;
+  std::optional<CloudBuilder> builder_;
+};
+
+}  // namespace
+
+absl::StatusOr<PointCloud> ReadXyz(absl::string_view bytes) { return ColumnText(bytes).Read(); }
+
+absl::StatusOr<PointCloud> ReadKitti(absl::string_view bytes) {
+  constexpr std::size_t kPointBytes = 16;
+  if (bytes.size() % kPointBytes != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(bytes.size(), " bytes; expected a multiple of 16 (x y z reflectance)"));
+  }
+  const std::vector<Meaning> meanings = UnnamedColumns(4);
+  STRATA_ASSIGN_OR_RETURN(CloudBuilder builder, CloudBuilder::Create(meanings));
+  std::vector<PointField> fields;
+  for (std::size_t k = 0; k < 4; ++k) {
+    fields.push_back({meanings[k], ScalarType::kFloat32, bytes.data() + 4 * k, kPointBytes});
+  }
+  builder.Reserve(bytes.size() / kPointBytes);
+  AddPoints(fields, bytes.size() / kPointBytes, false, builder);
+  return std::move(builder).Build();
+}
+
+absl::StatusOr<PointCloud> Read3dtk(absl::string_view bytes) {
+  using enum Meaning;
+  TextCursor cursor(bytes);
+  std::optional<CloudBuilder> builder;
+  std::size_t columns = 0;
+  while (const std::optional<absl::string_view> line = cursor.NextLine()) {
+    const std::vector<absl::string_view> words = SplitWords(*line);
+    if (words.empty() || words[0][0] == '#') continue;
+    const std::optional<std::vector<double>> numbers = Numbers(words);
+    if (!numbers.has_value()) return cursor.Error("expected numbers only");
+    if (numbers->size() < 3) {
+      if (cursor.line_number() == 1) continue;  // some files begin with their size
+      return cursor.Error(absl::StrCat("expected x y z, found ", numbers->size(), " numbers"));
+    }
+    if (!builder.has_value()) {
+      columns = numbers->size() > 3 ? 4 : 3;
+      STRATA_ASSIGN_OR_RETURN(builder, CloudBuilder::Create(UnnamedColumns(columns)));
+    }
+    if (numbers->size() < columns) return cursor.Error("expected a fourth number: reflectance");
+    const Eigen::Vector3d p =
+        kMetresPerCentimetre * (AxesOf3dtk() * Eigen::Map<const Eigen::Vector3d>(numbers->data()));
+    const double values[] = {p.x(), p.y(), p.z(), columns > 3 ? (*numbers)[3] : 0.0};
+    builder->Add(values);
+  }
+  if (!builder.has_value()) return cursor.Error("expected points, found the end of the file");
+  return std::move(*builder).Build();
+}
+
+absl::StatusOr<Pose> Parse3dtkPose(absl::string_view text) {
+  TextCursor cursor(text);
+  double values[6];
+  for (double& value : values) {
+    const std::optional<double> number = ParseNumber(cursor.NextWord());
+    if (!number.has_value() || !std::isfinite(*number)) {
+      return cursor.Error("expected x y z [cm] and three angles [degrees]");
+    }
+    value = *number;
+  }
+  const auto rotation = [&values](int axis) {
+    const double angle_rad = values[3 + axis] * std::numbers::pi / 180.0;
+    return Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::Unit(axis)).toRotationMatrix();
+  };
+  const Eigen::Matrix3d M = AxesOf3dtk();
+  const Eigen::Matrix3d R = M * rotation(0) * rotation(1) * rotation(2) * M.transpose();
+  const Eigen::Vector3d t(values[0], values[1], values[2]);
+  return MakePose(Eigen::Quaterniond(R), kMetresPerCentimetre * (M * t));
+}
+
+}  // namespace strata

@@ -1,0 +1,61 @@
+// Which files of a command line or a folder are scans, in which order, and with which poses.
+#ifndef STRATA_CLIENT_FORMATS_SCAN_LIST_H_
+#define STRATA_CLIENT_FORMATS_SCAN_LIST_H_
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/time/time.h"
+
+#include "client/formats/pose_reader.h"
+#include "client/formats/scan_reader.h"
+#include "core/geometry/pose.h"
+
+namespace strata {
+
+struct ScanListOptions {
+  ScanFormat format = ScanFormat::kAuto;
+  // The file of poses; empty: none, but 3DTK scans read the .pose files beside them if any is
+  // there.
+  std::filesystem::path poses = {};
+  PoseFormat pose_format = PoseFormat::kAuto;
+};
+
+// One scan to import.
+struct ScanSource {
+  std::filesystem::path path;
+  ScanFormat format = ScanFormat::kAuto;  // for ReadScan
+  std::uint64_t sequence = 0;
+  std::optional<absl::Time> time;
+  Pose T_map_scan = Pose::Identity();  // identity where no poses were given
+  absl::Status pose_status;            // NOT_FOUND, saying what was looked for, without a pose
+};
+
+// The last run of digits in the stem of a file's name ("scan012_3.pcd": 3); nullopt without digits
+// or beyond 2^53.
+std::optional<std::uint64_t> SequenceOfName(const std::filesystem::path& path);
+
+// Scans of `paths` in the order of their sequence numbers. A file counts as it is; of a folder (not
+// of those below it) the files whose name has the format's ending, with kAuto any ending that
+// ScanFormatOfName knows but .txt.
+//
+// The sequence number is SequenceOfName where every file has one and no two are equal; else the
+// files are numbered from 0 in natural order of their names (s2 before s10).
+//
+// Poses: index-tum and kitti by index = SequenceOfName. tum has no index: where every stem is a
+// time in seconds (it has a decimal point) by time, to a millisecond; else one after the other, the
+// scans in order and the poses in order of time. 3dtk: the .pose file beside each scan.
+//
+// INVALID_ARGUMENT, NOT_FOUND: no scan at all, a path that is not there, a file of poses that
+// cannot be read. A scan without a pose is in its `pose_status`.
+absl::StatusOr<std::vector<ScanSource>> ListScans(const std::vector<std::filesystem::path>& paths,
+                                                  const ScanListOptions& options);
+
+}  // namespace strata
+
+#endif  // STRATA_CLIENT_FORMATS_SCAN_LIST_H_

@@ -1,0 +1,35 @@
+// Scans out of files: one door for every format people already have.
+#ifndef STRATA_CLIENT_FORMATS_SCAN_READER_H_
+#define STRATA_CLIENT_FORMATS_SCAN_READER_H_
+
+#include <cstdint>
+#include <filesystem>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/cloud/point_cloud.h"
+
+namespace strata {
+
+enum class ScanFormat : std::uint8_t { kAuto, k3dtk, kPcd, kPly, kKitti, kVtk, kXyz };
+
+// "auto", "3dtk", "pcd", "ply", "kitti", "vtk", "xyz"; INVALID_ARGUMENT listing them otherwise.
+absl::StatusOr<ScanFormat> ParseScanFormat(absl::string_view name);
+absl::string_view ScanFormatName(ScanFormat format);
+
+// The format of a file by its name: .pcd, .ply, .bin (KITTI), .3d (3DTK), .vtk, and .xyz…, .txt,
+// .csv, .asc, .pts (text); kAuto for any other.
+ScanFormat ScanFormatOfName(const std::filesystem::path& path);
+
+// The cloud of a file, in metres, z up; kAuto goes by the first bytes (PCD, PLY and VTK say what
+// they are), else by the name. Points that are not finite are left out, but kept as NaN in
+// organised clouds. Far coordinates keep their precision by PointCloud::origin. Passes
+// ValidateCloud. NOT_FOUND; UNAVAILABLE if it cannot be read; INVALID_ARGUMENT with file, line or
+// byte and what was expected. Memory is bounded by about 20 times the file's size.
+absl::StatusOr<PointCloud> ReadScan(const std::filesystem::path& path,
+                                    ScanFormat format = ScanFormat::kAuto);
+
+}  // namespace strata
+
+#endif  // STRATA_CLIENT_FORMATS_SCAN_READER_H_

@@ -1,0 +1,54 @@
+#include "client/sdk/backoff.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "absl/random/random.h"
+#include "absl/time/clock.h"
+
+#include "proto/translate/status.h"
+
+namespace strata::sdk {
+namespace {
+
+// How soon a pause notices that nobody waits any more.
+constexpr absl::Duration kSlice = absl::Milliseconds(20);
+
+std::function<double()> DrawByChance() {
+  auto generator = std::make_shared<absl::BitGen>();
+  return [generator] { return absl::Uniform(*generator, 0.0, 1.0); };
+}
+
+}  // namespace
+
+Backoff::Backoff(const BackoffOptions& options, std::function<double()> uniform)
+    : options_(options), uniform_(std::move(uniform)) {}
+
+Backoff::Backoff(const BackoffOptions& options) : Backoff(options, DrawByChance()) {}
+
+std::optional<absl::Duration> Backoff::NextPause(const absl::Status& status) {
+  const std::optional<absl::Duration> asked = translate::RetryDelayOf(status);
+  const bool again =
+      absl::IsUnavailable(status) || (absl::IsResourceExhausted(status) && asked.has_value());
+  if (!again || attempts_ >= options_.max_attempts) return std::nullopt;
+  const absl::Duration doubled = options_.initial * std::exp2(attempts_ - 1);
+  ++attempts_;
+  const absl::Duration pause = std::min(doubled, options_.max) * (1.0 - 0.5 * uniform_());
+  return std::max(pause, asked.value_or(absl::ZeroDuration()));
+}
+
+bool Backoff::Wait(const absl::Status& status, const Stop& stop) {
+  const std::optional<absl::Duration> pause = NextPause(status);
+  if (!pause.has_value()) return false;
+  const absl::Time until = absl::Now() + *pause;
+  if (until >= stop.deadline()) return false;
+  for (absl::Time now = absl::Now(); now < until; now = absl::Now()) {
+    if (stop.requested()) return false;
+    absl::SleepFor(std::min(kSlice, until - now));
+  }
+  return true;
+}
+
+}  // namespace strata::sdk

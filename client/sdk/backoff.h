@@ -1,0 +1,39 @@
+// When to try a call again.
+#ifndef STRATA_CLIENT_SDK_BACKOFF_H_
+#define STRATA_CLIENT_SDK_BACKOFF_H_
+
+#include <functional>
+#include <optional>
+
+#include "absl/status/status.h"
+#include "absl/time/time.h"
+
+#include "client/sdk/client.h"
+#include "core/common/stop.h"
+
+namespace strata::sdk {
+
+// The attempts of one call. Not thread-safe.
+class Backoff {
+ public:
+  // `uniform` draws from [0, 1).
+  Backoff(const BackoffOptions& options, std::function<double()> uniform);
+  // Draws from a generator seeded by chance.
+  explicit Backoff(const BackoffOptions& options);
+
+  // The pause before the next attempt after one that ended with `status`; nullopt if it is not to
+  // be repeated: another error, or no attempts left.
+  std::optional<absl::Duration> NextPause(const absl::Status& status);
+
+  // Sleeps the next pause. False if there is none, or `stop` comes first.
+  bool Wait(const absl::Status& status, const Stop& stop);
+
+ private:
+  BackoffOptions options_;
+  std::function<double()> uniform_;
+  int attempts_ = 1;
+};
+
+}  // namespace strata::sdk
+
+#endif  // STRATA_CLIENT_SDK_BACKOFF_H_

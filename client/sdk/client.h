@@ -1,0 +1,58 @@
+// The database over gRPC: connect, then use it as if it were in the process.
+//
+//   STRATA_ASSIGN_OR_RETURN(auto db, strata::Connect({.target = "127.0.0.1:50051"}));
+//   STRATA_ASSIGN_OR_RETURN(auto stats, db->maps().Stats({}, "campus"));
+#ifndef STRATA_CLIENT_SDK_CLIENT_H_
+#define STRATA_CLIENT_SDK_CLIENT_H_
+
+#include <memory>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/time/time.h"
+
+#include "core/api/database.h"
+
+namespace strata {
+
+// Pauses between attempts of one call.
+struct BackoffOptions {
+  // Attempts of one call, the first included; in [1, 100]. More ride out longer troubles, and tell
+  // of them later.
+  int max_attempts = 6;
+  // Pause after the first attempt; doubles from one to the next, each shortened by up to a half at
+  // random so that clients do not come back together. A server that names a longer pause gets it.
+  absl::Duration initial = absl::Milliseconds(100);
+  absl::Duration max = absl::Seconds(5);
+};
+
+struct ClientOptions {
+  std::string target = "127.0.0.1:50051";  // HOST:PORT
+  // How long Connect() waits for the server; > 0.
+  absl::Duration connect_timeout = absl::Seconds(10);
+  // For calls that may be repeated, when the server was not there (UNAVAILABLE) or said that it was
+  // full and when to come back (RESOURCE_EXHAUSTED).
+  BackoffOptions backoff;
+
+  // INVALID_ARGUMENT naming every field out of range.
+  absl::Status Validate() const;
+};
+
+// A database behind `options.target`. Thread-safe; any number of calls and uploads may be under way
+// at once, on one connection that mends itself. UNAVAILABLE if no server answers in time.
+//
+// As the engine's, but for these:
+// - Every call may also answer UNAVAILABLE. Uploads, lookups and Cancel repeat themselves as
+//   `backoff` says (an upload keeps its points until they are acknowledged); Create, Start and the
+//   two Deletes do not, since their effect may have happened: look before calling them again. A
+//   stream repeats itself only while nothing of it was delivered.
+// - The call's deadline and cancellation reach into the work on the server.
+// - An error carries the server's ErrorDetail as payload
+//   "type.googleapis.com/strata.v1.ErrorDetail" with the id of the call in the server's log.
+// - SampleSurfaces asks for more than 10,000 places in several calls.
+absl::StatusOr<std::unique_ptr<api::Database>> Connect(const ClientOptions& options);
+
+}  // namespace strata
+
+#endif  // STRATA_CLIENT_SDK_CLIENT_H_

@@ -1,0 +1,65 @@
+#include "client/sdk/remote_maps.h"
+
+#include <string>
+
+#include "core/common/status.h"
+#include "proto/translate/maps.h"
+
+namespace strata::sdk {
+
+using translate::FromProto;
+using translate::ToProto;
+
+absl::StatusOr<MapInfo> RemoteMaps::Create(const api::Call& call,
+                                           absl::string_view name,
+                                           const MapParameters& parameters) {
+  v1::CreateMapRequest in;
+  in.set_name(std::string(name));
+  *in.mutable_parameters() = ToProto(parameters);
+  STRATA_ASSIGN_OR_RETURN(
+      const v1::CreateMapResponse out,
+      CallUnary(connection_, *stub_, &v1::Maps::Stub::Create, call, Repeat::kNever, in));
+  return FromProto(out.map());
+}
+
+absl::StatusOr<MapInfo> RemoteMaps::Get(const api::Call& call, absl::string_view name) {
+  v1::GetMapRequest in;
+  in.set_name(std::string(name));
+  STRATA_ASSIGN_OR_RETURN(
+      const v1::GetMapResponse out,
+      CallUnary(connection_, *stub_, &v1::Maps::Stub::Get, call, Repeat::kOnTrouble, in));
+  return FromProto(out.map());
+}
+
+absl::StatusOr<std::vector<MapInfo>> RemoteMaps::List(const api::Call& call) {
+  STRATA_ASSIGN_OR_RETURN(const v1::ListMapsResponse out,
+                          CallUnary(connection_,
+                                    *stub_,
+                                    &v1::Maps::Stub::List,
+                                    call,
+                                    Repeat::kOnTrouble,
+                                    v1::ListMapsRequest()));
+  std::vector<MapInfo> maps;
+  for (const v1::MapInfo& map : out.maps()) {
+    STRATA_ASSIGN_OR_RETURN(MapInfo added, FromProto(map));
+    maps.push_back(std::move(added));
+  }
+  return maps;
+}
+
+absl::Status RemoteMaps::Delete(const api::Call& call, absl::string_view name) {
+  v1::DeleteMapRequest in;
+  in.set_name(std::string(name));
+  return CallUnary(connection_, *stub_, &v1::Maps::Stub::Delete, call, Repeat::kNever, in).status();
+}
+
+absl::StatusOr<MapStats> RemoteMaps::Stats(const api::Call& call, absl::string_view name) {
+  v1::GetMapStatsRequest in;
+  in.set_name(std::string(name));
+  STRATA_ASSIGN_OR_RETURN(
+      const v1::GetMapStatsResponse out,
+      CallUnary(connection_, *stub_, &v1::Maps::Stub::Stats, call, Repeat::kOnTrouble, in));
+  return FromProto(out.stats());
+}
+
+}  // namespace strata::sdk

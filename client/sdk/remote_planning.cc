@@ -1,0 +1,87 @@
+#include "client/sdk/remote_planning.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <utility>
+
+#include "core/common/status.h"
+#include "proto/translate/geometry.h"
+#include "proto/translate/maps.h"
+#include "proto/translate/planning.h"
+
+namespace strata::sdk {
+namespace {
+
+// The server's bound for one request.
+constexpr std::size_t kMaxPlacesPerRequest = 10'000;
+
+}  // namespace
+
+using translate::FromProto;
+using translate::ToProto;
+
+absl::StatusOr<PlanResult> RemotePlanning::PlanPath(const api::Call& call,
+                                                    absl::string_view map,
+                                                    const PlanQuery& query) {
+  STRATA_ASSIGN_OR_RETURN(const v1::PlanPathResponse out,
+                          CallUnary(connection_,
+                                    *stub_,
+                                    &v1::Planning::Stub::PlanPath,
+                                    call,
+                                    Repeat::kOnTrouble,
+                                    ToProto(map, query)));
+  return FromProto(out);
+}
+
+absl::StatusOr<std::vector<SurfaceColumn>> RemotePlanning::SampleSurfaces(
+    const api::Call& call, absl::string_view map, const std::vector<Eigen::Vector2d>& places) {
+  std::vector<SurfaceColumn> columns;
+  std::size_t begin = 0;
+  do {  // also without places: the map may not exist
+    const std::size_t end = std::min(places.size(), begin + kMaxPlacesPerRequest);
+    v1::SampleSurfacesRequest in;
+    in.set_map(std::string(map));
+    for (; begin < end; ++begin) *in.add_places() = ToProto(places[begin]);
+    STRATA_ASSIGN_OR_RETURN(const v1::SampleSurfacesResponse out,
+                            CallUnary(connection_,
+                                      *stub_,
+                                      &v1::Planning::Stub::SampleSurfaces,
+                                      call,
+                                      Repeat::kOnTrouble,
+                                      in));
+    for (const v1::SurfaceColumn& column : out.columns()) {
+      STRATA_ASSIGN_OR_RETURN(SurfaceColumn added, FromProto(column));
+      columns.push_back(std::move(added));
+    }
+  } while (begin < places.size());
+  return columns;
+}
+
+absl::Status RemotePlanning::SetProfile(const api::Call& call,
+                                        absl::string_view map,
+                                        absl::string_view name,
+                                        const RobotProfile& profile) {
+  v1::SetProfileRequest in;
+  in.set_map(std::string(map));
+  in.set_name(std::string(name));
+  *in.mutable_profile() = ToProto(profile);
+  return CallUnary(
+             connection_, *stub_, &v1::Planning::Stub::SetProfile, call, Repeat::kOnTrouble, in)
+      .status();
+}
+
+absl::StatusOr<std::map<std::string, RobotProfile>> RemotePlanning::ListProfiles(
+    const api::Call& call, absl::string_view map) {
+  v1::ListProfilesRequest in;
+  in.set_map(std::string(map));
+  STRATA_ASSIGN_OR_RETURN(
+      const v1::ListProfilesResponse out,
+      CallUnary(
+          connection_, *stub_, &v1::Planning::Stub::ListProfiles, call, Repeat::kOnTrouble, in));
+  std::map<std::string, RobotProfile> profiles;
+  for (const auto& [name, profile] : out.profiles()) profiles.emplace(name, FromProto(profile));
+  return profiles;
+}
+
+}  // namespace strata::sdk

@@ -1,0 +1,35 @@
+// The envelope of everything core/codec writes: what it is, how long, and whether it is intact.
+#ifndef STRATA_CORE_CODEC_BLOB_H_
+#define STRATA_CORE_CODEC_BLOB_H_
+
+#include <cstdint>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+namespace strata {
+
+// Magic numbers, as their four bytes read in a hex dump.
+enum class BlobKind : std::uint32_t {  // stored
+  kSurfaceTile = 0x31545353,           // "SST1"
+  kMlsTile = 0x31544D53,               // "SMT1"
+  kPoints = 0x31545053,                // "SPT1"
+};
+
+// Bytes that the envelope adds to a body.
+inline constexpr std::size_t kBlobOverheadBytes = 20;
+
+// Header (magic, version, oldest reader's version, body length), body, XXH3-64 of all before.
+std::string SealBlob(BlobKind kind, std::uint16_t version, absl::string_view body);
+
+// The body, a view into `bytes`. DATA_LOSS if the bytes are damaged, cut short, followed by others
+// or of another kind; UNIMPLEMENTED if intact but readable only from a version after
+// `reader_version`.
+absl::StatusOr<absl::string_view> OpenBlob(BlobKind kind,
+                                           std::uint16_t reader_version,
+                                           absl::string_view bytes);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_CODEC_BLOB_H_

@@ -1,0 +1,307 @@
+#include "core/codec/surface_tile_codec.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+
+#include "core/codec/blob.h"
+#include "core/codec/bytes.h"
+#include "core/codec/columns.h"
+#include "core/codec/occupancy.h"
+#include "core/codec/tile_header.h"
+#include "core/common/status.h"
+
+namespace strata {
+namespace {
+
+constexpr float kStepsPerMetre = 512.0F;
+constexpr std::int32_t kMaxHeightCode = (1 << 24) - 1;  // exact in a float
+constexpr float kSigmaCodesPerOctave = 7.5F;            // steps of 9.7 %
+constexpr float kMinSigmaOctave = -24.0F;
+constexpr float kCostCodesPerOctave = 6.0F;        // steps of 12 %, where a robot can drive
+constexpr float kCoarseCostCodesPerOctave = 2.0F;  // steps of 41 %, elsewhere
+constexpr std::int32_t kInfiniteCost = 255;
+constexpr int kMaxTraversability = static_cast<int>(Traversability::kNonTraversable);
+
+// A surface in whole numbers, as it is stored.
+struct Codes {
+  std::uint16_t cell = 0;
+  std::uint8_t traversability = 0;
+  std::uint8_t class_id = 0;
+  std::int32_t height = 0;
+  std::int32_t depth = 0;  // > 0: vertical
+  std::int32_t sigma = 0;
+  std::int32_t cost = 0;
+};
+
+// Rounds to nearest; |value| < 2^30.
+std::int32_t Rounded(double value) {
+  constexpr double kShift = 1 << 30;  // makes it positive, so that truncating rounds down
+  return static_cast<std::int32_t>(static_cast<std::int64_t>(value + kShift + 0.5) - (1 << 30));
+}
+
+std::int32_t LengthCode(float metres) {
+  if (std::isnan(metres)) return 0;
+  constexpr double kMax = kMaxHeightCode;
+  return Rounded(std::clamp(double{metres} * kStepsPerMetre, -kMax, kMax));
+}
+
+std::int32_t SigmaCodeOf(float sigma_m) {
+  if (!(sigma_m > 0.0F)) return 0;
+  const float code = (std::log2(sigma_m) - kMinSigmaOctave) * kSigmaCodesPerOctave;
+  return Rounded(std::clamp(code, 0.0F, 255.0F));
+}
+
+float CostCodesPerOctave(std::uint8_t traversability) {
+  return traversability == static_cast<std::uint8_t>(Traversability::kTraversable)
+             ? kCostCodesPerOctave
+             : kCoarseCostCodesPerOctave;
+}
+
+std::int32_t CostCodeOf(float cost, std::uint8_t traversability) {
+  if (!(cost > 0.0F)) return 0;
+  if (std::isinf(cost)) return kInfiniteCost;
+  const float code = std::log2(1.0F + cost) * CostCodesPerOctave(traversability);
+  return Rounded(std::min(code, kInfiniteCost - 1.0F));
+}
+
+Codes Quantised(const Surface& surface) {
+  Codes codes{.cell = surface.cell,
+              .traversability = static_cast<std::uint8_t>(surface.traversability),
+              .class_id = surface.class_id,
+              .height = LengthCode(surface.z_m),
+              .sigma = SigmaCodeOf(surface.sigma_m)};
+  codes.cost = CostCodeOf(surface.cost, codes.traversability);
+  if (surface.vertical()) codes.depth = std::max(1, LengthCode(surface.depth_m));
+  return codes;
+}
+
+Surface Restored(const Codes& codes) {
+  Surface surface{.cell = codes.cell,
+                  .traversability = static_cast<Traversability>(codes.traversability),
+                  .class_id = codes.class_id,
+                  .z_m = static_cast<float>(codes.height) / kStepsPerMetre,
+                  .depth_m = static_cast<float>(codes.depth) / kStepsPerMetre};
+  surface.sigma_m =
+      std::exp2(static_cast<float>(codes.sigma) / kSigmaCodesPerOctave + kMinSigmaOctave);
+  surface.cost =
+      codes.cost == kInfiniteCost
+          ? std::numeric_limits<float>::infinity()
+          : std::exp2(static_cast<float>(codes.cost) / CostCodesPerOctave(codes.traversability)) -
+                1.0F;
+  return surface;
+}
+
+// Columns. Heights and the like go to one of several columns by what is known of their
+// surroundings, because a zstd frame has one table of frequencies.
+enum Column : std::uint8_t {
+  kSameKind,  // bits, + KindContext
+  kSameKindLast = kSameKind + 3,
+  kKind,  // where not the same
+  kClass,
+  kHeight,  // + HeightContext
+  kHeightLast = kHeight + 3,
+  kDepth,  // + 1 where the prediction comes from a vertical neighbour
+  kDepthLast = kDepth + 1,
+  kSigma,  // + vertical
+  kSigmaLast = kSigma + 1,
+  kCost,  // + traversability
+  kCostLast = kCost + 2,
+  kColumnCount
+};
+
+// Rounded sum / count for a count of 1 to 4; each division is by a constant.
+std::int32_t MeanOf(std::int32_t sum, int count) {
+  constexpr std::int32_t kShift = 3 << 27;  // makes it positive; a multiple of 3
+  switch (count) {
+    case 2:
+      return (sum + 1) >> 1;
+    case 3:
+      return (sum + 1 + kShift) / 3 - kShift / 3;
+    case 4:
+      return (sum + 2) >> 2;
+    default:
+      return sum;
+  }
+}
+
+// What is known beside a surface that is being coded: the mean of the surfaces around that are
+// vertical or not as it is; without any, the first one around; without that, zeros.
+struct Surroundings {
+  int alike = 0;  // how many
+  std::int32_t height = 0, depth = 0, sigma = 0;
+
+  Surroundings(std::span<const Codes> surfaces, const Neighbours& n, bool vertical) {
+    for (const std::uint32_t index : {n.left, n.up, n.up_right, n.up_left}) {
+      if (index == Neighbours::kNone || (surfaces[index].depth > 0) != vertical) continue;
+      Add(surfaces[index]);
+      ++alike;
+    }
+    if (alike == 0 && (n.left & n.up) != Neighbours::kNone) {
+      Add(surfaces[n.left != Neighbours::kNone ? n.left : n.up]);
+    }
+    height = MeanOf(height, alike);
+    depth = MeanOf(depth, alike);
+    sigma = MeanOf(sigma, alike);
+  }
+
+ private:
+  void Add(const Codes& codes) {
+    height += codes.height;
+    depth += codes.depth;
+    sigma += codes.sigma;
+  }
+};
+
+int HeightColumn(const Surroundings& around, bool vertical) {
+  if (around.alike == 0) return kHeight;
+  if (vertical) return kHeight + 1;
+  return around.alike == 1 ? kHeight + 2 : kHeight + 3;
+}
+
+// Reads or writes a number; false if what was read is not within [low, high].
+template <typename Coder>
+bool CodeWithin(Coder& coder,
+                int column,
+                std::int32_t expected,
+                std::int32_t low,
+                std::int32_t high,
+                std::int32_t& value) {
+  const std::int64_t coded = coder.CodeRelative(column, value, expected);
+  if (coded < low || coded > high) return false;
+  value = static_cast<std::int32_t>(coded);
+  return true;
+}
+
+// What a surface is: all its yes and no in one number.
+std::uint8_t KindOf(const Codes& codes) {
+  return static_cast<std::uint8_t>(codes.traversability << 1 | (codes.depth > 0 ? 1 : 0));
+}
+
+// The mean cost of the surfaces around that are as traversable; 0 without any.
+std::int32_t ExpectedCost(std::span<const Codes> surfaces,
+                          const Neighbours& n,
+                          std::uint8_t traversability) {
+  std::int32_t sum = 0;
+  int count = 0;
+  for (const std::uint32_t index : {n.left, n.up, n.up_right, n.up_left}) {
+    if (index == Neighbours::kNone || surfaces[index].traversability != traversability) continue;
+    sum += surfaces[index].cost;
+    ++count;
+  }
+  return MeanOf(sum, count);
+}
+
+// The kind of the surface to the left or else above, and how many of those around share it.
+struct ExpectedKind {
+  std::uint8_t kind = 0;
+  int others = 0;
+
+  ExpectedKind(std::span<const Codes> surfaces, const Neighbours& n) {
+    const std::uint32_t first = n.left != Neighbours::kNone ? n.left : n.up;
+    if (first == Neighbours::kNone) return;
+    kind = KindOf(surfaces[first]);
+    for (const std::uint32_t index : {n.up, n.up_left, n.up_right}) {
+      if (index != Neighbours::kNone && KindOf(surfaces[index]) == kind) ++others;
+    }
+  }
+};
+
+// One surface, in either direction; false if what was read is none. `codes.cell` is known.
+template <typename Coder>
+bool CodeSurface(Coder& coder,
+                 const Neighbours& neighbours,
+                 std::span<const Codes> surfaces,
+                 Codes& codes) {
+  const ExpectedKind expected_kind(surfaces, neighbours);
+  std::uint8_t kind = expected_kind.kind;
+  if (!coder.CodeBit(kSameKind + expected_kind.others, KindOf(codes) == kind)) {
+    kind = coder.CodeByte(kKind, KindOf(codes));
+  }
+  codes.traversability = kind >> 1;
+  if (codes.traversability > kMaxTraversability) return false;
+  codes.class_id = coder.CodeByte(kClass, codes.class_id);
+  const bool vertical = (kind & 1) != 0;
+  const Surroundings around(surfaces, neighbours, vertical);
+  if (!CodeWithin(coder,
+                  HeightColumn(around, vertical),
+                  around.height,
+                  -kMaxHeightCode,
+                  kMaxHeightCode,
+                  codes.height)) {
+    return false;
+  }
+  if (vertical) {
+    // Undersides continue better than lengths.
+    const bool known = around.alike > 0;
+    const std::int32_t expected = known ? around.depth + codes.height - around.height : 0;
+    if (!CodeWithin(coder, kDepth + known, expected, 1, kMaxHeightCode, codes.depth)) return false;
+  }
+  return CodeWithin(coder, kSigma + vertical, around.sigma, 0, 255, codes.sigma) &&
+         CodeWithin(coder,
+                    kCost + codes.traversability,
+                    ExpectedCost(surfaces, neighbours, codes.traversability),
+                    0,
+                    kInfiniteCost,
+                    codes.cost);
+}
+
+}  // namespace
+
+std::string EncodeSurfaceTile(const SurfaceTile& tile) {
+  std::vector<Codes> surfaces(tile.surfaces.size());
+  std::vector<std::uint16_t> cells(tile.surfaces.size());
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    surfaces[i] = Quantised(tile.surfaces[i]);
+    cells[i] = surfaces[i].cell;
+  }
+  const std::vector<Neighbours> neighbours = FindNeighbours(cells);
+  ColumnEncoder encoder(kColumnCount);
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    CodeSurface(encoder, neighbours[i], surfaces, surfaces[i]);
+  }
+  std::string body;
+  PutTileHeader(body, tile.key);
+  PutFixed(body, tile.version);
+  PutCells(body, cells);
+  encoder.Finish(body);
+  return SealBlob(BlobKind::kSurfaceTile, kSurfaceTileVersion, body);
+}
+
+absl::StatusOr<SurfaceTile> DecodeSurfaceTile(absl::string_view bytes) {
+  STRATA_ASSIGN_OR_RETURN(const absl::string_view body,
+                          OpenBlob(BlobKind::kSurfaceTile, kSurfaceTileVersion, bytes));
+  ByteReader reader(body);
+  SurfaceTile tile;
+  STRATA_RETURN_IF_ERROR(TakeTileHeader(reader, tile.key));
+  tile.version = reader.Fixed<std::uint64_t>();
+  STRATA_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> cells, TakeCells(reader));
+  STRATA_ASSIGN_OR_RETURN(ColumnDecoder decoder,
+                          ColumnDecoder::Open(reader, kColumnCount, cells.size()));
+  if (reader.remaining() != 0) return absl::DataLossError("surface tile: bytes left over");
+  const std::vector<Neighbours> neighbours = FindNeighbours(cells);
+  std::vector<Codes> surfaces(cells.size());
+  tile.surfaces.reserve(cells.size());
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    surfaces[i].cell = cells[i];
+    if (!CodeSurface(decoder, neighbours[i], surfaces, surfaces[i])) {
+      return absl::DataLossError(absl::StrCat("surface tile: surface ", i, " is out of range"));
+    }
+    tile.surfaces.push_back(Restored(surfaces[i]));
+  }
+  STRATA_RETURN_IF_ERROR(decoder.Finish());
+  tile.IndexRows();
+  return tile;
+}
+
+}  // namespace strata

@@ -1,0 +1,148 @@
+#include "core/engine/directory.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "absl/time/time.h"
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "core/common/status.h"
+#include "core/storage/sqlite/sqlite_storage.h"
+#include "core/world/names.h"
+
+namespace strata {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr absl::string_view kSuffix = ".strata";
+// Map names never begin with a dot, so neither prefix can meet a map.
+constexpr char kMakingPrefix[] = ".making-";
+constexpr char kLockName[] = ".lock";
+
+absl::Status ErrnoStatus(absl::string_view what, const fs::path& path) {
+  const int error = errno;
+  return absl::ErrnoToStatus(error, absl::StrCat(what, " ", path.string()));
+}
+
+absl::Status SyncDirectory(const fs::path& path) {
+  const int fd = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return ErrnoStatus("cannot open directory", path);
+  const int synced = ::fsync(fd);
+  const absl::Status status =
+      synced == 0 ? absl::OkStatus() : ErrnoStatus("cannot sync directory", path);
+  ::close(fd);
+  return status;
+}
+
+fs::path WithSuffix(fs::path file, const char* suffix) { return file += suffix; }
+
+// A journal without its database would be taken for that of the next map of the same name.
+absl::Status RemoveWithJournals(const fs::path& file) {
+  for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
+    std::error_code error;
+    fs::remove(WithSuffix(file, suffix), error);
+    if (error) {
+      return absl::UnavailableError(
+          absl::StrCat("cannot remove ", file.filename().string(), suffix, ": ", error.message()));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status RemoveLeftovers(const fs::path& directory) {
+  std::error_code error;
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(directory, error)) {
+    files.push_back(entry.path());
+  }
+  if (error) return absl::UnavailableError(absl::StrCat(directory.string(), ": ", error.message()));
+  for (const fs::path& file : files) {
+    const std::string name = file.filename().string();
+    const std::size_t journal = name.rfind(".strata-");
+    const bool orphan = journal != std::string::npos &&
+                        !fs::exists(directory / name.substr(0, journal + kSuffix.size()), error);
+    if (name.rfind(kMakingPrefix, 0) == 0 || orphan) fs::remove(file, error);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<MapDirectory> MapDirectory::Open(const fs::path& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (!fs::is_directory(path, error)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("directory ", path.string(), " cannot be made or is no directory"));
+  }
+  const fs::path lock_file = path / kLockName;
+  const int lock = ::open(lock_file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (lock < 0) return ErrnoStatus("cannot open", lock_file);
+  MapDirectory directory(path, lock);
+  if (::flock(lock, LOCK_EX | LOCK_NB) != 0) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("directory ", path.string(), " is in use by another process or engine"));
+  }
+  STRATA_RETURN_IF_ERROR(RemoveLeftovers(path));
+  return directory;
+}
+
+MapDirectory::~MapDirectory() {
+  if (lock_ >= 0) ::close(lock_);
+}
+
+fs::path MapDirectory::FileOf(absl::string_view name) const {
+  return path_ / absl::StrCat(name, kSuffix);
+}
+
+absl::StatusOr<std::vector<std::string>> MapDirectory::ListNames() const {
+  std::error_code error;
+  std::vector<std::string> names;
+  for (const fs::directory_entry& entry : fs::directory_iterator(path_, error)) {
+    const std::string name = entry.path().stem().string();
+    if (entry.path().extension().string() == kSuffix && ValidateName("map name", name).ok()) {
+      names.push_back(name);
+    }
+  }
+  if (error) return absl::UnavailableError(absl::StrCat(path_.string(), ": ", error.message()));
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+absl::Status MapDirectory::CreateFile(absl::string_view name,
+                                      const MapParameters& parameters,
+                                      absl::Time created) const {
+  const fs::path file = FileOf(name);
+  std::error_code error;
+  if (fs::exists(file, error)) {
+    return absl::AlreadyExistsError(absl::StrCat("map ", name, " exists"));
+  }
+  const fs::path making = path_ / absl::StrCat(kMakingPrefix, name, kSuffix);
+  STRATA_RETURN_IF_ERROR(RemoveWithJournals(making));
+  STRATA_RETURN_IF_ERROR(CreateSqliteMap(making, parameters, created));
+  fs::rename(making, file, error);
+  if (error) {
+    return absl::UnavailableError(absl::StrCat("cannot make map ", name, ": ", error.message()));
+  }
+  return SyncDirectory(path_);
+}
+
+absl::Status MapDirectory::RemoveFile(absl::string_view name) const {
+  STRATA_RETURN_IF_ERROR(RemoveWithJournals(FileOf(name)));
+  return SyncDirectory(path_);
+}
+
+}  // namespace strata

@@ -1,0 +1,49 @@
+// The directory of an engine: who owns it, and the files in it.
+#ifndef STRATA_CORE_ENGINE_DIRECTORY_H_
+#define STRATA_CORE_ENGINE_DIRECTORY_H_
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/time/time.h"
+
+#include "core/world/map_info.h"
+
+namespace strata {
+
+// Locked for as long as it lives. Map names must be valid (ValidateName): they become file names.
+class MapDirectory {
+ public:
+  // Makes the directory if needed and removes what a crash left of half-made and half-deleted maps.
+  // FAILED_PRECONDITION if another engine has it.
+  static absl::StatusOr<MapDirectory> Open(const std::filesystem::path& path);
+  ~MapDirectory();
+  MapDirectory(MapDirectory&& other) noexcept
+      : path_(std::move(other.path_)), lock_(std::exchange(other.lock_, -1)) {}
+  MapDirectory& operator=(MapDirectory&&) = delete;
+
+  std::filesystem::path FileOf(absl::string_view name) const;
+  // By name.
+  absl::StatusOr<std::vector<std::string>> ListNames() const;
+  // All or nothing, also when the power fails. ALREADY_EXISTS.
+  absl::Status CreateFile(absl::string_view name,
+                          const MapParameters& parameters,
+                          absl::Time created) const;
+  // No connection may be open.
+  absl::Status RemoveFile(absl::string_view name) const;
+
+ private:
+  MapDirectory(std::filesystem::path path, int lock) : path_(std::move(path)), lock_(lock) {}
+
+  std::filesystem::path path_;
+  int lock_;  // file descriptor
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_DIRECTORY_H_

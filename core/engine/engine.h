@@ -1,0 +1,50 @@
+// The database in this process: maps in a directory, behind the interfaces of core/api.
+#ifndef STRATA_CORE_ENGINE_ENGINE_H_
+#define STRATA_CORE_ENGINE_ENGINE_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/api/database.h"
+
+namespace strata {
+
+struct EngineOptions {
+  // Where the maps lie, one file each; made if it is not there. Owned by one engine at a time.
+  std::filesystem::path directory;
+  // Larger scans are refused.
+  std::uint64_t max_points_per_scan = 100'000'000;
+  // Acknowledged scans of a map that may wait for integration; more are refused until it caught up.
+  std::uint64_t max_pending_scans = 100'000;
+  // Bytes of points of a map that may wait for the disk; uploads block beyond it. In [1 MiB, …).
+  std::size_t queue_bytes = std::size_t{64} << 20;
+  // Decoded tiles and scan features kept in memory, each, a map.
+  std::size_t cache_bytes = std::size_t{256} << 20;
+  // What the planner keeps of a map between queries.
+  std::size_t planner_cache_bytes = std::size_t{512} << 20;
+  // Largest size of a map's file; 0: none.
+  std::uint64_t max_map_bytes = 0;
+  // Threads that rebuild and verify use, each map; at least 1. Results do not depend on it.
+  int worker_threads = 2;
+  // Scans integrated in one transaction when there is a backlog; at least 1. Tiles do not depend on
+  // it.
+  int max_batch_scans = 16;
+
+  // INVALID_ARGUMENT naming every field out of its range.
+  absl::Status Validate() const;
+};
+
+// Opens the directory: unfinished uploads are dropped, pending scans and jobs go on by themselves.
+// FAILED_PRECONDITION while another engine has it. A map whose file is damaged does not keep the
+// others from being served: calls on it answer with what is wrong. The engine ends its threads when
+// it is destroyed; no call may be under way then.
+absl::StatusOr<std::unique_ptr<api::Database>> OpenEngine(const EngineOptions& options);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_ENGINE_H_

@@ -1,0 +1,196 @@
+#include "core/engine/integrator.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/container/btree_set.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/common/status.h"
+#include "core/engine/local_map_codec.h"
+#include "core/engine/scan_source.h"
+
+namespace strata {
+namespace {
+
+constexpr std::uint64_t kBatchPoints = 8'000'000;
+
+// Errors that a scan's own bytes cause; others concern the store and may go away.
+bool IsFaultOfScan(const absl::Status& status) {
+  return absl::IsDataLoss(status) || absl::IsInvalidArgument(status) ||
+         absl::IsUnimplemented(status) || absl::IsOutOfRange(status);
+}
+
+}  // namespace
+
+absl::Status WriteTileChange(StorageWriter& writer,
+                             const TileChange& change,
+                             double cell_size_m,
+                             std::uint64_t collect_floor) {
+  for (const auto& [key, tile] : change.tiles) {
+    if (tile == nullptr) {
+      STRATA_RETURN_IF_ERROR(writer.DeleteMlsTile(key));
+      continue;
+    }
+    STRATA_RETURN_IF_ERROR(writer.PutMlsTile(MakeMlsTileRow(*tile, change.version, cell_size_m)));
+    STRATA_RETURN_IF_ERROR(writer.DeleteOlderMlsTiles(key, change.version));
+  }
+  for (const SurfaceTileRow& row : change.surfaces) {
+    STRATA_RETURN_IF_ERROR(writer.PutSurfaceTile(row));
+    STRATA_RETURN_IF_ERROR(writer.CollectSurfaceTile(row.key, collect_floor));
+  }
+  return writer.PublishTiles(change.version, true);
+}
+
+absl::StatusOr<std::uint64_t> Integrator::ReserveVersion() {
+  std::uint64_t version = 0;
+  STRATA_RETURN_IF_ERROR(core_.writer().Run(
+      Durability::kRelaxed, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
+        STRATA_ASSIGN_OR_RETURN(version, writer.NextCommitSequence());
+        return absl::OkStatus();
+      }));
+  return version;
+}
+
+absl::Status Integrator::LoadAlignerOnce(StorageReader& reader) {
+  if (aligner_loaded_) return absl::OkStatus();
+  STRATA_RETURN_IF_ERROR(aligner_.Load(reader, epoch()));
+  aligner_loaded_ = true;
+  return absl::OkStatus();
+}
+
+absl::Status Integrator::MakeServed(StorageReader& reader, TileChange& change) {
+  const MapParameters parameters = core_.info().parameters;
+  SurfaceTileMaker maker(core_,
+                         reader,
+                         store_,
+                         change.tiles,
+                         {.version = change.version,
+                          .threads = core_.options().worker_threads,
+                          .profile = parameters.default_profile});
+  absl::btree_set<TileKey> changed;
+  for (const auto& [key, tile] : change.tiles) changed.insert(key);
+  STRATA_ASSIGN_OR_RETURN(change.surfaces, maker.MakeBase(WithNeighbours(changed), Stop()));
+  const SurfaceTileMaker::Rows base = change.surfaces;
+  return maker.MakePyramid(base, change.surfaces, Stop());
+}
+
+absl::Status Integrator::Commit(Durability durability,
+                                const TileChange& change,
+                                absl::FunctionRef<absl::Status(StorageWriter&)> decision) {
+  const double cell_size_m = core_.info().parameters.mls.cell_size_m;
+  const std::uint64_t floor = core_.snapshots().Floor();
+  MapClock clock;
+  const absl::Status committed =
+      core_.writer().Run(durability, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
+        STRATA_RETURN_IF_ERROR(WriteTileChange(writer, change, cell_size_m, floor));
+        STRATA_RETURN_IF_ERROR(decision(writer));
+        STRATA_ASSIGN_OR_RETURN(clock, writer.reader().GetClock());
+        return absl::OkStatus();
+      });
+  if (!committed.ok()) {
+    aligner_loaded_ = false;  // it may know of scans that were not committed
+    return committed;
+  }
+  store_.Replace(change.tiles);
+  core_.snapshots().Publish({clock.epoch, clock.tile_version});
+  return absl::OkStatus();
+}
+
+absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
+                                       StorageReader& reader,
+                                       ScanSource& source,
+                                       MlsTileMap& tiles,
+                                       Batch& batch) {
+  Integrated done;
+  done.scan = scan;
+  STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
+  STRATA_ASSIGN_OR_RETURN(done.placement, aligner_.Place(scan, local_map, reader, source));
+  if (!core_.info().parameters.keep_points) done.local_map = EncodeLocalMap(local_map);
+  STRATA_ASSIGN_OR_RETURN(const MlsMap contribution,
+                          source.Contribution(scan, done.placement.T_map_scan));
+  const std::uint64_t version = core_.snapshots().current().tile_version;
+  for (const MlsTile& tile : contribution.tiles) {
+    if (tile.patches.empty()) continue;
+    done.tiles.push_back(tile.key);
+    if (tiles.contains(tile.key)) continue;
+    STRATA_ASSIGN_OR_RETURN(MlsTilePtr held, store_.Load(reader, tile.key, version));
+    tiles[tile.key] = std::move(held);
+  }
+  JoinContribution(
+      contribution, [](const TileKey&) { return true; }, tiles);
+  aligner_.Add(scan, done.placement.T_map_scan);
+  batch.integrated.push_back(std::move(done));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<int> Integrator::IntegrateBatch() {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  ScanQuery query;
+  query.state = ScanState::kPending;
+  query.limit = static_cast<std::uint32_t>(core_.options().max_batch_scans);
+  STRATA_ASSIGN_OR_RETURN(const std::vector<PosedScan> pending, reader->ListScans(query, epoch()));
+  if (pending.empty()) return 0;
+  STRATA_RETURN_IF_ERROR(LoadAlignerOnce(*reader));
+  const MapParameters parameters = core_.info().parameters;
+  ScanSource source(*reader, parameters);
+  TileChange change;
+  Batch batch;
+  std::uint64_t points = 0;
+  int count = 0;
+  for (const PosedScan& posed : pending) {
+    if (count > 0 && points + posed.scan.header.point_count > kBatchPoints) break;
+    points += posed.scan.header.point_count;
+    ++count;
+    const absl::Status done = IntegrateScan(posed.scan, *reader, source, change.tiles, batch);
+    if (done.ok()) continue;
+    if (!IsFaultOfScan(done)) {
+      aligner_loaded_ = false;
+      return done;
+    }
+    batch.failed.push_back({posed.scan.number, std::string(done.message())});
+  }
+  STRATA_ASSIGN_OR_RETURN(change.version, ReserveVersion());
+  absl::Status made = MakeServed(*reader, change);
+  if (made.ok()) made = CommitBatch(batch, change);
+  if (!made.ok()) {
+    aligner_loaded_ = false;
+    return made;
+  }
+  return count;
+}
+
+absl::Status Integrator::CommitBatch(const Batch& batch, const TileChange& change) {
+  return Commit(Durability::kRelaxed, change, [&](StorageWriter& writer) -> absl::Status {
+    for (const Failed& failed : batch.failed) {
+      STRATA_RETURN_IF_ERROR(
+          writer.SetScanState(failed.number, ScanState::kFailed, failed.message));
+    }
+    for (const Integrated& done : batch.integrated) {
+      const ScanNumber number = done.scan.number;
+      const Pose& T_map_scan = done.placement.T_map_scan;
+      STRATA_RETURN_IF_ERROR(writer.PutPose(
+          {number, epoch(), T_map_scan, PoseOrigin::kIngest, done.placement.report}));
+      for (const ConstraintRecord& constraint : done.placement.constraints) {
+        STRATA_RETURN_IF_ERROR(writer.PutConstraint(constraint));
+      }
+      STRATA_RETURN_IF_ERROR(writer.SetTilesOfScan(number, done.tiles));
+      STRATA_RETURN_IF_ERROR(
+          writer.SetFootprint(number, FootprintOf(done.scan.box_scan, T_map_scan)));
+      if (!done.local_map.empty() || !core_.info().parameters.keep_points) {
+        STRATA_RETURN_IF_ERROR(writer.DropPoints(number, done.local_map));
+      }
+      STRATA_RETURN_IF_ERROR(writer.SetScanState(number, ScanState::kIntegrated, ""));
+    }
+    return absl::OkStatus();
+  });
+}
+
+}  // namespace strata

@@ -1,0 +1,105 @@
+// Changes what is derived: takes scans into the tiles, moves and removes them. Every change is one
+// transaction that also records the decision it follows from, so nothing half-done is ever read.
+#ifndef STRATA_CORE_ENGINE_INTEGRATOR_H_
+#define STRATA_CORE_ENGINE_INTEGRATOR_H_
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/container/btree_set.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/common/stop.h"
+#include "core/engine/aligner.h"
+#include "core/engine/map_core.h"
+#include "core/engine/mls_tiles.h"
+#include "core/engine/surface_tiles.h"
+#include "core/world/robot_profile.h"
+#include "core/world/scan.h"
+
+namespace strata {
+
+// Tiles that change, with everything that is served of them.
+struct TileChange {
+  std::uint64_t version = 0;
+  MlsTileMap tiles;
+  SurfaceTileMaker::Rows surfaces;
+};
+
+// One thread at a time: the worker's.
+class Integrator {
+ public:
+  explicit Integrator(MapCore& core)
+      : core_(core), aligner_(core.options().cache_bytes), store_(core) {}
+
+  // Integrates pending scans in commit order, as many as make a good transaction; returns how many
+  // (0: none is left). A scan that cannot be integrated is marked failed and counted; an error is
+  // one of the store, and nothing has changed then.
+  absl::StatusOr<int> IntegrateBatch();
+
+  // In any state. NOT_FOUND.
+  absl::Status DeleteScan(const ScanId& id);
+  // NOT_FOUND; FAILED_PRECONDITION unless the scan is integrated. Begins a new epoch.
+  absl::Status SetPose(const ScanId& id, const Pose& T_map_scan);
+  // Annotates all tiles for another robot.
+  absl::Status SetDefaultProfile(const RobotProfile& profile, const Stop& stop);
+
+  MapCore& core() { return core_; }
+  MlsTileStore& store() { return store_; }
+  // The next value of the map's clock, for tiles that are about to be written.
+  absl::StatusOr<std::uint64_t> ReserveVersion();
+
+ private:
+  struct Integrated {
+    ScanRecord scan;
+    Placement placement;
+    std::vector<TileKey> tiles;
+    std::string local_map;  // encoded; only if the points go
+  };
+  struct Failed {
+    ScanNumber number;
+    std::string message;
+  };
+  struct Batch {
+    std::vector<Integrated> integrated;
+    std::vector<Failed> failed;
+  };
+
+  absl::Status LoadAlignerOnce(StorageReader& reader);
+  absl::Status IntegrateScan(const ScanRecord& scan,
+                             StorageReader& reader,
+                             ScanSource& source,
+                             MlsTileMap& tiles,
+                             Batch& batch);
+  absl::Status CommitBatch(const Batch& batch, const TileChange& change);
+  // Fills in what is served of change.tiles.
+  absl::Status MakeServed(StorageReader& reader, TileChange& change);
+  // Writes `change` and whatever `decision` adds in one transaction; then readers see it.
+  absl::Status Commit(Durability durability,
+                      const TileChange& change,
+                      absl::FunctionRef<absl::Status(StorageWriter&)> decision);
+  // The tiles of `keys` from all their scans but `without`.
+  absl::StatusOr<MlsTileMap> TilesWithout(StorageReader& reader,
+                                          const absl::btree_set<TileKey>& keys,
+                                          ScanNumber without);
+  std::uint64_t epoch() const { return core_.snapshots().current().epoch; }
+
+  MapCore& core_;
+  Aligner aligner_;
+  bool aligner_loaded_ = false;
+  MlsTileStore store_;
+};
+
+// Writes the rows of `change` and makes them the current ones. Inside a commit.
+absl::Status WriteTileChange(StorageWriter& writer,
+                             const TileChange& change,
+                             double cell_size_m,
+                             std::uint64_t collect_floor);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_INTEGRATOR_H_

@@ -1,0 +1,87 @@
+// The jobs of a map: a durable queue that people can watch.
+#ifndef STRATA_CORE_ENGINE_JOB_BOARD_H_
+#define STRATA_CORE_ENGINE_JOB_BOARD_H_
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/synchronization/mutex.h"
+
+#include "core/common/stop.h"
+#include "core/engine/map_core.h"
+#include "core/world/job.h"
+
+namespace strata {
+
+// What a running job tells and learns. Used by the job's thread.
+class JobContext {
+ public:
+  virtual ~JobContext() = default;
+  // Asks whether to go on; reports how far it is (in [0, 1]) and what it does now.
+  virtual absl::Status Progress(double progress, absl::string_view phase) = 0;
+  virtual const Stop& stop() const = 0;
+  // Numbers and a line of the result.
+  virtual void SetMetric(const std::string& name, double value) = 0;
+  virtual void SetMessage(std::string message) = 0;
+};
+
+// Thread-safe.
+class JobBoard {
+ public:
+  // Reads the jobs of the map; those that were running are queued again.
+  static absl::StatusOr<std::unique_ptr<JobBoard>> Open(MapCore& core);
+
+  // Durable when it returns. `kind` and `parameters` must have been checked.
+  absl::StatusOr<JobInfo> Start(const Stop& stop,
+                                absl::string_view kind,
+                                const std::map<std::string, std::string>& parameters);
+  absl::StatusOr<JobInfo> Get(std::uint64_t id) const;
+  std::vector<JobInfo> List() const;
+  absl::StatusOr<JobInfo> Cancel(std::uint64_t id);
+  absl::Status Watch(const Stop& stop,
+                     std::uint64_t id,
+                     absl::FunctionRef<absl::Status(const JobInfo&)> sink) const;
+  bool AnyRunning() const;
+  bool AnyQueued() const;
+
+  // Runs the first queued job, if any, and records how it ended. A job that ends because `closing`
+  // was requested stays queued for the next start.
+  absl::Status RunNext(const Stop& closing,
+                       absl::FunctionRef<absl::Status(const JobInfo&, JobContext&)> body);
+
+ private:
+  class Running;
+  struct Entry {
+    JobInfo info;
+    Stop stop;
+    std::uint64_t changes = 0;
+  };
+
+  explicit JobBoard(MapCore& core) : core_(core) {}
+  // Applies `change` to a job; returns it as it is then. NOT_FOUND.
+  absl::StatusOr<JobInfo> Change(std::uint64_t id, absl::FunctionRef<void(JobInfo&)> change);
+  absl::Status Store(const JobInfo& info, Durability durability, const Stop& stop);
+  // Progress of the running job; `durable`: also to the store.
+  void Report(std::uint64_t id, double progress, const std::string& phase, bool durable);
+  // The first queued job, marked running.
+  absl::StatusOr<std::optional<JobInfo>> TakeNext(Stop& stop);
+  absl::Status Finish(std::uint64_t id, const absl::Status& ended, Running& context);
+
+  MapCore& core_;
+  mutable absl::Mutex mutex_;
+  std::map<std::uint64_t, Entry> jobs_ ABSL_GUARDED_BY(mutex_);
+  std::uint64_t last_id_ ABSL_GUARDED_BY(mutex_) = 0;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_JOB_BOARD_H_

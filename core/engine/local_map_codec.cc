@@ -1,0 +1,61 @@
+#include "core/engine/local_map_codec.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/codec/mls_tile_codec.h"
+#include "core/common/status.h"
+#include "core/mls/mls_map.h"
+
+namespace strata {
+namespace {
+
+constexpr std::size_t kLengthBytes = 4;
+
+std::size_t ReadLength(absl::string_view bytes) {
+  std::uint32_t length = 0;
+  for (std::size_t i = 0; i < kLengthBytes; ++i) {
+    length |= std::uint32_t{static_cast<std::uint8_t>(bytes[i])} << (8 * i);
+  }
+  return length;
+}
+
+}  // namespace
+
+std::string EncodeLocalMap(const MlsMap& map) {
+  std::string bytes;
+  for (const MlsTile& tile : map.tiles) {
+    const std::string encoded = EncodeMlsTile(tile);
+    for (std::size_t i = 0; i < kLengthBytes; ++i) {
+      bytes.push_back(static_cast<char>((encoded.size() >> (8 * i)) & 0xFF));
+    }
+    bytes += encoded;
+  }
+  return bytes;
+}
+
+absl::StatusOr<MlsMap> DecodeLocalMap(absl::string_view bytes, const MlsParameters& parameters) {
+  MlsMap map;
+  map.parameters = parameters;
+  while (!bytes.empty()) {
+    if (bytes.size() < kLengthBytes || ReadLength(bytes) > bytes.size() - kLengthBytes) {
+      return absl::DataLossError("local map: cut short");
+    }
+    const std::size_t length = ReadLength(bytes);
+    STRATA_ASSIGN_OR_RETURN(MlsTile tile, DecodeMlsTile(bytes.substr(kLengthBytes, length)));
+    if (!map.tiles.empty() && !(map.tiles.back().key < tile.key)) {
+      return absl::DataLossError("local map: tiles out of order");
+    }
+    map.tiles.push_back(std::move(tile));
+    bytes.remove_prefix(kLengthBytes + length);
+  }
+  return map;
+}
+
+}  // namespace strata

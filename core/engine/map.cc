@@ -1,0 +1,37 @@
+#include "core/engine/map.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/common/status.h"
+
+namespace strata {
+
+absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
+                                               const std::filesystem::path& file,
+                                               const EngineOptions& options) {
+  std::shared_ptr<Map> map(new Map());
+  STRATA_ASSIGN_OR_RETURN(map->core_, MapCore::Open(name, file, options));
+  STRATA_ASSIGN_OR_RETURN(map->jobs_, JobBoard::Open(*map->core_));
+  std::uint64_t pending = 0;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map->core_->Reader());
+    STRATA_ASSIGN_OR_RETURN(const ScanTotals totals, reader->GetScanTotals());
+    pending = totals.pending;
+  }
+  map->worker_ = std::make_unique<Worker>(*map->core_, *map->jobs_, pending);
+  return map;
+}
+
+void Map::Close() {
+  if (worker_ != nullptr) worker_->Close();
+  if (core_ != nullptr) core_->Close();
+}
+
+}  // namespace strata

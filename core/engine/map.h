@@ -1,0 +1,49 @@
+// One map in use: its shared core and the worker that integrates scans and runs jobs.
+#ifndef STRATA_CORE_ENGINE_MAP_H_
+#define STRATA_CORE_ENGINE_MAP_H_
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/engine/job_board.h"
+#include "core/engine/map_core.h"
+#include "core/engine/worker.h"
+
+namespace strata {
+
+// Thread-safe.
+class Map {
+ public:
+  static absl::StatusOr<std::shared_ptr<Map>> Open(const std::string& name,
+                                                   const std::filesystem::path& file,
+                                                   const EngineOptions& options);
+  ~Map() { Close(); }
+
+  MapCore& core() { return *core_; }
+  JobBoard& jobs() { return *jobs_; }
+  Worker& worker() { return *worker_; }
+
+  // RESOURCE_EXHAUSTED while too many scans wait for integration.
+  absl::Status CheckRoomForPending() const { return worker_->CheckRoom(); }
+  // A scan became durable.
+  void ScanCommitted() { worker_->ScanCommitted(); }
+
+  // Ends all threads, waiting for what they do now, and closes the file.
+  void Close();
+
+ private:
+  Map() = default;
+
+  std::unique_ptr<MapCore> core_;
+  std::unique_ptr<JobBoard> jobs_;
+  std::unique_ptr<Worker> worker_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_MAP_H_

@@ -1,0 +1,83 @@
+#include "core/engine/map_core.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+
+#include "core/common/status.h"
+#include "core/storage/sqlite/sqlite_storage.h"
+#include "core/storage/storage.h"
+
+namespace strata {
+namespace {
+
+absl::Status ClearLeftovers(StorageWriter& writer) {
+  return writer.Commit(Durability::kFull, [&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
+    STRATA_RETURN_IF_ERROR(writer.AbandonOrphans());
+    STRATA_RETURN_IF_ERROR(writer.DiscardUnpublished());
+    return writer.CollectAllSurfaceTiles(clock.tile_version);
+  });
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<MapCore>> MapCore::Open(const std::string& name,
+                                                       const std::filesystem::path& file,
+                                                       const EngineOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(
+      std::unique_ptr<MapStorage> storage,
+      OpenSqliteStorage(file, SqliteOptions{.max_file_bytes = options.max_map_bytes}));
+  StorageWriter& writer = storage->writer();
+  STRATA_RETURN_IF_ERROR(ClearLeftovers(writer));
+  STRATA_ASSIGN_OR_RETURN(MapInfo info, writer.reader().GetMapInfo());
+  STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t last_upload, writer.reader().LastUpload());
+  info.name = name;
+  return std::unique_ptr<MapCore>(new MapCore(name,
+                                              options,
+                                              std::move(storage),
+                                              std::move(info),
+                                              MapView{clock.epoch, clock.tile_version},
+                                              last_upload));
+}
+
+MapCore::MapCore(std::string name,
+                 const EngineOptions& options,
+                 std::unique_ptr<MapStorage> storage,
+                 MapInfo info,
+                 MapView view,
+                 std::uint64_t last_upload)
+    : name_(std::move(name)),
+      options_(options),
+      info_(std::move(info)),
+      storage_(std::move(storage)),
+      snapshots_(view),
+      readers_(*storage_),
+      writer_(storage_->writer(), options.queue_bytes),
+      last_upload_(last_upload) {}
+
+MapInfo MapCore::info() const {
+  absl::MutexLock lock(&mutex_);
+  return info_;
+}
+
+void MapCore::set_default_profile(const RobotProfile& profile) {
+  absl::MutexLock lock(&mutex_);
+  info_.parameters.default_profile = profile;
+}
+
+void MapCore::Close() {
+  writer_.Close();
+  readers_.Close();
+  absl::MutexLock lock(&mutex_);
+  storage_.reset();
+}
+
+}  // namespace strata

@@ -1,0 +1,69 @@
+// What everything that works on one map shares: its store, its writer, its readers, its clock.
+#ifndef STRATA_CORE_ENGINE_MAP_CORE_H_
+#define STRATA_CORE_ENGINE_MAP_CORE_H_
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+
+#include "core/engine/engine.h"
+#include "core/engine/reader_pool.h"
+#include "core/engine/snapshots.h"
+#include "core/engine/writer.h"
+#include "core/storage/storage.h"
+#include "core/world/map_info.h"
+
+namespace strata {
+
+// Thread-safe.
+class MapCore {
+ public:
+  // Opens the file and clears what a crash left half-done in it.
+  static absl::StatusOr<std::unique_ptr<MapCore>> Open(const std::string& name,
+                                                       const std::filesystem::path& file,
+                                                       const EngineOptions& options);
+  ~MapCore() { Close(); }
+
+  const std::string& name() const { return name_; }
+  const EngineOptions& options() const { return options_; }
+  MapInfo info() const;
+  void set_default_profile(const RobotProfile& profile);
+
+  absl::StatusOr<ReaderPool::Lease> Reader() { return readers_.Take(); }
+  WriterThread& writer() { return writer_; }
+  Snapshots& snapshots() { return snapshots_; }
+  // A number for the chunks of one more upload.
+  std::uint64_t NextUpload() { return last_upload_.fetch_add(1) + 1; }
+
+  // Ends the writer and closes all connections, waiting for reads under way.
+  void Close();
+
+ private:
+  MapCore(std::string name,
+          const EngineOptions& options,
+          std::unique_ptr<MapStorage> storage,
+          MapInfo info,
+          MapView view,
+          std::uint64_t last_upload);
+
+  const std::string name_;
+  const EngineOptions options_;
+  mutable absl::Mutex mutex_;
+  MapInfo info_ ABSL_GUARDED_BY(mutex_);
+  std::unique_ptr<MapStorage> storage_;
+  Snapshots snapshots_;
+  ReaderPool readers_;
+  WriterThread writer_;
+  std::atomic<std::uint64_t> last_upload_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_MAP_CORE_H_

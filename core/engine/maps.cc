@@ -1,0 +1,120 @@
+#include "core/engine/maps.h"
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
+#include <glog/logging.h>
+
+#include "core/common/status.h"
+#include "core/engine/map_stats.h"
+#include "core/world/names.h"
+
+namespace strata {
+namespace {
+
+absl::Status NoSuchMap(absl::string_view name) {
+  return absl::NotFoundError(absl::StrCat("map ", name.substr(0, 100), " does not exist"));
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<EngineMaps>> EngineMaps::Open(const EngineOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(MapDirectory directory, MapDirectory::Open(options.directory));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<std::string> names, directory.ListNames());
+  std::unique_ptr<EngineMaps> maps(new EngineMaps(options, std::move(directory)));
+  absl::MutexLock lock(&maps->mutex_);
+  for (const std::string& name : names) maps->OpenMap(name);
+  return maps;
+}
+
+void EngineMaps::OpenMap(const std::string& name) {
+  absl::StatusOr<std::shared_ptr<Map>> map = Map::Open(name, directory_.FileOf(name), options_);
+  if (!map.ok()) LOG(ERROR) << "map=" << name << " not opened: " << map.status().message();
+  maps_.insert_or_assign(name, std::move(map));
+}
+
+absl::StatusOr<std::shared_ptr<Map>> EngineMaps::Find(absl::string_view name) const {
+  STRATA_RETURN_IF_ERROR(ValidateName("map name", name));
+  absl::MutexLock lock(&mutex_);
+  const auto it = maps_.find(std::string(name));
+  if (it == maps_.end()) return NoSuchMap(name);
+  return it->second;
+}
+
+absl::StatusOr<MapInfo> EngineMaps::Create(const api::Call& call,
+                                           absl::string_view name,
+                                           const MapParameters& parameters) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_RETURN_IF_ERROR(ValidateName("map name", name));
+  STRATA_RETURN_IF_ERROR(ValidateMapParameters(parameters));
+  const std::string key(name);
+  absl::MutexLock lock(&mutex_);
+  if (maps_.contains(key)) return absl::AlreadyExistsError(absl::StrCat("map ", key, " exists"));
+  STRATA_RETURN_IF_ERROR(directory_.CreateFile(key, parameters, absl::Now()));
+  OpenMap(key);
+  const absl::StatusOr<std::shared_ptr<Map>>& map = maps_.find(key)->second;
+  if (!map.ok()) return map.status();
+  return (*map)->core().info();
+}
+
+absl::StatusOr<MapInfo> EngineMaps::Get(const api::Call& call, absl::string_view name) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(name));
+  return map->core().info();
+}
+
+absl::StatusOr<std::vector<MapInfo>> EngineMaps::List(const api::Call& call) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  std::vector<MapInfo> infos;
+  absl::MutexLock lock(&mutex_);
+  for (const auto& [name, map] : maps_) {
+    if (map.ok()) infos.push_back((*map)->core().info());
+  }
+  return infos;
+}
+
+absl::StatusOr<std::shared_ptr<Map>> EngineMaps::Withdraw(absl::string_view name) {
+  absl::MutexLock lock(&mutex_);
+  const auto it = maps_.find(std::string(name));
+  if (it == maps_.end()) return NoSuchMap(name);
+  std::shared_ptr<Map> map;
+  if (it->second.ok()) {
+    map = *it->second;
+    if (map->jobs().AnyRunning()) {
+      return absl::FailedPreconditionError(
+          absl::StrCat("map ", it->first, ": a job is running; cancel it first"));
+    }
+  } else if (absl::IsAborted(it->second.status())) {
+    return NoSuchMap(name);
+  }
+  it->second = absl::AbortedError(absl::StrCat("map ", it->first, " is being deleted"));
+  return map;
+}
+
+absl::Status EngineMaps::Delete(const api::Call& call, absl::string_view name) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_RETURN_IF_ERROR(ValidateName("map name", name));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Withdraw(name));
+  if (map != nullptr) map->Close();
+  const absl::Status removed = directory_.RemoveFile(name);
+  absl::MutexLock lock(&mutex_);
+  maps_.erase(std::string(name));
+  return removed;
+}
+
+absl::StatusOr<MapStats> EngineMaps::Stats(const api::Call& call, absl::string_view name) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(name));
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map->core().Reader());
+  return CollectStats(*reader);
+}
+
+}  // namespace strata

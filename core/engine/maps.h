@@ -1,0 +1,56 @@
+// The maps of a directory, by name: api::Maps.
+#ifndef STRATA_CORE_ENGINE_MAPS_H_
+#define STRATA_CORE_ENGINE_MAPS_H_
+
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/synchronization/mutex.h"
+
+#include "core/api/maps.h"
+#include "core/engine/directory.h"
+#include "core/engine/engine.h"
+#include "core/engine/map.h"
+
+namespace strata {
+
+class EngineMaps final : public api::Maps {
+ public:
+  // Opens every map of the directory; one that does not open is kept with the reason.
+  static absl::StatusOr<std::unique_ptr<EngineMaps>> Open(const EngineOptions& options);
+
+  // NOT_FOUND; or why its file did not open.
+  absl::StatusOr<std::shared_ptr<Map>> Find(absl::string_view name) const;
+
+  absl::StatusOr<MapInfo> Create(const api::Call& call,
+                                 absl::string_view name,
+                                 const MapParameters& parameters) override;
+  absl::StatusOr<MapInfo> Get(const api::Call& call, absl::string_view name) override;
+  absl::StatusOr<std::vector<MapInfo>> List(const api::Call& call) override;
+  absl::Status Delete(const api::Call& call, absl::string_view name) override;
+  absl::StatusOr<MapStats> Stats(const api::Call& call, absl::string_view name) override;
+
+ private:
+  EngineMaps(const EngineOptions& options, MapDirectory directory)
+      : options_(options), directory_(std::move(directory)) {}
+  void OpenMap(const std::string& name) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Takes the map out of the list, so that nobody finds it any more; its name stays taken.
+  absl::StatusOr<std::shared_ptr<Map>> Withdraw(absl::string_view name);
+
+  const EngineOptions options_;
+  const MapDirectory directory_;
+  mutable absl::Mutex mutex_;
+  std::map<std::string, absl::StatusOr<std::shared_ptr<Map>>, std::less<>> maps_
+      ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_MAPS_H_

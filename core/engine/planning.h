@@ -1,0 +1,42 @@
+// api::Planning on the maps of an engine.
+#ifndef STRATA_CORE_ENGINE_PLANNING_H_
+#define STRATA_CORE_ENGINE_PLANNING_H_
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/api/planning.h"
+#include "core/engine/maps.h"
+
+namespace strata {
+
+class EnginePlanning final : public api::Planning {
+ public:
+  explicit EnginePlanning(EngineMaps& maps) : maps_(maps) {}
+
+  absl::StatusOr<PlanResult> PlanPath(const api::Call& call,
+                                      absl::string_view map,
+                                      const PlanQuery& query) override;
+  absl::StatusOr<std::vector<SurfaceColumn>> SampleSurfaces(
+      const api::Call& call,
+      absl::string_view map,
+      const std::vector<Eigen::Vector2d>& places) override;
+  absl::Status SetProfile(const api::Call& call,
+                          absl::string_view map,
+                          absl::string_view name,
+                          const RobotProfile& profile) override;
+  absl::StatusOr<std::map<std::string, RobotProfile>> ListProfiles(const api::Call& call,
+                                                                   absl::string_view map) override;
+
+ private:
+  EngineMaps& maps_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_PLANNING_H_

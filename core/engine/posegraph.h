@@ -1,0 +1,30 @@
+// api::PoseGraph on the maps of an engine.
+#ifndef STRATA_CORE_ENGINE_POSEGRAPH_H_
+#define STRATA_CORE_ENGINE_POSEGRAPH_H_
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/api/posegraph.h"
+#include "core/engine/maps.h"
+
+namespace strata {
+
+class EnginePoseGraph final : public api::PoseGraph {
+ public:
+  explicit EnginePoseGraph(EngineMaps& maps) : maps_(maps) {}
+
+  absl::StatusOr<api::PoseGraphState> Get(const api::Call& call, absl::string_view map) override;
+  absl::Status SetPose(const api::Call& call,
+                       absl::string_view map,
+                       const ScanId& id,
+                       const Pose& T_map_scan) override;
+
+ private:
+  EngineMaps& maps_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_POSEGRAPH_H_

@@ -1,0 +1,28 @@
+// Everything derived against everything it follows from: `verify` reports what differs, `rebuild`
+// puts it right. Both make all of it again from truth.
+#ifndef STRATA_CORE_ENGINE_REBUILD_H_
+#define STRATA_CORE_ENGINE_REBUILD_H_
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+
+#include "core/common/stop.h"
+#include "core/engine/integrator.h"
+#include "core/engine/job_board.h"
+#include "core/world/job.h"
+
+namespace strata {
+
+inline constexpr absl::string_view kRebuildJob = "rebuild";
+inline constexpr absl::string_view kVerifyJob = "verify";
+
+// Runs a job of either kind; DATA_LOSS naming what does not fit if `verify` finds anything.
+absl::Status RunRebuildJob(Integrator& integrator, const JobInfo& job, JobContext& context);
+
+// Rebuilds at once if the derived tables are marked incomplete: they were dropped, or written by a
+// program with another format.
+absl::Status RecoverDerived(Integrator& integrator, const Stop& closing);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_REBUILD_H_

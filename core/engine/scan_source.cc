@@ -1,0 +1,88 @@
+#include "core/engine/scan_source.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/codec/point_codec.h"
+#include "core/common/status.h"
+#include "core/engine/local_map_codec.h"
+#include "core/mls/build.h"
+#include "core/mls/join.h"
+
+namespace strata {
+namespace {
+
+constexpr std::size_t kBlockPoints = 1'000'000;
+
+template <typename T>
+void AppendTo(std::vector<T>& to, const std::vector<T>& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
+
+void AppendPiece(const PointCloud& piece, PointCloud& block) {
+  AppendTo(block.points, piece.points);
+  AppendTo(block.intensity, piece.intensity);
+  AppendTo(block.colour, piece.colour);
+  AppendTo(block.label, piece.label);
+}
+
+}  // namespace
+
+absl::Status ScanSource::ForEachBlock(const ScanRecord& scan,
+                                      absl::FunctionRef<absl::Status(const PointCloud&)> body) {
+  if (held_scan_ == scan.number && scan.number != 0) return body(held_);
+  held_scan_ = 0;
+  held_ = PointCloud();
+  held_.sensor_origin = scan.header.sensor_origin;
+  for (std::uint32_t ordinal = 0; ordinal < scan.chunks; ++ordinal) {
+    if (held_.size() >= kBlockPoints) {
+      STRATA_RETURN_IF_ERROR(body(held_));
+      held_ = PointCloud();
+      held_.sensor_origin = scan.header.sensor_origin;
+    }
+    STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader_.GetChunk(scan.upload, ordinal));
+    absl::StatusOr<PointCloud> piece = DecodePoints(bytes);
+    if (!piece.ok()) return Annotate(piece.status(), absl::StrCat("piece ", ordinal));
+    AppendPiece(*piece, held_);
+  }
+  if (held_.size() == scan.header.point_count) held_scan_ = scan.number;
+  return body(held_);
+}
+
+absl::StatusOr<MlsMap> ScanSource::Build(const ScanRecord& scan, const Pose& T_map_scan) {
+  const SensorModel sensor = scan.header.sensor.value_or(parameters_.sensor);
+  MlsMap map;
+  map.parameters = parameters_.mls;
+  STRATA_RETURN_IF_ERROR(ForEachBlock(scan, [&](const PointCloud& block) -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(MlsBuildResult built,
+                            BuildMlsMap(block, T_map_scan, sensor, parameters_.mls, scratch_));
+    if (map.tiles.empty()) {
+      map = std::move(built.map);
+    } else {
+      JoinInto(map, built.map);
+    }
+    return absl::OkStatus();
+  }));
+  return map;
+}
+
+absl::StatusOr<MlsMap> ScanSource::LocalMap(const ScanRecord& scan) {
+  if (scan.has_points) return Build(scan, Pose::Identity());
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader_.GetLocalMap(scan.number));
+  return DecodeLocalMap(bytes, parameters_.mls);
+}
+
+absl::StatusOr<MlsMap> ScanSource::Contribution(const ScanRecord& scan, const Pose& T_map_scan) {
+  if (parameters_.keep_points) return Build(scan, T_map_scan);
+  STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, LocalMap(scan));
+  return TransformContribution(local_map, T_map_scan);
+}
+
+}  // namespace strata

@@ -1,0 +1,52 @@
+// Scans out of the store, as what they are good for: local maps and contributions to the map.
+#ifndef STRATA_CORE_ENGINE_SCAN_SOURCE_H_
+#define STRATA_CORE_ENGINE_SCAN_SOURCE_H_
+
+#include <cstddef>
+#include <cstdint>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/cloud/point_cloud.h"
+#include "core/geometry/pose.h"
+#include "core/mls/build.h"
+#include "core/mls/mls_map.h"
+#include "core/storage/storage.h"
+#include "core/world/map_info.h"
+
+namespace strata {
+
+// One thread at a time. Memory is bounded whatever a scan's size: large ones are built block by
+// block and joined, which gives the same map.
+class ScanSource {
+ public:
+  // Both must outlive the source.
+  ScanSource(StorageReader& reader, const MapParameters& parameters)
+      : reader_(reader), parameters_(parameters) {}
+
+  // The scan in its own frame. DATA_LOSS naming the piece that is damaged.
+  absl::StatusOr<MlsMap> LocalMap(const ScanRecord& scan);
+  // What the scan adds to the map at this pose: a pure function of the scan, the pose and the map's
+  // parameters, before and after points were dropped.
+  absl::StatusOr<MlsMap> Contribution(const ScanRecord& scan, const Pose& T_map_scan);
+
+  // The points in blocks, in order.
+  absl::Status ForEachBlock(const ScanRecord& scan,
+                            absl::FunctionRef<absl::Status(const PointCloud&)> body);
+
+ private:
+  absl::StatusOr<MlsMap> Build(const ScanRecord& scan, const Pose& T_map_scan);
+
+  StorageReader& reader_;
+  const MapParameters& parameters_;
+  MlsScratch scratch_;
+  // The last scan that fitted one block: its local map and its contribution read it twice.
+  ScanNumber held_scan_ = 0;
+  PointCloud held_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_SCAN_SOURCE_H_

@@ -1,0 +1,175 @@
+#include "core/engine/scans.h"
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+
+#include "core/codec/point_codec.h"
+#include "core/common/status.h"
+#include "core/engine/upload.h"
+#include "core/world/names.h"
+
+namespace strata {
+namespace {
+
+constexpr std::uint32_t kPageScans = 256;
+
+absl::Status NoSuchScan(const ScanId& id) {
+  return absl::NotFoundError(absl::StrCat("scan ", id.ToString(), " does not exist"));
+}
+
+absl::Status CheckId(const ScanId& id) { return ValidateName("trajectory name", id.trajectory); }
+
+absl::StatusOr<PosedScan> FindScan(Map& map, const ScanId& id) {
+  STRATA_RETURN_IF_ERROR(CheckId(id));
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map.core().Reader());
+  STRATA_ASSIGN_OR_RETURN(std::optional<PosedScan> scan,
+                          reader->FindScan(id, map.core().snapshots().current().epoch));
+  if (!scan.has_value()) return NoSuchScan(id);
+  return *std::move(scan);
+}
+
+absl::StatusOr<ScanQuery> ToQuery(const api::ScanFilter& filter) {
+  ScanQuery query;
+  if (filter.trajectory.has_value()) {
+    STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", *filter.trajectory));
+  }
+  if (filter.box.has_value() &&
+      !(filter.box->min().allFinite() && filter.box->max().allFinite() && !filter.box->isEmpty())) {
+    return absl::InvalidArgumentError("box: not finite, or its minimum is beyond its maximum");
+  }
+  query.trajectory = filter.trajectory;
+  query.state = filter.state;
+  query.from = filter.from;
+  query.until = filter.until;
+  query.box = filter.box;
+  query.limit = kPageScans;
+  return query;
+}
+
+absl::StatusOr<PointCloud> ReadPiece(Map& map, const ScanRecord& scan, std::uint32_t ordinal) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map.core().Reader());
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader->GetChunk(scan.upload, ordinal));
+  STRATA_ASSIGN_OR_RETURN(PointCloud piece, DecodePoints(bytes));
+  piece.sensor_origin = scan.header.sensor_origin;
+  return piece;
+}
+
+}  // namespace
+
+ScanInfo ToScanInfo(const PosedScan& posed) {
+  ScanInfo info;
+  info.header = posed.scan.header;
+  info.state = posed.scan.state;
+  info.T_map_scan = posed.pose.has_value() ? posed.pose->T_map_scan : info.header.T_map_scan;
+  info.commit_sequence = posed.scan.number;
+  info.point_bytes = posed.scan.point_bytes;
+  info.content_hash = posed.scan.content_hash;
+  info.message = posed.scan.message;
+  if (posed.pose.has_value()) info.alignment = posed.pose->report;
+  return info;
+}
+
+absl::StatusOr<std::unique_ptr<api::ScanUpload>> EngineScans::Upload(const api::Call& call,
+                                                                     absl::string_view map,
+                                                                     const ScanHeader& header) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_RETURN_IF_ERROR(ValidateScanHeader(header));
+  const std::uint64_t most = found->core().options().max_points_per_scan;
+  if (header.point_count > most) {
+    return absl::ResourceExhaustedError(absl::StrCat("scan ",
+                                                     header.id.ToString(),
+                                                     ": ",
+                                                     header.point_count,
+                                                     " points; at most ",
+                                                     most,
+                                                     ", split it"));
+  }
+  STRATA_RETURN_IF_ERROR(found->CheckRoomForPending());
+  return std::make_unique<EngineUpload>(std::move(found), call, header);
+}
+
+absl::StatusOr<UploadState> EngineScans::GetUploadState(const api::Call& call,
+                                                        absl::string_view map,
+                                                        absl::string_view trajectory) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", trajectory));
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
+  return reader->GetUploadState(trajectory);
+}
+
+absl::StatusOr<ScanInfo> EngineScans::Get(const api::Call& call,
+                                          absl::string_view map,
+                                          const ScanId& id) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan scan, FindScan(*found, id));
+  return ToScanInfo(scan);
+}
+
+absl::Status EngineScans::List(const api::Call& call,
+                               absl::string_view map,
+                               const api::ScanFilter& filter,
+                               absl::FunctionRef<absl::Status(const ScanInfo&)> sink) {
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(ScanQuery query, ToQuery(filter));
+  const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
+  while (true) {
+    STRATA_RETURN_IF_ERROR(call.stop.status());
+    std::vector<PosedScan> page;
+    {
+      STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
+      STRATA_ASSIGN_OR_RETURN(page, reader->ListScans(query, pin.view().epoch));
+    }
+    for (const PosedScan& scan : page) STRATA_RETURN_IF_ERROR(sink(ToScanInfo(scan)));
+    if (page.size() < query.limit) return absl::OkStatus();
+    query.after = page.back().scan.number;
+  }
+}
+
+absl::Status EngineScans::GetPoints(const api::Call& call,
+                                    absl::string_view map,
+                                    const ScanId& id,
+                                    absl::FunctionRef<absl::Status(const PointCloud&)> sink) {
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(*found, id));
+  const std::string what = absl::StrCat("scan ", id.ToString());
+  if (!posed.scan.has_points) {
+    return absl::FailedPreconditionError(
+        absl::StrCat(what, ": the map drops points once a scan is integrated"));
+  }
+  for (std::uint32_t ordinal = 0; ordinal < posed.scan.chunks; ++ordinal) {
+    STRATA_RETURN_IF_ERROR(call.stop.status());
+    const absl::StatusOr<PointCloud> piece = ReadPiece(*found, posed.scan, ordinal);
+    if (!piece.ok()) {
+      // Deleted or dropped while we were reading?
+      STRATA_ASSIGN_OR_RETURN(const PosedScan now, FindScan(*found, id));
+      if (!now.scan.has_points)
+        return absl::FailedPreconditionError(absl::StrCat(what, ": points dropped"));
+      return Annotate(piece.status(), absl::StrCat(what, ", piece ", ordinal));
+    }
+    STRATA_RETURN_IF_ERROR(sink(*piece));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status EngineScans::Delete(const api::Call& call, absl::string_view map, const ScanId& id) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_RETURN_IF_ERROR(CheckId(id));
+  return found->worker().Execute(call.stop,
+                                 [&](Integrator& integrator) { return integrator.DeleteScan(id); });
+}
+
+}  // namespace strata

@@ -1,0 +1,132 @@
+#include "core/engine/tiles.h"
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+
+#include "core/codec/blob.h"
+#include "core/codec/surface_tile_codec.h"
+#include "core/common/status.h"
+
+namespace strata {
+namespace {
+
+absl::Status CheckLevel(std::int32_t level) {
+  if (level >= 0 && level <= kMaxLevel) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("level ", level, " is not in [0, ", kMaxLevel, "]"));
+}
+
+TileRange ToRange(const api::TileArea& area) {
+  return {area.level, area.x_min, area.x_max, area.y_min, area.y_max};
+}
+
+bool Contains(const api::TileArea& area, const TileKey& key) {
+  return key.level == area.level && key.x >= area.x_min && key.x < area.x_max &&
+         key.y >= area.y_min && key.y < area.y_max;
+}
+
+// nullopt where there is nothing.
+absl::StatusOr<std::optional<api::EncodedTile>> ReadTile(Map& map,
+                                                         const TileKey& key,
+                                                         const MapView& view) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map.core().Reader());
+  STRATA_ASSIGN_OR_RETURN(std::optional<SurfaceTileRow> row,
+                          reader->FindSurfaceTile(key, view.tile_version));
+  if (!row.has_value()) return std::optional<api::EncodedTile>();
+  const absl::Status intact =
+      OpenBlob(BlobKind::kSurfaceTile, kSurfaceTileVersion, row->bytes).status();
+  if (!intact.ok()) {
+    return Annotate(intact,
+                    absl::StrCat("tile ", key.ToString(), " is damaged, a rebuild mends it"));
+  }
+  return std::optional<api::EncodedTile>(
+      api::EncodedTile{key, row->version, view.epoch, std::move(row->bytes)});
+}
+
+}  // namespace
+
+absl::StatusOr<api::EncodedTile> EngineTiles::Get(const api::Call& call,
+                                                  absl::string_view map,
+                                                  const TileKey& key) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_RETURN_IF_ERROR(CheckLevel(key.level));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
+  STRATA_ASSIGN_OR_RETURN(std::optional<api::EncodedTile> tile, ReadTile(*found, key, pin.view()));
+  if (!tile.has_value()) {
+    return absl::NotFoundError(absl::StrCat("tile ", key.ToString(), ": nothing is mapped there"));
+  }
+  return *std::move(tile);
+}
+
+absl::StatusOr<std::vector<api::TileInfo>> EngineTiles::List(const api::Call& call,
+                                                             absl::string_view map,
+                                                             const api::TileArea& area) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_RETURN_IF_ERROR(CheckLevel(area.level));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
+  STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> rows,
+                          reader->ListSurfaceTiles(ToRange(area), pin.view().tile_version));
+  std::vector<api::TileInfo> infos;
+  infos.reserve(rows.size());
+  for (const SurfaceTileRow& row : rows) {
+    infos.push_back({row.key, row.version, row.size_bytes, row.patches});
+  }
+  return infos;
+}
+
+absl::Status EngineTiles::Fetch(const api::Call& call,
+                                absl::string_view map,
+                                const api::TileArea& area,
+                                const std::vector<api::HeldTile>& held,
+                                absl::FunctionRef<absl::Status(const api::TileUpdate&)> sink) {
+  using Kind = api::TileUpdate::Kind;
+  STRATA_RETURN_IF_ERROR(CheckLevel(area.level));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
+  std::map<TileKey, std::uint64_t> versions;
+  for (const api::HeldTile& tile : held) {
+    if (Contains(area, tile.key)) versions[tile.key] = tile.version;
+  }
+  std::vector<SurfaceTileRow> rows;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
+    STRATA_ASSIGN_OR_RETURN(rows, reader->ListSurfaceTiles(ToRange(area), pin.view().tile_version));
+  }
+  absl::Status damaged;
+  for (const SurfaceTileRow& row : rows) {
+    STRATA_RETURN_IF_ERROR(call.stop.status());
+    const auto known = versions.find(row.key);
+    const bool is_new = known == versions.end();
+    const bool same = !is_new && known->second == row.version;
+    if (!is_new) versions.erase(known);
+    if (same) continue;
+    absl::StatusOr<std::optional<api::EncodedTile>> tile = ReadTile(*found, row.key, pin.view());
+    if (absl::IsDataLoss(tile.status())) {
+      damaged.Update(tile.status());  // the others are served first
+      continue;
+    }
+    STRATA_RETURN_IF_ERROR(tile.status());
+    if (!tile->has_value()) continue;
+    STRATA_RETURN_IF_ERROR(sink({is_new ? Kind::kNew : Kind::kChanged, **std::move(tile)}));
+  }
+  for (const auto& [key, version] : versions) {
+    STRATA_RETURN_IF_ERROR(call.stop.status());
+    STRATA_RETURN_IF_ERROR(sink({Kind::kGone, {key, 0, pin.view().epoch, ""}}));
+  }
+  return damaged;
+}
+
+}  // namespace strata

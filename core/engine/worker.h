@@ -1,0 +1,79 @@
+// The one thread behind a map that changes what is derived: integrates scans in commit order, and
+// between batches runs what callers ask for and jobs.
+#ifndef STRATA_CORE_ENGINE_WORKER_H_
+#define STRATA_CORE_ENGINE_WORKER_H_
+
+#include <cstdint>
+#include <deque>
+#include <thread>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/synchronization/mutex.h"
+
+#include "core/common/stop.h"
+#include "core/engine/integrator.h"
+#include "core/engine/job_board.h"
+#include "core/engine/map_core.h"
+
+namespace strata {
+
+// Thread-safe.
+class Worker {
+ public:
+  using Command = absl::FunctionRef<absl::Status(Integrator&)>;
+
+  // `core` must outlive the worker. Begins where the last run stopped; `pending` scans wait.
+  Worker(MapCore& core, JobBoard& jobs, std::uint64_t pending);
+  ~Worker();
+
+  // RESOURCE_EXHAUSTED while too many scans wait for integration.
+  absl::Status CheckRoom() const;
+  // One more scan waits.
+  void ScanCommitted();
+  // A job was queued.
+  void JobQueued();
+
+  // Runs `command` on the worker's thread, before the next batch, and returns its status. `stop`
+  // ends the waiting (CANCELLED, DEADLINE_EXCEEDED); once begun, a command is waited for.
+  absl::Status Execute(const Stop& stop, Command command);
+
+  // Ends the thread after the step it is in; a running job goes back to the queue. What waits is
+  // answered CANCELLED. Safe to call again.
+  void Close();
+
+ private:
+  struct Task {
+    Command command;
+    absl::Status status;
+    bool begun = false;
+    bool done = false;
+  };
+  enum class Step { kClosed, kCommand, kBatch, kJob };
+
+  void Loop();
+  // Rebuilds what is derived if it is not usable.
+  void RunRecovery();
+  Step NextStep() ABSL_LOCKS_EXCLUDED(mutex_);
+  bool HasWork() const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
+  void RunCommand();
+  void RunBatch();
+  void RunJob();
+
+  MapCore& core_;
+  JobBoard& jobs_;
+  Integrator integrator_;
+  const Stop closing_;
+  mutable absl::Mutex mutex_;
+  std::deque<Task*> tasks_ ABSL_GUARDED_BY(mutex_);
+  std::uint64_t pending_ ABSL_GUARDED_BY(mutex_);
+  bool job_waits_ ABSL_GUARDED_BY(mutex_) = false;
+  bool batch_was_last_ ABSL_GUARDED_BY(mutex_) = false;
+  bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+  std::thread thread_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_WORKER_H_

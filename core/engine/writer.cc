@@ -1,0 +1,101 @@
+#include "core/engine/writer.h"
+
+#include <cstddef>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+
+#include "core/common/status.h"
+#include "core/common/stop.h"
+#include "core/storage/storage.h"
+
+namespace strata {
+namespace {
+
+constexpr absl::Duration kStopPoll = absl::Milliseconds(50);
+
+}  // namespace
+
+WriterThread::WriterThread(StorageWriter& storage, std::size_t queue_bytes)
+    : storage_(storage), queue_bytes_(queue_bytes), thread_([this] { Loop(); }) {}
+
+WriterThread::~WriterThread() { Close(); }
+
+void WriterThread::Close() {
+  {
+    absl::MutexLock lock(&mutex_);
+    closed_ = true;
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+absl::Status WriterThread::Run(Durability durability,
+                               std::size_t bytes,
+                               const Stop& stop,
+                               Work work) {
+  Task task{work, bytes, absl::OkStatus()};
+  absl::MutexLock lock(&mutex_);
+  const auto has_room = [this, bytes]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
+    return closed_ || queued_bytes_ == 0 || queued_bytes_ + bytes <= queue_bytes_;
+  };
+  while (!mutex_.AwaitWithTimeout(absl::Condition(&has_room), kStopPoll)) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+  }
+  if (closed_) return absl::CancelledError("the map is being closed");
+  queued_bytes_ += bytes;
+  (durability == Durability::kFull ? full_ : relaxed_).push_back(&task);
+  mutex_.Await(absl::Condition(&task.done));
+  return task.status;
+}
+
+bool WriterThread::HasWorkOrClosed() const {
+  return closed_ || !full_.empty() || !relaxed_.empty();
+}
+
+WriterThread::Queue WriterThread::TakeBatch(Durability& durability) {
+  durability = full_.empty() ? Durability::kRelaxed : Durability::kFull;
+  if (!full_.empty()) return std::exchange(full_, {});
+  Queue batch;
+  if (!relaxed_.empty()) {
+    batch.push_back(relaxed_.front());
+    relaxed_.pop_front();
+  }
+  return batch;
+}
+
+void WriterThread::CommitBatch(Durability durability, const Queue& batch) {
+  const absl::Status committed = storage_.Commit(durability, [&]() -> absl::Status {
+    for (Task* task : batch) {
+      task->status = storage_.Part([&] { return task->work(storage_); });
+    }
+    return absl::OkStatus();
+  });
+  if (committed.ok()) return;
+  for (Task* task : batch) {
+    if (task->status.ok()) task->status = committed;
+  }
+}
+
+void WriterThread::Loop() {
+  while (true) {
+    Durability durability = Durability::kFull;
+    Queue batch;
+    {
+      absl::MutexLock lock(&mutex_);
+      mutex_.Await(absl::Condition(this, &WriterThread::HasWorkOrClosed));
+      batch = TakeBatch(durability);
+      if (batch.empty()) return;
+    }
+    CommitBatch(durability, batch);
+    absl::MutexLock lock(&mutex_);
+    for (Task* task : batch) {
+      queued_bytes_ -= task->bytes;
+      task->done = true;
+    }
+  }
+}
+
+}  // namespace strata

@@ -1,0 +1,64 @@
+// The one thread that writes a map: acknowledgements first, many of them in one commit.
+#ifndef STRATA_CORE_ENGINE_WRITER_H_
+#define STRATA_CORE_ENGINE_WRITER_H_
+
+#include <cstddef>
+#include <deque>
+#include <thread>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/synchronization/mutex.h"
+
+#include "core/common/stop.h"
+#include "core/storage/storage.h"
+
+namespace strata {
+
+// Thread-safe.
+class WriterThread {
+ public:
+  using Work = absl::FunctionRef<absl::Status(StorageWriter&)>;
+
+  // `storage` must outlive the thread and is written by nobody else. At most `queue_bytes` wait.
+  WriterThread(StorageWriter& storage, std::size_t queue_bytes);
+  ~WriterThread();
+
+  // Runs `work` inside a commit on the writer's thread and returns when it is committed with that
+  // durability. kFull goes before kRelaxed; all kFull that wait share one commit, in which work
+  // that fails is undone alone. `bytes`: how much memory the work holds; with a full queue the call
+  // waits (CANCELLED, DEADLINE_EXCEEDED by `stop`). Once queued, the work is carried out.
+  absl::Status Run(Durability durability, std::size_t bytes, const Stop& stop, Work work);
+
+  // Carries out what is queued, then refuses everything with CANCELLED. Safe to call again.
+  void Close();
+
+ private:
+  struct Task {
+    Work work;
+    std::size_t bytes;
+    absl::Status status;
+    bool done = false;
+  };
+  using Queue = std::deque<Task*>;
+
+  void Loop();
+  // Takes what the next commit is made of.
+  Queue TakeBatch(Durability& durability) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void CommitBatch(Durability durability, const Queue& batch);
+  bool HasWorkOrClosed() const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
+
+  StorageWriter& storage_;
+  const std::size_t queue_bytes_;
+  absl::Mutex mutex_;
+  Queue full_ ABSL_GUARDED_BY(mutex_);
+  Queue relaxed_ ABSL_GUARDED_BY(mutex_);
+  std::size_t queued_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
+  bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+  std::thread thread_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_WRITER_H_

@@ -1,0 +1,96 @@
+#include "core/registration/plane_to_plane.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+
+#include "core/registration/column_grid.h"
+#include "core/registration/mls_registration.h"
+#include "core/registration/scan_features.h"
+
+namespace strata {
+namespace {
+
+Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+}  // namespace
+
+PlaneToPlaneMatcher::PlaneToPlaneMatcher(const ScanFeatures& source,
+                                         const RegistrationTarget& target,
+                                         const MlsRegistrationOptions& options)
+    : source_(source), target_(target), options_(options) {
+  for (int c = 0; c < kFeatureClasses; ++c) {
+    element_index_[c].assign(target.grid(static_cast<FeatureClass>(c)).points().size(), 0);
+  }
+}
+
+const SurfaceElement& PlaneToPlaneMatcher::TargetElement(FeatureClass c, std::uint32_t index) {
+  std::uint32_t& known = element_index_[static_cast<std::size_t>(c)][index];
+  if (known == 0) {
+    const ColumnGrid& grid = target_.grid(c);
+    elements_.push_back(FitSurfaceElement(grid,
+                                     grid.points()[index],
+                                     options_.neighbours,
+                                     static_cast<float>(options_.neighbour_radius_m)));
+    known = static_cast<std::uint32_t>(elements_.size());
+  }
+  return elements_[known - 1];
+}
+
+PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
+                                                double gate_m,
+                                                bool fine) {
+  PlaneToPlaneSums sums;
+  const Eigen::Matrix3d R = T_target_source.linear();
+  const Eigen::Vector3d t = T_target_source.translation();
+  const double tangent2 = options_.tangent_sigma_m * options_.tangent_sigma_m;
+  const double flattening = tangent2 - options_.normal_sigma_m * options_.normal_sigma_m;
+  const double inverse_width2 = 1.0 / (options_.robust_width * options_.robust_width);
+  const std::size_t limit =
+      static_cast<std::size_t>(fine ? options_.max_samples : options_.coarse_samples);
+  const std::size_t n = std::min(limit, source_.sample().size());
+  sums.selected = static_cast<int>(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const SampledFeature& sampled = source_.sample()[i];
+    const Eigen::Vector3d p = sampled.element.point.cast<double>();
+    const ColumnGrid& grid = target_.grid(sampled.feature_class);
+    const Eigen::Vector3d p_target = R * p + t;
+    const std::uint32_t j = grid.Nearest(p_target.cast<float>(), static_cast<float>(gate_m));
+    if (j == ColumnGrid::kNone) continue;
+    const SurfaceElement q = fine ? TargetElement(sampled.feature_class, j)
+                                  : SurfaceElement{grid.points()[j], R.cast<float>() * sampled.element.normal};
+    const Eigen::Vector3d r = R.transpose() * (q.point.cast<double>() - p_target);
+    const Eigen::Vector3d normal_p = sampled.element.normal.cast<double>();
+    const Eigen::Vector3d normal_q = R.transpose() * q.normal.cast<double>();
+    const Eigen::Matrix3d C = 2.0 * tangent2 * Eigen::Matrix3d::Identity() -
+                              flattening * (normal_p * normal_p.transpose() +
+                                            normal_q * normal_q.transpose());
+    const Eigen::Matrix3d M = C.inverse();
+    const Eigen::Vector3d Mr = M * r;
+    const double error = r.dot(Mr);
+    const double w = 1.0 / (1.0 + error * inverse_width2);
+    const Eigen::Matrix3d P = Skew(p);
+    const Eigen::Matrix3d PM = P * M;
+    sums.H.topLeftCorner<3, 3>() -= w * PM * P;  // Pᵀ = −P
+    sums.H.topRightCorner<3, 3>() += w * PM;
+    sums.H.bottomRightCorner<3, 3>() += w * M;
+    sums.b.head<3>() += w * P * Mr;
+    sums.b.tail<3>() += w * Mr;
+    sums.squared_error += w * error;
+    const double distance = r.dot(normal_q);
+    sums.squared_distance_m2 += distance * distance;
+    sums.squared_radius_m2 += p.squaredNorm();
+    ++sums.inliers;
+  }
+  sums.H.bottomLeftCorner<3, 3>() = sums.H.topRightCorner<3, 3>().transpose();
+  return sums;
+}
+
+}  // namespace strata

@@ -1,0 +1,56 @@
+// One linearisation of the plane-to-plane error between a scan's sample and a target: the inner
+// part of RegisterScan.
+#ifndef STRATA_CORE_REGISTRATION_PLANE_TO_PLANE_H_
+#define STRATA_CORE_REGISTRATION_PLANE_TO_PLANE_H_
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/geometry/pose.h"
+#include "core/registration/registration_target.h"
+#include "core/registration/scan_features.h"
+
+namespace strata {
+
+struct MlsRegistrationOptions;
+
+// Sums over the matches of one iteration.
+struct PlaneToPlaneSums {
+  Matrix6d H = Matrix6d::Zero();  // Σ w JᵀMJ
+  Vector6d b = Vector6d::Zero();  // Σ w JᵀM r
+  double squared_error = 0.0;        // Σ w rᵀM r
+  double squared_distance_m2 = 0.0;  // Σ (distance along the normal)²
+  double squared_radius_m2 = 0.0;    // Σ |p|², p in the scan frame
+  int selected = 0;
+  int inliers = 0;
+};
+
+// A match pairs p (scan frame) with q (target). With r = T⁻¹q − p and a right-hand step
+// T·Exp([ω, v]) its error is rᵀM r, its Jacobian J = [−[p]ₓ, I], and
+//   M = (C_p + Rᵀ C_q R)⁻¹,   C = σt² I − (σt² − σn²) n nᵀ
+// with n the normal of the surface element, so that a surface is known to σn across and to σt along.
+class PlaneToPlaneMatcher {
+ public:
+  // Keeps references.
+  PlaneToPlaneMatcher(const ScanFeatures& source,
+                      const RegistrationTarget& target,
+                      const MlsRegistrationOptions& options);
+
+  // `fine` uses `max_samples` and both sides' normals; otherwise `coarse_samples` and only the
+  // source's, which are at hand. Normals of the target are computed at its first match and kept.
+  PlaneToPlaneSums Linearise(const Pose& T_target_source, double gate_m, bool fine);
+
+ private:
+  const SurfaceElement& TargetElement(FeatureClass c, std::uint32_t index);
+
+  const ScanFeatures& source_;
+  const RegistrationTarget& target_;
+  const MlsRegistrationOptions& options_;
+  std::array<std::vector<std::uint32_t>, kFeatureClasses> element_index_;  // 0: not computed yet
+  std::vector<SurfaceElement> elements_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_REGISTRATION_PLANE_TO_PLANE_H_

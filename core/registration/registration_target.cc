@@ -1,0 +1,95 @@
+#include "core/registration/registration_target.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include <Eigen/Core>
+
+#include "core/registration/option_checks.h"
+#include "core/registration/scan_features.h"
+
+namespace strata {
+namespace {
+
+constexpr float kColumnSizeM = 0.4F;
+
+// Averages points that share a cube. Open addressing over cube keys; cubes keep the order in which
+// they are first seen, so the result depends on the points and their order only.
+std::vector<Eigen::Vector3f> AverageInCubes(const std::vector<Eigen::Vector3f>& points,
+                                            float cube_m) {
+  std::vector<Eigen::Vector3f> means;
+  std::vector<float> counts;
+  std::vector<std::uint64_t> keys;
+  means.reserve(points.size() / 2);
+  counts.reserve(points.size() / 2);
+  keys.reserve(points.size() / 2);
+  const std::size_t slots = std::bit_ceil(points.size() * 2 + 1);
+  const int shift = 64 - std::countr_zero(slots);
+  std::vector<std::uint32_t> table(slots, ColumnGrid::kNone);
+  const auto coordinate = [&](float v) {
+    return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(v / cube_m))) & 0x1FFFFF;
+  };
+  for (const Eigen::Vector3f& p : points) {
+    const std::uint64_t key =
+        coordinate(p.x()) | coordinate(p.y()) << 21 | coordinate(p.z()) << 42;
+    std::size_t slot = (key * 0x9E3779B97F4A7C15U) >> shift;
+    while (table[slot] != ColumnGrid::kNone && keys[table[slot]] != key) {
+      slot = (slot + 1) & (slots - 1);
+    }
+    if (table[slot] == ColumnGrid::kNone) {
+      table[slot] = static_cast<std::uint32_t>(means.size());
+      means.push_back(p);
+      counts.push_back(1.0F);
+      keys.push_back(key);
+    } else {
+      const std::uint32_t i = table[slot];
+      counts[i] += 1.0F;
+      means[i] += (p - means[i]) / counts[i];
+    }
+  }
+  return means;
+}
+
+}  // namespace
+
+absl::Status TargetOptions::Validate() const {
+  OptionChecks checks("target options");
+  checks.InRange("thinning_m", thinning_m, 0.0, 10.0);
+  checks.InRange("radius_m", radius_m, 1.0, 1e4);
+  checks.InRange("|centre|", centre.norm(), 0.0, 1e8);
+  return checks.status();
+}
+
+RegistrationTarget::RegistrationTarget(std::span<const PlacedScan> scans,
+                                       const TargetOptions& options)
+    : origin_(options.centre) {
+  const auto radius_m2 = static_cast<float>(options.radius_m * options.radius_m);
+  for (int c = 0; c < kFeatureClasses; ++c) {
+    std::vector<Eigen::Vector3f> points;
+    for (const PlacedScan& scan : scans) {
+      const Eigen::Matrix3f R = scan.T_target_scan.linear().cast<float>();
+      const Eigen::Vector3f t = (scan.T_target_scan.translation() - origin_).cast<float>();
+      for (const Eigen::Vector3f& p : scan.features->points(static_cast<FeatureClass>(c))) {
+        const Eigen::Vector3f moved = R * p + t;
+        if (moved.head<2>().squaredNorm() <= radius_m2) points.push_back(moved);
+      }
+    }
+    if (scans.size() > 1 && options.thinning_m > 0.0) {
+      points = AverageInCubes(points, static_cast<float>(options.thinning_m));
+    }
+    grids_[c] = ColumnGrid(points, kColumnSizeM);
+  }
+}
+
+std::size_t RegistrationTarget::memory_bytes() const {
+  return sizeof(*this) + grids_[0].memory_bytes() + grids_[1].memory_bytes() -
+         2 * sizeof(ColumnGrid);
+}
+
+}  // namespace strata

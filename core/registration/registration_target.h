@@ -1,0 +1,53 @@
+// What a new scan is matched to: the features of one scan or of several neighbouring ones.
+#ifndef STRATA_CORE_REGISTRATION_REGISTRATION_TARGET_H_
+#define STRATA_CORE_REGISTRATION_REGISTRATION_TARGET_H_
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include "core/geometry/pose.h"
+#include "core/registration/column_grid.h"
+#include "core/registration/scan_features.h"
+
+namespace strata {
+
+// A scan already in place.
+struct PlacedScan {
+  const ScanFeatures* features = nullptr;  // not null; used during the call only
+  Pose T_target_scan = Pose::Identity();
+};
+
+struct TargetOptions {
+  // Features of several scans that share a cube of this edge and a class are averaged into one
+  // [m]; in [0, 10], 0 keeps all. A single scan is never thinned.
+  double thinning_m = 0.1;
+  // Features farther than this (horizontally) from the centre are left out [m]; in [1, 10000].
+  double radius_m = 120.0;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // target frame; usually the guess
+
+  absl::Status Validate() const;
+};
+
+// Class-wise search structure over the union. A pure function of its arguments and their order.
+// Coordinates are kept relative to the centre, so that the target frame may be far away. Immutable,
+// safe to share between threads.
+class RegistrationTarget {
+ public:
+  RegistrationTarget() = default;
+  explicit RegistrationTarget(std::span<const PlacedScan> scans, const TargetOptions& options = {});
+
+  const ColumnGrid& grid(FeatureClass c) const { return grids_[static_cast<std::size_t>(c)]; }
+  // Of the grids' coordinates, in the target frame.
+  const Eigen::Vector3d& origin() const { return origin_; }
+  std::size_t size() const { return grids_[0].points().size() + grids_[1].points().size(); }
+  std::size_t memory_bytes() const;
+
+ private:
+  std::array<ColumnGrid, kFeatureClasses> grids_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_REGISTRATION_REGISTRATION_TARGET_H_

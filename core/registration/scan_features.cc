@@ -1,0 +1,148 @@
+#include "core/registration/scan_features.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+
+#include "core/mls/mls_map.h"
+#include "core/registration/column_grid.h"
+#include "core/registration/option_checks.h"
+#include "core/registration/random.h"
+
+namespace strata {
+namespace {
+
+// Columns of this width hold a few tens of features near the sensor, and the nearest one is most
+// often in the first.
+constexpr float kColumnSizeM = 0.4F;
+
+using ClassPoints = std::array<std::vector<Eigen::Vector3f>, kFeatureClasses>;
+
+void AppendPatch(const Patch& patch,
+                 float x,
+                 float y,
+                 double samples_per_metre,
+                 ClassPoints& points) {
+  if (!patch.vertical()) {
+    points[0].emplace_back(x, y, static_cast<float>(patch.mean_m()));
+    return;
+  }
+  const double depth = patch.depth_m();
+  const int n = std::max(1, static_cast<int>(std::lround(depth * samples_per_metre)));
+  for (int i = 0; i < n; ++i) {
+    points[1].emplace_back(x, y, static_cast<float>(patch.bottom_m() + (i + 0.5) * depth / n));
+  }
+}
+
+std::uint64_t ContentHash(const ClassPoints& points) {
+  std::uint64_t hash = 0;
+  for (const auto& list : points) {
+    for (const Eigen::Vector3f& p : list) {
+      hash = SplitMix64(hash ^ std::bit_cast<std::uint32_t>(p.z())).Next();
+    }
+  }
+  return hash;
+}
+
+}  // namespace
+
+absl::Status FeatureOptions::Validate() const {
+  OptionChecks checks("feature options");
+  checks.InRange("samples_per_metre", samples_per_metre, 0.1, 100.0);
+  checks.InRange("max_range_m", max_range_m, 1.0, 1e4);
+  checks.InRange("sample_count", sample_count, 0, 1000000);
+  checks.InRange("neighbours", neighbours, 4, ColumnGrid::kMaxNeighbours);
+  checks.InRange("neighbour_radius_m", neighbour_radius_m, 0.01, 100.0);
+  return checks.status();
+}
+
+SurfaceElement FitSurfaceElement(const ColumnGrid& grid,
+                                 const Eigen::Vector3f& p,
+                                 int neighbours,
+                                 float radius_m) {
+  SurfaceElement element{p, Eigen::Vector3f::Zero()};
+  std::array<std::uint32_t, ColumnGrid::kMaxNeighbours> indices;
+  const int n = grid.Nearest(p, neighbours, radius_m, indices.data());
+  if (n < 4) return element;
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  Eigen::Matrix3f moments = Eigen::Matrix3f::Zero();
+  for (int i = 0; i < n; ++i) {
+    const Eigen::Vector3f d = grid.points()[indices[i]] - p;  // small numbers: float suffices
+    sum += d;
+    moments += d * d.transpose();
+  }
+  const Eigen::Vector3f mean = sum / static_cast<float>(n);
+  const Eigen::Matrix3d covariance = (moments - sum * mean.transpose()).cast<double>();
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(covariance);
+  if (eigen.eigenvalues()[1] < 1e-3 * eigen.eigenvalues()[2]) return element;
+  element.normal = eigen.eigenvectors().col(0).cast<float>();
+  element.point += element.normal.dot(mean) * element.normal;
+  return element;
+}
+
+ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const FeatureOptions& options) {
+  ClassPoints points;
+  const double cell_size = local_map.parameters.cell_size_m;
+  const double max_range_m2 = options.max_range_m * options.max_range_m;
+  for (auto& list : points) list.reserve(local_map.patch_count());
+  for (const MlsTile& tile : local_map.tiles) {
+    for (const Patch& patch : tile.patches) {
+      const CellIndex cell = CellOf(tile.key, static_cast<std::uint16_t>(patch.cell));
+      const double x = (cell.x + 0.5) * cell_size;
+      const double y = (cell.y + 0.5) * cell_size;
+      if (x * x + y * y > max_range_m2) continue;
+      AppendPatch(patch,
+                  static_cast<float>(x),
+                  static_cast<float>(y),
+                  options.samples_per_metre,
+                  points);
+    }
+  }
+  for (auto& list : points) list.shrink_to_fit();
+  return FromPoints(std::move(points), options);
+}
+
+ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const FeatureOptions& options) {
+  ScanFeatures features;
+  features.points_ = std::move(points);
+  std::array<ColumnGrid, kFeatureClasses> grids;
+  if (options.sample_count == 0) return features;
+  for (int c = 0; c < kFeatureClasses; ++c) {
+    grids[c] = ColumnGrid(features.points_[c], kColumnSizeM);
+  }
+  const auto horizontal = static_cast<std::uint32_t>(features.points_[0].size());
+  // Not the same places in every scan, or their bias would add up along a chain of scans.
+  SplitMix64 random(options.seed ^ ContentHash(features.points_));
+  const std::vector<std::uint32_t> chosen =
+      SampleIndices(static_cast<std::uint32_t>(features.size()),
+                    static_cast<std::uint32_t>(options.sample_count),
+                    random);
+  features.sample_.resize(chosen.size());
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    const int c = chosen[i] < horizontal ? 0 : 1;
+    SampledFeature& sampled = features.sample_[i];
+    sampled.feature_class = static_cast<FeatureClass>(c);
+    sampled.element = FitSurfaceElement(grids[c],
+                                        features.points_[c][chosen[i] - (c == 0 ? 0 : horizontal)],
+                                        options.neighbours,
+                                        static_cast<float>(options.neighbour_radius_m));
+  }
+  return features;
+}
+
+std::size_t ScanFeatures::memory_bytes() const {
+  return sizeof(*this) + (points_[0].capacity() + points_[1].capacity()) * sizeof(Eigen::Vector3f) +
+         sample_.capacity() * sizeof(SampledFeature);
+}
+
+}  // namespace strata

@@ -1,0 +1,124 @@
+// What one map keeps, as plain values: the rows that storage hands out and takes in.
+#ifndef STRATA_CORE_STORAGE_RECORDS_H_
+#define STRATA_CORE_STORAGE_RECORDS_H_
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "absl/time/time.h"
+#include <Eigen/Geometry>
+
+#include "core/geometry/pose.h"
+#include "core/mls/tile_key.h"
+#include "core/world/constraint.h"
+#include "core/world/map_info.h"
+#include "core/world/scan.h"
+
+namespace strata {
+
+// A scan inside its map: the commit sequence of its acknowledgement. Never used twice.
+using ScanNumber = std::uint64_t;
+
+// Where a map stands on its one clock.
+struct MapClock {
+  std::uint64_t commit_sequence = 0;  // last value handed out in a committed transaction
+  std::uint64_t epoch = 1;            // current epoch
+  std::uint64_t tile_version = 0;     // tiles of this version and older are the current ones
+  bool derived_complete = true;       // false: derived data must be rebuilt before they are used
+};
+
+// A scan without its points.
+struct ScanRecord {
+  ScanNumber number = 0;
+  ScanHeader header;
+  ScanState state = ScanState::kPending;
+  std::uint64_t upload = 0;  // whose chunks are its points
+  std::uint32_t chunks = 0;  // 0 once the points were dropped
+  bool has_points = true;    // false once the map dropped them after integration
+  std::uint64_t point_bytes = 0;
+  Eigen::AlignedBox3f box_scan;  // of the finite points in the scan frame; empty without any
+  std::string content_hash;
+  std::string message;  // why it failed
+};
+
+enum class PoseOrigin : std::uint8_t {  // stored
+  kIngest = 1,
+  kPerson = 2,
+};
+
+// A recorded decision: where a scan is from `epoch` on, until a later epoch says otherwise.
+struct PoseRecord {
+  ScanNumber scan = 0;
+  std::uint64_t epoch = 0;
+  Pose T_map_scan = Pose::Identity();
+  PoseOrigin origin = PoseOrigin::kIngest;
+  AlignmentReport report;
+};
+
+// A scan with its pose in some epoch; no pose before integration.
+struct PosedScan {
+  ScanRecord scan;
+  std::optional<PoseRecord> pose;
+};
+
+// A constraint between numbered scans; Constraint::i and ::j are filled in when it is read.
+struct ConstraintRecord {
+  ScanNumber scan_i = 0;
+  ScanNumber scan_j = 0;
+  Constraint constraint;
+};
+
+// Which scans; every given condition must hold.
+struct ScanQuery {
+  std::optional<std::string> trajectory;
+  std::optional<ScanState> state;
+  std::optional<absl::Time> from, until;   // half-open
+  std::optional<Eigen::AlignedBox2d> box;  // meets the footprint [m]
+  ScanNumber after = 0;                    // only scans with a larger number
+  std::uint32_t limit = 1000;              // at most so many, by number
+};
+
+struct ScanTotals {
+  std::uint64_t scans = 0;
+  std::uint64_t pending = 0;
+  std::uint64_t failed = 0;
+  std::uint64_t points = 0;
+  std::uint64_t point_bytes = 0;
+};
+
+// A tile of full statistics (core/codec's MLS tile bytes), level 0.
+struct MlsTileRow {
+  TileKey key;
+  std::uint64_t version = 0;
+  std::uint64_t patches = 0;
+  std::uint64_t cells = 0;
+  Eigen::AlignedBox3d box;  // around its surfaces [m]
+  std::string digest;       // content hash of `bytes`
+  std::string bytes;        // empty in listings
+};
+
+// A tile as served (core/codec's surface tile bytes), any level of detail.
+struct SurfaceTileRow {
+  TileKey key;
+  std::uint64_t version = 0;
+  bool gone = false;  // from `version` on there is nothing here
+  std::uint64_t patches = 0;
+  std::uint64_t size_bytes = 0;
+  std::string bytes;  // empty in listings
+};
+
+// Tiles [x_min, x_max) × [y_min, y_max) of one level.
+struct TileRange {
+  std::int32_t level = 0;
+  std::int64_t x_min = -(std::int64_t{1} << 31), x_max = std::int64_t{1} << 31;
+  std::int64_t y_min = -(std::int64_t{1} << 31), y_max = std::int64_t{1} << 31;
+};
+
+// The box of a scan's points in the map: its box in the scan frame, turned, and the upright box
+// around that. Holds every point; as tight as the turning allows.
+Eigen::AlignedBox2d FootprintOf(const Eigen::AlignedBox3f& box_scan, const Pose& T_map_scan);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_STORAGE_RECORDS_H_

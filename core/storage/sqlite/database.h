@@ -1,0 +1,120 @@
+// RAII around SQLite: a connection, its statements and transactions. sqlite3.h stays in this
+// folder's sources.
+#ifndef STRATA_CORE_STORAGE_SQLITE_DATABASE_H_
+#define STRATA_CORE_STORAGE_SQLITE_DATABASE_H_
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace strata {
+
+// Marks bytes to be bound as a BLOB.
+struct Blob {
+  absl::string_view bytes;
+};
+
+// A prepared statement on loan from its connection; goes back, reset, when it is destroyed. The
+// first error of a bind is kept and answered by Step() or Run().
+class Statement {
+ public:
+  explicit Statement(sqlite3_stmt* statement) : statement_(statement) {}
+  ~Statement();
+  Statement(Statement&& other) noexcept : statement_(std::exchange(other.statement_, nullptr)) {}
+  Statement& operator=(Statement&&) = delete;
+
+  // Binds all parameters in order.
+  template <typename... Values>
+  Statement& Bind(const Values&... values) {
+    int index = 0;
+    (BindOne(++index, values), ...);
+    return *this;
+  }
+  void BindOne(int index, std::int64_t value);
+  void BindOne(int index, std::uint64_t value) { BindOne(index, static_cast<std::int64_t>(value)); }
+  void BindOne(int index, int value) { BindOne(index, std::int64_t{value}); }
+  void BindOne(int index, std::uint32_t value) { BindOne(index, std::int64_t{value}); }
+  void BindOne(int index, bool value) { BindOne(index, std::int64_t{value}); }
+  void BindOne(int index, double value);
+  void BindOne(int index, absl::string_view text);
+  void BindOne(int index, const std::string& text) { BindOne(index, absl::string_view(text)); }
+  void BindOne(int index, Blob blob);
+
+  // True with a row, false at the end.
+  absl::StatusOr<bool> Step();
+  // Steps to the end.
+  absl::Status Run();
+
+  std::int64_t Int(int column) const;
+  std::uint64_t Unsigned(int column) const { return static_cast<std::uint64_t>(Int(column)); }
+  double Real(int column) const;
+  std::string Text(int column) const;
+  // Valid until the next step.
+  absl::string_view Bytes(int column) const;
+
+ private:
+  void Keep(int code);
+
+  sqlite3_stmt* statement_;
+  int bind_error_ = 0;
+};
+
+// A connection; one thread at a time.
+class Database {
+ public:
+  enum class Mode { kCreate, kWrite, kRead };
+
+  // kCreate makes a new file and fails with ALREADY_EXISTS if there is one; the others want one.
+  static absl::StatusOr<Database> Open(const std::filesystem::path& file, Mode mode);
+  ~Database();
+  Database(Database&& other) noexcept
+      : connection_(std::exchange(other.connection_, nullptr)),
+        statements_(std::exchange(other.statements_, {})) {}
+  Database& operator=(Database&&) = delete;
+
+  // Prepared once a connection; `sql` must live as long as the connection (a literal), and two
+  // loans of the same literal must not overlap.
+  absl::StatusOr<Statement> Prepare(const char* sql);
+  // One or more statements without parameters or results.
+  absl::Status Execute(const std::string& sql);
+  absl::StatusOr<std::int64_t> Pragma(const char* sql);
+
+ private:
+  explicit Database(sqlite3* connection) : connection_(connection) {}
+
+  sqlite3* connection_;
+  std::map<const char*, sqlite3_stmt*> statements_;
+};
+
+// `begin` … "COMMIT"; rolled back on destruction unless Commit() succeeded.
+class Transaction {
+ public:
+  // `begin`: "BEGIN" for reads, "BEGIN IMMEDIATE" for writes.
+  static absl::StatusOr<Transaction> Begin(Database& database, const char* begin);
+  ~Transaction();
+  Transaction(Transaction&& other) noexcept : database_(std::exchange(other.database_, nullptr)) {}
+  Transaction& operator=(Transaction&&) = delete;
+
+  absl::Status Commit();
+
+ private:
+  explicit Transaction(Database& database) : database_(&database) {}
+  Database* database_;
+};
+
+// Calls `row` for every row of `statement`.
+absl::Status ForEachRow(Statement& statement, absl::FunctionRef<absl::Status()> row);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_STORAGE_SQLITE_DATABASE_H_

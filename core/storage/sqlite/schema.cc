@@ -1,0 +1,244 @@
+#include "core/storage/sqlite/schema.h"
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/common/status.h"
+#include "core/storage/sqlite/database.h"
+
+namespace strata {
+namespace {
+
+// Migration i brings a file from user_version i to i + 1. Never edited once released.
+constexpr std::array<const char*, kTruthVersion> kMigrations = {
+    R"sql(
+CREATE TABLE truth_map (
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  created_us INTEGER NOT NULL,
+  cell_size_m REAL NOT NULL,
+  gap_size_m REAL NOT NULL,
+  thickness_m REAL NOT NULL,
+  sensor_sigma_m REAL NOT NULL,
+  sensor_sigma_per_metre REAL NOT NULL,
+  sensor_min_range_m REAL NOT NULL,
+  sensor_max_range_m REAL NOT NULL,
+  keep_points INTEGER NOT NULL,
+  has_origin INTEGER NOT NULL,
+  latitude_rad REAL NOT NULL,
+  longitude_rad REAL NOT NULL,
+  altitude_m REAL NOT NULL,
+  commit_sequence INTEGER NOT NULL,
+  epoch INTEGER NOT NULL
+) STRICT;
+CREATE TABLE truth_scan (
+  number INTEGER PRIMARY KEY,
+  trajectory TEXT NOT NULL,
+  sequence INTEGER NOT NULL,
+  time_us INTEGER NOT NULL,
+  header BLOB NOT NULL,
+  points INTEGER NOT NULL,
+  state INTEGER NOT NULL,
+  upload INTEGER NOT NULL UNIQUE,
+  chunks INTEGER NOT NULL,
+  has_points INTEGER NOT NULL,
+  point_bytes INTEGER NOT NULL,
+  has_box INTEGER NOT NULL,
+  min_x REAL NOT NULL, min_y REAL NOT NULL, min_z REAL NOT NULL,
+  max_x REAL NOT NULL, max_y REAL NOT NULL, max_z REAL NOT NULL,
+  content_hash TEXT NOT NULL,
+  message TEXT NOT NULL,
+  UNIQUE (trajectory, sequence)
+) STRICT;
+CREATE INDEX truth_scan_state ON truth_scan (state, number);
+CREATE INDEX truth_scan_time ON truth_scan (time_us);
+CREATE TABLE truth_chunk (
+  upload INTEGER NOT NULL,
+  ordinal INTEGER NOT NULL,
+  bytes BLOB NOT NULL CHECK (length(bytes) <= 1048576),
+  PRIMARY KEY (upload, ordinal)
+) STRICT;
+CREATE TABLE truth_local_map (
+  scan INTEGER PRIMARY KEY,
+  bytes BLOB NOT NULL
+) STRICT;
+CREATE TABLE truth_epoch (
+  epoch INTEGER PRIMARY KEY,
+  created_us INTEGER NOT NULL,
+  reason TEXT NOT NULL
+) STRICT;
+CREATE TABLE truth_pose (
+  scan INTEGER NOT NULL,
+  epoch INTEGER NOT NULL,
+  pose BLOB NOT NULL,
+  origin INTEGER NOT NULL,
+  aligned INTEGER NOT NULL,
+  message TEXT NOT NULL,
+  overlap REAL NOT NULL,
+  rms_m REAL NOT NULL,
+  iterations INTEGER NOT NULL,
+  PRIMARY KEY (scan, epoch)
+) STRICT, WITHOUT ROWID;
+CREATE TABLE truth_constraint (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  scan_i INTEGER NOT NULL,
+  scan_j INTEGER NOT NULL,
+  pose BLOB NOT NULL,
+  information BLOB NOT NULL,
+  origin INTEGER NOT NULL,
+  enabled INTEGER NOT NULL,
+  note TEXT NOT NULL
+) STRICT;
+CREATE INDEX truth_constraint_i ON truth_constraint (scan_i);
+CREATE INDEX truth_constraint_j ON truth_constraint (scan_j);
+CREATE TABLE truth_profile (
+  name TEXT PRIMARY KEY,
+  radius_m REAL NOT NULL,
+  height_m REAL NOT NULL,
+  max_step_m REAL NOT NULL,
+  max_slope_rad REAL NOT NULL,
+  max_gap_m REAL NOT NULL,
+  max_roughness_m REAL NOT NULL
+) STRICT, WITHOUT ROWID;
+CREATE TABLE truth_job (
+  id INTEGER PRIMARY KEY,
+  kind TEXT NOT NULL,
+  state INTEGER NOT NULL,
+  progress REAL NOT NULL,
+  phase TEXT NOT NULL,
+  message TEXT NOT NULL,
+  created_us INTEGER NOT NULL,
+  updated_us INTEGER NOT NULL
+) STRICT;
+CREATE TABLE truth_job_parameter (
+  job INTEGER NOT NULL, name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (job, name)
+) STRICT, WITHOUT ROWID;
+CREATE TABLE truth_job_metric (
+  job INTEGER NOT NULL, name TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY (job, name)
+) STRICT, WITHOUT ROWID;
+)sql",
+};
+
+constexpr char kDerivedTables[] = R"sql(
+CREATE TABLE derived_state (
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  schema INTEGER NOT NULL,
+  tile_version INTEGER NOT NULL,
+  complete INTEGER NOT NULL
+) STRICT;
+CREATE TABLE derived_mls_tile (
+  level INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL,
+  version INTEGER NOT NULL,
+  patches INTEGER NOT NULL,
+  cells INTEGER NOT NULL,
+  min_x REAL NOT NULL, min_y REAL NOT NULL, min_z REAL NOT NULL,
+  max_x REAL NOT NULL, max_y REAL NOT NULL, max_z REAL NOT NULL,
+  digest TEXT NOT NULL,
+  bytes BLOB NOT NULL,
+  PRIMARY KEY (level, x, y, version)
+) STRICT;
+CREATE TABLE derived_surface_tile (
+  level INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL,
+  version INTEGER NOT NULL,
+  gone INTEGER NOT NULL,
+  patches INTEGER NOT NULL,
+  size_bytes INTEGER NOT NULL,
+  bytes BLOB NOT NULL,
+  PRIMARY KEY (level, x, y, version)
+) STRICT;
+CREATE TABLE derived_scan_tile (
+  scan INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL,
+  PRIMARY KEY (scan, x, y)
+) STRICT, WITHOUT ROWID;
+CREATE INDEX derived_scan_tile_place ON derived_scan_tile (x, y, scan);
+CREATE VIRTUAL TABLE derived_footprint USING rtree (
+  scan, min_x, max_x, min_y, max_y,
+  +exact_min_x, +exact_max_x, +exact_min_y, +exact_max_y
+);
+)sql";
+
+absl::StatusOr<bool> HasDerivedTables(Database& database) {
+  STRATA_ASSIGN_OR_RETURN(
+      const std::int64_t tables,
+      database.Pragma("SELECT count(*) FROM sqlite_schema WHERE name IN ('derived_state', "
+                      "'derived_mls_tile', 'derived_surface_tile', 'derived_scan_tile', "
+                      "'derived_footprint')"));
+  if (tables != 5) return false;
+  STRATA_ASSIGN_OR_RETURN(
+      const std::int64_t schema,
+      database.Pragma("SELECT coalesce(max(schema), 0) FROM derived_state WHERE id = 1"));
+  return schema == kDerivedVersion;
+}
+
+absl::Status Migrate(Database& database, std::int64_t version) {
+  for (; version < kTruthVersion; ++version) {
+    STRATA_ASSIGN_OR_RETURN(Transaction transaction,
+                            Transaction::Begin(database, "BEGIN IMMEDIATE"));
+    STRATA_RETURN_IF_ERROR(database.Execute(kMigrations[version]));
+    STRATA_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA user_version = ", version + 1)));
+    STRATA_RETURN_IF_ERROR(transaction.Commit());
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status ResetDerivedTables(Database& database) {
+  std::vector<std::string> tables;
+  {
+    // An R*Tree drops its shadow tables itself.
+    STRATA_ASSIGN_OR_RETURN(
+        Statement names,
+        database.Prepare("SELECT name FROM sqlite_schema WHERE type = 'table' AND "
+                         "name GLOB 'derived_*' AND name NOT GLOB 'derived_footprint_*'"));
+    STRATA_RETURN_IF_ERROR(ForEachRow(names, [&] {
+      tables.push_back(names.Text(0));
+      return absl::OkStatus();
+    }));
+  }
+  for (const std::string& table : tables) {
+    STRATA_RETURN_IF_ERROR(database.Execute(absl::StrCat("DROP TABLE \"", table, "\"")));
+  }
+  STRATA_RETURN_IF_ERROR(database.Execute(kDerivedTables));
+  return database.Execute(
+      absl::StrCat("INSERT INTO derived_state VALUES (1, ", kDerivedVersion, ", 0, 0)"));
+}
+
+absl::Status CreateSchema(Database& database) {
+  STRATA_RETURN_IF_ERROR(database.Execute("PRAGMA page_size = 8192"));
+  STRATA_RETURN_IF_ERROR(
+      database.Execute(absl::StrCat("PRAGMA application_id = ", kApplicationId)));
+  STRATA_RETURN_IF_ERROR(database.Execute("PRAGMA journal_mode = WAL"));
+  return UpgradeSchema(database);
+}
+
+absl::Status UpgradeSchema(Database& database) {
+  const absl::StatusOr<std::int64_t> application = database.Pragma("PRAGMA application_id");
+  if (!application.ok()) return application.status();
+  if (*application != kApplicationId) {
+    return absl::FailedPreconditionError(
+        "not a Strata map: a database file of another application");
+  }
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t version, database.Pragma("PRAGMA user_version"));
+  if (version < 0 || version > kTruthVersion) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("format version ",
+                     version,
+                     " is newer than ",
+                     kTruthVersion,
+                     ", the newest this program reads; update it"));
+  }
+  STRATA_RETURN_IF_ERROR(Migrate(database, version));
+  const absl::StatusOr<bool> derived = HasDerivedTables(database);
+  if (derived.ok() && *derived) return absl::OkStatus();
+  STRATA_ASSIGN_OR_RETURN(Transaction transaction, Transaction::Begin(database, "BEGIN IMMEDIATE"));
+  STRATA_RETURN_IF_ERROR(ResetDerivedTables(database));
+  return transaction.Commit();
+}
+
+}  // namespace strata

@@ -1,0 +1,307 @@
+// Truth: the map, its scans and what was decided about them. sqlite_tile_reader.cc has the rest.
+#include "core/storage/sqlite/sqlite_reader.h"
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "absl/time/time.h"
+
+#include "core/common/status.h"
+#include "core/storage/sqlite/database.h"
+#include "core/storage/sqlite/scan_rows.h"
+#include "core/storage/value_codec.h"
+
+namespace strata {
+namespace {
+
+RobotProfile ReadProfile(const Statement& row, int column) {
+  RobotProfile profile;
+  profile.radius_m = row.Real(column);
+  profile.height_m = row.Real(column + 1);
+  profile.max_step_m = row.Real(column + 2);
+  profile.max_slope_rad = row.Real(column + 3);
+  profile.max_gap_m = row.Real(column + 4);
+  profile.max_roughness_m = row.Real(column + 5);
+  return profile;
+}
+
+absl::StatusOr<std::optional<PosedScan>> ReadOne(Statement& row) {
+  STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
+  if (!found) return std::optional<PosedScan>();
+  STRATA_ASSIGN_OR_RETURN(PosedScan scan, ReadPosedScan(row));
+  return std::optional<PosedScan>(std::move(scan));
+}
+
+JobInfo ReadJob(const Statement& row) {
+  JobInfo job;
+  job.id = row.Unsigned(0);
+  job.kind = row.Text(1);
+  job.state = static_cast<JobState>(row.Int(2));
+  job.progress = row.Real(3);
+  job.phase = row.Text(4);
+  job.message = row.Text(5);
+  job.created = absl::FromUnixMicros(row.Int(6));
+  job.updated = absl::FromUnixMicros(row.Int(7));
+  return job;
+}
+
+absl::StatusOr<ConstraintRecord> ReadConstraint(const Statement& row) {
+  ConstraintRecord record;
+  Constraint& constraint = record.constraint;
+  constraint.id = row.Unsigned(0);
+  record.scan_i = row.Unsigned(1);
+  record.scan_j = row.Unsigned(2);
+  const std::string what = absl::StrCat("constraint ", constraint.id);
+  absl::StatusOr<Pose> pose = DecodePose(row.Bytes(3));
+  if (!pose.ok()) return Annotate(pose.status(), what);
+  constraint.T_i_j = *pose;
+  absl::StatusOr<Matrix6d> information = DecodeMatrix6(row.Bytes(4));
+  if (!information.ok()) return Annotate(information.status(), what);
+  constraint.information = *information;
+  constraint.origin = static_cast<ConstraintOrigin>(row.Int(5));
+  constraint.enabled = row.Int(6) != 0;
+  constraint.note = row.Text(7);
+  constraint.i = {row.Text(8), row.Unsigned(9)};
+  constraint.j = {row.Text(10), row.Unsigned(11)};
+  return record;
+}
+
+}  // namespace
+
+absl::Status SqliteReader::Snapshot(absl::FunctionRef<absl::Status()> body) {
+  STRATA_ASSIGN_OR_RETURN(Transaction transaction, Transaction::Begin(database_, "BEGIN"));
+  STRATA_RETURN_IF_ERROR(body());
+  return transaction.Commit();
+}
+
+absl::StatusOr<MapClock> SqliteReader::GetClock() {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT m.commit_sequence, m.epoch, d.tile_version, d.complete "
+                        "FROM truth_map AS m, derived_state AS d WHERE m.id = 1 AND d.id = 1"));
+  STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
+  if (!found) return absl::DataLossError("store: the map's own row is missing");
+  return MapClock{row.Unsigned(0), row.Unsigned(1), row.Unsigned(2), row.Int(3) != 0};
+}
+
+absl::StatusOr<MapInfo> SqliteReader::GetMapInfo() {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare(
+          "SELECT m.created_us, m.cell_size_m, m.gap_size_m, m.thickness_m, m.sensor_sigma_m, "
+          "m.sensor_sigma_per_metre, m.sensor_min_range_m, m.sensor_max_range_m, m.keep_points, "
+          "m.has_origin, m.latitude_rad, m.longitude_rad, m.altitude_m, p.radius_m, p.height_m, "
+          "p.max_step_m, p.max_slope_rad, p.max_gap_m, p.max_roughness_m FROM truth_map AS m, "
+          "truth_profile AS p WHERE m.id = 1 AND p.name = 'default'"));
+  STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
+  if (!found) return absl::DataLossError("store: the map's parameters are missing");
+  MapInfo info;
+  info.created = absl::FromUnixMicros(row.Int(0));
+  info.parameters.mls = {row.Real(1), row.Real(2), row.Real(3)};
+  info.parameters.sensor = {row.Real(4), row.Real(5), row.Real(6), row.Real(7)};
+  info.parameters.keep_points = row.Int(8) != 0;
+  if (row.Int(9) != 0) info.parameters.origin = {row.Real(10), row.Real(11), row.Real(12)};
+  info.parameters.default_profile = ReadProfile(row, 13);
+  if (const absl::Status valid = ValidateMapParameters(info.parameters); !valid.ok()) {
+    return absl::DataLossError(absl::StrCat("store: ", valid.message()));
+  }
+  return info;
+}
+
+absl::StatusOr<std::optional<PosedScan>> SqliteReader::FindScan(const ScanId& id,
+                                                                std::uint64_t epoch) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare(STRATA_SELECT_POSED_SCAN "WHERE s.trajectory = ?2 AND s.sequence = ?3"));
+  row.Bind(epoch, id.trajectory, id.sequence);
+  return ReadOne(row);
+}
+
+absl::StatusOr<PosedScan> SqliteReader::GetScan(ScanNumber number, std::uint64_t epoch) {
+  STRATA_ASSIGN_OR_RETURN(Statement row,
+                          database_.Prepare(STRATA_SELECT_POSED_SCAN "WHERE s.number = ?2"));
+  row.Bind(epoch, number);
+  STRATA_ASSIGN_OR_RETURN(std::optional<PosedScan> scan, ReadOne(row));
+  if (!scan.has_value()) return absl::NotFoundError(absl::StrCat("scan number ", number));
+  return *std::move(scan);
+}
+
+absl::StatusOr<std::optional<PosedScan>> SqliteReader::FindPredecessor(absl::string_view trajectory,
+                                                                       std::uint64_t sequence,
+                                                                       std::uint64_t epoch) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare(STRATA_SELECT_POSED_SCAN
+                        "WHERE s.trajectory = ?2 AND s.sequence < ?3 AND s.state = 2 "
+                        "ORDER BY s.sequence DESC LIMIT 1"));
+  row.Bind(epoch, trajectory, sequence);
+  return ReadOne(row);
+}
+
+absl::StatusOr<std::vector<PosedScan>> SqliteReader::ListScans(const ScanQuery& query,
+                                                               std::uint64_t epoch) {
+  // An absent condition is bound so that it always holds.
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare(
+          STRATA_SELECT_POSED_SCAN
+          "WHERE s.number > ?2 AND (?3 = '' OR s.trajectory = ?3) AND (?4 = 0 OR s.state = ?4) "
+          "AND s.time_us >= ?5 AND s.time_us < ?6 AND (?7 = 0 OR s.number IN (SELECT f.scan FROM "
+          "derived_footprint AS f WHERE f.min_x <= ?9 AND f.max_x >= ?8 AND f.min_y <= ?11 AND "
+          "f.max_y >= ?10 AND f.exact_min_x <= ?9 AND f.exact_max_x >= ?8 AND "
+          "f.exact_min_y <= ?11 AND f.exact_max_y >= ?10)) "
+          "ORDER BY s.number LIMIT ?12"));
+  constexpr std::int64_t kForever = std::int64_t{1} << 62;
+  const Eigen::AlignedBox2d box = query.box.value_or(Eigen::AlignedBox2d());
+  row.Bind(epoch,
+           query.after,
+           query.trajectory.value_or(""),
+           query.state.has_value() ? static_cast<int>(*query.state) : 0,
+           query.from.has_value() ? absl::ToUnixMicros(*query.from) : -kForever,
+           query.until.has_value() ? absl::ToUnixMicros(*query.until) : kForever,
+           query.box.has_value(),
+           box.min().x(),
+           box.max().x(),
+           box.min().y(),
+           box.max().y(),
+           query.limit);
+  std::vector<PosedScan> scans;
+  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(PosedScan scan, ReadPosedScan(row));
+    scans.push_back(std::move(scan));
+    return absl::OkStatus();
+  }));
+  return scans;
+}
+
+absl::StatusOr<UploadState> SqliteReader::GetUploadState(absl::string_view trajectory) {
+  STRATA_ASSIGN_OR_RETURN(Statement row,
+                          database_.Prepare("SELECT count(*), coalesce(max(sequence), 0) FROM "
+                                            "truth_scan WHERE trajectory = ?1"));
+  row.Bind(trajectory);
+  STRATA_RETURN_IF_ERROR(row.Step().status());
+  return UploadState{
+      .exists = row.Int(0) > 0, .last_sequence = row.Unsigned(1), .scans = row.Unsigned(0)};
+}
+
+absl::StatusOr<ScanTotals> SqliteReader::GetScanTotals() {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT count(*), count(*) FILTER (WHERE state = 1), count(*) FILTER "
+                        "(WHERE state = 3), coalesce(sum(points), 0), "
+                        "coalesce(sum(point_bytes), 0) FROM truth_scan"));
+  STRATA_RETURN_IF_ERROR(row.Step().status());
+  return ScanTotals{
+      row.Unsigned(0), row.Unsigned(1), row.Unsigned(2), row.Unsigned(3), row.Unsigned(4)};
+}
+
+absl::StatusOr<std::uint64_t> SqliteReader::LastUpload() {
+  STRATA_ASSIGN_OR_RETURN(
+      const std::int64_t last,
+      database_.Pragma("SELECT max(coalesce((SELECT max(upload) FROM truth_scan), 0), "
+                       "coalesce((SELECT max(upload) FROM truth_chunk), 0))"));
+  return static_cast<std::uint64_t>(last);
+}
+
+absl::StatusOr<std::string> SqliteReader::GetChunk(std::uint64_t upload, std::uint32_t ordinal) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT bytes FROM truth_chunk WHERE upload = ?1 AND ordinal = ?2"));
+  row.Bind(upload, ordinal);
+  STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
+  if (!found) return absl::DataLossError(absl::StrCat("piece ", ordinal, " of the points is gone"));
+  return row.Text(0);
+}
+
+absl::StatusOr<std::string> SqliteReader::GetLocalMap(ScanNumber number) {
+  STRATA_ASSIGN_OR_RETURN(Statement row,
+                          database_.Prepare("SELECT bytes FROM truth_local_map WHERE scan = ?1"));
+  row.Bind(number);
+  STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
+  if (!found) return absl::DataLossError(absl::StrCat("local map of scan ", number, " is gone"));
+  return row.Text(0);
+}
+
+absl::StatusOr<std::vector<ConstraintRecord>> SqliteReader::ListConstraints() {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT c.id, c.scan_i, c.scan_j, c.pose, c.information, c.origin, "
+                        "c.enabled, c.note, i.trajectory, i.sequence, j.trajectory, j.sequence "
+                        "FROM truth_constraint AS c JOIN truth_scan AS i ON i.number = c.scan_i "
+                        "JOIN truth_scan AS j ON j.number = c.scan_j ORDER BY c.id"));
+  std::vector<ConstraintRecord> constraints;
+  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(ConstraintRecord record, ReadConstraint(row));
+    constraints.push_back(std::move(record));
+    return absl::OkStatus();
+  }));
+  return constraints;
+}
+
+absl::StatusOr<std::map<std::string, RobotProfile>> SqliteReader::ListProfiles() {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT name, radius_m, height_m, max_step_m, max_slope_rad, max_gap_m, "
+                        "max_roughness_m FROM truth_profile ORDER BY name"));
+  std::map<std::string, RobotProfile> profiles;
+  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
+    profiles[row.Text(0)] = ReadProfile(row, 1);
+    return absl::OkStatus();
+  }));
+  return profiles;
+}
+
+absl::Status SqliteReader::ReadJobDetails(JobInfo& job) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement parameter,
+      database_.Prepare("SELECT name, value FROM truth_job_parameter WHERE job = ?1"));
+  parameter.Bind(job.id);
+  STRATA_RETURN_IF_ERROR(ForEachRow(parameter, [&] {
+    job.parameters[parameter.Text(0)] = parameter.Text(1);
+    return absl::OkStatus();
+  }));
+  STRATA_ASSIGN_OR_RETURN(
+      Statement metric,
+      database_.Prepare("SELECT name, value FROM truth_job_metric WHERE job = ?1"));
+  metric.Bind(job.id);
+  return ForEachRow(metric, [&] {
+    job.metrics[metric.Text(0)] = metric.Real(1);
+    return absl::OkStatus();
+  });
+}
+
+absl::StatusOr<std::optional<JobInfo>> SqliteReader::FindJob(std::uint64_t id) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT id, kind, state, progress, phase, message, created_us, updated_us "
+                        "FROM truth_job WHERE id = ?1"));
+  row.Bind(id);
+  STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
+  if (!found) return std::optional<JobInfo>();
+  JobInfo job = ReadJob(row);
+  STRATA_RETURN_IF_ERROR(ReadJobDetails(job));
+  return std::optional<JobInfo>(std::move(job));
+}
+
+absl::StatusOr<std::vector<JobInfo>> SqliteReader::ListJobs() {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT id, kind, state, progress, phase, message, created_us, updated_us "
+                        "FROM truth_job ORDER BY id"));
+  std::vector<JobInfo> jobs;
+  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&]() -> absl::Status {
+    jobs.push_back(ReadJob(row));
+    return ReadJobDetails(jobs.back());
+  }));
+  return jobs;
+}
+
+}  // namespace strata

@@ -1,0 +1,66 @@
+// StorageReader on a SQLite connection.
+#ifndef STRATA_CORE_STORAGE_SQLITE_SQLITE_READER_H_
+#define STRATA_CORE_STORAGE_SQLITE_SQLITE_READER_H_
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/storage/sqlite/database.h"
+#include "core/storage/storage.h"
+
+namespace strata {
+
+class SqliteReader final : public StorageReader {
+ public:
+  explicit SqliteReader(std::shared_ptr<Database> database) : connection_(std::move(database)) {}
+
+  absl::Status Snapshot(absl::FunctionRef<absl::Status()> body) override;
+  absl::StatusOr<MapClock> GetClock() override;
+  absl::StatusOr<MapInfo> GetMapInfo() override;
+  absl::StatusOr<std::optional<PosedScan>> FindScan(const ScanId& id, std::uint64_t epoch) override;
+  absl::StatusOr<PosedScan> GetScan(ScanNumber number, std::uint64_t epoch) override;
+  absl::StatusOr<std::vector<PosedScan>> ListScans(const ScanQuery& query,
+                                                   std::uint64_t epoch) override;
+  absl::StatusOr<std::optional<PosedScan>> FindPredecessor(absl::string_view trajectory,
+                                                           std::uint64_t sequence,
+                                                           std::uint64_t epoch) override;
+  absl::StatusOr<UploadState> GetUploadState(absl::string_view trajectory) override;
+  absl::StatusOr<ScanTotals> GetScanTotals() override;
+  absl::StatusOr<std::uint64_t> LastUpload() override;
+  absl::StatusOr<std::string> GetChunk(std::uint64_t upload, std::uint32_t ordinal) override;
+  absl::StatusOr<std::string> GetLocalMap(ScanNumber number) override;
+  absl::StatusOr<std::vector<ConstraintRecord>> ListConstraints() override;
+  absl::StatusOr<std::map<std::string, RobotProfile>> ListProfiles() override;
+  absl::StatusOr<std::optional<JobInfo>> FindJob(std::uint64_t id) override;
+  absl::StatusOr<std::vector<JobInfo>> ListJobs() override;
+  absl::StatusOr<std::optional<MlsTileRow>> FindMlsTile(const TileKey& key,
+                                                        std::uint64_t version) override;
+  absl::StatusOr<std::optional<SurfaceTileRow>> FindSurfaceTile(const TileKey& key,
+                                                                std::uint64_t version) override;
+  absl::StatusOr<std::vector<MlsTileRow>> ListMlsTiles(std::uint64_t version) override;
+  absl::StatusOr<std::vector<SurfaceTileRow>> ListSurfaceTiles(const TileRange& range,
+                                                               std::uint64_t version) override;
+  absl::StatusOr<std::vector<ScanNumber>> ScansOfTile(const TileKey& key) override;
+  absl::StatusOr<std::vector<TileKey>> TilesOfScan(ScanNumber number) override;
+  absl::StatusOr<std::optional<Eigen::AlignedBox2d>> FootprintOfScan(ScanNumber number) override;
+
+ private:
+  absl::Status ReadJobDetails(JobInfo& job);
+
+  std::shared_ptr<Database> connection_;
+  Database& database_ = *connection_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_STORAGE_SQLITE_SQLITE_READER_H_

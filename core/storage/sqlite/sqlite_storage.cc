@@ -1,0 +1,107 @@
+#include "core/storage/sqlite/sqlite_storage.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/time/time.h"
+
+#include "core/common/status.h"
+#include "core/storage/sqlite/database.h"
+#include "core/storage/sqlite/schema.h"
+#include "core/storage/sqlite/sqlite_reader.h"
+#include "core/storage/sqlite/sqlite_writer.h"
+
+namespace strata {
+namespace {
+
+class SqliteStorage final : public MapStorage {
+ public:
+  SqliteStorage(std::filesystem::path file, Database database)
+      : file_(std::move(file)), writer_(std::make_shared<Database>(std::move(database))) {}
+
+  absl::StatusOr<std::unique_ptr<StorageReader>> NewReader() override {
+    STRATA_ASSIGN_OR_RETURN(Database database, Database::Open(file_, Database::Mode::kRead));
+    return std::make_unique<SqliteReader>(std::make_shared<Database>(std::move(database)));
+  }
+  StorageWriter& writer() override { return writer_; }
+
+ private:
+  std::filesystem::path file_;
+  SqliteWriter writer_;
+};
+
+absl::Status InsertMap(Database& database, const MapParameters& parameters, absl::Time created) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database.Prepare("INSERT INTO truth_map VALUES (1, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, "
+                       "?11, ?12, ?13, 0, 1)"));
+  const GeodeticOrigin origin = parameters.origin.value_or(GeodeticOrigin());
+  row.Bind(absl::ToUnixMicros(created),
+           parameters.mls.cell_size_m,
+           parameters.mls.gap_size_m,
+           parameters.mls.thickness_m,
+           parameters.sensor.sigma_m,
+           parameters.sensor.sigma_per_metre,
+           parameters.sensor.min_range_m,
+           parameters.sensor.max_range_m,
+           parameters.keep_points,
+           parameters.origin.has_value(),
+           origin.latitude_rad,
+           origin.longitude_rad,
+           origin.altitude_m);
+  STRATA_RETURN_IF_ERROR(row.Run());
+  STRATA_ASSIGN_OR_RETURN(Statement epoch,
+                          database.Prepare("INSERT INTO truth_epoch (epoch, created_us, reason) "
+                                           "VALUES (1, ?1, 'created')"));
+  return epoch.Bind(absl::ToUnixMicros(created)).Run();
+}
+
+absl::Status LimitSize(Database& database, std::uint64_t max_file_bytes) {
+  if (max_file_bytes == 0) return absl::OkStatus();
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t page_bytes, database.Pragma("PRAGMA page_size"));
+  const std::uint64_t pages = max_file_bytes / static_cast<std::uint64_t>(page_bytes) + 1;
+  return database.Execute(absl::StrCat("PRAGMA max_page_count = ", pages));
+}
+
+}  // namespace
+
+absl::Status CreateSqliteMap(const std::filesystem::path& file,
+                             const MapParameters& parameters,
+                             absl::Time created) {
+  STRATA_RETURN_IF_ERROR(ValidateMapParameters(parameters));
+  STRATA_ASSIGN_OR_RETURN(Database opened, Database::Open(file, Database::Mode::kCreate));
+  const auto database = std::make_shared<Database>(std::move(opened));
+  STRATA_RETURN_IF_ERROR(CreateSchema(*database));
+  SqliteWriter writer(database);
+  return writer.Commit(Durability::kFull, [&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(InsertMap(*database, parameters, created));
+    STRATA_RETURN_IF_ERROR(writer.PutProfile("default", parameters.default_profile));
+    return writer.PublishTiles(0, true);
+  });
+}
+
+absl::StatusOr<std::unique_ptr<MapStorage>> OpenSqliteStorage(const std::filesystem::path& file,
+                                                              const SqliteOptions& options) {
+  const std::string what = file.filename().string();
+  absl::StatusOr<Database> database = Database::Open(file, Database::Mode::kWrite);
+  if (!database.ok()) return Annotate(database.status(), what);
+  absl::Status ready = UpgradeSchema(*database);
+  if (ready.ok()) ready = database->Execute("PRAGMA journal_mode = WAL");
+  if (ready.ok()) ready = database->Execute("PRAGMA synchronous = FULL");
+  if (ready.ok()) ready = database->Execute("PRAGMA wal_autocheckpoint = 2000");
+  if (ready.ok()) ready = LimitSize(*database, options.max_file_bytes);
+  if (!ready.ok()) return Annotate(ready, what);
+  auto storage = std::make_unique<SqliteStorage>(file, *std::move(database));
+  if (const absl::StatusOr<MapInfo> info = storage->writer().reader().GetMapInfo(); !info.ok()) {
+    return Annotate(info.status(), what);
+  }
+  return storage;
+}
+
+}  // namespace strata

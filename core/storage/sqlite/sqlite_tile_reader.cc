@@ -1,0 +1,152 @@
+// Derived data: tiles and the indexes over scans.
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include <Eigen/Geometry>
+
+#include "core/common/status.h"
+#include "core/mls/tile_key.h"
+#include "core/storage/sqlite/database.h"
+#include "core/storage/sqlite/sqlite_reader.h"
+
+namespace strata {
+namespace {
+
+TileKey ReadKey(const Statement& row) {
+  return {static_cast<std::int32_t>(row.Int(0)),
+          static_cast<std::int32_t>(row.Int(1)),
+          static_cast<std::int32_t>(row.Int(2))};
+}
+
+MlsTileRow ReadMlsTile(const Statement& row) {
+  MlsTileRow tile;
+  tile.key = ReadKey(row);
+  tile.version = row.Unsigned(3);
+  tile.patches = row.Unsigned(4);
+  tile.cells = row.Unsigned(5);
+  tile.box.min() = {row.Real(6), row.Real(7), row.Real(8)};
+  tile.box.max() = {row.Real(9), row.Real(10), row.Real(11)};
+  tile.digest = row.Text(12);
+  return tile;
+}
+
+SurfaceTileRow ReadSurfaceTile(const Statement& row) {
+  SurfaceTileRow tile;
+  tile.key = ReadKey(row);
+  tile.version = row.Unsigned(3);
+  tile.gone = row.Int(4) != 0;
+  tile.patches = row.Unsigned(5);
+  tile.size_bytes = row.Unsigned(6);
+  return tile;
+}
+
+}  // namespace
+
+absl::StatusOr<std::optional<MlsTileRow>> SqliteReader::FindMlsTile(const TileKey& key,
+                                                                    std::uint64_t version) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT level, x, y, version, patches, cells, min_x, min_y, min_z, max_x, "
+                        "max_y, max_z, digest, bytes FROM derived_mls_tile WHERE level = ?1 AND "
+                        "x = ?2 AND y = ?3 AND version <= ?4 ORDER BY version DESC LIMIT 1"));
+  row.Bind(key.level, key.x, key.y, version);
+  STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
+  if (!found) return std::optional<MlsTileRow>();
+  MlsTileRow tile = ReadMlsTile(row);
+  tile.bytes = row.Text(13);
+  return std::optional<MlsTileRow>(std::move(tile));
+}
+
+absl::StatusOr<std::optional<SurfaceTileRow>> SqliteReader::FindSurfaceTile(const TileKey& key,
+                                                                            std::uint64_t version) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT level, x, y, version, gone, patches, size_bytes, bytes FROM "
+                        "derived_surface_tile WHERE level = ?1 AND x = ?2 AND y = ?3 AND "
+                        "version <= ?4 ORDER BY version DESC LIMIT 1"));
+  row.Bind(key.level, key.x, key.y, version);
+  STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
+  if (!found || row.Int(4) != 0) return std::optional<SurfaceTileRow>();
+  SurfaceTileRow tile = ReadSurfaceTile(row);
+  tile.bytes = row.Text(7);
+  return std::optional<SurfaceTileRow>(std::move(tile));
+}
+
+absl::StatusOr<std::vector<MlsTileRow>> SqliteReader::ListMlsTiles(std::uint64_t version) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT level, x, y, version, patches, cells, min_x, min_y, min_z, max_x, "
+                        "max_y, max_z, digest FROM derived_mls_tile WHERE version <= ?1 "
+                        "ORDER BY level, x, y, version"));
+  row.Bind(version);
+  std::vector<MlsTileRow> tiles;
+  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
+    if (!tiles.empty() && tiles.back().key == ReadKey(row)) tiles.pop_back();
+    tiles.push_back(ReadMlsTile(row));
+    return absl::OkStatus();
+  }));
+  return tiles;
+}
+
+absl::StatusOr<std::vector<SurfaceTileRow>> SqliteReader::ListSurfaceTiles(const TileRange& range,
+                                                                           std::uint64_t version) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT level, x, y, version, gone, patches, size_bytes FROM "
+                        "derived_surface_tile WHERE level = ?1 AND x >= ?2 AND x < ?3 AND "
+                        "y >= ?4 AND y < ?5 AND version <= ?6 ORDER BY level, x, y, version"));
+  row.Bind(range.level, range.x_min, range.x_max, range.y_min, range.y_max, version);
+  std::vector<SurfaceTileRow> tiles;
+  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
+    if (!tiles.empty() && tiles.back().key == ReadKey(row)) tiles.pop_back();
+    tiles.push_back(ReadSurfaceTile(row));
+    return absl::OkStatus();
+  }));
+  std::erase_if(tiles, [](const SurfaceTileRow& tile) { return tile.gone; });
+  return tiles;
+}
+
+absl::StatusOr<std::vector<ScanNumber>> SqliteReader::ScansOfTile(const TileKey& key) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare(
+          "SELECT scan FROM derived_scan_tile WHERE x = ?1 AND y = ?2 ORDER BY scan"));
+  row.Bind(key.x, key.y);
+  std::vector<ScanNumber> scans;
+  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
+    scans.push_back(row.Unsigned(0));
+    return absl::OkStatus();
+  }));
+  return scans;
+}
+
+absl::StatusOr<std::vector<TileKey>> SqliteReader::TilesOfScan(ScanNumber number) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT 0, x, y FROM derived_scan_tile WHERE scan = ?1 ORDER BY x, y"));
+  row.Bind(number);
+  std::vector<TileKey> tiles;
+  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
+    tiles.push_back(ReadKey(row));
+    return absl::OkStatus();
+  }));
+  return tiles;
+}
+
+absl::StatusOr<std::optional<Eigen::AlignedBox2d>> SqliteReader::FootprintOfScan(
+    ScanNumber number) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT exact_min_x, exact_min_y, exact_max_x, exact_max_y FROM "
+                        "derived_footprint WHERE scan = ?1"));
+  row.Bind(number);
+  STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
+  if (!found) return std::optional<Eigen::AlignedBox2d>();
+  return std::optional<Eigen::AlignedBox2d>(Eigen::AlignedBox2d(
+      Eigen::Vector2d(row.Real(0), row.Real(1)), Eigen::Vector2d(row.Real(2), row.Real(3))));
+}
+
+}  // namespace strata

@@ -1,0 +1,135 @@
+// The derived tables.
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/status.h"
+#include <Eigen/Geometry>
+
+#include "core/common/status.h"
+#include "core/mls/tile_key.h"
+#include "core/storage/sqlite/schema.h"
+#include "core/storage/sqlite/sqlite_writer.h"
+
+namespace strata {
+
+absl::Status SqliteWriter::PutMlsTile(const MlsTileRow& row) {
+  return RunSql(
+      "INSERT OR REPLACE INTO derived_mls_tile (level, x, y, version, patches, cells, min_x, "
+      "min_y, min_z, max_x, max_y, max_z, digest, bytes) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, "
+      "?9, ?10, ?11, ?12, ?13, ?14)",
+      row.key.level,
+      row.key.x,
+      row.key.y,
+      row.version,
+      row.patches,
+      row.cells,
+      row.box.min().x(),
+      row.box.min().y(),
+      row.box.min().z(),
+      row.box.max().x(),
+      row.box.max().y(),
+      row.box.max().z(),
+      row.digest,
+      Blob{row.bytes});
+}
+
+absl::Status SqliteWriter::PutSurfaceTile(const SurfaceTileRow& row) {
+  return RunSql(
+      "INSERT OR REPLACE INTO derived_surface_tile (level, x, y, version, gone, patches, "
+      "size_bytes, bytes) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+      row.key.level,
+      row.key.x,
+      row.key.y,
+      row.version,
+      row.gone,
+      row.patches,
+      std::uint64_t{row.bytes.size()},
+      Blob{row.bytes});
+}
+
+absl::Status SqliteWriter::DeleteMlsTile(const TileKey& key) {
+  return RunSql("DELETE FROM derived_mls_tile WHERE level = ?1 AND x = ?2 AND y = ?3",
+                key.level,
+                key.x,
+                key.y);
+}
+
+absl::Status SqliteWriter::DeleteOlderMlsTiles(const TileKey& key, std::uint64_t version) {
+  return RunSql(
+      "DELETE FROM derived_mls_tile WHERE level = ?1 AND x = ?2 AND y = ?3 AND version < ?4",
+      key.level,
+      key.x,
+      key.y,
+      version);
+}
+
+absl::Status SqliteWriter::DeleteAllMlsTilesBelow(std::uint64_t version) {
+  return RunSql("DELETE FROM derived_mls_tile WHERE version < ?1", version);
+}
+
+absl::Status SqliteWriter::CollectSurfaceTile(const TileKey& key, std::uint64_t floor) {
+  return RunSql(
+      "DELETE FROM derived_surface_tile WHERE level = ?1 AND x = ?2 AND y = ?3 AND version < "
+      "(SELECT max(version) FROM derived_surface_tile WHERE level = ?1 AND x = ?2 AND y = ?3 AND "
+      "version <= ?4)",
+      key.level,
+      key.x,
+      key.y,
+      floor);
+}
+
+absl::Status SqliteWriter::CollectAllSurfaceTiles(std::uint64_t floor) {
+  STRATA_RETURN_IF_ERROR(
+      RunSql("DELETE FROM derived_surface_tile WHERE rowid IN (SELECT old.rowid FROM "
+             "derived_surface_tile AS old JOIN derived_surface_tile AS young ON young.level = "
+             "old.level AND young.x = old.x AND young.y = old.y AND young.version > old.version "
+             "AND young.version <= ?1)",
+             floor));
+  return RunSql("DELETE FROM derived_surface_tile WHERE gone = 1 AND version <= ?1", floor);
+}
+
+absl::Status SqliteWriter::DiscardUnpublished() {
+  STRATA_RETURN_IF_ERROR(
+      RunSql("DELETE FROM derived_mls_tile WHERE version > (SELECT tile_version FROM "
+             "derived_state WHERE id = 1)"));
+  return RunSql(
+      "DELETE FROM derived_surface_tile WHERE version > (SELECT tile_version FROM derived_state "
+      "WHERE id = 1)");
+}
+
+absl::Status SqliteWriter::SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) {
+  STRATA_RETURN_IF_ERROR(RunSql("DELETE FROM derived_scan_tile WHERE scan = ?1", number));
+  for (const TileKey& key : tiles) {
+    STRATA_RETURN_IF_ERROR(RunSql(
+        "INSERT INTO derived_scan_tile (scan, x, y) VALUES (?1, ?2, ?3)", number, key.x, key.y));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SqliteWriter::SetFootprint(ScanNumber number, const Eigen::AlignedBox2d& footprint) {
+  if (footprint.isEmpty()) {
+    return RunSql("DELETE FROM derived_footprint WHERE scan = ?1", number);
+  }
+  return RunSql(
+      "INSERT OR REPLACE INTO derived_footprint (scan, min_x, max_x, min_y, max_y, exact_min_x, "
+      "exact_max_x, exact_min_y, exact_max_y) VALUES (?1, ?2, ?3, ?4, ?5, ?2, ?3, ?4, ?5)",
+      number,
+      footprint.min().x(),
+      footprint.max().x(),
+      footprint.min().y(),
+      footprint.max().y());
+}
+
+absl::Status SqliteWriter::ClearScanIndexes() {
+  STRATA_RETURN_IF_ERROR(RunSql("DELETE FROM derived_scan_tile"));
+  return RunSql("DELETE FROM derived_footprint");
+}
+
+absl::Status SqliteWriter::PublishTiles(std::uint64_t version, bool complete) {
+  return RunSql(
+      "UPDATE derived_state SET tile_version = ?1, complete = ?2 WHERE id = 1", version, complete);
+}
+
+absl::Status SqliteWriter::DropDerived() { return ResetDerivedTables(database_); }
+
+}  // namespace strata

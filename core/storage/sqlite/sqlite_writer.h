@@ -1,0 +1,80 @@
+// StorageWriter on the one SQLite connection that writes.
+#ifndef STRATA_CORE_STORAGE_SQLITE_SQLITE_WRITER_H_
+#define STRATA_CORE_STORAGE_SQLITE_SQLITE_WRITER_H_
+
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/storage/sqlite/database.h"
+#include "core/storage/sqlite/sqlite_reader.h"
+#include "core/storage/storage.h"
+
+namespace strata {
+
+class SqliteWriter final : public StorageWriter {
+ public:
+  explicit SqliteWriter(std::shared_ptr<Database> database)
+      : connection_(std::move(database)), reader_(connection_) {}
+
+  absl::Status Commit(Durability durability, absl::FunctionRef<absl::Status()> body) override;
+  absl::Status Part(absl::FunctionRef<absl::Status()> body) override;
+  StorageReader& reader() override { return reader_; }
+  absl::StatusOr<std::uint64_t> NextCommitSequence() override;
+
+  absl::Status PutChunk(std::uint64_t upload,
+                        std::uint32_t ordinal,
+                        absl::string_view bytes) override;
+  absl::Status AbandonUpload(std::uint64_t upload) override;
+  absl::Status AbandonOrphans() override;
+  absl::Status PutScan(const ScanRecord& scan) override;
+  absl::Status SetScanState(ScanNumber number, ScanState state, absl::string_view message) override;
+  absl::Status DropPoints(ScanNumber number, absl::string_view local_map) override;
+  absl::Status DeleteScan(ScanNumber number) override;
+  absl::Status PutPose(const PoseRecord& pose) override;
+  absl::Status PutConstraint(const ConstraintRecord& constraint) override;
+  absl::StatusOr<std::uint64_t> BeginEpoch(absl::string_view reason) override;
+  absl::Status PutProfile(absl::string_view name, const RobotProfile& profile) override;
+  absl::Status PutJob(const JobInfo& job) override;
+
+  absl::Status PutMlsTile(const MlsTileRow& row) override;
+  absl::Status PutSurfaceTile(const SurfaceTileRow& row) override;
+  absl::Status DeleteMlsTile(const TileKey& key) override;
+  absl::Status DeleteOlderMlsTiles(const TileKey& key, std::uint64_t version) override;
+  absl::Status DeleteAllMlsTilesBelow(std::uint64_t version) override;
+  absl::Status CollectSurfaceTile(const TileKey& key, std::uint64_t floor) override;
+  absl::Status CollectAllSurfaceTiles(std::uint64_t floor) override;
+  absl::Status DiscardUnpublished() override;
+  absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) override;
+  absl::Status SetFootprint(ScanNumber number, const Eigen::AlignedBox2d& footprint) override;
+  absl::Status ClearScanIndexes() override;
+  absl::Status PublishTiles(std::uint64_t version, bool complete) override;
+  absl::Status DropDerived() override;
+
+ private:
+  // Prepares, binds and runs a statement that returns nothing.
+  template <typename... Values>
+  absl::Status RunSql(const char* sql, const Values&... values);
+
+  std::shared_ptr<Database> connection_;
+  Database& database_ = *connection_;
+  SqliteReader reader_;
+  Durability durability_ = Durability::kFull;  // what the connection is set to
+};
+
+template <typename... Values>
+absl::Status SqliteWriter::RunSql(const char* sql, const Values&... values) {
+  absl::StatusOr<Statement> statement = database_.Prepare(sql);
+  if (!statement.ok()) return statement.status();
+  return statement->Bind(values...).Run();
+}
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_STORAGE_SQLITE_SQLITE_WRITER_H_

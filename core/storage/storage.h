@@ -1,0 +1,163 @@
+// What is durable for one map, whoever keeps it. core/storage/sqlite implements it on one file; a
+// networked database can implement it later. Blobs are opaque here; codecs check them.
+#ifndef STRATA_CORE_STORAGE_STORAGE_H_
+#define STRATA_CORE_STORAGE_STORAGE_H_
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/mls/tile_key.h"
+#include "core/storage/records.h"
+#include "core/world/job.h"
+#include "core/world/map_info.h"
+#include "core/world/robot_profile.h"
+#include "core/world/scan.h"
+
+namespace strata {
+
+// Reads. One thread at a time; every call sees one committed state of its own, several calls inside
+// Snapshot() see the same one. A damaged row is DATA_LOSS naming it; a missing thing is NOT_FOUND
+// where the result is not optional.
+class StorageReader {
+ public:
+  virtual ~StorageReader() = default;
+
+  // All reads of `body` see one state. Keep it short: the store cannot reclaim space meanwhile.
+  virtual absl::Status Snapshot(absl::FunctionRef<absl::Status()> body) = 0;
+
+  virtual absl::StatusOr<MapClock> GetClock() = 0;
+  virtual absl::StatusOr<MapInfo> GetMapInfo() = 0;
+
+  virtual absl::StatusOr<std::optional<PosedScan>> FindScan(const ScanId& id,
+                                                            std::uint64_t epoch) = 0;
+  virtual absl::StatusOr<PosedScan> GetScan(ScanNumber number, std::uint64_t epoch) = 0;
+  // By number.
+  virtual absl::StatusOr<std::vector<PosedScan>> ListScans(const ScanQuery& query,
+                                                           std::uint64_t epoch) = 0;
+  // The integrated scan of `trajectory` with the largest sequence below `sequence`.
+  virtual absl::StatusOr<std::optional<PosedScan>> FindPredecessor(absl::string_view trajectory,
+                                                                   std::uint64_t sequence,
+                                                                   std::uint64_t epoch) = 0;
+  virtual absl::StatusOr<UploadState> GetUploadState(absl::string_view trajectory) = 0;
+  virtual absl::StatusOr<ScanTotals> GetScanTotals() = 0;
+  // Largest upload number in use, of scans and of chunks without one.
+  virtual absl::StatusOr<std::uint64_t> LastUpload() = 0;
+  virtual absl::StatusOr<std::string> GetChunk(std::uint64_t upload, std::uint32_t ordinal) = 0;
+  // Of a scan whose points were dropped.
+  virtual absl::StatusOr<std::string> GetLocalMap(ScanNumber number) = 0;
+  virtual absl::StatusOr<std::vector<ConstraintRecord>> ListConstraints() = 0;
+  virtual absl::StatusOr<std::map<std::string, RobotProfile>> ListProfiles() = 0;
+  virtual absl::StatusOr<std::optional<JobInfo>> FindJob(std::uint64_t id) = 0;
+  virtual absl::StatusOr<std::vector<JobInfo>> ListJobs() = 0;
+
+  // The newest row of `key` that is not newer than `version`; nullopt where there is none or it
+  // says that the tile is gone.
+  virtual absl::StatusOr<std::optional<MlsTileRow>> FindMlsTile(const TileKey& key,
+                                                                std::uint64_t version) = 0;
+  virtual absl::StatusOr<std::optional<SurfaceTileRow>> FindSurfaceTile(const TileKey& key,
+                                                                        std::uint64_t version) = 0;
+  // By key, without bytes. Tiles that are gone are left out.
+  virtual absl::StatusOr<std::vector<MlsTileRow>> ListMlsTiles(std::uint64_t version) = 0;
+  virtual absl::StatusOr<std::vector<SurfaceTileRow>> ListSurfaceTiles(const TileRange& range,
+                                                                       std::uint64_t version) = 0;
+  // Scan ↔ tile relation of integrated scans, level 0, each in ascending order.
+  virtual absl::StatusOr<std::vector<ScanNumber>> ScansOfTile(const TileKey& key) = 0;
+  virtual absl::StatusOr<std::vector<TileKey>> TilesOfScan(ScanNumber number) = 0;
+  // nullopt: none stored (a scan without finite points, or damage).
+  virtual absl::StatusOr<std::optional<Eigen::AlignedBox2d>> FootprintOfScan(ScanNumber number) = 0;
+};
+
+// When a commit returns.
+enum class Durability : std::uint8_t {
+  kFull,     // once it survives loss of power
+  kRelaxed,  // once it survives the end of the process; a later kFull commit covers it too
+};
+
+// Writes. One thread at a time. Everything but Commit() itself is called inside its body.
+class StorageWriter {
+ public:
+  virtual ~StorageWriter() = default;
+
+  // Runs `body` in one transaction: all of it or, on an error, nothing.
+  virtual absl::Status Commit(Durability durability, absl::FunctionRef<absl::Status()> body) = 0;
+  // A part of a commit that fails alone: on an error only what `body` did is undone.
+  virtual absl::Status Part(absl::FunctionRef<absl::Status()> body) = 0;
+  // Sees what the open transaction wrote.
+  virtual StorageReader& reader() = 0;
+
+  // Ticks the clock of the map.
+  virtual absl::StatusOr<std::uint64_t> NextCommitSequence() = 0;
+
+  // Points of an upload that is not a scan yet; `bytes` at most 1 MiB.
+  virtual absl::Status PutChunk(std::uint64_t upload,
+                                std::uint32_t ordinal,
+                                absl::string_view bytes) = 0;
+  // Removes the chunks of an upload that never became a scan.
+  virtual absl::Status AbandonUpload(std::uint64_t upload) = 0;
+  // Removes all chunks without a scan.
+  virtual absl::Status AbandonOrphans() = 0;
+  // Makes an upload a scan. ALREADY_EXISTS for its id.
+  virtual absl::Status PutScan(const ScanRecord& scan) = 0;
+  virtual absl::Status SetScanState(ScanNumber number,
+                                    ScanState state,
+                                    absl::string_view message) = 0;
+  // Keeps `local_map` (core/codec's map bytes) instead of the points.
+  virtual absl::Status DropPoints(ScanNumber number, absl::string_view local_map) = 0;
+  // With its chunks, local map, poses, constraints, footprint and tile relation.
+  virtual absl::Status DeleteScan(ScanNumber number) = 0;
+
+  virtual absl::Status PutPose(const PoseRecord& pose) = 0;
+  virtual absl::Status PutConstraint(const ConstraintRecord& constraint) = 0;
+  // Begins the next epoch, which starts with the poses of the current one; returns its number.
+  virtual absl::StatusOr<std::uint64_t> BeginEpoch(absl::string_view reason) = 0;
+  virtual absl::Status PutProfile(absl::string_view name, const RobotProfile& profile) = 0;
+  // Inserts or replaces.
+  virtual absl::Status PutJob(const JobInfo& job) = 0;
+
+  // Derived data. Rows of several versions may lie beside each other; readers see the newest up to
+  // MapClock::tile_version.
+  virtual absl::Status PutMlsTile(const MlsTileRow& row) = 0;
+  virtual absl::Status PutSurfaceTile(const SurfaceTileRow& row) = 0;
+  virtual absl::Status DeleteMlsTile(const TileKey& key) = 0;
+  // Older rows of one tile.
+  virtual absl::Status DeleteOlderMlsTiles(const TileKey& key, std::uint64_t version) = 0;
+  // Older rows of all tiles.
+  virtual absl::Status DeleteAllMlsTilesBelow(std::uint64_t version) = 0;
+  // Rows of one tile that nobody who reads at `floor` or later can see.
+  virtual absl::Status CollectSurfaceTile(const TileKey& key, std::uint64_t floor) = 0;
+  // The same for all tiles.
+  virtual absl::Status CollectAllSurfaceTiles(std::uint64_t floor) = 0;
+  // Rows newer than the current version: an unfinished rebuild.
+  virtual absl::Status DiscardUnpublished() = 0;
+  virtual absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) = 0;
+  virtual absl::Status SetFootprint(ScanNumber number, const Eigen::AlignedBox2d& footprint) = 0;
+  // Removes every relation and footprint, before they are put again.
+  virtual absl::Status ClearScanIndexes() = 0;
+  // Makes `version` the current one and, if `complete`, the derived data usable.
+  virtual absl::Status PublishTiles(std::uint64_t version, bool complete) = 0;
+  // Drops all derived data; MapClock::derived_complete becomes false.
+  virtual absl::Status DropDerived() = 0;
+};
+
+// One map's durable store.
+class MapStorage {
+ public:
+  virtual ~MapStorage() = default;
+
+  // Thread-safe; each reader is used by one thread at a time and must not outlive the storage.
+  virtual absl::StatusOr<std::unique_ptr<StorageReader>> NewReader() = 0;
+  virtual StorageWriter& writer() = 0;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_STORAGE_STORAGE_H_

@@ -1,0 +1,161 @@
+#!/usr/bin/env bash
+# Strata's main job, from nothing: installs what it needs, builds, and shows two robots mapping a bridge.
+#   deploy/demo.sh [--out DIR]                  simulated: two robots upload at once, plans over and under the bridge
+#   deploy/demo.sh --data FOLDER [--out DIR]    recorded: FOLDER has scans/ and poses_*.txt (or .pose files)
+# Files go to DIR, default ./demo-out. A second run skips the installing and building that is done.
+set -euo pipefail
+
+usage() { sed -n '3,5p' "$0" >&2; exit 2; }
+out=demo-out
+data=
+while [[ $# -gt 0 ]]; do
+  case "$1" in
+    --out) [[ $# -ge 2 ]] || usage; out=$2; shift 2 ;;
+    --data) [[ $# -ge 2 ]] || usage; data=$2; shift 2 ;;
+    *) usage ;;
+  esac
+done
+mkdir -p "$out"
+out=$(cd "$out" && pwd)
+if [[ -n $data ]]; then
+  [[ -d $data ]] || { echo "demo: no folder $data" >&2; exit 2; }
+  data=$(cd "$data" && pwd)
+fi
+cd "$(dirname "$0")/.."
+
+step() { printf '\n== %s\n' "$*"; }
+# Shows a command as one would type it, then runs it.
+run() { printf '$ %s\n' "$*"; "$@"; }
+
+work=$(mktemp -d)
+server=
+cleanup() {
+  if [[ -n $server ]]; then
+    kill -TERM "$server" 2>/dev/null || true
+    wait "$server" 2>/dev/null || true
+  fi
+  rm -rf "$work"
+}
+trap cleanup EXIT
+
+build() {
+  step "packages"
+  deploy/install-packages.sh
+  step "build"
+  cmake --preset release >"$work/cmake.log" || { cat "$work/cmake.log" >&2; exit 1; }
+  cmake --build --preset release --target stratad strata_cli strata_simulate
+  PATH=$PWD/build/release/client/cli:$PWD/build/release/server:$PWD/build/release/tests/support:$PATH
+}
+
+start_server() {
+  step "server"
+  stratad --data "$work/data" --listen 127.0.0.1:0 >"$work/listening" 2>"$out/stratad.log" &
+  server=$!
+  local address=
+  for _ in $(seq 200); do
+    address=$(sed -n 's/^listening //p' "$work/listening")
+    [[ -z $address ]] || break
+    kill -0 "$server" 2>/dev/null || { cat "$out/stratad.log" >&2; exit 1; }
+    sleep 0.1
+  done
+  [[ -n $address ]] || { echo "demo: stratad did not begin to listen" >&2; exit 1; }
+  echo "stratad listens on $address"
+  server_address=$address
+}
+
+strata_at() { strata --server "$server_address" "$@"; }
+
+# place NAME: "x,y,z" of a named place of the simulated world.
+place() { awk -v name="$1" '$1 == name { print $2 "," $3 "," $4 }' "$work/world/places.txt"; }
+
+demo_simulated() {
+  step "a bridge to cross and to pass under, seen by two robots with noisy odometry"
+  run strata-simulate bridge "$work/world" --seed 1
+  start_server
+  step "both upload at once"
+  run strata_at map create bridge --cell-size 0.1
+  local uploads=()
+  for robot in over under; do
+    strata_at scan import bridge "$work/world/$robot/scans" --poses "$work/world/$robot/poses_initial.txt" \
+      --pose-format index-tum --trajectory "$robot" --align on --wait >"$work/$robot.txt" &
+    uploads+=($!)
+  done
+  for upload in "${uploads[@]}"; do wait "$upload"; done
+  for robot in over under; do
+    printf -- '-- robot %s\n' "$robot"
+    cat "$work/$robot.txt"
+    strata_at pose export bridge --trajectory "$robot" --out "$out/poses_$robot.txt" >/dev/null
+    drift "$work/world/$robot/poses_truth.txt" "$work/world/$robot/poses_initial.txt" "$out/poses_$robot.txt"
+  done
+  step "the map"
+  run strata_at map show bridge
+  step "paths"
+  run strata_at plan bridge --from "$(place west)" --to "$(place east)" --out "$out/over.ply"
+  run strata_at plan bridge --from "$(place south)" --to "$(place north)" --out "$out/under.ply"
+  echo "from the deck to the road right beneath it:"
+  run strata_at plan bridge --from "$(place deck)" --to "$(place under)" --out "$out/deck_to_road.ply"
+  step "pictures"
+  run strata_at map render bridge "$out/bridge.png" --view oblique --path "$out/over.ply" --path "$out/under.ply"
+  run strata_at map render bridge "$out/bridge_top.png" --path "$out/over.ply" --path "$out/under.ply"
+  run strata_at map render bridge "$out/bridge_road.png" --slice -1,2 --path "$out/under.ply"
+}
+
+# drift TRUTH UPLOADED ALIGNED: how far the last pose is from the truth before and after alignment.
+drift() {
+  local truth uploaded aligned
+  truth=$(grep -v '^#' "$1" | tail -n 1)
+  uploaded=$(grep -v '^#' "$2" | tail -n 1)
+  aligned=$(grep -v '^#' "$3" | tail -n 1)
+  awk -v t="$truth" -v u="$uploaded" -v a="$aligned" 'BEGIN {
+    split(t, T); split(u, U); split(a, A)
+    printf "last pose is off by %.2f m as uploaded, %.3f m as aligned\n",
+      sqrt((T[3]-U[3])^2 + (T[4]-U[4])^2 + (T[5]-U[5])^2), sqrt((T[3]-A[2])^2 + (T[4]-A[3])^2 + (T[5]-A[4])^2) }'
+}
+
+# ground X Y Z: the place on the highest surface below a sensor.
+ground() {
+  strata_at surface recorded --at "$1,$2" |
+    awk -v x="$1" -v y="$2" -v z="$3" 'NR > 1 && $4 < z { best = $4; found = 1 }
+                                       END { print x "," y "," (found ? best : z) }'
+}
+
+demo_recorded() {
+  local scans=$data/scans poses=
+  [[ -d $scans ]] || scans=$data
+  for name in poses_initial poses_odometry poses_reference poses; do
+    for file in "$data/$name"*.txt; do
+      [[ -n $poses || ! -f $file ]] || poses=$file
+    done
+  done
+  start_server
+  step "import"
+  run strata_at map create recorded --cell-size 0.1
+  local options=(--trajectory recorded --align on --level --wait)
+  [[ -z $poses ]] || options+=(--poses "$poses")
+  run strata_at scan import recorded "$scans" "${options[@]}"
+  step "the map"
+  run strata_at map show recorded
+  run strata_at pose export recorded --out "$out/poses.txt"
+  step "a path between two places of the trajectory"
+  # The first pose and the one farthest from it: time x y z qx qy qz qw.
+  read -r x0 y0 z0 x1 y1 z1 < <(awk '!/^#/ { if (!n++) { x=$2; y=$3; z=$4 }
+      d = ($2-x)^2 + ($3-y)^2; if (d >= best) { best = d; fx=$2; fy=$3; fz=$4 } }
+      END { print x, y, z, fx, fy, fz }' "$out/poses.txt")
+  run strata_at plan recorded --from "$(ground "$x0" "$y0" "$z0")" --to "$(ground "$x1" "$y1" "$z1")" \
+    --max-gap 0.6 --out "$out/path.ply"
+  local paths=()
+  [[ ! -f $out/path.ply ]] || paths=(--path "$out/path.ply")
+  step "pictures"
+  run strata_at map render recorded "$out/recorded.png" --view oblique "${paths[@]}"
+  run strata_at map render recorded "$out/recorded_top.png" "${paths[@]}"
+}
+
+rm -f "$out"/{over,under,deck_to_road,path}.ply
+build
+if [[ -n $data ]]; then demo_recorded; else demo_simulated; fi
+step "stopping the server"
+kill -TERM "$server"
+wait "$server"
+server=
+step "files in $out"
+ls -1 "$out"

@@ -1,0 +1,210 @@
+#include "proto/translate/planning.h"
+
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/common/status.h"
+#include "proto/translate/geometry.h"
+#include "proto/translate/maps.h"
+#include "proto/translate/tiles.h"
+
+namespace strata::translate {
+namespace {
+
+// PlanReason and its wire twin differ by the wire's UNSPECIFIED.
+constexpr int kReasonOffset = 1;
+static_assert(v1::PLAN_REASON_FOUND == static_cast<int>(PlanReason::kFound) + kReasonOffset);
+static_assert(v1::PLAN_REASON_SEARCH_LIMIT ==
+              static_cast<int>(PlanReason::kSearchLimit) + kReasonOffset);
+static_assert(v1::OBSTRUCTION_STEP == static_cast<int>(Obstruction::kStep));
+static_assert(v1::OBSTRUCTION_UNKNOWN == static_cast<int>(Obstruction::kUnknown));
+static_assert(v1::TRAVERSABILITY_TRAVERSABLE == static_cast<int>(Traversability::kTraversable));
+static_assert(v1::TRAVERSABILITY_NON_TRAVERSABLE ==
+              static_cast<int>(Traversability::kNonTraversable));
+
+v1::PlanEndpoint EndpointToProto(const PlanEndpoint& endpoint) {
+  v1::PlanEndpoint proto;
+  proto.set_x_m(endpoint.x_m);
+  proto.set_y_m(endpoint.y_m);
+  if (endpoint.level.has_value()) proto.set_level(*endpoint.level);
+  if (endpoint.z_m.has_value()) proto.set_z_m(*endpoint.z_m);
+  return proto;
+}
+
+absl::StatusOr<PlanEndpoint> EndpointFromProto(const char* what, const v1::PlanEndpoint& proto) {
+  PlanEndpoint endpoint;
+  endpoint.x_m = proto.x_m();
+  endpoint.y_m = proto.y_m();
+  if (proto.has_z_m()) endpoint.z_m = proto.z_m();
+  if (proto.has_level()) endpoint.level = proto.level();
+  const double z = endpoint.z_m.value_or(0.0);
+  if (!std::isfinite(endpoint.x_m) || !std::isfinite(endpoint.y_m) || !std::isfinite(z)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(what, ": (", endpoint.x_m, ", ", endpoint.y_m, ", ", z, ") is not finite"));
+  }
+  if (endpoint.level.value_or(0) < 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(what, ": level ", *endpoint.level, " is below 0"));
+  }
+  return endpoint;
+}
+
+absl::StatusOr<std::optional<Eigen::Vector3d>> PlaceFromProto(const char* what,
+                                                              bool present,
+                                                              const v1::Vector3& place) {
+  if (!present) return std::nullopt;
+  STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d p, FromProto(what, place));
+  return p;
+}
+
+v1::Surface SurfaceToProto(const Surface& surface) {
+  v1::Surface proto;
+  proto.set_cell(surface.cell);
+  proto.set_traversability(static_cast<v1::Traversability>(surface.traversability));
+  proto.set_class_id(surface.class_id);
+  proto.set_z_m(surface.z_m);
+  proto.set_sigma_m(surface.sigma_m);
+  proto.set_depth_m(surface.depth_m);
+  proto.set_cost(surface.cost);
+  return proto;
+}
+
+absl::StatusOr<Surface> SurfaceFromProto(const v1::Surface& proto) {
+  if (proto.cell() > std::numeric_limits<std::uint16_t>::max() ||
+      proto.class_id() > std::numeric_limits<std::uint8_t>::max() ||
+      !v1::Traversability_IsValid(proto.traversability())) {
+    return absl::InvalidArgumentError(absl::StrCat("surface: cell ",
+                                                   proto.cell(),
+                                                   ", class_id ",
+                                                   proto.class_id(),
+                                                   " or traversability ",
+                                                   static_cast<int>(proto.traversability()),
+                                                   " is out of range"));
+  }
+  Surface surface;
+  surface.cell = static_cast<std::uint16_t>(proto.cell());
+  surface.traversability = static_cast<Traversability>(proto.traversability());
+  surface.class_id = static_cast<std::uint8_t>(proto.class_id());
+  surface.z_m = proto.z_m();
+  surface.sigma_m = proto.sigma_m();
+  surface.depth_m = proto.depth_m();
+  surface.cost = proto.cost();
+  return surface;
+}
+
+absl::Status ReasonsFromProto(const v1::PlanPathResponse& proto, PlanResult& result) {
+  if (!v1::PlanReason_IsValid(proto.reason()) || proto.reason() == v1::PLAN_REASON_UNSPECIFIED ||
+      !v1::Obstruction_IsValid(proto.obstruction())) {
+    return absl::InvalidArgumentError(absl::StrCat("plan: reason ",
+                                                   static_cast<int>(proto.reason()),
+                                                   " or obstruction ",
+                                                   static_cast<int>(proto.obstruction()),
+                                                   " is not known"));
+  }
+  result.reason = static_cast<PlanReason>(proto.reason() - kReasonOffset);
+  result.obstruction = static_cast<Obstruction>(proto.obstruction());
+  result.obstruction_value = proto.obstruction_value();
+  STRATA_ASSIGN_OR_RETURN(result.where, PlaceFromProto("where", proto.has_where(), proto.where()));
+  STRATA_ASSIGN_OR_RETURN(result.nearest,
+                          PlaceFromProto("nearest", proto.has_nearest(), proto.nearest()));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+v1::PlanPathRequest ToProto(absl::string_view map, const PlanQuery& query) {
+  v1::PlanPathRequest proto;
+  proto.set_map(std::string(map));
+  *proto.mutable_from() = EndpointToProto(query.from);
+  *proto.mutable_to() = EndpointToProto(query.to);
+  *proto.mutable_profile() = ToProto(query.profile);
+  proto.set_max_expanded(query.max_expanded);
+  return proto;
+}
+
+absl::StatusOr<PlanQuery> FromProto(const v1::PlanPathRequest& proto) {
+  PlanQuery query;
+  STRATA_ASSIGN_OR_RETURN(query.from, EndpointFromProto("from", proto.from()));
+  STRATA_ASSIGN_OR_RETURN(query.to, EndpointFromProto("to", proto.to()));
+  query.profile = FromProto(proto.profile());
+  STRATA_RETURN_IF_ERROR(ValidateRobotProfile(query.profile));
+  if (proto.has_max_expanded()) query.max_expanded = proto.max_expanded();
+  return query;
+}
+
+v1::PlanPathResponse ToProto(const PlanResult& result) {
+  v1::PlanPathResponse proto;
+  proto.set_reason(static_cast<v1::PlanReason>(static_cast<int>(result.reason) + kReasonOffset));
+  proto.set_message(result.message);
+  for (const Eigen::Vector3d& waypoint : result.waypoints) {
+    *proto.add_waypoints() = ToProto(waypoint);
+  }
+  proto.set_length_m(result.length_m);
+  proto.set_cost(result.cost);
+  for (const PlanGap& gap : result.gaps) {
+    v1::PlanGap& added = *proto.add_gaps();
+    *added.mutable_from() = ToProto(gap.from);
+    *added.mutable_to() = ToProto(gap.to);
+    added.set_length_m(gap.length_m);
+  }
+  proto.set_expanded(result.expanded);
+  proto.set_elapsed_ms(result.elapsed_ms);
+  proto.set_epoch(result.epoch);
+  for (const TileKey& tile : result.tiles) *proto.add_tiles() = ToProto(tile);
+  if (result.where.has_value()) *proto.mutable_where() = ToProto(*result.where);
+  proto.set_obstruction(static_cast<v1::Obstruction>(result.obstruction));
+  proto.set_obstruction_value(result.obstruction_value);
+  if (result.nearest.has_value()) *proto.mutable_nearest() = ToProto(*result.nearest);
+  return proto;
+}
+
+absl::StatusOr<PlanResult> FromProto(const v1::PlanPathResponse& proto) {
+  PlanResult result;
+  STRATA_RETURN_IF_ERROR(ReasonsFromProto(proto, result));
+  result.message = proto.message();
+  for (const v1::Vector3& waypoint : proto.waypoints()) {
+    STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d p, FromProto("waypoint", waypoint));
+    result.waypoints.push_back(p);
+  }
+  result.length_m = proto.length_m();
+  result.cost = proto.cost();
+  for (const v1::PlanGap& gap : proto.gaps()) {
+    STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d from, FromProto("gap.from", gap.from()));
+    STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d to, FromProto("gap.to", gap.to()));
+    result.gaps.push_back({from, to, gap.length_m()});
+  }
+  result.expanded = proto.expanded();
+  result.elapsed_ms = proto.elapsed_ms();
+  result.epoch = proto.epoch();
+  for (const v1::TileKey& tile : proto.tiles()) {
+    STRATA_ASSIGN_OR_RETURN(const TileKey key, FromProto(tile));
+    result.tiles.push_back(key);
+  }
+  return result;
+}
+
+v1::SurfaceColumn ToProto(const SurfaceColumn& column) {
+  v1::SurfaceColumn proto;
+  proto.set_x_m(column.x_m);
+  proto.set_y_m(column.y_m);
+  for (const Surface& surface : column.surfaces) *proto.add_surfaces() = SurfaceToProto(surface);
+  return proto;
+}
+
+absl::StatusOr<SurfaceColumn> FromProto(const v1::SurfaceColumn& proto) {
+  SurfaceColumn column;
+  column.x_m = proto.x_m();
+  column.y_m = proto.y_m();
+  for (const v1::Surface& surface : proto.surfaces()) {
+    STRATA_ASSIGN_OR_RETURN(const Surface added, SurfaceFromProto(surface));
+    column.surfaces.push_back(added);
+  }
+  return column;
+}
+
+}  // namespace strata::translate

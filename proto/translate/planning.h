@@ -1,0 +1,25 @@
+// Questions of planners and their answers between the core's words and the wire's.
+#ifndef STRATA_PROTO_TRANSLATE_PLANNING_H_
+#define STRATA_PROTO_TRANSLATE_PLANNING_H_
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/world/plan.h"
+#include "strata/v1/planning.pb.h"
+
+namespace strata::translate {
+
+v1::PlanPathRequest ToProto(absl::string_view map, const PlanQuery& query);
+v1::PlanPathResponse ToProto(const PlanResult& result);
+v1::SurfaceColumn ToProto(const SurfaceColumn& column);
+
+// INVALID_ARGUMENT for coordinates that are not finite, a negative level, or a profile out of
+// range.
+absl::StatusOr<PlanQuery> FromProto(const v1::PlanPathRequest& request);
+absl::StatusOr<PlanResult> FromProto(const v1::PlanPathResponse& result);
+absl::StatusOr<SurfaceColumn> FromProto(const v1::SurfaceColumn& column);
+
+}  // namespace strata::translate
+
+#endif  // STRATA_PROTO_TRANSLATE_PLANNING_H_

@@ -1,0 +1,116 @@
+#include "proto/translate/points.h"
+
+#include <bit>
+#include <cstddef>
+#include <cstring>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+
+#include "core/api/scans.h"
+#include "core/common/status.h"
+
+namespace strata::translate {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "columns are copied as they lie");
+static_assert(sizeof(Eigen::Vector3f) == 12 && sizeof(Colour) == 3);
+
+template <typename T>
+std::string Pack(const std::vector<T>& column) {
+  std::string bytes(column.size() * sizeof(T), '\0');
+  if (!column.empty()) std::memcpy(bytes.data(), column.data(), bytes.size());
+  return bytes;
+}
+
+// REQUIRES: bytes.size() is a multiple of sizeof(T).
+template <typename T>
+std::vector<T> Unpack(const std::string& bytes) {
+  std::vector<T> column(bytes.size() / sizeof(T));
+  if (!column.empty()) std::memcpy(static_cast<void*>(column.data()), bytes.data(), bytes.size());
+  return column;
+}
+
+absl::Status CheckPointCount(std::size_t points) {
+  if (points >= 1 && points <= api::kMaxPointsPerChunk) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("chunk has ", points, " points: send 1 to ", api::kMaxPointsPerChunk));
+}
+
+absl::Status CheckBytes(const char* name, std::size_t bytes, std::size_t per_point, std::size_t n) {
+  if (bytes == 0 || bytes == per_point * n) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "chunk: ", name, " has ", bytes, " bytes, not ", per_point, " for each of ", n, " points"));
+}
+
+absl::Status CheckColumn(const char* name, std::size_t entries, bool announced, std::size_t n) {
+  if (entries == (announced ? n : 0)) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("chunk: ",
+                                                 name,
+                                                 " has ",
+                                                 entries,
+                                                 " entries for ",
+                                                 n,
+                                                 " points; the header announced ",
+                                                 announced ? "the column" : "no such column"));
+}
+
+absl::Status CheckPoint(const Eigen::Vector3f& p, std::uint64_t index, bool organised) {
+  constexpr float kMaxCoordinateM = 1e6F;
+  // The negated comparison also catches NaN.
+  if (p.cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <= kMaxCoordinateM) return absl::OkStatus();
+  if (organised && p.array().isNaN().all()) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "point ", index, " (", p.x(), ", ", p.y(), ", ", p.z(), ") is not within ±1e6 m"));
+}
+
+}  // namespace
+
+v1::PointChunk ToProto(const PointCloud& cloud) {
+  v1::PointChunk chunk;
+  chunk.set_xyz(Pack(cloud.points));
+  chunk.set_intensity(Pack(cloud.intensity));
+  chunk.set_rgb(Pack(cloud.colour));
+  chunk.set_label(Pack(cloud.label));
+  return chunk;
+}
+
+absl::StatusOr<PointCloud> FromProto(const v1::PointChunk& chunk) {
+  if (chunk.xyz().size() % sizeof(Eigen::Vector3f) != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("chunk: xyz has ", chunk.xyz().size(), " bytes, not 12 a point"));
+  }
+  const std::size_t n = chunk.xyz().size() / sizeof(Eigen::Vector3f);
+  STRATA_RETURN_IF_ERROR(CheckPointCount(n));
+  STRATA_RETURN_IF_ERROR(CheckBytes("intensity", chunk.intensity().size(), sizeof(float), n));
+  STRATA_RETURN_IF_ERROR(CheckBytes("rgb", chunk.rgb().size(), sizeof(Colour), n));
+  STRATA_RETURN_IF_ERROR(CheckBytes("label", chunk.label().size(), sizeof(std::uint16_t), n));
+  PointCloud cloud;
+  cloud.points = Unpack<Eigen::Vector3f>(chunk.xyz());
+  cloud.intensity = Unpack<float>(chunk.intensity());
+  cloud.colour = Unpack<Colour>(chunk.rgb());
+  cloud.label = Unpack<std::uint16_t>(chunk.label());
+  return cloud;
+}
+
+absl::Status CheckChunk(const PointCloud& chunk, const ScanHeader& header, std::uint64_t first) {
+  const std::size_t n = chunk.size();
+  STRATA_RETURN_IF_ERROR(CheckPointCount(n));
+  if (first > header.point_count || n > header.point_count - first) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(first + n, " points arrived, the header announced ", header.point_count));
+  }
+  STRATA_RETURN_IF_ERROR(CheckColumn("intensity", chunk.intensity.size(), header.has_intensity, n));
+  STRATA_RETURN_IF_ERROR(CheckColumn("colour", chunk.colour.size(), header.has_colour, n));
+  STRATA_RETURN_IF_ERROR(CheckColumn("label", chunk.label.size(), header.has_label, n));
+  for (std::size_t i = 0; i < n; ++i) {
+    STRATA_RETURN_IF_ERROR(CheckPoint(chunk.points[i], first + i, header.rows != 0));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace strata::translate

@@ -1,0 +1,28 @@
+// Points of a scan between the core's arrays and the wire's packed columns.
+#ifndef STRATA_PROTO_TRANSLATE_POINTS_H_
+#define STRATA_PROTO_TRANSLATE_POINTS_H_
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/cloud/point_cloud.h"
+#include "core/world/scan.h"
+#include "strata/v1/scans.pb.h"
+
+namespace strata::translate {
+
+// `cloud`'s points and columns; grid and origins are the header's and stay behind.
+v1::PointChunk ToProto(const PointCloud& cloud);
+
+// INVALID_ARGUMENT unless the columns' lengths fit each other and there are 1 to
+// api::kMaxPointsPerChunk points.
+absl::StatusOr<PointCloud> FromProto(const v1::PointChunk& chunk);
+
+// What an upload may bring: INVALID_ARGUMENT unless `chunk` has 1 to api::kMaxPointsPerChunk points
+// in exactly the columns of `header`, all within ±1e6 m (three NaN pass in organised scans), and
+// with the `first` points before it no more than announced.
+absl::Status CheckChunk(const PointCloud& chunk, const ScanHeader& header, std::uint64_t first);
+
+}  // namespace strata::translate
+
+#endif  // STRATA_PROTO_TRANSLATE_POINTS_H_

@@ -1,0 +1,106 @@
+#include "proto/translate/status.h"
+
+#include <string>
+#include <utility>
+
+#include "absl/strings/cord.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+
+namespace strata::translate {
+namespace {
+
+constexpr char kDetailUrl[] = "type.googleapis.com/strata.v1.ErrorDetail";
+constexpr char kRequestId[] = "request_id";
+constexpr char kRetryDelay[] = "retry_delay_ms";
+constexpr int kDefaultRetryDelayMs = 200;
+
+v1::ErrorDetail DetailToSend(const absl::Status& status, absl::string_view request_id) {
+  v1::ErrorDetail detail = DetailOf(status).value_or(v1::ErrorDetail());
+  if (detail.reason().empty()) detail.set_reason(std::string(kDatabaseReason));
+  auto& metadata = *detail.mutable_metadata();
+  metadata[kRequestId] = std::string(request_id);
+  if (absl::IsResourceExhausted(status) || absl::IsUnavailable(status)) {
+    // insert() keeps a delay that is already there.
+    metadata.insert({kRetryDelay, absl::StrCat(kDefaultRetryDelayMs)});
+  }
+  return detail;
+}
+
+// Cuts between characters: a message that is not UTF-8 does not fit a proto string.
+std::string MessageToSend(const absl::Status& status) {
+  const absl::string_view message = status.message();
+  if (message.size() <= kMaxMessageBytes) return std::string(message);
+  std::size_t end = kMaxMessageBytes;
+  while (end > 0 && (static_cast<unsigned char>(message[end]) & 0xC0U) == 0x80U) --end;
+  return std::string(message.substr(0, end));
+}
+
+}  // namespace
+
+absl::Status WithDetail(absl::Status status, const v1::ErrorDetail& detail) {
+  status.SetPayload(kDetailUrl, absl::Cord(detail.SerializeAsString()));
+  return status;
+}
+
+absl::Status WithReason(absl::Status status, absl::string_view reason) {
+  if (status.ok() || status.GetPayload(kDetailUrl).has_value()) return status;
+  v1::ErrorDetail detail;
+  detail.set_reason(std::string(reason));
+  return WithDetail(std::move(status), detail);
+}
+
+std::optional<v1::ErrorDetail> DetailOf(const absl::Status& status) {
+  const auto payload = status.GetPayload(kDetailUrl);
+  v1::ErrorDetail detail;
+  if (!payload.has_value() || !detail.ParseFromString(std::string(*payload))) return std::nullopt;
+  return detail;
+}
+
+std::optional<absl::Duration> RetryDelayOf(const absl::Status& status) {
+  const std::optional<v1::ErrorDetail> detail = DetailOf(status);
+  if (!detail.has_value()) return std::nullopt;
+  const auto delay = detail->metadata().find(kRetryDelay);
+  int milliseconds = 0;
+  if (delay == detail->metadata().end() || !absl::SimpleAtoi(delay->second, &milliseconds) ||
+      milliseconds < 0) {
+    return std::nullopt;
+  }
+  return absl::Milliseconds(milliseconds);
+}
+
+grpc::Status ToGrpcStatus(const absl::Status& status, absl::string_view request_id) {
+  if (status.ok()) return grpc::Status::OK;
+  v1::ErrorStatus error;
+  error.set_code(static_cast<int>(status.code()));
+  error.set_message(MessageToSend(status));
+  error.add_details()->PackFrom(DetailToSend(status, request_id));
+  return {static_cast<grpc::StatusCode>(error.code()), error.message(), error.SerializeAsString()};
+}
+
+absl::Status FromGrpcStatus(const grpc::Status& status) {
+  if (status.ok()) return absl::OkStatus();
+  absl::Status result(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
+  v1::ErrorStatus error;
+  v1::ErrorDetail detail;
+  if (error.ParseFromString(status.error_details()) && error.details_size() == 1 &&
+      error.details(0).UnpackTo(&detail)) {
+    return WithDetail(std::move(result), detail);
+  }
+  return result;
+}
+
+v1::ScanError ToScanError(const absl::Status& status, absl::string_view request_id) {
+  v1::ScanError error;
+  error.set_code(static_cast<int>(status.code()));
+  error.set_message(MessageToSend(status));
+  *error.mutable_detail() = DetailToSend(status, request_id);
+  return error;
+}
+
+absl::Status FromScanError(const v1::ScanError& error) {
+  return WithDetail(absl::Status(static_cast<absl::StatusCode>(error.code()), error.message()),
+                    error.detail());
+}
+
+}  // namespace strata::translate

@@ -1,0 +1,48 @@
+// Statuses between the core and gRPC: the one place for each direction.
+#ifndef STRATA_PROTO_TRANSLATE_STATUS_H_
+#define STRATA_PROTO_TRANSLATE_STATUS_H_
+
+#include <optional>
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+#include "absl/time/time.h"
+#include <grpcpp/support/status.h>
+
+#include "strata/v1/error.pb.h"
+#include "strata/v1/scans.pb.h"
+
+namespace strata::translate {
+
+// ErrorDetail::reason; see error.proto.
+inline constexpr absl::string_view kRequestReason = "REQUEST";
+inline constexpr absl::string_view kDatabaseReason = "DATABASE";
+inline constexpr absl::string_view kServerBusyReason = "SERVER_BUSY";
+inline constexpr absl::string_view kShuttingDownReason = "SHUTTING_DOWN";
+inline constexpr absl::string_view kSlowReaderReason = "SLOW_READER";
+
+// Longest message that is sent; the rest is cut off [bytes].
+inline constexpr std::size_t kMaxMessageBytes = 1024;
+
+// `status` with a detail attached (as a payload), over the one it had.
+absl::Status WithDetail(absl::Status status, const v1::ErrorDetail& detail);
+// `status` with a detail of this reason, unless it has one or is OK.
+absl::Status WithReason(absl::Status status, absl::string_view reason);
+// The attached detail; nullopt without one.
+std::optional<v1::ErrorDetail> DetailOf(const absl::Status& status);
+// The detail's retry_delay_ms; nullopt when trying again makes no sense.
+std::optional<absl::Duration> RetryDelayOf(const absl::Status& status);
+
+// Code, message and detail of `status`. A detail gains the request's id, and `retry_delay_ms` when
+// the code is RESOURCE_EXHAUSTED or UNAVAILABLE.
+grpc::Status ToGrpcStatus(const absl::Status& status, absl::string_view request_id);
+// The reverse; a status whose details are not ours has none.
+absl::Status FromGrpcStatus(const grpc::Status& status);
+
+// The same for one scan of an Ingest stream.
+v1::ScanError ToScanError(const absl::Status& status, absl::string_view request_id);
+absl::Status FromScanError(const v1::ScanError& error);
+
+}  // namespace strata::translate
+
+#endif  // STRATA_PROTO_TRANSLATE_STATUS_H_

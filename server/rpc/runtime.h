@@ -1,0 +1,67 @@
+// What the services of one server share.
+#ifndef STRATA_SERVER_RPC_RUNTIME_H_
+#define STRATA_SERVER_RPC_RUNTIME_H_
+
+#include <atomic>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+
+#include "core/api/database.h"
+#include "server/rpc/executor.h"
+
+namespace strata::server {
+
+struct RuntimeOptions {
+  int query_threads = 8;    // unary calls; each blocks one while it runs
+  int stream_threads = 8;   // listings and downloads; a slow reader holds one
+  int upload_threads = 16;  // scans coming in; a commit holds one until it is durable
+  int max_calls = 1024;     // calls under way; more are told SERVER_BUSY
+  // A stream's reader that takes nothing for so long loses the stream.
+  absl::Duration slow_reader_timeout = absl::Seconds(30);
+};
+
+// Counts the calls under way. Thread-safe.
+class CallGate {
+ public:
+  // The number of calls with the one that enters.
+  int Enter() {
+    absl::MutexLock lock(&mutex_);
+    return ++calls_;
+  }
+  void Leave() {
+    absl::MutexLock lock(&mutex_);
+    --calls_;
+  }
+  void AwaitEmpty() {
+    const auto empty = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return calls_ == 0; };
+    absl::MutexLock lock(&mutex_, absl::Condition(&empty));
+  }
+
+ private:
+  absl::Mutex mutex_;
+  int calls_ ABSL_GUARDED_BY(mutex_) = 0;
+};
+
+// Thread-safe.
+struct Runtime {
+  Runtime(api::Database& database, const RuntimeOptions& runtime_options)
+      : db(database),
+        options(runtime_options),
+        queries(runtime_options.query_threads),
+        streams(runtime_options.stream_threads),
+        uploads(runtime_options.upload_threads) {}
+
+  api::Database& db;
+  const RuntimeOptions options;
+  Executor queries;
+  Executor streams;
+  Executor uploads;
+  CallGate calls;
+  std::atomic<bool> shutting_down = false;  // calls without an end of their own should end
+};
+
+}  // namespace strata::server
+
+#endif  // STRATA_SERVER_RPC_RUNTIME_H_

@@ -1,0 +1,108 @@
+// One request, a stream of answers.
+#ifndef STRATA_SERVER_RPC_STREAM_H_
+#define STRATA_SERVER_RPC_STREAM_H_
+
+#include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+#include "absl/synchronization/mutex.h"
+#include <grpcpp/server_context.h>
+#include <grpcpp/support/server_callback.h>
+
+#include "core/api/call.h"
+#include "core/api/database.h"
+#include "server/rpc/request.h"
+#include "server/rpc/runtime.h"
+
+namespace strata::server {
+
+// Sends one message; returns when gRPC has taken it, an error when the reader is gone or too slow.
+template <typename Out>
+using StreamSink = absl::FunctionRef<absl::Status(const Out&)>;
+
+template <typename In, typename Out>
+using StreamHandler =
+    absl::Status (*)(api::Database&, const api::Call&, const In&, StreamSink<Out>);
+
+// Lives from the call's arrival to its end; owns itself. The handler blocks one of the runtime's
+// stream threads, since the database delivers into a sink; so memory is one message a stream.
+template <typename In, typename Out>
+class StreamReactor final : public grpc::ServerWriteReactor<Out> {
+ public:
+  StreamReactor(Runtime& runtime,
+                grpc::CallbackServerContext& context,
+                absl::string_view method,
+                const In& in,
+                StreamHandler<In, Out> handler)
+      : runtime_(runtime), context_(context), request_(runtime, context, method), in_(in) {
+    request_.CountReceived(in);
+    if (const absl::Status admission = request_.admission(); !admission.ok()) {
+      this->Finish(request_.Close(admission));
+      return;
+    }
+    runtime.streams.Submit([this, handler] { Run(handler); });
+  }
+
+ private:
+  void Run(StreamHandler<In, Out> handler) {
+    const absl::Status status = Guarded([&]() -> absl::Status {
+      STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+      return handler(
+          runtime_.db, request_.call(), in_, [this](const Out& message) { return Send(message); });
+    });
+    this->Finish(request_.Close(status));
+  }
+
+  absl::Status Send(const Out& message) {
+    STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+    {
+      absl::MutexLock lock(&mutex_);
+      sending_ = true;
+    }
+    request_.CountSent(message);
+    this->StartWrite(&message);
+    absl::MutexLock lock(&mutex_);
+    const auto sent = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return !sending_; };
+    if (!mutex_.AwaitWithTimeout(absl::Condition(&sent), runtime_.options.slow_reader_timeout)) {
+      // gRPC reads `message` until the write ends, and only the end of the call ends it now.
+      context_.TryCancel();
+      mutex_.Await(absl::Condition(&sent));
+      return translate::WithReason(absl::DeadlineExceededError(absl::StrCat(
+                                       "the reader took nothing for ",
+                                       absl::FormatDuration(runtime_.options.slow_reader_timeout))),
+                                   translate::kSlowReaderReason);
+    }
+    return send_ok_ ? absl::OkStatus() : absl::CancelledError("the reader has gone");
+  }
+
+  void OnWriteDone(bool ok) override {
+    absl::MutexLock lock(&mutex_);
+    sending_ = false;
+    send_ok_ = ok;
+  }
+  void OnCancel() override { request_.Cancel(); }
+  void OnDone() override { delete this; }
+
+  Runtime& runtime_;
+  grpc::CallbackServerContext& context_;
+  Request request_;
+  const In& in_;
+  absl::Mutex mutex_;
+  bool sending_ ABSL_GUARDED_BY(mutex_) = false;
+  bool send_ok_ ABSL_GUARDED_BY(mutex_) = true;
+};
+
+// Answers with what `handler` sends from one of the runtime's stream threads.
+template <typename In, typename Out>
+grpc::ServerWriteReactor<Out>* RunStream(Runtime& runtime,
+                                         grpc::CallbackServerContext* context,
+                                         absl::string_view method,
+                                         const In* in,
+                                         StreamHandler<In, Out> handler) {
+  return new StreamReactor<In, Out>(runtime, *context, method, *in, handler);
+}
+
+}  // namespace strata::server
+
+#endif  // STRATA_SERVER_RPC_STREAM_H_

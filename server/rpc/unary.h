@@ -1,0 +1,69 @@
+// One request, one answer.
+#ifndef STRATA_SERVER_RPC_UNARY_H_
+#define STRATA_SERVER_RPC_UNARY_H_
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+#include <grpcpp/support/server_callback.h>
+
+#include "core/api/call.h"
+#include "core/api/database.h"
+#include "server/rpc/request.h"
+#include "server/rpc/runtime.h"
+
+namespace strata::server {
+
+template <typename In, typename Out>
+using UnaryHandler = absl::Status (*)(api::Database&, const api::Call&, const In&, Out&);
+
+// Lives from the call's arrival to its end; owns itself.
+template <typename In, typename Out>
+class UnaryReactor final : public grpc::ServerUnaryReactor {
+ public:
+  UnaryReactor(Runtime& runtime,
+               grpc::CallbackServerContext& context,
+               absl::string_view method,
+               const In& in,
+               Out& out,
+               UnaryHandler<In, Out> handler)
+      : runtime_(runtime), request_(runtime, context, method), in_(in), out_(out) {
+    request_.CountReceived(in);
+    if (const absl::Status admission = request_.admission(); !admission.ok()) {
+      Finish(request_.Close(admission));
+      return;
+    }
+    runtime.queries.Submit([this, handler] { Run(handler); });
+  }
+
+ private:
+  void Run(UnaryHandler<In, Out> handler) {
+    const absl::Status status = Guarded([&]() -> absl::Status {
+      STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+      return handler(runtime_.db, request_.call(), in_, out_);
+    });
+    request_.CountSent(out_);
+    Finish(request_.Close(status));
+  }
+  void OnCancel() override { request_.Cancel(); }
+  void OnDone() override { delete this; }
+
+  Runtime& runtime_;
+  Request request_;
+  const In& in_;
+  Out& out_;
+};
+
+// Answers with what `handler` does on one of the runtime's query threads.
+template <typename In, typename Out>
+grpc::ServerUnaryReactor* RunUnary(Runtime& runtime,
+                                   grpc::CallbackServerContext* context,
+                                   absl::string_view method,
+                                   const In* in,
+                                   Out* out,
+                                   UnaryHandler<In, Out> handler) {
+  return new UnaryReactor<In, Out>(runtime, *context, method, *in, *out, handler);
+}
+
+}  // namespace strata::server
+
+#endif  // STRATA_SERVER_RPC_UNARY_H_

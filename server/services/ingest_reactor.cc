@@ -1,0 +1,190 @@
+#include "server/services/ingest_reactor.h"
+
+#include <cstddef>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/common/status.h"
+#include "proto/translate/scans.h"
+#include "proto/translate/status.h"
+
+namespace strata::server {
+namespace {
+
+// Scans of one stream between their last point and their answer on the wire.
+constexpr std::size_t kMaxUnanswered = 16;
+
+}  // namespace
+
+IngestReactor::IngestReactor(Runtime& runtime, grpc::CallbackServerContext& context)
+    : runtime_(runtime), request_(runtime, context, "Scans.Ingest") {
+  if (const absl::Status admission = request_.admission(); !admission.ok()) {
+    Finish(request_.Close(admission));
+    return;
+  }
+  StartRead(&message_);
+}
+
+void IngestReactor::OnReadDone(bool ok) {
+  if (ok) {
+    runtime_.uploads.Submit([this] { Take(); });
+  } else {
+    runtime_.uploads.Submit([this] {
+      AbandonIncomplete();
+      EndReading(absl::OkStatus());
+    });
+  }
+}
+
+void IngestReactor::Take() {
+  request_.CountReceived(message_);
+  const absl::Status status = Guarded([this] { return TakeMessage(); });
+  if (!status.ok()) {
+    EndReading(status);
+    return;
+  }
+  absl::MutexLock lock(&mutex_);
+  reading_ = false;
+  StartReadIfRoom();
+}
+
+absl::Status IngestReactor::TakeMessage() {
+  STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+  if (message_.has_start()) {
+    AbandonIncomplete();
+    Begin(message_.start());
+    return absl::OkStatus();
+  }
+  if (message_.has_chunk()) return Add(message_.chunk());
+  return AtTheDoor(
+      absl::InvalidArgumentError("ingest: a message is the start of a scan or a chunk"));
+}
+
+void IngestReactor::Begin(const v1::ScanStart& start) {
+  current_id_ = start.header().id();
+  absl::StatusOr<ScanReceiver> begun = ScanReceiver::Begin(runtime_.db, request_.call(), start);
+  passing_over_ = !begun.ok();
+  if (!begun.ok()) {
+    EndScan(begun.status());
+    return;
+  }
+  current_ = *std::move(begun);
+  if (current_->complete()) EndScan(absl::OkStatus());
+}
+
+absl::Status IngestReactor::Add(const v1::PointChunk& chunk) {
+  if (passing_over_) return absl::OkStatus();
+  if (!current_.has_value()) {
+    return AtTheDoor(
+        absl::InvalidArgumentError("ingest: a chunk belongs to no scan; send its start"));
+  }
+  const absl::Status status = current_->Add(chunk);
+  passing_over_ = !status.ok();
+  if (!status.ok() || current_->complete()) EndScan(status);
+  return absl::OkStatus();
+}
+
+void IngestReactor::AbandonIncomplete() {
+  // The receiver itself says what is missing.
+  if (current_.has_value()) EndScan(current_->Finish().status());
+}
+
+void IngestReactor::EndScan(const absl::Status& error) {
+  Ended ended{current_id_, std::nullopt, error};
+  if (error.ok()) ended.scan = std::move(current_);
+  current_.reset();
+  absl::MutexLock lock(&mutex_);
+  ended_.push_back(std::move(ended));
+  StartCommitIfIdle();
+}
+
+void IngestReactor::EndReading(const absl::Status& status) {
+  current_.reset();
+  absl::MutexLock lock(&mutex_);
+  reading_ = false;
+  reading_ended_ = true;
+  stream_status_ = status;
+  FinishIfDone();
+}
+
+void IngestReactor::Commit() {
+  Ended ended;
+  {
+    absl::MutexLock lock(&mutex_);
+    ended = std::move(ended_.front());
+  }
+  v1::IngestScansResponse answer = Answer(ended);
+  ended.scan.reset();
+  request_.CountSent(answer);
+  absl::MutexLock lock(&mutex_);
+  committing_ = false;
+  ended_.pop_front();
+  answers_.push_back(std::move(answer));
+  StartCommitIfIdle();
+  StartWriteIfIdle();
+}
+
+v1::IngestScansResponse IngestReactor::Answer(Ended& ended) {
+  v1::IngestScansResponse answer;
+  *answer.mutable_id() = ended.id;
+  absl::Status status = ended.error;
+  if (status.ok()) {
+    status = Guarded([&]() -> absl::Status {
+      STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+      STRATA_ASSIGN_OR_RETURN(const ScanAck ack, ended.scan->Finish());
+      *answer.mutable_ack() = translate::ToProto(ack);
+      return absl::OkStatus();
+    });
+  }
+  if (!status.ok()) {
+    *answer.mutable_error() = translate::ToScanError(status, request_.call().request_id);
+  }
+  return answer;
+}
+
+void IngestReactor::OnWriteDone(bool ok) {
+  absl::MutexLock lock(&mutex_);
+  writing_ = false;
+  answers_.pop_front();
+  // A reader that is gone needs no answers; the end of its stream follows.
+  if (!ok) answers_.clear();
+  StartWriteIfIdle();
+  StartReadIfRoom();
+  FinishIfDone();
+}
+
+void IngestReactor::OnDone() {
+  // Whoever finished the call still holds the mutex for an instant.
+  mutex_.Lock();
+  mutex_.Unlock();
+  delete this;
+}
+
+void IngestReactor::StartCommitIfIdle() {
+  if (committing_ || ended_.empty()) return;
+  committing_ = true;
+  runtime_.uploads.Submit([this] { Commit(); });
+}
+
+void IngestReactor::StartWriteIfIdle() {
+  if (writing_ || answers_.empty()) return;
+  writing_ = true;
+  StartWrite(&answers_.front());
+}
+
+void IngestReactor::StartReadIfRoom() {
+  if (reading_ || reading_ended_ || ended_.size() + answers_.size() >= kMaxUnanswered) return;
+  reading_ = true;
+  StartRead(&message_);
+}
+
+bool IngestReactor::Done() const {
+  return reading_ended_ && !committing_ && ended_.empty() && !writing_ && answers_.empty();
+}
+
+void IngestReactor::FinishIfDone() {
+  if (Done()) Finish(request_.Close(stream_status_));
+}
+
+}  // namespace strata::server

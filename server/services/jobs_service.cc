@@ -1,0 +1,88 @@
+#include "server/services/jobs_service.h"
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/common/status.h"
+#include "core/world/job.h"
+#include "proto/translate/jobs.h"
+#include "server/rpc/unary.h"
+#include "server/services/watch_reactor.h"
+
+namespace strata::server {
+namespace {
+
+using translate::ToProto;
+
+absl::Status Start(api::Database& db,
+                   const api::Call& call,
+                   const v1::StartJobRequest& in,
+                   v1::StartJobResponse& out) {
+  const std::map<std::string, std::string> parameters(in.parameters().begin(),
+                                                      in.parameters().end());
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job,
+                          db.jobs().Start(call, in.map(), in.kind(), parameters));
+  *out.mutable_job() = ToProto(job);
+  return absl::OkStatus();
+}
+
+absl::Status Get(api::Database& db,
+                 const api::Call& call,
+                 const v1::GetJobRequest& in,
+                 v1::GetJobResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job, db.jobs().Get(call, in.map(), in.id()));
+  *out.mutable_job() = ToProto(job);
+  return absl::OkStatus();
+}
+
+absl::Status List(api::Database& db,
+                  const api::Call& call,
+                  const v1::ListJobsRequest& in,
+                  v1::ListJobsResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<JobInfo> jobs, db.jobs().List(call, in.map()));
+  for (const JobInfo& job : jobs) *out.add_jobs() = ToProto(job);
+  return absl::OkStatus();
+}
+
+absl::Status Cancel(api::Database& db,
+                    const api::Call& call,
+                    const v1::CancelJobRequest& in,
+                    v1::CancelJobResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job, db.jobs().Cancel(call, in.map(), in.id()));
+  *out.mutable_job() = ToProto(job);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* JobsService::Start(grpc::CallbackServerContext* context,
+                                             const v1::StartJobRequest* in,
+                                             v1::StartJobResponse* out) {
+  return RunUnary(runtime_, context, "Jobs.Start", in, out, &server::Start);
+}
+
+grpc::ServerUnaryReactor* JobsService::Get(grpc::CallbackServerContext* context,
+                                           const v1::GetJobRequest* in,
+                                           v1::GetJobResponse* out) {
+  return RunUnary(runtime_, context, "Jobs.Get", in, out, &server::Get);
+}
+
+grpc::ServerUnaryReactor* JobsService::List(grpc::CallbackServerContext* context,
+                                            const v1::ListJobsRequest* in,
+                                            v1::ListJobsResponse* out) {
+  return RunUnary(runtime_, context, "Jobs.List", in, out, &server::List);
+}
+
+grpc::ServerUnaryReactor* JobsService::Cancel(grpc::CallbackServerContext* context,
+                                              const v1::CancelJobRequest* in,
+                                              v1::CancelJobResponse* out) {
+  return RunUnary(runtime_, context, "Jobs.Cancel", in, out, &server::Cancel);
+}
+
+grpc::ServerWriteReactor<v1::WatchJobResponse>* JobsService::Watch(
+    grpc::CallbackServerContext* context, const v1::WatchJobRequest* in) {
+  return new WatchReactor(runtime_, *context, *in);
+}
+
+}  // namespace strata::server

@@ -1,0 +1,94 @@
+#include "server/services/maps_service.h"
+
+#include "core/common/status.h"
+#include "core/world/map_info.h"
+#include "core/world/names.h"
+#include "proto/translate/maps.h"
+#include "server/rpc/request.h"
+#include "server/rpc/unary.h"
+
+namespace strata::server {
+namespace {
+
+using translate::FromProto;
+using translate::ToProto;
+
+absl::Status Create(api::Database& db,
+                    const api::Call& call,
+                    const v1::CreateMapRequest& in,
+                    v1::CreateMapResponse& out) {
+  STRATA_RETURN_IF_ERROR(AtTheDoor(ValidateName("map name", in.name())));
+  const MapParameters parameters = FromProto(in.parameters());
+  STRATA_RETURN_IF_ERROR(AtTheDoor(ValidateMapParameters(parameters)));
+  STRATA_ASSIGN_OR_RETURN(const MapInfo map, db.maps().Create(call, in.name(), parameters));
+  *out.mutable_map() = ToProto(map);
+  return absl::OkStatus();
+}
+
+absl::Status Get(api::Database& db,
+                 const api::Call& call,
+                 const v1::GetMapRequest& in,
+                 v1::GetMapResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const MapInfo map, db.maps().Get(call, in.name()));
+  *out.mutable_map() = ToProto(map);
+  return absl::OkStatus();
+}
+
+absl::Status List(api::Database& db,
+                  const api::Call& call,
+                  const v1::ListMapsRequest&,
+                  v1::ListMapsResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MapInfo> maps, db.maps().List(call));
+  for (const MapInfo& map : maps) *out.add_maps() = ToProto(map);
+  return absl::OkStatus();
+}
+
+absl::Status Delete(api::Database& db,
+                    const api::Call& call,
+                    const v1::DeleteMapRequest& in,
+                    v1::DeleteMapResponse&) {
+  return db.maps().Delete(call, in.name());
+}
+
+absl::Status Stats(api::Database& db,
+                   const api::Call& call,
+                   const v1::GetMapStatsRequest& in,
+                   v1::GetMapStatsResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const MapStats stats, db.maps().Stats(call, in.name()));
+  *out.mutable_stats() = ToProto(stats);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* MapsService::Create(grpc::CallbackServerContext* context,
+                                              const v1::CreateMapRequest* in,
+                                              v1::CreateMapResponse* out) {
+  return RunUnary(runtime_, context, "Maps.Create", in, out, &server::Create);
+}
+
+grpc::ServerUnaryReactor* MapsService::Get(grpc::CallbackServerContext* context,
+                                           const v1::GetMapRequest* in,
+                                           v1::GetMapResponse* out) {
+  return RunUnary(runtime_, context, "Maps.Get", in, out, &server::Get);
+}
+
+grpc::ServerUnaryReactor* MapsService::List(grpc::CallbackServerContext* context,
+                                            const v1::ListMapsRequest* in,
+                                            v1::ListMapsResponse* out) {
+  return RunUnary(runtime_, context, "Maps.List", in, out, &server::List);
+}
+
+grpc::ServerUnaryReactor* MapsService::Delete(grpc::CallbackServerContext* context,
+                                              const v1::DeleteMapRequest* in,
+                                              v1::DeleteMapResponse* out) {
+  return RunUnary(runtime_, context, "Maps.Delete", in, out, &server::Delete);
+}
+
+grpc::ServerUnaryReactor* MapsService::Stats(grpc::CallbackServerContext* context,
+                                             const v1::GetMapStatsRequest* in,
+                                             v1::GetMapStatsResponse* out) {
+  return RunUnary(runtime_, context, "Maps.Stats", in, out, &server::Stats);
+}
+
+}  // namespace strata::server

@@ -1,0 +1,108 @@
+#include "server/services/planning_service.h"
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/common/status.h"
+#include "core/world/names.h"
+#include "core/world/plan.h"
+#include "proto/translate/geometry.h"
+#include "proto/translate/maps.h"
+#include "proto/translate/planning.h"
+#include "server/rpc/unary.h"
+
+namespace strata::server {
+namespace {
+
+using translate::FromProto;
+using translate::ToProto;
+
+// Bounds the answer: some levels a place, 30 bytes each, stay well below a message's 4 MiB.
+constexpr int kMaxPlaces = 10'000;
+
+absl::Status PlanPath(api::Database& db,
+                      const api::Call& call,
+                      const v1::PlanPathRequest& in,
+                      v1::PlanPathResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const PlanQuery query, AtTheDoor(FromProto(in)));
+  STRATA_ASSIGN_OR_RETURN(const PlanResult result, db.planning().PlanPath(call, in.map(), query));
+  out = ToProto(result);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<Eigen::Vector2d>> PlacesOf(const v1::SampleSurfacesRequest& in) {
+  if (in.places_size() > kMaxPlaces) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "places: ", in.places_size(), " are more than ", kMaxPlaces, "; ask in parts"));
+  }
+  std::vector<Eigen::Vector2d> places;
+  places.reserve(static_cast<std::size_t>(in.places_size()));
+  for (int i = 0; i < in.places_size(); ++i) {
+    STRATA_ASSIGN_OR_RETURN(const Eigen::Vector2d place,
+                            FromProto(absl::StrCat("places[", i, "]"), in.places(i)));
+    places.push_back(place);
+  }
+  return places;
+}
+
+absl::Status SampleSurfaces(api::Database& db,
+                            const api::Call& call,
+                            const v1::SampleSurfacesRequest& in,
+                            v1::SampleSurfacesResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<Eigen::Vector2d> places, AtTheDoor(PlacesOf(in)));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceColumn> columns,
+                          db.planning().SampleSurfaces(call, in.map(), places));
+  for (const SurfaceColumn& column : columns) *out.add_columns() = ToProto(column);
+  return absl::OkStatus();
+}
+
+absl::Status SetProfile(api::Database& db,
+                        const api::Call& call,
+                        const v1::SetProfileRequest& in,
+                        v1::SetProfileResponse&) {
+  STRATA_RETURN_IF_ERROR(AtTheDoor(ValidateName("profile name", in.name())));
+  const RobotProfile profile = FromProto(in.profile());
+  STRATA_RETURN_IF_ERROR(AtTheDoor(ValidateRobotProfile(profile)));
+  return db.planning().SetProfile(call, in.map(), in.name(), profile);
+}
+
+absl::Status ListProfiles(api::Database& db,
+                          const api::Call& call,
+                          const v1::ListProfilesRequest& in,
+                          v1::ListProfilesResponse& out) {
+  using Profiles = std::map<std::string, RobotProfile>;
+  STRATA_ASSIGN_OR_RETURN(const Profiles profiles, db.planning().ListProfiles(call, in.map()));
+  for (const auto& [name, profile] : profiles) (*out.mutable_profiles())[name] = ToProto(profile);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* PlanningService::PlanPath(grpc::CallbackServerContext* context,
+                                                    const v1::PlanPathRequest* in,
+                                                    v1::PlanPathResponse* out) {
+  return RunUnary(runtime_, context, "Planning.PlanPath", in, out, &server::PlanPath);
+}
+
+grpc::ServerUnaryReactor* PlanningService::SampleSurfaces(grpc::CallbackServerContext* context,
+                                                          const v1::SampleSurfacesRequest* in,
+                                                          v1::SampleSurfacesResponse* out) {
+  return RunUnary(runtime_, context, "Planning.SampleSurfaces", in, out, &server::SampleSurfaces);
+}
+
+grpc::ServerUnaryReactor* PlanningService::SetProfile(grpc::CallbackServerContext* context,
+                                                      const v1::SetProfileRequest* in,
+                                                      v1::SetProfileResponse* out) {
+  return RunUnary(runtime_, context, "Planning.SetProfile", in, out, &server::SetProfile);
+}
+
+grpc::ServerUnaryReactor* PlanningService::ListProfiles(grpc::CallbackServerContext* context,
+                                                        const v1::ListProfilesRequest* in,
+                                                        v1::ListProfilesResponse* out) {
+  return RunUnary(runtime_, context, "Planning.ListProfiles", in, out, &server::ListProfiles);
+}
+
+}  // namespace strata::server

@@ -1,0 +1,27 @@
+// strata.v1.PoseGraph over api::PoseGraph.
+#ifndef STRATA_SERVER_SERVICES_POSEGRAPH_SERVICE_H_
+#define STRATA_SERVER_SERVICES_POSEGRAPH_SERVICE_H_
+
+#include "server/rpc/runtime.h"
+#include "strata/v1/posegraph.grpc.pb.h"
+
+namespace strata::server {
+
+// Thread-safe.
+class PoseGraphService final : public v1::PoseGraph::CallbackService {
+ public:
+  explicit PoseGraphService(Runtime& runtime) : runtime_(runtime) {}
+
+  grpc::ServerWriteReactor<v1::GetPoseGraphResponse>* Get(
+      grpc::CallbackServerContext* context, const v1::GetPoseGraphRequest* in) override;
+  grpc::ServerUnaryReactor* SetPose(grpc::CallbackServerContext* context,
+                                    const v1::SetPoseRequest* in,
+                                    v1::SetPoseResponse* out) override;
+
+ private:
+  Runtime& runtime_;
+};
+
+}  // namespace strata::server
+
+#endif  // STRATA_SERVER_SERVICES_POSEGRAPH_SERVICE_H_

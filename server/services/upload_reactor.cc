@@ -1,0 +1,74 @@
+#include "server/services/upload_reactor.h"
+
+#include <utility>
+
+#include "core/common/status.h"
+#include "proto/translate/scans.h"
+
+namespace strata::server {
+
+UploadReactor::UploadReactor(Runtime& runtime,
+                             grpc::CallbackServerContext& context,
+                             v1::UploadScanResponse& out)
+    : runtime_(runtime), context_(context), request_(runtime, context, "Scans.Upload"), out_(out) {
+  if (const absl::Status admission = request_.admission(); !admission.ok()) {
+    Finish(request_.Close(admission));
+    return;
+  }
+  StartRead(&message_);
+}
+
+void UploadReactor::OnReadDone(bool ok) {
+  if (ok) {
+    runtime_.uploads.Submit([this] { Take(); });
+  } else {
+    runtime_.uploads.Submit([this] { Commit(); });
+  }
+}
+
+void UploadReactor::Take() {
+  request_.CountReceived(message_);
+  const absl::Status status = Guarded([this] { return TakeMessage(); });
+  if (status.ok()) {
+    StartRead(&message_);
+    return;
+  }
+  scan_.reset();
+  Finish(request_.Close(status));
+}
+
+absl::Status UploadReactor::TakeMessage() {
+  STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+  if (message_.has_start() && !scan_.has_value()) return Begin(message_.start());
+  if (message_.has_chunk() && scan_.has_value()) return scan_->Add(message_.chunk());
+  return AtTheDoor(absl::InvalidArgumentError(
+      scan_.has_value() ? "upload: every message after the first is a chunk"
+                        : "upload: the first message is the start of the scan"));
+}
+
+absl::Status UploadReactor::Begin(const v1::ScanStart& start) {
+  STRATA_ASSIGN_OR_RETURN(scan_, ScanReceiver::Begin(runtime_.db, request_.call(), start));
+  // Tells the client that its points are welcome.
+  context_.AddInitialMetadata("x-upload-accepted", "1");
+  StartSendInitialMetadata();
+  return absl::OkStatus();
+}
+
+void UploadReactor::Commit() {
+  const absl::Status status = Guarded([this]() -> absl::Status {
+    // The stream also ends when the client has gone: what it did not confirm is abandoned.
+    STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+    if (!scan_.has_value()) {
+      return AtTheDoor(
+          absl::InvalidArgumentError("upload: the stream ended before its scan began"));
+    }
+    STRATA_ASSIGN_OR_RETURN(const ScanAck ack, scan_->Finish());
+    *out_.mutable_ack() = translate::ToProto(ack);
+    return absl::OkStatus();
+  });
+  scan_.reset();
+  request_.CountSent(out_);
+  Finish(request_.Close(status));
+}
+
+}  // namespace strata::server

@@ -1,0 +1,8 @@
+find_package(octomap REQUIRED)
+strata_executable(
+  codec_benchmark codec_benchmark
+  SOURCES codec_benchmark.cc
+  DEPS strata::codec strata::codec_samples strata::test_support benchmark::benchmark PkgConfig::zstd
+       ${OCTOMAP_LIBRARIES}
+)
+target_include_directories(codec_benchmark SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})

@@ -1,0 +1,173 @@
+#include "client/cli/picture/map_picture.h"
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include "tests/support/status_matchers.h"
+#include "tests/support/temp_dir.h"
+
+namespace strata::picture {
+namespace {
+
+using Eigen::Vector3d;
+
+// A tile whose cells (x, y) in [0, side)² have the surface that `at` gives.
+template <typename F>
+SurfaceTile TileOf(int side, const F& at) {
+  SurfaceTile tile;
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      Surface surface = at(x, y);
+      surface.cell = CellInTile({x, y});
+      tile.surfaces.push_back(surface);
+    }
+  }
+  tile.IndexRows();
+  return tile;
+}
+
+Surface Ground(Traversability traversability, float z = 0.0F) {
+  return {.traversability = traversability, .z_m = z, .sigma_m = 0.01F};
+}
+
+// The pixel where a point of the map is drawn.
+Colour PixelAt(const Picture& picture, const Vector3d& p_map) {
+  const Vector3d p = picture.camera.Project(p_map);
+  const int x = static_cast<int>(std::floor(0.5 * picture.image.width + p.x()));
+  const int y = static_cast<int>(std::floor(0.5 * (picture.image.height - kLegendPixels) + p.y()));
+  return picture.image.At(x, y);
+}
+
+bool IsYellow(Colour c) { return c.r > 180 && c.g > 140 && c.b < 120; }
+bool IsRed(Colour c) { return c.r > 150 && c.g < 110 && c.b < 110; }
+bool IsBlue(Colour c) { return c.b > 130 && c.r < 120 && c.b > c.g + 40; }
+
+TEST(MapPictureTest, PlanShowsEachKindOfSurfaceInItsColour) {
+  const SurfaceTile tile = TileOf(60, [](int x, int) {
+    if (x < 20) return Ground(Traversability::kTraversable);
+    if (x < 40) return Ground(Traversability::kNonTraversable);
+    Surface wall = Ground(Traversability::kNonTraversable, 2.0F);
+    wall.depth_m = 2.0F;
+    return wall;
+  });
+  const Picture picture = DrawMap({tile}, 0.1, {}, {.width = 400, .height = 444});
+  EXPECT_TRUE(IsYellow(PixelAt(picture, {1.0, 3.0, 0.0})));
+  EXPECT_TRUE(IsRed(PixelAt(picture, {3.0, 3.0, 0.0})));
+  EXPECT_TRUE(IsBlue(PixelAt(picture, {5.0, 3.0, 2.0})));
+}
+
+TEST(MapPictureTest, PlanHasXToTheRightAndYUp) {
+  const Picture picture = DrawMap(
+      {TileOf(50, [](int, int) { return Ground(Traversability::kTraversable); })}, 0.1, {}, {});
+  const Vector3d right = picture.camera.Project(picture.camera.centre + Vector3d::UnitX());
+  const Vector3d up = picture.camera.Project(picture.camera.centre + Vector3d::UnitY());
+  EXPECT_NEAR(right.x(), 1.0 / picture.camera.metres_per_pixel, 1e-9);
+  EXPECT_NEAR(right.y(), 0.0, 1e-9);
+  EXPECT_NEAR(up.y(), -1.0 / picture.camera.metres_per_pixel, 1e-9);
+}
+
+TEST(MapPictureTest, UpperLevelHidesTheLowerAndASliceShowsIt) {
+  SurfaceTile tile;
+  for (int cell = 0; cell < 40 * 40; ++cell) {
+    Surface road = Ground(Traversability::kNonTraversable, 0.0F);
+    Surface deck = Ground(Traversability::kTraversable, 3.0F);
+    road.cell = deck.cell = CellInTile({cell % 40, cell / 40});
+    tile.surfaces.push_back(road);
+    tile.surfaces.push_back(deck);
+  }
+  PictureOptions options{.width = 300, .height = 344};
+  EXPECT_TRUE(IsYellow(PixelAt(DrawMap({tile}, 0.1, {}, options), {2, 2, 3})));
+  options.slice_m = {-1.0, 1.0};
+  EXPECT_TRUE(IsRed(PixelAt(DrawMap({tile}, 0.1, {}, options), {2, 2, 0})));
+}
+
+TEST(MapPictureTest, ObliqueViewShowsTheFacingSideOfAWallAndItsDrivableTop) {
+  const SurfaceTile tile = TileOf(60, [](int x, int y) {
+    Surface surface = Ground(Traversability::kTraversable);
+    if (x >= 20 && x < 40 && y >= 20 && y < 40) {
+      surface.z_m = 3.0F;
+      surface.depth_m = 3.0F;
+    }
+    return surface;
+  });
+  PictureOptions options{.width = 500, .height = 544};
+  options.azimuth_rad = -1.2;  // from the south
+  options.elevation_rad = 0.6;
+  const Picture picture = DrawMap({tile}, 0.1, {}, options);
+  EXPECT_TRUE(IsBlue(PixelAt(picture, {3.05, 2.0, 1.5})));
+  EXPECT_TRUE(IsYellow(PixelAt(picture, {3.05, 3.05, 3.0})));
+  EXPECT_TRUE(IsYellow(PixelAt(picture, {3.05, 0.5, 0.0})));
+  // The ground right behind the block is hidden by it.
+  EXPECT_TRUE(IsYellow(PixelAt(picture, {3.05, 5.9, 0.0})) ||
+              IsBlue(PixelAt(picture, {3.05, 5.9, 0.0})));
+}
+
+TEST(MapPictureTest, PathIsDrawnOnTopAndFaintWhereSomethingHidesIt) {
+  SurfaceTile tile = TileOf(
+      80, [](int x, int) { return Ground(Traversability::kTraversable, x < 40 ? 0.0F : 4.0F); });
+  const Path path = {{1.0, 4.0, 0.0}, {7.0, 4.0, 0.0}};
+  const PictureOptions options{.width = 400, .height = 444};
+  const Picture without = DrawMap({tile}, 0.1, {}, options);
+  const Picture with = DrawMap({tile}, 0.1, {path}, options);
+  const Colour open = PixelAt(with, {2.0, 4.0, 0.0});
+  EXPECT_LT(open.r + open.g + open.b, 200);
+  EXPECT_TRUE(IsYellow(PixelAt(without, {2.0, 4.0, 0.0})));
+  const Colour hidden = PixelAt(with, {6.0, 4.0, 0.0});
+  EXPECT_GT(hidden.r + hidden.g + hidden.b, 250);
+  EXPECT_NE(hidden, PixelAt(without, {6.0, 4.0, 0.0}));
+}
+
+TEST(MapPictureTest, AFewStraySurfacesDoNotShrinkTheView) {
+  SurfaceTile tile = TileOf(100, [](int, int) { return Ground(Traversability::kTraversable); });
+  SurfaceTile stray;
+  stray.key = {0, 100, 0};
+  stray.surfaces.push_back(Ground(Traversability::kUnknown));
+  stray.IndexRows();
+  const Picture picture = DrawMap({tile, stray}, 0.1, {}, {.width = 500, .height = 544});
+  EXPECT_LT(picture.camera.metres_per_pixel, 0.03);
+}
+
+TEST(MapPictureTest, AnEmptyMapIsAnEmptyPicture) {
+  const Picture picture = DrawMap({}, 0.1, {}, {.width = 200, .height = 200});
+  EXPECT_EQ(picture.image.width, 200);
+  EXPECT_EQ(picture.image.At(100, 50), picture.image.At(10, 10));
+}
+
+TEST(ImageTest, PngReadsBackAsItWasWritten) {
+  Image image(31, 17, {1, 2, 3});
+  for (int i = 0; i < 17; ++i) {
+    image.At(i, i) = {static_cast<std::uint8_t>(10 * i), 200, static_cast<std::uint8_t>(i)};
+  }
+  const testing::TempDir dir;
+  const std::string path = (dir.path() / "x.png").string();
+  STRATA_ASSERT_OK(WritePng(image, path));
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  ASSERT_EQ(png_image_begin_read_from_file(&png, path.c_str()), 1);
+  png.format = PNG_FORMAT_RGB;
+  std::vector<Colour> pixels(PNG_IMAGE_SIZE(png) / 3);
+  ASSERT_EQ(png_image_finish_read(&png, nullptr, pixels.data(), 0, nullptr), 1);
+  EXPECT_EQ(png.width, 31U);
+  EXPECT_EQ(png.height, 17U);
+  EXPECT_EQ(pixels, image.pixels);
+}
+
+TEST(ImageTest, PngInAFolderThatIsNotThereNamesTheFile) {
+  EXPECT_THAT(
+      WritePng(Image(2, 2, {}), "/nowhere/x.png"),
+      testing::StatusIs(absl::StatusCode::kUnavailable, ::testing::HasSubstr("/nowhere/x.png")));
+}
+
+TEST(ImageTest, TextStaysInsideTheImage) {
+  Image image(20, 10, {255, 255, 255});
+  EXPECT_EQ(DrawText(image, 2, 1, 1, "l2", {0, 0, 0}), 14);
+  EXPECT_EQ(image.At(4, 3), (Colour{0, 0, 0}));  // the stem of the l
+  DrawText(image, 15, 6, 3, "wide text that leaves the image", {0, 0, 0});
+}
+
+}  // namespace
+}  // namespace strata::picture

@@ -1,0 +1,79 @@
+#include "client/formats/plain_readers.h"
+
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/client/formats/hostile_files.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata {
+namespace {
+
+using ::strata::testing::StatusIs;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+TEST(XyzReaderTest, ColumnsWithoutNamesGoByTheirNumber) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud xyz, ReadXyz("1 2 3\n\n+4\t-5e0   6\r\n"));
+  EXPECT_THAT(xyz.points, ElementsAre(Eigen::Vector3f(1, 2, 3), Eigen::Vector3f(4, -5, 6)));
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud xyzi, ReadXyz("1,2,3,0.5\n"));
+  EXPECT_THAT(xyzi.intensity, ElementsAre(0.5F));
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud xyzirgb, ReadXyz("1;2;3;0.5;10;20;30\n"));
+  EXPECT_THAT(xyzirgb.colour, ElementsAre(Colour{10, 20, 30}));
+}
+
+TEST(XyzReaderTest, NamesComeFromALineOrAComment) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud csv, ReadXyz("time,z,x,y,nx\n0,3,1,2,9\n"));
+  EXPECT_THAT(csv.points, ElementsAre(Eigen::Vector3f(1, 2, 3)));
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const PointCloud commented,
+      ReadXyz("#Fri Feb 15\n#File format: x y z label_id confidence\n1 2 3 1203 2\n# stray\n"));
+  EXPECT_THAT(commented.label, ElementsAre(1203));
+}
+
+TEST(XyzReaderTest, ErrorsNameTheLine) {
+  const auto expect = [](const std::string& file, const std::string& message) {
+    EXPECT_THAT(ReadXyz(file), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(message)));
+  };
+  expect("", "expected points");
+  expect("1 2\n", "line 1: points have no field z");
+  expect("1 2 3\n4 5\n", "line 2: expected 3 numbers, found 2");
+  expect("1 2 3\n4 5 six\n", "line 2: expected numbers only");
+  expect("a,b,c\n1,2,3\n", "line 2: points have no field x");
+}
+
+TEST(KittiReaderTest, FourFloatsAPoint) {
+  const std::string point("\0\0\200\77\0\0\0\100\0\0\100\100\0\0\0\77", 16);
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, ReadKitti(point + point));
+  EXPECT_THAT(cloud.points, ElementsAre(Eigen::Vector3f(1, 2, 3), Eigen::Vector3f(1, 2, 3)));
+  EXPECT_THAT(cloud.intensity, ElementsAre(0.5F, 0.5F));
+  EXPECT_THAT(ReadKitti(point + "x"),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("17 bytes")));
+  EXPECT_THAT(ReadKitti(""), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("no finite")));
+  testing::ExpectSoundOnDamage(point + point, &ReadKitti, 1);
+}
+
+TEST(ThreeDtkReaderTest, CentimetresLeftHandedBecomeMetresRightHanded) {
+  // 3 m right, 1 m up, 20 m ahead.
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, Read3dtk("300 100 2000 0.25\n"));
+  EXPECT_THAT(cloud.points, ElementsAre(Eigen::Vector3f(20, -3, 1)));
+  EXPECT_THAT(cloud.intensity, ElementsAre(0.25F));
+  EXPECT_THAT(Read3dtk("1 2 3\n1 2\n"),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("line 2")));
+  testing::ExpectSoundOnDamage("300 100 2000\n1 2 3\n", &Read3dtk, 1);
+}
+
+TEST(ThreeDtkReaderTest, PoseMapsLikeTheLeftHandedOne) {
+  // In 3DTK's frame: p_world = Rx Ry Rz p + t, by hand for 90° about y: (x, z) → (z, -x).
+  STRATA_ASSERT_OK_AND_ASSIGN(const Pose T, Parse3dtkPose("100 200 300\n0 90 0\n"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud scan, Read3dtk("10 20 30\n"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud world, Read3dtk("130 220 290\n"));
+  EXPECT_LT((T * scan.points[0].cast<double>() - world.points[0].cast<double>()).norm(), 1e-6);
+  EXPECT_THAT(Parse3dtkPose("1 2 3 4 5"),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("three angles")));
+}
+
+}  // namespace
+}  // namespace strata

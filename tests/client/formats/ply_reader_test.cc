@@ -1,0 +1,91 @@
+#include "client/formats/ply_reader.h"
+
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/client/formats/hostile_files.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata {
+namespace {
+
+using ::strata::testing::StatusIs;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+// Another element before, a list between the properties, coordinates in three types.
+constexpr char kHeader[] =
+    "comment of all kinds\nelement camera 1\nproperty list uchar short k\nelement vertex 2\n"
+    "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty double z\n"
+    "property list uchar uchar tags\nproperty short y\nproperty float x\nproperty int label\n"
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+
+void ExpectTheTwoPoints(const absl::StatusOr<PointCloud>& cloud) {
+  STRATA_ASSERT_OK(cloud);
+  EXPECT_THAT(cloud->points,
+              ElementsAre(Eigen::Vector3f(1.5F, -2, 3), Eigen::Vector3f(4, 5, 6.25F)));
+  EXPECT_THAT(cloud->colour, ElementsAre(Colour{10, 20, 30}, Colour{255, 0, 1}));
+  EXPECT_THAT(cloud->label, ElementsAre(0, 300));  // -1 stands for none
+}
+
+std::string Ascii() {
+  return std::string("ply\nformat ascii 1.0\n") + kHeader +
+         "2 7 8\n10 20 30 3 2 1 1 -2 1.5 -1\n255 0 1 6.25 0 5 4 300\n3 0 1 0\n";
+}
+
+std::string LittleEndian() {
+  return std::string("ply\r\nformat binary_little_endian 1.0\n") + kHeader +
+         std::string("\2\7\0\10\0", 5) +
+         std::string("\12\24\36\0\0\0\0\0\0\10\100\2\1\1\376\377\0\0\300\77\377\377\377\377", 24) +
+         std::string("\377\0\1\0\0\0\0\0\0\31\100\0\5\0\0\0\200\100\54\1\0\0", 22);
+}
+
+std::string BigEndian() {
+  return std::string("ply\nformat binary_big_endian 1.0\n") + kHeader +
+         std::string("\2\0\7\0\10", 5) +
+         std::string("\12\24\36\100\10\0\0\0\0\0\0\2\1\1\377\376\77\300\0\0\377\377\377\377", 24) +
+         std::string("\377\0\1\100\31\0\0\0\0\0\0\0\0\5\100\200\0\0\0\0\1\54", 22);
+}
+
+TEST(PlyReaderTest, EveryEncodingWithAnyPropertiesGivesTheSamePoints) {
+  ExpectTheTwoPoints(ReadPly(Ascii()));
+  ExpectTheTwoPoints(ReadPly(LittleEndian()));
+  ExpectTheTwoPoints(ReadPly(BigEndian()));
+}
+
+TEST(PlyReaderTest, ColoursWithFractionsAreScaled) {
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const PointCloud cloud,
+      ReadPly("ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+              "property float z\nproperty float red\nproperty float green\nproperty float blue\n"
+              "end_header\n0 0 0 0.5 1 0\n1 1 1 0 0.2 1\n"));
+  EXPECT_THAT(cloud.colour, ElementsAre(Colour{128, 255, 0}, Colour{0, 51, 255}));
+}
+
+TEST(PlyReaderTest, ErrorsNameLineOrByteAndWhatWasExpected) {
+  const auto expect = [](const std::string& file, const std::string& message) {
+    EXPECT_THAT(ReadPly(file), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(message)));
+  };
+  const std::string xyz = "property float x\nproperty float y\nproperty float z\nend_header\n";
+  expect("plyx\n", "line 1: expected 'ply'");
+  expect("ply\nformat ascii 1.0\nelement vertex -1\n", "line 3: expected 'element NAME COUNT'");
+  expect("ply\nformat ascii 1.0\nelement face 0\nend_header\n", "no element vertex");
+  expect("ply\nformat utf8 1.0\nelement vertex 0\n" + xyz, "format is none of");
+  expect("ply\nformat ascii 1.0\nelement vertex 1\nproperty quad x\n", "unknown type");
+  expect("ply\nformat binary_little_endian 1.0\nelement vertex 99999999999\n" + xyz,
+         "99999999999 vertices do not fit");
+  expect("ply\nformat ascii 1.0\nelement vertex 2\n" + xyz + "1 2 3\n4 5 seven\n",
+         "line 9: expected a number, found 'seven'");
+  expect("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n",
+         "no field y");
+}
+
+TEST(PlyReaderTest, DamageIsAStatus) {
+  testing::ExpectSoundOnDamage(Ascii(), &ReadPly, 1);
+  testing::ExpectSoundOnDamage(LittleEndian(), &ReadPly, 2);
+}
+
+}  // namespace
+}  // namespace strata

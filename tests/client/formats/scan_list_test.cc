@@ -1,0 +1,128 @@
+#include "client/formats/scan_list.h"
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/formats/file_bytes.h"
+#include "tests/support/data_dir.h"
+#include "tests/support/status_matchers.h"
+#include "tests/support/temp_dir.h"
+
+namespace strata {
+namespace {
+
+using ::strata::testing::StatusIs;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class ScanListTest : public ::testing::Test {
+ protected:
+  std::filesystem::path Write(const std::string& name, const std::string& text = "1 2 3\n") {
+    STRATA_EXPECT_OK(WriteFileBytes(dir_.path() / name, text));
+    return dir_.path() / name;
+  }
+  static std::vector<std::string> Names(const std::vector<ScanSource>& scans) {
+    std::vector<std::string> names;
+    for (const ScanSource& scan : scans) names.push_back(scan.path.filename().string());
+    return names;
+  }
+  static std::vector<std::uint64_t> Sequences(const std::vector<ScanSource>& scans) {
+    std::vector<std::uint64_t> sequences;
+    for (const ScanSource& scan : scans) sequences.push_back(scan.sequence);
+    return sequences;
+  }
+  testing::TempDir dir_;
+};
+
+TEST(SequenceOfNameTest, LastRunOfDigitsOfTheStem) {
+  EXPECT_EQ(SequenceOfName("a/run7/scan012.pcd"), 12U);
+  EXPECT_EQ(SequenceOfName("scan3_v2.3d"), 2U);
+  EXPECT_EQ(SequenceOfName("scan.3d"), std::nullopt);
+  EXPECT_EQ(SequenceOfName("99999999999999999999.bin"), std::nullopt);
+}
+
+TEST_F(ScanListTest, FoldersGiveTheirScansByNumber) {
+  for (const char* name : {"s10.xyz", "s2.xyz", "s1.pcd", "README.txt", "poses.txt", "x.pose"}) {
+    Write(name);
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto all, ListScans({dir_.path()}, {}));
+  EXPECT_THAT(Names(all), ElementsAre("s1.pcd", "s2.xyz", "s10.xyz"));
+  EXPECT_THAT(Sequences(all), ElementsAre(1, 2, 10));
+  EXPECT_TRUE(all[0].pose_status.ok());
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto xyz,
+                              ListScans({dir_.path()}, {.format = ScanFormat::kPcd}));
+  EXPECT_THAT(Names(xyz), ElementsAre("s1.pcd"));
+}
+
+TEST_F(ScanListTest, NamesWithoutOwnNumbersAreCounted) {
+  const auto b = Write("b.xyz");
+  const auto a10 = Write("a10.xyz");
+  const auto a9 = Write("a9.xyz");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({b, a10, a9, b}, {}));
+  EXPECT_THAT(Names(scans), ElementsAre("a9.xyz", "a10.xyz", "b.xyz"));
+  EXPECT_THAT(Sequences(scans), ElementsAre(0, 1, 2));
+}
+
+TEST_F(ScanListTest, IndexedPosesGoToTheirScansAndTheRestIsAnError) {
+  const auto poses = Write("poses", "7 1.5 70 0 0 0 0 0 1\n5 1.25 50 0 0 0 0 0 1\n");
+  Write("s005.xyz");
+  Write("s006.xyz");
+  Write("s007.xyz");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({dir_.path()}, {.poses = poses}));
+  ASSERT_EQ(scans.size(), 3U);
+  EXPECT_EQ(scans[0].T_map_scan.translation().x(), 50);
+  EXPECT_EQ(scans[0].time, absl::FromUnixMillis(1250));
+  EXPECT_THAT(scans[1].pose_status, StatusIs(absl::StatusCode::kNotFound, HasSubstr("index 6")));
+  EXPECT_EQ(scans[2].T_map_scan.translation().x(), 70);
+}
+
+TEST_F(ScanListTest, TumPosesGoInOrderOfTime) {
+  const auto poses = Write("poses", "2 20 0 0 0 0 0 1\n1 10 0 0 0 0 0 1\n");
+  Write("a.xyz");
+  Write("b.xyz");
+  Write("c.xyz");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({dir_.path()}, {.poses = poses}));
+  EXPECT_EQ(scans[0].T_map_scan.translation().x(), 10);
+  EXPECT_EQ(scans[1].T_map_scan.translation().x(), 20);
+  EXPECT_THAT(scans[2].pose_status, StatusIs(absl::StatusCode::kNotFound, HasSubstr("scan 3")));
+}
+
+TEST_F(ScanListTest, TumPosesGoByTimeWhereNamesAreTimes) {
+  const auto poses =
+      Write("poses", "1305031102.1753 10 0 0 0 0 0 1\n1305031103.2 20 0 0 0 0 0 1\n");
+  Write("1305031103.200100.xyz");
+  Write("1305031109.500000.xyz");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({dir_.path()}, {.poses = poses}));
+  ASSERT_EQ(scans.size(), 2U);
+  EXPECT_EQ(scans[0].path.filename(), "1305031103.200100.xyz");
+  EXPECT_EQ(scans[0].T_map_scan.translation().x(), 20);
+  EXPECT_EQ(scans[0].time, absl::FromUnixMicros(1305031103200100));
+  EXPECT_THAT(scans[1].pose_status,
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("1305031109.5")));
+}
+
+TEST_F(ScanListTest, PosesBeside3dtkScansAreTakenByThemselves) {
+  Write("scan000.3d");
+  Write("scan000.pose", "100 0 0 0 0 0\n");
+  Write("scan001.3d");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({dir_.path()}, {}));
+  EXPECT_NEAR(scans[0].T_map_scan.translation().y(), -1.0, 1e-12);
+  EXPECT_THAT(scans[1].pose_status,
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("scan001.pose")));
+}
+
+TEST_F(ScanListTest, WhatIsNotThereIsNotFound) {
+  EXPECT_THAT(ListScans({dir_.path()}, {}),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("no scan")));
+  EXPECT_THAT(ListScans({dir_.path() / "x"}, {}),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("no such file or folder")));
+  EXPECT_THAT(ListScans({Write("a.xyz")}, {.poses = "none.txt"}),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("none.txt")));
+}
+
+}  // namespace
+}  // namespace strata

@@ -1,0 +1,158 @@
+#include "core/codec/surface_tile_codec.h"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <string>
+
+#include "absl/strings/escaping.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/mls/surface_tile.h"
+#include "tests/core/codec/hostile.h"
+#include "tests/core/codec/tile_samples.h"
+#include "tests/support/data_dir.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata {
+namespace {
+
+using ::strata::testing::IsOkAndHolds;
+using ::strata::testing::RandomTile;
+
+// Surfaces of a tile with made-up annotation.
+SurfaceTile Annotated(const MlsTile& tile, std::uint64_t seed) {
+  SurfaceTile surfaces = SurfacesOf(tile);
+  surfaces.version = seed;
+  std::mt19937_64 random(seed);
+  for (Surface& surface : surfaces.surfaces) {
+    surface.traversability = static_cast<Traversability>(random() % 3);
+    surface.class_id = static_cast<std::uint8_t>(random());
+    surface.cost = std::exp2(static_cast<float>(random() % 1000) / 50.0F) - 1.0F;
+    if (random() % 8 == 0) surface.cost = std::numeric_limits<float>::infinity();
+  }
+  return surfaces;
+}
+
+void ExpectWithinTolerance(const Surface& read, const Surface& written) {
+  EXPECT_EQ(read.cell, written.cell);
+  EXPECT_EQ(read.traversability, written.traversability);
+  EXPECT_EQ(read.class_id, written.class_id);
+  EXPECT_EQ(read.vertical(), written.vertical());
+  EXPECT_NEAR(read.z_m, written.z_m, 0.001);
+  EXPECT_NEAR(read.depth_m, written.depth_m, 0.001);
+  EXPECT_NEAR(read.sigma_m / written.sigma_m, 1.0, 0.05);
+  if (std::isinf(written.cost) || written.cost == 0.0F) {
+    EXPECT_EQ(read.cost, written.cost);
+  } else {
+    const float bound = written.traversability == Traversability::kTraversable ? 0.0601F : 0.1901F;
+    EXPECT_NEAR(std::log1p(read.cost), std::log1p(written.cost), std::log1p(bound));
+  }
+}
+
+void ExpectRoundTrip(const SurfaceTile& tile) {
+  const std::string bytes = EncodeSurfaceTile(tile);
+  STRATA_ASSERT_OK_AND_ASSIGN(const SurfaceTile read, DecodeSurfaceTile(bytes));
+  EXPECT_EQ(read.key, tile.key);
+  EXPECT_EQ(read.version, tile.version);
+  EXPECT_EQ(read.row_begin, tile.row_begin);
+  ASSERT_EQ(read.surfaces.size(), tile.surfaces.size());
+  for (std::size_t i = 0; i < tile.surfaces.size(); ++i) {
+    SCOPED_TRACE(i);
+    ExpectWithinTolerance(read.surfaces[i], tile.surfaces[i]);
+  }
+  EXPECT_EQ(EncodeSurfaceTile(read), bytes);
+}
+
+TEST(SurfaceTileCodecTest, RandomTilesRoundTripWithinTolerance) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    SurfaceTile tile = Annotated(RandomTile(seed, 1 << seed % 13, true), seed);
+    tile.key = {static_cast<int>(seed % 13), -(1 << 30), static_cast<int>(seed)};
+    ExpectRoundTrip(tile);
+  }
+}
+
+TEST(SurfaceTileCodecTest, EmptyTileRoundTrips) { ExpectRoundTrip(SurfaceTile()); }
+
+TEST(SurfaceTileCodecTest, EveryCodeOfSigmaAndCostIsStable) {
+  SurfaceTile tile;
+  for (int i = 0; i < 256; ++i) {
+    tile.surfaces.push_back({.cell = static_cast<std::uint16_t>(i),
+                             .traversability = static_cast<Traversability>(i % 3),
+                             .sigma_m = std::exp2(static_cast<float>(i) / 7.5F - 24.0F),
+                             .cost = std::exp2(static_cast<float>(i) / 6.0F)});
+  }
+  tile.IndexRows();
+  ExpectRoundTrip(tile);
+}
+
+TEST(SurfaceTileCodecTest, AbsurdValuesAreClampedAndDecodable) {
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  SurfaceTile tile;
+  for (const float value : {kInf, -kInf, std::nanf(""), 1e30F, -1e30F, 1e-30F}) {
+    tile.surfaces.push_back({.cell = static_cast<std::uint16_t>(tile.surfaces.size()),
+                             .z_m = value,
+                             .sigma_m = value,
+                             .depth_m = value,
+                             .cost = value});
+  }
+  const std::string bytes = EncodeSurfaceTile(tile);
+  STRATA_ASSERT_OK_AND_ASSIGN(const SurfaceTile read, DecodeSurfaceTile(bytes));
+  EXPECT_EQ(EncodeSurfaceTile(read), bytes);
+  EXPECT_FLOAT_EQ(read.surfaces[0].z_m, 32768.0F);
+}
+
+TEST(SurfaceTileCodecTest, RealTilesRoundTripWithinTheirBound) {
+  STRATA_REQUIRE_DATA(path, "nclt_campus_loop");
+  const MlsMap map = testing::NcltMap(path, 40);
+  std::size_t bytes = 0;
+  for (const MlsTile& tile : map.tiles) {
+    const SurfaceTile surfaces = SurfacesOf(tile);
+    ExpectRoundTrip(surfaces);
+    bytes += EncodeSurfaceTile(surfaces).size();
+  }
+  EXPECT_LE(static_cast<double>(bytes) / static_cast<double>(map.patch_count()), 2.9);
+}
+
+TEST(SurfaceTileCodecTest, DamageIsDataLoss) {
+  const SurfaceTile tile = Annotated(RandomTile(5, 300, true), 5);
+  testing::ExpectDamageIsDataLoss(EncodeSurfaceTile(tile), &DecodeSurfaceTile, 5, 1000);
+}
+
+TEST(SurfaceTileCodecTest, ForgedBytesNeverCrash) {
+  const std::string bytes = EncodeSurfaceTile(Annotated(RandomTile(6, 60, true), 6));
+  const int accepted =
+      testing::DecodeForgedBodies(BlobKind::kSurfaceTile, bytes, &DecodeSurfaceTile, 6, 4000);
+  EXPECT_GT(accepted, 0);
+  EXPECT_LT(accepted, 4000);
+}
+
+TEST(SurfaceTileCodecTest, GoldenBytesOfATinyTileDecode) {
+  SurfaceTile tile;
+  tile.key = {1, -1, 2};
+  tile.version = 77;
+  tile.surfaces = {{.cell = 0,
+                    .traversability = Traversability::kTraversable,
+                    .class_id = 3,
+                    .z_m = 0.5F,
+                    .sigma_m = 0.02F,
+                    .cost = 0.25F},
+                   {.cell = 1, .z_m = 1.5F, .sigma_m = 0.03F, .depth_m = 1.25F, .cost = 7.0F}};
+  tile.IndexRows();
+  // Of version 1: must be readable for ever. (Another zstd release may write other bytes.)
+  const std::string golden = absl::HexStringToBytes(
+      "53535431010001005e00000001ffffffff020000004d00000000000000028080011228b52ffd00204d0000100500"
+      "0100fb9f075800000001000000000000000002020100020300000284860000000000000001860000000182000108"
+      "00010c0001040000050014000001bc654a917e61afd9");
+  STRATA_ASSERT_OK_AND_ASSIGN(const SurfaceTile read, DecodeSurfaceTile(golden));
+  EXPECT_EQ(read.key, tile.key);
+  EXPECT_EQ(read.version, tile.version);
+  ASSERT_EQ(read.surfaces.size(), 2U);
+  for (int i = 0; i < 2; ++i) ExpectWithinTolerance(read.surfaces[i], tile.surfaces[i]);
+}
+
+}  // namespace
+}  // namespace strata

@@ -1,0 +1,291 @@
+#!/usr/bin/python3
+"""Recorded scans through a real server: import, align, render, plan; our poses beside the references.
+
+    tests/experiments/real_data.py --build build/release [--data ../shared/data] [--only nclt,kitti] [--out DIR]
+
+Starts stratad on port 0, drives it with the command line client as a user would, prints a table and exits 1 if a
+bound does not hold (77 where the data are absent). Needs python3-numpy.
+"""
+import argparse
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+
+
+def rotation(q):
+    x, y, z, w = q / np.linalg.norm(q)
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+
+
+def quaternion(R):
+    w, v = np.linalg.eigh(np.array([
+        [R[0, 0] - R[1, 1] - R[2, 2], R[1, 0] + R[0, 1], R[2, 0] + R[0, 2], R[2, 1] - R[1, 2]],
+        [R[1, 0] + R[0, 1], R[1, 1] - R[0, 0] - R[2, 2], R[2, 1] + R[1, 2], R[0, 2] - R[2, 0]],
+        [R[2, 0] + R[0, 2], R[2, 1] + R[1, 2], R[2, 2] - R[0, 0] - R[1, 1], R[1, 0] - R[0, 1]],
+        [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], R[0, 0] + R[1, 1] + R[2, 2]]]) / 3)
+    return v[:, np.argmax(w)]
+
+
+def load_poses(path):
+    """index-tum: {index: (time, 4×4 T_map_scan)}"""
+    poses = {}
+    for line in open(path, encoding="utf-8"):
+        if line.strip() and not line.startswith("#"):
+            f = [float(x) for x in line.split()]
+            T = np.eye(4)
+            T[:3, :3] = rotation(np.array(f[5:9]))
+            T[:3, 3] = f[2:5]
+            poses[int(f[0])] = (f[1], T)
+    return poses
+
+
+def load_tum(path):
+    rows = np.loadtxt(path, ndmin=2)
+    poses = []
+    for row in rows:
+        T = np.eye(4)
+        T[:3, :3] = rotation(row[4:8])
+        T[:3, 3] = row[1:4]
+        poses.append((row[0], T))
+    return poses
+
+
+def write_index_tum(path, poses):
+    with open(path, "w", encoding="utf-8") as out:
+        for index, (stamp, T) in sorted(poses.items()):
+            q = quaternion(T[:3, :3])
+            print(index, f"{stamp:.6f}", *(f"{v:.9f}" for v in (*T[:3, 3], *q)), file=out)
+
+
+def ate(estimate, reference):
+    """RMSE [m] of positions after rigid alignment (Umeyama without scale); both lists of 4×4."""
+    E = np.array([T[:3, 3] for T in estimate])
+    G = np.array([T[:3, 3] for T in reference])
+    me, mg = E.mean(0), G.mean(0)
+    U, _, Vt = np.linalg.svd((G - mg).T @ (E - me))
+    R = U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt
+    return float(np.sqrt((np.linalg.norm(G - mg - (E - me) @ R.T, axis=1) ** 2).mean()))
+
+
+def angle_deg(R):
+    return float(np.degrees(np.arccos(np.clip((np.trace(R) - 1) / 2, -1, 1))))
+
+
+class Strata:
+    """A server of our own and the command line client against it."""
+
+    def __init__(self, build, out):
+        self.cli = build / "client/cli/strata"
+        self.out = out
+        self.dir = tempfile.TemporaryDirectory()
+        self.server = subprocess.Popen([build / "server/stratad", "--data", self.dir.name, "--listen", "127.0.0.1:0"],
+                                       stdout=subprocess.PIPE, stderr=open(out / "stratad.log", "w"), text=True)
+        self.address = self.server.stdout.readline().split()[1]
+
+    def __call__(self, *arguments, check=True):
+        done = subprocess.run([self.cli, "--server", self.address, "--output", "json", *map(str, arguments)],
+                              stdout=subprocess.PIPE, stderr=open(self.out / "strata.log", "a"), text=True)
+        if check and done.returncode != 0:
+            raise RuntimeError(f"strata {' '.join(map(str, arguments))}: exit {done.returncode}: {done.stdout[-500:]}")
+        return json.loads(done.stdout) if done.stdout.strip() else None
+
+    def import_scans(self, name, *arguments, create=()):
+        self("map", "create", name, *create)
+        start = time.time()
+        self("scan", "import", name, *arguments, "--wait")
+        stats = self("map", "show", name)
+        stats["seconds"] = time.time() - start
+        return stats
+
+    def poses(self, name):
+        path = self.out / f"{name}_current.tum"
+        self("pose", "export", name, "--format", "tum", "--which", "current", "--out", path)
+        return load_tum(path)
+
+    def render(self, name, *arguments):
+        self("map", "render", name, self.out / f"{name}.png", *arguments)
+
+    def plan(self, name, start, goal, *arguments):
+        at = lambda p: ",".join(f"{v:.3f}" for v in p)
+        return self("plan", name, "--from", at(start), "--to", at(goal), *arguments)
+
+    def stop(self):
+        self.server.terminate()
+        self.server.wait(60)
+        self.dir.cleanup()
+
+
+class Table:
+    def __init__(self):
+        self.bad = 0
+
+    def row(self, data, what, value, bound=None, ok=True):
+        self.bad += not ok
+        limit = "" if bound is None else f"{bound}  {'ok' if ok else 'NOT REACHED'}"
+        print(f"{data:8} {what:58} {value:>22} {limit}", flush=True)
+
+    def imported(self, data, stats):
+        self.row(data, f"{stats['scans']} scans, {stats['points']} points, {stats['patches']} patches, "
+                       f"{stats['tiles']} tiles: import and alignment", f"{stats['seconds']:.1f} s",
+                 "every scan", stats.get("scans_failed", 0) == 0 and stats.get("scans_pending", 0) == 0)
+
+
+def nclt(strata, table, data):
+    folder = data / "nclt_campus_loop"
+    stats = strata.import_scans("nclt", folder / "scans", "--poses", folder / "poses_initial.txt",
+                                "--pose-format", "index-tum", create=("--cell-size", "0.1"))
+    table.imported("nclt", stats)
+    strata.render("nclt")
+    current = strata.poses("nclt")
+    indices = sorted(load_poses(folder / "poses_initial.txt"))
+    by_index = dict(zip(indices, (T for _, T in current)))
+    T_900_0 = np.linalg.inv(by_index[900]) @ by_index[0]
+    difference = np.linalg.inv(np.loadtxt(folder / "loop_edge_0_900.txt")) @ T_900_0
+    metres, degrees = np.linalg.norm(difference[:3, 3]), angle_deg(difference[:3, :3])
+    table.row("nclt", "scan 900 relative to scan 0, no loop closing", f"{metres:.2f} m / {degrees:.2f}°", "≤ 1 m / 2°",
+              metres <= 1.0 and degrees <= 2.0)
+    reference = load_poses(folder / "poses_reference.txt")
+    table.row("nclt", "ATE uploaded", f"{ate([load_poses(folder / 'poses_initial.txt')[i][1] for i in indices], [reference[i][1] for i in indices]):.3f} m")
+    table.row("nclt", "ATE after ingest", f"{ate([by_index[i] for i in indices], [reference[i][1] for i in indices]):.3f} m")
+    nclt_plan(strata, table, [by_index[i] for i in indices])
+
+
+def nclt_plan(strata, table, route, sensor_height=2.0):
+    """One plan between two driven places that are 300 m of driving apart."""
+    feet = [T[:3, 3] - [0, 0, sensor_height] for T in route]
+    driven = np.concatenate([[0], np.cumsum([np.linalg.norm(b - a) for a, b in zip(feet, feet[1:])])])
+    begin = int(np.searchsorted(driven, 10.0))
+    end = int(np.searchsorted(driven, driven[begin] + 320.0))
+    # Straight to the goal would be shorter than the driven route: the path is asked for along it, in legs.
+    marks = [begin, *(int(np.searchsorted(driven, driven[begin] + s)) for s in range(40, 320, 40)), end]
+    legs = [strata.plan("nclt", feet[a], feet[b]) for a, b in zip(marks, marks[1:])]
+    for leg in legs:
+        if not leg["found"]:
+            print("   leg:", leg["reason"], leg.get("message"), file=sys.stderr)
+    length = sum(leg["length_m"] for leg in legs if leg["found"])
+    table.row("nclt", f"plan along the driven route, {len(legs)} legs of 40 m", f"{length:.1f} m",
+              "≥ 300 m, all found", all(leg["found"] for leg in legs) and length >= 300)
+    whole = strata.plan("nclt", feet[begin], feet[end])
+    table.row("nclt", f"plan over {driven[end] - driven[begin]:.0f} m of driving at once: {whole['reason']}",
+              f"{whole['length_m']:.1f} m / {whole['elapsed_ms']:.0f} ms", "found", whole["found"])
+
+
+def ate_against_uploaded(strata, table, data, name, folder, *extra):
+    folder = data / folder
+    stats = strata.import_scans(name, folder / "scans", "--poses", folder / "poses_initial.txt",
+                                "--pose-format", "index-tum", *extra)
+    table.imported(name, stats)
+    strata.render(name)
+    reference = load_poses(folder / "poses_reference.txt")
+    uploaded = load_poses(folder / "poses_initial.txt")
+    indices = sorted(uploaded)
+    before = ate([uploaded[i][1] for i in indices], [reference[i][1] for i in indices])
+    after = ate([T for _, T in strata.poses(name)], [reference[i][1] for i in indices])
+    table.row(name, "ATE after ingest", f"{after:.4f} m", f"≤ {before:.4f} m uploaded", after <= before)
+
+
+def hall(strata, table, data):
+    ate_against_uploaded(strata, table, data, "hall", "hall_livox_loop")
+    folder = data / "hall_livox_loop"
+    stats = strata.import_scans("hall_level", folder / "scans", "--poses", folder / "poses_initial.txt",
+                                "--pose-format", "index-tum", "--level", create=("--cell-size", "0.2"))
+    strata.render("hall_level")
+    levels = stats["patches"] - stats["occupied_cells"]
+    table.row("hall", "levels beyond the first in a cell, levelled, 20 cm", levels, "thousands", levels >= 2000)
+    poses = strata.poses("hall_level")
+    feet = [T[:3, 3] - [0, 0, 1.7] for _, T in poses]
+    far = max(feet, key=lambda p: np.linalg.norm(p - feet[0]))
+    plan = strata.plan("hall_level", feet[0], far, "--radius", "0.25", "--height", "1.2")
+    on_floor = plan["found"] and max(abs(w[2] - feet[0][2]) for w in plan["waypoints"]) < 1.0
+    table.row("hall", f"plan on the floor under the gallery: {plan['reason']}", f"{plan['length_m']:.1f} m",
+              "found, within 1 m of the floor", on_floor)
+
+
+def facade(strata, table, data):
+    ate_against_uploaded(strata, table, data, "facade", "eth_facade_tls")
+
+
+def kitti(strata, table, data):
+    folder = data / "kitti_city_drive"
+    reference = load_poses(folder / "poses_reference_icp.txt")
+    random = np.random.default_rng(20261121)
+    indices = sorted(reference)
+    noisy, T = {}, reference[indices[0]][1]
+    for k, index in enumerate(indices):
+        if k > 0:
+            step = np.linalg.inv(reference[indices[k - 1]][1]) @ reference[index][1]
+            v = np.radians(0.5) * random.standard_normal(3)
+            noise = np.eye(4)
+            noise[:3, :3] = rotation(np.array([*(v / 2), 1.0]))
+            noise[:3, 3] = 0.05 * random.standard_normal(3)
+            T = T @ step @ noise
+        noisy[index] = (reference[index][0], T)
+    path = strata.out / "kitti_noisy.txt"
+    write_index_tum(path, noisy)
+    stats = strata.import_scans("kitti", folder / "scans", "--poses", path, "--pose-format", "index-tum")
+    table.imported("kitti", stats)
+    strata.render("kitti")
+    truth = [reference[i][1] for i in indices]
+    after = ate([T for _, T in strata.poses("kitti")], truth)
+    before = ate([noisy[i][1] for i in indices], truth)
+    table.row("kitti", f"ATE after ingest (uploaded with seeded noise: {before:.3f} m)", f"{after:.4f} m", "≤ 0.10 m",
+              after <= 0.10)
+
+
+def isprs(strata, table, data):
+    stats = strata.import_scans("isprs", data / "isprs_als_filter/samp71-utm.pcd", "--align", "off",
+                                create=("--cell-size", "3", "--thickness", "0.5"))
+    table.imported("isprs", stats)
+    strata.render("isprs")
+    levels = stats["patches"] - stats["occupied_cells"]
+    table.row("isprs", "samp71: cells with deck and road at the deck's edges", levels, "≥ 10", levels >= 10)
+
+
+def others(strata, table, data):
+    sets = {
+        "corridor": (data / "slam6d_corridor", "--format", "3dtk"),
+        "kitti00": (data / "kitti00_gt/velodyne", "--poses", data / "kitti00_gt/poses_00_velo.txt", "--pose-format",
+                    "index-tum"),
+        "vtk": (data / "libpointmatcher_scans/cloud_0.vtk", data / "libpointmatcher_scans/cloud_1.vtk"),
+        "pair": (data / "registration_pairs/small_gicp/target.ply",),
+        "lille": (data / "lille_facade",),
+    }
+    for name, arguments in sets.items():
+        table.imported(name, strata.import_scans(name, *arguments))
+        strata.render(name)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
+    parser.add_argument("--data", type=pathlib.Path, default=os.environ.get("STRATA_DATA", ROOT / "../shared/data"))
+    parser.add_argument("--only", default="nclt,hall,facade,kitti,isprs,others")
+    parser.add_argument("--out", type=pathlib.Path, default=None, help="pictures, poses and logs (default: a temporary folder)")
+    options = parser.parse_args()
+    data = pathlib.Path(options.data)
+    if not data.is_dir():
+        print(f"real_data: no recorded data at {data}; set STRATA_DATA", file=sys.stderr)
+        return 77
+    with tempfile.TemporaryDirectory() as scratch:
+        out = options.out or pathlib.Path(scratch)
+        out.mkdir(parents=True, exist_ok=True)
+        strata, table = Strata(options.build.resolve(), out), Table()
+        try:
+            for name in options.only.split(","):
+                globals()[name](strata, table, data)
+        finally:
+            strata.stop()
+    return 1 if table.bad else 0
+
+
+sys.exit(main())

@@ -1,0 +1,237 @@
+// Every field of every message survives wire → core → wire. The messages are filled by reflection,
+// so that a field that is added and forgotten in the translation fails here.
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include <gmock/gmock.h>
+#include <google/protobuf/util/message_differencer.h>
+#include <gtest/gtest.h>
+
+#include "proto/translate/jobs.h"
+#include "proto/translate/maps.h"
+#include "proto/translate/planning.h"
+#include "proto/translate/posegraph.h"
+#include "proto/translate/scans.h"
+#include "proto/translate/tiles.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::translate {
+namespace {
+
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+using google::protobuf::Reflection;
+
+// Gives every field another value that its range allows.
+class Filler {
+ public:
+  void Fill(Message& message) {
+    const auto& descriptor = *message.GetDescriptor();
+    if (descriptor.full_name() == "strata.v1.Quaternion") {
+      FillQuaternion(message);
+      return;
+    }
+    for (int i = 0; i < descriptor.field_count(); ++i) {
+      const FieldDescriptor& field = *descriptor.field(i);
+      // Of alternatives the last one stays.
+      if (field.is_map()) {
+        FillMap(message, field);
+      } else if (field.is_repeated()) {
+        for (int n = 0; n < (field.name() == "information" ? 36 : 2); ++n) Add(message, field);
+      } else {
+        Set(message, field);
+      }
+    }
+  }
+
+ private:
+  void FillQuaternion(Message& message) {
+    auto& q = dynamic_cast<v1::Quaternion&>(message);
+    q.set_x(0.5);
+    q.set_y(-0.5);
+    q.set_z(0.5);
+    q.set_w(0.5);
+  }
+
+  // Small, positive, growing.
+  double Real() { return 0.01 + 0.001 * ++count_; }
+  std::string Text() { return absl::StrCat("text", ++count_); }
+  int Whole(const FieldDescriptor& field) { return field.name() == "level" ? 3 : ++count_; }
+  static int LastValue(const FieldDescriptor& field) {
+    return field.enum_type()->value(field.enum_type()->value_count() - 1)->number();
+  }
+
+  void Set(Message& message, const FieldDescriptor& field) {
+    const Reflection& reflection = *message.GetReflection();
+    switch (field.cpp_type()) {
+      case FieldDescriptor::CPPTYPE_INT32:
+        return reflection.SetInt32(&message, &field, Whole(field));
+      case FieldDescriptor::CPPTYPE_INT64:
+        return reflection.SetInt64(&message, &field, Whole(field));
+      case FieldDescriptor::CPPTYPE_UINT32:
+        return reflection.SetUInt32(&message, &field, static_cast<std::uint32_t>(Whole(field)));
+      case FieldDescriptor::CPPTYPE_UINT64:
+        return reflection.SetUInt64(&message, &field, static_cast<std::uint64_t>(Whole(field)));
+      case FieldDescriptor::CPPTYPE_DOUBLE:
+        return reflection.SetDouble(&message, &field, Real());
+      case FieldDescriptor::CPPTYPE_FLOAT:
+        return reflection.SetFloat(&message, &field, static_cast<float>(Real()));
+      case FieldDescriptor::CPPTYPE_BOOL:
+        return reflection.SetBool(&message, &field, field.name() != "keep_points");
+      case FieldDescriptor::CPPTYPE_ENUM:
+        return reflection.SetEnumValue(&message, &field, LastValue(field));
+      case FieldDescriptor::CPPTYPE_STRING:
+        return reflection.SetString(&message, &field, Text());
+      case FieldDescriptor::CPPTYPE_MESSAGE:
+        return Fill(*reflection.MutableMessage(&message, &field));
+    }
+  }
+
+  void Add(Message& message, const FieldDescriptor& field) {
+    const Reflection& reflection = *message.GetReflection();
+    if (field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
+      return Fill(*reflection.AddMessage(&message, &field));
+    }
+    ASSERT_EQ(field.cpp_type(), FieldDescriptor::CPPTYPE_DOUBLE) << field.full_name();
+    reflection.AddDouble(&message, &field, Real());
+  }
+
+  void FillMap(Message& message, const FieldDescriptor& field) {
+    Fill(*message.GetReflection()->AddMessage(&message, &field));
+  }
+
+  int count_ = 0;
+};
+
+template <typename Proto>
+Proto Filled() {
+  Proto proto;
+  Filler().Fill(proto);
+  return proto;
+}
+
+void ExpectSame(const Message& expected, const Message& actual) {
+  google::protobuf::util::MessageDifferencer differencer;
+  std::string report;
+  differencer.ReportDifferencesToString(&report);
+  // The translation through a rotation matrix rounds.
+  differencer.set_float_comparison(google::protobuf::util::MessageDifferencer::APPROXIMATE);
+  EXPECT_TRUE(differencer.Compare(expected, actual)) << report;
+}
+
+template <typename Proto>
+void ExpectRoundTrip(const Proto& proto) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto core, FromProto(proto));
+  ExpectSame(proto, ToProto(core));
+}
+
+v1::ScanHeader FilledHeader() {
+  v1::ScanHeader header = Filled<v1::ScanHeader>();
+  header.set_rows(3);
+  header.set_columns(7);
+  header.set_point_count(21);
+  // Single precision.
+  header.mutable_sensor_origin()->set_x(0.25);
+  header.mutable_sensor_origin()->set_y(-0.5);
+  header.mutable_sensor_origin()->set_z(1.75);
+  return header;
+}
+
+TEST(TranslateRoundTripTest, Maps) {
+  ExpectSame(Filled<v1::RobotProfile>(), ToProto(FromProto(Filled<v1::RobotProfile>())));
+  ExpectSame(Filled<v1::SensorModel>(), ToProto(FromProto(Filled<v1::SensorModel>())));
+  ExpectSame(Filled<v1::MapParameters>(), ToProto(FromProto(Filled<v1::MapParameters>())));
+  ExpectRoundTrip(Filled<v1::MapInfo>());
+  ExpectRoundTrip(Filled<v1::MapStats>());
+}
+
+TEST(TranslateRoundTripTest, AbsentFieldsTakeTheCoresDefaults) {
+  EXPECT_EQ(FromProto(v1::MapParameters()), MapParameters());
+  EXPECT_EQ(FromProto(v1::RobotProfile()), RobotProfile());
+  EXPECT_EQ(FromProto(v1::SensorModel()), SensorModel());
+  STRATA_ASSERT_OK_AND_ASSIGN(const api::TileArea area, FromProto(v1::TileArea()));
+  EXPECT_EQ(area.x_min, api::TileArea().x_min);
+  EXPECT_EQ(area.y_max, api::TileArea().y_max);
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanQuery query, FromProto(v1::PlanPathRequest()));
+  EXPECT_EQ(query.max_expanded, PlanQuery().max_expanded);
+  EXPECT_EQ(query.from.z_m, std::nullopt);
+  EXPECT_EQ(query.from.level, std::nullopt);
+}
+
+TEST(TranslateRoundTripTest, Scans) {
+  ExpectRoundTrip(FilledHeader());
+  v1::ScanInfo scan = Filled<v1::ScanInfo>();
+  *scan.mutable_header() = FilledHeader();
+  ExpectRoundTrip(scan);
+  ExpectSame(Filled<v1::ScanAck>(), ToProto(FromProto(Filled<v1::ScanAck>())));
+  ExpectSame(Filled<v1::GetUploadStateResponse>(),
+             ToProto(FromProto(Filled<v1::GetUploadStateResponse>())));
+  const auto request = Filled<v1::ListScansRequest>();
+  STRATA_ASSERT_OK_AND_ASSIGN(const api::ScanFilter filter, FromProto(request));
+  ExpectSame(request, ToProto(request.map(), filter));
+}
+
+TEST(TranslateRoundTripTest, Tiles) {
+  ExpectRoundTrip(Filled<v1::EncodedTile>());
+  ExpectRoundTrip(Filled<v1::TileInfo>());
+  ExpectRoundTrip(Filled<v1::TileArea>());
+  ExpectRoundTrip(Filled<v1::HeldTile>());
+  ExpectRoundTrip(Filled<v1::FetchTilesResponse>());
+}
+
+TEST(TranslateRoundTripTest, Planning) {
+  const auto by_level = Filled<v1::PlanPathRequest>();
+  auto by_height = by_level;
+  by_height.mutable_from()->set_z_m(-2.5);
+  for (const v1::PlanPathRequest& request : {by_level, by_height}) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const PlanQuery query, FromProto(request));
+    ExpectSame(request, ToProto(request.map(), query));
+  }
+  ExpectRoundTrip(Filled<v1::PlanPathResponse>());
+  ExpectRoundTrip(Filled<v1::SurfaceColumn>());
+}
+
+TEST(TranslateRoundTripTest, EveryPlanReasonAndObstruction) {
+  for (int reason = 1; reason < v1::PlanReason_ARRAYSIZE; ++reason) {
+    for (int obstruction = 0; obstruction < v1::Obstruction_ARRAYSIZE; ++obstruction) {
+      auto plan = Filled<v1::PlanPathResponse>();
+      plan.set_reason(static_cast<v1::PlanReason>(reason));
+      plan.set_obstruction(static_cast<v1::Obstruction>(obstruction));
+      ExpectRoundTrip(plan);
+    }
+  }
+}
+
+TEST(TranslateRoundTripTest, JobsAndPoseGraph) {
+  ExpectRoundTrip(Filled<v1::Job>());
+  ExpectRoundTrip(Filled<v1::PoseNode>());
+  ExpectRoundTrip(Filled<v1::Constraint>());
+}
+
+TEST(TranslateRoundTripTest, UnknownEnumeratorsAreRefused) {
+  using ::strata::testing::StatusIs;
+  using ::testing::HasSubstr;
+  constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+  auto header = FilledHeader();
+  header.set_alignment(static_cast<v1::Alignment>(9));
+  EXPECT_THAT(FromProto(header), StatusIs(kInvalid, HasSubstr("alignment: 9")));
+  auto job = Filled<v1::Job>();
+  job.set_state(v1::JOB_STATE_UNSPECIFIED);
+  EXPECT_THAT(FromProto(job), StatusIs(kInvalid, HasSubstr("state 0")));
+  v1::ListScansRequest list;
+  list.set_state(static_cast<v1::ScanState>(77));
+  EXPECT_THAT(FromProto(list), StatusIs(kInvalid, HasSubstr("state: 77")));
+  auto constraint = Filled<v1::Constraint>();
+  constraint.mutable_information()->RemoveLast();
+  EXPECT_THAT(FromProto(constraint), StatusIs(kInvalid, HasSubstr("35 numbers")));
+  v1::TileKey key;
+  key.set_level(13);
+  EXPECT_THAT(FromProto(key), StatusIs(kInvalid, HasSubstr("level 13 is not in [0, 12]")));
+  v1::TileArea area;
+  area.set_x_min(5);
+  area.set_x_max(4);
+  EXPECT_THAT(FromProto(area), StatusIs(kInvalid, HasSubstr("x from 5 to 4")));
+}
+
+}  // namespace
+}  // namespace strata::translate

@@ -1,0 +1,51 @@
+#include "server/listen_address.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/status_matchers.h"
+
+namespace strata::server {
+namespace {
+
+using ::strata::testing::StatusIs;
+using ::testing::HasSubstr;
+
+TEST(ListenAddressTest, WritesWhatItReads) {
+  for (const char* text : {"127.0.0.1:50051", "[::1]:0", "localhost:1", "robot.example:65535"}) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const ListenAddress address, ParseListenAddress(text));
+    EXPECT_EQ(address.ToString(), text);
+  }
+}
+
+TEST(ListenAddressTest, KnowsLoopback) {
+  const auto loopback = [](const char* text) { return ParseListenAddress(text)->loopback(); };
+  EXPECT_TRUE(loopback("127.0.0.1:1"));
+  EXPECT_TRUE(loopback("127.9.9.9:1"));
+  EXPECT_TRUE(loopback("[::1]:1"));
+  EXPECT_TRUE(loopback("localhost:1"));
+  EXPECT_FALSE(loopback("0.0.0.0:1"));
+  EXPECT_FALSE(loopback("[::]:1"));
+  EXPECT_FALSE(loopback("128.0.0.1:1"));
+  EXPECT_FALSE(loopback("localhost.example:1"));
+}
+
+TEST(ListenAddressTest, RefusesWhatIsNoAddress) {
+  for (const char* text : {"",
+                           "127.0.0.1",
+                           ":1",
+                           "host:",
+                           "host:-1",
+                           "host:65536",
+                           "host:x",
+                           "::1:5",
+                           "[::1:5",
+                           "a b:1"}) {
+    EXPECT_THAT(ParseListenAddress(text),
+                StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("write HOST:PORT")))
+        << text;
+  }
+}
+
+}  // namespace
+}  // namespace strata::server

@@ -1,0 +1,164 @@
+// A database whose every answer a test decides.
+#ifndef STRATA_TESTS_SUPPORT_MOCK_DATABASE_H_
+#define STRATA_TESTS_SUPPORT_MOCK_DATABASE_H_
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "core/api/database.h"
+
+namespace strata::testing {
+
+using StringMap = std::map<std::string, std::string>;
+using Profiles = std::map<std::string, RobotProfile>;
+template <typename T>
+using Sink = absl::FunctionRef<absl::Status(const T&)>;
+
+class MockMaps : public api::Maps {
+ public:
+  MOCK_METHOD(absl::StatusOr<MapInfo>,
+              Create,
+              (const api::Call&, absl::string_view, const MapParameters&),
+              (override));
+  MOCK_METHOD(absl::StatusOr<MapInfo>, Get, (const api::Call&, absl::string_view), (override));
+  MOCK_METHOD(absl::StatusOr<std::vector<MapInfo>>, List, (const api::Call&), (override));
+  MOCK_METHOD(absl::Status, Delete, (const api::Call&, absl::string_view), (override));
+  MOCK_METHOD(absl::StatusOr<MapStats>, Stats, (const api::Call&, absl::string_view), (override));
+};
+
+class MockScanUpload : public api::ScanUpload {
+ public:
+  MOCK_METHOD(absl::Status, Write, (const PointCloud&), (override));
+  MOCK_METHOD(absl::StatusOr<ScanAck>, Finish, (), (override));
+};
+
+class MockScans : public api::Scans {
+ public:
+  MOCK_METHOD(absl::StatusOr<std::unique_ptr<api::ScanUpload>>,
+              Upload,
+              (const api::Call&, absl::string_view, const ScanHeader&),
+              (override));
+  MOCK_METHOD(absl::StatusOr<UploadState>,
+              GetUploadState,
+              (const api::Call&, absl::string_view, absl::string_view),
+              (override));
+  MOCK_METHOD(absl::StatusOr<ScanInfo>,
+              Get,
+              (const api::Call&, absl::string_view, const ScanId&),
+              (override));
+  MOCK_METHOD(absl::Status,
+              List,
+              (const api::Call&, absl::string_view, const api::ScanFilter&, Sink<ScanInfo>),
+              (override));
+  MOCK_METHOD(absl::Status,
+              GetPoints,
+              (const api::Call&, absl::string_view, const ScanId&, Sink<PointCloud>),
+              (override));
+  MOCK_METHOD(absl::Status,
+              Delete,
+              (const api::Call&, absl::string_view, const ScanId&),
+              (override));
+};
+
+class MockTiles : public api::Tiles {
+ public:
+  MOCK_METHOD(absl::StatusOr<api::EncodedTile>,
+              Get,
+              (const api::Call&, absl::string_view, const TileKey&),
+              (override));
+  MOCK_METHOD(absl::StatusOr<std::vector<api::TileInfo>>,
+              List,
+              (const api::Call&, absl::string_view, const api::TileArea&),
+              (override));
+  MOCK_METHOD(absl::Status,
+              Fetch,
+              (const api::Call&,
+               absl::string_view,
+               const api::TileArea&,
+               const std::vector<api::HeldTile>&,
+               Sink<api::TileUpdate>),
+              (override));
+};
+
+class MockPlanning : public api::Planning {
+ public:
+  MOCK_METHOD(absl::StatusOr<PlanResult>,
+              PlanPath,
+              (const api::Call&, absl::string_view, const PlanQuery&),
+              (override));
+  MOCK_METHOD(absl::StatusOr<std::vector<SurfaceColumn>>,
+              SampleSurfaces,
+              (const api::Call&, absl::string_view, const std::vector<Eigen::Vector2d>&),
+              (override));
+  MOCK_METHOD(absl::Status,
+              SetProfile,
+              (const api::Call&, absl::string_view, absl::string_view, const RobotProfile&),
+              (override));
+  MOCK_METHOD(absl::StatusOr<Profiles>,
+              ListProfiles,
+              (const api::Call&, absl::string_view),
+              (override));
+};
+
+class MockJobs : public api::Jobs {
+ public:
+  MOCK_METHOD(absl::StatusOr<JobInfo>,
+              Start,
+              (const api::Call&, absl::string_view, absl::string_view, const StringMap&),
+              (override));
+  MOCK_METHOD(absl::StatusOr<JobInfo>,
+              Get,
+              (const api::Call&, absl::string_view, std::uint64_t),
+              (override));
+  MOCK_METHOD(absl::StatusOr<std::vector<JobInfo>>,
+              List,
+              (const api::Call&, absl::string_view),
+              (override));
+  MOCK_METHOD(absl::StatusOr<JobInfo>,
+              Cancel,
+              (const api::Call&, absl::string_view, std::uint64_t),
+              (override));
+  MOCK_METHOD(absl::Status,
+              Watch,
+              (const api::Call&, absl::string_view, std::uint64_t, Sink<JobInfo>),
+              (override));
+};
+
+class MockPoseGraph : public api::PoseGraph {
+ public:
+  MOCK_METHOD(absl::StatusOr<api::PoseGraphState>,
+              Get,
+              (const api::Call&, absl::string_view),
+              (override));
+  MOCK_METHOD(absl::Status,
+              SetPose,
+              (const api::Call&, absl::string_view, const ScanId&, const Pose&),
+              (override));
+};
+
+// Calls nobody decided on answer UNKNOWN (gmock's default of a StatusOr).
+class MockDatabase : public api::Database {
+ public:
+  ::testing::NiceMock<MockMaps>& maps() override { return maps_; }
+  ::testing::NiceMock<MockScans>& scans() override { return scans_; }
+  ::testing::NiceMock<MockTiles>& tiles() override { return tiles_; }
+  ::testing::NiceMock<MockPlanning>& planning() override { return planning_; }
+  ::testing::NiceMock<MockJobs>& jobs() override { return jobs_; }
+  ::testing::NiceMock<MockPoseGraph>& posegraph() override { return posegraph_; }
+
+ private:
+  ::testing::NiceMock<MockMaps> maps_;
+  ::testing::NiceMock<MockScans> scans_;
+  ::testing::NiceMock<MockTiles> tiles_;
+  ::testing::NiceMock<MockPlanning> planning_;
+  ::testing::NiceMock<MockJobs> jobs_;
+  ::testing::NiceMock<MockPoseGraph> posegraph_;
+};
+
+}  // namespace strata::testing
+
+#endif  // STRATA_TESTS_SUPPORT_MOCK_DATABASE_H_

@@ -1,0 +1,94 @@
+// Drawn worlds that rays can hit: convex solids and terrain. Every surface is known exactly, so a
+// test knows what a map of it should say.
+#ifndef STRATA_TESTS_SUPPORT_SCENE_H_
+#define STRATA_TESTS_SUPPORT_SCENE_H_
+
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+namespace strata::testing {
+
+// The points with normal · p ≤ offset for every face. The bounding box must be finite.
+struct Solid {
+  struct Face {
+    Eigen::Vector3d normal;  // unit, outwards
+    double offset = 0.0;
+  };
+  std::vector<Face> faces;
+  Eigen::AlignedBox3d box;
+};
+
+Solid Box(const Eigen::Vector3d& min, const Eigen::Vector3d& max);
+// A box of edges `size` centred on the origin of its own frame.
+Solid OrientedBox(const Eigen::Isometry3d& T_world_box, const Eigen::Vector3d& size);
+// A ramp: the prism over the rectangle (x_low to x_high, y_min to y_max) from height z_base up to a
+// plane that rises from z_base at x_low to z_top at x_high; x_low may be the larger one.
+Solid RampX(double x_low, double x_high, double y_min, double y_max, double z_base, double z_top);
+// An upright cylinder with `sides` faces around (x, y), circumscribed about `radius`.
+Solid Post(double x, double y, double z_min, double z_max, double radius, int sides = 8);
+
+// Solids and at most one terrain. Add everything, then Build(), then ask; asking is const and
+// thread-safe.
+class Scene {
+ public:
+  void Add(Solid solid) { solids_.push_back(std::move(solid)); }
+  // Terrain: `height` sampled at the corners of square cells over `area`, two triangles a cell.
+  void SetTerrain(const Eigen::AlignedBox2d& area,
+                  double cell_m,
+                  const std::function<double(double, double)>& height);
+  void Build();
+
+  // Distance along the unit vector `direction` to the first surface within `max_range`. A solid
+  // that holds `origin` is not hit.
+  std::optional<double> Cast(const Eigen::Vector3d& origin,
+                             const Eigen::Vector3d& direction,
+                             double max_range) const;
+  // The height of the first surface below (x, y, z).
+  std::optional<double> GroundBelow(double x, double y, double z) const;
+
+  const std::vector<Solid>& solids() const { return solids_; }
+
+ private:
+  struct Node {  // children at `first` and `first + 1`, or `count` solids from `first`
+    Eigen::AlignedBox3d box;
+    std::size_t first = 0;
+    std::size_t count = 0;
+  };
+  struct Terrain {
+    Eigen::Vector2d origin = Eigen::Vector2d::Zero();
+    double cell = 0.0;
+    int columns = 0, rows = 0;    // of cells
+    std::vector<double> heights;  // (rows + 1) × (columns + 1)
+    double min_z = 0.0, max_z = 0.0;
+    double At(int column, int row) const {
+      return heights[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns + 1) +
+                     static_cast<std::size_t>(column)];
+    }
+  };
+
+  void Split(std::size_t node);
+  double CastSolids(const Eigen::Vector3d& origin,
+                    const Eigen::Vector3d& direction,
+                    double limit) const;
+  double CastTerrain(const Eigen::Vector3d& origin,
+                     const Eigen::Vector3d& direction,
+                     double limit) const;
+  double CastTerrainCell(int column,
+                         int row,
+                         const Eigen::Vector3d& origin,
+                         const Eigen::Vector3d& direction,
+                         double limit) const;
+
+  std::vector<Solid> solids_;
+  std::vector<Node> nodes_;  // a bounding volume hierarchy, root first
+  std::optional<Terrain> terrain_;
+};
+
+}  // namespace strata::testing
+
+#endif  // STRATA_TESTS_SUPPORT_SCENE_H_

@@ -1,0 +1,220 @@
+#include "tests/support/worlds.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "tests/support/simulator.h"
+
+namespace strata::testing {
+namespace {
+
+using Eigen::AngleAxisd;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// An upright box of `size` turned by `yaw` that stands at `foot`.
+Solid House(const Vector3d& foot, const Vector3d& size, double yaw) {
+  Eigen::Isometry3d T_world_box = Eigen::Isometry3d::Identity();
+  T_world_box.linear() = AngleAxisd(yaw, Vector3d::UnitZ()).toRotationMatrix();
+  T_world_box.translation() = foot + Vector3d(0.0, 0.0, 0.5 * size.z());
+  return OrientedBox(T_world_box, size);
+}
+
+void AddTree(Scene& scene, const Vector3d& foot, double height) {
+  const double crown = 0.28 * height;
+  scene.Add(Post(foot.x(), foot.y(), foot.z() - 0.5, foot.z() + 0.6 * height, 0.15));
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.translation() = foot + Vector3d(0.0, 0.0, 0.72 * height);
+  // Three boxes turned against each other look rough enough to a laser.
+  for (int i = 0; i < 3; ++i) {
+    T.linear() = (AngleAxisd(0.7 * i, Vector3d::UnitZ()) * AngleAxisd(0.6 * i, Vector3d::UnitX()))
+                     .toRotationMatrix();
+    scene.Add(OrientedBox(T, Vector3d::Constant(1.5 * crown)));
+  }
+}
+
+// Walls of `height` above the ramps and the deck along y = ±edge.
+void AddParapets(Scene& scene, double half_deck, double run, double edge, double deck_top) {
+  constexpr double kHeight = 0.9;
+  constexpr double kWidth = 0.15;
+  const double slope = std::atan2(deck_top, run);
+  for (const double side : {-1.0, 1.0}) {
+    const double y = side * (edge - 0.5 * kWidth);
+    scene.Add(Box({-half_deck, y - 0.5 * kWidth, deck_top - 0.4},
+                  {half_deck, y + 0.5 * kWidth, deck_top + kHeight}));
+    for (const double end : {-1.0, 1.0}) {
+      Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+      T.linear() = AngleAxisd(end * slope, Vector3d::UnitY()).toRotationMatrix();
+      T.translation() = Vector3d(end * (half_deck + 0.5 * run), y, 0.5 * deck_top) +
+                        T.linear() * Vector3d(0.0, 0.0, 0.5 * kHeight - 0.1);
+      scene.Add(OrientedBox(T, {std::hypot(run, deck_top), kWidth, kHeight + 0.2}));
+    }
+  }
+}
+
+// What stands around the bridge, so that scans have something to hold on to.
+void AddBridgeSurroundings(Scene& scene, double ramp_foot) {
+  const double far = ramp_foot + 8.0;
+  scene.Add(House({-0.6 * far, 17.0, 0.0}, {14.0, 7.0, 6.0}, 0.12));
+  scene.Add(House({0.55 * far, 18.0, 0.0}, {12.0, 8.0, 8.0}, -0.2));
+  scene.Add(House({-0.5 * far, -18.0, 0.0}, {16.0, 6.0, 5.0}, -0.08));
+  scene.Add(House({0.6 * far, -17.0, 0.0}, {10.0, 9.0, 7.0}, 0.3));
+  scene.Add(House({far + 5.0, 2.0, 0.0}, {5.0, 16.0, 6.0}, 0.05));
+  scene.Add(House({-far - 5.0, -3.0, 0.0}, {5.0, 14.0, 6.0}, -0.1));
+  scene.Add(House({6.0, 31.0, 0.0}, {18.0, 5.0, 6.0}, 0.07));
+  scene.Add(House({-5.0, -31.0, 0.0}, {18.0, 5.0, 6.0}, -0.05));
+  for (const double x : {-20.0, -12.0, 9.0, 17.0}) {
+    scene.Add(Post(x, 7.5, 0.0, 5.0, 0.12));
+    scene.Add(Post(x + 2.0, -8.0, 0.0, 5.0, 0.12));
+  }
+  AddTree(scene, {-8.0, 11.0, 0.0}, 6.0);
+  AddTree(scene, {9.5, -11.5, 0.0}, 7.0);
+  AddTree(scene, {7.0, 22.0, 0.0}, 6.5);
+}
+
+}  // namespace
+
+World BridgeWorld(const BridgeOptions& options) {
+  constexpr double kHalfDeck = 6.0;
+  constexpr double kEdge = 2.0;
+  constexpr double kDeckThickness = 0.4;
+  const double deck_top = options.clearance_m + kDeckThickness;
+  const double run = deck_top / 0.2;
+  const double ramp_foot = kHalfDeck + run;
+  World world;
+  Scene& scene = world.scene;
+  scene.Add(Box({-60.0, -60.0, -1.0}, {60.0, 60.0, 0.0}));
+  scene.Add(Box({-kHalfDeck, -kEdge, options.clearance_m}, {kHalfDeck, kEdge, deck_top}));
+  scene.Add(RampX(-ramp_foot, -kHalfDeck, -kEdge, kEdge, 0.0, deck_top));
+  scene.Add(RampX(ramp_foot, kHalfDeck, -kEdge, kEdge, 0.0, deck_top));
+  if (options.parapets) AddParapets(scene, kHalfDeck, run, kEdge, deck_top);
+  AddBridgeSurroundings(scene, ramp_foot);
+  scene.Build();
+  const double turn = ramp_foot + 4.0;
+  world.robots = {{"over", {{-turn, 0.0, 0.0}, {turn, 0.0, 0.0}}},
+                  {"under", {{0.0, -24.0, 0.0}, {0.0, 24.0, 0.0}}}};
+  world.places = {{"west", {-ramp_foot - 2.0, 0.0, 0.0}},
+                  {"east", {ramp_foot + 2.0, 0.0, 0.0}},
+                  {"south", {0.0, -20.0, 0.0}},
+                  {"north", {0.0, 20.0, 0.0}},
+                  {"deck", {0.0, 0.0, deck_top}},
+                  {"under", {0.0, 0.0, 0.0}}};
+  return world;
+}
+
+World CarParkWorld() {
+  constexpr double kFloor = 3.2;  // top of the upper slab
+  constexpr double kSlab = 0.3;
+  World world;
+  Scene& scene = world.scene;
+  scene.Add(Box({-30.0, -22.0, -1.0}, {30.0, 22.0, 0.0}));
+  // The upper slab leaves out the ramp's well: x from -8 to 8, y from -2.5 to 2.5.
+  scene.Add(Box({-20.0, 2.5, kFloor - kSlab}, {20.0, 12.0, kFloor}));
+  scene.Add(Box({-20.0, -12.0, kFloor - kSlab}, {20.0, -2.5, kFloor}));
+  scene.Add(Box({-20.0, -2.5, kFloor - kSlab}, {-8.0, 2.5, kFloor}));
+  scene.Add(Box({8.0, -2.5, kFloor - kSlab}, {20.0, 2.5, kFloor}));
+  scene.Add(RampX(-8.0, 8.0, -2.0, 2.0, 0.0, kFloor));
+  for (const double side : {-1.0, 1.0}) {  // a kerb wall along the well
+    scene.Add(Box({-8.0, side * 2.6 - 0.1, kFloor - kSlab}, {8.0, side * 2.6 + 0.1, kFloor + 1.0}));
+  }
+  for (const double x : {-14.0, -5.0, 5.0, 14.0}) {
+    for (const double y : {-7.0, 7.0})
+      scene.Add(Box({x - 0.2, y - 0.2, 0.0}, {x + 0.2, y + 0.2, kFloor - kSlab}));
+  }
+  for (const double base : {0.0, kFloor}) {  // breast walls on both storeys, open above
+    for (const double side : {-1.0, 1.0}) {
+      scene.Add(Box({-20.0, side * 12.0 - 0.15, base}, {20.0, side * 12.0 + 0.15, base + 1.1}));
+      if (base > 0.0 || side > 0.0) {  // below, the way in is at x = -20
+        scene.Add(Box({side * 20.0 - 0.15, -12.0, base}, {side * 20.0 + 0.15, 12.0, base + 1.1}));
+      }
+    }
+  }
+  scene.Add(House({15.5, 9.0, kFloor}, {4.0, 3.0, 2.6}, 0.0));
+  scene.Add(House({-25.0, 17.0, 0.0}, {6.0, 5.0, 7.0}, 0.4));
+  scene.Add(House({24.0, -17.0, 0.0}, {7.0, 5.0, 6.0}, -0.3));
+  scene.Build();
+  world.robots = {{"visitor",
+                   {{-25.0, -9.5, 0.0},
+                    {17.0, -9.5, 0.0},
+                    {17.0, 5.0, 0.0},
+                    {-16.0, 5.0, 0.0},
+                    {-16.0, 0.0, 0.0},
+                    {14.0, 0.0, 0.0},
+                    {14.0, -9.5, kFloor},
+                    {-16.0, -9.5, kFloor},
+                    {-16.0, 5.0, kFloor},
+                    {10.0, 5.0, kFloor}}}};
+  world.places = {{"below", {0.0, -9.5, 0.0}},
+                  {"above", {0.0, -9.5, kFloor}},
+                  {"ramp_foot", {-9.5, 0.0, 0.0}},
+                  {"ramp_head", {9.5, 0.0, kFloor}}};
+  return world;
+}
+
+namespace {
+
+double CampusHeight(double x, double y) {
+  return 2.0 * std::sin(x / 47.0) * std::cos(y / 61.0) + 0.8 * std::sin((x + 2.0 * y) / 29.0);
+}
+
+Vector3d OnCampus(double x, double y) { return {x, y, CampusHeight(x, y)}; }
+
+double DistanceToRoute(const std::vector<Vector3d>& route, const Vector2d& place) {
+  double nearest = 1e9;
+  for (std::size_t i = 0; i + 1 < route.size(); ++i) {
+    const Vector2d a = route[i].head<2>();
+    const Vector2d ab = route[i + 1].head<2>() - a;
+    const double t = std::clamp((place - a).dot(ab) / ab.squaredNorm(), 0.0, 1.0);
+    nearest = std::min(nearest, (place - a - t * ab).norm());
+  }
+  return nearest;
+}
+
+}  // namespace
+
+World CampusWorld(std::uint64_t seed) {
+  constexpr double kHalf = 150.0;
+  World world;
+  world.robots = {{"north_loop", {}}, {"south_loop", {}}};
+  const std::array<Vector2d, 6> loop = {Vector2d(-100, 0),
+                                        Vector2d(100, 0),
+                                        Vector2d(105, 60),
+                                        Vector2d(20, 95),
+                                        Vector2d(-80, 70),
+                                        Vector2d(-100, 5)};
+  for (const Vector2d& p : loop) {
+    world.robots[0].waypoints.push_back(OnCampus(p.x(), p.y()));
+    world.robots[1].waypoints.push_back(OnCampus(-p.x(), -p.y()));
+  }
+  world.scene.SetTerrain({Vector2d(-kHalf, -kHalf), Vector2d(kHalf, kHalf)}, 1.0, CampusHeight);
+  Random random(seed);
+  const auto free_place = [&](double distance) {
+    while (true) {
+      const Vector2d place(random.Uniform(-kHalf + 15, kHalf - 15),
+                           random.Uniform(-kHalf + 15, kHalf - 15));
+      if (DistanceToRoute(world.robots[0].waypoints, place) > distance &&
+          DistanceToRoute(world.robots[1].waypoints, place) > distance) {
+        return OnCampus(place.x(), place.y());
+      }
+    }
+  };
+  for (int i = 0; i < 40; ++i) {
+    const Vector3d size(random.Uniform(8, 22), random.Uniform(8, 16), random.Uniform(5, 14));
+    const Vector3d foot = free_place(0.5 * std::hypot(size.x(), size.y()) + 3.0);
+    world.scene.Add(House(foot - Vector3d(0, 0, 2), size, random.Uniform(0, 3.1)));
+  }
+  for (int i = 0; i < 150; ++i) {
+    AddTree(world.scene, free_place(4.0), random.Uniform(5, 10));
+  }
+  world.scene.Build();
+  world.places = {{"start", OnCampus(-100, 0)}, {"far", OnCampus(20, 95)}};
+  return world;
+}
+
+}  // namespace strata::testing

@@ -1,0 +1,51 @@
+// Three worlds drawn for tests and the demo, with robots that drive through them. Metres, z up.
+#ifndef STRATA_TESTS_SUPPORT_WORLDS_H_
+#define STRATA_TESTS_SUPPORT_WORLDS_H_
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "tests/support/scene.h"
+
+namespace strata::testing {
+
+struct Robot {
+  std::string name;
+  std::vector<Eigen::Vector3d> waypoints;  // for Drive()
+};
+
+struct World {
+  Scene scene;  // built
+  std::vector<Robot> robots;
+  std::map<std::string, Eigen::Vector3d> places;  // exact points on surfaces
+};
+
+// A deck of 12 × 4 m along x over a road along y, with ramps of slope 0.2 up to it on both sides;
+// houses, walls and posts around. Ground is z = 0, and the deck's top `clearance_m + 0.4`.
+//   robots: "over" drives up, across and down along y = 0; "under" drives along x = 0 beneath.
+//   places: "west", "east" at the ramps' feet, "south", "north" on the road, "deck" and "under" at
+//   x = y = 0.
+struct BridgeOptions {
+  bool parapets = true;      // 0.9 m high walls along both edges of deck and ramps
+  double clearance_m = 3.0;  // between road and deck
+};
+World BridgeWorld(const BridgeOptions& options = {});
+
+// Two storeys of 40 × 24 m with columns, walls with windows around them, and a ramp between. Floors
+// are z = 0 and 3.2.
+//   robots: "visitor" goes round below, up the ramp and round above.
+//   places: "below" and "above" at the same x, y; "ramp_foot", "ramp_head".
+World CarParkWorld();
+
+// Rolling terrain of 300 × 300 m with houses and trees.
+//   robots: "north_loop" and "south_loop", each some 500 m, sharing the street in the middle.
+//   places: "start" and "far".
+World CampusWorld(std::uint64_t seed = 1);
+
+}  // namespace strata::testing
+
+#endif  // STRATA_TESTS_SUPPORT_WORLDS_H_

@@ -1,0 +1,108 @@
+#include "tests/support/worlds.h"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/simulator.h"
+
+namespace strata::testing {
+namespace {
+
+using Eigen::Vector3d;
+
+std::vector<Pose> DriveOf(const World& world, const std::string& name) {
+  const auto robot = std::find_if(
+      world.robots.begin(), world.robots.end(), [&](const Robot& r) { return r.name == name; });
+  return Drive(world.scene, robot->waypoints, 1.0, 1.2);
+}
+
+void ExpectPlacesOnSurfaces(const World& world) {
+  for (const auto& [name, place] : world.places) {
+    EXPECT_NEAR(world.scene.GroundBelow(place.x(), place.y(), place.z() + 0.5).value_or(1e9),
+                place.z(),
+                0.05)
+        << name;
+  }
+}
+
+double HighestSensor(const std::vector<Pose>& poses) {
+  double highest = -1e9;
+  for (const Pose& pose : poses) highest = std::max(highest, pose.translation().z());
+  return highest;
+}
+
+// No robot drives through a wall: consecutive sensor positions see each other.
+void ExpectDrivesAreFree(const World& world) {
+  for (const Robot& robot : world.robots) {
+    const std::vector<Pose> poses = DriveOf(world, robot.name);
+    for (std::size_t i = 1; i < poses.size(); ++i) {
+      const Vector3d way = poses[i].translation() - poses[i - 1].translation();
+      EXPECT_FALSE(
+          world.scene.Cast(poses[i - 1].translation(), way.normalized(), way.norm()).has_value())
+          << robot.name << " between " << i - 1 << " and " << i;
+    }
+  }
+}
+
+TEST(WorldsTest, BridgeCanBeCrossedAndPassedUnder) {
+  for (const bool parapets : {true, false}) {
+    const World world = BridgeWorld({.parapets = parapets});
+    ExpectPlacesOnSurfaces(world);
+    ExpectDrivesAreFree(world);
+    EXPECT_NEAR(HighestSensor(DriveOf(world, "over")), 3.4 + 1.2, 0.01);
+    EXPECT_NEAR(HighestSensor(DriveOf(world, "under")), 1.2, 1e-9);
+    EXPECT_NEAR(world.scene.GroundBelow(0, 1.93, 10).value(), parapets ? 4.3 : 3.4, 1e-9);
+    EXPECT_NEAR(world.scene.GroundBelow(-14.5, 1.93, 10).value() -
+                    world.scene.GroundBelow(-14.5, 0.0, 10).value(),
+                parapets ? 0.92 : 0.0,
+                0.05);
+    EXPECT_NEAR(world.scene.Cast({0, 0, 0.1}, Vector3d::UnitZ(), 50).value(), 2.9, 1e-9);
+  }
+}
+
+TEST(WorldsTest, LowBridgeHasTheClearanceAskedFor) {
+  const World world = BridgeWorld({.parapets = false, .clearance_m = 1.5});
+  ExpectPlacesOnSurfaces(world);
+  EXPECT_NEAR(world.scene.Cast({0, 0, 0.1}, Vector3d::UnitZ(), 50).value(), 1.4, 1e-9);
+}
+
+TEST(WorldsTest, CarParkVisitorReachesTheUpperStoreyByTheRamp) {
+  const World world = CarParkWorld();
+  ExpectPlacesOnSurfaces(world);
+  ExpectDrivesAreFree(world);
+  EXPECT_NEAR(HighestSensor(DriveOf(world, "visitor")), 3.2 + 1.2, 0.05);
+  EXPECT_EQ(world.places.at("above").head<2>(), world.places.at("below").head<2>());
+}
+
+TEST(WorldsTest, CampusRobotsDriveAboutHalfAKilometreEach) {
+  const World world = CampusWorld();
+  ExpectPlacesOnSurfaces(world);
+  ExpectDrivesAreFree(world);
+  for (const Robot& robot : world.robots) {
+    EXPECT_NEAR(static_cast<double>(DriveOf(world, robot.name).size()), 550.0, 80.0) << robot.name;
+  }
+}
+
+TEST(WorldsTest, AScanSeesTheDeckFromBothSides) {
+  const World world = BridgeWorld();
+  const auto count_near = [&](const char* robot, double z) {
+    const std::vector<Pose> poses = DriveOf(world, robot);
+    const Pose& T = poses[poses.size() / 2];
+    int count = 0;
+    for (const Eigen::Vector3f& p : SimulateScan(world.scene, {}, T, 4).points) {
+      const Vector3d p_world = T * p.cast<double>();
+      if (p_world.head<2>().norm() < 4.0 && std::abs(p_world.z() - z) < 0.05) ++count;
+    }
+    return count;
+  };
+  EXPECT_GT(count_near("over", 3.4), 1000);
+  EXPECT_EQ(count_near("over", 3.0), 0);
+  EXPECT_GT(count_near("under", 3.0), 150);
+  EXPECT_GT(count_near("under", 0.0), 1000);
+}
+
+}  // namespace
+}  // namespace strata::testing
