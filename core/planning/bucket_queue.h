@@ -14,9 +14,11 @@ namespace strata {
 // order inside a bucket by expanding again what got cheaper.
 class BucketQueue {
  public:
-  explicit BucketQueue(int shift) : shift_(shift), ring_(1024) {}
+  BucketQueue() : ring_(1024) {}
 
-  void Clear() {
+  // Starts anew with buckets of 2^shift.
+  void Clear(int shift) {
+    shift_ = shift;
     for (std::vector<std::uint32_t>& bucket : ring_) bucket.clear();
     size_ = 0;
     begun_ = false;
@@ -65,7 +67,7 @@ class BucketQueue {
     ring_ = std::move(ring);
   }
 
-  int shift_;
+  int shift_ = 0;
   bool begun_ = false;
   std::uint32_t current_ = 0;
   std::size_t size_ = 0;

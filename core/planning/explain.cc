@@ -73,7 +73,7 @@ class TileReasons {
       return {
           Obstruction::kUnknown, ground_.HoleWidth(next, surface.z_m), Place(next, surface.z_m)};
     }
-    const Explanation reason = WhyNotStand(target);
+    Explanation reason = WhyNotStand(target);
     if (reason.kind != Obstruction::kNone) return reason;
     for (int n = 1; n < cells; ++n) {
       const int cell = static_cast<int>(surface.cell) + n * window_.Step(direction);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -18,7 +19,7 @@ constexpr int kFitWidth = 2 * kFitRadius + 1;
 constexpr double kBrokenGround = 0.5;
 
 // Numbers of the surfaces that a window's cells give, row by row; kNothing where none.
-using Members = std::array<std::uint32_t, kFitWidth * kFitWidth>;
+using Members = std::array<std::uint32_t, std::size_t{kFitWidth} * kFitWidth>;
 constexpr std::uint32_t kNothing = 0xFFFFFFFFU;
 
 std::uint32_t NearestInCell(const GroundWindow& window, int cell, float z, float reach_m) {

@@ -22,11 +22,17 @@ namespace {
 
 constexpr std::uint32_t kClosed = 8;
 constexpr std::uint64_t kExpansionsPerLook = 4096;  // at the clock
+// Widths of buckets, measured: wide ones stay in the processor's cache, but expand again what a bad
+// order within a bucket made too dear; the tighter the bound, the more that is.
+constexpr int kWideBuckets = 6;
+constexpr int kNarrowBuckets = 2;
 constexpr std::uint32_t kMaxCost = 0xF0000000U;
 
 // Cost of the shortest way over cells without danger; consistent, since a move of any length costs
 // at least as much.
 struct OctileBound {
+  static constexpr bool kKeep = false;  // as fast to compute as to read
+  static constexpr int kBucketShift = kWideBuckets;
   CellIndex goal;
 
   void Enter(int /*slot*/, const SearchSpace::Slot& /*s*/) {}
@@ -39,6 +45,8 @@ struct OctileBound {
 };
 
 struct NoBound {
+  static constexpr bool kKeep = false;
+  static constexpr int kBucketShift = kWideBuckets;
   void Enter(int /*slot*/, const SearchSpace::Slot& /*s*/) {}
   std::uint32_t operator()(std::int32_t /*x*/, std::int32_t /*y*/, std::uint32_t /*local*/) const {
     return 0;
@@ -48,6 +56,9 @@ struct NoBound {
 // |d(landmark, patch) − d(landmark, goal)| never exceeds the cost between patch and goal.
 class LandmarkBound {
  public:
+  static constexpr bool kKeep = true;
+  static constexpr int kBucketShift = kNarrowBuckets;
+
   LandmarkBound(CellIndex goal, const Landmarks& landmarks, const std::uint32_t* goal_costs)
       : octile_{goal}, landmarks_(landmarks), goal_costs_(goal_costs) {}
 
@@ -86,7 +97,7 @@ class Search {
 
   // Expands until `goal` (kNoPatchId: nothing) is settled or the queue is empty.
   absl::StatusOr<SearchOutcome> Run(PatchId start, PatchId goal, std::uint64_t max_expanded) {
-    workspace_.Begin();
+    workspace_.Begin(Bound::kBucketShift);
     goal_ = goal;
     EnterSlot(space_.SlotOf(start));
     const CellIndex cell = space_.CellOfPatch(start);
@@ -128,6 +139,7 @@ class Search {
     x0_ = s.x0;
     y0_ = s.y0;
     nodes_ = workspace_.Nodes(slot, tile_->size());
+    if constexpr (Bound::kKeep) bounds_ = workspace_.Bounds(slot, tile_->size());
     bound_.Enter(slot, s);
   }
 
@@ -142,17 +154,25 @@ class Search {
   void Relax(
       std::uint32_t local, std::uint32_t cost, int direction, std::int32_t x, std::int32_t y) {
     SearchNode& node = nodes_[local];
-    if (!workspace_.Reached(node)) {
-      node.remaining = bound_(x, y, local);
-    } else if (cost >= node.cost) {
-      return;
+    const bool reached = workspace_.Reached(node);
+    if (reached && cost >= node.cost) return;
+    if constexpr (Bound::kKeep) {
+      if (!reached) bounds_[local] = bound_(x, y, local);
     }
     node.cost = cost;
     node.stamp = workspace_.Stamp(direction);
     const PatchId patch = base_ + local;
     if (patch == goal_) goal_cost_ = cost;
-    const std::uint32_t total = cost + node.remaining;
+    const std::uint32_t total = cost + Remaining(local, x, y);
     if (total < goal_cost_ && total < kMaxCost) workspace_.queue().Push(total, patch);
+  }
+
+  std::uint32_t Remaining(std::uint32_t local, std::int32_t x, std::int32_t y) const {
+    if constexpr (Bound::kKeep) {
+      return bounds_[local];
+    } else {
+      return bound_(x, y, local);
+    }
   }
 
   // False if the patch was expanded before or cannot be on a better path.
@@ -160,16 +180,17 @@ class Search {
     EnterSlot(space_.SlotOf(patch));
     const std::uint32_t local = patch - base_;
     SearchNode& node = nodes_[local];
-    if ((node.stamp & kClosed) != 0 || node.cost + node.remaining >= goal_cost_) return false;
+    if ((node.stamp & kClosed) != 0) return false;
+    const std::uint16_t cell = tile_->cell[local];
+    const std::int32_t x = x0_ + (cell & (kTileCells - 1));
+    const std::int32_t y = y0_ + (cell >> kTileShift);
+    if (node.cost + Remaining(local, x, y) >= goal_cost_) return false;
     node.stamp |= kClosed;
     if (node.cost >= dearest_cost_) {
       dearest_cost_ = node.cost;
       dearest_ = patch;
     }
     const std::uint32_t cost = node.cost;
-    const std::uint16_t cell = tile_->cell[local];
-    const std::int32_t x = x0_ + (cell & (kTileCells - 1));
-    const std::int32_t y = y0_ + (cell >> kTileShift);
     const std::array<Move, 8>& moves = tile_->moves[local];
     unsigned far = 0;
     for (int k = 0; k < 8; ++k) {
@@ -228,18 +249,19 @@ class Search {
   std::int32_t x0_ = 0;
   std::int32_t y0_ = 0;
   SearchNode* nodes_ = nullptr;
+  std::uint32_t* bounds_ = nullptr;
 };
 
 }  // namespace
 
-void SearchWorkspace::Begin() {
+void SearchWorkspace::Begin(int bucket_shift) {
   // 28 bits of generations; then all memories are wiped once.
   if (++generation_ >= 1U << 28) {
     for (std::vector<SearchNode>& nodes : nodes_)
       std::fill(nodes.begin(), nodes.end(), SearchNode{});
     generation_ = 1;
   }
-  queue_.Clear();
+  queue_.Clear(bucket_shift);
 }
 
 SearchNode* SearchWorkspace::Nodes(int slot, std::uint32_t size) {
@@ -247,6 +269,13 @@ SearchNode* SearchWorkspace::Nodes(int slot, std::uint32_t size) {
   std::vector<SearchNode>& nodes = nodes_[slot];
   if (nodes.size() < size) nodes.resize(size);
   return nodes.data();
+}
+
+std::uint32_t* SearchWorkspace::Bounds(int slot, std::uint32_t size) {
+  if (static_cast<std::size_t>(slot) >= bounds_.size()) bounds_.resize(slot + 1);
+  std::vector<std::uint32_t>& bounds = bounds_[slot];
+  if (bounds.size() < size) bounds.resize(size);
+  return bounds.data();
 }
 
 const SearchNode* SearchWorkspace::NodesIfAny(int slot) const {

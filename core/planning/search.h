@@ -18,20 +18,20 @@ class Landmarks;
 
 // What a search knows of a patch.
 struct SearchNode {
-  std::uint32_t cost = 0;       // from the start
-  std::uint32_t remaining = 0;  // lower bound to the goal
-  std::uint32_t stamp = 0;      // generation << 4 | closed << 3 | direction it was reached by
-  std::uint32_t reserved = 0;   // keeps four nodes in a cache line
+  std::uint32_t cost = 0;   // from the start
+  std::uint32_t stamp = 0;  // generation << 4 | closed << 3 | direction it was reached by
 };
 
 // Memory of searches, kept between them: nodes of an earlier search are told by their generation
 // and never cleared. One search at a time.
 class SearchWorkspace {
  public:
-  // Starts anew.
-  void Begin();
+  // Starts anew, with a queue of buckets of 2^bucket_shift.
+  void Begin(int bucket_shift);
   // Nodes of a slot, at least `size` of them.
   SearchNode* Nodes(int slot, std::uint32_t size);
+  // Lower bounds to the goal beside them, for searches whose bound is worth keeping.
+  std::uint32_t* Bounds(int slot, std::uint32_t size);
   const SearchNode* NodesIfAny(int slot) const;
   bool Reached(const SearchNode& node) const { return node.stamp >> 4 == generation_; }
   std::uint32_t Stamp(int direction) const {
@@ -41,13 +41,10 @@ class SearchWorkspace {
   std::size_t memory_bytes() const;
 
  private:
-  // Wide buckets expand again what a bad order within a bucket made too dear, landmarks' bounds
-  // make it many; 2^3 of 2048 a cell measured best.
-  static constexpr int kBucketShift = 3;
-
   std::uint32_t generation_ = 0;
   std::vector<std::vector<SearchNode>> nodes_;  // per slot
-  BucketQueue queue_{kBucketShift};
+  std::vector<std::vector<std::uint32_t>> bounds_;
+  BucketQueue queue_;
 };
 
 struct SearchOutcome {
