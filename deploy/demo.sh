@@ -70,7 +70,7 @@ place() { awk -v name="$1" '$1 == name { print $2 "," $3 "," $4 }' "$work/world/
 
 demo_simulated() {
   step "a bridge to cross and to pass under, seen by two robots with noisy odometry"
-  run strata-simulate bridge "$work/world" --seed 1
+  run strata-simulate bridge "$work/world" --seed 1 --noise-m 0.02 --noise-rad 0.003
   start_server
   step "both upload at once"
   run strata_at map create bridge --cell-size 0.1
