@@ -99,8 +99,8 @@ World BridgeWorld(const BridgeOptions& options) {
   const double turn = ramp_foot + 8.0;
   world.robots = {{"over", {{-turn, 0.0, 0.0}, {turn, 0.0, 0.0}}},
                   {"under", {{0.0, -24.0, 0.0}, {0.0, 24.0, 0.0}}}};
-  world.places = {{"west", {-ramp_foot - 2.0, 0.0, 0.0}},
-                  {"east", {ramp_foot + 2.0, 0.0, 0.0}},
+  world.places = {{"west", {-ramp_foot - 3.0, 0.0, 0.0}},
+                  {"east", {ramp_foot + 3.0, 0.0, 0.0}},
                   {"south", {0.0, -20.0, 0.0}},
                   {"north", {0.0, 20.0, 0.0}},
                   {"deck", {0.0, 0.0, deck_top}},
