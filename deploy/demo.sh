@@ -92,7 +92,7 @@ demo_simulated() {
   step "paths"
   run strata_at plan bridge --from "$(place west)" --to "$(place east)" --out "$out/over.ply"
   run strata_at plan bridge --from "$(place south)" --to "$(place north)" --out "$out/under.ply"
-  echo "from the deck to the road right beneath it:"
+  echo "from the deck to the road right beneath it, or why not:"
   run strata_at plan bridge --from "$(place deck)" --to "$(place under)" --out "$out/deck_to_road.ply"
   step "pictures"
   run strata_at map render bridge "$out/bridge.png" --view oblique --path "$out/over.ply" --path "$out/under.ply"
