@@ -70,7 +70,7 @@ place() { awk -v name="$1" '$1 == name { print $2 "," $3 "," $4 }' "$work/world/
 
 demo_simulated() {
   step "a bridge to cross and to pass under, seen by two robots with noisy odometry"
-  run strata-simulate bridge "$work/world" --seed 1
+  run strata-simulate bridge "$work/world" --seed 1 --noise-m 0.02 --noise-rad 0.003
   start_server
   step "both upload at once"
   run strata_at map create bridge --cell-size 0.1
@@ -92,7 +92,7 @@ demo_simulated() {
   step "paths"
   run strata_at plan bridge --from "$(place west)" --to "$(place east)" --out "$out/over.ply"
   run strata_at plan bridge --from "$(place south)" --to "$(place north)" --out "$out/under.ply"
-  echo "from the deck to the road right beneath it:"
+  echo "from the deck to the road right beneath it, or why not:"
   run strata_at plan bridge --from "$(place deck)" --to "$(place under)" --out "$out/deck_to_road.ply"
   step "pictures"
   run strata_at map render bridge "$out/bridge.png" --view oblique --path "$out/over.ply" --path "$out/under.ply"

@@ -96,11 +96,11 @@ World BridgeWorld(const BridgeOptions& options) {
   if (options.parapets) AddParapets(scene, kHalfDeck, run, kEdge, deck_top);
   AddBridgeSurroundings(scene, ramp_foot);
   scene.Build();
-  const double turn = ramp_foot + 4.0;
+  const double turn = ramp_foot + 8.0;
   world.robots = {{"over", {{-turn, 0.0, 0.0}, {turn, 0.0, 0.0}}},
                   {"under", {{0.0, -24.0, 0.0}, {0.0, 24.0, 0.0}}}};
-  world.places = {{"west", {-ramp_foot - 2.0, 0.0, 0.0}},
-                  {"east", {ramp_foot + 2.0, 0.0, 0.0}},
+  world.places = {{"west", {-ramp_foot - 3.0, 0.0, 0.0}},
+                  {"east", {ramp_foot + 3.0, 0.0, 0.0}},
                   {"south", {0.0, -20.0, 0.0}},
                   {"north", {0.0, 20.0, 0.0}},
                   {"deck", {0.0, 0.0, deck_top}},

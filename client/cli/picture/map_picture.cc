@@ -73,7 +73,7 @@ std::pair<double, double> Bulk(std::vector<double> values, double share) {
 Camera Frame(const std::vector<Block>& blocks, double cell, const PictureOptions& options) {
   Camera camera = Camera::From(options.azimuth_rad, options.elevation_rad);
   camera.metres_per_pixel = 1.0;
-  constexpr double kStrays = 0.001;
+  constexpr double kStrays = 0.012;
   std::array<std::vector<double>, 3> projected;
   for (const Block& block : blocks) {
     const Vector3d p(block.x + 0.5 * cell, block.y + 0.5 * cell, block.top);

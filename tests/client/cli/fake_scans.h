@@ -2,7 +2,10 @@
 #ifndef STRATA_TESTS_CLIENT_CLI_FAKE_SCANS_H_
 #define STRATA_TESTS_CLIENT_CLI_FAKE_SCANS_H_
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <map>
 #include <memory>
 #include <mutex>

@@ -39,13 +39,14 @@ std::vector<UploadSource> Sources(int count) {
   return sources;
 }
 
-std::vector<UploadResult> Run(FakeDatabase& database, const std::vector<UploadSource>& sources) {
+std::vector<UploadResult> UploadAll(FakeDatabase& database,
+                                    const std::vector<UploadSource>& sources) {
   return UploadScans(database, {}, "map", sources, 4, [](const UploadProgress&) {});
 }
 
 TEST(ScanUploaderTest, CommitsInOrderThoughLaterScansAreReadyEarlier) {
   FakeDatabase database;
-  const auto results = Run(database, Sources(40));
+  const auto results = UploadAll(database, Sources(40));
   ASSERT_EQ(database.fake_scans.finished.size(), 40U);
   for (std::size_t i = 0; i < 40; ++i) {
     STRATA_EXPECT_OK(results[i].status);
@@ -60,7 +61,7 @@ TEST(ScanUploaderTest, LargeScansGoInPiecesOfTheAllowedSize) {
   FakeDatabase database;
   std::vector<UploadSource> sources = Sources(1);
   sources[0].read = []() -> absl::StatusOr<PointCloud> { return CloudOf(100'001); };
-  STRATA_ASSERT_OK(Run(database, sources)[0].status);
+  STRATA_ASSERT_OK(UploadAll(database, sources)[0].status);
   EXPECT_EQ(database.fake_scans.largest_chunk, api::kMaxPointsPerChunk);
   EXPECT_EQ(database.fake_scans.finished[0].second, 100'001U);
 }
@@ -79,7 +80,7 @@ TEST(ScanUploaderTest, HeaderSaysWhatTheCloudHasAndTheOriginGoesIntoThePose) {
     cloud.sensor_origin = {0, 0, 1};
     return cloud;
   };
-  STRATA_ASSERT_OK(Run(database, sources)[0].status);
+  STRATA_ASSERT_OK(UploadAll(database, sources)[0].status);
   const ScanHeader& header = database.fake_scans.finished[0].first;
   EXPECT_EQ(header.rows, 2U);
   EXPECT_EQ(header.columns, 3U);
@@ -95,7 +96,7 @@ TEST(ScanUploaderTest, ABadFileIsReportedAndTheRestGoesOn) {
   sources[2].read = []() -> absl::StatusOr<PointCloud> {
     return absl::InvalidArgumentError("scan2: byte 40: expected more points");
   };
-  const auto results = Run(database, sources);
+  const auto results = UploadAll(database, sources);
   EXPECT_THAT(results[2].status,
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("byte 40")));
   EXPECT_EQ(database.fake_scans.finished.size(), 4U);
@@ -106,7 +107,7 @@ TEST(ScanUploaderTest, ABusyServerIsTriedAgainAndTheOrderKept) {
   FakeDatabase database;
   database.fake_scans.troubles[3] = {absl::ResourceExhaustedError("queue full"),
                                      absl::UnavailableError("gone")};
-  for (const UploadResult& result : Run(database, Sources(8))) {
+  for (const UploadResult& result : UploadAll(database, Sources(8))) {
     STRATA_EXPECT_OK(result.status);
   }
   ASSERT_EQ(database.fake_scans.finished.size(), 8U);
@@ -116,7 +117,7 @@ TEST(ScanUploaderTest, ABusyServerIsTriedAgainAndTheOrderKept) {
 TEST(ScanUploaderTest, AnErrorThatLastsIsNotTriedAgain) {
   FakeDatabase database;
   database.fake_scans.troubles[1] = {absl::AlreadyExistsError("other content")};
-  const auto results = Run(database, Sources(3));
+  const auto results = UploadAll(database, Sources(3));
   EXPECT_THAT(results[1].status,
               StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("other content")));
   EXPECT_EQ(database.fake_scans.finished.size(), 2U);
