@@ -48,7 +48,8 @@ struct ScanFilter {
   std::optional<std::string> trajectory;
   std::optional<ScanState> state;
   std::optional<absl::Time> from, until;  // half-open
-  // Scans whose footprint (the box of their points in the map) meets this box [m].
+  // Scans whose footprint meets this box [m]: the upright box in the map around the box of their
+  // points in the scan frame, so it holds every point and may be larger than they are when turned.
   std::optional<Eigen::AlignedBox2d> box;
 };
 

@@ -31,6 +31,15 @@ double HeightAt(double x, double y, const std::vector<Box>& boxes) {
   return z;
 }
 
+bool NearSide(double x, double y, const std::vector<Box>& boxes) {
+  constexpr double kSide = 0.03;
+  for (const Box& box : boxes) {
+    const double inside = std::min(box.half - std::abs(x - box.x), box.half - std::abs(y - box.y));
+    if (inside > 0.0 && inside < kSide) return true;
+  }
+  return false;
+}
+
 std::vector<Box> RandomBoxes(std::uint64_t seed, int count, double reach) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> place(-reach, reach);
@@ -57,7 +66,7 @@ PointCloud Sample(const Pose& T_map_scan,
     const double x = T_map_scan.translation().x() + place(random);
     const double y = T_map_scan.translation().y() + place(random);
     double z = HeightAt(x, y, boxes);
-    if (z > 0.0 && unit(random) < 0.5) z *= unit(random);  // sides
+    if (z > 0.0 && NearSide(x, y, boxes) && unit(random) < 0.8) z *= unit(random);
     const Eigen::Vector3d p_map(x, y, z + noise(random));
     cloud.points.push_back((T_scan_map * p_map).cast<float>());
   }

@@ -1,0 +1,255 @@
+// What every store of a map must do; run against each implementation.
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/common/status.h"
+#include "core/storage/sqlite/sqlite_storage.h"
+#include "core/storage/storage.h"
+#include "core/storage/value_codec.h"
+#include "tests/support/status_matchers.h"
+#include "tests/support/temp_dir.h"
+
+namespace strata::testing {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class StorageContractTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    STRATA_ASSERT_OK(CreateSqliteMap(file(), MapParameters(), absl::FromUnixSeconds(1000)));
+    Reopen();
+  }
+  void Reopen(const SqliteOptions& options = {}) {
+    reader_.reset();
+    storage_.reset();
+    auto opened = OpenSqliteStorage(file(), options);
+    ASSERT_THAT(opened, IsOk());
+    storage_ = *std::move(opened);
+    auto reader = storage_->NewReader();
+    ASSERT_THAT(reader, IsOk());
+    reader_ = *std::move(reader);
+  }
+  std::filesystem::path file() const { return directory_.path() / "map.strata"; }
+  StorageWriter& writer() { return storage_->writer(); }
+  StorageReader& reader() { return *reader_; }
+
+  absl::Status Commit(absl::FunctionRef<absl::Status()> body) {
+    return writer().Commit(Durability::kFull, body);
+  }
+  ScanRecord Scan(std::uint64_t sequence) {
+    ScanRecord scan;
+    scan.header.id = {"run", sequence};
+    scan.header.T_map_scan =
+        MakePose(Eigen::Quaterniond(0.1, 0.2, 0.3, 0.9), {0.1 + sequence, 2.0 / 3.0, -1e7});
+    scan.header.point_count = 10 * sequence;
+    scan.header.sensor = SensorModel{.sigma_m = 0.0123};
+    scan.upload = sequence;
+    scan.chunks = 1;
+    scan.point_bytes = 5;
+    scan.box_scan.extend(Eigen::Vector3f(-1, -2, -3));
+    scan.box_scan.extend(Eigen::Vector3f(1, 2, 3));
+    scan.content_hash = "hash";
+    return scan;
+  }
+  ScanNumber Put(std::uint64_t sequence) {
+    ScanRecord scan = Scan(sequence);
+    STRATA_EXPECT_OK(Commit([&]() -> absl::Status {
+      STRATA_ASSIGN_OR_RETURN(scan.number, writer().NextCommitSequence());
+      STRATA_RETURN_IF_ERROR(writer().PutChunk(scan.upload, 0, "bytes"));
+      return writer().PutScan(scan);
+    }));
+    return scan.number;
+  }
+  absl::Status PutTile(const TileKey& key, std::uint64_t version, bool gone, std::string bytes) {
+    return Commit([&] {
+      SurfaceTileRow row;
+      row.key = key;
+      row.version = version;
+      row.gone = gone;
+      row.bytes = std::move(bytes);
+      return writer().PutSurfaceTile(row);
+    });
+  }
+
+  TempDir directory_;
+  std::unique_ptr<MapStorage> storage_;
+  std::unique_ptr<StorageReader> reader_;
+};
+
+TEST_F(StorageContractTest, ScanComesBackToTheBit) {
+  const ScanNumber number = Put(7);
+  Reopen();
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::optional<PosedScan> found,
+                              reader().FindScan({"run", 7}, 1));
+  ASSERT_TRUE(found.has_value());
+  EXPECT_EQ(found->scan.number, number);
+  EXPECT_EQ(EncodeScanHeader(found->scan.header), EncodeScanHeader(Scan(7).header));
+  EXPECT_EQ(found->scan.box_scan.min(), Scan(7).box_scan.min());
+  EXPECT_FALSE(found->pose.has_value());
+  EXPECT_THAT(reader().GetChunk(7, 0), IsOkAndHolds(std::string("bytes")));
+  EXPECT_THAT(reader().FindScan({"run", 8}, 1), IsOkAndHolds(::testing::Eq(std::nullopt)));
+}
+
+TEST_F(StorageContractTest, FailedCommitLeavesNothingAndFailedPartOnlyItself) {
+  const absl::Status failed = Commit([&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(writer().PutChunk(1, 0, "a"));
+    return absl::AbortedError("no");
+  });
+  EXPECT_THAT(failed, StatusIs(absl::StatusCode::kAborted, HasSubstr("no")));
+  EXPECT_THAT(reader().LastUpload(), IsOkAndHolds(0U));
+  STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(writer().PutChunk(1, 0, "a"));
+    EXPECT_FALSE(writer()
+                     .Part([&]() -> absl::Status {
+                       STRATA_RETURN_IF_ERROR(writer().PutChunk(2, 0, "b"));
+                       return absl::AbortedError("no");
+                     })
+                     .ok());
+    return absl::OkStatus();
+  }));
+  EXPECT_THAT(reader().LastUpload(), IsOkAndHolds(1U));
+}
+
+TEST_F(StorageContractTest, SameScanIdTwiceIsRefused) {
+  Put(1);
+  ScanRecord again = Scan(1);
+  again.number = 99;
+  again.upload = 99;
+  EXPECT_THAT(Commit([&] { return writer().PutScan(again); }),
+              StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("run/1")));
+}
+
+TEST_F(StorageContractTest, OrphansGoAndScansStay) {
+  Put(1);
+  STRATA_ASSERT_OK(Commit([&] { return writer().PutChunk(50, 0, "orphan"); }));
+  STRATA_ASSERT_OK(Commit([&] { return writer().AbandonOrphans(); }));
+  EXPECT_THAT(reader().GetChunk(50, 0),
+              StatusIs(absl::StatusCode::kDataLoss, HasSubstr("piece 0")));
+  EXPECT_THAT(reader().GetChunk(1, 0), IsOk());
+}
+
+TEST_F(StorageContractTest, PoseOfAnEpochIsTheNewestUpToIt) {
+  const ScanNumber number = Put(1);
+  const auto put = [&](std::uint64_t epoch, double x) {
+    PoseRecord pose;
+    pose.scan = number;
+    pose.epoch = epoch;
+    pose.T_map_scan.translation().x() = x;
+    STRATA_EXPECT_OK(Commit([&] { return writer().PutPose(pose); }));
+  };
+  put(1, 10.0);
+  put(4, 40.0);
+  for (const auto& [epoch, x] :
+       std::vector<std::pair<int, double>>{{1, 10}, {3, 10}, {4, 40}, {9, 40}}) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const PosedScan scan, reader().GetScan(number, epoch));
+    ASSERT_TRUE(scan.pose.has_value());
+    EXPECT_EQ(scan.pose->T_map_scan.translation().x(), x) << epoch;
+  }
+  EXPECT_FALSE(reader().GetScan(number, 0)->pose.has_value());
+  EXPECT_EQ(reader().GetScan(number, 9)->scan.header.T_map_scan.translation().x(), 1.1);
+}
+
+TEST_F(StorageContractTest, ReaderOfAVersionSeesTheNewestTileUpToIt) {
+  const TileKey key{0, -3, 5};
+  STRATA_ASSERT_OK(PutTile(key, 10, false, "ten"));
+  STRATA_ASSERT_OK(PutTile(key, 20, false, "twenty"));
+  STRATA_ASSERT_OK(PutTile(key, 30, true, ""));
+  STRATA_ASSERT_OK(PutTile({1, -2, 2}, 20, false, "up"));
+  EXPECT_FALSE(reader().FindSurfaceTile(key, 9)->has_value());
+  EXPECT_EQ(reader().FindSurfaceTile(key, 19)->value().bytes, "ten");
+  EXPECT_EQ(reader().FindSurfaceTile(key, 29)->value().bytes, "twenty");
+  EXPECT_FALSE(reader().FindSurfaceTile(key, 30)->has_value());
+  EXPECT_EQ(reader().ListSurfaceTiles({}, 25)->size(), 1U);
+  EXPECT_EQ(reader().ListSurfaceTiles({}, 30)->size(), 0U);
+  EXPECT_EQ(reader().ListSurfaceTiles({.level = 1}, 30)->size(), 1U);
+  STRATA_ASSERT_OK(Commit([&] { return writer().CollectSurfaceTile(key, 25); }));
+  EXPECT_FALSE(reader().FindSurfaceTile(key, 19)->has_value());
+  EXPECT_EQ(reader().FindSurfaceTile(key, 25)->value().bytes, "twenty");
+  STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(writer().PublishTiles(20, true));
+    return writer().DiscardUnpublished();
+  }));
+  EXPECT_EQ(reader().FindSurfaceTile(key, 99)->value().bytes, "twenty");
+}
+
+TEST_F(StorageContractTest, BoxQueryMeetsFootprintsExactly) {
+  const ScanNumber number = Put(1);
+  const Eigen::AlignedBox2d footprint(Eigen::Vector2d(1e6 + 0.01, 0), Eigen::Vector2d(1e6 + 1, 1));
+  STRATA_ASSERT_OK(Commit([&] { return writer().SetFootprint(number, footprint); }));
+  const auto count = [&](double x0, double x1) {
+    ScanQuery query;
+    query.box = Eigen::AlignedBox2d(Eigen::Vector2d(x0, 0.5), Eigen::Vector2d(x1, 0.6));
+    return reader().ListScans(query, 1)->size();
+  };
+  EXPECT_EQ(count(1e6 - 5, 1e6 + 0.009), 0U);
+  EXPECT_EQ(count(1e6 - 5, 1e6 + 0.011), 1U);
+  EXPECT_EQ(count(1e6 + 1.001, 1e6 + 9), 0U);
+}
+
+TEST_F(StorageContractTest, DeletedScanTakesEverythingAlong) {
+  const ScanNumber a = Put(1);
+  const ScanNumber b = Put(2);
+  STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
+    ConstraintRecord constraint;
+    constraint.scan_i = a;
+    constraint.scan_j = b;
+    STRATA_RETURN_IF_ERROR(writer().PutConstraint(constraint));
+    return writer().SetTilesOfScan(a, {{0, 1, 2}});
+  }));
+  EXPECT_THAT(reader().ScansOfTile({0, 1, 2}), IsOkAndHolds(ElementsAre(a)));
+  EXPECT_EQ(reader().ListConstraints()->at(0).constraint.j.sequence, 2U);
+  STRATA_ASSERT_OK(Commit([&] { return writer().DeleteScan(a); }));
+  EXPECT_THAT(reader().ScansOfTile({0, 1, 2}), IsOkAndHolds(ElementsAre()));
+  EXPECT_TRUE(reader().ListConstraints()->empty());
+  EXPECT_EQ(reader().GetScanTotals()->scans, 1U);
+  EXPECT_FALSE(reader().GetChunk(1, 0).ok());
+}
+
+TEST_F(StorageContractTest, DropDerivedKeepsTruth) {
+  Put(1);
+  STRATA_ASSERT_OK(PutTile({0, 0, 0}, 1, false, "x"));
+  STRATA_ASSERT_OK(Commit([&] { return writer().DropDerived(); }));
+  EXPECT_FALSE(reader().GetClock()->derived_complete);
+  EXPECT_FALSE(reader().FindSurfaceTile({0, 0, 0}, 99)->has_value());
+  EXPECT_EQ(reader().GetScanTotals()->scans, 1U);
+}
+
+TEST_F(StorageContractTest, FullStoreIsAnErrorAndLosesNothing) {
+  Put(1);
+  Reopen({.max_file_bytes = 400'000});
+  const std::string large(300'000, 'x');
+  EXPECT_THAT(Commit([&]() -> absl::Status {
+                STRATA_RETURN_IF_ERROR(writer().PutChunk(8, 0, large));
+                return writer().PutChunk(8, 1, large);
+              }),
+              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("full")));
+  EXPECT_EQ(reader().GetScanTotals()->scans, 1U);
+  Put(2);
+}
+
+TEST(ValueCodecTest, EveryFlippedBitIsFound) {
+  ScanHeader header;
+  header.id = {"run", 1};
+  const std::string good = EncodeScanHeader(header);
+  STRATA_ASSERT_OK(DecodeScanHeader(header.id, good));
+  for (std::size_t bit = 0; bit < 8 * good.size(); ++bit) {
+    std::string bad = good;
+    bad[bit / 8] = static_cast<char>(bad[bit / 8] ^ (1 << (bit % 8)));
+    EXPECT_THAT(DecodeScanHeader(header.id, bad),
+                StatusIs(absl::StatusCode::kDataLoss, HasSubstr("scan header")));
+  }
+  EXPECT_THAT(DecodeScanHeader(header.id, good.substr(1)),
+              StatusIs(absl::StatusCode::kDataLoss, HasSubstr("bytes instead of")));
+}
+
+}  // namespace
+}  // namespace strata::testing
