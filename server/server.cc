@@ -98,10 +98,12 @@ absl::Status GrpcServer::Listen(ListenAddress address) {
 void GrpcServer::Shutdown() {
   if (server_ == nullptr || runtime_.shutting_down.exchange(true)) return;
   server_->GetHealthCheckService()->SetServingStatus(false);
-  server_->Shutdown(absl::ToChronoTime(absl::Now() + options_.drain_timeout));
+  // gRPC's own draining would also wait for clients that keep an idle connection.
+  runtime_.calls.AwaitEmpty(options_.drain_timeout);
+  server_->Shutdown(absl::ToChronoTime(absl::Now()));
   server_->Wait();
   // The last calls may still be giving back what they hold.
-  runtime_.calls.AwaitEmpty();
+  runtime_.calls.AwaitEmpty(absl::InfiniteDuration());
 }
 
 }  // namespace

@@ -64,7 +64,7 @@ absl::StatusOr<Out> CallUnary(Connection& connection,
   while (true) {
     AttemptContext context(connection, call);
     Out out;
-    const absl::Status status = StatusOf((stub.*method)(context.get(), in, &out), call);
+    absl::Status status = StatusOf((stub.*method)(context.get(), in, &out), call);
     if (status.ok()) return out;
     if (repeat == Repeat::kNever || !backoff.Wait(status, call.stop)) return status;
   }
@@ -102,7 +102,7 @@ absl::Status CallStream(
     AttemptContext context(connection, call);
     const std::unique_ptr<grpc::ClientReader<Out>> reader = (stub.*method)(context.get(), in);
     bool delivered = false;
-    const absl::Status status = ReadStream(context, *reader, call, sink, delivered);
+    absl::Status status = ReadStream(context, *reader, call, sink, delivered);
     // What was delivered cannot be taken back.
     if (status.ok() || delivered || !backoff.Wait(status, call.stop)) return status;
   }

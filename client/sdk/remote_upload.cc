@@ -74,7 +74,7 @@ absl::StatusOr<ScanAck> RemoteUpload::Finish() {
 
 absl::Status RemoteUpload::Deliver() {
   while (true) {
-    const absl::Status status = Advance();
+    absl::Status status = Advance();
     if (status.ok() || !MayRepeat(status)) return status;
   }
 }

@@ -23,7 +23,8 @@ static_assert(sizeof(Eigen::Vector3f) == 12 && sizeof(Colour) == 3);
 template <typename T>
 std::string Pack(const std::vector<T>& column) {
   std::string bytes(column.size() * sizeof(T), '\0');
-  if (!column.empty()) std::memcpy(bytes.data(), column.data(), bytes.size());
+  if (!column.empty())
+    std::memcpy(bytes.data(), static_cast<const void*>(column.data()), bytes.size());
   return bytes;
 }
 

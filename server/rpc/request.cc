@@ -52,6 +52,10 @@ Request::Request(Runtime& runtime, grpc::CallbackServerContext& context, absl::s
 Request::~Request() { runtime_.calls.Leave(); }
 
 absl::Status Request::admission() const {
+  if (runtime_.shutting_down) {
+    return translate::WithReason(absl::UnavailableError("the server is shutting down"),
+                                 translate::kShuttingDownReason);
+  }
   if (admitted_) return absl::OkStatus();
   return translate::WithReason(
       absl::ResourceExhaustedError(absl::StrCat(

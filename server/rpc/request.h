@@ -34,7 +34,8 @@ class Request {
   Request(const Request&) = delete;
   Request& operator=(const Request&) = delete;
 
-  // RESOURCE_EXHAUSTED when the server is full and the call must end at once.
+  // RESOURCE_EXHAUSTED when the server is full, UNAVAILABLE when it shuts down: the call must end
+  // at once.
   absl::Status admission() const;
   const api::Call& call() const { return call_; }
   // The caller has gone: long work ends.

@@ -34,9 +34,11 @@ class CallGate {
     absl::MutexLock lock(&mutex_);
     --calls_;
   }
-  void AwaitEmpty() {
+  // Returns when there is none, or after `timeout`.
+  void AwaitEmpty(absl::Duration timeout) {
     const auto empty = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return calls_ == 0; };
-    absl::MutexLock lock(&mutex_, absl::Condition(&empty));
+    absl::MutexLock lock(&mutex_);
+    mutex_.AwaitWithTimeout(absl::Condition(&empty), timeout);
   }
 
  private:

@@ -1,4 +1,5 @@
 #include <thread>
+#include <vector>
 
 #include "absl/synchronization/notification.h"
 #include "absl/time/clock.h"
@@ -38,8 +39,15 @@ TEST_F(ShutdownTest, LetsCallsUnderWayEnd) {
   std::thread caller([this] { EXPECT_THAT(PlanPath(), IsOk()); });
   started_.WaitForNotification();
   std::thread shutdown([this] { server_->Shutdown(); });
-  // The channel learns that the server goes away while the call is still under way.
-  while (channel_->GetState(true) == GRPC_CHANNEL_READY) std::this_thread::yield();
+  // New calls are refused while the one under way goes on.
+  ON_CALL(db_.maps(), List(_)).WillByDefault(::testing::Return(std::vector<MapInfo>()));
+  absl::Status refused;
+  while (refused.ok()) {
+    v1::ListMapsResponse out;
+    refused = Call<v1::Maps>(&v1::Maps::Stub::List, v1::ListMapsRequest(), &out);
+  }
+  EXPECT_THAT(refused, StatusIs(absl::StatusCode::kUnavailable, _));
+  EXPECT_EQ(ReasonOf(refused), "SHUTTING_DOWN");
   go_on.Notify();
   caller.join();
   shutdown.join();

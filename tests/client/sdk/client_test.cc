@@ -74,7 +74,7 @@ TEST_F(ClientTest, AStreamIsNotRepeatedOnceItDelivered) {
       .WillOnce(Return(absl::UnavailableError("starting")))
       .WillOnce([](auto&, auto, auto&, ::strata::testing::Sink<PointCloud> sink) {
         PointCloud piece;
-        piece.points.resize(3);
+        piece.points.assign(3, Eigen::Vector3f::Zero());
         STRATA_EXPECT_OK(sink(piece));
         return absl::UnavailableError("gone");
       });
@@ -103,7 +103,7 @@ TEST_F(ClientTest, AnUploadIsSentAgainFromItsStart) {
         return upload;
       });
   PointCloud chunk;
-  chunk.points.resize(4);
+  chunk.points.assign(4, Eigen::Vector3f::Zero());
   ScanHeader header;
   header.id = {"run", 3};
   header.point_count = 8;
