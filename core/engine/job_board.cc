@@ -156,6 +156,7 @@ absl::Status JobBoard::Watch(const Stop& stop,
                              absl::FunctionRef<absl::Status(const JobInfo&)> sink) const {
   constexpr absl::Duration kPoll = absl::Milliseconds(50);
   std::uint64_t seen = 0;
+  absl::Time next = absl::InfinitePast();  // not more often than that
   for (bool first = true;; first = false) {
     JobInfo info;
     {
@@ -163,6 +164,11 @@ absl::Status JobBoard::Watch(const Stop& stop,
       const auto it = jobs_.find(id);
       if (it == jobs_.end()) return NoSuchJob(id);
       const Entry& entry = it->second;
+      const auto ended = [&entry] { return IsFinal(entry.info.state); };
+      while (absl::Now() < next && !ended()) {
+        STRATA_RETURN_IF_ERROR(stop.status());
+        mutex_.AwaitWithTimeout(absl::Condition(&ended), std::min(kPoll, next - absl::Now()));
+      }
       const auto changed = [&entry, &seen, first] { return first || entry.changes != seen; };
       while (!mutex_.AwaitWithTimeout(absl::Condition(&changed), kPoll)) {
         STRATA_RETURN_IF_ERROR(stop.status());
@@ -172,6 +178,7 @@ absl::Status JobBoard::Watch(const Stop& stop,
     }
     STRATA_RETURN_IF_ERROR(stop.status());
     STRATA_RETURN_IF_ERROR(sink(info));
+    next = absl::Now() + kReportInterval;
     if (IsFinal(info.state)) return absl::OkStatus();
   }
 }

@@ -114,7 +114,10 @@ absl::StatusOr<MapStats> EngineMaps::Stats(const api::Call& call, absl::string_v
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(name));
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map->core().Reader());
-  return CollectStats(*reader);
+  STRATA_ASSIGN_OR_RETURN(MapStats stats, CollectStats(*reader));
+  STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());
+  map->core().snapshots().AwaitPublished(clock.tile_version);
+  return stats;
 }
 
 }  // namespace strata

@@ -23,6 +23,14 @@ void Snapshots::Publish(MapView view) {
   current_ = view;
 }
 
+void Snapshots::AwaitPublished(std::uint64_t tile_version) const {
+  absl::MutexLock lock(&mutex_);
+  const auto published = [this, tile_version]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
+    return current_.tile_version >= tile_version;
+  };
+  mutex_.Await(absl::Condition(&published));
+}
+
 std::uint64_t Snapshots::Floor() const {
   absl::MutexLock lock(&mutex_);
   return pinned_.empty() ? current_.tile_version

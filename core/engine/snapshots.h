@@ -43,6 +43,9 @@ class Snapshots {
   Pin PinCurrent();
   // Called after the commit that made `view` the current one.
   void Publish(MapView view);
+  // Returns once tiles of `tile_version`, which must be committed, are what readers get: whoever
+  // saw a commit in the store must not find older tiles afterwards.
+  void AwaitPublished(std::uint64_t tile_version) const;
   // Oldest tile version that somebody reads or may begin to read.
   std::uint64_t Floor() const;
 
