@@ -20,7 +20,8 @@ inline constexpr std::uint16_t kSurfaceTileVersion = 1;
 //   z_m       within 1/1024 m (0.98 mm): a multiple of 1/512 m; |z| ≤ 32,767 m
 //   depth_m   the same, but never 0 when it was not: a depth below 1/1024 m becomes 1/512 m
 //   sigma_m   within 4.8 %, from 60 nm to 0.99 km (clamped outside)
-//   cost      where traversable 1 + cost within 6 % (clamped at 5e12); elsewhere within a factor 1.19;
+//   cost      where traversable 1 + cost within 6 % (clamped at 5e12); elsewhere within a
+//   factor 1.19;
 //             0 and infinity exactly
 // Not a number becomes 0. REQUIRES: surfaces sorted by (cell, z), at most kMaxTilePatches.
 // row_begin is not looked at. Thread-safe.

@@ -63,8 +63,7 @@ std::size_t MlsMap::occupied_cell_count() const {
 std::size_t MlsMap::memory_bytes() const {
   std::size_t bytes = sizeof(*this) + tiles.capacity() * sizeof(MlsTile);
   for (const MlsTile& tile : tiles) {
-    bytes += tile.patches.capacity() * sizeof(Patch) +
-             tile.colour.capacity() * sizeof(ColourSum) +
+    bytes += tile.patches.capacity() * sizeof(Patch) + tile.colour.capacity() * sizeof(ColourSum) +
              tile.votes.capacity() * sizeof(ClassVotes);
   }
   return bytes;

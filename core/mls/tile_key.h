@@ -17,7 +17,8 @@ inline constexpr int kTileShift = 8;
 // Levels of detail 0 (finest) to kMaxLevel; a cell of level l is cell_size · 2^l wide.
 inline constexpr int kMaxLevel = 12;
 
-// Cells of a map lie in [-kMaxCellIndex, kMaxCellIndex): neighbours and tile corners never overflow.
+// Cells of a map lie in [-kMaxCellIndex, kMaxCellIndex): neighbours and tile corners never
+// overflow.
 inline constexpr std::int32_t kMaxCellIndex = 1 << 30;
 
 // Tile (x, y) of level l covers the half-open square [x, x+1) × [y, y+1) · kTileCells · cell_size ·

@@ -121,8 +121,8 @@ absl::Status SqliteWriter::SetFootprint(ScanNumber number, const Eigen::AlignedB
 }
 
 absl::Status SqliteWriter::DeleteOrphanIndexes() {
-  STRATA_RETURN_IF_ERROR(RunSql(
-      "DELETE FROM derived_scan_tile WHERE scan NOT IN (SELECT number FROM truth_scan)"));
+  STRATA_RETURN_IF_ERROR(
+      RunSql("DELETE FROM derived_scan_tile WHERE scan NOT IN (SELECT number FROM truth_scan)"));
   return RunSql("DELETE FROM derived_footprint WHERE scan NOT IN (SELECT number FROM truth_scan)");
 }
 
