@@ -21,7 +21,7 @@ if [[ "${1:-}" != --quick ]]; then
 fi
 
 stage "release build"
-cmake --preset release >/dev/null
+cmake --preset release -DSTRATA_BUILD_BENCHMARKS=ON >/dev/null
 cmake --build --preset release
 
 stage "self-contained headers"
@@ -32,6 +32,12 @@ ctest --preset release
 
 stage "install and consumer"
 tests/consumer/run.sh build/release
+
+stage "README"
+/usr/bin/python3 tests/readme_test.py --build build/release
+
+stage "recorded data through a real server"
+/usr/bin/python3 tests/experiments/real_data.py --build build/release || [[ $? == 77 ]]
 
 if [[ "${1:-}" != --quick ]]; then
   stage "sanitizers"
