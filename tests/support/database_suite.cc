@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <ostream>
 #include <vector>
 
 #include "absl/time/clock.h"
@@ -85,6 +86,8 @@ void PutFloor(api::Database& db, const ScanId& id, double x_m = 0.0) {
 }
 
 }  // namespace
+
+void PrintTo(const DatabaseMaker& maker, std::ostream* out) { *out << maker.name; }
 
 std::string DatabaseMakerName(const ::testing::TestParamInfo<DatabaseMaker>& info) {
   return info.param.name;
