@@ -172,6 +172,10 @@ absl::Status Wait(Context& context, const ImportOptions& options, Summary& summa
       if (info.state == ScanState::kIntegrated) {
         ++summary.integrated;
         summary.aligned += info.alignment.aligned ? 1 : 0;
+        if (!info.message.empty()) {
+          progress.Clear();
+          context.output.Talk(absl::StrCat(summary.present[i].ToString(), ": ", info.message));
+        }
         break;
       }
       if (info.state == ScanState::kFailed) {

@@ -53,6 +53,8 @@ constexpr NamedMeaning kNames[] = {
 
 constexpr double kFarMetres = 1000.0;
 constexpr double kOriginStepMetres = 100.0;
+// Nearer than this, what is small may well be seen from the zero of its coordinates.
+constexpr double kSeenMetres = 100.0;
 
 std::uint16_t LabelOf(double value) {
   return value >= 0.0 && value <= 65535.0 ? static_cast<std::uint16_t>(value) : 0;
@@ -148,7 +150,11 @@ Eigen::Vector3d CloudBuilder::ChooseOrigin() const {
       origin[k] = std::round(middle / kOriginStepMetres) * kOriginStepMetres;
     }
   }
-  return origin;
+  if (!sensor_origin_.isZero(0.0)) return origin;
+  const Eigen::Array3d gap = (low - origin.array()).max(origin.array() - high).max(0.0);
+  const double size = (high - low).matrix().norm();
+  if (gap.matrix().norm() <= std::max(size, kSeenMetres)) return origin;
+  return (0.5 * low + 0.5 * high).round();
 }
 
 double CloudBuilder::ColourScale() const {

@@ -52,10 +52,12 @@ class CloudBuilder {
   // The cloud. Without a grid points that are not finite are left out; in one they become NaN.
   // Along an axis where all points lie on one side of zero and their middle beyond 1000 m, `origin`
   // is that middle rounded to 100 m: floats inside are then as fine as those of a local cloud, and
-  // the difference to a float of the file is exact. `sensor_origin` is what was set; else the zero
-  // of the file's coordinates, or, with an origin, the origin itself (nobody knows then). Colours
-  // come in 0–255, 0–65535 or, with fractions, 0–1, and are scaled to 8 bits; labels outside
-  // 0–65535 become 0. INVALID_ARGUMENT without any finite point, or as ValidateCloud.
+  // the difference to a float of the file is exact. Where no sensor position was set and what would
+  // stand for it, `origin`, is farther from the points' box than 100 m and than the box's diagonal,
+  // no sensor stood there, and `origin` is the box's centre rounded to 1 m. `sensor_origin` is what
+  // was set; else the zero of the file's coordinates, or, with an origin, the origin itself.
+  // Colours come in 0–255, 0–65535 or, with fractions, 0–1, and are scaled to 8 bits; labels
+  // outside 0–65535 become 0. INVALID_ARGUMENT without any finite point, or as ValidateCloud.
   absl::StatusOr<PointCloud> Build() &&;
 
  private:

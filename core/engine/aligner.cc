@@ -28,6 +28,16 @@ bool Accepted(Termination termination) {
          termination == Termination::kDegenerate;
 }
 
+AlignmentReport ReportOf(const RegistrationResult& match) {
+  AlignmentReport report;
+  report.aligned = Accepted(match.termination);
+  report.message = std::string(ToString(match.termination));
+  report.overlap = match.overlap;
+  report.rms_m = match.rms_m;
+  report.iterations = static_cast<std::uint32_t>(match.iterations);
+  return report;
+}
+
 void NearestFirst(const std::vector<Pose>& poses,
                   const Pose& place,
                   std::vector<std::size_t>& neighbours) {
@@ -90,6 +100,42 @@ absl::StatusOr<Aligner::Features> Aligner::FeaturesOf(ScanNumber number,
   return Keep(number, local_map);
 }
 
+absl::StatusOr<Aligner::Neighbourhood> Aligner::NeighboursOf(const Pose& guess,
+                                                             StorageReader& reader,
+                                                             ScanSource& source) {
+  Neighbourhood around;
+  for (const std::size_t i : SelectNeighbours(poses_, guess)) {
+    // A scan whose data are damaged is no reason to refuse this one.
+    absl::StatusOr<Features> features = FeaturesOf(scans_[i].number, reader, source);
+    if (absl::IsDataLoss(features.status())) continue;
+    STRATA_RETURN_IF_ERROR(features.status());
+    around.held.push_back(*std::move(features));
+    around.placed.push_back({around.held.back().get(), poses_[i]});
+    around.indices.push_back(i);
+  }
+  return around;
+}
+
+std::vector<ConstraintRecord> Aligner::ConstraintsOf(ScanNumber number,
+                                                     const Placement& placement,
+                                                     const Matrix6d& information,
+                                                     std::vector<std::size_t> partners) const {
+  NearestFirst(poses_, placement.T_map_scan, partners);
+  partners.resize(std::min(partners.size(), kMaxConstraints));
+  std::vector<ConstraintRecord> records;
+  for (const std::size_t i : partners) {
+    ConstraintRecord record;
+    record.scan_i = scans_[i].number;
+    record.scan_j = number;
+    record.constraint.T_i_j = Normalized(poses_[i].inverse() * placement.T_map_scan);
+    record.constraint.information = information / static_cast<double>(partners.size());
+    record.constraint.origin = ConstraintOrigin::kIngest;
+    record.constraint.note = placement.report.message;
+    records.push_back(std::move(record));
+  }
+  return records;
+}
+
 absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
                                          const MlsMap& local_map,
                                          StorageReader& reader,
@@ -103,44 +149,17 @@ absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
   }
   const Pose guess = Guess(scan);
   placement.T_map_scan = guess;
-  std::vector<std::size_t> neighbours = SelectNeighbours(poses_, guess);
-  std::vector<Features> held;
-  std::vector<PlacedScan> placed;
-  std::vector<std::size_t> used;
-  for (const std::size_t i : neighbours) {
-    // A scan whose data are damaged is no reason to refuse this one.
-    absl::StatusOr<Features> features = FeaturesOf(scans_[i].number, reader, source);
-    if (absl::IsDataLoss(features.status())) continue;
-    STRATA_RETURN_IF_ERROR(features.status());
-    held.push_back(*std::move(features));
-    placed.push_back({held.back().get(), poses_[i]});
-    used.push_back(i);
-  }
-  if (placed.empty()) {
+  STRATA_ASSIGN_OR_RETURN(const Neighbourhood around, NeighboursOf(guess, reader, source));
+  if (around.placed.empty()) {
     placement.report.message = "no scan around to align to";
     return placement;
   }
-  const RegistrationTarget target(placed, TargetOptions{.centre = guess.translation()});
+  const RegistrationTarget target(around.placed, TargetOptions{.centre = guess.translation()});
   const RegistrationResult match = RegisterScan(*own, target, guess);
-  placement.report.aligned = Accepted(match.termination);
-  placement.report.message = std::string(ToString(match.termination));
-  placement.report.overlap = match.overlap;
-  placement.report.rms_m = match.rms_m;
-  placement.report.iterations = static_cast<std::uint32_t>(match.iterations);
+  placement.report = ReportOf(match);
   if (!placement.report.aligned) return placement;
   placement.T_map_scan = Normalized(match.T_target_source);
-  NearestFirst(poses_, placement.T_map_scan, used);
-  used.resize(std::min(used.size(), kMaxConstraints));
-  for (const std::size_t i : used) {
-    ConstraintRecord record;
-    record.scan_i = scans_[i].number;
-    record.scan_j = scan.number;
-    record.constraint.T_i_j = Normalized(poses_[i].inverse() * placement.T_map_scan);
-    record.constraint.information = match.information / static_cast<double>(used.size());
-    record.constraint.origin = ConstraintOrigin::kIngest;
-    record.constraint.note = placement.report.message;
-    placement.constraints.push_back(std::move(record));
-  }
+  placement.constraints = ConstraintsOf(scan.number, placement, match.information, around.indices);
   return placement;
 }
 

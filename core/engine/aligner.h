@@ -15,6 +15,7 @@
 #include "core/engine/lru_cache.h"
 #include "core/engine/scan_source.h"
 #include "core/mls/mls_map.h"
+#include "core/registration/registration_target.h"
 #include "core/registration/scan_features.h"
 #include "core/storage/storage.h"
 #include "core/world/scan.h"
@@ -53,9 +54,23 @@ class Aligner {
     Pose T_map_scan_uploaded;
   };
   using Features = std::shared_ptr<const ScanFeatures>;
+  // The scans to align to.
+  struct Neighbourhood {
+    std::vector<Features> held;  // keeps alive what `placed` points to
+    std::vector<PlacedScan> placed;
+    std::vector<std::size_t> indices;  // into scans_
+  };
 
   Pose Guess(const ScanRecord& scan) const;
   absl::StatusOr<Features> FeaturesOf(ScanNumber number, StorageReader& reader, ScanSource& source);
+  absl::StatusOr<Neighbourhood> NeighboursOf(const Pose& guess,
+                                             StorageReader& reader,
+                                             ScanSource& source);
+  // What a match to `partners` says about the scan, as constraints to the nearest of them.
+  std::vector<ConstraintRecord> ConstraintsOf(ScanNumber number,
+                                              const Placement& placement,
+                                              const Matrix6d& information,
+                                              std::vector<std::size_t> partners) const;
   Features Keep(ScanNumber number, const MlsMap& local_map);
 
   // By commit order.

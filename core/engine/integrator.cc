@@ -15,6 +15,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/local_map_codec.h"
+#include "core/engine/scan_losses.h"
 #include "core/engine/scan_source.h"
 
 namespace strata {
@@ -111,11 +112,16 @@ absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
                                        Batch& batch) {
   Integrated done;
   done.scan = scan;
+  const MapParameters parameters = core_.info().parameters;
+  const SensorModel sensor = scan.header.sensor.value_or(parameters.sensor);
   STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
+  STRATA_RETURN_IF_ERROR(CheckContributes(local_map, source.dropped(), scan.header, sensor));
   STRATA_ASSIGN_OR_RETURN(done.placement, aligner_.Place(scan, local_map, reader, source));
-  if (!core_.info().parameters.keep_points) done.local_map = EncodeLocalMap(local_map);
+  if (!parameters.keep_points) done.local_map = EncodeLocalMap(local_map);
   STRATA_ASSIGN_OR_RETURN(const MlsMap contribution,
                           source.Contribution(scan, done.placement.T_map_scan));
+  STRATA_RETURN_IF_ERROR(CheckContributes(contribution, source.dropped(), scan.header, sensor));
+  done.losses = DescribeLosses(source.dropped(), scan.header, sensor);
   const std::uint64_t version = core_.snapshots().current().tile_version;
   for (const MlsTile& tile : contribution.tiles) {
     if (tile.patches.empty()) continue;
@@ -187,7 +193,7 @@ absl::Status Integrator::CommitBatch(const Batch& batch, const TileChange& chang
       if (!done.local_map.empty() || !core_.info().parameters.keep_points) {
         STRATA_RETURN_IF_ERROR(writer.DropPoints(number, done.local_map));
       }
-      STRATA_RETURN_IF_ERROR(writer.SetScanState(number, ScanState::kIntegrated, ""));
+      STRATA_RETURN_IF_ERROR(writer.SetScanState(number, ScanState::kIntegrated, done.losses));
     }
     return absl::OkStatus();
   });

@@ -59,6 +59,7 @@ class Integrator {
     Placement placement;
     std::vector<TileKey> tiles;
     std::string local_map;  // encoded; only if the points go
+    std::string losses;     // which points are not in it
   };
   struct Failed {
     ScanNumber number;

@@ -11,6 +11,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/integrator.h"
+#include "core/engine/scan_losses.h"
 #include "core/engine/scan_source.h"
 
 namespace strata {
@@ -63,6 +64,8 @@ absl::Status Integrator::SetPose(const ScanId& id, const Pose& T_map_scan) {
   const MapParameters parameters = core_.info().parameters;
   ScanSource source(*reader, parameters);
   STRATA_ASSIGN_OR_RETURN(const MlsMap contribution, source.Contribution(scan, T_map_scan));
+  STRATA_RETURN_IF_ERROR(CheckContributes(
+      contribution, source.dropped(), scan.header, scan.header.sensor.value_or(parameters.sensor)));
   STRATA_ASSIGN_OR_RETURN(const std::vector<TileKey> old, reader->TilesOfScan(scan.number));
   absl::btree_set<TileKey> keys(old.begin(), old.end());
   std::vector<TileKey> tiles;

@@ -11,7 +11,9 @@
 namespace strata {
 
 // Hash over header and points in order; does not depend on how the points were split into pieces.
-// NaN must be the quiet one (what core/codec writes).
+// NaN must be the quiet one (what core/codec writes). The pose counts in steps of 1e-9 (metres, and
+// of its unit quaternion): on its way over a wire it becomes a quaternion and back, which changes
+// its last bits.
 class ScanHasher {
  public:
   void Add(const PointCloud& piece);

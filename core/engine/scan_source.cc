@@ -60,9 +60,13 @@ absl::StatusOr<MlsMap> ScanSource::Build(const ScanRecord& scan, const Pose& T_m
   const SensorModel sensor = scan.header.sensor.value_or(parameters_.sensor);
   MlsMap map;
   map.parameters = parameters_.mls;
+  dropped_ = DroppedPoints();
   STRATA_RETURN_IF_ERROR(ForEachBlock(scan, [&](const PointCloud& block) -> absl::Status {
     STRATA_ASSIGN_OR_RETURN(MlsBuildResult built,
                             BuildMlsMap(block, T_map_scan, sensor, parameters_.mls, scratch_));
+    dropped_.not_finite += built.dropped.not_finite;
+    dropped_.out_of_range += built.dropped.out_of_range;
+    dropped_.outside_map += built.dropped.outside_map;
     if (map.tiles.empty()) {
       map = std::move(built.map);
     } else {

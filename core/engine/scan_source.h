@@ -12,6 +12,7 @@
 #include "core/cloud/point_cloud.h"
 #include "core/geometry/pose.h"
 #include "core/mls/build.h"
+#include "core/mls/measurement.h"
 #include "core/mls/mls_map.h"
 #include "core/storage/storage.h"
 #include "core/world/map_info.h"
@@ -32,6 +33,9 @@ class ScanSource {
   // parameters, before and after points were dropped.
   absl::StatusOr<MlsMap> Contribution(const ScanRecord& scan, const Pose& T_map_scan);
 
+  // What the last map built from points had to leave out of them.
+  const DroppedPoints& dropped() const { return dropped_; }
+
   // The points in blocks, in order.
   absl::Status ForEachBlock(const ScanRecord& scan,
                             absl::FunctionRef<absl::Status(const PointCloud&)> body);
@@ -42,6 +46,7 @@ class ScanSource {
   StorageReader& reader_;
   const MapParameters& parameters_;
   MlsScratch scratch_;
+  DroppedPoints dropped_;
   // The last scan that fitted one block: its local map and its contribution read it twice.
   ScanNumber held_scan_ = 0;
   PointCloud held_;

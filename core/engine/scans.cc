@@ -29,11 +29,30 @@ absl::Status NoSuchScan(const ScanId& id) {
 
 absl::Status CheckId(const ScanId& id) { return ValidateName("trajectory name", id.trajectory); }
 
+// Reads one state of the store and returns once its tiles are what readers get: who is told that a
+// scan is integrated finds it in the tiles.
+absl::Status ReadVisible(Map& map,
+                         absl::FunctionRef<absl::Status(StorageReader&, const MapClock&)> body) {
+  MapClock clock;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map.core().Reader());
+    STRATA_RETURN_IF_ERROR(reader->Snapshot([&]() -> absl::Status {
+      STRATA_ASSIGN_OR_RETURN(clock, reader->GetClock());
+      return body(*reader, clock);
+    }));
+  }
+  map.core().snapshots().AwaitPublished(clock.tile_version);
+  return absl::OkStatus();
+}
+
 absl::StatusOr<PosedScan> FindScan(Map& map, const ScanId& id) {
   STRATA_RETURN_IF_ERROR(CheckId(id));
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map.core().Reader());
-  STRATA_ASSIGN_OR_RETURN(std::optional<PosedScan> scan,
-                          reader->FindScan(id, map.core().snapshots().current().epoch));
+  std::optional<PosedScan> scan;
+  STRATA_RETURN_IF_ERROR(
+      ReadVisible(map, [&](StorageReader& reader, const MapClock& clock) -> absl::Status {
+        STRATA_ASSIGN_OR_RETURN(scan, reader.FindScan(id, clock.epoch));
+        return absl::OkStatus();
+      }));
   if (!scan.has_value()) return NoSuchScan(id);
   return *std::move(scan);
 }
@@ -128,10 +147,11 @@ absl::Status EngineScans::List(const api::Call& call,
   while (true) {
     STRATA_RETURN_IF_ERROR(call.stop.status());
     std::vector<PosedScan> page;
-    {
-      STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
-      STRATA_ASSIGN_OR_RETURN(page, reader->ListScans(query, pin.view().epoch));
-    }
+    STRATA_RETURN_IF_ERROR(
+        ReadVisible(*found, [&](StorageReader& reader, const MapClock&) -> absl::Status {
+          STRATA_ASSIGN_OR_RETURN(page, reader.ListScans(query, pin.view().epoch));
+          return absl::OkStatus();
+        }));
     for (const PosedScan& scan : page) STRATA_RETURN_IF_ERROR(sink(ToScanInfo(scan)));
     if (page.size() < query.limit) return absl::OkStatus();
     query.after = page.back().scan.number;

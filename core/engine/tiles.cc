@@ -35,6 +35,26 @@ bool Contains(const api::TileArea& area, const TileKey& key) {
          key.y >= area.y_min && key.y < area.y_max;
 }
 
+using Kind = api::TileUpdate::Kind;
+using HeldVersions = std::map<TileKey, std::uint64_t>;
+
+absl::StatusOr<std::vector<SurfaceTileRow>> ListRows(Map& map,
+                                                     const api::TileArea& area,
+                                                     const MapView& view) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map.core().Reader());
+  return reader->ListSurfaceTiles(ToRange(area), view.tile_version);
+}
+
+// What the tile is to one who holds `held`; nullopt if nothing new. Takes it out of `held`, where
+// at last those remain that are gone.
+std::optional<Kind> TakeKind(const SurfaceTileRow& row, HeldVersions& held) {
+  const auto known = held.find(row.key);
+  if (known == held.end()) return Kind::kNew;
+  const bool same = known->second == row.version;
+  held.erase(known);
+  return same ? std::nullopt : std::optional(Kind::kChanged);
+}
+
 // nullopt where there is nothing.
 absl::StatusOr<std::optional<api::EncodedTile>> ReadTile(Map& map,
                                                          const TileKey& key,
@@ -76,9 +96,8 @@ absl::StatusOr<std::vector<api::TileInfo>> EngineTiles::List(const api::Call& ca
   STRATA_RETURN_IF_ERROR(CheckLevel(area.level));
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
   const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
   STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> rows,
-                          reader->ListSurfaceTiles(ToRange(area), pin.view().tile_version));
+                          ListRows(*found, area, pin.view()));
   std::vector<api::TileInfo> infos;
   infos.reserve(rows.size());
   for (const SurfaceTileRow& row : rows) {
@@ -92,35 +111,27 @@ absl::Status EngineTiles::Fetch(const api::Call& call,
                                 const api::TileArea& area,
                                 const std::vector<api::HeldTile>& held,
                                 absl::FunctionRef<absl::Status(const api::TileUpdate&)> sink) {
-  using Kind = api::TileUpdate::Kind;
   STRATA_RETURN_IF_ERROR(CheckLevel(area.level));
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
   const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
-  std::map<TileKey, std::uint64_t> versions;
+  HeldVersions versions;
   for (const api::HeldTile& tile : held) {
     if (Contains(area, tile.key)) versions[tile.key] = tile.version;
   }
-  std::vector<SurfaceTileRow> rows;
-  {
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
-    STRATA_ASSIGN_OR_RETURN(rows, reader->ListSurfaceTiles(ToRange(area), pin.view().tile_version));
-  }
+  STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> rows,
+                          ListRows(*found, area, pin.view()));
   absl::Status damaged;
   for (const SurfaceTileRow& row : rows) {
     STRATA_RETURN_IF_ERROR(call.stop.status());
-    const auto known = versions.find(row.key);
-    const bool is_new = known == versions.end();
-    const bool same = !is_new && known->second == row.version;
-    if (!is_new) versions.erase(known);
-    if (same) continue;
+    const std::optional<Kind> kind = TakeKind(row, versions);
+    if (!kind.has_value()) continue;
     absl::StatusOr<std::optional<api::EncodedTile>> tile = ReadTile(*found, row.key, pin.view());
     if (absl::IsDataLoss(tile.status())) {
       damaged.Update(tile.status());  // the others are served first
       continue;
     }
     STRATA_RETURN_IF_ERROR(tile.status());
-    if (!tile->has_value()) continue;
-    STRATA_RETURN_IF_ERROR(sink({is_new ? Kind::kNew : Kind::kChanged, **std::move(tile)}));
+    if (tile->has_value()) STRATA_RETURN_IF_ERROR(sink({*kind, **std::move(tile)}));
   }
   for (const auto& [key, version] : versions) {
     STRATA_RETURN_IF_ERROR(call.stop.status());

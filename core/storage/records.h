@@ -39,7 +39,7 @@ struct ScanRecord {
   std::uint64_t point_bytes = 0;
   Eigen::AlignedBox3f box_scan;  // of the finite points in the scan frame; empty without any
   std::string content_hash;
-  std::string message;  // why it failed
+  std::string message;  // why it failed, or which points are not in the map
 };
 
 enum class PoseOrigin : std::uint8_t {  // stored

@@ -81,7 +81,7 @@ struct ScanInfo {
   std::uint64_t commit_sequence = 0;   // order of acknowledgement
   std::uint64_t point_bytes = 0;       // as stored
   std::string content_hash;            // of the uploaded points and header
-  std::string message;                 // why it failed
+  std::string message;                 // why it failed, or which points are not in the map
   AlignmentReport alignment;
 };
 

@@ -14,13 +14,13 @@ std::optional<std::filesystem::path> FindData(const std::string& folder);
 
 }  // namespace strata::testing
 
-// Skips the test with a clear message where the data folder is absent; otherwise `path` is its
-// place.
-#define STRATA_REQUIRE_DATA(path, folder)                                                  \
-  const auto path##_found = ::strata::testing::FindData(folder);                           \
-  if (!path##_found.has_value()) {                                                         \
+// Skips the test with a clear message where the data folder is absent; otherwise declares
+// `variable`, its place.
+#define STRATA_REQUIRE_DATA(variable, folder)                                              \
+  const auto variable##_found = ::strata::testing::FindData(folder);                       \
+  if (!variable##_found.has_value()) {                                                     \
     GTEST_SKIP() << "no recorded data: set STRATA_DATA to a folder that holds " << folder; \
   }                                                                                        \
-  const std::filesystem::path& path = *path##_found
+  const std::filesystem::path& variable = *variable##_found
 
 #endif  // STRATA_TESTS_SUPPORT_DATA_DIR_H_

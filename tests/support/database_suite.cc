@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <ostream>
 #include <vector>
 
 #include "absl/time/clock.h"
@@ -85,6 +86,8 @@ void PutFloor(api::Database& db, const ScanId& id, double x_m = 0.0) {
 }
 
 }  // namespace
+
+void PrintTo(const DatabaseMaker& maker, std::ostream* out) { *out << maker.name; }
 
 std::string DatabaseMakerName(const ::testing::TestParamInfo<DatabaseMaker>& info) {
   return info.param.name;
@@ -427,6 +430,48 @@ TEST_P(DatabaseSuite, SurfacesAndPathsOnALevelFloor) {
   query.profile.radius_m = -1.0;
   EXPECT_THAT(db().planning().PlanPath({}, kMap, query),
               StatusIs(Code::kInvalidArgument, HasSubstr("radius_m")));
+}
+
+TEST_P(DatabaseSuite, AScanSeenAsIntegratedIsInTheTiles) {
+  const PointCloud floor = LevelFloor(1.0);
+  for (std::uint64_t sequence = 1; sequence <= 30; ++sequence) {
+    const ScanId id{"run", sequence};
+    const double x_m = 3.0 * static_cast<double>(sequence);
+    STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader(id, floor, x_m), floor));
+    api::ScanFilter integrated;
+    integrated.state = ScanState::kIntegrated;
+    const auto seen = [&]() -> bool {
+      if (sequence % 2 == 0) return Listed(db(), integrated).size() == sequence;
+      const absl::StatusOr<ScanInfo> scan = db().scans().Get({}, kMap, id);
+      STRATA_EXPECT_OK(scan);
+      return !scan.ok() || scan->state == ScanState::kIntegrated;
+    };
+    while (!seen()) {
+    }
+    STRATA_ASSERT_OK_AND_ASSIGN(
+        const auto columns, db().planning().SampleSurfaces({}, kMap, {Eigen::Vector2d(x_m, 0.0)}));
+    ASSERT_THAT(columns[0].surfaces, SizeIs(1)) << id.ToString();
+  }
+}
+
+TEST_P(DatabaseSuite, PointsThatDoNotReachTheMapAreCounted) {
+  PointCloud floor = LevelFloor(2.0);
+  for (std::size_t i = 0; i < 7; ++i) floor.points[i].x() = 2000.0F;
+  STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", 1}, floor), floor));
+  for (Eigen::Vector3f& point : floor.points) point.x() = -3000.0F;
+  STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", 2}, floor), floor));
+  AwaitIntegration(db(), kMap);
+  STRATA_ASSERT_OK_AND_ASSIGN(ScanInfo scan, db().scans().Get({}, kMap, {"run", 1}));
+  EXPECT_EQ(scan.state, ScanState::kIntegrated);
+  EXPECT_EQ(scan.message,
+            "7 of 1600 points left out: 7 not within range [0, 1000] m of the sensor at (0, 0, 1)");
+  STRATA_ASSERT_OK_AND_ASSIGN(scan, db().scans().Get({}, kMap, {"run", 2}));
+  EXPECT_EQ(scan.state, ScanState::kFailed);
+  EXPECT_EQ(scan.message,
+            "scan run/2: 0 of 1600 points within range [0, 1000] m of the sensor at (0, 0, 1); set "
+            "the sensor origin or the sensor's max range");
+  STRATA_ASSERT_OK_AND_ASSIGN(const MapStats stats, db().maps().Stats({}, kMap));
+  EXPECT_EQ(stats.scans_failed, 1U);
 }
 
 TEST_P(DatabaseSuite, AStoppedCallSaysSo) {

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <ostream>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -25,6 +26,8 @@ struct DatabaseMaker {
   std::function<std::unique_ptr<api::Database>(const std::filesystem::path&)> make;
 };
 
+// What gtest prints of the parameter; the default, its bytes, differs from run to run.
+void PrintTo(const DatabaseMaker& maker, std::ostream* out);
 std::string DatabaseMakerName(const ::testing::TestParamInfo<DatabaseMaker>& info);
 
 // A database with the empty map "world".

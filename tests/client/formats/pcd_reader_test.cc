@@ -84,12 +84,49 @@ TEST(PcdReaderTest, FarDoublesLoseNothing) {
   STRATA_ASSERT_OK_AND_ASSIGN(
       const PointCloud cloud,
       ReadPcd(Header("X Y Z", "8 8 8", "F F F", "2", "POINTS 2\nDATA binary\n") + Bytes(utm)));
-  EXPECT_EQ(cloud.origin, Eigen::Vector3d(512300, 5412300, 0));
+  EXPECT_EQ(cloud.origin, Eigen::Vector3d(512346, 5412345, 251));
   for (int i = 0; i < 2; ++i) {
     const Eigen::Vector3d p = cloud.origin + cloud.points[i].cast<double>();
     for (int k = 0; k < 3; ++k) EXPECT_NEAR(p[k], utm[3 * i + k], 1e-5);
   }
   EXPECT_TRUE(cloud.sensor_origin.isZero());
+}
+
+// Four corners of a square of `size_m`, its centre at `centre`; where `viewpoint` says the sensor
+// was.
+PointCloud ReadSquare(const Eigen::Vector3d& centre, float size_m, const std::string& viewpoint) {
+  std::vector<float> values;
+  for (const float x : {-0.5F, 0.5F}) {
+    for (const float y : {-0.5F, 0.5F}) {
+      const Eigen::Vector3f p = centre.cast<float>() + size_m * Eigen::Vector3f(x, y, 0);
+      values.insert(values.end(), p.data(), p.data() + 3);
+    }
+  }
+  const auto cloud =
+      ReadPcd(Header("x y z",
+                     "4 4 4",
+                     "F F F",
+                     "4",
+                     "VIEWPOINT " + viewpoint + " 1 0 0 0\nPOINTS 4\nDATA binary\n") +
+              Bytes(values));
+  STRATA_EXPECT_OK(cloud);
+  return cloud.value_or(PointCloud());
+}
+
+TEST(PcdReaderTest, WhereNoSensorCanHaveStoodTheCentreIsTheOrigin) {
+  const Eigen::Vector3d far(-890.3, -943.0, 27.4);
+  const PointCloud cloud = ReadSquare(far, 30.0F, "0 0 0");
+  EXPECT_EQ(cloud.origin, Eigen::Vector3d(-890, -943, 27));
+  EXPECT_TRUE(cloud.sensor_origin.isZero());
+  EXPECT_TRUE((cloud.origin + cloud.points[3].cast<double>())
+                  .isApprox(far + Eigen::Vector3d(15, 15, 0), 1e-6));
+  // A sensor at zero may see what is large or near; a sensor that is named stood where it says.
+  EXPECT_TRUE(ReadSquare(far, 1500.0F, "0 0 0").origin.isZero());
+  EXPECT_TRUE(ReadSquare({60, 60, 0}, 0.5F, "0 0 0").origin.isZero());
+  EXPECT_EQ(ReadSquare({0, 120, 0}, 4.0F, "0 0 0").origin, Eigen::Vector3d(0, 120, 0));
+  const PointCloud named = ReadSquare({0, 120, 0}, 4.0F, "0 1 0");
+  EXPECT_TRUE(named.origin.isZero());
+  EXPECT_EQ(named.sensor_origin, Eigen::Vector3f(0, 1, 0));
 }
 
 TEST(PcdReaderTest, CompressedFieldsComeOneAfterTheOther) {

@@ -74,9 +74,9 @@ TEST_F(PoseReaderTest, ErrorsNameFileLineAndWhatWasExpected) {
 }
 
 TEST(RecordedPosesTest, OfficialKittiPosesInBothFormsAreOneTrajectory) {
-  STRATA_REQUIRE_DATA(path, "kitti00_gt");
-  STRATA_ASSERT_OK_AND_ASSIGN(const PoseList cam, ReadPoses(path / "poses_00_cam0.txt"));
-  STRATA_ASSERT_OK_AND_ASSIGN(const PoseList velo, ReadPoses(path / "poses_00_velo.txt"));
+  STRATA_REQUIRE_DATA(folder, "kitti00_gt");
+  STRATA_ASSERT_OK_AND_ASSIGN(const PoseList cam, ReadPoses(folder / "poses_00_cam0.txt"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const PoseList velo, ReadPoses(folder / "poses_00_velo.txt"));
   EXPECT_EQ(cam.format, PoseFormat::kKitti);
   EXPECT_EQ(velo.format, PoseFormat::kIndexTum);
   ASSERT_EQ(cam.poses.size(), 4541U);

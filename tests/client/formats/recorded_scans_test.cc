@@ -98,6 +98,17 @@ TEST(RecordedScansTest, UtmFloatsKeepWhatTheyHave) {
   }
 }
 
+TEST(RecordedScansTest, AStreetInWorldCoordinatesLiesAroundItsOrigin) {
+  STRATA_REQUIRE_DATA(path, "lille_facade");
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, ReadScan(path / "Lille_street_small.ply"));
+  EXPECT_EQ(cloud.size(), 170'610U);
+  EXPECT_NEAR(cloud.origin.x(), -890.0, 30.0);
+  EXPECT_NEAR(cloud.origin.y(), -943.0, 30.0);
+  for (const Eigen::Vector3f& point : cloud.points) {
+    ASSERT_LT((point - cloud.sensor_origin).norm(), 30.0F);
+  }
+}
+
 TEST(RecordedScansTest, EveryScanOfEverySetReads) {
   STRATA_REQUIRE_DATA(path, "");
   for (const char* folder : {"nclt_campus_loop/scans",

@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include <gmock/gmock.h>
@@ -53,6 +54,28 @@ absl::StatusOr<int> Sum(int a, int b) {
 TEST(StatusTest, AssignOrReturnMovesTheValueOrReturnsTheStatus) {
   EXPECT_THAT(Sum(2, 3), IsOkAndHolds(5));
   EXPECT_THAT(Sum(2, -3), StatusIs(absl::StatusCode::kInvalidArgument, "negative"));
+}
+
+absl::Status Call(absl::FunctionRef<absl::Status()> call) { return call(); }
+
+// Compiles only as long as the macros' variables do not shadow each other (-Wshadow).
+absl::Status PassNested(int value, int& reached) {
+  STRATA_RETURN_IF_ERROR(Call([&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(Call([&]() -> absl::Status {
+      STRATA_ASSIGN_OR_RETURN(const int sum, Sum(value, 1));
+      reached = sum;
+      return absl::OkStatus();
+    }));
+    return absl::OkStatus();
+  }));
+  return absl::OkStatus();
+}
+
+TEST(StatusTest, MacrosNestInLambdas) {
+  int reached = 0;
+  STRATA_EXPECT_OK(PassNested(2, reached));
+  EXPECT_EQ(reached, 3);
+  EXPECT_THAT(PassNested(-2, reached), StatusIs(absl::StatusCode::kInvalidArgument, "negative"));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <map>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -14,7 +15,9 @@
 
 #include "core/codec/surface_tile_codec.h"
 #include "tests/core/engine/engine_fixture.h"
+#include "tests/support/simulator.h"
 #include "tests/support/status_matchers.h"
+#include "tests/support/worlds.h"
 
 namespace strata::testing {
 namespace {
@@ -389,6 +392,96 @@ TEST_F(IntegrationTest, JobsAreCheckedListedAndSurvive) {
   EXPECT_EQ(all[1].state, JobState::kSucceeded);
   EXPECT_THAT(db().jobs().Get({}, kMapName, 99),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("99")));
+}
+
+TEST_F(IntegrationTest, AScanThatLeavesTheMapIsNotLostInSilence) {
+  MakeMap();
+  Pose high = Pose::Identity();
+  high.translation().z() = 3000.0;
+  const auto beyond = HasSubstr("0 of 3000 points within what a map can hold");
+  const ScanId lost = UploadRoom(1, high);
+  const ScanId room = UploadRoom(2, PoseAt(0, 0));
+  const std::string digest = Digest();
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo scan, db().scans().Get({}, kMapName, lost));
+  EXPECT_EQ(scan.state, ScanState::kFailed);
+  EXPECT_THAT(scan.message, beyond);
+  EXPECT_THAT(db().posegraph().SetPose({}, kMapName, room, high),
+              StatusIs(absl::StatusCode::kInvalidArgument, beyond));
+  EXPECT_EQ(Digest(), digest);
+  EXPECT_EQ(RunJob(db(), "verify").state, JobState::kSucceeded);
+}
+
+TEST_F(IntegrationTest, ACancelledRebuildChangesNothing) {
+  MakeMap();
+  UploadRooms(60);
+  const std::string digest = Digest();
+  const auto tiles = AllTiles(db());
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto listed, db().tiles().List({}, kMapName, {}));
+  JobInfo last;
+  // A job that ends before it can be cancelled is no failure, so there are several tries.
+  for (int attempt = 0; attempt < 20 && last.state != JobState::kCancelled; ++attempt) {
+    STRATA_ASSERT_OK_AND_ASSIGN(last, db().jobs().Start({}, kMapName, "rebuild", {}));
+    while (last.state == JobState::kQueued) {
+      STRATA_ASSERT_OK_AND_ASSIGN(last, db().jobs().Get({}, kMapName, last.id));
+    }
+    STRATA_ASSERT_OK(db().jobs().Cancel({}, kMapName, last.id));
+    STRATA_ASSERT_OK(db().jobs().Watch({}, kMapName, last.id, [&last](const JobInfo& info) {
+      last = info;
+      return absl::OkStatus();
+    }));
+  }
+  EXPECT_EQ(last.state, JobState::kCancelled);
+  EXPECT_LT(last.progress, 1.0);
+  EXPECT_EQ(Digest(), digest);
+  EXPECT_EQ(AllTiles(db()), tiles);
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto now, db().tiles().List({}, kMapName, {}));
+  ASSERT_EQ(now.size(), listed.size());
+  for (std::size_t i = 0; i < now.size(); ++i) EXPECT_EQ(now[i].version, listed[i].version);
+  EXPECT_EQ(RunJob(db(), "verify").state, JobState::kSucceeded);
+}
+
+TEST_F(IntegrationTest, PathsOverAndUnderABridge) {
+  MakeMap(MapParameters());
+  const World world = BridgeWorld();
+  for (const Robot& robot : world.robots) {
+    const std::vector<Pose> poses = Drive(world.scene, robot.waypoints, 2.0, 1.2);
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      const PointCloud cloud = SimulateScan(world.scene, {}, poses[i], i + 1);
+      STRATA_ASSERT_OK(Upload(db(), HeaderOf({robot.name, i + 1}, cloud, poses[i]), cloud, 40'000));
+    }
+  }
+  EXPECT_EQ(WaitIntegrated(db()).scans_failed, 0U);
+  const auto plan = [&](const char* from, const char* to) {
+    const Eigen::Vector3d a = world.places.at(from);
+    const Eigen::Vector3d b = world.places.at(to);
+    PlanQuery query;
+    query.from = {.x_m = a.x(), .y_m = a.y(), .z_m = a.z()};
+    query.to = {.x_m = b.x(), .y_m = b.y(), .z_m = b.z()};
+    const auto found = db().planning().PlanPath({}, kMapName, query);
+    STRATA_EXPECT_OK(found);
+    return found.value_or(PlanResult());
+  };
+  const auto heights = [](const PlanResult& result) {
+    std::pair<double, double> range(1e9, -1e9);
+    for (const Eigen::Vector3d& waypoint : result.waypoints) {
+      range.first = std::min(range.first, waypoint.z());
+      range.second = std::max(range.second, waypoint.z());
+    }
+    return range;
+  };
+  const PlanResult over = plan("west", "east");
+  ASSERT_EQ(over.reason, PlanReason::kFound) << over.message;
+  EXPECT_NEAR(heights(over).second, 3.4, 0.15);
+  const PlanResult under = plan("south", "north");
+  ASSERT_EQ(under.reason, PlanReason::kFound) << under.message;
+  EXPECT_LT(heights(under).second, 0.3);
+  EXPECT_GT(heights(under).first, -0.3);
+  const double straight_m = (world.places.at("north") - world.places.at("south")).norm();
+  EXPECT_LT(under.length_m, 1.1 * straight_m);
+  // From below onto the deck the way is round by a ramp.
+  const PlanResult up = plan("under", "deck");
+  ASSERT_EQ(up.reason, PlanReason::kFound) << up.message;
+  EXPECT_GT(up.length_m, 20.0);
 }
 
 TEST_F(IntegrationTest, MapsAreMadeListedAndDeleted) {

@@ -1,6 +1,8 @@
 // Taking scans in: durable, once, and refused with a reason.
 #include <limits>
 #include <memory>
+#include <numbers>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -75,6 +77,36 @@ TEST_F(UploadTest, OtherContentUnderTheSameIdIsRefused) {
   cloud.points[250].z() -= 0.5F;
   EXPECT_THAT(Upload(db(), moved, cloud),
               StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("run/1")));
+}
+
+TEST_F(UploadTest, ThePosesLastBitsAreNoOtherContent) {
+  const PointCloud cloud = MakeRoom(1, 500);
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> angle(-3.2, 3.2);
+  std::vector<Eigen::Quaterniond> rotations = {
+      Eigen::Quaterniond::Identity(),
+      Eigen::Quaterniond(0, 0, 0, 1),
+      Eigen::Quaterniond(0, 1, 0, 0),
+      Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d(0.6, 0.0, -0.8)))};
+  for (int i = 0; i < 20; ++i) {
+    rotations.emplace_back(Eigen::AngleAxisd(angle(random), Eigen::Vector3d::UnitZ()) *
+                           Eigen::AngleAxisd(angle(random), Eigen::Vector3d::UnitX()));
+  }
+  for (std::size_t i = 0; i < rotations.size(); ++i) {
+    ScanHeader header = HeaderOf({"run", i}, cloud, MakePose(rotations[i], {512'345.67, -7.1, 3}));
+    STRATA_ASSERT_OK(Upload(db(), header, cloud));
+    // As a wire does it, and as one whose quaternions have the other sign.
+    for (const double sign : {1.0, -1.0}) {
+      Eigen::Quaterniond q(header.T_map_scan.linear());
+      q.coeffs() *= sign;
+      header.T_map_scan.linear() = q.normalized().toRotationMatrix();
+      STRATA_ASSERT_OK_AND_ASSIGN(const ScanAck again, Upload(db(), header, cloud));
+      EXPECT_TRUE(again.already_present) << i;
+    }
+    header.T_map_scan.rotate(Eigen::AngleAxisd(1e-7, Eigen::Vector3d(1, 2, 2) / 3.0));
+    EXPECT_THAT(Upload(db(), header, cloud),
+                StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("run/")));
+  }
 }
 
 TEST_F(UploadTest, BadPointsAreNamed) {
