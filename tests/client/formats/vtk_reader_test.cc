@@ -28,9 +28,9 @@ TEST(VtkReaderTest, AsciiPointsMayBreakTheirLinesAnywhere) {
 TEST(VtkReaderTest, BinaryPointsAreBigEndian) {
   STRATA_ASSERT_OK_AND_ASSIGN(
       const PointCloud cloud,
-      ReadVtk(std::string(kStart) + "BINARY\nDATASET POLYDATA\nPOINTS 1 short\n" +
-              std::string("\0\1\377\377\1\0\n", 7)));
-  EXPECT_THAT(cloud.points, ElementsAre(Eigen::Vector3f(1, -1, 256)));
+      ReadVtk(std::string(kStart) + "BINARY\nDATASET POLYDATA\nPOINTS 2 short\n" +
+              std::string("\1\0\377\377\0\1\377\0\377\377\0\1\n", 13)));
+  EXPECT_THAT(cloud.points, ElementsAre(Eigen::Vector3f(256, -1, 1), Eigen::Vector3f(-256, -1, 1)));
 }
 
 TEST(VtkReaderTest, ErrorsNameTheLineAndWhatWasExpected) {
