@@ -28,8 +28,7 @@ namespace strata {
 struct NeighbourPolicy {
   // Scans whose origins are farther than this from the guess are no neighbours [m]; in (0, 1000].
   double radius_m = 25.0;
-  // At most so many; in [1, 1000]. 8 drift a little more, 25 to 60 no less; each
-  // costs 1 to 2 ms.
+  // At most so many; in [1, 1000]. 8 drift a little more, 25 to 60 no less.
   int max_scans = 15;
 
   absl::Status Validate() const;
