@@ -70,7 +70,7 @@ TEST(ColumnGridTest, AnswersHoldWithinTheirSlack) {
       slack_left += static_cast<int>(match.slack_m > 0.01F);
       const Eigen::Vector3f direction =
           Eigen::Vector3f(turn(random), turn(random), turn(random)).normalized();
-      const Eigen::Vector3f q = p + (match.slack_m - 1e-4F) * direction;
+      const Eigen::Vector3f q = p + std::max(match.slack_m - 1e-4F, 0.0F) * direction;
       const std::uint32_t nearest = grid.Nearest(q, reach);
       if (nearest == ColumnGrid::kNone) {
         EXPECT_TRUE(match.index == ColumnGrid::kNone ||
