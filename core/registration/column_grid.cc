@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -21,7 +23,6 @@ constexpr std::uint32_t kLongRun = 24;
 struct Candidate {
   float squared_m2;
   std::uint32_t index;
-  bool operator<(const Candidate& other) const { return squared_m2 < other.squared_m2; }
 };
 
 }  // namespace
@@ -69,106 +70,137 @@ void ColumnGrid::SortColumns() {
 }
 
 ColumnGrid::Place ColumnGrid::PlaceOf(const Eigen::Vector3f& p) const {
-  const float x = (p.x() - origin_.x()) / column_size_m_;
-  const float y = (p.y() - origin_.y()) / column_size_m_;
-  const float cx = std::clamp(std::floor(x), 0.0F, static_cast<float>(columns_x_ - 1));
-  const float cy = std::clamp(std::floor(y), 0.0F, static_cast<float>(columns_y_ - 1));
-  const float inside = std::min({x - cx, cx + 1.0F - x, y - cy, cy + 1.0F - y});
-  return {static_cast<int>(cx), static_cast<int>(cy), inside * column_size_m_};
+  Place place;
+  place.x_m = p.x() - origin_.x();
+  place.y_m = p.y() - origin_.y();
+  const float x = place.x_m / column_size_m_;
+  const float y = place.y_m / column_size_m_;
+  place.x = static_cast<int>(std::clamp(x, 0.0F, static_cast<float>(columns_x_ - 1)));
+  place.y = static_cast<int>(std::clamp(y, 0.0F, static_cast<float>(columns_y_ - 1)));
+  const float inside_x = std::min(x - place.x, place.x + 1 - x);
+  const float inside_y = std::min(y - place.y, place.y + 1 - y);
+  place.inside_m = std::min(inside_x, inside_y) * column_size_m_;
+  return place;
 }
 
-template <typename Visit>
-void ColumnGrid::VisitRing(const Place& place, int ring, const Visit& visit) const {
-  const int x0 = std::max(place.x - ring, 0);
-  const int x1 = std::min(place.x + ring, columns_x_ - 1);
-  for (int y = std::max(place.y - ring, 0); y <= std::min(place.y + ring, columns_y_ - 1); ++y) {
-    const std::uint32_t* row = begin_.data() + static_cast<std::size_t>(y) * columns_x_;
-    const bool whole_row = y == place.y - ring || y == place.y + ring;
-    for (int x = x0; x <= x1; ++x) {
-      if (!whole_row && x != place.x - ring && x != place.x + ring) {
-        if (x < place.x + ring) x = std::min(place.x + ring - 1, x1);  // jump over the inside
-        continue;
+float ColumnGrid::GapM(int column, float at_m) const {
+  const float low_m = static_cast<float>(column) * column_size_m_;
+  return std::max({0.0F, low_m - at_m, at_m - (low_m + column_size_m_)});
+}
+
+template <typename Offer>
+void ColumnGrid::VisitRun(std::uint32_t begin,
+                          std::uint32_t end,
+                          const Eigen::Vector3f& p,
+                          const float& bound_m2,
+                          const Offer& offer) const {
+  float highest_z = std::numeric_limits<float>::infinity();
+  if (end - begin >= kLongRun) {
+    const float reach = std::sqrt(bound_m2);
+    const auto below = [](const Eigen::Vector3f& a, float z) { return a.z() < z; };
+    const auto first =
+        std::lower_bound(points_.begin() + begin, points_.begin() + end, p.z() - reach, below);
+    begin = static_cast<std::uint32_t>(first - points_.begin());
+    highest_z = p.z() + reach;
+  }
+  for (; begin < end && points_[begin].z() <= highest_z; ++begin) {
+    const float d = (points_[begin] - p).squaredNorm();
+    if (d < bound_m2) offer(begin, d);
+  }
+}
+
+template <typename Offer>
+void ColumnGrid::VisitNear(const Eigen::Vector3f& p,
+                           const float& bound_m2,
+                           const Offer& offer) const {
+  if (points_.empty()) return;
+  const Place place = PlaceOf(p);
+  if (place.inside_m < 0.0F && place.inside_m * place.inside_m >= bound_m2) return;
+  const int rings = std::max(columns_x_, columns_y_);
+  for (int ring = 0; ring <= rings; ++ring) {
+    // Everything in this ring is at least so far away.
+    const float ring_m = static_cast<float>(ring - 1) * column_size_m_ + place.inside_m;
+    if (ring_m > 0.0F && ring_m * ring_m >= bound_m2) break;
+    const int x0 = std::max(place.x - ring, 0);
+    const int x1 = std::min(place.x + ring, columns_x_ - 1);
+    const int y1 = std::min(place.y + ring, columns_y_ - 1);
+    for (int y = std::max(place.y - ring, 0); y <= y1; ++y) {
+      const float gap_y = GapM(y, place.y_m);
+      if (gap_y * gap_y >= bound_m2) continue;
+      const std::uint32_t* row = begin_.data() + static_cast<std::size_t>(y) * columns_x_;
+      const bool whole_row = std::abs(y - place.y) == ring;
+      for (int x = x0; x <= x1; ++x) {
+        if (!whole_row && std::abs(x - place.x) != ring) {
+          if (place.x + ring > x1) break;
+          x = place.x + ring;  // jump over the inside
+        }
+        if (row[x] == row[x + 1]) continue;
+        const float gap_x = GapM(x, place.x_m);
+        if (gap_x * gap_x + gap_y * gap_y < bound_m2)
+          VisitRun(row[x], row[x + 1], p, bound_m2, offer);
       }
-      if (row[x] != row[x + 1]) visit(row[x], row[x + 1]);
     }
   }
 }
 
 std::uint32_t ColumnGrid::Nearest(const Eigen::Vector3f& p, float max_distance_m) const {
-  if (points_.empty()) return kNone;
-  const Place place = PlaceOf(p);
-  if (-place.inside_m >= max_distance_m) return kNone;
   float best_m2 = max_distance_m * max_distance_m;
   std::uint32_t best = kNone;
-  const auto scan = [&](std::uint32_t begin, std::uint32_t end) {
-    if (end - begin >= kLongRun) {
-      const float reach = std::sqrt(best_m2);
-      const auto below = [](const Eigen::Vector3f& a, float z) { return a.z() < z; };
-      const auto first =
-          std::lower_bound(points_.begin() + begin, points_.begin() + end, p.z() - reach, below);
-      begin = static_cast<std::uint32_t>(first - points_.begin());
-      for (; begin < end && points_[begin].z() <= p.z() + reach; ++begin) {
-        const float d = (points_[begin] - p).squaredNorm();
-        if (d < best_m2) {
-          best_m2 = d;
-          best = begin;
-        }
-      }
+  VisitNear(p, best_m2, [&](std::uint32_t index, float squared_m2) {
+    best_m2 = squared_m2;
+    best = index;
+  });
+  return best;
+}
+
+ColumnGrid::SlackMatch ColumnGrid::NearestWithSlack(const Eigen::Vector3f& p,
+                                                    float max_distance_m,
+                                                    float max_slack_m,
+                                                    std::uint32_t hint) const {
+  // Everything within the nearest distance and twice the slack is looked at.
+  const float margin_m = 2.0F * max_slack_m;
+  float best_m2 = (max_distance_m + max_slack_m) * (max_distance_m + max_slack_m);
+  float bound_m2 = best_m2;
+  float second_m2 = best_m2;
+  SlackMatch match;
+  const auto offer = [&](std::uint32_t index, float squared_m2) {
+    if (squared_m2 >= best_m2) {
+      if (index != match.index) second_m2 = std::min(second_m2, squared_m2);
       return;
     }
-    for (; begin < end; ++begin) {
-      const float d = (points_[begin] - p).squaredNorm();
-      if (d < best_m2) {
-        best_m2 = d;
-        best = begin;
-      }
-    }
+    if (match.index != kNone) second_m2 = best_m2;
+    best_m2 = squared_m2;
+    match.index = index;
+    const float reach_m = std::sqrt(best_m2) + margin_m;
+    bound_m2 = std::min(bound_m2, reach_m * reach_m);
   };
-  for (int ring = 0;; ++ring) {
-    // Everything in this ring is at least so far away.
-    const float ring_m = static_cast<float>(ring - 1) * column_size_m_ + place.inside_m;
-    if (ring > 0 && ring_m > 0.0F && ring_m * ring_m >= best_m2) break;
-    if (ring > std::max(columns_x_, columns_y_)) break;
-    VisitRing(place, ring, scan);
+  if (hint != kNone) {
+    const float d = (points_[hint] - p).squaredNorm();
+    if (d < best_m2) offer(hint, d);
   }
-  return best;
+  VisitNear(p, bound_m2, offer);
+  if (match.index == kNone) {
+    match.slack_m = max_slack_m;
+    return match;
+  }
+  second_m2 = std::min(second_m2, bound_m2);
+  match.slack_m = 0.5F * (std::sqrt(second_m2) - std::sqrt(best_m2));
+  return match;
 }
 
 int ColumnGrid::Nearest(const Eigen::Vector3f& p,
                         int count,
                         float max_distance_m,
                         std::uint32_t* indices) const {
-  if (points_.empty()) return 0;
-  const Place place = PlaceOf(p);
-  if (-place.inside_m >= max_distance_m) return 0;
   std::array<Candidate, kMaxNeighbours> nearest;  // sorted
   int found = 0;
   float bound_m2 = max_distance_m * max_distance_m;
-  const auto offer = [&](std::uint32_t index) {
-    const float d = (points_[index] - p).squaredNorm();
-    if (d >= bound_m2) return;
+  VisitNear(p, bound_m2, [&](std::uint32_t index, float squared_m2) {
     int at = found < count ? found++ : count - 1;
-    for (; at > 0 && d < nearest[at - 1].squared_m2; --at) nearest[at] = nearest[at - 1];
-    nearest[at] = {d, index};
+    for (; at > 0 && squared_m2 < nearest[at - 1].squared_m2; --at) nearest[at] = nearest[at - 1];
+    nearest[at] = {squared_m2, index};
     if (found == count) bound_m2 = nearest[count - 1].squared_m2;
-  };
-  for (int ring = 0;; ++ring) {
-    const float ring_m = static_cast<float>(ring - 1) * column_size_m_ + place.inside_m;
-    if (ring > 0 && ring_m > 0.0F && ring_m * ring_m >= bound_m2) break;
-    if (ring > std::max(columns_x_, columns_y_)) break;
-    VisitRing(place, ring, [&](std::uint32_t begin, std::uint32_t end) {
-      if (end - begin >= kLongRun) {
-        const auto below = [](const Eigen::Vector3f& a, float z) { return a.z() < z; };
-        const float reach = std::sqrt(bound_m2);
-        begin = static_cast<std::uint32_t>(
-            std::lower_bound(points_.begin() + begin, points_.begin() + end, p.z() - reach, below) -
-            points_.begin());
-        for (; begin < end && points_[begin].z() <= p.z() + reach; ++begin) offer(begin);
-        return;
-      }
-      for (; begin < end; ++begin) offer(begin);
-    });
-  }
+  });
   for (int i = 0; i < found; ++i) indices[i] = nearest[i].index;
   return found;
 }

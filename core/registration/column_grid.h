@@ -1,4 +1,5 @@
 // Nearest neighbours among the features of one class.
+// Internal to core/registration, not installed.
 #ifndef STRATA_CORE_REGISTRATION_COLUMN_GRID_H_
 #define STRATA_CORE_REGISTRATION_COLUMN_GRID_H_
 
@@ -13,8 +14,7 @@ namespace strata {
 
 // Points in upright square columns, row after row, each column sorted by z. Maps are flat: a dense
 // array of columns finds neighbours with two loads where a tree walks, and is built by one counting
-// sort, about 30 ns a point (tests/bench/registration_benchmark.cc). Immutable; concurrent queries
-// are safe.
+// sort. Immutable; concurrent queries are safe.
 class ColumnGrid {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFF;
@@ -31,6 +31,20 @@ class ColumnGrid {
   // ones, one that depends only on the points and their order.
   std::uint32_t Nearest(const Eigen::Vector3f& p, float max_distance_m) const;
 
+  struct SlackMatch {
+    std::uint32_t index = kNone;
+    // The same answer holds for every query less than this from `p`: none within `max_distance_m`,
+    // or this point the nearest.
+    float slack_m = 0.0F;
+  };
+  // As above, with points up to `max_distance_m` + `max_slack_m` away for an answer, and how far
+  // `p` may move before one has to ask again, at most `max_slack_m`. `hint` is a guess at the
+  // answer that makes it faster, or kNone.
+  SlackMatch NearestWithSlack(const Eigen::Vector3f& p,
+                              float max_distance_m,
+                              float max_slack_m,
+                              std::uint32_t hint) const;
+
   // Up to `count` (≤ kMaxNeighbours) nearest points closer than `max_distance_m`, `p` itself
   // included when it is a point; returns how many were written to `indices`, in no order.
   static constexpr int kMaxNeighbours = 32;
@@ -43,13 +57,23 @@ class ColumnGrid {
 
  private:
   struct Place {
+    float x_m, y_m;  // from the grid's corner
     int x, y;        // column, clamped to the grid
     float inside_m;  // distance to the nearest edge of that column, ≤ 0 outside of it
   };
   Place PlaceOf(const Eigen::Vector3f& p) const;
-  // Calls visit(begin, end) for the runs of points in the ring of columns `ring` around `place`.
-  template <typename Visit>
-  void VisitRing(const Place& place, int ring, const Visit& visit) const;
+  // Distance along one axis from `at_m` to a row or column.
+  float GapM(int column, float at_m) const;
+  // Calls offer(index, squared distance) for the points closer than `bound_m2`, which `offer` may
+  // lower, roughly from near to far.
+  template <typename Offer>
+  void VisitNear(const Eigen::Vector3f& p, const float& bound_m2, const Offer& offer) const;
+  template <typename Offer>
+  void VisitRun(std::uint32_t begin,
+                std::uint32_t end,
+                const Eigen::Vector3f& p,
+                const float& bound_m2,
+                const Offer& offer) const;
   void SortColumns();
 
   float column_size_m_ = 1.0F;

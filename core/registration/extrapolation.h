@@ -1,4 +1,5 @@
 // Longer steps for ICP along a steady direction (Besl and McKay 1992, thesis 7.2.2).
+// Internal to core/registration, not installed.
 #ifndef STRATA_CORE_REGISTRATION_EXTRAPOLATION_H_
 #define STRATA_CORE_REGISTRATION_EXTRAPOLATION_H_
 

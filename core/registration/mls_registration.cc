@@ -12,12 +12,17 @@
 #include <Eigen/LU>
 
 #include "core/geometry/pose.h"
+#include "core/mls/features.h"
+#include "core/registration/column_grid.h"
 #include "core/registration/option_checks.h"
 #include "core/registration/plane_to_plane.h"
 #include "core/registration/umeyama.h"
 
 namespace strata {
 namespace {
+
+// Of the tolerances; at 5 to 10 results are the same and times least.
+constexpr double kSettledFactor = 10.0;
 
 // One iteration's matches, whatever the metric.
 struct Round {
@@ -37,13 +42,14 @@ class RoundSolver {
       : source_(source), target_(target), options_(options), surfaces_(source, target, options) {}
 
   // `T_local_source`: into the grids' coordinates.
-  Round Solve(const Pose& T_local_source, double gate_m) {
-    return options_.metric == MlsErrorMetric::kPlaneToPlane ? PlaneToPlane(T_local_source, gate_m)
-                                                            : PointToPoint(T_local_source, gate_m);
+  Round Solve(const Pose& T_local_source, double gate_m, bool fine) {
+    return options_.metric == MlsErrorMetric::kPlaneToPlane
+               ? PlaneToPlane(T_local_source, gate_m, fine)
+               : PointToPoint(T_local_source, gate_m);
   }
 
  private:
-  Round PlaneToPlane(const Pose& T_local_source, double gate_m);
+  Round PlaneToPlane(const Pose& T_local_source, double gate_m, bool fine);
   Round PointToPoint(const Pose& T_local_source, double gate_m);
 
   const ScanFeatures& source_;
@@ -52,8 +58,7 @@ class RoundSolver {
   PlaneToPlaneMatcher surfaces_;
 };
 
-Round RoundSolver::PlaneToPlane(const Pose& T_local_source, double gate_m) {
-  const bool fine = gate_m <= options_.final_gate_m;
+Round RoundSolver::PlaneToPlane(const Pose& T_local_source, double gate_m, bool fine) {
   const PlaneToPlaneSums sums = surfaces_.Linearise(T_local_source, gate_m, fine);
   Round round;
   round.selected = sums.selected;
@@ -90,7 +95,8 @@ Round RoundSolver::PointToPoint(const Pose& T_local_source, double gate_m) {
       match(source_.sample()[i].element.point, source_.sample()[i].feature_class);
     }
   } else {
-    for (const FeatureClass c : {FeatureClass::kHorizontal, FeatureClass::kVertical}) {
+    for (const FeatureClass c :
+         {FeatureClass::kTraversable, FeatureClass::kNonTraversable, FeatureClass::kVertical}) {
       for (const Eigen::Vector3f& p : source_.points(c)) match(p, c);
     }
   }
@@ -162,14 +168,17 @@ RegistrationResult RegisterScan(const ScanFeatures& source,
   };
 
   double gate_m = options.initial_gate_m;
+  // Matches far off are not worth the target's normals: they wait until the others move little.
+  bool settled = options.metric == MlsErrorMetric::kPointToPoint;
   for (result.iterations = 1;; ++result.iterations) {
-    const Round round = solver.Solve(T, gate_m);
+    const bool narrow = gate_m <= options.final_gate_m;
+    const bool fine = narrow && settled;
+    const Round round = solver.Solve(T, gate_m, fine);
     result.inliers = round.inliers;
     result.overlap = round.selected > 0 ? static_cast<double>(round.inliers) / round.selected : 0.0;
     result.rms_m = round.rms_m;
     result.information = round.information;
     result.degenerate_directions = round.solution.degenerate_directions;
-    const bool fine = gate_m <= options.final_gate_m;
     if (round.inliers < options.min_inliers || (fine && result.overlap < options.min_overlap)) {
       finish(Termination::kTooLittleOverlap, T);
       return result;
@@ -179,8 +188,12 @@ RegistrationResult RegisterScan(const ScanFeatures& source,
       finish(Termination::kDiverged, T);
       return result;
     }
-    const bool still = round.solution.step.head<3>().norm() < options.rotation_tolerance_rad &&
-                       round.solution.step.tail<3>().norm() < options.translation_tolerance_m;
+    const auto step_within = [&](double factor) {
+      return round.solution.step.head<3>().norm() < factor * options.rotation_tolerance_rad &&
+             round.solution.step.tail<3>().norm() < factor * options.translation_tolerance_m;
+    };
+    const bool still = step_within(1.0);
+    settled = settled || (narrow && step_within(kSettledFactor));
     const bool last = result.iterations == options.max_iterations;
     if ((fine && still) || last) {
       const bool degenerate = !result.degenerate_directions.empty();

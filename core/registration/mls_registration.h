@@ -35,7 +35,8 @@ struct MlsRegistrationOptions {
   double final_gate_m = 0.5;
   double gate_factor = 0.6;  // in [0.1, 1)
   int max_iterations = 30;   // in [1, 1000]
-  // Source features used while the gate is wide, and then. kPointToPoint uses `max_samples` too, or
+  // Source features used until the gate is narrow and steps are small, and then (plane-to-plane:
+  // with the target's normals besides the source's). kPointToPoint uses `max_samples` too, or
   // all features when it is 0. In [0, 1000000].
   int coarse_samples = 500;
   int max_samples = 2000;
@@ -53,7 +54,7 @@ struct MlsRegistrationOptions {
   double max_translation_m = 5.0;
   double max_rotation_rad = 0.5;
   double min_eigenvalue_ratio = 1e-3;  // see SolveNormalEquations; in [0, 1]
-  // Target side of the surface elements, as FeatureOptions has them for the source.
+  // Target side of the surface elements, as ScanFeatureOptions has them for the source.
   int neighbours = 16;
   double neighbour_radius_m = 1.5;
 

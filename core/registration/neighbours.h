@@ -9,9 +9,10 @@
 //   - accept kConverged, kMaxIterations and kDegenerate (not moved where undetermined); with
 //     kTooLittleOverlap or kDiverged keep the prediction. The least overlap of an accepted scan was
 //     0.46 (facade), so min_overlap of 0.3 leaves room.
-// Seeds 1, 2, 3 of the sample: KITTI drive with noisy steps ATE 7 to 14 mm, hall 13 to 15 mm
-// (uploaded 61), facade 5 to 7 mm (35), NCLT campus, 636 m, off by 0.06 to 0.18 m at its closure
-// (17.9). Surface elements of 20 features, or σt of 0.5 m, let the campus drift by 1 m and more.
+// Sample seeds 1 to 6: NCLT campus, 636 m, off by 0.06 to 0.51 m and 0.3° to 1.2° at its closure
+// (uploaded 17.9 m). Seeds 1 to 3: KITTI drive with noisy steps ATE 7 to 14 mm, hall 13 to 15 mm
+// (uploaded 61), facade 5 to 7 mm (35). Surface elements of 20 features, or σt of 0.5 m, let the
+// campus drift by 1 m and more.
 #ifndef STRATA_CORE_REGISTRATION_NEIGHBOURS_H_
 #define STRATA_CORE_REGISTRATION_NEIGHBOURS_H_
 
@@ -28,8 +29,7 @@ namespace strata {
 struct NeighbourPolicy {
   // Scans whose origins are farther than this from the guess are no neighbours [m]; in (0, 1000].
   double radius_m = 25.0;
-  // At most so many; in [1, 1000]. 8 drift a little more, 25 to 60 no less; each
-  // costs 1 to 2 ms.
+  // At most so many; in [1, 1000]. 8 drift a little more, 25 to 60 no less.
   int max_scans = 15;
 
   absl::Status Validate() const;

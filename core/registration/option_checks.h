@@ -1,4 +1,5 @@
 // Collects every violated bound of an options struct.
+// Internal to core/registration, not installed.
 #ifndef STRATA_CORE_REGISTRATION_OPTION_CHECKS_H_
 #define STRATA_CORE_REGISTRATION_OPTION_CHECKS_H_
 

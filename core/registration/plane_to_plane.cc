@@ -14,6 +14,12 @@
 namespace strata {
 namespace {
 
+// How far a query may move before its nearest feature is looked up again; more makes the look-up
+// slower. Features are a cell apart.
+constexpr float kMaxSlackM = 0.03F;
+// Of coordinates and distances in float.
+constexpr float kRoundingM = 1e-4F;
+
 Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
   m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
@@ -26,6 +32,7 @@ PlaneToPlaneMatcher::PlaneToPlaneMatcher(const ScanFeatures& source,
                                          const RegistrationTarget& target,
                                          const MlsRegistrationOptions& options)
     : source_(source), target_(target), options_(options) {
+  known_.resize(source.sample().size());
   for (int c = 0; c < kFeatureClasses; ++c) {
     element_index_[c].assign(target.grid(static_cast<FeatureClass>(c)).points().size(), 0);
   }
@@ -42,6 +49,25 @@ const SurfaceElement& PlaneToPlaneMatcher::TargetElement(FeatureClass c, std::ui
     known = static_cast<std::uint32_t>(elements_.size());
   }
   return elements_[known - 1];
+}
+
+std::uint32_t PlaneToPlaneMatcher::Match(std::size_t sample,
+                                         const Eigen::Vector3f& p_target,
+                                         float gate_m,
+                                         bool fine) {
+  const ColumnGrid& grid = target_.grid(source_.sample()[sample].feature_class);
+  if (!fine) return grid.Nearest(p_target, gate_m);
+  KnownMatch& known = known_[sample];
+  const float slack_m = known.match.slack_m - kRoundingM;
+  if (slack_m <= 0.0F || (p_target - known.p_target).squaredNorm() >= slack_m * slack_m) {
+    known.match = grid.NearestWithSlack(p_target, gate_m, kMaxSlackM, known.match.index);
+    known.p_target = p_target;
+  }
+  const std::uint32_t j = known.match.index;
+  if (j == ColumnGrid::kNone || (grid.points()[j] - p_target).squaredNorm() >= gate_m * gate_m) {
+    return ColumnGrid::kNone;
+  }
+  return j;
 }
 
 PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
@@ -62,7 +88,7 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
     const Eigen::Vector3d p = sampled.element.point.cast<double>();
     const ColumnGrid& grid = target_.grid(sampled.feature_class);
     const Eigen::Vector3d p_target = R * p + t;
-    const std::uint32_t j = grid.Nearest(p_target.cast<float>(), static_cast<float>(gate_m));
+    const std::uint32_t j = Match(i, p_target.cast<float>(), static_cast<float>(gate_m), fine);
     if (j == ColumnGrid::kNone) continue;
     const SurfaceElement q =
         fine ? TargetElement(sampled.feature_class, j)

@@ -1,13 +1,18 @@
 // One linearisation of the plane-to-plane error between a scan's sample and a target: the inner
 // part of RegisterScan.
+// Internal to core/registration, not installed.
 #ifndef STRATA_CORE_REGISTRATION_PLANE_TO_PLANE_H_
 #define STRATA_CORE_REGISTRATION_PLANE_TO_PLANE_H_
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "core/geometry/pose.h"
+#include "core/registration/column_grid.h"
 #include "core/registration/registration_target.h"
 #include "core/registration/scan_features.h"
 
@@ -43,6 +48,8 @@ class PlaneToPlaneMatcher {
   PlaneToPlaneSums Linearise(const Pose& T_target_source, double gate_m, bool fine);
 
  private:
+  // The nearest feature of the class and closer than the gate, or kNone.
+  std::uint32_t Match(std::size_t sample, const Eigen::Vector3f& p_target, float gate_m, bool fine);
   const SurfaceElement& TargetElement(FeatureClass c, std::uint32_t index);
 
   const ScanFeatures& source_;
@@ -50,6 +57,11 @@ class PlaneToPlaneMatcher {
   const MlsRegistrationOptions& options_;
   std::array<std::vector<std::uint32_t>, kFeatureClasses> element_index_;  // 0: not computed yet
   std::vector<SurfaceElement> elements_;
+  struct KnownMatch {
+    Eigen::Vector3f p_target = Eigen::Vector3f::Zero();  // it was looked up for
+    ColumnGrid::SlackMatch match;
+  };
+  std::vector<KnownMatch> known_;  // of the sample; the last iterations hardly move
 };
 
 }  // namespace strata

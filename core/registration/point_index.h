@@ -1,4 +1,5 @@
 // The two ways ICP finds the partner of a point.
+// Internal to core/registration, not installed.
 #ifndef STRATA_CORE_REGISTRATION_POINT_INDEX_H_
 #define STRATA_CORE_REGISTRATION_POINT_INDEX_H_
 

@@ -1,4 +1,5 @@
 // Random choices that are the same on every machine and library.
+// Internal to core/registration, not installed.
 #ifndef STRATA_CORE_REGISTRATION_RANDOM_H_
 #define STRATA_CORE_REGISTRATION_RANDOM_H_
 

@@ -5,12 +5,14 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "absl/status/status.h"
 #include <Eigen/Core>
 
+#include "core/registration/column_grid.h"
 #include "core/registration/option_checks.h"
 #include "core/registration/scan_features.h"
 
@@ -82,13 +84,20 @@ RegistrationTarget::RegistrationTarget(std::span<const PlacedScan> scans,
     if (scans.size() > 1 && options.thinning_m > 0.0) {
       points = AverageInCubes(points, static_cast<float>(options.thinning_m));
     }
-    grids_[c] = ColumnGrid(points, kColumnSizeM);
+    grids_[c] = std::make_shared<const ColumnGrid>(points, kColumnSizeM);
   }
 }
 
+std::size_t RegistrationTarget::size() const {
+  std::size_t size = 0;
+  for (const auto& grid : grids_) size += grid->points().size();
+  return size;
+}
+
 std::size_t RegistrationTarget::memory_bytes() const {
-  return sizeof(*this) + grids_[0].memory_bytes() + grids_[1].memory_bytes() -
-         2 * sizeof(ColumnGrid);
+  std::size_t bytes = sizeof(*this);
+  for (const auto& grid : grids_) bytes += grid->memory_bytes();
+  return bytes;
 }
 
 }  // namespace strata

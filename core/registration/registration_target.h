@@ -4,13 +4,16 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <span>
 
 #include "core/geometry/pose.h"
-#include "core/registration/column_grid.h"
+#include "core/mls/features.h"
 #include "core/registration/scan_features.h"
 
 namespace strata {
+
+class ColumnGrid;  // internal
 
 // A scan already in place.
 struct PlacedScan {
@@ -34,17 +37,17 @@ struct TargetOptions {
 // safe to share between threads.
 class RegistrationTarget {
  public:
-  RegistrationTarget() = default;
+  RegistrationTarget() : RegistrationTarget(std::span<const PlacedScan>()) {}
   explicit RegistrationTarget(std::span<const PlacedScan> scans, const TargetOptions& options = {});
 
-  const ColumnGrid& grid(FeatureClass c) const { return grids_[static_cast<std::size_t>(c)]; }
+  const ColumnGrid& grid(FeatureClass c) const { return *grids_[static_cast<std::size_t>(c)]; }
   // Of the grids' coordinates, in the target frame.
   const Eigen::Vector3d& origin() const { return origin_; }
-  std::size_t size() const { return grids_[0].points().size() + grids_[1].points().size(); }
+  std::size_t size() const;
   std::size_t memory_bytes() const;
 
  private:
-  std::array<ColumnGrid, kFeatureClasses> grids_;
+  std::array<std::shared_ptr<const ColumnGrid>, kFeatureClasses> grids_;  // never null
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
 };
 

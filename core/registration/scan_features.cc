@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
+#include "core/mls/features.h"
 #include "core/mls/mls_map.h"
 #include "core/registration/column_grid.h"
 #include "core/registration/option_checks.h"
@@ -27,16 +29,22 @@ constexpr float kColumnSizeM = 0.4F;
 
 using ClassPoints = std::array<std::vector<Eigen::Vector3f>, kFeatureClasses>;
 
+std::vector<Eigen::Vector3f>& ListOf(FeatureClass c, ClassPoints& points) {
+  return points[static_cast<std::size_t>(c)];
+}
+
 void AppendPatch(
     const Patch& patch, float x, float y, double samples_per_metre, ClassPoints& points) {
   if (!patch.vertical()) {
-    points[0].emplace_back(x, y, static_cast<float>(patch.mean_m()));
+    ListOf(FeatureClass::kTraversable, points)
+        .emplace_back(x, y, static_cast<float>(patch.mean_m()));
     return;
   }
   const double depth = patch.depth_m();
   const int n = std::max(1, static_cast<int>(std::lround(depth * samples_per_metre)));
   for (int i = 0; i < n; ++i) {
-    points[1].emplace_back(x, y, static_cast<float>(patch.bottom_m() + (i + 0.5) * depth / n));
+    ListOf(FeatureClass::kVertical, points)
+        .emplace_back(x, y, static_cast<float>(patch.bottom_m() + (i + 0.5) * depth / n));
   }
 }
 
@@ -52,7 +60,7 @@ std::uint64_t ContentHash(const ClassPoints& points) {
 
 }  // namespace
 
-absl::Status FeatureOptions::Validate() const {
+absl::Status ScanFeatureOptions::Validate() const {
   OptionChecks checks("feature options");
   checks.InRange("samples_per_metre", samples_per_metre, 0.1, 100.0);
   checks.InRange("max_range_m", max_range_m, 1.0, 1e4);
@@ -87,11 +95,13 @@ SurfaceElement FitSurfaceElement(const ColumnGrid& grid,
   return element;
 }
 
-ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const FeatureOptions& options) {
+ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const ScanFeatureOptions& options) {
   ClassPoints points;
   const double cell_size = local_map.parameters.cell_size_m;
   const double max_range_m2 = options.max_range_m * options.max_range_m;
-  for (auto& list : points) list.reserve(local_map.patch_count());
+  for (const FeatureClass c : {FeatureClass::kTraversable, FeatureClass::kVertical}) {
+    ListOf(c, points).reserve(local_map.patch_count());
+  }
   for (const MlsTile& tile : local_map.tiles) {
     for (const Patch& patch : tile.patches) {
       const CellIndex cell = CellOf(tile.key, static_cast<std::uint16_t>(patch.cell));
@@ -106,7 +116,18 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const FeatureOptions
   return FromPoints(std::move(points), options);
 }
 
-ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const FeatureOptions& options) {
+ScanFeatures ScanFeatures::FromFeatures(std::span<const Feature> features,
+                                        const ScanFeatureOptions& options) {
+  ClassPoints points;
+  const double max_range_m2 = options.max_range_m * options.max_range_m;
+  for (const Feature& feature : features) {
+    if (feature.p_map.head<2>().squaredNorm() > max_range_m2) continue;
+    ListOf(feature.feature_class, points).emplace_back(feature.p_map.cast<float>());
+  }
+  return FromPoints(std::move(points), options);
+}
+
+ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const ScanFeatureOptions& options) {
   ScanFeatures features;
   features.points_ = std::move(points);
   std::array<ColumnGrid, kFeatureClasses> grids;
@@ -114,7 +135,6 @@ ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const FeatureOptions& 
   for (int c = 0; c < kFeatureClasses; ++c) {
     grids[c] = ColumnGrid(features.points_[c], kColumnSizeM);
   }
-  const auto horizontal = static_cast<std::uint32_t>(features.points_[0].size());
   // Not the same places in every scan, or their bias would add up along a chain of scans.
   SplitMix64 random(options.seed ^ ContentHash(features.points_));
   const std::vector<std::uint32_t> chosen =
@@ -123,20 +143,29 @@ ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const FeatureOptions& 
                     random);
   features.sample_.resize(chosen.size());
   for (std::size_t i = 0; i < chosen.size(); ++i) {
-    const int c = chosen[i] < horizontal ? 0 : 1;
+    std::size_t c = 0;
+    std::size_t place = chosen[i];
+    while (place >= features.points_[c].size()) place -= features.points_[c++].size();
     SampledFeature& sampled = features.sample_[i];
     sampled.feature_class = static_cast<FeatureClass>(c);
     sampled.element = FitSurfaceElement(grids[c],
-                                        features.points_[c][chosen[i] - (c == 0 ? 0 : horizontal)],
+                                        features.points_[c][place],
                                         options.neighbours,
                                         static_cast<float>(options.neighbour_radius_m));
   }
   return features;
 }
 
+std::size_t ScanFeatures::size() const {
+  std::size_t size = 0;
+  for (const auto& list : points_) size += list.size();
+  return size;
+}
+
 std::size_t ScanFeatures::memory_bytes() const {
-  return sizeof(*this) + (points_[0].capacity() + points_[1].capacity()) * sizeof(Eigen::Vector3f) +
-         sample_.capacity() * sizeof(SampledFeature);
+  std::size_t bytes = sizeof(*this) + sample_.capacity() * sizeof(SampledFeature);
+  for (const auto& list : points_) bytes += list.capacity() * sizeof(Eigen::Vector3f);
+  return bytes;
 }
 
 }  // namespace strata

@@ -5,27 +5,26 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "absl/status/status.h"
 #include <Eigen/Core>
 
+#include "core/mls/features.h"
 #include "core/mls/mls_map.h"
-#include "core/registration/column_grid.h"
 
 namespace strata {
 
-// Features are matched within their class only (thesis 7.2.3).
-enum class FeatureClass : std::uint8_t { kHorizontal = 0, kVertical = 1 };
-inline constexpr int kFeatureClasses = 2;
+class ColumnGrid;  // internal
 
-struct FeatureOptions {
-  double samples_per_metre = 4.0;  // points along a vertical patch (thesis 7.2.3); in [0.1, 100]
+struct ScanFeatureOptions {
+  double samples_per_metre = 4.0;  // FromMap: points along a vertical patch; in [0.1, 100]
   // Features farther than this from the scan's origin are left out; in [1, 10000]. They hold few of
   // a scan's points but spread its search structure.
   double max_range_m = 120.0;
   // Size of the random sample that is matched when the scan is a source; in [0, 1000000], 0 for a
-  // scan that is only ever a target. Costs about 1.5 µs each here and 4 µs in a registration.
+  // scan that is only ever a target. They are most of the cost here and in a registration.
   int sample_count = 2000;
   std::uint64_t seed = 1;
   int neighbours = 16;              // that span a surface element; in [4, 32]
@@ -45,7 +44,7 @@ struct SurfaceElement {
 
 struct SampledFeature {
   SurfaceElement element;
-  FeatureClass feature_class = FeatureClass::kHorizontal;
+  FeatureClass feature_class = FeatureClass::kTraversable;
 };
 
 // The plane through up to `neighbours` points of `grid` around its feature `p`. When fewer than
@@ -57,23 +56,28 @@ SurfaceElement FitSurfaceElement(const ColumnGrid& grid,
 
 // Registration features of one local map in its scan frame: one point per horizontal patch (cell
 // centre, mean height), evenly spaced points along each vertical one, and a sample of both with
-// normals. Flat float arrays, immutable, safe to share between threads.
+// normals. Features are matched within their class only (thesis 7.2.3). Flat float arrays,
+// immutable, safe to share between threads.
 class ScanFeatures {
  public:
   ScanFeatures() = default;
   // A pure function of its arguments. `options` must be valid. A map without patches gives features
   // without points, which overlap with nothing.
-  static ScanFeatures FromMap(const MlsMap& local_map, const FeatureOptions& options = {});
+  static ScanFeatures FromMap(const MlsMap& local_map, const ScanFeatureOptions& options = {});
+  // The same of what ExtractFeatures() gave, in the scan's frame: with the traversability of the
+  // patches there are three classes instead of two. Source and target need the same classes.
+  static ScanFeatures FromFeatures(std::span<const Feature> features,
+                                   const ScanFeatureOptions& options = {});
   // The same of ready points of each class; for features that come from elsewhere.
   static ScanFeatures FromPoints(std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points,
-                                 const FeatureOptions& options = {});
+                                 const ScanFeatureOptions& options = {});
 
   const std::vector<Eigen::Vector3f>& points(FeatureClass c) const {
     return points_[static_cast<std::size_t>(c)];
   }
   // In random order: any prefix is a uniform sample.
   const std::vector<SampledFeature>& sample() const { return sample_; }
-  std::size_t size() const { return points_[0].size() + points_[1].size(); }
+  std::size_t size() const;
   std::size_t memory_bytes() const;
 
  private:

@@ -46,7 +46,7 @@ Pose RegisterWithPcl(Peer peer,
                      const Pose& T_target_source_guess) {
   if (peer == Peer::kIcp) {
     pcl::IterativeClosestPoint<pcl::PointXYZ, pcl::PointXYZ> icp;
-    icp.setMaximumIterations(100);
+    icp.setMaximumIterations(50);
     icp.setTransformationEpsilon(1e-8);  // squared metres
     return Align(icp, source, target, T_target_source_guess);
   }

@@ -33,7 +33,7 @@ constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 struct Settings {
   MlsParameters mls;
-  FeatureOptions features;
+  ScanFeatureOptions features;
   TargetOptions target;
   NeighbourPolicy policy;
   MlsRegistrationOptions registration;

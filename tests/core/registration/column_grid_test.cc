@@ -55,6 +55,34 @@ TEST(ColumnGridTest, NearestFewEqualBruteForce) {
   }
 }
 
+TEST(ColumnGridTest, AnswersHoldWithinTheirSlack) {
+  const ColumnGrid grid(RandomPoints(2000, 5), 0.4F);
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<float> turn(-1.0F, 1.0F);
+  int slack_left = 0;
+  for (const Eigen::Vector3f& p : RandomPoints(500, 7)) {
+    for (const float reach : {0.3F, 2.0F}) {
+      const std::uint32_t hint = random() % 2000;
+      const auto match = grid.NearestWithSlack(p, reach, 0.1F, hint);
+      EXPECT_EQ(match.index, grid.NearestWithSlack(p, reach, 0.1F, ColumnGrid::kNone).index);
+      ASSERT_GE(match.slack_m, -1e-5F);
+      ASSERT_LE(match.slack_m, 0.1F + 1e-5F);
+      slack_left += static_cast<int>(match.slack_m > 0.01F);
+      const Eigen::Vector3f direction =
+          Eigen::Vector3f(turn(random), turn(random), turn(random)).normalized();
+      const Eigen::Vector3f q = p + std::max(match.slack_m - 1e-4F, 0.0F) * direction;
+      const std::uint32_t nearest = grid.Nearest(q, reach);
+      if (nearest == ColumnGrid::kNone) {
+        EXPECT_TRUE(match.index == ColumnGrid::kNone ||
+                    (grid.points()[match.index] - q).norm() >= reach);
+      } else {
+        EXPECT_EQ(nearest, match.index) << q.transpose() << " reach " << reach;
+      }
+    }
+  }
+  EXPECT_GT(slack_left, 100);
+}
+
 TEST(ColumnGridTest, OutsideOfTheGridIsSearchedToo) {
   const std::vector<Eigen::Vector3f> points = {{0, 0, 0}, {1, 0, 0}};
   const ColumnGrid grid(points, 0.4F);

@@ -1,10 +1,12 @@
 #include "core/registration/mls_registration.h"
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <numbers>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Eigenvalues>
@@ -13,6 +15,7 @@
 
 #include "core/cloud/sensor_model.h"
 #include "core/mls/build.h"
+#include "core/mls/features.h"
 #include "tests/support/data_dir.h"
 #include "tests/support/pcd.h"
 #include "tests/support/status_matchers.h"
@@ -57,7 +60,7 @@ PointCloud Yard(const Pose& T_world_scan, std::uint64_t seed, bool walls = true)
   return cloud;
 }
 
-ScanFeatures Features(const PointCloud& cloud, const FeatureOptions& options = {}) {
+ScanFeatures Features(const PointCloud& cloud, const ScanFeatureOptions& options = {}) {
   return ScanFeatures::FromMap(
       BuildMlsMap(cloud, Pose::Identity(), SensorModel(), MlsParameters())->map, options);
 }
@@ -88,8 +91,8 @@ TEST(ScanFeaturesTest, OneFeatureAPatchAndFourAMetreOfWall) {
   map.tiles[0].patches = {wall, PatchOfMeasurement(cell, 4 * kTicksPerMetre, sigma)};
   map.tiles[0].IndexRows();
   const ScanFeatures features = ScanFeatures::FromMap(map);
-  ASSERT_EQ(features.points(FeatureClass::kHorizontal).size(), 1U);
-  EXPECT_TRUE(features.points(FeatureClass::kHorizontal)[0].isApprox(
+  ASSERT_EQ(features.points(FeatureClass::kTraversable).size(), 1U);
+  EXPECT_TRUE(features.points(FeatureClass::kTraversable)[0].isApprox(
       Eigen::Vector3f(0.35F, 0.55F, 4.0F), 1e-6F));
   ASSERT_EQ(features.points(FeatureClass::kVertical).size(), 8U);
   EXPECT_NEAR(features.points(FeatureClass::kVertical)[0].z(), 0.125, 1e-6);
@@ -106,7 +109,7 @@ TEST(ScanFeaturesTest, SampleIsReproducedAndHasNormals) {
   for (std::size_t i = 0; i < a.sample().size(); ++i) {
     EXPECT_EQ(a.sample()[i].element.point, b.sample()[i].element.point);
     EXPECT_EQ(a.sample()[i].element.normal, b.sample()[i].element.normal);
-    if (a.sample()[i].feature_class != FeatureClass::kHorizontal) continue;
+    if (a.sample()[i].feature_class != FeatureClass::kTraversable) continue;
     ++horizontal;
     upright += static_cast<int>(std::abs(a.sample()[i].element.normal.z()) > 0.95F);
   }
@@ -114,12 +117,59 @@ TEST(ScanFeaturesTest, SampleIsReproducedAndHasNormals) {
 }
 
 TEST(ScanFeaturesTest, FarFeaturesAreLeftOut) {
-  FeatureOptions options;
+  ScanFeatureOptions options;
   options.max_range_m = 5.0;
   const ScanFeatures features = Features(Yard(Pose::Identity(), 1), options);
-  for (const auto c : {FeatureClass::kHorizontal, FeatureClass::kVertical}) {
+  for (const auto c : {FeatureClass::kTraversable, FeatureClass::kVertical}) {
     for (const Eigen::Vector3f& p : features.points(c)) EXPECT_LE(p.head<2>().norm(), 5.0F);
   }
+}
+
+TEST(ScanFeaturesTest, AnnotationMakesThreeClasses) {
+  const MlsMap map =
+      BuildMlsMap(Yard(Pose::Identity(), 1), Pose::Identity(), SensorModel(), MlsParameters())->map;
+  // Every other patch cannot be driven on.
+  std::vector<Traversability> annotation(map.patch_count(), Traversability::kTraversable);
+  for (std::size_t i = 0; i < annotation.size(); i += 2) {
+    annotation[i] = Traversability::kNonTraversable;
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto extracted, ExtractFeatures(map, {}, annotation));
+  const ScanFeatures features = ScanFeatures::FromFeatures(extracted);
+  std::size_t horizontal = 0;
+  for (const MlsTile& tile : map.tiles) {
+    for (const Patch& patch : tile.patches)
+      horizontal += static_cast<std::size_t>(!patch.vertical());
+  }
+  const std::size_t free = features.points(FeatureClass::kTraversable).size();
+  const std::size_t blocked = features.points(FeatureClass::kNonTraversable).size();
+  EXPECT_EQ(free + blocked, horizontal);
+  EXPECT_GT(free, horizontal / 3);
+  EXPECT_GT(blocked, horizontal / 3);
+  EXPECT_GT(features.points(FeatureClass::kVertical).size(), 1000U);
+  int sampled[kFeatureClasses] = {};
+  for (const SampledFeature& s : features.sample()) ++sampled[static_cast<int>(s.feature_class)];
+  EXPECT_GT(sampled[1], 100);
+}
+
+TEST(RegisterScanTest, ClassesAreMatchedAmongThemselvesOnly) {
+  std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points;
+  for (int i = 0; i < 400; ++i) {
+    points[0].emplace_back(0.1F * (i % 20), 0.1F * (i / 20), 0.0F);
+    points[1].emplace_back(0.1F * (i % 20), 0.1F * (i / 20), 1.0F);
+    points[2].emplace_back(0.1F * (i % 20), 3.0F, 0.1F * (i / 20));
+  }
+  const ScanFeatures source = ScanFeatures::FromPoints(points);
+  std::swap(points[0], points[1]);  // what was free is blocked: only the wall is left
+  const ScanFeatures target = ScanFeatures::FromPoints(points);
+  MlsRegistrationOptions options;
+  options.metric = MlsErrorMetric::kPointToPoint;
+  options.max_samples = 0;
+  options.initial_gate_m = 0.5;
+  options.min_overlap = 0.5;
+  const auto r = RegisterScan(source, TargetOf(target), Pose::Identity(), options);
+  EXPECT_EQ(r.termination, Termination::kTooLittleOverlap);
+  EXPECT_NEAR(r.overlap, 1.0 / 3.0, 1e-9);
+  EXPECT_EQ(RegisterScan(source, TargetOf(source), Pose::Identity(), options).overlap, 1.0);
 }
 
 class MlsMetricTest : public ::testing::TestWithParam<MlsErrorMetric> {};
@@ -231,7 +281,7 @@ TEST(RegisterScanTest, InfiniteGuessIsDiverged) {
 
 TEST(RegistrationOptionsTest, ValidateNamesEveryViolation) {
   STRATA_EXPECT_OK(MlsRegistrationOptions().Validate());
-  STRATA_EXPECT_OK(FeatureOptions().Validate());
+  STRATA_EXPECT_OK(ScanFeatureOptions().Validate());
   STRATA_EXPECT_OK(TargetOptions().Validate());
   MlsRegistrationOptions options;
   options.final_gate_m = 3.0;
@@ -240,7 +290,7 @@ TEST(RegistrationOptionsTest, ValidateNamesEveryViolation) {
               StatusIs(absl::StatusCode::kInvalidArgument,
                        AllOf(HasSubstr("final_gate_m is 3, must be in [0.001, 2]"),
                              HasSubstr("min_inliers is 1"))));
-  FeatureOptions features;
+  ScanFeatureOptions features;
   features.neighbours = 100;
   EXPECT_THAT(features.Validate(),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("neighbours is 100")));
