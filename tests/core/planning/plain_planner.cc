@@ -6,6 +6,7 @@
 #include <optional>
 #include <queue>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -269,8 +270,39 @@ void PlainPlanner::FindMoves(int i) {
   }
 }
 
+int PlainPlanner::Place(const PlanEndpoint& endpoint) const {
+  const double z = *endpoint.z_m;
+  int named = -1;
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    const bool own = patches_[i].cell.x == std::floor(endpoint.x_m / cell_size_) &&
+                     patches_[i].cell.y == std::floor(endpoint.y_m / cell_size_);
+    if (own && (named < 0 || std::abs(patches_[i].z - z) < std::abs(patches_[named].z - z))) {
+      named = static_cast<int>(i);
+    }
+  }
+  if (named >= 0 && patches_[named].danger >= 0.0) return named;
+  int best = -1;
+  std::tuple<double, double, double, double> best_rank;
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    const Patch& patch = patches_[i];
+    if (patch.danger < 0.0) continue;
+    const double x = (patch.cell.x + 0.5) * cell_size_;
+    const double y = (patch.cell.y + 0.5) * cell_size_;
+    const double d = std::hypot(x - endpoint.x_m, y - endpoint.y_m);
+    const double rise =
+        profile_.max_step_m + kTolerance + d * (std::tan(profile_.max_slope_rad) + 1e-4);
+    const bool same_level = std::abs(patch.z - z) <= rise ||
+                            (named >= 0 && std::abs(patch.z - patches_[named].z) <= rise);
+    if (d > profile_.radius_m + profile_.max_gap_m || !same_level) continue;
+    const std::tuple rank(d, std::abs(patch.z - z), x, y);
+    if (best >= 0 && rank >= best_rank) continue;
+    best = static_cast<int>(i);
+    best_rank = rank;
+  }
+  return best;
+}
+
 double PlainPlanner::Cost(int from, int to) const {
-  if (patches_[from].danger < 0.0 || patches_[to].danger < 0.0) return -1.0;
   std::vector<double> cost(patches_.size(), std::numeric_limits<double>::infinity());
   std::priority_queue<std::pair<double, int>> queue;
   cost[from] = 0.0;

@@ -28,7 +28,9 @@ class PlainPlanner {
     std::vector<std::pair<int, double>> moves;  // target, cost [m]
   };
   const std::vector<Patch>& patches() const { return patches_; }
-  // Cost of the cheapest path, infinity if none; -1 if an end is no place to stand. Dijkstra.
+  // Where a query from or to `endpoint` begins or ends, -1 if nowhere. REQUIRES: z_m.
+  int Place(const PlanEndpoint& endpoint) const;
+  // Cost of the cheapest path between places to stand, infinity if none. Dijkstra.
   double Cost(int from, int to) const;
 
  private:
