@@ -6,6 +6,8 @@
 #include <cstdlib>
 #include <limits>
 #include <optional>
+#include <string>
+#include <tuple>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -17,6 +19,7 @@
 #include "core/common/status.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/explain.h"
+#include "core/planning/profile_checks.h"
 #include "core/planning/search_space.h"
 #include "core/world/plan.h"
 
@@ -46,6 +49,52 @@ PatchId Choose(const SearchSpace& space,
     if (std::abs(space.Height(patch) - *endpoint.z_m) <
         std::abs(space.Height(best) - *endpoint.z_m)) {
       best = patch;
+    }
+  }
+  return best;
+}
+
+// True if a patch of the endpoint's surroundings, `d` away, is on the level that the endpoint
+// means; `named` is the patch of its own cell.
+bool SameLevel(SearchSpace& space,
+               const PlanEndpoint& endpoint,
+               PatchId named,
+               PatchId patch,
+               std::uint32_t level,
+               double d) {
+  if (endpoint.level.has_value()) return static_cast<std::int64_t>(level) == *endpoint.level;
+  if (!endpoint.z_m.has_value()) return level == 0;
+  const ProfileChecks& checks = space.checks();
+  const double rise = checks.step_m + d * checks.slope_tan;
+  const double z = space.Height(patch);
+  return std::abs(z - *endpoint.z_m) <= rise ||
+         (named != kNoPatchId && std::abs(z - space.Height(named)) <= rise);
+}
+
+// Where an endpoint goes that cannot be stood on; kNoPatchId if nowhere.
+PatchId Snap(SearchSpace& space, const PlanEndpoint& endpoint, PatchId named) {
+  const ProfileChecks& checks = space.checks();
+  const double reach = checks.profile.radius_m + checks.profile.max_gap_m;
+  const int cells = static_cast<int>(reach / checks.cell_size_m) + 1;
+  const CellIndex middle = CellAt(endpoint, checks.cell_size_m);
+  PatchId best = kNoPatchId;
+  std::tuple<double, double, double, double> best_rank;
+  for (int dy = -cells; dy <= cells; ++dy) {
+    for (int dx = -cells; dx <= cells; ++dx) {
+      PatchId first = 0;
+      const std::uint32_t count = space.FindCell({middle.x + dx, middle.y + dy}, &first);
+      for (std::uint32_t level = 0; level < count; ++level) {
+        const PatchId patch = first + level;
+        if (space.Danger(patch) < 0.0F) continue;
+        const Eigen::Vector3d p = space.Position(patch);
+        const double d = std::hypot(p.x() - endpoint.x_m, p.y() - endpoint.y_m);
+        if (d > reach || !SameLevel(space, endpoint, named, patch, level, d)) continue;
+        const double off = std::abs(p.z() - endpoint.z_m.value_or(p.z()));
+        const std::tuple rank(d, off, p.x(), p.y());
+        if (best != kNoPatchId && rank >= best_rank) continue;
+        best = patch;
+        best_rank = rank;
+      }
     }
   }
   return best;
@@ -137,6 +186,18 @@ absl::StatusOr<EndpointMatch> MatchEndpoint(SearchSpace& space, const PlanEndpoi
                                     space.Height(patch),
                                     match.reason.ToString());
     z = space.Height(patch);
+  }
+  match.patch = Snap(space, endpoint, patch);
+  STRATA_RETURN_IF_ERROR(space.status());
+  if (match.patch != kNoPatchId) {
+    const Eigen::Vector3d p = space.Position(match.patch);
+    match.message = absl::StrFormat("moved %.2f m to (%.2f, %.2f, %.2f), %s",
+                                    std::hypot(p.x() - endpoint.x_m, p.y() - endpoint.y_m),
+                                    p.x(),
+                                    p.y(),
+                                    p.z(),
+                                    match.message);
+    return match;
   }
   match.nearest = NearestStandable(space, endpoint, z);
   STRATA_RETURN_IF_ERROR(space.status());

@@ -31,7 +31,12 @@ absl::Status ValidateEndpoint(absl::string_view name,
                               const PlanEndpoint& endpoint,
                               double cell_size_m);
 
-// The surface of the endpoint's cell that `endpoint` names, if the robot can stand there.
+// The surface of the endpoint's cell that `endpoint` names, if the robot can stand there. Otherwise
+// the nearest place to stand, by horizontal distance d between (x, y) and centres of cells, then by
+// height, x and y: at most radius + max_gap away, and
+//   with z         within max_step + tan(max_slope) · d of it, or of the named surface
+//   with a level   on the surface of that level in its cell
+//   with neither   on the lowest surface of its cell.
 absl::StatusOr<EndpointMatch> MatchEndpoint(SearchSpace& space, const PlanEndpoint& endpoint);
 
 }  // namespace strata

@@ -1,10 +1,13 @@
 #include "core/planning/explain.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <string>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -12,11 +15,13 @@
 #include <Eigen/Core>
 
 #include "core/common/status.h"
+#include "core/common/stop.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/ground_checks.h"
 #include "core/planning/ground_fit.h"
 #include "core/planning/ground_window.h"
 #include "core/planning/prepared_tile.h"
+#include "core/planning/profile_checks.h"
 #include "core/planning/search.h"
 #include "core/planning/search_space.h"
 #include "core/planning/tile_cache.h"
@@ -94,7 +99,7 @@ class TileReasons {
     Explanation reason = {edge.kind, edge.value, Place(edge.cell, z)};
     if (edge.kind == Obstruction::kUnknown) reason.value = ground_.HoleWidth(edge.cell, z);
     if (edge.kind == Obstruction::kObstacle && edge.value < checks_.height_m &&
-        IsPlateau(edge.cell, edge.z_low_m + edge.value)) {
+        IsPlateau(edge.cell, edge.seen_from_m + edge.value)) {
       reason.kind = Obstruction::kStep;
     }
     return reason;
@@ -106,7 +111,7 @@ class TileReasons {
     for (int dy = -2; dy <= 2; ++dy) {
       for (int dx = -2; dx <= 2; ++dx) {
         const Footing footing = ground_.Meet(cell + dy * window_.width() + dx, z, checks_.step_m);
-        if (footing.kind == Footing::Kind::kGround) ++ground;
+        if (footing.ground != Footing::kNone) ++ground;
       }
     }
     return ground > kCrestCells;
@@ -118,50 +123,142 @@ class TileReasons {
   const GroundChecks ground_;
 };
 
-bool HasRefusedMove(const PreparedTile& tile, std::uint32_t patch) {
-  for (const Move& move : tile.moves[patch]) {
-    if (move.cost == Move::kNone) return true;
-  }
-  return false;
+bool Reached(const SearchSpace& space, const SearchWorkspace& workspace, PatchId patch) {
+  const int slot = space.SlotOf(patch);
+  const SearchNode* nodes = workspace.NodesIfAny(slot);
+  return nodes != nullptr && workspace.Reached(nodes[patch - space.slots()[slot].base]);
 }
 
-PatchId NearestFrontier(const SearchSpace& space,
-                        const SearchWorkspace& workspace,
-                        const Eigen::Vector3d& goal) {
-  PatchId best = kNoPatchId;
-  // Ties go by place, not by the order in which tiles were touched.
-  std::tuple<double, double, double, double> best_rank(
-      std::numeric_limits<double>::infinity(), 0, 0, 0);
-  for (std::size_t slot = 0; slot < space.slots().size(); ++slot) {
-    const SearchNode* nodes = workspace.NodesIfAny(static_cast<int>(slot));
-    if (nodes == nullptr) continue;
-    const SearchSpace::Slot& s = space.slots()[slot];
-    for (std::uint32_t i = 0; i < s.tile->size(); ++i) {
-      if (!workspace.Reached(nodes[i])) continue;
-      const Eigen::Vector3d p = space.Position(s.base + i);
-      const std::tuple rank((p - goal).squaredNorm(), p.x(), p.y(), p.z());
-      if (rank >= best_rank || !HasRefusedMove(*s.tile, i)) continue;
-      best_rank = rank;
-      best = s.base + i;
+struct RefusedMove {
+  PatchId patch = kNoPatchId;
+  int direction = 0;
+};
+
+// What is behind a refused move.
+enum class Beyond : std::uint8_t { kGoalsGround, kUnknown, kOther };
+
+// Looks for the other sides of the moves that a search was refused.
+class Frontier {
+ public:
+  Frontier(SearchSpace& space, const SearchWorkspace& reached, const SearchWorkspace& from_goal)
+      : space_(space), reached_(reached), from_goal_(from_goal) {}
+
+  // All patches with a refused move, the nearest to the goal first; ties go by place, not by the
+  // order in which tiles were touched.
+  std::vector<PatchId> Patches(const Eigen::Vector3d& goal) const {
+    std::vector<std::tuple<double, double, double, double, PatchId>> ranked;
+    for (std::size_t slot = 0; slot < space_.slots().size(); ++slot) {
+      const SearchNode* nodes = reached_.NodesIfAny(static_cast<int>(slot));
+      if (nodes == nullptr) continue;
+      const SearchSpace::Slot& s = space_.slots()[slot];
+      for (std::uint32_t i = 0; i < s.tile->size(); ++i) {
+        if (!reached_.Reached(nodes[i]) || !HasRefusedMove(*s.tile, i)) continue;
+        const Eigen::Vector3d p = space_.Position(s.base + i);
+        ranked.emplace_back((p - goal).squaredNorm(), p.x(), p.y(), p.z(), s.base + i);
+      }
+    }
+    std::sort(ranked.begin(), ranked.end());
+    std::vector<PatchId> patches;
+    patches.reserve(ranked.size());
+    for (const auto& entry : ranked) patches.push_back(std::get<4>(entry));
+    return patches;
+  }
+
+  // Refused directions, that towards the goal first.
+  std::vector<int> Refused(PatchId patch, const Eigen::Vector3d& goal) const {
+    const SearchSpace::Slot& slot = space_.SlotOfPatch(patch);
+    const Eigen::Vector2d towards = (goal - space_.Position(patch)).head<2>();
+    std::vector<std::pair<double, int>> ranked;
+    for (int k = 0; k < 8; ++k) {
+      if (slot.tile->moves[patch - slot.base][k].cost != Move::kNone) continue;
+      const Eigen::Vector2d step(kStepX[k], kStepY[k]);
+      ranked.emplace_back(-towards.dot(step.normalized()), k);
+    }
+    std::sort(ranked.begin(), ranked.end());
+    std::vector<int> directions;
+    for (const auto& [progress, k] : ranked) directions.push_back(k);
+    return directions;
+  }
+
+  Beyond Look(const RefusedMove& move) {
+    const ProfileChecks& checks = space_.checks();
+    CellIndex cell = space_.CellOfPatch(move.patch);
+    float level = space_.Height(move.patch);
+    const int limit = static_cast<int>(kLookAheadM / checks.StepLength(move.direction));
+    const int unknown_limit = static_cast<int>((checks.footprint_m + checks.profile.max_gap_m) /
+                                               checks.StepLength(move.direction));
+    bool even = true;  // nothing but ground so far
+    int unobserved = 0;
+    bool unknown = false;
+    for (int n = 1; n <= limit; ++n) {
+      cell = {cell.x + kStepX[move.direction], cell.y + kStepY[move.direction]};
+      PatchId first = 0;
+      const std::uint32_t count = space_.FindCell(cell, &first);
+      const PatchId next = Nearest(first, count, level);
+      if (next == kNoPatchId) {
+        if (count > 0 && space_.Height(first) < level) break;  // a drop
+        even = even && count == 0;
+        ++unobserved;
+        unknown = unknown || (even && unobserved > unknown_limit);
+        continue;
+      }
+      if (Reached(space_, from_goal_, next)) return Beyond::kGoalsGround;
+      if (Reached(space_, reached_, next)) return Beyond::kOther;  // another way leads there
+      even = even && std::abs(space_.Height(next) - level) <= checks.step_m;
+      unobserved = 0;
+      level = space_.Height(next);
+    }
+    return unknown ? Beyond::kUnknown : Beyond::kOther;
+  }
+
+ private:
+  static bool HasRefusedMove(const PreparedTile& tile, std::uint32_t patch) {
+    const auto& moves = tile.moves[patch];
+    return std::any_of(
+        moves.begin(), moves.end(), [](const Move& m) { return m.cost == Move::kNone; });
+  }
+
+  // The surface nearest to the level, if it is within the robot's height of it.
+  PatchId Nearest(PatchId first, std::uint32_t count, float level) const {
+    PatchId best = kNoPatchId;
+    float best_off = space_.checks().height_m;
+    for (PatchId patch = first; patch < first + count; ++patch) {
+      const float off = std::abs(space_.Height(patch) - level);
+      if (off >= best_off) continue;
+      best_off = off;
+      best = patch;
+    }
+    return best;
+  }
+
+  SearchSpace& space_;
+  const SearchWorkspace& reached_;
+  const SearchWorkspace& from_goal_;
+};
+
+absl::StatusOr<RefusedMove> ChooseMove(SearchSpace& space,
+                                       const SearchWorkspace& reached,
+                                       PatchId goal,
+                                       const Stop& stop) {
+  SearchWorkspace from_goal;
+  STRATA_RETURN_IF_ERROR(ReachAll(space, goal, from_goal, stop).status());
+  Frontier frontier(space, reached, from_goal);
+  const Eigen::Vector3d goal_position = space.Position(goal);
+  RefusedMove any;
+  RefusedMove unknown;
+  int looks = 0;
+  for (const PatchId patch : frontier.Patches(goal_position)) {
+    if (++looks % 1024 == 0) STRATA_RETURN_IF_ERROR(stop.status());
+    for (const int direction : frontier.Refused(patch, goal_position)) {
+      const RefusedMove move = {patch, direction};
+      if (any.patch == kNoPatchId) any = move;
+      const Beyond beyond = frontier.Look(move);
+      if (beyond == Beyond::kGoalsGround) return move;
+      if (beyond == Beyond::kUnknown && unknown.patch == kNoPatchId) unknown = move;
     }
   }
-  return best;
-}
-
-int RefusedDirectionTowards(const SearchSpace& space, PatchId patch, const Eigen::Vector3d& goal) {
-  const SearchSpace::Slot& slot = space.SlotOfPatch(patch);
-  const Eigen::Vector2d towards = (goal - space.Position(patch)).head<2>();
-  int best = 0;
-  double best_progress = -std::numeric_limits<double>::infinity();
-  for (int k = 0; k < 8; ++k) {
-    if (slot.tile->moves[patch - slot.base][k].cost != Move::kNone) continue;
-    const Eigen::Vector2d step(kStepX[k], kStepY[k]);
-    const double progress = towards.dot(step.normalized());
-    if (progress <= best_progress) continue;
-    best_progress = progress;
-    best = k;
-  }
-  return best;
+  STRATA_RETURN_IF_ERROR(space.status());
+  return unknown.patch != kNoPatchId ? unknown : any;
 }
 
 }  // namespace
@@ -183,16 +280,15 @@ absl::StatusOr<Explanation> WhyNotStand(SearchSpace& space, PatchId patch) {
 
 absl::StatusOr<Explanation> WhyNoFurther(SearchSpace& space,
                                          const SearchWorkspace& workspace,
-                                         PatchId goal) {
-  const Eigen::Vector3d goal_position = space.Position(goal);
-  const PatchId patch = NearestFrontier(space, workspace, goal_position);
-  if (patch == kNoPatchId) return Explanation{};
-  const SearchSpace::Slot& slot = space.SlotOfPatch(patch);
+                                         PatchId goal,
+                                         const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(const RefusedMove move, ChooseMove(space, workspace, goal, stop));
+  if (move.patch == kNoPatchId) return Explanation{};
+  const SearchSpace::Slot& slot = space.SlotOfPatch(move.patch);
   STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles,
                           LoadAround(space.source(), slot.tile->key));
   const TileReasons reasons(space, slot, tiles);
-  return reasons.WhyNoMove(reasons.SurfaceOf(patch),
-                           RefusedDirectionTowards(space, patch, goal_position));
+  return reasons.WhyNoMove(reasons.SurfaceOf(move.patch), move.direction);
 }
 
 }  // namespace strata

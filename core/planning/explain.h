@@ -7,11 +7,15 @@
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
 
+#include "core/common/stop.h"
 #include "core/planning/search.h"
 #include "core/planning/search_space.h"
 #include "core/world/plan.h"
 
 namespace strata {
+
+// How far beyond a refused move its other side is looked for [m].
+inline constexpr double kLookAheadM = 5.0;
 
 struct Explanation {
   Obstruction kind = Obstruction::kNone;
@@ -25,11 +29,15 @@ struct Explanation {
 // Why the robot cannot stand on `patch`; kNone if it can.
 absl::StatusOr<Explanation> WhyNotStand(SearchSpace& space, PatchId patch);
 
-// Of all patches that the last search of `workspace` reached and that a move is refused from, the
-// one nearest to `goal`, and why it does not go on there towards the goal.
+// Why the last search of `workspace` did not get on towards `goal`: the refused move nearest to it
+//   - that leads, straight on for at most kLookAheadM and within the robot's height of the ground
+//     followed, to ground connected to the goal; or, if there is none,
+//   - that leads to unobserved ground; or, if there is none,
+//   - at all: its end is the top of a wall, say, or another storey.
 absl::StatusOr<Explanation> WhyNoFurther(SearchSpace& space,
                                          const SearchWorkspace& workspace,
-                                         PatchId goal);
+                                         PatchId goal,
+                                         const Stop& stop);
 
 }  // namespace strata
 

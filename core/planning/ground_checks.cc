@@ -23,7 +23,7 @@ GroundChecks::GroundChecks(const GroundWindow& window, const ProfileChecks& chec
     : window_(window), checks_(checks) {
   for (const DiscCell& d : checks.disc) disc_step_.push_back(d.dy * window.width() + d.dx);
   // Cells this close to the window's border are not reached by any disc of the tile.
-  const int rim = checks.gap_cells[0] + 1;
+  const int rim = checks.sight_cells;
   std::vector<GroundEdge> edges;
   for (int y = rim; y < window.width() - rim; ++y) {
     const int row = y * window.width();
@@ -35,25 +35,25 @@ GroundChecks::GroundChecks(const GroundWindow& window, const ProfileChecks& chec
 }
 
 Footing GroundChecks::Meet(int cell, float z, float rise_m) const {
-  Footing drop;
-  Footing obstacle;
-  Footing ground;
+  Footing footing;
   float nearest = rise_m;
   for (std::uint32_t i = window_.begin(cell); i < window_.begin(cell + 1); ++i) {
     const WindowSurface& surface = window_.surface(i);
     const float dz = surface.z_m - z;
+    if (surface.bottom_m - z <= rise_m) footing.open = false;
     if (dz < -rise_m) {
-      drop = {Footing::Kind::kDrop, i};
+      footing.below = i;
+    } else if (dz > 0.0F && surface.bottom_m - z >= checks_.height_m) {
+      continue;
     } else if (dz <= rise_m) {
-      if (ground.kind == Footing::Kind::kGround && std::abs(dz) >= nearest) continue;
+      if (footing.ground != kNoSurface && std::abs(dz) >= nearest) continue;
       nearest = std::abs(dz);
-      ground = {Footing::Kind::kGround, i};
-    } else if (surface.bottom_m - z < checks_.height_m) {
-      if (obstacle.kind == Footing::Kind::kHole) obstacle = {Footing::Kind::kObstacle, i};
+      footing.ground = i;
+    } else if (footing.above == kNoSurface) {
+      footing.above = i;
     }
   }
-  if (ground.kind == Footing::Kind::kGround) return ground;
-  return obstacle.kind == Footing::Kind::kObstacle ? obstacle : drop;
+  return footing;
 }
 
 float GroundChecks::Clearance(std::uint32_t i) const {
@@ -64,57 +64,78 @@ float GroundChecks::Clearance(std::uint32_t i) const {
   return window_.surface(i + 1).bottom_m - surface.z_m;
 }
 
-void GroundChecks::CollectEdges(std::uint32_t i, std::vector<GroundEdge>* edges) const {
+// An edge to fill in, for the levels that surface i is the nearest to in its cell.
+GroundEdge GroundChecks::Seen(std::uint32_t i) const {
   const WindowSurface& surface = window_.surface(i);
   const auto cell = static_cast<int>(surface.cell);
-  const float z = surface.z_m;
+  GroundEdge edge = {.cell = cell,
+                     .z_low_m = surface.z_m - checks_.height_m,
+                     .z_high_m = surface.z_m + checks_.height_m,
+                     .seen_from_m = surface.z_m};
+  if (i > window_.begin(cell)) {
+    edge.z_low_m = std::max(edge.z_low_m, 0.5F * (surface.z_m + window_.surface(i - 1).z_m));
+  }
+  if (i + 1 < window_.begin(cell + 1)) {
+    edge.z_high_m = std::min(edge.z_high_m, 0.5F * (surface.z_m + window_.surface(i + 1).z_m));
+  }
+  return edge;
+}
+
+void GroundChecks::CollectEdges(std::uint32_t i, std::vector<GroundEdge>* edges) const {
+  GroundEdge seen = Seen(i);
+  const int cell = seen.cell;
+  const float z = seen.seen_from_m;
   if (const float free = Clearance(i); free < checks_.height_m) {
-    edges->push_back({cell, z, z, Obstruction::kClearance, free});
+    edges->push_back(seen);
+    edges->back().kind = Obstruction::kClearance;
+    edges->back().value = free;
   }
   for (int k = 0; k < 8; ++k) {
-    const int next = cell + window_.Step(k);
-    const Footing footing = Meet(next, z, checks_.step_m);
-    switch (footing.kind) {
-      case Footing::Kind::kGround:
-        break;
-      case Footing::Kind::kObstacle:
-        edges->push_back(
-            {next, z, z, Obstruction::kObstacle, window_.surface(footing.surface).z_m - z});
-        break;
-      case Footing::Kind::kDrop:
-        edges->push_back(
-            {next, z, z, Obstruction::kDrop, z - window_.surface(footing.surface).z_m});
-        break;
-      case Footing::Kind::kHole:
-        CollectHole(i, k, edges);
-        break;
+    seen.cell = cell + window_.Step(k);
+    const Footing footing = Meet(seen.cell, z, checks_.step_m);
+    if (footing.ground != kNoSurface) continue;
+    CollectMet(seen, footing, edges);
+    if (!footing.open) continue;
+    if (!HoleIsTolerated(seen.cell, z)) {
+      edges->push_back(seen);
+      edges->back().kind = Obstruction::kUnknown;
     }
+    CollectBehind(seen, k, edges);
   }
 }
 
-void GroundChecks::CollectHole(std::uint32_t i,
-                               int direction,
-                               std::vector<GroundEdge>* edges) const {
-  const WindowSurface& surface = window_.surface(i);
-  const float z = surface.z_m;
-  int cell = static_cast<int>(surface.cell) + window_.Step(direction);
-  if (!HoleIsTolerated(cell, z)) {
-    edges->push_back({cell, z, z, Obstruction::kUnknown, 0.0F});
-    return;
+// Levels nearer to what is met than to what it is seen from have the same edge the other way round.
+void GroundChecks::CollectMet(GroundEdge seen,
+                              const Footing& footing,
+                              std::vector<GroundEdge>* edges) const {
+  const float z = seen.seen_from_m;
+  if (footing.above != kNoSurface) {
+    const float dz = window_.surface(footing.above).z_m - z;
+    edges->push_back(seen);
+    edges->back().kind = Obstruction::kObstacle;
+    edges->back().value = dz;
+    edges->back().z_high_m = std::min(seen.z_high_m, z + 0.5F * dz);
   }
-  for (int n = 0; n < checks_.GapCells(direction); ++n) {
-    cell += window_.Step(direction);
-    const double length = (n + 2) * checks_.StepLength(direction);
-    const Footing footing = Meet(cell, z, checks_.RiseOver(length));
-    if (footing.kind == Footing::Kind::kHole) continue;
-    const float dz =
-        footing.kind == Footing::Kind::kGround ? 0.0F : window_.surface(footing.surface).z_m - z;
-    if (footing.kind == Footing::Kind::kObstacle) {
-      edges->push_back({cell, z, z, Obstruction::kObstacle, dz});
-    } else if (footing.kind == Footing::Kind::kDrop) {
-      edges->push_back({cell, z, z, Obstruction::kDrop, -dz});
-    }
-    return;
+  if (footing.below != kNoSurface) {
+    const float dz = z - window_.surface(footing.below).z_m;
+    edges->push_back(seen);
+    edges->back().kind = Obstruction::kDrop;
+    edges->back().value = dz;
+    edges->back().z_low_m = std::max(seen.z_low_m, z - 0.5F * dz);
+  }
+}
+
+// `seen` is at a hole next to the surface that looks in `direction`.
+void GroundChecks::CollectBehind(GroundEdge seen,
+                                 int direction,
+                                 std::vector<GroundEdge>* edges) const {
+  for (int n = 2; n <= checks_.BehindCells(direction) + 1; ++n) {
+    seen.cell += window_.Step(direction);
+    const float rise = checks_.RiseOver(n * checks_.StepLength(direction));
+    const Footing footing = Meet(seen.cell, seen.seen_from_m, rise);
+    if (footing.ground != kNoSurface) return;
+    CollectMet(seen, footing, edges);
+    if (!footing.open || footing.below != kNoSurface) return;
   }
 }
 
@@ -124,7 +145,7 @@ int GroundChecks::HoleRun(int cell, float z, int direction, int limit) const {
     cell += window_.Step(direction);
     if (!window_.Inside(cell, 1)) return limit + 1;
     const float rise = checks_.RiseOver((n + 2) * checks_.StepLength(direction));
-    if (Meet(cell, z, rise).kind != Footing::Kind::kHole) return n;
+    if (!Meet(cell, z, rise).open) return n;
   }
   return limit + 1;
 }
@@ -160,8 +181,8 @@ std::uint32_t GroundChecks::OneWayTarget(std::uint32_t i, int direction, int* ce
     const float rise =
         *cells == 1 ? checks_.step_m : checks_.RiseOver(*cells * checks_.StepLength(direction));
     const Footing footing = Meet(cell, surface.z_m, rise);
-    if (footing.kind == Footing::Kind::kGround) return footing.surface;
-    if (footing.kind != Footing::Kind::kHole) return kNoSurface;
+    if (footing.ground != kNoSurface) return footing.ground;
+    if (!footing.IsFree()) return kNoSurface;
   }
   return kNoSurface;
 }
@@ -173,18 +194,17 @@ std::uint32_t GroundChecks::Target(std::uint32_t i, int direction, int* cells) c
   return OneWayTarget(there, direction ^ 4, &cells_back) == i ? there : kNoSurface;
 }
 
-// Sorts by cell and height and fuses what lies within a step: a disc's level interval is at least
-// two steps wide, so fusing loses nothing.
+// Sorts by cell and joins what overlaps and is of one kind.
 void GroundChecks::IndexEdges(std::vector<GroundEdge> edges) {
   std::sort(edges.begin(), edges.end(), [](const GroundEdge& a, const GroundEdge& b) {
-    return std::tie(a.cell, a.z_low_m, a.kind, a.value) <
-           std::tie(b.cell, b.z_low_m, b.kind, b.value);
+    return std::tie(a.cell, a.kind, a.z_low_m, a.z_high_m, a.value, a.seen_from_m) <
+           std::tie(b.cell, b.kind, b.z_low_m, b.z_high_m, b.value, b.seen_from_m);
   });
   edge_first_.assign(static_cast<std::size_t>(window_.cell_count()) + 1, 0);
   for (const GroundEdge& edge : edges) {
-    if (!edges_.empty() && edges_.back().cell == edge.cell &&
-        edge.z_low_m - edges_.back().z_high_m <= checks_.step_m) {
-      edges_.back().z_high_m = edge.z_high_m;
+    if (!edges_.empty() && edges_.back().cell == edge.cell && edges_.back().kind == edge.kind &&
+        edge.z_low_m <= edges_.back().z_high_m) {
+      edges_.back().z_high_m = std::max(edges_.back().z_high_m, edge.z_high_m);
       continue;
     }
     edges_.push_back(edge);
@@ -224,34 +244,36 @@ void GroundChecks::MarkNearCells() {
 }
 
 const GroundEdge* GroundChecks::BlockingEdge(int cell, float z) const {
-  const GroundEdge* other_level = nullptr;
-  const float behind = checks_.footprint_m + 1.5F * static_cast<float>(checks_.cell_size_m);
   for (std::size_t k = 0; k < disc_step_.size(); ++k) {
-    const DiscCell& d = checks_.disc[k];
-    const bool within = d.distance_m < checks_.footprint_m;
-    if (!within && (other_level == nullptr || d.distance_m >= behind)) break;
+    if (checks_.disc[k].distance_m >= checks_.footprint_m) break;
     const int at = cell + disc_step_[k];
     for (std::uint32_t e = edge_first_[at]; e < edge_first_[at + 1]; ++e) {
-      const GroundEdge& edge = edges_[e];
-      const float off = std::max(edge.z_low_m - z, z - edge.z_high_m);
-      if (off <= checks_.step_m) return &edge;
-      if (within && off <= d.level_m && other_level == nullptr) other_level = &edge;
+      if (edges_[e].z_low_m <= z && z <= edges_[e].z_high_m) return &edges_[e];
     }
   }
-  return other_level;
+  return nullptr;
 }
 
 float GroundChecks::EdgeDistance(int cell, float z) const {
   if (near_edge_[cell] == 0) return checks_.reach_m;
   for (std::size_t k = 0; k < disc_step_.size(); ++k) {
-    const DiscCell& d = checks_.disc[k];
     const int at = cell + disc_step_[k];
     for (std::uint32_t e = edge_first_[at]; e < edge_first_[at + 1]; ++e) {
-      const GroundEdge& edge = edges_[e];
-      if (edge.z_low_m - z <= d.level_m && z - edge.z_high_m <= d.level_m) return d.distance_m;
+      if (edges_[e].z_low_m <= z && z <= edges_[e].z_high_m) return checks_.disc[k].distance_m;
     }
   }
   return checks_.reach_m;
+}
+
+// Over a gap no surface under the disc need have seen what stands within it.
+bool GroundChecks::DiscIsFree(int cell, float z) const {
+  for (std::size_t k = 0; k < disc_step_.size(); ++k) {
+    const DiscCell& d = checks_.disc[k];
+    if (d.distance_m >= checks_.footprint_m) break;
+    const Footing footing = Meet(cell + disc_step_[k], z, d.level_m);
+    if (footing.ground == kNoSurface && !footing.IsFree()) return false;
+  }
+  return true;
 }
 
 bool GroundChecks::GapIsClear(std::uint32_t from,
@@ -263,7 +285,7 @@ bool GroundChecks::GapIsClear(std::uint32_t from,
   for (int n = 1; n < cells; ++n) {
     const float z = a.z_m + (b.z_m - a.z_m) * static_cast<float>(n) / static_cast<float>(cells);
     const int cell = static_cast<int>(a.cell) + n * window_.Step(direction);
-    if (EdgeDistance(cell, z) < checks_.footprint_m) return false;
+    if (EdgeDistance(cell, z) < checks_.footprint_m || !DiscIsFree(cell, z)) return false;
   }
   return true;
 }

@@ -3,14 +3,21 @@
 // surfaces within the profile's reach, so two tiles agree on what they both see.
 //
 // A robot on a surface of height z meets in a neighbouring cell
-//   ground    a surface within max_step of z
-//   obstacle  otherwise a surface higher than that whose underside is lower than z + height
-//   drop      otherwise a surface below
-//   hole      otherwise (nothing, or only what hangs higher than the robot)
-// A hole is tolerated if along an axis or a diagonal through it no more than max_gap is unobserved
-// and it ends on both sides. Obstacles, drops (also those behind a tolerated hole) and holes that
-// are not tolerated are *edges* of the level z; a surface with too little clearance is an edge of
-// its own level.
+//   ground    the surface nearest to z, within max_step of it
+//   obstacle  without ground, a surface above whose underside is lower than z + height
+//   drop      without ground, a surface below
+//   hole      without ground, if nothing reaches down to z + max_step: no ground was observed
+// more than one of the last three at times. A hole is tolerated if along an axis or a diagonal
+// through it no more than max_gap is unobserved and it ends on both sides. Obstacles, drops (also
+// those up to a radius behind a hole) and holes that are not tolerated are *edges* seen from the
+// surface; too little clearance above it is an edge in its own cell.
+//
+// An edge concerns a robot of level z if the surface that it is seen from is nearer to z than all
+// else in that surface's cell and than the obstacle's or drop's own surface, and within the robot's
+// height of z. None of this depends on max_step, max_slope or max_gap, of which larger ones only
+// remove edges; smaller radius and height (as long as the robot is taller than its steps and what
+// it may rise over a gap) only remove edges, too. So what is ground for a profile is ground for
+// every profile that can do more.
 #ifndef STRATA_CORE_PLANNING_GROUND_CHECKS_H_
 #define STRATA_CORE_PLANNING_GROUND_CHECKS_H_
 
@@ -29,14 +36,19 @@ struct GroundEdge {
   std::int32_t cell = 0;
   float z_low_m = 0.0F;
   float z_high_m = 0.0F;
-  Obstruction kind = Obstruction::kNone;  // of the lowest that saw it, and how much; see plan.h
+  Obstruction kind = Obstruction::kNone;  // how much: value, see plan.h
   float value = 0.0F;
+  float seen_from_m = 0.0F;  // height of the surface that saw it; of several the first
 };
 
+// What a robot of some level meets in a cell; numbers of surfaces.
 struct Footing {
-  enum class Kind : std::uint8_t { kGround, kObstacle, kDrop, kHole };
-  Kind kind = Kind::kHole;
-  std::uint32_t surface = 0;  // unless a hole
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+  std::uint32_t ground = kNone;
+  std::uint32_t above = kNone;  // lowest obstacle above the rise
+  std::uint32_t below = kNone;  // highest surface below the rise
+  bool open = true;             // nothing reaches down to where ground should be
+  bool IsFree() const { return ground == kNone && above == kNone && below == kNone; }
 };
 
 class GroundChecks {
@@ -46,7 +58,8 @@ class GroundChecks {
   // Keeps references. REQUIRES: window.margin() ≥ checks.margin.
   GroundChecks(const GroundWindow& window, const ProfileChecks& checks);
 
-  // What a robot of level z meets in `cell` if it may rise or sink by `rise_m`.
+  // What a robot of level z meets in `cell` if it may rise or sink by `rise_m`; what hangs higher
+  // than the robot is not met.
   Footing Meet(int cell, float z, float rise_m) const;
 
   // The surface that one move in `direction` from surface `i` leads to, over a tolerated stretch of
@@ -56,11 +69,9 @@ class GroundChecks {
 
   // Distance [m] from the centre of `cell` to the nearest edge of level z, at most reach_m.
   float EdgeDistance(int cell, float z) const;
-  // The edge that keeps the footprint from being there; nullptr if none. Of a step just over the
-  // limit the lower side feels the drop that the upper side sees; the step right behind it is
-  // named.
+  // The nearest edge that keeps the footprint from being there; nullptr if none.
   const GroundEdge* BlockingEdge(int cell, float z) const;
-  // True if the disc is clear of edges all along a move over a gap.
+  // True if the disc is clear of edges, obstacles and drops all along a move over a gap.
   bool GapIsClear(std::uint32_t from, std::uint32_t to, int direction, int cells) const;
 
   // Height free above the surface up to the underside of the next [m].
@@ -69,8 +80,11 @@ class GroundChecks {
   double HoleWidth(int cell, float z) const;
 
  private:
+  GroundEdge Seen(std::uint32_t i) const;
   void CollectEdges(std::uint32_t i, std::vector<GroundEdge>* edges) const;
-  void CollectHole(std::uint32_t i, int direction, std::vector<GroundEdge>* edges) const;
+  void CollectMet(GroundEdge seen, const Footing& footing, std::vector<GroundEdge>* edges) const;
+  void CollectBehind(GroundEdge seen, int direction, std::vector<GroundEdge>* edges) const;
+  bool DiscIsFree(int cell, float z) const;
   bool HoleIsTolerated(int cell, float z) const;
   int HoleRun(int cell, float z, int direction, int limit) const;
   std::uint32_t OneWayTarget(std::uint32_t i, int direction, int* cells) const;

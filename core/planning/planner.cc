@@ -41,8 +41,9 @@ PlanResult NotOnSurface(PlanReason reason, absl::string_view end, const Endpoint
 absl::Status FillRefusal(SearchSpace& space,
                          const SearchWorkspace& workspace,
                          PatchId goal,
+                         const Stop& stop,
                          PlanResult* result) {
-  STRATA_ASSIGN_OR_RETURN(const Explanation why, WhyNoFurther(space, workspace, goal));
+  STRATA_ASSIGN_OR_RETURN(const Explanation why, WhyNoFurther(space, workspace, goal, stop));
   result->reason =
       why.kind == Obstruction::kUnknown ? PlanReason::kUnknownGround : PlanReason::kBlocked;
   result->message = absl::StrCat(
@@ -74,7 +75,7 @@ absl::StatusOr<PlanResult> Answer(SearchSpace& space,
       result.message = absl::StrCat("no path within ", query.max_expanded, " expanded patches");
       break;
     case SearchOutcome::End::kExhausted:
-      STRATA_RETURN_IF_ERROR(FillRefusal(space, workspace, to.patch, &result));
+      STRATA_RETURN_IF_ERROR(FillRefusal(space, workspace, to.patch, stop, &result));
       break;
     case SearchOutcome::End::kFound: {
       Route route = MakeRoute(space, outcome.path);
@@ -89,6 +90,8 @@ absl::StatusOr<PlanResult> Answer(SearchSpace& space,
       break;
     }
   }
+  if (!from.message.empty()) absl::StrAppend(&result.message, "; start ", from.message);
+  if (!to.message.empty()) absl::StrAppend(&result.message, "; goal ", to.message);
   return result;
 }
 

@@ -6,8 +6,10 @@
 //   - no edge of its level (core/planning/ground_checks.h: obstacle, step, drop, too little
 //     clearance, unknown ground wider than max_gap) comes within its radius.
 // It moves to the eight neighbouring cells over steps of at most max_step, and over up to max_gap
-// of unobserved cells between fitting rims. A move of length l costs l · (1 + danger), the mean of
-// both ends' danger (core/planning/profile_checks.h), plus kGapDanger over unobserved ground.
+// of unobserved cells between fitting rims. Where a robot may stand and move grows with max_step,
+// max_slope and max_gap, and as radius and height shrink (see ground_checks.h). A move of length l
+// costs l · (1 + danger), the mean of both ends' danger (core/planning/profile_checks.h), plus
+// kGapDanger over unobserved ground.
 //
 // What is prepared, when a query first touches a tile, and kept while it fits the cache:
 //   - per tile: local planes (12 bytes a patch), shared by all profiles;
@@ -47,7 +49,10 @@ class Planner {
  public:
   explicit Planner(const PlannerOptions& options);
 
-  // A path, or why there is none; both are OK. Fills all of PlanResult but `epoch`.
+  // A path, or why there is none; both are OK. Sensors do not see the ground they stand over: a
+  // start or goal where the robot cannot stand moves to the nearest place on the same level, at
+  // most radius + max_gap away (core/planning/endpoint.h); the path begins or ends there and the
+  // message says so ("start moved 0.32 m to ..."). Fills all of PlanResult but `epoch`.
   //   INVALID_ARGUMENT    query not finite or beyond the map's range, profile out of range
   //   CANCELLED, DEADLINE_EXCEEDED   by `stop`
   //   errors of `source`

@@ -74,9 +74,14 @@ absl::StatusOr<ProfileChecks> MakeProfileChecks(const RobotProfile& profile, dou
   checks.reach_m = checks.footprint_m + static_cast<float>(kDangerReachM);
   for (int d = 0; d < 2; ++d) {
     checks.gap_cells[d] = static_cast<int>(profile.max_gap_m / checks.StepLength(d) + 1e-6);
+    checks.behind_cells[d] = static_cast<int>(checks.footprint_m / checks.StepLength(d)) + 1;
   }
-  const double cells = checks.reach_m / cell_size_m + 1.5 + 3.0 * (checks.gap_cells[0] + 1);
-  if (cells + kFitRadius > kTileCells - 1) {
+  checks.sight_cells = std::max(checks.gap_cells[0], checks.behind_cells[0]) + 2;
+  // Targets of moves, the disc around them, the surfaces that see its edges, what those see.
+  const double disc_cells = checks.reach_m / cell_size_m + 1.5;
+  const double cells =
+      checks.gap_cells[0] + 1 + disc_cells + checks.behind_cells[0] + 1 + checks.sight_cells;
+  if (cells > kTileCells - 1) {
     return absl::InvalidArgumentError(absl::StrCat("radius_m = ",
                                                    profile.radius_m,
                                                    " and max_gap_m = ",
@@ -86,12 +91,12 @@ absl::StatusOr<ProfileChecks> MakeProfileChecks(const RobotProfile& profile, dou
                                                    " cells of ",
                                                    cell_size_m,
                                                    " m; at most ",
-                                                   kTileCells - 1 - kFitRadius,
+                                                   kTileCells - 1,
                                                    " are checked"));
   }
   FillDisc(&checks);
-  // Targets of moves, the disc around them, the edges seen from a gap away, the gap's other axes.
-  checks.margin = 3 * (checks.gap_cells[0] + 1) + checks.disc_cells + kFitRadius;
+  checks.margin =
+      checks.gap_cells[0] + 1 + checks.disc_cells + checks.behind_cells[0] + 1 + checks.sight_cells;
   return checks;
 }
 

@@ -22,8 +22,8 @@ struct DiscCell {
   std::int16_t dx = 0;
   std::int16_t dy = 0;
   float distance_m = 0.0F;  // from the disc's centre to the nearest point of the cell's square
-  // How much an edge of the ground seen at this cell may differ in height from the disc's centre to
-  // belong to the same level: max_step + tan(max_slope) · (distance of the centres + one cell).
+  // How much ground at this cell may differ in height from the disc's centre:
+  // max_step + tan(max_slope) · (distance of the centres + one cell).
   float level_m = 0.0F;
 };
 
@@ -37,13 +37,16 @@ struct ProfileChecks {
   // √(radius² + (half a cell's diagonal)²): discs of this size at the two ends of a move to a
   // neighbouring cell cover everything that the robot's disc sweeps between them.
   float footprint_m = 0.0F;
-  float reach_m = 0.0F;        // footprint_m + kDangerReachM; distances are cut off here
-  std::vector<DiscCell> disc;  // all within reach_m, nearest first
-  int disc_cells = 0;          // largest |dx|
-  int gap_cells[2] = {0, 0};   // longest gap along an axis, along a diagonal
-  int margin = 0;              // of the GroundWindow that the checks of a tile need
+  float reach_m = 0.0F;          // footprint_m + kDangerReachM; distances are cut off here
+  std::vector<DiscCell> disc;    // all within reach_m, nearest first
+  int disc_cells = 0;            // largest |dx|
+  int gap_cells[2] = {0, 0};     // longest gap along an axis, along a diagonal
+  int behind_cells[2] = {0, 0};  // how far behind a hole obstacles and drops count: the footprint
+  int sight_cells = 0;           // how far from a surface its edges and their reasons reach
+  int margin = 0;                // of the GroundWindow that the checks of a tile need
 
   int GapCells(int direction) const { return gap_cells[direction & 1]; }
+  int BehindCells(int direction) const { return behind_cells[direction & 1]; }
   double StepLength(int direction) const {
     return (direction & 1) != 0 ? cell_size_m * 1.4142135623730951 : cell_size_m;
   }
@@ -57,7 +60,7 @@ struct ProfileChecks {
 };
 
 // INVALID_ARGUMENT for a profile out of range or one that spans more cells than a tile has
-// (radius + kDangerReachM + 3 max_gap may not exceed about 250 cells).
+// (3 · radius + kDangerReachM + 2 · max_gap may not exceed about 240 cells).
 absl::StatusOr<ProfileChecks> MakeProfileChecks(const RobotProfile& profile, double cell_size_m);
 
 }  // namespace strata

@@ -6,6 +6,7 @@
 #include <optional>
 #include <queue>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -44,7 +45,7 @@ PlainPlanner::PlainPlanner(const DrawnMap& map, const RobotProfile& profile, dou
                           {}});
     }
   }
-  for (const Patch& patch : patches_) FindEdges(patch);
+  for (std::size_t i = 0; i < patches_.size(); ++i) FindEdges(static_cast<int>(i));
   for (std::size_t i = 0; i < patches_.size(); ++i) {
     const double distance = EdgeDistance(patches_[i].cell, patches_[i].z);
     if (distance >= footprint_) patches_[i].danger = DangerAt(static_cast<int>(i), distance);
@@ -57,27 +58,26 @@ double PlainPlanner::Rise(double cells) const {
          kTolerance;
 }
 
-PlainPlanner::Meeting PlainPlanner::Meet(CellIndex cell, double z, double rise, int* which) const {
+PlainPlanner::Meeting PlainPlanner::Meet(CellIndex cell, double z, double rise) const {
+  Meeting meeting;
   const auto column = columns_.find(cell);
-  if (column == columns_.end()) return Meeting::kHole;
-  bool obstacle = false;
-  bool below = false;
-  double nearest = std::numeric_limits<double>::infinity();
+  if (column == columns_.end()) return meeting;
   for (const int i : column->second) {
-    const double dz = patches_[i].z - z;
+    const Patch& patch = patches_[i];
+    const double dz = patch.z - z;
+    if (patch.bottom <= z + rise) meeting.hole = false;
+    if (dz > 0 && patch.bottom >= z + profile_.height_m - kTolerance) continue;
     if (std::abs(dz) <= rise) {
-      if (std::abs(dz) < nearest) {
-        nearest = std::abs(dz);
-        if (which != nullptr) *which = i;
+      if (meeting.ground < 0 || std::abs(dz) < std::abs(patches_[meeting.ground].z - z)) {
+        meeting.ground = i;
       }
-    } else if (dz < 0) {
-      below = true;
-    } else if (patches_[i].bottom < z + profile_.height_m - kTolerance) {
-      obstacle = true;
+    } else if (dz > 0) {
+      if (meeting.obstacle < 0 || patch.z < patches_[meeting.obstacle].z) meeting.obstacle = i;
+    } else if (meeting.drop < 0 || patch.z > patches_[meeting.drop].z) {
+      meeting.drop = i;
     }
   }
-  if (nearest <= rise) return Meeting::kGround;
-  return obstacle ? Meeting::kObstacle : below ? Meeting::kDrop : Meeting::kHole;
+  return meeting;
 }
 
 // Holes from `hole` on, itself included; 999 if the row does not end within max_gap.
@@ -85,7 +85,7 @@ int PlainPlanner::Run(CellIndex hole, double z, int dx, int dy) const {
   const double unit = std::hypot(dx, dy);
   for (int n = 1; n * unit * cell_size_ <= profile_.max_gap_m + 1e-6 + unit * cell_size_; ++n) {
     const CellIndex cell = {hole.x + n * dx, hole.y + n * dy};
-    if (Meet(cell, z, Rise((n + 1) * unit), nullptr) != Meeting::kHole) return n;
+    if (!Meet(cell, z, Rise((n + 1) * unit)).hole) return n;
   }
   return 999;
 }
@@ -99,11 +99,18 @@ bool PlainPlanner::Tolerated(CellIndex hole, double z) const {
   return false;
 }
 
-void PlainPlanner::FindEdges(const Patch& patch) {
+void PlainPlanner::AddMet(CellIndex cell, int seen_from, const Meeting& meeting) {
+  if (meeting.ground >= 0) return;
+  if (meeting.obstacle >= 0) edges_.push_back({cell, seen_from, meeting.obstacle});
+  if (meeting.drop >= 0) edges_.push_back({cell, seen_from, meeting.drop});
+}
+
+void PlainPlanner::FindEdges(int i) {
+  const Patch& patch = patches_[i];
   for (const int other : columns_[patch.cell]) {
     const Patch& above = patches_[other];
     if (above.z > patch.z && above.bottom - patch.z < profile_.height_m - kTolerance) {
-      edges_.push_back({patch.cell, patch.z});
+      edges_.push_back({patch.cell, i, -1});
       break;
     }
   }
@@ -111,24 +118,31 @@ void PlainPlanner::FindEdges(const Patch& patch) {
     for (int dx = -1; dx <= 1; ++dx) {
       if (dx == 0 && dy == 0) continue;
       CellIndex cell = {patch.cell.x + dx, patch.cell.y + dy};
-      Meeting meeting = Meet(cell, patch.z, profile_.max_step_m + kTolerance, nullptr);
-      if (meeting == Meeting::kHole) {
-        if (!Tolerated(cell, patch.z)) {
-          edges_.push_back({cell, patch.z});
-          continue;
-        }
-        const double unit = std::hypot(dx, dy);
-        for (int n = 2; (n - 1) * unit * cell_size_ <= profile_.max_gap_m + 1e-6; ++n) {
-          cell = {patch.cell.x + n * dx, patch.cell.y + n * dy};
-          meeting = Meet(cell, patch.z, Rise(n * unit), nullptr);
-          if (meeting != Meeting::kHole) break;
-        }
-      }
-      if (meeting == Meeting::kObstacle || meeting == Meeting::kDrop) {
-        edges_.push_back({cell, patch.z});
+      Meeting meeting = Meet(cell, patch.z, profile_.max_step_m + kTolerance);
+      AddMet(cell, i, meeting);
+      if (meeting.ground >= 0 || !meeting.hole) continue;
+      if (!Tolerated(cell, patch.z)) edges_.push_back({cell, i, -1});
+      // A footprint behind the hole's first cell.
+      const double unit = std::hypot(dx, dy);
+      const int behind = static_cast<int>(footprint_ / (unit * cell_size_)) + 1;
+      for (int n = 2; n <= behind + 1; ++n) {
+        cell = {patch.cell.x + n * dx, patch.cell.y + n * dy};
+        meeting = Meet(cell, patch.z, Rise(n * unit));
+        AddMet(cell, i, meeting);
+        if (meeting.ground >= 0 || meeting.drop >= 0 || !meeting.hole) break;
       }
     }
   }
+}
+
+bool PlainPlanner::Concerns(const Edge& edge, double z) const {
+  const Patch& from = patches_[edge.seen_from];
+  const double off = std::abs(from.z - z);
+  if (off > profile_.height_m - kTolerance) return false;
+  if (edge.met >= 0 && std::abs(patches_[edge.met].z - z) < off) return false;
+  const std::vector<int>& column = columns_.at(from.cell);
+  return std::none_of(
+      column.begin(), column.end(), [&](int i) { return std::abs(patches_[i].z - z) < off; });
 }
 
 double PlainPlanner::EdgeDistance(CellIndex cell, double z) const {
@@ -137,13 +151,24 @@ double PlainPlanner::EdgeDistance(CellIndex cell, double z) const {
     const double dx = (edge.cell.x - cell.x) * cell_size_;
     const double dy = (edge.cell.y - cell.y) * cell_size_;
     const double d = DistanceToSquare(dx, dy, cell_size_);
-    if (d >= nearest) continue;
-    const double run = std::hypot(dx, dy) + cell_size_;
-    const double level =
-        profile_.max_step_m + kTolerance + run * (std::tan(profile_.max_slope_rad) + 1e-4);
-    if (std::abs(edge.z - z) <= level) nearest = d;
+    if (d < nearest && Concerns(edge, z)) nearest = d;
   }
   return nearest;
+}
+
+bool PlainPlanner::DiscFree(CellIndex cell, double z) const {
+  const int reach = static_cast<int>(footprint_ / cell_size_) + 1;
+  for (int dy = -reach; dy <= reach; ++dy) {
+    for (int dx = -reach; dx <= reach; ++dx) {
+      if (DistanceToSquare(dx * cell_size_, dy * cell_size_, cell_size_) >= footprint_) continue;
+      const double run = (std::hypot(dx, dy) + 1.0) * cell_size_;
+      const double rise =
+          profile_.max_step_m + kTolerance + run * (std::tan(profile_.max_slope_rad) + 1e-4);
+      const Meeting meeting = Meet({cell.x + dx, cell.y + dy}, z, rise);
+      if (meeting.ground < 0 && !meeting.Nothing()) return false;
+    }
+  }
+  return true;
 }
 
 double PlainPlanner::DangerAt(int i, double distance) const {
@@ -213,10 +238,9 @@ int PlainPlanner::OneWay(int i, int dx, int dy, int* cells) const {
   for (*cells = 1; (*cells - 1) * unit * cell_size_ <= profile_.max_gap_m + 1e-6; ++*cells) {
     const CellIndex cell = {patch.cell.x + *cells * dx, patch.cell.y + *cells * dy};
     const double rise = *cells == 1 ? profile_.max_step_m + kTolerance : Rise(*cells * unit);
-    int which = -1;
-    const Meeting meeting = Meet(cell, patch.z, rise, &which);
-    if (meeting == Meeting::kGround) return which;
-    if (meeting != Meeting::kHole) return -1;
+    const Meeting meeting = Meet(cell, patch.z, rise);
+    if (meeting.ground >= 0) return meeting.ground;
+    if (!meeting.Nothing()) return -1;
   }
   return -1;
 }
@@ -234,7 +258,8 @@ void PlainPlanner::FindMoves(int i) {
       bool clear = true;
       for (int n = 1; n < cells; ++n) {
         const double z = patch.z + (patches_[to].z - patch.z) * n / cells;
-        clear &= EdgeDistance({patch.cell.x + n * dx, patch.cell.y + n * dy}, z) >= footprint_;
+        const CellIndex between = {patch.cell.x + n * dx, patch.cell.y + n * dy};
+        clear &= EdgeDistance(between, z) >= footprint_ && DiscFree(between, z);
       }
       if (!clear) continue;
       const double run = cells * std::hypot(dx, dy) * cell_size_;
@@ -245,8 +270,39 @@ void PlainPlanner::FindMoves(int i) {
   }
 }
 
+int PlainPlanner::Place(const PlanEndpoint& endpoint) const {
+  const double z = *endpoint.z_m;
+  int named = -1;
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    const bool own = patches_[i].cell.x == std::floor(endpoint.x_m / cell_size_) &&
+                     patches_[i].cell.y == std::floor(endpoint.y_m / cell_size_);
+    if (own && (named < 0 || std::abs(patches_[i].z - z) < std::abs(patches_[named].z - z))) {
+      named = static_cast<int>(i);
+    }
+  }
+  if (named >= 0 && patches_[named].danger >= 0.0) return named;
+  int best = -1;
+  std::tuple<double, double, double, double> best_rank;
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    const Patch& patch = patches_[i];
+    if (patch.danger < 0.0) continue;
+    const double x = (patch.cell.x + 0.5) * cell_size_;
+    const double y = (patch.cell.y + 0.5) * cell_size_;
+    const double d = std::hypot(x - endpoint.x_m, y - endpoint.y_m);
+    const double rise =
+        profile_.max_step_m + kTolerance + d * (std::tan(profile_.max_slope_rad) + 1e-4);
+    const bool same_level = std::abs(patch.z - z) <= rise ||
+                            (named >= 0 && std::abs(patch.z - patches_[named].z) <= rise);
+    if (d > profile_.radius_m + profile_.max_gap_m || !same_level) continue;
+    const std::tuple rank(d, std::abs(patch.z - z), x, y);
+    if (best >= 0 && rank >= best_rank) continue;
+    best = static_cast<int>(i);
+    best_rank = rank;
+  }
+  return best;
+}
+
 double PlainPlanner::Cost(int from, int to) const {
-  if (patches_[from].danger < 0.0 || patches_[to].danger < 0.0) return -1.0;
   std::vector<double> cost(patches_.size(), std::numeric_limits<double>::infinity());
   std::priority_queue<std::pair<double, int>> queue;
   cost[from] = 0.0;

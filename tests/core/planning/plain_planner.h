@@ -28,20 +28,32 @@ class PlainPlanner {
     std::vector<std::pair<int, double>> moves;  // target, cost [m]
   };
   const std::vector<Patch>& patches() const { return patches_; }
-  // Cost of the cheapest path, infinity if none; -1 if an end is no place to stand. Dijkstra.
+  // Where a query from or to `endpoint` begins or ends, -1 if nowhere. REQUIRES: z_m.
+  int Place(const PlanEndpoint& endpoint) const;
+  // Cost of the cheapest path between places to stand, infinity if none. Dijkstra.
   double Cost(int from, int to) const;
 
  private:
-  enum class Meeting { kGround, kObstacle, kDrop, kHole };
   struct Edge {
-    CellIndex cell;
-    double z;
+    CellIndex cell;  // where ground ends
+    int seen_from;   // patch
+    int met;         // obstacle or drop; -1: unknown ground, too little clearance
   };
-  // What lies in `cell` for a robot at z; *which is the ground's patch.
-  Meeting Meet(CellIndex cell, double z, double rise, int* which) const;
+  // Patches in a cell as a robot at z finds them, -1: none.
+  struct Meeting {
+    int ground = -1;
+    int obstacle = -1;
+    int drop = -1;
+    bool hole = true;  // nothing reaches down to the ground
+    bool Nothing() const { return ground < 0 && obstacle < 0 && drop < 0; }
+  };
+  Meeting Meet(CellIndex cell, double z, double rise) const;
+  bool Concerns(const Edge& edge, double z) const;
+  bool DiscFree(CellIndex cell, double z) const;
   bool Tolerated(CellIndex hole, double z) const;
   int Run(CellIndex hole, double z, int dx, int dy) const;
-  void FindEdges(const Patch& patch);
+  void FindEdges(int i);
+  void AddMet(CellIndex cell, int seen_from, const Meeting& meeting);
   double EdgeDistance(CellIndex cell, double z) const;
   double DangerAt(int i, double distance) const;  // < 0: too steep or rough
   int OneWay(int i, int dx, int dy, int* cells) const;

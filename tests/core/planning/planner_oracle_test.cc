@@ -1,14 +1,22 @@
 // Random worlds: costs against a plain Dijkstra over the definitions, paths against every surface.
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <random>
+#include <set>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/match.h"
 #include <gtest/gtest.h>
 
 #include "core/planning/planner.h"
+#include "core/planning/profile_checks.h"
+#include "core/planning/search_space.h"
+#include "core/planning/tile_cache.h"
 #include "tests/core/planning/memory_tiles.h"
 #include "tests/core/planning/plain_planner.h"
 #include "tests/support/drawing.h"
@@ -97,7 +105,7 @@ PlanEndpoint EndpointOf(const PlainPlanner::Patch& patch) {
 }
 
 struct Tally {
-  int found = 0, none = 0, off = 0, gaps = 0, pulled = 0;
+  int found = 0, none = 0, off = 0, gaps = 0, pulled = 0, moved = 0;
 };
 
 void CompareOneWorld(std::uint64_t seed, Tally* tally) {
@@ -111,22 +119,23 @@ void CompareOneWorld(std::uint64_t seed, Tally* tally) {
       with_landmarks.PrepareLandmarks(source, world.profile, source.Keys(), 4, Stop()));
   std::mt19937_64 random(seed + 1);
   for (int q = 0; q < 12; ++q) {
-    const int from = static_cast<int>(random() % plain.patches().size());
-    const int to = static_cast<int>(random() % plain.patches().size());
-    const PlanQuery query = {.from = EndpointOf(plain.patches()[from]),
-                             .to = EndpointOf(plain.patches()[to]),
-                             .profile = world.profile};
+    const PlanEndpoint ends[2] = {EndpointOf(plain.patches()[random() % plain.patches().size()]),
+                                  EndpointOf(plain.patches()[random() % plain.patches().size()])};
+    const int from = plain.Place(ends[0]);
+    const int to = plain.Place(ends[1]);
+    const PlanQuery query = {.from = ends[0], .to = ends[1], .profile = world.profile};
     STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult result, planner.Plan(source, query, Stop()));
     STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult same, with_landmarks.Plan(source, query, Stop()));
     EXPECT_EQ(same.graph_cost, result.graph_cost);
     EXPECT_EQ(same.reason, result.reason);
-    EXPECT_EQ(plain.patches()[from].danger < 0.0, result.reason == PlanReason::kStartNotOnSurface);
-    const double expected = plain.Cost(from, to);
-    if (expected < 0.0) {
+    EXPECT_EQ(from < 0, result.reason == PlanReason::kStartNotOnSurface);
+    EXPECT_EQ(from >= 0 && to < 0, result.reason == PlanReason::kGoalNotOnSurface);
+    if (from < 0 || to < 0) {
       ++tally->off;
       EXPECT_FALSE(result.found());
       continue;
     }
+    const double expected = plain.Cost(from, to);
     ASSERT_EQ(result.found(), std::isfinite(expected)) << result.message;
     if (!result.found()) {
       ++tally->none;
@@ -138,6 +147,13 @@ void CompareOneWorld(std::uint64_t seed, Tally* tally) {
     tally->pulled += result.cost < 0.999 * result.graph_cost ? 1 : 0;
     EXPECT_NEAR(result.graph_cost, expected, 2e-4 * expected + 1e-9);
     EXPECT_LE(result.cost, result.graph_cost * 1.0002);
+    for (const auto& [patch, at] :
+         {std::pair(from, result.waypoints.front()), std::pair(to, result.waypoints.back())}) {
+      const PlainPlanner::Patch& p = plain.patches()[patch];
+      const Eigen::Vector3d centre((p.cell.x + 0.5) * kCell, (p.cell.y + 0.5) * kCell, p.z);
+      EXPECT_LT((at - centre).norm(), 1e-5);
+    }
+    tally->moved += absl::StrContains(result.message, "moved") ? 1 : 0;
     EXPECT_EQ(Collision(world.map, result.waypoints, world.profile, kCell), "");
   }
 }
@@ -150,6 +166,69 @@ TEST(PlannerOracleTest, CostsAreThoseOfDijkstraAndPathsHitNothing) {
   EXPECT_GT(tally.none, 5);
   EXPECT_GT(tally.gaps, 3);
   EXPECT_GT(tally.pulled, 5);
+  EXPECT_GT(tally.moved, 5);
+}
+
+// Places to stand and moves of a profile, as (cell, height) and (cell, height, cell, height).
+using Place = std::tuple<int, int, float>;
+struct Freedom {
+  std::set<Place> places;
+  std::set<std::pair<Place, Place>> moves;
+};
+
+Freedom FreedomOf(MemoryTiles& source, const RobotProfile& profile) {
+  Freedom freedom;
+  const auto checks = MakeProfileChecks(profile, kCell);
+  STRATA_EXPECT_OK(checks);
+  TileCache cache(std::size_t{1} << 28);
+  SearchSpace space(cache, source, *checks);
+  for (const TileKey& key : source.Keys()) space.SlotOf(key);
+  const auto place = [&space](PatchId patch) {
+    const CellIndex cell = space.CellOfPatch(patch);
+    return Place(cell.x, cell.y, space.Height(patch));
+  };
+  for (const SearchSpace::Slot& slot : space.slots()) {
+    for (PatchId patch = slot.base; patch < slot.base + slot.tile->size(); ++patch) {
+      if (space.Danger(patch) < 0.0F) continue;
+      freedom.places.insert(place(patch));
+      for (int k = 0; k < 8; ++k) {
+        std::uint32_t cost = 0;
+        int cells = 0;
+        const PatchId to = space.Follow(patch, k, &cost, &cells);
+        if (to != kNoPatchId) freedom.moves.emplace(place(patch), place(to));
+      }
+    }
+  }
+  return freedom;
+}
+
+TEST(PlannerOracleTest, WhoCanDoMoreMayStandAndMoveWhereverWhoCanDoLessMay) {
+  std::size_t gained = 0;
+  for (std::uint64_t seed = 101; seed <= 124; ++seed) {
+    const World world = RandomWorld(seed);
+    MemoryTiles source(world.map.Tiles());
+    const Freedom less = FreedomOf(source, world.profile);
+    std::mt19937_64 random(seed);
+    const auto factor = [&random](double low, double high) {
+      return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    for (int way = 0; way < 6; ++way) {
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << " way " << way);
+      RobotProfile able = world.profile;  // one thing better, then all of them
+      if (way == 0 || way == 5) able.max_step_m *= factor(1.1, 2.5);
+      if (way == 1 || way == 5) able.max_slope_rad *= factor(1.1, 1.6);
+      if (way == 2 || way == 5) able.max_gap_m += factor(0.1, 0.4);
+      if (way == 3 || way == 5) able.radius_m *= factor(0.3, 0.9);
+      if (way == 4 || way == 5) able.height_m *= factor(0.93, 0.99);
+      const Freedom more = FreedomOf(source, able);
+      EXPECT_TRUE(std::includes(
+          more.places.begin(), more.places.end(), less.places.begin(), less.places.end()));
+      EXPECT_TRUE(std::includes(
+          more.moves.begin(), more.moves.end(), less.moves.begin(), less.moves.end()));
+      gained += more.places.size() - less.places.size();
+    }
+  }
+  EXPECT_GT(gained, 1000U);
 }
 
 }  // namespace

@@ -217,6 +217,46 @@ TEST(PlannerTest, StartAndGoalOffTheMapNameTheNearestPlace) {
   EXPECT_FALSE(goal.nearest.has_value());
 }
 
+TEST(PlannerTest, EndpointsMoveToTheNearestPlaceOnTheirLevel) {
+  DrawnMap map = Bridge(1.5, 0.3, '=');
+  for (int y = 8; y < 12; ++y) {
+    for (int x = 8; x < 12; ++x) map.Erase({x, y});  // below a sensor at (1, 1)
+  }
+  const PlanResult start = PlanIn(map, At(1.0, 1.0, 0.05), At(7.05, 1.05, 0));
+  ASSERT_TRUE(start.found()) << start.message;
+  EXPECT_THAT(start.message, HasSubstr("found; start moved 0.25 m"));
+  EXPECT_THAT(start.message, HasSubstr("no surface at (1.00, 1.00)"));
+  const Eigen::Vector3d first = start.waypoints.front();
+  EXPECT_LE(std::hypot(first.x() - 1.0, first.y() - 1.0), 0.5);
+  EXPECT_NEAR(first.z(), 0.0, 1e-6);
+  // No higher than a step and slope from the height asked for.
+  EXPECT_EQ(PlanIn(map, At(1.0, 1.0, 0.4), At(7.05, 1.05, 0)).reason,
+            PlanReason::kStartNotOnSurface);
+
+  // At the deck's edge: the deck, not the road beneath; by level the same.
+  for (const bool by_level : {false, true}) {
+    PlanEndpoint goal = At(11.05, 2.55, 1.5);
+    if (by_level) goal = {.x_m = 11.05, .y_m = 2.55, .level = 1};
+    const PlanResult edge = PlanIn(map, At(3.05, 3.75, 1.5), goal);
+    ASSERT_TRUE(edge.found()) << edge.message;
+    EXPECT_THAT(edge.message, HasSubstr("goal moved 0.2"));
+    EXPECT_THAT(edge.message, HasSubstr("drop of 1.50 m"));
+    EXPECT_NEAR(edge.waypoints.back().z(), 1.5, 1e-6);
+  }
+}
+
+// A storey above the goal whose wall is nearest to it; the ramp leads to ground that
+// unobserved cells separate from the goal's.
+TEST(PlannerTest, NamesTheMoveThatSeparatesAndNotTheWallAboveTheGoal) {
+  DrawnMap map = Bridge(1.5, 0.3, '#');
+  for (int y = 0; y < 75; ++y) {
+    for (int x = -100; x < -60; ++x) map[{x, y}] = {{0.0}};
+  }
+  const PlanResult result = PlanIn(map, At(7.05, 3.75, 1.5), At(7.05, 3.75, 0));
+  EXPECT_FALSE(result.found());
+  EXPECT_EQ(result.reason, PlanReason::kUnknownGround) << result.message;
+}
+
 TEST(PlannerTest, TakesStartAndGoalByLevel) {
   const DrawnMap map = Bridge(1.5, 0.3, '=');
   PlanQuery query = {.from = {.x_m = 3.05, .y_m = 3.75, .level = 1},
@@ -302,6 +342,7 @@ TEST(PlannerTest, LimitsStopsAndFailuresAreAnswered) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("radius_m")));
   query.profile = SmallRobot();
   query.profile.max_gap_m = 10.0;
+  query.profile.radius_m = 5.0;
   EXPECT_THAT(planner.Plan(source, query, Stop()),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("cells")));
   MemoryTiles broken(Terraces(0.0).Tiles(2));
