@@ -9,6 +9,7 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include <Eigen/Core>
@@ -41,10 +42,12 @@ class PaddedTile {
       }
     }
     while (next_cell < begin_.size()) begin_[next_cell++] = size();
+    samples_.emplace_back();  // so that the last cells, too, have something to read
   }
 
   // Index of cell (x, y) of the tile; x, y in [−kMargin, kTileCells + kMargin).
   static int IndexOf(int x, int y) { return (y + kMargin) * kPaddedCells + x + kMargin; }
+  // data() may be read even when the cell is empty.
   std::span<const HeightSample> Cell(int index) const {
     return {samples_.data() + begin_[index], begin_[index + 1] - begin_[index]};
   }
@@ -102,13 +105,26 @@ double Noise(const HeightSample& a, const HeightSample& b) {
   return kNoiseGate * std::sqrt(double{a.variance_m2} + b.variance_m2);
 }
 
+// Of an empty column whatever lies there.
 const HeightSample& Nearest(std::span<const HeightSample> column, float z_m) {
-  const HeightSample* nearest = &column.front();
-  for (const HeightSample& sample : column.subspan(1)) {
-    if (std::abs(sample.z_m - z_m) < std::abs(nearest->z_m - z_m)) nearest = &sample;
+  const HeightSample* nearest = column.data();
+  for (std::size_t i = 1; i < column.size(); ++i) {
+    if (std::abs(column[i].z_m - z_m) < std::abs(nearest->z_m - z_m)) nearest = &column[i];
   }
   return *nearest;
 }
+
+// The tops around a surface that are the same ground, itself first.
+struct Ground {
+  struct Top {
+    double dx, dy, dz_m;
+    HeightSample sample;
+  };
+  std::array<Top, (2 * kPlaneRadiusCells + 1) * (2 * kPlaneRadiusCells + 1) + 1> tops;
+  std::size_t count = 0;
+
+  std::span<const Top> span() const { return {tops.data(), count}; }
+};
 
 // What the rules say about one surface.
 struct Finding {
@@ -168,63 +184,66 @@ class Judge {
   }
 
   void FitAndCheckSteps(int cell, const HeightSample& self, Finding& finding) const {
+    Ground ground;
+    finding.step_m = GatherGround(cell, self, ground);
     LocalPlaneFit fit(cell_size_m_);
-    fit.Add(0.0, 0.0, 0.0, self);
-    for (const Offset& offset : window_) {
-      const std::span<const HeightSample> column = padded_.Cell(cell + offset.cells);
-      if (column.empty()) continue;
-      const HeightSample& sample = Nearest(column, self.z_m);
-      const double dz = double{sample.z_m} - self.z_m;
-      if (WithinReach(dz, offset, self, sample)) fit.Add(offset.dx, offset.dy, dz, sample);
-      if (offset.adjacent && std::abs(dz) > finding.step_m) {
-        finding.step_m = std::max(finding.step_m, StepTo(column, offset, dz, self, sample));
-      }
-    }
+    for (const Ground::Top& top : ground.span()) fit.Add(top.dx, top.dy, top.dz_m, top.sample);
     finding.plane = fit.Solve();
     if (finding.plane.has_value() && finding.plane->SteeperThan(tan_limit_) &&
         finding.plane->roughness_m() > 0.0) {
-      StandBesideStep(cell, self, *finding.plane);
+      StandBesideStep(ground, *finding.plane);
     }
   }
 
-  static bool WithinReach(double dz,
-                          const Offset& offset,
-                          const HeightSample& self,
-                          const HeightSample& sample) {
-    return std::abs(dz) <= offset.reach_m || std::abs(dz) <= offset.reach_m + Noise(self, sample);
-  }
-
-  // Height of the step to an adjacent column beyond noise; infinite next to a wall or a drop.
-  double StepTo(std::span<const HeightSample> column,
-                const Offset& offset,
-                double dz,
-                const HeightSample& self,
-                const HeightSample& nearest) const {
-    const double beyond_noise = std::abs(dz) - Noise(self, nearest);
-    if (beyond_noise <= offset.step_m) return beyond_noise;
-    for (const HeightSample& sample : column) {
-      const bool drop = sample.z_m < self.z_m;
-      if (drop || sample.bottom_m - self.z_m < limits_.clearance_m) {
-        return std::numeric_limits<double>::infinity();
+  // Returns the largest step. Which cells are occupied and within reach is as good as random, so
+  // every cell is computed and written, and kept or not: branches would cost more.
+  double GatherGround(int cell, const HeightSample& self, Ground& ground) const {
+    ground.tops[0] = {0.0, 0.0, 0.0, self};
+    ground.count = 1;
+    double step_m = 0.0;
+    for (const Offset& offset : window_) {
+      const std::span<const HeightSample> column = padded_.Cell(cell + offset.cells);
+      const HeightSample& sample = Nearest(column, self.z_m);
+      const double dz = column.empty() ? 0.0 : double{sample.z_m} - self.z_m;
+      const double noise = Noise(self, sample);
+      const bool within_reach = std::abs(dz) <= offset.reach_m + noise;
+      ground.tops[ground.count] = {offset.dx, offset.dy, dz, sample};
+      ground.count += !column.empty() & within_reach ? 1 : 0;
+      if (!offset.adjacent) continue;
+      const double beyond_noise = std::abs(dz) - noise;
+      if (beyond_noise > offset.step_m && std::abs(dz) > step_m) [[unlikely]] {
+        if (Blocks(column, self)) step_m = std::numeric_limits<double>::infinity();
+      } else {
+        step_m = std::max(step_m, beyond_noise);
       }
     }
-    return 0.0;
+    return step_m;
+  }
+
+  // True of a column whose nearest top is out of a step's reach: a wall or a drop; false of one
+  // that is all above the robot's head.
+  bool Blocks(std::span<const HeightSample> column, const HeightSample& self) const {
+    return std::any_of(column.begin(), column.end(), [&](const HeightSample& sample) {
+      return sample.z_m < self.z_m || sample.bottom_m - self.z_m < limits_.clearance_m;
+    });
   }
 
   // Puts the plane of the quarter window with the smallest residual in place of `plane`, if noise
   // explains that residual.
-  void StandBesideStep(int cell, const HeightSample& self, LocalPlane& plane) const {
+  void StandBesideStep(const Ground& ground, LocalPlane& plane) const {
     std::optional<LocalPlane> best;
     for (const auto& [sx, sy] : kQuarters) {
+      std::array<std::uint8_t, std::tuple_size_v<decltype(ground.tops)>> in_quarter;
+      std::size_t count = 0;
+      for (std::size_t i = 0; i < ground.count; ++i) {
+        const Ground::Top& top = ground.tops[i];
+        in_quarter[count] = static_cast<std::uint8_t>(i);
+        count += (top.dx * sx >= 0.0) & (top.dy * sy >= 0.0) ? 1 : 0;
+      }
       LocalPlaneFit fit(cell_size_m_);
-      fit.Add(0.0, 0.0, 0.0, self);
-      for (const Offset& offset : window_) {
-        if (offset.dx * sx < 0.0 || offset.dy * sy < 0.0) continue;
-        const std::span<const HeightSample> column = padded_.Cell(cell + offset.cells);
-        if (column.empty()) continue;
-        const HeightSample& sample = Nearest(column, self.z_m);
-        const double dz = double{sample.z_m} - self.z_m;
-        if (WithinReach(dz, offset, self, sample)) fit.Add(offset.dx, offset.dy, dz, sample);
+      for (std::size_t i = 0; i < count; ++i) {
+        const Ground::Top& top = ground.tops[in_quarter[i]];
+        fit.Add(top.dx, top.dy, top.dz_m, top.sample);
       }
       const std::optional<LocalPlane> quarter = fit.Solve();
       if (!quarter.has_value() || quarter->roughness_m() > 0.0) continue;
