@@ -125,7 +125,7 @@ class TileReasons {
 
 bool Reached(const SearchSpace& space, const SearchWorkspace& workspace, PatchId patch) {
   const int slot = space.SlotOf(patch);
-  const SearchNode* nodes = workspace.NodesIfAny(slot);
+  const SearchNode* nodes = workspace.NodesIfAny(slot, space.slots()[slot].tile->size());
   return nodes != nullptr && workspace.Reached(nodes[patch - space.slots()[slot].base]);
 }
 
@@ -148,9 +148,9 @@ class Frontier {
   std::vector<PatchId> Patches(const Eigen::Vector3d& goal) const {
     std::vector<std::tuple<double, double, double, double, PatchId>> ranked;
     for (std::size_t slot = 0; slot < space_.slots().size(); ++slot) {
-      const SearchNode* nodes = reached_.NodesIfAny(static_cast<int>(slot));
-      if (nodes == nullptr) continue;
       const SearchSpace::Slot& s = space_.slots()[slot];
+      const SearchNode* nodes = reached_.NodesIfAny(static_cast<int>(slot), s.tile->size());
+      if (nodes == nullptr) continue;
       for (std::uint32_t i = 0; i < s.tile->size(); ++i) {
         if (!reached_.Reached(nodes[i]) || !HasRefusedMove(*s.tile, i)) continue;
         const Eigen::Vector3d p = space_.Position(s.base + i);
@@ -187,8 +187,9 @@ class Frontier {
     const int limit = static_cast<int>(kLookAheadM / checks.StepLength(move.direction));
     const int unknown_limit = static_cast<int>((checks.footprint_m + checks.profile.max_gap_m) /
                                                checks.StepLength(move.direction));
-    bool even = true;  // nothing but ground so far
-    int unobserved = 0;
+    bool even = true;    // nothing but ground so far
+    int unobserved = 0;  // cells since the last ground, walls included
+    bool wall = false;   // among them
     bool unknown = false;
     for (int n = 1; n <= limit; ++n) {
       cell = {cell.x + kStepX[move.direction], cell.y + kStepY[move.direction]};
@@ -197,15 +198,22 @@ class Frontier {
       const PatchId next = Nearest(first, count, level);
       if (next == kNoPatchId) {
         if (count > 0 && space_.Height(first) < level) break;  // a drop
+        wall = wall || count > 0;
         even = even && count == 0;
         ++unobserved;
         unknown = unknown || (even && unobserved > unknown_limit);
         continue;
       }
+      // Slopes under a hole count as ground that was not seen; behind a wall it must be level.
+      const float rise =
+          wall ? checks.step_m
+               : checks.RiseOver((unobserved + 1) * checks.StepLength(move.direction));
+      if (unobserved > 0 && std::abs(space_.Height(next) - level) > rise) break;
       if (Reached(space_, from_goal_, next)) return Beyond::kGoalsGround;
       if (Reached(space_, reached_, next)) return Beyond::kOther;  // another way leads there
       even = even && std::abs(space_.Height(next) - level) <= checks.step_m;
       unobserved = 0;
+      wall = false;
       level = space_.Height(next);
     }
     return unknown ? Beyond::kUnknown : Beyond::kOther;

@@ -25,9 +25,9 @@ namespace {
 template <typename Visit>
 void ForEachReached(const SearchSpace& space, const SearchWorkspace& workspace, Visit visit) {
   for (std::size_t slot = 0; slot < space.slots().size(); ++slot) {
-    const SearchNode* nodes = workspace.NodesIfAny(static_cast<int>(slot));
-    if (nodes == nullptr) continue;
     const SearchSpace::Slot& s = space.slots()[slot];
+    const SearchNode* nodes = workspace.NodesIfAny(static_cast<int>(slot), s.tile->size());
+    if (nodes == nullptr) continue;
     for (std::uint32_t i = 0; i < s.tile->size(); ++i) {
       if (workspace.Reached(nodes[i])) visit(s.base + i, nodes[i].cost);
     }

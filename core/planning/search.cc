@@ -278,8 +278,8 @@ std::uint32_t* SearchWorkspace::Bounds(int slot, std::uint32_t size) {
   return bounds.data();
 }
 
-const SearchNode* SearchWorkspace::NodesIfAny(int slot) const {
-  return static_cast<std::size_t>(slot) < nodes_.size() && !nodes_[slot].empty()
+const SearchNode* SearchWorkspace::NodesIfAny(int slot, std::uint32_t size) const {
+  return static_cast<std::size_t>(slot) < nodes_.size() && nodes_[slot].size() >= std::max(size, 1U)
              ? nodes_[slot].data()
              : nullptr;
 }

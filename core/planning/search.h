@@ -32,7 +32,9 @@ class SearchWorkspace {
   SearchNode* Nodes(int slot, std::uint32_t size);
   // Lower bounds to the goal beside them, for searches whose bound is worth keeping.
   std::uint32_t* Bounds(int slot, std::uint32_t size);
-  const SearchNode* NodesIfAny(int slot) const;
+  // nullptr if the search has not been in a slot of that size; nodes are kept from search to
+  // search, so an earlier one's slot of the same number may be smaller.
+  const SearchNode* NodesIfAny(int slot, std::uint32_t size) const;
   bool Reached(const SearchNode& node) const { return node.stamp >> 4 == generation_; }
   std::uint32_t Stamp(int direction) const {
     return generation_ << 4 | static_cast<std::uint32_t>(direction);
