@@ -444,7 +444,7 @@ TEST_F(IntegrationTest, PathsOverAndUnderABridge) {
   MakeMap(MapParameters());
   const World world = BridgeWorld();
   for (const Robot& robot : world.robots) {
-    const std::vector<Pose> poses = Drive(world.scene, robot.waypoints, 3.0, 1.2);
+    const std::vector<Pose> poses = Drive(world.scene, robot.waypoints, 1.5, 1.2);
     for (std::size_t i = 0; i < poses.size(); ++i) {
       const PointCloud cloud = SimulateScan(world.scene, {}, poses[i], i + 1);
       STRATA_ASSERT_OK(Upload(db(), HeaderOf({robot.name, i + 1}, cloud, poses[i]), cloud, 40'000));
