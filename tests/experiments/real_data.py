@@ -160,30 +160,43 @@ def nclt(strata, table, data):
     nclt_plan(strata, table, [by_index[i] for i in indices])
 
 
-def nclt_plan(strata, table, route, sensor_height=2.1, gap=0.7):
+def ground_below(strata, name, T):
+    """The driven place on the ground: below the sensor, at the median height of what the map has around it."""
+    around = []
+    for angle in np.radians(np.arange(0, 360, 30)):
+        x, y = T[:2, 3] + 1.5 * np.array([np.cos(angle), np.sin(angle)])
+        surfaces = strata("surface", name, "--at", f"{x:.3f},{y:.3f}")["surfaces"]
+        around += [s["z"] for s in surfaces if 1.5 < T[2, 3] - s["z"] < 4.0]
+    return np.array([*T[:2, 3], np.median(around) if around else T[2, 3] - 2.7])
+
+
+def nclt_plan(strata, table, route, gap=0.7, step=0.25):
     """Plans along 320 m of the driven route: in legs of about 40 m, and at once.
 
-    The author of the data thinned the scans, so the ground has wide unobserved stretches: `gap` is what it takes. Ends
-    are the driven positions themselves; a robot stands on ground that it does not see, so the planner may move them.
+    The author of the data thinned the scans, so the ground has unobserved stretches: `gap` is what it takes to cross
+    them, `step` to cross its kerbs. Ends are the driven positions; a sensor does not see the ground that it stands
+    over, so the planner may move them.
     """
-    feet = [T[:3, 3] - [0, 0, sensor_height] for T in route]
-    driven = np.concatenate([[0], np.cumsum([np.linalg.norm(b - a) for a, b in zip(feet, feet[1:])])])
+    limits = ("--max-gap", gap, "--max-step", step)
+    driven = np.concatenate([[0], np.cumsum([np.linalg.norm(b[:3, 3] - a[:3, 3]) for a, b in zip(route, route[1:])])])
     begin = int(np.searchsorted(driven, 10.0))
     # Straight to the goal would be shorter than the driven route: the path is asked for along it, in legs.
     marks = [int(np.searchsorted(driven, driven[begin] + s)) for s in range(0, 321, 40)]
-    legs = [strata.plan("nclt", feet[a], feet[b], "--max-gap", gap) for a, b in zip(marks, marks[1:])]
-    for leg, a in zip(legs, marks):
+    feet = [ground_below(strata, "nclt", route[mark]) for mark in marks]
+    legs = [strata.plan("nclt", a, b, *limits) for a, b in zip(feet, feet[1:])]
+    for leg, mark in zip(legs, marks):
         if not leg["found"]:
-            print(f"   leg from {driven[a]:.0f} m: {leg['reason']}: {leg.get('message')}", file=sys.stderr)
+            print(f"   leg from {driven[mark]:.0f} m: {leg['reason']}: {leg.get('message')}", file=sys.stderr)
     length = sum(leg["length_m"] for leg in legs if leg["found"])
+    way = driven[marks[-1]] - driven[begin]
     moved = sum("moved" in leg.get("message", "") for leg in legs)
-    table.row("nclt", f"plan along the route, {len(legs)} legs, max_gap {gap} m, {moved} with ends moved", f"{length:.1f} m",
-              "≥ 300 m, all found", all(leg["found"] for leg in legs) and length >= 300)
-    end = marks[-1]
-    whole = strata.plan("nclt", feet[begin], feet[end], "--max-gap", gap)
+    said = f"max_gap {gap} max_step {step} m"
+    table.row("nclt", f"plan along the route, {len(legs)} legs ({moved} with moved ends), {said}", f"{length:.1f} m",
+              f"300 to {1.25 * way:.0f} m, all found", all(leg["found"] for leg in legs) and 300 <= length <= 1.25 * way)
+    whole = strata.plan("nclt", feet[0], feet[-1], *limits)
     if not whole["found"]:
         print("   at once:", whole["reason"], whole.get("message"), file=sys.stderr)
-    table.row("nclt", f"plan over {driven[end] - driven[begin]:.0f} m of driving at once, max_gap {gap} m: {whole['reason']}",
+    table.row("nclt", f"plan over {way:.0f} m of driving at once, {said}: {whole['reason']}",
               f"{whole['length_m']:.1f} m / {whole['elapsed_ms']:.0f} ms", "found", whole["found"])
 
 
