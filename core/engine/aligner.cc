@@ -23,6 +23,16 @@ namespace {
 // information: more would repeat the same measurement.
 constexpr std::size_t kMaxConstraints = 3;
 
+// Twice the default: a chain of hundreds of scans drifts less and by chance (neighbours.h has
+// numbers).
+constexpr int kSamples = 4000;
+
+MlsRegistrationOptions RegistrationOptions() {
+  MlsRegistrationOptions options;
+  options.max_samples = kSamples;
+  return options;
+}
+
 bool Accepted(Termination termination) {
   return termination == Termination::kConverged || termination == Termination::kMaxIterations ||
          termination == Termination::kDegenerate;
@@ -85,9 +95,12 @@ Pose Aligner::Guess(const ScanRecord& scan) const {
                     header.T_map_scan);
 }
 
-Aligner::Features Aligner::Keep(ScanNumber number, const MlsMap& local_map) {
-  auto features = std::make_shared<const ScanFeatures>(ScanFeatures::FromMap(local_map));
-  features_.Put(number, features, features->memory_bytes());
+Aligner::Features Aligner::Keep(const ScanRecord& scan, const MlsMap& local_map) {
+  ScanFeatureOptions options;
+  options.sample_count = kSamples;
+  options.sensor_origin = scan.header.sensor_origin.cast<double>();
+  auto features = std::make_shared<const ScanFeatures>(ScanFeatures::FromMap(local_map, options));
+  features_.Put(scan.number, features, features->memory_bytes());
   return features;
 }
 
@@ -97,7 +110,7 @@ absl::StatusOr<Aligner::Features> Aligner::FeaturesOf(ScanNumber number,
   if (Features held = features_.Find(number); held != nullptr) return held;
   STRATA_ASSIGN_OR_RETURN(const PosedScan posed, reader.GetScan(number, 0));
   STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(posed.scan));
-  return Keep(number, local_map);
+  return Keep(posed.scan, local_map);
 }
 
 absl::StatusOr<Aligner::Neighbourhood> Aligner::NeighboursOf(const Pose& guess,
@@ -142,7 +155,7 @@ absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
                                          ScanSource& source) {
   Placement placement;
   placement.T_map_scan = scan.header.T_map_scan;
-  const Features own = Keep(scan.number, local_map);
+  const Features own = Keep(scan, local_map);
   if (scan.header.alignment == Alignment::kOff) {
     placement.report.message = "alignment off: pose as uploaded";
     return placement;
@@ -155,7 +168,7 @@ absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
     return placement;
   }
   const RegistrationTarget target(around.placed, TargetOptions{.centre = guess.translation()});
-  const RegistrationResult match = RegisterScan(*own, target, guess);
+  const RegistrationResult match = RegisterScan(*own, target, guess, RegistrationOptions());
   placement.report = ReportOf(match);
   if (!placement.report.aligned) return placement;
   placement.T_map_scan = Normalized(match.T_target_source);

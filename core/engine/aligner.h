@@ -71,7 +71,7 @@ class Aligner {
                                               const Placement& placement,
                                               const Matrix6d& information,
                                               std::vector<std::size_t> partners) const;
-  Features Keep(ScanNumber number, const MlsMap& local_map);
+  Features Keep(const ScanRecord& scan, const MlsMap& local_map);
 
   // By commit order.
   std::vector<PlacedEntry> scans_;

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "absl/status/status.h"
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
@@ -26,6 +27,12 @@ namespace {
 // Columns of this width hold a few tens of features near the sensor, and the nearest one is most
 // often in the first.
 constexpr float kColumnSizeM = 0.4F;
+
+// An underside is seen at elevations above 3°, given as a sine, and is level: within a square metre
+// its heights spread little, unlike those of leaves or of a hillside.
+constexpr float kOverhead = 0.05F;
+constexpr double kMaxSpreadM = 0.05;
+constexpr int kMinLevelPoints = 3;
 
 using ClassPoints = std::array<std::vector<Eigen::Vector3f>, kFeatureClasses>;
 
@@ -48,6 +55,44 @@ void AppendPatch(
   }
 }
 
+// Of heights.
+struct Spread {
+  int n = 0;
+  double sum = 0.0;
+  double squares = 0.0;
+
+  void Add(double z) {
+    ++n;
+    sum += z;
+    squares += z * z;
+  }
+  bool IsLevel() const {
+    const double mean = sum / n;
+    return n >= kMinLevelPoints && squares / n - mean * mean < kMaxSpreadM * kMaxSpreadM;
+  }
+};
+
+// Moves the undersides of decks and ceilings out of the traversable class.
+void SeparateUndersides(const Eigen::Vector3f& sensor_origin, ClassPoints& points) {
+  using Block = std::array<int, 3>;
+  const auto block_of = [](const Eigen::Vector3f& p) {
+    return Block{static_cast<int>(std::floor(p.x())),
+                 static_cast<int>(std::floor(p.y())),
+                 static_cast<int>(std::floor(p.z() / 2.0F))};
+  };
+  std::vector<Eigen::Vector3f>& horizontal = ListOf(FeatureClass::kTraversable, points);
+  const auto above =
+      std::stable_partition(horizontal.begin(), horizontal.end(), [&](const Eigen::Vector3f& p) {
+        return p.z() - sensor_origin.z() < kOverhead * (p - sensor_origin).norm();
+      });
+  absl::flat_hash_map<Block, Spread> spreads;
+  std::for_each(above, horizontal.end(), [&](const auto& p) { spreads[block_of(p)].Add(p.z()); });
+  const auto undersides = std::stable_partition(
+      above, horizontal.end(), [&](const auto& p) { return !spreads[block_of(p)].IsLevel(); });
+  ListOf(FeatureClass::kNonTraversable, points).assign(undersides, horizontal.end());
+  horizontal.erase(undersides, horizontal.end());
+}
+
 std::uint64_t ContentHash(const ClassPoints& points) {
   std::uint64_t hash = 0;
   for (const auto& list : points) {
@@ -67,6 +112,7 @@ absl::Status ScanFeatureOptions::Validate() const {
   checks.InRange("sample_count", sample_count, 0, 1000000);
   checks.InRange("neighbours", neighbours, 4, ColumnGrid::kMaxNeighbours);
   checks.InRange("neighbour_radius_m", neighbour_radius_m, 0.01, 100.0);
+  checks.InRange("|sensor_origin|", sensor_origin.norm(), 0.0, 1e8);
   return checks.status();
 }
 
@@ -112,6 +158,7 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const ScanFeatureOpt
           patch, static_cast<float>(x), static_cast<float>(y), options.samples_per_metre, points);
     }
   }
+  SeparateUndersides(options.sensor_origin.cast<float>(), points);
   for (auto& list : points) list.shrink_to_fit();
   return FromPoints(std::move(points), options);
 }

@@ -29,6 +29,9 @@ struct ScanFeatureOptions {
   std::uint64_t seed = 1;
   int neighbours = 16;              // that span a surface element; in [4, 32]
   double neighbour_radius_m = 1.5;  // farther ones do not count; in [0.01, 100]
+  // FromMap: where the scan was taken from, in its frame; finite. What it saw from below is not
+  // what others saw from above.
+  Eigen::Vector3d sensor_origin = Eigen::Vector3d::Zero();
 
   // INVALID_ARGUMENT naming every field out of its range.
   absl::Status Validate() const;
@@ -56,8 +59,9 @@ SurfaceElement FitSurfaceElement(const ColumnGrid& grid,
 
 // Registration features of one local map in its scan frame: one point per horizontal patch (cell
 // centre, mean height), evenly spaced points along each vertical one, and a sample of both with
-// normals. Features are matched within their class only (thesis 7.2.3). Flat float arrays,
-// immutable, safe to share between threads.
+// normals. Features are matched within their class only (thesis 7.2.3); so that the underside of
+// a deck is not drawn onto its top, level surfaces seen from below are in the class of what cannot
+// be driven on. Flat float arrays, immutable, safe to share between threads.
 class ScanFeatures {
  public:
   ScanFeatures() = default;

@@ -1,5 +1,6 @@
 #include "core/registration/mls_registration.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -149,6 +150,59 @@ TEST(ScanFeaturesTest, AnnotationMakesThreeClasses) {
   int sampled[kFeatureClasses] = {};
   for (const SampledFeature& s : features.sample()) ++sampled[static_cast<int>(s.feature_class)];
   EXPECT_GT(sampled[1], 100);
+}
+
+// The yard with one side of a deck of 10 × 10 m.
+PointCloud YardWithDeck(const Pose& T_world_scan, std::uint64_t seed, double deck_z) {
+  PointCloud cloud = Yard(T_world_scan, seed);
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> across(-5.0, 5.0);
+  std::normal_distribution<double> noise(0.0, 0.01);
+  const Pose T_scan_world = T_world_scan.inverse();
+  for (int i = 0; i < 60000; ++i) {
+    const Eigen::Vector3d p(across(random), across(random), deck_z + noise(random));
+    cloud.points.push_back((T_scan_world * p).cast<float>());
+  }
+  return cloud;
+}
+
+TEST(ScanFeaturesTest, WhatWasSeenFromBelowIsNotWhatWasSeenFromAbove) {
+  const Pose T_world_below = Step(0, 0, 0, 1, 0, 1);
+  const ScanFeatures below = Features(YardWithDeck(T_world_below, 1, 3.0));
+  const auto at_the_deck = [&](FeatureClass c) {
+    return std::ranges::count_if(
+        below.points(c), [](const Eigen::Vector3f& p) { return std::abs(p.z() - 2.0F) < 0.1F; });
+  };
+  EXPECT_GT(at_the_deck(FeatureClass::kNonTraversable), 9000);
+  EXPECT_LT(at_the_deck(FeatureClass::kTraversable), 90);
+  // A sensor elsewhere than its frame's origin.
+  ScanFeatureOptions options;
+  options.sensor_origin = {0, 0, 5};
+  const ScanFeatures above = Features(YardWithDeck(Pose::Identity(), 2, 3.4), options);
+  EXPECT_THAT(above.points(FeatureClass::kNonTraversable), IsEmpty());
+}
+
+TEST(ScanFeaturesTest, AHillsideIsSeenFromAbove) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> wide(-15.0, 15.0);
+  std::normal_distribution<double> noise(0.0, 0.02);
+  PointCloud hill;  // rises by 20 %: most of its upper half is above the sensor
+  for (int i = 0; i < 60000; ++i) {
+    const double x = wide(random);
+    hill.points.emplace_back(
+        Eigen::Vector3d(x, wide(random), 0.2 * x - 0.7 + noise(random)).cast<float>());
+  }
+  const ScanFeatures features = Features(hill);
+  EXPECT_LT(features.points(FeatureClass::kNonTraversable).size(), features.size() / 20);
+}
+
+TEST(RegisterScanTest, UndersideOfADeckIsNotDrawnOntoItsTop) {
+  const Pose T_world_below = Step(0, 0, 0, 1, 0, 1);
+  const Pose T_world_above = Step(0, 0, 0, -1, 1, 5);
+  const ScanFeatures below = Features(YardWithDeck(T_world_below, 1, 3.0));
+  const ScanFeatures above = Features(YardWithDeck(T_world_above, 2, 3.4));
+  const auto r = RegisterScan(below, TargetOf(above, T_world_above), T_world_below * kOff);
+  EXPECT_LT((T_world_below.inverse() * r.T_target_source).translation().norm(), 0.02);
 }
 
 TEST(RegisterScanTest, ClassesAreMatchedAmongThemselvesOnly) {
