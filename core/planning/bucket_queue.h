@@ -46,14 +46,6 @@ class BucketQueue {
     --size_;
     return value;
   }
-  // What is popped next unless something is pushed before; nullptr if that is not known cheaply.
-  const std::uint32_t* Next() const {
-    for (std::uint32_t b = current_; b < current_ + 4; ++b) {
-      const std::vector<std::uint32_t>& bucket = ring_[b & (ring_.size() - 1)];
-      if (!bucket.empty()) return &bucket.back();
-    }
-    return nullptr;
-  }
 
  private:
   void Grow(std::uint32_t bucket) {

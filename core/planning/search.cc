@@ -108,7 +108,6 @@ class Search {
     while (!queue.empty()) {
       const PatchId patch = queue.Pop();
       if (goal_cost_ <= queue.lower_bound()) break;
-      if (const PatchId* next = queue.Next(); next != nullptr) Prefetch(*next);
       if (!Expand(patch)) continue;
       ++outcome.expanded;
       if (outcome.expanded % kExpansionsPerLook == 0) STRATA_RETURN_IF_ERROR(stop_.status());
@@ -143,13 +142,6 @@ class Search {
     bound_.Enter(slot, s);
   }
 
-  // Fetches what expanding a patch reads first while another is expanded.
-  void Prefetch(PatchId patch) const {
-    const int slot = space_.SlotOf(patch);
-    const SearchSpace::Slot& s = space_.slots()[slot];
-    __builtin_prefetch(&s.tile->moves[patch - s.base]);
-  }
-
   // Offers a way to patch `local` of the slot entered.
   void Relax(
       std::uint32_t local, std::uint32_t cost, int direction, std::int32_t x, std::int32_t y) {
@@ -164,7 +156,9 @@ class Search {
     const PatchId patch = base_ + local;
     if (patch == goal_) goal_cost_ = cost;
     const std::uint32_t total = cost + Remaining(local, x, y);
-    if (total < goal_cost_ && total < kMaxCost) workspace_.queue().Push(total, patch);
+    if (total >= goal_cost_ || total >= kMaxCost) return;
+    workspace_.queue().Push(total, patch);
+    __builtin_prefetch(&tile_->moves[local]);  // what expanding it reads first
   }
 
   std::uint32_t Remaining(std::uint32_t local, std::int32_t x, std::int32_t y) const {
