@@ -100,8 +100,7 @@ class Search {
     workspace_.Begin(Bound::kBucketShift);
     goal_ = goal;
     EnterSlot(space_.SlotOf(start));
-    const CellIndex cell = space_.CellOfPatch(start);
-    Relax(start - base_, 0, 0, cell.x, cell.y);
+    Relax(start - base_, 0, 0);
     if (start == goal) goal_cost_ = 0;
     BucketQueue& queue = workspace_.queue();
     SearchOutcome outcome;
@@ -143,42 +142,41 @@ class Search {
   }
 
   // Offers a way to patch `local` of the slot entered.
-  void Relax(
-      std::uint32_t local, std::uint32_t cost, int direction, std::int32_t x, std::int32_t y) {
+  void Relax(std::uint32_t local, std::uint32_t cost, int direction) {
     SearchNode& node = nodes_[local];
     const bool reached = workspace_.Reached(node);
     if (reached && cost >= node.cost) return;
     if constexpr (Bound::kKeep) {
-      if (!reached) bounds_[local] = bound_(x, y, local);
+      if (!reached) bounds_[local] = Bounded(local);
     }
     node.cost = cost;
     node.stamp = workspace_.Stamp(direction);
     const PatchId patch = base_ + local;
     if (patch == goal_) goal_cost_ = cost;
-    const std::uint32_t total = cost + Remaining(local, x, y);
+    const std::uint32_t total = cost + Remaining(local);
     if (total >= goal_cost_ || total >= kMaxCost) return;
     workspace_.queue().Push(total, patch);
     __builtin_prefetch(&tile_->moves[local]);  // what expanding it reads first
   }
 
-  std::uint32_t Remaining(std::uint32_t local, std::int32_t x, std::int32_t y) const {
+  std::uint32_t Bounded(std::uint32_t local) const {
+    const std::uint16_t cell = tile_->cell[local];
+    return bound_(x0_ + (cell & (kTileCells - 1)), y0_ + (cell >> kTileShift), local);
+  }
+  std::uint32_t Remaining(std::uint32_t local) const {
     if constexpr (Bound::kKeep) {
       return bounds_[local];
     } else {
-      return bound_(x, y, local);
+      return Bounded(local);
     }
   }
 
-  // False if the patch was expanded before or cannot be on a better path.
+  // False if the patch was expanded before.
   bool Expand(PatchId patch) {
     EnterSlot(space_.SlotOf(patch));
     const std::uint32_t local = patch - base_;
     SearchNode& node = nodes_[local];
     if ((node.stamp & kClosed) != 0) return false;
-    const std::uint16_t cell = tile_->cell[local];
-    const std::int32_t x = x0_ + (cell & (kTileCells - 1));
-    const std::int32_t y = y0_ + (cell >> kTileShift);
-    if (node.cost + Remaining(local, x, y) >= goal_cost_) return false;
     node.stamp |= kClosed;
     if (node.cost >= dearest_cost_) {
       dearest_cost_ = node.cost;
@@ -194,7 +192,7 @@ class Search {
         far |= 1U << k;
         continue;
       }
-      Relax(local + move.delta, cost + move.cost, k, x + kStepX[k], y + kStepY[k]);
+      Relax(local + move.delta, cost + move.cost, k);
     }
     if (far != 0) ExpandFar(local, cost, far);
     return true;
@@ -209,8 +207,7 @@ class Search {
       const PatchId target = space_.Resolve(space_.slots()[own_slot], move);
       if (target == kNoPatchId) continue;
       EnterSlot(space_.SlotOf(target));
-      const CellIndex cell = space_.CellOfPatch(target);
-      Relax(target - base_, cost + move.cost, k, cell.x, cell.y);
+      Relax(target - base_, cost + move.cost, k);
     }
   }
 
