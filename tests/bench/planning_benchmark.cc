@@ -362,8 +362,8 @@ int Compare(testing::MemoryTiles& source, std::size_t query_count, int repetitio
 }  // namespace strata
 
 int main(int argc, char** argv) {
-  const std::size_t queries = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 12;
-  const int repetitions = argc > 2 ? std::atoi(argv[2]) : 5;
+  const std::size_t queries = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 60;
+  const int repetitions = argc > 2 ? std::atoi(argv[2]) : 3;
   strata::testing::MemoryTiles source(strata::Campus().Build());
   return strata::Compare(source, queries, std::max(1, repetitions));
 }
