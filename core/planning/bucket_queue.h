@@ -9,9 +9,8 @@
 
 namespace strata {
 
-// Buckets of 2^shift priorities in a ring that grows to the span in use; last in, first out within
-// a bucket, which keeps a search near what is in the processor's cache. The caller copes with the
-// order inside a bucket by expanding again what got cheaper.
+// Buckets of 2^shift priorities in a ring that grows to the span in use; first in, first out within
+// a bucket. The caller copes with the order inside a bucket by expanding again what got cheaper.
 class BucketQueue {
  public:
   BucketQueue() : ring_(1024) {}
@@ -21,6 +20,7 @@ class BucketQueue {
     shift_ = shift;
     for (std::vector<std::uint32_t>& bucket : ring_) bucket.clear();
     size_ = 0;
+    next_ = 0;
     begun_ = false;
   }
   bool empty() const { return size_ == 0; }
@@ -40,19 +40,13 @@ class BucketQueue {
   // REQUIRES: !empty().
   std::uint32_t Pop() {
     std::vector<std::uint32_t>* bucket = &ring_[current_ & (ring_.size() - 1)];
-    while (bucket->empty()) bucket = &ring_[++current_ & (ring_.size() - 1)];
-    const std::uint32_t value = bucket->back();
-    bucket->pop_back();
-    --size_;
-    return value;
-  }
-  // What is popped next unless something is pushed before; nullptr if that is not known cheaply.
-  const std::uint32_t* Next() const {
-    for (std::uint32_t b = current_; b < current_ + 4; ++b) {
-      const std::vector<std::uint32_t>& bucket = ring_[b & (ring_.size() - 1)];
-      if (!bucket.empty()) return &bucket.back();
+    while (next_ == bucket->size()) {
+      bucket->clear();
+      next_ = 0;
+      bucket = &ring_[++current_ & (ring_.size() - 1)];
     }
-    return nullptr;
+    --size_;
+    return (*bucket)[next_++];
   }
 
  private:
@@ -69,7 +63,8 @@ class BucketQueue {
 
   int shift_ = 0;
   bool begun_ = false;
-  std::uint32_t current_ = 0;
+  std::uint32_t current_ = 0;  // the bucket that values are popped from,
+  std::size_t next_ = 0;       // and where in it the next one is
   std::size_t size_ = 0;
   std::vector<std::vector<std::uint32_t>> ring_;
 };

@@ -120,14 +120,15 @@ absl::StatusOr<std::shared_ptr<const Landmarks>> Landmarks::Make(SearchSpace& sp
 }
 
 void Landmarks::Store(const SearchSpace& space, const SearchWorkspace& workspace, int landmark) {
+  std::vector<std::uint32_t*> of_slot;
   for (const SearchSpace::Slot& slot : space.slots()) {
     std::vector<std::uint32_t>& costs = tiles_[slot.tile->key].costs;
     costs.resize(static_cast<std::size_t>(slot.tile->size()) * count_, kUnreached);
+    of_slot.push_back(costs.data() + static_cast<std::size_t>(slot.tile->size()) * landmark);
   }
   ForEachReached(space, workspace, [&](PatchId p, std::uint32_t cost) {
-    const SearchSpace::Slot& slot = space.SlotOfPatch(p);
-    tiles_[slot.tile->key].costs[static_cast<std::size_t>(p - slot.base) * count_ + landmark] =
-        cost;
+    const int slot = space.SlotOf(p);
+    of_slot[slot][p - space.slots()[slot].base] = cost;
   });
 }
 

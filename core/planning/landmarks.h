@@ -40,7 +40,9 @@ class Landmarks {
 
   int count() const { return count_; }
   std::size_t memory_bytes() const;
-  // count() costs a patch, in the order of PreparedTile; nullptr for a tile that was not reached.
+  // The cost of each patch, in the order of PreparedTile, to the first landmark, then to the
+  // second, and so on: what a search asks of one landmark lies together. Patches connected to a
+  // landmark are connected to all; the rest has kUnreached. nullptr for a tile that has none.
   const std::uint32_t* Tile(const TileKey& key) const;
 
   static constexpr std::uint32_t kUnreached = 0xFFFFFFFFU;

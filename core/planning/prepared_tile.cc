@@ -126,8 +126,8 @@ class Preparation {
         MoveCost(cells * checks_.StepLength(k), rise, danger, checks_.cell_size_m);
     Move& move = tile_.moves[patch][k];
     const std::int64_t delta = static_cast<std::int64_t>(number_[to]) - patch;
-    const bool near = number_[to] != PreparedTile::kNoPatch && cells == 1 && cost < Move::kFar &&
-                      std::abs(delta) <= INT16_MAX;
+    const bool near =
+        number_[to] != PreparedTile::kNoPatch && cost < Move::kFar && std::abs(delta) <= INT16_MAX;
     if (near) {
       move = {static_cast<std::int16_t>(delta), static_cast<std::uint16_t>(cost)};
       return;

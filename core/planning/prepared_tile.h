@@ -18,7 +18,8 @@ namespace strata {
 inline constexpr std::uint32_t kCostPerCell = 2048;
 inline constexpr std::uint32_t kCostPerDiagonal = 2896;  // ⌊2048 √2⌋
 
-// A move in one of the eight directions: target = own number + delta, in the same tile.
+// A move in one of the eight directions, over a gap too: target = own number + delta, in the same
+// tile.
 struct Move {
   std::int16_t delta = 0;
   std::uint16_t cost = kNone;
@@ -27,7 +28,7 @@ struct Move {
   static constexpr std::uint16_t kFar = 0xFFFF;  // see PreparedTile::far_moves
 };
 
-// A move into another tile, over a gap, or one that does not fit into a Move.
+// A move into another tile, or one that does not fit into a Move.
 struct FarMove {
   std::uint32_t patch = 0;  // from
   std::uint8_t direction = 0;

@@ -1,8 +1,10 @@
 #include "core/planning/search.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstdlib>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -22,17 +24,14 @@ namespace {
 
 constexpr std::uint32_t kClosed = 8;
 constexpr std::uint64_t kExpansionsPerLook = 4096;  // at the clock
-// Widths of buckets, measured: wide ones stay in the processor's cache, but expand again what a bad
-// order within a bucket made too dear; the tighter the bound, the more that is.
-constexpr int kWideBuckets = 6;
-constexpr int kNarrowBuckets = 2;
+// Buckets of 1/64 of a cell, measured: wide ones keep the ring in the processor's cache, but expand
+// again what a bad order within a bucket made too dear; the tighter the bound, the more that is.
+constexpr int kBucketShift = 5;
 constexpr std::uint32_t kMaxCost = 0xF0000000U;
 
 // Cost of the shortest way over cells without danger; consistent, since a move of any length costs
 // at least as much.
 struct OctileBound {
-  static constexpr bool kKeep = false;  // as fast to compute as to read
-  static constexpr int kBucketShift = kWideBuckets;
   CellIndex goal;
 
   void Enter(int /*slot*/, const SearchSpace::Slot& /*s*/) {}
@@ -45,48 +44,69 @@ struct OctileBound {
 };
 
 struct NoBound {
-  static constexpr bool kKeep = false;
-  static constexpr int kBucketShift = kWideBuckets;
   void Enter(int /*slot*/, const SearchSpace::Slot& /*s*/) {}
   std::uint32_t operator()(std::int32_t /*x*/, std::int32_t /*y*/, std::uint32_t /*local*/) const {
     return 0;
   }
 };
 
-// |d(landmark, patch) − d(landmark, goal)| never exceeds the cost between patch and goal.
+// |d(landmark, patch) − d(landmark, goal)| never exceeds the cost between patch and goal. Of all
+// landmarks the few that say most about the way from start to goal are asked.
 class LandmarkBound {
  public:
-  static constexpr bool kKeep = true;
-  static constexpr int kBucketShift = kNarrowBuckets;
+  // REQUIRES: Measured(), for start and goal.
+  LandmarkBound(const SearchSpace& space, const Landmarks& landmarks, PatchId start, PatchId goal)
+      : octile_{space.CellOfPatch(goal)}, landmarks_(landmarks) {
+    std::array<std::pair<std::uint32_t, int>, kMaxLandmarks> order;  // bound at the start, landmark
+    for (int l = 0; l < landmarks.count(); ++l) {
+      order[l] = {Apart(Cost(space, landmarks, start, l), Cost(space, landmarks, goal, l)), l};
+    }
+    std::sort(order.begin(), order.begin() + landmarks.count(), std::greater<>());
+    for (int i = 0; i < kAsked; ++i) {
+      asked_[i] = order[std::min(i, landmarks.count() - 1)].second;
+      goal_costs_[i] = Cost(space, landmarks, goal, asked_[i]);
+    }
+  }
 
-  LandmarkBound(CellIndex goal, const Landmarks& landmarks, const std::uint32_t* goal_costs)
-      : octile_{goal}, landmarks_(landmarks), goal_costs_(goal_costs) {}
+  static bool Measured(const SearchSpace& space, const Landmarks& landmarks, PatchId patch) {
+    return landmarks.Tile(space.SlotOfPatch(patch).tile->key) != nullptr &&
+           Cost(space, landmarks, patch, 0) != Landmarks::kUnreached;
+  }
 
   void Enter(int slot, const SearchSpace::Slot& s) {
     if (static_cast<std::size_t>(slot) >= of_slot_.size()) of_slot_.resize(slot + 1, nullptr);
+    // Never nullptr: the start is connected to the landmarks, and so is what a search enters.
     if (of_slot_[slot] == nullptr) of_slot_[slot] = landmarks_.Tile(s.tile->key);
-    costs_ = of_slot_[slot];
+    for (int i = 0; i < kAsked; ++i) {
+      costs_[i] = of_slot_[slot] + static_cast<std::size_t>(s.tile->size()) * asked_[i];
+    }
   }
   std::uint32_t operator()(std::int32_t x, std::int32_t y, std::uint32_t local) const {
     std::uint32_t bound = octile_(x, y, local);
-    if (costs_ == nullptr) return bound;
-    const int count = landmarks_.count();
-    const std::uint32_t* costs = costs_ + static_cast<std::size_t>(local) * count;
-    for (int l = 0; l < count; ++l) {
-      const std::uint32_t a = costs[l];
-      const std::uint32_t b = goal_costs_[l];
-      if (a == Landmarks::kUnreached || b == Landmarks::kUnreached) continue;
-      bound = std::max(bound, a > b ? a - b : b - a);
+    for (int i = 0; i < kAsked; ++i) {
+      bound = std::max(bound, Apart(costs_[i][local], goal_costs_[i]));
     }
     return bound;
   }
 
  private:
+  static constexpr int kAsked = 4;
+
+  static std::uint32_t Apart(std::uint32_t a, std::uint32_t b) { return a > b ? a - b : b - a; }
+  static std::uint32_t Cost(const SearchSpace& space,
+                            const Landmarks& landmarks,
+                            PatchId patch,
+                            int l) {
+    const SearchSpace::Slot& slot = space.SlotOfPatch(patch);
+    return landmarks.Tile(slot.tile->key)[std::size_t{slot.tile->size()} * l + patch - slot.base];
+  }
+
   OctileBound octile_;
   const Landmarks& landmarks_;
-  const std::uint32_t* goal_costs_;
+  std::array<int, kAsked> asked_;
+  std::array<std::uint32_t, kAsked> goal_costs_;
   std::vector<const std::uint32_t*> of_slot_;
-  const std::uint32_t* costs_ = nullptr;  // of the tile entered
+  std::array<const std::uint32_t*, kAsked> costs_;  // of the tile entered
 };
 
 template <typename Bound>
@@ -97,18 +117,16 @@ class Search {
 
   // Expands until `goal` (kNoPatchId: nothing) is settled or the queue is empty.
   absl::StatusOr<SearchOutcome> Run(PatchId start, PatchId goal, std::uint64_t max_expanded) {
-    workspace_.Begin(Bound::kBucketShift);
+    workspace_.Begin(kBucketShift);
     goal_ = goal;
     EnterSlot(space_.SlotOf(start));
-    const CellIndex cell = space_.CellOfPatch(start);
-    Relax(start - base_, 0, 0, cell.x, cell.y);
+    Relax(start - base_, 0, 0);
     if (start == goal) goal_cost_ = 0;
     BucketQueue& queue = workspace_.queue();
     SearchOutcome outcome;
     while (!queue.empty()) {
       const PatchId patch = queue.Pop();
       if (goal_cost_ <= queue.lower_bound()) break;
-      if (const PatchId* next = queue.Next(); next != nullptr) Prefetch(*next);
       if (!Expand(patch)) continue;
       ++outcome.expanded;
       if (outcome.expanded % kExpansionsPerLook == 0) STRATA_RETURN_IF_ERROR(stop_.status());
@@ -139,52 +157,34 @@ class Search {
     x0_ = s.x0;
     y0_ = s.y0;
     nodes_ = workspace_.Nodes(slot, tile_->size());
-    if constexpr (Bound::kKeep) bounds_ = workspace_.Bounds(slot, tile_->size());
     bound_.Enter(slot, s);
   }
 
-  // Fetches what expanding a patch reads first while another is expanded.
-  void Prefetch(PatchId patch) const {
-    const int slot = space_.SlotOf(patch);
-    const SearchSpace::Slot& s = space_.slots()[slot];
-    __builtin_prefetch(&s.tile->moves[patch - s.base]);
-  }
-
   // Offers a way to patch `local` of the slot entered.
-  void Relax(
-      std::uint32_t local, std::uint32_t cost, int direction, std::int32_t x, std::int32_t y) {
+  void Relax(std::uint32_t local, std::uint32_t cost, int direction) {
     SearchNode& node = nodes_[local];
-    const bool reached = workspace_.Reached(node);
-    if (reached && cost >= node.cost) return;
-    if constexpr (Bound::kKeep) {
-      if (!reached) bounds_[local] = bound_(x, y, local);
-    }
+    if (workspace_.Reached(node) && cost >= node.cost) return;
     node.cost = cost;
     node.stamp = workspace_.Stamp(direction);
     const PatchId patch = base_ + local;
     if (patch == goal_) goal_cost_ = cost;
-    const std::uint32_t total = cost + Remaining(local, x, y);
-    if (total < goal_cost_ && total < kMaxCost) workspace_.queue().Push(total, patch);
+    const std::uint32_t total = cost + Remaining(local);
+    if (total >= goal_cost_ || total >= kMaxCost) return;
+    workspace_.queue().Push(total, patch);
+    __builtin_prefetch(&tile_->moves[local]);  // what expanding it reads first
   }
 
-  std::uint32_t Remaining(std::uint32_t local, std::int32_t x, std::int32_t y) const {
-    if constexpr (Bound::kKeep) {
-      return bounds_[local];
-    } else {
-      return bound_(x, y, local);
-    }
+  std::uint32_t Remaining(std::uint32_t local) const {
+    const std::uint16_t cell = tile_->cell[local];
+    return bound_(x0_ + (cell & (kTileCells - 1)), y0_ + (cell >> kTileShift), local);
   }
 
-  // False if the patch was expanded before or cannot be on a better path.
+  // False if the patch was expanded before.
   bool Expand(PatchId patch) {
     EnterSlot(space_.SlotOf(patch));
     const std::uint32_t local = patch - base_;
     SearchNode& node = nodes_[local];
     if ((node.stamp & kClosed) != 0) return false;
-    const std::uint16_t cell = tile_->cell[local];
-    const std::int32_t x = x0_ + (cell & (kTileCells - 1));
-    const std::int32_t y = y0_ + (cell >> kTileShift);
-    if (node.cost + Remaining(local, x, y) >= goal_cost_) return false;
     node.stamp |= kClosed;
     if (node.cost >= dearest_cost_) {
       dearest_cost_ = node.cost;
@@ -200,7 +200,7 @@ class Search {
         far |= 1U << k;
         continue;
       }
-      Relax(local + move.delta, cost + move.cost, k, x + kStepX[k], y + kStepY[k]);
+      Relax(local + move.delta, cost + move.cost, k);
     }
     if (far != 0) ExpandFar(local, cost, far);
     return true;
@@ -215,8 +215,7 @@ class Search {
       const PatchId target = space_.Resolve(space_.slots()[own_slot], move);
       if (target == kNoPatchId) continue;
       EnterSlot(space_.SlotOf(target));
-      const CellIndex cell = space_.CellOfPatch(target);
-      Relax(target - base_, cost + move.cost, k, cell.x, cell.y);
+      Relax(target - base_, cost + move.cost, k);
     }
   }
 
@@ -249,7 +248,6 @@ class Search {
   std::int32_t x0_ = 0;
   std::int32_t y0_ = 0;
   SearchNode* nodes_ = nullptr;
-  std::uint32_t* bounds_ = nullptr;
 };
 
 }  // namespace
@@ -269,13 +267,6 @@ SearchNode* SearchWorkspace::Nodes(int slot, std::uint32_t size) {
   std::vector<SearchNode>& nodes = nodes_[slot];
   if (nodes.size() < size) nodes.resize(size);
   return nodes.data();
-}
-
-std::uint32_t* SearchWorkspace::Bounds(int slot, std::uint32_t size) {
-  if (static_cast<std::size_t>(slot) >= bounds_.size()) bounds_.resize(slot + 1);
-  std::vector<std::uint32_t>& bounds = bounds_[slot];
-  if (bounds.size() < size) bounds.resize(size);
-  return bounds.data();
 }
 
 const SearchNode* SearchWorkspace::NodesIfAny(int slot, std::uint32_t size) const {
@@ -298,16 +289,13 @@ absl::StatusOr<SearchOutcome> FindPath(SearchSpace& space,
                                        std::uint64_t max_expanded,
                                        SearchWorkspace& workspace,
                                        const Stop& stop) {
-  const CellIndex cell = space.CellOfPatch(goal);
-  if (landmarks != nullptr) {
-    const SearchSpace::Slot& slot = space.SlotOfPatch(goal);
-    if (const std::uint32_t* costs = landmarks->Tile(slot.tile->key); costs != nullptr) {
-      costs += static_cast<std::size_t>(goal - slot.base) * landmarks->count();
-      return Search(space, workspace, LandmarkBound(cell, *landmarks, costs), stop)
-          .Run(start, goal, max_expanded);
-    }
+  if (landmarks != nullptr && LandmarkBound::Measured(space, *landmarks, start) &&
+      LandmarkBound::Measured(space, *landmarks, goal)) {
+    return Search(space, workspace, LandmarkBound(space, *landmarks, start, goal), stop)
+        .Run(start, goal, max_expanded);
   }
-  return Search(space, workspace, OctileBound{cell}, stop).Run(start, goal, max_expanded);
+  return Search(space, workspace, OctileBound{space.CellOfPatch(goal)}, stop)
+      .Run(start, goal, max_expanded);
 }
 
 absl::StatusOr<PatchId> ReachAll(SearchSpace& space,

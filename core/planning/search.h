@@ -30,8 +30,6 @@ class SearchWorkspace {
   void Begin(int bucket_shift);
   // Nodes of a slot, at least `size` of them.
   SearchNode* Nodes(int slot, std::uint32_t size);
-  // Lower bounds to the goal beside them, for searches whose bound is worth keeping.
-  std::uint32_t* Bounds(int slot, std::uint32_t size);
   // nullptr if the search has not been in a slot of that size; nodes are kept from search to
   // search, so an earlier one's slot of the same number may be smaller.
   const SearchNode* NodesIfAny(int slot, std::uint32_t size) const;
@@ -45,7 +43,6 @@ class SearchWorkspace {
  private:
   std::uint32_t generation_ = 0;
   std::vector<std::vector<SearchNode>> nodes_;  // per slot
-  std::vector<std::vector<std::uint32_t>> bounds_;
   BucketQueue queue_;
 };
 

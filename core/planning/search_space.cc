@@ -1,6 +1,8 @@
 #include "core/planning/search_space.h"
 
+#include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <memory>
 #include <utility>
 
@@ -17,6 +19,12 @@ namespace strata {
 namespace {
 
 constexpr int kMaxSlots = 65535;
+
+// Length of a straight move inside a tile.
+int CellsBetween(std::uint16_t a, std::uint16_t b) {
+  return std::max(std::abs((a & (kTileCells - 1)) - (b & (kTileCells - 1))),
+                  std::abs((a >> kTileShift) - (b >> kTileShift)));
+}
 
 }  // namespace
 
@@ -65,8 +73,9 @@ PatchId SearchSpace::Follow(PatchId patch, int direction, std::uint32_t* cost, i
   const Move move = slot.tile->moves[patch - slot.base][direction];
   if (move.cost == Move::kNone) return kNoPatchId;
   if (move.cost != Move::kFar) {
+    const std::uint16_t* const own = &slot.tile->cell[patch - slot.base];
     *cost = move.cost;
-    *cells = 1;
+    *cells = CellsBetween(own[0], own[move.delta]);
     return patch + move.delta;
   }
   const FarMove& far = slot.tile->Far(patch - slot.base, direction);

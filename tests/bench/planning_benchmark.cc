@@ -31,6 +31,7 @@ namespace strata {
 namespace {
 
 constexpr double kCell = 0.1;
+constexpr int kLandmarks = 16;
 constexpr int kCampusX = 1200;
 constexpr int kCampusY = 1000;
 constexpr std::uint64_t kSeed = 20261121;
@@ -286,19 +287,20 @@ int Compare(testing::MemoryTiles& source, std::size_t query_count, int repetitio
   BoostSearch peer(graph);
   SearchWorkspace workspace;
   begin = NowMs();
-  const auto landmarks = Landmarks::Make(space, source.Keys(), 6, workspace, Stop());
+  const auto landmarks = Landmarks::Make(space, source.Keys(), kLandmarks, workspace, Stop());
   const double landmarks_ms = NowMs() - begin;
   Planner planner({.cell_size_m = kCell});
   Planner alt({.cell_size_m = kCell});
-  if (!landmarks.ok() || !alt.PrepareLandmarks(source, profile, source.Keys(), 6, Stop()).ok()) {
+  if (!landmarks.ok() ||
+      !alt.PrepareLandmarks(source, profile, source.Keys(), kLandmarks, Stop()).ok()) {
     return 1;
   }
   const auto queries = PickQueries(space, peer, graph, query_count);
   Column columns[] = {{"boost::astar_search"},
                       {"search"},
-                      {"search, 6 landmarks"},
+                      {"search, landmarks"},
                       {"Plan, warm"},
-                      {"Plan, warm, 6 landmarks"}};
+                      {"Plan, warm, landmarks"}};
   double worst = 0.0;
   for (const auto& [from, to] : queries) {
     std::vector<double> ms[5];
@@ -339,7 +341,8 @@ int Compare(testing::MemoryTiles& source, std::size_t query_count, int repetitio
               prepare_ms,
               prepare_ms * 1e6 / patches,
               static_cast<double>(cache.statistics().bytes) / patches);
-  std::printf("6 landmarks: %.0f ms, %.1f bytes a patch\n",
+  std::printf("%d landmarks: %.0f ms, %.1f bytes a patch\n",
+              kLandmarks,
               landmarks_ms,
               static_cast<double>((*landmarks)->memory_bytes()) / patches);
   std::printf("largest difference of costs: %.5f %%\n", 100.0 * worst);
@@ -359,8 +362,8 @@ int Compare(testing::MemoryTiles& source, std::size_t query_count, int repetitio
 }  // namespace strata
 
 int main(int argc, char** argv) {
-  const std::size_t queries = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 12;
-  const int repetitions = argc > 2 ? std::atoi(argv[2]) : 5;
+  const std::size_t queries = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 60;
+  const int repetitions = argc > 2 ? std::atoi(argv[2]) : 3;
   strata::testing::MemoryTiles source(strata::Campus().Build());
   return strata::Compare(source, queries, std::max(1, repetitions));
 }

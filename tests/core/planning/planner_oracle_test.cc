@@ -116,7 +116,7 @@ void CompareOneWorld(std::uint64_t seed, Tally* tally) {
   Planner planner({.cell_size_m = kCell});
   Planner with_landmarks({.cell_size_m = kCell});
   STRATA_ASSERT_OK(
-      with_landmarks.PrepareLandmarks(source, world.profile, source.Keys(), 4, Stop()));
+      with_landmarks.PrepareLandmarks(source, world.profile, source.Keys(), 7, Stop()));
   std::mt19937_64 random(seed + 1);
   for (int q = 0; q < 12; ++q) {
     const PlanEndpoint ends[2] = {EndpointOf(plain.patches()[random() % plain.patches().size()]),
