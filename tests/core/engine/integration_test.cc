@@ -15,9 +15,7 @@
 
 #include "core/codec/surface_tile_codec.h"
 #include "tests/core/engine/engine_fixture.h"
-#include "tests/support/simulator.h"
 #include "tests/support/status_matchers.h"
-#include "tests/support/worlds.h"
 
 namespace strata::testing {
 namespace {
@@ -438,49 +436,6 @@ TEST_F(IntegrationTest, ACancelledRebuildChangesNothing) {
   ASSERT_EQ(now.size(), listed.size());
   for (std::size_t i = 0; i < now.size(); ++i) EXPECT_EQ(now[i].version, listed[i].version);
   EXPECT_EQ(RunJob(db(), "verify").state, JobState::kSucceeded);
-}
-
-TEST_F(IntegrationTest, PathsOverAndUnderABridge) {
-  MakeMap(MapParameters());
-  const World world = BridgeWorld();
-  for (const Robot& robot : world.robots) {
-    const std::vector<Pose> poses = Drive(world.scene, robot.waypoints, 1.5, 1.2);
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-      const PointCloud cloud = SimulateScan(world.scene, {}, poses[i], i + 1);
-      STRATA_ASSERT_OK(Upload(db(), HeaderOf({robot.name, i + 1}, cloud, poses[i]), cloud, 40'000));
-    }
-  }
-  EXPECT_EQ(WaitIntegrated(db()).scans_failed, 0U);
-  const auto plan = [&](const char* from, const char* to) {
-    const Eigen::Vector3d a = world.places.at(from);
-    const Eigen::Vector3d b = world.places.at(to);
-    PlanQuery query;
-    query.from = {.x_m = a.x(), .y_m = a.y(), .z_m = a.z()};
-    query.to = {.x_m = b.x(), .y_m = b.y(), .z_m = b.z()};
-    const auto found = db().planning().PlanPath({}, kMapName, query);
-    STRATA_EXPECT_OK(found);
-    return found.value_or(PlanResult());
-  };
-  const auto heights = [](const PlanResult& result) {
-    std::pair<double, double> range(1e9, -1e9);
-    for (const Eigen::Vector3d& waypoint : result.waypoints) {
-      range.first = std::min(range.first, waypoint.z());
-      range.second = std::max(range.second, waypoint.z());
-    }
-    return range;
-  };
-  const PlanResult over = plan("west", "east");
-  ASSERT_EQ(over.reason, PlanReason::kFound) << over.message;
-  EXPECT_NEAR(heights(over).second, 3.4, 0.15);
-  const PlanResult under = plan("south", "north");
-  ASSERT_EQ(under.reason, PlanReason::kFound) << under.message;
-  EXPECT_LT(heights(under).second, 0.3);
-  EXPECT_GT(heights(under).first, -0.3);
-  const double straight_m = (world.places.at("north") - world.places.at("south")).norm();
-  EXPECT_LT(under.length_m, 1.1 * straight_m);
-  // 3.4 m above each other, but no way leads straight up.
-  const PlanResult up = plan("under", "deck");
-  EXPECT_TRUE(!up.found() || up.length_m > 20.0) << up.length_m;
 }
 
 TEST_F(IntegrationTest, MapsAreMadeListedAndDeleted) {
