@@ -146,6 +146,17 @@ absl::StatusOr<std::optional<PosedScan>> SqliteReader::FindPredecessor(absl::str
   return ReadOne(row);
 }
 
+absl::StatusOr<std::vector<ScanNumber>> SqliteReader::ListScanNumbers() {
+  STRATA_ASSIGN_OR_RETURN(Statement row,
+                          database_.Prepare("SELECT number FROM truth_scan ORDER BY number"));
+  std::vector<ScanNumber> numbers;
+  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
+    numbers.push_back(row.Unsigned(0));
+    return absl::OkStatus();
+  }));
+  return numbers;
+}
+
 absl::StatusOr<std::vector<PosedScan>> SqliteReader::ListScans(const ScanQuery& query,
                                                                std::uint64_t epoch) {
   // An absent condition is bound so that it always holds.
