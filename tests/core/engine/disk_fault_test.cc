@@ -58,10 +58,6 @@ class DiskFaultTest : public EngineTest, public ::testing::WithParamInterface<Tr
       EXPECT_EQ(back.points, MakeRoom(sequence).points) << sequence;
     }
   }
-  void ExpectSound() {
-    const JobInfo verified = RunJob(db(), "verify");
-    EXPECT_EQ(verified.state, JobState::kSucceeded) << verified.message;
-  }
 
   FaultyDisk disk_;
   std::set<std::uint64_t> acknowledged_;
