@@ -1,9 +1,11 @@
 // Maps as files: made, listed, deleted, foreign.
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 
 #include "absl/status/status.h"
+#include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,7 +17,14 @@ namespace {
 
 using ::testing::HasSubstr;
 
-class EngineMapsTest : public EngineTest {};
+class EngineMapsTest : public EngineTest {
+ protected:
+  static std::string Contents(const std::filesystem::path& file) {
+    std::ostringstream contents;
+    contents << std::ifstream(file, std::ios::binary).rdbuf();
+    return contents.str();
+  }
+};
 
 TEST_F(EngineMapsTest, MapsAreMadeListedAndDeleted) {
   MakeMap();
@@ -45,7 +54,57 @@ TEST_F(EngineMapsTest, ForeignFileDoesNotKeepOthersFromBeingServed) {
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("not a Strata map")));
   EXPECT_THAT(db().maps().Get({}, "garbage"), StatusIs(absl::StatusCode::kDataLoss, HasSubstr("")));
   EXPECT_THAT(db().maps().Get({}, "newer"),
-              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("99")));
+              StatusIs(absl::StatusCode::kFailedPrecondition,
+                       HasSubstr("format version 99 is newer than 1, the newest this program "
+                                 "reads; update it")));
+}
+
+TEST_F(EngineMapsTest, ANewerFileIsLeftAsItIs) {
+  MakeMap();
+  UploadRooms(1);
+  WaitIntegrated(db());
+  Close();
+  Sql("PRAGMA user_version = 2");
+  const std::string before = Contents(MapFile());
+  Reopen();
+  EXPECT_THAT(db().maps().Get({}, kMapName),
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("update it")));
+  Close();
+  EXPECT_EQ(Contents(MapFile()), before);
+  Sql("PRAGMA user_version = 1");
+  Reopen();
+  ExpectSound();
+}
+
+TEST_F(EngineMapsTest, AFileOfVersion1HasAllItHad) {
+  Sql(Contents(STRATA_MAP_V1));
+  Reopen();
+  ExpectSound();
+  const MapStats stats = WaitIntegrated(db());
+  EXPECT_EQ(stats.scans, 2U);
+  EXPECT_EQ(stats.points, 80U);
+  EXPECT_EQ(stats.patches, 69U);
+  EXPECT_EQ(stats.epoch, 2U);
+  EXPECT_EQ(stats.content_digest, "047a46f59d369c9b63a2f7cc455a3fd4");
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo moved, db().scans().Get({}, kMapName, {"run", 1}));
+  EXPECT_EQ(moved.header.time, absl::FromUnixMillis(11'500));
+  EXPECT_TRUE(moved.T_map_scan.translation().isApprox(Eigen::Vector3d(2.0, 0.5, 1.1)));
+  EXPECT_TRUE(moved.header.T_map_scan.translation().isApprox(Eigen::Vector3d(2.0, 0.5, 1.0)));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto profiles, db().planning().ListProfiles({}, kMapName));
+  EXPECT_EQ(profiles.at("cart").radius_m, 0.5);
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto jobs, db().jobs().List({}, kMapName));
+  EXPECT_EQ(jobs.at(0).metrics.at("scans_checked"), 2.0);
+}
+
+TEST_F(EngineMapsTest, DerivedTablesOfAnotherFormatAreMadeAgain) {
+  MakeMap();
+  UploadRooms(2);
+  const std::string digest = Digest();
+  Close();
+  Sql("UPDATE derived_state SET schema = 0; ALTER TABLE derived_mls_tile DROP COLUMN digest");
+  Reopen();
+  ExpectSound();
+  EXPECT_EQ(Digest(), digest);
 }
 
 TEST_F(EngineMapsTest, MapWithoutPointsKeepsItsContent) {
