@@ -169,7 +169,7 @@ absl::StatusOr<std::vector<PosedScan>> SqliteReader::ListScans(const ScanQuery& 
           "derived_footprint AS f WHERE f.min_x <= ?9 AND f.max_x >= ?8 AND f.min_y <= ?11 AND "
           "f.max_y >= ?10 AND f.exact_min_x <= ?9 AND f.exact_max_x >= ?8 AND "
           "f.exact_min_y <= ?11 AND f.exact_max_y >= ?10)) "
-          "ORDER BY s.number LIMIT ?12"));
+          "ORDER BY s.number"));
   constexpr std::int64_t kForever = std::int64_t{1} << 62;
   const Eigen::AlignedBox2d box = query.box.value_or(Eigen::AlignedBox2d());
   row.Bind(epoch,
@@ -182,14 +182,16 @@ absl::StatusOr<std::vector<PosedScan>> SqliteReader::ListScans(const ScanQuery& 
            box.min().x(),
            box.max().x(),
            box.min().y(),
-           box.max().y(),
-           query.limit);
+           box.max().y());
   std::vector<PosedScan> scans;
-  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&]() -> absl::Status {
-    STRATA_ASSIGN_OR_RETURN(PosedScan scan, ReadPosedScan(row));
-    scans.push_back(std::move(scan));
-    return absl::OkStatus();
-  }));
+  while (scans.size() < query.limit) {
+    STRATA_ASSIGN_OR_RETURN(const bool more, row.Step());
+    if (!more) break;
+    absl::StatusOr<PosedScan> scan = ReadPosedScan(row);
+    if (query.skip_damaged && absl::IsDataLoss(scan.status())) continue;
+    STRATA_RETURN_IF_ERROR(scan.status());
+    scans.push_back(*std::move(scan));
+  }
   return scans;
 }
 

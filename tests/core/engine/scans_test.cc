@@ -110,5 +110,32 @@ TEST_F(EngineScansTest, AScanThatLeavesTheMapIsNotLostInSilence) {
   ExpectSound();
 }
 
+TEST_F(EngineScansTest, ADamagedScanDoesNotStopTheOthers) {
+  MakeMap();
+  UploadRooms(3);
+  WaitIntegrated(db());
+  Close();
+  const std::string spoilt = "UPDATE truth_scan SET header = x'00' WHERE sequence = ";
+  Sql(spoilt + "1");                                                      // integrated
+  Sql(spoilt + "2; UPDATE truth_scan SET state = 1 WHERE sequence = 2");  // pending
+  Reopen();
+  for (const std::uint64_t next : {4, 5}) UploadRoom(next, RoomPose(next));
+  const auto state = [&](std::uint64_t sequence) {
+    const auto scan = db().scans().Get({}, kMapName, {"run", sequence});
+    STRATA_EXPECT_OK(scan);
+    return scan.ok() ? scan->state : ScanState::kFailed;
+  };
+  while (state(5) == ScanState::kPending) {
+  }
+  for (const std::uint64_t sound : {3, 4, 5}) EXPECT_EQ(state(sound), ScanState::kIntegrated);
+  for (const std::uint64_t damaged : {1, 2}) {
+    EXPECT_THAT(db().scans().Get({}, kMapName, {"run", damaged}),
+                StatusIs(absl::StatusCode::kDataLoss, HasSubstr("scan run/")));
+  }
+  const JobInfo verified = RunJob(db(), "verify");
+  EXPECT_EQ(verified.state, JobState::kFailed);
+  EXPECT_THAT(verified.message, HasSubstr("2 mismatches"));
+}
+
 }  // namespace
 }  // namespace strata::testing
