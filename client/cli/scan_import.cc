@@ -158,6 +158,18 @@ void Upload(Context& context,
   }
 }
 
+// A server that is away may be starting again, as while uploading (scan_uploader.h).
+absl::StatusOr<ScanInfo> GetPatiently(Context& context, const std::string& map, const ScanId& id) {
+  constexpr absl::Duration kPatience = absl::Minutes(1);
+  const absl::Time since = absl::Now();
+  while (true) {
+    absl::StatusOr<ScanInfo> info = context.database.scans().Get(context.call, map, id);
+    if (!absl::IsUnavailable(info.status()) || absl::Now() - since > kPatience) return info;
+    STRATA_RETURN_IF_ERROR(context.call.stop.status());
+    absl::SleepFor(absl::Milliseconds(100));
+  }
+}
+
 // Waits until no scan of the call is pending. They are integrated in order, so one after the other
 // is asked for.
 absl::Status Wait(Context& context, const ImportOptions& options, Summary& summary) {
@@ -166,9 +178,8 @@ absl::Status Wait(Context& context, const ImportOptions& options, Summary& summa
   for (std::size_t i = 0; i < summary.present.size(); ++i) {
     absl::Duration pause = absl::Milliseconds(10);
     while (true) {
-      STRATA_ASSIGN_OR_RETURN(
-          const ScanInfo info,
-          context.database.scans().Get(context.call, options.map, summary.present[i]));
+      STRATA_ASSIGN_OR_RETURN(const ScanInfo info,
+                              GetPatiently(context, options.map, summary.present[i]));
       if (info.state == ScanState::kIntegrated) {
         ++summary.integrated;
         summary.aligned += info.alignment.aligned ? 1 : 0;

@@ -67,6 +67,7 @@ absl::Status Aligner::Load(StorageReader& reader, std::uint64_t epoch) {
   trajectories_.clear();
   ScanQuery query;
   query.state = ScanState::kIntegrated;
+  query.skip_damaged = true;  // no neighbour, but no reason to stop either
   while (true) {
     STRATA_ASSIGN_OR_RETURN(const std::vector<PosedScan> page, reader.ListScans(query, epoch));
     for (const PosedScan& posed : page) {

@@ -141,6 +141,7 @@ absl::StatusOr<int> Integrator::IntegrateBatch() {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
   ScanQuery query;
   query.state = ScanState::kPending;
+  query.skip_damaged = true;  // it stays pending, and verify names it
   query.limit = static_cast<std::uint32_t>(core_.options().max_batch_scans);
   STRATA_ASSIGN_OR_RETURN(const std::vector<PosedScan> pending, reader->ListScans(query, epoch()));
   if (pending.empty()) return 0;

@@ -220,8 +220,15 @@ absl::StatusOr<std::optional<JobInfo>> JobBoard::TakeNext(Stop& stop) {
     stop = it->second.stop;
     taken = it->second.info;
   }
-  STRATA_RETURN_IF_ERROR(Store(taken, Durability::kRelaxed, Stop()));
+  if (const absl::Status stored = Store(taken, Durability::kRelaxed, Stop()); !stored.ok()) {
+    STRATA_RETURN_IF_ERROR(Requeue(taken.id));
+    return stored;
+  }
   return std::optional<JobInfo>(std::move(taken));
+}
+
+absl::Status JobBoard::Requeue(std::uint64_t id) {
+  return Change(id, [](JobInfo& job) { job.state = JobState::kQueued; }).status();
 }
 
 absl::Status JobBoard::Finish(std::uint64_t id, const absl::Status& ended, Running& context) {
@@ -238,8 +245,11 @@ absl::Status JobBoard::Finish(std::uint64_t id, const absl::Status& ended, Runni
     info.message = std::string(ended.message());
   }
   info.updated = absl::FromUnixMicros(absl::ToUnixMicros(absl::Now()));
-  // Durable before anybody sees that it ended.
-  STRATA_RETURN_IF_ERROR(Store(info, Durability::kFull, Stop()));
+  // Durable before anybody sees that it ended; if that cannot be, it did not.
+  if (const absl::Status stored = Store(info, Durability::kFull, Stop()); !stored.ok()) {
+    STRATA_RETURN_IF_ERROR(Requeue(id));
+    return stored;
+  }
   return Change(id, [&](JobInfo& job) { job = info; }).status();
 }
 
@@ -250,9 +260,7 @@ absl::Status JobBoard::RunNext(const Stop& closing,
   if (!job.has_value()) return absl::OkStatus();
   Running context(*this, job->id, stop, closing);
   const absl::Status ended = body(*job, context);
-  if (closing.requested() && !ended.ok()) {
-    return Change(job->id, [](JobInfo& info) { info.state = JobState::kQueued; }).status();
-  }
+  if (closing.requested() && !ended.ok()) return Requeue(job->id);
   return Finish(job->id, ended, context);
 }
 

@@ -54,7 +54,8 @@ class JobBoard {
   bool AnyQueued() const;
 
   // Runs the first queued job, if any, and records how it ended. A job that ends because `closing`
-  // was requested stays queued for the next start.
+  // was requested stays queued for the next start; one whose state cannot be stored stays queued
+  // for the next call, and the error is returned.
   absl::Status RunNext(const Stop& closing,
                        absl::FunctionRef<absl::Status(const JobInfo&, JobContext&)> body);
 
@@ -74,6 +75,7 @@ class JobBoard {
   void Report(std::uint64_t id, double progress, const std::string& phase, bool durable);
   // The first queued job, marked running.
   absl::StatusOr<std::optional<JobInfo>> TakeNext(Stop& stop);
+  absl::Status Requeue(std::uint64_t id);
   absl::Status Finish(std::uint64_t id, const absl::Status& ended, Running& context);
 
   MapCore& core_;

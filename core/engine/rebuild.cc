@@ -13,6 +13,7 @@
 #include "core/common/status.h"
 #include "core/engine/derived_pass.h"
 #include "core/engine/staged_tiles.h"
+#include "core/engine/tile_check.h"
 #include "core/engine/truth_check.h"
 
 namespace strata {
@@ -24,7 +25,7 @@ int ThreadsOf(const JobInfo& job, int threads) {
   return threads;
 }
 
-// Counts mismatches and keeps the first for the message.
+// Counts mismatches and names them, up to as many as a person would read.
 class Findings final : public DerivedSink {
  public:
   absl::Status Differs(const DerivedDifferences& differences) override {
@@ -46,12 +47,14 @@ class Findings final : public DerivedSink {
   std::uint64_t count() const { return count_; }
   absl::Status Verdict() const {
     if (count_ == 0) return absl::OkStatus();
-    return absl::DataLossError(absl::StrCat(
-        count_, " mismatches: ", named_, count_ > kNamed ? ", …" : "", "; a rebuild mends tiles"));
+    const std::string more =
+        count_ > kNamed ? absl::StrCat(", and ", count_ - kNamed, " more") : "";
+    return absl::DataLossError(
+        absl::StrCat(count_, " mismatches: ", named_, more, "; a rebuild mends tiles"));
   }
 
  private:
-  static constexpr std::uint64_t kNamed = 5;
+  static constexpr std::uint64_t kNamed = 1000;
   std::uint64_t count_ = 0;
   std::string named_;
 };
@@ -107,12 +110,18 @@ absl::Status Verify(Integrator& integrator, int threads, JobContext& context) {
   Findings findings;
   TruthCheck truth(core, context);
   STRATA_RETURN_IF_ERROR(truth.Run([&](const std::string& what) { findings.Add(what); }));
-  // Without sound points nothing can be said about what follows from them.
+  std::uint64_t tiles = 0;
   if (findings.count() == 0) {
     DerivedPass pass(integrator, core.snapshots().current().tile_version, threads, context);
     STRATA_RETURN_IF_ERROR(pass.Run(findings));
-    context.SetMetric("tiles_checked", static_cast<double>(pass.tiles()));
+    tiles = pass.tiles();
+  } else {
+    // Without sound points nothing can be said about what should follow from them.
+    STRATA_ASSIGN_OR_RETURN(tiles, CheckTilesAlone(core, context, [&](const std::string& what) {
+                              findings.Add(what);
+                            }));
   }
+  context.SetMetric("tiles_checked", static_cast<double>(tiles));
   integrator.store().Clear();
   context.SetMetric("scans_checked", static_cast<double>(truth.scans()));
   context.SetMetric("pieces_checked", static_cast<double>(truth.pieces()));

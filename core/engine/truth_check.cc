@@ -16,68 +16,68 @@
 
 namespace strata {
 
-absl::Status TruthCheck::CheckPoints(StorageReader& reader, const ScanRecord& scan) {
+// A damaged piece leaves the others to be looked at, but nothing to compare the whole with.
+void TruthCheck::CheckPoints(StorageReader& reader, const ScanRecord& scan, Report report) {
   ScanHasher hasher;
   std::uint64_t points = 0;
+  bool whole = true;
   for (std::uint32_t ordinal = 0; ordinal < scan.chunks; ++ordinal) {
-    STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader.GetChunk(scan.upload, ordinal));
-    const absl::StatusOr<PointCloud> piece = DecodePoints(bytes);
-    if (!piece.ok()) return Annotate(piece.status(), absl::StrCat("piece ", ordinal));
+    ++pieces_;
+    const absl::StatusOr<std::string> bytes = reader.GetChunk(scan.upload, ordinal);
+    const absl::StatusOr<PointCloud> piece = bytes.ok() ? DecodePoints(*bytes) : bytes.status();
+    if (!piece.ok()) {
+      report(absl::StrCat("piece ", ordinal, ": ", piece.status().message()));
+      whole = false;
+      continue;
+    }
     hasher.Add(*piece);
     points += piece->size();
-    ++pieces_;
   }
+  if (!whole) return;
   if (points != scan.header.point_count) {
-    return absl::DataLossError(
-        absl::StrCat(points, " points instead of ", scan.header.point_count));
+    report(absl::StrCat(points, " points instead of ", scan.header.point_count));
+  } else if (hasher.Digest(scan.header) != scan.content_hash) {
+    report("points or header are not those that were uploaded");
   }
-  if (hasher.Digest(scan.header) != scan.content_hash) {
-    return absl::DataLossError("points or header are not those that were uploaded");
-  }
-  return absl::OkStatus();
 }
 
-absl::Status TruthCheck::CheckScan(StorageReader& reader, const PosedScan& posed) {
+void TruthCheck::CheckScan(StorageReader& reader, const PosedScan& posed, Report report) {
   const ScanRecord& scan = posed.scan;
-  STRATA_RETURN_IF_ERROR(ValidateScanHeader(scan.header));
-  if (posed.pose.has_value()) STRATA_RETURN_IF_ERROR(ValidatePose(posed.pose->T_map_scan));
+  const auto check = [&](const absl::Status& sound) {
+    if (!sound.ok()) report(std::string(sound.message()));
+  };
+  check(ValidateScanHeader(scan.header));
+  if (posed.pose.has_value()) check(ValidatePose(posed.pose->T_map_scan));
   if (scan.state == ScanState::kIntegrated && !posed.pose.has_value()) {
-    return absl::DataLossError("integrated without a pose");
+    report("integrated without a pose");
   }
-  if (scan.has_points) return CheckPoints(reader, scan);
-  STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader.GetLocalMap(scan.number));
-  return DecodeLocalMap(bytes, core_.info().parameters.mls).status();
+  if (scan.has_points) return CheckPoints(reader, scan, report);
+  const absl::StatusOr<std::string> bytes = reader.GetLocalMap(scan.number);
+  check(bytes.ok() ? DecodeLocalMap(*bytes, core_.info().parameters.mls).status() : bytes.status());
 }
 
 absl::Status TruthCheck::Run(Report report) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-  STRATA_ASSIGN_OR_RETURN(const ScanTotals totals, reader->GetScanTotals());
-  ScanQuery query;
-  query.limit = 1;  // one at a time: a damaged header must not hide the others
+  STRATA_ASSIGN_OR_RETURN(const std::vector<ScanNumber> numbers, reader->ListScanNumbers());
   const std::uint64_t epoch = core_.snapshots().current().epoch;
-  while (scans_ < totals.scans) {
-    const double share = static_cast<double>(scans_) / static_cast<double>(totals.scans);
+  for (const ScanNumber number : numbers) {
+    const double share = static_cast<double>(scans_) / static_cast<double>(numbers.size());
     STRATA_RETURN_IF_ERROR(context_.Progress(0.4 * share, "checking scans"));
-    const absl::StatusOr<std::vector<PosedScan>> page = reader->ListScans(query, epoch);
-    if (absl::IsDataLoss(page.status())) {
-      report(std::string(page.status().message()));
-      return absl::OkStatus();
-    }
-    STRATA_RETURN_IF_ERROR(page.status());
-    if (page->empty()) break;
-    query.after = page->front().scan.number;
     ++scans_;
-    const absl::Status sound = CheckScan(*reader, page->front());
-    if (!sound.ok()) {
-      report(absl::StrCat("scan ", page->front().scan.header.id.ToString(), ": ", sound.message()));
+    const absl::StatusOr<PosedScan> posed = reader->GetScan(number, epoch);
+    if (absl::IsDataLoss(posed.status())) {
+      report(absl::StrCat("row ", number, ": ", posed.status().message()));
+      continue;
     }
+    STRATA_RETURN_IF_ERROR(posed.status());
+    CheckScan(*reader, *posed, [&](const std::string& what) {
+      report(absl::StrCat("scan ", posed->scan.header.id.ToString(), ": ", what));
+    });
   }
   const absl::Status constraints = reader->ListConstraints().status();
-  if (absl::IsDataLoss(constraints)) {
-    report(std::string(constraints.message()));
-    return absl::OkStatus();
-  }
-  return constraints;
+  if (!absl::IsDataLoss(constraints)) return constraints;
+  report(std::string(constraints.message()));
+  return absl::OkStatus();
 }
 
 }  // namespace strata

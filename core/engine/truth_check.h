@@ -28,9 +28,8 @@ class TruthCheck {
   std::uint64_t pieces() const { return pieces_; }
 
  private:
-  // Why the scan is not what was uploaded; OK if it is.
-  absl::Status CheckScan(StorageReader& reader, const PosedScan& posed);
-  absl::Status CheckPoints(StorageReader& reader, const ScanRecord& scan);
+  void CheckScan(StorageReader& reader, const PosedScan& posed, Report report);
+  void CheckPoints(StorageReader& reader, const ScanRecord& scan, Report report);
 
   MapCore& core_;
   JobContext& context_;

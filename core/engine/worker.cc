@@ -143,9 +143,11 @@ void Worker::RunJob() {
       jobs_.RunNext(closing_, [this](const JobInfo& job, JobContext& context) {
         return RunRebuildJob(integrator_, job, context);
       });
-  if (!done.ok()) LOG(ERROR) << "map=" << core_.name() << " job: " << done.message();
   absl::MutexLock lock(&mutex_);
   job_waits_ = jobs_.AnyQueued();
+  if (done.ok()) return;
+  LOG(ERROR) << "map=" << core_.name() << " job: " << done.message();
+  mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
 }
 
 void Worker::Close() {

@@ -77,6 +77,7 @@ struct ScanQuery {
   std::optional<Eigen::AlignedBox2d> box;  // meets the footprint [m]
   ScanNumber after = 0;                    // only scans with a larger number
   std::uint32_t limit = 1000;              // at most so many, by number
+  bool skip_damaged = false;  // rows that cannot be read are left out instead of ending the list
 };
 
 struct ScanTotals {

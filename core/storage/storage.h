@@ -40,6 +40,8 @@ class StorageReader {
   virtual absl::StatusOr<std::optional<PosedScan>> FindScan(const ScanId& id,
                                                             std::uint64_t epoch) = 0;
   virtual absl::StatusOr<PosedScan> GetScan(ScanNumber number, std::uint64_t epoch) = 0;
+  // Of all scans, ascending. Reads nothing else of their rows, so a damaged one hides no other.
+  virtual absl::StatusOr<std::vector<ScanNumber>> ListScanNumbers() = 0;
   // By number.
   virtual absl::StatusOr<std::vector<PosedScan>> ListScans(const ScanQuery& query,
                                                            std::uint64_t epoch) = 0;

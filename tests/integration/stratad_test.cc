@@ -194,6 +194,41 @@ TEST_F(StratadTest, KilledDuringUploadsItHasWhatItAcknowledgedAndGoesOn) {
   ExpectVerified(*db);
 }
 
+TEST_F(StratadTest, AShutdownEndsAWatchAndTheJobGoesOnAfterwards) {
+  JobInfo last;
+  // A job that ends before the signal is no failure, so there are several tries.
+  for (int attempt = 0; attempt < 10; ++attempt) {
+    SCOPED_TRACE(attempt);
+    StratadProcess stratad(Arguments());
+    const auto db = ConnectTo(stratad, 1);
+    if (attempt == 0) {
+      STRATA_ASSERT_OK(db->maps().Create({}, kMap, {}));
+      Robot red("red", 40);
+      STRATA_ASSERT_OK(red.Run(*db));
+    }
+    STRATA_ASSERT_OK_AND_ASSIGN(last, db->jobs().Start({}, kMap, "rebuild", {{"threads", "1"}}));
+    const absl::Status ended = db->jobs().Watch({}, kMap, last.id, [&](const JobInfo& now) {
+      last = now;
+      if (now.state == JobState::kRunning) stratad.Signal(SIGTERM);
+      return absl::OkStatus();
+    });
+    stratad.Signal(SIGTERM);
+    EXPECT_EQ(stratad.Wait(), 0);
+    if (IsFinal(last.state)) continue;
+    EXPECT_THAT(ended, StatusIs(absl::StatusCode::kUnavailable, ::testing::_));
+    break;
+  }
+  ASSERT_FALSE(IsFinal(last.state)) << "every job ended before the shutdown";
+  StratadProcess stratad(Arguments());
+  const auto db = ConnectTo(stratad);
+  STRATA_ASSERT_OK(db->jobs().Watch({}, kMap, last.id, [&last](const JobInfo& now) {
+    last = now;
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(last.state, JobState::kSucceeded) << last.message;
+  ExpectVerified(*db);
+}
+
 TEST_F(StratadTest, AClientRidesOutARestart) {
   {
     StratadProcess stratad(Arguments());

@@ -7,11 +7,13 @@
 #ifndef STRATA_TESTS_SUPPORT_DATABASE_SUITE_H_
 #define STRATA_TESTS_SUPPORT_DATABASE_SUITE_H_
 
+#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <ostream>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -41,6 +43,8 @@ class DatabaseSuite : public ::testing::TestWithParam<DatabaseMaker> {
   std::unique_ptr<api::Database> database_;
 };
 
+inline constexpr char kMap[] = "world";
+
 // A level floor at z = 0, `side_m` long and wide around the origin, a point every 5 cm.
 PointCloud LevelFloor(double side_m = 8.0);
 // Header of `cloud` with the columns it has, taken as uploaded.
@@ -50,6 +54,14 @@ absl::StatusOr<ScanAck> UploadScan(api::Database& database,
                                    const std::string& map,
                                    const ScanHeader& header,
                                    const PointCloud& cloud);
+// Points [begin, end) with all their columns.
+PointCloud Slice(const PointCloud& cloud, std::size_t begin, std::size_t end);
+// A pose that no call takes.
+const Pose& NanPose();
+// Puts LevelFloor() into kMap at `x_m` and waits for its integration.
+void PutFloor(api::Database& db, const ScanId& id, double x_m = 0.0);
+// The ids in kMap that `filter` lets pass, as listed.
+std::vector<ScanId> Listed(api::Database& db, const api::ScanFilter& filter);
 // Returns once no scan of the map is pending.
 void AwaitIntegration(api::Database& database, const std::string& map);
 

@@ -17,9 +17,8 @@
 #include <CLI/CLI.hpp>
 
 #include "client/formats/file_bytes.h"
-#include "client/formats/geometry_writer.h"
 #include "core/common/status.h"
-#include "tests/support/simulator.h"
+#include "tests/support/robot_files.h"
 #include "tests/support/worlds.h"
 
 namespace strata::testing {
@@ -29,10 +28,7 @@ struct Options {
   std::string world;
   std::filesystem::path out;
   std::uint64_t seed = 1;
-  double step_m = 1.0;
-  double height_m = 1.2;
-  OdometryNoise noise;
-  SensorOptions sensor;
+  RobotFiles files;
 };
 
 World WorldOf(const std::string& name, std::uint64_t seed) {
@@ -48,53 +44,6 @@ World WorldOf(const std::string& name, std::uint64_t seed) {
   return BridgeWorld({.parapets = name == "bridge", .clearance_m = 3.0});
 }
 
-std::string IndexTum(const std::vector<Pose>& poses, const std::string& comment) {
-  std::string text = absl::StrCat("# ", comment, "\n# index time x y z qx qy qz qw\n");
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Eigen::Vector3d t = poses[i].translation();
-    const Eigen::Quaterniond q(poses[i].linear());
-    absl::StrAppendFormat(&text,
-                          "%d %.6f %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n",
-                          i,
-                          static_cast<double>(i),
-                          t.x(),
-                          t.y(),
-                          t.z(),
-                          q.x(),
-                          q.y(),
-                          q.z(),
-                          q.w());
-  }
-  return text;
-}
-
-absl::Status WriteRobot(const World& world,
-                        const Robot& robot,
-                        std::uint64_t seed,
-                        const Options& options) {
-  const std::filesystem::path folder = options.out / robot.name;
-  std::filesystem::create_directories(folder / "scans");
-  const std::vector<Pose> truth =
-      Drive(world.scene, robot.waypoints, options.step_m, options.height_m);
-  STRATA_RETURN_IF_ERROR(
-      WriteFileBytes(folder / "poses_truth.txt", IndexTum(truth, "exact, simulated")));
-  STRATA_RETURN_IF_ERROR(
-      WriteFileBytes(folder / "poses_initial.txt",
-                     IndexTum(NoisyOdometry(truth, options.noise, seed), "odometry, simulated")));
-  std::size_t points = 0;
-  for (std::size_t i = 0; i < truth.size(); ++i) {
-    const PointCloud cloud =
-        SimulateScan(world.scene, options.sensor, truth[i], seed + 1000003 * (i + 1));
-    points += cloud.size();
-    STRATA_ASSIGN_OR_RETURN(const std::string bytes, PcdBytes(GeometryOf(cloud)));
-    STRATA_RETURN_IF_ERROR(
-        WriteFileBytes(folder / "scans" / absl::StrFormat("scan%04d.pcd", i), bytes));
-  }
-  std::cout << "robot " << robot.name << ": " << truth.size() << " scans, " << points
-            << " points in " << folder.string() << std::endl;
-  return absl::OkStatus();
-}
-
 absl::Status Simulate(const Options& options) {
   const World world = WorldOf(options.world, options.seed);
   std::filesystem::create_directories(options.out);
@@ -104,7 +53,13 @@ absl::Status Simulate(const Options& options) {
   }
   STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out / "places.txt", places));
   for (std::size_t i = 0; i < world.robots.size(); ++i) {
-    STRATA_RETURN_IF_ERROR(WriteRobot(world, world.robots[i], options.seed + 17 * i, options));
+    const Robot& robot = world.robots[i];
+    const std::filesystem::path folder = options.out / robot.name;
+    STRATA_ASSIGN_OR_RETURN(
+        const WrittenRobot written,
+        WriteRobot(world.scene, robot, options.seed + 17 * i, options.files, folder));
+    std::cout << "robot " << robot.name << ": " << written.scans << " scans, " << written.points
+              << " points in " << folder.string() << std::endl;
   }
   return absl::OkStatus();
 }
@@ -117,22 +72,24 @@ int Main(int argc, char** argv) {
       ->check(CLI::IsMember({"bridge", "open_bridge", "low_bridge", "car_park", "campus"}));
   app.add_option("OUT", options.out, "Folder to write to")->required();
   app.add_option("--seed", options.seed, "Of all noise")->capture_default_str();
-  app.add_option("--step", options.step_m, "Way between scans [m]")
+  app.add_option("--step", options.files.step_m, "Way between scans [m]")
       ->check(CLI::Range(0.1, 100.0))
       ->capture_default_str();
-  app.add_option("--height", options.height_m, "Of the sensor [m]")
+  app.add_option("--height", options.files.height_m, "Of the sensor [m]")
       ->check(CLI::Range(0.1, 10.0))
       ->capture_default_str();
-  app.add_option("--noise-m", options.noise.translation_sigma_m, "Odometry, a step and axis [m]")
+  app.add_option(
+         "--noise-m", options.files.noise.translation_sigma_m, "Odometry, a step and axis [m]")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_option("--noise-rad", options.noise.rotation_sigma_rad, "Odometry, a step and axis [rad]")
+  app.add_option(
+         "--noise-rad", options.files.noise.rotation_sigma_rad, "Odometry, a step and axis [rad]")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_option("--rings", options.sensor.rings, "Beams of the sensor")
+  app.add_option("--rings", options.files.sensor.rings, "Beams of the sensor")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  app.add_option("--columns", options.sensor.columns, "Azimuth steps of a turn")
+  app.add_option("--columns", options.files.sensor.columns, "Azimuth steps of a turn")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   try {

@@ -1,6 +1,7 @@
 #include "core/storage/sqlite/schema.h"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "absl/types/span.h"
 
 #include "core/common/status.h"
 #include "core/storage/sqlite/database.h"
@@ -175,18 +177,28 @@ absl::StatusOr<bool> HasDerivedTables(Database& database) {
   return schema == kDerivedVersion;
 }
 
-absl::Status Migrate(Database& database, std::int64_t version) {
-  for (; version < kTruthVersion; ++version) {
+}  // namespace
+
+absl::Status Migrate(Database& database, absl::Span<const char* const> migrations) {
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t version, database.Pragma("PRAGMA user_version"));
+  const auto newest = static_cast<std::int64_t>(migrations.size());
+  if (version < 0 || version > newest) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("format version ",
+                     version,
+                     " is newer than ",
+                     newest,
+                     ", the newest this program reads; update it"));
+  }
+  for (std::int64_t done = version; done < newest; ++done) {
     STRATA_ASSIGN_OR_RETURN(Transaction transaction,
                             Transaction::Begin(database, "BEGIN IMMEDIATE"));
-    STRATA_RETURN_IF_ERROR(database.Execute(kMigrations[version]));
-    STRATA_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA user_version = ", version + 1)));
+    STRATA_RETURN_IF_ERROR(database.Execute(migrations[static_cast<std::size_t>(done)]));
+    STRATA_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA user_version = ", done + 1)));
     STRATA_RETURN_IF_ERROR(transaction.Commit());
   }
   return absl::OkStatus();
 }
-
-}  // namespace
 
 absl::Status ResetDerivedTables(Database& database) {
   std::vector<std::string> tables;
@@ -224,16 +236,7 @@ absl::Status UpgradeSchema(Database& database) {
     return absl::FailedPreconditionError(
         "not a Strata map: a database file of another application");
   }
-  STRATA_ASSIGN_OR_RETURN(const std::int64_t version, database.Pragma("PRAGMA user_version"));
-  if (version < 0 || version > kTruthVersion) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("format version ",
-                     version,
-                     " is newer than ",
-                     kTruthVersion,
-                     ", the newest this program reads; update it"));
-  }
-  STRATA_RETURN_IF_ERROR(Migrate(database, version));
+  STRATA_RETURN_IF_ERROR(Migrate(database, kMigrations));
   const absl::StatusOr<bool> derived = HasDerivedTables(database);
   if (derived.ok() && *derived) return absl::OkStatus();
   STRATA_ASSIGN_OR_RETURN(Transaction transaction, Transaction::Begin(database, "BEGIN IMMEDIATE"));

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "absl/status/status.h"
+#include "absl/types/span.h"
 
 #include "core/storage/sqlite/database.h"
 
@@ -16,6 +17,11 @@ inline constexpr std::int32_t kApplicationId = 0x53545241;
 inline constexpr std::int32_t kTruthVersion = 1;
 // Format of the derived tables; any other is dropped and rebuilt.
 inline constexpr std::int32_t kDerivedVersion = 1;
+
+// Brings a file from its user_version to `migrations.size()`: migration i makes version i + 1 out
+// of version i, each in one transaction with the change of user_version. FAILED_PRECONDITION for a
+// newer version.
+absl::Status Migrate(Database& database, absl::Span<const char* const> migrations);
 
 // Makes the tables of a new, empty file.
 absl::Status CreateSchema(Database& database);

@@ -146,6 +146,17 @@ absl::StatusOr<std::optional<PosedScan>> SqliteReader::FindPredecessor(absl::str
   return ReadOne(row);
 }
 
+absl::StatusOr<std::vector<ScanNumber>> SqliteReader::ListScanNumbers() {
+  STRATA_ASSIGN_OR_RETURN(Statement row,
+                          database_.Prepare("SELECT number FROM truth_scan ORDER BY number"));
+  std::vector<ScanNumber> numbers;
+  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
+    numbers.push_back(row.Unsigned(0));
+    return absl::OkStatus();
+  }));
+  return numbers;
+}
+
 absl::StatusOr<std::vector<PosedScan>> SqliteReader::ListScans(const ScanQuery& query,
                                                                std::uint64_t epoch) {
   // An absent condition is bound so that it always holds.
@@ -158,7 +169,7 @@ absl::StatusOr<std::vector<PosedScan>> SqliteReader::ListScans(const ScanQuery& 
           "derived_footprint AS f WHERE f.min_x <= ?9 AND f.max_x >= ?8 AND f.min_y <= ?11 AND "
           "f.max_y >= ?10 AND f.exact_min_x <= ?9 AND f.exact_max_x >= ?8 AND "
           "f.exact_min_y <= ?11 AND f.exact_max_y >= ?10)) "
-          "ORDER BY s.number LIMIT ?12"));
+          "ORDER BY s.number"));
   constexpr std::int64_t kForever = std::int64_t{1} << 62;
   const Eigen::AlignedBox2d box = query.box.value_or(Eigen::AlignedBox2d());
   row.Bind(epoch,
@@ -171,14 +182,16 @@ absl::StatusOr<std::vector<PosedScan>> SqliteReader::ListScans(const ScanQuery& 
            box.min().x(),
            box.max().x(),
            box.min().y(),
-           box.max().y(),
-           query.limit);
+           box.max().y());
   std::vector<PosedScan> scans;
-  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&]() -> absl::Status {
-    STRATA_ASSIGN_OR_RETURN(PosedScan scan, ReadPosedScan(row));
-    scans.push_back(std::move(scan));
-    return absl::OkStatus();
-  }));
+  while (scans.size() < query.limit) {
+    STRATA_ASSIGN_OR_RETURN(const bool more, row.Step());
+    if (!more) break;
+    absl::StatusOr<PosedScan> scan = ReadPosedScan(row);
+    if (query.skip_damaged && absl::IsDataLoss(scan.status())) continue;
+    STRATA_RETURN_IF_ERROR(scan.status());
+    scans.push_back(*std::move(scan));
+  }
   return scans;
 }
 

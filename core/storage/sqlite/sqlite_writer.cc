@@ -26,19 +26,25 @@ absl::Status SqliteWriter::Commit(Durability durability, absl::FunctionRef<absl:
   }
   STRATA_ASSIGN_OR_RETURN(Transaction transaction,
                           Transaction::Begin(database_, "BEGIN IMMEDIATE"));
+  broken_ = absl::OkStatus();
   STRATA_RETURN_IF_ERROR(body());
+  STRATA_RETURN_IF_ERROR(broken_);
   return transaction.Commit();
 }
 
+// After some errors (a full disk, say) SQLite rolls back the whole transaction by itself. Then
+// there is no savepoint to go back to, and a further part would begin and commit a transaction of
+// its own.
 absl::Status SqliteWriter::Part(absl::FunctionRef<absl::Status()> body) {
+  STRATA_RETURN_IF_ERROR(broken_);
   STRATA_RETURN_IF_ERROR(database_.Execute("SAVEPOINT part"));
   const absl::Status done = body();
-  if (!done.ok()) {
-    // A rollback that fails has ended the whole transaction; the commit will say so.
-    database_.Execute("ROLLBACK TO part").IgnoreError();
+  if (!done.ok() && !database_.Execute("ROLLBACK TO part").ok()) {
+    broken_ = done;
+    return done;
   }
-  database_.Execute("RELEASE part").IgnoreError();
-  return done;
+  const absl::Status released = database_.Execute("RELEASE part");
+  return done.ok() ? released : done;
 }
 
 absl::StatusOr<std::uint64_t> SqliteWriter::NextCommitSequence() {

@@ -66,6 +66,7 @@ class SqliteWriter final : public StorageWriter {
   Database& database_ = *connection_;
   SqliteReader reader_;
   Durability durability_ = Durability::kFull;  // what the connection is set to
+  absl::Status broken_;                        // what ended the open transaction before its commit
 };
 
 template <typename... Values>

@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
+#include <sqlite3.h>
 
 #include "core/common/status.h"
 #include "tests/support/status_matchers.h"
@@ -92,6 +93,11 @@ PointCloud SeeWorld(const Pose& T_map_scan, std::uint64_t seed, std::size_t poin
 Pose PoseAt(double x_m, double y_m, double yaw_rad) {
   return MakePose(Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ())),
                   {x_m, y_m, 0.0});
+}
+
+Pose RoomPose(std::uint64_t i) {
+  const auto n = static_cast<double>(i);
+  return PoseAt(4.0 * n - 10.0, 0.7 * n, 0.3 * n);
 }
 
 ScanHeader HeaderOf(const ScanId& id,
@@ -193,11 +199,30 @@ void EngineTest::MakeMap(const MapParameters& parameters, const std::string& map
   ASSERT_THAT(db().maps().Create({}, map, parameters), IsOk());
 }
 
-ScanId EngineTest::UploadRoom(std::uint64_t sequence, const Pose& T_map_scan) {
+ScanId EngineTest::UploadRoom(std::uint64_t sequence,
+                              const Pose& T_map_scan,
+                              const std::string& map) {
   const PointCloud cloud = MakeRoom(sequence);
   const ScanId id{"run", sequence};
-  EXPECT_THAT(Upload(db(), HeaderOf(id, cloud, T_map_scan), cloud), IsOk());
+  EXPECT_THAT(Upload(db(), HeaderOf(id, cloud, T_map_scan), cloud, 2000, map), IsOk());
   return id;
+}
+
+void EngineTest::UploadRooms(std::uint64_t count, const std::string& map) {
+  for (std::uint64_t i = 1; i <= count; ++i) UploadRoom(i, RoomPose(i), map);
+}
+
+void EngineTest::ExpectSound() {
+  const JobInfo verified = RunJob(db(), "verify");
+  EXPECT_EQ(verified.state, JobState::kSucceeded) << verified.message;
+}
+
+void EngineTest::Sql(const std::string& sql, const std::string& map) const {
+  sqlite3* file = nullptr;
+  ASSERT_EQ(sqlite3_open(MapFile(map).c_str(), &file), SQLITE_OK);
+  char* error = nullptr;
+  EXPECT_EQ(sqlite3_exec(file, sql.c_str(), nullptr, nullptr, &error), SQLITE_OK) << error;
+  sqlite3_close(file);
 }
 
 }  // namespace strata::testing

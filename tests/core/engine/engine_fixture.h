@@ -31,6 +31,8 @@ PointCloud MakeRoom(std::uint64_t seed, std::size_t points = 3000);
 // The same world of boxes seen from T_map_scan: scans of it overlap and can be aligned.
 PointCloud SeeWorld(const Pose& T_map_scan, std::uint64_t seed, std::size_t points = 6000);
 Pose PoseAt(double x_m, double y_m, double yaw_rad = 0.0);
+// Where room `i` of UploadRooms() lies.
+Pose RoomPose(std::uint64_t i);
 
 ScanHeader HeaderOf(const ScanId& id,
                     const PointCloud& cloud,
@@ -69,7 +71,17 @@ class EngineTest : public ::testing::Test {
   void Close() { database_.reset(); }
   void MakeMap(const MapParameters& parameters = SmallMap(), const std::string& map = kMapName);
   // Uploads a room, expecting success.
-  ScanId UploadRoom(std::uint64_t sequence, const Pose& T_map_scan);
+  ScanId UploadRoom(std::uint64_t sequence,
+                    const Pose& T_map_scan,
+                    const std::string& map = kMapName);
+  // Rooms 1 to `count`, each where it lies.
+  void UploadRooms(std::uint64_t count, const std::string& map = kMapName);
+  // Of the map's content once nothing is pending.
+  std::string Digest() { return WaitIntegrated(db()).content_digest; }
+  // The map verifies.
+  void ExpectSound();
+  // Changes a map's file behind the engine's back, which must be closed.
+  void Sql(const std::string& sql, const std::string& map = kMapName) const;
 
   TempDir directory_;
   std::unique_ptr<api::Database> database_;

@@ -236,6 +236,31 @@ TEST_F(StorageContractTest, FullStoreIsAnErrorAndLosesNothing) {
   Put(2);
 }
 
+// A full store ends the whole transaction, not the part alone that met it.
+TEST_F(StorageContractTest, FullStoreInOnePartEndsTheWholeCommit) {
+  Put(1);
+  Reopen({.max_file_bytes = 400'000});
+  const std::string large(60'000, 'x');
+  const auto part = [&](std::uint64_t upload, int pieces) {
+    return writer().Part([&]() -> absl::Status {
+      for (int i = 0; i < pieces; ++i) {
+        STRATA_RETURN_IF_ERROR(writer().PutChunk(upload, static_cast<std::uint32_t>(i), large));
+      }
+      return absl::OkStatus();
+    });
+  };
+  const auto full = StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("full"));
+  EXPECT_THAT(Commit([&]() -> absl::Status {
+                STRATA_EXPECT_OK(part(8, 1));
+                EXPECT_THAT(part(9, 9), full);
+                EXPECT_THAT(part(10, 1), full);
+                return absl::OkStatus();
+              }),
+              full);
+  EXPECT_THAT(reader().LastUpload(), IsOkAndHolds(1U));
+  Put(2);
+}
+
 TEST(ValueCodecTest, EveryFlippedBitIsFound) {
   ScanHeader header;
   header.id = {"run", 1};

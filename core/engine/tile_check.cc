@@ -1,0 +1,60 @@
+#include "core/engine/tile_check.h"
+
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/codec/mls_tile_codec.h"
+#include "core/codec/surface_tile_codec.h"
+#include "core/common/status.h"
+#include "core/mls/tile_key.h"
+#include "core/storage/storage.h"
+
+namespace strata {
+namespace {
+
+// Why the row cannot be read; OK where there is none.
+template <typename Row, typename Decode>
+absl::Status Readable(const Row& row, const TileKey& key, Decode decode) {
+  STRATA_RETURN_IF_ERROR(row.status());
+  if (!row->has_value()) return absl::OkStatus();
+  STRATA_ASSIGN_OR_RETURN(const auto tile, decode((*row)->bytes));
+  if (tile.key == key) return absl::OkStatus();
+  return absl::DataLossError(absl::StrCat("holds tile ", tile.key.ToString()));
+}
+
+}  // namespace
+
+absl::StatusOr<std::uint64_t> CheckTilesAlone(MapCore& core,
+                                              JobContext& context,
+                                              absl::FunctionRef<void(const std::string&)> report) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  const std::uint64_t version = core.snapshots().current().tile_version;
+  std::uint64_t tiles = 0;
+  const auto look = [&](const TileKey& key, const char* kind, const absl::Status& readable) {
+    ++tiles;
+    if (readable.ok()) return;
+    report(absl::StrCat("tile ", key.ToString(), " (", kind, "): ", readable.message()));
+  };
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MlsTileRow> rows, reader->ListMlsTiles(version));
+  for (const MlsTileRow& row : rows) {
+    STRATA_RETURN_IF_ERROR(context.Progress(0.4, "reading tiles"));
+    look(row.key,
+         "statistics",
+         Readable(reader->FindMlsTile(row.key, version), row.key, DecodeMlsTile));
+  }
+  for (TileRange range; range.level <= kMaxLevel; ++range.level) {
+    STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> served,
+                            reader->ListSurfaceTiles(range, version));
+    for (const SurfaceTileRow& row : served) {
+      STRATA_RETURN_IF_ERROR(context.Progress(0.7, "reading tiles"));
+      look(row.key,
+           "served",
+           Readable(reader->FindSurfaceTile(row.key, version), row.key, DecodeSurfaceTile));
+    }
+  }
+  return tiles;
+}
+
+}  // namespace strata

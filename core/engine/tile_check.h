@@ -1,0 +1,24 @@
+// Checks stored tiles for damage by themselves, without what they are made of.
+#ifndef STRATA_CORE_ENGINE_TILE_CHECK_H_
+#define STRATA_CORE_ENGINE_TILE_CHECK_H_
+
+#include <cstdint>
+#include <string>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/statusor.h"
+
+#include "core/engine/job_board.h"
+#include "core/engine/map_core.h"
+
+namespace strata {
+
+// Reads every tile of every level that readers see now and calls `report` with each one that cannot
+// be read. Returns how many were looked at; an error is one of the store or of the job being ended.
+absl::StatusOr<std::uint64_t> CheckTilesAlone(MapCore& core,
+                                              JobContext& context,
+                                              absl::FunctionRef<void(const std::string&)> report);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_TILE_CHECK_H_

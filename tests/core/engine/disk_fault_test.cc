@@ -1,0 +1,156 @@
+// A disk that is full or fails: errors are values, what was acknowledged stays, and once the disk
+// is well again so is the map.
+#include <cstdint>
+#include <set>
+#include <string>
+
+#include "absl/status/status.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/core/engine/engine_fixture.h"
+#include "tests/support/faulty_disk.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+using ::testing::AnyOf;
+using Code = absl::StatusCode;
+
+struct Trouble {
+  std::string name;
+  DiskFault fault;
+};
+void PrintTo(const Trouble& trouble, std::ostream* out) { *out << trouble.name; }
+
+class DiskFaultTest : public EngineTest, public ::testing::WithParamInterface<Trouble> {
+ protected:
+  void SetUp() override { MakeMap(); }
+  ~DiskFaultTest() override { Close(); }  // before the disk goes
+
+  absl::Status Put(std::uint64_t sequence) {
+    const PointCloud cloud = MakeRoom(sequence);
+    const Pose T_map_scan = PoseAt(static_cast<double>(sequence % 20), 0.0);
+    return Upload(db(), HeaderOf({"run", sequence}, cloud, T_map_scan), cloud).status();
+  }
+  // Uploads scans `first` to `last`; those that are acknowledged join acknowledged_.
+  int PutAll(std::uint64_t first, std::uint64_t last) {
+    int failed = 0;
+    for (std::uint64_t sequence = first; sequence <= last; ++sequence) {
+      const absl::Status put = Put(sequence);
+      if (put.ok()) {
+        acknowledged_.insert(sequence);
+        continue;
+      }
+      ++failed;
+      EXPECT_THAT(put.code(), AnyOf(Code::kResourceExhausted, Code::kUnavailable)) << put;
+    }
+    return failed;
+  }
+  void ExpectAcknowledgedAreThere() {
+    for (const std::uint64_t sequence : acknowledged_) {
+      PointCloud back;
+      STRATA_EXPECT_OK(db().scans().GetPoints({}, kMapName, {"run", sequence}, [&](const auto& p) {
+        back.points.insert(back.points.end(), p.points.begin(), p.points.end());
+        return absl::OkStatus();
+      }));
+      EXPECT_EQ(back.points, MakeRoom(sequence).points) << sequence;
+    }
+  }
+
+  FaultyDisk disk_;
+  std::set<std::uint64_t> acknowledged_;
+};
+
+TEST_P(DiskFaultTest, NothingAcknowledgedIsLostAndTheMapGoesOn) {
+  EXPECT_EQ(PutAll(1, 5), 0);
+  std::uint64_t next = 6;
+  int failed = 0;
+  for (const int sound : {0, 1, 2, 3, 5, 8, 13, 21, 34}) {
+    SCOPED_TRACE(sound);
+    disk_.Fail(GetParam().fault, sound);
+    failed += PutAll(next, next + 2);
+    disk_.Mend();
+    EXPECT_EQ(PutAll(next, next + 2), 0);  // again, those that failed among them
+    ExpectAcknowledgedAreThere();
+    next += 3;
+  }
+  EXPECT_GT(failed, 5);
+  EXPECT_GT(disk_.failed(), 5);
+  EXPECT_EQ(WaitIntegrated(db()).scans, acknowledged_.size());
+  ExpectSound();
+  Reopen();
+  ExpectAcknowledgedAreThere();
+  ExpectSound();
+}
+
+TEST_P(DiskFaultTest, AMapThatIsClosedOnAFailingDiskOpensAgain) {
+  for (const int sound : {0, 1, 4, 9, 20}) {
+    SCOPED_TRACE(sound);
+    const std::uint64_t first = acknowledged_.empty() ? 1 : *acknowledged_.rbegin() + 10;
+    EXPECT_EQ(PutAll(first, first + 3), 0);
+    disk_.Fail(GetParam().fault, sound);
+    PutAll(first + 4, first + 6);
+    Close();
+    disk_.Mend();
+    Reopen();
+    ExpectAcknowledgedAreThere();
+    EXPECT_GE(WaitIntegrated(db()).scans, acknowledged_.size());
+    ExpectSound();
+  }
+}
+
+TEST_P(DiskFaultTest, CallsThatChangeTheMapSaySoAndChangeNothing) {
+  EXPECT_EQ(PutAll(1, 4), 0);
+  const std::string digest = WaitIntegrated(db()).content_digest;
+  disk_.Fail(GetParam().fault, 0);
+  const auto trouble = AnyOf(StatusIs(Code::kResourceExhausted, ::testing::_),
+                             StatusIs(Code::kUnavailable, ::testing::_));
+  EXPECT_THAT(db().scans().Delete({}, kMapName, {"run", 2}), trouble);
+  EXPECT_THAT(db().posegraph().SetPose({}, kMapName, {"run", 3}, PoseAt(5, 5)), trouble);
+  RobotProfile profile;
+  profile.radius_m = 0.7;
+  EXPECT_THAT(db().planning().SetProfile({}, kMapName, "cart", profile), trouble);
+  EXPECT_THAT(db().planning().SetProfile({}, kMapName, api::kDefaultProfile, profile), trouble);
+  EXPECT_THAT(db().jobs().Start({}, kMapName, "verify", {}), trouble);
+  EXPECT_THAT(db().maps().Create({}, "other", SmallMap()), trouble);
+  EXPECT_EQ(db().maps().Stats({}, kMapName)->content_digest, digest);
+  disk_.Mend();
+  EXPECT_EQ(WaitIntegrated(db()).content_digest, digest);
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto profiles, db().planning().ListProfiles({}, kMapName));
+  EXPECT_EQ(profiles.size(), 1U);
+  EXPECT_EQ(profiles.begin()->second, RobotProfile());
+  ExpectSound();
+  STRATA_EXPECT_OK(db().maps().Create({}, "other", SmallMap()));
+  STRATA_EXPECT_OK(db().scans().Delete({}, kMapName, {"run", 2}));
+  ExpectSound();
+}
+
+// The end of a job is stored before anybody sees it.
+TEST_P(DiskFaultTest, AJobWhoseEndCannotBeStoredRunsAgain) {
+  EXPECT_EQ(PutAll(1, 30), 0);
+  WaitIntegrated(db());
+  STRATA_ASSERT_OK_AND_ASSIGN(JobInfo job, db().jobs().Start({}, kMapName, "verify", {}));
+  disk_.Fail(GetParam().fault, 0);
+  while (disk_.failed() == 0) {
+    STRATA_ASSERT_OK_AND_ASSIGN(job, db().jobs().Get({}, kMapName, job.id));
+    ASSERT_FALSE(IsFinal(job.state)) << job.message;
+  }
+  disk_.Mend();
+  STRATA_ASSERT_OK(db().jobs().Watch({}, kMapName, job.id, [&job](const JobInfo& info) {
+    job = info;
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(job.state, JobState::kSucceeded) << job.message;
+}
+
+INSTANTIATE_TEST_SUITE_P(Disk,
+                         DiskFaultTest,
+                         ::testing::Values(Trouble{"Full", DiskFault::kFull},
+                                           Trouble{"WriteError", DiskFault::kWrite},
+                                           Trouble{"SyncError", DiskFault::kSync}),
+                         [](const auto& trouble) { return trouble.param.name; });
+
+}  // namespace
+}  // namespace strata::testing

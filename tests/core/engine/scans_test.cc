@@ -1,0 +1,141 @@
+// What becomes of scans once they are acknowledged.
+#include <cstdint>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/status/status.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/codec/surface_tile_codec.h"
+#include "tests/core/engine/engine_fixture.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class EngineScansTest : public EngineTest {};
+
+TEST_F(EngineScansTest, RestartContinuesWithPendingScans) {
+  MakeMap();
+  UploadRooms(12);
+  Close();  // some are surely still pending
+  Reopen();
+  const MapStats stats = WaitIntegrated(db());
+  EXPECT_EQ(stats.scans, 12U);
+  MakeMap(SmallMap(), "other");
+  UploadRooms(12, "other");
+  EXPECT_EQ(WaitIntegrated(db(), "other").content_digest, stats.content_digest);
+}
+
+TEST_F(EngineScansTest, ScansAreAlignedToThoseAround) {
+  MapParameters parameters = SmallMap();
+  parameters.mls.cell_size_m = 0.2;
+  MakeMap(parameters);
+  double uploaded_error = 0.0;
+  for (std::uint64_t i = 0; i < 6; ++i) {
+    const Pose truth = PoseAt(1.5 * static_cast<double>(i), 0.0, 0.05 * static_cast<double>(i));
+    const PointCloud cloud = SeeWorld(truth, i + 1, 60'000);
+    const Pose rough = i == 0 ? truth : truth * PoseAt(0.15, -0.1, 0.01);
+    uploaded_error = (rough.translation() - truth.translation()).norm();
+    STRATA_ASSERT_OK(Upload(db(), HeaderOf({"run", i}, cloud, rough, Alignment::kOn), cloud));
+  }
+  WaitIntegrated(db());
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo last, db().scans().Get({}, kMapName, {"run", 5}));
+  EXPECT_TRUE(last.alignment.aligned) << last.alignment.message;
+  const Pose truth = PoseAt(7.5, 0.0, 0.25);
+  EXPECT_LT((last.T_map_scan.translation() - truth.translation()).norm(), uploaded_error / 2);
+  STRATA_ASSERT_OK_AND_ASSIGN(const api::PoseGraphState graph, db().posegraph().Get({}, kMapName));
+  EXPECT_EQ(graph.nodes.size(), 6U);
+  ASSERT_GE(graph.constraints.size(), 5U);
+  for (const Constraint& constraint : graph.constraints) {
+    EXPECT_GT(constraint.information.diagonal().minCoeff(), 0.0);
+  }
+}
+
+TEST_F(EngineScansTest, DeleteEqualsNeverUploaded) {
+  MakeMap();
+  UploadRooms(3);
+  const std::string before = Digest();
+  const auto tiles = AllTiles(db());
+  UploadRoom(9, PoseAt(1, 1));
+  EXPECT_THAT(Digest(), Not(before));
+  STRATA_ASSERT_OK(db().scans().Delete({}, kMapName, {"run", 9}));
+  EXPECT_EQ(Digest(), before);
+  for (const auto& [key, bytes] : AllTiles(db())) {
+    ASSERT_TRUE(tiles.contains(key)) << key.ToString();
+    EXPECT_EQ(DecodeSurfaceTile(bytes)->surfaces, DecodeSurfaceTile(tiles.at(key))->surfaces);
+  }
+  EXPECT_THAT(db().scans().Delete({}, kMapName, {"run", 9}),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("run/9")));
+  ExpectSound();
+}
+
+TEST_F(EngineScansTest, ManyRobotsAtOnce) {
+  MakeMap();
+  std::vector<std::thread> robots;
+  for (int robot = 0; robot < 4; ++robot) {
+    robots.emplace_back([this, robot] {
+      for (std::uint64_t i = 1; i <= 6; ++i) {
+        const PointCloud cloud = MakeRoom(i + 100 * static_cast<std::uint64_t>(robot), 1000);
+        const ScanId id{"robot" + std::to_string(robot), i};
+        STRATA_EXPECT_OK(Upload(db(), HeaderOf(id, cloud, PoseAt(robot * 5.0, i * 3.0)), cloud));
+        STRATA_EXPECT_OK(db().maps().Stats({}, kMapName));
+      }
+    });
+  }
+  for (std::thread& robot : robots) robot.join();
+  EXPECT_EQ(WaitIntegrated(db()).scans, 24U);
+  ExpectSound();
+}
+
+TEST_F(EngineScansTest, AScanThatLeavesTheMapIsNotLostInSilence) {
+  MakeMap();
+  Pose high = Pose::Identity();
+  high.translation().z() = 3000.0;
+  const auto beyond = HasSubstr("0 of 3000 points within what a map can hold");
+  const ScanId lost = UploadRoom(1, high);
+  const ScanId room = UploadRoom(2, PoseAt(0, 0));
+  const std::string digest = Digest();
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo scan, db().scans().Get({}, kMapName, lost));
+  EXPECT_EQ(scan.state, ScanState::kFailed);
+  EXPECT_THAT(scan.message, beyond);
+  EXPECT_THAT(db().posegraph().SetPose({}, kMapName, room, high),
+              StatusIs(absl::StatusCode::kInvalidArgument, beyond));
+  EXPECT_EQ(Digest(), digest);
+  ExpectSound();
+}
+
+TEST_F(EngineScansTest, ADamagedScanDoesNotStopTheOthers) {
+  MakeMap();
+  UploadRooms(3);
+  WaitIntegrated(db());
+  Close();
+  const std::string spoilt = "UPDATE truth_scan SET header = x'00' WHERE sequence = ";
+  Sql(spoilt + "1");                                                      // integrated
+  Sql(spoilt + "2; UPDATE truth_scan SET state = 1 WHERE sequence = 2");  // pending
+  Reopen();
+  for (const std::uint64_t next : {4, 5}) UploadRoom(next, RoomPose(next));
+  const auto state = [&](std::uint64_t sequence) {
+    const auto scan = db().scans().Get({}, kMapName, {"run", sequence});
+    STRATA_EXPECT_OK(scan);
+    return scan.ok() ? scan->state : ScanState::kFailed;
+  };
+  while (state(5) == ScanState::kPending) {
+  }
+  for (const std::uint64_t sound : {3, 4, 5}) EXPECT_EQ(state(sound), ScanState::kIntegrated);
+  for (const std::uint64_t damaged : {1, 2}) {
+    EXPECT_THAT(db().scans().Get({}, kMapName, {"run", damaged}),
+                StatusIs(absl::StatusCode::kDataLoss, HasSubstr("scan run/")));
+  }
+  const JobInfo verified = RunJob(db(), "verify");
+  EXPECT_EQ(verified.state, JobState::kFailed);
+  EXPECT_THAT(verified.message, HasSubstr("2 mismatches"));
+}
+
+}  // namespace
+}  // namespace strata::testing

@@ -1,0 +1,97 @@
+// Tiles: a function of the scans alone, and streams of what changed.
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/codec/surface_tile_codec.h"
+#include "tests/core/engine/engine_fixture.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+class EngineTilesTest : public EngineTest {};
+
+TEST_F(EngineTilesTest, TilesDoNotDependOnOrderBatchesOrThreads) {
+  MakeMap();
+  UploadRooms(7);
+  const MapStats forward = WaitIntegrated(db());
+  EXPECT_EQ(forward.scans, 7U);
+  EXPECT_EQ(forward.scans_failed, 0U);
+  EXPECT_GT(forward.patches, 5000U);
+  EXPECT_GT(forward.tiles, 3U);
+  const auto tiles = AllTiles(db());
+  Close();
+
+  EngineOptions options = Options();
+  options.max_batch_scans = 1;
+  options.worker_threads = 4;
+  Reopen(options);
+  MakeMap(SmallMap(), "other");
+  for (std::uint64_t i = 7; i >= 1; --i) UploadRoom(i, RoomPose(i), "other");
+  EXPECT_EQ(WaitIntegrated(db(), "other").content_digest, forward.content_digest);
+  const auto other = AllTiles(db(), "other");
+  ASSERT_EQ(other.size(), tiles.size());
+  for (const auto& [key, bytes] : tiles) {
+    const SurfaceTile a = DecodeSurfaceTile(bytes).value();
+    const SurfaceTile b = DecodeSurfaceTile(other.at(key)).value();
+    EXPECT_EQ(a.surfaces, b.surfaces) << key.ToString();
+  }
+}
+
+TEST_F(EngineTilesTest, FetchSendsOnlyWhatChangedOrIsGone) {
+  MakeMap();
+  UploadRoom(1, PoseAt(0, 0));
+  UploadRoom(2, PoseAt(200, 0));
+  WaitIntegrated(db());
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto infos, db().tiles().List({}, kMapName, {}));
+  std::vector<api::HeldTile> held;
+  for (const api::TileInfo& info : infos) held.push_back({info.key, info.version});
+  const auto fetch = [&] {
+    std::map<TileKey, api::TileUpdate::Kind> kinds;
+    STRATA_EXPECT_OK(db().tiles().Fetch({}, kMapName, {}, held, [&](const api::TileUpdate& u) {
+      kinds[u.tile.key] = u.kind;
+      return absl::OkStatus();
+    }));
+    return kinds;
+  };
+  EXPECT_TRUE(fetch().empty());
+  STRATA_ASSERT_OK(db().scans().Delete({}, kMapName, {"run", 2}));
+  const auto kinds = fetch();
+  EXPECT_FALSE(kinds.empty());
+  for (const auto& [key, kind] : kinds) {
+    EXPECT_EQ(kind, api::TileUpdate::Kind::kGone) << key.ToString();
+    EXPECT_GT(key.x, 5);
+  }
+}
+
+TEST_F(EngineTilesTest, AStreamKeepsToTheStateItBeganWith) {
+  MakeMap();
+  UploadRooms(4);
+  WaitIntegrated(db());
+  const auto before = AllTiles(db());
+  std::map<TileKey, std::string> streamed;
+  bool moved = false;
+  STRATA_ASSERT_OK(db().tiles().Fetch({}, kMapName, {}, {}, [&](const api::TileUpdate& update) {
+    streamed[update.tile.key] = update.tile.bytes;
+    if (!moved) {
+      moved = true;
+      STRATA_EXPECT_OK(db().posegraph().SetPose({}, kMapName, {"run", 4}, PoseAt(60, 60)));
+      STRATA_EXPECT_OK(db().scans().Delete({}, kMapName, {"run", 1}));
+    }
+    return absl::OkStatus();
+  }));
+  for (const auto& [key, bytes] : streamed) EXPECT_EQ(bytes, before.at(key)) << key.ToString();
+  EXPECT_EQ(streamed.size(), std::count_if(before.begin(), before.end(), [](const auto& tile) {
+              return tile.first.level == 0;
+            }));
+}
+
+}  // namespace
+}  // namespace strata::testing

@@ -1,0 +1,123 @@
+// What verify says of damage, and what rebuild makes of it.
+#include <iterator>
+#include <string>
+
+#include "absl/status/status.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/core/engine/engine_fixture.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+class EngineVerifyTest : public EngineTest {};
+
+TEST_F(EngineVerifyTest, DamagedTileIsDataLossVerifyNamesItAndRebuildMendsIt) {
+  MakeMap();
+  UploadRooms(3);
+  WaitIntegrated(db());
+  const auto tiles = AllTiles(db());
+  for (const std::string table : {"derived_surface_tile", "derived_mls_tile"}) {
+    Close();
+    Sql("UPDATE " + table +
+        " SET bytes = CAST(substr(bytes, 1, 40) || x'5a5a' || substr(bytes, 43) AS BLOB) "
+        "WHERE level = 0 AND (x, y) = (SELECT x, y FROM " +
+        table + " WHERE level = 0 ORDER BY x, y LIMIT 1)");
+    Reopen();
+    const TileKey key = tiles.begin()->first;
+    if (table == "derived_surface_tile") {
+      EXPECT_THAT(db().tiles().Get({}, kMapName, key),
+                  StatusIs(absl::StatusCode::kDataLoss, HasSubstr(key.ToString())));
+      EXPECT_THAT(db().tiles().Get({}, kMapName, std::next(tiles.begin())->first), IsOk());
+    }
+    const JobInfo found = RunJob(db(), "verify");
+    EXPECT_EQ(found.state, JobState::kFailed);
+    EXPECT_THAT(found.message, HasSubstr("tile " + key.ToString()));
+    EXPECT_EQ(RunJob(db(), "rebuild").state, JobState::kSucceeded);
+    const JobInfo mended = RunJob(db(), "verify");
+    EXPECT_EQ(mended.state, JobState::kSucceeded) << mended.message;
+    EXPECT_THAT(db().tiles().Get({}, kMapName, key), IsOk());
+  }
+}
+
+TEST_F(EngineVerifyTest, DamagedPointsAreNamed) {
+  MakeMap();
+  UploadRooms(2);
+  WaitIntegrated(db());
+  Close();
+  Sql("UPDATE truth_chunk SET bytes = CAST(substr(bytes, 1, 100) || x'00ff' || substr(bytes, 103) "
+      "AS BLOB) WHERE upload = (SELECT upload FROM truth_scan WHERE sequence = 2)");
+  Reopen();
+  const JobInfo job = RunJob(db(), "verify");
+  EXPECT_EQ(job.state, JobState::kFailed);
+  EXPECT_THAT(job.message, HasSubstr("scan run/2"));
+  EXPECT_THAT(db().scans().GetPoints(
+                  {}, kMapName, {"run", 2}, [](const PointCloud&) { return absl::OkStatus(); }),
+              StatusIs(absl::StatusCode::kDataLoss, HasSubstr("run/2")));
+}
+
+TEST_F(EngineVerifyTest, EverythingDamagedIsNamed) {
+  MakeMap();
+  UploadRooms(4);
+  const PointCloud large = MakeRoom(5, 90'000);  // three pieces
+  STRATA_ASSERT_OK(Upload(db(), HeaderOf({"run", 5}, large, RoomPose(5)), large));
+  WaitIntegrated(db());
+  Close();
+  const std::string spoilt =
+      " = CAST(substr(bytes, 1, 40) || x'5a5a' || substr(bytes, 43) AS BLOB) ";
+  const std::string piece = "UPDATE truth_chunk SET bytes" + spoilt +
+                            "WHERE upload = (SELECT upload FROM truth_scan WHERE sequence = ";
+  Sql("UPDATE truth_scan SET header = CAST(x'00' || substr(header, 2) AS BLOB) WHERE sequence IN "
+      "(1, 3)");
+  Sql(piece + "2)");
+  Sql(piece + "5) AND ordinal IN (0, 2)");
+  Sql("UPDATE derived_surface_tile SET bytes" + spoilt +
+      "WHERE level = 0 AND (x, y) IN ((0, 0), "
+      "(-1, 0))");
+  Sql("UPDATE derived_mls_tile SET bytes" + spoilt + "WHERE (x, y) = (0, 0)");
+  Reopen();
+  const JobInfo job = RunJob(db(), "verify");
+  EXPECT_EQ(job.state, JobState::kFailed);
+  for (const char* damaged : {"scan run/1",
+                              "scan run/3",
+                              "scan run/2: piece 0",
+                              "scan run/5: piece 0",
+                              "scan run/5: piece 2",
+                              "tile 0/0/0 (served)",
+                              "tile 0/-1/0 (served)",
+                              "tile 0/0/0 (statistics)"}) {
+    EXPECT_THAT(job.message, HasSubstr(damaged));
+  }
+  EXPECT_THAT(job.message, HasSubstr("8 mismatches"));
+  EXPECT_EQ(job.metrics.at("mismatches"), 8.0);
+  EXPECT_EQ(job.metrics.at("scans_checked"), 5.0);
+}
+
+// With sound truth every tile is compared with what it should be.
+TEST_F(EngineVerifyTest, EveryDamagedTileIsNamedAndMended) {
+  MakeMap();
+  UploadRooms(4);
+  const std::string digest = Digest();
+  const auto tiles = AllTiles(db());
+  Close();
+  Sql("UPDATE derived_surface_tile SET bytes = x'00'");
+  Sql("UPDATE derived_mls_tile SET bytes = x'00'");
+  Reopen();
+  const JobInfo job = RunJob(db(), "verify");
+  EXPECT_EQ(job.state, JobState::kFailed);
+  for (const auto& [key, bytes] : tiles) {
+    EXPECT_THAT(job.message, HasSubstr("tile " + key.ToString() + " (served)"));
+    if (key.level > 0) continue;
+    EXPECT_THAT(job.message, HasSubstr("tile " + key.ToString() + " (statistics)"));
+  }
+  EXPECT_EQ(RunJob(db(), "rebuild").state, JobState::kSucceeded);
+  ExpectSound();
+  EXPECT_EQ(Digest(), digest);
+}
+
+}  // namespace
+}  // namespace strata::testing

@@ -1,0 +1,78 @@
+// Conformance: maps.
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/database_suite.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+using ::testing::_;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+using Code = absl::StatusCode;
+
+TEST_P(DatabaseSuite, MapsAreCreatedFoundListedAndDeleted) {
+  MapParameters parameters;
+  parameters.mls.cell_size_m = 0.25;
+  parameters.default_profile.radius_m = 0.75;
+  parameters.keep_points = false;
+  parameters.origin = GeodeticOrigin{0.8, 0.1, 300.0};
+  STRATA_ASSERT_OK(db().maps().Create({}, "campus", parameters));
+  STRATA_ASSERT_OK_AND_ASSIGN(const MapInfo found, db().maps().Get({}, "campus"));
+  EXPECT_EQ(found.name, "campus");
+  EXPECT_EQ(found.parameters, parameters);
+  STRATA_ASSERT_OK_AND_ASSIGN(std::vector<MapInfo> maps, db().maps().List({}));
+  ASSERT_THAT(maps, SizeIs(2));
+  EXPECT_EQ(maps[0].name, "campus");
+  EXPECT_EQ(maps[1].name, kMap);
+  STRATA_EXPECT_OK(db().maps().Delete({}, "campus"));
+  EXPECT_THAT(db().maps().Get({}, "campus"), StatusIs(Code::kNotFound, HasSubstr("campus")));
+}
+
+TEST_P(DatabaseSuite, BadAndTakenMapsAreRefused) {
+  EXPECT_THAT(db().maps().Create({}, kMap, {}), StatusIs(Code::kAlreadyExists, HasSubstr(kMap)));
+  EXPECT_THAT(db().maps().Create({}, "../x", {}), StatusIs(Code::kInvalidArgument, _));
+  MapParameters parameters;
+  parameters.mls.cell_size_m = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(db().maps().Create({}, "x", parameters),
+              StatusIs(Code::kInvalidArgument, HasSubstr("cell_size_m")));
+}
+
+TEST_P(DatabaseSuite, AnUnknownMapIsNotFoundEverywhere) {
+  const std::string no = "nowhere";
+  const auto not_found = StatusIs(Code::kNotFound, HasSubstr("nowhere"));
+  EXPECT_THAT(db().maps().Get({}, no), not_found);
+  EXPECT_THAT(db().maps().Stats({}, no), not_found);
+  EXPECT_THAT(db().maps().Delete({}, no), not_found);
+  const PointCloud floor = LevelFloor(0.2);
+  EXPECT_THAT(db().scans().Upload({}, no, FloorHeader({"run", 1}, floor)).status(), not_found);
+  EXPECT_THAT(db().scans().GetUploadState({}, no, "run"), not_found);
+  EXPECT_THAT(db().scans().Get({}, no, {"run", 1}), not_found);
+  EXPECT_THAT(db().scans().Delete({}, no, {"run", 1}), not_found);
+  const auto ignore = [](const auto&) { return absl::OkStatus(); };
+  EXPECT_THAT(db().scans().List({}, no, {}, ignore), not_found);
+  EXPECT_THAT(db().scans().GetPoints({}, no, {"run", 1}, ignore), not_found);
+  EXPECT_THAT(db().tiles().Get({}, no, {}), not_found);
+  EXPECT_THAT(db().tiles().List({}, no, {}), not_found);
+  EXPECT_THAT(db().tiles().Fetch({}, no, {}, {}, ignore), not_found);
+  EXPECT_THAT(db().planning().PlanPath({}, no, {}), not_found);
+  EXPECT_THAT(db().planning().SampleSurfaces({}, no, {}), not_found);
+  EXPECT_THAT(db().planning().SetProfile({}, no, "p", {}), not_found);
+  EXPECT_THAT(db().planning().ListProfiles({}, no), not_found);
+  EXPECT_THAT(db().jobs().Start({}, no, "verify", {}), not_found);
+  EXPECT_THAT(db().jobs().Get({}, no, 1), not_found);
+  EXPECT_THAT(db().jobs().List({}, no), not_found);
+  EXPECT_THAT(db().jobs().Cancel({}, no, 1), not_found);
+  EXPECT_THAT(db().jobs().Watch({}, no, 1, ignore), not_found);
+  EXPECT_THAT(db().posegraph().Get({}, no), not_found);
+  EXPECT_THAT(db().posegraph().SetPose({}, no, {"run", 1}, Pose::Identity()), not_found);
+}
+
+}  // namespace
+}  // namespace strata::testing
