@@ -14,12 +14,12 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 
+#include "client/cli/patience.h"
 #include "core/common/status.h"
 
 namespace strata::cli {
 namespace {
 
-constexpr absl::Duration kPatience = absl::Minutes(1);
 constexpr absl::Duration kFirstDelay = absl::Milliseconds(100);
 constexpr absl::Duration kLongestDelay = absl::Seconds(5);
 
