@@ -90,8 +90,9 @@ std::string TrajectoryOf(const std::string& path) {
   return name.empty() ? "scans" : name.substr(0, 100);
 }
 
-absl::StatusOr<std::vector<ScanSource>> FindScans(const ImportOptions& options) {
+absl::StatusOr<std::vector<ScanSource>> FindScans(const ImportOptions& options, Output& output) {
   ScanListOptions list;
+  list.warn = [&output](const std::string& warning) { output.Talk("warning: " + warning); };
   STRATA_ASSIGN_OR_RETURN(list.format, ParseScanFormat(options.format));
   STRATA_ASSIGN_OR_RETURN(list.pose_format, ParsePoseFormat(options.pose_format));
   list.poses = options.poses;
@@ -267,7 +268,7 @@ absl::Status Import(Context& context, ImportOptions options) {
   if (options.trajectory.empty()) {
     options.trajectory = TrajectoryOf(options.paths.front());
   }
-  STRATA_ASSIGN_OR_RETURN(std::vector<ScanSource> scans, FindScans(options));
+  STRATA_ASSIGN_OR_RETURN(std::vector<ScanSource> scans, FindScans(options, context.output));
   STRATA_ASSIGN_OR_RETURN(const std::set<std::uint64_t> there, SequencesThere(context, options));
   Summary summary;
   if (options.level) {

@@ -188,14 +188,24 @@ void AssignInOrder(const std::vector<FilePose>& sorted,
   }
 }
 
-void AssignTum(PoseList list, const fs::path& file, std::vector<ScanSource>& scans) {
+void AssignTum(PoseList list, const ScanListOptions& options, std::vector<ScanSource>& scans) {
   std::stable_sort(list.poses.begin(), list.poses.end(), [](const FilePose& a, const FilePose& b) {
     return *a.time < *b.time;
   });
   const bool timed = std::all_of(scans.begin(), scans.end(), [](const ScanSource& scan) {
     return TimeOfName(scan.path).has_value();
   });
-  timed ? AssignByTime(list.poses, file, scans) : AssignInOrder(list.poses, file, scans);
+  if (!timed && list.poses.size() > scans.size() && options.warn) {
+    options.warn(absl::StrCat(options.poses.string(),
+                              " has ",
+                              list.poses.size(),
+                              " poses for ",
+                              scans.size(),
+                              " scans, whose names are no times: the first are taken in order; "
+                              "index-tum says which is whose"));
+  }
+  timed ? AssignByTime(list.poses, options.poses, scans)
+        : AssignInOrder(list.poses, options.poses, scans);
 }
 
 // Poses in `folder`, or beside the scans where it is empty; where nobody asked for them and there
@@ -251,7 +261,7 @@ absl::StatusOr<std::vector<ScanSource>> ListScans(const std::vector<fs::path>& p
   }
   STRATA_ASSIGN_OR_RETURN(PoseList list, ReadPoses(options.poses, options.pose_format));
   if (list.format == PoseFormat::kTum) {
-    AssignTum(std::move(list), options.poses, scans);
+    AssignTum(std::move(list), options, scans);
   } else {
     AssignByIndex(list, options.poses, scans);
   }

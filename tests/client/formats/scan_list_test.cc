@@ -124,6 +124,21 @@ TEST_F(ScanListTest, WhatIsNotThereIsNotFound) {
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("none.txt")));
 }
 
+TEST_F(ScanListTest, MoreTumPosesThanScansAreAWarning) {
+  Write("a.xyz");
+  const auto poses = Write("poses", "1 10 0 0 0 0 0 1\n2 20 0 0 0 0 0 1\n");
+  std::string warning;
+  const auto warn = [&warning](const std::string& text) { warning += text; };
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans,
+                              ListScans({dir_.path()}, {.poses = poses, .warn = warn}));
+  EXPECT_EQ(scans.at(0).T_map_scan.translation().x(), 10);
+  EXPECT_THAT(warning, HasSubstr("2 poses for 1 scans"));
+  warning.clear();
+  Write("b.xyz");
+  STRATA_EXPECT_OK(ListScans({dir_.path()}, {.poses = poses, .warn = warn}));
+  EXPECT_EQ(warning, "");
+}
+
 TEST_F(ScanListTest, AFolderOf3dtkPosesMayBeNamed) {
   Write("s000.3d", "100 100 100\n");
   std::filesystem::create_directory(dir_.path() / "poses");
