@@ -234,6 +234,7 @@ void DrawLegend(Image& image, const Camera& camera) {
 // The axes of the map in the lower left corner, as far as the view shows them.
 void DrawAxes(Image& image, const Camera& camera) {
   const int length = std::clamp(image.width / 40, 14, 36);
+  const int scale = length > 24 ? 2 : 1;  // of the letters
   const int left = length + 14;
   const int bottom = image.height - kLegendPixels - length - 14;
   const std::array<std::pair<Vector3d, const char*>, 3> axes = {
@@ -249,11 +250,11 @@ void DrawAxes(Image& image, const Camera& camera) {
         const int y = bottom + static_cast<int>(std::lround(share * down)) - width / 2;
         FillRectangle(image, x, y, width, width, width == 2 ? kInk : kBackground);
       }
-      const double beyond = 1.0 + 8.0 / std::hypot(right, down);
+      const double beyond = 1.0 + 7.0 * scale / std::hypot(right, down);
       DrawText(image,
-               left + static_cast<int>(std::lround(beyond * right)) - 2,
-               bottom + static_cast<int>(std::lround(beyond * down)) - 3,
-               1,
+               left + static_cast<int>(std::lround(beyond * right)) - 5 * scale / 2,
+               bottom + static_cast<int>(std::lround(beyond * down)) - 7 * scale / 2,
+               scale,
                name,
                kInk);
     }
