@@ -25,7 +25,7 @@ cd "$(dirname "$0")/.."
 
 step() { printf '\n== %s\n' "$*"; }
 # Shows a command as one would type it, then runs it.
-run() { printf '$ %s\n' "$*"; "$@"; }
+run() { local line="$*"; printf '$ %s\n' "${line/#strata_at/strata --server ${server_address:-}}"; "$@"; }
 
 work=$(mktemp -d)
 server=
