@@ -107,10 +107,9 @@ class ColumnText {
  private:
   absl::Status ReadLine(absl::string_view line) {
     const bool comment = absl::StartsWith(line, "#") || absl::StartsWith(line, "//");
-    if (comment)
-      line.remove_prefix(line.find_first_not_of("#/") == absl::string_view::npos
-                             ? line.size()
-                             : line.find_first_not_of("#/"));
+    if (comment) {
+      line.remove_prefix(std::min(line.find_first_not_of("#/"), line.size()));
+    }
     const std::vector<absl::string_view> words = SplitWords(line, true);
     if (words.empty()) return absl::OkStatus();
     if (comment) {
@@ -126,16 +125,15 @@ class ColumnText {
       meanings_ = NamedColumns(words, 0);
       return absl::OkStatus();
     }
-    std::vector<double> numbers;
-    for (const absl::string_view word : words) {
-      const std::optional<double> number = ParseNumber(word);
-      if (!number.has_value()) {
-        return cursor_.Error(
-            absl::StrCat("expected numbers only, found '", word.substr(0, 40), "'"));
-      }
-      numbers.push_back(*number);
-    }
-    return AddPoint(numbers);
+    const std::optional<std::vector<double>> numbers = Numbers(words);
+    return numbers.has_value() ? AddPoint(*numbers) : NotNumbers(words);
+  }
+
+  absl::Status NotNumbers(const std::vector<absl::string_view>& words) const {
+    const auto bad = std::find_if(words.begin(), words.end(), [](absl::string_view word) {
+      return !ParseNumber(word).has_value();
+    });
+    return cursor_.Error(absl::StrCat("expected numbers only, found '", bad->substr(0, 40), "'"));
   }
 
   absl::Status AddPoint(const std::vector<double>& numbers) {
