@@ -175,7 +175,8 @@ void AddPlanCommand(Commands& commands) {
   verb->add_option("--profile", options->profile, "The map's robot profile to start from")
       ->capture_default_str();
   AddProfileOptions(verb, options->overrides);
-  verb->add_option("--max-expanded", options->query.max_expanded, "Search limit")
+  verb->add_option("--max-expanded", options->query.max_expanded, "Search limit: patches looked at")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   verb->add_option("--out",
                    options->out,

@@ -114,6 +114,9 @@ void AddList(Commands& commands, CLI::App* noun, const std::shared_ptr<ScanOptio
       4,
       4,
       [options](const std::vector<double>& n) {
+        if (n[0] > n[2] || n[1] > n[3]) {
+          throw CLI::ValidationError("--box", "expected X0 <= X1 and Y0 <= Y1");
+        }
         options->filter.box =
             Eigen::AlignedBox2d(Eigen::Vector2d(n[0], n[1]), Eigen::Vector2d(n[2], n[3]));
       },

@@ -93,6 +93,9 @@ void AddTileCommands(Commands& commands) {
       4,
       4,
       [options](const std::vector<double>& n) {
+        if (n[0] > n[2] || n[1] > n[3]) {
+          throw CLI::ValidationError("--area", "expected X0 <= X1 and Y0 <= Y1");
+        }
         const auto index = [&](int i) {
           constexpr double kLimit = 1LL << 31;
           return static_cast<std::int64_t>(

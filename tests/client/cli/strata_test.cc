@@ -103,6 +103,10 @@ TEST_F(StrataTest, WrongUsageExitsWithTwo) {
       {"plan", "m"},
       {"plan", "m", "--from", "1,2,3"},
       {"plan", "m", "--from", "1,x", "--to", "1,2"},
+      {"plan", "m", "--from", "1,2", "--to", "1,2", "--max-expanded", "-1"},
+      {"job", "show", "m", "-1"},
+      {"scan", "list", "m", "--box", "1,0,-1,2"},
+      {"tile", "list", "m", "--area", "0,1,2,0"},
       {"surface", "m"},
       {"map", "list", "--output", "yaml"},
       {"scan", "show", "m", "no-number"}};
