@@ -66,6 +66,7 @@ absl::Status WriteFileBytes(const std::filesystem::path& path, absl::string_view
   temporary += absl::StrCat(".", getpid(), ".part");
   absl::Status status = WriteInto(temporary, path, bytes);
   if (status.ok()) {
+    if (fs::exists(there)) fs::permissions(temporary, there.permissions(), error);
     fs::rename(temporary, target, error);
     if (!error) return status;
     status = CannotWrite(path, error.message());

@@ -46,6 +46,18 @@ TEST_F(FollowJobTest, WatchesAgainWhenTheServerComesBack) {
   EXPECT_EQ(job.state, JobState::kSucceeded);
 }
 
+TEST_F(FollowJobTest, InterruptedItSaysThatTheJobGoesOn) {
+  auto& jobs = database_.jobs();
+  ON_CALL(jobs, Get).WillByDefault(Return(JobIn(JobState::kRunning)));
+  EXPECT_CALL(jobs, Watch).WillOnce([](const api::Call& call, auto, auto, const auto&) {
+    call.stop.Request();
+    return absl::CancelledError("cancelled by the caller");
+  });
+  EXPECT_THAT(FollowJob(context_, "m", 7).status(),
+              testing::StatusIs(absl::StatusCode::kCancelled,
+                                ::testing::HasSubstr("'strata job watch m 7' comes back to it")));
+}
+
 TEST_F(FollowJobTest, OtherErrorsEndIt) {
   auto& jobs = database_.jobs();
   ON_CALL(jobs, Get).WillByDefault(Return(JobIn(JobState::kRunning)));

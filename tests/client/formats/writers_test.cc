@@ -106,6 +106,7 @@ TEST(WriteFileBytesTest, ReplacesAFileAsAWholeAndKeepsALink) {
   const auto file = dir.path() / "file";
   const auto link = dir.path() / "link";
   STRATA_ASSERT_OK(WriteFileBytes(file, "old"));
+  std::filesystem::permissions(file, std::filesystem::perms::owner_read);
   std::filesystem::create_symlink(file, link);
   std::ifstream reader(file);
   STRATA_ASSERT_OK(WriteFileBytes(link, "new bytes"));
@@ -114,6 +115,7 @@ TEST(WriteFileBytesTest, ReplacesAFileAsAWholeAndKeepsALink) {
   EXPECT_EQ(seen, "old");  // who had it open still has the whole old file
   EXPECT_TRUE(std::filesystem::is_symlink(link));
   EXPECT_EQ(*ReadFileBytes(file), "new bytes");
+  EXPECT_EQ(std::filesystem::status(file).permissions(), std::filesystem::perms::owner_read);
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(dir.path()), {}), 2);
 }
 
