@@ -64,15 +64,16 @@ void AddGlobalOptions(CLI::App& root, GlobalOptions& options) {
   root.set_version_flag("--version", "strata " STRATA_VERSION);
 }
 
-// A server that went away names itself and the cure.
+// Trouble with a server says with which, and the cure.
 absl::Status Explained(const absl::Status& status, const Target& target) {
   if (!absl::IsUnavailable(status) || !target.embedded.empty()) {
     return status;
   }
-  return absl::UnavailableError(absl::StrCat(status.message(),
-                                             " (server ",
-                                             target.server,
-                                             "; once stratad runs there, run the command again)"));
+  return absl::UnavailableError(
+      absl::StrCat(status.message(),
+                   " (from ",
+                   target.server,
+                   "; if stratad does not run there, start it and run the command again)"));
 }
 
 int Fail(const absl::Status& status, Output& output) {

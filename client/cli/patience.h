@@ -8,15 +8,15 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 
-namespace strata::cli {
+#include "client/cli/scan_uploader.h"
 
-inline constexpr absl::Duration kPatience = absl::Minutes(1);
+namespace strata::cli {
 
 // Counts from the first of several failures in a row. Not thread-safe.
 class Patience {
  public:
-  // True if it is worth asking again after `status`: always after OK, for kPatience while the
-  // server is UNAVAILABLE, never after another error.
+  // True if it is worth asking again after `status`: always after OK, for kPatience, as an
+  // import, while the server is UNAVAILABLE, never after another error.
   bool Has(const absl::Status& status) {
     if (!absl::IsUnavailable(status)) {
       away_since_ = absl::InfiniteFuture();

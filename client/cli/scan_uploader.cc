@@ -14,7 +14,6 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 
-#include "client/cli/patience.h"
 #include "core/common/status.h"
 
 namespace strata::cli {
