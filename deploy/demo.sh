@@ -25,7 +25,7 @@ cd "$(dirname "$0")/.."
 
 step() { printf '\n== %s\n' "$*"; }
 # Shows a command as one would type it, then runs it.
-run() { printf '$ %s\n' "$*"; "$@"; }
+run() { local line="$*"; printf '$ %s\n' "${line/#strata_at/strata --server ${server_address:-}}"; "$@"; }
 
 work=$(mktemp -d)
 server=
@@ -119,6 +119,18 @@ ground() {
                                        END { print x "," y "," (found ? best : z) }'
 }
 
+scans_in() { strata_at map show "$1" --output json | sed -n 's/^ *"scans": \([0-9]*\),$/\1/p'; }
+
+# Levelled by the floor where one is seen; goes on with what could be read where some files are bad.
+import_recorded() {
+  run strata_at scan import recorded "$@" --level && return
+  if [[ $(scans_in recorded) == 0 ]]; then
+    run strata_at scan import recorded "$@" && return
+  fi
+  [[ $(scans_in recorded) != 0 ]] || exit 1
+  echo "demo: goes on with the $(scans_in recorded) scans that could be read"
+}
+
 demo_recorded() {
   local scans=$data/scans poses=
   [[ -d $scans ]] || scans=$data
@@ -130,9 +142,9 @@ demo_recorded() {
   start_server
   step "import"
   run strata_at map create recorded --cell-size 0.1
-  local options=(--trajectory recorded --align on --level --wait)
+  local options=(--trajectory recorded --align on --wait)
   [[ -z $poses ]] || options+=(--poses "$poses")
-  run strata_at scan import recorded "$scans" "${options[@]}"
+  import_recorded "$scans" "${options[@]}"
   step "the map"
   run strata_at map show recorded
   run strata_at pose export recorded --out "$out/poses.txt"

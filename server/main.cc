@@ -5,6 +5,7 @@
 #include <string>
 
 #include "absl/status/status.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include <CLI/CLI.hpp>
 #include <glog/logging.h>
@@ -38,12 +39,13 @@ absl::Status Serve(const EngineOptions& engine_options,
                           OpenEngine(engine_options));
   STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<server::Server> server,
                           server::Server::Start(*database, server_options));
+  // Before any other line with an address, for scripts that read both streams as one.
+  std::cout << "listening " << server->address() << std::endl;
   LOG(INFO) << "event=start version=" << STRATA_VERSION << " data=" << engine_options.directory
             << " listen=" << server->address() << " query_threads=" << server_options.query_threads
             << " stream_threads=" << server_options.stream_threads
             << " upload_threads=" << server_options.upload_threads
             << " max_calls=" << server_options.max_calls;
-  std::cout << "listening " << server->address() << std::endl;
   int signal = 0;
   sigwait(&signals, &signal);
   LOG(INFO) << "event=shutdown signal=" << signal;
@@ -76,6 +78,11 @@ int Main(int argc, char** argv) {
   app.add_option("--max-calls", options.max_calls, "Calls under way before clients are sent away")
       ->capture_default_str();
   app.add_option("--drain", drain_s, "Seconds that calls may take to end at shutdown")
+      ->check([](const std::string& text) {
+        double seconds = 0.0;
+        const bool good = absl::SimpleAtod(text, &seconds) && seconds >= 0.0 && seconds <= 3600.0;
+        return good ? std::string() : "expected 0 to 3600 seconds, got " + text;
+      })
       ->capture_default_str();
   try {
     app.parse(argc, argv);

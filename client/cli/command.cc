@@ -5,9 +5,19 @@
 
 namespace strata::cli {
 
-CLI::App* Commands::Noun(const std::string& name, const std::string& description) {
+namespace {
+
+constexpr char kGlobalOptions[] =
+    "Also --server HOST:PORT, --embedded DIR, --output text|json: see strata --help.\n\n";
+
+}  // namespace
+
+CLI::App* Commands::Noun(const std::string& name,
+                         const std::string& description,
+                         const std::string& example) {
   CLI::App* noun = root.add_subcommand(name, description);
   noun->require_subcommand(1);
+  noun->footer(kGlobalOptions + ("Example:\n  " + example));
   return noun;
 }
 
@@ -17,7 +27,7 @@ CLI::App* Commands::Verb(CLI::App* noun,
                          const std::string& example,
                          Action action) {
   CLI::App* verb = noun->add_subcommand(name, description);
-  verb->footer("Example:\n  " + example);
+  verb->footer(kGlobalOptions + ("Example:\n  " + example));
   verb->callback([this, action = std::move(action)] { selected = action; });
   return verb;
 }

@@ -30,8 +30,11 @@ struct Commands {
   CLI::App& root;
   Action selected;
 
-  CLI::App* Noun(const std::string& name, const std::string& description);
-  // A verb under `noun` (the root for `surface` and `plan`); `example` appears below its --help.
+  // `example` appears below the --help of a noun or a verb.
+  CLI::App* Noun(const std::string& name,
+                 const std::string& description,
+                 const std::string& example);
+  // A verb under `noun` (the root for `surface` and `plan`).
   CLI::App* Verb(CLI::App* noun,
                  const std::string& name,
                  const std::string& description,

@@ -86,7 +86,7 @@ void AddParameters(CLI::App* verb, JobOptions& options) {
               options.parameters.insert(pair);
             }
           },
-          "Parameter of the job; may be given several times")
+          "Parameter of the job, as in threads=4; may be given several times")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
 }
@@ -95,7 +95,8 @@ void AddParameters(CLI::App* verb, JobOptions& options) {
 
 void AddJobCommands(Commands& commands) {
   auto options = std::make_shared<JobOptions>();
-  CLI::App* noun = commands.Noun("job", "Durable background work on a map");
+  CLI::App* noun = commands.Noun(
+      "job", "Durable background work on a map", "strata job start campus verify --wait");
   const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
     CLI::App* app =
         commands.Verb(noun, name, description, example, [options, run](Context& context) {
@@ -111,7 +112,7 @@ void AddJobCommands(Commands& commands) {
   start->add_flag("--wait", options->wait, "Return when it has ended; exit 1 unless it succeeded");
   verb("list", "All jobs of a map", "strata job list campus", List);
   const auto with_id = [&](CLI::App* app) {
-    app->add_option("ID", options->id, "Number of the job")->required();
+    app->add_option("ID", options->id, "Number of the job")->check(CLI::PositiveNumber)->required();
   };
   with_id(verb("show", "One job", "strata job show campus 3", Show));
   with_id(verb("watch",

@@ -5,8 +5,10 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
 
 #include "client/cli/json.h"
+#include "client/cli/patience.h"
 #include "client/cli/progress.h"
 #include "core/common/status.h"
 
@@ -15,13 +17,34 @@ namespace strata::cli {
 absl::StatusOr<JobInfo> FollowJob(Context& context, const std::string& map, std::uint64_t id) {
   STRATA_ASSIGN_OR_RETURN(JobInfo last, context.database.jobs().Get(context.call, map, id));
   Progress progress(context.output.talk(), TalksToTerminal(), last.kind);
-  STRATA_RETURN_IF_ERROR(
-      context.database.jobs().Watch(context.call, map, id, [&](const JobInfo& job) {
-        last = job;
-        progress.Update(job.progress, job.phase);
-        return absl::OkStatus();
-      }));
-  return last;
+  Patience patience;
+  while (true) {
+    const absl::Status watched =
+        context.database.jobs().Watch(context.call, map, id, [&](const JobInfo& job) {
+          last = job;
+          progress.Update(job.progress, job.phase);
+          patience.Has(absl::OkStatus());
+          return absl::OkStatus();
+        });
+    if (watched.ok()) {
+      return last;
+    }
+    if (context.call.stop.requested()) {
+      return absl::CancelledError(
+          absl::StrCat("no longer watching; job ",
+                       id,
+                       " goes on, 'strata job watch ",
+                       map,
+                       " ",
+                       id,
+                       "' comes back to it and 'strata job cancel' ends it"));
+    }
+    // Jobs are durable: a server that comes back goes on with it.
+    if (!patience.Has(watched)) {
+      return watched;
+    }
+    absl::SleepFor(absl::Milliseconds(200));
+  }
 }
 
 absl::Status StatusOf(const JobInfo& job) {

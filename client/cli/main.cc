@@ -1,14 +1,20 @@
 // strata: the command line of the map database.
 #include <csignal>
+#include <cstddef>
 #include <exception>
 #include <iostream>
 #include <string>
 
+#include "absl/status/status.h"
+#include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
 #include <CLI/CLI.hpp>
 
 #include "client/cli/command.h"
 #include "client/cli/connect.h"
 #include "client/cli/output.h"
+#include "client/cli/usage.h"
 
 namespace strata::cli {
 namespace {
@@ -30,11 +36,22 @@ struct GlobalOptions {
   std::string output = "text";
 };
 
+// For CLI11: empty, or what is wrong.
+std::string IsAddress(const std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  int port = 0;
+  const bool good = absl::StartsWith(text, "unix:") ||
+                    (colon != std::string::npos && colon > 0 &&
+                     absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port <= 65535);
+  return good ? "" : "expected HOST:PORT, as in 127.0.0.1:50051, got '" + text + "'";
+}
+
 void AddGlobalOptions(CLI::App& root, GlobalOptions& options) {
   root.fallthrough();  // options of the root are taken after noun and verb too
   root.require_subcommand(1);
   auto* server = root.add_option("--server", options.target.server, "Address of stratad")
                      ->type_name("HOST:PORT")
+                     ->check(IsAddress)
                      ->capture_default_str();
   root.add_option("--embedded",
                   options.target.embedded,
@@ -47,13 +64,30 @@ void AddGlobalOptions(CLI::App& root, GlobalOptions& options) {
   root.set_version_flag("--version", "strata " STRATA_VERSION);
 }
 
+// Trouble with a server says with which, and the cure.
+absl::Status Explained(const absl::Status& status, const Target& target) {
+  if (!absl::IsUnavailable(status) || !target.embedded.empty()) {
+    return status;
+  }
+  return absl::UnavailableError(
+      absl::StrCat(status.message(),
+                   " (from ",
+                   target.server,
+                   "; if stratad does not run there, start it and run the command again)"));
+}
+
+int Fail(const absl::Status& status, Output& output) {
+  output.Talk("error: " +
+              (status.message().empty() ? status.ToString() : std::string(status.message())));
+  return kExitFailed;
+}
+
 int Run(const GlobalOptions& options, const Action& action) {
   Output output(
       options.output == "json" ? OutputFormat::kJson : OutputFormat::kText, std::cout, std::cerr);
   auto database = OpenDatabase(options.target);
   if (!database.ok()) {
-    output.Talk("error: " + std::string(database.status().message()));
-    return kExitFailed;
+    return Fail(database.status(), output);
   }
   Context context{.database = **database, .call = {}, .output = output};
   running = &context.call.stop;
@@ -63,17 +97,19 @@ int Run(const GlobalOptions& options, const Action& action) {
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
   if (!status.ok()) {
-    output.Talk("error: " +
-                (status.message().empty() ? status.ToString() : std::string(status.message())));
-    return kExitFailed;
+    return Fail(Explained(status, options.target), output);
   }
-  return 0;
+  // Data that did not arrive (a full disk behind a redirection) is not done.
+  return std::cout.flush() ? 0 : Fail(absl::DataLossError("cannot write to stdout"), output);
 }
 
 int Main(int argc, char** argv) {
   CLI::App root("Strata: a map database for robots that live in three dimensions", "strata");
   root.footer(
-      "Lengths are in metres, angles in radians. `strata NOUN VERB --help` shows an example.");
+      "Lengths are in metres, angles in radians; values may be negative (--from -14,0,0). Options "
+      "above work\nbefore and after NOUN and VERB. Exit code: 0 done (\"no path\" included), 1 "
+      "failed, 2 wrong usage.\n\nExample:\n  strata --embedded maps map create campus --cell-size "
+      "0.1\n  strata map create --help");
   GlobalOptions options;
   AddGlobalOptions(root, options);
   Commands commands{.root = root, .selected = {}};
@@ -88,7 +124,11 @@ int Main(int argc, char** argv) {
   try {
     root.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return root.exit(error) == 0 ? 0 : kExitUsage;
+    if (error.get_exit_code() == 0) {
+      return root.exit(error);  // --help, --version
+    }
+    std::cerr << UsageMessage(root, error) << std::endl;
+    return kExitUsage;
   }
   return Run(options, commands.selected);
 }

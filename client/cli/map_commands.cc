@@ -110,7 +110,7 @@ void AddCreate(Commands& commands, CLI::App* noun, const std::shared_ptr<MapOpti
 
 void AddMapCommands(Commands& commands) {
   auto options = std::make_shared<MapOptions>();
-  CLI::App* noun = commands.Noun("map", "Whole worlds");
+  CLI::App* noun = commands.Noun("map", "Whole worlds", "strata map show campus --output json");
   AddCreate(commands, noun, options);
   commands.Verb(noun, "list", "All maps", "strata map list", List);
   const auto verb = [&](const char* name, const char* description, const char* example, auto run) {

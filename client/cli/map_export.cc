@@ -30,6 +30,7 @@ struct ExportOptions {
   std::string format;
   std::string out;
   std::int32_t level = 0;
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
 };
 
 Colour ColourOf(const Surface& surface) {
@@ -109,8 +110,17 @@ absl::StatusOr<Geometry> PointsOf(Context& context, const ExportOptions& options
 
 absl::Status Export(Context& context, const ExportOptions& options) {
   const bool points = options.format == "pcd";
-  STRATA_ASSIGN_OR_RETURN(const Geometry geometry,
+  STRATA_ASSIGN_OR_RETURN(Geometry geometry,
                           points ? PointsOf(context, options) : MeshOf(context, options));
+  for (Eigen::Vector3d& vertex : geometry.vertices) {
+    vertex -= options.origin;
+  }
+  const bool as_double = options.format != "obj" && NeedsDouble(geometry);
+  if (as_double) {
+    context.output.Talk(
+        "coordinates beyond 8 km are written as doubles, which PCL's point types do not read; "
+        "--relative-to X,Y,Z makes them small");
+  }
   STRATA_ASSIGN_OR_RETURN(const std::string bytes,
                           points                    ? PcdBytes(geometry)
                           : options.format == "ply" ? PlyBytes(geometry)
@@ -121,6 +131,11 @@ absl::Status Export(Context& context, const ExportOptions& options) {
                          {"vertices", geometry.vertices.size()},
                          {"triangles", geometry.triangles.size()},
                          {"lines", geometry.lines.size()},
+                         {"coordinates",
+                          options.format == "obj" ? "text"
+                          : as_double             ? "double"
+                                                  : "float"},
+                         {"relative_to", ToJson(options.origin)},
                          {"bytes", bytes.size()}});
   return absl::OkStatus();
 }
@@ -136,10 +151,24 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
                                 "strata map export campus --format ply --out campus.ply",
                                 [options](Context& context) { return Export(context, *options); });
   AddMapName(app, options->map);
-  app->add_option("--format", options->format, "ply or obj: surfaces; pcd: points")
+  app->add_option(
+         "--format",
+         options->format,
+         "ply: triangles and edges, colour by traversability, binary; obj: the same as text; "
+         "pcd: all points, binary x y z")
       ->check(CLI::IsMember({"ply", "obj", "pcd"}))
       ->required();
-  app->add_option("--out", options->out, "The file to write")->required();
+  app->add_option("--out", options->out, "The file to write")->type_name("FILE")->required();
+  AddNumbers(
+      app,
+      "--relative-to",
+      "X,Y,Z",
+      3,
+      3,
+      [options](const std::vector<double>& n) {
+        options->origin = {n[0], n[1], n[2]};
+      },
+      "Coordinates relative to this place, for maps far from their origin [m]");
   app->add_option("--level", options->level, "Level of detail of the mesh, 0 = finest")
       ->check(CLI::Range(0, kMaxLevel))
       ->capture_default_str();

@@ -21,6 +21,7 @@
 #include "client/cli/path_file.h"
 #include "client/cli/picture/map_picture.h"
 #include "client/cli/tile_source.h"
+#include "client/formats/file_bytes.h"
 #include "core/common/status.h"
 
 namespace strata::cli {
@@ -67,7 +68,8 @@ absl::Status Render(Context& context, RenderOptions options) {
                           FetchTiles(context, options.map, level));
   const picture::Picture picture =
       picture::DrawMap(tiles, cell * static_cast<double>(1 << level), paths, options.picture);
-  STRATA_RETURN_IF_ERROR(picture::WritePng(picture.image, options.out));
+  STRATA_ASSIGN_OR_RETURN(const std::string png, picture::PngBytes(picture.image));
+  STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, png));
   const picture::Camera& camera = picture.camera;
   context.output.Object({{"file", options.out},
                          {"view", options.view},
@@ -131,7 +133,12 @@ void AddMapRender(Commands& commands, CLI::App* noun) {
       "strata map render campus campus.png --view oblique --path route.ply",
       [options](Context& context) { return Render(context, *options); });
   AddMapName(render, options->map);
-  render->add_option("OUT", options->out, "The PNG file to write")->required();
+  render
+      ->add_option("OUT",
+                   options->out,
+                   "The PNG file to write: RGB, the legend, a scale bar and the map's axes on it")
+      ->type_name("FILE.png")
+      ->required();
   AddNumbers(
       render,
       "--slice",

@@ -2,8 +2,9 @@
 
 #include <cmath>
 #include <cstddef>
-#include <fstream>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/ascii.h"
@@ -11,12 +12,19 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
+
+#include "client/formats/file_bytes.h"
+#include "client/formats/text_cursor.h"
+#include "core/common/status.h"
 
 namespace strata::cli {
 namespace {
 
+constexpr absl::string_view kByteOrderMark = "\xef\xbb\xbf";
+
 // The numbers of a line; empty if one of its words is none.
-std::vector<double> NumbersOf(const std::string& line) {
+std::vector<double> NumbersOf(absl::string_view line) {
   std::vector<double> numbers;
   for (const absl::string_view word :
        absl::StrSplit(line, absl::ByAnyChar(",; \t\r"), absl::SkipEmpty())) {
@@ -34,19 +42,16 @@ std::vector<double> NumbersOf(const std::string& line) {
 absl::StatusOr<std::vector<std::vector<double>>> ReadNumberFile(const std::string& path,
                                                                 std::size_t min_count,
                                                                 std::size_t max_count) {
-  std::ifstream file(path);
-  if (!file) {
-    return absl::NotFoundError(absl::StrCat(path, ": cannot be opened"));
-  }
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(path));
+  TextCursor cursor(absl::StripPrefix(bytes, kByteOrderMark));
   std::vector<std::vector<double>> rows;
-  std::string line;
   bool first = true;
-  for (int number = 1; std::getline(file, line); ++number) {
-    const absl::string_view text = absl::StripAsciiWhitespace(line);
+  while (const std::optional<absl::string_view> line = cursor.NextLine()) {
+    const absl::string_view text = absl::StripAsciiWhitespace(*line);
     if (text.empty() || text.front() == '#') {
       continue;
     }
-    std::vector<double> numbers = NumbersOf(line);
+    std::vector<double> numbers = NumbersOf(text);
     const bool header = first && numbers.empty() && absl::ascii_isalpha(text.front());
     first = false;
     if (header) {
@@ -55,8 +60,9 @@ absl::StatusOr<std::vector<std::vector<double>>> ReadNumberFile(const std::strin
     if (numbers.size() < min_count || numbers.size() > max_count) {
       const std::string count = min_count == max_count ? absl::StrCat(min_count)
                                                        : absl::StrCat(min_count, " to ", max_count);
-      return absl::InvalidArgumentError(absl::StrCat(
-          path, ":", number, ": expected ", count, " numbers, got \"", text.substr(0, 60), "\""));
+      return Annotate(cursor.Error(absl::StrCat(
+                          "expected ", count, " numbers, found '", text.substr(0, 60), "'")),
+                      path);
     }
     rows.push_back(std::move(numbers));
   }

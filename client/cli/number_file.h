@@ -12,7 +12,7 @@ namespace strata::cli {
 
 // Lines of `min_count` to `max_count` finite numbers separated by commas, semicolons or blanks.
 // Empty lines, lines that start with '#' and a first line of words (a header) are left out.
-// NOT_FOUND for a file that cannot be read; INVALID_ARGUMENT naming file and line.
+// As ReadFileBytes for a file that cannot be read; INVALID_ARGUMENT naming file and line.
 absl::StatusOr<std::vector<std::vector<double>>> ReadNumberFile(const std::string& path,
                                                                 std::size_t min_count,
                                                                 std::size_t max_count);

@@ -1,17 +1,31 @@
 #include "client/cli/output.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <ostream>
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_format.h"
+
 namespace strata::cli {
 namespace {
+
+// At most six decimals (a micrometre) and at least one; what is smaller is zero.
+std::string Decimal(double value) {
+  constexpr double kMost = 1e15;
+  if (!(std::abs(value) < kMost)) return absl::StrFormat("%g", value);
+  std::string text = absl::StrFormat("%.6f", value);
+  const std::size_t last = text.find_last_not_of('0');
+  text.erase(std::max(last, text.find('.') + 1) + 1);
+  return text == "-0.0" ? "0.0" : text;
+}
 
 std::string TextOf(const Json& value) {
   if (value.is_null()) return "-";
   if (value.is_string()) return value.get<std::string>();
+  if (value.is_number_float()) return Decimal(value.get<double>());
   if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
   if (value.is_array()) {
     std::string text;

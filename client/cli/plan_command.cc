@@ -1,5 +1,4 @@
 // strata plan
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -84,7 +83,16 @@ absl::Status PlanOne(Context& context, PlanOptions options) {
   return absl::OkStatus();
 }
 
-// A JSON line for each query; one that is refused has "error" instead and the rest goes on.
+// A query that was refused, with the keys of an answer.
+Json Refused(const absl::Status& status) {
+  Json json = ToJson(PlanResult{});
+  json["found"] = false;
+  json["reason"] = "error";
+  json["message"] = std::string(status.message());
+  return json;
+}
+
+// A JSON line for each query; one that is refused has the reason "error" and the rest goes on.
 absl::Status PlanMany(Context& context, PlanOptions options) {
   STRATA_ASSIGN_OR_RETURN(const auto rows, ReadNumberFile(options.queries_file, 6, 6));
   STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options));
@@ -96,7 +104,7 @@ absl::Status PlanMany(Context& context, PlanOptions options) {
         context.database.planning().PlanPath(context.call, options.map, options.query);
     if (!plan.ok()) {
       first_error.Update(plan.status());
-      context.output.JsonLine({{"error", std::string(plan.status().message())}});
+      context.output.JsonLine(Refused(plan.status()));
       if (context.call.stop.requested() || absl::IsUnavailable(plan.status())) {
         break;
       }
@@ -140,7 +148,11 @@ void AddEndpoints(CLI::App* verb, const std::shared_ptr<PlanOptions>& options) {
   verb->add_option("--to-level", options->to_level, "End on this surface, 0 = lowest")
       ->needs(to)
       ->check(CLI::NonNegativeNumber);
-  verb->add_option("--queries", options->queries_file, "File with X,Y,Z,X,Y,Z on each line")
+  verb->add_option(
+          "--queries",
+          options->queries_file,
+          "File with X,Y,Z,X,Y,Z (start, goal) on each line; the answer is a JSON line each")
+      ->type_name("FILE.csv")
       ->excludes(from)
       ->excludes(to);
 }
@@ -163,9 +175,14 @@ void AddPlanCommand(Commands& commands) {
   verb->add_option("--profile", options->profile, "The map's robot profile to start from")
       ->capture_default_str();
   AddProfileOptions(verb, options->overrides);
-  verb->add_option("--max-expanded", options->query.max_expanded, "Search limit")
+  verb->add_option("--max-expanded", options->query.max_expanded, "Search limit: patches looked at")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  verb->add_option("--out", options->out, "Write the path as a PLY polyline");
+  verb->add_option("--out",
+                   options->out,
+                   "Write the path, if there is one, as PLY: its waypoints as vertices in order, "
+                   "joined by edges; map render --path reads it")
+      ->type_name("FILE.ply");
   verb->parse_complete_callback([verb] {
     if (verb->count("--from") == 0 && verb->count("--queries") == 0) {
       throw CLI::RequiredError("--from and --to, or --queries");

@@ -100,21 +100,25 @@ void AddExport(Commands& commands, CLI::App* noun, const std::shared_ptr<PoseOpt
                     "strata pose export campus --format tum --which current --out poses.txt",
                     [options](Context& context) { return Export(context, *options); });
   AddMapName(app, options->map);
-  app->add_option("--format", options->format, "tum: time x y z qx qy qz qw")
+  app->add_option(
+         "--format",
+         options->format,
+         "tum: a line 'time x y z qx qy qz qw' for each scan, T_map_scan, seconds and metres")
       ->check(CLI::IsMember({"tum"}))
       ->capture_default_str();
   app->add_option("--which", options->which, "uploaded, or those of the current epoch")
       ->check(CLI::IsMember({"uploaded", "current"}))
       ->capture_default_str();
   app->add_option("--trajectory", options->trajectory, "Only this trajectory");
-  app->add_option("--out", options->out, "The file to write")->required();
+  app->add_option("--out", options->out, "The file to write")->type_name("FILE")->required();
 }
 
 }  // namespace
 
 void AddPoseCommands(Commands& commands) {
   auto options = std::make_shared<PoseOptions>();
-  CLI::App* noun = commands.Noun("pose", "Where scans are in the map");
+  CLI::App* noun = commands.Noun(
+      "pose", "Where scans are in the map", "strata pose export campus --out poses.txt");
   CLI::App* list = commands.Verb(noun,
                                  "list",
                                  "Poses of all scans and how far they are from the uploaded ones",

@@ -62,7 +62,8 @@ absl::Status List(Context& context, const ProfileOptions& options) {
 
 void AddProfileCommands(Commands& commands) {
   auto options = std::make_shared<ProfileOptions>();
-  CLI::App* noun = commands.Noun("profile", "Robots: what \"traversable\" means for whom");
+  CLI::App* noun = commands.Noun(
+      "profile", "Robots: what \"traversable\" means for whom", "strata profile list campus");
   CLI::App* set =
       commands.Verb(noun,
                     "set",

@@ -114,6 +114,9 @@ void AddList(Commands& commands, CLI::App* noun, const std::shared_ptr<ScanOptio
       4,
       4,
       [options](const std::vector<double>& n) {
+        if (n[0] > n[2] || n[1] > n[3]) {
+          throw CLI::ValidationError("--box", "expected X0 <= X1 and Y0 <= Y1");
+        }
         options->filter.box =
             Eigen::AlignedBox2d(Eigen::Vector2d(n[0], n[1]), Eigen::Vector2d(n[2], n[3]));
       },
@@ -128,20 +131,24 @@ void AddExport(Commands& commands, CLI::App* noun, const std::shared_ptr<ScanOpt
                                 [options](Context& context) { return Export(context, *options); });
   AddMapName(app, options->map);
   AddScanId(app, options->id);
-  app->add_option("--format", options->format, "pcd or ply")
+  app->add_option(
+         "--format",
+         options->format,
+         "pcd or ply, binary: x y z and, where the scan has them, intensity, colour, label")
       ->check(CLI::IsMember({"pcd", "ply"}))
       ->capture_default_str();
   app->add_option("--frame", options->frame, "scan: as uploaded; map: at its current pose")
       ->check(CLI::IsMember({"scan", "map"}))
       ->capture_default_str();
-  app->add_option("--out", options->out, "The file to write")->required();
+  app->add_option("--out", options->out, "The file to write")->type_name("FILE")->required();
 }
 
 }  // namespace
 
 void AddScanCommands(Commands& commands) {
   auto options = std::make_shared<ScanOptions>();
-  CLI::App* noun = commands.Noun("scan", "Uploads of robots");
+  CLI::App* noun = commands.Noun(
+      "scan", "Uploads of robots", "strata scan import campus scans/ --poses poses.txt --wait");
   AddScanImport(commands, noun);
   AddList(commands, noun, options);
   const auto verb = [&](const char* name, const char* description, const char* example, auto run) {

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -14,11 +16,14 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 #include "absl/time/clock.h"
 
 #include "client/cli/arguments.h"
 #include "client/cli/json.h"
 #include "client/cli/level_trajectory.h"
+#include "client/cli/patience.h"
 #include "client/cli/progress.h"
 #include "client/cli/scan_uploader.h"
 #include "client/formats/scan_list.h"
@@ -51,10 +56,15 @@ struct Summary {
   std::uint64_t points = 0;
   double seconds = 0.0;
   std::size_t integrated = 0, aligned = 0, integration_failed = 0;  // with --wait
+  std::optional<double> level_rad;                                  // with --level
+  bool interrupted = false;                                         // by the user
   Json errors = Json::array();
 
-  void AddError(const std::string& where, const std::string& message) {
-    errors.push_back({{"scan", where}, {"error", message}});
+  // Messages about files begin with their name, about scans with "scan ID".
+  void AddError(const std::string& where, absl::string_view message) {
+    absl::ConsumePrefix(&message, "scan ");
+    absl::ConsumePrefix(&message, where + ": ");
+    errors.push_back({{"scan", where}, {"error", std::string(message)}});
   }
 };
 
@@ -80,8 +90,9 @@ std::string TrajectoryOf(const std::string& path) {
   return name.empty() ? "scans" : name.substr(0, 100);
 }
 
-absl::StatusOr<std::vector<ScanSource>> FindScans(const ImportOptions& options) {
+absl::StatusOr<std::vector<ScanSource>> FindScans(const ImportOptions& options, Output& output) {
   ScanListOptions list;
+  list.warn = [&output](const std::string& warning) { output.Talk("warning: " + warning); };
   STRATA_ASSIGN_OR_RETURN(list.format, ParseScanFormat(options.format));
   STRATA_ASSIGN_OR_RETURN(list.pose_format, ParsePoseFormat(options.pose_format));
   list.poses = options.poses;
@@ -115,7 +126,7 @@ std::vector<UploadSource> SourcesOf(const std::vector<ScanSource>& scans,
       continue;
     }
     if (!scan.pose_status.ok()) {
-      summary.AddError(scan.path.string(), std::string(scan.pose_status.message()));
+      summary.AddError(scan.path.string(), scan.pose_status.message());
       continue;
     }
     UploadSource source;
@@ -147,9 +158,13 @@ void Upload(Context& context,
                   });
   progress.Clear();
   summary.seconds = absl::ToDoubleSeconds(absl::Now() - start);
+  summary.interrupted = context.call.stop.requested();
   for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (summary.interrupted && absl::IsCancelled(results[i].status)) {
+      continue;  // not sent
+    }
     if (!results[i].status.ok()) {
-      summary.AddError(sources[i].file, std::string(results[i].status.message()));
+      summary.AddError(sources[i].file, results[i].status.message());
       continue;
     }
     ++summary.uploaded;
@@ -158,15 +173,24 @@ void Upload(Context& context,
   }
 }
 
-// A server that is away may be starting again, as while uploading (scan_uploader.h).
-absl::StatusOr<ScanInfo> GetPatiently(Context& context, const std::string& map, const ScanId& id) {
-  constexpr absl::Duration kPatience = absl::Minutes(1);
-  const absl::Time since = absl::Now();
+// Where a scan that is not integrated for this long is said to be stuck.
+constexpr absl::Duration kStuck = absl::Minutes(1);
+
+// The scan once it is no longer pending. A server that is away may come back: it goes on by itself.
+absl::StatusOr<ScanInfo> AwaitScan(Context& context,
+                                   const std::string& map,
+                                   const ScanId& id,
+                                   const std::function<void()>& idle) {
+  Patience patience;
+  absl::Duration pause = absl::Milliseconds(10);
   while (true) {
     absl::StatusOr<ScanInfo> info = context.database.scans().Get(context.call, map, id);
-    if (!absl::IsUnavailable(info.status()) || absl::Now() - since > kPatience) return info;
+    if (info.ok() && info->state != ScanState::kPending) return info;
+    if (!patience.Has(info.status())) return info;
     STRATA_RETURN_IF_ERROR(context.call.stop.status());
-    absl::SleepFor(absl::Milliseconds(100));
+    idle();
+    absl::SleepFor(pause);
+    pause = std::min(2 * pause, absl::Milliseconds(300));
   }
 }
 
@@ -175,29 +199,30 @@ absl::StatusOr<ScanInfo> GetPatiently(Context& context, const std::string& map, 
 absl::Status Wait(Context& context, const ImportOptions& options, Summary& summary) {
   Progress progress(context.output.talk(), TalksToTerminal(), "integrating");
   std::sort(summary.present.begin(), summary.present.end());
+  absl::Time moved = absl::Now();
   for (std::size_t i = 0; i < summary.present.size(); ++i) {
-    absl::Duration pause = absl::Milliseconds(10);
-    while (true) {
-      STRATA_ASSIGN_OR_RETURN(const ScanInfo info,
-                              GetPatiently(context, options.map, summary.present[i]));
-      if (info.state == ScanState::kIntegrated) {
-        ++summary.integrated;
-        summary.aligned += info.alignment.aligned ? 1 : 0;
-        if (!info.message.empty()) {
-          progress.Clear();
-          context.output.Talk(absl::StrCat(summary.present[i].ToString(), ": ", info.message));
-        }
-        break;
-      }
-      if (info.state == ScanState::kFailed) {
-        ++summary.integration_failed;
-        summary.AddError(summary.present[i].ToString(), info.message);
-        break;
-      }
-      STRATA_RETURN_IF_ERROR(context.call.stop.status());
-      absl::SleepFor(pause);
-      pause = std::min(2 * pause, absl::Milliseconds(300));
+    const auto idle = [&] {
       progress.Update(i, summary.present.size(), 0);
+      if (absl::Now() - moved < kStuck) return;
+      progress.Clear();
+      context.output.Talk(absl::StrCat("no scan integrated for ",
+                                       absl::FormatDuration(kStuck),
+                                       "; the log of stratad says why (is its disk full?)"));
+      moved = absl::Now();
+    };
+    STRATA_ASSIGN_OR_RETURN(const ScanInfo info,
+                            AwaitScan(context, options.map, summary.present[i], idle));
+    moved = absl::Now();
+    if (info.state == ScanState::kFailed) {
+      ++summary.integration_failed;
+      summary.AddError(summary.present[i].ToString(), info.message);
+      continue;
+    }
+    ++summary.integrated;
+    summary.aligned += info.alignment.aligned ? 1 : 0;
+    if (!info.message.empty()) {
+      progress.Clear();
+      context.output.Talk(absl::StrCat(summary.present[i].ToString(), ": ", info.message));
     }
   }
   return absl::OkStatus();
@@ -220,6 +245,12 @@ void Print(const ImportOptions& options, const Summary& summary, Output& output)
     json["aligned"] = summary.aligned;
     json["integration_failed"] = summary.integration_failed;
   }
+  if (summary.level_rad.has_value()) {
+    json["level_rad"] = *summary.level_rad;
+  }
+  if (summary.interrupted) {
+    json["interrupted"] = true;
+  }
   json["errors"] = summary.errors;
   for (const Json& error : summary.errors) {
     output.Talk(absl::StrCat(
@@ -237,20 +268,24 @@ absl::Status Import(Context& context, ImportOptions options) {
   if (options.trajectory.empty()) {
     options.trajectory = TrajectoryOf(options.paths.front());
   }
-  STRATA_ASSIGN_OR_RETURN(std::vector<ScanSource> scans, FindScans(options));
+  STRATA_ASSIGN_OR_RETURN(std::vector<ScanSource> scans, FindScans(options, context.output));
   STRATA_ASSIGN_OR_RETURN(const std::set<std::uint64_t> there, SequencesThere(context, options));
-  if (options.level) {
-    STRATA_ASSIGN_OR_RETURN(const double tilt_rad, LevelTrajectory(scans));
-    context.output.Talk(absl::StrFormat("levelled by %.4f rad", tilt_rad));
-  }
   Summary summary;
+  if (options.level) {
+    STRATA_ASSIGN_OR_RETURN(summary.level_rad, LevelTrajectory(scans));
+    context.output.Talk(absl::StrFormat("levelled by %.4f rad", *summary.level_rad));
+  }
   summary.files = scans.size();
   const std::vector<UploadSource> sources = SourcesOf(scans, there, options, summary);
   Upload(context, options, sources, summary);
-  if (options.wait) {
-    STRATA_RETURN_IF_ERROR(Wait(context, options, summary));
-  }
+  const absl::Status waited =
+      options.wait && !summary.interrupted ? Wait(context, options, summary) : absl::OkStatus();
+  summary.interrupted = context.call.stop.requested();
   Print(options, summary, context.output);
+  if (summary.interrupted) {
+    return absl::CancelledError("interrupted; the same command goes on where this one stopped");
+  }
+  STRATA_RETURN_IF_ERROR(waited);
   if (!summary.errors.empty()) {
     return absl::UnknownError(
         absl::StrCat(summary.errors.size(), " of ", summary.files, " scans failed"));
@@ -270,11 +305,27 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
                     [options](Context& context) { return Import(context, *options); });
   AddMapName(import, options->map);
   import->add_option("PATH", options->paths, "Files or folders of scans")->required();
-  import->add_option("--format", options->format, "Format of the scans")
+  import
+      ->add_option(
+          "--format",
+          options->format,
+          "Format of the scans; auto: by content or ending (.pcd .ply .bin .vtk .3d .xyz .csv "
+          ".asc .pts, .txt if named)")
       ->check(CLI::IsMember({"auto", "3dtk", "pcd", "ply", "kitti", "vtk", "xyz"}))
       ->capture_default_str();
-  import->add_option("--poses", options->poses, "File with the poses of the scans");
-  import->add_option("--pose-format", options->pose_format, "Format of the poses")
+  import
+      ->add_option(
+          "--poses",
+          options->poses,
+          "File with the poses T_map_scan of the scans, or a folder of .pose files; without "
+          "it .pose files beside .3d files, else every scan is at the origin")
+      ->type_name("FILE");
+  import
+      ->add_option(
+          "--pose-format",
+          options->pose_format,
+          "tum: time x y z qx qy qz qw; index-tum: index before that, the last number in a "
+          "file's name; kitti: 12 numbers, line 0 for index 0; 3dtk: .pose files")
       ->check(CLI::IsMember({"auto", "tum", "index-tum", "kitti", "3dtk"}))
       ->capture_default_str();
   import->add_option("--trajectory", options->trajectory, "Its name; default: that of the folder");

@@ -19,7 +19,6 @@
 namespace strata::cli {
 namespace {
 
-constexpr absl::Duration kPatience = absl::Minutes(1);
 constexpr absl::Duration kFirstDelay = absl::Milliseconds(100);
 constexpr absl::Duration kLongestDelay = absl::Seconds(5);
 

@@ -9,12 +9,16 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/time/time.h"
 
 #include "core/api/database.h"
 #include "core/cloud/point_cloud.h"
 #include "core/world/scan.h"
 
 namespace strata::cli {
+
+// How long an import puts up with a server that is away or busy.
+inline constexpr absl::Duration kPatience = absl::Minutes(1);
 
 // A scan to upload. `header` has id, time, alignment and the pose of the points as `read` returns
 // them; what depends on the points is filled in by the uploader.
@@ -36,7 +40,7 @@ struct UploadProgress {
 
 // One result a source, in the same order. Scans are read and sent by `workers` threads but finished
 // one after the other, so that their commit order, and with it what alignment makes of them, is
-// that of the sources. A busy or unreachable server is tried again for a minute without progress;
+// that of the sources. A busy or unreachable server is tried again for kPatience without progress;
 // after that the rest fails at once. `report` is called some ten times a second on this thread.
 std::vector<UploadResult> UploadScans(api::Database& database,
                                       const api::Call& call,

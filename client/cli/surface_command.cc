@@ -1,7 +1,7 @@
 // strata surface
-#include <fstream>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -23,17 +23,25 @@ struct SurfaceOptions {
   std::string points_file;
 };
 
-void Print(const SurfaceColumn& column, Output& output) {
-  Json json = ToJson(column);
+// JSON: a line for each place. Text: one table of all surfaces; places without any have no row.
+void Print(const std::vector<SurfaceColumn>& columns, Output& output) {
+  Json rows = Json::array();
+  for (const SurfaceColumn& column : columns) {
+    Json json = ToJson(column);
+    if (output.json()) {
+      output.JsonLine(json);
+      continue;
+    }
+    for (Json& surface : json["surfaces"]) {
+      surface["x"] = column.x_m;
+      surface["y"] = column.y_m;
+      rows.push_back(std::move(surface));
+    }
+  }
   if (output.json()) {
-    output.JsonLine(json);
     return;
   }
-  for (Json& surface : json["surfaces"]) {
-    surface["x"] = column.x_m;
-    surface["y"] = column.y_m;
-  }
-  output.List(json["surfaces"],
+  output.List(rows,
               {{"x", "X"},
                {"y", "Y"},
                {"level", "LEVEL"},
@@ -56,9 +64,7 @@ absl::Status Run(Context& context, const SurfaceOptions& options) {
   STRATA_ASSIGN_OR_RETURN(
       const std::vector<SurfaceColumn> columns,
       context.database.planning().SampleSurfaces(context.call, options.map, places));
-  for (const SurfaceColumn& column : columns) {
-    Print(column, context.output);
-  }
+  Print(columns, context.output);
   return absl::OkStatus();
 }
 
@@ -84,7 +90,12 @@ void AddSurfaceCommand(Commands& commands) {
         options->at = {{n[0], n[1]}};
       },
       "The place [m]");
-  where->add_option("--points", options->points_file, "File with a place X,Y on each line");
+  where
+      ->add_option(
+          "--points",
+          options->points_file,
+          "File with a place X,Y on each line; commas, semicolons or blanks, # for comments")
+      ->type_name("FILE");
   where->require_option(1);
 }
 

@@ -1,6 +1,5 @@
 // strata tile list|get
 #include <cstdint>
-#include <fstream>
 #include <memory>
 #include <string>
 #include <vector>
@@ -11,6 +10,7 @@
 #include "client/cli/arguments.h"
 #include "client/cli/command.h"
 #include "client/cli/json.h"
+#include "client/formats/file_bytes.h"
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/status.h"
 
@@ -37,13 +37,6 @@ absl::Status List(Context& context, const TileOptions& options) {
   return absl::OkStatus();
 }
 
-absl::Status WriteBytes(const std::string& path, const std::string& bytes) {
-  std::ofstream file(path, std::ios::binary);
-  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  file.close();
-  return file ? absl::OkStatus() : absl::UnavailableError(path + ": cannot be written");
-}
-
 Json Surfaces(const SurfaceTile& tile, double cell_size_m) {
   Json surfaces = Json::array();
   const double size = cell_size_m * static_cast<double>(std::int64_t{1} << tile.key.level);
@@ -61,7 +54,7 @@ absl::Status Get(Context& context, const TileOptions& options) {
                           context.database.tiles().Get(context.call, options.map, options.key));
   STRATA_ASSIGN_OR_RETURN(const SurfaceTile tile, DecodeSurfaceTile(encoded.bytes));
   if (!options.out.empty()) {
-    STRATA_RETURN_IF_ERROR(WriteBytes(options.out, encoded.bytes));
+    STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, encoded.bytes));
     context.output.Talk("wrote " + options.out);
   }
   Json json = {{"key", encoded.key.ToString()},
@@ -82,7 +75,9 @@ absl::Status Get(Context& context, const TileOptions& options) {
 
 void AddTileCommands(Commands& commands) {
   auto options = std::make_shared<TileOptions>();
-  CLI::App* noun = commands.Noun("tile", "Squares of 256 x 256 cells, at several levels of detail");
+  CLI::App* noun = commands.Noun("tile",
+                                 "Squares of 256 x 256 cells, at several levels of detail",
+                                 "strata tile list campus --level 2");
   CLI::App* list = commands.Verb(noun,
                                  "list",
                                  "Tiles of one level of detail",
@@ -98,6 +93,9 @@ void AddTileCommands(Commands& commands) {
       4,
       4,
       [options](const std::vector<double>& n) {
+        if (n[0] > n[2] || n[1] > n[3]) {
+          throw CLI::ValidationError("--area", "expected X0 <= X1 and Y0 <= Y1");
+        }
         const auto index = [&](int i) {
           constexpr double kLimit = 1LL << 31;
           return static_cast<std::int64_t>(
@@ -116,7 +114,9 @@ void AddTileCommands(Commands& commands) {
                                 [options](Context& context) { return Get(context, *options); });
   AddMapName(get, options->map);
   AddTileKey(get, options->key);
-  get->add_option("--out", options->out, "Write the tile's bytes as served");
+  get->add_option("--out",
+                  options->out,
+                  "Write the tile's bytes as served (core/codec/FORMAT.md: surface tile)");
   get->add_flag("--surfaces", options->surfaces, "Print every surface too");
 }
 

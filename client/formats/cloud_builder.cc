@@ -53,11 +53,25 @@ constexpr NamedMeaning kNames[] = {
 
 constexpr double kFarMetres = 1000.0;
 constexpr double kOriginStepMetres = 100.0;
+// As ValidateCloud, which knows no more the coordinates of the file.
+constexpr double kFarthestMetres = 1e6;
 // Nearer than this, what is small may well be seen from the zero of its coordinates.
 constexpr double kSeenMetres = 100.0;
 
 std::uint16_t LabelOf(double value) {
   return value >= 0.0 && value <= 65535.0 ? static_cast<std::uint16_t>(value) : 0;
+}
+
+absl::Status TooFar(const Eigen::Vector3d& point) {
+  return absl::InvalidArgumentError(absl::StrCat("point (",
+                                                 point.x(),
+                                                 ", ",
+                                                 point.y(),
+                                                 ", ",
+                                                 point.z(),
+                                                 ") is more than ",
+                                                 kFarthestMetres,
+                                                 " m from the middle of the others or from zero"));
 }
 
 std::uint8_t ChannelOf(double value) {
@@ -114,6 +128,7 @@ void CloudBuilder::Add(const double* values) {
   }
   const auto value = [&of](Meaning meaning) { return of[static_cast<std::size_t>(meaning)]; };
   Eigen::Vector3d point(value(Meaning::kX), value(Meaning::kY), value(Meaning::kZ));
+  ++added_;
   if (!point.allFinite()) {
     if (rows_ == 0) return;
     point.setConstant(std::numeric_limits<double>::quiet_NaN());
@@ -180,7 +195,9 @@ absl::StatusOr<PointCloud> CloudBuilder::Build() && {
   }
   cloud.points.reserve(points_.size());
   for (const Eigen::Vector3d& point : points_) {
-    cloud.points.push_back((point - cloud.origin).cast<float>());
+    const Eigen::Vector3d local = point - cloud.origin;
+    if (local.cwiseAbs().maxCoeff() > kFarthestMetres) return TooFar(point);
+    cloud.points.push_back(local.cast<float>());
   }
   const double scale = ColourScale();
   cloud.colour.reserve(colour_.size());
@@ -189,7 +206,10 @@ absl::StatusOr<PointCloud> CloudBuilder::Build() && {
                             ChannelOf(colour.y() * scale),
                             ChannelOf(colour.z() * scale)});
   }
-  if (CountFinite(cloud) == 0) return absl::InvalidArgumentError("has no finite point");
+  if (CountFinite(cloud) == 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("no finite point among ", added_, "; expected at least one"));
+  }
   STRATA_RETURN_IF_ERROR(ValidateCloud(cloud));
   return cloud;
 }

@@ -73,6 +73,7 @@ class CloudBuilder {
   std::vector<float> intensity_;
   std::vector<Eigen::Vector3f> colour_;
   std::vector<std::uint16_t> label_;
+  std::size_t added_ = 0;  // finite or not
   std::uint32_t rows_ = 0;
   std::uint32_t columns_ = 0;
   Eigen::Vector3d sensor_origin_ = Eigen::Vector3d::Zero();

@@ -1,6 +1,8 @@
 #include "client/formats/file_bytes.h"
 
+#include <cerrno>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -9,11 +11,27 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include <unistd.h>
 
 namespace strata {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{16} << 30;
+
+absl::Status CannotWrite(const fs::path& path, absl::string_view why) {
+  return absl::UnavailableError(absl::StrCat(path.string(), ": cannot be written: ", why));
+}
+
+// `path` is the name that the user knows.
+absl::Status WriteInto(const fs::path& file, const fs::path& path, absl::string_view bytes) {
+  errno = 0;
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  out.close();
+  return out ? absl::OkStatus() : CannotWrite(path, std::strerror(errno));
+}
 
 }  // namespace
 
@@ -39,11 +57,22 @@ absl::StatusOr<std::string> ReadFileBytes(const std::filesystem::path& path) {
 }
 
 absl::Status WriteFileBytes(const std::filesystem::path& path, absl::string_view bytes) {
-  std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  out.close();
-  if (!out) return absl::UnavailableError(absl::StrCat(path.string(), ": cannot be written"));
-  return absl::OkStatus();
+  std::error_code error;
+  const fs::file_status there = fs::status(path, error);
+  // A device or a pipe (/dev/stdout) must stay what it is.
+  if (fs::exists(there) && !fs::is_regular_file(there)) return WriteInto(path, path, bytes);
+  const fs::path target = fs::exists(there) ? fs::canonical(path, error) : path;
+  fs::path temporary = target;
+  temporary += absl::StrCat(".", getpid(), ".part");
+  absl::Status status = WriteInto(temporary, path, bytes);
+  if (status.ok()) {
+    if (fs::exists(there)) fs::permissions(temporary, there.permissions(), error);
+    fs::rename(temporary, target, error);
+    if (!error) return status;
+    status = CannotWrite(path, error.message());
+  }
+  fs::remove(temporary, error);
+  return status;
 }
 
 }  // namespace strata

@@ -15,7 +15,9 @@ namespace strata {
 // GiB, UNAVAILABLE if it cannot be read. Messages name the file.
 absl::StatusOr<std::string> ReadFileBytes(const std::filesystem::path& path);
 
-// Replaces the file. UNAVAILABLE, naming the file, if that fails.
+// Replaces the file as a whole: a reader sees the old bytes or the new ones, whatever happens in
+// between. What is no regular file (/dev/stdout, a pipe) is written into. UNAVAILABLE, naming the
+// file and the reason, if that fails.
 absl::Status WriteFileBytes(const std::filesystem::path& path, absl::string_view bytes);
 
 }  // namespace strata

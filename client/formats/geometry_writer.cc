@@ -18,7 +18,8 @@
 namespace strata {
 namespace {
 
-constexpr double kFloatIsFineMetres = 1000.0;
+// A float is within half a millimetre up to here.
+constexpr double kFloatIsFineMetres = 8192.0;
 
 template <typename T>
 void Append(std::string& out, T value) {
@@ -57,12 +58,6 @@ absl::Status Check(const Geometry& geometry) {
   return CheckIndices(geometry.lines, geometry);
 }
 
-bool NeedsDouble(const Geometry& geometry) {
-  return std::any_of(geometry.vertices.begin(), geometry.vertices.end(), [](const auto& v) {
-    return v.cwiseAbs().maxCoeff() > kFloatIsFineMetres;
-  });
-}
-
 void AppendPoint(const Eigen::Vector3d& point, bool as_double, std::string& out) {
   for (const double coordinate : point) {
     as_double ? Append(out, coordinate) : Append(out, static_cast<float>(coordinate));
@@ -99,6 +94,12 @@ std::string PlyHeader(const Geometry& geometry, bool as_double) {
 }
 
 }  // namespace
+
+bool NeedsDouble(const Geometry& geometry) {
+  return std::any_of(geometry.vertices.begin(), geometry.vertices.end(), [](const auto& v) {
+    return v.cwiseAbs().maxCoeff() > kFloatIsFineMetres;
+  });
+}
 
 Geometry GeometryOf(const PointCloud& cloud) {
   Geometry geometry;

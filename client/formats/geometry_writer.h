@@ -30,8 +30,12 @@ Geometry GeometryOf(const PointCloud& cloud);
 // The points one after the other, joined by lines.
 Geometry PathGeometry(const std::vector<Eigen::Vector3d>& waypoints);
 
+// True if the coordinates of PLY and PCD are doubles.
+bool NeedsDouble(const Geometry& geometry);
+
 // The bytes of a file. INVALID_ARGUMENT if a column's length or an index does not fit.
-// Coordinates are float where that is fine to 0.1 mm (all within ±1 km), else double.
+// Coordinates are float where that is fine to 0.5 mm (all within ±8192 m), else double, which PCL's
+// own point types do not read.
 //
 // PLY: binary_little_endian; vertex x y z, then intensity, red green blue, label where given;
 // elements face (list uchar int vertex_indices) and edge (vertex1, vertex2) where there are any.

@@ -171,7 +171,7 @@ absl::StatusOr<Header> ReadHeader(TextCursor& cursor) {
 
 absl::Status TooShort(std::size_t points, std::size_t needed, std::size_t at, std::size_t have) {
   return absl::InvalidArgumentError(absl::StrCat(
-      points, " points need ", needed, " bytes from byte ", at, " on, the file has ", have));
+      points, " points need ", needed, " bytes from byte ", at, " on, there are ", have));
 }
 
 std::vector<Meaning> MeaningsOf(const Header& header) {

@@ -1,5 +1,6 @@
 #include "client/formats/plain_readers.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
@@ -9,9 +10,11 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 #include <Eigen/Geometry>
 
 #include "client/formats/cloud_builder.h"
@@ -78,10 +81,20 @@ std::optional<std::vector<double>> Numbers(const std::vector<absl::string_view>&
   return numbers;
 }
 
+constexpr absl::string_view kByteOrderMark = "\xef\xbb\xbf";
+
+// A word that may head a column: none that begins as numbers do, but "nan" is a number too.
+bool IsName(absl::string_view word) {
+  return !ParseNumber(word).has_value() &&
+         !absl::ascii_isdigit(static_cast<unsigned char>(word[0])) && word[0] != '-' &&
+         word[0] != '+' && word[0] != '.';
+}
+
 // Reads the points of a text, finding out at its beginning what the columns are.
 class ColumnText {
  public:
-  explicit ColumnText(absl::string_view bytes) : cursor_(bytes) {}
+  explicit ColumnText(absl::string_view bytes)
+      : cursor_(absl::StripPrefix(bytes, kByteOrderMark)) {}
 
   absl::StatusOr<PointCloud> Read() {
     while (const std::optional<absl::string_view> line = cursor_.NextLine()) {
@@ -94,10 +107,9 @@ class ColumnText {
  private:
   absl::Status ReadLine(absl::string_view line) {
     const bool comment = absl::StartsWith(line, "#") || absl::StartsWith(line, "//");
-    if (comment)
-      line.remove_prefix(line.find_first_not_of("#/") == absl::string_view::npos
-                             ? line.size()
-                             : line.find_first_not_of("#/"));
+    if (comment) {
+      line.remove_prefix(std::min(line.find_first_not_of("#/"), line.size()));
+    }
     const std::vector<absl::string_view> words = SplitWords(line, true);
     if (words.empty()) return absl::OkStatus();
     if (comment) {
@@ -106,12 +118,22 @@ class ColumnText {
       }
       return absl::OkStatus();
     }
-    const std::optional<std::vector<double>> numbers = Numbers(words);
-    if (!numbers.has_value() && !builder_.has_value() && meanings_.empty()) {
+    const bool first = !builder_.has_value() && meanings_.empty();
+    // Some programs write the number of points first.
+    if (first && words.size() == 1 && ParseCount(words[0]).has_value()) return absl::OkStatus();
+    if (first && std::all_of(words.begin(), words.end(), IsName)) {
       meanings_ = NamedColumns(words, 0);
       return absl::OkStatus();
     }
-    return numbers.has_value() ? AddPoint(*numbers) : cursor_.Error("expected numbers only");
+    const std::optional<std::vector<double>> numbers = Numbers(words);
+    return numbers.has_value() ? AddPoint(*numbers) : NotNumbers(words);
+  }
+
+  absl::Status NotNumbers(const std::vector<absl::string_view>& words) const {
+    const auto bad = std::find_if(words.begin(), words.end(), [](absl::string_view word) {
+      return !ParseNumber(word).has_value();
+    });
+    return cursor_.Error(absl::StrCat("expected numbers only, found '", bad->substr(0, 40), "'"));
   }
 
   absl::Status AddPoint(const std::vector<double>& numbers) {

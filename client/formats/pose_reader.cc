@@ -155,8 +155,11 @@ absl::StatusOr<PoseFormat> ParsePoseFormat(absl::string_view name) {
 
 absl::StatusOr<PoseList> ReadPoses(const std::filesystem::path& path, PoseFormat format) {
   if (format == PoseFormat::k3dtk) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        path.string(), ": 3DTK keeps poses beside the scans, in .pose files, not in one file"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(path.string(),
+                     ": 3DTK keeps poses in a .pose file a scan; name their folder, or nothing if "
+                     "they lie beside "
+                     "the scans"));
   }
   STRATA_ASSIGN_OR_RETURN(const std::string text, ReadFileBytes(path));
   absl::StatusOr<PoseList> list = Parse(text, format);

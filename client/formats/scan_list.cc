@@ -50,12 +50,25 @@ absl::Status AddPath(const fs::path& path, ScanFormat format, std::vector<fs::pa
   }
   for (fs::directory_iterator it(path, error), end; !error && it != end; it.increment(error)) {
     std::error_code ignored;
-    if (it->is_regular_file(ignored) && IsScanOfFolder(it->path(), format)) {
+    // Neither a link to nothing nor what cannot be read is passed over: reading it will say so.
+    if (!it->is_directory(ignored) && IsScanOfFolder(it->path(), format)) {
       files.push_back(it->path());
     }
   }
   if (!error) return absl::OkStatus();
   return absl::UnavailableError(absl::StrCat(path.string(), ": ", error.message()));
+}
+
+absl::Status NoScans(const std::vector<fs::path>& paths, ScanFormat format) {
+  const std::string where = paths.empty() ? std::string("nowhere") : paths.front().string();
+  if (format == ScanFormat::kAuto) {
+    return absl::NotFoundError(absl::StrCat(where,
+                                            ": no scan by its ending (.pcd .ply .bin .vtk .3d .xyz "
+                                            ".csv .asc .pts); say --format xyz for "
+                                            "points in .txt files"));
+  }
+  return absl::NotFoundError(
+      absl::StrCat(where, ": no scan of format ", ScanFormatName(format), " by its ending"));
 }
 
 // Runs of digits compare as numbers, so that s2 comes before s10.
@@ -110,8 +123,8 @@ std::vector<ScanSource> Ordered(std::vector<fs::path> files, ScanFormat format) 
   return scans;
 }
 
-absl::Status NoPose(absl::string_view of) {
-  return absl::NotFoundError(absl::StrCat("no pose of ", of));
+absl::Status NoPose(const fs::path& poses, absl::string_view of) {
+  return absl::NotFoundError(absl::StrCat(poses.string(), ": no pose of ", of));
 }
 
 void Assign(const FilePose& pose, ScanSource& scan) {
@@ -119,7 +132,7 @@ void Assign(const FilePose& pose, ScanSource& scan) {
   scan.time = pose.time;
 }
 
-void AssignByIndex(const PoseList& list, std::vector<ScanSource>& scans) {
+void AssignByIndex(const PoseList& list, const fs::path& file, std::vector<ScanSource>& scans) {
   std::map<std::uint64_t, const FilePose*> by_index;
   for (const FilePose& pose : list.poses) by_index[*pose.index] = &pose;
   for (ScanSource& scan : scans) {
@@ -128,7 +141,8 @@ void AssignByIndex(const PoseList& list, std::vector<ScanSource>& scans) {
     if (found != by_index.end()) {
       Assign(*found->second, scan);
     } else {
-      scan.pose_status = NoPose(index.has_value() ? absl::StrCat("index ", *index)
+      scan.pose_status = NoPose(file,
+                                index.has_value() ? absl::StrCat("index ", *index)
                                                   : std::string("a file without a number"));
     }
   }
@@ -143,7 +157,9 @@ std::optional<absl::Time> TimeOfName(const fs::path& path) {
   return absl::FromUnixMicros(std::llround(*seconds * 1e6));
 }
 
-void AssignByTime(const std::vector<FilePose>& sorted, std::vector<ScanSource>& scans) {
+void AssignByTime(const std::vector<FilePose>& sorted,
+                  const fs::path& file,
+                  std::vector<ScanSource>& scans) {
   for (ScanSource& scan : scans) {
     const absl::Time time = *TimeOfName(scan.path);
     const auto found = std::lower_bound(
@@ -153,40 +169,55 @@ void AssignByTime(const std::vector<FilePose>& sorted, std::vector<ScanSource>& 
     if (found != sorted.end() && *found->time <= time + kSameTime) {
       Assign(*found, scan);
     } else {
-      scan.pose_status = NoPose(absl::StrCat("time ", scan.path.stem().string()));
+      scan.pose_status = NoPose(file, absl::StrCat("time ", scan.path.stem().string()));
     }
     scan.time = time;
   }
 }
 
-void AssignInOrder(const std::vector<FilePose>& sorted, std::vector<ScanSource>& scans) {
+void AssignInOrder(const std::vector<FilePose>& sorted,
+                   const fs::path& file,
+                   std::vector<ScanSource>& scans) {
   for (std::size_t i = 0; i < scans.size(); ++i) {
     if (i < sorted.size()) {
       Assign(sorted[i], scans[i]);
     } else {
-      scans[i].pose_status = NoPose(absl::StrCat("scan ", i + 1, ": the file has ", sorted.size()));
+      scans[i].pose_status =
+          NoPose(file, absl::StrCat("scan ", i + 1, "; the file has ", sorted.size()));
     }
   }
 }
 
-void AssignTum(PoseList list, std::vector<ScanSource>& scans) {
+void AssignTum(PoseList list, const ScanListOptions& options, std::vector<ScanSource>& scans) {
   std::stable_sort(list.poses.begin(), list.poses.end(), [](const FilePose& a, const FilePose& b) {
     return *a.time < *b.time;
   });
   const bool timed = std::all_of(scans.begin(), scans.end(), [](const ScanSource& scan) {
     return TimeOfName(scan.path).has_value();
   });
-  timed ? AssignByTime(list.poses, scans) : AssignInOrder(list.poses, scans);
+  if (!timed && list.poses.size() > scans.size() && options.warn) {
+    options.warn(absl::StrCat(options.poses.string(),
+                              " has ",
+                              list.poses.size(),
+                              " poses for ",
+                              scans.size(),
+                              " scans, whose names are no times: the first are taken in order; "
+                              "index-tum says which is whose"));
+  }
+  timed ? AssignByTime(list.poses, options.poses, scans)
+        : AssignInOrder(list.poses, options.poses, scans);
 }
 
-// Poses beside the scans; where nobody asked for them and there is none, nothing.
-void Assign3dtk(bool asked, std::vector<ScanSource>& scans) {
+// Poses in `folder`, or beside the scans where it is empty; where nobody asked for them and there
+// is none, nothing.
+void Assign3dtk(bool asked, const fs::path& folder, std::vector<ScanSource>& scans) {
   std::vector<absl::StatusOr<Pose>> poses;
   bool any = asked;
   for (const ScanSource& scan : scans) {
     const bool is_3dtk =
         scan.format == ScanFormat::k3dtk || ScanFormatOfName(scan.path) == ScanFormat::k3dtk;
-    poses.push_back(asked || is_3dtk ? Read3dtkPoseOf(scan.path)
+    const fs::path named = folder.empty() ? scan.path : folder / scan.path.filename();
+    poses.push_back(asked || is_3dtk ? Read3dtkPoseOf(named)
                                      : absl::StatusOr<Pose>(Pose::Identity()));
     any = any || (is_3dtk && !absl::IsNotFound(poses.back().status()));
   }
@@ -217,19 +248,22 @@ absl::StatusOr<std::vector<ScanSource>> ListScans(const std::vector<fs::path>& p
     STRATA_RETURN_IF_ERROR(AddPath(path, options.format, files));
   }
   if (files.empty()) {
-    return absl::NotFoundError(absl::StrCat(
-        "no scan of format ", ScanFormatName(options.format), " among the paths given"));
+    return NoScans(paths, options.format);
   }
   std::vector<ScanSource> scans = Ordered(std::move(files), options.format);
-  if (options.poses.empty()) {
-    Assign3dtk(options.pose_format == PoseFormat::k3dtk, scans);
+  std::error_code error;
+  const bool folder =
+      fs::is_directory(options.poses, error) &&
+      (options.pose_format == PoseFormat::kAuto || options.pose_format == PoseFormat::k3dtk);
+  if (options.poses.empty() || folder) {
+    Assign3dtk(folder || options.pose_format == PoseFormat::k3dtk, options.poses, scans);
     return scans;
   }
   STRATA_ASSIGN_OR_RETURN(PoseList list, ReadPoses(options.poses, options.pose_format));
   if (list.format == PoseFormat::kTum) {
-    AssignTum(std::move(list), scans);
+    AssignTum(std::move(list), options, scans);
   } else {
-    AssignByIndex(list, scans);
+    AssignByIndex(list, options.poses, scans);
   }
   return scans;
 }

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,10 +21,12 @@ namespace strata {
 
 struct ScanListOptions {
   ScanFormat format = ScanFormat::kAuto;
-  // The file of poses; empty: none, but 3DTK scans read the .pose files beside them if any is
-  // there.
+  // The file of poses, or a folder of 3DTK's .pose files; empty: none, but 3DTK scans read the
+  // .pose files beside them if any is there.
   std::filesystem::path poses = {};
   PoseFormat pose_format = PoseFormat::kAuto;
+  // Told, if set, what is no error but may not be what was meant.
+  std::function<void(const std::string&)> warn = {};
 };
 
 // One scan to import.
@@ -49,7 +52,8 @@ std::optional<std::uint64_t> SequenceOfName(const std::filesystem::path& path);
 //
 // Poses: index-tum and kitti by index = SequenceOfName. tum has no index: where every stem is a
 // time in seconds (it has a decimal point) by time, to a millisecond; else one after the other, the
-// scans in order and the poses in order of time. 3dtk: the .pose file beside each scan.
+// scans in order and the poses in order of time; `warn` is told where the file has more poses.
+// 3dtk: the .pose file beside each scan or in the folder named.
 //
 // INVALID_ARGUMENT, NOT_FOUND: no scan at all, a path that is not there, a file of poses that
 // cannot be read. A scan without a pose is in its `pose_status`.

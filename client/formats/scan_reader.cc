@@ -106,6 +106,10 @@ ScanFormat ScanFormatOfName(const std::filesystem::path& path) {
 
 absl::StatusOr<PointCloud> ReadScan(const std::filesystem::path& path, ScanFormat format) {
   STRATA_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(path));
+  if (bytes.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(path.string(), ": the file is empty; expected a scan"));
+  }
   if (format == ScanFormat::kAuto) format = FormatOfBytes(bytes);
   if (format == ScanFormat::kAuto) format = ScanFormatOfName(path);
   absl::StatusOr<PointCloud> cloud = Parse(bytes, format);

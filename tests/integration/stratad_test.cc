@@ -131,6 +131,10 @@ TEST_F(StratadTest, RefusesToListenBeyondLoopback) {
   EXPECT_EQ(stratad.Wait(), 1);
   StratadProcess usage({"--no-such-option"});
   EXPECT_EQ(usage.Wait(), 2);
+  for (const char* seconds : {"nan", "-1", "1e9", "soon"}) {
+    StratadProcess drain({"--data", directory_.path().string(), "--drain", seconds});
+    EXPECT_EQ(drain.Wait(), 2) << seconds;
+  }
 }
 
 TEST_F(StratadTest, TwoRobotsUploadAtOnce) {

@@ -94,16 +94,20 @@ int DrawText(Image& image, int x, int y, int scale, absl::string_view text, Colo
   return x;
 }
 
-absl::Status WritePng(const Image& image, const std::string& path) {
+absl::StatusOr<std::string> PngBytes(const Image& image) {
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
   png.width = static_cast<png_uint_32>(image.width);
   png.height = static_cast<png_uint_32>(image.height);
   png.format = PNG_FORMAT_RGB;
-  if (png_image_write_to_file(&png, path.c_str(), 0, image.pixels.data(), 0, nullptr) == 0) {
-    return absl::UnavailableError(absl::StrCat(path, ": cannot be written: ", png.message));
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(png);
+  std::string bytes(size, '\0');
+  if (png_image_write_to_memory(&png, bytes.data(), &size, 0, image.pixels.data(), 0, nullptr) ==
+      0) {
+    return absl::InternalError(absl::StrCat("picture: ", png.message));
   }
-  return absl::OkStatus();
+  bytes.resize(size);
+  return bytes;
 }
 
 }  // namespace strata::picture

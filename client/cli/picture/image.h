@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
 #include "core/cloud/point_cloud.h"
@@ -41,8 +41,8 @@ void FillRectangle(Image& image, int x, int y, int width, int height, Colour col
 // characters stay blank. (x, y) is the upper left corner. Returns the x after the text.
 int DrawText(Image& image, int x, int y, int scale, absl::string_view text, Colour colour);
 
-// 8 bits a channel, RGB. UNAVAILABLE if the file cannot be written.
-absl::Status WritePng(const Image& image, const std::string& path);
+// The bytes of a PNG file, 8 bits a channel, RGB. INTERNAL if libpng fails.
+absl::StatusOr<std::string> PngBytes(const Image& image);
 
 }  // namespace strata::picture
 

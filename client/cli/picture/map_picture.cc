@@ -181,29 +181,84 @@ double RoundLength(double limit_m) {
   return power;
 }
 
-void DrawLegend(Image& image, const Camera& camera) {
-  constexpr int kScale = 2;
-  constexpr int kText = 7 * kScale;
-  const int y = image.height - kLegendPixels + (kLegendPixels - kText) / 2;
-  int x = 20;
-  const std::array<std::pair<Colour, const char*>, 4> entries = {
-      {{kTraversableColour, "traversable"},
-       {kNonTraversableColour, "not traversable"},
-       {kVerticalColour, "vertical"},
-       {kUnknownColour, "unknown"}}};
-  for (const auto& [colour, text] : entries) {
-    FillRectangle(image, x, y - 2, 18, 18, colour);
-    x = DrawText(image, x + 26, y, kScale, text, kInk) + 26;
+constexpr std::array<std::pair<Colour, const char*>, 4> kEntries = {
+    {{kTraversableColour, "traversable"},
+     {kNonTraversableColour, "not traversable"},
+     {kVerticalColour, "vertical"},
+     {kUnknownColour, "unknown"}}};
+
+// Where the text of the legend begins, `scale` pixels a dot.
+int LegendTop(const Image& image, int scale) {
+  return image.height - kLegendPixels + (kLegendPixels - 7 * scale) / 2;
+}
+
+// Returns where the entries end.
+int DrawEntries(Image& image, int scale) {
+  const int y = LegendTop(image, scale);
+  int x = 10 * scale;
+  for (const auto& [colour, text] : kEntries) {
+    FillRectangle(image, x, y - scale, 9 * scale, 9 * scale, colour);
+    x = DrawText(image, x + 13 * scale, y, scale, text, kInk) + 13 * scale;
   }
+  return x;
+}
+
+// Returns where the bar begins.
+int DrawScaleBar(Image& image, const Camera& camera, int scale) {
   const double length = RoundLength(0.2 * image.width * camera.metres_per_pixel);
   const int pixels = static_cast<int>(std::lround(length / camera.metres_per_pixel));
   const std::string label = absl::StrCat(length, " m");
-  const int text_width = static_cast<int>(label.size()) * 6 * kScale;
-  const int bar = image.width - 24 - text_width - 12 - pixels;
-  FillRectangle(image, bar, y + kText / 2 - 1, pixels, 3, kInk);
-  FillRectangle(image, bar, y, 3, kText, kInk);
-  FillRectangle(image, bar + pixels - 3, y, 3, kText, kInk);
-  DrawText(image, bar + pixels + 12, y, kScale, label, kInk);
+  const int text = image.width - 12 * scale - static_cast<int>(label.size()) * 6 * scale;
+  const int begin = text - 6 * scale - pixels;
+  const int y = LegendTop(image, scale);
+  FillRectangle(image, begin, y + 3 * scale, pixels, 3, kInk);
+  FillRectangle(image, begin, y, 3, 7 * scale, kInk);
+  FillRectangle(image, begin + pixels - 3, y, 3, 7 * scale, kInk);
+  DrawText(image, text, y, scale, label, kInk);
+  return begin;
+}
+
+// As large as fits; the scale bar alone where nothing else does.
+void DrawLegend(Image& image, const Camera& camera) {
+  for (const int scale : {2, 1}) {
+    Image trial(image.width, image.height, kBackground);
+    if (DrawEntries(trial, scale) <= DrawScaleBar(trial, camera, scale)) {
+      DrawEntries(image, scale);
+      DrawScaleBar(image, camera, scale);
+      return;
+    }
+  }
+  DrawScaleBar(image, camera, 1);
+}
+
+// The axes of the map in the lower left corner, as far as the view shows them.
+void DrawAxes(Image& image, const Camera& camera) {
+  const int length = std::clamp(image.width / 40, 14, 36);
+  const int scale = length > 24 ? 2 : 1;  // of the letters
+  const int left = length + 14;
+  const int bottom = image.height - kLegendPixels - length - 14;
+  const std::array<std::pair<Vector3d, const char*>, 3> axes = {
+      {{Vector3d::UnitX(), "x"}, {Vector3d::UnitY(), "y"}, {Vector3d::UnitZ(), "z"}}};
+  for (const int width : {4, 2}) {  // light below dark, to be seen on any ground
+    for (const auto& [axis, name] : axes) {
+      const double right = length * camera.right.dot(axis);
+      const double down = -length * camera.up.dot(axis);
+      if (std::hypot(right, down) < 0.2 * length) continue;  // looks along it
+      for (int step = 0; step <= length; ++step) {
+        const double share = static_cast<double>(step) / length;
+        const int x = left + static_cast<int>(std::lround(share * right)) - width / 2;
+        const int y = bottom + static_cast<int>(std::lround(share * down)) - width / 2;
+        FillRectangle(image, x, y, width, width, width == 2 ? kInk : kBackground);
+      }
+      const double beyond = 1.0 + 7.0 * scale / std::hypot(right, down);
+      DrawText(image,
+               left + static_cast<int>(std::lround(beyond * right)) - 5 * scale / 2,
+               bottom + static_cast<int>(std::lround(beyond * down)) - 7 * scale / 2,
+               scale,
+               name,
+               kInk);
+    }
+  }
 }
 
 }  // namespace
@@ -235,6 +290,7 @@ Picture DrawMap(const std::vector<SurfaceTile>& tiles,
   const Image map = raster.Finish();
   picture.image = Image(options.width, options.height, kBackground);
   std::copy(map.pixels.begin(), map.pixels.end(), picture.image.pixels.begin());
+  DrawAxes(picture.image, picture.camera);
   DrawLegend(picture.image, picture.camera);
   return picture;
 }

@@ -22,7 +22,7 @@ inline constexpr Colour kUnknownColour = {176, 176, 172};
 // Pixels at the lower edge that belong to the legend.
 inline constexpr int kLegendPixels = 44;
 
-// A path and its name in the legend.
+// Drawn over the map; each in its own colour.
 using Path = std::vector<Eigen::Vector3d>;
 
 struct PictureOptions {
@@ -42,6 +42,8 @@ struct Picture {
 
 // Tiles are of one level of detail with cells of `cell_size_m`. The view holds all surfaces but a
 // few stray ones. Without surfaces it shows a metre around the origin.
+// The legend is below, as much of it as fits the width, with a scale bar; the axes of the map are
+// in the lower left corner.
 //   A traversable top is yellow even on a vertical patch (a deck seen from both sides); the sides
 //   are blue then. Higher surfaces are lighter.
 Picture DrawMap(const std::vector<SurfaceTile>& tiles,

@@ -54,10 +54,22 @@ TEST_F(NumberFileTest, SkipsHeaderCommentsAndEmptyLines) {
 }
 
 TEST_F(NumberFileTest, NamesTheBadLine) {
-  EXPECT_THAT(
-      Read("1,2\n1,two\n"),
-      StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("numbers.csv:2: expected 2 to 3")));
-  EXPECT_THAT(Read("1\n"), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(":1:")));
+  EXPECT_THAT(Read("1,2\n1,two\n"),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       HasSubstr("numbers.csv: line 2: expected 2 to 3")));
+  EXPECT_THAT(Read("1\n"), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(": line 1:")));
+}
+
+TEST_F(NumberFileTest, AByteOrderMarkIsNoNumber) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto rows, Read("\xef\xbb\xbf-1,2\n"));
+  EXPECT_THAT(rows, ElementsAre(ElementsAre(-1.0, 2.0)));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto headed, Read("\xef\xbb\xbfx,y\n1,2\n"));
+  EXPECT_THAT(headed, ElementsAre(ElementsAre(1.0, 2.0)));
+}
+
+TEST_F(NumberFileTest, AFolderIsAnError) {
+  EXPECT_THAT(ReadNumberFile(dir_.path().string(), 2, 2),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("not a file")));
 }
 
 TEST_F(NumberFileTest, MissingFileIsNotFound) {

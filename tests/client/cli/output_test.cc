@@ -30,6 +30,22 @@ TEST(OutputTest, ObjectIsKeysAndValuesOrJson) {
   EXPECT_EQ(Json::parse(json.str()), object);
 }
 
+TEST(OutputTest, TextHasNoMoreDecimalsThanMeanSomething) {
+  std::ostringstream data;
+  std::ostringstream talk;
+  Output(OutputFormat::kText, data, talk)
+      .Object({{"a", -59.300000000000004},
+               {"b", 6.123233995736766e-17},
+               {"c", -1e-9},
+               {"d", 5412345.678901},
+               {"e", 1e300},
+               {"f", 2.0},
+               {"g", 0.35},
+               {"h", 120.0}});
+  EXPECT_EQ(data.str(),
+            "a  -59.3\nb  0.0\nc  0.0\nd  5412345.678901\ne  1e+300\nf  2.0\ng  0.35\nh  120.0\n");
+}
+
 TEST(OutputTest, JsonModeKeepsTextOffStdout) {
   std::ostringstream data;
   std::ostringstream talk;

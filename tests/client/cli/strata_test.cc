@@ -1,7 +1,10 @@
 // The program as its users have it, on a database in a temporary directory.
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -100,6 +103,10 @@ TEST_F(StrataTest, WrongUsageExitsWithTwo) {
       {"plan", "m"},
       {"plan", "m", "--from", "1,2,3"},
       {"plan", "m", "--from", "1,x", "--to", "1,2"},
+      {"plan", "m", "--from", "1,2", "--to", "1,2", "--max-expanded", "-1"},
+      {"job", "show", "m", "-1"},
+      {"scan", "list", "m", "--box", "1,0,-1,2"},
+      {"tile", "list", "m", "--area", "0,1,2,0"},
       {"surface", "m"},
       {"map", "list", "--output", "yaml"},
       {"scan", "show", "m", "no-number"}};
@@ -108,6 +115,39 @@ TEST_F(StrataTest, WrongUsageExitsWithTwo) {
     EXPECT_EQ(ran.exit_code, 2) << ran.err;
     EXPECT_EQ(ran.out, "");
   }
+}
+
+TEST_F(StrataTest, NounsAndTheProgramHaveHelpWithAnExample) {
+  for (const std::string noun : {"map", "scan", "pose", "tile", "profile", "job"}) {
+    EXPECT_THAT(RunStrata({noun, "--help"}).out, HasSubstr("Example:\n  strata " + noun));
+  }
+  EXPECT_THAT(RunStrata({"--help"}).out,
+              HasSubstr("Example:\n  strata --embedded maps map create"));
+}
+
+TEST_F(StrataTest, AWrongWordIsAnsweredWithTheNearestRightOne) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
+      {{"map", "creat", "x"}, "did you mean create?"},
+      {{"plan", "m", "--form", "1,2,3", "--to", "1,2,3"}, "did you mean --from?"},
+      {{"scan", "import", "m", "x", "--pose", "p"}, "did you mean --poses?"},
+      {{"surface", "m", "--point", "p"}, "did you mean --points?"},
+      {{"--serv", "x:1", "map", "list"}, "did you mean --server?"},
+      {{"map", "list", "--server", "127.0.0.1"}, "expected HOST:PORT"},
+      {{"map", "list", "--server", "127.0.0.1:99999"}, "expected HOST:PORT"}};
+  for (const auto& [words, message] : wrong) {
+    const Ran ran = RunStrata(words);
+    EXPECT_EQ(ran.exit_code, 2) << ran.err;
+    EXPECT_EQ(ran.out, "");
+    EXPECT_THAT(ran.err, HasSubstr(message));
+  }
+}
+
+TEST_F(StrataTest, OutputThatCannotBeWrittenIsAFailure) {
+  RunOk({"map", "create", "m"});
+  const Ran ran = Run({"map", "export", "m", "--format", "ply", "--out", "/dev/full"});
+  EXPECT_EQ(ran.exit_code, 1);
+  EXPECT_EQ(ran.out, "");
+  EXPECT_THAT(ran.err, HasSubstr("/dev/full: cannot be written: No space left on device"));
 }
 
 TEST_F(StrataTest, UnknownMapExitsWithOneAndKeepsStdoutEmpty) {
@@ -157,14 +197,17 @@ TEST_F(StrataTest, ImportSkipsWhatIsThereAndReportsABadFile) {
   const json second = Import({"--align", "off"});
   EXPECT_EQ(second.at("uploaded"), 0);
   EXPECT_EQ(second.at("skipped"), 3);
-  const std::string bad = Write("scans/scan3.pcd", "# .PCD v0.7\nFIELDS x y z\nnonsense\n");
+  const std::string bad = Write("scans/scan2.pcd", "# .PCD v0.7\nFIELDS x y z\nnonsense\n");
   const Ran ran =
       Run({"scan", "import", "m", scans_, "--poses", poses_, "--trajectory", "u", "--wait"});
   EXPECT_EQ(ran.exit_code, 1);
   const json third = json::parse(ran.out);
-  EXPECT_EQ(third.at("uploaded"), 3);
+  EXPECT_EQ(third.at("uploaded"), 2);
   EXPECT_EQ(third.at("failed"), 1);
   EXPECT_EQ(third.at("errors").at(0).at("scan"), bad);
+  EXPECT_EQ(third.at("errors").at(0).at("error"),
+            "line 3: expected a PCD header entry, found 'nonsense'");
+  EXPECT_THAT(ran.err, HasSubstr("error: " + bad + ": line 3: expected"));
 }
 
 TEST_F(StrataTest, PosesComeBackByTimeAsTheyWereUploaded) {
@@ -212,6 +255,22 @@ TEST_F(StrataTest, SurfacePlanRenderAndExportOfADrive) {
   ASSERT_TRUE(std::getline(lines, line));
   EXPECT_EQ(json::parse(line).at("found"), false);
 
+  const std::string refused = Write("refused.csv", "1e300,0,0,3,0,0\n-4,0,0,3,0,0\n");
+  const Ran some = Run({"plan", "m", "--queries", refused});
+  EXPECT_EQ(some.exit_code, 1);
+  std::istringstream answers(some.out);
+  ASSERT_TRUE(std::getline(answers, line));
+  EXPECT_EQ(json::parse(line).at("reason"), "error");
+  EXPECT_EQ(json::parse(line).at("found"), false);
+  ASSERT_TRUE(std::getline(answers, line));
+  EXPECT_EQ(json::parse(line).at("found"), true);
+
+  const std::string places = Write("places.csv", "x,y\n-2.05,0.05\n500,0\n-3.05,0.05\n");
+  const Ran table = RunStrata({"surface", "m", "--points", places, "--embedded", database_});
+  EXPECT_EQ(std::count(table.out.begin(), table.out.end(), '\n'), 3) << table.out;
+  const Ran each = Run({"surface", "m", "--points", places});
+  EXPECT_EQ(std::count(each.out.begin(), each.out.end(), '\n'), 3) << each.out;
+
   const std::string png = (dir_.path() / "map.png").string();
   EXPECT_EQ(RunOk({"map", "render", "m", png, "--path", path}).at("paths"), 1);
   EXPECT_GT(std::filesystem::file_size(png), 5000U);
@@ -221,6 +280,16 @@ TEST_F(StrataTest, SurfacePlanRenderAndExportOfADrive) {
     EXPECT_EQ(std::filesystem::file_size(file), written.at("bytes").get<std::size_t>());
     EXPECT_GT(written.at("vertices").get<std::size_t>(), 1000U);
   }
+  const std::string far = (dir_.path() / "far.pcd").string();
+  const std::vector<std::string> shifted = {
+      "map", "export", "m", "--format", "pcd", "--out", far, "--relative-to"};
+  const auto exported = [&](const std::string& origin) {
+    std::vector<std::string> words = shifted;
+    words.push_back(origin);
+    return RunOk(words).at("coordinates");
+  };
+  EXPECT_EQ(exported("1,2,3"), "float");
+  EXPECT_EQ(exported("-500000,0,0"), "double");
 }
 
 TEST_F(StrataTest, VerifyAndRebuildKeepTheContent) {

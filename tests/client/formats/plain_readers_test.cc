@@ -33,6 +33,17 @@ TEST(XyzReaderTest, NamesComeFromALineOrAComment) {
   EXPECT_THAT(commented.label, ElementsAre(1203));
 }
 
+TEST(XyzReaderTest, CountsAndByteOrderMarksBeforeThePointsAreNoPoints) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud pts,
+                              ReadXyz("2\n1 2 3 -7 10 20 30\n4 5 6 9 1 2 3\n"));
+  EXPECT_THAT(pts.points, ElementsAre(Eigen::Vector3f(1, 2, 3), Eigen::Vector3f(4, 5, 6)));
+  EXPECT_THAT(pts.intensity, ElementsAre(-7, 9));
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud csv, ReadXyz("\xef\xbb\xbfx,y,z\r\n1,2,3\r\n"));
+  EXPECT_THAT(csv.points, ElementsAre(Eigen::Vector3f(1, 2, 3)));
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud nan, ReadXyz("nan nan nan\n1 2 3\n"));
+  EXPECT_THAT(nan.points, ElementsAre(Eigen::Vector3f(1, 2, 3)));
+}
+
 TEST(XyzReaderTest, ErrorsNameTheLine) {
   const auto expect = [](const std::string& file, const std::string& message) {
     EXPECT_THAT(ReadXyz(file), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(message)));
@@ -40,7 +51,11 @@ TEST(XyzReaderTest, ErrorsNameTheLine) {
   expect("", "expected points");
   expect("1 2\n", "line 1: points have no field z");
   expect("1 2 3\n4 5\n", "line 2: expected 3 numbers, found 2");
-  expect("1 2 3\n4 5 six\n", "line 2: expected numbers only");
+  expect("1 2 3\n4 5 six\n", "line 2: expected numbers only, found 'six'");
+  expect("1e400 2 3\n1 2 3\n", "line 1: expected numbers only, found '1e400'");
+  expect("1 2 3\n7\n", "line 2: expected 3 numbers, found 1");
+  expect("nan nan nan\ninf 1 2\n", "no finite point among 2");
+  expect("1 2 3\n1e30 2 3\n", "point (");
   expect("a,b,c\n1,2,3\n", "line 2: points have no field x");
 }
 

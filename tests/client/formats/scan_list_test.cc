@@ -124,5 +124,54 @@ TEST_F(ScanListTest, WhatIsNotThereIsNotFound) {
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("none.txt")));
 }
 
+TEST_F(ScanListTest, MoreTumPosesThanScansAreAWarning) {
+  Write("a.xyz");
+  const auto poses = Write("poses", "1 10 0 0 0 0 0 1\n2 20 0 0 0 0 0 1\n");
+  std::string warning;
+  const auto warn = [&warning](const std::string& text) { warning += text; };
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans,
+                              ListScans({dir_.path()}, {.poses = poses, .warn = warn}));
+  EXPECT_EQ(scans.at(0).T_map_scan.translation().x(), 10);
+  EXPECT_THAT(warning, HasSubstr("2 poses for 1 scans"));
+  warning.clear();
+  Write("b.xyz");
+  STRATA_EXPECT_OK(ListScans({dir_.path()}, {.poses = poses, .warn = warn}));
+  EXPECT_EQ(warning, "");
+}
+
+TEST_F(ScanListTest, AFolderOf3dtkPosesMayBeNamed) {
+  Write("s000.3d", "100 100 100\n");
+  std::filesystem::create_directory(dir_.path() / "poses");
+  Write("poses/s000.pose", "100 0 0\n0 0 0\n");
+  for (const PoseFormat format : {PoseFormat::kAuto, PoseFormat::k3dtk}) {
+    STRATA_ASSERT_OK_AND_ASSIGN(
+        const auto scans,
+        ListScans({dir_.path()}, {.poses = dir_.path() / "poses", .pose_format = format}));
+    STRATA_ASSERT_OK(scans.at(0).pose_status);
+    EXPECT_NEAR(scans[0].T_map_scan.translation().y(), -1.0, 1e-12);
+  }
+  EXPECT_THAT(
+      ListScans({dir_.path()}, {.poses = dir_.path(), .pose_format = PoseFormat::kTum}).status(),
+      StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("not a file")));
+}
+
+TEST_F(ScanListTest, ALinkToNothingIsAScanThatCannotBeRead) {
+  Write("s0.xyz");
+  std::filesystem::create_symlink("/nowhere/s1.xyz", dir_.path() / "s1.xyz");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({dir_.path()}, {}));
+  EXPECT_THAT(Names(scans), ElementsAre("s0.xyz", "s1.xyz"));
+  EXPECT_THAT(ReadScan(scans[1].path).status(),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("no such file")));
+}
+
+TEST_F(ScanListTest, AFolderOfTextFilesIsToldHowToBeRead) {
+  Write("s0.txt");
+  EXPECT_THAT(ListScans({dir_.path()}, {}).status(),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("--format xyz")));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans,
+                              ListScans({dir_.path()}, {.format = ScanFormat::kXyz}));
+  EXPECT_THAT(Names(scans), ElementsAre("s0.txt"));
+}
+
 }  // namespace
 }  // namespace strata

@@ -1,4 +1,7 @@
 #include <array>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -96,6 +99,38 @@ TEST(FileBytesTest, WhatCannotBeWrittenOrReadSaysWhich) {
               StatusIs(absl::StatusCode::kUnavailable, HasSubstr("no/file")));
   EXPECT_THAT(ReadFileBytes(dir.path()),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("not a file")));
+}
+
+TEST(WriteFileBytesTest, ReplacesAFileAsAWholeAndKeepsALink) {
+  const testing::TempDir dir;
+  const auto file = dir.path() / "file";
+  const auto link = dir.path() / "link";
+  STRATA_ASSERT_OK(WriteFileBytes(file, "old"));
+  std::filesystem::permissions(file, std::filesystem::perms::owner_read);
+  std::filesystem::create_symlink(file, link);
+  std::ifstream reader(file);
+  STRATA_ASSERT_OK(WriteFileBytes(link, "new bytes"));
+  std::string seen;
+  reader >> seen;
+  EXPECT_EQ(seen, "old");  // who had it open still has the whole old file
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_EQ(*ReadFileBytes(file), "new bytes");
+  EXPECT_EQ(std::filesystem::status(file).permissions(), std::filesystem::perms::owner_read);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(dir.path()), {}), 2);
+}
+
+TEST(WriteFileBytesTest, FailureNamesFileAndReasonAndLeavesNothing) {
+  const testing::TempDir dir;
+  EXPECT_THAT(
+      WriteFileBytes(dir.path() / "no" / "file", "x"),
+      StatusIs(absl::StatusCode::kUnavailable, HasSubstr("no/file: cannot be written: No")));
+  std::filesystem::create_directory(dir.path() / "folder");
+  EXPECT_THAT(WriteFileBytes(dir.path() / "folder", "x"),
+              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("Is a directory")));
+  EXPECT_THAT(WriteFileBytes("/dev/full", "x"),
+              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("No space left")));
+  STRATA_EXPECT_OK(WriteFileBytes("/dev/null", "x"));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(dir.path()), {}), 1);
 }
 
 }  // namespace
