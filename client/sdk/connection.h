@@ -62,6 +62,7 @@ absl::StatusOr<Out> CallUnary(Connection& connection,
                               const In& in) {
   Backoff backoff = connection.NewBackoff();
   while (true) {
+    STRATA_RETURN_IF_ERROR(call.stop.status());  // else a quick server may answer it all the same
     AttemptContext context(connection, call);
     Out out;
     absl::Status status = StatusOf((stub.*method)(context.get(), in, &out), call);
@@ -99,6 +100,7 @@ absl::Status CallStream(
     const Sink& sink) {
   Backoff backoff = connection.NewBackoff();
   while (true) {
+    STRATA_RETURN_IF_ERROR(call.stop.status());
     AttemptContext context(connection, call);
     const std::unique_ptr<grpc::ClientReader<Out>> reader = (stub.*method)(context.get(), in);
     bool delivered = false;
