@@ -39,7 +39,7 @@ endfunction()
 # strata_library(NAME [NO_INSTALL] SOURCES... HEADERS... DEPS... [PRIVATE_DEPS...])
 #
 # Makes the static library strata_NAME with the alias strata::NAME. HEADERS are public, are installed, and are
-# proved self-contained by the target all_verify_interface_header_sets. Includes start at the repository root.
+# held self-contained by tests/check_headers.py. Includes start at the repository root.
 function(strata_library name)
   cmake_parse_arguments(ARG "NO_INSTALL" "" "SOURCES;HEADERS;DEPS;PRIVATE_DEPS" ${ARGN})
   set(target strata_${name})
