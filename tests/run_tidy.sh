@@ -6,7 +6,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 cmake --preset dev >/dev/null
-cmake --build --preset dev --target strata_proto >/dev/null
+cmake --build --preset dev --target strata_proto_code >/dev/null
 checks=()
 if [[ $# -eq 0 ]]; then checks=(--checks=-clang-analyzer-*); fi
 if [[ $# -eq 0 || "$1" == --deep ]]; then

@@ -42,7 +42,7 @@ CLI::Option* AddNumbers(CLI::App* app,
   return app
       ->add_option_function<std::string>(
           name,
-          [=](const std::string& text) {
+          [=, set = std::move(set)](const std::string& text) {
             const auto numbers = ParseNumbers(text, min_count, max_count);
             if (!numbers.has_value()) {
               throw CLI::ValidationError(name, absl::StrCat("expected ", shape, ", got ", text));

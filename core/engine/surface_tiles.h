@@ -78,7 +78,6 @@ class SurfaceTileMaker {
                                 const Stop& stop,
                                 absl::FunctionRef<SurfaceTile(std::size_t)> make);
 
-  MapCore& core_;
   StorageReader& reader_;
   MlsTileStore& store_;
   const MlsTileMap& changed_;

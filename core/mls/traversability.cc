@@ -208,7 +208,7 @@ class Judge {
       const double noise = Noise(self, sample);
       const bool within_reach = std::abs(dz) <= offset.reach_m + noise;
       ground.tops[ground.count] = {offset.dx, offset.dy, dz, sample};
-      ground.count += !column.empty() & within_reach ? 1 : 0;
+      ground.count += (!column.empty() & within_reach) ? 1 : 0;
       if (!offset.adjacent) continue;
       const double beyond_noise = std::abs(dz) - noise;
       if (beyond_noise > offset.step_m && std::abs(dz) > step_m) [[unlikely]] {
@@ -238,7 +238,7 @@ class Judge {
       for (std::size_t i = 0; i < ground.count; ++i) {
         const Ground::Top& top = ground.tops[i];
         in_quarter[count] = static_cast<std::uint8_t>(i);
-        count += (top.dx * sx >= 0.0) & (top.dy * sy >= 0.0) ? 1 : 0;
+        count += ((top.dx * sx >= 0.0) & (top.dy * sy >= 0.0)) ? 1 : 0;
       }
       LocalPlaneFit fit(cell_size_m_);
       for (std::size_t i = 0; i < count; ++i) {

@@ -15,7 +15,7 @@ std::uint64_t KeyOf(CellIndex cell) {
   return (std::uint64_t{static_cast<std::uint32_t>(cell.x)} << 32) |
          static_cast<std::uint32_t>(cell.y);
 }
-CellIndex CellOfKey(std::uint64_t key) {
+CellIndex IndexOfKey(std::uint64_t key) {
   return {static_cast<std::int32_t>(key >> 32), static_cast<std::int32_t>(key & 0xFFFFFFFF)};
 }
 
@@ -105,7 +105,7 @@ MlsMap MlsUpdater::Map() const {
   std::vector<std::pair<TileKey, Patch>> placed;
   placed.reserve(nodes_.size());
   for (const auto& [key, head] : first_) {
-    const TileKey tile = TileOfCell(CellOfKey(key));
+    const TileKey tile = TileOfCell(IndexOfKey(key));
     for (std::uint32_t i = head; i != kNone; i = nodes_[i].next) {
       placed.emplace_back(tile, nodes_[i].patch);
     }

@@ -8,7 +8,7 @@
 namespace strata::translate {
 namespace {
 
-v1::MlsParameters ToProto(const MlsParameters& mls) {
+v1::MlsParameters MlsToProto(const MlsParameters& mls) {
   v1::MlsParameters proto;
   proto.set_cell_size_m(mls.cell_size_m);
   proto.set_gap_size_m(mls.gap_size_m);
@@ -16,7 +16,7 @@ v1::MlsParameters ToProto(const MlsParameters& mls) {
   return proto;
 }
 
-MlsParameters FromProto(const v1::MlsParameters& proto) {
+MlsParameters MlsFromProto(const v1::MlsParameters& proto) {
   MlsParameters mls;
   if (proto.has_cell_size_m()) mls.cell_size_m = proto.cell_size_m();
   if (proto.has_gap_size_m()) mls.gap_size_m = proto.gap_size_m();
@@ -68,7 +68,7 @@ SensorModel FromProto(const v1::SensorModel& proto) {
 
 v1::MapParameters ToProto(const MapParameters& parameters) {
   v1::MapParameters proto;
-  *proto.mutable_mls() = ToProto(parameters.mls);
+  *proto.mutable_mls() = MlsToProto(parameters.mls);
   *proto.mutable_sensor() = ToProto(parameters.sensor);
   *proto.mutable_default_profile() = ToProto(parameters.default_profile);
   proto.set_keep_points(parameters.keep_points);
@@ -83,7 +83,7 @@ v1::MapParameters ToProto(const MapParameters& parameters) {
 
 MapParameters FromProto(const v1::MapParameters& proto) {
   MapParameters parameters;
-  parameters.mls = FromProto(proto.mls());
+  parameters.mls = MlsFromProto(proto.mls());
   parameters.sensor = FromProto(proto.sensor());
   parameters.default_profile = FromProto(proto.default_profile());
   if (proto.has_keep_points()) parameters.keep_points = proto.keep_points();
