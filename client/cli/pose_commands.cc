@@ -61,6 +61,7 @@ absl::Status Export(Context& context, const PoseOptions& options) {
     return std::tie(a.time, a.id) < std::tie(b.time, b.id);
   });
   std::vector<TimedPose> poses;
+  poses.reserve(nodes.size());
   for (const PoseNode& node : nodes) {
     poses.push_back(
         {node.time, options.which == "current" ? node.T_map_scan : node.T_map_scan_uploaded});
