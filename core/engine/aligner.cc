@@ -23,8 +23,8 @@ namespace {
 // information: more would repeat the same measurement.
 constexpr std::size_t kMaxConstraints = 3;
 
-// Twice the default: a chain of hundreds of scans drifts less and by chance (neighbours.h has
-// numbers).
+// Twice the default: a chain of hundreds of scans then drifts little whatever the sample
+// (neighbours.h has numbers).
 constexpr int kSamples = 4000;
 
 MlsRegistrationOptions RegistrationOptions() {
