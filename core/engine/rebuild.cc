@@ -44,18 +44,30 @@ class Findings final : public DerivedSink {
     ++count_;
     if (count_ <= kNamed) absl::StrAppend(&named_, named_.empty() ? "" : ", ", what);
   }
+  void AddTruth(const std::string& what) {
+    truth_damaged_ = true;
+    Add(what);
+  }
   std::uint64_t count() const { return count_; }
   absl::Status Verdict() const {
     if (count_ == 0) return absl::OkStatus();
     const std::string more =
         count_ > kNamed ? absl::StrCat(", and ", count_ - kNamed, " more") : "";
-    return absl::DataLossError(
-        absl::StrCat(count_, " mismatches: ", named_, more, "; a rebuild mends tiles"));
+    return absl::DataLossError(absl::StrCat(
+        count_,
+        count_ == 1 ? " mismatch: " : " mismatches: ",
+        named_,
+        more,
+        truth_damaged_
+            ? "; no rebuild makes scans again: put back a copy of the map's file, or delete the "
+              "scan and upload it again"
+            : "; a rebuild mends tiles"));
   }
 
  private:
   static constexpr std::uint64_t kNamed = 1000;
   std::uint64_t count_ = 0;
+  bool truth_damaged_ = false;
   std::string named_;
 };
 
@@ -109,7 +121,7 @@ absl::Status Verify(Integrator& integrator, int threads, JobContext& context) {
   integrator.store().Clear();
   Findings findings;
   TruthCheck truth(core, context);
-  STRATA_RETURN_IF_ERROR(truth.Run([&](const std::string& what) { findings.Add(what); }));
+  STRATA_RETURN_IF_ERROR(truth.Run([&](const std::string& what) { findings.AddTruth(what); }));
   std::uint64_t tiles = 0;
   if (findings.count() == 0) {
     DerivedPass pass(integrator, core.snapshots().current().tile_version, threads, context);

@@ -20,6 +20,7 @@ namespace strata {
 void TruthCheck::CheckPoints(StorageReader& reader, const ScanRecord& scan, Report report) {
   ScanHasher hasher;
   std::uint64_t points = 0;
+  std::uint64_t point_bytes = 0;
   bool whole = true;
   for (std::uint32_t ordinal = 0; ordinal < scan.chunks; ++ordinal) {
     ++pieces_;
@@ -32,8 +33,12 @@ void TruthCheck::CheckPoints(StorageReader& reader, const ScanRecord& scan, Repo
     }
     hasher.Add(*piece);
     points += piece->size();
+    point_bytes += bytes->size();
   }
   if (!whole) return;
+  if (point_bytes != scan.point_bytes) {
+    report(absl::StrCat(point_bytes, " bytes of points instead of ", scan.point_bytes));
+  }
   if (points != scan.header.point_count) {
     report(absl::StrCat(points, " points instead of ", scan.header.point_count));
   } else if (hasher.Digest(scan.header) != scan.content_hash) {
@@ -47,6 +52,7 @@ void TruthCheck::CheckScan(StorageReader& reader, const PosedScan& posed, Report
     if (!sound.ok()) report(std::string(sound.message()));
   };
   check(ValidateScanHeader(scan.header));
+  check(reader.CheckScanRow(scan.number));
   if (posed.pose.has_value()) check(ValidatePose(posed.pose->T_map_scan));
   if (scan.state == ScanState::kIntegrated && !posed.pose.has_value()) {
     report("integrated without a pose");

@@ -157,6 +157,25 @@ absl::StatusOr<std::vector<ScanNumber>> SqliteReader::ListScanNumbers() {
   return numbers;
 }
 
+absl::Status SqliteReader::CheckScanRow(ScanNumber number) {
+  STRATA_ASSIGN_OR_RETURN(Statement row,
+                          database_.Prepare("SELECT trajectory, sequence, header, points, time_us "
+                                            "FROM truth_scan WHERE number = ?1"));
+  row.Bind(number);
+  STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
+  if (!found) return absl::NotFoundError(absl::StrCat("scan number ", number, " does not exist"));
+  STRATA_ASSIGN_OR_RETURN(const ScanHeader header,
+                          DecodeScanHeader({row.Text(0), row.Unsigned(1)}, row.Bytes(2)));
+  if (row.Unsigned(3) != header.point_count) {
+    return absl::DataLossError(
+        absl::StrCat("counted with ", row.Unsigned(3), " points instead of ", header.point_count));
+  }
+  const std::int64_t time_us = absl::ToUnixMicros(header.time);
+  if (row.Int(4) == time_us) return absl::OkStatus();
+  return absl::DataLossError(
+      absl::StrCat("found by time ", row.Int(4), " us instead of ", time_us));
+}
+
 absl::StatusOr<std::vector<PosedScan>> SqliteReader::ListScans(const ScanQuery& query,
                                                                std::uint64_t epoch) {
   // An absent condition is bound so that it always holds.

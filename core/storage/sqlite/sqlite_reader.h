@@ -30,6 +30,7 @@ class SqliteReader final : public StorageReader {
   absl::StatusOr<std::optional<PosedScan>> FindScan(const ScanId& id, std::uint64_t epoch) override;
   absl::StatusOr<PosedScan> GetScan(ScanNumber number, std::uint64_t epoch) override;
   absl::StatusOr<std::vector<ScanNumber>> ListScanNumbers() override;
+  absl::Status CheckScanRow(ScanNumber number) override;
   absl::StatusOr<std::vector<PosedScan>> ListScans(const ScanQuery& query,
                                                    std::uint64_t epoch) override;
   absl::StatusOr<std::optional<PosedScan>> FindPredecessor(absl::string_view trajectory,

@@ -12,7 +12,10 @@
 namespace strata::testing {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
 
 class EngineVerifyTest : public EngineTest {};
 
@@ -58,6 +61,45 @@ TEST_F(EngineVerifyTest, DamagedPointsAreNamed) {
   EXPECT_THAT(db().scans().GetPoints(
                   {}, kMapName, {"run", 2}, [](const PointCloud&) { return absl::OkStatus(); }),
               StatusIs(absl::StatusCode::kDataLoss, HasSubstr("run/2")));
+}
+
+// Columns that only counts and searches read.
+TEST_F(EngineVerifyTest, ARowThatDiffersFromItsHeaderIsDamageThatNoRebuildMends) {
+  for (const std::string column : {"points", "time_us", "point_bytes"}) {
+    MakeMap(SmallMap(), column);
+    UploadRoom(1, RoomPose(1), column);
+    UploadRoom(2, RoomPose(2), column);
+    WaitIntegrated(db(), column);
+    Close();
+    Sql("UPDATE truth_scan SET " + column + " = " + column + " + 1 WHERE sequence = 2", column);
+    Reopen();
+    const JobInfo job = RunJob(db(), "verify", {}, column);
+    EXPECT_EQ(job.state, JobState::kFailed) << column;
+    EXPECT_THAT(job.message, StartsWith("1 mismatch: scan run/2: ")) << column;
+    EXPECT_THAT(job.message, Not(HasSubstr("a rebuild mends"))) << column;
+  }
+}
+
+// The cure that verify names.
+TEST_F(EngineVerifyTest, ADamagedScanThatIsDeletedAndUploadedAgainIsSound) {
+  MakeMap();
+  UploadRooms(2);
+  const std::string digest = Digest();
+  Close();
+  Sql("UPDATE truth_scan SET points = points + 1 WHERE sequence = 1");
+  Sql("UPDATE truth_chunk SET bytes = x'00' WHERE upload = (SELECT upload FROM truth_scan WHERE "
+      "sequence = 2)");
+  Reopen();
+  const JobInfo job = RunJob(db(), "verify");
+  EXPECT_THAT(job.message, HasSubstr("delete the scan and upload it again"));
+  EXPECT_THAT(job.message, Not(HasSubstr("a rebuild mends")));
+  for (const std::uint64_t i : {2, 1}) {  // tiles are made again from readable scans only
+    STRATA_ASSERT_OK(db().scans().Delete({}, kMapName, {"run", i}));
+    UploadRoom(i, RoomPose(i));
+  }
+  WaitIntegrated(db());
+  ExpectSound();
+  EXPECT_EQ(Digest(), digest);
 }
 
 TEST_F(EngineVerifyTest, EverythingDamagedIsNamed) {
@@ -109,6 +151,7 @@ TEST_F(EngineVerifyTest, EveryDamagedTileIsNamedAndMended) {
   Reopen();
   const JobInfo job = RunJob(db(), "verify");
   EXPECT_EQ(job.state, JobState::kFailed);
+  EXPECT_THAT(job.message, EndsWith("; a rebuild mends tiles"));
   for (const auto& [key, bytes] : tiles) {
     EXPECT_THAT(job.message, HasSubstr("tile " + key.ToString() + " (served)"));
     if (key.level > 0) continue;
