@@ -1,6 +1,7 @@
 #include "core/engine/directory.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -11,8 +12,10 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 #include "absl/time/time.h"
 #include <fcntl.h>
 #include <sys/file.h>
@@ -31,6 +34,8 @@ constexpr absl::string_view kSuffix = ".strata";
 // Map names never begin with a dot, so neither prefix can meet a map.
 constexpr char kMakingPrefix[] = ".making-";
 constexpr char kLockName[] = ".lock";
+// Of the files of a map, itself first.
+constexpr std::array<const char*, 4> kSuffixes = {"", "-wal", "-shm", "-journal"};
 
 absl::Status ErrnoStatus(absl::string_view what, const fs::path& path) {
   const int error = errno;
@@ -51,7 +56,7 @@ fs::path WithSuffix(fs::path file, const char* suffix) { return file += suffix; 
 
 // A journal without its database would be taken for that of the next map of the same name.
 absl::Status RemoveWithJournals(const fs::path& file) {
-  for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
+  for (const char* suffix : kSuffixes) {
     std::error_code error;
     fs::remove(WithSuffix(file, suffix), error);
     if (error) {
@@ -62,6 +67,17 @@ absl::Status RemoveWithJournals(const fs::path& file) {
   return absl::OkStatus();
 }
 
+// Whether the file is the journal of a map file that is not there.
+bool IsOrphan(const fs::path& file) {
+  for (const absl::string_view suffix : kSuffixes) {
+    absl::string_view map = file.native();
+    if (!absl::ConsumeSuffix(&map, suffix) || !absl::EndsWith(map, kSuffix)) continue;
+    std::error_code error;
+    return !fs::exists(std::string(map), error) && !error;
+  }
+  return false;
+}
+
 absl::Status RemoveLeftovers(const fs::path& directory) {
   std::error_code error;
   std::vector<fs::path> files;
@@ -70,11 +86,8 @@ absl::Status RemoveLeftovers(const fs::path& directory) {
   }
   if (error) return absl::UnavailableError(absl::StrCat(directory.string(), ": ", error.message()));
   for (const fs::path& file : files) {
-    const std::string name = file.filename().string();
-    const std::size_t journal = name.rfind(".strata-");
-    const bool orphan = journal != std::string::npos &&
-                        !fs::exists(directory / name.substr(0, journal + kSuffix.size()), error);
-    if (name.rfind(kMakingPrefix, 0) == 0 || orphan) fs::remove(file, error);
+    const bool half_made = absl::StartsWith(file.filename().string(), kMakingPrefix);
+    if (half_made || IsOrphan(file)) fs::remove(file, error);
   }
   return absl::OkStatus();
 }
@@ -138,6 +151,14 @@ absl::Status MapDirectory::CreateFile(absl::string_view name,
     return absl::UnavailableError(absl::StrCat("cannot make map ", name, ": ", error.message()));
   }
   return SyncDirectory(path_);
+}
+
+absl::Status MapDirectory::CheckRemovable(absl::string_view name) const {
+  const fs::path file = FileOf(name);
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(file, error))) return absl::OkStatus();
+  const absl::Status is_map = CheckIsSqliteMap(file);
+  return is_map.ok() ? is_map : Annotate(is_map, "not deleted");
 }
 
 absl::Status MapDirectory::RemoveFile(absl::string_view name) const {

@@ -34,6 +34,8 @@ class MapDirectory {
   absl::Status CreateFile(absl::string_view name,
                           const MapParameters& parameters,
                           absl::Time created) const;
+  // FAILED_PRECONDITION for a file that no map was ever in; OK also where there is none.
+  absl::Status CheckRemovable(absl::string_view name) const;
   // No connection may be open.
   absl::Status RemoveFile(absl::string_view name) const;
 

@@ -94,6 +94,8 @@ absl::StatusOr<std::shared_ptr<Map>> EngineMaps::Withdraw(absl::string_view name
     }
   } else if (absl::IsAborted(it->second.status())) {
     return NoSuchMap(name);
+  } else {
+    STRATA_RETURN_IF_ERROR(directory_.CheckRemovable(name));
   }
   it->second = absl::AbortedError(absl::StrCat("map ", it->first, " is being deleted"));
   return map;

@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "absl/status/status.h"
@@ -69,7 +71,32 @@ absl::Status LimitSize(Database& database, std::uint64_t max_file_bytes) {
   return database.Execute(absl::StrCat("PRAGMA max_page_count = ", pages));
 }
 
+// By the header that SQLite gives its files (sqlite.org/fileformat2.html#the_database_header): 100
+// bytes that begin with 16 fixed ones and have the application id, big-endian, at offset 68.
+std::string KindOf(const std::filesystem::path& file) {
+  std::error_code error;
+  if (std::filesystem::is_directory(file, error)) return "a directory";
+  std::string header(100, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(header.data(), static_cast<std::streamsize>(header.size()));
+  if (stream.gcount() == 0) return "an empty or unreadable file";
+  const std::string magic("SQLite format 3\0", 16);
+  if (!stream || header.compare(0, magic.size(), magic) != 0) return "no database file";
+  std::uint32_t application = 0;
+  for (int i = 68; i < 72; ++i)
+    application = application << 8 | static_cast<std::uint8_t>(header[i]);
+  if (application == static_cast<std::uint32_t>(kApplicationId)) return "";
+  return absl::StrCat("a database file of another application (application_id ", application, ")");
+}
+
 }  // namespace
+
+absl::Status CheckIsSqliteMap(const std::filesystem::path& file) {
+  const std::string kind = KindOf(file);
+  if (kind.empty()) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      absl::StrCat(file.filename().string(), " is not a Strata map but ", kind));
+}
 
 absl::Status CreateSqliteMap(const std::filesystem::path& file,
                              const MapParameters& parameters,

@@ -31,6 +31,10 @@ absl::Status CreateSqliteMap(const std::filesystem::path& file,
 absl::StatusOr<std::unique_ptr<MapStorage>> OpenSqliteStorage(const std::filesystem::path& file,
                                                               const SqliteOptions& options);
 
+// OK for a file that was made as a map, damaged or newer as it may be; FAILED_PRECONDITION saying
+// what else the file is.
+absl::Status CheckIsSqliteMap(const std::filesystem::path& file);
+
 }  // namespace strata
 
 #endif  // STRATA_CORE_STORAGE_SQLITE_SQLITE_STORAGE_H_

@@ -3,6 +3,8 @@
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/time/time.h"
@@ -15,7 +17,9 @@
 namespace strata::testing {
 namespace {
 
+using ::testing::_;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class EngineMapsTest : public EngineTest {
  protected:
@@ -57,6 +61,61 @@ TEST_F(EngineMapsTest, ForeignFileDoesNotKeepOthersFromBeingServed) {
               StatusIs(absl::StatusCode::kFailedPrecondition,
                        HasSubstr("format version 99 is newer than 1, the newest this program "
                                  "reads; update it")));
+}
+
+TEST_F(EngineMapsTest, OnlyFilesOfMapsAreDeleted) {
+  Sql("CREATE TABLE t (a); PRAGMA application_id = 7;", "foreign");
+  Sql("CREATE TABLE t (a); PRAGMA application_id = 1398035009; PRAGMA user_version = 99;", "newer");
+  std::ofstream(MapFile("garbage")) << std::string(20'000, 'x');
+  std::ofstream(MapFile("short")) << "SQLite";
+  std::ofstream(MapFile("empty"));
+  std::filesystem::create_directory(MapFile("folder"));
+  Reopen();
+  const std::vector<std::pair<std::string, std::string>> kinds = {
+      {"foreign", "a database file of another application (application_id 7)"},
+      {"garbage", "no database file"},
+      {"short", "no database file"},
+      {"empty", "an empty or unreadable file"},
+      {"folder", "a directory"}};
+  for (const auto& [name, kind] : kinds) {
+    const std::string before = Contents(MapFile(name));
+    EXPECT_THAT(db().maps().Delete({}, name),
+                StatusIs(absl::StatusCode::kFailedPrecondition,
+                         HasSubstr(name + ".strata is not a Strata map but " + kind)));
+    EXPECT_TRUE(std::filesystem::exists(MapFile(name))) << name;
+    EXPECT_EQ(Contents(MapFile(name)), before) << name;
+    EXPECT_THAT(db().maps().Get({}, name), Not(IsOk())) << name;
+  }
+  STRATA_EXPECT_OK(db().maps().Delete({}, "newer"));  // a map, if one that cannot be read
+  EXPECT_FALSE(std::filesystem::exists(MapFile("newer")));
+  EXPECT_THAT(db().maps().Delete({}, "newer"), StatusIs(absl::StatusCode::kNotFound, _));
+}
+
+TEST_F(EngineMapsTest, ADamagedMapCanBeDeleted) {
+  MakeMap();
+  Close();
+  Sql("DROP TABLE truth_map");
+  Reopen();
+  EXPECT_THAT(db().maps().Get({}, kMapName), Not(IsOk()));
+  STRATA_EXPECT_OK(db().maps().Delete({}, kMapName));
+  EXPECT_FALSE(std::filesystem::exists(MapFile()));
+}
+
+TEST_F(EngineMapsTest, OfFilesBesideMapsOnlyLeftJournalsAreRemoved) {
+  MakeMap();
+  Close();
+  const std::vector<std::string> kept = {"world.strata", "gone.strata-copy", "notes-wal"};
+  const std::vector<std::string> removed = {"gone.strata-wal", "gone.strata-shm"};
+  for (const std::string& name : {kept[1], kept[2], removed[0], removed[1]}) {
+    std::ofstream(directory_.path() / name) << "x";
+  }
+  Reopen();
+  for (const std::string& name : kept) {
+    EXPECT_TRUE(std::filesystem::exists(directory_.path() / name)) << name;
+  }
+  for (const std::string& name : removed) {
+    EXPECT_FALSE(std::filesystem::exists(directory_.path() / name)) << name;
+  }
 }
 
 TEST_F(EngineMapsTest, ANewerFileIsLeftAsItIs) {
