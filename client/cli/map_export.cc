@@ -71,16 +71,20 @@ Geometry GeometryOf(const std::vector<SurfaceTile>& tiles, SurfaceMesh mesh) {
   return geometry;
 }
 
-absl::StatusOr<Geometry> MeshOf(Context& context, const ExportOptions& options) {
+// What is damaged is left out and said in `damage`.
+absl::StatusOr<Geometry> MeshOf(Context& context,
+                                const ExportOptions& options,
+                                absl::Status& damage) {
   STRATA_ASSIGN_OR_RETURN(const MapInfo info,
                           context.database.maps().Get(context.call, options.map));
-  STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTile> tiles,
+  STRATA_ASSIGN_OR_RETURN(const FetchedTiles fetched,
                           FetchTiles(context, options.map, options.level));
+  damage = fetched.damage;
   std::vector<const SurfaceTile*> pointers;
-  for (const SurfaceTile& tile : tiles) {
+  for (const SurfaceTile& tile : fetched.tiles) {
     pointers.push_back(&tile);
   }
-  return GeometryOf(tiles, MakeSurfaceMesh(pointers, info.parameters.mls.cell_size_m));
+  return GeometryOf(fetched.tiles, MakeSurfaceMesh(pointers, info.parameters.mls.cell_size_m));
 }
 
 // Every integrated scan's points at their poses.
@@ -110,8 +114,9 @@ absl::StatusOr<Geometry> PointsOf(Context& context, const ExportOptions& options
 
 absl::Status Export(Context& context, const ExportOptions& options) {
   const bool points = options.format == "pcd";
+  absl::Status damage;
   STRATA_ASSIGN_OR_RETURN(Geometry geometry,
-                          points ? PointsOf(context, options) : MeshOf(context, options));
+                          points ? PointsOf(context, options) : MeshOf(context, options, damage));
   for (Eigen::Vector3d& vertex : geometry.vertices) {
     vertex -= options.origin;
   }
@@ -137,7 +142,7 @@ absl::Status Export(Context& context, const ExportOptions& options) {
                                                   : "float"},
                          {"relative_to", ToJson(options.origin)},
                          {"bytes", bytes.size()}});
-  return absl::OkStatus();
+  return damage;
 }
 
 }  // namespace

@@ -64,10 +64,9 @@ absl::Status Render(Context& context, RenderOptions options) {
                           context.database.maps().Stats(context.call, options.map));
   const double cell = info.parameters.mls.cell_size_m;
   const std::int32_t level = options.level.value_or(LevelFor(stats, cell, options.picture));
-  STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTile> tiles,
-                          FetchTiles(context, options.map, level));
-  const picture::Picture picture =
-      picture::DrawMap(tiles, cell * static_cast<double>(1 << level), paths, options.picture);
+  STRATA_ASSIGN_OR_RETURN(const FetchedTiles fetched, FetchTiles(context, options.map, level));
+  const picture::Picture picture = picture::DrawMap(
+      fetched.tiles, cell * static_cast<double>(1 << level), paths, options.picture);
   STRATA_ASSIGN_OR_RETURN(const std::string png, picture::PngBytes(picture.image));
   STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, png));
   const picture::Camera& camera = picture.camera;
@@ -81,9 +80,9 @@ absl::Status Render(Context& context, RenderOptions options) {
                          {"right", ToJson(camera.right)},
                          {"up", ToJson(camera.up)},
                          {"level", level},
-                         {"tiles", tiles.size()},
+                         {"tiles", fetched.tiles.size()},
                          {"paths", paths.size()}});
-  return absl::OkStatus();
+  return fetched.damage;
 }
 
 void SetSize(const std::string& text, picture::PictureOptions& options) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
 #include "client/cli/command.h"
@@ -13,10 +14,15 @@
 
 namespace strata::cli {
 
-// All tiles of one level of detail, by key.
-absl::StatusOr<std::vector<SurfaceTile>> FetchTiles(Context& context,
-                                                    const std::string& map,
-                                                    std::int32_t level);
+struct FetchedTiles {
+  std::vector<SurfaceTile> tiles;  // by key
+  absl::Status damage;             // DATA_LOSS naming the tiles that cannot be read and the cure
+};
+
+// All tiles of one level of detail that can be read.
+absl::StatusOr<FetchedTiles> FetchTiles(Context& context,
+                                        const std::string& map,
+                                        std::int32_t level);
 
 }  // namespace strata::cli
 

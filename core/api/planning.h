@@ -26,11 +26,13 @@ class Planning {
   virtual ~Planning() = default;
 
   // A path or the reason why there is none; both are OK. INVALID_ARGUMENT for a bad query (not
-  // finite, profile out of range); CANCELLED and DEADLINE_EXCEEDED from inside the search.
+  // finite, profile out of range); CANCELLED and DEADLINE_EXCEEDED from inside the search;
+  // DATA_LOSS naming a damaged tile on the way.
   virtual absl::StatusOr<PlanResult> PlanPath(const Call& call,
                                               absl::string_view map,
                                               const PlanQuery& query) = 0;
   // All levels at each place, in the order asked; a place without surfaces has an empty column.
+  // DATA_LOSS naming a damaged tile where one of the places lies.
   virtual absl::StatusOr<std::vector<SurfaceColumn>> SampleSurfaces(
       const Call& call, absl::string_view map, const std::vector<Eigen::Vector2d>& places) = 0;
 

@@ -46,9 +46,10 @@ struct HeldTile {
 
 // One message of Fetch.
 struct TileUpdate {
-  enum class Kind : std::uint8_t { kNew = 1, kChanged = 2, kGone = 3 };
+  // kDamaged: what is stored cannot be read; the reader keeps what it has. A rebuild mends it.
+  enum class Kind : std::uint8_t { kNew = 1, kChanged = 2, kGone = 3, kDamaged = 4 };
   Kind kind = Kind::kNew;
-  EncodedTile tile;  // of a tile that is gone: key and epoch only
+  EncodedTile tile;  // gone: key and epoch only; damaged: all but the bytes
 };
 
 // Thread-safe. Every answer is of one epoch.
@@ -66,7 +67,8 @@ class Tiles {
                                                      absl::string_view map,
                                                      const TileArea& area) = 0;
   // What is new, changed or gone in the area against what the reader holds; nothing else is sent. A
-  // sink's error ends the stream and is handed back.
+  // damaged tile is marked, Get says why, and the others are served. A sink's error ends the stream
+  // and is handed back.
   virtual absl::Status Fetch(const Call& call,
                              absl::string_view map,
                              const TileArea& area,

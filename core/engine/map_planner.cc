@@ -15,6 +15,7 @@
 
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/status.h"
+#include "core/engine/tile_check.h"
 
 namespace strata {
 
@@ -86,7 +87,8 @@ absl::StatusOr<std::shared_ptr<const SurfaceTile>> MapPlanner::LoadTile(const Ti
   }
   if (!row.has_value()) return std::shared_ptr<const SurfaceTile>();
   absl::StatusOr<SurfaceTile> decoded = DecodeSurfaceTile(row->bytes);
-  if (!decoded.ok()) return Annotate(decoded.status(), absl::StrCat("tile ", key.ToString()));
+  if (!decoded.ok()) return DamagedTile(key, decoded.status());
+  if (decoded->key != key) return DamagedTile(key, absl::DataLossError("it is another tile"));
   auto tile = std::make_shared<const SurfaceTile>(*std::move(decoded));
   absl::MutexLock lock(&mutex_);
   tiles_.Put(

@@ -26,6 +26,11 @@ absl::Status Readable(const Row& row, const TileKey& key, Decode decode) {
 
 }  // namespace
 
+absl::Status DamagedTile(const TileKey& key, const absl::Status& why) {
+  return absl::DataLossError(absl::StrCat(
+      "tile ", key.ToString(), " is damaged, a rebuild of the map mends it: ", why.message()));
+}
+
 absl::StatusOr<std::uint64_t> CheckTilesAlone(MapCore& core,
                                               JobContext& context,
                                               absl::FunctionRef<void(const std::string&)> report) {

@@ -1,4 +1,5 @@
-// Checks stored tiles for damage by themselves, without what they are made of.
+// Stored tiles that are damaged: how that is said, and how they are found by themselves, without
+// what they are made of.
 #ifndef STRATA_CORE_ENGINE_TILE_CHECK_H_
 #define STRATA_CORE_ENGINE_TILE_CHECK_H_
 
@@ -6,12 +7,17 @@
 #include <string>
 
 #include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
 #include "core/engine/job_board.h"
 #include "core/engine/map_core.h"
+#include "core/mls/tile_key.h"
 
 namespace strata {
+
+// DATA_LOSS naming the tile, the cure and why it cannot be read.
+absl::Status DamagedTile(const TileKey& key, const absl::Status& why);
 
 // Reads every tile of every level that readers see now and calls `report` with each one that cannot
 // be read. Returns how many were looked at; an error is one of the store or of the job being ended.

@@ -16,6 +16,7 @@
 #include "core/codec/blob.h"
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/status.h"
+#include "core/engine/tile_check.h"
 
 namespace strata {
 namespace {
@@ -55,7 +56,7 @@ std::optional<Kind> TakeKind(const SurfaceTileRow& row, HeldVersions& held) {
   return same ? std::nullopt : std::optional(Kind::kChanged);
 }
 
-// nullopt where there is nothing.
+// nullopt where there is nothing; DATA_LOSS if damaged.
 absl::StatusOr<std::optional<api::EncodedTile>> ReadTile(Map& map,
                                                          const TileKey& key,
                                                          const MapView& view) {
@@ -65,12 +66,20 @@ absl::StatusOr<std::optional<api::EncodedTile>> ReadTile(Map& map,
   if (!row.has_value()) return std::optional<api::EncodedTile>();
   const absl::Status intact =
       OpenBlob(BlobKind::kSurfaceTile, kSurfaceTileVersion, row->bytes).status();
-  if (!intact.ok()) {
-    return Annotate(intact,
-                    absl::StrCat("tile ", key.ToString(), " is damaged, a rebuild mends it"));
-  }
+  if (!intact.ok()) return DamagedTile(key, intact);
   return std::optional<api::EncodedTile>(
       api::EncodedTile{key, row->version, view.epoch, std::move(row->bytes)});
+}
+
+// The tile of `row` to one who lacks it.
+absl::StatusOr<api::TileUpdate> UpdateOf(Map& map,
+                                         const SurfaceTileRow& row,
+                                         Kind kind,
+                                         const MapView& view) {
+  absl::StatusOr<std::optional<api::EncodedTile>> tile = ReadTile(map, row.key, view);
+  if (tile.ok() && tile->has_value()) return api::TileUpdate{kind, **std::move(tile)};
+  if (!tile.ok() && !absl::IsDataLoss(tile.status())) return tile.status();
+  return api::TileUpdate{Kind::kDamaged, {row.key, row.version, view.epoch, ""}};
 }
 
 }  // namespace
@@ -120,24 +129,18 @@ absl::Status EngineTiles::Fetch(const api::Call& call,
   }
   STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> rows,
                           ListRows(*found, area, pin.view()));
-  absl::Status damaged;
   for (const SurfaceTileRow& row : rows) {
     STRATA_RETURN_IF_ERROR(call.stop.status());
     const std::optional<Kind> kind = TakeKind(row, versions);
     if (!kind.has_value()) continue;
-    absl::StatusOr<std::optional<api::EncodedTile>> tile = ReadTile(*found, row.key, pin.view());
-    if (absl::IsDataLoss(tile.status())) {
-      damaged.Update(tile.status());  // the others are served first
-      continue;
-    }
-    STRATA_RETURN_IF_ERROR(tile.status());
-    if (tile->has_value()) STRATA_RETURN_IF_ERROR(sink({*kind, **std::move(tile)}));
+    STRATA_ASSIGN_OR_RETURN(const api::TileUpdate update, UpdateOf(*found, row, *kind, pin.view()));
+    STRATA_RETURN_IF_ERROR(sink(update));
   }
   for (const auto& [key, version] : versions) {
     STRATA_RETURN_IF_ERROR(call.stop.status());
     STRATA_RETURN_IF_ERROR(sink({Kind::kGone, {key, 0, pin.view().epoch, ""}}));
   }
-  return damaged;
+  return absl::OkStatus();
 }
 
 }  // namespace strata

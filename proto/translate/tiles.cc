@@ -14,6 +14,7 @@ using Kind = api::TileUpdate::Kind;
 static_assert(v1::FetchTilesResponse::KIND_NEW == static_cast<int>(Kind::kNew));
 static_assert(v1::FetchTilesResponse::KIND_CHANGED == static_cast<int>(Kind::kChanged));
 static_assert(v1::FetchTilesResponse::KIND_GONE == static_cast<int>(Kind::kGone));
+static_assert(v1::FetchTilesResponse::KIND_DAMAGED == static_cast<int>(Kind::kDamaged));
 
 absl::Status CheckLevel(std::int32_t level) {
   if (level >= 0 && level <= kMaxLevel) return absl::OkStatus();
@@ -116,8 +117,8 @@ v1::FetchTilesResponse ToProto(const api::TileUpdate& update) {
 absl::StatusOr<api::TileUpdate> FromProto(const v1::FetchTilesResponse& proto) {
   if (!v1::FetchTilesResponse::Kind_IsValid(proto.kind()) ||
       proto.kind() == v1::FetchTilesResponse::KIND_UNSPECIFIED) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("kind: ", static_cast<int>(proto.kind()), " is not new, changed or gone"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "kind: ", static_cast<int>(proto.kind()), " is not new, changed, gone or damaged"));
   }
   STRATA_ASSIGN_OR_RETURN(api::EncodedTile tile, FromProto(proto.tile()));
   return api::TileUpdate{static_cast<Kind>(proto.kind()), std::move(tile)};

@@ -171,6 +171,7 @@ std::map<TileKey, std::string> AllTiles(api::Database& database, const std::stri
     area.level = level;
     const absl::Status fetched =
         database.tiles().Fetch({}, map, area, {}, [&](const api::TileUpdate& update) {
+          EXPECT_EQ(update.kind, api::TileUpdate::Kind::kNew);
           tiles[update.tile.key] = update.tile.bytes;
           return absl::OkStatus();
         });
@@ -223,6 +224,13 @@ void EngineTest::Sql(const std::string& sql, const std::string& map) const {
   char* error = nullptr;
   EXPECT_EQ(sqlite3_exec(file, sql.c_str(), nullptr, nullptr, &error), SQLITE_OK) << error;
   sqlite3_close(file);
+}
+
+void EngineTest::DamageSurfaceTile(const TileKey& key) const {
+  Sql("UPDATE derived_surface_tile SET bytes = CAST(substr(bytes, 1, 40) || x'5a5a' || "
+      "substr(bytes, 43) AS BLOB) WHERE (level, x, y) = (" +
+      std::to_string(key.level) + ", " + std::to_string(key.x) + ", " + std::to_string(key.y) +
+      ")");
 }
 
 }  // namespace strata::testing

@@ -83,6 +83,9 @@ class EngineTest : public ::testing::Test {
   // Changes a map's file behind the engine's back, which must be closed.
   void Sql(const std::string& sql, const std::string& map = kMapName) const;
 
+  // Spoils a served tile; the engine must be closed.
+  void DamageSurfaceTile(const TileKey& key) const;
+
   TempDir directory_;
   std::unique_ptr<api::Database> database_;
 };

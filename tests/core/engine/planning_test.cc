@@ -1,4 +1,6 @@
 // Profiles, plans and samples on the tiles; world_planning_test.cc has whole worlds.
+#include <vector>
+
 #include "absl/status/status.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,6 +11,8 @@
 
 namespace strata::testing {
 namespace {
+
+using ::testing::HasSubstr;
 
 class EnginePlanningTest : public EngineTest {};
 
@@ -49,6 +53,52 @@ TEST_F(EnginePlanningTest, PlansAndSamplesOnTheTiles) {
   STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult none, db().planning().PlanPath({}, kMapName, query));
   EXPECT_EQ(none.reason, PlanReason::kStartNotOnSurface);
   EXPECT_EQ(none.epoch, 1U);
+}
+
+// A plane of 20 tiles of 12.8 m in a row, the third of them damaged.
+TEST_F(EnginePlanningTest, OnlyWhatNeedsADamagedTileIsDataLoss) {
+  MakeMap();
+  PointCloud floor;
+  for (double x = 0.0; x < 256.0; x += 0.05) {
+    for (double y = 0.0; y < 6.0; y += 0.05) {
+      floor.points.emplace_back(static_cast<float>(x + 0.02), static_cast<float>(y + 0.02), 0.0F);
+    }
+  }
+  STRATA_ASSERT_OK(Upload(db(), HeaderOf({"run", 1}, floor, PoseAt(0, 0)), floor, 40'000));
+  WaitIntegrated(db());
+  const TileKey damaged{0, 2, 0};
+  const auto plan = [&](double from_x_m, double to_x_m) {
+    PlanQuery query;
+    query.from = {.x_m = from_x_m, .y_m = 3.0};
+    query.to = {.x_m = to_x_m, .y_m = 3.0};
+    return db().planning().PlanPath({}, kMapName, query);
+  };
+  const auto sample = [&](const std::vector<Eigen::Vector2d>& places) {
+    return db().planning().SampleSurfaces({}, kMapName, places);
+  };
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult sound, plan(5.0, 250.0));
+  EXPECT_TRUE(sound.found()) << sound.message;
+  Close();
+  DamageSurfaceTile(damaged);
+  Reopen();
+  const auto data_loss =
+      StatusIs(absl::StatusCode::kDataLoss,
+               HasSubstr("tile 0/2/0 is damaged, a rebuild of the map mends it"));
+  for (int i = 0; i < 2; ++i) {  // a failure leaves nothing behind that changes later answers
+    EXPECT_THAT(plan(5.0, 250.0), data_loss);
+    EXPECT_THAT(plan(30.0, 100.0), data_loss);
+    EXPECT_THAT(plan(250.0, 30.0), data_loss);
+    STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult elsewhere, plan(100.0, 250.0));
+    EXPECT_TRUE(elsewhere.found()) << elsewhere.message;
+    EXPECT_THAT(sample({{30.0, 3.0}}), data_loss);
+    STRATA_ASSERT_OK_AND_ASSIGN(const auto columns, sample({{20.0, 3.0}, {45.0, 3.0}}));
+    EXPECT_EQ(columns.at(0).surfaces.size(), 1U);
+    EXPECT_EQ(columns.at(1).surfaces.size(), 1U);
+  }
+  EXPECT_EQ(RunJob(db(), "rebuild").state, JobState::kSucceeded);
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult mended, plan(5.0, 250.0));
+  EXPECT_EQ(mended.waypoints, sound.waypoints);
+  STRATA_EXPECT_OK(sample({{30.0, 3.0}}));
 }
 
 }  // namespace

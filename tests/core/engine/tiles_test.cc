@@ -71,6 +71,41 @@ TEST_F(EngineTilesTest, FetchSendsOnlyWhatChangedOrIsGone) {
   }
 }
 
+TEST_F(EngineTilesTest, ADamagedTileIsMarkedAndTheOthersAreServed) {
+  MakeMap();
+  UploadRooms(4);
+  WaitIntegrated(db());
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto infos, db().tiles().List({}, kMapName, {}));
+  ASSERT_GT(infos.size(), 3U);
+  const api::TileInfo damaged = infos[1];
+  const auto before = AllTiles(db());
+  Close();
+  DamageSurfaceTile(damaged.key);
+  Reopen();
+  const auto fetch = [&](const std::vector<api::HeldTile>& held) {
+    std::map<TileKey, api::TileUpdate> updates;
+    STRATA_EXPECT_OK(db().tiles().Fetch({}, kMapName, {}, held, [&](const api::TileUpdate& u) {
+      updates[u.tile.key] = u;
+      return absl::OkStatus();
+    }));
+    return updates;
+  };
+  const auto updates = fetch({});
+  EXPECT_EQ(updates.size(), infos.size());
+  for (const auto& [key, update] : updates) {
+    const bool whole = key != damaged.key;
+    EXPECT_EQ(update.kind, whole ? api::TileUpdate::Kind::kNew : api::TileUpdate::Kind::kDamaged);
+    EXPECT_EQ(update.tile.bytes, whole ? before.at(key) : "");
+  }
+  EXPECT_EQ(updates.at(damaged.key).tile.version, damaged.version);
+  // Whoever has it whole is not told; whoever has an old one is.
+  EXPECT_FALSE(fetch({{damaged.key, damaged.version}}).contains(damaged.key));
+  EXPECT_EQ(fetch({{damaged.key, damaged.version + 1}}).at(damaged.key).kind,
+            api::TileUpdate::Kind::kDamaged);
+  EXPECT_EQ(RunJob(db(), "rebuild").state, JobState::kSucceeded);
+  EXPECT_EQ(fetch({}).at(damaged.key).kind, api::TileUpdate::Kind::kNew);
+}
+
 TEST_F(EngineTilesTest, AStreamKeepsToTheStateItBeganWith) {
   MakeMap();
   UploadRooms(4);
