@@ -29,6 +29,7 @@ using Action = std::function<absl::Status(Context&)>;
 struct Commands {
   CLI::App& root;
   Action selected;
+  bool creates = false;  // the chosen verb may be the first in a directory
 
   // `example` appears below the --help of a noun or a verb.
   CLI::App* Noun(const std::string& name,

@@ -1,7 +1,11 @@
 #include "client/cli/connect.h"
 
+#include <filesystem>
 #include <memory>
+#include <system_error>
 
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
 #include <glog/logging.h>
 
 #include "client/sdk/client.h"
@@ -11,6 +15,11 @@ namespace strata::cli {
 
 absl::StatusOr<std::unique_ptr<api::Database>> OpenDatabase(const Target& target) {
   if (!target.embedded.empty()) {
+    std::error_code error;
+    if (!target.make_directory && !std::filesystem::exists(target.embedded, error)) {
+      return absl::NotFoundError(absl::StrCat(
+          "directory ", target.embedded, " does not exist; map create makes it with a first map"));
+    }
     // What the engine does not say through a call (a map that cannot be opened), as plain talk.
     FLAGS_logtostderr = true;
     FLAGS_log_prefix = false;

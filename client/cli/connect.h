@@ -13,7 +13,8 @@ namespace strata::cli {
 
 struct Target {
   std::string server = "127.0.0.1:50051";
-  std::string embedded;  // a directory: the database runs in this process
+  std::string embedded;         // a directory: the database runs in this process
+  bool make_directory = false;  // if there is none; else that is NOT_FOUND
 };
 
 absl::StatusOr<std::unique_ptr<api::Database>> OpenDatabase(const Target& target);

@@ -130,6 +130,7 @@ int Main(int argc, char** argv) {
     std::cerr << UsageMessage(root, error) << std::endl;
     return kExitUsage;
   }
+  options.target.make_directory = commands.creates;
   return Run(options, commands.selected);
 }
 

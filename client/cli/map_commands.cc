@@ -70,6 +70,7 @@ void AddCreate(Commands& commands, CLI::App* noun, const std::shared_ptr<MapOpti
                     "Create a map",
                     "strata map create campus --cell-size 0.1",
                     [options](Context& context) { return Create(context, *options); });
+  create->parse_complete_callback([&commands] { commands.creates = true; });
   AddMapName(create, options->map);
   MapParameters& parameters = options->parameters;
   create->add_option("--cell-size", parameters.mls.cell_size_m, "Edge of a cell [m]")

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -99,22 +99,63 @@ absl::StatusOr<std::vector<ScanSource>> FindScans(const ImportOptions& options, 
   return ListScans({options.paths.begin(), options.paths.end()}, list);
 }
 
-absl::StatusOr<std::set<std::uint64_t>> SequencesThere(Context& context,
-                                                       const ImportOptions& options) {
-  std::set<std::uint64_t> sequences;
+// What the trajectory has, by sequence.
+using ScansThere = std::map<std::uint64_t, ScanHeader>;
+
+absl::StatusOr<ScansThere> FindScansThere(Context& context, const ImportOptions& options) {
+  ScansThere there;
   api::ScanFilter filter;
   filter.trajectory = options.trajectory;
   STRATA_RETURN_IF_ERROR(
       context.database.scans().List(context.call, options.map, filter, [&](const ScanInfo& info) {
-        sequences.insert(info.header.id.sequence);
+        there.emplace(info.header.id.sequence, info.header);
         return absl::OkStatus();
       }));
-  return sequences;
+  return there;
+}
+
+// Whether the file cannot be what is there, as far as its time and pose tell.
+bool Differs(const ScanSource& scan, const ScanHeader& there) {
+  constexpr double kRounding = 1e-6;
+  return absl::ToUnixMicros(scan.time.value_or(absl::UnixEpoch())) !=
+             absl::ToUnixMicros(there.time) ||
+         (scan.pose_status.ok() && !scan.T_map_scan.isApprox(there.T_map_scan, kRounding));
+}
+
+// Scans without poses and times are told apart by the points of the first one.
+bool HasOtherPoints(const ScanSource& scan, const ScanHeader& there) {
+  const absl::StatusOr<PointCloud> cloud = ReadScan(scan.path, scan.format);
+  return cloud.ok() && cloud->size() != there.point_count;
+}
+
+// Folders of the same name have the same trajectory unless it is given: what is skipped then is
+// not what the map has.
+void WarnOfOtherScans(const std::vector<ScanSource>& scans,
+                      const ScansThere& there,
+                      const ImportOptions& options,
+                      Output& output) {
+  std::size_t skipped = 0;
+  std::size_t other = 0;
+  for (const ScanSource& scan : scans) {
+    const auto it = there.find(scan.sequence);
+    if (it == there.end()) continue;
+    const bool first = skipped++ == 0;
+    if (Differs(scan, it->second) || (first && HasOtherPoints(scan, it->second))) ++other;
+  }
+  if (other == 0) return;
+  output.Talk(absl::StrCat("warning: trajectory ",
+                           options.trajectory,
+                           " has other scans under these numbers (",
+                           other,
+                           " of ",
+                           skipped,
+                           " skipped files differ in time, pose or points); --trajectory NAME "
+                           "uploads these as a run of their own"));
 }
 
 // Those scans that have a pose and are not there yet.
 std::vector<UploadSource> SourcesOf(const std::vector<ScanSource>& scans,
-                                    const std::set<std::uint64_t>& there,
+                                    const ScansThere& there,
                                     const ImportOptions& options,
                                     Summary& summary) {
   std::vector<UploadSource> sources;
@@ -269,12 +310,13 @@ absl::Status Import(Context& context, ImportOptions options) {
     options.trajectory = TrajectoryOf(options.paths.front());
   }
   STRATA_ASSIGN_OR_RETURN(std::vector<ScanSource> scans, FindScans(options, context.output));
-  STRATA_ASSIGN_OR_RETURN(const std::set<std::uint64_t> there, SequencesThere(context, options));
+  STRATA_ASSIGN_OR_RETURN(const ScansThere there, FindScansThere(context, options));
   Summary summary;
   if (options.level) {
     STRATA_ASSIGN_OR_RETURN(summary.level_rad, LevelTrajectory(scans));
     context.output.Talk(absl::StrFormat("levelled by %.4f rad", *summary.level_rad));
   }
+  WarnOfOtherScans(scans, there, options, context.output);
   summary.files = scans.size();
   const std::vector<UploadSource> sources = SourcesOf(scans, there, options, summary);
   Upload(context, options, sources, summary);

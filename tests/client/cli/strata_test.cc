@@ -22,6 +22,7 @@ namespace {
 
 using nlohmann::json;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class StrataTest : public ::testing::Test {
  protected:
@@ -40,6 +41,11 @@ class StrataTest : public ::testing::Test {
     std::filesystem::create_directories(path.parent_path());
     std::ofstream(path, std::ios::binary) << bytes;
     return path.string();
+  }
+  static std::string Contents(const std::string& file) {
+    std::ostringstream contents;
+    contents << std::ifstream(file, std::ios::binary).rdbuf();
+    return contents.str();
   }
   // A drive over a floor between walls as scans/scan0.pcd … and poses.txt (index-tum, exact).
   void WriteDrive(int scans) {
@@ -151,10 +157,97 @@ TEST_F(StrataTest, OutputThatCannotBeWrittenIsAFailure) {
 }
 
 TEST_F(StrataTest, UnknownMapExitsWithOneAndKeepsStdoutEmpty) {
+  RunOk({"map", "create", "m"});
   const Ran ran = Run({"map", "show", "nowhere"});
   EXPECT_EQ(ran.exit_code, 1);
   EXPECT_EQ(ran.out, "");
   EXPECT_THAT(ran.err, HasSubstr("nowhere"));
+}
+
+TEST_F(StrataTest, OnlyMapCreateMakesTheDirectory) {
+  for (const std::vector<std::string>& words : {std::vector<std::string>{"map", "list"},
+                                                {"map", "show", "m"},
+                                                {"map", "delete", "m"},
+                                                {"scan", "list", "m"}}) {
+    const Ran ran = Run(words);
+    EXPECT_EQ(ran.exit_code, 1);
+    EXPECT_EQ(ran.out, "");
+    EXPECT_THAT(ran.err, HasSubstr("directory " + database_ + " does not exist; map create"));
+    EXPECT_FALSE(std::filesystem::exists(database_));
+  }
+  RunOk({"map", "create", "m"});
+  EXPECT_EQ(RunOk({"map", "list"}).size(), 1U);
+}
+
+TEST_F(StrataTest, MapsThatCannotBeOpenedAreNamedAndNotDeleted) {
+  RunOk({"map", "create", "m"});
+  const std::string file = Write("db/notes.strata", "my notes");
+  const Ran ran = Run({"map", "list"});
+  EXPECT_EQ(ran.exit_code, 0);
+  EXPECT_EQ(json::parse(ran.out).size(), 1U);
+  EXPECT_THAT(ran.err, HasSubstr("map=notes not opened: notes.strata: "));
+  const Ran deleted = Run({"map", "delete", "notes"});
+  EXPECT_EQ(deleted.exit_code, 1);
+  EXPECT_THAT(deleted.err, HasSubstr("notes.strata is not a Strata map but no database file"));
+  EXPECT_EQ(Contents(file), "my notes");
+}
+
+TEST_F(StrataTest, ADamagedTileIsNamedAndTheOthersAreDrawnAndExported) {
+  WriteDrive(3);
+  RunOk({"map", "create", "m", "--cell-size", "0.05"});
+  Import({"--align", "off"});
+  const std::size_t tiles = RunOk({"tile", "list", "m"}).size();
+  ASSERT_GT(tiles, 2U);
+  const std::string served = (dir_.path() / "tile").string();
+  RunOk({"tile", "get", "m", "0/0/0", "--out", served});
+  const std::string map_file = database_ + "/m.strata";
+  std::string bytes = Contents(map_file);
+  const std::size_t at = bytes.find(Contents(served).substr(0, 64));
+  ASSERT_NE(at, std::string::npos);
+  bytes[at + 60] ^= 1;
+  Write("db/m.strata", bytes);
+
+  const std::string png = (dir_.path() / "map.png").string();
+  const std::string ply = (dir_.path() / "map.ply").string();
+  const std::string sentence =
+      "error: 1 tile is damaged and left out: 0/0/0; map rebuild m mends it";
+  const Ran drawn = Run({"map", "render", "m", png, "--level", "0"});
+  EXPECT_EQ(drawn.exit_code, 1);
+  EXPECT_THAT(drawn.err, HasSubstr(sentence));
+  EXPECT_EQ(json::parse(drawn.out).at("tiles"), tiles - 1);
+  EXPECT_GT(std::filesystem::file_size(png), 5000U);
+  const std::vector<std::string> mesh = {"map", "export", "m", "--format", "ply", "--out", ply};
+  const Ran written = Run(mesh);
+  EXPECT_EQ(written.exit_code, 1);
+  EXPECT_THAT(written.err, HasSubstr(sentence));
+  const auto vertices = json::parse(written.out).at("vertices").get<std::size_t>();
+  EXPECT_GT(vertices, 1000U);
+  RunOk({"map", "rebuild", "m"});
+  EXPECT_GT(RunOk(mesh).at("vertices").get<std::size_t>(), vertices);
+}
+
+TEST_F(StrataTest, ImportWarnsWhenTheTrajectoryHasOtherScans) {
+  WriteDrive(2);
+  RunOk({"map", "create", "m"});
+  const auto import = [&](const std::string& run, bool poses) {
+    std::filesystem::create_directories(dir_.path() / run / "walk");
+    std::filesystem::copy(scans_,
+                          dir_.path() / run / "walk",
+                          std::filesystem::copy_options::recursive |
+                              std::filesystem::copy_options::overwrite_existing);
+    std::vector<std::string> words = {
+        "scan", "import", "m", (dir_.path() / run / "walk").string(), "--align", "off"};
+    if (poses) words.insert(words.end(), {"--poses", poses_});
+    const Ran ran = Run(words);
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    return ran.err;
+  };
+  const auto warned = HasSubstr("warning: trajectory walk has other scans under these numbers (");
+  EXPECT_THAT(import("monday", false), Not(warned));
+  EXPECT_THAT(import("monday", false), Not(warned));
+  EXPECT_THAT(import("tuesday", true), warned);
+  Write("scans/scan0.pcd", Contents(scans_ + "/scan1.pcd"));
+  EXPECT_THAT(import("wednesday", false), warned);
 }
 
 TEST_F(StrataTest, GlobalOptionsWorkBeforeAndAfterTheVerb) {
