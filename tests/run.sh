@@ -45,7 +45,7 @@ tests/run_sanitizers.sh
 
 if [[ "${1:-}" == --full ]]; then
   stage "clang-tidy"
-  tests/run_tidy.sh
+  python3 tests/check_clang.py --tidy
 
   stage "clang build"
   cmake --preset dev >/dev/null
