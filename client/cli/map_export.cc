@@ -81,6 +81,7 @@ absl::StatusOr<Geometry> MeshOf(Context& context,
                           FetchTiles(context, options.map, options.level));
   damage = fetched.damage;
   std::vector<const SurfaceTile*> pointers;
+  pointers.reserve(fetched.tiles.size());
   for (const SurfaceTile& tile : fetched.tiles) {
     pointers.push_back(&tile);
   }

@@ -186,6 +186,7 @@ std::vector<UploadResult> UploadScans(api::Database& database,
                                       const std::function<void(const UploadProgress&)>& report) {
   Uploader uploader(database, call, map, sources);
   std::vector<std::thread> threads;
+  threads.reserve(static_cast<std::size_t>(workers));
   for (int i = 0; i < workers; ++i) {
     threads.emplace_back([&uploader] { uploader.Work(); });
   }

@@ -20,7 +20,7 @@ AttemptContext::AttemptContext(Connection& connection, const api::Call& call)
 
 absl::Status StatusOf(const grpc::Status& status, const api::Call& call) {
   if (status.ok()) return absl::OkStatus();
-  if (const absl::Status stopped = call.stop.status(); !stopped.ok()) return stopped;
+  if (absl::Status stopped = call.stop.status(); !stopped.ok()) return stopped;
   return translate::FromGrpcStatus(status);
 }
 

@@ -95,7 +95,8 @@ bool InRange(const Numbers& n) {
   const auto is_code = [](std::int64_t code) { return code >= 0 && code <= 255; };
   return n.z_min >= -kMaxZTicks - 1 && n.z_min <= n.z_max && n.z_max <= kMaxZTicks &&
          is_code(n.top_sigma) && is_code(n.lowest_code) && is_code(n.middle_code) && n.count >= 0 &&
-         n.count <= Patch::kMaxCount && n.middle_ticks >= 0 && n.middle_ticks <= 2 * kMaxZTicks;
+         n.count <= Patch::kMaxCount && n.middle_ticks >= 0 &&
+         n.middle_ticks <= 2 * std::int64_t{kMaxZTicks};
 }
 
 // Heights, top and count of a patch; then what its shape needs of the other measurements.

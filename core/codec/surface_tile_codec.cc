@@ -46,8 +46,9 @@ struct Codes {
 
 // Rounds to nearest; |value| < 2^30.
 std::int32_t Rounded(double value) {
-  constexpr double kShift = 1 << 30;  // makes it positive, so that truncating rounds down
-  return static_cast<std::int32_t>(static_cast<std::int64_t>(value + kShift + 0.5) - (1 << 30));
+  // Makes it positive, so that truncating rounds down; and a half, so that it rounds to nearest.
+  constexpr double kShift = (1 << 30) + 0.5;
+  return static_cast<std::int32_t>(static_cast<std::int64_t>(value + kShift) - (1 << 30));
 }
 
 std::int32_t LengthCode(float metres) {

@@ -46,8 +46,7 @@ absl::Status SyncDirectory(const fs::path& path) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0) return ErrnoStatus("cannot open directory", path);
   const int synced = ::fsync(fd);
-  const absl::Status status =
-      synced == 0 ? absl::OkStatus() : ErrnoStatus("cannot sync directory", path);
+  absl::Status status = synced == 0 ? absl::OkStatus() : ErrnoStatus("cannot sync directory", path);
   ::close(fd);
   return status;
 }

@@ -89,7 +89,7 @@ absl::Status Integrator::Commit(Durability durability,
   const double cell_size_m = core_.info().parameters.mls.cell_size_m;
   const std::uint64_t floor = core_.snapshots().Floor();
   MapClock clock;
-  const absl::Status committed =
+  absl::Status committed =
       core_.writer().Run(durability, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
         STRATA_RETURN_IF_ERROR(WriteTileChange(writer, change, cell_size_m, floor));
         STRATA_RETURN_IF_ERROR(decision(writer));

@@ -246,7 +246,7 @@ absl::Status JobBoard::Finish(std::uint64_t id, const absl::Status& ended, Runni
   }
   info.updated = absl::FromUnixMicros(absl::ToUnixMicros(absl::Now()));
   // Durable before anybody sees that it ended; if that cannot be, it did not.
-  if (const absl::Status stored = Store(info, Durability::kFull, Stop()); !stored.ok()) {
+  if (absl::Status stored = Store(info, Durability::kFull, Stop()); !stored.ok()) {
     STRATA_RETURN_IF_ERROR(Requeue(id));
     return stored;
   }

@@ -106,7 +106,7 @@ absl::Status EngineMaps::Delete(const api::Call& call, absl::string_view name) {
   STRATA_RETURN_IF_ERROR(ValidateName("map name", name));
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Withdraw(name));
   if (map != nullptr) map->Close();
-  const absl::Status removed = directory_.RemoveFile(name);
+  absl::Status removed = directory_.RemoveFile(name);
   absl::MutexLock lock(&mutex_);
   maps_.erase(std::string(name));
   return removed;

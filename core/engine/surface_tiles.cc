@@ -73,8 +73,8 @@ SurfaceTile SurfaceTileMaker::Annotated(const TileKey& key) const {
   SurfaceNeighbourhood neighbours{};
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) {
-      neighbours[static_cast<std::size_t>((dy + 1) * 3 + dx + 1)] =
-          plain_.at({0, key.x + dx, key.y + dy}).get();
+      const int place = (dy + 1) * 3 + dx + 1;
+      neighbours[static_cast<std::size_t>(place)] = plain_.at({0, key.x + dx, key.y + dy}).get();
     }
   }
   AnnotateTraversability(tile, neighbours, parameters_.mls.cell_size_m, LimitsOf(options_.profile));

@@ -80,7 +80,7 @@ absl::Status TruthCheck::Run(Report report) {
       report(absl::StrCat("scan ", posed->scan.header.id.ToString(), ": ", what));
     });
   }
-  const absl::Status constraints = reader->ListConstraints().status();
+  absl::Status constraints = reader->ListConstraints().status();
   if (!absl::IsDataLoss(constraints)) return constraints;
   report(std::string(constraints.message()));
   return absl::OkStatus();

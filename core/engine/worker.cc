@@ -56,7 +56,7 @@ absl::Status Worker::Execute(const Stop& stop, Command command) {
   if (closed_) return absl::CancelledError("the map is being closed");
   tasks_.push_back(&task);
   while (!mutex_.AwaitWithTimeout(absl::Condition(&task.done), kStopPoll)) {
-    const absl::Status waiting = stop.status();
+    absl::Status waiting = stop.status();
     if (waiting.ok() || task.begun) continue;
     tasks_.erase(std::find(tasks_.begin(), tasks_.end(), &task));
     return waiting;

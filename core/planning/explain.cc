@@ -176,6 +176,7 @@ class Frontier {
     }
     std::sort(ranked.begin(), ranked.end());
     std::vector<int> directions;
+    directions.reserve(ranked.size());
     for (const auto& [progress, k] : ranked) directions.push_back(k);
     return directions;
   }

@@ -33,6 +33,7 @@ std::vector<std::size_t> SelectNeighbours(std::span<const Pose> T_map_scans,
   });
   if (near.size() > static_cast<std::size_t>(policy.max_scans)) near.resize(policy.max_scans);
   std::vector<std::size_t> chosen;
+  chosen.reserve(near.size());
   for (const auto& [distance_m, index] : near) chosen.push_back(index);
   std::sort(chosen.begin(), chosen.end());
   return chosen;

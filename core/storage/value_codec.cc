@@ -91,7 +91,8 @@ class ByteReader {
 };
 
 constexpr std::size_t kPoseBytes = 12 * sizeof(double);
-constexpr std::size_t kHeaderBytes = 8 + kPoseBytes + 12 + 1 + 4 * 8 + 1 + 8 + 4 + 4 + 1;
+constexpr std::size_t kHeaderBytes =
+    8 + kPoseBytes + 12 + 1 + 4 * sizeof(double) + 1 + 8 + 4 + 4 + 1;
 
 void PutPose(const Pose& pose, ByteWriter& writer) {
   for (int row = 0; row < 3; ++row) {

@@ -45,7 +45,7 @@ absl::Status List(api::Database& db,
   const auto collect = [&out, &sink](const ScanInfo& scan) {
     *out.add_scans() = ToProto(scan);
     if (out.scans_size() < kMaxScansPerMessage) return absl::OkStatus();
-    const absl::Status sent = sink(out);
+    absl::Status sent = sink(out);
     out.clear_scans();
     return sent;
   };

@@ -38,7 +38,7 @@ absl::Status SqliteWriter::Commit(Durability durability, absl::FunctionRef<absl:
 absl::Status SqliteWriter::Part(absl::FunctionRef<absl::Status()> body) {
   STRATA_RETURN_IF_ERROR(broken_);
   STRATA_RETURN_IF_ERROR(database_.Execute("SAVEPOINT part"));
-  const absl::Status done = body();
+  absl::Status done = body();
   if (!done.ok() && !database_.Execute("ROLLBACK TO part").ok()) {
     broken_ = done;
     return done;
@@ -85,7 +85,7 @@ absl::Status SqliteWriter::PutScan(const ScanRecord& scan) {
   const Eigen::Vector3d high = has_box ? Eigen::Vector3d(scan.box_scan.max().cast<double>())
                                        : Eigen::Vector3d(Eigen::Vector3d::Zero());
   const std::string header = EncodeScanHeader(scan.header);
-  const absl::Status put = RunSql(
+  absl::Status put = RunSql(
       "INSERT INTO truth_scan (number, trajectory, sequence, time_us, header, points, state, "
       "upload, chunks, has_points, point_bytes, has_box, min_x, min_y, min_z, max_x, max_y, max_z, "
       "content_hash, message) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, "
