@@ -96,9 +96,9 @@ Pose Aligner::Guess(const ScanRecord& scan) const {
                     header.T_map_scan);
 }
 
-Aligner::Features Aligner::Keep(const ScanRecord& scan, const MlsMap& local_map) {
+Aligner::Features Aligner::Keep(const ScanRecord& scan, const MlsMap& local_map, int samples) {
   ScanFeatureOptions options;
-  options.sample_count = kSamples;
+  options.sample_count = samples;
   options.sensor_origin = scan.header.sensor_origin.cast<double>();
   auto features = std::make_shared<const ScanFeatures>(ScanFeatures::FromMap(local_map, options));
   features_.Put(scan.number, features, features->memory_bytes());
@@ -111,7 +111,7 @@ absl::StatusOr<Aligner::Features> Aligner::FeaturesOf(ScanNumber number,
   if (Features held = features_.Find(number); held != nullptr) return held;
   STRATA_ASSIGN_OR_RETURN(const PosedScan posed, reader.GetScan(number, 0));
   STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(posed.scan));
-  return Keep(posed.scan, local_map);
+  return Keep(posed.scan, local_map, 0);
 }
 
 absl::StatusOr<Aligner::Neighbourhood> Aligner::NeighboursOf(const Pose& guess,
@@ -156,7 +156,7 @@ absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
                                          ScanSource& source) {
   Placement placement;
   placement.T_map_scan = scan.header.T_map_scan;
-  const Features own = Keep(scan, local_map);
+  const Features own = Keep(scan, local_map, kSamples);
   if (scan.header.alignment == Alignment::kOff) {
     placement.report.message = "alignment off: pose as uploaded";
     return placement;

@@ -71,7 +71,8 @@ class Aligner {
                                               const Placement& placement,
                                               const Matrix6d& information,
                                               std::vector<std::size_t> partners) const;
-  Features Keep(const ScanRecord& scan, const MlsMap& local_map);
+  // `samples`: 0 for a scan that others are matched to, and that is not matched itself.
+  Features Keep(const ScanRecord& scan, const MlsMap& local_map, int samples);
 
   // By commit order.
   std::vector<PlacedEntry> scans_;
