@@ -16,9 +16,9 @@
 #include "core/common/random.h"
 #include "core/geometry/plane_fit.h"
 #include "core/geometry/primitives.h"
-#include "core/planes/global_planes.h"
 #include "core/planes/moments.h"
 #include "core/planes/scan_planes.h"
+#include "core/planes/shared_planes.h"
 
 namespace strata {
 namespace {
@@ -57,13 +57,13 @@ std::vector<PosedEdge> EdgesInMap(std::span<const PosedPlanes> scans) {
 
 class EdgePlaneFinder {
  public:
-  EdgePlaneFinder(std::span<const PosedEdge> edges, const GlobalPlaneOptions& options)
+  EdgePlaneFinder(std::span<const PosedEdge> edges, const SharedPlaneOptions& options)
       : edges_(edges), options_(options), random_(options.seed) {
     double sum = 0.0;
     for (const PosedEdge& edge : edges) cumulated_m_.push_back(sum += edge.edge->length_m);
   }
 
-  std::vector<GlobalPlane> Run() {
+  std::vector<SharedPlane> Run() {
     std::vector<Candidate> candidates;
     if (edges_.size() < kMinLines) return {};
     for (int i = 0; i < options_.hypotheses; ++i) {
@@ -74,7 +74,7 @@ class EdgePlaneFinder {
       return a.value_m > b.value_m;
     });
     std::vector<bool> used(edges_.size(), false);
-    std::vector<GlobalPlane> planes;
+    std::vector<SharedPlane> planes;
     for (Candidate& candidate : candidates) {
       if (NewLength(candidate, used) < kMinNewShare * candidate.value_m) continue;
       DropScansThatDoNotFit(candidate);
@@ -225,34 +225,34 @@ class EdgePlaneFinder {
     return lines.size();
   }
 
-  GlobalPlane PlaneOf(const Candidate& candidate) const {
-    GlobalPlane global{.kind = GlobalPlaneKind::kEdges,
-                       .plane = candidate.plane,
-                       .supports = {},
+  SharedPlane PlaneOf(const Candidate& candidate) const {
+    SharedPlane shared{.plane = candidate.plane,
+                       .from_edges = true,
+                       .views = {},
                        .support_value = candidate.value_m};
     double disagreement = 0.0;
     for (const std::uint32_t i : candidate.support) {
       disagreement += edges_[i].edge->length_m / candidate.value_m *
                       std::pow(RmsOf(edges_[i], candidate.plane), 2);
     }
-    std::map<std::size_t, GlobalPlane::Support> supports;
+    std::map<std::size_t, SharedPlane::View> views;
     for (const std::uint32_t i : candidate.support) {
       const EdgeFeature& edge = *edges_[i].edge;
-      GlobalPlane::Support& support =
-          supports
+      SharedPlane::View& view =
+          views
               .try_emplace(
                   edges_[i].scan,
-                  GlobalPlane::Support{.scan = edges_[i].scan, .moments = Eigen::Matrix4d::Zero()})
+                  SharedPlane::View{.scan = edges_[i].scan, .moments = Eigen::Matrix4d::Zero()})
               .first->second;
-      support.moments += InformationOf(edge, disagreement);
-      support.weight += edge.length_m;
-      support.rms_m += edge.length_m * std::pow(RmsOf(edges_[i], candidate.plane), 2);
+      view.moments += InformationOf(edge, disagreement);
+      view.weight += edge.length_m;
+      view.rms_m += edge.length_m * std::pow(RmsOf(edges_[i], candidate.plane), 2);
     }
-    for (auto& [scan, support] : supports) {
-      support.rms_m = std::sqrt(support.rms_m / support.weight);
-      global.supports.push_back(support);
+    for (auto& [scan, view] : views) {
+      view.rms_m = std::sqrt(view.rms_m / view.weight);
+      shared.views.push_back(view);
     }
-    return global;
+    return shared;
   }
 
   Eigen::Matrix4d InformationOf(const EdgeFeature& edge, double disagreement) const {
@@ -270,15 +270,15 @@ class EdgePlaneFinder {
   }
 
   std::span<const PosedEdge> edges_;
-  const GlobalPlaneOptions& options_;
+  const SharedPlaneOptions& options_;
   SplitMix64 random_;
   std::vector<double> cumulated_m_;
 };
 
 }  // namespace
 
-std::vector<GlobalPlane> FindEdgePlanes(std::span<const PosedPlanes> scans,
-                                        const GlobalPlaneOptions& options) {
+std::vector<SharedPlane> FindEdgePlanes(std::span<const PosedPlanes> scans,
+                                        const SharedPlaneOptions& options) {
   const std::vector<PosedEdge> edges = EdgesInMap(scans);
   return EdgePlaneFinder(edges, options).Run();
 }

@@ -6,15 +6,15 @@
 #include <span>
 #include <vector>
 
-#include "core/planes/global_planes.h"
+#include "core/planes/shared_planes.h"
 
 namespace strata {
 
-// The planes of edges, see FindGlobalPlanes(). Beyond the thesis, a plane needs three different
+// The planes of edges, see FindSharedPlanes(). Beyond the thesis, a plane needs three different
 // lines (two are always nearly in some plane), and three times the support of the corridors beside
 // it (where there are edges everywhere, every corridor holds some).
-std::vector<GlobalPlane> FindEdgePlanes(std::span<const PosedPlanes> scans,
-                                        const GlobalPlaneOptions& options);
+std::vector<SharedPlane> FindEdgePlanes(std::span<const PosedPlanes> scans,
+                                        const SharedPlaneOptions& options);
 
 }  // namespace strata
 

@@ -15,10 +15,10 @@
 #include <Eigen/Core>
 
 #include "core/geometry/primitives.h"
-#include "core/planes/global_planes.h"
 #include "core/planes/moments.h"
 #include "core/planes/posed_patch.h"
 #include "core/planes/scan_planes.h"
+#include "core/planes/shared_planes.h"
 
 namespace strata {
 namespace {
@@ -74,28 +74,22 @@ Plane PlaneOf(const Eigen::Matrix4d& information, const Eigen::Vector3d& side) {
   return {.normal = -plane.normal, .distance = -plane.distance};
 }
 
-GlobalPlaneKind KindOf(const Eigen::Vector3d& normal) {
-  const double up = std::abs(normal.z());
-  if (up > 0.966) return GlobalPlaneKind::kFloor;
-  return up < 0.259 ? GlobalPlaneKind::kWall : GlobalPlaneKind::kSlope;
-}
-
 class PatchAssociation {
  public:
-  PatchAssociation(std::vector<PosedPatch> patches, const GlobalPlaneOptions& options)
+  PatchAssociation(std::vector<PosedPatch> patches, const SharedPlaneOptions& options)
       : patches_(std::move(patches)),
         options_(options),
         index_(patches_),
         taken_(patches_.size(), false),
         seen_by_(patches_.size(), 0) {}
 
-  std::vector<GlobalPlane> Run() {
+  std::vector<SharedPlane> Run() {
     std::vector<std::uint32_t> order(patches_.size());
     std::iota(order.begin(), order.end(), 0U);
     std::stable_sort(order.begin(), order.end(), [this](std::uint32_t a, std::uint32_t b) {
       return patches_[a].patch->area_m2 > patches_[b].patch->area_m2;
     });
-    std::vector<GlobalPlane> planes;
+    std::vector<SharedPlane> planes;
     for (const std::uint32_t seed : order) {
       if (taken_[seed]) continue;
       std::vector<std::uint32_t> group = Grow(seed);
@@ -174,7 +168,7 @@ class PatchAssociation {
     return static_cast<std::size_t>(std::unique(scans.begin(), scans.end()) - scans.begin());
   }
 
-  // Mean square of what the supports' distances to the plane exceed their own spread by.
+  // Mean square of what the patches' distances to the plane exceed their own spread by.
   double Disagreement(std::span<const std::uint32_t> group, const Plane& plane) const {
     double sum = 0.0;
     double weight = 0.0;
@@ -188,36 +182,35 @@ class PatchAssociation {
     return sum / weight;
   }
 
-  GlobalPlane PlaneOfGroup(std::span<const std::uint32_t> group) const {
-    GlobalPlane global;
+  SharedPlane PlaneOfGroup(std::span<const std::uint32_t> group) const {
+    SharedPlane shared;
     Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
     for (const std::uint32_t i : group) information += patches_[i].information;
-    global.plane = PlaneOf(information, patches_[group.front()].plane.normal);
-    global.kind = KindOf(global.plane.normal);
-    const double disagreement = Disagreement(group, global.plane);
-    std::map<std::size_t, GlobalPlane::Support> supports;
+    shared.plane = PlaneOf(information, patches_[group.front()].plane.normal);
+    const double disagreement = Disagreement(group, shared.plane);
+    std::map<std::size_t, SharedPlane::View> views;
     for (const std::uint32_t i : group) {
       const PosedPatch& p = patches_[i];
-      GlobalPlane::Support& support =
-          supports
+      SharedPlane::View& view =
+          views
               .try_emplace(p.scan,
-                           GlobalPlane::Support{.scan = p.scan, .moments = Eigen::Matrix4d::Zero()})
+                           SharedPlane::View{.scan = p.scan, .moments = Eigen::Matrix4d::Zero()})
               .first->second;
       const double weight = p.measurements / (p.variance_m2 + disagreement);
-      support.moments += weight / p.patch->moments(3, 3) * p.patch->moments;
-      support.weight += p.patch->area_m2;
-      support.rms_m += p.patch->area_m2 * std::pow(RmsDistance(p.information, global.plane), 2);
-      global.support_value += p.patch->area_m2;
+      view.moments += weight / p.patch->moments(3, 3) * p.patch->moments;
+      view.weight += p.patch->area_m2;
+      view.rms_m += p.patch->area_m2 * std::pow(RmsDistance(p.information, shared.plane), 2);
+      shared.support_value += p.patch->area_m2;
     }
-    for (auto& [scan, support] : supports) {
-      support.rms_m = std::sqrt(support.rms_m / support.weight);
-      global.supports.push_back(support);
+    for (auto& [scan, view] : views) {
+      view.rms_m = std::sqrt(view.rms_m / view.weight);
+      shared.views.push_back(view);
     }
-    return global;
+    return shared;
   }
 
   std::vector<PosedPatch> patches_;
-  const GlobalPlaneOptions& options_;
+  const SharedPlaneOptions& options_;
   PatchIndex index_;
   std::vector<bool> taken_;
   std::vector<std::uint32_t> seen_by_;  // the last seed that has this patch or refused it
@@ -226,8 +219,8 @@ class PatchAssociation {
 
 }  // namespace
 
-std::vector<GlobalPlane> FindPatchPlanes(std::span<const PosedPlanes> scans,
-                                         const GlobalPlaneOptions& options) {
+std::vector<SharedPlane> FindPatchPlanes(std::span<const PosedPlanes> scans,
+                                         const SharedPlaneOptions& options) {
   std::vector<PosedPatch> patches;
   for (std::size_t scan = 0; scan < scans.size(); ++scan) {
     for (const PlanePatch& patch : scans[scan].planes->patches) {

@@ -6,13 +6,13 @@
 #include <span>
 #include <vector>
 
-#include "core/planes/global_planes.h"
+#include "core/planes/shared_planes.h"
 
 namespace strata {
 
-// The planes of patches, see FindGlobalPlanes().
-std::vector<GlobalPlane> FindPatchPlanes(std::span<const PosedPlanes> scans,
-                                         const GlobalPlaneOptions& options);
+// The planes of patches, see FindSharedPlanes().
+std::vector<SharedPlane> FindPatchPlanes(std::span<const PosedPlanes> scans,
+                                         const SharedPlaneOptions& options);
 
 }  // namespace strata
 

@@ -11,9 +11,9 @@
 
 #include "core/geometry/pose.h"
 #include "core/geometry/primitives.h"
-#include "core/planes/global_planes.h"
 #include "core/planes/moments.h"
 #include "core/planes/scan_planes.h"
+#include "core/planes/shared_planes.h"
 
 namespace strata {
 namespace {
@@ -65,7 +65,7 @@ double ShareOn(const PosedPatch& a, const PosedPatch& b) {
 PosedPatch InMap(const PlanePatch& patch,
                  std::size_t scan,
                  const Pose& T_map_scan,
-                 const GlobalPlaneOptions& options) {
+                 const SharedPlaneOptions& options) {
   PosedPatch posed;
   posed.patch = &patch;
   posed.scan = scan;
@@ -100,7 +100,7 @@ double Overlap(const PosedPatch& a, const PosedPatch& b) {
   return area(a) <= area(b) ? ShareOn(a, b) : ShareOn(b, a);
 }
 
-bool FitsPlane(const PosedPatch& patch, const Plane& plane, const GlobalPlaneOptions& options) {
+bool FitsPlane(const PosedPatch& patch, const Plane& plane, const SharedPlaneOptions& options) {
   const double tilt_sigma = std::hypot(patch.tilt_sigma_rad, options.pose_sigma_rad);
   if (AngleBetween(patch.plane.normal, plane.normal) > kGate * tilt_sigma) return false;
   const double offset_sigma = std::hypot(

@@ -9,8 +9,8 @@
 
 #include "core/geometry/pose.h"
 #include "core/geometry/primitives.h"
-#include "core/planes/global_planes.h"
 #include "core/planes/scan_planes.h"
+#include "core/planes/shared_planes.h"
 
 namespace strata {
 
@@ -34,7 +34,7 @@ struct PosedPatch {
 PosedPatch InMap(const PlanePatch& patch,
                  std::size_t scan,
                  const Pose& T_map_scan,
-                 const GlobalPlaneOptions& options);
+                 const SharedPlaneOptions& options);
 
 // Share of the patch with the smaller footprint that lies on the other one when looked at along the
 // normal of that other one.
@@ -42,7 +42,7 @@ double Overlap(const PosedPatch& a, const PosedPatch& b);
 
 // True if a patch of this accuracy can lie in `plane` after an error of its pose as the options
 // allow; 3σ. The normals must point to the same side.
-bool FitsPlane(const PosedPatch& patch, const Plane& plane, const GlobalPlaneOptions& options);
+bool FitsPlane(const PosedPatch& patch, const Plane& plane, const SharedPlaneOptions& options);
 
 // True if two patches of one scan can be one plane: no pose is between them. 3σ.
 bool Coplanar(const PosedPatch& a, const PosedPatch& b);

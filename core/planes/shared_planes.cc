@@ -1,4 +1,4 @@
-#include "core/planes/global_planes.h"
+#include "core/planes/shared_planes.h"
 
 #include <algorithm>
 #include <span>
@@ -14,17 +14,17 @@
 namespace strata {
 namespace {
 
-void Append(std::vector<GlobalPlane> found, std::vector<GlobalPlane>& planes) {
-  std::stable_sort(found.begin(), found.end(), [](const GlobalPlane& a, const GlobalPlane& b) {
+void Append(std::vector<SharedPlane> found, std::vector<SharedPlane>& planes) {
+  std::stable_sort(found.begin(), found.end(), [](const SharedPlane& a, const SharedPlane& b) {
     return a.support_value > b.support_value;
   });
-  for (GlobalPlane& plane : found) planes.push_back(std::move(plane));
+  for (SharedPlane& plane : found) planes.push_back(std::move(plane));
 }
 
 }  // namespace
 
-absl::Status GlobalPlaneOptions::Validate() const {
-  OptionChecks checks("global planes");
+absl::Status SharedPlaneOptions::Validate() const {
+  OptionChecks checks("shared planes");
   checks.InRange("pose_sigma_m", pose_sigma_m, 0.0, 10.0);
   checks.InRange("pose_sigma_rad", pose_sigma_rad, 0.0, 0.3);
   checks.InRange("min_overlap", min_overlap, 0.0, 1.0);
@@ -39,9 +39,9 @@ absl::Status GlobalPlaneOptions::Validate() const {
   return checks.status();
 }
 
-std::vector<GlobalPlane> FindGlobalPlanes(std::span<const PosedPlanes> scans,
-                                          const GlobalPlaneOptions& options) {
-  std::vector<GlobalPlane> planes;
+std::vector<SharedPlane> FindSharedPlanes(std::span<const PosedPlanes> scans,
+                                          const SharedPlaneOptions& options) {
+  std::vector<SharedPlane> planes;
   Append(FindPatchPlanes(scans, options), planes);
   Append(FindEdgePlanes(scans, options), planes);
   return planes;

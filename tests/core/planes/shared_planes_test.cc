@@ -1,4 +1,4 @@
-#include "core/planes/global_planes.h"
+#include "core/planes/shared_planes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -66,9 +66,9 @@ std::vector<Pose> Disturbed(std::vector<Pose> poses, double m, double rad, std::
   return poses;
 }
 
-const GlobalPlane* PlaneNear(const std::vector<GlobalPlane>& planes, const Plane& truth, double m) {
-  for (const GlobalPlane& g : planes) {
-    if (g.kind != GlobalPlaneKind::kEdges && g.plane.normal.dot(truth.normal) > 0.999 &&
+const SharedPlane* PlaneNear(const std::vector<SharedPlane>& planes, const Plane& truth, double m) {
+  for (const SharedPlane& g : planes) {
+    if (!g.from_edges && g.plane.normal.dot(truth.normal) > 0.999 &&
         std::abs(g.plane.distance - truth.distance) < m) {
       return &g;
     }
@@ -90,33 +90,31 @@ const std::vector<Eigen::Vector3d>& AroundTheYard() {
   return places;
 }
 
-TEST(GlobalPlanesTest, FindsWallsAndFloorOfDisturbedScans) {
+TEST(SharedPlanesTest, FindsWallsAndFloorOfDisturbedScans) {
   const Views views = Look(Yard(), AroundTheYard(), 10);
-  const std::vector<GlobalPlane> planes =
-      FindGlobalPlanes(views.At(Disturbed(views.truth, 0.03, 0.005, 11)));
-  const GlobalPlane* floor = PlaneNear(planes, {.normal = {0, 0, 1}, .distance = 0.0}, 0.05);
+  const std::vector<SharedPlane> planes =
+      FindSharedPlanes(views.At(Disturbed(views.truth, 0.03, 0.005, 11)));
+  const SharedPlane* floor = PlaneNear(planes, {.normal = {0, 0, 1}, .distance = 0.0}, 0.05);
   ASSERT_NE(floor, nullptr);
-  EXPECT_EQ(floor->kind, GlobalPlaneKind::kFloor);
-  EXPECT_EQ(floor->supports.size(), 6U);
-  const GlobalPlane* wall = PlaneNear(planes, {.normal = {-1, 0, 0}, .distance = -8.0}, 0.05);
+  EXPECT_EQ(floor->views.size(), 6U);
+  const SharedPlane* wall = PlaneNear(planes, {.normal = {-1, 0, 0}, .distance = -8.0}, 0.05);
   ASSERT_NE(wall, nullptr);
-  EXPECT_EQ(wall->kind, GlobalPlaneKind::kWall);
-  EXPECT_GE(wall->supports.size(), 3U);
-  EXPECT_EQ(PlaneNear(planes, {.normal = {1, 0, 0}, .distance = 16.0}, 0.05)->supports.size(), 2U);
+  EXPECT_GE(wall->views.size(), 3U);
+  EXPECT_EQ(PlaneNear(planes, {.normal = {1, 0, 0}, .distance = 16.0}, 0.05)->views.size(), 2U);
 }
 
-TEST(GlobalPlanesTest, SupportsAreInformationAboutThePlane) {
+TEST(SharedPlanesTest, ViewsAreInformationAboutThePlane) {
   const Views views = Look(Yard(), AroundTheYard(), 20);
-  const GlobalPlaneOptions options;
-  const std::vector<GlobalPlane> planes = FindGlobalPlanes(views.At(views.truth), options);
+  const SharedPlaneOptions options;
+  const std::vector<SharedPlane> planes = FindSharedPlanes(views.At(views.truth), options);
   ASSERT_FALSE(planes.empty());
-  for (const GlobalPlane& g : planes) {
-    ASSERT_GE(g.supports.size(), 2U);
+  for (const SharedPlane& g : planes) {
+    ASSERT_GE(g.views.size(), 2U);
     double value = 0.0;
-    for (std::size_t i = 0; i < g.supports.size(); ++i) {
-      const GlobalPlane::Support& s = g.supports[i];
+    for (std::size_t i = 0; i < g.views.size(); ++i) {
+      const SharedPlane::View& s = g.views[i];
       if (i > 0) {
-        EXPECT_GT(s.scan, g.supports[i - 1].scan);
+        EXPECT_GT(s.scan, g.views[i - 1].scan);
       }
       value += s.weight;
       const Eigen::Matrix4d in_map = Moved(views.truth[s.scan], s.moments);
@@ -129,7 +127,7 @@ TEST(GlobalPlanesTest, SupportsAreInformationAboutThePlane) {
 }
 
 // Each has its own plane or none; no plane holds both.
-TEST(GlobalPlanesTest, KerbAndRampAndFloorStayApart) {
+TEST(SharedPlanesTest, KerbAndRampAndFloorStayApart) {
   Scene scene;
   scene.Add(Box({-40, -40, -1}, {4, 40, 0}));
   scene.Add(Box({4, -40, -1}, {14, 40, 0.08}));
@@ -138,49 +136,49 @@ TEST(GlobalPlanesTest, KerbAndRampAndFloorStayApart) {
   const Views views =
       Look(scene, {{0, -6, 1.5}, {0, 0, 1.5}, {1, 6, 1.5}, {-3, 3, 1.5}, {-5, -3, 1.5}}, 30);
   for (const std::uint64_t seed : {31, 32, 33}) {
-    const std::vector<GlobalPlane> planes =
-        FindGlobalPlanes(views.At(Disturbed(views.truth, 0.02, 0.003, seed)));
-    for (const GlobalPlane& g : planes) {
-      for (const GlobalPlane::Support& s : g.supports) {
+    const std::vector<SharedPlane> planes =
+        FindSharedPlanes(views.At(Disturbed(views.truth, 0.02, 0.003, seed)));
+    for (const SharedPlane& g : planes) {
+      for (const SharedPlane::View& s : g.views) {
         // At the true poses the support lies in one of the three surfaces, and all in the same.
         const MomentsFit fit = FitMoments(Moved(views.truth[s.scan], s.moments));
         EXPECT_LT(std::sqrt(fit.eigenvalues(0)), 0.025) << "seed " << seed;
       }
       Eigen::Matrix4d all = Eigen::Matrix4d::Zero();
-      for (const GlobalPlane::Support& s : g.supports) all += Moved(views.truth[s.scan], s.moments);
+      for (const SharedPlane::View& s : g.views) all += Moved(views.truth[s.scan], s.moments);
       EXPECT_LT(std::sqrt(FitMoments(all).eigenvalues(0)), 0.025)
-          << "seed " << seed << ", value " << g.support_value << ", supports " << g.supports.size();
+          << "seed " << seed << ", value " << g.support_value << ", views " << g.views.size();
     }
   }
 }
 
-TEST(GlobalPlanesTest, OppositeSidesOfAThinWallAreTwoPlanes) {
+TEST(SharedPlanesTest, OppositeSidesOfAThinWallAreTwoPlanes) {
   Scene scene;
   scene.Add(Box({-40, -40, -1}, {40, 40, 0}));
   scene.Add(Box({-6, -0.06, 0}, {6, 0.06, 3}));
   scene.Build();
   const Views views = Look(scene, {{-2, -5, 1.5}, {2, -5, 1.5}, {-2, 5, 1.5}, {2, 5, 1.5}}, 40);
-  const std::vector<GlobalPlane> planes = FindGlobalPlanes(views.At(views.truth));
-  const GlobalPlane* south = PlaneNear(planes, {.normal = {0, -1, 0}, .distance = 0.06}, 0.03);
-  const GlobalPlane* north = PlaneNear(planes, {.normal = {0, 1, 0}, .distance = 0.06}, 0.03);
+  const std::vector<SharedPlane> planes = FindSharedPlanes(views.At(views.truth));
+  const SharedPlane* south = PlaneNear(planes, {.normal = {0, -1, 0}, .distance = 0.06}, 0.03);
+  const SharedPlane* north = PlaneNear(planes, {.normal = {0, 1, 0}, .distance = 0.06}, 0.03);
   ASSERT_NE(south, nullptr);
   ASSERT_NE(north, nullptr);
-  EXPECT_EQ(south->supports.size(), 2U);
-  EXPECT_EQ(north->supports.size(), 2U);
+  EXPECT_EQ(south->views.size(), 2U);
+  EXPECT_EQ(north->views.size(), 2U);
 }
 
-TEST(GlobalPlanesTest, OneScanOrNoneGivesNone) {
+TEST(SharedPlanesTest, OneScanOrNoneGivesNone) {
   const Views views = Look(Yard(), {{0, 0, 1.5}}, 50);
-  EXPECT_TRUE(FindGlobalPlanes(views.At(views.truth)).empty());
-  EXPECT_TRUE(FindGlobalPlanes({}).empty());
+  EXPECT_TRUE(FindSharedPlanes(views.At(views.truth)).empty());
+  EXPECT_TRUE(FindSharedPlanes({}).empty());
   const ScanPlanes nothing;
   const std::vector<PosedPlanes> empty(3, {&nothing, Pose::Identity()});
-  EXPECT_TRUE(FindGlobalPlanes(empty).empty());
+  EXPECT_TRUE(FindSharedPlanes(empty).empty());
 }
 
-TEST(GlobalPlanesTest, ChecksOptions) {
-  STRATA_EXPECT_OK(GlobalPlaneOptions().Validate());
-  GlobalPlaneOptions bad;
+TEST(SharedPlanesTest, ChecksOptions) {
+  STRATA_EXPECT_OK(SharedPlaneOptions().Validate());
+  SharedPlaneOptions bad;
   bad.corridor_m = std::numeric_limits<double>::quiet_NaN();
   bad.max_extent_m = 0.0;
   EXPECT_THAT(bad.Validate(),
