@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <span>
@@ -77,7 +78,7 @@ class EdgePlaneFinder {
     std::vector<SharedPlane> planes;
     for (Candidate& candidate : candidates) {
       if (NewLength(candidate, used) < kMinNewShare * candidate.value_m) continue;
-      DropScansThatDoNotFit(candidate);
+      DropWhatDoesNotFit(candidate);
       if (!Stands(candidate)) continue;
       for (const std::uint32_t i : candidate.support) used[i] = true;
       planes.push_back(PlaneOf(candidate));
@@ -97,7 +98,7 @@ class EdgePlaneFinder {
     const std::uint32_t a = DrawByLength();
     const std::uint32_t b = DrawByLength();
     if (a == b || Apart(a, b) > options_.max_extent_m) return std::nullopt;
-    std::optional<Plane> plane = FitTo(std::vector<std::uint32_t>{a, b});
+    std::optional<Plane> plane = PlaneOfPair(a, b);
     if (!plane.has_value()) return std::nullopt;
     Candidate best = SupportOf(*plane, a);
     while (best.support.size() >= kMinLines) {  // hill climbing
@@ -115,23 +116,39 @@ class EdgePlaneFinder {
     return Distance(edges_[a].line.origin, edges_[b].line.origin);
   }
 
-  // Through the mean of what was measured, as in 5.2.3 step 4; nothing where all lies on one line.
-  std::optional<Plane> FitTo(std::span<const std::uint32_t> support) const {
-    std::vector<Line> lines;
-    std::vector<Eigen::Vector3d> points;
-    Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
-    for (const std::uint32_t i : support) {
-      lines.push_back(edges_[i].line);
-      for (const Eigen::Vector3d& p : edges_[i].points) {
-        points.push_back(p);
-        moments += MomentsOf(1.0, p, Eigen::Matrix3d::Zero());
-      }
-    }
-    const MomentsFit spread = FitMoments(moments);
+  // The plane of a pair (5.2.3 step 2): along both lines (2.6.2), through the mean of what was
+  // measured on them. Nothing where both lie on one line.
+  std::optional<Plane> PlaneOfPair(std::uint32_t a, std::uint32_t b) const {
+    const MomentsFit spread = FitMoments(MomentsOfEdge(a) + MomentsOfEdge(b));
     if (spread.eigenvalues(1) < kMinSpreadM * kMinSpreadM) return std::nullopt;
-    const absl::StatusOr<LinesPlaneFit> fit = FitPlaneToLines(lines, points);
+    std::vector<Eigen::Vector3d> points = edges_[a].points;
+    points.insert(points.end(), edges_[b].points.begin(), edges_[b].points.end());
+    const absl::StatusOr<LinesPlaneFit> fit =
+        FitPlaneToLines(std::vector<Line>{edges_[a].line, edges_[b].line}, points);
     if (!fit.ok()) return std::nullopt;
     return Plane{.normal = fit->plane.normal, .distance = fit->plane.normal.dot(spread.mean)};
+  }
+
+  // The plane of many edges is that of least squared distance to what was measured on them, by
+  // length: what the constraint will minimise (7.19). Directions (2.6.2) say less: short edges have
+  // poor ones.
+  std::optional<Plane> FitTo(std::span<const std::uint32_t> support) const {
+    Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
+    for (const std::uint32_t i : support) moments += MomentsOfEdge(i);
+    if (!(moments(3, 3) > 0.0)) return std::nullopt;
+    const MomentsFit fit = FitMoments(moments);
+    if (fit.eigenvalues(1) < kMinSpreadM * kMinSpreadM) return std::nullopt;
+    return fit.plane;
+  }
+
+  Eigen::Matrix4d MomentsOfEdge(std::uint32_t i) const {
+    const PosedEdge& edge = edges_[i];
+    const double weight = edge.edge->length_m / static_cast<double>(edge.points.size());
+    Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
+    for (const Eigen::Vector3d& p : edge.points) {
+      moments += MomentsOf(weight, p, Eigen::Matrix3d::Zero());
+    }
+    return moments;
   }
 
   bool InCorridor(const PosedEdge& edge, const Plane& plane) const {
@@ -158,8 +175,9 @@ class EdgePlaneFinder {
     return length;
   }
 
-  // A scan's edges leave when the plane of the others does not hold them.
-  void DropScansThatDoNotFit(Candidate& candidate) const {
+  // Edges leave that the plane of the other scans' edges, or without them the plane of all, does
+  // not hold in its corridor.
+  void DropWhatDoesNotFit(Candidate& candidate) const {
     std::map<std::size_t, std::vector<std::uint32_t>> of_scan;
     for (const std::uint32_t i : candidate.support) of_scan[edges_[i].scan].push_back(i);
     std::vector<std::uint32_t> kept;
@@ -170,20 +188,17 @@ class EdgePlaneFinder {
                           own.begin(),
                           own.end(),
                           std::back_inserter(others));
-      const std::optional<Plane> plane = others.size() < 2 ? std::nullopt : FitTo(others);
-      if (!plane.has_value()) {
-        kept.insert(kept.end(), own.begin(), own.end());
-        continue;
-      }
-      for (const std::uint32_t i : own) {
-        if (RmsOf(edges_[i], *plane) <= options_.corridor_m) kept.push_back(i);
-      }
+      const Plane plane = FitTo(others).value_or(candidate.plane);
+      std::copy_if(own.begin(), own.end(), std::back_inserter(kept), [&](std::uint32_t i) {
+        return InCorridor(edges_[i], plane);
+      });
     }
     std::sort(kept.begin(), kept.end());
+    candidate.plane = FitTo(kept).value_or(candidate.plane);
+    std::erase_if(kept, [&](std::uint32_t i) { return !InCorridor(edges_[i], candidate.plane); });
     candidate.support = std::move(kept);
     candidate.value_m = 0.0;
     for (const std::uint32_t i : candidate.support) candidate.value_m += edges_[i].edge->length_m;
-    if (const std::optional<Plane> plane = FitTo(candidate.support)) candidate.plane = *plane;
   }
 
   double RmsOf(const PosedEdge& edge, const Plane& plane) const {
