@@ -18,6 +18,7 @@ ARROWS = {
     "core/mls": ["core/cloud", "core/geometry", "core/common"],
     "core/world": ["core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/codec": ["core/mls", "core/cloud", "core/geometry", "core/common"],
+    "core/planes": ["core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/registration": ["core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/planning": ["core/world", "core/mls", "core/geometry", "core/common"],
     "core/storage": ["core/world", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
