@@ -176,7 +176,7 @@ absl::StatusOr<JobInfo> JobBoard::Accept(std::uint64_t id) {
       id,
       [](JobInfo& job) {
         job.state = JobState::kQueued;
-        job.parameters[kAccepted] = "1";
+        job.parameters.insert_or_assign(kAccepted, "1");
       },
       [](StorageWriter&) { return absl::OkStatus(); });
 }

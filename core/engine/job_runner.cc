@@ -6,6 +6,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/optimize.h"
+#include "core/engine/optimize_settings.h"
 #include "core/engine/rebuild.h"
 #include "core/engine/revert.h"
 

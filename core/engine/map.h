@@ -12,6 +12,7 @@
 
 #include "core/engine/job_board.h"
 #include "core/engine/job_runner.h"
+#include "core/engine/localizer.h"
 #include "core/engine/map_core.h"
 #include "core/engine/map_planner.h"
 #include "core/engine/worker.h"
@@ -29,6 +30,7 @@ class Map {
   MapCore& core() { return *core_; }
   JobBoard& jobs() { return *jobs_; }
   MapPlanner& planner() { return *planner_; }
+  Localizer& localizer() { return *localizer_; }
   Worker& worker() { return *worker_; }
 
   // RESOURCE_EXHAUSTED while too many scans wait for integration.
@@ -47,6 +49,7 @@ class Map {
   std::unique_ptr<MapCore> core_;
   std::unique_ptr<JobBoard> jobs_;
   std::unique_ptr<MapPlanner> planner_;
+  std::unique_ptr<Localizer> localizer_;
   std::unique_ptr<Worker> worker_;
   std::unique_ptr<JobRunner> runner_;
 };

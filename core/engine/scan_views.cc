@@ -8,7 +8,7 @@
 #include "core/engine/aligner.h"
 #include "core/engine/scan_source.h"
 #include "core/planes/extraction.h"
-#include "core/planes/planes_codec.h"
+#include "core/planes/scan_planes_codec.h"
 
 namespace strata {
 namespace {
