@@ -15,8 +15,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
+#include "core/common/option_checks.h"
 #include "core/mls/mls_map.h"
-#include "core/registration/option_checks.h"
 
 namespace strata {
 namespace {

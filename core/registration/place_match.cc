@@ -15,11 +15,11 @@
 #include "absl/strings/string_view.h"
 #include <Eigen/Core>
 
+#include "core/common/option_checks.h"
+#include "core/common/random.h"
 #include "core/mls/features.h"
 #include "core/registration/column_grid.h"
-#include "core/registration/option_checks.h"
 #include "core/registration/place_search.h"
-#include "core/registration/random.h"
 #include "core/registration/registration_target.h"
 #include "core/registration/view_check.h"
 

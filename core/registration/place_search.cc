@@ -12,10 +12,10 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "core/common/random.h"
 #include "core/mls/features.h"
 #include "core/registration/column_grid.h"
 #include "core/registration/place_match.h"
-#include "core/registration/random.h"
 
 namespace strata {
 namespace {

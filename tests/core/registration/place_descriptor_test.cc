@@ -10,8 +10,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/common/random.h"
 #include "core/mls/build.h"
-#include "core/registration/random.h"
 #include "tests/core/registration/place_scans.h"
 #include "tests/support/status_matchers.h"
 

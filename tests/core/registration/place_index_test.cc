@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/registration/random.h"
+#include "core/common/random.h"
 
 namespace strata {
 namespace {

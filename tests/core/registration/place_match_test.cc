@@ -15,8 +15,8 @@
 namespace strata {
 namespace {
 
-using ::testing::HasSubstr;
 using testing::Box;
+using ::testing::HasSubstr;
 using testing::MapAt;
 using testing::Scene;
 using testing::StandingAt;
