@@ -8,6 +8,7 @@
 #include "absl/status/status.h"
 
 #include "core/common/status.h"
+#include "core/posegraph/information.h"
 
 namespace strata {
 namespace {
@@ -21,13 +22,9 @@ PlaneKind KindOf(const Eigen::Vector3d& normal) {
   return tilt > M_PI_2 - kStraightRad ? PlaneKind::kWall : PlaneKind::kSloped;
 }
 
-// How far a step of odometry may be trusted that nothing was measured about.
-Matrix6d OdometryInformation(const ScanPair& pair) {
-  Vector6d information;
-  information << Eigen::Vector3d::Constant(1.0 / (pair.sigma_rad * pair.sigma_rad)),
-      Eigen::Vector3d::Constant(1.0 / (pair.sigma_m * pair.sigma_m));
-  return information.asDiagonal();
-}
+// What repeats from match to match, and so is not in a registration's information.
+constexpr double kMatchSigmaM = 0.01;
+constexpr double kMatchSigmaRad = 0.001;
 
 }  // namespace
 
@@ -131,10 +128,11 @@ PoseGraphProblem GraphWorld::Measured(const OptimizeSettings& settings) const {
     const auto record = recorded.find({pair.i, pair.j});
     if (record != recorded.end()) {
       term.T_i_j = record->second->constraint.T_i_j;
-      term.information = record->second->constraint.information;
+      term.information = LoosenedInformation(record->second->constraint.information,
+                                             IsotropicInformation(kMatchSigmaRad, kMatchSigmaM));
     } else {
       term.T_i_j = poses_[pair.i].inverse() * poses_[pair.j];
-      term.information = OdometryInformation(pair);
+      term.information = IsotropicInformation(pair.sigma_rad, pair.sigma_m);
     }
     graph.relative.push_back(std::move(term));
   }

@@ -176,7 +176,7 @@ absl::StatusOr<JobInfo> JobBoard::Accept(std::uint64_t id) {
       id,
       [](JobInfo& job) {
         job.state = JobState::kQueued;
-        job.parameters.insert_or_assign(kAccepted, "1");
+        job.parameters.emplace(kAccepted, "1");
       },
       [](StorageWriter&) { return absl::OkStatus(); });
 }
@@ -186,7 +186,7 @@ absl::StatusOr<JobInfo> JobBoard::Discard(std::uint64_t id) {
       id,
       [](JobInfo& job) {
         job.state = JobState::kCancelled;
-        job.message = "proposal discarded";
+        job.message = std::string("proposal discarded");
       },
       [id](StorageWriter& writer) { return writer.DiscardProposal(id); });
 }

@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include <Eigen/Cholesky>
 
 #include "core/common/status.h"
+#include "core/posegraph/information.h"
 #include "core/registration/registration_target.h"
 
 namespace strata {
@@ -28,20 +28,6 @@ struct Measurement {
 // Within these of where it was registered a pair has the same correspondences.
 constexpr double kSamePlaceM = 0.05;
 constexpr double kSamePlaceRad = 0.005;
-
-Matrix6d Diagonal(double sigma_rad, double sigma_m) {
-  Vector6d variances;
-  variances << Eigen::Vector3d::Constant(sigma_rad * sigma_rad),
-      Eigen::Vector3d::Constant(sigma_m * sigma_m);
-  return variances.cwiseInverse().asDiagonal();
-}
-
-// (information⁻¹ + extra⁻¹)⁻¹, also for a singular information.
-Matrix6d Loosened(const Matrix6d& information, const Matrix6d& extra) {
-  const Matrix6d sum = information + extra;
-  const Matrix6d loosened = extra - extra * sum.ldlt().solve(extra);
-  return 0.5 * (loosened + loosened.transpose());
-}
 
 bool Acceptable(Termination termination) {
   return termination == Termination::kConverged || termination == Termination::kMaxIterations ||
@@ -191,9 +177,9 @@ class Alignment {
       measured.good = Acceptable(match.termination);
       if (!measured.good) continue;
       measured.T_i_j = Normalized(match.T_target_source);
-      measured.information =
-          Loosened(match.information,
-                   Diagonal(options_.registration_sigma_rad, options_.registration_sigma_m));
+      measured.information = LoosenedInformation(
+          match.information,
+          IsotropicInformation(options_.registration_sigma_rad, options_.registration_sigma_m));
     }
     return absl::OkStatus();
   }
@@ -228,7 +214,7 @@ class Alignment {
       } else {
         if (term.may_be_false) continue;
         term.T_i_j = problem_.T_map_scan[term.i].inverse() * problem_.T_map_scan[term.j];
-        term.information = Diagonal(given->second.sigma_rad, given->second.sigma_m);
+        term.information = IsotropicInformation(given->second.sigma_rad, given->second.sigma_m);
       }
       graph.relative.push_back(term);
       pair_of_term_.push_back(given == given_.end() ? std::nullopt

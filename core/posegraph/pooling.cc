@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/common/status.h"
+#include "core/posegraph/information.h"
 
 namespace strata {
 namespace {
@@ -50,10 +51,8 @@ RelativePoseTerm SharedScanTerm(std::size_t a,
   term.j = b;
   term.T_i_j = T_a_b;
   const double count = static_cast<double>(std::max<std::size_t>(1, steps));
-  Vector6d information;
-  information << Eigen::Vector3d::Constant(1.0 / (kStepSigmaRad * kStepSigmaRad * count)),
-      Eigen::Vector3d::Constant(1.0 / (kStepSigmaM * kStepSigmaM * count));
-  term.information = information.asDiagonal();
+  term.information =
+      IsotropicInformation(kStepSigmaRad * std::sqrt(count), kStepSigmaM * std::sqrt(count));
   return term;
 }
 
