@@ -14,6 +14,7 @@
 #include "core/posegraph/graph_least_squares.h"
 #include "core/posegraph/levenberg_marquardt.h"
 #include "core/posegraph/pose_graph_checks.h"
+#include "core/posegraph/robust_minimum.h"
 
 namespace strata {
 namespace {
@@ -110,11 +111,20 @@ absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& prob
     summary.termination = PoseGraphTermination::kNothingToDo;
   } else {
     BlockCholesky H = squares.MakeSystem();
-    STRATA_ASSIGN_OR_RETURN(const Minimum minimum, Minimise(squares, H, options.convergence, stop));
+    STRATA_ASSIGN_OR_RETURN(const Minimum minimum,
+                            MinimiseRobustly(problem, options, squares, H, stop));
     summary.iterations = minimum.iterations;
     summary.termination = minimum.termination;
   }
   summary.after = CostsOf(problem, squares);
+  for (std::size_t k = 0; k < problem.relative.size(); ++k) {
+    if (squares.relative_weights()[k] > 0.0) continue;
+    summary.rejected_relative.push_back({.term = k, .chi2 = squares.RelativeChi2(k)});
+  }
+  for (std::size_t k = 0; k < problem.pairs.size(); ++k) {
+    if (squares.pairs_weights()[k] > 0.0) continue;
+    summary.rejected_pairs.push_back({.term = k, .chi2 = squares.PairsExcess(k)});
+  }
   summary.worst_nodes = WorstNodes(problem, squares);
   solution.T_map_scan = squares.poses();
   solution.planes = squares.planes();
