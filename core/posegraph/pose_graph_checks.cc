@@ -8,16 +8,14 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "core/common/status.h"
+#include "core/posegraph/semidefinite.h"
 
 namespace strata {
 namespace {
 
-// Share of the largest entry by which a matrix may miss symmetry or a zero eigenvalue.
-constexpr double kMatrixTolerance = 1e-9;
 constexpr double kLargestCoordinate = 1e8;  // as ValidatePose()
 constexpr double kLargest = std::numeric_limits<double>::max();
 
@@ -25,26 +23,6 @@ absl::Status InRange(absl::string_view field, double value, double low, double h
   if (value >= low && value <= high) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
       "pose graph options: ", field, " is ", value, ", must be in [", low, ", ", high, "]"));
-}
-
-template <int size>
-absl::Status ValidateSemidefinite(const Eigen::Matrix<double, size, size>& matrix,
-                                  absl::string_view field) {
-  if (!matrix.allFinite()) return absl::InvalidArgumentError(absl::StrCat(field, ": not finite"));
-  const double scale = matrix.cwiseAbs().maxCoeff();
-  const double skew = (matrix - matrix.transpose()).cwiseAbs().maxCoeff();
-  if (skew > kMatrixTolerance * scale) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(field, ": not symmetric: two entries that should be equal differ by ", skew));
-  }
-  if (scale == 0.0) return absl::OkStatus();
-  Eigen::Matrix<double, size, size> raised = matrix / scale;
-  raised.diagonal().array() += kMatrixTolerance;
-  if (Eigen::LLT<Eigen::Matrix<double, size, size>>(raised).info() != Eigen::Success) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(field, ": has a negative eigenvalue; it must be positive semidefinite"));
-  }
-  return absl::OkStatus();
 }
 
 absl::Status ValidateNode(std::size_t node, std::size_t nodes, absl::string_view field) {
@@ -71,7 +49,7 @@ absl::Status Validate(const PointPairsTerm& term, std::size_t nodes) {
   STRATA_RETURN_IF_ERROR(ValidateSemidefinite<8>(term.moments, "moments"));
   const double scale = term.moments.cwiseAbs().maxCoeff();
   const double unlike = (term.moments.row(3) - term.moments.row(7)).cwiseAbs().maxCoeff();
-  if (unlike > kMatrixTolerance * scale) {
+  if (unlike > kSemidefiniteTolerance * scale) {
     return absl::InvalidArgumentError(
         "moments: rows 3 and 7 differ; both are the sums of weights times the points");
   }
