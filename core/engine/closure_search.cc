@@ -9,6 +9,7 @@
 #include "absl/strings/str_format.h"
 
 #include "core/common/status.h"
+#include "core/engine/aligner.h"
 #include "core/engine/parallel.h"
 #include "core/posegraph/closure_candidates.h"
 #include "core/posegraph/closure_consistency.h"
