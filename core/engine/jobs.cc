@@ -76,6 +76,14 @@ absl::StatusOr<JobInfo> EngineJobs::Cancel(const api::Call& call,
   return found->jobs().Cancel(id);
 }
 
+absl::StatusOr<JobInfo> EngineJobs::Accept(const api::Call&, absl::string_view, std::uint64_t) {
+  return absl::UnimplementedError("accept");
+}
+
+absl::StatusOr<JobInfo> EngineJobs::Revert(const api::Call&, absl::string_view, std::uint64_t) {
+  return absl::UnimplementedError("revert");
+}
+
 absl::Status EngineJobs::Watch(const api::Call& call,
                                absl::string_view map,
                                std::uint64_t id,

@@ -122,4 +122,15 @@ absl::StatusOr<MapStats> EngineMaps::Stats(const api::Call& call, absl::string_v
   return stats;
 }
 
+absl::StatusOr<std::vector<EpochInfo>> EngineMaps::History(const api::Call&, absl::string_view) {
+  return absl::UnimplementedError("history");
+}
+
+absl::Status EngineMaps::Watch(const api::Call&,
+                               absl::string_view,
+                               const api::WatchOptions&,
+                               absl::FunctionRef<absl::Status(const api::MapUpdate&)>) {
+  return absl::UnimplementedError("watch");
+}
+
 }  // namespace strata

@@ -67,4 +67,33 @@ absl::Status EnginePoseGraph::SetPose(const api::Call& call,
       call.stop, [&](Integrator& integrator) { return integrator.SetPose(id, T_map_scan); });
 }
 
+absl::StatusOr<Constraint> EnginePoseGraph::AddConstraint(const api::Call&,
+                                                          absl::string_view,
+                                                          const Constraint&) {
+  return absl::UnimplementedError("add constraint");
+}
+
+absl::Status EnginePoseGraph::RemoveConstraint(const api::Call&, absl::string_view, std::uint64_t) {
+  return absl::UnimplementedError("remove constraint");
+}
+
+absl::Status EnginePoseGraph::EnableConstraint(const api::Call&,
+                                               absl::string_view,
+                                               std::uint64_t,
+                                               bool) {
+  return absl::UnimplementedError("enable constraint");
+}
+
+absl::StatusOr<api::PoseLookup> EnginePoseGraph::LookupPose(const api::Call&,
+                                                            absl::string_view,
+                                                            const ScanId&) {
+  return absl::UnimplementedError("lookup pose");
+}
+
+absl::StatusOr<LocalizeResult> EnginePoseGraph::Localize(const api::Call&,
+                                                         absl::string_view,
+                                                         const LocalizeQuery&) {
+  return absl::UnimplementedError("localize");
+}
+
 }  // namespace strata
