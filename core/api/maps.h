@@ -24,9 +24,10 @@ struct WatchOptions {
   // Changes after this commit sequence. What happened long ago, or before the server's last start,
   // comes as the whole present state: a watcher may be told what it knew. 0: everything there is.
   std::uint64_t since = 0;
-  std::string trajectory;  // scans of this one only; empty: of all
-  bool tiles = true;       // false: scans and epochs only
-  bool once = false;       // end when there is nothing newer
+  std::uint64_t epoch = 0;  // that the watcher knows; another one is announced with its reason
+  std::string trajectory;   // scans of this one only; empty: of all
+  bool tiles = true;        // false: scans and epochs only
+  bool once = false;        // end when there is nothing newer
 };
 
 // Where a scan is now; a scan that was deleted is `gone`.
@@ -48,7 +49,7 @@ struct TileChangeNotice {
 struct MapUpdate {
   std::uint64_t commit_sequence = 0;  // resume from here
   std::uint64_t epoch = 0;
-  std::string epoch_reason;  // set when the epoch is another than before
+  std::string epoch_reason;  // set when the watcher knew an epoch and this is another
   std::vector<ScanChange> scans;
   std::vector<TileChangeNotice> tiles;
 };

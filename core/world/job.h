@@ -22,10 +22,12 @@ enum class JobState : std::uint8_t {  // stored
 // Nothing more happens by itself.
 inline bool IsFinal(JobState state) { return state >= JobState::kSucceeded; }
 
+using JobParameters = std::map<std::string, std::string>;
+
 struct JobInfo {
   std::uint64_t id = 0;  // unique in the map
   std::string kind;      // "rebuild", "verify", "optimize", "revert"
-  std::map<std::string, std::string> parameters;
+  JobParameters parameters;
   JobState state = JobState::kQueued;
   double progress = 0.0;                  // in [0, 1]
   std::string phase;                      // what it does now, for people
