@@ -27,6 +27,8 @@ absl::string_view NameOf(BlobKind kind) {
       return "MLS tile";
     case BlobKind::kPoints:
       return "points";
+    case BlobKind::kScanPlanes:
+      return "planes of a scan";
   }
   return "blob";
 }

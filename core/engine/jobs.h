@@ -21,7 +21,7 @@ class EngineJobs final : public api::Jobs {
  public:
   explicit EngineJobs(EngineMaps& maps) : maps_(maps) {}
 
-  // Both kinds take the parameter "threads": 1 to 64.
+  // Parameters: rebuild.h, optimize.h, revert.h.
   absl::StatusOr<JobInfo> Start(const api::Call& call,
                                 absl::string_view map,
                                 absl::string_view kind,

@@ -2,6 +2,8 @@
 #ifndef STRATA_CORE_ENGINE_POSEGRAPH_H_
 #define STRATA_CORE_ENGINE_POSEGRAPH_H_
 
+#include <cstdint>
+
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"

@@ -12,11 +12,11 @@
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
 
+#include "core/common/option_checks.h"
+#include "core/common/random.h"
 #include "core/common/status.h"
 #include "core/registration/extrapolation.h"
-#include "core/registration/option_checks.h"
 #include "core/registration/point_index.h"
-#include "core/registration/random.h"
 #include "core/registration/umeyama.h"
 
 namespace strata {

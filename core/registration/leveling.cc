@@ -14,9 +14,9 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
+#include "core/common/option_checks.h"
+#include "core/common/random.h"
 #include "core/common/status.h"
-#include "core/registration/option_checks.h"
-#include "core/registration/random.h"
 
 namespace strata {
 namespace {

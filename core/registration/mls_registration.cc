@@ -11,10 +11,10 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
+#include "core/common/option_checks.h"
 #include "core/geometry/pose.h"
 #include "core/mls/features.h"
 #include "core/registration/column_grid.h"
-#include "core/registration/option_checks.h"
 #include "core/registration/plane_to_plane.h"
 #include "core/registration/umeyama.h"
 

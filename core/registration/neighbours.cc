@@ -8,7 +8,7 @@
 
 #include "absl/status/status.h"
 
-#include "core/registration/option_checks.h"
+#include "core/common/option_checks.h"
 
 namespace strata {
 

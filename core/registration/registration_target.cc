@@ -12,8 +12,8 @@
 #include "absl/status/status.h"
 #include <Eigen/Core>
 
+#include "core/common/option_checks.h"
 #include "core/registration/column_grid.h"
-#include "core/registration/option_checks.h"
 #include "core/registration/scan_features.h"
 
 namespace strata {

@@ -15,11 +15,11 @@
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
+#include "core/common/option_checks.h"
+#include "core/common/random.h"
 #include "core/mls/features.h"
 #include "core/mls/mls_map.h"
 #include "core/registration/column_grid.h"
-#include "core/registration/option_checks.h"
-#include "core/registration/random.h"
 
 namespace strata {
 namespace {

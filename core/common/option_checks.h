@@ -1,7 +1,6 @@
 // Collects every violated bound of an options struct.
-// Internal to core/registration, not installed.
-#ifndef STRATA_CORE_REGISTRATION_OPTION_CHECKS_H_
-#define STRATA_CORE_REGISTRATION_OPTION_CHECKS_H_
+#ifndef STRATA_CORE_COMMON_OPTION_CHECKS_H_
+#define STRATA_CORE_COMMON_OPTION_CHECKS_H_
 
 #include <string>
 
@@ -43,4 +42,4 @@ class OptionChecks {
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_REGISTRATION_OPTION_CHECKS_H_
+#endif  // STRATA_CORE_COMMON_OPTION_CHECKS_H_

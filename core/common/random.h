@@ -1,7 +1,6 @@
 // Random choices that are the same on every machine and library.
-// Internal to core/registration, not installed.
-#ifndef STRATA_CORE_REGISTRATION_RANDOM_H_
-#define STRATA_CORE_REGISTRATION_RANDOM_H_
+#ifndef STRATA_CORE_COMMON_RANDOM_H_
+#define STRATA_CORE_COMMON_RANDOM_H_
 
 #include <cstdint>
 #include <utility>
@@ -49,4 +48,4 @@ inline std::vector<std::uint32_t> SampleIndices(std::uint32_t size,
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_REGISTRATION_RANDOM_H_
+#endif  // STRATA_CORE_COMMON_RANDOM_H_

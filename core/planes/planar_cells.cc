@@ -1,0 +1,223 @@
+#include "core/planes/planar_cells.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include <Eigen/Core>
+
+#include "core/planes/extraction.h"
+#include "core/planes/moments.h"
+
+namespace strata {
+namespace {
+
+constexpr std::uint32_t kMinPoints = 6;
+constexpr int kCoordinateBits = 16;
+constexpr std::int32_t kOffset = 1 << (kCoordinateBits - 1);
+// A node is kept whole while its mean squared residual is at most this much above that of its
+// children: noise is the same in both, a step or a bend is not.
+constexpr double kMergeRatio = 1.5;
+constexpr double kMinFlatness = 9.0;    // second over first eigenvalue: 3 σ of thickness
+constexpr double kMinRoundness = 0.01;  // second over third: a single scan line is no surface
+
+struct CodedPoint {
+  std::uint64_t code;  // interleaved coordinates of the smallest cell: nodes are ranges
+  std::uint32_t index;
+};
+
+std::uint64_t SpreadBits(std::uint64_t v) {
+  v = (v | v << 32) & 0x001F00000000FFFFU;
+  v = (v | v << 16) & 0x001F0000FF0000FFU;
+  v = (v | v << 8) & 0x100F00F00F00F00FU;
+  v = (v | v << 4) & 0x10C30C30C30C30C3U;
+  v = (v | v << 2) & 0x1249249249249249U;
+  return v;
+}
+
+class CellFinder {
+ public:
+  CellFinder(std::span<const Eigen::Vector3f> points,
+             const Eigen::Vector3f& sensor_origin,
+             const PlaneExtractionOptions& options)
+      : points_(points),
+        sensor_(sensor_origin),
+        options_(options),
+        smallest_m_(options.cell_size_m / (1 << (kCellLevels - 1))) {}
+
+  std::vector<PlanarCell> Run() {
+    CodePoints();
+    const auto end = static_cast<std::uint32_t>(coded_.size());
+    for (std::uint32_t b = 0; b < end;) {
+      const std::uint32_t e = RangeEnd(b, end, kCellLevels - 1);
+      Visit(b, e, kCellLevels - 1);
+      b = e;
+    }
+    return std::move(cells_);
+  }
+
+ private:
+  struct Node {
+    MomentsFit fit;  // about `reference`
+    Eigen::Vector3d reference;
+    double rms_m = 0.0;
+    double sigma_m = 0.0;
+    bool flat = false;
+  };
+
+  void CodePoints() {
+    const double reach = std::min(options_.max_range_m, options_.sensor.max_range_m);
+    coded_.reserve(points_.size());
+    for (std::uint32_t i = 0; i < points_.size(); ++i) {
+      const double range = (points_[i] - sensor_).norm();
+      if (!(range >= options_.sensor.min_range_m && range <= reach)) continue;
+      std::uint64_t code = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double cell = std::floor((points_[i] - sensor_)(axis) / smallest_m_) + kOffset;
+        code |= SpreadBits(static_cast<std::uint64_t>(cell)) << axis;
+      }
+      coded_.push_back({code, i});
+    }
+    std::sort(coded_.begin(), coded_.end(), [](const CodedPoint& a, const CodedPoint& b) {
+      return a.code != b.code ? a.code < b.code : a.index < b.index;
+    });
+  }
+
+  std::uint32_t RangeEnd(std::uint32_t begin, std::uint32_t end, int level) const {
+    const std::uint64_t node = coded_[begin].code >> (3 * level);
+    std::uint32_t e = begin + 1;
+    while (e < end && coded_[e].code >> (3 * level) == node) ++e;
+    return e;
+  }
+
+  Node Judge(std::uint32_t begin, std::uint32_t end) const {
+    Node node;
+    const auto n = static_cast<double>(end - begin);
+    const Eigen::Vector3f reference = points_[coded_[begin].index];
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+    for (std::uint32_t i = begin; i < end; ++i) {
+      const Eigen::Vector3d p = (points_[coded_[i].index] - reference).cast<double>();
+      sum += p;
+      squares.noalias() += p * p.transpose();
+    }
+    const Eigen::Vector3d mean = sum / n;
+    node.reference = reference.cast<double>();
+    node.fit = FitMoments(MomentsOf(1.0, mean, squares / n - mean * mean.transpose()));
+    const Eigen::Vector3d& e = node.fit.eigenvalues;
+    node.rms_m = std::sqrt(e(0) * n / (n - 3.0));
+    node.sigma_m = options_.sensor.SigmaAt((node.reference + mean - sensor_.cast<double>()).norm());
+    node.flat = node.rms_m <= options_.max_rms_m && e(1) >= kMinFlatness * e(0) &&
+                e(1) >= kMinRoundness * e(2) && e(1) > 0.0;
+    return node;
+  }
+
+  void Visit(std::uint32_t begin, std::uint32_t end, int level) {
+    if (end - begin < kMinPoints) return;
+    const Node node = Judge(begin, end);
+    if (level == 0 || (node.flat && node.rms_m <= node.sigma_m)) {
+      if (node.flat) Keep(node, begin, end, level);
+      return;
+    }
+    const std::size_t before = cells_.size();
+    for (std::uint32_t b = begin; b < end;) {
+      const std::uint32_t e = RangeEnd(b, end, level - 1);
+      Visit(b, e, level - 1);
+      b = e;
+    }
+    if (node.flat && !ChildrenAreFlatter(node, before, end - begin)) {
+      cells_.resize(before);
+      Keep(node, begin, end, level);
+    }
+  }
+
+  // Children that hold less than half of the points prove nothing.
+  bool ChildrenAreFlatter(const Node& node, std::size_t first, std::uint32_t point_count) const {
+    double squares = 0.0;
+    std::uint32_t held = 0;
+    for (std::size_t i = first; i < cells_.size(); ++i) {
+      squares += cells_[i].point_count * cells_[i].rms_m * cells_[i].rms_m;
+      held += cells_[i].point_count;
+    }
+    return 2 * held >= point_count && node.rms_m * node.rms_m * held > kMergeRatio * squares;
+  }
+
+  void Keep(const Node& node, std::uint32_t begin, std::uint32_t end, int level) {
+    PlanarCell cell;
+    cell.level = level;
+    cell.size_m = smallest_m_ * (1 << level);
+    const Eigen::Vector3f p = points_[coded_[begin].index] - sensor_;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double at = std::floor(p(static_cast<Eigen::Index>(axis)) / smallest_m_) + kOffset;
+      cell.at[axis] = static_cast<std::int32_t>(at) >> level;
+    }
+    cell.point_count = end - begin;
+    const Eigen::Vector3d& e = node.fit.eigenvalues;
+    const double cross_section =
+        cell.size_m * cell.size_m / node.fit.plane.normal.cwiseAbs().maxCoeff();
+    cell.area_m2 = std::min(12.0 * std::sqrt(e(1) * e(2)), cross_section);
+    cell.sigma_m = node.sigma_m;
+    cell.rms_m = node.rms_m;
+    cell.mean = node.reference + node.fit.mean;
+    cell.normal = node.fit.plane.normal;
+    const Eigen::Matrix3d& V = node.fit.eigenvectors;
+    cell.moments = MomentsOf(cell.area_m2, cell.mean, V * e.asDiagonal() * V.transpose());
+    cells_.push_back(cell);
+  }
+
+  std::span<const Eigen::Vector3f> points_;
+  Eigen::Vector3f sensor_;
+  const PlaneExtractionOptions& options_;
+  double smallest_m_;
+  std::vector<CodedPoint> coded_;
+  std::vector<PlanarCell> cells_;
+};
+
+std::uint64_t KeyOf(int level, const std::array<std::int32_t, 3>& at) {
+  std::uint64_t key = static_cast<std::uint64_t>(level);
+  for (const std::int32_t c : at) key = key << 20 | static_cast<std::uint64_t>(c & 0xFFFFF);
+  return key;
+}
+
+}  // namespace
+
+std::vector<PlanarCell> FindPlanarCells(std::span<const Eigen::Vector3f> points,
+                                        const Eigen::Vector3f& sensor_origin,
+                                        const PlaneExtractionOptions& options) {
+  return CellFinder(points, sensor_origin, options).Run();
+}
+
+std::vector<std::vector<std::uint32_t>> TouchingCells(std::span<const PlanarCell> cells) {
+  absl::flat_hash_map<std::uint64_t, std::uint32_t> index;
+  index.reserve(cells.size());
+  for (std::uint32_t i = 0; i < cells.size(); ++i) index[KeyOf(cells[i].level, cells[i].at)] = i;
+  std::vector<std::vector<std::uint32_t>> touching(cells.size());
+  // Every cell looks for those of its size or larger; the smaller ones find it.
+  for (std::uint32_t i = 0; i < cells.size(); ++i) {
+    for (int k = 0; k < 27; ++k) {
+      std::array<std::int32_t, 3> at = {
+          cells[i].at[0] + k % 3 - 1, cells[i].at[1] + k / 3 % 3 - 1, cells[i].at[2] + k / 9 - 1};
+      for (int level = cells[i].level; level < kCellLevels; ++level) {
+        const auto found = index.find(KeyOf(level, at));
+        if (found != index.end() && found->second != i) {
+          touching[i].push_back(found->second);
+          touching[found->second].push_back(i);
+          break;
+        }
+        for (std::int32_t& c : at) c >>= 1;
+      }
+    }
+  }
+  for (std::vector<std::uint32_t>& list : touching) {
+    std::sort(list.begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+  }
+  return touching;
+}
+
+}  // namespace strata

@@ -1,0 +1,123 @@
+#include "core/planes/posed_patch.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "core/geometry/pose.h"
+#include "core/geometry/primitives.h"
+#include "core/planes/moments.h"
+#include "core/planes/scan_planes.h"
+#include "core/planes/shared_planes.h"
+
+namespace strata {
+namespace {
+
+constexpr double kGate = 3.0;
+
+double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+int FootprintSize(const PlanePatch& patch) {
+  int count = 0;
+  for (const std::uint32_t row : patch.footprint) count += std::popcount(row);
+  return count;
+}
+
+bool OnFootprint(const PlanePatch& patch, const Eigen::Vector2d& at) {
+  const Eigen::Vector2d square = (at - patch.extent_min) / patch.footprint_cell_m;
+  if (!(square.x() >= 0.0 && square.y() >= 0.0 && square.y() < 32.0 &&
+        square.x() < static_cast<double>(patch.footprint.size()))) {
+    return false;
+  }
+  const std::uint32_t row = patch.footprint[static_cast<std::size_t>(square.x())];
+  return (row >> static_cast<int>(square.y()) & 1U) != 0;
+}
+
+// Share of the squares of `a` that lie on `b`.
+double ShareOn(const PosedPatch& a, const PosedPatch& b) {
+  const Eigen::Vector3d a_v = a.plane.normal.cross(a.axis_u);
+  const Eigen::Vector3d b_v = b.plane.normal.cross(b.axis_u);
+  int squares = 0;
+  int on = 0;
+  for (std::size_t i = 0; i < a.patch->footprint.size(); ++i) {
+    for (int j = 0; j < 32; ++j) {
+      if ((a.patch->footprint[i] >> j & 1U) == 0) continue;
+      ++squares;
+      const Eigen::Vector2d at =
+          a.patch->extent_min +
+          a.patch->footprint_cell_m * Eigen::Vector2d(static_cast<double>(i) + 0.5, j + 0.5);
+      const Eigen::Vector3d p = a.centroid + at.x() * a.axis_u + at.y() * a_v - b.centroid;
+      on += OnFootprint(*b.patch, {b.axis_u.dot(p), b_v.dot(p)}) ? 1 : 0;
+    }
+  }
+  return squares == 0 ? 0.0 : static_cast<double>(on) / squares;
+}
+
+}  // namespace
+
+PosedPatch InMap(const PlanePatch& patch,
+                 std::size_t scan,
+                 const Pose& T_map_scan,
+                 const SharedPlaneOptions& options) {
+  PosedPatch posed;
+  posed.patch = &patch;
+  posed.scan = scan;
+  posed.T_map_scan = T_map_scan;
+  posed.measurements =
+      std::clamp(patch.area_m2 / options.independent_area_m2, 1.0, options.max_measurements);
+  posed.variance_m2 = std::pow(std::max(patch.rms_m, options.sigma_floor_m), 2);
+  posed.centroid = T_map_scan * patch.centroid;
+  posed.axis_u = T_map_scan.linear() * patch.axis_u;
+  posed.plane.normal = T_map_scan.linear() * patch.plane.normal;
+  posed.plane.distance = posed.plane.normal.dot(posed.centroid);
+  const double weight = posed.measurements / posed.variance_m2;
+  posed.information = Moved(T_map_scan, weight / patch.moments(3, 3) * patch.moments);
+  const Eigen::Vector3d axis_v = patch.plane.normal.cross(patch.axis_u);
+  for (const double a : {patch.extent_min.x(), patch.extent_max.x()}) {
+    for (const double b : {patch.extent_min.y(), patch.extent_max.y()}) {
+      posed.box.extend(T_map_scan * (patch.centroid + a * patch.axis_u + b * axis_v));
+    }
+  }
+  posed.offset_sigma_m = 1.0 / std::sqrt(weight);
+  const double spread_m = std::sqrt(FitMoments(patch.moments).eigenvalues(1));
+  posed.tilt_sigma_rad = posed.offset_sigma_m / std::max(spread_m, 0.01);
+  const double height = patch.plane.normal.dot(patch.centroid);
+  posed.lever_m = std::sqrt(std::max(0.0, patch.centroid.squaredNorm() - height * height));
+  return posed;
+}
+
+double Overlap(const PosedPatch& a, const PosedPatch& b) {
+  const auto area = [](const PosedPatch& p) {
+    return FootprintSize(*p.patch) * p.patch->footprint_cell_m * p.patch->footprint_cell_m;
+  };
+  return area(a) <= area(b) ? ShareOn(a, b) : ShareOn(b, a);
+}
+
+bool FitsPlane(const PosedPatch& patch, const Plane& plane, const SharedPlaneOptions& options) {
+  const double tilt_sigma = std::hypot(patch.tilt_sigma_rad, options.pose_sigma_rad);
+  if (AngleBetween(patch.plane.normal, plane.normal) > kGate * tilt_sigma) return false;
+  const double offset_sigma = std::hypot(
+      patch.offset_sigma_m, options.pose_sigma_m, options.pose_sigma_rad * patch.lever_m);
+  return Distance(patch.centroid, plane) <= kGate * offset_sigma;
+}
+
+bool Coplanar(const PosedPatch& a, const PosedPatch& b) {
+  const double tilt_sigma = std::hypot(a.tilt_sigma_rad, b.tilt_sigma_rad);
+  if (AngleBetween(a.plane.normal, b.plane.normal) > kGate * tilt_sigma) return false;
+  const double apart = Distance(a.centroid, b.centroid);
+  const auto offset_fits = [apart](const PosedPatch& from, const PosedPatch& to) {
+    const double sigma =
+        std::hypot(from.offset_sigma_m, to.offset_sigma_m, from.tilt_sigma_rad * apart);
+    return Distance(to.centroid, from.plane) <= kGate * sigma;
+  };
+  return offset_fits(a, b) && offset_fits(b, a);
+}
+
+}  // namespace strata

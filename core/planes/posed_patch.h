@@ -1,0 +1,52 @@
+// A patch in the map frame, with what is known about its accuracy.
+// Internal to core/planes, not installed.
+#ifndef STRATA_CORE_PLANES_POSED_PATCH_H_
+#define STRATA_CORE_PLANES_POSED_PATCH_H_
+
+#include <cstddef>
+
+#include <Eigen/Geometry>
+
+#include "core/geometry/pose.h"
+#include "core/geometry/primitives.h"
+#include "core/planes/scan_planes.h"
+#include "core/planes/shared_planes.h"
+
+namespace strata {
+
+struct PosedPatch {
+  const PlanePatch* patch = nullptr;
+  std::size_t scan = 0;
+  Pose T_map_scan;
+  double measurements = 0.0;  // independent ones
+  double variance_m2 = 0.0;   // of each
+  // In the map frame.
+  Plane plane;
+  Eigen::Vector3d centroid, axis_u;
+  Eigen::Matrix4d information;  // moments of total weight measurements / variance
+  Eigen::AlignedBox3d box;
+  // σ of the plane by the patch alone: at the centroid, and of the normal.
+  double offset_sigma_m = 0.0;
+  double tilt_sigma_rad = 0.0;
+  double lever_m = 0.0;  // from the sensor to the centroid, along the plane
+};
+
+PosedPatch InMap(const PlanePatch& patch,
+                 std::size_t scan,
+                 const Pose& T_map_scan,
+                 const SharedPlaneOptions& options);
+
+// Share of the patch with the smaller footprint that lies on the other one when looked at along the
+// normal of that other one.
+double Overlap(const PosedPatch& a, const PosedPatch& b);
+
+// True if a patch of this accuracy can lie in `plane` after an error of its pose as the options
+// allow; 3σ. The normals must point to the same side.
+bool FitsPlane(const PosedPatch& patch, const Plane& plane, const SharedPlaneOptions& options);
+
+// True if two patches of one scan can be one plane: no pose is between them. 3σ.
+bool Coplanar(const PosedPatch& a, const PosedPatch& b);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_PLANES_POSED_PATCH_H_

@@ -1,0 +1,21 @@
+#include "core/posegraph/information.h"
+
+#include <Eigen/Cholesky>
+
+namespace strata {
+
+Matrix6d IsotropicInformation(double sigma_rad, double sigma_m) {
+  Vector6d information;
+  information << Eigen::Vector3d::Constant(1.0 / (sigma_rad * sigma_rad)),
+      Eigen::Vector3d::Constant(1.0 / (sigma_m * sigma_m));
+  return information.asDiagonal();
+}
+
+Matrix6d LoosenedInformation(const Matrix6d& information, const Matrix6d& extra) {
+  // By the matrix inversion lemma, without inverting the first.
+  const Matrix6d sum = information + extra;
+  const Matrix6d loosened = extra - extra * sum.ldlt().solve(extra);
+  return 0.5 * (loosened + loosened.transpose());
+}
+
+}  // namespace strata

@@ -1,0 +1,18 @@
+// Information matrices of relative poses, [rotation, translation], of right-hand steps.
+#ifndef STRATA_CORE_POSEGRAPH_INFORMATION_H_
+#define STRATA_CORE_POSEGRAPH_INFORMATION_H_
+
+#include "core/geometry/pose.h"
+
+namespace strata {
+
+// Of independent errors, the same along every axis; both > 0.
+Matrix6d IsotropicInformation(double sigma_rad, double sigma_m);
+
+// (information⁻¹ + extra⁻¹)⁻¹: an error of its own and an `extra` one. `information` may be
+// singular, `extra` not.
+Matrix6d LoosenedInformation(const Matrix6d& information, const Matrix6d& extra);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_POSEGRAPH_INFORMATION_H_

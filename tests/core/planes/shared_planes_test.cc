@@ -1,0 +1,190 @@
+#include "core/planes/shared_planes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "absl/status/status.h"
+#include <Eigen/Core>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/geometry/pose.h"
+#include "core/geometry/primitives.h"
+#include "core/planes/extraction.h"
+#include "core/planes/moments.h"
+#include "core/planes/scan_planes.h"
+#include "tests/support/scene.h"
+#include "tests/support/simulator.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata {
+namespace {
+
+using ::testing::AllOf;
+using testing::Box;
+using ::testing::HasSubstr;
+using testing::Random;
+using testing::Scene;
+using testing::SensorOptions;
+using testing::SimulateScan;
+using testing::StatusIs;
+
+struct Views {
+  std::vector<ScanPlanes> planes;
+  std::vector<Pose> truth;
+
+  std::vector<PosedPlanes> At(const std::vector<Pose>& poses) const {
+    std::vector<PosedPlanes> posed;
+    for (std::size_t i = 0; i < planes.size(); ++i) posed.push_back({&planes[i], poses[i]});
+    return posed;
+  }
+};
+
+Views Look(const Scene& scene, const std::vector<Eigen::Vector3d>& from, std::uint64_t seed) {
+  Views views;
+  SensorOptions sensor;
+  for (const Eigen::Vector3d& at : from) {
+    const Eigen::Quaterniond turn(
+        Eigen::AngleAxisd(0.7 * static_cast<double>(views.truth.size()), Eigen::Vector3d::UnitZ()));
+    views.truth.push_back(MakePose(turn, at));
+    views.planes.push_back(
+        ExtractPlanes(SimulateScan(scene, sensor, views.truth.back(), seed + views.truth.size())));
+  }
+  return views;
+}
+
+std::vector<Pose> Disturbed(std::vector<Pose> poses, double m, double rad, std::uint64_t seed) {
+  Random random(seed);
+  for (Pose& T : poses) {
+    Vector6d step;
+    for (int k = 0; k < 6; ++k) step(k) = (k < 3 ? rad : m) * random.Gaussian();
+    T = Retract(T, step);
+  }
+  return poses;
+}
+
+const SharedPlane* PlaneNear(const std::vector<SharedPlane>& planes, const Plane& truth, double m) {
+  for (const SharedPlane& g : planes) {
+    if (!g.from_edges && g.plane.normal.dot(truth.normal) > 0.999 &&
+        std::abs(g.plane.distance - truth.distance) < m) {
+      return &g;
+    }
+  }
+  return nullptr;
+}
+
+Scene Yard() {
+  Scene scene;
+  scene.Add(Box({-40, -40, -1}, {40, 40, 0}));
+  scene.Add(Box({8, -6, 0}, {16, 6, 5}));
+  scene.Build();
+  return scene;
+}
+
+const std::vector<Eigen::Vector3d>& AroundTheYard() {
+  static const std::vector<Eigen::Vector3d> places = {
+      {0, -2, 1.5}, {2, 4, 1.5}, {4, -9, 1.5}, {12, -14, 1.5}, {20, -8, 1.5}, {22, 2, 1.5}};
+  return places;
+}
+
+TEST(SharedPlanesTest, FindsWallsAndFloorOfDisturbedScans) {
+  const Views views = Look(Yard(), AroundTheYard(), 10);
+  const std::vector<SharedPlane> planes =
+      FindSharedPlanes(views.At(Disturbed(views.truth, 0.03, 0.005, 11)));
+  const SharedPlane* floor = PlaneNear(planes, {.normal = {0, 0, 1}, .distance = 0.0}, 0.05);
+  ASSERT_NE(floor, nullptr);
+  EXPECT_EQ(floor->views.size(), 6U);
+  const SharedPlane* wall = PlaneNear(planes, {.normal = {-1, 0, 0}, .distance = -8.0}, 0.05);
+  ASSERT_NE(wall, nullptr);
+  EXPECT_GE(wall->views.size(), 3U);
+  EXPECT_EQ(PlaneNear(planes, {.normal = {1, 0, 0}, .distance = 16.0}, 0.05)->views.size(), 2U);
+}
+
+TEST(SharedPlanesTest, ViewsAreInformationAboutThePlane) {
+  const Views views = Look(Yard(), AroundTheYard(), 20);
+  const SharedPlaneOptions options;
+  const std::vector<SharedPlane> planes = FindSharedPlanes(views.At(views.truth), options);
+  ASSERT_FALSE(planes.empty());
+  for (const SharedPlane& g : planes) {
+    ASSERT_GE(g.views.size(), 2U);
+    double value = 0.0;
+    for (std::size_t i = 0; i < g.views.size(); ++i) {
+      const SharedPlane::View& s = g.views[i];
+      if (i > 0) {
+        EXPECT_GT(s.scan, g.views[i - 1].scan);
+      }
+      value += s.weight;
+      const Eigen::Matrix4d in_map = Moved(views.truth[s.scan], s.moments);
+      EXPECT_LT(RmsDistance(in_map, g.plane), 0.06);
+      const double best = 1.0 / (options.sigma_floor_m * options.sigma_floor_m);
+      EXPECT_LE(s.moments(3, 3), 10 * options.max_measurements * best);
+    }
+    EXPECT_NEAR(value, g.support_value, 1e-9 * value);
+  }
+}
+
+// Each has its own plane or none; no plane holds both.
+TEST(SharedPlanesTest, KerbAndRampAndFloorStayApart) {
+  Scene scene;
+  scene.Add(Box({-40, -40, -1}, {4, 40, 0}));
+  scene.Add(Box({4, -40, -1}, {14, 40, 0.08}));
+  scene.Add(testing::RampX(-6, -40, -40, 40, 0.0, 1.19));  // 2°
+  scene.Build();
+  const Views views =
+      Look(scene, {{0, -6, 1.5}, {0, 0, 1.5}, {1, 6, 1.5}, {-3, 3, 1.5}, {-5, -3, 1.5}}, 30);
+  for (const std::uint64_t seed : {31, 32, 33}) {
+    const std::vector<SharedPlane> planes =
+        FindSharedPlanes(views.At(Disturbed(views.truth, 0.02, 0.003, seed)));
+    for (const SharedPlane& g : planes) {
+      for (const SharedPlane::View& s : g.views) {
+        // At the true poses the support lies in one of the three surfaces, and all in the same.
+        const MomentsFit fit = FitMoments(Moved(views.truth[s.scan], s.moments));
+        EXPECT_LT(std::sqrt(fit.eigenvalues(0)), 0.025) << "seed " << seed;
+      }
+      Eigen::Matrix4d all = Eigen::Matrix4d::Zero();
+      for (const SharedPlane::View& s : g.views) all += Moved(views.truth[s.scan], s.moments);
+      EXPECT_LT(std::sqrt(FitMoments(all).eigenvalues(0)), 0.025)
+          << "seed " << seed << ", value " << g.support_value << ", views " << g.views.size();
+    }
+  }
+}
+
+TEST(SharedPlanesTest, OppositeSidesOfAThinWallAreTwoPlanes) {
+  Scene scene;
+  scene.Add(Box({-40, -40, -1}, {40, 40, 0}));
+  scene.Add(Box({-6, -0.06, 0}, {6, 0.06, 3}));
+  scene.Build();
+  const Views views = Look(scene, {{-2, -5, 1.5}, {2, -5, 1.5}, {-2, 5, 1.5}, {2, 5, 1.5}}, 40);
+  const std::vector<SharedPlane> planes = FindSharedPlanes(views.At(views.truth));
+  const SharedPlane* south = PlaneNear(planes, {.normal = {0, -1, 0}, .distance = 0.06}, 0.03);
+  const SharedPlane* north = PlaneNear(planes, {.normal = {0, 1, 0}, .distance = 0.06}, 0.03);
+  ASSERT_NE(south, nullptr);
+  ASSERT_NE(north, nullptr);
+  EXPECT_EQ(south->views.size(), 2U);
+  EXPECT_EQ(north->views.size(), 2U);
+}
+
+TEST(SharedPlanesTest, OneScanOrNoneGivesNone) {
+  const Views views = Look(Yard(), {{0, 0, 1.5}}, 50);
+  EXPECT_TRUE(FindSharedPlanes(views.At(views.truth)).empty());
+  EXPECT_TRUE(FindSharedPlanes({}).empty());
+  const ScanPlanes nothing;
+  const std::vector<PosedPlanes> empty(3, {&nothing, Pose::Identity()});
+  EXPECT_TRUE(FindSharedPlanes(empty).empty());
+}
+
+TEST(SharedPlanesTest, ChecksOptions) {
+  STRATA_EXPECT_OK(SharedPlaneOptions().Validate());
+  SharedPlaneOptions bad;
+  bad.corridor_m = std::numeric_limits<double>::quiet_NaN();
+  bad.max_extent_m = 0.0;
+  EXPECT_THAT(bad.Validate(),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       AllOf(HasSubstr("corridor_m"), HasSubstr("max_extent_m is 0"))));
+}
+
+}  // namespace
+}  // namespace strata
