@@ -19,10 +19,11 @@ std::size_t Components::Root(std::size_t node) {
   return node;
 }
 
-void Components::Join(std::size_t a, std::size_t b) {
+bool Components::Join(std::size_t a, std::size_t b) {
   const std::size_t root_a = Root(a);
   const std::size_t root_b = Root(b);
   parent_[std::max(root_a, root_b)] = std::min(root_a, root_b);
+  return root_a != root_b;
 }
 
 std::vector<std::size_t> Components::Unanchored(const std::vector<bool>& anchored) {

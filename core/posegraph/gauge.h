@@ -12,7 +12,8 @@ namespace strata {
 class Components {
  public:
   explicit Components(std::size_t nodes);
-  void Join(std::size_t a, std::size_t b);
+  // False if they were in one set already.
+  bool Join(std::size_t a, std::size_t b);
   // The first node of each component in which no node is `anchored`, ascending.
   std::vector<std::size_t> Unanchored(const std::vector<bool>& anchored);
 

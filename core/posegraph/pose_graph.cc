@@ -14,11 +14,38 @@
 #include "core/posegraph/graph_least_squares.h"
 #include "core/posegraph/levenberg_marquardt.h"
 #include "core/posegraph/pose_graph_checks.h"
+#include "core/posegraph/robust_minimum.h"
 
 namespace strata {
 namespace {
 
 constexpr std::size_t kWorstNodes = 10;
+
+// Relative poses first.
+class GraphSuspects : public Suspects {
+ public:
+  GraphSuspects(const PoseGraphProblem& problem, GraphLeastSquares& squares) : squares_(squares) {
+    for (std::size_t k = 0; k < problem.relative.size(); ++k) {
+      if (problem.relative[k].may_be_false) relative_.push_back(k);
+    }
+    for (std::size_t k = 0; k < problem.pairs.size(); ++k) {
+      if (problem.pairs[k].may_be_false) pairs_.push_back(k);
+    }
+  }
+  std::size_t size() const override { return relative_.size() + pairs_.size(); }
+  double Chi2(std::size_t k) const override {
+    return k < relative_.size() ? squares_.RelativeChi2(relative_[k])
+                                : squares_.PairsExcess(pairs_[k - relative_.size()]);
+  }
+  double& Weight(std::size_t k) override {
+    return k < relative_.size() ? squares_.relative_weights()[relative_[k]]
+                                : squares_.pairs_weights()[pairs_[k - relative_.size()]];
+  }
+
+ private:
+  GraphLeastSquares& squares_;
+  std::vector<std::size_t> relative_, pairs_;
+};
 
 // Nodes that nothing but a decision holds.
 std::vector<std::size_t> NodesToHold(const PoseGraphProblem& problem) {
@@ -110,11 +137,23 @@ absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& prob
     summary.termination = PoseGraphTermination::kNothingToDo;
   } else {
     BlockCholesky H = squares.MakeSystem();
-    STRATA_ASSIGN_OR_RETURN(const Minimum minimum, Minimise(squares, H, options.convergence, stop));
+    GraphSuspects suspects(problem, squares);
+    STRATA_ASSIGN_OR_RETURN(
+        const Minimum minimum,
+        MinimiseRobustly(
+            squares, suspects, options.max_closure_chi2, options.convergence, H, stop));
     summary.iterations = minimum.iterations;
     summary.termination = minimum.termination;
   }
   summary.after = CostsOf(problem, squares);
+  for (std::size_t k = 0; k < problem.relative.size(); ++k) {
+    if (squares.relative_weights()[k] > 0.0) continue;
+    summary.rejected_relative.push_back({.term = k, .chi2 = squares.RelativeChi2(k)});
+  }
+  for (std::size_t k = 0; k < problem.pairs.size(); ++k) {
+    if (squares.pairs_weights()[k] > 0.0) continue;
+    summary.rejected_pairs.push_back({.term = k, .chi2 = squares.PairsExcess(k)});
+  }
   summary.worst_nodes = WorstNodes(problem, squares);
   solution.T_map_scan = squares.poses();
   solution.planes = squares.planes();

@@ -109,7 +109,7 @@ struct PoseGraphCosts {
 // A term that may be false and in the end counts nothing; all others count in full.
 struct RejectedTerm {
   std::size_t term = 0;  // index into PoseGraphProblem::relative or pairs
-  double chi2 = 0.0;     // at the solution
+  double chi2 = 0.0;     // at the solution, as max_closure_chi2 counts it
 };
 
 struct NodeResidual {

@@ -3,46 +3,26 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "core/common/status.h"
+#include "core/posegraph/semidefinite.h"
 
 namespace strata {
 namespace {
 
-// Share of the largest entry by which a matrix may miss symmetry or a zero eigenvalue.
-constexpr double kMatrixTolerance = 1e-9;
+constexpr double kLargestCoordinate = 1e8;  // as ValidatePose()
 constexpr double kLargest = std::numeric_limits<double>::max();
 
 absl::Status InRange(absl::string_view field, double value, double low, double high) {
   if (value >= low && value <= high) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
       "pose graph options: ", field, " is ", value, ", must be in [", low, ", ", high, "]"));
-}
-
-template <int size>
-absl::Status ValidateSemidefinite(const Eigen::Matrix<double, size, size>& matrix,
-                                  absl::string_view field) {
-  if (!matrix.allFinite()) return absl::InvalidArgumentError(absl::StrCat(field, ": not finite"));
-  const double scale = matrix.cwiseAbs().maxCoeff();
-  const double skew = (matrix - matrix.transpose()).cwiseAbs().maxCoeff();
-  if (skew > kMatrixTolerance * scale) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(field, ": not symmetric: two entries that should be equal differ by ", skew));
-  }
-  if (scale == 0.0) return absl::OkStatus();
-  Eigen::Matrix<double, size, size> raised = matrix / scale;
-  raised.diagonal().array() += kMatrixTolerance;
-  if (Eigen::LLT<Eigen::Matrix<double, size, size>>(raised).info() != Eigen::Success) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(field, ": has a negative eigenvalue; it must be positive semidefinite"));
-  }
-  return absl::OkStatus();
 }
 
 absl::Status ValidateNode(std::size_t node, std::size_t nodes, absl::string_view field) {
@@ -69,7 +49,7 @@ absl::Status Validate(const PointPairsTerm& term, std::size_t nodes) {
   STRATA_RETURN_IF_ERROR(ValidateSemidefinite<8>(term.moments, "moments"));
   const double scale = term.moments.cwiseAbs().maxCoeff();
   const double unlike = (term.moments.row(3) - term.moments.row(7)).cwiseAbs().maxCoeff();
-  if (unlike > kMatrixTolerance * scale) {
+  if (unlike > kSemidefiniteTolerance * scale) {
     return absl::InvalidArgumentError(
         "moments: rows 3 and 7 differ; both are the sums of weights times the points");
   }
@@ -98,6 +78,34 @@ absl::Status Validate(const PriorTerm& term, std::size_t nodes) {
   return ValidateSemidefinite<6>(term.information, "information");
 }
 
+absl::Status ValidateFixed(const std::vector<bool>& fixed, std::size_t nodes) {
+  if (fixed.empty() || fixed.size() == nodes) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("pose graph: fixed has ",
+                                                 fixed.size(),
+                                                 " entries, must have none or one for each of ",
+                                                 nodes,
+                                                 " poses"));
+}
+
+absl::Status ValidateMaxChi2(double max_chi2) {
+  if (std::isinf(max_chi2) && max_chi2 > 0.0) return absl::OkStatus();
+  return InRange("max_closure_chi2", max_chi2, 1e-12, kLargest);
+}
+
+absl::Status ValidatePlanarPose(const PlanarPose& pose) {
+  if (!pose.allFinite()) return absl::InvalidArgumentError("pose: not finite");
+  const double largest = pose.cwiseAbs().maxCoeff();
+  if (largest <= kLargestCoordinate) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("pose: ", largest, " is beyond ", kLargestCoordinate));
+}
+
+absl::Status Validate(const PlanarRelativeTerm& term, std::size_t nodes) {
+  STRATA_RETURN_IF_ERROR(ValidateEnds(term.i, term.j, nodes));
+  STRATA_RETURN_IF_ERROR(Annotate(ValidatePlanarPose(term.T_i_j), "T_i_j"));
+  return ValidateSemidefinite<3>(term.information, "information");
+}
+
 template <typename Terms>
 absl::Status ValidateAll(const Terms& terms, std::size_t nodes, absl::string_view kind) {
   for (std::size_t k = 0; k < terms.size(); ++k) {
@@ -111,13 +119,7 @@ absl::Status ValidateAll(const Terms& terms, std::size_t nodes, absl::string_vie
 
 absl::Status ValidateProblem(const PoseGraphProblem& problem) {
   const std::size_t nodes = problem.T_map_scan.size();
-  if (!problem.fixed.empty() && problem.fixed.size() != nodes) {
-    return absl::InvalidArgumentError(absl::StrCat("pose graph: fixed has ",
-                                                   problem.fixed.size(),
-                                                   " entries, must have none or one for each of ",
-                                                   nodes,
-                                                   " poses"));
-  }
+  STRATA_RETURN_IF_ERROR(ValidateFixed(problem.fixed, nodes));
   for (std::size_t i = 0; i < nodes; ++i) {
     const absl::Status status = ValidatePose(problem.T_map_scan[i]);
     if (!status.ok()) return Annotate(status, absl::StrCat("pose graph: T_map_scan ", i));
@@ -137,10 +139,22 @@ absl::Status ValidateOptions(const ConvergenceOptions& options) {
 absl::Status ValidateOptions(const PoseGraphOptions& options) {
   STRATA_RETURN_IF_ERROR(ValidateOptions(options.convergence));
   STRATA_RETURN_IF_ERROR(InRange("local_weight", options.local_weight, 1e-6, 1.0 - 1e-6));
-  if (std::isinf(options.max_closure_chi2) && options.max_closure_chi2 > 0.0) {
-    return absl::OkStatus();
+  return ValidateMaxChi2(options.max_closure_chi2);
+}
+
+absl::Status ValidateProblem(const PlanarPoseGraph& graph) {
+  const std::size_t nodes = graph.poses.size();
+  STRATA_RETURN_IF_ERROR(ValidateFixed(graph.fixed, nodes));
+  for (std::size_t i = 0; i < nodes; ++i) {
+    const absl::Status status = ValidatePlanarPose(graph.poses[i]);
+    if (!status.ok()) return Annotate(status, absl::StrCat("pose graph: pose ", i));
   }
-  return InRange("max_closure_chi2", options.max_closure_chi2, 1e-12, kLargest);
+  return ValidateAll(graph.relative, nodes, "relative pose");
+}
+
+absl::Status ValidateOptions(const PlanarOptions& options) {
+  STRATA_RETURN_IF_ERROR(ValidateOptions(options.convergence));
+  return ValidateMaxChi2(options.max_closure_chi2);
 }
 
 }  // namespace strata
