@@ -43,10 +43,14 @@ struct ClientOptions {
 // at once, on one connection that mends itself. UNAVAILABLE if no server answers in time.
 //
 // As the engine's, but for these:
-// - Every call may also answer UNAVAILABLE. Uploads, lookups and Cancel repeat themselves as
-//   `backoff` says (an upload keeps its points until they are acknowledged); Create, Start and the
-//   two Deletes do not, since their effect may have happened: look before calling them again. A
-//   stream repeats itself only while nothing of it was delivered.
+// - Every call may also answer UNAVAILABLE. Uploads, lookups, Localize, Cancel, SetPose and
+//   EnableConstraint repeat themselves as `backoff` says (an upload keeps its points until they are
+//   acknowledged); Create, Start, Accept, Revert, AddConstraint, RemoveConstraint and the two
+//   Deletes do not, since their effect may have happened: look before calling them again. A stream
+//   repeats itself only while nothing of it was delivered; but Maps.Watch resumes where it was,
+//   each time the server comes back.
+// - Maps.Watch delivers an update of more than 1024 scans or tiles in parts; until the last,
+//   commit_sequence stays that of the update before.
 // - The call's deadline and cancellation reach into the work on the server.
 // - An error carries the server's ErrorDetail as payload
 //   "type.googleapis.com/strata.v1.ErrorDetail" with the id of the call in the server's log.

@@ -73,6 +73,32 @@ absl::StatusOr<JobInfo> RemoteJobs::Cancel(const api::Call& call,
   return FromProto(out.job());
 }
 
+absl::StatusOr<JobInfo> RemoteJobs::Accept(const api::Call& call,
+                                           absl::string_view map,
+                                           std::uint64_t id) {
+  STRATA_ASSIGN_OR_RETURN(const v1::AcceptJobResponse out,
+                          CallUnary(connection_,
+                                    *stub_,
+                                    &v1::Jobs::Stub::Accept,
+                                    call,
+                                    Repeat::kNever,
+                                    RequestFor<v1::AcceptJobRequest>(map, id)));
+  return FromProto(out.job());
+}
+
+absl::StatusOr<JobInfo> RemoteJobs::Revert(const api::Call& call,
+                                           absl::string_view map,
+                                           std::uint64_t id) {
+  STRATA_ASSIGN_OR_RETURN(const v1::RevertJobResponse out,
+                          CallUnary(connection_,
+                                    *stub_,
+                                    &v1::Jobs::Stub::Revert,
+                                    call,
+                                    Repeat::kNever,
+                                    RequestFor<v1::RevertJobRequest>(map, id)));
+  return FromProto(out.job());
+}
+
 absl::Status RemoteJobs::Watch(const api::Call& call,
                                absl::string_view map,
                                std::uint64_t id,

@@ -27,6 +27,12 @@ class RemoteJobs final : public api::Jobs {
   absl::StatusOr<JobInfo> Cancel(const api::Call& call,
                                  absl::string_view map,
                                  std::uint64_t id) override;
+  absl::StatusOr<JobInfo> Accept(const api::Call& call,
+                                 absl::string_view map,
+                                 std::uint64_t id) override;
+  absl::StatusOr<JobInfo> Revert(const api::Call& call,
+                                 absl::string_view map,
+                                 std::uint64_t id) override;
   absl::Status Watch(const api::Call& call,
                      absl::string_view map,
                      std::uint64_t id,

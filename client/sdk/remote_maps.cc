@@ -4,6 +4,7 @@
 
 #include "core/common/status.h"
 #include "proto/translate/maps.h"
+#include "proto/translate/watch.h"
 
 namespace strata::sdk {
 
@@ -60,6 +61,47 @@ absl::StatusOr<MapStats> RemoteMaps::Stats(const api::Call& call, absl::string_v
       const v1::GetMapStatsResponse out,
       CallUnary(connection_, *stub_, &v1::Maps::Stub::Stats, call, Repeat::kOnTrouble, in));
   return FromProto(out.stats());
+}
+
+absl::StatusOr<std::vector<EpochInfo>> RemoteMaps::History(const api::Call& call,
+                                                           absl::string_view name) {
+  v1::GetMapHistoryRequest in;
+  in.set_name(std::string(name));
+  STRATA_ASSIGN_OR_RETURN(
+      const v1::GetMapHistoryResponse out,
+      CallUnary(connection_, *stub_, &v1::Maps::Stub::History, call, Repeat::kOnTrouble, in));
+  std::vector<EpochInfo> epochs;
+  for (const v1::Epoch& epoch : out.epochs()) {
+    STRATA_ASSIGN_OR_RETURN(EpochInfo added, FromProto(epoch));
+    epochs.push_back(std::move(added));
+  }
+  return epochs;
+}
+
+absl::Status RemoteMaps::Watch(const api::Call& call,
+                               absl::string_view name,
+                               const api::WatchOptions& options,
+                               absl::FunctionRef<absl::Status(const api::MapUpdate&)> sink) {
+  v1::WatchMapRequest in = ToProto(name, options);
+  while (true) {
+    bool delivered = false;
+    absl::Status taken;
+    const auto deliver = [&](const v1::WatchMapResponse& out) -> absl::Status {
+      STRATA_ASSIGN_OR_RETURN(const api::MapUpdate update, FromProto(out));
+      delivered = true;
+      taken = sink(update);
+      if (taken.ok()) {
+        in.set_since(update.commit_sequence);
+        in.set_epoch(update.epoch);
+      }
+      return taken;
+    };
+    const absl::Status ended =
+        CallStream(connection_, *stub_, &v1::Maps::Stub::Watch, call, in, deliver);
+    // Without a delivery CallStream has tried again as often as it may.
+    if (!taken.ok() || !absl::IsUnavailable(ended) || !delivered) return ended;
+    if (!connection_.NewBackoff().Wait(ended, call.stop)) return ended;
+  }
 }
 
 }  // namespace strata::sdk

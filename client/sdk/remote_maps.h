@@ -23,6 +23,13 @@ class RemoteMaps final : public api::Maps {
   absl::StatusOr<std::vector<MapInfo>> List(const api::Call& call) override;
   absl::Status Delete(const api::Call& call, absl::string_view name) override;
   absl::StatusOr<MapStats> Stats(const api::Call& call, absl::string_view name) override;
+  absl::StatusOr<std::vector<EpochInfo>> History(const api::Call& call,
+                                                 absl::string_view name) override;
+  // Resumes by itself after UNAVAILABLE, as often as the server comes back in time.
+  absl::Status Watch(const api::Call& call,
+                     absl::string_view name,
+                     const api::WatchOptions& options,
+                     absl::FunctionRef<absl::Status(const api::MapUpdate&)> sink) override;
 
  private:
   Connection& connection_;

@@ -21,6 +21,23 @@ class RemotePoseGraph final : public api::PoseGraph {
                        absl::string_view map,
                        const ScanId& id,
                        const Pose& T_map_scan) override;
+  absl::StatusOr<Constraint> AddConstraint(const api::Call& call,
+                                           absl::string_view map,
+                                           const Constraint& constraint) override;
+  absl::Status RemoveConstraint(const api::Call& call,
+                                absl::string_view map,
+                                std::uint64_t id) override;
+  absl::Status EnableConstraint(const api::Call& call,
+                                absl::string_view map,
+                                std::uint64_t id,
+                                bool enabled) override;
+  absl::StatusOr<api::PoseLookup> LookupPose(const api::Call& call,
+                                             absl::string_view map,
+                                             const ScanId& id) override;
+  // Sends the points' coordinates only.
+  absl::StatusOr<LocalizeResult> Localize(const api::Call& call,
+                                          absl::string_view map,
+                                          const LocalizeQuery& query) override;
 
  private:
   Connection& connection_;

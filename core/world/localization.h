@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "absl/status/status.h"
+
 #include "core/cloud/point_cloud.h"
 #include "core/cloud/sensor_model.h"
 #include "core/geometry/pose.h"
@@ -20,6 +22,13 @@ struct LocalizeQuery {
   // Only places within this distance of the guess [m]; in (0, 10000]. Without a guess, anywhere.
   double guess_radius_m = 20.0;
 };
+
+inline constexpr double kMaxGuessRadiusM = 10'000.0;
+
+// INVALID_ARGUMENT naming what is wrong beside the points: sensor, guess, radius, sensor origin.
+absl::Status ValidateLocalizeGuess(const LocalizeQuery& query);
+// The same, and for a cloud that is empty, not valid (ValidateCloud) or has an origin of its own.
+absl::Status ValidateLocalizeQuery(const LocalizeQuery& query);
 
 // A place where the scan could have been taken.
 struct LocalizeCandidate {

@@ -10,6 +10,8 @@
 namespace strata::translate {
 namespace {
 
+using RowMajor6d = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+
 constexpr double kQuaternionNormTolerance = 1e-3;
 // The range of google.protobuf.Timestamp.
 constexpr std::int64_t kMinSeconds = -62135596800;
@@ -72,6 +74,11 @@ google::protobuf::Timestamp ToProto(absl::Time time) {
   return proto;
 }
 
+google::protobuf::RepeatedField<double> ToProto(const Matrix6d& matrix) {
+  const RowMajor6d rows = matrix;
+  return {rows.data(), rows.data() + rows.size()};
+}
+
 absl::StatusOr<Eigen::Vector2d> FromProto(absl::string_view what, const v1::Vector2& v) {
   const Eigen::Vector2d result(v.x(), v.y());
   if (result.allFinite()) return result;
@@ -117,6 +124,16 @@ absl::StatusOr<absl::Time> FromProto(absl::string_view what,
                                                    " ns are not within the years 1 to 9999"));
   }
   return absl::FromUnixSeconds(time.seconds()) + absl::Nanoseconds(time.nanos());
+}
+
+absl::StatusOr<Matrix6d> FromProto(absl::string_view what,
+                                   const google::protobuf::RepeatedField<double>& numbers) {
+  if (numbers.size() == RowMajor6d::SizeAtCompileTime) {
+    const Matrix6d matrix = Eigen::Map<const RowMajor6d>(numbers.data());
+    if (matrix.allFinite()) return matrix;
+  }
+  return absl::InvalidArgumentError(
+      absl::StrCat(what, ": ", numbers.size(), " numbers, not 36 finite ones"));
 }
 
 }  // namespace strata::translate

@@ -7,6 +7,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
+#include "google/protobuf/repeated_field.h"
 #include "google/protobuf/timestamp.pb.h"
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -21,6 +22,8 @@ v1::Vector3 ToProto(const Eigen::Vector3d& v);
 v1::Pose ToProto(const Pose& T);
 v1::Box2 ToProto(const Eigen::AlignedBox2d& box);
 google::protobuf::Timestamp ToProto(absl::Time time);
+// Row by row.
+google::protobuf::RepeatedField<double> ToProto(const Matrix6d& matrix);
 
 absl::StatusOr<Eigen::Vector2d> FromProto(absl::string_view what, const v1::Vector2& v);
 absl::StatusOr<Eigen::Vector3d> FromProto(absl::string_view what, const v1::Vector3& v);
@@ -31,6 +34,8 @@ absl::StatusOr<Pose> FromProto(absl::string_view what, const v1::Pose& pose);
 absl::StatusOr<Eigen::AlignedBox2d> FromProto(absl::string_view what, const v1::Box2& box);
 absl::StatusOr<absl::Time> FromProto(absl::string_view what,
                                      const google::protobuf::Timestamp& time);
+absl::StatusOr<Matrix6d> FromProto(absl::string_view what,
+                                   const google::protobuf::RepeatedField<double>& numbers);
 
 }  // namespace strata::translate
 

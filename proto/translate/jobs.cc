@@ -14,6 +14,7 @@ static_assert(v1::JOB_STATE_RUNNING == static_cast<int>(JobState::kRunning));
 static_assert(v1::JOB_STATE_SUCCEEDED == static_cast<int>(JobState::kSucceeded));
 static_assert(v1::JOB_STATE_FAILED == static_cast<int>(JobState::kFailed));
 static_assert(v1::JOB_STATE_CANCELLED == static_cast<int>(JobState::kCancelled));
+static_assert(v1::JOB_STATE_PROPOSED == static_cast<int>(JobState::kProposed));
 
 }  // namespace
 

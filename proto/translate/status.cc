@@ -20,7 +20,8 @@ v1::ErrorDetail DetailToSend(const absl::Status& status, absl::string_view reque
   if (detail.reason().empty()) detail.set_reason(std::string(kDatabaseReason));
   auto& metadata = *detail.mutable_metadata();
   metadata[kRequestId] = std::string(request_id);
-  if (absl::IsResourceExhausted(status) || absl::IsUnavailable(status)) {
+  const bool passes = absl::IsResourceExhausted(status) || absl::IsUnavailable(status);
+  if (passes && detail.reason() != kRequestReason) {
     // insert() keeps a delay that is already there.
     metadata.insert({kRetryDelay, absl::StrCat(kDefaultRetryDelayMs)});
   }

@@ -34,7 +34,7 @@ std::optional<v1::ErrorDetail> DetailOf(const absl::Status& status);
 std::optional<absl::Duration> RetryDelayOf(const absl::Status& status);
 
 // Code, message and detail of `status`. A detail gains the request's id, and `retry_delay_ms` when
-// the code is RESOURCE_EXHAUSTED or UNAVAILABLE.
+// the code is RESOURCE_EXHAUSTED or UNAVAILABLE and it is not the request itself that is wrong.
 grpc::Status ToGrpcStatus(const absl::Status& status, absl::string_view request_id);
 // The reverse; a status whose details are not ours has none.
 absl::Status FromGrpcStatus(const grpc::Status& status);

@@ -8,7 +8,7 @@
 #include "core/world/job.h"
 #include "proto/translate/jobs.h"
 #include "server/rpc/unary.h"
-#include "server/services/watch_reactor.h"
+#include "server/services/job_watch_reactor.h"
 
 namespace strata::server {
 namespace {
@@ -54,6 +54,24 @@ absl::Status Cancel(api::Database& db,
   return absl::OkStatus();
 }
 
+absl::Status Accept(api::Database& db,
+                    const api::Call& call,
+                    const v1::AcceptJobRequest& in,
+                    v1::AcceptJobResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job, db.jobs().Accept(call, in.map(), in.id()));
+  *out.mutable_job() = ToProto(job);
+  return absl::OkStatus();
+}
+
+absl::Status Revert(api::Database& db,
+                    const api::Call& call,
+                    const v1::RevertJobRequest& in,
+                    v1::RevertJobResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job, db.jobs().Revert(call, in.map(), in.id()));
+  *out.mutable_job() = ToProto(job);
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 grpc::ServerUnaryReactor* JobsService::Start(grpc::CallbackServerContext* context,
@@ -80,9 +98,21 @@ grpc::ServerUnaryReactor* JobsService::Cancel(grpc::CallbackServerContext* conte
   return RunUnary(runtime_, context, "Jobs.Cancel", in, out, &server::Cancel);
 }
 
+grpc::ServerUnaryReactor* JobsService::Accept(grpc::CallbackServerContext* context,
+                                              const v1::AcceptJobRequest* in,
+                                              v1::AcceptJobResponse* out) {
+  return RunUnary(runtime_, context, "Jobs.Accept", in, out, &server::Accept);
+}
+
+grpc::ServerUnaryReactor* JobsService::Revert(grpc::CallbackServerContext* context,
+                                              const v1::RevertJobRequest* in,
+                                              v1::RevertJobResponse* out) {
+  return RunUnary(runtime_, context, "Jobs.Revert", in, out, &server::Revert);
+}
+
 grpc::ServerWriteReactor<v1::WatchJobResponse>* JobsService::Watch(
     grpc::CallbackServerContext* context, const v1::WatchJobRequest* in) {
-  return new WatchReactor(runtime_, *context, *in);
+  return StartPolling<JobWatchReactor>(runtime_, *context, *in);
 }
 
 }  // namespace strata::server

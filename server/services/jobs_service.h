@@ -24,6 +24,12 @@ class JobsService final : public v1::Jobs::CallbackService {
   grpc::ServerUnaryReactor* Cancel(grpc::CallbackServerContext* context,
                                    const v1::CancelJobRequest* in,
                                    v1::CancelJobResponse* out) override;
+  grpc::ServerUnaryReactor* Accept(grpc::CallbackServerContext* context,
+                                   const v1::AcceptJobRequest* in,
+                                   v1::AcceptJobResponse* out) override;
+  grpc::ServerUnaryReactor* Revert(grpc::CallbackServerContext* context,
+                                   const v1::RevertJobRequest* in,
+                                   v1::RevertJobResponse* out) override;
   grpc::ServerWriteReactor<v1::WatchJobResponse>* Watch(grpc::CallbackServerContext* context,
                                                         const v1::WatchJobRequest* in) override;
 

@@ -4,8 +4,10 @@
 #include "core/world/map_info.h"
 #include "core/world/names.h"
 #include "proto/translate/maps.h"
+#include "proto/translate/watch.h"
 #include "server/rpc/request.h"
 #include "server/rpc/unary.h"
+#include "server/services/map_watch_reactor.h"
 
 namespace strata::server {
 namespace {
@@ -59,6 +61,15 @@ absl::Status Stats(api::Database& db,
   return absl::OkStatus();
 }
 
+absl::Status History(api::Database& db,
+                     const api::Call& call,
+                     const v1::GetMapHistoryRequest& in,
+                     v1::GetMapHistoryResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<EpochInfo> epochs, db.maps().History(call, in.name()));
+  for (const EpochInfo& epoch : epochs) *out.add_epochs() = ToProto(epoch);
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 grpc::ServerUnaryReactor* MapsService::Create(grpc::CallbackServerContext* context,
@@ -89,6 +100,17 @@ grpc::ServerUnaryReactor* MapsService::Stats(grpc::CallbackServerContext* contex
                                              const v1::GetMapStatsRequest* in,
                                              v1::GetMapStatsResponse* out) {
   return RunUnary(runtime_, context, "Maps.Stats", in, out, &server::Stats);
+}
+
+grpc::ServerUnaryReactor* MapsService::History(grpc::CallbackServerContext* context,
+                                               const v1::GetMapHistoryRequest* in,
+                                               v1::GetMapHistoryResponse* out) {
+  return RunUnary(runtime_, context, "Maps.History", in, out, &server::History);
+}
+
+grpc::ServerWriteReactor<v1::WatchMapResponse>* MapsService::Watch(
+    grpc::CallbackServerContext* context, const v1::WatchMapRequest* in) {
+  return StartPolling<MapWatchReactor>(runtime_, *context, *in);
 }
 
 }  // namespace strata::server

@@ -27,6 +27,11 @@ class MapsService final : public v1::Maps::CallbackService {
   grpc::ServerUnaryReactor* Stats(grpc::CallbackServerContext* context,
                                   const v1::GetMapStatsRequest* in,
                                   v1::GetMapStatsResponse* out) override;
+  grpc::ServerUnaryReactor* History(grpc::CallbackServerContext* context,
+                                    const v1::GetMapHistoryRequest* in,
+                                    v1::GetMapHistoryResponse* out) override;
+  grpc::ServerWriteReactor<v1::WatchMapResponse>* Watch(grpc::CallbackServerContext* context,
+                                                        const v1::WatchMapRequest* in) override;
 
  private:
   Runtime& runtime_;

@@ -6,6 +6,7 @@
 #include "proto/translate/scans.h"
 #include "server/rpc/stream.h"
 #include "server/rpc/unary.h"
+#include "server/services/localize_reactor.h"
 
 namespace strata::server {
 namespace {
@@ -13,7 +14,7 @@ namespace {
 using translate::FromProto;
 using translate::ToProto;
 
-constexpr int kMaxPartsPerMessage = 1024;
+constexpr std::size_t kMaxPartsPerMessage = 1024;
 
 absl::Status Get(api::Database& db,
                  const api::Call& call,
@@ -22,18 +23,27 @@ absl::Status Get(api::Database& db,
   STRATA_ASSIGN_OR_RETURN(const api::PoseGraphState state, db.posegraph().Get(call, in.map()));
   v1::GetPoseGraphResponse out;
   out.set_epoch(state.epoch);
+  std::size_t parts = 0;
+  const auto count = [&](std::size_t added) -> absl::Status {
+    parts += added;
+    if (parts < kMaxPartsPerMessage) return absl::OkStatus();
+    STRATA_RETURN_IF_ERROR(sink(out));
+    parts = 0;
+    out.Clear();
+    out.set_epoch(state.epoch);
+    return absl::OkStatus();
+  };
   for (const PoseNode& node : state.nodes) {
     *out.add_nodes() = ToProto(node);
-    if (out.nodes_size() < kMaxPartsPerMessage) continue;
-    STRATA_RETURN_IF_ERROR(sink(out));
-    out.clear_nodes();
+    STRATA_RETURN_IF_ERROR(count(1));
   }
   for (const Constraint& constraint : state.constraints) {
     *out.add_constraints() = ToProto(constraint);
-    if (out.constraints_size() < kMaxPartsPerMessage) continue;
-    STRATA_RETURN_IF_ERROR(sink(out));
-    out.clear_nodes();
-    out.clear_constraints();
+    STRATA_RETURN_IF_ERROR(count(1));
+  }
+  for (const GlobalPlane& plane : state.planes) {
+    *out.add_planes() = ToProto(plane);
+    STRATA_RETURN_IF_ERROR(count(1 + plane.supports.size()));
   }
   // Also the only message of an empty graph, for its epoch.
   return sink(out);
@@ -47,6 +57,42 @@ absl::Status SetPose(api::Database& db,
   return db.posegraph().SetPose(call, in.map(), FromProto(in.id()), T_map_scan);
 }
 
+absl::Status AddConstraint(api::Database& db,
+                           const api::Call& call,
+                           const v1::AddConstraintRequest& in,
+                           v1::AddConstraintResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const Constraint constraint,
+                          AtTheDoor(translate::NewConstraintFromProto(in.constraint())));
+  STRATA_ASSIGN_OR_RETURN(const Constraint added,
+                          db.posegraph().AddConstraint(call, in.map(), constraint));
+  *out.mutable_constraint() = ToProto(added);
+  return absl::OkStatus();
+}
+
+absl::Status RemoveConstraint(api::Database& db,
+                              const api::Call& call,
+                              const v1::RemoveConstraintRequest& in,
+                              v1::RemoveConstraintResponse&) {
+  return db.posegraph().RemoveConstraint(call, in.map(), in.id());
+}
+
+absl::Status EnableConstraint(api::Database& db,
+                              const api::Call& call,
+                              const v1::EnableConstraintRequest& in,
+                              v1::EnableConstraintResponse&) {
+  return db.posegraph().EnableConstraint(call, in.map(), in.id(), in.enabled());
+}
+
+absl::Status LookupPose(api::Database& db,
+                        const api::Call& call,
+                        const v1::LookupPoseRequest& in,
+                        v1::LookupPoseResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const api::PoseLookup lookup,
+                          db.posegraph().LookupPose(call, in.map(), FromProto(in.id())));
+  out = ToProto(lookup);
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 grpc::ServerWriteReactor<v1::GetPoseGraphResponse>* PoseGraphService::Get(
@@ -58,6 +104,37 @@ grpc::ServerUnaryReactor* PoseGraphService::SetPose(grpc::CallbackServerContext*
                                                     const v1::SetPoseRequest* in,
                                                     v1::SetPoseResponse* out) {
   return RunUnary(runtime_, context, "PoseGraph.SetPose", in, out, &server::SetPose);
+}
+
+grpc::ServerUnaryReactor* PoseGraphService::AddConstraint(grpc::CallbackServerContext* context,
+                                                          const v1::AddConstraintRequest* in,
+                                                          v1::AddConstraintResponse* out) {
+  return RunUnary(runtime_, context, "PoseGraph.AddConstraint", in, out, &server::AddConstraint);
+}
+
+grpc::ServerUnaryReactor* PoseGraphService::RemoveConstraint(grpc::CallbackServerContext* context,
+                                                             const v1::RemoveConstraintRequest* in,
+                                                             v1::RemoveConstraintResponse* out) {
+  return RunUnary(
+      runtime_, context, "PoseGraph.RemoveConstraint", in, out, &server::RemoveConstraint);
+}
+
+grpc::ServerUnaryReactor* PoseGraphService::EnableConstraint(grpc::CallbackServerContext* context,
+                                                             const v1::EnableConstraintRequest* in,
+                                                             v1::EnableConstraintResponse* out) {
+  return RunUnary(
+      runtime_, context, "PoseGraph.EnableConstraint", in, out, &server::EnableConstraint);
+}
+
+grpc::ServerUnaryReactor* PoseGraphService::LookupPose(grpc::CallbackServerContext* context,
+                                                       const v1::LookupPoseRequest* in,
+                                                       v1::LookupPoseResponse* out) {
+  return RunUnary(runtime_, context, "PoseGraph.LookupPose", in, out, &server::LookupPose);
+}
+
+grpc::ServerReadReactor<v1::LocalizeRequest>* PoseGraphService::Localize(
+    grpc::CallbackServerContext* context, v1::LocalizeResponse* out) {
+  return new LocalizeReactor(runtime_, *context, *out);
 }
 
 }  // namespace strata::server

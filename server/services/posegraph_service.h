@@ -17,6 +17,20 @@ class PoseGraphService final : public v1::PoseGraph::CallbackService {
   grpc::ServerUnaryReactor* SetPose(grpc::CallbackServerContext* context,
                                     const v1::SetPoseRequest* in,
                                     v1::SetPoseResponse* out) override;
+  grpc::ServerUnaryReactor* AddConstraint(grpc::CallbackServerContext* context,
+                                          const v1::AddConstraintRequest* in,
+                                          v1::AddConstraintResponse* out) override;
+  grpc::ServerUnaryReactor* RemoveConstraint(grpc::CallbackServerContext* context,
+                                             const v1::RemoveConstraintRequest* in,
+                                             v1::RemoveConstraintResponse* out) override;
+  grpc::ServerUnaryReactor* EnableConstraint(grpc::CallbackServerContext* context,
+                                             const v1::EnableConstraintRequest* in,
+                                             v1::EnableConstraintResponse* out) override;
+  grpc::ServerUnaryReactor* LookupPose(grpc::CallbackServerContext* context,
+                                       const v1::LookupPoseRequest* in,
+                                       v1::LookupPoseResponse* out) override;
+  grpc::ServerReadReactor<v1::LocalizeRequest>* Localize(grpc::CallbackServerContext* context,
+                                                         v1::LocalizeResponse* out) override;
 
  private:
   Runtime& runtime_;

@@ -28,6 +28,14 @@ class MockMaps : public api::Maps {
   MOCK_METHOD(absl::StatusOr<std::vector<MapInfo>>, List, (const api::Call&), (override));
   MOCK_METHOD(absl::Status, Delete, (const api::Call&, absl::string_view), (override));
   MOCK_METHOD(absl::StatusOr<MapStats>, Stats, (const api::Call&, absl::string_view), (override));
+  MOCK_METHOD(absl::StatusOr<std::vector<EpochInfo>>,
+              History,
+              (const api::Call&, absl::string_view),
+              (override));
+  MOCK_METHOD(absl::Status,
+              Watch,
+              (const api::Call&, absl::string_view, const api::WatchOptions&, Sink<api::MapUpdate>),
+              (override));
 };
 
 class MockScanUpload : public api::ScanUpload {
@@ -122,6 +130,14 @@ class MockJobs : public api::Jobs {
               Cancel,
               (const api::Call&, absl::string_view, std::uint64_t),
               (override));
+  MOCK_METHOD(absl::StatusOr<JobInfo>,
+              Accept,
+              (const api::Call&, absl::string_view, std::uint64_t),
+              (override));
+  MOCK_METHOD(absl::StatusOr<JobInfo>,
+              Revert,
+              (const api::Call&, absl::string_view, std::uint64_t),
+              (override));
   MOCK_METHOD(absl::Status,
               Watch,
               (const api::Call&, absl::string_view, std::uint64_t, Sink<JobInfo>),
@@ -137,6 +153,26 @@ class MockPoseGraph : public api::PoseGraph {
   MOCK_METHOD(absl::Status,
               SetPose,
               (const api::Call&, absl::string_view, const ScanId&, const Pose&),
+              (override));
+  MOCK_METHOD(absl::StatusOr<Constraint>,
+              AddConstraint,
+              (const api::Call&, absl::string_view, const Constraint&),
+              (override));
+  MOCK_METHOD(absl::Status,
+              RemoveConstraint,
+              (const api::Call&, absl::string_view, std::uint64_t),
+              (override));
+  MOCK_METHOD(absl::Status,
+              EnableConstraint,
+              (const api::Call&, absl::string_view, std::uint64_t, bool),
+              (override));
+  MOCK_METHOD(absl::StatusOr<api::PoseLookup>,
+              LookupPose,
+              (const api::Call&, absl::string_view, const ScanId&),
+              (override));
+  MOCK_METHOD(absl::StatusOr<LocalizeResult>,
+              Localize,
+              (const api::Call&, absl::string_view, const LocalizeQuery&),
               (override));
 };
 

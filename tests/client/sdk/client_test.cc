@@ -10,9 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/server.h"
-#include "tests/support/mock_database.h"
-#include "tests/support/status_matchers.h"
+#include "tests/client/sdk/connected_mock.h"
 
 namespace strata {
 namespace {
@@ -24,30 +22,7 @@ using ::testing::HasSubstr;
 using ::testing::Return;
 using Code = absl::StatusCode;
 
-class ClientTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    server::ServerOptions server_options;
-    server_options.listen = "127.0.0.1:0";
-    auto server = server::Server::Start(behind_, server_options);
-    ASSERT_THAT(server, IsOk());
-    server_ = *std::move(server);
-    ClientOptions options;
-    options.target = server_->address();
-    options.backoff.initial = absl::Milliseconds(1);
-    auto client = Connect(options);
-    ASSERT_THAT(client, IsOk());
-    client_ = *std::move(client);
-  }
-  void TearDown() override {
-    client_.reset();
-    server_.reset();
-  }
-
-  ::strata::testing::MockDatabase behind_;
-  std::unique_ptr<server::Server> server_;
-  std::unique_ptr<api::Database> client_;
-};
+using ClientTest = sdk::ConnectedMock;
 
 TEST_F(ClientTest, LookupsAreRepeatedUntilTheServerIsBack) {
   EXPECT_CALL(behind_.maps(), List(_))
@@ -62,10 +37,14 @@ TEST_F(ClientTest, WhatMayHaveHappenedIsNotRepeated) {
   EXPECT_CALL(behind_.maps(), Create(_, _, _)).WillOnce(Return(away));
   EXPECT_CALL(behind_.maps(), Delete(_, _)).WillOnce(Return(away));
   EXPECT_CALL(behind_.jobs(), Start(_, _, _, _)).WillOnce(Return(away));
+  EXPECT_CALL(behind_.jobs(), Accept(_, _, _)).WillOnce(Return(away));
+  EXPECT_CALL(behind_.jobs(), Revert(_, _, _)).WillOnce(Return(away));
   EXPECT_CALL(behind_.scans(), Delete(_, _, _)).WillOnce(Return(away));
   EXPECT_THAT(client_->maps().Create({}, "m", {}), StatusIs(Code::kUnavailable, "away"));
   EXPECT_THAT(client_->maps().Delete({}, "m"), StatusIs(Code::kUnavailable, "away"));
   EXPECT_THAT(client_->jobs().Start({}, "m", "verify", {}), StatusIs(Code::kUnavailable, "away"));
+  EXPECT_THAT(client_->jobs().Accept({}, "m", 1), StatusIs(Code::kUnavailable, "away"));
+  EXPECT_THAT(client_->jobs().Revert({}, "m", 1), StatusIs(Code::kUnavailable, "away"));
   EXPECT_THAT(client_->scans().Delete({}, "m", {"r", 1}), StatusIs(Code::kUnavailable, "away"));
 }
 

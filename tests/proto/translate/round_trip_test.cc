@@ -8,11 +8,13 @@
 #include <gtest/gtest.h>
 
 #include "proto/translate/jobs.h"
+#include "proto/translate/localize.h"
 #include "proto/translate/maps.h"
 #include "proto/translate/planning.h"
 #include "proto/translate/posegraph.h"
 #include "proto/translate/scans.h"
 #include "proto/translate/tiles.h"
+#include "proto/translate/watch.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::translate {
@@ -31,13 +33,18 @@ class Filler {
       FillQuaternion(message);
       return;
     }
+    if (descriptor.full_name() == "strata.v1.Plane") {
+      FillPlane(message);
+      return;
+    }
     for (int i = 0; i < descriptor.field_count(); ++i) {
       const FieldDescriptor& field = *descriptor.field(i);
       // Of alternatives the last one stays.
       if (field.is_map()) {
         FillMap(message, field);
       } else if (field.is_repeated()) {
-        for (int n = 0; n < (field.name() == "information" ? 36 : 2); ++n) Add(message, field);
+        const bool matrix = field.name() == "information" || field.name() == "covariance";
+        for (int n = 0; n < (matrix ? 36 : 2); ++n) Add(message, field);
       } else {
         Set(message, field);
       }
@@ -51,6 +58,13 @@ class Filler {
     q.set_y(-0.5);
     q.set_z(0.5);
     q.set_w(0.5);
+  }
+
+  static void FillPlane(Message& message) {
+    auto& plane = dynamic_cast<v1::Plane&>(message);
+    plane.mutable_normal()->set_x(0.6);
+    plane.mutable_normal()->set_z(-0.8);
+    plane.set_distance(-7.5);
   }
 
   // Small, positive, growing.
@@ -206,6 +220,43 @@ TEST(TranslateRoundTripTest, JobsAndPoseGraph) {
   ExpectRoundTrip(Filled<v1::Job>());
   ExpectRoundTrip(Filled<v1::PoseNode>());
   ExpectRoundTrip(Filled<v1::Constraint>());
+  ExpectRoundTrip(Filled<v1::GlobalPlane>());
+  ExpectRoundTrip(Filled<v1::LookupPoseResponse>());
+}
+
+TEST(TranslateRoundTripTest, APriorHasNoFirstScan) {
+  auto prior = Filled<v1::Constraint>();
+  prior.clear_i();
+  ExpectRoundTrip(prior);
+  STRATA_ASSERT_OK_AND_ASSIGN(const Constraint constraint, FromProto(prior));
+  EXPECT_TRUE(constraint.is_prior());
+}
+
+TEST(TranslateRoundTripTest, Localize) {
+  auto start = Filled<v1::LocalizeStart>();
+  start.set_rows(0);
+  start.set_columns(0);
+  start.set_point_count(0);  // the points come apart
+  start.mutable_sensor_origin()->set_x(0.25);
+  start.mutable_sensor_origin()->set_y(-0.5);
+  start.mutable_sensor_origin()->set_z(1.75);
+  STRATA_ASSERT_OK_AND_ASSIGN(const LocalizeQuery query, FromProto(start));
+  ExpectSame(start, ToProto(start.map(), query));
+  ExpectRoundTrip(Filled<v1::LocalizeResponse>());
+  STRATA_ASSERT_OK_AND_ASSIGN(const LocalizeQuery defaults, FromProto(v1::LocalizeStart()));
+  EXPECT_EQ(defaults.guess_radius_m, LocalizeQuery().guess_radius_m);
+  EXPECT_EQ(defaults.T_map_scan_guess, std::nullopt);
+}
+
+TEST(TranslateRoundTripTest, Watch) {
+  ExpectRoundTrip(Filled<v1::Epoch>());
+  ExpectRoundTrip(Filled<v1::WatchMapResponse>());
+  auto request = Filled<v1::WatchMapRequest>();
+  request.set_tiles(false);
+  STRATA_ASSERT_OK_AND_ASSIGN(const api::WatchOptions options, FromProto(request));
+  ExpectSame(request, ToProto(request.name(), options));
+  STRATA_ASSERT_OK_AND_ASSIGN(const api::WatchOptions defaults, FromProto(v1::WatchMapRequest()));
+  EXPECT_TRUE(defaults.tiles);
 }
 
 TEST(TranslateRoundTripTest, UnknownEnumeratorsAreRefused) {
@@ -224,6 +275,12 @@ TEST(TranslateRoundTripTest, UnknownEnumeratorsAreRefused) {
   auto constraint = Filled<v1::Constraint>();
   constraint.mutable_information()->RemoveLast();
   EXPECT_THAT(FromProto(constraint), StatusIs(kInvalid, HasSubstr("35 numbers")));
+  constraint = Filled<v1::Constraint>();
+  constraint.set_origin(v1::CONSTRAINT_ORIGIN_UNSPECIFIED);
+  EXPECT_THAT(FromProto(constraint), StatusIs(kInvalid, HasSubstr("origin 0")));
+  auto plane = Filled<v1::GlobalPlane>();
+  plane.set_kind(static_cast<v1::PlaneKind>(4));
+  EXPECT_THAT(FromProto(plane), StatusIs(kInvalid, HasSubstr("kind 4")));
   v1::TileKey key;
   key.set_level(13);
   EXPECT_THAT(FromProto(key), StatusIs(kInvalid, HasSubstr("level 13 is not in [0, 12]")));

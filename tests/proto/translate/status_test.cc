@@ -39,6 +39,8 @@ TEST(TranslateStatusTest, OnlyWhatMayHelpNamesARetryDelay) {
   v1::ErrorDetail detail;
   (*detail.mutable_metadata())["retry_delay_ms"] = "4321";
   EXPECT_EQ(delay(WithDetail(absl::UnavailableError("x"), detail)), absl::Milliseconds(4321));
+  // The same too large request is too large another time.
+  EXPECT_EQ(delay(WithReason(absl::ResourceExhaustedError("x"), kRequestReason)), std::nullopt);
 }
 
 TEST(TranslateStatusTest, AReasonGivenFirstStays) {

@@ -1,0 +1,107 @@
+#include "server/services/localize_reactor.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/common/status.h"
+#include "proto/translate/localize.h"
+#include "proto/translate/points.h"
+
+namespace strata::server {
+namespace {
+
+constexpr std::uint64_t kMaxPoints = 2'000'000;
+
+absl::Status OutOfOrder(absl::string_view rule) {
+  return absl::InvalidArgumentError(absl::StrCat("localize: ", rule));
+}
+
+}  // namespace
+
+LocalizeReactor::LocalizeReactor(Runtime& runtime,
+                                 grpc::CallbackServerContext& context,
+                                 v1::LocalizeResponse& out)
+    : runtime_(runtime), request_(runtime, context, "PoseGraph.Localize"), out_(out) {
+  if (const absl::Status admission = request_.admission(); !admission.ok()) {
+    Finish(request_.Close(admission));
+    return;
+  }
+  StartRead(&message_);
+}
+
+void LocalizeReactor::OnReadDone(bool ok) {
+  if (ok) {
+    runtime_.uploads.Submit([this] { Take(); });
+  } else {
+    runtime_.queries.Submit([this] { Search(); });
+  }
+}
+
+void LocalizeReactor::Take() {
+  request_.CountReceived(message_);
+  const absl::Status status = Guarded([this] { return TakeMessage(); });
+  if (status.ok()) {
+    StartRead(&message_);
+  } else {
+    Finish(request_.Close(status));
+  }
+}
+
+absl::Status LocalizeReactor::TakeMessage() {
+  STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+  if (message_.has_start() && !begun_) return AtTheDoor(Begin(message_.start()));
+  if (message_.has_chunk() && begun_) return AtTheDoor(Add(message_.chunk()));
+  return AtTheDoor(OutOfOrder(begun_ ? "every message after the first is a chunk"
+                                     : "the first message is the start of the scan"));
+}
+
+absl::Status LocalizeReactor::Begin(const v1::LocalizeStart& start) {
+  if (start.point_count() > kMaxPoints) {
+    return absl::ResourceExhaustedError(absl::StrCat("localize: ",
+                                                     start.point_count(),
+                                                     " points announced, at most ",
+                                                     kMaxPoints,
+                                                     "; thin the scan out"));
+  }
+  STRATA_ASSIGN_OR_RETURN(query_, translate::FromProto(start));
+  map_ = start.map();
+  shape_.point_count = start.point_count();
+  shape_.rows = start.rows();
+  shape_.columns = start.columns();
+  begun_ = true;
+  return absl::OkStatus();
+}
+
+absl::Status LocalizeReactor::Add(const v1::PointChunk& chunk) {
+  STRATA_ASSIGN_OR_RETURN(const PointCloud piece, translate::FromProto(chunk));
+  std::vector<Eigen::Vector3f>& points = query_.cloud.points;
+  STRATA_RETURN_IF_ERROR(translate::CheckChunk(piece, shape_, points.size()));
+  points.insert(points.end(), piece.points.begin(), piece.points.end());
+  return absl::OkStatus();
+}
+
+absl::Status LocalizeReactor::CheckComplete() const {
+  if (!begun_) return OutOfOrder("the stream ended before its scan began");
+  if (query_.cloud.size() != shape_.point_count) {
+    return OutOfOrder(absl::StrCat(
+        query_.cloud.size(), " points arrived, the start announced ", shape_.point_count));
+  }
+  return ValidateLocalizeQuery(query_);
+}
+
+void LocalizeReactor::Search() {
+  const absl::Status status = Guarded([this]() -> absl::Status {
+    // The stream also ends when the client has gone.
+    STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+    STRATA_RETURN_IF_ERROR(AtTheDoor(CheckComplete()));
+    STRATA_ASSIGN_OR_RETURN(const LocalizeResult result,
+                            runtime_.db.posegraph().Localize(request_.call(), map_, query_));
+    out_ = translate::ToProto(result);
+    return absl::OkStatus();
+  });
+  request_.CountSent(out_);
+  Finish(request_.Close(status));
+}
+
+}  // namespace strata::server
