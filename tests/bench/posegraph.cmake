@@ -1,0 +1,6 @@
+find_package(Ceres 2.1 REQUIRED)
+strata_executable(
+  posegraph_benchmark posegraph_benchmark
+  SOURCES posegraph_benchmark.cc posegraph_peer.cc
+  DEPS strata::posegraph strata::formats strata::test_support Ceres::ceres
+)
