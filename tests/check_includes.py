@@ -20,6 +20,8 @@ ARROWS = {
     "core/codec": ["core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/planes": ["core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/registration": ["core/mls", "core/cloud", "core/geometry", "core/common"],
+    "core/posegraph": ["core/registration", "core/planes", "core/world", "core/mls", "core/cloud", "core/geometry",
+                       "core/common"],
     "core/planning": ["core/world", "core/mls", "core/geometry", "core/common"],
     "core/storage": ["core/world", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/api": ["core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
@@ -29,9 +31,9 @@ ARROWS = {
                "core/common"],
     "client/sdk": ["proto", "core/api", "core/codec", "core/world", "core/mls", "core/cloud", "core/geometry",
                    "core/common"],
-    "client/formats": ["core/mls", "core/cloud", "core/geometry", "core/common"],
+    "client/formats": ["core/posegraph", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "client/cli": ["client/sdk", "client/formats", "core/api", "core/engine", "core/codec", "core/registration",
-                   "core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
+                   "core/posegraph", "core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
 }
 
 # external header pattern: rooms that may include it

@@ -24,7 +24,9 @@ class Jobs {
   virtual ~Jobs() = default;
 
   // Kinds: "rebuild" (all derived data again from truth), "verify" (everything checked; a mismatch
-  // fails the job). INVALID_ARGUMENT for an unknown kind or parameter.
+  // fails the job), "optimize" (poses made globally consistent; with dry_run=1 it only proposes),
+  // "revert" (poses and constraints of an earlier epoch). INVALID_ARGUMENT for an unknown kind or
+  // parameter.
   virtual absl::StatusOr<JobInfo> Start(const Call& call,
                                         absl::string_view map,
                                         absl::string_view kind,
@@ -35,6 +37,17 @@ class Jobs {
   virtual absl::StatusOr<std::vector<JobInfo>> List(const Call& call, absl::string_view map) = 0;
   // Asks a queued or running job to end; one that has ended stays as it is.
   virtual absl::StatusOr<JobInfo> Cancel(const Call& call,
+                                         absl::string_view map,
+                                         std::uint64_t id) = 0;
+  // Makes what a dry run proposed real; the job is queued again and then ends as succeeded.
+  // FAILED_PRECONDITION unless it is proposed.
+  virtual absl::StatusOr<JobInfo> Accept(const Call& call,
+                                         absl::string_view map,
+                                         std::uint64_t id) = 0;
+  // Of a proposed job: forgets the proposal; the job is cancelled, and returned. Of an optimize or
+  // revert job that made the current epoch: queues a job that brings back the epoch before, and
+  // returns that. FAILED_PRECONDITION for any other.
+  virtual absl::StatusOr<JobInfo> Revert(const Call& call,
                                          absl::string_view map,
                                          std::uint64_t id) = 0;
   // Delivers the job's state now and after every change, at most ten times a second, until it has

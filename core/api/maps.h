@@ -2,16 +2,57 @@
 #ifndef STRATA_CORE_API_MAPS_H_
 #define STRATA_CORE_API_MAPS_H_
 
+#include <cstdint>
+#include <string>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
 #include "core/api/call.h"
+#include "core/mls/tile_key.h"
+#include "core/world/epoch.h"
 #include "core/world/map_info.h"
+#include "core/world/scan.h"
 
 namespace strata::api {
+
+// From where a map is watched.
+struct WatchOptions {
+  // Changes after this commit sequence. What happened long ago, or before the server's last start,
+  // comes as the whole present state: a watcher may be told what it knew. 0: everything there is.
+  std::uint64_t since = 0;
+  std::uint64_t epoch = 0;  // that the watcher knows; another one is announced with its reason
+  std::string trajectory;   // scans of this one only; empty: of all
+  bool tiles = true;        // false: scans and epochs only
+  bool once = false;        // end when there is nothing newer
+};
+
+// Where a scan is now; a scan that was deleted is `gone`.
+struct ScanChange {
+  ScanId id;
+  ScanState state = ScanState::kPending;
+  Pose T_map_scan = Pose::Identity();
+  bool gone = false;
+};
+
+// A tile of level 0 that is another now.
+struct TileChangeNotice {
+  TileKey key;
+  std::uint64_t version = 0;
+  bool gone = false;
+};
+
+// What changed since the message before. Poses and tiles are of `epoch`.
+struct MapUpdate {
+  std::uint64_t commit_sequence = 0;  // resume from here
+  std::uint64_t epoch = 0;
+  std::string epoch_reason;  // set when the watcher knew an epoch and this is another
+  std::vector<ScanChange> scans;
+  std::vector<TileChangeNotice> tiles;
+};
 
 // Thread-safe. An unknown map is NOT_FOUND in every call of every interface.
 class Maps {
@@ -29,6 +70,16 @@ class Maps {
   // that name that is no map.
   virtual absl::Status Delete(const Call& call, absl::string_view name) = 0;
   virtual absl::StatusOr<MapStats> Stats(const Call& call, absl::string_view name) = 0;
+  // The epochs, newest first.
+  virtual absl::StatusOr<std::vector<EpochInfo>> History(const Call& call,
+                                                         absl::string_view name) = 0;
+  // Delivers what changes until the call is stopped, or, with `once`, what has changed. The first
+  // message comes at once, even if it says nothing but where the map stands. A sink's error ends
+  // the stream and is handed back.
+  virtual absl::Status Watch(const Call& call,
+                             absl::string_view name,
+                             const WatchOptions& options,
+                             absl::FunctionRef<absl::Status(const MapUpdate&)> sink) = 0;
 };
 
 }  // namespace strata::api

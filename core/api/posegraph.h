@@ -3,6 +3,7 @@
 #define STRATA_CORE_API_POSEGRAPH_H_
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -11,6 +12,7 @@
 
 #include "core/api/call.h"
 #include "core/world/constraint.h"
+#include "core/world/localization.h"
 
 namespace strata::api {
 
@@ -19,6 +21,15 @@ struct PoseGraphState {
   std::uint64_t epoch = 0;
   std::vector<PoseNode> nodes;          // in commit order
   std::vector<Constraint> constraints;  // by id
+  std::vector<GlobalPlane> planes;      // by id
+};
+
+// Where a scan is, or why that is not known yet.
+struct PoseLookup {
+  bool known = false;
+  std::string message;  // why not, for people: pending behind so many scans, failed and why
+  Pose T_map_scan = Pose::Identity();  // the uploaded pose unless known
+  std::uint64_t epoch = 0;
 };
 
 // Thread-safe.
@@ -33,6 +44,30 @@ class PoseGraph {
                                absl::string_view map,
                                const ScanId& id,
                                const Pose& T_map_scan) = 0;
+  // Records what a person knows; the next optimize job uses it. Id and origin of `constraint` are
+  // ignored; returns it as recorded. INVALID_ARGUMENT (ValidateConstraint); NOT_FOUND for a scan.
+  virtual absl::StatusOr<Constraint> AddConstraint(const Call& call,
+                                                   absl::string_view map,
+                                                   const Constraint& constraint) = 0;
+  // NOT_FOUND, also when repeated. A plane found by a job is disabled rather than removed, or the
+  // next job finds it again: FAILED_PRECONDITION.
+  virtual absl::Status RemoveConstraint(const Call& call,
+                                        absl::string_view map,
+                                        std::uint64_t id) = 0;
+  // Switches a constraint or a global plane on or off for the jobs to come. NOT_FOUND.
+  virtual absl::Status EnableConstraint(const Call& call,
+                                        absl::string_view map,
+                                        std::uint64_t id,
+                                        bool enabled) = 0;
+  // NOT_FOUND for a scan that was never acknowledged.
+  virtual absl::StatusOr<PoseLookup> LookupPose(const Call& call,
+                                                absl::string_view map,
+                                                const ScanId& id) = 0;
+  // Where `query.cloud` was taken; changes nothing. INVALID_ARGUMENT for a bad cloud, guess or
+  // sensor; RESOURCE_EXHAUSTED for a cloud beyond the server's limit.
+  virtual absl::StatusOr<LocalizeResult> Localize(const Call& call,
+                                                  absl::string_view map,
+                                                  const LocalizeQuery& query) = 0;
 };
 
 }  // namespace strata::api

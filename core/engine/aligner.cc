@@ -27,12 +27,6 @@ constexpr std::size_t kMaxConstraints = 3;
 // (neighbours.h has numbers).
 constexpr int kSamples = 4000;
 
-MlsRegistrationOptions RegistrationOptions() {
-  MlsRegistrationOptions options;
-  options.max_samples = kSamples;
-  return options;
-}
-
 bool Accepted(Termination termination) {
   return termination == Termination::kConverged || termination == Termination::kMaxIterations ||
          termination == Termination::kDegenerate;
@@ -60,6 +54,19 @@ void NearestFirst(const std::vector<Pose>& poses,
 }
 
 }  // namespace
+
+ScanFeatureOptions FeatureOptionsOf(const ScanRecord& scan) {
+  ScanFeatureOptions options;
+  options.sample_count = kSamples;
+  options.sensor_origin = scan.header.sensor_origin.cast<double>();
+  return options;
+}
+
+MlsRegistrationOptions EngineRegistrationOptions() {
+  MlsRegistrationOptions options;
+  options.max_samples = kSamples;
+  return options;
+}
 
 absl::Status Aligner::Load(StorageReader& reader, std::uint64_t epoch) {
   scans_.clear();
@@ -97,9 +104,8 @@ Pose Aligner::Guess(const ScanRecord& scan) const {
 }
 
 Aligner::Features Aligner::Keep(const ScanRecord& scan, const MlsMap& local_map, int samples) {
-  ScanFeatureOptions options;
+  ScanFeatureOptions options = FeatureOptionsOf(scan);
   options.sample_count = samples;
-  options.sensor_origin = scan.header.sensor_origin.cast<double>();
   auto features = std::make_shared<const ScanFeatures>(ScanFeatures::FromMap(local_map, options));
   features_.Put(scan.number, features, features->memory_bytes());
   return features;
@@ -169,7 +175,7 @@ absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
     return placement;
   }
   const RegistrationTarget target(around.placed, TargetOptions{.centre = guess.translation()});
-  const RegistrationResult match = RegisterScan(*own, target, guess, RegistrationOptions());
+  const RegistrationResult match = RegisterScan(*own, target, guess, EngineRegistrationOptions());
   placement.report = ReportOf(match);
   if (!placement.report.aligned) return placement;
   placement.T_map_scan = Normalized(match.T_target_source);

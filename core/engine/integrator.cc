@@ -85,23 +85,27 @@ absl::Status Integrator::MakeServed(StorageReader& reader, TileChange& change) {
 
 absl::Status Integrator::Commit(Durability durability,
                                 const TileChange& change,
+                                const std::vector<ScanId>& scans,
                                 absl::FunctionRef<absl::Status(StorageWriter&)> decision) {
   const double cell_size_m = core_.info().parameters.mls.cell_size_m;
   const std::uint64_t floor = core_.snapshots().Floor();
   MapClock clock;
-  absl::Status committed =
-      core_.writer().Run(durability, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
+  absl::Status committed = core_.writer().Run(
+      durability,
+      0,
+      Stop(),
+      [&](StorageWriter& writer) -> absl::Status {
         STRATA_RETURN_IF_ERROR(WriteTileChange(writer, change, cell_size_m, floor));
         STRATA_RETURN_IF_ERROR(decision(writer));
         STRATA_ASSIGN_OR_RETURN(clock, writer.reader().GetClock());
         return absl::OkStatus();
-      });
+      },
+      [&] { core_.Publish(clock, scans, NoticesOf(change.surfaces)); });
   if (!committed.ok()) {
     aligner_loaded_ = false;  // it may know of scans that were not committed
     return committed;
   }
   store_.Replace(change.tiles);
-  core_.snapshots().Publish({clock.epoch, clock.tile_version});
   return absl::OkStatus();
 }
 
@@ -162,7 +166,7 @@ absl::StatusOr<int> Integrator::IntegrateBatch() {
       aligner_loaded_ = false;
       return done;
     }
-    batch.failed.push_back({posed.scan.number, std::string(done.message())});
+    batch.failed.push_back({posed.scan.number, posed.scan.header.id, std::string(done.message())});
   }
   STRATA_ASSIGN_OR_RETURN(change.version, ReserveVersion());
   absl::Status made = MakeServed(*reader, change);
@@ -175,7 +179,10 @@ absl::StatusOr<int> Integrator::IntegrateBatch() {
 }
 
 absl::Status Integrator::CommitBatch(const Batch& batch, const TileChange& change) {
-  return Commit(Durability::kRelaxed, change, [&](StorageWriter& writer) -> absl::Status {
+  std::vector<ScanId> scans;
+  for (const Failed& failed : batch.failed) scans.push_back(failed.id);
+  for (const Integrated& done : batch.integrated) scans.push_back(done.scan.header.id);
+  return Commit(Durability::kRelaxed, change, scans, [&](StorageWriter& writer) -> absl::Status {
     for (const Failed& failed : batch.failed) {
       STRATA_RETURN_IF_ERROR(
           writer.SetScanState(failed.number, ScanState::kFailed, failed.message));
@@ -186,7 +193,7 @@ absl::Status Integrator::CommitBatch(const Batch& batch, const TileChange& chang
       STRATA_RETURN_IF_ERROR(writer.PutPose(
           {number, epoch(), T_map_scan, PoseOrigin::kIngest, done.placement.report}));
       for (const ConstraintRecord& constraint : done.placement.constraints) {
-        STRATA_RETURN_IF_ERROR(writer.PutConstraint(constraint));
+        STRATA_RETURN_IF_ERROR(writer.PutConstraint(constraint).status());
       }
       STRATA_RETURN_IF_ERROR(writer.SetTilesOfScan(number, done.tiles));
       STRATA_RETURN_IF_ERROR(

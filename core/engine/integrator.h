@@ -17,6 +17,7 @@
 #include "core/engine/aligner.h"
 #include "core/engine/map_core.h"
 #include "core/engine/mls_tiles.h"
+#include "core/engine/scan_mover.h"
 #include "core/engine/surface_tiles.h"
 #include "core/world/robot_profile.h"
 #include "core/world/scan.h"
@@ -45,6 +46,11 @@ class Integrator {
   absl::Status DeleteScan(const ScanId& id);
   // NOT_FOUND; FAILED_PRECONDITION unless the scan is integrated. Begins a new epoch.
   absl::Status SetPose(const ScanId& id, const Pose& T_map_scan);
+  // Begins a new epoch with other poses, as ScanMover does.
+  absl::StatusOr<MoveOutcome> MoveScans(const ScanMoves& moves,
+                                        int threads,
+                                        JobContext& context,
+                                        absl::FunctionRef<absl::Status(StorageWriter&)> decision);
   // Annotates all tiles for another robot.
   absl::Status SetDefaultProfile(const RobotProfile& profile, const Stop& stop);
 
@@ -63,6 +69,7 @@ class Integrator {
   };
   struct Failed {
     ScanNumber number;
+    ScanId id;
     std::string message;
   };
   struct Batch {
@@ -79,9 +86,11 @@ class Integrator {
   absl::Status CommitBatch(const Batch& batch, const TileChange& change);
   // Fills in what is served of change.tiles.
   absl::Status MakeServed(StorageReader& reader, TileChange& change);
-  // Writes `change` and whatever `decision` adds in one transaction; then readers see it.
+  // Writes `change` and whatever `decision` adds in one transaction; then readers see it and
+  // watchers learn of it and of `scans`.
   absl::Status Commit(Durability durability,
                       const TileChange& change,
+                      const std::vector<ScanId>& scans,
                       absl::FunctionRef<absl::Status(StorageWriter&)> decision);
   // The tiles of `keys` from all their scans but `without`.
   absl::StatusOr<MlsTileMap> TilesWithout(StorageReader& reader,

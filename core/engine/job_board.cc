@@ -53,9 +53,11 @@ class JobBoard::Running final : public JobContext {
   const Stop& stop() const override { return stop_; }
   void SetMetric(const std::string& name, double value) override { metrics_[name] = value; }
   void SetMessage(std::string message) override { message_ = std::move(message); }
+  void SetProposed() override { proposed_ = true; }
 
   std::map<std::string, double>& metrics() { return metrics_; }
   std::string& message() { return message_; }
+  bool proposed() const { return proposed_; }
 
  private:
   JobBoard& board_;
@@ -67,6 +69,7 @@ class JobBoard::Running final : public JobContext {
   std::string phase_;
   std::map<std::string, double> metrics_;
   std::string message_;
+  bool proposed_ = false;
 };
 
 absl::StatusOr<std::unique_ptr<JobBoard>> JobBoard::Open(MapCore& core) {
@@ -149,6 +152,43 @@ absl::StatusOr<JobInfo> JobBoard::Cancel(std::uint64_t id) {
                           }));
   STRATA_RETURN_IF_ERROR(Store(info, Durability::kFull, Stop()));
   return info;
+}
+
+absl::StatusOr<JobInfo> JobBoard::Decide(std::uint64_t id,
+                                         absl::FunctionRef<void(JobInfo&)> change,
+                                         WriterThread::Work work) {
+  STRATA_ASSIGN_OR_RETURN(JobInfo info, Get(id));
+  if (info.state != JobState::kProposed) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("job ", id, " has no proposal that waits; start one with dry_run=1"));
+  }
+  change(info);
+  STRATA_RETURN_IF_ERROR(
+      core_.writer().Run(Durability::kFull, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
+        STRATA_RETURN_IF_ERROR(work(writer));
+        return writer.PutJob(info);
+      }));
+  return Change(id, [&](JobInfo& job) { job = info; });
+}
+
+absl::StatusOr<JobInfo> JobBoard::Accept(std::uint64_t id) {
+  return Decide(
+      id,
+      [](JobInfo& job) {
+        job.state = JobState::kQueued;
+        job.parameters.insert_or_assign(kAccepted, "1");
+      },
+      [](StorageWriter&) { return absl::OkStatus(); });
+}
+
+absl::StatusOr<JobInfo> JobBoard::Discard(std::uint64_t id) {
+  return Decide(
+      id,
+      [](JobInfo& job) {
+        job.state = JobState::kCancelled;
+        job.message = "proposal discarded";
+      },
+      [id](StorageWriter& writer) { return writer.DiscardProposal(id); });
 }
 
 absl::Status JobBoard::Watch(const Stop& stop,
@@ -234,10 +274,10 @@ absl::Status JobBoard::Requeue(std::uint64_t id) {
 absl::Status JobBoard::Finish(std::uint64_t id, const absl::Status& ended, Running& context) {
   JobInfo info;
   STRATA_ASSIGN_OR_RETURN(info, Get(id));
-  info.metrics = context.metrics();
+  for (const auto& [name, value] : context.metrics()) info.metrics[name] = value;
   info.phase.clear();
   if (ended.ok()) {
-    info.state = JobState::kSucceeded;
+    info.state = context.proposed() ? JobState::kProposed : JobState::kSucceeded;
     info.progress = 1.0;
     info.message = context.message();
   } else {

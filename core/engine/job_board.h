@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
@@ -32,6 +33,25 @@ class JobContext {
   // Numbers and a line of the result.
   virtual void SetMetric(const std::string& name, double value) = 0;
   virtual void SetMessage(std::string message) = 0;
+  // The job will end as proposed instead of succeeded.
+  virtual void SetProposed() = 0;
+};
+
+// Set on a job whose proposal was accepted.
+inline constexpr char kAccepted[] = "accepted";
+
+// For work that nobody follows.
+class SilentContext final : public JobContext {
+ public:
+  explicit SilentContext(Stop stop) : stop_(std::move(stop)) {}
+  absl::Status Progress(double, absl::string_view) override { return stop_.status(); }
+  const Stop& stop() const override { return stop_; }
+  void SetMetric(const std::string&, double) override {}
+  void SetMessage(std::string) override {}
+  void SetProposed() override {}
+
+ private:
+  const Stop stop_;
 };
 
 // Thread-safe.
@@ -47,6 +67,10 @@ class JobBoard {
   absl::StatusOr<JobInfo> Get(std::uint64_t id) const;
   std::vector<JobInfo> List() const;
   absl::StatusOr<JobInfo> Cancel(std::uint64_t id);
+  // Queues a proposed job again, with the parameter kAccepted. FAILED_PRECONDITION.
+  absl::StatusOr<JobInfo> Accept(std::uint64_t id);
+  // Ends a proposed job as cancelled and forgets its proposal. FAILED_PRECONDITION.
+  absl::StatusOr<JobInfo> Discard(std::uint64_t id);
   absl::Status Watch(const Stop& stop,
                      std::uint64_t id,
                      absl::FunctionRef<absl::Status(const JobInfo&)> sink) const;
@@ -68,6 +92,10 @@ class JobBoard {
   };
 
   explicit JobBoard(MapCore& core) : core_(core) {}
+  // Applies `change` to a proposed job, durably with what `work` writes.
+  absl::StatusOr<JobInfo> Decide(std::uint64_t id,
+                                 absl::FunctionRef<void(JobInfo&)> change,
+                                 WriterThread::Work work);
   // Applies `change` to a job; returns it as it is then. NOT_FOUND.
   absl::StatusOr<JobInfo> Change(std::uint64_t id, absl::FunctionRef<void(JobInfo&)> change);
   absl::Status Store(const JobInfo& info, Durability durability, const Stop& stop);

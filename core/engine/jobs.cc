@@ -14,17 +14,14 @@
 #include "absl/strings/string_view.h"
 
 #include "core/common/status.h"
+#include "core/engine/optimize_settings.h"
 #include "core/engine/rebuild.h"
+#include "core/engine/revert.h"
 
 namespace strata {
 namespace {
 
-absl::Status CheckJob(absl::string_view kind,
-                      const std::map<std::string, std::string>& parameters) {
-  if (kind != kRebuildJob && kind != kVerifyJob) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "job kind '", kind.substr(0, 100), "': use ", kRebuildJob, " or ", kVerifyJob));
-  }
+absl::Status CheckThreads(absl::string_view kind, const JobParameters& parameters) {
   for (const auto& [name, value] : parameters) {
     int threads = 0;
     if (name != "threads") {
@@ -39,6 +36,54 @@ absl::Status CheckJob(absl::string_view kind,
   return absl::OkStatus();
 }
 
+absl::Status CheckEpoch(const JobParameters& parameters) {
+  std::uint64_t epoch = 0;
+  if (parameters.size() == 1 && parameters.begin()->first == "epoch" &&
+      absl::SimpleAtoi(parameters.begin()->second, &epoch) && epoch > 0) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(
+      absl::StrCat(kRevertJob, " takes the parameter epoch only, as in epoch=1; see map history"));
+}
+
+absl::Status CheckJob(absl::string_view kind, const JobParameters& parameters) {
+  if (kind == kRebuildJob || kind == kVerifyJob) return CheckThreads(kind, parameters);
+  if (kind == kRevertJob) return CheckEpoch(parameters);
+  if (kind == kOptimizeJob) return ParseOptimizeSettings(parameters).status();
+  return absl::InvalidArgumentError(absl::StrCat("job kind '",
+                                                 kind.substr(0, 100),
+                                                 "': use ",
+                                                 kRebuildJob,
+                                                 ", ",
+                                                 kVerifyJob,
+                                                 ", ",
+                                                 kOptimizeJob,
+                                                 " or ",
+                                                 kRevertJob));
+}
+
+// The epoch before the one that `job` made, which must be the current one.
+absl::StatusOr<std::uint64_t> EpochBefore(const JobInfo& job, std::uint64_t current) {
+  const auto before = job.metrics.find("epoch_before");
+  const auto made = job.metrics.find("epoch");
+  if (job.state != JobState::kSucceeded || before == job.metrics.end() ||
+      made == job.metrics.end() || made->second == before->second) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("job ", job.id, " made no epoch that could be reverted"));
+  }
+  if (made->second != static_cast<double>(current)) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("job ",
+                     job.id,
+                     " made epoch ",
+                     made->second,
+                     ", but the map is at ",
+                     current,
+                     " by now; name the epoch to go back to: map revert"));
+  }
+  return static_cast<std::uint64_t>(before->second);
+}
+
 }  // namespace
 
 absl::StatusOr<JobInfo> EngineJobs::Start(const api::Call& call,
@@ -49,7 +94,7 @@ absl::StatusOr<JobInfo> EngineJobs::Start(const api::Call& call,
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
   STRATA_RETURN_IF_ERROR(CheckJob(kind, parameters));
   STRATA_ASSIGN_OR_RETURN(JobInfo info, found->jobs().Start(call.stop, kind, parameters));
-  found->worker().JobQueued();
+  found->JobQueued();
   return info;
 }
 
@@ -74,6 +119,31 @@ absl::StatusOr<JobInfo> EngineJobs::Cancel(const api::Call& call,
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
   return found->jobs().Cancel(id);
+}
+
+absl::StatusOr<JobInfo> EngineJobs::Accept(const api::Call& call,
+                                           absl::string_view map,
+                                           std::uint64_t id) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(JobInfo info, found->jobs().Accept(id));
+  found->JobQueued();
+  return info;
+}
+
+absl::StatusOr<JobInfo> EngineJobs::Revert(const api::Call& call,
+                                           absl::string_view map,
+                                           std::uint64_t id) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job, found->jobs().Get(id));
+  if (job.state == JobState::kProposed) return found->jobs().Discard(id);
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t epoch,
+                          EpochBefore(job, found->core().snapshots().current().epoch));
+  STRATA_ASSIGN_OR_RETURN(
+      JobInfo revert, found->jobs().Start(call.stop, kRevertJob, {{"epoch", absl::StrCat(epoch)}}));
+  found->JobQueued();
+  return revert;
 }
 
 absl::Status EngineJobs::Watch(const api::Call& call,

@@ -21,7 +21,7 @@ class EngineJobs final : public api::Jobs {
  public:
   explicit EngineJobs(EngineMaps& maps) : maps_(maps) {}
 
-  // Both kinds take the parameter "threads": 1 to 64.
+  // Parameters: rebuild.h, optimize.h, revert.h.
   absl::StatusOr<JobInfo> Start(const api::Call& call,
                                 absl::string_view map,
                                 absl::string_view kind,
@@ -31,6 +31,12 @@ class EngineJobs final : public api::Jobs {
                               std::uint64_t id) override;
   absl::StatusOr<std::vector<JobInfo>> List(const api::Call& call, absl::string_view map) override;
   absl::StatusOr<JobInfo> Cancel(const api::Call& call,
+                                 absl::string_view map,
+                                 std::uint64_t id) override;
+  absl::StatusOr<JobInfo> Accept(const api::Call& call,
+                                 absl::string_view map,
+                                 std::uint64_t id) override;
+  absl::StatusOr<JobInfo> Revert(const api::Call& call,
                                  absl::string_view map,
                                  std::uint64_t id) override;
   absl::Status Watch(const api::Call& call,

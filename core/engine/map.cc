@@ -26,11 +26,14 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
     pending = totals.pending;
   }
   map->planner_ = std::make_unique<MapPlanner>(*map->core_);
-  map->worker_ = std::make_unique<Worker>(*map->core_, *map->jobs_, pending);
+  map->localizer_ = std::make_unique<Localizer>(*map->core_);
+  map->worker_ = std::make_unique<Worker>(*map->core_, pending);
+  map->runner_ = std::make_unique<JobRunner>(*map->core_, *map->jobs_, *map->worker_);
   return map;
 }
 
 void Map::Close() {
+  if (runner_ != nullptr) runner_->Close();
   if (worker_ != nullptr) worker_->Close();
   if (core_ != nullptr) core_->Close();
 }

@@ -1,4 +1,4 @@
-// One map in use: its shared core and the worker that integrates scans and runs jobs.
+// One map in use: its shared core, the worker that integrates scans, and the runner of its jobs.
 #ifndef STRATA_CORE_ENGINE_MAP_H_
 #define STRATA_CORE_ENGINE_MAP_H_
 
@@ -11,6 +11,8 @@
 #include "absl/status/statusor.h"
 
 #include "core/engine/job_board.h"
+#include "core/engine/job_runner.h"
+#include "core/engine/localizer.h"
 #include "core/engine/map_core.h"
 #include "core/engine/map_planner.h"
 #include "core/engine/worker.h"
@@ -28,12 +30,15 @@ class Map {
   MapCore& core() { return *core_; }
   JobBoard& jobs() { return *jobs_; }
   MapPlanner& planner() { return *planner_; }
+  Localizer& localizer() { return *localizer_; }
   Worker& worker() { return *worker_; }
 
   // RESOURCE_EXHAUSTED while too many scans wait for integration.
   absl::Status CheckRoomForPending() const { return worker_->CheckRoom(); }
   // A scan became durable.
   void ScanCommitted() { worker_->ScanCommitted(); }
+  // A job was queued.
+  void JobQueued() { runner_->JobQueued(); }
 
   // Ends all threads, waiting for what they do now, and closes the file.
   void Close();
@@ -44,7 +49,9 @@ class Map {
   std::unique_ptr<MapCore> core_;
   std::unique_ptr<JobBoard> jobs_;
   std::unique_ptr<MapPlanner> planner_;
+  std::unique_ptr<Localizer> localizer_;
   std::unique_ptr<Worker> worker_;
+  std::unique_ptr<JobRunner> runner_;
 };
 
 }  // namespace strata

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -40,25 +41,22 @@ absl::StatusOr<std::unique_ptr<MapCore>> MapCore::Open(const std::string& name,
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t last_upload, writer.reader().LastUpload());
   info.name = name;
-  return std::unique_ptr<MapCore>(new MapCore(name,
-                                              options,
-                                              std::move(storage),
-                                              std::move(info),
-                                              MapView{clock.epoch, clock.tile_version},
-                                              last_upload));
+  return std::unique_ptr<MapCore>(
+      new MapCore(name, options, std::move(storage), std::move(info), clock, last_upload));
 }
 
 MapCore::MapCore(std::string name,
                  const EngineOptions& options,
                  std::unique_ptr<MapStorage> storage,
                  MapInfo info,
-                 MapView view,
+                 const MapClock& clock,
                  std::uint64_t last_upload)
     : name_(std::move(name)),
       options_(options),
       info_(std::move(info)),
       storage_(std::move(storage)),
-      snapshots_(view),
+      snapshots_({clock.epoch, clock.tile_version}),
+      changes_(clock.commit_sequence),
       readers_(*storage_),
       writer_(storage_->writer(), options.queue_bytes),
       last_upload_(last_upload) {}
@@ -71,6 +69,13 @@ MapInfo MapCore::info() const {
 void MapCore::set_default_profile(const RobotProfile& profile) {
   absl::MutexLock lock(&mutex_);
   info_.parameters.default_profile = profile;
+}
+
+void MapCore::Publish(const MapClock& clock,
+                      const std::vector<ScanId>& scans,
+                      const std::vector<api::TileChangeNotice>& tiles) {
+  snapshots_.Publish({clock.epoch, clock.tile_version});
+  changes_.Add(clock.commit_sequence, scans, tiles);
 }
 
 void MapCore::Close() {

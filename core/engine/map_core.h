@@ -7,12 +7,14 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 
+#include "core/engine/change_log.h"
 #include "core/engine/engine.h"
 #include "core/engine/reader_pool.h"
 #include "core/engine/snapshots.h"
@@ -39,6 +41,12 @@ class MapCore {
   absl::StatusOr<ReaderPool::Lease> Reader() { return readers_.Take(); }
   WriterThread& writer() { return writer_; }
   Snapshots& snapshots() { return snapshots_; }
+  ChangeLog& changes() { return changes_; }
+  // Makes what was committed the state that readers get, and tells watchers. On the writer's
+  // thread, so that both happen in the order of commits.
+  void Publish(const MapClock& clock,
+               const std::vector<ScanId>& scans,
+               const std::vector<api::TileChangeNotice>& tiles);
   // A number for the chunks of one more upload.
   std::uint64_t NextUpload() { return last_upload_.fetch_add(1) + 1; }
 
@@ -50,7 +58,7 @@ class MapCore {
           const EngineOptions& options,
           std::unique_ptr<MapStorage> storage,
           MapInfo info,
-          MapView view,
+          const MapClock& clock,
           std::uint64_t last_upload);
 
   const std::string name_;
@@ -59,6 +67,7 @@ class MapCore {
   MapInfo info_ ABSL_GUARDED_BY(mutex_);
   std::unique_ptr<MapStorage> storage_;
   Snapshots snapshots_;
+  ChangeLog changes_;
   ReaderPool readers_;
   WriterThread writer_;
   std::atomic<std::uint64_t> last_upload_;

@@ -15,6 +15,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/map_stats.h"
+#include "core/engine/map_watch.h"
 #include "core/world/names.h"
 
 namespace strata {
@@ -120,6 +121,25 @@ absl::StatusOr<MapStats> EngineMaps::Stats(const api::Call& call, absl::string_v
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());
   map->core().snapshots().AwaitPublished(clock.tile_version);
   return stats;
+}
+
+absl::StatusOr<std::vector<EpochInfo>> EngineMaps::History(const api::Call& call,
+                                                           absl::string_view name) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(name));
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map->core().Reader());
+  return reader->ListEpochs();
+}
+
+absl::Status EngineMaps::Watch(const api::Call& call,
+                               absl::string_view name,
+                               const api::WatchOptions& options,
+                               absl::FunctionRef<absl::Status(const api::MapUpdate&)> sink) {
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(name));
+  if (!options.trajectory.empty()) {
+    STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", options.trajectory));
+  }
+  return WatchMap(map->core(), call.stop, options, sink);
 }
 
 }  // namespace strata

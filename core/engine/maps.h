@@ -36,6 +36,12 @@ class EngineMaps final : public api::Maps {
   absl::StatusOr<std::vector<MapInfo>> List(const api::Call& call) override;
   absl::Status Delete(const api::Call& call, absl::string_view name) override;
   absl::StatusOr<MapStats> Stats(const api::Call& call, absl::string_view name) override;
+  absl::StatusOr<std::vector<EpochInfo>> History(const api::Call& call,
+                                                 absl::string_view name) override;
+  absl::Status Watch(const api::Call& call,
+                     absl::string_view name,
+                     const api::WatchOptions& options,
+                     absl::FunctionRef<absl::Status(const api::MapUpdate&)> sink) override;
 
  private:
   EngineMaps(const EngineOptions& options, MapDirectory directory)

@@ -32,7 +32,7 @@ absl::Status Integrator::SetDefaultProfile(const RobotProfile& profile, const St
       [&stop](double) { return stop.status(); },
       [&staged](const SurfaceTileMaker::Rows& rows) { return staged.Put({}, rows); });
   STRATA_RETURN_IF_ERROR(made);
-  STRATA_RETURN_IF_ERROR(staged.Publish([&profile](StorageWriter& writer) {
+  STRATA_RETURN_IF_ERROR(staged.Publish({}, [&profile](StorageWriter& writer) {
     return writer.PutProfile(api::kDefaultProfile, profile);
   }));
   core_.set_default_profile(profile);

@@ -100,7 +100,7 @@ absl::Status Rebuild(Integrator& integrator, int threads, JobContext& context) {
   DerivedPass pass(integrator, version, threads, context);
   STRATA_RETURN_IF_ERROR(pass.Run(repairs));
   const absl::Status published =
-      staged.Publish([&](StorageWriter& writer) { return PutIndexes(writer, pass.indexes()); });
+      staged.Publish({}, [&](StorageWriter& writer) { return PutIndexes(writer, pass.indexes()); });
   integrator.store().Clear();
   STRATA_RETURN_IF_ERROR(published);
   context.SetMetric("scans", static_cast<double>(pass.scans()));
@@ -141,19 +141,6 @@ absl::Status Verify(Integrator& integrator, int threads, JobContext& context) {
   context.SetMessage(absl::StrCat(truth.scans(), " scans and all tiles are as they should be"));
   return findings.Verdict();
 }
-
-// Recovery has nobody to report to.
-class SilentContext final : public JobContext {
- public:
-  explicit SilentContext(const Stop& stop) : stop_(stop) {}
-  absl::Status Progress(double, absl::string_view) override { return stop_.status(); }
-  const Stop& stop() const override { return stop_; }
-  void SetMetric(const std::string&, double) override {}
-  void SetMessage(std::string) override {}
-
- private:
-  const Stop& stop_;
-};
 
 }  // namespace
 

@@ -1,4 +1,4 @@
-// Scans that leave or move: their tiles are made again from the scans that stay.
+// Scans that leave or move.
 #include <cstdint>
 #include <optional>
 #include <utility>
@@ -11,8 +11,6 @@
 
 #include "core/common/status.h"
 #include "core/engine/integrator.h"
-#include "core/engine/scan_losses.h"
-#include "core/engine/scan_source.h"
 
 namespace strata {
 namespace {
@@ -44,10 +42,26 @@ absl::Status Integrator::DeleteScan(const ScanId& id) {
                           TilesWithout(*reader, {tiles.begin(), tiles.end()}, number));
   STRATA_ASSIGN_OR_RETURN(change.version, ReserveVersion());
   STRATA_RETURN_IF_ERROR(MakeServed(*reader, change));
-  STRATA_RETURN_IF_ERROR(Commit(
-      Durability::kFull, change, [&](StorageWriter& writer) { return writer.DeleteScan(number); }));
+  STRATA_RETURN_IF_ERROR(Commit(Durability::kFull, change, {id}, [&](StorageWriter& writer) {
+    return writer.DeleteScan(number);
+  }));
   aligner_loaded_ = false;
   return absl::OkStatus();
+}
+
+absl::StatusOr<MoveOutcome> Integrator::MoveScans(
+    const ScanMoves& moves,
+    int threads,
+    JobContext& context,
+    absl::FunctionRef<absl::Status(StorageWriter&)> decision) {
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, ReserveVersion());
+  // Decoded tiles are kept by key alone: those of the coming epoch must not outlive a failure.
+  store_.Clear();
+  absl::StatusOr<MoveOutcome> outcome =
+      ScanMover(core_, store_, moves, version, threads, context).Run(decision);
+  store_.Clear();
+  aligner_loaded_ = false;
+  return outcome;
 }
 
 absl::Status Integrator::SetPose(const ScanId& id, const Pose& T_map_scan) {
@@ -61,39 +75,16 @@ absl::Status Integrator::SetPose(const ScanId& id, const Pose& T_map_scan) {
                                                           ? " is not integrated yet; wait for it"
                                                           : " failed to integrate; delete it"));
   }
-  const MapParameters parameters = core_.info().parameters;
-  ScanSource source(*reader, parameters);
-  STRATA_ASSIGN_OR_RETURN(const MlsMap contribution, source.Contribution(scan, T_map_scan));
-  STRATA_RETURN_IF_ERROR(CheckContributes(
-      contribution, source.dropped(), scan.header, scan.header.sensor.value_or(parameters.sensor)));
-  STRATA_ASSIGN_OR_RETURN(const std::vector<TileKey> old, reader->TilesOfScan(scan.number));
-  absl::btree_set<TileKey> keys(old.begin(), old.end());
-  std::vector<TileKey> tiles;
-  for (const MlsTile& tile : contribution.tiles) {
-    if (tile.patches.empty()) continue;
-    tiles.push_back(tile.key);
-    keys.insert(tile.key);
-  }
-  TileChange change;
-  STRATA_ASSIGN_OR_RETURN(change.tiles, TilesWithout(*reader, keys, scan.number));
-  JoinContribution(
-      contribution, [](const TileKey&) { return true; }, change.tiles);
-  STRATA_ASSIGN_OR_RETURN(change.version, ReserveVersion());
-  STRATA_RETURN_IF_ERROR(MakeServed(*reader, change));
-  const absl::Status done =
-      Commit(Durability::kFull, change, [&](StorageWriter& writer) -> absl::Status {
-        STRATA_ASSIGN_OR_RETURN(const std::uint64_t next,
-                                writer.BeginEpoch(absl::StrCat("pose of ", id.ToString())));
-        AlignmentReport report;
-        report.message = "set by hand";
-        STRATA_RETURN_IF_ERROR(
-            writer.PutPose({scan.number, next, T_map_scan, PoseOrigin::kPerson, report}));
-        STRATA_RETURN_IF_ERROR(writer.SetTilesOfScan(scan.number, tiles));
-        return writer.SetFootprint(scan.number, FootprintOf(scan.box_scan, T_map_scan));
-      });
-  STRATA_RETURN_IF_ERROR(done);
-  aligner_loaded_ = false;
-  return absl::OkStatus();
+  ScanMoves moves;
+  moves.poses.push_back({scan.number, T_map_scan});
+  moves.origin = PoseOrigin::kPerson;
+  moves.reason = absl::StrCat("pose of ", id.ToString());
+  SilentContext context{Stop()};
+  return MoveScans(moves,
+                   core_.options().worker_threads,
+                   context,
+                   [](StorageWriter&) { return absl::OkStatus(); })
+      .status();
 }
 
 }  // namespace strata

@@ -33,6 +33,8 @@ absl::Status StagedTiles::Put(const MlsTileMap& tiles, const SurfaceTileMaker::R
     }
   }
   for (const SurfaceTileRow& row : surfaces) served_.insert(row.key);
+  const std::vector<api::TileChangeNotice> notices = NoticesOf(surfaces);
+  notices_.insert(notices_.end(), notices.begin(), notices.end());
   if (rows.empty() && surfaces.empty()) return absl::OkStatus();
   return core_.writer().Run(
       Durability::kRelaxed, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
@@ -55,20 +57,24 @@ absl::Status StagedTiles::RetireOld(StorageWriter& writer, std::uint64_t floor) 
   return absl::OkStatus();
 }
 
-absl::Status StagedTiles::Publish(absl::FunctionRef<absl::Status(StorageWriter&)> decision) {
+absl::Status StagedTiles::Publish(const std::vector<ScanId>& scans,
+                                  absl::FunctionRef<absl::Status(StorageWriter&)> decision) {
   const std::uint64_t floor = core_.snapshots().Floor();
   MapClock clock;
-  const absl::Status done =
-      core_.writer().Run(Durability::kFull, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
+  const absl::Status done = core_.writer().Run(
+      Durability::kFull,
+      0,
+      Stop(),
+      [&](StorageWriter& writer) -> absl::Status {
         STRATA_RETURN_IF_ERROR(RetireOld(writer, floor));
         STRATA_RETURN_IF_ERROR(writer.PublishTiles(version_, true));
         STRATA_RETURN_IF_ERROR(decision(writer));
         STRATA_ASSIGN_OR_RETURN(clock, writer.reader().GetClock());
         return absl::OkStatus();
-      });
+      },
+      [&] { core_.Publish(clock, scans, notices_); });
   STRATA_RETURN_IF_ERROR(done);
   published_ = true;
-  core_.snapshots().Publish({clock.epoch, clock.tile_version});
   return absl::OkStatus();
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "absl/container/btree_set.h"
 #include "absl/functional/function_ref.h"
@@ -26,8 +27,10 @@ class StagedTiles {
 
   absl::Status Put(const MlsTileMap& tiles, const SurfaceTileMaker::Rows& surfaces);
 
-  // Makes all of it what readers see, together with what `decision` writes. Durable.
-  absl::Status Publish(absl::FunctionRef<absl::Status(StorageWriter&)> decision);
+  // Makes all of it what readers see, together with what `decision` writes; watchers learn of it
+  // and of `scans`. Durable.
+  absl::Status Publish(const std::vector<ScanId>& scans,
+                       absl::FunctionRef<absl::Status(StorageWriter&)> decision);
 
   // Tiles that were put, of either kind.
   std::size_t changed() const { return changed_.size() + served_.size(); }
@@ -41,6 +44,7 @@ class StagedTiles {
   absl::btree_set<TileKey> changed_;
   absl::btree_set<TileKey> gone_;
   absl::btree_set<TileKey> served_;
+  std::vector<api::TileChangeNotice> notices_;
 };
 
 }  // namespace strata

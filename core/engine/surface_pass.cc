@@ -20,6 +20,27 @@ namespace {
 // A square of tiles, so that a scan is read, and a border shared, by few blocks. A power of two.
 constexpr std::int32_t kBlockShift = 3;
 
+// The tiles `keys` of one level, block by block.
+absl::Status MakeLevel(SurfaceTileMaker& maker,
+                       int level,
+                       const absl::btree_set<TileKey>& keys,
+                       const Stop& stop,
+                       absl::FunctionRef<absl::Status(double)> progress,
+                       absl::FunctionRef<absl::Status(SurfaceTileMaker::Rows)> sink) {
+  const std::vector<absl::btree_set<TileKey>> blocks = TileBlocks(keys);
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const double within = static_cast<double>(i) / static_cast<double>(blocks.size());
+    // Every level has about a quarter of the tiles of the one below.
+    STRATA_RETURN_IF_ERROR(progress(level == 0 ? 0.75 * within : 0.75 + 0.02 * level));
+    STRATA_ASSIGN_OR_RETURN(
+        SurfaceTileMaker::Rows rows,
+        level == 0 ? maker.MakeBase(blocks[i], stop) : maker.MakeOverviews(blocks[i], stop));
+    STRATA_RETURN_IF_ERROR(sink(std::move(rows)));
+    maker.ForgetRows();
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 std::vector<absl::btree_set<TileKey>> TileBlocks(const absl::btree_set<TileKey>& keys) {
@@ -31,6 +52,33 @@ std::vector<absl::btree_set<TileKey>> TileBlocks(const absl::btree_set<TileKey>&
   list.reserve(blocks.size());
   for (auto& [corner, block] : blocks) list.push_back(std::move(block));
   return list;
+}
+
+std::vector<api::TileChangeNotice> NoticesOf(const std::vector<SurfaceTileRow>& rows) {
+  std::vector<api::TileChangeNotice> notices;
+  for (const SurfaceTileRow& row : rows) {
+    if (row.key.level == 0) notices.push_back({row.key, row.version, row.gone});
+  }
+  return notices;
+}
+
+absl::Status MakeChangedSurfaces(SurfaceTileMaker& maker,
+                                 absl::btree_set<TileKey> keys,
+                                 const Stop& stop,
+                                 absl::FunctionRef<absl::Status(double)> progress,
+                                 absl::FunctionRef<absl::Status(SurfaceTileMaker::Rows)> sink) {
+  for (int level = 0; level <= kMaxLevel && !keys.empty(); ++level) {
+    absl::btree_set<TileKey> parents;
+    const auto store = [&](SurfaceTileMaker::Rows rows) {
+      for (const SurfaceTileRow& row : rows) {
+        if (level < kMaxLevel) parents.insert(ParentOf(row.key));
+      }
+      return sink(std::move(rows));
+    };
+    STRATA_RETURN_IF_ERROR(MakeLevel(maker, level, keys, stop, progress, store));
+    keys = std::move(parents);
+  }
+  return absl::OkStatus();
 }
 
 absl::Status MakeAllSurfaces(SurfaceTileMaker& maker,
@@ -45,17 +93,7 @@ absl::Status MakeAllSurfaces(SurfaceTileMaker& maker,
     STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> stored,
                             reader.ListSurfaceTiles(range, maker.version()));
     for (const SurfaceTileRow& row : stored) keys.insert(row.key);
-    const std::vector<absl::btree_set<TileKey>> blocks = TileBlocks(keys);
-    for (std::size_t i = 0; i < blocks.size(); ++i) {
-      const double within = static_cast<double>(i) / static_cast<double>(blocks.size());
-      // Every level has about a quarter of the tiles of the one below.
-      STRATA_RETURN_IF_ERROR(progress(level == 0 ? 0.75 * within : 0.75 + 0.02 * level));
-      STRATA_ASSIGN_OR_RETURN(
-          SurfaceTileMaker::Rows rows,
-          level == 0 ? maker.MakeBase(blocks[i], stop) : maker.MakeOverviews(blocks[i], stop));
-      STRATA_RETURN_IF_ERROR(sink(std::move(rows)));
-      maker.ForgetRows();
-    }
+    STRATA_RETURN_IF_ERROR(MakeLevel(maker, level, keys, stop, progress, sink));
     if (level == kMaxLevel) break;
     absl::btree_set<TileKey> parents;
     for (const TileKey& key : keys) parents.insert(ParentOf(key));

@@ -14,6 +14,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/api/maps.h"
 #include "core/common/stop.h"
 #include "core/engine/mls_tiles.h"
 #include "core/mls/surface_tile.h"
@@ -87,8 +88,19 @@ class SurfaceTileMaker {
   absl::btree_map<TileKey, SurfaceTileRow> made_;
 };
 
+// What watchers are told of rows of level 0.
+std::vector<api::TileChangeNotice> NoticesOf(const std::vector<SurfaceTileRow>& rows);
+
 // Groups keys of one level into squares of a few tiles: as much as is made at a time.
 std::vector<absl::btree_set<TileKey>> TileBlocks(const absl::btree_set<TileKey>& keys);
+
+// The level-0 tiles `keys` and every tile above that changes with them, block by block; the rest as
+// MakeAllSurfaces.
+absl::Status MakeChangedSurfaces(SurfaceTileMaker& maker,
+                                 absl::btree_set<TileKey> keys,
+                                 const Stop& stop,
+                                 absl::FunctionRef<absl::Status(double)> progress,
+                                 absl::FunctionRef<absl::Status(SurfaceTileMaker::Rows)> sink);
 
 // All levels over the level-0 tiles `keys` and over whatever is stored, block by block. `progress`
 // gets the share done and may end it; `sink` gets the rows that differ, and stores them at once or

@@ -80,7 +80,8 @@ absl::Status TruthCheck::Run(Report report) {
       report(absl::StrCat("scan ", posed->scan.header.id.ToString(), ": ", what));
     });
   }
-  absl::Status constraints = reader->ListConstraints().status();
+  absl::Status constraints = reader->ListConstraints(epoch).status();
+  if (constraints.ok()) constraints = reader->ListPlanes(epoch).status();
   if (!absl::IsDataLoss(constraints)) return constraints;
   report(std::string(constraints.message()));
   return absl::OkStatus();

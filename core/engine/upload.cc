@@ -197,9 +197,15 @@ absl::StatusOr<ScanAck> EngineUpload::Finish() {
   record_.content_hash = hasher_.Digest(record_.header);
   ScanAck ack;
   const absl::Status committed = map_->core().writer().Run(
-      Durability::kFull, pieces_bytes_, call_.stop, [&](StorageWriter& writer) -> absl::Status {
+      Durability::kFull,
+      pieces_bytes_,
+      call_.stop,
+      [&](StorageWriter& writer) -> absl::Status {
         STRATA_ASSIGN_OR_RETURN(ack, Commit(writer));
         return absl::OkStatus();
+      },
+      [&] {
+        if (!ack.already_present) map_->core().changes().Add(ack.commit_sequence, {ack.id}, {});
       });
   if (!committed.ok()) return Annotate(committed, what);
   finished_ = true;

@@ -22,13 +22,8 @@ constexpr absl::Duration kRetryDelay = absl::Seconds(1);
 
 }  // namespace
 
-Worker::Worker(MapCore& core, JobBoard& jobs, std::uint64_t pending)
-    : core_(core),
-      jobs_(jobs),
-      integrator_(core),
-      pending_(pending),
-      job_waits_(jobs.AnyQueued()),
-      thread_([this] { Loop(); }) {}
+Worker::Worker(MapCore& core, std::uint64_t pending)
+    : core_(core), integrator_(core), pending_(pending), thread_([this] { Loop(); }) {}
 
 Worker::~Worker() { Close(); }
 
@@ -45,11 +40,6 @@ void Worker::ScanCommitted() {
   ++pending_;
 }
 
-void Worker::JobQueued() {
-  absl::MutexLock lock(&mutex_);
-  job_waits_ = true;
-}
-
 absl::Status Worker::Execute(const Stop& stop, Command command) {
   Task task{command, absl::OkStatus()};
   absl::MutexLock lock(&mutex_);
@@ -64,17 +54,14 @@ absl::Status Worker::Execute(const Stop& stop, Command command) {
   return task.status;
 }
 
-bool Worker::HasWork() const { return closed_ || !tasks_.empty() || pending_ > 0 || job_waits_; }
+bool Worker::HasWork() const { return closed_ || !tasks_.empty() || pending_ > 0; }
 
-// Commands go first, since somebody waits for them; jobs and batches take turns.
+// Commands go first, since somebody waits for them.
 Worker::Step Worker::NextStep() {
   absl::MutexLock lock(&mutex_);
   mutex_.Await(absl::Condition(this, &Worker::HasWork));
   if (closed_) return Step::kClosed;
-  if (!tasks_.empty()) return Step::kCommand;
-  const bool job = job_waits_ && (pending_ == 0 || batch_was_last_);
-  batch_was_last_ = !job;
-  return job ? Step::kJob : Step::kBatch;
+  return tasks_.empty() ? Step::kBatch : Step::kCommand;
 }
 
 void Worker::Loop() {
@@ -88,9 +75,6 @@ void Worker::Loop() {
         break;
       case Step::kBatch:
         RunBatch();
-        break;
-      case Step::kJob:
-        RunJob();
         break;
     }
   }
@@ -136,18 +120,6 @@ void Worker::RunRecovery() {
     absl::MutexLock lock(&mutex_);
     if (mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay)) return;
   }
-}
-
-void Worker::RunJob() {
-  const absl::Status done =
-      jobs_.RunNext(closing_, [this](const JobInfo& job, JobContext& context) {
-        return RunRebuildJob(integrator_, job, context);
-      });
-  absl::MutexLock lock(&mutex_);
-  job_waits_ = jobs_.AnyQueued();
-  if (done.ok()) return;
-  LOG(ERROR) << "map=" << core_.name() << " job: " << done.message();
-  mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
 }
 
 void Worker::Close() {

@@ -1,5 +1,5 @@
 // The one thread behind a map that changes what is derived: integrates scans in commit order, and
-// between batches runs what callers ask for and jobs.
+// between batches runs what callers and jobs ask for.
 #ifndef STRATA_CORE_ENGINE_WORKER_H_
 #define STRATA_CORE_ENGINE_WORKER_H_
 
@@ -14,7 +14,6 @@
 
 #include "core/common/stop.h"
 #include "core/engine/integrator.h"
-#include "core/engine/job_board.h"
 #include "core/engine/map_core.h"
 
 namespace strata {
@@ -25,22 +24,19 @@ class Worker {
   using Command = absl::FunctionRef<absl::Status(Integrator&)>;
 
   // `core` must outlive the worker. Begins where the last run stopped; `pending` scans wait.
-  Worker(MapCore& core, JobBoard& jobs, std::uint64_t pending);
+  Worker(MapCore& core, std::uint64_t pending);
   ~Worker();
 
   // RESOURCE_EXHAUSTED while too many scans wait for integration.
   absl::Status CheckRoom() const;
   // One more scan waits.
   void ScanCommitted();
-  // A job was queued.
-  void JobQueued();
 
   // Runs `command` on the worker's thread, before the next batch, and returns its status. `stop`
   // ends the waiting (CANCELLED, DEADLINE_EXCEEDED); once begun, a command is waited for.
   absl::Status Execute(const Stop& stop, Command command);
 
-  // Ends the thread after the step it is in; a running job goes back to the queue. What waits is
-  // answered CANCELLED. Safe to call again.
+  // Ends the thread after the step it is in. What waits is answered CANCELLED. Safe to call again.
   void Close();
 
  private:
@@ -50,7 +46,7 @@ class Worker {
     bool begun = false;
     bool done = false;
   };
-  enum class Step { kClosed, kCommand, kBatch, kJob };
+  enum class Step { kClosed, kCommand, kBatch };
 
   void Loop();
   // Rebuilds what is derived if it is not usable.
@@ -59,17 +55,13 @@ class Worker {
   bool HasWork() const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
   void RunCommand();
   void RunBatch();
-  void RunJob();
 
   MapCore& core_;
-  JobBoard& jobs_;
   Integrator integrator_;
   const Stop closing_;
   mutable absl::Mutex mutex_;
   std::deque<Task*> tasks_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t pending_ ABSL_GUARDED_BY(mutex_);
-  bool job_waits_ ABSL_GUARDED_BY(mutex_) = false;
-  bool batch_was_last_ ABSL_GUARDED_BY(mutex_) = false;
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };

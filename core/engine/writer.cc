@@ -32,11 +32,9 @@ void WriterThread::Close() {
   if (thread_.joinable()) thread_.join();
 }
 
-absl::Status WriterThread::Run(Durability durability,
-                               std::size_t bytes,
-                               const Stop& stop,
-                               Work work) {
-  Task task{work, bytes, absl::OkStatus()};
+absl::Status WriterThread::Run(
+    Durability durability, std::size_t bytes, const Stop& stop, Work work, Tell tell) {
+  Task task{work, tell, bytes, absl::OkStatus()};
   absl::MutexLock lock(&mutex_);
   const auto has_room = [this, bytes]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
     return closed_ || queued_bytes_ == 0 || queued_bytes_ + bytes <= queue_bytes_;
@@ -73,9 +71,10 @@ void WriterThread::CommitBatch(Durability durability, const Queue& batch) {
     }
     return absl::OkStatus();
   });
-  if (committed.ok()) return;
   for (Task* task : batch) {
-    if (task->status.ok()) task->status = committed;
+    if (!task->status.ok()) continue;
+    task->status = committed;
+    if (committed.ok()) task->tell();
   }
 }
 

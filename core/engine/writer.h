@@ -20,6 +20,7 @@ namespace strata {
 class WriterThread {
  public:
   using Work = absl::FunctionRef<absl::Status(StorageWriter&)>;
+  using Tell = absl::FunctionRef<void()>;
 
   // `storage` must outlive the thread and is written by nobody else. At most `queue_bytes` wait.
   WriterThread(StorageWriter& storage, std::size_t queue_bytes);
@@ -28,15 +29,22 @@ class WriterThread {
   // Runs `work` inside a commit on the writer's thread and returns when it is committed with that
   // durability. kFull goes before kRelaxed; all kFull that wait share one commit, in which work
   // that fails is undone alone. `bytes`: how much memory the work holds; with a full queue the call
-  // waits (CANCELLED, DEADLINE_EXCEEDED by `stop`). Once queued, the work is carried out.
-  absl::Status Run(Durability durability, std::size_t bytes, const Stop& stop, Work work);
+  // waits (CANCELLED, DEADLINE_EXCEEDED by `stop`). Once queued, the work is carried out. `tell` is
+  // called on the writer's thread if and when it is committed: in the order of commits.
+  absl::Status Run(Durability durability,
+                   std::size_t bytes,
+                   const Stop& stop,
+                   Work work,
+                   Tell tell = TellNobody);
 
   // Carries out what is queued, then refuses everything with CANCELLED. Safe to call again.
   void Close();
 
  private:
+  static void TellNobody() {}
   struct Task {
     Work work;
+    Tell tell;
     std::size_t bytes;
     absl::Status status;
     bool done = false;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/time/time.h"
 #include <Eigen/Geometry>
@@ -45,6 +46,8 @@ struct ScanRecord {
 enum class PoseOrigin : std::uint8_t {  // stored
   kIngest = 1,
   kPerson = 2,
+  kOptimize = 3,
+  kRevert = 4,
 };
 
 // A recorded decision: where a scan is from `epoch` on, until a later epoch says otherwise.
@@ -64,9 +67,28 @@ struct PosedScan {
 
 // A constraint between numbered scans; Constraint::i and ::j are filled in when it is read.
 struct ConstraintRecord {
-  ScanNumber scan_i = 0;
+  ScanNumber scan_i = 0;  // 0: the map itself
   ScanNumber scan_j = 0;
   Constraint constraint;
+};
+
+// A plane with the numbers of its supporters, in the order of GlobalPlane::supports; their ids are
+// filled in when it is read.
+struct PlaneRecord {
+  GlobalPlane plane;
+  std::vector<ScanNumber> scans;
+};
+
+struct ProposedPose {
+  ScanNumber scan = 0;
+  Pose T_map_scan = Pose::Identity();
+};
+
+// What global consistency keeps of a scan in its own frame, so that it need not be made twice;
+// empty: not made yet.
+struct ScanView {
+  std::string place;   // its place descriptor
+  std::string planes;  // its edges and planes
 };
 
 // Which scans; every given condition must hold.

@@ -17,6 +17,7 @@
 
 #include "core/mls/tile_key.h"
 #include "core/storage/records.h"
+#include "core/world/epoch.h"
 #include "core/world/job.h"
 #include "core/world/map_info.h"
 #include "core/world/robot_profile.h"
@@ -58,7 +59,13 @@ class StorageReader {
   virtual absl::StatusOr<std::string> GetChunk(std::uint64_t upload, std::uint32_t ordinal) = 0;
   // Of a scan whose points were dropped.
   virtual absl::StatusOr<std::string> GetLocalMap(ScanNumber number) = 0;
-  virtual absl::StatusOr<std::vector<ConstraintRecord>> ListConstraints() = 0;
+  // Those of `epoch`, by id; proposed ones are left out.
+  virtual absl::StatusOr<std::vector<ConstraintRecord>> ListConstraints(std::uint64_t epoch) = 0;
+  virtual absl::StatusOr<std::vector<PlaneRecord>> ListPlanes(std::uint64_t epoch) = 0;
+  // What a job has proposed, by scan; empty when nothing is.
+  virtual absl::StatusOr<std::vector<ProposedPose>> ListProposedPoses(std::uint64_t job) = 0;
+  // Newest first; the newest is the current one.
+  virtual absl::StatusOr<std::vector<EpochInfo>> ListEpochs() = 0;
   virtual absl::StatusOr<std::map<std::string, RobotProfile>> ListProfiles() = 0;
   virtual absl::StatusOr<std::optional<JobInfo>> FindJob(std::uint64_t id) = 0;
   virtual absl::StatusOr<std::vector<JobInfo>> ListJobs() = 0;
@@ -78,6 +85,8 @@ class StorageReader {
   virtual absl::StatusOr<std::vector<TileKey>> TilesOfScan(ScanNumber number) = 0;
   // nullopt: none stored (a scan without finite points, or damage).
   virtual absl::StatusOr<std::optional<Eigen::AlignedBox2d>> FootprintOfScan(ScanNumber number) = 0;
+  // Empty where none is stored.
+  virtual absl::StatusOr<ScanView> FindScanView(ScanNumber number) = 0;
 };
 
 // When a commit returns.
@@ -120,9 +129,28 @@ class StorageWriter {
   virtual absl::Status DeleteScan(ScanNumber number) = 0;
 
   virtual absl::Status PutPose(const PoseRecord& pose) = 0;
-  virtual absl::Status PutConstraint(const ConstraintRecord& constraint) = 0;
-  // Begins the next epoch, which starts with the poses of the current one; returns its number.
-  virtual absl::StatusOr<std::uint64_t> BeginEpoch(absl::string_view reason) = 0;
+  // From the current epoch on; returns its id.
+  virtual absl::StatusOr<std::uint64_t> PutConstraint(const ConstraintRecord& constraint) = 0;
+  // In every epoch. NOT_FOUND.
+  virtual absl::Status DeleteConstraint(std::uint64_t id) = 0;
+  // Of a constraint or a plane. NOT_FOUND.
+  virtual absl::Status EnableConstraint(std::uint64_t id, bool enabled) = 0;
+  // What a job would change; nobody sees it until it is adopted. Poses replace earlier ones.
+  virtual absl::Status ProposePose(std::uint64_t job, const ProposedPose& pose) = 0;
+  virtual absl::Status ProposeConstraint(std::uint64_t job, const ConstraintRecord& constraint) = 0;
+  virtual absl::Status ProposePlane(std::uint64_t job, const PlaneRecord& plane) = 0;
+  // The job's constraints join those of the current epoch, its planes replace them, and its poses
+  // are forgotten: the caller has put them.
+  virtual absl::Status AdoptProposal(std::uint64_t job) = 0;
+  virtual absl::Status DiscardProposal(std::uint64_t job) = 0;
+  // Begins the next epoch, which starts with poses and constraints of the current one; returns its
+  // number. `job`: that makes it, or 0.
+  virtual absl::StatusOr<std::uint64_t> BeginEpoch(absl::string_view reason, std::uint64_t job) = 0;
+  // What optimize jobs found (constraints of that origin, planes) is in the current epoch as it was
+  // in `epoch`.
+  virtual absl::Status RestoreConstraints(std::uint64_t epoch) = 0;
+  // Poses that only epochs before `epoch` use; those can not be gone back to any more.
+  virtual absl::Status ForgetEpochsBefore(std::uint64_t epoch) = 0;
   virtual absl::Status PutProfile(absl::string_view name, const RobotProfile& profile) = 0;
   // Inserts or replaces.
   virtual absl::Status PutJob(const JobInfo& job) = 0;
@@ -144,7 +172,8 @@ class StorageWriter {
   virtual absl::Status DiscardUnpublished() = 0;
   virtual absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) = 0;
   virtual absl::Status SetFootprint(ScanNumber number, const Eigen::AlignedBox2d& footprint) = 0;
-  // Removes relations and footprints of scans that are not there.
+  virtual absl::Status PutScanView(ScanNumber number, const ScanView& view) = 0;
+  // Removes relations, footprints and views of scans that are not there.
   virtual absl::Status DeleteOrphanIndexes() = 0;
   // Makes `version` the current one and, if `complete`, the derived data usable.
   virtual absl::Status PublishTiles(std::uint64_t version, bool complete) = 0;

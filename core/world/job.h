@@ -16,14 +16,18 @@ enum class JobState : std::uint8_t {  // stored
   kSucceeded = 3,
   kFailed = 4,
   kCancelled = 5,
+  kProposed = 6,  // a dry run has ended; what it found waits to be accepted or reverted
 };
 
+// Nothing more happens by itself.
 inline bool IsFinal(JobState state) { return state >= JobState::kSucceeded; }
+
+using JobParameters = std::map<std::string, std::string>;
 
 struct JobInfo {
   std::uint64_t id = 0;  // unique in the map
-  std::string kind;      // "rebuild", "verify"
-  std::map<std::string, std::string> parameters;
+  std::string kind;      // "rebuild", "verify", "optimize", "revert"
+  JobParameters parameters;
   JobState state = JobState::kQueued;
   double progress = 0.0;                  // in [0, 1]
   std::string phase;                      // what it does now, for people

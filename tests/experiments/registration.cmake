@@ -3,3 +3,8 @@ strata_executable(
   SOURCES ingest_chain.cc
   DEPS strata::registration strata::mls strata::test_support strata::test_recordings
 )
+strata_executable(
+  place_recognition place_recognition
+  SOURCES place_recognition.cc
+  DEPS strata::registration strata::mls strata::simulator strata::test_support strata::test_recordings
+)

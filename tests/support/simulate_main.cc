@@ -4,6 +4,7 @@
 //   OUT/ROBOT/scans/scan0000.pcd    in the sensor's frame
 //   OUT/ROBOT/poses_initial.txt     index-tum; odometry with noise from an exact start
 //   OUT/ROBOT/poses_truth.txt       index-tum
+#include <algorithm>
 #include <cstdint>
 #include <exception>
 #include <filesystem>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include <CLI/CLI.hpp>
@@ -28,6 +30,7 @@ struct Options {
   std::string world;
   std::filesystem::path out;
   std::uint64_t seed = 1;
+  std::vector<std::string> robots;
   RobotFiles files;
 };
 
@@ -38,22 +41,47 @@ World WorldOf(const std::string& name, std::uint64_t seed) {
   if (name == "campus") {
     return CampusWorld(seed);
   }
+  if (name == "campus_loop") {
+    return CampusLoopWorld(seed);
+  }
   if (name == "low_bridge") {
     return BridgeWorld({.parapets = true, .clearance_m = 1.5});
   }
   return BridgeWorld({.parapets = name == "bridge", .clearance_m = 3.0});
 }
 
+// Those asked for by name, or all of the world that do not drive loops.
+absl::StatusOr<std::vector<Robot>> RobotsOf(const World& world,
+                                            const std::vector<std::string>& names) {
+  if (names.empty()) return world.robots;
+  std::vector<Robot> all = world.robots;
+  all.insert(all.end(), world.loops.begin(), world.loops.end());
+  std::vector<Robot> chosen;
+  for (const std::string& name : names) {
+    const auto robot =
+        std::find_if(all.begin(), all.end(), [&](const Robot& r) { return r.name == name; });
+    if (robot == all.end()) {
+      std::string known;
+      for (const Robot& r : all) absl::StrAppend(&known, known.empty() ? "" : ", ", r.name);
+      return absl::NotFoundError(
+          absl::StrCat("no robot '", name, "' in this world; it has ", known));
+    }
+    chosen.push_back(*robot);
+  }
+  return chosen;
+}
+
 absl::Status Simulate(const Options& options) {
   const World world = WorldOf(options.world, options.seed);
+  STRATA_ASSIGN_OR_RETURN(const std::vector<Robot> robots, RobotsOf(world, options.robots));
   std::filesystem::create_directories(options.out);
   std::string places;
   for (const auto& [name, p] : world.places) {
     absl::StrAppendFormat(&places, "%s %.3f %.3f %.3f\n", name, p.x(), p.y(), p.z());
   }
   STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out / "places.txt", places));
-  for (std::size_t i = 0; i < world.robots.size(); ++i) {
-    const Robot& robot = world.robots[i];
+  for (std::size_t i = 0; i < robots.size(); ++i) {
+    const Robot& robot = robots[i];
     const std::filesystem::path folder = options.out / robot.name;
     STRATA_ASSIGN_OR_RETURN(
         const WrittenRobot written,
@@ -69,9 +97,14 @@ int Main(int argc, char** argv) {
   CLI::App app("Scans of robots in a drawn world", "strata-simulate");
   app.add_option("WORLD", options.world, "Which world")
       ->required()
-      ->check(CLI::IsMember({"bridge", "open_bridge", "low_bridge", "car_park", "campus"}));
+      ->check(CLI::IsMember(
+          {"bridge", "open_bridge", "low_bridge", "car_park", "campus", "campus_loop"}));
   app.add_option("OUT", options.out, "Folder to write to")->required();
   app.add_option("--seed", options.seed, "Of all noise")->capture_default_str();
+  app.add_option("--robot",
+                 options.robots,
+                 "Only these; the ones that drive loops (car_park: loop, bridge: eight) are "
+                 " written only when asked for");
   app.add_option("--step", options.files.step_m, "Way between scans [m]")
       ->check(CLI::Range(0.1, 100.0))
       ->capture_default_str();

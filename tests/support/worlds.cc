@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -99,6 +100,16 @@ World BridgeWorld(const BridgeOptions& options) {
   const double turn = ramp_foot + 8.0;
   world.robots = {{"over", {{-turn, 0.0, 0.0}, {turn, 0.0, 0.0}}},
                   {"under", {{0.0, -24.0, 0.0}, {0.0, 24.0, 0.0}}}};
+  const double bend = ramp_foot + 6.0;
+  world.loops = {{"eight",
+                  {{-bend, 0.0, 0.0},
+                   {bend, 0.0, 0.0},
+                   {bend, 10.3, 0.0},
+                   {0.0, 10.3, 0.0},
+                   {0.0, -11.2, 0.0},
+                   {-bend, -11.2, 0.0},
+                   {-bend, 0.0, 0.0},
+                   {-ramp_foot + 6.0, 0.0, 0.0}}}};
   world.places = {{"west", {-ramp_foot - 3.0, 0.0, 0.0}},
                   {"east", {ramp_foot + 3.0, 0.0, 0.0}},
                   {"south", {0.0, -20.0, 0.0}},
@@ -150,6 +161,21 @@ World CarParkWorld() {
                     {-16.0, -9.5, kFloor},
                     {-16.0, 5.0, kFloor},
                     {10.0, 5.0, kFloor}}}};
+  world.loops = {{"loop",
+                  {{-16.0, -9.5, 0.0},
+                   {17.0, -9.5, 0.0},
+                   {17.0, 5.0, 0.0},
+                   {-16.0, 5.0, 0.0},
+                   {-16.0, 0.0, 0.0},
+                   {14.0, 0.0, kFloor},
+                   {14.0, -9.5, kFloor},
+                   {-16.0, -9.5, kFloor},
+                   {-16.0, 5.0, kFloor},
+                   {14.0, 5.0, kFloor},
+                   {14.0, 0.0, kFloor},
+                   {-16.0, 0.0, 0.0},
+                   {-16.0, -9.5, 0.0},
+                   {-6.0, -9.5, 0.0}}}};
   world.places = {{"below", {0.0, -9.5, 0.0}},
                   {"above", {0.0, -9.5, kFloor}},
                   {"ramp_foot", {-9.5, 0.0, 0.0}},
@@ -176,30 +202,20 @@ double DistanceToRoute(const std::vector<Vector3d>& route, const Vector2d& place
   return nearest;
 }
 
-}  // namespace
-
-World CampusWorld(std::uint64_t seed) {
+// Terrain with houses and trees beside the ways of `robots`.
+World PlantCampus(std::vector<Robot> robots, std::uint64_t seed) {
   constexpr double kHalf = 150.0;
   World world;
-  world.robots = {{"north_loop", {}}, {"south_loop", {}}};
-  const std::array<Vector2d, 6> loop = {Vector2d(-100, 0),
-                                        Vector2d(100, 0),
-                                        Vector2d(105, 60),
-                                        Vector2d(20, 95),
-                                        Vector2d(-80, 70),
-                                        Vector2d(-100, 5)};
-  for (const Vector2d& p : loop) {
-    world.robots[0].waypoints.push_back(OnCampus(p.x(), p.y()));
-    world.robots[1].waypoints.push_back(OnCampus(-p.x(), -p.y()));
-  }
+  world.robots = std::move(robots);
   world.scene.SetTerrain({Vector2d(-kHalf, -kHalf), Vector2d(kHalf, kHalf)}, 1.0, CampusHeight);
   Random random(seed);
   const auto free_place = [&](double distance) {
     while (true) {
       const Vector2d place(random.Uniform(-kHalf + 15, kHalf - 15),
                            random.Uniform(-kHalf + 15, kHalf - 15));
-      if (DistanceToRoute(world.robots[0].waypoints, place) > distance &&
-          DistanceToRoute(world.robots[1].waypoints, place) > distance) {
+      if (std::all_of(world.robots.begin(), world.robots.end(), [&](const Robot& robot) {
+            return DistanceToRoute(robot.waypoints, place) > distance;
+          })) {
         return OnCampus(place.x(), place.y());
       }
     }
@@ -213,7 +229,47 @@ World CampusWorld(std::uint64_t seed) {
     AddTree(world.scene, free_place(4.0), random.Uniform(5, 10));
   }
   world.scene.Build();
+  return world;
+}
+
+}  // namespace
+
+World CampusWorld(std::uint64_t seed) {
+  std::vector<Robot> robots = {{"north_loop", {}}, {"south_loop", {}}};
+  const std::array<Vector2d, 6> loop = {Vector2d(-100, 0),
+                                        Vector2d(100, 0),
+                                        Vector2d(105, 60),
+                                        Vector2d(20, 95),
+                                        Vector2d(-80, 70),
+                                        Vector2d(-100, 5)};
+  for (const Vector2d& p : loop) {
+    robots[0].waypoints.push_back(OnCampus(p.x(), p.y()));
+    robots[1].waypoints.push_back(OnCampus(-p.x(), -p.y()));
+  }
+  World world = PlantCampus(std::move(robots), seed);
   world.places = {{"start", OnCampus(-100, 0)}, {"far", OnCampus(20, 95)}};
+  return world;
+}
+
+World CampusLoopWorld(std::uint64_t seed) {
+  constexpr int kCorners = 8;
+  constexpr double kLength = 300.0;
+  Random random(seed);
+  std::vector<Vector2d> corners;
+  for (int i = 0; i < kCorners; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / kCorners;
+    corners.push_back(random.Uniform(0.7, 1.3) * Vector2d(std::cos(angle), std::sin(angle)));
+  }
+  double length = 0.0;
+  for (int i = 0; i < kCorners; ++i) length += (corners[(i + 1) % kCorners] - corners[i]).norm();
+  const Vector2d centre(random.Uniform(-60, 60), random.Uniform(-60, 60));
+  for (Vector2d& corner : corners) corner = centre + kLength / length * corner;
+  corners.push_back(corners[0]);
+  corners.push_back(corners[0] + 10.0 * (corners[1] - corners[0]).normalized());
+  Robot robot{"loop", {}};
+  for (const Vector2d& p : corners) robot.waypoints.push_back(OnCampus(p.x(), p.y()));
+  World world = PlantCampus({robot}, seed);
+  world.places = {{"start", robot.waypoints[0]}, {"far", robot.waypoints[kCorners / 2]}};
   return world;
 }
 

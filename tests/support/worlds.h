@@ -21,12 +21,14 @@ struct Robot {
 struct World {
   Scene scene;  // built
   std::vector<Robot> robots;
+  std::vector<Robot> loops;                       // robots that come back to where they started
   std::map<std::string, Eigen::Vector3d> places;  // exact points on surfaces
 };
 
 // A deck of 12 × 4 m along x over a road along y, with ramps of slope 0.2 up to it on both sides;
 // houses, walls and posts around. Ground is z = 0, and the deck's top `clearance_m + 0.4`.
 //   robots: "over" drives up, across and down along y = 0; "under" drives along x = 0 beneath.
+//   loops: "eight" drives a figure of eight of 170 m, over the deck and under it.
 //   places: "west", "east" at the ramps' feet, "south", "north" on the road, "deck" and "under" at
 //   x = y = 0.
 struct BridgeOptions {
@@ -38,6 +40,7 @@ World BridgeWorld(const BridgeOptions& options = {});
 // Two storeys of 40 × 24 m with columns, walls with windows around them, and a ramp between. Floors
 // are z = 0 and 3.2.
 //   robots: "visitor" goes round below, up the ramp and round above.
+//   loops: "loop" goes round below, up, round above and down to its start, 230 m.
 //   places: "below" and "above" at the same x, y; "ramp_foot", "ramp_head".
 World CarParkWorld();
 
@@ -45,6 +48,11 @@ World CarParkWorld();
 //   robots: "north_loop" and "south_loop", each some 500 m, sharing the street in the middle.
 //   places: "start" and "far".
 World CampusWorld(std::uint64_t seed = 1);
+
+// The same terrain with other houses and trees.
+//   robots: "loop", 300 m round and 10 m of the way once more; shape and place by the seed.
+//   places: "start" and "far".
+World CampusLoopWorld(std::uint64_t seed = 1);
 
 }  // namespace strata::testing
 

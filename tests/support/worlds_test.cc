@@ -1,6 +1,7 @@
 #include "tests/support/worlds.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -14,8 +15,10 @@ namespace {
 using Eigen::Vector3d;
 
 std::vector<Pose> DriveOf(const World& world, const std::string& name) {
-  const auto robot = std::find_if(
-      world.robots.begin(), world.robots.end(), [&](const Robot& r) { return r.name == name; });
+  std::vector<Robot> robots = world.robots;
+  robots.insert(robots.end(), world.loops.begin(), world.loops.end());
+  const auto robot =
+      std::find_if(robots.begin(), robots.end(), [&](const Robot& r) { return r.name == name; });
   return Drive(world.scene, robot->waypoints, 1.0, 1.2);
 }
 
@@ -36,7 +39,9 @@ double HighestSensor(const std::vector<Pose>& poses) {
 
 // No robot drives through a wall: consecutive sensor positions see each other.
 void ExpectDrivesAreFree(const World& world) {
-  for (const Robot& robot : world.robots) {
+  std::vector<Robot> robots = world.robots;
+  robots.insert(robots.end(), world.loops.begin(), world.loops.end());
+  for (const Robot& robot : robots) {
     const std::vector<Pose> poses = DriveOf(world, robot.name);
     for (std::size_t i = 1; i < poses.size(); ++i) {
       const Vector3d way = poses[i].translation() - poses[i - 1].translation();
@@ -83,6 +88,36 @@ TEST(WorldsTest, CampusRobotsDriveAboutHalfAKilometreEach) {
   ExpectDrivesAreFree(world);
   for (const Robot& robot : world.robots) {
     EXPECT_NEAR(static_cast<double>(DriveOf(world, robot.name).size()), 550.0, 80.0) << robot.name;
+  }
+}
+
+// Of the last poses, how near one comes to the first, in place and in height.
+double ReturnsWithin(const std::vector<Pose>& poses) {
+  double nearest = 1e9;
+  for (std::size_t i = poses.size() - 20; i < poses.size(); ++i) {
+    nearest = std::min(nearest, (poses[i].translation() - poses[0].translation()).norm());
+  }
+  return nearest;
+}
+
+TEST(WorldsTest, LoopsComeBackToTheirStart) {
+  const World bridge = BridgeWorld();
+  const std::vector<Pose> eight = DriveOf(bridge, "eight");
+  EXPECT_LT(ReturnsWithin(eight), 1.0);
+  EXPECT_NEAR(HighestSensor(eight), 3.4 + 1.2, 0.01);
+  EXPECT_TRUE(std::any_of(eight.begin(), eight.end(), [](const Pose& T) {
+    return T.translation().head<2>().norm() < 0.6 && T.translation().z() < 1.3;
+  })) << "passes under the deck";
+  const std::vector<Pose> parking = DriveOf(CarParkWorld(), "loop");
+  EXPECT_LT(ReturnsWithin(parking), 1.0);
+  EXPECT_NEAR(HighestSensor(parking), 3.2 + 1.2, 0.05);
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const World campus = CampusLoopWorld(seed);
+    ExpectPlacesOnSurfaces(campus);
+    ExpectDrivesAreFree(campus);
+    const std::vector<Pose> loop = DriveOf(campus, "loop");
+    EXPECT_LT(ReturnsWithin(loop), 1.5) << seed;
+    EXPECT_NEAR(static_cast<double>(loop.size()), 310.0, 5.0) << seed;
   }
 }
 

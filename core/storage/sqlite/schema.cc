@@ -124,6 +124,40 @@ CREATE TABLE truth_job_metric (
   job INTEGER NOT NULL, name TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY (job, name)
 ) STRICT, WITHOUT ROWID;
 )sql",
+    R"sql(
+ALTER TABLE truth_map ADD COLUMN last_constraint INTEGER NOT NULL DEFAULT 0;
+UPDATE truth_map SET last_constraint =
+  coalesce((SELECT seq FROM sqlite_sequence WHERE name = 'truth_constraint'), 0);
+ALTER TABLE truth_map ADD COLUMN oldest_epoch INTEGER NOT NULL DEFAULT 1;
+ALTER TABLE truth_epoch ADD COLUMN job INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE truth_constraint ADD COLUMN since_epoch INTEGER NOT NULL DEFAULT 1;
+ALTER TABLE truth_constraint ADD COLUMN until_epoch INTEGER NOT NULL DEFAULT 4611686018427387904;
+ALTER TABLE truth_constraint ADD COLUMN proposed_by INTEGER NOT NULL DEFAULT 0;
+CREATE INDEX truth_constraint_proposed ON truth_constraint (proposed_by) WHERE proposed_by > 0;
+CREATE TABLE truth_plane (
+  id INTEGER PRIMARY KEY,
+  normal_x REAL NOT NULL, normal_y REAL NOT NULL, normal_z REAL NOT NULL,
+  distance REAL NOT NULL,
+  kind INTEGER NOT NULL,
+  from_edges INTEGER NOT NULL,
+  enabled INTEGER NOT NULL,
+  note TEXT NOT NULL,
+  since_epoch INTEGER NOT NULL,
+  until_epoch INTEGER NOT NULL,
+  proposed_by INTEGER NOT NULL
+) STRICT;
+CREATE TABLE truth_plane_support (
+  plane INTEGER NOT NULL,
+  scan INTEGER NOT NULL,
+  weight REAL NOT NULL,
+  rms_m REAL NOT NULL,
+  PRIMARY KEY (plane, scan)
+) STRICT, WITHOUT ROWID;
+CREATE INDEX truth_plane_support_scan ON truth_plane_support (scan);
+CREATE TABLE truth_proposed_pose (
+  job INTEGER NOT NULL, scan INTEGER NOT NULL, pose BLOB NOT NULL, PRIMARY KEY (job, scan)
+) STRICT, WITHOUT ROWID;
+)sql",
 };
 
 constexpr char kDerivedTables[] = R"sql(
@@ -153,6 +187,9 @@ CREATE TABLE derived_surface_tile (
   bytes BLOB NOT NULL,
   PRIMARY KEY (level, x, y, version)
 ) STRICT;
+CREATE TABLE derived_scan_view (
+  scan INTEGER PRIMARY KEY, place BLOB NOT NULL, planes BLOB NOT NULL
+) STRICT;
 CREATE TABLE derived_scan_tile (
   scan INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL,
   PRIMARY KEY (scan, x, y)
@@ -169,8 +206,8 @@ absl::StatusOr<bool> HasDerivedTables(Database& database) {
       const std::int64_t tables,
       database.Pragma("SELECT count(*) FROM sqlite_schema WHERE name IN ('derived_state', "
                       "'derived_mls_tile', 'derived_surface_tile', 'derived_scan_tile', "
-                      "'derived_footprint')"));
-  if (tables != 5) return false;
+                      "'derived_footprint', 'derived_scan_view')"));
+  if (tables != 6) return false;
   STRATA_ASSIGN_OR_RETURN(
       const std::int64_t schema,
       database.Pragma("SELECT coalesce(max(schema), 0) FROM derived_state WHERE id = 1"));

@@ -1,4 +1,5 @@
-// Truth: the map, its scans and what was decided about them. sqlite_tile_reader.cc has the rest.
+// Truth: the map, its scans, profiles and jobs. sqlite_posegraph.cc and sqlite_tile_reader.cc have
+// the rest.
 #include "core/storage/sqlite/sqlite_reader.h"
 
 #include <cstdint>
@@ -51,27 +52,6 @@ JobInfo ReadJob(const Statement& row) {
   job.created = absl::FromUnixMicros(row.Int(6));
   job.updated = absl::FromUnixMicros(row.Int(7));
   return job;
-}
-
-absl::StatusOr<ConstraintRecord> ReadConstraint(const Statement& row) {
-  ConstraintRecord record;
-  Constraint& constraint = record.constraint;
-  constraint.id = row.Unsigned(0);
-  record.scan_i = row.Unsigned(1);
-  record.scan_j = row.Unsigned(2);
-  const std::string what = absl::StrCat("constraint ", constraint.id);
-  absl::StatusOr<Pose> pose = DecodePose(row.Bytes(3));
-  if (!pose.ok()) return Annotate(pose.status(), what);
-  constraint.T_i_j = *pose;
-  absl::StatusOr<Matrix6d> information = DecodeMatrix6(row.Bytes(4));
-  if (!information.ok()) return Annotate(information.status(), what);
-  constraint.information = *information;
-  constraint.origin = static_cast<ConstraintOrigin>(row.Int(5));
-  constraint.enabled = row.Int(6) != 0;
-  constraint.note = row.Text(7);
-  constraint.i = {row.Text(8), row.Unsigned(9)};
-  constraint.j = {row.Text(10), row.Unsigned(11)};
-  return record;
 }
 
 }  // namespace
@@ -260,22 +240,6 @@ absl::StatusOr<std::string> SqliteReader::GetLocalMap(ScanNumber number) {
   STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
   if (!found) return absl::DataLossError(absl::StrCat("local map of scan ", number, " is gone"));
   return row.Text(0);
-}
-
-absl::StatusOr<std::vector<ConstraintRecord>> SqliteReader::ListConstraints() {
-  STRATA_ASSIGN_OR_RETURN(
-      Statement row,
-      database_.Prepare("SELECT c.id, c.scan_i, c.scan_j, c.pose, c.information, c.origin, "
-                        "c.enabled, c.note, i.trajectory, i.sequence, j.trajectory, j.sequence "
-                        "FROM truth_constraint AS c JOIN truth_scan AS i ON i.number = c.scan_i "
-                        "JOIN truth_scan AS j ON j.number = c.scan_j ORDER BY c.id"));
-  std::vector<ConstraintRecord> constraints;
-  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&]() -> absl::Status {
-    STRATA_ASSIGN_OR_RETURN(ConstraintRecord record, ReadConstraint(row));
-    constraints.push_back(std::move(record));
-    return absl::OkStatus();
-  }));
-  return constraints;
 }
 
 absl::StatusOr<std::map<std::string, RobotProfile>> SqliteReader::ListProfiles() {

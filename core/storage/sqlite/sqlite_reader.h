@@ -41,7 +41,10 @@ class SqliteReader final : public StorageReader {
   absl::StatusOr<std::uint64_t> LastUpload() override;
   absl::StatusOr<std::string> GetChunk(std::uint64_t upload, std::uint32_t ordinal) override;
   absl::StatusOr<std::string> GetLocalMap(ScanNumber number) override;
-  absl::StatusOr<std::vector<ConstraintRecord>> ListConstraints() override;
+  absl::StatusOr<std::vector<ConstraintRecord>> ListConstraints(std::uint64_t epoch) override;
+  absl::StatusOr<std::vector<PlaneRecord>> ListPlanes(std::uint64_t epoch) override;
+  absl::StatusOr<std::vector<ProposedPose>> ListProposedPoses(std::uint64_t job) override;
+  absl::StatusOr<std::vector<EpochInfo>> ListEpochs() override;
   absl::StatusOr<std::map<std::string, RobotProfile>> ListProfiles() override;
   absl::StatusOr<std::optional<JobInfo>> FindJob(std::uint64_t id) override;
   absl::StatusOr<std::vector<JobInfo>> ListJobs() override;
@@ -55,9 +58,11 @@ class SqliteReader final : public StorageReader {
   absl::StatusOr<std::vector<ScanNumber>> ScansOfTile(const TileKey& key) override;
   absl::StatusOr<std::vector<TileKey>> TilesOfScan(ScanNumber number) override;
   absl::StatusOr<std::optional<Eigen::AlignedBox2d>> FootprintOfScan(ScanNumber number) override;
+  absl::StatusOr<ScanView> FindScanView(ScanNumber number) override;
 
  private:
   absl::Status ReadJobDetails(JobInfo& job);
+  absl::Status ReadSupports(PlaneRecord& record);
 
   std::shared_ptr<Database> connection_;
   Database& database_ = *connection_;

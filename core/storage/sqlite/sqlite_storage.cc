@@ -42,7 +42,7 @@ absl::Status InsertMap(Database& database, const MapParameters& parameters, absl
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
       database.Prepare("INSERT INTO truth_map VALUES (1, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, "
-                       "?11, ?12, ?13, 0, 1)"));
+                       "?11, ?12, ?13, 0, 1, 0, 1)"));
   const GeodeticOrigin origin = parameters.origin.value_or(GeodeticOrigin());
   row.Bind(absl::ToUnixMicros(created),
            parameters.mls.cell_size_m,

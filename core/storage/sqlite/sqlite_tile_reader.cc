@@ -136,6 +136,16 @@ absl::StatusOr<std::vector<TileKey>> SqliteReader::TilesOfScan(ScanNumber number
   return tiles;
 }
 
+absl::StatusOr<ScanView> SqliteReader::FindScanView(ScanNumber number) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT place, planes FROM derived_scan_view WHERE scan = ?1"));
+  row.Bind(number);
+  STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
+  if (!found) return ScanView();
+  return ScanView{row.Text(0), row.Text(1)};
+}
+
 absl::StatusOr<std::optional<Eigen::AlignedBox2d>> SqliteReader::FootprintOfScan(
     ScanNumber number) {
   STRATA_ASSIGN_OR_RETURN(

@@ -120,9 +120,19 @@ absl::Status SqliteWriter::SetFootprint(ScanNumber number, const Eigen::AlignedB
       footprint.max().y());
 }
 
+absl::Status SqliteWriter::PutScanView(ScanNumber number, const ScanView& view) {
+  return RunSql(
+      "INSERT OR REPLACE INTO derived_scan_view (scan, place, planes) VALUES (?1, ?2, ?3)",
+      number,
+      Blob{view.place},
+      Blob{view.planes});
+}
+
 absl::Status SqliteWriter::DeleteOrphanIndexes() {
   STRATA_RETURN_IF_ERROR(
       RunSql("DELETE FROM derived_scan_tile WHERE scan NOT IN (SELECT number FROM truth_scan)"));
+  STRATA_RETURN_IF_ERROR(
+      RunSql("DELETE FROM derived_scan_view WHERE scan NOT IN (SELECT number FROM truth_scan)"));
   return RunSql("DELETE FROM derived_footprint WHERE scan NOT IN (SELECT number FROM truth_scan)");
 }
 

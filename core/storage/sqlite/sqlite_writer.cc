@@ -144,7 +144,10 @@ absl::Status SqliteWriter::DeleteScan(ScanNumber number) {
              number));
   for (const char* sql : {"DELETE FROM truth_local_map WHERE scan = ?1",
                           "DELETE FROM truth_pose WHERE scan = ?1",
+                          "DELETE FROM truth_proposed_pose WHERE scan = ?1",
                           "DELETE FROM truth_constraint WHERE scan_i = ?1 OR scan_j = ?1",
+                          "DELETE FROM truth_plane_support WHERE scan = ?1",
+                          "DELETE FROM derived_scan_view WHERE scan = ?1",
                           "DELETE FROM derived_scan_tile WHERE scan = ?1",
                           "DELETE FROM derived_footprint WHERE scan = ?1",
                           "DELETE FROM truth_scan WHERE number = ?1"}) {
@@ -167,38 +170,6 @@ absl::Status SqliteWriter::PutPose(const PoseRecord& pose) {
       pose.report.overlap,
       pose.report.rms_m,
       pose.report.iterations);
-}
-
-absl::Status SqliteWriter::PutConstraint(const ConstraintRecord& record) {
-  const Constraint& constraint = record.constraint;
-  const std::string pose = EncodePose(constraint.T_i_j);
-  const std::string information = EncodeMatrix6(constraint.information);
-  return RunSql(
-      "INSERT INTO truth_constraint (scan_i, scan_j, pose, information, origin, enabled, note) "
-      "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
-      record.scan_i,
-      record.scan_j,
-      Blob{pose},
-      Blob{information},
-      static_cast<int>(constraint.origin),
-      constraint.enabled,
-      constraint.note);
-}
-
-absl::StatusOr<std::uint64_t> SqliteWriter::BeginEpoch(absl::string_view reason) {
-  STRATA_ASSIGN_OR_RETURN(
-      Statement row,
-      database_.Prepare("UPDATE truth_map SET epoch = epoch + 1 WHERE id = 1 RETURNING epoch"));
-  STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
-  if (!found) return absl::DataLossError("store: the map's own row is missing");
-  const std::uint64_t epoch = row.Unsigned(0);
-  STRATA_RETURN_IF_ERROR(row.Run());
-  STRATA_RETURN_IF_ERROR(
-      RunSql("INSERT INTO truth_epoch (epoch, created_us, reason) VALUES (?1, ?2, ?3)",
-             epoch,
-             absl::ToUnixMicros(absl::Now()),
-             reason));
-  return epoch;
 }
 
 absl::Status SqliteWriter::PutProfile(absl::string_view name, const RobotProfile& profile) {

@@ -38,8 +38,17 @@ class SqliteWriter final : public StorageWriter {
   absl::Status DropPoints(ScanNumber number, absl::string_view local_map) override;
   absl::Status DeleteScan(ScanNumber number) override;
   absl::Status PutPose(const PoseRecord& pose) override;
-  absl::Status PutConstraint(const ConstraintRecord& constraint) override;
-  absl::StatusOr<std::uint64_t> BeginEpoch(absl::string_view reason) override;
+  absl::StatusOr<std::uint64_t> PutConstraint(const ConstraintRecord& constraint) override;
+  absl::Status DeleteConstraint(std::uint64_t id) override;
+  absl::Status EnableConstraint(std::uint64_t id, bool enabled) override;
+  absl::Status ProposePose(std::uint64_t job, const ProposedPose& pose) override;
+  absl::Status ProposeConstraint(std::uint64_t job, const ConstraintRecord& constraint) override;
+  absl::Status ProposePlane(std::uint64_t job, const PlaneRecord& plane) override;
+  absl::Status AdoptProposal(std::uint64_t job) override;
+  absl::Status DiscardProposal(std::uint64_t job) override;
+  absl::StatusOr<std::uint64_t> BeginEpoch(absl::string_view reason, std::uint64_t job) override;
+  absl::Status RestoreConstraints(std::uint64_t epoch) override;
+  absl::Status ForgetEpochsBefore(std::uint64_t epoch) override;
   absl::Status PutProfile(absl::string_view name, const RobotProfile& profile) override;
   absl::Status PutJob(const JobInfo& job) override;
 
@@ -53,6 +62,7 @@ class SqliteWriter final : public StorageWriter {
   absl::Status DiscardUnpublished() override;
   absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) override;
   absl::Status SetFootprint(ScanNumber number, const Eigen::AlignedBox2d& footprint) override;
+  absl::Status PutScanView(ScanNumber number, const ScanView& view) override;
   absl::Status DeleteOrphanIndexes() override;
   absl::Status PublishTiles(std::uint64_t version, bool complete) override;
   absl::Status DropDerived() override;
@@ -61,6 +71,13 @@ class SqliteWriter final : public StorageWriter {
   // Prepares, binds and runs a statement that returns nothing.
   template <typename... Values>
   absl::Status RunSql(const char* sql, const Values&... values);
+  // Whether the last statement changed a row.
+  absl::StatusOr<bool> Changed();
+  // The next id of a constraint or plane.
+  absl::StatusOr<std::uint64_t> NextConstraint();
+  // From the current epoch on; `job`: only proposed by it, unless 0.
+  absl::StatusOr<std::uint64_t> InsertConstraint(const ConstraintRecord& record, std::uint64_t job);
+  absl::Status InsertPlane(const PlaneRecord& record, std::uint64_t job);
 
   std::shared_ptr<Database> connection_;
   Database& database_ = *connection_;

@@ -195,6 +195,164 @@ TEST_F(StorageContractTest, BoxQueryMeetsFootprintsExactly) {
   EXPECT_EQ(count(1e6 + 1.001, 1e6 + 9), 0U);
 }
 
+ConstraintRecord Between(ScanNumber i, ScanNumber j, ConstraintOrigin origin) {
+  ConstraintRecord record;
+  record.scan_i = i;
+  record.scan_j = j;
+  record.constraint.origin = origin;
+  return record;
+}
+
+PlaneRecord PlaneOf(const std::vector<ScanNumber>& scans) {
+  PlaneRecord record;
+  record.plane.plane.distance = 2.5;
+  record.scans = scans;
+  record.plane.supports.assign(scans.size(), {{}, 4.0, 0.01});
+  return record;
+}
+
+TEST_F(StorageContractTest, ConstraintsAndPlanesShareTheirIds) {
+  const ScanNumber a = Put(1);
+  const ScanNumber b = Put(2);
+  std::uint64_t first = 0;
+  STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(first,
+                            writer().PutConstraint(Between(a, b, ConstraintOrigin::kIngest)));
+    STRATA_RETURN_IF_ERROR(writer().ProposePlane(7, PlaneOf({a, b})));
+    STRATA_RETURN_IF_ERROR(writer().AdoptProposal(7));
+    return writer().PutConstraint(Between(0, b, ConstraintOrigin::kPerson)).status();
+  }));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto constraints, reader().ListConstraints(1));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto planes, reader().ListPlanes(1));
+  ASSERT_EQ(constraints.size(), 2U);
+  ASSERT_EQ(planes.size(), 1U);
+  EXPECT_EQ(constraints[0].constraint.id, first);
+  EXPECT_EQ(planes[0].plane.id, first + 1);
+  EXPECT_EQ(constraints[1].constraint.id, first + 2);
+  EXPECT_TRUE(constraints[1].constraint.is_prior());
+  EXPECT_EQ(planes[0].plane.plane.distance, 2.5);
+  EXPECT_THAT(planes[0].scans, ElementsAre(a, b));
+  EXPECT_EQ(planes[0].plane.supports[1].scan.sequence, 2U);
+  for (const std::uint64_t id : {first, first + 1}) {
+    STRATA_EXPECT_OK(Commit([&] { return writer().EnableConstraint(id, false); }));
+  }
+  EXPECT_FALSE(reader().ListConstraints(1)->at(0).constraint.enabled);
+  EXPECT_FALSE(reader().ListPlanes(1)->at(0).plane.enabled);
+  EXPECT_THAT(Commit([&] { return writer().EnableConstraint(first + 3, false); }),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("constraint")));
+  EXPECT_THAT(Commit([&] { return writer().DeleteConstraint(first + 3); }),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("constraint")));
+  STRATA_EXPECT_OK(Commit([&] { return writer().DeleteConstraint(first); }));
+  EXPECT_EQ(reader().ListConstraints(1)->size(), 1U);
+}
+
+TEST_F(StorageContractTest, ProposalsAreSeenOnceAdoptedAndGoneOnceDiscarded) {
+  const ScanNumber a = Put(1);
+  const ScanNumber b = Put(2);
+  const auto propose = [&](std::uint64_t job) {
+    return Commit([&]() -> absl::Status {
+      Pose pose = Pose::Identity();
+      pose.translation().x() = static_cast<double>(job);
+      STRATA_RETURN_IF_ERROR(writer().ProposePose(job, {a, pose}));
+      STRATA_RETURN_IF_ERROR(
+          writer().ProposeConstraint(job, Between(a, b, ConstraintOrigin::kOptimize)));
+      return writer().ProposePlane(job, PlaneOf({a, b}));
+    });
+  };
+  STRATA_ASSERT_OK(propose(3));
+  STRATA_ASSERT_OK(propose(4));
+  EXPECT_TRUE(reader().ListConstraints(1)->empty());
+  EXPECT_TRUE(reader().ListPlanes(1)->empty());
+  ASSERT_EQ(reader().ListProposedPoses(3)->size(), 1U);
+  EXPECT_EQ(reader().ListProposedPoses(3)->at(0).T_map_scan.translation().x(), 3.0);
+  STRATA_ASSERT_OK(Commit([&] { return writer().DiscardProposal(4); }));
+  EXPECT_TRUE(reader().ListProposedPoses(4)->empty());
+  const auto adopt = [&](std::uint64_t job) {
+    return Commit([&]() -> absl::Status {
+      STRATA_RETURN_IF_ERROR(writer().BeginEpoch("better", job).status());
+      return writer().AdoptProposal(job);
+    });
+  };
+  STRATA_ASSERT_OK(adopt(3));
+  EXPECT_TRUE(reader().ListConstraints(1)->empty());
+  EXPECT_EQ(reader().ListConstraints(2)->size(), 1U);
+  EXPECT_EQ(reader().ListPlanes(2)->size(), 1U);
+  EXPECT_TRUE(reader().ListProposedPoses(3)->empty());
+  // The next one's planes replace them, its constraints come on top.
+  STRATA_ASSERT_OK(propose(5));
+  STRATA_ASSERT_OK(adopt(5));
+  EXPECT_EQ(reader().ListConstraints(3)->size(), 2U);
+  EXPECT_EQ(reader().ListPlanes(3)->size(), 1U);
+  EXPECT_NE(reader().ListPlanes(3)->at(0).plane.id, reader().ListPlanes(2)->at(0).plane.id);
+}
+
+TEST_F(StorageContractTest, AnEpochComesBackWithItsConstraints) {
+  const ScanNumber a = Put(1);
+  const ScanNumber b = Put(2);
+  const auto epoch = [&](std::uint64_t job) {
+    return Commit([&]() -> absl::Status {
+      STRATA_RETURN_IF_ERROR(
+          writer().ProposeConstraint(job, Between(a, b, ConstraintOrigin::kOptimize)));
+      STRATA_RETURN_IF_ERROR(writer().ProposePlane(job, PlaneOf({a, b})));
+      STRATA_RETURN_IF_ERROR(writer().BeginEpoch("better", job).status());
+      return writer().AdoptProposal(job);
+    });
+  };
+  const auto back_to = [&](std::uint64_t old) {
+    return Commit([&]() -> absl::Status {
+      STRATA_RETURN_IF_ERROR(writer().BeginEpoch("back", 0).status());
+      return writer().RestoreConstraints(old);
+    });
+  };
+  STRATA_ASSERT_OK(epoch(1));  // 2: one closure
+  STRATA_ASSERT_OK(epoch(2));  // 3: two
+  STRATA_ASSERT_OK(Commit(
+      [&] { return writer().PutConstraint(Between(a, b, ConstraintOrigin::kPerson)).status(); }));
+  STRATA_ASSERT_OK(back_to(1));  // 4: the person's only
+  STRATA_ASSERT_OK(back_to(3));  // 5: all three
+  STRATA_ASSERT_OK(back_to(2));  // 6: one closure, the person's
+  const std::vector<std::size_t> expected = {0, 1, 3, 1, 3, 2};
+  for (std::size_t e = 1; e <= 6; ++e) {
+    EXPECT_EQ(reader().ListConstraints(e)->size(), expected[e - 1]) << "epoch " << e;
+    EXPECT_EQ(reader().ListPlanes(e)->size(), e == 1 || e == 4 ? 0U : 1U) << "epoch " << e;
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto epochs, reader().ListEpochs());
+  ASSERT_EQ(epochs.size(), 6U);
+  EXPECT_TRUE(epochs.front().current);
+  EXPECT_EQ(epochs.front().epoch, 6U);
+  EXPECT_EQ(epochs[3].job, 2U);
+  STRATA_ASSERT_OK(Commit([&] { return writer().ForgetEpochsBefore(5); }));
+  EXPECT_EQ(reader().ListConstraints(6)->size(), 2U);
+  EXPECT_EQ(reader().ListConstraints(5)->size(), 3U);
+  EXPECT_FALSE(reader().ListEpochs()->at(2).kept);
+  EXPECT_TRUE(reader().ListEpochs()->at(1).kept);
+}
+
+TEST_F(StorageContractTest, ForgottenEpochsKeepWhatLaterOnesUse) {
+  const ScanNumber number = Put(1);
+  for (const std::uint64_t epoch : {1, 3, 5}) {
+    PoseRecord pose;
+    pose.scan = number;
+    pose.epoch = epoch;
+    pose.T_map_scan.translation().x() = static_cast<double>(epoch);
+    STRATA_ASSERT_OK(Commit([&] { return writer().PutPose(pose); }));
+  }
+  STRATA_ASSERT_OK(Commit([&] { return writer().ForgetEpochsBefore(4); }));
+  EXPECT_FALSE(reader().GetScan(number, 2)->pose.has_value());
+  EXPECT_EQ(reader().GetScan(number, 4)->pose->T_map_scan.translation().x(), 3.0);
+  EXPECT_EQ(reader().GetScan(number, 5)->pose->T_map_scan.translation().x(), 5.0);
+}
+
+TEST_F(StorageContractTest, ScanViewsAreKeptWithTheirScan) {
+  const ScanNumber number = Put(1);
+  EXPECT_EQ(reader().FindScanView(number)->place, "");
+  STRATA_ASSERT_OK(Commit([&] { return writer().PutScanView(number, {"place", "planes"}); }));
+  EXPECT_EQ(reader().FindScanView(number)->place, "place");
+  EXPECT_EQ(reader().FindScanView(number)->planes, "planes");
+  STRATA_ASSERT_OK(Commit([&] { return writer().DeleteScan(number); }));
+  EXPECT_EQ(reader().FindScanView(number)->planes, "");
+}
+
 TEST_F(StorageContractTest, DeletedScanTakesEverythingAlong) {
   const ScanNumber a = Put(1);
   const ScanNumber b = Put(2);
@@ -202,14 +360,14 @@ TEST_F(StorageContractTest, DeletedScanTakesEverythingAlong) {
     ConstraintRecord constraint;
     constraint.scan_i = a;
     constraint.scan_j = b;
-    STRATA_RETURN_IF_ERROR(writer().PutConstraint(constraint));
+    STRATA_RETURN_IF_ERROR(writer().PutConstraint(constraint).status());
     return writer().SetTilesOfScan(a, {{0, 1, 2}});
   }));
   EXPECT_THAT(reader().ScansOfTile({0, 1, 2}), IsOkAndHolds(ElementsAre(a)));
-  EXPECT_EQ(reader().ListConstraints()->at(0).constraint.j.sequence, 2U);
+  EXPECT_EQ(reader().ListConstraints(9)->at(0).constraint.j.sequence, 2U);
   STRATA_ASSERT_OK(Commit([&] { return writer().DeleteScan(a); }));
   EXPECT_THAT(reader().ScansOfTile({0, 1, 2}), IsOkAndHolds(ElementsAre()));
-  EXPECT_TRUE(reader().ListConstraints()->empty());
+  EXPECT_TRUE(reader().ListConstraints(9)->empty());
   EXPECT_EQ(reader().GetScanTotals()->scans, 1U);
   EXPECT_FALSE(reader().GetChunk(1, 0).ok());
 }

@@ -1,0 +1,164 @@
+#include "core/engine/graph_world.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+
+#include "core/common/status.h"
+
+namespace strata {
+namespace {
+
+// A surface is level or upright within this of the vertical or the horizontal [rad].
+constexpr double kStraightRad = 0.26;
+
+PlaneKind KindOf(const Eigen::Vector3d& normal) {
+  const double tilt = std::acos(std::min(1.0, std::abs(normal.z())));
+  if (tilt < kStraightRad) return PlaneKind::kLevel;
+  return tilt > M_PI_2 - kStraightRad ? PlaneKind::kWall : PlaneKind::kSloped;
+}
+
+// How far a step of odometry may be trusted that nothing was measured about.
+Matrix6d OdometryInformation(const ScanPair& pair) {
+  Vector6d information;
+  information << Eigen::Vector3d::Constant(1.0 / (pair.sigma_rad * pair.sigma_rad)),
+      Eigen::Vector3d::Constant(1.0 / (pair.sigma_m * pair.sigma_m));
+  return information.asDiagonal();
+}
+
+}  // namespace
+
+absl::Status GraphWorld::ReadScans(StorageReader& reader) {
+  ScanQuery query;
+  query.state = ScanState::kIntegrated;
+  query.skip_damaged = true;  // it keeps its pose, and verify names it
+  for (bool more = true; more;) {
+    STRATA_ASSIGN_OR_RETURN(std::vector<PosedScan> page, reader.ListScans(query, epoch_));
+    more = page.size() == query.limit;
+    if (!page.empty()) query.after = page.back().scan.number;
+    for (PosedScan& posed : page) {
+      if (!posed.pose.has_value()) continue;
+      nodes_[posed.scan.number] = scans_.size();
+      poses_.push_back(posed.pose->T_map_scan);
+      scans_.push_back(std::move(posed.scan));
+    }
+  }
+  std::map<std::string, std::map<std::uint64_t, std::size_t>> by_name;
+  for (std::size_t k = 0; k < scans_.size(); ++k) by_name[id(k).trajectory][id(k).sequence] = k;
+  for (const auto& [name, sequence] : by_name) {
+    std::vector<std::size_t>& trajectory = trajectories_.emplace_back();
+    for (const auto& [number, node] : sequence) trajectory.push_back(node);
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<GraphWorld> GraphWorld::Read(MapCore& core) {
+  GraphWorld world;
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  STRATA_RETURN_IF_ERROR(reader->Snapshot([&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());
+    world.epoch_ = clock.epoch;
+    STRATA_RETURN_IF_ERROR(world.ReadScans(*reader));
+    STRATA_ASSIGN_OR_RETURN(world.constraints_, reader->ListConstraints(clock.epoch));
+    STRATA_ASSIGN_OR_RETURN(world.planes_, reader->ListPlanes(clock.epoch));
+    return absl::OkStatus();
+  }));
+  std::erase_if(world.constraints_, [&world](const ConstraintRecord& record) {
+    return !world.nodes_.contains(record.scan_j) ||
+           (!record.constraint.is_prior() && !world.nodes_.contains(record.scan_i));
+  });
+  return world;
+}
+
+AlignmentProblem GraphWorld::Problem(const OptimizeSettings& settings) const {
+  AlignmentProblem problem;
+  problem.T_map_scan = poses_;
+  std::vector<bool> held(scans_.size(), false);
+  for (const ConstraintRecord& record : constraints_) {
+    const Constraint& constraint = record.constraint;
+    const std::size_t j = nodes_.at(record.scan_j);
+    if (constraint.is_prior()) {
+      if (constraint.enabled) {
+        problem.priors.push_back({j, constraint.T_i_j, constraint.information});
+      }
+      continue;
+    }
+    const std::size_t i = nodes_.at(record.scan_i);
+    if (!constraint.enabled) {
+      problem.excluded_pairs.emplace_back(i, j);
+    } else if (constraint.origin == ConstraintOrigin::kPerson) {
+      problem.relative.push_back({i, j, constraint.T_i_j, constraint.information, false});
+      held[std::max(i, j)] = true;
+    } else {
+      const bool closure = constraint.origin == ConstraintOrigin::kOptimize;
+      problem.pairs.push_back({i, j, closure && settings.robust});
+      if (!closure) held[std::max(i, j)] = true;
+    }
+  }
+  for (const std::vector<std::size_t>& trajectory : trajectories_) {
+    for (std::size_t k = 1; k < trajectory.size(); ++k) {
+      if (!held[trajectory[k]]) problem.pairs.push_back({trajectory[k - 1], trajectory[k]});
+    }
+  }
+  for (const PlaneRecord& record : planes_) {
+    if (record.plane.enabled) continue;
+    ExcludedPlane& excluded = problem.excluded_planes.emplace_back();
+    excluded.plane_map = record.plane.plane;
+    for (const ScanNumber scan : record.scans) {
+      if (nodes_.contains(scan)) excluded.nodes.push_back(nodes_.at(scan));
+    }
+  }
+  return problem;
+}
+
+PoseGraphProblem GraphWorld::Measured(const OptimizeSettings& settings) const {
+  const AlignmentProblem problem = Problem(settings);
+  PoseGraphProblem graph;
+  graph.T_map_scan = poses_;
+  graph.relative = problem.relative;
+  graph.priors = problem.priors;
+  std::map<std::pair<std::size_t, std::size_t>, const ConstraintRecord*> recorded;
+  for (const ConstraintRecord& record : constraints_) {
+    if (record.constraint.is_prior()) continue;
+    recorded[{nodes_.at(record.scan_i), nodes_.at(record.scan_j)}] = &record;
+  }
+  for (const ScanPair& pair : problem.pairs) {
+    RelativePoseTerm term{pair.i, pair.j};
+    term.may_be_false = pair.may_be_false;
+    const auto record = recorded.find({pair.i, pair.j});
+    if (record != recorded.end()) {
+      term.T_i_j = record->second->constraint.T_i_j;
+      term.information = record->second->constraint.information;
+    } else {
+      term.T_i_j = poses_[pair.i].inverse() * poses_[pair.j];
+      term.information = OdometryInformation(pair);
+    }
+    graph.relative.push_back(std::move(term));
+  }
+  return graph;
+}
+
+PlaneRecord GraphWorld::RecordOf(const SharedPlane& plane) const {
+  PlaneRecord record;
+  record.plane.plane = plane.plane;
+  record.plane.kind = KindOf(plane.plane.normal);
+  record.plane.from_edges = plane.from_edges;
+  for (const SharedPlane::View& view : plane.views) {
+    record.scans.push_back(number(view.scan));
+    record.plane.supports.push_back({id(view.scan), view.weight, view.rms_m});
+  }
+  return record;
+}
+
+std::vector<PlaneRecord> GraphWorld::DisabledPlanes() const {
+  std::vector<PlaneRecord> disabled;
+  for (const PlaneRecord& record : planes_) {
+    if (!record.plane.enabled) disabled.push_back(record);
+  }
+  return disabled;
+}
+
+}  // namespace strata

@@ -1,0 +1,56 @@
+// The integrated scans of a map and what holds them, as the nodes of one pose graph.
+#ifndef STRATA_CORE_ENGINE_GRAPH_WORLD_H_
+#define STRATA_CORE_ENGINE_GRAPH_WORLD_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+#include "core/engine/map_core.h"
+#include "core/engine/optimize_settings.h"
+#include "core/posegraph/alignment.h"
+#include "core/storage/storage.h"
+
+namespace strata {
+
+// One epoch as it was when read. Immutable.
+class GraphWorld {
+ public:
+  static absl::StatusOr<GraphWorld> Read(MapCore& core);
+
+  std::uint64_t epoch() const { return epoch_; }
+  std::size_t size() const { return scans_.size(); }
+  ScanNumber number(std::size_t node) const { return scans_[node].number; }
+  const ScanId& id(std::size_t node) const { return scans_[node].header.id; }
+  const std::vector<ScanRecord>& Scans() const { return scans_; }  // by number
+  const std::vector<Pose>& Poses() const { return poses_; }
+  // Nodes of every trajectory, by sequence.
+  const std::vector<std::vector<std::size_t>>& Trajectories() const { return trajectories_; }
+
+  // What is enabled: pairs to register, constraints as they are, priors. Scans that follow each
+  // other on a trajectory and are held by nothing else are a pair too.
+  AlignmentProblem Problem(const OptimizeSettings& settings) const;
+  // The same as measured when it was recorded, for a graph that has drifted apart.
+  PoseGraphProblem Measured(const OptimizeSettings& settings) const;
+
+  PlaneRecord RecordOf(const SharedPlane& plane) const;
+  std::vector<PlaneRecord> DisabledPlanes() const;
+
+ private:
+  absl::Status ReadScans(StorageReader& reader);
+
+  std::uint64_t epoch_ = 0;
+  std::vector<ScanRecord> scans_;
+  std::vector<Pose> poses_;  // beside scans_
+  std::map<ScanNumber, std::size_t> nodes_;
+  std::vector<std::vector<std::size_t>> trajectories_;
+  std::vector<ConstraintRecord> constraints_;  // between scans that are there
+  std::vector<PlaneRecord> planes_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_GRAPH_WORLD_H_

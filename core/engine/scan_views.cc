@@ -1,0 +1,93 @@
+#include "core/engine/scan_views.h"
+
+#include <utility>
+
+#include "absl/status/status.h"
+
+#include "core/common/status.h"
+#include "core/engine/aligner.h"
+#include "core/engine/scan_source.h"
+#include "core/planes/extraction.h"
+#include "core/planes/scan_planes_codec.h"
+
+namespace strata {
+namespace {
+
+// Larger clouds are looked at in their local map, so that memory stays bounded.
+constexpr std::uint64_t kMaxPlanePoints = 2'000'000;
+
+absl::StatusOr<ScanPlanes> PlanesOf(ScanSource& source,
+                                    const ScanRecord& scan,
+                                    const MlsMap& local_map,
+                                    const MapParameters& parameters) {
+  PlaneExtractionOptions options;
+  options.sensor = scan.header.sensor.value_or(parameters.sensor);
+  if (!scan.has_points || scan.header.point_count > kMaxPlanePoints) {
+    return ExtractPlanes(local_map, options);
+  }
+  PointCloud cloud;
+  STRATA_RETURN_IF_ERROR(source.ForEachBlock(scan, [&cloud](const PointCloud& block) {
+    cloud.points.insert(cloud.points.end(), block.points.begin(), block.points.end());
+    return absl::OkStatus();
+  }));
+  cloud.rows = scan.header.rows;
+  cloud.columns = scan.header.columns;
+  return ExtractPlanes(cloud, options);
+}
+
+}  // namespace
+
+ScanViews::ScanViews(MapCore& core, std::vector<ScanRecord> scans)
+    : core_(core), scans_(std::move(scans)), features_(core.options().cache_bytes) {}
+
+absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::Features(std::size_t node) {
+  {
+    absl::MutexLock lock(&mutex_);
+    if (auto held = features_.Find(node); held != nullptr) return held;
+  }
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  const MapParameters parameters = core_.info().parameters;
+  ScanSource source(*reader, parameters);
+  STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scans_[node]));
+  auto features = std::make_shared<const ScanFeatures>(
+      ScanFeatures::FromMap(local_map, FeatureOptionsOf(scans_[node])));
+  absl::MutexLock lock(&mutex_);
+  features_.Put(node, features, features->memory_bytes());
+  return features;
+}
+
+absl::StatusOr<ScanView> ScanViews::MakeView(StorageReader& reader, const ScanRecord& scan) {
+  const MapParameters parameters = core_.info().parameters;
+  ScanSource source(reader, parameters);
+  STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
+  STRATA_ASSIGN_OR_RETURN(const ScanPlanes planes, PlanesOf(source, scan, local_map, parameters));
+  const ScanView view{EncodePlace(DescribePlace(local_map)), EncodeScanPlanes(planes)};
+  // Kept for the next time; a store that is full is no reason to stop.
+  core_.writer()
+      .Run(Durability::kRelaxed,
+           view.place.size() + view.planes.size(),
+           Stop(),
+           [&](StorageWriter& writer) { return writer.PutScanView(scan.number, view); })
+      .IgnoreError();
+  return view;
+}
+
+absl::StatusOr<ScanView> ScanViews::View(std::size_t node) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  STRATA_ASSIGN_OR_RETURN(ScanView view, reader->FindScanView(scans_[node].number));
+  if (DecodePlace(view.place).ok() && DecodeScanPlanes(view.planes).ok()) return view;
+  return MakeView(*reader, scans_[node]);
+}
+
+absl::StatusOr<std::shared_ptr<const ScanPlanes>> ScanViews::Planes(std::size_t node) {
+  STRATA_ASSIGN_OR_RETURN(const ScanView view, View(node));
+  STRATA_ASSIGN_OR_RETURN(ScanPlanes planes, DecodeScanPlanes(view.planes));
+  return std::make_shared<const ScanPlanes>(std::move(planes));
+}
+
+absl::StatusOr<PlaceDescriptor> ScanViews::Place(std::size_t node) {
+  STRATA_ASSIGN_OR_RETURN(const ScanView view, View(node));
+  return DecodePlace(view.place);
+}
+
+}  // namespace strata

@@ -1,0 +1,48 @@
+// What global consistency needs of scans, made out of the store at most once while it is wanted.
+#ifndef STRATA_CORE_ENGINE_SCAN_VIEWS_H_
+#define STRATA_CORE_ENGINE_SCAN_VIEWS_H_
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+
+#include "core/engine/lru_cache.h"
+#include "core/engine/map_core.h"
+#include "core/mls/mls_map.h"
+#include "core/posegraph/alignment.h"
+#include "core/registration/place_descriptor.h"
+#include "core/storage/storage.h"
+
+namespace strata {
+
+// Nodes are the places of scans in the list it is made with. Thread-safe. Features are kept as far
+// as they fit into EngineOptions::cache_bytes; descriptors and planes are kept in the store.
+class ScanViews final : public AlignmentSource {
+ public:
+  ScanViews(MapCore& core, std::vector<ScanRecord> scans);
+
+  absl::StatusOr<std::shared_ptr<const ScanFeatures>> Features(std::size_t node) override;
+  absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t node) override;
+  absl::StatusOr<PlaceDescriptor> Place(std::size_t node);
+
+  std::size_t size() const { return scans_.size(); }
+  const ScanRecord& scan(std::size_t node) const { return scans_[node]; }
+
+ private:
+  // Loads what is stored of the scan and calls `make` for what is missing.
+  absl::StatusOr<ScanView> View(std::size_t node);
+  absl::StatusOr<ScanView> MakeView(StorageReader& reader, const ScanRecord& scan);
+
+  MapCore& core_;
+  const std::vector<ScanRecord> scans_;
+  absl::Mutex mutex_;
+  LruCache<std::size_t, ScanFeatures> features_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_SCAN_VIEWS_H_

@@ -1,0 +1,26 @@
+// Which nodes have to be held because no term says where they are.
+// Internal to core/posegraph, not installed.
+#ifndef STRATA_CORE_POSEGRAPH_GAUGE_H_
+#define STRATA_CORE_POSEGRAPH_GAUGE_H_
+
+#include <cstddef>
+#include <vector>
+
+namespace strata {
+
+// Sets of nodes joined by terms.
+class Components {
+ public:
+  explicit Components(std::size_t nodes);
+  void Join(std::size_t a, std::size_t b);
+  // The first node of each component in which no node is `anchored`, ascending.
+  std::vector<std::size_t> Unanchored(const std::vector<bool>& anchored);
+
+ private:
+  std::size_t Root(std::size_t node);
+  std::vector<std::size_t> parent_;  // a root is the first node of its component
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_POSEGRAPH_GAUGE_H_

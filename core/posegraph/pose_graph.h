@@ -1,0 +1,156 @@
+// Poses that agree best with everything known about them (thesis 7.3, 7.4): relative poses, pairs
+// of corresponding points, planes seen from any number of scans, and absolute poses.
+//
+// Frames: T_map_scan maps a scan's coordinates into the map; nodes are numbered by their place in
+// PoseGraphProblem::T_map_scan. Metres and radians. Information matrices have the order [rotation,
+// translation] and belong to a right-hand step on the pose they stand beside.
+//
+// A relative pose and a prior have the error of g2o (Kümmerle et al. 2011) in our units: with
+// Δ = T_i_j⁻¹ T_i⁻¹ T_j, e = [2 · vec q(Δ), translation of Δ], q having w ≥ 0. 2 · vec q is the
+// rotation vector up to its third power, its length ends at 2, and Σ eᵀΩe is g2o's χ² when g2o's
+// information, which is of vec q = rotation / 2, is scaled: rotation rows and columns by ½ each
+// (see InformationFromG2o). So files and database have one error.
+#ifndef STRATA_CORE_POSEGRAPH_POSE_GRAPH_H_
+#define STRATA_CORE_POSEGRAPH_POSE_GRAPH_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include <Eigen/Core>
+
+#include "core/common/stop.h"
+#include "core/geometry/pose.h"
+#include "core/geometry/primitives.h"
+#include "core/posegraph/convergence.h"
+
+namespace strata {
+
+// Σ w p̃ p̃ᵀ over weighted points p̃ = (x, y, z, 1) in scan coordinates: all that a plane needs to
+// know of the points of one scan, exactly.
+using PointMoments = Eigen::Matrix4d;
+
+// Σ w (ã; b̃)(ã; b̃)ᵀ over pairs of points, a in the scan of i, b in that of j:
+// Σ w |T_i a − T_j b|² is a function of it alone, however many pairs there are (thesis 7.17).
+using PairMoments = Eigen::Matrix<double, 8, 8>;
+
+// What a node pair knows of its relative pose (thesis 7.10–7.15).
+struct RelativePoseTerm {
+  std::size_t i = 0, j = 0;
+  Pose T_i_j = Pose::Identity();
+  Matrix6d information = Matrix6d::Identity();
+  bool may_be_false = false;  // a loop closure, which may be rejected as a whole
+};
+
+// Corresponding points of two scans (7.17), their weights being 1 / variance [1/m²].
+struct PointPairsTerm {
+  std::size_t i = 0, j = 0;
+  PairMoments moments = PairMoments::Zero();
+  bool may_be_false = false;
+};
+
+// One plane and what all scans saw of it (7.19), edge vertices and plane patches alike: the squared
+// distances of the points to the plane, which is free to move. Weights are 1 / variance [1/m²].
+// Seen by one node only it says nothing about it.
+struct PlaneTerm {
+  struct View {
+    std::size_t i = 0;
+    PointMoments moments = PointMoments::Zero();
+  };
+  Plane plane_map;  // where to start from
+  std::vector<View> views;
+};
+
+// An absolute pose (GPS, landmark). With the rotation's rows and columns 0 it is a position; it is
+// then the translation's information in the axes of T_map_scan's rotation: the identity for the
+// axes of the map.
+struct PriorTerm {
+  std::size_t i = 0;
+  Pose T_map_scan = Pose::Identity();
+  Matrix6d information = Matrix6d::Identity();
+};
+
+struct PoseGraphProblem {
+  std::vector<Pose> T_map_scan;  // where to start from
+  std::vector<bool> fixed;       // empty: none
+  std::vector<RelativePoseTerm> relative;
+  std::vector<PointPairsTerm> pairs;
+  std::vector<PlaneTerm> planes;
+  std::vector<PriorTerm> priors;
+};
+
+enum class Weighting : std::uint8_t {
+  kCovariance,   // every term by its information
+  kLocalGlobal,  // f = local_weight · l + (1 − local_weight) · g (7.21)
+};
+
+struct PoseGraphOptions {
+  Weighting weighting = Weighting::kCovariance;
+  // l sums relative poses and pairs, g planes and priors. The thesis does not normalise the two
+  // sums. Ours are both in units of their measurements' variance, and then equal weights are the
+  // most likely poses: ½ is the default and gives what kCovariance gives. More than ½ trusts
+  // correspondences more than their variance says, less trusts planes more. [1e-6, 1 − 1e-6]
+  double local_weight = 0.5;
+  ConvergenceOptions convergence;
+  // Terms that may be false are rejected if they cannot be had below this χ² (of a relative pose,
+  // or of point pairs beyond what their own best relative pose leaves) together with the rest. By
+  // graduated non-convexity with truncated least squares (Yang et al. 2020). The default is the
+  // 99.9 % quantile for 6 degrees of freedom. > 0; infinity believes everything.
+  double max_closure_chi2 = 22.458;
+};
+
+// Σ eᵀΩe of every kind of term, rejected ones included, whatever the weighting.
+struct PoseGraphCosts {
+  double relative = 0.0, pairs = 0.0, planes = 0.0, priors = 0.0;
+  double total() const { return relative + pairs + planes + priors; }
+};
+
+// A term that may be false and in the end counts nothing; all others count in full.
+struct RejectedTerm {
+  std::size_t term = 0;  // index into PoseGraphProblem::relative or pairs
+  double chi2 = 0.0;     // at the solution
+};
+
+struct NodeResidual {
+  std::size_t node = 0;
+  // Of the terms that touch the node: a term of two nodes counts half for each, a plane by views;
+  // rejected terms do not count.
+  double chi2 = 0.0;
+};
+
+struct PoseGraphSummary {
+  PoseGraphCosts before, after;
+  int iterations = 0;  // linear systems solved
+  PoseGraphTermination termination = PoseGraphTermination::kConverged;
+  std::vector<std::size_t> held;  // nodes held only because nothing else fixes their component
+  std::vector<RejectedTerm> rejected_relative, rejected_pairs;  // ascending
+  std::vector<NodeResidual> worst_nodes;                        // the 10 worst, worst first
+};
+
+struct PoseGraphSolution {
+  std::vector<Pose> T_map_scan;
+  std::vector<Plane> planes;  // of each PlaneTerm, its normal on the side it was given
+  PoseGraphSummary summary;
+};
+
+// Levenberg–Marquardt with analytic derivatives on SE(3) and on planes (3 parameters each), sparse
+// Cholesky. A component of the graph in which nothing is fixed and that has no prior is held at its
+// first node. What no term determines stays as it is. Deterministic, one thread.
+// INVALID_ARGUMENT naming the term, the field and the bound for indices out of range, i = j,
+// numbers that are not finite, matrices that are not symmetric and positive semidefinite (to 1e-9
+// of their largest entry), options out of range; CANCELLED or DEADLINE_EXCEEDED by `stop`, asked
+// before each iteration.
+absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& problem,
+                                                    const PoseGraphOptions& options = {},
+                                                    const Stop& stop = Stop());
+
+// The information [rotation, translation] of a right-hand step on T_i_j from that of g2o's
+// EDGE_SE3:QUAT, [translation, vec q].
+Matrix6d InformationFromG2o(const Matrix6d& information);
+// Its inverse.
+Matrix6d InformationToG2o(const Matrix6d& information);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_POSEGRAPH_POSE_GRAPH_H_

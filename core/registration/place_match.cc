@@ -1,0 +1,326 @@
+#include "core/registration/place_match.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <numbers>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+#include <Eigen/Core>
+
+#include "core/common/option_checks.h"
+#include "core/common/random.h"
+#include "core/mls/features.h"
+#include "core/registration/column_grid.h"
+#include "core/registration/place_search.h"
+#include "core/registration/registration_target.h"
+#include "core/registration/view_check.h"
+
+namespace strata {
+namespace {
+
+// What is compared of a scan.
+constexpr std::uint32_t kComparedOfClass = 1000;
+constexpr float kComparedRangeM = 30.0F;  // beyond, a scan is too sparse to have every partner
+constexpr float kPartnerM = 0.5F;
+constexpr int kMinCompared = 50;
+constexpr double kContradictionScale = 0.05;
+constexpr double kTiltMatters = 0.03;
+
+// Of the features of one scan, those another one could see at the pose.
+struct Comparison {
+  int seen_through = 0;
+  int visible = 0;
+  struct Share {
+    int found = 0;  // with a partner in the other
+    int all = 0;
+  };
+  Share level;
+  Share upright;
+
+  double SeenThrough() const {
+    return visible > 0 ? static_cast<double>(seen_through) / visible : 0.0;
+  }
+  // Ground fits in many places, walls do not: each counts half, whatever their numbers.
+  double Overlap() const {
+    const auto of = [](const Share& s) { return static_cast<double>(s.found) / s.all; };
+    if (level.all < kMinCompared && upright.all < kMinCompared) return 0.0;
+    if (level.all < kMinCompared) return of(upright);
+    if (upright.all < kMinCompared) return of(level);
+    return std::sqrt(of(level) * of(upright));
+  }
+};
+
+// A registered start and how well it fits.
+struct Fit {
+  RegistrationResult registration;
+  double overlap = 0.0;
+  double seen_through = 0.0;
+  double score() const { return overlap * std::exp(-seen_through / kContradictionScale); }
+};
+
+struct SampledPoint {
+  Eigen::Vector3f p;
+  bool upright;
+};
+
+std::vector<SampledPoint> SampleOf(const ScanFeatures& features) {
+  std::vector<SampledPoint> sample;
+  SplitMix64 random(1);
+  for (const auto c :
+       {FeatureClass::kTraversable, FeatureClass::kNonTraversable, FeatureClass::kVertical}) {
+    const std::vector<Eigen::Vector3f>& points = features.points(c);
+    std::vector<Eigen::Vector3f> near;
+    std::copy_if(points.begin(), points.end(), std::back_inserter(near), [](const auto& p) {
+      return p.norm() <= kComparedRangeM;
+    });
+    for (const std::uint32_t i :
+         SampleIndices(static_cast<std::uint32_t>(near.size()), kComparedOfClass, random)) {
+      sample.push_back({near[i], c == FeatureClass::kVertical});
+    }
+  }
+  return sample;
+}
+
+bool Accepted(Termination termination) {
+  return termination == Termination::kConverged || termination == Termination::kMaxIterations ||
+         termination == Termination::kDegenerate;
+}
+
+double TiltRad(const Pose& T) { return std::acos(std::clamp(T.linear()(2, 2), -1.0, 1.0)); }
+
+class Matcher {
+ public:
+  Matcher(const SeenScan& source,
+          std::span<const SeenScan> target,
+          const Eigen::Vector3d& centre,
+          double window_m,
+          const PlaceMatchOptions& options)
+      : options_(options),
+        source_(*source.features),
+        target_(Placed(target), {.radius_m = options.radius_m + window_m, .centre = centre}),
+        search_(source_, target_),
+        source_view_(source_, source.sensor_origin),
+        source_sample_(SampleOf(source_)) {
+    const PlacedScan alone[] = {{&source_, Pose::Identity()}};
+    source_grids_ = RegistrationTarget(alone, {});
+    for (const SeenScan& scan : target) {
+      views_.push_back({RangeImage(*scan.features, scan.sensor_origin),
+                        SampleOf(*scan.features),
+                        scan.T_target_scan});
+    }
+  }
+
+  void Try(const PlaceHypothesis& hypothesis, std::vector<Fit>& fits) const {
+    std::vector<Pose> starts = {hypothesis.T_target_source};
+    const Eigen::Matrix3d& R = hypothesis.T_target_source.linear();
+    const double tilt = TiltRad(hypothesis.T_target_source);
+    const Eigen::AngleAxisd untilted(std::atan2(R(1, 0), R(0, 0)), Eigen::Vector3d::UnitZ());
+    for (const CoarsePlace& place :
+         search_.Search(hypothesis, static_cast<std::size_t>(options_.max_starts))) {
+      starts.push_back(place.T_target_source);
+      if (tilt < kTiltMatters) continue;
+      Pose tilted = place.T_target_source;
+      tilted.linear() = tilted.linear() * untilted.inverse() * R;
+      starts.push_back(tilted);
+    }
+    for (const Pose& start : starts) {
+      if (std::optional<Fit> fit = FitFrom(start); fit.has_value()) fits.push_back(*fit);
+    }
+  }
+
+ private:
+  struct View {
+    RangeImage image;
+    std::vector<SampledPoint> sample;
+    Pose T_target_scan;
+  };
+
+  static std::vector<PlacedScan> Placed(std::span<const SeenScan> target) {
+    std::vector<PlacedScan> placed;
+    for (const SeenScan& scan : target) placed.push_back({scan.features, scan.T_target_scan});
+    return placed;
+  }
+
+  std::optional<Fit> FitFrom(const Pose& start) const {
+    Fit fit;
+    fit.registration = RegisterScan(source_, target_, start, options_.registration);
+    if (!Accepted(fit.registration.termination)) return std::nullopt;
+    Check(fit);
+    return fit;
+  }
+
+  // Looks from the source at the target's scans and back.
+  void Check(Fit& fit) const {
+    const Pose T_source_target = fit.registration.T_target_source.inverse();
+    Comparison forth;
+    Comparison back;
+    for (const View& view : views_) {
+      const Pose T_source_scan = T_source_target * view.T_target_scan;
+      Compare(view.sample, T_source_scan, source_view_, T_source_scan, source_grids_, forth);
+      Pose T_grid_source = fit.registration.T_target_source;
+      T_grid_source.translation() -= target_.origin();
+      Compare(source_sample_, T_source_scan.inverse(), view.image, T_grid_source, target_, back);
+    }
+    fit.seen_through = std::max(forth.SeenThrough(), back.SeenThrough());
+    fit.overlap = std::min(forth.Overlap(), back.Overlap());
+  }
+
+  // Adds what `image` and the features `grids` of the other side say about `points`.
+  static void Compare(const std::vector<SampledPoint>& points,
+                      const Pose& T_image_points,
+                      const RangeImage& image,
+                      const Pose& T_grid_points,
+                      const RegistrationTarget& grids,
+                      Comparison& sum) {
+    const Eigen::Isometry3f to_image = T_image_points.cast<float>();
+    const Eigen::Isometry3f to_grid = T_grid_points.cast<float>();
+    for (const SampledPoint& point : points) {
+      const Eigen::Vector3f p_image = to_image * point.p;
+      const Sight sight = image.At(p_image);
+      if (sight == Sight::kUnknown) continue;
+      ++sum.visible;
+      sum.seen_through += sight == Sight::kSeenThrough ? 1 : 0;
+      if (p_image.norm() > kComparedRangeM) continue;
+      Comparison::Share& share = point.upright ? sum.upright : sum.level;
+      ++share.all;
+      share.found += HasPartner(to_grid * point.p, grids) ? 1 : 0;
+    }
+  }
+
+  static bool HasPartner(const Eigen::Vector3f& p, const RegistrationTarget& grids) {
+    for (const auto c :
+         {FeatureClass::kTraversable, FeatureClass::kNonTraversable, FeatureClass::kVertical}) {
+      if (grids.grid(c).Nearest(p, kPartnerM) != ColumnGrid::kNone) return true;
+    }
+    return false;
+  }
+
+  const PlaceMatchOptions& options_;
+  const ScanFeatures& source_;
+  RegistrationTarget target_;
+  PlaceSearch search_;
+  RangeImage source_view_;
+  std::vector<SampledPoint> source_sample_;
+  RegistrationTarget source_grids_;
+  std::vector<View> views_;
+};
+
+bool SamePlace(const Pose& a, const Pose& b, const PlaceMatchOptions& options) {
+  const Pose T_a_b = a.inverse() * b;
+  return T_a_b.translation().norm() <= options.same_place_m &&
+         RotationAngleRad(T_a_b) <= options.same_place_rad;
+}
+
+PlaceVerdict VerdictOn(const Fit& fit, double rival, const PlaceMatchOptions& options) {
+  if (fit.overlap < options.min_overlap) return PlaceVerdict::kNoFit;
+  if (fit.registration.termination == Termination::kDegenerate) return PlaceVerdict::kDegenerate;
+  if (fit.seen_through > options.max_seen_through) return PlaceVerdict::kContradicted;
+  return rival >= options.rival_share ? PlaceVerdict::kAmbiguous : PlaceVerdict::kMatched;
+}
+
+}  // namespace
+
+std::vector<PlaceHypothesis> HypothesesOf(const PlaceSimilarity& similarity,
+                                          const Pose& T_target_scan) {
+  std::vector<PlaceHypothesis> hypotheses(2);
+  for (int half_turns = 0; half_turns < 2; ++half_turns) {
+    Pose& T = hypotheses[static_cast<std::size_t>(half_turns)].T_target_source;
+    T = T_target_scan;
+    T.rotate(Eigen::AngleAxisd(similarity.heading_rad + half_turns * std::numbers::pi,
+                               Eigen::Vector3d::UnitZ()));
+  }
+  return hypotheses;
+}
+
+absl::string_view ToString(PlaceVerdict verdict) {
+  switch (verdict) {
+    case PlaceVerdict::kMatched:
+      return "matched";
+    case PlaceVerdict::kNoFit:
+      return "no fit";
+    case PlaceVerdict::kDegenerate:
+      return "degenerate";
+    case PlaceVerdict::kContradicted:
+      return "contradicted";
+    case PlaceVerdict::kAmbiguous:
+      return "ambiguous";
+  }
+  return "unknown";
+}
+
+absl::Status PlaceMatchOptions::Validate() const {
+  OptionChecks checks("place match options");
+  checks.InRange("max_starts", max_starts, 1, 100);
+  checks.InRange("radius_m", radius_m, 5.0, 200.0);
+  checks.InRange("min_overlap", min_overlap, 0.0, 1.0);
+  checks.InRange("max_seen_through", max_seen_through, 0.0, 1.0);
+  checks.InRange("rival_share", rival_share, 0.0, 1.0);
+  checks.InRange("same_place_m", same_place_m, 1e-3, 100.0);
+  checks.InRange("same_place_rad", same_place_rad, 1e-3, 3.15);
+  if (!checks.status().ok()) return checks.status();
+  return registration.Validate();
+}
+
+PlaceMatch MatchPlace(const SeenScan& source,
+                      std::span<const SeenScan> target,
+                      std::span<const PlaceHypothesis> hypotheses,
+                      const PlaceMatchOptions& options) {
+  PlaceMatch match;
+  if (hypotheses.empty() || target.empty()) return match;
+  match.T_target_source = hypotheses[0].T_target_source;
+  std::vector<Fit> fits;
+  for (const PlaceHypothesis& hypothesis : hypotheses) {
+    const Matcher matcher(
+        source, target, hypothesis.T_target_source.translation(), hypothesis.radius_m, options);
+    matcher.Try(hypothesis, fits);
+  }
+  if (fits.empty()) return match;
+  const Fit& best = *std::max_element(
+      fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.score() < b.score(); });
+  for (const Fit& fit : fits) {
+    if (SamePlace(fit.registration.T_target_source, best.registration.T_target_source, options) ||
+        best.score() <= 0.0) {
+      continue;
+    }
+    match.rival = std::max(match.rival, fit.score() / best.score());
+  }
+  match.T_target_source = best.registration.T_target_source;
+  match.information = best.registration.information;
+  match.rms_m = best.registration.rms_m;
+  match.overlap = best.overlap;
+  match.seen_through = best.seen_through;
+  match.verdict = VerdictOn(best, match.rival, options);
+  if (match.matched() && options.max_seen_through > 0.0) {
+    match.confidence =
+        match.overlap * (1.0 - match.seen_through / options.max_seen_through) * (1.0 - match.rival);
+  }
+  return match;
+}
+
+std::optional<std::size_t> UniquePlace(std::span<const PlaceMatch> matches,
+                                       const PlaceMatchOptions& options) {
+  std::optional<std::size_t> best;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (!matches[i].matched()) continue;
+    if (!best.has_value() || matches[i].confidence > matches[*best].confidence) best = i;
+  }
+  if (!best.has_value()) return std::nullopt;
+  for (const PlaceMatch& other : matches) {
+    if (other.verdict == PlaceVerdict::kNoFit || other.verdict == PlaceVerdict::kContradicted) {
+      continue;
+    }
+    if (SamePlace(other.T_target_source, matches[*best].T_target_source, options)) continue;
+    if (other.overlap >= options.rival_share * matches[*best].overlap) return std::nullopt;
+  }
+  return best;
+}
+
+}  // namespace strata

@@ -1,0 +1,82 @@
+#include "core/registration/view_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/mls/features.h"
+
+namespace strata {
+namespace {
+
+constexpr int kColumns = 180;  // 2°
+constexpr int kRows = 90;
+constexpr float kMinRangeM = 2.0F;
+constexpr float kMaxRangeM = 40.0F;
+// What may differ between two visits: cells of the map and of the image, and the match's error.
+constexpr float kMarginM = 0.5F;
+constexpr float kMarginPerMetre = 0.03F;
+
+// Cell of the image, or -1 straight above and below.
+int CellOf(const Eigen::Vector3f& p, float range) {
+  constexpr float kPi = std::numbers::pi_v<float>;
+  const float elevation = std::asin(std::clamp(p.z() / range, -1.0F, 1.0F));
+  const int row = static_cast<int>((elevation / kPi + 0.5F) * kRows);
+  const int column =
+      static_cast<int>((std::atan2(p.y(), p.x()) / kPi + 1.0F) * 0.5F * kColumns) % kColumns;
+  return row < 1 || row >= kRows - 1 ? -1 : row * kColumns + column;
+}
+
+}  // namespace
+
+RangeImage::RangeImage(const ScanFeatures& features, const Eigen::Vector3d& sensor_origin)
+    : origin_(sensor_origin.cast<float>()) {
+  std::vector<Cell> own(kRows * kColumns);
+  for (int c = 0; c < kFeatureClasses; ++c) {
+    for (const Eigen::Vector3f& point : features.points(static_cast<FeatureClass>(c))) {
+      const Eigen::Vector3f p = point - origin_;
+      const float range = p.norm();
+      if (range < 1e-3F) continue;
+      const int at = CellOf(p, range);
+      if (at < 0) continue;
+      Cell& cell = own[static_cast<std::size_t>(at)];
+      cell.nearest_m = cell.nearest_m == 0.0F ? range : std::min(cell.nearest_m, range);
+      cell.farthest_m = std::max(cell.farthest_m, range);
+    }
+  }
+  cells_ = own;
+  for (int row = 1; row + 1 < kRows; ++row) {
+    for (int column = 0; column < kColumns; ++column) {
+      Cell& cell = cells_[static_cast<std::size_t>(row * kColumns + column)];
+      if (cell.nearest_m == 0.0F) continue;
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) {
+          const int x = (column + dx + kColumns) % kColumns;
+          const Cell& other = own[static_cast<std::size_t>((row + dy) * kColumns + x)];
+          if (other.nearest_m == 0.0F) continue;
+          cell.nearest_m = std::min(cell.nearest_m, other.nearest_m);
+          cell.farthest_m = std::max(cell.farthest_m, other.farthest_m);
+        }
+      }
+    }
+  }
+}
+
+Sight RangeImage::At(const Eigen::Vector3f& p_scan) const {
+  const Eigen::Vector3f p = p_scan - origin_;
+  const float range = p.norm();
+  if (cells_.empty() || !(range >= kMinRangeM && range <= kMaxRangeM)) return Sight::kUnknown;
+  const int at = CellOf(p, range);
+  if (at < 0) return Sight::kUnknown;
+  const Cell& cell = cells_[static_cast<std::size_t>(at)];
+  if (cell.nearest_m == 0.0F) return Sight::kUnknown;
+  const float margin = kMarginM + kMarginPerMetre * range;
+  if (range < cell.nearest_m - margin) return Sight::kSeenThrough;
+  return range <= cell.farthest_m + margin ? Sight::kAgreeing : Sight::kUnknown;
+}
+
+}  // namespace strata

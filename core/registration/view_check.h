@@ -1,0 +1,43 @@
+// Do two scans contradict each other at a relative pose? What one sees must not stand where the
+// other looked through, and what the other should see too must be there.
+// Internal to core/registration, not installed.
+#ifndef STRATA_CORE_REGISTRATION_VIEW_CHECK_H_
+#define STRATA_CORE_REGISTRATION_VIEW_CHECK_H_
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/registration/scan_features.h"
+
+namespace strata {
+
+// What a scan says of a point in the world.
+enum class Sight {
+  kUnknown,      // it did not look there, or something was in the way
+  kAgreeing,     // it measured about that far in that direction
+  kSeenThrough,  // it measured farther only
+};
+
+// How far a scan sees in every direction: a spherical image with the least and the greatest
+// distance of the features in each cell. Immutable.
+class RangeImage {
+ public:
+  RangeImage() = default;
+  RangeImage(const ScanFeatures& features, const Eigen::Vector3d& sensor_origin);
+
+  // `p_scan` in the frame of the scan. Points within 2 m and beyond 40 m are unknown.
+  Sight At(const Eigen::Vector3f& p_scan) const;
+
+ private:
+  struct Cell {
+    float nearest_m = 0.0F;  // 0: nothing measured
+    float farthest_m = 0.0F;
+  };
+  std::vector<Cell> cells_;  // of a cell and the eight around it
+  Eigen::Vector3f origin_ = Eigen::Vector3f::Zero();
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_REGISTRATION_VIEW_CHECK_H_
