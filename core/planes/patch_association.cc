@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <map>
 #include <numeric>
+#include <set>
 #include <span>
 #include <utility>
 #include <vector>
@@ -24,6 +25,10 @@ namespace strata {
 namespace {
 
 constexpr double kCubeM = 8.0;
+// Of areas: a much smaller patch brings no larger one in (it may bridge a kerb), and in the same
+// scan neither wins against it nor makes a draw.
+constexpr double kMinShare = 0.25;
+constexpr double kByFar = 2.0;
 
 // Patches by the cubes of space that their boxes touch.
 class PatchIndex {
@@ -67,12 +72,33 @@ class PatchIndex {
   absl::flat_hash_map<Cube, std::vector<std::uint32_t>> cubes_;
 };
 
-// The plane of the information, its normal to the side of `side`.
-Plane PlaneOf(const Eigen::Matrix4d& information, const Eigen::Vector3d& side) {
-  const Plane plane = FitMoments(information).plane;
-  if (plane.normal.dot(side) >= 0.0) return plane;
-  return {.normal = -plane.normal, .distance = -plane.distance};
-}
+// What patches say together.
+class PatchSum {
+ public:
+  void Add(const PosedPatch& patch) {
+    if (scans_.empty()) side_ = patch.plane.normal;
+    information_ += patch.information;
+    scans_.insert(patch.scan);
+  }
+  bool empty() const { return scans_.empty(); }
+  std::size_t scan_count() const { return scans_.size(); }
+
+  // The normal to the side of the patches'. REQUIRES: not empty.
+  JointPlane Joint() const {
+    const MomentsFit fit = FitMoments(information_);
+    JointPlane joint{
+        .plane = fit.plane, .mean = fit.mean, .scans = static_cast<double>(scans_.size())};
+    if (joint.plane.normal.dot(side_) < 0.0) {
+      joint.plane = {.normal = -joint.plane.normal, .distance = -joint.plane.distance};
+    }
+    return joint;
+  }
+
+ private:
+  Eigen::Matrix4d information_ = Eigen::Matrix4d::Zero();
+  Eigen::Vector3d side_ = Eigen::Vector3d::Zero();
+  std::set<std::size_t> scans_;
+};
 
 class PatchAssociation {
  public:
@@ -92,9 +118,11 @@ class PatchAssociation {
     std::vector<SharedPlane> planes;
     for (const std::uint32_t seed : order) {
       if (taken_[seed]) continue;
-      std::vector<std::uint32_t> group = Grow(seed);
+      std::vector<std::uint32_t> rivals;
+      std::vector<std::uint32_t> group = Grow(seed, rivals);
+      SettleRivals(rivals, group);
       KeepWhatFits(group);
-      if (ScanCount(group) < 2) continue;
+      if (SumOf(group).scan_count() < 2) continue;
       for (const std::uint32_t i : group) taken_[i] = true;
       planes.push_back(PlaneOfGroup(group));
     }
@@ -102,27 +130,33 @@ class PatchAssociation {
   }
 
  private:
-  std::vector<std::uint32_t> Grow(std::uint32_t seed) {
+  // `rivals` gets patches that would fit as well, but for another one of their scan.
+  std::vector<std::uint32_t> Grow(std::uint32_t seed, std::vector<std::uint32_t>& rivals) {
     ++seeds_;
     std::vector<std::uint32_t> group = {seed};
     seen_by_[seed] = seeds_;
-    Eigen::Matrix4d information = patches_[seed].information;
-    Plane plane = patches_[seed].plane;
+    PatchSum sum;
+    sum.Add(patches_[seed]);
+    JointPlane joint = sum.Joint();
     for (std::size_t next = 0; next < group.size(); ++next) {
       const PosedPatch& member = patches_[group[next]];
       for (const std::uint32_t i : index_.Near(member.box)) {
         const PosedPatch& candidate = patches_[i];
         if (taken_[i] || seen_by_[i] == seeds_ ||
             Distance(candidate.centroid, patches_[seed].centroid) > options_.max_extent_m ||
-            !FitsPlane(candidate, plane, options_) ||
+            member.patch->area_m2 < kMinShare * candidate.patch->area_m2 ||
+            !Fits(candidate, joint, options_) ||
             Overlap(candidate, member) < options_.min_overlap) {
           continue;
         }
         seen_by_[i] = seeds_;
-        if (!AgreesWithItsScan(candidate, group)) continue;
+        if (!AgreesWithItsScan(candidate, group)) {
+          rivals.push_back(i);
+          continue;
+        }
         group.push_back(i);
-        information += candidate.information;
-        plane = PlaneOf(information, plane.normal);
+        sum.Add(candidate);
+        joint = sum.Joint();
       }
     }
     return group;
@@ -130,27 +164,82 @@ class PatchAssociation {
 
   bool AgreesWithItsScan(const PosedPatch& candidate, std::span<const std::uint32_t> group) const {
     return std::all_of(group.begin(), group.end(), [&](std::uint32_t i) {
-      return patches_[i].scan != candidate.scan || Coplanar(patches_[i], candidate);
+      return patches_[i].scan != candidate.scan ||
+             Coplanar(patches_[i], candidate, options_.sigma_floor_m);
     });
+  }
+
+  // Of surfaces of one scan that are not one plane, the poses cannot say which is the group's (a
+  // floor and a ramp, a road and its kerb): the nearest to what the other scans saw is, if by far,
+  // and otherwise none.
+  void SettleRivals(const std::vector<std::uint32_t>& rivals, std::vector<std::uint32_t>& group) {
+    std::map<std::size_t, std::vector<std::uint32_t>> of_scan;
+    for (const std::uint32_t i : rivals) of_scan[patches_[i].scan].push_back(i);
+    for (auto& [scan, contenders] : of_scan) {
+      const auto own =
+          std::stable_partition(group.begin(), group.end(), [&, scan = scan](std::uint32_t i) {
+            return patches_[i].scan != scan;
+          });
+      contenders.insert(contenders.end(), own, group.end());
+      group.erase(own, group.end());
+      if (group.empty()) return;
+      const std::vector<std::uint32_t> nearest =
+          NearestByFar(contenders, SumOf(group).Joint().plane);
+      group.insert(group.end(), nearest.begin(), nearest.end());
+    }
+  }
+
+  PatchSum SumOf(std::span<const std::uint32_t> group) const {
+    PatchSum sum;
+    for (const std::uint32_t i : group) sum.Add(patches_[i]);
+    return sum;
+  }
+
+  // Empty when it is a draw.
+  std::vector<std::uint32_t> NearestByFar(std::vector<std::uint32_t> contenders,
+                                          const Plane& plane) const {
+    double largest = 0.0;
+    for (const std::uint32_t i : contenders) {
+      largest = std::max(largest, patches_[i].patch->area_m2);
+    }
+    std::erase_if(contenders, [&](std::uint32_t i) {
+      return patches_[i].patch->area_m2 < kMinShare * largest;
+    });
+    const auto distance = [&](std::uint32_t i) {
+      return RmsDistance(patches_[i].information, plane);
+    };
+    std::sort(contenders.begin(), contenders.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return std::pair(distance(a), a) < std::pair(distance(b), b);
+    });
+    const PosedPatch& best = patches_[contenders.front()];
+    std::vector<std::uint32_t> nearest;
+    for (const std::uint32_t i : contenders) {
+      if (Coplanar(patches_[i], best, options_.sigma_floor_m)) {
+        nearest.push_back(i);
+      } else if (distance(i) < kByFar * distance(contenders.front())) {
+        return {};
+      }
+    }
+    return nearest;
   }
 
   // While a patch does not fit the plane of all other scans, the farthest such leaves.
   void KeepWhatFits(std::vector<std::uint32_t>& group) const {
-    while (ScanCount(group) >= 2) {
-      Eigen::Matrix4d all = Eigen::Matrix4d::Zero();
-      std::map<std::size_t, Eigen::Matrix4d> of_scan;
-      for (const std::uint32_t i : group) {
-        all += patches_[i].information;
-        of_scan.try_emplace(patches_[i].scan, Eigen::Matrix4d::Zero()).first->second +=
-            patches_[i].information;
+    while (SumOf(group).scan_count() >= 2) {
+      std::map<std::size_t, PatchSum> others;  // of what the other scans say
+      for (const std::uint32_t i : group) others[patches_[i].scan];
+      for (auto& [scan, sum] : others) {
+        for (const std::uint32_t i : group) {
+          if (patches_[i].scan != scan) sum.Add(patches_[i]);
+        }
       }
       std::size_t worst = group.size();
       double worst_rms = 0.0;
       for (std::size_t k = 0; k < group.size(); ++k) {
         const PosedPatch& patch = patches_[group[k]];
-        const Plane others = PlaneOf(all - of_scan.at(patch.scan), patch.plane.normal);
-        if (FitsPlane(patch, others, options_)) continue;
-        const double rms = RmsDistance(patch.information, others);
+        const JointPlane joint = others.at(patch.scan).Joint();
+        if (Fits(patch, joint, options_)) continue;
+        const double rms = RmsDistance(patch.information, joint.plane);
         if (worst == group.size() || rms > worst_rms) {
           worst = k;
           worst_rms = rms;
@@ -159,13 +248,6 @@ class PatchAssociation {
       if (worst == group.size()) return;
       group.erase(group.begin() + static_cast<std::ptrdiff_t>(worst));
     }
-  }
-
-  std::size_t ScanCount(std::span<const std::uint32_t> group) const {
-    std::vector<std::size_t> scans;
-    for (const std::uint32_t i : group) scans.push_back(patches_[i].scan);
-    std::sort(scans.begin(), scans.end());
-    return static_cast<std::size_t>(std::unique(scans.begin(), scans.end()) - scans.begin());
   }
 
   // Mean square of what the patches' distances to the plane exceed their own spread by.
@@ -184,9 +266,7 @@ class PatchAssociation {
 
   SharedPlane PlaneOfGroup(std::span<const std::uint32_t> group) const {
     SharedPlane shared;
-    Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
-    for (const std::uint32_t i : group) information += patches_[i].information;
-    shared.plane = PlaneOf(information, patches_[group.front()].plane.normal);
+    shared.plane = SumOf(group).Joint().plane;
     const double disagreement = Disagreement(group, shared.plane);
     std::map<std::size_t, SharedPlane::View> views;
     for (const std::uint32_t i : group) {

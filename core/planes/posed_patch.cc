@@ -19,6 +19,7 @@ namespace strata {
 namespace {
 
 constexpr double kGate = 3.0;
+constexpr double kTiltFloorRad = 0.001;  // surfaces and sensors are no truer: 1 cm over 10 m
 
 double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
@@ -100,21 +101,25 @@ double Overlap(const PosedPatch& a, const PosedPatch& b) {
   return area(a) <= area(b) ? ShareOn(a, b) : ShareOn(b, a);
 }
 
-bool FitsPlane(const PosedPatch& patch, const Plane& plane, const SharedPlaneOptions& options) {
-  const double tilt_sigma = std::hypot(patch.tilt_sigma_rad, options.pose_sigma_rad);
-  if (AngleBetween(patch.plane.normal, plane.normal) > kGate * tilt_sigma) return false;
-  const double offset_sigma = std::hypot(
+bool Fits(const PosedPatch& patch, const JointPlane& joint, const SharedPlaneOptions& options) {
+  const double joint_tilt_sigma = options.pose_sigma_rad / std::sqrt(joint.scans);
+  const double tilt_sigma =
+      std::hypot(patch.tilt_sigma_rad, options.pose_sigma_rad, joint_tilt_sigma);
+  if (AngleBetween(patch.plane.normal, joint.plane.normal) > kGate * tilt_sigma) return false;
+  const double own_sigma = std::hypot(
       patch.offset_sigma_m, options.pose_sigma_m, options.pose_sigma_rad * patch.lever_m);
-  return Distance(patch.centroid, plane) <= kGate * offset_sigma;
+  const double joint_sigma = std::hypot(options.pose_sigma_m / std::sqrt(joint.scans),
+                                        joint_tilt_sigma * Distance(patch.centroid, joint.mean));
+  return Distance(patch.centroid, joint.plane) <= kGate * std::hypot(own_sigma, joint_sigma);
 }
 
-bool Coplanar(const PosedPatch& a, const PosedPatch& b) {
-  const double tilt_sigma = std::hypot(a.tilt_sigma_rad, b.tilt_sigma_rad);
+bool Coplanar(const PosedPatch& a, const PosedPatch& b, double sigma_floor_m) {
+  const double tilt_sigma = std::hypot(a.tilt_sigma_rad, b.tilt_sigma_rad, kTiltFloorRad);
   if (AngleBetween(a.plane.normal, b.plane.normal) > kGate * tilt_sigma) return false;
   const double apart = Distance(a.centroid, b.centroid);
-  const auto offset_fits = [apart](const PosedPatch& from, const PosedPatch& to) {
-    const double sigma =
-        std::hypot(from.offset_sigma_m, to.offset_sigma_m, from.tilt_sigma_rad * apart);
+  const auto offset_fits = [apart, sigma_floor_m](const PosedPatch& from, const PosedPatch& to) {
+    const double sigma = std::hypot(
+        sigma_floor_m, to.offset_sigma_m, std::max(from.tilt_sigma_rad, kTiltFloorRad) * apart);
     return Distance(to.centroid, from.plane) <= kGate * sigma;
   };
   return offset_fits(a, b) && offset_fits(b, a);

@@ -40,12 +40,20 @@ PosedPatch InMap(const PlanePatch& patch,
 // normal of that other one.
 double Overlap(const PosedPatch& a, const PosedPatch& b);
 
-// True if a patch of this accuracy can lie in `plane` after an error of its pose as the options
-// allow; 3σ. The normals must point to the same side.
-bool FitsPlane(const PosedPatch& patch, const Plane& plane, const SharedPlaneOptions& options);
+// A plane through patches of `scans` scans, whose poses err independently.
+struct JointPlane {
+  Plane plane;
+  Eigen::Vector3d mean;  // of what it goes through
+  double scans = 1.0;
+};
 
-// True if two patches of one scan can be one plane: no pose is between them. 3σ.
-bool Coplanar(const PosedPatch& a, const PosedPatch& b);
+// True if a patch can lie in the plane, given the accuracy of both and the errors of poses that the
+// options allow; 3σ. The normals must point to the same side.
+bool Fits(const PosedPatch& patch, const JointPlane& joint, const SharedPlaneOptions& options);
+
+// True if two patches of one scan can be one plane: no pose is between them. 3σ, where none is
+// known better than sigma_floor_m and 1 mrad.
+bool Coplanar(const PosedPatch& a, const PosedPatch& b, double sigma_floor_m);
 
 }  // namespace strata
 

@@ -57,7 +57,7 @@ class RegionGrower {
  private:
   bool Fits(const PlanarCell& cell, const Plane& plane) const {
     const double limit =
-        std::min(kSpreadGate * std::max(cell.rms_m, cell.sigma_m), options_.max_rms_m);
+        std::min(kSpreadGate * std::max(cell.rms_m, options_.sensor.sigma_m), options_.max_rms_m);
     return std::abs(cell.normal.dot(plane.normal)) >= min_cosine_ &&
            RmsDistance(cell.moments, plane) <= std::max(limit, cell.rms_m);
   }

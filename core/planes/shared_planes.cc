@@ -6,13 +6,37 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include <Eigen/Core>
 
 #include "core/common/option_checks.h"
 #include "core/planes/edge_planes.h"
+#include "core/planes/moments.h"
 #include "core/planes/patch_association.h"
 
 namespace strata {
 namespace {
+
+// True if the edges lie in a plane of patches that half of their scans see: creases of these
+// patches and borders of this surface, which would only be counted twice.
+bool IsKnown(const SharedPlane& edges,
+             std::span<const SharedPlane> patch_planes,
+             std::span<const PosedPlanes> scans,
+             double corridor_m) {
+  Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
+  for (const SharedPlane::View& view : edges.views) {
+    moments += Moved(scans[view.scan].T_map_scan, view.moments);
+  }
+  return std::any_of(patch_planes.begin(), patch_planes.end(), [&](const SharedPlane& known) {
+    if (RmsDistance(moments, known.plane) > corridor_m) return false;
+    const auto common = std::count_if(
+        edges.views.begin(), edges.views.end(), [&known](const SharedPlane::View& view) {
+          return std::any_of(known.views.begin(), known.views.end(), [&view](const auto& other) {
+            return other.scan == view.scan;
+          });
+        });
+    return 2 * common >= std::ssize(edges.views);
+  });
+}
 
 void Append(std::vector<SharedPlane> found, std::vector<SharedPlane>& planes) {
   std::stable_sort(found.begin(), found.end(), [](const SharedPlane& a, const SharedPlane& b) {
@@ -43,7 +67,11 @@ std::vector<SharedPlane> FindSharedPlanes(std::span<const PosedPlanes> scans,
                                           const SharedPlaneOptions& options) {
   std::vector<SharedPlane> planes;
   Append(FindPatchPlanes(scans, options), planes);
-  Append(FindEdgePlanes(scans, options), planes);
+  std::vector<SharedPlane> of_edges = FindEdgePlanes(scans, options);
+  std::erase_if(of_edges, [&](const SharedPlane& plane) {
+    return IsKnown(plane, planes, scans, options.corridor_m);
+  });
+  Append(std::move(of_edges), planes);
   return planes;
 }
 

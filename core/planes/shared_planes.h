@@ -44,8 +44,8 @@ struct SharedPlaneOptions {
   // Of a scan's pose relative to the others that see a plane: what the gates of 3σ allow for beside
   // the spread of the features. Larger finds more planes and joins more that are none; in
   // [0, 10] and [0, 0.3].
-  double pose_sigma_m = 0.05;
-  double pose_sigma_rad = 0.01;
+  double pose_sigma_m = 0.03;
+  double pose_sigma_rad = 0.005;
   // Two patches are one surface only if so much of the smaller one lies on the other; in [0, 1].
   double min_overlap = 0.2;
   // Nothing lies farther from where a plane was begun: what is flat here may bend there; in
@@ -70,7 +70,8 @@ struct SharedPlaneOptions {
 // of the same facing side while offset and tilt pass the gates; of two surfaces of one scan that
 // are not one plane by that scan's own accuracy at most one is in a plane; views that do not
 // fit the plane of all others leave. Edges: RANSAC over pairs of edges by length, corridor, hill
-// climbing (5.2.3). A patch is in at most one plane. Order: patches' planes
+// climbing (5.2.3); those that are the border of a plane of patches are left out. A patch is in at
+// most one plane. Order: patches' planes
 // by falling support value, then edges'. `options` must be valid and poses finite. A pure function,
 // thread-safe.
 std::vector<SharedPlane> FindSharedPlanes(std::span<const PosedPlanes> scans,

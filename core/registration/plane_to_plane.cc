@@ -1,6 +1,7 @@
 #include "core/registration/plane_to_plane.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -19,6 +20,20 @@ namespace {
 constexpr float kMaxSlackM = 0.03F;
 // Of coordinates and distances in float.
 constexpr float kRoundingM = 1e-4F;
+
+// Sines of the angles at which a surface is seen; closer to its own plane nobody knows the side.
+constexpr double kGrazing = 0.1;
+
+// True if a surface with this normal at p, seen from `a`, is seen from its other side from `b`.
+bool OppositeSides(const Eigen::Vector3d& p,
+                   const Eigen::Vector3d& normal,
+                   const Eigen::Vector3d& a,
+                   const Eigen::Vector3d& b) {
+  const double side_a = normal.dot(a - p);
+  const double side_b = normal.dot(b - p);
+  return side_a * side_b < 0.0 && std::abs(side_a) > kGrazing * (a - p).norm() &&
+         std::abs(side_b) > kGrazing * (b - p).norm();
+}
 
 Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
@@ -76,6 +91,7 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
   PlaneToPlaneSums sums;
   const Eigen::Matrix3d R = T_target_source.linear();
   const Eigen::Vector3d t = T_target_source.translation();
+  const Eigen::Vector3d sensor = T_target_source * source_.sensor_origin();
   const double tangent2 = options_.tangent_sigma_m * options_.tangent_sigma_m;
   const double flattening = tangent2 - options_.normal_sigma_m * options_.normal_sigma_m;
   const double inverse_width2 = 1.0 / (options_.robust_width * options_.robust_width);
@@ -93,6 +109,10 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
     const SurfaceElement q =
         fine ? TargetElement(sampled.feature_class, j)
              : SurfaceElement{grid.points()[j], R.cast<float>() * sampled.element.normal};
+    if (target_.sensor().has_value() &&
+        OppositeSides(q.point.cast<double>(), q.normal.cast<double>(), sensor, *target_.sensor())) {
+      continue;
+    }
     const Eigen::Vector3d r = R.transpose() * (q.point.cast<double>() - p_target);
     const Eigen::Vector3d normal_p = sampled.element.normal.cast<double>();
     const Eigen::Vector3d normal_q = R.transpose() * q.normal.cast<double>();

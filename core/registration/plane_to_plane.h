@@ -44,7 +44,8 @@ class PlaneToPlaneMatcher {
                       const MlsRegistrationOptions& options);
 
   // `fine` uses `max_samples` and both sides' normals; otherwise `coarse_samples` and only the
-  // source's, which are at hand. Normals of the target are computed at its first match and kept.
+  // source's, which are at hand. Two sides of a thin wall are no match where the target is one
+  // scan. Normals of the target are computed at its first match and kept.
   PlaneToPlaneSums Linearise(const Pose& T_target_source, double gate_m, bool fine);
 
  private:

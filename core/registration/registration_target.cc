@@ -70,6 +70,9 @@ absl::Status TargetOptions::Validate() const {
 RegistrationTarget::RegistrationTarget(std::span<const PlacedScan> scans,
                                        const TargetOptions& options)
     : origin_(options.centre) {
+  if (scans.size() == 1) {
+    sensor_ = scans[0].T_target_scan * scans[0].features->sensor_origin() - origin_;
+  }
   const auto radius_m2 = static_cast<float>(options.radius_m * options.radius_m);
   for (int c = 0; c < kFeatureClasses; ++c) {
     std::vector<Eigen::Vector3f> points;

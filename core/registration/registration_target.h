@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "core/geometry/pose.h"
@@ -41,6 +42,9 @@ class RegistrationTarget {
   explicit RegistrationTarget(std::span<const PlacedScan> scans, const TargetOptions& options = {});
 
   const ColumnGrid& grid(FeatureClass c) const { return *grids_[static_cast<std::size_t>(c)]; }
+  // Where all of it was seen from, in the grids' coordinates: of a single scan; of several nobody
+  // knows which saw what.
+  const std::optional<Eigen::Vector3d>& sensor() const { return sensor_; }
   // Of the grids' coordinates, in the target frame.
   const Eigen::Vector3d& origin() const { return origin_; }
   std::size_t size() const;
@@ -48,6 +52,7 @@ class RegistrationTarget {
 
  private:
   std::array<std::shared_ptr<const ColumnGrid>, kFeatureClasses> grids_;  // never null
+  std::optional<Eigen::Vector3d> sensor_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
 };
 

@@ -177,6 +177,7 @@ ScanFeatures ScanFeatures::FromFeatures(std::span<const Feature> features,
 ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const ScanFeatureOptions& options) {
   ScanFeatures features;
   features.points_ = std::move(points);
+  features.sensor_origin_ = options.sensor_origin;
   std::array<ColumnGrid, kFeatureClasses> grids;
   if (options.sample_count == 0) return features;
   for (int c = 0; c < kFeatureClasses; ++c) {

@@ -29,8 +29,8 @@ struct ScanFeatureOptions {
   std::uint64_t seed = 1;
   int neighbours = 16;              // that span a surface element; in [4, 32]
   double neighbour_radius_m = 1.5;  // farther ones do not count; in [0.01, 100]
-  // FromMap: where the scan was taken from, in its frame; finite. What it saw from below is not
-  // what others saw from above.
+  // Where the scan was taken from, in its frame; finite. What it saw from one side is not what
+  // another scan saw from the other.
   Eigen::Vector3d sensor_origin = Eigen::Vector3d::Zero();
 
   // INVALID_ARGUMENT naming every field out of its range.
@@ -81,10 +81,13 @@ class ScanFeatures {
   }
   // In random order: any prefix is a uniform sample.
   const std::vector<SampledFeature>& sample() const { return sample_; }
+  // ScanFeatureOptions::sensor_origin.
+  const Eigen::Vector3d& sensor_origin() const { return sensor_origin_; }
   std::size_t size() const;
   std::size_t memory_bytes() const;
 
  private:
+  Eigen::Vector3d sensor_origin_ = Eigen::Vector3d::Zero();
   std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points_;
   std::vector<SampledFeature> sample_;
 };

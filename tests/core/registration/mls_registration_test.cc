@@ -205,6 +205,38 @@ TEST(RegisterScanTest, UndersideOfADeckIsNotDrawnOntoItsTop) {
   EXPECT_LT((T_world_below.inverse() * r.T_target_source).translation().norm(), 0.01);
 }
 
+// A hut with walls of 0.1 m, drawn as a scan from outside and one from inside see it.
+PointCloud Hut(double half_m, const Pose& T_world_scan, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> along(-half_m, half_m);
+  std::uniform_real_distribution<double> tall(0.0, 2.5);
+  std::normal_distribution<double> noise(0.0, 0.005);
+  PointCloud cloud;
+  const Pose T_scan_world = T_world_scan.inverse();
+  for (int i = 0; i < 20000; ++i) {
+    const double across = half_m + noise(random);
+    const double a = along(random);
+    const Eigen::Vector3d p = i % 2 == 0 ? Eigen::Vector3d(across, a, tall(random))
+                                         : Eigen::Vector3d(a, across, tall(random));
+    cloud.points.push_back((T_scan_world * p).cast<float>());
+  }
+  return cloud;
+}
+
+TEST(RegisterScanTest, TheTwoSidesOfAThinWallAreNotDrawnOntoEachOther) {
+  const Pose outside = MakePose(Eigen::Quaterniond::Identity(), {6.0, 7.0, 1.2});
+  const Pose inside = MakePose(Eigen::Quaterniond::Identity(), {0.0, 0.0, 1.2});
+  const ScanFeatures from_outside = Features(Hut(3.0, outside, 1));
+  const ScanFeatures from_inside = Features(Hut(2.9, inside, 2));
+  const RegistrationTarget target = TargetOf(from_outside);
+  const Pose truth = outside.inverse() * inside;
+  const RegistrationResult result = RegisterScan(from_inside, target, truth);
+  EXPECT_EQ(result.termination, Termination::kTooLittleOverlap);
+  // Seen from the same side it is one.
+  const ScanFeatures again = Features(Hut(3.0, outside, 3));
+  EXPECT_TRUE(RegisterScan(again, target, Pose::Identity()).inliers > 500);
+}
+
 TEST(RegisterScanTest, ClassesAreMatchedAmongThemselvesOnly) {
   std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points;
   for (int i = 0; i < 400; ++i) {

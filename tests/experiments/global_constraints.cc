@@ -1,0 +1,374 @@
+// The thesis' experiments on local and global constraints (7.4.4), ours beside the thesis' numbers:
+//
+//   global_constraints table_7_1      the small house, 4 views, low and high noise, 10 starts each
+//   global_constraints fig_7_9        the same with 2 to 6 views
+//   global_constraints sigma_alpha    edges' deviation from their planes on the large building
+//   global_constraints facade [STEP]  recorded facade (eth_facade_tls), every STEP-th scan
+//
+// Three columns: local constraints by point-to-point ICP as in the thesis, our local constraints,
+// and ours with planes. What it is run with stands in global_constraint_cases.h.
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/common/stop.h"
+#include "core/mls/build.h"
+#include "core/planes/extraction.h"
+#include "core/planes/moments.h"
+#include "core/planes/shared_planes.h"
+#include "core/posegraph/alignment.h"
+#include "core/registration/scan_features.h"
+#include "tests/experiments/global_constraint_cases.h"
+#include "tests/support/data_dir.h"
+#include "tests/support/pcd.h"
+#include "tests/support/views.h"
+
+namespace strata {
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+using testing::View;
+
+// Scans held in memory.
+class Scans : public AlignmentSource {
+ public:
+  struct Sizes {
+    double cell_m = 0.1;        // of the maps that are matched
+    double sigma_m = 0.01;      // of the sensor
+    double min_area_m2 = 1.0;   // of a patch
+    double plane_cell_m = 2.0;  // PlaneExtractionOptions::cell_size_m
+    double min_edge_length_m = 1.0;
+  };
+
+  void Add(const PointCloud& cloud, const Sizes& sizes) {
+    const SensorModel sensor{.sigma_m = sizes.sigma_m, .sigma_per_metre = 0.0};
+    PointCloud finite;
+    for (const Eigen::Vector3f& p : cloud.points) {
+      if (p.allFinite()) finite.points.push_back(p);
+    }
+    const MlsParameters mls{.cell_size_m = sizes.cell_m};
+    const MlsMap map = BuildMlsMap(finite, Pose::Identity(), sensor, mls).value().map;
+    features_.push_back(std::make_shared<const ScanFeatures>(
+        ScanFeatures::FromMap(map, {.samples_per_metre = 1.0 / sizes.cell_m})));
+    PlaneExtractionOptions extraction;
+    extraction.sensor = sensor;
+    extraction.cell_size_m = sizes.plane_cell_m;
+    extraction.min_area_m2 = sizes.min_area_m2;
+    extraction.min_edge_length_m = sizes.min_edge_length_m;
+    planes_.push_back(std::make_shared<const ScanPlanes>(ExtractPlanes(cloud, extraction)));
+  }
+
+  absl::StatusOr<std::shared_ptr<const ScanFeatures>> Features(std::size_t node) override {
+    return features_[node];
+  }
+  absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t node) override {
+    return planes_[node];
+  }
+  std::vector<PosedPlanes> Posed(const std::vector<Pose>& poses) const {
+    std::vector<PosedPlanes> posed;
+    for (std::size_t i = 0; i < planes_.size(); ++i) posed.push_back({planes_[i].get(), poses[i]});
+    return posed;
+  }
+
+ private:
+  std::vector<std::shared_ptr<const ScanFeatures>> features_;
+  std::vector<std::shared_ptr<const ScanPlanes>> planes_;
+};
+
+enum Method { kThesisLocal, kLocal, kLocalAndGlobal };
+constexpr const char* kMethodNames[] = {"thesis' ICP, local", "local", "local + global"};
+
+// Every scan is matched to the next one, the last to the first; the first is held.
+std::vector<Pose> Align(Scans& scans, const std::vector<Pose>& start, Method method) {
+  AlignmentProblem problem;
+  problem.T_map_scan = start;
+  problem.fixed.assign(start.size(), false);
+  problem.fixed[0] = true;
+  for (std::size_t i = 0; i + 1 < start.size(); ++i) problem.pairs.push_back({.i = i, .j = i + 1});
+  if (start.size() > 2) problem.pairs.push_back({.i = 0, .j = start.size() - 1});
+  AlignmentOptions options;
+  options.neighbours = 0;
+  options.max_rounds = 30;
+  options.planes = method == kLocalAndGlobal;
+  options.registration.initial_gate_m = 1.5;
+  options.registration.final_gate_m = 0.3;
+  if (method == kThesisLocal) options.registration.metric = MlsErrorMetric::kPointToPoint;
+  const absl::StatusOr<AlignmentResult> result = AlignScans(
+      problem, scans, options, &ForEachInTurn, [](double) { return absl::OkStatus(); }, Stop());
+  if (!result.ok()) {
+    std::fprintf(stderr, "%s\n", result.status().ToString().c_str());
+    std::exit(1);
+  }
+  if (std::getenv("STRATA_VERBOSE") != nullptr) {
+    for (const AlignmentRound& r : result->rounds) {
+      std::fprintf(stderr,
+                   "    %s: pairs %zu (new %zu) planes %zu views %zu shift %.4f m %.5f rad\n",
+                   kMethodNames[method],
+                   r.pairs,
+                   r.registered,
+                   r.planes,
+                   r.supports,
+                   r.max_shift_m,
+                   r.max_turn_rad);
+    }
+  }
+  return result->T_map_scan;
+}
+
+constexpr Scans::Sizes kSmallSizes = {.cell_m = 0.05,
+                                      .sigma_m = 0.01,
+                                      .min_area_m2 = 0.25,
+                                      .plane_cell_m = 1.0,
+                                      .min_edge_length_m = 0.5};
+
+struct Campaign {
+  testing::PoseErrors mean[3];
+  int diverged[3] = {};
+};
+
+Campaign Run(int view_count, const testing::StartNoise& noise) {
+  const std::vector<View> views =
+      testing::TakeViews(testing::SmallHouse(), view_count, testing::Tour{}, testing::kViewSeed);
+  Scans scans;
+  for (const View& view : views) scans.Add(view.cloud, kSmallSizes);
+  Campaign campaign;
+  for (const std::uint64_t seed : testing::kStartSeeds) {
+    const std::vector<Pose> start =
+        testing::NoisyStart(views, noise.sigma_rad, noise.sigma_m, seed);
+    for (const Method method : {kThesisLocal, kLocal, kLocalAndGlobal}) {
+      const testing::PoseErrors errors = ErrorsOf(views, Align(scans, start, method));
+      campaign.mean[method].angle_rad += errors.angle_rad / testing::kStartSeeds.size();
+      campaign.mean[method].position_m += errors.position_m / testing::kStartSeeds.size();
+      campaign.diverged[method] += errors.angle_rad > testing::kDivergedFactor * noise.sigma_rad ||
+                                   errors.position_m > testing::kDivergedFactor * noise.sigma_m;
+      if (std::getenv("STRATA_VERBOSE") != nullptr) {
+        std::fprintf(stderr,
+                     "  seed %d %s: %.4f rad %.4f m\n",
+                     static_cast<int>(seed),
+                     kMethodNames[method],
+                     errors.angle_rad,
+                     errors.position_m);
+      }
+    }
+  }
+  return campaign;
+}
+
+void Table71() {
+  std::printf(
+      "Table 7.1: mean errors of %zu starts, %d views; diverged: beyond the start's noise\n"
+      "| noise | constraints | angle [rad] | position [m] | diverged |\n|---|---|---|---|---|\n",
+      testing::kStartSeeds.size(),
+      testing::kTableViews);
+  for (const testing::StartNoise& noise : testing::kStartNoise) {
+    const Campaign c = Run(testing::kTableViews, noise);
+    for (const Method method : {kThesisLocal, kLocal, kLocalAndGlobal}) {
+      std::printf("| %s | %s | %.4f | %.4f | %d |\n",
+                  noise.name,
+                  kMethodNames[method],
+                  c.mean[method].angle_rad,
+                  c.mean[method].position_m,
+                  c.diverged[method]);
+    }
+  }
+  std::printf(
+      "| low | thesis: local | 0.0175 | 0.1595 | |\n"
+      "| low | thesis: local + global | 0.0071 | 0.1109 | |\n"
+      "| high | thesis: local | | | all |\n");
+}
+
+void Fig79() {
+  std::printf(
+      "Fig. 7.9: mean errors of %zu starts with low noise, angle [rad] / position [m]\n"
+      "| views | %s | %s | %s |\n|---|---|---|---|\n",
+      testing::kStartSeeds.size(),
+      kMethodNames[0],
+      kMethodNames[1],
+      kMethodNames[2]);
+  for (int views = testing::kMinViews; views <= testing::kMaxViews; ++views) {
+    const Campaign c = Run(views, testing::kStartNoise[0]);
+    std::printf("| %d |", views);
+    for (const testing::PoseErrors& mean : c.mean) {
+      std::printf(" %.4f / %.4f |", mean.angle_rad, mean.position_m);
+    }
+    std::printf("\n");
+  }
+}
+
+// The edges' deviation from the tangents of their planes. Which edges are in which plane is found
+// at `reference`; the planes are fitted anew at `poses`. Mean and standard deviation of the
+// absolute angle [degrees].
+struct EdgeDeviation {
+  double mean_deg = 0.0, sigma_deg = 0.0;
+  std::size_t edges = 0;
+};
+EdgeDeviation DeviationOf(const Scans& scans,
+                          const std::vector<Pose>& reference,
+                          const std::vector<Pose>& poses) {
+  const std::vector<PosedPlanes> at_reference = scans.Posed(reference);
+  const std::vector<PosedPlanes> at_poses = scans.Posed(poses);
+  std::vector<double> angles;
+  for (const SharedPlane& shared : FindSharedPlanes(at_reference)) {
+    Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
+    for (const SharedPlane::View& view : shared.views) {
+      moments += Moved(poses[view.scan], view.moments);
+    }
+    const Plane plane = FitMoments(moments).plane;
+    for (const SharedPlane::View& view : shared.views) {
+      for (const EdgeFeature& edge : at_poses[view.scan].planes->edges) {
+        const bool inside =
+            std::all_of(edge.points.begin(), edge.points.end(), [&](const Eigen::Vector3d& p) {
+              return Distance(reference[view.scan] * p, shared.plane) < 0.1;
+            });
+        if (!inside || edge.length_m < 2.0) continue;
+        const Eigen::Vector3d along = poses[view.scan].linear() * edge.line.direction;
+        angles.push_back(kDegrees * std::asin(std::min(1.0, std::abs(along.dot(plane.normal)))));
+      }
+    }
+  }
+  EdgeDeviation deviation{.edges = angles.size()};
+  for (const double a : angles) deviation.mean_deg += a / static_cast<double>(angles.size());
+  double variance = 0.0;
+  for (const double a : angles) {
+    variance += std::pow(a - deviation.mean_deg, 2) / static_cast<double>(angles.size());
+  }
+  deviation.sigma_deg = std::sqrt(variance);
+  return deviation;
+}
+
+void PrintDeviation(const char* name, const EdgeDeviation& d) {
+  std::printf("| %s | %.3f | %.3f | %.3f | %zu |\n",
+              name,
+              d.mean_deg,
+              d.sigma_deg,
+              d.sigma_deg * d.sigma_deg,
+              d.edges);
+}
+
+void SigmaAlpha() {
+  const std::vector<View> views = testing::TakeViews(testing::LargeBuilding(),
+                                                     testing::kBuildingViews,
+                                                     testing::kBuildingTour,
+                                                     testing::kBuildingSeed);
+  Scans scans;
+  std::vector<Pose> truth;
+  for (const View& view : views) {
+    scans.Add(view.cloud, {.cell_m = 0.2, .sigma_m = testing::kBuildingTour.sigma_m});
+    truth.push_back(view.T_world_sensor);
+  }
+  std::printf(
+      "Edges' angle to their planes on the building of %d views, mean of %zu starts\n"
+      "| constraints | mean [deg] | sigma [deg] | variance [deg^2] | edges | angle [rad] | "
+      "position [m] |\n|---|---|---|---|---|---|---|\n",
+      testing::kBuildingViews,
+      testing::kStartSeeds.size());
+  for (const Method method : {kThesisLocal, kLocal, kLocalAndGlobal}) {
+    EdgeDeviation mean;
+    testing::PoseErrors errors;
+    const auto n = static_cast<double>(testing::kStartSeeds.size());
+    for (const std::uint64_t seed : testing::kStartSeeds) {
+      const std::vector<Pose> poses = Align(
+          scans,
+          testing::NoisyStart(
+              views, testing::kStartNoise[0].sigma_rad, testing::kStartNoise[0].sigma_m, seed),
+          method);
+      const EdgeDeviation d = DeviationOf(scans, truth, poses);
+      const testing::PoseErrors e = ErrorsOf(views, poses);
+      mean.mean_deg += d.mean_deg / n;
+      mean.sigma_deg += d.sigma_deg / n;
+      mean.edges = d.edges;
+      errors.angle_rad += e.angle_rad / n;
+      errors.position_m += e.position_m / n;
+    }
+    std::printf("| %s | %.3f | %.3f | %.3f | %zu | %.4f | %.4f |\n",
+                kMethodNames[method],
+                mean.mean_deg,
+                mean.sigma_deg,
+                mean.sigma_deg * mean.sigma_deg,
+                mean.edges,
+                errors.angle_rad,
+                errors.position_m);
+  }
+  std::printf(
+      "| thesis (another building): local | | | 2.56 | | | |\n"
+      "| thesis: local + global | | | 0.75 | | | |\n");
+}
+
+// Root mean square of the positions after the best rigid move onto the reference.
+double AteOf(const std::vector<Pose>& poses, const std::vector<Pose>& reference) {
+  Eigen::Matrix3Xd a(3, poses.size());
+  Eigen::Matrix3Xd b(3, poses.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    a.col(static_cast<Eigen::Index>(i)) = poses[i].translation();
+    b.col(static_cast<Eigen::Index>(i)) = reference[i].translation();
+  }
+  const Eigen::Matrix4d T = Eigen::umeyama(a, b, false);
+  const Eigen::Matrix3Xd moved = (T.topLeftCorner<3, 3>() * a).colwise() + T.topRightCorner<3, 1>();
+  return std::sqrt((moved - b).colwise().squaredNorm().mean());
+}
+
+void Facade(int step) {
+  const auto folder = testing::FindData("eth_facade_tls");
+  if (!folder.has_value()) {
+    std::printf("no recorded data: set STRATA_DATA\n");
+    return;
+  }
+  const auto uploaded = testing::ReadIndexedPoses(*folder / "poses_initial.txt").value();
+  const auto referenced = testing::ReadIndexedPoses(*folder / "poses_reference.txt").value();
+  Scans scans;
+  std::vector<Pose> start;
+  std::vector<Pose> reference;
+  int k = 0;
+  for (const auto& [index, path] : testing::ListScans(*folder / "scans")) {
+    if (k++ % step != 0) continue;
+    scans.Add(testing::ReadBinaryPcd(path).value(), {.sigma_m = 0.02});
+    start.push_back(uploaded.at(index).T_world_scan);
+    reference.push_back(referenced.at(index).T_world_scan);
+  }
+  std::printf(
+      "eth_facade_tls, every %d. scan: %zu\n"
+      "| poses | mean [deg] | sigma [deg] | variance [deg^2] | edges |\n|---|---|---|---|---|\n",
+      step,
+      start.size());
+  PrintDeviation("uploaded", DeviationOf(scans, reference, start));
+  std::printf("ATE %.4f m\n", AteOf(start, reference));
+  for (const Method method : {kThesisLocal, kLocal, kLocalAndGlobal}) {
+    const std::vector<Pose> poses = Align(scans, start, method);
+    PrintDeviation(kMethodNames[method], DeviationOf(scans, reference, poses));
+    std::printf("ATE %.4f m\n", AteOf(poses, reference));
+  }
+  PrintDeviation("reference", DeviationOf(scans, reference, reference));
+}
+
+int Main(int argc, char** argv) {
+  const std::string what = argc > 1 ? argv[1] : "";
+  if (what == "table_7_1") {
+    Table71();
+  } else if (what == "fig_7_9") {
+    Fig79();
+  } else if (what == "sigma_alpha") {
+    SigmaAlpha();
+  } else if (what == "facade") {
+    Facade(argc > 2 ? std::max(1, std::atoi(argv[2])) : 1);
+  } else {
+    std::fprintf(stderr, "usage: global_constraints table_7_1|fig_7_9|sigma_alpha|facade [STEP]\n");
+    return 2;
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace strata
+
+int main(int argc, char** argv) { return strata::Main(argc, argv); }
