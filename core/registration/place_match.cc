@@ -31,12 +31,16 @@ constexpr std::uint32_t kComparedOfClass = 1000;
 constexpr float kComparedRangeM = 30.0F;  // beyond, a scan is too sparse to have every partner
 constexpr float kPartnerM = 0.5F;
 constexpr int kMinCompared = 50;
+// Glass and wet roads return nothing though they are there.
+constexpr double kNoReturnCounts = 0.5;
+// Contradictions make a fit worse by e for each of this.
 constexpr double kContradictionScale = 0.05;
 constexpr double kTiltMatters = 0.03;
 
 // Of the features of one scan, those another one could see at the pose.
 struct Comparison {
   int seen_through = 0;
+  int no_return = 0;
   int visible = 0;
   struct Share {
     int found = 0;  // with a partner in the other
@@ -45,8 +49,9 @@ struct Comparison {
   Share level;
   Share upright;
 
-  double SeenThrough() const {
-    return visible > 0 ? static_cast<double>(seen_through) / visible : 0.0;
+  double Contradiction() const {
+    const int all = visible + no_return;
+    return all > 0 ? (seen_through + kNoReturnCounts * no_return) / all : 0.0;
   }
   // Ground fits in many places, walls do not: each counts half, whatever their numbers.
   double Overlap() const {
@@ -62,8 +67,8 @@ struct Comparison {
 struct Fit {
   RegistrationResult registration;
   double overlap = 0.0;
-  double seen_through = 0.0;
-  double score() const { return overlap * std::exp(-seen_through / kContradictionScale); }
+  double contradiction = 0.0;
+  double score() const { return overlap * std::exp(-contradiction / kContradictionScale); }
 };
 
 struct SampledPoint {
@@ -169,7 +174,7 @@ class Matcher {
       T_grid_source.translation() -= target_.origin();
       Compare(source_sample_, T_source_scan.inverse(), view.image, T_grid_source, target_, back);
     }
-    fit.seen_through = std::max(forth.SeenThrough(), back.SeenThrough());
+    fit.contradiction = std::max(forth.Contradiction(), back.Contradiction());
     fit.overlap = std::min(forth.Overlap(), back.Overlap());
   }
 
@@ -186,6 +191,10 @@ class Matcher {
       const Eigen::Vector3f p_image = to_image * point.p;
       const Sight sight = image.At(p_image);
       if (sight == Sight::kUnknown) continue;
+      if (sight == Sight::kNoReturn) {
+        ++sum.no_return;
+        continue;
+      }
       ++sum.visible;
       sum.seen_through += sight == Sight::kSeenThrough ? 1 : 0;
       if (p_image.norm() > kComparedRangeM) continue;
@@ -222,7 +231,7 @@ bool SamePlace(const Pose& a, const Pose& b, const PlaceMatchOptions& options) {
 PlaceVerdict VerdictOn(const Fit& fit, double rival, const PlaceMatchOptions& options) {
   if (fit.overlap < options.min_overlap) return PlaceVerdict::kNoFit;
   if (fit.registration.termination == Termination::kDegenerate) return PlaceVerdict::kDegenerate;
-  if (fit.seen_through > options.max_seen_through) return PlaceVerdict::kContradicted;
+  if (fit.contradiction > options.max_contradiction) return PlaceVerdict::kContradicted;
   return rival >= options.rival_share ? PlaceVerdict::kAmbiguous : PlaceVerdict::kMatched;
 }
 
@@ -261,7 +270,7 @@ absl::Status PlaceMatchOptions::Validate() const {
   checks.InRange("max_starts", max_starts, 1, 100);
   checks.InRange("radius_m", radius_m, 5.0, 200.0);
   checks.InRange("min_overlap", min_overlap, 0.0, 1.0);
-  checks.InRange("max_seen_through", max_seen_through, 0.0, 1.0);
+  checks.InRange("max_contradiction", max_contradiction, 0.0, 1.0);
   checks.InRange("rival_share", rival_share, 0.0, 1.0);
   checks.InRange("same_place_m", same_place_m, 1e-3, 100.0);
   checks.InRange("same_place_rad", same_place_rad, 1e-3, 3.15);
@@ -296,11 +305,11 @@ PlaceMatch MatchPlace(const SeenScan& source,
   match.information = best.registration.information;
   match.rms_m = best.registration.rms_m;
   match.overlap = best.overlap;
-  match.seen_through = best.seen_through;
+  match.contradiction = best.contradiction;
   match.verdict = VerdictOn(best, match.rival, options);
-  if (match.matched() && options.max_seen_through > 0.0) {
-    match.confidence =
-        match.overlap * (1.0 - match.seen_through / options.max_seen_through) * (1.0 - match.rival);
+  if (match.matched() && options.max_contradiction > 0.0) {
+    match.confidence = match.overlap * (1.0 - match.contradiction / options.max_contradiction) *
+                       (1.0 - match.rival);
   }
   return match;
 }

@@ -65,8 +65,8 @@ struct PlaceMatchOptions {
   // Refused below: the smaller of the two shares of features that have a partner, among those that
   // both scans could see. In [0, 1].
   double min_overlap = 0.7;
-  // Refused above: share of features that the other scan looked through; in [0, 1].
-  double max_seen_through = 0.05;
+  // Refused above; see PlaceMatch::contradiction. In [0, 1].
+  double max_contradiction = 0.045;
   // Ambiguous when the best fit elsewhere reaches this share of the best fit; in [0, 1].
   double rival_share = 0.75;
   // Fits nearer to each other than both are the same.
@@ -82,10 +82,12 @@ struct PlaceMatch {
   Pose T_target_source = Pose::Identity();
   Matrix6d information = Matrix6d::Zero();  // as RegistrationResult::information
   double rms_m = 0.0;
-  double overlap = 0.0;       // the smaller of both directions, in [0, 1]
-  double seen_through = 0.0;  // the larger of both directions, in [0, 1]
-  double rival = 0.0;         // fit of the best one elsewhere / of this one, in [0, 1]
-  // overlap · (1 − seen_through / max_seen_through) · (1 − rival), limited to [0, 1]: how much of
+  double overlap = 0.0;  // the smaller of both directions, in [0, 1]
+  // Of the features that the other side looked at, the share of those it looked through, and half
+  // the share of near ones where it looked and nothing came back; the larger of both directions.
+  double contradiction = 0.0;
+  double rival = 0.0;  // fit of the best one elsewhere / of this one, in [0, 1]
+  // overlap · (1 − contradiction / max_contradiction) · (1 − rival), limited to [0, 1]: how much of
   // what can be checked speaks for this pose and no other; 0 for every verdict but kMatched. An
   // order, not a probability.
   double confidence = 0.0;

@@ -17,6 +17,8 @@ constexpr int kColumns = 180;  // 2°
 constexpr int kRows = 90;
 constexpr float kMinRangeM = 2.0F;
 constexpr float kMaxRangeM = 40.0F;
+constexpr int kAllAround = 160;  // columns, of 180
+constexpr float kReturnsM = 15.0F;
 // What may differ between two visits: cells of the map and of the image, and the match's error.
 constexpr float kMarginM = 0.5F;
 constexpr float kMarginPerMetre = 0.03F;
@@ -49,15 +51,25 @@ RangeImage::RangeImage(const ScanFeatures& features, const Eigen::Vector3d& sens
     }
   }
   cells_ = own;
+  rows_.assign(kRows, false);
+  columns_.assign(kColumns, false);
+  for (int at = 0; at < kRows * kColumns; ++at) {
+    if (own[static_cast<std::size_t>(at)].nearest_m == 0.0F) continue;
+    rows_[static_cast<std::size_t>(at / kColumns)] = true;
+    columns_[static_cast<std::size_t>(at % kColumns)] = true;
+  }
+  // Only of a sensor that turns all around is it known where it looked: within its rows.
+  if (std::count(columns_.begin(), columns_.end(), true) < kAllAround) rows_.assign(kRows, false);
   for (int row = 1; row + 1 < kRows; ++row) {
     for (int column = 0; column < kColumns; ++column) {
       Cell& cell = cells_[static_cast<std::size_t>(row * kColumns + column)];
-      if (cell.nearest_m == 0.0F) continue;
       for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
           const int x = (column + dx + kColumns) % kColumns;
           const Cell& other = own[static_cast<std::size_t>((row + dy) * kColumns + x)];
           if (other.nearest_m == 0.0F) continue;
+          cell.measured_around = true;
+          if (cell.nearest_m == 0.0F) continue;
           cell.nearest_m = std::min(cell.nearest_m, other.nearest_m);
           cell.farthest_m = std::max(cell.farthest_m, other.farthest_m);
         }
@@ -73,7 +85,13 @@ Sight RangeImage::At(const Eigen::Vector3f& p_scan) const {
   const int at = CellOf(p, range);
   if (at < 0) return Sight::kUnknown;
   const Cell& cell = cells_[static_cast<std::size_t>(at)];
-  if (cell.nearest_m == 0.0F) return Sight::kUnknown;
+  if (cell.nearest_m == 0.0F) {
+    return !cell.measured_around && range < kReturnsM &&
+                   rows_[static_cast<std::size_t>(at / kColumns)] &&
+                   columns_[static_cast<std::size_t>(at % kColumns)]
+               ? Sight::kNoReturn
+               : Sight::kUnknown;
+  }
   const float margin = kMarginM + kMarginPerMetre * range;
   if (range < cell.nearest_m - margin) return Sight::kSeenThrough;
   return range <= cell.farthest_m + margin ? Sight::kAgreeing : Sight::kUnknown;

@@ -17,6 +17,7 @@ enum class Sight {
   kUnknown,      // it did not look there, or something was in the way
   kAgreeing,     // it measured about that far in that direction
   kSeenThrough,  // it measured farther only
+  kNoReturn,     // near, it looked there, and nothing came back
 };
 
 // How far a scan sees in every direction: a spherical image with the least and the greatest
@@ -31,10 +32,13 @@ class RangeImage {
 
  private:
   struct Cell {
-    float nearest_m = 0.0F;  // 0: nothing measured
+    float nearest_m = 0.0F;  // of the cell and the eight around it; 0: nothing in the cell
     float farthest_m = 0.0F;
+    bool measured_around = false;
   };
-  std::vector<Cell> cells_;  // of a cell and the eight around it
+  std::vector<Cell> cells_;
+  std::vector<bool> rows_;     // measured anywhere
+  std::vector<bool> columns_;  // measured anywhere
   Eigen::Vector3f origin_ = Eigen::Vector3f::Zero();
 };
 

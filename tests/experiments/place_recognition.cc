@@ -14,7 +14,10 @@
 #include "core/cloud/sensor_model.h"
 #include "core/mls/build.h"
 #include "core/mls/join.h"
+#include "core/posegraph/closure_candidates.h"
+#include "core/posegraph/closure_consistency.h"
 #include "core/registration/place_descriptor.h"
+#include "core/registration/place_index.h"
 #include "core/registration/place_match.h"
 #include "tests/support/data_dir.h"
 #include "tests/support/pcd.h"
@@ -49,11 +52,12 @@ Recording Load(const std::filesystem::path& folder) {
 Recording Simulate(const std::string& name,
                    const testing::World& world,
                    const testing::Robot& robot,
-                   double step_m) {
+                   double step_m,
+                   const testing::OdometryNoise& noise) {
   Recording r;
   r.name = name;
   r.reference = testing::Drive(world.scene, robot.waypoints, step_m, 1.2);
-  r.uploaded = testing::NoisyOdometry(r.reference, {.translation_sigma_m = 0.03}, 1);
+  r.uploaded = testing::NoisyOdometry(r.reference, noise, 1);
   testing::SensorOptions sensor;
   sensor.columns = 480;
   for (std::size_t i = 0; i < r.reference.size(); ++i) {
@@ -219,7 +223,7 @@ void EvaluateMatches(const Recording& r, int pool, std::size_t count, bool verbo
       }
       if (verbose) {
         std::printf(
-            "  %zu-%zu %s apart %.1f desc %.2f %-12s overlap %.2f through %.3f rival %.2f "
+            "  %zu-%zu %s apart %.1f desc %.2f %-12s overlap %.2f against %.3f rival %.2f "
             "rms %.3f conf %.2f error %.2f m %.1f deg\n",
             q.i,
             q.j,
@@ -228,7 +232,7 @@ void EvaluateMatches(const Recording& r, int pool, std::size_t count, bool verbo
             q.s.distance,
             std::string(ToString(m.verdict)).c_str(),
             m.overlap,
-            m.seen_through,
+            m.contradiction,
             m.rival,
             m.rms_m,
             m.confidence,
@@ -255,6 +259,117 @@ void EvaluateMatches(const Recording& r, int pool, std::size_t count, bool verbo
   }
 }
 
+struct Described {
+  std::vector<PlaceDescriptor> places;
+  std::vector<ScanFeatures> features;
+};
+
+Described Describe(const Recording& r, int pool) {
+  Described d;
+  for (std::size_t i = 0; i < r.clouds.size(); ++i) {
+    const MlsMap map = LocalMap(r, i, pool);
+    d.places.push_back(DescribePlace(map));
+    d.features.push_back(ScanFeatures::FromMap(map));
+  }
+  return d;
+}
+
+// Scan i and its `beside` neighbours to both sides, in the frame of i.
+std::vector<SeenScan> TargetOf(const Recording& r,
+                               const Described& d,
+                               std::size_t i,
+                               std::size_t beside) {
+  std::vector<SeenScan> target = {{&d.features[i]}};
+  for (std::size_t k = 1; k <= beside; ++k) {
+    for (const std::size_t j : {i - k, i + k}) {
+      if (j >= r.clouds.size()) continue;
+      target.push_back({&d.features[j], Normalized(r.uploaded[i].inverse() * r.uploaded[j])});
+    }
+  }
+  return target;
+}
+
+// From candidates to consistent closures, the uploaded poses being the prior.
+void EvaluateClosures(
+    const Recording& r, int pool, std::size_t beside, const DriftOptions& drift, bool verbose) {
+  const Described d = Describe(r, pool);
+  const auto now = [] { return std::chrono::steady_clock::now(); };
+  const auto ms_since = [&](auto start) {
+    return std::chrono::duration<double, std::milli>(now() - start).count();
+  };
+  std::vector<ClosureNode> nodes;
+  std::vector<GraphEdge> edges;
+  PlaceIndex index;
+  std::vector<AlikePair> alike;
+  for (std::size_t j = 0; j < r.clouds.size(); ++j) {
+    nodes.push_back({r.uploaded[j], 1});
+    if (j > 0) edges.push_back({j - 1, j, 1e4 * Matrix6d::Identity()});
+    for (const auto& n :
+         index.Nearest(d.places[j], 5, [&](std::uint64_t i) { return i + 15 > j; })) {
+      alike.push_back({static_cast<std::size_t>(n.number), j, n.similarity});
+    }
+    index.Add(j, d.places[j]);
+  }
+  ClosureCandidateOptions options;
+  options.drift = drift;
+  auto start = now();
+  const auto candidates = FindClosureCandidates(nodes, edges, alike, options).value();
+  const double candidates_ms = ms_since(start);
+  start = now();
+  std::vector<Closure> closures;
+  std::vector<bool> right;
+  int near = 0;
+  for (const ClosureCandidate& c : candidates) {
+    const Pose truth = r.reference[c.i].inverse() * r.reference[c.j];
+    near += static_cast<int>(truth.translation().norm() < 12.0);
+    const PlaceMatch m = MatchPlace({&d.features[c.j]}, TargetOf(r, d, c.i, beside), c.hypotheses);
+    const Pose error = truth.inverse() * m.T_target_source;
+    const bool correct = error.translation().norm() < 0.5 && RotationAngleRad(error) < 0.05;
+    if (verbose) {
+      std::printf(
+          "  %zu-%zu %s sigma %.1f m %.2f rad score %.2f apart %.1f: %s overlap %.2f through "
+          "%.3f rival %.2f conf %.2f error %.2f m %.1f deg\n",
+          c.i,
+          c.j,
+          c.reason == ClosureReason::kNear ? "near " : "alike",
+          c.sigma_m,
+          c.sigma_rad,
+          c.score,
+          truth.translation().norm(),
+          std::string(ToString(m.verdict)).c_str(),
+          m.overlap,
+          m.contradiction,
+          m.rival,
+          m.confidence,
+          error.translation().norm(),
+          RotationAngleRad(error) * kDegrees);
+    }
+    if (!m.matched()) continue;
+    closures.push_back({c.i, c.j, m.T_target_source, 0.2, 0.02});
+    right.push_back(correct);
+  }
+  const double match_ms = ms_since(start);
+  ClosureConsistencyOptions consistency;
+  consistency.drift = drift;
+  const auto set = ConsistentClosures(r.uploaded, edges, closures, consistency).value();
+  int kept_right = 0;
+  for (const std::size_t k : set.kept) kept_right += right[k];
+  const auto matched_right = std::count(right.begin(), right.end(), true);
+  std::printf(
+      "%-16s %zu candidates (%d within 12 m) in %.0f ms, matched right %zd wrong %zd, %.0f ms "
+      "each; consistent right %d wrong %zu\n",
+      r.name.c_str(),
+      candidates.size(),
+      near,
+      candidates_ms,
+      matched_right,
+      static_cast<std::ptrdiff_t>(right.size()) - matched_right,
+      candidates.empty() ? 0.0 : match_ms / static_cast<double>(candidates.size()),
+      kept_right,
+      set.kept.size() - static_cast<std::size_t>(kept_right));
+  std::fflush(stdout);
+}
+
 int Main(int argc, char** argv) {
   CLI::App app("place recognition");
   std::string only;
@@ -268,11 +383,23 @@ int Main(int argc, char** argv) {
   app.add_option("--max-height", options.max_height_m);
   std::size_t matches = 0;
   bool verbose = false;
+  bool closures = false;
+  std::size_t beside = 0;
+  DriftOptions drift{0.1, 0.01};
+  testing::OdometryNoise noise;
+  app.add_option("--noise-m", noise.translation_sigma_m);
+  app.add_option("--noise-rad", noise.rotation_sigma_rad);
+  app.add_flag("--closures", closures);
+  app.add_option("--beside", beside);
+  app.add_option("--drift", drift.drift_m);
+  app.add_option("--drift-rad", drift.drift_rad);
   app.add_option("--matches", matches);
   app.add_flag("--verbose", verbose);
   CLI11_PARSE(app, argc, argv);
   const auto Evaluate = [&](const Recording& r) {
-    if (matches > 0) {
+    if (closures) {
+      EvaluateClosures(r, pool, beside, drift, verbose);
+    } else if (matches > 0) {
       EvaluateMatches(r, pool, matches, verbose);
     } else {
       EvaluateDescriptor(r, pool, options);
@@ -289,19 +416,19 @@ int Main(int argc, char** argv) {
     testing::Robot both = world.robots[0];
     both.waypoints.insert(
         both.waypoints.end(), world.robots[1].waypoints.begin(), world.robots[1].waypoints.end());
-    Evaluate(Simulate("campus", world, both, 3.0));
+    Evaluate(Simulate("campus", world, both, 3.0, noise));
   }
   if (wanted("campus_loop")) {
     const testing::World world = testing::CampusLoopWorld();
-    Evaluate(Simulate("campus_loop", world, world.robots[0], 2.0));
+    Evaluate(Simulate("campus_loop", world, world.robots[0], 2.0, noise));
   }
   if (wanted("car_park")) {
     const testing::World world = testing::CarParkWorld();
-    Evaluate(Simulate("car_park", world, world.loops[0], 2.0));
+    Evaluate(Simulate("car_park", world, world.loops[0], 2.0, noise));
   }
   if (wanted("bridge")) {
     const testing::World world = testing::BridgeWorld();
-    Evaluate(Simulate("bridge", world, world.loops[0], 2.0));
+    Evaluate(Simulate("bridge", world, world.loops[0], 2.0, noise));
   }
   return 0;
 }

@@ -6,5 +6,5 @@ strata_executable(
 strata_executable(
   place_recognition place_recognition
   SOURCES place_recognition.cc
-  DEPS strata::registration strata::mls strata::simulator strata::test_support strata::test_recordings
+  DEPS strata::posegraph strata::registration strata::mls strata::simulator strata::test_support strata::test_recordings
 )
