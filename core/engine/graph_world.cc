@@ -73,6 +73,7 @@ absl::StatusOr<GraphWorld> GraphWorld::Read(MapCore& core) {
 AlignmentProblem GraphWorld::Problem(const OptimizeSettings& settings) const {
   AlignmentProblem problem;
   problem.T_map_scan = poses_;
+  problem.trajectories = trajectories_;
   std::vector<bool> held(scans_.size(), false);
   for (const ConstraintRecord& record : constraints_) {
     const Constraint& constraint = record.constraint;
@@ -91,7 +92,8 @@ AlignmentProblem GraphWorld::Problem(const OptimizeSettings& settings) const {
       held[std::max(i, j)] = true;
     } else {
       const bool closure = constraint.origin == ConstraintOrigin::kOptimize;
-      problem.pairs.push_back({i, j, closure && settings.robust});
+      ScanPair& pair = problem.pairs.emplace_back(ScanPair{i, j, closure && settings.robust});
+      if (!closure) pair.measured = MeasuredPose{constraint.T_i_j, constraint.information};
       if (!closure) held[std::max(i, j)] = true;
     }
   }

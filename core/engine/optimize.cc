@@ -27,6 +27,9 @@ namespace {
 // Shares of the whole job.
 constexpr double kClosuresEnd = 0.3;
 constexpr double kAlignmentEnd = 0.8;
+// A closure that is farther off than these in the end was none.
+constexpr double kSamePlaceM = 0.5;
+constexpr double kSamePlaceRad = 0.05;
 
 // Progress of a part of the job, as the job's own.
 class PartOfJob final : public JobContext {
@@ -77,7 +80,7 @@ class Optimizer {
     }
     STRATA_ASSIGN_OR_RETURN(const AlignmentResult result, Align(problem, views));
     Report(world, result);
-    STRATA_RETURN_IF_ERROR(Store(world, result, KeptClosures(closures, result)));
+    STRATA_RETURN_IF_ERROR(Store(world, result, KeptClosures(world, closures, result)));
     return world.epoch();
   }
 
@@ -107,22 +110,23 @@ class Optimizer {
         context_.stop());
   }
 
-  // The closures that the graph agrees with, with what their scans were last registered to say.
-  std::vector<ConstraintRecord> KeptClosures(const std::vector<FoundClosure>& closures,
+  // The closures that the final poses agree with.
+  std::vector<ConstraintRecord> KeptClosures(const GraphWorld& world,
+                                             const std::vector<FoundClosure>& closures,
                                              const AlignmentResult& result) const {
     std::vector<ConstraintRecord> kept;
     for (const FoundClosure& closure : closures) {
-      const auto same = [&closure](const auto& other) {
-        return std::minmax(other.i, other.j) == std::minmax(closure.i, closure.j);
-      };
-      if (std::any_of(result.rejected.begin(), result.rejected.end(), same)) continue;
-      const auto term = std::find_if(result.measured.begin(), result.measured.end(), same);
-      if (term == result.measured.end()) continue;
+      const Pose difference = closure.T_i_j.inverse() * result.T_map_scan[closure.i].inverse() *
+                              result.T_map_scan[closure.j];
+      if (difference.translation().norm() > kSamePlaceM ||
+          RotationAngleRad(difference) > kSamePlaceRad) {
+        continue;
+      }
       ConstraintRecord record;
-      record.scan_i = term->i;
-      record.scan_j = term->j;
-      record.constraint.T_i_j = term->T_i_j;
-      record.constraint.information = term->information;
+      record.scan_i = world.number(closure.i);
+      record.scan_j = world.number(closure.j);
+      record.constraint.T_i_j = closure.T_i_j;
+      record.constraint.information = closure.information;
       record.constraint.origin = ConstraintOrigin::kOptimize;
       record.constraint.note = closure.note;
       kept.push_back(std::move(record));
@@ -132,13 +136,9 @@ class Optimizer {
 
   absl::Status Store(const GraphWorld& world,
                      const AlignmentResult& result,
-                     std::vector<ConstraintRecord> closures) {
+                     const std::vector<ConstraintRecord>& closures) {
     std::vector<PlaneRecord> planes = world.DisabledPlanes();
     for (const SharedPlane& plane : result.planes) planes.push_back(world.RecordOf(plane));
-    for (ConstraintRecord& record : closures) {
-      record.scan_i = world.number(static_cast<std::size_t>(record.scan_i));
-      record.scan_j = world.number(static_cast<std::size_t>(record.scan_j));
-    }
     context_.SetMetric("closures", static_cast<double>(closures.size()));
     return core_.writer().Run(
         Durability::kFull, 0, context_.stop(), [&](StorageWriter& writer) -> absl::Status {
@@ -161,7 +161,7 @@ class Optimizer {
     for (std::size_t r = 0; r < result.rounds.size(); ++r) {
       const AlignmentRound& round = result.rounds[r];
       const std::string name = absl::StrCat("round.", r + 1, ".");
-      context_.SetMetric(name + "pairs", static_cast<double>(round.pairs));
+      context_.SetMetric(name + "matches", static_cast<double>(round.matches));
       context_.SetMetric(name + "registered", static_cast<double>(round.registered));
       context_.SetMetric(name + "planes", static_cast<double>(round.planes));
       context_.SetMetric(name + "cost_before", round.before.total());
@@ -181,7 +181,7 @@ class Optimizer {
     context_.SetMetric("settled", result.termination == AlignmentTermination::kSettled ? 1.0 : 0.0);
     context_.SetMetric("scans", static_cast<double>(world.size()));
     context_.SetMetric("planes", static_cast<double>(result.planes.size()));
-    context_.SetMetric("closures_rejected", static_cast<double>(result.rejected.size()));
+    context_.SetMetric("matches_rejected", static_cast<double>(result.rejected.size()));
     double squares = 0.0;
     double largest = 0.0;
     for (std::size_t k = 0; k < world.size(); ++k) {

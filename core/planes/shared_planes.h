@@ -54,7 +54,7 @@ struct SharedPlaneOptions {
   double sigma_floor_m = 0.01;        // in [1e-4, 1]
   double independent_area_m2 = 0.25;  // in [1e-4, 100]
   double independent_length_m = 0.5;  // in [1e-3, 100]
-  double max_measurements = 50.0;     // in [1, 1e6]
+  double max_measurements = 5.0;      // in [1, 1e6]
   // Planes of edges: half the width of the corridor in which an edge must lie entirely; at least
   // this much length of edges in all; in [0.001, 1], [0.1, 1e4].
   double corridor_m = 0.05;

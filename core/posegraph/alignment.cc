@@ -2,42 +2,50 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <optional>
-#include <set>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
 #include "core/posegraph/information.h"
+#include "core/posegraph/stretches.h"
 #include "core/registration/registration_target.h"
 
 namespace strata {
 namespace {
 
-using NodePair = std::pair<std::size_t, std::size_t>;  // i < j
-
-// A registration made at some relative pose, good until the poses say something else.
-struct Measurement {
-  Pose T_i_j = Pose::Identity();
-  Matrix6d information = Matrix6d::Zero();
+// A scan registered to a stretch of way.
+struct Match {
+  Stretch stretch;
   bool good = false;
+  // T_i_scan as measured, i being scans of the stretch, nearest first.
+  std::vector<std::pair<std::size_t, Pose>> T_i_scan;
+  Matrix6d information = Matrix6d::Zero();  // of the match, to be shared by all of them
 };
 
-// Within these of where it was registered a pair has the same correspondences.
-constexpr double kSamePlaceM = 0.05;
-constexpr double kSamePlaceRad = 0.005;
+// Within these of what was measured a match has the same correspondences.
+constexpr double kSamePlaceM = 0.02;
+constexpr double kSamePlaceRad = 0.002;
+// Within these of what was measured when a scan came in, it still holds.
+constexpr double kMeasuredPlaceM = 0.1;
+constexpr double kMeasuredPlaceRad = 0.02;
+// A match is recorded as relative poses to the nearest few.
+constexpr std::size_t kMaxPartners = 3;
 
 bool Acceptable(Termination termination) {
   return termination == Termination::kConverged || termination == Termination::kMaxIterations ||
          termination == Termination::kDegenerate;
 }
 
-NodePair Ordered(std::size_t i, std::size_t j) { return {std::min(i, j), std::max(i, j)}; }
+bool Near(const Pose& a, const Pose& b, double distance_m, double turn_rad) {
+  const Pose difference = a.inverse() * b;
+  return difference.translation().norm() <= distance_m && RotationAngleRad(difference) <= turn_rad;
+}
 
-// Whether `found` is what was excluded: the same plane to 3° and 0.2 m where it is seen, and a scan
-// in common.
+double Turn(const Pose& a, const Pose& b) { return RotationAngleRad(a.inverse() * b); }
+
+// Whether `found` is what was excluded: the same plane to 3° and 0.2 m, and a scan in common.
 bool IsExcluded(const SharedPlane& found, const ExcludedPlane& excluded) {
   constexpr double kSameCosine = 0.9986;
   constexpr double kSameDistanceM = 0.2;
@@ -49,8 +57,6 @@ bool IsExcluded(const SharedPlane& found, const ExcludedPlane& excluded) {
   });
 }
 
-double Turn(const Pose& a, const Pose& b) { return RotationAngleRad(a.inverse() * b); }
-
 class Alignment {
  public:
   Alignment(const AlignmentProblem& problem,
@@ -58,12 +64,18 @@ class Alignment {
             const AlignmentOptions& options,
             ForEach for_each,
             const Stop& stop)
-      : problem_(problem), source_(source), options_(options), for_each_(for_each), stop_(stop) {
+      : problem_(problem),
+        source_(source),
+        options_(options),
+        for_each_(for_each),
+        stop_(stop),
+        stretches_(problem, options.neighbours),
+        matches_(problem.T_map_scan.size()),
+        measured_(problem.T_map_scan.size()) {
     result_.T_map_scan = problem.T_map_scan;
     for (const ScanPair& pair : problem.pairs) {
-      given_.insert({Ordered(pair.i, pair.j), pair});
+      if (pair.measured.has_value()) measured_[pair.j].push_back(&pair);
     }
-    for (const auto& [i, j] : problem.excluded_pairs) excluded_.insert(Ordered(i, j));
   }
 
   absl::StatusOr<AlignmentResult> Run(AlignmentProgress progress) {
@@ -85,11 +97,8 @@ class Alignment {
 
   absl::Status Round() {
     AlignmentRound round;
-    std::set<NodePair> pairs = NearbyPairs();
-    for (const auto& [pair, given] : given_) pairs.insert(pair);
-    for (const NodePair& pair : excluded_) pairs.erase(pair);
-    STRATA_RETURN_IF_ERROR(Register(pairs, round));
-    PoseGraphProblem graph = GraphOf(pairs, round);
+    STRATA_RETURN_IF_ERROR(Register(round));
+    PoseGraphProblem graph = Graph(round);
     STRATA_RETURN_IF_ERROR(AddPlanes(graph, round));
     STRATA_ASSIGN_OR_RETURN(PoseGraphSolution solution,
                             OptimizePoseGraph(graph, options_.pose_graph, stop_));
@@ -106,82 +115,92 @@ class Alignment {
     return absl::OkStatus();
   }
 
-  // Every scan with its nearest ones.
-  std::set<NodePair> NearbyPairs() const {
-    std::set<NodePair> pairs;
-    if (options_.neighbours == 0) return pairs;
-    // A coarse grid keeps this linear in the number of scans.
-    const double cell_m = options_.neighbour_radius_m;
-    std::map<std::pair<std::int64_t, std::int64_t>, std::vector<std::size_t>> grid;
-    const auto cell_of = [&](const Pose& T) {
-      return std::pair(static_cast<std::int64_t>(std::floor(T.translation().x() / cell_m)),
-                       static_cast<std::int64_t>(std::floor(T.translation().y() / cell_m)));
-    };
-    for (std::size_t k = 0; k < result_.T_map_scan.size(); ++k) grid[cell_of(pose(k))].push_back(k);
-    for (std::size_t k = 0; k < result_.T_map_scan.size(); ++k) {
-      std::vector<std::pair<double, std::size_t>> near;
-      const auto [x, y] = cell_of(pose(k));
-      for (std::int64_t dx = -1; dx <= 1; ++dx) {
-        for (std::int64_t dy = -1; dy <= 1; ++dy) {
-          const auto cell = grid.find({x + dx, y + dy});
-          if (cell == grid.end()) continue;
-          for (const std::size_t other : cell->second) {
-            const double distance = (pose(other).translation() - pose(k).translation()).norm();
-            if (other != k && distance <= cell_m) near.push_back({distance, other});
-          }
-        }
-      }
-      const std::size_t count =
-          std::min(near.size(), static_cast<std::size_t>(options_.neighbours));
-      std::partial_sort(
-          near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count), near.end());
-      for (std::size_t n = 0; n < count; ++n) {
-        pairs.insert(Ordered(k, near[n].second));
-      }
-    }
-    return pairs;
-  }
-
-  // Registers the pairs that are not known at the current poses, grouped by the scan they are
-  // matched to, whose search structure is made once.
-  absl::Status Register(const std::set<NodePair>& pairs, AlignmentRound& round) {
-    std::vector<std::vector<NodePair>> groups;
-    for (const NodePair& pair : pairs) {
-      const Measurement& known = measurements_[pair];
-      const Pose T_i_j = pose(pair.first).inverse() * pose(pair.second);
-      const bool same = (known.T_i_j.translation() - T_i_j.translation()).norm() <= kSamePlaceM &&
-                        Turn(known.T_i_j, T_i_j) <= kSamePlaceRad;
-      if (known.good && same) continue;
-      if (groups.empty() || groups.back().front().first != pair.first) groups.emplace_back();
-      groups.back().push_back(pair);
-      ++round.registered;
-    }
-    return for_each_(groups.size(), [&](std::size_t g) { return RegisterGroup(groups[g]); });
-  }
-
-  absl::Status RegisterGroup(const std::vector<NodePair>& group) {
-    STRATA_RETURN_IF_ERROR(stop_.status());
-    const std::size_t i = group.front().first;
-    STRATA_ASSIGN_OR_RETURN(const auto target_features, FeaturesOf(i));
-    if (target_features == nullptr) return absl::OkStatus();
-    const PlacedScan placed{target_features.get(), Pose::Identity()};
-    const RegistrationTarget target({&placed, 1});
-    for (const NodePair& pair : group) {
+  absl::Status Register(AlignmentRound& round) {
+    std::vector<std::size_t> registered(matches_.size(), 0);
+    STRATA_RETURN_IF_ERROR(for_each_(matches_.size(), [&](std::size_t node) -> absl::Status {
       STRATA_RETURN_IF_ERROR(stop_.status());
-      STRATA_ASSIGN_OR_RETURN(const auto features, FeaturesOf(pair.second));
-      if (features == nullptr) continue;
-      const Pose guess = pose(i).inverse() * pose(pair.second);
-      const RegistrationResult match =
-          RegisterScan(*features, target, guess, options_.registration);
-      Measurement& measured = measurements_.find(pair)->second;
-      measured.good = Acceptable(match.termination);
-      if (!measured.good) continue;
-      measured.T_i_j = Normalized(match.T_target_source);
-      measured.information = LoosenedInformation(
-          match.information,
-          IsotropicInformation(options_.registration_sigma_rad, options_.registration_sigma_m));
+      std::vector<Match> before = std::exchange(matches_[node], {});
+      for (Stretch& stretch : stretches_.Around(node, result_.T_map_scan)) {
+        if (stretch.own && MeasuredHolds(node)) continue;
+        const auto known = std::find_if(before.begin(), before.end(), [&](const Match& match) {
+          return match.stretch.nodes == stretch.nodes && StillHolds(node, match);
+        });
+        if (known != before.end()) {
+          matches_[node].push_back(*std::move(known));
+          continue;
+        }
+        STRATA_ASSIGN_OR_RETURN(Match match, RegisterTo(node, std::move(stretch)));
+        matches_[node].push_back(std::move(match));
+        ++registered[node];
+      }
+      return absl::OkStatus();
+    }));
+    for (std::size_t node = 0; node < matches_.size(); ++node) {
+      round.registered += registered[node];
+      for (const Match& match : matches_[node]) round.matches += match.good ? 1 : 0;
     }
     return absl::OkStatus();
+  }
+
+  // Whether what was measured when the scan came in still tells where it is on its own way.
+  bool MeasuredHolds(std::size_t node) const {
+    return !measured_[node].empty() &&
+           std::all_of(measured_[node].begin(), measured_[node].end(), [&](const ScanPair* pair) {
+             return Near(pose(pair->i).inverse() * pose(node),
+                         pair->measured->T_i_j,
+                         kMeasuredPlaceM,
+                         kMeasuredPlaceRad);
+           });
+  }
+
+  // The poses are still about what was measured.
+  bool StillHolds(std::size_t node, const Match& match) const {
+    if (!match.good) return false;
+    return std::all_of(match.T_i_scan.begin(), match.T_i_scan.end(), [&](const auto& measured) {
+      return Near(
+          pose(measured.first).inverse() * pose(node), measured.second, kSamePlaceM, kSamePlaceRad);
+    });
+  }
+
+  absl::StatusOr<Match> RegisterTo(std::size_t node, Stretch stretch) {
+    Match match;
+    match.stretch = std::move(stretch);
+    STRATA_ASSIGN_OR_RETURN(const auto own, FeaturesOf(node));
+    if (own == nullptr) return match;
+    std::vector<std::shared_ptr<const ScanFeatures>> held;
+    std::vector<PlacedScan> placed;
+    for (const std::size_t i : match.stretch.nodes) {
+      STRATA_ASSIGN_OR_RETURN(auto features, FeaturesOf(i));
+      if (features == nullptr) continue;
+      held.push_back(std::move(features));
+      placed.push_back({held.back().get(), pose(i)});
+    }
+    const RegistrationTarget target(placed, {.centre = pose(node).translation()});
+    const RegistrationResult result = RegisterScan(*own, target, pose(node), options_.registration);
+    match.good = Acceptable(result.termination);
+    if (!match.good) return match;
+    match.information = LoosenedInformation(
+        result.information,
+        IsotropicInformation(options_.registration_sigma_rad, options_.registration_sigma_m));
+    // A match that may be false is one relative pose, so that it is believed or not as a whole.
+    const std::size_t partners = match.stretch.may_be_false ? 1 : kMaxPartners;
+    for (const std::size_t i : Nearest(match.stretch.nodes, result.T_target_source, partners)) {
+      match.T_i_scan.push_back({i, Normalized(pose(i).inverse() * result.T_target_source)});
+    }
+    return match;
+  }
+
+  std::vector<std::size_t> Nearest(std::vector<std::size_t> nodes,
+                                   const Pose& T_map_scan,
+                                   std::size_t count) const {
+    const auto distance = [&](std::size_t i) {
+      return (pose(i).translation() - T_map_scan.translation()).squaredNorm();
+    };
+    std::stable_sort(nodes.begin(), nodes.end(), [&](std::size_t a, std::size_t b) {
+      return distance(a) < distance(b);
+    });
+    nodes.resize(std::min(nodes.size(), count));
+    return nodes;
   }
 
   // nullptr: damaged.
@@ -191,34 +210,45 @@ class Alignment {
     return features;
   }
 
-  PoseGraphProblem GraphOf(const std::set<NodePair>& pairs, AlignmentRound& round) {
+  PoseGraphProblem Graph(const AlignmentRound& round) const {
     PoseGraphProblem graph;
     graph.T_map_scan = result_.T_map_scan;
     graph.fixed = problem_.fixed;
     graph.priors = problem_.priors;
     graph.relative = problem_.relative;
-    pair_of_term_.assign(graph.relative.size(), std::nullopt);
-    for (const NodePair& pair : pairs) {
-      const Measurement& measured = measurements_[pair];
-      const auto given = given_.find(pair);
-      if (!measured.good && given == given_.end()) continue;
-      RelativePoseTerm term;
-      term.i = pair.first;
-      term.j = pair.second;
-      // What is merely near may be another storey, or behind a wall.
-      term.may_be_false = given == given_.end() || given->second.may_be_false;
-      if (measured.good) {
-        term.T_i_j = measured.T_i_j;
-        term.information = measured.information;
-        ++round.pairs;
-      } else {
-        if (term.may_be_false) continue;
-        term.T_i_j = problem_.T_map_scan[term.i].inverse() * problem_.T_map_scan[term.j];
-        term.information = IsotropicInformation(given->second.sigma_rad, given->second.sigma_m);
+    graph.relative.reserve(graph.relative.size() + kMaxPartners * round.matches);
+    std::vector<bool> known(matches_.size(), false);
+    for (std::size_t node = 0; node < matches_.size(); ++node) {
+      for (const Match& match : matches_[node]) {
+        for (const auto& [i, T_i_scan] : match.T_i_scan) {
+          graph.relative.push_back({i,
+                                    node,
+                                    T_i_scan,
+                                    match.information / static_cast<double>(match.T_i_scan.size()),
+                                    match.stretch.may_be_false});
+        }
+        known[node] = known[node] || (match.good && !match.stretch.may_be_false);
       }
-      graph.relative.push_back(term);
-      pair_of_term_.push_back(given == given_.end() ? std::nullopt
-                                                    : std::optional<ScanPair>(given->second));
+      if (!MeasuredHolds(node)) continue;
+      for (const ScanPair* pair : measured_[node]) {
+        graph.relative.push_back(
+            {pair->i,
+             node,
+             pair->measured->T_i_j,
+             LoosenedInformation(pair->measured->information,
+                                 IsotropicInformation(options_.registration_sigma_rad,
+                                                      options_.registration_sigma_m)),
+             pair->may_be_false});
+      }
+      known[node] = true;
+    }
+    for (const ScanPair& pair : problem_.pairs) {
+      if (known[pair.j] || pair.may_be_false) continue;
+      graph.relative.push_back(
+          {pair.i,
+           pair.j,
+           Normalized(problem_.T_map_scan[pair.i].inverse() * problem_.T_map_scan[pair.j]),
+           IsotropicInformation(pair.sigma_rad, pair.sigma_m)});
     }
     return graph;
   }
@@ -261,14 +291,12 @@ class Alignment {
 
   void Keep(const PoseGraphProblem& graph, PoseGraphSolution solution) {
     result_.T_map_scan = std::move(solution.T_map_scan);
-    result_.measured.assign(
-        graph.relative.begin() + static_cast<std::ptrdiff_t>(problem_.relative.size()),
-        graph.relative.end());
+    result_.measured.clear();
     result_.rejected.clear();
-    for (const RejectedTerm& rejected : solution.summary.rejected_relative) {
-      if (pair_of_term_[rejected.term].has_value()) {
-        result_.rejected.push_back(*pair_of_term_[rejected.term]);
-      }
+    std::vector<bool> rejected(graph.relative.size(), false);
+    for (const RejectedTerm& term : solution.summary.rejected_relative) rejected[term.term] = true;
+    for (std::size_t k = problem_.relative.size(); k < graph.relative.size(); ++k) {
+      (rejected[k] ? result_.rejected : result_.measured).push_back(graph.relative[k]);
     }
     for (std::size_t p = 0; p < shared_.size(); ++p) shared_[p].plane = solution.planes[p];
     result_.planes = shared_;
@@ -280,23 +308,35 @@ class Alignment {
   const AlignmentOptions& options_;
   const ForEach for_each_;
   const Stop& stop_;
-  std::map<NodePair, ScanPair> given_;
-  std::set<NodePair> excluded_;
-  std::map<NodePair, Measurement> measurements_;
-  std::vector<std::optional<ScanPair>> pair_of_term_;  // beside the graph's relative terms
+  const Stretches stretches_;
+  std::vector<std::vector<Match>> matches_;             // of every node
+  std::vector<std::vector<const ScanPair*>> measured_;  // of every node j
   std::vector<SharedPlane> shared_;
   AlignmentResult result_;
 };
 
 absl::Status CheckProblem(const AlignmentProblem& problem) {
   const std::size_t nodes = problem.T_map_scan.size();
-  for (const Pose& T_map_scan : problem.T_map_scan)
+  for (const Pose& T_map_scan : problem.T_map_scan) {
     STRATA_RETURN_IF_ERROR(ValidatePose(T_map_scan));
+  }
   for (const ScanPair& pair : problem.pairs) {
     if (pair.i >= nodes || pair.j >= nodes || pair.i == pair.j) {
       return absl::InvalidArgumentError(absl::StrCat(
           "pair of scans ", pair.i, " and ", pair.j, ": not two different ones of ", nodes));
     }
+  }
+  std::vector<int> seen(nodes, 0);
+  for (const std::vector<std::size_t>& trajectory : problem.trajectories) {
+    for (const std::size_t node : trajectory) {
+      if (node >= nodes || ++seen[node] > 1) {
+        return absl::InvalidArgumentError(
+            absl::StrCat("trajectories: node ", node, " is none or there twice"));
+      }
+    }
+  }
+  if (std::find(seen.begin(), seen.end(), 0) != seen.end()) {
+    return absl::InvalidArgumentError("trajectories: a node is in none");
   }
   return absl::OkStatus();
 }
