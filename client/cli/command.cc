@@ -32,4 +32,15 @@ CLI::App* Commands::Verb(CLI::App* noun,
   return verb;
 }
 
+CLI::App* Commands::FileVerb(CLI::App* noun,
+                             const std::string& name,
+                             const std::string& description,
+                             const std::string& example,
+                             FileAction action) {
+  CLI::App* verb = noun->add_subcommand(name, description);
+  verb->footer("Also --output text|json; no server is asked.\n\nExample:\n  " + example);
+  verb->callback([this, action = std::move(action)] { selected_on_files = action; });
+  return verb;
+}
+
 }  // namespace strata::cli

@@ -12,6 +12,7 @@
 #include "client/cli/output.h"
 #include "core/api/call.h"
 #include "core/api/database.h"
+#include "core/common/stop.h"
 
 namespace strata::cli {
 
@@ -22,14 +23,22 @@ struct Context {
   Output& output;
 };
 
+// What a running command has at hand that works on files alone and opens no database.
+struct FileContext {
+  const Stop& stop;  // on the first Ctrl-C
+  Output& output;
+};
+
 // OK: exit 0. Any other status: its message on stderr and exit 1.
 using Action = std::function<absl::Status(Context&)>;
+using FileAction = std::function<absl::Status(FileContext&)>;
 
 // The parser's root and the action that the verb on the command line chose.
 struct Commands {
   CLI::App& root;
   Action selected;
-  bool creates = false;  // the chosen verb may be the first in a directory
+  FileAction selected_on_files;  // in place of `selected`
+  bool creates = false;          // the chosen verb may be the first in a directory
 
   // `example` appears below the --help of a noun or a verb.
   CLI::App* Noun(const std::string& name,
@@ -41,11 +50,17 @@ struct Commands {
                  const std::string& description,
                  const std::string& example,
                  Action action);
+  CLI::App* FileVerb(CLI::App* noun,
+                     const std::string& name,
+                     const std::string& description,
+                     const std::string& example,
+                     FileAction action);
 };
 
 void AddMapCommands(Commands& commands);
 void AddScanCommands(Commands& commands);
 void AddPoseCommands(Commands& commands);
+void AddPosegraphCommands(Commands& commands);
 void AddTileCommands(Commands& commands);
 void AddSurfaceCommand(Commands& commands);
 void AddPlanCommand(Commands& commands);

@@ -2,6 +2,7 @@
 #include <csignal>
 #include <cstddef>
 #include <exception>
+#include <functional>
 #include <iostream>
 #include <string>
 
@@ -15,6 +16,8 @@
 #include "client/cli/connect.h"
 #include "client/cli/output.h"
 #include "client/cli/usage.h"
+#include "core/common/status.h"
+#include "core/common/stop.h"
 
 namespace strata::cli {
 namespace {
@@ -82,23 +85,37 @@ int Fail(const absl::Status& status, Output& output) {
   return kExitFailed;
 }
 
-int Run(const GlobalOptions& options, const Action& action) {
-  Output output(
-      options.output == "json" ? OutputFormat::kJson : OutputFormat::kText, std::cout, std::cerr);
-  auto database = OpenDatabase(options.target);
-  if (!database.ok()) {
-    return Fail(database.status(), output);
-  }
-  Context context{.database = **database, .call = {}, .output = output};
-  running = &context.call.stop;
+// The first Ctrl-C requests `stop` while `run` runs.
+absl::Status RunWithSignals(const Stop& stop, const std::function<absl::Status()>& run) {
+  running = &stop;
   std::signal(SIGINT, OnSignal);
   std::signal(SIGTERM, OnSignal);
-  const absl::Status status = action(context);
+  const absl::Status status = run();
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
-  if (!status.ok()) {
-    return Fail(Explained(status, options.target), output);
-  }
+  return status;
+}
+
+absl::Status RunOnDatabase(const Target& target, const Action& action, Output& output) {
+  STRATA_ASSIGN_OR_RETURN(const auto database, OpenDatabase(target));
+  Context context{.database = *database, .call = {}, .output = output};
+  const absl::Status status = RunWithSignals(context.call.stop, [&] { return action(context); });
+  return Explained(status, target);
+}
+
+absl::Status RunOnFiles(const FileAction& action, Output& output) {
+  const Stop stop;
+  FileContext context{.stop = stop, .output = output};
+  return RunWithSignals(stop, [&] { return action(context); });
+}
+
+int Run(const GlobalOptions& options, const Commands& commands) {
+  Output output(
+      options.output == "json" ? OutputFormat::kJson : OutputFormat::kText, std::cout, std::cerr);
+  const absl::Status status = commands.selected_on_files
+                                  ? RunOnFiles(commands.selected_on_files, output)
+                                  : RunOnDatabase(options.target, commands.selected, output);
+  if (!status.ok()) return Fail(status, output);
   // Data that did not arrive (a full disk behind a redirection) is not done.
   return std::cout.flush() ? 0 : Fail(absl::DataLossError("cannot write to stdout"), output);
 }
@@ -112,10 +129,11 @@ int Main(int argc, char** argv) {
       "0.1\n  strata map create --help");
   GlobalOptions options;
   AddGlobalOptions(root, options);
-  Commands commands{.root = root, .selected = {}};
+  Commands commands{.root = root, .selected = {}, .selected_on_files = {}};
   AddMapCommands(commands);
   AddScanCommands(commands);
   AddPoseCommands(commands);
+  AddPosegraphCommands(commands);
   AddTileCommands(commands);
   AddSurfaceCommand(commands);
   AddPlanCommand(commands);
@@ -131,7 +149,7 @@ int Main(int argc, char** argv) {
     return kExitUsage;
   }
   options.target.make_directory = commands.creates;
-  return Run(options, commands.selected);
+  return Run(options, commands);
 }
 
 }  // namespace

@@ -145,7 +145,7 @@ absl::StatusOr<PlanarSolution> OptimizePlanarPoseGraph(const PlanarPoseGraph& gr
   STRATA_RETURN_IF_ERROR(ValidateOptions(options));
   STRATA_RETURN_IF_ERROR(ValidateProblem(graph));
   PlanarSolution solution;
-  solution.chi2_before = PlanarChi2(graph);
+  solution.chi2_before = Chi2(graph);
   PlanarLeastSquares squares(graph, HeldNodes(graph));
   if (squares.blocks() == 0) {
     solution.termination = PoseGraphTermination::kNothingToDo;
@@ -165,7 +165,7 @@ absl::StatusOr<PlanarSolution> OptimizePlanarPoseGraph(const PlanarPoseGraph& gr
   return solution;
 }
 
-double PlanarChi2(const PlanarPoseGraph& graph) {
+double Chi2(const PlanarPoseGraph& graph) {
   double chi2 = 0.0;
   for (const PlanarRelativeTerm& term : graph.relative) {
     const Eigen::Vector3d e = PlanarError(graph.poses[term.i], graph.poses[term.j], term.T_i_j);

@@ -52,7 +52,7 @@ absl::StatusOr<PlanarSolution> OptimizePlanarPoseGraph(const PlanarPoseGraph& gr
                                                        const Stop& stop = Stop());
 
 // Σ eᵀΩe. REQUIRES: a valid graph.
-double PlanarChi2(const PlanarPoseGraph& graph);
+double Chi2(const PlanarPoseGraph& graph);
 
 }  // namespace strata
 

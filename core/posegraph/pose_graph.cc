@@ -14,6 +14,7 @@
 #include "core/posegraph/graph_least_squares.h"
 #include "core/posegraph/levenberg_marquardt.h"
 #include "core/posegraph/pose_graph_checks.h"
+#include "core/posegraph/relative_pose_cost.h"
 #include "core/posegraph/robust_minimum.h"
 
 namespace strata {
@@ -158,6 +159,16 @@ absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& prob
   solution.T_map_scan = squares.poses();
   solution.planes = squares.planes();
   return solution;
+}
+
+double Chi2(const PoseGraphProblem& problem) {
+  double chi2 = 0.0;
+  for (const RelativePoseTerm& term : problem.relative) {
+    const Vector6d e =
+        RelativePoseError(problem.T_map_scan[term.i], problem.T_map_scan[term.j], term.T_i_j);
+    chi2 += e.dot(term.information * e);
+  }
+  return chi2;
 }
 
 Matrix6d InformationFromG2o(const Matrix6d& information) {

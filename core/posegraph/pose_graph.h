@@ -145,6 +145,9 @@ absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& prob
                                                     const PoseGraphOptions& options = {},
                                                     const Stop& stop = Stop());
 
+// Σ eᵀΩe of the relative poses where they are. REQUIRES: a valid problem.
+double Chi2(const PoseGraphProblem& problem);
+
 // The information [rotation, translation] of a right-hand step on T_i_j from that of g2o's
 // EDGE_SE3:QUAT, [translation, vec q].
 Matrix6d InformationFromG2o(const Matrix6d& information);

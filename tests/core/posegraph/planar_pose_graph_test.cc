@@ -88,12 +88,12 @@ TEST_P(PlanarPoseGraphTest, NoNeighbourIsBetter) {
   EXPECT_LT(solution.chi2_after, solution.chi2_before);
   PlanarPoseGraph neighbour = graph_;
   neighbour.poses = solution.poses;
-  EXPECT_DOUBLE_EQ(PlanarChi2(neighbour), solution.chi2_after);
+  EXPECT_DOUBLE_EQ(Chi2(neighbour), solution.chi2_after);
   for (int k = 0; k < 300; ++k) {
     const double size = std::pow(10.0, -0.02 * k);
     neighbour.poses = solution.poses;
     for (PlanarPose& pose : neighbour.poses) pose = Moved(pose, random_.Vector(size));
-    EXPECT_GE(PlanarChi2(neighbour), solution.chi2_after * (1.0 - 1e-7));
+    EXPECT_GE(Chi2(neighbour), solution.chi2_after * (1.0 - 1e-7));
   }
 }
 
