@@ -48,7 +48,7 @@ absl::StatusOr<JobInfo> FollowJob(Context& context, const std::string& map, std:
 }
 
 absl::Status StatusOf(const JobInfo& job) {
-  if (job.state == JobState::kSucceeded) {
+  if (job.state == JobState::kSucceeded || job.state == JobState::kProposed) {
     return absl::OkStatus();
   }
   return absl::FailedPreconditionError(

@@ -52,6 +52,8 @@ std::string ToString(JobState state) {
       return "failed";
     case JobState::kCancelled:
       return "cancelled";
+    case JobState::kProposed:
+      return "proposed";
   }
   return "unknown";
 }
