@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -48,7 +49,7 @@ TEST(GraphOverlayTest, ManyTrajectoriesAreCounted) {
   api::PoseGraphState state;
   for (int i = 0; i < 11; ++i) {
     PoseNode node;
-    node.id = {"t" + std::to_string(i), 1};
+    node.id = {absl::StrCat("t", i), 1};
     state.nodes.push_back(node);
   }
   picture::Overlay overlay;
