@@ -52,7 +52,7 @@ absl::Status Start(Context& context, JobOptions options) {
   STRATA_ASSIGN_OR_RETURN(
       const JobInfo job,
       context.database.jobs().Start(context.call, options.map, options.kind, options.parameters));
-  context.output.Object(ToJson(job));
+  PrintJob(job, context.output);
   return absl::OkStatus();
 }
 
@@ -76,31 +76,31 @@ absl::Status List(Context& context, const JobOptions& options) {
 absl::Status Show(Context& context, const JobOptions& options) {
   STRATA_ASSIGN_OR_RETURN(const JobInfo job,
                           context.database.jobs().Get(context.call, options.map, options.id));
-  context.output.Object(ToJson(job));
+  PrintJob(job, context.output);
   return absl::OkStatus();
 }
 
 absl::Status Watch(Context& context, const JobOptions& options) {
   STRATA_ASSIGN_OR_RETURN(const JobInfo job, FollowJob(context, options.map, options.id));
-  context.output.Object(ToJson(job));
+  PrintJob(job, context.output);
   return StatusOf(job);
 }
 
 absl::Status Cancel(Context& context, const JobOptions& options) {
   STRATA_ASSIGN_OR_RETURN(const JobInfo job,
                           context.database.jobs().Cancel(context.call, options.map, options.id));
-  context.output.Object(ToJson(job));
+  PrintJob(job, context.output);
   return absl::OkStatus();
 }
 
 // What became of a decision; with --wait, of the job that carries it out.
 absl::Status ShowDecided(Context& context, const JobInfo& job, const JobOptions& options) {
   if (!options.wait || IsFinal(job.state)) {
-    context.output.Object(ToJson(job));
+    PrintJob(job, context.output);
     return absl::OkStatus();
   }
   STRATA_ASSIGN_OR_RETURN(const JobInfo ended, FollowJob(context, options.map, job.id));
-  context.output.Object(ToJson(ended));
+  PrintJob(ended, context.output);
   return StatusOf(ended);
 }
 

@@ -93,7 +93,7 @@ absl::Status Revert(Context& context, const MapOptions& options) {
   STRATA_ASSIGN_OR_RETURN(
       const JobInfo job,
       context.database.jobs().Start(context.call, options.map, "revert", parameters));
-  context.output.Object(ToJson(job));
+  PrintJob(job, context.output);
   return absl::OkStatus();
 }
 

@@ -263,13 +263,15 @@ std::vector<Path> Dashes(const Path& line, double length_m) {
   return dashes;
 }
 
-void DrawStroke(Raster& raster, const Camera& camera, const Stroke& stroke, double tolerance_m) {
+// Above everything: a diagram of what is below a roof must be seen too.
+void DrawStroke(Raster& raster, const Camera& camera, const Stroke& stroke) {
   constexpr double kDashPixels = 9.0;
+  constexpr double kNothingHidesM = 1e9;
   const std::vector<Path> lines = stroke.dashed
                                       ? Dashes(stroke.points, kDashPixels * camera.metres_per_pixel)
                                       : std::vector<Path>{stroke.points};
   for (const Path& line : lines) {
-    raster.DrawLine(line, stroke.width_pixels, stroke.colour, tolerance_m);
+    raster.DrawLine(line, stroke.width_pixels, stroke.colour, kNothingHidesM);
   }
 }
 
@@ -325,9 +327,7 @@ Picture DrawMap(const std::vector<SurfaceTile>& tiles,
   }
   raster.ShadeByDepth(2.2);
   const double tolerance_m = std::max(0.4, 2.0 * cell_size_m);
-  for (const Stroke& stroke : overlay.strokes) {
-    DrawStroke(raster, picture.camera, stroke, tolerance_m);
-  }
+  for (const Stroke& stroke : overlay.strokes) DrawStroke(raster, picture.camera, stroke);
   for (std::size_t i = 0; i < paths.size(); ++i) {
     raster.DrawLine(paths[i], kPathWidthPixels, kPathColours[i % kPathColours.size()], tolerance_m);
   }

@@ -36,7 +36,7 @@ struct Stroke {
 
 // What is drawn over a map beside paths, and what it means: a column in the upper left corner.
 struct Overlay {
-  std::vector<Stroke> strokes;  // later ones above earlier ones
+  std::vector<Stroke> strokes;  // above the map, later ones above earlier ones
   std::vector<std::pair<Colour, std::string>> legend;
 };
 

@@ -118,6 +118,15 @@ TEST_F(WorldCommandsTest, ADryRunThatProposesHasDoneItsWork) {
               StatusIs(Code::kFailedPrecondition, HasSubstr("job 7 failed")));
 }
 
+TEST_F(WorldCommandsTest, TheReportOfAJobHasALineANumber) {
+  JobInfo job = Job(7, JobState::kProposed);
+  job.metrics = {{"cost_before", 12.5}, {"cost_after", 3.25}};
+  ON_CALL(db_.jobs(), Get(_, _, _)).WillByDefault(Return(job));
+  EXPECT_THAT(RunText({"job", "show", "m", "7"}),
+              HasSubstr("\n\ncost_after   3.25\ncost_before  12.5\n"));
+  EXPECT_EQ(RunJson({"job", "show", "m", "7"})["metrics"]["cost_after"], 3.25);
+}
+
 TEST_F(WorldCommandsTest, ProposalsAreAcceptedAndForgotten) {
   EXPECT_CALL(db_.jobs(), Accept(_, absl::string_view("m"), 7))
       .WillRepeatedly(Return(Job(7, JobState::kQueued)));

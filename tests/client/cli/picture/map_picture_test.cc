@@ -123,9 +123,9 @@ TEST(MapPictureTest, PathIsDrawnOnTopAndFaintWhereSomethingHidesIt) {
   EXPECT_NE(hidden, PixelAt(without, {6.0, 4.0, 0.0}));
 }
 
-TEST(MapPictureTest, AnOverlayIsDrawnWithItsMeaning) {
+TEST(MapPictureTest, AnOverlayIsDrawnAboveWhatHidesItAndWithItsMeaning) {
   const SurfaceTile tile =
-      TileOf(80, [](int, int) { return Ground(Traversability::kTraversable); });
+      TileOf(80, [](int, int) { return Ground(Traversability::kTraversable, 4.0F); });
   const PictureOptions options{.width = 400, .height = 444};
   const Colour green = {0, 120, 0};
   const Colour violet = {120, 0, 200};
