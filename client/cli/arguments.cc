@@ -16,6 +16,11 @@
 #include "absl/strings/string_view.h"
 
 namespace strata::cli {
+namespace {
+
+constexpr char kPoseShape[] = "X,Y,Z[,YAW|,QX,QY,QZ,QW]";
+
+}  // namespace
 
 std::optional<std::vector<double>> ParseNumbers(const std::string& text,
                                                 std::size_t min_count,
@@ -51,6 +56,26 @@ CLI::Option* AddNumbers(CLI::App* app,
           },
           description)
       ->type_name(shape);
+}
+
+CLI::Option* AddPose(CLI::App* app,
+                     const std::string& name,
+                     std::function<void(const Pose&, std::size_t)> set,
+                     const std::string& description) {
+  const auto set_pose = [name, set = std::move(set)](const std::vector<double>& n) {
+    Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+    if (n.size() == 4) {
+      rotation = Eigen::AngleAxisd(n[3], Eigen::Vector3d::UnitZ());
+    } else if (n.size() == 7) {
+      rotation = Eigen::Quaterniond(n[6], n[3], n[4], n[5]);
+      if (rotation.norm() < 1e-6) throw CLI::ValidationError(name, "the quaternion is zero");
+      rotation.normalize();
+    } else if (n.size() != 3) {
+      throw CLI::ValidationError(name, absl::StrCat("expected ", kPoseShape));
+    }
+    set(MakePose(rotation, {n[0], n[1], n[2]}), n.size());
+  };
+  return AddNumbers(app, name, kPoseShape, 3, 7, set_pose, description);
 }
 
 void AddMapName(CLI::App* app, std::string& map) {

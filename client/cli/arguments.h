@@ -35,6 +35,13 @@ CLI::Option* AddNumbers(CLI::App* app,
                         std::function<void(const std::vector<double>&)> set,
                         const std::string& description);
 
+// Adds an option that takes a pose as a place, a place and a turn about z, or a place and a
+// quaternion, which is normalised. `set` also gets how many numbers there were: 3, 4 or 7.
+CLI::Option* AddPose(CLI::App* app,
+                     const std::string& name,
+                     std::function<void(const Pose&, std::size_t)> set,
+                     const std::string& description);
+
 // The positional argument NAME.
 void AddMapName(CLI::App* app, std::string& map);
 // The positional argument TRAJECTORY/SEQUENCE.

@@ -66,6 +66,8 @@ void AddSurfaceCommand(Commands& commands);
 void AddPlanCommand(Commands& commands);
 void AddProfileCommands(Commands& commands);
 void AddJobCommands(Commands& commands);
+void AddPlanesCommands(Commands& commands);
+void AddLocalizeCommand(Commands& commands);
 
 }  // namespace strata::cli
 

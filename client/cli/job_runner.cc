@@ -47,8 +47,21 @@ absl::StatusOr<JobInfo> FollowJob(Context& context, const std::string& map, std:
   }
 }
 
+void PrintJob(const JobInfo& job, Output& output) {
+  Json json = ToJson(job);
+  if (output.json() || job.metrics.empty()) {
+    output.Object(json);
+    return;
+  }
+  const Json metrics = json["metrics"];
+  json.erase("metrics");
+  output.Object(json);
+  output.Text("");
+  output.Object(metrics);
+}
+
 absl::Status StatusOf(const JobInfo& job) {
-  if (job.state == JobState::kSucceeded) {
+  if (job.state == JobState::kSucceeded || job.state == JobState::kProposed) {
     return absl::OkStatus();
   }
   return absl::FailedPreconditionError(
@@ -62,7 +75,7 @@ absl::Status RunJob(Context& context,
   STRATA_ASSIGN_OR_RETURN(JobInfo started,
                           context.database.jobs().Start(context.call, map, kind, parameters));
   STRATA_ASSIGN_OR_RETURN(JobInfo job, FollowJob(context, map, started.id));
-  context.output.Object(ToJson(job));
+  PrintJob(job, context.output);
   return StatusOf(job);
 }
 

@@ -23,7 +23,10 @@ absl::Status RunJob(Context& context,
                     const std::string& kind,
                     const std::map<std::string, std::string>& parameters);
 
-// OK only for a job that has succeeded.
+// The job; as text with a line for each number of its result.
+void PrintJob(const JobInfo& job, Output& output);
+
+// OK only for a job that has succeeded, or proposes what a dry run found.
 absl::Status StatusOf(const JobInfo& job);
 
 }  // namespace strata::cli

@@ -139,6 +139,8 @@ int Main(int argc, char** argv) {
   AddPlanCommand(commands);
   AddProfileCommands(commands);
   AddJobCommands(commands);
+  AddPlanesCommands(commands);
+  AddLocalizeCommand(commands);
   try {
     root.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,4 +1,7 @@
-// strata map create|list|show|delete|verify|rebuild; export and render have files of their own.
+// strata map create|list|show|delete|verify|rebuild|history|revert; export, render and watch have
+// files of their own.
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +13,7 @@
 #include "client/cli/job_runner.h"
 #include "client/cli/json.h"
 #include "client/cli/map_files.h"
+#include "client/cli/world_json.h"
 #include "core/common/status.h"
 
 namespace strata::cli {
@@ -20,6 +24,8 @@ struct MapOptions {
   MapParameters parameters;
   ProfileOverrides profile;
   bool drop_points = false;
+  std::uint64_t epoch = 0;
+  bool wait = false;
 };
 
 absl::Status Create(Context& context, MapOptions options) {
@@ -61,6 +67,48 @@ absl::Status Delete(Context& context, const MapOptions& options) {
   STRATA_RETURN_IF_ERROR(context.database.maps().Delete(context.call, options.map));
   context.output.Object({{"deleted", options.map}});
   return absl::OkStatus();
+}
+
+absl::Status History(Context& context, const MapOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<EpochInfo> epochs,
+                          context.database.maps().History(context.call, options.map));
+  Json rows = Json::array();
+  for (const EpochInfo& epoch : epochs) {
+    rows.push_back(ToJson(epoch));
+  }
+  context.output.List(rows,
+                      {{"epoch", "EPOCH"},
+                       {"created", "CREATED"},
+                       {"decided", "POSES"},
+                       {"job", "JOB"},
+                       {"current", "CURRENT"},
+                       {"kept", "KEPT"},
+                       {"reason", "REASON"}});
+  return absl::OkStatus();
+}
+
+absl::Status Revert(Context& context, const MapOptions& options) {
+  const std::map<std::string, std::string> parameters = {{"epoch", std::to_string(options.epoch)}};
+  if (options.wait) return RunJob(context, options.map, "revert", parameters);
+  STRATA_ASSIGN_OR_RETURN(
+      const JobInfo job,
+      context.database.jobs().Start(context.call, options.map, "revert", parameters));
+  PrintJob(job, context.output);
+  return absl::OkStatus();
+}
+
+void AddRevert(Commands& commands, CLI::App* noun, const std::shared_ptr<MapOptions>& options) {
+  CLI::App* revert =
+      commands.Verb(noun,
+                    "revert",
+                    "Bring back poses and constraints of an earlier epoch, as a new one",
+                    "strata map revert campus 3 --wait",
+                    [options](Context& context) { return Revert(context, *options); });
+  AddMapName(revert, options->map);
+  revert->add_option("EPOCH", options->epoch, "Number of the epoch; see map history")
+      ->check(CLI::PositiveNumber)
+      ->required();
+  revert->add_flag("--wait", options->wait, "Return when it is done; exit 1 unless it succeeded");
 }
 
 void AddCreate(Commands& commands, CLI::App* noun, const std::shared_ptr<MapOptions>& options) {
@@ -134,6 +182,12 @@ void AddMapCommands(Commands& commands) {
        "Make all derived data again from the scans",
        "strata map rebuild campus",
        [](Context& context, const MapOptions& o) { return RunJob(context, o.map, "rebuild", {}); });
+  verb("history",
+       "The epochs of a map, newest first: what made them, and which can be brought back",
+       "strata map history campus",
+       History);
+  AddRevert(commands, noun, options);
+  AddMapWatch(commands, noun);
   AddMapExport(commands, noun);
   AddMapRender(commands, noun);
 }

@@ -1,4 +1,4 @@
-// The verbs of `map` that write files.
+// The verbs of `map` that have files of their own.
 #ifndef STRATA_CLIENT_CLI_MAP_FILES_H_
 #define STRATA_CLIENT_CLI_MAP_FILES_H_
 
@@ -8,6 +8,7 @@ namespace strata::cli {
 
 void AddMapExport(Commands& commands, CLI::App* noun);
 void AddMapRender(Commands& commands, CLI::App* noun);
+void AddMapWatch(Commands& commands, CLI::App* noun);
 
 }  // namespace strata::cli
 

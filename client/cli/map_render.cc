@@ -16,6 +16,7 @@
 
 #include "client/cli/arguments.h"
 #include "client/cli/command.h"
+#include "client/cli/graph_overlay.h"
 #include "client/cli/json.h"
 #include "client/cli/map_files.h"
 #include "client/cli/path_file.h"
@@ -35,6 +36,8 @@ struct RenderOptions {
   double azimuth_rad = -1.0;
   double elevation_rad = 0.6;
   std::optional<int> level;
+  bool trajectories = false;
+  bool constraints = false;
   picture::PictureOptions picture;
 };
 
@@ -46,6 +49,16 @@ std::int32_t LevelFor(const MapStats& stats,
   const double metres_per_pixel = std::max(size.x() / options.width, size.y() / options.height);
   const double ratio = metres_per_pixel / cell_size_m;
   return ratio < 2.0 ? 0 : std::min(static_cast<int>(std::log2(ratio)), kMaxLevel);
+}
+
+absl::StatusOr<picture::Overlay> OverlayOf(Context& context, const RenderOptions& options) {
+  picture::Overlay overlay;
+  if (!options.trajectories && !options.constraints) return overlay;
+  STRATA_ASSIGN_OR_RETURN(const api::PoseGraphState state,
+                          context.database.posegraph().Get(context.call, options.map));
+  if (options.constraints) AddConstraints(state, overlay);
+  if (options.trajectories) AddTrajectories(state, overlay);
+  return overlay;
 }
 
 absl::Status Render(Context& context, RenderOptions options) {
@@ -65,8 +78,9 @@ absl::Status Render(Context& context, RenderOptions options) {
   const double cell = info.parameters.mls.cell_size_m;
   const std::int32_t level = options.level.value_or(LevelFor(stats, cell, options.picture));
   STRATA_ASSIGN_OR_RETURN(const FetchedTiles fetched, FetchTiles(context, options.map, level));
+  STRATA_ASSIGN_OR_RETURN(const picture::Overlay overlay, OverlayOf(context, options));
   const picture::Picture picture = picture::DrawMap(
-      fetched.tiles, cell * static_cast<double>(1 << level), paths, options.picture);
+      fetched.tiles, cell * static_cast<double>(1 << level), paths, options.picture, overlay);
   STRATA_ASSIGN_OR_RETURN(const std::string png, picture::PngBytes(picture.image));
   STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, png));
   const picture::Camera& camera = picture.camera;
@@ -81,7 +95,8 @@ absl::Status Render(Context& context, RenderOptions options) {
                          {"up", ToJson(camera.up)},
                          {"level", level},
                          {"tiles", fetched.tiles.size()},
-                         {"paths", paths.size()}});
+                         {"paths", paths.size()},
+                         {"lines", overlay.strokes.size()}});
   return fetched.damage;
 }
 
@@ -156,6 +171,11 @@ void AddMapRender(Commands& commands, CLI::App* noun) {
           "--path", options->path_files, "PLY file of a path to draw; may be given several times")
       ->type_name("FILE.ply")
       ->allow_extra_args(false);
+  render->add_flag(
+      "--trajectories", options->trajectories, "The way of each trajectory through its scans");
+  render->add_flag("--constraints",
+                   options->constraints,
+                   "What holds the scans together, coloured by how well the poses keep it");
   AddViewOptions(render, options);
 }
 

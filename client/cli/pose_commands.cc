@@ -1,4 +1,4 @@
-// strata pose list|export|set
+// strata pose list|export|set|lookup
 #include <algorithm>
 #include <memory>
 #include <string>
@@ -7,11 +7,11 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
-#include <Eigen/Geometry>
 
 #include "client/cli/arguments.h"
 #include "client/cli/command.h"
 #include "client/cli/json.h"
+#include "client/cli/world_json.h"
 #include "client/formats/file_bytes.h"
 #include "client/formats/pose_writer.h"
 #include "core/common/status.h"
@@ -78,19 +78,14 @@ absl::Status Set(Context& context, const PoseOptions& options) {
   return absl::OkStatus();
 }
 
-// X,Y,Z keeps the axes of the map; seven numbers bring a quaternion, which is normalised.
-void SetPoseOption(const std::vector<double>& n, Pose& T_map_scan) {
-  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
-  if (n.size() == 7) {
-    rotation = Eigen::Quaterniond(n[6], n[3], n[4], n[5]);
-    if (rotation.norm() < 1e-6) {
-      throw CLI::ValidationError("--pose", "the quaternion is zero");
-    }
-    rotation.normalize();
-  } else if (n.size() != 3) {
-    throw CLI::ValidationError("--pose", "expected 3 or 7 numbers");
-  }
-  T_map_scan = MakePose(rotation, {n[0], n[1], n[2]});
+absl::Status Lookup(Context& context, const PoseOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(
+      const api::PoseLookup lookup,
+      context.database.posegraph().LookupPose(context.call, options.map, options.id));
+  Json json = {{"id", options.id.ToString()}};
+  json.update(ToJson(lookup));
+  context.output.Object(json);
+  return absl::OkStatus();
 }
 
 void AddExport(Commands& commands, CLI::App* noun, const std::shared_ptr<PoseOptions>& options) {
@@ -135,15 +130,20 @@ void AddPoseCommands(Commands& commands) {
                                 [options](Context& context) { return Set(context, *options); });
   AddMapName(set, options->map);
   AddScanId(set, options->id);
-  AddNumbers(
+  AddPose(
       set,
       "--pose",
-      "X,Y,Z[,QX,QY,QZ,QW]",
-      3,
-      7,
-      [options](const std::vector<double>& n) { SetPoseOption(n, options->T_map_scan); },
-      "Where the scan's frame is in the map [m]")
+      [options](const Pose& pose, std::size_t) { options->T_map_scan = pose; },
+      "Where the scan's frame is in the map [m, rad]; X,Y,Z keeps the axes of the map")
       ->required();
+  CLI::App* lookup =
+      commands.Verb(noun,
+                    "lookup",
+                    "Where a scan is now, or why that is not known yet",
+                    "strata pose lookup campus segway/12",
+                    [options](Context& context) { return Lookup(context, *options); });
+  AddMapName(lookup, options->map);
+  AddScanId(lookup, options->id);
 }
 
 }  // namespace strata::cli

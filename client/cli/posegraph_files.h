@@ -1,4 +1,4 @@
-// The verbs of `posegraph` that work on bare files.
+// The verbs of `posegraph` that read and write files.
 #ifndef STRATA_CLIENT_CLI_POSEGRAPH_FILES_H_
 #define STRATA_CLIENT_CLI_POSEGRAPH_FILES_H_
 
@@ -6,6 +6,7 @@
 
 namespace strata::cli {
 
+void AddPosegraphExchange(Commands& commands, CLI::App* noun);
 void AddPosegraphOptimize(Commands& commands, CLI::App* noun);
 
 }  // namespace strata::cli

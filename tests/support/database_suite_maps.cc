@@ -69,9 +69,22 @@ TEST_P(DatabaseSuite, AnUnknownMapIsNotFoundEverywhere) {
   EXPECT_THAT(db().jobs().Get({}, no, 1), not_found);
   EXPECT_THAT(db().jobs().List({}, no), not_found);
   EXPECT_THAT(db().jobs().Cancel({}, no, 1), not_found);
+  EXPECT_THAT(db().jobs().Accept({}, no, 1), not_found);
+  EXPECT_THAT(db().jobs().Revert({}, no, 1), not_found);
   EXPECT_THAT(db().jobs().Watch({}, no, 1, ignore), not_found);
+  EXPECT_THAT(db().maps().History({}, no), not_found);
+  EXPECT_THAT(db().maps().Watch({}, no, {.trajectory = "", .once = true}, ignore), not_found);
   EXPECT_THAT(db().posegraph().Get({}, no), not_found);
   EXPECT_THAT(db().posegraph().SetPose({}, no, {"run", 1}, Pose::Identity()), not_found);
+  Constraint constraint;
+  constraint.j = {"run", 1};
+  EXPECT_THAT(db().posegraph().AddConstraint({}, no, constraint), not_found);
+  EXPECT_THAT(db().posegraph().RemoveConstraint({}, no, 1), not_found);
+  EXPECT_THAT(db().posegraph().EnableConstraint({}, no, 1, true), not_found);
+  EXPECT_THAT(db().posegraph().LookupPose({}, no, {"run", 1}), not_found);
+  LocalizeQuery query;
+  query.cloud = floor;
+  EXPECT_THAT(db().posegraph().Localize({}, no, query), not_found);
 }
 
 }  // namespace

@@ -231,6 +231,50 @@ void DrawLegend(Image& image, const Camera& camera) {
   DrawScaleBar(image, camera, 1);
 }
 
+// One below the other, on a ground of their own.
+void DrawOverlayLegend(Image& image, const Overlay& overlay) {
+  if (overlay.legend.empty()) return;
+  const int scale = image.width >= 1000 ? 2 : 1;
+  const int row = 12 * scale;
+  std::size_t longest = 0;
+  for (const auto& [colour, text] : overlay.legend) longest = std::max(longest, text.size());
+  const int width = (20 + 6 * static_cast<int>(longest)) * scale;
+  const int height = row * static_cast<int>(overlay.legend.size()) + 6 * scale;
+  FillRectangle(image, 4 * scale, 4 * scale, width, height, kBackground);
+  int y = 8 * scale;
+  for (const auto& [colour, text] : overlay.legend) {
+    FillRectangle(image, 8 * scale, y + 2 * scale, 9 * scale, 3 * scale, colour);
+    DrawText(image, 20 * scale, y, scale, text, kInk);
+    y += row;
+  }
+}
+
+// Every second piece of `length_m` of the line.
+std::vector<Path> Dashes(const Path& line, double length_m) {
+  std::vector<Path> dashes;
+  for (std::size_t i = 1; i < line.size(); ++i) {
+    const Vector3d along = line[i] - line[i - 1];
+    const int pieces = std::clamp(static_cast<int>(along.norm() / length_m), 1, 1000);
+    for (int piece = 0; piece < pieces; piece += 2) {
+      dashes.push_back(
+          {line[i - 1] + along * piece / pieces, line[i - 1] + along * (piece + 1) / pieces});
+    }
+  }
+  return dashes;
+}
+
+// Above everything: a diagram of what is below a roof must be seen too.
+void DrawStroke(Raster& raster, const Camera& camera, const Stroke& stroke) {
+  constexpr double kDashPixels = 9.0;
+  constexpr double kNothingHidesM = 1e9;
+  const std::vector<Path> lines = stroke.dashed
+                                      ? Dashes(stroke.points, kDashPixels * camera.metres_per_pixel)
+                                      : std::vector<Path>{stroke.points};
+  for (const Path& line : lines) {
+    raster.DrawLine(line, stroke.width_pixels, stroke.colour, kNothingHidesM);
+  }
+}
+
 // The axes of the map in the lower left corner, as far as the view shows them.
 void DrawAxes(Image& image, const Camera& camera) {
   const int length = std::clamp(image.width / 40, 14, 36);
@@ -266,7 +310,8 @@ void DrawAxes(Image& image, const Camera& camera) {
 Picture DrawMap(const std::vector<SurfaceTile>& tiles,
                 double cell_size_m,
                 const std::vector<Path>& paths,
-                const PictureOptions& options) {
+                const PictureOptions& options,
+                const Overlay& overlay) {
   const std::vector<Block> blocks = BlocksOf(tiles, cell_size_m, options);
   Picture picture;
   picture.camera = Frame(blocks, cell_size_m, options);
@@ -281,16 +326,16 @@ Picture DrawMap(const std::vector<SurfaceTile>& tiles,
     painter.Paint(block);
   }
   raster.ShadeByDepth(2.2);
+  const double tolerance_m = std::max(0.4, 2.0 * cell_size_m);
+  for (const Stroke& stroke : overlay.strokes) DrawStroke(raster, picture.camera, stroke);
   for (std::size_t i = 0; i < paths.size(); ++i) {
-    raster.DrawLine(paths[i],
-                    kPathWidthPixels,
-                    kPathColours[i % kPathColours.size()],
-                    std::max(0.4, 2.0 * cell_size_m));
+    raster.DrawLine(paths[i], kPathWidthPixels, kPathColours[i % kPathColours.size()], tolerance_m);
   }
   const Image map = raster.Finish();
   picture.image = Image(options.width, options.height, kBackground);
   std::copy(map.pixels.begin(), map.pixels.end(), picture.image.pixels.begin());
   DrawAxes(picture.image, picture.camera);
+  DrawOverlayLegend(picture.image, overlay);
   DrawLegend(picture.image, picture.camera);
   return picture;
 }

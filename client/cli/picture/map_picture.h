@@ -4,6 +4,7 @@
 #define STRATA_CLIENT_CLI_PICTURE_MAP_PICTURE_H_
 
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -24,6 +25,20 @@ inline constexpr int kLegendPixels = 44;
 
 // Drawn over the map; each in its own colour.
 using Path = std::vector<Eigen::Vector3d>;
+
+// A line over the map.
+struct Stroke {
+  Path points;
+  Colour colour;
+  double width_pixels = 4.0;
+  bool dashed = false;
+};
+
+// What is drawn over a map beside paths, and what it means: a column in the upper left corner.
+struct Overlay {
+  std::vector<Stroke> strokes;  // above the map, later ones above earlier ones
+  std::vector<std::pair<Colour, std::string>> legend;
+};
 
 struct PictureOptions {
   int width = 1600;
@@ -49,7 +64,8 @@ struct Picture {
 Picture DrawMap(const std::vector<SurfaceTile>& tiles,
                 double cell_size_m,
                 const std::vector<Path>& paths,
-                const PictureOptions& options);
+                const PictureOptions& options,
+                const Overlay& overlay = {});
 
 }  // namespace strata::picture
 

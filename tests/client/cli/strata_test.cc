@@ -81,12 +81,46 @@ class StrataTest : public ::testing::Test {
 };
 
 TEST_F(StrataTest, EveryCommandHasHelpWithAnExample) {
-  const std::vector<std::string> commands = {
-      "map create",  "map list",   "map show",    "map delete",   "map verify", "map rebuild",
-      "map export",  "map render", "scan import", "scan list",    "scan show",  "scan export",
-      "scan delete", "pose list",  "pose export", "pose set",     "tile list",  "tile get",
-      "surface",     "plan",       "profile set", "profile list", "job start",  "job list",
-      "job show",    "job watch",  "job cancel"};
+  const std::vector<std::string> commands = {"map create",
+                                             "map list",
+                                             "map show",
+                                             "map delete",
+                                             "map verify",
+                                             "map rebuild",
+                                             "map export",
+                                             "map render",
+                                             "scan import",
+                                             "scan list",
+                                             "scan show",
+                                             "scan export",
+                                             "scan delete",
+                                             "pose list",
+                                             "pose export",
+                                             "pose set",
+                                             "tile list",
+                                             "tile get",
+                                             "surface",
+                                             "plan",
+                                             "profile set",
+                                             "profile list",
+                                             "job start",
+                                             "job list",
+                                             "job show",
+                                             "job watch",
+                                             "job cancel",
+                                             "job accept",
+                                             "job revert",
+                                             "map history",
+                                             "map revert",
+                                             "map watch",
+                                             "pose lookup",
+                                             "localize",
+                                             "planes list",
+                                             "posegraph show",
+                                             "posegraph add-constraint",
+                                             "posegraph remove-constraint",
+                                             "posegraph enable",
+                                             "posegraph disable"};
   for (const std::string& command : commands) {
     std::vector<std::string> words;
     std::istringstream stream(command);
@@ -111,6 +145,11 @@ TEST_F(StrataTest, WrongUsageExitsWithTwo) {
       {"plan", "m", "--from", "1,x", "--to", "1,2"},
       {"plan", "m", "--from", "1,2", "--to", "1,2", "--max-expanded", "-1"},
       {"job", "show", "m", "-1"},
+      {"job", "start", "m", "optimize", "fast"},
+      {"map", "revert", "m", "first"},
+      {"localize", "m", "scan.pcd", "--guess", "1,2"},
+      {"posegraph", "disable", "m", "0"},
+      {"posegraph", "add-constraint", "m", "a/1", "b", "--pose", "1,2,3"},
       {"scan", "list", "m", "--box", "1,0,-1,2"},
       {"tile", "list", "m", "--area", "0,1,2,0"},
       {"surface", "m"},
@@ -124,7 +163,8 @@ TEST_F(StrataTest, WrongUsageExitsWithTwo) {
 }
 
 TEST_F(StrataTest, NounsAndTheProgramHaveHelpWithAnExample) {
-  for (const std::string noun : {"map", "scan", "pose", "tile", "profile", "job"}) {
+  for (const std::string noun :
+       {"map", "scan", "pose", "tile", "profile", "job", "posegraph", "planes"}) {
     EXPECT_THAT(RunStrata({noun, "--help"}).out, HasSubstr("Example:\n  strata " + noun));
   }
   EXPECT_THAT(RunStrata({"--help"}).out,

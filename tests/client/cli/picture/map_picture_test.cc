@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -120,6 +121,35 @@ TEST(MapPictureTest, PathIsDrawnOnTopAndFaintWhereSomethingHidesIt) {
   const Colour hidden = PixelAt(with, {6.0, 4.0, 0.0});
   EXPECT_GT(hidden.r + hidden.g + hidden.b, 250);
   EXPECT_NE(hidden, PixelAt(without, {6.0, 4.0, 0.0}));
+}
+
+TEST(MapPictureTest, AnOverlayIsDrawnAboveWhatHidesItAndWithItsMeaning) {
+  const SurfaceTile tile =
+      TileOf(80, [](int, int) { return Ground(Traversability::kTraversable, 4.0F); });
+  const PictureOptions options{.width = 400, .height = 444};
+  const Colour green = {0, 120, 0};
+  const Colour violet = {120, 0, 200};
+  const Overlay overlay = {.strokes = {{{{1.0, 2.0, 0.0}, {7.0, 2.0, 0.0}}, green, 4.0, false},
+                                       {{{1.0, 6.0, 0.0}, {7.0, 6.0, 0.0}}, violet, 4.0, true}},
+                           .legend = {{green, "solid"}, {violet, "dashed"}}};
+  const Picture picture = DrawMap({tile}, 0.1, {}, options, overlay);
+  const auto drawn = [&](double y, Colour colour) {
+    int count = 0;
+    for (int i = 0; i < 100; ++i) {
+      const Colour c = PixelAt(picture, {1.5 + 0.05 * i, y, 0.0});
+      if (std::abs(c.r - colour.r) + std::abs(c.g - colour.g) + std::abs(c.b - colour.b) < 60) {
+        ++count;
+      }
+    }
+    return count;
+  };
+  EXPECT_EQ(drawn(2.0, green), 100);
+  EXPECT_GT(drawn(6.0, violet), 30);
+  EXPECT_LT(drawn(6.0, violet), 80);
+  EXPECT_EQ(drawn(4.0, green) + drawn(4.0, violet), 0);
+  // The legend, a row each.
+  EXPECT_EQ(picture.image.At(12, 11), green);
+  EXPECT_EQ(picture.image.At(12, 23), violet);
 }
 
 TEST(MapPictureTest, AFewStraySurfacesDoNotShrinkTheView) {

@@ -1,0 +1,105 @@
+// strata map watch
+#include <memory>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/time/clock.h"
+
+#include "client/cli/arguments.h"
+#include "client/cli/command.h"
+#include "client/cli/json.h"
+#include "client/cli/map_files.h"
+#include "client/cli/patience.h"
+#include "client/cli/world_json.h"
+#include "core/common/status.h"
+
+namespace strata::cli {
+namespace {
+
+struct MapWatchOptions {
+  std::string map;
+  api::WatchOptions watch;
+  bool no_tiles = false;
+};
+
+std::string TextOf(const api::ScanChange& scan) {
+  if (scan.gone) return absl::StrCat("scan ", scan.id.ToString(), " deleted");
+  const Eigen::Vector3d t = scan.T_map_scan.translation();
+  return absl::StrFormat("scan %s %s at %.3f, %.3f, %.3f",
+                         scan.id.ToString(),
+                         ToString(scan.state),
+                         t.x(),
+                         t.y(),
+                         t.z());
+}
+
+std::string TextOf(const api::TileChangeNotice& tile) {
+  return absl::StrCat(
+      "tile ", tile.key.ToString(), tile.gone ? " gone" : absl::StrCat(" version ", tile.version));
+}
+
+void Print(const api::MapUpdate& update, Output& output) {
+  if (output.json()) {
+    output.JsonLine(ToJson(update));
+    return;
+  }
+  const bool reason = !update.epoch_reason.empty();
+  output.Text(absl::StrCat("commit ",
+                           update.commit_sequence,
+                           " epoch ",
+                           update.epoch,
+                           reason ? " " + update.epoch_reason : ""));
+  for (const api::ScanChange& scan : update.scans) output.Text("  " + TextOf(scan));
+  for (const api::TileChangeNotice& tile : update.tiles) output.Text("  " + TextOf(tile));
+}
+
+// Until the watch has ended; a server that is away for a while is waited for.
+absl::Status Follow(Context& context, const std::string& map, api::WatchOptions& options) {
+  Patience patience;
+  while (true) {
+    const absl::Status ended = context.database.maps().Watch(
+        context.call, map, options, [&](const api::MapUpdate& update) {
+          Print(update, context.output);
+          options.since = update.commit_sequence;
+          options.epoch = update.epoch;
+          patience.Has(absl::OkStatus());
+          return absl::OkStatus();
+        });
+    if (ended.ok() || context.call.stop.requested() || !patience.Has(ended)) return ended;
+    absl::SleepFor(absl::Milliseconds(200));
+  }
+}
+
+absl::Status Watch(Context& context, const MapWatchOptions& options) {
+  api::WatchOptions watch = options.watch;
+  watch.tiles = !options.no_tiles;
+  const absl::Status ended = Follow(context, options.map, watch);
+  if (ended.ok()) return ended;
+  context.output.Talk(absl::StrCat("--since ", watch.since, " goes on from here"));
+  // A watch without an end is ended by its user.
+  return context.call.stop.requested() && !watch.once ? absl::OkStatus() : ended;
+}
+
+}  // namespace
+
+void AddMapWatch(Commands& commands, CLI::App* noun) {
+  auto options = std::make_shared<MapWatchOptions>();
+  CLI::App* watch = commands.Verb(
+      noun,
+      "watch",
+      "Follow a map: scan states, corrected poses, epochs and tiles as they change, until Ctrl-C",
+      "strata map watch campus --trajectory segway --since 812 --output json",
+      [options](Context& context) { return Watch(context, *options); });
+  AddMapName(watch, options->map);
+  watch
+      ->add_option("--since",
+                   options->watch.since,
+                   "Only what changed after this commit; 0: first everything there is")
+      ->capture_default_str();
+  watch->add_option("--trajectory", options->watch.trajectory, "Only scans of this trajectory");
+  watch->add_flag("--no-tiles", options->no_tiles, "Only scans and epochs");
+  watch->add_flag("--once", options->watch.once, "End when there is nothing newer");
+}
+
+}  // namespace strata::cli
