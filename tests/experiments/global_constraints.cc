@@ -52,15 +52,22 @@ struct Setup {
   double min_overlap = 0.3;
   double sigma_m = 0.01;  // of the sensor
   PlaneExtractionOptions extraction;
-  double min_edge_support_m = 12.0;
+  SharedPlaneOptions shared_planes;
 };
+
+// The gates know how far off the poses may be.
+void ExpectStartNoise(Setup& setup) {
+  setup.shared_planes.pose_sigma_m = testing::kStartNoise[0].sigma_m;
+  setup.shared_planes.pose_sigma_rad = testing::kStartNoise[0].sigma_rad;
+}
 
 Setup SmallHouseSetup() {
   Setup setup;
   setup.extraction.cell_size_m = 1.0;
   setup.extraction.min_area_m2 = 0.25;
   setup.extraction.min_edge_length_m = 0.5;
-  setup.min_edge_support_m = 4.0;
+  setup.shared_planes.min_edge_support_m = 4.0;
+  ExpectStartNoise(setup);
   return setup;
 }
 
@@ -71,6 +78,7 @@ Setup LargeBuildingSetup() {
   setup.final_gate_m = 0.3;
   setup.min_overlap = 0.1;
   setup.sigma_m = testing::kBuildingTour.sigma_m;
+  ExpectStartNoise(setup);
   return setup;
 }
 
@@ -151,7 +159,7 @@ std::vector<Pose> Align(Scans& scans, const std::vector<Pose>& start, Method met
   options.registration.initial_gate_m = scans.setup().initial_gate_m;
   options.registration.min_overlap = scans.setup().min_overlap;
   options.registration.final_gate_m = scans.setup().final_gate_m;
-  options.shared_planes.min_edge_support_m = scans.setup().min_edge_support_m;
+  options.shared_planes = scans.setup().shared_planes;
   if (method == kThesisLocal) options.registration.metric = MlsErrorMetric::kPointToPoint;
   const absl::StatusOr<AlignmentResult> result = AlignScans(
       problem, scans, options, &ForEachInTurn, [](double) { return absl::OkStatus(); }, Stop());
