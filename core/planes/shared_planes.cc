@@ -16,26 +16,36 @@
 namespace strata {
 namespace {
 
-// True if the edges lie in a plane of patches that half of their scans see: creases of these
-// patches and borders of this surface, which would only be counted twice.
-bool IsKnown(const SharedPlane& edges,
-             std::span<const SharedPlane> patch_planes,
-             std::span<const PosedPlanes> scans,
-             double corridor_m) {
-  Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
+// Edges in a plane of patches that one of their scans sees are creases and borders of that surface.
+// For scans that see the patches too they say nothing new; scans that see only the border (a corner
+// from the other side, the eaves from below) get a view of the plane by it. True if so.
+bool LendViews(const SharedPlane& edges,
+               std::span<const PosedPlanes> scans,
+               double corridor_m,
+               SharedPlane& plane) {
+  const auto has_view = [&plane](std::size_t scan) {
+    return std::any_of(plane.views.begin(), plane.views.end(), [scan](const auto& view) {
+      return view.scan == scan;
+    });
+  };
+  Eigen::Matrix4d all = Eigen::Matrix4d::Zero();
+  bool seen = false;
   for (const SharedPlane::View& view : edges.views) {
-    moments += Moved(scans[view.scan].T_map_scan, view.moments);
+    all += Moved(scans[view.scan].T_map_scan, view.moments);
+    seen = seen || has_view(view.scan);
   }
-  return std::any_of(patch_planes.begin(), patch_planes.end(), [&](const SharedPlane& known) {
-    if (RmsDistance(moments, known.plane) > corridor_m) return false;
-    const auto common = std::count_if(
-        edges.views.begin(), edges.views.end(), [&known](const SharedPlane::View& view) {
-          return std::any_of(known.views.begin(), known.views.end(), [&view](const auto& other) {
-            return other.scan == view.scan;
-          });
-        });
-    return 2 * common >= std::ssize(edges.views);
+  if (!seen || RmsDistance(all, plane.plane) > corridor_m) return false;
+  for (SharedPlane::View view : edges.views) {
+    if (has_view(view.scan)) continue;
+    view.rms_m = RmsDistance(Moved(scans[view.scan].T_map_scan, view.moments), plane.plane);
+    if (view.rms_m > corridor_m) continue;
+    plane.support_value += view.weight;
+    plane.views.push_back(view);
+  }
+  std::sort(plane.views.begin(), plane.views.end(), [](const auto& x, const auto& y) {
+    return x.scan < y.scan;
   });
+  return true;
 }
 
 void Append(std::vector<SharedPlane> found, std::vector<SharedPlane>& planes) {
@@ -68,8 +78,10 @@ std::vector<SharedPlane> FindSharedPlanes(std::span<const PosedPlanes> scans,
   std::vector<SharedPlane> planes;
   Append(FindPatchPlanes(scans, options), planes);
   std::vector<SharedPlane> of_edges = FindEdgePlanes(scans, options);
-  std::erase_if(of_edges, [&](const SharedPlane& plane) {
-    return IsKnown(plane, planes, scans, options.corridor_m);
+  std::erase_if(of_edges, [&](const SharedPlane& edges) {
+    return std::any_of(planes.begin(), planes.end(), [&](SharedPlane& plane) {
+      return LendViews(edges, scans, options.corridor_m, plane);
+    });
   });
   Append(std::move(of_edges), planes);
   return planes;

@@ -8,6 +8,7 @@
 // Three columns: local constraints by point-to-point ICP as in the thesis, our local constraints,
 // and ours with planes. What it is run with stands in global_constraint_cases.h.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -40,32 +41,71 @@ constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 using testing::View;
 
+// What fits the size of a scene and the spacing of its points.
+struct Setup {
+  // Edge of the cells of the maps that are matched; 0: the points themselves are, as in the thesis'
+  // experiment, whose object is not much larger than what γ closes.
+  double map_cell_m = 0.0;
+  double neighbour_radius_m = 0.3;  // of surface elements
+  double initial_gate_m = 1.5;      // of matches: more than the start's error where points are
+  double final_gate_m = 0.15;
+  double min_overlap = 0.3;
+  double sigma_m = 0.01;  // of the sensor
+  PlaneExtractionOptions extraction;
+  SharedPlaneOptions shared_planes;
+};
+
+// The gates know how far off the poses may be.
+void ExpectStartNoise(Setup& setup) {
+  setup.shared_planes.pose_sigma_m = testing::kStartNoise[0].sigma_m;
+  setup.shared_planes.pose_sigma_rad = testing::kStartNoise[0].sigma_rad;
+}
+
+Setup SmallHouseSetup() {
+  Setup setup;
+  setup.extraction.cell_size_m = 1.0;
+  setup.extraction.min_area_m2 = 0.25;
+  setup.extraction.min_edge_length_m = 0.5;
+  setup.shared_planes.min_edge_support_m = 4.0;
+  ExpectStartNoise(setup);
+  return setup;
+}
+
+Setup LargeBuildingSetup() {
+  Setup setup;
+  setup.neighbour_radius_m = 1.0;
+  setup.initial_gate_m = 4.0;
+  setup.final_gate_m = 0.3;
+  setup.min_overlap = 0.1;
+  setup.sigma_m = testing::kBuildingTour.sigma_m;
+  ExpectStartNoise(setup);
+  return setup;
+}
+
+Setup FacadeSetup() {
+  Setup setup;
+  setup.map_cell_m = 0.1;
+  setup.neighbour_radius_m = 1.5;
+  setup.final_gate_m = 0.3;
+  setup.sigma_m = 0.02;
+  return setup;
+}
+
 // Scans held in memory.
 class Scans : public AlignmentSource {
  public:
-  struct Sizes {
-    double cell_m = 0.1;        // of the maps that are matched
-    double sigma_m = 0.01;      // of the sensor
-    double min_area_m2 = 1.0;   // of a patch
-    double plane_cell_m = 2.0;  // PlaneExtractionOptions::cell_size_m
-    double min_edge_length_m = 1.0;
-  };
+  explicit Scans(const Setup& setup) : setup_(setup) {}
+  const Setup& setup() const { return setup_; }
 
-  void Add(const PointCloud& cloud, const Sizes& sizes) {
-    const SensorModel sensor{.sigma_m = sizes.sigma_m, .sigma_per_metre = 0.0};
+  void Add(const PointCloud& cloud) {
+    const SensorModel sensor{.sigma_m = setup_.sigma_m, .sigma_per_metre = 0.0};
     PointCloud finite;
     for (const Eigen::Vector3f& p : cloud.points) {
       if (p.allFinite()) finite.points.push_back(p);
     }
-    const MlsParameters mls{.cell_size_m = sizes.cell_m};
-    const MlsMap map = BuildMlsMap(finite, Pose::Identity(), sensor, mls).value().map;
-    features_.push_back(std::make_shared<const ScanFeatures>(
-        ScanFeatures::FromMap(map, {.samples_per_metre = 1.0 / sizes.cell_m})));
-    PlaneExtractionOptions extraction;
+    features_.push_back(std::make_shared<const ScanFeatures>(FeaturesOf(finite, sensor)));
+    PlaneExtractionOptions extraction = setup_.extraction;
     extraction.sensor = sensor;
-    extraction.cell_size_m = sizes.plane_cell_m;
-    extraction.min_area_m2 = sizes.min_area_m2;
-    extraction.min_edge_length_m = sizes.min_edge_length_m;
     planes_.push_back(std::make_shared<const ScanPlanes>(ExtractPlanes(cloud, extraction)));
   }
 
@@ -82,6 +122,21 @@ class Scans : public AlignmentSource {
   }
 
  private:
+  ScanFeatures FeaturesOf(const PointCloud& finite, const SensorModel& sensor) const {
+    ScanFeatureOptions options;
+    options.neighbour_radius_m = setup_.neighbour_radius_m;
+    if (setup_.map_cell_m == 0.0) {
+      std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points;
+      points[static_cast<std::size_t>(FeatureClass::kVertical)] = finite.points;
+      options.sample_count = 4000;
+      return ScanFeatures::FromPoints(std::move(points), options);
+    }
+    const MlsParameters mls{.cell_size_m = setup_.map_cell_m};
+    return ScanFeatures::FromMap(BuildMlsMap(finite, Pose::Identity(), sensor, mls).value().map,
+                                 options);
+  }
+
+  Setup setup_;
   std::vector<std::shared_ptr<const ScanFeatures>> features_;
   std::vector<std::shared_ptr<const ScanPlanes>> planes_;
 };
@@ -101,8 +156,10 @@ std::vector<Pose> Align(Scans& scans, const std::vector<Pose>& start, Method met
   options.neighbours = 0;
   options.max_rounds = 30;
   options.planes = method == kLocalAndGlobal;
-  options.registration.initial_gate_m = 1.5;
-  options.registration.final_gate_m = 0.3;
+  options.registration.initial_gate_m = scans.setup().initial_gate_m;
+  options.registration.min_overlap = scans.setup().min_overlap;
+  options.registration.final_gate_m = scans.setup().final_gate_m;
+  options.shared_planes = scans.setup().shared_planes;
   if (method == kThesisLocal) options.registration.metric = MlsErrorMetric::kPointToPoint;
   const absl::StatusOr<AlignmentResult> result = AlignScans(
       problem, scans, options, &ForEachInTurn, [](double) { return absl::OkStatus(); }, Stop());
@@ -126,12 +183,6 @@ std::vector<Pose> Align(Scans& scans, const std::vector<Pose>& start, Method met
   return result->T_map_scan;
 }
 
-constexpr Scans::Sizes kSmallSizes = {.cell_m = 0.05,
-                                      .sigma_m = 0.01,
-                                      .min_area_m2 = 0.25,
-                                      .plane_cell_m = 1.0,
-                                      .min_edge_length_m = 0.5};
-
 struct Campaign {
   testing::PoseErrors mean[3];
   int diverged[3] = {};
@@ -140,8 +191,8 @@ struct Campaign {
 Campaign Run(int view_count, const testing::StartNoise& noise) {
   const std::vector<View> views =
       testing::TakeViews(testing::SmallHouse(), view_count, testing::Tour{}, testing::kViewSeed);
-  Scans scans;
-  for (const View& view : views) scans.Add(view.cloud, kSmallSizes);
+  Scans scans(SmallHouseSetup());
+  for (const View& view : views) scans.Add(view.cloud);
   Campaign campaign;
   for (const std::uint64_t seed : testing::kStartSeeds) {
     const std::vector<Pose> start =
@@ -261,10 +312,10 @@ void SigmaAlpha() {
                                                      testing::kBuildingViews,
                                                      testing::kBuildingTour,
                                                      testing::kBuildingSeed);
-  Scans scans;
+  Scans scans(LargeBuildingSetup());
   std::vector<Pose> truth;
   for (const View& view : views) {
-    scans.Add(view.cloud, {.cell_m = 0.2, .sigma_m = testing::kBuildingTour.sigma_m});
+    scans.Add(view.cloud);
     truth.push_back(view.T_world_sensor);
   }
   std::printf(
@@ -326,13 +377,13 @@ void Facade(int step) {
   }
   const auto uploaded = testing::ReadIndexedPoses(*folder / "poses_initial.txt").value();
   const auto referenced = testing::ReadIndexedPoses(*folder / "poses_reference.txt").value();
-  Scans scans;
+  Scans scans(FacadeSetup());
   std::vector<Pose> start;
   std::vector<Pose> reference;
   int k = 0;
   for (const auto& [index, path] : testing::ListScans(*folder / "scans")) {
     if (k++ % step != 0) continue;
-    scans.Add(testing::ReadBinaryPcd(path).value(), {.sigma_m = 0.02});
+    scans.Add(testing::ReadBinaryPcd(path).value());
     start.push_back(uploaded.at(index).T_world_scan);
     reference.push_back(referenced.at(index).T_world_scan);
   }

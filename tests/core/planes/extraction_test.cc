@@ -2,7 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <istream>
 #include <limits>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -182,6 +188,82 @@ TEST(PlaneExtractionTest, RecordedHallHasItsFloor) {
   const Plane& floor = planes.patches[0].plane;
   EXPECT_GT(floor.normal.dot(Eigen::Vector3d(-0.0472, 0.0066, 0.9989)), 0.9999);
   EXPECT_NEAR(floor.distance, -1.553, 0.02);
+}
+
+// Of a PLY file up to its points; the number of these.
+std::size_t SkipPlyHeader(std::istream& in) {
+  std::string line;
+  std::size_t vertices = 0;
+  while (std::getline(in, line) && line != "end_header") {
+    if (line.starts_with("element vertex ")) vertices = std::stoul(line.substr(15));
+  }
+  return vertices;
+}
+
+// Binary, x y z as floats; relative to the first point.
+PointCloud ReadFloatPly(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  PointCloud cloud;
+  cloud.points.resize(SkipPlyHeader(in));
+  in.read(reinterpret_cast<char*>(cloud.points.data()),
+          static_cast<std::streamsize>(12 * cloud.size()));
+  if (!cloud.points.empty()) cloud.origin = cloud.points[0].cast<double>();
+  for (Eigen::Vector3f& p : cloud.points) p -= cloud.origin.cast<float>();
+  return cloud;
+}
+
+// The building's own segments are coarse (some merge the relief of a facade): those that are planes
+// to 0.1 m and have 200 points are to be found.
+TEST(PlaneExtractionTest, RecordedBuildingHasItsSegments) {
+  STRATA_REQUIRE_DATA(folder, "cgal_building_planes");
+  std::ifstream in(folder / "building.ply");
+  PointCloud cloud;
+  std::map<int, Eigen::Matrix4d> segments;
+  for (std::size_t left = SkipPlyHeader(in); left > 0; --left) {
+    Eigen::Vector3d p;
+    Eigen::Vector3d normal;
+    int segment = -1;
+    in >> p.x() >> p.y() >> p.z() >> normal.x() >> normal.y() >> normal.z() >> segment;
+    cloud.points.push_back(p.cast<float>());
+    if (segment < 0) continue;
+    segments.try_emplace(segment, Eigen::Matrix4d::Zero()).first->second +=
+        MomentsOf(1.0, p, Eigen::Matrix3d::Zero());
+  }
+  ASSERT_TRUE(in.good());
+  ASSERT_EQ(segments.size(), 19U);
+  const ScanPlanes planes = ExtractPlanes(cloud);
+  int flat = 0;
+  int found = 0;
+  for (const auto& [segment, moments] : segments) {
+    const MomentsFit fit = FitMoments(moments);
+    if (std::sqrt(fit.eigenvalues(0)) > 0.1 || moments(3, 3) < 200.0) continue;
+    ++flat;
+    found += std::any_of(planes.patches.begin(), planes.patches.end(), [&](const auto& patch) {
+      return std::abs(patch.plane.normal.dot(fit.plane.normal)) > 0.998 &&
+             Distance(patch.centroid, fit.plane) < 0.15;
+    });
+  }
+  EXPECT_EQ(flat, 8);
+  EXPECT_EQ(found, flat);
+}
+
+TEST(PlaneExtractionTest, RecordedStreetHasItsFacadeAndRoad) {
+  STRATA_REQUIRE_DATA(folder, "lille_facade");
+  PointCloud cloud = ReadFloatPly(folder / "Lille_street_small.ply");
+  ASSERT_EQ(cloud.size(), 170610U);
+  cloud.sensor_origin = Eigen::Vector3f(0, 0, 3);
+  PlaneExtractionOptions options;
+  options.sensor.sigma_m = 0.02;
+  const ScanPlanes planes = ExtractPlanes(cloud, options);
+  double road = 0.0;
+  double walls = 0.0;
+  for (const PlanePatch& patch : planes.patches) {
+    EXPECT_LE(patch.rms_m, options.max_rms_m);
+    (std::abs(patch.plane.normal.z()) > 0.9 ? road : walls) += patch.area_m2;
+  }
+  EXPECT_GT(road, 80.0);
+  EXPECT_GT(walls, 80.0);
+  EXPECT_GE(planes.edges.size(), 10U);
 }
 
 }  // namespace
