@@ -18,8 +18,8 @@ constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
 // Columns are joined although some of their blocks are zero while the front is small or the zeros
 // are few: dense arithmetic on them costs less than another front.
-constexpr std::size_t kSmallFrontColumns = 4;
-constexpr double kMaxZeroShare = 0.15;
+constexpr std::size_t kSmallFrontColumns = 2;
+constexpr double kMaxZeroShare = 0.1;
 
 Eigen::Index ToIndex(std::size_t i) { return static_cast<Eigen::Index>(i); }
 
@@ -154,7 +154,7 @@ std::vector<Indices> BlockCholesky::ColumnStructures() const {
 }
 
 void BlockCholesky::MakeSupernodes(std::vector<Indices> structures) {
-  Indices supernode_of(row_.size());
+  supernode_of_.resize(row_.size());
   for (std::size_t begin = 0; begin < row_.size();) {
     std::size_t end = begin + 1;
     std::size_t zeros = 0;
@@ -178,14 +178,34 @@ void BlockCholesky::MakeSupernodes(std::vector<Indices> structures) {
     const std::size_t columns = end - begin;
     const Eigen::Index size = ToIndex(columns) * block_size_;
     node.factor.resize(size + ToIndex(node.below.size()) * block_size_, size);
-    for (std::size_t c = begin; c < end; ++c) supernode_of[c] = supernodes_.size();
+    for (std::size_t c = begin; c < end; ++c) supernode_of_[c] = supernodes_.size();
     supernodes_.push_back(std::move(node));
     begin = end;
   }
   for (std::size_t s = 0; s < supernodes_.size(); ++s) {
     if (supernodes_[s].below.empty()) continue;
-    supernodes_[supernode_of[supernodes_[s].below.front()]].children.push_back(s);
+    supernodes_[supernode_of_[supernodes_[s].below.front()]].children.push_back(s);
   }
+  PlaceUpdates();
+}
+
+// In postorder the children's updates are the uppermost on the stack.
+void BlockCholesky::PlaceUpdates() {
+  std::size_t top = 0;
+  std::size_t size = 0;
+  for (Supernode& node : supernodes_) {
+    const std::size_t rows = node.below.size() * static_cast<std::size_t>(block_size_);
+    node.made = top;
+    node.kept = node.children.empty() ? top : supernodes_[node.children.front()].kept;
+    size = std::max(size, node.made + rows * rows);
+    top = node.kept + rows * rows;
+  }
+  stack_.resize(size);
+}
+
+Eigen::Map<Eigen::MatrixXd> BlockCholesky::UpdateAt(const Supernode& node, std::size_t place) {
+  const Eigen::Index rows = ToIndex(node.below.size()) * block_size_;
+  return {stack_.data() + place, rows, rows};
 }
 
 BlockSlot BlockCholesky::Slot(std::size_t i, std::size_t j) const {
@@ -231,19 +251,35 @@ void BlockCholesky::AssembleValues(const Eigen::VectorXd& damping, Supernode& no
 void BlockCholesky::AssembleChild(const Supernode& child, Supernode& node) {
   const Eigen::Index size = block_size_;
   const std::size_t columns = node.end - node.begin;
+  const Eigen::Map<Eigen::MatrixXd> from = UpdateAt(child, child.kept);
+  Eigen::Map<Eigen::MatrixXd> update = UpdateAt(node, node.made);
   for (std::size_t b = 0; b < child.below.size(); ++b) {
     const std::size_t column = local_[child.below[b]];
     for (std::size_t a = b; a < child.below.size(); ++a) {
       const std::size_t row = local_[child.below[a]];
-      const auto block = child.update.block(ToIndex(a) * size, ToIndex(b) * size, size, size);
+      const auto block = from.block(ToIndex(a) * size, ToIndex(b) * size, size, size);
       if (column < columns) {
         node.factor.block(ToIndex(row) * size, ToIndex(column) * size, size, size) += block;
       } else {
-        node.update.block(
-            ToIndex(row - columns) * size, ToIndex(column - columns) * size, size, size) += block;
+        update.block(ToIndex(row - columns) * size, ToIndex(column - columns) * size, size, size) +=
+            block;
       }
     }
   }
+}
+
+// The front's own columns of the factor, and what they leave for the rows below.
+bool BlockCholesky::Eliminate(Supernode& node) {
+  auto diagonal = node.factor.topRows(node.factor.cols());
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(diagonal);
+  if (llt.info() != Eigen::Success) return false;
+  if (node.below.empty()) return true;
+  auto rest = node.factor.bottomRows(ToIndex(node.below.size()) * block_size_);
+  diagonal.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(rest);
+  Eigen::Map<Eigen::MatrixXd> update = UpdateAt(node, node.made);
+  update.selfadjointView<Eigen::Lower>().rankUpdate(rest, -1.0);
+  std::copy(update.data(), update.data() + update.size(), stack_.data() + node.kept);
+  return true;
 }
 
 bool BlockCholesky::Factor(const Eigen::VectorXd& damping) {
@@ -251,21 +287,11 @@ bool BlockCholesky::Factor(const Eigen::VectorXd& damping) {
     const std::size_t columns = node.end - node.begin;
     for (std::size_t c = 0; c < columns; ++c) local_[node.begin + c] = c;
     for (std::size_t k = 0; k < node.below.size(); ++k) local_[node.below[k]] = columns + k;
-    const Eigen::Index below = ToIndex(node.below.size()) * block_size_;
     node.factor.setZero();
-    node.update.setZero(below, below);
+    UpdateAt(node, node.made).setZero();
     AssembleValues(damping, node);
-    for (const std::size_t c : node.children) {
-      AssembleChild(supernodes_[c], node);
-      supernodes_[c].update.resize(0, 0);
-    }
-    auto diagonal = node.factor.topRows(node.factor.cols());
-    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(diagonal);
-    if (llt.info() != Eigen::Success) return false;
-    if (below == 0) continue;
-    auto rest = node.factor.bottomRows(below);
-    diagonal.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(rest);
-    node.update.selfadjointView<Eigen::Lower>().rankUpdate(rest, -1.0);
+    for (const std::size_t c : node.children) AssembleChild(supernodes_[c], node);
+    if (!Eliminate(node)) return false;
   }
   return true;
 }
@@ -303,6 +329,58 @@ Eigen::VectorXd BlockCholesky::Solve(const Eigen::VectorXd& b) const {
     result.segment(ToIndex(row_[k]) * size, size) = x.segment(ToIndex(k) * size, size);
   }
   return result;
+}
+
+// With the factor [L11 0; L21 L22] of a supernode and the rows below it, and Z the inverse:
+// Z21 = −Z22 L21 L11⁻¹ and Z11 = (L11 L11ᵀ)⁻¹ − (L21 L11⁻¹)ᵀ Z21 (Takahashi et al. 1973). Z22 lies
+// in the supernodes above, all of it, because they have these rows too.
+Eigen::MatrixXd BlockCholesky::InverseDiagonal() const {
+  const Eigen::Index size = block_size_;
+  std::vector<Eigen::MatrixXd> inverse(supernodes_.size());  // as Supernode::factor
+  Eigen::MatrixXd diagonal(ToIndex(row_.size()) * size, size);
+  for (std::size_t s = supernodes_.size(); s-- > 0;) {
+    const Supernode& node = supernodes_[s];
+    const Eigen::Index columns = node.factor.cols();
+    const auto L11 = node.factor.topRows(columns).triangularView<Eigen::Lower>();
+    Eigen::MatrixXd own = L11.solve(Eigen::MatrixXd::Identity(columns, columns));
+    own = (own.transpose() * own).eval();
+    Eigen::MatrixXd below = node.factor.bottomRows(node.factor.rows() - columns);
+    L11.solveInPlace<Eigen::OnTheRight>(below);
+    const Eigen::MatrixXd mixed = -InverseBelow(node, inverse) * below;
+    own.noalias() -= below.transpose() * mixed;
+    inverse[s].resize(node.factor.rows(), columns);
+    inverse[s] << own, mixed;
+    for (std::size_t c = node.begin; c < node.end; ++c) {
+      const Eigen::Index k = ToIndex(c - node.begin) * size;
+      diagonal.middleRows(ToIndex(row_[c]) * size, size) = own.block(k, k, size, size);
+    }
+  }
+  return diagonal;
+}
+
+Eigen::MatrixXd BlockCholesky::InverseBelow(const Supernode& node,
+                                            const std::vector<Eigen::MatrixXd>& inverse) const {
+  const Eigen::Index size = block_size_;
+  const Eigen::Index rows = ToIndex(node.below.size()) * size;
+  Eigen::MatrixXd Z(rows, rows);
+  for (std::size_t b = 0; b < node.below.size(); ++b) {
+    const std::size_t s = supernode_of_[node.below[b]];
+    const Supernode& above = supernodes_[s];
+    const Eigen::Index column = ToIndex(node.below[b] - above.begin) * size;
+    auto next = above.below.begin();
+    for (std::size_t a = b; a < node.below.size(); ++a) {
+      const std::size_t row = node.below[a];
+      std::size_t place = row - above.begin;
+      if (row >= above.end) {
+        next = std::lower_bound(next, above.below.end(), row);
+        place = above.end - above.begin + static_cast<std::size_t>(next - above.below.begin());
+      }
+      const auto block = inverse[s].block(ToIndex(place) * size, column, size, size);
+      Z.block(ToIndex(a) * size, ToIndex(b) * size, size, size) = block;
+      if (a != b) Z.block(ToIndex(b) * size, ToIndex(a) * size, size, size) = block.transpose();
+    }
+  }
+  return Z;
 }
 
 std::size_t BlockCholesky::factor_blocks() const {

@@ -42,6 +42,10 @@ class BlockCholesky {
   // The solution for `b`, by original rows. REQUIRES: the last Factor() succeeded.
   Eigen::VectorXd Solve(const Eigen::VectorXd& b) const;
 
+  // The diagonal blocks of the inverse of what was factored, one below the other, by original rows.
+  // REQUIRES: as Solve(). Costs about as much as Factor() and, while it runs, as much memory.
+  Eigen::MatrixXd InverseDiagonal() const;
+
   std::size_t factor_blocks() const;  // of the factor: what memory and time go by
 
  private:
@@ -51,14 +55,21 @@ class BlockCholesky {
     std::vector<std::size_t> below;  // ascending
     std::vector<std::size_t> children;
     Eigen::MatrixXd factor;  // (columns + below) × columns, lower
-    Eigen::MatrixXd update;  // below × below, lower; for the parent
+    // Where the below × below numbers for the parent are made and, when the children's are used up,
+    // kept on the stack.
+    std::size_t made = 0, kept = 0;
   };
 
   void Order(const std::vector<std::vector<std::size_t>>& neighbours);
   std::vector<std::vector<std::size_t>> ColumnStructures() const;
   void MakeSupernodes(std::vector<std::vector<std::size_t>> structures);
   void AssembleValues(const Eigen::VectorXd& damping, Supernode& node);
+  void PlaceUpdates();
+  Eigen::Map<Eigen::MatrixXd> UpdateAt(const Supernode& node, std::size_t place);
   void AssembleChild(const Supernode& child, Supernode& node);
+  bool Eliminate(Supernode& node);
+  Eigen::MatrixXd InverseBelow(const Supernode& node,
+                               const std::vector<Eigen::MatrixXd>& inverse) const;
 
   int block_size_;
   std::vector<std::size_t> position_;  // in the elimination order, of each row
@@ -68,7 +79,9 @@ class BlockCholesky {
   std::vector<std::size_t> begin_, rows_;
   std::vector<double> values_;
   std::vector<Supernode> supernodes_;
-  std::vector<std::size_t> local_;  // scratch: row of the front at hand
+  std::vector<std::size_t> supernode_of_;  // by column
+  std::vector<double> stack_;              // scratch: updates
+  std::vector<std::size_t> local_;         // scratch: row of the front at hand
 };
 
 }  // namespace strata

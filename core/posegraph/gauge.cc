@@ -38,4 +38,17 @@ std::vector<std::size_t> Components::Unanchored(const std::vector<bool>& anchore
   return first;
 }
 
+std::vector<std::size_t> NodesToHold(const PoseGraphProblem& problem) {
+  Components components(problem.T_map_scan.size());
+  for (const RelativePoseTerm& term : problem.relative) components.Join(term.i, term.j);
+  for (const PointPairsTerm& term : problem.pairs) components.Join(term.i, term.j);
+  for (const PlaneTerm& term : problem.planes) {
+    for (const PlaneTerm::View& view : term.views) components.Join(view.i, term.views[0].i);
+  }
+  std::vector<bool> anchored = problem.fixed;
+  anchored.resize(problem.T_map_scan.size(), false);
+  for (const PriorTerm& term : problem.priors) anchored[term.i] = true;
+  return components.Unanchored(anchored);
+}
+
 }  // namespace strata

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/posegraph/pose_graph.h"
+
 namespace strata {
 
 // Sets of nodes joined by terms.
@@ -21,6 +23,9 @@ class Components {
   std::size_t Root(std::size_t node);
   std::vector<std::size_t> parent_;  // a root is the first node of its component
 };
+
+// The first node of each component of `problem` that nothing fixed and no prior holds.
+std::vector<std::size_t> NodesToHold(const PoseGraphProblem& problem);
 
 }  // namespace strata
 
