@@ -54,7 +54,7 @@ struct ClosureCandidateOptions {
   // Pairs may be as much nearer or farther as this many σ; in [0, 10].
   double sigmas = 2.0;
   // Pairs joined by a path of fewer edges or less way say nothing new.
-  int min_hops = 10;
+  int min_hops = 4;
   double min_way_m = 25.0;
   // Alike pairs with a greater distance are left out; in [0, 2].
   double max_alike_distance = 0.6;

@@ -14,6 +14,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 
 #include "core/common/option_checks.h"
 #include "core/common/random.h"
@@ -141,6 +142,27 @@ class Matcher {
     }
   }
 
+  // How firmly the surfaces of both hold the pose along its loosest horizontal direction: the mean
+  // of (n · d)² over the matched features with a normal n.
+  double Hold(const Pose& T_target_source) const {
+    Pose T = T_target_source;
+    T.translation() -= target_.origin();
+    const Eigen::Isometry3f to_grid = T.cast<float>();
+    Eigen::Matrix2d held = Eigen::Matrix2d::Zero();
+    int count = 0;
+    for (const SampledFeature& feature : source_.sample()) {
+      const Eigen::Vector3f& p = feature.element.point;
+      const Eigen::Vector3f n = feature.element.normal;
+      if (n.isZero() || p.norm() > kComparedRangeM) continue;
+      if (!HasPartner(to_grid * p, target_)) continue;
+      const Eigen::Vector2d across = n.head<2>().cast<double>();
+      held += across * across.transpose();
+      ++count;
+    }
+    if (count == 0) return 0.0;
+    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(held).eigenvalues()[0] / count;
+  }
+
  private:
   struct View {
     RangeImage image;
@@ -228,9 +250,15 @@ bool SamePlace(const Pose& a, const Pose& b, const PlaceMatchOptions& options) {
          RotationAngleRad(T_a_b) <= options.same_place_rad;
 }
 
-PlaceVerdict VerdictOn(const Fit& fit, double rival, const PlaceMatchOptions& options) {
+PlaceVerdict VerdictOn(const Fit& fit,
+                       double hold,
+                       double rival,
+                       const PlaceMatchOptions& options) {
   if (fit.overlap < options.min_overlap) return PlaceVerdict::kNoFit;
-  if (fit.registration.termination == Termination::kDegenerate) return PlaceVerdict::kDegenerate;
+  // The registration alone does not see it: to its metric a surface's points hold along it too.
+  if (fit.registration.termination == Termination::kDegenerate || hold < options.min_hold) {
+    return PlaceVerdict::kDegenerate;
+  }
   if (fit.contradiction > options.max_contradiction) return PlaceVerdict::kContradicted;
   return rival >= options.rival_share ? PlaceVerdict::kAmbiguous : PlaceVerdict::kMatched;
 }
@@ -271,6 +299,7 @@ absl::Status PlaceMatchOptions::Validate() const {
   checks.InRange("radius_m", radius_m, 5.0, 200.0);
   checks.InRange("min_overlap", min_overlap, 0.0, 1.0);
   checks.InRange("max_contradiction", max_contradiction, 0.0, 1.0);
+  checks.InRange("min_hold", min_hold, 0.0, 0.5);
   checks.InRange("rival_share", rival_share, 0.0, 1.0);
   checks.InRange("same_place_m", same_place_m, 1e-3, 100.0);
   checks.InRange("same_place_rad", same_place_rad, 1e-3, 3.15);
@@ -285,12 +314,15 @@ PlaceMatch MatchPlace(const SeenScan& source,
   PlaceMatch match;
   if (hypotheses.empty() || target.empty()) return match;
   match.T_target_source = hypotheses[0].T_target_source;
-  std::vector<Fit> fits;
+  double window_m = 0.0;
   for (const PlaceHypothesis& hypothesis : hypotheses) {
-    const Matcher matcher(
-        source, target, hypothesis.T_target_source.translation(), hypothesis.radius_m, options);
-    matcher.Try(hypothesis, fits);
+    const double apart =
+        (hypothesis.T_target_source.translation() - match.T_target_source.translation()).norm();
+    window_m = std::max(window_m, apart + hypothesis.radius_m);
   }
+  const Matcher matcher(source, target, match.T_target_source.translation(), window_m, options);
+  std::vector<Fit> fits;
+  for (const PlaceHypothesis& hypothesis : hypotheses) matcher.Try(hypothesis, fits);
   if (fits.empty()) return match;
   const Fit& best = *std::max_element(
       fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.score() < b.score(); });
@@ -301,12 +333,13 @@ PlaceMatch MatchPlace(const SeenScan& source,
     }
     match.rival = std::max(match.rival, fit.score() / best.score());
   }
+  match.hold = matcher.Hold(best.registration.T_target_source);
   match.T_target_source = best.registration.T_target_source;
   match.information = best.registration.information;
   match.rms_m = best.registration.rms_m;
   match.overlap = best.overlap;
   match.contradiction = best.contradiction;
-  match.verdict = VerdictOn(best, match.rival, options);
+  match.verdict = VerdictOn(best, match.hold, match.rival, options);
   if (match.matched() && options.max_contradiction > 0.0) {
     match.confidence = match.overlap * (1.0 - match.contradiction / options.max_contradiction) *
                        (1.0 - match.rival);

@@ -51,7 +51,7 @@ std::vector<PlaceHypothesis> HypothesesOf(const PlaceSimilarity& similarity,
 enum class PlaceVerdict {
   kMatched,
   kNoFit,         // no start converged with enough overlap
-  kDegenerate,    // fits, but may be moved along something: a corridor, an open field
+  kDegenerate,    // fits, but may slide along something: a corridor, an open field
   kContradicted,  // fits, but one scan looked through what the other one saw
   kAmbiguous,     // fits nearly as well elsewhere within the windows
 };
@@ -67,6 +67,8 @@ struct PlaceMatchOptions {
   double min_overlap = 0.7;
   // Refused above; see PlaceMatch::contradiction. In [0, 1].
   double max_contradiction = 0.045;
+  // Degenerate below; see PlaceMatch::hold. In [0, 0.5].
+  double min_hold = 0.015;
   // Ambiguous when the best fit elsewhere reaches this share of the best fit; in [0, 1].
   double rival_share = 0.75;
   // Fits nearer to each other than both are the same.
@@ -86,6 +88,10 @@ struct PlaceMatch {
   // Of the features that the other side looked at, the share of those it looked through, and half
   // the share of near ones where it looked and nothing came back; the larger of both directions.
   double contradiction = 0.0;
+  // Mean of (n · d)² over the matched surfaces' normals n, d being the horizontal direction in
+  // which it is least: how firmly the match is held where it may slide most. A corridor has 0.007
+  // at most.
+  double hold = 0.0;
   double rival = 0.0;  // fit of the best one elsewhere / of this one, in [0, 1]
   // overlap · (1 − contradiction / max_contradiction) · (1 − rival), limited to [0, 1]: how much of
   // what can be checked speaks for this pose and no other; 0 for every verdict but kMatched. An

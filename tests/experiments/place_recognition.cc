@@ -1,11 +1,22 @@
-// Which scans show the same place? Recorded loops and simulated ones, against the true poses.
+// Which scans show the same place? Three tables over recorded loops and simulated ones, against the
+// true poses. Scans less than 30 m of way apart are not asked about.
+//   descriptor    pairs sorted by the distance of their descriptors: how many of the true ones come
+//                 before the first false one, and whether heading and nearest place are right
+//   localisation  every scan without any prior: its five likest places are verified, and one of
+//                 them is the answer or there is none
+//   closures      candidates from the uploaded poses (NCLT's are 18 m off at the closure, simulated
+//                 ones have noisy odometry), verified, then checked for consistency
+//
+//   place_recognition [--only NAME] [--table descriptor|localisation|closures] [--verbose]
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,7 +24,6 @@
 
 #include "core/cloud/sensor_model.h"
 #include "core/mls/build.h"
-#include "core/mls/join.h"
 #include "core/posegraph/closure_candidates.h"
 #include "core/posegraph/closure_consistency.h"
 #include "core/registration/place_descriptor.h"
@@ -28,6 +38,17 @@ namespace strata {
 namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr double kApartOnWayM = 30.0;
+
+struct Settings {
+  std::string only;
+  std::string table;
+  bool verbose = false;
+  std::size_t beside = 2;         // neighbours to each side that a scan is matched to with it
+  double simulated_step_m = 2.0;  // between scans
+  testing::OdometryNoise noise;
+  DriftOptions drift{0.1, 0.01};
+};
 
 struct Recording {
   std::string name;
@@ -35,6 +56,29 @@ struct Recording {
   std::vector<Pose> uploaded;
   std::vector<Pose> reference;
 };
+
+// What is kept of the scans.
+struct Places {
+  std::string name;
+  std::vector<Pose> uploaded;
+  std::vector<Pose> reference;
+  std::vector<double> way;
+  std::vector<PlaceDescriptor> descriptors;
+  std::vector<ScanFeatures> features;
+
+  std::size_t size() const { return way.size(); }
+  double Apart(std::size_t i, std::size_t j) const {
+    return (reference[i].translation() - reference[j].translation()).norm();
+  }
+  bool FarOnWay(std::size_t i, std::size_t j) const {
+    return std::abs(way[j] - way[i]) > kApartOnWayM;
+  }
+};
+
+double MillisecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
+}
 
 Recording Load(const std::filesystem::path& folder) {
   Recording r;
@@ -51,13 +95,16 @@ Recording Load(const std::filesystem::path& folder) {
 
 Recording Simulate(const std::string& name,
                    const testing::World& world,
-                   const testing::Robot& robot,
-                   double step_m,
-                   const testing::OdometryNoise& noise) {
+                   const std::vector<testing::Robot>& robots,
+                   const Settings& settings) {
   Recording r;
   r.name = name;
-  r.reference = testing::Drive(world.scene, robot.waypoints, step_m, 1.2);
-  r.uploaded = testing::NoisyOdometry(r.reference, noise, 1);
+  std::vector<Eigen::Vector3d> waypoints;  // one robot drives all of them
+  for (const testing::Robot& robot : robots) {
+    waypoints.insert(waypoints.end(), robot.waypoints.begin(), robot.waypoints.end());
+  }
+  r.reference = testing::Drive(world.scene, waypoints, settings.simulated_step_m, 1.2);
+  r.uploaded = testing::NoisyOdometry(r.reference, settings.noise, 1);
   testing::SensorOptions sensor;
   sensor.columns = 480;
   for (std::size_t i = 0; i < r.reference.size(); ++i) {
@@ -66,369 +113,273 @@ Recording Simulate(const std::string& name,
   return r;
 }
 
-// The local map of `pool` scans that end with scan i, in the frame of scan i.
-MlsMap LocalMap(const Recording& r, std::size_t i, int pool) {
-  MlsMap map;
-  for (std::size_t j = i + 1 > static_cast<std::size_t>(pool) ? i + 1 - pool : 0; j <= i; ++j) {
-    JoinInto(map,
-             BuildMlsMap(r.clouds[j],
-                         Normalized(r.uploaded[i].inverse() * r.uploaded[j]),
-                         SensorModel(),
-                         map.parameters)
-                 ->map);
+Places Describe(const Recording& r) {
+  Places places;
+  places.name = r.name;
+  places.uploaded = r.uploaded;
+  places.reference = r.reference;
+  double ms = 0.0;
+  for (std::size_t i = 0; i < r.clouds.size(); ++i) {
+    const MlsMap map =
+        BuildMlsMap(r.clouds[i], Pose::Identity(), SensorModel(), MlsParameters())->map;
+    const auto start = std::chrono::steady_clock::now();
+    places.descriptors.push_back(DescribePlace(map));
+    ms += MillisecondsSince(start);
+    places.features.push_back(ScanFeatures::FromMap(map));
+    places.way.push_back(0.0);
+    if (i > 0) places.way[i] = places.way[i - 1] + places.Apart(i, i - 1);
   }
-  return map;
+  std::printf("%s: %zu scans, %.0f m, %.1f ms a descriptor\n",
+              r.name.c_str(),
+              places.size(),
+              places.way.back(),
+              ms / static_cast<double>(places.size()));
+  return places;
 }
+
+double HeadingRad(const Pose& T) { return std::atan2(T.linear()(1, 0), T.linear()(0, 0)); }
 
 struct Pair {
   std::size_t i, j;
-  double distance;
-  double heading_error_deg;
-  double apart_m;
+  PlaceSimilarity similarity;
 };
 
-double YawRad(const Eigen::Matrix3d& R) { return std::atan2(R(1, 0), R(0, 0)); }
-
-void EvaluateMatches(const Recording& r, int pool, std::size_t count, bool verbose);
-
-void EvaluateDescriptor(const Recording& r, int pool, const PlaceDescriptorOptions& options) {
-  std::vector<PlaceDescriptor> places;
-  std::vector<double> way = {0.0};
-  double ms = 0.0;
-  for (std::size_t i = 0; i < r.clouds.size(); ++i) {
-    const MlsMap map = LocalMap(r, i, pool);
-    const auto start = std::chrono::steady_clock::now();
-    places.push_back(DescribePlace(map, options));
-    ms +=
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    if (i > 0) {
-      way.push_back(way.back() +
-                    (r.reference[i].translation() - r.reference[i - 1].translation()).norm());
-    }
-  }
+std::vector<Pair> ComparedPairs(const Places& places) {
   std::vector<Pair> pairs;
   for (std::size_t j = 0; j < places.size(); ++j) {
-    for (std::size_t i = 0; i < j && way[j] - way[i] > 30.0; ++i) {
-      const PlaceSimilarity s = ComparePlaces(places[i], places[j]);
-      const Pose T_i_j = r.reference[i].inverse() * r.reference[j];
-      const double yaw = YawRad(T_i_j.linear()) - s.heading_rad;
-      const double error = std::abs(std::remainder(yaw, std::numbers::pi)) * kDegrees;
-      pairs.push_back({i, j, s.distance, error, T_i_j.translation().norm()});
+    for (std::size_t i = 0; i < j && places.FarOnWay(i, j); ++i) {
+      pairs.push_back({i, j, ComparePlaces(places.descriptors[i], places.descriptors[j])});
     }
   }
   std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
-    return a.distance < b.distance;
+    return a.similarity.distance < b.similarity.distance;
   });
-  std::printf("%-16s %4zu scans pool %d, %.1f ms:",
-              r.name.c_str(),
-              places.size(),
-              pool,
-              ms / static_cast<double>(places.size()));
+  return pairs;
+}
+
+void PrintDescriptorTable(const Places& places) {
+  const std::vector<Pair> pairs = ComparedPairs(places);
   for (const double radius : {5.0, 12.0}) {
-    std::size_t all = 0, first = 0, good_heading = 0;
-    bool wrong = false;
+    int all = 0;
+    int before_false = 0;
+    int right_heading = 0;
+    bool any_false = false;
+    std::vector<int> nearest(places.size(), -1);  // whether the likest place is a true one
+    std::vector<bool> has_true(places.size(), false);
     for (const Pair& p : pairs) {
-      const bool is_true = p.apart_m < radius;
-      all += is_true;
-      good_heading += is_true && p.heading_error_deg < 5.0;
-      wrong = wrong || p.apart_m > std::max(radius, 12.0);
-      first += is_true && !wrong;
+      const double apart = places.Apart(p.i, p.j);
+      const bool is_true = apart < radius;
+      any_false = any_false || apart > 12.0;
+      if (nearest[p.j] < 0) nearest[p.j] = static_cast<int>(is_true);
+      if (!is_true) continue;
+      has_true[p.j] = true;
+      ++all;
+      before_false += static_cast<int>(!any_false);
+      const double yaw = HeadingRad(places.reference[p.i].inverse() * places.reference[p.j]);
+      const double error = std::remainder(yaw - p.similarity.heading_rad, std::numbers::pi);
+      right_heading += static_cast<int>(std::abs(error) < 0.09);
     }
-    std::size_t queries = 0, top1 = 0, top10 = 0;
+    int queries = 0;
+    int first = 0;
     for (std::size_t j = 0; j < places.size(); ++j) {
-      int rank = 0;
-      bool any = false, in1 = false, in10 = false;
-      for (const Pair& p : pairs) {
-        if (p.j != j) continue;
-        const bool is_true = p.apart_m < radius;
-        any = any || is_true;
-        in1 = in1 || (is_true && rank < 1);
-        in10 = in10 || (is_true && rank < 10);
-        ++rank;
-      }
-      queries += any;
-      top1 += any && in1;
-      top10 += any && in10;
+      if (!has_true[j]) continue;
+      ++queries;
+      first += nearest[j];
     }
     std::printf(
-        " | %.0f m: %zu true, recall@100%% %.3f, heading %.2f, top-1 %.2f top-10 %.2f of %zu",
+        "  descriptor, within %2.0f m: %d pairs, %d before the first false one, heading right "
+        "(5 deg) of %d; likest place right for %d of %d scans\n",
         radius,
         all,
-        all ? double(first) / all : 0,
-        all ? double(good_heading) / all : 0,
-        queries ? double(top1) / queries : 0,
-        queries ? double(top10) / queries : 0,
+        before_false,
+        right_heading,
+        first,
         queries);
   }
-  std::printf("\n");
-  std::fflush(stdout);
 }
 
-// What the matcher makes of the pairs that look alike, true and false.
-void EvaluateMatches(const Recording& r, int pool, std::size_t count, bool verbose) {
-  std::vector<PlaceDescriptor> places;
-  std::vector<ScanFeatures> features;
-  std::vector<double> way = {0.0};
-  for (std::size_t i = 0; i < r.clouds.size(); ++i) {
-    const MlsMap map = LocalMap(r, i, pool);
-    places.push_back(DescribePlace(map));
-    features.push_back(ScanFeatures::FromMap(map));
-    if (i > 0) {
-      way.push_back(way.back() +
-                    (r.reference[i].translation() - r.reference[i - 1].translation()).norm());
-    }
-  }
-  struct Query {
-    std::size_t i, j;
-    PlaceSimilarity s;
-    Pose truth;
-  };
-  std::vector<Query> near, far;
-  for (std::size_t j = 0; j < places.size(); ++j) {
-    for (std::size_t i = 0; i < j && way[j] - way[i] > 30.0; ++i) {
-      const Query q{
-          i, j, ComparePlaces(places[i], places[j]), r.reference[i].inverse() * r.reference[j]};
-      const double apart = q.truth.translation().norm();
-      if (apart < 12.0) near.push_back(q);
-      if (apart > 30.0) far.push_back(q);
-    }
-  }
-  const auto by_distance = [](const Query& a, const Query& b) {
-    return a.s.distance < b.s.distance;
-  };
-  std::stable_sort(far.begin(), far.end(), by_distance);
-  if (far.size() > count) far.resize(count);
-  std::vector<Query> spread;
-  for (std::size_t k = 0; k < std::min(count, near.size()); ++k) {
-    spread.push_back(near[k * near.size() / std::min(count, near.size())]);
-  }
-  for (const bool is_near : {true, false}) {
-    int right = 0, wrong = 0, verdicts[5] = {};
-    double worst_right = 2.0, best_wrong = 0.0, ms = 0.0;
-    const auto& queries = is_near ? spread : far;
-    for (const Query& q : queries) {
-      const std::vector<PlaceHypothesis> hypotheses = HypothesesOf(q.s, Pose::Identity());
-      const SeenScan target[] = {{&features[q.i]}};
-      const auto start = std::chrono::steady_clock::now();
-      const PlaceMatch m = MatchPlace({&features[q.j]}, target, hypotheses);
-      ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-                .count();
-      const Pose error = q.truth.inverse() * m.T_target_source;
-      const bool correct = error.translation().norm() < 0.5 && RotationAngleRad(error) < 0.05;
-      ++verdicts[static_cast<int>(m.verdict)];
-      if (m.matched()) {
-        ++(correct ? right : wrong);
-        if (correct) worst_right = std::min(worst_right, m.confidence);
-        if (!correct) best_wrong = std::max(best_wrong, m.confidence);
-      }
-      if (verbose) {
-        std::printf(
-            "  %zu-%zu %s apart %.1f desc %.2f %-12s overlap %.2f against %.3f rival %.2f "
-            "rms %.3f conf %.2f error %.2f m %.1f deg\n",
-            q.i,
-            q.j,
-            is_near ? "near" : "far",
-            q.truth.translation().norm(),
-            q.s.distance,
-            std::string(ToString(m.verdict)).c_str(),
-            m.overlap,
-            m.contradiction,
-            m.rival,
-            m.rms_m,
-            m.confidence,
-            error.translation().norm(),
-            RotationAngleRad(error) * kDegrees);
-      }
-    }
-    std::printf(
-        "%-16s %s %3zu pairs: matched right %d (least confidence %.2f), matched wrong %d "
-        "(most %.2f), no fit %d, degenerate %d, contradicted %d, ambiguous %d; %.0f ms\n",
-        r.name.c_str(),
-        is_near ? "<12 m" : ">30 m",
-        queries.size(),
-        right,
-        worst_right,
-        wrong,
-        best_wrong,
-        verdicts[1],
-        verdicts[2],
-        verdicts[3],
-        verdicts[4],
-        queries.empty() ? 0.0 : ms / static_cast<double>(queries.size()));
-    std::fflush(stdout);
-  }
-}
-
-struct Described {
-  std::vector<PlaceDescriptor> places;
-  std::vector<ScanFeatures> features;
-};
-
-Described Describe(const Recording& r, int pool) {
-  Described d;
-  for (std::size_t i = 0; i < r.clouds.size(); ++i) {
-    const MlsMap map = LocalMap(r, i, pool);
-    d.places.push_back(DescribePlace(map));
-    d.features.push_back(ScanFeatures::FromMap(map));
-  }
-  return d;
-}
-
-// Scan i and its `beside` neighbours to both sides, in the frame of i.
-std::vector<SeenScan> TargetOf(const Recording& r,
-                               const Described& d,
+// Scan i and its neighbours, in a frame in which the scans have the poses `T`.
+std::vector<SeenScan> TargetOf(const Places& places,
+                               const std::vector<Pose>& T,
+                               const Pose& T_target_map,
                                std::size_t i,
                                std::size_t beside) {
-  std::vector<SeenScan> target = {{&d.features[i]}};
-  for (std::size_t k = 1; k <= beside; ++k) {
-    for (const std::size_t j : {i - k, i + k}) {
-      if (j >= r.clouds.size()) continue;
-      target.push_back({&d.features[j], Normalized(r.uploaded[i].inverse() * r.uploaded[j])});
-    }
+  std::vector<SeenScan> target;
+  for (std::size_t k = i - std::min(i, beside); k <= std::min(i + beside, places.size() - 1); ++k) {
+    target.push_back({&places.features[k], Normalized(T_target_map * T[k])});
   }
   return target;
 }
 
-// From candidates to consistent closures, the uploaded poses being the prior.
-void EvaluateClosures(
-    const Recording& r, int pool, std::size_t beside, const DriftOptions& drift, bool verbose) {
-  const Described d = Describe(r, pool);
-  const auto now = [] { return std::chrono::steady_clock::now(); };
-  const auto ms_since = [&](auto start) {
-    return std::chrono::duration<double, std::milli>(now() - start).count();
-  };
+bool IsRight(const Pose& truth, const Pose& T) {
+  const Pose error = truth.inverse() * T;
+  return error.translation().norm() < 0.5 && RotationAngleRad(error) < 0.05;
+}
+
+void PrintMatch(
+    const char* what, std::size_t i, std::size_t j, const PlaceMatch& m, const Pose& truth) {
+  const Pose error = truth.inverse() * m.T_target_source;
+  std::printf(
+      "    %s %zu-%zu %s: overlap %.2f against %.3f rival %.2f hold %.4f confidence %.2f, off by "
+      "%.2f m %.1f deg\n",
+      what,
+      i,
+      j,
+      std::string(ToString(m.verdict)).c_str(),
+      m.overlap,
+      m.contradiction,
+      m.rival,
+      m.hold,
+      m.confidence,
+      error.translation().norm(),
+      RotationAngleRad(error) * kDegrees);
+}
+
+void PrintLocalisationTable(const Places& places, const Settings& settings) {
+  PlaceIndex index;
+  for (std::size_t i = 0; i < places.size(); ++i) index.Add(i, places.descriptors[i]);
+  int seen_before = 0;
+  int right = 0;
+  int wrong = 0;
+  const auto start = std::chrono::steady_clock::now();
+  for (std::size_t j = 0; j < places.size(); ++j) {
+    const auto excluded = [&](std::uint64_t i) { return !places.FarOnWay(i, j); };
+    bool is_known = false;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      is_known = is_known || (!excluded(i) && places.Apart(i, j) < 12.0);
+    }
+    seen_before += static_cast<int>(is_known);
+    std::vector<PlaceMatch> matches;
+    for (const auto& near : index.Nearest(places.descriptors[j], 5, excluded)) {
+      const std::vector<SeenScan> target =
+          TargetOf(places, places.reference, Pose::Identity(), near.number, settings.beside);
+      matches.push_back(MatchPlace({&places.features[j]},
+                                   target,
+                                   HypothesesOf(near.similarity, places.reference[near.number])));
+      if (settings.verbose) {
+        PrintMatch("at", near.number, j, matches.back(), places.reference[j]);
+      }
+    }
+    const std::optional<std::size_t> answer = UniquePlace(matches);
+    if (!answer.has_value()) continue;
+    ++(IsRight(places.reference[j], matches[*answer].T_target_source) ? right : wrong);
+  }
+  std::printf(
+      "  localisation: %d of %zu scans within 12 m of others; right %d, wrong %d; %.0f ms "
+      "each\n",
+      seen_before,
+      places.size(),
+      right,
+      wrong,
+      MillisecondsSince(start) / static_cast<double>(places.size()));
+}
+
+std::vector<ClosureCandidate> CandidatesOf(const Places& places,
+                                           const std::vector<GraphEdge>& edges,
+                                           const DriftOptions& drift) {
   std::vector<ClosureNode> nodes;
-  std::vector<GraphEdge> edges;
   PlaceIndex index;
   std::vector<AlikePair> alike;
-  for (std::size_t j = 0; j < r.clouds.size(); ++j) {
-    nodes.push_back({r.uploaded[j], 1});
-    if (j > 0) edges.push_back({j - 1, j, 1e4 * Matrix6d::Identity()});
-    for (const auto& n :
-         index.Nearest(d.places[j], 5, [&](std::uint64_t i) { return i + 15 > j; })) {
-      alike.push_back({static_cast<std::size_t>(n.number), j, n.similarity});
+  for (std::size_t j = 0; j < places.size(); ++j) {
+    nodes.push_back({places.uploaded[j], 1});
+    const auto excluded = [&](std::uint64_t i) { return !places.FarOnWay(i, j); };
+    for (const auto& near : index.Nearest(places.descriptors[j], 4, excluded)) {
+      alike.push_back({static_cast<std::size_t>(near.number), j, near.similarity});
     }
-    index.Add(j, d.places[j]);
+    index.Add(j, places.descriptors[j]);
   }
   ClosureCandidateOptions options;
   options.drift = drift;
-  auto start = now();
-  const auto candidates = FindClosureCandidates(nodes, edges, alike, options).value();
-  const double candidates_ms = ms_since(start);
-  start = now();
+  return FindClosureCandidates(nodes, edges, alike, options).value();
+}
+
+void PrintClosureTable(const Places& places, const Settings& settings) {
+  std::vector<GraphEdge> edges;
+  for (std::size_t j = 1; j < places.size(); ++j) {
+    edges.push_back({j - 1, j, 1e4 * Matrix6d::Identity()});
+  }
+  const std::vector<ClosureCandidate> candidates = CandidatesOf(places, edges, settings.drift);
   std::vector<Closure> closures;
   std::vector<bool> right;
   int near = 0;
+  const auto start = std::chrono::steady_clock::now();
   for (const ClosureCandidate& c : candidates) {
-    const Pose truth = r.reference[c.i].inverse() * r.reference[c.j];
-    near += static_cast<int>(truth.translation().norm() < 12.0);
-    const PlaceMatch m = MatchPlace({&d.features[c.j]}, TargetOf(r, d, c.i, beside), c.hypotheses);
-    const Pose error = truth.inverse() * m.T_target_source;
-    const bool correct = error.translation().norm() < 0.5 && RotationAngleRad(error) < 0.05;
-    if (verbose) {
-      std::printf(
-          "  %zu-%zu %s sigma %.1f m %.2f rad score %.2f apart %.1f: %s overlap %.2f through "
-          "%.3f rival %.2f conf %.2f error %.2f m %.1f deg\n",
-          c.i,
-          c.j,
-          c.reason == ClosureReason::kNear ? "near " : "alike",
-          c.sigma_m,
-          c.sigma_rad,
-          c.score,
-          truth.translation().norm(),
-          std::string(ToString(m.verdict)).c_str(),
-          m.overlap,
-          m.contradiction,
-          m.rival,
-          m.confidence,
-          error.translation().norm(),
-          RotationAngleRad(error) * kDegrees);
+    near += static_cast<int>(places.Apart(c.i, c.j) < 12.0);
+    const std::vector<SeenScan> target =
+        TargetOf(places, places.uploaded, places.uploaded[c.i].inverse(), c.i, settings.beside);
+    const PlaceMatch m = MatchPlace({&places.features[c.j]}, target, c.hypotheses);
+    const Pose truth = places.reference[c.i].inverse() * places.reference[c.j];
+    if (settings.verbose) {
+      PrintMatch(c.reason == ClosureReason::kNear ? "near" : "alike", c.i, c.j, m, truth);
     }
     if (!m.matched()) continue;
     closures.push_back({c.i, c.j, m.T_target_source, 0.2, 0.02});
-    right.push_back(correct);
+    right.push_back(IsRight(truth, m.T_target_source));
   }
-  const double match_ms = ms_since(start);
+  const double match_ms =
+      MillisecondsSince(start) / std::max(1.0, static_cast<double>(candidates.size()));
   ClosureConsistencyOptions consistency;
-  consistency.drift = drift;
-  const auto set = ConsistentClosures(r.uploaded, edges, closures, consistency).value();
-  int kept_right = 0;
-  for (const std::size_t k : set.kept) kept_right += right[k];
+  consistency.drift = settings.drift;
+  const auto set = ConsistentClosures(places.uploaded, edges, closures, consistency).value();
+  const auto kept_right = std::count_if(
+      set.kept.begin(), set.kept.end(), [&](std::size_t k) { return static_cast<bool>(right[k]); });
   const auto matched_right = std::count(right.begin(), right.end(), true);
   std::printf(
-      "%-16s %zu candidates (%d within 12 m) in %.0f ms, matched right %zd wrong %zd, %.0f ms "
-      "each; consistent right %d wrong %zu\n",
-      r.name.c_str(),
+      "  closures: %zu candidates, %d within 12 m; matched %zd right, %zd wrong, %.0f ms "
+      "each; consistent %zd right, %zd wrong\n",
       candidates.size(),
       near,
-      candidates_ms,
       matched_right,
       static_cast<std::ptrdiff_t>(right.size()) - matched_right,
-      candidates.empty() ? 0.0 : match_ms / static_cast<double>(candidates.size()),
+      match_ms,
       kept_right,
-      set.kept.size() - static_cast<std::size_t>(kept_right));
+      static_cast<std::ptrdiff_t>(set.kept.size()) - kept_right);
+}
+
+void Evaluate(const Recording& recording, const Settings& settings) {
+  const Places places = Describe(recording);
+  const auto wanted = [&](const char* table) {
+    return settings.table.empty() || settings.table == table;
+  };
+  if (wanted("descriptor")) PrintDescriptorTable(places);
+  if (wanted("localisation")) PrintLocalisationTable(places, settings);
+  if (wanted("closures")) PrintClosureTable(places, settings);
   std::fflush(stdout);
 }
 
 int Main(int argc, char** argv) {
   CLI::App app("place recognition");
-  std::string only;
-  int pool = 1;
-  PlaceDescriptorOptions options;
-  app.add_option("--only", only);
-  app.add_option("--pool", pool);
-  app.add_option("--radius", options.radius_m);
-  app.add_option("--cell", options.cell_m);
-  app.add_option("--min-height", options.min_height_m);
-  app.add_option("--max-height", options.max_height_m);
-  std::size_t matches = 0;
-  bool verbose = false;
-  bool closures = false;
-  std::size_t beside = 0;
-  DriftOptions drift{0.1, 0.01};
-  testing::OdometryNoise noise;
-  app.add_option("--noise-m", noise.translation_sigma_m);
-  app.add_option("--noise-rad", noise.rotation_sigma_rad);
-  app.add_flag("--closures", closures);
-  app.add_option("--beside", beside);
-  app.add_option("--drift", drift.drift_m);
-  app.add_option("--drift-rad", drift.drift_rad);
-  app.add_option("--matches", matches);
-  app.add_flag("--verbose", verbose);
+  Settings settings;
+  app.add_option("--only", settings.only, "one recording or world");
+  app.add_option("--table", settings.table)
+      ->check(CLI::IsMember({"descriptor", "localisation", "closures"}));
+  app.add_flag("--verbose", settings.verbose, "a line a match");
+  app.add_option("--beside", settings.beside)->capture_default_str();
+  app.add_option("--noise-m", settings.noise.translation_sigma_m)->capture_default_str();
+  app.add_option("--noise-rad", settings.noise.rotation_sigma_rad)->capture_default_str();
+  app.add_option("--drift-m", settings.drift.drift_m)->capture_default_str();
+  app.add_option("--drift-rad", settings.drift.drift_rad)->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const auto Evaluate = [&](const Recording& r) {
-    if (closures) {
-      EvaluateClosures(r, pool, beside, drift, verbose);
-    } else if (matches > 0) {
-      EvaluateMatches(r, pool, matches, verbose);
-    } else {
-      EvaluateDescriptor(r, pool, options);
-    }
+  const auto wanted = [&](const std::string& name) {
+    return settings.only.empty() || settings.only == name;
   };
-  const auto wanted = [&](const std::string& name) { return only.empty() || only == name; };
   for (const std::string name : {"nclt_campus_loop", "hall_livox_loop"}) {
     if (const auto f = testing::FindData(name); f.has_value() && wanted(name)) {
-      Evaluate(Load(*f));
+      Evaluate(Load(*f), settings);
     }
   }
-  if (wanted("campus")) {
-    const testing::World world = testing::CampusWorld();
-    testing::Robot both = world.robots[0];
-    both.waypoints.insert(
-        both.waypoints.end(), world.robots[1].waypoints.begin(), world.robots[1].waypoints.end());
-    Evaluate(Simulate("campus", world, both, 3.0, noise));
-  }
-  if (wanted("campus_loop")) {
-    const testing::World world = testing::CampusLoopWorld();
-    Evaluate(Simulate("campus_loop", world, world.robots[0], 2.0, noise));
-  }
-  if (wanted("car_park")) {
-    const testing::World world = testing::CarParkWorld();
-    Evaluate(Simulate("car_park", world, world.loops[0], 2.0, noise));
-  }
-  if (wanted("bridge")) {
-    const testing::World world = testing::BridgeWorld();
-    Evaluate(Simulate("bridge", world, world.loops[0], 2.0, noise));
+  struct Drawn {
+    std::string name;
+    testing::World world;
+    bool loops;
+  };
+  for (const Drawn& d : {Drawn{"campus", testing::CampusWorld(), false},
+                         Drawn{"campus_loop", testing::CampusLoopWorld(), false},
+                         Drawn{"car_park", testing::CarParkWorld(), true},
+                         Drawn{"bridge", testing::BridgeWorld(), true}}) {
+    if (!wanted(d.name)) continue;
+    Evaluate(Simulate(d.name, d.world, d.loops ? d.world.loops : d.world.robots, settings),
+             settings);
   }
   return 0;
 }

@@ -121,7 +121,8 @@ TEST_F(PlaceMatchTest, StoreysThatLookAlikeAreAmbiguous) {
   ExpectNear(T_here, match.T_target_source, 0.1, 0.01);
 }
 
-TEST_F(PlaceMatchTest, ACorridorIsDegenerate) {
+// Nothing in it tells how far along one stands: neither in a wide window nor in a narrow one.
+TEST_F(PlaceMatchTest, ACorridorTellsNoPlace) {
   Scene scene;
   scene.Add(Box({-80, -3, -0.3}, {80, 3, 0}));
   scene.Add(Box({-80, 2, 0}, {80, 2.2, 3}));
@@ -130,9 +131,15 @@ TEST_F(PlaceMatchTest, ACorridorIsDegenerate) {
   const ScanFeatures there = FeaturesAt(scene, StandingAt(scene, 0, 0, 2, 0), 1);
   const ScanFeatures here = FeaturesAt(scene, StandingAt(scene, 3, 0, 2, 0), 2);
   const SeenScan target[] = {{&there}};
-  const PlaceHypothesis guess[] = {Around(Pose::Identity(), 5.0, 1.0, 0.2)};
-  const PlaceMatch match = MatchPlace({&here}, target, guess);
-  EXPECT_FALSE(match.matched());
+  for (const double radius : {0.0, 1.0, 3.0, 10.0}) {
+    for (const double off : {0.0, 1.0, 2.0}) {
+      const PlaceHypothesis guess[] = {Around(Off(0.0, 3.0 - off, 0.0, 0.0), radius, 1.0, 0.2)};
+      const PlaceMatch match = MatchPlace({&here}, target, guess);
+      EXPECT_FALSE(match.matched())
+          << radius << " m around " << off << " m off, hold " << match.hold << " at "
+          << match.T_target_source.translation().transpose();
+    }
+  }
 }
 
 TEST_F(PlaceMatchTest, WithoutScansOrGuessesThereIsNoFit) {

@@ -1,0 +1,5 @@
+strata_executable(
+  places_benchmark places_benchmark
+  SOURCES places_benchmark.cc
+  DEPS strata::posegraph strata::registration
+)

@@ -1,0 +1,81 @@
+#include "core/registration/view_check.h"
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace strata {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+
+// A round wall 10 m away over the azimuths [from, to), between 20° below and above the sensor.
+ScanFeatures RoundWall(double from_rad, double to_rad) {
+  std::array<std::vector<Vector3f>, kFeatureClasses> points;
+  for (double azimuth = from_rad; azimuth < to_rad; azimuth += 0.01) {
+    for (double elevation = -0.35; elevation < 0.35; elevation += 0.01) {
+      points[static_cast<std::size_t>(FeatureClass::kVertical)].push_back(
+          (10.0 * Vector3d(std::cos(elevation) * std::cos(azimuth),
+                           std::cos(elevation) * std::sin(azimuth),
+                           std::sin(elevation)))
+              .cast<float>());
+    }
+  }
+  return ScanFeatures::FromPoints(std::move(points));
+}
+
+constexpr double kPi = std::numbers::pi;
+
+TEST(RangeImageTest, TellsWhatIsThereFromWhatIsSeenThroughAndHidden) {
+  const RangeImage image(RoundWall(-kPi, kPi), Vector3d::Zero());
+  EXPECT_EQ(image.At({10.0F, 0.0F, 0.5F}), Sight::kAgreeing);
+  EXPECT_EQ(image.At({-6.9F, -6.9F, 0.5F}), Sight::kAgreeing);
+  EXPECT_EQ(image.At({5.0F, 0.0F, 0.5F}), Sight::kSeenThrough);
+  EXPECT_EQ(image.At({15.0F, 0.0F, 0.5F}), Sight::kUnknown) << "behind the wall";
+  EXPECT_EQ(image.At({0.5F, 0.0F, 0.0F}), Sight::kUnknown) << "at the sensor";
+  EXPECT_EQ(image.At({0.0F, 0.0F, 8.0F}), Sight::kUnknown) << "above where it looked";
+}
+
+TEST(RangeImageTest, LooksFromWhereTheSensorWas) {
+  const RangeImage image(RoundWall(-kPi, kPi), {4.0, 0.0, 0.0});
+  EXPECT_EQ(image.At({10.0F, 0.0F, 0.0F}), Sight::kAgreeing);
+  EXPECT_EQ(image.At({-10.0F, 0.0F, 0.0F}), Sight::kAgreeing);
+  EXPECT_EQ(image.At({4.0F, 5.0F, 0.0F}), Sight::kSeenThrough);
+}
+
+TEST(RangeImageTest, NothingComesBackOnlyWhereASensorLooks) {
+  // A sensor that turns, with posts around and a gap ahead.
+  const RangeImage around(RoundWall(0.2, 2.0 * kPi - 0.2), Vector3d::Zero());
+  EXPECT_EQ(around.At({6.0F, 0.0F, 0.5F}), Sight::kUnknown) << "no beam is known to go there";
+  std::array<std::vector<Vector3f>, kFeatureClasses> points;
+  const ScanFeatures walls = RoundWall(0.2, 2.0 * kPi - 0.2);
+  points[static_cast<std::size_t>(FeatureClass::kVertical)] = walls.points(FeatureClass::kVertical);
+  for (float y = -2.0F; y < 2.0F; y += 0.02F) {  // the road in the gap
+    for (float x = 4.0F; x < 9.0F; x += 0.05F) {
+      points[static_cast<std::size_t>(FeatureClass::kTraversable)].emplace_back(x, y, -1.5F);
+    }
+  }
+  const RangeImage road(ScanFeatures::FromPoints(std::move(points)), Vector3d::Zero());
+  EXPECT_EQ(road.At({6.0F, 0.0F, 1.0F}), Sight::kNoReturn);
+  EXPECT_EQ(road.At({25.0F, 0.0F, 1.0F}), Sight::kUnknown) << "far things may not answer";
+  // One that looks ahead only may just not have looked.
+  const RangeImage ahead(RoundWall(-0.5, 0.5), Vector3d::Zero());
+  EXPECT_EQ(ahead.At({0.0F, 10.0F, 0.0F}), Sight::kUnknown);
+}
+
+TEST(RangeImageTest, WithoutFeaturesNothingIsKnown) {
+  EXPECT_EQ(RangeImage().At({5.0F, 0.0F, 0.0F}), Sight::kUnknown);
+  EXPECT_EQ(RangeImage(ScanFeatures(), Vector3d::Zero()).At({5.0F, 0.0F, 0.0F}), Sight::kUnknown);
+  const float nan = std::nanf("");
+  EXPECT_EQ(RangeImage(RoundWall(-kPi, kPi), Vector3d::Zero()).At({nan, 0.0F, 0.0F}),
+            Sight::kUnknown);
+}
+
+}  // namespace
+}  // namespace strata
