@@ -14,16 +14,26 @@
 
 namespace strata {
 
-// Thread-safe; answers one question at a time.
+// Thread-safe. What places look like is kept between questions, until the map changes.
 class Localizer {
  public:
   explicit Localizer(MapCore& core) : core_(core) {}
+  ~Localizer();
 
-  // INVALID_ARGUMENT naming the field.
+  // INVALID_ARGUMENT naming the field that is wrong. Scans of the map that are damaged are no
+  // places.
   absl::StatusOr<LocalizeResult> Localize(const LocalizeQuery& query, const Stop& stop);
 
  private:
+  struct Places;
+  class Search;
+
+  // Of the present state.
+  absl::StatusOr<std::shared_ptr<Places>> CurrentPlaces(const Stop& stop);
+
   MapCore& core_;
+  absl::Mutex mutex_;
+  std::shared_ptr<Places> places_ ABSL_GUARDED_BY(mutex_);  // nullptr: never asked for
 };
 
 }  // namespace strata
