@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -16,6 +18,13 @@ namespace {
 
 using nlohmann::json;
 using ::testing::HasSubstr;
+
+// A pose as options take it.
+std::string WithCommas(const json& pose) {
+  return absl::StrJoin(pose.get<std::vector<double>>(), ",", [](std::string* out, double number) {
+    absl::StrAppendFormat(out, "%.12f", number);
+  });
+}
 
 class WorldTest : public CliTest {
  protected:
@@ -43,12 +52,9 @@ class WorldTest : public CliTest {
   std::uint64_t Epoch() const { return Json({"map", "show", "m"}).at("epoch"); }
   // Says that over/1 is 0.3 m higher than it is, very surely; the id.
   std::string SayHigher() const {
-    const json pose = PoseOf("over/1");
-    std::string said;
-    for (int i = 0; i < 7; ++i) {
-      const double value = pose.at(static_cast<std::size_t>(i)).get<double>();
-      said += (i == 0 ? "" : ",") + std::to_string(value + (i == 2 ? 0.3 : 0.0));
-    }
+    json pose = PoseOf("over/1");
+    pose[2] = pose[2].get<double>() + 0.3;
+    const std::string said = WithCommas(pose);
     const json added = Json({"posegraph",
                              "add-constraint",
                              "m",
@@ -147,12 +153,10 @@ TEST_F(WorldTest, ConstraintsAreSeenSwitchedAndDrawn) {
 TEST_F(WorldTest, AScanIsFoundWhereItWasTaken) {
   Json({"scan", "export", "m", "over/3", "--format", "pcd", "--out", Path("scan.pcd")});
   const json pose = PoseOf("over/3");
-  const std::string guess =
-      std::to_string(pose.at(0).get<double>() + 0.4) + "," +
-      std::to_string(pose.at(1).get<double>() - 0.3) + "," +
-      std::to_string(pose.at(2).get<double>()) + "," + std::to_string(pose.at(3).get<double>()) +
-      "," + std::to_string(pose.at(4).get<double>()) + "," +
-      std::to_string(pose.at(5).get<double>()) + "," + std::to_string(pose.at(6).get<double>());
+  json near = pose;
+  near[0] = pose[0].get<double>() + 0.4;
+  near[1] = pose[1].get<double>() - 0.3;
+  const std::string guess = WithCommas(near);
   const json found = Json({"localize", "m", Path("scan.pcd"), "--guess", guess, "--radius", "10"});
   ASSERT_TRUE(found.at("found").get<bool>()) << found;
   for (const std::size_t axis : {0U, 1U, 2U}) {
