@@ -46,8 +46,9 @@ absl::Status CheckQuery(const LocalizeQuery& query) {
   STRATA_RETURN_IF_ERROR(ValidateCloud(query.cloud));
   if (query.cloud.points.empty()) return absl::InvalidArgumentError("cloud: no points");
   if (query.sensor.has_value()) STRATA_RETURN_IF_ERROR(ValidateSensorModel(*query.sensor));
-  if (!query.T_map_scan_guess.has_value()) return absl::OkStatus();
-  STRATA_RETURN_IF_ERROR(ValidatePose(*query.T_map_scan_guess));
+  if (query.T_map_scan_guess.has_value()) {
+    STRATA_RETURN_IF_ERROR(ValidatePose(*query.T_map_scan_guess));
+  }
   if (query.guess_radius_m > 0.0 && query.guess_radius_m <= 10000.0) return absl::OkStatus();
   return absl::InvalidArgumentError(
       absl::StrCat("guess_radius_m = ", query.guess_radius_m, " is not in (0, 10000]"));

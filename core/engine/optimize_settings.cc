@@ -34,7 +34,7 @@ Read Flag(bool& to) {
 
 Read Whole(int& to, int most) {
   return [&to, most](const std::string& text) {
-    return absl::SimpleAtoi(text, &to) && to >= 0 && to <= most;
+    return absl::SimpleAtoi(text, &to) && to >= 1 && to <= most;
   };
 }
 
