@@ -31,6 +31,8 @@ constexpr double kSamePlaceRad = 0.002;
 // Within these of what was measured when a scan came in, it still holds.
 constexpr double kMeasuredPlaceM = 0.1;
 constexpr double kMeasuredPlaceRad = 0.02;
+// What may be false must look the same at least to this share.
+constexpr double kMinSuspectOverlap = 0.5;
 // A match is recorded as relative poses to the nearest few.
 constexpr std::size_t kMaxPartners = 3;
 
@@ -204,7 +206,8 @@ class Alignment {
     }
     const RegistrationTarget target(placed, {.centre = pose(node).translation()});
     const RegistrationResult result = RegisterScan(*own, target, pose(node), options_.registration);
-    match.good = Acceptable(result.termination);
+    match.good = Acceptable(result.termination) &&
+                 (!match.stretch.may_be_false || result.overlap >= kMinSuspectOverlap);
     if (!match.good) return match;
     match.information = LoosenedInformation(
         result.information,

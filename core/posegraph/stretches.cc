@@ -1,6 +1,7 @@
 #include "core/posegraph/stretches.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/registration/neighbours.h"
 
@@ -9,6 +10,8 @@ namespace {
 
 // Scans farther apart than this in the order of their trajectory are of different passes.
 constexpr std::size_t kSamePass = 5;
+// Of another pass, scans higher or lower than this are on another storey, which may look the same.
+constexpr double kSameStoreyM = 1.5;
 // A robot that comes back to a place later than this is on another pass.
 constexpr std::size_t kOwnPass = 30;
 
@@ -26,6 +29,7 @@ Stretches::Stretches(const AlignmentProblem& problem, const NeighbourPolicy& pol
     }
   }
   for (const ScanPair& pair : problem.pairs) {
+    if (pair.measured.has_value()) continue;  // that says it all
     partners_[pair.i].push_back({pair.j, pair.may_be_false});
     partners_[pair.j].push_back({pair.i, pair.may_be_false});
   }
@@ -48,7 +52,9 @@ std::vector<Stretch> Stretches::Around(std::size_t node, std::span<const Pose> T
     around.push_back({way_[other], {other, known}});
   };
   for (const std::size_t other : SelectNeighbours(T_map_scan, T_map_scan[node], policy_)) {
-    add(other, false);
+    const double rise_m =
+        std::abs(T_map_scan[other].translation().z() - T_map_scan[node].translation().z());
+    if (OwnPass(node, other) || rise_m <= kSameStoreyM) add(other, false);
   }
   for (const Partner& partner : partners_[node]) add(partner.node, !partner.may_be_false);
   std::sort(around.begin(), around.end());
