@@ -16,9 +16,9 @@
 #include "core/mls/build.h"
 #include "core/planes/extraction.h"
 #include "tests/core/posegraph/random_poses.h"
-#include "tests/support/scene.h"
 #include "tests/support/simulator.h"
 #include "tests/support/status_matchers.h"
+#include "tests/support/worlds.h"
 
 namespace strata {
 namespace {
@@ -32,24 +32,6 @@ using testing::RandomPoses;
 using testing::StatusIs;
 using Code = absl::StatusCode;
 
-// A yard with a wall around it, sheds and posts.
-testing::Scene Yard() {
-  testing::Scene scene;
-  scene.Add(testing::Box({-20.0, -15.0, -1.0}, {30.0, 15.0, 0.0}));
-  scene.Add(testing::Box({-20.0, 14.0, 0.0}, {30.0, 15.0, 4.0}));
-  scene.Add(testing::Box({-20.0, -15.0, 0.0}, {30.0, -14.0, 4.0}));
-  scene.Add(testing::Box({-20.0, -14.0, 0.0}, {-19.0, 14.0, 4.0}));
-  scene.Add(testing::Box({29.0, -14.0, 0.0}, {30.0, 14.0, 4.0}));
-  scene.Add(testing::Box({3.0, 4.0, 0.0}, {7.0, 7.0, 2.5}));
-  scene.Add(testing::Box({-4.0, -8.0, 0.0}, {-1.0, -5.0, 3.0}));
-  scene.Add(testing::Box({11.0, -7.0, 0.0}, {14.0, -4.0, 2.0}));
-  for (const auto& [x, y] : {std::pair{0.0, 6.0}, {8.0, -5.0}, {16.0, 5.0}, {-6.0, 4.0}}) {
-    scene.Add(testing::Post(x, y, 0.0, 3.0, 0.2));
-  }
-  scene.Build();
-  return scene;
-}
-
 // What a robot saw on its way through the yard and a second one after it, a scan every 2 m.
 class YardScans final : public AlignmentSource {
  public:
@@ -57,7 +39,7 @@ class YardScans final : public AlignmentSource {
   static constexpr std::size_t kScans = 10;
 
   YardScans() {
-    const testing::Scene yard = Yard();
+    const testing::Scene yard = testing::YardScene();
     testing::SensorOptions sensor;
     sensor.rings = 32;
     sensor.columns = 360;
