@@ -372,6 +372,31 @@ TEST_F(OptimizeTest, ADisabledPlaneIsNotUsedButRemembered) {
   EXPECT_EQ(Optimize({{"planes", "0"}}).metrics.at("planes"), 0.0);
 }
 
+// Tiles cannot be made again without them.
+TEST_F(OptimizeTest, ADamagedScanIsNamedAndNothingMoves) {
+  MakeWorld();
+  const std::string digest = Digest();
+  const std::vector<Pose> poses = Poses();
+  Close();
+  Sql("UPDATE truth_chunk SET bytes = x'00' WHERE upload = "
+      "(SELECT upload FROM truth_scan WHERE sequence = 3)");
+  Reopen();
+  const JobInfo job = Optimize();
+  EXPECT_EQ(job.state, JobState::kFailed);
+  EXPECT_THAT(job.message, HasSubstr("run/3"));
+  EXPECT_EQ(Digest(), digest);
+  ExpectEqual(Poses(), poses);
+  EXPECT_EQ(WaitIntegrated(db()).epoch, 1U);
+  EXPECT_THAT(Graph().planes, IsEmpty());
+  // Without it the others come to their places.
+  STRATA_ASSERT_OK(db().scans().Delete({}, kMapName, {"run", 3}));
+  const JobInfo again = Optimize();
+  ASSERT_EQ(again.state, JobState::kSucceeded) << again.message;
+  const Pose off = TruthOf(1).inverse() * TruthOf(6) * PoseOf(6).inverse() * PoseOf(1);
+  EXPECT_LT(off.translation().norm(), 0.03);
+  ExpectSound();
+}
+
 TEST_F(OptimizeTest, AnEmptyMapIsConsistent) {
   MakeMap(MapParameters());
   const JobInfo job = RunJob(db(), "optimize");
