@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
 # Strata's main job, from nothing: installs what it needs, builds, and shows two robots mapping a bridge.
-#   deploy/demo.sh [--out DIR]                  simulated: two robots upload at once, plans over and under the bridge
+#   deploy/demo.sh [--out DIR]                  simulated: two robots upload at once, plans over and under the bridge;
+#                                               then a loop of 300 m is closed
 #   deploy/demo.sh --data FOLDER [--out DIR]    recorded: FOLDER has scans/ and poses_*.txt (or .pose files)
 # Files go to DIR, default ./demo-out. A second run skips the installing and building that is done.
 set -euo pipefail
 
-usage() { sed -n '3,5p' "$0" >&2; exit 2; }
+usage() { sed -n '3,6p' "$0" >&2; exit 2; }
 out=demo-out
 data=
 while [[ $# -gt 0 ]]; do
@@ -100,6 +101,21 @@ demo_simulated() {
   run strata_at map render bridge "$out/bridge_road.png" --slice -1,2 --path "$out/under.ply"
 }
 
+demo_loop() {
+  step "a robot with poor odometry drives a loop of 300 m"
+  run strata-simulate campus_loop "$work/loop" --seed 1 --noise-m 0.03 --noise-rad 0.005
+  run strata_at map create loop --cell-size 0.1
+  run strata_at scan import loop "$work/loop/loop/scans" --poses "$work/loop/loop/poses_initial.txt" \
+    --pose-format index-tum --trajectory loop --align off --wait
+  run strata_at map render loop "$out/loop_before.png" --trajectories
+  step "closing the loop"
+  run strata_at job start loop optimize --wait
+  strata_at pose export loop --out "$out/poses_loop.txt" >/dev/null
+  drift "$work/loop/loop/poses_truth.txt" "$work/loop/loop/poses_initial.txt" "$out/poses_loop.txt"
+  run strata_at map history loop
+  run strata_at map render loop "$out/loop_after.png" --trajectories
+}
+
 # drift TRUTH UPLOADED ALIGNED: how far the last pose is from the truth before and after alignment.
 drift() {
   local truth uploaded aligned
@@ -164,7 +180,7 @@ demo_recorded() {
 
 rm -f "$out"/{over,under,deck_to_road,path}.ply
 build
-if [[ -n $data ]]; then demo_recorded; else demo_simulated; fi
+if [[ -n $data ]]; then demo_recorded; else demo_simulated; demo_loop; fi
 step "stopping the server"
 kill -TERM "$server"
 wait "$server"

@@ -17,8 +17,8 @@ namespace {
 
 using picture::Stroke;
 
-constexpr std::array<Colour, 6> kTrajectoryColours = {
-    {{20, 30, 40}, {120, 72, 0}, {0, 96, 140}, {90, 0, 110}, {70, 90, 0}, {150, 40, 70}}};
+constexpr std::array<Colour, 5> kTrajectoryColours = {
+    {{120, 72, 0}, {0, 96, 140}, {90, 0, 110}, {70, 90, 0}, {150, 40, 70}}};
 constexpr std::size_t kMostNames = 8;
 
 constexpr Colour kIngestColour = {0, 128, 150};

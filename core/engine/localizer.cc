@@ -42,18 +42,6 @@ constexpr double kAlikeHeadingRad = 0.1;
 constexpr double kMatchSigmaM = 0.05;
 constexpr double kMatchSigmaRad = 0.005;
 
-absl::Status CheckQuery(const LocalizeQuery& query) {
-  STRATA_RETURN_IF_ERROR(ValidateCloud(query.cloud));
-  if (query.cloud.points.empty()) return absl::InvalidArgumentError("cloud: no points");
-  if (query.sensor.has_value()) STRATA_RETURN_IF_ERROR(ValidateSensorModel(*query.sensor));
-  if (query.T_map_scan_guess.has_value()) {
-    STRATA_RETURN_IF_ERROR(ValidatePose(*query.T_map_scan_guess));
-  }
-  if (query.guess_radius_m > 0.0 && query.guess_radius_m <= 10000.0) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat("guess_radius_m = ", query.guess_radius_m, " is not in (0, 10000]"));
-}
-
 // A scan of the map near which the asked one may have been taken.
 struct Candidate {
   std::size_t node = 0;
@@ -301,7 +289,7 @@ absl::StatusOr<std::shared_ptr<Localizer::Places>> Localizer::CurrentPlaces(cons
 }
 
 absl::StatusOr<LocalizeResult> Localizer::Localize(const LocalizeQuery& query, const Stop& stop) {
-  STRATA_RETURN_IF_ERROR(CheckQuery(query));
+  STRATA_RETURN_IF_ERROR(ValidateLocalizeQuery(query));
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Places> places, CurrentPlaces(stop));
   return Search(core_, *places, query, stop).Run();
 }

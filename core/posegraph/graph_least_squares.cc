@@ -1,5 +1,6 @@
 #include "core/posegraph/graph_least_squares.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <utility>
 #include <vector>
@@ -35,11 +36,12 @@ auto Segment(Eigen::VectorXd& v, std::size_t block) {
   return v.segment<6>(static_cast<Eigen::Index>(block) * 6);
 }
 
-// Adds a share of their mean to `size` entries of the diagonal of the block.
+// Adds a share of their mean, or of 1 where they are nothing, to `size` entries of the diagonal of
+// the block.
 void AddInertia(BlockCholesky& H, std::size_t block, int first, int size) {
   Eigen::Map<Block> values(H.values().data() + H.Slot(block, block).offset);
   auto diagonal = values.diagonal().segment(first, size);
-  const double inertia = kInertia * diagonal.mean();
+  const double inertia = kInertia * std::max(diagonal.mean(), 1.0);
   diagonal.array() += inertia;
 }
 
@@ -267,7 +269,7 @@ void GraphLeastSquares::HoldBack(BlockCholesky& H) const {
     AddInertia(H, block, 3, 3);
   }
   for (std::size_t p = 0; p < problem_.planes.size(); ++p) {
-    AddInertia(H, blocks_ - problem_.planes.size() + p, 0, 2);
+    AddInertia(H, blocks_ - problem_.planes.size() + p, 0, kPlaneParameters);
   }
 }
 

@@ -136,7 +136,7 @@ struct PoseGraphSolution {
 
 // Levenberg–Marquardt with analytic derivatives on SE(3) and on planes (3 parameters each), sparse
 // Cholesky. A component of the graph in which nothing is fixed and that has no prior is held at its
-// first node. What no term determines stays as it is. Deterministic, one thread.
+// first node. What no term determines moves as little as possible. Deterministic, one thread.
 // INVALID_ARGUMENT naming the term, the field and the bound for indices out of range, i = j,
 // numbers that are not finite, matrices that are not symmetric and positive semidefinite (to 1e-9
 // of their largest entry), options out of range; CANCELLED or DEADLINE_EXCEEDED by `stop`, asked

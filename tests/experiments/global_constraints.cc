@@ -150,10 +150,12 @@ std::vector<Pose> Align(Scans& scans, const std::vector<Pose>& start, Method met
   problem.T_map_scan = start;
   problem.fixed.assign(start.size(), false);
   problem.fixed[0] = true;
+  problem.trajectories.emplace_back();
+  for (std::size_t i = 0; i < start.size(); ++i) problem.trajectories[0].push_back(i);
   for (std::size_t i = 0; i + 1 < start.size(); ++i) problem.pairs.push_back({.i = i, .j = i + 1});
   if (start.size() > 2) problem.pairs.push_back({.i = 0, .j = start.size() - 1});
   AlignmentOptions options;
-  options.neighbours = 0;
+  options.neighbours.max_scans = 0;  // the pairs only
   options.max_rounds = 30;
   options.planes = method == kLocalAndGlobal;
   options.registration.initial_gate_m = scans.setup().initial_gate_m;
@@ -170,9 +172,9 @@ std::vector<Pose> Align(Scans& scans, const std::vector<Pose>& start, Method met
   if (std::getenv("STRATA_VERBOSE") != nullptr) {
     for (const AlignmentRound& r : result->rounds) {
       std::fprintf(stderr,
-                   "    %s: pairs %zu (new %zu) planes %zu views %zu shift %.4f m %.5f rad\n",
+                   "    %s: matches %zu (new %zu) planes %zu views %zu shift %.4f m %.5f rad\n",
                    kMethodNames[method],
-                   r.pairs,
+                   r.matches,
                    r.registered,
                    r.planes,
                    r.supports,

@@ -172,6 +172,7 @@ TEST_P(DatabaseSuite, BadSearchesAreRefused) {
   LocalizeQuery query;
   EXPECT_THAT(db().posegraph().Localize({}, kMap, query), StatusIs(Code::kInvalidArgument, _));
   query.cloud = LevelFloor(1.0);
+  query.T_map_scan_guess = Pose::Identity();
   query.guess_radius_m = 0.0;
   EXPECT_THAT(db().posegraph().Localize({}, kMap, query), StatusIs(Code::kInvalidArgument, _));
   query.guess_radius_m = 5.0;

@@ -93,6 +93,8 @@ TEST(CovarianceErrorsTest, NameWhatIsWrong) {
   problem.T_map_scan.assign(2, Pose::Identity());
   problem.relative.push_back({.i = 0, .j = 1});
   STRATA_EXPECT_OK(MarginalCovariances(problem, {0, 1}));
+  problem.planes.emplace_back();  // that nobody saw
+  STRATA_EXPECT_OK(MarginalCovariances(problem, {0, 1}));
   EXPECT_THAT(MarginalCovariances(problem, {2}),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("node 2 of covariance")));
   problem.relative[0].information(5, 5) = 0.0;
