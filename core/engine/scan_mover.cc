@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
+
 #include "core/common/status.h"
 #include "core/engine/parallel.h"
 #include "core/engine/scan_losses.h"
@@ -29,11 +31,13 @@ absl::StatusOr<ScanMover::MovedScan> ScanMover::Move(const ProposedPose& pose) c
   ScanSource source(*reader, parameters);
   MovedScan moved;
   moved.T_map_scan = pose.T_map_scan;
-  STRATA_ASSIGN_OR_RETURN(const MlsMap contribution,
-                          source.Contribution(posed.scan, pose.T_map_scan));
+  const absl::StatusOr<MlsMap> contribution = source.Contribution(posed.scan, pose.T_map_scan);
+  if (!contribution.ok()) {
+    return Annotate(contribution.status(), absl::StrCat("scan ", header.id.ToString()));
+  }
   STRATA_RETURN_IF_ERROR(CheckContributes(
-      contribution, source.dropped(), header, header.sensor.value_or(parameters.sensor)));
-  for (const MlsTile& tile : contribution.tiles) {
+      *contribution, source.dropped(), header, header.sensor.value_or(parameters.sensor)));
+  for (const MlsTile& tile : contribution->tiles) {
     if (!tile.patches.empty()) moved.tiles.push_back(tile.key);
   }
   moved.scan = std::move(posed.scan);

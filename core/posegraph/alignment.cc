@@ -198,9 +198,11 @@ class Alignment {
     if (own == nullptr) return match;
     std::vector<std::shared_ptr<const ScanFeatures>> held;
     std::vector<PlacedScan> placed;
+    std::vector<std::size_t> seen;  // nothing is measured about damaged ones
     for (const std::size_t i : match.stretch.nodes) {
       STRATA_ASSIGN_OR_RETURN(auto features, FeaturesOf(i));
       if (features == nullptr) continue;
+      seen.push_back(i);
       held.push_back(std::move(features));
       placed.push_back({held.back().get(), pose(i)});
     }
@@ -214,7 +216,7 @@ class Alignment {
         IsotropicInformation(options_.registration_sigma_rad, options_.registration_sigma_m));
     // A match that may be false is one relative pose, so that it is believed or not as a whole.
     const std::size_t partners = match.stretch.may_be_false ? 1 : kMaxPartners;
-    for (const std::size_t i : Nearest(match.stretch.nodes, result.T_target_source, partners)) {
+    for (const std::size_t i : Nearest(seen, result.T_target_source, partners)) {
       match.T_i_scan.push_back({i, Normalized(pose(i).inverse() * result.T_target_source)});
     }
     return match;

@@ -273,4 +273,21 @@ World CampusLoopWorld(std::uint64_t seed) {
   return world;
 }
 
+Scene YardScene() {
+  Scene scene;
+  scene.Add(Box({-20.0, -15.0, -1.0}, {30.0, 15.0, 0.0}));
+  scene.Add(Box({-20.0, 14.0, 0.0}, {30.0, 15.0, 4.0}));
+  scene.Add(Box({-20.0, -15.0, 0.0}, {30.0, -14.0, 4.0}));
+  scene.Add(Box({-20.0, -14.0, 0.0}, {-19.0, 14.0, 4.0}));
+  scene.Add(Box({29.0, -14.0, 0.0}, {30.0, 14.0, 4.0}));
+  scene.Add(Box({3.0, 4.0, 0.0}, {7.0, 7.0, 2.5}));
+  scene.Add(Box({-4.0, -8.0, 0.0}, {-1.0, -5.0, 3.0}));
+  scene.Add(Box({11.0, -7.0, 0.0}, {14.0, -4.0, 2.0}));
+  for (const auto& [x, y] : {std::pair{0.0, 6.0}, {8.0, -5.0}, {16.0, 5.0}, {-6.0, 4.0}}) {
+    scene.Add(Post(x, y, 0.0, 3.0, 0.2));
+  }
+  scene.Build();
+  return scene;
+}
+
 }  // namespace strata::testing

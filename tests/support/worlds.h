@@ -54,6 +54,10 @@ World CampusWorld(std::uint64_t seed = 1);
 //   places: "start" and "far".
 World CampusLoopWorld(std::uint64_t seed = 1);
 
+// A yard of 48 × 28 m around (5, 0) with a wall of 4 m around it, three sheds and four posts; its
+// ground is z = 0. Small, and well determined from anywhere in it: for tests of single steps.
+Scene YardScene();
+
 }  // namespace strata::testing
 
 #endif  // STRATA_TESTS_SUPPORT_WORLDS_H_
