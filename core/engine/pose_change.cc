@@ -24,6 +24,7 @@ absl::StatusOr<PoseChange> PoseChange::Read(StorageReader& reader, std::uint64_t
   PoseChange change;
   ScanQuery query;
   query.state = ScanState::kIntegrated;
+  query.skip_damaged = true;  // it keeps its pose, and verify names it
   for (bool more = true; more;) {
     STRATA_ASSIGN_OR_RETURN(std::vector<PosedScan> page, reader.ListScans(query, epoch));
     more = page.size() == query.limit;
