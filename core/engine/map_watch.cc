@@ -28,8 +28,12 @@ class Watcher {
     api::MapUpdate update;
     update.commit_sequence = changes.last;
     update.epoch = pin.view().epoch;
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-    STRATA_RETURN_IF_ERROR(reader->Snapshot([&] { return Fill(*reader, pin, changes, update); }));
+    const bool nothing = changes.complete && changes.scans.empty() && changes.tiles.empty() &&
+                         (epoch_ == 0 || epoch_ == update.epoch);
+    if (!nothing) {  // a thousand idle watchers ask ten times a second
+      STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+      STRATA_RETURN_IF_ERROR(reader->Snapshot([&] { return Fill(*reader, pin, changes, update); }));
+    }
     since_ = update.commit_sequence;
     epoch_ = update.epoch;
     first_ = false;
