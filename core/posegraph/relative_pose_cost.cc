@@ -16,7 +16,7 @@ Eigen::Quaterniond Upper(const Eigen::Matrix3d& R) {
 }  // namespace
 
 Vector6d RelativePoseError(const Pose& T_i, const Pose& T_j, const Pose& T_i_j) {
-  const Eigen::Matrix3d R_j_i = T_i_j.linear().transpose();
+  const Eigen::Matrix3d R_j_i = T_i_j.inverse().linear();
   const Eigen::Matrix3d R = R_j_i * (T_i.linear().transpose() * T_j.linear());
   const Eigen::Vector3d t = T_i.linear().transpose() * (T_j.translation() - T_i.translation());
   Vector6d error;
@@ -28,7 +28,7 @@ Vector6d RelativePoseError(const Pose& T_i, const Pose& T_j, const Pose& T_i_j) 
 RelativePoseDerivatives DifferentiateRelativePose(const Pose& T_i,
                                                   const Pose& T_j,
                                                   const Pose& T_i_j) {
-  const Eigen::Matrix3d R_j_i = T_i_j.linear().transpose();
+  const Eigen::Matrix3d R_j_i = T_i_j.inverse().linear();
   const Eigen::Matrix3d R = R_j_i * (T_i.linear().transpose() * T_j.linear());
   const Eigen::Vector3d t = T_i.linear().transpose() * (T_j.translation() - T_i.translation());
   const Eigen::Quaterniond q = Upper(R);
