@@ -1,0 +1,55 @@
+// Associative Markov networks (thesis 9.2; Taskar, Chatalbashev, Koller 2004): how well labels fit
+// points and neighbours.
+//
+// The logarithm of eq. 9.2 without its partition function: Σ_i w_n^k · x_i + Σ_ij w_e^k x_ij with k
+// the label of i, and of both i and j. Edge features are one constant (9.4.3), so that w_e^k is the
+// reward of two neighbours that are both of class k; neighbours that differ get none (Potts).
+#ifndef STRATA_CORE_CLASSIFICATION_AMN_H_
+#define STRATA_CORE_CLASSIFICATION_AMN_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/classification/network.h"
+
+namespace strata {
+
+// One row a point.
+using FeatureMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+// One row a point, one column a class.
+using ScoreMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+// The number of a class in a model, from 0.
+using ClassIndex = std::uint16_t;
+
+struct AmnWeights {
+  Eigen::MatrixXd node;  // w_n: one row a class, one column a feature
+  Eigen::VectorXd edge;  // w_e ≥ 0: one a class
+
+  std::size_t classes() const { return static_cast<std::size_t>(node.rows()); }
+};
+
+// A network whose labels are wanted.
+struct AmnProblem {
+  ScoreMatrix node_scores;  // w_n^k · x_i
+  std::span<const NetworkEdge> edges;
+  Eigen::VectorXd edge_scores;  // w_e^k ≥ 0
+
+  std::size_t points() const { return static_cast<std::size_t>(node_scores.rows()); }
+  std::size_t classes() const { return static_cast<std::size_t>(node_scores.cols()); }
+};
+
+// The scores of `features` under `weights`.
+AmnProblem MakeAmnProblem(const AmnWeights& weights,
+                          const FeatureMatrix& features,
+                          std::span<const NetworkEdge> edges);
+
+// What inference maximises.
+double Score(const AmnProblem& problem, std::span<const ClassIndex> labels);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_CLASSIFICATION_AMN_H_

@@ -1,0 +1,40 @@
+// The nearest neighbours of every point of a cloud.
+#ifndef STRATA_CORE_CLASSIFICATION_NEIGHBOURS_H_
+#define STRATA_CORE_CLASSIFICATION_NEIGHBOURS_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace strata {
+
+// The same number of neighbours for every point, nearest first, itself left out; equally far ones
+// by index. Immutable.
+class Neighbours {
+ public:
+  // `count` ≥ 1, or as many as there are other points. Points must be finite.
+  static Neighbours Find(std::span<const Eigen::Vector3f> points, std::size_t count);
+
+  std::size_t size() const { return points_; }  // points
+  std::size_t count() const { return count_; }  // neighbours of a point
+  std::span<const std::uint32_t> Of(std::size_t point) const {
+    return {indices_.data() + point * count_, count_};
+  }
+  // Beside Of() [m²].
+  std::span<const float> SquaredDistances(std::size_t point) const {
+    return {squared_.data() + point * count_, count_};
+  }
+
+ private:
+  std::size_t points_ = 0;
+  std::size_t count_ = 0;
+  std::vector<std::uint32_t> indices_;
+  std::vector<float> squared_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_CLASSIFICATION_NEIGHBOURS_H_

@@ -1,0 +1,91 @@
+#include "core/classification/network.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/common/random.h"
+
+namespace strata {
+namespace {
+
+std::vector<Eigen::Vector3f> Cloud(std::size_t count, std::uint64_t seed) {
+  SplitMix64 random(seed);
+  std::vector<Eigen::Vector3f> points(count);
+  for (Eigen::Vector3f& p : points) {
+    for (float& x : p) x = static_cast<float>(10.0 * random.Uniform());
+  }
+  return points;
+}
+
+TEST(NeighboursTest, AreTheNearestOfAll) {
+  std::vector<Eigen::Vector3f> points = Cloud(400, 3);
+  for (int k = 0; k < 12; ++k) points.push_back(points[7]);  // many at one place
+  const Neighbours neighbours = Neighbours::Find(points, 6);
+  ASSERT_EQ(neighbours.size(), points.size());
+  ASSERT_EQ(neighbours.count(), 6U);
+  for (std::size_t p = 0; p < points.size(); ++p) {
+    std::vector<float> all;
+    for (std::size_t q = 0; q < points.size(); ++q) {
+      if (q != p) all.push_back((points[p] - points[q]).squaredNorm());
+    }
+    std::sort(all.begin(), all.end());
+    for (std::size_t k = 0; k < 6; ++k) {
+      const std::uint32_t other = neighbours.Of(p)[k];
+      EXPECT_NE(other, p);
+      EXPECT_NEAR(neighbours.SquaredDistances(p)[k], all[k], 1e-5F) << p;
+      EXPECT_NEAR((points[p] - points[other]).squaredNorm(), all[k], 1e-5F) << p;
+    }
+  }
+}
+
+TEST(NeighboursTest, SmallCloudsHaveFewer) {
+  EXPECT_EQ(Neighbours::Find({}, 5).size(), 0U);
+  EXPECT_EQ(Neighbours::Find(Cloud(1, 1), 5).count(), 0U);
+  const Neighbours three = Neighbours::Find(Cloud(3, 1), 5);
+  EXPECT_EQ(three.count(), 2U);
+}
+
+TEST(NetworkTest, NoPointHasMoreThanThreeAndMostHaveSome) {
+  const Neighbours neighbours = Neighbours::Find(Cloud(3000, 4), 16);
+  const std::vector<NetworkEdge> edges = DrawNetwork(neighbours, {});
+  std::vector<int> degree(neighbours.size(), 0);
+  for (const NetworkEdge& edge : edges) {
+    ASSERT_LT(edge.i, edge.j);
+    ++degree[edge.i];
+    ++degree[edge.j];
+    const auto of = neighbours.Of(edge.i);
+    const auto back = neighbours.Of(edge.j);
+    EXPECT_TRUE(std::find(of.begin(), of.end(), edge.j) != of.end() ||
+                std::find(back.begin(), back.end(), edge.i) != back.end());
+  }
+  EXPECT_LE(*std::max_element(degree.begin(), degree.end()), 3);
+  EXPECT_GT(edges.size(), 1.2 * 3000);
+  EXPECT_EQ(std::adjacent_find(edges.begin(), edges.end()), edges.end());
+  EXPECT_EQ(edges, DrawNetwork(neighbours, {}));
+  EXPECT_NE(edges, DrawNetwork(neighbours, {.seed = 2}));
+}
+
+TEST(NetworkTest, NearNeighboursAreLikelier) {
+  const Neighbours neighbours = Neighbours::Find(Cloud(3000, 5), 16);
+  const auto mean_rank = [&](double sigma) {
+    NetworkOptions options;
+    options.sigma_spacings = sigma;
+    double sum = 0.0;
+    std::size_t count = 0;
+    for (const NetworkEdge& edge : DrawNetwork(neighbours, options)) {
+      const auto of = neighbours.Of(edge.i);
+      sum += static_cast<double>(std::find(of.begin(), of.end(), edge.j) - of.begin());
+      ++count;
+    }
+    return sum / static_cast<double>(count);
+  };
+  EXPECT_LT(mean_rank(0.5), mean_rank(2.0));
+  EXPECT_LT(mean_rank(2.0), mean_rank(50.0));
+}
+
+}  // namespace
+}  // namespace strata
