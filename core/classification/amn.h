@@ -8,22 +8,14 @@
 #define STRATA_CORE_CLASSIFICATION_AMN_H_
 
 #include <cstddef>
-#include <cstdint>
 #include <span>
-#include <vector>
 
 #include <Eigen/Core>
 
+#include "core/classification/labelled_features.h"
 #include "core/classification/network.h"
 
 namespace strata {
-
-// One row a point.
-using FeatureMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-// One row a point, one column a class.
-using ScoreMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-// The number of a class in a model, from 0.
-using ClassIndex = std::uint16_t;
 
 struct AmnWeights {
   Eigen::MatrixXd node;  // w_n: one row a class, one column a feature

@@ -13,16 +13,6 @@ namespace {
 // A move is taken only if it gains more than rounding can.
 constexpr double kLeastGain = 1e-9;
 
-std::vector<ClassIndex> BestAlone(const AmnProblem& problem) {
-  std::vector<ClassIndex> labels(problem.points());
-  for (std::size_t i = 0; i < labels.size(); ++i) {
-    Eigen::Index best = 0;
-    problem.node_scores.row(static_cast<Eigen::Index>(i)).maxCoeff(&best);
-    labels[i] = static_cast<ClassIndex>(best);
-  }
-  return labels;
-}
-
 // Lets points change to one class, all at once (an expansion move).
 class Expander {
  public:
@@ -74,7 +64,7 @@ class Expander {
 
 absl::StatusOr<AmnLabels> MaximizeScore(const AmnProblem& problem, const Stop& stop) {
   AmnLabels best;
-  best.labels = BestAlone(problem);
+  best.labels = LargestScores(problem.node_scores);
   best.score = Score(problem, best.labels);
   if (problem.classes() < 2 || problem.points() == 0) return best;
   Expander expander(problem);

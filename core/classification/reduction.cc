@@ -1,0 +1,121 @@
+#include "core/classification/reduction.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <numeric>
+
+#include "core/common/option_checks.h"
+#include "core/common/random.h"
+
+namespace strata {
+namespace {
+
+class Reducer {
+ public:
+  Reducer(std::span<const Eigen::Vector3f> positions,
+          const LabelledFeatures& data,
+          const ReductionOptions& options)
+      : positions_(positions), data_(data), options_(options) {
+    reduced_.data.classes = data.classes;
+    order_.resize(data.size());
+    std::iota(order_.begin(), order_.end(), 0U);
+  }
+
+  ReducedPoints Run() {
+    std::vector<std::span<std::uint32_t>> leaves;
+    if (options_.kind == ReductionKind::kRandom) {
+      SplitMix64 random(options_.seed);
+      order_ = SampleIndices(static_cast<std::uint32_t>(order_.size()), options_.count, random);
+      std::sort(order_.begin(), order_.end());
+    }
+    if (options_.kind == ReductionKind::kDepth || options_.kind == ReductionKind::kPure) {
+      Split(order_, 0, leaves);
+    } else {
+      for (std::uint32_t& row : order_) leaves.emplace_back(&row, 1);
+    }
+    reduced_.data.features.resize(static_cast<Eigen::Index>(leaves.size()), data_.features.cols());
+    for (const std::span<std::uint32_t> leaf : leaves) Merge(leaf);
+    return std::move(reduced_);
+  }
+
+ private:
+  bool IsLeaf(std::span<const std::uint32_t> rows, int depth) const {
+    if (rows.size() < 2) return true;
+    if (options_.kind == ReductionKind::kDepth) return depth + 1 >= options_.depth;
+    return std::all_of(rows.begin(), rows.end(), [&](std::uint32_t row) {
+      return data_.labels[row] == data_.labels[rows.front()];
+    });
+  }
+
+  void Split(std::span<std::uint32_t> rows,
+             int depth,
+             std::vector<std::span<std::uint32_t>>& leaves) {
+    if (rows.empty()) return;
+    if (IsLeaf(rows, depth)) {
+      leaves.push_back(rows);
+      return;
+    }
+    Eigen::Vector3f low = positions_[rows.front()];
+    Eigen::Vector3f high = low;
+    for (const std::uint32_t row : rows) {
+      low = low.cwiseMin(positions_[row]);
+      high = high.cwiseMax(positions_[row]);
+    }
+    Eigen::Index axis = 0;
+    (high - low).maxCoeff(&axis);
+    const auto middle = rows.begin() + static_cast<std::ptrdiff_t>(rows.size() / 2);
+    std::nth_element(rows.begin(), middle, rows.end(), [&](std::uint32_t a, std::uint32_t b) {
+      const float x = positions_[a][axis];
+      const float y = positions_[b][axis];
+      return x != y ? x < y : a < b;
+    });
+    Split(rows.first(rows.size() / 2), depth + 1, leaves);
+    Split(rows.subspan(rows.size() / 2), depth + 1, leaves);
+  }
+
+  ClassIndex CommonestLabel(std::span<const std::uint32_t> rows) const {
+    std::vector<std::size_t> count(data_.classes, 0);
+    for (const std::uint32_t row : rows) ++count[data_.labels[row]];
+    return static_cast<ClassIndex>(std::max_element(count.begin(), count.end()) - count.begin());
+  }
+
+  void Merge(std::span<std::uint32_t> rows) {
+    std::sort(rows.begin(), rows.end());  // sums do not depend on how the tree was cut
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();
+    Eigen::RowVectorXd features = Eigen::RowVectorXd::Zero(data_.features.cols());
+    for (const std::uint32_t row : rows) {
+      position += positions_[row].cast<double>();
+      features += data_.features.row(row).cast<double>();
+    }
+    const auto n = static_cast<double>(rows.size());
+    const auto at = static_cast<Eigen::Index>(reduced_.positions.size());
+    reduced_.positions.emplace_back((position / n).cast<float>());
+    reduced_.data.features.row(at) = (features / n).cast<float>();
+    reduced_.data.labels.push_back(CommonestLabel(rows));
+    reduced_.counts.push_back(static_cast<std::uint32_t>(rows.size()));
+  }
+
+  const std::span<const Eigen::Vector3f> positions_;
+  const LabelledFeatures& data_;
+  const ReductionOptions& options_;
+  std::vector<std::uint32_t> order_;
+  ReducedPoints reduced_;
+};
+
+}  // namespace
+
+absl::Status ReductionOptions::Validate() const {
+  OptionChecks checks("reduction options");
+  checks.InRange("depth", depth, 1, 30);
+  checks.InRange("count", count, 1, std::numeric_limits<std::uint32_t>::max());
+  return checks.status();
+}
+
+ReducedPoints Reduce(std::span<const Eigen::Vector3f> positions,
+                     const LabelledFeatures& data,
+                     const ReductionOptions& options) {
+  return Reducer(positions, data, options).Run();
+}
+
+}  // namespace strata

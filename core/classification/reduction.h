@@ -1,0 +1,50 @@
+// Fewer training points that say the same (thesis 9.3).
+//
+// A point that stands for several is at their mean, and has the mean of their features: those were
+// computed in the full cloud, so that learning sees the distributions that inference will see.
+// Features computed anew among the fewer points would be those of another, coarser sensor.
+#ifndef STRATA_CORE_CLASSIFICATION_REDUCTION_H_
+#define STRATA_CORE_CLASSIFICATION_REDUCTION_H_
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include <Eigen/Core>
+
+#include "core/classification/labelled_features.h"
+
+namespace strata {
+
+enum class ReductionKind : std::uint8_t {
+  kNone,
+  kRandom,  // `count` of the points, as they are (9.3)
+  kDepth,   // the leaves of a kd-tree of `depth` levels (9.3.1); the commonest label of each
+  kPure,    // the largest subtrees of which all labels are equal (9.3.2): no parameter
+};
+
+struct ReductionOptions {
+  ReductionKind kind = ReductionKind::kPure;
+  int depth = 15;              // in [1, 30]
+  std::uint32_t count = 5000;  // at least 1
+  std::uint64_t seed = 1;
+
+  absl::Status Validate() const;
+};
+
+struct ReducedPoints {
+  std::vector<Eigen::Vector3f> positions;
+  LabelledFeatures data;
+  std::vector<std::uint32_t> counts;  // how many points each stands for
+};
+
+// `positions` beside the rows of `data`, which must be valid, as must `options`. The tree halves
+// points at the median along their widest axis. Deterministic.
+ReducedPoints Reduce(std::span<const Eigen::Vector3f> positions,
+                     const LabelledFeatures& data,
+                     const ReductionOptions& options);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_CLASSIFICATION_REDUCTION_H_

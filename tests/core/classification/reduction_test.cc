@@ -1,0 +1,119 @@
+#include "core/classification/reduction.h"
+
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/classification/evaluation.h"
+#include "core/common/random.h"
+
+namespace strata {
+namespace {
+
+struct Scene {
+  std::vector<Eigen::Vector3f> positions;
+  LabelledFeatures data;
+};
+
+// A wall of one class with a window of another in it.
+Scene WallWithWindow(int across) {
+  Scene scene;
+  scene.data.classes = 2;
+  scene.data.features.resize(across * across, 2);
+  SplitMix64 random(5);
+  for (int i = 0; i < across; ++i) {
+    for (int j = 0; j < across; ++j) {
+      const auto row = static_cast<Eigen::Index>(scene.positions.size());
+      scene.positions.emplace_back(static_cast<float>(i), 0.0F, static_cast<float>(j));
+      const bool window =
+          i > across / 2 && i < 3 * across / 4 && j > across / 2 && j < 3 * across / 4;
+      scene.data.labels.push_back(window ? 1 : 0);
+      scene.data.features.row(row) << static_cast<float>(random.Uniform()), window ? 1.0F : 0.0F;
+    }
+  }
+  return scene;
+}
+
+std::uint32_t Sum(const std::vector<std::uint32_t>& counts) {
+  return std::accumulate(counts.begin(), counts.end(), 0U);
+}
+
+TEST(ReductionTest, PureLeavesStandForPointsOfOneClass) {
+  const Scene scene = WallWithWindow(64);
+  const ReducedPoints reduced = Reduce(scene.positions, scene.data, {});
+  EXPECT_EQ(Sum(reduced.counts), scene.positions.size());
+  EXPECT_LT(reduced.positions.size(), scene.positions.size() / 10);
+  double windows = 0.0;
+  Eigen::RowVector2d sum = Eigen::RowVector2d::Zero();
+  for (std::size_t k = 0; k < reduced.positions.size(); ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    // The second feature is the label: no leaf mixes.
+    EXPECT_EQ(reduced.data.features(row, 1), reduced.data.labels[k] == 1 ? 1.0F : 0.0F);
+    windows += reduced.data.labels[k] == 1 ? reduced.counts[k] : 0.0;
+    sum += reduced.counts[k] * reduced.data.features.row(row).cast<double>();
+  }
+  EXPECT_EQ(windows, std::accumulate(scene.data.labels.begin(), scene.data.labels.end(), 0));
+  // Means of means are the mean.
+  EXPECT_NEAR(sum[0], scene.data.features.col(0).cast<double>().sum(), 1e-2);
+  EXPECT_NEAR(sum[1], scene.data.features.col(1).cast<double>().sum(), 1e-2);
+}
+
+TEST(ReductionTest, DepthBoundsTheNumberOfPoints) {
+  const Scene scene = WallWithWindow(40);
+  for (const int depth : {1, 4, 8, 30}) {
+    const ReducedPoints reduced =
+        Reduce(scene.positions, scene.data, {.kind = ReductionKind::kDepth, .depth = depth});
+    EXPECT_EQ(Sum(reduced.counts), scene.positions.size());
+    const std::size_t most = std::min<std::size_t>(std::size_t{1} << (depth - 1), 1600);
+    EXPECT_EQ(reduced.positions.size(), most);
+  }
+}
+
+TEST(ReductionTest, RandomKeepsPointsAsTheyAre) {
+  const Scene scene = WallWithWindow(40);
+  const ReducedPoints reduced =
+      Reduce(scene.positions, scene.data, {.kind = ReductionKind::kRandom, .count = 100});
+  ASSERT_EQ(reduced.positions.size(), 100U);
+  for (std::size_t k = 0; k < reduced.positions.size(); ++k) {
+    const auto row =
+        static_cast<Eigen::Index>(40.0F * reduced.positions[k].x() + reduced.positions[k].z());
+    EXPECT_EQ(reduced.data.features.row(static_cast<Eigen::Index>(k)),
+              scene.data.features.row(row));
+  }
+  const ReducedPoints none = Reduce(scene.positions, scene.data, {.kind = ReductionKind::kNone});
+  EXPECT_EQ(none.data.features, scene.data.features);
+  EXPECT_EQ(none.data.labels, scene.data.labels);
+}
+
+TEST(EvaluationTest, CountsByHand) {
+  ConfusionMatrix matrix(3);
+  const std::vector<ClassIndex> truth = {0, 0, 0, 1, 1};
+  const std::vector<ClassIndex> given = {0, 0, 1, 1, 0};
+  matrix.Add(truth, given);
+  EXPECT_EQ(matrix.total(), 5U);
+  EXPECT_DOUBLE_EQ(matrix.Accuracy(), 0.6);
+  EXPECT_DOUBLE_EQ(matrix.Precision(0).value(), 2.0 / 3.0);
+  EXPECT_DOUBLE_EQ(matrix.Recall(0).value(), 2.0 / 3.0);
+  EXPECT_DOUBLE_EQ(matrix.Iou(0).value(), 0.5);
+  EXPECT_DOUBLE_EQ(matrix.Iou(1).value(), 1.0 / 3.0);
+  EXPECT_FALSE(matrix.Iou(2).has_value());
+  EXPECT_FALSE(matrix.Precision(2).has_value());
+  EXPECT_DOUBLE_EQ(matrix.MeanIou(), (0.5 + 1.0 / 3.0) / 2.0);
+  matrix.Add(matrix);
+  EXPECT_EQ(matrix.count(0, 1), 2U);
+  EXPECT_EQ(ConfusionMatrix(2).Accuracy(), 0.0);
+}
+
+TEST(EvaluationTest, FoldsAreOfEqualSize) {
+  const std::vector<std::size_t> folds = DrawFolds(11, 3, 4);
+  std::vector<int> size(3, 0);
+  for (const std::size_t fold : folds) ++size.at(fold);
+  for (const int n : size) EXPECT_TRUE(n == 3 || n == 4);
+  EXPECT_EQ(folds, DrawFolds(11, 3, 4));
+  EXPECT_NE(folds, DrawFolds(11, 3, 5));
+}
+
+}  // namespace
+}  // namespace strata
