@@ -11,12 +11,16 @@
 
 namespace strata {
 
-// The same number of neighbours for every point, nearest first, itself left out; equally far ones
-// by index. Immutable.
+// The same number of neighbours for every point, nearest first; equally far ones by index. A point
+// is not its own neighbour. Immutable.
 class Neighbours {
  public:
   // `count` ≥ 1, or as many as there are other points. Points must be finite.
   static Neighbours Find(std::span<const Eigen::Vector3f> points, std::size_t count);
+  // Of every one of `queries` among other points; at most as many as there are.
+  static Neighbours Find(std::span<const Eigen::Vector3f> queries,
+                         std::span<const Eigen::Vector3f> points,
+                         std::size_t count);
 
   std::size_t size() const { return points_; }  // points
   std::size_t count() const { return count_; }  // neighbours of a point
@@ -29,6 +33,10 @@ class Neighbours {
   }
 
  private:
+  void Fill(std::span<const Eigen::Vector3f> queries,
+            std::span<const Eigen::Vector3f> points,
+            bool without_self);
+
   std::size_t points_ = 0;
   std::size_t count_ = 0;
   std::vector<std::uint32_t> indices_;

@@ -1,0 +1,77 @@
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/classification/feature_columns.h"
+#include "core/classification/local_shape.h"
+#include "core/classification/neighbours.h"
+#include "core/classification/point_tree.h"
+#include "core/common/status.h"
+
+namespace strata {
+namespace {
+
+constexpr int kAcross = 5;  // bins of the distance from the axis
+constexpr int kAlong = 10;  // bins of the height along it
+constexpr float kRadiusSpacings = 10.0F;
+
+float MedianSpacing(const Neighbours& neighbours) {
+  std::vector<float> squared;
+  for (std::size_t i = 0; i < neighbours.size(); ++i) {
+    if (neighbours.count() > 0) squared.push_back(neighbours.SquaredDistances(i).front());
+  }
+  if (squared.empty()) return 0.0F;
+  const auto middle = squared.begin() + static_cast<std::ptrdiff_t>(squared.size() / 2);
+  std::nth_element(squared.begin(), middle, squared.end());
+  return std::sqrt(*middle);
+}
+
+}  // namespace
+
+std::vector<std::string> SpinFeatureNames() {
+  std::vector<std::string> names;
+  for (int across = 0; across < kAcross; ++across) {
+    for (int along = 0; along < kAlong; ++along) {
+      names.push_back(absl::StrCat("spin.", across, ".", along));
+    }
+  }
+  return names;
+}
+
+absl::StatusOr<FeatureMatrix> SpinFeatures(const PointCloud& cloud,
+                                           const FeatureOptions& options,
+                                           const Stop& stop) {
+  const std::span<const Eigen::Vector3f> points = cloud.points;
+  const Neighbours neighbours =
+      Neighbours::Find(points, static_cast<std::size_t>(options.neighbours));
+  const float radius = options.spin_radius_m > 0.0
+                           ? static_cast<float>(options.spin_radius_m)
+                           : std::max(1e-3F, kRadiusSpacings * MedianSpacing(neighbours));
+  FeatureMatrix features =
+      FeatureMatrix::Zero(static_cast<Eigen::Index>(points.size()), kAcross * kAlong);
+  const PointsView view{points};
+  const PointTree tree(3, view, nanoflann::KDTreeSingleIndexAdaptorParams(10));
+  std::vector<std::pair<std::uint32_t, float>> found;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i % 4096 == 0) STRATA_RETURN_IF_ERROR(stop.status());
+    Eigen::Vector3f normal = DescribeShape(points[i], points, neighbours.Of(i)).normal;
+    // Towards the sensor, so that both sides of a thin thing do not look alike.
+    if (normal.dot(cloud.sensor_origin - points[i]) < 0.0F) normal = -normal;
+    tree.radiusSearch(points[i].data(), radius * radius, found, nanoflann::SearchParams());
+    const float each = 1.0F / static_cast<float>(std::max<std::size_t>(1, found.size()));
+    for (const auto& [other, squared] : found) {
+      const float along = (points[other] - points[i]).dot(normal);
+      const float across = std::sqrt(std::max(0.0F, squared - along * along));
+      const int a = std::min(kAcross - 1, static_cast<int>(kAcross * across / radius));
+      const int b =
+          std::clamp(static_cast<int>(kAlong * (along + radius) / (2.0F * radius)), 0, kAlong - 1);
+      features(static_cast<Eigen::Index>(i), a * kAlong + b) += each;
+    }
+  }
+  return features;
+}
+
+}  // namespace strata
