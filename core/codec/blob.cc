@@ -29,6 +29,8 @@ absl::string_view NameOf(BlobKind kind) {
       return "points";
     case BlobKind::kScanPlanes:
       return "planes of a scan";
+    case BlobKind::kClassifier:
+      return "classifier";
   }
   return "blob";
 }

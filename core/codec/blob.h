@@ -16,6 +16,7 @@ enum class BlobKind : std::uint32_t {  // stored
   kMlsTile = 0x31544D53,               // "SMT1"
   kPoints = 0x31545053,                // "SPT1"
   kScanPlanes = 0x314C5053,            // "SPL1"
+  kClassifier = 0x314C4353,            // "SCL1"
 };
 
 // Bytes that the envelope adds to a body.

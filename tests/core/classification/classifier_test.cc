@@ -1,5 +1,6 @@
 #include "core/classification/classifier.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -8,7 +9,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/classification/evaluation.h"
+#include "core/classification/classifier_codec.h"
+#include "core/codec/blob.h"
 #include "tests/core/classification/random_networks.h"
 #include "tests/support/status_matchers.h"
 
@@ -78,6 +80,58 @@ TEST_P(ClassifierTest, LearnsOneParkAndKnowsAnother) {
   ASSERT_EQ(again.labels.size(), with.size());
   again.labels.pop_back();
   EXPECT_EQ(again.labels, classified.labels);
+}
+
+TEST_P(ClassifierTest, BytesAreTheSameClassifier) {
+  TrainingOptions options;
+  options.method = GetParam();
+  options.features.scales = 1;
+  options.rounds = 5;
+  STRATA_ASSERT_OK_AND_ASSIGN(const Classifier classifier,
+                              TrainClassifier({Park(1)}, kClasses, options, NoProgress, Stop()));
+  const std::string bytes = EncodeClassifier(classifier);
+  STRATA_ASSERT_OK_AND_ASSIGN(const Classifier read, DecodeClassifier(bytes));
+  EXPECT_EQ(EncodeClassifier(read), bytes);
+  EXPECT_EQ(read.classes, classifier.classes);
+  const PointCloud other = Park(4);
+  STRATA_ASSERT_OK_AND_ASSIGN(const ClassifiedCloud before, Classify(classifier, other, Stop()));
+  STRATA_ASSERT_OK_AND_ASSIGN(const ClassifiedCloud after, Classify(read, other, Stop()));
+  EXPECT_EQ(before.labels, after.labels);
+  EXPECT_EQ(before.score, after.score);
+}
+
+// Bytes that were made to look intact: refused, or a classifier that can be used.
+TEST_P(ClassifierTest, HostileBytesAreRefusedOrHarmless) {
+  TrainingOptions options;
+  options.method = GetParam();
+  options.features.scales = 1;
+  options.rounds = 3;
+  options.reduction = {.kind = ReductionKind::kDepth, .depth = 7};
+  STRATA_ASSERT_OK_AND_ASSIGN(const Classifier classifier,
+                              TrainClassifier({Park(1)}, kClasses, options, NoProgress, Stop()));
+  const std::string bytes = EncodeClassifier(classifier);
+  for (std::size_t size = 0; size < bytes.size(); size += 1 + size / 16) {
+    EXPECT_FALSE(DecodeClassifier(bytes.substr(0, size)).ok()) << size;
+  }
+  const std::string body = bytes.substr(kBlobOverheadBytes - 8, bytes.size() - kBlobOverheadBytes);
+  STRATA_ASSERT_OK(DecodeClassifier(SealBlob(BlobKind::kClassifier, 1, body)).status());
+  PointCloud small;
+  for (int k = 0; k < 40; ++k) {
+    small.points.emplace_back(0.1F * static_cast<float>(k % 7), 0.1F * static_cast<float>(k), 0.0F);
+  }
+  constexpr std::uint64_t kSeed = 12;
+  SplitMix64 random(kSeed);
+  for (int run = 0; run < 2000; ++run) {
+    std::string changed = body;
+    // Where sizes stand rather than numbers, mostly.
+    const std::size_t reach = run % 2 == 0 ? std::min<std::size_t>(body.size(), 150) : body.size();
+    changed[random.Below(static_cast<std::uint32_t>(reach))] = static_cast<char>(random.Next());
+    const auto read = DecodeClassifier(SealBlob(BlobKind::kClassifier, 1, changed));
+    if (!read.ok()) continue;
+    const absl::StatusOr<ClassifiedCloud> labels = Classify(*read, small, Stop());
+    if (!labels.ok()) continue;
+    for (const ClassIndex label : labels->labels) ASSERT_LT(label, read->classes.size());
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods,
