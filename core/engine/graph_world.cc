@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
 #include "core/posegraph/information.h"
@@ -31,7 +32,7 @@ constexpr double kMatchSigmaRad = 0.001;
 absl::Status GraphWorld::ReadScans(StorageReader& reader) {
   ScanQuery query;
   query.state = ScanState::kIntegrated;
-  query.skip_damaged = true;  // it keeps its pose, and verify names it
+  query.skip_damaged = true;  // FindDamagedRows() names them
   for (bool more = true; more;) {
     STRATA_ASSIGN_OR_RETURN(std::vector<PosedScan> page, reader.ListScans(query, epoch_));
     more = page.size() == query.limit;
@@ -52,13 +53,26 @@ absl::Status GraphWorld::ReadScans(StorageReader& reader) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<GraphWorld> GraphWorld::Read(MapCore& core) {
+absl::Status GraphWorld::FindDamagedRows(StorageReader& reader, DamagedScans& damaged) const {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<ScanNumber> numbers, reader.ListScanNumbers());
+  for (const ScanNumber number : numbers) {
+    if (nodes_.contains(number)) continue;
+    const absl::Status read = reader.GetScan(number, epoch_).status();
+    if (!damaged.LeaveOut(number, absl::StrCat("row ", number), read)) {
+      STRATA_RETURN_IF_ERROR(read);
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<GraphWorld> GraphWorld::Read(MapCore& core, DamagedScans* damaged) {
   GraphWorld world;
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
   STRATA_RETURN_IF_ERROR(reader->Snapshot([&]() -> absl::Status {
     STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());
     world.epoch_ = clock.epoch;
     STRATA_RETURN_IF_ERROR(world.ReadScans(*reader));
+    if (damaged != nullptr) STRATA_RETURN_IF_ERROR(world.FindDamagedRows(*reader, *damaged));
     STRATA_ASSIGN_OR_RETURN(world.constraints_, reader->ListConstraints(clock.epoch));
     STRATA_ASSIGN_OR_RETURN(world.planes_, reader->ListPlanes(clock.epoch));
     return absl::OkStatus();

@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/engine/damaged_scans.h"
 #include "core/engine/map_core.h"
 #include "core/engine/optimize_settings.h"
 #include "core/posegraph/alignment.h"
@@ -19,7 +20,8 @@ namespace strata {
 // One epoch as it was when read. Immutable.
 class GraphWorld {
  public:
-  static absl::StatusOr<GraphWorld> Read(MapCore& core);
+  // Scans whose rows are damaged are left out, and put into `damaged` unless it is nullptr.
+  static absl::StatusOr<GraphWorld> Read(MapCore& core, DamagedScans* damaged = nullptr);
 
   std::uint64_t epoch() const { return epoch_; }
   std::size_t size() const { return scans_.size(); }
@@ -41,6 +43,7 @@ class GraphWorld {
 
  private:
   absl::Status ReadScans(StorageReader& reader);
+  absl::Status FindDamagedRows(StorageReader& reader, DamagedScans& damaged) const;
 
   std::uint64_t epoch_ = 0;
   std::vector<ScanRecord> scans_;
