@@ -331,58 +331,6 @@ Eigen::VectorXd BlockCholesky::Solve(const Eigen::VectorXd& b) const {
   return result;
 }
 
-// With the factor [L11 0; L21 L22] of a supernode and the rows below it, and Z the inverse:
-// Z21 = −Z22 L21 L11⁻¹ and Z11 = (L11 L11ᵀ)⁻¹ − (L21 L11⁻¹)ᵀ Z21 (Takahashi et al. 1973). Z22 lies
-// in the supernodes above, all of it, because they have these rows too.
-Eigen::MatrixXd BlockCholesky::InverseDiagonal() const {
-  const Eigen::Index size = block_size_;
-  std::vector<Eigen::MatrixXd> inverse(supernodes_.size());  // as Supernode::factor
-  Eigen::MatrixXd diagonal(ToIndex(row_.size()) * size, size);
-  for (std::size_t s = supernodes_.size(); s-- > 0;) {
-    const Supernode& node = supernodes_[s];
-    const Eigen::Index columns = node.factor.cols();
-    const auto L11 = node.factor.topRows(columns).triangularView<Eigen::Lower>();
-    Eigen::MatrixXd own = L11.solve(Eigen::MatrixXd::Identity(columns, columns));
-    own = (own.transpose() * own).eval();
-    Eigen::MatrixXd below = node.factor.bottomRows(node.factor.rows() - columns);
-    L11.solveInPlace<Eigen::OnTheRight>(below);
-    const Eigen::MatrixXd mixed = -InverseBelow(node, inverse) * below;
-    own.noalias() -= below.transpose() * mixed;
-    inverse[s].resize(node.factor.rows(), columns);
-    inverse[s] << own, mixed;
-    for (std::size_t c = node.begin; c < node.end; ++c) {
-      const Eigen::Index k = ToIndex(c - node.begin) * size;
-      diagonal.middleRows(ToIndex(row_[c]) * size, size) = own.block(k, k, size, size);
-    }
-  }
-  return diagonal;
-}
-
-Eigen::MatrixXd BlockCholesky::InverseBelow(const Supernode& node,
-                                            const std::vector<Eigen::MatrixXd>& inverse) const {
-  const Eigen::Index size = block_size_;
-  const Eigen::Index rows = ToIndex(node.below.size()) * size;
-  Eigen::MatrixXd Z(rows, rows);
-  for (std::size_t b = 0; b < node.below.size(); ++b) {
-    const std::size_t s = supernode_of_[node.below[b]];
-    const Supernode& above = supernodes_[s];
-    const Eigen::Index column = ToIndex(node.below[b] - above.begin) * size;
-    auto next = above.below.begin();
-    for (std::size_t a = b; a < node.below.size(); ++a) {
-      const std::size_t row = node.below[a];
-      std::size_t place = row - above.begin;
-      if (row >= above.end) {
-        next = std::lower_bound(next, above.below.end(), row);
-        place = above.end - above.begin + static_cast<std::size_t>(next - above.below.begin());
-      }
-      const auto block = inverse[s].block(ToIndex(place) * size, column, size, size);
-      Z.block(ToIndex(a) * size, ToIndex(b) * size, size, size) = block;
-      if (a != b) Z.block(ToIndex(b) * size, ToIndex(a) * size, size, size) = block.transpose();
-    }
-  }
-  return Z;
-}
-
 std::size_t BlockCholesky::factor_blocks() const {
   std::size_t blocks = 0;
   for (const Supernode& node : supernodes_) {
