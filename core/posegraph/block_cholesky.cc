@@ -278,8 +278,20 @@ bool BlockCholesky::Eliminate(Supernode& node) {
   diagonal.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(rest);
   Eigen::Map<Eigen::MatrixXd> update = UpdateAt(node, node.made);
   update.selfadjointView<Eigen::Lower>().rankUpdate(rest, -1.0);
-  std::copy(update.data(), update.data() + update.size(), stack_.data() + node.kept);
+  if (node.kept != node.made) KeepUpdate(node);
   return true;
+}
+
+// Down to where the children's updates began; only what is below the diagonal is ever read.
+void BlockCholesky::KeepUpdate(const Supernode& node) {
+  const std::size_t rows = node.below.size() * static_cast<std::size_t>(block_size_);
+  for (std::size_t j = 0; j < rows; ++j) {
+    const auto from = stack_.begin() + static_cast<std::ptrdiff_t>(node.made + j * rows);
+    const auto to = stack_.begin() + static_cast<std::ptrdiff_t>(node.kept + j * rows);
+    std::copy(from + static_cast<std::ptrdiff_t>(j),
+              from + static_cast<std::ptrdiff_t>(rows),
+              to + static_cast<std::ptrdiff_t>(j));
+  }
 }
 
 bool BlockCholesky::Factor(const Eigen::VectorXd& damping) {
@@ -288,7 +300,7 @@ bool BlockCholesky::Factor(const Eigen::VectorXd& damping) {
     for (std::size_t c = 0; c < columns; ++c) local_[node.begin + c] = c;
     for (std::size_t k = 0; k < node.below.size(); ++k) local_[node.below[k]] = columns + k;
     node.factor.setZero();
-    UpdateAt(node, node.made).setZero();
+    UpdateAt(node, node.made).triangularView<Eigen::Lower>().setZero();
     AssembleValues(damping, node);
     for (const std::size_t c : node.children) AssembleChild(supernodes_[c], node);
     if (!Eliminate(node)) return false;

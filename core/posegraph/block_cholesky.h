@@ -64,6 +64,7 @@ class BlockCholesky {
   Eigen::Map<Eigen::MatrixXd> UpdateAt(const Supernode& node, std::size_t place);
   void AssembleChild(const Supernode& child, Supernode& node);
   bool Eliminate(Supernode& node);
+  void KeepUpdate(const Supernode& node);
 
   int block_size_;
   std::vector<std::size_t> position_;  // in the elimination order, of each row
