@@ -50,7 +50,7 @@ build() {
 
 start_server() {
   step "server"
-  stratad --data "$work/data" --listen 127.0.0.1:0 >"$work/listening" 2>"$out/stratad.log" &
+  stratad --data "$work/data" --listen 127.0.0.1:0 --optimize-every 0 >"$work/listening" 2>"$out/stratad.log" &
   server=$!
   local address=
   for _ in $(seq 200); do

@@ -7,6 +7,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/time/time.h"
 #include <CLI/CLI.hpp>
 #include <glog/logging.h>
 #include <pthread.h>
@@ -32,6 +33,16 @@ sigset_t BlockSignals() {
   return signals;
 }
 
+CLI::Validator SecondsUpTo(double most) {
+  return CLI::Validator(
+      [most](const std::string& text) {
+        double seconds = 0.0;
+        const bool good = absl::SimpleAtod(text, &seconds) && seconds >= 0.0 && seconds <= most;
+        return good ? std::string() : absl::StrCat("expected 0 to ", most, " seconds, got ", text);
+      },
+      "");
+}
+
 absl::Status Serve(const EngineOptions& engine_options,
                    const server::ServerOptions& server_options,
                    const sigset_t& signals) {
@@ -45,7 +56,8 @@ absl::Status Serve(const EngineOptions& engine_options,
             << " listen=" << server->address() << " query_threads=" << server_options.query_threads
             << " stream_threads=" << server_options.stream_threads
             << " upload_threads=" << server_options.upload_threads
-            << " max_calls=" << server_options.max_calls;
+            << " max_calls=" << server_options.max_calls
+            << " optimize_every=" << engine_options.optimize_interval;
   int signal = 0;
   sigwait(&signals, &signal);
   LOG(INFO) << "event=shutdown signal=" << signal;
@@ -60,6 +72,7 @@ int Main(int argc, char** argv) {
       "Example:\n  stratad --data ./maps --listen 127.0.0.1:50051");
   EngineOptions engine_options;
   server::ServerOptions options;
+  double optimize_every_s = 60.0;
   double drain_s = absl::ToDoubleSeconds(options.drain_timeout);
   std::string directory;
   app.set_version_flag("--version", absl::StrCat("stratad ", STRATA_VERSION));
@@ -77,12 +90,15 @@ int Main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--max-calls", options.max_calls, "Calls under way before clients are sent away")
       ->capture_default_str();
+  app.add_option(
+         "--optimize-every",
+         optimize_every_s,
+         "After a loop was closed, and at most so often [s], optimize a map's poses without "
+         "being asked; 0: never")
+      ->check(SecondsUpTo(86400.0))
+      ->capture_default_str();
   app.add_option("--drain", drain_s, "Seconds that calls may take to end at shutdown")
-      ->check([](const std::string& text) {
-        double seconds = 0.0;
-        const bool good = absl::SimpleAtod(text, &seconds) && seconds >= 0.0 && seconds <= 3600.0;
-        return good ? std::string() : "expected 0 to 3600 seconds, got " + text;
-      })
+      ->check(SecondsUpTo(3600.0))
       ->capture_default_str();
   try {
     app.parse(argc, argv);
@@ -90,6 +106,7 @@ int Main(int argc, char** argv) {
     return app.exit(e) == 0 ? 0 : kUsage;
   }
   engine_options.directory = directory;
+  engine_options.optimize_interval = absl::Seconds(optimize_every_s);
   options.drain_timeout = absl::Seconds(drain_s);
 
   FLAGS_logtostderr = true;

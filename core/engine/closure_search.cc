@@ -33,11 +33,13 @@ class Searcher {
  public:
   Searcher(const GraphWorld& world,
            ScanViews& views,
+           std::size_t first_new,
            const OptimizeSettings& settings,
            int threads,
            JobContext& context)
       : world_(world),
         views_(views),
+        first_new_(first_new),
         settings_(settings),
         threads_(threads),
         context_(context),
@@ -120,7 +122,8 @@ class Searcher {
     STRATA_ASSIGN_OR_RETURN(std::vector<ClosureCandidate> candidates,
                             FindClosureCandidates(nodes, edges, alike_));
     std::erase_if(candidates, [this](const ClosureCandidate& candidate) {
-      return !tried_.insert({candidate.i, candidate.j}).second;
+      return std::max(candidate.i, candidate.j) < first_new_ ||
+             !tried_.insert({candidate.i, candidate.j}).second;
     });
     return candidates;
   }
@@ -238,6 +241,7 @@ class Searcher {
 
   const GraphWorld& world_;
   ScanViews& views_;
+  const std::size_t first_new_;
   const OptimizeSettings& settings_;
   const int threads_;
   JobContext& context_;
@@ -255,11 +259,12 @@ class Searcher {
 
 absl::StatusOr<ClosureSearch> SearchClosures(const GraphWorld& world,
                                              ScanViews& views,
+                                             std::size_t first_new,
                                              const OptimizeSettings& settings,
                                              int threads,
                                              JobContext& context) {
   if (world.size() == 0) return ClosureSearch();
-  return Searcher(world, views, settings, threads, context).Run();
+  return Searcher(world, views, first_new, settings, threads, context).Run();
 }
 
 }  // namespace strata

@@ -31,9 +31,10 @@ struct ClosureSearch {
 
 // Candidates by the uncertainty of relative poses and by what places look like; each verified by
 // registration, and all by the graph and by each other. Closing one moves the poses, which makes
-// others likely: so until none is found any more.
+// others likely: so until none is found any more. Only pairs with a node from `first_new` on.
 absl::StatusOr<ClosureSearch> SearchClosures(const GraphWorld& world,
                                              ScanViews& views,
+                                             std::size_t first_new,
                                              const OptimizeSettings& settings,
                                              int threads,
                                              JobContext& context);

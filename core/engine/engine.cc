@@ -55,6 +55,10 @@ absl::Status EngineOptions::Validate() const {
   if (max_batch_scans < 1 || max_batch_scans > 1000) {
     faults.push_back(absl::StrCat("max_batch_scans = ", max_batch_scans, " is not in [1, 1000]"));
   }
+  if (optimize_interval < absl::ZeroDuration()) {
+    faults.push_back(absl::StrCat(
+        "optimize_interval = ", absl::FormatDuration(optimize_interval), " is negative"));
+  }
   if (faults.empty()) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat("engine: ", absl::StrJoin(faults, "; ")));
 }

@@ -9,6 +9,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/time/time.h"
 
 #include "core/api/database.h"
 
@@ -34,6 +35,9 @@ struct EngineOptions {
   // Scans integrated in one transaction when there is a backlog; at least 1. Tiles do not depend on
   // it.
   int max_batch_scans = 16;
+  // After a verified closure, and at most so often, a map's poses are optimised without being
+  // asked; zero: never.
+  absl::Duration optimize_interval = absl::ZeroDuration();
 
   // INVALID_ARGUMENT naming every field out of its range.
   absl::Status Validate() const;

@@ -223,17 +223,10 @@ absl::Status JobBoard::Watch(const Stop& stop,
   }
 }
 
-bool JobBoard::AnyRunning() const {
+bool JobBoard::AnyIn(JobState state) const {
   absl::MutexLock lock(&mutex_);
-  return std::any_of(jobs_.begin(), jobs_.end(), [](const auto& entry) {
-    return entry.second.info.state == JobState::kRunning;
-  });
-}
-
-bool JobBoard::AnyQueued() const {
-  absl::MutexLock lock(&mutex_);
-  return std::any_of(jobs_.begin(), jobs_.end(), [](const auto& entry) {
-    return entry.second.info.state == JobState::kQueued;
+  return std::any_of(jobs_.begin(), jobs_.end(), [state](const auto& entry) {
+    return entry.second.info.state == state;
   });
 }
 

@@ -74,8 +74,7 @@ class JobBoard {
   absl::Status Watch(const Stop& stop,
                      std::uint64_t id,
                      absl::FunctionRef<absl::Status(const JobInfo&)> sink) const;
-  bool AnyRunning() const;
-  bool AnyQueued() const;
+  bool AnyIn(JobState state) const;
 
   // Runs the first queued job, if any, and records how it ended. A job that ends because `closing`
   // was requested stays queued for the next start; one whose state cannot be stored stays queued

@@ -1,6 +1,10 @@
 #include "core/engine/job_runner.h"
 
-#include "absl/strings/str_cat.h"
+#include <algorithm>
+#include <cstddef>
+
+#include "absl/status/statusor.h"
+#include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include <glog/logging.h>
 
@@ -19,13 +23,20 @@ constexpr absl::Duration kRetryDelay = absl::Seconds(1);
 }  // namespace
 
 JobRunner::JobRunner(MapCore& core, JobBoard& jobs, Worker& worker)
-    : core_(core), jobs_(jobs), worker_(worker), job_waits_(jobs.AnyQueued()), thread_([this] {
-        Loop();
-      }) {}
+    : core_(core),
+      jobs_(jobs),
+      worker_(worker),
+      closures_(core),
+      job_waits_(jobs.AnyIn(JobState::kQueued)),
+      next_look_(core.options().optimize_interval > absl::ZeroDuration()
+                     ? absl::Now() + core.options().optimize_interval
+                     : absl::InfiniteFuture()),
+      thread_([this] { Loop(); }) {}
 
 void JobRunner::JobQueued() {
   absl::MutexLock lock(&mutex_);
   job_waits_ = true;
+  look_.Request();
 }
 
 absl::Status JobRunner::Run(const JobInfo& job, JobContext& context) {
@@ -36,27 +47,69 @@ absl::Status JobRunner::Run(const JobInfo& job, JobContext& context) {
   });
 }
 
+JobRunner::Step JobRunner::NextStep() {
+  absl::MutexLock lock(&mutex_);
+  mutex_.AwaitWithDeadline(absl::Condition(this, &JobRunner::HasWork), next_look_);
+  if (closed_) return Step::kClosed;
+  if (job_waits_) return Step::kJob;
+  look_ = Stop();
+  return Step::kLook;
+}
+
 void JobRunner::Loop() {
   while (true) {
-    {
-      absl::MutexLock lock(&mutex_);
-      mutex_.Await(absl::Condition(this, &JobRunner::HasWork));
-      if (closed_) return;
-    }
-    const absl::Status done = jobs_.RunNext(
-        closing_, [this](const JobInfo& job, JobContext& context) { return Run(job, context); });
-    absl::MutexLock lock(&mutex_);
-    job_waits_ = jobs_.AnyQueued();
-    if (done.ok()) continue;
-    LOG(ERROR) << "map=" << core_.name() << " job: " << done.message();
-    mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
+    const Step step = NextStep();
+    if (step == Step::kClosed) return;
+    const absl::Time begun = absl::Now();
+    step == Step::kJob ? RunJob() : LookForClosures();
+    PlanNextLook(begun);
   }
+}
+
+void JobRunner::RunJob() {
+  const absl::Status done = jobs_.RunNext(
+      closing_, [this](const JobInfo& job, JobContext& context) { return Run(job, context); });
+  absl::MutexLock lock(&mutex_);
+  job_waits_ = jobs_.AnyIn(JobState::kQueued);
+  if (done.ok()) return;
+  LOG(ERROR) << "map=" << core_.name() << " job: " << done.message();
+  mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
+}
+
+void JobRunner::LookForClosures() {
+  // Somebody has still to decide about a proposal, which another epoch would make worthless.
+  if (jobs_.AnyIn(JobState::kProposed)) return;
+  Stop stop;
+  {
+    absl::MutexLock lock(&mutex_);
+    stop = look_;
+  }
+  const absl::StatusOr<std::size_t> found = closures_.Look(stop);
+  absl::Status done = found.status();
+  if (found.ok() && *found > 0) {
+    LOG(INFO) << "map=" << core_.name() << " event=closures found=" << *found;
+    done = jobs_.Start(closing_, kOptimizeJob, {{"automatic", "1"}}).status();
+    absl::MutexLock lock(&mutex_);
+    job_waits_ = jobs_.AnyIn(JobState::kQueued);
+  }
+  if (!done.ok() && !absl::IsCancelled(done)) {
+    LOG(ERROR) << "map=" << core_.name() << " looking for closures: " << done.message();
+  }
+}
+
+void JobRunner::PlanNextLook(absl::Time begun) {
+  const absl::Duration interval = core_.options().optimize_interval;
+  if (interval == absl::ZeroDuration()) return;
+  const absl::Time now = absl::Now();
+  absl::MutexLock lock(&mutex_);
+  next_look_ = now + std::max(interval, now - begun);
 }
 
 void JobRunner::Close() {
   {
     absl::MutexLock lock(&mutex_);
     closed_ = true;
+    look_.Request();
   }
   closing_.Request();
   if (thread_.joinable()) thread_.join();

@@ -1,5 +1,6 @@
-// The thread behind a map that runs its jobs, one at a time. What changes derived data is handed to
-// the worker; the rest runs beside uploads, integration and reads.
+// The thread behind a map that runs its jobs, one at a time, and between them looks whether one is
+// due that nobody asked for. What changes derived data is handed to the worker; the rest runs
+// beside uploads, integration and reads.
 #ifndef STRATA_CORE_ENGINE_JOB_RUNNER_H_
 #define STRATA_CORE_ENGINE_JOB_RUNNER_H_
 
@@ -8,8 +9,10 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
 
 #include "core/common/stop.h"
+#include "core/engine/closure_watch.h"
 #include "core/engine/job_board.h"
 #include "core/engine/map_core.h"
 #include "core/engine/worker.h"
@@ -31,17 +34,28 @@ class JobRunner {
   void Close();
 
  private:
+  enum class Step { kClosed, kJob, kLook };
   void Loop();
   bool HasWork() const ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return closed_ || job_waits_; }
+  // Waits until there is something to do.
+  Step NextStep();
+  void RunJob();
   absl::Status Run(const JobInfo& job, JobContext& context);
+  // Queues an optimize job if closures were found.
+  void LookForClosures();
+  // After something that began at `begun`: leaves at least as much time to others.
+  void PlanNextLook(absl::Time begun);
 
   MapCore& core_;
   JobBoard& jobs_;
   Worker& worker_;
+  ClosureWatch closures_;  // the thread's
   const Stop closing_;
   absl::Mutex mutex_;
   bool job_waits_ ABSL_GUARDED_BY(mutex_);
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+  absl::Time next_look_ ABSL_GUARDED_BY(mutex_);
+  Stop look_ ABSL_GUARDED_BY(mutex_);  // ends the look under way
   std::thread thread_;
 };
 

@@ -89,7 +89,7 @@ absl::StatusOr<std::shared_ptr<Map>> EngineMaps::Withdraw(absl::string_view name
   std::shared_ptr<Map> map;
   if (it->second.ok()) {
     map = *it->second;
-    if (map->jobs().AnyRunning()) {
+    if (map->jobs().AnyIn(JobState::kRunning)) {
       return absl::FailedPreconditionError(
           absl::StrCat("map ", it->first, ": a job is running; cancel it first"));
     }

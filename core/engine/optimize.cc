@@ -68,7 +68,7 @@ class Optimizer {
     if (settings_.closures) {
       PartOfJob part(context_, 0.0, kClosuresEnd);
       STRATA_ASSIGN_OR_RETURN(ClosureSearch search,
-                              SearchClosures(world, views, settings_, threads(), part));
+                              SearchClosures(world, views, 0, settings_, threads(), part));
       closures = std::move(search.closures);
       start = std::move(search.T_map_scan);
       context_.SetMetric("closures_tried", static_cast<double>(search.tried));

@@ -62,7 +62,8 @@ std::map<std::string, Parameter> ParametersOf(OptimizeSettings& settings) {
           {"local_weight", {Real(settings.local_weight, 1e-6, 1.0 - 1e-6), "in (0, 1)"}},
           {"tolerance_m", {Real(settings.tolerance.translation_m, 0.0, 1.0), "in [0, 1]"}},
           {"tolerance_rad", {Real(settings.tolerance.rotation_rad, 0.0, 1.0), "in [0, 1]"}},
-          {"threads", {Whole(settings.threads, 64), "in [1, 64]"}}};
+          {"threads", {Whole(settings.threads, 64), "in [1, 64]"}},
+          {"automatic", {Flag(settings.automatic), "0 or 1"}}};
 }
 
 }  // namespace

@@ -25,6 +25,8 @@ struct OptimizeSettings {
   double local_weight = 0.5;                     // of local_global; (0, 1)
   MoveTolerance tolerance;                       // tolerance_m, tolerance_rad; [0, 1]
   int threads = 0;                               // [1, 64]; 0: the engine's
+  // Tells people that nobody asked for the job: a closure was verified.
+  bool automatic = false;
 };
 
 // INVALID_ARGUMENT naming the parameter, its value and what it may be.
