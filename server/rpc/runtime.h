@@ -51,9 +51,9 @@ struct Runtime {
   Runtime(api::Database& database, const RuntimeOptions& runtime_options)
       : db(database),
         options(runtime_options),
-        queries(runtime_options.query_threads),
-        streams(runtime_options.stream_threads),
-        uploads(runtime_options.upload_threads) {}
+        queries(runtime_options.query_threads, "query"),
+        streams(runtime_options.stream_threads, "stream"),
+        uploads(runtime_options.upload_threads, "upload") {}
 
   api::Database& db;
   const RuntimeOptions options;

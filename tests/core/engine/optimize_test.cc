@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -207,6 +208,44 @@ TEST_F(OptimizeTest, AProposalOfAnOldWorldIsNotApplied) {
   EXPECT_THAT(failed.message, HasSubstr("epoch"));
   EXPECT_EQ(Digest(), digest);
   ExpectEqual(Poses(), poses);
+}
+
+TEST_F(OptimizeTest, AJobThatWasKilledAfterItsEpochMakesNoSecondOne) {
+  for (const bool dry_run : {false, true}) {
+    SCOPED_TRACE(dry_run);
+    const std::string map = dry_run ? "proposed" : kMapName;
+    MakeMap(MapParameters(), map);
+    for (std::uint64_t k = 1; k <= 3; ++k) UploadScan(k, SaidOf(k), map);
+    WaitIntegrated(db(), map);
+    STRATA_ASSERT_OK_AND_ASSIGN(
+        JobInfo job,
+        db().jobs().Start(
+            {}, map, "optimize", {{"closures", "0"}, {"dry_run", dry_run ? "1" : "0"}}));
+    const auto follow = [&] {
+      return db().jobs().Watch({}, map, job.id, [&job](const JobInfo& info) {
+        job = info;
+        return absl::OkStatus();
+      });
+    };
+    STRATA_ASSERT_OK(follow());
+    if (dry_run) {
+      STRATA_ASSERT_OK(db().jobs().Accept({}, map, job.id));
+      STRATA_ASSERT_OK(follow());
+    }
+    ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
+    const MapStats made = WaitIntegrated(db(), map);
+    EXPECT_EQ(made.epoch, 2U);
+    Close();  // as if it had not come to say so
+    Sql(absl::StrCat("UPDATE truth_job SET state = 2 WHERE id = ", job.id), map);
+    Reopen();
+    STRATA_ASSERT_OK(follow());
+    EXPECT_EQ(job.state, JobState::kSucceeded) << job.message;
+    EXPECT_EQ(WaitIntegrated(db(), map).epoch, made.epoch);
+    EXPECT_EQ(WaitIntegrated(db(), map).content_digest, made.content_digest);
+    STRATA_ASSERT_OK_AND_ASSIGN(job, db().jobs().Revert({}, map, job.id));
+    STRATA_ASSERT_OK(follow());
+    EXPECT_THAT(job.message, HasSubstr("epoch 1 are back"));
+  }
 }
 
 TEST_F(OptimizeTest, AForgottenProposalLeavesNothing) {
