@@ -81,6 +81,7 @@ Json ToJson(const Constraint& constraint) {
           {"j", constraint.j.ToString()},
           {"origin", ToString(constraint.origin)},
           {"enabled", constraint.enabled},
+          {"may_be_false", constraint.may_be_false},
           {"pose", ToJson(constraint.T_i_j)},
           {"information", ToJson(constraint.information)},
           {"note", constraint.note}};

@@ -102,20 +102,12 @@ class Searcher {
     return absl::OkStatus();
   }
 
-  std::vector<GraphEdge> Edges() const {
-    std::vector<GraphEdge> edges;
-    for (const RelativePoseTerm& term : measured_.relative) {
-      edges.push_back({term.i, term.j, term.information});
-    }
-    return edges;
-  }
-
   absl::StatusOr<std::vector<ClosureCandidate>> Candidates() {
     std::vector<ClosureNode> nodes;
     for (std::size_t k = 0; k < world_.size(); ++k) {
       nodes.push_back({search_.T_map_scan[k], static_cast<std::uint32_t>(trajectory_of_[k])});
     }
-    std::vector<GraphEdge> edges = Edges();
+    std::vector<GraphEdge> edges = measured_.edges;
     for (const FoundClosure& closure : search_.closures) {
       edges.push_back({closure.i, closure.j, closure.information});
     }
@@ -213,14 +205,14 @@ class Searcher {
       closures.push_back({found.i, found.j, found.T_i_j, kMatchSigmaM, kMatchSigmaRad});
     }
     STRATA_ASSIGN_OR_RETURN(const ConsistentClosureSet consistent,
-                            ConsistentClosures(world_.Poses(), Edges(), closures));
+                            ConsistentClosures(world_.Poses(), measured_.edges, closures));
     search_.closures.clear();
     for (const std::size_t k : consistent.kept) search_.closures.push_back(matched_[k]);
     return absl::OkStatus();
   }
 
   absl::Status CloseLoops() {
-    PoseGraphProblem graph = measured_;
+    PoseGraphProblem graph = measured_.graph;
     for (const FoundClosure& closure : search_.closures) {
       graph.relative.push_back(
           {closure.i, closure.j, closure.T_i_j, closure.information, settings_.robust});
@@ -245,7 +237,7 @@ class Searcher {
   const OptimizeSettings& settings_;
   const int threads_;
   JobContext& context_;
-  const PoseGraphProblem measured_;
+  const MeasuredGraph measured_;
   std::vector<std::size_t> trajectory_of_;  // of every node
   std::vector<std::size_t> place_in_;       // of every node in its trajectory
   std::vector<AlikePair> alike_;

@@ -102,8 +102,9 @@ AlignmentProblem GraphWorld::Problem(const OptimizeSettings& settings) const {
     if (!constraint.enabled) {
       problem.excluded_pairs.emplace_back(i, j);
     } else if (constraint.origin == ConstraintOrigin::kPerson) {
-      problem.relative.push_back({i, j, constraint.T_i_j, constraint.information, false});
-      held[std::max(i, j)] = true;
+      const bool suspect = constraint.may_be_false && settings.robust;
+      problem.relative.push_back({i, j, constraint.T_i_j, constraint.information, suspect});
+      if (!suspect) held[std::max(i, j)] = true;
     } else {
       const bool closure = constraint.origin == ConstraintOrigin::kOptimize;
       ScanPair& pair = problem.pairs.emplace_back(ScanPair{i, j, closure && settings.robust});
@@ -127,12 +128,16 @@ AlignmentProblem GraphWorld::Problem(const OptimizeSettings& settings) const {
   return problem;
 }
 
-PoseGraphProblem GraphWorld::Measured(const OptimizeSettings& settings) const {
+MeasuredGraph GraphWorld::Measured(const OptimizeSettings& settings) const {
   const AlignmentProblem problem = Problem(settings);
-  PoseGraphProblem graph;
+  MeasuredGraph measured;
+  PoseGraphProblem& graph = measured.graph;
   graph.T_map_scan = poses_;
   graph.relative = problem.relative;
   graph.priors = problem.priors;
+  for (const RelativePoseTerm& term : problem.relative) {
+    if (!term.may_be_false) measured.edges.push_back({term.i, term.j, term.information});
+  }
   std::map<std::pair<std::size_t, std::size_t>, const ConstraintRecord*> recorded;
   for (const ConstraintRecord& record : constraints_) {
     if (record.constraint.is_prior()) continue;
@@ -150,9 +155,10 @@ PoseGraphProblem GraphWorld::Measured(const OptimizeSettings& settings) const {
       term.T_i_j = poses_[pair.i].inverse() * poses_[pair.j];
       term.information = IsotropicInformation(pair.sigma_rad, pair.sigma_m);
     }
+    measured.edges.push_back({term.i, term.j, term.information});
     graph.relative.push_back(std::move(term));
   }
-  return graph;
+  return measured;
 }
 
 PlaneRecord GraphWorld::RecordOf(const SharedPlane& plane) const {

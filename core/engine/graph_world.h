@@ -13,9 +13,18 @@
 #include "core/engine/map_core.h"
 #include "core/engine/optimize_settings.h"
 #include "core/posegraph/alignment.h"
+#include "core/posegraph/path_uncertainty.h"
 #include "core/storage/storage.h"
 
 namespace strata {
+
+// A graph as it was measured, for scans that have drifted apart.
+struct MeasuredGraph {
+  PoseGraphProblem graph;
+  // What it says of two scans, without what was given as maybe false and nothing has checked: drift
+  // along these is what closures are looked for and judged by.
+  std::vector<GraphEdge> edges;
+};
 
 // One epoch as it was when read. Immutable.
 class GraphWorld {
@@ -35,8 +44,8 @@ class GraphWorld {
   // What is enabled: pairs to register, constraints as they are, priors. Scans that follow each
   // other on a trajectory and are held by nothing else are a pair too.
   AlignmentProblem Problem(const OptimizeSettings& settings) const;
-  // The same as measured when it was recorded, for a graph that has drifted apart.
-  PoseGraphProblem Measured(const OptimizeSettings& settings) const;
+  // The same as measured when it was recorded.
+  MeasuredGraph Measured(const OptimizeSettings& settings) const;
 
   PlaneRecord RecordOf(const SharedPlane& plane) const;
   std::vector<PlaneRecord> DisabledPlanes() const;

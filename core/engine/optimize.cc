@@ -190,7 +190,7 @@ class Optimizer {
     context_.SetMetric("settled", result.termination == AlignmentTermination::kSettled ? 1.0 : 0.0);
     context_.SetMetric("scans", static_cast<double>(world.size()));
     context_.SetMetric("planes", static_cast<double>(result.planes.size()));
-    context_.SetMetric("matches_rejected", static_cast<double>(result.rejected.size()));
+    ReportRejected(world, result);
     double squares = 0.0;
     double largest = 0.0;
     for (std::size_t k = 0; k < world.size(); ++k) {
@@ -211,6 +211,29 @@ class Optimizer {
         largest,
         result.termination == AlignmentTermination::kSettled ? "settled" : "not settled",
         result.rounds.size());
+  }
+
+  // How many, and the worst by name.
+  void ReportRejected(const GraphWorld& world, const AlignmentResult& result) {
+    constexpr std::size_t kNamed = 20;
+    std::vector<RejectedMatch> rejected = result.rejected;
+    const auto given = std::count_if(
+        rejected.begin(), rejected.end(), [](const RejectedMatch& match) { return match.given; });
+    context_.SetMetric("constraints_rejected", static_cast<double>(given));
+    context_.SetMetric("matches_rejected",
+                       static_cast<double>(rejected.size()) - static_cast<double>(given));
+    // Constraints that a person can switch off come first.
+    std::stable_sort(rejected.begin(), rejected.end(), [](const auto& a, const auto& b) {
+      return a.given != b.given ? a.given : a.chi2 > b.chi2;
+    });
+    rejected.resize(std::min(rejected.size(), kNamed));
+    for (const RejectedMatch& match : rejected) {
+      context_.SetMetric(absl::StrCat("rejected.",
+                                      world.id(match.term.i).ToString(),
+                                      ".",
+                                      world.id(match.term.j).ToString()),
+                         match.chi2);
+    }
   }
 
   MapCore& core_;

@@ -331,9 +331,13 @@ class Alignment {
     result_.measured.clear();
     result_.rejected.clear();
     std::vector<bool> rejected(graph.relative.size(), false);
-    for (const RejectedTerm& term : solution.summary.rejected_relative) rejected[term.term] = true;
-    for (std::size_t k = problem_.relative.size(); k < graph.relative.size(); ++k) {
-      (rejected[k] ? result_.rejected : result_.measured).push_back(graph.relative[k]);
+    const std::size_t given = problem_.relative.size();
+    for (const auto& [k, chi2] : solution.summary.rejected_relative) {
+      rejected[k] = true;
+      result_.rejected.push_back({graph.relative[k], chi2, k < given});
+    }
+    for (std::size_t k = given; k < graph.relative.size(); ++k) {
+      if (!rejected[k]) result_.measured.push_back(graph.relative[k]);
     }
     for (std::size_t p = 0; p < shared_.size(); ++p) shared_[p].plane = solution.planes[p];
     result_.planes = shared_;

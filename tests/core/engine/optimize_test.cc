@@ -385,6 +385,32 @@ TEST_F(OptimizeTest, ADisabledConstraintIsNotUsed) {
   EXPECT_GT(Error(), 1.0);
 }
 
+TEST_F(OptimizeTest, AConstraintThatMayBeFalseIsRejectedByNameIfItIs) {
+  MakeWorld();
+  Constraint said;
+  said.i = {"run", 1};
+  said.j = {"run", 6};
+  said.T_i_j = TruthOf(1).inverse() * TruthOf(6);
+  said.information = 1e4 * Matrix6d::Identity();
+  said.may_be_false = true;
+  STRATA_ASSERT_OK(db().posegraph().AddConstraint({}, kMapName, said));
+  said.j.sequence = 5;
+  said.T_i_j = TruthOf(1).inverse() * TruthOf(5) * PoseAt(0.0, 2.0, 0.5);
+  STRATA_ASSERT_OK(db().posegraph().AddConstraint({}, kMapName, said));
+  const JobInfo job = Optimize({{"closures", "1"}});
+  ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
+  EXPECT_LT(Error(), 0.03);
+  EXPECT_EQ(job.metrics.at("constraints_rejected"), 1.0);
+  ASSERT_TRUE(job.metrics.contains("rejected.run/1.run/5"));
+  EXPECT_GT(job.metrics.at("rejected.run/1.run/5"), 1000.0);
+  EXPECT_FALSE(job.metrics.contains("rejected.run/1.run/6"));
+  // Without robust estimation it is believed.
+  const JobInfo naive = Optimize({{"robust", "0"}, {"rounds", "1"}});
+  ASSERT_EQ(naive.state, JobState::kSucceeded) << naive.message;
+  EXPECT_EQ(naive.metrics.at("constraints_rejected"), 0.0);
+  EXPECT_GT(Error(), 0.1);
+}
+
 TEST_F(OptimizeTest, ADisabledPlaneIsNotUsedButRemembered) {
   MakeWorld();
   ASSERT_EQ(Optimize().state, JobState::kSucceeded);
