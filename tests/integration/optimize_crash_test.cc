@@ -54,7 +54,7 @@ class OptimizeCrashTest : public ::testing::Test {
   void StartServer() {
     server_.reset();
     server_ = std::make_unique<StratadProcess>(std::vector<std::string>{
-        "--data", (directory_.path() / "maps").string(), "--listen", address_});
+        "--data", (directory_.path() / "maps").string(), "--listen", address_, "--optimize-every", "0"});
     address_ = server_->Address();
     ClientOptions options;
     options.target = address_;
