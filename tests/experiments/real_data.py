@@ -229,7 +229,7 @@ def by_itself(strata, table, data, name, folder, bound):
         jobs, deadline = [], time.time() + 120
         while not any(job["state"] == "succeeded" for job in jobs) and time.time() < deadline:
             time.sleep(0.5)
-            jobs = [job for job in own("job", "list", name)["jobs"] if job["kind"] == "optimize"]
+            jobs = [job for job in own("job", "list", name) if job["kind"] == "optimize"]
         reference = load_poses(folder / "poses_reference.txt")
         uploaded = sorted(load_poses(folder / "poses_initial.txt"))
         after = ate([T for _, T in own.poses(name)], [reference[i][1] for i in uploaded])
