@@ -119,6 +119,10 @@ void PlanReader::Step(api::Database& db, const api::Call& call) {
 absl::Status Watcher::Take(const api::MapUpdate& update) {
   last_.Saw(update.epoch);
   EXPECT_GE(update.commit_sequence, resume_.since);
+  if (update.whole) {
+    scans_.clear();
+    tiles_.clear();
+  }
   resume_.since = update.commit_sequence;
   resume_.epoch = update.epoch;
   for (const api::ScanChange& scan : update.scans) {
