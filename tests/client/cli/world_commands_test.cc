@@ -217,23 +217,6 @@ TEST_F(WorldCommandsTest, AnEndedWatchSaysWhereItGoesOn) {
   EXPECT_THAT(talk_.str(), HasSubstr("--since 40"));
 }
 
-TEST_F(WorldCommandsTest, AWatchWaitsForAServerThatIsAway) {
-  EXPECT_CALL(db_.maps(), Watch(_, _, _, _))
-      .WillOnce([](auto&, auto, auto&, auto sink) {
-        api::MapUpdate update;
-        update.commit_sequence = 40;
-        update.epoch = 2;
-        EXPECT_THAT(sink(update), IsOk());
-        return absl::UnavailableError("away");
-      })
-      .WillOnce([](auto&, auto, const api::WatchOptions& options, auto) {
-        EXPECT_EQ(options.since, 40U);
-        EXPECT_EQ(options.epoch, 2U);
-        return absl::OkStatus();
-      });
-  EXPECT_THAT(Run({"map", "watch", "m", "--once"}), IsOk());
-}
-
 TEST_F(WorldCommandsTest, APoseThatIsNotKnownSaysWhy) {
   EXPECT_CALL(db_.posegraph(), LookupPose(_, absl::string_view("m"), ScanId{"run", 4}))
       .WillOnce(Return(api::PoseLookup{false, "pending behind 3 scans", Pose::Identity(), 2}));
