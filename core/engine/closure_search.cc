@@ -86,16 +86,24 @@ class Searcher {
           places[k] = *std::move(place);
           return absl::OkStatus();
         }));
+    return LookUp(places);
+  }
+
+  absl::Status LookUp(const std::vector<PlaceDescriptor>& places) {
     PlaceIndex index;
     for (std::size_t k = 0; k < places.size(); ++k) index.Add(k, places[k]);
-    for (std::size_t k = 0; k < places.size(); ++k) {
-      STRATA_RETURN_IF_ERROR(context_.stop().status());
+    std::vector<std::vector<PlaceIndex::Neighbour>> nearest(places.size());
+    STRATA_RETURN_IF_ERROR(ParallelFor(threads_, places.size(), [&](int, std::size_t k) {
       // Each pair once; scans just before are alike and tell nothing.
       const auto excluded = [&](std::uint64_t other) {
         return other >= k ||
                (trajectory_of_[other] == trajectory_of_[k] && place_in_[k] - place_in_[other] < 10);
       };
-      for (const PlaceIndex::Neighbour& near : index.Nearest(places[k], kAlikeScans, excluded)) {
+      nearest[k] = index.Nearest(places[k], kAlikeScans, excluded);
+      return context_.stop().status();
+    }));
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      for (const PlaceIndex::Neighbour& near : nearest[k]) {
         alike_.push_back({static_cast<std::size_t>(near.number), k, near.similarity});
       }
     }
