@@ -5,7 +5,8 @@
 
 Maps are made at the reference poses without alignment, on a server, and asked through the command line. An answer is
 right within 0.5 m and 0.05 rad of the reference. Queries of other recordings have no place in a map: any answer is
-wrong. --most N asks for at most N scans a row, evenly spread. Prints a table and exits 1 if an answer is wrong (77 where the data are absent). Needs python3-numpy.
+wrong. --most N asks for at most N scans a row, evenly spread. Prints a table and exits 1 if an answer is wrong (77 where
+the data are absent). Needs python3-numpy.
 
 The matcher's thresholds (core/registration/place_match.h) were set on the loops of NCLT and the hall and on simulated
 worlds; KITTI, the facade and all strangers are data that they have not seen.

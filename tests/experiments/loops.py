@@ -7,8 +7,8 @@ Drives the command line client on an embedded database, prints a table and exits
 and robots are those of tests/support/worlds.h, the noise per step and axis is 0.03 m and 0.005 rad.
 
 Each loop is optimized a second time with planted false closures: as many that they are 20 % of the closures that the
-first run found and them together, one at least, imported as constraints that may be false. The error may grow by half. Needs
-python3-numpy.
+first run found and them together, one at least, imported as constraints that may be false. The error may grow by half.
+Needs python3-numpy.
 """
 import argparse
 import json
