@@ -5,8 +5,9 @@
                                    [--peers] [--crispness]
 
 --peers adds the ATE of a chain of PCL's pairwise ICP and GICP, --crispness how well the scans agree at the uploaded
-poses, after ingest, after optimize and at the reference poses (crispness.cc). Starts stratad on port 0, drives it with the command line client as a user would, prints a table and exits 1 if a
-bound does not hold (77 where the data are absent). Needs python3-numpy.
+poses, after ingest, after optimize and at the reference poses (crispness.cc). Starts stratad on port 0, drives it with
+the command line client as a user would, prints a table and exits 1 if a bound does not hold (77 where the data are
+absent). Needs python3-numpy.
 """
 import argparse
 import json
