@@ -27,6 +27,11 @@ PlaneKind KindOf(const Eigen::Vector3d& normal) {
 constexpr double kMatchSigmaM = 0.01;
 constexpr double kMatchSigmaRad = 0.001;
 
+// Of uploaded poses from scan to scan. Nobody says how good they are; they count only where nothing
+// else does.
+constexpr double kOdometrySigmaM = 0.05;
+constexpr double kOdometrySigmaRad = 0.005;
+
 }  // namespace
 
 absl::Status GraphWorld::ReadScans(StorageReader& reader) {
@@ -84,6 +89,12 @@ absl::StatusOr<GraphWorld> GraphWorld::Read(MapCore& core, DamagedScans* damaged
   return world;
 }
 
+RelativePoseTerm GraphWorld::Odometry(std::size_t i, std::size_t j) const {
+  const Pose T_i_j =
+      Normalized(scans_[i].header.T_map_scan.inverse() * scans_[j].header.T_map_scan);
+  return {i, j, T_i_j, IsotropicInformation(kOdometrySigmaRad, kOdometrySigmaM)};
+}
+
 AlignmentProblem GraphWorld::Problem(const OptimizeSettings& settings) const {
   AlignmentProblem problem;
   problem.T_map_scan = poses_;
@@ -117,6 +128,11 @@ AlignmentProblem GraphWorld::Problem(const OptimizeSettings& settings) const {
       if (!held[trajectory[k]]) problem.pairs.push_back({trajectory[k - 1], trajectory[k]});
     }
   }
+  for (const std::vector<std::size_t>& trajectory : trajectories_) {
+    for (std::size_t k = 1; k < trajectory.size(); ++k) {
+      problem.odometry.push_back(Odometry(trajectory[k - 1], trajectory[k]));
+    }
+  }
   for (const PlaneRecord& record : planes_) {
     if (record.plane.enabled) continue;
     ExcludedPlane& excluded = problem.excluded_planes.emplace_back();
@@ -143,6 +159,7 @@ MeasuredGraph GraphWorld::Measured(const OptimizeSettings& settings) const {
     if (record.constraint.is_prior()) continue;
     recorded[{nodes_.at(record.scan_i), nodes_.at(record.scan_j)}] = &record;
   }
+  std::map<std::size_t, Matrix6d> information;  // of what was recorded as nodes came in
   for (const ScanPair& pair : problem.pairs) {
     RelativePoseTerm term{pair.i, pair.j};
     term.may_be_false = pair.may_be_false;
@@ -151,12 +168,21 @@ MeasuredGraph GraphWorld::Measured(const OptimizeSettings& settings) const {
       term.T_i_j = record->second->constraint.T_i_j;
       term.information = LoosenedInformation(record->second->constraint.information,
                                              IsotropicInformation(kMatchSigmaRad, kMatchSigmaM));
+      if (!term.may_be_false) {
+        information.insert({pair.j, Matrix6d::Zero()}).first->second += term.information;
+      }
     } else {
       term.T_i_j = poses_[pair.i].inverse() * poses_[pair.j];
       term.information = IsotropicInformation(pair.sigma_rad, pair.sigma_m);
     }
     measured.edges.push_back({term.i, term.j, term.information});
     graph.relative.push_back(std::move(term));
+  }
+  for (RelativePoseTerm odometry : problem.odometry) {
+    const auto known = information.find(odometry.j);
+    if (known == information.end()) continue;
+    odometry.information = WhereLess(known->second, odometry.information, kLooseShare);
+    if (!odometry.information.isZero()) graph.relative.push_back(odometry);
   }
   return measured;
 }

@@ -52,6 +52,8 @@ class GraphWorld {
 
  private:
   absl::Status ReadScans(StorageReader& reader);
+  // From scan to scan as uploaded.
+  RelativePoseTerm Odometry(std::size_t i, std::size_t j) const;
   absl::Status FindDamagedRows(StorageReader& reader, DamagedScans& damaged) const;
 
   std::uint64_t epoch_ = 0;

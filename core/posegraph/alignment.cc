@@ -250,6 +250,7 @@ class Alignment {
     graph.relative = problem_.relative;
     graph.relative.reserve(graph.relative.size() + kMaxPartners * round.matches);
     std::vector<bool> known(matches_.size(), false);
+    std::vector<Matrix6d> information(matches_.size(), Matrix6d::Zero());
     for (std::size_t node = 0; node < matches_.size(); ++node) {
       for (const Match& match : matches_[node]) {
         for (const auto& [i, T_i_scan] : match.T_i_scan) {
@@ -259,18 +260,18 @@ class Alignment {
                                     match.information / static_cast<double>(match.T_i_scan.size()),
                                     match.stretch.may_be_false});
         }
-        known[node] = known[node] || (match.good && !match.stretch.may_be_false);
+        if (!match.good || match.stretch.may_be_false) continue;
+        known[node] = true;
+        information[node] += match.information;
       }
       if (!MeasuredHolds(node)) continue;
       for (const ScanPair* pair : measured_[node]) {
+        const Matrix6d loosened = LoosenedInformation(
+            pair->measured->information,
+            IsotropicInformation(options_.registration_sigma_rad, options_.registration_sigma_m));
         graph.relative.push_back(
-            {pair->i,
-             node,
-             pair->measured->T_i_j,
-             LoosenedInformation(pair->measured->information,
-                                 IsotropicInformation(options_.registration_sigma_rad,
-                                                      options_.registration_sigma_m)),
-             pair->may_be_false});
+            {pair->i, node, pair->measured->T_i_j, loosened, pair->may_be_false});
+        information[node] += loosened;
       }
       known[node] = true;
     }
@@ -281,6 +282,11 @@ class Alignment {
            pair.j,
            Normalized(problem_.T_map_scan[pair.i].inverse() * problem_.T_map_scan[pair.j]),
            IsotropicInformation(pair.sigma_rad, pair.sigma_m)});
+    }
+    for (RelativePoseTerm odometry : problem_.odometry) {
+      if (!known[odometry.j]) continue;
+      odometry.information = WhereLess(information[odometry.j], odometry.information, kLooseShare);
+      if (!odometry.information.isZero()) graph.relative.push_back(odometry);
     }
     return graph;
   }

@@ -58,6 +58,9 @@ struct ScanPair {
   std::optional<MeasuredPose> measured = std::nullopt;
 };
 
+// Registration leaves loose what it knows less than this many times as well as odometry.
+inline constexpr double kLooseShare = 4.0;
+
 // A plane that must not be used where these scans support it.
 struct ExcludedPlane {
   Plane plane_map;
@@ -72,6 +75,9 @@ struct AlignmentProblem {
   std::vector<ScanPair> pairs;  // known to overlap, however far apart they seem
   // That stay as they are: what a person said. Those that may be false are rejected as matches are.
   std::vector<RelativePoseTerm> relative;
+  // What robots say of their motion from i to j. Used in directions that registration leaves
+  // loose: on a floor with nothing on it, say, it knows neither place nor heading.
+  std::vector<RelativePoseTerm> odometry;
   std::vector<PriorTerm> priors;
   std::vector<std::pair<std::size_t, std::size_t>> excluded_pairs;  // never held against each other
   std::vector<ExcludedPlane> excluded_planes;
