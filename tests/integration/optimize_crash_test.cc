@@ -53,8 +53,13 @@ class OptimizeCrashTest : public ::testing::Test {
   // Starts or restarts the server; the first address stays.
   void StartServer() {
     server_.reset();
-    server_ = std::make_unique<StratadProcess>(std::vector<std::string>{
-        "--data", (directory_.path() / "maps").string(), "--listen", address_, "--optimize-every", "0"});
+    server_ = std::make_unique<StratadProcess>(
+        std::vector<std::string>{"--data",
+                                 (directory_.path() / "maps").string(),
+                                 "--listen",
+                                 address_,
+                                 "--optimize-every",
+                                 "0"});
     address_ = server_->Address();
     ClientOptions options;
     options.target = address_;
