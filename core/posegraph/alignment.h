@@ -75,8 +75,10 @@ struct AlignmentProblem {
   std::vector<ScanPair> pairs;  // known to overlap, however far apart they seem
   // That stay as they are: what a person said. Those that may be false are rejected as matches are.
   std::vector<RelativePoseTerm> relative;
-  // What robots say of their motion from i to j. Used in directions that registration leaves
-  // loose: on a floor with nothing on it, say, it knows neither place nor heading.
+  // What robots say of their motion from i to j, each the scan before j on its trajectory. Where a
+  // trajectory is long enough to tell how good that is, it counts as much; elsewhere, and by its
+  // information, in the directions that registration leaves loose: on a floor with nothing on it,
+  // say, it knows neither place nor heading.
   std::vector<RelativePoseTerm> odometry;
   std::vector<PriorTerm> priors;
   std::vector<std::pair<std::size_t, std::size_t>> excluded_pairs;  // never held against each other
