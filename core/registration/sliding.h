@@ -17,12 +17,12 @@ struct NormalEquations {
 // features have along their surfaces: it steadies a registration that surfaces hold in every
 // direction, but where they hold it in none it is all that is left, looks certain as it is a sum of
 // thousands, and pulls towards where the scans overlap most. Directions are the eigenvectors of the
-// rest, rotations weighed as the arc at `radius_m`; one is left out if its eigenvalue is a small
-// share of `full`, which it would be if every feature held it (Zhang, Kaess, Singh, "On degeneracy
-// of optimization-based state estimation problems", ICRA 2016).
+// rest, rotations weighed as the arc at `radius_m`; one is left out if its eigenvalue is below
+// `least` (Zhang, Kaess, Singh, "On degeneracy of optimization-based state estimation problems",
+// ICRA 2016).
 NormalEquations WithoutSliding(const NormalEquations& all,
                                const Matrix6d& H_along,
-                               double full,
+                               double least,
                                double radius_m);
 
 }  // namespace strata
