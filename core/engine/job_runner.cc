@@ -69,7 +69,7 @@ absl::Status JobRunner::Run(const JobInfo& job, JobContext& context) {
 
 JobRunner::Step JobRunner::NextStep() {
   absl::MutexLock lock(&mutex_);
-  mutex_.AwaitWithDeadline(absl::Condition(this, &JobRunner::HasWork), next_look_);
+  mutex_.AwaitWithTimeout(absl::Condition(this, &JobRunner::HasWork), next_look_ - absl::Now());
   if (closed_) return Step::kClosed;
   if (job_waits_) return Step::kJob;
   look_ = Stop();
