@@ -45,15 +45,6 @@ class Searcher {
         context_(context),
         measured_(world.Measured(settings)) {
     search_.T_map_scan = world.Poses();
-    trajectory_of_.resize(world.size());
-    place_in_.resize(world.size());
-    for (std::size_t t = 0; t < world.Trajectories().size(); ++t) {
-      const std::vector<std::size_t>& trajectory = world.Trajectories()[t];
-      for (std::size_t k = 0; k < trajectory.size(); ++k) {
-        trajectory_of_[trajectory[k]] = t;
-        place_in_[trajectory[k]] = k;
-      }
-    }
   }
 
   absl::StatusOr<ClosureSearch> Run() {
@@ -94,10 +85,10 @@ class Searcher {
     for (std::size_t k = 0; k < places.size(); ++k) index.Add(k, places[k]);
     std::vector<std::vector<PlaceIndex::Neighbour>> nearest(places.size());
     STRATA_RETURN_IF_ERROR(ParallelFor(threads_, places.size(), [&](int, std::size_t k) {
+      if (k < first_new_) return absl::OkStatus();
       // Each pair once; scans just before are alike and tell nothing.
       const auto excluded = [&](std::uint64_t other) {
-        return other >= k ||
-               (trajectory_of_[other] == trajectory_of_[k] && place_in_[k] - place_in_[other] < 10);
+        return other >= k || world_.SamePass(static_cast<std::size_t>(other), k);
       };
       nearest[k] = index.Nearest(places[k], kAlikeScans, excluded);
       return context_.stop().status();
@@ -113,7 +104,8 @@ class Searcher {
   absl::StatusOr<std::vector<ClosureCandidate>> Candidates() {
     std::vector<ClosureNode> nodes;
     for (std::size_t k = 0; k < world_.size(); ++k) {
-      nodes.push_back({search_.T_map_scan[k], static_cast<std::uint32_t>(trajectory_of_[k])});
+      nodes.push_back(
+          {search_.T_map_scan[k], static_cast<std::uint32_t>(world_.PlaceOf(k).trajectory)});
     }
     std::vector<GraphEdge> edges = measured_.edges;
     for (const FoundClosure& closure : search_.closures) {
@@ -131,9 +123,9 @@ class Searcher {
   // The scans around `node` on its trajectory, in its frame: a pooled local map.
   absl::StatusOr<std::vector<SeenScan>> PoolAround(
       std::size_t node, std::vector<std::shared_ptr<const ScanFeatures>>& held) {
-    const std::vector<std::size_t>& trajectory = world_.Trajectories()[trajectory_of_[node]];
+    const auto& [t, place] = world_.PlaceOf(node);
+    const std::vector<std::size_t>& trajectory = world_.Trajectories()[t];
     const std::size_t half = static_cast<std::size_t>(settings_.pool) / 2;
-    const std::size_t place = place_in_[node];
     const std::size_t first = place - std::min(place, half);
     const std::size_t last = std::min(place + half, trajectory.size() - 1);
     std::vector<SeenScan> pool;
@@ -246,8 +238,6 @@ class Searcher {
   const int threads_;
   JobContext& context_;
   const MeasuredGraph measured_;
-  std::vector<std::size_t> trajectory_of_;  // of every node
-  std::vector<std::size_t> place_in_;       // of every node in its trajectory
   std::vector<AlikePair> alike_;
   std::set<std::pair<std::size_t, std::size_t>> tried_;
   std::vector<FoundClosure> matched_;

@@ -51,9 +51,13 @@ absl::Status GraphWorld::ReadScans(StorageReader& reader) {
   }
   std::map<std::string, std::map<std::uint64_t, std::size_t>> by_name;
   for (std::size_t k = 0; k < scans_.size(); ++k) by_name[id(k).trajectory][id(k).sequence] = k;
+  places_.resize(scans_.size());
   for (const auto& [name, sequence] : by_name) {
     std::vector<std::size_t>& trajectory = trajectories_.emplace_back();
-    for (const auto& [number, node] : sequence) trajectory.push_back(node);
+    for (const auto& [number, node] : sequence) {
+      places_[node] = {trajectories_.size() - 1, trajectory.size()};
+      trajectory.push_back(node);
+    }
   }
   return absl::OkStatus();
 }
@@ -87,6 +91,11 @@ absl::StatusOr<GraphWorld> GraphWorld::Read(MapCore& core, DamagedScans* damaged
            (!record.constraint.is_prior() && !world.nodes_.contains(record.scan_i));
   });
   return world;
+}
+
+bool GraphWorld::SamePass(std::size_t a, std::size_t b) const {
+  const auto [first, last] = std::minmax(places_[a].index, places_[b].index);
+  return places_[a].trajectory == places_[b].trajectory && last - first < kPass;
 }
 
 RelativePoseTerm GraphWorld::Odometry(std::size_t i, std::size_t j) const {

@@ -40,6 +40,16 @@ class GraphWorld {
   const std::vector<Pose>& Poses() const { return poses_; }
   // Nodes of every trajectory, by sequence.
   const std::vector<std::vector<std::size_t>>& Trajectories() const { return trajectories_; }
+  // Where in Trajectories() a node is.
+  struct Place {
+    std::size_t trajectory = 0;
+    std::size_t index = 0;
+  };
+  const Place& PlaceOf(std::size_t node) const { return places_[node]; }
+  // Two scans less than this far from each other on one trajectory are of one pass by a place: that
+  // they show the same says nothing.
+  static constexpr std::size_t kPass = 10;
+  bool SamePass(std::size_t a, std::size_t b) const;
 
   // What is enabled: pairs to register, constraints as they are, priors. Scans that follow each
   // other on a trajectory and are held by nothing else are a pair too.
@@ -61,6 +71,7 @@ class GraphWorld {
   std::vector<Pose> poses_;  // beside scans_
   std::map<ScanNumber, std::size_t> nodes_;
   std::vector<std::vector<std::size_t>> trajectories_;
+  std::vector<Place> places_;                  // beside scans_
   std::vector<ConstraintRecord> constraints_;  // between scans that are there
   std::vector<PlaneRecord> planes_;
 };

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 
 namespace strata {
+
 NormalEquations WithoutSliding(const NormalEquations& all,
                                const Matrix6d& H_along,
                                double least,

@@ -23,6 +23,9 @@ import time
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.append(str(ROOT / "tests/experiments"))
+from trajectory_error import ate
+
 SCANS_A_ROBOT = 2000
 LOOP_EVERY, LOOP_RADIUS_M, LOOP_MIN_STEPS = 10, 4.0, 100
 SIGMA_M, SIGMA_RAD = 0.02, 0.001  # of the constraints
@@ -83,17 +86,10 @@ def write_graph(path, robots):
     return loops
 
 
-def rmse(estimate, truth):
-    """After rigid alignment (Umeyama without scale) [m]."""
-    e, g = estimate - estimate.mean(0), truth - truth.mean(0)
-    U, _, Vt = np.linalg.svd(g.T @ e)
-    R = U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt
-    return float(np.sqrt((np.linalg.norm(g - e @ R.T, axis=1) ** 2).mean()))
-
-
 class Server:
     def __init__(self, build, data):
-        self.process = subprocess.Popen([build / "server/stratad", "--data", data, "--listen", "127.0.0.1:0"],
+        self.process = subprocess.Popen([build / "server/stratad", "--data", data, "--listen", "127.0.0.1:0",
+                                         "--optimize-every", "0"],
                                         stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         self.address = self.process.stdout.readline().split()[1]
         self.cli = build / "client/cli/strata"
@@ -175,7 +171,7 @@ def measure(build, work, size, parameters):
             sys.exit(f"{size} scans: {job['state']}: {job['message']}")
         row = {"scans": size, "loops": loops, "seconds": last - begin, "wall": time.monotonic() - wall,
                "mb": server.peak_mb(), "phases": phases, "metrics": job["metrics"],
-               "before_m": rmse(start, truth), "after_m": rmse(positions(server, work), truth)}
+               "before_m": ate(start, truth), "after_m": ate(positions(server, work), truth)}
     print(f"{size:6} scans, {loops} loops: {row['seconds']:8.1f} s ({row['wall']:.0f} s by the clock), peak"
           f" {row['mb']:7.1f} MB; error {row['before_m']:.3f} m before, {row['after_m']:.3f} m after; {job['message']}",
           flush=True)

@@ -20,6 +20,8 @@ import tempfile
 
 import numpy as np
 
+from trajectory_error import ate
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 # world, robot that comes back to its start, bound of the error after optimize [m]
 LOOPS = [("campus_loop", "loop", 0.10), ("car_park", "loop", 0.10), ("bridge", "eight", 0.10)]
@@ -32,14 +34,6 @@ def positions(path):
     """x y z of a pose file; index-tum has a number before the time."""
     rows = [line.split() for line in open(path, encoding="utf-8") if line.strip() and not line.startswith("#")]
     return np.array([[float(v) for v in row[-7:-4]] for row in rows])
-
-
-def ate(estimate, truth):
-    """RMSE [m] after rigid alignment (Umeyama without scale)."""
-    e, g = estimate - estimate.mean(0), truth - truth.mean(0)
-    U, _, Vt = np.linalg.svd(g.T @ e)
-    R = U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt
-    return float(np.sqrt((np.linalg.norm(g - e @ R.T, axis=1) ** 2).mean()))
 
 
 class Loop:

@@ -20,6 +20,8 @@ import time
 
 import numpy as np
 
+import trajectory_error
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
 
@@ -71,13 +73,8 @@ def write_index_tum(path, poses):
 
 
 def ate(estimate, reference):
-    """RMSE [m] of positions after rigid alignment (Umeyama without scale); both lists of 4×4."""
-    E = np.array([T[:3, 3] for T in estimate])
-    G = np.array([T[:3, 3] for T in reference])
-    me, mg = E.mean(0), G.mean(0)
-    U, _, Vt = np.linalg.svd((G - mg).T @ (E - me))
-    R = U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt
-    return float(np.sqrt((np.linalg.norm(G - mg - (E - me) @ R.T, axis=1) ** 2).mean()))
+    """RMSE [m] of positions after rigid alignment; both lists of 4×4."""
+    return trajectory_error.ate(*(np.array([T[:3, 3] for T in poses]) for poses in (estimate, reference)))
 
 
 def angle_deg(R):
