@@ -57,6 +57,7 @@ absl::Status Serve(const EngineOptions& engine_options,
             << " stream_threads=" << server_options.stream_threads
             << " upload_threads=" << server_options.upload_threads
             << " max_calls=" << server_options.max_calls
+            << " max_watches=" << server_options.max_watches
             << " optimize_every=" << engine_options.optimize_interval;
   int signal = 0;
   sigwait(&signals, &signal);
@@ -87,6 +88,10 @@ int Main(int argc, char** argv) {
   app.add_option("--stream-threads", options.stream_threads, "Downloads served at a time")
       ->capture_default_str();
   app.add_option("--upload-threads", options.upload_threads, "Scans taken in at a time")
+      ->capture_default_str();
+  app.add_option("--max-watches",
+                 options.max_watches,
+                 "Watches of maps and jobs under way before more are sent away; they are no calls")
       ->capture_default_str();
   app.add_option("--max-calls", options.max_calls, "Calls under way before clients are sent away")
       ->capture_default_str();

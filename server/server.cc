@@ -33,6 +33,7 @@ RuntimeOptions RuntimeOptionsOf(const ServerOptions& options) {
           .stream_threads = options.stream_threads,
           .upload_threads = options.upload_threads,
           .max_calls = options.max_calls,
+          .max_watches = options.max_watches,
           .slow_reader_timeout = options.slow_reader_timeout};
 }
 
@@ -99,11 +100,14 @@ void GrpcServer::Shutdown() {
   if (server_ == nullptr || runtime_.shutting_down.exchange(true)) return;
   server_->GetHealthCheckService()->SetServingStatus(false);
   // gRPC's own draining would also wait for clients that keep an idle connection.
+  const absl::Time drained = absl::Now() + options_.drain_timeout;
   runtime_.calls.AwaitEmpty(options_.drain_timeout);
+  runtime_.watches.AwaitEmpty(drained - absl::Now());
   server_->Shutdown(absl::ToChronoTime(absl::Now()));
   server_->Wait();
   // The last calls may still be giving back what they hold.
   runtime_.calls.AwaitEmpty(absl::InfiniteDuration());
+  runtime_.watches.AwaitEmpty(absl::InfiniteDuration());
 }
 
 }  // namespace
@@ -118,6 +122,7 @@ absl::Status ServerOptions::Validate() const {
   check("stream_threads", stream_threads, 1, 1000);
   check("upload_threads", upload_threads, 1, 1000);
   check("max_calls", max_calls, 1, 1'000'000);
+  check("max_watches", max_watches, 1, 1'000'000);
   if (!(slow_reader_timeout > absl::ZeroDuration())) {
     faults.emplace_back("slow_reader_timeout is not positive");
   }

@@ -19,7 +19,10 @@ struct ServerOptions {
   int query_threads = 8;    // calls answered at a time; in [1, 1000]
   int stream_threads = 8;   // listings and downloads served at a time; in [1, 1000]
   int upload_threads = 16;  // scans taken in at a time; in [1, 1000]
-  int max_calls = 1024;     // calls under way, streams included; more are told to come back; ≥ 1
+  // Calls under way, streams included but watches of maps and jobs, which cost little and have a
+  // limit of their own; more are told to come back. In [1, 1'000'000].
+  int max_calls = 1024;
+  int max_watches = 4096;
   // A stream's reader that takes nothing for so long loses the stream.
   absl::Duration slow_reader_timeout = absl::Seconds(30);
   // How long Shutdown() lets calls end by themselves.

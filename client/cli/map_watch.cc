@@ -1,18 +1,16 @@
 // strata map watch
+#include <cstdint>
 #include <memory>
 #include <string>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "absl/time/clock.h"
 
 #include "client/cli/arguments.h"
 #include "client/cli/command.h"
 #include "client/cli/json.h"
 #include "client/cli/map_files.h"
-#include "client/cli/patience.h"
 #include "client/cli/world_json.h"
-#include "core/common/status.h"
 
 namespace strata::cli {
 namespace {
@@ -49,34 +47,24 @@ void Print(const api::MapUpdate& update, Output& output) {
                            update.commit_sequence,
                            " epoch ",
                            update.epoch,
-                           reason ? " " + update.epoch_reason : ""));
+                           reason ? " " + update.epoch_reason : "",
+                           update.whole ? ", everything there is:" : ""));
   for (const api::ScanChange& scan : update.scans) output.Text("  " + TextOf(scan));
   for (const api::TileChangeNotice& tile : update.tiles) output.Text("  " + TextOf(tile));
-}
-
-// Until the watch has ended; a server that is away for a while is waited for.
-absl::Status Follow(Context& context, const std::string& map, api::WatchOptions& options) {
-  Patience patience;
-  while (true) {
-    const absl::Status ended = context.database.maps().Watch(
-        context.call, map, options, [&](const api::MapUpdate& update) {
-          Print(update, context.output);
-          options.since = update.commit_sequence;
-          options.epoch = update.epoch;
-          patience.Has(absl::OkStatus());
-          return absl::OkStatus();
-        });
-    if (ended.ok() || context.call.stop.requested() || !patience.Has(ended)) return ended;
-    absl::SleepFor(absl::Milliseconds(200));
-  }
 }
 
 absl::Status Watch(Context& context, const MapWatchOptions& options) {
   api::WatchOptions watch = options.watch;
   watch.tiles = !options.no_tiles;
-  const absl::Status ended = Follow(context, options.map, watch);
+  std::uint64_t since = watch.since;
+  const absl::Status ended = context.database.maps().Watch(
+      context.call, options.map, watch, [&](const api::MapUpdate& update) {
+        Print(update, context.output);
+        since = update.commit_sequence;
+        return absl::OkStatus();
+      });
   if (ended.ok()) return ended;
-  context.output.Talk(absl::StrCat("--since ", watch.since, " goes on from here"));
+  context.output.Talk(absl::StrCat("--since ", since, " goes on from here"));
   // A watch without an end is ended by its user.
   return context.call.stop.requested() && !watch.once ? absl::OkStatus() : ended;
 }

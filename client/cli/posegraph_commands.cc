@@ -85,6 +85,7 @@ absl::Status Show(Context& context, const PoseGraphOptions& options) {
                        {"j", "TO"},
                        {"origin", "ORIGIN"},
                        {"enabled", "ENABLED"},
+                       {"may_be_false", "MAY BE FALSE"},
                        {"residual_m", "RESIDUAL [M]"},
                        {"residual_rad", "[RAD]"},
                        {"chi2", "CHI2"},
@@ -163,6 +164,9 @@ void AddAddConstraint(Commands& commands,
   app->add_option("--sigma-rad", options->sigma_rad, "Standard deviation of the rotation [rad]")
       ->check(CLI::Range(1e-6, 10.0))
       ->capture_default_str();
+  app->add_flag("--may-be-false",
+                options->constraint.may_be_false,
+                "Optimize may reject it if everything else contradicts it");
   app->add_option("--note", options->constraint.note, "For people: how it is known");
 }
 

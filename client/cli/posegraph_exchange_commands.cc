@@ -24,6 +24,7 @@ struct ExchangeOptions {
   std::string map;
   std::string file;
   bool poses = false;
+  bool may_be_false = false;
 };
 
 absl::Status Export(Context& context, const ExchangeOptions& options) {
@@ -68,6 +69,7 @@ absl::StatusOr<std::size_t> AddNew(Context& context,
         });
     if (known) continue;
     constraint.note = absl::StrCat("imported from ", options.file.substr(0, 500));
+    constraint.may_be_false = options.may_be_false && !constraint.is_prior();
     STRATA_RETURN_IF_ERROR(
         context.database.posegraph().AddConstraint(context.call, options.map, constraint).status());
     ++added;
@@ -133,6 +135,9 @@ void AddPosegraphExchange(Commands& commands, CLI::App* noun) {
   AddMapName(read, options->map);
   read->add_option("FILE", options->file, "The file to read")->type_name("FILE.g2o")->required();
   read->add_flag("--poses", options->poses, "Move the scans to the vertices too, as pose set does");
+  read->add_flag("--may-be-false",
+                 options->may_be_false,
+                 "Optimize may reject edges of two scans that everything else contradicts");
 }
 
 }  // namespace strata::cli

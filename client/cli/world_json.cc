@@ -57,7 +57,8 @@ Json ToJson(const api::MapUpdate& update) {
   for (const api::ScanChange& scan : update.scans) scans.push_back(ToJson(scan));
   Json tiles = Json::array();
   for (const api::TileChangeNotice& tile : update.tiles) tiles.push_back(ToJson(tile));
-  return {{"commit_sequence", update.commit_sequence},
+  return {{"whole", update.whole},
+          {"commit_sequence", update.commit_sequence},
           {"epoch", update.epoch},
           {"epoch_reason", update.epoch_reason},
           {"scans", scans},
@@ -81,6 +82,7 @@ Json ToJson(const Constraint& constraint) {
           {"j", constraint.j.ToString()},
           {"origin", ToString(constraint.origin)},
           {"enabled", constraint.enabled},
+          {"may_be_false", constraint.may_be_false},
           {"pose", ToJson(constraint.T_i_j)},
           {"information", ToJson(constraint.information)},
           {"note", constraint.note}};

@@ -47,8 +47,9 @@ struct ClientOptions {
 //   EnableConstraint repeat themselves as `backoff` says (an upload keeps its points until they are
 //   acknowledged); Create, Start, Accept, Revert, AddConstraint, RemoveConstraint and the two
 //   Deletes do not, since their effect may have happened: look before calling them again. A stream
-//   repeats itself only while nothing of it was delivered; but Maps.Watch resumes where it was,
-//   each time the server comes back.
+//   repeats itself only while nothing of it was delivered; but Maps.Watch waits for its server
+//   until the call is stopped, however many attempts that takes, and resumes where it was (with
+//   `once` it waits as other calls do).
 // - Maps.Watch delivers an update of more than 1024 scans or tiles in parts; until the last,
 //   commit_sequence stays that of the update before.
 // - The call's deadline and cancellation reach into the work on the server.

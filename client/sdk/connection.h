@@ -2,6 +2,7 @@
 #ifndef STRATA_CLIENT_SDK_CONNECTION_H_
 #define STRATA_CLIENT_SDK_CONNECTION_H_
 
+#include <limits>
 #include <memory>
 
 #include "absl/status/status.h"
@@ -28,6 +29,12 @@ class Connection {
   const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
   Canceller& canceller() { return canceller_; }
   Backoff NewBackoff() const { return Backoff(options_.backoff); }
+  // Of one who waits for the server as long as it takes.
+  Backoff NewEndlessBackoff() const {
+    BackoffOptions endless = options_.backoff;
+    endless.max_attempts = std::numeric_limits<int>::max();
+    return Backoff(endless);
+  }
 
  private:
   std::shared_ptr<grpc::Channel> channel_;

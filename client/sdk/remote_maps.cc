@@ -1,5 +1,6 @@
 #include "client/sdk/remote_maps.h"
 
+#include <memory>
 #include <string>
 
 #include "core/common/status.h"
@@ -83,24 +84,28 @@ absl::Status RemoteMaps::Watch(const api::Call& call,
                                const api::WatchOptions& options,
                                absl::FunctionRef<absl::Status(const api::MapUpdate&)> sink) {
   v1::WatchMapRequest in = ToProto(name, options);
+  const auto new_backoff = [&] {
+    return options.once ? connection_.NewBackoff() : connection_.NewEndlessBackoff();
+  };
+  Backoff backoff = new_backoff();
   while (true) {
-    bool delivered = false;
+    STRATA_RETURN_IF_ERROR(call.stop.status());
     absl::Status taken;
     const auto deliver = [&](const v1::WatchMapResponse& out) -> absl::Status {
       STRATA_ASSIGN_OR_RETURN(const api::MapUpdate update, FromProto(out));
-      delivered = true;
       taken = sink(update);
-      if (taken.ok()) {
-        in.set_since(update.commit_sequence);
-        in.set_epoch(update.epoch);
-      }
+      in.set_since(update.commit_sequence);
+      in.set_epoch(update.epoch);
       return taken;
     };
-    const absl::Status ended =
-        CallStream(connection_, *stub_, &v1::Maps::Stub::Watch, call, in, deliver);
-    // Without a delivery CallStream has tried again as often as it may.
-    if (!taken.ok() || !absl::IsUnavailable(ended) || !delivered) return ended;
-    if (!connection_.NewBackoff().Wait(ended, call.stop)) return ended;
+    AttemptContext context(connection_, call);
+    bool delivered = false;
+    const std::unique_ptr<grpc::ClientReader<v1::WatchMapResponse>> reader =
+        stub_->Watch(context.get(), in);
+    const absl::Status ended = ReadStream(context, *reader, call, deliver, delivered);
+    if (delivered) backoff = new_backoff();
+    if (ended.ok() || !taken.ok()) return ended;
+    if (!backoff.Wait(ended, call.stop)) return call.stop.requested() ? call.stop.status() : ended;
   }
 }
 

@@ -25,7 +25,7 @@ class RemoteMaps final : public api::Maps {
   absl::StatusOr<MapStats> Stats(const api::Call& call, absl::string_view name) override;
   absl::StatusOr<std::vector<EpochInfo>> History(const api::Call& call,
                                                  absl::string_view name) override;
-  // Resumes by itself after UNAVAILABLE, as often as the server comes back in time.
+  // Resumes by itself whenever the server comes back.
   absl::Status Watch(const api::Call& call,
                      absl::string_view name,
                      const api::WatchOptions& options,

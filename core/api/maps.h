@@ -21,8 +21,9 @@ namespace strata::api {
 
 // From where a map is watched.
 struct WatchOptions {
-  // Changes after this commit sequence. What happened long ago, or before the server's last start,
-  // comes as the whole present state: a watcher may be told what it knew. 0: everything there is.
+  // Changes after this commit sequence. What happened long ago, before the server's last start, or
+  // in another map of that name cannot be told: the state comes as a whole then. 0: it does at
+  // once.
   std::uint64_t since = 0;
   std::uint64_t epoch = 0;  // that the watcher knows; another one is announced with its reason
   std::string trajectory;   // scans of this one only; empty: of all
@@ -47,6 +48,8 @@ struct TileChangeNotice {
 
 // What changed since the message before. Poses and tiles are of `epoch`.
 struct MapUpdate {
+  // `scans` and `tiles` are all there are: what the watcher knew before is void.
+  bool whole = false;
   std::uint64_t commit_sequence = 0;  // resume from here
   std::uint64_t epoch = 0;
   std::string epoch_reason;  // set when the watcher knew an epoch and this is another

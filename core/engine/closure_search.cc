@@ -45,15 +45,6 @@ class Searcher {
         context_(context),
         measured_(world.Measured(settings)) {
     search_.T_map_scan = world.Poses();
-    trajectory_of_.resize(world.size());
-    place_in_.resize(world.size());
-    for (std::size_t t = 0; t < world.Trajectories().size(); ++t) {
-      const std::vector<std::size_t>& trajectory = world.Trajectories()[t];
-      for (std::size_t k = 0; k < trajectory.size(); ++k) {
-        trajectory_of_[trajectory[k]] = t;
-        place_in_[trajectory[k]] = k;
-      }
-    }
   }
 
   absl::StatusOr<ClosureSearch> Run() {
@@ -86,36 +77,37 @@ class Searcher {
           places[k] = *std::move(place);
           return absl::OkStatus();
         }));
+    return LookUp(places);
+  }
+
+  absl::Status LookUp(const std::vector<PlaceDescriptor>& places) {
     PlaceIndex index;
     for (std::size_t k = 0; k < places.size(); ++k) index.Add(k, places[k]);
-    for (std::size_t k = 0; k < places.size(); ++k) {
-      STRATA_RETURN_IF_ERROR(context_.stop().status());
+    std::vector<std::vector<PlaceIndex::Neighbour>> nearest(places.size());
+    STRATA_RETURN_IF_ERROR(ParallelFor(threads_, places.size(), [&](int, std::size_t k) {
+      if (k < first_new_) return absl::OkStatus();
       // Each pair once; scans just before are alike and tell nothing.
       const auto excluded = [&](std::uint64_t other) {
-        return other >= k ||
-               (trajectory_of_[other] == trajectory_of_[k] && place_in_[k] - place_in_[other] < 10);
+        return other >= k || world_.SamePass(static_cast<std::size_t>(other), k);
       };
-      for (const PlaceIndex::Neighbour& near : index.Nearest(places[k], kAlikeScans, excluded)) {
+      nearest[k] = index.Nearest(places[k], kAlikeScans, excluded);
+      return context_.stop().status();
+    }));
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      for (const PlaceIndex::Neighbour& near : nearest[k]) {
         alike_.push_back({static_cast<std::size_t>(near.number), k, near.similarity});
       }
     }
     return absl::OkStatus();
   }
 
-  std::vector<GraphEdge> Edges() const {
-    std::vector<GraphEdge> edges;
-    for (const RelativePoseTerm& term : measured_.relative) {
-      edges.push_back({term.i, term.j, term.information});
-    }
-    return edges;
-  }
-
   absl::StatusOr<std::vector<ClosureCandidate>> Candidates() {
     std::vector<ClosureNode> nodes;
     for (std::size_t k = 0; k < world_.size(); ++k) {
-      nodes.push_back({search_.T_map_scan[k], static_cast<std::uint32_t>(trajectory_of_[k])});
+      nodes.push_back(
+          {search_.T_map_scan[k], static_cast<std::uint32_t>(world_.PlaceOf(k).trajectory)});
     }
-    std::vector<GraphEdge> edges = Edges();
+    std::vector<GraphEdge> edges = measured_.edges;
     for (const FoundClosure& closure : search_.closures) {
       edges.push_back({closure.i, closure.j, closure.information});
     }
@@ -131,9 +123,9 @@ class Searcher {
   // The scans around `node` on its trajectory, in its frame: a pooled local map.
   absl::StatusOr<std::vector<SeenScan>> PoolAround(
       std::size_t node, std::vector<std::shared_ptr<const ScanFeatures>>& held) {
-    const std::vector<std::size_t>& trajectory = world_.Trajectories()[trajectory_of_[node]];
+    const auto& [t, place] = world_.PlaceOf(node);
+    const std::vector<std::size_t>& trajectory = world_.Trajectories()[t];
     const std::size_t half = static_cast<std::size_t>(settings_.pool) / 2;
-    const std::size_t place = place_in_[node];
     const std::size_t first = place - std::min(place, half);
     const std::size_t last = std::min(place + half, trajectory.size() - 1);
     std::vector<SeenScan> pool;
@@ -213,14 +205,14 @@ class Searcher {
       closures.push_back({found.i, found.j, found.T_i_j, kMatchSigmaM, kMatchSigmaRad});
     }
     STRATA_ASSIGN_OR_RETURN(const ConsistentClosureSet consistent,
-                            ConsistentClosures(world_.Poses(), Edges(), closures));
+                            ConsistentClosures(world_.Poses(), measured_.edges, closures));
     search_.closures.clear();
     for (const std::size_t k : consistent.kept) search_.closures.push_back(matched_[k]);
     return absl::OkStatus();
   }
 
   absl::Status CloseLoops() {
-    PoseGraphProblem graph = measured_;
+    PoseGraphProblem graph = measured_.graph;
     for (const FoundClosure& closure : search_.closures) {
       graph.relative.push_back(
           {closure.i, closure.j, closure.T_i_j, closure.information, settings_.robust});
@@ -245,9 +237,7 @@ class Searcher {
   const OptimizeSettings& settings_;
   const int threads_;
   JobContext& context_;
-  const PoseGraphProblem measured_;
-  std::vector<std::size_t> trajectory_of_;  // of every node
-  std::vector<std::size_t> place_in_;       // of every node in its trajectory
+  const MeasuredGraph measured_;
   std::vector<AlikePair> alike_;
   std::set<std::pair<std::size_t, std::size_t>> tried_;
   std::vector<FoundClosure> matched_;

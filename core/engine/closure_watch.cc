@@ -10,46 +10,18 @@
 #include "core/engine/scan_views.h"
 
 namespace strata {
-namespace {
-
-// Scans so near each other on one trajectory are of one pass.
-constexpr std::size_t kSamePass = 10;
-
-struct Place {
-  std::size_t trajectory = 0;
-  std::size_t place = 0;
-};
-
-std::vector<Place> PlacesOf(const GraphWorld& world) {
-  std::vector<Place> places(world.size());
-  for (std::size_t t = 0; t < world.Trajectories().size(); ++t) {
-    const std::vector<std::size_t>& trajectory = world.Trajectories()[t];
-    for (std::size_t k = 0; k < trajectory.size(); ++k) places[trajectory[k]] = {t, k};
-  }
-  return places;
-}
-
-bool SamePass(const Place& a, const Place& b) {
-  return a.trajectory == b.trajectory &&
-         std::max(a.place, b.place) - std::min(a.place, b.place) <= kSamePass;
-}
-
-}  // namespace
-
 std::size_t CountFreshContacts(const GraphWorld& world, std::size_t first_new) {
-  const std::vector<Place> places = PlacesOf(world);
   std::vector<bool> joined(world.size(), false);  // the younger one to another pass
   for (const ScanPair& pair : world.Problem({}).pairs) {
-    if (!pair.measured.has_value() || SamePass(places[pair.i], places[pair.j])) continue;
+    if (!pair.measured.has_value() || world.SamePass(pair.i, pair.j)) continue;
     joined[std::max(pair.i, pair.j)] = true;
   }
   std::size_t fresh = 0;
   for (std::size_t node = first_new; node < joined.size(); ++node) {
     if (!joined[node]) continue;
-    const auto [t, place] = places[node];
-    const std::vector<std::size_t>& trajectory = world.Trajectories()[t];
-    const auto here = trajectory.begin() + static_cast<std::ptrdiff_t>(place);
-    const auto before = here - static_cast<std::ptrdiff_t>(std::min(place, kSamePass));
+    const auto& [t, index] = world.PlaceOf(node);
+    const auto here = world.Trajectories()[t].begin() + static_cast<std::ptrdiff_t>(index);
+    const auto before = here - static_cast<std::ptrdiff_t>(std::min(index, GraphWorld::kPass));
     if (std::none_of(before, here, [&](std::size_t other) { return joined[other]; })) ++fresh;
   }
   return fresh;

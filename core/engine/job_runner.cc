@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <vector>
 
 #include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include <glog/logging.h>
 
 #include "core/common/status.h"
+#include "core/common/thread_name.h"
 #include "core/engine/optimize.h"
 #include "core/engine/optimize_settings.h"
 #include "core/engine/rebuild.h"
@@ -19,6 +22,21 @@ namespace {
 
 // After an error of the store (a full disk, say): how long until the next try.
 constexpr absl::Duration kRetryDelay = absl::Seconds(1);
+
+// Whether a job that begins has made its epoch already, and was killed before it could say so; a
+// second one would not be undone with the first. If so, tells what is known.
+absl::StatusOr<bool> HasMadeItsEpoch(MapCore& core, const JobInfo& job, JobContext& context) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  STRATA_ASSIGN_OR_RETURN(const std::vector<EpochInfo> epochs, reader->ListEpochs());
+  for (const EpochInfo& epoch : epochs) {
+    if (epoch.job != job.id) continue;
+    context.SetMetric("epoch", static_cast<double>(epoch.epoch));
+    context.SetMetric("epoch_before", static_cast<double>(epoch.epoch - 1));
+    context.SetMessage(absl::StrCat("epoch ", epoch.epoch, " was made before a restart"));
+    return true;
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -40,6 +58,8 @@ void JobRunner::JobQueued() {
 }
 
 absl::Status JobRunner::Run(const JobInfo& job, JobContext& context) {
+  STRATA_ASSIGN_OR_RETURN(const bool done, HasMadeItsEpoch(core_, job, context));
+  if (done) return absl::OkStatus();
   if (job.kind == kOptimizeJob) return RunOptimizeJob(core_, worker_, job, context);
   return worker_.Execute(closing_, [&](Integrator& integrator) {
     return job.kind == kRevertJob ? RunRevertJob(integrator, job, context)
@@ -49,7 +69,7 @@ absl::Status JobRunner::Run(const JobInfo& job, JobContext& context) {
 
 JobRunner::Step JobRunner::NextStep() {
   absl::MutexLock lock(&mutex_);
-  mutex_.AwaitWithDeadline(absl::Condition(this, &JobRunner::HasWork), next_look_);
+  mutex_.AwaitWithTimeout(absl::Condition(this, &JobRunner::HasWork), next_look_ - absl::Now());
   if (closed_) return Step::kClosed;
   if (job_waits_) return Step::kJob;
   look_ = Stop();
@@ -57,6 +77,7 @@ JobRunner::Step JobRunner::NextStep() {
 }
 
 void JobRunner::Loop() {
+  NameThisThread("job");
   while (true) {
     const Step step = NextStep();
     if (step == Step::kClosed) return;

@@ -71,9 +71,15 @@ void MapCore::set_default_profile(const RobotProfile& profile) {
   info_.parameters.default_profile = profile;
 }
 
+std::pair<ChangeSet, Snapshots::Pin> MapCore::ChangesSince(std::uint64_t commit_sequence) {
+  absl::MutexLock lock(&publishing_);
+  return {changes_.Since(commit_sequence), snapshots_.PinCurrent()};
+}
+
 void MapCore::Publish(const MapClock& clock,
                       const std::vector<ScanId>& scans,
                       const std::vector<api::TileChangeNotice>& tiles) {
+  absl::MutexLock lock(&publishing_);
   snapshots_.Publish({clock.epoch, clock.tile_version});
   changes_.Add(clock.commit_sequence, scans, tiles);
 }

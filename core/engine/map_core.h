@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
@@ -42,8 +43,10 @@ class MapCore {
   WriterThread& writer() { return writer_; }
   Snapshots& snapshots() { return snapshots_; }
   ChangeLog& changes() { return changes_; }
-  // Makes what was committed the state that readers get, and tells watchers. On the writer's
-  // thread, so that both happen in the order of commits.
+  // What changed after a commit, and the state that it led to.
+  std::pair<ChangeSet, Snapshots::Pin> ChangesSince(std::uint64_t commit_sequence);
+  // Makes what was committed the state that readers get, and tells watchers, as one. On the
+  // writer's thread, so that it happens in the order of commits.
   void Publish(const MapClock& clock,
                const std::vector<ScanId>& scans,
                const std::vector<api::TileChangeNotice>& tiles);
@@ -66,6 +69,7 @@ class MapCore {
   mutable absl::Mutex mutex_;
   MapInfo info_ ABSL_GUARDED_BY(mutex_);
   std::unique_ptr<MapStorage> storage_;
+  absl::Mutex publishing_;  // what snapshots_ and changes_ say is of one commit
   Snapshots snapshots_;
   ChangeLog changes_;
   ReaderPool readers_;

@@ -21,18 +21,19 @@ class Watcher {
 
   // What changed since the message before; nullopt if nothing did and it is not the first.
   absl::StatusOr<std::optional<api::MapUpdate>> Next() {
-    const ChangeSet changes = core_.changes().Since(since_);
+    const std::pair<ChangeSet, Snapshots::Pin> told = core_.ChangesSince(since_);
+    const auto& [changes, pin] = told;
     if (!first_ && changes.last == since_) return std::optional<api::MapUpdate>();
-    // Taken after the changes: what they speak of is in this state or a newer one.
-    const Snapshots::Pin pin = core_.snapshots().PinCurrent();
     api::MapUpdate update;
     update.commit_sequence = changes.last;
     update.epoch = pin.view().epoch;
-    const bool nothing = changes.complete && changes.scans.empty() && changes.tiles.empty() &&
-                         (epoch_ == 0 || epoch_ == update.epoch);
-    if (!nothing) {  // a thousand idle watchers ask ten times a second
+    update.whole = since_ == 0 || !changes.complete;
+    const bool same = changes.scans.empty() && changes.tiles.empty() && since_ <= changes.last &&
+                      (epoch_ == 0 || epoch_ == update.epoch);
+    if (!same || !changes.complete) {  // a thousand idle watchers ask ten times a second
       STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-      STRATA_RETURN_IF_ERROR(reader->Snapshot([&] { return Fill(*reader, pin, changes, update); }));
+      STRATA_RETURN_IF_ERROR(
+          reader->Snapshot([&] { return Fill(*reader, told.second, told.first, update); }));
     }
     since_ = update.commit_sequence;
     epoch_ = update.epoch;
@@ -46,13 +47,14 @@ class Watcher {
                     const Snapshots::Pin& pin,
                     const ChangeSet& changes,
                     api::MapUpdate& update) const {
+    STRATA_RETURN_IF_ERROR(CheckSince(reader, update));
     if (epoch_ != 0 && epoch_ != update.epoch) {
       STRATA_ASSIGN_OR_RETURN(const std::vector<EpochInfo> epochs, reader.ListEpochs());
       for (const EpochInfo& info : epochs) {
         if (info.epoch == update.epoch) update.epoch_reason = info.reason;
       }
     }
-    if (!changes.complete) return AddEverything(reader, pin, update);
+    if (update.whole) return AddEverything(reader, pin, update);
     for (const ScanId& id : changes.scans) {
       if (!Wanted(id)) continue;
       STRATA_ASSIGN_OR_RETURN(const std::optional<PosedScan> posed,
@@ -65,6 +67,19 @@ class Watcher {
     }
     if (!options_.tiles) return absl::OkStatus();
     for (const auto& [key, tile] : changes.tiles) update.tiles.push_back(tile);
+    return absl::OkStatus();
+  }
+
+  // A commit that no watcher was told of yet may be resumed from; one that the map has not come to
+  // is of another map of that name.
+  absl::Status CheckSince(StorageReader& reader, api::MapUpdate& update) const {
+    if (since_ <= update.commit_sequence) return absl::OkStatus();
+    STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader.GetClock());
+    if (since_ > clock.commit_sequence) {
+      update.whole = true;
+    } else {
+      update.commit_sequence = since_;
+    }
     return absl::OkStatus();
   }
 

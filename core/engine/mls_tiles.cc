@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -66,7 +67,8 @@ absl::StatusOr<MlsTileMap> MakeTiles(MapCore& core,
                                      const std::vector<PlacedScanRecord>& scans,
                                      const absl::btree_set<TileKey>& keys,
                                      int threads,
-                                     const Stop& stop) {
+                                     const Stop& stop,
+                                     DamagedScans* damaged) {
   const MapParameters parameters = core.info().parameters;
   const auto wanted = [&keys](const TileKey& key) { return keys.contains(key); };
   std::vector<MlsTileMap> parts(static_cast<std::size_t>(std::max(threads, 1)));
@@ -77,9 +79,13 @@ absl::StatusOr<MlsTileMap> MakeTiles(MapCore& core,
         ScanSource source(*reader, parameters);
         const absl::StatusOr<MlsMap> contribution =
             source.Contribution(scans[i].scan, scans[i].T_map_scan);
+        const std::string id = scans[i].scan.header.id.ToString();
+        if (damaged != nullptr &&
+            damaged->LeaveOut(scans[i].scan.number, id, contribution.status())) {
+          return absl::OkStatus();
+        }
         if (!contribution.ok()) {
-          return Annotate(contribution.status(),
-                          absl::StrCat("scan ", scans[i].scan.header.id.ToString()));
+          return Annotate(contribution.status(), absl::StrCat("scan ", id));
         }
         JoinContribution(*contribution, wanted, parts[static_cast<std::size_t>(thread)]);
         return absl::OkStatus();
@@ -101,7 +107,8 @@ absl::StatusOr<MlsTileMap> MakeTiles(MapCore& core,
 
 absl::StatusOr<std::vector<PlacedScanRecord>> ScansOfTiles(StorageReader& reader,
                                                            const absl::btree_set<TileKey>& keys,
-                                                           std::uint64_t epoch) {
+                                                           std::uint64_t epoch,
+                                                           DamagedScans* damaged) {
   absl::btree_set<ScanNumber> numbers;
   for (const TileKey& key : keys) {
     STRATA_ASSIGN_OR_RETURN(const std::vector<ScanNumber> scans, reader.ScansOfTile(key));
@@ -109,7 +116,12 @@ absl::StatusOr<std::vector<PlacedScanRecord>> ScansOfTiles(StorageReader& reader
   }
   std::vector<PlacedScanRecord> placed;
   for (const ScanNumber number : numbers) {
-    STRATA_ASSIGN_OR_RETURN(PosedScan posed, reader.GetScan(number, epoch));
+    absl::StatusOr<PosedScan> read = reader.GetScan(number, epoch);
+    if (damaged != nullptr &&
+        damaged->LeaveOut(number, absl::StrCat("row ", number), read.status())) {
+      continue;
+    }
+    STRATA_ASSIGN_OR_RETURN(PosedScan posed, std::move(read));
     if (!posed.pose.has_value()) continue;
     placed.push_back({std::move(posed.scan), posed.pose->T_map_scan});
   }

@@ -14,6 +14,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/common/stop.h"
+#include "core/engine/damaged_scans.h"
 #include "core/engine/lru_cache.h"
 #include "core/engine/map_core.h"
 #include "core/mls/mls_map.h"
@@ -45,12 +46,14 @@ void JoinContribution(const MlsMap& contribution,
                       MlsTileMap& tiles);
 
 // The tiles `keys` out of the contributions of `scans` alone, by `threads` threads; the same bytes
-// for any number. Keys that get nothing are nullptr. Memory: the tiles and a scan a thread.
+// for any number. Keys that get nothing are nullptr. Memory: the tiles and a scan a thread. Damaged
+// scans are put into `damaged`; where that is nullptr, DATA_LOSS naming one.
 absl::StatusOr<MlsTileMap> MakeTiles(MapCore& core,
                                      const std::vector<PlacedScanRecord>& scans,
                                      const absl::btree_set<TileKey>& keys,
                                      int threads,
-                                     const Stop& stop);
+                                     const Stop& stop,
+                                     DamagedScans* damaged = nullptr);
 
 // Stored tiles, decoded ones kept. One thread at a time.
 class MlsTileStore {
@@ -68,10 +71,12 @@ class MlsTileStore {
   LruCache<TileKey, MlsTile> cache_;
 };
 
-// All integrated scans with a tile in `keys`, by number, at their poses of `epoch`.
+// All integrated scans with a tile in `keys`, by number, at their poses of `epoch`; damaged rows as
+// of MakeTiles.
 absl::StatusOr<std::vector<PlacedScanRecord>> ScansOfTiles(StorageReader& reader,
                                                            const absl::btree_set<TileKey>& keys,
-                                                           std::uint64_t epoch);
+                                                           std::uint64_t epoch,
+                                                           DamagedScans* damaged = nullptr);
 
 }  // namespace strata
 

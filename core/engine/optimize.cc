@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,6 +15,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/closure_search.h"
+#include "core/engine/damaged_scans.h"
 #include "core/engine/graph_world.h"
 #include "core/engine/optimize_settings.h"
 #include "core/engine/parallel.h"
@@ -50,19 +52,25 @@ class PartOfJob final : public JobContext {
   const double end_;
 };
 
+struct Proposed {
+  std::uint64_t base_epoch = 0;  // that the proposal is of
+  std::string summary;           // for people
+};
+
 class Optimizer {
  public:
   Optimizer(MapCore& core,
             const OptimizeSettings& settings,
             const JobInfo& job,
+            DamagedScans& damaged,
             JobContext& context)
-      : core_(core), settings_(settings), job_(job), context_(context) {}
+      : core_(core), settings_(settings), job_(job), damaged_(damaged), context_(context) {}
 
-  // Leaves the proposal in the store; returns the epoch it is of.
-  absl::StatusOr<std::uint64_t> Propose() {
+  // Leaves the proposal in the store.
+  absl::StatusOr<Proposed> Propose() {
     STRATA_RETURN_IF_ERROR(context_.Progress(0.0, "reading the pose graph"));
-    STRATA_ASSIGN_OR_RETURN(GraphWorld world, GraphWorld::Read(core_));
-    ScanViews views(core_, world.Scans());
+    STRATA_ASSIGN_OR_RETURN(GraphWorld world, GraphWorld::Read(core_, &damaged_));
+    ScanViews views(core_, world.Scans(), &damaged_);
     std::vector<FoundClosure> closures;
     std::vector<Pose> start = world.Poses();
     if (settings_.closures) {
@@ -79,9 +87,8 @@ class Optimizer {
       problem.pairs.push_back({closure.i, closure.j, settings_.robust});
     }
     STRATA_ASSIGN_OR_RETURN(const AlignmentResult result, Align(problem, views));
-    Report(world, result);
     STRATA_RETURN_IF_ERROR(Store(world, result, KeptClosures(world, closures, result)));
-    return world.epoch();
+    return Proposed{world.epoch(), Report(world, result)};
   }
 
   int threads() const {
@@ -140,10 +147,12 @@ class Optimizer {
     std::vector<PlaneRecord> planes = world.DisabledPlanes();
     for (const SharedPlane& plane : result.planes) planes.push_back(world.RecordOf(plane));
     context_.SetMetric("closures", static_cast<double>(closures.size()));
+    const std::set<ScanNumber> damaged = damaged_.Scans();
     return core_.writer().Run(
         Durability::kFull, 0, context_.stop(), [&](StorageWriter& writer) -> absl::Status {
           STRATA_RETURN_IF_ERROR(writer.DiscardProposal(job_.id));
           for (std::size_t k = 0; k < result.T_map_scan.size(); ++k) {
+            if (damaged.contains(world.number(k))) continue;  // its neighbours carry it
             STRATA_RETURN_IF_ERROR(
                 writer.ProposePose(job_.id, {world.number(k), result.T_map_scan[k]}));
           }
@@ -157,7 +166,7 @@ class Optimizer {
         });
   }
 
-  void Report(const GraphWorld& world, const AlignmentResult& result) {
+  std::string Report(const GraphWorld& world, const AlignmentResult& result) {
     for (std::size_t r = 0; r < result.rounds.size(); ++r) {
       const AlignmentRound& round = result.rounds[r];
       const std::string name = absl::StrCat("round.", r + 1, ".");
@@ -181,7 +190,7 @@ class Optimizer {
     context_.SetMetric("settled", result.termination == AlignmentTermination::kSettled ? 1.0 : 0.0);
     context_.SetMetric("scans", static_cast<double>(world.size()));
     context_.SetMetric("planes", static_cast<double>(result.planes.size()));
-    context_.SetMetric("matches_rejected", static_cast<double>(result.rejected.size()));
+    ReportRejected(world, result);
     double squares = 0.0;
     double largest = 0.0;
     for (std::size_t k = 0; k < world.size(); ++k) {
@@ -194,19 +203,43 @@ class Optimizer {
         std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, world.size())));
     context_.SetMetric("shift_rms_m", rms);
     context_.SetMetric("shift_max_m", largest);
-    context_.SetMessage(absl::StrFormat(
+    return absl::StrFormat(
         "%d scans, %d planes: moved by %.3f m rms, %.3f m at most; %s after %d rounds",
         world.size(),
         result.planes.size(),
         rms,
         largest,
         result.termination == AlignmentTermination::kSettled ? "settled" : "not settled",
-        result.rounds.size()));
+        result.rounds.size());
+  }
+
+  // How many, and the worst by name.
+  void ReportRejected(const GraphWorld& world, const AlignmentResult& result) {
+    constexpr std::size_t kNamed = 20;
+    std::vector<RejectedMatch> rejected = result.rejected;
+    const auto given = std::count_if(
+        rejected.begin(), rejected.end(), [](const RejectedMatch& match) { return match.given; });
+    context_.SetMetric("constraints_rejected", static_cast<double>(given));
+    context_.SetMetric("matches_rejected",
+                       static_cast<double>(rejected.size()) - static_cast<double>(given));
+    // Constraints that a person can switch off come first.
+    std::stable_sort(rejected.begin(), rejected.end(), [](const auto& a, const auto& b) {
+      return a.given != b.given ? a.given : a.chi2 > b.chi2;
+    });
+    rejected.resize(std::min(rejected.size(), kNamed));
+    for (const RejectedMatch& match : rejected) {
+      context_.SetMetric(absl::StrCat("rejected.",
+                                      world.id(match.term.i).ToString(),
+                                      ".",
+                                      world.id(match.term.j).ToString()),
+                         match.chi2);
+    }
   }
 
   MapCore& core_;
   const OptimizeSettings& settings_;
   const JobInfo& job_;
+  DamagedScans& damaged_;
   JobContext& context_;
 };
 
@@ -219,24 +252,37 @@ absl::Status RunOptimizeJob(MapCore& core,
   JobParameters parameters = job.parameters;
   const bool accepted = parameters.erase(kAccepted) > 0;
   STRATA_ASSIGN_OR_RETURN(const OptimizeSettings settings, ParseOptimizeSettings(parameters));
-  Optimizer optimizer(core, settings, job, context);
-  std::uint64_t base_epoch = 0;
+  DamagedScans damaged;
+  Optimizer optimizer(core, settings, job, damaged, context);
+  Proposed proposed;
   if (accepted) {
-    base_epoch = static_cast<std::uint64_t>(job.metrics.at("epoch_before"));
-    context.SetMessage(job.message);
+    proposed = {static_cast<std::uint64_t>(job.metrics.at("epoch_before")), job.message};
   } else {
-    STRATA_ASSIGN_OR_RETURN(base_epoch, optimizer.Propose());
+    STRATA_ASSIGN_OR_RETURN(proposed, optimizer.Propose());
   }
-  context.SetMetric("epoch_before", static_cast<double>(base_epoch));
+  context.SetMetric("epoch_before", static_cast<double>(proposed.base_epoch));
   if (settings.dry_run && !accepted) {
     context.SetProposed();
-    return absl::OkStatus();
+  } else {
+    PartOfJob part(context, accepted ? 0.0 : kAlignmentEnd, 1.0);
+    STRATA_RETURN_IF_ERROR(worker.Execute(context.stop(), [&](Integrator& integrator) {
+      return ApplyProposal(integrator,
+                           job,
+                           proposed.base_epoch,
+                           settings.tolerance,
+                           optimizer.threads(),
+                           damaged,
+                           part);
+    }));
   }
-  PartOfJob part(context, accepted ? 0.0 : kAlignmentEnd, 1.0);
-  return worker.Execute(context.stop(), [&](Integrator& integrator) {
-    return ApplyProposal(
-        integrator, job, base_epoch, settings.tolerance, optimizer.threads(), part);
-  });
+  const bool told = accepted && job.metrics.contains("left_out") &&
+                    job.metrics.at("left_out") > 0.0;  // by the proposal
+  if (!told) {
+    damaged.SetMetrics(context);
+    absl::StrAppend(&proposed.summary, damaged.Message());
+  }
+  context.SetMessage(std::move(proposed.summary));
+  return absl::OkStatus();
 }
 
 }  // namespace strata

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -30,15 +31,28 @@ class PoseChange {
 
   struct Outcome {
     std::vector<ProposedPose> moves;  // by number
-    std::size_t carried = 0;          // scans nobody decided on, moved or not
+    std::size_t carried = 0;          // scans nobody decided on that follow others, moved or not
   };
-  // Scans that nobody decided on keep their place relative to the nearest of the scans they were
-  // held against when they were integrated, or relative to the one before on their trajectory.
+  // Scans that nobody decided on keep their place relative to one that was decided on: the nearest
+  // of those that constraints hold them against, or else of the two beside them on their
+  // trajectory; or, where there is none, relative to one that is carried so, and so on. What
+  // nothing leads to stays.
   Outcome Resolve(const MoveTolerance& tolerance) const;
 
  private:
+  // Indices into scans_ that a scan can be carried by.
+  struct Partners {
+    std::vector<std::size_t> held;    // by a constraint, older or younger
+    std::vector<std::size_t> beside;  // on the trajectory
+  };
+  // Where every scan is from now on; what stays undecided is empty.
+  std::vector<std::optional<Pose>> Carry() const;
+  std::optional<std::size_t> NearestOf(std::size_t scan,
+                                       const std::vector<std::size_t>& partners,
+                                       const std::vector<std::optional<Pose>>& after) const;
+
   std::vector<PosedScan> scans_;
-  std::map<ScanNumber, std::vector<ScanNumber>> partners_;  // of every scan, older, nearest first
+  std::vector<Partners> partners_;  // beside scans_
   std::map<ScanNumber, Pose> decided_;
 };
 

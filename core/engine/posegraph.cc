@@ -47,8 +47,9 @@ absl::StatusOr<api::PoseGraphState> EnginePoseGraph::Get(const api::Call& call,
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
   api::PoseGraphState state;
+  MapClock clock;
   const absl::Status read = reader->Snapshot([&]() -> absl::Status {
-    STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());
+    STRATA_ASSIGN_OR_RETURN(clock, reader->GetClock());
     state.epoch = clock.epoch;
     STRATA_RETURN_IF_ERROR(AddNodes(*reader, state));
     STRATA_ASSIGN_OR_RETURN(std::vector<ConstraintRecord> records,
@@ -61,6 +62,7 @@ absl::StatusOr<api::PoseGraphState> EnginePoseGraph::Get(const api::Call& call,
     return absl::OkStatus();
   });
   STRATA_RETURN_IF_ERROR(read);
+  found->core().snapshots().AwaitPublished(clock.tile_version);
   return state;
 }
 

@@ -47,6 +47,7 @@ absl::Status ApplyProposal(Integrator& integrator,
                            std::uint64_t base_epoch,
                            const MoveTolerance& tolerance,
                            int threads,
+                           DamagedScans& damaged,
                            JobContext& context) {
   MapCore& core = integrator.core();
   STRATA_ASSIGN_OR_RETURN(const PoseChange change, ReadChange(core, job, base_epoch));
@@ -65,6 +66,7 @@ absl::Status ApplyProposal(Integrator& integrator,
     moves.origin = PoseOrigin::kOptimize;
     moves.reason = absl::StrCat(job.kind, ", job ", job.id);
     moves.job = job.id;
+    moves.damaged = &damaged;
     STRATA_ASSIGN_OR_RETURN(moved, integrator.MoveScans(moves, threads, context, adopt));
   }
   context.SetMetric("epoch", static_cast<double>(moved.epoch));

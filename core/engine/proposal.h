@@ -6,6 +6,7 @@
 
 #include "absl/status/status.h"
 
+#include "core/engine/damaged_scans.h"
 #include "core/engine/integrator.h"
 #include "core/engine/job_board.h"
 #include "core/engine/pose_change.h"
@@ -16,12 +17,13 @@ namespace strata {
 // On the worker: makes what `job` has proposed the next epoch. Scans it says nothing about came in
 // meanwhile and are carried by their partners; a scan that a person moved since `base_epoch`, which
 // the proposal is of, stays where it was put. FAILED_PRECONDITION if the poses have been optimised
-// or reverted since. Adds metrics to the job.
+// or reverted since. Damaged scans are left out and put into `damaged`. Adds metrics to the job.
 absl::Status ApplyProposal(Integrator& integrator,
                            const JobInfo& job,
                            std::uint64_t base_epoch,
                            const MoveTolerance& tolerance,
                            int threads,
+                           DamagedScans& damaged,
                            JobContext& context);
 
 }  // namespace strata

@@ -55,6 +55,8 @@ absl::Status RunRevertJob(Integrator& integrator, const JobInfo& job, JobContext
   moves.origin = PoseOrigin::kRevert;
   moves.reason = absl::StrCat("back to epoch ", epoch, ", job ", job.id);
   moves.job = job.id;
+  DamagedScans damaged;
+  moves.damaged = &damaged;
   context.SetMetric("epoch_before", static_cast<double>(core.snapshots().current().epoch));
   context.SetMetric("scans_moved", static_cast<double>(moves.poses.size()));
   context.SetMetric("scans_carried", static_cast<double>(outcome.carried));
@@ -66,8 +68,12 @@ absl::Status RunRevertJob(Integrator& integrator, const JobInfo& job, JobContext
           }));
   context.SetMetric("epoch", static_cast<double>(moved.epoch));
   context.SetMetric("tiles_changed", static_cast<double>(moved.tiles));
-  context.SetMessage(
-      absl::StrCat("poses and constraints of epoch ", epoch, " are back as epoch ", moved.epoch));
+  damaged.SetMetrics(context);
+  context.SetMessage(absl::StrCat("poses and constraints of epoch ",
+                                  epoch,
+                                  " are back as epoch ",
+                                  moved.epoch,
+                                  damaged.Message()));
   return absl::OkStatus();
 }
 

@@ -32,6 +32,11 @@ absl::StatusOr<ScanMover::MovedScan> ScanMover::Move(const ProposedPose& pose) c
   MovedScan moved;
   moved.T_map_scan = pose.T_map_scan;
   const absl::StatusOr<MlsMap> contribution = source.Contribution(posed.scan, pose.T_map_scan);
+  if (moves_.damaged != nullptr &&
+      moves_.damaged->LeaveOut(pose.scan, header.id.ToString(), contribution.status())) {
+    moved.scan = std::move(posed.scan);
+    return moved;
+  }
   if (!contribution.ok()) {
     return Annotate(contribution.status(), absl::StrCat("scan ", header.id.ToString()));
   }
@@ -74,7 +79,8 @@ absl::StatusOr<ScanMover::KeySet> ScanMover::TilesTouched(StorageReader& reader)
 
 absl::StatusOr<std::vector<PlacedScanRecord>> ScanMover::ScansOfBlock(StorageReader& reader,
                                                                       const KeySet& keys) const {
-  STRATA_ASSIGN_OR_RETURN(std::vector<PlacedScanRecord> scans, ScansOfTiles(reader, keys, epoch_));
+  STRATA_ASSIGN_OR_RETURN(std::vector<PlacedScanRecord> scans,
+                          ScansOfTiles(reader, keys, epoch_, moves_.damaged));
   std::erase_if(scans, [this](const PlacedScanRecord& placed) {
     return moved_.contains(placed.scan.number);
   });
@@ -94,8 +100,9 @@ absl::StatusOr<MlsTileMap> ScanMover::StageMlsTiles(StorageReader& reader, const
     STRATA_RETURN_IF_ERROR(context_.Progress(0.2 + 0.5 * Share(i, blocks.size()), "joining tiles"));
     STRATA_ASSIGN_OR_RETURN(const std::vector<PlacedScanRecord> scans,
                             ScansOfBlock(reader, blocks[i]));
-    STRATA_ASSIGN_OR_RETURN(const MlsTileMap tiles,
-                            MakeTiles(core_, scans, blocks[i], threads_, context_.stop()));
+    STRATA_ASSIGN_OR_RETURN(
+        const MlsTileMap tiles,
+        MakeTiles(core_, scans, blocks[i], threads_, context_.stop(), moves_.damaged));
     for (const auto& [key, tile] : tiles) {
       if (tile == nullptr) gone[key] = nullptr;
     }
@@ -122,6 +129,17 @@ absl::Status ScanMover::StageSurfaces(StorageReader& reader,
       [&](const SurfaceTileMaker::Rows& rows) { return staged_.Put({}, rows); });
 }
 
+absl::Status ScanMover::KeepOtherTiles(StorageReader& reader, const KeySet& keys) {
+  if (moves_.damaged == nullptr) return absl::OkStatus();
+  for (const ScanNumber number : moves_.damaged->Scans()) {
+    if (moved_.contains(number)) continue;
+    STRATA_ASSIGN_OR_RETURN(std::vector<TileKey> tiles, reader.TilesOfScan(number));
+    std::erase_if(tiles, [&keys](const TileKey& key) { return keys.contains(key); });
+    tiles_of_damaged_[number] = std::move(tiles);
+  }
+  return absl::OkStatus();
+}
+
 absl::Status ScanMover::PutMoves(StorageWriter& writer, std::uint64_t epoch) const {
   AlignmentReport report;
   report.message = moves_.reason;
@@ -130,6 +148,9 @@ absl::Status ScanMover::PutMoves(StorageWriter& writer, std::uint64_t epoch) con
     STRATA_RETURN_IF_ERROR(writer.SetTilesOfScan(number, scan.tiles));
     STRATA_RETURN_IF_ERROR(
         writer.SetFootprint(number, FootprintOf(scan.scan.box_scan, scan.T_map_scan)));
+  }
+  for (const auto& [number, tiles] : tiles_of_damaged_) {
+    STRATA_RETURN_IF_ERROR(writer.SetTilesOfScan(number, tiles));
   }
   return absl::OkStatus();
 }
@@ -142,6 +163,7 @@ absl::StatusOr<MoveOutcome> ScanMover::Run(
     STRATA_ASSIGN_OR_RETURN(const KeySet keys, TilesTouched(*reader));
     STRATA_ASSIGN_OR_RETURN(const MlsTileMap gone, StageMlsTiles(*reader, keys));
     STRATA_RETURN_IF_ERROR(StageSurfaces(*reader, keys, gone));
+    STRATA_RETURN_IF_ERROR(KeepOtherTiles(*reader, keys));
   }
   MoveOutcome outcome;
   outcome.tiles = staged_.changed();

@@ -13,6 +13,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/engine/damaged_scans.h"
 #include "core/engine/job_board.h"
 #include "core/engine/map_core.h"
 #include "core/engine/mls_tiles.h"
@@ -27,6 +28,9 @@ struct ScanMoves {
   PoseOrigin origin = PoseOrigin::kOptimize;
   std::string reason;     // of the epoch, for people
   std::uint64_t job = 0;  // that asks for it; 0: none
+  // Takes what is damaged: such scans get their poses, but are in no tile that is made again.
+  // nullptr: one of them is DATA_LOSS, and nothing moves.
+  DamagedScans* damaged = nullptr;
 };
 
 struct MoveOutcome {
@@ -74,6 +78,8 @@ class ScanMover {
   // Returns the tiles where nothing is any more.
   absl::StatusOr<MlsTileMap> StageMlsTiles(StorageReader& reader, const KeySet& keys);
   absl::Status StageSurfaces(StorageReader& reader, const KeySet& keys, const MlsTileMap& gone);
+  // Of damaged scans that stay where they are: all but those made again.
+  absl::Status KeepOtherTiles(StorageReader& reader, const KeySet& keys);
   absl::Status PutMoves(StorageWriter& writer, std::uint64_t epoch) const;
 
   MapCore& core_;
@@ -85,6 +91,7 @@ class ScanMover {
   const std::uint64_t version_;
   StagedTiles staged_;
   absl::btree_map<ScanNumber, MovedScan> moved_;
+  absl::btree_map<ScanNumber, std::vector<TileKey>> tiles_of_damaged_;
 };
 
 }  // namespace strata

@@ -37,22 +37,37 @@ absl::StatusOr<ScanPlanes> PlanesOf(ScanSource& source,
 
 }  // namespace
 
-ScanViews::ScanViews(MapCore& core, std::vector<ScanRecord> scans)
-    : core_(core), scans_(std::move(scans)), features_(core.options().cache_bytes) {}
+ScanViews::ScanViews(MapCore& core, std::vector<ScanRecord> scans, DamagedScans* damaged)
+    : core_(core),
+      scans_(std::move(scans)),
+      damaged_(damaged),
+      features_(core.options().cache_bytes) {}
+
+void ScanViews::Remember(std::size_t node, const absl::Status& status) {
+  if (damaged_ == nullptr) return;
+  damaged_->LeaveOut(scans_[node].number, scans_[node].header.id.ToString(), status);
+}
+
+absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::MakeFeatures(
+    const ScanRecord& scan) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  const MapParameters parameters = core_.info().parameters;
+  ScanSource source(*reader, parameters);
+  STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
+  return std::make_shared<const ScanFeatures>(
+      ScanFeatures::FromMap(local_map, FeatureOptionsOf(scan)));
+}
 
 absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::Features(std::size_t node) {
   {
     absl::MutexLock lock(&mutex_);
     if (auto held = features_.Find(node); held != nullptr) return held;
   }
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-  const MapParameters parameters = core_.info().parameters;
-  ScanSource source(*reader, parameters);
-  STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scans_[node]));
-  auto features = std::make_shared<const ScanFeatures>(
-      ScanFeatures::FromMap(local_map, FeatureOptionsOf(scans_[node])));
+  auto features = MakeFeatures(scans_[node]);
+  Remember(node, features.status());
+  if (!features.ok()) return features;
   absl::MutexLock lock(&mutex_);
-  features_.Put(node, features, features->memory_bytes());
+  features_.Put(node, *features, (*features)->memory_bytes());
   return features;
 }
 
@@ -73,10 +88,16 @@ absl::StatusOr<ScanView> ScanViews::MakeView(StorageReader& reader, const ScanRe
 }
 
 absl::StatusOr<ScanView> ScanViews::View(std::size_t node) {
+  absl::StatusOr<ScanView> view = ReadView(scans_[node]);
+  Remember(node, view.status());
+  return view;
+}
+
+absl::StatusOr<ScanView> ScanViews::ReadView(const ScanRecord& scan) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-  STRATA_ASSIGN_OR_RETURN(ScanView view, reader->FindScanView(scans_[node].number));
+  STRATA_ASSIGN_OR_RETURN(ScanView view, reader->FindScanView(scan.number));
   if (DecodePlace(view.place).ok() && DecodeScanPlanes(view.planes).ok()) return view;
-  return MakeView(*reader, scans_[node]);
+  return MakeView(*reader, scan);
 }
 
 absl::StatusOr<std::shared_ptr<const ScanPlanes>> ScanViews::Planes(std::size_t node) {

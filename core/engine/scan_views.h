@@ -10,6 +10,7 @@
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 
+#include "core/engine/damaged_scans.h"
 #include "core/engine/lru_cache.h"
 #include "core/engine/map_core.h"
 #include "core/mls/mls_map.h"
@@ -20,10 +21,11 @@
 namespace strata {
 
 // Nodes are the places of scans in the list it is made with. Thread-safe. Features are kept as far
-// as they fit into EngineOptions::cache_bytes; descriptors and planes are kept in the store.
+// as they fit into EngineOptions::cache_bytes; descriptors and planes are kept in the store. Scans
+// that answer DATA_LOSS are put into `damaged`, unless it is nullptr.
 class ScanViews final : public AlignmentSource {
  public:
-  ScanViews(MapCore& core, std::vector<ScanRecord> scans);
+  ScanViews(MapCore& core, std::vector<ScanRecord> scans, DamagedScans* damaged = nullptr);
 
   absl::StatusOr<std::shared_ptr<const ScanFeatures>> Features(std::size_t node) override;
   absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t node) override;
@@ -33,12 +35,16 @@ class ScanViews final : public AlignmentSource {
   const ScanRecord& scan(std::size_t node) const { return scans_[node]; }
 
  private:
-  // Loads what is stored of the scan and calls `make` for what is missing.
+  absl::StatusOr<std::shared_ptr<const ScanFeatures>> MakeFeatures(const ScanRecord& scan);
   absl::StatusOr<ScanView> View(std::size_t node);
+  void Remember(std::size_t node, const absl::Status& status);
+  // Loads what is stored of the scan and calls `make` for what is missing.
+  absl::StatusOr<ScanView> ReadView(const ScanRecord& scan);
   absl::StatusOr<ScanView> MakeView(StorageReader& reader, const ScanRecord& scan);
 
   MapCore& core_;
   const std::vector<ScanRecord> scans_;
+  DamagedScans* const damaged_;
   absl::Mutex mutex_;
   LruCache<std::size_t, ScanFeatures> features_ ABSL_GUARDED_BY(mutex_);
 };

@@ -11,6 +11,7 @@
 #include <glog/logging.h>
 
 #include "core/common/status.h"
+#include "core/common/thread_name.h"
 #include "core/engine/rebuild.h"
 
 namespace strata {
@@ -65,6 +66,7 @@ Worker::Step Worker::NextStep() {
 }
 
 void Worker::Loop() {
+  NameThisThread("worker");
   RunRecovery();
   while (true) {
     switch (NextStep()) {

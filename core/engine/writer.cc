@@ -10,6 +10,7 @@
 
 #include "core/common/status.h"
 #include "core/common/stop.h"
+#include "core/common/thread_name.h"
 #include "core/storage/storage.h"
 
 namespace strata {
@@ -79,6 +80,7 @@ void WriterThread::CommitBatch(Durability durability, const Queue& batch) {
 }
 
 void WriterThread::Loop() {
+  NameThisThread("writer");
   while (true) {
     Durability durability = Durability::kFull;
     Queue batch;

@@ -10,6 +10,7 @@
 
 #include "core/common/status.h"
 #include "core/posegraph/information.h"
+#include "core/posegraph/odometry_noise.h"
 #include "core/posegraph/stretches.h"
 #include "core/registration/registration_target.h"
 
@@ -100,11 +101,13 @@ class Alignment {
         stop_(stop),
         stretches_(problem, options.neighbours),
         matches_(problem.T_map_scan.size()),
-        measured_(problem.T_map_scan.size()) {
+        measured_(problem.T_map_scan.size()),
+        odometry_(problem.T_map_scan.size(), nullptr) {
     result_.T_map_scan = problem.T_map_scan;
     for (const ScanPair& pair : problem.pairs) {
       if (pair.measured.has_value()) measured_[pair.j].push_back(&pair);
     }
+    for (const RelativePoseTerm& motion : problem.odometry) odometry_[motion.j] = &motion;
   }
 
   absl::StatusOr<AlignmentResult> Run(AlignmentProgress progress) {
@@ -250,6 +253,7 @@ class Alignment {
     graph.relative = problem_.relative;
     graph.relative.reserve(graph.relative.size() + kMaxPartners * round.matches);
     std::vector<bool> known(matches_.size(), false);
+    std::vector<Matrix6d> information(matches_.size(), Matrix6d::Zero());
     for (std::size_t node = 0; node < matches_.size(); ++node) {
       for (const Match& match : matches_[node]) {
         for (const auto& [i, T_i_scan] : match.T_i_scan) {
@@ -259,18 +263,18 @@ class Alignment {
                                     match.information / static_cast<double>(match.T_i_scan.size()),
                                     match.stretch.may_be_false});
         }
-        known[node] = known[node] || (match.good && !match.stretch.may_be_false);
+        if (!match.good || match.stretch.may_be_false) continue;
+        known[node] = true;
+        information[node] += match.information;
       }
       if (!MeasuredHolds(node)) continue;
       for (const ScanPair* pair : measured_[node]) {
+        const Matrix6d loosened = LoosenedInformation(
+            pair->measured->information,
+            IsotropicInformation(options_.registration_sigma_rad, options_.registration_sigma_m));
         graph.relative.push_back(
-            {pair->i,
-             node,
-             pair->measured->T_i_j,
-             LoosenedInformation(pair->measured->information,
-                                 IsotropicInformation(options_.registration_sigma_rad,
-                                                      options_.registration_sigma_m)),
-             pair->may_be_false});
+            {pair->i, node, pair->measured->T_i_j, loosened, pair->may_be_false});
+        information[node] += loosened;
       }
       known[node] = true;
     }
@@ -282,7 +286,53 @@ class Alignment {
            Normalized(problem_.T_map_scan[pair.i].inverse() * problem_.T_map_scan[pair.j]),
            IsotropicInformation(pair.sigma_rad, pair.sigma_m)});
     }
+    AddOdometry(known, information, graph);
     return graph;
+  }
+
+  // What robots say of their motion: as good as it has proved to be, or where that is not known in
+  // the directions that registration leaves loose.
+  void AddOdometry(const std::vector<bool>& known,
+                   const std::vector<Matrix6d>& information,
+                   PoseGraphProblem& graph) const {
+    for (const std::vector<std::size_t>& trajectory : problem_.trajectories) {
+      const std::optional<OdometryNoise> noise = NoiseOf(trajectory);
+      for (const std::size_t node : trajectory) {
+        if (odometry_[node] == nullptr || !known[node]) continue;
+        RelativePoseTerm term = *odometry_[node];
+        term.information = noise.has_value()
+                               ? IsotropicInformation(noise->sigma_rad, noise->sigma_m)
+                               : WhereLess(information[node], term.information, kLooseShare);
+        if (!term.information.isZero()) graph.relative.push_back(std::move(term));
+      }
+    }
+  }
+
+  std::optional<OdometryNoise> NoiseOf(const std::vector<std::size_t>& trajectory) const {
+    std::vector<std::optional<Pose>> errors;
+    for (const std::size_t node : trajectory) {
+      if (odometry_[node] == nullptr) continue;
+      const std::optional<Pose> T_i_j = MeasuredMotion(odometry_[node]->i, node);
+      errors.push_back(std::nullopt);
+      if (T_i_j.has_value()) errors.back() = odometry_[node]->T_i_j.inverse() * *T_i_j;
+    }
+    return EstimateOdometryNoise(errors);
+  }
+
+  // From scan i to scan j, as registration has it.
+  std::optional<Pose> MeasuredMotion(std::size_t i, std::size_t j) const {
+    if (MeasuredHolds(j)) {
+      for (const ScanPair* pair : measured_[j]) {
+        if (pair->i == i) return pair->measured->T_i_j;
+      }
+    }
+    for (const Match& match : matches_[j]) {
+      if (match.stretch.may_be_false) continue;
+      for (const auto& [partner, T_i_scan] : match.T_i_scan) {
+        if (partner == i) return T_i_scan;
+      }
+    }
+    return std::nullopt;
   }
 
   absl::Status AddPlanes(PoseGraphProblem& graph, AlignmentRound& round) {
@@ -331,9 +381,13 @@ class Alignment {
     result_.measured.clear();
     result_.rejected.clear();
     std::vector<bool> rejected(graph.relative.size(), false);
-    for (const RejectedTerm& term : solution.summary.rejected_relative) rejected[term.term] = true;
-    for (std::size_t k = problem_.relative.size(); k < graph.relative.size(); ++k) {
-      (rejected[k] ? result_.rejected : result_.measured).push_back(graph.relative[k]);
+    const std::size_t given = problem_.relative.size();
+    for (const auto& [k, chi2] : solution.summary.rejected_relative) {
+      rejected[k] = true;
+      result_.rejected.push_back({graph.relative[k], chi2, k < given});
+    }
+    for (std::size_t k = given; k < graph.relative.size(); ++k) {
+      if (!rejected[k]) result_.measured.push_back(graph.relative[k]);
     }
     for (std::size_t p = 0; p < shared_.size(); ++p) shared_[p].plane = solution.planes[p];
     result_.planes = shared_;
@@ -348,6 +402,7 @@ class Alignment {
   const Stretches stretches_;
   std::vector<std::vector<Match>> matches_;             // of every node
   std::vector<std::vector<const ScanPair*>> measured_;  // of every node j
+  std::vector<const RelativePoseTerm*> odometry_;       // of every node j; nullptr: none
   std::vector<SharedPlane> shared_;
   AlignmentResult result_;
 };
@@ -361,6 +416,12 @@ absl::Status CheckProblem(const AlignmentProblem& problem) {
     if (pair.i >= nodes || pair.j >= nodes || pair.i == pair.j) {
       return absl::InvalidArgumentError(absl::StrCat(
           "pair of scans ", pair.i, " and ", pair.j, ": not two different ones of ", nodes));
+    }
+  }
+  for (const RelativePoseTerm& motion : problem.odometry) {
+    if (motion.i >= nodes || motion.j >= nodes || motion.i == motion.j) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "odometry from ", motion.i, " to ", motion.j, ": not two different ones of ", nodes));
     }
   }
   std::vector<int> seen(nodes, 0);

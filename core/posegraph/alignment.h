@@ -58,6 +58,9 @@ struct ScanPair {
   std::optional<MeasuredPose> measured = std::nullopt;
 };
 
+// Registration leaves loose what it knows less than this many times as well as odometry.
+inline constexpr double kLooseShare = 4.0;
+
 // A plane that must not be used where these scans support it.
 struct ExcludedPlane {
   Plane plane_map;
@@ -69,8 +72,14 @@ struct AlignmentProblem {
   std::vector<bool> fixed;       // empty: none
   // Nodes of every run of a robot in the order of its way; each node once.
   std::vector<std::vector<std::size_t>> trajectories;
-  std::vector<ScanPair> pairs;             // known to overlap, however far apart they seem
-  std::vector<RelativePoseTerm> relative;  // that stay as they are: what a person said
+  std::vector<ScanPair> pairs;  // known to overlap, however far apart they seem
+  // That stay as they are: what a person said. Those that may be false are rejected as matches are.
+  std::vector<RelativePoseTerm> relative;
+  // What robots say of their motion from i to j, each the scan before j on its trajectory. Where a
+  // trajectory is long enough to tell how good that is, it counts as much; elsewhere, and by its
+  // information, in the directions that registration leaves loose: on a floor with nothing on it,
+  // say, it knows neither place nor heading.
+  std::vector<RelativePoseTerm> odometry;
   std::vector<PriorTerm> priors;
   std::vector<std::pair<std::size_t, std::size_t>> excluded_pairs;  // never held against each other
   std::vector<ExcludedPlane> excluded_planes;
@@ -103,15 +112,24 @@ struct AlignmentRound {
   double max_shift_m = 0.0, max_turn_rad = 0.0;  // of a scan in this round
 };
 
+// A relative pose that counts nothing in the end.
+struct RejectedMatch {
+  RelativePoseTerm term;
+  double chi2 = 0.0;   // at the final poses
+  bool given = false;  // one of AlignmentProblem::relative
+};
+
 enum class AlignmentTermination { kSettled, kMaxRounds };
 
 struct AlignmentResult {
   std::vector<Pose> T_map_scan;
   std::vector<AlignmentRound> rounds;
   AlignmentTermination termination = AlignmentTermination::kMaxRounds;
-  std::vector<RelativePoseTerm> measured;  // of the last round, those not rejected
-  std::vector<RelativePoseTerm> rejected;  // of the last round: matches that turned out to be false
-  std::vector<SharedPlane> planes;         // of the last round, at the final poses
+  // Of the last round. `rejected`: those that turned out to be false, AlignmentProblem::relative
+  // first; `measured`: matches that did not.
+  std::vector<RelativePoseTerm> measured;
+  std::vector<RejectedMatch> rejected;
+  std::vector<SharedPlane> planes;  // of the last round, at the final poses
   std::vector<NodeResidual> worst_nodes;
 };
 

@@ -278,8 +278,20 @@ bool BlockCholesky::Eliminate(Supernode& node) {
   diagonal.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(rest);
   Eigen::Map<Eigen::MatrixXd> update = UpdateAt(node, node.made);
   update.selfadjointView<Eigen::Lower>().rankUpdate(rest, -1.0);
-  std::copy(update.data(), update.data() + update.size(), stack_.data() + node.kept);
+  if (node.kept != node.made) KeepUpdate(node);
   return true;
+}
+
+// Down to where the children's updates began; only what is below the diagonal is ever read.
+void BlockCholesky::KeepUpdate(const Supernode& node) {
+  const std::size_t rows = node.below.size() * static_cast<std::size_t>(block_size_);
+  for (std::size_t j = 0; j < rows; ++j) {
+    const auto from = stack_.begin() + static_cast<std::ptrdiff_t>(node.made + j * rows);
+    const auto to = stack_.begin() + static_cast<std::ptrdiff_t>(node.kept + j * rows);
+    std::copy(from + static_cast<std::ptrdiff_t>(j),
+              from + static_cast<std::ptrdiff_t>(rows),
+              to + static_cast<std::ptrdiff_t>(j));
+  }
 }
 
 bool BlockCholesky::Factor(const Eigen::VectorXd& damping) {
@@ -288,7 +300,7 @@ bool BlockCholesky::Factor(const Eigen::VectorXd& damping) {
     for (std::size_t c = 0; c < columns; ++c) local_[node.begin + c] = c;
     for (std::size_t k = 0; k < node.below.size(); ++k) local_[node.below[k]] = columns + k;
     node.factor.setZero();
-    UpdateAt(node, node.made).setZero();
+    UpdateAt(node, node.made).triangularView<Eigen::Lower>().setZero();
     AssembleValues(damping, node);
     for (const std::size_t c : node.children) AssembleChild(supernodes_[c], node);
     if (!Eliminate(node)) return false;
@@ -329,58 +341,6 @@ Eigen::VectorXd BlockCholesky::Solve(const Eigen::VectorXd& b) const {
     result.segment(ToIndex(row_[k]) * size, size) = x.segment(ToIndex(k) * size, size);
   }
   return result;
-}
-
-// With the factor [L11 0; L21 L22] of a supernode and the rows below it, and Z the inverse:
-// Z21 = −Z22 L21 L11⁻¹ and Z11 = (L11 L11ᵀ)⁻¹ − (L21 L11⁻¹)ᵀ Z21 (Takahashi et al. 1973). Z22 lies
-// in the supernodes above, all of it, because they have these rows too.
-Eigen::MatrixXd BlockCholesky::InverseDiagonal() const {
-  const Eigen::Index size = block_size_;
-  std::vector<Eigen::MatrixXd> inverse(supernodes_.size());  // as Supernode::factor
-  Eigen::MatrixXd diagonal(ToIndex(row_.size()) * size, size);
-  for (std::size_t s = supernodes_.size(); s-- > 0;) {
-    const Supernode& node = supernodes_[s];
-    const Eigen::Index columns = node.factor.cols();
-    const auto L11 = node.factor.topRows(columns).triangularView<Eigen::Lower>();
-    Eigen::MatrixXd own = L11.solve(Eigen::MatrixXd::Identity(columns, columns));
-    own = (own.transpose() * own).eval();
-    Eigen::MatrixXd below = node.factor.bottomRows(node.factor.rows() - columns);
-    L11.solveInPlace<Eigen::OnTheRight>(below);
-    const Eigen::MatrixXd mixed = -InverseBelow(node, inverse) * below;
-    own.noalias() -= below.transpose() * mixed;
-    inverse[s].resize(node.factor.rows(), columns);
-    inverse[s] << own, mixed;
-    for (std::size_t c = node.begin; c < node.end; ++c) {
-      const Eigen::Index k = ToIndex(c - node.begin) * size;
-      diagonal.middleRows(ToIndex(row_[c]) * size, size) = own.block(k, k, size, size);
-    }
-  }
-  return diagonal;
-}
-
-Eigen::MatrixXd BlockCholesky::InverseBelow(const Supernode& node,
-                                            const std::vector<Eigen::MatrixXd>& inverse) const {
-  const Eigen::Index size = block_size_;
-  const Eigen::Index rows = ToIndex(node.below.size()) * size;
-  Eigen::MatrixXd Z(rows, rows);
-  for (std::size_t b = 0; b < node.below.size(); ++b) {
-    const std::size_t s = supernode_of_[node.below[b]];
-    const Supernode& above = supernodes_[s];
-    const Eigen::Index column = ToIndex(node.below[b] - above.begin) * size;
-    auto next = above.below.begin();
-    for (std::size_t a = b; a < node.below.size(); ++a) {
-      const std::size_t row = node.below[a];
-      std::size_t place = row - above.begin;
-      if (row >= above.end) {
-        next = std::lower_bound(next, above.below.end(), row);
-        place = above.end - above.begin + static_cast<std::size_t>(next - above.below.begin());
-      }
-      const auto block = inverse[s].block(ToIndex(place) * size, column, size, size);
-      Z.block(ToIndex(a) * size, ToIndex(b) * size, size, size) = block;
-      if (a != b) Z.block(ToIndex(b) * size, ToIndex(a) * size, size, size) = block.transpose();
-    }
-  }
-  return Z;
 }
 
 std::size_t BlockCholesky::factor_blocks() const {

@@ -42,10 +42,6 @@ class BlockCholesky {
   // The solution for `b`, by original rows. REQUIRES: the last Factor() succeeded.
   Eigen::VectorXd Solve(const Eigen::VectorXd& b) const;
 
-  // The diagonal blocks of the inverse of what was factored, one below the other, by original rows.
-  // REQUIRES: as Solve(). Costs about as much as Factor() and, while it runs, as much memory.
-  Eigen::MatrixXd InverseDiagonal() const;
-
   std::size_t factor_blocks() const;  // of the factor: what memory and time go by
 
  private:
@@ -68,8 +64,7 @@ class BlockCholesky {
   Eigen::Map<Eigen::MatrixXd> UpdateAt(const Supernode& node, std::size_t place);
   void AssembleChild(const Supernode& child, Supernode& node);
   bool Eliminate(Supernode& node);
-  Eigen::MatrixXd InverseBelow(const Supernode& node,
-                               const std::vector<Eigen::MatrixXd>& inverse) const;
+  void KeepUpdate(const Supernode& node);
 
   int block_size_;
   std::vector<std::size_t> position_;  // in the elimination order, of each row

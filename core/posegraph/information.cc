@@ -1,6 +1,7 @@
 #include "core/posegraph/information.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 namespace strata {
 
@@ -16,6 +17,17 @@ Matrix6d LoosenedInformation(const Matrix6d& information, const Matrix6d& extra)
   const Matrix6d sum = information + extra;
   const Matrix6d loosened = extra - extra * sum.ldlt().solve(extra);
   return 0.5 * (loosened + loosened.transpose());
+}
+
+Matrix6d WhereLess(const Matrix6d& information, const Matrix6d& other, double share) {
+  // information · u = λ · other · u, the u being orthonormal with respect to `other`.
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6d> eigen(information, other);
+  Matrix6d where = Matrix6d::Zero();
+  for (int k = 0; k < 6 && eigen.eigenvalues()[k] < share; ++k) {
+    const Vector6d u = other * eigen.eigenvectors().col(k);
+    where += u * u.transpose();
+  }
+  return where;
 }
 
 }  // namespace strata

@@ -13,6 +13,10 @@ Matrix6d IsotropicInformation(double sigma_rad, double sigma_m);
 // singular, `extra` not.
 Matrix6d LoosenedInformation(const Matrix6d& information, const Matrix6d& extra);
 
+// `other` in those directions alone of which `information` knows less than `share` times as much;
+// zero if there is none. `information` may be singular, `other` not.
+Matrix6d WhereLess(const Matrix6d& information, const Matrix6d& other, double share);
+
 }  // namespace strata
 
 #endif  // STRATA_CORE_POSEGRAPH_INFORMATION_H_

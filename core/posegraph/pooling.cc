@@ -1,11 +1,9 @@
 #include "core/posegraph/pooling.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
-#include "core/common/status.h"
 #include "core/posegraph/information.h"
 
 namespace strata {
@@ -70,36 +68,6 @@ std::vector<Pool> MakePools(std::span<const std::vector<std::size_t>> trajectori
     }
   }
   return pools;
-}
-
-PooledSource::PooledSource(AlignmentSource& scans,
-                           std::span<const Pool> pools,
-                           std::span<const Pose> T_map_scan)
-    : scans_(scans), pools_(pools), T_map_scan_(T_map_scan) {}
-
-absl::StatusOr<std::shared_ptr<const ScanFeatures>> PooledSource::Features(std::size_t pool) {
-  std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points;
-  const std::vector<std::size_t>& nodes = pools_[pool].nodes;
-  const Pose T_pool_map = T_map_scan_[nodes.front()].inverse();
-  ScanFeatureOptions options;
-  for (const std::size_t node : nodes) {
-    absl::StatusOr<std::shared_ptr<const ScanFeatures>> features = scans_.Features(node);
-    if (absl::IsDataLoss(features.status())) continue;
-    STRATA_RETURN_IF_ERROR(features.status());
-    const Eigen::Isometry3f T_pool_scan = (T_pool_map * T_map_scan_[node]).cast<float>();
-    options.sample_count =
-        std::max(options.sample_count, static_cast<int>((*features)->sample().size()));
-    for (int c = 0; c < kFeatureClasses; ++c) {
-      for (const Eigen::Vector3f& p : (*features)->points(static_cast<FeatureClass>(c))) {
-        points[static_cast<std::size_t>(c)].push_back(T_pool_scan * p);
-      }
-    }
-  }
-  return std::make_shared<const ScanFeatures>(ScanFeatures::FromPoints(std::move(points), options));
-}
-
-absl::StatusOr<std::shared_ptr<const ScanPlanes>> PooledSource::Planes(std::size_t) {
-  return std::make_shared<const ScanPlanes>();
 }
 
 PoseGraphProblem PoolGraph(const PoseGraphProblem& graph, std::span<const Pool> pools) {

@@ -4,14 +4,10 @@
 #define STRATA_CORE_POSEGRAPH_POOLING_H_
 
 #include <cstddef>
-#include <memory>
 #include <span>
 #include <vector>
 
-#include "absl/status/statusor.h"
-
 #include "core/geometry/pose.h"
-#include "core/posegraph/alignment.h"
 #include "core/posegraph/pose_graph.h"
 
 namespace strata {
@@ -26,25 +22,6 @@ struct Pool {
 // the last of a trajectory of what is left.
 std::vector<Pool> MakePools(std::span<const std::vector<std::size_t>> trajectories,
                             std::size_t size);
-
-// Serves pools as if they were scans. Both must outlive the source; thread-safe if `scans` is.
-class PooledSource final : public AlignmentSource {
- public:
-  // `T_map_scan`: where the scans are relative to each other within a pool.
-  PooledSource(AlignmentSource& scans,
-               std::span<const Pool> pools,
-               std::span<const Pose> T_map_scan);
-
-  // The features of all scans of the pool.
-  absl::StatusOr<std::shared_ptr<const ScanFeatures>> Features(std::size_t pool) override;
-  // None: planes are held against scans.
-  absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t pool) override;
-
- private:
-  AlignmentSource& scans_;
-  const std::span<const Pool> pools_;
-  const std::span<const Pose> T_map_scan_;
-};
 
 // The graph of scans as one of pools: terms between scans of different pools become terms between
 // the pools they are in, those within one go, and pools that share a scan are held together by it.

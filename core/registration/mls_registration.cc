@@ -16,6 +16,7 @@
 #include "core/mls/features.h"
 #include "core/registration/column_grid.h"
 #include "core/registration/plane_to_plane.h"
+#include "core/registration/sliding.h"
 #include "core/registration/umeyama.h"
 
 namespace strata {
@@ -65,13 +66,14 @@ Round RoundSolver::PlaneToPlane(const Pose& T_local_source, double gate_m, bool 
   round.inliers = sums.inliers;
   if (sums.inliers == 0) return round;
   round.rms_m = std::sqrt(sums.squared_distance_m2 / sums.inliers);
-  round.solution = SolveNormalEquations(sums.H,
-                                        sums.b,
-                                        std::sqrt(sums.squared_radius_m2 / sums.inliers),
-                                        options_.min_eigenvalue_ratio);
+  const double radius_m = std::sqrt(sums.squared_radius_m2 / sums.inliers);
+  const double full = sums.weight / (2.0 * options_.normal_sigma_m * options_.normal_sigma_m);
+  const NormalEquations held =
+      WithoutSliding({sums.H, sums.b}, sums.H_along, options_.min_hold * full, radius_m);
+  round.solution = SolveNormalEquations(held.H, held.b, radius_m, options_.min_eigenvalue_ratio);
   // Residuals larger than the assumed σ take their share from the information.
   const double variance_factor = std::max(1.0, sums.squared_error / sums.inliers);
-  round.information = sums.H / variance_factor;
+  round.information = round.solution.information / variance_factor;
   return round;
 }
 
@@ -137,6 +139,7 @@ absl::Status MlsRegistrationOptions::Validate() const {
   checks.InRange("max_translation_m", max_translation_m, 0.0, 1e6);
   checks.InRange("max_rotation_rad", max_rotation_rad, 0.0, 3.15);
   checks.InRange("min_eigenvalue_ratio", min_eigenvalue_ratio, 0.0, 1.0);
+  checks.InRange("min_hold", min_hold, 0.0, 1.0);
   checks.InRange("neighbours", neighbours, 4, ColumnGrid::kMaxNeighbours);
   checks.InRange("neighbour_radius_m", neighbour_radius_m, 0.01, 100.0);
   return checks.status();

@@ -130,6 +130,9 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
     sums.H.bottomRightCorner<3, 3>() += w * M;
     sums.b.head<3>() += w * P * Mr;
     sums.b.tail<3>() += w * Mr;
+    sums.H_along.topLeftCorner<3, 3>() -= w * P * P;
+    sums.H_along.topRightCorner<3, 3>() += w * P;
+    sums.weight += w;
     sums.squared_error += w * error;
     const double distance = r.dot(normal_q);
     sums.squared_distance_m2 += distance * distance;
@@ -137,6 +140,9 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
     ++sums.inliers;
   }
   sums.H.bottomLeftCorner<3, 3>() = sums.H.topRightCorner<3, 3>().transpose();
+  sums.H_along.bottomRightCorner<3, 3>() = sums.weight * Eigen::Matrix3d::Identity();
+  sums.H_along.bottomLeftCorner<3, 3>() = sums.H_along.topRightCorner<3, 3>().transpose();
+  sums.H_along /= 2.0 * tangent2;
   return sums;
 }
 

@@ -22,11 +22,13 @@ struct MlsRegistrationOptions;
 
 // Sums over the matches of one iteration.
 struct PlaneToPlaneSums {
-  Matrix6d H = Matrix6d::Zero();     // Σ w JᵀMJ
-  Vector6d b = Vector6d::Zero();     // Σ w JᵀM r
-  double squared_error = 0.0;        // Σ w rᵀM r
-  double squared_distance_m2 = 0.0;  // Σ (distance along the normal)²
-  double squared_radius_m2 = 0.0;    // Σ |p|², p in the scan frame
+  Matrix6d H = Matrix6d::Zero();        // Σ w JᵀMJ
+  Vector6d b = Vector6d::Zero();        // Σ w JᵀM r
+  Matrix6d H_along = Matrix6d::Zero();  // Σ w JᵀJ / 2σt²: their share along the surfaces
+  double weight = 0.0;                  // Σ w
+  double squared_error = 0.0;           // Σ w rᵀM r
+  double squared_distance_m2 = 0.0;     // Σ (distance along the normal)²
+  double squared_radius_m2 = 0.0;       // Σ |p|², p in the scan frame
   int selected = 0;
   int inliers = 0;
 };

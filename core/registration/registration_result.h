@@ -31,6 +31,7 @@ struct RegistrationResult {
   int inliers = 0;       // matches of the last iteration that were not rejected
   double overlap = 0.0;  // inliers / selected source points, in [0, 1]
   // Of a right-hand step on T_target_source, tangent order [rotation, translation]; 1/rad², 1/m².
+  // None along degenerate_directions.
   Matrix6d information = Matrix6d::Zero();
   // Unit tangent vectors that the matches leave undetermined: eigenvectors of the information (its
   // rotation scaled to metres) with an eigenvalue below a share of the largest one.
@@ -43,6 +44,7 @@ struct RegistrationResult {
 struct NormalStep {
   Vector6d step = Vector6d::Zero();
   std::vector<Vector6d> degenerate_directions;
+  Matrix6d information = Matrix6d::Zero();  // H without what it says of undetermined directions
 };
 
 // Solves H·step = b. `radius_m` > 0 is the typical distance of the points from the frame's origin:

@@ -30,6 +30,7 @@ absl::StatusOr<Constraint> StatementFromProto(const v1::Constraint& proto) {
   STRATA_ASSIGN_OR_RETURN(constraint.information, FromProto("information", proto.information()));
   if (proto.has_enabled()) constraint.enabled = proto.enabled();
   constraint.note = proto.note();
+  constraint.may_be_false = proto.may_be_false();
   return constraint;
 }
 
@@ -73,6 +74,7 @@ v1::Constraint ToProto(const Constraint& constraint) {
   proto.set_origin(static_cast<v1::ConstraintOrigin>(constraint.origin));
   proto.set_enabled(constraint.enabled);
   proto.set_note(constraint.note);
+  proto.set_may_be_false(constraint.may_be_false);
   return proto;
 }
 

@@ -2,11 +2,18 @@
 
 #include <utility>
 
+#include "core/common/thread_name.h"
+
 namespace strata::server {
 
-Executor::Executor(int threads) {
+Executor::Executor(int threads, const char* name) {
   threads_.reserve(static_cast<std::size_t>(threads));
-  for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { Work(); });
+  for (int i = 0; i < threads; ++i) {
+    threads_.emplace_back([this, name] {
+      NameThisThread(name);
+      Work();
+    });
+  }
 }
 
 Executor::~Executor() {

@@ -16,8 +16,8 @@ namespace strata::server {
 // as there are calls under way, which Runtime bounds: a call has few tasks at a time.
 class Executor {
  public:
-  // REQUIRES: threads ≥ 1.
-  explicit Executor(int threads);
+  // `name` is that of the threads and must outlive them. REQUIRES: threads ≥ 1.
+  Executor(int threads, const char* name);
   // Runs what was submitted, then joins the threads.
   ~Executor();
   Executor(const Executor&) = delete;

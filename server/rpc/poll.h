@@ -44,7 +44,7 @@ class PollReactor : public grpc::ServerWriteReactor<Out> {
 
   // `method` as in "Jobs.Watch"; must outlive the reactor.
   PollReactor(Runtime& runtime, grpc::CallbackServerContext& context, absl::string_view method)
-      : runtime_(runtime), request_(runtime, context, method) {}
+      : runtime_(runtime), request_(runtime, context, method, runtime.watches) {}
 
   // One look, on a query thread. `out` holds what was sent last, and then what is to be sent.
   virtual absl::StatusOr<News> Look(Out& out) = 0;

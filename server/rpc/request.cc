@@ -38,18 +38,22 @@ absl::Time DeadlineOf(const grpc::CallbackServerContext& context) {
 
 }  // namespace
 
-Request::Request(Runtime& runtime, grpc::CallbackServerContext& context, absl::string_view method)
+Request::Request(Runtime& runtime,
+                 grpc::CallbackServerContext& context,
+                 absl::string_view method,
+                 CallGate& gate)
     : runtime_(runtime),
+      gate_(gate),
       method_(method),
       peer_(context.peer()),
       started_(absl::Now()),
-      admitted_(runtime.calls.Enter() <= runtime.options.max_calls) {
+      admitted_(gate.Enter()) {
   call_.stop = Stop(DeadlineOf(context));
   call_.request_id = RequestIdOf(context);
   context.AddInitialMetadata(kRequestIdKey, call_.request_id);
 }
 
-Request::~Request() { runtime_.calls.Leave(); }
+Request::~Request() { gate_.Leave(); }
 
 absl::Status Request::admission() const {
   if (runtime_.shutting_down) {
@@ -59,7 +63,7 @@ absl::Status Request::admission() const {
   if (admitted_) return absl::OkStatus();
   return translate::WithReason(
       absl::ResourceExhaustedError(absl::StrCat(
-          "the server has its ", runtime_.options.max_calls, " calls under way; try again later")),
+          "the server has its ", gate_.most(), " ", gate_.what(), " under way; try again later")),
       translate::kServerBusyReason);
 }
 

@@ -28,8 +28,14 @@ inline constexpr char kRequestIdKey[] = "x-request-id";
 // line in the log. Thread-safe, but for Close(), which is called once and last.
 class Request {
  public:
-  // `method` as in "Maps.Create"; must outlive the request.
-  Request(Runtime& runtime, grpc::CallbackServerContext& context, absl::string_view method);
+  // `method` as in "Maps.Create"; must outlive the request. `gate`: what it counts among, the calls
+  // or the watches.
+  Request(Runtime& runtime,
+          grpc::CallbackServerContext& context,
+          absl::string_view method,
+          CallGate& gate);
+  Request(Runtime& runtime, grpc::CallbackServerContext& context, absl::string_view method)
+      : Request(runtime, context, method, runtime.calls) {}
   ~Request();
   Request(const Request&) = delete;
   Request& operator=(const Request&) = delete;
@@ -53,6 +59,7 @@ class Request {
 
  private:
   Runtime& runtime_;
+  CallGate& gate_;
   const absl::string_view method_;
   const std::string peer_;
   const absl::Time started_;

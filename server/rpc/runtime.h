@@ -5,6 +5,7 @@
 #include <atomic>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/strings/string_view.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 
@@ -18,18 +19,24 @@ struct RuntimeOptions {
   int stream_threads = 8;   // listings and downloads; a slow reader holds one
   int upload_threads = 16;  // scans coming in; a commit holds one until it is durable
   int max_calls = 1024;     // calls under way; more are told SERVER_BUSY
+  int max_watches = 4096;   // watches under way, which are no calls; more are told SERVER_BUSY
   // A stream's reader that takes nothing for so long loses the stream.
   absl::Duration slow_reader_timeout = absl::Seconds(30);
 };
 
-// Counts the calls under way. Thread-safe.
+// Counts what is under way, and says whether it is more than there may be. Thread-safe.
 class CallGate {
  public:
-  // The number of calls with the one that enters.
-  int Enter() {
+  // `what` as in "calls".
+  CallGate(int most, absl::string_view what) : most_(most), what_(what) {}
+
+  // Whether there was room for the one that enters; it leaves in either case.
+  bool Enter() {
     absl::MutexLock lock(&mutex_);
-    return ++calls_;
+    return ++calls_ <= most_;
   }
+  int most() const { return most_; }
+  absl::string_view what() const { return what_; }
   void Leave() {
     absl::MutexLock lock(&mutex_);
     --calls_;
@@ -42,6 +49,8 @@ class CallGate {
   }
 
  private:
+  const int most_;
+  const absl::string_view what_;
   absl::Mutex mutex_;
   int calls_ ABSL_GUARDED_BY(mutex_) = 0;
 };
@@ -51,9 +60,11 @@ struct Runtime {
   Runtime(api::Database& database, const RuntimeOptions& runtime_options)
       : db(database),
         options(runtime_options),
-        queries(runtime_options.query_threads),
-        streams(runtime_options.stream_threads),
-        uploads(runtime_options.upload_threads) {}
+        queries(runtime_options.query_threads, "query"),
+        streams(runtime_options.stream_threads, "stream"),
+        uploads(runtime_options.upload_threads, "upload"),
+        calls(runtime_options.max_calls, "calls"),
+        watches(runtime_options.max_watches, "watches") {}
 
   api::Database& db;
   const RuntimeOptions options;
@@ -61,6 +72,7 @@ struct Runtime {
   Executor streams;
   Executor uploads;
   CallGate calls;
+  CallGate watches;
   std::atomic<bool> shutting_down = false;  // calls without an end of their own should end
 };
 

@@ -57,7 +57,10 @@ void MapWatchReactor::TakePart(v1::WatchMapResponse& out) {
   };
   api::MapUpdate part;
   part.epoch = update.epoch;
-  if (scans_sent_ == 0 && tiles_sent_ == 0) part.epoch_reason = update.epoch_reason;
+  if (scans_sent_ == 0 && tiles_sent_ == 0) {
+    part.epoch_reason = update.epoch_reason;
+    part.whole = update.whole;
+  }
   part.scans = next(update.scans, scans_sent_);
   part.tiles = next(update.tiles, tiles_sent_);
   const bool last = scans_sent_ == update.scans.size() && tiles_sent_ == update.tiles.size();

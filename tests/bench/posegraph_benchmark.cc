@@ -186,34 +186,43 @@ Measured InAChild(const std::function<Measured()>& work) {
   return measured;
 }
 
-void ScaleTable() {
+Measured SolvePatrol(std::size_t nodes) {
+  const PoseGraphProblem problem = Patrol(nodes);
+  const double begin = Milliseconds();
+  const auto solution = OptimizePoseGraph(problem);
+  Measured measured;
+  measured.ms = Milliseconds() - begin;
+  measured.iterations = solution->summary.iterations;
+  return measured;
+}
+
+void ScaleTable(int runs) {
   const Measured empty = InAChild([] { return Measured(); });
-  Measured rows[2];
   const std::size_t sizes[2] = {2'000, 20'000};
+  std::vector<double> ms[2];
+  Measured last[2];
+  for (int run = 0; run < runs; ++run) {
+    for (int k = 0; k < 2; ++k) {
+      last[k] = InAChild([&] { return SolvePatrol(sizes[k]); });
+      ms[k].push_back(last[k].ms);
+    }
+  }
+  double megabytes[2];
   for (int k = 0; k < 2; ++k) {
-    rows[k] = InAChild([&] {
-      const PoseGraphProblem problem = Patrol(sizes[k]);
-      const double begin = Milliseconds();
-      const auto solution = OptimizePoseGraph(problem);
-      Measured measured;
-      measured.ms = Milliseconds() - begin;
-      measured.iterations = solution->summary.iterations;
-      return measured;
-    });
-    rows[k].megabytes -= empty.megabytes;
+    megabytes[k] = last[k].megabytes - empty.megabytes;
     std::printf("patrol of %6zu poses: %9.1f ms, %d iterations, %7.1f MB above an empty process\n",
                 sizes[k],
-                rows[k].ms,
-                rows[k].iterations,
-                rows[k].megabytes);
+                MedianOf(ms[k]),
+                last[k].iterations,
+                megabytes[k]);
   }
   std::printf("ten times the poses: %.1f x the time, %.1f x the memory\n",
-              rows[1].ms / rows[0].ms,
-              rows[1].megabytes / rows[0].megabytes);
+              MedianOf(ms[1]) / MedianOf(ms[0]),
+              megabytes[1] / megabytes[0]);
 }
 
 int Main(int runs) {
-  ScaleTable();  // first: children inherit what the process has grown to
+  ScaleTable(runs);  // first: children inherit what the process has grown to
   const auto folder = testing::FindData("posegraphs");
   if (!folder.has_value()) {
     std::printf("no recorded graphs: set STRATA_DATA to a folder that holds posegraphs\n");

@@ -1,10 +1,18 @@
-pkg_check_modules(pcl_registration REQUIRED IMPORTED_TARGET pcl_registration pcl_filters)
+pkg_check_modules(pcl_registration REQUIRED IMPORTED_TARGET GLOBAL pcl_registration pcl_filters)
 
-strata_executable(
-  registration_benchmark registration_benchmark
-  SOURCES registration_benchmark.cc registration_peers.cc simulated_bridge.cc
-  DEPS strata::registration strata::mls strata::test_support strata::test_recordings
-       PkgConfig::pcl_registration
+strata_library(
+  registration_peers
+  NO_INSTALL
+  SOURCES registration_peers.cc
+  HEADERS registration_peers.h
+  DEPS strata::cloud strata::geometry
+  PRIVATE_DEPS PkgConfig::pcl_registration
 )
 # g++ 12 sees array bounds crossed inside Eigen where PCL instantiates it.
 set_source_files_properties(registration_peers.cc PROPERTIES COMPILE_OPTIONS -Wno-array-bounds)
+
+strata_executable(
+  registration_benchmark registration_benchmark
+  SOURCES registration_benchmark.cc simulated_bridge.cc
+  DEPS strata::registration strata::registration_peers strata::mls strata::test_support strata::test_recordings
+)

@@ -2,9 +2,12 @@
 """Recorded scans through a real server: import, align, render, plan; our poses beside the references.
 
     tests/experiments/real_data.py --build build/release [--data ../shared/data] [--only nclt,kitti] [--out DIR]
+                                   [--peers] [--crispness]
 
-Starts stratad on port 0, drives it with the command line client as a user would, prints a table and exits 1 if a
-bound does not hold (77 where the data are absent). Needs python3-numpy.
+--peers adds the ATE of a chain of PCL's pairwise ICP and GICP, --crispness how well the scans agree at the uploaded
+poses, after ingest, after optimize and at the reference poses (crispness.cc). Starts stratad on port 0, drives it with
+the command line client as a user would, prints a table and exits 1 if a bound does not hold (77 where the data are
+absent). Needs python3-numpy.
 """
 import argparse
 import json
@@ -16,6 +19,8 @@ import tempfile
 import time
 
 import numpy as np
+
+import trajectory_error
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
@@ -68,13 +73,8 @@ def write_index_tum(path, poses):
 
 
 def ate(estimate, reference):
-    """RMSE [m] of positions after rigid alignment (Umeyama without scale); both lists of 4×4."""
-    E = np.array([T[:3, 3] for T in estimate])
-    G = np.array([T[:3, 3] for T in reference])
-    me, mg = E.mean(0), G.mean(0)
-    U, _, Vt = np.linalg.svd((G - mg).T @ (E - me))
-    R = U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt
-    return float(np.sqrt((np.linalg.norm(G - mg - (E - me) @ R.T, axis=1) ** 2).mean()))
+    """RMSE [m] of positions after rigid alignment; both lists of 4×4."""
+    return trajectory_error.ate(*(np.array([T[:3, 3] for T in poses]) for poses in (estimate, reference)))
 
 
 def angle_deg(R):
@@ -84,12 +84,14 @@ def angle_deg(R):
 class Strata:
     """A server of our own and the command line client against it."""
 
-    def __init__(self, build, out):
+    def __init__(self, build, out, optimize_every=0):
+        self.build = build
         self.cli = build / "client/cli/strata"
         self.out = out
         self.dir = tempfile.TemporaryDirectory()
-        self.server = subprocess.Popen([build / "server/stratad", "--data", self.dir.name, "--listen", "127.0.0.1:0"],
-                                       stdout=subprocess.PIPE, stderr=open(out / "stratad.log", "w"), text=True)
+        self.server = subprocess.Popen([build / "server/stratad", "--data", self.dir.name, "--listen", "127.0.0.1:0",
+                                        "--optimize-every", str(optimize_every)],
+                                       stdout=subprocess.PIPE, stderr=open(out / "stratad.log", "a"), text=True)
         self.address = self.server.stdout.readline().split()[1]
 
     def __call__(self, *arguments, check=True):
@@ -141,8 +143,10 @@ class Strata:
 
 
 class Table:
-    def __init__(self):
+    def __init__(self, peers=False, crispness=False):
         self.bad = 0
+        self.peers = peers
+        self.crispness = crispness
 
     def row(self, data, what, value, bound=None, ok=True):
         self.bad += not ok
@@ -173,17 +177,64 @@ def nclt(strata, table, data):
     table.row("nclt", "ATE uploaded", f"{ate([load_poses(folder / 'poses_initial.txt')[i][1] for i in indices], [reference[i][1] for i in indices]):.3f} m")
     table.row("nclt", "ATE after ingest", f"{ate([by_index[i] for i in indices], [reference[i][1] for i in indices]):.3f} m")
     nclt_plan(strata, table, [by_index[i] for i in indices])
-    optimized(strata, table, "nclt", [reference[i][1] for i in indices], 0.15)
+    after = optimized(strata, table, "nclt", [reference[i][1] for i in indices], 0.15)
+    beside(strata, table, "nclt", folder, [by_index[i] for i in indices], after)
+
+
+def beside(strata, table, name, folder, ingested, optimized_poses):
+    """What others reach, and how well the scans agree, before, after and at the reference poses."""
+    reference = load_poses(folder / "poses_reference.txt")
+    indices = sorted(load_poses(folder / "poses_initial.txt"))
+    if table.peers:
+        for method in ("icp", "gicp"):
+            path, start = strata.out / f"{name}_pcl_{method}.txt", time.time()
+            subprocess.run([strata.build / "tests/experiments/icp_chain", folder, path, "--method", method], check=True)
+            chain = load_poses(path)
+            error = ate([chain[i][1] for i in indices], [reference[i][1] for i in indices])
+            table.row(name, f"ATE of a chain of PCL's pairwise {method.upper()}, {time.time() - start:.1f} s",
+                      f"{error:.4f} m")
+    if table.crispness:
+        files = [folder / "poses_initial.txt"]
+        for what, poses in (("ingest", ingested), ("optimize", optimized_poses)):
+            files.append(strata.out / f"{name}_after_{what}.txt")
+            write_index_tum(files[-1], {i: (reference[i][0], T) for i, T in zip(indices, poses)})
+        files.append(folder / "poses_reference.txt")
+        done = subprocess.run([strata.build / "tests/experiments/crispness", folder / "scans", *files], check=True,
+                              stdout=subprocess.PIPE, text=True)
+        for line in done.stdout.splitlines():
+            crisp = json.loads(line)
+            table.row(name, f"{crisp['poses']}: spread rms, median; two levels < 0.5 m",
+                      f"{1000 * crisp['spread_m']:.1f}, {1000 * crisp['median_spread_m']:.1f} mm;"
+                      f" {100 * crisp['double_share']:.2f} %")
 
 
 def optimized(strata, table, name, reference, bound, *parameters):
-    """Loops closed and planes held without a hand."""
+    """Loops closed and planes held without a hand; the poses afterwards."""
     poses, job = strata.optimize(name, *parameters)
     metrics = job["metrics"]
     after = ate(poses, reference)
     table.row(name, f"ATE after optimize: {metrics.get('closures', 0):.0f} closures, {metrics['planes']:.0f} planes, "
                     f"{job['seconds']:.1f} s", f"{after:.4f} m", f"≤ {bound} m", after <= bound)
-    return after
+    return poses
+
+
+def by_itself(strata, table, data, name, folder, bound):
+    """The server closes the loop without being asked."""
+    folder = data / folder
+    own = Strata(strata.build, strata.out, optimize_every=1)
+    try:
+        own.import_scans(name, folder / "scans", "--poses", folder / "poses_initial.txt", "--pose-format", "index-tum")
+        jobs, deadline = [], time.time() + 120
+        while not any(job["state"] == "succeeded" for job in jobs) and time.time() < deadline:
+            time.sleep(0.5)
+            jobs = [job for job in own("job", "list", name) if job["kind"] == "optimize"]
+        reference = load_poses(folder / "poses_reference.txt")
+        uploaded = sorted(load_poses(folder / "poses_initial.txt"))
+        after = ate([T for _, T in own.poses(name)], [reference[i][1] for i in uploaded])
+        table.row(name, f"ATE by itself: {len(jobs)} jobs nobody asked for", f"{after:.4f} m", f"≤ {bound} m",
+                  len(jobs) > 0 and after <= bound)
+    finally:
+        own.stop()
 
 
 def disturbed(strata, table, data, name, folder, bound, seed=1):
@@ -271,15 +322,18 @@ def ate_against_uploaded(strata, table, data, name, folder, *extra):
     uploaded = load_poses(folder / "poses_initial.txt")
     indices = sorted(uploaded)
     before = ate([uploaded[i][1] for i in indices], [reference[i][1] for i in indices])
-    after = ate([T for _, T in strata.poses(name)], [reference[i][1] for i in indices])
+    ingested = [T for _, T in strata.poses(name)]
+    after = ate(ingested, [reference[i][1] for i in indices])
     table.row(name, "ATE after ingest", f"{after:.4f} m", f"≤ {before:.4f} m uploaded", after <= before)
-    return [reference[i][1] for i in indices]
+    return [reference[i][1] for i in indices], ingested
 
 
 def hall(strata, table, data):
-    reference = ate_against_uploaded(strata, table, data, "hall", "hall_livox_loop")
-    optimized(strata, table, "hall", reference, 0.04)
+    reference, ingested = ate_against_uploaded(strata, table, data, "hall", "hall_livox_loop")
+    after = optimized(strata, table, "hall", reference, 0.04)
+    beside(strata, table, "hall", data / "hall_livox_loop", ingested, after)
     disturbed(strata, table, data, "hall", "hall_livox_loop", 0.04)
+    by_itself(strata, table, data, "hall", "hall_livox_loop", 0.04)
     folder = data / "hall_livox_loop"
     stats = strata.import_scans("hall_level", folder / "scans", "--poses", folder / "poses_initial.txt",
                                 "--pose-format", "index-tum", "--level", create=("--cell-size", "0.2"))
@@ -316,8 +370,9 @@ def hall_under_gallery(strata, table, floor=-1.55):
 
 
 def facade(strata, table, data):
-    reference = ate_against_uploaded(strata, table, data, "facade", "eth_facade_tls")
-    optimized(strata, table, "facade", reference, 0.02)
+    reference, ingested = ate_against_uploaded(strata, table, data, "facade", "eth_facade_tls")
+    after = optimized(strata, table, "facade", reference, 0.02)
+    beside(strata, table, "facade", data / "eth_facade_tls", ingested, after)
     disturbed(strata, table, data, "facade", "eth_facade_tls", 0.02)
     facade_halved(strata, table, data)
 
@@ -378,6 +433,8 @@ def main():
     parser.add_argument("--data", type=pathlib.Path, default=os.environ.get("STRATA_DATA", ROOT / "../shared/data"))
     parser.add_argument("--only", default="nclt,hall,facade,kitti,isprs,others")
     parser.add_argument("--out", type=pathlib.Path, default=None, help="pictures, poses and logs (default: a temporary folder)")
+    parser.add_argument("--peers", action="store_true")
+    parser.add_argument("--crispness", action="store_true")
     options = parser.parse_args()
     data = pathlib.Path(options.data)
     if not data.is_dir():
@@ -386,7 +443,7 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         out = options.out or pathlib.Path(scratch)
         out.mkdir(parents=True, exist_ok=True)
-        strata, table = Strata(options.build.resolve(), out), Table()
+        strata, table = Strata(options.build.resolve(), out), Table(options.peers, options.crispness)
         try:
             for name in options.only.split(","):
                 globals()[name](strata, table, data)
@@ -395,4 +452,5 @@ def main():
     return 1 if table.bad else 0
 
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main())

@@ -8,3 +8,13 @@ strata_executable(
   SOURCES place_recognition.cc
   DEPS strata::posegraph strata::registration strata::mls strata::simulator strata::test_support strata::test_recordings
 )
+strata_executable(
+  icp_chain icp_chain
+  SOURCES icp_chain.cc
+  DEPS strata::registration_peers strata::test_recordings
+)
+strata_executable(
+  crispness crispness
+  SOURCES crispness.cc
+  DEPS strata::mls strata::test_recordings
+)

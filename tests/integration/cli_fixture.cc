@@ -7,8 +7,8 @@ namespace strata::testing {
 
 void CliTest::StartServer(const std::string& data) {
   server_.reset();
-  server_ = std::make_unique<StratadProcess>(
-      std::vector<std::string>{"--data", Path(data), "--listen", address_});
+  server_ = std::make_unique<StratadProcess>(std::vector<std::string>{
+      "--data", Path(data), "--listen", address_, "--optimize-every", "0"});
   address_ = server_->Address();
 }
 

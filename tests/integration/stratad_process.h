@@ -24,6 +24,7 @@ class StratadProcess {
   // HOST:PORT out of "listening HOST:PORT", read once.
   const std::string& Address();
   void Signal(int signal) const;
+  pid_t pid() const { return pid_; }
   // Waits for its end: its exit code, or minus the signal that ended it.
   int Wait();
 

@@ -28,7 +28,7 @@ using Code = absl::StatusCode;
 class MapWatchTest : public ServedMock {
  protected:
   void SetUp() override {
-    Serve();
+    Serve(Options());
     stub_ = v1::Maps::NewStub(channel_);
     ON_CALL(db_.maps(), Watch(_, _, _, _))
         .WillByDefault([this](auto&, auto, const api::WatchOptions& options, auto sink) {
@@ -41,6 +41,7 @@ class MapWatchTest : public ServedMock {
         });
   }
 
+  virtual ServerOptions Options() const { return {}; }
   void Put(const api::MapUpdate& now) {
     absl::MutexLock lock(&mutex_);
     now_ = now;
@@ -115,6 +116,7 @@ TEST_F(MapWatchTest, TellsWhereTheMapStandsThenEveryChangeOnce) {
 TEST_F(MapWatchTest, OnlyTheLastPartOfAnUpdateMovesTheResumePoint) {
   api::MapUpdate update = Update(40, 2500);
   update.epoch_reason = "job 7";
+  update.whole = true;
   for (int x = 0; x < 1030; ++x) update.tiles.push_back({{0, x, -x}, 12, x == 0});
   Put(update);
   v1::WatchMapRequest in;
@@ -125,12 +127,14 @@ TEST_F(MapWatchTest, OnlyTheLastPartOfAnUpdateMovesTheResumePoint) {
   std::vector<int> scans;
   std::vector<int> tiles;
   std::vector<std::string> reasons;
+  std::vector<bool> whole;
   std::uint64_t next_scan = 1;
   while (reader_->Read(&message_)) {
     resume.push_back(message_.commit_sequence());
     scans.push_back(message_.scans_size());
     tiles.push_back(message_.tiles_size());
     reasons.push_back(message_.epoch_reason());
+    whole.push_back(message_.whole());
     EXPECT_EQ(message_.epoch(), 3U);
     for (const v1::ScanChange& scan : message_.scans()) {
       EXPECT_EQ(scan.id().sequence(), next_scan++);
@@ -141,6 +145,7 @@ TEST_F(MapWatchTest, OnlyTheLastPartOfAnUpdateMovesTheResumePoint) {
   EXPECT_THAT(scans, ElementsAre(1024, 1024, 452));
   EXPECT_THAT(tiles, ElementsAre(1024, 6, 0));
   EXPECT_THAT(reasons, ElementsAre("job 7", "", ""));
+  EXPECT_THAT(whole, ElementsAre(true, false, false));
 }
 
 TEST_F(MapWatchTest, OnceEndsEvenWhereNothingIsNew) {
@@ -204,6 +209,41 @@ TEST_F(MapWatchTest, AShutdownTellsToResume) {
   const absl::Status status = End();
   EXPECT_THAT(status, StatusIs(Code::kUnavailable, HasSubstr("resume after its restart")));
   EXPECT_EQ(ReasonOf(status), "SHUTTING_DOWN");
+}
+
+// A server with room for one call and two watches.
+class WatchLimitTest : public MapWatchTest {
+ protected:
+  ServerOptions Options() const override {
+    ServerOptions options;
+    options.max_calls = 1;
+    options.max_watches = 2;
+    return options;
+  }
+};
+
+TEST_F(WatchLimitTest, WatchersAreNoCallsAndHaveALimitOfTheirOwn) {
+  grpc::ClientContext other;
+  Watch({});
+  const auto second = stub_->Watch(&other, {});
+  ASSERT_TRUE(reader_->Read(&message_));
+  ASSERT_TRUE(second->Read(&message_));
+  ON_CALL(db_.maps(), List(_)).WillByDefault(::testing::Return(std::vector<MapInfo>()));
+  v1::ListMapsResponse maps;
+  EXPECT_THAT(Call<v1::Maps>(&v1::Maps::Stub::List, v1::ListMapsRequest(), &maps), IsOk());
+
+  grpc::ClientContext refused;
+  const auto third = stub_->Watch(&refused, {});
+  EXPECT_FALSE(third->Read(&message_));
+  const absl::Status status = translate::FromGrpcStatus(third->Finish());
+  EXPECT_THAT(status, StatusIs(Code::kResourceExhausted, HasSubstr("2 watches under way")));
+  EXPECT_EQ(ReasonOf(status), "SERVER_BUSY");
+  EXPECT_NE(translate::RetryDelayOf(status), std::nullopt);
+
+  other.TryCancel();
+  second->Finish();
+  context_.TryCancel();
+  EXPECT_THAT(End(), StatusIs(Code::kCancelled, _));
 }
 
 TEST_F(MapWatchTest, ManyWatchersHoldNoThreads) {

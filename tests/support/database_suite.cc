@@ -19,6 +19,12 @@ std::string DatabaseMakerName(const ::testing::TestParamInfo<DatabaseMaker>& inf
   return info.param.name;
 }
 
+void DatabaseSuite::Reopen() {
+  database_.reset();
+  database_ = GetParam().make(directory_.path());
+  ASSERT_NE(database_, nullptr);
+}
+
 void DatabaseSuite::SetUp() {
   database_ = GetParam().make(directory_.path());
   ASSERT_NE(database_, nullptr);

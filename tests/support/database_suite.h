@@ -37,6 +37,8 @@ class DatabaseSuite : public ::testing::TestWithParam<DatabaseMaker> {
  protected:
   void SetUp() override;
   api::Database& db() { return *database_; }
+  // Closes the database and opens it again.
+  void Reopen();
 
  private:
   TempDir directory_;

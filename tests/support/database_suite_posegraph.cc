@@ -53,6 +53,7 @@ TEST_P(DatabaseSuite, ConstraintsAreAddedSwitchedAndRemoved) {
   Constraint said = TapeMeasure();
   said.id = 4711;
   said.origin = ConstraintOrigin::kIngest;
+  said.may_be_false = true;
   STRATA_ASSERT_OK_AND_ASSIGN(const Constraint added,
                               db().posegraph().AddConstraint({}, kMap, said));
   EXPECT_EQ(added.origin, ConstraintOrigin::kPerson);
@@ -60,6 +61,10 @@ TEST_P(DatabaseSuite, ConstraintsAreAddedSwitchedAndRemoved) {
   prior.i = {};
   prior.information.topLeftCorner<3, 3>().setZero();  // position only
   prior.enabled = false;
+  prior.may_be_false = true;
+  EXPECT_THAT(db().posegraph().AddConstraint({}, kMap, prior),
+              StatusIs(Code::kInvalidArgument, ::testing::HasSubstr("may_be_false")));
+  prior.may_be_false = false;
   STRATA_ASSERT_OK_AND_ASSIGN(const Constraint second,
                               db().posegraph().AddConstraint({}, kMap, prior));
   EXPECT_NE(second.id, added.id);
@@ -81,11 +86,13 @@ TEST_P(DatabaseSuite, ConstraintsAreAddedSwitchedAndRemoved) {
   EXPECT_EQ(listed->information, said.information);
   EXPECT_EQ(listed->note, "tape measure");
   EXPECT_TRUE(listed->enabled);
+  EXPECT_TRUE(listed->may_be_false);
   EXPECT_EQ(listed->origin, ConstraintOrigin::kPerson);
   listed = find(second.id);
   ASSERT_TRUE(listed.has_value());
   EXPECT_TRUE(listed->is_prior());
   EXPECT_FALSE(listed->enabled);
+  EXPECT_FALSE(listed->may_be_false);
 
   for (const bool enabled : {false, false, true}) {
     STRATA_EXPECT_OK(db().posegraph().EnableConstraint({}, kMap, added.id, enabled));

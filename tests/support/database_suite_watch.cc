@@ -27,9 +27,15 @@ struct Known {
   std::map<ScanId, api::ScanChange> scans;
   std::map<TileKey, std::uint64_t> tiles;  // versions
   int messages = 0;
+  bool whole = false;  // the last message
 
   absl::Status Take(const api::MapUpdate& update) {
-    EXPECT_GE(update.commit_sequence, commit_sequence);
+    EXPECT_TRUE(update.whole || update.commit_sequence >= commit_sequence);
+    whole = update.whole;
+    if (whole) {
+      scans.clear();
+      tiles.clear();
+    }
     commit_sequence = update.commit_sequence;
     epoch = update.epoch;
     for (const api::ScanChange& scan : update.scans) {
@@ -73,6 +79,7 @@ TEST_P(DatabaseSuite, AWatcherKnowsWhatTheMapHolds) {
   EXPECT_THAT(known.scans, IsEmpty());
   EXPECT_THAT(known.tiles, IsEmpty());
   EXPECT_THAT(known.messages, 1);
+  EXPECT_TRUE(known.whole);
 
   PutFloor(db(), {"run", 1}, 3.0);
   CatchUp(db(), known);
@@ -112,6 +119,53 @@ TEST_P(DatabaseSuite, AWatcherWhoKnowsAllIsToldNothingTwice) {
   EXPECT_THAT(again.tiles, IsEmpty());
   EXPECT_EQ(again.commit_sequence, known.commit_sequence);
   EXPECT_EQ(again.messages, 1);
+}
+
+TEST_P(DatabaseSuite, AWatcherWhoComesBackInTimeIsToldTheDifference) {
+  PutFloor(db(), {"run", 1});
+  Known known;
+  CatchUp(db(), known);
+  EXPECT_TRUE(known.whole);
+  PutFloor(db(), {"run", 2}, 80.0);
+  CatchUp(db(), known);
+  EXPECT_FALSE(known.whole);
+  EXPECT_THAT(known.scans, SizeIs(2));
+  EXPECT_EQ(known.tiles, ListedTiles(db()));
+  Reopen();  // the clock stands where the watcher saw it
+  CatchUp(db(), known);
+  EXPECT_FALSE(known.whole);
+}
+
+TEST_P(DatabaseSuite, AWatcherWhoMissedARestartTakesTheStateAsAWhole) {
+  PutFloor(db(), {"run", 1});
+  PutFloor(db(), {"run", 2}, 80.0);
+  Known known;
+  CatchUp(db(), known);
+  STRATA_ASSERT_OK(db().scans().Delete({}, kMap, {"run", 2}));
+  Reopen();
+  CatchUp(db(), known);
+  EXPECT_TRUE(known.whole);
+  EXPECT_THAT(known.scans, SizeIs(1));  // nobody could tell that the other one has gone
+  EXPECT_EQ(known.tiles, ListedTiles(db()));
+  STRATA_ASSERT_OK_AND_ASSIGN(const MapStats stats, db().maps().Stats({}, kMap));
+  EXPECT_EQ(known.commit_sequence, stats.commit_sequence);
+  EXPECT_EQ(known.epoch, stats.epoch);
+  CatchUp(db(), known);
+  EXPECT_FALSE(known.whole);
+}
+
+TEST_P(DatabaseSuite, AWatcherOfAMapThatWasReplacedTakesTheNewOneAsAWhole) {
+  PutFloor(db(), {"run", 1});
+  Known known;
+  CatchUp(db(), known);
+  STRATA_ASSERT_OK(db().maps().Delete({}, kMap));
+  STRATA_ASSERT_OK(db().maps().Create({}, kMap, {}));
+  const std::uint64_t before = known.commit_sequence;
+  CatchUp(db(), known);
+  EXPECT_TRUE(known.whole);
+  EXPECT_LT(known.commit_sequence, before);
+  EXPECT_THAT(known.scans, IsEmpty());
+  EXPECT_THAT(known.tiles, IsEmpty());
 }
 
 TEST_P(DatabaseSuite, AWatcherMayAskForATrajectoryAndForNoTiles) {

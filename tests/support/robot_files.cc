@@ -1,5 +1,6 @@
 #include "tests/support/robot_files.h"
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -41,7 +42,8 @@ absl::StatusOr<WrittenRobot> WriteRobot(const Scene& scene,
                                         const RobotFiles& files,
                                         const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder / "scans");
-  const std::vector<Pose> truth = Drive(scene, robot.waypoints, files.step_m, files.height_m);
+  std::vector<Pose> truth = Drive(scene, robot.waypoints, files.step_m, files.height_m);
+  truth.resize(std::min(truth.size(), files.max_scans));
   STRATA_RETURN_IF_ERROR(
       WriteFileBytes(folder / "poses_truth.txt", IndexTum(truth, "exact, simulated")));
   STRATA_RETURN_IF_ERROR(

@@ -17,6 +17,7 @@ namespace strata::testing {
 struct RobotFiles {
   double step_m = 1.0;    // way between scans
   double height_m = 1.2;  // of the sensor
+  std::size_t max_scans = 100'000;
   OdometryNoise noise;
   SensorOptions sensor;
 };

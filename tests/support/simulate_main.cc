@@ -30,16 +30,20 @@ struct Options {
   std::string world;
   std::filesystem::path out;
   std::uint64_t seed = 1;
+  int districts = 1;
   std::vector<std::string> robots;
   RobotFiles files;
 };
 
-World WorldOf(const std::string& name, std::uint64_t seed) {
+World WorldOf(const std::string& name, std::uint64_t seed, int districts) {
   if (name == "car_park") {
     return CarParkWorld();
   }
   if (name == "campus") {
     return CampusWorld(seed);
+  }
+  if (name == "city") {
+    return CityWorld(districts, seed);
   }
   if (name == "campus_loop") {
     return CampusLoopWorld(seed);
@@ -72,7 +76,7 @@ absl::StatusOr<std::vector<Robot>> RobotsOf(const World& world,
 }
 
 absl::Status Simulate(const Options& options) {
-  const World world = WorldOf(options.world, options.seed);
+  const World world = WorldOf(options.world, options.seed, options.districts);
   STRATA_ASSIGN_OR_RETURN(const std::vector<Robot> robots, RobotsOf(world, options.robots));
   std::filesystem::create_directories(options.out);
   std::string places;
@@ -98,13 +102,19 @@ int Main(int argc, char** argv) {
   app.add_option("WORLD", options.world, "Which world")
       ->required()
       ->check(CLI::IsMember(
-          {"bridge", "open_bridge", "low_bridge", "car_park", "campus", "campus_loop"}));
+          {"bridge", "open_bridge", "low_bridge", "car_park", "campus", "campus_loop", "city"}));
   app.add_option("OUT", options.out, "Folder to write to")->required();
   app.add_option("--seed", options.seed, "Of all noise")->capture_default_str();
   app.add_option("--robot",
                  options.robots,
                  "Only these; the ones that drive loops (car_park: loop, bridge: eight) are "
                  " written only when asked for");
+  app.add_option("--districts", options.districts, "Of the city, a robot in each")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  app.add_option("--scans", options.files.max_scans, "Of each robot, at most")
+      ->check(CLI::Range(1, 100'000))
+      ->capture_default_str();
   app.add_option("--step", options.files.step_m, "Way between scans [m]")
       ->check(CLI::Range(0.1, 100.0))
       ->capture_default_str();

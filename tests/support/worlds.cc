@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -203,16 +204,20 @@ double DistanceToRoute(const std::vector<Vector3d>& route, const Vector2d& place
 }
 
 // Terrain with houses and trees beside the ways of `robots`.
-World PlantCampus(std::vector<Robot> robots, std::uint64_t seed) {
-  constexpr double kHalf = 150.0;
+World PlantCampus(std::vector<Robot> robots,
+                  const Eigen::AlignedBox2d& area,
+                  int houses,
+                  int trees,
+                  std::uint64_t seed) {
+  constexpr double kMargin = 15.0;
   World world;
   world.robots = std::move(robots);
-  world.scene.SetTerrain({Vector2d(-kHalf, -kHalf), Vector2d(kHalf, kHalf)}, 1.0, CampusHeight);
+  world.scene.SetTerrain(area, 1.0, CampusHeight);
   Random random(seed);
   const auto free_place = [&](double distance) {
     while (true) {
-      const Vector2d place(random.Uniform(-kHalf + 15, kHalf - 15),
-                           random.Uniform(-kHalf + 15, kHalf - 15));
+      const Vector2d place(random.Uniform(area.min().x() + kMargin, area.max().x() - kMargin),
+                           random.Uniform(area.min().y() + kMargin, area.max().y() - kMargin));
       if (std::all_of(world.robots.begin(), world.robots.end(), [&](const Robot& robot) {
             return DistanceToRoute(robot.waypoints, place) > distance;
           })) {
@@ -220,19 +225,56 @@ World PlantCampus(std::vector<Robot> robots, std::uint64_t seed) {
       }
     }
   };
-  for (int i = 0; i < 40; ++i) {
+  for (int i = 0; i < houses; ++i) {
     const Vector3d size(random.Uniform(8, 22), random.Uniform(8, 16), random.Uniform(5, 14));
     const Vector3d foot = free_place(0.5 * std::hypot(size.x(), size.y()) + 3.0);
     world.scene.Add(House(foot - Vector3d(0, 0, 2), size, random.Uniform(0, 3.1)));
   }
-  for (int i = 0; i < 150; ++i) {
+  for (int i = 0; i < trees; ++i) {
     AddTree(world.scene, free_place(4.0), random.Uniform(5, 10));
   }
   world.scene.Build();
   return world;
 }
 
+World PlantCampus(std::vector<Robot> robots, std::uint64_t seed) {
+  return PlantCampus(
+      std::move(robots), {Vector2d(-150.0, -150.0), Vector2d(150.0, 150.0)}, 40, 150, seed);
+}
+
+// To and fro along streets 60 m apart: those along x, those along y, those along x again.
+std::vector<Vector3d> DistrictTour(const Vector2d& corner) {
+  constexpr int kStreets = 6;
+  constexpr double kStreetM = 60.0;
+  std::vector<Vector3d> tour;
+  for (int pass = 0; pass < 3; ++pass) {
+    for (int k = 0; k < 2 * kStreets; ++k) {
+      const double across = kStreetM * (k / 2);
+      const bool far = (k + 1) / 2 % 2 == 1;
+      const double along = far ? kStreetM * (kStreets - 1) : 0.0;
+      const Vector2d p = corner + (pass == 1 ? Vector2d(across, along) : Vector2d(along, across));
+      tour.push_back(OnCampus(p.x(), p.y()));
+    }
+  }
+  return tour;
+}
+
 }  // namespace
+
+World CityWorld(int districts, std::uint64_t seed) {
+  constexpr int kDistrictsARow = 5;
+  constexpr double kDistrictM = 300.0;
+  constexpr double kMarginM = 30.0;
+  std::vector<Robot> robots;
+  Eigen::AlignedBox2d area;
+  for (int d = 0; d < districts; ++d) {
+    const Vector2d corner = kDistrictM * Vector2d(d % kDistrictsARow, d / kDistrictsARow);
+    robots.push_back({"robot" + std::to_string(d), DistrictTour(corner)});
+    area.extend((corner - Vector2d::Constant(kMarginM)).eval());
+    area.extend((corner + Vector2d::Constant(kDistrictM + kMarginM)).eval());
+  }
+  return PlantCampus(std::move(robots), area, 40 * districts, 150 * districts, seed);
+}
 
 World CampusWorld(std::uint64_t seed) {
   std::vector<Robot> robots = {{"north_loop", {}}, {"south_loop", {}}};

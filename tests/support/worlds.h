@@ -1,4 +1,4 @@
-// Three worlds drawn for tests and the demo, with robots that drive through them. Metres, z up.
+// Worlds drawn for tests and the demo, with robots that drive through them. Metres, z up.
 #ifndef STRATA_TESTS_SUPPORT_WORLDS_H_
 #define STRATA_TESTS_SUPPORT_WORLDS_H_
 
@@ -53,6 +53,12 @@ World CampusWorld(std::uint64_t seed = 1);
 //   robots: "loop", 300 m round and 10 m of the way once more; shape and place by the seed.
 //   places: "start" and "far".
 World CampusLoopWorld(std::uint64_t seed = 1);
+
+// Districts of 300 × 300 m of such terrain, five a row, each with streets 60 m apart: as large as
+// wanted, and everywhere alike.
+//   robots: "robot0", "robot1", … drive all streets of a district along x, then all along y, then
+//   those along x again: 6.9 km. Neighbours share the street between them.
+World CityWorld(int districts, std::uint64_t seed = 1);
 
 // A yard of 48 × 28 m around (5, 0) with a wall of 4 m around it, three sheds and four posts; its
 // ground is z = 0. Small, and well determined from anywhere in it: for tests of single steps.

@@ -91,6 +91,22 @@ TEST(WorldsTest, CampusRobotsDriveAboutHalfAKilometreEach) {
   }
 }
 
+TEST(WorldsTest, CityRobotsMeetOnTheStreetBetweenTheirDistricts) {
+  const World world = CityWorld(2);
+  ASSERT_EQ(world.robots.size(), 2U);
+  ExpectDrivesAreFree(world);
+  const std::vector<Pose> west = DriveOf(world, "robot0");
+  const std::vector<Pose> east = DriveOf(world, "robot1");
+  EXPECT_NEAR(static_cast<double>(west.size()), 6900.0, 20.0);
+  std::size_t met = 0;
+  for (std::size_t i = 0; i < west.size(); i += 10) {
+    met += std::any_of(east.begin(), east.end(), [&](const Pose& T) {
+      return (T.translation() - west[i].translation()).norm() < 1.0;
+    });
+  }
+  EXPECT_GT(met, 40U);
+}
+
 // Of the last poses, how near one comes to the first, in place and in height.
 double ReturnsWithin(const std::vector<Pose>& poses) {
   double nearest = 1e9;

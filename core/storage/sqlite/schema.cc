@@ -133,6 +133,7 @@ ALTER TABLE truth_epoch ADD COLUMN job INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE truth_constraint ADD COLUMN since_epoch INTEGER NOT NULL DEFAULT 1;
 ALTER TABLE truth_constraint ADD COLUMN until_epoch INTEGER NOT NULL DEFAULT 4611686018427387904;
 ALTER TABLE truth_constraint ADD COLUMN proposed_by INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE truth_constraint ADD COLUMN may_be_false INTEGER NOT NULL DEFAULT 0;
 CREATE INDEX truth_constraint_proposed ON truth_constraint (proposed_by) WHERE proposed_by > 0;
 CREATE TABLE truth_plane (
   id INTEGER PRIMARY KEY,

@@ -41,6 +41,7 @@ absl::StatusOr<ConstraintRecord> ReadConstraint(const Statement& row) {
   constraint.note = row.Text(7);
   constraint.i = {row.Text(8), row.Unsigned(9)};
   constraint.j = {row.Text(10), row.Unsigned(11)};
+  constraint.may_be_false = row.Int(12) != 0;
   return record;
 }
 
@@ -85,7 +86,7 @@ absl::StatusOr<std::vector<ConstraintRecord>> SqliteReader::ListConstraints(std:
       Statement row,
       database_.Prepare("SELECT c.id, c.scan_i, c.scan_j, c.pose, c.information, c.origin, "
                         "c.enabled, c.note, coalesce(i.trajectory, ''), coalesce(i.sequence, 0), "
-                        "j.trajectory, j.sequence FROM truth_constraint AS c "
+                        "j.trajectory, j.sequence, c.may_be_false FROM truth_constraint AS c "
                         "LEFT JOIN truth_scan AS i ON i.number = c.scan_i "
                         "JOIN truth_scan AS j ON j.number = c.scan_j "
                         "WHERE c.since_epoch <= ?1 AND c.until_epoch > ?1 AND c.proposed_by = 0 "
@@ -192,19 +193,20 @@ absl::StatusOr<std::uint64_t> SqliteWriter::InsertConstraint(const ConstraintRec
   const std::string pose = EncodePose(constraint.T_i_j);
   const std::string information = EncodeMatrix6(constraint.information);
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t id, NextConstraint());
-  STRATA_RETURN_IF_ERROR(
-      RunSql("INSERT INTO truth_constraint (id, scan_i, scan_j, pose, information, origin, "
-             "enabled, note, since_epoch, proposed_by) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, "
-             "(SELECT epoch FROM truth_map WHERE id = 1), ?9)",
-             id,
-             record.scan_i,
-             record.scan_j,
-             Blob{pose},
-             Blob{information},
-             static_cast<int>(constraint.origin),
-             constraint.enabled,
-             constraint.note,
-             job));
+  STRATA_RETURN_IF_ERROR(RunSql(
+      "INSERT INTO truth_constraint (id, scan_i, scan_j, pose, information, origin, "
+      "enabled, note, since_epoch, proposed_by, may_be_false) VALUES (?1, ?2, ?3, ?4, ?5, ?6, "
+      "?7, ?8, (SELECT epoch FROM truth_map WHERE id = 1), ?9, ?10)",
+      id,
+      record.scan_i,
+      record.scan_j,
+      Blob{pose},
+      Blob{information},
+      static_cast<int>(constraint.origin),
+      constraint.enabled,
+      constraint.note,
+      job,
+      constraint.may_be_false));
   return id;
 }
 

@@ -217,23 +217,6 @@ TEST_F(WorldCommandsTest, AnEndedWatchSaysWhereItGoesOn) {
   EXPECT_THAT(talk_.str(), HasSubstr("--since 40"));
 }
 
-TEST_F(WorldCommandsTest, AWatchWaitsForAServerThatIsAway) {
-  EXPECT_CALL(db_.maps(), Watch(_, _, _, _))
-      .WillOnce([](auto&, auto, auto&, auto sink) {
-        api::MapUpdate update;
-        update.commit_sequence = 40;
-        update.epoch = 2;
-        EXPECT_THAT(sink(update), IsOk());
-        return absl::UnavailableError("away");
-      })
-      .WillOnce([](auto&, auto, const api::WatchOptions& options, auto) {
-        EXPECT_EQ(options.since, 40U);
-        EXPECT_EQ(options.epoch, 2U);
-        return absl::OkStatus();
-      });
-  EXPECT_THAT(Run({"map", "watch", "m", "--once"}), IsOk());
-}
-
 TEST_F(WorldCommandsTest, APoseThatIsNotKnownSaysWhy) {
   EXPECT_CALL(db_.posegraph(), LookupPose(_, absl::string_view("m"), ScanId{"run", 4}))
       .WillOnce(Return(api::PoseLookup{false, "pending behind 3 scans", Pose::Identity(), 2}));
@@ -270,6 +253,38 @@ TEST_F(WorldCommandsTest, AConstraintIsSaidInMetresAndRadians) {
   information << 400, 400, 400, 100, 100, 100;
   EXPECT_TRUE(seen.information.isApprox(Matrix6d(information.asDiagonal()), 1e-9));
   EXPECT_EQ(seen.note, "tape");
+  EXPECT_FALSE(seen.may_be_false);
+  const Json doubtful = RunJson(
+      {"posegraph", "add-constraint", "m", "a/1", "b/2", "--pose", "1,2,3", "--may-be-false"});
+  EXPECT_TRUE(seen.may_be_false);
+  EXPECT_EQ(doubtful["may_be_false"], true);
+}
+
+TEST_F(WorldCommandsTest, AnImportedEdgeMayBeFalseIfTheUserSaysSo) {
+  api::PoseGraphState state;
+  state.nodes = {Node({"a", 1}, 0.0), Node({"a", 2}, 1.5)};
+  ON_CALL(db_.posegraph(), Get(_, _)).WillByDefault(Return(state));
+  std::vector<Constraint> added;
+  ON_CALL(db_.posegraph(), AddConstraint(_, _, _))
+      .WillByDefault([&added](auto&, auto, const Constraint& constraint) {
+        added.push_back(constraint);
+        return absl::StatusOr<Constraint>(constraint);
+      });
+  const ::strata::testing::TempDir dir;
+  const std::string file = (dir.path() / "graph.g2o").string();
+  const std::string information = " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
+  std::ofstream(file) << "# 0 a/1\n# 1 a/2\n# 2 map\n"
+                      << "EDGE_SE3:QUAT 0 1 1.5 0 0 0 0 0 1" << information
+                      << "EDGE_SE3:QUAT 2 0 0 0 0 0 0 0 1" << information;
+  EXPECT_EQ(RunJson({"posegraph", "import", "m", file})["constraints_added"], 2);
+  ASSERT_EQ(added.size(), 2U);
+  EXPECT_FALSE(added[0].may_be_false);
+  added.clear();
+  RunJson({"posegraph", "import", "m", file, "--may-be-false"});
+  ASSERT_EQ(added.size(), 2U);
+  EXPECT_TRUE(added[0].may_be_false);
+  EXPECT_TRUE(added[1].is_prior());
+  EXPECT_FALSE(added[1].may_be_false);
 }
 
 TEST_F(WorldCommandsTest, APlaceInTheMapIsAPriorOnThePositionAlone) {

@@ -1,7 +1,11 @@
 #include <atomic>
 #include <cstdint>
+#include <limits>
+#include <thread>
 #include <vector>
 
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -76,11 +80,46 @@ TEST_F(MapWatchTest, OnceEndsWithWhatThereIs) {
   EXPECT_THAT(seen, ElementsAre(4U));
 }
 
-TEST_F(MapWatchTest, AServerThatStaysAwayIsUnavailable) {
-  ON_CALL(behind_.maps(), Watch(_, _, _, _))
-      .WillByDefault(Return(absl::UnavailableError("starting")));
-  const auto ignore = [](const api::MapUpdate&) { return absl::OkStatus(); };
-  EXPECT_THAT(client_->maps().Watch({}, "m", {}, ignore), StatusIs(Code::kUnavailable, "starting"));
+// Servers that are starting, for as long as the test says.
+class AwayTest : public MapWatchTest {
+ protected:
+  void SetUp() override {
+    MapWatchTest::SetUp();
+    ON_CALL(behind_.maps(), Watch(_, _, _, _)).WillByDefault([this](auto&, auto, auto&, auto sink) {
+      return ++looks_ <= away_ ? absl::UnavailableError("starting") : sink({});
+    });
+  }
+  static absl::Status Enough(const api::MapUpdate&) { return absl::OutOfRangeError("enough"); }
+
+  int away_ = std::numeric_limits<int>::max();
+};
+
+TEST_F(AwayTest, IsWaitedForHoweverLong) {
+  away_ = 9;  // more than the attempts of other calls
+  EXPECT_THAT(client_->maps().Watch({}, "m", {}, Enough), StatusIs(Code::kOutOfRange, "enough"));
+  EXPECT_EQ(looks_, 10);
+}
+
+TEST_F(AwayTest, IsWaitedForByOnceAsByOtherCalls) {
+  EXPECT_THAT(client_->maps().Watch({}, "m", {.trajectory = "", .once = true}, Enough),
+              StatusIs(Code::kUnavailable, "starting"));
+  EXPECT_EQ(looks_, BackoffOptions().max_attempts);
+}
+
+TEST_F(AwayTest, IsWaitedForUntilTheDeadline) {
+  const api::Call call{Stop(absl::Now() + absl::Milliseconds(300)), "", ""};
+  const absl::Status ended = client_->maps().Watch(call, "m", {}, Enough);
+  EXPECT_TRUE(absl::IsUnavailable(ended) || absl::IsDeadlineExceeded(ended)) << ended;
+}
+
+TEST_F(AwayTest, IsNotWaitedForByOneWhoStops) {
+  const api::Call call;
+  std::thread impatient([&] {
+    while (looks_ < 8) absl::SleepFor(absl::Milliseconds(1));
+    call.stop.Request();
+  });
+  EXPECT_THAT(client_->maps().Watch(call, "m", {}, Enough), StatusIs(Code::kCancelled, _));
+  impatient.join();
 }
 
 TEST_F(MapWatchTest, TheCallersStopEndsIt) {

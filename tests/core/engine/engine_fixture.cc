@@ -90,6 +90,12 @@ PointCloud SeeWorld(const Pose& T_map_scan, std::uint64_t seed, std::size_t poin
   return Sample(T_map_scan, RandomBoxes(77, 120, 40.0), 12.0, seed, points);
 }
 
+PointCloud SeeFloor(const Pose& T_map_scan, std::uint64_t seed, std::size_t points) {
+  std::vector<Box> boxes = RandomBoxes(11, 35, 25.0);
+  for (Box& box : boxes) box.top *= 0.4;
+  return Sample(T_map_scan, boxes, 12.0, seed, points);
+}
+
 Pose PoseAt(double x_m, double y_m, double yaw_rad) {
   return MakePose(Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ())),
                   {x_m, y_m, 0.0});

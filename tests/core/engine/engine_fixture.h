@@ -30,6 +30,9 @@ MapParameters SmallMap();
 PointCloud MakeRoom(std::uint64_t seed, std::size_t points = 3000);
 // The same world of boxes seen from T_map_scan: scans of it overlap and can be aligned.
 PointCloud SeeWorld(const Pose& T_map_scan, std::uint64_t seed, std::size_t points = 6000);
+// A floor of which a scan sees 24 × 24 m and some eight low boxes: what lies along it is hardly
+// held by anything.
+PointCloud SeeFloor(const Pose& T_map_scan, std::uint64_t seed, std::size_t points = 6000);
 Pose PoseAt(double x_m, double y_m, double yaw_rad = 0.0);
 // Where room `i` of UploadRooms() lies.
 Pose RoomPose(std::uint64_t i);

@@ -118,7 +118,7 @@ TEST_F(PoseChangeTest, ScansFollowTheOneBeforeOnTheirTrajectory) {
   ExpectCarried(moves, second, first);
   ExpectCarried(moves, third, first);
   EXPECT_FALSE(moves.contains(other));
-  EXPECT_EQ(change.Resolve({}).carried, 2U);  // the first of a trajectory has nobody to follow
+  EXPECT_EQ(change.Resolve({}).carried, 2U);  // nothing leads to the other trajectory
 }
 
 TEST_F(PoseChangeTest, WhatAScanWasHeldAgainstComesFirst) {
@@ -133,12 +133,58 @@ TEST_F(PoseChangeTest, WhatAScanWasHeldAgainstComesFirst) {
   change.Decide(far, PoseAt(4, -5, 0.9));
   change.Decide(before, PoseAt(7, 7, 1.9));
   ExpectCarried(Moves(change), scan, near);
-  // What came later says nothing about it.
-  const ScanNumber later = Put({"other", 3}, PoseAt(0, 0));
-  Hold(later, near);
-  PoseChange again = Read();
-  again.Decide(later, PoseAt(50, 0));
-  EXPECT_THAT(Moves(again), SizeIs(1));
+}
+
+// Scans that came in late, and the first of a trajectory.
+TEST_F(PoseChangeTest, YoungerScansCarryToo) {
+  const ScanNumber first = Put({"run", 1}, PoseAt(1, 0, 0.1));
+  const ScanNumber second = Put({"run", 2}, PoseAt(2, 1, 0.4));
+  const ScanNumber held = Put({"other", 1}, PoseAt(8, 1, 2.5));
+  const ScanNumber last = Put({"run", 3}, PoseAt(4, 1, 1.1));
+  Hold(held, last);
+  PoseChange change = Read();
+  change.Decide(last, PoseAt(-2, 3, 0.3));
+  const auto moves = Moves(change);
+  EXPECT_THAT(moves, SizeIs(4));
+  ExpectCarried(moves, second, last);
+  ExpectCarried(moves, first, second);  // by one that is carried itself
+  ExpectCarried(moves, held, last);
+  EXPECT_EQ(change.Resolve({}).carried, 3U);
+}
+
+TEST_F(PoseChangeTest, TheNearestOfThoseDecidedCarries) {
+  const ScanNumber far = Put({"a", 1}, PoseAt(0, 0));
+  const ScanNumber scan = Put({"run", 7}, PoseAt(10, 0, 0.7));
+  const ScanNumber near = Put({"b", 1}, PoseAt(9, 0, 0.2));
+  const ScanNumber undecided = Put({"c", 1}, PoseAt(10, 0));
+  const ScanNumber beside = Put({"run", 8}, PoseAt(10, 0.1));
+  for (const ScanNumber partner : {far, near, undecided}) Hold(partner, scan);
+  PoseChange change = Read();
+  change.Decide(far, PoseAt(1, 1, 0.1));
+  change.Decide(near, PoseAt(9, 3, 0.4));
+  change.Decide(beside, PoseAt(5, 5, 0.4));
+  const auto moves = Moves(change);
+  ExpectCarried(moves, scan, near);
+  ExpectCarried(moves, undecided, scan);
+}
+
+// Every third scan of a bent way is decided as the whole way is turned: the others turn with it,
+// whatever the order in which they came in.
+TEST_F(PoseChangeTest, ARigidMotionOfSomeIsOneOfAll) {
+  const Pose turn = PoseAt(3, -7, 0.8);
+  std::vector<std::uint64_t> order = {5, 9, 1, 8, 2, 12, 3, 7, 11, 4, 10, 6};
+  std::map<std::uint64_t, ScanNumber> scans;
+  for (const std::uint64_t k : order) {
+    const auto n = static_cast<double>(k);
+    scans[k] = Put({"run", k}, PoseAt(2 * n, 0.3 * n * n, 0.2 * n));
+  }
+  PoseChange change = Read();
+  for (std::uint64_t k = 2; k <= 12; k += 3) change.Decide(scans[k], turn * before_[scans[k]]);
+  const auto moves = Moves(change);
+  ASSERT_THAT(moves, SizeIs(12));
+  for (const auto& [scan, pose] : moves) {
+    EXPECT_TRUE(pose.isApprox(turn * before_[scan], 1e-9)) << scan;
+  }
 }
 
 TEST_F(PoseChangeTest, WhatIsDecidedStays) {

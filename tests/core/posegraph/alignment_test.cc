@@ -269,9 +269,15 @@ TEST_F(AlignmentTest, AFalseClosureMovesNothingUnlessItMustBeTrue) {
   Disturb(6);
   STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align());
   EXPECT_LT(ErrorsOf(result.T_map_scan).max_m, 0.02);
-  // What was given from outside is neither measured nor rejected.
-  for (const auto* terms : {&result.measured, &result.rejected}) {
-    for (const RelativePoseTerm& term : *terms) EXPECT_FALSE(term.T_i_j.isApprox(lie.T_i_j));
+  ASSERT_FALSE(result.rejected.empty());
+  EXPECT_TRUE(result.rejected[0].given);
+  EXPECT_EQ(result.rejected[0].term.j, 8U);
+  EXPECT_GT(result.rejected[0].chi2, 1e5);
+  for (std::size_t k = 1; k < result.rejected.size(); ++k) {
+    EXPECT_FALSE(result.rejected[k].given);
+  }
+  for (const RelativePoseTerm& term : result.measured) {
+    EXPECT_FALSE(term.T_i_j.isApprox(lie.T_i_j));  // it was given
   }
   problem_.relative[0].may_be_false = false;
   options_.max_rounds = 1;

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 namespace strata {
@@ -89,17 +88,6 @@ TEST_P(BlockCholeskyTest, SolvesWhatADenseFactorisationSolves) {
     ASSERT_TRUE(sparse.Factor(damping));
     const Eigen::VectorXd x = sparse.Solve(b);
     EXPECT_LT((x - damped.llt().solve(b)).norm(), 1e-9 * x.norm());
-  }
-}
-
-TEST_P(BlockCholeskyTest, InverseDiagonalIsThatOfTheDenseInverse) {
-  const int size = GetParam().size;
-  ASSERT_TRUE(sparse_[0].Factor(Eigen::VectorXd::Zero(dense_.rows())));
-  const Eigen::MatrixXd diagonal = sparse_[0].InverseDiagonal();
-  const Eigen::MatrixXd inverse = dense_.inverse();
-  for (Eigen::Index k = 0; k < dense_.rows(); k += size) {
-    const Eigen::MatrixXd block = inverse.block(k, k, size, size);
-    EXPECT_LT((diagonal.middleRows(k, size) - block).norm(), 1e-8 * block.norm()) << k;
   }
 }
 

@@ -1,7 +1,9 @@
 #include "core/posegraph/information.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <gtest/gtest.h>
 
 #include "tests/core/posegraph/random_poses.h"
@@ -54,6 +56,26 @@ TEST(InformationTest, WhatNothingIsKnownAboutStaysUnknown) {
     EXPECT_GT(
         Eigen::SelfAdjointEigenSolver<Matrix6d>(information - loosened).eigenvalues().minCoeff(),
         -1e-9 * scale);
+  }
+}
+
+TEST(InformationTest, WhatIsKnownLessIsTakenFromTheOther) {
+  RandomPoses random(5);
+  for (int trial = 0; trial < 50; ++trial) {
+    SCOPED_TRACE(trial);
+    const Matrix6d other = random.Information();
+    // Any basis in which the other is the identity: knowledge of 0, 1, …, 5 times as much.
+    const Matrix6d root = other.llt().matrixL();
+    const Eigen::HouseholderQR<Matrix6d> random_basis(random.Information());
+    const Matrix6d Q = random_basis.householderQ();
+    const Vector6d times = Vector6d::LinSpaced(0.0, 5.0);
+    const Matrix6d information = root * Q * times.asDiagonal() * Q.transpose() * root.transpose();
+    Vector6d less = Vector6d::Zero();
+    less.head<3>().setOnes();  // than 2.5 times
+    const Matrix6d expected = root * Q * less.asDiagonal() * Q.transpose() * root.transpose();
+    EXPECT_TRUE(WhereLess(information, other, 2.5).isApprox(expected, 1e-7));
+    EXPECT_TRUE(WhereLess(10.0 * other, other, 2.5).isZero());
+    EXPECT_TRUE(WhereLess(Matrix6d::Zero(), other, 2.5).isApprox(other, 1e-9));
   }
 }
 

@@ -1,14 +1,11 @@
 #include "core/posegraph/pooling.h"
 
 #include <algorithm>
-#include <array>
 #include <map>
-#include <memory>
 #include <numeric>
 #include <utility>
 #include <vector>
 
-#include "absl/status/status.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,10 +16,8 @@ namespace strata {
 namespace {
 
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::RandomPoses;
-using testing::StatusIs;
 using Nodes = std::vector<std::size_t>;
 
 Nodes Range(std::size_t first, std::size_t last) {
@@ -211,47 +206,6 @@ TEST_F(PoolGraphTest, ScansFollowTheirPoolRigidly) {
       EXPECT_TRUE((after[i].inverse() * after[j]).isApprox(before, 1e-9)) << i << " " << j;
     }
   }
-}
-
-// One point a scan, one of them damaged.
-class PointSource final : public AlignmentSource {
- public:
-  absl::StatusOr<std::shared_ptr<const ScanFeatures>> Features(std::size_t node) override {
-    if (node == 1) return absl::DataLossError("spoilt");
-    if (node == 6) return absl::UnavailableError("no disk");
-    std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points;
-    points[0].push_back(PointOf(node));
-    return std::make_shared<const ScanFeatures>(ScanFeatures::FromPoints(std::move(points)));
-  }
-  absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t) override {
-    return absl::InternalError("nobody needs them");
-  }
-  static Eigen::Vector3f PointOf(std::size_t node) {
-    return {1.0F, static_cast<float>(node), -0.5F};
-  }
-};
-
-TEST_F(PoolGraphTest, APoolShowsWhatItsScansShow) {
-  PointSource scans;
-  PooledSource pooled(scans, pools_, graph_.T_map_scan);
-  for (const std::size_t p : {0, 1}) {
-    STRATA_ASSERT_OK_AND_ASSIGN(const auto features, pooled.Features(p));
-    std::vector<Eigen::Vector3d> expected;
-    for (const std::size_t node : pools_[p].nodes) {
-      if (node == 1) continue;  // damaged: left out
-      expected.push_back(graph_.T_map_scan[node] * PointSource::PointOf(node).cast<double>());
-    }
-    ASSERT_EQ(features->size(), expected.size());
-    for (std::size_t k = 0; k < expected.size(); ++k) {
-      const Eigen::Vector3d p_map =
-          graph_.T_map_scan[2 * p] *
-          features->points(static_cast<FeatureClass>(0))[k].cast<double>();
-      EXPECT_LT((p_map - expected[k]).norm(), 1e-4);
-    }
-    STRATA_ASSERT_OK_AND_ASSIGN(const auto planes, pooled.Planes(p));
-    EXPECT_EQ(*planes, ScanPlanes());
-  }
-  EXPECT_THAT(pooled.Features(2), StatusIs(absl::StatusCode::kUnavailable, HasSubstr("no disk")));
 }
 
 }  // namespace

@@ -16,6 +16,7 @@ TEST(SolveNormalEquationsTest, FullRankEqualsCholesky) {
   const NormalStep step = SolveNormalEquations(H, b, 7.0, 1e-9);
   EXPECT_TRUE(step.step.isApprox(H.llt().solve(b), 1e-9));
   EXPECT_THAT(step.degenerate_directions, ::testing::IsEmpty());
+  EXPECT_EQ(step.information, H);
 }
 
 TEST(SolveNormalEquationsTest, UndeterminedDirectionGetsNoStep) {
@@ -26,6 +27,9 @@ TEST(SolveNormalEquationsTest, UndeterminedDirectionGetsNoStep) {
   EXPECT_NEAR(std::abs(step.degenerate_directions[0][4]), 1.0, 1e-6);
   EXPECT_NEAR(step.step[4], 0.0, 1e-9);
   EXPECT_NEAR(step.step[3], 1.0, 1e-9);
+  EXPECT_NEAR(step.information(4, 4), 0.0, 1e-12);
+  H(4, 4) = 0.0;
+  EXPECT_TRUE(step.information.isApprox(H, 1e-9));
 }
 
 TEST(TerminationTest, EveryOneHasAName) {

@@ -306,8 +306,9 @@ TEST_F(StorageContractTest, AnEpochComesBackWithItsConstraints) {
   };
   STRATA_ASSERT_OK(epoch(1));  // 2: one closure
   STRATA_ASSERT_OK(epoch(2));  // 3: two
-  STRATA_ASSERT_OK(Commit(
-      [&] { return writer().PutConstraint(Between(a, b, ConstraintOrigin::kPerson)).status(); }));
+  ConstraintRecord doubtful = Between(a, b, ConstraintOrigin::kPerson);
+  doubtful.constraint.may_be_false = true;
+  STRATA_ASSERT_OK(Commit([&] { return writer().PutConstraint(doubtful).status(); }));
   STRATA_ASSERT_OK(back_to(1));  // 4: the person's only
   STRATA_ASSERT_OK(back_to(3));  // 5: all three
   STRATA_ASSERT_OK(back_to(2));  // 6: one closure, the person's
@@ -315,6 +316,12 @@ TEST_F(StorageContractTest, AnEpochComesBackWithItsConstraints) {
   for (std::size_t e = 1; e <= 6; ++e) {
     EXPECT_EQ(reader().ListConstraints(e)->size(), expected[e - 1]) << "epoch " << e;
     EXPECT_EQ(reader().ListPlanes(e)->size(), e == 1 || e == 4 ? 0U : 1U) << "epoch " << e;
+    STRATA_ASSERT_OK_AND_ASSIGN(const auto constraints, reader().ListConstraints(e));
+    for (const ConstraintRecord& record : constraints) {
+      EXPECT_EQ(record.constraint.may_be_false,
+                record.constraint.origin == ConstraintOrigin::kPerson)
+          << "epoch " << e;
+    }
   }
   STRATA_ASSERT_OK_AND_ASSIGN(const auto epochs, reader().ListEpochs());
   ASSERT_EQ(epochs.size(), 6U);

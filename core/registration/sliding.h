@@ -1,0 +1,30 @@
+// Surfaces slide along themselves without being noticed: what a scan of nearly nothing but a floor
+// says about where on the floor it is.
+// Internal to core/registration, not installed.
+#ifndef STRATA_CORE_REGISTRATION_SLIDING_H_
+#define STRATA_CORE_REGISTRATION_SLIDING_H_
+
+#include "core/geometry/pose.h"
+
+namespace strata {
+
+struct NormalEquations {
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d b = Vector6d::Zero();
+};
+
+// Leaves out the directions that hardly any surface holds. `H_along` is the part of `all.H` that
+// features have along their surfaces: it steadies a registration that surfaces hold in every
+// direction, but where they hold it in none it is all that is left, looks certain as it is a sum of
+// thousands, and pulls towards where the scans overlap most. Directions are the eigenvectors of the
+// rest, rotations weighed as the arc at `radius_m`; one is left out if its eigenvalue is below
+// `least` (Zhang, Kaess, Singh, "On degeneracy of optimization-based state estimation problems",
+// ICRA 2016).
+NormalEquations WithoutSliding(const NormalEquations& all,
+                               const Matrix6d& H_along,
+                               double least,
+                               double radius_m);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_REGISTRATION_SLIDING_H_
