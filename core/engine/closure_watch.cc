@@ -10,6 +10,7 @@
 #include "core/engine/scan_views.h"
 
 namespace strata {
+
 std::size_t CountFreshContacts(const GraphWorld& world, std::size_t first_new) {
   std::vector<bool> joined(world.size(), false);  // the younger one to another pass
   for (const ScanPair& pair : world.Problem({}).pairs) {

@@ -11,7 +11,7 @@
 #include <glog/logging.h>
 
 #include "core/common/status.h"
-#include "core/common/thread_name.h"
+#include "core/common/this_thread.h"
 #include "core/engine/optimize.h"
 #include "core/engine/optimize_settings.h"
 #include "core/engine/rebuild.h"
@@ -78,6 +78,7 @@ JobRunner::Step JobRunner::NextStep() {
 
 void JobRunner::Loop() {
   NameThisThread("job");
+  YieldThisThread(10);  // uploads, integration and readers go first
   while (true) {
     const Step step = NextStep();
     if (step == Step::kClosed) return;

@@ -11,7 +11,7 @@
 #include <glog/logging.h>
 
 #include "core/common/status.h"
-#include "core/common/thread_name.h"
+#include "core/common/this_thread.h"
 #include "core/engine/rebuild.h"
 
 namespace strata {
@@ -67,6 +67,7 @@ Worker::Step Worker::NextStep() {
 
 void Worker::Loop() {
   NameThisThread("worker");
+  YieldThisThread(5);  // what is acknowledged waits for nobody
   RunRecovery();
   while (true) {
     switch (NextStep()) {

@@ -10,7 +10,7 @@
 
 #include "core/common/status.h"
 #include "core/common/stop.h"
-#include "core/common/thread_name.h"
+#include "core/common/this_thread.h"
 #include "core/storage/storage.h"
 
 namespace strata {

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "core/common/thread_name.h"
+#include "core/common/this_thread.h"
 
 namespace strata::server {
 

@@ -10,30 +10,24 @@
 #include <gtest/gtest.h>
 
 #include "core/engine/map.h"
-#include "tests/core/engine/engine_fixture.h"
-#include "tests/support/simulator.h"
+#include "tests/core/engine/yard_fixture.h"
 #include "tests/support/status_matchers.h"
-#include "tests/support/worlds.h"
 
 namespace strata::testing {
 namespace {
 
-class ClosureWatchTest : public EngineTest {
+class ClosureWatchTest : public YardTest {
  protected:
-  // A scan of the yard from its true pose.
-  void UploadScan(const ScanId& id, const Pose& T_map_scan, Alignment alignment) {
-    static const Scene* const yard = new Scene(YardScene());
-    SensorOptions sensor;
-    sensor.rings = 32;
-    sensor.columns = 360;
-    const PointCloud cloud = SimulateScan(*yard, sensor, T_map_scan, id.sequence);
+  // From its true pose.
+  void UploadTrue(const ScanId& id, const Pose& T_map_scan, Alignment alignment) {
+    const PointCloud cloud = See(T_map_scan, id.sequence);
     STRATA_ASSERT_OK(Upload(db(), HeaderOf(id, cloud, T_map_scan, alignment), cloud, 6000));
   }
   // Scan `k`, from 1, of a robot whose way is `y_m` beside the other's.
   void Drive(const std::string& robot, double y_m, std::uint64_t k, Alignment alignment) {
     Pose pose = PoseAt(2.0 * static_cast<double>(k) - 6.0, y_m, 0.1 * static_cast<double>(k));
     pose.translation().z() = 1.2;
-    UploadScan({robot, k}, pose, alignment);
+    UploadTrue({robot, k}, pose, alignment);
   }
   // The map's file in this test's hands; the engine is closed meanwhile.
   std::shared_ptr<Map> OpenMap() {

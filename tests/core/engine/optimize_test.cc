@@ -13,7 +13,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/core/engine/engine_fixture.h"
+#include "tests/core/engine/yard_fixture.h"
 #include "tests/support/simulator.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/worlds.h"
@@ -26,88 +26,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 using Code = absl::StatusCode;
-using Parameters = std::map<std::string, std::string>;
-
-constexpr std::uint64_t kScans = 6;
-
-// Where scan `k`, from 1, was taken: a bow through the yard, the sensor 1.2 m above its ground.
-Pose TruthOf(std::uint64_t k) {
-  const auto n = static_cast<double>(k);
-  Pose pose = PoseAt(2.0 * n - 6.0, 0.1 * n * n - 2.0, 0.2 * n);
-  pose.translation().z() = 1.2;
-  return pose;
-}
-
-// Where it is said to have been taken; the first is right.
-Pose SaidOf(std::uint64_t k) {
-  if (k == 1) return TruthOf(1);
-  const double side = k % 2 == 0 ? 1.0 : -1.0;
-  return TruthOf(k) * PoseAt(0.08 * side, 0.05, 0.015 * side);
-}
-
-class OptimizeTest : public EngineTest {
- protected:
-  static PointCloud See(const Pose& T_map_scan, std::uint64_t seed) {
-    static const Scene* const yard = new Scene(YardScene());
-    SensorOptions sensor;
-    sensor.rings = 32;
-    sensor.columns = 360;
-    return SimulateScan(*yard, sensor, T_map_scan, seed);
-  }
-  void UploadScan(std::uint64_t k, const Pose& T_map_scan, const std::string& map = kMapName) {
-    const PointCloud cloud = See(TruthOf(k), k);
-    STRATA_EXPECT_OK(Upload(db(), HeaderOf({"run", k}, cloud, T_map_scan), cloud, 6000, map));
-  }
-  void MakeWorld() {
-    MakeMap(MapParameters());
-    for (std::uint64_t k = 1; k <= kScans; ++k) UploadScan(k, SaidOf(k));
-    WaitIntegrated(db());
-  }
-
-  // Only what scans and planes say.
-  JobInfo Optimize(Parameters parameters = {}) {
-    parameters.insert({"closures", "0"});
-    return RunJob(db(), "optimize", parameters);
-  }
-  JobInfo Follow(std::uint64_t id) {
-    JobInfo last;
-    STRATA_EXPECT_OK(db().jobs().Watch({}, kMapName, id, [&last](const JobInfo& info) {
-      last = info;
-      return absl::OkStatus();
-    }));
-    return last;
-  }
-
-  api::PoseGraphState Graph() {
-    const absl::StatusOr<api::PoseGraphState> graph = db().posegraph().Get({}, kMapName);
-    EXPECT_THAT(graph, IsOk());
-    return graph.value_or(api::PoseGraphState());
-  }
-  Pose PoseOf(std::uint64_t k) {
-    const auto lookup = db().posegraph().LookupPose({}, kMapName, {"run", k});
-    EXPECT_THAT(lookup, IsOk());
-    return lookup.ok() ? lookup->T_map_scan : Pose::Identity();
-  }
-  std::vector<Pose> Poses() {
-    std::vector<Pose> poses;
-    for (const PoseNode& node : Graph().nodes) poses.push_back(node.T_map_scan);
-    return poses;
-  }
-  // The largest distance from where scans are to where they are relative to the first [m].
-  double Error() {
-    double worst = 0.0;
-    for (std::uint64_t k = 2; k <= kScans; ++k) {
-      const Pose is = PoseOf(1).inverse() * PoseOf(k);
-      const Pose should = TruthOf(1).inverse() * TruthOf(k);
-      worst = std::max(worst, (is.translation() - should.translation()).norm());
-    }
-    return worst;
-  }
-  static void ExpectEqual(const std::vector<Pose>& a, const std::vector<Pose>& b) {
-    ASSERT_EQ(a.size(), b.size());
-    for (std::size_t k = 0; k < a.size(); ++k) EXPECT_EQ(a[k].matrix(), b[k].matrix()) << k;
-  }
-};
+using OptimizeTest = YardTest;
 
 TEST_F(OptimizeTest, ScansComeCloserToTruthInANewEpochThatVerifies) {
   MakeWorld();
@@ -438,117 +357,6 @@ TEST_F(OptimizeTest, ADisabledPlaneIsNotUsedButRemembered) {
   EXPECT_EQ(Optimize({{"planes", "0"}}).metrics.at("planes"), 0.0);
 }
 
-// Whichever bit of its points flips, and wherever on the way it is: it follows its neighbours, and
-// is told of.
-TEST_F(OptimizeTest, ADamagedScanIsLeftOutAndNamed) {
-  for (const std::uint64_t k : {1, 3, 6}) {
-    const std::string map = "damaged" + std::to_string(k);
-    SCOPED_TRACE(map);
-    MakeMap(MapParameters(), map);
-    for (std::uint64_t i = 1; i <= kScans; ++i) UploadScan(i, SaidOf(i), map);
-    WaitIntegrated(db(), map);
-    Close();
-    // The type of the first piece, a length, and what is in it.
-    const std::string at = std::to_string(k == 1 ? 2 : k == 3 ? 10 : 3000);
-    Sql("UPDATE truth_chunk SET bytes = CAST(substr(bytes, 1, " + at +
-            ") || x'5a' || substr(bytes, " + at +
-            " + 2) AS BLOB) WHERE ordinal = 0 AND upload = "
-            "(SELECT upload FROM truth_scan WHERE sequence = " +
-            std::to_string(k) + ")",
-        map);
-    Reopen();
-    const JobInfo job = RunJob(db(), "optimize", {{"closures", "0"}}, map);
-    ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
-    const std::string name = "run/" + std::to_string(k);
-    EXPECT_THAT(job.message, HasSubstr("1 damaged scan left out: " + name + " ("));
-    EXPECT_EQ(job.metrics.at("left_out"), 1.0);
-    EXPECT_EQ(job.metrics.at("left_out." + name), 1.0);
-    EXPECT_EQ(job.metrics.at("scans_carried"), 1.0);
-
-    // The others are where they belong, it is where it was seen from one of them.
-    const auto pose = [&](std::uint64_t i) {
-      const auto lookup = db().posegraph().LookupPose({}, map, {"run", i});
-      EXPECT_THAT(lookup, IsOk());
-      return lookup.ok() ? lookup->T_map_scan : Pose::Identity();
-    };
-    const std::uint64_t one = k == 1 ? 2 : 1;
-    for (std::uint64_t i = 1; i <= kScans; ++i) {
-      if (i == k) continue;
-      const Pose off = TruthOf(one).inverse() * TruthOf(i) * pose(i).inverse() * pose(one);
-      EXPECT_LT(off.translation().norm(), 0.03) << i;
-    }
-    const auto follows = [&](std::uint64_t i) {
-      return (pose(i).inverse() * pose(k)).isApprox(SaidOf(i).inverse() * SaidOf(k), 1e-9);
-    };
-    EXPECT_TRUE((k > 1 && follows(k - 1)) || (k < kScans && follows(k + 1)));
-
-    // It is still there to be mended: deleted and sent again the map is sound.
-    const JobInfo verify = RunJob(db(), "verify", {}, map);
-    EXPECT_THAT(verify.message, HasSubstr(name));
-    const Pose place = pose(k);
-    STRATA_ASSERT_OK(db().scans().Delete({}, map, {"run", k}));
-    UploadScan(k, place, map);
-    WaitIntegrated(db(), map);
-    const JobInfo sound = RunJob(db(), "verify", {}, map);
-    EXPECT_EQ(sound.state, JobState::kSucceeded) << sound.message;
-  }
-}
-
-// Its header says where its points are: without it the points cannot be used either.
-TEST_F(OptimizeTest, AScanWithADamagedRowIsLeftOutAndNamed) {
-  MakeWorld();
-  Close();
-  Sql("UPDATE truth_scan SET header = CAST(x'00' || substr(header, 2) AS BLOB) WHERE sequence = 4");
-  Reopen();
-  const JobInfo job = Optimize({{"dry_run", "1"}});
-  ASSERT_EQ(job.state, JobState::kProposed) << job.message;
-  EXPECT_THAT(job.message, HasSubstr("run/4"));
-  EXPECT_EQ(job.metrics.at("left_out"), 1.0);
-  STRATA_ASSERT_OK(db().jobs().Accept({}, kMapName, job.id));
-  const JobInfo accepted = Follow(job.id);
-  ASSERT_EQ(accepted.state, JobState::kSucceeded) << accepted.message;
-  EXPECT_EQ(accepted.message, job.message);
-  const Pose off = TruthOf(1).inverse() * TruthOf(6) * PoseOf(6).inverse() * PoseOf(1);
-  EXPECT_LT(off.translation().norm(), 0.03);
-}
-
-// A local map takes the place of points that are not kept.
-TEST_F(OptimizeTest, ADamagedLocalMapIsLeftOutAndTheWayBackIsOpen) {
-  MapParameters parameters;
-  parameters.keep_points = false;
-  MakeMap(parameters);
-  for (std::uint64_t k = 1; k <= kScans; ++k) UploadScan(k, SaidOf(k));
-  WaitIntegrated(db());
-  const std::vector<Pose> poses = Poses();
-  Close();
-  Sql("UPDATE truth_local_map SET bytes = CAST(substr(bytes, 1, 200) || x'5a5a' || "
-      "substr(bytes, 203) AS BLOB) WHERE scan = "
-      "(SELECT number FROM truth_scan WHERE sequence = 5)");
-  Reopen();
-  const JobInfo job = Optimize();
-  ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
-  EXPECT_EQ(job.metrics.at("left_out.run/5"), 1.0);
-  EXPECT_LT((TruthOf(6).translation() - PoseOf(6).translation()).norm(), 0.03);
-  STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo undo, db().jobs().Revert({}, kMapName, job.id));
-  const JobInfo back = Follow(undo.id);
-  ASSERT_EQ(back.state, JobState::kSucceeded) << back.message;
-  EXPECT_THAT(back.message, HasSubstr("run/5"));
-  ExpectEqual(Poses(), poses);
-}
-
-// A person moves one scan and is told at once what stands in the way.
-TEST_F(OptimizeTest, APoseSetByHandDropsNoDamagedScan) {
-  MakeWorld();
-  const std::string digest = Digest();
-  Close();
-  Sql("UPDATE truth_chunk SET bytes = x'00' WHERE upload = "
-      "(SELECT upload FROM truth_scan WHERE sequence = 3)");
-  Reopen();
-  EXPECT_THAT(db().posegraph().SetPose({}, kMapName, {"run", 4}, TruthOf(4)),
-              StatusIs(Code::kDataLoss, HasSubstr("run/3")));
-  EXPECT_EQ(Digest(), digest);
-}
-
 // Root of the mean squared distance from the truth, best aligned [m].
 double Ate(const std::vector<Pose>& poses, const std::vector<Pose>& truth) {
   const auto count = static_cast<Eigen::Index>(poses.size());
@@ -606,42 +414,6 @@ TEST_F(OptimizeTest, AnEmptyMapIsConsistent) {
   const JobInfo job = RunJob(db(), "optimize");
   EXPECT_EQ(job.state, JobState::kSucceeded) << job.message;
   EXPECT_EQ(WaitIntegrated(db()).epoch, 1U);
-  LocalizeQuery query;
-  query.cloud = See(TruthOf(1), 1);
-  STRATA_ASSERT_OK_AND_ASSIGN(const LocalizeResult result,
-                              db().posegraph().Localize({}, kMapName, query));
-  EXPECT_FALSE(result.found);
-  EXPECT_NE(result.message, "");
-}
-
-TEST_F(OptimizeTest, AScanFindsItsPlace) {
-  MakeMap(MapParameters());
-  for (std::uint64_t k = 1; k <= kScans; ++k) UploadScan(k, TruthOf(k));
-  const std::string digest = Digest();
-  const Pose taken = TruthOf(3) * PoseAt(0.6, -0.4, 0.25);
-  LocalizeQuery query;
-  query.cloud = See(taken, 1234);
-  query.T_map_scan_guess = taken * PoseAt(1.0, 0.5, 0.2);
-  query.guess_radius_m = 3.0;
-  for (const bool guess : {true, false}) {
-    SCOPED_TRACE(guess ? "with a guess" : "by looks");
-    if (!guess) query.T_map_scan_guess.reset();
-    STRATA_ASSERT_OK_AND_ASSIGN(const LocalizeResult result,
-                                db().posegraph().Localize({}, kMapName, query));
-    ASSERT_TRUE(result.found) << result.message;
-    const Pose off = taken.inverse() * result.best.T_map_scan;
-    EXPECT_LT(off.translation().norm(), 0.1);
-    EXPECT_LT(RotationAngleRad(off), 0.02);
-    EXPECT_EQ(result.epoch, 1U);
-    EXPECT_GT(result.best.overlap, 0.5);
-    EXPECT_TRUE(result.covariance.allFinite());
-    EXPECT_GT(result.covariance.diagonal().minCoeff(), 0.0);
-  }
-  EXPECT_EQ(Digest(), digest);
-  query.T_map_scan_guess = PoseAt(500.0, 500.0);
-  STRATA_ASSERT_OK_AND_ASSIGN(const LocalizeResult nowhere,
-                              db().posegraph().Localize({}, kMapName, query));
-  EXPECT_FALSE(nowhere.found);
 }
 
 }  // namespace

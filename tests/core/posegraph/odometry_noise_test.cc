@@ -66,6 +66,7 @@ TEST(OdometryNoiseTest, GapsEndWhatIsSummedAndFewStepsSayNothing) {
   EXPECT_FALSE(EstimateOdometryNoise({}).has_value());
   EXPECT_FALSE(EstimateOdometryNoise(Draw(29, 0.01, 0.1, Vector6d::Zero())).has_value());
   Vector6d bias = Vector6d::Zero();
+  bias[2] = 0.01;
   bias[3] = 0.1;
   const Errors whole = Draw(90, 0.0, 0.0, bias);
   Errors gaps;
@@ -74,8 +75,12 @@ TEST(OdometryNoiseTest, GapsEndWhatIsSummedAndFewStepsSayNothing) {
     if (k % 9 == 8) gaps.emplace_back(std::nullopt);
   }
   // Never ten in a row: single errors only.
-  EXPECT_NEAR(EstimateOdometryNoise(gaps)->sigma_m, 0.1 / std::sqrt(3.0), 1e-9);
-  EXPECT_NEAR(EstimateOdometryNoise(whole)->sigma_m, 0.1 * std::sqrt(10.0 / 3.0), 1e-9);
+  const auto apart = EstimateOdometryNoise(gaps);
+  EXPECT_NEAR(apart->sigma_rad, 0.01 / std::sqrt(3.0), 1e-9);
+  EXPECT_NEAR(apart->sigma_m, 0.1 / std::sqrt(3.0), 1e-9);
+  const auto together = EstimateOdometryNoise(whole);
+  EXPECT_NEAR(together->sigma_rad, 0.01 * std::sqrt(10.0 / 3.0), 1e-9);
+  EXPECT_NEAR(together->sigma_m, 0.1 * std::sqrt(10.0 / 3.0), 1e-9);
 }
 
 TEST(OdometryNoiseTest, NobodyIsPerfect) {

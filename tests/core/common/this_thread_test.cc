@@ -1,4 +1,4 @@
-#include "core/common/thread_name.h"
+#include "core/common/this_thread.h"
 
 #include <array>
 #include <string>
@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 #include <pthread.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 namespace strata {
 namespace {
@@ -16,7 +18,7 @@ std::string NameOfThisThread() {
   return name.data();
 }
 
-TEST(ThreadNameTest, GoesToTheThreadsItStarts) {
+TEST(ThisThreadTest, NameGoesToTheThreadsItStarts) {
   std::thread([] {
     NameThisThread("job");
     EXPECT_EQ(NameOfThisThread(), "job");
@@ -24,11 +26,23 @@ TEST(ThreadNameTest, GoesToTheThreadsItStarts) {
   }).join();
 }
 
-TEST(ThreadNameTest, IsCut) {
+TEST(ThisThreadTest, LongNameIsCut) {
   std::thread([] {
     NameThisThread("a name beyond fifteen");
     EXPECT_EQ(NameOfThisThread(), "a name beyond f");
   }).join();
+}
+
+int NicenessOfThisThread() { return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); }
+
+TEST(ThisThreadTest, YieldsAsDoTheThreadsItStarts) {
+  const int usual = NicenessOfThisThread();
+  std::thread([usual] {
+    YieldThisThread(2);
+    EXPECT_EQ(NicenessOfThisThread(), usual + 2);
+    std::thread([usual] { EXPECT_EQ(NicenessOfThisThread(), usual + 2); }).join();
+  }).join();
+  EXPECT_EQ(NicenessOfThisThread(), usual);
 }
 
 }  // namespace
