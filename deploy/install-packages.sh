@@ -5,14 +5,14 @@
 set -euo pipefail
 
 packages=(
-  ca-certificates ccache cmake g++ git mold ninja-build pkg-config
+  ca-certificates ccache cmake coinor-libclp-dev coinor-libipopt-dev g++ git mold ninja-build pkg-config
   libabsl-dev libboost-dev libcli11-dev libeigen3-dev libgoogle-glog-dev libgrpc++-dev libnanoflann-dev
   libpng-dev libprotobuf-dev libsqlite3-dev libxxhash-dev libzstd-dev nlohmann-json3-dev
   protobuf-compiler protobuf-compiler-grpc
   libgmock-dev libgtest-dev
 )
 if [[ "${1:-}" == --dev ]]; then
-  packages+=(clang clang-format clang-tidy libbenchmark-dev libceres-dev liboctomap-dev libpcl-dev python3 python3-numpy sqlite3)
+  packages+=(clang clang-format clang-tidy libbenchmark-dev libceres-dev libcgal-dev libdlib-dev liboctomap-dev libpcl-dev python3 python3-numpy sqlite3)
 fi
 
 missing=()
