@@ -35,6 +35,17 @@ bool OppositeSides(const Eigen::Vector3d& p,
          std::abs(side_b) > kGrazing * (b - p).norm();
 }
 
+// Where beams draw lines on a wall, a cell wide and far apart, neighbours lie on a level strip. Its
+// height goes with the distance of the sensor: held against each other such strips lift whatever is
+// in front of a robot, and a chain of scans bends upwards.
+bool IsStripOnAWall(const SampledFeature& feature,
+                    const Eigen::Vector3d& normal,
+                    const Eigen::Vector3d& sensor_origin) {
+  constexpr double kLevel = 0.7;  // cosine of its inclination
+  return feature.feature_class != FeatureClass::kNonTraversable && std::abs(normal.z()) > kLevel &&
+         SeenFromBelow(feature.element.point, sensor_origin.cast<float>());
+}
+
 Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
   m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
@@ -116,6 +127,11 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
     const Eigen::Vector3d r = R.transpose() * (q.point.cast<double>() - p_target);
     const Eigen::Vector3d normal_p = sampled.element.normal.cast<double>();
     const Eigen::Vector3d normal_q = R.transpose() * q.normal.cast<double>();
+    if (IsStripOnAWall(sampled, normal_p, source_.sensor_origin()) ||
+        IsStripOnAWall(sampled, normal_q, source_.sensor_origin())) {
+      ++sums.inliers;
+      continue;
+    }
     const Eigen::Matrix3d C =
         2.0 * tangent2 * Eigen::Matrix3d::Identity() -
         flattening * (normal_p * normal_p.transpose() + normal_q * normal_q.transpose());

@@ -120,13 +120,17 @@ class Server:
         return 0.0
 
 
+def robot_names(size):
+    return [f"robot{k}" for k in range(-(-size // SCANS_A_ROBOT))]
+
+
 def prepare(build, work, size):
     """Draws `size` scans and makes a map of them and their constraints in work/map."""
-    count = -(-size // SCANS_A_ROBOT)
+    count = len(robot_names(size))
     subprocess.run([build / "tests/support/strata-simulate", "city", work / "city", "--districts", str(count),
                     "--scans", str(size // count), "--step", "2.5", "--rings", "18", "--columns", "400",
                     "--noise-m", "0.01", "--noise-rad", "0.0001"], check=True, stdout=subprocess.DEVNULL)
-    folders = [work / "city" / f"robot{k}" for k in range(count)]
+    folders = [work / "city" / name for name in robot_names(size)]
     robots = {folder.name: load(folder / "poses_truth.txt") for folder in folders}
     loops = write_graph(work / "graph.g2o", robots)
     (work / "made").mkdir()
@@ -142,9 +146,13 @@ def prepare(build, work, size):
     (work / "made").rename(work / "map")
 
 
-def positions(server, work):
-    server.strata("pose", "export", "city", "--format", "tum", "--out", work / "poses.txt")
-    return np.loadtxt(work / "poses.txt", ndmin=2)[:, 1:4]
+def positions(server, work, robots):
+    """Of the scans of one robot after the other."""
+    rows = []
+    for robot in robots:
+        server.strata("pose", "export", "city", "--format", "tum", "--trajectory", robot, "--out", work / "poses.txt")
+        rows.append(np.loadtxt(work / "poses.txt", ndmin=2)[:, 1:4])
+    return np.concatenate(rows)
 
 
 def measure(build, work, size, parameters):
@@ -171,7 +179,7 @@ def measure(build, work, size, parameters):
             sys.exit(f"{size} scans: {job['state']}: {job['message']}")
         row = {"scans": size, "loops": loops, "seconds": last - begin, "wall": time.monotonic() - wall,
                "mb": server.peak_mb(), "phases": phases, "metrics": job["metrics"],
-               "before_m": ate(start, truth), "after_m": ate(positions(server, work), truth)}
+               "before_m": ate(start, truth), "after_m": ate(positions(server, work, robot_names(size)), truth)}
     print(f"{size:6} scans, {loops} loops: {row['seconds']:8.1f} s ({row['wall']:.0f} s by the clock), peak"
           f" {row['mb']:7.1f} MB; error {row['before_m']:.3f} m before, {row['after_m']:.3f} m after; {job['message']}",
           flush=True)
