@@ -12,3 +12,9 @@ target_include_directories(strata_classification_peers SYSTEM PRIVATE ${CGAL_INC
 target_compile_definitions(strata_classification_peers PRIVATE CGAL_EIGEN3_ENABLED)
 # g++ 12 sees values used uninitialised inside Boost where CGAL instantiates it.
 set_source_files_properties(classification_peers.cc PROPERTIES COMPILE_OPTIONS -Wno-maybe-uninitialized)
+
+strata_executable(
+  classification_benchmark classification_benchmark
+  SOURCES classification_benchmark.cc
+  DEPS strata::classification strata::classification_peers strata::labelled_clouds
+)
