@@ -1,12 +1,25 @@
 #include "core/classification/amn.h"
 
+#include <algorithm>
+
 namespace strata {
+namespace {
+
+constexpr Eigen::Index kBlock = 4096;
+
+}  // namespace
 
 AmnProblem MakeAmnProblem(const AmnWeights& weights,
                           const FeatureMatrix& features,
                           std::span<const NetworkEdge> edges) {
   AmnProblem problem;
-  problem.node_scores = features.cast<double>() * weights.node.transpose();
+  problem.node_scores.resize(features.rows(), weights.node.rows());
+  // Block by block: all features as doubles would be the largest thing in memory.
+  for (Eigen::Index begin = 0; begin < features.rows(); begin += kBlock) {
+    const Eigen::Index rows = std::min(kBlock, features.rows() - begin);
+    problem.node_scores.middleRows(begin, rows).noalias() =
+        features.middleRows(begin, rows).cast<double>() * weights.node.transpose();
+  }
   problem.edges = edges;
   problem.edge_scores = weights.edge;
   return problem;

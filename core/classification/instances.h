@@ -4,19 +4,20 @@
 #define STRATA_CORE_CLASSIFICATION_INSTANCES_H_
 
 #include <cstddef>
-#include <memory>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "core/classification/labelled_features.h"
 
 namespace strata {
 
-// A kd-tree a class, in the space of features (9.4.3). Immutable, thread-safe.
+// Held against all queries, block by block: in the some forty dimensions of features a kd-tree
+// (9.4.3) looks at nearly every instance too, one by one. Immutable, thread-safe.
 class Instances {
  public:
   // `data` must be valid, and outlive the instances.
   explicit Instances(const LabelledFeatures& data);
-  ~Instances();
 
   // τ of eq. 9.9: a row a point, the distances to the `count` nearest instances of class 0, rising,
   // then of class 1 and so on. A class with fewer instances repeats its farthest.
@@ -29,9 +30,21 @@ class Instances {
   ScoreMatrix Votes(const FeatureMatrix& features, std::size_t count) const;
 
  private:
-  class Tree;
+  struct OfClass {
+    FeatureMatrix features;
+    Eigen::RowVectorXf squared_norms;
+    std::vector<Eigen::Index> rows;  // in the data
+
+    // Of a row of the data among `rows`; their number if it is none of them.
+    std::size_t PlaceOf(Eigen::Index row) const;
+  };
+
+  // As Distances(), but negative where a class has fewer instances. `within`: `features` are those
+  // of the data.
+  FeatureMatrix Nearest(const FeatureMatrix& features, std::size_t count, bool within) const;
+
   const LabelledFeatures& data_;
-  std::vector<std::unique_ptr<Tree>> trees_;  // of every class
+  std::vector<OfClass> classes_;
 };
 
 }  // namespace strata

@@ -11,6 +11,8 @@
 
 namespace strata {
 
+class BoxTree;
+
 // The same number of neighbours for every point, nearest first; equally far ones by index. A point
 // is not its own neighbour. Immutable.
 class Neighbours {
@@ -33,9 +35,7 @@ class Neighbours {
   }
 
  private:
-  void Fill(std::span<const Eigen::Vector3f> queries,
-            std::span<const Eigen::Vector3f> points,
-            bool without_self);
+  void Fill(const BoxTree& queries, const BoxTree& points, bool without_self);
 
   std::size_t points_ = 0;
   std::size_t count_ = 0;

@@ -1,6 +1,7 @@
 #include "core/classification/reduction.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <numeric>
@@ -29,6 +30,7 @@ class Reducer {
       order_ = SampleIndices(static_cast<std::uint32_t>(order_.size()), options_.count, random);
       std::sort(order_.begin(), order_.end());
     }
+    if (options_.kind == ReductionKind::kBalanced) order_ = DrawBalanced();
     if (options_.kind == ReductionKind::kDepth || options_.kind == ReductionKind::kPure) {
       Split(order_, 0, leaves);
     } else {
@@ -40,6 +42,23 @@ class Reducer {
   }
 
  private:
+  std::vector<std::uint32_t> DrawBalanced() const {
+    std::vector<std::vector<std::uint32_t>> of_class(data_.classes);
+    for (const std::uint32_t row : order_) of_class[data_.labels[row]].push_back(row);
+    double roots = 0.0;
+    for (const auto& rows : of_class) roots += std::sqrt(static_cast<double>(rows.size()));
+    SplitMix64 random(options_.seed);
+    std::vector<std::uint32_t> drawn;
+    for (const auto& rows : of_class) {
+      const auto size = static_cast<std::uint32_t>(rows.size());
+      const double share = std::sqrt(static_cast<double>(size)) / roots;
+      const auto count = static_cast<std::uint32_t>(std::ceil(share * options_.count));
+      for (const std::uint32_t k : SampleIndices(size, count, random)) drawn.push_back(rows[k]);
+    }
+    std::sort(drawn.begin(), drawn.end());
+    return drawn;
+  }
+
   bool IsLeaf(std::span<const std::uint32_t> rows, int depth) const {
     if (rows.size() < 2) return true;
     if (options_.kind == ReductionKind::kDepth) return depth + 1 >= options_.depth;

@@ -22,12 +22,16 @@ enum class ReductionKind : std::uint8_t {
   kRandom,  // `count` of the points, as they are (9.3)
   kDepth,   // the leaves of a kd-tree of `depth` levels (9.3.1); the commonest label of each
   kPure,    // the largest subtrees of which all labels are equal (9.3.2): no parameter
+  // About `count` of the points, as they are, a class by the square root of its number: rare
+  // classes are still learned, frequent ones still expected. Unlike leaves, drawn points look as
+  // those do that inference will see.
+  kBalanced,
 };
 
 struct ReductionOptions {
-  ReductionKind kind = ReductionKind::kPure;
+  ReductionKind kind = ReductionKind::kBalanced;
   int depth = 15;              // in [1, 30]
-  std::uint32_t count = 5000;  // at least 1
+  std::uint32_t count = 5000;  // of every cloud, at least 1
   std::uint64_t seed = 1;
 
   absl::Status Validate() const;

@@ -116,6 +116,34 @@ TEST(InstancesTest, DistancesAreThoseOfAllPairs) {
   expect(data.features, instances.DistancesWithin(5), true);
 }
 
+// Far from zero and close together: what a product of matrices alone would round away.
+TEST(InstancesTest, KeepsSmallDistancesInManyDimensions) {
+  constexpr Eigen::Index kDimensions = 40;
+  SplitMix64 random(11);
+  LabelledFeatures data;
+  data.classes = 2;
+  data.features.resize(500, kDimensions);
+  for (float& x : data.features.reshaped()) x = static_cast<float>(RandomIn(8.0, 10.0, random));
+  for (Eigen::Index i = 0; i < 500; ++i) data.labels.push_back(i % 3 == 0 ? 1 : 0);
+  data.features.row(400) = data.features.row(100);
+  data.features(400, 7) += 1e-3F;
+  const FeatureMatrix found = Instances(data).DistancesWithin(3);
+  for (const Eigen::Index i : {0, 100, 127, 128, 255, 400, 499}) {
+    for (const ClassIndex k : {0, 1}) {
+      std::vector<float> all;
+      for (Eigen::Index j = 0; j < 500; ++j) {
+        if (j == i || data.labels[static_cast<std::size_t>(j)] != k) continue;
+        all.push_back((data.features.row(i) - data.features.row(j)).norm());
+      }
+      std::sort(all.begin(), all.end());
+      for (Eigen::Index m = 0; m < 3; ++m) {
+        EXPECT_NEAR(found(i, 3 * k + m), all[static_cast<std::size_t>(m)], 1e-5F) << i;
+      }
+    }
+  }
+  EXPECT_NEAR(found(100, data.labels[400] * 3), 1e-3F, 1e-5F);
+}
+
 TEST(InstancesTest, ClassesOfOneRepeatOrAreFar) {
   LabelledFeatures data;
   data.classes = 2;

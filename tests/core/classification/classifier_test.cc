@@ -62,6 +62,7 @@ TEST_P(ClassifierTest, LearnsOneParkAndKnowsAnother) {
   TrainingOptions options;
   options.method = GetParam();
   options.features.scales = 2;
+  options.reduction.count = 1000;
   STRATA_ASSERT_OK_AND_ASSIGN(
       const Classifier classifier,
       TrainClassifier({Park(1), Park(2)}, kClasses, options, NoProgress, Stop()));
@@ -86,6 +87,7 @@ TEST_P(ClassifierTest, BytesAreTheSameClassifier) {
   TrainingOptions options;
   options.method = GetParam();
   options.features.scales = 1;
+  options.reduction.count = 500;
   options.rounds = 5;
   STRATA_ASSERT_OK_AND_ASSIGN(const Classifier classifier,
                               TrainClassifier({Park(1)}, kClasses, options, NoProgress, Stop()));

@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/classification/columns.h"
 #include "core/classification/ground_height.h"
 #include "core/classification/local_shape.h"
 #include "core/classification/voxels.h"
@@ -78,6 +79,28 @@ TEST(VoxelsTest, MeansOfHalfOpenCubes) {
   EXPECT_TRUE(means[2].isApprox(points[2]));
 }
 
+TEST(ColumnsTest, KnowWhatIsAboveBelowAndInBetween) {
+  // A wire over a floor, and a wall; one column apart.
+  const std::vector<Eigen::Vector3f> points = {{0.1F, 0.1F, 0.0F},
+                                               {0.3F, 0.2F, 2.1F},
+                                               {1.1F, 0.1F, 0.1F},
+                                               {1.1F, 0.1F, 0.3F},
+                                               {1.2F, 0.3F, 0.4F},
+                                               {1.2F, 0.3F, 0.6F}};
+  const std::vector<float> ground(points.size(), 0.0F);
+  const std::vector<ColumnPlace> places = ColumnPlaces(points, ground, 0.5);
+  EXPECT_NEAR(places[0].above_m, 2.1F, 1e-6F);
+  EXPECT_EQ(places[0].below_m, 0.0F);
+  EXPECT_EQ(places[0].filled, 1.0F);
+  EXPECT_NEAR(places[1].below_m, 2.1F, 1e-6F);
+  EXPECT_NEAR(places[1].filled, 2.0F / 9.0F, 1e-6F) << "two of the nine levels up to 2.25 m";
+  EXPECT_NEAR(places[3].above_m, 0.3F, 1e-6F);
+  EXPECT_NEAR(places[3].below_m, 0.2F, 1e-6F);
+  EXPECT_EQ(places[5].filled, 1.0F);
+  // In wider columns all stand together.
+  EXPECT_NEAR(ColumnPlaces(points, ground, 2.0)[5].above_m, 1.5F, 1e-6F);
+}
+
 TEST(GroundHeightTest, IsAboveTheLowestAroundNotAboveStrayReturns) {
   std::vector<Eigen::Vector3f> points = Floor(60);  // 6 m × 6 m
   const std::size_t floor = points.size();
@@ -116,6 +139,12 @@ TEST(FeaturesTest, ShapesOfAFloorAndAPole) {
   EXPECT_EQ(at(pole, "height.0.5"), 1.0F);
   EXPECT_NEAR(at(pole, "height.3"), 0.5F, 0.01F);
   EXPECT_NEAR(at(pole, "height.15"), 0.1F, 0.01F);
+  EXPECT_NEAR(at(pole, "below.0.5"), 0.5F, 0.01F);
+  EXPECT_NEAR(at(pole, "above.0.5"), 0.49F, 0.01F);
+  EXPECT_EQ(at(pole, "filled.2"), 1.0F);
+  // The 16 nearest on a grid of 10 cm reach to its third ring, or 3 cm times 8 along the pole.
+  EXPECT_NEAR(at(kFloor, "reach.0"), 0.2F * std::sqrt(1.25F) / 1.2F, 1e-3F);
+  EXPECT_NEAR(at(pole, "reach.0"), 0.24F / 1.2F, 1e-3F);
   EXPECT_EQ(at(pole, "constant"), 1.0F);
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -38,6 +39,29 @@ TEST(NeighboursTest, AreTheNearestOfAll) {
       EXPECT_NE(other, p);
       EXPECT_NEAR(neighbours.SquaredDistances(p)[k], all[k], 1e-5F) << p;
       EXPECT_NEAR((points[p] - points[other]).squaredNorm(), all[k], 1e-5F) << p;
+    }
+  }
+}
+
+// A grid has many equally far ones.
+TEST(NeighboursTest, EquallyFarOnesGoByIndexAlsoAmongOtherPoints) {
+  std::vector<Eigen::Vector3f> points;
+  for (int k = 0; k < 500; ++k) {
+    points.emplace_back(
+        static_cast<float>(k % 8), static_cast<float>(k / 8 % 8), static_cast<float>(k / 64));
+  }
+  std::vector<Eigen::Vector3f> queries(points.begin(), points.begin() + 100);
+  for (Eigen::Vector3f& q : queries) q += Eigen::Vector3f(0.5F, 2.0F, -1.0F);
+  const Neighbours neighbours = Neighbours::Find(queries, points, 16);
+  for (std::size_t q = 0; q < queries.size(); ++q) {
+    std::vector<std::pair<float, std::uint32_t>> all;
+    for (std::uint32_t p = 0; p < points.size(); ++p) {
+      all.emplace_back((points[p] - queries[q]).squaredNorm(), p);
+    }
+    std::sort(all.begin(), all.end());
+    for (std::size_t k = 0; k < 16; ++k) {
+      ASSERT_EQ(neighbours.Of(q)[k], all[k].second) << q;
+      ASSERT_EQ(neighbours.SquaredDistances(q)[k], all[k].first) << q;
     }
   }
 }

@@ -1,5 +1,6 @@
 #include "core/classification/reduction.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <numeric>
 #include <vector>
@@ -42,7 +43,7 @@ std::uint32_t Sum(const std::vector<std::uint32_t>& counts) {
 
 TEST(ReductionTest, PureLeavesStandForPointsOfOneClass) {
   const Scene scene = WallWithWindow(64);
-  const ReducedPoints reduced = Reduce(scene.positions, scene.data, {});
+  const ReducedPoints reduced = Reduce(scene.positions, scene.data, {.kind = ReductionKind::kPure});
   EXPECT_EQ(Sum(reduced.counts), scene.positions.size());
   EXPECT_LT(reduced.positions.size(), scene.positions.size() / 10);
   double windows = 0.0;
@@ -85,6 +86,26 @@ TEST(ReductionTest, RandomKeepsPointsAsTheyAre) {
   const ReducedPoints none = Reduce(scene.positions, scene.data, {.kind = ReductionKind::kNone});
   EXPECT_EQ(none.data.features, scene.data.features);
   EXPECT_EQ(none.data.labels, scene.data.labels);
+}
+
+TEST(ReductionTest, BalancedSharesGoByTheRootOfTheNumbers) {
+  const Scene scene = WallWithWindow(64);  // 225 of 4096 points are window: roots 15 and 62
+  const ReducedPoints reduced =
+      Reduce(scene.positions, scene.data, {.kind = ReductionKind::kBalanced, .count = 154});
+  const auto windows = std::count(reduced.data.labels.begin(), reduced.data.labels.end(), 1);
+  EXPECT_EQ(windows, 30);
+  EXPECT_EQ(reduced.data.labels.size(), 155U) << "29.9 and 124.1, both rounded up";
+  for (std::size_t k = 0; k < reduced.positions.size(); ++k) {
+    const auto row =
+        static_cast<Eigen::Index>(64.0F * reduced.positions[k].x() + reduced.positions[k].z());
+    EXPECT_EQ(reduced.data.features.row(static_cast<Eigen::Index>(k)),
+              scene.data.features.row(row));
+  }
+  // Where a class has fewer points than its share, all of them.
+  const ReducedPoints most =
+      Reduce(scene.positions, scene.data, {.kind = ReductionKind::kBalanced, .count = 2000});
+  EXPECT_EQ(std::count(most.data.labels.begin(), most.data.labels.end(), 1), 225);
+  EXPECT_EQ(most.counts, std::vector<std::uint32_t>(most.data.labels.size(), 1));
 }
 
 TEST(EvaluationTest, CountsByHand) {
