@@ -7,6 +7,6 @@ strata_library(
 )
 strata_executable(
   classification_thesis classification_thesis
-  SOURCES classification_thesis.cc
-  DEPS strata::classification strata::classification_scenes
+  SOURCES classification_thesis.cc range_scan_features.cc
+  DEPS strata::classification strata::classification_scenes strata::simulator
 )
