@@ -27,6 +27,7 @@
 #include "core/classification/amn_learning.h"
 #include "core/classification/classifier.h"
 #include "core/classification/evaluation.h"
+#include "core/classification/instance_features.h"
 #include "core/classification/instances.h"
 #include "core/classification/neighbours.h"
 #include "core/classification/network.h"
@@ -305,9 +306,9 @@ std::vector<ClassIndex> LabelPlaces(const Wing& training, const Wing& test, Meth
   }
   return LearnAndLabel(
       training,
-      WithConstant(instances.DistancesWithin(testing::kInstanceNeighbours)),
+      InstanceFeatures(instances.DistancesWithin(testing::kInstanceNeighbours)),
       test,
-      WithConstant(instances.Distances(test.data.features, testing::kInstanceNeighbours)));
+      InstanceFeatures(instances.Distances(test.data.features, testing::kInstanceNeighbours)));
 }
 
 void Places(Seeds seeds) {
@@ -349,6 +350,7 @@ TrainingOptions FacadeOptions(ClassifierMethod method, FeatureSet set) {
   TrainingOptions options;
   options.method = method;
   options.features.set = set;
+  options.features.neighbours = testing::kFacadeNeighbours;
   options.reduction.kind = ReductionKind::kPure;
   return options;
 }

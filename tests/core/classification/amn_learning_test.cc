@@ -168,7 +168,7 @@ TEST(AmnLearningTest, TheQuadraticProgramMeetsItsOptimalityConditions) {
         worst.score - Score(MakeAmnProblem(w, chain.features, chain.edges), chain.labels);
     EXPECT_NEAR(program.objective, HalfNorm(w) + c * slack, 1e-5 * program.objective);
     // Multipliers, found without the solver: strong duality, hence complementary slackness.
-    const Multipliers dual = ClimbDual(chain, c, 800);
+    const Multipliers dual = ClimbDual(chain, c, 2000);
     EXPECT_NEAR(
         c * dual.loss - HalfNorm(dual.weights), program.objective, 2e-3 * program.objective);
     EXPECT_LE(c * dual.loss - HalfNorm(dual.weights), program.objective * (1.0 + 1e-5));
