@@ -8,6 +8,7 @@
 
 #include "core/classification/amn_inference.h"
 #include "core/classification/amn_learning.h"
+#include "core/classification/instance_features.h"
 #include "core/classification/instances.h"
 #include "core/classification/neighbours.h"
 #include "core/common/option_checks.h"
@@ -29,13 +30,6 @@ constexpr double kFeaturesShare = 0.5;
 std::vector<NetworkEdge> NetworkOf(const std::vector<Eigen::Vector3f>& points,
                                    const NetworkOptions& options) {
   return DrawNetwork(Neighbours::Find(points, kNetworkCandidates), options);
-}
-
-// With the constant that a linear classifier needs.
-FeatureMatrix WithConstant(FeatureMatrix features) {
-  features.conservativeResize(Eigen::NoChange, features.cols() + 1);
-  features.rightCols(1).setOnes();
-  return features;
 }
 
 FeatureMatrix Standardised(const Classifier& classifier, FeatureMatrix features) {
@@ -103,7 +97,7 @@ class Trainer {
         break;
       case ClassifierMethod::kInstanceAmn: {
         InstanceModel model{{}, options_.neighbours, {}};
-        const FeatureMatrix distances = WithConstant(
+        const FeatureMatrix distances = InstanceFeatures(
             Instances(data_).DistancesWithin(static_cast<std::size_t>(options_.neighbours)));
         STRATA_ASSIGN_OR_RETURN(model.weights, Network(distances, stop));
         model.instances = std::move(data_);
@@ -270,7 +264,7 @@ absl::StatusOr<ClassifiedCloud> Classify(const Classifier& classifier,
     return ClassifiedCloud{LargestScores(instances.Votes(features, count))};
   }
   return Infer(kept.weights,
-               WithConstant(instances.Distances(features, count)),
+               InstanceFeatures(instances.Distances(features, count)),
                NetworkOfFinite(cloud, classifier.network),
                stop);
 }

@@ -26,7 +26,7 @@ enum class FeatureSet : std::uint8_t {  // stored in models
   // that of the wall, or of the ground where there is no wall; neighbours in front of, in and
   // behind the plane through the point; normalised height.
   kWall = 2,
-  // Spin images of 5 × 10 bins (9.4.3; Johnson 1997).
+  // Spin images of 5 × 10 bins (9.4.3; Johnson 1997): roots of the shares of the points around.
   kSpin = 3,
 };
 

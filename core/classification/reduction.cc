@@ -99,18 +99,20 @@ class Reducer {
     return static_cast<ClassIndex>(std::max_element(count.begin(), count.end()) - count.begin());
   }
 
+  std::uint32_t NearestTo(const Eigen::Vector3f& place, std::span<const std::uint32_t> rows) const {
+    return *std::min_element(rows.begin(), rows.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return (positions_[a] - place).squaredNorm() < (positions_[b] - place).squaredNorm();
+    });
+  }
+
   void Merge(std::span<std::uint32_t> rows) {
-    std::sort(rows.begin(), rows.end());  // sums do not depend on how the tree was cut
-    Eigen::Vector3d position = Eigen::Vector3d::Zero();
-    Eigen::RowVectorXd features = Eigen::RowVectorXd::Zero(data_.features.cols());
-    for (const std::uint32_t row : rows) {
-      position += positions_[row].cast<double>();
-      features += data_.features.row(row).cast<double>();
-    }
-    const auto n = static_cast<double>(rows.size());
+    std::sort(rows.begin(), rows.end());  // sums and ties do not depend on how the tree was cut
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const std::uint32_t row : rows) sum += positions_[row].cast<double>();
+    const Eigen::Vector3f mean = (sum / static_cast<double>(rows.size())).cast<float>();
     const auto at = static_cast<Eigen::Index>(reduced_.positions.size());
-    reduced_.positions.emplace_back((position / n).cast<float>());
-    reduced_.data.features.row(at) = (features / n).cast<float>();
+    reduced_.data.features.row(at) = data_.features.row(NearestTo(mean, rows));
+    reduced_.positions.push_back(mean);
     reduced_.data.labels.push_back(CommonestLabel(rows));
     reduced_.counts.push_back(static_cast<std::uint32_t>(rows.size()));
   }

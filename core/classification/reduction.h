@@ -1,8 +1,9 @@
 // Fewer training points that say the same (thesis 9.3).
 //
-// A point that stands for several is at their mean, and has the mean of their features: those were
-// computed in the full cloud, so that learning sees the distributions that inference will see.
-// Features computed anew among the fewer points would be those of another, coarser sensor.
+// A point that stands for several is at their mean, and has the features of the one nearest to it:
+// those were computed in the full cloud, so that learning sees what inference will see. Means of
+// features are smoother than features of points are, and a classifier learned from them is too
+// sure; features computed anew among the fewer points would be those of another, coarser sensor.
 #ifndef STRATA_CORE_CLASSIFICATION_REDUCTION_H_
 #define STRATA_CORE_CLASSIFICATION_REDUCTION_H_
 

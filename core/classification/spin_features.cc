@@ -18,6 +18,25 @@ constexpr int kAcross = 5;  // bins of the distance from the axis
 constexpr int kAlong = 10;  // bins of the height along it
 constexpr float kRadiusSpacings = 10.0F;
 
+// A point's share of the four bins whose centres are around it, so that noise moves little over the
+// bins' edges (Johnson 1997).
+template <typename Row>
+void AddBilinear(float across, float along, float share, Row&& bins) {
+  const float a = across - 0.5F;
+  const float b = along - 0.5F;
+  const float a_low = std::floor(a);
+  const float b_low = std::floor(b);
+  for (int k = 0; k < 4; ++k) {
+    const int right = k % 2;
+    const int up = k / 2;
+    const float weight =
+        (right == 1 ? a - a_low : 1.0F - (a - a_low)) * (up == 1 ? b - b_low : 1.0F - (b - b_low));
+    const int bin_a = std::clamp(static_cast<int>(a_low) + right, 0, kAcross - 1);
+    const int bin_b = std::clamp(static_cast<int>(b_low) + up, 0, kAlong - 1);
+    bins[bin_a * kAlong + bin_b] += weight * share;
+  }
+}
+
 float MedianSpacing(const Neighbours& neighbours) {
   std::vector<float> squared;
   for (std::size_t i = 0; i < neighbours.size(); ++i) {
@@ -65,12 +84,14 @@ absl::StatusOr<FeatureMatrix> SpinFeatures(const PointCloud& cloud,
     for (const auto& [other, squared] : found) {
       const float along = (points[other] - points[i]).dot(normal);
       const float across = std::sqrt(std::max(0.0F, squared - along * along));
-      const int a = std::min(kAcross - 1, static_cast<int>(kAcross * across / radius));
-      const int b =
-          std::clamp(static_cast<int>(kAlong * (along + radius) / (2.0F * radius)), 0, kAlong - 1);
-      features(static_cast<Eigen::Index>(i), a * kAlong + b) += each;
+      AddBilinear(kAcross * across / radius,
+                  kAlong * (along + radius) / (2.0F * radius),
+                  each,
+                  features.row(static_cast<Eigen::Index>(i)));
     }
   }
+  // Counts vary by their root: as roots, full and sparse bins weigh alike.
+  features = features.cwiseSqrt();
   return features;
 }
 

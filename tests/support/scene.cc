@@ -138,6 +138,33 @@ Solid Post(double x, double y, double z_min, double z_max, double radius, int si
   return solid;
 }
 
+Solid Hull(const std::vector<Ellipsoid>& ellipsoids, int faces) {
+  const auto reach = [&ellipsoids](const Vector3d& normal) {
+    double most = -kNothing;
+    for (const Ellipsoid& e : ellipsoids) {
+      most = std::max(most, normal.dot(e.centre) + (e.axes.transpose() * normal).norm());
+    }
+    return most;
+  };
+  Solid solid;
+  for (int k = 0; k < faces; ++k) {  // normals evenly over the sphere, along a spiral
+    const double z = 1.0 - (2.0 * k + 1.0) / faces;
+    const double angle = k * std::numbers::pi * (3.0 - std::sqrt(5.0));
+    const double r = std::sqrt(1.0 - z * z);
+    const Vector3d normal(r * std::cos(angle), r * std::sin(angle), z);
+    solid.faces.push_back({normal, reach(normal)});
+  }
+  Vector3d min, max;
+  for (int axis = 0; axis < 3; ++axis) {
+    max[axis] = reach(Vector3d::Unit(axis));
+    min[axis] = -reach(-Vector3d::Unit(axis));
+    solid.faces.push_back({Vector3d::Unit(axis), max[axis]});
+    solid.faces.push_back({-Vector3d::Unit(axis), -min[axis]});
+  }
+  solid.box = {min, max};
+  return solid;
+}
+
 void Scene::SetTerrain(const Eigen::AlignedBox2d& area,
                        double cell_m,
                        const std::function<double(double, double)>& height) {
@@ -191,14 +218,22 @@ void Scene::Split(std::size_t node) {
   Split(child + 1);
 }
 
+std::optional<Scene::Hit> Scene::Trace(const Vector3d& origin,
+                                       const Vector3d& direction,
+                                       double max_range) const {
+  const Hit solid = CastSolids(origin, direction, max_range);
+  const double ground = CastTerrain(origin, direction, std::min(solid.range, max_range));
+  const Hit hit = ground < solid.range ? Hit{.range = ground} : solid;
+  if (hit.range > max_range) return std::nullopt;
+  return hit;
+}
+
 std::optional<double> Scene::Cast(const Vector3d& origin,
                                   const Vector3d& direction,
                                   double max_range) const {
-  const double solid = CastSolids(origin, direction, max_range);
-  const double ground = CastTerrain(origin, direction, std::min(solid, max_range));
-  const double range = std::min(solid, ground);
-  if (range > max_range) return std::nullopt;
-  return range;
+  const std::optional<Hit> hit = Trace(origin, direction, max_range);
+  if (!hit.has_value()) return std::nullopt;
+  return hit->range;
 }
 
 std::optional<double> Scene::GroundBelow(double x, double y, double z) const {
@@ -207,22 +242,24 @@ std::optional<double> Scene::GroundBelow(double x, double y, double z) const {
   return z - *range;
 }
 
-double Scene::CastSolids(const Vector3d& origin, const Vector3d& direction, double limit) const {
-  if (nodes_.empty()) return kNothing;
-  double nearest = kNothing;
+Scene::Hit Scene::CastSolids(const Vector3d& origin,
+                             const Vector3d& direction,
+                             double limit) const {
+  Hit nearest{.range = kNothing};
+  if (nodes_.empty()) return nearest;
   std::array<std::size_t, 64> stack{};
   std::size_t depth = 1;
   while (depth > 0) {
     const Node& node = nodes_[stack[--depth]];
-    if (CastBox(node.box, origin, direction, std::min(limit, nearest)) == kNothing) continue;
+    if (CastBox(node.box, origin, direction, std::min(limit, nearest.range)) == kNothing) continue;
     if (node.count == 0) {
       stack[depth++] = node.first;
       stack[depth++] = node.first + 1;
       continue;
     }
     for (std::size_t i = node.first; i < node.first + node.count; ++i) {
-      nearest =
-          std::min(nearest, CastSolid(solids_[i], origin, direction, std::min(limit, nearest)));
+      const double range = CastSolid(solids_[i], origin, direction, std::min(limit, nearest.range));
+      if (range < nearest.range) nearest = {range, solids_[i].label};
     }
   }
   return nearest;

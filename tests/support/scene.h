@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -21,6 +22,7 @@ struct Solid {
   };
   std::vector<Face> faces;
   Eigen::AlignedBox3d box;
+  std::uint16_t label = 0;  // what it is, for scans that say so; 0: nothing in particular
 };
 
 Solid Box(const Eigen::Vector3d& min, const Eigen::Vector3d& max);
@@ -31,6 +33,14 @@ Solid OrientedBox(const Eigen::Isometry3d& T_world_box, const Eigen::Vector3d& s
 Solid RampX(double x_low, double x_high, double y_min, double y_max, double z_base, double z_top);
 // An upright cylinder with `sides` faces around (x, y), circumscribed about `radius`.
 Solid Post(double x, double y, double z_min, double z_max, double radius, int sides = 8);
+
+// The points centre + axes · u with |u| ≤ 1.
+struct Ellipsoid {
+  Eigen::Vector3d centre;
+  Eigen::Matrix3d axes;
+};
+// The convex hull of ellipsoids, circumscribed by `faces` planes: heads, limbs, tapered bodies.
+Solid Hull(const std::vector<Ellipsoid>& ellipsoids, int faces = 96);
 
 // Solids and at most one terrain. Add everything, then Build(), then ask; asking is const and
 // thread-safe.
@@ -43,8 +53,16 @@ class Scene {
                   const std::function<double(double, double)>& height);
   void Build();
 
-  // Distance along the unit vector `direction` to the first surface within `max_range`. A solid
-  // that holds `origin` is not hit.
+  struct Hit {
+    double range = 0.0;
+    std::uint16_t label = 0;  // of the solid; 0 of terrain
+  };
+  // The first surface along the unit vector `direction` within `max_range`. A solid that holds
+  // `origin` is not hit.
+  std::optional<Hit> Trace(const Eigen::Vector3d& origin,
+                           const Eigen::Vector3d& direction,
+                           double max_range) const;
+  // Its range.
   std::optional<double> Cast(const Eigen::Vector3d& origin,
                              const Eigen::Vector3d& direction,
                              double max_range) const;
@@ -72,9 +90,9 @@ class Scene {
   };
 
   void Split(std::size_t node);
-  double CastSolids(const Eigen::Vector3d& origin,
-                    const Eigen::Vector3d& direction,
-                    double limit) const;
+  Hit CastSolids(const Eigen::Vector3d& origin,
+                 const Eigen::Vector3d& direction,
+                 double limit) const;
   double CastTerrain(const Eigen::Vector3d& origin,
                      const Eigen::Vector3d& direction,
                      double limit) const;

@@ -109,5 +109,32 @@ TEST(SceneTest, HierarchyFindsWhatTryingEverySolidFinds) {
   EXPECT_GT(hits, 200);
 }
 
+TEST(SceneTest, HullOfEllipsoidsIsTheirs) {
+  // A ball, and a limb between two balls along z.
+  const Eigen::Matrix3d ball = 0.5 * Eigen::Matrix3d::Identity();
+  Solid limb = Hull({{{3, 0, 0}, ball}, {{3, 0, 2}, ball}}, 400);
+  limb.label = 7;
+  Scene scene;
+  scene.Add(limb);
+  scene.Add(Hull({{{0, 4, 0}, ball}}, 400));
+  scene.Build();
+  const auto side = scene.Trace({0, 0, 1}, Vector3d::UnitX(), 10.0);
+  ASSERT_TRUE(side.has_value());
+  EXPECT_NEAR(side->range, 2.5, 0.02);
+  EXPECT_EQ(side->label, 7);
+  EXPECT_NEAR(scene.Cast({3, 0, 5}, -Vector3d::UnitZ(), 10.0).value_or(0.0), 2.5, 0.02);
+  const auto round = scene.Trace({0, 0, 0}, Vector3d::UnitY(), 10.0);
+  ASSERT_TRUE(round.has_value());
+  EXPECT_NEAR(round->range, 3.5, 0.02);
+  EXPECT_EQ(round->label, 0);
+  // Circumscribed: rays that meet the ball meet the hull.
+  Random random(5);
+  for (int run = 0; run < 500; ++run) {
+    const double angle = random.Uniform(-0.124, 0.124);
+    const Vector3d direction(std::sin(angle), std::cos(angle), 0.0);
+    EXPECT_TRUE(scene.Cast({0, 0, 0}, direction, 10.0).has_value()) << angle;
+  }
+}
+
 }  // namespace
 }  // namespace strata::testing

@@ -77,15 +77,18 @@ PointCloud SimulateScan(const Scene& scene,
       const Vector3d beam(std::cos(elevation) * std::cos(azimuth),
                           std::cos(elevation) * std::sin(azimuth),
                           std::sin(elevation));
-      const auto range = scene.Cast(
+      const auto hit = scene.Trace(
           T_world_sensor.translation(), T_world_sensor.linear() * beam, sensor.max_range_m);
-      if (range.has_value() && *range >= sensor.min_range_m) {
-        const double sigma = sensor.sigma_m + sensor.sigma_per_metre * *range;
-        cloud.points.emplace_back(((*range + sigma * random.Gaussian()) * beam).cast<float>());
-      } else if (sensor.organised) {
+      const bool seen = hit.has_value() && hit->range >= sensor.min_range_m;
+      if (!seen && !sensor.organised) continue;
+      if (seen) {
+        const double sigma = sensor.sigma_m + sensor.sigma_per_metre * hit->range;
+        cloud.points.emplace_back(((hit->range + sigma * random.Gaussian()) * beam).cast<float>());
+      } else {
         cloud.points.emplace_back(
             Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
       }
+      if (sensor.labelled) cloud.label.push_back(seen ? hit->label : std::uint16_t{0});
     }
   }
   if (sensor.organised) {

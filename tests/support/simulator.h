@@ -36,6 +36,7 @@ struct SensorOptions {
   double sigma_m = 0.01;  // Gaussian, along the beam
   double sigma_per_metre = 0.0005;
   bool organised = false;  // rows = rings from below, NaN where nothing came back
+  bool labelled = false;   // PointCloud::label is that of the solids
 };
 
 // One turn in the sensor's frame (x forward, y left, z up), with sensor_origin zero.

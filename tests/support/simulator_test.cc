@@ -135,5 +135,27 @@ TEST(SimulatorTest, NoisyOdometryDriftsFromAnExactStart) {
   EXPECT_NEAR(std::sqrt(squares / (3.0 * static_cast<double>(truth.size() - 1))), 0.05, 0.004);
 }
 
+TEST(SimulatorTest, LabelsAreThoseOfTheSolids) {
+  Scene scene;
+  Solid left = Box({-1, 2, -1}, {1, 3, 1});
+  left.label = 5;
+  scene.Add(left);
+  scene.Add(Box({-1, -3, -1}, {1, -2, 1}));
+  scene.Build();
+  SensorOptions sensor;
+  sensor.labelled = true;
+  const PointCloud cloud = SimulateScan(scene, sensor, Pose::Identity(), 1);
+  ASSERT_EQ(cloud.label.size(), cloud.size());
+  ASSERT_GT(cloud.size(), 100U);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    EXPECT_EQ(cloud.label[i], cloud.points[i].y() > 0.0F ? 5 : 0);
+  }
+  sensor.organised = true;
+  const PointCloud grid = SimulateScan(scene, sensor, Pose::Identity(), 1);
+  EXPECT_EQ(grid.label.size(), grid.size());
+  sensor.labelled = false;
+  EXPECT_TRUE(SimulateScan(scene, sensor, Pose::Identity(), 1).label.empty());
+}
+
 }  // namespace
 }  // namespace strata::testing

@@ -1,5 +1,7 @@
 #include "core/classification/amn_inference.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 #include <gmock/gmock.h>
@@ -53,6 +55,55 @@ TEST(AmnInferenceTest, ExpansionIsNearTheBestAndBelowTheRelaxation) {
   }
   RecordProperty("exact", exact);
   EXPECT_GE(exact, kRuns * 9 / 10);
+}
+
+// As an energy that is never negative: ½ w_e^k of every edge of a point goes to the point, and an
+// edge between a ≠ b costs V = ½ (w_e^a + w_e^b), a metric.
+double TopOfEnergy(const AmnProblem& problem) {
+  ScoreMatrix node = problem.node_scores;
+  for (const NetworkEdge& edge : problem.edges) {
+    node.row(edge.i) += 0.5 * problem.edge_scores.transpose();
+    node.row(edge.j) += 0.5 * problem.edge_scores.transpose();
+  }
+  return node.rowwise().maxCoeff().sum();
+}
+
+TEST(AmnInferenceTest, ExpansionKeepsItsBoundAndItsStart) {
+  constexpr std::uint64_t kSeed = 93;
+  SplitMix64 random(kSeed);
+  int exact = 0;
+  constexpr int kRuns = 60;
+  for (int run = 0; run < kRuns; ++run) {
+    SCOPED_TRACE(run);
+    const int classes = 2 + run % 3;
+    const std::uint32_t points = 6 + random.Below(7);
+    const auto edges = RandomEdges(points, static_cast<int>(random.Below(28)), random);
+    AmnProblem problem = RandomProblem(points, classes, edges, random);
+    for (double& score : problem.edge_scores) score += 0.2;
+    STRATA_ASSERT_OK_AND_ASSIGN(const AmnLabels labels, MaximizeScore(problem, Stop()));
+    const double best = testing::BestScoreByBranching(problem);
+    EXPECT_GE(labels.score, Score(problem, LargestScores(problem.node_scores)) - 1e-9);
+    EXPECT_TRUE(classes > 2 || std::abs(labels.score - best) < 1e-9);
+    exact += labels.score > best - 1e-9 ? 1 : 0;
+    // Boykov, Veksler, Zabih 2001: within 2 max V / min V of the least energy.
+    Eigen::VectorXd w = problem.edge_scores;
+    std::sort(w.begin(), w.end());
+    const double ratio = (w[w.size() - 1] + w[w.size() - 2]) / (w[0] + w[1]);
+    const double top = TopOfEnergy(problem);
+    EXPECT_GE(top - best, -1e-9);
+    EXPECT_LE(top - labels.score, 2.0 * ratio * (top - best) + 1e-9);
+  }
+  RecordProperty("exact", exact);
+}
+
+TEST(AmnInferenceTest, BranchingIsEnumeration) {
+  constexpr std::uint64_t kSeed = 94;
+  SplitMix64 random(kSeed);
+  for (int run = 0; run < 30; ++run) {
+    const auto edges = RandomEdges(7, static_cast<int>(random.Below(18)), random);
+    const AmnProblem problem = RandomProblem(7, 3, edges, random);
+    EXPECT_NEAR(testing::BestScoreByBranching(problem), BestScoreByEnumeration(problem), 1e-9);
+  }
 }
 
 TEST(AmnInferenceTest, NeighboursOutvoteNoise) {

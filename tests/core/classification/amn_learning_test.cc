@@ -9,52 +9,20 @@
 #include <gtest/gtest.h>
 
 #include "core/classification/amn_inference.h"
-#include "tests/core/classification/random_networks.h"
+#include "core/classification/amn_relaxation.h"
+#include "tests/core/classification/chains.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {
 namespace {
 
-// Points along a way whose class changes now and then; features say it with noise.
-struct Chain {
-  FeatureMatrix features;
-  std::vector<NetworkEdge> edges;
-  std::vector<ClassIndex> labels;
-  std::size_t classes = 0;
-
-  AmnTrainingSet set() const { return {features, edges, labels, classes}; }
-};
-
-Chain MakeChain(std::uint32_t points, std::size_t classes, double noise, std::uint64_t seed) {
-  SplitMix64 random(seed);
-  Chain chain;
-  chain.classes = classes;
-  chain.features = FeatureMatrix::Zero(points, static_cast<Eigen::Index>(classes) + 1);
-  ClassIndex label = 0;
-  for (std::uint32_t i = 0; i < points; ++i) {
-    if (i % 7 == 0)
-      label = static_cast<ClassIndex>(random.Below(static_cast<std::uint32_t>(classes)));
-    chain.labels.push_back(label);
-    chain.features(i, 0) = 1.0F;
-    chain.features(i, 1 + label) = 1.0F;
-    for (std::size_t k = 0; k < classes; ++k) {
-      chain.features(i, 1 + static_cast<Eigen::Index>(k)) +=
-          static_cast<float>(testing::RandomIn(-noise, noise, random));
-    }
-    if (i > 0) chain.edges.push_back({i - 1, i});
-    if (i > 2 && random.Below(2) == 0) chain.edges.push_back({i - 3, i});
-  }
-  return chain;
-}
+using testing::Chain;
+using testing::MakeChain;
 
 // ½ |w|² + c ξ by enumeration of all labelings.
 double ObjectiveByEnumeration(const Chain& chain, const AmnWeights& weights, double slack_weight) {
-  AmnProblem problem = MakeAmnProblem(weights, chain.features, chain.edges);
-  const double right = Score(problem, chain.labels);
-  problem.node_scores.array() += 1.0;
-  for (std::size_t i = 0; i < chain.labels.size(); ++i) {
-    problem.node_scores(static_cast<Eigen::Index>(i), chain.labels[i]) -= 1.0;
-  }
+  const double right = Score(MakeAmnProblem(weights, chain.features, chain.edges), chain.labels);
+  const AmnProblem problem = testing::AugmentedProblem(chain, weights);
   const double slack = testing::BestScoreByEnumeration(problem) - right;
   return 0.5 * (weights.node.squaredNorm() + weights.edge.squaredNorm()) +
          slack_weight / static_cast<double>(chain.labels.size()) * slack;
@@ -120,6 +88,93 @@ TEST(AmnLearningTest, NoStepFromTheLeastObjectiveGains) {
     for (double& w : moved.node.reshaped()) w += testing::RandomIn(-0.02, 0.02, random);
     for (double& w : moved.edge) w = std::max(0.0, w + testing::RandomIn(-0.02, 0.02, random));
     EXPECT_GE(ObjectiveByEnumeration(chain, moved, options.slack_weight), least * (1.0 - 1e-6));
+  }
+}
+
+// Shares y of eq. 9.8 and the weights that go with them: w_n^k = c Σ_i (ŷ_i^k − y_i^k) x_i, w_e^k =
+// max(0, c Σ_ij (ŷ_ij^k − y_ij^k)): stationarity of eq. 9.7, whose multipliers c y are.
+struct Multipliers {
+  AmnWeights weights;  // before the max
+  double loss = 0.0;   // Σ_i (1 − y_i of the right class)
+};
+
+Multipliers MultipliersOf(const Chain& chain, const AmnRelaxation& shares, double c) {
+  Multipliers result;
+  ScoreMatrix node = -shares.share;
+  ScoreMatrix edge = -shares.edge_share;
+  for (Eigen::Index i = 0; i < node.rows(); ++i) {
+    const ClassIndex right = chain.labels[static_cast<std::size_t>(i)];
+    result.loss += 1.0 - shares.share(i, right);
+    node(i, right) += 1.0;
+  }
+  for (Eigen::Index e = 0; e < edge.rows(); ++e) {
+    const NetworkEdge& ends = chain.edges[static_cast<std::size_t>(e)];
+    if (chain.labels[ends.i] == chain.labels[ends.j]) edge(e, chain.labels[ends.i]) += 1.0;
+  }
+  result.weights.node = c * node.transpose() * chain.features.cast<double>();
+  result.weights.edge = c * edge.colwise().sum().transpose();
+  return result;
+}
+
+double HalfNorm(const AmnWeights& w) {
+  return 0.5 * (w.node.squaredNorm() + w.edge.cwiseMax(0.0).squaredNorm());
+}
+
+// The dual of eq. 9.7, c · loss − ½ |w|², climbed by steps towards what the linear program says
+// (Frank, Wolfe 1956).
+Multipliers ClimbDual(const Chain& chain, double c, int steps) {
+  AmnWeights zero;
+  zero.node =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(chain.classes), chain.features.cols());
+  zero.edge = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(chain.classes));
+  Multipliers at{zero};
+  for (int step = 0; step < steps; ++step) {
+    AmnWeights w = at.weights;
+    w.edge = w.edge.cwiseMax(0.0);
+    const Multipliers to =
+        MultipliersOf(chain, RelaxScore(testing::AugmentedProblem(chain, w)).value(), c);
+    Multipliers best = at;
+    double highest = -1e300;
+    for (int k = 0; k <= 64; ++k) {  // on a line, finer and finer towards where it stands
+      const double share = std::pow(k / 64.0, 3);
+      Multipliers tried;
+      tried.weights.node = (1.0 - share) * at.weights.node + share * to.weights.node;
+      tried.weights.edge = (1.0 - share) * at.weights.edge + share * to.weights.edge;
+      tried.loss = (1.0 - share) * at.loss + share * to.loss;
+      const double dual = c * tried.loss - HalfNorm(tried.weights);
+      if (dual <= highest) continue;
+      highest = dual;
+      best = std::move(tried);
+    }
+    at = std::move(best);
+  }
+  return at;
+}
+
+TEST(AmnLearningTest, TheQuadraticProgramMeetsItsOptimalityConditions) {
+  for (const std::size_t classes : {2U, 3U}) {
+    SCOPED_TRACE(classes);
+    const Chain chain = MakeChain(16, classes, 1.0, 40 + classes);
+    const AmnLearningOptions options{.slack_weight = 12.0, .tolerance = 1e-6};
+    const double c = options.slack_weight / 16.0;
+    STRATA_ASSERT_OK_AND_ASSIGN(const AmnLearning program,
+                                LearnByQuadraticProgram(chain.set(), options));
+    const AmnWeights& w = program.weights;
+    // Primal feasibility: w_e ≥ 0, and ξ is what the relaxed best labeling is ahead.
+    EXPECT_GE(w.edge.minCoeff(), 0.0);
+    STRATA_ASSERT_OK_AND_ASSIGN(const AmnRelaxation worst,
+                                RelaxScore(testing::AugmentedProblem(chain, w)));
+    const double slack =
+        worst.score - Score(MakeAmnProblem(w, chain.features, chain.edges), chain.labels);
+    EXPECT_NEAR(program.objective, HalfNorm(w) + c * slack, 1e-5 * program.objective);
+    // Multipliers, found without the solver: strong duality, hence complementary slackness.
+    const Multipliers dual = ClimbDual(chain, c, 2000);
+    EXPECT_NEAR(
+        c * dual.loss - HalfNorm(dual.weights), program.objective, 2e-3 * program.objective);
+    EXPECT_LE(c * dual.loss - HalfNorm(dual.weights), program.objective * (1.0 + 1e-5));
+    // Stationarity.
+    EXPECT_LE((dual.weights.node - w.node).norm(), 0.06 * w.node.norm());
+    EXPECT_LE((dual.weights.edge.cwiseMax(0.0) - w.edge).norm(), 0.06 * w.node.norm());
   }
 }
 

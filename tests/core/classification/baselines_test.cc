@@ -9,6 +9,7 @@
 
 #include "core/classification/adaboost.h"
 #include "core/classification/evaluation.h"
+#include "core/classification/instance_features.h"
 #include "core/classification/instances.h"
 #include "core/classification/naive_bayes.h"
 #include "tests/core/classification/random_networks.h"
@@ -157,6 +158,17 @@ TEST(InstancesTest, ClassesOfOneRepeatOrAreFar) {
   const FeatureMatrix within = instances.DistancesWithin(2);
   EXPECT_EQ(within(2, 2), 5.0F) << "no other of its class: as far as the farthest";
   EXPECT_EQ(within(0, 0), 1.0F);
+}
+
+TEST(InstanceFeaturesTest, DoNotDependOnHowFarAllAre) {
+  FeatureMatrix distances(3, 4);
+  distances << 1.0F, 2.0F, 3.0F, 6.0F, 10.0F, 20.0F, 30.0F, 60.0F, 0.0F, 0.0F, 0.0F, 0.0F;
+  const FeatureMatrix features = InstanceFeatures(distances);
+  ASSERT_EQ(features.cols(), 5);
+  EXPECT_TRUE(features.row(0).isApprox(features.row(1)));
+  EXPECT_FLOAT_EQ(features(0, 3), 2.0F);
+  EXPECT_EQ(features.col(4), Eigen::VectorXf::Ones(3));
+  EXPECT_EQ(features.row(2).sum(), 1.0F);
 }
 
 TEST(InstancesTest, VotesFollowTheNearest) {

@@ -205,10 +205,34 @@ TEST(FeaturesTest, SpinImagesDoNotDependOnWhereAndHowAThingStands) {
   for (Eigen::Vector3f& p : cloud.points) p = turn * p + Eigen::Vector3f(1.0F, -2.0F, 3.0F);
   cloud.sensor_origin = turn * cloud.sensor_origin + Eigen::Vector3f(1.0F, -2.0F, 3.0F);
   STRATA_ASSERT_OK_AND_ASSIGN(const FeatureMatrix there, ComputeFeatures(cloud, options, Stop()));
-  // A point near a bin's edge may change bins by rounding.
+  // A point at the edge of the ball may come or go by rounding.
   EXPECT_LT((here - there).cwiseAbs().mean(), 2e-4F);
   for (Eigen::Index i = 0; i < here.rows(); ++i)
-    EXPECT_NEAR(here.row(i).head(50).sum(), 1.0F, 1e-4F);
+    EXPECT_NEAR(here.row(i).head(50).squaredNorm(), 1.0F, 1e-4F);
+}
+
+TEST(FeaturesTest, SpinImagesShareAPointAmongFourBins) {
+  // A flat grid seen from above, far smaller than a bin, and one point above its middle.
+  PointCloud cloud;
+  for (int i = -3; i <= 3; ++i) {
+    for (int j = -3; j <= 3; ++j) cloud.points.emplace_back(0.001F * i, 0.001F * j, 0.0F);
+  }
+  cloud.points.emplace_back(0.0F, 0.3F, 0.15F);
+  cloud.sensor_origin = {0.0F, 0.0F, 20.0F};
+  FeatureOptions options;
+  options.set = FeatureSet::kSpin;
+  options.spin_radius_m = 1.0;
+  STRATA_ASSERT_OK_AND_ASSIGN(const FeatureMatrix f, ComputeFeatures(cloud, options, Stop()));
+  // Across 0.3 m of bins of 0.2 m: between the centres 0.1 and 0.3, at the second. Along 0.15 m
+  // of bins of 0.2 m from −1 m: between the centres 0.1 (bin 5) and 0.3 (bin 6), a quarter above.
+  const Eigen::Index middle = 24;
+  const auto share = [&](int across, int along) {
+    return 50.0F * std::pow(f(middle, across * 10 + along), 2.0F);
+  };
+  EXPECT_NEAR(share(1, 5), 0.75F, 0.01F);
+  EXPECT_NEAR(share(1, 6), 0.25F, 0.01F);
+  EXPECT_NEAR(share(0, 4) + share(0, 5), 49.0F, 0.01F) << "the grid, in the middle of two";
+  EXPECT_NEAR(share(0, 4), 24.5F, 0.5F);
 }
 
 TEST(FeaturesTest, PointsThatAreNoneHaveNoFeatures) {

@@ -54,6 +54,54 @@ inline double BestScoreByEnumeration(const AmnProblem& problem) {
   }
 }
 
+// The same by trying labels point after point, as long as what is left could still make it the
+// best: for a dozen points of four classes.
+class Branching {
+ public:
+  explicit Branching(const AmnProblem& problem)
+      : problem_(problem), labels_(problem.points(), 0), left_(problem.points() + 1, 0.0) {
+    for (std::size_t i = problem.points(); i-- > 0;) {
+      left_[i] = left_[i + 1] + problem.node_scores.row(static_cast<Eigen::Index>(i)).maxCoeff();
+      for (const NetworkEdge& edge : problem.edges) {
+        if (edge.j == i) left_[i] += problem.edge_scores.maxCoeff();
+      }
+    }
+  }
+
+  double Best() {
+    best_ = Score(problem_, labels_);
+    Try(0, 0.0);
+    return best_;
+  }
+
+ private:
+  void Try(std::size_t i, double score) {
+    if (score + left_[i] <= best_) return;
+    if (i == labels_.size()) {
+      best_ = score;
+      return;
+    }
+    for (std::size_t k = 0; k < problem_.classes(); ++k) {
+      labels_[i] = static_cast<ClassIndex>(k);
+      double gain =
+          problem_.node_scores(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
+      for (const NetworkEdge& edge : problem_.edges) {
+        if (edge.j == i && labels_[edge.i] == k) {
+          gain += problem_.edge_scores[static_cast<Eigen::Index>(k)];
+        }
+      }
+      Try(i + 1, score + gain);
+    }
+  }
+
+  const AmnProblem& problem_;
+  std::vector<ClassIndex> labels_;
+  std::vector<double> left_;  // the most that points from here on can add
+  double best_ = 0.0;
+};
+
+inline double BestScoreByBranching(const AmnProblem& problem) { return Branching(problem).Best(); }
+
 }  // namespace strata::testing
 
 #endif  // STRATA_TESTS_CORE_CLASSIFICATION_RANDOM_NETWORKS_H_
