@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string>
 
+#include "absl/strings/str_format.h"
 #include "absl/time/time.h"
 #include <Eigen/Geometry>
 
@@ -107,6 +108,13 @@ Json ToJson(const MapInfo& info) {
                       {"altitude_m", parameters.origin->altitude_m}};
   }
   return json;
+}
+
+Json ToJson(const MapClass& map_class) {
+  const Colour& c = map_class.colour;
+  return {{"id", map_class.id},
+          {"name", map_class.name},
+          {"colour", absl::StrFormat("#%02x%02x%02x", c.r, c.g, c.b)}};
 }
 
 Json ToJson(const MapInfo& info, const MapStats& stats) {

@@ -19,6 +19,7 @@
 #include "core/storage/records.h"
 #include "core/world/epoch.h"
 #include "core/world/job.h"
+#include "core/world/map_class.h"
 #include "core/world/map_info.h"
 #include "core/world/robot_profile.h"
 #include "core/world/scan.h"
@@ -67,6 +68,8 @@ class StorageReader {
   // Newest first; the newest is the current one.
   virtual absl::StatusOr<std::vector<EpochInfo>> ListEpochs() = 0;
   virtual absl::StatusOr<std::map<std::string, RobotProfile>> ListProfiles() = 0;
+  // By id.
+  virtual absl::StatusOr<std::vector<MapClass>> ListClasses() = 0;
   virtual absl::StatusOr<std::optional<JobInfo>> FindJob(std::uint64_t id) = 0;
   virtual absl::StatusOr<std::vector<JobInfo>> ListJobs() = 0;
 
@@ -152,6 +155,8 @@ class StorageWriter {
   // Poses that only epochs before `epoch` use; those can not be gone back to any more.
   virtual absl::Status ForgetEpochsBefore(std::uint64_t epoch) = 0;
   virtual absl::Status PutProfile(absl::string_view name, const RobotProfile& profile) = 0;
+  // Inserts or replaces. ALREADY_EXISTS where another id has the name.
+  virtual absl::Status PutClass(const MapClass& map_class) = 0;
   // Inserts or replaces.
   virtual absl::Status PutJob(const JobInfo& job) = 0;
 

@@ -73,6 +73,8 @@ TEST_P(DatabaseSuite, AnUnknownMapIsNotFoundEverywhere) {
   EXPECT_THAT(db().jobs().Revert({}, no, 1), not_found);
   EXPECT_THAT(db().jobs().Watch({}, no, 1, ignore), not_found);
   EXPECT_THAT(db().maps().History({}, no), not_found);
+  EXPECT_THAT(db().maps().ListClasses({}, no), not_found);
+  EXPECT_THAT(db().maps().SetClass({}, no, {1, "wall", {}}), not_found);
   EXPECT_THAT(db().maps().Watch({}, no, {.trajectory = "", .once = true}, ignore), not_found);
   EXPECT_THAT(db().posegraph().Get({}, no), not_found);
   EXPECT_THAT(db().posegraph().SetPose({}, no, {"run", 1}, Pose::Identity()), not_found);

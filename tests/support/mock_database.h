@@ -32,6 +32,14 @@ class MockMaps : public api::Maps {
               History,
               (const api::Call&, absl::string_view),
               (override));
+  MOCK_METHOD(absl::StatusOr<std::vector<MapClass>>,
+              ListClasses,
+              (const api::Call&, absl::string_view),
+              (override));
+  MOCK_METHOD(absl::Status,
+              SetClass,
+              (const api::Call&, absl::string_view, const MapClass&),
+              (override));
   MOCK_METHOD(absl::Status,
               Watch,
               (const api::Call&, absl::string_view, const api::WatchOptions&, Sink<api::MapUpdate>),

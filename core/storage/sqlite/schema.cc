@@ -158,6 +158,11 @@ CREATE INDEX truth_plane_support_scan ON truth_plane_support (scan);
 CREATE TABLE truth_proposed_pose (
   job INTEGER NOT NULL, scan INTEGER NOT NULL, pose BLOB NOT NULL, PRIMARY KEY (job, scan)
 ) STRICT, WITHOUT ROWID;
+CREATE TABLE truth_class (
+  id INTEGER PRIMARY KEY,
+  name TEXT NOT NULL UNIQUE,
+  colour INTEGER NOT NULL
+) STRICT;
 )sql",
 };
 

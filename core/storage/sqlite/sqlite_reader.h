@@ -46,6 +46,7 @@ class SqliteReader final : public StorageReader {
   absl::StatusOr<std::vector<ProposedPose>> ListProposedPoses(std::uint64_t job) override;
   absl::StatusOr<std::vector<EpochInfo>> ListEpochs() override;
   absl::StatusOr<std::map<std::string, RobotProfile>> ListProfiles() override;
+  absl::StatusOr<std::vector<MapClass>> ListClasses() override;
   absl::StatusOr<std::optional<JobInfo>> FindJob(std::uint64_t id) override;
   absl::StatusOr<std::vector<JobInfo>> ListJobs() override;
   absl::StatusOr<std::optional<MlsTileRow>> FindMlsTile(const TileKey& key,

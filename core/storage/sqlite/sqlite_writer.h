@@ -50,6 +50,7 @@ class SqliteWriter final : public StorageWriter {
   absl::Status RestoreConstraints(std::uint64_t epoch) override;
   absl::Status ForgetEpochsBefore(std::uint64_t epoch) override;
   absl::Status PutProfile(absl::string_view name, const RobotProfile& profile) override;
+  absl::Status PutClass(const MapClass& map_class) override;
   absl::Status PutJob(const JobInfo& job) override;
 
   absl::Status PutMlsTile(const MlsTileRow& row) override;
