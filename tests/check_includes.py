@@ -22,6 +22,7 @@ ARROWS = {
     "core/registration": ["core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/posegraph": ["core/registration", "core/planes", "core/world", "core/mls", "core/cloud", "core/geometry",
                        "core/common"],
+    "core/classification": ["core/planes", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/planning": ["core/world", "core/mls", "core/geometry", "core/common"],
     "core/storage": ["core/world", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/api": ["core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
@@ -33,7 +34,8 @@ ARROWS = {
                    "core/common"],
     "client/formats": ["core/posegraph", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "client/cli": ["client/sdk", "client/formats", "core/api", "core/engine", "core/codec", "core/registration",
-                   "core/posegraph", "core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
+                   "core/classification", "core/posegraph", "core/world", "core/mls", "core/cloud", "core/geometry",
+                   "core/common"],
 }
 
 # external header pattern: rooms that may include it

@@ -68,6 +68,7 @@ void AddProfileCommands(Commands& commands);
 void AddJobCommands(Commands& commands);
 void AddPlanesCommands(Commands& commands);
 void AddLocalizeCommand(Commands& commands);
+void AddClassifierCommands(Commands& commands);
 
 }  // namespace strata::cli
 

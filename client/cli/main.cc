@@ -141,6 +141,7 @@ int Main(int argc, char** argv) {
   AddJobCommands(commands);
   AddPlanesCommands(commands);
   AddLocalizeCommand(commands);
+  AddClassifierCommands(commands);
   try {
     root.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
