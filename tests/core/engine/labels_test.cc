@@ -52,6 +52,7 @@ TEST_F(EngineLabelsTest, TilesAreThoseOfScansThatWereUploadedWithTheLabels) {
   Close();
   Sql("UPDATE derived_state SET schema = 0");  // all derived data are dropped and made again
   Reopen();
+  ExpectSound();  // once they are made
   EXPECT_EQ(Digest(), expected);
 }
 
