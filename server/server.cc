@@ -14,6 +14,7 @@
 #include "core/common/status.h"
 #include "server/listen_address.h"
 #include "server/rpc/runtime.h"
+#include "server/services/classifiers_service.h"
 #include "server/services/jobs_service.h"
 #include "server/services/maps_service.h"
 #include "server/services/planning_service.h"
@@ -49,7 +50,7 @@ class GrpcServer final : public Server {
 
  private:
   std::vector<grpc::Service*> Services() {
-    return {&maps_, &scans_, &tiles_, &planning_, &jobs_, &posegraph_};
+    return {&maps_, &scans_, &tiles_, &planning_, &jobs_, &posegraph_, &classifiers_};
   }
 
   const ServerOptions options_;
@@ -60,6 +61,7 @@ class GrpcServer final : public Server {
   PlanningService planning_{runtime_};
   JobsService jobs_{runtime_};
   PoseGraphService posegraph_{runtime_};
+  ClassifiersService classifiers_{runtime_};
   std::string address_;
   std::unique_ptr<grpc::Server> server_;
 };
@@ -70,7 +72,8 @@ void SetServingForEach(grpc::HealthCheckServiceInterface& health) {
                               v1::Tiles::service_full_name(),
                               v1::Planning::service_full_name(),
                               v1::Jobs::service_full_name(),
-                              v1::PoseGraph::service_full_name()}) {
+                              v1::PoseGraph::service_full_name(),
+                              v1::Classifiers::service_full_name()}) {
     health.SetServingStatus(service, true);
   }
 }

@@ -1,7 +1,11 @@
 // strata classifier …
+#include <functional>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "client/cli/classifier_files.h"
+#include "client/cli/classifier_maps.h"
 #include "client/cli/classifier_options.h"
 #include "client/cli/command.h"
 
@@ -14,18 +18,58 @@ constexpr char kClassesHelp[] =
 constexpr char kClassesType[] = "'NAME=LABEL,…;…'|FILE";
 constexpr char kDataHelp[] = "Labelled scans: PLY, PCD or text columns with a label";
 
+// Whether the command line names files; then no server is asked.
+void ChooseByData(Commands& commands,
+                  CLI::App* verb,
+                  std::function<bool()> on_files,
+                  FileAction file_action,
+                  Action map_action) {
+  verb->callback([&commands, on_files, file_action, map_action] {
+    if (on_files()) {
+      commands.selected_on_files = file_action;
+    } else {
+      commands.selected = map_action;
+    }
+  });
+}
+
 void AddTrain(Commands& commands, CLI::App* noun) {
   auto training = std::make_shared<FileTraining>();
-  CLI::App* verb = commands.FileVerb(
+  auto on_map = std::make_shared<MapTraining>();
+  CLI::App* verb = commands.Verb(
       noun,
       "train",
-      "Learn to tell classes of points apart from labelled files. Without --classes every label "
-      "but 0 is a class",
-      "strata classifier train --data a.ply b.ply --classes 'ground=1,2;wall=7' --out street.model",
-      [training](FileContext& context) { return TrainOnFiles(context, *training); });
-  verb->add_option("--data", training->data, kDataHelp)->type_name("FILES")->required();
-  verb->add_option("--classes", training->classes, kClassesHelp)->type_name(kClassesType);
-  verb->add_option("--out", training->out, "The classifier's file")->type_name("FILE")->required();
+      "Learn to tell classes of points apart: from all labelled scans of a map, or, with --data, "
+      "from labelled files alone. Without --classes every label but 0 is a class",
+      "strata classifier train campus --method amn --name street --wait\n"
+      "  strata classifier train --data a.ply b.ply --classes 'ground=1,2;wall=7' --out "
+      "street.model",
+      {});
+  ChooseByData(
+      commands,
+      verb,
+      [training] { return !training->data.empty(); },
+      [training](FileContext& context) { return TrainOnFiles(context, *training); },
+      [training, on_map](Context& context) {
+        on_map->folds = training->folds > 0 ? training->folds : -1;
+        return TrainOnMap(context, *on_map, training->options);
+      });
+  CLI::Option* map = verb->add_option("MAP", on_map->map, "Name of the map");
+  CLI::Option* data =
+      verb->add_option("--data", training->data, kDataHelp)->type_name("FILES")->excludes(map);
+  verb->add_option("--classes", training->classes, kClassesHelp)
+      ->type_name(kClassesType)
+      ->needs(data);
+  CLI::Option* out = verb->add_option("--out", training->out, "The classifier's file")
+                         ->type_name("FILE")
+                         ->needs(data);
+  data->needs(out);
+  verb->add_option("--name", on_map->name, "What the map calls the classifier")->needs(map);
+  verb->add_flag("--wait", on_map->wait, "Return when the job is done; exit 1 unless it succeeded")
+      ->needs(map);
+  verb->parse_complete_callback([map, data] {
+    if (map->empty() && data->empty()) throw CLI::RequiredError("MAP or --data");
+  });
   AddTrainingOptions(verb, training->options);
   verb->add_option("--folds",
                    training->folds,
@@ -36,21 +80,41 @@ void AddTrain(Commands& commands, CLI::App* noun) {
 
 void AddEvaluate(Commands& commands, CLI::App* noun) {
   auto evaluation = std::make_shared<FileEvaluation>();
-  CLI::App* verb = commands.FileVerb(
+  auto words = std::make_shared<std::vector<std::string>>();
+  CLI::App* verb = commands.Verb(
       noun,
       "evaluate",
-      "How well a classifier labels files whose labels are known. Without --classes labels are "
-      "ids of the classifier's classes",
-      "strata classifier evaluate street.model --data c.ply --classes 'ground=1,2;wall=7' "
+      "How well a classifier labels points whose labels are known: those that people labelled in a "
+      "map, or, with --data, files. Without --classes labels are ids of the classifier's classes",
+      "strata classifier evaluate campus street\n"
+      "  strata classifier evaluate street.model --data c.ply --classes 'ground=1,2;wall=7' "
       "--picture confusion.png",
-      [evaluation](FileContext& context) { return EvaluateOnFiles(context, *evaluation); });
-  verb->add_option("MODEL", evaluation->model, "The classifier's file")
-      ->type_name("FILE")
+      {});
+  ChooseByData(
+      commands,
+      verb,
+      [evaluation] { return !evaluation->data.empty(); },
+      [evaluation, words](FileContext& context) {
+        evaluation->model = words->front();
+        return EvaluateOnFiles(context, *evaluation);
+      },
+      [words](Context& context) { return EvaluateOnMap(context, words->front(), words->back()); });
+  verb->add_option("MODEL", *words, "A map and its classifier; with --data the classifier's file")
+      ->type_name("MAP MODEL|FILE")
+      ->expected(1, 2)
       ->required();
-  verb->add_option("--data", evaluation->data, kDataHelp)->type_name("FILES")->required();
-  verb->add_option("--classes", evaluation->classes, kClassesHelp)->type_name(kClassesType);
+  CLI::Option* data = verb->add_option("--data", evaluation->data, kDataHelp)->type_name("FILES");
+  verb->add_option("--classes", evaluation->classes, kClassesHelp)
+      ->type_name(kClassesType)
+      ->needs(data);
   verb->add_option("--picture", evaluation->picture, "Draw the confusion matrix")
-      ->type_name("FILE.png");
+      ->type_name("FILE.png")
+      ->needs(data);
+  verb->parse_complete_callback([words, data] {
+    if (words->size() != (data->empty() ? 2U : 1U)) {
+      throw CLI::ValidationError("MODEL", "give MAP and MODEL, or a file and --data");
+    }
+  });
 }
 
 void AddApply(Commands& commands, CLI::App* noun) {
@@ -80,6 +144,7 @@ void AddClassifierCommands(Commands& commands) {
   AddTrain(commands, noun);
   AddEvaluate(commands, noun);
   AddApply(commands, noun);
+  AddClassifierMapVerbs(commands, noun);
 }
 
 }  // namespace strata::cli

@@ -1,14 +1,8 @@
 #include "client/cli/classifier_options.h"
 
-#include <cstdint>
 #include <utility>
 
-#include "absl/strings/numbers.h"
-#include "absl/strings/str_cat.h"
-#include "absl/strings/str_split.h"
-#include "absl/strings/string_view.h"
-
-#include "core/common/status.h"
+#include "absl/status/statusor.h"
 
 namespace strata::cli {
 namespace {
@@ -21,27 +15,6 @@ T ValueOf(const std::string& option, absl::StatusOr<T> value) {
 }
 
 }  // namespace
-
-absl::StatusOr<ReductionOptions> ParseReduction(const std::string& text) {
-  ReductionOptions options;
-  const std::pair<absl::string_view, absl::string_view> parts =
-      absl::StrSplit(text, absl::MaxSplits('=', 1));
-  const auto [kind, number] = parts;
-  if (text == "auto") {
-    options.kind = ReductionKind::kPure;
-  } else if (text == "none") {
-    options.kind = ReductionKind::kNone;
-  } else if (kind == "depth" && absl::SimpleAtoi(number, &options.depth)) {
-    options.kind = ReductionKind::kDepth;
-  } else if (kind == "random" && absl::SimpleAtoi(number, &options.count)) {
-    options.kind = ReductionKind::kRandom;
-  } else {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "reduction '", text.substr(0, 40), "' is none of auto, none, depth=N, random=N"));
-  }
-  STRATA_RETURN_IF_ERROR(options.Validate());
-  return options;
-}
 
 void AddTrainingOptions(CLI::App* verb, TrainingOptions& options) {
   verb->add_option_function<std::string>(

@@ -2,17 +2,11 @@
 #ifndef STRATA_CLIENT_CLI_CLASSIFIER_OPTIONS_H_
 #define STRATA_CLIENT_CLI_CLASSIFIER_OPTIONS_H_
 
-#include <string>
-
-#include "absl/status/statusor.h"
 #include <CLI/CLI.hpp>
 
 #include "core/classification/classifier.h"
 
 namespace strata::cli {
-
-// "auto", "none", "depth=N", "random=N"; INVALID_ARGUMENT listing them otherwise.
-absl::StatusOr<ReductionOptions> ParseReduction(const std::string& text);
 
 // --method, --features, --reduce, --neighbours. Written to `options` while the command line is
 // parsed.

@@ -19,7 +19,7 @@ namespace {
 
 constexpr char kKinds[] = R"(
 
-Kinds and their parameters (and threads=1..64 for all but revert):
+Kinds and their parameters (and threads=1..64 for the first three):
   rebuild   All derived data again from the scans.
   verify    Everything checked; a mismatch fails the job.
   optimize  Poses made globally consistent, in a new epoch.
@@ -33,7 +33,14 @@ Kinds and their parameters (and threads=1..64 for all but revert):
             local_weight=0..1   With local_global: of matches against planes (0.5)
             tolerance_m=, tolerance_rad=
                                 Scans that would move less stay (0.005, 0.0005)
-  revert    Poses and constraints of an earlier epoch: epoch=N, see map history.)";
+  revert    Poses and constraints of an earlier epoch: epoch=N, see map history.
+  train     A classifier from all labelled scans; see classifier train.
+            name=, method=amn|iamn|bayes|knn|adaboost (amn), features=shape|wall|spin (shape)
+            reduce=auto|none|depth=N|random=N (auto), neighbours=1..100 (5), rounds=1..10000 (100)
+            slack_weight= (100)
+            folds=0..100        Of the validation over scans (5)
+  classify  The classifier model=NAME labels every scan that it has not labelled yet.
+  evaluate  The classifier model=NAME against labels that people gave.)";
 
 struct JobOptions {
   std::string map;
@@ -136,7 +143,10 @@ void AddParameters(CLI::App* verb, JobOptions& options) {
 }
 
 void AddStart(CLI::App* start, JobOptions& options) {
-  start->add_option("KIND", options.kind, "rebuild, verify, optimize or revert")->required();
+  start
+      ->add_option(
+          "KIND", options.kind, "rebuild, verify, optimize, revert, train, classify or evaluate")
+      ->required();
   AddParameters(start, options);
   start->add_flag(
       "--dry-run", options.dry_run, "optimize: only propose; see job accept and revert");
@@ -159,7 +169,7 @@ void AddJobCommands(Commands& commands) {
     return app;
   };
   AddStart(verb("start",
-                "Start a job: rebuild, verify, optimize or revert",
+                "Start a job: rebuild, verify, optimize, revert, train, classify or evaluate",
                 "strata job start campus optimize rounds=3 --dry-run --wait",
                 Start),
            *options);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string>
 
+#include "absl/strings/str_format.h"
 #include "absl/time/time.h"
 #include <Eigen/Geometry>
 
@@ -109,6 +110,24 @@ Json ToJson(const MapInfo& info) {
   return json;
 }
 
+Json ToJson(const ClassifierInfo& classifier) {
+  return {{"id", classifier.id},
+          {"name", classifier.name},
+          {"created", TimeText(classifier.created)},
+          {"job", classifier.job},
+          {"description", classifier.description},
+          {"parameters", classifier.parameters},
+          {"scores", classifier.scores},
+          {"bytes", classifier.bytes}};
+}
+
+Json ToJson(const MapClass& map_class) {
+  const Colour& c = map_class.colour;
+  return {{"id", map_class.id},
+          {"name", map_class.name},
+          {"colour", absl::StrFormat("#%02x%02x%02x", c.r, c.g, c.b)}};
+}
+
 Json ToJson(const MapInfo& info, const MapStats& stats) {
   Json json = ToJson(info);
   json["scans"] = stats.scans;
@@ -143,6 +162,8 @@ Json ToJson(const ScanInfo& info) {
           {"has_intensity", header.has_intensity},
           {"has_colour", header.has_colour},
           {"has_label", header.has_label},
+          {"person_labels", info.person_labels},
+          {"label_model", info.label_model},
           {"point_bytes", info.point_bytes},
           {"commit_sequence", info.commit_sequence},
           {"content_hash", info.content_hash},

@@ -9,8 +9,10 @@
 
 #include "client/cli/output.h"
 #include "core/api/tiles.h"
+#include "core/world/classifier_info.h"
 #include "core/world/constraint.h"
 #include "core/world/job.h"
+#include "core/world/map_class.h"
 #include "core/world/map_info.h"
 #include "core/world/plan.h"
 #include "core/world/scan.h"
@@ -21,6 +23,8 @@ Json ToJson(const Eigen::Vector3d& point);  // [x, y, z]
 Json ToJson(const Pose& pose);              // [x, y, z, qx, qy, qz, qw]
 Json ToJson(const RobotProfile& profile);
 Json ToJson(const MapInfo& info);
+Json ToJson(const ClassifierInfo& classifier);
+Json ToJson(const MapClass& map_class);  // colour as "#rrggbb"
 Json ToJson(const MapInfo& info, const MapStats& stats);
 Json ToJson(const ScanInfo& info);
 Json ToJson(const PoseNode& node);

@@ -1,5 +1,5 @@
-// strata map create|list|show|delete|verify|rebuild|history|revert; export, render and watch have
-// files of their own.
+// strata map create|list|show|delete|verify|rebuild|history|revert; classes, export, render and
+// watch have files of their own.
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -187,6 +187,7 @@ void AddMapCommands(Commands& commands) {
        "strata map history campus",
        History);
   AddRevert(commands, noun, options);
+  AddMapClasses(commands, noun);
   AddMapWatch(commands, noun);
   AddMapExport(commands, noun);
   AddMapRender(commands, noun);

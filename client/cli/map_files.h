@@ -6,6 +6,7 @@
 
 namespace strata::cli {
 
+void AddMapClasses(Commands& commands, CLI::App* noun);
 void AddMapExport(Commands& commands, CLI::App* noun);
 void AddMapRender(Commands& commands, CLI::App* noun);
 void AddMapWatch(Commands& commands, CLI::App* noun);

@@ -1,4 +1,4 @@
-// strata scan list|show|export|delete; import has files of its own.
+// strata scan list|show|export|delete; import and label have files of their own.
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +11,7 @@
 #include "client/cli/command.h"
 #include "client/cli/json.h"
 #include "client/cli/scan_import.h"
+#include "client/cli/scan_label.h"
 #include "client/formats/file_bytes.h"
 #include "client/formats/geometry_writer.h"
 #include "core/common/status.h"
@@ -124,11 +125,13 @@ void AddList(Commands& commands, CLI::App* noun, const std::shared_ptr<ScanOptio
 }
 
 void AddExport(Commands& commands, CLI::App* noun, const std::shared_ptr<ScanOptions>& options) {
-  CLI::App* app = commands.Verb(noun,
-                                "export",
-                                "Write the points of a scan as they were uploaded",
-                                "strata scan export campus segway/12 --format pcd --out scan.pcd",
-                                [options](Context& context) { return Export(context, *options); });
+  CLI::App* app =
+      commands.Verb(noun,
+                    "export",
+                    "Write the points of a scan as they were uploaded, with the labels that count: "
+                    "a person's, else the uploaded one, else a classifier's",
+                    "strata scan export campus segway/12 --format pcd --out scan.pcd",
+                    [options](Context& context) { return Export(context, *options); });
   AddMapName(app, options->map);
   AddScanId(app, options->id);
   app->add_option(
@@ -164,6 +167,7 @@ void AddScanCommands(Commands& commands) {
        "strata scan show campus segway/12",
        Show);
   AddExport(commands, noun, options);
+  AddScanLabel(commands, noun);
   verb("delete",
        "Take a scan and its contribution out of the map",
        "strata scan delete campus segway/12",

@@ -10,6 +10,7 @@
 #include <grpcpp/security/credentials.h>
 
 #include "client/sdk/connection.h"
+#include "client/sdk/remote_classifiers.h"
 #include "client/sdk/remote_jobs.h"
 #include "client/sdk/remote_maps.h"
 #include "client/sdk/remote_planning.h"
@@ -37,6 +38,7 @@ class RemoteDatabase final : public api::Database {
   api::Planning& planning() override { return planning_; }
   api::Jobs& jobs() override { return jobs_; }
   api::PoseGraph& posegraph() override { return posegraph_; }
+  api::Classifiers& classifiers() override { return classifiers_; }
 
  private:
   sdk::Connection connection_;
@@ -46,6 +48,7 @@ class RemoteDatabase final : public api::Database {
   sdk::RemotePlanning planning_{connection_};
   sdk::RemoteJobs jobs_{connection_};
   sdk::RemotePoseGraph posegraph_{connection_};
+  sdk::RemoteClassifiers classifiers_{connection_};
 };
 
 }  // namespace

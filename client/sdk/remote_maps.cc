@@ -79,6 +79,31 @@ absl::StatusOr<std::vector<EpochInfo>> RemoteMaps::History(const api::Call& call
   return epochs;
 }
 
+absl::StatusOr<std::vector<MapClass>> RemoteMaps::ListClasses(const api::Call& call,
+                                                              absl::string_view name) {
+  v1::ListMapClassesRequest in;
+  in.set_name(std::string(name));
+  STRATA_ASSIGN_OR_RETURN(
+      const v1::ListMapClassesResponse out,
+      CallUnary(connection_, *stub_, &v1::Maps::Stub::ListClasses, call, Repeat::kOnTrouble, in));
+  std::vector<MapClass> classes;
+  for (const v1::MapClass& map_class : out.classes()) {
+    STRATA_ASSIGN_OR_RETURN(MapClass added, FromProto(map_class));
+    classes.push_back(std::move(added));
+  }
+  return classes;
+}
+
+absl::Status RemoteMaps::SetClass(const api::Call& call,
+                                  absl::string_view name,
+                                  const MapClass& map_class) {
+  v1::SetMapClassRequest in;
+  in.set_name(std::string(name));
+  *in.mutable_map_class() = ToProto(map_class);
+  return CallUnary(connection_, *stub_, &v1::Maps::Stub::SetClass, call, Repeat::kOnTrouble, in)
+      .status();
+}
+
 absl::Status RemoteMaps::Watch(const api::Call& call,
                                absl::string_view name,
                                const api::WatchOptions& options,

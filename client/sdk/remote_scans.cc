@@ -1,5 +1,8 @@
 #include "client/sdk/remote_scans.h"
 
+#include <algorithm>
+#include <cstddef>
+#include <span>
 #include <string>
 
 #include "client/sdk/remote_upload.h"
@@ -11,6 +14,38 @@ namespace strata::sdk {
 
 using translate::FromProto;
 using translate::ToProto;
+
+namespace {
+
+constexpr std::size_t kLabelsPerMessage = 400'000;
+
+// One attempt.
+absl::Status SendLabels(Connection& connection,
+                        v1::Scans::Stub& stub,
+                        const api::Call& call,
+                        absl::string_view map,
+                        const ScanId& id,
+                        std::span<const std::uint16_t> labels,
+                        api::LabelMode mode) {
+  AttemptContext context(connection, call);
+  v1::SetScanLabelsResponse out;
+  const auto writer = stub.SetLabels(context.get(), &out);
+  v1::SetScanLabelsRequest message;
+  message.mutable_start()->set_map(std::string(map));
+  *message.mutable_start()->mutable_id() = ToProto(id);
+  message.mutable_start()->set_update(mode == api::LabelMode::kUpdate);
+  bool goes_on = writer->Write(message);
+  for (std::size_t begin = 0; goes_on && begin < labels.size(); begin += kLabelsPerMessage) {
+    const std::size_t count = std::min(kLabelsPerMessage, labels.size() - begin);
+    message.set_labels(translate::PackLabels(labels.subspan(begin, count)));
+    goes_on = writer->Write(message);
+  }
+  // The server refuses early by ending the stream; why is in its status.
+  if (goes_on) writer->WritesDone();
+  return StatusOf(writer->Finish(), call);
+}
+
+}  // namespace
 
 absl::StatusOr<std::unique_ptr<api::ScanUpload>> RemoteScans::Upload(const api::Call& call,
                                                                      absl::string_view map,
@@ -74,6 +109,19 @@ absl::Status RemoteScans::GetPoints(const api::Call& call,
     return sink(piece);
   };
   return CallStream(connection_, *stub_, &v1::Scans::Stub::GetPoints, call, in, deliver);
+}
+
+absl::Status RemoteScans::SetLabels(const api::Call& call,
+                                    absl::string_view map,
+                                    const ScanId& id,
+                                    const std::vector<std::uint16_t>& labels,
+                                    api::LabelMode mode) {
+  Backoff backoff = connection_.NewBackoff();
+  while (true) {
+    STRATA_RETURN_IF_ERROR(call.stop.status());
+    const absl::Status sent = SendLabels(connection_, *stub_, call, map, id, labels, mode);
+    if (sent.ok() || !backoff.Wait(sent, call.stop)) return sent;
+  }
 }
 
 absl::Status RemoteScans::Delete(const api::Call& call, absl::string_view map, const ScanId& id) {

@@ -2,7 +2,9 @@
 #ifndef STRATA_CLIENT_SDK_REMOTE_SCANS_H_
 #define STRATA_CLIENT_SDK_REMOTE_SCANS_H_
 
+#include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "client/sdk/connection.h"
 #include "core/api/scans.h"
@@ -33,6 +35,11 @@ class RemoteScans final : public api::Scans {
                          absl::string_view map,
                          const ScanId& id,
                          absl::FunctionRef<absl::Status(const PointCloud&)> sink) override;
+  absl::Status SetLabels(const api::Call& call,
+                         absl::string_view map,
+                         const ScanId& id,
+                         const std::vector<std::uint16_t>& labels,
+                         api::LabelMode mode) override;
   absl::Status Delete(const api::Call& call, absl::string_view map, const ScanId& id) override;
 
  private:

@@ -3,6 +3,7 @@
 #ifndef STRATA_CORE_API_DATABASE_H_
 #define STRATA_CORE_API_DATABASE_H_
 
+#include "core/api/classifiers.h"
 #include "core/api/jobs.h"
 #include "core/api/maps.h"
 #include "core/api/planning.h"
@@ -23,6 +24,7 @@ class Database {
   virtual Planning& planning() = 0;
   virtual Jobs& jobs() = 0;
   virtual PoseGraph& posegraph() = 0;
+  virtual Classifiers& classifiers() = 0;
 };
 
 }  // namespace strata::api

@@ -14,6 +14,7 @@
 #include "core/api/call.h"
 #include "core/mls/tile_key.h"
 #include "core/world/epoch.h"
+#include "core/world/map_class.h"
 #include "core/world/map_info.h"
 #include "core/world/scan.h"
 
@@ -76,6 +77,14 @@ class Maps {
   // The epochs, newest first.
   virtual absl::StatusOr<std::vector<EpochInfo>> History(const Call& call,
                                                          absl::string_view name) = 0;
+  // The classes that have a name, by id.
+  virtual absl::StatusOr<std::vector<MapClass>> ListClasses(const Call& call,
+                                                            absl::string_view name) = 0;
+  // Names a class, or gives it another name or colour. INVALID_ARGUMENT (ValidateMapClass);
+  // ALREADY_EXISTS where another id has the name.
+  virtual absl::Status SetClass(const Call& call,
+                                absl::string_view name,
+                                const MapClass& map_class) = 0;
   // Delivers what changes until the call is stopped, or, with `once`, what has changed. The first
   // message comes at once, even if it says nothing but where the map stands. A sink's error ends
   // the stream and is handed back.

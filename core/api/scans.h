@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
@@ -43,6 +44,12 @@ class ScanUpload {
   virtual absl::StatusOr<ScanAck> Finish() = 0;
 };
 
+// How labels that a person gives a scan meet those that people gave it before.
+enum class LabelMode : std::uint8_t {
+  kReplace,  // they take their place, 0 included
+  kUpdate,   // 0 leaves what was there
+};
+
 // Which scans; every given condition must hold.
 struct ScanFilter {
   std::optional<std::string> trajectory;
@@ -75,12 +82,23 @@ class Scans {
                             absl::string_view map,
                             const ScanFilter& filter,
                             absl::FunctionRef<absl::Status(const ScanInfo&)> sink) = 0;
-  // The points as uploaded, in pieces of at most kMaxPointsPerChunk. FAILED_PRECONDITION if the map
-  // dropped them; DATA_LOSS if a stored piece is damaged.
+  // The points as uploaded, in pieces of at most kMaxPointsPerChunk, with the labels that count:
+  // where a person gave one (SetLabels), that; else the uploaded one; else what the classifier says
+  // that labelled the scan last. FAILED_PRECONDITION if the map dropped them; DATA_LOSS if a stored
+  // piece is damaged.
   virtual absl::Status GetPoints(const Call& call,
                                  absl::string_view map,
                                  const ScanId& id,
                                  absl::FunctionRef<absl::Status(const PointCloud&)> sink) = 0;
+  // What a person says the points of a scan are: one label each, in their order, 0 for none. Every
+  // surface of the scan counts them when the call returns; uploaded labels stay as they are.
+  // INVALID_ARGUMENT unless there are as many as points; NOT_FOUND; FAILED_PRECONDITION if the map
+  // dropped the points.
+  virtual absl::Status SetLabels(const Call& call,
+                                 absl::string_view map,
+                                 const ScanId& id,
+                                 const std::vector<std::uint16_t>& labels,
+                                 LabelMode mode) = 0;
   // Takes the scan, its points and its contribution out of the map.
   virtual absl::Status Delete(const Call& call, absl::string_view map, const ScanId& id) = 0;
 };

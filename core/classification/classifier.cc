@@ -230,12 +230,26 @@ absl::StatusOr<Classifier> TrainClassifier(const std::vector<PointCloud>& clouds
                                            const TrainingOptions& options,
                                            ClassifierProgress progress,
                                            const Stop& stop) {
+  const auto source = [&clouds](std::size_t k,
+                                absl::FunctionRef<absl::Status(const PointCloud&)> use) {
+    return use(clouds[k]);
+  };
+  return TrainClassifier(clouds.size(), source, classes, options, progress, stop);
+}
+
+absl::StatusOr<Classifier> TrainClassifier(std::size_t clouds,
+                                           CloudSource source,
+                                           const std::vector<ClassName>& classes,
+                                           const TrainingOptions& options,
+                                           ClassifierProgress progress,
+                                           const Stop& stop) {
   STRATA_RETURN_IF_ERROR(options.Validate());
   Trainer trainer(classes, options);
-  for (std::size_t k = 0; k < clouds.size(); ++k) {
+  for (std::size_t k = 0; k < clouds; ++k) {
     STRATA_RETURN_IF_ERROR(
-        progress(kFeaturesShare * static_cast<double>(k) / static_cast<double>(clouds.size())));
-    STRATA_RETURN_IF_ERROR(trainer.Add(clouds[k], stop));
+        progress(kFeaturesShare * static_cast<double>(k) / static_cast<double>(clouds)));
+    STRATA_RETURN_IF_ERROR(
+        source(k, [&](const PointCloud& part) { return trainer.Add(part, stop); }));
   }
   STRATA_RETURN_IF_ERROR(progress(kFeaturesShare));
   STRATA_ASSIGN_OR_RETURN(Classifier classifier, trainer.Learn(stop));

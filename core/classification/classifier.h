@@ -47,7 +47,7 @@ struct ClassName {
 
 struct TrainingOptions {
   ClassifierMethod method = ClassifierMethod::kAmn;
-  FeatureOptions features;
+  PointFeatureOptions features;
   ReductionOptions reduction;
   NetworkOptions network;
   double slack_weight = 100.0;  // of AmnLearningOptions
@@ -68,7 +68,7 @@ struct InstanceModel {
 struct Classifier {
   ClassifierMethod method = ClassifierMethod::kAmn;
   std::vector<ClassName> classes;  // by ClassIndex
-  FeatureOptions features;
+  PointFeatureOptions features;
   NetworkOptions network;
   // Features are taken to mean 0 and variance 1 of the training points (but the constant), so that
   // no unit decides what counts.
@@ -88,10 +88,24 @@ struct ClassifiedCloud {
 // Told how far it is, in [0, 1]; may end the work.
 using ClassifierProgress = absl::FunctionRef<absl::Status(double progress)>;
 
+// Clouds that come one after the other, so that they need not be in memory together: hands the
+// parts of cloud k to `use`, in order and always the same; each part is a cloud of its own, and is
+// all that is in memory. An error of `use` is handed back.
+using CloudSource = absl::FunctionRef<absl::Status(
+    std::size_t k, absl::FunctionRef<absl::Status(const PointCloud&)> use)>;
+
 // Learns from the points of `clouds` whose label is one of `classes`; others are not looked at, but
 // are neighbours of those. Clouds are learned from one after the other and need not be of one
 // place. INVALID_ARGUMENT for bad options and for classes without a point.
 absl::StatusOr<Classifier> TrainClassifier(const std::vector<PointCloud>& clouds,
+                                           const std::vector<ClassName>& classes,
+                                           const TrainingOptions& options,
+                                           ClassifierProgress progress,
+                                           const Stop& stop);
+
+// The same from `clouds` clouds of a source, each asked for once and in order.
+absl::StatusOr<Classifier> TrainClassifier(std::size_t clouds,
+                                           CloudSource source,
                                            const std::vector<ClassName>& classes,
                                            const TrainingOptions& options,
                                            ClassifierProgress progress,

@@ -18,7 +18,9 @@ class ConfusionMatrix {
   explicit ConfusionMatrix(std::size_t classes)
       : classes_(classes), counts_(classes * classes, 0) {}
 
-  void Add(ClassIndex truth, ClassIndex given) { ++counts_[truth * classes_ + given]; }
+  void Add(ClassIndex truth, ClassIndex given, std::uint64_t points = 1) {
+    counts_[truth * classes_ + given] += points;
+  }
   // Both of equal length.
   void Add(std::span<const ClassIndex> truth, std::span<const ClassIndex> given);
   // Of the same classes.

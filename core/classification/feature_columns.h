@@ -12,19 +12,19 @@
 
 namespace strata {
 
-std::vector<std::string> ShapeFeatureNames(const FeatureOptions& options);
+std::vector<std::string> ShapeFeatureNames(const PointFeatureOptions& options);
 absl::StatusOr<FeatureMatrix> ShapeFeatures(const PointCloud& cloud,
-                                            const FeatureOptions& options,
+                                            const PointFeatureOptions& options,
                                             const Stop& stop);
 
 std::vector<std::string> WallFeatureNames();
 absl::StatusOr<FeatureMatrix> WallFeatures(const PointCloud& cloud,
-                                           const FeatureOptions& options,
+                                           const PointFeatureOptions& options,
                                            const Stop& stop);
 
 std::vector<std::string> SpinFeatureNames();
 absl::StatusOr<FeatureMatrix> SpinFeatures(const PointCloud& cloud,
-                                           const FeatureOptions& options,
+                                           const PointFeatureOptions& options,
                                            const Stop& stop);
 
 }  // namespace strata

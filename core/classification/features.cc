@@ -13,7 +13,7 @@ namespace strata {
 namespace {
 
 absl::StatusOr<FeatureMatrix> ColumnsOf(const PointCloud& cloud,
-                                        const FeatureOptions& options,
+                                        const PointFeatureOptions& options,
                                         const Stop& stop) {
   switch (options.set) {
     case FeatureSet::kShape:
@@ -28,7 +28,7 @@ absl::StatusOr<FeatureMatrix> ColumnsOf(const PointCloud& cloud,
 
 }  // namespace
 
-absl::Status FeatureOptions::Validate() const {
+absl::Status PointFeatureOptions::Validate() const {
   OptionChecks checks("feature options");
   checks.InRange("set", static_cast<int>(set), 1, 3);
   checks.InRange("neighbours", neighbours, 4, 64);
@@ -61,7 +61,7 @@ absl::StatusOr<FeatureSet> FeatureSetFromName(absl::string_view name) {
       absl::StrCat("feature set '", name.substr(0, 100), "' is none of shape, wall, spin"));
 }
 
-std::vector<std::string> FeatureNames(const FeatureOptions& options) {
+std::vector<std::string> FeatureNames(const PointFeatureOptions& options) {
   std::vector<std::string> names = options.set == FeatureSet::kShape  ? ShapeFeatureNames(options)
                                    : options.set == FeatureSet::kWall ? WallFeatureNames()
                                                                       : SpinFeatureNames();
@@ -70,7 +70,7 @@ std::vector<std::string> FeatureNames(const FeatureOptions& options) {
 }
 
 absl::StatusOr<FeatureMatrix> ComputeFeatures(const PointCloud& cloud,
-                                              const FeatureOptions& options,
+                                              const PointFeatureOptions& options,
                                               const Stop& stop) {
   STRATA_RETURN_IF_ERROR(options.Validate());
   PointCloud finite;

@@ -30,7 +30,7 @@ enum class FeatureSet : std::uint8_t {  // stored in models
   kSpin = 3,
 };
 
-struct FeatureOptions {
+struct PointFeatureOptions {
   FeatureSet set = FeatureSet::kShape;
   int neighbours = 16;  // in [4, 64]
   // kShape: looked at in the cloud itself, and then in clouds thinned to voxels of this edge [m],
@@ -43,7 +43,7 @@ struct FeatureOptions {
   double spin_radius_m = 0.0;    // 0: ten times the median spacing of the cloud; in [0, 100]
 
   absl::Status Validate() const;
-  friend bool operator==(const FeatureOptions&, const FeatureOptions&) = default;
+  friend bool operator==(const PointFeatureOptions&, const PointFeatureOptions&) = default;
 };
 
 // "shape", "wall", "spin".
@@ -51,13 +51,13 @@ absl::string_view ToString(FeatureSet set);
 absl::StatusOr<FeatureSet> FeatureSetFromName(absl::string_view name);
 
 // One for every column, the constant 1 last.
-std::vector<std::string> FeatureNames(const FeatureOptions& options);
+std::vector<std::string> FeatureNames(const PointFeatureOptions& options);
 
 // One row a point of the cloud, in its order; rows of points that are not finite are zero but for
 // the constant. Values are about 0 to 1. z must be up. INVALID_ARGUMENT for bad options; errors are
 // also those of `stop`. Deterministic.
 absl::StatusOr<FeatureMatrix> ComputeFeatures(const PointCloud& cloud,
-                                              const FeatureOptions& options,
+                                              const PointFeatureOptions& options,
                                               const Stop& stop);
 
 }  // namespace strata

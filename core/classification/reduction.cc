@@ -5,9 +5,15 @@
 #include <cstddef>
 #include <limits>
 #include <numeric>
+#include <utility>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 
 #include "core/common/option_checks.h"
 #include "core/common/random.h"
+#include "core/common/status.h"
 
 namespace strata {
 namespace {
@@ -137,6 +143,41 @@ ReducedPoints Reduce(std::span<const Eigen::Vector3f> positions,
                      const LabelledFeatures& data,
                      const ReductionOptions& options) {
   return Reducer(positions, data, options).Run();
+}
+
+absl::StatusOr<ReductionOptions> ParseReduction(absl::string_view text) {
+  ReductionOptions options;
+  const std::pair<absl::string_view, absl::string_view> parts =
+      absl::StrSplit(text, absl::MaxSplits('=', 1));
+  const auto [kind, number] = parts;
+  if (text == "auto") {
+    options.kind = ReductionKind::kPure;
+  } else if (text == "none") {
+    options.kind = ReductionKind::kNone;
+  } else if (kind == "depth" && absl::SimpleAtoi(number, &options.depth)) {
+    options.kind = ReductionKind::kDepth;
+  } else if (kind == "random" && absl::SimpleAtoi(number, &options.count)) {
+    options.kind = ReductionKind::kRandom;
+  } else {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "reduction '", text.substr(0, 40), "' is none of auto, none, depth=N, random=N"));
+  }
+  STRATA_RETURN_IF_ERROR(options.Validate());
+  return options;
+}
+
+std::string ToString(const ReductionOptions& options) {
+  switch (options.kind) {
+    case ReductionKind::kNone:
+      return "none";
+    case ReductionKind::kRandom:
+      return absl::StrCat("random=", options.count);
+    case ReductionKind::kDepth:
+      return absl::StrCat("depth=", options.depth);
+    case ReductionKind::kPure:
+      return "auto";
+  }
+  return "unknown";
 }
 
 }  // namespace strata

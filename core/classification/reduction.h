@@ -9,9 +9,12 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include <Eigen/Core>
 
 #include "core/classification/labelled_features.h"
@@ -37,6 +40,12 @@ struct ReductionOptions {
 
   absl::Status Validate() const;
 };
+
+// "auto" (kPure), "none", "depth=N", "random=N"; INVALID_ARGUMENT listing them otherwise.
+absl::StatusOr<ReductionOptions> ParseReduction(absl::string_view text);
+
+// The text that ParseReduction() reads.
+std::string ToString(const ReductionOptions& options);
 
 struct ReducedPoints {
   std::vector<Eigen::Vector3f> positions;

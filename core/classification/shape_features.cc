@@ -71,7 +71,7 @@ void PutScale(std::span<const Eigen::Vector3f> points,
 
 }  // namespace
 
-std::vector<std::string> ShapeFeatureNames(const FeatureOptions& options) {
+std::vector<std::string> ShapeFeatureNames(const PointFeatureOptions& options) {
   std::vector<std::string> names;
   for (int scale = 0; scale < options.scales; ++scale) {
     for (const char* name : kPerScale) names.push_back(absl::StrCat(name, ".", scale));
@@ -85,7 +85,7 @@ std::vector<std::string> ShapeFeatureNames(const FeatureOptions& options) {
 }
 
 absl::StatusOr<FeatureMatrix> ShapeFeatures(const PointCloud& cloud,
-                                            const FeatureOptions& options,
+                                            const PointFeatureOptions& options,
                                             const Stop& stop) {
   const std::span<const Eigen::Vector3f> points = cloud.points;
   const auto count = static_cast<std::size_t>(options.neighbours);

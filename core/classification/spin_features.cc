@@ -61,7 +61,7 @@ std::vector<std::string> SpinFeatureNames() {
 }
 
 absl::StatusOr<FeatureMatrix> SpinFeatures(const PointCloud& cloud,
-                                           const FeatureOptions& options,
+                                           const PointFeatureOptions& options,
                                            const Stop& stop) {
   const std::span<const Eigen::Vector3f> points = cloud.points;
   const Neighbours neighbours =

@@ -1,5 +1,6 @@
 #include "core/classification/validation.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <set>
@@ -13,14 +14,28 @@ namespace {
 
 constexpr std::uint64_t kFoldSeed = 1;
 
-// Those of `classes` that label a point of `clouds`.
-std::vector<ClassName> ClassesIn(const std::vector<PointCloud>& clouds,
+// The labels of each cloud.
+absl::StatusOr<std::vector<std::set<std::uint16_t>>> LabelsOf(std::size_t clouds,
+                                                              CloudSource source) {
+  std::vector<std::set<std::uint16_t>> labels(clouds);
+  for (std::size_t k = 0; k < clouds; ++k) {
+    STRATA_RETURN_IF_ERROR(source(k, [&](const PointCloud& part) {
+      labels[k].insert(part.label.begin(), part.label.end());
+      return absl::OkStatus();
+    }));
+  }
+  return labels;
+}
+
+// Those of `classes` that label a point of one of the clouds `chosen`.
+std::vector<ClassName> ClassesIn(const std::vector<std::set<std::uint16_t>>& labels,
+                                 const std::vector<std::size_t>& chosen,
                                  const std::vector<ClassName>& classes) {
-  std::set<std::uint16_t> seen;
-  for (const PointCloud& cloud : clouds) seen.insert(cloud.label.begin(), cloud.label.end());
   std::vector<ClassName> found;
   for (const ClassName& name : classes) {
-    if (seen.contains(name.id)) found.push_back(name);
+    const bool seen = std::any_of(
+        chosen.begin(), chosen.end(), [&](std::size_t k) { return labels[k].contains(name.id); });
+    if (seen) found.push_back(name);
   }
   return found;
 }
@@ -49,28 +64,54 @@ absl::StatusOr<ConfusionMatrix> CrossValidate(const std::vector<PointCloud>& clo
                                               std::size_t folds,
                                               ClassifierProgress progress,
                                               const Stop& stop) {
-  if (folds < 2 || folds > clouds.size()) {
+  const auto source = [&clouds](std::size_t k,
+                                absl::FunctionRef<absl::Status(const PointCloud&)> use) {
+    return use(clouds[k]);
+  };
+  return CrossValidate(clouds.size(), source, classes, options, folds, progress, stop);
+}
+
+absl::StatusOr<ConfusionMatrix> CrossValidate(std::size_t clouds,
+                                              CloudSource source,
+                                              const std::vector<ClassName>& classes,
+                                              const TrainingOptions& options,
+                                              std::size_t folds,
+                                              ClassifierProgress progress,
+                                              const Stop& stop) {
+  if (folds < 2 || folds > clouds) {
     return absl::InvalidArgumentError(absl::StrCat(
-        "folds ", folds, " is not in [2, ", clouds.size(), "], the number of labelled clouds"));
+        "folds ", folds, " is not in [2, ", clouds, "], the number of labelled clouds"));
   }
-  const std::vector<std::size_t> fold_of = DrawFolds(clouds.size(), folds, kFoldSeed);
+  const std::vector<std::size_t> fold_of = DrawFolds(clouds, folds, kFoldSeed);
+  STRATA_ASSIGN_OR_RETURN(const std::vector<std::set<std::uint16_t>> labels,
+                          LabelsOf(clouds, source));
   ConfusionMatrix confusion(classes.size());
   for (std::size_t fold = 0; fold < folds; ++fold) {
-    std::vector<PointCloud> others;
-    for (std::size_t i = 0; i < clouds.size(); ++i) {
-      if (fold_of[i] != fold) others.push_back(clouds[i]);
+    std::vector<std::size_t> others;
+    for (std::size_t k = 0; k < clouds; ++k) {
+      if (fold_of[k] != fold) others.push_back(k);
     }
-    const auto part = [&](double share) {
-      return progress((static_cast<double>(fold) + share) / static_cast<double>(folds));
-    };
     STRATA_ASSIGN_OR_RETURN(
         const Classifier classifier,
-        TrainClassifier(others, ClassesIn(others, classes), options, part, stop));
-    for (std::size_t i = 0; i < clouds.size(); ++i) {
-      if (fold_of[i] != fold) continue;
-      STRATA_ASSIGN_OR_RETURN(const ConfusionMatrix counts,
-                              EvaluateClassifier(classifier, clouds[i], classes, stop));
-      confusion.Add(counts);
+        TrainClassifier(
+            others.size(),
+            [&](std::size_t i, absl::FunctionRef<absl::Status(const PointCloud&)> use) {
+              return source(others[i], use);
+            },
+            ClassesIn(labels, others, classes),
+            options,
+            [&](double share) {
+              return progress((static_cast<double>(fold) + share) / static_cast<double>(folds));
+            },
+            stop));
+    for (std::size_t k = 0; k < clouds; ++k) {
+      if (fold_of[k] != fold) continue;
+      STRATA_RETURN_IF_ERROR(source(k, [&](const PointCloud& part) -> absl::Status {
+        STRATA_ASSIGN_OR_RETURN(const ConfusionMatrix counts,
+                                EvaluateClassifier(classifier, part, classes, stop));
+        confusion.Add(counts);
+        return absl::OkStatus();
+      }));
     }
   }
   return confusion;

@@ -33,6 +33,15 @@ absl::StatusOr<ConfusionMatrix> CrossValidate(const std::vector<PointCloud>& clo
                                               ClassifierProgress progress,
                                               const Stop& stop);
 
+// The same over `clouds` clouds of a source, which is gone through several times.
+absl::StatusOr<ConfusionMatrix> CrossValidate(std::size_t clouds,
+                                              CloudSource source,
+                                              const std::vector<ClassName>& classes,
+                                              const TrainingOptions& options,
+                                              std::size_t folds,
+                                              ClassifierProgress progress,
+                                              const Stop& stop);
+
 }  // namespace strata
 
 #endif  // STRATA_CORE_CLASSIFICATION_VALIDATION_H_

@@ -71,7 +71,7 @@ std::vector<std::string> WallFeatureNames() {
 }
 
 absl::StatusOr<FeatureMatrix> WallFeatures(const PointCloud& cloud,
-                                           const FeatureOptions& options,
+                                           const PointFeatureOptions& options,
                                            const Stop& stop) {
   const std::span<const Eigen::Vector3f> points = cloud.points;
   const Neighbours neighbours =

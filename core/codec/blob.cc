@@ -31,6 +31,8 @@ absl::string_view NameOf(BlobKind kind) {
       return "planes of a scan";
     case BlobKind::kClassifier:
       return "classifier";
+    case BlobKind::kLabels:
+      return "labels";
   }
   return "blob";
 }

@@ -17,6 +17,7 @@ enum class BlobKind : std::uint32_t {  // stored
   kPoints = 0x31545053,                // "SPT1"
   kScanPlanes = 0x314C5053,            // "SPL1"
   kClassifier = 0x314C4353,            // "SCL1"
+  kLabels = 0x31424C53,                // "SLB1"
 };
 
 // Bytes that the envelope adds to a body.

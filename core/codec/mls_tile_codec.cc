@@ -56,11 +56,11 @@ struct Surroundings {
   std::int64_t bottom = 0, top = 0, top_sigma = 0;
   bool alike = false;
 
-  Surroundings(std::span<const Patch> patches, const Neighbours& neighbours, bool vertical) {
+  Surroundings(std::span<const Patch> patches, const SurfacesBeside& neighbours, bool vertical) {
     std::int64_t count = 0;
     for (const std::uint32_t index :
          {neighbours.left, neighbours.up, neighbours.up_right, neighbours.up_left}) {
-      if (index == Neighbours::kNone || patches[index].vertical() != vertical) continue;
+      if (index == SurfacesBeside::kNone || patches[index].vertical() != vertical) continue;
       Add(patches[index]);
       ++count;
     }
@@ -72,7 +72,7 @@ struct Surroundings {
       return;
     }
     for (const std::uint32_t index : {neighbours.left, neighbours.up}) {
-      if (index == Neighbours::kNone) continue;
+      if (index == SurfacesBeside::kNone) continue;
       Add(patches[index]);
       return;
     }
@@ -152,7 +152,7 @@ bool CodeSums(Coder& coder, Patch& patch) {
 // One patch in either direction; false if what was read is no patch. `patch.cell` is known.
 template <typename Coder>
 bool CodePatch(Coder& coder,
-               const Neighbours& neighbours,
+               const SurfacesBeside& neighbours,
                std::span<const Patch> patches,
                Patch& patch) {
   OtherMeasurements others;
@@ -231,7 +231,7 @@ absl::Status Damaged(absl::string_view what) {
 absl::Status DecodePatches(ColumnDecoder& decoder,
                            std::span<const std::uint16_t> cells,
                            std::vector<Patch>& patches) {
-  const std::vector<Neighbours> neighbours = FindNeighbours(cells);
+  const std::vector<SurfacesBeside> neighbours = FindNeighbours(cells);
   patches.resize(cells.size());
   for (std::size_t i = 0; i < cells.size(); ++i) {
     patches[i].cell = cells[i];
@@ -250,7 +250,7 @@ std::string EncodeMlsTile(const MlsTile& tile) {
   for (std::size_t i = 0; i < cells.size(); ++i) {
     cells[i] = static_cast<std::uint16_t>(tile.patches[i].cell);
   }
-  const std::vector<Neighbours> neighbours = FindNeighbours(cells);
+  const std::vector<SurfacesBeside> neighbours = FindNeighbours(cells);
   ColumnEncoder encoder(kColumnCount);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     Patch patch = tile.patches[i];

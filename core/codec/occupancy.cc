@@ -72,16 +72,16 @@ absl::StatusOr<std::vector<std::uint16_t>> TakeCells(ByteReader& reader) {
   return cells;
 }
 
-std::vector<Neighbours> FindNeighbours(std::span<const std::uint16_t> cells) {
+std::vector<SurfacesBeside> FindNeighbours(std::span<const std::uint16_t> cells) {
   // begin[x + 1]: first surface of cell x of the row, with an empty cell on either side.
   std::array<std::uint32_t, kTileCells + 3> above{};
   std::array<std::uint32_t, kTileCells + 3> here{};
   const auto layer_of = [](const auto& begin, int x, std::uint32_t layer) {
     const std::uint32_t first = begin[x + 1];
     const std::uint32_t count = begin[x + 2] - first;
-    return count == 0 ? Neighbours::kNone : first + std::min(layer, count - 1);
+    return count == 0 ? SurfacesBeside::kNone : first + std::min(layer, count - 1);
   };
-  std::vector<Neighbours> neighbours(cells.size());
+  std::vector<SurfacesBeside> neighbours(cells.size());
   std::uint32_t i = 0;
   for (int y = 0; y < kTileCells && i < cells.size(); ++y) {
     here[0] = i;

@@ -25,11 +25,11 @@ absl::StatusOr<std::vector<std::uint16_t>> TakeCells(ByteReader& reader);
 // Surfaces of the same layer (how many lie below in the cell), or the highest below it, in the
 // cells to the left (x − 1) and up (y − 1) and beside that (x − 1, y − 1) and (x + 1, y − 1):
 // indices of what comes before in order, or kNone.
-struct Neighbours {
+struct SurfacesBeside {
   static constexpr std::uint32_t kNone = 0xFFFFFFFF;
   std::uint32_t left = kNone, up = kNone, up_left = kNone, up_right = kNone;
 };
-std::vector<Neighbours> FindNeighbours(std::span<const std::uint16_t> cells);
+std::vector<SurfacesBeside> FindNeighbours(std::span<const std::uint16_t> cells);
 
 }  // namespace strata
 

@@ -142,14 +142,14 @@ struct Surroundings {
   int alike = 0;  // how many
   std::int32_t height = 0, depth = 0, sigma = 0;
 
-  Surroundings(std::span<const Codes> surfaces, const Neighbours& n, bool vertical) {
+  Surroundings(std::span<const Codes> surfaces, const SurfacesBeside& n, bool vertical) {
     for (const std::uint32_t index : {n.left, n.up, n.up_right, n.up_left}) {
-      if (index == Neighbours::kNone || (surfaces[index].depth > 0) != vertical) continue;
+      if (index == SurfacesBeside::kNone || (surfaces[index].depth > 0) != vertical) continue;
       Add(surfaces[index]);
       ++alike;
     }
-    if (alike == 0 && (n.left & n.up) != Neighbours::kNone) {
-      Add(surfaces[n.left != Neighbours::kNone ? n.left : n.up]);
+    if (alike == 0 && (n.left & n.up) != SurfacesBeside::kNone) {
+      Add(surfaces[n.left != SurfacesBeside::kNone ? n.left : n.up]);
     }
     height = MeanOf(height, alike);
     depth = MeanOf(depth, alike);
@@ -191,12 +191,12 @@ std::uint8_t KindOf(const Codes& codes) {
 
 // The mean cost of the surfaces around that are as traversable; 0 without any.
 std::int32_t ExpectedCost(std::span<const Codes> surfaces,
-                          const Neighbours& n,
+                          const SurfacesBeside& n,
                           std::uint8_t traversability) {
   std::int32_t sum = 0;
   int count = 0;
   for (const std::uint32_t index : {n.left, n.up, n.up_right, n.up_left}) {
-    if (index == Neighbours::kNone || surfaces[index].traversability != traversability) continue;
+    if (index == SurfacesBeside::kNone || surfaces[index].traversability != traversability) continue;
     sum += surfaces[index].cost;
     ++count;
   }
@@ -208,12 +208,12 @@ struct ExpectedKind {
   std::uint8_t kind = 0;
   int others = 0;
 
-  ExpectedKind(std::span<const Codes> surfaces, const Neighbours& n) {
-    const std::uint32_t first = n.left != Neighbours::kNone ? n.left : n.up;
-    if (first == Neighbours::kNone) return;
+  ExpectedKind(std::span<const Codes> surfaces, const SurfacesBeside& n) {
+    const std::uint32_t first = n.left != SurfacesBeside::kNone ? n.left : n.up;
+    if (first == SurfacesBeside::kNone) return;
     kind = KindOf(surfaces[first]);
     for (const std::uint32_t index : {n.up, n.up_left, n.up_right}) {
-      if (index != Neighbours::kNone && KindOf(surfaces[index]) == kind) ++others;
+      if (index != SurfacesBeside::kNone && KindOf(surfaces[index]) == kind) ++others;
     }
   }
 };
@@ -221,7 +221,7 @@ struct ExpectedKind {
 // One surface, in either direction; false if what was read is none. `codes.cell` is known.
 template <typename Coder>
 bool CodeSurface(Coder& coder,
-                 const Neighbours& neighbours,
+                 const SurfacesBeside& neighbours,
                  std::span<const Codes> surfaces,
                  Codes& codes) {
   const ExpectedKind expected_kind(surfaces, neighbours);
@@ -266,7 +266,7 @@ std::string EncodeSurfaceTile(const SurfaceTile& tile) {
     surfaces[i] = Quantised(tile.surfaces[i]);
     cells[i] = surfaces[i].cell;
   }
-  const std::vector<Neighbours> neighbours = FindNeighbours(cells);
+  const std::vector<SurfacesBeside> neighbours = FindNeighbours(cells);
   ColumnEncoder encoder(kColumnCount);
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     CodeSurface(encoder, neighbours[i], surfaces, surfaces[i]);
@@ -290,7 +290,7 @@ absl::StatusOr<SurfaceTile> DecodeSurfaceTile(absl::string_view bytes) {
   STRATA_ASSIGN_OR_RETURN(ColumnDecoder decoder,
                           ColumnDecoder::Open(reader, kColumnCount, cells.size()));
   if (reader.remaining() != 0) return absl::DataLossError("surface tile: bytes left over");
-  const std::vector<Neighbours> neighbours = FindNeighbours(cells);
+  const std::vector<SurfacesBeside> neighbours = FindNeighbours(cells);
   std::vector<Codes> surfaces(cells.size());
   tile.surfaces.reserve(cells.size());
   for (std::size_t i = 0; i < surfaces.size(); ++i) {

@@ -11,6 +11,7 @@
 #include "absl/strings/str_join.h"
 
 #include "core/common/status.h"
+#include "core/engine/classifiers.h"
 #include "core/engine/jobs.h"
 #include "core/engine/maps.h"
 #include "core/engine/planning.h"
@@ -31,6 +32,7 @@ class Engine final : public api::Database {
   api::Planning& planning() override { return planning_; }
   api::Jobs& jobs() override { return jobs_; }
   api::PoseGraph& posegraph() override { return posegraph_; }
+  api::Classifiers& classifiers() override { return classifiers_; }
 
  private:
   std::unique_ptr<EngineMaps> maps_;
@@ -39,6 +41,7 @@ class Engine final : public api::Database {
   EnginePlanning planning_{*maps_};
   EngineJobs jobs_{*maps_};
   EnginePoseGraph posegraph_{*maps_};
+  EngineClassifiers classifiers_{*maps_};
 };
 
 }  // namespace

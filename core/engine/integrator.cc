@@ -67,7 +67,7 @@ absl::Status Integrator::LoadAlignerOnce(StorageReader& reader) {
   return absl::OkStatus();
 }
 
-absl::Status Integrator::MakeServed(StorageReader& reader, TileChange& change) {
+absl::Status Integrator::MakeServed(StorageReader& reader, TileChange& change, bool geometry) {
   const MapParameters parameters = core_.info().parameters;
   SurfaceTileMaker maker(core_,
                          reader,
@@ -78,7 +78,9 @@ absl::Status Integrator::MakeServed(StorageReader& reader, TileChange& change) {
                           .profile = parameters.default_profile});
   absl::btree_set<TileKey> changed;
   for (const auto& [key, tile] : change.tiles) changed.insert(key);
-  STRATA_ASSIGN_OR_RETURN(change.surfaces, maker.MakeBase(WithNeighbours(changed), Stop()));
+  // A tile's annotation looks beyond its border, at heights only.
+  if (geometry) changed = WithNeighbours(changed);
+  STRATA_ASSIGN_OR_RETURN(change.surfaces, maker.MakeBase(changed, Stop()));
   const SurfaceTileMaker::Rows base = change.surfaces;
   return maker.MakePyramid(base, change.surfaces, Stop());
 }

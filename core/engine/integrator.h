@@ -17,6 +17,7 @@
 #include "core/engine/aligner.h"
 #include "core/engine/map_core.h"
 #include "core/engine/mls_tiles.h"
+#include "core/engine/scan_labels.h"
 #include "core/engine/scan_mover.h"
 #include "core/engine/surface_tiles.h"
 #include "core/world/robot_profile.h"
@@ -51,6 +52,16 @@ class Integrator {
                                         int threads,
                                         JobContext& context,
                                         absl::FunctionRef<absl::Status(StorageWriter&)> decision);
+  // What a person says of a scan in any state; `update`: a label that is 0 leaves what people said
+  // before. NOT_FOUND; FAILED_PRECONDITION where the points were dropped; INVALID_ARGUMENT unless
+  // there is a label for every point.
+  absl::Status SetPersonLabels(const ScanId& id,
+                               const std::vector<std::uint16_t>& labels,
+                               bool update);
+  // What a classifier says of it; errors as above.
+  absl::Status SetModelLabels(ScanNumber number,
+                              std::uint64_t model,
+                              std::vector<std::uint16_t> labels);
   // Annotates all tiles for another robot.
   absl::Status SetDefaultProfile(const RobotProfile& profile, const Stop& stop);
 
@@ -84,8 +95,16 @@ class Integrator {
                              MlsTileMap& tiles,
                              Batch& batch);
   absl::Status CommitBatch(const Batch& batch, const TileChange& change);
-  // Fills in what is served of change.tiles.
-  absl::Status MakeServed(StorageReader& reader, TileChange& change);
+  // Stores the labels, and has the tiles of the scan count them.
+  absl::Status ChangeLabels(StorageReader& reader,
+                            const PosedScan& posed,
+                            const LabelChange& change);
+  // The tiles of the scan with the votes of its labels as they will be.
+  absl::StatusOr<MlsTileMap> Revoted(StorageReader& reader,
+                                     const PosedScan& posed,
+                                     const LabelChange& change);
+  // Fills in what is served of change.tiles, and of their neighbours if geometry changed.
+  absl::Status MakeServed(StorageReader& reader, TileChange& change, bool geometry = true);
   // Writes `change` and whatever `decision` adds in one transaction; then readers see it and
   // watchers learn of it and of `scans`.
   absl::Status Commit(Durability durability,

@@ -12,10 +12,12 @@
 
 #include "core/common/status.h"
 #include "core/common/this_thread.h"
+#include "core/engine/classify.h"
 #include "core/engine/optimize.h"
 #include "core/engine/optimize_settings.h"
 #include "core/engine/rebuild.h"
 #include "core/engine/revert.h"
+#include "core/engine/train.h"
 
 namespace strata {
 namespace {
@@ -61,6 +63,9 @@ absl::Status JobRunner::Run(const JobInfo& job, JobContext& context) {
   STRATA_ASSIGN_OR_RETURN(const bool done, HasMadeItsEpoch(core_, job, context));
   if (done) return absl::OkStatus();
   if (job.kind == kOptimizeJob) return RunOptimizeJob(core_, worker_, job, context);
+  if (job.kind == kTrainJob) return RunTrainJob(core_, job, context);
+  if (job.kind == kEvaluateJob) return RunEvaluateJob(core_, job, context);
+  if (job.kind == kClassifyJob) return RunClassifyJob(core_, worker_, job, context);
   return worker_.Execute(closing_, [&](Integrator& integrator) {
     return job.kind == kRevertJob ? RunRevertJob(integrator, job, context)
                                   : RunRebuildJob(integrator, job, context);

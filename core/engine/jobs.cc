@@ -14,9 +14,14 @@
 #include "absl/strings/string_view.h"
 
 #include "core/common/status.h"
+#include "core/engine/classifier_store.h"
+#include "core/engine/classify.h"
+#include "core/engine/job_parameters.h"
 #include "core/engine/optimize_settings.h"
 #include "core/engine/rebuild.h"
 #include "core/engine/revert.h"
+#include "core/engine/train.h"
+#include "core/world/names.h"
 
 namespace strata {
 namespace {
@@ -46,10 +51,27 @@ absl::Status CheckEpoch(const JobParameters& parameters) {
       absl::StrCat(kRevertJob, " takes the parameter epoch only, as in epoch=1; see map history"));
 }
 
+absl::Status CheckModel(absl::string_view kind, const JobParameters& parameters) {
+  std::string model;
+  STRATA_RETURN_IF_ERROR(ReadJobParameters(kind,
+                                           parameters,
+                                           {{"model",
+                                             {[&model](const std::string& text) {
+                                                model = text;
+                                                return ValidateName("", text).ok();
+                                              },
+                                              "the name of a classifier"}}}));
+  if (!model.empty()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat(kind, " takes the parameter model, as in model=street; see classifier list"));
+}
+
 absl::Status CheckJob(absl::string_view kind, const JobParameters& parameters) {
   if (kind == kRebuildJob || kind == kVerifyJob) return CheckThreads(kind, parameters);
   if (kind == kRevertJob) return CheckEpoch(parameters);
   if (kind == kOptimizeJob) return ParseOptimizeSettings(parameters).status();
+  if (kind == kTrainJob) return ParseTrainSettings(parameters).status();
+  if (kind == kClassifyJob || kind == kEvaluateJob) return CheckModel(kind, parameters);
   return absl::InvalidArgumentError(absl::StrCat("job kind '",
                                                  kind.substr(0, 100),
                                                  "': use ",
@@ -58,8 +80,27 @@ absl::Status CheckJob(absl::string_view kind, const JobParameters& parameters) {
                                                  kVerifyJob,
                                                  ", ",
                                                  kOptimizeJob,
+                                                 ", ",
+                                                 kTrainJob,
+                                                 ", ",
+                                                 kClassifyJob,
+                                                 ", ",
+                                                 kEvaluateJob,
                                                  " or ",
                                                  kRevertJob));
+}
+
+// What a job needs that is not there, said before it waits for its turn.
+absl::Status CheckClassifiers(MapCore& core,
+                              absl::string_view kind,
+                              const JobParameters& parameters) {
+  if (kind != kTrainJob && kind != kClassifyJob && kind != kEvaluateJob) return absl::OkStatus();
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  if (kind != kTrainJob) return FindClassifier(*reader, parameters.at("model")).status();
+  const auto name = parameters.find("name");
+  if (name == parameters.end() || absl::IsNotFound(FindClassifier(*reader, name->second).status()))
+    return absl::OkStatus();
+  return absl::AlreadyExistsError(absl::StrCat("classifier ", name->second, " exists"));
 }
 
 // The epoch before the one that `job` made, which must be the current one.
@@ -93,6 +134,7 @@ absl::StatusOr<JobInfo> EngineJobs::Start(const api::Call& call,
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
   STRATA_RETURN_IF_ERROR(CheckJob(kind, parameters));
+  STRATA_RETURN_IF_ERROR(CheckClassifiers(found->core(), kind, parameters));
   STRATA_ASSIGN_OR_RETURN(JobInfo info, found->jobs().Start(call.stop, kind, parameters));
   found->JobQueued();
   return info;

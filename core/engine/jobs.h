@@ -21,7 +21,7 @@ class EngineJobs final : public api::Jobs {
  public:
   explicit EngineJobs(EngineMaps& maps) : maps_(maps) {}
 
-  // Parameters: rebuild.h, optimize.h, revert.h.
+  // Parameters: rebuild.h, optimize.h, revert.h, train.h, classify.h.
   absl::StatusOr<JobInfo> Start(const api::Call& call,
                                 absl::string_view map,
                                 absl::string_view kind,

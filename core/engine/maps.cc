@@ -131,6 +131,25 @@ absl::StatusOr<std::vector<EpochInfo>> EngineMaps::History(const api::Call& call
   return reader->ListEpochs();
 }
 
+absl::StatusOr<std::vector<MapClass>> EngineMaps::ListClasses(const api::Call& call,
+                                                              absl::string_view name) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(name));
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map->core().Reader());
+  return reader->ListClasses();
+}
+
+absl::Status EngineMaps::SetClass(const api::Call& call,
+                                  absl::string_view name,
+                                  const MapClass& map_class) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(name));
+  STRATA_RETURN_IF_ERROR(ValidateMapClass(map_class));
+  return map->core().writer().Run(Durability::kFull, 0, call.stop, [&](StorageWriter& writer) {
+    return writer.PutClass(map_class);
+  });
+}
+
 absl::Status EngineMaps::Watch(const api::Call& call,
                                absl::string_view name,
                                const api::WatchOptions& options,

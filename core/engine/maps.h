@@ -38,6 +38,11 @@ class EngineMaps final : public api::Maps {
   absl::StatusOr<MapStats> Stats(const api::Call& call, absl::string_view name) override;
   absl::StatusOr<std::vector<EpochInfo>> History(const api::Call& call,
                                                  absl::string_view name) override;
+  absl::StatusOr<std::vector<MapClass>> ListClasses(const api::Call& call,
+                                                    absl::string_view name) override;
+  absl::Status SetClass(const api::Call& call,
+                        absl::string_view name,
+                        const MapClass& map_class) override;
   absl::Status Watch(const api::Call& call,
                      absl::string_view name,
                      const api::WatchOptions& options,

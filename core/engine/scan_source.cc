@@ -41,6 +41,7 @@ absl::Status ScanSource::ForEachBlock(const ScanRecord& scan,
   held_scan_ = 0;
   held_ = PointCloud();
   held_.sensor_origin = scan.header.sensor_origin;
+  ScanLabels labels(scan, labels_);
   for (std::uint32_t ordinal = 0; ordinal < scan.chunks; ++ordinal) {
     if (held_.size() >= kBlockPoints) {
       STRATA_RETURN_IF_ERROR(body(held_));
@@ -50,6 +51,7 @@ absl::Status ScanSource::ForEachBlock(const ScanRecord& scan,
     STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader_.GetChunk(scan.upload, ordinal));
     absl::StatusOr<PointCloud> piece = DecodePoints(bytes);
     if (!piece.ok()) return Annotate(piece.status(), absl::StrCat("piece ", ordinal));
+    STRATA_RETURN_IF_ERROR(labels.Apply(reader_, *piece));
     AppendPiece(*piece, held_);
   }
   if (held_.size() == scan.header.point_count) held_scan_ = scan.number;

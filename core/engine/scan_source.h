@@ -10,6 +10,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/cloud/point_cloud.h"
+#include "core/engine/scan_labels.h"
 #include "core/geometry/pose.h"
 #include "core/mls/build.h"
 #include "core/mls/measurement.h"
@@ -23,20 +24,20 @@ namespace strata {
 // block and joined, which gives the same map.
 class ScanSource {
  public:
-  // Both must outlive the source.
-  ScanSource(StorageReader& reader, const MapParameters& parameters)
-      : reader_(reader), parameters_(parameters) {}
+  // All must outlive the source. `labels`: which labels its points have.
+  ScanSource(StorageReader& reader, const MapParameters& parameters, const LabelView& labels = {})
+      : reader_(reader), parameters_(parameters), labels_(labels) {}
 
   // The scan in its own frame. DATA_LOSS naming the piece that is damaged.
   absl::StatusOr<MlsMap> LocalMap(const ScanRecord& scan);
-  // What the scan adds to the map at this pose: a pure function of the scan, the pose and the map's
-  // parameters, before and after points were dropped.
+  // What the scan adds to the map at this pose: a pure function of the scan, its labels, the pose
+  // and the map's parameters, before and after points were dropped.
   absl::StatusOr<MlsMap> Contribution(const ScanRecord& scan, const Pose& T_map_scan);
 
   // What the last map built from points had to leave out of them.
   const DroppedPoints& dropped() const { return dropped_; }
 
-  // The points in blocks, in order.
+  // The points in blocks of about a million, in order.
   absl::Status ForEachBlock(const ScanRecord& scan,
                             absl::FunctionRef<absl::Status(const PointCloud&)> body);
 
@@ -45,6 +46,7 @@ class ScanSource {
 
   StorageReader& reader_;
   const MapParameters& parameters_;
+  const LabelView labels_;
   MlsScratch scratch_;
   DroppedPoints dropped_;
   // The last scan that fitted one block: its local map and its contribution read it twice.

@@ -15,6 +15,7 @@
 
 #include "core/codec/point_codec.h"
 #include "core/common/status.h"
+#include "core/engine/scan_labels.h"
 #include "core/engine/upload.h"
 #include "core/world/names.h"
 
@@ -75,10 +76,14 @@ absl::StatusOr<ScanQuery> ToQuery(const api::ScanFilter& filter) {
   return query;
 }
 
-absl::StatusOr<PointCloud> ReadPiece(Map& map, const ScanRecord& scan, std::uint32_t ordinal) {
+absl::StatusOr<PointCloud> ReadPiece(Map& map,
+                                     const ScanRecord& scan,
+                                     std::uint32_t ordinal,
+                                     ScanLabels& labels) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map.core().Reader());
   STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader->GetChunk(scan.upload, ordinal));
   STRATA_ASSIGN_OR_RETURN(PointCloud piece, DecodePoints(bytes));
+  STRATA_RETURN_IF_ERROR(labels.Apply(*reader, piece));
   piece.sensor_origin = scan.header.sensor_origin;
   return piece;
 }
@@ -95,6 +100,8 @@ ScanInfo ToScanInfo(const PosedScan& posed) {
   info.content_hash = posed.scan.content_hash;
   info.message = posed.scan.message;
   if (posed.pose.has_value()) info.alignment = posed.pose->report;
+  info.person_labels = posed.scan.person_labels;
+  info.label_model = posed.scan.label_model;
   return info;
 }
 
@@ -169,9 +176,10 @@ absl::Status EngineScans::GetPoints(const api::Call& call,
     return absl::FailedPreconditionError(
         absl::StrCat(what, ": the map drops points once a scan is integrated"));
   }
+  ScanLabels labels(posed.scan, {});
   for (std::uint32_t ordinal = 0; ordinal < posed.scan.chunks; ++ordinal) {
     STRATA_RETURN_IF_ERROR(call.stop.status());
-    const absl::StatusOr<PointCloud> piece = ReadPiece(*found, posed.scan, ordinal);
+    const absl::StatusOr<PointCloud> piece = ReadPiece(*found, posed.scan, ordinal, labels);
     if (!piece.ok()) {
       // Deleted or dropped while we were reading?
       STRATA_ASSIGN_OR_RETURN(const PosedScan now, FindScan(*found, id));
@@ -182,6 +190,19 @@ absl::Status EngineScans::GetPoints(const api::Call& call,
     STRATA_RETURN_IF_ERROR(sink(*piece));
   }
   return absl::OkStatus();
+}
+
+absl::Status EngineScans::SetLabels(const api::Call& call,
+                                    absl::string_view map,
+                                    const ScanId& id,
+                                    const std::vector<std::uint16_t>& labels,
+                                    api::LabelMode mode) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_RETURN_IF_ERROR(CheckId(id));
+  return found->worker().Execute(call.stop, [&](Integrator& integrator) {
+    return integrator.SetPersonLabels(id, labels, mode == api::LabelMode::kUpdate);
+  });
 }
 
 absl::Status EngineScans::Delete(const api::Call& call, absl::string_view map, const ScanId& id) {

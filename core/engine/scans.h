@@ -2,7 +2,9 @@
 #ifndef STRATA_CORE_ENGINE_SCANS_H_
 #define STRATA_CORE_ENGINE_SCANS_H_
 
+#include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
@@ -35,6 +37,11 @@ class EngineScans final : public api::Scans {
                          absl::string_view map,
                          const ScanId& id,
                          absl::FunctionRef<absl::Status(const PointCloud&)> sink) override;
+  absl::Status SetLabels(const api::Call& call,
+                         absl::string_view map,
+                         const ScanId& id,
+                         const std::vector<std::uint16_t>& labels,
+                         api::LabelMode mode) override;
   absl::Status Delete(const api::Call& call, absl::string_view map, const ScanId& id) override;
 
  private:

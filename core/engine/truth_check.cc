@@ -8,10 +8,12 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 
+#include "core/classification/classifier_codec.h"
 #include "core/codec/point_codec.h"
 #include "core/common/status.h"
 #include "core/engine/local_map_codec.h"
 #include "core/engine/scan_hash.h"
+#include "core/engine/scan_labels.h"
 #include "core/geometry/pose.h"
 
 namespace strata {
@@ -46,6 +48,29 @@ void TruthCheck::CheckPoints(StorageReader& reader, const ScanRecord& scan, Repo
   }
 }
 
+void TruthCheck::CheckLabels(StorageReader& reader, const ScanRecord& scan, Report report) {
+  for (const LabelOrigin origin : {LabelOrigin::kPerson, LabelOrigin::kModel}) {
+    const bool given = origin == LabelOrigin::kPerson ? scan.person_labels : scan.label_model != 0;
+    const absl::StatusOr<std::uint64_t> count = CountLabels(reader, scan, origin);
+    if (!count.ok()) {
+      report(std::string(count.status().message()));
+    } else if (const std::uint64_t expected = given ? scan.header.point_count : 0;
+               *count != expected) {
+      report(absl::StrCat(*count, " labels instead of ", expected));
+    }
+  }
+}
+
+void TruthCheck::CheckClassifiers(StorageReader& reader, Report report) {
+  const absl::StatusOr<std::vector<ClassifierInfo>> classifiers = reader.ListClassifiers();
+  if (!classifiers.ok()) return report(std::string(classifiers.status().message()));
+  for (const ClassifierInfo& info : *classifiers) {
+    const absl::StatusOr<std::string> bytes = reader.GetClassifier(info.id);
+    const absl::Status sound = bytes.ok() ? DecodeClassifier(*bytes).status() : bytes.status();
+    if (!sound.ok()) report(absl::StrCat("classifier ", info.name, ": ", sound.message()));
+  }
+}
+
 void TruthCheck::CheckScan(StorageReader& reader, const PosedScan& posed, Report report) {
   const ScanRecord& scan = posed.scan;
   const auto check = [&](const absl::Status& sound) {
@@ -57,7 +82,10 @@ void TruthCheck::CheckScan(StorageReader& reader, const PosedScan& posed, Report
   if (scan.state == ScanState::kIntegrated && !posed.pose.has_value()) {
     report("integrated without a pose");
   }
-  if (scan.has_points) return CheckPoints(reader, scan, report);
+  if (scan.has_points) {
+    CheckPoints(reader, scan, report);
+    return CheckLabels(reader, scan, report);
+  }
   const absl::StatusOr<std::string> bytes = reader.GetLocalMap(scan.number);
   check(bytes.ok() ? DecodeLocalMap(*bytes, core_.info().parameters.mls).status() : bytes.status());
 }
@@ -80,6 +108,7 @@ absl::Status TruthCheck::Run(Report report) {
       report(absl::StrCat("scan ", posed->scan.header.id.ToString(), ": ", what));
     });
   }
+  CheckClassifiers(*reader, report);
   absl::Status constraints = reader->ListConstraints(epoch).status();
   if (constraints.ok()) constraints = reader->ListPlanes(epoch).status();
   if (!absl::IsDataLoss(constraints)) return constraints;

@@ -30,6 +30,8 @@ class TruthCheck {
  private:
   void CheckScan(StorageReader& reader, const PosedScan& posed, Report report);
   void CheckPoints(StorageReader& reader, const ScanRecord& scan, Report report);
+  void CheckLabels(StorageReader& reader, const ScanRecord& scan, Report report);
+  void CheckClassifiers(StorageReader& reader, Report report);
 
   MapCore& core_;
   JobContext& context_;

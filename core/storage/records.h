@@ -40,7 +40,15 @@ struct ScanRecord {
   std::uint64_t point_bytes = 0;
   Eigen::AlignedBox3f box_scan;  // of the finite points in the scan frame; empty without any
   std::string content_hash;
-  std::string message;  // why it failed, or which points are not in the map
+  std::string message;            // why it failed, or which points are not in the map
+  bool person_labels = false;     // it has labels of LabelOrigin::kPerson
+  std::uint64_t label_model = 0;  // whose labels of LabelOrigin::kModel it has; 0: none
+};
+
+// Who gave a scan labels after its upload.
+enum class LabelOrigin : std::uint8_t {  // stored
+  kPerson = 1,
+  kModel = 2,  // the classifier that did so last
 };
 
 enum class PoseOrigin : std::uint8_t {  // stored

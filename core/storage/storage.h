@@ -17,8 +17,10 @@
 
 #include "core/mls/tile_key.h"
 #include "core/storage/records.h"
+#include "core/world/classifier_info.h"
 #include "core/world/epoch.h"
 #include "core/world/job.h"
+#include "core/world/map_class.h"
 #include "core/world/map_info.h"
 #include "core/world/robot_profile.h"
 #include "core/world/scan.h"
@@ -67,6 +69,14 @@ class StorageReader {
   // Newest first; the newest is the current one.
   virtual absl::StatusOr<std::vector<EpochInfo>> ListEpochs() = 0;
   virtual absl::StatusOr<std::map<std::string, RobotProfile>> ListProfiles() = 0;
+  // Piece `piece` of a scan's labels; nullopt where there is none.
+  virtual absl::StatusOr<std::optional<std::string>> FindLabels(ScanNumber number,
+                                                                LabelOrigin origin,
+                                                                std::uint32_t piece) = 0;
+  // By id.
+  virtual absl::StatusOr<std::vector<MapClass>> ListClasses() = 0;
+  virtual absl::StatusOr<std::vector<ClassifierInfo>> ListClassifiers() = 0;
+  virtual absl::StatusOr<std::string> GetClassifier(std::uint64_t id) = 0;
   virtual absl::StatusOr<std::optional<JobInfo>> FindJob(std::uint64_t id) = 0;
   virtual absl::StatusOr<std::vector<JobInfo>> ListJobs() = 0;
 
@@ -123,9 +133,15 @@ class StorageWriter {
   virtual absl::Status SetScanState(ScanNumber number,
                                     ScanState state,
                                     absl::string_view message) = 0;
-  // Keeps `local_map` (core/codec's map bytes) instead of the points.
+  // Keeps `local_map` (core/codec's map bytes) instead of the points and their labels.
   virtual absl::Status DropPoints(ScanNumber number, absl::string_view local_map) = 0;
-  // With its chunks, local map, poses, constraints, footprint and tile relation.
+  // Labels of a scan in place of earlier ones of that origin, in order, each piece at most 1 MiB;
+  // none: takes them away. `model`: that gave them; 0 for a person.
+  virtual absl::Status PutLabels(ScanNumber number,
+                                 LabelOrigin origin,
+                                 std::uint64_t model,
+                                 const std::vector<std::string>& pieces) = 0;
+  // With its chunks, labels, local map, poses, constraints, footprint and tile relation.
   virtual absl::Status DeleteScan(ScanNumber number) = 0;
 
   virtual absl::Status PutPose(const PoseRecord& pose) = 0;
@@ -152,6 +168,12 @@ class StorageWriter {
   // Poses that only epochs before `epoch` use; those can not be gone back to any more.
   virtual absl::Status ForgetEpochsBefore(std::uint64_t epoch) = 0;
   virtual absl::Status PutProfile(absl::string_view name, const RobotProfile& profile) = 0;
+  // Inserts or replaces. ALREADY_EXISTS where another id has the name.
+  virtual absl::Status PutClass(const MapClass& map_class) = 0;
+  // Under a new id, which it returns; that of `info` is ignored. ALREADY_EXISTS for its name.
+  virtual absl::StatusOr<std::uint64_t> PutClassifier(const ClassifierInfo& info,
+                                                      absl::string_view bytes) = 0;
+  virtual absl::Status DeleteClassifier(std::uint64_t id) = 0;
   // Inserts or replaces.
   virtual absl::Status PutJob(const JobInfo& job) = 0;
 

@@ -1,6 +1,9 @@
 #include "proto/translate/maps.h"
 
+#include <cstdint>
+
 #include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
 #include "proto/translate/geometry.h"
@@ -147,6 +150,30 @@ absl::StatusOr<MapStats> FromProto(const v1::MapStats& proto) {
   STRATA_ASSIGN_OR_RETURN(stats.box_min, FromProto("box_min", proto.box_min()));
   STRATA_ASSIGN_OR_RETURN(stats.box_max, FromProto("box_max", proto.box_max()));
   return stats;
+}
+
+v1::MapClass ToProto(const MapClass& map_class) {
+  v1::MapClass proto;
+  proto.set_id(map_class.id);
+  proto.set_name(map_class.name);
+  const Colour& c = map_class.colour;
+  proto.set_colour(std::uint32_t{c.r} << 16 | std::uint32_t{c.g} << 8 | c.b);
+  return proto;
+}
+
+absl::StatusOr<MapClass> FromProto(const v1::MapClass& proto) {
+  if (proto.id() > 0xFFFF || proto.colour() > 0xFFFFFF) {
+    return absl::InvalidArgumentError(absl::StrCat("class: id = ",
+                                                   proto.id(),
+                                                   " or colour = ",
+                                                   proto.colour(),
+                                                   " does not fit; at most 255 and 0xFFFFFF"));
+  }
+  const auto channel = [&](int shift) {
+    return static_cast<std::uint8_t>(proto.colour() >> shift & 0xFF);
+  };
+  return MapClass{
+      static_cast<std::uint16_t>(proto.id()), proto.name(), {channel(16), channel(8), channel(0)}};
 }
 
 }  // namespace strata::translate

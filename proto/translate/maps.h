@@ -6,6 +6,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/cloud/sensor_model.h"
+#include "core/world/map_class.h"
 #include "core/world/map_info.h"
 #include "core/world/robot_profile.h"
 #include "strata/v1/maps.pb.h"
@@ -19,12 +20,14 @@ v1::SensorModel ToProto(const SensorModel& model);
 v1::MapParameters ToProto(const MapParameters& parameters);
 v1::MapInfo ToProto(const MapInfo& map);
 v1::MapStats ToProto(const MapStats& stats);
+v1::MapClass ToProto(const MapClass& map_class);
 
 RobotProfile FromProto(const v1::RobotProfile& profile);
 SensorModel FromProto(const v1::SensorModel& model);
 MapParameters FromProto(const v1::MapParameters& parameters);
 absl::StatusOr<MapInfo> FromProto(const v1::MapInfo& map);
 absl::StatusOr<MapStats> FromProto(const v1::MapStats& stats);
+absl::StatusOr<MapClass> FromProto(const v1::MapClass& map_class);
 
 }  // namespace strata::translate
 

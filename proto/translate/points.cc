@@ -3,6 +3,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstring>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -21,7 +22,7 @@ static_assert(std::endian::native == std::endian::little, "columns are copied as
 static_assert(sizeof(Eigen::Vector3f) == 12 && sizeof(Colour) == 3);
 
 template <typename T>
-std::string Pack(const std::vector<T>& column) {
+std::string Pack(std::span<const T> column) {
   std::string bytes(column.size() * sizeof(T), '\0');
   if (!column.empty())
     std::memcpy(bytes.data(), static_cast<const void*>(column.data()), bytes.size());
@@ -73,10 +74,10 @@ absl::Status CheckPoint(const Eigen::Vector3f& p, std::uint64_t index, bool orga
 
 v1::PointChunk ToProto(const PointCloud& cloud) {
   v1::PointChunk chunk;
-  chunk.set_xyz(Pack(cloud.points));
-  chunk.set_intensity(Pack(cloud.intensity));
-  chunk.set_rgb(Pack(cloud.colour));
-  chunk.set_label(Pack(cloud.label));
+  chunk.set_xyz(Pack(std::span(cloud.points)));
+  chunk.set_intensity(Pack(std::span(cloud.intensity)));
+  chunk.set_rgb(Pack(std::span(cloud.colour)));
+  chunk.set_label(Pack(std::span(cloud.label)));
   return chunk;
 }
 
@@ -96,6 +97,14 @@ absl::StatusOr<PointCloud> FromProto(const v1::PointChunk& chunk) {
   cloud.colour = Unpack<Colour>(chunk.rgb());
   cloud.label = Unpack<std::uint16_t>(chunk.label());
   return cloud;
+}
+
+std::string PackLabels(std::span<const std::uint16_t> labels) { return Pack(labels); }
+
+absl::StatusOr<std::vector<std::uint16_t>> UnpackLabels(const std::string& bytes) {
+  if (bytes.size() % sizeof(std::uint16_t) == 0) return Unpack<std::uint16_t>(bytes);
+  return absl::InvalidArgumentError(
+      absl::StrCat("labels: ", bytes.size(), " bytes, not 2 a label"));
 }
 
 absl::Status CheckChunk(const PointCloud& chunk, const ScanHeader& header, std::uint64_t first) {

@@ -2,6 +2,11 @@
 #ifndef STRATA_PROTO_TRANSLATE_POINTS_H_
 #define STRATA_PROTO_TRANSLATE_POINTS_H_
 
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
@@ -17,6 +22,10 @@ v1::PointChunk ToProto(const PointCloud& cloud);
 // INVALID_ARGUMENT unless the columns' lengths fit each other and there are 1 to
 // api::kMaxPointsPerChunk points.
 absl::StatusOr<PointCloud> FromProto(const v1::PointChunk& chunk);
+
+// Labels as 2 bytes each, and back: INVALID_ARGUMENT for half a label.
+std::string PackLabels(std::span<const std::uint16_t> labels);
+absl::StatusOr<std::vector<std::uint16_t>> UnpackLabels(const std::string& bytes);
 
 // What an upload may bring: INVALID_ARGUMENT unless `chunk` has 1 to api::kMaxPointsPerChunk points
 // in exactly the columns of `header`, all within ±1e6 m (three NaN pass in organised scans), and

@@ -115,6 +115,8 @@ v1::ScanInfo ToProto(const ScanInfo& scan) {
   proto.set_content_hash(scan.content_hash);
   proto.set_message(scan.message);
   *proto.mutable_alignment() = ReportToProto(scan.alignment);
+  proto.set_person_labels(scan.person_labels);
+  proto.set_label_model(scan.label_model);
   return proto;
 }
 
@@ -128,6 +130,8 @@ absl::StatusOr<ScanInfo> FromProto(const v1::ScanInfo& proto) {
   scan.content_hash = proto.content_hash();
   scan.message = proto.message();
   scan.alignment = ReportFromProto(proto.alignment());
+  scan.person_labels = proto.person_labels();
+  scan.label_model = proto.label_model();
   return scan;
 }
 

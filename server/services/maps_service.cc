@@ -70,6 +70,26 @@ absl::Status History(api::Database& db,
   return absl::OkStatus();
 }
 
+absl::Status ListClasses(api::Database& db,
+                         const api::Call& call,
+                         const v1::ListMapClassesRequest& in,
+                         v1::ListMapClassesResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes,
+                          db.maps().ListClasses(call, in.name()));
+  for (const MapClass& map_class : classes) *out.add_classes() = ToProto(map_class);
+  return absl::OkStatus();
+}
+
+absl::Status SetClass(api::Database& db,
+                      const api::Call& call,
+                      const v1::SetMapClassRequest& in,
+                      v1::SetMapClassResponse&) {
+  const absl::StatusOr<MapClass> map_class = FromProto(in.map_class());
+  STRATA_RETURN_IF_ERROR(AtTheDoor(map_class.status()));
+  STRATA_RETURN_IF_ERROR(AtTheDoor(ValidateMapClass(*map_class)));
+  return db.maps().SetClass(call, in.name(), *map_class);
+}
+
 }  // namespace
 
 grpc::ServerUnaryReactor* MapsService::Create(grpc::CallbackServerContext* context,
@@ -106,6 +126,18 @@ grpc::ServerUnaryReactor* MapsService::History(grpc::CallbackServerContext* cont
                                                const v1::GetMapHistoryRequest* in,
                                                v1::GetMapHistoryResponse* out) {
   return RunUnary(runtime_, context, "Maps.History", in, out, &server::History);
+}
+
+grpc::ServerUnaryReactor* MapsService::ListClasses(grpc::CallbackServerContext* context,
+                                                   const v1::ListMapClassesRequest* in,
+                                                   v1::ListMapClassesResponse* out) {
+  return RunUnary(runtime_, context, "Maps.ListClasses", in, out, &server::ListClasses);
+}
+
+grpc::ServerUnaryReactor* MapsService::SetClass(grpc::CallbackServerContext* context,
+                                                const v1::SetMapClassRequest* in,
+                                                v1::SetMapClassResponse* out) {
+  return RunUnary(runtime_, context, "Maps.SetClass", in, out, &server::SetClass);
 }
 
 grpc::ServerWriteReactor<v1::WatchMapResponse>* MapsService::Watch(

@@ -30,6 +30,12 @@ class MapsService final : public v1::Maps::CallbackService {
   grpc::ServerUnaryReactor* History(grpc::CallbackServerContext* context,
                                     const v1::GetMapHistoryRequest* in,
                                     v1::GetMapHistoryResponse* out) override;
+  grpc::ServerUnaryReactor* ListClasses(grpc::CallbackServerContext* context,
+                                        const v1::ListMapClassesRequest* in,
+                                        v1::ListMapClassesResponse* out) override;
+  grpc::ServerUnaryReactor* SetClass(grpc::CallbackServerContext* context,
+                                     const v1::SetMapClassRequest* in,
+                                     v1::SetMapClassResponse* out) override;
   grpc::ServerWriteReactor<v1::WatchMapResponse>* Watch(grpc::CallbackServerContext* context,
                                                         const v1::WatchMapRequest* in) override;
 

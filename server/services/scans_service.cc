@@ -4,9 +4,11 @@
 #include "core/world/scan.h"
 #include "proto/translate/points.h"
 #include "proto/translate/scans.h"
+#include "server/rpc/collect.h"
 #include "server/rpc/stream.h"
 #include "server/rpc/unary.h"
 #include "server/services/ingest_reactor.h"
+#include "server/services/label_collector.h"
 #include "server/services/upload_reactor.h"
 
 namespace strata::server {
@@ -103,6 +105,11 @@ grpc::ServerWriteReactor<v1::ListScansResponse>* ScansService::List(
 grpc::ServerWriteReactor<v1::GetScanPointsResponse>* ScansService::GetPoints(
     grpc::CallbackServerContext* context, const v1::GetScanPointsRequest* in) {
   return RunStream(runtime_, context, "Scans.GetPoints", in, &server::GetPoints);
+}
+
+grpc::ServerReadReactor<v1::SetScanLabelsRequest>* ScansService::SetLabels(
+    grpc::CallbackServerContext* context, v1::SetScanLabelsResponse* out) {
+  return new CollectReactor<LabelCollector>(runtime_, *context, "Scans.SetLabels", *out);
 }
 
 grpc::ServerUnaryReactor* ScansService::Delete(grpc::CallbackServerContext* context,

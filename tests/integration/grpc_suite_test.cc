@@ -36,6 +36,7 @@ class ServedDatabase final : public api::Database {
   api::Planning& planning() override { return client_->planning(); }
   api::Jobs& jobs() override { return client_->jobs(); }
   api::PoseGraph& posegraph() override { return client_->posegraph(); }
+  api::Classifiers& classifiers() override { return client_->classifiers(); }
 
  private:
   // In the order they need each other.

@@ -73,6 +73,14 @@ TEST_P(DatabaseSuite, AnUnknownMapIsNotFoundEverywhere) {
   EXPECT_THAT(db().jobs().Revert({}, no, 1), not_found);
   EXPECT_THAT(db().jobs().Watch({}, no, 1, ignore), not_found);
   EXPECT_THAT(db().maps().History({}, no), not_found);
+  EXPECT_THAT(db().scans().SetLabels({}, no, {"run", 1}, {1}, {}), not_found);
+  EXPECT_THAT(db().classifiers().Get({}, no, "c"), not_found);
+  EXPECT_THAT(db().classifiers().List({}, no), not_found);
+  EXPECT_THAT(db().classifiers().Delete({}, no, "c"), not_found);
+  EXPECT_THAT(db().classifiers().Export({}, no, "c", ignore), not_found);
+  EXPECT_THAT(db().classifiers().Import({}, no, "c", "x"), not_found);
+  EXPECT_THAT(db().maps().ListClasses({}, no), not_found);
+  EXPECT_THAT(db().maps().SetClass({}, no, {1, "wall", {}}), not_found);
   EXPECT_THAT(db().maps().Watch({}, no, {.trajectory = "", .once = true}, ignore), not_found);
   EXPECT_THAT(db().posegraph().Get({}, no), not_found);
   EXPECT_THAT(db().posegraph().SetPose({}, no, {"run", 1}, Pose::Identity()), not_found);

@@ -32,6 +32,14 @@ class MockMaps : public api::Maps {
               History,
               (const api::Call&, absl::string_view),
               (override));
+  MOCK_METHOD(absl::StatusOr<std::vector<MapClass>>,
+              ListClasses,
+              (const api::Call&, absl::string_view),
+              (override));
+  MOCK_METHOD(absl::Status,
+              SetClass,
+              (const api::Call&, absl::string_view, const MapClass&),
+              (override));
   MOCK_METHOD(absl::Status,
               Watch,
               (const api::Call&, absl::string_view, const api::WatchOptions&, Sink<api::MapUpdate>),
@@ -65,6 +73,14 @@ class MockScans : public api::Scans {
   MOCK_METHOD(absl::Status,
               GetPoints,
               (const api::Call&, absl::string_view, const ScanId&, Sink<PointCloud>),
+              (override));
+  MOCK_METHOD(absl::Status,
+              SetLabels,
+              (const api::Call&,
+               absl::string_view,
+               const ScanId&,
+               const std::vector<std::uint16_t>&,
+               api::LabelMode),
               (override));
   MOCK_METHOD(absl::Status,
               Delete,
@@ -176,6 +192,33 @@ class MockPoseGraph : public api::PoseGraph {
               (override));
 };
 
+class MockClassifiers : public api::Classifiers {
+ public:
+  MOCK_METHOD(absl::StatusOr<ClassifierInfo>,
+              Get,
+              (const api::Call&, absl::string_view, absl::string_view),
+              (override));
+  MOCK_METHOD(absl::StatusOr<std::vector<ClassifierInfo>>,
+              List,
+              (const api::Call&, absl::string_view),
+              (override));
+  MOCK_METHOD(absl::Status,
+              Delete,
+              (const api::Call&, absl::string_view, absl::string_view),
+              (override));
+  MOCK_METHOD(absl::Status,
+              Export,
+              (const api::Call&,
+               absl::string_view,
+               absl::string_view,
+               absl::FunctionRef<absl::Status(absl::string_view)>),
+              (override));
+  MOCK_METHOD(absl::StatusOr<ClassifierInfo>,
+              Import,
+              (const api::Call&, absl::string_view, absl::string_view, absl::string_view),
+              (override));
+};
+
 // Calls nobody decided on answer UNKNOWN (gmock's default of a StatusOr).
 class MockDatabase : public api::Database {
  public:
@@ -185,6 +228,7 @@ class MockDatabase : public api::Database {
   ::testing::NiceMock<MockPlanning>& planning() override { return planning_; }
   ::testing::NiceMock<MockJobs>& jobs() override { return jobs_; }
   ::testing::NiceMock<MockPoseGraph>& posegraph() override { return posegraph_; }
+  ::testing::NiceMock<MockClassifiers>& classifiers() override { return classifiers_; }
 
  private:
   ::testing::NiceMock<MockMaps> maps_;
@@ -193,6 +237,7 @@ class MockDatabase : public api::Database {
   ::testing::NiceMock<MockPlanning> planning_;
   ::testing::NiceMock<MockJobs> jobs_;
   ::testing::NiceMock<MockPoseGraph> posegraph_;
+  ::testing::NiceMock<MockClassifiers> classifiers_;
 };
 
 }  // namespace strata::testing

@@ -32,6 +32,8 @@ absl::StatusOr<ScanRecord> ReadScan(const Statement& row) {
   }
   scan.content_hash = row.Text(16);
   scan.message = row.Text(17);
+  scan.person_labels = row.Int(27) != 0;
+  scan.label_model = row.Unsigned(28);
   return scan;
 }
 

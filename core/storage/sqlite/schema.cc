@@ -158,6 +158,40 @@ CREATE INDEX truth_plane_support_scan ON truth_plane_support (scan);
 CREATE TABLE truth_proposed_pose (
   job INTEGER NOT NULL, scan INTEGER NOT NULL, pose BLOB NOT NULL, PRIMARY KEY (job, scan)
 ) STRICT, WITHOUT ROWID;
+ALTER TABLE truth_scan ADD COLUMN person_labels INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE truth_scan ADD COLUMN label_model INTEGER NOT NULL DEFAULT 0;
+CREATE TABLE truth_label (
+  scan INTEGER NOT NULL,
+  origin INTEGER NOT NULL,
+  piece INTEGER NOT NULL,
+  bytes BLOB NOT NULL CHECK (length(bytes) <= 1048576),
+  PRIMARY KEY (scan, origin, piece)
+) STRICT;
+CREATE TABLE truth_model (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  name TEXT NOT NULL UNIQUE,
+  created_us INTEGER NOT NULL,
+  job INTEGER NOT NULL,
+  description TEXT NOT NULL,
+  size_bytes INTEGER NOT NULL
+) STRICT;
+CREATE TABLE truth_model_parameter (
+  model INTEGER NOT NULL, name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (model, name)
+) STRICT, WITHOUT ROWID;
+CREATE TABLE truth_model_score (
+  model INTEGER NOT NULL, name TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY (model, name)
+) STRICT, WITHOUT ROWID;
+CREATE TABLE truth_model_piece (
+  model INTEGER NOT NULL,
+  piece INTEGER NOT NULL,
+  bytes BLOB NOT NULL CHECK (length(bytes) <= 1048576),
+  PRIMARY KEY (model, piece)
+) STRICT;
+CREATE TABLE truth_class (
+  id INTEGER PRIMARY KEY,
+  name TEXT NOT NULL UNIQUE,
+  colour INTEGER NOT NULL
+) STRICT;
 )sql",
 };
 

@@ -46,6 +46,12 @@ class SqliteReader final : public StorageReader {
   absl::StatusOr<std::vector<ProposedPose>> ListProposedPoses(std::uint64_t job) override;
   absl::StatusOr<std::vector<EpochInfo>> ListEpochs() override;
   absl::StatusOr<std::map<std::string, RobotProfile>> ListProfiles() override;
+  absl::StatusOr<std::optional<std::string>> FindLabels(ScanNumber number,
+                                                        LabelOrigin origin,
+                                                        std::uint32_t piece) override;
+  absl::StatusOr<std::vector<MapClass>> ListClasses() override;
+  absl::StatusOr<std::vector<ClassifierInfo>> ListClassifiers() override;
+  absl::StatusOr<std::string> GetClassifier(std::uint64_t id) override;
   absl::StatusOr<std::optional<JobInfo>> FindJob(std::uint64_t id) override;
   absl::StatusOr<std::vector<JobInfo>> ListJobs() override;
   absl::StatusOr<std::optional<MlsTileRow>> FindMlsTile(const TileKey& key,
@@ -62,6 +68,7 @@ class SqliteReader final : public StorageReader {
 
  private:
   absl::Status ReadJobDetails(JobInfo& job);
+  absl::Status ReadClassifierDetails(ClassifierInfo& info);
   absl::Status ReadSupports(PlaneRecord& record);
 
   std::shared_ptr<Database> connection_;

@@ -132,6 +132,7 @@ absl::Status SqliteWriter::DropPoints(ScanNumber number, absl::string_view local
       RunSql("DELETE FROM truth_chunk WHERE upload = (SELECT upload FROM truth_scan WHERE number = "
              "?1)",
              number));
+  STRATA_RETURN_IF_ERROR(RunSql("DELETE FROM truth_label WHERE scan = ?1", number));
   return RunSql(
       "UPDATE truth_scan SET chunks = 0, has_points = 0, point_bytes = 0 WHERE number = ?1",
       number);
@@ -142,7 +143,8 @@ absl::Status SqliteWriter::DeleteScan(ScanNumber number) {
       RunSql("DELETE FROM truth_chunk WHERE upload = (SELECT upload FROM truth_scan WHERE number = "
              "?1)",
              number));
-  for (const char* sql : {"DELETE FROM truth_local_map WHERE scan = ?1",
+  for (const char* sql : {"DELETE FROM truth_label WHERE scan = ?1",
+                          "DELETE FROM truth_local_map WHERE scan = ?1",
                           "DELETE FROM truth_pose WHERE scan = ?1",
                           "DELETE FROM truth_proposed_pose WHERE scan = ?1",
                           "DELETE FROM truth_constraint WHERE scan_i = ?1 OR scan_j = ?1",

@@ -50,6 +50,14 @@ class SqliteWriter final : public StorageWriter {
   absl::Status RestoreConstraints(std::uint64_t epoch) override;
   absl::Status ForgetEpochsBefore(std::uint64_t epoch) override;
   absl::Status PutProfile(absl::string_view name, const RobotProfile& profile) override;
+  absl::Status PutClass(const MapClass& map_class) override;
+  absl::Status PutLabels(ScanNumber number,
+                         LabelOrigin origin,
+                         std::uint64_t model,
+                         const std::vector<std::string>& pieces) override;
+  absl::StatusOr<std::uint64_t> PutClassifier(const ClassifierInfo& info,
+                                              absl::string_view bytes) override;
+  absl::Status DeleteClassifier(std::uint64_t id) override;
   absl::Status PutJob(const JobInfo& job) override;
 
   absl::Status PutMlsTile(const MlsTileRow& row) override;

@@ -52,6 +52,13 @@ class FakeScans : public api::Scans {
                          absl::FunctionRef<absl::Status(const PointCloud&)> /*sink*/) override {
     return absl::UnimplementedError("");
   }
+  absl::Status SetLabels(const api::Call& /*call*/,
+                         absl::string_view /*map*/,
+                         const ScanId& /*id*/,
+                         const std::vector<std::uint16_t>& /*labels*/,
+                         api::LabelMode /*mode*/) override {
+    return absl::UnimplementedError("");
+  }
   absl::Status Delete(const api::Call& /*call*/,
                       absl::string_view /*map*/,
                       const ScanId& /*id*/) override {
@@ -100,6 +107,7 @@ class FakeDatabase : public api::Database {
   api::Planning& planning() override { std::abort(); }
   api::Jobs& jobs() override { std::abort(); }
   api::PoseGraph& posegraph() override { std::abort(); }
+  api::Classifiers& classifiers() override { std::abort(); }
 };
 
 }  // namespace strata::cli

@@ -24,7 +24,7 @@ namespace {
 using ::testing::HasSubstr;
 
 // The column of a feature.
-Eigen::Index ColumnOf(const FeatureOptions& options, const std::string& name) {
+Eigen::Index ColumnOf(const PointFeatureOptions& options, const std::string& name) {
   const std::vector<std::string> names = FeatureNames(options);
   const auto it = std::find(names.begin(), names.end(), name);
   EXPECT_NE(it, names.end()) << name;
@@ -122,7 +122,7 @@ TEST(FeaturesTest, ShapesOfAFloorAndAPole) {
   const auto pole = static_cast<Eigen::Index>(cloud.size() + 50);
   for (int k = 0; k < 100; ++k)
     cloud.points.emplace_back(2.5F, 2.5F, 0.03F * static_cast<float>(k));
-  const FeatureOptions options;
+  const PointFeatureOptions options;
   STRATA_ASSERT_OK_AND_ASSIGN(const FeatureMatrix features,
                               ComputeFeatures(cloud, options, Stop()));
   const auto at = [&](Eigen::Index row, const std::string& name) {
@@ -157,7 +157,7 @@ TEST(FeaturesTest, AWindowLiesBehindItsWall) {
       cloud.points.emplace_back(x, recess(x, z) ? 6.1F : 6.0F, z);
     }
   }
-  FeatureOptions options;
+  PointFeatureOptions options;
   options.set = FeatureSet::kWall;
   STRATA_ASSERT_OK_AND_ASSIGN(const FeatureMatrix features,
                               ComputeFeatures(cloud, options, Stop()));
@@ -195,7 +195,7 @@ TEST(FeaturesTest, SpinImagesDoNotDependOnWhereAndHowAThingStands) {
         static_cast<float>(x), static_cast<float>(y), static_cast<float>(0.5 * (x * x + y * y)));
   }
   cloud.sensor_origin = {0.0F, 0.0F, 20.0F};
-  FeatureOptions options;
+  PointFeatureOptions options;
   options.set = FeatureSet::kSpin;
   options.spin_radius_m = 0.3;
   STRATA_ASSERT_OK_AND_ASSIGN(const FeatureMatrix here, ComputeFeatures(cloud, options, Stop()));
@@ -237,7 +237,7 @@ TEST(FeaturesTest, SpinImagesShareAPointAmongFourBins) {
 
 TEST(FeaturesTest, PointsThatAreNoneHaveNoFeatures) {
   for (const FeatureSet set : {FeatureSet::kShape, FeatureSet::kWall, FeatureSet::kSpin}) {
-    FeatureOptions options;
+    PointFeatureOptions options;
     options.set = set;
     SCOPED_TRACE(std::string(ToString(set)));
     STRATA_ASSERT_OK_AND_ASSIGN(const FeatureMatrix none,
@@ -262,7 +262,7 @@ TEST(FeaturesTest, PointsThatAreNoneHaveNoFeatures) {
   EXPECT_THAT(
       FeatureSetFromName("colour"),
       testing::StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("shape, wall, spin")));
-  FeatureOptions options;
+  PointFeatureOptions options;
   options.neighbours = 1;
   EXPECT_THAT(ComputeFeatures(PointCloud(), options, Stop()),
               testing::StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("neighbours")));

@@ -1,0 +1,82 @@
+// A stream of requests that make up one, and one answer.
+#ifndef STRATA_SERVER_RPC_COLLECT_H_
+#define STRATA_SERVER_RPC_COLLECT_H_
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+#include <grpcpp/server_context.h>
+#include <grpcpp/support/server_callback.h>
+
+#include "core/common/status.h"
+#include "server/rpc/request.h"
+#include "server/rpc/runtime.h"
+
+namespace strata::server {
+
+// Reads a message only when the one before is dealt with; memory is what `Collector` keeps, which
+// it must bound. `Collector` has In and Out, and
+//   absl::Status Take(api::Database&, const api::Call&, const In&)   on an upload thread
+//   absl::Status Finish(api::Database&, const api::Call&, Out&)      on a query thread, at the end
+// called one at a time. Lives from the call's arrival to its end; owns itself.
+template <typename Collector>
+class CollectReactor final : public grpc::ServerReadReactor<typename Collector::In> {
+ public:
+  using In = typename Collector::In;
+  using Out = typename Collector::Out;
+
+  CollectReactor(Runtime& runtime,
+                 grpc::CallbackServerContext& context,
+                 absl::string_view method,
+                 Out& out)
+      : runtime_(runtime), request_(runtime, context, method), out_(out) {
+    if (const absl::Status admission = request_.admission(); !admission.ok()) {
+      this->Finish(request_.Close(admission));
+      return;
+    }
+    this->StartRead(&message_);
+  }
+
+ private:
+  void OnReadDone(bool ok) override {
+    if (ok) {
+      runtime_.uploads.Submit([this] { Take(); });
+    } else {
+      runtime_.queries.Submit([this] { End(); });
+    }
+  }
+  void OnCancel() override { request_.Cancel(); }
+  void OnDone() override { delete this; }
+
+  void Take() {
+    request_.CountReceived(message_);
+    const absl::Status status = Guarded([this]() -> absl::Status {
+      STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+      return collector_.Take(runtime_.db, request_.call(), message_);
+    });
+    if (status.ok()) {
+      this->StartRead(&message_);
+    } else {
+      this->Finish(request_.Close(status));
+    }
+  }
+
+  void End() {
+    const absl::Status status = Guarded([this]() -> absl::Status {
+      // The stream also ends when the client has gone.
+      STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+      return collector_.Finish(runtime_.db, request_.call(), out_);
+    });
+    request_.CountSent(out_);
+    this->Finish(request_.Close(status));
+  }
+
+  Runtime& runtime_;
+  Request request_;
+  Out& out_;
+  In message_;
+  Collector collector_;
+};
+
+}  // namespace strata::server
+
+#endif  // STRATA_SERVER_RPC_COLLECT_H_

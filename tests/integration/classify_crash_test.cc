@@ -1,0 +1,152 @@
+// A classifier labels a map that robots upload to, and the server is killed under it.
+#include <csignal>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "absl/time/clock.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/sdk/client.h"
+#include "core/common/status.h"
+#include "tests/integration/stratad_process.h"
+#include "tests/support/park.h"
+#include "tests/support/status_matchers.h"
+#include "tests/support/temp_dir.h"
+
+namespace strata::testing {
+namespace {
+
+constexpr char kMap[] = "park";
+constexpr std::uint64_t kBefore = 12;  // scans that are there when the job begins
+constexpr std::uint64_t kScans = 18;
+
+struct Outcome {
+  std::vector<std::vector<std::uint16_t>> labels;  // of every scan
+  std::string digest;
+};
+
+// One server on a folder of its own.
+class World {
+ public:
+  World() { Start(); }
+
+  api::Database& db() { return *client_; }
+  void Kill() {
+    process_->Signal(SIGKILL);
+    EXPECT_EQ(process_->Wait(), -SIGKILL);
+    Start();
+  }
+
+  // Every second of the first scans is labelled.
+  absl::Status Put(std::uint64_t i) {
+    PointCloud park = MakePark(i);
+    if (i > kBefore || i % 2 == 0) park.label.clear();
+    ScanHeader header;
+    header.id = {"run", i};
+    header.T_map_scan =
+        MakePose(Eigen::Quaterniond::Identity(), {3.0 * static_cast<double>(i), 0.0, 0.0});
+    header.alignment = Alignment::kOff;
+    header.point_count = park.size();
+    header.has_label = !park.label.empty();
+    STRATA_ASSIGN_OR_RETURN(const auto upload, db().scans().Upload({}, kMap, header));
+    STRATA_RETURN_IF_ERROR(upload->Write(park));
+    return upload->Finish().status();
+  }
+  JobInfo Follow(std::uint64_t id) {
+    JobInfo last;
+    STRATA_EXPECT_OK(db().jobs().Watch({}, kMap, id, [&last](const JobInfo& now) {
+      last = now;
+      return absl::OkStatus();
+    }));
+    EXPECT_EQ(last.state, JobState::kSucceeded) << last.kind << ": " << last.message;
+    return last;
+  }
+  JobInfo Run(const std::string& kind, const std::map<std::string, std::string>& parameters) {
+    const auto job = db().jobs().Start({}, kMap, kind, parameters);
+    STRATA_EXPECT_OK(job);
+    return job.ok() ? Follow(job->id) : JobInfo();
+  }
+  // A map of the first scans and a classifier of them.
+  void Prepare() {
+    STRATA_ASSERT_OK(db().maps().Create({}, kMap, {}));
+    for (std::uint64_t i = 1; i <= kBefore; ++i) STRATA_ASSERT_OK(Put(i));
+    Run("train", {{"name", "street"}, {"method", "amn"}, {"reduce", "depth=6"}, {"folds", "0"}});
+  }
+  Outcome Result() {
+    Outcome outcome;
+    for (std::uint64_t i = 1; i <= kScans; ++i) {
+      auto& labels = outcome.labels.emplace_back();
+      STRATA_EXPECT_OK(db().scans().GetPoints({}, kMap, {"run", i}, [&](const PointCloud& piece) {
+        labels.insert(labels.end(), piece.label.begin(), piece.label.end());
+        return absl::OkStatus();
+      }));
+    }
+    while (true) {
+      const auto stats = db().maps().Stats({}, kMap);
+      STRATA_EXPECT_OK(stats);
+      if (!stats.ok() || stats->scans_pending == 0) {
+        outcome.digest = stats.ok() ? stats->content_digest : "";
+        break;
+      }
+      absl::SleepFor(absl::Milliseconds(5));
+    }
+    Run("verify", {});
+    return outcome;
+  }
+
+ private:
+  void Start() {
+    process_ = std::make_unique<StratadProcess>(std::vector<std::string>{
+        "--data", (directory_.path() / "maps").string(), "--listen", "127.0.0.1:0"});
+    ClientOptions options;
+    options.target = process_->Address();
+    auto client = Connect(options);
+    STRATA_EXPECT_OK(client);
+    if (client.ok()) client_ = *std::move(client);
+  }
+
+  TempDir directory_;
+  std::unique_ptr<StratadProcess> process_;
+  std::unique_ptr<api::Database> client_;
+};
+
+TEST(ClassifyCrashTest, LabelsAreThoseOfAnUndisturbedJob) {
+  Outcome expected;
+  {
+    World world;
+    ASSERT_NO_FATAL_FAILURE(world.Prepare());
+    for (std::uint64_t i = kBefore + 1; i <= kScans; ++i) STRATA_ASSERT_OK(world.Put(i));
+    EXPECT_EQ(world.Run("classify", {{"model", "street"}}).metrics.at("scans_labelled"), kScans);
+    expected = world.Result();
+  }
+  for (const auto& labels : expected.labels)
+    EXPECT_THAT(labels, ::testing::Not(::testing::IsEmpty()));
+
+  constexpr std::uint64_t kSeed = 20261122;
+  SCOPED_TRACE(kSeed);
+  std::mt19937_64 random(kSeed);
+  World world;
+  ASSERT_NO_FATAL_FAILURE(world.Prepare());
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo job,
+                              world.db().jobs().Start({}, kMap, "classify", {{"model", "street"}}));
+  std::uint64_t next = kBefore + 1;
+  for (int round = 0; round < 3; ++round) {
+    for (int k = 0; k < 2; ++k) STRATA_ASSERT_OK(world.Put(next++));
+    absl::SleepFor(absl::Milliseconds(random() % 150));
+    world.Kill();
+  }
+  world.Follow(job.id);
+  // What came in after the job had ended, if it was quick.
+  world.Run("classify", {{"model", "street"}});
+  const Outcome outcome = world.Result();
+  EXPECT_EQ(outcome.labels, expected.labels);
+  EXPECT_EQ(outcome.digest, expected.digest);
+}
+
+}  // namespace
+}  // namespace strata::testing
