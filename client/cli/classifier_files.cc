@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -147,6 +148,10 @@ absl::Status TrainOnFiles(FileContext& context, const FileTraining& training) {
     STRATA_ASSIGN_OR_RETURN(labels, ReadLabelClasses(training.classes));
   }
   for (PointCloud& cloud : clouds) labels.Apply(cloud);
+  std::optional<ConfusionMatrix> confusion;
+  if (training.folds > 0) {
+    STRATA_ASSIGN_OR_RETURN(confusion, Validated(training, labels.classes, clouds, context));
+  }
   const auto begin = std::chrono::steady_clock::now();
   absl::StatusOr<Classifier> classifier = absl::UnknownError("not trained");
   {
@@ -173,22 +178,16 @@ absl::Status TrainOnFiles(FileContext& context, const FileTraining& training) {
                {"points_kept", classifier->points_kept},
                {"seconds", seconds},
                {"bytes", bytes.size()}};
-  if (training.folds == 0) {
-    context.output.Object(json);
-    return absl::OkStatus();
-  }
-  STRATA_ASSIGN_OR_RETURN(const ConfusionMatrix confusion,
-                          Validated(training, labels.classes, clouds, context));
   const std::vector<std::string> names = NamesOf(labels.classes);
-  if (context.output.json()) {
+  if (confusion.has_value() && context.output.json()) {
     json["folds"] = training.folds;
-    json["validation"] = ScoresJson(confusion, names);
-    context.output.Object(json);
-    return absl::OkStatus();
+    json["validation"] = ScoresJson(*confusion, names);
   }
   context.output.Object(json);
-  context.output.Text(absl::StrCat("\nvalidation, ", training.folds, " folds of whole files:"));
-  PrintScores(confusion, names, context.output);
+  if (confusion.has_value() && !context.output.json()) {
+    context.output.Text(absl::StrCat("\nvalidation, ", training.folds, " folds of whole files:"));
+    PrintScores(*confusion, names, context.output);
+  }
   return absl::OkStatus();
 }
 

@@ -1,4 +1,5 @@
 // strata map export
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -45,6 +46,13 @@ Colour ColourOf(const Surface& surface) {
   return surface.vertical() ? picture::kVerticalColour : picture::kUnknownColour;
 }
 
+// No labels rather than none but zeros.
+void DropIfNone(std::vector<std::uint16_t>& labels) {
+  if (std::all_of(labels.begin(), labels.end(), [](auto label) { return label == 0; })) {
+    labels.clear();
+  }
+}
+
 // Vertical segments become lines down to a vertex of their own.
 Geometry GeometryOf(const std::vector<SurfaceTile>& tiles, SurfaceMesh mesh) {
   Geometry geometry;
@@ -54,6 +62,7 @@ Geometry GeometryOf(const std::vector<SurfaceTile>& tiles, SurfaceMesh mesh) {
   for (const SurfaceTile& tile : tiles) {
     for (const Surface& surface : tile.surfaces) {
       geometry.colour.push_back(ColourOf(surface));
+      geometry.label.push_back(surface.class_id);
     }
   }
   for (const auto& [a, b, c, d] : mesh.quads) {
@@ -67,7 +76,9 @@ Geometry GeometryOf(const std::vector<SurfaceTile>& tiles, SurfaceMesh mesh) {
         {segment.vertex, static_cast<std::uint32_t>(geometry.vertices.size())});
     geometry.vertices.push_back(foot);
     geometry.colour.push_back(picture::kVerticalColour);
+    geometry.label.push_back(geometry.label[segment.vertex]);
   }
+  DropIfNone(geometry.label);
   return geometry;
 }
 
@@ -102,14 +113,15 @@ absl::StatusOr<Geometry> PointsOf(Context& context, const ExportOptions& options
   for (const ScanInfo& scan : scans) {
     STRATA_RETURN_IF_ERROR(context.database.scans().GetPoints(
         context.call, options.map, scan.header.id, [&](const PointCloud& chunk) {
-          for (const Eigen::Vector3f& p : chunk.points) {
-            if (std::isfinite(p.x())) {
-              geometry.vertices.emplace_back(scan.T_map_scan * p.cast<double>());
-            }
+          for (std::size_t i = 0; i < chunk.size(); ++i) {
+            if (!std::isfinite(chunk.points[i].x())) continue;
+            geometry.vertices.emplace_back(scan.T_map_scan * chunk.points[i].cast<double>());
+            geometry.label.push_back(chunk.label.empty() ? 0 : chunk.label[i]);
           }
           return absl::OkStatus();
         }));
   }
+  DropIfNone(geometry.label);
   return geometry;
 }
 
@@ -160,8 +172,9 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
   app->add_option(
          "--format",
          options->format,
-         "ply: triangles and edges, colour by traversability, binary; obj: the same as text; "
-         "pcd: all points, binary x y z")
+         "ply: triangles and edges, colour by traversability and the class as label where there "
+         "are classes, binary; obj: the same as text, without label; pcd: all points, binary x y z "
+         "and label")
       ->check(CLI::IsMember({"ply", "obj", "pcd"}))
       ->required();
   app->add_option("--out", options->out, "The file to write")->type_name("FILE")->required();

@@ -24,6 +24,7 @@
 #include "client/cli/tile_source.h"
 #include "client/formats/file_bytes.h"
 #include "core/common/status.h"
+#include "core/world/map_class.h"
 
 namespace strata::cli {
 namespace {
@@ -33,6 +34,7 @@ struct RenderOptions {
   std::string out;
   std::vector<std::string> path_files;
   std::string view = "top";
+  std::string layer = "traversability";
   double azimuth_rad = -1.0;
   double elevation_rad = 0.6;
   std::optional<int> level;
@@ -61,6 +63,31 @@ absl::StatusOr<picture::Overlay> OverlayOf(Context& context, const RenderOptions
   return overlay;
 }
 
+// Every class that surfaces have, by the map's table.
+absl::StatusOr<picture::ClassStyles> StylesOf(Context& context,
+                                              const std::string& map,
+                                              const std::vector<SurfaceTile>& tiles) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes,
+                          context.database.maps().ListClasses(context.call, map));
+  picture::ClassStyles styles;
+  for (const SurfaceTile& tile : tiles) {
+    for (const Surface& surface : tile.surfaces) {
+      const std::uint8_t id = surface.class_id;
+      if (id == 0 || styles.contains(id)) continue;
+      const MapClass map_class = ClassOf(classes, id);
+      styles[id] = {map_class.name, map_class.colour};
+    }
+  }
+  return styles;
+}
+
+Json LegendJson(const picture::ClassStyles& styles) {
+  Json legend = Json::array();
+  for (const auto& [id, style] : styles)
+    legend.push_back(ToJson(MapClass{id, style.name, style.colour}));
+  return legend;
+}
+
 absl::Status Render(Context& context, RenderOptions options) {
   if (options.view == "oblique") {
     options.picture.azimuth_rad = options.azimuth_rad;
@@ -78,25 +105,31 @@ absl::Status Render(Context& context, RenderOptions options) {
   const double cell = info.parameters.mls.cell_size_m;
   const std::int32_t level = options.level.value_or(LevelFor(stats, cell, options.picture));
   STRATA_ASSIGN_OR_RETURN(const FetchedTiles fetched, FetchTiles(context, options.map, level));
+  if (options.layer == "class") {
+    STRATA_ASSIGN_OR_RETURN(options.picture.classes, StylesOf(context, options.map, fetched.tiles));
+  }
   STRATA_ASSIGN_OR_RETURN(const picture::Overlay overlay, OverlayOf(context, options));
   const picture::Picture picture = picture::DrawMap(
       fetched.tiles, cell * static_cast<double>(1 << level), paths, options.picture, overlay);
   STRATA_ASSIGN_OR_RETURN(const std::string png, picture::PngBytes(picture.image));
   STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, png));
   const picture::Camera& camera = picture.camera;
-  context.output.Object({{"file", options.out},
-                         {"view", options.view},
-                         {"width", picture.image.width},
-                         {"height", picture.image.height},
-                         {"legend_height", picture::kLegendPixels},
-                         {"metres_per_pixel", camera.metres_per_pixel},
-                         {"centre", ToJson(camera.centre)},
-                         {"right", ToJson(camera.right)},
-                         {"up", ToJson(camera.up)},
-                         {"level", level},
-                         {"tiles", fetched.tiles.size()},
-                         {"paths", paths.size()},
-                         {"lines", overlay.strokes.size()}});
+  context.output.Object(
+      {{"file", options.out},
+       {"view", options.view},
+       {"layer", options.layer},
+       {"classes", LegendJson(options.picture.classes.value_or(picture::ClassStyles()))},
+       {"width", picture.image.width},
+       {"height", picture.image.height},
+       {"legend_height", picture::kLegendPixels},
+       {"metres_per_pixel", camera.metres_per_pixel},
+       {"centre", ToJson(camera.centre)},
+       {"right", ToJson(camera.right)},
+       {"up", ToJson(camera.up)},
+       {"level", level},
+       {"tiles", fetched.tiles.size()},
+       {"paths", paths.size()},
+       {"lines", overlay.strokes.size()}});
   return fetched.damage;
 }
 
@@ -143,7 +176,8 @@ void AddMapRender(Commands& commands, CLI::App* noun) {
   CLI::App* render = commands.Verb(
       noun,
       "render",
-      "Draw a map: traversable yellow, horizontal but not traversable red, vertical blue",
+      "Draw a map: traversable yellow, horizontal but not traversable red, vertical blue; or "
+      "every class in its colour",
       "strata map render campus campus.png --view oblique --path route.ply",
       [options](Context& context) { return Render(context, *options); });
   AddMapName(render, options->map);
@@ -176,6 +210,9 @@ void AddMapRender(Commands& commands, CLI::App* noun) {
   render->add_flag("--constraints",
                    options->constraints,
                    "What holds the scans together, coloured by how well the poses keep it");
+  render->add_option("--layer", options->layer, "What the colours of surfaces say")
+      ->check(CLI::IsMember({"traversability", "class"}))
+      ->capture_default_str();
   AddViewOptions(render, options);
 }
 

@@ -1,13 +1,17 @@
 // strata plan
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_split.h"
 
 #include "client/cli/arguments.h"
 #include "client/cli/command.h"
@@ -15,6 +19,7 @@
 #include "client/cli/number_file.h"
 #include "client/cli/path_file.h"
 #include "core/common/status.h"
+#include "core/world/map_class.h"
 
 namespace strata::cli {
 namespace {
@@ -26,8 +31,29 @@ struct PlanOptions {
   std::string queries_file;
   std::string profile = std::string(api::kDefaultProfile);
   ProfileOverrides overrides;
+  std::vector<std::string> avoid;  // CLASS=FACTOR or CLASS=never
   std::string out;
 };
+
+// Classes by the map's table.
+absl::StatusOr<ClassCosts> ClassCostsOf(Context& context, const PlanOptions& options) {
+  ClassCosts costs;
+  if (options.avoid.empty()) return costs;
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes,
+                          context.database.maps().ListClasses(context.call, options.map));
+  for (const std::string& text : options.avoid) {
+    const std::pair<std::string, std::string> sides = absl::StrSplit(text, absl::MaxSplits('=', 1));
+    double factor = kForbiddenClass;
+    if (sides.second != "never" && !absl::SimpleAtod(sides.second, &factor)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("--avoid ", text, ": expected CLASS=FACTOR or CLASS=never"));
+    }
+    STRATA_ASSIGN_OR_RETURN(const std::uint16_t id, ClassIdOf(classes, sides.first));
+    costs[id] = factor;
+  }
+  STRATA_RETURN_IF_ERROR(ValidateClassCosts(costs));
+  return costs;
+}
 
 absl::StatusOr<RobotProfile> ProfileOf(Context& context, const PlanOptions& options) {
   STRATA_ASSIGN_OR_RETURN(const auto profiles,
@@ -66,6 +92,7 @@ void PrintText(const PlanResult& plan, Output& output) {
 
 absl::Status PlanOne(Context& context, PlanOptions options) {
   STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options));
+  STRATA_ASSIGN_OR_RETURN(options.query.class_costs, ClassCostsOf(context, options));
   options.query.from.level = options.from_level;
   options.query.to.level = options.to_level;
   STRATA_ASSIGN_OR_RETURN(
@@ -96,6 +123,7 @@ Json Refused(const absl::Status& status) {
 absl::Status PlanMany(Context& context, PlanOptions options) {
   STRATA_ASSIGN_OR_RETURN(const auto rows, ReadNumberFile(options.queries_file, 6, 6));
   STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options));
+  STRATA_ASSIGN_OR_RETURN(options.query.class_costs, ClassCostsOf(context, options));
   absl::Status first_error;
   for (const std::vector<double>& row : rows) {
     options.query.from = {.x_m = row[0], .y_m = row[1], .z_m = row[2], .level = {}};
@@ -165,7 +193,9 @@ void AddPlanCommand(Commands& commands) {
       commands.Verb(&commands.root,
                     "plan",
                     "A path for a robot, or the reason why there is none",
-                    "strata plan campus --from -14,0,0 --to 20,5,0 --radius 0.4 --out path.ply",
+                    "strata plan campus --from -14,0,0 --to 20,5,0 --radius 0.4 --out path.ply\n"
+                    "  strata plan campus --from -14,0 --to 20,5 --avoid vegetation=5 "
+                    "--avoid water=never",
                     [options](Context& context) {
                       return options->queries_file.empty() ? PlanOne(context, *options)
                                                            : PlanMany(context, *options);
@@ -175,6 +205,12 @@ void AddPlanCommand(Commands& commands) {
   verb->add_option("--profile", options->profile, "The map's robot profile to start from")
       ->capture_default_str();
   AddProfileOptions(verb, options->overrides);
+  verb->add_option("--avoid",
+                   options->avoid,
+                   "Surfaces of a class, by its name or id, cost so many times as much (1 to 100), "
+                   "or are never crossed; may be given several times")
+      ->type_name("CLASS=FACTOR|CLASS=never")
+      ->allow_extra_args(false);
   verb->add_option("--max-expanded", options->query.max_expanded, "Search limit: patches looked at")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();

@@ -353,7 +353,7 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
           options->format,
           "Format of the scans; auto: by content or ending (.pcd .ply .bin .vtk .3d .xyz .csv "
           ".asc .pts, .txt if named)")
-      ->check(CLI::IsMember({"auto", "3dtk", "pcd", "ply", "kitti", "vtk", "xyz"}))
+      ->check(CLI::IsMember({"auto", "3dtk", "pcd", "ply", "kitti", "vtk", "xyz", "oakland"}))
       ->capture_default_str();
   import
       ->add_option(

@@ -1,4 +1,5 @@
 // strata surface
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <utility>
@@ -13,6 +14,7 @@
 #include "client/cli/json.h"
 #include "client/cli/number_file.h"
 #include "core/common/status.h"
+#include "core/world/map_class.h"
 
 namespace strata::cli {
 namespace {
@@ -23,11 +25,22 @@ struct SurfaceOptions {
   std::string points_file;
 };
 
+// Adds what the map calls the classes of surfaces.
+void NameClasses(const std::vector<MapClass>& classes, Json& column) {
+  for (Json& surface : column["surfaces"]) {
+    const auto id = surface["class"].get<std::uint16_t>();
+    surface["class_name"] = id == 0 ? Json() : Json(ClassOf(classes, id).name);
+  }
+}
+
 // JSON: a line for each place. Text: one table of all surfaces; places without any have no row.
-void Print(const std::vector<SurfaceColumn>& columns, Output& output) {
+void Print(const std::vector<SurfaceColumn>& columns,
+           const std::vector<MapClass>& classes,
+           Output& output) {
   Json rows = Json::array();
   for (const SurfaceColumn& column : columns) {
     Json json = ToJson(column);
+    NameClasses(classes, json);
     if (output.json()) {
       output.JsonLine(json);
       continue;
@@ -49,7 +62,7 @@ void Print(const std::vector<SurfaceColumn>& columns, Output& output) {
                {"sigma_m", "SIGMA"},
                {"depth_m", "DEPTH"},
                {"traversability", "TRAVERSABILITY"},
-               {"class", "CLASS"},
+               {"class_name", "CLASS"},
                {"cost", "COST"}});
 }
 
@@ -64,7 +77,9 @@ absl::Status Run(Context& context, const SurfaceOptions& options) {
   STRATA_ASSIGN_OR_RETURN(
       const std::vector<SurfaceColumn> columns,
       context.database.planning().SampleSurfaces(context.call, options.map, places));
-  Print(columns, context.output);
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes,
+                          context.database.maps().ListClasses(context.call, options.map));
+  Print(columns, classes, context.output);
   return absl::OkStatus();
 }
 

@@ -49,6 +49,9 @@ constexpr NamedMeaning kNames[] = {
     {"label_id", Meaning::kLabel},
     {"class", Meaning::kLabel},
     {"classification", Meaning::kLabel},
+    {"scalar_label", Meaning::kLabel},  // as CloudCompare writes them
+    {"scalar_class", Meaning::kLabel},
+    {"scalar_classification", Meaning::kLabel},
 };
 
 constexpr double kFarMetres = 1000.0;
@@ -137,7 +140,11 @@ void CloudBuilder::Add(const double* values) {
   if (Has(Meaning::kIntensity)) {
     intensity_.push_back(static_cast<float>(value(Meaning::kIntensity)));
   }
-  if (Has(Meaning::kLabel)) label_.push_back(LabelOf(value(Meaning::kLabel)));
+  if (Has(Meaning::kLabel)) {
+    const double label = value(Meaning::kLabel);
+    whole_labels_ = whole_labels_ && (label == std::floor(label) || !std::isfinite(label));
+    label_.push_back(LabelOf(label));
+  }
   if (!has_colour_) return;
   if (Has(Meaning::kPackedColour)) {
     const auto bits = static_cast<std::uint32_t>(value(Meaning::kPackedColour));
@@ -189,7 +196,7 @@ absl::StatusOr<PointCloud> CloudBuilder::Build() && {
   cloud.rows = rows_;
   cloud.columns = columns_;
   cloud.intensity = std::move(intensity_);
-  cloud.label = std::move(label_);
+  if (whole_labels_) cloud.label = std::move(label_);
   if (!sensor_origin_.isZero(0.0)) {
     cloud.sensor_origin = (sensor_origin_ - cloud.origin).cast<float>();
   }

@@ -57,7 +57,8 @@ class CloudBuilder {
   // no sensor stood there, and `origin` is the box's centre rounded to 1 m. `sensor_origin` is what
   // was set; else the zero of the file's coordinates, or, with an origin, the origin itself.
   // Colours come in 0–255, 0–65535 or, with fractions, 0–1, and are scaled to 8 bits; labels
-  // outside 0–65535 become 0. INVALID_ARGUMENT without any finite point, or as ValidateCloud.
+  // that are not in 0–65535 become 0, and a column of labels with fractions is none and is left
+  // out. INVALID_ARGUMENT without any finite point, or as ValidateCloud.
   absl::StatusOr<PointCloud> Build() &&;
 
  private:
@@ -73,6 +74,7 @@ class CloudBuilder {
   std::vector<float> intensity_;
   std::vector<Eigen::Vector3f> colour_;
   std::vector<std::uint16_t> label_;
+  bool whole_labels_ = true;
   std::size_t added_ = 0;  // finite or not
   std::uint32_t rows_ = 0;
   std::uint32_t columns_ = 0;

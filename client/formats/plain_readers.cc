@@ -54,6 +54,13 @@ std::vector<Meaning> UnnamedColumns(std::size_t columns) {
   }
 }
 
+std::vector<Meaning> OaklandColumns(std::size_t columns) {
+  std::vector<Meaning> meanings = UnnamedColumns(std::max<std::size_t>(columns, 8));
+  meanings[3] = Meaning::kLabel;
+  meanings.resize(columns);
+  return meanings;
+}
+
 std::vector<Meaning> NamedColumns(const std::vector<absl::string_view>& names, std::size_t first) {
   std::vector<Meaning> meanings;
   for (std::size_t i = first; i < names.size(); ++i) meanings.push_back(MeaningOf(names[i]));
@@ -93,8 +100,11 @@ bool IsName(absl::string_view word) {
 // Reads the points of a text, finding out at its beginning what the columns are.
 class ColumnText {
  public:
-  explicit ColumnText(absl::string_view bytes)
-      : cursor_(absl::StripPrefix(bytes, kByteOrderMark)) {}
+  using Columns = std::vector<Meaning> (*)(std::size_t count);
+
+  // `unnamed`: what so many columns are if the text names none.
+  ColumnText(absl::string_view bytes, Columns unnamed)
+      : cursor_(absl::StripPrefix(bytes, kByteOrderMark)), unnamed_(unnamed) {}
 
   absl::StatusOr<PointCloud> Read() {
     while (const std::optional<absl::string_view> line = cursor_.NextLine()) {
@@ -138,7 +148,7 @@ class ColumnText {
 
   absl::Status AddPoint(const std::vector<double>& numbers) {
     if (!builder_.has_value()) {
-      if (meanings_.empty()) meanings_ = UnnamedColumns(numbers.size());
+      if (meanings_.empty()) meanings_ = unnamed_(numbers.size());
       absl::StatusOr<CloudBuilder> builder = CloudBuilder::Create(meanings_);
       if (!builder.ok()) return cursor_.Error(builder.status().message());
       builder_ = *std::move(builder);
@@ -152,13 +162,20 @@ class ColumnText {
   }
 
   TextCursor cursor_;
+  const Columns unnamed_;
   std::vector<Meaning> meanings_;
   std::optional<CloudBuilder> builder_;
 };
 
 }  // namespace
 
-absl::StatusOr<PointCloud> ReadXyz(absl::string_view bytes) { return ColumnText(bytes).Read(); }
+absl::StatusOr<PointCloud> ReadXyz(absl::string_view bytes) {
+  return ColumnText(bytes, UnnamedColumns).Read();
+}
+
+absl::StatusOr<PointCloud> ReadOakland(absl::string_view bytes) {
+  return ColumnText(bytes, OaklandColumns).Read();
+}
 
 absl::StatusOr<PointCloud> ReadKitti(absl::string_view bytes) {
   constexpr std::size_t kPointBytes = 16;

@@ -17,6 +17,10 @@ namespace strata {
 // first three count. INVALID_ARGUMENT with the line.
 absl::StatusOr<PointCloud> ReadXyz(absl::string_view bytes);
 
+// The same, of the Oakland 3-D point clouds (Munoz et al. 2009): without names the columns are x y
+// z label confidence, and after them may come more that do not count.
+absl::StatusOr<PointCloud> ReadOakland(absl::string_view bytes);
+
 // x y z reflectance, float32 little-endian, metres, x forward, z up. INVALID_ARGUMENT unless the
 // size is a multiple of 16.
 absl::StatusOr<PointCloud> ReadKitti(absl::string_view bytes);

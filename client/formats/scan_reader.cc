@@ -34,6 +34,7 @@ constexpr NamedFormat kFormats[] = {
     {"kitti", ScanFormat::kKitti},
     {"vtk", ScanFormat::kVtk},
     {"xyz", ScanFormat::kXyz},
+    {"oakland", ScanFormat::kOakland},
 };
 
 constexpr NamedFormat kEndings[] = {
@@ -42,6 +43,7 @@ constexpr NamedFormat kEndings[] = {
     {".ply", ScanFormat::kPly},
     {".bin", ScanFormat::kKitti},
     {".vtk", ScanFormat::kVtk},
+    {".xyz_label_conf", ScanFormat::kOakland},
     {".txt", ScanFormat::kXyz},
     {".csv", ScanFormat::kXyz},
     {".asc", ScanFormat::kXyz},
@@ -72,10 +74,13 @@ absl::StatusOr<PointCloud> Parse(absl::string_view bytes, ScanFormat format) {
       return ReadVtk(bytes);
     case ScanFormat::kXyz:
       return ReadXyz(bytes);
+    case ScanFormat::kOakland:
+      return ReadOakland(bytes);
     case ScanFormat::kAuto:
       break;
   }
-  return absl::InvalidArgumentError("unknown format; say which of 3dtk, pcd, ply, kitti, vtk, xyz");
+  return absl::InvalidArgumentError(
+      "unknown format; say which of 3dtk, pcd, ply, kitti, vtk, xyz, oakland");
 }
 
 }  // namespace
@@ -84,8 +89,10 @@ absl::StatusOr<ScanFormat> ParseScanFormat(absl::string_view name) {
   for (const NamedFormat& named : kFormats) {
     if (named.name == name) return named.format;
   }
-  return absl::InvalidArgumentError(absl::StrCat(
-      "scan format '", name.substr(0, 40), "' is none of auto, 3dtk, pcd, ply, kitti, vtk, xyz"));
+  return absl::InvalidArgumentError(
+      absl::StrCat("scan format '",
+                   name.substr(0, 40),
+                   "' is none of auto, 3dtk, pcd, ply, kitti, vtk, xyz, oakland"));
 }
 
 absl::string_view ScanFormatName(ScanFormat format) {
@@ -97,11 +104,10 @@ absl::string_view ScanFormatName(ScanFormat format) {
 
 ScanFormat ScanFormatOfName(const std::filesystem::path& path) {
   const std::string ending = absl::AsciiStrToLower(path.extension().string());
-  if (absl::StartsWith(ending, ".xyz")) return ScanFormat::kXyz;
   for (const NamedFormat& named : kEndings) {
     if (named.name == ending) return named.format;
   }
-  return ScanFormat::kAuto;
+  return absl::StartsWith(ending, ".xyz") ? ScanFormat::kXyz : ScanFormat::kAuto;
 }
 
 absl::StatusOr<PointCloud> ReadScan(const std::filesystem::path& path, ScanFormat format) {

@@ -12,14 +12,15 @@
 
 namespace strata {
 
-enum class ScanFormat : std::uint8_t { kAuto, k3dtk, kPcd, kPly, kKitti, kVtk, kXyz };
+enum class ScanFormat : std::uint8_t { kAuto, k3dtk, kPcd, kPly, kKitti, kVtk, kXyz, kOakland };
 
-// "auto", "3dtk", "pcd", "ply", "kitti", "vtk", "xyz"; INVALID_ARGUMENT listing them otherwise.
+// "auto", "3dtk", "pcd", "ply", "kitti", "vtk", "xyz", "oakland"; INVALID_ARGUMENT listing them
+// otherwise.
 absl::StatusOr<ScanFormat> ParseScanFormat(absl::string_view name);
 absl::string_view ScanFormatName(ScanFormat format);
 
 // The format of a file by its name: .pcd, .ply, .bin (KITTI), .3d (3DTK), .vtk, and .xyz…, .txt,
-// .csv, .asc, .pts (text); kAuto for any other.
+// .csv, .asc, .pts (text), and of those .xyz_label_conf (Oakland); kAuto for any other.
 ScanFormat ScanFormatOfName(const std::filesystem::path& path);
 
 // The cloud of a file, in metres, z up; kAuto goes by the first bytes (PCD, PLY and VTK say what

@@ -129,6 +129,16 @@ bool Reached(const SearchSpace& space, const SearchWorkspace& workspace, PatchId
   return nodes != nullptr && workspace.Reached(nodes[patch - space.slots()[slot].base]);
 }
 
+// True if the ground allows the move, whatever classes cost.
+bool HasMove(const SearchSpace& space, PatchId patch, int direction) {
+  const SearchSpace::Slot& slot = space.SlotOfPatch(patch);
+  return slot.tile->moves[patch - slot.base][direction].cost != Move::kNone;
+}
+
+Explanation OfClass(const SearchSpace& space, PatchId patch) {
+  return {Obstruction::kClass, static_cast<double>(space.ClassOf(patch)), space.Position(patch)};
+}
+
 struct RefusedMove {
   PatchId patch = kNoPatchId;
   int direction = 0;
@@ -148,13 +158,14 @@ class Frontier {
   std::vector<PatchId> Patches(const Eigen::Vector3d& goal) const {
     std::vector<std::tuple<double, double, double, double, PatchId>> ranked;
     for (std::size_t slot = 0; slot < space_.slots().size(); ++slot) {
-      const SearchSpace::Slot& s = space_.slots()[slot];
-      const SearchNode* nodes = reached_.NodesIfAny(static_cast<int>(slot), s.tile->size());
+      const PatchId base = space_.slots()[slot].base;
+      const std::uint32_t size = space_.slots()[slot].tile->size();
+      const SearchNode* nodes = reached_.NodesIfAny(static_cast<int>(slot), size);
       if (nodes == nullptr) continue;
-      for (std::uint32_t i = 0; i < s.tile->size(); ++i) {
-        if (!reached_.Reached(nodes[i]) || !HasRefusedMove(*s.tile, i)) continue;
-        const Eigen::Vector3d p = space_.Position(s.base + i);
-        ranked.emplace_back((p - goal).squaredNorm(), p.x(), p.y(), p.z(), s.base + i);
+      for (std::uint32_t i = 0; i < size; ++i) {
+        if (!reached_.Reached(nodes[i]) || !HasRefusedMove(base + i)) continue;
+        const Eigen::Vector3d p = space_.Position(base + i);
+        ranked.emplace_back((p - goal).squaredNorm(), p.x(), p.y(), p.z(), base + i);
       }
     }
     std::sort(ranked.begin(), ranked.end());
@@ -166,11 +177,10 @@ class Frontier {
 
   // Refused directions, that towards the goal first.
   std::vector<int> Refused(PatchId patch, const Eigen::Vector3d& goal) const {
-    const SearchSpace::Slot& slot = space_.SlotOfPatch(patch);
     const Eigen::Vector2d towards = (goal - space_.Position(patch)).head<2>();
     std::vector<std::pair<double, int>> ranked;
     for (int k = 0; k < 8; ++k) {
-      if (slot.tile->moves[patch - slot.base][k].cost != Move::kNone) continue;
+      if (!IsRefused(patch, k)) continue;
       const Eigen::Vector2d step(kStepX[k], kStepY[k]);
       ranked.emplace_back(-towards.dot(step.normalized()), k);
     }
@@ -221,10 +231,20 @@ class Frontier {
   }
 
  private:
-  static bool HasRefusedMove(const PreparedTile& tile, std::uint32_t patch) {
-    const auto& moves = tile.moves[patch];
-    return std::any_of(
-        moves.begin(), moves.end(), [](const Move& m) { return m.cost == Move::kNone; });
+  // The ground refuses, or a forbidden class.
+  bool IsRefused(PatchId patch, int direction) const {
+    if (!HasMove(space_, patch, direction)) return true;
+    if (space_.classes().plain()) return false;
+    std::uint32_t cost = 0;
+    int cells = 0;
+    return space_.Follow(patch, direction, &cost, &cells) == kNoPatchId;
+  }
+
+  bool HasRefusedMove(PatchId patch) const {
+    for (int k = 0; k < 8; ++k) {
+      if (IsRefused(patch, k)) return true;
+    }
+    return false;
   }
 
   // The surface nearest to the level, if it is within the robot's height of it.
@@ -276,11 +296,15 @@ std::string Explanation::ToString() const {
   const absl::string_view unit = kind == Obstruction::kSlope ? "rad" : "m";
   const std::string at = absl::StrFormat("at (%.2f, %.2f, %.2f)", where.x(), where.y(), where.z());
   if (kind == Obstruction::kUnknown && value == 0.0) return "unknown ground " + at;
+  if (kind == Obstruction::kClass) return absl::StrFormat("forbidden class %.0f %s", value, at);
   return absl::StrFormat("%s of %.2f %s %s", strata::ToString(kind), value, unit, at);
 }
 
 absl::StatusOr<Explanation> WhyNotStand(SearchSpace& space, PatchId patch) {
   const SearchSpace::Slot& slot = space.SlotOfPatch(patch);
+  if (slot.tile->CanStand(patch - slot.base) && space.Danger(patch) < 0.0F) {
+    return OfClass(space, patch);
+  }
   STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles,
                           LoadAround(space.source(), slot.tile->key));
   const TileReasons reasons(space, slot, tiles);
@@ -293,6 +317,13 @@ absl::StatusOr<Explanation> WhyNoFurther(SearchSpace& space,
                                          const Stop& stop) {
   STRATA_ASSIGN_OR_RETURN(const RefusedMove move, ChooseMove(space, workspace, goal, stop));
   if (move.patch == kNoPatchId) return Explanation{};
+  if (HasMove(space, move.patch, move.direction)) {
+    std::uint32_t cost = 0;
+    int cells = 0;
+    const PatchId target = space.FollowGround(move.patch, move.direction, &cost, &cells);
+    STRATA_RETURN_IF_ERROR(space.status());
+    if (target != kNoPatchId) return OfClass(space, target);
+  }
   const SearchSpace::Slot& slot = space.SlotOfPatch(move.patch);
   STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles,
                           LoadAround(space.source(), slot.tile->key));

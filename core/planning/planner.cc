@@ -14,6 +14,7 @@
 
 #include "core/common/status.h"
 #include "core/common/stop.h"
+#include "core/planning/class_factors.h"
 #include "core/planning/endpoint.h"
 #include "core/planning/explain.h"
 #include "core/planning/landmarks.h"
@@ -132,11 +133,12 @@ absl::StatusOr<PlanResult> Planner::Plan(TileSource& source,
   STRATA_RETURN_IF_ERROR(stop.status());
   STRATA_RETURN_IF_ERROR(ValidateEndpoint("from", query.from, options_.cell_size_m));
   STRATA_RETURN_IF_ERROR(ValidateEndpoint("to", query.to, options_.cell_size_m));
+  STRATA_RETURN_IF_ERROR(ValidateClassCosts(query.class_costs));
   STRATA_ASSIGN_OR_RETURN(const ProfileChecks checks,
                           MakeProfileChecks(query.profile, options_.cell_size_m));
   const std::shared_ptr<const Landmarks> landmarks = LandmarksFor(source, query.profile);
   WorkspaceLoan loan(*this);
-  SearchSpace space(cache_, source, checks);
+  SearchSpace space(cache_, source, checks, ClassFactors(query.class_costs));
   absl::StatusOr<PlanResult> result = Answer(space, query, landmarks.get(), loan.workspace(), stop);
   if (result.ok()) result->elapsed_ms = absl::ToDoubleMilliseconds(absl::Now() - begin);
   return result;

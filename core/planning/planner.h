@@ -9,7 +9,9 @@
 // of unobserved cells between fitting rims. Where a robot may stand and move grows with max_step,
 // max_slope and max_gap, and as radius and height shrink (see ground_checks.h). A move of length l
 // costs l · (1 + danger), the mean of both ends' danger (core/planning/profile_checks.h), plus
-// kGapDanger over unobserved ground.
+// kGapDanger over unobserved ground. A query may bring costs of classes: a move is then multiplied
+// by the mean factor of both ends' classes, and forbidden classes are no place to stand; what
+// bounds costs without classes stays a lower bound, and nothing is prepared anew.
 //
 // What is prepared, when a query first touches a tile, and kept while it fits the cache:
 //   - per tile: local planes (12 bytes a patch), shared by all profiles;
@@ -53,7 +55,8 @@ class Planner {
   // start or goal where the robot cannot stand moves to the nearest place on the same level, at
   // most radius + max_gap away (core/planning/endpoint.h); the path begins or ends there and the
   // message says so ("start moved 0.32 m to ..."). Fills all of PlanResult but `epoch`.
-  //   INVALID_ARGUMENT    query not finite or beyond the map's range, profile out of range
+  //   INVALID_ARGUMENT    query not finite or beyond the map's range, profile or class costs out of
+  //                       range
   //   CANCELLED, DEADLINE_EXCEEDED   by `stop`
   //   errors of `source`
   absl::StatusOr<PlanResult> Plan(TileSource& source, const PlanQuery& query, const Stop& stop);

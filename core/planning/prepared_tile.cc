@@ -178,7 +178,7 @@ std::size_t PreparedTile::memory_bytes() const {
   return sizeof(*this) + moves.capacity() * sizeof(moves[0]) +
          far_moves.capacity() * sizeof(FarMove) + cell.capacity() * sizeof(cell[0]) +
          z_m.capacity() * sizeof(float) + danger.capacity() * sizeof(float) +
-         edge_distance.capacity();
+         edge_distance.capacity() + class_id.capacity();
 }
 
 std::uint32_t MoveCost(double run_m, double rise_m, double danger, double cell_size_m) {
@@ -194,6 +194,20 @@ PreparedTile PrepareTile(const TileKey& key,
                          const std::vector<GroundFit>& fits,
                          const ProfileChecks& checks) {
   return Preparation(window, checks).Run(key, fits);
+}
+
+std::vector<std::uint8_t> ClassesOf(const PreparedTile& tile, const SurfaceTile& surfaces) {
+  const auto has_class = [](const Surface& surface) { return surface.class_id != 0; };
+  if (std::none_of(surfaces.surfaces.begin(), surfaces.surfaces.end(), has_class)) return {};
+  std::vector<std::uint8_t> classes;
+  classes.reserve(tile.size());
+  while (classes.size() < tile.size()) {
+    // Patches of a cell follow each other, lowest first, as its surfaces do.
+    for (const Surface& surface : surfaces.Cell(tile.cell[classes.size()])) {
+      classes.push_back(surface.class_id);
+    }
+  }
+  return classes;
 }
 
 }  // namespace strata

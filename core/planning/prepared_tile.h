@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/ground_fit.h"
 #include "core/planning/ground_window.h"
@@ -38,7 +39,7 @@ struct FarMove {
 };
 
 // Patches are numbered along a Morton curve over the tile's cells, lowest first within a cell, so
-// that what a search touches together lies together. 45 bytes a patch. Immutable.
+// that what a search touches together lies together. 45 bytes a patch, 46 with classes. Immutable.
 struct PreparedTile {
   TileKey key;
   std::vector<std::array<Move, 8>> moves;
@@ -47,12 +48,14 @@ struct PreparedTile {
   std::vector<float> z_m;
   std::vector<float> danger;                      // < 0: the robot cannot stand there
   std::vector<std::uint8_t> edge_distance;        // ⌊255 · EdgeDistance / reach⌋
+  std::vector<std::uint8_t> class_id;             // empty where no surface has a class
   std::array<std::uint32_t, 1025> block_begin{};  // first patch of each 8 × 8 block of cells
 
   static constexpr std::uint32_t kNoPatch = 0xFFFFFFFFU;
 
   std::uint32_t size() const { return static_cast<std::uint32_t>(cell.size()); }
   bool CanStand(std::uint32_t patch) const { return danger[patch] >= 0.0F; }
+  std::uint8_t ClassOf(std::uint32_t patch) const { return class_id.empty() ? 0 : class_id[patch]; }
   // Patches of a cell: [first, first + count).
   void FindCell(std::uint16_t cell_in_tile, std::uint32_t* first, std::uint32_t* count) const;
   const FarMove& Far(std::uint32_t patch, int direction) const;
@@ -69,6 +72,9 @@ PreparedTile PrepareTile(const TileKey& key,
                          const GroundWindow& window,
                          const std::vector<GroundFit>& fits,
                          const ProfileChecks& checks);
+
+// The class of each patch of `tile`, which was prepared from `surfaces`; empty if none has one.
+std::vector<std::uint8_t> ClassesOf(const PreparedTile& tile, const SurfaceTile& surfaces);
 
 }  // namespace strata
 

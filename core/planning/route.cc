@@ -22,11 +22,17 @@ namespace {
 struct Sample {
   Eigen::Vector3d position;
   double danger = 0.0;
+  double class_factor = 1.0;
   PatchId patch = 0;
 };
 
+Sample SampleAt(const SearchSpace& space, PatchId patch, const Eigen::Vector3d& position) {
+  return {position, space.Danger(patch), space.ClassFactor(patch), patch};
+}
+
 double CostBetween(const Sample& a, const Sample& b, double extra_danger) {
-  return (b.position - a.position).norm() * (1.0 + 0.5 * (a.danger + b.danger) + extra_danger);
+  return (b.position - a.position).norm() * (1.0 + 0.5 * (a.danger + b.danger) + extra_danger) *
+         0.5 * (a.class_factor + b.class_factor);
 }
 
 int DirectionOf(int dx, int dy) {
@@ -104,7 +110,7 @@ class RouteMaker {
 
  private:
   void AddOriginal(PatchId patch) {
-    original_.push_back({space_.Position(patch), space_.Danger(patch), patch});
+    original_.push_back(SampleAt(space_, patch, space_.Position(patch)));
     double extra = 0.0;
     double cost = 0.0;
     if (original_.size() > 1) {
@@ -190,7 +196,7 @@ class RouteMaker {
       if (patch == kNoPatchId || cells != 1) return false;
       Eigen::Vector3d position = from + walk.middle() * along;
       position.z() = space_.Height(patch);
-      line->push_back({position, space_.Danger(patch), patch});
+      line->push_back(SampleAt(space_, patch, position));
       cost += CostBetween(*last, line->back(), 0.0);
       if (cost > allowed) return false;
       last = &line->back();

@@ -18,7 +18,7 @@ inline constexpr double kWaypointToleranceM = 0.05;
 struct Route {
   std::vector<Eigen::Vector3d> waypoints;
   double length_m = 0.0;  // of the waypoints
-  double cost_m = 0.0;    // Σ length · (1 + danger) over the surfaces crossed
+  double cost_m = 0.0;    // Σ length · (1 + danger) · class factor, of the surfaces
   std::vector<PlanGap> gaps;
   std::vector<TileKey> tiles;  // sorted
 };

@@ -109,7 +109,8 @@ class LandmarkBound {
   std::array<const std::uint32_t*, kAsked> costs_;  // of the tile entered
 };
 
-template <typename Bound>
+// `kByClass`: moves cost by the classes of both ends too; otherwise nobody asks for classes.
+template <typename Bound, bool kByClass>
 class Search {
  public:
   Search(SearchSpace& space, SearchWorkspace& workspace, Bound bound, const Stop& stop)
@@ -136,6 +137,7 @@ class Search {
       }
     }
     STRATA_RETURN_IF_ERROR(space_.status());
+    outcome.dearest = dearest_;
     if (goal_cost_ != kMaxCost) {
       outcome.end = SearchOutcome::End::kFound;
       outcome.cost = goal_cost_;
@@ -144,8 +146,6 @@ class Search {
     }
     return outcome;
   }
-
-  PatchId dearest() const { return dearest_; }
 
  private:
   void EnterSlot(int slot) {
@@ -192,6 +192,7 @@ class Search {
     }
     const std::uint32_t cost = node.cost;
     const std::array<Move, 8>& moves = tile_->moves[local];
+    const std::uint8_t own_class = kByClass ? tile_->ClassOf(local) : std::uint8_t{0};
     unsigned far = 0;
     for (int k = 0; k < 8; ++k) {
       const Move move = moves[k];
@@ -200,22 +201,34 @@ class Search {
         far |= 1U << k;
         continue;
       }
-      Relax(local + move.delta, cost + move.cost, k);
+      RelaxMove(own_class, local + move.delta, cost, move.cost, k);
     }
     if (far != 0) ExpandFar(local, cost, far);
     return true;
   }
 
+  // Offers a way to patch `local` of the slot entered by a move from a patch of class `from`.
+  void RelaxMove(
+      std::uint8_t from, std::uint32_t local, std::uint32_t cost, std::uint32_t move, int k) {
+    if constexpr (kByClass) {
+      const std::uint8_t to = tile_->ClassOf(local);
+      if (space_.classes().Forbidden(to)) return;
+      move = space_.classes().Scaled(move, from, to);
+    }
+    Relax(local, cost + move, k);
+  }
+
   void ExpandFar(std::uint32_t local, std::uint32_t cost, unsigned directions) {
     const int own_slot = slot_;
     const PreparedTile& tile = *tile_;
+    const std::uint8_t own_class = kByClass ? tile.ClassOf(local) : std::uint8_t{0};
     for (int k = 0; k < 8; ++k) {
       if ((directions >> k & 1U) == 0) continue;
       const FarMove& move = tile.Far(local, k);
       const PatchId target = space_.Resolve(space_.slots()[own_slot], move);
       if (target == kNoPatchId) continue;
       EnterSlot(space_.SlotOf(target));
-      Relax(target - base_, cost + move.cost, k);
+      RelaxMove(own_class, target - base_, cost, move.cost, k);
     }
   }
 
@@ -249,6 +262,20 @@ class Search {
   std::int32_t y0_ = 0;
   SearchNode* nodes_ = nullptr;
 };
+
+template <typename Bound>
+absl::StatusOr<SearchOutcome> RunSearch(SearchSpace& space,
+                                        SearchWorkspace& workspace,
+                                        const Bound& bound,
+                                        PatchId start,
+                                        PatchId goal,
+                                        std::uint64_t max_expanded,
+                                        const Stop& stop) {
+  if (space.classes().plain()) {
+    return Search<Bound, false>(space, workspace, bound, stop).Run(start, goal, max_expanded);
+  }
+  return Search<Bound, true>(space, workspace, bound, stop).Run(start, goal, max_expanded);
+}
 
 }  // namespace
 
@@ -291,20 +318,21 @@ absl::StatusOr<SearchOutcome> FindPath(SearchSpace& space,
                                        const Stop& stop) {
   if (landmarks != nullptr && LandmarkBound::Measured(space, *landmarks, start) &&
       LandmarkBound::Measured(space, *landmarks, goal)) {
-    return Search(space, workspace, LandmarkBound(space, *landmarks, start, goal), stop)
-        .Run(start, goal, max_expanded);
+    const LandmarkBound bound(space, *landmarks, start, goal);
+    return RunSearch(space, workspace, bound, start, goal, max_expanded, stop);
   }
-  return Search(space, workspace, OctileBound{space.CellOfPatch(goal)}, stop)
-      .Run(start, goal, max_expanded);
+  const OctileBound bound{space.CellOfPatch(goal)};
+  return RunSearch(space, workspace, bound, start, goal, max_expanded, stop);
 }
 
 absl::StatusOr<PatchId> ReachAll(SearchSpace& space,
                                  PatchId start,
                                  SearchWorkspace& workspace,
                                  const Stop& stop) {
-  Search search(space, workspace, NoBound{}, stop);
-  STRATA_RETURN_IF_ERROR(search.Run(start, kNoPatchId, UINT64_MAX).status());
-  return search.dearest();
+  STRATA_ASSIGN_OR_RETURN(
+      const SearchOutcome outcome,
+      RunSearch(space, workspace, NoBound{}, start, kNoPatchId, UINT64_MAX, stop));
+  return outcome.dearest;
 }
 
 }  // namespace strata

@@ -50,13 +50,14 @@ struct SearchOutcome {
   enum class End : std::uint8_t { kFound, kExhausted, kLimit };
   End end = End::kExhausted;
   std::uint64_t expanded = 0;
-  std::uint32_t cost = 0;     // of the path
-  std::vector<PatchId> path;  // start to goal
+  std::uint32_t cost = 0;        // of the path
+  std::vector<PatchId> path;     // start to goal
+  PatchId dearest = kNoPatchId;  // the patch expanded that was the most expensive to reach
 };
 
 // The cheapest path from `start` to `goal`, both places where the robot can stand. `landmarks`
-// (optional) must fit the space's source and profile. CANCELLED and DEADLINE_EXCEEDED by `stop`;
-// errors of the source.
+// (optional) must fit the space's source and profile; costs of classes only add to what they know.
+// CANCELLED and DEADLINE_EXCEEDED by `stop`; errors of the source.
 absl::StatusOr<SearchOutcome> FindPath(SearchSpace& space,
                                        PatchId start,
                                        PatchId goal,

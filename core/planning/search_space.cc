@@ -69,6 +69,16 @@ PatchId SearchSpace::Resolve(const Slot& slot, const FarMove& move) {
 }
 
 PatchId SearchSpace::Follow(PatchId patch, int direction, std::uint32_t* cost, int* cells) {
+  const PatchId target = FollowGround(patch, direction, cost, cells);
+  if (target == kNoPatchId || classes_.plain()) return target;
+  const std::uint8_t from = ClassOf(patch);
+  const std::uint8_t to = ClassOf(target);
+  if (classes_.Forbidden(from) || classes_.Forbidden(to)) return kNoPatchId;
+  *cost = classes_.Scaled(*cost, from, to);
+  return target;
+}
+
+PatchId SearchSpace::FollowGround(PatchId patch, int direction, std::uint32_t* cost, int* cells) {
   const Slot& slot = SlotOfPatch(patch);
   const Move move = slot.tile->moves[patch - slot.base][direction];
   if (move.cost == Move::kNone) return kNoPatchId;
@@ -97,7 +107,13 @@ float SearchSpace::Height(PatchId patch) const {
 
 float SearchSpace::Danger(PatchId patch) const {
   const Slot& slot = SlotOfPatch(patch);
+  if (classes_.Forbidden(slot.tile->ClassOf(patch - slot.base))) return -1.0F;
   return slot.tile->danger[patch - slot.base];
+}
+
+std::uint8_t SearchSpace::ClassOf(PatchId patch) const {
+  const Slot& slot = SlotOfPatch(patch);
+  return slot.tile->ClassOf(patch - slot.base);
 }
 
 float SearchSpace::EdgeDistance(PatchId patch) const {

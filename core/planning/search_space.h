@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "core/mls/tile_key.h"
+#include "core/planning/class_factors.h"
 #include "core/planning/prepared_tile.h"
 #include "core/planning/profile_checks.h"
 #include "core/planning/tile_cache.h"
@@ -33,11 +34,15 @@ class SearchSpace {
     std::int32_t y0 = 0;
   };
 
-  SearchSpace(TileCache& cache, TileSource& source, const ProfileChecks& checks)
-      : cache_(cache), source_(source), checks_(checks) {}
+  SearchSpace(TileCache& cache,
+              TileSource& source,
+              const ProfileChecks& checks,
+              const ClassFactors& classes = {})
+      : cache_(cache), source_(source), checks_(checks), classes_(classes) {}
 
   const absl::Status& status() const { return status_; }
   const ProfileChecks& checks() const { return checks_; }
+  const ClassFactors& classes() const { return classes_; }
   TileSource& source() const { return source_; }
   const std::vector<Slot>& slots() const { return slots_; }
   PatchId end() const { return static_cast<PatchId>(page_slot_.size()) << kPageShift; }
@@ -52,12 +57,19 @@ class SearchSpace {
 
   // Where a far move leads; kNoPatchId if its tile cannot be had.
   PatchId Resolve(const Slot& slot, const FarMove& move);
-  // Where a move in `direction` leads and what it costs; kNoPatchId if there is none.
+  // Where a move in `direction` leads and what it costs; kNoPatchId if there is none, or if it
+  // leads to a forbidden class.
   PatchId Follow(PatchId patch, int direction, std::uint32_t* cost, int* cells);
+  // The same whatever classes cost.
+  PatchId FollowGround(PatchId patch, int direction, std::uint32_t* cost, int* cells);
 
   CellIndex CellOfPatch(PatchId patch) const;
   float Height(PatchId patch) const;
-  float Danger(PatchId patch) const;  // < 0: the robot cannot stand there
+  // < 0: the robot cannot stand there, or its class is forbidden.
+  float Danger(PatchId patch) const;
+  std::uint8_t ClassOf(PatchId patch) const;
+  // By what its class multiplies costs.
+  double ClassFactor(PatchId patch) const { return classes_.Factor(ClassOf(patch)); }
   // Lower bound of the distance to the nearest edge [m].
   float EdgeDistance(PatchId patch) const;
   // Centre of the cell at the surface.
@@ -69,6 +81,7 @@ class SearchSpace {
   TileCache& cache_;
   TileSource& source_;
   const ProfileChecks& checks_;
+  const ClassFactors classes_;
   absl::Status status_;
   std::vector<Slot> slots_;
   std::vector<std::uint16_t> page_slot_;  // of each page of patch numbers

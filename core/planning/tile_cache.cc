@@ -65,6 +65,7 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Get(TileSource& s
   const GroundWindow window(tiles, checks.margin, checks.cell_size_m);
   const auto fits = Fits({key, versions, {}}, window);
   auto tile = std::make_shared<PreparedTile>(PrepareTile(key, window, *fits, checks));
+  tile->class_id = ClassesOf(*tile, *tiles[kMiddleTile]);
   entry->tile = tile;
   Account(cache_key, *entry, tile->memory_bytes(), false);
   return tile;

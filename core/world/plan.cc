@@ -1,8 +1,28 @@
 #include "core/world/plan.h"
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
 namespace strata {
+
+absl::Status ValidateClassCosts(const ClassCosts& costs) {
+  for (const auto& [id, factor] : costs) {
+    if (id < 1 || id > 255) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("class_costs: class ", id, " is not in [1, 255]"));
+    }
+    if (factor != kForbiddenClass && !(factor >= 1.0 && factor <= kMaxClassFactor)) {
+      return absl::InvalidArgumentError(absl::StrCat("class_costs: factor ",
+                                                     factor,
+                                                     " of class ",
+                                                     id,
+                                                     " is not in [1, ",
+                                                     kMaxClassFactor,
+                                                     "] and not forbidden"));
+    }
+  }
+  return absl::OkStatus();
+}
 
 absl::string_view ToString(PlanReason reason) {
   switch (reason) {
@@ -40,6 +60,8 @@ absl::string_view ToString(Obstruction obstruction) {
       return "roughness";
     case Obstruction::kUnknown:
       return "unknown";
+    case Obstruction::kClass:
+      return "class";
   }
   return "unknown";
 }

@@ -3,10 +3,13 @@
 #define STRATA_CORE_WORLD_PLAN_H_
 
 #include <cstdint>
+#include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 #include <Eigen/Core>
 
@@ -25,10 +28,21 @@ struct PlanEndpoint {
   std::optional<int> level = std::nullopt;
 };
 
+// By what the cost of crossing surfaces of a class is multiplied, by class id in [1, 255]: in
+// [1, kMaxClassFactor], or kForbiddenClass. Classes that are not there cost what their ground does.
+using ClassCosts = std::map<int, double>;
+inline constexpr double kMaxClassFactor = 100.0;
+// The robot's centre never is over a surface of the class.
+inline constexpr double kForbiddenClass = std::numeric_limits<double>::infinity();
+
+// INVALID_ARGUMENT naming the class whose id or factor is out of range.
+absl::Status ValidateClassCosts(const ClassCosts& costs);
+
 struct PlanQuery {
   PlanEndpoint from;
   PlanEndpoint to;
   RobotProfile profile;
+  ClassCosts class_costs = {};
   std::uint64_t max_expanded = 50'000'000;  // search limit
 };
 
@@ -51,6 +65,7 @@ enum class Obstruction : std::uint8_t {
   kObstacle = 5,   // value: height of what stands within the radius [m]
   kRoughness = 6,  // value: σ around the local plane [m]
   kUnknown = 7,    // value: width of the unobserved stretch [m]
+  kClass = 8,      // value: id of a forbidden class
 };
 
 // A stretch of unobserved cells that the path bridges.
@@ -66,7 +81,7 @@ struct PlanResult {
   std::string message;                     // for people, with numbers
   std::vector<Eigen::Vector3d> waypoints;  // on the surfaces, in the map frame; empty unless found
   double length_m = 0.0;
-  double cost = 0.0;  // Σ length · (1 + danger) [m]
+  double cost = 0.0;  // Σ length · (1 + danger) · factor of the class [m]
   // Cost of the cheapest path from patch to patch, before it was pulled straight; ≥ cost.
   double graph_cost = 0.0;
   std::vector<PlanGap> gaps;

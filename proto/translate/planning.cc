@@ -1,6 +1,8 @@
 #include "proto/translate/planning.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
@@ -23,6 +25,7 @@ static_assert(v1::PLAN_REASON_SEARCH_LIMIT ==
               static_cast<int>(PlanReason::kSearchLimit) + kReasonOffset);
 static_assert(v1::OBSTRUCTION_STEP == static_cast<int>(Obstruction::kStep));
 static_assert(v1::OBSTRUCTION_UNKNOWN == static_cast<int>(Obstruction::kUnknown));
+static_assert(v1::OBSTRUCTION_CLASS == static_cast<int>(Obstruction::kClass));
 static_assert(v1::TRAVERSABILITY_TRAVERSABLE == static_cast<int>(Traversability::kTraversable));
 static_assert(v1::TRAVERSABILITY_NON_TRAVERSABLE ==
               static_cast<int>(Traversability::kNonTraversable));
@@ -52,6 +55,22 @@ absl::StatusOr<PlanEndpoint> EndpointFromProto(const char* what, const v1::PlanE
         absl::StrCat(what, ": level ", *endpoint.level, " is below 0"));
   }
   return endpoint;
+}
+
+absl::StatusOr<ClassCosts> ClassCostsFromProto(const v1::PlanPathRequest& proto) {
+  constexpr std::uint32_t kMostId = 255;
+  ClassCosts costs;
+  for (const v1::ClassCost& cost : proto.class_costs()) {
+    const double factor = cost.forbidden() ? kForbiddenClass : cost.factor();
+    // A larger id is refused as 256, which is none either.
+    const auto id = static_cast<int>(std::min(cost.class_id(), kMostId + 1));
+    if (!costs.emplace(id, factor).second) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("class_costs: class ", cost.class_id(), " is there twice"));
+    }
+  }
+  STRATA_RETURN_IF_ERROR(ValidateClassCosts(costs));
+  return costs;
 }
 
 absl::StatusOr<std::optional<Eigen::Vector3d>> PlaceFromProto(const char* what,
@@ -124,6 +143,15 @@ v1::PlanPathRequest ToProto(absl::string_view map, const PlanQuery& query) {
   *proto.mutable_to() = EndpointToProto(query.to);
   *proto.mutable_profile() = ToProto(query.profile);
   proto.set_max_expanded(query.max_expanded);
+  for (const auto& [id, factor] : query.class_costs) {
+    v1::ClassCost& cost = *proto.add_class_costs();
+    cost.set_class_id(static_cast<std::uint32_t>(id));
+    if (factor == kForbiddenClass) {
+      cost.set_forbidden(true);
+    } else {
+      cost.set_factor(factor);
+    }
+  }
   return proto;
 }
 
@@ -133,6 +161,7 @@ absl::StatusOr<PlanQuery> FromProto(const v1::PlanPathRequest& proto) {
   STRATA_ASSIGN_OR_RETURN(query.to, EndpointFromProto("to", proto.to()));
   query.profile = FromProto(proto.profile());
   STRATA_RETURN_IF_ERROR(ValidateRobotProfile(query.profile));
+  STRATA_ASSIGN_OR_RETURN(query.class_costs, ClassCostsFromProto(proto));
   if (proto.has_max_expanded()) query.max_expanded = proto.max_expanded();
   return query;
 }

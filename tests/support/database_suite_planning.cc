@@ -1,4 +1,5 @@
 // Conformance: planning.
+#include <cmath>
 #include <string>
 
 #include "absl/time/time.h"
@@ -41,6 +42,30 @@ TEST_P(DatabaseSuite, SurfacesAndPathsOnALevelFloor) {
   query.profile.radius_m = -1.0;
   EXPECT_THAT(db().planning().PlanPath({}, kMap, query),
               StatusIs(Code::kInvalidArgument, HasSubstr("radius_m")));
+}
+
+TEST_P(DatabaseSuite, PathsKeepToWhatClassesCost) {
+  PointCloud floor = LevelFloor();
+  for (const Eigen::Vector3f& p : floor.points) {
+    floor.label.push_back(std::abs(p.x()) < 0.5F && p.y() < 1.0F ? 3 : 1);
+  }
+  STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", 1}, floor, 0.0), floor));
+  AwaitIntegration(db(), kMap);
+  PlanQuery query;
+  query.from.x_m = -1.5;
+  query.to.x_m = 1.5;
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult straight, db().planning().PlanPath({}, kMap, query));
+  EXPECT_NEAR(straight.length_m, 3.0, 0.1);
+  query.class_costs = {{3, 1.5}};
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult dearer, db().planning().PlanPath({}, kMap, query));
+  EXPECT_NEAR(dearer.cost - straight.cost, 0.5, 0.2);
+  query.class_costs = {{3, kForbiddenClass}};
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult around, db().planning().PlanPath({}, kMap, query));
+  EXPECT_TRUE(around.found()) << around.message;
+  EXPECT_GT(around.length_m, straight.length_m + 0.3);
+  query.class_costs = {{3, kForbiddenClass}, {1, 0.5}};
+  EXPECT_THAT(db().planning().PlanPath({}, kMap, query),
+              StatusIs(Code::kInvalidArgument, HasSubstr("factor 0.5 of class 1")));
 }
 
 TEST_P(DatabaseSuite, AStoppedCallSaysSo) {

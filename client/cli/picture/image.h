@@ -37,7 +37,7 @@ Colour Blend(Colour a, Colour b, double share);
 // Fills the part of the rectangle that lies inside the image.
 void FillRectangle(Image& image, int x, int y, int width, int height, Colour colour);
 
-// Lower-case letters, digits, '.', '-' and blanks in a 5 × 7 face, `scale` pixels a dot; other
+// Lower-case letters, digits, '.', '-', '_' and blanks in a 5 × 7 face, `scale` pixels a dot; other
 // characters stay blank. (x, y) is the upper left corner. Returns the x after the text.
 int DrawText(Image& image, int x, int y, int scale, absl::string_view text, Colour colour);
 

@@ -4,9 +4,13 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include <Eigen/Geometry>
 
@@ -21,14 +25,45 @@ constexpr std::array<Colour, 4> kPathColours = {
     {{16, 24, 32}, {0, 150, 90}, {200, 0, 170}, {0, 160, 200}}};
 constexpr double kPathWidthPixels = 4.0;
 
+struct BlockColours {
+  Colour top, side;
+};
+
 // A surface cut to the slice, in map coordinates.
 struct Block {
   double x = 0.0, y = 0.0;  // lower left corner of the cell
   double top = 0.0, bottom = 0.0;
   bool vertical = false;
-  bool cut = false;  // the top is where the slice ends
-  Traversability traversability = Traversability::kUnknown;
+  BlockColours colours = {};
 };
+
+Colour TraversabilityColour(const Surface& surface, bool cut) {
+  if (cut) return kVerticalColour;
+  switch (surface.traversability) {
+    case Traversability::kTraversable:
+      return kTraversableColour;
+    case Traversability::kNonTraversable:
+      return surface.vertical() ? kVerticalColour : kNonTraversableColour;
+    case Traversability::kUnknown:
+      break;
+  }
+  return surface.vertical() ? kVerticalColour : kUnknownColour;
+}
+
+Colour ClassColour(const Surface& surface, const ClassStyles& classes) {
+  const auto style = classes.find(surface.class_id);
+  return style == classes.end() ? kUnknownColour : style->second.colour;
+}
+
+// `cut`: the top is where the slice ends.
+BlockColours ColoursOf(const Surface& surface, bool cut, const PictureOptions& options) {
+  if (options.classes.has_value()) {
+    const Colour colour = ClassColour(surface, *options.classes);
+    return {colour, colour};
+  }
+  const Colour top = TraversabilityColour(surface, cut);
+  return {top, surface.vertical() ? kVerticalColour : top};
+}
 
 std::vector<Block> BlocksOf(const std::vector<SurfaceTile>& tiles,
                             double cell,
@@ -47,8 +82,7 @@ std::vector<Block> BlocksOf(const std::vector<SurfaceTile>& tiles,
                         .top = std::min<double>(surface.z_m, high),
                         .bottom = std::max<double>(surface.bottom_m(), low),
                         .vertical = surface.vertical(),
-                        .cut = surface.z_m > high,
-                        .traversability = surface.traversability});
+                        .colours = ColoursOf(surface, surface.z_m > high, options)});
     }
   }
   return blocks;
@@ -99,21 +133,6 @@ Colour Lit(Colour colour, double factor) {
                        : Blend(colour, {255, 255, 255}, std::min(factor - 1.0, 1.0));
 }
 
-Colour TopColour(const Block& block) {
-  if (block.cut) {
-    return kVerticalColour;
-  }
-  switch (block.traversability) {
-    case Traversability::kTraversable:
-      return kTraversableColour;
-    case Traversability::kNonTraversable:
-      return block.vertical ? kVerticalColour : kNonTraversableColour;
-    case Traversability::kUnknown:
-      break;
-  }
-  return block.vertical ? kVerticalColour : kUnknownColour;
-}
-
 // Draws cells as boxes: the top, and the two sides that face the viewer.
 class BlockPainter {
  public:
@@ -126,13 +145,12 @@ class BlockPainter {
     const double x1 = x0 + cell_;
     const double y1 = y0 + cell_;
     const double top = block.top;
-    const Colour colour = TopColour(block);
     const double light = Light(top);
     raster_.FillQuad({{{x0, y0, top}, {x1, y0, top}, {x1, y1, top}, {x0, y1, top}}},
-                     Lit(colour, light));
+                     Lit(block.colours.top, light));
     // A horizontal patch gets sides too, so that slopes have no cracks.
     const double bottom = block.vertical ? block.bottom : top - 0.6 * cell_;
-    const Colour side = block.vertical ? kVerticalColour : colour;
+    const Colour side = block.colours.side;
     const double x = camera_.forward.x() < 0.0 ? x1 : x0;
     const double y = camera_.forward.y() < 0.0 ? y1 : y0;
     PaintSide({x, y0, 0.0}, {x, y1, 0.0}, bottom, top, block.vertical, Lit(side, 0.92), light);
@@ -218,8 +236,13 @@ int DrawScaleBar(Image& image, const Camera& camera, int scale) {
   return begin;
 }
 
-// As large as fits; the scale bar alone where nothing else does.
-void DrawLegend(Image& image, const Camera& camera) {
+// As large as fits; the scale bar alone where nothing else does, or for classes, whose names stand
+// elsewhere.
+void DrawLegend(Image& image, const Camera& camera, bool classes) {
+  if (classes) {
+    DrawScaleBar(image, camera, image.width >= 1000 ? 2 : 1);
+    return;
+  }
   for (const int scale : {2, 1}) {
     Image trial(image.width, image.height, kBackground);
     if (DrawEntries(trial, scale) <= DrawScaleBar(trial, camera, scale)) {
@@ -231,20 +254,49 @@ void DrawLegend(Image& image, const Camera& camera) {
   DrawScaleBar(image, camera, 1);
 }
 
-// One below the other, on a ground of their own.
-void DrawOverlayLegend(Image& image, const Overlay& overlay) {
-  if (overlay.legend.empty()) return;
+using Entries = std::vector<std::pair<Colour, std::string>>;
+
+// The classes that surfaces have; those that nobody styled, and none, are the last entry.
+Entries ClassEntries(const std::vector<SurfaceTile>& tiles, const PictureOptions& options) {
+  Entries entries;
+  if (!options.classes.has_value()) return entries;
+  std::set<std::uint8_t> seen;
+  for (const SurfaceTile& tile : tiles) {
+    for (const Surface& surface : tile.surfaces) seen.insert(surface.class_id);
+  }
+  bool none = false;
+  for (const std::uint8_t id : seen) {
+    const auto style = options.classes->find(id);
+    none = none || style == options.classes->end();
+    if (style == options.classes->end()) continue;
+    entries.emplace_back(style->second.colour, absl::AsciiStrToLower(style->second.name));
+  }
+  if (none) entries.emplace_back(kUnknownColour, "no class");
+  return entries;
+}
+
+// One below the other, on a ground of their own: areas as squares, lines as dashes.
+void DrawColumnLegend(Image& image, const Entries& areas, const Overlay& overlay) {
+  Entries all = areas;
+  all.insert(all.end(), overlay.legend.begin(), overlay.legend.end());
+  if (all.empty()) return;
   const int scale = image.width >= 1000 ? 2 : 1;
   const int row = 12 * scale;
   std::size_t longest = 0;
-  for (const auto& [colour, text] : overlay.legend) longest = std::max(longest, text.size());
+  for (const auto& [colour, text] : all) longest = std::max(longest, text.size());
   const int width = (20 + 6 * static_cast<int>(longest)) * scale;
-  const int height = row * static_cast<int>(overlay.legend.size()) + 6 * scale;
+  const int height = row * static_cast<int>(all.size()) + 6 * scale;
   FillRectangle(image, 4 * scale, 4 * scale, width, height, kBackground);
   int y = 8 * scale;
-  for (const auto& [colour, text] : overlay.legend) {
-    FillRectangle(image, 8 * scale, y + 2 * scale, 9 * scale, 3 * scale, colour);
-    DrawText(image, 20 * scale, y, scale, text, kInk);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const bool area = i < areas.size();
+    FillRectangle(image,
+                  8 * scale,
+                  area ? y - scale : y + 2 * scale,
+                  9 * scale,
+                  (area ? 9 : 3) * scale,
+                  all[i].first);
+    DrawText(image, 20 * scale, y, scale, all[i].second, kInk);
     y += row;
   }
 }
@@ -335,8 +387,8 @@ Picture DrawMap(const std::vector<SurfaceTile>& tiles,
   picture.image = Image(options.width, options.height, kBackground);
   std::copy(map.pixels.begin(), map.pixels.end(), picture.image.pixels.begin());
   DrawAxes(picture.image, picture.camera);
-  DrawOverlayLegend(picture.image, overlay);
-  DrawLegend(picture.image, picture.camera);
+  DrawColumnLegend(picture.image, ClassEntries(tiles, options), overlay);
+  DrawLegend(picture.image, picture.camera, options.classes.has_value());
   return picture;
 }
 

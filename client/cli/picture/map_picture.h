@@ -1,8 +1,10 @@
 // Maps as pictures, in the colours of the thesis (Fig. 6.6): traversable yellow, horizontal but not
-// traversable red, vertical blue; surfaces that nobody judged are grey.
+// traversable red, vertical blue; surfaces that nobody judged are grey. Or in those of classes.
 #ifndef STRATA_CLIENT_CLI_PICTURE_MAP_PICTURE_H_
 #define STRATA_CLIENT_CLI_PICTURE_MAP_PICTURE_H_
 
+#include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -40,6 +42,13 @@ struct Overlay {
   std::vector<std::pair<Colour, std::string>> legend;
 };
 
+// How surfaces of a class are drawn, and what they are called in the legend.
+struct ClassStyle {
+  std::string name;
+  Colour colour;
+};
+using ClassStyles = std::map<std::uint8_t, ClassStyle>;  // by class id
+
 struct PictureOptions {
   int width = 1600;
   int height = 1100;
@@ -48,6 +57,8 @@ struct PictureOptions {
   double elevation_rad = 1.5707963267948966;
   // Only what lies between these heights; vertical patches are cut.
   std::optional<std::pair<double, double>> slice_m = std::nullopt;
+  // Instead of by traversability: tops and sides by class; grey without one that is here.
+  std::optional<ClassStyles> classes = std::nullopt;
 };
 
 struct Picture {
@@ -59,6 +70,7 @@ struct Picture {
 // few stray ones. Without surfaces it shows a metre around the origin.
 // The legend is below, as much of it as fits the width, with a scale bar; the axes of the map are
 // in the lower left corner.
+// With classes, those that surfaces have are in a column in the upper left corner, by id.
 //   A traversable top is yellow even on a vertical patch (a deck seen from both sides); the sides
 //   are blue then. Higher surfaces are lighter.
 Picture DrawMap(const std::vector<SurfaceTile>& tiles,

@@ -63,6 +63,21 @@ TEST(PcdReaderTest, AsciiWithColumnsInAnyOrder) {
   EXPECT_FALSE(cloud.organised());
 }
 
+TEST(PcdReaderTest, LabelsHaveAnyWholeNumbers) {
+  for (const char* type : {"1 U", "1 I", "2 I", "4 U", "8 I", "4 F", "8 F"}) {
+    SCOPED_TRACE(type);
+    const std::string letter(1, type[2]);
+    const std::string size(1, type[0]);
+    const std::string file = Header("x y z label",
+                                    "4 4 4 " + size,
+                                    "F F F " + letter,
+                                    "2",
+                                    "POINTS 2\nDATA ascii\n0 0 0 100\n1 1 1 7\n");
+    STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, ReadPcd(file));
+    EXPECT_THAT(cloud.label, ::testing::ElementsAre(100, 7));
+  }
+}
+
 TEST(PcdReaderTest, OrganisedCloudsKeepTheirGridAndHoles) {
   const float nan = std::nanf("");
   STRATA_ASSERT_OK_AND_ASSIGN(

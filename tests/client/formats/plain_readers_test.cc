@@ -33,6 +33,28 @@ TEST(XyzReaderTest, NamesComeFromALineOrAComment) {
   EXPECT_THAT(commented.label, ElementsAre(1203));
 }
 
+TEST(OaklandReaderTest, TheFourthColumnIsTheLabelWhereNoneIsNamed) {
+  const std::string named =
+      "#File format: x y z label_id confidence \n#  1203 -- paved_road\n"
+      "-10.5 33.25 4.125 1203 2\n# a comment among points\n-11 33 4 9999 2\n";
+  for (const std::string& file : {named, named.substr(named.find("-10.5"))}) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, ReadOakland(file));
+    EXPECT_THAT(cloud.label, ElementsAre(1203, 9999));
+    EXPECT_THAT(cloud.points,
+                ElementsAre(Eigen::Vector3f(-10.5, 33.25, 4.125), Eigen::Vector3f(-11, 33, 4)));
+    EXPECT_TRUE(cloud.intensity.empty());
+  }
+  // Far away, floats are about an origin.
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud far,
+                              ReadOakland("584000.0625 4477000.125 270 1400 2\n"));
+  EXPECT_EQ(far.origin + far.points[0].cast<double>(),
+            Eigen::Vector3d(584000.0625, 4477000.125, 270));
+  EXPECT_THAT(ReadOakland("1 2 3 1203 2\n1 2 3\n"),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       HasSubstr("line 2: expected 5 numbers, found 3")));
+  testing::ExpectSoundOnDamage(named, &ReadOakland, 1);
+}
+
 TEST(XyzReaderTest, CountsAndByteOrderMarksBeforeThePointsAreNoPoints) {
   STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud pts,
                               ReadXyz("2\n1 2 3 -7 10 20 30\n4 5 6 9 1 2 3\n"));

@@ -64,6 +64,33 @@ TEST(PlyReaderTest, ColoursWithFractionsAreScaled) {
   EXPECT_THAT(cloud.colour, ElementsAre(Colour{128, 255, 0}, Colour{0, 51, 255}));
 }
 
+// Two points with a label of some name and type.
+std::string Labelled(const std::string& property, const std::string& first) {
+  return "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+         "property float z\nproperty " +
+         property + "\nend_header\n0 0 0 " + first + "\n1 1 1 7\n";
+}
+
+TEST(PlyReaderTest, LabelsHaveAnyWholeNumbersAndManyNames) {
+  for (const char* property : {"uchar label",
+                               "int class",
+                               "ushort Classification",
+                               "float scalar_Label",
+                               "double scalar_Classification"}) {
+    SCOPED_TRACE(property);
+    STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, ReadPly(Labelled(property, "12")));
+    EXPECT_THAT(cloud.label, ElementsAre(12, 7));
+  }
+  for (const char* none : {"-1", "65536", "nan", "1e30"}) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, ReadPly(Labelled("float label", none)));
+    EXPECT_THAT(cloud.label, ElementsAre(0, 7)) << none;
+  }
+  // A probability is no label.
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, ReadPly(Labelled("float class", "0.25")));
+  EXPECT_THAT(cloud.label, ::testing::IsEmpty());
+  testing::ExpectSoundOnDamage(Labelled("float label", "12"), &ReadPly, 3);
+}
+
 TEST(PlyReaderTest, ErrorsNameLineOrByteAndWhatWasExpected) {
   const auto expect = [](const std::string& file, const std::string& message) {
     EXPECT_THAT(ReadPly(file), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(message)));

@@ -163,6 +163,7 @@ TEST(RecordedScansTest, ColumnsComeWithTheirScans) {
   EXPECT_GT(autzen.origin.norm(), 1e5);
   STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud oakland,
                               ReadScan(path / "oakland3d/oakland_part3_ap.xyz_label_conf"));
+  EXPECT_EQ(oakland.label.size(), oakland.size());
   EXPECT_THAT(oakland.label, ::testing::Contains(1203));
   STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud kitti,
                               ReadScan(path / "importer_samples/kitti_000008_reduced.bin"));

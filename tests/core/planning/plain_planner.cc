@@ -270,6 +270,23 @@ void PlainPlanner::FindMoves(int i) {
   }
 }
 
+void PlainPlanner::AddClasses(const std::function<int(CellIndex)>& class_of,
+                              const ClassCosts& costs) {
+  const auto factor = [&](const Patch& patch) {
+    const auto cost = costs.find(class_of(patch.cell));
+    return cost == costs.end() ? 1.0 : cost->second;
+  };
+  for (Patch& patch : patches_) {
+    std::vector<std::pair<int, double>> moves;
+    for (const auto& [to, cost] : patch.moves) {
+      const double both = 0.5 * (factor(patch) + factor(patches_[to]));
+      if (both != kForbiddenClass) moves.emplace_back(to, cost * both);
+    }
+    patch.moves = std::move(moves);
+    if (factor(patch) == kForbiddenClass) patch.danger = -1.0;
+  }
+}
+
 int PlainPlanner::Place(const PlanEndpoint& endpoint) const {
   const double z = *endpoint.z_m;
   int named = -1;

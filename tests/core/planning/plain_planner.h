@@ -3,6 +3,7 @@
 #ifndef STRATA_TESTS_CORE_PLANNING_PLAIN_PLANNER_H_
 #define STRATA_TESTS_CORE_PLANNING_PLAIN_PLANNER_H_
 
+#include <functional>
 #include <map>
 #include <string>
 #include <utility>
@@ -28,6 +29,8 @@ class PlainPlanner {
     std::vector<std::pair<int, double>> moves;  // target, cost [m]
   };
   const std::vector<Patch>& patches() const { return patches_; }
+  // Multiplies moves by what classes cost; `class_of` says which class the surfaces of a cell are.
+  void AddClasses(const std::function<int(CellIndex)>& class_of, const ClassCosts& costs);
   // Where a query from or to `endpoint` begins or ends, -1 if nowhere. REQUIRES: z_m.
   int Place(const PlanEndpoint& endpoint) const;
   // Cost of the cheapest path between places to stand, infinity if none. Dijkstra.

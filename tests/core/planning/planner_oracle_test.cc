@@ -105,14 +105,31 @@ PlanEndpoint EndpointOf(const PlainPlanner::Patch& patch) {
 }
 
 struct Tally {
-  int found = 0, none = 0, off = 0, gaps = 0, pulled = 0, moved = 0;
+  int found = 0, none = 0, off = 0, gaps = 0, pulled = 0, moved = 0, forbidden = 0;
 };
 
-void CompareOneWorld(std::uint64_t seed, Tally* tally) {
+// Fields of four classes, one of them 0, some 0.5 to 1.2 m wide.
+int ClassOfCell(CellIndex cell) {
+  const int x = (cell.x >> 3) * 5 + (cell.y >> 4) * 3;
+  const int y = (cell.y >> 2) * 7 + (cell.x >> 4);
+  return (x ^ y) & 3;
+}
+
+std::vector<SurfaceTile> WithClasses(std::vector<SurfaceTile> tiles) {
+  for (SurfaceTile& tile : tiles) {
+    for (Surface& surface : tile.surfaces) {
+      surface.class_id = static_cast<std::uint8_t>(ClassOfCell(CellOf(tile.key, surface.cell)));
+    }
+  }
+  return tiles;
+}
+
+void CompareOneWorld(std::uint64_t seed, const ClassCosts& costs, Tally* tally) {
   SCOPED_TRACE(::testing::Message() << "seed " << seed);
   const World world = RandomWorld(seed);
-  const PlainPlanner plain(world.map, world.profile, kCell);
-  MemoryTiles source(world.map.Tiles());
+  PlainPlanner plain(world.map, world.profile, kCell);
+  plain.AddClasses(ClassOfCell, costs);
+  MemoryTiles source(WithClasses(world.map.Tiles()));
   Planner planner({.cell_size_m = kCell});
   Planner with_landmarks({.cell_size_m = kCell});
   STRATA_ASSERT_OK(
@@ -123,7 +140,8 @@ void CompareOneWorld(std::uint64_t seed, Tally* tally) {
                                   EndpointOf(plain.patches()[random() % plain.patches().size()])};
     const int from = plain.Place(ends[0]);
     const int to = plain.Place(ends[1]);
-    const PlanQuery query = {.from = ends[0], .to = ends[1], .profile = world.profile};
+    const PlanQuery query = {
+        .from = ends[0], .to = ends[1], .profile = world.profile, .class_costs = costs};
     STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult result, planner.Plan(source, query, Stop()));
     STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult same, with_landmarks.Plan(source, query, Stop()));
     EXPECT_EQ(same.graph_cost, result.graph_cost);
@@ -140,6 +158,7 @@ void CompareOneWorld(std::uint64_t seed, Tally* tally) {
     if (!result.found()) {
       ++tally->none;
       EXPECT_NE(result.obstruction, Obstruction::kNone);
+      tally->forbidden += result.obstruction == Obstruction::kClass ? 1 : 0;
       continue;
     }
     ++tally->found;
@@ -160,13 +179,24 @@ void CompareOneWorld(std::uint64_t seed, Tally* tally) {
 
 TEST(PlannerOracleTest, CostsAreThoseOfDijkstraAndPathsHitNothing) {
   Tally tally;
-  for (std::uint64_t seed = 1; seed <= 24; ++seed) CompareOneWorld(seed, &tally);
+  for (std::uint64_t seed = 1; seed <= 24; ++seed) CompareOneWorld(seed, {}, &tally);
   // The worlds are hard enough and not too hard.
   EXPECT_GT(tally.found, 30);
   EXPECT_GT(tally.none, 5);
   EXPECT_GT(tally.gaps, 3);
   EXPECT_GT(tally.pulled, 5);
   EXPECT_GT(tally.moved, 5);
+}
+
+TEST(PlannerOracleTest, CostsOfClassesAreThoseOfDijkstraToo) {
+  Tally tally;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    CompareOneWorld(seed, {{1, 5.0}, {3, 1.5}}, &tally);
+    CompareOneWorld(seed, {{2, kForbiddenClass}, {1, 100.0}}, &tally);
+  }
+  EXPECT_GT(tally.found, 15);
+  EXPECT_GT(tally.pulled, 3);
+  EXPECT_GT(tally.forbidden, 1);
 }
 
 // Places to stand and moves of a profile, as (cell, height) and (cell, height, cell, height).

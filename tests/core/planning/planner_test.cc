@@ -164,6 +164,70 @@ TEST(PlannerTest, GoesAroundAWallAndNamesTheOneThatClosesTheWay) {
   EXPECT_NEAR(blocked.obstruction_value, 2.0, 1e-5);
 }
 
+// Paving, 10 m by 6 m, across which lies a lawn; with a way around it at its upper end.
+std::vector<SurfaceTile> Garden(bool way_around) {
+  DrawnMap map;
+  for (int y = 0; y < 60; ++y) {
+    for (int x = 0; x < 100; ++x) map[{x, y}] = {{0.0}};
+  }
+  std::vector<SurfaceTile> tiles = map.Tiles();
+  for (SurfaceTile& tile : tiles) {
+    for (Surface& surface : tile.surfaces) {
+      const CellIndex cell = CellOf(tile.key, surface.cell);
+      const bool lawn = cell.x >= 40 && cell.x < 60 && (!way_around || cell.y < 50);
+      surface.class_id = lawn ? 3 : 1;
+    }
+  }
+  return tiles;
+}
+
+TEST(PlannerTest, GoesAroundWhatClassesCostAndNeverOverWhatTheyForbid) {
+  MemoryTiles garden(Garden(true));
+  Planner planner({.cell_size_m = kCell});
+  PlanQuery query = {.from = At(2.05, 1.05, 0), .to = At(8.05, 1.05, 0), .profile = SmallRobot()};
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult straight, planner.Plan(garden, query, Stop()));
+  EXPECT_NEAR(straight.length_m, 6.0, 0.1);
+  query.class_costs = {{3, 2.0}};  // 2 m dearer, the way around is 4 m longer
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult across, planner.Plan(garden, query, Stop()));
+  EXPECT_NEAR(across.length_m, straight.length_m, 1e-9);
+  EXPECT_NEAR(across.cost - straight.cost, 2.0, 0.3);
+  for (const double factor : {20.0, kForbiddenClass}) {
+    query.class_costs = {{3, factor}};
+    STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult around, planner.Plan(garden, query, Stop()));
+    ASSERT_TRUE(around.found()) << around.message;
+    EXPECT_GT(around.length_m, 8.0);
+    const auto highest = std::max_element(
+        around.waypoints.begin(), around.waypoints.end(), [](const auto& a, const auto& b) {
+          return a.y() < b.y();
+        });
+    EXPECT_GT(highest->y(), 5.0);
+  }
+  // The prepared tiles are those of every query.
+  EXPECT_EQ(planner.cache_statistics().prepared, 1U);
+}
+
+TEST(PlannerTest, NamesTheForbiddenClassThatIsInTheWay) {
+  MemoryTiles garden(Garden(false));
+  Planner planner({.cell_size_m = kCell});
+  PlanQuery query = {.from = At(2.05, 1.05, 0), .to = At(8.05, 1.05, 0), .profile = SmallRobot()};
+  query.class_costs = {{3, kForbiddenClass}};
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult blocked, planner.Plan(garden, query, Stop()));
+  EXPECT_EQ(blocked.reason, PlanReason::kBlocked);
+  EXPECT_EQ(blocked.obstruction, Obstruction::kClass);
+  EXPECT_EQ(blocked.obstruction_value, 3.0);
+  EXPECT_THAT(blocked.message, HasSubstr("forbidden class 3 at (4.05, "));
+  query.to = At(5.05, 1.05, 0);
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult on_it, planner.Plan(garden, query, Stop()));
+  EXPECT_EQ(on_it.reason, PlanReason::kGoalNotOnSurface);
+  EXPECT_EQ(on_it.obstruction, Obstruction::kClass);
+  for (const auto& [id, factor] :
+       {std::pair(0, 2.0), std::pair(256, 2.0), std::pair(1, 0.5), std::pair(1, 101.0)}) {
+    query.class_costs = {{id, factor}};
+    EXPECT_THAT(planner.Plan(garden, query, Stop()),
+                StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("class_costs: ")));
+  }
+}
+
 TEST(PlannerTest, RampsBetweenStoreysByTheirSlope) {
   const auto storeys = [](double slope_tan) {
     DrawnMap map = MapFromDrawing("....\n....", {{'.', {{0.0}}}}, 10, {-40, 0});

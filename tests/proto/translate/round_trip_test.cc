@@ -1,6 +1,9 @@
 // Every field of every message survives wire → core → wire. The messages are filled by reflection,
 // so that a field that is added and forgotten in the translation fails here.
+#include <cmath>
+#include <cstdint>
 #include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include <gmock/gmock.h>
@@ -170,6 +173,7 @@ TEST(TranslateRoundTripTest, AbsentFieldsTakeTheCoresDefaults) {
   EXPECT_EQ(query.max_expanded, PlanQuery().max_expanded);
   EXPECT_EQ(query.from.z_m, std::nullopt);
   EXPECT_EQ(query.from.level, std::nullopt);
+  EXPECT_TRUE(query.class_costs.empty());
 }
 
 TEST(TranslateRoundTripTest, Scans) {
@@ -203,6 +207,43 @@ TEST(TranslateRoundTripTest, Planning) {
   }
   ExpectRoundTrip(Filled<v1::PlanPathResponse>());
   ExpectRoundTrip(Filled<v1::SurfaceColumn>());
+}
+
+TEST(TranslateRoundTripTest, ClassCosts) {
+  v1::PlanPathRequest request;
+  const auto add = [&request](std::uint32_t id) {
+    request.add_class_costs()->set_class_id(id);
+    return request.mutable_class_costs(request.class_costs_size() - 1);
+  };
+  add(3)->set_factor(2.5);
+  add(255)->set_forbidden(true);
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanQuery query, FromProto(request));
+  EXPECT_EQ(query.class_costs, (ClassCosts{{3, 2.5}, {255, kForbiddenClass}}));
+  ASSERT_EQ(ToProto("m", query).class_costs_size(), 2);
+  for (int k = 0; k < 2; ++k) {
+    ExpectSame(request.class_costs(k), ToProto("m", query).class_costs(k));
+  }
+  const auto refused = [](std::uint32_t id, double factor) {
+    v1::PlanPathRequest bad;
+    bad.add_class_costs()->set_class_id(id);
+    bad.mutable_class_costs(0)->set_factor(factor);
+    return FromProto(bad).status();
+  };
+  for (const auto& [id, factor] : {std::pair(0U, 2.0),
+                                   std::pair(256U, 2.0),
+                                   std::pair(4'294'967'295U, 2.0),
+                                   std::pair(1U, 0.0),
+                                   std::pair(1U, -kForbiddenClass),
+                                   std::pair(1U, std::nan(""))}) {
+    EXPECT_THAT(refused(id, factor),
+                testing::StatusIs(absl::StatusCode::kInvalidArgument,
+                                  ::testing::HasSubstr("class_costs: ")))
+        << id << " " << factor;
+  }
+  add(3)->set_factor(2.0);
+  EXPECT_THAT(FromProto(request).status(),
+              testing::StatusIs(absl::StatusCode::kInvalidArgument,
+                                ::testing::HasSubstr("class 3 is there twice")));
 }
 
 TEST(TranslateRoundTripTest, EveryPlanReasonAndObstruction) {

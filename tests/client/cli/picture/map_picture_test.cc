@@ -62,6 +62,30 @@ TEST(MapPictureTest, PlanShowsEachKindOfSurfaceInItsColour) {
   EXPECT_TRUE(IsBlue(PixelAt(picture, {5.0, 3.0, 2.0})));
 }
 
+TEST(MapPictureTest, ClassesHaveTheirColoursAndALegend) {
+  const SurfaceTile tile = TileOf(60, [](int x, int) {
+    Surface surface = Ground(Traversability::kTraversable, x < 40 ? 0.0F : 2.0F);
+    surface.class_id = x < 20 ? 7 : x < 40 ? 0 : 9;
+    surface.depth_m = x < 40 ? 0.0F : 2.0F;
+    return surface;
+  });
+  PictureOptions options = {.width = 400, .height = 444};
+  options.classes = {{7, {"Lawn_1", {20, 160, 40}}}, {9, {"wall", {200, 30, 40}}}};
+  const Picture picture = DrawMap({tile}, 0.1, {}, options);
+  const Colour lawn = PixelAt(picture, {1.0, 3.0, 0.0});
+  EXPECT_GT(lawn.g, lawn.r + 60);
+  const Colour none = PixelAt(picture, {3.0, 3.0, 0.0});
+  EXPECT_LT(std::abs(none.r - none.b), 30);
+  EXPECT_TRUE(IsRed(PixelAt(picture, {5.0, 3.0, 2.0})));
+  // The squares of the column: lawn, wall, no class.
+  EXPECT_EQ(picture.image.At(10, 10), (Colour{20, 160, 40}));
+  EXPECT_EQ(picture.image.At(10, 22), (Colour{200, 30, 40}));
+  EXPECT_EQ(picture.image.At(10, 34), kUnknownColour);
+  // Classes that no surface has are not in it.
+  options.classes->emplace(11, ClassStyle{"pond", {1, 2, 250}});
+  EXPECT_EQ(DrawMap({tile}, 0.1, {}, options).image.pixels, picture.image.pixels);
+}
+
 TEST(MapPictureTest, PlanHasXToTheRightAndYUp) {
   const Picture picture = DrawMap(
       {TileOf(50, [](int, int) { return Ground(Traversability::kTraversable); })}, 0.1, {}, {});

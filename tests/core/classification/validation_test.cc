@@ -1,0 +1,106 @@
+#include "core/classification/validation.h"
+
+#include <cstdint>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/common/random.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata {
+namespace {
+
+using ::strata::testing::StatusIs;
+using ::testing::HasSubstr;
+
+const std::vector<ClassName> kClasses = {{4, "floor"}, {6, "wall"}};
+
+absl::Status NoProgress(double) { return absl::OkStatus(); }
+
+// A floor, and a wall where there is to be one; a few points are unlabelled.
+PointCloud Room(std::uint64_t seed, bool wall) {
+  SplitMix64 random(seed);
+  const auto in = [&random](double high) { return high * random.Below(1U << 20) / (1 << 20); };
+  PointCloud cloud;
+  for (int k = 0; k < 800; ++k) {
+    const bool upright = wall && k % 2 == 0;
+    cloud.points.emplace_back(
+        upright ? 0.02 * in(1) : in(4), in(4), upright ? in(2) : 0.02 * in(1));
+    cloud.label.push_back(k % 20 == 0 ? 0 : upright ? 6 : 4);
+  }
+  return cloud;
+}
+
+TrainingOptions Quick() {
+  TrainingOptions options;
+  options.method = ClassifierMethod::kBayes;
+  options.features.scales = 1;
+  return options;
+}
+
+TEST(ValidationTest, CountsLabelledPointsByTruthAndClassGiven) {
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const Classifier classifier,
+      TrainClassifier({Room(1, true)}, kClasses, Quick(), NoProgress, Stop()));
+  // One more class than the classifier knows, in front of its own.
+  const std::vector<ClassName> classes = {{9, "sky"}, {4, "floor"}, {6, "wall"}};
+  PointCloud room = Room(2, true);
+  room.label[1] = 9;
+  STRATA_ASSERT_OK_AND_ASSIGN(const ConfusionMatrix confusion,
+                              EvaluateClassifier(classifier, room, classes, Stop()));
+  EXPECT_EQ(confusion.total(), 800U - 40U);
+  EXPECT_EQ(confusion.Recall(0), 0.0);
+  STRATA_ASSERT_OK_AND_ASSIGN(const ClassifiedCloud given, Classify(classifier, room, Stop()));
+  ConfusionMatrix by_hand(3);
+  for (std::size_t i = 0; i < room.size(); ++i) {
+    if (room.label[i] == 0) continue;
+    const ClassIndex truth = room.label[i] == 9 ? 0 : room.label[i] == 4 ? 1 : 2;
+    by_hand.Add(truth, static_cast<ClassIndex>(given.labels[i] + 1));
+  }
+  for (std::size_t truth = 0; truth < 3; ++truth) {
+    for (std::size_t k = 0; k < 3; ++k)
+      EXPECT_EQ(confusion.count(truth, k), by_hand.count(truth, k));
+  }
+}
+
+TEST(ValidationTest, EveryCloudIsLabelledOnceByAClassifierThatNeverSawIt) {
+  const std::vector<PointCloud> clouds = {Room(1, true), Room(2, true), Room(3, true)};
+  STRATA_ASSERT_OK_AND_ASSIGN(const ConfusionMatrix confusion,
+                              CrossValidate(clouds, kClasses, Quick(), 3, NoProgress, Stop()));
+  ConfusionMatrix by_hand(2);
+  for (std::size_t i = 0; i < 3; ++i) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const Classifier classifier,
+                                TrainClassifier({clouds[(i == 0) ? 1 : 0], clouds[i == 2 ? 1 : 2]},
+                                                kClasses,
+                                                Quick(),
+                                                NoProgress,
+                                                Stop()));
+    STRATA_ASSERT_OK_AND_ASSIGN(const ConfusionMatrix one,
+                                EvaluateClassifier(classifier, clouds[i], kClasses, Stop()));
+    by_hand.Add(one);
+  }
+  EXPECT_EQ(confusion.total(), 3U * 760U);
+  EXPECT_EQ(confusion.Accuracy(), by_hand.Accuracy());
+}
+
+TEST(ValidationTest, AClassOfOneCloudAloneCountsAsMissed) {
+  const std::vector<ClassName> classes = {{4, "floor"}, {6, "wall"}, {8, "pond"}};
+  std::vector<PointCloud> clouds = {Room(1, true), Room(2, true), Room(3, true)};
+  for (std::size_t i = 1; i < 800; i += 4) clouds[1].label[i] = 8;
+  STRATA_ASSERT_OK_AND_ASSIGN(const ConfusionMatrix confusion,
+                              CrossValidate(clouds, classes, Quick(), 3, NoProgress, Stop()));
+  EXPECT_EQ(confusion.Recall(2), 0.0);
+  EXPECT_THAT(CrossValidate(clouds, classes, Quick(), 4, NoProgress, Stop()),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("folds 4 is not in [2, 3]")));
+  EXPECT_THAT(CrossValidate(clouds, classes, Quick(), 1, NoProgress, Stop()),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("folds 1 is not in")));
+  Stop stop;
+  stop.Request();
+  EXPECT_THAT(CrossValidate(clouds, classes, Quick(), 3, NoProgress, stop),
+              StatusIs(absl::StatusCode::kCancelled, HasSubstr("")));
+}
+
+}  // namespace
+}  // namespace strata
