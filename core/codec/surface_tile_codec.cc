@@ -196,7 +196,8 @@ std::int32_t ExpectedCost(std::span<const Codes> surfaces,
   std::int32_t sum = 0;
   int count = 0;
   for (const std::uint32_t index : {n.left, n.up, n.up_right, n.up_left}) {
-    if (index == SurfacesBeside::kNone || surfaces[index].traversability != traversability) continue;
+    if (index == SurfacesBeside::kNone || surfaces[index].traversability != traversability)
+      continue;
     sum += surfaces[index].cost;
     ++count;
   }
