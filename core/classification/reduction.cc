@@ -151,6 +151,8 @@ absl::StatusOr<ReductionOptions> ParseReduction(absl::string_view text) {
       absl::StrSplit(text, absl::MaxSplits('=', 1));
   const auto [kind, number] = parts;
   if (text == "auto") {
+    options.kind = ReductionKind::kBalanced;
+  } else if (text == "pure") {
     options.kind = ReductionKind::kPure;
   } else if (text == "none") {
     options.kind = ReductionKind::kNone;
@@ -160,7 +162,7 @@ absl::StatusOr<ReductionOptions> ParseReduction(absl::string_view text) {
     options.kind = ReductionKind::kRandom;
   } else {
     return absl::InvalidArgumentError(absl::StrCat(
-        "reduction '", text.substr(0, 40), "' is none of auto, none, depth=N, random=N"));
+        "reduction '", text.substr(0, 40), "' is none of auto, pure, none, depth=N, random=N"));
   }
   STRATA_RETURN_IF_ERROR(options.Validate());
   return options;
@@ -175,6 +177,8 @@ std::string ToString(const ReductionOptions& options) {
     case ReductionKind::kDepth:
       return absl::StrCat("depth=", options.depth);
     case ReductionKind::kPure:
+      return "pure";
+    case ReductionKind::kBalanced:
       return "auto";
   }
   return "unknown";

@@ -65,7 +65,7 @@ KnownParameters ParametersOf(TrainSettings& settings) {
           {"features",
            {ParsedParameter(options.features.set, FeatureSetFromName), "shape, wall or spin"}},
           {"reduce",
-           {ParsedParameter(options.reduction, ParseReduction), "auto, none, depth=N or random=N"}},
+           {ParsedParameter(options.reduction, ParseReduction), "auto, pure, none, depth=N or random=N"}},
           {"neighbours", {WholeParameter(options.neighbours, 1, 100), "in [1, 100]"}},
           {"rounds", {WholeParameter(options.rounds, 1, 10000), "in [1, 10000]"}},
           {"slack_weight", {RealParameter(options.slack_weight, 1e-12, 1e12), "in [1e-12, 1e12]"}},

@@ -88,7 +88,8 @@ TEST(ClassifierOptionsTest, ReductionsByName) {
   STRATA_ASSERT_OK_AND_ASSIGN(const ReductionOptions random, ParseReduction("random=500"));
   EXPECT_EQ(random.kind, ReductionKind::kRandom);
   EXPECT_EQ(random.count, 500U);
-  EXPECT_EQ(ParseReduction("auto")->kind, ReductionKind::kPure);
+  EXPECT_EQ(ParseReduction("auto")->kind, ReductionKind::kBalanced);
+  EXPECT_EQ(ParseReduction("pure")->kind, ReductionKind::kPure);
   EXPECT_EQ(ParseReduction("none")->kind, ReductionKind::kNone);
   for (const char* bad : {"", "depth", "depth=", "depth=x", "depth=0", "depth=31", "some"}) {
     EXPECT_EQ(ParseReduction(bad).status().code(), absl::StatusCode::kInvalidArgument) << bad;
