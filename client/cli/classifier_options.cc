@@ -40,9 +40,9 @@ void AddTrainingOptions(CLI::App* verb, TrainingOptions& options) {
           [&options](const std::string& text) {
             options.reduction = ValueOf("--reduce", ParseReduction(text));
           },
-          "Fewer points to learn from: one for each region of one class, for each leaf of a tree "
-          "of N levels, N drawn ones, or all")
-      ->type_name("auto|depth=N|random=N|none")
+          "Points to learn from: drawn so that rare classes count, one for each region of one "
+          "class (thesis 9.3.2), one for each leaf of a tree of N levels, N drawn ones, or all")
+      ->type_name("auto|pure|depth=N|random=N|none")
       ->default_str("auto");
   verb->add_option("--neighbours",
                    options.neighbours,

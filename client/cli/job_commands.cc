@@ -36,7 +36,7 @@ Kinds and their parameters (and threads=1..64 for the first three):
   revert    Poses and constraints of an earlier epoch: epoch=N, see map history.
   train     A classifier from all labelled scans; see classifier train.
             name=, method=amn|iamn|bayes|knn|adaboost (amn), features=shape|wall|spin (shape)
-            reduce=auto|none|depth=N|random=N (auto), neighbours=1..100 (5), rounds=1..10000 (100)
+            reduce=auto|pure|none|depth=N|random=N (auto), neighbours=1..100 (5), rounds=1..10000 (100)
             slack_weight= (100)
             folds=0..100        Of the validation over scans (5)
   classify  The classifier model=NAME labels every scan that it has not labelled yet.
