@@ -154,6 +154,13 @@ absl::StatusOr<JobInfo> JobBoard::Cancel(std::uint64_t id) {
   return info;
 }
 
+void JobBoard::StopRunning() {
+  absl::MutexLock lock(&mutex_);
+  for (const auto& [id, entry] : jobs_) {
+    if (entry.info.state == JobState::kRunning) entry.stop.Request();
+  }
+}
+
 absl::StatusOr<JobInfo> JobBoard::Decide(std::uint64_t id,
                                          absl::FunctionRef<void(JobInfo&)> change,
                                          WriterThread::Work work) {

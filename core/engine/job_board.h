@@ -75,6 +75,8 @@ class JobBoard {
                      std::uint64_t id,
                      absl::FunctionRef<absl::Status(const JobInfo&)> sink) const;
   bool AnyIn(JobState state) const;
+  // Tells the running job to end; see RunNext().
+  void StopRunning();
 
   // Runs the first queued job, if any, and records how it ended. A job that ends because `closing`
   // was requested stays queued for the next start; one whose state cannot be stored stays queued

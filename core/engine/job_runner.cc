@@ -139,6 +139,7 @@ void JobRunner::Close() {
     look_.Request();
   }
   closing_.Request();
+  jobs_.StopRunning();  // a learning step does not look at closing_
   if (thread_.joinable()) thread_.join();
 }
 
