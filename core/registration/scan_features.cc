@@ -28,11 +28,9 @@ namespace {
 // often in the first.
 constexpr float kColumnSizeM = 0.4F;
 
-// An underside is level and wide: within a square metre its heights spread little, unlike those of
-// leaves or of a hillside, and its places spread both ways, unlike the line that one beam draws on
-// a wall as the sensor turns.
+// An underside is level: all that is seen above a square metre spreads little in height, unlike
+// leaves, a hillside, or the lines that beams draw on a wall, one above the other.
 constexpr double kMaxSpreadM = 0.05;
-constexpr double kMinWidthM = 0.12;
 constexpr int kMinLevelPoints = 3;
 
 using ClassPoints = std::array<std::vector<Eigen::Vector3f>, kFeatureClasses>;
@@ -56,49 +54,38 @@ void AppendPatch(
   }
 }
 
-// Of the features in a block.
-class Spread {
- public:
-  void Add(const Eigen::Vector3f& p) {
-    const Eigen::Vector3d q = p.cast<double>();
-    ++n_;
-    sum_ += q;
-    moments_ += q * q.transpose();
-  }
-  bool IsLevelAndWide() const {
-    if (n_ < kMinLevelPoints) return false;
-    const Eigen::Vector3d mean = sum_ / n_;
-    const Eigen::Matrix3d covariance = moments_ / n_ - mean * mean.transpose();
-    if (covariance(2, 2) >= kMaxSpreadM * kMaxSpreadM) return false;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> across(covariance.topLeftCorner<2, 2>(),
-                                                                Eigen::EigenvaluesOnly);
-    return across.eigenvalues()[0] >= kMinWidthM * kMinWidthM;
-  }
+// Of heights.
+struct Spread {
+  int n = 0;
+  double sum = 0.0;
+  double squares = 0.0;
 
- private:
-  int n_ = 0;
-  Eigen::Vector3d sum_ = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d moments_ = Eigen::Matrix3d::Zero();
+  void Add(double z) {
+    ++n;
+    sum += z;
+    squares += z * z;
+  }
+  bool IsLevel() const {
+    const double mean = sum / n;
+    return n >= kMinLevelPoints && squares / n - mean * mean < kMaxSpreadM * kMaxSpreadM;
+  }
 };
 
 // Moves the undersides of decks and ceilings out of the traversable class.
 void SeparateUndersides(const Eigen::Vector3f& sensor_origin, ClassPoints& points) {
-  using Block = std::array<int, 3>;
-  const auto block_of = [](const Eigen::Vector3f& p) {
-    return Block{static_cast<int>(std::floor(p.x())),
-                 static_cast<int>(std::floor(p.y())),
-                 static_cast<int>(std::floor(p.z() / 2.0F))};
+  using Column = std::array<int, 2>;
+  const auto column_of = [](const Eigen::Vector3f& p) {
+    return Column{static_cast<int>(std::floor(p.x())), static_cast<int>(std::floor(p.y()))};
   };
   std::vector<Eigen::Vector3f>& horizontal = ListOf(FeatureClass::kTraversable, points);
   const auto above =
       std::stable_partition(horizontal.begin(), horizontal.end(), [&](const Eigen::Vector3f& p) {
         return !SeenFromBelow(p, sensor_origin);
       });
-  absl::flat_hash_map<Block, Spread> spreads;
-  std::for_each(above, horizontal.end(), [&](const auto& p) { spreads[block_of(p)].Add(p); });
-  const auto undersides = std::stable_partition(above, horizontal.end(), [&](const auto& p) {
-    return !spreads[block_of(p)].IsLevelAndWide();
-  });
+  absl::flat_hash_map<Column, Spread> spreads;
+  std::for_each(above, horizontal.end(), [&](const auto& p) { spreads[column_of(p)].Add(p.z()); });
+  const auto undersides = std::stable_partition(
+      above, horizontal.end(), [&](const auto& p) { return !spreads[column_of(p)].IsLevel(); });
   ListOf(FeatureClass::kNonTraversable, points).assign(undersides, horizontal.end());
   horizontal.erase(undersides, horizontal.end());
 }
