@@ -41,7 +41,7 @@ bool OppositeSides(const Eigen::Vector3d& p,
 bool IsStripOnAWall(const SampledFeature& feature,
                     const Eigen::Vector3d& normal,
                     const Eigen::Vector3d& sensor_origin) {
-  constexpr double kLevel = 0.7;  // cosine of its inclination
+  constexpr double kLevel = 0.95;  // cosine of its inclination; roofs rise more
   return feature.feature_class != FeatureClass::kNonTraversable && std::abs(normal.z()) > kLevel &&
          SeenFromBelow(feature.element.point, sensor_origin.cast<float>());
 }
