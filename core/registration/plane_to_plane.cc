@@ -37,13 +37,16 @@ bool OppositeSides(const Eigen::Vector3d& p,
 
 // Where beams draw lines on a wall, a cell wide and far apart, neighbours lie on a level strip. Its
 // height goes with the distance of the sensor: held against each other such strips lift whatever is
-// in front of a robot, and a chain of scans bends upwards.
-bool IsStripOnAWall(const SampledFeature& feature,
-                    const Eigen::Vector3d& normal,
-                    const Eigen::Vector3d& sensor_origin) {
-  constexpr double kLevel = 0.95;  // cosine of its inclination; roofs rise more
-  return feature.feature_class != FeatureClass::kNonTraversable && std::abs(normal.z()) > kLevel &&
+// in front of a robot, and a chain of scans bends upwards. So features above the sensor that look
+// level, and are no undersides, only count as overlap.
+bool MayBeStripOnAWall(const SampledFeature& feature, const Eigen::Vector3d& sensor_origin) {
+  return feature.feature_class != FeatureClass::kNonTraversable &&
          SeenFromBelow(feature.element.point, sensor_origin.cast<float>());
+}
+
+bool IsLevel(const Eigen::Vector3d& normal) {
+  constexpr double kLevel = 0.95;  // cosine of its inclination; roofs rise more
+  return std::abs(normal.z()) > kLevel;
 }
 
 Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
@@ -127,8 +130,8 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
     const Eigen::Vector3d r = R.transpose() * (q.point.cast<double>() - p_target);
     const Eigen::Vector3d normal_p = sampled.element.normal.cast<double>();
     const Eigen::Vector3d normal_q = R.transpose() * q.normal.cast<double>();
-    if (IsStripOnAWall(sampled, normal_p, source_.sensor_origin()) ||
-        IsStripOnAWall(sampled, normal_q, source_.sensor_origin())) {
+    if ((IsLevel(normal_p) || IsLevel(normal_q)) &&
+        MayBeStripOnAWall(sampled, source_.sensor_origin())) {
       ++sums.inliers;
       continue;
     }
