@@ -133,14 +133,25 @@ absl::StatusOr<ConfusionMatrix> Validated(const FileTraining& training,
   if (training.region_m > 0.0) cut = CutIntoRegions(clouds, training.region_m);
   std::vector<std::size_t> each(clouds.size());
   std::iota(each.begin(), each.end(), std::size_t{0});
+  const std::vector<PointCloud>& parts = training.region_m > 0.0 ? cut.clouds : clouds;
+  STRATA_ASSIGN_OR_RETURN(const TrainingSet set,
+                          ReadTrainingSet(
+                              parts.size(),
+                              SourceOf(parts),
+                              classes,
+                              training.options,
+                              [&](double share) {
+                                progress.Update(0.5 * share, "features");
+                                return absl::OkStatus();
+                              },
+                              context.stop));
   return CrossValidate(
-      training.region_m > 0.0 ? cut.clouds : clouds,
+      set,
       training.region_m > 0.0 ? cut.regions : each,
-      classes,
-      training.options,
+      SourceOf(parts),
       static_cast<std::size_t>(training.folds),
       [&](double share) {
-        progress.Update(share, "files or regions left out");
+        progress.Update(0.5 + 0.5 * share, "files or regions left out");
         return absl::OkStatus();
       },
       context.stop);

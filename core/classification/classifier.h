@@ -1,4 +1,4 @@
-// A trained classifier, whatever its method: learned from labelled clouds, labels others.
+// A trained classifier, whatever its method: labels clouds. See training.h for how one is learned.
 #ifndef STRATA_CORE_CLASSIFICATION_CLASSIFIER_H_
 #define STRATA_CORE_CLASSIFICATION_CLASSIFIER_H_
 
@@ -8,7 +8,6 @@
 #include <variant>
 #include <vector>
 
-#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
@@ -85,31 +84,8 @@ struct ClassifiedCloud {
   double score = 0.0;              // of networks: what inference reached
 };
 
-// Told how far it is, in [0, 1]; may end the work.
-using ClassifierProgress = absl::FunctionRef<absl::Status(double progress)>;
-
-// Clouds that come one after the other, so that they need not be in memory together: hands the
-// parts of cloud k to `use`, in order and always the same; each part is a cloud of its own, and is
-// all that is in memory. An error of `use` is handed back.
-using CloudSource = absl::FunctionRef<absl::Status(
-    std::size_t k, absl::FunctionRef<absl::Status(const PointCloud&)> use)>;
-
-// Learns from the points of `clouds` whose label is one of `classes`; others are not looked at, but
-// are neighbours of those. Clouds are learned from one after the other and need not be of one
-// place. INVALID_ARGUMENT for bad options and for classes without a point.
-absl::StatusOr<Classifier> TrainClassifier(const std::vector<PointCloud>& clouds,
-                                           const std::vector<ClassName>& classes,
-                                           const TrainingOptions& options,
-                                           ClassifierProgress progress,
-                                           const Stop& stop);
-
-// The same from `clouds` clouds of a source, each asked for once and in order.
-absl::StatusOr<Classifier> TrainClassifier(std::size_t clouds,
-                                           CloudSource source,
-                                           const std::vector<ClassName>& classes,
-                                           const TrainingOptions& options,
-                                           ClassifierProgress progress,
-                                           const Stop& stop);
+// Features as the model sees them.
+FeatureMatrix Standardised(const Classifier& classifier, FeatureMatrix features);
 
 // Deterministic. Points that are not finite get what their constant feature says.
 absl::StatusOr<ClassifiedCloud> Classify(const Classifier& classifier,

@@ -11,6 +11,8 @@
 namespace strata {
 namespace {
 
+constexpr std::size_t kCandidates = 16;  // for a point's few neighbours
+
 // What a network is drawn with.
 class Drawer {
  public:
@@ -91,6 +93,11 @@ absl::Status NetworkOptions::Validate() const {
 
 std::vector<NetworkEdge> DrawNetwork(const Neighbours& neighbours, const NetworkOptions& options) {
   return Drawer(neighbours, options).Run();
+}
+
+std::vector<NetworkEdge> DrawNetwork(std::span<const Eigen::Vector3f> points,
+                                     const NetworkOptions& options) {
+  return DrawNetwork(Neighbours::Find(points, kCandidates), options);
 }
 
 }  // namespace strata

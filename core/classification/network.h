@@ -30,6 +30,9 @@ struct NetworkOptions {
 // is there once and no point has more than `max_degree`. By i, then j. `options` must be valid. The
 // same for the same neighbours and seed.
 std::vector<NetworkEdge> DrawNetwork(const Neighbours& neighbours, const NetworkOptions& options);
+// Of points whose neighbours are looked for first: 16 of each.
+std::vector<NetworkEdge> DrawNetwork(std::span<const Eigen::Vector3f> points,
+                                     const NetworkOptions& options);
 
 }  // namespace strata
 

@@ -10,6 +10,7 @@
 
 #include "core/classification/classifier.h"
 #include "core/classification/evaluation.h"
+#include "core/classification/training.h"
 #include "core/cloud/point_cloud.h"
 #include "core/common/stop.h"
 
@@ -24,23 +25,14 @@ absl::StatusOr<ConfusionMatrix> EvaluateClassifier(const Classifier& classifier,
                                                    const Stop& stop);
 
 // k-fold validation: every cloud is classified once, by a classifier that learned from the clouds
-// of the other folds (DrawFolds with seed 1); points of one cloud are never on both sides. A class
-// that is in one fold only cannot be learned for it, and counts as missed. INVALID_ARGUMENT unless
-// 2 ≤ folds ≤ groups; otherwise errors as TrainClassifier(). `groups`: of every cloud, in [0,
-// number of groups); clouds of one group are left out together.
-absl::StatusOr<ConfusionMatrix> CrossValidate(const std::vector<PointCloud>& clouds,
+// of the other folds (DrawFolds with seed 1); points of one cloud are never on both sides.
+// `groups`: of every cloud of the set, in [0, number of groups); clouds of one group are left out
+// together. A class that is in one fold only cannot be learned for it, and counts as missed.
+// `source` is what the set was read from, and gone through once. INVALID_ARGUMENT unless 2 ≤ folds
+// ≤ groups; otherwise errors as LearnClassifier().
+absl::StatusOr<ConfusionMatrix> CrossValidate(const TrainingSet& set,
                                               std::span<const std::size_t> groups,
-                                              const std::vector<ClassName>& classes,
-                                              const TrainingOptions& options,
-                                              std::size_t folds,
-                                              ClassifierProgress progress,
-                                              const Stop& stop);
-
-// The same over the clouds of a source, one for each of `groups`; it is gone through several times.
-absl::StatusOr<ConfusionMatrix> CrossValidate(std::span<const std::size_t> groups,
                                               CloudSource source,
-                                              const std::vector<ClassName>& classes,
-                                              const TrainingOptions& options,
                                               std::size_t folds,
                                               ClassifierProgress progress,
                                               const Stop& stop);

@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "core/classification/training.h"
 #include "core/classification/validation.h"
 #include "core/common/status.h"
 #include "core/engine/classifier_store.h"
@@ -23,7 +24,8 @@ namespace {
 
 // Shares of the whole job.
 constexpr double kReadingEnd = 0.1;
-constexpr double kValidationEnd = 0.8;
+constexpr double kFeaturesEnd = 0.5;
+constexpr double kValidationEnd = 0.9;
 
 // Progress of a part of the job, as the job's own.
 class Part {
@@ -96,25 +98,27 @@ std::map<std::string, double> ScoresOf(const ConfusionMatrix& confusion,
   return scores;
 }
 
+auto SourceOf(const LabelledScans& scans) {
+  return [&scans](std::size_t k, absl::FunctionRef<absl::Status(const PointCloud&)> use) {
+    return scans.Visit(k, use);
+  };
+}
+
 absl::StatusOr<std::map<std::string, double>> Validate(const LabelledScans& scans,
+                                                       const TrainingSet& set,
                                                        const TrainSettings& settings,
                                                        JobContext& context) {
   const std::vector<std::size_t> regions = scans.Regions(settings.region_m);
-  const std::size_t apart = regions.empty() ? 0 : *std::ranges::max_element(regions) + 1;
-  const std::size_t folds = std::min<std::size_t>(apart, settings.folds);
+  const std::size_t folds =
+      std::min<std::size_t>(*std::ranges::max_element(regions) + 1, settings.folds);
   if (folds < 2) return std::map<std::string, double>();
-  STRATA_ASSIGN_OR_RETURN(
-      const ConfusionMatrix confusion,
-      CrossValidate(
-          regions,
-          [&](std::size_t k, absl::FunctionRef<absl::Status(const PointCloud&)> use) {
-            return scans.Visit(k, use);
-          },
-          scans.classes(),
-          settings.options,
-          folds,
-          Part(context, kReadingEnd, kValidationEnd, "validating"),
-          context.stop()));
+  STRATA_ASSIGN_OR_RETURN(const ConfusionMatrix confusion,
+                          CrossValidate(set,
+                                        regions,
+                                        SourceOf(scans),
+                                        folds,
+                                        Part(context, kFeaturesEnd, kValidationEnd, "validating"),
+                                        context.stop()));
   std::map<std::string, double> scores = ScoresOf(confusion, scans.classes());
   scores["folds"] = static_cast<double>(folds);
   return scores;
@@ -154,18 +158,16 @@ absl::Status RunTrainJob(MapCore& core, const JobInfo& job, JobContext& context)
         "no scan has labels: upload some with labels, or give some with scan label");
   }
   ClassifierInfo info;
-  STRATA_ASSIGN_OR_RETURN(info.scores, Validate(scans, settings, context));
-  STRATA_ASSIGN_OR_RETURN(
-      const Classifier classifier,
-      TrainClassifier(
-          scans.size(),
-          [&](std::size_t k, absl::FunctionRef<absl::Status(const PointCloud&)> use) {
-            return scans.Visit(k, use);
-          },
-          scans.classes(),
-          settings.options,
-          Part(context, kValidationEnd, 1.0, "learning"),
-          context.stop()));
+  STRATA_ASSIGN_OR_RETURN(const TrainingSet set,
+                          ReadTrainingSet(scans.size(),
+                                          SourceOf(scans),
+                                          scans.classes(),
+                                          settings.options,
+                                          Part(context, kReadingEnd, kFeaturesEnd, "features"),
+                                          context.stop()));
+  STRATA_ASSIGN_OR_RETURN(info.scores, Validate(scans, set, settings, context));
+  STRATA_RETURN_IF_ERROR(context.Progress(kValidationEnd, "learning"));
+  STRATA_ASSIGN_OR_RETURN(const Classifier classifier, LearnClassifier(set, context.stop()));
   const std::string method(ToString(settings.options.method));
   info.name = settings.name.empty() ? absl::StrCat(method, "-", job.id) : settings.name;
   info.job = job.id;

@@ -23,8 +23,8 @@
 
 #include "core/classification/amn_inference.h"
 #include "core/classification/amn_learning.h"
-#include "core/classification/classifier.h"
 #include "core/classification/neighbours.h"
+#include "core/classification/training.h"
 #include "tests/bench/classification_peers.h"
 #include "tests/support/labelled_clouds.h"
 

@@ -21,9 +21,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "core/classification/classifier.h"
 #include "core/classification/evaluation.h"
 #include "core/classification/neighbours.h"
+#include "core/classification/training.h"
 #include "tests/bench/classification_peers.h"
 
 namespace strata {

@@ -1,5 +1,3 @@
-#include "core/classification/classifier.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -10,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "core/classification/classifier_codec.h"
+#include "core/classification/training.h"
 #include "core/codec/blob.h"
 #include "tests/core/classification/random_networks.h"
 #include "tests/support/status_matchers.h"

@@ -8,8 +8,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/classification/classifier_codec.h"
 #include "core/classification/regions.h"
 #include "core/common/random.h"
+#include "core/common/status.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {
@@ -46,6 +48,17 @@ TrainingOptions Quick() {
   return options;
 }
 
+absl::StatusOr<ConfusionMatrix> Validated(const std::vector<PointCloud>& clouds,
+                                          const std::vector<std::size_t>& groups,
+                                          const std::vector<ClassName>& classes,
+                                          std::size_t folds,
+                                          const Stop& stop = Stop()) {
+  STRATA_ASSIGN_OR_RETURN(
+      const TrainingSet set,
+      ReadTrainingSet(clouds.size(), SourceOf(clouds), classes, Quick(), NoProgress, Stop()));
+  return CrossValidate(set, groups, SourceOf(clouds), folds, NoProgress, stop);
+}
+
 TEST(ValidationTest, CountsLabelledPointsByTruthAndClassGiven) {
   STRATA_ASSERT_OK_AND_ASSIGN(
       const Classifier classifier,
@@ -73,9 +86,8 @@ TEST(ValidationTest, CountsLabelledPointsByTruthAndClassGiven) {
 
 TEST(ValidationTest, EveryCloudIsLabelledOnceByAClassifierThatNeverSawIt) {
   const std::vector<PointCloud> clouds = {Room(1, true), Room(2, true), Room(3, true)};
-  STRATA_ASSERT_OK_AND_ASSIGN(
-      const ConfusionMatrix confusion,
-      CrossValidate(clouds, kEach, kClasses, Quick(), 3, NoProgress, Stop()));
+  STRATA_ASSERT_OK_AND_ASSIGN(const ConfusionMatrix confusion,
+                              Validated(clouds, kEach, kClasses, 3));
   ConfusionMatrix by_hand(2);
   for (std::size_t i = 0; i < 3; ++i) {
     STRATA_ASSERT_OK_AND_ASSIGN(const Classifier classifier,
@@ -92,30 +104,64 @@ TEST(ValidationTest, EveryCloudIsLabelledOnceByAClassifierThatNeverSawIt) {
   EXPECT_EQ(confusion.Accuracy(), by_hand.Accuracy());
 }
 
+TEST(ValidationTest, CloudsAreGoneThroughOnceToLearnAndOnceToJudge) {
+  std::vector<PointCloud> clouds = {Room(1, true), Room(2, true), Room(3, true)};
+  clouds[1].label.clear();
+  std::vector<int> visits(3, 0);
+  const auto counted = [&](std::size_t k, absl::FunctionRef<absl::Status(const PointCloud&)> use) {
+    ++visits[k];
+    return use(clouds[k]);
+  };
+  STRATA_ASSERT_OK_AND_ASSIGN(const TrainingSet set,
+                              ReadTrainingSet(3, counted, kClasses, Quick(), NoProgress, Stop()));
+  EXPECT_THAT(visits, ElementsAre(1, 1, 1));
+  STRATA_ASSERT_OK_AND_ASSIGN(const ConfusionMatrix confusion,
+                              CrossValidate(set, kEach, counted, 3, NoProgress, Stop()));
+  EXPECT_THAT(visits, ElementsAre(2, 2, 2));
+  EXPECT_EQ(confusion.total(), 2U * 760U);
+  STRATA_ASSERT_OK_AND_ASSIGN(const Classifier learned, LearnClassifier(set, Stop()));
+  STRATA_ASSERT_OK_AND_ASSIGN(const Classifier trained,
+                              TrainClassifier(clouds, kClasses, Quick(), NoProgress, Stop()));
+  EXPECT_EQ(EncodeClassifier(learned), EncodeClassifier(trained));
+}
+
+// Where points are drawn, those of all clouds together are bounded.
+TEST(ValidationTest, OfManyCloudsFewerPointsEachAreKept) {
+  std::vector<PointCloud> clouds(400, Room(1, true));
+  TrainingOptions options = Quick();
+  const auto kept = [&](std::size_t count) -> std::size_t {
+    const auto set =
+        ReadTrainingSet(count, SourceOf(clouds), kClasses, options, NoProgress, Stop());
+    STRATA_EXPECT_OK(set);
+    return set.ok() ? set->clouds[0].data.size() : 0;
+  };
+  EXPECT_EQ(kept(1), 760U);
+  EXPECT_LE(kept(400), 100'000U / 400U + 2U);
+  options.reduction.kind = ReductionKind::kNone;
+  EXPECT_EQ(kept(3), 760U);
+}
+
 TEST(ValidationTest, AClassOfOneCloudAloneCountsAsMissed) {
   const std::vector<ClassName> classes = {{4, "floor"}, {6, "wall"}, {8, "pond"}};
   std::vector<PointCloud> clouds = {Room(1, true), Room(2, true), Room(3, true)};
   for (std::size_t i = 1; i < 800; i += 4) clouds[1].label[i] = 8;
-  STRATA_ASSERT_OK_AND_ASSIGN(
-      const ConfusionMatrix confusion,
-      CrossValidate(clouds, kEach, classes, Quick(), 3, NoProgress, Stop()));
+  STRATA_ASSERT_OK_AND_ASSIGN(const ConfusionMatrix confusion,
+                              Validated(clouds, kEach, classes, 3));
   EXPECT_EQ(confusion.Recall(2), 0.0);
-  EXPECT_THAT(CrossValidate(clouds, kEach, classes, Quick(), 4, NoProgress, Stop()),
+  EXPECT_THAT(Validated(clouds, kEach, classes, 4),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("folds 4 is not in [2, 3]")));
-  EXPECT_THAT(CrossValidate(clouds, kEach, classes, Quick(), 1, NoProgress, Stop()),
+  EXPECT_THAT(Validated(clouds, kEach, classes, 1),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("folds 1 is not in")));
   Stop stop;
   stop.Request();
-  EXPECT_THAT(CrossValidate(clouds, kEach, classes, Quick(), 3, NoProgress, stop),
+  EXPECT_THAT(Validated(clouds, kEach, classes, 3, stop),
               StatusIs(absl::StatusCode::kCancelled, HasSubstr("")));
 }
 
 TEST(ValidationTest, CloudsOfOneGroupAreLeftOutTogether) {
   const std::vector<PointCloud> clouds = {Room(1, true), Room(2, true), Room(3, true)};
-  STRATA_ASSERT_OK_AND_ASSIGN(
-      const ConfusionMatrix confusion,
-      CrossValidate(
-          clouds, std::vector<std::size_t>{0, 1, 0}, kClasses, Quick(), 2, NoProgress, Stop()));
+  STRATA_ASSERT_OK_AND_ASSIGN(const ConfusionMatrix confusion,
+                              Validated(clouds, {0, 1, 0}, kClasses, 2));
   STRATA_ASSERT_OK_AND_ASSIGN(const Classifier of_second,
                               TrainClassifier({clouds[1]}, kClasses, Quick(), NoProgress, Stop()));
   STRATA_ASSERT_OK_AND_ASSIGN(
@@ -132,10 +178,8 @@ TEST(ValidationTest, CloudsOfOneGroupAreLeftOutTogether) {
     for (std::size_t k = 0; k < 2; ++k)
       EXPECT_EQ(confusion.count(truth, k), by_hand.count(truth, k));
   }
-  EXPECT_THAT(
-      CrossValidate(
-          clouds, std::vector<std::size_t>{0, 0, 0}, kClasses, Quick(), 2, NoProgress, Stop()),
-      StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("folds 2 is not in [2, 1]")));
+  EXPECT_THAT(Validated(clouds, {0, 0, 0}, kClasses, 2),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("folds 2 is not in [2, 1]")));
 }
 
 TEST(RegionsTest, CloudsAreCutAlongTheSquaresOfTheirCommonFrame) {
