@@ -8,8 +8,9 @@
 //   classification_thesis people      two people, 11-fold (Table 9.1, H)
 //   classification_thesis places      rooms, corridors, lobbies (Fig. 9.6)
 //
-// and, after it, how many of the ten seeds (all). What they are run with stands in
-// classification_cases.h. Ends with 1 if what must hold does not.
+// and, after it, how many of the ten worlds (all), and `tuning` for those that options are chosen
+// in instead of those of the tables. What they are run with stands in classification_cases.h. Ends
+// with 1 if what must hold does not.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -573,7 +574,8 @@ void Scenes(Seeds seeds) {
 int Main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
   const int count = argc > 2 ? std::atoi(argv[2]) : 10;
-  const Seeds seeds = Seeds(testing::kClassificationSeeds)
+  const bool tuning = argc > 3 && argv[3] == std::string("tuning");
+  const Seeds seeds = Seeds(tuning ? testing::kTuningSeeds : testing::kClassificationSeeds)
                           .first(static_cast<std::size_t>(std::clamp(count, 1, 10)));
   const std::pair<const char*, void (*)(Seeds)> experiments[] = {{"scenes", &Scenes},
                                                                  {"facade", &Facade},
@@ -589,7 +591,7 @@ int Main(int argc, char** argv) {
   }
   std::fprintf(stderr,
                "usage: classification_thesis "
-               "scenes|facade|depths|transform|objects|people|places [SEEDS]\n");
+               "scenes|facade|depths|transform|objects|people|places [WORLDS [tuning]]\n");
   return 2;
 }
 
