@@ -28,33 +28,36 @@ class CuttingPlanes {
 
   absl::StatusOr<AmnLearning> Run(const Stop& stop) {
     AmnLearning best;
-    best.weights = Unpack(program_.weights());
+    Eigen::VectorXd best_w = program_.weights();
     for (int k = 0; k < options_.max_iterations; ++k) {
       STRATA_RETURN_IF_ERROR(stop.status());
-      STRATA_ASSIGN_OR_RETURN(const Plane plane, MostViolated(stop));
-      const Eigen::VectorXd& w = program_.weights();
+      // Far from the best point so far the planes say little: where they have their least is often
+      // worse. A part of the way there, either a better point or a better bound is found
+      // (Ben-Ameur, Neto 2007).
+      const Eigen::VectorXd w = best_w + kStep * (program_.weights() - best_w);
+      STRATA_ASSIGN_OR_RETURN(const Plane plane, MostViolated(w, stop));
       const double slack = std::max(0.0, plane.b - w.dot(plane.a));
       const double objective = 0.5 * w.squaredNorm() + c_ * slack;
       if (k == 0 || objective < best.objective) {
         best.objective = objective;
-        best.weights = Unpack(w);
+        best_w = w;
       }
       best.iterations = k + 1;
       best.lower_bound = std::max(best.lower_bound, program_.dual());
       const double gap = best.objective - best.lower_bound;
-      if (gap <= options_.tolerance * best.objective) {
-        best.converged = true;
-        return best;
-      }
+      best.converged = gap <= options_.tolerance * best.objective;
+      if (best.converged) break;
       program_.AddPlane(plane.a, plane.b);
       program_.Solve(kProgramShare * std::max(gap, options_.tolerance * best.objective));
     }
+    best.weights = Unpack(best_w);
     return best;
   }
 
  private:
   // The program under the planes needs to be known better than what planes are added for.
   static constexpr double kProgramShare = 0.05;
+  static constexpr double kStep = 0.25;
 
   struct Plane {
     Eigen::VectorXd a;  // Ψ(ŷ) − Ψ(y)
@@ -83,9 +86,9 @@ class CuttingPlanes {
   }
 
   // Scores that also count wrong labels.
-  AmnProblem Augmented() const {
+  AmnProblem Augmented(const Eigen::VectorXd& w) const {
     AmnProblem problem;
-    const AmnWeights weights = Unpack(program_.weights());
+    const AmnWeights weights = Unpack(w);
     problem.node_scores = features_ * weights.node.transpose();
     problem.node_scores.array() += 1.0;
     for (std::size_t i = 0; i < set_.labels.size(); ++i) {
@@ -96,12 +99,12 @@ class CuttingPlanes {
     return problem;
   }
 
-  absl::StatusOr<Plane> MostViolated(const Stop& stop) const {
-    return options_.relaxed ? MostViolatedRelaxed() : MostViolatedLabels(stop);
+  absl::StatusOr<Plane> MostViolated(const Eigen::VectorXd& w, const Stop& stop) const {
+    return options_.relaxed ? MostViolatedRelaxed(w) : MostViolatedLabels(w, stop);
   }
 
-  absl::StatusOr<Plane> MostViolatedLabels(const Stop& stop) const {
-    STRATA_ASSIGN_OR_RETURN(const AmnLabels worst, MaximizeScore(Augmented(), stop));
+  absl::StatusOr<Plane> MostViolatedLabels(const Eigen::VectorXd& w, const Stop& stop) const {
+    STRATA_ASSIGN_OR_RETURN(const AmnLabels worst, MaximizeScore(Augmented(w), stop));
     Plane plane;
     plane.a = psi_right_ - PsiOf(worst.labels);
     for (std::size_t i = 0; i < worst.labels.size(); ++i) {
@@ -110,8 +113,8 @@ class CuttingPlanes {
     return plane;
   }
 
-  absl::StatusOr<Plane> MostViolatedRelaxed() const {
-    STRATA_ASSIGN_OR_RETURN(const AmnRelaxation worst, RelaxScore(Augmented()));
+  absl::StatusOr<Plane> MostViolatedRelaxed(const Eigen::VectorXd& w) const {
+    STRATA_ASSIGN_OR_RETURN(const AmnRelaxation worst, RelaxScore(Augmented(w)));
     const Eigen::Index d = features_.cols();
     Plane plane;
     plane.a = psi_right_;
