@@ -19,9 +19,9 @@ class CuttingPlanes {
   CuttingPlanes(const AmnTrainingSet& set, const AmnLearningOptions& options)
       : set_(set),
         options_(options),
-        features_(set.features.cast<double>()),
+        features_(SumsOfFeatures(set)),
         classes_(static_cast<Eigen::Index>(set.classes)),
-        c_(options.slack_weight / static_cast<double>(std::max<std::size_t>(1, set.labels.size()))),
+        c_(options.slack_weight / std::max(1.0, set.TotalCount())),
         program_(classes_ * (features_.cols() + 1), classes_, c_) {
     psi_right_ = PsiOf({set.labels.begin(), set.labels.end()});
   }
@@ -61,8 +61,17 @@ class CuttingPlanes {
 
   struct Plane {
     Eigen::VectorXd a;  // Ψ(ŷ) − Ψ(y)
-    double b = 0.0;     // how many labels of y are wrong
+    double b = 0.0;     // how many points y has wrong
   };
+
+  // Over the points that a row stands for.
+  static ScoreMatrix SumsOfFeatures(const AmnTrainingSet& set) {
+    ScoreMatrix sums = set.features.cast<double>();
+    for (std::size_t i = 0; i < set.labels.size(); ++i) {
+      sums.row(static_cast<Eigen::Index>(i)) *= set.Count(i);
+    }
+    return sums;
+  }
 
   AmnWeights Unpack(const Eigen::VectorXd& w) const {
     AmnWeights weights;
@@ -78,6 +87,7 @@ class CuttingPlanes {
     Eigen::VectorXd psi = Eigen::VectorXd::Zero(classes_ * (d + 1));
     for (std::size_t i = 0; i < labels.size(); ++i) {
       psi.segment(labels[i] * d, d) += features_.row(static_cast<Eigen::Index>(i));
+      psi[classes_ * d + labels[i]] += set_.InnerEdges(i);
     }
     for (const NetworkEdge& edge : set_.edges) {
       if (labels[edge.i] == labels[edge.j]) psi[classes_ * d + labels[edge.i]] += 1.0;
@@ -90,9 +100,11 @@ class CuttingPlanes {
     AmnProblem problem;
     const AmnWeights weights = Unpack(w);
     problem.node_scores = features_ * weights.node.transpose();
-    problem.node_scores.array() += 1.0;
     for (std::size_t i = 0; i < set_.labels.size(); ++i) {
-      problem.node_scores(static_cast<Eigen::Index>(i), set_.labels[i]) -= 1.0;
+      auto scores = problem.node_scores.row(static_cast<Eigen::Index>(i));
+      scores += set_.InnerEdges(i) * weights.edge.transpose();
+      scores.array() += set_.Count(i);
+      scores[set_.labels[i]] -= set_.Count(i);
     }
     problem.edges = set_.edges;
     problem.edge_scores = weights.edge;
@@ -108,7 +120,7 @@ class CuttingPlanes {
     Plane plane;
     plane.a = psi_right_ - PsiOf(worst.labels);
     for (std::size_t i = 0; i < worst.labels.size(); ++i) {
-      plane.b += worst.labels[i] != set_.labels[i] ? 1.0 : 0.0;
+      plane.b += worst.labels[i] != set_.labels[i] ? set_.Count(i) : 0.0;
     }
     return plane;
   }
@@ -122,7 +134,9 @@ class CuttingPlanes {
     for (Eigen::Index k = 0; k < classes_; ++k) plane.a.segment(k * d, d) -= node.row(k);
     plane.a.tail(classes_) -= worst.edge_share.colwise().sum();
     for (std::size_t i = 0; i < set_.labels.size(); ++i) {
-      plane.b += 1.0 - worst.share(static_cast<Eigen::Index>(i), set_.labels[i]);
+      const auto share = worst.share.row(static_cast<Eigen::Index>(i));
+      plane.a.tail(classes_) -= set_.InnerEdges(i) * share.transpose();
+      plane.b += set_.Count(i) * (1.0 - share[set_.labels[i]]);
     }
     return plane;
   }

@@ -70,7 +70,9 @@ class Trainer {
     labelled.features.conservativeResize(static_cast<Eigen::Index>(positions.size()),
                                          Eigen::NoChange);
     classifier_.points_seen += positions.size();
-    Append(Reduce(positions, labelled, options_.reduction));
+    ReducedPoints reduced = Reduce(positions, labelled, options_.reduction);
+    AppendNetwork(positions, reduced);
+    Append(std::move(reduced));
     return absl::OkStatus();
   }
 
@@ -109,12 +111,24 @@ class Trainer {
   }
 
  private:
-  void Append(ReducedPoints reduced) {
-    // A network of its own a cloud: those of different places have nothing to do with each other.
+  // A network of its own a cloud: those of different places have nothing to do with each other.
+  void AppendNetwork(const std::vector<Eigen::Vector3f>& positions, const ReducedPoints& reduced) {
+    const std::size_t rows = reduced.data.size();
+    ContractedNetwork network;
+    if (reduced.row_of.empty()) {
+      network = {NetworkOf(reduced.positions, options_.network), std::vector<std::uint32_t>(rows)};
+    } else {
+      network = Contract(NetworkOf(positions, options_.network), reduced.row_of, rows);
+    }
     const auto first = static_cast<std::uint32_t>(data_.size());
-    for (const NetworkEdge& edge : NetworkOf(reduced.positions, options_.network)) {
+    for (const NetworkEdge& edge : network.edges) {
       edges_.push_back({first + edge.i, first + edge.j});
     }
+    inner_edges_.insert(inner_edges_.end(), network.inner_edges.begin(), network.inner_edges.end());
+    counts_.insert(counts_.end(), reduced.counts.begin(), reduced.counts.end());
+  }
+
+  void Append(ReducedPoints reduced) {
     const Eigen::Index before = data_.features.rows();
     const FeatureMatrix& more = reduced.data.features;
     data_.features.conservativeResize(before + more.rows(), more.cols());
@@ -154,7 +168,9 @@ class Trainer {
     learning.tolerance = 1e-3;
     STRATA_ASSIGN_OR_RETURN(
         AmnLearning learned,
-        LearnByCuttingPlanes({features, edges_, data_.labels, data_.classes}, learning, stop));
+        LearnByCuttingPlanes({features, edges_, data_.labels, data_.classes, counts_, inner_edges_},
+                             learning,
+                             stop));
     return std::move(learned.weights);
   }
 
@@ -162,6 +178,8 @@ class Trainer {
   std::map<std::uint16_t, ClassIndex> index_;  // of class ids
   LabelledFeatures data_;
   std::vector<NetworkEdge> edges_;
+  std::vector<std::uint32_t> counts_;       // of every row of data_
+  std::vector<std::uint32_t> inner_edges_;  // of every row of data_
   Classifier classifier_;
 };
 
