@@ -6,6 +6,8 @@
 #ifndef STRATA_CORE_CLASSIFICATION_AMN_LEARNING_H_
 #define STRATA_CORE_CLASSIFICATION_AMN_LEARNING_H_
 
+#include <cstdint>
+#include <numeric>
 #include <span>
 
 #include "absl/status/status.h"
@@ -22,6 +24,18 @@ struct AmnTrainingSet {
   std::span<const NetworkEdge> edges;
   std::span<const ClassIndex> labels;  // of every point, < classes
   std::size_t classes = 0;
+  // Rows may stand for several points with one label (ReducedPoints): how many each, and how many
+  // edges are among them (ContractedNetwork). The objective is then that of all points, over the
+  // labelings that give points of one row one label. Both empty: rows are points.
+  std::span<const std::uint32_t> counts = {};
+  std::span<const std::uint32_t> inner_edges = {};
+
+  double Count(std::size_t row) const { return counts.empty() ? 1.0 : counts[row]; }
+  double InnerEdges(std::size_t row) const { return inner_edges.empty() ? 0.0 : inner_edges[row]; }
+  double TotalCount() const {
+    return counts.empty() ? static_cast<double>(labels.size())
+                          : std::accumulate(counts.begin(), counts.end(), 0.0);
+  }
 };
 
 struct AmnLearningOptions {

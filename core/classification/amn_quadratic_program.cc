@@ -184,7 +184,9 @@ class MarginNlp final : public Ipopt::TNLP {
     Eigen::MatrixXd node = Eigen::MatrixXd::Zero(classes_, features_);
     Eigen::VectorXd edge = Eigen::VectorXd::Zero(classes_);
     for (Index i = 0; i < points_; ++i) {
-      node.row(set_.labels[static_cast<std::size_t>(i)]) += set_.features.row(i).cast<double>();
+      const auto at = static_cast<std::size_t>(i);
+      node.row(set_.labels[at]) += set_.Count(at) * set_.features.row(i).cast<double>();
+      edge[set_.labels[at]] += set_.InnerEdges(at);
     }
     for (const NetworkEdge& e : set_.edges) {
       if (set_.labels[e.i] == set_.labels[e.j]) edge[set_.labels[e.i]] += 1.0;
@@ -195,7 +197,7 @@ class MarginNlp final : public Ipopt::TNLP {
     }
     Put(Slack(), 1.0);
     for (Index i = 0; i < points_; ++i) Put(PointDual(i), -1.0);
-    EndRow(points_);
+    EndRow(set_.TotalCount());
   }
 
   // α_i − Σ_j α_ij^k − w_n^k · x_i ≥ −ŷ_i^k
@@ -212,9 +214,10 @@ class MarginNlp final : public Ipopt::TNLP {
         Put(PointDual(i), 1.0);
         for (const auto& [e, end] : ends[at]) Put(EdgeDual(e, k, end), -1.0);
         for (Index f = 0; f < features_; ++f) {
-          Put(NodeWeight(k, f), -static_cast<double>(set_.features(i, f)));
+          Put(NodeWeight(k, f), -set_.Count(at) * static_cast<double>(set_.features(i, f)));
         }
-        EndRow(set_.labels[at] == k ? -1.0 : 0.0);
+        Put(EdgeWeight(k), -set_.InnerEdges(at));
+        EndRow(set_.labels[at] == k ? -set_.Count(at) : 0.0);
       }
     }
   }
@@ -250,8 +253,7 @@ absl::StatusOr<AmnLearning> LearnByQuadraticProgram(const AmnTrainingSet& set,
                                                     const AmnLearningOptions& options) {
   STRATA_RETURN_IF_ERROR(options.Validate());
   AmnLearning result;
-  const double c =
-      options.slack_weight / static_cast<double>(std::max<std::size_t>(1, set.labels.size()));
+  const double c = options.slack_weight / std::max(1.0, set.TotalCount());
   const Ipopt::SmartPtr<Ipopt::TNLP> program = new MarginNlp(set, c, result);
   const Ipopt::SmartPtr<Ipopt::IpoptApplication> solver = IpoptApplicationFactory();
   solver->Options()->SetIntegerValue("print_level", 0);

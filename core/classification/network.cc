@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <span>
+#include <utility>
 
 #include "core/common/option_checks.h"
 #include "core/common/random.h"
@@ -13,6 +14,10 @@ namespace {
 
 constexpr std::size_t kCandidates = 16;  // for a point's few neighbours
 
+bool IsBefore(const NetworkEdge& a, const NetworkEdge& b) {
+  return a.i != b.i ? a.i < b.i : a.j < b.j;
+}
+
 // What a network is drawn with.
 class Drawer {
  public:
@@ -21,9 +26,7 @@ class Drawer {
 
   std::vector<NetworkEdge> Run() {
     for (std::uint32_t point = 0; point < degree_.size(); ++point) DrawFor(point);
-    std::sort(edges_.begin(), edges_.end(), [](const NetworkEdge& a, const NetworkEdge& b) {
-      return a.i != b.i ? a.i < b.i : a.j < b.j;
-    });
+    std::sort(edges_.begin(), edges_.end(), IsBefore);
     return std::move(edges_);
   }
 
@@ -98,6 +101,23 @@ std::vector<NetworkEdge> DrawNetwork(const Neighbours& neighbours, const Network
 std::vector<NetworkEdge> DrawNetwork(std::span<const Eigen::Vector3f> points,
                                      const NetworkOptions& options) {
   return DrawNetwork(Neighbours::Find(points, kCandidates), options);
+}
+
+ContractedNetwork Contract(std::span<const NetworkEdge> edges,
+                           std::span<const std::uint32_t> row_of,
+                           std::size_t rows) {
+  ContractedNetwork contracted;
+  contracted.inner_edges.resize(rows, 0);
+  for (const NetworkEdge& edge : edges) {
+    const auto [low, high] = std::minmax(row_of[edge.i], row_of[edge.j]);
+    if (low == high) {
+      ++contracted.inner_edges[low];
+    } else {
+      contracted.edges.push_back({low, high});
+    }
+  }
+  std::sort(contracted.edges.begin(), contracted.edges.end(), IsBefore);
+  return contracted;
 }
 
 }  // namespace strata

@@ -2,7 +2,9 @@
 #ifndef STRATA_CORE_CLASSIFICATION_NETWORK_H_
 #define STRATA_CORE_CLASSIFICATION_NETWORK_H_
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -33,6 +35,17 @@ std::vector<NetworkEdge> DrawNetwork(const Neighbours& neighbours, const Network
 // Of points whose neighbours are looked for first: 16 of each.
 std::vector<NetworkEdge> DrawNetwork(std::span<const Eigen::Vector3f> points,
                                      const NetworkOptions& options);
+
+// The network of points as one of rows that stand for several points each.
+struct ContractedNetwork {
+  std::vector<NetworkEdge> edges;          // one for every edge between points of two rows
+  std::vector<std::uint32_t> inner_edges;  // of every row: how many are among its points
+};
+
+// `row_of`: of every point, below `rows`. By i, then j.
+ContractedNetwork Contract(std::span<const NetworkEdge> edges,
+                           std::span<const std::uint32_t> row_of,
+                           std::size_t rows);
 
 }  // namespace strata
 

@@ -38,6 +38,7 @@ class Reducer {
     }
     if (options_.kind == ReductionKind::kBalanced) order_ = DrawBalanced();
     if (options_.kind == ReductionKind::kDepth || options_.kind == ReductionKind::kPure) {
+      reduced_.row_of.resize(order_.size());
       Split(order_, 0, leaves);
     } else {
       for (std::uint32_t& row : order_) leaves.emplace_back(&row, 1);
@@ -121,6 +122,8 @@ class Reducer {
     reduced_.positions.push_back(mean);
     reduced_.data.labels.push_back(CommonestLabel(rows));
     reduced_.counts.push_back(static_cast<std::uint32_t>(rows.size()));
+    if (reduced_.row_of.empty()) return;
+    for (const std::uint32_t row : rows) reduced_.row_of[row] = static_cast<std::uint32_t>(at);
   }
 
   const std::span<const Eigen::Vector3f> positions_;

@@ -4,6 +4,11 @@
 // those were computed in the full cloud, so that learning sees what inference will see. Means of
 // features are smoother than features of points are, and a classifier learned from them is too
 // sure; features computed anew among the fewer points would be those of another, coarser sensor.
+//
+// Networks are learned as if all points were there, but those of one leaf shared one label: a leaf
+// weighs as many points as it stands for, and keeps the edges of its points (Contract() in
+// network.h). A network drawn among the leaves themselves would be one of borders: neighbours there
+// differ far more often than they do where inference will look, and its edges are learned too weak.
 #ifndef STRATA_CORE_CLASSIFICATION_REDUCTION_H_
 #define STRATA_CORE_CLASSIFICATION_REDUCTION_H_
 
@@ -52,6 +57,9 @@ struct ReducedPoints {
   std::vector<Eigen::Vector3f> positions;
   LabelledFeatures data;
   std::vector<std::uint32_t> counts;  // how many points each stands for
+  // Of trees (kDepth, kPure): for every point given, which of these stands for it. Empty where
+  // points were drawn, or all are kept: they stand for themselves.
+  std::vector<std::uint32_t> row_of;
 };
 
 // `positions` beside the rows of `data`, which must be valid, as must `options`. The tree halves

@@ -25,12 +25,25 @@ void Append(const TrainingCloud& more, TrainingCloud& to) {
   // A network of its own a cloud: those of different places have nothing to do with each other.
   const auto first = static_cast<std::uint32_t>(to.data.size());
   for (const NetworkEdge& edge : more.edges) to.edges.push_back({first + edge.i, first + edge.j});
+  to.counts.insert(to.counts.end(), more.counts.begin(), more.counts.end());
+  to.inner_edges.insert(to.inner_edges.end(), more.inner_edges.begin(), more.inner_edges.end());
   const Eigen::Index before = to.data.features.rows();
   const FeatureMatrix& features = more.data.features;
   to.data.features.conservativeResize(before + features.rows(), features.cols());
   to.data.features.bottomRows(features.rows()) = features;
   to.data.labels.insert(to.data.labels.end(), more.data.labels.begin(), more.data.labels.end());
   to.points_seen += more.points_seen;
+}
+
+// Rows that stand for several points keep the network of these.
+ContractedNetwork NetworkOf(std::span<const Eigen::Vector3f> positions,
+                            const ReducedPoints& reduced,
+                            const NetworkOptions& options) {
+  const std::size_t rows = reduced.data.size();
+  if (!reduced.row_of.empty()) {
+    return Contract(DrawNetwork(positions, options), reduced.row_of, rows);
+  }
+  return {DrawNetwork(reduced.positions, options), std::vector<std::uint32_t>(rows)};
 }
 
 // What is learned from of one part of a cloud.
@@ -56,8 +69,12 @@ absl::StatusOr<TrainingCloud> ReadPart(const PointCloud& part,
   labelled.features.conservativeResize(static_cast<Eigen::Index>(positions.size()),
                                        Eigen::NoChange);
   ReducedPoints reduced = Reduce(positions, labelled, options.reduction);
-  return TrainingCloud{
-      std::move(reduced.data), DrawNetwork(reduced.positions, options.network), positions.size()};
+  ContractedNetwork network = NetworkOf(positions, reduced, options.network);
+  return TrainingCloud{std::move(reduced.data),
+                       std::move(network.edges),
+                       std::move(reduced.counts),
+                       std::move(network.inner_edges),
+                       positions.size()};
 }
 
 class Learner {
@@ -138,10 +155,15 @@ class Learner {
     AmnLearningOptions learning;
     learning.slack_weight = options_.slack_weight;
     learning.tolerance = 1e-3;
-    STRATA_ASSIGN_OR_RETURN(
-        AmnLearning learned,
-        LearnByCuttingPlanes(
-            {features, all_.edges, all_.data.labels, all_.data.classes}, learning, stop));
+    STRATA_ASSIGN_OR_RETURN(AmnLearning learned,
+                            LearnByCuttingPlanes({features,
+                                                  all_.edges,
+                                                  all_.data.labels,
+                                                  all_.data.classes,
+                                                  all_.counts,
+                                                  all_.inner_edges},
+                                                 learning,
+                                                 stop));
     return std::move(learned.weights);
   }
 

@@ -32,7 +32,9 @@ using CloudSource = absl::FunctionRef<absl::Status(
 struct TrainingCloud {
   LabelledFeatures data;  // may lack classes
   std::vector<NetworkEdge> edges;
-  std::uint64_t points_seen = 0;  // before reduction
+  std::vector<std::uint32_t> counts;       // of every row: how many points it stands for
+  std::vector<std::uint32_t> inner_edges;  // of every row: how many edges are among those
+  std::uint64_t points_seen = 0;           // before reduction
 };
 
 struct TrainingSet {

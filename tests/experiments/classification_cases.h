@@ -1,5 +1,5 @@
 // What the experiments on classification (thesis 9.3, 9.4) are run with. Fixed before the first
-// result was seen: a change here makes every table a new one.
+// result in the worlds of the tables was seen: a change here makes every table a new one.
 #ifndef STRATA_TESTS_EXPERIMENTS_CLASSIFICATION_CASES_H_
 #define STRATA_TESTS_EXPERIMENTS_CLASSIFICATION_CASES_H_
 
@@ -8,8 +8,13 @@
 
 namespace strata::testing {
 
-// Every seed is a world of its own: other walls, objects, people and rooms, other noise.
+// Every seed is a world of its own: other walls, objects, people and rooms, other noise. The tables
+// are of the first ten; these were never looked at before all below was fixed.
 inline constexpr std::array<std::uint64_t, 10> kClassificationSeeds = {
+    401, 402, 403, 404, 405, 406, 407, 408, 409, 410};
+// The worlds of the first tables. Some options were chosen after their results had been seen, so
+// these are what everything is tuned in from now on.
+inline constexpr std::array<std::uint64_t, 10> kTuningSeeds = {
     101, 102, 103, 104, 105, 106, 107, 108, 109, 110};
 
 // The `index`-th scan of a world's set: training facade, test facades, S, M, H, training wing, test

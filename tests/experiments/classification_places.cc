@@ -1,159 +1,286 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <utility>
+#include <numbers>
+#include <vector>
 
-#include "core/geometry/pose.h"
 #include "tests/experiments/classification_cases.h"
 #include "tests/experiments/classification_scenes.h"
-#include "tests/support/scene.h"
 #include "tests/support/simulator.h"
 
 namespace strata::testing {
 namespace {
 
 using Eigen::Vector2d;
-using Eigen::Vector3d;
 
 constexpr std::uint16_t kRoom = 1, kCorridor = 2, kLobby = 3;
 constexpr double kWallM = 0.15;      // thickness
 constexpr double kClearanceM = 0.2;  // of a cell from all that stands there
+constexpr double kDoorM = 0.95;
+constexpr double kTurn = 2.0 * std::numbers::pi;
+// Of a beam. One that hits glass or something black does not come back.
+constexpr double kBeamSigmaM = 0.03;
+constexpr double kLostBeams = 0.02;
+// What a robot's map has wrong: wall cells beside free ones that it takes for free.
+constexpr double kWornCells = 0.1;
 
-// A wing: the corridor along x from 0, rooms on both sides, the lobby at its end.
+// The robot's occupancy grid: all is wall until it is carved out, and what stands there is put
+// back.
+class Grid {
+ public:
+  static constexpr double kCellM = 0.05;
+
+  Grid(const Vector2d& min, const Vector2d& max)
+      : min_(min),
+        columns_(static_cast<int>((max - min).x() / kCellM)),
+        rows_(static_cast<int>((max - min).y() / kCellM)),
+        free_(static_cast<std::size_t>(columns_ * rows_), 0),
+        label_(free_.size(), 0) {}
+
+  template <typename Inside>
+  void Fill(const Inside& inside) {
+    ForEach([&](std::size_t cell, const Vector2d& p) {
+      if (inside(p)) free_[cell] = 0;
+    });
+  }
+  // `label` 0: free, but nothing that is asked about, as a doorway is.
+  void Carve(std::uint16_t label, const Vector2d& a, const Vector2d& b) {
+    const Eigen::AlignedBox2d box(a.cwiseMin(b), a.cwiseMax(b));
+    ForEach([&](std::size_t cell, const Vector2d& p) {
+      if (!box.contains(p)) return;
+      free_[cell] = 1;
+      label_[cell] = label;
+    });
+  }
+  void Wear(Random& random) {
+    const std::vector<std::uint8_t> before = free_;
+    for (int row = 1; row + 1 < rows_; ++row) {
+      for (int column = 1; column + 1 < columns_; ++column) {
+        const std::size_t cell = Index(column, row);
+        const auto wide = static_cast<std::size_t>(columns_);
+        const bool edge =
+            before[cell - 1] + before[cell + 1] + before[cell - wide] + before[cell + wide] > 0;
+        if (before[cell] == 0 && edge && random.Uniform(0, 1) < kWornCells) free_[cell] = 1;
+      }
+    }
+  }
+
+  bool IsFree(const Vector2d& p) const { return At(free_, p) != 0; }
+  std::uint16_t LabelAt(const Vector2d& p) const { return At(label_, p); }
+  bool IsClear(const Vector2d& p) const {
+    for (double angle = 0.0; angle < kTurn; angle += kTurn / 32) {
+      const Vector2d along(std::cos(angle), std::sin(angle));
+      for (double r = 0.0; r <= kClearanceM; r += kCellM) {
+        if (!IsFree(p + r * along)) return false;
+      }
+    }
+    return true;
+  }
+  double Cast(const Vector2d& from, double angle, double most) const {
+    const Vector2d along(std::cos(angle), std::sin(angle));
+    double range = 0.0;
+    while (range < most && IsFree(from + range * along)) range += 0.5 * kCellM;
+    return std::min(range, most);
+  }
+
+  const Vector2d& min() const { return min_; }
+  Vector2d max() const { return min_ + kCellM * Vector2d(columns_, rows_); }
+
+ private:
+  std::size_t Index(int column, int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+           static_cast<std::size_t>(column);
+  }
+  template <typename T>
+  T At(const std::vector<T>& values, const Vector2d& p) const {
+    const int column = static_cast<int>(std::floor((p - min_).x() / kCellM));
+    const int row = static_cast<int>(std::floor((p - min_).y() / kCellM));
+    const bool inside = column >= 0 && column < columns_ && row >= 0 && row < rows_;
+    return inside ? values[Index(column, row)] : T{0};
+  }
+  template <typename Use>
+  void ForEach(const Use& use) {
+    for (int row = 0; row < rows_; ++row) {
+      for (int column = 0; column < columns_; ++column) {
+        use(Index(column, row), min_ + kCellM * Vector2d(column + 0.5, row + 0.5));
+      }
+    }
+  }
+
+  Vector2d min_;
+  int columns_, rows_;
+  std::vector<std::uint8_t> free_;
+  std::vector<std::uint16_t> label_;
+};
+
+// A wing: the corridor along x from 0, rooms, side corridors and bays on both sides, the lobby at
+// its end.
 class Wing {
  public:
   explicit Wing(std::uint64_t seed) : random_(seed) {}
 
-  Places Scan(std::uint64_t seed) {
-    const double width = In(1.8, 2.6);
+  Places Scan() {
+    const double half = 0.5 * In(1.6, 3.4);
     const double length = In(20.0, 28.0);
-    AddRegion(kCorridor, {0.0, -width / 2}, {length, width / 2});
-    Block({-kWallM, -width / 2 - kWallM}, {0.0, width / 2 + kWallM});
-    for (const double side : {-1.0, 1.0}) AddRooms(side, width / 2, length);
-    AddLobby(length, width / 2);
-    scene_.Build();
-    return CastAll(seed);
+    grid_.Carve(kCorridor, {0.0, -half}, {length, half});
+    for (const double side : {-1.0, 1.0}) AddSlots(side, half, length);
+    AddLobby(length, half);
+    Furnish({0.0, -half}, {length, half}, 0.05, 0.12, true);
+    grid_.Wear(random_);
+    return CastAll();
   }
 
  private:
-  struct Region {
-    std::uint16_t label;
-    Eigen::AlignedBox2d box;
-  };
-
   double In(double low, double high) { return random_.Uniform(low, high); }
-  void AddRegion(std::uint16_t label, const Vector2d& min, const Vector2d& max) {
-    regions_.push_back({label, {min, max}});
-  }
-  void Block(const Vector2d& a, const Vector2d& b) {
-    const Vector2d min = a.cwiseMin(b);
-    const Vector2d max = a.cwiseMax(b);
-    blocked_.emplace_back(min, max);
-    scene_.Add(Box({min.x(), min.y(), 0.0}, {max.x(), max.y(), 2.5}));
-  }
+  bool Chance(double share) { return In(0.0, 1.0) < share; }
 
-  // Along the corridor's wall at side · y, each with a door.
-  void AddRooms(double side, double y, double length) {
+  // What opens from the corridor at side · y, one after the other.
+  void AddSlots(double side, double y, double length) {
     double x = 0.0;
     while (x < length - 1e-9) {
-      double end = x + In(3.0, 6.5);
+      // Whatever is left at the end is a room.
+      const double kind = length - x < 8.0 ? 1.0 : In(0.0, 1.0);
+      double end = x + (kind < 0.12 ? In(1.6, 2.6) : In(2.5, 7.5)) + kWallM;
       if (length - end < 3.0) end = length;
-      const double depth = In(3.5, 6.0);
       const double near = side * (y + kWallM);
-      const double far = side * (y + kWallM + depth);
-      AddRegion(kRoom,
-                Vector2d(x, near).cwiseMin(Vector2d(end, far)),
-                Vector2d(end - kWallM, near).cwiseMax(Vector2d(end - kWallM, far)));
-      const double door = In(x + 0.3, end - kWallM - 1.3);
-      Block({x, side * y}, {door, near});
-      if (In(0, 1) < 0.7) {  // others are shut
-        Block({door + 0.95, side * y}, {end, near});
+      if (kind < 0.12) {  // a side corridor
+        const double far = side * (y + In(4.0, 9.0));
+        grid_.Carve(kCorridor, {x, side * y}, {end - kWallM, far});
+      } else if (kind < 0.25) {  // a bay to wait in, open to the corridor
+        const double far = side * (y + In(1.5, 4.0));
+        grid_.Carve(kLobby, {x, side * y}, {end - kWallM, far});
+        Furnish({x, side * y}, {end - kWallM, far}, 0.15, 0.1, false);
       } else {
-        Block({door, side * y}, {end, near});
+        AddRoom(x, end - kWallM, near, side * (y + kWallM + In(3.0, 7.0)));
       }
-      Block({end - kWallM, near}, {end, far});
-      Block({x, far}, {end, side * (y + 2 * kWallM + depth)});
-      if (x == 0.0) Block({-kWallM, near}, {0.0, far});
-      Furnish({x + 0.2, std::min(near, far) + 0.2},
-              {end - kWallM - 0.2, std::max(near, far) - 0.2});
       x = end;
     }
   }
 
-  // Desks and shelves anywhere.
-  void Furnish(const Vector2d& min, const Vector2d& max) {
-    const int pieces = 1 + static_cast<int>(In(0.0, 4.0));
-    for (int k = 0; k < pieces; ++k) {
-      const Vector2d size(In(0.4, 1.4), In(0.4, 1.4));
-      const Vector2d at(In(min.x(), max.x() - size.x()), In(min.y(), max.y() - size.y()));
-      Block(at, at + size);
+  void AddRoom(double left, double right, double near, double far) {
+    grid_.Carve(kRoom, {left, near}, {right, far});
+    Furnish({left, near}, {right, far}, 0.25, 0.04, Chance(0.5));
+    if (Chance(0.2)) return;  // the door is shut
+    const double side = near > 0.0 ? 1.0 : -1.0;
+    const double door = In(left + 0.2, right - 0.2 - kDoorM);
+    grid_.Carve(0, {door, near - side * (kWallM + 0.01)}, {door + kDoorM, near});
+    // Its leaf stands open into the room as it was left.
+    const double swing = In(0.2, 1.9);
+    const Vector2d leaf(std::cos(swing), side * std::sin(swing));
+    const Vector2d hinge(door, near);
+    Bar(hinge, hinge + kDoorM * leaf, 0.05);
+  }
+
+  void AddLobby(double x, double half) {
+    const double depth = In(4.0, 10.0);
+    const double low = -half - In(0.5, 5.0);
+    const double high = half + In(0.5, 5.0);
+    grid_.Carve(kLobby, {x, low}, {x + depth, high});
+    if (Chance(0.5)) {  // an L
+      const double far = Chance(0.5) ? high + In(2.0, 4.0) : low - In(2.0, 4.0);
+      const double start = x + In(0.0, 0.4) * depth;
+      grid_.Carve(kLobby, {start, 0.0}, {start + In(2.5, 4.0), far});
+    }
+    for (int k = 0; k < 3; ++k) {
+      const Vector2d at(In(x + 1.0, x + depth - 0.5), In(low + 0.5, high - 0.5));
+      Disc(at, In(0.15, 0.35));
+    }
+    Furnish({x, low}, {x + depth, high}, 0.1, 0.1, false);
+  }
+
+  // So many pieces and people a square metre; cupboards may stand along walls only.
+  void Furnish(
+      const Vector2d& a, const Vector2d& b, double pieces, double people, bool along_walls) {
+    const Eigen::AlignedBox2d area(a.cwiseMin(b), a.cwiseMax(b));
+    const double m2 = area.volume();
+    for (double k = In(0.0, 1.0); k < pieces * m2; k += 1.0) AddPiece(area, along_walls);
+    for (double k = In(0.0, 1.0); k < people * m2; k += 1.0) {  // their legs
+      const double angle = In(0.0, kTurn);
+      const Vector2d apart(0.14 * std::cos(angle), 0.14 * std::sin(angle));
+      const Vector2d at = Somewhere(area);
+      Disc(at - apart, 0.07);
+      Disc(at + apart, 0.07);
     }
   }
 
-  void AddLobby(double x, double corridor) {
-    const double depth = In(7.0, 10.0);
-    const double low = -corridor - In(2.0, 5.0);
-    const double high = corridor + In(2.0, 5.0);
-    AddRegion(kLobby, {x, low}, {x + depth, high});
-    Block({x - kWallM, low}, {x, -corridor - kWallM});
-    Block({x - kWallM, corridor + kWallM}, {x, high});
-    Block({x, low - kWallM}, {x + depth, low});
-    Block({x, high}, {x + depth, high + kWallM});
-    Block({x + depth, low}, {x + depth + kWallM, high});
-    for (int k = 0; k < 3; ++k) {  // columns and seats
-      const Vector2d at(In(x + 1.0, x + depth - 1.5), In(low + 1.0, high - 1.5));
-      Block(at, at + Vector2d(In(0.3, 0.8), In(0.3, 0.8)));
+  // A cupboard, a table's or chair's legs, or something round.
+  void AddPiece(const Eigen::AlignedBox2d& area, bool along_walls) {
+    const double kind = In(0.0, 1.0);
+    Vector2d at = Somewhere(area);
+    if (kind < 0.4) {
+      const double long_m = In(0.6, 1.6);
+      const double deep_m = In(0.3, 0.5);
+      if (along_walls) {
+        at.y() = Chance(0.5) ? area.min().y() + deep_m / 2 : area.max().y() - deep_m / 2;
+      }
+      const double angle = along_walls ? 0.0 : In(0.0, kTurn);
+      const Vector2d along(std::cos(angle), std::sin(angle));
+      Bar(at - 0.5 * long_m * along, at + 0.5 * long_m * along, deep_m);
+    } else if (kind < 0.85) {
+      const double angle = In(0.0, kTurn);
+      const Vector2d u(std::cos(angle), std::sin(angle));
+      const Vector2d v(-u.y(), u.x());
+      const double x = In(0.2, 0.7);
+      const double y = In(0.2, 0.4);
+      for (const double s : {-1.0, 1.0}) {
+        for (const double t : {-1.0, 1.0}) Disc(at + s * x * u + t * y * v, 0.04);
+      }
+    } else {
+      Disc(at, In(0.12, 0.3));
     }
   }
 
-  bool IsFree(const Vector2d& p) const {
-    return std::none_of(blocked_.begin(), blocked_.end(), [&](const Eigen::AlignedBox2d& box) {
-      return box.exteriorDistance(p) < kClearanceM;
+  Vector2d Somewhere(const Eigen::AlignedBox2d& area) {
+    return {In(area.min().x(), area.max().x()), In(area.min().y(), area.max().y())};
+  }
+  void Disc(const Vector2d& at, double radius) {
+    grid_.Fill([&](const Vector2d& p) { return (p - at).norm() <= radius; });
+  }
+  // Along the line from a to b.
+  void Bar(const Vector2d& a, const Vector2d& b, double width) {
+    const double length = (b - a).norm();
+    const Vector2d u = (b - a) / length;
+    grid_.Fill([&](const Vector2d& p) {
+      const Vector2d d = p - a;
+      const double across = std::abs(u.x() * d.y() - u.y() * d.x());
+      return d.dot(u) >= 0.0 && d.dot(u) <= length && across <= 0.5 * width;
     });
   }
 
-  Places CastAll(std::uint64_t seed) const {
-    SensorOptions sensor;
-    sensor.rings = 1;
-    sensor.columns = 360;
-    sensor.elevation_min_rad = sensor.elevation_max_rad = 0.0;
-    sensor.min_range_m = 0.0;
-    sensor.max_range_m = static_cast<double>(kPlaceMaxRangeM);
-    sensor.sigma_m = 0.02;
-    sensor.organised = true;
+  std::vector<float> RangesAt(const Vector2d& p) {
+    std::vector<float> ranges;
+    const auto most = static_cast<double>(kPlaceMaxRangeM);
+    for (int degree = 0; degree < 360; ++degree) {
+      const double range = grid_.Cast(p, kTurn * degree / 360.0, most);
+      const double noisy = std::clamp(range + kBeamSigmaM * random_.Gaussian(), 0.0, most);
+      ranges.push_back(Chance(kLostBeams) ? kPlaceMaxRangeM : static_cast<float>(noisy));
+    }
+    return ranges;
+  }
+
+  Places CastAll() {
     Places places;
-    for (const Region& region : regions_) {
-      const Vector2d size = region.box.sizes() / kPlaceCellM;
-      for (int i = 0; i < static_cast<int>(size.x()); ++i) {
-        for (int j = 0; j < static_cast<int>(size.y()); ++j) {
-          const Vector2d p = region.box.min() + kPlaceCellM * Vector2d(i + 0.5, j + 0.5);
-          if (!IsFree(p)) continue;
-          const Pose at = MakePose(Eigen::Quaterniond::Identity(), Vector3d(p.x(), p.y(), 1.0));
-          const PointCloud scan =
-              SimulateScan(scene_, sensor, at, seed ^ (places.cells.size() << 8));
-          std::vector<float> ranges;
-          for (const Eigen::Vector3f& hit : scan.points) {
-            ranges.push_back(hit.allFinite() ? hit.norm() : kPlaceMaxRangeM);
-          }
-          places.cells.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()), 0.0F);
-          places.labels.push_back(region.label);
-          places.ranges_m.push_back(std::move(ranges));
-        }
+    const Vector2d max = grid_.max();
+    for (double x = grid_.min().x(); x < max.x(); x += kPlaceCellM) {
+      for (double y = grid_.min().y(); y < max.y(); y += kPlaceCellM) {
+        const Vector2d p(x, y);
+        if (grid_.LabelAt(p) == 0 || !grid_.IsClear(p)) continue;
+        places.cells.emplace_back(static_cast<float>(x), static_cast<float>(y), 0.0F);
+        places.labels.push_back(grid_.LabelAt(p));
+        places.ranges_m.push_back(RangesAt(p));
       }
     }
     return places;
   }
 
   Random random_;
-  Scene scene_;
-  std::vector<Eigen::AlignedBox2d> blocked_;
-  std::vector<Region> regions_;
+  Grid grid_{{-1.0, -12.0}, {40.0, 12.0}};
 };
 
 }  // namespace
 
 std::vector<std::string> PlaceClasses() { return {"room", "corridor", "lobby"}; }
 
-Places ScanPlaces(std::uint64_t seed) { return Wing(seed).Scan(seed); }
+Places ScanPlaces(std::uint64_t seed) { return Wing(seed).Scan(); }
 
 }  // namespace strata::testing

@@ -35,7 +35,10 @@ PointCloud ScanManyObjects(std::uint64_t seed);
 // Two people who stand, walk, sit or point, from about 3 m (H). No floor, no walls.
 PointCloud ScanPeople(std::uint64_t seed);
 
-// The free cells of one wing of a building: rooms and a lobby along a corridor.
+// The free cells of one wing of a building as a robot's occupancy grid has it: rooms, side
+// corridors and bays along a corridor, a lobby at its end, of any width and shape; doors half open,
+// furniture, people's legs; worn walls, noisy beams and some that do not come back. (The first
+// wings were so tidy that all three methods had 99 % right.)
 struct Places {
   std::vector<Eigen::Vector3f> cells;        // centres, z = 0
   std::vector<std::uint16_t> labels;         // of every cell

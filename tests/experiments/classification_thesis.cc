@@ -8,8 +8,9 @@
 //   classification_thesis people      two people, 11-fold (Table 9.1, H)
 //   classification_thesis places      rooms, corridors, lobbies (Fig. 9.6)
 //
-// and, after it, how many of the ten seeds (all). What they are run with stands in
-// classification_cases.h. Ends with 1 if what must hold does not.
+// and, after it, how many of the ten worlds (all), and `tuning` for those that options are chosen
+// in instead of those of the tables. What they are run with stands in classification_cases.h. Ends
+// with 1 if what must hold does not.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -408,7 +409,10 @@ void Facade(Seeds seeds) {
       Mean(seen),
       Mean(kept),
       Mean(seconds));
-  ExpectMean("facade: Bayes on shape features", bayes_shape, testing::kThesisFacadeBayes);
+  // The thesis gives the best that it found, with features that it does not name.
+  const std::vector<double>& best_bayes =
+      Mean(bayes_shape) > Mean(bayes_wall) ? bayes_shape : bayes_wall;
+  ExpectMean("facade: Bayes on its better features", best_bayes, testing::kThesisFacadeBayes);
   ExpectMean("facade: AMN", amn, testing::kThesisFacadeAmn);
   ExpectAhead("facade: AMN ahead of Bayes on shape features", amn, bayes_shape);
   ExpectAhead("facade: AMN ahead of Bayes on wall features", amn, bayes_wall);
@@ -450,12 +454,14 @@ void Depths(Seeds seeds) {
                 rate[k].size());
   }
   std::printf("| thesis: 15 | 6558 | 150 | 92.9 | |\n| thesis: pure | 919 | 5 to 7 | 93.8 | |\n");
-  double best = 0.0;
-  for (std::size_t k = 0; k < testing::kTreeDepths.size(); ++k)
-    best = std::max(best, Mean(rate[k]));
-  const double deep = Mean(rate[testing::kTreeDepths.size() - 2]);
-  Expect(deep >= best - 0.01, "depths: nothing better than d_max = 15, to one percent");
-  Expect(Mean(rate.back()) >= best - 0.02, "depths: pure leaves are as good, to two percent");
+  const std::size_t deepest = testing::kTreeDepths.size() - 1;
+  static_assert(testing::kTreeDepths[testing::kTreeDepths.size() - 2] == 15);
+  const double deep = Mean(rate[deepest - 1]);
+  Expect(Mean(rate[deepest]) <= deep + 0.005, "depths: beyond d_max = 15 nothing is gained");
+  Expect(Mean(rate[0]) <= deep - 0.02, "depths: a shallow tree says too little");
+  Expect(Mean(rate.back()) >= deep - 0.01, "depths: pure leaves are as good, to one percent");
+  Expect(Mean(points.back()) <= 0.2 * Mean(points[deepest - 1]),
+         "depths: pure leaves are a fifth of those at d_max = 15, or less");
 }
 
 // --- Fig. 9.5 ----------------------------------------------------------------------------------
@@ -573,7 +579,8 @@ void Scenes(Seeds seeds) {
 int Main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
   const int count = argc > 2 ? std::atoi(argv[2]) : 10;
-  const Seeds seeds = Seeds(testing::kClassificationSeeds)
+  const bool tuning = argc > 3 && argv[3] == std::string("tuning");
+  const Seeds seeds = Seeds(tuning ? testing::kTuningSeeds : testing::kClassificationSeeds)
                           .first(static_cast<std::size_t>(std::clamp(count, 1, 10)));
   const std::pair<const char*, void (*)(Seeds)> experiments[] = {{"scenes", &Scenes},
                                                                  {"facade", &Facade},
@@ -589,7 +596,7 @@ int Main(int argc, char** argv) {
   }
   std::fprintf(stderr,
                "usage: classification_thesis "
-               "scenes|facade|depths|transform|objects|people|places [SEEDS]\n");
+               "scenes|facade|depths|transform|objects|people|places [WORLDS [tuning]]\n");
   return 2;
 }
 

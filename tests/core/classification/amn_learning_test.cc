@@ -1,5 +1,6 @@
 #include "core/classification/amn_learning.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <utility>
@@ -70,6 +71,73 @@ TEST(AmnLearningTest, MoreClassesAgreeUnderTheRelaxation) {
                               LearnByCuttingPlanes(chain.set(), options, Stop()));
   EXPECT_LE(expanded.lower_bound, program.objective * (1.0 + 1e-4));
   RecordProperty("gap_ppm", static_cast<int>(1e6 * (1.0 - expanded.objective / program.objective)));
+}
+
+// Rows that stand for one, two or three points of a chain.
+struct Rows {
+  Chain of_rows;
+  Chain of_points;
+  std::vector<std::uint32_t> row_of, counts, inner_edges;
+
+  AmnTrainingSet set() const {
+    return {of_rows.features, of_rows.edges, of_rows.labels, 2, counts, inner_edges};
+  }
+  // ½ |w|² + c ξ over all labelings of the points that give those of one row one label.
+  double ObjectiveByEnumeration(const AmnWeights& weights, double slack_weight) const {
+    const AmnProblem problem = testing::AugmentedProblem(of_points, weights);
+    double best = -1e300;
+    for (std::uint32_t bits = 0; bits < (1U << counts.size()); ++bits) {
+      std::vector<ClassIndex> labels;
+      for (const std::uint32_t row : row_of) labels.push_back((bits >> row) & 1U);
+      best = std::max(best, Score(problem, labels));
+    }
+    const AmnProblem plain = MakeAmnProblem(weights, of_points.features, of_points.edges);
+    const double slack = best - Score(plain, of_points.labels);
+    return 0.5 * (weights.node.squaredNorm() + weights.edge.squaredNorm()) +
+           slack_weight / static_cast<double>(row_of.size()) * slack;
+  }
+};
+
+Rows MakeRows(std::uint64_t seed) {
+  Rows rows;
+  rows.of_rows = MakeChain(9, 2, 1.2, seed);
+  rows.of_points.classes = 2;
+  for (std::uint32_t row = 0; row < 9; ++row) {
+    rows.counts.push_back(1 + row % 3);
+    rows.row_of.insert(rows.row_of.end(), rows.counts.back(), row);
+  }
+  rows.of_points.features = rows.of_rows.features(rows.row_of, Eigen::all);
+  for (std::uint32_t i = 0; i < rows.row_of.size(); ++i) {
+    rows.of_points.labels.push_back(rows.of_rows.labels[rows.row_of[i]]);
+    for (std::uint32_t j = i + 1; j < std::min<std::size_t>(i + 4, rows.row_of.size()); ++j) {
+      rows.of_points.edges.push_back({i, j});
+    }
+  }
+  ContractedNetwork network = Contract(rows.of_points.edges, rows.row_of, 9);
+  rows.of_rows.edges = std::move(network.edges);
+  rows.inner_edges = std::move(network.inner_edges);
+  return rows;
+}
+
+TEST(AmnLearningTest, RowsThatStandForPointsAreLearnedAsThosePoints) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    SCOPED_TRACE(seed);
+    const Rows rows = MakeRows(seed);
+    AmnLearningOptions options;
+    options.slack_weight = 20.0;
+    options.tolerance = 1e-6;
+    STRATA_ASSERT_OK_AND_ASSIGN(const AmnLearning program,
+                                LearnByQuadraticProgram(rows.set(), options));
+    for (const bool relaxed : {false, true}) {
+      options.relaxed = relaxed;
+      STRATA_ASSERT_OK_AND_ASSIGN(const AmnLearning planes,
+                                  LearnByCuttingPlanes(rows.set(), options, Stop()));
+      EXPECT_NEAR(planes.objective, program.objective, 1e-4 * program.objective);
+      EXPECT_NEAR(planes.objective,
+                  rows.ObjectiveByEnumeration(planes.weights, options.slack_weight),
+                  1e-5 * planes.objective);
+    }
+  }
 }
 
 // The optimality conditions of the margin problem in its own variables: a small step in any

@@ -111,5 +111,14 @@ TEST(NetworkTest, NearNeighboursAreLikelier) {
   EXPECT_LT(mean_rank(2.0), mean_rank(50.0));
 }
 
+TEST(NetworkTest, ContractionKeepsEveryEdge) {
+  // Rows a = {0, 1, 4}, b = {2}, c = {3, 5}.
+  const std::vector<NetworkEdge> edges = {{0, 1}, {0, 2}, {0, 4}, {2, 4}, {3, 4}, {3, 5}};
+  const ContractedNetwork contracted =
+      Contract(edges, std::vector<std::uint32_t>{0, 0, 1, 2, 0, 2}, 3);
+  EXPECT_EQ(contracted.inner_edges, (std::vector<std::uint32_t>{2, 0, 1}));
+  EXPECT_EQ(contracted.edges, (std::vector<NetworkEdge>{{0, 1}, {0, 1}, {0, 2}}));
+}
+
 }  // namespace
 }  // namespace strata

@@ -49,6 +49,7 @@ TEST(ReductionTest, PureLeavesStandForPointsOfOneClass) {
   double windows = 0.0;
   for (std::size_t k = 0; k < reduced.positions.size(); ++k) {
     const auto row = static_cast<Eigen::Index>(k);
+    EXPECT_EQ(std::count(reduced.row_of.begin(), reduced.row_of.end(), k), reduced.counts[k]);
     // The second feature is the label: no leaf mixes.
     EXPECT_EQ(reduced.data.features(row, 1), reduced.data.labels[k] == 1 ? 1.0F : 0.0F);
     windows += reduced.data.labels[k] == 1 ? reduced.counts[k] : 0.0;
@@ -90,6 +91,7 @@ TEST(ReductionTest, RandomKeepsPointsAsTheyAre) {
               scene.data.features.row(row));
   }
   const ReducedPoints none = Reduce(scene.positions, scene.data, {.kind = ReductionKind::kNone});
+  EXPECT_TRUE(none.row_of.empty());
   EXPECT_EQ(none.data.features, scene.data.features);
   EXPECT_EQ(none.data.labels, scene.data.labels);
 }
