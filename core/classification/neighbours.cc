@@ -1,8 +1,8 @@
 #include "core/classification/neighbours.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
-#include <tuple>
 #include <utility>
 
 #include "core/classification/box_tree.h"
@@ -12,23 +12,23 @@ namespace {
 
 using Node = BoxTree::Node;
 
-std::uint32_t CountUpTo(std::span<const float> values, float most) {
+template <typename Predicate>
+std::uint32_t Count(std::span<const float> values, const Predicate& predicate) {
   std::uint32_t count = 0;
-  for (const float value : values) count += value <= most ? 1 : 0;
+  for (const float value : values) count += predicate(value) ? 1 : 0;
   return count;
 }
 
-std::uint32_t CountBelow(std::span<const float> values, float bound) {
-  std::uint32_t count = 0;
-  for (const float value : values) count += value < bound ? 1 : 0;
-  return count;
+std::uint32_t CountUpTo(std::span<const float> values, float most) {
+  return Count(values, [most](float value) { return value <= most; });
 }
 
 // `count` of the values, and not many more, are up to this; all are up to `most`. Halving needs no
 // branch that depends on the values, of which processors foresee every second one.
-float BoundOf(std::span<const float> values, std::size_t count, float most, int halvings) {
+float BoundOf(std::span<const float> values, std::size_t count, float most) {
+  constexpr int kHalvings = 7;
   float least = 0.0F;
-  for (int k = 0; k < halvings; ++k) {
+  for (int k = 0; k < kHalvings; ++k) {
     const float middle = 0.5F * (least + most);
     const bool enough = CountUpTo(values, middle) >= count;
     most = enough ? middle : most;
@@ -43,29 +43,27 @@ class Search {
   Search(const BoxTree& queries, const BoxTree& points, std::size_t count, bool without_self)
       : queries_(queries.points()), tree_(points), count_(count), without_self_(without_self) {}
 
-  // `put` takes the index of a query and then may ask Put() for its nearest.
-  template <typename Put>
-  void ForAll(const Node& leaf, const Put& put) {
-    bounds_.clear();
-    float reach = 0.0F;
-    for (std::uint32_t q = leaf.begin; q < leaf.end; ++q) {
-      bounds_.push_back(BoundNear(queries_.at(q)));
-      reach = std::max(reach, bounds_.back());
-    }
-    // A leaf with a point far from the others reaches over too many.
-    const bool together = Gather(leaf.box, reach, kMostTogether + 16 * needed());
+  // Nearest first; `place_of` says where those of the query with an index go.
+  template <typename PlaceOf>
+  void FindAll(const Node& leaf, const PlaceOf& place_of) {
+    bool together = Gather(leaf.box, reach_, kMostTogether);
+    float farthest = 0.0F;
     for (std::uint32_t q = leaf.begin; q < leaf.end; ++q) {
       const Eigen::Array3f at = queries_.at(q);
-      const float bound = bounds_[q - leaf.begin];
-      if (!together) Gather({at, at}, bound, std::numeric_limits<std::size_t>::max());
-      Choose(at, bound);
-      put(queries_.index[q]);
+      if (!together || !Choose(at)) {
+        reach_ = BoundNear(at);
+        together = Gather(leaf.box, reach_, kMostTogether);
+        if (!together) Gather({at, at}, reach_, std::numeric_limits<std::size_t>::max());
+        Choose(at);
+      }
+      const std::uint32_t query = queries_.index[q];
+      const auto [squared, indices] = place_of(query);
+      SortFound();
+      Put(without_self_ ? query : kNobody, squared, indices);
+      last_ = squared[count_ - 1];
+      farthest = std::max(farthest, last_);
     }
-  }
-
-  // Of the query at hand, nearest first.
-  void Put(std::uint32_t query, float* squared, std::uint32_t* indices) {
-    if (!PutByRank(squared, indices)) PutSorted(without_self_ ? query : kNobody, squared, indices);
+    reach_ = kLikely * farthest;
   }
 
  private:
@@ -84,7 +82,7 @@ class Search {
     const std::uint32_t end = node.right == 0 ? EndOf(node) : node.end;
     squared_.resize(std::max<std::size_t>(squared_.size(), end - node.begin));
     tree_.points().SquaredDistances(from, node.begin, end, squared_.data());
-    return BoundOf({squared_.data(), end - node.begin}, needed(), node.box.SquaredReach(from), 7);
+    return BoundOf({squared_.data(), end - node.begin}, needed(), node.box.SquaredReach(from));
   }
 
   const Node& SmallNodeAt(const Eigen::Array3f& from) const {
@@ -99,7 +97,7 @@ class Search {
     return nodes[at];
   }
 
-  // False if there are more than `most` candidates for queries in the box.
+  // Points within reach of the box, and some more. False if those are more than `most`.
   bool Gather(const BoxTree::Box& box, float reach, std::size_t most) {
     gathered_ = 0;
     nodes_.assign(1, 0);
@@ -132,15 +130,19 @@ class Search {
     gathered_ += count;
   }
 
-  // The candidates within the bound, without branches.
-  void Choose(const Eigen::Array3f& from, float most) {
+  // The candidates that may be among the nearest, packed without branches. False if within reach
+  // there are too few.
+  bool Choose(const Eigen::Array3f& from) {
     squared_.resize(std::max(squared_.size(), gathered_));
     found_squared_.resize(std::max(found_squared_.size(), gathered_));
     found_indices_.resize(found_squared_.size());
     candidates_.SquaredDistances(from, 0, gathered_, squared_.data());
     const float* const all = squared_.data();
     const std::uint32_t* const all_indices = candidates_.index.data();
-    const float bound = BoundOf({all, gathered_}, needed(), most, 2);
+    const auto enough = [&](float bound) { return CountUpTo({all, gathered_}, bound) >= needed(); };
+    const float likely = kLikely * last_;
+    const float bound = likely < reach_ && enough(likely) ? likely : reach_;
+    if (bound == reach_ && !enough(bound)) return false;
     float* const to = found_squared_.data();
     std::uint32_t* const to_indices = found_indices_.data();
     std::size_t found = 0;
@@ -150,44 +152,59 @@ class Search {
       found += all[k] <= bound ? 1 : 0;
     }
     found_ = found;
-  }
-
-  // Each goes behind as many as are nearer: many comparisons, but none to be foreseen. False where
-  // distances are equal or too many.
-  bool PutByRank(float* squared, std::uint32_t* indices) const {
-    constexpr std::size_t kMost = 128;
-    if (found_ > kMost) return false;
-    const std::span<const float> all(found_squared_.data(), found_);
-    std::uint32_t ranks[kMost];
-    std::size_t sum = 0;
-    for (std::size_t i = 0; i < found_; ++i) {
-      ranks[i] = CountBelow(all, all[i]);
-      sum += ranks[i];
-    }
-    if (sum != found_ * (found_ - 1) / 2) return false;
-    // The query itself is the first.
-    const std::size_t first = needed() - count_;
-    for (std::size_t i = 0; i < found_; ++i) {
-      const std::size_t to = ranks[i] - first;
-      if (to >= count_) continue;
-      squared[to] = all[i];
-      indices[to] = found_indices_[i];
-    }
     return true;
   }
 
-  void PutSorted(std::uint32_t self, float* squared, std::uint32_t* indices) {
-    sorted_.clear();
-    for (std::size_t k = 0; k < found_; ++k) {
-      if (found_indices_[k] != self) sorted_.emplace_back(found_squared_[k], found_indices_[k]);
+  // Nearest first, at least as many as needed. Each goes behind as many as are nearer: many
+  // comparisons, but none to be foreseen.
+  void SortFound() {
+    keys_.resize(std::max(keys_.size(), found_));
+    if (found_ > kMostRanked) {
+      for (std::size_t i = 0; i < found_; ++i) keys_[i] = KeyOf(i);
+      const auto end = keys_.begin() + static_cast<std::ptrdiff_t>(found_);
+      std::partial_sort(keys_.begin(), keys_.begin() + static_cast<std::ptrdiff_t>(needed()), end);
+      return;
     }
-    std::partial_sort(
-        sorted_.begin(), sorted_.begin() + static_cast<std::ptrdiff_t>(count_), sorted_.end());
-    for (std::size_t k = 0; k < count_; ++k) std::tie(squared[k], indices[k]) = sorted_[k];
+    const std::span<const float> all(found_squared_.data(), found_);
+    std::uint32_t ranks[kMostRanked];
+    std::size_t sum = 0;
+    for (std::size_t i = 0; i < found_; ++i) {
+      ranks[i] = Count(all, [d = all[i]](float other) { return other < d; });
+      sum += ranks[i];
+    }
+    const bool equal_ones = sum != found_ * (found_ - 1) / 2;
+    for (std::size_t i = 0; equal_ones && i < found_; ++i) {
+      ranks[i] += Count(all.first(i), [d = all[i]](float other) { return other == d; });
+    }
+    for (std::size_t i = 0; i < found_; ++i) keys_[ranks[i]] = KeyOf(i);
+    for (std::size_t i = 1; equal_ones && i < found_; ++i) {
+      const std::uint64_t key = keys_[i];
+      std::size_t k = i;
+      for (; k > 0 && key < keys_[k - 1]; --k) keys_[k] = keys_[k - 1];
+      keys_[k] = key;
+    }
+  }
+
+  // In the order of distances, then of indices.
+  std::uint64_t KeyOf(std::size_t found) const {
+    return std::uint64_t{std::bit_cast<std::uint32_t>(found_squared_[found])} << 32 |
+           found_indices_[found];
+  }
+
+  void Put(std::uint32_t self, float* squared, std::uint32_t* indices) const {
+    std::size_t to = 0;
+    for (std::size_t k = 0; to < count_; ++k) {
+      squared[to] = std::bit_cast<float>(static_cast<std::uint32_t>(keys_[k] >> 32));
+      indices[to] = static_cast<std::uint32_t>(keys_[k]);
+      to += indices[to] != self ? 1 : 0;
+    }
   }
 
   static constexpr std::uint32_t kNobody = std::numeric_limits<std::uint32_t>::max();
-  static constexpr std::size_t kMostTogether = 256;
+  static constexpr std::size_t kMostTogether = 512;
+  static constexpr std::size_t kMostRanked = 128;
+  // What was the distance of the farthest neighbour tells what the next will be, squared.
+  static constexpr float kLikely = 1.25F;
   // A bound from so many times the points needed is rarely far off.
   static constexpr std::size_t kSeeds = 3;
 
@@ -195,14 +212,15 @@ class Search {
   const BoxTree& tree_;
   const std::size_t count_;
   const bool without_self_;
-  std::vector<float> bounds_;         // of the queries of the leaf
+  float reach_ = 0.0F;                // candidates are all within this of the leaf's box, squared
+  float last_ = 0.0F;                 // squared distance of the farthest neighbour found last
   std::vector<std::uint32_t> nodes_;  // to be visited
   PointColumns candidates_;
   std::size_t gathered_ = 0;  // of the candidates' room
   std::vector<float> squared_, found_squared_;
   std::vector<std::uint32_t> found_indices_;
   std::size_t found_ = 0;
-  std::vector<std::pair<float, std::uint32_t>> sorted_;
+  std::vector<std::uint64_t> keys_;
 };
 
 }  // namespace
@@ -234,9 +252,9 @@ void Neighbours::Fill(const BoxTree& queries, const BoxTree& points, bool withou
   Search search(queries, points, count_, without_self);
   for (const Node& node : queries.nodes()) {
     if (node.right != 0) continue;
-    search.ForAll(node, [&](std::uint32_t query) {
+    search.FindAll(node, [&](std::uint32_t query) {
       const std::size_t to = query * count_;
-      search.Put(query, squared_.data() + to, indices_.data() + to);
+      return std::pair(squared_.data() + to, indices_.data() + to);
     });
   }
 }
