@@ -3,6 +3,7 @@
 #ifndef STRATA_CORE_CLASSIFICATION_BOX_TREE_H_
 #define STRATA_CORE_CLASSIFICATION_BOX_TREE_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -10,6 +11,20 @@
 #include <Eigen/Core>
 
 namespace strata {
+
+// Points by coordinate, for loops over many of them.
+struct PointColumns {
+  std::vector<float> x, y, z;
+  std::vector<std::uint32_t> index;
+
+  Eigen::Array3f at(std::size_t k) const { return {x[k], y[k], z[k]}; }
+  void Resize(std::size_t size);
+  // From `from`, of the points from `begin` to `end`.
+  void SquaredDistances(const Eigen::Array3f& from,
+                        std::size_t begin,
+                        std::size_t end,
+                        float* to) const;
+};
 
 // A kd-tree that halves its points along the widest axis and keeps them in the order of its leaves.
 // Points must be finite.
@@ -23,29 +38,35 @@ class BoxTree {
       const Eigen::Array3f gap = (low - other.high).max(other.low - high).max(0.0F);
       return gap.x() * gap.x() + gap.y() * gap.y() + gap.z() * gap.z();
     }
+    // Nor is this ever less.
+    float SquaredReach(const Eigen::Array3f& from) const {
+      const Eigen::Array3f reach = (high - from).max(from - low);
+      return reach.x() * reach.x() + reach.y() * reach.y() + reach.z() * reach.z();
+    }
   };
   struct Node {
     Box box;
     std::uint32_t begin = 0, end = 0;  // points in the order of the tree
     std::uint32_t right = 0;           // the left child comes next; 0: a leaf
+
+    std::uint32_t size() const { return end - begin; }
   };
 
   explicit BoxTree(std::span<const Eigen::Vector3f> points);
 
-  const std::vector<Node>& nodes() const { return nodes_; }  // the root first
-  std::uint32_t index(std::uint32_t k) const { return order_[k]; }
-  Eigen::Array3f at(std::uint32_t k) const { return {x_[k], y_[k], z_[k]}; }
-  // Squared distances of the points of a leaf; room for kMostInLeaf.
-  void SquaredDistances(const Node& leaf, const Eigen::Array3f& from, float* to) const;
-
-  static constexpr std::uint32_t kMostInLeaf = 16;
+  // The root first. A leaf has few points, or any number at one place, which are by index.
+  const std::vector<Node>& nodes() const { return nodes_; }
+  const PointColumns& points() const { return points_; }
 
  private:
-  void Split(std::span<const Eigen::Vector3f> points, std::uint32_t begin, std::uint32_t end);
+  struct Point {
+    Eigen::Array3f at;
+    std::uint32_t index;
+  };
+  void Split(std::span<Point> points, std::uint32_t begin);
 
   std::vector<Node> nodes_;
-  std::vector<std::uint32_t> order_;
-  std::vector<float> x_, y_, z_;
+  PointColumns points_;
 };
 
 }  // namespace strata

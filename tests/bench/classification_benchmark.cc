@@ -35,15 +35,26 @@ double ProcessorSeconds() {
   return static_cast<double>(std::clock()) / static_cast<double>(CLOCKS_PER_SEC);
 }
 
-double MedianSeconds(int rounds, const std::function<void()>& run) {
-  std::vector<double> seconds;
+// Of every one of what is run, in turns, so that what else the machine does meets all alike.
+std::vector<double> MedianSeconds(int rounds, const std::vector<std::function<void()>>& runs) {
+  std::vector<std::vector<double>> seconds(runs.size());
   for (int round = 0; round < rounds; ++round) {
-    const double start_s = ProcessorSeconds();
-    run();
-    seconds.push_back(ProcessorSeconds() - start_s);
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      const double start_s = ProcessorSeconds();
+      runs[k]();
+      seconds[k].push_back(ProcessorSeconds() - start_s);
+    }
   }
-  std::sort(seconds.begin(), seconds.end());
-  return seconds[seconds.size() / 2];
+  std::vector<double> medians;
+  for (std::vector<double>& of_one : seconds) {
+    std::sort(of_one.begin(), of_one.end());
+    medians.push_back(of_one[of_one.size() / 2]);
+  }
+  return medians;
+}
+
+double MedianSeconds(int rounds, const std::function<void()>& run) {
+  return MedianSeconds(rounds, std::vector{run}).front();
 }
 
 PointCloud FirstPoints(const PointCloud& cloud, std::size_t count) {
@@ -58,12 +69,14 @@ void MeasureFeatures(const PointCloud& cloud, int rounds) {
   shape.scales = 1;
   PointFeatureOptions wall;
   wall.set = FeatureSet::kWall;
-  const auto ours = [&](const PointFeatureOptions& options) {
-    return MedianSeconds(rounds, [&] { ComputeFeatures(cloud, options, Stop()).value(); });
-  };
-  const double cgal_s = MedianSeconds(rounds, [&] { CgalFeatures(cloud.points, 1, -1.0F); });
-  const double shape_s = ours(shape);
-  const double wall_s = ours(wall);
+  const std::vector<double> seconds =
+      MedianSeconds(rounds,
+                    {[&] { CgalFeatures(cloud.points, 1, -1.0F); },
+                     [&] { ComputeFeatures(cloud, shape, Stop()).value(); },
+                     [&] { ComputeFeatures(cloud, wall, Stop()).value(); }});
+  const double cgal_s = seconds[0];
+  const double shape_s = seconds[1];
+  const double wall_s = seconds[2];
   const auto k_points = static_cast<double>(cloud.size()) / 1e3;
   std::printf("features, %zu points: CGAL %.0f k points/s\n", cloud.size(), k_points / cgal_s);
   std::printf("  shape %.0f k points/s, ratio %.2f\n", k_points / shape_s, cgal_s / shape_s);
@@ -165,11 +178,15 @@ void MeasureTraining(const testing::LabelledClouds& oakland, int rounds) {
   const LabelledFeatures& data = reduced.data;
   AmnLearningOptions options;
   options.tolerance = 1e-2;
-  const double ours_s = MedianSeconds(rounds, [&] {
-    LearnByCuttingPlanes({data.features, edges, data.labels, data.classes}, options, Stop())
-        .value();
-  });
-  const double cgal_s = MedianSeconds(rounds, [&] { CgalForest forest(data); });
+  const std::vector<double> seconds = MedianSeconds(
+      rounds,
+      {[&] {
+         LearnByCuttingPlanes({data.features, edges, data.labels, data.classes}, options, Stop())
+             .value();
+       },
+       [&] { CgalForest forest(data); }});
+  const double ours_s = seconds[0];
+  const double cgal_s = seconds[1];
   std::printf("training, %zu points: AMN %.2f s, CGAL's forest %.2f s, ratio %.2f\n",
               data.size(),
               ours_s,

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/common/random.h"
@@ -62,6 +63,38 @@ TEST(NeighboursTest, EquallyFarOnesGoByIndexAlsoAmongOtherPoints) {
     for (std::size_t k = 0; k < 16; ++k) {
       ASSERT_EQ(neighbours.Of(q)[k], all[k].second) << q;
       ASSERT_EQ(neighbours.SquaredDistances(q)[k], all[k].first) << q;
+    }
+  }
+}
+
+// As sensors report that saw nothing. Would not end if everybody were held against everybody.
+TEST(NeighboursTest, ManyAtOnePlaceAreCheap) {
+  std::vector<Eigen::Vector3f> points(50'000, Eigen::Vector3f::Zero());
+  points.emplace_back(1.0F, 0.0F, 0.0F);
+  const Neighbours neighbours = Neighbours::Find(points, 3);
+  EXPECT_THAT(neighbours.Of(0), ::testing::ElementsAre(1, 2, 3));
+  EXPECT_THAT(neighbours.Of(2), ::testing::ElementsAre(0, 1, 3));
+  EXPECT_THAT(neighbours.Of(30'000), ::testing::ElementsAre(0, 1, 2));
+  EXPECT_THAT(neighbours.Of(50'000), ::testing::ElementsAre(0, 1, 2));
+}
+
+// Spacings of a millimetre beside some of kilometres, among which leaves reach far.
+TEST(NeighboursTest, OfUnevenCloudsAreThoseOfBruteForce) {
+  std::vector<Eigen::Vector3f> points = Cloud(2000, 6);
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] *= i % 50 == 0 ? 1e3F : 1e-2F;
+  for (const std::size_t count : {1, 16, 64}) {
+    const Neighbours neighbours = Neighbours::Find(points, count);
+    for (std::size_t i = 0; i < points.size(); i += 7) {
+      std::vector<std::pair<float, std::uint32_t>> all;
+      for (std::uint32_t p = 0; p < points.size(); ++p) {
+        const Eigen::Vector3f d = points[p] - points[i];
+        if (p != i) all.emplace_back(d.x() * d.x() + d.y() * d.y() + d.z() * d.z(), p);
+      }
+      std::sort(all.begin(), all.end());
+      for (std::size_t k = 0; k < count; ++k) {
+        ASSERT_EQ(neighbours.SquaredDistances(i)[k], all[k].first) << i;
+        ASSERT_EQ(neighbours.Of(i)[k], all[k].second) << i;
+      }
     }
   }
 }
