@@ -52,6 +52,7 @@ void AddTrain(Commands& commands, CLI::App* noun) {
       [training](FileContext& context) { return TrainOnFiles(context, *training); },
       [training, on_map](Context& context) {
         on_map->folds = training->folds > 0 ? training->folds : -1;
+        on_map->region_m = training->region_m;
         return TrainOnMap(context, *on_map, training->options);
       });
   CLI::Option* map = verb->add_option("MAP", on_map->map, "Name of the map");
@@ -71,11 +72,17 @@ void AddTrain(Commands& commands, CLI::App* noun) {
     if (map->empty() && data->empty()) throw CLI::RequiredError("MAP or --data");
   });
   AddTrainingOptions(verb, training->options);
-  verb->add_option("--folds",
-                   training->folds,
-                   "Score the method too: learn so often, each time without some of the files, "
-                   "and label those")
+  verb->add_option(
+          "--folds",
+          training->folds,
+          "Score the method too: learn so often, each time without some of the files or scans, "
+          "and label those")
       ->check(CLI::Range(2, 1000));
+  verb->add_option("--region-size",
+                   training->region_m,
+                   "Of the score: leave out whole squares of so many metres instead of files or "
+                   "scans; for one large file, or scans that see the same places")
+      ->check(CLI::PositiveNumber);
 }
 
 void AddEvaluate(Commands& commands, CLI::App* noun) {

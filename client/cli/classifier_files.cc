@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -19,6 +20,7 @@
 #include "client/formats/geometry_writer.h"
 #include "client/formats/scan_reader.h"
 #include "core/classification/classifier_codec.h"
+#include "core/classification/regions.h"
 #include "core/classification/validation.h"
 #include "core/common/status.h"
 
@@ -127,13 +129,18 @@ absl::StatusOr<ConfusionMatrix> Validated(const FileTraining& training,
                                           const std::vector<PointCloud>& clouds,
                                           FileContext& context) {
   Progress progress(context.output.talk(), TalksToTerminal(), "validate");
+  RegionClouds cut;
+  if (training.region_m > 0.0) cut = CutIntoRegions(clouds, training.region_m);
+  std::vector<std::size_t> each(clouds.size());
+  std::iota(each.begin(), each.end(), std::size_t{0});
   return CrossValidate(
-      clouds,
+      training.region_m > 0.0 ? cut.clouds : clouds,
+      training.region_m > 0.0 ? cut.regions : each,
       classes,
       training.options,
       static_cast<std::size_t>(training.folds),
       [&](double share) {
-        progress.Update(share, "whole files left out");
+        progress.Update(share, "files or regions left out");
         return absl::OkStatus();
       },
       context.stop);
@@ -185,7 +192,10 @@ absl::Status TrainOnFiles(FileContext& context, const FileTraining& training) {
   }
   context.output.Object(json);
   if (confusion.has_value() && !context.output.json()) {
-    context.output.Text(absl::StrCat("\nvalidation, ", training.folds, " folds of whole files:"));
+    context.output.Text(
+        absl::StrCat("\nvalidation, ",
+                     training.folds,
+                     training.region_m > 0.0 ? " folds of regions:" : " folds of whole files:"));
     PrintScores(*confusion, names, context.output);
   }
   return absl::OkStatus();

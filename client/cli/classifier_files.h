@@ -19,6 +19,7 @@ struct FileTraining {
   std::string classes;            // as ReadLabelClasses(); empty: every label is a class
   std::string out;                // the classifier's file
   int folds = 0;                  // > 0: also scored by validation, whole files left out
+  double region_m = 0.0;          // > 0: squares of this edge are left out instead
   TrainingOptions options;
 };
 absl::Status TrainOnFiles(FileContext& context, const FileTraining& training);

@@ -122,6 +122,7 @@ absl::Status TrainOnMap(Context& context,
       {"neighbours", absl::StrCat(options.neighbours)}};
   if (!training.name.empty()) parameters["name"] = training.name;
   if (training.folds >= 0) parameters["folds"] = absl::StrCat(training.folds);
+  if (training.region_m > 0.0) parameters["region_m"] = absl::StrCat(training.region_m);
   if (training.wait) return RunJob(context, training.map, "train", parameters);
   STRATA_ASSIGN_OR_RETURN(
       const JobInfo job,

@@ -13,8 +13,9 @@ namespace strata::cli {
 
 struct MapTraining {
   std::string map;
-  std::string name;  // of the classifier; empty: the server's choice
-  int folds = -1;    // of the validation over scans; -1: the server's choice
+  std::string name;       // of the classifier; empty: the server's choice
+  int folds = -1;         // of the validation over scans; -1: the server's choice
+  double region_m = 0.0;  // > 0: scans of one square of this edge are left out together
   bool wait = false;
 };
 // Starts the job; with `wait` an error unless it succeeds.

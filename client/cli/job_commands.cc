@@ -39,6 +39,7 @@ Kinds and their parameters (and threads=1..64 for the first three):
             reduce=auto|pure|none|depth=N|random=N (auto), neighbours=1..100 (5), rounds=1..10000 (100)
             slack_weight= (100)
             folds=0..100        Of the validation over scans (5)
+            region_m=M          Scans taken in one square of M metres are left out together (0: each alone)
   classify  The classifier model=NAME labels every scan that it has not labelled yet.
   evaluate  The classifier model=NAME against labels that people gave.)";
 

@@ -41,7 +41,8 @@ struct ReductionOptions {
   absl::Status Validate() const;
 };
 
-// "auto" (kBalanced), "pure", "none", "depth=N", "random=N"; INVALID_ARGUMENT listing them otherwise.
+// "auto" (kBalanced), "pure", "none", "depth=N", "random=N"; INVALID_ARGUMENT listing them
+// otherwise.
 absl::StatusOr<ReductionOptions> ParseReduction(absl::string_view text);
 
 // The text that ParseReduction() reads.

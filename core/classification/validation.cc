@@ -59,6 +59,7 @@ absl::StatusOr<ConfusionMatrix> EvaluateClassifier(const Classifier& classifier,
 }
 
 absl::StatusOr<ConfusionMatrix> CrossValidate(const std::vector<PointCloud>& clouds,
+                                              std::span<const std::size_t> groups,
                                               const std::vector<ClassName>& classes,
                                               const TrainingOptions& options,
                                               std::size_t folds,
@@ -68,28 +69,31 @@ absl::StatusOr<ConfusionMatrix> CrossValidate(const std::vector<PointCloud>& clo
                                 absl::FunctionRef<absl::Status(const PointCloud&)> use) {
     return use(clouds[k]);
   };
-  return CrossValidate(clouds.size(), source, classes, options, folds, progress, stop);
+  return CrossValidate(groups, source, classes, options, folds, progress, stop);
 }
 
-absl::StatusOr<ConfusionMatrix> CrossValidate(std::size_t clouds,
+absl::StatusOr<ConfusionMatrix> CrossValidate(std::span<const std::size_t> groups,
                                               CloudSource source,
                                               const std::vector<ClassName>& classes,
                                               const TrainingOptions& options,
                                               std::size_t folds,
                                               ClassifierProgress progress,
                                               const Stop& stop) {
-  if (folds < 2 || folds > clouds) {
+  const std::size_t clouds = groups.size();
+  const std::size_t apart = groups.empty() ? 0 : *std::ranges::max_element(groups) + 1;
+  if (folds < 2 || folds > apart) {
     return absl::InvalidArgumentError(absl::StrCat(
-        "folds ", folds, " is not in [2, ", clouds, "], the number of labelled clouds"));
+        "folds ", folds, " is not in [2, ", apart, "], the number of labelled scans or regions"));
   }
-  const std::vector<std::size_t> fold_of = DrawFolds(clouds, folds, kFoldSeed);
+  const std::vector<std::size_t> fold_of_group = DrawFolds(apart, folds, kFoldSeed);
+  const auto fold_of = [&](std::size_t cloud) { return fold_of_group[groups[cloud]]; };
   STRATA_ASSIGN_OR_RETURN(const std::vector<std::set<std::uint16_t>> labels,
                           LabelsOf(clouds, source));
   ConfusionMatrix confusion(classes.size());
   for (std::size_t fold = 0; fold < folds; ++fold) {
     std::vector<std::size_t> others;
     for (std::size_t k = 0; k < clouds; ++k) {
-      if (fold_of[k] != fold) others.push_back(k);
+      if (fold_of(k) != fold) others.push_back(k);
     }
     STRATA_ASSIGN_OR_RETURN(
         const Classifier classifier,
@@ -105,7 +109,7 @@ absl::StatusOr<ConfusionMatrix> CrossValidate(std::size_t clouds,
             },
             stop));
     for (std::size_t k = 0; k < clouds; ++k) {
-      if (fold_of[k] != fold) continue;
+      if (fold_of(k) != fold) continue;
       STRATA_RETURN_IF_ERROR(source(k, [&](const PointCloud& part) -> absl::Status {
         STRATA_ASSIGN_OR_RETURN(const ConfusionMatrix counts,
                                 EvaluateClassifier(classifier, part, classes, stop));

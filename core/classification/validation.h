@@ -3,6 +3,7 @@
 #define STRATA_CORE_CLASSIFICATION_VALIDATION_H_
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -25,16 +26,18 @@ absl::StatusOr<ConfusionMatrix> EvaluateClassifier(const Classifier& classifier,
 // k-fold validation: every cloud is classified once, by a classifier that learned from the clouds
 // of the other folds (DrawFolds with seed 1); points of one cloud are never on both sides. A class
 // that is in one fold only cannot be learned for it, and counts as missed. INVALID_ARGUMENT unless
-// 2 ≤ folds ≤ clouds; otherwise errors as TrainClassifier().
+// 2 ≤ folds ≤ groups; otherwise errors as TrainClassifier(). `groups`: of every cloud, in [0,
+// number of groups); clouds of one group are left out together.
 absl::StatusOr<ConfusionMatrix> CrossValidate(const std::vector<PointCloud>& clouds,
+                                              std::span<const std::size_t> groups,
                                               const std::vector<ClassName>& classes,
                                               const TrainingOptions& options,
                                               std::size_t folds,
                                               ClassifierProgress progress,
                                               const Stop& stop);
 
-// The same over `clouds` clouds of a source, which is gone through several times.
-absl::StatusOr<ConfusionMatrix> CrossValidate(std::size_t clouds,
+// The same over the clouds of a source, one for each of `groups`; it is gone through several times.
+absl::StatusOr<ConfusionMatrix> CrossValidate(std::span<const std::size_t> groups,
                                               CloudSource source,
                                               const std::vector<ClassName>& classes,
                                               const TrainingOptions& options,

@@ -100,7 +100,8 @@ absl::Status CheckClassifiers(MapCore& core,
   const auto name = parameters.find("name");
   if (name == parameters.end() || absl::IsNotFound(FindClassifier(*reader, name->second).status()))
     return absl::OkStatus();
-  return absl::AlreadyExistsError(absl::StrCat("classifier ", name->second, " exists"));
+  return absl::AlreadyExistsError(
+      absl::StrCat("classifier ", name->second, " exists; choose another name, or delete it"));
 }
 
 // The epoch before the one that `job` made, which must be the current one.

@@ -1,8 +1,10 @@
 #include "core/engine/labelled_scans.h"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
+#include "core/classification/regions.h"
 #include "core/common/status.h"
 #include "core/engine/scan_source.h"
 #include "core/world/map_class.h"
@@ -24,9 +26,9 @@ absl::StatusOr<ClassCounts> CountClasses(MapCore& core, const ScanRecord& scan) 
   return counts;
 }
 
-absl::StatusOr<std::vector<ScanRecord>> ScansWithLabels(MapCore& core) {
+absl::StatusOr<std::vector<PosedScan>> ScansWithLabels(MapCore& core) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-  std::vector<ScanRecord> scans;
+  std::vector<PosedScan> scans;
   ScanQuery query;
   query.skip_damaged = true;  // verify names it
   for (bool more = true; more;) {
@@ -36,10 +38,15 @@ absl::StatusOr<std::vector<ScanRecord>> ScansWithLabels(MapCore& core) {
     if (!page.empty()) query.after = page.back().scan.number;
     for (PosedScan& posed : page) {
       const bool labelled = posed.scan.header.has_label || posed.scan.person_labels;
-      if (labelled && posed.scan.has_points) scans.push_back(std::move(posed.scan));
+      if (labelled && posed.scan.has_points) scans.push_back(std::move(posed));
     }
   }
   return scans;
+}
+
+// Where it is now, or where it was uploaded to be.
+const Pose& PoseOf(const PosedScan& posed) {
+  return posed.pose.has_value() ? posed.pose->T_map_scan : posed.scan.header.T_map_scan;
 }
 
 }  // namespace
@@ -59,21 +66,29 @@ absl::Status ForEachUprightPart(MapCore& core,
   });
 }
 
+std::vector<std::size_t> LabelledScans::Regions(double edge_m) const {
+  if (edge_m > 0.0) return RegionsOf(places_, edge_m);
+  std::vector<std::size_t> each(scans_.size());
+  std::iota(each.begin(), each.end(), std::size_t{0});
+  return each;
+}
+
 absl::StatusOr<LabelledScans> LabelledScans::Read(MapCore& core,
                                                   DamagedScans& damaged,
                                                   JobContext& context) {
-  STRATA_ASSIGN_OR_RETURN(const std::vector<ScanRecord> candidates, ScansWithLabels(core));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<PosedScan> candidates, ScansWithLabels(core));
   LabelledScans labelled(core);
   ClassCounts counts;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     STRATA_RETURN_IF_ERROR(context.Progress(
         static_cast<double>(i) / static_cast<double>(candidates.size()), "reading labels"));
-    const ScanRecord& scan = candidates[i];
+    const ScanRecord& scan = candidates[i].scan;
     const absl::StatusOr<ClassCounts> more = CountClasses(core, scan);
     if (damaged.LeaveOut(scan.number, scan.header.id.ToString(), more.status())) continue;
     STRATA_RETURN_IF_ERROR(more.status());
     if (more->empty()) continue;
     labelled.scans_.push_back(scan);
+    labelled.places_.emplace_back(PoseOf(candidates[i]).translation().head<2>());
     for (const auto& [label, points] : *more) counts[label] += points;
   }
   std::vector<MapClass> table;

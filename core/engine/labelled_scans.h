@@ -37,6 +37,8 @@ class LabelledScans {
   // The classes there are points of; their names are those of the map.
   const std::vector<ClassName>& classes() const { return classes_; }
   std::uint64_t points() const { return points_; }  // labelled ones
+  // Which square of `edge_m` every scan was taken in (RegionsOf); 0: each scan is a region.
+  std::vector<std::size_t> Regions(double edge_m) const;
   // Hands on scan `k`, as a CloudSource does.
   absl::Status Visit(std::size_t k, absl::FunctionRef<absl::Status(const PointCloud&)> use) const {
     return ForEachUprightPart(*core_, scans_[k], use);
@@ -47,6 +49,7 @@ class LabelledScans {
 
   MapCore* core_;
   std::vector<ScanRecord> scans_;
+  std::vector<Eigen::Vector2d> places_;  // of `scans_`, where they were taken
   std::vector<ClassName> classes_;
   std::uint64_t points_ = 0;
 };

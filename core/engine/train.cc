@@ -65,11 +65,13 @@ KnownParameters ParametersOf(TrainSettings& settings) {
           {"features",
            {ParsedParameter(options.features.set, FeatureSetFromName), "shape, wall or spin"}},
           {"reduce",
-           {ParsedParameter(options.reduction, ParseReduction), "auto, pure, none, depth=N or random=N"}},
+           {ParsedParameter(options.reduction, ParseReduction),
+            "auto, pure, none, depth=N or random=N"}},
           {"neighbours", {WholeParameter(options.neighbours, 1, 100), "in [1, 100]"}},
           {"rounds", {WholeParameter(options.rounds, 1, 10000), "in [1, 10000]"}},
           {"slack_weight", {RealParameter(options.slack_weight, 1e-12, 1e12), "in [1e-12, 1e12]"}},
-          {"folds", {WholeParameter(settings.folds, 0, 100), "in [0, 100]"}}};
+          {"folds", {WholeParameter(settings.folds, 0, 100), "in [0, 100]"}},
+          {"region_m", {RealParameter(settings.region_m, 0.0, 1e6), "in [0, 1000000]"}}};
 }
 
 // A classifier that this job made before a restart.
@@ -97,12 +99,14 @@ std::map<std::string, double> ScoresOf(const ConfusionMatrix& confusion,
 absl::StatusOr<std::map<std::string, double>> Validate(const LabelledScans& scans,
                                                        const TrainSettings& settings,
                                                        JobContext& context) {
-  const std::size_t folds = std::min<std::size_t>(scans.size(), settings.folds);
+  const std::vector<std::size_t> regions = scans.Regions(settings.region_m);
+  const std::size_t apart = regions.empty() ? 0 : *std::ranges::max_element(regions) + 1;
+  const std::size_t folds = std::min<std::size_t>(apart, settings.folds);
   if (folds < 2) return std::map<std::string, double>();
   STRATA_ASSIGN_OR_RETURN(
       const ConfusionMatrix confusion,
       CrossValidate(
-          scans.size(),
+          regions,
           [&](std::size_t k, absl::FunctionRef<absl::Status(const PointCloud&)> use) {
             return scans.Visit(k, use);
           },
@@ -123,7 +127,7 @@ void Report(const ClassifierInfo& info, JobContext& context) {
   const auto accuracy = info.scores.find("accuracy");
   const std::string score =
       accuracy == info.scores.end()
-          ? std::string("not validated, which takes two labelled scans")
+          ? std::string("not validated, which takes two labelled scans or regions")
           : absl::StrFormat("%.1f %% right of scans it had not seen", 100.0 * accuracy->second);
   context.SetMessage(absl::StrCat("classifier ", info.name, ": ", info.description, "; ", score));
 }

@@ -22,7 +22,9 @@ struct TrainSettings {
   std::string name;  // of the classifier; empty: the method's and the job's number
   // method, features, reduce (ParseReduction), neighbours, rounds, slack_weight
   TrainingOptions options;
-  int folds = 5;  // of the validation over scans, at most as many as are labelled; 0: none
+  int folds = 5;  // of the validation over scans or regions, at most as many as there are; 0: none
+  // > 0: scans taken in one square of this edge are left out together; 0: each scan alone.
+  double region_m = 0.0;
 };
 
 // INVALID_ARGUMENT naming the parameter, its value and what it may be.

@@ -54,11 +54,11 @@ PointCloud FirstPoints(const PointCloud& cloud, std::size_t count) {
 }
 
 void MeasureFeatures(const PointCloud& cloud, int rounds) {
-  FeatureOptions shape;
+  PointFeatureOptions shape;
   shape.scales = 1;
-  FeatureOptions wall;
+  PointFeatureOptions wall;
   wall.set = FeatureSet::kWall;
-  const auto ours = [&](const FeatureOptions& options) {
+  const auto ours = [&](const PointFeatureOptions& options) {
     return MedianSeconds(rounds, [&] { ComputeFeatures(cloud, options, Stop()).value(); });
   };
   const double cgal_s = MedianSeconds(rounds, [&] { CgalFeatures(cloud.points, 1, -1.0F); });

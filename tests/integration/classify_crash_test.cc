@@ -1,4 +1,5 @@
-// A classifier labels a map that robots upload to, and the server is killed under it.
+// Classifiers learn from and label a map that robots upload to, and the server is killed under
+// them.
 #include <csignal>
 #include <cstdint>
 #include <map>
@@ -7,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,6 +16,7 @@
 #include "client/sdk/client.h"
 #include "core/common/status.h"
 #include "tests/integration/stratad_process.h"
+#include "tests/support/asked.h"
 #include "tests/support/park.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
@@ -22,8 +25,8 @@ namespace strata::testing {
 namespace {
 
 constexpr char kMap[] = "park";
-constexpr std::uint64_t kBefore = 12;  // scans that are there when the job begins
-constexpr std::uint64_t kScans = 18;
+constexpr std::uint64_t kBefore = 12;   // scans that are there when the job begins
+constexpr std::uint64_t kPerRound = 2;  // scans uploaded before each kill
 
 struct Outcome {
   std::vector<std::vector<std::uint16_t>> labels;  // of every scan
@@ -77,9 +80,24 @@ class World {
     for (std::uint64_t i = 1; i <= kBefore; ++i) STRATA_ASSERT_OK(Put(i));
     Run("train", {{"name", "street"}, {"method", "amn"}, {"reduce", "depth=6"}, {"folds", "0"}});
   }
-  Outcome Result() {
+  // Of the bytes of every classifier there is.
+  std::vector<std::string> Classifiers() {
+    std::vector<std::string> all;
+    const auto infos = db().classifiers().List({}, kMap);
+    STRATA_EXPECT_OK(infos);
+    for (const ClassifierInfo& info : infos.value_or(std::vector<ClassifierInfo>())) {
+      std::string& bytes = all.emplace_back();
+      STRATA_EXPECT_OK(
+          db().classifiers().Export({}, kMap, info.name, [&bytes](absl::string_view piece) {
+            bytes.append(piece.data(), piece.size());
+            return absl::OkStatus();
+          }));
+    }
+    return all;
+  }
+  Outcome Result(std::uint64_t scans) {
     Outcome outcome;
-    for (std::uint64_t i = 1; i <= kScans; ++i) {
+    for (std::uint64_t i = 1; i <= scans; ++i) {
       auto& labels = outcome.labels.emplace_back();
       STRATA_EXPECT_OK(db().scans().GetPoints({}, kMap, {"run", i}, [&](const PointCloud& piece) {
         labels.insert(labels.end(), piece.label.begin(), piece.label.end());
@@ -115,37 +133,63 @@ class World {
   std::unique_ptr<api::Database> client_;
 };
 
-TEST(ClassifyCrashTest, LabelsAreThoseOfAnUndisturbedJob) {
+class ClassifyCrashTest : public ::testing::Test {
+ protected:
+  void KillWithin(World& world, std::uint64_t most_ms) {
+    absl::SleepFor(absl::Milliseconds(random_() % most_ms));
+    world.Kill();
+  }
+
+  const std::uint64_t kills_ = Asked("STRATA_KILLS", 3);
+  const std::uint64_t seed_ = Asked("STRATA_SEED", 20261122);
+  const ::testing::ScopedTrace trace_{__FILE__, __LINE__, absl::StrCat("seed ", seed_)};
+  std::mt19937_64 random_{seed_};
+};
+
+TEST_F(ClassifyCrashTest, LabelsAreThoseOfAnUndisturbedJob) {
+  const std::uint64_t scans = kBefore + kPerRound * kills_;
   Outcome expected;
   {
     World world;
     ASSERT_NO_FATAL_FAILURE(world.Prepare());
-    for (std::uint64_t i = kBefore + 1; i <= kScans; ++i) STRATA_ASSERT_OK(world.Put(i));
-    EXPECT_EQ(world.Run("classify", {{"model", "street"}}).metrics.at("scans_labelled"), kScans);
-    expected = world.Result();
+    for (std::uint64_t i = kBefore + 1; i <= scans; ++i) STRATA_ASSERT_OK(world.Put(i));
+    EXPECT_EQ(world.Run("classify", {{"model", "street"}}).metrics.at("scans_labelled"), scans);
+    expected = world.Result(scans);
   }
   for (const auto& labels : expected.labels)
     EXPECT_THAT(labels, ::testing::Not(::testing::IsEmpty()));
 
-  constexpr std::uint64_t kSeed = 20261122;
-  SCOPED_TRACE(kSeed);
-  std::mt19937_64 random(kSeed);
   World world;
   ASSERT_NO_FATAL_FAILURE(world.Prepare());
   STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo job,
                               world.db().jobs().Start({}, kMap, "classify", {{"model", "street"}}));
   std::uint64_t next = kBefore + 1;
-  for (int round = 0; round < 3; ++round) {
-    for (int k = 0; k < 2; ++k) STRATA_ASSERT_OK(world.Put(next++));
-    absl::SleepFor(absl::Milliseconds(random() % 150));
-    world.Kill();
+  for (std::uint64_t round = 0; round < kills_; ++round) {
+    for (std::uint64_t k = 0; k < kPerRound; ++k) STRATA_ASSERT_OK(world.Put(next++));
+    KillWithin(world, 150);
   }
   world.Follow(job.id);
   // What came in after the job had ended, if it was quick.
   world.Run("classify", {{"model", "street"}});
-  const Outcome outcome = world.Result();
+  const Outcome outcome = world.Result(scans);
   EXPECT_EQ(outcome.labels, expected.labels);
   EXPECT_EQ(outcome.digest, expected.digest);
+}
+
+TEST_F(ClassifyCrashTest, AClassifierIsLearnedOnceAndIsThatOfAnUndisturbedJob) {
+  const std::map<std::string, std::string> parameters = {{"name", "again"}, {"folds", "4"}};
+  World world;
+  ASSERT_NO_FATAL_FAILURE(world.Prepare());
+  world.Run("train", {{"name", "calm"}, {"folds", "4"}});
+  ASSERT_EQ(world.Classifiers().size(), 2U);
+  const std::string calm = world.Classifiers()[1];
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo job,
+                              world.db().jobs().Start({}, kMap, "train", parameters));
+  for (std::uint64_t round = 0; round < kills_; ++round) KillWithin(world, 400);
+  world.Follow(job.id);
+  const std::vector<std::string> all = world.Classifiers();
+  ASSERT_EQ(all.size(), 3U);
+  EXPECT_EQ(all[2], calm);
 }
 
 }  // namespace

@@ -2,14 +2,12 @@
 // clients read.
 #include <csignal>
 #include <cstdint>
-#include <cstdlib>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
@@ -22,18 +20,13 @@
 #include "tests/integration/epoch_ledger.h"
 #include "tests/integration/stratad_process.h"
 #include "tests/integration/yard_clients.h"
+#include "tests/support/asked.h"
 #include "tests/support/simulator.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 
 namespace strata::testing {
 namespace {
-
-std::uint64_t Asked(const char* variable, std::uint64_t otherwise) {
-  const char* text = std::getenv(variable);
-  std::uint64_t number = 0;
-  return text != nullptr && absl::SimpleAtoi(text, &number) ? number : otherwise;
-}
 
 class OptimizeCrashTest : public ::testing::Test {
  protected:

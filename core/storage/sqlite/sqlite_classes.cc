@@ -154,7 +154,8 @@ absl::StatusOr<std::uint64_t> SqliteWriter::PutClassifier(const ClassifierInfo& 
       info.description,
       static_cast<std::uint64_t>(bytes.size()));
   if (absl::IsAlreadyExists(put)) {
-    return absl::AlreadyExistsError(absl::StrCat("classifier ", info.name, " exists"));
+    return absl::AlreadyExistsError(
+        absl::StrCat("classifier ", info.name, " exists; choose another name, or delete it"));
   }
   STRATA_RETURN_IF_ERROR(put);
   STRATA_ASSIGN_OR_RETURN(const std::int64_t id, database_.Pragma("SELECT last_insert_rowid()"));

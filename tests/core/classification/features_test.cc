@@ -219,7 +219,7 @@ TEST(FeaturesTest, SpinImagesShareAPointAmongFourBins) {
   }
   cloud.points.emplace_back(0.0F, 0.3F, 0.15F);
   cloud.sensor_origin = {0.0F, 0.0F, 20.0F};
-  FeatureOptions options;
+  PointFeatureOptions options;
   options.set = FeatureSet::kSpin;
   options.spin_radius_m = 1.0;
   STRATA_ASSERT_OK_AND_ASSIGN(const FeatureMatrix f, ComputeFeatures(cloud, options, Stop()));

@@ -1,11 +1,14 @@
 #include "core/classification/validation.h"
 
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/classification/regions.h"
 #include "core/common/random.h"
 #include "tests/support/status_matchers.h"
 
@@ -13,9 +16,12 @@ namespace strata {
 namespace {
 
 using ::strata::testing::StatusIs;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 const std::vector<ClassName> kClasses = {{4, "floor"}, {6, "wall"}};
+
+const std::vector<std::size_t> kEach = {0, 1, 2};  // every cloud a group
 
 absl::Status NoProgress(double) { return absl::OkStatus(); }
 
@@ -67,8 +73,9 @@ TEST(ValidationTest, CountsLabelledPointsByTruthAndClassGiven) {
 
 TEST(ValidationTest, EveryCloudIsLabelledOnceByAClassifierThatNeverSawIt) {
   const std::vector<PointCloud> clouds = {Room(1, true), Room(2, true), Room(3, true)};
-  STRATA_ASSERT_OK_AND_ASSIGN(const ConfusionMatrix confusion,
-                              CrossValidate(clouds, kClasses, Quick(), 3, NoProgress, Stop()));
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const ConfusionMatrix confusion,
+      CrossValidate(clouds, kEach, kClasses, Quick(), 3, NoProgress, Stop()));
   ConfusionMatrix by_hand(2);
   for (std::size_t i = 0; i < 3; ++i) {
     STRATA_ASSERT_OK_AND_ASSIGN(const Classifier classifier,
@@ -89,17 +96,66 @@ TEST(ValidationTest, AClassOfOneCloudAloneCountsAsMissed) {
   const std::vector<ClassName> classes = {{4, "floor"}, {6, "wall"}, {8, "pond"}};
   std::vector<PointCloud> clouds = {Room(1, true), Room(2, true), Room(3, true)};
   for (std::size_t i = 1; i < 800; i += 4) clouds[1].label[i] = 8;
-  STRATA_ASSERT_OK_AND_ASSIGN(const ConfusionMatrix confusion,
-                              CrossValidate(clouds, classes, Quick(), 3, NoProgress, Stop()));
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const ConfusionMatrix confusion,
+      CrossValidate(clouds, kEach, classes, Quick(), 3, NoProgress, Stop()));
   EXPECT_EQ(confusion.Recall(2), 0.0);
-  EXPECT_THAT(CrossValidate(clouds, classes, Quick(), 4, NoProgress, Stop()),
+  EXPECT_THAT(CrossValidate(clouds, kEach, classes, Quick(), 4, NoProgress, Stop()),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("folds 4 is not in [2, 3]")));
-  EXPECT_THAT(CrossValidate(clouds, classes, Quick(), 1, NoProgress, Stop()),
+  EXPECT_THAT(CrossValidate(clouds, kEach, classes, Quick(), 1, NoProgress, Stop()),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("folds 1 is not in")));
   Stop stop;
   stop.Request();
-  EXPECT_THAT(CrossValidate(clouds, classes, Quick(), 3, NoProgress, stop),
+  EXPECT_THAT(CrossValidate(clouds, kEach, classes, Quick(), 3, NoProgress, stop),
               StatusIs(absl::StatusCode::kCancelled, HasSubstr("")));
+}
+
+TEST(ValidationTest, CloudsOfOneGroupAreLeftOutTogether) {
+  const std::vector<PointCloud> clouds = {Room(1, true), Room(2, true), Room(3, true)};
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const ConfusionMatrix confusion,
+      CrossValidate(
+          clouds, std::vector<std::size_t>{0, 1, 0}, kClasses, Quick(), 2, NoProgress, Stop()));
+  STRATA_ASSERT_OK_AND_ASSIGN(const Classifier of_second,
+                              TrainClassifier({clouds[1]}, kClasses, Quick(), NoProgress, Stop()));
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const Classifier of_others,
+      TrainClassifier({clouds[0], clouds[2]}, kClasses, Quick(), NoProgress, Stop()));
+  ConfusionMatrix by_hand(2);
+  for (std::size_t i = 0; i < 3; ++i) {
+    STRATA_ASSERT_OK_AND_ASSIGN(
+        const ConfusionMatrix one,
+        EvaluateClassifier(i == 1 ? of_others : of_second, clouds[i], kClasses, Stop()));
+    by_hand.Add(one);
+  }
+  for (std::size_t truth = 0; truth < 2; ++truth) {
+    for (std::size_t k = 0; k < 2; ++k)
+      EXPECT_EQ(confusion.count(truth, k), by_hand.count(truth, k));
+  }
+  EXPECT_THAT(
+      CrossValidate(
+          clouds, std::vector<std::size_t>{0, 0, 0}, kClasses, Quick(), 2, NoProgress, Stop()),
+      StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("folds 2 is not in [2, 1]")));
+}
+
+TEST(RegionsTest, CloudsAreCutAlongTheSquaresOfTheirCommonFrame) {
+  PointCloud first;
+  first.origin = {100.0, 0.0, 0.0};
+  first.points = {{0.5F, 0.5F, 0.0F}, {-0.5F, 0.5F, 1.0F}, {1.5F, 0.5F, 2.0F}};
+  first.label = {1, 2, 3};
+  PointCloud second;
+  second.origin = {0.0, 0.0, 5.0};
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  second.points = {{nan, 0.0F, 0.0F}, {99.0F, 1.0F, 0.0F}};
+  second.label = {4, 5};
+  const RegionClouds cut = CutIntoRegions({first, second}, 2.0);
+  EXPECT_THAT(cut.regions, ElementsAre(0, 1, 1));
+  ASSERT_EQ(cut.clouds.size(), 3U);
+  EXPECT_THAT(cut.clouds[0].label, ElementsAre(1, 3));
+  EXPECT_THAT(cut.clouds[1].label, ElementsAre(2));
+  EXPECT_THAT(cut.clouds[2].label, ElementsAre(5));
+  EXPECT_EQ(cut.clouds[0].points[1], first.points[2]);
+  EXPECT_EQ(cut.clouds[2].origin, second.origin);
 }
 
 }  // namespace
