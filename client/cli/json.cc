@@ -237,6 +237,7 @@ Json ToJson(const Surface& surface) {
           {"vertical", surface.vertical()},
           {"traversability", ToString(surface.traversability)},
           {"class", surface.class_id},
+          {"confidence", surface.class_id == 0 ? Json() : Json(surface.confidence / 100.0)},
           {"cost", Short(surface.cost)}};
 }
 

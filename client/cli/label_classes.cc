@@ -13,6 +13,7 @@
 
 #include "client/formats/file_bytes.h"
 #include "core/common/status.h"
+#include "core/world/map_class.h"
 
 namespace strata::cli {
 namespace {
@@ -119,6 +120,23 @@ absl::StatusOr<LabelClasses> ForClassesOf(const LabelClasses& labels,
   }
   for (const auto& [label, of] : labels.class_of_label) result.class_of_label[label] = id.at(of);
   return result;
+}
+
+absl::StatusOr<LabelClasses> ForClassesOfMap(api::Maps& maps,
+                                             const api::Call& call,
+                                             const std::string& map,
+                                             const LabelClasses& labels) {
+  STRATA_ASSIGN_OR_RETURN(std::vector<MapClass> table, maps.ListClasses(call, map));
+  const std::size_t known = table.size();
+  for (const ClassName& name : labels.classes) {
+    STRATA_RETURN_IF_ERROR(IdInTable(table, name.name, name.id).status());
+  }
+  for (std::size_t i = known; i < table.size(); ++i) {
+    STRATA_RETURN_IF_ERROR(maps.SetClass(call, map, table[i]));
+  }
+  std::vector<ClassName> names;
+  for (const MapClass& map_class : table) names.push_back({map_class.id, map_class.name});
+  return ForClassesOf(labels, names);
 }
 
 }  // namespace strata::cli

@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
+#include "core/api/maps.h"
 #include "core/classification/classifier.h"
 #include "core/cloud/point_cloud.h"
 
@@ -39,6 +40,12 @@ LabelClasses EveryLabel(const std::vector<PointCloud>& clouds);
 // name that is not among them.
 absl::StatusOr<LabelClasses> ForClassesOf(const LabelClasses& labels,
                                           const std::vector<ClassName>& classes);
+
+// The same for the classes of a map; those that it does not have become its classes.
+absl::StatusOr<LabelClasses> ForClassesOfMap(api::Maps& maps,
+                                             const api::Call& call,
+                                             const std::string& map,
+                                             const LabelClasses& labels);
 
 }  // namespace strata::cli
 

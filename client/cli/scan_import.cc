@@ -22,6 +22,7 @@
 
 #include "client/cli/arguments.h"
 #include "client/cli/json.h"
+#include "client/cli/label_classes.h"
 #include "client/cli/level_trajectory.h"
 #include "client/cli/patience.h"
 #include "client/cli/progress.h"
@@ -29,6 +30,7 @@
 #include "client/formats/scan_list.h"
 #include "client/formats/scan_reader.h"
 #include "core/common/status.h"
+#include "core/world/map_class.h"
 
 namespace strata::cli {
 namespace {
@@ -43,6 +45,8 @@ struct ImportOptions {
   std::string pose_format = "auto";
   std::string trajectory;
   std::string align = "on";
+  std::string classes;  // as ReadLabelClasses(); empty: labels are ids of the map's classes
+  bool without_labels = false;
   bool level = false;
   bool wait = false;
 };
@@ -153,10 +157,46 @@ void WarnOfOtherScans(const std::vector<ScanSource>& scans,
                            "uploads these as a run of their own"));
 }
 
+// What labels of files become in a map.
+using LabelsToMap = std::function<absl::Status(PointCloud&)>;
+
+absl::StatusOr<LabelsToMap> LabelsFor(Context& context, const ImportOptions& options) {
+  if (options.without_labels) {
+    return [](PointCloud& cloud) {
+      cloud.label.clear();
+      return absl::OkStatus();
+    };
+  }
+  if (options.classes.empty()) {
+    return [](PointCloud& cloud) {
+      const absl::Status valid = ValidateLabels(cloud.label);
+      if (valid.ok()) return valid;
+      return absl::InvalidArgumentError(absl::StrCat(
+          valid.message(),
+          "; say with --classes which labels are which class, or leave them out with --no-labels"));
+    };
+  }
+  STRATA_ASSIGN_OR_RETURN(const LabelClasses given, ReadLabelClasses(options.classes));
+  STRATA_ASSIGN_OR_RETURN(
+      const LabelClasses labels,
+      ForClassesOfMap(context.database.maps(), context.call, options.map, given));
+  return [labels](PointCloud& cloud) {
+    labels.Apply(cloud);
+    return absl::OkStatus();
+  };
+}
+
+absl::StatusOr<PointCloud> ReadForMap(const ScanSource& scan, const LabelsToMap& labels) {
+  STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScan(scan.path, scan.format));
+  STRATA_RETURN_IF_ERROR(labels(cloud));
+  return cloud;
+}
+
 // Those scans that have a pose and are not there yet.
 std::vector<UploadSource> SourcesOf(const std::vector<ScanSource>& scans,
                                     const ScansThere& there,
                                     const ImportOptions& options,
+                                    const LabelsToMap& labels,
                                     Summary& summary) {
   std::vector<UploadSource> sources;
   for (const ScanSource& scan : scans) {
@@ -176,7 +216,7 @@ std::vector<UploadSource> SourcesOf(const std::vector<ScanSource>& scans,
     source.header.time = scan.time.value_or(absl::UnixEpoch());
     source.header.T_map_scan = scan.T_map_scan;
     source.header.alignment = options.align == "on" ? Alignment::kOn : Alignment::kOff;
-    source.read = [path = scan.path, format = scan.format] { return ReadScan(path, format); };
+    source.read = [scan, labels] { return ReadForMap(scan, labels); };
     sources.push_back(std::move(source));
   }
   return sources;
@@ -311,6 +351,7 @@ absl::Status Import(Context& context, ImportOptions options) {
   }
   STRATA_ASSIGN_OR_RETURN(std::vector<ScanSource> scans, FindScans(options, context.output));
   STRATA_ASSIGN_OR_RETURN(const ScansThere there, FindScansThere(context, options));
+  STRATA_ASSIGN_OR_RETURN(const LabelsToMap labels, LabelsFor(context, options));
   Summary summary;
   if (options.level) {
     STRATA_ASSIGN_OR_RETURN(summary.level_rad, LevelTrajectory(scans));
@@ -318,7 +359,7 @@ absl::Status Import(Context& context, ImportOptions options) {
   }
   WarnOfOtherScans(scans, there, options, context.output);
   summary.files = scans.size();
-  const std::vector<UploadSource> sources = SourcesOf(scans, there, options, summary);
+  const std::vector<UploadSource> sources = SourcesOf(scans, there, options, labels, summary);
   Upload(context, options, sources, summary);
   const absl::Status waited =
       options.wait && !summary.interrupted ? Wait(context, options, summary) : absl::OkStatus();
@@ -376,6 +417,15 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
           "--align", options->align, "on: register each scan to the map; off: take its pose")
       ->check(CLI::IsMember({"on", "off"}))
       ->capture_default_str();
+  CLI::Option* classes =
+      import
+          ->add_option("--classes",
+                       options->classes,
+                       "Which labels of the files are which class of the map, to which new ones "
+                       "are added; other labels are left out. Without it labels are ids of classes")
+          ->type_name("'NAME=LABEL,…;…'|FILE");
+  import->add_flag("--no-labels", options->without_labels, "Leave out what files say points are")
+      ->excludes(classes);
   import->add_flag("--level", options->level, "Turn all poses so that the dominant floor is level");
   import->add_flag("--wait", options->wait, "Return when every scan is integrated or failed");
 }

@@ -28,26 +28,27 @@ struct LabelOptions {
   bool update = false;
 };
 
-absl::StatusOr<std::vector<std::uint16_t>> LabelsOfFile(const LabelOptions& options,
-                                                        const std::vector<MapClass>& table) {
+absl::StatusOr<std::vector<std::uint16_t>> LabelsOfFile(Context& context,
+                                                        const LabelOptions& options) {
   STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScan(options.file));
   if (cloud.label.empty()) {
     return absl::InvalidArgumentError(
         absl::StrCat(options.file, ": points have no label, class or classification"));
   }
   if (options.classes.empty()) return std::move(cloud.label);
-  std::vector<ClassName> names;
-  for (const MapClass& known : table) names.push_back({known.id, known.name});
   STRATA_ASSIGN_OR_RETURN(const LabelClasses given, ReadLabelClasses(options.classes));
-  STRATA_ASSIGN_OR_RETURN(const LabelClasses labels, ForClassesOf(given, names));
+  STRATA_ASSIGN_OR_RETURN(
+      const LabelClasses labels,
+      ForClassesOfMap(context.database.maps(), context.call, options.map, given));
   labels.Apply(cloud);
   return std::move(cloud.label);
 }
 
 // The class for the points of the scan that are in the prism, 0 for the others.
 absl::StatusOr<std::vector<std::uint16_t>> LabelsOfPrism(Context& context,
-                                                         const LabelOptions& options,
-                                                         const std::vector<MapClass>& table) {
+                                                         const LabelOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> table,
+                          context.database.maps().ListClasses(context.call, options.map));
   STRATA_ASSIGN_OR_RETURN(const std::uint16_t id, ClassIdOf(table, options.class_name));
   api::Scans& scans = context.database.scans();
   STRATA_ASSIGN_OR_RETURN(const ScanInfo info, scans.Get(context.call, options.map, options.id));
@@ -65,12 +66,10 @@ absl::StatusOr<std::vector<std::uint16_t>> LabelsOfPrism(Context& context,
 }
 
 absl::Status Label(Context& context, const LabelOptions& options) {
-  STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> table,
-                          context.database.maps().ListClasses(context.call, options.map));
   const bool update = options.update || options.prism.has_value();
-  STRATA_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> labels,
-                          options.prism.has_value() ? LabelsOfPrism(context, options, table)
-                                                    : LabelsOfFile(options, table));
+  STRATA_ASSIGN_OR_RETURN(
+      const std::vector<std::uint16_t> labels,
+      options.prism.has_value() ? LabelsOfPrism(context, options) : LabelsOfFile(context, options));
   STRATA_RETURN_IF_ERROR(context.database.scans().SetLabels(
       context.call,
       options.map,
@@ -168,7 +167,8 @@ void AddScanLabel(Commands& commands, CLI::App* noun) {
   label
       ->add_option("--classes",
                    options->classes,
-                   "Which labels of the file are which class of the map; else labels are ids")
+                   "Which labels of the file are which class of the map, to which new ones are "
+                   "added; else labels are ids")
       ->type_name("'NAME=LABEL,…;…'|FILE")
       ->needs("--from");
   label->add_flag("--update", options->update, "Labels that are 0 leave what people said before")

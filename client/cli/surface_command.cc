@@ -63,6 +63,7 @@ void Print(const std::vector<SurfaceColumn>& columns,
                {"depth_m", "DEPTH"},
                {"traversability", "TRAVERSABILITY"},
                {"class_name", "CLASS"},
+               {"confidence", "CONFIDENCE"},
                {"cost", "COST"}});
 }
 

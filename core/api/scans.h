@@ -92,8 +92,8 @@ class Scans {
                                  absl::FunctionRef<absl::Status(const PointCloud&)> sink) = 0;
   // What a person says the points of a scan are: one label each, in their order, 0 for none. Every
   // surface of the scan counts them when the call returns; uploaded labels stay as they are.
-  // INVALID_ARGUMENT unless there are as many as points; NOT_FOUND; FAILED_PRECONDITION if the map
-  // dropped the points.
+  // INVALID_ARGUMENT unless there are as many as points, none beyond kMaxClassId; NOT_FOUND;
+  // FAILED_PRECONDITION if the map dropped the points.
   virtual absl::Status SetLabels(const Call& call,
                                  absl::string_view map,
                                  const ScanId& id,

@@ -88,4 +88,9 @@ absl::StatusOr<absl::string_view> OpenBlob(BlobKind kind,
   return body;
 }
 
+std::uint16_t VersionOfBlob(absl::string_view bytes) {
+  constexpr std::size_t kOldestReader = 6;
+  return ByteReader(bytes.substr(kOldestReader)).Fixed<std::uint16_t>();
+}
+
 }  // namespace strata

@@ -33,6 +33,9 @@ absl::StatusOr<absl::string_view> OpenBlob(BlobKind kind,
                                            std::uint16_t reader_version,
                                            absl::string_view bytes);
 
+// The oldest reader's version of bytes that OpenBlob() has accepted.
+std::uint16_t VersionOfBlob(absl::string_view bytes);
+
 }  // namespace strata
 
 #endif  // STRATA_CORE_CODEC_BLOB_H_

@@ -31,6 +31,7 @@ constexpr float kMinSigmaOctave = -24.0F;
 constexpr float kCostCodesPerOctave = 6.0F;        // steps of 12 %, where a robot can drive
 constexpr float kCoarseCostCodesPerOctave = 2.0F;  // steps of 41 %, elsewhere
 constexpr std::int32_t kInfiniteCost = 255;
+constexpr std::uint8_t kMaxConfidence = 100;
 constexpr int kMaxTraversability = static_cast<int>(Traversability::kNonTraversable);
 
 // A surface in whole numbers, as it is stored.
@@ -38,6 +39,7 @@ struct Codes {
   std::uint16_t cell = 0;
   std::uint8_t traversability = 0;
   std::uint8_t class_id = 0;
+  std::uint8_t confidence = 0;
   std::int32_t height = 0;
   std::int32_t depth = 0;  // > 0: vertical
   std::int32_t sigma = 0;
@@ -83,6 +85,7 @@ Codes Quantised(const Surface& surface) {
               .height = LengthCode(surface.z_m),
               .sigma = SigmaCodeOf(surface.sigma_m)};
   codes.cost = CostCodeOf(surface.cost, codes.traversability);
+  if (codes.class_id != 0) codes.confidence = std::min(surface.confidence, kMaxConfidence);
   if (surface.vertical()) codes.depth = std::max(1, LengthCode(surface.depth_m));
   return codes;
 }
@@ -91,6 +94,7 @@ Surface Restored(const Codes& codes) {
   Surface surface{.cell = codes.cell,
                   .traversability = static_cast<Traversability>(codes.traversability),
                   .class_id = codes.class_id,
+                  .confidence = codes.confidence,
                   .z_m = static_cast<float>(codes.height) / kStepsPerMetre,
                   .depth_m = static_cast<float>(codes.depth) / kStepsPerMetre};
   surface.sigma_m =
@@ -118,6 +122,7 @@ enum Column : std::uint8_t {
   kSigmaLast = kSigma + 1,
   kCost,  // + traversability
   kCostLast = kCost + 2,
+  kConfidence,  // where there is a class
   kColumnCount
 };
 
@@ -219,11 +224,22 @@ struct ExpectedKind {
   }
 };
 
+// Tiles in which nothing is known of any class are of version 1, without the last column.
+constexpr std::uint16_t kVersionWithoutConfidence = 1;
+
+int ColumnsOf(bool with_confidence) { return with_confidence ? kColumnCount : kConfidence; }
+
+bool AnyConfidence(const std::vector<Codes>& surfaces) {
+  return std::any_of(
+      surfaces.begin(), surfaces.end(), [](const Codes& codes) { return codes.confidence != 0; });
+}
+
 // One surface, in either direction; false if what was read is none. `codes.cell` is known.
 template <typename Coder>
 bool CodeSurface(Coder& coder,
                  const SurfacesBeside& neighbours,
                  std::span<const Codes> surfaces,
+                 bool with_confidence,
                  Codes& codes) {
   const ExpectedKind expected_kind(surfaces, neighbours);
   std::uint8_t kind = expected_kind.kind;
@@ -233,6 +249,10 @@ bool CodeSurface(Coder& coder,
   codes.traversability = kind >> 1;
   if (codes.traversability > kMaxTraversability) return false;
   codes.class_id = coder.CodeByte(kClass, codes.class_id);
+  if (with_confidence && codes.class_id != 0) {
+    codes.confidence = coder.CodeByte(kConfidence, codes.confidence);
+    if (codes.confidence > kMaxConfidence) return false;
+  }
   const bool vertical = (kind & 1) != 0;
   const Surroundings around(surfaces, neighbours, vertical);
   if (!CodeWithin(coder,
@@ -268,40 +288,47 @@ std::string EncodeSurfaceTile(const SurfaceTile& tile) {
     cells[i] = surfaces[i].cell;
   }
   const std::vector<SurfacesBeside> neighbours = FindNeighbours(cells);
-  ColumnEncoder encoder(kColumnCount);
+  const bool with_confidence = AnyConfidence(surfaces);
+  ColumnEncoder encoder(ColumnsOf(with_confidence));
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
-    CodeSurface(encoder, neighbours[i], surfaces, surfaces[i]);
+    CodeSurface(encoder, neighbours[i], surfaces, with_confidence, surfaces[i]);
   }
   std::string body;
   PutTileHeader(body, tile.key);
   PutFixed(body, tile.version);
   PutCells(body, cells);
   encoder.Finish(body);
-  return SealBlob(BlobKind::kSurfaceTile, kSurfaceTileVersion, body);
+  return SealBlob(BlobKind::kSurfaceTile,
+                  with_confidence ? kSurfaceTileVersion : kVersionWithoutConfidence,
+                  body);
 }
 
 absl::StatusOr<SurfaceTile> DecodeSurfaceTile(absl::string_view bytes) {
   STRATA_ASSIGN_OR_RETURN(const absl::string_view body,
                           OpenBlob(BlobKind::kSurfaceTile, kSurfaceTileVersion, bytes));
+  const bool with_confidence = VersionOfBlob(bytes) > kVersionWithoutConfidence;
   ByteReader reader(body);
   SurfaceTile tile;
   STRATA_RETURN_IF_ERROR(TakeTileHeader(reader, tile.key));
   tile.version = reader.Fixed<std::uint64_t>();
   STRATA_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> cells, TakeCells(reader));
   STRATA_ASSIGN_OR_RETURN(ColumnDecoder decoder,
-                          ColumnDecoder::Open(reader, kColumnCount, cells.size()));
+                          ColumnDecoder::Open(reader, ColumnsOf(with_confidence), cells.size()));
   if (reader.remaining() != 0) return absl::DataLossError("surface tile: bytes left over");
   const std::vector<SurfacesBeside> neighbours = FindNeighbours(cells);
   std::vector<Codes> surfaces(cells.size());
   tile.surfaces.reserve(cells.size());
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     surfaces[i].cell = cells[i];
-    if (!CodeSurface(decoder, neighbours[i], surfaces, surfaces[i])) {
+    if (!CodeSurface(decoder, neighbours[i], surfaces, with_confidence, surfaces[i])) {
       return absl::DataLossError(absl::StrCat("surface tile: surface ", i, " is out of range"));
     }
     tile.surfaces.push_back(Restored(surfaces[i]));
   }
   STRATA_RETURN_IF_ERROR(decoder.Finish());
+  if (with_confidence != AnyConfidence(surfaces)) {
+    return absl::DataLossError("surface tile: a column of confidences without any");
+  }
   tile.IndexRows();
   return tile;
 }

@@ -39,29 +39,6 @@ absl::Status Put(StorageWriter& writer, const Classifier& classifier, Classifier
   return absl::OkStatus();
 }
 
-// The id of the class called `name` in `table`, to which it is added if it is not there: as `id`,
-// where that is free, else as the first that is.
-absl::StatusOr<std::uint16_t> IdInTable(std::vector<MapClass>& table,
-                                        const std::string& name,
-                                        std::uint16_t id,
-                                        const std::set<std::uint16_t>& taken) {
-  std::set<std::uint16_t> used = taken;
-  for (const MapClass& known : table) {
-    if (known.name == name) return known.id;
-    used.insert(known.id);
-  }
-  if (id < 1 || id > kMaxClassId || used.contains(id)) id = 1;
-  while (used.contains(id) && id < kMaxClassId) ++id;
-  if (used.contains(id)) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat("class ", name, ": all ", kMaxClassId, " ids of the map are in use"));
-  }
-  const MapClass added{id, name, DefaultClassColour(id)};
-  STRATA_RETURN_IF_ERROR(ValidateMapClass(added));
-  table.push_back(added);
-  return id;
-}
-
 // Gives the classes the map's ids. Inside a commit.
 absl::Status MatchClasses(StorageWriter& writer, std::vector<ClassName>& classes) {
   STRATA_ASSIGN_OR_RETURN(std::vector<MapClass> table, writer.reader().ListClasses());

@@ -17,6 +17,7 @@
 #include "core/common/status.h"
 #include "core/engine/scan_labels.h"
 #include "core/engine/upload.h"
+#include "core/world/map_class.h"
 #include "core/world/names.h"
 
 namespace strata {
@@ -200,6 +201,7 @@ absl::Status EngineScans::SetLabels(const api::Call& call,
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
   STRATA_RETURN_IF_ERROR(CheckId(id));
+  STRATA_RETURN_IF_ERROR(Annotate(ValidateLabels(labels), absl::StrCat("scan ", id.ToString())));
   return found->worker().Execute(call.stop, [&](Integrator& integrator) {
     return integrator.SetPersonLabels(id, labels, mode == api::LabelMode::kUpdate);
   });

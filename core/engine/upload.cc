@@ -18,6 +18,7 @@
 #include "core/common/status.h"
 #include "core/engine/map_core.h"
 #include "core/storage/storage.h"
+#include "core/world/map_class.h"
 
 namespace strata {
 namespace {
@@ -99,6 +100,7 @@ absl::Status EngineUpload::CheckChunk(const PointCloud& chunk) const {
       CheckColumn("intensity", chunk.intensity.size(), header.has_intensity, size));
   STRATA_RETURN_IF_ERROR(CheckColumn("colour", chunk.colour.size(), header.has_colour, size));
   STRATA_RETURN_IF_ERROR(CheckColumn("label", chunk.label.size(), header.has_label, size));
+  STRATA_RETURN_IF_ERROR(ValidateLabels(chunk.label, points_));
   for (std::size_t i = 0; i < size; ++i) {
     const Eigen::Vector3f& p = chunk.points[i];
     if ((p.array().abs() <= kMaxCoordinate).all()) continue;

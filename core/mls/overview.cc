@@ -48,7 +48,14 @@ std::size_t LargestGap(std::span<const ChildSurface> chain) {
   return cut;
 }
 
-std::uint8_t MajorityClass(std::span<const ChildSurface> chain) {
+// What most of the chain's surfaces with a class are, and how sure that is on average; those of
+// other classes are not at all.
+struct Majority {
+  std::uint8_t class_id = 0;
+  std::uint8_t confidence = 0;
+};
+
+Majority MajorityClass(std::span<const ChildSurface> chain) {
   std::uint8_t best = 0;
   std::ptrdiff_t best_count = 0;
   for (const ChildSurface& candidate : chain) {
@@ -62,7 +69,15 @@ std::uint8_t MajorityClass(std::span<const ChildSurface> chain) {
     best = id;
     best_count = count;
   }
-  return best;
+  if (best == 0) return {};
+  unsigned sum = 0;
+  unsigned with_class = 0;
+  for (const ChildSurface& child : chain) {
+    if (child.surface->class_id == best) sum += child.surface->confidence;
+    if (child.surface->class_id != 0) ++with_class;
+  }
+  const unsigned mean = (2 * sum + with_class) / (2 * with_class);
+  return {best, static_cast<std::uint8_t>(sum == 0 ? 0 : std::max(mean, 1U))};
 }
 
 Traversability MajorityTraversability(std::span<const ChildSurface> chain) {
@@ -106,9 +121,11 @@ Surface Summarise(std::uint16_t cell, std::span<const ChildSurface> chain, doubl
   const double mean = sum_wz / sum_w;
   const double spread = std::max(0.0, sum_wzz / sum_w - mean * mean);
   const double z_m = reference + mean;
+  const Majority majority = MajorityClass(chain);
   return {.cell = cell,
           .traversability = MajorityTraversability(chain),
-          .class_id = MajorityClass(chain),
+          .class_id = majority.class_id,
+          .confidence = majority.confidence,
           .z_m = static_cast<float>(z_m),
           .sigma_m = static_cast<float>(std::sqrt(1.0 / sum_w + spread)),
           .depth_m = DepthOf(chain, z_m, thickness_m),

@@ -3,12 +3,32 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "core/mls/mls_map.h"
 #include "core/mls/patch.h"
 
 namespace strata {
+namespace {
+
+// `votes` are those of one patch.
+void Elect(std::span<const ClassVotes> votes, Surface& surface) {
+  std::uint64_t all = 0;
+  std::uint64_t most = 0;
+  for (const ClassVotes& vote : votes) {
+    if (vote.class_id > std::numeric_limits<std::uint8_t>::max()) continue;
+    all += vote.count;
+    if (vote.count <= most) continue;
+    most = vote.count;
+    surface.class_id = static_cast<std::uint8_t>(vote.class_id);
+  }
+  if (most == 0) return;
+  const std::uint64_t percent = (200 * most + all) / (2 * all);
+  surface.confidence = static_cast<std::uint8_t>(std::max<std::uint64_t>(percent, 1));
+}
+
+}  // namespace
 
 void SurfaceTile::IndexRows() {
   row_begin.fill(0);
@@ -38,13 +58,11 @@ SurfaceTile SurfacesOf(const MlsTile& tile) {
                                .sigma_m = static_cast<float>(patch.sigma_m()),
                                .depth_m = static_cast<float>(patch.depth_m())});
   }
-  std::uint32_t best_count = 0;
-  for (std::size_t i = 0; i < tile.votes.size(); ++i) {
-    const ClassVotes& vote = tile.votes[i];
-    if (i == 0 || tile.votes[i - 1].patch != vote.patch) best_count = 0;
-    if (vote.count <= best_count) continue;
-    best_count = vote.count;
-    result.surfaces[vote.patch].class_id = static_cast<std::uint8_t>(vote.class_id);
+  for (auto vote = tile.votes.begin(); vote != tile.votes.end();) {
+    const auto of_other = std::find_if(
+        vote, tile.votes.end(), [&](const ClassVotes& v) { return v.patch != vote->patch; });
+    Elect({vote, of_other}, result.surfaces[vote->patch]);
+    vote = of_other;
   }
   return result;
 }

@@ -20,14 +20,15 @@ enum class Traversability : std::uint8_t {  // stored in tiles
   kNonTraversable = 2,
 };
 
-// One patch as served, 20 bytes.
+// One patch as served, 24 bytes.
 struct Surface {
   std::uint16_t cell = 0;  // CellInTile
   Traversability traversability = Traversability::kUnknown;
-  std::uint8_t class_id = 0;  // class with the most votes, the smaller id on a tie; 0 = none
-  float z_m = 0.0F;           // Patch::mean_m()
-  float sigma_m = 0.0F;       // Patch::sigma_m()
-  float depth_m = 0.0F;       // Patch::depth_m(); > 0 means vertical
+  std::uint8_t class_id = 0;    // class with the most votes, the smaller id on a tie; 0 = none
+  std::uint8_t confidence = 0;  // share of the votes that class_id has [%], 1 to 100; 0 without
+  float z_m = 0.0F;             // Patch::mean_m()
+  float sigma_m = 0.0F;         // Patch::sigma_m()
+  float depth_m = 0.0F;         // Patch::depth_m(); > 0 means vertical
   float cost = 0.0F;  // path cost factor of the default profile, ≥ 0 (6.2.2); see traversability.h
 
   bool vertical() const { return depth_m > 0.0F; }
@@ -51,7 +52,8 @@ struct SurfaceTile {
   friend bool operator==(const SurfaceTile&, const SurfaceTile&) = default;
 };
 
-// The surfaces of a tile, not annotated: traversability kUnknown, cost 0.
+// The surfaces of a tile, not annotated: traversability kUnknown, cost 0. Votes for classes beyond
+// what class_id holds are not counted.
 SurfaceTile SurfacesOf(const MlsTile& tile);
 
 }  // namespace strata

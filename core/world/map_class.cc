@@ -1,5 +1,6 @@
 #include "core/world/map_class.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -55,6 +56,41 @@ absl::StatusOr<std::uint16_t> ClassIdOf(const std::vector<MapClass>& classes,
                                           text.substr(0, 100),
                                           "' does not exist; there is ",
                                           names.empty() ? "none" : names));
+}
+
+absl::StatusOr<std::uint16_t> IdInTable(std::vector<MapClass>& table,
+                                        const std::string& name,
+                                        std::uint16_t id,
+                                        const std::set<std::uint16_t>& taken) {
+  std::set<std::uint16_t> used = taken;
+  for (const MapClass& known : table) {
+    if (known.name == name) return known.id;
+    used.insert(known.id);
+  }
+  if (id < 1 || id > kMaxClassId || used.contains(id)) id = 1;
+  while (used.contains(id) && id < kMaxClassId) ++id;
+  if (used.contains(id)) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("class ", name, ": all ", kMaxClassId, " ids of the map are in use"));
+  }
+  const MapClass added{id, name, DefaultClassColour(id)};
+  STRATA_RETURN_IF_ERROR(ValidateMapClass(added));
+  table.push_back(added);
+  return id;
+}
+
+absl::Status ValidateLabels(std::span<const std::uint16_t> labels, std::uint64_t first_point) {
+  const auto bad = std::find_if(
+      labels.begin(), labels.end(), [](std::uint16_t label) { return label > kMaxClassId; });
+  if (bad == labels.end()) return absl::OkStatus();
+  const auto index = static_cast<std::uint64_t>(bad - labels.begin());
+  return absl::InvalidArgumentError(absl::StrCat("label ",
+                                                 *bad,
+                                                 " of point ",
+                                                 first_point + index,
+                                                 " is not in [0, ",
+                                                 kMaxClassId,
+                                                 "], the ids of classes"));
 }
 
 Colour DefaultClassColour(std::uint16_t id) {

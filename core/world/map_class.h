@@ -3,6 +3,8 @@
 #define STRATA_CORE_WORLD_MAP_CLASS_H_
 
 #include <cstdint>
+#include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,8 +16,8 @@
 
 namespace strata {
 
-// Largest id that a class can have: what a served surface has room for. Larger labels stay with
-// their points, but are of no class.
+// Largest id that a class can have: what a served surface has room for. Larger labels are
+// refused.
 inline constexpr std::uint16_t kMaxClassId = 255;
 
 // A class keeps its id for ever; its name and colour may change. A label whose id is in no table is
@@ -38,6 +40,18 @@ MapClass ClassOf(const std::vector<MapClass>& classes, std::uint16_t id);
 // kMaxClassId], in the table or not. NOT_FOUND listing the names there are.
 absl::StatusOr<std::uint16_t> ClassIdOf(const std::vector<MapClass>& classes,
                                         absl::string_view text);
+
+// The id of the class called `name` in `table`, to which it is added if it is not there: as `id`
+// where that is free, else as the first that is; ids in `taken` are not. RESOURCE_EXHAUSTED when
+// none is left, INVALID_ARGUMENT for a bad name.
+absl::StatusOr<std::uint16_t> IdInTable(std::vector<MapClass>& table,
+                                        const std::string& name,
+                                        std::uint16_t id,
+                                        const std::set<std::uint16_t>& taken = {});
+
+// INVALID_ARGUMENT for a label that is no class's id, nor 0; the first one is that of
+// `first_point`.
+absl::Status ValidateLabels(std::span<const std::uint16_t> labels, std::uint64_t first_point = 0);
 
 // A colour for a class that nobody chose one for: the same for an id always, and well apart from
 // those of the ids beside it.

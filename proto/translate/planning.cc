@@ -90,17 +90,20 @@ v1::Surface SurfaceToProto(const Surface& surface) {
   proto.set_sigma_m(surface.sigma_m);
   proto.set_depth_m(surface.depth_m);
   proto.set_cost(surface.cost);
+  proto.set_confidence(surface.confidence);
   return proto;
 }
 
 absl::StatusOr<Surface> SurfaceFromProto(const v1::Surface& proto) {
   if (proto.cell() > std::numeric_limits<std::uint16_t>::max() ||
-      proto.class_id() > std::numeric_limits<std::uint8_t>::max() ||
+      proto.class_id() > std::numeric_limits<std::uint8_t>::max() || proto.confidence() > 100 ||
       !v1::Traversability_IsValid(proto.traversability())) {
     return absl::InvalidArgumentError(absl::StrCat("surface: cell ",
                                                    proto.cell(),
                                                    ", class_id ",
                                                    proto.class_id(),
+                                                   ", confidence ",
+                                                   proto.confidence(),
                                                    " or traversability ",
                                                    static_cast<int>(proto.traversability()),
                                                    " is out of range"));
@@ -113,6 +116,7 @@ absl::StatusOr<Surface> SurfaceFromProto(const v1::Surface& proto) {
   surface.sigma_m = proto.sigma_m();
   surface.depth_m = proto.depth_m();
   surface.cost = proto.cost();
+  surface.confidence = static_cast<std::uint8_t>(proto.confidence());
   return surface;
 }
 

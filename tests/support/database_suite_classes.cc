@@ -65,7 +65,10 @@ std::map<int, int> SurfaceClasses(api::Database& db) {
     const auto tile = DecodeSurfaceTile(update.tile.bytes);
     STRATA_EXPECT_OK(tile);
     if (!tile.ok()) return tile.status();
-    for (const Surface& surface : tile->surfaces) ++classes[surface.class_id];
+    for (const Surface& surface : tile->surfaces) {
+      ++classes[surface.class_id];
+      EXPECT_EQ(surface.class_id == 0, surface.confidence == 0);
+    }
     return absl::OkStatus();
   }));
   return classes;
@@ -104,7 +107,7 @@ TEST_P(DatabaseSuite, LabelsOfAPersonCountMoreThanUploadedOnes) {
   ASSERT_THAT(uploaded, ::testing::SizeIs(2));
   STRATA_ASSERT_OK_AND_ASSIGN(const MapStats before, db().maps().Stats({}, kMap));
   std::vector<std::uint16_t> said(expected.size(), 0);
-  for (std::size_t i = 0; i < 1000; ++i) said[i] = expected[i] = 300;
+  for (std::size_t i = 0; i < 1000; ++i) said[i] = expected[i] = 200;
   for (std::size_t i = 1000; i < 1200; ++i) said[i] = expected[i] = 9;
   STRATA_ASSERT_OK(db().scans().SetLabels({}, kMap, id, said, api::LabelMode::kReplace));
   EXPECT_EQ(LabelsOf(db(), id), expected);
@@ -130,14 +133,19 @@ TEST_P(DatabaseSuite, LabelsOfAPersonCountMoreThanUploadedOnes) {
 TEST_P(DatabaseSuite, LabelsThatDoNotFitAreRefused) {
   PutPark(db(), 1, false);
   const std::size_t points = MakePark(1).size();
-  const auto set = [&](const ScanId& id, std::size_t count) {
+  const auto set = [&](const ScanId& id, std::size_t count, std::uint16_t label = 1) {
     return db().scans().SetLabels(
-        {}, kMap, id, std::vector<std::uint16_t>(count, 1), api::LabelMode::kReplace);
+        {}, kMap, id, std::vector<std::uint16_t>(count, label), api::LabelMode::kReplace);
   };
   EXPECT_THAT(set({"run", 1}, points - 1), StatusIs(Code::kInvalidArgument, HasSubstr("points")));
   EXPECT_THAT(set({"run", 1}, points + 1), StatusIs(Code::kInvalidArgument, HasSubstr("points")));
   EXPECT_THAT(set({"run", 2}, points), StatusIs(Code::kNotFound, HasSubstr("run/2")));
+  EXPECT_THAT(set({"run", 1}, points, 256), StatusIs(Code::kInvalidArgument, HasSubstr("256")));
   EXPECT_THAT(LabelsOf(db(), {"run", 1}), IsEmpty());
+  PointCloud park = MakePark(2);
+  park.label[70] = 1200;
+  EXPECT_THAT(UploadScan(db(), kMap, FloorHeader({"run", 2}, park, 0.0), park),
+              StatusIs(Code::kInvalidArgument, HasSubstr("label 1200 of point 70")));
 }
 
 TEST_P(DatabaseSuite, AClassifierIsTrainedLabelsScansAndIsScored) {

@@ -4,10 +4,12 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -165,10 +167,17 @@ Solid Hull(const std::vector<Ellipsoid>& ellipsoids, int faces) {
   return solid;
 }
 
+Solid Labelled(Solid solid, std::uint16_t label) {
+  solid.label = label;
+  return solid;
+}
+
 void Scene::SetTerrain(const Eigen::AlignedBox2d& area,
                        double cell_m,
-                       const std::function<double(double, double)>& height) {
+                       const std::function<double(double, double)>& height,
+                       std::uint16_t label) {
   Terrain terrain;
+  terrain.label = label;
   terrain.origin = area.min();
   terrain.cell = cell_m;
   terrain.columns = static_cast<int>(std::ceil(area.sizes().x() / cell_m - 1e-9));
@@ -223,7 +232,7 @@ std::optional<Scene::Hit> Scene::Trace(const Vector3d& origin,
                                        double max_range) const {
   const Hit solid = CastSolids(origin, direction, max_range);
   const double ground = CastTerrain(origin, direction, std::min(solid.range, max_range));
-  const Hit hit = ground < solid.range ? Hit{.range = ground} : solid;
+  const Hit hit = ground < solid.range ? Hit{ground, terrain_->label} : solid;
   if (hit.range > max_range) return std::nullopt;
   return hit;
 }
@@ -240,6 +249,14 @@ std::optional<double> Scene::GroundBelow(double x, double y, double z) const {
   const auto range = Cast({x, y, z}, -Vector3d::UnitZ(), 1e4);
   if (!range.has_value()) return std::nullopt;
   return z - *range;
+}
+
+std::set<std::uint16_t> Scene::Labels() const {
+  std::set<std::uint16_t> labels;
+  for (const Solid& solid : solids_) labels.insert(solid.label);
+  if (terrain_.has_value()) labels.insert(terrain_->label);
+  labels.erase(0);
+  return labels;
 }
 
 Scene::Hit Scene::CastSolids(const Vector3d& origin,

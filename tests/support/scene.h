@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -42,6 +43,8 @@ struct Ellipsoid {
 // The convex hull of ellipsoids, circumscribed by `faces` planes: heads, limbs, tapered bodies.
 Solid Hull(const std::vector<Ellipsoid>& ellipsoids, int faces = 96);
 
+Solid Labelled(Solid solid, std::uint16_t label);
+
 // Solids and at most one terrain. Add everything, then Build(), then ask; asking is const and
 // thread-safe.
 class Scene {
@@ -50,12 +53,13 @@ class Scene {
   // Terrain: `height` sampled at the corners of square cells over `area`, two triangles a cell.
   void SetTerrain(const Eigen::AlignedBox2d& area,
                   double cell_m,
-                  const std::function<double(double, double)>& height);
+                  const std::function<double(double, double)>& height,
+                  std::uint16_t label = 0);
   void Build();
 
   struct Hit {
     double range = 0.0;
-    std::uint16_t label = 0;  // of the solid; 0 of terrain
+    std::uint16_t label = 0;  // of the solid or the terrain
   };
   // The first surface along the unit vector `direction` within `max_range`. A solid that holds
   // `origin` is not hit.
@@ -70,6 +74,8 @@ class Scene {
   std::optional<double> GroundBelow(double x, double y, double z) const;
 
   const std::vector<Solid>& solids() const { return solids_; }
+  // Every label that something in it has, in order; 0 is none.
+  std::set<std::uint16_t> Labels() const;
 
  private:
   struct Node {  // children at `first` and `first + 1`, or `count` solids from `first`
@@ -83,6 +89,7 @@ class Scene {
     int columns = 0, rows = 0;    // of cells
     std::vector<double> heights;  // (rows + 1) × (columns + 1)
     double min_z = 0.0, max_z = 0.0;
+    std::uint16_t label = 0;
     double At(int column, int row) const {
       return heights[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns + 1) +
                      static_cast<std::size_t>(column)];

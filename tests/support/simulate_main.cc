@@ -1,7 +1,8 @@
 // strata-simulate: scans of robots in a drawn world, as files that `strata scan import` takes.
 //
 //   OUT/places.txt                  "name x y z" of points on surfaces to plan between
-//   OUT/ROBOT/scans/scan0000.pcd    in the sensor's frame
+//   OUT/classes.txt                 with --labels: "name=label", as --classes of `strata` takes it
+//   OUT/ROBOT/scans/scan0000.pcd    in the sensor's frame; with --labels every point has one
 //   OUT/ROBOT/poses_initial.txt     index-tum; odometry with noise from an exact start
 //   OUT/ROBOT/poses_truth.txt       index-tum
 #include <algorithm>
@@ -39,6 +40,9 @@ World WorldOf(const std::string& name, std::uint64_t seed, int districts) {
   if (name == "car_park") {
     return CarParkWorld();
   }
+  if (name == "building") {
+    return BuildingWorld(seed);
+  }
   if (name == "campus") {
     return CampusWorld(seed);
   }
@@ -75,6 +79,14 @@ absl::StatusOr<std::vector<Robot>> RobotsOf(const World& world,
   return chosen;
 }
 
+std::string ClassLines(const Scene& scene) {
+  std::string lines;
+  for (const std::uint16_t label : scene.Labels()) {
+    absl::StrAppend(&lines, ToString(static_cast<WorldClass>(label)), "=", label, "\n");
+  }
+  return lines;
+}
+
 absl::Status Simulate(const Options& options) {
   const World world = WorldOf(options.world, options.seed, options.districts);
   STRATA_ASSIGN_OR_RETURN(const std::vector<Robot> robots, RobotsOf(world, options.robots));
@@ -84,6 +96,9 @@ absl::Status Simulate(const Options& options) {
     absl::StrAppendFormat(&places, "%s %.3f %.3f %.3f\n", name, p.x(), p.y(), p.z());
   }
   STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out / "places.txt", places));
+  if (options.files.sensor.labelled) {
+    STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out / "classes.txt", ClassLines(world.scene)));
+  }
   for (std::size_t i = 0; i < robots.size(); ++i) {
     const Robot& robot = robots[i];
     const std::filesystem::path folder = options.out / robot.name;
@@ -101,10 +116,19 @@ int Main(int argc, char** argv) {
   CLI::App app("Scans of robots in a drawn world", "strata-simulate");
   app.add_option("WORLD", options.world, "Which world")
       ->required()
-      ->check(CLI::IsMember(
-          {"bridge", "open_bridge", "low_bridge", "car_park", "campus", "campus_loop", "city"}));
+      ->check(CLI::IsMember({"bridge",
+                             "open_bridge",
+                             "low_bridge",
+                             "building",
+                             "car_park",
+                             "campus",
+                             "campus_loop",
+                             "city"}));
   app.add_option("OUT", options.out, "Folder to write to")->required();
-  app.add_option("--seed", options.seed, "Of all noise")->capture_default_str();
+  app.add_option(
+         "--seed", options.seed, "Of all noise, and of what campus, city and building look like")
+      ->capture_default_str();
+  app.add_flag("--labels", options.files.sensor.labelled, "Say of every point what it is of");
   app.add_option("--robot",
                  options.robots,
                  "Only these; the ones that drive loops (car_park: loop, bridge: eight) are "

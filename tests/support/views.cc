@@ -13,68 +13,12 @@
 #include "core/geometry/pose.h"
 #include "tests/support/scene.h"
 #include "tests/support/simulator.h"
+#include "tests/support/walls.h"
 
 namespace strata::testing {
 namespace {
 
 using Eigen::Vector3d;
-
-// An upright wall of a rectangular house along x (outer face at y = `face`) or, with x and y
-// exchanged, along y. `from` to `to` along it, `inwards` is the sign of the way to the inside.
-struct Wall {
-  bool along_y = false;
-  double from = 0.0, to = 0.0;
-  double face = 0.0;
-  double inwards = 1.0;
-};
-
-struct Opening {
-  double from = 0.0, to = 0.0;  // along the wall
-  double sill = 0.0, lintel = 0.0;
-};
-
-// A box in the wall, from `front` to `back` metres behind its face.
-void AddPart(Scene& scene,
-             const Wall& wall,
-             double from,
-             double to,
-             double low,
-             double high,
-             double front,
-             double back) {
-  if (to - from < 1e-9 || high - low < 1e-9) return;
-  const double a = wall.face + wall.inwards * front;
-  const double b = wall.face + wall.inwards * back;
-  Vector3d min(from, std::min(a, b), low);
-  Vector3d max(to, std::max(a, b), high);
-  if (wall.along_y) {
-    std::swap(min.x(), min.y());
-    std::swap(max.x(), max.y());
-  }
-  scene.Add(Box(min, max));
-}
-
-// The wall up to `height` with its openings, which come in order and do not overlap; at `depth`
-// behind the face they are closed by a pane (0: they are holes).
-void AddWall(Scene& scene,
-             const Wall& wall,
-             double low,
-             double height,
-             double thickness,
-             const std::vector<Opening>& openings,
-             double pane_depth) {
-  double done = wall.from;
-  for (const Opening& o : openings) {
-    AddPart(scene, wall, done, o.from, low, height, 0.0, thickness);
-    AddPart(scene, wall, o.from, o.to, low, o.sill, 0.0, thickness);
-    AddPart(scene, wall, o.from, o.to, o.lintel, height, 0.0, thickness);
-    if (pane_depth > 0.0) {
-      AddPart(scene, wall, o.from, o.to, o.sill, o.lintel, pane_depth, thickness);
-    }
-    done = o.to;
-  }
-  AddPart(scene, wall, done, wall.to, low, height, 0.0, thickness);
-}
 
 // The triangle of a gable: over x from −half to half at `low`, its tip at x = 0 and `high`, between
 // two y.

@@ -25,19 +25,20 @@ Solid House(const Vector3d& foot, const Vector3d& size, double yaw) {
   Eigen::Isometry3d T_world_box = Eigen::Isometry3d::Identity();
   T_world_box.linear() = AngleAxisd(yaw, Vector3d::UnitZ()).toRotationMatrix();
   T_world_box.translation() = foot + Vector3d(0.0, 0.0, 0.5 * size.z());
-  return OrientedBox(T_world_box, size);
+  return Labelled(OrientedBox(T_world_box, size), kWall);
 }
 
 void AddTree(Scene& scene, const Vector3d& foot, double height) {
   const double crown = 0.28 * height;
-  scene.Add(Post(foot.x(), foot.y(), foot.z() - 0.5, foot.z() + 0.6 * height, 0.15));
+  scene.Add(Labelled(Post(foot.x(), foot.y(), foot.z() - 0.5, foot.z() + 0.6 * height, 0.15),
+                     kVegetation));
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   T.translation() = foot + Vector3d(0.0, 0.0, 0.72 * height);
   // Three boxes turned against each other look rough enough to a laser.
   for (int i = 0; i < 3; ++i) {
     T.linear() = (AngleAxisd(0.7 * i, Vector3d::UnitZ()) * AngleAxisd(0.6 * i, Vector3d::UnitX()))
                      .toRotationMatrix();
-    scene.Add(OrientedBox(T, Vector3d::Constant(1.5 * crown)));
+    scene.Add(Labelled(OrientedBox(T, Vector3d::Constant(1.5 * crown)), kVegetation));
   }
 }
 
@@ -48,14 +49,16 @@ void AddParapets(Scene& scene, double half_deck, double run, double edge, double
   const double slope = std::atan2(deck_top, run);
   for (const double side : {-1.0, 1.0}) {
     const double y = side * (edge - 0.5 * kWidth);
-    scene.Add(Box({-half_deck, y - 0.5 * kWidth, deck_top - 0.4},
-                  {half_deck, y + 0.5 * kWidth, deck_top + kHeight}));
+    scene.Add(Labelled(Box({-half_deck, y - 0.5 * kWidth, deck_top - 0.4},
+                           {half_deck, y + 0.5 * kWidth, deck_top + kHeight}),
+                       kWall));
     for (const double end : {-1.0, 1.0}) {
       Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
       T.linear() = AngleAxisd(end * slope, Vector3d::UnitY()).toRotationMatrix();
       T.translation() = Vector3d(end * (half_deck + 0.5 * run), y, 0.5 * deck_top) +
                         T.linear() * Vector3d(0.0, 0.0, 0.5 * kHeight - 0.1);
-      scene.Add(OrientedBox(T, {std::hypot(run, deck_top), kWidth, kHeight + 0.2}));
+      scene.Add(
+          Labelled(OrientedBox(T, {std::hypot(run, deck_top), kWidth, kHeight + 0.2}), kWall));
     }
   }
 }
@@ -72,8 +75,8 @@ void AddBridgeSurroundings(Scene& scene, double ramp_foot) {
   scene.Add(House({6.0, 31.0, 0.0}, {18.0, 5.0, 6.0}, 0.07));
   scene.Add(House({-5.0, -31.0, 0.0}, {18.0, 5.0, 6.0}, -0.05));
   for (const double x : {-20.0, -12.0, 9.0, 17.0}) {
-    scene.Add(Post(x, 7.5, 0.0, 5.0, 0.12));
-    scene.Add(Post(x + 2.0, -8.0, 0.0, 5.0, 0.12));
+    scene.Add(Labelled(Post(x, 7.5, 0.0, 5.0, 0.12), kPole));
+    scene.Add(Labelled(Post(x + 2.0, -8.0, 0.0, 5.0, 0.12), kPole));
   }
   AddTree(scene, {-8.0, 11.0, 0.0}, 6.0);
   AddTree(scene, {9.5, -11.5, 0.0}, 7.0);
@@ -81,6 +84,24 @@ void AddBridgeSurroundings(Scene& scene, double ramp_foot) {
 }
 
 }  // namespace
+
+std::string ToString(WorldClass world_class) {
+  switch (world_class) {
+    case kGround:
+      return "ground";
+    case kWall:
+      return "wall";
+    case kWindow:
+      return "window";
+    case kStairs:
+      return "stairs";
+    case kVegetation:
+      return "vegetation";
+    case kPole:
+      return "pole";
+  }
+  return "";
+}
 
 World BridgeWorld(const BridgeOptions& options) {
   constexpr double kHalfDeck = 6.0;
@@ -91,10 +112,11 @@ World BridgeWorld(const BridgeOptions& options) {
   const double ramp_foot = kHalfDeck + run;
   World world;
   Scene& scene = world.scene;
-  scene.Add(Box({-60.0, -60.0, -1.0}, {60.0, 60.0, 0.0}));
-  scene.Add(Box({-kHalfDeck, -kEdge, options.clearance_m}, {kHalfDeck, kEdge, deck_top}));
-  scene.Add(RampX(-ramp_foot, -kHalfDeck, -kEdge, kEdge, 0.0, deck_top));
-  scene.Add(RampX(ramp_foot, kHalfDeck, -kEdge, kEdge, 0.0, deck_top));
+  scene.Add(Labelled(Box({-60.0, -60.0, -1.0}, {60.0, 60.0, 0.0}), kGround));
+  scene.Add(Labelled(Box({-kHalfDeck, -kEdge, options.clearance_m}, {kHalfDeck, kEdge, deck_top}),
+                     kGround));
+  scene.Add(Labelled(RampX(-ramp_foot, -kHalfDeck, -kEdge, kEdge, 0.0, deck_top), kGround));
+  scene.Add(Labelled(RampX(ramp_foot, kHalfDeck, -kEdge, kEdge, 0.0, deck_top), kGround));
   if (options.parapets) AddParapets(scene, kHalfDeck, run, kEdge, deck_top);
   AddBridgeSurroundings(scene, ramp_foot);
   scene.Build();
@@ -125,25 +147,29 @@ World CarParkWorld() {
   constexpr double kSlab = 0.3;
   World world;
   Scene& scene = world.scene;
-  scene.Add(Box({-30.0, -22.0, -1.0}, {30.0, 22.0, 0.0}));
+  scene.Add(Labelled(Box({-30.0, -22.0, -1.0}, {30.0, 22.0, 0.0}), kGround));
   // The upper slab leaves out the ramp's well: x from -8 to 8, y from -2.5 to 2.5.
-  scene.Add(Box({-20.0, 2.5, kFloor - kSlab}, {20.0, 12.0, kFloor}));
-  scene.Add(Box({-20.0, -12.0, kFloor - kSlab}, {20.0, -2.5, kFloor}));
-  scene.Add(Box({-20.0, -2.5, kFloor - kSlab}, {-8.0, 2.5, kFloor}));
-  scene.Add(Box({8.0, -2.5, kFloor - kSlab}, {20.0, 2.5, kFloor}));
-  scene.Add(RampX(-8.0, 8.0, -2.0, 2.0, 0.0, kFloor));
+  scene.Add(Labelled(Box({-20.0, 2.5, kFloor - kSlab}, {20.0, 12.0, kFloor}), kGround));
+  scene.Add(Labelled(Box({-20.0, -12.0, kFloor - kSlab}, {20.0, -2.5, kFloor}), kGround));
+  scene.Add(Labelled(Box({-20.0, -2.5, kFloor - kSlab}, {-8.0, 2.5, kFloor}), kGround));
+  scene.Add(Labelled(Box({8.0, -2.5, kFloor - kSlab}, {20.0, 2.5, kFloor}), kGround));
+  scene.Add(Labelled(RampX(-8.0, 8.0, -2.0, 2.0, 0.0, kFloor), kGround));
   for (const double side : {-1.0, 1.0}) {  // a kerb wall along the well
-    scene.Add(Box({-8.0, side * 2.6 - 0.1, kFloor - kSlab}, {8.0, side * 2.6 + 0.1, kFloor + 1.0}));
+    scene.Add(Labelled(
+        Box({-8.0, side * 2.6 - 0.1, kFloor - kSlab}, {8.0, side * 2.6 + 0.1, kFloor + 1.0}),
+        kWall));
   }
   for (const double x : {-14.0, -5.0, 5.0, 14.0}) {
     for (const double y : {-7.0, 7.0})
-      scene.Add(Box({x - 0.2, y - 0.2, 0.0}, {x + 0.2, y + 0.2, kFloor - kSlab}));
+      scene.Add(Labelled(Box({x - 0.2, y - 0.2, 0.0}, {x + 0.2, y + 0.2, kFloor - kSlab}), kWall));
   }
   for (const double base : {0.0, kFloor}) {  // breast walls on both storeys, open above
     for (const double side : {-1.0, 1.0}) {
-      scene.Add(Box({-20.0, side * 12.0 - 0.15, base}, {20.0, side * 12.0 + 0.15, base + 1.1}));
+      scene.Add(Labelled(
+          Box({-20.0, side * 12.0 - 0.15, base}, {20.0, side * 12.0 + 0.15, base + 1.1}), kWall));
       if (base > 0.0 || side > 0.0) {  // below, the way in is at x = -20
-        scene.Add(Box({side * 20.0 - 0.15, -12.0, base}, {side * 20.0 + 0.15, 12.0, base + 1.1}));
+        scene.Add(Labelled(
+            Box({side * 20.0 - 0.15, -12.0, base}, {side * 20.0 + 0.15, 12.0, base + 1.1}), kWall));
       }
     }
   }
@@ -212,7 +238,7 @@ World PlantCampus(std::vector<Robot> robots,
   constexpr double kMargin = 15.0;
   World world;
   world.robots = std::move(robots);
-  world.scene.SetTerrain(area, 1.0, CampusHeight);
+  world.scene.SetTerrain(area, 1.0, CampusHeight, kGround);
   Random random(seed);
   const auto free_place = [&](double distance) {
     while (true) {

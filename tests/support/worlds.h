@@ -13,6 +13,10 @@
 
 namespace strata::testing {
 
+// What things are in the worlds that robots drive through: labels of their solids.
+enum WorldClass : std::uint16_t { kGround = 1, kWall, kWindow, kStairs, kVegetation, kPole };
+std::string ToString(WorldClass world_class);
+
 struct Robot {
   std::string name;
   std::vector<Eigen::Vector3d> waypoints;  // for Drive()
@@ -59,6 +63,12 @@ World CampusLoopWorld(std::uint64_t seed = 1);
 //   robots: "robot0", "robot1", … drive all streets of a district along x, then all along y, then
 //   those along x again: 6.9 km. Neighbours share the street between them.
 World CityWorld(int districts, std::uint64_t seed = 1);
+
+// A building of two wings with rows of windows and two flights of stairs, on a level lawn with
+// bushes, trees and lamp posts; size, shape and what stands around it by the seed.
+//   robots: "round" drives round it, some 200 m.
+//   places: "start", and "door" at the head of the stairs.
+World BuildingWorld(std::uint64_t seed = 1);
 
 // A yard of 48 × 28 m around (5, 0) with a wall of 4 m around it, three sheds and four posts; its
 // ground is z = 0. Small, and well determined from anywhere in it: for tests of single steps.

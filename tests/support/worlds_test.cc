@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -134,6 +136,49 @@ TEST(WorldsTest, LoopsComeBackToTheirStart) {
     const std::vector<Pose> loop = DriveOf(campus, "loop");
     EXPECT_LT(ReturnsWithin(loop), 1.5) << seed;
     EXPECT_NEAR(static_cast<double>(loop.size()), 310.0, 5.0) << seed;
+  }
+}
+
+TEST(WorldsTest, BuildingsCanBeDrivenRound) {
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    const World world = BuildingWorld(seed);
+    ExpectPlacesOnSurfaces(world);
+    ExpectDrivesAreFree(world);
+    const std::vector<Pose> round = DriveOf(world, "round");
+    EXPECT_LT(ReturnsWithin(round), 2.0) << seed;
+    EXPECT_NEAR(static_cast<double>(round.size()), 160.0, 40.0) << seed;
+    EXPECT_EQ(world.scene.Labels(),
+              (std::set<std::uint16_t>{kGround, kWall, kWindow, kStairs, kVegetation, kPole}));
+  }
+}
+
+// Where a labelled scan of the first building says windows are, and of what else there is much.
+TEST(WorldsTest, WhatABuildingIsMadeOfIsSeenFromItsRound) {
+  const World world = BuildingWorld(1);
+  struct Seen {
+    int points = 0;
+    double lowest = 1e9, highest = -1e9;
+  };
+  std::map<std::uint16_t, Seen> seen;
+  const std::vector<Pose> round = DriveOf(world, "round");
+  SensorOptions sensor;
+  sensor.labelled = true;
+  for (std::size_t i = 0; i < round.size(); i += 10) {
+    const PointCloud cloud = SimulateScan(world.scene, sensor, round[i], i);
+    for (std::size_t k = 0; k < cloud.size(); ++k) {
+      const double z = (round[i] * cloud.points[k].cast<double>()).z();
+      Seen& of_class = seen[cloud.label[k]];
+      ++of_class.points;
+      of_class.lowest = std::min(of_class.lowest, z);
+      of_class.highest = std::max(of_class.highest, z);
+    }
+  }
+  EXPECT_LT(seen[kGround].highest, 0.1);
+  EXPECT_GT(seen[kWindow].lowest, 0.8);
+  EXPECT_LT(seen[kStairs].highest, 0.9);
+  EXPECT_EQ(seen.count(0), 0U);
+  for (const WorldClass c : {kGround, kWall, kWindow, kStairs, kVegetation, kPole}) {
+    EXPECT_GT(seen[c].points, 300) << ToString(c);
   }
 }
 

@@ -105,7 +105,7 @@ TEST_F(ClassCommandsTest, PlanNamesWhatItCannotAvoid) {
 
 TEST_F(ClassCommandsTest, SurfacesSayWhatTheMapCallsTheirClass) {
   const SurfaceColumn column{
-      1.0, 2.0, {{.class_id = 3}, {.class_id = 9, .z_m = 1.0F}, {.z_m = 2.0F}}};
+      1.0, 2.0, {{.class_id = 3, .confidence = 87}, {.class_id = 9, .z_m = 1.0F}, {.z_m = 2.0F}}};
   ON_CALL(db_.planning(), SampleSurfaces(_, _, _))
       .WillByDefault(Return(std::vector<SurfaceColumn>{column}));
   EXPECT_THAT(Run({"surface", "m", "--at", "1,2"}), IsOk());
@@ -114,6 +114,8 @@ TEST_F(ClassCommandsTest, SurfacesSayWhatTheMapCallsTheirClass) {
   EXPECT_EQ(surfaces[0]["class_name"], "vegetation");
   EXPECT_EQ(surfaces[1]["class_name"], "9");
   EXPECT_TRUE(surfaces[2]["class_name"].is_null());
+  EXPECT_EQ(surfaces[0]["confidence"], 0.87);
+  EXPECT_TRUE(surfaces[2]["confidence"].is_null());
   EXPECT_THAT(Run({"surface", "m", "--at", "1,2"}, OutputFormat::kText), IsOk());
   EXPECT_THAT(data_.str(), HasSubstr("vegetation"));
 }

@@ -7,6 +7,8 @@
 
 #include "client/cli/classifier_options.h"
 #include "client/formats/file_bytes.h"
+#include "core/world/map_class.h"
+#include "tests/support/mock_database.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 
@@ -14,9 +16,11 @@ namespace strata::cli {
 namespace {
 
 using ::strata::testing::StatusIs;
+using ::testing::_;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Pair;
+using ::testing::Return;
 
 constexpr char kTwo[] = "ground=1200,1202; facade = 1400";
 
@@ -70,6 +74,16 @@ TEST(LabelClassesTest, MeetsTheClassesOfAClassifierByName) {
   EXPECT_THAT(ForClassesOf(two, {{1, "ground"}}),
               StatusIs(absl::StatusCode::kInvalidArgument,
                        HasSubstr("class facade is none of the classifier's: ground")));
+}
+
+TEST(LabelClassesTest, AMapIsGivenTheClassesThatItDoesNotHave) {
+  ::strata::testing::MockMaps maps;
+  ON_CALL(maps, ListClasses(_, _)).WillByDefault(Return(std::vector<MapClass>{{1, "facade", {}}}));
+  EXPECT_CALL(maps, ListClasses(_, _));
+  EXPECT_CALL(maps, SetClass(_, _, MapClass{2, "ground", DefaultClassColour(2)}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const LabelClasses two, ParseLabelClasses(kTwo));
+  STRATA_ASSERT_OK_AND_ASSIGN(const LabelClasses met, ForClassesOfMap(maps, {}, "m", two));
+  EXPECT_THAT(met.class_of_label, ElementsAre(Pair(1200, 2), Pair(1202, 2), Pair(1400, 1)));
 }
 
 TEST(LabelClassesTest, EveryLabelIsAClassOfItsOwn) {

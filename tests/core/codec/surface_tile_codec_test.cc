@@ -10,6 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/codec/blob.h"
 #include "core/mls/surface_tile.h"
 #include "tests/core/codec/hostile.h"
 #include "tests/core/codec/tile_samples.h"
@@ -30,6 +31,7 @@ SurfaceTile Annotated(const MlsTile& tile, std::uint64_t seed) {
   for (Surface& surface : surfaces.surfaces) {
     surface.traversability = static_cast<Traversability>(random() % 3);
     surface.class_id = static_cast<std::uint8_t>(random());
+    surface.confidence = static_cast<std::uint8_t>(surface.class_id == 0 ? 0 : 1 + random() % 100);
     surface.cost = std::exp2(static_cast<float>(random() % 1000) / 50.0F) - 1.0F;
     if (random() % 8 == 0) surface.cost = std::numeric_limits<float>::infinity();
   }
@@ -40,6 +42,7 @@ void ExpectWithinTolerance(const Surface& read, const Surface& written) {
   EXPECT_EQ(read.cell, written.cell);
   EXPECT_EQ(read.traversability, written.traversability);
   EXPECT_EQ(read.class_id, written.class_id);
+  EXPECT_EQ(read.confidence, written.confidence);
   EXPECT_EQ(read.vertical(), written.vertical());
   EXPECT_NEAR(read.z_m, written.z_m, 0.001);
   EXPECT_NEAR(read.depth_m, written.depth_m, 0.001);
@@ -115,6 +118,20 @@ TEST(SurfaceTileCodecTest, RealTilesRoundTripWithinTheirBound) {
     bytes += EncodeSurfaceTile(surfaces).size();
   }
   EXPECT_LE(static_cast<double>(bytes) / static_cast<double>(map.patch_count()), 2.9);
+}
+
+// What has no class costs nothing, and is read by those who know of no confidence.
+TEST(SurfaceTileCodecTest, OnlyTilesWithConfidencesAreOfTheSecondVersion) {
+  SurfaceTile tile = Annotated(RandomTile(7, 300, true), 7);
+  EXPECT_EQ(VersionOfBlob(EncodeSurfaceTile(tile)), 2);
+  for (Surface& surface : tile.surfaces) surface.confidence = 0;
+  const std::string plain = EncodeSurfaceTile(tile);
+  EXPECT_EQ(VersionOfBlob(plain), 1);
+  ExpectRoundTrip(tile);
+  for (Surface& surface : tile.surfaces) {
+    if (surface.class_id == 0) surface.confidence = 50;
+  }
+  EXPECT_EQ(EncodeSurfaceTile(tile), plain);
 }
 
 TEST(SurfaceTileCodecTest, DamageIsDataLoss) {

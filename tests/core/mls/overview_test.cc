@@ -122,6 +122,19 @@ TEST(OverviewTest, ClassTraversabilityAndCostOfMost) {
   EXPECT_EQ(Parent({make(0, 0, unknown, 0)}).surfaces[0].traversability, unknown);
 }
 
+TEST(OverviewTest, ConfidenceIsTheMeanOfTheClassAmongThoseWithAClass) {
+  const auto make = [](std::uint16_t cell, std::uint8_t id, std::uint8_t confidence) {
+    return Surface{.cell = cell, .class_id = id, .confidence = confidence, .sigma_m = 0.01F};
+  };
+  const Surface most =
+      Parent({make(0, 7, 100), make(1, 7, 61), make(kRow, 3, 90), make(kRow + 1, 0, 0)})
+          .surfaces[0];
+  EXPECT_EQ(most.class_id, 7);
+  EXPECT_EQ(most.confidence, 54);  // 161 / 3
+  EXPECT_EQ(Parent({make(0, 7, 1), make(1, 8, 99), make(kRow, 9, 99)}).surfaces[0].confidence, 1);
+  EXPECT_EQ(Parent({make(0, 0, 0)}).surfaces[0].confidence, 0);
+}
+
 TEST(OverviewTest, EveryChildCellLandsInItsParentCell) {
   // One surface in every third cell of a 2 × 2 block of tiles; its height tells where it is.
   const SurfaceWorld world = Draw(

@@ -56,6 +56,26 @@ TEST(SurfaceTileTest, ClassOfMostVotesAndOfTheSmallerIdOnATie) {
   EXPECT_EQ(surfaces[3].class_id, 7);
 }
 
+TEST(SurfaceTileTest, ConfidenceIsTheShareOfTheVotesInPercent) {
+  MlsTile tile;
+  for (std::uint16_t cell = 0; cell < 6; ++cell) tile.patches.push_back(At(cell, 0.0));
+  constexpr std::uint32_t kMany = 4'000'000'000;
+  tile.votes = {{0, 4, 1}, {0, 9, 2}, {1, 5, 7}, {2, 1, kMany}, {2, 2, kMany}, {3, 300, 9}};
+  tile.votes.push_back({4, 3, 1});
+  tile.votes.push_back({4, 300, 9});  // of no class
+  for (std::uint16_t id = 1; id <= 250; ++id) tile.votes.push_back({5, id, 1});
+  tile.IndexRows();
+  const std::vector<Surface> surfaces = SurfacesOf(tile).surfaces;
+  EXPECT_EQ(surfaces[0].confidence, 67);
+  EXPECT_EQ(surfaces[1].confidence, 100);
+  EXPECT_EQ(surfaces[2].confidence, 50);
+  EXPECT_EQ(surfaces[3].class_id, 0);
+  EXPECT_EQ(surfaces[3].confidence, 0);
+  EXPECT_EQ(surfaces[4].class_id, 3);
+  EXPECT_EQ(surfaces[4].confidence, 100);
+  EXPECT_EQ(surfaces[5].confidence, 1);  // of 0.4 %
+}
+
 TEST(SurfaceTileTest, CellFindsItsSurfacesAndOnlyThose) {
   std::mt19937 random(3);
   SurfaceTile tile;

@@ -1,7 +1,9 @@
 #include "core/world/map_class.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdlib>
+#include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -28,6 +30,30 @@ TEST(MapClassTest, ATextIsANameFirstAndANumberElse) {
   EXPECT_THAT(ClassIdOf(kClasses, "200"), IsOkAndHolds(200));
   EXPECT_THAT(ClassIdOf(kClasses, "256"), StatusIs(Code::kNotFound, HasSubstr("ground, 12")));
   EXPECT_THAT(ClassIdOf({}, "wall"), StatusIs(Code::kNotFound, HasSubstr("none")));
+}
+
+TEST(MapClassTest, ANameHasItsIdOrTakesTheWantedOrTheFirstFreeOne) {
+  std::vector<MapClass> table = kClasses;
+  EXPECT_THAT(IdInTable(table, "ground", 7), IsOkAndHolds(3));
+  EXPECT_EQ(table, kClasses);
+  EXPECT_THAT(IdInTable(table, "wall", 7), IsOkAndHolds(7));
+  EXPECT_THAT(IdInTable(table, "pole", 3), IsOkAndHolds(1));
+  EXPECT_THAT(IdInTable(table, "wire", 0, {2, 4}), IsOkAndHolds(5));
+  EXPECT_THAT(IdInTable(table, "roof", 1200), IsOkAndHolds(2));
+  EXPECT_EQ(table.size(), 6U);
+  EXPECT_EQ(table.back(), (MapClass{2, "roof", DefaultClassColour(2)}));
+  EXPECT_THAT(IdInTable(table, "a b", 8), StatusIs(Code::kInvalidArgument, HasSubstr("a b")));
+  while (table.size() < kMaxClassId) {
+    ASSERT_TRUE(IdInTable(table, "c" + std::to_string(table.size()), 1).ok());
+  }
+  EXPECT_THAT(IdInTable(table, "more", 1), StatusIs(Code::kResourceExhausted, HasSubstr("more")));
+}
+
+TEST(MapClassTest, LabelsAreIdsOfClassesOrNone) {
+  EXPECT_THAT(ValidateLabels(std::vector<std::uint16_t>{0, 1, 255}), IsOk());
+  EXPECT_THAT(ValidateLabels({}), IsOk());
+  EXPECT_THAT(ValidateLabels(std::vector<std::uint16_t>{0, 256}, 40),
+              StatusIs(Code::kInvalidArgument, HasSubstr("label 256 of point 41")));
 }
 
 TEST(MapClassTest, ColoursOfIdsNearbyAreApart) {
