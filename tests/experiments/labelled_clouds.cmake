@@ -3,3 +3,8 @@ strata_executable(
   SOURCES labelled_clouds.cc
   DEPS strata::classification strata::classification_peers strata::labelled_clouds
 )
+strata_executable(
+  labelled_entities labelled_entities
+  SOURCES labelled_entities.cc
+  DEPS strata::classification strata::labelled_clouds
+)
