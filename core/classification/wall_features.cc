@@ -96,7 +96,8 @@ absl::StatusOr<FeatureMatrix> WallFeatures(const PointCloud& cloud,
   STRATA_RETURN_IF_ERROR(stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::vector<float> heights, HeightsAboveLowest(points));
   const auto epsilon = static_cast<float>(options.plane_side_m);
-  FeatureMatrix features = FeatureMatrix::Zero(static_cast<Eigen::Index>(points.size()), kColumns);
+  FeatureMatrix features =
+      FeatureMatrix::Zero(static_cast<Eigen::Index>(points.size()), kColumns + 1);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     const Eigen::Vector3f n = walls.DirectionAt(points[i]);
