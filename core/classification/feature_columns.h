@@ -1,5 +1,5 @@
-// The parts of core/classification/features.h, one a set. Points are finite, options valid.
-// Internal to core/classification, not installed.
+// The parts of core/classification/features.h, one a set. Points are finite, options valid. The
+// last column is left for the constant. Internal to core/classification, not installed.
 #ifndef STRATA_CORE_CLASSIFICATION_FEATURE_COLUMNS_H_
 #define STRATA_CORE_CLASSIFICATION_FEATURE_COLUMNS_H_
 

@@ -26,6 +26,16 @@ absl::StatusOr<FeatureMatrix> ColumnsOf(const PointCloud& cloud,
   return absl::InvalidArgumentError("feature options: set is none");
 }
 
+FeatureMatrix Spread(const FeatureMatrix& features,
+                     const std::vector<std::size_t>& rows,
+                     std::size_t size) {
+  FeatureMatrix all = FeatureMatrix::Zero(static_cast<Eigen::Index>(size), features.cols());
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    all.row(static_cast<Eigen::Index>(rows[k])) = features.row(static_cast<Eigen::Index>(k));
+  }
+  return all;
+}
+
 }  // namespace
 
 absl::Status PointFeatureOptions::Validate() const {
@@ -81,14 +91,9 @@ absl::StatusOr<FeatureMatrix> ComputeFeatures(const PointCloud& cloud,
     finite.points.push_back(cloud.points[i]);
     rows.push_back(i);
   }
-  STRATA_ASSIGN_OR_RETURN(const FeatureMatrix columns, ColumnsOf(finite, options, stop));
-  FeatureMatrix features =
-      FeatureMatrix::Zero(static_cast<Eigen::Index>(cloud.size()), columns.cols() + 1);
+  STRATA_ASSIGN_OR_RETURN(FeatureMatrix features, ColumnsOf(finite, options, stop));
+  if (rows.size() < cloud.size()) features = Spread(features, rows, cloud.size());
   features.rightCols(1).setOnes();
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    features.row(static_cast<Eigen::Index>(rows[k])).head(columns.cols()) =
-        columns.row(static_cast<Eigen::Index>(k));
-  }
   return features;
 }
 

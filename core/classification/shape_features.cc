@@ -93,7 +93,7 @@ absl::StatusOr<FeatureMatrix> ShapeFeatures(const PointCloud& cloud,
   const Eigen::Index height_column = options.scales * per_scale;
   FeatureMatrix features(static_cast<Eigen::Index>(points.size()),
                          height_column + static_cast<Eigen::Index>(kHeightsM.size()) + 1 +
-                             static_cast<Eigen::Index>(kColumnsM.size() * kPerColumn.size()));
+                             static_cast<Eigen::Index>(kColumnsM.size() * kPerColumn.size()) + 1);
   PutScale(
       points, points, Neighbours::Find(points, count), kReachVoxels * options.voxel_m, 0, features);
   double voxel_m = options.voxel_m;

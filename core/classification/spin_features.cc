@@ -70,7 +70,7 @@ absl::StatusOr<FeatureMatrix> SpinFeatures(const PointCloud& cloud,
                            ? static_cast<float>(options.spin_radius_m)
                            : std::max(1e-3F, kRadiusSpacings * MedianSpacing(neighbours));
   FeatureMatrix features =
-      FeatureMatrix::Zero(static_cast<Eigen::Index>(points.size()), kAcross * kAlong);
+      FeatureMatrix::Zero(static_cast<Eigen::Index>(points.size()), kAcross * kAlong + 1);
   const PointsView view{points};
   const PointTree tree(3, view, nanoflann::KDTreeSingleIndexAdaptorParams(10));
   std::vector<std::pair<std::uint32_t, float>> found;
