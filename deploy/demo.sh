@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # Strata's main job, from nothing: installs what it needs, builds, and shows two robots mapping a bridge.
 #   deploy/demo.sh [--out DIR]                  simulated: two robots upload at once, plans over and under the bridge;
-#                                               then a loop of 300 m is closed
+#                                               then a loop of 300 m is closed, and what was learned at one building
+#                                               says what another one is made of
 #   deploy/demo.sh --data FOLDER [--out DIR]    recorded: FOLDER has scans/ and poses_*.txt (or .pose files)
 # Files go to DIR, default ./demo-out. A second run skips the installing and building that is done.
 set -euo pipefail
 
-usage() { sed -n '3,6p' "$0" >&2; exit 2; }
+usage() { sed -n '3,7p' "$0" >&2; exit 2; }
 out=demo-out
 data=
 while [[ $# -gt 0 ]]; do
@@ -116,6 +117,30 @@ demo_loop() {
   run strata_at map render loop "$out/loop_after.png" --trajectories
 }
 
+demo_classes() {
+  step "two buildings; of the first, people have said what every point is"
+  run strata-simulate building "$work/library" --seed 1 --labels --step 10
+  run strata-simulate building "$work/school" --seed 2 --labels --step 10
+  run strata_at map create library --cell-size 0.2
+  run strata_at map create school --cell-size 0.2
+  local import=(--poses "$work/library/round/poses_initial.txt" --classes "$work/library/classes.txt")
+  run strata_at scan import library "$work/library/round/scans" "${import[@]}" --wait
+  import=(--poses "$work/school/round/poses_initial.txt" --no-labels)
+  run strata_at scan import school "$work/school/round/scans" "${import[@]}" --wait
+  step "learning from the first"
+  run strata_at classifier train library --method amn --name buildings --folds 2 --wait
+  run strata_at classifier export library buildings --out "$out/buildings.model"
+  step "labelling the second"
+  run strata_at classifier import school "$out/buildings.model" --name buildings
+  run strata_at job start school classify model=buildings --wait
+  run strata_at surface school --at "$(awk '$1 == "door" { print $2 "," $3 }' "$work/school/places.txt")"
+  step "pictures and scores"
+  run strata_at map render library "$out/library_classes.png" --layer class --view oblique
+  run strata_at map render school "$out/school_classes.png" --layer class --view oblique
+  run strata classifier evaluate "$out/buildings.model" --data "$work/school/round/scans" \
+    --classes "$work/school/classes.txt" --picture "$out/school_confusion.png"
+}
+
 # drift TRUTH UPLOADED ALIGNED: how far the last pose is from the truth before and after alignment.
 drift() {
   local truth uploaded aligned
@@ -180,7 +205,7 @@ demo_recorded() {
 
 rm -f "$out"/{over,under,deck_to_road,path}.ply
 build
-if [[ -n $data ]]; then demo_recorded; else demo_simulated; demo_loop; fi
+if [[ -n $data ]]; then demo_recorded; else demo_simulated; demo_loop; demo_classes; fi
 step "stopping the server"
 kill -TERM "$server"
 wait "$server"

@@ -16,7 +16,8 @@ constexpr char kClassesHelp[] =
     "Which labels of the files are which class, or a file that says so in lines; other labels are "
     "not looked at";
 constexpr char kClassesType[] = "'NAME=LABEL,…;…'|FILE";
-constexpr char kDataHelp[] = "Labelled scans: PLY, PCD or text columns with a label";
+constexpr char kDataHelp[] =
+    "Labelled scans, or folders of them: PLY, PCD or text columns with a label";
 
 // Whether the command line names files; then no server is asked.
 void ChooseByData(Commands& commands,

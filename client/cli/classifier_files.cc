@@ -18,6 +18,7 @@
 #include "client/cli/progress.h"
 #include "client/formats/file_bytes.h"
 #include "client/formats/geometry_writer.h"
+#include "client/formats/scan_list.h"
 #include "client/formats/scan_reader.h"
 #include "core/classification/classifier_codec.h"
 #include "core/classification/regions.h"
@@ -42,8 +43,18 @@ absl::StatusOr<PointCloud> ReadLabelled(const std::string& path) {
   return cloud;
 }
 
-absl::StatusOr<std::vector<PointCloud>> ReadAll(const std::vector<std::string>& paths,
+// The files, and those in the folders, in the order of import.
+absl::StatusOr<std::vector<std::string>> FilesOf(const std::vector<std::string>& data) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<ScanSource> scans,
+                          ListScans({data.begin(), data.end()}, {}));
+  std::vector<std::string> paths;
+  for (const ScanSource& scan : scans) paths.push_back(scan.path.string());
+  return paths;
+}
+
+absl::StatusOr<std::vector<PointCloud>> ReadAll(const std::vector<std::string>& data,
                                                 const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<std::string> paths, FilesOf(data));
   std::vector<PointCloud> clouds;
   for (const std::string& path : paths) {
     STRATA_RETURN_IF_ERROR(stop.status());
@@ -107,8 +118,9 @@ absl::Status WritePicture(const std::string& path,
 // Files are classified one after the other; no more than one is in memory.
 absl::StatusOr<ConfusionMatrix> EvaluateAll(const Classifier& classifier,
                                             const LabelClasses& labels,
-                                            const std::vector<std::string>& paths,
+                                            const std::vector<std::string>& data,
                                             FileContext& context) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<std::string> paths, FilesOf(data));
   Progress progress(context.output.talk(), TalksToTerminal(), "evaluate");
   ConfusionMatrix confusion(labels.classes.size());
   std::uint64_t points = 0;

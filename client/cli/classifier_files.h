@@ -15,7 +15,7 @@ namespace strata::cli {
 // Errors name the file, and are those of what is called.
 
 struct FileTraining {
-  std::vector<std::string> data;  // labelled scans
+  std::vector<std::string> data;  // labelled scans, and folders of them
   std::string classes;            // as ReadLabelClasses(); empty: every label is a class
   std::string out;                // the classifier's file
   int folds = 0;                  // > 0: also scored by validation, whole files left out
@@ -26,7 +26,7 @@ absl::Status TrainOnFiles(FileContext& context, const FileTraining& training);
 
 struct FileEvaluation {
   std::string model;
-  std::vector<std::string> data;  // labelled scans
+  std::vector<std::string> data;  // labelled scans, and folders of them
   std::string classes;            // empty: labels are ids of the classifier's classes
   std::string picture;            // PNG; empty: none
 };

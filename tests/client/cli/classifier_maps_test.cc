@@ -1,5 +1,7 @@
 // Classes, labels and classifiers of a map from the command line, on a database in a temporary
 // directory.
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -10,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/formats/geometry_writer.h"
+#include "client/formats/scan_reader.h"
 #include "tests/client/cli/run_strata.h"
 #include "tests/support/park.h"
 #include "tests/support/temp_dir.h"
@@ -133,6 +136,42 @@ TEST_F(ClassifierMapsTest, ScansAreLabelledByBoxPolygonAndFile) {
   const Ran unknown = Run({"scan", "label", "m", "t/2", "--box", "0,0,0,1,1,1", "--class", "sea"});
   EXPECT_THAT(unknown.err, HasSubstr("there is sky"));
   RunOk({"map", "verify", "m"});
+}
+
+// Files that people have call the ground 1200 and poles 1103, as Oakland does.
+TEST_F(ClassifierMapsTest, ImportMapsLabelsOfFilesToClassesOfTheMap) {
+  PointCloud park = testing::MakePark(9);
+  for (std::uint16_t& label : park.label) label = label == testing::kParkGround ? 1200 : 1103;
+  const std::string file = Write("elsewhere/scan9.ply", *PlyBytes(GeometryOf(park)));
+  const auto import = [&](const std::string& map, const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"scan", "import", map, file, "--trajectory", "e", "--wait"};
+    words.insert(words.end(), more.begin(), more.end());
+    return Run(words);
+  };
+  const Ran refused = import("m", {});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("label 1200 of point 0"));
+  EXPECT_THAT(refused.err, HasSubstr("--classes"));
+  // Named classes keep their ids, others are added.
+  RunOk({"map", "classes", "m", "--set", "1=pole"});
+  const Ran done = import("m", {"--classes", "ground=1200;pole=1103,1104"});
+  EXPECT_EQ(done.exit_code, 0) << done.err;
+  const json classes = RunOk({"map", "classes", "m"});
+  ASSERT_EQ(classes.size(), 2U);
+  EXPECT_EQ(classes[0]["name"], "pole");
+  EXPECT_EQ(classes[1]["id"], 2);
+  EXPECT_EQ(classes[1]["name"], "ground");
+  RunOk({"scan", "export", "m", "e/9", "--format", "ply", "--out", Path("back.ply")});
+  const auto back = ReadScan(Path("back.ply"));
+  ASSERT_TRUE(back.ok());
+  ASSERT_EQ(back->label.size(), park.size());
+  for (std::size_t i = 0; i < park.size(); ++i) {
+    ASSERT_EQ(back->label[i], park.label[i] == 1200 ? 2 : 1);
+  }
+  RunOk({"map", "create", "bare"});
+  EXPECT_EQ(import("bare", {"--no-labels"}).exit_code, 0);
+  EXPECT_EQ(RunOk({"map", "classes", "bare"}).size(), 0U);
+  EXPECT_EQ(import("bare", {"--no-labels", "--classes", "a=1"}).exit_code, 2);
 }
 
 }  // namespace
