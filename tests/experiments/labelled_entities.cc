@@ -23,10 +23,10 @@
 #include "core/classification/adaboost.h"
 #include "core/classification/amn_inference.h"
 #include "core/classification/amn_learning.h"
-#include "core/classification/classifier.h"
 #include "core/classification/evaluation.h"
 #include "core/classification/ground_height.h"
 #include "core/classification/neighbours.h"
+#include "core/classification/training.h"
 #include "tests/support/labelled_clouds.h"
 
 namespace strata {
