@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -44,7 +45,7 @@ TEST(MapClassTest, ANameHasItsIdOrTakesTheWantedOrTheFirstFreeOne) {
   EXPECT_EQ(table.back(), (MapClass{2, "roof", DefaultClassColour(2)}));
   EXPECT_THAT(IdInTable(table, "a b", 8), StatusIs(Code::kInvalidArgument, HasSubstr("a b")));
   while (table.size() < kMaxClassId) {
-    ASSERT_TRUE(IdInTable(table, "c" + std::to_string(table.size()), 1).ok());
+    ASSERT_TRUE(IdInTable(table, absl::StrCat("c", table.size()), 1).ok());
   }
   EXPECT_THAT(IdInTable(table, "more", 1), StatusIs(Code::kResourceExhausted, HasSubstr("more")));
 }
