@@ -42,7 +42,8 @@ void ExpectDamageIsDataLoss(const std::string& bytes,
 template <typename Decode>
 int DecodeForgedBodies(
     BlobKind kind, const std::string& bytes, Decode decode, std::uint64_t seed, int tries) {
-  const std::string body(*OpenBlob(kind, 1, bytes));
+  const std::uint16_t version = VersionOfBlob(bytes);
+  const std::string body(*OpenBlob(kind, version, bytes));
   std::mt19937_64 random(seed);
   int accepted = 0;
   for (int i = 0; i < tries; ++i) {
@@ -51,7 +52,7 @@ int DecodeForgedBodies(
       forged[random() % forged.size()] = static_cast<char>(random());
     }
     if (random() % 4 == 0) forged.resize(random() % forged.size());
-    const auto decoded = decode(SealBlob(kind, 1, forged));
+    const auto decoded = decode(SealBlob(kind, version, forged));
     if (decoded.ok()) {
       ++accepted;
     } else {

@@ -171,5 +171,20 @@ TEST(SurfaceTileCodecTest, GoldenBytesOfATinyTileDecode) {
   for (int i = 0; i < 2; ++i) ExpectWithinTolerance(read.surfaces[i], tile.surfaces[i]);
 }
 
+TEST(SurfaceTileCodecTest, GoldenBytesOfATinyTileWithAConfidenceDecode) {
+  SurfaceTile tile;
+  tile.surfaces = {{.cell = 0, .class_id = 3, .confidence = 87, .z_m = 0.5F, .sigma_m = 0.02F},
+                   {.cell = 1, .z_m = 1.5F, .sigma_m = 0.03F}};
+  tile.IndexRows();
+  // Of version 2: must be readable for ever.
+  const std::string golden = absl::HexStringToBytes(
+      "53535431020002005b0000000000000000000000000000000000000000028080011228b52ffd00204d0000100500"
+      "0100fb9f075800000001030000000000000000000203000001840000000186000000000000000282080000010200"
+      "0000000000015703001400c16fe3f42162b66b");
+  STRATA_ASSERT_OK_AND_ASSIGN(const SurfaceTile read, DecodeSurfaceTile(golden));
+  ASSERT_EQ(read.surfaces.size(), 2U);
+  for (int i = 0; i < 2; ++i) ExpectWithinTolerance(read.surfaces[i], tile.surfaces[i]);
+}
+
 }  // namespace
 }  // namespace strata
