@@ -12,6 +12,11 @@ namespace strata::testing {
 // are of the first ten; these were never looked at before all below was fixed.
 inline constexpr std::array<std::uint64_t, 10> kClassificationSeeds = {
     401, 402, 403, 404, 405, 406, 407, 408, 409, 410};
+// Of places, made anew: in the worlds above every wing was of a building of its own, while the
+// thesis learns from one part of a building and is asked about the other. There NN, AMN and iAMN
+// had 75.8, 80.2 and 80.6 % right.
+inline constexpr std::array<std::uint64_t, 10> kPlacesSeeds = {
+    411, 412, 413, 414, 415, 416, 417, 418, 419, 420};
 // The worlds of the first tables. Some options were chosen after their results had been seen, so
 // these are what everything is tuned in from now on.
 inline constexpr std::array<std::uint64_t, 10> kTuningSeeds = {

@@ -113,14 +113,32 @@ class Grid {
   std::vector<std::uint16_t> label_;
 };
 
+// What the wings of one building have in common.
+struct Building {
+  explicit Building(std::uint64_t seed) {
+    Random random(seed);
+    half_corridor_m = 0.5 * random.Uniform(1.6, 3.4);
+    room_m = random.Uniform(2.5, 4.5);
+    room_depth_m = random.Uniform(3.5, 6.5);
+    lobby_depth_m = random.Uniform(5.0, 9.0);
+    lobby_aside_m = random.Uniform(1.0, 4.0);
+  }
+
+  double half_corridor_m = 0.0;
+  double room_m = 0.0;  // length along the corridor of a single one
+  double room_depth_m = 0.0;
+  double lobby_depth_m = 0.0;
+  double lobby_aside_m = 0.0;  // on both sides of the corridor
+};
+
 // A wing: the corridor along x from 0, rooms, side corridors and bays on both sides, the lobby at
 // its end.
 class Wing {
  public:
-  explicit Wing(std::uint64_t seed) : random_(seed) {}
+  Wing(const Building& building, std::uint64_t seed) : building_(building), random_(seed) {}
 
   Places Scan() {
-    const double half = 0.5 * In(1.6, 3.4);
+    const double half = building_.half_corridor_m;
     const double length = In(20.0, 28.0);
     grid_.Carve(kCorridor, {0.0, -half}, {length, half});
     for (const double side : {-1.0, 1.0}) AddSlots(side, half, length);
@@ -132,6 +150,7 @@ class Wing {
 
  private:
   double In(double low, double high) { return random_.Uniform(low, high); }
+  double Near(double length) { return length * In(0.8, 1.25); }
   bool Chance(double share) { return In(0.0, 1.0) < share; }
 
   // What opens from the corridor at side · y, one after the other.
@@ -140,7 +159,8 @@ class Wing {
     while (x < length - 1e-9) {
       // Whatever is left at the end is a room.
       const double kind = length - x < 8.0 ? 1.0 : In(0.0, 1.0);
-      double end = x + (kind < 0.12 ? In(1.6, 2.6) : In(2.5, 7.5)) + kWallM;
+      const double room = building_.room_m * (Chance(0.3) ? 2.0 : 1.0) + In(-0.2, 0.2);
+      double end = x + (kind < 0.12 ? 2.0 * building_.half_corridor_m : room) + kWallM;
       if (length - end < 3.0) end = length;
       const double near = side * (y + kWallM);
       if (kind < 0.12) {  // a side corridor
@@ -151,7 +171,7 @@ class Wing {
         grid_.Carve(kLobby, {x, side * y}, {end - kWallM, far});
         Furnish({x, side * y}, {end - kWallM, far}, 0.15, 0.1, false);
       } else {
-        AddRoom(x, end - kWallM, near, side * (y + kWallM + In(3.0, 7.0)));
+        AddRoom(x, end - kWallM, near, side * (y + kWallM + Near(building_.room_depth_m)));
       }
       x = end;
     }
@@ -172,9 +192,9 @@ class Wing {
   }
 
   void AddLobby(double x, double half) {
-    const double depth = In(4.0, 10.0);
-    const double low = -half - In(0.5, 5.0);
-    const double high = half + In(0.5, 5.0);
+    const double depth = Near(building_.lobby_depth_m);
+    const double low = -half - Near(building_.lobby_aside_m);
+    const double high = half + Near(building_.lobby_aside_m);
     grid_.Carve(kLobby, {x, low}, {x + depth, high});
     if (Chance(0.5)) {  // an L
       const double far = Chance(0.5) ? high + In(2.0, 4.0) : low - In(2.0, 4.0);
@@ -273,6 +293,7 @@ class Wing {
     return places;
   }
 
+  const Building building_;
   Random random_;
   Grid grid_{{-1.0, -12.0}, {40.0, 12.0}};
 };
@@ -281,6 +302,8 @@ class Wing {
 
 std::vector<std::string> PlaceClasses() { return {"room", "corridor", "lobby"}; }
 
-Places ScanPlaces(std::uint64_t seed) { return Wing(seed).Scan(); }
+Places ScanPlaces(std::uint64_t building, std::uint64_t seed) {
+  return Wing(Building(building), seed).Scan();
+}
 
 }  // namespace strata::testing

@@ -45,7 +45,8 @@ struct Places {
   std::vector<std::vector<float>> ranges_m;  // of every cell: 360 beams, one a degree
 };
 inline constexpr float kPlaceMaxRangeM = 30.0F;
-Places ScanPlaces(std::uint64_t seed);
+// Wings of one `building` have corridors of one width, and rooms and lobbies of about one size.
+Places ScanPlaces(std::uint64_t building, std::uint64_t seed);
 
 }  // namespace strata::testing
 

@@ -7,6 +7,7 @@
 //   classification_thesis objects     single and many objects (Table 9.1, S and M)
 //   classification_thesis people      two people, 11-fold (Table 9.1, H)
 //   classification_thesis places      rooms, corridors, lobbies (Fig. 9.6)
+//   classification_thesis buildings   the same, in a building that nothing was learned from
 //
 // and, after it, how many of the ten worlds (all), and `tuning` for those that options are chosen
 // in instead of those of the tables. What they are run with stands in classification_cases.h. Ends
@@ -144,8 +145,8 @@ struct Rates {
   std::vector<double> of[3];
 };
 
-void Report(const testing::ThesisRow& thesis, const Rates& rates) {
-  std::printf("\n%s\n| world | NN | AMN | iAMN |\n|---|---|---|---|\n", thesis.name);
+void PrintRates(const char* name, const Rates& rates) {
+  std::printf("\n%s\n| world | NN | AMN | iAMN |\n|---|---|---|---|\n", name);
   for (std::size_t k = 0; k < rates.of[kAmn].size(); ++k) {
     std::printf("| %zu |", k + 1);
     for (const auto& of : rates.of) std::printf(" %.1f |", 100.0 * of[k]);
@@ -153,7 +154,12 @@ void Report(const testing::ThesisRow& thesis, const Rates& rates) {
   }
   std::printf("| mean |");
   for (const auto& of : rates.of) std::printf(" %.1f |", 100.0 * Mean(of));
-  std::printf("\n| thesis | %.1f | %.1f | %.1f |\n",
+  std::printf("\n");
+}
+
+void Report(const testing::ThesisRow& thesis, const Rates& rates) {
+  PrintRates(thesis.name, rates);
+  std::printf("| thesis | %.1f | %.1f | %.1f |\n",
               100.0 * thesis.nearest,
               100.0 * thesis.amn,
               100.0 * thesis.iamn);
@@ -248,8 +254,8 @@ struct Wing {
   std::vector<NetworkEdge> edges;
 };
 
-Wing MakeWing(std::uint64_t seed) {
-  const testing::Places places = testing::ScanPlaces(seed);
+Wing MakeWing(std::uint64_t building, std::uint64_t seed) {
+  const testing::Places places = testing::ScanPlaces(building, seed);
   Wing wing;
   wing.data.classes = testing::PlaceClasses().size();
   for (std::size_t i = 0; i < places.cells.size(); ++i) {
@@ -318,11 +324,13 @@ std::vector<ClassIndex> LabelPlaces(const Wing& training, const Wing& test, Meth
       InstanceFeatures(instances.Distances(test.data.features, testing::kInstanceNeighbours)));
 }
 
-void Places(Seeds seeds) {
+Rates LabelWings(Seeds seeds, bool other_building) {
   Rates rates;
   for (const std::uint64_t world : seeds) {
-    Wing training = MakeWing(ScanSeed(world, ScanSet::kPlacesTraining, 0));
-    Wing test = MakeWing(ScanSeed(world, ScanSet::kPlacesTest, 0));
+    const std::uint64_t first = ScanSeed(world, ScanSet::kPlacesTraining, 0);
+    const std::uint64_t second = ScanSeed(world, ScanSet::kPlacesTest, 0);
+    Wing training = MakeWing(first, first);
+    Wing test = MakeWing(other_building ? second : first, second);
     SelectFeatures(training, test);
     for (const Method method : {kNearest, kAmn, kInstanceAmn}) {
       ConfusionMatrix matrix(test.data.classes);
@@ -335,7 +343,16 @@ void Places(Seeds seeds) {
                    100.0 * matrix.Accuracy());
     }
   }
-  Report(testing::kThesisPlaces, rates);
+  return rates;
+}
+
+// Two parts of one building, as in the thesis.
+void Places(Seeds seeds) { Report(testing::kThesisPlaces, LabelWings(seeds, false)); }
+
+// A building that nothing was learned from; the thesis has no such numbers.
+void Buildings(Seeds seeds) {
+  const Rates rates = LabelWings(seeds, true);
+  PrintRates("places of another building", rates);
 }
 
 // --- Facades -----------------------------------------------------------------------------------
@@ -572,7 +589,7 @@ void Scenes(Seeds seeds) {
         "people", testing::PeopleClasses(), testing::ScanPeople(seed(ScanSet::kPeople)).label);
     PrintCounts("places",
                 testing::PlaceClasses(),
-                testing::ScanPlaces(seed(ScanSet::kPlacesTraining)).labels);
+                testing::ScanPlaces(world, seed(ScanSet::kPlacesTraining)).labels);
   }
 }
 
@@ -580,7 +597,10 @@ int Main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
   const int count = argc > 2 ? std::atoi(argv[2]) : 10;
   const bool tuning = argc > 3 && argv[3] == std::string("tuning");
-  const Seeds seeds = Seeds(tuning ? testing::kTuningSeeds : testing::kClassificationSeeds)
+  const bool places = what == "places" || what == "buildings";
+  const Seeds seeds = Seeds(tuning   ? testing::kTuningSeeds
+                            : places ? testing::kPlacesSeeds
+                                     : testing::kClassificationSeeds)
                           .first(static_cast<std::size_t>(std::clamp(count, 1, 10)));
   const std::pair<const char*, void (*)(Seeds)> experiments[] = {{"scenes", &Scenes},
                                                                  {"facade", &Facade},
@@ -588,15 +608,17 @@ int Main(int argc, char** argv) {
                                                                  {"transform", &Transform},
                                                                  {"objects", &Objects},
                                                                  {"people", &People},
-                                                                 {"places", &Places}};
+                                                                 {"places", &Places},
+                                                                 {"buildings", &Buildings}};
   for (const auto& [name, run] : experiments) {
     if (what != name) continue;
     run(seeds);
     return failures == 0 ? 0 : 1;
   }
-  std::fprintf(stderr,
-               "usage: classification_thesis "
-               "scenes|facade|depths|transform|objects|people|places [WORLDS [tuning]]\n");
+  std::fprintf(
+      stderr,
+      "usage: classification_thesis "
+      "scenes|facade|depths|transform|objects|people|places|buildings [WORLDS [tuning]]\n");
   return 2;
 }
 
