@@ -133,7 +133,6 @@ demo_classes() {
   step "labelling the second"
   run strata_at classifier import school "$out/buildings.model" --name buildings
   run strata_at job start school classify model=buildings --wait
-  run strata_at surface school --at "$(awk '$1 == "door" { print $2 "," $3 }' "$work/school/places.txt")"
   step "pictures and scores"
   run strata_at map render library "$out/library_classes.png" --layer class --view oblique
   run strata_at map render school "$out/school_classes.png" --layer class --view oblique
