@@ -154,7 +154,7 @@ class Learner {
   absl::StatusOr<AmnWeights> Network(const FeatureMatrix& features, const Stop& stop) const {
     AmnLearningOptions learning;
     learning.slack_weight = options_.slack_weight;
-    learning.tolerance = 1e-3;
+    learning.tolerance = 1e-2;
     STRATA_ASSIGN_OR_RETURN(AmnLearning learned,
                             LearnByCuttingPlanes({features,
                                                   all_.edges,
