@@ -19,6 +19,8 @@ namespace {
 constexpr double kFeaturesShare = 0.5;
 // Of all clouds together, where the reduction draws by class: more say little more.
 constexpr std::size_t kMostDrawn = 100'000;
+// Whatever the reduction: a gigabyte of features, with what learning adds.
+constexpr std::size_t kMostRows = 1'000'000;
 
 void Append(const TrainingCloud& more, TrainingCloud& to) {
   if (more.data.size() == 0) return;
@@ -189,12 +191,18 @@ absl::StatusOr<TrainingSet> ReadTrainingSet(std::size_t clouds,
   }
   std::map<std::uint16_t, ClassIndex> index;
   for (const ClassName& name : classes) index[name.id] = static_cast<ClassIndex>(index.size());
+  std::size_t rows = 0;
   for (std::size_t k = 0; k < clouds; ++k) {
     STRATA_RETURN_IF_ERROR(progress(static_cast<double>(k) / static_cast<double>(clouds)));
     STRATA_RETURN_IF_ERROR(source(k, [&](const PointCloud& part) -> absl::Status {
       STRATA_ASSIGN_OR_RETURN(const TrainingCloud more, ReadPart(part, index, set.options, stop));
       Append(more, set.clouds[k]);
-      return absl::OkStatus();
+      rows += more.data.size();
+      if (rows <= kMostRows) return absl::OkStatus();
+      return absl::ResourceExhaustedError(
+          absl::StrCat("training: more than ",
+                       kMostRows,
+                       " points to learn from; let them be reduced, as by reduce=auto"));
     }));
   }
   STRATA_RETURN_IF_ERROR(progress(1.0));

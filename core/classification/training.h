@@ -45,7 +45,8 @@ struct TrainingSet {
 
 // Goes once through the `clouds` clouds of a source: points whose label is one of `classes` are
 // learned from; others are not looked at, but are neighbours of those. Of many clouds fewer points
-// each are kept where `options` leave that open. INVALID_ARGUMENT for bad options.
+// each are kept where `options` leave that open. INVALID_ARGUMENT for bad options,
+// RESOURCE_EXHAUSTED where more than a million points are left to learn from.
 absl::StatusOr<TrainingSet> ReadTrainingSet(std::size_t clouds,
                                             CloudSource source,
                                             const std::vector<ClassName>& classes,
