@@ -1,6 +1,8 @@
 // The jobs train and classify: interrupted, beside uploads, and with little to learn from.
+#include <algorithm>
 #include <cstdint>
 #include <map>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -114,6 +116,27 @@ TEST_F(EngineClassifyTest, AnotherClassifierTakesThePlaceOfTheOneBefore) {
   STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo scan, db().scans().Get({}, kMapName, {"run", 2}));
   EXPECT_EQ(scan.label_model, trained.metrics.at("model"));
   ExpectSound();
+}
+
+// As if the power had failed after the classifier was durable, and before its job was done.
+TEST_F(EngineClassifyTest, AJobThatMadeItsClassifierBeforeACrashMakesNoSecondOne) {
+  MakeParks(1);
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::vector<JobInfo> jobs, db().jobs().List({}, kMapName));
+  const auto train = std::find_if(
+      jobs.begin(), jobs.end(), [](const JobInfo& job) { return job.kind == "train"; });
+  ASSERT_NE(train, jobs.end());
+  Close();
+  Sql("UPDATE truth_job SET state = 2 WHERE id = " + std::to_string(train->id));
+  Reopen();
+  JobInfo last;
+  STRATA_ASSERT_OK(db().jobs().Watch({}, kMapName, train->id, [&last](const JobInfo& job) {
+    last = job;
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(last.state, JobState::kSucceeded) << last.message;
+  EXPECT_THAT(last.message, HasSubstr("classifier park"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto all, db().classifiers().List({}, kMapName));
+  EXPECT_EQ(all.size(), 1U);
 }
 
 TEST_F(EngineClassifyTest, WithoutLabelsThereIsNothingToLearn) {
