@@ -43,9 +43,9 @@ absl::Status Put(StorageWriter& writer, const Classifier& classifier, Classifier
 absl::Status MatchClasses(StorageWriter& writer, std::vector<ClassName>& classes) {
   STRATA_ASSIGN_OR_RETURN(std::vector<MapClass> table, writer.reader().ListClasses());
   const std::size_t known = table.size();
-  std::set<std::uint16_t> taken;  // by others of `classes`
+  std::set<std::uint16_t> taken;
   for (ClassName& name : classes) {
-    STRATA_ASSIGN_OR_RETURN(name.id, IdInTable(table, name.name, name.id, taken));
+    STRATA_ASSIGN_OR_RETURN(name.id, IdInTable(table, name.name, name.id));
     if (!taken.insert(name.id).second) {
       return absl::InvalidArgumentError(
           absl::StrCat("classifier: two of its classes are called ", name.name));

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
@@ -60,9 +61,8 @@ absl::StatusOr<std::uint16_t> ClassIdOf(const std::vector<MapClass>& classes,
 
 absl::StatusOr<std::uint16_t> IdInTable(std::vector<MapClass>& table,
                                         const std::string& name,
-                                        std::uint16_t id,
-                                        const std::set<std::uint16_t>& taken) {
-  std::set<std::uint16_t> used = taken;
+                                        std::uint16_t id) {
+  std::set<std::uint16_t> used;
   for (const MapClass& known : table) {
     if (known.name == name) return known.id;
     used.insert(known.id);

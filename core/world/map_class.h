@@ -3,7 +3,6 @@
 #define STRATA_CORE_WORLD_MAP_CLASS_H_
 
 #include <cstdint>
-#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -42,12 +41,11 @@ absl::StatusOr<std::uint16_t> ClassIdOf(const std::vector<MapClass>& classes,
                                         absl::string_view text);
 
 // The id of the class called `name` in `table`, to which it is added if it is not there: as `id`
-// where that is free, else as the first that is; ids in `taken` are not. RESOURCE_EXHAUSTED when
-// none is left, INVALID_ARGUMENT for a bad name.
+// where that is free, else as the first that is. RESOURCE_EXHAUSTED when none is left,
+// INVALID_ARGUMENT for a bad name.
 absl::StatusOr<std::uint16_t> IdInTable(std::vector<MapClass>& table,
                                         const std::string& name,
-                                        std::uint16_t id,
-                                        const std::set<std::uint16_t>& taken = {});
+                                        std::uint16_t id);
 
 // INVALID_ARGUMENT for a label that is no class's id, nor 0; the first one is that of
 // `first_point`.
