@@ -112,14 +112,17 @@ absl::StatusOr<std::map<std::string, double>> Validate(const LabelledScans& scan
   const std::size_t folds =
       std::min<std::size_t>(*std::ranges::max_element(regions) + 1, settings.folds);
   if (folds < 2) return std::map<std::string, double>();
-  STRATA_ASSIGN_OR_RETURN(const ConfusionMatrix confusion,
-                          CrossValidate(set,
-                                        regions,
-                                        SourceOf(scans),
-                                        folds,
-                                        Part(context, kFeaturesEnd, kValidationEnd, "validating"),
-                                        context.stop()));
-  std::map<std::string, double> scores = ScoresOf(confusion, scans.classes());
+  const absl::StatusOr<ConfusionMatrix> confusion =
+      CrossValidate(set,
+                    regions,
+                    SourceOf(scans),
+                    folds,
+                    Part(context, kFeaturesEnd, kValidationEnd, "validating"),
+                    context.stop());
+  // Without a fold there may be less than two classes; all scans together may do still.
+  if (absl::IsInvalidArgument(confusion.status())) return std::map<std::string, double>();
+  STRATA_RETURN_IF_ERROR(confusion.status());
+  std::map<std::string, double> scores = ScoresOf(*confusion, scans.classes());
   scores["folds"] = static_cast<double>(folds);
   return scores;
 }
@@ -131,7 +134,8 @@ void Report(const ClassifierInfo& info, JobContext& context) {
   const auto accuracy = info.scores.find("accuracy");
   const std::string score =
       accuracy == info.scores.end()
-          ? std::string("not validated, which takes two labelled scans or regions")
+          ? std::string(
+                "not validated, which takes two labelled scans or regions, each with two classes")
           : absl::StrFormat("%.1f %% right of scans it had not seen", 100.0 * accuracy->second);
   context.SetMessage(absl::StrCat("classifier ", info.name, ": ", info.description, "; ", score));
 }

@@ -139,6 +139,21 @@ TEST_F(EngineClassifyTest, AJobThatMadeItsClassifierBeforeACrashMakesNoSecondOne
   EXPECT_EQ(all.size(), 1U);
 }
 
+// Leaving out either scan leaves one class, which cannot be told apart from nothing.
+TEST_F(EngineClassifyTest, ScansOfOneClassEachAreLearnedFromWithoutAScore) {
+  MakeMap();
+  for (const std::uint16_t only : {kParkGround, kParkPole}) {
+    PointCloud park = MakePark(only);
+    for (std::uint16_t& label : park.label) label = label == only ? label : 0;
+    STRATA_ASSERT_OK(Upload(db(), HeaderOf({"run", only}, park, RoomPose(only)), park));
+  }
+  WaitIntegrated(db());
+  const JobInfo job = RunJob(db(), "train", {{"name", "park"}, {"method", "bayes"}});
+  EXPECT_EQ(job.state, JobState::kSucceeded) << job.message;
+  EXPECT_THAT(job.message, HasSubstr("not validated"));
+  EXPECT_FALSE(job.metrics.contains("accuracy"));
+}
+
 TEST_F(EngineClassifyTest, WithoutLabelsThereIsNothingToLearn) {
   MakeMap();
   UploadRooms(2);
