@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -143,6 +144,20 @@ INSTANTIATE_TEST_SUITE_P(Methods,
                                            ClassifierMethod::kAmn,
                                            ClassifierMethod::kInstanceAmn),
                          [](const auto& test) { return std::string(ToString(test.param)); });
+
+// Without it weights would have to pass through the mean of all points.
+TEST(TrainClassifierTest, TheConstantFeatureStaysOne) {
+  TrainingOptions options;
+  options.method = ClassifierMethod::kBayes;
+  options.features.scales = 1;
+  STRATA_ASSERT_OK_AND_ASSIGN(const Classifier classifier,
+                              TrainClassifier({Park(1)}, kClasses, options, NoProgress, Stop()));
+  STRATA_ASSERT_OK_AND_ASSIGN(FeatureMatrix features,
+                              ComputeFeatures(Park(2), options.features, Stop()));
+  const FeatureMatrix seen = Standardised(classifier, std::move(features));
+  EXPECT_TRUE((seen.rightCols(1).array() == 1.0F).all());
+  EXPECT_NEAR(seen.col(0).mean(), 0.0F, 0.5F);
+}
 
 TEST(TrainClassifierTest, RefusesWhatItCannotLearn) {
   using ::testing::HasSubstr;
