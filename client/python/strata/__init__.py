@@ -1,0 +1,24 @@
+"""Strata, a map database for robots in 3D: its client for Python.
+
+    with strata.connect("127.0.0.1:50051") as db:
+        campus = db.create_map("campus")
+        campus.upload(points, pose)
+
+Metres, radians, seconds; right-handed, z up. T_a_b maps coordinates in frame b into frame a: p_a = T_a_b · p_b.
+"""
+from strata.database import Database, connect
+from strata.errors import (AlreadyExists, Cancelled, DataLoss, DeadlineExceeded, FailedPrecondition, InvalidArgument,
+                           NotFound, PermissionDenied, ResourceExhausted, StrataError, Unauthenticated, Unavailable,
+                           Unimplemented)
+from strata.job import Job
+from strata.map import Change, Map, ScanChange, Stats
+from strata.plan import Path
+from strata.scan import Ack, Points, Scan
+from strata.tiles import NON_TRAVERSABLE, SURFACE, TRAVERSABLE, UNKNOWN, Tile, TileKey, decode_tile
+
+__all__ = [
+    "AlreadyExists", "Cancelled", "DataLoss", "DeadlineExceeded", "FailedPrecondition", "InvalidArgument", "NotFound",
+    "PermissionDenied", "ResourceExhausted", "StrataError", "Unauthenticated", "Unavailable", "Unimplemented",
+    "Ack", "Change", "Database", "Job", "Map", "NON_TRAVERSABLE", "Path", "Points", "SURFACE", "Scan", "ScanChange",
+    "Stats", "TRAVERSABLE", "Tile", "TileKey", "UNKNOWN", "connect", "decode_tile",
+]

@@ -1,0 +1,97 @@
+"""What goes wrong, as exceptions."""
+import grpc
+
+from strata.v1 import error_pb2
+
+
+class StrataError(Exception):
+    """A call that did not succeed. `str()` is the message: the thing, its value, the bound or the cure."""
+
+    code = grpc.StatusCode.UNKNOWN
+
+    def __init__(self, message, *, reason="", retry_delay=None, request_id=""):
+        super().__init__(message)
+        self.reason = reason
+        """Who refused: REQUEST, DATABASE, SERVER_BUSY, SHUTTING_DOWN, SLOW_READER; "" if nobody said."""
+        self.retry_delay = retry_delay
+        """Seconds after which the same call may succeed; None where the server named none."""
+        self.request_id = request_id
+        """Of the call in the server's log."""
+
+
+class InvalidArgument(StrataError, ValueError):
+    code = grpc.StatusCode.INVALID_ARGUMENT
+
+
+class NotFound(StrataError, LookupError):
+    code = grpc.StatusCode.NOT_FOUND
+
+
+class AlreadyExists(StrataError):
+    """Also: another scan has the same trajectory and sequence."""
+
+    code = grpc.StatusCode.ALREADY_EXISTS
+
+
+class FailedPrecondition(StrataError):
+    """Also: a job that failed or was cancelled."""
+
+    code = grpc.StatusCode.FAILED_PRECONDITION
+
+
+class ResourceExhausted(StrataError):
+    code = grpc.StatusCode.RESOURCE_EXHAUSTED
+
+
+class Unavailable(StrataError, ConnectionError):
+    code = grpc.StatusCode.UNAVAILABLE
+
+
+class DeadlineExceeded(StrataError, TimeoutError):
+    code = grpc.StatusCode.DEADLINE_EXCEEDED
+
+
+class Cancelled(StrataError):
+    code = grpc.StatusCode.CANCELLED
+
+
+class Unauthenticated(StrataError):
+    code = grpc.StatusCode.UNAUTHENTICATED
+
+
+class PermissionDenied(StrataError):
+    code = grpc.StatusCode.PERMISSION_DENIED
+
+
+class DataLoss(StrataError):
+    """Bytes that are not what was written; also of a tile that this program was given."""
+
+    code = grpc.StatusCode.DATA_LOSS
+
+
+class Unimplemented(StrataError):
+    code = grpc.StatusCode.UNIMPLEMENTED
+
+
+_BY_CODE = {kind.code: kind for kind in StrataError.__subclasses__()}
+
+
+def _detail_of(error):
+    for key, value in error.trailing_metadata() or ():
+        if key == "grpc-status-details-bin":
+            status = error_pb2.ErrorStatus.FromString(value)
+            detail = error_pb2.ErrorDetail()
+            if status.details and status.details[0].Unpack(detail):
+                return detail
+    return error_pb2.ErrorDetail()
+
+
+def from_rpc(error):
+    """The StrataError that a grpc.RpcError stands for."""
+    detail = _detail_of(error)
+    delay = detail.metadata.get("retry_delay_ms")
+    kind = _BY_CODE.get(error.code(), StrataError)
+    made = kind(error.details() or error.code().name, reason=detail.reason,
+                retry_delay=int(delay) / 1000 if delay else None, request_id=detail.metadata.get("request_id", ""))
+    made.code = error.code()
+    return made

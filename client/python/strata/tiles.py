@@ -1,0 +1,285 @@
+"""Tiles of surfaces out of their bytes: the surface tile `SST1` of core/codec/FORMAT.md, into numpy arrays.
+
+Numbers of a surface are told relative to those of surfaces beside it, which come before it. Kinds decide which column
+a number is in, so they are read one by one. All else is read at once, and the differences are added up in waves: the
+surfaces of the cells with equal x + 2 y depend on earlier waves only.
+"""
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+import xxhash
+
+from strata.columns import ByteReader, numbers_of
+from strata.errors import DataLoss, Unimplemented
+
+SURFACE = np.dtype([
+    ("x", "f8"), ("y", "f8"),  # middle of the cell, map frame [m]
+    ("z", "f4"),  # height, map frame [m]
+    ("sigma", "f4"),  # standard deviation of the height [m]
+    ("depth", "f4"),  # length of a vertical interval below z [m]; 0: horizontal
+    ("cost", "f4"),  # path cost factor of the default profile; inf: never
+    ("traversability", "u1"),  # for the default profile: UNKNOWN, TRAVERSABLE, NON_TRAVERSABLE
+    ("class_id", "u1"),  # with the most votes; 0: none
+    ("confidence", "u1"),  # share of the votes that class_id has [%]
+])
+UNKNOWN, TRAVERSABLE, NON_TRAVERSABLE = 0, 1, 2
+
+TILE_CELLS = 256  # along an edge
+MAX_LEVEL = 12
+_CELLS = TILE_CELLS * TILE_CELLS
+_MAX_SURFACES = 1 << 22
+_READER_VERSION = 2
+_VERSION_WITH_CONFIDENCE = 2
+_OVERHEAD_BYTES = 20
+
+# Columns, see FORMAT.md.
+_SAME_KIND, _KIND, _CLASS, _HEIGHT, _DEPTH, _SIGMA, _COST, _CONFIDENCE = 0, 4, 5, 6, 10, 12, 14, 17
+_MAX_HEIGHT = (1 << 24) - 1
+_NOBODY = -1  # index of a surface beside that is not there
+
+
+class TileKey(NamedTuple):
+    """Address of a tile."""
+
+    level: int
+    """Level of detail; 0 (finest) to 12."""
+    x: int
+    """Column, growing with x."""
+    y: int
+    """Row, growing with y."""
+
+    def __str__(self):
+        return f"{self.level}/{self.x}/{self.y}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Tile:
+    """What robots see of 256 × 256 cells of a map."""
+
+    key: TileKey
+    version: int
+    """Commit sequence of the content; same key and version, same content."""
+    cell_size: float
+    """Edge of a cell of this level [m]."""
+    surfaces: np.ndarray
+    """(n,) of dtype SURFACE, by cell (rows of growing y, x grows along a row), lowest first."""
+
+
+def _opened(data):
+    """Version and body of a blob."""
+    data = memoryview(data)
+    if len(data) < _OVERHEAD_BYTES:
+        raise DataLoss(f"surface tile: {len(data)} bytes, fewer than an empty one has")
+    if bytes(data[:4]) != b"SST1":
+        raise DataLoss("surface tile: does not begin with its magic number")
+    size = int.from_bytes(data[8:12], "little")
+    if size != len(data) - _OVERHEAD_BYTES:
+        raise DataLoss(f"surface tile: announces {size} bytes of content, has {len(data) - _OVERHEAD_BYTES}")
+    if xxhash.xxh3_64_intdigest(data[:-8]) != int.from_bytes(data[-8:], "little"):
+        raise DataLoss("surface tile: checksum does not match")
+    oldest_reader = int.from_bytes(data[6:8], "little")
+    if oldest_reader > _READER_VERSION:
+        raise Unimplemented(f"surface tile: needs a reader of version {oldest_reader}, "
+                            f"this one has version {_READER_VERSION}")
+    return oldest_reader, data[12:-8]
+
+
+def _counts(reader):
+    """(65536,) numbers of surfaces by cell."""
+    blocks = reader.column(_CELLS // 4)
+    if len(blocks) != _CELLS // 4:
+        raise DataLoss(f"occupancy of {4 * len(blocks)} cells")
+    blocks = blocks.reshape(TILE_CELLS // 2, TILE_CELLS // 2)
+    counts = np.empty((TILE_CELLS, TILE_CELLS), np.int64)
+    for shift, (y, x) in ((0, (0, 0)), (2, (0, 1)), (4, (1, 0)), (6, (1, 1))):
+        counts[y::2, x::2] = blocks >> shift & 3
+    counts = counts.ravel()
+    rest = ByteReader(reader.column(5 * _CELLS))
+    for cell in np.flatnonzero(counts == 3):
+        counts[cell] += min(rest.varint(), _MAX_SURFACES)
+    if rest.remaining:
+        raise DataLoss("occupancy: bytes left over")
+    if counts.sum() > _MAX_SURFACES:
+        raise DataLoss(f"more than {_MAX_SURFACES} surfaces")
+    return counts
+
+
+def _beside(cells, counts):
+    """(n, 4) indices of the surfaces left, up, up right and up left of each; _NOBODY where none is."""
+    first = np.cumsum(counts) - counts
+    layer = np.arange(len(cells)) - first[cells]
+    x, y = cells % TILE_CELLS, cells // TILE_CELLS
+    beside = np.empty((len(cells), 4), np.int32)
+    for column, (dx, dy) in enumerate(((-1, 0), (0, -1), (1, -1), (-1, -1))):
+        inside = (x + dx >= 0) & (x + dx < TILE_CELLS) & (y + dy >= 0)
+        other = np.where(inside, cells + dx + TILE_CELLS * dy, 0)
+        found = inside & (counts[other] > 0)
+        beside[:, column] = np.where(found, first[other] + np.minimum(layer, counts[other] - 1), _NOBODY)
+    return beside
+
+
+def _kinds(beside, columns):
+    """(n,) kinds: traversability · 2 + vertical."""
+    same = [iter(np.unpackbits(column, bitorder="little").tobytes()) for column in columns[_SAME_KIND:_KIND]]
+    told = iter(columns[_KIND].tobytes())
+    nobody = 255
+    kinds = bytearray(len(beside) + 1)
+    kinds[_NOBODY] = nobody
+    i = 0
+    try:
+        for rows in np.array_split(beside, len(beside) // _CELLS + 1):  # lists take ten times the memory
+            for left, up, up_right, up_left in rows.tolist():
+                expected = kinds[left]
+                if expected == nobody:
+                    expected = kinds[up]
+                if expected == nobody:
+                    expected = others = 0
+                else:
+                    others = (kinds[up] == expected) + (kinds[up_left] == expected) + (kinds[up_right] == expected)
+                kind = expected if next(same[others]) else next(told)
+                if kind > 5:
+                    raise DataLoss(f"surface tile: surface {i} is out of range")
+                kinds[i] = kind
+                i += 1
+    except StopIteration:
+        raise DataLoss("column: fewer numbers than the tile needs") from None
+    if any(bits.__length_hint__() >= 8 for bits in same) or told.__length_hint__():
+        raise DataLoss("column: more numbers than the tile needs")
+    return np.frombuffer(kinds, np.uint8)[:-1]
+
+
+def _scattered(columns, route):
+    """(n,) bytes, each the next of the column that `route` names; 0 where that is _NOBODY."""
+    result = np.zeros(len(route), np.uint8)
+    for index, column in columns.items():
+        places = np.flatnonzero(route == index)
+        if len(places) != len(column):
+            raise DataLoss(f"column: {len(column)} numbers, the tile needs {len(places)}")
+        result[places] = column
+    return result
+
+
+def _check(good, what="surface tile: a surface is out of range"):
+    if not good:
+        raise DataLoss(what)
+
+
+class _Surroundings:
+    """Which of the surfaces beside tell what to expect of a surface: (n, 4) indices, and how many they are."""
+
+    def __init__(self, beside, kinds):
+        vertical, traversability = kinds & 1, kinds >> 1
+        nobody = 255
+        same_shape = np.append(vertical, nobody)[beside] == vertical[:, None]
+        same_cost = np.append(traversability, nobody)[beside] == traversability[:, None]
+        self.alike = same_shape.sum(axis=1)
+        self.shape_of = np.where(same_shape, beside, _NOBODY)
+        left, up = beside[:, 0], beside[:, 1]
+        self.shape_of[:, 0] = np.where(self.alike == 0, np.where(left == _NOBODY, up, left), self.shape_of[:, 0])
+        self.shape_count = np.maximum(self.alike, 1)
+        self.cost_of = np.where(same_cost, beside, _NOBODY)
+        self.cost_count = np.maximum(same_cost.sum(axis=1), 1)
+
+
+def _summed(cells, around, vertical, differences):
+    """(n, 4) codes of height, depth, sigma and cost out of their differences to what is expected."""
+    n = len(cells)
+    wave = cells % TILE_CELLS + 2 * (cells // TILE_CELLS)
+    order = np.argsort(wave, kind="stable")
+    rank = np.empty(n + 1, np.int32)
+    rank[order] = np.arange(n)
+    rank[_NOBODY] = n  # a row of zeros
+    shape_of, cost_of = rank[around.shape_of[order]], rank[around.cost_of[order]]
+    shape_count, cost_count = around.shape_count[order, None], around.cost_count[order]
+    expects_depth = (vertical & (around.alike > 0))[order]
+    differences = differences[order]
+    codes = np.zeros((n + 1, 4), np.int64)
+    ends = np.append(np.flatnonzero(np.diff(wave[order])) + 1, n)
+    begin = 0
+    for end in ends if n else ():
+        now = slice(begin, end)
+        count = shape_count[now]
+        mean = (codes[shape_of[now]].sum(axis=1) + (count >> 1)) // count
+        mean[:, 1] = expects_depth[now] * (mean[:, 1] + differences[now, 0])  # undersides continue
+        count = cost_count[now]
+        mean[:, 3] = (codes[cost_of[now], 3].sum(axis=1) + (count >> 1)) // count
+        codes[now] = mean + differences[now]
+        begin = end
+    result = np.empty((n, 4), np.int64)
+    result[order] = codes[:n]
+    return result
+
+
+def _checked(codes, vertical):
+    height, depth, sigma, cost = codes.T
+    _check((np.abs(height) <= _MAX_HEIGHT).all())
+    _check(((depth >= vertical) & (depth <= _MAX_HEIGHT)).all())
+    _check(((sigma >= 0) & (sigma <= 255) & (cost >= 0) & (cost <= 255)).all())
+    return codes
+
+
+def _codes(cells, counts, columns, raw):
+    """kinds, classes, confidences, and (n, 4) codes of height, depth, sigma and cost."""
+    beside = _beside(cells, counts)
+    kinds = _kinds(beside, columns)
+    vertical = (kinds & 1).astype(bool)
+    around = _Surroundings(beside, kinds)
+    classes = columns[_CLASS]
+    _check(len(classes) == len(cells), "column: classes of other surfaces than the tile has")
+    confidences = np.zeros(len(cells), np.uint8)
+    if len(columns) > _CONFIDENCE:
+        confidences = _scattered({_CONFIDENCE: columns[_CONFIDENCE]}, np.where(classes > 0, _CONFIDENCE, _NOBODY))
+        _check(confidences.any() and confidences.max() <= 100)
+    heights = np.where(vertical, _HEIGHT + 1, np.where(around.alike == 1, _HEIGHT + 2, _HEIGHT + 3))
+    routes = (
+        np.where(around.alike == 0, _HEIGHT, heights),
+        np.where(vertical, _DEPTH + (around.alike > 0), _NOBODY),
+        _SIGMA + vertical,
+        _COST + (kinds >> 1),
+    )
+    bounds = (_HEIGHT, _DEPTH, _SIGMA, _COST, _CONFIDENCE)
+    tokens = np.empty((len(cells), 4), np.uint8)
+    for field, route in enumerate(routes):
+        tokens[:, field] = _scattered({c: columns[c] for c in range(bounds[field], bounds[field + 1])}, route)
+    differences = numbers_of(tokens.ravel(), raw).reshape(-1, 4)
+    return kinds, classes, confidences, _checked(_summed(cells, around, vertical, differences), vertical)
+
+
+# What codes stand for. Doubles, rounded once, are floats as the server's own.
+_STEPS = np.arange(256, dtype=np.float32)
+_SIGMA_M = np.exp2((_STEPS / np.float32(7.5) - np.float32(24)).astype(float)).astype(np.float32)
+_COSTS = np.stack([np.exp2((_STEPS / np.float32(k)).astype(float)).astype(np.float32) - np.float32(1)
+                   for k in (2, 6, 2)])  # by traversability
+_COSTS[:, 255] = np.inf
+
+
+def decode_tile(data, cell_size):
+    """The tile that `data` holds (as served, or written by `strata tile get --out`).
+
+    cell_size: that of the map [m]. Raises DataLoss for bytes that are no intact tile, Unimplemented for those of a
+    later format.
+    """
+    oldest_reader, body = _opened(data)
+    reader = ByteReader(body)
+    key = TileKey(reader.fixed(1), reader.fixed(4, signed=True), reader.fixed(4, signed=True))
+    _check(key.level <= MAX_LEVEL, f"tile: level {key.level}")
+    version = reader.fixed(8)
+    counts = _counts(reader)
+    cells = np.repeat(np.arange(_CELLS, dtype=np.int32), counts)
+    columns = [reader.column(len(cells))
+               for _ in range(_CONFIDENCE + (oldest_reader >= _VERSION_WITH_CONFIDENCE))]
+    raw = np.frombuffer(reader.take(reader.varint()), np.uint8)
+    _check(not reader.remaining, "surface tile: bytes left over")
+    kinds, classes, confidences, codes = _codes(cells, counts, columns, raw)
+    size = cell_size * 2.0**key.level
+    surfaces = np.empty(len(cells), SURFACE)
+    surfaces["x"] = (key.x * TILE_CELLS + cells % TILE_CELLS + 0.5) * size
+    surfaces["y"] = (key.y * TILE_CELLS + cells // TILE_CELLS + 0.5) * size
+    surfaces["z"] = codes[:, 0].astype(np.float32) / np.float32(512)
+    surfaces["depth"] = codes[:, 1].astype(np.float32) / np.float32(512)
+    surfaces["sigma"] = _SIGMA_M[codes[:, 2]]
+    surfaces["traversability"] = kinds >> 1
+    surfaces["cost"] = _COSTS[kinds >> 1, codes[:, 3]]
+    surfaces["class_id"], surfaces["confidence"] = classes, confidences
+    return Tile(key, version, size, surfaces)
