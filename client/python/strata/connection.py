@@ -63,11 +63,12 @@ class Connection:
         self._timeout = timeout
         self._patience = patience
         self.channel = open_channel(target, ca, certificate, key)
+        connect_timeout = min(_CONNECT_TIMEOUT_S, timeout or _CONNECT_TIMEOUT_S)
         try:
-            grpc.channel_ready_future(self.channel).result(timeout=_CONNECT_TIMEOUT_S)
+            grpc.channel_ready_future(self.channel).result(timeout=connect_timeout)
         except grpc.FutureTimeoutError:
             self.channel.close()
-            raise errors.Unavailable(f"no server answers at {target} within {_CONNECT_TIMEOUT_S:g} s; "
+            raise errors.Unavailable(f"no server answers at {target} within {connect_timeout:g} s; "
                                      "is stratad running there, with or without TLS as here?") from None
 
     def new_backoff(self):

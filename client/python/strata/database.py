@@ -12,10 +12,10 @@ def connect(target="127.0.0.1:50051", **options):
     token: the bearer token that the server's owner gave you. Without TLS anybody on the way can read it.
     ca: file of the root certificates to trust, PEM, or True for those of the system; None: no TLS.
     certificate, key: files of this client's own certificate and its key, PEM, for servers that ask for it.
-    timeout: seconds that a single call may take, uploads included; None: as long as it takes.
+    timeout: seconds that a single call may take, uploads and this one included; None: as long as it takes.
     patience: seconds for which a call that may be repeated puts up with a server that is away or busy.
 
-    Raises Unavailable if nobody answers within ten seconds.
+    Raises Unavailable if nobody answers within ten seconds, or `timeout`.
     """
     return Database(Connection(target, **options))
 

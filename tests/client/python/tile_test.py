@@ -1,0 +1,132 @@
+"""Tiles decoded in numpy beside the server's own decoder, and what hostile bytes come to."""
+import os
+import random
+import subprocess
+import unittest
+
+import numpy as np
+import xxhash
+
+import strata
+from strata.v1 import tiles_pb2, tiles_pb2_grpc
+from support import ServerTest
+
+
+def sealed(blob):
+    """The blob with the checksum that its bytes have."""
+    return blob[:-8] + xxhash.xxh3_64_intdigest(blob[:-8]).to_bytes(8, "little")
+
+
+class TileTest(ServerTest):
+    """A simulated drive under and over a bridge, with labels, imported by the command line."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        world = cls.folder / "world"
+        subprocess.run([os.environ["STRATA_SIMULATE"], "bridge", world, "--labels", "--step", "4"],
+                       check=True, stdout=subprocess.DEVNULL)
+        cls.map = cls.db.create_map("drive")
+        for robot in ("over", "under"):
+            subprocess.run(
+                [os.environ["STRATA_PROGRAM"], "--server", cls.server.address, "scan", "import", "drive",
+                 world / robot / "scans", "--poses", world / robot / "poses_initial.txt", "--pose-format", "index-tum",
+                 "--trajectory", robot, "--align", "off"], check=True, stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL)
+        cls.map.wait(timeout=120)
+        stub = tiles_pb2_grpc.TilesStub(cls.map._connection.channel)
+        cls.encoded = {level: [answer.tile.bytes for answer in stub.Fetch(tiles_pb2.FetchTilesRequest(
+            map="drive", area=tiles_pb2.TileArea(level=level)))] for level in (0, 2, 5)}
+
+    def test_equal_the_servers_decoder_bit_for_bit(self):
+        tiles = self.map.fetch()
+        decoded = np.concatenate([tile.surfaces for tile in tiles.values()])
+        self.assertGreater(len(decoded), 100_000)
+        for name, kind in (("vertical", decoded["depth"] > 0),
+                           ("of two classes", (decoded["confidence"] > 0) & (decoded["confidence"] < 100))):
+            self.assertTrue(kind.any(), name)
+        self.assertEqual(set(decoded["traversability"]), {0, 1, 2})
+        cells = np.unique(decoded[["x", "y"]])
+        asked = np.concatenate(self.map.surfaces(np.stack([cells["x"], cells["y"]], axis=1)))
+        order = ["x", "y", "z"]
+        decoded, asked = np.sort(decoded, order=order), np.sort(asked, order=order)
+        for field in strata.SURFACE.names:
+            np.testing.assert_array_equal(decoded[field], asked[field], field)
+
+    def test_coarse_levels_are_read_too(self):
+        for level in (2, 5):
+            tile = strata.decode_tile(self.encoded[level][0], 0.1)
+            self.assertEqual((tile.key.level, tile.cell_size), (level, 0.1 * 2**level))
+            inside = tile.surfaces["x"] / (256 * tile.cell_size)
+            self.assertTrue(((inside > tile.key.x) & (inside < tile.key.x + 1)).all())
+
+    def test_every_cut_and_every_changed_byte_is_data_loss(self):
+        blob = min(self.encoded[0], key=len)
+        for size in range(len(blob)):
+            with self.assertRaises(strata.DataLoss):
+                strata.decode_tile(blob[:size], 0.1)
+        for place in range(len(blob)):
+            changed = bytearray(blob)
+            changed[place] ^= 0x40
+            with self.assertRaises(strata.DataLoss):
+                strata.decode_tile(bytes(changed), 0.1)
+        with self.assertRaises(strata.DataLoss):
+            strata.decode_tile(blob + b"\0", 0.1)
+
+    def test_later_formats_are_unimplemented(self):
+        later = bytearray(self.encoded[0][0])
+        later[6] = 200
+        with self.assertRaises(strata.Unimplemented):
+            strata.decode_tile(sealed(bytes(later)), 0.1)
+
+    def test_hostile_bytes_with_a_good_checksum_raise_nothing_but_data_loss(self):
+        seed = random.randrange(1 << 32)
+        print(f"seed {seed}")
+        draw = random.Random(seed)
+        sources = [blob for blobs in self.encoded.values() for blob in blobs if len(blob) < 8000]
+        refused = 0
+        for _ in range(1500):
+            blob = bytearray(draw.choice(sources))
+            for _ in range(draw.choice((1, 1, 2, 8))):
+                begin = draw.randrange(12, len(blob) - 8)
+                kind = draw.randrange(3)
+                if kind == 0:
+                    blob[begin] = draw.randrange(256)
+                elif kind == 1:
+                    del blob[begin:min(begin + draw.randrange(1, 9), len(blob) - 8)]
+                else:
+                    blob[begin:begin] = draw.randbytes(draw.randrange(1, 9))
+            blob[8:12] = (len(blob) - 20).to_bytes(4, "little")
+            try:
+                tile = strata.decode_tile(sealed(bytes(blob)), 0.1)
+                self.assertTrue(np.isfinite(tile.surfaces["z"]).all())
+            except strata.DataLoss:
+                refused += 1
+        self.assertGreater(refused, 500)
+
+    def test_a_few_bytes_cannot_claim_much(self):
+        def column(packing, size, *more):
+            digits = []
+            while size > 127:
+                digits.append(size & 127 | 128)
+                size >>= 7
+            return bytes([packing, *digits, size, *more])
+
+        def blob(*columns):
+            body = bytes(9) + bytes(8) + b"".join(columns)
+            return sealed(b"SST1\1\0\1\0" + len(body).to_bytes(4, "little") + body + bytes(8))
+
+        full = column(1, 16384, 0xFF)
+        with self.assertRaisesRegex(strata.DataLoss, "more than 4194304 surfaces"):
+            strata.decode_tile(blob(full, column(1, 65536, 127)), 0.1)
+        with self.assertRaisesRegex(strata.DataLoss, "at most 16384 can be"):
+            strata.decode_tile(blob(column(1, 1 << 40, 0)), 0.1)
+        announced = bytes([0x28, 0xB5, 0x2F, 0xFD, 0xE0, *(1 << 50).to_bytes(8, "little"), 1, 0, 0])
+        with self.assertRaisesRegex(strata.DataLoss, f"{1 << 50} bytes in a zstd frame"):
+            strata.decode_tile(blob(column(2, 16384, len(announced), *announced)), 0.1)
+        empty = blob(column(1, 16384, 0), *[column(0, 0)] * 18, bytes(1))
+        self.assertEqual(len(strata.decode_tile(empty, 0.1).surfaces), 0)
+
+
+if __name__ == "__main__":
+    unittest.main()
