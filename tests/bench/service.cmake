@@ -4,3 +4,8 @@ strata_executable(
   DEPS strata::codec_samples strata::engine strata::sdk strata::server strata::test_support PkgConfig::glog
        PkgConfig::sqlite3
 )
+strata_executable(
+  tile_read_benchmark tile_read_benchmark
+  SOURCES tile_read_benchmark.cc
+  DEPS strata::engine strata::proto strata::server strata::test_support gRPC::grpc++ PkgConfig::glog
+)
