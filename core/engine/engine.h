@@ -24,7 +24,8 @@ struct EngineOptions {
   std::uint64_t max_pending_scans = 100'000;
   // Bytes of points of a map that may wait for the disk; uploads block beyond it. In [1 MiB, …).
   std::size_t queue_bytes = std::size_t{64} << 20;
-  // Decoded tiles and scan features kept in memory, each, a map.
+  // Decoded tiles and scan features kept in memory, each, a map; and an eighth of it for tiles as
+  // they are served.
   std::size_t cache_bytes = std::size_t{256} << 20;
   // What the planner keeps of a map between queries.
   std::size_t planner_cache_bytes = std::size_t{512} << 20;

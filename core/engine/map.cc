@@ -26,6 +26,7 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
     pending = totals.pending;
   }
   map->planner_ = std::make_unique<MapPlanner>(*map->core_);
+  map->tiles_ = std::make_unique<ServedTiles>(*map->core_);
   map->localizer_ = std::make_unique<Localizer>(*map->core_);
   map->worker_ = std::make_unique<Worker>(*map->core_, pending);
   map->runner_ = std::make_unique<JobRunner>(*map->core_, *map->jobs_, *map->worker_);

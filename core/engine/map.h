@@ -15,6 +15,7 @@
 #include "core/engine/localizer.h"
 #include "core/engine/map_core.h"
 #include "core/engine/map_planner.h"
+#include "core/engine/served_tiles.h"
 #include "core/engine/worker.h"
 
 namespace strata {
@@ -30,6 +31,7 @@ class Map {
   MapCore& core() { return *core_; }
   JobBoard& jobs() { return *jobs_; }
   MapPlanner& planner() { return *planner_; }
+  ServedTiles& tiles() { return *tiles_; }
   Localizer& localizer() { return *localizer_; }
   Worker& worker() { return *worker_; }
 
@@ -49,6 +51,7 @@ class Map {
   std::unique_ptr<MapCore> core_;
   std::unique_ptr<JobBoard> jobs_;
   std::unique_ptr<MapPlanner> planner_;
+  std::unique_ptr<ServedTiles> tiles_;
   std::unique_ptr<Localizer> localizer_;
   std::unique_ptr<Worker> worker_;
   std::unique_ptr<JobRunner> runner_;

@@ -13,10 +13,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
-#include "core/codec/blob.h"
-#include "core/codec/surface_tile_codec.h"
 #include "core/common/status.h"
-#include "core/engine/tile_check.h"
+#include "core/engine/served_tiles.h"
 
 namespace strata {
 namespace {
@@ -56,28 +54,15 @@ std::optional<Kind> TakeKind(const SurfaceTileRow& row, HeldVersions& held) {
   return same ? std::nullopt : std::optional(Kind::kChanged);
 }
 
-// nullopt where there is nothing; DATA_LOSS if damaged.
-absl::StatusOr<std::optional<api::EncodedTile>> ReadTile(Map& map,
-                                                         const TileKey& key,
-                                                         const MapView& view) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map.core().Reader());
-  STRATA_ASSIGN_OR_RETURN(std::optional<SurfaceTileRow> row,
-                          reader->FindSurfaceTile(key, view.tile_version));
-  if (!row.has_value()) return std::optional<api::EncodedTile>();
-  const absl::Status intact =
-      OpenBlob(BlobKind::kSurfaceTile, kSurfaceTileVersion, row->bytes).status();
-  if (!intact.ok()) return DamagedTile(key, intact);
-  return std::optional<api::EncodedTile>(
-      api::EncodedTile{key, row->version, view.epoch, std::move(row->bytes)});
-}
-
 // The tile of `row` to one who lacks it.
 absl::StatusOr<api::TileUpdate> UpdateOf(Map& map,
                                          const SurfaceTileRow& row,
                                          Kind kind,
                                          const MapView& view) {
-  absl::StatusOr<std::optional<api::EncodedTile>> tile = ReadTile(map, row.key, view);
-  if (tile.ok() && tile->has_value()) return api::TileUpdate{kind, **std::move(tile)};
+  const absl::StatusOr<ServedTiles::Handle> tile = map.tiles().Find(row.key, view);
+  if (tile.ok() && *tile != nullptr) {
+    return api::TileUpdate{kind, {row.key, (*tile)->version, view.epoch, (*tile)->bytes}};
+  }
   if (!tile.ok() && !absl::IsDataLoss(tile.status())) return tile.status();
   return api::TileUpdate{Kind::kDamaged, {row.key, row.version, view.epoch, ""}};
 }
@@ -91,11 +76,11 @@ absl::StatusOr<api::EncodedTile> EngineTiles::Get(const api::Call& call,
   STRATA_RETURN_IF_ERROR(CheckLevel(key.level));
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
   const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
-  STRATA_ASSIGN_OR_RETURN(std::optional<api::EncodedTile> tile, ReadTile(*found, key, pin.view()));
-  if (!tile.has_value()) {
+  STRATA_ASSIGN_OR_RETURN(const ServedTiles::Handle tile, found->tiles().Find(key, pin.view()));
+  if (tile == nullptr) {
     return absl::NotFoundError(absl::StrCat("tile ", key.ToString(), ": nothing is mapped there"));
   }
-  return *std::move(tile);
+  return api::EncodedTile{key, tile->version, pin.view().epoch, tile->bytes};
 }
 
 absl::StatusOr<std::vector<api::TileInfo>> EngineTiles::List(const api::Call& call,

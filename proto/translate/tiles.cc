@@ -1,6 +1,7 @@
 #include "proto/translate/tiles.h"
 
 #include <cstdint>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
@@ -44,12 +45,12 @@ absl::StatusOr<TileKey> FromProto(const v1::TileKey& proto) {
   return TileKey{proto.level(), proto.x(), proto.y()};
 }
 
-v1::EncodedTile ToProto(const api::EncodedTile& tile) {
+v1::EncodedTile ToProto(api::EncodedTile tile) {
   v1::EncodedTile proto;
   *proto.mutable_key() = ToProto(tile.key);
   proto.set_version(tile.version);
   proto.set_epoch(tile.epoch);
-  proto.set_bytes(tile.bytes);
+  proto.set_bytes(std::move(tile.bytes));
   return proto;
 }
 
@@ -62,7 +63,7 @@ v1::TileInfo ToProto(const api::TileInfo& tile) {
   v1::TileInfo proto;
   *proto.mutable_key() = ToProto(tile.key);
   proto.set_version(tile.version);
-  proto.set_bytes(tile.bytes);
+  proto.set_bytes(std::move(tile.bytes));
   proto.set_patches(tile.patches);
   return proto;
 }

@@ -11,7 +11,7 @@
 namespace strata::translate {
 
 v1::TileKey ToProto(const TileKey& key);
-v1::EncodedTile ToProto(const api::EncodedTile& tile);
+v1::EncodedTile ToProto(api::EncodedTile tile);
 v1::TileInfo ToProto(const api::TileInfo& tile);
 v1::TileArea ToProto(const api::TileArea& area);
 v1::HeldTile ToProto(const api::HeldTile& held);

@@ -1,5 +1,6 @@
 #include "server/services/tiles_service.h"
 
+#include <utility>
 #include <vector>
 
 #include "core/common/status.h"
@@ -20,8 +21,8 @@ absl::Status Get(api::Database& db,
                  const v1::GetTileRequest& in,
                  v1::GetTileResponse& out) {
   STRATA_ASSIGN_OR_RETURN(const TileKey key, AtTheDoor(FromProto(in.key())));
-  STRATA_ASSIGN_OR_RETURN(const api::EncodedTile tile, db.tiles().Get(call, in.map(), key));
-  *out.mutable_tile() = ToProto(tile);
+  STRATA_ASSIGN_OR_RETURN(api::EncodedTile tile, db.tiles().Get(call, in.map(), key));
+  *out.mutable_tile() = ToProto(std::move(tile));
   return absl::OkStatus();
 }
 

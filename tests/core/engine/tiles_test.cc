@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cstdint>
 #include <map>
+#include <random>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -104,6 +106,40 @@ TEST_F(EngineTilesTest, ADamagedTileIsMarkedAndTheOthersAreServed) {
             api::TileUpdate::Kind::kDamaged);
   EXPECT_EQ(RunJob(db(), "rebuild").state, JobState::kSucceeded);
   EXPECT_EQ(fetch({}).at(damaged.key).kind, api::TileUpdate::Kind::kNew);
+}
+
+TEST_F(EngineTilesTest, TilesKeptInMemoryAreThoseOfTheStore) {
+  const unsigned seed = std::random_device()();
+  SCOPED_TRACE(seed);
+  std::mt19937 draw(seed);
+  EngineOptions options = Options();
+  options.cache_bytes = 40'000;  // room for a few tiles
+  Reopen(options);
+  MakeMap();
+  std::set<TileKey> ever;
+  for (std::uint64_t step = 1; step <= 12; ++step) {
+    switch (step < 4 ? 0 : draw() % 3) {
+      case 0:
+        UploadRoom(step, PoseAt(draw() % 30, draw() % 30));
+        break;
+      case 1:
+        STRATA_ASSERT_OK(db().posegraph().SetPose({}, kMapName, {"run", 1}, PoseAt(step, 5)));
+        break;
+      default:
+        db().scans().Delete({}, kMapName, {"run", 2 + draw() % step}).IgnoreError();
+    }
+    WaitIntegrated(db());
+    const auto tiles = AllTiles(db());
+    for (const auto& [key, _] : tiles) ever.insert(key);
+    for (const TileKey& key : ever) {
+      const auto tile = db().tiles().Get({}, kMapName, key);
+      ASSERT_EQ(tile.ok(), tiles.contains(key)) << key.ToString();
+      EXPECT_TRUE(!tile.ok() || tile->bytes == tiles.at(key)) << key.ToString();
+    }
+    if (step % 3 != 0) continue;
+    Reopen(options);
+    EXPECT_EQ(AllTiles(db()), tiles) << "after step " << step;
+  }
 }
 
 TEST_F(EngineTilesTest, AStreamKeepsToTheStateItBeganWith) {
