@@ -58,7 +58,12 @@ absl::StatusOr<std::vector<std::uint16_t>> TakeCells(ByteReader& reader) {
   }
   std::vector<std::uint16_t> cells;
   ByteReader rest_reader(rest);
+  const std::string empty_row(kTileCells / 2, '\0');
   for (int cell = 0; cell < kCells; ++cell) {
+    if (cell % kTileCells == 0 && codes.compare(BlockOf(cell), empty_row.size(), empty_row) == 0) {
+      cell += kTileCells - 1;
+      continue;
+    }
     std::uint64_t count =
         static_cast<std::uint8_t>(codes[BlockOf(cell)]) >> ShiftInBlock(cell) & 3U;
     if (count == 0) continue;

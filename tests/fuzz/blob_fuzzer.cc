@@ -1,0 +1,91 @@
+// Everything else that is stored or sent as bytes: bodies behind a right checksum, and raw bytes.
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include <fuzzer/FuzzedDataProvider.h>
+
+#include "core/classification/classifier_codec.h"
+#include "core/codec/blob.h"
+#include "core/codec/bytes.h"
+#include "core/codec/label_codec.h"
+#include "core/codec/mls_tile_codec.h"
+#include "core/codec/point_codec.h"
+#include "core/codec/surface_tile_codec.h"
+#include "core/common/checksum.h"
+#include "core/engine/local_map_codec.h"
+#include "core/planes/scan_planes_codec.h"
+#include "core/registration/place_descriptor.h"
+#include "core/storage/value_codec.h"
+#include "tests/fuzz/require.h"
+
+namespace strata::fuzz {
+namespace {
+
+// What is accepted is written and accepted again. (Not compared: a NaN is not itself.)
+template <typename Decode, typename Encode>
+void TryBytes(const std::string& bytes, const Decode& decode, const Encode& encode) {
+  const auto value = decode(bytes);
+  RequireGoodRefusal(value.status());
+  if (value.ok()) Require(decode(encode(*value)).ok(), "what is read can be written");
+}
+
+// Values of core/storage end with the checksum of all before.
+std::string WithChecksum(std::string bytes) {
+  PutFixed(bytes, Checksum64(bytes));
+  return bytes;
+}
+
+void TryKind(int kind, const std::string& body, std::uint16_t version) {
+  const auto sealed = [&](BlobKind blob) { return SealBlob(blob, version, body); };
+  switch (kind) {
+    case 0:
+      return TryBytes(sealed(BlobKind::kPoints), DecodePoints, EncodePoints);
+    case 1:
+      return TryBytes(sealed(BlobKind::kLabels), DecodeLabels, [](const auto& labels) {
+        return EncodeLabels(labels);
+      });
+    case 2:
+      return TryBytes(sealed(BlobKind::kScanPlanes), DecodeScanPlanes, EncodeScanPlanes);
+    case 3:
+      return TryBytes(sealed(BlobKind::kClassifier), DecodeClassifier, EncodeClassifier);
+    case 4:
+      return TryBytes(sealed(BlobKind::kSurfaceTile), DecodeSurfaceTile, EncodeSurfaceTile);
+    case 5:
+      return TryBytes(sealed(BlobKind::kMlsTile), DecodeMlsTile, EncodeMlsTile);
+    case 6:
+      return TryBytes(body, DecodePlace, EncodePlace);
+    case 7:
+      return TryBytes(WithChecksum(body), DecodePose, EncodePose);
+    case 8:
+      return TryBytes(WithChecksum(body), DecodeMatrix6, EncodeMatrix6);
+    case 9: {
+      const auto decode = [](const std::string& bytes) {
+        return DecodeScanHeader({"t", 1}, bytes);
+      };
+      return TryBytes(WithChecksum(body), decode, EncodeScanHeader);
+    }
+    default: {
+      const auto decode = [](const std::string& bytes) { return DecodeLocalMap(bytes, {}); };
+      return TryBytes(body, decode, EncodeLocalMap);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace strata::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace strata;
+  FuzzedDataProvider input(data, size);
+  const int kind = input.ConsumeIntegralInRange(0, 10);
+  const auto version = input.ConsumeIntegralInRange<std::uint16_t>(0, 3);
+  const std::string bytes = input.ConsumeRemainingBytesAsString();
+  fuzz::TryKind(kind, bytes, version);
+  constexpr std::array kKinds = {BlobKind::kPoints, BlobKind::kClassifier};
+  for (const BlobKind blob : kKinds) {
+    fuzz::RequireGoodRefusal(OpenBlob(blob, version, bytes).status());
+  }
+  return 0;
+}
