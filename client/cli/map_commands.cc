@@ -141,6 +141,14 @@ void AddCreate(Commands& commands, CLI::App* noun, const std::shared_ptr<MapOpti
       ->add_option("--max-range", parameters.sensor.max_range_m, "Farther returns are ignored [m]")
       ->capture_default_str();
   create->add_flag("--drop-points", options->drop_points, "Drop points once a scan is integrated");
+  create
+      ->add_option(
+          "--fade-after",
+          parameters.fade_after,
+          "Let what has gone fade once so many later scans looked through where it was; 0: "
+          "nothing fades")
+      ->check(CLI::Range(0U, kMaxFadeAfter))
+      ->capture_default_str();
   AddNumbers(
       create,
       "--origin",

@@ -26,6 +26,7 @@ struct ScanOptions {
   std::string format = "pcd";
   std::string frame = "scan";
   std::string out;
+  std::string faded = "with";
 };
 
 absl::Status List(Context& context, const ScanOptions& options) {
@@ -52,14 +53,45 @@ absl::Status Show(Context& context, const ScanOptions& options) {
   return absl::OkStatus();
 }
 
+// The points of `chunk`, the first of which is `first` of its scan, that have faded, with the
+// number of scans that looked through them as intensity; or those that have not.
+PointCloud FadedOrNot(const PointCloud& chunk,
+                      const std::vector<std::uint16_t>& faded,
+                      std::size_t first,
+                      bool wanted) {
+  PointCloud part;
+  for (std::size_t i = 0; i < chunk.size(); ++i) {
+    const std::uint16_t scans = first + i < faded.size() ? faded[first + i] : std::uint16_t{0};
+    if ((scans != 0) != wanted) continue;
+    part.points.push_back(chunk.points[i]);
+    if (wanted) {
+      part.intensity.push_back(scans);
+    } else if (!chunk.intensity.empty()) {
+      part.intensity.push_back(chunk.intensity[i]);
+    }
+    if (!chunk.colour.empty()) part.colour.push_back(chunk.colour[i]);
+    if (!chunk.label.empty()) part.label.push_back(chunk.label[i]);
+  }
+  return part;
+}
+
 // The points with their columns; a grid is not kept, since no writer of ours has one.
 absl::Status Export(Context& context, const ScanOptions& options) {
   STRATA_ASSIGN_OR_RETURN(const ScanInfo info,
                           context.database.scans().Get(context.call, options.map, options.id));
+  std::vector<std::uint16_t> faded;
+  if (options.faded != "with") {
+    STRATA_ASSIGN_OR_RETURN(
+        faded, context.database.scans().GetFaded(context.call, options.map, options.id));
+  }
   Geometry all;
+  std::size_t first = 0;
   STRATA_RETURN_IF_ERROR(context.database.scans().GetPoints(
       context.call, options.map, options.id, [&](const PointCloud& chunk) {
-        const Geometry piece = GeometryOf(chunk);
+        const Geometry piece = GeometryOf(
+            options.faded == "with" ? chunk
+                                    : FadedOrNot(chunk, faded, first, options.faded == "only"));
+        first += chunk.size();
         const auto append = [](auto& to, const auto& from) {
           to.insert(to.end(), from.begin(), from.end());
         };
@@ -142,6 +174,13 @@ void AddExport(Commands& commands, CLI::App* noun, const std::shared_ptr<ScanOpt
       ->capture_default_str();
   app->add_option("--frame", options->frame, "scan: as uploaded; map: at its current pose")
       ->check(CLI::IsMember({"scan", "map"}))
+      ->capture_default_str();
+  app->add_option(
+         "--faded",
+         options->faded,
+         "with: all points; without: those that the map holds; only: those that have faded, "
+         "with the number of scans that looked through them as intensity")
+      ->check(CLI::IsMember({"with", "without", "only"}))
       ->capture_default_str();
   app->add_option("--out", options->out, "The file to write")->type_name("FILE")->required();
 }

@@ -111,6 +111,24 @@ absl::Status RemoteScans::GetPoints(const api::Call& call,
   return CallStream(connection_, *stub_, &v1::Scans::Stub::GetPoints, call, in, deliver);
 }
 
+absl::StatusOr<std::vector<std::uint16_t>> RemoteScans::GetFaded(const api::Call& call,
+                                                                 absl::string_view map,
+                                                                 const ScanId& id) {
+  v1::GetFadedPointsRequest in;
+  in.set_map(std::string(map));
+  *in.mutable_id() = ToProto(id);
+  std::vector<std::uint16_t> faded;
+  const auto deliver = [&faded](const v1::GetFadedPointsResponse& out) -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> piece,
+                            translate::UnpackLabels(out.scans()));
+    faded.insert(faded.end(), piece.begin(), piece.end());
+    return absl::OkStatus();
+  };
+  STRATA_RETURN_IF_ERROR(
+      CallStream(connection_, *stub_, &v1::Scans::Stub::GetFaded, call, in, deliver));
+  return faded;
+}
+
 absl::Status RemoteScans::SetLabels(const api::Call& call,
                                     absl::string_view map,
                                     const ScanId& id,

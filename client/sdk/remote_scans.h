@@ -35,6 +35,9 @@ class RemoteScans final : public api::Scans {
                          absl::string_view map,
                          const ScanId& id,
                          absl::FunctionRef<absl::Status(const PointCloud&)> sink) override;
+  absl::StatusOr<std::vector<std::uint16_t>> GetFaded(const api::Call& call,
+                                                      absl::string_view map,
+                                                      const ScanId& id) override;
   absl::Status SetLabels(const api::Call& call,
                          absl::string_view map,
                          const ScanId& id,

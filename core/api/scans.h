@@ -90,6 +90,12 @@ class Scans {
                                  absl::string_view map,
                                  const ScanId& id,
                                  absl::FunctionRef<absl::Status(const PointCloud&)> sink) = 0;
+  // Which points of a scan have faded (job "fade"), and why: for each point, in order, how many
+  // later scans looked through the place where it was; 0 if it has not. Empty if none has.
+  // DATA_LOSS if the stored evidence is damaged.
+  virtual absl::StatusOr<std::vector<std::uint16_t>> GetFaded(const Call& call,
+                                                              absl::string_view map,
+                                                              const ScanId& id) = 0;
   // What a person says the points of a scan are: one label each, in their order, 0 for none. Every
   // surface of the scan counts them when the call returns; uploaded labels stay as they are.
   // INVALID_ARGUMENT unless there are as many as points, none beyond kMaxClassId; NOT_FOUND;

@@ -4,6 +4,7 @@
 #define STRATA_CORE_ENGINE_INTEGRATOR_H_
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -62,6 +63,9 @@ class Integrator {
   absl::Status SetModelLabels(ScanNumber number,
                               std::uint64_t model,
                               std::vector<std::uint16_t> labels);
+  // Which points of scans have faded, by number; scans that are gone or not integrated are left
+  // out. One transaction, so they should be few.
+  absl::Status SetFaded(const std::map<ScanNumber, LabelChange>& changes);
   // Annotates all tiles for another robot.
   absl::Status SetDefaultProfile(const RobotProfile& profile, const Stop& stop);
 

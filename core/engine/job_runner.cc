@@ -13,6 +13,7 @@
 #include "core/common/status.h"
 #include "core/common/this_thread.h"
 #include "core/engine/classify.h"
+#include "core/engine/fade.h"
 #include "core/engine/optimize.h"
 #include "core/engine/optimize_settings.h"
 #include "core/engine/rebuild.h"
@@ -66,6 +67,7 @@ absl::Status JobRunner::Run(const JobInfo& job, JobContext& context) {
   if (job.kind == kTrainJob) return RunTrainJob(core_, job, context);
   if (job.kind == kEvaluateJob) return RunEvaluateJob(core_, job, context);
   if (job.kind == kClassifyJob) return RunClassifyJob(core_, worker_, job, context);
+  if (job.kind == kFadeJob) return RunFadeJob(core_, worker_, job, context);
   return worker_.Execute(closing_, [&](Integrator& integrator) {
     return job.kind == kRevertJob ? RunRevertJob(integrator, job, context)
                                   : RunRebuildJob(integrator, job, context);
@@ -88,7 +90,7 @@ void JobRunner::Loop() {
     const Step step = NextStep();
     if (step == Step::kClosed) return;
     const absl::Time begun = absl::Now();
-    step == Step::kJob ? RunJob() : LookForClosures();
+    step == Step::kJob ? RunJob() : Look();
     PlanNextLook(begun);
   }
 }
@@ -103,25 +105,33 @@ void JobRunner::RunJob() {
   mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
 }
 
-void JobRunner::LookForClosures() {
+absl::StatusOr<bool> JobRunner::OptimizeIsDue() {
   // Somebody has still to decide about a proposal, which another epoch would make worthless.
-  if (jobs_.AnyIn(JobState::kProposed)) return;
+  if (jobs_.AnyIn(JobState::kProposed)) return false;
   Stop stop;
   {
     absl::MutexLock lock(&mutex_);
     stop = look_;
   }
-  const absl::StatusOr<std::size_t> found = closures_.Look(stop);
-  absl::Status done = found.status();
-  if (found.ok() && *found > 0) {
-    LOG(INFO) << "map=" << core_.name() << " event=closures found=" << *found;
-    done = jobs_.Start(closing_, kOptimizeJob, {{"automatic", "1"}}).status();
-    absl::MutexLock lock(&mutex_);
-    job_waits_ = jobs_.AnyIn(JobState::kQueued);
-  }
+  STRATA_ASSIGN_OR_RETURN(const std::size_t found, closures_.Look(stop));
+  if (found > 0) LOG(INFO) << "map=" << core_.name() << " event=closures found=" << found;
+  return found > 0;
+}
+
+void JobRunner::Look() {
+  const auto start_if = [this](const absl::StatusOr<bool>& due,
+                               absl::string_view kind,
+                               const JobParameters& parameters) -> absl::Status {
+    if (!due.ok() || !*due) return due.status();
+    return jobs_.Start(closing_, kind, parameters).status();
+  };
+  absl::Status done = start_if(OptimizeIsDue(), kOptimizeJob, {{"automatic", "1"}});
+  if (done.ok()) done = start_if(FadingIsDue(core_, jobs_.List()), kFadeJob, {});
   if (!done.ok() && !absl::IsCancelled(done)) {
-    LOG(ERROR) << "map=" << core_.name() << " looking for closures: " << done.message();
+    LOG(ERROR) << "map=" << core_.name() << " looking for what is due: " << done.message();
   }
+  absl::MutexLock lock(&mutex_);
+  job_waits_ = jobs_.AnyIn(JobState::kQueued);
 }
 
 void JobRunner::PlanNextLook(absl::Time begun) {

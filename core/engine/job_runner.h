@@ -41,8 +41,10 @@ class JobRunner {
   Step NextStep();
   void RunJob();
   absl::Status Run(const JobInfo& job, JobContext& context);
-  // Queues an optimize job if closures were found.
-  void LookForClosures();
+  // Queues what nobody has asked for and is due.
+  void Look();
+  // Whether closures were found that no optimize job has had a chance to use.
+  absl::StatusOr<bool> OptimizeIsDue();
   // After something that began at `begun`: leaves at least as much time to others.
   void PlanNextLook(absl::Time begun);
 

@@ -16,6 +16,7 @@
 #include "core/common/status.h"
 #include "core/engine/classifier_store.h"
 #include "core/engine/classify.h"
+#include "core/engine/fade.h"
 #include "core/engine/job_parameters.h"
 #include "core/engine/optimize_settings.h"
 #include "core/engine/rebuild.h"
@@ -71,6 +72,7 @@ absl::Status CheckJob(absl::string_view kind, const JobParameters& parameters) {
   if (kind == kRevertJob) return CheckEpoch(parameters);
   if (kind == kOptimizeJob) return ParseOptimizeSettings(parameters).status();
   if (kind == kTrainJob) return ParseTrainSettings(parameters).status();
+  if (kind == kFadeJob) return ParseFadeSettings(parameters).status();
   if (kind == kClassifyJob || kind == kEvaluateJob) return CheckModel(kind, parameters);
   return absl::InvalidArgumentError(absl::StrCat("job kind '",
                                                  kind.substr(0, 100),
@@ -86,8 +88,16 @@ absl::Status CheckJob(absl::string_view kind, const JobParameters& parameters) {
                                                  kClassifyJob,
                                                  ", ",
                                                  kEvaluateJob,
+                                                 ", ",
+                                                 kFadeJob,
                                                  " or ",
                                                  kRevertJob));
+}
+
+absl::Status CheckPointsKept(MapCore& core, absl::string_view kind) {
+  if (kind != kFadeJob || core.info().parameters.keep_points) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      "fade: the map drops points; what has faded is told by the rays of scans");
 }
 
 // What a job needs that is not there, said before it waits for its turn.
@@ -135,6 +145,7 @@ absl::StatusOr<JobInfo> EngineJobs::Start(const api::Call& call,
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
   STRATA_RETURN_IF_ERROR(CheckJob(kind, parameters));
+  STRATA_RETURN_IF_ERROR(CheckPointsKept(found->core(), kind));
   STRATA_RETURN_IF_ERROR(CheckClassifiers(found->core(), kind, parameters));
   STRATA_ASSIGN_OR_RETURN(JobInfo info, found->jobs().Start(call.stop, kind, parameters));
   found->JobQueued();

@@ -76,7 +76,7 @@ absl::StatusOr<MlsTileMap> MakeTiles(MapCore& core,
       ParallelFor(threads, scans.size(), [&](int thread, std::size_t i) -> absl::Status {
         STRATA_RETURN_IF_ERROR(stop.status());
         STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-        ScanSource source(*reader, parameters);
+        ScanSource source(*reader, parameters, {.change = scans[i].change});
         const absl::StatusOr<MlsMap> contribution =
             source.Contribution(scans[i].scan, scans[i].T_map_scan);
         const std::string id = scans[i].scan.header.id.ToString();

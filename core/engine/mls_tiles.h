@@ -16,6 +16,7 @@
 #include "core/common/stop.h"
 #include "core/engine/damaged_scans.h"
 #include "core/engine/lru_cache.h"
+#include "core/engine/scan_labels.h"
 #include "core/engine/map_core.h"
 #include "core/mls/mls_map.h"
 #include "core/mls/tile_key.h"
@@ -31,6 +32,7 @@ using MlsTileMap = absl::btree_map<TileKey, MlsTilePtr>;
 struct PlacedScanRecord {
   ScanRecord scan;
   Pose T_map_scan = Pose::Identity();
+  const LabelChange* change = nullptr;  // as if this had been stored already
 };
 
 // Bytes a tile takes in memory.

@@ -34,7 +34,7 @@ std::vector<std::string> EncodeLabelChange(const LabelChange& change) {
   const std::span<const std::uint16_t> labels(change.labels);
   const bool none =
       std::all_of(labels.begin(), labels.end(), [](std::uint16_t label) { return label == 0; });
-  if (none && change.origin == LabelOrigin::kPerson) return pieces;
+  if (none && change.origin != LabelOrigin::kModel) return pieces;
   for (std::size_t begin = 0; begin < labels.size(); begin += kMaxEncodedLabels) {
     const std::size_t count = std::min(kMaxEncodedLabels, labels.size() - begin);
     pieces.push_back(EncodeLabels(labels.subspan(begin, count)));
@@ -71,8 +71,11 @@ ScanLabels::ScanLabels(const ScanRecord& scan, const LabelView& view)
   person_ = {.wanted = scan.person_labels, .origin = LabelOrigin::kPerson, .held = {}};
   model_ = {
       .wanted = scan.label_model != 0 && view.models, .origin = LabelOrigin::kModel, .held = {}};
+  faded_ = {.wanted = scan.faded_points != 0, .origin = LabelOrigin::kFaded, .held = {}};
   if (view.change == nullptr) return;
-  Column& changed = view.change->origin == LabelOrigin::kPerson ? person_ : model_;
+  Column& changed = view.change->origin == LabelOrigin::kPerson  ? person_
+                    : view.change->origin == LabelOrigin::kModel ? model_
+                                                                 : faded_;
   changed.wanted = true;
   changed.change = view.change;
 }
@@ -113,6 +116,18 @@ absl::Status ScanLabels::Apply(StorageReader& reader, PointCloud& piece) {
     }
   }
   return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<std::uint16_t>> ScanLabels::Faded(StorageReader& reader,
+                                                             std::size_t count) {
+  std::vector<std::uint16_t> faded;
+  if (!faded_.wanted) return faded;
+  faded.reserve(count);
+  while (faded.size() < count) {
+    STRATA_ASSIGN_OR_RETURN(const std::uint16_t seen_through, Next(reader, faded_));
+    faded.push_back(seen_through);
+  }
+  return faded;
 }
 
 }  // namespace strata

@@ -19,8 +19,8 @@ namespace strata {
 // Labels that a scan gets.
 struct LabelChange {
   LabelOrigin origin = LabelOrigin::kPerson;
-  std::uint64_t model = 0;            // of kModel
-  std::vector<std::uint16_t> labels;  // of every point, in order; kPerson, all 0: none at all
+  std::uint64_t model = 0;            // of kModel; of kFaded, how many labels are not 0
+  std::vector<std::uint16_t> labels;  // of every point, in order; all 0: none at all but of kModel
 };
 
 // The pieces that storage keeps of `change`; none where it takes labels away.
@@ -51,6 +51,9 @@ class ScanLabels {
   // The next piece in order: its label column becomes the one that counts; empty if the scan has no
   // label at all. DATA_LOSS naming the labels that are damaged.
   absl::Status Apply(StorageReader& reader, PointCloud& piece);
+  // Of the next `count` points in order, how many scans looked through their places where that made
+  // them fade, else 0; empty if none of the scan has. DATA_LOSS.
+  absl::StatusOr<std::vector<std::uint16_t>> Faded(StorageReader& reader, std::size_t count);
 
  private:
   // Labels of one origin, read piece by piece.
@@ -70,6 +73,7 @@ class ScanLabels {
   const bool uploaded_;
   Column person_;
   Column model_;
+  Column faded_;
 };
 
 }  // namespace strata

@@ -33,39 +33,68 @@ void AppendPiece(const PointCloud& piece, PointCloud& block) {
   AppendTo(block.label, piece.label);
 }
 
+// The points of `block` that have not faded.
+PointCloud Lasting(const PointCloud& block, const std::vector<std::uint16_t>& faded) {
+  PointCloud lasting;
+  lasting.sensor_origin = block.sensor_origin;
+  const auto keep = [&](const auto& from, auto& to) {
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      if (faded[i] == 0) to.push_back(from[i]);
+    }
+  };
+  keep(block.points, lasting.points);
+  keep(block.intensity, lasting.intensity);
+  keep(block.colour, lasting.colour);
+  keep(block.label, lasting.label);
+  return lasting;
+}
+
 }  // namespace
 
 absl::Status ScanSource::ForEachBlock(const ScanRecord& scan,
                                       absl::FunctionRef<absl::Status(const PointCloud&)> body) {
   if (held_scan_ == scan.number && scan.number != 0) return body(held_);
   held_scan_ = 0;
-  held_ = PointCloud();
-  held_.sensor_origin = scan.header.sensor_origin;
+  const auto begin_block = [&] {
+    held_ = PointCloud();
+    held_.sensor_origin = scan.header.sensor_origin;
+    held_faded_.clear();
+  };
+  begin_block();
   ScanLabels labels(scan, labels_);
   for (std::uint32_t ordinal = 0; ordinal < scan.chunks; ++ordinal) {
     if (held_.size() >= kBlockPoints) {
       STRATA_RETURN_IF_ERROR(body(held_));
-      held_ = PointCloud();
-      held_.sensor_origin = scan.header.sensor_origin;
+      begin_block();
     }
     STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader_.GetChunk(scan.upload, ordinal));
     absl::StatusOr<PointCloud> piece = DecodePoints(bytes);
     if (!piece.ok()) return Annotate(piece.status(), absl::StrCat("piece ", ordinal));
     STRATA_RETURN_IF_ERROR(labels.Apply(reader_, *piece));
+    STRATA_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> faded,
+                            labels.Faded(reader_, piece->size()));
     AppendPiece(*piece, held_);
+    AppendTo(held_faded_, faded);
   }
   if (held_.size() == scan.header.point_count) held_scan_ = scan.number;
   return body(held_);
 }
 
-absl::StatusOr<MlsMap> ScanSource::Build(const ScanRecord& scan, const Pose& T_map_scan) {
+absl::StatusOr<MlsMap> ScanSource::Build(const ScanRecord& scan,
+                                         const Pose& T_map_scan,
+                                         Faded faded) {
   const SensorModel sensor = scan.header.sensor.value_or(parameters_.sensor);
   MlsMap map;
   map.parameters = parameters_.mls;
   dropped_ = DroppedPoints();
   STRATA_RETURN_IF_ERROR(ForEachBlock(scan, [&](const PointCloud& block) -> absl::Status {
+    const bool all = faded == Faded::kWith || held_faded_.empty();
     STRATA_ASSIGN_OR_RETURN(MlsBuildResult built,
-                            BuildMlsMap(block, T_map_scan, sensor, parameters_.mls, scratch_));
+                            BuildMlsMap(all ? block : Lasting(block, held_faded_),
+                                        T_map_scan,
+                                        sensor,
+                                        parameters_.mls,
+                                        scratch_));
     dropped_.not_finite += built.dropped.not_finite;
     dropped_.out_of_range += built.dropped.out_of_range;
     dropped_.outside_map += built.dropped.outside_map;
@@ -80,13 +109,13 @@ absl::StatusOr<MlsMap> ScanSource::Build(const ScanRecord& scan, const Pose& T_m
 }
 
 absl::StatusOr<MlsMap> ScanSource::LocalMap(const ScanRecord& scan) {
-  if (scan.has_points) return Build(scan, Pose::Identity());
+  if (scan.has_points) return Build(scan, Pose::Identity(), Faded::kWith);
   STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader_.GetLocalMap(scan.number));
   return DecodeLocalMap(bytes, parameters_.mls);
 }
 
 absl::StatusOr<MlsMap> ScanSource::Contribution(const ScanRecord& scan, const Pose& T_map_scan) {
-  if (parameters_.keep_points) return Build(scan, T_map_scan);
+  if (parameters_.keep_points) return Build(scan, T_map_scan, Faded::kWithout);
   STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, LocalMap(scan));
   return TransformContribution(local_map, T_map_scan);
 }

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
@@ -30,8 +31,9 @@ class ScanSource {
 
   // The scan in its own frame. DATA_LOSS naming the piece that is damaged.
   absl::StatusOr<MlsMap> LocalMap(const ScanRecord& scan);
-  // What the scan adds to the map at this pose: a pure function of the scan, its labels, the pose
-  // and the map's parameters, before and after points were dropped.
+  // What the scan adds to the map at this pose, without points that have faded: a pure function of
+  // the scan, what is said of its points, the pose and the map's parameters, before and after
+  // points were dropped.
   absl::StatusOr<MlsMap> Contribution(const ScanRecord& scan, const Pose& T_map_scan);
 
   // What the last map built from points had to leave out of them.
@@ -42,7 +44,8 @@ class ScanSource {
                             absl::FunctionRef<absl::Status(const PointCloud&)> body);
 
  private:
-  absl::StatusOr<MlsMap> Build(const ScanRecord& scan, const Pose& T_map_scan);
+  enum class Faded { kWith, kWithout };
+  absl::StatusOr<MlsMap> Build(const ScanRecord& scan, const Pose& T_map_scan, Faded faded);
 
   StorageReader& reader_;
   const MapParameters& parameters_;
@@ -52,6 +55,7 @@ class ScanSource {
   // The last scan that fitted one block: its local map and its contribution read it twice.
   ScanNumber held_scan_ = 0;
   PointCloud held_;
+  std::vector<std::uint16_t> held_faded_;  // ScanLabels::Faded() of the points held
 };
 
 }  // namespace strata

@@ -103,6 +103,7 @@ ScanInfo ToScanInfo(const PosedScan& posed) {
   if (posed.pose.has_value()) info.alignment = posed.pose->report;
   info.person_labels = posed.scan.person_labels;
   info.label_model = posed.scan.label_model;
+  info.faded_points = posed.scan.faded_points;
   return info;
 }
 
@@ -191,6 +192,20 @@ absl::Status EngineScans::GetPoints(const api::Call& call,
     STRATA_RETURN_IF_ERROR(sink(*piece));
   }
   return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<std::uint16_t>> EngineScans::GetFaded(const api::Call& call,
+                                                                 absl::string_view map,
+                                                                 const ScanId& id) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(*found, id));
+  if (posed.scan.faded_points == 0) return std::vector<std::uint16_t>();
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
+  absl::StatusOr<std::vector<std::uint16_t>> faded =
+      ReadLabels(*reader, posed.scan, LabelOrigin::kFaded);
+  if (!faded.ok()) return Annotate(faded.status(), absl::StrCat("scan ", id.ToString()));
+  return faded;
 }
 
 absl::Status EngineScans::SetLabels(const api::Call& call,

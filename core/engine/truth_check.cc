@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -49,8 +50,10 @@ void TruthCheck::CheckPoints(StorageReader& reader, const ScanRecord& scan, Repo
 }
 
 void TruthCheck::CheckLabels(StorageReader& reader, const ScanRecord& scan, Report report) {
-  for (const LabelOrigin origin : {LabelOrigin::kPerson, LabelOrigin::kModel}) {
-    const bool given = origin == LabelOrigin::kPerson ? scan.person_labels : scan.label_model != 0;
+  const std::pair<LabelOrigin, bool> columns[] = {{LabelOrigin::kPerson, scan.person_labels},
+                                                  {LabelOrigin::kModel, scan.label_model != 0},
+                                                  {LabelOrigin::kFaded, scan.faded_points != 0}};
+  for (const auto& [origin, given] : columns) {
     const absl::StatusOr<std::uint64_t> count = CountLabels(reader, scan, origin);
     if (!count.ok()) {
       report(std::string(count.status().message()));

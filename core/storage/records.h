@@ -43,12 +43,15 @@ struct ScanRecord {
   std::string message;            // why it failed, or which points are not in the map
   bool person_labels = false;     // it has labels of LabelOrigin::kPerson
   std::uint64_t label_model = 0;  // whose labels of LabelOrigin::kModel it has; 0: none
+  std::uint64_t faded_points = 0;  // that LabelOrigin::kFaded has
 };
 
 // Who gave a scan labels after its upload.
 enum class LabelOrigin : std::uint8_t {  // stored
   kPerson = 1,
   kModel = 2,  // the classifier that did so last
+  // No label: how many later scans looked through the place of a point that has faded.
+  kFaded = 3,
 };
 
 enum class PoseOrigin : std::uint8_t {  // stored

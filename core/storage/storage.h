@@ -136,7 +136,7 @@ class StorageWriter {
   // Keeps `local_map` (core/codec's map bytes) instead of the points and their labels.
   virtual absl::Status DropPoints(ScanNumber number, absl::string_view local_map) = 0;
   // Labels of a scan in place of earlier ones of that origin, in order, each piece at most 1 MiB;
-  // none: takes them away. `model`: that gave them; 0 for a person.
+  // none: takes them away. `model`: that gave them; 0 for a person; of kFaded, how many points.
   virtual absl::Status PutLabels(ScanNumber number,
                                  LabelOrigin origin,
                                  std::uint64_t model,

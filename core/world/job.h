@@ -26,7 +26,8 @@ using JobParameters = std::map<std::string, std::string>;
 
 struct JobInfo {
   std::uint64_t id = 0;  // unique in the map
-  std::string kind;  // "rebuild", "verify", "optimize", "revert", "train", "classify", "evaluate"
+  std::string kind;  // "rebuild", "verify", "optimize", "revert", "train", "classify", "evaluate",
+                     // "fade"
   JobParameters parameters;
   JobState state = JobState::kQueued;
   double progress = 0.0;                  // in [0, 1]

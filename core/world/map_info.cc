@@ -17,6 +17,16 @@ absl::Status ValidateMapParameters(const MapParameters& parameters) {
   STRATA_RETURN_IF_ERROR(ValidateMlsParameters(parameters.mls));
   STRATA_RETURN_IF_ERROR(ValidateSensorModel(parameters.sensor));
   STRATA_RETURN_IF_ERROR(ValidateRobotProfile(parameters.default_profile));
+  if (parameters.fade_after > kMaxFadeAfter) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "fade_after = ", parameters.fade_after, " scans is not in [0, ", kMaxFadeAfter, "]"));
+  }
+  if (parameters.fade_after > 0 && !parameters.keep_points) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("fade_after = ",
+                     parameters.fade_after,
+                     " needs keep_points: what has faded is told by the rays of scans"));
+  }
   if (!parameters.origin.has_value()) return absl::OkStatus();
   const GeodeticOrigin& origin = *parameters.origin;
   if (std::abs(origin.latitude_rad) <= std::numbers::pi / 2 &&

@@ -24,12 +24,17 @@ struct GeodeticOrigin {
   friend bool operator==(const GeodeticOrigin&, const GeodeticOrigin&) = default;
 };
 
+inline constexpr std::uint32_t kMaxFadeAfter = 1000;
+
 // Fixed when the map is created, but for `default_profile`.
 struct MapParameters {
   MlsParameters mls;
   SensorModel sensor;            // for scans that bring none of their own
   RobotProfile default_profile;  // whose traversability the tiles carry
   bool keep_points = true;       // false: points are dropped once their scan is integrated
+  // Later scans that must have looked through a place for what was there to fade (job "fade"); 0:
+  // nothing fades by itself. At most kMaxFadeAfter; needs keep_points.
+  std::uint32_t fade_after = 0;
   std::optional<GeodeticOrigin> origin;
 
   friend bool operator==(const MapParameters&, const MapParameters&) = default;

@@ -83,8 +83,9 @@ struct ScanInfo {
   std::string content_hash;            // of the uploaded points and header
   std::string message;                 // why it failed, or which points are not in the map
   AlignmentReport alignment;
-  bool person_labels = false;     // a person gave some of its points labels
-  std::uint64_t label_model = 0;  // id of the classifier that labelled it last; 0: none
+  bool person_labels = false;      // a person gave some of its points labels
+  std::uint64_t label_model = 0;   // id of the classifier that labelled it last; 0: none
+  std::uint64_t faded_points = 0;  // later scans looked through where they were: not in the tiles
 };
 
 // Answer to an upload: durable now.

@@ -75,6 +75,7 @@ v1::MapParameters ToProto(const MapParameters& parameters) {
   *proto.mutable_sensor() = ToProto(parameters.sensor);
   *proto.mutable_default_profile() = ToProto(parameters.default_profile);
   proto.set_keep_points(parameters.keep_points);
+  proto.set_fade_after(parameters.fade_after);
   if (parameters.origin.has_value()) {
     v1::GeodeticOrigin& origin = *proto.mutable_origin();
     origin.set_latitude_rad(parameters.origin->latitude_rad);
@@ -90,6 +91,7 @@ MapParameters FromProto(const v1::MapParameters& proto) {
   parameters.sensor = FromProto(proto.sensor());
   parameters.default_profile = FromProto(proto.default_profile());
   if (proto.has_keep_points()) parameters.keep_points = proto.keep_points();
+  parameters.fade_after = proto.fade_after();
   if (proto.has_origin()) {
     const v1::GeodeticOrigin& origin = proto.origin();
     parameters.origin =

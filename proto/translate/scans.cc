@@ -117,6 +117,7 @@ v1::ScanInfo ToProto(const ScanInfo& scan) {
   *proto.mutable_alignment() = ReportToProto(scan.alignment);
   proto.set_person_labels(scan.person_labels);
   proto.set_label_model(scan.label_model);
+  proto.set_faded_points(scan.faded_points);
   return proto;
 }
 
@@ -132,6 +133,7 @@ absl::StatusOr<ScanInfo> FromProto(const v1::ScanInfo& proto) {
   scan.alignment = ReportFromProto(proto.alignment());
   scan.person_labels = proto.person_labels();
   scan.label_model = proto.label_model();
+  scan.faded_points = proto.faded_points();
   return scan;
 }
 

@@ -1,5 +1,11 @@
 #include "server/services/scans_service.h"
 
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
 #include "core/common/status.h"
 #include "core/world/scan.h"
 #include "proto/translate/points.h"
@@ -66,6 +72,22 @@ absl::Status GetPoints(api::Database& db,
   });
 }
 
+absl::Status GetFaded(api::Database& db,
+                      const api::Call& call,
+                      const v1::GetFadedPointsRequest& in,
+                      StreamSink<v1::GetFadedPointsResponse> sink) {
+  constexpr std::size_t kMostInMessage = 500'000;
+  STRATA_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> faded,
+                          db.scans().GetFaded(call, in.map(), FromProto(in.id())));
+  for (std::size_t begin = 0; begin < faded.size(); begin += kMostInMessage) {
+    v1::GetFadedPointsResponse out;
+    out.set_scans(translate::PackLabels(
+        std::span(faded).subspan(begin, std::min(kMostInMessage, faded.size() - begin))));
+    STRATA_RETURN_IF_ERROR(sink(out));
+  }
+  return absl::OkStatus();
+}
+
 absl::Status Delete(api::Database& db,
                     const api::Call& call,
                     const v1::DeleteScanRequest& in,
@@ -105,6 +127,11 @@ grpc::ServerWriteReactor<v1::ListScansResponse>* ScansService::List(
 grpc::ServerWriteReactor<v1::GetScanPointsResponse>* ScansService::GetPoints(
     grpc::CallbackServerContext* context, const v1::GetScanPointsRequest* in) {
   return RunStream(runtime_, context, "Scans.GetPoints", in, &server::GetPoints);
+}
+
+grpc::ServerWriteReactor<v1::GetFadedPointsResponse>* ScansService::GetFaded(
+    grpc::CallbackServerContext* context, const v1::GetFadedPointsRequest* in) {
+  return RunStream(runtime_, context, "Scans.GetFaded", in, &server::GetFaded);
 }
 
 grpc::ServerReadReactor<v1::SetScanLabelsRequest>* ScansService::SetLabels(

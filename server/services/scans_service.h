@@ -26,6 +26,8 @@ class ScansService final : public v1::Scans::CallbackService {
                                                         const v1::ListScansRequest* in) override;
   grpc::ServerWriteReactor<v1::GetScanPointsResponse>* GetPoints(
       grpc::CallbackServerContext* context, const v1::GetScanPointsRequest* in) override;
+  grpc::ServerWriteReactor<v1::GetFadedPointsResponse>* GetFaded(
+      grpc::CallbackServerContext* context, const v1::GetFadedPointsRequest* in) override;
   grpc::ServerReadReactor<v1::SetScanLabelsRequest>* SetLabels(
       grpc::CallbackServerContext* context, v1::SetScanLabelsResponse* out) override;
   grpc::ServerUnaryReactor* Delete(grpc::CallbackServerContext* context,

@@ -74,6 +74,10 @@ class MockScans : public api::Scans {
               GetPoints,
               (const api::Call&, absl::string_view, const ScanId&, Sink<PointCloud>),
               (override));
+  MOCK_METHOD(absl::StatusOr<std::vector<std::uint16_t>>,
+              GetFaded,
+              (const api::Call&, absl::string_view, const ScanId&),
+              (override));
   MOCK_METHOD(absl::Status,
               SetLabels,
               (const api::Call&,

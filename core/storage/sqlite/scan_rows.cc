@@ -34,6 +34,7 @@ absl::StatusOr<ScanRecord> ReadScan(const Statement& row) {
   scan.message = row.Text(17);
   scan.person_labels = row.Int(27) != 0;
   scan.label_model = row.Unsigned(28);
+  scan.faded_points = row.Unsigned(29);
   return scan;
 }
 

@@ -193,6 +193,10 @@ CREATE TABLE truth_class (
   colour INTEGER NOT NULL
 ) STRICT;
 )sql",
+    R"sql(
+ALTER TABLE truth_map ADD COLUMN fade_after INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE truth_scan ADD COLUMN faded_points INTEGER NOT NULL DEFAULT 0;
+)sql",
 };
 
 constexpr char kDerivedTables[] = R"sql(

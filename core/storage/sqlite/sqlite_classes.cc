@@ -87,7 +87,9 @@ absl::Status SqliteWriter::PutLabels(ScanNumber number,
     return RunSql(
         "UPDATE truth_scan SET person_labels = ?2 WHERE number = ?1", number, !pieces.empty());
   }
-  return RunSql("UPDATE truth_scan SET label_model = ?2 WHERE number = ?1", number, model);
+  return origin == LabelOrigin::kModel
+             ? RunSql("UPDATE truth_scan SET label_model = ?2 WHERE number = ?1", number, model)
+             : RunSql("UPDATE truth_scan SET faded_points = ?2 WHERE number = ?1", number, model);
 }
 
 absl::StatusOr<std::vector<ClassifierInfo>> SqliteReader::ListClassifiers() {

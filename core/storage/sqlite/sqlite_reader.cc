@@ -79,7 +79,8 @@ absl::StatusOr<MapInfo> SqliteReader::GetMapInfo() {
           "SELECT m.created_us, m.cell_size_m, m.gap_size_m, m.thickness_m, m.sensor_sigma_m, "
           "m.sensor_sigma_per_metre, m.sensor_min_range_m, m.sensor_max_range_m, m.keep_points, "
           "m.has_origin, m.latitude_rad, m.longitude_rad, m.altitude_m, p.radius_m, p.height_m, "
-          "p.max_step_m, p.max_slope_rad, p.max_gap_m, p.max_roughness_m FROM truth_map AS m, "
+          "p.max_step_m, p.max_slope_rad, p.max_gap_m, p.max_roughness_m, m.fade_after FROM "
+          "truth_map AS m, "
           "truth_profile AS p WHERE m.id = 1 AND p.name = 'default'"));
   STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
   if (!found) return absl::DataLossError("store: the map's parameters are missing");
@@ -90,6 +91,7 @@ absl::StatusOr<MapInfo> SqliteReader::GetMapInfo() {
   info.parameters.keep_points = row.Int(8) != 0;
   if (row.Int(9) != 0) info.parameters.origin = {row.Real(10), row.Real(11), row.Real(12)};
   info.parameters.default_profile = ReadProfile(row, 13);
+  info.parameters.fade_after = static_cast<std::uint32_t>(row.Int(19));
   if (const absl::Status valid = ValidateMapParameters(info.parameters); !valid.ok()) {
     return absl::DataLossError(absl::StrCat("store: ", valid.message()));
   }

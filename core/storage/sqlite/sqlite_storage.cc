@@ -42,7 +42,7 @@ absl::Status InsertMap(Database& database, const MapParameters& parameters, absl
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
       database.Prepare("INSERT INTO truth_map VALUES (1, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, "
-                       "?11, ?12, ?13, 0, 1, 0, 1)"));
+                       "?11, ?12, ?13, 0, 1, 0, 1, ?14)"));
   const GeodeticOrigin origin = parameters.origin.value_or(GeodeticOrigin());
   row.Bind(absl::ToUnixMicros(created),
            parameters.mls.cell_size_m,
@@ -56,7 +56,8 @@ absl::Status InsertMap(Database& database, const MapParameters& parameters, absl
            parameters.origin.has_value(),
            origin.latitude_rad,
            origin.longitude_rad,
-           origin.altitude_m);
+           origin.altitude_m,
+           parameters.fade_after);
   STRATA_RETURN_IF_ERROR(row.Run());
   STRATA_ASSIGN_OR_RETURN(Statement epoch,
                           database.Prepare("INSERT INTO truth_epoch (epoch, created_us, reason) "

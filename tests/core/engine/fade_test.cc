@@ -1,0 +1,196 @@
+// The job "fade": what has gone leaves the map, and can come back.
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/core/engine/engine_fixture.h"
+#include "tests/support/scene.h"
+#include "tests/support/simulator.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+constexpr std::uint64_t kScans = 14;
+constexpr std::uint64_t kWithCrate = 4;  // scans before it was taken away
+
+Scene Yard(bool crate) {
+  Scene scene;
+  scene.SetTerrain(Eigen::AlignedBox2d(Eigen::Vector2d(-15.0, -15.0), Eigen::Vector2d(15.0, 15.0)),
+                   1.0,
+                   [](double, double) { return 0.0; });
+  scene.Add(Box({-10.0, 8.0, 0.0}, {10.0, 8.2, 2.0}));
+  if (crate) scene.Add(Box({0.0, 3.0, 0.0}, {1.5, 4.5, 1.2}));
+  scene.Build();
+  return scene;
+}
+
+Pose StopAt(std::uint64_t i) {
+  Pose T = Pose::Identity();
+  T.translate(Eigen::Vector3d(-4.0 + 0.7 * static_cast<double>(i), 0.0, 2.2));
+  return T;
+}
+
+PointCloud ScanAt(std::uint64_t i) {
+  SensorOptions sensor;
+  sensor.rings = 128;
+  sensor.columns = 480;
+  return SimulateScan(Yard(i < kWithCrate), sensor, StopAt(i), i);
+}
+
+// Surfaces higher than the ground where the crate was.
+std::size_t SurfacesOfCrate(api::Database& db) {
+  std::vector<Eigen::Vector2d> places;
+  for (double x = 0.05; x < 1.5; x += 0.1) {
+    for (double y = 3.05; y < 4.5; y += 0.1) places.emplace_back(x, y);
+  }
+  std::size_t high = 0;
+  const auto columns = db.planning().SampleSurfaces({}, kMapName, places);
+  EXPECT_THAT(columns, IsOk());
+  if (!columns.ok()) return high;
+  for (const SurfaceColumn& column : *columns) {
+    for (const Surface& surface : column.surfaces) high += surface.z_m > 0.3F ? 1 : 0;
+  }
+  return high;
+}
+
+class FadeTest : public EngineTest {
+ protected:
+  void SetUp() override {
+    MakeMap(MapParameters());
+    for (std::uint64_t i = 0; i < kScans; ++i) {
+      const PointCloud cloud = ScanAt(i);
+      ASSERT_THAT(Upload(db(), HeaderOf({"robot", i}, cloud, StopAt(i)), cloud), IsOk());
+    }
+    WaitIntegrated(db());
+  }
+  std::vector<std::uint16_t> FadedOf(std::uint64_t i) {
+    return db().scans().GetFaded({}, kMapName, {"robot", i}).value();
+  }
+};
+
+TEST_F(FadeTest, WhatHasGoneLeavesTheMapAndComesBack) {
+  const std::string before = Digest();
+  const std::size_t high = SurfacesOfCrate(db());
+  EXPECT_GT(high, 40U);
+  const JobInfo job = RunJob(db(), "fade");
+  EXPECT_EQ(job.state, JobState::kSucceeded) << job.message;
+  EXPECT_GT(job.metrics.at("points_faded"), 500.0);
+  EXPECT_LT(SurfacesOfCrate(db()), high / 4);
+  ExpectSound();
+
+  const std::string faded = Digest();
+  EXPECT_NE(faded, before);
+  EXPECT_EQ(RunJob(db(), "fade").metrics.at("scans_changed"), 0.0);
+  EXPECT_EQ(RunJob(db(), "fade", {{"undo", "1"}}).state, JobState::kSucceeded);
+  EXPECT_EQ(Digest(), before);
+  ExpectSound();
+}
+
+// The map is that of the scans without the points that have faded.
+TEST_F(FadeTest, TheMapIsThatOfWhatLasts) {
+  ASSERT_EQ(RunJob(db(), "fade").state, JobState::kSucceeded);
+  MakeMap(MapParameters(), "lasting");
+  for (std::uint64_t i = 0; i < kScans; ++i) {
+    PointCloud cloud = ScanAt(i);
+    const std::vector<std::uint16_t> faded = FadedOf(i);
+    const ScanInfo info = db().scans().Get({}, kMapName, {"robot", i}).value();
+    std::vector<Eigen::Vector3f> points;
+    for (std::size_t k = 0; k < cloud.size(); ++k) {
+      if (faded.empty() || faded[k] == 0) points.push_back(cloud.points[k]);
+    }
+    EXPECT_EQ(info.faded_points, cloud.size() - points.size());
+    if (i >= kWithCrate) {
+      EXPECT_EQ(info.faded_points, 0U) << i;
+    }
+    cloud.points = points;
+    ASSERT_THAT(Upload(db(), HeaderOf({"robot", i}, cloud, StopAt(i)), cloud, 2000, "lasting"),
+                IsOk());
+  }
+  EXPECT_EQ(WaitIntegrated(db(), "lasting").content_digest, Digest());
+}
+
+TEST_F(FadeTest, EvidenceLastsARestartAMoveAndARebuild) {
+  ASSERT_EQ(RunJob(db(), "fade").state, JobState::kSucceeded);
+  const std::string faded = Digest();
+  const std::vector<std::uint16_t> evidence = FadedOf(1);
+  EXPECT_THAT(evidence, ::testing::Contains(::testing::Ge(3)));
+  Reopen();
+  EXPECT_EQ(Digest(), faded);
+  EXPECT_EQ(FadedOf(1), evidence);
+  ASSERT_EQ(RunJob(db(), "rebuild").state, JobState::kSucceeded);
+  EXPECT_EQ(Digest(), faded);
+  // There and back: what has faded stays away.
+  ASSERT_THAT(db().posegraph().SetPose({}, kMapName, {"robot", 1}, PoseAt(0.0, -3.0)), IsOk());
+  EXPECT_NE(Digest(), faded);
+  ASSERT_THAT(db().posegraph().SetPose({}, kMapName, {"robot", 1}, StopAt(1)), IsOk());
+  EXPECT_EQ(Digest(), faded);
+  ExpectSound();
+}
+
+TEST_F(FadeTest, AnyNumberOfThreadsTellsTheSame) {
+  ASSERT_EQ(RunJob(db(), "fade", {{"threads", "1"}}).state, JobState::kSucceeded);
+  const std::string one = Digest();
+  ASSERT_EQ(RunJob(db(), "fade", {{"undo", "1"}}).state, JobState::kSucceeded);
+  ASSERT_EQ(RunJob(db(), "fade", {{"threads", "4"}}).state, JobState::kSucceeded);
+  EXPECT_EQ(Digest(), one);
+}
+
+TEST_F(FadeTest, DamagedEvidenceIsNamed) {
+  ASSERT_EQ(RunJob(db(), "fade").state, JobState::kSucceeded);
+  Close();
+  Sql("UPDATE truth_label SET bytes = x'00' WHERE origin = 3 AND scan = (SELECT min(scan) FROM "
+      "truth_label WHERE origin = 3)");
+  Reopen();
+  const JobInfo verify = RunJob(db(), "verify");
+  EXPECT_EQ(verify.state, JobState::kFailed);
+  EXPECT_THAT(verify.message, ::testing::HasSubstr("robot/"));
+  // Undone, nothing of it is left to be damaged.
+  EXPECT_EQ(RunJob(db(), "fade", {{"undo", "1"}}).state, JobState::kSucceeded);
+  ExpectSound();
+}
+
+TEST_F(EngineTest, AMapThatLetsThingsFadeDoesSoByItself) {
+  EngineOptions options = Options();
+  options.optimize_interval = absl::Milliseconds(10);
+  Reopen(options);
+  MapParameters parameters;
+  parameters.fade_after = 3;
+  MakeMap(parameters);
+  for (std::uint64_t i = 0; i < kScans; ++i) {
+    const PointCloud cloud = ScanAt(i);
+    ASSERT_THAT(Upload(db(), HeaderOf({"robot", i}, cloud, StopAt(i)), cloud), IsOk());
+  }
+  std::vector<JobInfo> fades;
+  const absl::Time deadline = absl::Now() + absl::Seconds(60);
+  while (absl::Now() < deadline && (fades.empty() || !IsFinal(fades[0].state))) {
+    absl::SleepFor(absl::Milliseconds(10));
+    fades = db().jobs().List({}, kMapName).value();
+    std::erase_if(fades, [](const JobInfo& job) { return job.kind != "fade"; });
+  }
+  ASSERT_FALSE(fades.empty());
+  EXPECT_EQ(fades[0].state, JobState::kSucceeded) << fades[0].message;
+  EXPECT_GE(fades[0].metrics.at("scans"), 10.0);
+}
+
+TEST_F(EngineTest, MapsThatDropPointsDoNotFade) {
+  MapParameters parameters = SmallMap();
+  parameters.keep_points = false;
+  MakeMap(parameters);
+  EXPECT_THAT(db().jobs().Start({}, kMapName, "fade", {}).status(),
+              StatusIs(absl::StatusCode::kFailedPrecondition, ::testing::_));
+  parameters.fade_after = 3;
+  EXPECT_THAT(db().maps().Create({}, "other", parameters).status(),
+              StatusIs(absl::StatusCode::kInvalidArgument, ::testing::_));
+  EXPECT_THAT(db().jobs().Start({}, kMapName, "fade", {{"scans", "0"}}).status(),
+              StatusIs(absl::StatusCode::kInvalidArgument, ::testing::_));
+}
+
+}  // namespace
+}  // namespace strata::testing
