@@ -4,7 +4,7 @@ set(CPACK_PACKAGE_NAME strata)
 set(CPACK_PACKAGE_VENDOR "Strata")
 set(CPACK_PACKAGE_CONTACT "The founders of Strata <strata@localhost>")
 set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR}/packages)
-set(CPACK_COMPONENTS_ALL server client dev)
+set(CPACK_COMPONENTS_ALL server client dev python)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_SET_DESTDIR ON) # /etc and /lib/systemd are not below the prefix
 set(CPACK_INSTALL_PREFIX /usr)
@@ -30,6 +30,17 @@ set(CPACK_DEBIAN_DEV_PACKAGE_NAME libstrata-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_COMPONENT_DEV_DESCRIPTION "headers and libraries of the map database Strata
  For find_package(strata): the database in a program, or its client.")
+set(CPACK_DEBIAN_DEV_PACKAGE_SHLIBDEPS OFF)
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
+    "coinor-libclp-dev, coinor-libipopt-dev, libabsl-dev, libboost-dev, libeigen3-dev, libgoogle-glog-dev, libgrpc++-dev, libnanoflann-dev, libprotobuf-dev, libsqlite3-dev, libxxhash-dev, libzstd-dev"
+)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-strata)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_ARCHITECTURE all)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS OFF)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3-grpcio, python3-numpy, python3-protobuf, python3-xxhash, python3-zstandard")
+set(CPACK_COMPONENT_PYTHON_DESCRIPTION "Python client of the map database Strata
+ Arrays of points in, arrays of surfaces and paths out.")
 include(CPack)
 
 # Only in packages: an installation under a prefix must not write to /etc.

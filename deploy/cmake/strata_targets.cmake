@@ -61,7 +61,10 @@ function(strata_library name)
     install(
       TARGETS ${target}
       EXPORT strata
-      FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/strata
+      COMPONENT dev
+      FILE_SET HEADERS
+      DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/strata
+      COMPONENT dev
     )
   endif()
 endfunction()

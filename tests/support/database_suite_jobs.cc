@@ -1,4 +1,5 @@
 // Conformance: jobs.
+#include <algorithm>
 #include <cstdint>
 
 #include "absl/time/time.h"
@@ -40,6 +41,47 @@ TEST_P(DatabaseSuite, JobsRunToTheirEndAndAreWatched) {
   EXPECT_THAT(db().jobs().Start({}, kMap, "dance", {}),
               StatusIs(Code::kInvalidArgument, HasSubstr("dance")));
   EXPECT_THAT(db().jobs().Get({}, kMap, 999), StatusIs(Code::kNotFound, _));
+}
+
+// Upright, `x_m` in front of the sensor, a point every 5 cm.
+PointCloud Wall(float x_m, float half_width_m, float bottom_m, float top_m) {
+  PointCloud cloud;
+  for (float y = -half_width_m; y <= half_width_m; y += 0.05F) {
+    for (float z = bottom_m; z <= top_m; z += 0.05F) cloud.points.emplace_back(x_m, y, z);
+  }
+  return cloud;
+}
+
+TEST_P(DatabaseSuite, WhatFadesIsNamedWithItsEvidence) {
+  // A door that is open from the second scan on.
+  for (std::uint64_t i = 1; i <= 5; ++i) {
+    const PointCloud cloud = i == 1 ? Wall(5.0F, 0.5F, 0.2F, 1.6F) : Wall(10.0F, 1.5F, -1.0F, 2.5F);
+    STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", i}, cloud), cloud));
+  }
+  AwaitIntegration(db(), kMap);
+  STRATA_ASSERT_OK_AND_ASSIGN(auto faded, db().scans().GetFaded({}, kMap, {"run", 1}));
+  EXPECT_THAT(faded, SizeIs(0));
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo job, db().jobs().Start({}, kMap, "fade", {}));
+  JobInfo last;
+  STRATA_ASSERT_OK(db().jobs().Watch({}, kMap, job.id, [&last](const JobInfo& now) {
+    last = now;
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(last.state, JobState::kSucceeded) << last.message;
+
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo door, db().scans().Get({}, kMap, {"run", 1}));
+  STRATA_ASSERT_OK_AND_ASSIGN(faded, db().scans().GetFaded({}, kMap, {"run", 1}));
+  ASSERT_THAT(faded, SizeIs(door.header.point_count));
+  EXPECT_EQ(door.faded_points,
+            static_cast<std::uint64_t>(
+                std::count_if(faded.begin(), faded.end(), [](auto scans) { return scans != 0; })));
+  EXPECT_GT(door.faded_points, door.header.point_count / 2);
+  EXPECT_THAT(faded, ::testing::Each(::testing::AnyOf(0, 3, 4)));
+  STRATA_ASSERT_OK_AND_ASSIGN(faded, db().scans().GetFaded({}, kMap, {"run", 2}));
+  EXPECT_THAT(faded, SizeIs(0));
+  EXPECT_THAT(db().scans().GetFaded({}, kMap, {"run", 9}), StatusIs(Code::kNotFound, _));
+  EXPECT_THAT(db().jobs().Start({}, kMap, "fade", {{"rays", "0"}}),
+              StatusIs(Code::kInvalidArgument, HasSubstr("rays")));
 }
 
 // A job that ends before it could be watched is no failure, so there are several tries.
