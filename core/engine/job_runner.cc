@@ -10,6 +10,7 @@
 #include "absl/time/time.h"
 #include <glog/logging.h>
 
+#include "core/common/log_line.h"
 #include "core/common/status.h"
 #include "core/common/this_thread.h"
 #include "core/engine/classify.h"
@@ -99,7 +100,7 @@ void JobRunner::RunJob() {
   absl::MutexLock lock(&mutex_);
   job_waits_ = jobs_.AnyIn(JobState::kQueued);
   if (done.ok()) return;
-  LOG(ERROR) << "map=" << core_.name() << " job: " << done.message();
+  LOG(ERROR) << LogLine("job").Add("map", core_.name()).Add("error", done.message());
   mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
 }
 
@@ -114,13 +115,13 @@ void JobRunner::LookForClosures() {
   const absl::StatusOr<std::size_t> found = closures_.Look(stop);
   absl::Status done = found.status();
   if (found.ok() && *found > 0) {
-    LOG(INFO) << "map=" << core_.name() << " event=closures found=" << *found;
+    LOG(INFO) << LogLine("closures").Add("map", core_.name()).Add("found", *found);
     done = jobs_.Start(closing_, kOptimizeJob, {{"automatic", "1"}}).status();
     absl::MutexLock lock(&mutex_);
     job_waits_ = jobs_.AnyIn(JobState::kQueued);
   }
   if (!done.ok() && !absl::IsCancelled(done)) {
-    LOG(ERROR) << "map=" << core_.name() << " looking for closures: " << done.message();
+    LOG(ERROR) << LogLine("closures").Add("map", core_.name()).Add("error", done.message());
   }
 }
 
