@@ -7,7 +7,7 @@ set -euo pipefail
 packages=(
   ca-certificates ccache cmake coinor-libclp-dev coinor-libipopt-dev g++ git mold ninja-build pkg-config
   libabsl-dev libboost-dev libcli11-dev libeigen3-dev libgoogle-glog-dev libgrpc++-dev libnanoflann-dev
-  libpng-dev libprotobuf-dev libsqlite3-dev libxxhash-dev libzstd-dev nlohmann-json3-dev
+  libpng-dev libprotobuf-dev libsqlite3-dev libssl-dev libxxhash-dev libzstd-dev nlohmann-json3-dev prometheus-cpp-dev
   protobuf-compiler protobuf-compiler-grpc
   libgmock-dev libgtest-dev
 )

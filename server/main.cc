@@ -1,29 +1,32 @@
 // stratad: the database behind gRPC.
 #include <csignal>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
-#include "absl/time/time.h"
 #include <CLI/CLI.hpp>
 #include <glog/logging.h>
 #include <pthread.h>
 
+#include "core/common/log_line.h"
 #include "core/common/status.h"
 #include "core/engine/engine.h"
+#include "server/check.h"
+#include "server/options.h"
 #include "server/server.h"
+#include "server/token_commands.h"
 
-namespace strata {
+namespace strata::server {
 namespace {
 
 constexpr int kFailed = 1;
 constexpr int kUsage = 2;
 
-// SIGTERM and SIGINT wait for WaitForSignal(). Called before there are other threads, which inherit
-// it.
+// SIGTERM and SIGINT wait for sigwait(). Called before there are other threads, which inherit it.
 sigset_t BlockSignals() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -33,37 +36,51 @@ sigset_t BlockSignals() {
   return signals;
 }
 
-CLI::Validator SecondsUpTo(double most) {
-  return CLI::Validator(
-      [most](const std::string& text) {
-        double seconds = 0.0;
-        const bool good = absl::SimpleAtod(text, &seconds) && seconds >= 0.0 && seconds <= most;
-        return good ? std::string() : absl::StrCat("expected 0 to ", most, " seconds, got ", text);
-      },
-      "");
+LogLine StartLine(const ProgramOptions& options, const std::string& address) {
+  const ServerOptions& server = options.server;
+  LogLine line("start");
+  line.Add("version", STRATA_VERSION)
+      .Add("data", options.engine.directory.string())
+      .Add("listen", address)
+      .Add("tls", server.tls.enabled() ? (server.tls.client_ca.empty() ? "yes" : "mutual") : "no")
+      .Add("tokens", server.token_file.empty() ? "no" : "yes")
+      .Add("max_calls", server.max_calls)
+      .Add("max_watches", server.max_watches)
+      .Add("client_calls", server.client.max_calls)
+      .Add("client_rate", server.client.calls_per_second)
+      .Add("optimize_every", absl::FormatDuration(options.engine.optimize_interval));
+  return line;
 }
 
-absl::Status Serve(const EngineOptions& engine_options,
-                   const server::ServerOptions& server_options,
-                   const sigset_t& signals) {
+absl::Status Serve(const ProgramOptions& options) {
+  FLAGS_logtostderr = true;
+  google::InitGoogleLogging("stratad");
+  const sigset_t signals = BlockSignals();
+  STRATA_RETURN_IF_ERROR(CheckExposure(options.server));  // before a directory is made
   STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<api::Database> database,
-                          OpenEngine(engine_options));
-  STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<server::Server> server,
-                          server::Server::Start(*database, server_options));
+                          OpenEngine(options.engine));
+  STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<Server> server,
+                          Server::Start(*database, options.server));
   // Before any other line with an address, for scripts that read both streams as one.
   std::cout << "listening " << server->address() << std::endl;
-  LOG(INFO) << "event=start version=" << STRATA_VERSION << " data=" << engine_options.directory
-            << " listen=" << server->address() << " query_threads=" << server_options.query_threads
-            << " stream_threads=" << server_options.stream_threads
-            << " upload_threads=" << server_options.upload_threads
-            << " max_calls=" << server_options.max_calls
-            << " max_watches=" << server_options.max_watches
-            << " optimize_every=" << engine_options.optimize_interval;
+  LOG(INFO) << StartLine(options, server->address());
   int signal = 0;
   sigwait(&signals, &signal);
-  LOG(INFO) << "event=shutdown signal=" << signal;
+  LOG(INFO) << LogLine("shutdown").Add("signal", signal);
   server->Shutdown();
   return absl::OkStatus();
+}
+
+int Check(const ProgramOptions& options, bool json) {
+  const std::vector<Finding> findings = CheckInstallation(options);
+  std::cout << (json ? ToJson(findings) : ToText(findings)) << std::flush;
+  return AnyError(findings) ? kFailed : 0;
+}
+
+int Exit(const absl::Status& status) {
+  if (status.ok()) return 0;
+  std::cerr << "stratad: " << status.message() << std::endl;
+  return kFailed;
 }
 
 int Main(int argc, char** argv) {
@@ -71,59 +88,36 @@ int Main(int argc, char** argv) {
   app.footer(
       "Once it serves, it prints one line on stdout: listening HOST:PORT\n\n"
       "Example:\n  stratad --data ./maps --listen 127.0.0.1:50051");
-  EngineOptions engine_options;
-  server::ServerOptions options;
-  double optimize_every_s = 60.0;
-  double drain_s = absl::ToDoubleSeconds(options.drain_timeout);
-  std::string directory;
   app.set_version_flag("--version", absl::StrCat("stratad ", STRATA_VERSION));
-  app.add_option("--data", directory, "Directory that holds the maps; made if absent")->required();
-  app.add_option("--listen", options.listen, "HOST:PORT to listen on; port 0 takes a free one")
+  const std::function<absl::StatusOr<ProgramOptions>()> read_options = AddServeOptions(app);
+  app.require_subcommand(0, 1);
+  app.fallthrough();  // check takes the options of serving
+  std::string output = "text";
+  CLI::App* check = app.add_subcommand(
+      "check", "Say whether the server could run with these options, without serving");
+  check->add_option("--output", output, "text for people, json for programs")
+      ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
-  app.add_flag("--insecure",
-               options.insecure,
-               "Listen beyond loopback without TLS and tokens, which are not there yet");
-  app.add_option("--query-threads", options.query_threads, "Calls answered at a time")
-      ->capture_default_str();
-  app.add_option("--stream-threads", options.stream_threads, "Downloads served at a time")
-      ->capture_default_str();
-  app.add_option("--upload-threads", options.upload_threads, "Scans taken in at a time")
-      ->capture_default_str();
-  app.add_option("--max-watches",
-                 options.max_watches,
-                 "Watches of maps and jobs under way before more are sent away; they are no calls")
-      ->capture_default_str();
-  app.add_option("--max-calls", options.max_calls, "Calls under way before clients are sent away")
-      ->capture_default_str();
-  app.add_option(
-         "--optimize-every",
-         optimize_every_s,
-         "After a loop was closed, and at most so often [s], optimize a map's poses without "
-         "being asked; 0: never")
-      ->check(SecondsUpTo(86400.0))
-      ->capture_default_str();
-  app.add_option("--drain", drain_s, "Seconds that calls may take to end at shutdown")
-      ->check(SecondsUpTo(3600.0))
-      ->capture_default_str();
+  check->footer(
+      "Takes the options of serving. Exit code: 0 it could, 1 something is an error.\n\n"
+      "Example:\n  stratad check --config /etc/strata/stratad.conf");
+  TokenAction token_action;
+  AddTokenCommands(app, token_action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : kUsage;
   }
-  engine_options.directory = directory;
-  engine_options.optimize_interval = absl::Seconds(optimize_every_s);
-  options.drain_timeout = absl::Seconds(drain_s);
-
-  FLAGS_logtostderr = true;
-  google::InitGoogleLogging(argv[0]);
-  const sigset_t signals = BlockSignals();
-  const absl::Status status = Serve(engine_options, options, signals);
-  if (status.ok()) return 0;
-  std::cerr << "stratad: " << status.message() << std::endl;
-  return kFailed;
+  if (token_action) return Exit(token_action(std::cout));
+  const absl::StatusOr<ProgramOptions> options = read_options();
+  if (!options.ok()) {
+    std::cerr << "stratad: " << options.status().message() << "\nSee stratad --help" << std::endl;
+    return kUsage;
+  }
+  return check->parsed() ? Check(*options, output == "json") : Exit(Serve(*options));
 }
 
 }  // namespace
-}  // namespace strata
+}  // namespace strata::server
 
-int main(int argc, char** argv) { return strata::Main(argc, argv); }
+int main(int argc, char** argv) { return strata::server::Main(argc, argv); }

@@ -6,13 +6,20 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include <glog/logging.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
 
+#include "core/common/host_port.h"
+#include "core/common/log_line.h"
 #include "core/common/status.h"
-#include "server/listen_address.h"
+#include "core/engine/numbers.h"
+#include "server/access/grant_table.h"
+#include "server/metrics/engine_metrics.h"
+#include "server/metrics/metrics.h"
+#include "server/reflection.h"
 #include "server/rpc/runtime.h"
 #include "server/services/classifiers_service.h"
 #include "server/services/jobs_service.h"
@@ -25,9 +32,14 @@
 namespace strata::server {
 namespace {
 
-constexpr int kMaxReceiveBytes = 4 << 20;
 // A robot that left the network is noticed after about this long.
 constexpr int kKeepaliveMs = 30'000;
+// Clients that ping more often are sent away.
+constexpr int kMinPingIntervalMs = 10'000;
+constexpr int kMaxMetadataBytes = 16 << 10;
+constexpr int kHandshakeMs = 10'000;
+// A connection without calls; a client that comes again connects again by itself.
+constexpr int kIdleConnectionMs = 10 * 60 * 1000;
 
 RuntimeOptions RuntimeOptionsOf(const ServerOptions& options) {
   return {.query_threads = options.query_threads,
@@ -35,20 +47,28 @@ RuntimeOptions RuntimeOptionsOf(const ServerOptions& options) {
           .upload_threads = options.upload_threads,
           .max_calls = options.max_calls,
           .max_watches = options.max_watches,
-          .slow_reader_timeout = options.slow_reader_timeout};
+          .slow_reader_timeout = options.slow_reader_timeout,
+          .slow_sender_timeout = options.slow_sender_timeout,
+          .client = options.client};
 }
 
 class GrpcServer final : public Server {
  public:
-  GrpcServer(api::Database& database, const ServerOptions& options)
-      : options_(options), runtime_(database, RuntimeOptionsOf(options)) {}
+  GrpcServer(api::Database& database,
+             std::unique_ptr<GrantTable> grants,
+             const ServerOptions& options)
+      : options_(options), runtime_(database, std::move(grants), RuntimeOptionsOf(options)) {}
   ~GrpcServer() override { GrpcServer::Shutdown(); }
 
-  absl::Status Listen(ListenAddress address);
+  absl::Status Listen(HostPort address);
   const std::string& address() const override { return address_; }
+  // After Listen().
+  absl::Status OpenMetrics();
   void Shutdown() override;
 
  private:
+  // How connections are made, and who may use what strata.v1's own checks do not see: reflection.
+  std::shared_ptr<grpc::ServerCredentials> Credentials();
   std::vector<grpc::Service*> Services() {
     return {&maps_, &scans_, &tiles_, &planning_, &jobs_, &posegraph_, &classifiers_};
   }
@@ -64,6 +84,7 @@ class GrpcServer final : public Server {
   ClassifiersService classifiers_{runtime_};
   std::string address_;
   std::unique_ptr<grpc::Server> server_;
+  std::unique_ptr<MetricsEndpoint> metrics_;
 };
 
 void SetServingForEach(grpc::HealthCheckServiceInterface& health) {
@@ -78,15 +99,54 @@ void SetServingForEach(grpc::HealthCheckServiceInterface& health) {
   }
 }
 
-absl::Status GrpcServer::Listen(ListenAddress address) {
-  grpc::ServerBuilder builder;
-  int port = 0;
-  builder.AddListeningPort(address.ToString(), grpc::InsecureServerCredentials(), &port);
-  builder.SetMaxReceiveMessageSize(kMaxReceiveBytes);
+// What a connection may cost before its first call, and what one costs that is forgotten.
+void LimitConnections(grpc::ServerBuilder& builder, const ServerOptions& options) {
+  builder.SetMaxReceiveMessageSize(options.max_message_bytes);
   builder.SetMaxSendMessageSize(-1);
   // A second server on the same port is an error, not a lottery.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
+                             kMinPingIntervalMs);
+  builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, kMaxMetadataBytes);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
+                             options.client.max_calls + options.client.max_watches);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, kIdleConnectionMs);
+}
+
+void AddUnderWay(MetricFamilies& families, const Runtime& runtime) {
+  constexpr auto kGauge = prometheus::MetricType::Gauge;
+  const auto row = [](const CallGate& gate) {
+    return MetricRow{{{"what", std::string(gate.what())}}, static_cast<double>(gate.under_way())};
+  };
+  AddFamily(families,
+            kGauge,
+            "strata_under_way",
+            "Calls and watches under way",
+            {row(runtime.calls), row(runtime.watches)});
+  AddFamily(families,
+            kGauge,
+            "strata_clients",
+            "Clients that have calls under way or had some lately",
+            {{{}, static_cast<double>(runtime.clients.clients())}});
+}
+
+std::shared_ptr<grpc::ServerCredentials> GrpcServer::Credentials() {
+  if (!options_.tls.enabled()) return grpc::InsecureServerCredentials();
+  std::shared_ptr<grpc::ServerCredentials> credentials = TlsCredentials(options_.tls);
+  credentials->SetAuthMetadataProcessor(GuardReflection(runtime_.access));
+  return credentials;
+}
+
+absl::Status GrpcServer::Listen(HostPort address) {
+  grpc::ServerBuilder builder;
+  int port = 0;
+  builder.AddListeningPort(address.ToString(), Credentials(), &port);
+  LimitConnections(builder, options_);
+  // gRPC has no guard for plain text.
+  const bool guarded = options_.token_file.empty() || options_.tls.enabled();
+  if (!guarded) LeaveOutReflection(builder);
   for (grpc::Service* service : Services()) builder.RegisterService(service);
   server_ = builder.BuildAndStart();
   if (server_ == nullptr || port == 0) {
@@ -99,8 +159,22 @@ absl::Status GrpcServer::Listen(ListenAddress address) {
   return absl::OkStatus();
 }
 
+absl::Status GrpcServer::OpenMetrics() {
+  if (options_.metrics_listen.empty()) return absl::OkStatus();
+  const auto gauges = [this, started = absl::Now()](MetricFamilies& families) {
+    AddProcess(families, started);
+    AddUnderWay(families, runtime_);
+    AddEngine(families, NumbersOf(runtime_.db));
+  };
+  STRATA_ASSIGN_OR_RETURN(metrics_,
+                          MetricsEndpoint::Open(options_.metrics_listen, runtime_.metrics, gauges));
+  LOG(INFO) << LogLine("metrics").Add("listen", metrics_->address());
+  return absl::OkStatus();
+}
+
 void GrpcServer::Shutdown() {
   if (server_ == nullptr || runtime_.shutting_down.exchange(true)) return;
+  metrics_.reset();  // it looks at the database
   server_->GetHealthCheckService()->SetServingStatus(false);
   // gRPC's own draining would also wait for clients that keep an idle connection.
   const absl::Time drained = absl::Now() + options_.drain_timeout;
@@ -126,30 +200,78 @@ absl::Status ServerOptions::Validate() const {
   check("upload_threads", upload_threads, 1, 1000);
   check("max_calls", max_calls, 1, 1'000'000);
   check("max_watches", max_watches, 1, 1'000'000);
+  check("client.max_calls", client.max_calls, 1, 1'000'000);
+  check("client.max_watches", client.max_watches, 1, 1'000'000);
+  check("max_message_bytes", max_message_bytes, 64 << 10, 64 << 20);
+  if (!(client.calls_per_second >= 0.0 && client.calls_per_second <= 1e6)) {
+    faults.emplace_back("client.calls_per_second is not in [0, 1000000]");
+  }
+  if (!(client.burst >= 1.0 && client.burst <= 1e6)) {
+    faults.emplace_back("client.burst is not in [1, 1000000]");
+  }
+  if (tls.certificate.empty() != tls.key.empty()) {
+    faults.emplace_back("of the TLS certificate and its key only one is given");
+  }
+  if (!tls.client_ca.empty() && !tls.enabled()) {
+    faults.emplace_back("client certificates need a TLS certificate and its key");
+  }
   if (!(slow_reader_timeout > absl::ZeroDuration())) {
     faults.emplace_back("slow_reader_timeout is not positive");
+  }
+  if (!(slow_sender_timeout > absl::ZeroDuration())) {
+    faults.emplace_back("slow_sender_timeout is not positive");
   }
   if (!(drain_timeout >= absl::ZeroDuration())) faults.emplace_back("drain_timeout is negative");
   if (faults.empty()) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat("server: ", absl::StrJoin(faults, "; ")));
 }
 
+absl::Status CheckExposure(const ServerOptions& options) {
+  STRATA_RETURN_IF_ERROR(options.Validate());
+  if (!options.metrics_listen.empty()) {
+    STRATA_ASSIGN_OR_RETURN(const HostPort metrics, ParseHostPort(options.metrics_listen));
+    if (!metrics.loopback() && !options.insecure) {
+      return absl::FailedPreconditionError(absl::StrCat(
+          "will not serve metrics on ",
+          metrics.ToString(),
+          ": they are for anybody and name the maps; use a loopback address or --insecure"));
+    }
+  }
+  STRATA_ASSIGN_OR_RETURN(const HostPort address, ParseHostPort(options.listen));
+  if (address.loopback() || options.insecure) return absl::OkStatus();
+  const auto refused = [&address](absl::string_view why) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("will not listen on ", address.ToString(), ": ", why));
+  };
+  const bool asks = !options.token_file.empty() || !options.tls.client_ca.empty();
+  if (!asks) {
+    return refused(
+        "anyone who reaches it could read and change every map; give --tls-cert, --tls-key and "
+        "--tokens (or --tls-client-ca), or use a loopback address or --insecure");
+  }
+  if (!options.tls.enabled()) {
+    return refused(
+        "tokens and maps would cross the network in plain text; give --tls-cert and --tls-key, or "
+        "use a loopback address or --insecure");
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(api::Database& database,
                                                       const ServerOptions& options) {
-  STRATA_RETURN_IF_ERROR(options.Validate());
-  STRATA_ASSIGN_OR_RETURN(const ListenAddress address, ParseListenAddress(options.listen));
-  if (!address.loopback() && !options.insecure) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        "will not listen on ",
-        address.ToString(),
-        ": anyone who reaches it could read and change every map, since TLS and tokens "
-        "are not there yet; use a loopback address or --insecure"));
+  STRATA_RETURN_IF_ERROR(CheckExposure(options));
+  STRATA_ASSIGN_OR_RETURN(const HostPort address, ParseHostPort(options.listen));
+  if (options.tls.enabled()) STRATA_RETURN_IF_ERROR(CheckTls(options.tls, absl::Now()).status());
+  std::unique_ptr<GrantTable> grants;
+  if (!options.token_file.empty()) {
+    STRATA_ASSIGN_OR_RETURN(grants, GrantTable::Open(options.token_file));
   }
   // Both are process-wide and idempotent; they must precede the builder.
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
-  auto server = std::make_unique<GrpcServer>(database, options);
+  auto server = std::make_unique<GrpcServer>(database, std::move(grants), options);
   STRATA_RETURN_IF_ERROR(server->Listen(address));
+  STRATA_RETURN_IF_ERROR(server->OpenMetrics());
   return server;
 }
 

@@ -2,6 +2,7 @@
 #ifndef STRATA_SERVER_SERVER_H_
 #define STRATA_SERVER_SERVER_H_
 
+#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -9,13 +10,19 @@
 #include "absl/time/time.h"
 
 #include "core/api/database.h"
+#include "server/rpc/client_limits.h"
+#include "server/tls.h"
 
 namespace strata::server {
 
 struct ServerOptions {
   std::string listen = "127.0.0.1:50051";  // HOST:PORT; port 0: any free one
-  // Listen beyond loopback although nothing is encrypted and nobody is asked who he is.
+  // Listen beyond loopback although not all is encrypted, or nobody is asked who he is.
   bool insecure = false;
+  TlsFiles tls;                      // empty: plain text
+  std::filesystem::path token_file;  // who may do what (token_file.h); empty: everybody everything
+  // HOST:PORT that answers Prometheus at /metrics, in plain text and to anybody; empty: none.
+  std::string metrics_listen;
   int query_threads = 8;    // calls answered at a time; in [1, 1000]
   int stream_threads = 8;   // listings and downloads served at a time; in [1, 1000]
   int upload_threads = 16;  // scans taken in at a time; in [1, 1000]
@@ -23,8 +30,12 @@ struct ServerOptions {
   // limit of their own; more are told to come back. In [1, 1'000'000].
   int max_calls = 1024;
   int max_watches = 4096;
+  ClientLimitOptions client;        // the same for one client, and how often it may call
+  int max_message_bytes = 4 << 20;  // of a request; in [64 KiB, 64 MiB]
   // A stream's reader that takes nothing for so long loses the stream.
   absl::Duration slow_reader_timeout = absl::Seconds(30);
+  // A stream of requests that brings nothing for so long ends.
+  absl::Duration slow_sender_timeout = absl::Seconds(60);
   // How long Shutdown() lets calls end by themselves.
   absl::Duration drain_timeout = absl::Seconds(5);
 
@@ -32,12 +43,17 @@ struct ServerOptions {
   absl::Status Validate() const;
 };
 
-// Serves from Start() to Shutdown(): strata.v1, grpc.health.v1 (by server and by service) and
-// reflection. Requests above 4 MiB are refused. Thread-safe.
+// Whether what is offered at options.listen is safe to offer there: FAILED_PRECONDITION for an
+// address beyond loopback without TLS or without tokens (or client certificates), unless
+// `insecure`; INVALID_ARGUMENT for bad options.
+absl::Status CheckExposure(const ServerOptions& options);
+
+// Serves from Start() to Shutdown(): strata.v1, grpc.health.v1 (by server and by service, for
+// anybody) and reflection (for whoever is known; not in plain text with tokens). Thread-safe.
 class Server {
  public:
-  // `database` must outlive the server. INVALID_ARGUMENT for bad options; FAILED_PRECONDITION for
-  // an address beyond loopback without `insecure`; UNAVAILABLE if it cannot be listened on.
+  // `database` must outlive the server. What CheckExposure, CheckTls and ReadTokenFile answer;
+  // UNAVAILABLE if the address cannot be listened on.
   static absl::StatusOr<std::unique_ptr<Server>> Start(api::Database& database,
                                                        const ServerOptions& options);
   virtual ~Server() = default;  // shuts down

@@ -43,6 +43,8 @@ EXTERNAL = {
     r"sqlite3\.h": ["core/storage/sqlite"],
     r"ceres/.*": ["core/posegraph"],
     r"(grpc|grpcpp)/.*|google/protobuf/.*|.*\.pb\.h": ["proto", "server", "client/sdk"],
+    r"openssl/.*": ["server"],
+    r"prometheus/.*": ["server/metrics"],
     r"pcl/.*": ["core/registration", "core/planes", "core/classification", "client/formats"],
     r"(thread|mutex|condition_variable)": ["core/engine", "server", "client", "core/common"],
 }

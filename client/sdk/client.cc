@@ -1,8 +1,14 @@
 #include "client/sdk/client.h"
 
+#include <algorithm>
+#include <cerrno>
+#include <fstream>
+#include <iterator>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/time/clock.h"
@@ -17,6 +23,7 @@
 #include "client/sdk/remote_posegraph.h"
 #include "client/sdk/remote_scans.h"
 #include "client/sdk/remote_tiles.h"
+#include "core/common/host_port.h"
 #include "core/common/status.h"
 
 namespace strata {
@@ -26,6 +33,44 @@ namespace {
 constexpr int kMaxReceiveBytes = 64 << 20;
 // A server that comes back is found again within a second.
 constexpr int kMaxReconnectMs = 1000;
+
+bool OnThisMachine(const std::string& target) {
+  if (absl::StartsWith(target, "unix:")) return true;
+  const absl::StatusOr<HostPort> address = ParseHostPort(target);
+  return address.ok() && address->loopback();
+}
+
+absl::StatusOr<std::string> ReadFile(const std::string& path) {
+  if (path.empty()) return std::string();
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  if (!file.is_open() || file.bad()) {
+    return absl::ErrnoToStatus(errno, absl::StrCat("cannot read ", path));
+  }
+  return bytes;
+}
+
+absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> CredentialsOf(const ClientTls& tls) {
+  if (!tls.enabled()) return grpc::InsecureChannelCredentials();
+  grpc::SslCredentialsOptions options;
+  STRATA_ASSIGN_OR_RETURN(options.pem_root_certs, ReadFile(tls.ca_file));
+  STRATA_ASSIGN_OR_RETURN(options.pem_cert_chain, ReadFile(tls.certificate_file));
+  STRATA_ASSIGN_OR_RETURN(options.pem_private_key, ReadFile(tls.key_file));
+  return grpc::SslCredentials(options);
+}
+
+grpc::ChannelArguments ArgumentsOf(const ClientOptions& options) {
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kMaxReconnectMs);
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kMaxReconnectMs / 10);
+  arguments.SetUserAgentPrefix("strata");
+  if (!options.tls.server_name.empty()) {
+    arguments.SetSslTargetNameOverride(options.tls.server_name);
+  }
+  return arguments;
+}
 
 class RemoteDatabase final : public api::Database {
  public:
@@ -66,25 +111,40 @@ absl::Status ClientOptions::Validate() const {
   if (!(backoff.initial > absl::ZeroDuration()) || !(backoff.max >= backoff.initial)) {
     faults.emplace_back("backoff.initial is not positive, or above backoff.max");
   }
+  if (tls.certificate_file.empty() != tls.key_file.empty()) {
+    faults.emplace_back("of tls.certificate_file and tls.key_file only one is given");
+  }
+  if (!tls.enabled() && !(tls.certificate_file.empty() && tls.server_name.empty())) {
+    faults.emplace_back("tls.certificate_file and tls.server_name need tls.ca_file");
+  }
+  if (!std::all_of(
+          token.begin(), token.end(), [](unsigned char c) { return absl::ascii_isgraph(c); })) {
+    faults.emplace_back("token holds what is no printable character");
+  }
   if (faults.empty()) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat("client: ", absl::StrJoin(faults, "; ")));
 }
 
 absl::StatusOr<std::unique_ptr<api::Database>> Connect(const ClientOptions& options) {
   STRATA_RETURN_IF_ERROR(options.Validate());
-  grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
-  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kMaxReconnectMs);
-  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kMaxReconnectMs / 10);
-  arguments.SetUserAgentPrefix("strata");
-  auto channel =
-      grpc::CreateCustomChannel(options.target, grpc::InsecureChannelCredentials(), arguments);
+  if (!options.token.empty() && !options.tls.enabled() && !options.insecure &&
+      !OnThisMachine(options.target)) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "the token would cross the network to ",
+        options.target,
+        " in plain text, for anyone to copy; connect with TLS (name the server's authority)"));
+  }
+  STRATA_ASSIGN_OR_RETURN(const auto credentials, CredentialsOf(options.tls));
+  auto channel = grpc::CreateCustomChannel(options.target, credentials, ArgumentsOf(options));
   if (!channel->WaitForConnected(absl::ToChronoTime(absl::Now() + options.connect_timeout))) {
-    return absl::UnavailableError(absl::StrCat("no server answers at ",
-                                               options.target,
-                                               " within ",
-                                               absl::FormatDuration(options.connect_timeout),
-                                               "; is stratad running there?"));
+    return absl::UnavailableError(absl::StrCat(
+        "no server answers at ",
+        options.target,
+        " within ",
+        absl::FormatDuration(options.connect_timeout),
+        options.tls.enabled() ? "; is stratad running there, with a certificate of that authority "
+                                "for that name, and does it take ours?"
+                              : "; is stratad running there, and without TLS?"));
   }
   return std::make_unique<RemoteDatabase>(std::move(channel), options);
 }

@@ -27,8 +27,24 @@ struct BackoffOptions {
   absl::Duration max = absl::Seconds(5);
 };
 
+// PEM files; nothing of them: plain text.
+struct ClientTls {
+  std::string ca_file;           // authorities whose servers are trusted; asks for TLS
+  std::string certificate_file;  // the client's own, for servers that want one
+  std::string key_file;          // of the certificate
+  // The name to expect in the server's certificate; empty: the host of the target.
+  std::string server_name;
+
+  bool enabled() const { return !ca_file.empty(); }
+};
+
 struct ClientOptions {
-  std::string target = "127.0.0.1:50051";  // HOST:PORT
+  std::string target = "127.0.0.1:50051";  // HOST:PORT or unix:PATH
+  ClientTls tls;
+  // Shown with every call (stratad token add); empty: none.
+  std::string token;
+  // Show the token in plain text to a server that is not on this machine.
+  bool insecure = false;
   // How long Connect() waits for the server; > 0.
   absl::Duration connect_timeout = absl::Seconds(10);
   // For calls that may be repeated, when the server was not there (UNAVAILABLE) or said that it was
@@ -40,10 +56,14 @@ struct ClientOptions {
 };
 
 // A database behind `options.target`. Thread-safe; any number of calls and uploads may be under way
-// at once, on one connection that mends itself. UNAVAILABLE if no server answers in time.
+// at once, on one connection that mends itself. UNAVAILABLE if no server answers in time, which is
+// also all that is known where one does not trust the other's certificate; NOT_FOUND or
+// PERMISSION_DENIED for a file of `tls`; FAILED_PRECONDITION for a token that would cross the
+// network in plain text without `insecure`.
 //
 // As the engine's, but for these:
-// - Every call may also answer UNAVAILABLE. Uploads, lookups, Localize, Cancel, SetPose and
+// - Every call may also answer UNAVAILABLE, UNAUTHENTICATED and PERMISSION_DENIED. Uploads,
+// lookups, Localize, Cancel, SetPose and
 //   EnableConstraint repeat themselves as `backoff` says (an upload keeps its points until they are
 //   acknowledged); Create, Start, Accept, Revert, AddConstraint, RemoveConstraint and the two
 //   Deletes do not, since their effect may have happened: look before calling them again. A stream

@@ -15,6 +15,9 @@ AttemptContext::AttemptContext(Connection& connection, const api::Call& call)
   if (call.stop.deadline() != absl::InfiniteFuture()) {
     context_.set_deadline(absl::ToChronoTime(call.stop.deadline()));
   }
+  if (!connection.token().empty()) {
+    context_.AddMetadata("authorization", "Bearer " + connection.token());
+  }
   if (!call.request_id.empty()) context_.AddMetadata(kRequestIdKey, call.request_id);
 }
 

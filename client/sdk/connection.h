@@ -28,6 +28,7 @@ class Connection {
 
   const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
   Canceller& canceller() { return canceller_; }
+  const std::string& token() const { return options_.token; }
   Backoff NewBackoff() const { return Backoff(options_.backoff); }
   // Of one who waits for the server as long as it takes.
   Backoff NewEndlessBackoff() const {

@@ -116,20 +116,20 @@ MapDirectory::~MapDirectory() {
   if (lock_ >= 0) ::close(lock_);
 }
 
-fs::path MapDirectory::FileOf(absl::string_view name) const {
-  return path_ / absl::StrCat(name, kSuffix);
+fs::path MapDirectory::FileIn(const fs::path& directory, absl::string_view name) {
+  return directory / absl::StrCat(name, kSuffix);
 }
 
-absl::StatusOr<std::vector<std::string>> MapDirectory::ListNames() const {
+absl::StatusOr<std::vector<std::string>> MapDirectory::NamesIn(const fs::path& directory) {
   std::error_code error;
   std::vector<std::string> names;
-  for (const fs::directory_entry& entry : fs::directory_iterator(path_, error)) {
+  for (const fs::directory_entry& entry : fs::directory_iterator(directory, error)) {
     const std::string name = entry.path().stem().string();
     if (entry.path().extension().string() == kSuffix && ValidateName("map name", name).ok()) {
       names.push_back(name);
     }
   }
-  if (error) return absl::UnavailableError(absl::StrCat(path_.string(), ": ", error.message()));
+  if (error) return absl::UnavailableError(absl::StrCat(directory.string(), ": ", error.message()));
   std::sort(names.begin(), names.end());
   return names;
 }

@@ -27,9 +27,12 @@ class MapDirectory {
       : path_(std::move(other.path_)), lock_(std::exchange(other.lock_, -1)) {}
   MapDirectory& operator=(MapDirectory&&) = delete;
 
-  std::filesystem::path FileOf(absl::string_view name) const;
-  // By name.
-  absl::StatusOr<std::vector<std::string>> ListNames() const;
+  // Of a directory that nobody need have opened: the file of a map, and the names of all, sorted.
+  static std::filesystem::path FileIn(const std::filesystem::path& directory,
+                                      absl::string_view name);
+  static absl::StatusOr<std::vector<std::string>> NamesIn(const std::filesystem::path& directory);
+  std::filesystem::path FileOf(absl::string_view name) const { return FileIn(path_, name); }
+  absl::StatusOr<std::vector<std::string>> ListNames() const { return NamesIn(path_); }
   // All or nothing, also when the power fails. ALREADY_EXISTS.
   absl::Status CreateFile(absl::string_view name,
                           const MapParameters& parameters,

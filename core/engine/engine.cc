@@ -14,6 +14,7 @@
 #include "core/engine/classifiers.h"
 #include "core/engine/jobs.h"
 #include "core/engine/maps.h"
+#include "core/engine/numbers.h"
 #include "core/engine/planning.h"
 #include "core/engine/posegraph.h"
 #include "core/engine/scans.h"
@@ -22,7 +23,7 @@
 namespace strata {
 namespace {
 
-class Engine final : public api::Database {
+class Engine final : public api::Database, public NumbersSource {
  public:
   explicit Engine(std::unique_ptr<EngineMaps> maps) : maps_(std::move(maps)) {}
 
@@ -33,6 +34,7 @@ class Engine final : public api::Database {
   api::Jobs& jobs() override { return jobs_; }
   api::PoseGraph& posegraph() override { return posegraph_; }
   api::Classifiers& classifiers() override { return classifiers_; }
+  EngineNumbers Numbers() override { return maps_->Numbers(); }
 
  private:
   std::unique_ptr<EngineMaps> maps_;
@@ -51,6 +53,7 @@ absl::Status EngineOptions::Validate() const {
   if (directory.empty()) faults.emplace_back("directory is empty");
   if (queue_bytes < (std::size_t{1} << 20)) faults.emplace_back("queue_bytes is below 1 MiB");
   if (max_points_per_scan == 0) faults.emplace_back("max_points_per_scan is 0");
+  if (max_maps == 0) faults.emplace_back("max_maps is 0");
   if (max_pending_scans == 0) faults.emplace_back("max_pending_scans is 0");
   if (worker_threads < 1 || worker_threads > 64) {
     faults.push_back(absl::StrCat("worker_threads = ", worker_threads, " is not in [1, 64]"));

@@ -29,6 +29,8 @@ struct EngineOptions {
   std::size_t cache_bytes = std::size_t{256} << 20;
   // What the planner keeps of a map between queries.
   std::size_t planner_cache_bytes = std::size_t{512} << 20;
+  // Maps there may be; one more is refused with RESOURCE_EXHAUSTED.
+  std::uint64_t max_maps = 10'000;
   // Largest size of a map's file; 0: none.
   std::uint64_t max_map_bytes = 0;
   // Threads that rebuild and verify use, each map; at least 1. Results do not depend on it.

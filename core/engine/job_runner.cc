@@ -10,6 +10,7 @@
 #include "absl/time/time.h"
 #include <glog/logging.h>
 
+#include "core/common/log_line.h"
 #include "core/common/status.h"
 #include "core/common/this_thread.h"
 #include "core/engine/classify.h"
@@ -101,7 +102,7 @@ void JobRunner::RunJob() {
   absl::MutexLock lock(&mutex_);
   job_waits_ = jobs_.AnyIn(JobState::kQueued);
   if (done.ok()) return;
-  LOG(ERROR) << "map=" << core_.name() << " job: " << done.message();
+  LOG(ERROR) << LogLine("job").Add("map", core_.name()).Add("error", done.message());
   mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
 }
 
@@ -114,7 +115,7 @@ absl::StatusOr<bool> JobRunner::OptimizeIsDue() {
     stop = look_;
   }
   STRATA_ASSIGN_OR_RETURN(const std::size_t found, closures_.Look(stop));
-  if (found > 0) LOG(INFO) << "map=" << core_.name() << " event=closures found=" << found;
+  if (found > 0) LOG(INFO) << LogLine("closures").Add("map", core_.name()).Add("found", found);
   return found > 0;
 }
 
@@ -128,7 +129,7 @@ void JobRunner::Look() {
   absl::Status done = start_if(OptimizeIsDue(), kOptimizeJob, {{"automatic", "1"}});
   if (done.ok()) done = start_if(FadingIsDue(core_, jobs_.List()), kFadeJob, {});
   if (!done.ok() && !absl::IsCancelled(done)) {
-    LOG(ERROR) << "map=" << core_.name() << " looking for what is due: " << done.message();
+    LOG(ERROR) << LogLine("look").Add("map", core_.name()).Add("error", done.message());
   }
   absl::MutexLock lock(&mutex_);
   job_waits_ = jobs_.AnyIn(JobState::kQueued);

@@ -1,7 +1,9 @@
 #include "core/engine/maps.h"
 
+#include <filesystem>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -13,6 +15,7 @@
 #include "absl/time/clock.h"
 #include <glog/logging.h>
 
+#include "core/common/log_line.h"
 #include "core/common/status.h"
 #include "core/engine/map_stats.h"
 #include "core/engine/map_watch.h"
@@ -25,7 +28,48 @@ absl::Status NoSuchMap(absl::string_view name) {
   return absl::NotFoundError(absl::StrCat("map ", name.substr(0, 100), " does not exist"));
 }
 
+// Numbers that cannot be read now stay zero: they are looked at again in some seconds.
+MapNumbers NumbersOfMap(Map& map, const std::filesystem::path& file) {
+  MapNumbers numbers;
+  numbers.map = map.core().name();
+  for (const char* suffix : {"", "-wal"}) {
+    std::error_code error;
+    const std::uintmax_t bytes = std::filesystem::file_size(file.string() + suffix, error);
+    if (!error) numbers.file_bytes += bytes;
+  }
+  for (const JobInfo& job : map.jobs().List()) ++numbers.jobs[{job.kind, job.state}];
+  const auto reader = map.core().Reader();
+  if (!reader.ok()) return numbers;
+  if (const auto totals = (*reader)->GetScanTotals(); totals.ok()) {
+    numbers.scans = totals->scans;
+    numbers.scans_pending = totals->pending;
+    numbers.scans_failed = totals->failed;
+  }
+  const auto tiles = (*reader)->ListMlsTiles(map.core().snapshots().current().tile_version);
+  if (tiles.ok()) numbers.tiles = tiles->size();
+  return numbers;
+}
+
 }  // namespace
+
+EngineNumbers EngineMaps::Numbers() const {
+  std::vector<std::shared_ptr<Map>> open;
+  EngineNumbers numbers;
+  {
+    absl::MutexLock lock(&mutex_);
+    for (const auto& [name, map] : maps_) {
+      if (map.ok()) {
+        open.push_back(*map);
+      } else {
+        ++numbers.maps_not_opened;
+      }
+    }
+  }
+  for (const std::shared_ptr<Map>& map : open) {
+    numbers.maps.push_back(NumbersOfMap(*map, directory_.FileOf(map->core().name())));
+  }
+  return numbers;
+}
 
 absl::StatusOr<std::unique_ptr<EngineMaps>> EngineMaps::Open(const EngineOptions& options) {
   STRATA_ASSIGN_OR_RETURN(MapDirectory directory, MapDirectory::Open(options.directory));
@@ -38,7 +82,9 @@ absl::StatusOr<std::unique_ptr<EngineMaps>> EngineMaps::Open(const EngineOptions
 
 void EngineMaps::OpenMap(const std::string& name) {
   absl::StatusOr<std::shared_ptr<Map>> map = Map::Open(name, directory_.FileOf(name), options_);
-  if (!map.ok()) LOG(ERROR) << "map=" << name << " not opened: " << map.status().message();
+  if (!map.ok()) {
+    LOG(ERROR) << LogLine("map").Add("map", name).Add("not_opened", map.status().message());
+  }
   maps_.insert_or_assign(name, std::move(map));
 }
 
@@ -59,6 +105,10 @@ absl::StatusOr<MapInfo> EngineMaps::Create(const api::Call& call,
   const std::string key(name);
   absl::MutexLock lock(&mutex_);
   if (maps_.contains(key)) return absl::AlreadyExistsError(absl::StrCat("map ", key, " exists"));
+  if (maps_.size() >= options_.max_maps) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "there are ", maps_.size(), " maps, the most this server holds; delete one first"));
+  }
   STRATA_RETURN_IF_ERROR(directory_.CreateFile(key, parameters, absl::Now()));
   OpenMap(key);
   const absl::StatusOr<std::shared_ptr<Map>>& map = maps_.find(key)->second;

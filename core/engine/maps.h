@@ -18,6 +18,7 @@
 #include "core/engine/directory.h"
 #include "core/engine/engine.h"
 #include "core/engine/map.h"
+#include "core/engine/numbers.h"
 
 namespace strata {
 
@@ -28,6 +29,8 @@ class EngineMaps final : public api::Maps {
 
   // NOT_FOUND; or why its file did not open.
   absl::StatusOr<std::shared_ptr<Map>> Find(absl::string_view name) const;
+
+  EngineNumbers Numbers() const;
 
   absl::StatusOr<MapInfo> Create(const api::Call& call,
                                  absl::string_view name,

@@ -10,6 +10,7 @@
 #include "absl/time/time.h"
 #include <glog/logging.h>
 
+#include "core/common/log_line.h"
 #include "core/common/status.h"
 #include "core/common/this_thread.h"
 #include "core/engine/rebuild.h"
@@ -111,7 +112,8 @@ void Worker::RunBatch() {
     pending_ -= *done == 0 ? waited : std::min(pending_, static_cast<std::uint64_t>(*done));
     return;
   }
-  LOG(ERROR) << "map=" << core_.name() << " integration stopped: " << done.status().message();
+  LOG(ERROR)
+      << LogLine("integration").Add("map", core_.name()).Add("stopped", done.status().message());
   mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
 }
 
@@ -119,7 +121,7 @@ void Worker::RunRecovery() {
   while (true) {
     const absl::Status done = RecoverDerived(integrator_, closing_);
     if (done.ok() || closing_.requested()) return;
-    LOG(ERROR) << "map=" << core_.name() << " recovery stopped: " << done.message();
+    LOG(ERROR) << LogLine("recovery").Add("map", core_.name()).Add("stopped", done.message());
     absl::MutexLock lock(&mutex_);
     if (mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay)) return;
   }

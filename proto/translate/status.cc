@@ -51,6 +51,14 @@ absl::Status WithReason(absl::Status status, absl::string_view reason) {
   return WithDetail(std::move(status), detail);
 }
 
+absl::Status WithRetryDelay(absl::Status status, absl::string_view reason, absl::Duration delay) {
+  v1::ErrorDetail detail;
+  detail.set_reason(std::string(reason));
+  const std::int64_t ms = absl::ToInt64Milliseconds(absl::Ceil(delay, absl::Milliseconds(1)));
+  (*detail.mutable_metadata())[kRetryDelay] = absl::StrCat(ms);
+  return WithDetail(std::move(status), detail);
+}
+
 std::optional<v1::ErrorDetail> DetailOf(const absl::Status& status) {
   const auto payload = status.GetPayload(kDetailUrl);
   v1::ErrorDetail detail;

@@ -20,6 +20,9 @@ inline constexpr absl::string_view kDatabaseReason = "DATABASE";
 inline constexpr absl::string_view kServerBusyReason = "SERVER_BUSY";
 inline constexpr absl::string_view kShuttingDownReason = "SHUTTING_DOWN";
 inline constexpr absl::string_view kSlowReaderReason = "SLOW_READER";
+inline constexpr absl::string_view kSlowSenderReason = "SLOW_SENDER";
+inline constexpr absl::string_view kAccessReason = "ACCESS";
+inline constexpr absl::string_view kClientLimitReason = "CLIENT_LIMIT";
 
 // Longest message that is sent; the rest is cut off [bytes].
 inline constexpr std::size_t kMaxMessageBytes = 1024;
@@ -28,6 +31,8 @@ inline constexpr std::size_t kMaxMessageBytes = 1024;
 absl::Status WithDetail(absl::Status status, const v1::ErrorDetail& detail);
 // `status` with a detail of this reason, unless it has one or is OK.
 absl::Status WithReason(absl::Status status, absl::string_view reason);
+// The same for a status that passes, with how long to wait before the same call is tried again.
+absl::Status WithRetryDelay(absl::Status status, absl::string_view reason, absl::Duration delay);
 // The attached detail; nullopt without one.
 std::optional<v1::ErrorDetail> DetailOf(const absl::Status& status);
 // The detail's retry_delay_ms; nullopt when trying again makes no sense.

@@ -28,16 +28,25 @@ class CollectReactor final : public grpc::ServerReadReactor<typename Collector::
                  grpc::CallbackServerContext& context,
                  absl::string_view method,
                  Out& out)
-      : runtime_(runtime), request_(runtime, context, method), out_(out) {
-    if (const absl::Status admission = request_.admission(); !admission.ok()) {
-      this->Finish(request_.Close(admission));
+      : runtime_(runtime),
+        request_(runtime, context, method),
+        out_(out),
+        expected_(runtime.silence,
+                  [this](const absl::Status& status) { this->Finish(request_.Close(status)); }) {
+    if (!request_.admission().ok()) {
+      this->Finish(request_.Close(request_.admission()));
       return;
     }
-    this->StartRead(&message_);
+    Read();
   }
 
  private:
+  void Read() {
+    expected_.Expect();
+    this->StartRead(&message_);
+  }
   void OnReadDone(bool ok) override {
+    if (!expected_.Arrived()) return;
     if (ok) {
       runtime_.uploads.Submit([this] { Take(); });
     } else {
@@ -48,13 +57,13 @@ class CollectReactor final : public grpc::ServerReadReactor<typename Collector::
   void OnDone() override { delete this; }
 
   void Take() {
-    request_.CountReceived(message_);
     const absl::Status status = Guarded([this]() -> absl::Status {
       STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+      STRATA_RETURN_IF_ERROR(request_.Receive(message_));
       return collector_.Take(runtime_.db, request_.call(), message_);
     });
     if (status.ok()) {
-      this->StartRead(&message_);
+      Read();
     } else {
       this->Finish(request_.Close(status));
     }
@@ -75,6 +84,7 @@ class CollectReactor final : public grpc::ServerReadReactor<typename Collector::
   Out& out_;
   In message_;
   Collector collector_;
+  ExpectedMessage expected_;
 };
 
 }  // namespace strata::server

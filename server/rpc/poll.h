@@ -8,6 +8,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include <google/protobuf/message.h>
 #include <grpcpp/alarm.h>
 #include <grpcpp/server_context.h>
 #include <grpcpp/support/server_callback.h>
@@ -26,8 +27,8 @@ class PollReactor : public grpc::ServerWriteReactor<Out> {
  public:
   // Once, when construction has ended: a look is a virtual call.
   void Start() {
-    if (const absl::Status admission = request_.admission(); !admission.ok()) {
-      this->Finish(request_.Close(admission));
+    if (!request_.admission().ok()) {
+      this->Finish(request_.Close(request_.admission()));
       return;
     }
     runtime_.queries.Submit([this] { LookAndSend(); });
@@ -42,9 +43,12 @@ class PollReactor : public grpc::ServerWriteReactor<Out> {
     kLast,  // to be sent, and the stream ends
   };
 
-  // `method` as in "Jobs.Watch"; must outlive the reactor.
-  PollReactor(Runtime& runtime, grpc::CallbackServerContext& context, absl::string_view method)
-      : runtime_(runtime), request_(runtime, context, method, runtime.watches) {}
+  // `method` as in "Jobs.Watch"; it and `in`, what was asked, must outlive the reactor.
+  PollReactor(Runtime& runtime,
+              grpc::CallbackServerContext& context,
+              absl::string_view method,
+              const google::protobuf::Message& in)
+      : runtime_(runtime), request_(runtime, context, method, Request::Kind::kWatch), asked_(in) {}
 
   // One look, on a query thread. `out` holds what was sent last, and then what is to be sent.
   virtual absl::StatusOr<News> Look(Out& out) = 0;
@@ -65,6 +69,8 @@ class PollReactor : public grpc::ServerWriteReactor<Out> {
         return translate::WithReason(absl::UnavailableError(shutdown_message()),
                                      translate::kShuttingDownReason);
       }
+      STRATA_RETURN_IF_ERROR(received_ ? request_.StillAllowed() : request_.Receive(asked_));
+      received_ = true;
       STRATA_ASSIGN_OR_RETURN(news_, Look(out_));
       return absl::OkStatus();
     });
@@ -101,6 +107,8 @@ class PollReactor : public grpc::ServerWriteReactor<Out> {
 
   Runtime& runtime_;
   Request request_;
+  const google::protobuf::Message& asked_;
+  bool received_ = false;
   Out out_;
   News news_ = News::kNone;
   std::unique_ptr<grpc::Alarm> alarm_;

@@ -1,16 +1,24 @@
 #include "server/rpc/request.h"
 
 #include <algorithm>
+#include <optional>
 #include <random>
+#include <utility>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include <glog/logging.h>
 #include <grpcpp/server_context.h>
 
+#include "core/common/log_line.h"
+#include "server/access/method_rights.h"
+
 namespace strata::server {
 namespace {
+
+constexpr std::size_t kMaxLoggedName = 100;
 
 // Unique among the calls of this process and, very likely, of all others.
 std::string NewRequestId() {
@@ -19,11 +27,16 @@ std::string NewRequestId() {
   return absl::StrCat(absl::Hex(process, absl::kZeroPad8), "-", next.fetch_add(1));
 }
 
+// Empty without it.
+absl::string_view MetadataOf(const grpc::CallbackServerContext& context, const char* key) {
+  const auto found = context.client_metadata().find(key);
+  if (found == context.client_metadata().end()) return "";
+  return {found->second.data(), found->second.size()};
+}
+
 std::string RequestIdOf(const grpc::CallbackServerContext& context) {
   constexpr std::size_t kMaxLength = 64;
-  const auto found = context.client_metadata().find(kRequestIdKey);
-  if (found == context.client_metadata().end()) return NewRequestId();
-  const absl::string_view id(found->second.data(), found->second.size());
+  const absl::string_view id = MetadataOf(context, kRequestIdKey);
   const bool usable =
       !id.empty() && id.size() <= kMaxLength &&
       std::all_of(id.begin(), id.end(), [](unsigned char c) { return absl::ascii_isgraph(c); });
@@ -36,42 +49,107 @@ absl::Time DeadlineOf(const grpc::CallbackServerContext& context) {
                                                                   : absl::FromChrono(deadline);
 }
 
+// gRPC's name of a peer without its port: a client that comes by many connections is one.
+std::string HostOf(absl::string_view peer) {
+  return std::string(absl::StartsWith(peer, "ipv") ? peer.substr(0, peer.rfind(':')) : peer);
+}
+
+// `reason` if it says that the call was not let in, or thrown out; else empty.
+absl::string_view Rejection(absl::string_view reason) {
+  const bool answered = reason == translate::kDatabaseReason || reason == translate::kRequestReason;
+  return answered ? "" : reason;
+}
+
+absl::Status NobodyMay(absl::string_view method) {
+  return absl::PermissionDeniedError(absl::StrCat("nobody may call ", method));
+}
+
 }  // namespace
 
 Request::Request(Runtime& runtime,
                  grpc::CallbackServerContext& context,
                  absl::string_view method,
-                 CallGate& gate)
+                 Kind kind)
     : runtime_(runtime),
-      gate_(gate),
+      kind_(kind),
       method_(method),
       peer_(context.peer()),
-      started_(absl::Now()),
-      admitted_(gate.Enter()) {
+      started_(absl::Now()) {
   call_.stop = Stop(DeadlineOf(context));
   call_.request_id = RequestIdOf(context);
   context.AddInitialMetadata(kRequestIdKey, call_.request_id);
+  // In the gate also when it is refused: until the call has ended, it uses what a server must give
+  // back before it goes.
+  entered_ = gate().Enter();
+  admission_ = Admit(context);
 }
 
-Request::~Request() { gate_.Leave(); }
+Request::~Request() {
+  if (!client_.empty()) runtime_.clients.Leave(client_, kind_);
+  gate().Leave();
+}
 
-absl::Status Request::admission() const {
+absl::Status Request::Admit(const grpc::CallbackServerContext& context) {
   if (runtime_.shutting_down) {
     return translate::WithReason(absl::UnavailableError("the server is shutting down"),
                                  translate::kShuttingDownReason);
   }
-  if (admitted_) return absl::OkStatus();
+  STRATA_ASSIGN_OR_RETURN(caller_,
+                          runtime_.access.Authenticate(MetadataOf(context, kAuthorizationKey),
+                                                       CertificateNameOf(*context.auth_context())));
+  call_.principal = caller_.principal;
+  return EnterLimits();
+}
+
+absl::Status Request::EnterLimits() {
+  const std::string client = caller_.principal.empty() ? HostOf(peer_) : caller_.principal;
+  STRATA_RETURN_IF_ERROR(runtime_.clients.Enter(client, kind_, started_));
+  client_ = client;
+  if (entered_) return absl::OkStatus();
   return translate::WithReason(
       absl::ResourceExhaustedError(absl::StrCat(
-          "the server has its ", gate_.most(), " ", gate_.what(), " under way; try again later")),
+          "the server has its ", gate().most(), " ", gate().what(), " under way; try again later")),
       translate::kServerBusyReason);
 }
 
+absl::Status Request::Receive(const google::protobuf::Message& message) {
+  bytes_received_ += message.ByteSizeLong();
+  const MethodRight* row = FindMethodRight(method_);
+  if (row == nullptr) return NobodyMay(method_);
+  if (row->map_field.empty()) return absl::OkStatus();
+  std::optional<std::string> map = MapNamedIn(message, row->map_field);
+  if (!map.has_value()) return absl::OkStatus();
+  map_ = *std::move(map);
+  has_map_ = true;
+  return runtime_.access.Authorize(caller_, row->right, map_);
+}
+
+absl::Status Request::StillAllowed() {
+  const MethodRight* row = FindMethodRight(method_);
+  if (row == nullptr) return NobodyMay(method_);
+  return has_map_ ? runtime_.access.Authorize(caller_, row->right, map_)
+                  : runtime_.access.StillKnown(caller_);
+}
+
 grpc::Status Request::Close(const absl::Status& status) {
-  LOG(INFO) << "method=" << method_ << " code=" << absl::StatusCodeToString(status.code())
-            << " duration_ms=" << absl::ToInt64Milliseconds(absl::Now() - started_)
-            << " bytes_received=" << bytes_received_ << " bytes_sent=" << bytes_sent_
-            << " peer=" << peer_ << " id=" << call_.request_id;
+  const absl::Duration duration = absl::Now() - started_;
+  const std::optional<v1::ErrorDetail> detail = translate::DetailOf(status);
+  runtime_.metrics.Ended(method_,
+                         status.code(),
+                         duration,
+                         bytes_received_,
+                         bytes_sent_,
+                         Rejection(detail.has_value() ? detail->reason() : ""));
+  LOG(INFO) << LogLine("call")
+                   .Add("method", method_)
+                   .Add("code", absl::StatusCodeToString(status.code()))
+                   .Add("duration_ms", absl::ToInt64Milliseconds(duration))
+                   .Add("bytes_received", bytes_received_.load())
+                   .Add("bytes_sent", bytes_sent_.load())
+                   .Add("principal", call_.principal.empty() ? "-" : call_.principal)
+                   .Add("map", has_map_ ? map_.substr(0, kMaxLoggedName) : "-")
+                   .Add("peer", peer_)
+                   .Add("id", call_.request_id);
   return translate::ToGrpcStatus(status, call_.request_id);
 }
 

@@ -10,12 +10,14 @@
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
-#include <google/protobuf/message_lite.h>
+#include <google/protobuf/message.h>
 #include <grpcpp/support/server_callback.h>
 
 #include "core/api/call.h"
 #include "core/common/status.h"
 #include "proto/translate/status.h"
+#include "server/access/access.h"
+#include "server/rpc/client_limits.h"
 #include "server/rpc/runtime.h"
 
 namespace strata::server {
@@ -24,32 +26,37 @@ namespace strata::server {
 // without spaces; otherwise the server chooses) and in the answer's initial metadata.
 inline constexpr char kRequestIdKey[] = "x-request-id";
 
-// The context of a call (deadline, cancellation, id), its place among the calls under way, and its
-// line in the log. Thread-safe, but for Close(), which is called once and last.
+// The context of a call (deadline, cancellation, id, who calls), its place among the calls under
+// way, and its line in the log. Every message that comes in goes through Receive(), which is where
+// rights are checked. Thread-safe, but for Receive(), called one at a time, and Close(), called
+// once and last.
 class Request {
  public:
-  // `method` as in "Maps.Create"; must outlive the request. `gate`: what it counts among, the calls
-  // or the watches.
+  using Kind = ClientLimits::Kind;
+
+  // `method` as in "Maps.Create"; must outlive the request. `kind`: what it counts among.
   Request(Runtime& runtime,
           grpc::CallbackServerContext& context,
           absl::string_view method,
-          CallGate& gate);
-  Request(Runtime& runtime, grpc::CallbackServerContext& context, absl::string_view method)
-      : Request(runtime, context, method, runtime.calls) {}
+          Kind kind = Kind::kCall);
   ~Request();
   Request(const Request&) = delete;
   Request& operator=(const Request&) = delete;
 
-  // RESOURCE_EXHAUSTED when the server is full, UNAVAILABLE when it shuts down: the call must end
-  // at once.
-  absl::Status admission() const;
+  // UNAUTHENTICATED for a caller nobody knows, RESOURCE_EXHAUSTED when the server is full or the
+  // caller has all it may have, UNAVAILABLE when the server shuts down: the call must end at once.
+  const absl::Status& admission() const { return admission_; }
+  // Counts a message and checks that the caller may do to the map it names what the method does; a
+  // message without a map goes with the one before. UNAUTHENTICATED, PERMISSION_DENIED.
+  absl::Status Receive(const google::protobuf::Message& message);
+  // For a call that goes on and on: that the caller may still do what Receive() checked.
+  absl::Status StillAllowed();
+  // For the one answer that tells of many maps.
+  bool MayRead(absl::string_view map) const { return runtime_.access.MayRead(caller_, map); }
   const api::Call& call() const { return call_; }
   // The caller has gone: long work ends.
   void Cancel() { call_.stop.Request(); }
   // For the log.
-  void CountReceived(const google::protobuf::MessageLite& message) {
-    bytes_received_ += message.ByteSizeLong();
-  }
   void CountSent(const google::protobuf::MessageLite& message) {
     bytes_sent_ += message.ByteSizeLong();
   }
@@ -58,13 +65,24 @@ class Request {
   grpc::Status Close(const absl::Status& status);
 
  private:
+  CallGate& gate() { return kind_ == Kind::kCall ? runtime_.calls : runtime_.watches; }
+  // Finds out who calls, and books the call.
+  absl::Status Admit(const grpc::CallbackServerContext& context);
+  // Of the server and of this client.
+  absl::Status EnterLimits();
+
   Runtime& runtime_;
-  CallGate& gate_;
+  const Kind kind_;
   const absl::string_view method_;
   const std::string peer_;
   const absl::Time started_;
-  const bool admitted_;
+  Caller caller_;
+  std::string map_;  // that the last message with a map named
+  bool has_map_ = false;
+  std::string client_;    // whose limits hold; empty: none were booked
+  bool entered_ = false;  // the server's gate
   api::Call call_;
+  absl::Status admission_;
   std::atomic<std::size_t> bytes_received_ = 0;
   std::atomic<std::size_t> bytes_sent_ = 0;
 };

@@ -3,6 +3,8 @@
 #define STRATA_SERVER_RPC_RUNTIME_H_
 
 #include <atomic>
+#include <memory>
+#include <utility>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/string_view.h"
@@ -10,7 +12,11 @@
 #include "absl/time/time.h"
 
 #include "core/api/database.h"
+#include "server/access/access.h"
+#include "server/metrics/metrics.h"
+#include "server/rpc/client_limits.h"
 #include "server/rpc/executor.h"
+#include "server/rpc/silence.h"
 
 namespace strata::server {
 
@@ -22,6 +28,9 @@ struct RuntimeOptions {
   int max_watches = 4096;   // watches under way, which are no calls; more are told SERVER_BUSY
   // A stream's reader that takes nothing for so long loses the stream.
   absl::Duration slow_reader_timeout = absl::Seconds(30);
+  // And a sender that brings nothing for so long.
+  absl::Duration slow_sender_timeout = absl::Seconds(60);
+  ClientLimitOptions client;
 };
 
 // Counts what is under way, and says whether it is more than there may be. Thread-safe.
@@ -37,6 +46,10 @@ class CallGate {
   }
   int most() const { return most_; }
   absl::string_view what() const { return what_; }
+  int under_way() const {
+    absl::MutexLock lock(&mutex_);
+    return calls_;
+  }
   void Leave() {
     absl::MutexLock lock(&mutex_);
     --calls_;
@@ -51,26 +64,35 @@ class CallGate {
  private:
   const int most_;
   const absl::string_view what_;
-  absl::Mutex mutex_;
+  mutable absl::Mutex mutex_;
   int calls_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
 // Thread-safe.
 struct Runtime {
-  Runtime(api::Database& database, const RuntimeOptions& runtime_options)
+  Runtime(api::Database& database,
+          std::unique_ptr<GrantTable> grants,
+          const RuntimeOptions& runtime_options)
       : db(database),
         options(runtime_options),
+        access(std::move(grants)),
+        clients(runtime_options.client),
         queries(runtime_options.query_threads, "query"),
         streams(runtime_options.stream_threads, "stream"),
         uploads(runtime_options.upload_threads, "upload"),
+        silence(runtime_options.slow_sender_timeout, uploads),
         calls(runtime_options.max_calls, "calls"),
         watches(runtime_options.max_watches, "watches") {}
 
   api::Database& db;
   const RuntimeOptions options;
+  Access access;
+  ClientLimits clients;
+  CallMetrics metrics;
   Executor queries;
   Executor streams;
   Executor uploads;
+  SilenceWatch silence;
   CallGate calls;
   CallGate watches;
   std::atomic<bool> shutting_down = false;  // calls without an end of their own should end

@@ -36,9 +36,8 @@ class StreamReactor final : public grpc::ServerWriteReactor<Out> {
                 const In& in,
                 StreamHandler<In, Out> handler)
       : runtime_(runtime), context_(context), request_(runtime, context, method), in_(in) {
-    request_.CountReceived(in);
-    if (const absl::Status admission = request_.admission(); !admission.ok()) {
-      this->Finish(request_.Close(admission));
+    if (!request_.admission().ok()) {
+      this->Finish(request_.Close(request_.admission()));
       return;
     }
     runtime.streams.Submit([this, handler] { Run(handler); });
@@ -48,6 +47,7 @@ class StreamReactor final : public grpc::ServerWriteReactor<Out> {
   void Run(StreamHandler<In, Out> handler) {
     const absl::Status status = Guarded([&]() -> absl::Status {
       STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+      STRATA_RETURN_IF_ERROR(request_.Receive(in_));
       return handler(
           runtime_.db, request_.call(), in_, [this](const Out& message) { return Send(message); });
     });

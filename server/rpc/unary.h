@@ -2,6 +2,8 @@
 #ifndef STRATA_SERVER_RPC_UNARY_H_
 #define STRATA_SERVER_RPC_UNARY_H_
 
+#include <type_traits>
+
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 #include <grpcpp/support/server_callback.h>
@@ -15,9 +17,12 @@ namespace strata::server {
 
 template <typename In, typename Out>
 using UnaryHandler = absl::Status (*)(api::Database&, const api::Call&, const In&, Out&);
+// Of a call whose answer depends on who asks.
+template <typename In, typename Out>
+using RequestHandler = absl::Status (*)(api::Database&, const Request&, const In&, Out&);
 
 // Lives from the call's arrival to its end; owns itself.
-template <typename In, typename Out>
+template <typename In, typename Out, typename Handler>
 class UnaryReactor final : public grpc::ServerUnaryReactor {
  public:
   UnaryReactor(Runtime& runtime,
@@ -25,21 +30,25 @@ class UnaryReactor final : public grpc::ServerUnaryReactor {
                absl::string_view method,
                const In& in,
                Out& out,
-               UnaryHandler<In, Out> handler)
+               Handler handler)
       : runtime_(runtime), request_(runtime, context, method), in_(in), out_(out) {
-    request_.CountReceived(in);
-    if (const absl::Status admission = request_.admission(); !admission.ok()) {
-      Finish(request_.Close(admission));
+    if (!request_.admission().ok()) {
+      Finish(request_.Close(request_.admission()));
       return;
     }
     runtime.queries.Submit([this, handler] { Run(handler); });
   }
 
  private:
-  void Run(UnaryHandler<In, Out> handler) {
+  void Run(Handler handler) {
     const absl::Status status = Guarded([&]() -> absl::Status {
       STRATA_RETURN_IF_ERROR(request_.call().stop.status());
-      return handler(runtime_.db, request_.call(), in_, out_);
+      STRATA_RETURN_IF_ERROR(request_.Receive(in_));
+      if constexpr (std::is_same_v<Handler, RequestHandler<In, Out>>) {
+        return handler(runtime_.db, request_, in_, out_);
+      } else {
+        return handler(runtime_.db, request_.call(), in_, out_);
+      }
     });
     request_.CountSent(out_);
     Finish(request_.Close(status));
@@ -53,15 +62,16 @@ class UnaryReactor final : public grpc::ServerUnaryReactor {
   Out& out_;
 };
 
-// Answers with what `handler` does on one of the runtime's query threads.
-template <typename In, typename Out>
+// Answers with what `handler`, of one of the two types above, does on one of the runtime's query
+// threads.
+template <typename In, typename Out, typename Handler>
 grpc::ServerUnaryReactor* RunUnary(Runtime& runtime,
                                    grpc::CallbackServerContext* context,
                                    absl::string_view method,
                                    const In* in,
                                    Out* out,
-                                   UnaryHandler<In, Out> handler) {
-  return new UnaryReactor<In, Out>(runtime, *context, method, *in, *out, handler);
+                                   Handler handler) {
+  return new UnaryReactor<In, Out, Handler>(runtime, *context, method, *in, *out, handler);
 }
 
 }  // namespace strata::server

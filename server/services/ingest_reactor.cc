@@ -18,15 +18,23 @@ constexpr std::size_t kMaxUnanswered = 16;
 }  // namespace
 
 IngestReactor::IngestReactor(Runtime& runtime, grpc::CallbackServerContext& context)
-    : runtime_(runtime), request_(runtime, context, "Scans.Ingest") {
-  if (const absl::Status admission = request_.admission(); !admission.ok()) {
-    Finish(request_.Close(admission));
+    : runtime_(runtime),
+      request_(runtime, context, "Scans.Ingest"),
+      expected_(runtime.silence, [this](const absl::Status& status) { EndReading(status); }) {
+  if (!request_.admission().ok()) {
+    Finish(request_.Close(request_.admission()));
     return;
   }
+  Read();
+}
+
+void IngestReactor::Read() {
+  expected_.Expect();
   StartRead(&message_);
 }
 
 void IngestReactor::OnReadDone(bool ok) {
+  if (!expected_.Arrived()) return;
   if (ok) {
     runtime_.uploads.Submit([this] { Take(); });
   } else {
@@ -38,7 +46,6 @@ void IngestReactor::OnReadDone(bool ok) {
 }
 
 void IngestReactor::Take() {
-  request_.CountReceived(message_);
   const absl::Status status = Guarded([this] { return TakeMessage(); });
   if (!status.ok()) {
     EndReading(status);
@@ -51,19 +58,24 @@ void IngestReactor::Take() {
 
 absl::Status IngestReactor::TakeMessage() {
   STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+  const absl::Status allowed = request_.Receive(message_);
+  if (absl::IsUnauthenticated(allowed)) return allowed;
+  // Another scan's map may be his to write to.
   if (message_.has_start()) {
     AbandonIncomplete();
-    Begin(message_.start());
+    Begin(message_.start(), allowed);
     return absl::OkStatus();
   }
+  STRATA_RETURN_IF_ERROR(allowed);
   if (message_.has_chunk()) return Add(message_.chunk());
   return AtTheDoor(
       absl::InvalidArgumentError("ingest: a message is the start of a scan or a chunk"));
 }
 
-void IngestReactor::Begin(const v1::ScanStart& start) {
+void IngestReactor::Begin(const v1::ScanStart& start, const absl::Status& allowed) {
   current_id_ = start.header().id();
-  absl::StatusOr<ScanReceiver> begun = ScanReceiver::Begin(runtime_.db, request_.call(), start);
+  absl::StatusOr<ScanReceiver> begun =
+      allowed.ok() ? ScanReceiver::Begin(runtime_.db, request_.call(), start) : allowed;
   passing_over_ = !begun.ok();
   if (!begun.ok()) {
     EndScan(begun.status());
@@ -176,7 +188,7 @@ void IngestReactor::StartWriteIfIdle() {
 void IngestReactor::StartReadIfRoom() {
   if (reading_ || reading_ended_ || ended_.size() + answers_.size() >= kMaxUnanswered) return;
   reading_ = true;
-  StartRead(&message_);
+  Read();
 }
 
 bool IngestReactor::Done() const {

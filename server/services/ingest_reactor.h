@@ -34,6 +34,7 @@ class IngestReactor final
     absl::Status error;
   };
 
+  void Read();
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
   void OnCancel() override { request_.Cancel(); }
@@ -42,7 +43,8 @@ class IngestReactor final
   // Reading, on an upload thread. An error ends the stream.
   void Take();
   absl::Status TakeMessage();
-  void Begin(const v1::ScanStart& start);
+  // `allowed`: whether the caller may write to the scan's map; if not, the scan is answered so.
+  void Begin(const v1::ScanStart& start, const absl::Status& allowed);
   absl::Status Add(const v1::PointChunk& chunk);
   // The scan under way will not be completed.
   void AbandonIncomplete();
@@ -69,6 +71,7 @@ class IngestReactor final
   v1::ScanId current_id_;
   std::optional<ScanReceiver> current_;
   bool passing_over_ = false;  // the rest of a refused scan
+  ExpectedMessage expected_;
 
   absl::Mutex mutex_;
   bool reading_ ABSL_GUARDED_BY(mutex_) = true;

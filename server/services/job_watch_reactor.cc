@@ -13,9 +13,7 @@ namespace strata::server {
 JobWatchReactor::JobWatchReactor(Runtime& runtime,
                                  grpc::CallbackServerContext& context,
                                  const v1::WatchJobRequest& in)
-    : PollReactor(runtime, context, "Jobs.Watch"), in_(in) {
-  request().CountReceived(in);
-}
+    : PollReactor(runtime, context, "Jobs.Watch", in), in_(in) {}
 
 absl::StatusOr<JobWatchReactor::News> JobWatchReactor::Look(v1::WatchJobResponse& out) {
   STRATA_ASSIGN_OR_RETURN(const JobInfo info,

@@ -22,15 +22,25 @@ absl::Status OutOfOrder(absl::string_view rule) {
 LocalizeReactor::LocalizeReactor(Runtime& runtime,
                                  grpc::CallbackServerContext& context,
                                  v1::LocalizeResponse& out)
-    : runtime_(runtime), request_(runtime, context, "PoseGraph.Localize"), out_(out) {
-  if (const absl::Status admission = request_.admission(); !admission.ok()) {
-    Finish(request_.Close(admission));
+    : runtime_(runtime),
+      request_(runtime, context, "PoseGraph.Localize"),
+      out_(out),
+      expected_(runtime.silence,
+                [this](const absl::Status& status) { Finish(request_.Close(status)); }) {
+  if (!request_.admission().ok()) {
+    Finish(request_.Close(request_.admission()));
     return;
   }
+  Read();
+}
+
+void LocalizeReactor::Read() {
+  expected_.Expect();
   StartRead(&message_);
 }
 
 void LocalizeReactor::OnReadDone(bool ok) {
+  if (!expected_.Arrived()) return;
   if (ok) {
     runtime_.uploads.Submit([this] { Take(); });
   } else {
@@ -39,10 +49,9 @@ void LocalizeReactor::OnReadDone(bool ok) {
 }
 
 void LocalizeReactor::Take() {
-  request_.CountReceived(message_);
   const absl::Status status = Guarded([this] { return TakeMessage(); });
   if (status.ok()) {
-    StartRead(&message_);
+    Read();
   } else {
     Finish(request_.Close(status));
   }
@@ -50,6 +59,7 @@ void LocalizeReactor::Take() {
 
 absl::Status LocalizeReactor::TakeMessage() {
   STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+  STRATA_RETURN_IF_ERROR(request_.Receive(message_));
   if (message_.has_start() && !begun_) return AtTheDoor(Begin(message_.start()));
   if (message_.has_chunk() && begun_) return AtTheDoor(Add(message_.chunk()));
   return AtTheDoor(OutOfOrder(begun_ ? "every message after the first is a chunk"

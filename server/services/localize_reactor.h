@@ -23,6 +23,7 @@ class LocalizeReactor final : public grpc::ServerReadReactor<v1::LocalizeRequest
                   v1::LocalizeResponse& out);
 
  private:
+  void Read();
   void OnReadDone(bool ok) override;
   void OnCancel() override { request_.Cancel(); }
   void OnDone() override { delete this; }
@@ -44,6 +45,7 @@ class LocalizeReactor final : public grpc::ServerReadReactor<v1::LocalizeRequest
   std::string map_;
   ScanHeader shape_;  // grid and number of the points to come
   LocalizeQuery query_;
+  ExpectedMessage expected_;
 };
 
 }  // namespace strata::server

@@ -15,9 +15,7 @@ constexpr std::size_t kMaxPerMessage = 1024;
 MapWatchReactor::MapWatchReactor(Runtime& runtime,
                                  grpc::CallbackServerContext& context,
                                  const v1::WatchMapRequest& in)
-    : PollReactor(runtime, context, "Maps.Watch"), in_(in), resume_from_(in.since()) {
-  request().CountReceived(in);
-}
+    : PollReactor(runtime, context, "Maps.Watch", in), in_(in), resume_from_(in.since()) {}
 
 absl::StatusOr<MapWatchReactor::News> MapWatchReactor::Look(v1::WatchMapResponse& out) {
   if (updates_.empty()) STRATA_RETURN_IF_ERROR(LookAtMap());

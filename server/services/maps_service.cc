@@ -37,11 +37,13 @@ absl::Status Get(api::Database& db,
 }
 
 absl::Status List(api::Database& db,
-                  const api::Call& call,
+                  const Request& request,
                   const v1::ListMapsRequest&,
                   v1::ListMapsResponse& out) {
-  STRATA_ASSIGN_OR_RETURN(const std::vector<MapInfo> maps, db.maps().List(call));
-  for (const MapInfo& map : maps) *out.add_maps() = ToProto(map);
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MapInfo> maps, db.maps().List(request.call()));
+  for (const MapInfo& map : maps) {
+    if (request.MayRead(map.name)) *out.add_maps() = ToProto(map);
+  }
   return absl::OkStatus();
 }
 

@@ -10,15 +10,25 @@ namespace strata::server {
 UploadReactor::UploadReactor(Runtime& runtime,
                              grpc::CallbackServerContext& context,
                              v1::UploadScanResponse& out)
-    : runtime_(runtime), context_(context), request_(runtime, context, "Scans.Upload"), out_(out) {
-  if (const absl::Status admission = request_.admission(); !admission.ok()) {
-    Finish(request_.Close(admission));
+    : runtime_(runtime),
+      context_(context),
+      request_(runtime, context, "Scans.Upload"),
+      out_(out),
+      expected_(runtime.silence, [this](const absl::Status& status) { End(status); }) {
+  if (!request_.admission().ok()) {
+    Finish(request_.Close(request_.admission()));
     return;
   }
+  Read();
+}
+
+void UploadReactor::Read() {
+  expected_.Expect();
   StartRead(&message_);
 }
 
 void UploadReactor::OnReadDone(bool ok) {
+  if (!expected_.Arrived()) return;
   if (ok) {
     runtime_.uploads.Submit([this] { Take(); });
   } else {
@@ -27,18 +37,22 @@ void UploadReactor::OnReadDone(bool ok) {
 }
 
 void UploadReactor::Take() {
-  request_.CountReceived(message_);
   const absl::Status status = Guarded([this] { return TakeMessage(); });
   if (status.ok()) {
-    StartRead(&message_);
-    return;
+    Read();
+  } else {
+    End(status);
   }
+}
+
+void UploadReactor::End(const absl::Status& error) {
   scan_.reset();
-  Finish(request_.Close(status));
+  Finish(request_.Close(error));
 }
 
 absl::Status UploadReactor::TakeMessage() {
   STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+  STRATA_RETURN_IF_ERROR(request_.Receive(message_));
   if (message_.has_start() && !scan_.has_value()) return Begin(message_.start());
   if (message_.has_chunk() && scan_.has_value()) return scan_->Add(message_.chunk());
   return AtTheDoor(absl::InvalidArgumentError(

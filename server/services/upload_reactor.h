@@ -22,11 +22,13 @@ class UploadReactor final : public grpc::ServerReadReactor<v1::UploadScanRequest
                 v1::UploadScanResponse& out);
 
  private:
+  void Read();
   void OnReadDone(bool ok) override;
   void OnCancel() override { request_.Cancel(); }
   void OnDone() override { delete this; }
 
   // These run on an upload thread, one at a time.
+  void End(const absl::Status& error);
   void Take();
   absl::Status TakeMessage();
   absl::Status Begin(const v1::ScanStart& start);
@@ -38,6 +40,7 @@ class UploadReactor final : public grpc::ServerReadReactor<v1::UploadScanRequest
   v1::UploadScanResponse& out_;
   v1::UploadScanRequest message_;
   std::optional<ScanReceiver> scan_;
+  ExpectedMessage expected_;
 };
 
 }  // namespace strata::server

@@ -14,7 +14,7 @@
 #include "client/formats/pose_reader.h"
 #include "core/classification/reduction.h"
 #include "core/world/scan.h"
-#include "server/listen_address.h"
+#include "core/common/host_port.h"
 #include "tests/fuzz/input_file.h"
 #include "tests/fuzz/require.h"
 

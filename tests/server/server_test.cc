@@ -10,14 +10,13 @@
 #include "absl/synchronization/notification.h"
 #include "absl/time/clock.h"
 #include <gmock/gmock.h>
-#include <grpcpp/completion_queue.h>
-#include <grpcpp/generic/generic_stub.h>
 #include <gtest/gtest.h>
 
 #include "strata/v1/maps.grpc.pb.h"
 #include "strata/v1/planning.grpc.pb.h"
 #include "strata/v1/posegraph.grpc.pb.h"
 #include "strata/v1/tiles.grpc.pb.h"
+#include "tests/server/raw_call.h"
 #include "tests/server/served_mock.h"
 
 namespace strata::server {
@@ -57,37 +56,13 @@ class ServerTest : public ServedMock {
   absl::Status stopped_by_;
 };
 
-// The answer's bytes of a service without generated code here.
+// The answer's bytes, or why there are none.
 std::string RawCall(const std::shared_ptr<grpc::Channel>& channel,
                     const char* method,
                     const std::string& request) {
-  grpc::GenericStub stub(channel);
-  grpc::ClientContext context;
-  grpc::CompletionQueue queue;
-  const auto call = stub.PrepareCall(&context, method, &queue);
-  const auto next = [&queue] {
-    void* tag = nullptr;
-    bool ok = false;
-    return queue.Next(&tag, &ok) && ok;
-  };
-  call->StartCall(nullptr);
-  if (!next()) return "not started";
-  const grpc::Slice slice(request);
-  call->WriteLast(grpc::ByteBuffer(&slice, 1), grpc::WriteOptions(), nullptr);
-  if (!next()) return "not written";
-  grpc::ByteBuffer answer;
-  call->Read(&answer, nullptr);
-  next();
-  grpc::Status status;
-  call->Finish(&status, nullptr);
-  next();
-  std::vector<grpc::Slice> slices;
-  if (!status.ok() || !answer.Dump(&slices).ok()) return status.error_message();
-  std::string bytes;
-  for (const grpc::Slice& part : slices) {
-    bytes.append(reinterpret_cast<const char*>(part.begin()), part.size());
-  }
-  return bytes;
+  const RawAnswer answer = CallRaw(channel, method, request);
+  if (!answer.status.ok()) return answer.status.error_message();
+  return answer.messages.empty() ? "no message" : answer.messages.front();
 }
 
 TEST_F(ServerTest, HealthIsKnownByServerAndByService) {
@@ -119,7 +94,7 @@ TEST_F(ServerTest, ListensBeyondLoopbackOnlyWhenTold) {
   ServerOptions options;
   options.listen = "0.0.0.0:0";
   EXPECT_THAT(Server::Start(db_, options),
-              StatusIs(Code::kFailedPrecondition, HasSubstr("TLS and tokens")));
+              StatusIs(Code::kFailedPrecondition, HasSubstr("--tls-cert")));
   options.insecure = true;
   EXPECT_THAT(Server::Start(db_, options), IsOk());
 }

@@ -1,15 +1,15 @@
-// Where the server listens.
-#ifndef STRATA_SERVER_LISTEN_ADDRESS_H_
-#define STRATA_SERVER_LISTEN_ADDRESS_H_
+// Where a server listens.
+#ifndef STRATA_CORE_COMMON_HOST_PORT_H_
+#define STRATA_CORE_COMMON_HOST_PORT_H_
 
 #include <string>
 
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
-namespace strata::server {
+namespace strata {
 
-struct ListenAddress {
+struct HostPort {
   std::string host;  // without the brackets of IPv6
   int port = 0;      // 0 to 65535; 0: any free one
 
@@ -20,8 +20,8 @@ struct ListenAddress {
 };
 
 // INVALID_ARGUMENT unless `text` is HOST:PORT or [IPV6]:PORT.
-absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text);
+absl::StatusOr<HostPort> ParseHostPort(absl::string_view text);
 
-}  // namespace strata::server
+}  // namespace strata
 
-#endif  // STRATA_SERVER_LISTEN_ADDRESS_H_
+#endif  // STRATA_CORE_COMMON_HOST_PORT_H_

@@ -1,4 +1,4 @@
-#include "server/listen_address.h"
+#include "core/common/host_port.h"
 
 #include <cstdint>
 
@@ -8,9 +8,9 @@
 #include "absl/strings/strip.h"
 #include <arpa/inet.h>
 
-namespace strata::server {
+namespace strata {
 
-bool ListenAddress::loopback() const {
+bool HostPort::loopback() const {
   if (host == "localhost") return true;
   in_addr v4{};
   if (inet_pton(AF_INET, host.c_str(), &v4) == 1) return (ntohl(v4.s_addr) >> 24U) == 127;
@@ -18,14 +18,14 @@ bool ListenAddress::loopback() const {
   return inet_pton(AF_INET6, host.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
 }
 
-std::string ListenAddress::ToString() const {
+std::string HostPort::ToString() const {
   const bool v6 = host.find(':') != std::string::npos;
   return v6 ? absl::StrCat("[", host, "]:", port) : absl::StrCat(host, ":", port);
 }
 
-absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text) {
+absl::StatusOr<HostPort> ParseHostPort(absl::string_view text) {
   const std::size_t colon = text.rfind(':');
-  ListenAddress address;
+  HostPort address;
   if (colon != absl::string_view::npos && absl::SimpleAtoi(text.substr(colon + 1), &address.port) &&
       address.port >= 0 && address.port <= 65535) {
     absl::string_view host = text.substr(0, colon);
@@ -36,8 +36,8 @@ absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text) {
       return address;
     }
   }
-  return absl::InvalidArgumentError(absl::StrCat(
-      "listen address '", text, "': write HOST:PORT, as in 127.0.0.1:50051 or [::1]:0"));
+  return absl::InvalidArgumentError(
+      absl::StrCat("address '", text, "': write HOST:PORT, as in 127.0.0.1:50051 or [::1]:0"));
 }
 
-}  // namespace strata::server
+}  // namespace strata

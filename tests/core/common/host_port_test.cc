@@ -1,25 +1,25 @@
-#include "server/listen_address.h"
+#include "core/common/host_port.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/support/status_matchers.h"
 
-namespace strata::server {
+namespace strata {
 namespace {
 
 using ::strata::testing::StatusIs;
 using ::testing::HasSubstr;
 
-TEST(ListenAddressTest, WritesWhatItReads) {
+TEST(HostPortTest, WritesWhatItReads) {
   for (const char* text : {"127.0.0.1:50051", "[::1]:0", "localhost:1", "robot.example:65535"}) {
-    STRATA_ASSERT_OK_AND_ASSIGN(const ListenAddress address, ParseListenAddress(text));
+    STRATA_ASSERT_OK_AND_ASSIGN(const HostPort address, ParseHostPort(text));
     EXPECT_EQ(address.ToString(), text);
   }
 }
 
-TEST(ListenAddressTest, KnowsLoopback) {
-  const auto loopback = [](const char* text) { return ParseListenAddress(text)->loopback(); };
+TEST(HostPortTest, KnowsLoopback) {
+  const auto loopback = [](const char* text) { return ParseHostPort(text)->loopback(); };
   EXPECT_TRUE(loopback("127.0.0.1:1"));
   EXPECT_TRUE(loopback("127.9.9.9:1"));
   EXPECT_TRUE(loopback("[::1]:1"));
@@ -30,7 +30,7 @@ TEST(ListenAddressTest, KnowsLoopback) {
   EXPECT_FALSE(loopback("localhost.example:1"));
 }
 
-TEST(ListenAddressTest, RefusesWhatIsNoAddress) {
+TEST(HostPortTest, RefusesWhatIsNoAddress) {
   for (const char* text : {"",
                            "127.0.0.1",
                            ":1",
@@ -41,11 +41,11 @@ TEST(ListenAddressTest, RefusesWhatIsNoAddress) {
                            "::1:5",
                            "[::1:5",
                            "a b:1"}) {
-    EXPECT_THAT(ParseListenAddress(text),
+    EXPECT_THAT(ParseHostPort(text),
                 StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("write HOST:PORT")))
         << text;
   }
 }
 
 }  // namespace
-}  // namespace strata::server
+}  // namespace strata

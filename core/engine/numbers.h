@@ -1,0 +1,49 @@
+// What an engine counts, for whoever watches over it.
+#ifndef STRATA_CORE_ENGINE_NUMBERS_H_
+#define STRATA_CORE_ENGINE_NUMBERS_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/api/database.h"
+#include "core/world/job.h"
+
+namespace strata {
+
+// Of one map that is open. Counts of what happened begin with the engine.
+struct MapNumbers {
+  std::string map;
+  std::uint64_t file_bytes = 0;  // with its journal
+  std::uint64_t scans = 0;
+  std::uint64_t scans_pending = 0;  // acknowledged, not joined yet
+  std::uint64_t scans_failed = 0;
+  std::uint64_t tiles = 0;                                         // level of detail 0
+  std::map<std::pair<std::string, JobState>, std::uint64_t> jobs;  // by kind and state
+};
+
+struct EngineNumbers {
+  std::vector<MapNumbers> maps;       // by name
+  std::uint64_t maps_not_opened = 0;  // files that are damaged or of another version
+};
+
+// What a database is that has numbers.
+class NumbersSource {
+ public:
+  virtual ~NumbersSource() = default;
+  virtual EngineNumbers Numbers() = 0;
+};
+
+// `engine`: what OpenEngine returned; of another database there are none. Reads a little of every
+// map: for once in some seconds. Thread-safe.
+inline EngineNumbers NumbersOf(api::Database& engine) {
+  auto* const source = dynamic_cast<NumbersSource*>(&engine);
+  return source == nullptr ? EngineNumbers() : source->Numbers();
+}
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_NUMBERS_H_

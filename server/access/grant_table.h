@@ -1,0 +1,63 @@
+// The grants that hold now.
+#ifndef STRATA_SERVER_ACCESS_GRANT_TABLE_H_
+#define STRATA_SERVER_ACCESS_GRANT_TABLE_H_
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+
+#include "server/access/right.h"
+
+namespace strata::server {
+
+// Grants of one reading of the token file.
+struct Grants {
+  std::map<std::string, Grant, std::less<>> by_id;
+  std::map<std::string, std::string, std::less<>> ids_by_certificate;  // common name → id
+};
+
+// Follows a token file: looks at most once in `interval` whether it is another one, so that adding
+// and revoking need no restart. A file that cannot be read is logged, and what held goes on
+// holding. Thread-safe.
+class GrantTable {
+ public:
+  // What ReadTokenFile answers.
+  static absl::StatusOr<std::unique_ptr<GrantTable>> Open(
+      const std::filesystem::path& path, absl::Duration interval = absl::Seconds(1));
+
+  // Never null.
+  std::shared_ptr<const Grants> Current();
+
+ private:
+  // What tells one content from another without reading it.
+  struct Mark {
+    std::uint64_t inode = 0;
+    std::int64_t modified_ns = 0;
+    std::int64_t size = 0;
+    friend bool operator==(const Mark&, const Mark&) = default;
+  };
+
+  GrantTable(std::filesystem::path path, absl::Duration interval)
+      : path_(std::move(path)), interval_(interval) {}
+  static Mark MarkOf(const std::filesystem::path& path);
+  absl::Status Load() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  const std::filesystem::path path_;
+  const absl::Duration interval_;
+  absl::Mutex mutex_;
+  absl::Time looked_ ABSL_GUARDED_BY(mutex_) = absl::InfinitePast();
+  Mark mark_ ABSL_GUARDED_BY(mutex_);
+  std::shared_ptr<const Grants> grants_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace strata::server
+
+#endif  // STRATA_SERVER_ACCESS_GRANT_TABLE_H_

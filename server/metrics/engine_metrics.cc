@@ -1,0 +1,67 @@
+#include "server/metrics/engine_metrics.h"
+
+#include <string>
+
+namespace strata::server {
+namespace {
+
+using prometheus::MetricType;
+
+std::string NameOf(JobState state) {
+  switch (state) {
+    case JobState::kQueued:
+      return "queued";
+    case JobState::kRunning:
+      return "running";
+    case JobState::kSucceeded:
+      return "succeeded";
+    case JobState::kFailed:
+      return "failed";
+    case JobState::kCancelled:
+      return "cancelled";
+    case JobState::kProposed:
+      return "proposed";
+  }
+  return "unknown";
+}
+
+void AddJobs(MetricFamilies& families, const EngineNumbers& numbers) {
+  std::vector<MetricRow> rows;
+  for (const MapNumbers& map : numbers.maps) {
+    for (const auto& [job, count] : map.jobs) {
+      rows.push_back({{{"map", map.map}, {"kind", job.first}, {"state", NameOf(job.second)}},
+                      static_cast<double>(count)});
+    }
+  }
+  AddFamily(families, MetricType::Gauge, "strata_jobs", "Jobs by map, kind and state", rows);
+}
+
+}  // namespace
+
+void AddEngine(MetricFamilies& families, const EngineNumbers& numbers) {
+  const auto add = [&](const char* name, const char* help, auto value) {
+    std::vector<MetricRow> rows;
+    for (const MapNumbers& map : numbers.maps) {
+      rows.push_back({{{"map", map.map}}, static_cast<double>(value(map))});
+    }
+    AddFamily(families, MetricType::Gauge, name, help, rows);
+  };
+  using Map = const MapNumbers&;
+  AddFamily(families,
+            MetricType::Gauge,
+            "strata_maps_not_opened",
+            "Map files that could not be opened",
+            {{{}, static_cast<double>(numbers.maps_not_opened)}});
+  add("strata_map_file_bytes", "Map file with its journal", [](Map m) { return m.file_bytes; });
+  add("strata_map_scans", "Acknowledged scans", [](Map m) { return m.scans; });
+  add("strata_map_scans_pending", "Scans acknowledged, not joined yet", [](Map m) {
+    return m.scans_pending;
+  });
+  add("strata_map_scans_failed", "Scans that could not be joined", [](Map m) {
+    return m.scans_failed;
+  });
+  add("strata_map_tiles", "Tiles of level of detail 0", [](Map m) { return m.tiles; });
+  AddJobs(families, numbers);
+}
+
+}  // namespace strata::server

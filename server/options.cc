@@ -1,0 +1,244 @@
+#include "server/options.h"
+
+#include <memory>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+
+namespace strata::server {
+namespace {
+
+constexpr std::uint64_t kMebi = std::uint64_t{1} << 20;
+
+// As they are written; in the units of their texts.
+struct Written {
+  std::string data;
+  double optimize_every_s = 60.0;
+  double drain_s = 5.0;
+  double upload_idle_s = 60.0;
+  double slow_reader_s = 30.0;
+  double max_message_mib = 4.0;
+  std::uint64_t queue_mib = 64;
+  std::uint64_t cache_mib = 256;
+  std::uint64_t planner_cache_mib = 512;
+  std::uint64_t max_map_mib = 0;
+  EngineOptions engine;
+  ServerOptions server;
+};
+
+// Closed; CLI::Range takes any text for 0.
+CLI::Validator Between(double low, double high, const std::string& unit) {
+  const std::string range = absl::StrCat(low, " to ", high, unit.empty() ? "" : " ", unit);
+  return CLI::Validator(
+      [=](const std::string& text) {
+        double value = 0.0;
+        const bool good = absl::SimpleAtod(text, &value) && value >= low && value <= high;
+        return good ? std::string() : absl::StrCat("expected ", range, ", got ", text);
+      },
+      "");
+}
+
+template <typename T>
+void Add(CLI::App& app,
+         const char* group,
+         const char* name,
+         T& value,
+         const char* text,
+         const CLI::Validator& validator) {
+  app.add_option(name, value, text)->check(validator)->capture_default_str()->group(group);
+}
+
+void AddPlaces(CLI::App& app, Written& o) {
+  app.add_option("--data", o.data, "Directory that holds the maps; made if absent")
+      ->type_name("DIR");
+  app.add_option("--listen", o.server.listen, "Address to listen on; port 0 takes a free one")
+      ->type_name("HOST:PORT")
+      ->capture_default_str();
+  app.add_option("--metrics",
+                 o.server.metrics_listen,
+                 "Address that answers Prometheus at /metrics, in plain text and to anybody; none: "
+                 "no metrics")
+      ->type_name("HOST:PORT");
+}
+
+void AddDoors(CLI::App& app, Written& o) {
+  constexpr char kGroup[] = "Doors";
+  const auto file = [&](const char* name, std::filesystem::path& path, const char* text) {
+    app.add_option_function<std::string>(
+           name, [&path](const std::string& value) { path = value; }, text)
+        ->type_name("FILE")
+        ->group(kGroup);
+  };
+  file("--tls-cert", o.server.tls.certificate, "Certificate of the server (PEM), then its chain");
+  file("--tls-key", o.server.tls.key, "Key of the certificate (PEM, no passphrase)");
+  file(
+      "--tls-client-ca",
+      o.server.tls.client_ca,
+      "Authorities (PEM): every client must show a certificate of theirs; with --tokens its common "
+      "name is that of a grant (stratad token add --certificate), unless a token is shown");
+  file("--tokens", o.server.token_file, "Who may do what; see stratad token add. Absent: anybody");
+  app.add_flag("--insecure",
+               o.server.insecure,
+               "Listen beyond loopback without TLS, or without tokens and client certificates")
+      ->group(kGroup);
+}
+
+void AddClientLimits(CLI::App& app, Written& o) {
+  constexpr char kGroup[] = "Limits of one client (a name of --tokens, or an address)";
+  ClientLimitOptions& client = o.server.client;
+  const CLI::Validator count = Between(1, 1e6, "");
+  Add(app, kGroup, "--client-calls", client.max_calls, "Calls under way", count);
+  Add(app, kGroup, "--client-watches", client.max_watches, "Watches under way", count);
+  Add(app,
+      kGroup,
+      "--client-rate",
+      client.calls_per_second,
+      "Calls begun a second [1/s], in the long run; 0: any number",
+      Between(0, 1e6, "calls/s"));
+  Add(app,
+      kGroup,
+      "--client-burst",
+      client.burst,
+      "Calls begun at once after a pause, with --client-rate",
+      Between(1, 1e6, "calls"));
+  Add(app,
+      kGroup,
+      "--max-message",
+      o.max_message_mib,
+      "Size of one request [MiB]; chunks of points of the SDK take below 1",
+      Between(0.0625, 64, "MiB"));
+  Add(app,
+      kGroup,
+      "--max-scan-points",
+      o.engine.max_points_per_scan,
+      "Points of one scan",
+      Between(1, 1e10, "points"));
+  Add(app,
+      kGroup,
+      "--upload-idle",
+      o.upload_idle_s,
+      "How long a stream of requests may bring nothing [s]",
+      Between(0.1, 86400, "s"));
+  Add(app,
+      kGroup,
+      "--slow-reader",
+      o.slow_reader_s,
+      "How long the reader of a stream may take nothing [s]",
+      Between(0.1, 86400, "s"));
+}
+
+void AddServerLimits(CLI::App& app, Written& o) {
+  constexpr char kGroup[] = "Limits of the server";
+  const CLI::Validator threads = Between(1, 1000, "threads");
+  const CLI::Validator count = Between(1, 1e6, "");
+  Add(app,
+      kGroup,
+      "--max-calls",
+      o.server.max_calls,
+      "Calls under way before clients are sent away",
+      count);
+  Add(app,
+      kGroup,
+      "--max-watches",
+      o.server.max_watches,
+      "Watches of maps and jobs under way before more are sent away; they are no calls",
+      count);
+  Add(app, kGroup, "--query-threads", o.server.query_threads, "Calls answered at a time", threads);
+  Add(app,
+      kGroup,
+      "--stream-threads",
+      o.server.stream_threads,
+      "Downloads served at a time",
+      threads);
+  Add(app,
+      kGroup,
+      "--upload-threads",
+      o.server.upload_threads,
+      "Scans taken in at a time",
+      threads);
+  Add(app,
+      kGroup,
+      "--drain",
+      o.drain_s,
+      "How long calls may take to end at shutdown [s]",
+      Between(0, 3600, "s"));
+}
+
+void AddMapLimits(CLI::App& app, Written& o) {
+  constexpr char kGroup[] = "Maps";
+  const CLI::Validator mebi = Between(1, 1 << 20, "MiB");
+  Add(app, kGroup, "--max-maps", o.engine.max_maps, "Maps there may be", Between(1, 1e6, "maps"));
+  Add(app,
+      kGroup,
+      "--max-map-size",
+      o.max_map_mib,
+      "Size of a map's file [MiB]; 0: what the disk holds",
+      Between(0, 1 << 30, "MiB"));
+  Add(app,
+      kGroup,
+      "--max-pending-scans",
+      o.engine.max_pending_scans,
+      "Acknowledged scans of a map that may wait to be joined into it before more are sent away",
+      Between(1, 1e9, "scans"));
+  Add(app,
+      kGroup,
+      "--queue",
+      o.queue_mib,
+      "Points of a map that may wait for the disk [MiB]",
+      mebi);
+  Add(app,
+      kGroup,
+      "--cache",
+      o.cache_mib,
+      "Tiles, and features, kept in memory, each, a map [MiB]",
+      mebi);
+  Add(app,
+      kGroup,
+      "--planner-cache",
+      o.planner_cache_mib,
+      "What the planner keeps of a map between queries [MiB]",
+      mebi);
+  Add(app,
+      kGroup,
+      "--optimize-every",
+      o.optimize_every_s,
+      "After a loop was closed, and at most so often [s], optimize a map's poses without being "
+      "asked; 0: never",
+      Between(0, 86400, "s"));
+}
+
+absl::StatusOr<ProgramOptions> Read(const Written& o) {
+  if (o.data.empty()) {
+    return absl::InvalidArgumentError("--data is missing: the directory that holds the maps");
+  }
+  ProgramOptions options{o.engine, o.server};
+  options.engine.directory = o.data;
+  options.engine.queue_bytes = o.queue_mib * kMebi;
+  options.engine.cache_bytes = o.cache_mib * kMebi;
+  options.engine.planner_cache_bytes = o.planner_cache_mib * kMebi;
+  options.engine.max_map_bytes = o.max_map_mib * kMebi;
+  options.engine.optimize_interval = absl::Seconds(o.optimize_every_s);
+  options.server.drain_timeout = absl::Seconds(o.drain_s);
+  options.server.slow_sender_timeout = absl::Seconds(o.upload_idle_s);
+  options.server.slow_reader_timeout = absl::Seconds(o.slow_reader_s);
+  options.server.max_message_bytes =
+      static_cast<int>(o.max_message_mib * static_cast<double>(kMebi));
+  return options;
+}
+
+}  // namespace
+
+std::function<absl::StatusOr<ProgramOptions>()> AddServeOptions(CLI::App& app) {
+  const auto written = std::make_shared<Written>();
+  app.set_config("--config", "", "Options in a file, one a line: listen = 127.0.0.1:50051")
+      ->type_name("FILE");
+  app.allow_config_extras(CLI::config_extras_mode::error);
+  AddPlaces(app, *written);
+  AddDoors(app, *written);
+  AddClientLimits(app, *written);
+  AddServerLimits(app, *written);
+  AddMapLimits(app, *written);
+  return [written] { return Read(*written); };
+}
+
+}  // namespace strata::server

@@ -1,0 +1,72 @@
+#include "server/access/grant_table.h"
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/access/token.h"
+#include "server/access/token_file.h"
+#include "tests/support/status_matchers.h"
+#include "tests/support/temp_dir.h"
+
+namespace strata::server {
+namespace {
+
+using ::strata::testing::StatusIs;
+using ::testing::_;
+
+class GrantTableTest : public ::testing::Test {
+ protected:
+  static Grant GrantNamed(const std::string& name, const std::string& id) {
+    Grant grant;
+    grant.id = id;
+    grant.name = name;
+    grant.secret_sha256 = SecretHash(name);
+    grant.maps = {{"*", Right::kRead}};
+    return grant;
+  }
+
+  testing::TempDir dir_;
+  const std::filesystem::path path_ = dir_.path() / "tokens.json";
+  const Grant robot7_ = GrantNamed("robot7", "000000000007");
+  const Grant robot8_ = GrantNamed("robot8", "000000000008");
+};
+
+TEST_F(GrantTableTest, WithoutAFileThereIsNoTable) {
+  EXPECT_THAT(GrantTable::Open(path_), StatusIs(absl::StatusCode::kNotFound, _));
+}
+
+TEST_F(GrantTableTest, FollowsItsFile) {
+  STRATA_ASSERT_OK(WriteTokenFile(path_, {robot7_}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto table, GrantTable::Open(path_, absl::ZeroDuration()));
+  EXPECT_TRUE(table->Current()->by_id.contains("000000000007"));
+  STRATA_ASSERT_OK(WriteTokenFile(path_, {robot7_, robot8_}));
+  EXPECT_TRUE(table->Current()->by_id.contains("000000000008"));
+  STRATA_ASSERT_OK(WriteTokenFile(path_, {robot8_}));
+  EXPECT_FALSE(table->Current()->by_id.contains("000000000007"));
+}
+
+TEST_F(GrantTableTest, ABrokenOrAbsentFileLeavesWhatHeld) {
+  STRATA_ASSERT_OK(WriteTokenFile(path_, {robot7_}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto table, GrantTable::Open(path_, absl::ZeroDuration()));
+  std::ofstream(path_) << "{\"version\": 1, \"gra";
+  EXPECT_TRUE(table->Current()->by_id.contains("000000000007"));
+  std::filesystem::remove(path_);
+  EXPECT_TRUE(table->Current()->by_id.contains("000000000007"));
+  STRATA_ASSERT_OK(WriteTokenFile(path_, {}));
+  EXPECT_TRUE(table->Current()->by_id.empty());
+}
+
+TEST_F(GrantTableTest, LooksAtMostOnceInAnInterval) {
+  STRATA_ASSERT_OK(WriteTokenFile(path_, {robot7_}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto table, GrantTable::Open(path_, absl::Hours(1)));
+  const auto before = table->Current();
+  STRATA_ASSERT_OK(WriteTokenFile(path_, {}));
+  EXPECT_EQ(table->Current(), before);
+}
+
+}  // namespace
+}  // namespace strata::server
