@@ -74,6 +74,7 @@ int Main(int argc, char** argv) {
   EngineOptions engine_options;
   server::ServerOptions options;
   double optimize_every_s = 60.0;
+  double upload_keep_s = absl::ToDoubleSeconds(engine_options.upload_keep);
   double drain_s = absl::ToDoubleSeconds(options.drain_timeout);
   std::string directory;
   app.set_version_flag("--version", absl::StrCat("stratad ", STRATA_VERSION));
@@ -102,6 +103,12 @@ int Main(int argc, char** argv) {
          "being asked; 0: never")
       ->check(SecondsUpTo(86400.0))
       ->capture_default_str();
+  app.add_option("--upload-keep",
+                 upload_keep_s,
+                 "How long [s] the points of an announced scan whose upload broke off stay for its "
+                 "client to go on with")
+      ->check(SecondsUpTo(86400.0))
+      ->capture_default_str();
   app.add_option("--drain", drain_s, "Seconds that calls may take to end at shutdown")
       ->check(SecondsUpTo(3600.0))
       ->capture_default_str();
@@ -112,6 +119,7 @@ int Main(int argc, char** argv) {
   }
   engine_options.directory = directory;
   engine_options.optimize_interval = absl::Seconds(optimize_every_s);
+  engine_options.upload_keep = absl::Seconds(upload_keep_s);
   options.drain_timeout = absl::Seconds(drain_s);
 
   FLAGS_logtostderr = true;

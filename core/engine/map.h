@@ -15,6 +15,7 @@
 #include "core/engine/localizer.h"
 #include "core/engine/map_core.h"
 #include "core/engine/map_planner.h"
+#include "core/engine/unfinished_uploads.h"
 #include "core/engine/worker.h"
 
 namespace strata {
@@ -32,6 +33,7 @@ class Map {
   MapPlanner& planner() { return *planner_; }
   Localizer& localizer() { return *localizer_; }
   Worker& worker() { return *worker_; }
+  UnfinishedUploads& uploads() { return *uploads_; }
 
   // RESOURCE_EXHAUSTED while too many scans wait for integration.
   absl::Status CheckRoomForPending() const { return worker_->CheckRoom(); }
@@ -50,6 +52,7 @@ class Map {
   std::unique_ptr<JobBoard> jobs_;
   std::unique_ptr<MapPlanner> planner_;
   std::unique_ptr<Localizer> localizer_;
+  std::unique_ptr<UnfinishedUploads> uploads_;
   std::unique_ptr<Worker> worker_;
   std::unique_ptr<JobRunner> runner_;
 };

@@ -2,6 +2,7 @@
 #ifndef STRATA_SERVER_SERVICES_INGEST_REACTOR_H_
 #define STRATA_SERVER_SERVICES_INGEST_REACTOR_H_
 
+#include <cstdint>
 #include <deque>
 #include <optional>
 
@@ -43,6 +44,8 @@ class IngestReactor final
   void Take();
   absl::Status TakeMessage();
   void Begin(const v1::ScanStart& start);
+  // Tells the client where the points of the scan begun are to go on.
+  void Accept(std::uint64_t points_held);
   absl::Status Add(const v1::PointChunk& chunk);
   // The scan under way will not be completed.
   void AbandonIncomplete();

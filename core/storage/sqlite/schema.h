@@ -14,7 +14,7 @@ namespace strata {
 // "STRA"; `file` names it "Strata map" to whoever looks.
 inline constexpr std::int32_t kApplicationId = 0x53545241;
 // Newest format of the truth tables this program reads and writes.
-inline constexpr std::int32_t kTruthVersion = 2;
+inline constexpr std::int32_t kTruthVersion = 3;
 // Format of the derived tables; any other is dropped and rebuilt.
 inline constexpr std::int32_t kDerivedVersion = 3;
 
