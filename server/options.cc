@@ -14,6 +14,7 @@ constexpr std::uint64_t kMebi = std::uint64_t{1} << 20;
 struct Written {
   std::string data;
   double optimize_every_s = 60.0;
+  double upload_keep_s = 3600.0;
   double drain_s = 5.0;
   double upload_idle_s = 60.0;
   double slow_reader_s = 30.0;
@@ -205,6 +206,14 @@ void AddMapLimits(CLI::App& app, Written& o) {
       "After a loop was closed, and at most so often [s], optimize a map's poses without being "
       "asked; 0: never",
       Between(0, 86400, "s"));
+  Add(app,
+      kGroup,
+      "--upload-keep",
+      o.upload_keep_s,
+      "How long the points of an announced scan whose upload broke off stay for its client to go "
+      "on "
+      "with [s]",
+      Between(0, 86400, "s"));
 }
 
 absl::StatusOr<ProgramOptions> Read(const Written& o) {
@@ -218,6 +227,7 @@ absl::StatusOr<ProgramOptions> Read(const Written& o) {
   options.engine.planner_cache_bytes = o.planner_cache_mib * kMebi;
   options.engine.max_map_bytes = o.max_map_mib * kMebi;
   options.engine.optimize_interval = absl::Seconds(o.optimize_every_s);
+  options.engine.upload_keep = absl::Seconds(o.upload_keep_s);
   options.server.drain_timeout = absl::Seconds(o.drain_s);
   options.server.slow_sender_timeout = absl::Seconds(o.upload_idle_s);
   options.server.slow_reader_timeout = absl::Seconds(o.slow_reader_s);

@@ -32,7 +32,8 @@ std::optional<absl::Duration> Backoff::NextPause(const absl::Status& status) {
   const std::optional<absl::Duration> asked = translate::RetryDelayOf(status);
   const bool again =
       absl::IsUnavailable(status) || (absl::IsResourceExhausted(status) && asked.has_value());
-  if (!again || attempts_ >= options_.max_attempts) return std::nullopt;
+  const bool exhausted = options_.max_attempts > 0 && attempts_ >= options_.max_attempts;
+  if (!again || exhausted) return std::nullopt;
   const absl::Duration doubled = options_.initial * std::exp2(attempts_ - 1);
   ++attempts_;
   const absl::Duration pause = std::min(doubled, options_.max) * (1.0 - 0.5 * uniform_());

@@ -104,9 +104,9 @@ absl::Status ClientOptions::Validate() const {
   if (!(connect_timeout > absl::ZeroDuration())) {
     faults.emplace_back("connect_timeout is not positive");
   }
-  if (backoff.max_attempts < 1 || backoff.max_attempts > 100) {
+  if (backoff.max_attempts < 0 || backoff.max_attempts > 100) {
     faults.push_back(
-        absl::StrCat("backoff.max_attempts = ", backoff.max_attempts, " is not in [1, 100]"));
+        absl::StrCat("backoff.max_attempts = ", backoff.max_attempts, " is not in [0, 100]"));
   }
   if (!(backoff.initial > absl::ZeroDuration()) || !(backoff.max >= backoff.initial)) {
     faults.emplace_back("backoff.initial is not positive, or above backoff.max");

@@ -18,8 +18,9 @@ namespace strata {
 
 // Pauses between attempts of one call.
 struct BackoffOptions {
-  // Attempts of one call, the first included; in [1, 100]. More ride out longer troubles, and tell
-  // of them later.
+  // Attempts of one call, the first included; in [0, 100], 0: as many as it takes. More ride out
+  // longer troubles, and tell of them later. An announced scan counts those since more of it has
+  // come to the server.
   int max_attempts = 6;
   // Pause after the first attempt; doubles from one to the next, each shortened by up to a half at
   // random so that clients do not come back together. A server that names a longer pause gets it.

@@ -2,7 +2,6 @@
 #ifndef STRATA_CLIENT_SDK_CONNECTION_H_
 #define STRATA_CLIENT_SDK_CONNECTION_H_
 
-#include <limits>
 #include <memory>
 
 #include "absl/status/status.h"
@@ -33,7 +32,7 @@ class Connection {
   // Of one who waits for the server as long as it takes.
   Backoff NewEndlessBackoff() const {
     BackoffOptions endless = options_.backoff;
-    endless.max_attempts = std::numeric_limits<int>::max();
+    endless.max_attempts = 0;
     return Backoff(endless);
   }
 

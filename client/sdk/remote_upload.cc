@@ -1,9 +1,14 @@
 #include "client/sdk/remote_upload.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <string>
 #include <utility>
 
+#include "absl/status/status.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
 
 #include "core/common/status.h"
 #include "proto/translate/points.h"
@@ -13,7 +18,7 @@ namespace strata::sdk {
 namespace {
 
 constexpr std::size_t kMaxKeptBytes = std::size_t{64} << 20;
-// The server's word, in its initial metadata, that the points are welcome.
+// The server's word, in its initial metadata, that the points are welcome, and how many it has.
 constexpr char kAcceptedKey[] = "x-upload-accepted";
 
 }  // namespace
@@ -30,6 +35,7 @@ RemoteUpload::RemoteUpload(Connection& connection,
       backoff_(connection.NewBackoff()) {
   start_.mutable_start()->set_map(std::string(map));
   *start_.mutable_start()->mutable_header() = translate::ToProto(header);
+  start_.mutable_start()->set_resume(true);
 }
 
 RemoteUpload::~RemoteUpload() {
@@ -40,23 +46,31 @@ RemoteUpload::~RemoteUpload() {
   stream_->writer->Finish();
 }
 
-absl::Status RemoteUpload::Open() { return Deliver(); }
+absl::Status RemoteUpload::Open() {
+  STRATA_RETURN_IF_ERROR(Deliver());
+  held_ = stream_->sent;
+  points_ = held_;
+  return absl::OkStatus();
+}
 
 absl::Status RemoteUpload::Write(const PointCloud& chunk) {
   if (chunk.points.empty()) return absl::OkStatus();
   STRATA_RETURN_IF_ERROR(Annotate(translate::CheckChunk(chunk, header_, points_),
                                   absl::StrCat("scan ", header_.id.ToString())));
-  points_ += chunk.size();
-  v1::UploadScanRequest& message = messages_.emplace_back();
-  *message.mutable_chunk() = translate::ToProto(chunk);
-  kept_bytes_ += message.ByteSizeLong();
+  Chunk& kept = chunks_.emplace_back(Chunk{points_, points_ + chunk.size(), {}});
+  points_ = kept.end;
+  *kept.message.mutable_chunk() = translate::ToProto(chunk);
+  kept_bytes_ += kept.message.ByteSizeLong();
   STRATA_RETURN_IF_ERROR(Deliver());
-  if (kept_bytes_ > kMaxKeptBytes) {
-    forgotten_ = true;
-    messages_.clear();
-    stream_->sent = 0;
-  }
+  Forget();
   return absl::OkStatus();
+}
+
+void RemoteUpload::Forget() {
+  while (kept_bytes_ > kMaxKeptBytes) {
+    kept_bytes_ -= chunks_.front().message.ByteSizeLong();
+    chunks_.pop_front();
+  }
 }
 
 absl::StatusOr<ScanAck> RemoteUpload::Finish() {
@@ -80,17 +94,20 @@ absl::Status RemoteUpload::Deliver() {
 }
 
 absl::Status RemoteUpload::Advance() {
-  if (stream_ == nullptr) {
-    if (forgotten_) {
-      return absl::AbortedError(
-          absl::StrCat("scan ", header_.id.ToString(), ": its upload has ended; begin it again"));
-    }
-    STRATA_RETURN_IF_ERROR(OpenStream());
-  }
-  for (; stream_->sent < messages_.size(); ++stream_->sent) {
-    if (!stream_->writer->Write(messages_[stream_->sent])) return CloseStream();
+  if (stream_ == nullptr) STRATA_RETURN_IF_ERROR(OpenStream());
+  for (const Chunk& chunk : chunks_) {
+    if (chunk.end <= stream_->sent) continue;
+    if (!Send(chunk)) return CloseStream();
+    stream_->sent = chunk.end;
   }
   return absl::OkStatus();
+}
+
+bool RemoteUpload::Send(const Chunk& chunk) {
+  if (chunk.first >= stream_->sent) return stream_->writer->Write(chunk.message);
+  v1::UploadScanRequest rest = chunk.message;
+  translate::DropFirst(stream_->sent - chunk.first, *rest.mutable_chunk());
+  return stream_->writer->Write(rest);
 }
 
 absl::Status RemoteUpload::OpenStream() {
@@ -100,7 +117,35 @@ absl::Status RemoteUpload::OpenStream() {
   if (!stream_->writer->Write(start_)) return CloseStream();
   stream_->writer->WaitForInitialMetadata();
   const auto& metadata = stream_->context.get()->GetServerInitialMetadata();
-  return metadata.count(kAcceptedKey) == 0 ? CloseStream() : absl::OkStatus();
+  const auto accepted = metadata.find(kAcceptedKey);
+  if (accepted == metadata.end()) return CloseStream();
+  const absl::Status resumed =
+      GoOnFrom(absl::string_view(accepted->second.data(), accepted->second.size()));
+  if (resumed.ok()) return resumed;
+  stream_->context.get()->TryCancel();
+  stream_->writer->Finish();
+  stream_ = nullptr;
+  return resumed;
+}
+
+absl::Status RemoteUpload::GoOnFrom(absl::string_view accepted) {
+  const std::string what = absl::StrCat("scan ", header_.id.ToString());
+  std::uint64_t held = 0;
+  if (!absl::SimpleAtoi(accepted, &held) || held > header_.point_count) {
+    return absl::InternalError(absl::StrCat(
+        what, ": the server has accepted '", accepted, "' points of ", header_.point_count));
+  }
+  const std::uint64_t kept_from = chunks_.empty() ? points_ : chunks_.front().first;
+  if (held < kept_from) {
+    return absl::AbortedError(absl::StrCat(what,
+                                           ": its upload broke off, and the server has only ",
+                                           held,
+                                           " points of it; begin it again"));
+  }
+  stream_->sent = held;
+  if (held > most_held_) backoff_ = connection_.NewBackoff();  // the attempts before were worth it
+  most_held_ = std::max(most_held_, held);
+  return absl::OkStatus();
 }
 
 absl::Status RemoteUpload::CloseStream() {
@@ -111,7 +156,7 @@ absl::Status RemoteUpload::CloseStream() {
 }
 
 bool RemoteUpload::MayRepeat(const absl::Status& status) {
-  return !forgotten_ && backoff_.Wait(status, call_.stop);
+  return backoff_.Wait(status, call_.stop);
 }
 
 }  // namespace strata::sdk

@@ -26,11 +26,17 @@ namespace strata::api {
 // (21 bytes a point with every column).
 inline constexpr std::size_t kMaxPointsPerChunk = 40'000;
 
-// An upload under way. Not thread-safe; destroying it before Finish() abandons the scan without a
-// trace.
+// An upload under way. Not thread-safe. Destroying it before Finish() abandons the scan without a
+// trace, unless the header announced its content_hash: what came of such a scan stays for a while,
+// also over a restart, so that another upload of the same header can go on with it. That may be
+// begun while this one is still there, which then answers ABORTED.
 class ScanUpload {
  public:
   virtual ~ScanUpload() = default;
+
+  // Points of the announced scan that were there when this upload began: Write() goes on behind
+  // them. All of them if the scan is durable already: Finish() says so. 0 without a content_hash.
+  virtual std::uint64_t points_held() const { return 0; }
 
   // The next points of the scan, in order: at most kMaxPointsPerChunk, with the columns the header
   // announced; rows, columns and origin of `chunk` are ignored (its origin must be zero). Blocks
@@ -39,8 +45,8 @@ class ScanUpload {
   virtual absl::Status Write(const PointCloud& chunk) = 0;
 
   // Returns once the scan is durable. The same scan again is OK with `already_present`; the same id
-  // with other content is ALREADY_EXISTS; fewer points than announced is INVALID_ARGUMENT; a full
-  // queue is RESOURCE_EXHAUSTED.
+  // with other content is ALREADY_EXISTS; fewer points than announced, or another hash of what came
+  // than announced, is INVALID_ARGUMENT and nothing is kept; a full queue is RESOURCE_EXHAUSTED.
   virtual absl::StatusOr<ScanAck> Finish() = 0;
 };
 
@@ -66,7 +72,7 @@ class Scans {
   virtual ~Scans() = default;
 
   // Begins an upload. The header is checked here: INVALID_ARGUMENT; RESOURCE_EXHAUSTED beyond the
-  // limits.
+  // limits; ALREADY_EXISTS if the scan is there with another content_hash than announced.
   virtual absl::StatusOr<std::unique_ptr<ScanUpload>> Upload(const Call& call,
                                                              absl::string_view map,
                                                              const ScanHeader& header) = 0;

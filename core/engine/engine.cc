@@ -65,6 +65,10 @@ absl::Status EngineOptions::Validate() const {
     faults.push_back(absl::StrCat(
         "optimize_interval = ", absl::FormatDuration(optimize_interval), " is negative"));
   }
+  if (upload_keep < absl::ZeroDuration()) {
+    faults.push_back(
+        absl::StrCat("upload_keep = ", absl::FormatDuration(upload_keep), " is negative"));
+  }
   if (faults.empty()) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat("engine: ", absl::StrJoin(faults, "; ")));
 }

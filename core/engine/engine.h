@@ -35,6 +35,12 @@ struct EngineOptions {
   std::uint64_t max_map_bytes = 0;
   // Threads that rebuild and verify use, each map; at least 1. Results do not depend on it.
   int worker_threads = 2;
+  // How long the points of an announced scan (ScanHeader::content_hash) whose stream ended stay for
+  // its client to go on with; zero: not at all. What has stayed longer goes when the next stream
+  // begins or ends.
+  absl::Duration upload_keep = absl::Hours(1);
+  // Bytes of such points a map keeps, the newest; those of streams under way are not counted.
+  std::uint64_t max_kept_upload_bytes = std::uint64_t{4} << 30;
   // Scans integrated in one transaction when there is a backlog; at least 1. Tiles do not depend on
   // it.
   int max_batch_scans = 16;
@@ -46,7 +52,7 @@ struct EngineOptions {
   absl::Status Validate() const;
 };
 
-// Opens the directory: unfinished uploads are dropped, pending scans and jobs go on by themselves.
+// Opens the directory: unfinished uploads are dropped but for announced ones, pending scans and jobs go on by themselves.
 // FAILED_PRECONDITION while another engine has it. A map whose file is damaged does not keep the
 // others from being served: calls on it answer with what is wrong. The engine ends its threads when
 // it is destroyed; no call may be under way then.

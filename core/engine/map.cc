@@ -19,6 +19,7 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
   std::shared_ptr<Map> map(new Map());
   STRATA_ASSIGN_OR_RETURN(map->core_, MapCore::Open(name, file, options));
   STRATA_ASSIGN_OR_RETURN(map->jobs_, JobBoard::Open(*map->core_));
+  STRATA_ASSIGN_OR_RETURN(map->uploads_, UnfinishedUploads::Open(*map->core_));
   std::uint64_t pending = 0;
   {
     STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map->core_->Reader());

@@ -16,6 +16,7 @@
 #include "core/engine/map_core.h"
 #include "core/engine/map_planner.h"
 #include "core/engine/served_tiles.h"
+#include "core/engine/unfinished_uploads.h"
 #include "core/engine/worker.h"
 
 namespace strata {
@@ -34,6 +35,7 @@ class Map {
   ServedTiles& tiles() { return *tiles_; }
   Localizer& localizer() { return *localizer_; }
   Worker& worker() { return *worker_; }
+  UnfinishedUploads& uploads() { return *uploads_; }
 
   // RESOURCE_EXHAUSTED while too many scans wait for integration.
   absl::Status CheckRoomForPending() const { return worker_->CheckRoom(); }
@@ -53,6 +55,7 @@ class Map {
   std::unique_ptr<MapPlanner> planner_;
   std::unique_ptr<ServedTiles> tiles_;
   std::unique_ptr<Localizer> localizer_;
+  std::unique_ptr<UnfinishedUploads> uploads_;
   std::unique_ptr<Worker> worker_;
   std::unique_ptr<JobRunner> runner_;
 };

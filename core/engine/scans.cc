@@ -123,8 +123,7 @@ absl::StatusOr<std::unique_ptr<api::ScanUpload>> EngineScans::Upload(const api::
                                                      most,
                                                      ", split it"));
   }
-  STRATA_RETURN_IF_ERROR(found->CheckRoomForPending());
-  return std::make_unique<EngineUpload>(std::move(found), call, header);
+  return EngineUpload::Begin(std::move(found), call, header);
 }
 
 absl::StatusOr<UploadState> EngineScans::GetUploadState(const api::Call& call,

@@ -13,9 +13,9 @@
 #include "core/codec/point_codec.h"
 #include "core/common/status.h"
 #include "core/engine/local_map_codec.h"
-#include "core/engine/scan_hash.h"
 #include "core/engine/scan_labels.h"
 #include "core/geometry/pose.h"
+#include "core/world/scan_hash.h"
 
 namespace strata {
 
@@ -44,7 +44,7 @@ void TruthCheck::CheckPoints(StorageReader& reader, const ScanRecord& scan, Repo
   }
   if (points != scan.header.point_count) {
     report(absl::StrCat(points, " points instead of ", scan.header.point_count));
-  } else if (hasher.Digest(scan.header) != scan.content_hash) {
+  } else if (!hasher.Matches(scan.header, scan.content_hash)) {
     report("points or header are not those that were uploaded");
   }
 }

@@ -1,56 +1,50 @@
-// Takes in one scan: checks its points as they come, puts them to disk piece by piece, and makes
-// them a scan in one durable commit.
+// One stream of a scan: api::ScanUpload.
 #ifndef STRATA_CORE_ENGINE_UPLOAD_H_
 #define STRATA_CORE_ENGINE_UPLOAD_H_
 
 #include <cstdint>
 #include <memory>
-#include <string>
-#include <vector>
+#include <optional>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include <Eigen/Geometry>
 
 #include "core/api/call.h"
 #include "core/api/scans.h"
-#include "core/cloud/point_cloud.h"
 #include "core/engine/map.h"
-#include "core/engine/scan_hash.h"
+#include "core/engine/scan_intake.h"
 #include "core/world/scan.h"
 
 namespace strata {
 
 class EngineUpload final : public api::ScanUpload {
  public:
-  // `header` must be valid.
-  EngineUpload(std::shared_ptr<Map> map, const api::Call& call, const ScanHeader& header);
+  // `header` must be valid. RESOURCE_EXHAUSTED while too many scans wait; ALREADY_EXISTS for a scan
+  // with another content than announced.
+  static absl::StatusOr<std::unique_ptr<EngineUpload>> Begin(std::shared_ptr<Map> map,
+                                                             const api::Call& call,
+                                                             const ScanHeader& header);
   ~EngineUpload() override;
 
+  std::uint64_t points_held() const override { return held_; }
   absl::Status Write(const PointCloud& chunk) override;
   absl::StatusOr<ScanAck> Finish() override;
 
  private:
-  absl::Status WriteChecked(const PointCloud& chunk);
-  absl::Status CheckChunk(const PointCloud& chunk) const;
-  // Adds point `i` of `chunk` to the piece under way.
-  void Append(const PointCloud& chunk, std::size_t i);
-  // Encodes the piece under way; sends pieces to disk once there are many.
-  absl::Status SealPiece();
-  absl::Status StagePieces();
-  absl::StatusOr<ScanAck> Commit(StorageWriter& writer);
+  EngineUpload(std::shared_ptr<Map> map, const api::Call& call, const ScanHeader& header)
+      : map_(std::move(map)), call_(call), id_(header.id), intake_(map_->uploads().Find(header)) {}
+  absl::Status Open(const ScanHeader& header);
+  // Sets present_ if the announced scan is there.
+  absl::Status LookForPresent(const ScanHeader& header);
 
-  std::shared_ptr<Map> map_;
+  const std::shared_ptr<Map> map_;
   const api::Call call_;
-  ScanRecord record_;
-  ScanHasher hasher_;
-  PointCloud piece_;                 // less than kMaxEncodedPoints
-  std::vector<std::string> pieces_;  // encoded, not on disk yet
-  std::size_t pieces_bytes_ = 0;
-  std::uint32_t staged_ = 0;  // pieces on disk
-  std::uint64_t points_ = 0;
-  absl::Status failed_;  // first error; the upload is dead then
-  bool finished_ = false;
+  const ScanId id_;
+  std::shared_ptr<ScanIntake> intake_;
+  std::uint64_t ticket_ = 0;
+  std::uint64_t held_ = 0;
+  std::optional<ScanAck> present_;
+  absl::Status failed_;  // first error; the stream is dead then
 };
 
 }  // namespace strata

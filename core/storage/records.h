@@ -46,6 +46,17 @@ struct ScanRecord {
   std::uint64_t faded_points = 0;  // that LabelOrigin::kFaded has
 };
 
+// Points of an announced scan whose stream ended before it was whole: its chunks stay for a while,
+// so that its client can go on with it.
+struct UnfinishedUpload {
+  std::uint64_t upload = 0;  // whose chunks they are
+  ScanId id;
+  std::string content_hash;                // as announced
+  absl::Time touched = absl::UnixEpoch();  // when points last came; microseconds are kept
+  std::uint32_t chunks = 0;
+  std::uint64_t bytes = 0;  // of the chunks
+};
+
 // Who gave a scan labels after its upload.
 enum class LabelOrigin : std::uint8_t {  // stored
   kPerson = 1,

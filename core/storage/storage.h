@@ -58,6 +58,8 @@ class StorageReader {
   virtual absl::StatusOr<ScanTotals> GetScanTotals() = 0;
   // Largest upload number in use, of scans and of chunks without one.
   virtual absl::StatusOr<std::uint64_t> LastUpload() = 0;
+  // By upload number.
+  virtual absl::StatusOr<std::vector<UnfinishedUpload>> ListUnfinishedUploads() = 0;
   virtual absl::StatusOr<std::string> GetChunk(std::uint64_t upload, std::uint32_t ordinal) = 0;
   // Of a scan whose points were dropped.
   virtual absl::StatusOr<std::string> GetLocalMap(ScanNumber number) = 0;
@@ -124,11 +126,14 @@ class StorageWriter {
   virtual absl::Status PutChunk(std::uint64_t upload,
                                 std::uint32_t ordinal,
                                 absl::string_view bytes) = 0;
+  // An upload under way whose chunks AbandonOrphans() leaves; inserts, or says when points last
+  // came. `upload.chunks` and `bytes` are ignored: they are counted.
+  virtual absl::Status KeepUpload(const UnfinishedUpload& upload) = 0;
   // Removes the chunks of an upload that never became a scan.
   virtual absl::Status AbandonUpload(std::uint64_t upload) = 0;
-  // Removes all chunks without a scan.
+  // Removes all chunks without a scan and without a KeepUpload().
   virtual absl::Status AbandonOrphans() = 0;
-  // Makes an upload a scan. ALREADY_EXISTS for its id.
+  // Makes an upload a scan, which is unfinished no longer. ALREADY_EXISTS for its id.
   virtual absl::Status PutScan(const ScanRecord& scan) = 0;
   virtual absl::Status SetScanState(ScanNumber number,
                                     ScanState state,

@@ -15,6 +15,13 @@
 #include "core/world/names.h"
 
 namespace strata {
+namespace {
+
+bool IsContentHash(absl::string_view text) {
+  return text.size() == 32 && text.find_first_not_of("0123456789abcdef") == absl::string_view::npos;
+}
+
+}  // namespace
 
 std::string ScanId::ToString() const { return absl::StrCat(trajectory, "/", sequence); }
 
@@ -47,6 +54,12 @@ absl::Status ValidateScanHeader(const ScanHeader& header) {
   }
   if (header.time < absl::UnixEpoch() || header.time > absl::FromUnixSeconds(253402300799)) {
     return absl::InvalidArgumentError(absl::StrCat(what, ": time is not within 1970 to 9999"));
+  }
+  if (!header.content_hash.empty() && !IsContentHash(header.content_hash)) {
+    return absl::InvalidArgumentError(absl::StrCat(what,
+                                                   ": content_hash '",
+                                                   header.content_hash.substr(0, 64),
+                                                   "' is not 32 lower-case hexadecimal digits"));
   }
   const std::uint64_t grid = std::uint64_t{header.rows} * header.columns;
   if ((header.rows != 0 || header.columns != 0) && grid != header.point_count) {

@@ -54,6 +54,9 @@ struct ScanHeader {
   bool has_intensity = false;
   bool has_colour = false;
   bool has_label = false;
+  // Of an upload: the scan's ScanHasher digest if its sender has announced it, else empty. In what
+  // the map says of a scan always empty: see ScanInfo.
+  std::string content_hash;
 };
 
 // INVALID_ARGUMENT naming the field, its value and the bound.
@@ -93,6 +96,7 @@ struct ScanAck {
   ScanId id;
   std::uint64_t commit_sequence = 0;
   bool already_present = false;  // the same scan was there; nothing changed
+  std::string content_hash;      // of the points and header that are durable
 };
 
 // What the server has of a trajectory.

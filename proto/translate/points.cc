@@ -99,6 +99,16 @@ absl::StatusOr<PointCloud> FromProto(const v1::PointChunk& chunk) {
   return cloud;
 }
 
+void DropFirst(std::size_t points, v1::PointChunk& chunk) {
+  const auto drop = [points](std::size_t per_point, std::string& column) {
+    if (!column.empty()) column.erase(0, points * per_point);
+  };
+  drop(sizeof(Eigen::Vector3f), *chunk.mutable_xyz());
+  drop(sizeof(float), *chunk.mutable_intensity());
+  drop(sizeof(Colour), *chunk.mutable_rgb());
+  drop(sizeof(std::uint16_t), *chunk.mutable_label());
+}
+
 std::string PackLabels(std::span<const std::uint16_t> labels) { return Pack(labels); }
 
 absl::StatusOr<std::vector<std::uint16_t>> UnpackLabels(const std::string& bytes) {

@@ -2,6 +2,7 @@
 #ifndef STRATA_PROTO_TRANSLATE_POINTS_H_
 #define STRATA_PROTO_TRANSLATE_POINTS_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -22,6 +23,9 @@ v1::PointChunk ToProto(const PointCloud& cloud);
 // INVALID_ARGUMENT unless the columns' lengths fit each other and there are 1 to
 // api::kMaxPointsPerChunk points.
 absl::StatusOr<PointCloud> FromProto(const v1::PointChunk& chunk);
+
+// Takes the first `points` points out. REQUIRES: `chunk` is what ToProto() makes of more points.
+void DropFirst(std::size_t points, v1::PointChunk& chunk);
 
 // Labels as 2 bytes each, and back: INVALID_ARGUMENT for half a label.
 std::string PackLabels(std::span<const std::uint16_t> labels);

@@ -82,6 +82,7 @@ v1::ScanHeader ToProto(const ScanHeader& header) {
   proto.set_has_intensity(header.has_intensity);
   proto.set_has_colour(header.has_colour);
   proto.set_has_label(header.has_label);
+  proto.set_content_hash(header.content_hash);
   return proto;
 }
 
@@ -101,6 +102,7 @@ absl::StatusOr<ScanHeader> FromProto(const v1::ScanHeader& proto) {
   header.has_intensity = proto.has_intensity();
   header.has_colour = proto.has_colour();
   header.has_label = proto.has_label();
+  header.content_hash = proto.content_hash();
   STRATA_RETURN_IF_ERROR(ValidateScanHeader(header));
   return header;
 }
@@ -142,13 +144,15 @@ v1::ScanAck ToProto(const ScanAck& ack) {
   *proto.mutable_id() = ToProto(ack.id);
   proto.set_commit_sequence(ack.commit_sequence);
   proto.set_already_present(ack.already_present);
+  proto.set_content_hash(ack.content_hash);
   return proto;
 }
 
 ScanAck FromProto(const v1::ScanAck& proto) {
   return {.id = FromProto(proto.id()),
           .commit_sequence = proto.commit_sequence(),
-          .already_present = proto.already_present()};
+          .already_present = proto.already_present(),
+          .content_hash = proto.content_hash()};
 }
 
 v1::GetUploadStateResponse ToProto(const UploadState& state) {

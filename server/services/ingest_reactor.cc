@@ -1,6 +1,7 @@
 #include "server/services/ingest_reactor.h"
 
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -82,7 +83,21 @@ void IngestReactor::Begin(const v1::ScanStart& start, const absl::Status& allowe
     return;
   }
   current_ = *std::move(begun);
-  if (current_->complete()) EndScan(absl::OkStatus());
+  if (start.resume()) Accept(current_->points_held());
+  if (!current_->complete()) return;
+  // Of a scan that is there, a client that does not resume sends all points all the same.
+  passing_over_ = current_->points_held() > 0;
+  EndScan(absl::OkStatus());
+}
+
+void IngestReactor::Accept(std::uint64_t points_held) {
+  v1::IngestScansResponse answer;
+  *answer.mutable_id() = current_id_;
+  answer.mutable_accepted()->set_points_held(points_held);
+  request_.CountSent(answer);
+  absl::MutexLock lock(&mutex_);
+  answers_.push_back(std::move(answer));
+  StartWriteIfIdle();
 }
 
 absl::Status IngestReactor::Add(const v1::PointChunk& chunk) {

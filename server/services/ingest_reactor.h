@@ -2,6 +2,7 @@
 #ifndef STRATA_SERVER_SERVICES_INGEST_REACTOR_H_
 #define STRATA_SERVER_SERVICES_INGEST_REACTOR_H_
 
+#include <cstdint>
 #include <deque>
 #include <optional>
 
@@ -45,6 +46,8 @@ class IngestReactor final
   absl::Status TakeMessage();
   // `allowed`: whether the caller may write to the scan's map; if not, the scan is answered so.
   void Begin(const v1::ScanStart& start, const absl::Status& allowed);
+  // Tells the client where the points of the scan begun are to go on.
+  void Accept(std::uint64_t points_held);
   absl::Status Add(const v1::PointChunk& chunk);
   // The scan under way will not be completed.
   void AbandonIncomplete();

@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/cloud/cloud_slice.h"
 #include "core/common/status.h"
 #include "proto/translate/points.h"
 #include "proto/translate/scans.h"
@@ -17,7 +18,7 @@ absl::StatusOr<ScanReceiver> ScanReceiver::Begin(api::Database& db,
   STRATA_ASSIGN_OR_RETURN(ScanHeader header, AtTheDoor(translate::FromProto(start.header())));
   STRATA_ASSIGN_OR_RETURN(std::unique_ptr<api::ScanUpload> upload,
                           db.scans().Upload(call, start.map(), header));
-  return ScanReceiver(std::move(header), std::move(upload));
+  return ScanReceiver(std::move(header), std::move(upload), start.resume());
 }
 
 absl::Status ScanReceiver::Add(const v1::PointChunk& chunk) {
@@ -26,9 +27,11 @@ absl::Status ScanReceiver::Add(const v1::PointChunk& chunk) {
   if (!cloud.ok()) return AtTheDoor(Annotate(cloud.status(), where));
   STRATA_RETURN_IF_ERROR(
       AtTheDoor(Annotate(translate::CheckChunk(*cloud, header_, received_), where)));
-  STRATA_RETURN_IF_ERROR(upload_->Write(*cloud));
+  const std::uint64_t first = received_;
   received_ += cloud->size();
-  return absl::OkStatus();
+  if (received_ <= held_) return absl::OkStatus();
+  if (first >= held_) return upload_->Write(*cloud);
+  return upload_->Write(SliceOf(*cloud, held_ - first, cloud->size()));
 }
 
 absl::StatusOr<ScanAck> ScanReceiver::Finish() {

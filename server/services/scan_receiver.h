@@ -2,8 +2,10 @@
 #ifndef STRATA_SERVER_SERVICES_SCAN_RECEIVER_H_
 #define STRATA_SERVER_SERVICES_SCAN_RECEIVER_H_
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -25,21 +27,28 @@ class ScanReceiver {
                                             const v1::ScanStart& start);
 
   // INVALID_ARGUMENT for points that the header did not announce or that are not finite.
+  // Those that were there already are passed over.
   absl::Status Add(const v1::PointChunk& chunk);
   // INVALID_ARGUMENT while points are missing; otherwise returns once the scan is durable.
   absl::StatusOr<ScanAck> Finish();
 
   const ScanId& id() const { return header_.id; }
-  // Every announced point has arrived.
-  bool complete() const { return received_ == header_.point_count; }
+  // Points that were there when it began.
+  std::uint64_t points_held() const { return held_; }
+  // Every announced point is there.
+  bool complete() const { return std::max(held_, received_) == header_.point_count; }
 
  private:
-  ScanReceiver(ScanHeader header, std::unique_ptr<api::ScanUpload> upload)
-      : header_(std::move(header)), upload_(std::move(upload)) {}
+  ScanReceiver(ScanHeader header, std::unique_ptr<api::ScanUpload> upload, bool resume)
+      : header_(std::move(header)),
+        upload_(std::move(upload)),
+        held_(upload_->points_held()),
+        received_(resume ? held_ : 0) {}
 
   ScanHeader header_;
   std::unique_ptr<api::ScanUpload> upload_;
-  std::uint64_t received_ = 0;  // points
+  std::uint64_t held_;
+  std::uint64_t received_;  // points, those included that the client knew to be there
 };
 
 }  // namespace strata::server

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "absl/strings/str_cat.h"
+
 #include "core/common/status.h"
 #include "proto/translate/scans.h"
 
@@ -38,6 +40,10 @@ void UploadReactor::OnReadDone(bool ok) {
 
 void UploadReactor::Take() {
   const absl::Status status = Guarded([this] { return TakeMessage(); });
+  if (status.ok() && message_.has_start() && scan_->points_held() > 0 && scan_->complete()) {
+    Commit();
+    return;
+  }
   if (status.ok()) {
     Read();
   } else {
@@ -62,8 +68,8 @@ absl::Status UploadReactor::TakeMessage() {
 
 absl::Status UploadReactor::Begin(const v1::ScanStart& start) {
   STRATA_ASSIGN_OR_RETURN(scan_, ScanReceiver::Begin(runtime_.db, request_.call(), start));
-  // Tells the client that its points are welcome.
-  context_.AddInitialMetadata("x-upload-accepted", "1");
+  // Tells the client that its points are welcome, and which of them are there.
+  context_.AddInitialMetadata("x-upload-accepted", absl::StrCat(scan_->points_held()));
   StartSendInitialMetadata();
   return absl::OkStatus();
 }

@@ -50,7 +50,7 @@ absl::Status Try(int kind, const std::string& text) {
     case 8:
       return ParseReduction(text).status();
     default:
-      return server::ParseListenAddress(text).status();
+      return ParseHostPort(text).status();
   }
 }
 

@@ -46,6 +46,9 @@ class IngestTest : public ServedMock {
     if (!stream_->Read(&answer)) return "end";
     last_error_ = answer.error().message();
     const auto code = static_cast<Code>(answer.error().code());
+    if (answer.has_accepted()) {
+      return absl::StrCat(answer.id().sequence(), " from ", answer.accepted().points_held());
+    }
     return absl::StrCat(
         answer.id().sequence(), " ", answer.has_ack() ? "ok" : absl::StatusCodeToString(code));
   }
@@ -97,6 +100,32 @@ TEST_F(IngestTest, ManyScansAreCommittedAndAnsweredInOrder) {
   const std::vector<std::string> committed = sink_.committed();
   ASSERT_THAT(committed, SizeIs(kScans));
   EXPECT_EQ(committed[122], "run/123: 3");
+}
+
+TEST_F(IngestTest, TellsWhereToGoOn) {
+  v1::ScanStart start = StartOf(1, 9);
+  start.mutable_header()->set_content_hash(std::string(32, 'a'));
+  start.set_resume(true);
+  ASSERT_TRUE(Send(start));
+  EXPECT_EQ(Next(), "1 from 4");
+  ASSERT_TRUE(Send(Points(5)));
+  EXPECT_EQ(Next(), "1 ok");
+  start.mutable_header()->set_point_count(3);  // is there
+  ASSERT_TRUE(Send(start));
+  EXPECT_EQ(Next(), "1 from 3");
+  EXPECT_EQ(Next(), "1 ok");
+  start.set_resume(false);  // one that does not ask sends it all the same
+  ASSERT_TRUE(Send(start));
+  ASSERT_TRUE(Send(Points(3)));
+  EXPECT_EQ(Next(), "1 ok");
+  start.mutable_header()->clear_content_hash();
+  start.set_resume(true);
+  ASSERT_TRUE(Send(start));
+  EXPECT_EQ(Next(), "1 from 0");
+  ASSERT_TRUE(Send(Points(3)));
+  EXPECT_EQ(Next(), "1 ok");
+  EXPECT_THAT(End(), IsOk());
+  EXPECT_THAT(sink_.committed(), ElementsAre("run/1: 5", "run/1: 0", "run/1: 0", "run/1: 3"));
 }
 
 TEST_F(IngestTest, AScansErrorIsItsOwn) {

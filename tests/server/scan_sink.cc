@@ -1,5 +1,7 @@
 #include "tests/server/scan_sink.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <memory>
 
 #include "absl/strings/str_cat.h"
@@ -7,6 +9,12 @@
 #include "proto/translate/points.h"
 
 namespace strata::server {
+namespace {
+
+// Points that are there of every announced scan.
+constexpr std::uint64_t kHeld = 4;
+
+}  // namespace
 
 class ScanSink::Upload final : public api::ScanUpload {
  public:
@@ -16,6 +24,9 @@ class ScanSink::Upload final : public api::ScanUpload {
     if (!finished_) ++sink_.abandoned_;
   }
 
+  std::uint64_t points_held() const override {
+    return header_.content_hash.empty() ? 0 : std::min(kHeld, header_.point_count);
+  }
   absl::Status Write(const PointCloud& chunk) override {
     points_ += chunk.size();
     return absl::OkStatus();
@@ -28,7 +39,7 @@ class ScanSink::Upload final : public api::ScanUpload {
       return absl::AlreadyExistsError(absl::StrCat(header_.id.ToString(), " has other content"));
     }
     sink_.committed_.push_back(absl::StrCat(header_.id.ToString(), ": ", points_));
-    return ScanAck{header_.id, sink_.committed_.size(), false};
+    return ScanAck{header_.id, sink_.committed_.size(), false, header_.content_hash};
   }
 
  private:

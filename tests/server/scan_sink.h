@@ -16,7 +16,8 @@
 
 namespace strata::server {
 
-// Takes every upload of `db`, notes which scans were committed and which abandoned. Thread-safe.
+// Takes every upload of `db` (of an announced scan the first four points are there), notes which
+// scans were committed and which abandoned. Thread-safe.
 class ScanSink {
  public:
   explicit ScanSink(::strata::testing::MockDatabase& db);

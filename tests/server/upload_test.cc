@@ -1,4 +1,5 @@
 #include <limits>
+#include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -99,6 +100,34 @@ TEST_F(UploadTest, RefusesBadHeadersBeforePoints) {
   start = StartOf(1, 5);
   start.set_map("nowhere");
   EXPECT_THAT(Upload({Message(start)}), StatusIs(Code::kNotFound, HasSubstr("nowhere")));
+}
+
+TEST_F(UploadTest, PointsThatAreThereAreNotTakenTwice) {
+  v1::ScanStart start = StartOf(1, 9);
+  start.mutable_header()->set_content_hash(std::string(32, 'a'));
+  // A client that knows nothing of it sends them all the same.
+  EXPECT_THAT(Upload({Message(start), Message(Points(3)), Message(Points(3)), Message(Points(3))}),
+              IsOk());
+  start.set_resume(true);
+  EXPECT_THAT(Upload({Message(start), Message(Points(5))}), IsOk());
+  EXPECT_THAT(sink_.committed(), ElementsAre("run/1: 5", "run/1: 5"));
+  EXPECT_THAT(
+      Upload({Message(start), Message(Points(6))}),
+      StatusIs(Code::kInvalidArgument, HasSubstr("10 points arrived, the header announced 9")));
+}
+
+TEST_F(UploadTest, AScanThatIsThereIsAcknowledgedBeforeItsPoints) {
+  v1::ScanStart start = StartOf(1, 4);
+  start.mutable_header()->set_content_hash(std::string(32, 'a'));
+  const auto stub = v1::Scans::NewStub(channel_);
+  grpc::ClientContext context;
+  const auto writer = stub->Upload(&context, &response_);
+  ASSERT_TRUE(writer->Write(Message(start)));
+  EXPECT_TRUE(writer->Finish().ok());  // without half-close
+  EXPECT_EQ(response_.ack().id().sequence(), 1U);
+  const auto& metadata = context.GetServerInitialMetadata();
+  ASSERT_EQ(metadata.count("x-upload-accepted"), 1U);
+  EXPECT_EQ(metadata.find("x-upload-accepted")->second, "4");
 }
 
 TEST_F(UploadTest, AClientThatGoesAwayLeavesNoTrace) {

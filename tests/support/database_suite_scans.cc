@@ -1,13 +1,17 @@
 // Conformance: scans.
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/common/status.h"
+#include "core/world/scan_hash.h"
 #include "tests/support/database_suite.h"
 #include "tests/support/status_matchers.h"
 
@@ -128,6 +132,85 @@ TEST_P(DatabaseSuite, AnAbandonedUploadLeavesNoTrace) {
   EXPECT_THAT(db().scans().Get({}, kMap, header.id), StatusIs(Code::kNotFound, HasSubstr("run/1")));
   STRATA_ASSERT_OK_AND_ASSIGN(const ScanAck ack, UploadScan(db(), kMap, header, floor));
   EXPECT_FALSE(ack.already_present);
+}
+
+// Those of the upload's points that it does not hold, up to `end`.
+absl::Status WriteRest(api::ScanUpload& upload, const PointCloud& cloud, std::size_t end) {
+  constexpr std::size_t kPiece = 777;
+  for (std::size_t begin = upload.points_held(); begin < end; begin += kPiece) {
+    STRATA_RETURN_IF_ERROR(upload.Write(Slice(cloud, begin, std::min(end, begin + kPiece))));
+  }
+  return absl::OkStatus();
+}
+
+TEST_P(DatabaseSuite, AnAnnouncedUploadGoesOnWhereItBroke) {
+  const PointCloud cloud = ColouredCloud(9'000);
+  ScanHeader header = FloorHeader({"run", 1}, cloud);
+  header.content_hash = ContentHashOf(header, cloud);
+  for (const std::size_t end : {0, 1, 2'500, 5'001}) {
+    STRATA_ASSERT_OK_AND_ASSIGN(auto upload, db().scans().Upload({}, kMap, header));
+    STRATA_ASSERT_OK(WriteRest(*upload, cloud, end));
+    upload = nullptr;
+    STRATA_ASSERT_OK_AND_ASSIGN(upload, db().scans().Upload({}, kMap, header));
+    EXPECT_EQ(upload->points_held(), end);
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(auto upload, db().scans().Upload({}, kMap, header));
+  STRATA_ASSERT_OK(WriteRest(*upload, cloud, cloud.size()));
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanAck ack, upload->Finish());
+  EXPECT_FALSE(ack.already_present);
+  EXPECT_EQ(ack.content_hash, header.content_hash);
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo scan, db().scans().Get({}, kMap, header.id));
+  EXPECT_EQ(scan.content_hash, header.content_hash);
+  EXPECT_THAT(scan.header.content_hash, IsEmpty());
+  std::vector<float> intensity;
+  STRATA_ASSERT_OK(db().scans().GetPoints({}, kMap, header.id, [&](const PointCloud& piece) {
+    intensity.insert(intensity.end(), piece.intensity.begin(), piece.intensity.end());
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(intensity, cloud.intensity);
+}
+
+TEST_P(DatabaseSuite, AnAnnouncedScanThatIsThereNeedsNoPoints) {
+  const PointCloud floor = LevelFloor(1.0);
+  ScanHeader header = FloorHeader({"run", 1}, floor);
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanAck first, UploadScan(db(), kMap, header, floor));
+  header.content_hash = first.content_hash;
+  EXPECT_EQ(header.content_hash, ContentHashOf(header, floor));
+  STRATA_ASSERT_OK_AND_ASSIGN(auto upload, db().scans().Upload({}, kMap, header));
+  EXPECT_EQ(upload->points_held(), floor.size());
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanAck again, upload->Finish());
+  EXPECT_TRUE(again.already_present);
+  EXPECT_EQ(again.commit_sequence, first.commit_sequence);
+  header.content_hash = std::string(32, '0');
+  EXPECT_THAT(db().scans().Upload({}, kMap, header).status(),
+              StatusIs(Code::kAlreadyExists, HasSubstr("run/1")));
+}
+
+TEST_P(DatabaseSuite, AnUploadWithAnotherHashThanAnnouncedLeavesNoTrace) {
+  const PointCloud floor = LevelFloor(1.0);
+  ScanHeader header = FloorHeader({"run", 1}, floor);
+  header.content_hash = "not a hash";
+  EXPECT_THAT(db().scans().Upload({}, kMap, header).status(),
+              StatusIs(Code::kInvalidArgument, HasSubstr("'not a hash'")));
+  header.content_hash = std::string(32, 'a');
+  EXPECT_THAT(UploadScan(db(), kMap, header, floor),
+              StatusIs(Code::kInvalidArgument, HasSubstr("announced aaaa")));
+  EXPECT_THAT(Listed(db(), {}), IsEmpty());
+  STRATA_ASSERT_OK_AND_ASSIGN(auto upload, db().scans().Upload({}, kMap, header));
+  EXPECT_EQ(upload->points_held(), 0U);
+}
+
+TEST_P(DatabaseSuite, TheLaterOfTwoUploadsOfAnAnnouncedScanTakesOver) {
+  const PointCloud floor = LevelFloor(2.0);
+  ScanHeader header = FloorHeader({"run", 1}, floor);
+  header.content_hash = ContentHashOf(header, floor);
+  STRATA_ASSERT_OK_AND_ASSIGN(auto first, db().scans().Upload({}, kMap, header));
+  STRATA_ASSERT_OK(WriteRest(*first, floor, 1'000));
+  STRATA_ASSERT_OK_AND_ASSIGN(auto second, db().scans().Upload({}, kMap, header));
+  STRATA_ASSERT_OK(WriteRest(*second, floor, floor.size()));
+  STRATA_ASSERT_OK(second->Finish());
+  EXPECT_THAT(first->Finish(), StatusIs(Code::kAborted, HasSubstr("taken over")));
+  EXPECT_THAT(Listed(db(), {}), ElementsAre(ScanId{"run", 1}));
 }
 
 TEST_P(DatabaseSuite, UploadsMayBeUnderWayTogether) {

@@ -48,6 +48,7 @@ class MockMaps : public api::Maps {
 
 class MockScanUpload : public api::ScanUpload {
  public:
+  MOCK_METHOD(std::uint64_t, points_held, (), (const, override));
   MOCK_METHOD(absl::Status, Write, (const PointCloud&), (override));
   MOCK_METHOD(absl::StatusOr<ScanAck>, Finish, (), (override));
 };

@@ -9,7 +9,7 @@
 #include "core/common/status.h"
 #include "core/storage/records.h"
 #include "core/storage/sqlite/database.h"
-#include "core/storage/value_codec.h"
+#include "core/world/value_codec.h"
 
 namespace strata {
 namespace {

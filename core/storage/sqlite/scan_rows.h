@@ -8,13 +8,13 @@
 #include "core/storage/sqlite/database.h"
 
 // A scan `s` with its pose `p` of epoch ?1; needs a WHERE.
-#define STRATA_SELECT_POSED_SCAN                                                                 \
-  "SELECT s.number, s.trajectory, s.sequence, s.header, s.state, s.upload, s.chunks, "           \
-  "s.has_points, s.point_bytes, s.has_box, s.min_x, s.min_y, s.min_z, s.max_x, s.max_y, "        \
-  "s.max_z, s.content_hash, s.message, p.epoch IS NOT NULL, p.epoch, p.pose, p.origin, "         \
-  "p.aligned, p.message, p.overlap, p.rms_m, p.iterations, s.person_labels, s.label_model, s.faded_points FROM " \
-  "truth_scan AS s LEFT JOIN "                                                                   \
-  "truth_pose AS p ON p.scan = s.number AND p.epoch = (SELECT max(epoch) FROM truth_pose AS e "  \
+#define STRATA_SELECT_POSED_SCAN                                                                \
+  "SELECT s.number, s.trajectory, s.sequence, s.header, s.state, s.upload, s.chunks, "          \
+  "s.has_points, s.point_bytes, s.has_box, s.min_x, s.min_y, s.min_z, s.max_x, s.max_y, "       \
+  "s.max_z, s.content_hash, s.message, p.epoch IS NOT NULL, p.epoch, p.pose, p.origin, "        \
+  "p.aligned, p.message, p.overlap, p.rms_m, p.iterations, s.person_labels, s.label_model, "    \
+  "s.faded_points FROM truth_scan AS s LEFT JOIN "                                              \
+  "truth_pose AS p ON p.scan = s.number AND p.epoch = (SELECT max(epoch) FROM truth_pose AS e " \
   "WHERE e.scan = s.number AND e.epoch <= ?1) "
 
 namespace strata {

@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
 #include "absl/types/span.h"
 
 #include "core/common/status.h"
@@ -160,14 +161,16 @@ CREATE TABLE truth_proposed_pose (
 ) STRICT, WITHOUT ROWID;
 ALTER TABLE truth_scan ADD COLUMN person_labels INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE truth_scan ADD COLUMN label_model INTEGER NOT NULL DEFAULT 0;
-CREATE TABLE truth_label (
+)sql",
+    R"sql(
+CREATE TABLE IF NOT EXISTS truth_label (
   scan INTEGER NOT NULL,
   origin INTEGER NOT NULL,
   piece INTEGER NOT NULL,
   bytes BLOB NOT NULL CHECK (length(bytes) <= 1048576),
   PRIMARY KEY (scan, origin, piece)
 ) STRICT;
-CREATE TABLE truth_model (
+CREATE TABLE IF NOT EXISTS truth_model (
   id INTEGER PRIMARY KEY AUTOINCREMENT,
   name TEXT NOT NULL UNIQUE,
   created_us INTEGER NOT NULL,
@@ -175,25 +178,30 @@ CREATE TABLE truth_model (
   description TEXT NOT NULL,
   size_bytes INTEGER NOT NULL
 ) STRICT;
-CREATE TABLE truth_model_parameter (
+CREATE TABLE IF NOT EXISTS truth_model_parameter (
   model INTEGER NOT NULL, name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (model, name)
 ) STRICT, WITHOUT ROWID;
-CREATE TABLE truth_model_score (
+CREATE TABLE IF NOT EXISTS truth_model_score (
   model INTEGER NOT NULL, name TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY (model, name)
 ) STRICT, WITHOUT ROWID;
-CREATE TABLE truth_model_piece (
+CREATE TABLE IF NOT EXISTS truth_model_piece (
   model INTEGER NOT NULL,
   piece INTEGER NOT NULL,
   bytes BLOB NOT NULL CHECK (length(bytes) <= 1048576),
   PRIMARY KEY (model, piece)
 ) STRICT;
-CREATE TABLE truth_class (
+CREATE TABLE IF NOT EXISTS truth_class (
   id INTEGER PRIMARY KEY,
   name TEXT NOT NULL UNIQUE,
   colour INTEGER NOT NULL
 ) STRICT;
-)sql",
-    R"sql(
+CREATE TABLE truth_upload (
+  upload INTEGER PRIMARY KEY,
+  trajectory TEXT NOT NULL,
+  sequence INTEGER NOT NULL,
+  content_hash TEXT NOT NULL,
+  touched_us INTEGER NOT NULL
+) STRICT;
 ALTER TABLE truth_map ADD COLUMN fade_after INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE truth_scan ADD COLUMN faded_points INTEGER NOT NULL DEFAULT 0;
 )sql",
@@ -239,6 +247,39 @@ CREATE VIRTUAL TABLE derived_footprint USING rtree (
   +exact_min_x, +exact_max_x, +exact_min_y, +exact_max_y
 );
 )sql";
+
+struct AddedColumn {
+  const char* table;
+  const char* name;
+  const char* type;
+};
+
+// Version 2 grew while it was being made, without a number of its own for each step: files of its
+// first days lack its last columns, and its last tables, which therefore belong to version 3. What
+// they lack was only ever added, with these defaults, so that adding it now makes the same file.
+absl::Status CompleteVersion2(Database& database) {
+  constexpr std::array<AddedColumn, 3> kAdded = {{
+      {"truth_constraint", "may_be_false", "INTEGER NOT NULL DEFAULT 0"},
+      {"truth_scan", "person_labels", "INTEGER NOT NULL DEFAULT 0"},
+      {"truth_scan", "label_model", "INTEGER NOT NULL DEFAULT 0"},
+  }};
+  STRATA_ASSIGN_OR_RETURN(Transaction transaction, Transaction::Begin(database, "BEGIN IMMEDIATE"));
+  for (const AddedColumn& column : kAdded) {
+    std::int64_t found = 0;
+    {
+      STRATA_ASSIGN_OR_RETURN(
+          Statement row,
+          database.Prepare("SELECT count(*) FROM pragma_table_info(?1) WHERE name = ?2"));
+      row.Bind(absl::string_view(column.table), absl::string_view(column.name));
+      STRATA_RETURN_IF_ERROR(row.Step().status());
+      found = row.Int(0);
+    }
+    if (found > 0) continue;
+    STRATA_RETURN_IF_ERROR(database.Execute(
+        absl::StrCat("ALTER TABLE ", column.table, " ADD COLUMN ", column.name, " ", column.type)));
+  }
+  return transaction.Commit();
+}
 
 absl::StatusOr<bool> HasDerivedTables(Database& database) {
   STRATA_ASSIGN_OR_RETURN(
@@ -312,6 +353,8 @@ absl::Status UpgradeSchema(Database& database) {
     return absl::FailedPreconditionError(
         "not a Strata map: a database file of another application");
   }
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t version, database.Pragma("PRAGMA user_version"));
+  if (version == 2) STRATA_RETURN_IF_ERROR(CompleteVersion2(database));
   STRATA_RETURN_IF_ERROR(Migrate(database, kMigrations));
   const absl::StatusOr<bool> derived = HasDerivedTables(database);
   if (derived.ok() && *derived) return absl::OkStatus();

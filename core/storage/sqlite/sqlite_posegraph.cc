@@ -18,7 +18,7 @@
 #include "core/storage/sqlite/database.h"
 #include "core/storage/sqlite/sqlite_reader.h"
 #include "core/storage/sqlite/sqlite_writer.h"
-#include "core/storage/value_codec.h"
+#include "core/world/value_codec.h"
 
 namespace strata {
 namespace {

@@ -18,7 +18,7 @@
 #include "core/common/status.h"
 #include "core/storage/sqlite/database.h"
 #include "core/storage/sqlite/scan_rows.h"
-#include "core/storage/value_codec.h"
+#include "core/world/value_codec.h"
 
 namespace strata {
 namespace {
@@ -221,8 +221,29 @@ absl::StatusOr<std::uint64_t> SqliteReader::LastUpload() {
   STRATA_ASSIGN_OR_RETURN(
       const std::int64_t last,
       database_.Pragma("SELECT max(coalesce((SELECT max(upload) FROM truth_scan), 0), "
-                       "coalesce((SELECT max(upload) FROM truth_chunk), 0))"));
+                       "coalesce((SELECT max(upload) FROM truth_chunk), 0), "
+                       "coalesce((SELECT max(upload) FROM truth_upload), 0))"));
   return static_cast<std::uint64_t>(last);
+}
+
+absl::StatusOr<std::vector<UnfinishedUpload>> SqliteReader::ListUnfinishedUploads() {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT u.upload, u.trajectory, u.sequence, u.content_hash, u.touched_us, "
+                        "count(c.ordinal), coalesce(sum(length(c.bytes)), 0) FROM truth_upload AS "
+                        "u LEFT JOIN truth_chunk AS c ON c.upload = u.upload GROUP BY u.upload "
+                        "ORDER BY u.upload"));
+  std::vector<UnfinishedUpload> uploads;
+  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
+    uploads.push_back({.upload = row.Unsigned(0),
+                       .id = {row.Text(1), row.Unsigned(2)},
+                       .content_hash = row.Text(3),
+                       .touched = absl::FromUnixMicros(row.Int(4)),
+                       .chunks = static_cast<std::uint32_t>(row.Int(5)),
+                       .bytes = row.Unsigned(6)});
+    return absl::OkStatus();
+  }));
+  return uploads;
 }
 
 absl::StatusOr<std::string> SqliteReader::GetChunk(std::uint64_t upload, std::uint32_t ordinal) {

@@ -13,7 +13,7 @@
 
 #include "core/common/status.h"
 #include "core/storage/sqlite/database.h"
-#include "core/storage/value_codec.h"
+#include "core/world/value_codec.h"
 
 namespace strata {
 
@@ -68,14 +68,28 @@ absl::Status SqliteWriter::PutChunk(std::uint64_t upload,
                 Blob{bytes});
 }
 
+absl::Status SqliteWriter::KeepUpload(const UnfinishedUpload& upload) {
+  return RunSql(
+      "INSERT INTO truth_upload (upload, trajectory, sequence, content_hash, touched_us) VALUES "
+      "(?1, ?2, ?3, ?4, ?5) ON CONFLICT (upload) DO UPDATE SET touched_us = excluded.touched_us",
+      upload.upload,
+      upload.id.trajectory,
+      upload.id.sequence,
+      upload.content_hash,
+      absl::ToUnixMicros(upload.touched));
+}
+
 absl::Status SqliteWriter::AbandonUpload(std::uint64_t upload) {
+  STRATA_RETURN_IF_ERROR(RunSql("DELETE FROM truth_upload WHERE upload = ?1", upload));
   return RunSql(
       "DELETE FROM truth_chunk WHERE upload = ?1 AND ?1 NOT IN (SELECT upload FROM truth_scan)",
       upload);
 }
 
 absl::Status SqliteWriter::AbandonOrphans() {
-  return RunSql("DELETE FROM truth_chunk WHERE upload NOT IN (SELECT upload FROM truth_scan)");
+  return RunSql(
+      "DELETE FROM truth_chunk WHERE upload NOT IN (SELECT upload FROM truth_scan) AND upload NOT "
+      "IN (SELECT upload FROM truth_upload)");
 }
 
 absl::Status SqliteWriter::PutScan(const ScanRecord& scan) {
@@ -110,6 +124,7 @@ absl::Status SqliteWriter::PutScan(const ScanRecord& scan) {
       high.z(),
       scan.content_hash,
       scan.message);
+  if (put.ok()) return RunSql("DELETE FROM truth_upload WHERE upload = ?1", scan.upload);
   if (!absl::IsAlreadyExists(put)) return put;
   return absl::AlreadyExistsError(absl::StrCat("scan ", scan.header.id.ToString(), " exists"));
 }

@@ -31,6 +31,7 @@ class SqliteWriter final : public StorageWriter {
   absl::Status PutChunk(std::uint64_t upload,
                         std::uint32_t ordinal,
                         absl::string_view bytes) override;
+  absl::Status KeepUpload(const UnfinishedUpload& upload) override;
   absl::Status AbandonUpload(std::uint64_t upload) override;
   absl::Status AbandonOrphans() override;
   absl::Status PutScan(const ScanRecord& scan) override;

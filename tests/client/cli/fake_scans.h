@@ -84,7 +84,7 @@ class FakeScans : public api::Scans {
         return trouble;
       }
       scans_.finished.emplace_back(header_, points_);
-      return ScanAck{.id = header_.id, .commit_sequence = scans_.finished.size()};
+      return ScanAck{header_.id, scans_.finished.size(), false, header_.content_hash};
     }
 
    private:

@@ -1,6 +1,10 @@
 #include "client/sdk/client.h"
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -78,7 +82,7 @@ TEST_F(ClientTest, AnUploadIsSentAgainFromItsStart) {
         EXPECT_CALL(*upload, Finish())
             .WillOnce(Return(attempts == 1
                                  ? absl::StatusOr<ScanAck>(absl::ResourceExhaustedError("full"))
-                                 : absl::StatusOr<ScanAck>(ScanAck{header.id, 5, false})));
+                                 : absl::StatusOr<ScanAck>(ScanAck{header.id, 5, false, ""})));
         return upload;
       });
   PointCloud chunk;
@@ -93,6 +97,47 @@ TEST_F(ClientTest, AnUploadIsSentAgainFromItsStart) {
   STRATA_ASSERT_OK_AND_ASSIGN(const ScanAck ack, (*upload)->Finish());
   EXPECT_EQ(ack.commit_sequence, 5U);
   EXPECT_EQ(attempts, 2);
+}
+
+TEST_F(ClientTest, AnAnnouncedUploadGoesOnBehindWhatTheServerHas) {
+  std::vector<std::vector<float>> attempts;
+  ON_CALL(behind_.scans(), Upload(_, _, _))
+      .WillByDefault([&attempts](auto&, auto, const ScanHeader& header)
+                         -> absl::StatusOr<std::unique_ptr<api::ScanUpload>> {
+        constexpr std::array<std::uint64_t, 4> kHeld = {2, 5, 5, 7};
+        auto upload = std::make_unique<::testing::NiceMock<::strata::testing::MockScanUpload>>();
+        const std::size_t attempt = attempts.size();
+        attempts.emplace_back();
+        ON_CALL(*upload, points_held()).WillByDefault(Return(kHeld.at(attempt)));
+        ON_CALL(*upload, Write(_)).WillByDefault([&attempts, attempt](const PointCloud& chunk) {
+          for (const Eigen::Vector3f& point : chunk.points) attempts[attempt].push_back(point.x());
+          return absl::OkStatus();
+        });
+        ON_CALL(*upload, Finish())
+            .WillByDefault(
+                Return(attempt < 3 ? absl::StatusOr<ScanAck>(absl::ResourceExhaustedError("full"))
+                                   : absl::StatusOr<ScanAck>(ScanAck{header.id, 5, false, ""})));
+        return upload;
+      });
+  ScanHeader header;
+  header.id = {"run", 3};
+  header.point_count = 8;
+  header.content_hash = std::string(32, 'a');
+  STRATA_ASSERT_OK_AND_ASSIGN(auto upload, client_->scans().Upload({}, "m", header));
+  EXPECT_EQ(upload->points_held(), 2U);
+  for (const int begin : {2, 5}) {
+    PointCloud chunk;
+    for (int x = begin; x < begin + 3; ++x) {
+      chunk.points.emplace_back(static_cast<float>(x), 0.0F, 0.0F);
+    }
+    STRATA_ASSERT_OK(upload->Write(chunk));
+  }
+  STRATA_ASSERT_OK(upload->Finish());
+  EXPECT_THAT(attempts,
+              ::testing::ElementsAre(::testing::ElementsAre(2, 3, 4, 5, 6, 7),
+                                     ::testing::ElementsAre(5, 6, 7),
+                                     ::testing::ElementsAre(5, 6, 7),
+                                     ::testing::ElementsAre(7)));
 }
 
 TEST_F(ClientTest, CancellationReachesTheWorkOnTheServer) {
@@ -148,9 +193,9 @@ TEST(ConnectTest, SaysWhatIsWrong) {
   options.connect_timeout = absl::Milliseconds(100);
   EXPECT_THAT(Connect(options).status(), StatusIs(Code::kUnavailable, HasSubstr("127.0.0.1:1")));
   options.target = "";
-  options.backoff.max_attempts = 0;
+  options.backoff.max_attempts = -1;
   EXPECT_THAT(Connect(options).status(),
-              StatusIs(Code::kInvalidArgument, HasSubstr("max_attempts = 0")));
+              StatusIs(Code::kInvalidArgument, HasSubstr("max_attempts = -1")));
 }
 
 }  // namespace

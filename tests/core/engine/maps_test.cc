@@ -59,7 +59,7 @@ TEST_F(EngineMapsTest, ForeignFileDoesNotKeepOthersFromBeingServed) {
   EXPECT_THAT(db().maps().Get({}, "garbage"), StatusIs(absl::StatusCode::kDataLoss, HasSubstr("")));
   EXPECT_THAT(db().maps().Get({}, "newer"),
               StatusIs(absl::StatusCode::kFailedPrecondition,
-                       HasSubstr("format version 99 is newer than 2, the newest this program "
+                       HasSubstr("format version 99 is newer than 3, the newest this program "
                                  "reads; update it")));
 }
 
@@ -123,14 +123,14 @@ TEST_F(EngineMapsTest, ANewerFileIsLeftAsItIs) {
   UploadRooms(1);
   WaitIntegrated(db());
   Close();
-  Sql("PRAGMA user_version = 3");
+  Sql("PRAGMA user_version = 4");
   const std::string before = Contents(MapFile());
   Reopen();
   EXPECT_THAT(db().maps().Get({}, kMapName),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("update it")));
   Close();
   EXPECT_EQ(Contents(MapFile()), before);
-  Sql("PRAGMA user_version = 2");
+  Sql("PRAGMA user_version = 3");
   Reopen();
   ExpectSound();
 }

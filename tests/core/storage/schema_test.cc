@@ -79,5 +79,29 @@ TEST_F(SchemaTest, ANewerVersionIsRefusedWithWhatToDo) {
   EXPECT_EQ(Ask(database, "PRAGMA user_version"), 3);
 }
 
+// As a program of its first days left it: nothing but the number says that it is of version 2.
+TEST_F(SchemaTest, AnEarlyFileOfVersion2GetsWhatVersion2HadLater) {
+  auto database = Database::Open(directory_.path() / "early", Database::Mode::kCreate);
+  STRATA_ASSERT_OK(database);
+  STRATA_ASSERT_OK(CreateSchema(*database));
+  STRATA_ASSERT_OK(
+      database->Execute("ALTER TABLE truth_constraint DROP COLUMN may_be_false;"
+                        "ALTER TABLE truth_scan DROP COLUMN person_labels;"
+                        "ALTER TABLE truth_scan DROP COLUMN label_model;"
+                        "DROP TABLE truth_label; DROP TABLE truth_model; DROP TABLE truth_class;"
+                        "DROP TABLE truth_model_parameter; DROP TABLE truth_model_score;"
+                        "DROP TABLE truth_model_piece; DROP TABLE truth_upload;"
+                        "PRAGMA user_version = 2"));
+  STRATA_ASSERT_OK(UpgradeSchema(*database));
+  EXPECT_EQ(Ask(*database, "PRAGMA user_version"), kTruthVersion);
+  for (const char* sql : {"SELECT count(may_be_false) FROM truth_constraint",
+                          "SELECT count(person_labels) + count(label_model) FROM truth_scan",
+                          "SELECT count(*) FROM truth_label, truth_model, truth_model_parameter",
+                          "SELECT count(*) FROM truth_model_score, truth_model_piece",
+                          "SELECT count(*) FROM truth_class, truth_upload"}) {
+    EXPECT_EQ(Ask(*database, sql), 0) << sql;
+  }
+}
+
 }  // namespace
 }  // namespace strata::testing

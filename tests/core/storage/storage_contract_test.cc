@@ -12,7 +12,7 @@
 #include "core/common/status.h"
 #include "core/storage/sqlite/sqlite_storage.h"
 #include "core/storage/storage.h"
-#include "core/storage/value_codec.h"
+#include "core/world/value_codec.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 
@@ -135,6 +135,46 @@ TEST_F(StorageContractTest, OrphansGoAndScansStay) {
   EXPECT_THAT(reader().GetChunk(50, 0),
               StatusIs(absl::StatusCode::kDataLoss, HasSubstr("piece 0")));
   EXPECT_THAT(reader().GetChunk(1, 0), IsOk());
+}
+
+TEST_F(StorageContractTest, KeptUploadsStayUntilTheyAreScansOrAbandoned) {
+  const auto keep =
+      [&](std::uint64_t upload, std::uint32_t ordinal, const char* bytes, int second) {
+        UnfinishedUpload unfinished;
+        unfinished.upload = upload;
+        unfinished.id = {"run", upload};
+        unfinished.content_hash = "hash";
+        unfinished.touched = absl::FromUnixSeconds(second);
+        return Commit([&]() -> absl::Status {
+          STRATA_RETURN_IF_ERROR(writer().PutChunk(upload, ordinal, bytes));
+          return writer().KeepUpload(unfinished);
+        });
+      };
+  STRATA_ASSERT_OK(keep(50, 0, "12345", 10));
+  STRATA_ASSERT_OK(keep(60, 0, "12345", 20));
+  STRATA_ASSERT_OK(keep(50, 1, "678", 30));
+  STRATA_ASSERT_OK(Commit([&] { return writer().AbandonOrphans(); }));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto found, reader().ListUnfinishedUploads());
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[0].upload, 50U);
+  EXPECT_EQ(found[0].id, (ScanId{"run", 50}));
+  EXPECT_EQ(found[0].content_hash, "hash");
+  EXPECT_EQ(found[0].touched, absl::FromUnixSeconds(30));
+  EXPECT_EQ(found[0].chunks, 2U);
+  EXPECT_EQ(found[0].bytes, 8U);
+  EXPECT_THAT(reader().LastUpload(), IsOkAndHolds(60U));
+
+  ScanRecord scan = Scan(50);
+  STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(scan.number, writer().NextCommitSequence());
+    return writer().PutScan(scan);
+  }));
+  STRATA_ASSERT_OK(Commit([&] { return writer().AbandonUpload(60); }));
+  STRATA_ASSERT_OK(Commit([&] { return writer().AbandonOrphans(); }));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto left, reader().ListUnfinishedUploads());
+  EXPECT_TRUE(left.empty());
+  EXPECT_THAT(reader().GetChunk(50, 1), IsOkAndHolds(std::string("678")));
+  EXPECT_FALSE(reader().GetChunk(60, 0).ok());
 }
 
 TEST_F(StorageContractTest, PoseOfAnEpochIsTheNewestUpToIt) {

@@ -1,6 +1,7 @@
-// Small values as stored bytes: little-endian, with a version and a checksum. Part of FORMAT.md.
-#ifndef STRATA_CORE_STORAGE_VALUE_CODEC_H_
-#define STRATA_CORE_STORAGE_VALUE_CODEC_H_
+// Small values as stored bytes: little-endian, with a version and a checksum. Part of
+// core/storage/FORMAT.md, and of what a client keeps until it is acknowledged.
+#ifndef STRATA_CORE_WORLD_VALUE_CODEC_H_
+#define STRATA_CORE_WORLD_VALUE_CODEC_H_
 
 #include <string>
 
@@ -21,10 +22,11 @@ absl::StatusOr<Pose> DecodePose(absl::string_view bytes);
 std::string EncodeMatrix6(const Matrix6d& matrix);
 absl::StatusOr<Matrix6d> DecodeMatrix6(absl::string_view bytes);
 
-// Without the id, which the row holds; `id` is put into the result. Time in whole microseconds.
+// Without the id, which the row holds; `id` is put into the result. Time in whole microseconds; the
+// announced hash is left out.
 std::string EncodeScanHeader(const ScanHeader& header);
 absl::StatusOr<ScanHeader> DecodeScanHeader(const ScanId& id, absl::string_view bytes);
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_STORAGE_VALUE_CODEC_H_
+#endif  // STRATA_CORE_WORLD_VALUE_CODEC_H_

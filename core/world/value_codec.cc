@@ -1,4 +1,4 @@
-#include "core/storage/value_codec.h"
+#include "core/world/value_codec.h"
 
 #include <bit>
 #include <cstddef>

@@ -1,0 +1,316 @@
+#include "core/engine/scan_intake.h"
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include <Eigen/Core>
+
+#include "core/api/scans.h"
+#include "core/codec/point_codec.h"
+#include "core/common/status.h"
+#include "core/storage/storage.h"
+#include "core/world/map_class.h"
+
+namespace strata {
+namespace {
+
+constexpr std::size_t kStageBytes = std::size_t{1} << 20;
+constexpr float kMaxCoordinate = 1e6F;
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+absl::Status CheckColumn(const char* name, std::size_t size, bool announced, std::size_t points) {
+  if (size == (announced ? points : 0)) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("column ",
+                                                 name,
+                                                 " has ",
+                                                 size,
+                                                 " entries for ",
+                                                 points,
+                                                 " points; the header announced ",
+                                                 announced ? "it" : "none"));
+}
+
+float QuietNan(float value) { return std::isnan(value) ? kNan : value; }
+
+}  // namespace
+
+absl::StatusOr<std::uint64_t> ScanIntake::Take(const ScanHeader& header) {
+  absl::MutexLock lock(&mutex_);
+  const bool begun = hasher_.has_value() && !dead_;
+  record_.header = header;
+  if (!begun) {
+    BeginAnew();
+    STRATA_RETURN_IF_ERROR(Load());
+  }
+  return ++ticket_;
+}
+
+void ScanIntake::BeginAnew() {
+  const ScanHeader header = std::move(record_.header);
+  record_ = ScanRecord();
+  record_.header = header;
+  record_.upload = core_.NextUpload();
+  hasher_.emplace();
+  piece_ = PointCloud();
+  pieces_.clear();
+  pieces_bytes_ = 0;
+  staged_ = 0;
+  points_ = 0;
+  dead_ = false;
+}
+
+absl::Status ScanIntake::Load() {
+  if (!parked_.has_value()) return absl::OkStatus();
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    const absl::Status loaded = LoadPieces(*reader, *parked_);
+    record_.upload = parked_->upload;
+    staged_ = parked_->chunks;
+    touched_ = parked_->touched;
+    parked_.reset();
+    if (loaded.ok()) return loaded;
+  }
+  Abandon();
+  BeginAnew();
+  return absl::OkStatus();
+}
+
+absl::Status ScanIntake::LoadPieces(StorageReader& reader, const UnfinishedUpload& parked) {
+  for (std::uint32_t ordinal = 0; ordinal < parked.chunks; ++ordinal) {
+    STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader.GetChunk(parked.upload, ordinal));
+    STRATA_ASSIGN_OR_RETURN(const PointCloud piece, DecodePoints(bytes));
+    STRATA_RETURN_IF_ERROR(CheckChunk(piece));
+    hasher_->Add(piece);
+    for (const Eigen::Vector3f& p : piece.points) {
+      if (!std::isnan(p.x())) record_.box_scan.extend(p);
+    }
+    points_ += piece.size();
+    ++record_.chunks;
+    record_.point_bytes += bytes.size();
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ScanIntake::CheckTicket(std::uint64_t ticket) const {
+  if (ticket != ticket_) {
+    return absl::AbortedError("another stream of the same scan has taken over");
+  }
+  return dead_ ? absl::FailedPreconditionError("upload is finished") : absl::OkStatus();
+}
+
+std::uint64_t ScanIntake::points() const {
+  absl::MutexLock lock(&mutex_);
+  return points_;
+}
+
+absl::Status ScanIntake::Write(std::uint64_t ticket, const Stop& stop, const PointCloud& chunk) {
+  absl::MutexLock lock(&mutex_);
+  STRATA_RETURN_IF_ERROR(CheckTicket(ticket));
+  if (const absl::Status sound = CheckChunk(chunk); !sound.ok()) {
+    Abandon();
+    return sound;
+  }
+  for (std::size_t i = 0; i < chunk.size(); ++i) {
+    Append(chunk, i);
+    if (piece_.size() == kMaxEncodedPoints) SealPiece();
+  }
+  points_ += chunk.size();
+  return pieces_bytes_ >= kStageBytes ? StagePieces(stop) : absl::OkStatus();
+}
+
+absl::Status ScanIntake::CheckChunk(const PointCloud& chunk) const {
+  const ScanHeader& header = record_.header;
+  const std::size_t size = chunk.size();
+  if (size > api::kMaxPointsPerChunk) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("piece of ", size, " points; at most ", api::kMaxPointsPerChunk));
+  }
+  if (!chunk.origin.isZero(0.0)) {
+    return absl::InvalidArgumentError("piece with an origin; fold it into the pose");
+  }
+  if (points_ + size > header.point_count) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(points_ + size, " points, but the header announced ", header.point_count));
+  }
+  STRATA_RETURN_IF_ERROR(
+      CheckColumn("intensity", chunk.intensity.size(), header.has_intensity, size));
+  STRATA_RETURN_IF_ERROR(CheckColumn("colour", chunk.colour.size(), header.has_colour, size));
+  STRATA_RETURN_IF_ERROR(CheckColumn("label", chunk.label.size(), header.has_label, size));
+  STRATA_RETURN_IF_ERROR(ValidateLabels(chunk.label, points_));
+  for (std::size_t i = 0; i < size; ++i) {
+    const Eigen::Vector3f& p = chunk.points[i];
+    if ((p.array().abs() <= kMaxCoordinate).all()) continue;
+    if (header.rows != 0 && p.array().isNaN().all()) continue;
+    return absl::InvalidArgumentError(absl::StrCat("point ",
+                                                   points_ + i,
+                                                   " (",
+                                                   p.x(),
+                                                   ", ",
+                                                   p.y(),
+                                                   ", ",
+                                                   p.z(),
+                                                   ") is not within ±",
+                                                   kMaxCoordinate,
+                                                   " m"));
+  }
+  return absl::OkStatus();
+}
+
+void ScanIntake::Append(const PointCloud& chunk, std::size_t i) {
+  const Eigen::Vector3f& p = chunk.points[i];
+  if (std::isnan(p.x())) {
+    piece_.points.emplace_back(kNan, kNan, kNan);
+  } else {
+    piece_.points.push_back(p);
+    record_.box_scan.extend(p);
+  }
+  if (!chunk.intensity.empty()) piece_.intensity.push_back(QuietNan(chunk.intensity[i]));
+  if (!chunk.colour.empty()) piece_.colour.push_back(chunk.colour[i]);
+  if (!chunk.label.empty()) piece_.label.push_back(chunk.label[i]);
+}
+
+void ScanIntake::SealPiece() {
+  hasher_->Add(piece_);
+  pieces_.push_back(EncodePoints(piece_));
+  pieces_bytes_ += pieces_.back().size();
+  record_.point_bytes += pieces_.back().size();
+  ++record_.chunks;
+  piece_.points.clear();
+  piece_.intensity.clear();
+  piece_.colour.clear();
+  piece_.label.clear();
+}
+
+absl::Status ScanIntake::StagePieces(const Stop& stop) {
+  touched_ = absl::Now();
+  const UnfinishedUpload unfinished = Unfinished();
+  const auto put = [&, this](StorageWriter& writer) ABSL_NO_THREAD_SAFETY_ANALYSIS -> absl::Status {
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      STRATA_RETURN_IF_ERROR(
+          writer.PutChunk(record_.upload, staged_ + static_cast<std::uint32_t>(i), pieces_[i]));
+    }
+    return unfinished.content_hash.empty() ? absl::OkStatus() : writer.KeepUpload(unfinished);
+  };
+  STRATA_RETURN_IF_ERROR(core_.writer().Run(Durability::kRelaxed, pieces_bytes_, stop, put));
+  staged_ += static_cast<std::uint32_t>(pieces_.size());
+  pieces_.clear();
+  pieces_bytes_ = 0;
+  return absl::OkStatus();
+}
+
+absl::Status ScanIntake::CheckWhole() const {
+  const ScanHeader& header = record_.header;
+  if (points_ != header.point_count) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(points_, " points, but the header announced ", header.point_count));
+  }
+  if (announced() && !hasher_->Matches(header, header.content_hash)) {
+    return absl::InvalidArgumentError(absl::StrCat("content_hash of what arrived is ",
+                                                   hasher_->Digest(header),
+                                                   ", but the header announced ",
+                                                   header.content_hash,
+                                                   "; nothing of it is kept"));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<ScanAck> ScanIntake::Commit(StorageWriter& writer, CheckRoom check_room) {
+  StorageReader& reader = writer.reader();
+  STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader.GetClock());
+  STRATA_ASSIGN_OR_RETURN(const std::optional<PosedScan> present,
+                          reader.FindScan(record_.header.id, clock.epoch));
+  if (present.has_value()) {
+    if (present->scan.content_hash != record_.content_hash) {
+      return absl::AlreadyExistsError("exists with other content");
+    }
+    STRATA_RETURN_IF_ERROR(writer.AbandonUpload(record_.upload));
+    return ScanAck{record_.header.id, present->scan.number, true, record_.content_hash};
+  }
+  STRATA_RETURN_IF_ERROR(check_room());
+  STRATA_ASSIGN_OR_RETURN(record_.number, writer.NextCommitSequence());
+  for (std::size_t i = 0; i < pieces_.size(); ++i) {
+    STRATA_RETURN_IF_ERROR(
+        writer.PutChunk(record_.upload, staged_ + static_cast<std::uint32_t>(i), pieces_[i]));
+  }
+  STRATA_RETURN_IF_ERROR(writer.PutScan(record_));
+  STRATA_RETURN_IF_ERROR(writer.SetFootprint(
+      record_.number, FootprintOf(record_.box_scan, record_.header.T_map_scan)));
+  return ScanAck{record_.header.id, record_.number, false, record_.content_hash};
+}
+
+absl::StatusOr<ScanAck> ScanIntake::Finish(std::uint64_t ticket,
+                                           const Stop& stop,
+                                           CheckRoom check_room) {
+  absl::MutexLock lock(&mutex_);
+  STRATA_RETURN_IF_ERROR(CheckTicket(ticket));
+  if (piece_.size() > 0) SealPiece();
+  if (const absl::Status whole = CheckWhole(); !whole.ok()) {
+    Abandon();
+    return whole;
+  }
+  record_.content_hash =
+      announced() ? record_.header.content_hash : hasher_->Digest(record_.header);
+  ScanAck ack;
+  const absl::Status committed = core_.writer().Run(
+      Durability::kFull,
+      pieces_bytes_,
+      stop,
+      [&](StorageWriter& writer) ABSL_NO_THREAD_SAFETY_ANALYSIS -> absl::Status {
+        STRATA_ASSIGN_OR_RETURN(ack, Commit(writer, check_room));
+        return absl::OkStatus();
+      },
+      [&] {
+        if (!ack.already_present) core_.changes().Add(ack.commit_sequence, {ack.id}, {});
+      });
+  if (absl::IsAlreadyExists(committed)) Abandon();
+  STRATA_RETURN_IF_ERROR(committed);
+  dead_ = true;
+  return ack;
+}
+
+void ScanIntake::Abandon() {
+  dead_ = true;
+  if (staged_ == 0) return;
+  // If this fails the next start cleans up: what is announced, once it has been kept long enough.
+  core_.writer()
+      .Run(
+          Durability::kRelaxed,
+          0,
+          Stop(),
+          [upload = record_.upload](StorageWriter& writer) { return writer.AbandonUpload(upload); })
+      .IgnoreError();
+}
+
+UnfinishedUpload ScanIntake::Unfinished() const {
+  return {.upload = record_.upload,
+          .id = record_.header.id,
+          .content_hash = record_.header.content_hash,
+          .touched = touched_,
+          .chunks = staged_,
+          .bytes = record_.point_bytes};
+}
+
+std::optional<UnfinishedUpload> ScanIntake::Release(std::uint64_t ticket) {
+  absl::MutexLock lock(&mutex_);
+  if (parked_.has_value()) return std::move(parked_);  // it was not taken up
+  if (ticket != ticket_ || dead_) return std::nullopt;
+  if (!announced() || core_.options().upload_keep == absl::ZeroDuration()) {
+    Abandon();
+    return std::nullopt;
+  }
+  if (piece_.size() > 0) SealPiece();
+  if (!pieces_.empty()) StagePieces(Stop()).IgnoreError();  // what does not get there is sent again
+  if (staged_ == 0) return std::nullopt;
+  return Unfinished();
+}
+
+}  // namespace strata

@@ -1,0 +1,80 @@
+#include "core/engine/unfinished_uploads.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/time/clock.h"
+
+#include "core/common/status.h"
+#include "core/storage/storage.h"
+
+namespace strata {
+
+absl::StatusOr<std::unique_ptr<UnfinishedUploads>> UnfinishedUploads::Open(MapCore& core) {
+  auto uploads = std::unique_ptr<UnfinishedUploads>(new UnfinishedUploads(core));
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  STRATA_ASSIGN_OR_RETURN(const std::vector<UnfinishedUpload> found,
+                          reader->ListUnfinishedUploads());
+  absl::MutexLock lock(&uploads->mutex_);
+  for (const UnfinishedUpload& upload : found) {
+    uploads->parked_.insert_or_assign({upload.id, upload.content_hash}, upload);
+  }
+  uploads->Sweep(absl::Now());
+  return uploads;
+}
+
+std::shared_ptr<ScanIntake> UnfinishedUploads::Find(const ScanHeader& header) {
+  if (header.content_hash.empty()) return std::make_shared<ScanIntake>(core_, std::nullopt);
+  const Key key{header.id, header.content_hash};
+  absl::MutexLock lock(&mutex_);
+  Sweep(absl::Now());
+  std::erase_if(active_, [](const auto& entry) { return entry.second.expired(); });
+  std::weak_ptr<ScanIntake>& active = active_[key];
+  if (std::shared_ptr<ScanIntake> intake = active.lock(); intake != nullptr) return intake;
+  std::optional<UnfinishedUpload> parked;
+  if (auto node = parked_.extract(key); !node.empty()) parked = std::move(node.mapped());
+  auto intake = std::make_shared<ScanIntake>(core_, std::move(parked));
+  active = intake;
+  return intake;
+}
+
+void UnfinishedUploads::Release(std::shared_ptr<ScanIntake> intake, std::uint64_t ticket) {
+  // Nobody else can come to hold it meanwhile.
+  absl::MutexLock lock(&mutex_);
+  std::optional<UnfinishedUpload> left = intake->Release(ticket);
+  if (!left.has_value() || intake.use_count() > 1) return;
+  const Key key{left->id, left->content_hash};
+  active_.erase(key);
+  parked_.insert_or_assign(key, *std::move(left));
+  Sweep(absl::Now());
+}
+
+void UnfinishedUploads::Sweep(absl::Time now) {
+  std::vector<Key> by_age;
+  for (const auto& [key, upload] : parked_) by_age.push_back(key);
+  std::sort(by_age.begin(),
+            by_age.end(),
+            [this](const Key& a, const Key& b) ABSL_NO_THREAD_SAFETY_ANALYSIS {
+              return parked_.at(a).touched > parked_.at(b).touched;
+            });
+  std::uint64_t bytes = 0;
+  for (const Key& key : by_age) {
+    const UnfinishedUpload& upload = parked_.at(key);
+    bytes += upload.bytes;
+    const bool stays = now - upload.touched <= core_.options().upload_keep &&
+                       bytes <= core_.options().max_kept_upload_bytes;
+    if (stays) continue;
+    const absl::Status gone = core_.writer().Run(
+        Durability::kRelaxed, 0, Stop(), [number = upload.upload](StorageWriter& writer) {
+          return writer.AbandonUpload(number);
+        });
+    if (gone.ok()) parked_.erase(key);  // else the next sweep tries again
+  }
+}
+
+}  // namespace strata

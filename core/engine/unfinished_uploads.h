@@ -1,0 +1,52 @@
+// The announced scans of a map that are not whole yet: who sends them, and what stays for a while
+// of those whose stream ended.
+#ifndef STRATA_CORE_ENGINE_UNFINISHED_UPLOADS_H_
+#define STRATA_CORE_ENGINE_UNFINISHED_UPLOADS_H_
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+
+#include "core/engine/map_core.h"
+#include "core/engine/scan_intake.h"
+#include "core/storage/records.h"
+#include "core/world/scan.h"
+
+namespace strata {
+
+// Thread-safe.
+class UnfinishedUploads {
+ public:
+  // Finds what earlier runs left, and drops what is too old.
+  static absl::StatusOr<std::unique_ptr<UnfinishedUploads>> Open(MapCore& core);
+
+  // Where the points of this scan go: with an announced hash the intake of an earlier stream of it,
+  // if there is one, under way or not.
+  std::shared_ptr<ScanIntake> Find(const ScanHeader& header);
+  // A stream that holds `intake` has ended.
+  void Release(std::shared_ptr<ScanIntake> intake, std::uint64_t ticket);
+
+ private:
+  using Key = std::pair<ScanId, std::string>;  // with the announced hash
+
+  explicit UnfinishedUploads(MapCore& core) : core_(core) {}
+  // Drops what has stayed too long, and the oldest beyond the bound of bytes.
+  void Sweep(absl::Time now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  MapCore& core_;
+  absl::Mutex mutex_;
+  std::map<Key, std::weak_ptr<ScanIntake>> active_ ABSL_GUARDED_BY(mutex_);
+  std::map<Key, UnfinishedUpload> parked_ ABSL_GUARDED_BY(mutex_);  // no stream has them
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_UNFINISHED_UPLOADS_H_
