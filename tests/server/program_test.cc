@@ -67,8 +67,9 @@ TEST(OptionsTest, DefaultsAreThoseOfTheLibraries) {
 TEST(OptionsTest, AFileSaysTheSameAsTheCommandLineWhichGoesFirst) {
   const testing::TempDir dir;
   const std::string file = (dir.path() / "stratad.conf").string();
-  std::ofstream(file) << "# of this site\ndata = /srv/maps\nlisten = \"0.0.0.0:1\"\nclient-rate = 20\n"
-                         "upload-idle = 1.5\ntokens = /etc/t.json\ninsecure = true\n";
+  std::ofstream(file)
+      << "# of this site\ndata = /srv/maps\nlisten = \"0.0.0.0:1\"\nclient-rate = 20\n"
+         "upload-idle = 1.5\ntokens = /etc/t.json\ninsecure = true\n";
   STRATA_ASSERT_OK_AND_ASSIGN(const ProgramOptions options,
                               Parsed({"--config", file, "--client-rate", "30"}));
   EXPECT_EQ(options.engine.directory, "/srv/maps");
@@ -79,7 +80,8 @@ TEST(OptionsTest, AFileSaysTheSameAsTheCommandLineWhichGoesFirst) {
   EXPECT_TRUE(options.server.insecure);
   std::ofstream(file) << "data = maps\nlisen = 127.0.0.1:1\n";
   EXPECT_THAT(Parsed({"--config", file}), StatusIs(Code::kInvalidArgument, HasSubstr("lisen")));
-  EXPECT_THAT(Parsed({"--config", file + "x"}), StatusIs(Code::kInvalidArgument, HasSubstr("conf")));
+  EXPECT_THAT(Parsed({"--config", file + "x"}),
+              StatusIs(Code::kInvalidArgument, HasSubstr("conf")));
 }
 
 TEST(OptionsTest, NamesWhatIsOutOfRange) {
@@ -87,8 +89,10 @@ TEST(OptionsTest, NamesWhatIsOutOfRange) {
     return Parsed({"--data", "maps", option, value}).status();
   };
   EXPECT_THAT(status("--max-calls", "0"), StatusIs(Code::kInvalidArgument, HasSubstr("got 0")));
-  EXPECT_THAT(status("--client-rate", "-1"), StatusIs(Code::kInvalidArgument, HasSubstr("calls/s")));
-  EXPECT_THAT(status("--upload-idle", "nan"), StatusIs(Code::kInvalidArgument, HasSubstr("86400 s")));
+  EXPECT_THAT(status("--client-rate", "-1"),
+              StatusIs(Code::kInvalidArgument, HasSubstr("calls/s")));
+  EXPECT_THAT(status("--upload-idle", "nan"),
+              StatusIs(Code::kInvalidArgument, HasSubstr("86400 s")));
   EXPECT_THAT(status("--max-message", "65"), StatusIs(Code::kInvalidArgument, HasSubstr("64 MiB")));
   EXPECT_THAT(Parsed({}), StatusIs(Code::kInvalidArgument, HasSubstr("--data is missing")));
 }
@@ -114,10 +118,19 @@ absl::StatusOr<std::string> RunToken(std::vector<std::string> words) {
 TEST(TokenCommandsTest, AddPrintsATokenThatTheFileKnowsByItsHash) {
   const testing::TempDir dir;
   const std::string file = (dir.path() / "tokens.json").string();
-  STRATA_ASSERT_OK_AND_ASSIGN(
-      const std::string printed,
-      RunToken({"add", "robot7", "--right", "write", "--map", "campus", "--map", "harbour",
-                "--expires", "30d", "--tokens", file}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::string printed,
+                              RunToken({"add",
+                                        "robot7",
+                                        "--right",
+                                        "write",
+                                        "--map",
+                                        "campus",
+                                        "--map",
+                                        "harbour",
+                                        "--expires",
+                                        "30d",
+                                        "--tokens",
+                                        file}));
   const auto token = ParseToken(printed.substr(0, printed.size() - 1));
   ASSERT_TRUE(token.has_value()) << printed;
   STRATA_ASSERT_OK_AND_ASSIGN(const std::vector<Grant> grants, ReadTokenFile(file));
@@ -140,8 +153,16 @@ TEST(TokenCommandsTest, ListShowsAndRevokeTakesAway) {
   const std::string file = (dir.path() / "tokens.json").string();
   STRATA_ASSERT_OK(
       RunToken({"add", "ada", "--right", "admin", "--all-maps", "--tokens", file}).status());
-  EXPECT_EQ(RunToken({"add", "cam", "--right", "read", "--all-maps", "--certificate", "--expires",
-                      "never", "--tokens", file})
+  EXPECT_EQ(RunToken({"add",
+                      "cam",
+                      "--right",
+                      "read",
+                      "--all-maps",
+                      "--certificate",
+                      "--expires",
+                      "never",
+                      "--tokens",
+                      file})
                 .value(),
             "");
   EXPECT_THAT(RunToken({"add", "ada", "--right", "read", "--all-maps", "--tokens", file}),
@@ -249,8 +270,8 @@ TEST_F(CheckTest, FindsDamageInAMap) {
   const fs::path file = options_.engine.directory / "campus.strata";
   {
     std::fstream bytes(file, std::ios::in | std::ios::out | std::ios::binary);
-    bytes.seekp(4096 + 8);  // in the second page
-    bytes << std::string(2000, '\x5a');
+    bytes.seekp(16 << 10);  // behind the first pages, which say what the file is
+    bytes << std::string(64 << 10, '\x5a');
   }
   EXPECT_EQ(Of("map campus").verdict, Verdict::kError) << Of("map campus").message;
   EXPECT_EQ(Of("map moon").verdict, Verdict::kOk);

@@ -1,0 +1,121 @@
+// A stratad with TLS and tokens, and `strata` as its user has it.
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/client/cli/run_strata.h"
+#include "tests/integration/stratad_process.h"
+#include "tests/server/test_certificates.h"
+#include "tests/support/temp_dir.h"
+
+namespace strata::testing {
+namespace {
+
+using cli::Ran;
+using cli::RunStrata;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class DoorsTest : public ::testing::Test {
+ protected:
+  using Words = std::vector<std::string>;
+
+  std::string Path(const std::string& name) const { return (dir_.path() / name).string(); }
+
+  // The standard output of `stratad` with these words; it must end with `exit_code`.
+  static std::string RunStratad(const Words& words, int exit_code = 0) {
+    StratadProcess stratad(words);
+    std::string out;
+    for (std::string line = stratad.ReadLine(); !line.empty(); line = stratad.ReadLine()) {
+      out += line + "\n";
+    }
+    EXPECT_EQ(stratad.Wait(), exit_code) << out;
+    return out;
+  }
+  // Makes access for `name` and keeps the token in a file of that name.
+  void Give(const std::string& name, const Words& rights) const {
+    Words words = {"token", "add", name, "--tokens", Path("tokens.json")};
+    words.insert(words.end(), rights.begin(), rights.end());
+    std::ofstream(Path(name)) << RunStratad(words);
+  }
+  Words ServeOptions() const {
+    const TestCertificate certificate = authority_.Issue("server", "strata.example");
+    return {"--data",
+            Path("maps"),
+            "--listen",
+            "127.0.0.1:0",
+            "--tls-cert",
+            certificate.certificate.string(),
+            "--tls-key",
+            certificate.key.string(),
+            "--tokens",
+            Path("tokens.json")};
+  }
+  Ran Strata(StratadProcess& stratad, const std::string& token_of, const Words& verb) const {
+    Words words = {"--server", stratad.Address(), "--tls-ca", Path("authority.pem")};
+    if (!token_of.empty()) words.insert(words.end(), {"--token-file", Path(token_of)});
+    words.insert(words.end(), verb.begin(), verb.end());
+    return RunStrata(words);
+  }
+
+  TempDir dir_;
+  const TestAuthority authority_{dir_.path(), "authority"};
+};
+
+TEST_F(DoorsTest, TheCommandLineComesInWithATokenAndDoesWhatItMay) {
+  Give("ada", {"--right", "admin", "--all-maps"});
+  Give("robot7", {"--right", "write", "--map", "campus"});
+  Give("guest", {"--right", "read", "--map", "harbour"});
+  StratadProcess stratad(ServeOptions());
+  EXPECT_EQ(Strata(stratad, "ada", {"map", "create", "campus"}).exit_code, 0);
+  EXPECT_EQ(Strata(stratad, "ada", {"map", "create", "harbour"}).exit_code, 0);
+  EXPECT_THAT(Strata(stratad, "robot7", {"map", "list"}).out, HasSubstr("campus"));
+  EXPECT_THAT(Strata(stratad, "guest", {"map", "list"}).out, Not(HasSubstr("campus")));
+
+  const Ran refused = Strata(stratad, "robot7", {"map", "delete", "campus"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("robot7 lacks the right 'admin' on map campus"));
+  const Ran none = Strata(stratad, "", {"map", "list"});
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_THAT(none.err, HasSubstr("show a token with --token-file FILE"));
+  const Ran foreign = Strata(stratad, "guest", {"map", "show", "campus"});
+  EXPECT_EQ(foreign.exit_code, 1);
+  EXPECT_THAT(foreign.err, HasSubstr("guest lacks the right 'read' on map campus"));
+
+  const Ran plain = RunStrata({"--server", stratad.Address(), "map", "list"});
+  EXPECT_EQ(plain.exit_code, 1);
+  EXPECT_THAT(plain.err, HasSubstr("without TLS?"));
+  stratad.Signal(SIGTERM);
+  EXPECT_EQ(stratad.Wait(), 0);
+}
+
+TEST_F(DoorsTest, CheckSaysWhetherItCouldServe) {
+  Give("ada", {"--right", "admin", "--all-maps"});
+  Words words = ServeOptions();
+  words.insert(words.begin(), "check");
+  EXPECT_THAT(RunStratad(words), AllOf(HasSubstr("tokens: "), HasSubstr("1 clients, 0 expired")));
+  std::ofstream(Path("tokens.json")) << "{";
+  EXPECT_THAT(RunStratad(words, 1), HasSubstr("error   tokens: "));
+}
+
+TEST_F(DoorsTest, BeyondLoopbackItNeedsTlsAndTokens) {
+  Give("ada", {"--right", "admin", "--all-maps"});
+  RunStratad({"--data", Path("maps"), "--listen", "0.0.0.0:0"}, 1);
+  RunStratad({"--data", Path("maps"), "--listen", "0.0.0.0:0", "--tokens", Path("tokens.json")}, 1);
+  RunStratad({"--data", Path("maps"), "--metrics", "0.0.0.0:0"}, 1);
+  EXPECT_FALSE(std::filesystem::exists(Path("maps")));
+  Words words = ServeOptions();
+  words[3] = "0.0.0.0:0";
+  StratadProcess stratad(words);
+  EXPECT_THAT(stratad.Address(), HasSubstr("0.0.0.0:"));
+}
+
+}  // namespace
+}  // namespace strata::testing
