@@ -9,8 +9,8 @@
 
 namespace strata::testing {
 
-StratadProcess::StratadProcess(const std::vector<std::string>& arguments) {
-  std::vector<std::string> words = {STRATA_STRATAD};
+ChildProcess::ChildProcess(const std::string& program, const std::vector<std::string>& arguments) {
+  std::vector<std::string> words = {program};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
@@ -29,7 +29,7 @@ StratadProcess::StratadProcess(const std::vector<std::string>& arguments) {
   stdout_ = fdopen(ends[0], "r");
 }
 
-StratadProcess::~StratadProcess() {
+ChildProcess::~ChildProcess() {
   if (pid_ > 0) {
     Signal(SIGKILL);
     Wait();
@@ -37,13 +37,16 @@ StratadProcess::~StratadProcess() {
   std::fclose(stdout_);
 }
 
-std::string StratadProcess::ReadLine() {
+std::string ChildProcess::ReadLine() {
   std::string line;
   for (int c = std::fgetc(stdout_); c != EOF && c != '\n'; c = std::fgetc(stdout_)) {
     line.push_back(static_cast<char>(c));
   }
   return line;
 }
+
+StratadProcess::StratadProcess(const std::vector<std::string>& arguments)
+    : ChildProcess(STRATA_STRATAD, arguments) {}
 
 const std::string& StratadProcess::Address() {
   const std::string prefix = "listening ";
@@ -55,9 +58,11 @@ const std::string& StratadProcess::Address() {
   return address_;
 }
 
-void StratadProcess::Signal(int signal) const { kill(pid_, signal); }
+void ChildProcess::Signal(int signal) const {
+  if (pid_ > 0) kill(pid_, signal);  // -1 would be everybody
+}
 
-int StratadProcess::Wait() {
+int ChildProcess::Wait() {
   int status = 0;
   EXPECT_EQ(waitpid(pid_, &status, 0), pid_);
   pid_ = -1;

@@ -10,19 +10,17 @@
 
 namespace strata::testing {
 
-// Runs stratad with `arguments`; its log goes to the test's stderr.
-class StratadProcess {
+// Runs a program with `arguments`; its stderr is the test's.
+class ChildProcess {
  public:
-  explicit StratadProcess(const std::vector<std::string>& arguments);
+  ChildProcess(const std::string& program, const std::vector<std::string>& arguments);
   // Kills what still runs.
-  ~StratadProcess();
-  StratadProcess(const StratadProcess&) = delete;
-  StratadProcess& operator=(const StratadProcess&) = delete;
+  ~ChildProcess();
+  ChildProcess(const ChildProcess&) = delete;
+  ChildProcess& operator=(const ChildProcess&) = delete;
 
   // The next line of its stdout without the newline; empty at its end.
   std::string ReadLine();
-  // HOST:PORT out of "listening HOST:PORT", read once.
-  const std::string& Address();
   void Signal(int signal) const;
   pid_t pid() const { return pid_; }
   // Waits for its end: its exit code, or minus the signal that ended it.
@@ -31,6 +29,15 @@ class StratadProcess {
  private:
   pid_t pid_ = -1;
   std::FILE* stdout_ = nullptr;
+};
+
+class StratadProcess : public ChildProcess {
+ public:
+  explicit StratadProcess(const std::vector<std::string>& arguments);
+  // HOST:PORT out of "listening HOST:PORT", read once.
+  const std::string& Address();
+
+ private:
   std::string address_;
 };
 
