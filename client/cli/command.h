@@ -4,9 +4,11 @@
 #define STRATA_CLIENT_CLI_COMMAND_H_
 
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include <CLI/CLI.hpp>
 
 #include "client/cli/output.h"
@@ -21,6 +23,9 @@ struct Context {
   api::Database& database;
   api::Call call;  // stops on the first Ctrl-C
   Output& output;
+  // Opens a directory of maps in this process.
+  std::function<absl::StatusOr<std::unique_ptr<api::Database>>(const std::string&)> open_directory =
+      nullptr;
 };
 
 // What a running command has at hand that works on files alone and opens no database.
@@ -64,6 +69,7 @@ void AddPosegraphCommands(Commands& commands);
 void AddTileCommands(Commands& commands);
 void AddSurfaceCommand(Commands& commands);
 void AddPlanCommand(Commands& commands);
+void AddPathCommands(Commands& commands);
 void AddProfileCommands(Commands& commands);
 void AddJobCommands(Commands& commands);
 void AddPlanesCommands(Commands& commands);

@@ -37,6 +37,17 @@ absl::StatusOr<std::string> TokenOf(const Target& target) {
 
 }  // namespace
 
+absl::StatusOr<std::unique_ptr<api::Database>> OpenDirectory(const std::string& directory) {
+  // What the engine does not say through a call (a map that cannot be opened), as plain talk.
+  FLAGS_logtostderr = true;
+  FLAGS_log_prefix = false;
+  FLAGS_minloglevel = google::GLOG_ERROR;
+  if (!google::IsGoogleLoggingInitialized()) google::InitGoogleLogging("strata");
+  EngineOptions options;
+  options.directory = directory;
+  return OpenEngine(options);
+}
+
 absl::StatusOr<std::unique_ptr<api::Database>> OpenDatabase(const Target& target) {
   if (!target.embedded.empty()) {
     std::error_code error;
@@ -44,14 +55,7 @@ absl::StatusOr<std::unique_ptr<api::Database>> OpenDatabase(const Target& target
       return absl::NotFoundError(absl::StrCat(
           "directory ", target.embedded, " does not exist; map create makes it with a first map"));
     }
-    // What the engine does not say through a call (a map that cannot be opened), as plain talk.
-    FLAGS_logtostderr = true;
-    FLAGS_log_prefix = false;
-    FLAGS_minloglevel = google::GLOG_ERROR;
-    google::InitGoogleLogging("strata");
-    EngineOptions options;
-    options.directory = target.embedded;
-    return OpenEngine(options);
+    return OpenDirectory(target.embedded);
   }
   ClientOptions options;
   options.target = target.server;

@@ -25,6 +25,9 @@ struct Target {
   bool make_directory = false;  // if there is none; else that is NOT_FOUND
 };
 
+// In this process.
+absl::StatusOr<std::unique_ptr<api::Database>> OpenDirectory(const std::string& directory);
+
 absl::StatusOr<std::unique_ptr<api::Database>> OpenDatabase(const Target& target);
 
 }  // namespace strata::cli

@@ -232,6 +232,24 @@ Json ToJson(const PlanResult& plan) {
   return json;
 }
 
+Json ToJson(const PathCheck& check) {
+  Json tiles = Json::array();
+  for (const TileKey& tile : check.tiles) tiles.push_back(tile.ToString());
+  Json json = {{"valid", check.valid},
+               {"message", check.message},
+               {"valid_m", check.valid_m},
+               {"length_m", check.length_m},
+               {"epoch", check.epoch},
+               {"commit_sequence", check.commit_sequence},
+               {"tiles", tiles}};
+  if (check.obstruction != Obstruction::kNone) {
+    json["obstruction"] = std::string(strata::ToString(check.obstruction));
+    json["obstruction_value"] = check.obstruction_value;
+  }
+  if (check.where.has_value()) json["where"] = ToJson(*check.where);
+  return json;
+}
+
 Json ToJson(const Surface& surface) {
   return {{"z", Short(surface.z_m)},
           {"sigma_m", Short(surface.sigma_m)},

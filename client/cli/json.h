@@ -30,6 +30,7 @@ Json ToJson(const ScanInfo& info);
 Json ToJson(const PoseNode& node);
 Json ToJson(const JobInfo& job);
 Json ToJson(const PlanResult& plan);
+Json ToJson(const PathCheck& check);
 Json ToJson(const Surface& surface);
 Json ToJson(const SurfaceColumn& column);
 Json ToJson(const api::TileInfo& tile);

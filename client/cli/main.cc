@@ -129,7 +129,8 @@ absl::Status RunWithSignals(const Stop& stop, const std::function<absl::Status()
 
 absl::Status RunOnDatabase(const Target& target, const Action& action, Output& output) {
   STRATA_ASSIGN_OR_RETURN(const auto database, OpenDatabase(target));
-  Context context{.database = *database, .call = {}, .output = output};
+  Context context{
+      .database = *database, .call = {}, .output = output, .open_directory = OpenDirectory};
   const absl::Status status = RunWithSignals(context.call.stop, [&] { return action(context); });
   return Explained(status, target);
 }
@@ -168,6 +169,7 @@ int Main(int argc, char** argv) {
   AddTileCommands(commands);
   AddSurfaceCommand(commands);
   AddPlanCommand(commands);
+  AddPathCommands(commands);
   AddProfileCommands(commands);
   AddJobCommands(commands);
   AddPlanesCommands(commands);

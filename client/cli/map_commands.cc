@@ -1,5 +1,5 @@
-// strata map create|list|show|delete|verify|rebuild|history|revert; classes, export, render and
-// watch have files of their own.
+// strata map create|list|show|delete|verify|rebuild|history|revert; backup, classes, diff, export,
+// merge, render and watch have files of their own.
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -195,9 +195,12 @@ void AddMapCommands(Commands& commands) {
        "strata map history campus",
        History);
   AddRevert(commands, noun, options);
+  AddMapBackup(commands, noun);
   AddMapClasses(commands, noun);
   AddMapWatch(commands, noun);
+  AddMapDiff(commands, noun);
   AddMapExport(commands, noun);
+  AddMapMerge(commands, noun);
   AddMapRender(commands, noun);
 }
 

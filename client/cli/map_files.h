@@ -6,8 +6,11 @@
 
 namespace strata::cli {
 
+void AddMapBackup(Commands& commands, CLI::App* noun);
 void AddMapClasses(Commands& commands, CLI::App* noun);
+void AddMapDiff(Commands& commands, CLI::App* noun);
 void AddMapExport(Commands& commands, CLI::App* noun);
+void AddMapMerge(Commands& commands, CLI::App* noun);
 void AddMapRender(Commands& commands, CLI::App* noun);
 void AddMapWatch(Commands& commands, CLI::App* noun);
 

@@ -3,23 +3,21 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "absl/strings/str_split.h"
 
 #include "client/cli/arguments.h"
 #include "client/cli/command.h"
+#include "client/cli/driver_options.h"
 #include "client/cli/json.h"
 #include "client/cli/number_file.h"
+#include "client/cli/path_commands.h"
 #include "client/cli/path_file.h"
 #include "core/common/status.h"
-#include "core/world/map_class.h"
 
 namespace strata::cli {
 namespace {
@@ -29,41 +27,10 @@ struct PlanOptions {
   PlanQuery query;
   std::optional<int> from_level, to_level;
   std::string queries_file;
-  std::string profile = std::string(api::kDefaultProfile);
-  ProfileOverrides overrides;
-  std::vector<std::string> avoid;  // CLASS=FACTOR or CLASS=never
+  DriverOptions driver;
   std::string out;
+  bool watch = false;
 };
-
-// Classes by the map's table.
-absl::StatusOr<ClassCosts> ClassCostsOf(Context& context, const PlanOptions& options) {
-  ClassCosts costs;
-  if (options.avoid.empty()) return costs;
-  STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes,
-                          context.database.maps().ListClasses(context.call, options.map));
-  for (const std::string& text : options.avoid) {
-    const std::pair<std::string, std::string> sides = absl::StrSplit(text, absl::MaxSplits('=', 1));
-    double factor = kForbiddenClass;
-    if (sides.second != "never" && !absl::SimpleAtod(sides.second, &factor)) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("--avoid ", text, ": expected CLASS=FACTOR or CLASS=never"));
-    }
-    STRATA_ASSIGN_OR_RETURN(const std::uint16_t id, ClassIdOf(classes, sides.first));
-    costs[id] = factor;
-  }
-  STRATA_RETURN_IF_ERROR(ValidateClassCosts(costs));
-  return costs;
-}
-
-absl::StatusOr<RobotProfile> ProfileOf(Context& context, const PlanOptions& options) {
-  STRATA_ASSIGN_OR_RETURN(const auto profiles,
-                          context.database.planning().ListProfiles(context.call, options.map));
-  const auto profile = profiles.find(options.profile);
-  if (profile == profiles.end()) {
-    return absl::NotFoundError(absl::StrCat("map ", options.map, ": no profile ", options.profile));
-  }
-  return options.overrides.Over(profile->second);
-}
 
 void PrintText(const PlanResult& plan, Output& output) {
   if (!plan.found()) {
@@ -91,8 +58,9 @@ void PrintText(const PlanResult& plan, Output& output) {
 }
 
 absl::Status PlanOne(Context& context, PlanOptions options) {
-  STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options));
-  STRATA_ASSIGN_OR_RETURN(options.query.class_costs, ClassCostsOf(context, options));
+  STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options.map, options.driver));
+  STRATA_ASSIGN_OR_RETURN(options.query.class_costs,
+                          ClassCostsOf(context, options.map, options.driver));
   options.query.from.level = options.from_level;
   options.query.to.level = options.to_level;
   STRATA_ASSIGN_OR_RETURN(
@@ -107,7 +75,9 @@ absl::Status PlanOne(Context& context, PlanOptions options) {
   } else {
     PrintText(plan, context.output);
   }
-  return absl::OkStatus();
+  if (!options.watch || !plan.found()) return absl::OkStatus();
+  return FollowPath(
+      context, options.map, {plan.waypoints, options.query.profile, options.query.class_costs});
 }
 
 // A query that was refused, with the keys of an answer.
@@ -122,8 +92,9 @@ Json Refused(const absl::Status& status) {
 // A JSON line for each query; one that is refused has the reason "error" and the rest goes on.
 absl::Status PlanMany(Context& context, PlanOptions options) {
   STRATA_ASSIGN_OR_RETURN(const auto rows, ReadNumberFile(options.queries_file, 6, 6));
-  STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options));
-  STRATA_ASSIGN_OR_RETURN(options.query.class_costs, ClassCostsOf(context, options));
+  STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options.map, options.driver));
+  STRATA_ASSIGN_OR_RETURN(options.query.class_costs,
+                          ClassCostsOf(context, options.map, options.driver));
   absl::Status first_error;
   for (const std::vector<double>& row : rows) {
     options.query.from = {.x_m = row[0], .y_m = row[1], .z_m = row[2], .level = {}};
@@ -202,15 +173,7 @@ void AddPlanCommand(Commands& commands) {
                     });
   AddMapName(verb, options->map);
   AddEndpoints(verb, options);
-  verb->add_option("--profile", options->profile, "The map's robot profile to start from")
-      ->capture_default_str();
-  AddProfileOptions(verb, options->overrides);
-  verb->add_option("--avoid",
-                   options->avoid,
-                   "Surfaces of a class, by its name or id, cost so many times as much (1 to 100), "
-                   "or are never crossed; may be given several times")
-      ->type_name("CLASS=FACTOR|CLASS=never")
-      ->allow_extra_args(false);
+  AddDriverOptions(verb, options->driver);
   verb->add_option("--max-expanded", options->query.max_expanded, "Search limit: patches looked at")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
@@ -219,6 +182,10 @@ void AddPlanCommand(Commands& commands) {
                    "Write the path, if there is one, as PLY: its waypoints as vertices in order, "
                    "joined by edges; map render --path reads it")
       ->type_name("FILE.ply");
+  verb->add_flag("--watch",
+                 options->watch,
+                 "Then say whenever the path stops to hold or holds again, until Ctrl-C")
+      ->excludes("--queries");
   verb->parse_complete_callback([verb] {
     if (verb->count("--from") == 0 && verb->count("--queries") == 0) {
       throw CLI::RequiredError("--from and --to, or --queries");

@@ -86,6 +86,10 @@ void AddTileCommands(Commands& commands) {
   AddMapName(list, options->map);
   list->add_option("--level", options->area.level, "Level of detail, 0 = finest")
       ->capture_default_str();
+  list->add_option("--epoch",
+                   options->area.epoch,
+                   "As the poses of an earlier epoch make them; see map history")
+      ->check(CLI::PositiveNumber);
   AddNumbers(
       list,
       "--area",

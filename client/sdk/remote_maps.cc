@@ -1,8 +1,10 @@
 #include "client/sdk/remote_maps.h"
 
+#include <cstdint>
 #include <memory>
 #include <string>
 
+#include "core/common/checksum.h"
 #include "core/common/status.h"
 #include "proto/translate/maps.h"
 #include "proto/translate/watch.h"
@@ -132,6 +134,29 @@ absl::Status RemoteMaps::Watch(const api::Call& call,
     if (ended.ok() || !taken.ok()) return ended;
     if (!backoff.Wait(ended, call.stop)) return call.stop.requested() ? call.stop.status() : ended;
   }
+}
+
+absl::Status RemoteMaps::Backup(const api::Call& call,
+                                absl::string_view name,
+                                absl::FunctionRef<absl::Status(const api::BackupPiece&)> sink) {
+  v1::BackupMapRequest in;
+  in.set_name(std::string(name));
+  ContentHasher hasher;
+  std::uint64_t received = 0;
+  bool whole = false;
+  const auto deliver = [&](const v1::BackupMapResponse& out) -> absl::Status {
+    const api::BackupPiece piece = FromProto(out);
+    hasher.Add(piece.bytes);
+    received += piece.bytes.size();
+    if (!piece.content_hash.empty()) {
+      whole = received == piece.total_bytes && hasher.HexDigest() == piece.content_hash;
+      if (!whole) return absl::DataLossError("backup: what arrived is not what was sent");
+    }
+    return sink(piece);
+  };
+  STRATA_RETURN_IF_ERROR(
+      CallStream(connection_, *stub_, &v1::Maps::Stub::Backup, call, in, deliver));
+  return whole ? absl::OkStatus() : absl::DataLossError("backup: it ended before its end");
 }
 
 }  // namespace strata::sdk

@@ -35,6 +35,9 @@ class RemoteMaps final : public api::Maps {
                      absl::string_view name,
                      const api::WatchOptions& options,
                      absl::FunctionRef<absl::Status(const api::MapUpdate&)> sink) override;
+  absl::Status Backup(const api::Call& call,
+                      absl::string_view name,
+                      absl::FunctionRef<absl::Status(const api::BackupPiece&)> sink) override;
 
  private:
   Connection& connection_;

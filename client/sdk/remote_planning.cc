@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -32,6 +34,47 @@ absl::StatusOr<PlanResult> RemotePlanning::PlanPath(const api::Call& call,
                                     Repeat::kOnTrouble,
                                     ToProto(map, query)));
   return FromProto(out);
+}
+
+absl::StatusOr<PathCheck> RemotePlanning::CheckPath(const api::Call& call,
+                                                    absl::string_view map,
+                                                    const PathQuery& query) {
+  STRATA_ASSIGN_OR_RETURN(const v1::CheckPathResponse out,
+                          CallUnary(connection_,
+                                    *stub_,
+                                    &v1::Planning::Stub::CheckPath,
+                                    call,
+                                    Repeat::kOnTrouble,
+                                    translate::CheckToProto(map, query)));
+  return FromProto(out.check());
+}
+
+absl::Status RemotePlanning::WatchPath(const api::Call& call,
+                                       absl::string_view map,
+                                       const PathQuery& query,
+                                       absl::FunctionRef<absl::Status(const PathCheck&)> sink) {
+  const v1::WatchPathRequest in = translate::WatchToProto(map, query);
+  std::optional<bool> told;
+  Backoff backoff = connection_.NewEndlessBackoff();
+  while (true) {
+    STRATA_RETURN_IF_ERROR(call.stop.status());
+    absl::Status taken;
+    const auto deliver = [&](const v1::WatchPathResponse& out) -> absl::Status {
+      STRATA_ASSIGN_OR_RETURN(const PathCheck check, FromProto(out.check()));
+      if (told == check.valid) return absl::OkStatus();  // as before the connection broke
+      told = check.valid;
+      taken = sink(check);
+      return taken;
+    };
+    AttemptContext context(connection_, call);
+    bool delivered = false;
+    const std::unique_ptr<grpc::ClientReader<v1::WatchPathResponse>> reader =
+        stub_->WatchPath(context.get(), in);
+    const absl::Status ended = ReadStream(context, *reader, call, deliver, delivered);
+    if (delivered) backoff = connection_.NewEndlessBackoff();
+    if (ended.ok() || !taken.ok()) return ended;
+    if (!backoff.Wait(ended, call.stop)) return call.stop.requested() ? call.stop.status() : ended;
+  }
 }
 
 absl::StatusOr<std::vector<SurfaceColumn>> RemotePlanning::SampleSurfaces(

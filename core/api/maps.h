@@ -58,6 +58,13 @@ struct MapUpdate {
   std::vector<TileChangeNotice> tiles;
 };
 
+// A part of a map's backup, in order.
+struct BackupPiece {
+  std::string bytes;              // at most 1 MiB
+  std::uint64_t total_bytes = 0;  // of the whole
+  std::string content_hash;       // of the whole, with the last piece: XXH3-128, hexadecimal
+};
+
 // Thread-safe. An unknown map is NOT_FOUND in every call of every interface.
 class Maps {
  public:
@@ -92,6 +99,14 @@ class Maps {
                              absl::string_view name,
                              const WatchOptions& options,
                              absl::FunctionRef<absl::Status(const MapUpdate&)> sink) = 0;
+  // Delivers the file of the map as it is at one moment, with every scan that was acknowledged
+  // before the call; uploads go on meanwhile. The server's disk holds a copy until it is delivered.
+  // RESOURCE_EXHAUSTED while another backup of the map runs and for a full disk; DATA_LOSS if the
+  // file cannot be read, or if what arrived is not what was sent. A sink's error ends the stream
+  // and is handed back.
+  virtual absl::Status Backup(const Call& call,
+                              absl::string_view name,
+                              absl::FunctionRef<absl::Status(const BackupPiece&)> sink) = 0;
 };
 
 }  // namespace strata::api

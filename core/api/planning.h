@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
@@ -31,6 +32,18 @@ class Planning {
   virtual absl::StatusOr<PlanResult> PlanPath(const Call& call,
                                               absl::string_view map,
                                               const PlanQuery& query) = 0;
+  // Whether a path holds, and where it does not; both are OK. One that was just planned does.
+  // INVALID_ARGUMENT for a bad query (Planner::Check in core/planning); else as PlanPath.
+  virtual absl::StatusOr<PathCheck> CheckPath(const Call& call,
+                                              absl::string_view map,
+                                              const PathQuery& query) = 0;
+  // Delivers how the path stands, at once and whenever it stops to hold or holds again, until the
+  // call is stopped. Looks only when a tile changed that the path stands on, or one beside. A
+  // sink's error ends the stream and is handed back. Errors of CheckPath.
+  virtual absl::Status WatchPath(const Call& call,
+                                 absl::string_view map,
+                                 const PathQuery& query,
+                                 absl::FunctionRef<absl::Status(const PathCheck&)> sink) = 0;
   // All levels at each place, in the order asked; a place without surfaces has an empty column.
   // DATA_LOSS naming a damaged tile where one of the places lies.
   virtual absl::StatusOr<std::vector<SurfaceColumn>> SampleSurfaces(

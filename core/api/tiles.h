@@ -31,11 +31,15 @@ struct TileInfo {
   std::uint64_t patches = 0;
 };
 
-// Tiles x_min ≤ x < x_max, y_min ≤ y < y_max of one level of detail.
+// Tiles x_min ≤ x < x_max, y_min ≤ y < y_max of one level of detail, in one epoch.
 struct TileArea {
   std::int32_t level = 0;
   std::int64_t x_min = -(std::int64_t{1} << 31), x_max = std::int64_t{1} << 31;
   std::int64_t y_min = -(std::int64_t{1} << 31), y_max = std::int64_t{1} << 31;
+  // 0: the current one. An earlier one has the tiles that its poses make of the scans that are
+  // there now and had a pose in it, level 0 only; they are made when asked for. Those that are not
+  // as they are now have version 0, which no reader holds: they are sent again each time.
+  std::uint64_t epoch = 0;
 };
 
 // A tile the reader has already.
@@ -62,13 +66,15 @@ class Tiles {
   virtual absl::StatusOr<EncodedTile> Get(const Call& call,
                                           absl::string_view map,
                                           const TileKey& key) = 0;
-  // By key. INVALID_ARGUMENT for a level outside 0 to kMaxLevel.
+  // By key. INVALID_ARGUMENT for a level outside 0 to kMaxLevel, and above 0 in an earlier epoch;
+  // NOT_FOUND for an epoch that is not kept; DATA_LOSS naming a damaged scan, ABORTED naming one
+  // that was deleted meanwhile, where tiles of an earlier epoch are made.
   virtual absl::StatusOr<std::vector<TileInfo>> List(const Call& call,
                                                      absl::string_view map,
                                                      const TileArea& area) = 0;
   // What is new, changed or gone in the area against what the reader holds; nothing else is sent. A
-  // damaged tile is marked, Get says why, and the others are served. A sink's error ends the stream
-  // and is handed back.
+  // damaged tile is marked, Get says why, and the others are served. Errors of List. A sink's error
+  // ends the stream and is handed back.
   virtual absl::Status Fetch(const Call& call,
                              absl::string_view map,
                              const TileArea& area,

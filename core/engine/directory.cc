@@ -31,8 +31,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr absl::string_view kSuffix = ".strata";
-// Map names never begin with a dot, so neither prefix can meet a map.
+// Map names never begin with a dot, so no prefix can meet a map.
 constexpr char kMakingPrefix[] = ".making-";
+constexpr char kCopyPrefix[] = ".copy-";
 constexpr char kLockName[] = ".lock";
 // Of the files of a map, itself first.
 constexpr std::array<const char*, 4> kSuffixes = {"", "-wal", "-shm", "-journal"};
@@ -85,7 +86,9 @@ absl::Status RemoveLeftovers(const fs::path& directory) {
   }
   if (error) return absl::UnavailableError(absl::StrCat(directory.string(), ": ", error.message()));
   for (const fs::path& file : files) {
-    const bool half_made = absl::StartsWith(file.filename().string(), kMakingPrefix);
+    const std::string name = file.filename().string();
+    const bool half_made =
+        absl::StartsWith(name, kMakingPrefix) || absl::StartsWith(name, kCopyPrefix);
     if (half_made || IsOrphan(file)) fs::remove(file, error);
   }
   return absl::OkStatus();
@@ -118,6 +121,10 @@ MapDirectory::~MapDirectory() {
 
 fs::path MapDirectory::FileIn(const fs::path& directory, absl::string_view name) {
   return directory / absl::StrCat(name, kSuffix);
+}
+
+fs::path MapDirectory::CopyOf(absl::string_view name) const {
+  return path_ / absl::StrCat(kCopyPrefix, name, kSuffix);
 }
 
 absl::StatusOr<std::vector<std::string>> MapDirectory::NamesIn(const fs::path& directory) {

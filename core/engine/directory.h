@@ -19,8 +19,8 @@ namespace strata {
 // Locked for as long as it lives. Map names must be valid (ValidateName): they become file names.
 class MapDirectory {
  public:
-  // Makes the directory if needed and removes what a crash left of half-made and half-deleted maps.
-  // FAILED_PRECONDITION if another engine has it.
+  // Makes the directory if needed and removes what a crash left of half-made and half-deleted maps
+  // and of copies. FAILED_PRECONDITION if another engine has it.
   static absl::StatusOr<MapDirectory> Open(const std::filesystem::path& path);
   ~MapDirectory();
   MapDirectory(MapDirectory&& other) noexcept
@@ -33,6 +33,8 @@ class MapDirectory {
   static absl::StatusOr<std::vector<std::string>> NamesIn(const std::filesystem::path& directory);
   std::filesystem::path FileOf(absl::string_view name) const { return FileIn(path_, name); }
   absl::StatusOr<std::vector<std::string>> ListNames() const { return NamesIn(path_); }
+  // Where a copy of the map is made: no map's file, and removed by the next Open().
+  std::filesystem::path CopyOf(absl::string_view name) const;
   // All or nothing, also when the power fails. ALREADY_EXISTS.
   absl::Status CreateFile(absl::string_view name,
                           const MapParameters& parameters,

@@ -1,13 +1,17 @@
 #include "core/engine/map_planner.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "absl/container/btree_set.h"
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
@@ -15,9 +19,32 @@
 
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/status.h"
+#include "core/engine/change_log.h"
+#include "core/engine/surface_tiles.h"
 #include "core/engine/tile_check.h"
+#include "core/planning/path_check.h"
 
 namespace strata {
+namespace {
+
+// Whether an answer given before is the one that would be given now. What a robot may do in a tile
+// depends on the tiles around it too.
+bool StillKnown(const PathCheck& known,
+                const PathQuery& query,
+                const ChangeSet& changes,
+                double cell_size_m) {
+  if (!changes.complete || known.commit_sequence > changes.last) return false;
+  if (!ValidateWaypoints(query.waypoints, cell_size_m).ok() ||
+      known.tiles != TilesUnder(query.waypoints, cell_size_m)) {
+    return false;
+  }
+  const absl::btree_set<TileKey> around = WithNeighbours({known.tiles.begin(), known.tiles.end()});
+  return std::none_of(changes.tiles.begin(), changes.tiles.end(), [&](const auto& change) {
+    return around.contains(change.first);
+  });
+}
+
+}  // namespace
 
 // The tiles of one pinned state.
 class MapPlanner::Source final : public TileSource {
@@ -37,7 +64,9 @@ class MapPlanner::Source final : public TileSource {
   std::uint64_t epoch() const { return pin_.view().epoch; }
 
   static absl::StatusOr<Source> OfNow(MapPlanner& planner) {
-    Snapshots::Pin pin = planner.core_.snapshots().PinCurrent();
+    return Of(planner, planner.core_.snapshots().PinCurrent());
+  }
+  static absl::StatusOr<Source> Of(MapPlanner& planner, Snapshots::Pin pin) {
     STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const Versions> versions,
                             planner.VersionsOf(pin.view()));
     return Source(planner, std::move(pin), std::move(versions));
@@ -101,6 +130,41 @@ absl::StatusOr<PlanResult> MapPlanner::Plan(const PlanQuery& query, const Stop& 
   STRATA_ASSIGN_OR_RETURN(PlanResult result, planner_.Plan(source, query, stop));
   result.epoch = source.epoch();
   return result;
+}
+
+absl::StatusOr<PathCheck> MapPlanner::Check(const PathQuery& query, const Stop& stop) {
+  const double cell_size_m = core_.info().parameters.mls.cell_size_m;
+  const std::uint64_t since = query.known.has_value() ? query.known->commit_sequence
+                                                      : std::numeric_limits<std::uint64_t>::max();
+  std::pair<ChangeSet, Snapshots::Pin> told = core_.ChangesSince(since);
+  const ChangeSet& changes = told.first;
+  const std::uint64_t epoch = told.second.view().epoch;
+  PathCheck check;
+  if (query.known.has_value() && StillKnown(*query.known, query, changes, cell_size_m)) {
+    check = *query.known;
+  } else {
+    STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, std::move(told.second)));
+    STRATA_ASSIGN_OR_RETURN(check, planner_.Check(source, query, stop));
+  }
+  check.epoch = epoch;
+  check.commit_sequence = changes.last;
+  return check;
+}
+
+absl::Status MapPlanner::Watch(const PathQuery& query,
+                               const Stop& stop,
+                               absl::FunctionRef<absl::Status(const PathCheck&)> sink) {
+  PathQuery asked = query;
+  asked.known.reset();
+  while (true) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+    STRATA_ASSIGN_OR_RETURN(const PathCheck check, Check(asked, stop));
+    if (!asked.known.has_value() || asked.known->valid != check.valid) {
+      STRATA_RETURN_IF_ERROR(sink(check));
+    }
+    asked.known = check;
+    STRATA_RETURN_IF_ERROR(core_.changes().Await(check.commit_sequence, stop));
+  }
 }
 
 absl::StatusOr<std::vector<SurfaceColumn>> MapPlanner::Sample(

@@ -9,6 +9,8 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/container/flat_hash_map.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 #include <Eigen/Core>
@@ -28,6 +30,11 @@ class MapPlanner {
   explicit MapPlanner(MapCore& core);
 
   absl::StatusOr<PlanResult> Plan(const PlanQuery& query, const Stop& stop);
+  absl::StatusOr<PathCheck> Check(const PathQuery& query, const Stop& stop);
+  // As api::Planning::WatchPath.
+  absl::Status Watch(const PathQuery& query,
+                     const Stop& stop,
+                     absl::FunctionRef<absl::Status(const PathCheck&)> sink);
   // INVALID_ARGUMENT for a place that is not finite.
   absl::StatusOr<std::vector<SurfaceColumn>> Sample(const std::vector<Eigen::Vector2d>& places,
                                                     const Stop& stop);

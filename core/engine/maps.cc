@@ -17,6 +17,7 @@
 
 #include "core/common/log_line.h"
 #include "core/common/status.h"
+#include "core/engine/backup.h"
 #include "core/engine/map_stats.h"
 #include "core/engine/map_watch.h"
 #include "core/world/names.h"
@@ -70,6 +71,28 @@ EngineNumbers EngineMaps::Numbers() const {
   }
   return numbers;
 }
+
+// The one copy of a map that may be made at a time, from before the map's own file to after it.
+class EngineMaps::CopyTurn {
+ public:
+  CopyTurn(EngineMaps& maps, absl::string_view name) : maps_(maps), name_(name) {
+    absl::MutexLock lock(&maps_.mutex_);
+    taken_ = maps_.copied_.insert(name_).second;
+  }
+  ~CopyTurn() {
+    if (!taken_) return;
+    absl::MutexLock lock(&maps_.mutex_);
+    maps_.copied_.erase(name_);
+  }
+  CopyTurn(const CopyTurn&) = delete;
+  CopyTurn& operator=(const CopyTurn&) = delete;
+  bool taken() const { return taken_; }
+
+ private:
+  EngineMaps& maps_;
+  const std::string name_;
+  bool taken_ = false;
+};
 
 absl::StatusOr<std::unique_ptr<EngineMaps>> EngineMaps::Open(const EngineOptions& options) {
   STRATA_ASSIGN_OR_RETURN(MapDirectory directory, MapDirectory::Open(options.directory));
@@ -209,6 +232,19 @@ absl::Status EngineMaps::Watch(const api::Call& call,
     STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", options.trajectory));
   }
   return WatchMap(map->core(), call.stop, options, sink);
+}
+
+absl::Status EngineMaps::Backup(const api::Call& call,
+                                absl::string_view name,
+                                absl::FunctionRef<absl::Status(const api::BackupPiece&)> sink) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(name));
+  const CopyTurn turn(*this, name);
+  if (!turn.taken()) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("map ", name, ": another backup of it runs; try again later"));
+  }
+  return BackUp(map->core(), directory_.CopyOf(name), call.stop, sink);
 }
 
 }  // namespace strata

@@ -50,6 +50,9 @@ class EngineMaps final : public api::Maps {
                      absl::string_view name,
                      const api::WatchOptions& options,
                      absl::FunctionRef<absl::Status(const api::MapUpdate&)> sink) override;
+  absl::Status Backup(const api::Call& call,
+                      absl::string_view name,
+                      absl::FunctionRef<absl::Status(const api::BackupPiece&)> sink) override;
 
  private:
   EngineMaps(const EngineOptions& options, MapDirectory directory)
@@ -58,11 +61,15 @@ class EngineMaps final : public api::Maps {
   // Takes the map out of the list, so that nobody finds it any more; its name stays taken.
   absl::StatusOr<std::shared_ptr<Map>> Withdraw(absl::string_view name);
 
+  class CopyTurn;
+
   const EngineOptions options_;
   const MapDirectory directory_;
   mutable absl::Mutex mutex_;
   std::map<std::string, absl::StatusOr<std::shared_ptr<Map>>, std::less<>> maps_
       ABSL_GUARDED_BY(mutex_);
+  std::set<std::string, std::less<>> copied_
+      ABSL_GUARDED_BY(mutex_);  // maps with a copy being made
 };
 
 }  // namespace strata

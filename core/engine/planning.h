@@ -22,6 +22,13 @@ class EnginePlanning final : public api::Planning {
   absl::StatusOr<PlanResult> PlanPath(const api::Call& call,
                                       absl::string_view map,
                                       const PlanQuery& query) override;
+  absl::StatusOr<PathCheck> CheckPath(const api::Call& call,
+                                      absl::string_view map,
+                                      const PathQuery& query) override;
+  absl::Status WatchPath(const api::Call& call,
+                         absl::string_view map,
+                         const PathQuery& query,
+                         absl::FunctionRef<absl::Status(const PathCheck&)> sink) override;
   absl::StatusOr<std::vector<SurfaceColumn>> SampleSurfaces(
       const api::Call& call,
       absl::string_view map,

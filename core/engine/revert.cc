@@ -1,35 +1,22 @@
 #include "core/engine/revert.h"
 
-#include <algorithm>
 #include <cstdint>
 #include <utility>
-#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
+#include "core/engine/epoch_tiles.h"
 #include "core/engine/pose_change.h"
 
 namespace strata {
 namespace {
 
-absl::Status CheckKept(StorageReader& reader, std::uint64_t epoch) {
-  STRATA_ASSIGN_OR_RETURN(const std::vector<EpochInfo> epochs, reader.ListEpochs());
-  const auto it = std::find_if(
-      epochs.begin(), epochs.end(), [epoch](const EpochInfo& info) { return info.epoch == epoch; });
-  if (it == epochs.end()) {
-    return absl::NotFoundError(absl::StrCat("epoch ", epoch, " does not exist; see map history"));
-  }
-  if (it->kept) return absl::OkStatus();
-  return absl::FailedPreconditionError(
-      absl::StrCat("epoch ", epoch, " is too old: its poses are not kept; see map history"));
-}
-
 absl::StatusOr<PoseChange> ReadChange(MapCore& core, std::uint64_t epoch) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-  STRATA_RETURN_IF_ERROR(CheckKept(*reader, epoch));
+  STRATA_RETURN_IF_ERROR(CheckEpochKept(*reader, epoch, absl::StatusCode::kFailedPrecondition));
   STRATA_ASSIGN_OR_RETURN(PoseChange change,
                           PoseChange::Read(*reader, core.snapshots().current().epoch));
   STRATA_ASSIGN_OR_RETURN(const PoseChange then, PoseChange::Read(*reader, epoch));

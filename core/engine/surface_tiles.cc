@@ -51,7 +51,7 @@ SurfaceTileMaker::SurfaceTileMaker(MapCore& core,
 absl::StatusOr<MlsTilePtr> SurfaceTileMaker::LoadMls(const TileKey& key) {
   const auto it = changed_.find(key);
   if (it != changed_.end()) return it->second;
-  return store_.Load(reader_, key, options_.version);
+  return store_.Load(reader_, key, options_.read_at);
 }
 
 absl::StatusOr<SurfaceTileMaker::SurfacePtr> SurfaceTileMaker::Plain(const TileKey& key) {
@@ -108,7 +108,7 @@ absl::StatusOr<SurfaceTileMaker::Rows> SurfaceTileMaker::MakeRows(
     absl::FunctionRef<SurfaceTile(std::size_t)> make) {
   std::vector<std::optional<SurfaceTileRow>> stored(keys.size());
   for (std::size_t i = 0; i < keys.size(); ++i) {
-    STRATA_ASSIGN_OR_RETURN(stored[i], reader_.FindSurfaceTile(keys[i], options_.version));
+    STRATA_ASSIGN_OR_RETURN(stored[i], reader_.FindSurfaceTile(keys[i], options_.read_at));
   }
   std::vector<std::optional<SurfaceTileRow>> differing(keys.size());
   const absl::Status done =
@@ -163,7 +163,7 @@ absl::StatusOr<SurfaceTileMaker::SurfacePtr> SurfaceTileMaker::Served(const Tile
     bytes = it->second.bytes;
   } else {
     STRATA_ASSIGN_OR_RETURN(std::optional<SurfaceTileRow> row,
-                            reader_.FindSurfaceTile(key, options_.version));
+                            reader_.FindSurfaceTile(key, options_.read_at));
     if (!row.has_value()) return SurfacePtr();
     bytes = std::move(row->bytes);
   }

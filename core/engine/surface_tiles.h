@@ -38,7 +38,8 @@ absl::btree_set<TileKey> WithNeighbours(const absl::btree_set<TileKey>& keys);
 class SurfaceTileMaker {
  public:
   struct Options {
-    std::uint64_t version = 0;  // of the new rows; stored rows are read as of it
+    std::uint64_t version = 0;        // of the new rows
+    std::uint64_t read_at = version;  // stored rows are read as of this version
     int threads = 1;
     RobotProfile profile;
   };

@@ -88,6 +88,14 @@ class TileReasons {
     return reason;
   }
 
+  Explanation WhyTooNear(std::uint32_t i, double within_m) const {
+    const WindowSurface& surface = window_.surface(i);
+    const auto cell = static_cast<int>(surface.cell);
+    const GroundEdge* edge = ground_.NearestEdge(cell, surface.z_m, static_cast<float>(within_m));
+    return edge == nullptr ? Explanation{Obstruction::kNone, 0.0, Place(cell, surface.z_m)}
+                           : OfEdge(*edge, surface.z_m);
+  }
+
  private:
   Eigen::Vector3d Place(int cell, double z) const {
     const int x = slot_.x0 + cell % window_.width() - window_.margin();
@@ -311,24 +319,38 @@ absl::StatusOr<Explanation> WhyNotStand(SearchSpace& space, PatchId patch) {
   return reasons.WhyNotStand(reasons.SurfaceOf(patch));
 }
 
+absl::StatusOr<Explanation> WhyNoMove(SearchSpace& space, PatchId patch, int direction) {
+  if (HasMove(space, patch, direction)) {
+    std::uint32_t cost = 0;
+    int cells = 0;
+    const PatchId target = space.FollowGround(patch, direction, &cost, &cells);
+    STRATA_RETURN_IF_ERROR(space.status());
+    if (target != kNoPatchId) {
+      return space.Danger(target) < 0.0F ? OfClass(space, target) : Explanation{};
+    }
+  }
+  const SearchSpace::Slot& slot = space.SlotOfPatch(patch);
+  STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles,
+                          LoadAround(space.source(), slot.tile->key));
+  const TileReasons reasons(space, slot, tiles);
+  return reasons.WhyNoMove(reasons.SurfaceOf(patch), direction);
+}
+
+absl::StatusOr<Explanation> WhyTooNear(SearchSpace& space, PatchId patch, double within_m) {
+  const SearchSpace::Slot& slot = space.SlotOfPatch(patch);
+  STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles,
+                          LoadAround(space.source(), slot.tile->key));
+  const TileReasons reasons(space, slot, tiles);
+  return reasons.WhyTooNear(reasons.SurfaceOf(patch), within_m);
+}
+
 absl::StatusOr<Explanation> WhyNoFurther(SearchSpace& space,
                                          const SearchWorkspace& workspace,
                                          PatchId goal,
                                          const Stop& stop) {
   STRATA_ASSIGN_OR_RETURN(const RefusedMove move, ChooseMove(space, workspace, goal, stop));
   if (move.patch == kNoPatchId) return Explanation{};
-  if (HasMove(space, move.patch, move.direction)) {
-    std::uint32_t cost = 0;
-    int cells = 0;
-    const PatchId target = space.FollowGround(move.patch, move.direction, &cost, &cells);
-    STRATA_RETURN_IF_ERROR(space.status());
-    if (target != kNoPatchId) return OfClass(space, target);
-  }
-  const SearchSpace::Slot& slot = space.SlotOfPatch(move.patch);
-  STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles,
-                          LoadAround(space.source(), slot.tile->key));
-  const TileReasons reasons(space, slot, tiles);
-  return reasons.WhyNoMove(reasons.SurfaceOf(move.patch), move.direction);
+  return WhyNoMove(space, move.patch, move.direction);
 }
 
 }  // namespace strata

@@ -29,6 +29,12 @@ struct Explanation {
 // Why the robot cannot stand on `patch`; kNone if it can.
 absl::StatusOr<Explanation> WhyNotStand(SearchSpace& space, PatchId patch);
 
+// Why the robot cannot go from `patch` in `direction`; kNone if it can.
+absl::StatusOr<Explanation> WhyNoMove(SearchSpace& space, PatchId patch, int direction);
+
+// The edge nearest to the centre of `patch` that is nearer than within_m; kNone if none is.
+absl::StatusOr<Explanation> WhyTooNear(SearchSpace& space, PatchId patch, double within_m);
+
 // Why the last search of `workspace` did not get on towards `goal`: the refused move nearest to it
 //   - that leads, straight on for at most kLookAheadM, from cell to cell within the robot's height,
 //     over holes within a slope that it takes and behind walls within a step, to

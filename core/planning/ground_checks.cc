@@ -243,9 +243,9 @@ void GroundChecks::MarkNearCells() {
   }
 }
 
-const GroundEdge* GroundChecks::BlockingEdge(int cell, float z) const {
+const GroundEdge* GroundChecks::NearestEdge(int cell, float z, float within_m) const {
   for (std::size_t k = 0; k < disc_step_.size(); ++k) {
-    if (checks_.disc[k].distance_m >= checks_.footprint_m) break;
+    if (checks_.disc[k].distance_m >= within_m) break;
     const int at = cell + disc_step_[k];
     for (std::uint32_t e = edge_first_[at]; e < edge_first_[at + 1]; ++e) {
       if (edges_[e].z_low_m <= z && z <= edges_[e].z_high_m) return &edges_[e];

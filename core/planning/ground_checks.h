@@ -69,8 +69,12 @@ class GroundChecks {
 
   // Distance [m] from the centre of `cell` to the nearest edge of level z, at most reach_m.
   float EdgeDistance(int cell, float z) const;
+  // The nearest edge of level z that is nearer than within_m, at most reach_m; nullptr if none.
+  const GroundEdge* NearestEdge(int cell, float z, float within_m) const;
   // The nearest edge that keeps the footprint from being there; nullptr if none.
-  const GroundEdge* BlockingEdge(int cell, float z) const;
+  const GroundEdge* BlockingEdge(int cell, float z) const {
+    return NearestEdge(cell, z, checks_.footprint_m);
+  }
   // True if the disc is clear of edges, obstacles and drops all along a move over a gap.
   bool GapIsClear(std::uint32_t from, std::uint32_t to, int direction, int cells) const;
 

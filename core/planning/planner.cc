@@ -18,6 +18,7 @@
 #include "core/planning/endpoint.h"
 #include "core/planning/explain.h"
 #include "core/planning/landmarks.h"
+#include "core/planning/path_check.h"
 #include "core/planning/prepared_tile.h"
 #include "core/planning/profile_checks.h"
 #include "core/planning/route.h"
@@ -142,6 +143,17 @@ absl::StatusOr<PlanResult> Planner::Plan(TileSource& source,
   absl::StatusOr<PlanResult> result = Answer(space, query, landmarks.get(), loan.workspace(), stop);
   if (result.ok()) result->elapsed_ms = absl::ToDoubleMilliseconds(absl::Now() - begin);
   return result;
+}
+
+absl::StatusOr<PathCheck> Planner::Check(TileSource& source,
+                                         const PathQuery& query,
+                                         const Stop& stop) {
+  STRATA_RETURN_IF_ERROR(ValidateWaypoints(query.waypoints, options_.cell_size_m));
+  STRATA_RETURN_IF_ERROR(ValidateClassCosts(query.class_costs));
+  STRATA_ASSIGN_OR_RETURN(const ProfileChecks checks,
+                          MakeProfileChecks(query.profile, options_.cell_size_m));
+  SearchSpace space(cache_, source, checks, ClassFactors(query.class_costs));
+  return CheckPath(space, query.waypoints, stop);
 }
 
 absl::Status Planner::PrepareLandmarks(TileSource& source,

@@ -61,6 +61,15 @@ class Planner {
   //   errors of `source`
   absl::StatusOr<PlanResult> Plan(TileSource& source, const PlanQuery& query, const Stop& stop);
 
+  // Whether a path holds by the rules above; both are OK. A path just planned always does. Fills
+  // all of PathCheck but what is of an epoch; `known` of the query is ignored.
+  //   INVALID_ARGUMENT    no waypoint or more than kMaxWaypoints, one that is not finite or beyond
+  //                       the map's range, a path over more than kMaxPathTiles, profile or class
+  //                       costs out of range
+  //   CANCELLED, DEADLINE_EXCEEDED   by `stop`
+  //   errors of `source`
+  absl::StatusOr<PathCheck> Check(TileSource& source, const PathQuery& query, const Stop& stop);
+
   // Measures landmarks for one profile over everything connected to `tiles` (usually all tiles of
   // the map), `count` in [1, 16]. Later queries of that profile use them as long as the source has
   // the same tiles; results do not change, only time. Replaces those of the same profile.

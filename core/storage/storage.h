@@ -4,6 +4,7 @@
 #define STRATA_CORE_STORAGE_STORAGE_H_
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
+#include "core/common/stop.h"
 #include "core/mls/tile_key.h"
 #include "core/storage/records.h"
 #include "core/world/classifier_info.h"
@@ -36,6 +38,11 @@ class StorageReader {
 
   // All reads of `body` see one state. Keep it short: the store cannot reclaim space meanwhile.
   virtual absl::Status Snapshot(absl::FunctionRef<absl::Status()> body) = 0;
+
+  // Writes one committed state as a store of its own into `file`, which must not be there; closed
+  // and whole when this returns. Commits go on meanwhile. Not inside Snapshot(). ALREADY_EXISTS;
+  // CANCELLED, DEADLINE_EXCEEDED by `stop`, which leave an unusable file.
+  virtual absl::Status CopyTo(const std::filesystem::path& file, const Stop& stop) = 0;
 
   virtual absl::StatusOr<MapClock> GetClock() = 0;
   virtual absl::StatusOr<MapInfo> GetMapInfo() = 0;

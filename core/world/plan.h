@@ -2,6 +2,7 @@
 #ifndef STRATA_CORE_WORLD_PLAN_H_
 #define STRATA_CORE_WORLD_PLAN_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <map>
@@ -98,6 +99,36 @@ struct PlanResult {
 
   bool found() const { return reason == PlanReason::kFound; }
 };
+
+// Whether a path holds, and where it does not.
+struct PathCheck {
+  bool valid = true;
+  std::string message;    // for people, with numbers
+  double valid_m = 0.0;   // along the waypoints, as far as it holds
+  double length_m = 0.0;  // of all of it
+  // If it does not hold: what is in the way behind valid_m, of what kind and how much (see
+  // Obstruction).
+  std::optional<Eigen::Vector3d> where;
+  Obstruction obstruction = Obstruction::kNone;
+  double obstruction_value = 0.0;
+  std::uint64_t epoch = 0;
+  std::uint64_t commit_sequence = 0;  // the state of the map that it is about
+  std::vector<TileKey> tiles;         // that the path crosses, sorted
+};
+
+// Asks whether a path still holds.
+struct PathQuery {
+  std::vector<Eigen::Vector3d> waypoints;  // on the surfaces, in the map frame
+  RobotProfile profile;
+  ClassCosts class_costs = {};  // only what is forbidden counts
+  // The answer to the same question before: where nothing that it stands on changed since, it is
+  // the answer again, at once.
+  std::optional<PathCheck> known = std::nullopt;
+};
+
+// The longest path that is checked.
+inline constexpr std::size_t kMaxWaypoints = 100'000;
+inline constexpr std::size_t kMaxPathTiles = 10'000;
 
 // All surfaces at one place, lowest first.
 struct SurfaceColumn {

@@ -178,4 +178,18 @@ absl::StatusOr<MapClass> FromProto(const v1::MapClass& proto) {
       static_cast<std::uint16_t>(proto.id()), proto.name(), {channel(16), channel(8), channel(0)}};
 }
 
+v1::BackupMapResponse ToProto(const api::BackupPiece& piece) {
+  v1::BackupMapResponse proto;
+  proto.set_bytes(piece.bytes);
+  proto.set_total_bytes(piece.total_bytes);
+  proto.set_content_hash(piece.content_hash);
+  return proto;
+}
+
+api::BackupPiece FromProto(const v1::BackupMapResponse& proto) {
+  return {.bytes = proto.bytes(),
+          .total_bytes = proto.total_bytes(),
+          .content_hash = proto.content_hash()};
+}
+
 }  // namespace strata::translate

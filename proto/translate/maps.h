@@ -5,6 +5,7 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/api/maps.h"
 #include "core/cloud/sensor_model.h"
 #include "core/world/map_class.h"
 #include "core/world/map_info.h"
@@ -21,6 +22,7 @@ v1::MapParameters ToProto(const MapParameters& parameters);
 v1::MapInfo ToProto(const MapInfo& map);
 v1::MapStats ToProto(const MapStats& stats);
 v1::MapClass ToProto(const MapClass& map_class);
+v1::BackupMapResponse ToProto(const api::BackupPiece& piece);
 
 RobotProfile FromProto(const v1::RobotProfile& profile);
 SensorModel FromProto(const v1::SensorModel& model);
@@ -28,6 +30,7 @@ MapParameters FromProto(const v1::MapParameters& parameters);
 absl::StatusOr<MapInfo> FromProto(const v1::MapInfo& map);
 absl::StatusOr<MapStats> FromProto(const v1::MapStats& stats);
 absl::StatusOr<MapClass> FromProto(const v1::MapClass& map_class);
+api::BackupPiece FromProto(const v1::BackupMapResponse& piece);
 
 }  // namespace strata::translate
 

@@ -57,10 +57,12 @@ absl::StatusOr<PlanEndpoint> EndpointFromProto(const char* what, const v1::PlanE
   return endpoint;
 }
 
-absl::StatusOr<ClassCosts> ClassCostsFromProto(const v1::PlanPathRequest& proto) {
+using ClassCostFields = google::protobuf::RepeatedPtrField<v1::ClassCost>;
+
+absl::StatusOr<ClassCosts> ClassCostsFromProto(const ClassCostFields& fields) {
   constexpr std::uint32_t kMostId = 255;
   ClassCosts costs;
-  for (const v1::ClassCost& cost : proto.class_costs()) {
+  for (const v1::ClassCost& cost : fields) {
     const double factor = cost.forbidden() ? kForbiddenClass : cost.factor();
     // A larger id is refused as 256, which is none either.
     const auto id = static_cast<int>(std::min(cost.class_id(), kMostId + 1));
@@ -71,6 +73,44 @@ absl::StatusOr<ClassCosts> ClassCostsFromProto(const v1::PlanPathRequest& proto)
   }
   STRATA_RETURN_IF_ERROR(ValidateClassCosts(costs));
   return costs;
+}
+
+void ClassCostsToProto(const ClassCosts& costs, ClassCostFields& fields) {
+  for (const auto& [id, factor] : costs) {
+    v1::ClassCost& cost = *fields.Add();
+    cost.set_class_id(static_cast<std::uint32_t>(id));
+    if (factor == kForbiddenClass) {
+      cost.set_forbidden(true);
+    } else {
+      cost.set_factor(factor);
+    }
+  }
+}
+
+// The fields that CheckPathRequest and WatchPathRequest share.
+template <typename Request>
+Request PathToProto(absl::string_view map, const PathQuery& query) {
+  Request proto;
+  proto.set_map(std::string(map));
+  for (const Eigen::Vector3d& waypoint : query.waypoints) {
+    *proto.add_waypoints() = ToProto(waypoint);
+  }
+  *proto.mutable_profile() = ToProto(query.profile);
+  ClassCostsToProto(query.class_costs, *proto.mutable_class_costs());
+  return proto;
+}
+
+template <typename Request>
+absl::StatusOr<PathQuery> PathFromProto(const Request& proto) {
+  PathQuery query;
+  for (const v1::Vector3& waypoint : proto.waypoints()) {
+    STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d p, FromProto("waypoint", waypoint));
+    query.waypoints.push_back(p);
+  }
+  query.profile = FromProto(proto.profile());
+  STRATA_RETURN_IF_ERROR(ValidateRobotProfile(query.profile));
+  STRATA_ASSIGN_OR_RETURN(query.class_costs, ClassCostsFromProto(proto.class_costs()));
+  return query;
 }
 
 absl::StatusOr<std::optional<Eigen::Vector3d>> PlaceFromProto(const char* what,
@@ -147,15 +187,7 @@ v1::PlanPathRequest ToProto(absl::string_view map, const PlanQuery& query) {
   *proto.mutable_to() = EndpointToProto(query.to);
   *proto.mutable_profile() = ToProto(query.profile);
   proto.set_max_expanded(query.max_expanded);
-  for (const auto& [id, factor] : query.class_costs) {
-    v1::ClassCost& cost = *proto.add_class_costs();
-    cost.set_class_id(static_cast<std::uint32_t>(id));
-    if (factor == kForbiddenClass) {
-      cost.set_forbidden(true);
-    } else {
-      cost.set_factor(factor);
-    }
-  }
+  ClassCostsToProto(query.class_costs, *proto.mutable_class_costs());
   return proto;
 }
 
@@ -165,7 +197,7 @@ absl::StatusOr<PlanQuery> FromProto(const v1::PlanPathRequest& proto) {
   STRATA_ASSIGN_OR_RETURN(query.to, EndpointFromProto("to", proto.to()));
   query.profile = FromProto(proto.profile());
   STRATA_RETURN_IF_ERROR(ValidateRobotProfile(query.profile));
-  STRATA_ASSIGN_OR_RETURN(query.class_costs, ClassCostsFromProto(proto));
+  STRATA_ASSIGN_OR_RETURN(query.class_costs, ClassCostsFromProto(proto.class_costs()));
   if (proto.has_max_expanded()) query.max_expanded = proto.max_expanded();
   return query;
 }
@@ -240,6 +272,64 @@ absl::StatusOr<SurfaceColumn> FromProto(const v1::SurfaceColumn& proto) {
     column.surfaces.push_back(added);
   }
   return column;
+}
+
+v1::PathCheck ToProto(const PathCheck& check) {
+  v1::PathCheck proto;
+  proto.set_valid(check.valid);
+  proto.set_message(check.message);
+  proto.set_valid_m(check.valid_m);
+  proto.set_length_m(check.length_m);
+  if (check.where.has_value()) *proto.mutable_where() = ToProto(*check.where);
+  proto.set_obstruction(static_cast<v1::Obstruction>(check.obstruction));
+  proto.set_obstruction_value(check.obstruction_value);
+  proto.set_epoch(check.epoch);
+  proto.set_commit_sequence(check.commit_sequence);
+  for (const TileKey& tile : check.tiles) *proto.add_tiles() = ToProto(tile);
+  return proto;
+}
+
+absl::StatusOr<PathCheck> FromProto(const v1::PathCheck& proto) {
+  if (!v1::Obstruction_IsValid(proto.obstruction())) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "path check: obstruction ", static_cast<int>(proto.obstruction()), " is not known"));
+  }
+  PathCheck check;
+  check.valid = proto.valid();
+  check.message = proto.message();
+  check.valid_m = proto.valid_m();
+  check.length_m = proto.length_m();
+  STRATA_ASSIGN_OR_RETURN(check.where, PlaceFromProto("where", proto.has_where(), proto.where()));
+  check.obstruction = static_cast<Obstruction>(proto.obstruction());
+  check.obstruction_value = proto.obstruction_value();
+  check.epoch = proto.epoch();
+  check.commit_sequence = proto.commit_sequence();
+  for (const v1::TileKey& tile : proto.tiles()) {
+    STRATA_ASSIGN_OR_RETURN(const TileKey key, FromProto(tile));
+    check.tiles.push_back(key);
+  }
+  return check;
+}
+
+v1::CheckPathRequest CheckToProto(absl::string_view map, const PathQuery& query) {
+  v1::CheckPathRequest proto = PathToProto<v1::CheckPathRequest>(map, query);
+  if (query.known.has_value()) *proto.mutable_known() = ToProto(*query.known);
+  return proto;
+}
+
+v1::WatchPathRequest WatchToProto(absl::string_view map, const PathQuery& query) {
+  return PathToProto<v1::WatchPathRequest>(map, query);
+}
+
+absl::StatusOr<PathQuery> FromProto(const v1::CheckPathRequest& proto) {
+  STRATA_ASSIGN_OR_RETURN(PathQuery query, PathFromProto(proto));
+  if (!proto.has_known()) return query;
+  STRATA_ASSIGN_OR_RETURN(query.known, FromProto(proto.known()));
+  return query;
+}
+
+absl::StatusOr<PathQuery> FromProto(const v1::WatchPathRequest& proto) {
+  return PathFromProto(proto);
 }
 
 }  // namespace strata::translate

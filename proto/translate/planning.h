@@ -13,12 +13,19 @@ namespace strata::translate {
 v1::PlanPathRequest ToProto(absl::string_view map, const PlanQuery& query);
 v1::PlanPathResponse ToProto(const PlanResult& result);
 v1::SurfaceColumn ToProto(const SurfaceColumn& column);
+v1::PathCheck ToProto(const PathCheck& check);
+v1::CheckPathRequest CheckToProto(absl::string_view map, const PathQuery& query);
+// Without what is known.
+v1::WatchPathRequest WatchToProto(absl::string_view map, const PathQuery& query);
 
 // INVALID_ARGUMENT for coordinates that are not finite, a negative level, or a profile out of
 // range.
 absl::StatusOr<PlanQuery> FromProto(const v1::PlanPathRequest& request);
 absl::StatusOr<PlanResult> FromProto(const v1::PlanPathResponse& result);
 absl::StatusOr<SurfaceColumn> FromProto(const v1::SurfaceColumn& column);
+absl::StatusOr<PathCheck> FromProto(const v1::PathCheck& check);
+absl::StatusOr<PathQuery> FromProto(const v1::CheckPathRequest& request);
+absl::StatusOr<PathQuery> FromProto(const v1::WatchPathRequest& request);
 
 }  // namespace strata::translate
 

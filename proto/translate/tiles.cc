@@ -80,6 +80,7 @@ v1::TileArea ToProto(const api::TileArea& area) {
   proto.set_x_max(area.x_max);
   proto.set_y_min(area.y_min);
   proto.set_y_max(area.y_max);
+  proto.set_epoch(area.epoch);
   return proto;
 }
 
@@ -90,6 +91,7 @@ absl::StatusOr<api::TileArea> FromProto(const v1::TileArea& proto) {
   if (proto.has_x_max()) area.x_max = proto.x_max();
   if (proto.has_y_min()) area.y_min = proto.y_min();
   if (proto.has_y_max()) area.y_max = proto.y_max();
+  area.epoch = proto.epoch();
   STRATA_RETURN_IF_ERROR(CheckLevel(area.level));
   STRATA_RETURN_IF_ERROR(CheckRange("x", area.x_min, area.x_max));
   STRATA_RETURN_IF_ERROR(CheckRange("y", area.y_min, area.y_max));

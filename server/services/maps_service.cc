@@ -6,6 +6,7 @@
 #include "proto/translate/maps.h"
 #include "proto/translate/watch.h"
 #include "server/rpc/request.h"
+#include "server/rpc/stream.h"
 #include "server/rpc/unary.h"
 #include "server/services/map_watch_reactor.h"
 
@@ -92,6 +93,14 @@ absl::Status SetClass(api::Database& db,
   return db.maps().SetClass(call, in.name(), *map_class);
 }
 
+absl::Status Backup(api::Database& db,
+                    const api::Call& call,
+                    const v1::BackupMapRequest& in,
+                    StreamSink<v1::BackupMapResponse> sink) {
+  return db.maps().Backup(
+      call, in.name(), [&sink](const api::BackupPiece& piece) { return sink(ToProto(piece)); });
+}
+
 }  // namespace
 
 grpc::ServerUnaryReactor* MapsService::Create(grpc::CallbackServerContext* context,
@@ -145,6 +154,11 @@ grpc::ServerUnaryReactor* MapsService::SetClass(grpc::CallbackServerContext* con
 grpc::ServerWriteReactor<v1::WatchMapResponse>* MapsService::Watch(
     grpc::CallbackServerContext* context, const v1::WatchMapRequest* in) {
   return StartPolling<MapWatchReactor>(runtime_, *context, *in);
+}
+
+grpc::ServerWriteReactor<v1::BackupMapResponse>* MapsService::Backup(
+    grpc::CallbackServerContext* context, const v1::BackupMapRequest* in) {
+  return RunStream(runtime_, context, "Maps.Backup", in, &server::Backup);
 }
 
 }  // namespace strata::server

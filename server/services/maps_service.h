@@ -36,6 +36,8 @@ class MapsService final : public v1::Maps::CallbackService {
   grpc::ServerUnaryReactor* SetClass(grpc::CallbackServerContext* context,
                                      const v1::SetMapClassRequest* in,
                                      v1::SetMapClassResponse* out) override;
+  grpc::ServerWriteReactor<v1::BackupMapResponse>* Backup(grpc::CallbackServerContext* context,
+                                                          const v1::BackupMapRequest* in) override;
   grpc::ServerWriteReactor<v1::WatchMapResponse>* Watch(grpc::CallbackServerContext* context,
                                                         const v1::WatchMapRequest* in) override;
 

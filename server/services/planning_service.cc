@@ -13,6 +13,7 @@
 #include "proto/translate/maps.h"
 #include "proto/translate/planning.h"
 #include "server/rpc/unary.h"
+#include "server/services/path_watch_reactor.h"
 
 namespace strata::server {
 namespace {
@@ -30,6 +31,16 @@ absl::Status PlanPath(api::Database& db,
   STRATA_ASSIGN_OR_RETURN(const PlanQuery query, AtTheDoor(FromProto(in)));
   STRATA_ASSIGN_OR_RETURN(const PlanResult result, db.planning().PlanPath(call, in.map(), query));
   out = ToProto(result);
+  return absl::OkStatus();
+}
+
+absl::Status CheckPath(api::Database& db,
+                       const api::Call& call,
+                       const v1::CheckPathRequest& in,
+                       v1::CheckPathResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const PathQuery query, AtTheDoor(FromProto(in)));
+  STRATA_ASSIGN_OR_RETURN(const PathCheck check, db.planning().CheckPath(call, in.map(), query));
+  *out.mutable_check() = ToProto(check);
   return absl::OkStatus();
 }
 
@@ -85,6 +96,17 @@ grpc::ServerUnaryReactor* PlanningService::PlanPath(grpc::CallbackServerContext*
                                                     const v1::PlanPathRequest* in,
                                                     v1::PlanPathResponse* out) {
   return RunUnary(runtime_, context, "Planning.PlanPath", in, out, &server::PlanPath);
+}
+
+grpc::ServerUnaryReactor* PlanningService::CheckPath(grpc::CallbackServerContext* context,
+                                                     const v1::CheckPathRequest* in,
+                                                     v1::CheckPathResponse* out) {
+  return RunUnary(runtime_, context, "Planning.CheckPath", in, out, &server::CheckPath);
+}
+
+grpc::ServerWriteReactor<v1::WatchPathResponse>* PlanningService::WatchPath(
+    grpc::CallbackServerContext* context, const v1::WatchPathRequest* in) {
+  return StartPolling<PathWatchReactor>(runtime_, *context, *in);
 }
 
 grpc::ServerUnaryReactor* PlanningService::SampleSurfaces(grpc::CallbackServerContext* context,

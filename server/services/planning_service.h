@@ -15,6 +15,11 @@ class PlanningService final : public v1::Planning::CallbackService {
   grpc::ServerUnaryReactor* PlanPath(grpc::CallbackServerContext* context,
                                      const v1::PlanPathRequest* in,
                                      v1::PlanPathResponse* out) override;
+  grpc::ServerUnaryReactor* CheckPath(grpc::CallbackServerContext* context,
+                                      const v1::CheckPathRequest* in,
+                                      v1::CheckPathResponse* out) override;
+  grpc::ServerWriteReactor<v1::WatchPathResponse>* WatchPath(
+      grpc::CallbackServerContext* context, const v1::WatchPathRequest* in) override;
   grpc::ServerUnaryReactor* SampleSurfaces(grpc::CallbackServerContext* context,
                                            const v1::SampleSurfacesRequest* in,
                                            v1::SampleSurfacesResponse* out) override;

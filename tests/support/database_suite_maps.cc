@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/common/checksum.h"
 #include "tests/support/database_suite.h"
 #include "tests/support/status_matchers.h"
 
@@ -93,6 +94,23 @@ TEST_P(DatabaseSuite, AnUnknownMapIsNotFoundEverywhere) {
   LocalizeQuery query;
   query.cloud = floor;
   EXPECT_THAT(db().posegraph().Localize({}, no, query), not_found);
+}
+
+TEST_P(DatabaseSuite, ABackupIsTheWholeFile) {
+  PutFloor(db(), {"run", 1});
+  std::string bytes;
+  ContentHasher hasher;
+  STRATA_ASSERT_OK(db().maps().Backup({}, kMap, [&](const api::BackupPiece& piece) {
+    bytes += piece.bytes;
+    hasher.Add(piece.bytes);
+    const bool last = bytes.size() == piece.total_bytes;
+    EXPECT_EQ(piece.content_hash, last ? hasher.HexDigest() : "");
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(bytes.substr(0, 15), "SQLite format 3");
+  EXPECT_EQ(bytes.substr(68, 4), "STRA");
+  const auto nothing = [](const api::BackupPiece&) { return absl::OkStatus(); };
+  EXPECT_THAT(db().maps().Backup({}, "none", nothing), StatusIs(absl::StatusCode::kNotFound, _));
 }
 
 }  // namespace

@@ -1,7 +1,11 @@
 // Conformance: planning.
 #include <cmath>
 #include <string>
+#include <thread>
+#include <vector>
 
+#include "absl/base/thread_annotations.h"
+#include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -66,6 +70,88 @@ TEST_P(DatabaseSuite, PathsKeepToWhatClassesCost) {
   query.class_costs = {{3, kForbiddenClass}, {1, 0.5}};
   EXPECT_THAT(db().planning().PlanPath({}, kMap, query),
               StatusIs(Code::kInvalidArgument, HasSubstr("factor 0.5 of class 1")));
+}
+
+// A wall across the floor at x = 0.
+PointCloud Wall() {
+  PointCloud wall;
+  for (int y = -80; y < 80; ++y) {
+    for (int z = 0; z < 20; ++z) {
+      wall.points.emplace_back(
+          0.01F, static_cast<float>(0.05 * y), 0.05F * static_cast<float>(z + 1));
+    }
+  }
+  return wall;
+}
+
+// What the watcher of a path is told, in order.
+class Told {
+ public:
+  absl::Status Take(const PathCheck& check) {
+    absl::MutexLock lock(&mutex_);
+    told_.push_back(check);
+    return absl::OkStatus();
+  }
+  // The i-th message, once it has come.
+  PathCheck Await(std::size_t i) {
+    absl::MutexLock lock(&mutex_);
+    const auto come = [this, i]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return told_.size() > i; };
+    mutex_.Await(absl::Condition(&come));
+    return told_[i];
+  }
+  std::size_t count() {
+    absl::MutexLock lock(&mutex_);
+    return told_.size();
+  }
+
+ private:
+  absl::Mutex mutex_;
+  std::vector<PathCheck> told_ ABSL_GUARDED_BY(mutex_);
+};
+
+TEST_P(DatabaseSuite, APathHoldsUntilSomethingStandsInItsWay) {
+  PutFloor(db(), {"run", 1});
+  PlanQuery query;
+  query.from.x_m = -2.0;
+  query.to.x_m = 2.0;
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult plan, db().planning().PlanPath({}, kMap, query));
+  PathQuery asked = {plan.waypoints, query.profile};
+  STRATA_ASSERT_OK_AND_ASSIGN(const PathCheck before, db().planning().CheckPath({}, kMap, asked));
+  EXPECT_TRUE(before.valid) << before.message;
+  EXPECT_NEAR(before.length_m, plan.length_m, 1e-6);
+  EXPECT_FALSE(before.tiles.empty());
+  asked.known = before;
+  STRATA_ASSERT_OK_AND_ASSIGN(const PathCheck again, db().planning().CheckPath({}, kMap, asked));
+  EXPECT_EQ(again.message, before.message);
+  Told told;
+  const api::Call call;
+  std::thread watcher([&] {
+    EXPECT_THAT(db().planning().WatchPath(
+                    call, kMap, asked, [&](const PathCheck& check) { return told.Take(check); }),
+                StatusIs(Code::kCancelled, _));
+  });
+  EXPECT_TRUE(told.Await(0).valid);
+  PutFloor(db(), {"far", 1}, 300.0);  // says nothing about the path
+  const PointCloud wall = Wall();
+  STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"wall", 1}, wall), wall));
+  const PathCheck blocked = told.Await(1);
+  EXPECT_FALSE(blocked.valid);
+  ASSERT_TRUE(blocked.where.has_value());
+  EXPECT_NEAR(blocked.where->x(), 0.0, 0.2);
+  EXPECT_NE(blocked.obstruction, Obstruction::kNone);
+  EXPECT_NEAR(blocked.valid_m, 2.0 - query.profile.radius_m, 0.4);
+  STRATA_ASSERT_OK_AND_ASSIGN(const PathCheck known, db().planning().CheckPath({}, kMap, asked));
+  EXPECT_EQ(known.message, blocked.message);
+  STRATA_ASSERT_OK(db().scans().Delete({}, kMap, {"wall", 1}));
+  EXPECT_TRUE(told.Await(2).valid);
+  call.stop.Request();
+  watcher.join();
+  EXPECT_EQ(told.count(), 3U);
+  asked.waypoints.clear();
+  EXPECT_THAT(db().planning().CheckPath({}, kMap, asked),
+              StatusIs(Code::kInvalidArgument, HasSubstr("waypoints: 0")));
+  EXPECT_THAT(db().planning().CheckPath({}, "none", {plan.waypoints, {}}),
+              StatusIs(Code::kNotFound, _));
 }
 
 TEST_P(DatabaseSuite, AStoppedCallSaysSo) {

@@ -73,5 +73,32 @@ TEST_P(DatabaseSuite, TileListingsKeepToTheirArea) {
   EXPECT_THAT(db().tiles().List({}, kMap, area), StatusIs(Code::kInvalidArgument, HasSubstr("13")));
 }
 
+TEST_P(DatabaseSuite, AnEarlierEpochHasTheTilesOfItsPoses) {
+  PutFloor(db(), {"run", 1});
+  const std::vector<api::TileUpdate> before = Fetched(db(), {});
+  STRATA_ASSERT_OK_AND_ASSIGN(const MapStats then, db().maps().Stats({}, kMap));
+  const Pose moved = MakePose(Eigen::Quaterniond::Identity(), {300.0, 0.0, 0.0});
+  STRATA_ASSERT_OK(db().posegraph().SetPose({}, kMap, {"run", 1}, moved));
+  std::vector<api::TileUpdate> again;
+  const auto take = [&again](const api::TileUpdate& update) {
+    again.push_back(update);
+    return absl::OkStatus();
+  };
+  STRATA_ASSERT_OK(db().tiles().Fetch({}, kMap, {.epoch = then.epoch}, {}, take));
+  ASSERT_EQ(again.size(), before.size());
+  for (std::size_t i = 0; i < again.size(); ++i) {
+    EXPECT_EQ(again[i].tile.key, before[i].tile.key);
+    EXPECT_EQ(again[i].tile.epoch, then.epoch);
+    EXPECT_EQ(again[i].tile.version, 0U);
+    STRATA_ASSERT_OK_AND_ASSIGN(const SurfaceTile a, DecodeSurfaceTile(again[i].tile.bytes));
+    STRATA_ASSERT_OK_AND_ASSIGN(const SurfaceTile b, DecodeSurfaceTile(before[i].tile.bytes));
+    EXPECT_EQ(a.surfaces, b.surfaces);
+  }
+  EXPECT_THAT(db().tiles().List({}, kMap, {.epoch = then.epoch + 9}),
+              StatusIs(Code::kNotFound, HasSubstr("map history")));
+  EXPECT_THAT(db().tiles().List({}, kMap, {.level = 1, .epoch = then.epoch}),
+              StatusIs(Code::kInvalidArgument, HasSubstr("level 1")));
+}
+
 }  // namespace
 }  // namespace strata::testing

@@ -44,6 +44,10 @@ class MockMaps : public api::Maps {
               Watch,
               (const api::Call&, absl::string_view, const api::WatchOptions&, Sink<api::MapUpdate>),
               (override));
+  MOCK_METHOD(absl::Status,
+              Backup,
+              (const api::Call&, absl::string_view, Sink<api::BackupPiece>),
+              (override));
 };
 
 class MockScanUpload : public api::ScanUpload {
@@ -118,6 +122,14 @@ class MockPlanning : public api::Planning {
   MOCK_METHOD(absl::StatusOr<PlanResult>,
               PlanPath,
               (const api::Call&, absl::string_view, const PlanQuery&),
+              (override));
+  MOCK_METHOD(absl::StatusOr<PathCheck>,
+              CheckPath,
+              (const api::Call&, absl::string_view, const PathQuery&),
+              (override));
+  MOCK_METHOD(absl::Status,
+              WatchPath,
+              (const api::Call&, absl::string_view, const PathQuery&, Sink<PathCheck>),
               (override));
   MOCK_METHOD(absl::StatusOr<std::vector<SurfaceColumn>>,
               SampleSurfaces,

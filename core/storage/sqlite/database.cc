@@ -153,6 +153,20 @@ absl::Status Database::Execute(const std::string& sql) {
   return StatusOf(sqlite3_exec(connection_, sql.c_str(), nullptr, nullptr, nullptr), connection_);
 }
 
+absl::Status Database::Execute(const std::string& sql, const Stop& stop) {
+  constexpr int kInstructionsBetweenLooks = 10'000;
+  const auto stopped = [](void* asked) {
+    return static_cast<const Stop*>(asked)->status().ok() ? 0 : 1;
+  };
+  Stop asked = stop;
+  sqlite3_progress_handler(connection_, kInstructionsBetweenLooks, stopped, &asked);
+  absl::Status done = Execute(sql);
+  sqlite3_progress_handler(connection_, 0, nullptr, nullptr);
+  if (done.ok()) return done;
+  STRATA_RETURN_IF_ERROR(stop.status());
+  return done;
+}
+
 absl::StatusOr<std::int64_t> Database::Pragma(const char* sql) {
   STRATA_ASSIGN_OR_RETURN(Statement statement, Prepare(sql));
   STRATA_ASSIGN_OR_RETURN(const bool row, statement.Step());

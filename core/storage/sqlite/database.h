@@ -14,6 +14,8 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
+#include "core/common/stop.h"
+
 struct sqlite3;
 struct sqlite3_stmt;
 
@@ -88,6 +90,8 @@ class Database {
   // One or more statements without parameters or results.
   absl::Status Execute(const std::string& sql);
   absl::StatusOr<std::int64_t> Pragma(const char* sql);
+  // As Execute(), of work that may take long.
+  absl::Status Execute(const std::string& sql, const Stop& stop);
 
  private:
   explicit Database(sqlite3* connection) : connection_(connection) {}

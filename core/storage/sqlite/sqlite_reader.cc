@@ -3,6 +3,7 @@
 #include "core/storage/sqlite/sqlite_reader.h"
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -12,6 +13,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
@@ -60,6 +62,15 @@ absl::Status SqliteReader::Snapshot(absl::FunctionRef<absl::Status()> body) {
   STRATA_ASSIGN_OR_RETURN(Transaction transaction, Transaction::Begin(database_, "BEGIN"));
   STRATA_RETURN_IF_ERROR(body());
   return transaction.Commit();
+}
+
+absl::Status SqliteReader::CopyTo(const std::filesystem::path& file, const Stop& stop) {
+  std::error_code error;
+  if (std::filesystem::exists(file, error)) {
+    return absl::AlreadyExistsError(absl::StrCat(file.string(), " exists"));
+  }
+  const std::string quoted = absl::StrReplaceAll(file.string(), {{"'", "''"}});
+  return database_.Execute(absl::StrCat("VACUUM INTO '", quoted, "'"), stop);
 }
 
 absl::StatusOr<MapClock> SqliteReader::GetClock() {

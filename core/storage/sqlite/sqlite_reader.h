@@ -3,6 +3,7 @@
 #define STRATA_CORE_STORAGE_SQLITE_SQLITE_READER_H_
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -25,6 +26,7 @@ class SqliteReader final : public StorageReader {
   explicit SqliteReader(std::shared_ptr<Database> database) : connection_(std::move(database)) {}
 
   absl::Status Snapshot(absl::FunctionRef<absl::Status()> body) override;
+  absl::Status CopyTo(const std::filesystem::path& file, const Stop& stop) override;
   absl::StatusOr<MapClock> GetClock() override;
   absl::StatusOr<MapInfo> GetMapInfo() override;
   absl::StatusOr<std::optional<PosedScan>> FindScan(const ScanId& id, std::uint64_t epoch) override;

@@ -113,6 +113,11 @@ TEST_F(StrataTest, EveryCommandHasHelpWithAnExample) {
                                              "map history",
                                              "map revert",
                                              "map watch",
+                                             "map diff",
+                                             "map backup",
+                                             "map merge",
+                                             "path check",
+                                             "path watch",
                                              "pose lookup",
                                              "localize",
                                              "planes list",
@@ -164,7 +169,7 @@ TEST_F(StrataTest, WrongUsageExitsWithTwo) {
 
 TEST_F(StrataTest, NounsAndTheProgramHaveHelpWithAnExample) {
   for (const std::string noun :
-       {"map", "scan", "pose", "tile", "profile", "job", "posegraph", "planes"}) {
+       {"map", "scan", "pose", "tile", "profile", "job", "posegraph", "planes", "path"}) {
     EXPECT_THAT(RunStrata({noun, "--help"}).out, HasSubstr("Example:\n  strata " + noun));
   }
   EXPECT_THAT(RunStrata({"--help"}).out,
@@ -186,6 +191,108 @@ TEST_F(StrataTest, AWrongWordIsAnsweredWithTheNearestRightOne) {
     EXPECT_EQ(ran.out, "");
     EXPECT_THAT(ran.err, HasSubstr(message));
   }
+}
+
+TEST_F(StrataTest, DiffTellsWhatCameWentAndMoved) {
+  WriteDrive(3);
+  RunOk({"map", "create", "m"});
+  Import({"--align", "off"});
+  const json same = RunOk({"map", "diff", "m", "m"});
+  EXPECT_EQ(same["tiles_compared"], 0);
+  const std::string scan = "t/0";
+  RunOk({"pose", "set", "m", scan, "--pose", "-4,0,1.3,0,0,0,1"});
+  const std::string picture = (dir_.path() / "diff.png").string();
+  const json diff = RunOk({"map", "diff", "m@1", "m", "--out", picture});
+  EXPECT_GT(diff["moved"], 100);
+  EXPECT_GT(diff["unchanged"], 100);
+  EXPECT_GT(diff["rise_largest_m"].get<double>(), 0.25);
+  EXPECT_TRUE(std::filesystem::file_size(picture) > 1000);
+  // The way back is the opposite, and tiles as they are now are not fetched without a picture.
+  const json back = RunOk({"map", "diff", "m", "m@1"});
+  EXPECT_EQ(back["added"], diff["removed"]);
+  EXPECT_EQ(back["removed"], diff["added"]);
+  EXPECT_EQ(back["moved"], diff["moved"]);
+  EXPECT_NEAR(back["rise_rms_m"].get<double>(), diff["rise_rms_m"].get<double>(), 1e-9);
+  RunOk({"pose", "set", "m", scan, "--pose", "-4,0,1,0,0,0,1"});
+  const json undone = RunOk({"map", "diff", "m@1", "m"});
+  EXPECT_EQ(undone["added"], 0);
+  EXPECT_EQ(undone["removed"], 0);
+  EXPECT_EQ(undone["moved"], 0);
+  RunOk({"map", "create", "coarse", "--cell-size", "0.2"});
+  const Ran refused = Run({"map", "diff", "m", "coarse"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("different cells or gaps"));
+  EXPECT_THAT(Run({"map", "diff", "m@99", "m"}).err, HasSubstr("map history"));
+  EXPECT_EQ(Run({"map", "diff", "m@x", "m"}).exit_code, 2);
+}
+
+TEST_F(StrataTest, BackupsAndMapsAreMergedIntoOne) {
+  WriteDrive(3);
+  RunOk({"map", "create", "m"});
+  Import({"--align", "off"});
+  const std::string file = (dir_.path() / "m copy.strata").string();
+  const json written = RunOk({"map", "backup", "m", file});
+  EXPECT_EQ(std::filesystem::file_size(file), written["bytes"]);
+  EXPECT_EQ(written["content_hash"].get<std::string>().size(), 32U);
+  const Ran again = Run({"map", "backup", "m", file});
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_THAT(again.err, HasSubstr("exists; --force"));
+  RunOk({"map", "backup", "m", file, "--force"});
+  EXPECT_EQ(Run({"map", "backup", "none", file, "--force"}).exit_code, 1);
+  EXPECT_EQ(std::filesystem::file_size(file), written["bytes"]);  // as before
+
+  // Other scans of the same drive, one of them moved; all of it once more in one map.
+  RunOk({"map", "create", "n"});
+  const auto import = [&](const std::string& map, const std::string& trajectory) {
+    RunOk({"scan",
+           "import",
+           map,
+           scans_,
+           "--poses",
+           poses_,
+           "--trajectory",
+           trajectory,
+           "--align",
+           "off",
+           "--wait"});
+  };
+  import("n", "u");
+  const std::vector<std::string> move = {"pose", "set", "n", "u/1", "--pose", "1,2,1,0,0,0,1"};
+  RunOk(move);
+  RunOk({"map", "create", "both"});
+  import("both", "t");
+  import("both", "u");
+  RunOk({"pose", "set", "both", "u/1", "--pose", "1,2,1,0,0,0,1"});
+  const json merged = RunOk({"map", "merge", "all", file, "n"});
+  const json expected = RunOk({"map", "show", "both"});
+  EXPECT_EQ(merged["content_digest"], expected["content_digest"]);
+  EXPECT_EQ(merged["scans"], 6);
+  RunOk({"map", "verify", "all"});
+
+  const Ran clash = Run({"map", "merge", "twice", "m", file});
+  EXPECT_EQ(clash.exit_code, 1);
+  EXPECT_THAT(clash.err, HasSubstr("trajectory t is in m and in"));
+  EXPECT_THAT(clash.err, HasSubstr("--rename-clashes"));
+  EXPECT_EQ(Run({"map", "show", "twice"}).exit_code, 1);
+  RunOk({"map", "create", "coarse", "--cell-size", "0.2"});
+  EXPECT_THAT(Run({"map", "merge", "x", "m", "coarse"}).err, HasSubstr("differ in cell size"));
+  EXPECT_THAT(Run({"map", "merge", "all", "m"}).err, HasSubstr("all exists"));
+}
+
+TEST_F(StrataTest, PathsAreCheckedFromTheirFiles) {
+  WriteDrive(8);
+  RunOk({"map", "create", "m"});
+  Import({"--align", "off"});
+  const std::string path = (dir_.path() / "path.ply").string();
+  const json plan = RunOk({"plan", "m", "--from", "-4,0.5,0", "--to", "3,-0.5,0", "--out", path});
+  ASSERT_EQ(plan["found"], true) << plan;
+  const json check = RunOk({"path", "check", "m", path});
+  EXPECT_EQ(check["valid"], true) << check;
+  EXPECT_NEAR(check["length_m"].get<double>(), plan["length_m"].get<double>(), 0.01);
+  const json wide = RunOk({"path", "check", "m", path, "--radius", "5"});
+  EXPECT_EQ(wide["valid"], false);
+  EXPECT_TRUE(wide.contains("where"));
+  EXPECT_EQ(Run({"path", "check", "m", path + "x"}).exit_code, 1);
 }
 
 TEST_F(StrataTest, OutputThatCannotBeWrittenIsAFailure) {

@@ -164,5 +164,124 @@ TEST_F(EngineTilesTest, AStreamKeepsToTheStateItBeganWith) {
             }));
 }
 
+// Bytes of level 0 in an epoch, the version left out.
+std::map<TileKey, std::vector<Surface>> SurfacesAt(api::Database& database,
+                                                   std::uint64_t epoch,
+                                                   const api::TileArea& area = {},
+                                                   const std::string& map = kMapName) {
+  std::map<TileKey, std::vector<Surface>> tiles;
+  api::TileArea asked = area;
+  asked.epoch = epoch;
+  STRATA_EXPECT_OK(database.tiles().Fetch({}, map, asked, {}, [&](const api::TileUpdate& update) {
+    EXPECT_EQ(update.tile.epoch, epoch);
+    const SurfaceTile tile = DecodeSurfaceTile(update.tile.bytes).value();
+    EXPECT_EQ(tile.version, update.tile.version);
+    EXPECT_TRUE(tiles.emplace(update.tile.key, tile.surfaces).second);
+    return absl::OkStatus();
+  }));
+  return tiles;
+}
+
+class EngineEpochTilesTest : public EngineTest {
+ protected:
+  // Moves some rooms of a map of seven, again and again; what each epoch looked like.
+  void MakeHistory() {
+    MakeMap();
+    UploadRooms(7);
+    for (const std::uint64_t i : {0U, 3U, 5U, 3U}) {
+      if (i != 0) {
+        const Pose moved = PoseAt(9.0 * static_cast<double>(history_.size()) - 20.0, 31.0, 0.4);
+        STRATA_ASSERT_OK(db().posegraph().SetPose({}, kMapName, {"run", i}, moved));
+      }
+      const MapStats stats = WaitIntegrated(db());
+      history_[stats.epoch] = SurfacesAt(db(), stats.epoch);
+    }
+  }
+  std::map<std::uint64_t, std::map<TileKey, std::vector<Surface>>> history_;
+};
+
+TEST_F(EngineEpochTilesTest, AnEarlierEpochHasTheTilesThatWereServedInIt) {
+  MakeHistory();
+  ASSERT_EQ(history_.size(), 4U);
+  for (const auto& [epoch, tiles] : history_) EXPECT_EQ(SurfacesAt(db(), epoch), tiles) << epoch;
+  EXPECT_NE(history_.begin()->second, history_.rbegin()->second);
+  EngineOptions options = Options();
+  options.worker_threads = 4;
+  Reopen(options);
+  for (const auto& [epoch, tiles] : history_) EXPECT_EQ(SurfacesAt(db(), epoch), tiles) << epoch;
+}
+
+TEST_F(EngineEpochTilesTest, AnAreaOfItHasTheTilesOfTheWhole) {
+  MakeHistory();
+  const auto& [epoch, whole] = *history_.begin();
+  for (const auto& [key, surfaces] : whole) {
+    const auto one = SurfacesAt(
+        db(), epoch, {.x_min = key.x, .x_max = key.x + 1, .y_min = key.y, .y_max = key.y + 1});
+    ASSERT_EQ(one.size(), 1U) << key.ToString();
+    EXPECT_EQ(one.at(key), surfaces) << key.ToString();
+  }
+}
+
+TEST_F(EngineEpochTilesTest, ScansThatCameSinceAreNotInItAndDeletedOnesAreGone) {
+  MakeHistory();
+  UploadRoom(8, PoseAt(0.0, 0.0));
+  WaitIntegrated(db());
+  const std::uint64_t first = history_.begin()->first;
+  EXPECT_EQ(SurfacesAt(db(), first), history_.at(first));
+  STRATA_ASSERT_OK(db().scans().Delete({}, kMapName, {"run", 3}));
+  STRATA_ASSERT_OK(db().scans().Delete({}, kMapName, {"run", 6}));
+  MakeMap(SmallMap(), "other");
+  for (const std::uint64_t i : {1U, 2U, 4U, 5U, 7U}) UploadRoom(i, RoomPose(i), "other");
+  const MapStats other = WaitIntegrated(db(), "other");
+  EXPECT_EQ(SurfacesAt(db(), first), SurfacesAt(db(), other.epoch, {}, "other"));
+}
+
+TEST_F(EngineEpochTilesTest, OnlyTilesThatAreOtherwiseNowAreSentToOneWhoHoldsThoseOfNow) {
+  MakeHistory();
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto infos, db().tiles().List({}, kMapName, {}));
+  std::vector<api::HeldTile> held;
+  for (const api::TileInfo& info : infos) held.push_back({info.key, info.version});
+  const auto& [epoch, then] = *history_.begin();
+  const auto& now = history_.rbegin()->second;
+  std::map<TileKey, api::TileUpdate::Kind> kinds;
+  STRATA_ASSERT_OK(
+      db().tiles().Fetch({}, kMapName, {.epoch = epoch}, held, [&](const api::TileUpdate& u) {
+        EXPECT_EQ(u.tile.version, 0U);
+        kinds[u.tile.key] = u.kind;
+        return absl::OkStatus();
+      }));
+  using Kind = api::TileUpdate::Kind;
+  for (const auto& [key, surfaces] : then) {
+    const auto it = now.find(key);
+    if (it == now.end()) {
+      EXPECT_EQ(kinds[key], Kind::kNew) << key.ToString();
+    } else if (it->second != surfaces) {
+      EXPECT_EQ(kinds[key], Kind::kChanged) << key.ToString();
+    } else {
+      EXPECT_FALSE(kinds.contains(key)) << key.ToString();
+    }
+  }
+  for (const auto& [key, surfaces] : now) {
+    if (then.contains(key)) continue;
+    EXPECT_EQ(kinds[key], Kind::kGone) << key.ToString();
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto listed, db().tiles().List({}, kMapName, {.epoch = epoch}));
+  ASSERT_EQ(listed.size(), then.size());
+  for (const api::TileInfo& info : listed) {
+    EXPECT_EQ(info.patches, then.at(info.key).size());
+    EXPECT_EQ(info.version == 0, kinds.contains(info.key)) << info.key.ToString();
+  }
+}
+
+TEST_F(EngineEpochTilesTest, OtherEpochsAndLevelsAreRefused) {
+  MakeHistory();
+  const std::uint64_t now = history_.rbegin()->first;
+  EXPECT_THAT(db().tiles().List({}, kMapName, {.epoch = now + 1}),
+              StatusIs(absl::StatusCode::kNotFound, ::testing::HasSubstr("see map history")));
+  EXPECT_THAT(db().tiles().List({}, kMapName, {.level = 1, .epoch = now - 1}),
+              StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr("level 1")));
+  STRATA_EXPECT_OK(db().tiles().List({}, kMapName, {.level = 1, .epoch = now}));
+}
+
 }  // namespace
 }  // namespace strata::testing

@@ -124,6 +124,23 @@ std::vector<SurfaceTile> WithClasses(std::vector<SurfaceTile> tiles) {
   return tiles;
 }
 
+// A path just planned holds, back too, and in the precision of a file.
+void ExpectHolds(Planner& planner,
+                 MemoryTiles& source,
+                 const PlanQuery& query,
+                 const PlanResult& result) {
+  PathQuery asked = {result.waypoints, query.profile, query.class_costs};
+  STRATA_ASSERT_OK_AND_ASSIGN(const PathCheck check, planner.Check(source, asked, Stop()));
+  EXPECT_TRUE(check.valid) << check.message;
+  EXPECT_NEAR(check.length_m, result.length_m, 1e-9);
+  EXPECT_TRUE(std::includes(
+      check.tiles.begin(), check.tiles.end(), result.tiles.begin(), result.tiles.end()));
+  std::reverse(asked.waypoints.begin(), asked.waypoints.end());
+  for (Eigen::Vector3d& p : asked.waypoints) p = p.cast<float>().cast<double>();
+  STRATA_ASSERT_OK_AND_ASSIGN(const PathCheck back, planner.Check(source, asked, Stop()));
+  EXPECT_TRUE(back.valid) << back.message;
+}
+
 void CompareOneWorld(std::uint64_t seed, const ClassCosts& costs, Tally* tally) {
   SCOPED_TRACE(::testing::Message() << "seed " << seed);
   const World world = RandomWorld(seed);
@@ -174,6 +191,7 @@ void CompareOneWorld(std::uint64_t seed, const ClassCosts& costs, Tally* tally) 
     }
     tally->moved += absl::StrContains(result.message, "moved") ? 1 : 0;
     EXPECT_EQ(Collision(world.map, result.waypoints, world.profile, kCell), "");
+    ExpectHolds(planner, source, query, result);
   }
 }
 

@@ -208,6 +208,18 @@ TEST(TranslateRoundTripTest, Planning) {
   }
   ExpectRoundTrip(Filled<v1::PlanPathResponse>());
   ExpectRoundTrip(Filled<v1::SurfaceColumn>());
+  ExpectRoundTrip(Filled<v1::PathCheck>());
+  const auto check = Filled<v1::CheckPathRequest>();
+  STRATA_ASSERT_OK_AND_ASSIGN(const PathQuery checked, FromProto(check));
+  ExpectSame(check, CheckToProto(check.map(), checked));
+  const auto watch = Filled<v1::WatchPathRequest>();
+  STRATA_ASSERT_OK_AND_ASSIGN(const PathQuery watched, FromProto(watch));
+  ExpectSame(watch, WatchToProto(watch.map(), watched));
+}
+
+TEST(TranslateRoundTripTest, Backups) {
+  const auto piece = Filled<v1::BackupMapResponse>();
+  ExpectSame(piece, ToProto(FromProto(piece)));
 }
 
 TEST(TranslateRoundTripTest, ClassCosts) {
