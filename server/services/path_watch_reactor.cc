@@ -10,9 +10,7 @@ namespace strata::server {
 PathWatchReactor::PathWatchReactor(Runtime& runtime,
                                    grpc::CallbackServerContext& context,
                                    const v1::WatchPathRequest& in)
-    : PollReactor(runtime, context, "Planning.WatchPath"), in_(in) {
-  request().CountReceived(in);
-}
+    : PollReactor(runtime, context, "Planning.WatchPath", in), in_(in) {}
 
 absl::StatusOr<PathWatchReactor::News> PathWatchReactor::Look(v1::WatchPathResponse& out) {
   if (!query_.has_value()) {
