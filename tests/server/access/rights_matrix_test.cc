@@ -59,6 +59,7 @@ const std::map<std::string, std::optional<Right>>& Needed() {
          "Scans.Get",
          "Scans.List",
          "Scans.GetPoints",
+         "Scans.GetFaded",
          "Tiles.Get",
          "Tiles.List",
          "Tiles.Fetch",
