@@ -38,6 +38,11 @@ MapNumbers NumbersOfMap(Map& map, const std::filesystem::path& file) {
     const std::uintmax_t bytes = std::filesystem::file_size(file.string() + suffix, error);
     if (!error) numbers.file_bytes += bytes;
   }
+  const WriterNumbers writer = map.core().writer().numbers();
+  numbers.commits = writer.commits;
+  numbers.commit_parts = writer.parts;
+  numbers.commit_time = writer.time;
+  numbers.queued_bytes = writer.queued_bytes;
   for (const JobInfo& job : map.jobs().List()) ++numbers.jobs[{job.kind, job.state}];
   const auto reader = map.core().Reader();
   if (!reader.ok()) return numbers;

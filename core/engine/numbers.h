@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "absl/time/time.h"
+
 #include "core/api/database.h"
 #include "core/world/job.h"
 
@@ -21,7 +23,11 @@ struct MapNumbers {
   std::uint64_t scans = 0;
   std::uint64_t scans_pending = 0;  // acknowledged, not joined yet
   std::uint64_t scans_failed = 0;
-  std::uint64_t tiles = 0;                                         // level of detail 0
+  std::uint64_t tiles = 0;         // level of detail 0
+  std::uint64_t queued_bytes = 0;  // points that wait for the disk
+  std::uint64_t commits = 0;
+  std::uint64_t commit_parts = 0;  // uploads and other works that they were made of
+  absl::Duration commit_time;      // that they took, in all
   std::map<std::pair<std::string, JobState>, std::uint64_t> jobs;  // by kind and state
 };
 

@@ -50,6 +50,13 @@ absl::Status WriterThread::Run(
   return task.status;
 }
 
+WriterNumbers WriterThread::numbers() const {
+  absl::MutexLock lock(&mutex_);
+  WriterNumbers numbers = numbers_;
+  numbers.queued_bytes = queued_bytes_;
+  return numbers;
+}
+
 bool WriterThread::HasWorkOrClosed() const {
   return closed_ || !full_.empty() || !relaxed_.empty();
 }
@@ -90,8 +97,12 @@ void WriterThread::Loop() {
       batch = TakeBatch(durability);
       if (batch.empty()) return;
     }
+    const absl::Time begun = absl::Now();
     CommitBatch(durability, batch);
     absl::MutexLock lock(&mutex_);
+    ++numbers_.commits;
+    numbers_.parts += batch.size();
+    numbers_.time += absl::Now() - begun;
     for (Task* task : batch) {
       queued_bytes_ -= task->bytes;
       task->done = true;

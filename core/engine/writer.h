@@ -3,6 +3,7 @@
 #define STRATA_CORE_ENGINE_WRITER_H_
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <thread>
 
@@ -10,11 +11,20 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
 
 #include "core/common/stop.h"
 #include "core/storage/storage.h"
 
 namespace strata {
+
+// What a writer has done since it began.
+struct WriterNumbers {
+  std::uint64_t commits = 0;
+  std::uint64_t parts = 0;  // works they were made of
+  absl::Duration time;      // that they took, in all
+  std::size_t queued_bytes = 0;
+};
 
 // Thread-safe.
 class WriterThread {
@@ -36,6 +46,8 @@ class WriterThread {
                    const Stop& stop,
                    Work work,
                    Tell tell = TellNobody);
+
+  WriterNumbers numbers() const;
 
   // Carries out what is queued, then refuses everything with CANCELLED. Safe to call again.
   void Close();
@@ -59,7 +71,8 @@ class WriterThread {
 
   StorageWriter& storage_;
   const std::size_t queue_bytes_;
-  absl::Mutex mutex_;
+  mutable absl::Mutex mutex_;
+  WriterNumbers numbers_ ABSL_GUARDED_BY(mutex_);  // without queued_bytes
   Queue full_ ABSL_GUARDED_BY(mutex_);
   Queue relaxed_ ABSL_GUARDED_BY(mutex_);
   std::size_t queued_bytes_ ABSL_GUARDED_BY(mutex_) = 0;

@@ -61,6 +61,20 @@ void AddEngine(MetricFamilies& families, const EngineNumbers& numbers) {
     return m.scans_failed;
   });
   add("strata_map_tiles", "Tiles of level of detail 0", [](Map m) { return m.tiles; });
+  add("strata_map_queue_bytes", "Points that wait for the disk", [](Map m) {
+    return m.queued_bytes;
+  });
+  const auto add_counter = [&](const char* name, const char* help, auto value) {
+    add(name, help, value);
+    families.back().type = MetricType::Counter;
+  };
+  add_counter("strata_commits_total", "Commits", [](Map m) { return m.commits; });
+  add_counter("strata_commit_parts_total",
+              "Uploads and other works in them; by commits, the size of a batch",
+              [](Map m) { return m.commit_parts; });
+  add_counter("strata_commit_seconds_total", "Time that commits took", [](Map m) {
+    return absl::ToDoubleSeconds(m.commit_time);
+  });
   AddJobs(families, numbers);
 }
 

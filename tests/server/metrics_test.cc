@@ -78,6 +78,9 @@ TEST(MetricsTest, AScrapeHasWhatWasCounted) {
   map.map = "campus";
   map.file_bytes = 4096;
   map.scans = 7;
+  map.commits = 3;
+  map.commit_parts = 12;
+  map.commit_time = absl::Milliseconds(1500);
   map.jobs[{"rebuild", JobState::kRunning}] = 1;
   numbers.maps.push_back(map);
   const auto gauges = [&numbers](MetricFamilies& families) {
@@ -102,6 +105,9 @@ TEST(MetricsTest, AScrapeHasWhatWasCounted) {
   EXPECT_EQ(value("strata_call_seconds_bucket{method=\"Maps.Get\",le=\"0.05\"}"), 4);
   EXPECT_EQ(value("strata_maps_not_opened"), 2);
   EXPECT_EQ(value("strata_map_file_bytes{map=\"campus\"}"), 4096);
+  EXPECT_EQ(value("strata_commits_total{map=\"campus\"}"), 3);
+  EXPECT_EQ(value("strata_commit_parts_total{map=\"campus\"}"), 12);
+  EXPECT_EQ(value("strata_commit_seconds_total{map=\"campus\"}"), 1.5);
   EXPECT_EQ(value("strata_map_scans{map=\"campus\"}"), 7);
   EXPECT_EQ(value("strata_jobs{kind=\"rebuild\",map=\"campus\",state=\"running\"}"), 1);
   EXPECT_NEAR(value("strata_uptime_seconds"), 5.0, 4.0);
