@@ -145,12 +145,14 @@ struct Difference {
     }
   }
   std::uint64_t changed() const { return added + removed + moved; }
+  double RiseRms() const {
+    return moved == 0 ? 0.0 : std::sqrt(squared_rises / static_cast<double>(moved));
+  }
   Json ToJson(double cell_size_m) const {
     const double area_m2 = cell_size_m * cell_size_m;
     const auto area = [area_m2](std::uint64_t count) {
       return static_cast<double>(count) * area_m2;
     };
-    const double rms_m = moved == 0 ? 0.0 : std::sqrt(squared_rises / static_cast<double>(moved));
     return {{"added", added},
             {"removed", removed},
             {"moved", moved},
@@ -158,7 +160,7 @@ struct Difference {
             {"added_m2", area(added)},
             {"removed_m2", area(removed)},
             {"moved_m2", area(moved)},
-            {"rise_rms_m", rms_m},
+            {"rise_rms_m", RiseRms()},
             {"rise_largest_m", largest_rise_m}};
   }
 };
@@ -198,20 +200,26 @@ absl::StatusOr<std::vector<ComparedTile>> Compare(const Sides& sides,
 
 constexpr Colour kAddedColour = {46, 160, 67};
 constexpr Colour kRemovedColour = {207, 48, 43};
-constexpr Colour kSunkColour = {38, 84, 214};
-constexpr Colour kRisenColour = {255, 206, 40};
-// Moves are drawn in so many steps of height.
-constexpr int kRiseSteps = 7;
+// Far down, a little down, a little up, far up.
+constexpr Colour kSunkColour = {24, 56, 190};
+constexpr Colour kLittleSunkColour = {140, 190, 255};
+constexpr Colour kLittleRisenColour = {196, 120, 20};
+constexpr Colour kRisenColour = {255, 222, 50};
+// Moves are drawn in so many steps of height, half of them down.
+constexpr int kRiseSteps = 6;
 constexpr std::uint8_t kUnchangedStyle = 1, kAddedStyle = 2, kRemovedStyle = 3, kFirstRiseStyle = 4;
 
-// In [0, kRiseSteps): which step of ±`largest_m` a rise falls into.
+// In [0, kRiseSteps): which step of ±`largest_m` a rise falls into, or is beyond.
 int RiseStep(double rise_m, double largest_m) {
   const double share = 0.5 + 0.5 * rise_m / largest_m;
   return std::clamp(static_cast<int>(share * kRiseSteps), 0, kRiseSteps - 1);
 }
 
 Colour RiseColour(int step) {
-  return picture::Blend(kSunkColour, kRisenColour, static_cast<double>(step) / (kRiseSteps - 1));
+  constexpr int kHalf = kRiseSteps / 2;
+  const double share = static_cast<double>(step % kHalf) / (kHalf - 1);
+  return step < kHalf ? picture::Blend(kSunkColour, kLittleSunkColour, share)
+                      : picture::Blend(kLittleRisenColour, kRisenColour, share);
 }
 
 picture::ClassStyles Styles(double largest_m) {
@@ -221,7 +229,7 @@ picture::ClassStyles Styles(double largest_m) {
   for (int step = 0; step < kRiseSteps; ++step) {
     const double middle_m = largest_m * ((2.0 * step + 1.0) / kRiseSteps - 1.0);
     styles[static_cast<std::uint8_t>(kFirstRiseStyle + step)] = {
-        absl::StrFormat("%s %.2f m", middle_m < -1e-9 ? "sunk" : "risen", std::abs(middle_m)),
+        absl::StrFormat("%s %.2f m", middle_m < 0.0 ? "sunk" : "risen", std::abs(middle_m)),
         RiseColour(step)};
   }
   return styles;
@@ -282,7 +290,9 @@ absl::Status Write(Context& context,
                    const std::vector<ComparedTile>& compared,
                    double cell_size_m,
                    const Difference& total) {
-  const double largest_m = std::max(std::abs(total.largest_rise_m), kLeastRiseM);
+  // Few moves are much larger than the others: twice the root mean square spreads the colours.
+  const double largest_m = std::clamp(
+      2.0 * total.RiseRms(), kLeastRiseM, std::max(kLeastRiseM, std::abs(total.largest_rise_m)));
   STRATA_ASSIGN_OR_RETURN(const std::string bytes,
                           absl::EndsWith(out, ".ply")
                               ? PlyOf(compared, cell_size_m, largest_m)

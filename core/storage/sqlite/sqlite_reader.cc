@@ -65,6 +65,7 @@ absl::Status SqliteReader::Snapshot(absl::FunctionRef<absl::Status()> body) {
 }
 
 absl::Status SqliteReader::CopyTo(const std::filesystem::path& file, const Stop& stop) {
+  STRATA_RETURN_IF_ERROR(stop.status());
   std::error_code error;
   if (std::filesystem::exists(file, error)) {
     return absl::AlreadyExistsError(absl::StrCat(file.string(), " exists"));

@@ -77,7 +77,7 @@ class EngineForgetTest : public EngineTest {
 };
 
 TEST_F(EngineForgetTest, TilesAreThoseOfTheRemainingScansAtTheirPoses) {
-  for (const std::uint64_t seed : {11U, 12U, 13U}) {
+  for (const std::uint64_t seed : {11U, 12U}) {
     SCOPED_TRACE(seed);
     random_.seed(seed);
     kept_.clear();

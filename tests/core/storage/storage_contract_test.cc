@@ -99,6 +99,30 @@ TEST_F(StorageContractTest, ScanComesBackToTheBit) {
   EXPECT_THAT(reader().FindScan({"run", 8}, 1), IsOkAndHolds(::testing::Eq(std::nullopt)));
 }
 
+TEST_F(StorageContractTest, ACopyIsAStoreOfItsOwnAndCommitsGoOn) {
+  const ScanNumber number = Put(7);
+  const std::filesystem::path copy = directory_.path() / "it's a copy.strata";
+  STRATA_ASSERT_OK(reader().CopyTo(copy, Stop()));
+  Put(8);  // does not wait for anything
+  EXPECT_THAT(reader().CopyTo(copy, Stop()),
+              StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("a copy.strata")));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto opened, OpenSqliteStorage(copy, {}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto copied, opened->NewReader());
+  EXPECT_THAT(copied->ListScanNumbers(), IsOkAndHolds(ElementsAre(number)));
+  EXPECT_THAT(copied->GetChunk(7, 0), IsOkAndHolds(std::string("bytes")));
+  STRATA_ASSERT_OK_AND_ASSIGN(const MapClock clock, copied->GetClock());
+  EXPECT_EQ(clock.commit_sequence, number);
+}
+
+TEST_F(StorageContractTest, ACopyStopsWhenAsked) {
+  const ScanNumber number = Put(1);
+  const Stop stop;
+  stop.Request();
+  EXPECT_THAT(reader().CopyTo(directory_.path() / "copy.strata", stop),
+              StatusIs(absl::StatusCode::kCancelled, ::testing::_));
+  EXPECT_THAT(reader().ListScanNumbers(), IsOkAndHolds(ElementsAre(number)));
+}
+
 TEST_F(StorageContractTest, FailedCommitLeavesNothingAndFailedPartOnlyItself) {
   const absl::Status failed = Commit([&]() -> absl::Status {
     STRATA_RETURN_IF_ERROR(writer().PutChunk(1, 0, "a"));
