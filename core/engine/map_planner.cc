@@ -107,7 +107,8 @@ absl::StatusOr<std::shared_ptr<const SurfaceTile>> MapPlanner::LoadTile(const Ti
                                                                         std::uint64_t version) {
   {
     absl::MutexLock lock(&mutex_);
-    if (auto held = tiles_.Find({key, version}); held != nullptr) return held;
+    const auto held = tiles_.Find(key);
+    if (held != nullptr && held->version == version) return held->tile;
   }
   std::optional<SurfaceTileRow> row;
   {
@@ -120,8 +121,9 @@ absl::StatusOr<std::shared_ptr<const SurfaceTile>> MapPlanner::LoadTile(const Ti
   if (decoded->key != key) return DamagedTile(key, absl::DataLossError("it is another tile"));
   auto tile = std::make_shared<const SurfaceTile>(*std::move(decoded));
   absl::MutexLock lock(&mutex_);
-  tiles_.Put(
-      {key, version}, tile, sizeof(SurfaceTile) + tile->surfaces.capacity() * sizeof(Surface));
+  tiles_.Put(key,
+             std::make_shared<const Decoded>(Decoded{version, tile}),
+             sizeof(SurfaceTile) + tile->surfaces.capacity() * sizeof(Surface));
   return tile;
 }
 

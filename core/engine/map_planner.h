@@ -44,6 +44,11 @@ class MapPlanner {
   // Versions of all level-0 tiles of one state.
   using Versions = absl::flat_hash_map<TileKey, std::uint64_t>;
 
+  struct Decoded {
+    std::uint64_t version = 0;
+    std::shared_ptr<const SurfaceTile> tile;
+  };
+
   absl::StatusOr<std::shared_ptr<const Versions>> VersionsOf(const MapView& view);
   absl::StatusOr<std::shared_ptr<const SurfaceTile>> LoadTile(const TileKey& key,
                                                               std::uint64_t version);
@@ -53,7 +58,7 @@ class MapPlanner {
   absl::Mutex mutex_;
   MapView versions_view_ ABSL_GUARDED_BY(mutex_);
   std::shared_ptr<const Versions> versions_ ABSL_GUARDED_BY(mutex_);
-  LruCache<std::pair<TileKey, std::uint64_t>, SurfaceTile> tiles_ ABSL_GUARDED_BY(mutex_);
+  LruCache<TileKey, Decoded> tiles_ ABSL_GUARDED_BY(mutex_);  // of each what was asked for last
 };
 
 }  // namespace strata

@@ -54,16 +54,14 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Get(TileSource& s
   if (versions[kMiddleTile] == 0) return nullptr;
   const RobotProfile& p = checks.profile;
   const Key cache_key = {
-      key,
-      versions,
-      {p.radius_m, p.height_m, p.max_step_m, p.max_slope_rad, p.max_gap_m, p.max_roughness_m}};
-  const std::shared_ptr<Entry> entry = FindOrInsert(cache_key);
+      key, {p.radius_m, p.height_m, p.max_step_m, p.max_slope_rad, p.max_gap_m, p.max_roughness_m}};
+  const std::shared_ptr<Entry> entry = FindOrInsert(cache_key, versions);
   absl::MutexLock lock(&entry->mutex);
   if (entry->tile != nullptr) return entry->tile;
   STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles, LoadAround(source, key));
   if (tiles[kMiddleTile] == nullptr) return nullptr;
   const GroundWindow window(tiles, checks.margin, checks.cell_size_m);
-  const auto fits = Fits({key, versions, {}}, window);
+  const auto fits = Fits(key, versions, window);
   auto tile = std::make_shared<PreparedTile>(PrepareTile(key, window, *fits, checks));
   tile->class_id = ClassesOf(*tile, *tiles[kMiddleTile]);
   entry->tile = tile;
@@ -71,8 +69,11 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Get(TileSource& s
   return tile;
 }
 
-std::shared_ptr<const std::vector<GroundFit>> TileCache::Fits(Key key, const GroundWindow& window) {
-  const std::shared_ptr<Entry> entry = FindOrInsert(key);
+std::shared_ptr<const std::vector<GroundFit>> TileCache::Fits(const TileKey& tile,
+                                                              const TileVersions& versions,
+                                                              const GroundWindow& window) {
+  const Key key{tile, {}};
+  const std::shared_ptr<Entry> entry = FindOrInsert(key, versions);
   absl::MutexLock lock(&entry->mutex);
   if (entry->fits == nullptr) {
     entry->fits = std::make_shared<const std::vector<GroundFit>>(FitTile(window));
@@ -81,16 +82,19 @@ std::shared_ptr<const std::vector<GroundFit>> TileCache::Fits(Key key, const Gro
   return entry->fits;
 }
 
-std::shared_ptr<TileCache::Entry> TileCache::FindOrInsert(const Key& key) {
+std::shared_ptr<TileCache::Entry> TileCache::FindOrInsert(const Key& key,
+                                                          const TileVersions& versions) {
   absl::MutexLock lock(&mutex_);
   std::shared_ptr<Entry>& entry = entries_[key];
-  if (entry == nullptr) {
-    entry = std::make_shared<Entry>();
-    by_age_.push_front(key);
-    entry->age = by_age_.begin();
-  } else {
+  if (entry != nullptr) {
     by_age_.splice(by_age_.begin(), by_age_, entry->age);
+    if (entry->versions == versions) return entry;
+    statistics_.bytes -= entry->bytes;
+  } else {
+    by_age_.push_front(key);
   }
+  entry = std::make_shared<Entry>(versions);
+  entry->age = by_age_.begin();
   return entry;
 }
 

@@ -32,7 +32,8 @@ TileVersions VersionsAround(TileSource& source, const TileKey& key);
 absl::StatusOr<TileNeighbourhood> LoadAround(TileSource& source, const TileKey& key);
 
 // Thread-safe. A tile of unchanged versions is prepared once, however many threads ask for it at
-// the same time; a changed one has another key and the old falls out by age.
+// the same time; of a tile and a profile only what was asked for last is kept, so that a map that
+// changes takes no more than one that does not.
 class TileCache {
  public:
   struct Statistics {
@@ -53,15 +54,16 @@ class TileCache {
  private:
   struct Key {
     TileKey tile;
-    TileVersions versions{};
     std::array<double, 6> profile{};  // all zero: the fits, which know no profile
     friend bool operator==(const Key&, const Key&) = default;
     template <typename H>
     friend H AbslHashValue(H h, const Key& key) {
-      return H::combine(std::move(h), key.tile, key.versions, key.profile);
+      return H::combine(std::move(h), key.tile, key.profile);
     }
   };
   struct Entry {
+    explicit Entry(const TileVersions& of) : versions(of) {}
+    const TileVersions versions;
     absl::Mutex mutex;  // held while the content is made
     std::shared_ptr<const PreparedTile> tile ABSL_GUARDED_BY(mutex);
     std::shared_ptr<const std::vector<GroundFit>> fits ABSL_GUARDED_BY(mutex);
@@ -69,9 +71,11 @@ class TileCache {
     std::list<Key>::iterator age;
   };
 
-  std::shared_ptr<Entry> FindOrInsert(const Key& key);
+  std::shared_ptr<Entry> FindOrInsert(const Key& key, const TileVersions& versions);
   void Account(const Key& key, const Entry& entry, std::size_t bytes, bool fits);
-  std::shared_ptr<const std::vector<GroundFit>> Fits(Key key, const GroundWindow& window);
+  std::shared_ptr<const std::vector<GroundFit>> Fits(const TileKey& tile,
+                                                     const TileVersions& versions,
+                                                     const GroundWindow& window);
 
   const std::size_t max_bytes_;
   mutable absl::Mutex mutex_;

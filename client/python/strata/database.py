@@ -37,17 +37,19 @@ class Database:
         self._connection.channel.close()
 
     def create_map(self, name, *, cell_size=None, gap_size=None, thickness=None, profile=None, keep_points=True,
-                   exist_ok=False):
+                   fade_after=0, exist_ok=False):
         """A new, empty map.
 
         cell_size, gap_size, thickness: of its surfaces [m]; None: 0.1, 1 and 0.1. profile: {"radius": 0.3, …} of the
         robot whose traversability the tiles carry, see Map.plan. keep_points False: points are dropped once a scan is
-        in the tiles. exist_ok: a map of that name is taken as it is. Raises AlreadyExists, InvalidArgument.
+        in the tiles. fade_after: later scans that must have looked through a place for what was there to fade by itself;
+        0: nothing does. exist_ok: a map of that name is taken as it is. Raises AlreadyExists, InvalidArgument.
         """
         mls = {"cell_size_m": cell_size, "gap_size_m": gap_size, "thickness_m": thickness}
         parameters = maps_pb2.MapParameters(
             mls=maps_pb2.MlsParameters(**{field: value for field, value in mls.items() if value is not None}),
-            default_profile=plan.profile_to_proto(profile or {}), keep_points=keep_points)
+            default_profile=plan.profile_to_proto(profile or {}), keep_points=keep_points,
+            fade_after=fade_after)
         request = maps_pb2.CreateMapRequest(name=name, parameters=parameters)
         call = self._connection.unary if exist_ok else self._connection.once
         try:

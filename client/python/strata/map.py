@@ -142,6 +142,13 @@ class Map:
         answers = self._connection.collected(self._scans.GetPoints, request)
         return scan.points_from_proto([answer.chunk for answer in answers])
 
+    def faded(self, which):
+        """(n,) uint16: for each point of a scan how many later scans looked through the place where it was, 0 if it has
+        not faded; empty if none of them has."""
+        request = scans_pb2.GetFadedPointsRequest(map=self.name, id=scan.id_of(which))
+        answers = self._connection.collected(self._scans.GetFaded, request)
+        return np.frombuffer(b"".join(answer.scans for answer in answers), "<u2")
+
     def delete_scan(self, which):
         """Takes a scan, its points and its contribution out of the map."""
         self._connection.once(self._scans.Delete,
@@ -286,7 +293,8 @@ class Map:
                 backoff.wait(failure)
 
     def start_job(self, kind, **parameters):
-        """Queues a Job, "rebuild", "verify", "optimize", "revert", "train", "classify" or "evaluate"."""
+        """Queues a Job, "rebuild", "verify", "optimize", "fade", "revert", "train", "classify" or
+        "evaluate"."""
         answer = self._connection.once(self._jobs.Start, jobs_pb2.StartJobRequest(
             map=self.name, kind=kind, parameters=job.parameters(parameters)))
         return job.from_proto(answer.job)

@@ -45,6 +45,8 @@ class Scan:
     aligned: bool
     """The pose was found by registration."""
     point_count: int
+    faded_points: int
+    """Points that later scans looked through, so that they are not in the tiles (job "fade")."""
     commit_sequence: int
     """Order of acknowledgement in the map."""
     content_hash: str
@@ -78,8 +80,8 @@ def from_proto(info):
     header = info.header
     return Scan(header.id.trajectory, header.id.sequence, header.time.seconds + header.time.nanos * 1e-9,
                 state_name(info.state), info.message, poses.from_proto(info.pose),
-                poses.from_proto(header.pose), info.alignment.aligned, header.point_count, info.commit_sequence,
-                info.content_hash)
+                poses.from_proto(header.pose), info.alignment.aligned, header.point_count, info.faded_points,
+                info.commit_sequence, info.content_hash)
 
 
 def points_from_proto(chunks):

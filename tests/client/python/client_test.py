@@ -277,6 +277,28 @@ class ChangesTest(ServerTest):
         self.assertEqual(tiles, {(0, -1, 0): None, (0, 0, 0): third[0, 0, 0].version})
 
 
+class FadeTest(ServerTest):
+    def test_what_later_scans_look_through_fades(self):
+        world = self.db.create_map("fading", fade_after=0)
+        floor = grid((-2, 10), (-3, 3)) - (0, 0, 1)  # seen from 1 m above
+        _, y, z = grid((-1, 1), (-0.5, 0.5), lambda x, y: 0.6 * y + 0.35).T
+        box = np.stack([np.full_like(y, 3.0), y, z - 1], axis=1)
+        hidden = (floor[:, 0] > 3) & (np.abs(floor[:, 1]) < 0.2 * floor[:, 0])
+        first = world.upload(np.concatenate([floor[~hidden], box]), align=False)
+        for _ in range(3):
+            world.upload(floor, align=False)
+        world.wait(timeout=60)
+        self.assertEqual(len(world.faded(first)), 0)
+        world.job("fade", scans=2)
+        count = world.faded(first)
+        scan = world.scans()[0]
+        self.assertEqual(len(count), scan.point_count)
+        self.assertEqual(scan.faded_points, np.count_nonzero(count))
+        self.assertEqual(np.count_nonzero(count[:-len(box)]), 0)
+        self.assertGreater(np.count_nonzero(count[-len(box):]), len(box) / 4)  # not what is close to the floor
+        self.assertEqual(set(count) - {0}, {3})
+
+
 class ReadmeTest(ServerTest):
     def test_its_example_runs(self):
         example, = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -358,18 +359,37 @@ TEST(PlannerTest, ChangedTilesAreNeverUsedStaleAndUnchangedOnesPreparedOnce) {
   Planner planner({.cell_size_m = kCell});
   const PlanQuery query = {
       .from = At(0.55, 0.75, 0), .to = At(2.45, 0.75, 0), .profile = SmallRobot()};
-  for (int i = 0; i < 3; ++i) {
-    STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult free, planner.Plan(open, query, Stop()));
-    EXPECT_TRUE(free.found());
-    STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult blocked, planner.Plan(closed, query, Stop()));
-    EXPECT_EQ(blocked.reason, PlanReason::kBlocked);
-  }
+  const auto reason = [&](MemoryTiles& tiles, const PlanQuery& asked) {
+    const auto result = planner.Plan(tiles, asked, Stop());
+    STRATA_EXPECT_OK(result);
+    return result.ok() ? result->reason : PlanReason::kSearchLimit;
+  };
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(reason(open, query), PlanReason::kFound);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(reason(closed, query), PlanReason::kBlocked);
   EXPECT_EQ(planner.cache_statistics().prepared, 2U);
   PlanQuery other = query;
   other.profile.radius_m = 0.3;
-  STRATA_EXPECT_OK(planner.Plan(open, other, Stop()));
+  EXPECT_EQ(reason(closed, other), PlanReason::kBlocked);
   EXPECT_EQ(planner.cache_statistics().prepared, 3U);
   EXPECT_EQ(planner.cache_statistics().fitted, 2U);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(reason(open, query), PlanReason::kFound);
+    EXPECT_EQ(reason(closed, query), PlanReason::kBlocked);
+  }
+}
+
+TEST(PlannerTest, AMapThatChangesTakesNoMoreMemoryThanOneThatDoesNot) {
+  const Legend legend = {{'.', {{0.0}}}};
+  Planner planner({.cell_size_m = kCell});
+  std::set<std::size_t> bytes;
+  for (std::uint64_t version = 1; version <= 20; ++version) {
+    MemoryTiles tiles(MapFromDrawing("......\n......\n......", legend, 5).Tiles(version));
+    const PlanQuery query = {
+        .from = At(0.55, 0.75, 0), .to = At(2.45, 0.75, 0), .profile = SmallRobot()};
+    STRATA_EXPECT_OK(planner.Plan(tiles, query, Stop()));
+    bytes.insert(planner.cache_statistics().bytes);
+  }
+  EXPECT_EQ(bytes.size(), 1U) << *bytes.rbegin();
 }
 
 TEST(PlannerTest, WorksWithACacheThatHoldsNothing) {
