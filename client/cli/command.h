@@ -4,9 +4,11 @@
 #define STRATA_CLIENT_CLI_COMMAND_H_
 
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include <CLI/CLI.hpp>
 
 #include "client/cli/output.h"
@@ -23,10 +25,12 @@ struct Context {
   Output& output;
 };
 
-// What a running command has at hand that works on files alone and opens no database.
+// What a running command has at hand that works on files and needs no database.
 struct FileContext {
   const Stop& stop;  // on the first Ctrl-C
   Output& output;
+  // The one that the command line names, for commands that can do with and without.
+  std::function<absl::StatusOr<std::unique_ptr<api::Database>>()> open_database;
 };
 
 // OK: exit 0. Any other status: its message on stderr and exit 1.
@@ -69,6 +73,7 @@ void AddJobCommands(Commands& commands);
 void AddPlanesCommands(Commands& commands);
 void AddLocalizeCommand(Commands& commands);
 void AddClassifierCommands(Commands& commands);
+void AddSpoolCommands(Commands& commands);
 
 }  // namespace strata::cli
 
