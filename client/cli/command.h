@@ -28,10 +28,12 @@ struct Context {
       nullptr;
 };
 
-// What a running command has at hand that works on files alone and opens no database.
+// What a running command has at hand that works on files and needs no database.
 struct FileContext {
   const Stop& stop;  // on the first Ctrl-C
   Output& output;
+  // The one that the command line names, for commands that can do with and without.
+  std::function<absl::StatusOr<std::unique_ptr<api::Database>>()> open_database;
 };
 
 // OK: exit 0. Any other status: its message on stderr and exit 1.
@@ -75,6 +77,7 @@ void AddJobCommands(Commands& commands);
 void AddPlanesCommands(Commands& commands);
 void AddLocalizeCommand(Commands& commands);
 void AddClassifierCommands(Commands& commands);
+void AddSpoolCommands(Commands& commands);
 
 }  // namespace strata::cli
 

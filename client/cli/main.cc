@@ -135,9 +135,10 @@ absl::Status RunOnDatabase(const Target& target, const Action& action, Output& o
   return Explained(status, target);
 }
 
-absl::Status RunOnFiles(const FileAction& action, Output& output) {
+absl::Status RunOnFiles(const Target& target, const FileAction& action, Output& output) {
   const Stop stop;
-  FileContext context{.stop = stop, .output = output};
+  FileContext context{
+      .stop = stop, .output = output, .open_database = [&] { return OpenDatabase(target); }};
   return RunWithSignals(stop, [&] { return action(context); });
 }
 
@@ -145,7 +146,7 @@ int Run(const GlobalOptions& options, const Commands& commands) {
   Output output(
       options.output == "json" ? OutputFormat::kJson : OutputFormat::kText, std::cout, std::cerr);
   const absl::Status status = commands.selected_on_files
-                                  ? RunOnFiles(commands.selected_on_files, output)
+                                  ? RunOnFiles(options.target, commands.selected_on_files, output)
                                   : RunOnDatabase(options.target, commands.selected, output);
   if (!status.ok()) return Fail(status, output);
   // Data that did not arrive (a full disk behind a redirection) is not done.
@@ -175,6 +176,7 @@ int Main(int argc, char** argv) {
   AddPlanesCommands(commands);
   AddLocalizeCommand(commands);
   AddClassifierCommands(commands);
+  AddSpoolCommands(commands);
   try {
     root.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

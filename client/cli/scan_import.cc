@@ -27,6 +27,7 @@
 #include "client/cli/patience.h"
 #include "client/cli/progress.h"
 #include "client/cli/scan_uploader.h"
+#include "client/cli/spool_commands.h"
 #include "client/formats/scan_list.h"
 #include "client/formats/scan_reader.h"
 #include "core/common/status.h"
@@ -49,6 +50,7 @@ struct ImportOptions {
   bool without_labels = false;
   bool level = false;
   bool wait = false;
+  std::string spool;  // a directory, if scans go there first
 };
 
 // What became of the files of one call.
@@ -160,22 +162,25 @@ void WarnOfOtherScans(const std::vector<ScanSource>& scans,
 // What labels of files become in a map.
 using LabelsToMap = std::function<absl::Status(PointCloud&)>;
 
-absl::StatusOr<LabelsToMap> LabelsFor(Context& context, const ImportOptions& options) {
+// Without --classes.
+LabelsToMap PlainLabels(const ImportOptions& options) {
   if (options.without_labels) {
     return [](PointCloud& cloud) {
       cloud.label.clear();
       return absl::OkStatus();
     };
   }
-  if (options.classes.empty()) {
-    return [](PointCloud& cloud) {
-      const absl::Status valid = ValidateLabels(cloud.label);
-      if (valid.ok()) return valid;
-      return absl::InvalidArgumentError(absl::StrCat(
-          valid.message(),
-          "; say with --classes which labels are which class, or leave them out with --no-labels"));
-    };
-  }
+  return [](PointCloud& cloud) {
+    const absl::Status valid = ValidateLabels(cloud.label);
+    if (valid.ok()) return valid;
+    return absl::InvalidArgumentError(absl::StrCat(
+        valid.message(),
+        "; say with --classes which labels are which class, or leave them out with --no-labels"));
+  };
+}
+
+absl::StatusOr<LabelsToMap> LabelsFor(Context& context, const ImportOptions& options) {
+  if (options.without_labels || options.classes.empty()) return PlainLabels(options);
   STRATA_ASSIGN_OR_RETURN(const LabelClasses given, ReadLabelClasses(options.classes));
   STRATA_ASSIGN_OR_RETURN(
       const LabelClasses labels,
@@ -376,6 +381,34 @@ absl::Status Import(Context& context, ImportOptions options) {
   return absl::OkStatus();
 }
 
+absl::Status ImportBySpool(FileContext& context, ImportOptions options) {
+  if (options.trajectory.empty()) {
+    options.trajectory = TrajectoryOf(options.paths.front());
+  }
+  STRATA_ASSIGN_OR_RETURN(std::vector<ScanSource> scans, FindScans(options, context.output));
+  Summary summary;
+  if (options.level) {
+    STRATA_ASSIGN_OR_RETURN(summary.level_rad, LevelTrajectory(scans));
+    context.output.Talk(absl::StrFormat("levelled by %.4f rad", *summary.level_rad));
+  }
+  const std::vector<UploadSource> sources =
+      SourcesOf(scans, {}, options, PlainLabels(options), summary);
+  Json json = {{"map", options.map},
+               {"trajectory", options.trajectory},
+               {"files", scans.size()},
+               {"errors", summary.errors}};
+  STRATA_RETURN_IF_ERROR(ImportIntoSpool(context, options.spool, options.map, sources, json));
+  const Json errors = json["errors"];
+  for (const Json& error : errors) {
+    context.output.Talk(absl::StrCat(
+        "error: ", error["scan"].get<std::string>(), ": ", error["error"].get<std::string>()));
+  }
+  if (!context.output.json()) json.erase("errors");
+  context.output.Object(json);
+  if (errors.empty()) return absl::OkStatus();
+  return absl::UnknownError(absl::StrCat(errors.size(), " of ", scans.size(), " scans failed"));
+}
+
 }  // namespace
 
 void AddScanImport(Commands& commands, CLI::App* noun) {
@@ -427,7 +460,27 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
   import->add_flag("--no-labels", options->without_labels, "Leave out what files say points are")
       ->excludes(classes);
   import->add_flag("--level", options->level, "Turn all poses so that the dominant floor is level");
-  import->add_flag("--wait", options->wait, "Return when every scan is integrated or failed");
+  CLI::Option* wait =
+      import->add_flag("--wait", options->wait, "Return when every scan is integrated or failed");
+  import
+      ->add_option("--spool",
+                   options->spool,
+                   "Put the scans into this directory first, where they are safe until the server "
+                   "has acknowledged them; done also when it is away: strata spool send goes on")
+      ->type_name("DIR")
+      ->excludes(classes)
+      ->excludes(wait);
+  import->callback([&commands, options] {
+    if (options->spool.empty()) {
+      commands.selected = [options](Context& context) { return Import(context, *options);
+};
+}  // namespace strata::cli
+else {
+  commands.selected_on_files = [options](FileContext& context) {
+    return ImportBySpool(context, *options);
+  };
+}
+});
 }
 
 }  // namespace strata::cli

@@ -14,7 +14,9 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 
+#include "core/cloud/cloud_slice.h"
 #include "core/common/status.h"
+#include "core/world/scan_hash.h"
 
 namespace strata::cli {
 namespace {
@@ -25,35 +27,6 @@ constexpr absl::Duration kLongestDelay = absl::Seconds(5);
 bool WorthRetrying(const absl::Status& status) {
   return absl::IsUnavailable(status) || absl::IsResourceExhausted(status) ||
          absl::IsAborted(status);
-}
-
-// The columns of points [begin, end) of `cloud`.
-PointCloud ChunkOf(const PointCloud& cloud, std::size_t begin, std::size_t end) {
-  const auto slice = [=](const auto& column, auto& out) {
-    if (!column.empty()) {
-      out.assign(column.begin() + static_cast<std::ptrdiff_t>(begin),
-                 column.begin() + static_cast<std::ptrdiff_t>(end));
-    }
-  };
-  PointCloud chunk;
-  slice(cloud.points, chunk.points);
-  slice(cloud.intensity, chunk.intensity);
-  slice(cloud.colour, chunk.colour);
-  slice(cloud.label, chunk.label);
-  return chunk;
-}
-
-ScanHeader HeaderOf(const UploadSource& source, const PointCloud& cloud) {
-  ScanHeader header = source.header;
-  header.T_map_scan.translate(cloud.origin);
-  header.sensor_origin = cloud.sensor_origin;
-  header.point_count = cloud.size();
-  header.rows = cloud.rows;
-  header.columns = cloud.columns;
-  header.has_intensity = !cloud.intensity.empty();
-  header.has_colour = !cloud.colour.empty();
-  header.has_label = !cloud.label.empty();
-  return header;
 }
 
 class Uploader {
@@ -103,7 +76,8 @@ class Uploader {
     STRATA_RETURN_IF_ERROR(call_.stop.status());
     STRATA_RETURN_IF_ERROR(lost_server());
     STRATA_ASSIGN_OR_RETURN(const PointCloud cloud, sources_[index].read());
-    const ScanHeader header = HeaderOf(sources_[index], cloud);
+    ScanHeader header = HeaderFor(sources_[index], cloud);
+    header.content_hash = ContentHashOf(header, cloud);
     absl::Time since = absl::Now();
     absl::Duration delay = kFirstDelay;
     absl::Status status = Send(index, header, cloud);
@@ -131,9 +105,10 @@ class Uploader {
   absl::Status Send(std::size_t index, const ScanHeader& header, const PointCloud& cloud) {
     STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<api::ScanUpload> upload,
                             database_.scans().Upload(call_, map_, header));
-    for (std::size_t begin = 0; begin < cloud.size(); begin += api::kMaxPointsPerChunk) {
+    for (std::size_t begin = upload->points_held(); begin < cloud.size();
+         begin += api::kMaxPointsPerChunk) {
       const std::size_t end = std::min(begin + api::kMaxPointsPerChunk, cloud.size());
-      STRATA_RETURN_IF_ERROR(upload->Write(ChunkOf(cloud, begin, end)));
+      STRATA_RETURN_IF_ERROR(upload->Write(SliceOf(cloud, begin, end)));
     }
     WaitForTurn(index);
     return upload->Finish().status();
@@ -177,6 +152,19 @@ class Uploader {
 };
 
 }  // namespace
+
+ScanHeader HeaderFor(const UploadSource& source, const PointCloud& cloud) {
+  ScanHeader header = source.header;
+  header.T_map_scan.translate(cloud.origin);
+  header.sensor_origin = cloud.sensor_origin;
+  header.point_count = cloud.size();
+  header.rows = cloud.rows;
+  header.columns = cloud.columns;
+  header.has_intensity = !cloud.intensity.empty();
+  header.has_colour = !cloud.colour.empty();
+  header.has_label = !cloud.label.empty();
+  return header;
+}
 
 std::vector<UploadResult> UploadScans(api::Database& database,
                                       const api::Call& call,

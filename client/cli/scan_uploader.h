@@ -28,6 +28,9 @@ struct UploadSource {
   std::function<absl::StatusOr<PointCloud>()> read;
 };
 
+// The whole header of a source whose points are `cloud`, for points relative to the cloud's origin.
+ScanHeader HeaderFor(const UploadSource& source, const PointCloud& cloud);
+
 struct UploadResult {
   absl::Status status;  // of reading and uploading
   std::uint64_t points = 0;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
@@ -97,6 +98,32 @@ TEST_F(ImportTest, GoesOnWhereAnEarlierCallEnded) {
   EXPECT_EQ(summary.at("uploaded"), 3);
   EXPECT_EQ(summary.at("skipped"), scans_ - 3);
   EXPECT_EQ(Show().at("content_digest"), digest);
+}
+
+TEST_F(ImportTest, ASpoolKeepsTheScansOfAServerThatIsAway) {
+  StartServer();
+  Json({"map", "create", "m"});
+  server().Signal(SIGKILL);
+  server().Wait();
+  const std::string spool = Path("spool");
+  std::vector<std::string> arguments = ImportArguments("m", kRobot);
+  arguments.pop_back();  // --wait
+  arguments.insert(arguments.end(), {"--spool", spool});
+  const json away = Json(arguments);
+  EXPECT_EQ(away.at("added"), scans_);
+  EXPECT_EQ(away.at("sent"), 0);
+  EXPECT_EQ(away.at("waiting"), scans_);
+  EXPECT_EQ(Json({"spool", "status", spool}).at("waiting"), scans_);
+  EXPECT_EQ(Run({"spool", "send", spool}).exit_code, 1);
+  EXPECT_EQ(Json(arguments).at("added"), 0);  // they wait already
+
+  StartServer();
+  const json sent = Json({"spool", "send", spool});
+  EXPECT_EQ(sent.at("sent"), scans_);
+  EXPECT_EQ(sent.at("waiting"), 0);
+  EXPECT_EQ(Json(arguments).at("sent"), scans_);  // and once more, which changes nothing
+  EXPECT_EQ(Import().at("skipped"), scans_);
+  EXPECT_EQ(Show().at("scans"), scans_);
 }
 
 }  // namespace
