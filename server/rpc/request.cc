@@ -85,8 +85,15 @@ Request::Request(Runtime& runtime,
 }
 
 Request::~Request() {
-  if (!client_.empty()) runtime_.clients.Leave(client_, kind_);
+  End();
   gate().Leave();
+}
+
+void Request::End() {
+  if (ended_) return;
+  ended_ = true;
+  if (!client_.empty()) runtime_.clients.Leave(client_, kind_);
+  gate().End();
 }
 
 absl::Status Request::Admit(const grpc::CallbackServerContext& context) {
@@ -132,6 +139,7 @@ absl::Status Request::StillAllowed() {
 }
 
 grpc::Status Request::Close(const absl::Status& status) {
+  End();
   const absl::Duration duration = absl::Now() - started_;
   const std::optional<v1::ErrorDetail> detail = translate::DetailOf(status);
   runtime_.metrics.Ended(method_,

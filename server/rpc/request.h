@@ -70,6 +70,8 @@ class Request {
   absl::Status Admit(const grpc::CallbackServerContext& context);
   // Of the server and of this client.
   absl::Status EnterLimits();
+  // Makes room for another one. Again: nothing.
+  void End();
 
   Runtime& runtime_;
   const Kind kind_;
@@ -81,6 +83,7 @@ class Request {
   bool has_map_ = false;
   std::string client_;    // whose limits hold; empty: none were booked
   bool entered_ = false;  // the server's gate
+  bool ended_ = false;
   api::Call call_;
   absl::Status admission_;
   std::atomic<std::size_t> bytes_received_ = 0;

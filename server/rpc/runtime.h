@@ -39,33 +39,44 @@ class CallGate {
   // `what` as in "calls".
   CallGate(int most, absl::string_view what) : most_(most), what_(what) {}
 
-  // Whether there was room for the one that enters; it leaves in either case.
+  // Whether there was room for the one that enters; it ends and leaves in either case.
   bool Enter() {
     absl::MutexLock lock(&mutex_);
-    return ++calls_ <= most_;
+    ++here_;
+    return ++under_way_ <= most_ && here_ <= kHereShare * most_;
+  }
+  // Its answer is on its way; gRPC tells only later that the client has it, much later where the
+  // machine is busy.
+  void End() {
+    absl::MutexLock lock(&mutex_);
+    --under_way_;
   }
   int most() const { return most_; }
   absl::string_view what() const { return what_; }
   int under_way() const {
     absl::MutexLock lock(&mutex_);
-    return calls_;
+    return under_way_;
   }
   void Leave() {
     absl::MutexLock lock(&mutex_);
-    --calls_;
+    --here_;
   }
-  // Returns when there is none, or after `timeout`.
+  // Returns when all have left, or after `timeout`.
   void AwaitEmpty(absl::Duration timeout) {
-    const auto empty = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return calls_ == 0; };
+    const auto empty = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return here_ == 0; };
     absl::MutexLock lock(&mutex_);
     mutex_.AwaitWithTimeout(absl::Condition(&empty), timeout);
   }
 
  private:
+  // Answers that nobody takes are memory, too.
+  static constexpr int kHereShare = 4;
+
   const int most_;
   const absl::string_view what_;
   mutable absl::Mutex mutex_;
-  int calls_ ABSL_GUARDED_BY(mutex_) = 0;
+  int under_way_ ABSL_GUARDED_BY(mutex_) = 0;
+  int here_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
 // Thread-safe.
