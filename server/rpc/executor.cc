@@ -6,34 +6,34 @@
 
 namespace strata::server {
 
-Executor::Executor(int threads, const char* name) {
-  threads_.reserve(static_cast<std::size_t>(threads));
-  for (int i = 0; i < threads; ++i) {
-    threads_.emplace_back([this, name] {
-      NameThisThread(name);
-      Work();
-    });
-  }
-}
-
 Executor::~Executor() {
+  std::vector<std::thread> threads;
   {
     absl::MutexLock lock(&mutex_);
     closing_ = true;
+    threads.swap(threads_);
   }
-  for (std::thread& thread : threads_) thread.join();
+  for (std::thread& thread : threads) thread.join();
 }
 
 void Executor::Submit(std::function<void()> task) {
   absl::MutexLock lock(&mutex_);
   tasks_.push_back(std::move(task));
+  if (tasks_.size() <= idle_ || threads_.size() == most_threads_) return;
+  threads_.emplace_back([this] {
+    NameThisThread(name_);
+    Work();
+  });
 }
 
 void Executor::Work() {
   while (true) {
     std::function<void()> task;
     {
-      absl::MutexLock lock(&mutex_, absl::Condition(this, &Executor::Ready));
+      absl::MutexLock lock(&mutex_);
+      ++idle_;
+      mutex_.Await(absl::Condition(this, &Executor::Ready));
+      --idle_;
       if (tasks_.empty()) return;
       task = std::move(tasks_.front());
       tasks_.pop_front();

@@ -2,6 +2,7 @@
 #ifndef STRATA_SERVER_RPC_EXECUTOR_H_
 #define STRATA_SERVER_RPC_EXECUTOR_H_
 
+#include <cstddef>
 #include <deque>
 #include <functional>
 #include <thread>
@@ -12,12 +13,14 @@
 
 namespace strata::server {
 
-// Runs tasks in the order submitted on a fixed number of threads. Thread-safe. The queue is as long
+// Runs tasks in the order submitted, on as many threads as were ever needed at once, up to a bound.
+// Thread-safe. The queue is as long
 // as there are calls under way, which Runtime bounds: a call has few tasks at a time.
 class Executor {
  public:
-  // `name` is that of the threads and must outlive them. REQUIRES: threads ≥ 1.
-  Executor(int threads, const char* name);
+  // `name` is that of the threads and must outlive them. REQUIRES: most_threads ≥ 1.
+  Executor(int most_threads, const char* name)
+      : most_threads_(static_cast<std::size_t>(most_threads)), name_(name) {}
   // Runs what was submitted, then joins the threads.
   ~Executor();
   Executor(const Executor&) = delete;
@@ -30,10 +33,13 @@ class Executor {
   void Work();
   bool Ready() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return closing_ || !tasks_.empty(); }
 
+  const std::size_t most_threads_;
+  const char* const name_;
   absl::Mutex mutex_;
   std::deque<std::function<void()>> tasks_ ABSL_GUARDED_BY(mutex_);
   bool closing_ ABSL_GUARDED_BY(mutex_) = false;
-  std::vector<std::thread> threads_;
+  std::size_t idle_ ABSL_GUARDED_BY(mutex_) = 0;  // threads that wait for a task
+  std::vector<std::thread> threads_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace strata::server
