@@ -1,10 +1,24 @@
 #include "server/rpc/executor.h"
 
+#include <system_error>
 #include <utility>
 
 #include "core/common/this_thread.h"
 
 namespace strata::server {
+
+Executor::Executor(int most_threads, const char* name)
+    : most_threads_(static_cast<std::size_t>(most_threads)), name_(name) {
+  absl::MutexLock lock(&mutex_);
+  AddThread();
+}
+
+void Executor::AddThread() {
+  threads_.emplace_back([this] {
+    NameThisThread(name_);
+    Work();
+  });
+}
 
 Executor::~Executor() {
   std::vector<std::thread> threads;
@@ -20,10 +34,11 @@ void Executor::Submit(std::function<void()> task) {
   absl::MutexLock lock(&mutex_);
   tasks_.push_back(std::move(task));
   if (tasks_.size() <= idle_ || threads_.size() == most_threads_) return;
-  threads_.emplace_back([this] {
-    NameThisThread(name_);
-    Work();
-  });
+  try {
+    AddThread();
+  } catch (const std::system_error&) {
+    // The system has no more to give; those that are there take it in their turn.
+  }
 }
 
 void Executor::Work() {

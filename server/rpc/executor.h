@@ -14,13 +14,12 @@
 namespace strata::server {
 
 // Runs tasks in the order submitted, on as many threads as were ever needed at once, up to a bound.
-// Thread-safe. The queue is as long
-// as there are calls under way, which Runtime bounds: a call has few tasks at a time.
+// Thread-safe. The queue is as long as there are calls under way, which Runtime bounds: a call has
+// few tasks at a time.
 class Executor {
  public:
   // `name` is that of the threads and must outlive them. REQUIRES: most_threads ≥ 1.
-  Executor(int most_threads, const char* name)
-      : most_threads_(static_cast<std::size_t>(most_threads)), name_(name) {}
+  Executor(int most_threads, const char* name);
   // Runs what was submitted, then joins the threads.
   ~Executor();
   Executor(const Executor&) = delete;
@@ -30,6 +29,7 @@ class Executor {
   void Submit(std::function<void()> task);
 
  private:
+  void AddThread() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Work();
   bool Ready() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return closing_ || !tasks_.empty(); }
 
