@@ -52,10 +52,10 @@ struct EngineOptions {
   absl::Status Validate() const;
 };
 
-// Opens the directory: unfinished uploads are dropped but for announced ones, pending scans and jobs go on by themselves.
-// FAILED_PRECONDITION while another engine has it. A map whose file is damaged does not keep the
-// others from being served: calls on it answer with what is wrong. The engine ends its threads when
-// it is destroyed; no call may be under way then.
+// Opens the directory: unfinished uploads are dropped but for announced ones, pending scans and
+// jobs go on by themselves. FAILED_PRECONDITION while another engine has it. A map whose file is
+// damaged does not keep the others from being served: calls on it answer with what is wrong. The
+// engine ends its threads when it is destroyed; no call may be under way then.
 absl::StatusOr<std::unique_ptr<api::Database>> OpenEngine(const EngineOptions& options);
 
 }  // namespace strata

@@ -40,9 +40,9 @@ struct ScanRecord {
   std::uint64_t point_bytes = 0;
   Eigen::AlignedBox3f box_scan;  // of the finite points in the scan frame; empty without any
   std::string content_hash;
-  std::string message;            // why it failed, or which points are not in the map
-  bool person_labels = false;     // it has labels of LabelOrigin::kPerson
-  std::uint64_t label_model = 0;  // whose labels of LabelOrigin::kModel it has; 0: none
+  std::string message;             // why it failed, or which points are not in the map
+  bool person_labels = false;      // it has labels of LabelOrigin::kPerson
+  std::uint64_t label_model = 0;   // whose labels of LabelOrigin::kModel it has; 0: none
   std::uint64_t faded_points = 0;  // that LabelOrigin::kFaded has
 };
 

@@ -32,8 +32,7 @@ PointCloud AnyCloud(FuzzedDataProvider& input) {
 void TryDamaged(FuzzedDataProvider& input, const std::string& bytes) {
   TileParts parts = TakeApart(BlobKind::kMlsTile, bytes);
   Damage(input, parts);
-  const auto damaged =
-      DecodeMlsTile(PutTogether(BlobKind::kMlsTile, VersionOfBlob(bytes), parts));
+  const auto damaged = DecodeMlsTile(PutTogether(BlobKind::kMlsTile, VersionOfBlob(bytes), parts));
   RequireGoodRefusal(damaged.status());
   if (!damaged.ok()) return;
   Require(DecodeMlsTile(EncodeMlsTile(*damaged)).value() == *damaged,

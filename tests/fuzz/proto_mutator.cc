@@ -99,9 +99,8 @@ void SetValue(Message& message, const FieldDescriptor& field, std::minstd_rand& 
     case FieldDescriptor::CPPTYPE_BOOL:
       return put(&Reflection::SetBool, &Reflection::AddBool, random() % 2 == 0);
     case FieldDescriptor::CPPTYPE_ENUM:
-      return put(&Reflection::SetEnumValue,
-                 &Reflection::AddEnumValue,
-                 static_cast<int>(random() % 12));
+      return put(
+          &Reflection::SetEnumValue, &Reflection::AddEnumValue, static_cast<int>(random() % 12));
     case FieldDescriptor::CPPTYPE_STRING: {
       const std::string text =
           field.type() == FieldDescriptor::TYPE_BYTES ? AnyBytes(random) : AnyText(random);
@@ -125,8 +124,8 @@ void Mutate(Message& message, std::minstd_rand& random) {
   const google::protobuf::Descriptor& descriptor = *message.GetDescriptor();
   const Reflection& reflection = *message.GetReflection();
   if (descriptor.field_count() == 0) return;
-  const FieldDescriptor& field =
-      *descriptor.field(static_cast<int>(random() % static_cast<unsigned>(descriptor.field_count())));
+  const FieldDescriptor& field = *descriptor.field(
+      static_cast<int>(random() % static_cast<unsigned>(descriptor.field_count())));
   if (random() % 8 == 0) return reflection.ClearField(&message, &field);
   if (!field.is_repeated()) return SetValue(message, field, random, false);
   const int size = reflection.FieldSize(message, &field);

@@ -67,8 +67,8 @@ RpcScript ReadScript(const std::uint8_t* data, std::size_t size) {
     const std::size_t length = reader.Fixed<std::uint16_t>();
     const absl::string_view bytes = reader.Take(std::min(length, reader.remaining()));
     script.requests.push_back(NewRequest(*script.method));
-    script.parseable &= script.requests.back()->ParseFromArray(bytes.data(),
-                                                               static_cast<int>(bytes.size()));
+    script.parseable &=
+        script.requests.back()->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
   }
   return script;
 }

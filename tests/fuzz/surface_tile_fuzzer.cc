@@ -54,8 +54,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::TileParts parts = fuzz::TakeApart(BlobKind::kSurfaceTile, bytes);
   const std::uint16_t version = input.ConsumeBool() ? 1 : VersionOfBlob(bytes);
   fuzz::Damage(input, parts);
-  const auto damaged =
-      DecodeSurfaceTile(fuzz::PutTogether(BlobKind::kSurfaceTile, version, parts));
+  const auto damaged = DecodeSurfaceTile(fuzz::PutTogether(BlobKind::kSurfaceTile, version, parts));
   fuzz::RequireGoodRefusal(damaged.status());
   if (damaged.ok()) {
     fuzz::Require(DecodeSurfaceTile(EncodeSurfaceTile(*damaged)).value() == *damaged,

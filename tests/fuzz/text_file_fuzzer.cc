@@ -13,8 +13,8 @@
 #include "client/formats/plain_readers.h"
 #include "client/formats/pose_reader.h"
 #include "core/classification/reduction.h"
-#include "core/world/scan.h"
 #include "core/common/host_port.h"
+#include "core/world/scan.h"
 #include "tests/fuzz/input_file.h"
 #include "tests/fuzz/require.h"
 
@@ -60,7 +60,6 @@ absl::Status Try(int kind, const std::string& text) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   FuzzedDataProvider input(data, size);
   const int kind = input.ConsumeIntegralInRange(0, 9);
-  strata::fuzz::RequireGoodRefusal(
-      strata::fuzz::Try(kind, input.ConsumeRemainingBytesAsString()));
+  strata::fuzz::RequireGoodRefusal(strata::fuzz::Try(kind, input.ConsumeRemainingBytesAsString()));
   return 0;
 }
