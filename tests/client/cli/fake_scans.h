@@ -52,6 +52,11 @@ class FakeScans : public api::Scans {
                          absl::FunctionRef<absl::Status(const PointCloud&)> /*sink*/) override {
     return absl::UnimplementedError("");
   }
+  absl::StatusOr<std::vector<std::uint16_t>> GetFaded(const api::Call& /*call*/,
+                                                      absl::string_view /*map*/,
+                                                      const ScanId& /*id*/) override {
+    return absl::UnimplementedError("");
+  }
   absl::Status SetLabels(const api::Call& /*call*/,
                          absl::string_view /*map*/,
                          const ScanId& /*id*/,
