@@ -259,6 +259,7 @@ class Merger {
     ScanHeader header = scan.header;
     header.id = Renamed(source, header.id);
     header.T_map_scan = scan.T_map_scan;
+    header.content_hash.clear();
     header.alignment = Alignment::kOff;
     header.has_label = header.has_label || scan.person_labels || scan.label_model != 0;
     STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<api::ScanUpload> upload,
@@ -351,7 +352,7 @@ void AddMapMerge(Commands& commands, CLI::App* noun) {
       noun,
       "merge",
       "Make a map of the scans of several at their present poses, with the labels that count, "
-      "classes, profiles and the constraints that people added",
+      "classes, profiles and the constraints that people added; points that faded are in it again",
       "strata map merge all campus forest.strata",
       [options](Context& context) { return Merge(context, *options); });
   AddMapName(merge, options->map);
