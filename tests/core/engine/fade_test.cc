@@ -40,7 +40,7 @@ Pose StopAt(std::uint64_t i) {
 PointCloud ScanAt(std::uint64_t i) {
   SensorOptions sensor;
   sensor.rings = 128;
-  sensor.columns = 480;
+  sensor.columns = 720;
   return SimulateScan(Yard(i < kWithCrate), sensor, StopAt(i), i);
 }
 

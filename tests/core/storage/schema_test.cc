@@ -88,6 +88,8 @@ TEST_F(SchemaTest, AnEarlyFileOfVersion2GetsWhatVersion2HadLater) {
       database->Execute("ALTER TABLE truth_constraint DROP COLUMN may_be_false;"
                         "ALTER TABLE truth_scan DROP COLUMN person_labels;"
                         "ALTER TABLE truth_scan DROP COLUMN label_model;"
+                        "ALTER TABLE truth_scan DROP COLUMN faded_points;"
+                        "ALTER TABLE truth_map DROP COLUMN fade_after;"
                         "DROP TABLE truth_label; DROP TABLE truth_model; DROP TABLE truth_class;"
                         "DROP TABLE truth_model_parameter; DROP TABLE truth_model_score;"
                         "DROP TABLE truth_model_piece; DROP TABLE truth_upload;"
