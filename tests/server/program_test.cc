@@ -231,7 +231,7 @@ TEST_F(CheckTest, ASoundInstallationIsSound) {
   EXPECT_THAT(findings, Each(Field(&Finding::verdict, ::testing::Ne(Verdict::kError))))
       << ToText(findings);
   EXPECT_FALSE(AnyError(findings));
-  EXPECT_THAT(ToText(findings), HasSubstr("ok      map campus: sound, format 2"));
+  EXPECT_THAT(ToText(findings), HasSubstr("ok      map campus: sound, format 3"));
   EXPECT_THAT(ToJson(findings), AllOf(HasSubstr("\"ok\": true"), HasSubstr("\"map campus\"")));
 }
 

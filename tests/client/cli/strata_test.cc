@@ -332,7 +332,7 @@ TEST_F(StrataTest, MapsThatCannotBeOpenedAreNamedAndNotDeleted) {
   const Ran ran = Run({"map", "list"});
   EXPECT_EQ(ran.exit_code, 0);
   EXPECT_EQ(json::parse(ran.out).size(), 1U);
-  EXPECT_THAT(ran.err, HasSubstr("map=notes not opened: notes.strata: "));
+  EXPECT_THAT(ran.err, HasSubstr("map=notes not_opened=\"notes.strata: "));
   const Ran deleted = Run({"map", "delete", "notes"});
   EXPECT_EQ(deleted.exit_code, 1);
   EXPECT_THAT(deleted.err, HasSubstr("notes.strata is not a Strata map but no database file"));
