@@ -31,8 +31,9 @@ python3 tests/check_clang.py
 stage "tests"
 ctest --preset release
 
-stage "install and consumer"
+stage "install, consumer and packages"
 tests/consumer/run.sh build/release
+tests/packages/run.sh build/release
 
 stage "README"
 /usr/bin/python3 tests/readme_test.py --build build/release

@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# Makes the Debian packages of a build, unpacks them beside each other and runs what is in them.
+#   tests/packages/run.sh BUILD_DIR
+set -euo pipefail
+build=$(realpath "${1:?usage: tests/packages/run.sh BUILD_DIR}")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cpack --config "$build/CPackConfig.cmake" -G DEB -B "$work/packages" >"$work/log" 2>&1 || { cat "$work/log" >&2; exit 1; }
+for name in stratad strata libstrata-dev python3-strata; do
+  dpkg-deb --extract "$work"/packages/"${name}"_*.deb "$work/root"
+done
+root=$work/root
+sed -i "s|/var/lib/strata|$work/maps|" "$root/etc/strata/stratad.conf"
+"$root/usr/bin/stratad" check --config "$root/etc/strata/stratad.conf"
+"$root/usr/bin/strata" --embedded "$work/maps" map create yard >/dev/null
+PYTHONPATH=$root/usr/lib/python3/dist-packages /usr/bin/python3 -c 'import strata; strata.connect'
+for file in lib/systemd/system/stratad.service usr/share/doc/stratad/README.md usr/include/strata/core/api/database.h; do
+  [[ -s $root/$file ]] || { echo "packages: no $file" >&2; exit 1; }
+done
+echo "packages: $(cd "$work/packages" && ls ./*.deb | wc -l), unpacked and run"
