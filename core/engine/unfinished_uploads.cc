@@ -20,19 +20,32 @@ absl::StatusOr<std::unique_ptr<UnfinishedUploads>> UnfinishedUploads::Open(MapCo
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
   STRATA_ASSIGN_OR_RETURN(const std::vector<UnfinishedUpload> found,
                           reader->ListUnfinishedUploads());
-  absl::MutexLock lock(&uploads->mutex_);
-  for (const UnfinishedUpload& upload : found) {
-    uploads->parked_.insert_or_assign({upload.id, upload.content_hash}, upload);
+  std::vector<std::uint64_t> stale;
+  {
+    absl::MutexLock lock(&uploads->mutex_);
+    for (const UnfinishedUpload& upload : found) {
+      uploads->parked_.insert_or_assign({upload.id, upload.content_hash}, upload);
+    }
+    stale = uploads->TakeStale(absl::Now());
   }
-  uploads->Sweep(absl::Now());
+  uploads->Abandon(stale);
   return uploads;
 }
 
 std::shared_ptr<ScanIntake> UnfinishedUploads::Find(const ScanHeader& header) {
   if (header.content_hash.empty()) return std::make_shared<ScanIntake>(core_, std::nullopt);
-  const Key key{header.id, header.content_hash};
-  absl::MutexLock lock(&mutex_);
-  Sweep(absl::Now());
+  std::vector<std::uint64_t> stale;
+  std::shared_ptr<ScanIntake> found;
+  {
+    absl::MutexLock lock(&mutex_);
+    stale = TakeStale(absl::Now());
+    found = FindAnnounced({header.id, header.content_hash});
+  }
+  Abandon(stale);
+  return found;
+}
+
+std::shared_ptr<ScanIntake> UnfinishedUploads::FindAnnounced(const Key& key) {
   std::erase_if(active_, [](const auto& entry) { return entry.second.expired(); });
   std::weak_ptr<ScanIntake>& active = active_[key];
   if (std::shared_ptr<ScanIntake> intake = active.lock(); intake != nullptr) return intake;
@@ -44,17 +57,21 @@ std::shared_ptr<ScanIntake> UnfinishedUploads::Find(const ScanHeader& header) {
 }
 
 void UnfinishedUploads::Release(std::shared_ptr<ScanIntake> intake, std::uint64_t ticket) {
-  // Nobody else can come to hold it meanwhile.
-  absl::MutexLock lock(&mutex_);
-  std::optional<UnfinishedUpload> left = intake->Release(ticket);
-  if (!left.has_value() || intake.use_count() > 1) return;
-  const Key key{left->id, left->content_hash};
-  active_.erase(key);
-  parked_.insert_or_assign(key, *std::move(left));
-  Sweep(absl::Now());
+  std::vector<std::uint64_t> stale;
+  {
+    // Nobody else can come to hold it meanwhile.
+    absl::MutexLock lock(&mutex_);
+    std::optional<UnfinishedUpload> left = intake->Release(ticket);
+    if (!left.has_value() || intake.use_count() > 1) return;
+    const Key key{left->id, left->content_hash};
+    active_.erase(key);
+    parked_.insert_or_assign(key, *std::move(left));
+    stale = TakeStale(absl::Now());
+  }
+  Abandon(stale);
 }
 
-void UnfinishedUploads::Sweep(absl::Time now) {
+std::vector<std::uint64_t> UnfinishedUploads::TakeStale(absl::Time now) {
   std::vector<Key> by_age;
   for (const auto& [key, upload] : parked_) by_age.push_back(key);
   std::sort(by_age.begin(),
@@ -62,6 +79,7 @@ void UnfinishedUploads::Sweep(absl::Time now) {
             [this](const Key& a, const Key& b) ABSL_NO_THREAD_SAFETY_ANALYSIS {
               return parked_.at(a).touched > parked_.at(b).touched;
             });
+  std::vector<std::uint64_t> stale;
   std::uint64_t bytes = 0;
   for (const Key& key : by_age) {
     const UnfinishedUpload& upload = parked_.at(key);
@@ -69,11 +87,21 @@ void UnfinishedUploads::Sweep(absl::Time now) {
     const bool stays = now - upload.touched <= core_.options().upload_keep &&
                        bytes <= core_.options().max_kept_upload_bytes;
     if (stays) continue;
-    const absl::Status gone = core_.writer().Run(
-        Durability::kRelaxed, 0, Stop(), [number = upload.upload](StorageWriter& writer) {
-          return writer.AbandonUpload(number);
-        });
-    if (gone.ok()) parked_.erase(key);  // else the next sweep tries again
+    stale.push_back(upload.upload);
+    parked_.erase(key);
+  }
+  return stale;
+}
+
+void UnfinishedUploads::Abandon(const std::vector<std::uint64_t>& uploads) {
+  for (const std::uint64_t upload : uploads) {
+    // If this fails the next start finds it again.
+    core_.writer()
+        .Run(Durability::kRelaxed,
+             0,
+             Stop(),
+             [upload](StorageWriter& writer) { return writer.AbandonUpload(upload); })
+        .IgnoreError();
   }
 }
 

@@ -38,8 +38,11 @@ class UnfinishedUploads {
   using Key = std::pair<ScanId, std::string>;  // with the announced hash
 
   explicit UnfinishedUploads(MapCore& core) : core_(core) {}
-  // Drops what has stayed too long, and the oldest beyond the bound of bytes.
-  void Sweep(absl::Time now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::shared_ptr<ScanIntake> FindAnnounced(const Key& key) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // What has stayed too long, and the oldest beyond the bound of bytes: nobody finds it any more.
+  std::vector<std::uint64_t> TakeStale(absl::Time now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Drops it from the store. Waits for the writer, so without the lock.
+  void Abandon(const std::vector<std::uint64_t>& uploads);
 
   MapCore& core_;
   absl::Mutex mutex_;
