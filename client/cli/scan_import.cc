@@ -51,6 +51,7 @@ struct ImportOptions {
   bool level = false;
   bool wait = false;
   std::string spool;  // a directory, if scans go there first
+  bool as_local_maps = false;
 };
 
 // What became of the files of one call.
@@ -60,6 +61,7 @@ struct Summary {
   std::size_t uploaded = 0;
   std::size_t skipped = 0;
   std::uint64_t points = 0;
+  std::uint64_t local_map_bytes = 0;  // with --local-maps
   double seconds = 0.0;
   std::size_t integrated = 0, aligned = 0, integration_failed = 0;  // with --wait
   std::optional<double> level_rad;                                  // with --level
@@ -255,6 +257,7 @@ void Upload(Context& context,
     }
     ++summary.uploaded;
     summary.points += results[i].points;
+    summary.local_map_bytes += results[i].local_map_bytes;
     summary.present.push_back(sources[i].header.id);
   }
 }
@@ -326,6 +329,7 @@ void Print(const ImportOptions& options, const Summary& summary, Output& output)
       {"seconds", summary.seconds},
       {"points_per_second",
        summary.seconds > 0.0 ? static_cast<double>(summary.points) / summary.seconds : 0.0}};
+  if (options.as_local_maps) json["local_map_bytes"] = summary.local_map_bytes;
   if (options.wait) {
     json["integrated"] = summary.integrated;
     json["aligned"] = summary.aligned;
@@ -364,7 +368,12 @@ absl::Status Import(Context& context, ImportOptions options) {
   }
   WarnOfOtherScans(scans, there, options, context.output);
   summary.files = scans.size();
-  const std::vector<UploadSource> sources = SourcesOf(scans, there, options, labels, summary);
+  std::vector<UploadSource> sources = SourcesOf(scans, there, options, labels, summary);
+  if (options.as_local_maps) {
+    STRATA_ASSIGN_OR_RETURN(const MapInfo map,
+                            context.database.maps().Get(context.call, options.map));
+    for (UploadSource& source : sources) source.as_local_map = map.parameters;
+  }
   Upload(context, options, sources, summary);
   const absl::Status waited =
       options.wait && !summary.interrupted ? Wait(context, options, summary) : absl::OkStatus();
@@ -407,6 +416,17 @@ absl::Status ImportBySpool(FileContext& context, ImportOptions options) {
   context.output.Object(json);
   if (errors.empty()) return absl::OkStatus();
   return absl::UnknownError(absl::StrCat(errors.size(), " of ", scans.size(), " scans failed"));
+}
+
+// Of the two ways the one that the options say.
+void Select(Commands& commands, const std::shared_ptr<ImportOptions>& options) {
+  if (!options->spool.empty()) {
+    commands.selected_on_files = [options](FileContext& context) {
+      return ImportBySpool(context, *options);
+    };
+    return;
+  }
+  commands.selected = [options](Context& context) { return Import(context, *options); };
 }
 
 }  // namespace
@@ -462,6 +482,11 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
   import->add_flag("--level", options->level, "Turn all poses so that the dominant floor is level");
   CLI::Option* wait =
       import->add_flag("--wait", options->wait, "Return when every scan is integrated or failed");
+  CLI::Option* local_maps = import->add_flag(
+      "--local-maps",
+      options->as_local_maps,
+      "Make the local maps here and send them in place of the points, of which there are fewer "
+      "bytes; such scans have no points to export, label or classify");
   import
       ->add_option("--spool",
                    options->spool,
@@ -469,18 +494,9 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
                    "has acknowledged them; done also when it is away: strata spool send goes on")
       ->type_name("DIR")
       ->excludes(classes)
-      ->excludes(wait);
-  import->callback([&commands, options] {
-    if (options->spool.empty()) {
-      commands.selected = [options](Context& context) { return Import(context, *options);
-};
-}  // namespace strata::cli
-else {
-  commands.selected_on_files = [options](FileContext& context) {
-    return ImportBySpool(context, *options);
-  };
-}
-});
+      ->excludes(wait)
+      ->excludes(local_maps);
+  import->callback(std::bind(&Select, std::ref(commands), options));
 }
 
 }  // namespace strata::cli

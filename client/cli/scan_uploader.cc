@@ -11,11 +11,15 @@
 #include <thread>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
+#include "absl/strings/string_view.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 
 #include "core/cloud/cloud_slice.h"
+#include "core/codec/local_map_codec.h"
 #include "core/common/status.h"
+#include "core/mls/build.h"
 #include "core/world/scan_hash.h"
 
 namespace strata::cli {
@@ -27,6 +31,15 @@ constexpr absl::Duration kLongestDelay = absl::Seconds(5);
 bool WorthRetrying(const absl::Status& status) {
   return absl::IsUnavailable(status) || absl::IsResourceExhausted(status) ||
          absl::IsAborted(status);
+}
+
+// Of the points relative to the cloud's origin.
+absl::StatusOr<std::string> LocalMapOf(const PointCloud& cloud, const MapParameters& parameters) {
+  PointCloud points = cloud;
+  points.origin.setZero();
+  STRATA_ASSIGN_OR_RETURN(const MlsBuildResult built,
+                          BuildMlsMap(points, Pose::Identity(), parameters.sensor, parameters.mls));
+  return EncodeLocalMap(built.map);
 }
 
 class Uploader {
@@ -48,7 +61,7 @@ class Uploader {
         index = next_++;
       }
       UploadResult result;
-      result.status = Upload(index, result.points);
+      result.status = Upload(index, result);
       WaitForTurn(index);
       const std::lock_guard lock(mutex_);
       ++done_.scans;
@@ -72,15 +85,29 @@ class Uploader {
   std::vector<UploadResult> TakeResults() { return std::move(results_); }
 
  private:
-  absl::Status Upload(std::size_t index, std::uint64_t& points) {
+  absl::Status Upload(std::size_t index, UploadResult& result) {
     STRATA_RETURN_IF_ERROR(call_.stop.status());
     STRATA_RETURN_IF_ERROR(lost_server());
-    STRATA_ASSIGN_OR_RETURN(const PointCloud cloud, sources_[index].read());
-    ScanHeader header = HeaderFor(sources_[index], cloud);
-    header.content_hash = ContentHashOf(header, cloud);
+    const UploadSource& source = sources_[index];
+    STRATA_ASSIGN_OR_RETURN(const PointCloud cloud, source.read());
+    absl::Status status;
+    if (source.as_local_map.has_value()) {
+      STRATA_ASSIGN_OR_RETURN(const std::string bytes, LocalMapOf(cloud, *source.as_local_map));
+      result.local_map_bytes = bytes.size();
+      status = SendPatiently(index, [&] { return SendLocalMap(index, cloud, bytes); });
+    } else {
+      ScanHeader header = HeaderFor(source, cloud);
+      header.content_hash = ContentHashOf(header, cloud);
+      status = SendPatiently(index, [&] { return Send(index, header, cloud); });
+    }
+    if (status.ok()) result.points = cloud.size();
+    return status;
+  }
+
+  absl::Status SendPatiently(std::size_t index, absl::FunctionRef<absl::Status()> send) {
     absl::Time since = absl::Now();
     absl::Duration delay = kFirstDelay;
-    absl::Status status = Send(index, header, cloud);
+    absl::Status status = send();
     while (WorthRetrying(status)) {
       // Only the first in line counts time: the others wait for it anyway.
       WaitForTurn(index);
@@ -94,10 +121,7 @@ class Uploader {
       }
       STRATA_RETURN_IF_ERROR(Pause(delay));
       delay = std::min(2 * delay, kLongestDelay);
-      status = Send(index, header, cloud);
-    }
-    if (status.ok()) {
-      points = cloud.size();
+      status = send();
     }
     return status;
   }
@@ -112,6 +136,17 @@ class Uploader {
     }
     WaitForTurn(index);
     return upload->Finish().status();
+  }
+
+  absl::Status SendLocalMap(std::size_t index, const PointCloud& cloud, absl::string_view bytes) {
+    const UploadSource& source = sources_[index];
+    ScanHeader header = source.header;
+    header.T_map_scan.translate(cloud.origin);
+    header.sensor_origin = cloud.sensor_origin;
+    WaitForTurn(index);
+    return database_.scans()
+        .UploadLocalMap(call_, map_, header, source.as_local_map->mls, bytes)
+        .status();
   }
 
   // Indices are handed out in order, so the one whose turn it is always has a thread.

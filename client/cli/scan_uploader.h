@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 
 #include "core/api/database.h"
 #include "core/cloud/point_cloud.h"
+#include "core/world/map_info.h"
 #include "core/world/scan.h"
 
 namespace strata::cli {
@@ -26,6 +28,9 @@ struct UploadSource {
   std::string file;
   ScanHeader header;
   std::function<absl::StatusOr<PointCloud>()> read;
+  // The parameters of the map, if its points are to stay here: the local map that is made of them
+  // is sent in their place.
+  std::optional<MapParameters> as_local_map;
 };
 
 // The whole header of a source whose points are `cloud`, for points relative to the cloud's origin.
@@ -34,6 +39,7 @@ ScanHeader HeaderFor(const UploadSource& source, const PointCloud& cloud);
 struct UploadResult {
   absl::Status status;  // of reading and uploading
   std::uint64_t points = 0;
+  std::uint64_t local_map_bytes = 0;  // of what was sent in their place
 };
 
 struct UploadProgress {

@@ -18,6 +18,7 @@ using translate::ToProto;
 namespace {
 
 constexpr std::size_t kLabelsPerMessage = 400'000;
+constexpr std::size_t kPieceBytes = std::size_t{1} << 20;
 
 // One attempt.
 absl::Status SendLabels(Connection& connection,
@@ -45,6 +46,27 @@ absl::Status SendLabels(Connection& connection,
   return StatusOf(writer->Finish(), call);
 }
 
+// One attempt.
+absl::StatusOr<ScanAck> SendLocalMap(Connection& connection,
+                                     v1::Scans::Stub& stub,
+                                     const api::Call& call,
+                                     const v1::UploadLocalMapRequest& start,
+                                     absl::string_view bytes) {
+  AttemptContext context(connection, call);
+  v1::UploadLocalMapResponse out;
+  const auto writer = stub.UploadLocalMap(context.get(), &out);
+  bool goes_on = writer->Write(start);
+  v1::UploadLocalMapRequest message;
+  for (std::size_t begin = 0; goes_on && begin < bytes.size(); begin += kPieceBytes) {
+    message.set_local_map(std::string(bytes.substr(begin, kPieceBytes)));
+    goes_on = writer->Write(message);
+  }
+  // The server refuses early by ending the stream; why is in its status.
+  if (goes_on) writer->WritesDone();
+  STRATA_RETURN_IF_ERROR(StatusOf(writer->Finish(), call));
+  return FromProto(out.ack());
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<api::ScanUpload>> RemoteScans::Upload(const api::Call& call,
@@ -55,6 +77,27 @@ absl::StatusOr<std::unique_ptr<api::ScanUpload>> RemoteScans::Upload(const api::
   auto upload = std::make_unique<RemoteUpload>(connection_, *stub_, call, map, header);
   STRATA_RETURN_IF_ERROR(upload->Open());
   return upload;
+}
+
+absl::StatusOr<ScanAck> RemoteScans::UploadLocalMap(const api::Call& call,
+                                                    absl::string_view map,
+                                                    const ScanHeader& header,
+                                                    const MlsParameters& parameters,
+                                                    absl::string_view local_map) {
+  STRATA_RETURN_IF_ERROR(ValidateScanHeader(header));
+  v1::UploadLocalMapRequest request;
+  v1::UploadLocalMapStart& start = *request.mutable_start();
+  start.set_map(std::string(map));
+  *start.mutable_header() = ToProto(header);
+  start.set_cell_size_m(parameters.cell_size_m);
+  start.set_gap_size_m(parameters.gap_size_m);
+  start.set_thickness_m(parameters.thickness_m);
+  Backoff backoff = connection_.NewBackoff();
+  while (true) {
+    STRATA_RETURN_IF_ERROR(call.stop.status());
+    const absl::StatusOr<ScanAck> ack = SendLocalMap(connection_, *stub_, call, request, local_map);
+    if (ack.ok() || !backoff.Wait(ack.status(), call.stop)) return ack;
+  }
 }
 
 absl::StatusOr<UploadState> RemoteScans::GetUploadState(const api::Call& call,

@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
+#include "core/api/chunk_check.h"
 #include "core/common/status.h"
 #include "proto/translate/points.h"
 #include "proto/translate/scans.h"
@@ -55,7 +56,7 @@ absl::Status RemoteUpload::Open() {
 
 absl::Status RemoteUpload::Write(const PointCloud& chunk) {
   if (chunk.points.empty()) return absl::OkStatus();
-  STRATA_RETURN_IF_ERROR(Annotate(translate::CheckChunk(chunk, header_, points_),
+  STRATA_RETURN_IF_ERROR(Annotate(api::CheckChunk(chunk, header_, points_),
                                   absl::StrCat("scan ", header_.id.ToString())));
   Chunk& kept = chunks_.emplace_back(Chunk{points_, points_ + chunk.size(), {}});
   points_ = kept.end;

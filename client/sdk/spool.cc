@@ -18,11 +18,11 @@
 
 #include "client/sdk/spool_directory.h"
 #include "client/sdk/spool_file.h"
+#include "core/api/chunk_check.h"
 #include "core/cloud/cloud_slice.h"
 #include "core/common/status.h"
 #include "core/world/names.h"
 #include "core/world/scan_hash.h"
-#include "proto/translate/points.h"
 
 namespace strata {
 namespace {
@@ -83,7 +83,7 @@ absl::Status CheckCloud(const ScanHeader& header, const PointCloud& cloud) {
   }
   for (std::size_t begin = 0; begin < cloud.size(); begin += api::kMaxPointsPerChunk) {
     const std::size_t end = std::min(cloud.size(), begin + api::kMaxPointsPerChunk);
-    STRATA_RETURN_IF_ERROR(translate::CheckChunk(SliceOf(cloud, begin, end), header, begin));
+    STRATA_RETURN_IF_ERROR(api::CheckChunk(SliceOf(cloud, begin, end), header, begin));
   }
   return absl::OkStatus();
 }

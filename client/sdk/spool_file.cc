@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
+#include "core/api/chunk_check.h"
 #include "core/cloud/cloud_slice.h"
 #include "core/codec/bytes.h"
 #include "core/codec/point_codec.h"
@@ -18,7 +19,6 @@
 #include "core/common/status.h"
 #include "core/world/names.h"
 #include "core/world/value_codec.h"
-#include "proto/translate/points.h"
 
 namespace strata::sdk {
 namespace {
@@ -140,7 +140,7 @@ absl::StatusOr<std::optional<PointCloud>> SpoolFileReader::Next() {
     return absl::DataLossError(absl::StrCat("piece behind point ", points_, ": cut short"));
   }
   STRATA_ASSIGN_OR_RETURN(PointCloud piece, DecodePoints(*bytes));
-  if (const absl::Status sound = translate::CheckChunk(piece, scan_.header, points_); !sound.ok()) {
+  if (const absl::Status sound = api::CheckChunk(piece, scan_.header, points_); !sound.ok()) {
     return absl::DataLossError(sound.message());
   }
   points_ += piece.size();

@@ -18,6 +18,7 @@
 
 #include "core/api/call.h"
 #include "core/cloud/point_cloud.h"
+#include "core/mls/mls_parameters.h"
 #include "core/world/scan.h"
 
 namespace strata::api {
@@ -25,6 +26,9 @@ namespace strata::api {
 // Largest number of points in one piece of a scan, so that a piece stays below 1 MiB on the wire
 // (21 bytes a point with every column).
 inline constexpr std::size_t kMaxPointsPerChunk = 40'000;
+
+// Largest local map that is taken.
+inline constexpr std::size_t kMaxLocalMapBytes = std::size_t{64} << 20;
 
 // An upload under way. Not thread-safe. Destroying it before Finish() abandons the scan without a
 // trace, unless the header announced its content_hash: what came of such a scan stays for a while,
@@ -76,6 +80,21 @@ class Scans {
   virtual absl::StatusOr<std::unique_ptr<ScanUpload>> Upload(const Call& call,
                                                              absl::string_view map,
                                                              const ScanHeader& header) = 0;
+  // A scan whose points stay with its robot, which sends the local map that it has made of them
+  // (core/codec's local map bytes, in the scan frame, at most kMaxLocalMapBytes). It is aligned,
+  // integrated, moved and deleted as any scan; at a pose it contributes what a scan contributes in
+  // a map that drops points: every patch moves as a whole (TransformContribution() in
+  // core/mls/join.h says what that approximates). It has no points to get, label or classify.
+  // `parameters` are those that it was made with. Returns once it is durable; repeating it is OK
+  // with `already_present`.
+  // INVALID_ARGUMENT for a header that announces points, parameters that are not the map's, bytes
+  // that are no local map, or one that reaches beyond ±1e6 m; ALREADY_EXISTS for the same id with
+  // other content; RESOURCE_EXHAUSTED for one that is too large, or a full queue.
+  virtual absl::StatusOr<ScanAck> UploadLocalMap(const Call& call,
+                                                 absl::string_view map,
+                                                 const ScanHeader& header,
+                                                 const MlsParameters& parameters,
+                                                 absl::string_view local_map) = 0;
   // What is committed of a trajectory; an unknown trajectory has `exists` false.
   virtual absl::StatusOr<UploadState> GetUploadState(const Call& call,
                                                      absl::string_view map,

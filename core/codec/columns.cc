@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#define ZSTD_STATIC_LINKING_ONLY  // for ZSTD_c_literalCompressionMode
 #include <zstd.h>
 
 #include "core/common/status.h"
@@ -25,20 +26,40 @@ enum class Packing : std::uint8_t {  // stored
 };
 
 constexpr int kLevel = 3;
+constexpr int kQuickLevel = 1;
+constexpr std::size_t kSampleBytes = 1024;
 
 absl::Status Damaged(absl::string_view what) {
   return absl::DataLossError(absl::StrCat("column: ", what));
 }
 
-// A thread's compressor: making one costs more than compressing a small column.
-ZSTD_CCtx* Compressor() {
-  thread_local const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context = [] {
-    ZSTD_CCtx* made = ZSTD_createCCtx();
-    ZSTD_CCtx_setParameter(made, ZSTD_c_compressionLevel, kLevel);
-    ZSTD_CCtx_setParameter(made, ZSTD_c_contentSizeFlag, 0);  // the column has it already
-    return std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)>(made, &ZSTD_freeCCtx);
-  }();
-  return context.get();
+using Compressor = std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)>;
+
+Compressor MakeCompressor(int level) {
+  Compressor made(ZSTD_createCCtx(), &ZSTD_freeCCtx);
+  ZSTD_CCtx_setParameter(made.get(), ZSTD_c_compressionLevel, level);
+  ZSTD_CCtx_setParameter(made.get(), ZSTD_c_contentSizeFlag, 0);  // the column has it already
+  return made;
+}
+
+// Hardly ever finds a repetition, and codes by frequency nevertheless. A zstd without that
+// parameter, which is not of its stable interface, stores the bytes; any zstd reads both.
+Compressor MakeFrequencyCoder() {
+  Compressor made = MakeCompressor(ZSTD_minCLevel());
+  ZSTD_CCtx_setParameter(made.get(), ZSTD_c_literalCompressionMode, ZSTD_lcm_huffman);
+  return made;
+}
+
+// A thread's compressors: making one costs more than compressing a small column.
+struct Compressors {
+  Compressor thorough = MakeCompressor(kLevel);
+  Compressor quick = MakeCompressor(kQuickLevel);
+  Compressor frequencies = MakeFrequencyCoder();
+};
+
+Compressors& OfThisThread() {
+  thread_local Compressors compressors;
+  return compressors;
 }
 
 bool IsRepeated(absl::string_view bytes) {
@@ -52,21 +73,48 @@ void PutPacked(std::string& out, Packing packing, std::size_t size, absl::string
   out.append(packed.data(), packed.size());
 }
 
-}  // namespace
+// Bytes after compression, at most as many as before.
+std::size_t PackedSize(ZSTD_CCtx* compressor, absl::string_view bytes, std::string& packed) {
+  packed.resize(ZSTD_compressBound(bytes.size()));
+  const std::size_t size =
+      ZSTD_compress2(compressor, packed.data(), packed.size(), bytes.data(), bytes.size());
+  return ZSTD_isError(size) != 0 ? bytes.size() : std::min(size, bytes.size());
+}
 
-void PutColumn(std::string& out, absl::string_view bytes) {
+void PutWith(ZSTD_CCtx* compressor, std::string& out, absl::string_view bytes) {
   if (IsRepeated(bytes)) {
     PutPacked(out, Packing::kRepeated, bytes.size(), bytes.substr(0, 1));
     return;
   }
-  std::string packed(ZSTD_compressBound(bytes.size()), '\0');
-  const std::size_t size =
-      ZSTD_compress2(Compressor(), packed.data(), packed.size(), bytes.data(), bytes.size());
-  if (ZSTD_isError(size) != 0 || size + 2 >= bytes.size()) {
+  std::string packed;
+  const std::size_t size = PackedSize(compressor, bytes, packed);
+  if (size + 2 >= bytes.size()) {
     PutPacked(out, Packing::kStored, bytes.size(), bytes);
   } else {
     PutPacked(out, Packing::kZstd, bytes.size(), absl::string_view(packed.data(), size));
   }
+}
+
+// Whether looking for repetitions saves a twentieth of a sample from the middle.
+bool HasRepetitions(absl::string_view bytes) {
+  const std::size_t size = std::min(bytes.size(), kSampleBytes);
+  const absl::string_view sample = bytes.substr((bytes.size() - size) / 2, size);
+  Compressors& compressors = OfThisThread();
+  std::string packed;
+  const std::size_t without = PackedSize(compressors.frequencies.get(), sample, packed);
+  if (without == size) return false;
+  return 20 * PackedSize(compressors.quick.get(), sample, packed) < 19 * without;
+}
+
+}  // namespace
+
+void PutColumn(std::string& out, absl::string_view bytes) {
+  PutWith(OfThisThread().thorough.get(), out, bytes);
+}
+
+void PutNoisyColumn(std::string& out, absl::string_view bytes) {
+  Compressors& compressors = OfThisThread();
+  PutWith((HasRepetitions(bytes) ? compressors.quick : compressors.frequencies).get(), out, bytes);
 }
 
 absl::Status TakeColumn(ByteReader& reader, std::size_t max_size, std::string& bytes) {

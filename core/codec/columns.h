@@ -25,7 +25,10 @@ namespace strata {
 // Appends `bytes` compressed at zstd level 3, or stored, or as one repeated byte, whichever is
 // smallest.
 void PutColumn(std::string& out, absl::string_view bytes);
-// Reads what PutColumn wrote; `max_size` bounds what a hostile input may make it allocate.
+// The same for bytes that are mostly noise: looks for repetitions, the slow part of zstd, only
+// where a sample of the bytes has some, and codes their frequencies alone otherwise.
+void PutNoisyColumn(std::string& out, absl::string_view bytes);
+// Reads what either wrote; `max_size` bounds what a hostile input may make it allocate.
 // DATA_LOSS.
 absl::Status TakeColumn(ByteReader& reader, std::size_t max_size, std::string& bytes);
 

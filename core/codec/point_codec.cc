@@ -31,22 +31,26 @@ std::uint32_t BitsOf(float value) {
 
 // Numbers of neighbouring points differ little: their differences, zigzag, byte by byte in planes,
 // so that what is nearly constant and what is noise end up in different columns.
+template <typename Word>
+Word ZigzagDifference(Word word, Word previous) {
+  const auto difference = static_cast<Word>(word - previous);
+  const auto sign = static_cast<Word>(0 - (difference >> (8 * sizeof(Word) - 1)));
+  return static_cast<Word>(static_cast<Word>(difference << 1) ^ sign);
+}
+
 template <typename Word, typename Get>
 void PutPlanes(std::string& out, std::size_t count, Get get) {
-  std::string planes[sizeof(Word)];
-  for (std::string& plane : planes) plane.resize(count);
-  Word previous = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Word word = get(i);
-    const auto difference = static_cast<Word>(word - previous);
-    const auto sign = static_cast<Word>(0 - (difference >> (8 * sizeof(Word) - 1)));
-    const auto zigzag = static_cast<Word>(static_cast<Word>(difference << 1) ^ sign);
-    for (std::size_t k = 0; k < sizeof(Word); ++k) {
-      planes[k][i] = static_cast<char>(zigzag >> (8 * k) & 0xFF);
-    }
-    previous = word;
+  // Loop by loop, so that the compiler makes vectors of each.
+  std::vector<Word> words(count);
+  for (std::size_t i = 0; i < count; ++i) words[i] = get(i);
+  std::vector<Word> zigzag(count);
+  if (count > 0) zigzag[0] = ZigzagDifference<Word>(words[0], 0);
+  for (std::size_t i = 1; i < count; ++i) zigzag[i] = ZigzagDifference(words[i], words[i - 1]);
+  std::string plane(count, '\0');
+  for (std::size_t k = 0; k < sizeof(Word); ++k) {
+    for (std::size_t i = 0; i < count; ++i) plane[i] = static_cast<char>(zigzag[i] >> (8 * k));
+    PutNoisyColumn(out, plane);
   }
-  for (const std::string& plane : planes) PutColumn(out, plane);
 }
 
 template <typename Word, typename Set>

@@ -13,8 +13,8 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 
+#include "core/codec/local_map_codec.h"
 #include "core/common/status.h"
-#include "core/engine/local_map_codec.h"
 #include "core/engine/scan_losses.h"
 #include "core/engine/scan_source.h"
 

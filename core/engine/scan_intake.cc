@@ -1,9 +1,9 @@
 #include "core/engine/scan_intake.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,32 +14,16 @@
 #include "absl/time/clock.h"
 #include <Eigen/Core>
 
-#include "core/api/scans.h"
+#include "core/api/chunk_check.h"
+#include "core/cloud/cloud_slice.h"
 #include "core/codec/point_codec.h"
 #include "core/common/status.h"
 #include "core/storage/storage.h"
-#include "core/world/map_class.h"
 
 namespace strata {
 namespace {
 
 constexpr std::size_t kStageBytes = std::size_t{1} << 20;
-constexpr float kMaxCoordinate = 1e6F;
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
-absl::Status CheckColumn(const char* name, std::size_t size, bool announced, std::size_t points) {
-  if (size == (announced ? points : 0)) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("column ",
-                                                 name,
-                                                 " has ",
-                                                 size,
-                                                 " entries for ",
-                                                 points,
-                                                 " points; the header announced ",
-                                                 announced ? "it" : "none"));
-}
-
-float QuietNan(float value) { return std::isnan(value) ? kNan : value; }
 
 }  // namespace
 
@@ -88,7 +72,7 @@ absl::Status ScanIntake::LoadPieces(StorageReader& reader, const UnfinishedUploa
   for (std::uint32_t ordinal = 0; ordinal < parked.chunks; ++ordinal) {
     STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader.GetChunk(parked.upload, ordinal));
     STRATA_ASSIGN_OR_RETURN(const PointCloud piece, DecodePoints(bytes));
-    STRATA_RETURN_IF_ERROR(CheckChunk(piece));
+    STRATA_RETURN_IF_ERROR(api::CheckChunk(piece, record_.header, points_));
     hasher_->Add(piece);
     for (const Eigen::Vector3f& p : piece.points) {
       if (!std::isnan(p.x())) record_.box_scan.extend(p);
@@ -115,67 +99,33 @@ std::uint64_t ScanIntake::points() const {
 absl::Status ScanIntake::Write(std::uint64_t ticket, const Stop& stop, const PointCloud& chunk) {
   absl::MutexLock lock(&mutex_);
   STRATA_RETURN_IF_ERROR(CheckTicket(ticket));
-  if (const absl::Status sound = CheckChunk(chunk); !sound.ok()) {
+  if (chunk.size() == 0) return absl::OkStatus();
+  if (const absl::Status sound = api::CheckChunk(chunk, record_.header, points_); !sound.ok()) {
     Abandon();
     return sound;
   }
-  for (std::size_t i = 0; i < chunk.size(); ++i) {
-    Append(chunk, i);
+  for (std::size_t begin = 0, end = 0; begin < chunk.size(); begin = end) {
+    end = std::min(chunk.size(), begin + kMaxEncodedPoints - piece_.size());
+    Append(chunk, begin, end);
     if (piece_.size() == kMaxEncodedPoints) SealPiece();
   }
   points_ += chunk.size();
   return pieces_bytes_ >= kStageBytes ? StagePieces(stop) : absl::OkStatus();
 }
 
-absl::Status ScanIntake::CheckChunk(const PointCloud& chunk) const {
-  const ScanHeader& header = record_.header;
-  const std::size_t size = chunk.size();
-  if (size > api::kMaxPointsPerChunk) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("piece of ", size, " points; at most ", api::kMaxPointsPerChunk));
+void ScanIntake::Append(const PointCloud& chunk, std::size_t begin, std::size_t end) {
+  PointCloud slice = SliceOf(chunk, begin, end);
+  QuietNans(slice);
+  for (const Eigen::Vector3f& p : slice.points) {
+    if (!std::isnan(p.x())) record_.box_scan.extend(p);
   }
-  if (!chunk.origin.isZero(0.0)) {
-    return absl::InvalidArgumentError("piece with an origin; fold it into the pose");
-  }
-  if (points_ + size > header.point_count) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(points_ + size, " points, but the header announced ", header.point_count));
-  }
-  STRATA_RETURN_IF_ERROR(
-      CheckColumn("intensity", chunk.intensity.size(), header.has_intensity, size));
-  STRATA_RETURN_IF_ERROR(CheckColumn("colour", chunk.colour.size(), header.has_colour, size));
-  STRATA_RETURN_IF_ERROR(CheckColumn("label", chunk.label.size(), header.has_label, size));
-  STRATA_RETURN_IF_ERROR(ValidateLabels(chunk.label, points_));
-  for (std::size_t i = 0; i < size; ++i) {
-    const Eigen::Vector3f& p = chunk.points[i];
-    if ((p.array().abs() <= kMaxCoordinate).all()) continue;
-    if (header.rows != 0 && p.array().isNaN().all()) continue;
-    return absl::InvalidArgumentError(absl::StrCat("point ",
-                                                   points_ + i,
-                                                   " (",
-                                                   p.x(),
-                                                   ", ",
-                                                   p.y(),
-                                                   ", ",
-                                                   p.z(),
-                                                   ") is not within ±",
-                                                   kMaxCoordinate,
-                                                   " m"));
-  }
-  return absl::OkStatus();
-}
-
-void ScanIntake::Append(const PointCloud& chunk, std::size_t i) {
-  const Eigen::Vector3f& p = chunk.points[i];
-  if (std::isnan(p.x())) {
-    piece_.points.emplace_back(kNan, kNan, kNan);
-  } else {
-    piece_.points.push_back(p);
-    record_.box_scan.extend(p);
-  }
-  if (!chunk.intensity.empty()) piece_.intensity.push_back(QuietNan(chunk.intensity[i]));
-  if (!chunk.colour.empty()) piece_.colour.push_back(chunk.colour[i]);
-  if (!chunk.label.empty()) piece_.label.push_back(chunk.label[i]);
+  const auto append = [](const auto& from, auto& to) {
+    to.insert(to.end(), from.begin(), from.end());
+  };
+  append(slice.points, piece_.points);
+  append(slice.intensity, piece_.intensity);
+  append(slice.colour, piece_.colour);
+  append(slice.label, piece_.label);
 }
 
 void ScanIntake::SealPiece() {

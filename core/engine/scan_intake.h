@@ -53,9 +53,9 @@ class ScanIntake {
   absl::Status LoadPieces(StorageReader& reader, const UnfinishedUpload& parked)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void BeginAnew() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::Status CheckChunk(const PointCloud& chunk) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // Adds point `i` of `chunk` to the piece under way.
-  void Append(const PointCloud& chunk, std::size_t i) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Adds points of `chunk` to the piece under way.
+  void Append(const PointCloud& chunk, std::size_t begin, std::size_t end)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Encodes the piece under way.
   void SealPiece() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Sends the encoded pieces to disk.

@@ -10,9 +10,9 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 
+#include "core/codec/local_map_codec.h"
 #include "core/codec/point_codec.h"
 #include "core/common/status.h"
-#include "core/engine/local_map_codec.h"
 #include "core/mls/build.h"
 #include "core/mls/join.h"
 
@@ -110,12 +110,13 @@ absl::StatusOr<MlsMap> ScanSource::Build(const ScanRecord& scan,
 
 absl::StatusOr<MlsMap> ScanSource::LocalMap(const ScanRecord& scan) {
   if (scan.has_points) return Build(scan, Pose::Identity(), Faded::kWith);
+  dropped_ = DroppedPoints();
   STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader_.GetLocalMap(scan.number));
   return DecodeLocalMap(bytes, parameters_.mls);
 }
 
 absl::StatusOr<MlsMap> ScanSource::Contribution(const ScanRecord& scan, const Pose& T_map_scan) {
-  if (parameters_.keep_points) return Build(scan, T_map_scan, Faded::kWithout);
+  if (parameters_.keep_points && scan.has_points) return Build(scan, T_map_scan, Faded::kWithout);
   STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, LocalMap(scan));
   return TransformContribution(local_map, T_map_scan);
 }

@@ -15,6 +15,7 @@
 
 #include "core/codec/point_codec.h"
 #include "core/common/status.h"
+#include "core/engine/local_map_upload.h"
 #include "core/engine/scan_labels.h"
 #include "core/engine/upload.h"
 #include "core/world/map_class.h"
@@ -126,6 +127,19 @@ absl::StatusOr<std::unique_ptr<api::ScanUpload>> EngineScans::Upload(const api::
   return EngineUpload::Begin(std::move(found), call, header);
 }
 
+absl::StatusOr<ScanAck> EngineScans::UploadLocalMap(const api::Call& call,
+                                                    absl::string_view map,
+                                                    const ScanHeader& header,
+                                                    const MlsParameters& parameters,
+                                                    absl::string_view local_map) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_RETURN_IF_ERROR(ValidateScanHeader(header));
+  absl::StatusOr<ScanAck> ack = strata::UploadLocalMap(*found, call, header, parameters, local_map);
+  if (ack.ok()) return ack;
+  return Annotate(ack.status(), absl::StrCat("scan ", header.id.ToString()));
+}
+
 absl::StatusOr<UploadState> EngineScans::GetUploadState(const api::Call& call,
                                                         absl::string_view map,
                                                         absl::string_view trajectory) {
@@ -175,7 +189,10 @@ absl::Status EngineScans::GetPoints(const api::Call& call,
   const std::string what = absl::StrCat("scan ", id.ToString());
   if (!posed.scan.has_points) {
     return absl::FailedPreconditionError(
-        absl::StrCat(what, ": the map drops points once a scan is integrated"));
+        absl::StrCat(what,
+                     found->core().info().parameters.keep_points
+                         ? ": it was sent as a local map, without points"
+                         : ": the map drops points once a scan is integrated"));
   }
   ScanLabels labels(posed.scan, {});
   for (std::uint32_t ordinal = 0; ordinal < posed.scan.chunks; ++ordinal) {

@@ -23,6 +23,11 @@ class EngineScans final : public api::Scans {
   absl::StatusOr<std::unique_ptr<api::ScanUpload>> Upload(const api::Call& call,
                                                           absl::string_view map,
                                                           const ScanHeader& header) override;
+  absl::StatusOr<ScanAck> UploadLocalMap(const api::Call& call,
+                                         absl::string_view map,
+                                         const ScanHeader& header,
+                                         const MlsParameters& parameters,
+                                         absl::string_view local_map) override;
   absl::StatusOr<UploadState> GetUploadState(const api::Call& call,
                                              absl::string_view map,
                                              absl::string_view trajectory) override;

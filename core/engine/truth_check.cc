@@ -10,9 +10,9 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/classification/classifier_codec.h"
+#include "core/codec/local_map_codec.h"
 #include "core/codec/point_codec.h"
 #include "core/common/status.h"
-#include "core/engine/local_map_codec.h"
 #include "core/engine/scan_labels.h"
 #include "core/geometry/pose.h"
 #include "core/world/scan_hash.h"

@@ -49,27 +49,6 @@ absl::Status CheckBytes(const char* name, std::size_t bytes, std::size_t per_poi
       "chunk: ", name, " has ", bytes, " bytes, not ", per_point, " for each of ", n, " points"));
 }
 
-absl::Status CheckColumn(const char* name, std::size_t entries, bool announced, std::size_t n) {
-  if (entries == (announced ? n : 0)) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("chunk: ",
-                                                 name,
-                                                 " has ",
-                                                 entries,
-                                                 " entries for ",
-                                                 n,
-                                                 " points; the header announced ",
-                                                 announced ? "the column" : "no such column"));
-}
-
-absl::Status CheckPoint(const Eigen::Vector3f& p, std::uint64_t index, bool organised) {
-  constexpr float kMaxCoordinateM = 1e6F;
-  // The negated comparison also catches NaN.
-  if (p.cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <= kMaxCoordinateM) return absl::OkStatus();
-  if (organised && p.array().isNaN().all()) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(
-      "point ", index, " (", p.x(), ", ", p.y(), ", ", p.z(), ") is not within ±1e6 m"));
-}
-
 }  // namespace
 
 v1::PointChunk ToProto(const PointCloud& cloud) {
@@ -115,22 +94,6 @@ absl::StatusOr<std::vector<std::uint16_t>> UnpackLabels(const std::string& bytes
   if (bytes.size() % sizeof(std::uint16_t) == 0) return Unpack<std::uint16_t>(bytes);
   return absl::InvalidArgumentError(
       absl::StrCat("labels: ", bytes.size(), " bytes, not 2 a label"));
-}
-
-absl::Status CheckChunk(const PointCloud& chunk, const ScanHeader& header, std::uint64_t first) {
-  const std::size_t n = chunk.size();
-  STRATA_RETURN_IF_ERROR(CheckPointCount(n));
-  if (first > header.point_count || n > header.point_count - first) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(first + n, " points arrived, the header announced ", header.point_count));
-  }
-  STRATA_RETURN_IF_ERROR(CheckColumn("intensity", chunk.intensity.size(), header.has_intensity, n));
-  STRATA_RETURN_IF_ERROR(CheckColumn("colour", chunk.colour.size(), header.has_colour, n));
-  STRATA_RETURN_IF_ERROR(CheckColumn("label", chunk.label.size(), header.has_label, n));
-  for (std::size_t i = 0; i < n; ++i) {
-    STRATA_RETURN_IF_ERROR(CheckPoint(chunk.points[i], first + i, header.rows != 0));
-  }
-  return absl::OkStatus();
 }
 
 }  // namespace strata::translate

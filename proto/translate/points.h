@@ -31,11 +31,6 @@ void DropFirst(std::size_t points, v1::PointChunk& chunk);
 std::string PackLabels(std::span<const std::uint16_t> labels);
 absl::StatusOr<std::vector<std::uint16_t>> UnpackLabels(const std::string& bytes);
 
-// What an upload may bring: INVALID_ARGUMENT unless `chunk` has 1 to api::kMaxPointsPerChunk points
-// in exactly the columns of `header`, all within ±1e6 m (three NaN pass in organised scans), and
-// with the `first` points before it no more than announced.
-absl::Status CheckChunk(const PointCloud& chunk, const ScanHeader& header, std::uint64_t first);
-
 }  // namespace strata::translate
 
 #endif  // STRATA_PROTO_TRANSLATE_POINTS_H_

@@ -26,6 +26,7 @@ constexpr std::array kTable = {
     MethodRight{"Maps.Backup", kAdmin, "name"},
     MethodRight{"Scans.Upload", kWrite, "start.map"},
     MethodRight{"Scans.Ingest", kWrite, "start.map"},
+    MethodRight{"Scans.UploadLocalMap", kWrite, "start.map"},
     MethodRight{"Scans.GetUploadState", kRead, "map"},
     MethodRight{"Scans.Get", kRead, "map"},
     MethodRight{"Scans.List", kRead, "map"},

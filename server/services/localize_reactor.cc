@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/api/chunk_check.h"
 #include "core/common/status.h"
 #include "proto/translate/localize.h"
 #include "proto/translate/points.h"
@@ -86,7 +87,7 @@ absl::Status LocalizeReactor::Begin(const v1::LocalizeStart& start) {
 absl::Status LocalizeReactor::Add(const v1::PointChunk& chunk) {
   STRATA_ASSIGN_OR_RETURN(const PointCloud piece, translate::FromProto(chunk));
   std::vector<Eigen::Vector3f>& points = query_.cloud.points;
-  STRATA_RETURN_IF_ERROR(translate::CheckChunk(piece, shape_, points.size()));
+  STRATA_RETURN_IF_ERROR(api::CheckChunk(piece, shape_, points.size()));
   points.insert(points.end(), piece.points.begin(), piece.points.end());
   return absl::OkStatus();
 }

@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/api/chunk_check.h"
 #include "core/cloud/cloud_slice.h"
 #include "core/common/status.h"
 #include "proto/translate/points.h"
@@ -25,8 +26,7 @@ absl::Status ScanReceiver::Add(const v1::PointChunk& chunk) {
   const std::string where = absl::StrCat("scan ", id().ToString());
   absl::StatusOr<PointCloud> cloud = translate::FromProto(chunk);
   if (!cloud.ok()) return AtTheDoor(Annotate(cloud.status(), where));
-  STRATA_RETURN_IF_ERROR(
-      AtTheDoor(Annotate(translate::CheckChunk(*cloud, header_, received_), where)));
+  STRATA_RETURN_IF_ERROR(AtTheDoor(Annotate(api::CheckChunk(*cloud, header_, received_), where)));
   const std::uint64_t first = received_;
   received_ += cloud->size();
   if (received_ <= held_) return absl::OkStatus();

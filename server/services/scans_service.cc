@@ -15,6 +15,7 @@
 #include "server/rpc/unary.h"
 #include "server/services/ingest_reactor.h"
 #include "server/services/label_collector.h"
+#include "server/services/local_map_collector.h"
 #include "server/services/upload_reactor.h"
 
 namespace strata::server {
@@ -105,6 +106,11 @@ grpc::ServerReadReactor<v1::UploadScanRequest>* ScansService::Upload(
 grpc::ServerBidiReactor<v1::IngestScansRequest, v1::IngestScansResponse>* ScansService::Ingest(
     grpc::CallbackServerContext* context) {
   return new IngestReactor(runtime_, *context);
+}
+
+grpc::ServerReadReactor<v1::UploadLocalMapRequest>* ScansService::UploadLocalMap(
+    grpc::CallbackServerContext* context, v1::UploadLocalMapResponse* out) {
+  return new CollectReactor<LocalMapCollector>(runtime_, *context, "Scans.UploadLocalMap", *out);
 }
 
 grpc::ServerUnaryReactor* ScansService::GetUploadState(grpc::CallbackServerContext* context,

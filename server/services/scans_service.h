@@ -16,6 +16,8 @@ class ScansService final : public v1::Scans::CallbackService {
                                                          v1::UploadScanResponse* out) override;
   grpc::ServerBidiReactor<v1::IngestScansRequest, v1::IngestScansResponse>* Ingest(
       grpc::CallbackServerContext* context) override;
+  grpc::ServerReadReactor<v1::UploadLocalMapRequest>* UploadLocalMap(
+      grpc::CallbackServerContext* context, v1::UploadLocalMapResponse* out) override;
   grpc::ServerUnaryReactor* GetUploadState(grpc::CallbackServerContext* context,
                                            const v1::GetUploadStateRequest* in,
                                            v1::GetUploadStateResponse* out) override;

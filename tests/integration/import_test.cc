@@ -100,6 +100,23 @@ TEST_F(ImportTest, GoesOnWhereAnEarlierCallEnded) {
   EXPECT_EQ(Show().at("content_digest"), digest);
 }
 
+// A map that drops points is the same whoever made the local maps.
+TEST_F(ImportTest, LocalMapsMadeHereMakeTheSameMapOfFewerBytes) {
+  StartServer();
+  Json({"map", "create", "points", "--drop-points"});
+  Json({"map", "create", "m", "--drop-points"});
+  const json points = Json(ImportArguments("points", kRobot));
+  std::vector<std::string> arguments = ImportArguments("m", kRobot);
+  arguments.push_back("--local-maps");
+  const json local_maps = Json(arguments);
+  EXPECT_EQ(local_maps.at("integrated"), scans_);
+  EXPECT_EQ(local_maps.at("points"), points.at("points"));
+  EXPECT_LT(local_maps.at("local_map_bytes"), 12 * points.at("points").get<std::uint64_t>());
+  EXPECT_EQ(Show().at("content_digest"), Json({"map", "show", "points"}).at("content_digest"));
+  EXPECT_EQ(Json({"map", "verify", "m"}).at("state"), "succeeded");
+  EXPECT_EQ(Json(arguments).at("skipped"), scans_);
+}
+
 TEST_F(ImportTest, ASpoolKeepsTheScansOfAServerThatIsAway) {
   StartServer();
   Json({"map", "create", "m"});

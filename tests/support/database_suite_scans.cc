@@ -10,7 +10,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/codec/local_map_codec.h"
 #include "core/common/status.h"
+#include "core/mls/build.h"
 #include "core/world/scan_hash.h"
 #include "tests/support/database_suite.h"
 #include "tests/support/status_matchers.h"
@@ -214,6 +216,50 @@ TEST_P(DatabaseSuite, TheLaterOfTwoUploadsOfAnAnnouncedScanTakesOver) {
   if (last.ok()) last = first->Finish().status();
   EXPECT_THAT(last, StatusIs(Code::kAborted, HasSubstr("taken over")));
   EXPECT_THAT(Listed(db(), {}), ElementsAre(ScanId{"run", 1}));
+}
+
+TEST_P(DatabaseSuite, ALocalMapIsAScanWithoutPoints) {
+  const PointCloud floor = LevelFloor(4.0);
+  STRATA_ASSERT_OK_AND_ASSIGN(const MapInfo map, db().maps().Get({}, kMap));
+  const MlsParameters mls = map.parameters.mls;
+  STRATA_ASSERT_OK_AND_ASSIGN(const MlsBuildResult built,
+                              BuildMlsMap(floor, Pose::Identity(), map.parameters.sensor, mls));
+  const std::string bytes = EncodeLocalMap(built.map);
+  ScanHeader header = FloorHeader({"run", 1}, {});
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanAck ack,
+                              db().scans().UploadLocalMap({}, kMap, header, mls, bytes));
+  EXPECT_FALSE(ack.already_present);
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanAck again,
+                              db().scans().UploadLocalMap({}, kMap, header, mls, bytes));
+  EXPECT_TRUE(again.already_present);
+  EXPECT_EQ(again.commit_sequence, ack.commit_sequence);
+  AwaitIntegration(db(), kMap);
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo scan, db().scans().Get({}, kMap, header.id));
+  EXPECT_EQ(scan.state, ScanState::kIntegrated) << scan.message;
+  STRATA_ASSERT_OK_AND_ASSIGN(const MapStats stats, db().maps().Stats({}, kMap));
+  EXPECT_EQ(stats.patches, built.map.patch_count());
+  EXPECT_THAT(db().scans().GetPoints(
+                  {}, kMap, header.id, [](const PointCloud&) { return absl::OkStatus(); }),
+              StatusIs(Code::kFailedPrecondition, HasSubstr("local map")));
+
+  const auto refused = [&](const ScanHeader& h, const MlsParameters& p, const std::string& b) {
+    return db().scans().UploadLocalMap({}, kMap, h, p, b).status();
+  };
+  EXPECT_THAT(refused(header, mls, EncodeLocalMap(MlsMap{mls, {}})),
+              StatusIs(Code::kAlreadyExists, HasSubstr("run/1")));
+  header.id.sequence = 2;
+  MlsParameters coarse = mls;
+  coarse.cell_size_m *= 2;
+  EXPECT_THAT(refused(header, coarse, bytes),
+              StatusIs(Code::kInvalidArgument, HasSubstr("cell_size")));
+  EXPECT_THAT(refused(header, mls, bytes.substr(0, bytes.size() - 1)),
+              StatusIs(Code::kInvalidArgument, HasSubstr("run/2")));
+  EXPECT_THAT(refused(FloorHeader({"run", 2}, floor), mls, bytes),
+              StatusIs(Code::kInvalidArgument, HasSubstr("points")));
+  EXPECT_THAT(Listed(db(), {}), ElementsAre(ScanId{"run", 1}));
+  STRATA_ASSERT_OK(db().scans().Delete({}, kMap, {"run", 1}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const MapStats empty, db().maps().Stats({}, kMap));
+  EXPECT_EQ(empty.patches, 0U);
 }
 
 TEST_P(DatabaseSuite, UploadsMayBeUnderWayTogether) {

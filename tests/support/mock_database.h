@@ -63,6 +63,14 @@ class MockScans : public api::Scans {
               Upload,
               (const api::Call&, absl::string_view, const ScanHeader&),
               (override));
+  MOCK_METHOD(absl::StatusOr<ScanAck>,
+              UploadLocalMap,
+              (const api::Call&,
+               absl::string_view,
+               const ScanHeader&,
+               const MlsParameters&,
+               absl::string_view),
+              (override));
   MOCK_METHOD(absl::StatusOr<UploadState>,
               GetUploadState,
               (const api::Call&, absl::string_view, absl::string_view),

@@ -30,6 +30,13 @@ class FakeScans : public api::Scans {
                                                           const ScanHeader& header) override {
     return std::make_unique<FakeUpload>(*this, header);
   }
+  absl::StatusOr<ScanAck> UploadLocalMap(const api::Call& /*call*/,
+                                         absl::string_view /*map*/,
+                                         const ScanHeader& /*header*/,
+                                         const MlsParameters& /*parameters*/,
+                                         absl::string_view /*local_map*/) override {
+    return absl::UnimplementedError("");
+  }
   absl::StatusOr<UploadState> GetUploadState(const api::Call& /*call*/,
                                              absl::string_view /*map*/,
                                              absl::string_view /*trajectory*/) override {

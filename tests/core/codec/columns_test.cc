@@ -1,7 +1,11 @@
 #include "core/codec/columns.h"
 
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <iostream>
 #include <limits>
+#include <map>
 #include <random>
 #include <string>
 #include <vector>
@@ -25,15 +29,44 @@ TEST(ColumnTest, EveryPackingRoundTrips) {
   for (int i = 0; i < 1000; ++i) text += "abc";
   for (const std::string& bytes :
        {std::string(), std::string("x"), std::string(500, 'y'), noise, text}) {
-    std::string out;
-    PutColumn(out, bytes);
-    EXPECT_LE(out.size(), bytes.size() + 4);
-    ByteReader reader(out);
-    std::string read;
-    STRATA_EXPECT_OK(TakeColumn(reader, bytes.size(), read));
-    EXPECT_EQ(read, bytes);
-    EXPECT_EQ(reader.remaining(), 0U);
+    for (const auto put : {&PutColumn, &PutNoisyColumn}) {
+      std::string out;
+      put(out, bytes);
+      EXPECT_LE(out.size(), bytes.size() + 4);
+      ByteReader reader(out);
+      std::string read;
+      STRATA_EXPECT_OK(TakeColumn(reader, bytes.size(), read));
+      EXPECT_EQ(read, bytes);
+      EXPECT_EQ(reader.remaining(), 0U);
+    }
   }
+}
+
+TEST(ColumnTest, NoiseTakesItsEntropyAndRepeatedNoiseLess) {
+  constexpr unsigned kSeed = 3;
+  std::cout << "seed " << kSeed << "\n";
+  std::mt19937 random(kSeed);
+  std::geometric_distribution<int> skewed(0.1);
+  std::string noise;
+  std::map<char, double> count;
+  for (int i = 0; i < 30'000; ++i) {
+    noise.push_back(static_cast<char>(skewed(random)));
+    ++count[noise.back()];
+  }
+  double entropy_bits = 0.0;
+  for (const auto& [byte, n] : count) {
+    entropy_bits -= n * std::log2(n / static_cast<double>(noise.size()));
+  }
+  std::string out;
+  PutNoisyColumn(out, noise);
+  EXPECT_GE(static_cast<double>(out.size()), entropy_bits / 8.0);
+  EXPECT_LE(static_cast<double>(out.size()), 1.02 * entropy_bits / 8.0 + 200.0);
+
+  std::string repeated;
+  while (repeated.size() < noise.size()) repeated += noise.substr(0, 300);
+  out.clear();
+  PutNoisyColumn(out, repeated);
+  EXPECT_LT(out.size(), 1000U);
 }
 
 TEST(ColumnTest, AnnouncedSizeBeyondTheBoundIsDataLossBeforeAllocation) {

@@ -1,7 +1,5 @@
 #include "proto/translate/points.h"
 
-#include <limits>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,7 +14,6 @@ using ::strata::testing::StatusIs;
 using ::testing::HasSubstr;
 
 constexpr absl::StatusCode kInvalid = absl::StatusCode::kInvalidArgument;
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 PointCloud FullCloud() {
   PointCloud cloud;
@@ -25,14 +22,6 @@ PointCloud FullCloud() {
   cloud.colour = {{1, 2, 3}, {253, 254, 255}};
   cloud.label = {0, 65535};
   return cloud;
-}
-
-ScanHeader FullHeader() {
-  ScanHeader header;
-  header.id = {"run", 1};
-  header.point_count = 2;
-  header.has_intensity = header.has_colour = header.has_label = true;
-  return header;
 }
 
 TEST(TranslatePointsTest, ColumnsAreLittleEndianAsDocumented) {
@@ -48,7 +37,6 @@ TEST(TranslatePointsTest, EveryColumnComesBack) {
   EXPECT_EQ(back.intensity, FullCloud().intensity);
   EXPECT_EQ(back.colour, FullCloud().colour);
   EXPECT_EQ(back.label, FullCloud().label);
-  EXPECT_THAT(CheckChunk(back, FullHeader(), 0), IsOk());
 }
 
 TEST(TranslatePointsTest, AFullChunkFitsOneMebibyte) {
@@ -76,34 +64,6 @@ TEST(TranslatePointsTest, RefusesColumnsOfWrongLength) {
   refused([](auto& c) { c.mutable_intensity()->push_back('x'); }, "intensity has 9 bytes");
   refused([](auto& c) { c.mutable_rgb()->pop_back(); }, "rgb has 5 bytes");
   refused([](auto& c) { c.mutable_label()->pop_back(); }, "label has 3 bytes");
-}
-
-TEST(TranslatePointsTest, RefusesColumnsThatWereNotAnnounced) {
-  ScanHeader header = FullHeader();
-  header.has_colour = false;
-  EXPECT_THAT(CheckChunk(FullCloud(), header, 0), StatusIs(kInvalid, HasSubstr("colour")));
-  PointCloud cloud = FullCloud();
-  cloud.label.clear();
-  EXPECT_THAT(CheckChunk(cloud, FullHeader(), 0), StatusIs(kInvalid, HasSubstr("label")));
-}
-
-TEST(TranslatePointsTest, RefusesMorePointsThanAnnounced) {
-  EXPECT_THAT(CheckChunk(FullCloud(), FullHeader(), 1),
-              StatusIs(kInvalid, HasSubstr("3 points arrived, the header announced 2")));
-}
-
-TEST(TranslatePointsTest, NanIsAPixelWithoutReturnInOrganisedScansOnly) {
-  PointCloud cloud = FullCloud();
-  cloud.points[1] = {kNan, kNan, kNan};
-  ScanHeader header = FullHeader();
-  EXPECT_THAT(CheckChunk(cloud, header, 0), StatusIs(kInvalid, HasSubstr("point 1 (nan")));
-  header.rows = 1;
-  header.columns = 2;
-  EXPECT_THAT(CheckChunk(cloud, header, 0), IsOk());
-  cloud.points[1].x() = 0.0F;
-  EXPECT_THAT(CheckChunk(cloud, header, 0), StatusIs(kInvalid, HasSubstr("point 1 (0, nan")));
-  cloud.points[1] = {0.0F, 1.1e6F, 0.0F};
-  EXPECT_THAT(CheckChunk(cloud, header, 0), StatusIs(kInvalid, HasSubstr("±1e6 m")));
 }
 
 }  // namespace

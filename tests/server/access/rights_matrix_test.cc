@@ -81,6 +81,7 @@ const std::map<std::string, std::optional<Right>>& Needed() {
         {"Maps.SetClass",
          "Scans.Upload",
          "Scans.Ingest",
+         "Scans.UploadLocalMap",
          "Scans.SetLabels",
          "Scans.Delete",
          "Planning.SetProfile",

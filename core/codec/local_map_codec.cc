@@ -1,4 +1,4 @@
-#include "core/engine/local_map_codec.h"
+#include "core/codec/local_map_codec.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -7,6 +7,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
 #include "core/codec/mls_tile_codec.h"
@@ -43,6 +44,7 @@ std::string EncodeLocalMap(const MlsMap& map) {
 absl::StatusOr<MlsMap> DecodeLocalMap(absl::string_view bytes, const MlsParameters& parameters) {
   MlsMap map;
   map.parameters = parameters;
+  std::size_t patches = 0;
   while (!bytes.empty()) {
     if (bytes.size() < kLengthBytes || ReadLength(bytes) > bytes.size() - kLengthBytes) {
       return absl::DataLossError("local map: cut short");
@@ -51,6 +53,11 @@ absl::StatusOr<MlsMap> DecodeLocalMap(absl::string_view bytes, const MlsParamete
     STRATA_ASSIGN_OR_RETURN(MlsTile tile, DecodeMlsTile(bytes.substr(kLengthBytes, length)));
     if (!map.tiles.empty() && !(map.tiles.back().key < tile.key)) {
       return absl::DataLossError("local map: tiles out of order");
+    }
+    patches += tile.patches.size();
+    if (patches > kMaxLocalMapPatches) {
+      return absl::ResourceExhaustedError(
+          absl::StrCat("local map: more than ", kMaxLocalMapPatches, " patches"));
     }
     map.tiles.push_back(std::move(tile));
     bytes.remove_prefix(kLengthBytes + length);
