@@ -41,24 +41,6 @@ std::string ToString(ScanState state) {
   return "unknown";
 }
 
-std::string ToString(JobState state) {
-  switch (state) {
-    case JobState::kQueued:
-      return "queued";
-    case JobState::kRunning:
-      return "running";
-    case JobState::kSucceeded:
-      return "succeeded";
-    case JobState::kFailed:
-      return "failed";
-    case JobState::kCancelled:
-      return "cancelled";
-    case JobState::kProposed:
-      return "proposed";
-  }
-  return "unknown";
-}
-
 std::string ToString(Traversability traversability) {
   switch (traversability) {
     case Traversability::kUnknown:
@@ -193,7 +175,7 @@ Json ToJson(const JobInfo& job) {
   return {{"id", job.id},
           {"kind", job.kind},
           {"parameters", parameters},
-          {"state", ToString(job.state)},
+          {"state", std::string(ToString(job.state))},
           {"progress", job.progress},
           {"phase", job.phase},
           {"message", job.message},

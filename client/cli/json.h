@@ -39,7 +39,6 @@ Json ToJson(const api::TileInfo& tile);
 std::string TimeText(absl::Time time);
 
 std::string ToString(ScanState state);
-std::string ToString(JobState state);
 std::string ToString(Traversability traversability);
 
 }  // namespace strata::cli

@@ -6,6 +6,7 @@
 #include <map>
 #include <string>
 
+#include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
 namespace strata {
@@ -18,6 +19,9 @@ enum class JobState : std::uint8_t {  // stored
   kCancelled = 5,
   kProposed = 6,  // a dry run has ended; what it found waits to be accepted or reverted
 };
+
+// As clients and metrics say it: "queued", "running" …; "unknown" for a number that is no state.
+absl::string_view ToString(JobState state);
 
 // Nothing more happens by itself.
 inline bool IsFinal(JobState state) { return state >= JobState::kSucceeded; }

@@ -7,30 +7,13 @@ namespace {
 
 using prometheus::MetricType;
 
-std::string NameOf(JobState state) {
-  switch (state) {
-    case JobState::kQueued:
-      return "queued";
-    case JobState::kRunning:
-      return "running";
-    case JobState::kSucceeded:
-      return "succeeded";
-    case JobState::kFailed:
-      return "failed";
-    case JobState::kCancelled:
-      return "cancelled";
-    case JobState::kProposed:
-      return "proposed";
-  }
-  return "unknown";
-}
-
 void AddJobs(MetricFamilies& families, const EngineNumbers& numbers) {
   std::vector<MetricRow> rows;
   for (const MapNumbers& map : numbers.maps) {
     for (const auto& [job, count] : map.jobs) {
-      rows.push_back({{{"map", map.map}, {"kind", job.first}, {"state", NameOf(job.second)}},
-                      static_cast<double>(count)});
+      rows.push_back(
+          {{{"map", map.map}, {"kind", job.first}, {"state", std::string(ToString(job.second))}},
+           static_cast<double>(count)});
     }
   }
   AddFamily(families, MetricType::Gauge, "strata_jobs", "Jobs by map, kind and state", rows);
