@@ -249,17 +249,21 @@ UnfinishedUpload ScanIntake::Unfinished() const {
           .bytes = record_.point_bytes};
 }
 
-std::optional<UnfinishedUpload> ScanIntake::Release(std::uint64_t ticket) {
+void ScanIntake::EndStream(std::uint64_t ticket) {
   absl::MutexLock lock(&mutex_);
-  if (parked_.has_value()) return std::move(parked_);  // it was not taken up
-  if (ticket != ticket_ || dead_) return std::nullopt;
+  if (parked_.has_value() || ticket != ticket_ || dead_) return;
   if (!announced() || core_.options().upload_keep == absl::ZeroDuration()) {
     Abandon();
-    return std::nullopt;
+    return;
   }
   if (piece_.size() > 0) SealPiece();
   if (!pieces_.empty()) StagePieces(Stop()).IgnoreError();  // what does not get there is sent again
-  if (staged_ == 0) return std::nullopt;
+}
+
+std::optional<UnfinishedUpload> ScanIntake::Rest() const {
+  absl::MutexLock lock(&mutex_);
+  if (parked_.has_value()) return parked_;  // it was not taken up
+  if (dead_ || !announced() || staged_ == 0) return std::nullopt;
   return Unfinished();
 }
 

@@ -42,9 +42,11 @@ class ScanIntake {
   absl::Status Write(std::uint64_t ticket, const Stop& stop, const PointCloud& chunk);
   // Makes it a scan; `check_room` is asked on the writer's thread unless the scan is there already.
   absl::StatusOr<ScanAck> Finish(std::uint64_t ticket, const Stop& stop, CheckRoom check_room);
-  // The stream has ended. Of an announced scan everything that came goes to disk, and what is there
-  // now is returned; any other is forgotten.
-  std::optional<UnfinishedUpload> Release(std::uint64_t ticket);
+  // The stream has ended. Of an announced scan everything that came goes to disk; any other is
+  // forgotten.
+  void EndStream(std::uint64_t ticket);
+  // What is on disk of an announced scan that is not whole.
+  std::optional<UnfinishedUpload> Rest() const;
 
  private:
   absl::Status CheckTicket(std::uint64_t ticket) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);

@@ -57,15 +57,16 @@ std::shared_ptr<ScanIntake> UnfinishedUploads::FindAnnounced(const Key& key) {
 }
 
 void UnfinishedUploads::Release(std::shared_ptr<ScanIntake> intake, std::uint64_t ticket) {
+  intake->EndStream(ticket);  // waits for the writer, so without the lock
   std::vector<std::uint64_t> stale;
   {
-    // Nobody else can come to hold it meanwhile.
     absl::MutexLock lock(&mutex_);
-    std::optional<UnfinishedUpload> left = intake->Release(ticket);
-    if (!left.has_value() || intake.use_count() > 1) return;
-    const Key key{left->id, left->content_hash};
+    if (intake.use_count() > 1) return;  // who holds it, too, comes here after this one
+    const std::optional<UnfinishedUpload> rest = intake->Rest();
+    if (!rest.has_value()) return;
+    const Key key{rest->id, rest->content_hash};
     active_.erase(key);
-    parked_.insert_or_assign(key, *std::move(left));
+    parked_.insert_or_assign(key, *rest);
     stale = TakeStale(absl::Now());
   }
   Abandon(stale);

@@ -105,6 +105,19 @@ TEST_F(ResumeTest, BreaksInARowAddUp) {
   ExpectStoredAsSent(header.id);
 }
 
+TEST_F(ResumeTest, WhatIsLeftIsFoundInWhateverOrderItsStreamsEnd) {
+  const ScanHeader header = Announce(1);
+  auto older = Begin(header);
+  STRATA_ASSERT_OK(WriteUpTo(*older, 2 * kChunk));
+  auto newer = Begin(header);
+  STRATA_ASSERT_OK(WriteUpTo(*newer, 4 * kChunk));
+  newer = nullptr;
+  older = nullptr;
+  EXPECT_EQ(Held(header), 4 * kChunk);
+  Complete(header);
+  ExpectStoredAsSent(header.id);
+}
+
 TEST_F(ResumeTest, AnAnnouncedScanThatIsThereNeedsNoPoints) {
   ScanHeader header = Announce(1);
   Complete(header);
