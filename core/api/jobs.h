@@ -17,8 +17,8 @@
 
 namespace strata::api {
 
-// Thread-safe. Jobs of a map run one at a time in the order of their ids, survive a restart, and
-// leave the world as it was when they fail or are cancelled.
+// Thread-safe. Jobs of a map run one at a time by id, survive a restart, and leave the world as it
+// was when they fail or are cancelled, but for "classify" and "fade": these go scan by scan.
 class Jobs {
  public:
   virtual ~Jobs() = default;

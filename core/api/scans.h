@@ -102,7 +102,7 @@ class Scans {
   virtual absl::StatusOr<ScanInfo> Get(const Call& call,
                                        absl::string_view map,
                                        const ScanId& id) = 0;
-  // In commit order. The sink may end the listing by returning a status, which is handed back.
+  // In commit order. A sink's error ends it and is handed back; DATA_LOSS at its end: some damaged.
   virtual absl::Status List(const Call& call,
                             absl::string_view map,
                             const ScanFilter& filter,

@@ -156,7 +156,9 @@ absl::Status MapDirectory::CreateFile(absl::string_view name,
   if (error) {
     return absl::UnavailableError(absl::StrCat("cannot make map ", name, ": ", error.message()));
   }
-  return SyncDirectory(path_);
+  absl::Status synced = SyncDirectory(path_);
+  if (!synced.ok()) RemoveWithJournals(file).IgnoreError();
+  return synced;
 }
 
 absl::Status MapDirectory::CheckRemovable(absl::string_view name) const {

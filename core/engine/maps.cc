@@ -139,9 +139,11 @@ absl::StatusOr<MapInfo> EngineMaps::Create(const api::Call& call,
   }
   STRATA_RETURN_IF_ERROR(directory_.CreateFile(key, parameters, absl::Now()));
   OpenMap(key);
-  const absl::StatusOr<std::shared_ptr<Map>>& map = maps_.find(key)->second;
-  if (!map.ok()) return map.status();
-  return (*map)->core().info();
+  const absl::StatusOr<std::shared_ptr<Map>> map = maps_.find(key)->second;
+  if (map.ok()) return (*map)->core().info();
+  // Nobody has put anything into it.
+  if (directory_.RemoveFile(key).ok()) maps_.erase(key);
+  return map.status();
 }
 
 absl::StatusOr<MapInfo> EngineMaps::Get(const api::Call& call, absl::string_view name) {

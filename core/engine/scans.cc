@@ -166,16 +166,23 @@ absl::Status EngineScans::List(const api::Call& call,
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
   STRATA_ASSIGN_OR_RETURN(ScanQuery query, ToQuery(filter));
   const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
+  absl::Status damaged;  // the first that cannot be read; it hides no other
   while (true) {
     STRATA_RETURN_IF_ERROR(call.stop.status());
     std::vector<PosedScan> page;
     STRATA_RETURN_IF_ERROR(
         ReadVisible(*found, [&](StorageReader& reader, const MapClock&) -> absl::Status {
-          STRATA_ASSIGN_OR_RETURN(page, reader.ListScans(query, pin.view().epoch));
+          absl::StatusOr<std::vector<PosedScan>> read = reader.ListScans(query, pin.view().epoch);
+          if (absl::IsDataLoss(read.status()) && !query.skip_damaged) {
+            damaged = read.status();
+            query.skip_damaged = true;
+            read = reader.ListScans(query, pin.view().epoch);
+          }
+          STRATA_ASSIGN_OR_RETURN(page, std::move(read));
           return absl::OkStatus();
         }));
     for (const PosedScan& scan : page) STRATA_RETURN_IF_ERROR(sink(ToScanInfo(scan)));
-    if (page.size() < query.limit) return absl::OkStatus();
+    if (page.size() < query.limit) return damaged;
     query.after = page.back().scan.number;
   }
 }

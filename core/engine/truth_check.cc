@@ -1,5 +1,6 @@
 #include "core/engine/truth_check.h"
 
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <utility>
@@ -24,6 +25,7 @@ void TruthCheck::CheckPoints(StorageReader& reader, const ScanRecord& scan, Repo
   ScanHasher hasher;
   std::uint64_t points = 0;
   std::uint64_t point_bytes = 0;
+  Eigen::AlignedBox3f box_scan;
   bool whole = true;
   for (std::uint32_t ordinal = 0; ordinal < scan.chunks; ++ordinal) {
     ++pieces_;
@@ -35,12 +37,18 @@ void TruthCheck::CheckPoints(StorageReader& reader, const ScanRecord& scan, Repo
       continue;
     }
     hasher.Add(*piece);
+    for (const Eigen::Vector3f& p : piece->points) {
+      if (!std::isnan(p.x())) box_scan.extend(p);
+    }
     points += piece->size();
     point_bytes += bytes->size();
   }
   if (!whole) return;
   if (point_bytes != scan.point_bytes) {
     report(absl::StrCat(point_bytes, " bytes of points instead of ", scan.point_bytes));
+  }
+  if (box_scan.min() != scan.box_scan.min() || box_scan.max() != scan.box_scan.max()) {
+    report("the box is not that of the points");
   }
   if (points != scan.header.point_count) {
     report(absl::StrCat(points, " points instead of ", scan.header.point_count));
@@ -80,6 +88,9 @@ void TruthCheck::CheckScan(StorageReader& reader, const PosedScan& posed, Report
     if (!sound.ok()) report(std::string(sound.message()));
   };
   check(ValidateScanHeader(scan.header));
+  if (scan.state < ScanState::kPending || scan.state > ScanState::kFailed) {
+    report(absl::StrCat("state ", static_cast<int>(scan.state), " is none"));
+  }
   check(reader.CheckScanRow(scan.number));
   if (posed.pose.has_value()) check(ValidatePose(posed.pose->T_map_scan));
   if (scan.state == ScanState::kIntegrated && !posed.pose.has_value()) {

@@ -52,7 +52,7 @@ class StorageReader {
   virtual absl::StatusOr<PosedScan> GetScan(ScanNumber number, std::uint64_t epoch) = 0;
   // Of all scans, ascending. Reads nothing else of their rows, so a damaged one hides no other.
   virtual absl::StatusOr<std::vector<ScanNumber>> ListScanNumbers() = 0;
-  // DATA_LOSS if what the row is counted and found by (points, time) is not what its header says.
+  // DATA_LOSS if points or time, which it is found by, are not its header's, and for damaged poses.
   virtual absl::Status CheckScanRow(ScanNumber number) = 0;
   // By number.
   virtual absl::StatusOr<std::vector<PosedScan>> ListScans(const ScanQuery& query,

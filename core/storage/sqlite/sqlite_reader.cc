@@ -165,9 +165,18 @@ absl::Status SqliteReader::CheckScanRow(ScanNumber number) {
         absl::StrCat("counted with ", row.Unsigned(3), " points instead of ", header.point_count));
   }
   const std::int64_t time_us = absl::ToUnixMicros(header.time);
-  if (row.Int(4) == time_us) return absl::OkStatus();
-  return absl::DataLossError(
-      absl::StrCat("found by time ", row.Int(4), " us instead of ", time_us));
+  if (row.Int(4) != time_us) {
+    return absl::DataLossError(
+        absl::StrCat("found by time ", row.Int(4), " us instead of ", time_us));
+  }
+  STRATA_ASSIGN_OR_RETURN(
+      Statement pose,
+      database_.Prepare("SELECT epoch, pose FROM truth_pose WHERE scan = ?1 ORDER BY epoch"));
+  pose.Bind(number);
+  return ForEachRow(pose, [&] {
+    return Annotate(DecodePose(pose.Bytes(1)).status(),
+                    absl::StrCat("in epoch ", pose.Unsigned(0)));
+  });
 }
 
 absl::StatusOr<std::vector<PosedScan>> SqliteReader::ListScans(const ScanQuery& query,

@@ -65,6 +65,13 @@ absl::Status InsertMap(Database& database, const MapParameters& parameters, absl
   return epoch.Bind(absl::ToUnixMicros(created)).Run();
 }
 
+// Leaves all there is in the file itself. Closing does so too, but tells nobody where it fails.
+absl::Status EmptyLog(Database& database) {
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t busy,
+                          database.Pragma("PRAGMA wal_checkpoint(TRUNCATE)"));
+  return busy == 0 ? absl::OkStatus() : absl::UnavailableError("store: the log is in use");
+}
+
 absl::Status LimitSize(Database& database, std::uint64_t max_file_bytes) {
   if (max_file_bytes == 0) return absl::OkStatus();
   STRATA_ASSIGN_OR_RETURN(const std::int64_t page_bytes, database.Pragma("PRAGMA page_size"));
@@ -107,11 +114,12 @@ absl::Status CreateSqliteMap(const std::filesystem::path& file,
   const auto database = std::make_shared<Database>(std::move(opened));
   STRATA_RETURN_IF_ERROR(CreateSchema(*database));
   SqliteWriter writer(database);
-  return writer.Commit(Durability::kFull, [&]() -> absl::Status {
+  STRATA_RETURN_IF_ERROR(writer.Commit(Durability::kFull, [&]() -> absl::Status {
     STRATA_RETURN_IF_ERROR(InsertMap(*database, parameters, created));
     STRATA_RETURN_IF_ERROR(writer.PutProfile("default", parameters.default_profile));
     return writer.PublishTiles(0, true);
-  });
+  }));
+  return EmptyLog(*database);  // which does not follow when the file is given another name
 }
 
 absl::StatusOr<std::unique_ptr<MapStorage>> OpenSqliteStorage(const std::filesystem::path& file,

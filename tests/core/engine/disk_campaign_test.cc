@@ -1,0 +1,63 @@
+// Seeded samples of what tests/experiments/disk_campaign does at every moment of a map's life.
+#include "tests/core/engine/disk_campaign.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <glog/logging.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+constexpr std::uint64_t kSeed = 20261122;
+
+class DiskCampaignTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    RecordProperty("seed", std::to_string(kSeed));
+    FLAGS_minloglevel = google::GLOG_FATAL;  // errors are what this is about
+  }
+  // About `trials` of them, at moments that the seed chooses.
+  static Sweep SampleOf(std::int64_t moments, std::int64_t trials) {
+    Sweep sweep;
+    sweep.seed = kSeed;
+    sweep.every = std::max<std::int64_t>(1, moments / trials);
+    sweep.first = static_cast<std::int64_t>(kSeed) % sweep.every;
+    return sweep;
+  }
+  static void ExpectKept(const SweepResult& result, const std::string& what) {
+    EXPECT_GT(result.trials, 0) << what;
+    EXPECT_EQ(result.restarts, 0) << what;
+    EXPECT_THAT(result.violations, IsEmpty()) << what;
+  }
+};
+
+TEST_F(DiskCampaignTest, WhatIsAcknowledgedOutlivesDisksThatFail) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const DiskCampaign disks, DiskCampaign::Prepare());
+  for (const DiskFault fault : {DiskFault::kWrite, DiskFault::kSync}) {
+    const std::int64_t moments = disks.moments(fault);
+    ExpectKept(disks.FailOnce(fault, SampleOf(moments, 2)), "once");
+    ExpectKept(disks.FailUntilMended(fault, SampleOf(moments, 2)), "until mended");
+  }
+  ExpectKept(disks.FillUp(SampleOf(disks.bytes(), 3)), "full");
+}
+
+TEST_F(DiskCampaignTest, WhatIsAcknowledgedOutlivesThePower) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const DiskCampaign disks, DiskCampaign::Prepare());
+  ExpectKept(disks.CutPower(false, SampleOf(disks.cuts(), 5)), "power");
+  // It could tell.
+  EXPECT_THAT(disks.CutPower(true, SampleOf(disks.cuts(), 2)).violations, Not(IsEmpty()));
+}
+
+}  // namespace
+}  // namespace strata::testing
