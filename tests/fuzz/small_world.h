@@ -1,0 +1,41 @@
+// A small map that fuzzers ask and damage.
+#ifndef STRATA_TESTS_FUZZ_SMALL_WORLD_H_
+#define STRATA_TESTS_FUZZ_SMALL_WORLD_H_
+
+#include <filesystem>
+
+#include "core/cloud/point_cloud.h"
+#include "core/world/scan.h"
+#include "tests/support/temp_dir.h"
+
+namespace strata::fuzz {
+
+// The map and the trajectory of its scans, which are numbered from 1 on.
+inline constexpr char kWorld[] = "world";
+inline constexpr int kWorldScans = 3;
+inline constexpr int kWorldPoints = 500;  // of each scan, all labelled 1 or 2
+inline constexpr char kWorldClassifier[] = "first";
+
+struct WorldScan {
+  ScanHeader header;
+  PointCloud cloud;
+};
+// The scan whose upload broke off half-way, announced.
+WorldScan BrokenOffScan();
+
+// Three overlapping scans in their second epoch, a fourth whose upload broke off, a class, a
+// constraint, a classifier: in a closed file, made once.
+class SmallWorld {
+ public:
+  SmallWorld();
+
+  // Into a new directory of maps.
+  void CopyTo(const std::filesystem::path& directory) const;
+
+ private:
+  testing::TempDir directory_;
+};
+
+}  // namespace strata::fuzz
+
+#endif  // STRATA_TESTS_FUZZ_SMALL_WORLD_H_
