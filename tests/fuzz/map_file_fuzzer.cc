@@ -176,7 +176,8 @@ void AskTiles(api::Database& database) {
   RequireGoodRefusal(database.tiles().Fetch({}, kWorld, {.epoch = 1}, {}, ignore));
   PlanQuery query;
   query.from = {.x_m = -6.0, .y_m = 0.7};
-  query.to = {.x_m = 2.0, .y_m = 2.0};
+  query.to = {.x_m = 1.0, .y_m = 2.0};
+  query.profile = kWorldRobot;
   RequireGoodRefusal(database.planning().PlanPath({}, kWorld, query).status());
 }
 

@@ -58,17 +58,20 @@ const std::multimap<std::string, std::string>& Examples() {
        "map: 'world' area { level: 0 } held { key { x: -1 y: 0 } version: 1 } "
        "held { key { x: 7 y: 7 } version: 2 }"},
       {"Planning/PlanPath",
-       "map: 'world' from { x_m: -6 y_m: 0.7 z_m: 0 } to { x_m: 2 y_m: 2 z_m: 0 } "
-       "profile { radius_m: 0.2 max_gap_m: 1 max_step_m: 2 max_slope_rad: 1 }"},
+       "map: 'world' from { x_m: -6 y_m: 0.7 z_m: 0 } to { x_m: 1 y_m: 2 z_m: 0 } "
+       "profile { radius_m: 0.2 height_m: 0.3 max_step_m: 2 max_slope_rad: 1.4 max_gap_m: 1 "
+       "max_roughness_m: 5 }"},
       {"Planning/PlanPath",
        "map: 'world' from { x_m: -6 y_m: 0.7 level: 0 } to { x_m: -5 y_m: 1 level: 0 } "
        "profile { radius_m: 0.1 max_gap_m: 1 } max_expanded: 1000 "
        "class_costs { class_id: 1 factor: 2 } class_costs { class_id: 2 forbidden: true }"},
       {"Planning/CheckPath",
-       "map: 'world' waypoints { x: -6 y: 0.7 } waypoints { x: -5 y: 1 } waypoints { x: 2 y: 2 } "
-       "profile { radius_m: 0.2 max_gap_m: 1 max_step_m: 2 } "
+       "map: 'world' waypoints { x: -6 y: 0.7 } waypoints { x: -5 y: 1 } waypoints { x: 1 y: 2 } "
+       "profile { radius_m: 0.2 height_m: 0.3 max_step_m: 2 max_gap_m: 1 max_roughness_m: 5 } "
        "known { valid: true epoch: 1 commit_sequence: 3 tiles { x: -1 } }"},
-      {"Planning/WatchPath", "map: 'world' waypoints { x: -6 y: 0.7 } waypoints { x: -5 y: 1 }"},
+      {"Planning/WatchPath",
+       "map: 'world' waypoints { x: -6 y: 0.7 } waypoints { x: -5 y: 1 } "
+       "profile { radius_m: 0.2 height_m: 0.3 max_step_m: 2 max_gap_m: 1 max_roughness_m: 5 }"},
       {"Planning/SampleSurfaces", "map: 'world' places { x: -6 y: 0.7 } places { x: 2 y: 2 }"},
       {"Planning/SetProfile", "map: 'world' name: 'slim' profile { radius_m: 0.1 height_m: 0.3 }"},
       {"Planning/ListProfiles", "map: 'world'"},

@@ -52,6 +52,15 @@ void Learn(api::Database& database) {
   Require(job.state == JobState::kSucceeded, "labels are learned");
 }
 
+void CheckPlanning(api::Database& database) {
+  PlanQuery query;
+  query.from = {.x_m = -6.0, .y_m = 0.7};
+  query.to = {.x_m = 1.0, .y_m = 2.0};
+  query.profile = kWorldRobot;
+  const auto plan = database.planning().PlanPath({}, kWorld, query);
+  Require(plan.ok() && plan->reason == PlanReason::kFound, "there is a path through the world");
+}
+
 }  // namespace
 
 WorldScan BrokenOffScan() {
@@ -64,12 +73,15 @@ WorldScan BrokenOffScan() {
 
 SmallWorld::SmallWorld() {
   const auto database = OpenEngine({.directory = directory_.path()}).value();
-  Require(database->maps().Create({}, kWorld, testing::SmallMap()).ok(), "a map is made");
+  MapParameters parameters;
+  parameters.mls.cell_size_m = 0.4;  // the points lie densely enough to drive on
+  Require(database->maps().Create({}, kWorld, parameters).ok(), "a map is made");
   for (std::uint64_t i = 1; i <= kWorldScans; ++i) AddScan(*database, i);
   testing::WaitIntegrated(*database, kWorld);
   Decide(*database);
   Learn(*database);
   BreakUploadOff(*database);
+  CheckPlanning(*database);
 }
 
 void SmallWorld::CopyTo(const std::filesystem::path& directory) const {

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "core/cloud/point_cloud.h"
+#include "core/world/robot_profile.h"
 #include "core/world/scan.h"
 #include "tests/support/temp_dir.h"
 
@@ -15,6 +16,14 @@ inline constexpr char kWorld[] = "world";
 inline constexpr int kWorldScans = 3;
 inline constexpr int kWorldPoints = 500;  // of each scan, all labelled 1 or 2
 inline constexpr char kWorldClassifier[] = "first";
+
+// It finds a path from (-6, 0.7) to (1, 2).
+inline constexpr RobotProfile kWorldRobot = {.radius_m = 0.2,
+                                             .height_m = 0.3,
+                                             .max_step_m = 2.0,
+                                             .max_slope_rad = 1.4,
+                                             .max_gap_m = 1.0,
+                                             .max_roughness_m = 5.0};
 
 struct WorldScan {
   ScanHeader header;
