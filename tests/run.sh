@@ -44,6 +44,9 @@ stage "recorded data through a real server"
 stage "sanitizers"
 tests/run_sanitizers.sh
 
+stage "fuzzers"
+tests/fuzz/run.sh --smoke 60
+
 if [[ "${1:-}" == --full ]]; then
   stage "clang-tidy"
   python3 tests/check_clang.py --tidy

@@ -108,8 +108,10 @@ v1::ScanError ToScanError(const absl::Status& status, absl::string_view request_
 }
 
 absl::Status FromScanError(const v1::ScanError& error) {
-  return WithDetail(absl::Status(static_cast<absl::StatusCode>(error.code()), error.message()),
-                    error.detail());
+  auto code = static_cast<absl::StatusCode>(error.code());
+  // Else a scan that was not taken would seem to be.
+  if (code == absl::StatusCode::kOk) code = absl::StatusCode::kUnknown;
+  return WithDetail(absl::Status(code, error.message()), error.detail());
 }
 
 }  // namespace strata::translate

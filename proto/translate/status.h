@@ -46,6 +46,7 @@ absl::Status FromGrpcStatus(const grpc::Status& status);
 
 // The same for one scan of an Ingest stream.
 v1::ScanError ToScanError(const absl::Status& status, absl::string_view request_id);
+// The reverse; never OK: UNKNOWN without a code.
 absl::Status FromScanError(const v1::ScanError& error);
 
 }  // namespace strata::translate

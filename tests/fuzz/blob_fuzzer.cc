@@ -17,7 +17,7 @@
 #include "core/engine/local_map_codec.h"
 #include "core/planes/scan_planes_codec.h"
 #include "core/registration/place_descriptor.h"
-#include "core/storage/value_codec.h"
+#include "core/world/value_codec.h"
 #include "tests/fuzz/require.h"
 
 namespace strata::fuzz {

@@ -23,20 +23,28 @@ T Pick(const std::array<T, N>& values, std::minstd_rand& random) {
 
 double AnyDouble(std::minstd_rand& random) {
   constexpr double kInf = std::numeric_limits<double>::infinity();
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr std::array kOdd = {
-      0.0, -0.0, 1.0, -1.0, 0.1, 0.5, 1e-9, 1e6, -1e6, 1e300, -1e300, kInf, -kInf, -kInf / kInf};
+      0.0, -0.0, 1.0, -1.0, 0.1, 0.5, 1e-9, 1e6, -1e6, 1e300, -1e300, kInf, -kInf, kNan};
   return random() % 2 == 0 ? Pick(kOdd, random) : static_cast<double>(random() % 4000) / 100 - 20;
 }
 
 std::uint64_t AnyWhole(std::minstd_rand& random) {
   constexpr std::array<std::uint64_t, 9> kOdd = {
       0, 1, 2, 255, 256, UINT32_MAX, std::uint64_t{1} << 62, INT64_MAX, UINT64_MAX};
-  return random() % 2 == 0 ? Pick(kOdd, random) : random() % 300;
+  switch (random() % 4) {
+    case 0:
+      return Pick(kOdd, random);
+    case 1:
+      return random() % 300;
+    default:  // what the world of the fuzzer has
+      return random() % 5;
+  }
 }
 
 // Names of things that the world of the fuzzer has, among others.
 std::string AnyText(std::minstd_rand& random) {
-  switch (random() % 8) {
+  switch (random() % 10) {
     case 0:
       return "";
     case 1:
@@ -48,7 +56,11 @@ std::string AnyText(std::minstd_rand& random) {
     case 4:
       return "default";
     case 5:
-      return "rooms";
+      return "run";
+    case 6:
+      return "first";
+    case 7:
+      return std::to_string(random() % 5);
     default:
       return "world";
   }

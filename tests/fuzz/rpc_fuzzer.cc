@@ -3,21 +3,25 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <random>
 #include <string>
+#include <thread>
+#include <utility>
 
-#include "absl/strings/str_cat.h"
+#include <glog/logging.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/grpcpp.h>
 
 #include "core/engine/engine.h"
 #include "server/server.h"
-#include "tests/core/engine/engine_fixture.h"
 #include "tests/fuzz/require.h"
 #include "tests/fuzz/rpc_script.h"
+#include "tests/fuzz/small_world.h"
 #include "tests/support/temp_dir.h"
 
 namespace strata::fuzz {
@@ -25,31 +29,29 @@ namespace {
 
 constexpr std::chrono::milliseconds kPatience{2000};
 constexpr int kMostAnswers = 20;
-constexpr std::size_t kMostMaps = 4;
+constexpr int kScriptsPerWorld = 100;
 
-// A server around a small world, for the life of the process.
+// A server around a copy of the small world.
 class World {
  public:
-  World() {
-    FLAGS_minloglevel = google::GLOG_ERROR;
-    database_ = OpenEngine({.directory = directory_.path(),
+  explicit World(const SmallWorld& content) {
+    content.CopyTo(directory_.path() / "maps");
+    database_ = OpenEngine({.directory = directory_.path() / "maps",
                             .cache_bytes = std::size_t{8} << 20,
-                            .planner_cache_bytes = std::size_t{8} << 20})
+                            .planner_cache_bytes = std::size_t{8} << 20,
+                            .max_maps = 4})
                     .value();
-    Require(database_->maps().Create({}, "world", testing::SmallMap()).ok(), "a map is made");
-    for (std::uint64_t i = 1; i <= 3; ++i) {
-      const PointCloud cloud = testing::MakeRoom(i, 500);
-      const ScanHeader header = testing::HeaderOf({"world", i}, cloud, testing::RoomPose(i));
-      Require(testing::Upload(*database_, header, cloud, 500, "world").ok(), "a scan is taken");
-    }
-    server_ = server::Server::Start(*database_, {.listen = "127.0.0.1:0"}).value();
+    server::ServerOptions options;
+    options.listen = "127.0.0.1:0";
+    server_ = server::Server::Start(*database_, options).value();
+    grpc::ChannelArguments own;  // or all channels to one address share a connection
+    own.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
     stub_ = std::make_unique<grpc::GenericStub>(
-        grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials()));
+        grpc::CreateCustomChannel(server_->address(), grpc::InsecureChannelCredentials(), own));
   }
 
-  grpc::Status Say(const RpcScript& script);
-  // Maps that a fuzzer made would be open files and threads.
-  void DeleteOtherMaps();
+  grpc::Status Say(const RpcCall& call);
+  bool HasMap() { return database_->maps().Get({}, kWorld).ok(); }
 
  private:
   // Waits for what was just started; false at the end of the stream.
@@ -72,49 +74,69 @@ grpc::ByteBuffer BufferOf(const google::protobuf::Message& message) {
   return grpc::ByteBuffer(&slice, 1);
 }
 
-grpc::Status World::Say(const RpcScript& script) {
+std::chrono::milliseconds PatienceFor(const RpcCall& call) {
+  const std::string path = call.path();
+  if (path == "/strata.v1.Jobs/Watch") return std::chrono::milliseconds(500);
+  // These have no end of their own.
+  const bool watch = path == "/strata.v1.Maps/Watch" || path == "/strata.v1.Planning/WatchPath";
+  return watch ? std::chrono::milliseconds(20) : kPatience;
+}
+
+grpc::Status World::Say(const RpcCall& said) {
   grpc::ClientContext context;
-  // A watch has no end of its own.
-  const bool watch = script.method->name().compare(0, 5, "Watch") == 0;
-  context.set_deadline(std::chrono::system_clock::now() +
-                       (watch ? std::chrono::milliseconds(20) : kPatience));
-  const auto call = stub_->PrepareCall(&context, script.path(), &queue_);
+  context.set_deadline(std::chrono::system_clock::now() + PatienceFor(said));
+  const auto call = stub_->PrepareCall(&context, said.path(), &queue_);
   call->StartCall(nullptr);
   bool open = Done();
-  for (const auto& request : script.requests) {
+  for (const auto& request : said.requests) {
     if (!open) break;
     call->Write(BufferOf(*request), nullptr);
     open = Done();
   }
-  call->WritesDone(nullptr);
-  Done();
-  grpc::ByteBuffer answer;
-  for (int i = 0; i < kMostAnswers; ++i) {
-    call->Read(&answer, nullptr);
-    if (!Done()) break;
+  if (said.cut) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));  // or nothing of it arrives
+    context.TryCancel();
+  } else {
+    call->WritesDone(nullptr);
+    Done();
   }
-  context.TryCancel();
+  grpc::ByteBuffer answer;
+  int answers = 0;
+  for (bool more = true; more && answers < kMostAnswers; ++answers) {
+    call->Read(&answer, nullptr);
+    more = Done();
+  }
+  if (answers == kMostAnswers) context.TryCancel();
   grpc::Status status;
   call->Finish(&status, nullptr);
   Done();
   return status;
 }
 
-void World::DeleteOtherMaps() {
-  const auto maps = database_->maps().List({});
-  Require(maps.ok(), "the maps are listed");
-  if (maps->size() <= kMostMaps) return;
-  for (const MapInfo& map : *maps) {
-    if (map.name != "world") database_->maps().Delete({}, map.name).IgnoreError();
+// How often each call was made and granted: what a run never reached can be seen at its end.
+class Tally {
+ public:
+  ~Tally() {
+    for (const auto& [path, counts] : counts_) {
+      std::cerr << path << ": " << counts.first << " calls, " << counts.second << " granted\n";
+    }
   }
-}
+  void Count(const RpcCall& call, const grpc::Status& status) {
+    auto& [calls, granted] = counts_[call.path()];
+    ++calls;
+    granted += status.ok() ? 1 : 0;
+  }
+
+ private:
+  std::map<std::string, std::pair<int, int>> counts_;
+};
 
 // Not a reason to trust a server less: what it says of others' faults and of being full.
-bool Blameless(const grpc::Status& status, const RpcScript& script) {
+bool Blameless(const grpc::Status& status, const RpcCall& call) {
   switch (status.error_code()) {
     case grpc::StatusCode::INTERNAL:
       // gRPC's own word for bytes that are no message, or not one message where one is expected.
-      return !script.parseable || script.requests.size() != 1;
+      return !call.parseable || call.requests.size() != 1;
     case grpc::StatusCode::UNKNOWN:
     case grpc::StatusCode::DATA_LOSS:
     case grpc::StatusCode::UNAVAILABLE:
@@ -122,6 +144,16 @@ bool Blameless(const grpc::Status& status, const RpcScript& script) {
     default:
       return true;
   }
+}
+
+void Say(const RpcCall& call, World& world) {
+  static Tally tally;
+  const grpc::Status status = world.Say(call);
+  tally.Count(call, status);
+  if (Blameless(status, call)) return;
+  std::cerr << call.path() << ": " << status.error_code() << ' ' << status.error_message() << '\n';
+  for (const auto& request : call.requests) std::cerr << request->DebugString() << "--\n";
+  Require(false, "the server's status blames the caller");
 }
 
 }  // namespace
@@ -142,14 +174,18 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data,
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static auto* const world = new strata::fuzz::World();
-  const strata::fuzz::RpcScript script = strata::fuzz::ReadScript(data, size);
-  const grpc::Status status = world->Say(script);
-  if (!strata::fuzz::Blameless(status, script)) {
-    std::cerr << script.path() << ": " << status.error_message() << '\n';
-    for (const auto& request : script.requests) std::cerr << request->DebugString() << "--\n";
-    strata::fuzz::Require(false, "the server's status blames the caller");
+  using namespace strata::fuzz;
+  static const auto* const content = [] {
+    FLAGS_minloglevel = google::GLOG_ERROR;
+    return new SmallWorld();
+  }();
+  static std::unique_ptr<World> world;
+  static int scripts = 0;
+  // A copy takes longer than a script, and changes of one script hardly hinder the next.
+  if (world == nullptr || ++scripts % kScriptsPerWorld == 0 || !world->HasMap()) {
+    world.reset();
+    world = std::make_unique<World>(*content);
   }
-  world->DeleteOtherMaps();
+  for (const RpcCall& call : ReadScript(data, size)) Say(call, *world);
   return 0;
 }

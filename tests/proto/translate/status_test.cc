@@ -71,5 +71,11 @@ TEST(TranslateStatusTest, ScanErrorsCarryTheSame) {
   EXPECT_EQ(DetailOf(back)->metadata().at("request_id"), "id-2");
 }
 
+TEST(TranslateStatusTest, AScanErrorWithoutACodeIsNoSuccess) {
+  v1::ScanError error;
+  error.set_message("not taken");
+  EXPECT_THAT(FromScanError(error), StatusIs(absl::StatusCode::kUnknown, "not taken"));
+}
+
 }  // namespace
 }  // namespace strata::translate
