@@ -16,6 +16,8 @@
 
 #include "core/classification/classifier_codec.h"
 #include "core/classification/training.h"
+#include "core/codec/local_map_codec.h"
+#include "core/mls/build.h"
 #include "core/world/scan_hash.h"
 #include "proto/translate/points.h"
 #include "proto/translate/scans.h"
@@ -150,6 +152,22 @@ void AddScan(RpcCall& call, std::minstd_rand& random) {
   }
 }
 
+void AddLocalMap(RpcCall& call, std::minstd_rand& random) {
+  MlsParameters parameters;
+  parameters.cell_size_m = kWorldCellSizeM;
+  const auto built =
+      BuildMlsMap(SomeFloor(40, random), Pose::Identity(), SensorModel(), parameters);
+  Require(built.ok(), "points make a local map");
+  auto& start = *AddRequest<v1::UploadLocalMapRequest>(call).mutable_start();
+  start.set_map("world");
+  start.mutable_header()->mutable_id()->set_trajectory("run");
+  start.mutable_header()->mutable_id()->set_sequence(1 + random() % 3);
+  start.set_cell_size_m(parameters.cell_size_m);
+  start.set_gap_size_m(parameters.gap_size_m);
+  start.set_thickness_m(parameters.thickness_m);
+  AddRequest<v1::UploadLocalMapRequest>(call).set_local_map(EncodeLocalMap(built->map));
+}
+
 void AddLabels(RpcCall& call, std::minstd_rand& random) {
   v1::SetScanLabelsStart& start = *AddRequest<v1::SetScanLabelsRequest>(call).mutable_start();
   start.set_map("world");
@@ -269,6 +287,8 @@ RpcCall AnyExample(std::minstd_rand& random) {
   } else if (input == "IngestScansRequest") {
     AddScan<v1::IngestScansRequest>(call, random);
     if (random() % 2 == 0) AddScan<v1::IngestScansRequest>(call, random);
+  } else if (input == "UploadLocalMapRequest") {
+    AddLocalMap(call, random);
   } else if (input == "SetScanLabelsRequest") {
     AddLabels(call, random);
   } else if (input == "LocalizeRequest") {

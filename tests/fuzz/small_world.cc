@@ -74,7 +74,7 @@ WorldScan BrokenOffScan() {
 SmallWorld::SmallWorld() {
   const auto database = OpenEngine({.directory = directory_.path()}).value();
   MapParameters parameters;
-  parameters.mls.cell_size_m = 0.4;  // the points lie densely enough to drive on
+  parameters.mls.cell_size_m = kWorldCellSizeM;
   Require(database->maps().Create({}, kWorld, parameters).ok(), "a map is made");
   for (std::uint64_t i = 1; i <= kWorldScans; ++i) AddScan(*database, i);
   testing::WaitIntegrated(*database, kWorld);

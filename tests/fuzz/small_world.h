@@ -15,6 +15,7 @@ namespace strata::fuzz {
 inline constexpr char kWorld[] = "world";
 inline constexpr int kWorldScans = 3;
 inline constexpr int kWorldPoints = 500;  // of each scan, all labelled 1 or 2
+inline constexpr double kWorldCellSizeM = 0.4;  // its points lie densely enough to drive on
 inline constexpr char kWorldClassifier[] = "first";
 
 // It finds a path from (-6, 0.7) to (1, 2).
