@@ -49,6 +49,10 @@ std::vector<Campaign> Campaigns() {
         {name + ", until mended", [kind](const DiskCampaign& disks, const Sweep& sweep) {
            return disks.FailUntilMended(kind, sweep);
          }});
+    campaigns.push_back(
+        {name + ", on opening", [kind](const DiskCampaign& disks, const Sweep& sweep) {
+           return disks.FailOnOpening(kind, sweep);
+         }});
   }
   campaigns.push_back(
       {"full", [](const DiskCampaign& disks, const Sweep& sweep) { return disks.FillUp(sweep); }});

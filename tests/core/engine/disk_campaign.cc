@@ -1,6 +1,7 @@
 #include "tests/core/engine/disk_campaign.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -8,6 +9,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/strings/match.h"
@@ -18,7 +20,6 @@
 #include "core/common/status.h"
 #include "core/engine/engine.h"
 #include "tests/support/power_cut_disk.h"
-#include "tests/support/temp_dir.h"
 
 namespace strata::testing {
 namespace {
@@ -56,6 +57,23 @@ absl::StatusOr<std::unique_ptr<api::Database>> Open(const std::filesystem::path&
   return OpenEngine(HistoryOptions(directory));
 }
 
+// What a disk has to do for an engine that is opened, takes the steps and is closed.
+absl::Status Count(const std::filesystem::path& directory,
+                   const std::vector<HistoryStep>& steps,
+                   std::array<std::int64_t, kDiskFaults>& operations,
+                   std::int64_t& grown) {
+  const FaultyDisk disk;
+  {
+    STRATA_ASSIGN_OR_RETURN(const auto database, Open(directory));
+    for (const HistoryStep& step : steps) STRATA_RETURN_IF_ERROR(step.run(*database, {}));
+  }
+  for (int i = 0; i < kDiskFaults; ++i) {
+    operations[static_cast<std::size_t>(i)] = disk.operations(static_cast<DiskFault>(i));
+  }
+  grown = disk.grown();
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::StatusOr<DiskCampaign> DiskCampaign::Prepare() {
@@ -81,26 +99,24 @@ absl::StatusOr<DiskCampaign> DiskCampaign::Prepare() {
     STRATA_RETURN_IF_ERROR(CheckSound(*database));
   }
   const TempDir counted;
+  STRATA_RETURN_IF_ERROR(
+      Count(counted.path(), DiskHistory(), campaign.operations_, campaign.grown_));
+  const TempDir whole;
+  const auto cut = std::make_shared<TempDir>();
   {
-    const FaultyDisk disk;
-    {
-      STRATA_ASSIGN_OR_RETURN(const auto database, Open(counted.path()));
-      for (const HistoryStep& step : DiskHistory()) {
-        STRATA_RETURN_IF_ERROR(step.run(*database, {}));
-      }
-    }
-    for (int i = 0; i < kDiskFaults; ++i) {
-      campaign.operations_[static_cast<std::size_t>(i)] =
-          disk.operations(static_cast<DiskFault>(i));
-    }
-    campaign.grown_ = disk.grown();
+    PowerCutDisk disk(whole.path());
+    STRATA_ASSIGN_OR_RETURN(const auto database, Open(whole.path()));
+    for (const HistoryStep& step : DiskHistory()) STRATA_RETURN_IF_ERROR(step.run(*database, {}));
+    campaign.cuts_ = disk.operations();
+    disk.CutAfter(0, 1, cut->path());
+    // The first thing that would be written.
+    database->planning().SetProfile({}, kHistoryMap, "cut", RobotProfile()).IgnoreError();
   }
-  const TempDir cut;
-  const PowerCutDisk disk(cut.path());
-  STRATA_ASSIGN_OR_RETURN(auto database, Open(cut.path()));
-  for (const HistoryStep& step : DiskHistory()) STRATA_RETURN_IF_ERROR(step.run(*database, {}));
-  database.reset();
-  campaign.cuts_ = disk.operations();
+  campaign.cut_ = cut;
+  const TempDir opened;
+  std::filesystem::copy(cut->path(), opened.path());
+  std::int64_t grown = 0;
+  STRATA_RETURN_IF_ERROR(Count(opened.path(), {}, campaign.opening_, grown));
   return campaign;
 }
 
@@ -176,6 +192,37 @@ DiskCampaign::Trial DiskCampaign::RunOnFaultyDisk(const Arm& arm,
   if (!again.empty()) return violated("opened again", again);
   const absl::Status sound = CheckSound(**database);
   if (!sound.ok()) return violated("opened again", sound.ToString());
+  return trial;
+}
+
+DiskCampaign::Trial DiskCampaign::RunOpening(const Arm& arm) const {
+  Trial trial;
+  const TempDir directory;
+  std::filesystem::copy(cut_->path(), directory.path());
+  FaultyDisk disk;
+  arm(disk);
+  const std::size_t steps = DiskHistory().size();
+  const auto violated = [&](const std::string& how) {
+    trial.violation = how;
+    return trial;
+  };
+  for (int tries = 0; tries < 2; ++tries) {
+    const auto database = Open(directory.path());
+    Patience patience([&] { return disk.failed() > 0; });
+    absl::Status done = database.status();
+    if (done.ok()) done = Settle(**database, [&] { return tries == 0 && patience.IsOver(); });
+    trial.failed = disk.failed() > 0;
+    if (!done.ok() && (!trial.failed || tries > 0 || !MayAnswer(done))) {
+      return violated(absl::StrCat("says ", done.ToString()));
+    }
+    trial.steps_failed += done.ok() ? 0 : 1;
+    disk.Mend();
+    if (!done.ok()) continue;
+    const std::string wrong = CompareAfter(**database, steps);
+    if (!wrong.empty()) return violated(wrong);
+    const absl::Status sound = CheckSound(**database);
+    return sound.ok() ? trial : violated(sound.ToString());
+  }
   return trial;
 }
 
@@ -265,6 +312,13 @@ SweepResult DiskCampaign::FillUp(const Sweep& sweep) const {
   return Run(sweep, grown_, [&](std::int64_t n) {
     const bool reopen = (n / sweep.every + static_cast<std::int64_t>(sweep.seed)) % 2 == 0;
     return RunOnFaultyDisk([&](FaultyDisk& disk) { disk.LeaveRoom(n); }, true, reopen);
+  });
+}
+
+SweepResult DiskCampaign::FailOnOpening(DiskFault fault, const Sweep& sweep) const {
+  return Run(sweep, moments_of_opening(fault), [&](std::int64_t n) {
+    const std::int64_t times = n % 2 == 0 ? 1 : INT64_MAX / 2;
+    return RunOpening([&](FaultyDisk& disk) { disk.Fail(fault, n, times); });
   });
 }
 

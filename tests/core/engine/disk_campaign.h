@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 
 #include "tests/core/engine/disk_history.h"
 #include "tests/support/faulty_disk.h"
+#include "tests/support/temp_dir.h"
 
 namespace strata::testing {
 
@@ -43,6 +45,9 @@ class DiskCampaign {
   std::int64_t moments(DiskFault fault) const {
     return operations_[static_cast<std::size_t>(fault)];
   }
+  std::int64_t moments_of_opening(DiskFault fault) const {
+    return opening_[static_cast<std::size_t>(fault)];
+  }
   std::int64_t bytes() const { return grown_; }
   std::int64_t cuts() const { return cuts_; }
 
@@ -53,6 +58,9 @@ class DiskCampaign {
   SweepResult FailUntilMended(DiskFault fault, const Sweep& sweep) const;
   // After byte n the disk is full until it is mended.
   SweepResult FillUp(const Sweep& sweep) const;
+  // The map is opened after its power was cut, and operation n of that fails. It opens, or says
+  // what is wrong and opens the next time.
+  SweepResult FailOnOpening(DiskFault fault, const Sweep& sweep) const;
   // Power is cut at operation n. `lying`: of a disk that ignores syncs, whose violations show that
   // this can tell.
   SweepResult CutPower(bool lying, const Sweep& sweep) const;
@@ -68,6 +76,7 @@ class DiskCampaign {
 
   DiskCampaign() = default;
   Trial RunOnFaultyDisk(const Arm& arm, bool until_mended, bool reopen) const;
+  Trial RunOpening(const Arm& arm) const;
   Trial RunUntilCut(std::int64_t moment, std::uint64_t seed, bool lying) const;
   // Empty, or how the map is neither as after `steps` steps nor as after one more.
   std::string CompareAfter(api::Database& database, std::size_t steps) const;
@@ -79,6 +88,8 @@ class DiskCampaign {
   std::array<std::int64_t, kDiskFaults> operations_{};
   std::int64_t grown_ = 0;
   std::int64_t cuts_ = 0;
+  std::shared_ptr<const TempDir> cut_;  // the map after its last step, its power cut
+  std::array<std::int64_t, kDiskFaults> opening_{};
 };
 
 }  // namespace strata::testing

@@ -49,6 +49,9 @@ TEST_F(DiskCampaignTest, WhatIsAcknowledgedOutlivesDisksThatFail) {
     ExpectKept(disks.FailOnce(fault, SampleOf(moments, 2)), "once");
     ExpectKept(disks.FailUntilMended(fault, SampleOf(moments, 2)), "until mended");
   }
+  for (const DiskFault fault : {DiskFault::kWrite, DiskFault::kRead, DiskFault::kShm}) {
+    ExpectKept(disks.FailOnOpening(fault, SampleOf(disks.moments_of_opening(fault), 2)), "opening");
+  }
   ExpectKept(disks.FillUp(SampleOf(disks.bytes(), 3)), "full");
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include <gmock/gmock.h>
@@ -125,6 +126,33 @@ TEST_P(DiskFaultTest, CallsThatChangeTheMapSaySoAndChangeNothing) {
   STRATA_EXPECT_OK(db().maps().Create({}, "other", SmallMap()));
   STRATA_EXPECT_OK(db().scans().Delete({}, kMapName, {"run", 2}));
   ExpectSound();
+}
+
+// It is made under another name: nothing of it may be left behind there.
+TEST_P(DiskFaultTest, AMapIsMadeAsAWholeOrNotAtAll) {
+  std::int64_t failed = -1;
+  int refused = 0;
+  for (int n = 0; disk_.failed() > failed; n += 1 + n / 16) {
+    const std::string name = "made" + std::to_string(n);
+    failed = disk_.failed();
+    disk_.Fail(GetParam().fault, n, 1);
+    const absl::Status made = db().maps().Create({}, name, SmallMap()).status();
+    disk_.Mend();
+    if (!made.ok()) {
+      ++refused;
+      EXPECT_THAT(made.code(), AnyOf(Code::kResourceExhausted, Code::kUnavailable)) << made;
+      EXPECT_THAT(db().maps().Get({}, name), StatusIs(Code::kNotFound, ::testing::_));
+      STRATA_EXPECT_OK(db().maps().Create({}, name, SmallMap()));
+    }
+    UploadRoom(1, RoomPose(1), name);
+  }
+  EXPECT_GT(refused, 2);
+  Reopen();
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::vector<MapInfo> maps, db().maps().List({}));
+  for (const MapInfo& map : maps) {
+    if (map.name == kMapName) continue;
+    EXPECT_EQ(WaitIntegrated(db(), map.name).scans, 1U) << map.name;
+  }
 }
 
 // The end of a job is stored before anybody sees it.

@@ -1,6 +1,8 @@
 // What verify says of damage, and what rebuild makes of it.
+#include <cstdint>
 #include <iterator>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include <gmock/gmock.h>
@@ -65,7 +67,7 @@ TEST_F(EngineVerifyTest, DamagedPointsAreNamed) {
 
 // Columns that only counts and searches read.
 TEST_F(EngineVerifyTest, ARowThatDiffersFromItsHeaderIsDamageThatNoRebuildMends) {
-  for (const std::string column : {"points", "time_us", "point_bytes"}) {
+  for (const std::string column : {"points", "time_us", "point_bytes", "max_x"}) {
     MakeMap(SmallMap(), column);
     UploadRoom(1, RoomPose(1), column);
     UploadRoom(2, RoomPose(2), column);
@@ -78,6 +80,42 @@ TEST_F(EngineVerifyTest, ARowThatDiffersFromItsHeaderIsDamageThatNoRebuildMends)
     EXPECT_THAT(job.message, StartsWith("1 mismatch: scan run/2: ")) << column;
     EXPECT_THAT(job.message, Not(HasSubstr("a rebuild mends"))) << column;
   }
+}
+
+TEST_F(EngineVerifyTest, ADamagedPoseOfAnEarlierEpochIsNamed) {
+  MakeMap();
+  UploadRooms(2);
+  WaitIntegrated(db());
+  Close();
+  Sql("UPDATE truth_map SET epoch = 2; INSERT INTO truth_epoch (epoch, created_us, reason) VALUES "
+      "(2, 0, 'again'); INSERT INTO truth_pose SELECT scan, 2, pose, origin, aligned, message, "
+      "overlap, rms_m, iterations FROM truth_pose");
+  Reopen();
+  ExpectSound();
+  Close();
+  Sql("UPDATE truth_pose SET pose = CAST(substr(pose, 1, 20) || x'5a' || substr(pose, 22) AS BLOB) "
+      "WHERE epoch = 1 AND scan = (SELECT number FROM truth_scan WHERE sequence = 2)");
+  Reopen();
+  EXPECT_THAT(RunJob(db(), "verify").message, StartsWith("1 mismatch: scan run/2: in epoch 1: "));
+}
+
+TEST_F(EngineVerifyTest, ADamagedRowHidesNoOtherFromAListing) {
+  MakeMap();
+  UploadRooms(4);
+  WaitIntegrated(db());
+  Close();
+  Sql("UPDATE truth_scan SET header = CAST(x'00' || substr(header, 2) AS BLOB) WHERE sequence = 2");
+  Reopen();
+  std::vector<std::uint64_t> listed;
+  EXPECT_THAT(db().scans().List({},
+                                kMapName,
+                                {},
+                                [&](const ScanInfo& scan) {
+                                  listed.push_back(scan.header.id.sequence);
+                                  return absl::OkStatus();
+                                }),
+              StatusIs(absl::StatusCode::kDataLoss, HasSubstr("run/2")));
+  EXPECT_THAT(listed, ::testing::ElementsAre(1, 3, 4));
 }
 
 // The cure that verify names.
