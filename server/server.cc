@@ -6,6 +6,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "absl/time/clock.h"
 #include <glog/logging.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
@@ -15,6 +16,7 @@
 #include "core/common/host_port.h"
 #include "core/common/log_line.h"
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "core/engine/numbers.h"
 #include "server/access/grant_table.h"
 #include "server/metrics/engine_metrics.h"
@@ -161,7 +163,7 @@ absl::Status GrpcServer::Listen(HostPort address) {
 
 absl::Status GrpcServer::OpenMetrics() {
   if (options_.metrics_listen.empty()) return absl::OkStatus();
-  const auto gauges = [this, started = absl::Now()](MetricFamilies& families) {
+  const auto gauges = [this, started = SteadyNow()](MetricFamilies& families) {
     AddProcess(families, started);
     AddUnderWay(families, runtime_);
     AddEngine(families, NumbersOf(runtime_.db));
@@ -177,9 +179,9 @@ void GrpcServer::Shutdown() {
   metrics_.reset();  // it looks at the database
   server_->GetHealthCheckService()->SetServingStatus(false);
   // gRPC's own draining would also wait for clients that keep an idle connection.
-  const absl::Time drained = absl::Now() + options_.drain_timeout;
+  const absl::Time drained = SteadyNow() + options_.drain_timeout;
   runtime_.calls.AwaitEmpty(options_.drain_timeout);
-  runtime_.watches.AwaitEmpty(drained - absl::Now());
+  runtime_.watches.AwaitEmpty(drained - SteadyNow());
   server_->Shutdown(absl::ToChronoTime(absl::Now()));
   server_->Wait();
   // The last calls may still be giving back what they hold.

@@ -8,6 +8,7 @@
 #include "absl/random/random.h"
 #include "absl/time/clock.h"
 
+#include "core/common/steady_time.h"
 #include "proto/translate/status.h"
 
 namespace strata::sdk {
@@ -43,9 +44,9 @@ std::optional<absl::Duration> Backoff::NextPause(const absl::Status& status) {
 bool Backoff::Wait(const absl::Status& status, const Stop& stop) {
   const std::optional<absl::Duration> pause = NextPause(status);
   if (!pause.has_value()) return false;
-  const absl::Time until = absl::Now() + *pause;
+  const absl::Time until = SteadyNow() + *pause;
   if (until >= stop.deadline()) return false;
-  for (absl::Time now = absl::Now(); now < until; now = absl::Now()) {
+  for (absl::Time now = SteadyNow(); now < until; now = SteadyNow()) {
     if (stop.requested()) return false;
     absl::SleepFor(std::min(kSlice, until - now));
   }

@@ -1,5 +1,6 @@
 #include "client/sdk/canceller.h"
 
+#include "absl/time/clock.h"
 #include "absl/time/time.h"
 
 namespace strata::sdk {
@@ -31,17 +32,19 @@ Canceller::Watch::~Watch() {
 }
 
 void Canceller::Work() {
-  absl::MutexLock lock(&mutex_);
   const auto needed = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     return closing_ || !watches_.empty();
   };
   while (true) {
-    mutex_.Await(absl::Condition(&needed));
-    if (closing_) return;
-    for (Watch* watch : watches_) {
-      if (watch->stop_.requested()) watch->context_.TryCancel();
+    {
+      absl::MutexLock lock(&mutex_);
+      mutex_.Await(absl::Condition(&needed));
+      if (closing_) return;
+      for (Watch* watch : watches_) {
+        if (watch->stop_.requested()) watch->context_.TryCancel();
+      }
     }
-    mutex_.AwaitWithTimeout(absl::Condition(&closing_), kInterval);
+    absl::SleepFor(kInterval);  // AwaitWithTimeout would wait as long as a clock is set back
   }
 }
 

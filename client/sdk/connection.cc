@@ -2,6 +2,8 @@
 
 #include "absl/time/clock.h"
 
+#include "core/common/steady_time.h"
+
 namespace strata::sdk {
 namespace {
 
@@ -13,7 +15,7 @@ constexpr char kRequestIdKey[] = "x-request-id";
 AttemptContext::AttemptContext(Connection& connection, const api::Call& call)
     : watch_(connection.canceller(), call.stop, context_) {
   if (call.stop.deadline() != absl::InfiniteFuture()) {
-    context_.set_deadline(absl::ToChronoTime(call.stop.deadline()));
+    context_.set_deadline(absl::ToChronoTime(absl::Now() + (call.stop.deadline() - SteadyNow())));
   }
   if (!connection.token().empty()) {
     context_.AddMetadata("authorization", "Bearer " + connection.token());

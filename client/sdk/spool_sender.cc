@@ -5,6 +5,7 @@
 #include "absl/time/time.h"
 
 #include "client/sdk/spool.h"
+#include "core/common/steady_time.h"
 
 namespace strata {
 namespace {
@@ -27,8 +28,8 @@ void SpoolSender::Loop() {
   while (!call_.stop.requested()) {
     const absl::Status sent = spool_.Send(call_, database_);
     pause = sent.ok() ? kShortest : std::min(2 * pause, kLongest);
-    const absl::Time until = absl::Now() + pause;
-    while (absl::Now() < until && !call_.stop.requested()) absl::SleepFor(absl::Milliseconds(20));
+    const absl::Time until = SteadyNow() + pause;
+    while (SteadyNow() < until && !call_.stop.requested()) absl::SleepFor(absl::Milliseconds(20));
   }
 }
 

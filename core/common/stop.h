@@ -15,7 +15,7 @@ namespace strata {
 // OK.
 class Stop {
  public:
-  // Never stops by time; stops when Request() is called on it or on a copy.
+  // Never stops by time (that of SteadyNow()); stops when Request() is called on it or on a copy.
   Stop() : Stop(absl::InfiniteFuture()) {}
   explicit Stop(absl::Time deadline)
       : deadline_(deadline), requested_(std::make_shared<std::atomic<bool>>(false)) {}

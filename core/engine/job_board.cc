@@ -19,6 +19,7 @@
 #include "absl/time/time.h"
 
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 
 namespace strata {
 namespace {
@@ -41,7 +42,7 @@ class JobBoard::Running final : public JobContext {
   absl::Status Progress(double progress, absl::string_view phase) override {
     STRATA_RETURN_IF_ERROR(closing_.status());
     STRATA_RETURN_IF_ERROR(stop_.status());
-    const absl::Time now = absl::Now();
+    const absl::Time now = SteadyNow();
     if (now - reported_ < kReportInterval && phase == phase_) return absl::OkStatus();
     const bool store = now - stored_ >= kStoreInterval;
     reported_ = now;
@@ -65,7 +66,7 @@ class JobBoard::Running final : public JobContext {
   const Stop stop_;
   const Stop& closing_;
   absl::Time reported_ = absl::InfinitePast();
-  absl::Time stored_ = absl::Now();
+  absl::Time stored_ = SteadyNow();
   std::string phase_;
   std::map<std::string, double> metrics_;
   std::string message_;
@@ -212,9 +213,9 @@ absl::Status JobBoard::Watch(const Stop& stop,
       if (it == jobs_.end()) return NoSuchJob(id);
       const Entry& entry = it->second;
       const auto ended = [&entry] { return IsFinal(entry.info.state); };
-      while (absl::Now() < next && !ended()) {
+      while (SteadyNow() < next && !ended()) {
         STRATA_RETURN_IF_ERROR(stop.status());
-        mutex_.AwaitWithTimeout(absl::Condition(&ended), std::min(kPoll, next - absl::Now()));
+        mutex_.AwaitWithTimeout(absl::Condition(&ended), std::min(kPoll, next - SteadyNow()));
       }
       const auto changed = [&entry, &seen, first] { return first || entry.changes != seen; };
       while (!mutex_.AwaitWithTimeout(absl::Condition(&changed), kPoll)) {
@@ -225,7 +226,7 @@ absl::Status JobBoard::Watch(const Stop& stop,
     }
     STRATA_RETURN_IF_ERROR(stop.status());
     STRATA_RETURN_IF_ERROR(sink(info));
-    next = absl::Now() + kReportInterval;
+    next = SteadyNow() + kReportInterval;
     if (IsFinal(info.state)) return absl::OkStatus();
   }
 }

@@ -6,12 +6,12 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include <glog/logging.h>
 
 #include "core/common/log_line.h"
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "core/common/this_thread.h"
 #include "core/engine/classify.h"
 #include "core/engine/fade.h"
@@ -51,7 +51,7 @@ JobRunner::JobRunner(MapCore& core, JobBoard& jobs, Worker& worker)
       closures_(core),
       job_waits_(jobs.AnyIn(JobState::kQueued)),
       next_look_(core.options().optimize_interval > absl::ZeroDuration()
-                     ? absl::Now() + core.options().optimize_interval
+                     ? SteadyNow() + core.options().optimize_interval
                      : absl::InfiniteFuture()),
       thread_([this] { Loop(); }) {}
 
@@ -77,7 +77,11 @@ absl::Status JobRunner::Run(const JobInfo& job, JobContext& context) {
 
 JobRunner::Step JobRunner::NextStep() {
   absl::MutexLock lock(&mutex_);
-  mutex_.AwaitWithTimeout(absl::Condition(this, &JobRunner::HasWork), next_look_ - absl::Now());
+  // A clock that is set forward ends a wait early.
+  while (!mutex_.AwaitWithTimeout(absl::Condition(this, &JobRunner::HasWork),
+                                  next_look_ - SteadyNow()) &&
+         SteadyNow() < next_look_) {
+  }
   if (closed_) return Step::kClosed;
   if (job_waits_) return Step::kJob;
   look_ = Stop();
@@ -90,7 +94,7 @@ void JobRunner::Loop() {
   while (true) {
     const Step step = NextStep();
     if (step == Step::kClosed) return;
-    const absl::Time begun = absl::Now();
+    const absl::Time begun = SteadyNow();
     step == Step::kJob ? RunJob() : Look();
     PlanNextLook(begun);
   }
@@ -138,7 +142,7 @@ void JobRunner::Look() {
 void JobRunner::PlanNextLook(absl::Time begun) {
   const absl::Duration interval = core_.options().optimize_interval;
   if (interval == absl::ZeroDuration()) return;
-  const absl::Time now = absl::Now();
+  const absl::Time now = SteadyNow();
   absl::MutexLock lock(&mutex_);
   next_look_ = now + std::max(interval, now - begun);
 }

@@ -11,13 +11,13 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
 #include <Eigen/Core>
 
 #include "core/api/chunk_check.h"
 #include "core/cloud/cloud_slice.h"
 #include "core/codec/point_codec.h"
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "core/storage/storage.h"
 
 namespace strata {
@@ -141,7 +141,7 @@ void ScanIntake::SealPiece() {
 }
 
 absl::Status ScanIntake::StagePieces(const Stop& stop) {
-  touched_ = absl::Now();
+  touched_ = SteadyNow();
   const UnfinishedUpload unfinished = Unfinished();
   const auto put = [&, this](StorageWriter& writer) ABSL_NO_THREAD_SAFETY_ANALYSIS -> absl::Status {
     for (std::size_t i = 0; i < pieces_.size(); ++i) {

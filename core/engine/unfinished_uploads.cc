@@ -8,9 +8,10 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "absl/time/clock.h"
+#include "absl/time/time.h"
 
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "core/storage/storage.h"
 
 namespace strata {
@@ -18,15 +19,15 @@ namespace strata {
 absl::StatusOr<std::unique_ptr<UnfinishedUploads>> UnfinishedUploads::Open(MapCore& core) {
   auto uploads = std::unique_ptr<UnfinishedUploads>(new UnfinishedUploads(core));
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-  STRATA_ASSIGN_OR_RETURN(const std::vector<UnfinishedUpload> found,
-                          reader->ListUnfinishedUploads());
+  STRATA_ASSIGN_OR_RETURN(std::vector<UnfinishedUpload> found, reader->ListUnfinishedUploads());
   std::vector<std::uint64_t> stale;
   {
     absl::MutexLock lock(&uploads->mutex_);
-    for (const UnfinishedUpload& upload : found) {
+    for (UnfinishedUpload& upload : found) {
+      upload.touched = std::min(upload.touched, SteadyNow());  // the clock may have been set back
       uploads->parked_.insert_or_assign({upload.id, upload.content_hash}, upload);
     }
-    stale = uploads->TakeStale(absl::Now());
+    stale = uploads->TakeStale(SteadyNow());
   }
   uploads->Abandon(stale);
   return uploads;
@@ -38,7 +39,7 @@ std::shared_ptr<ScanIntake> UnfinishedUploads::Find(const ScanHeader& header) {
   std::shared_ptr<ScanIntake> found;
   {
     absl::MutexLock lock(&mutex_);
-    stale = TakeStale(absl::Now());
+    stale = TakeStale(SteadyNow());
     found = FindAnnounced({header.id, header.content_hash});
   }
   Abandon(stale);
@@ -67,7 +68,7 @@ void UnfinishedUploads::Release(std::shared_ptr<ScanIntake> intake, std::uint64_
     const Key key{rest->id, rest->content_hash};
     active_.erase(key);
     parked_.insert_or_assign(key, *rest);
-    stale = TakeStale(absl::Now());
+    stale = TakeStale(SteadyNow());
   }
   Abandon(stale);
 }

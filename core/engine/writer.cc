@@ -5,10 +5,10 @@
 
 #include "absl/status/status.h"
 #include "absl/synchronization/mutex.h"
-#include "absl/time/clock.h"
 #include "absl/time/time.h"
 
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "core/common/stop.h"
 #include "core/common/this_thread.h"
 #include "core/storage/storage.h"
@@ -97,12 +97,12 @@ void WriterThread::Loop() {
       batch = TakeBatch(durability);
       if (batch.empty()) return;
     }
-    const absl::Time begun = absl::Now();
+    const absl::Time begun = SteadyNow();
     CommitBatch(durability, batch);
     absl::MutexLock lock(&mutex_);
     ++numbers_.commits;
     numbers_.parts += batch.size();
-    numbers_.time += absl::Now() - begun;
+    numbers_.time += SteadyNow() - begun;
     for (Task* task : batch) {
       queued_bytes_ -= task->bytes;
       task->done = true;

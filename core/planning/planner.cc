@@ -9,10 +9,10 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
-#include "absl/time/clock.h"
 #include "absl/time/time.h"
 
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "core/common/stop.h"
 #include "core/planning/class_factors.h"
 #include "core/planning/endpoint.h"
@@ -130,7 +130,7 @@ Planner::Planner(const PlannerOptions& options) : options_(options), cache_(opti
 absl::StatusOr<PlanResult> Planner::Plan(TileSource& source,
                                          const PlanQuery& query,
                                          const Stop& stop) {
-  const absl::Time begin = absl::Now();
+  const absl::Time begin = SteadyNow();
   STRATA_RETURN_IF_ERROR(stop.status());
   STRATA_RETURN_IF_ERROR(ValidateEndpoint("from", query.from, options_.cell_size_m));
   STRATA_RETURN_IF_ERROR(ValidateEndpoint("to", query.to, options_.cell_size_m));
@@ -141,7 +141,7 @@ absl::StatusOr<PlanResult> Planner::Plan(TileSource& source,
   WorkspaceLoan loan(*this);
   SearchSpace space(cache_, source, checks, ClassFactors(query.class_costs));
   absl::StatusOr<PlanResult> result = Answer(space, query, landmarks.get(), loan.workspace(), stop);
-  if (result.ok()) result->elapsed_ms = absl::ToDoubleMilliseconds(absl::Now() - begin);
+  if (result.ok()) result->elapsed_ms = absl::ToDoubleMilliseconds(SteadyNow() - begin);
   return result;
 }
 

@@ -4,12 +4,12 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "absl/time/clock.h"
 #include <glog/logging.h>
 #include <sys/stat.h>
 
 #include "core/common/log_line.h"
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "server/access/token_file.h"
 
 namespace strata::server {
@@ -30,7 +30,7 @@ GrantTable::Mark GrantTable::MarkOf(const std::filesystem::path& path) {
 }
 
 absl::Status GrantTable::Load() {
-  looked_ = absl::Now();
+  looked_ = SteadyNow();
   mark_ = MarkOf(path_);  // before reading: what changes meanwhile is read again
   STRATA_ASSIGN_OR_RETURN(std::vector<Grant> list, ReadTokenFile(path_));
   auto grants = std::make_shared<Grants>();
@@ -44,10 +44,9 @@ absl::Status GrantTable::Load() {
 
 std::shared_ptr<const Grants> GrantTable::Current() {
   absl::MutexLock lock(&mutex_);
-  // A clock that was set back must not keep a revoked token alive.
-  const absl::Duration since = absl::AbsDuration(absl::Now() - looked_);
+  const absl::Duration since = SteadyNow() - looked_;
   if (since < interval_) return grants_;
-  looked_ = absl::Now();
+  looked_ = SteadyNow();
   if (MarkOf(path_) == mark_) return grants_;
   const absl::Status loaded = Load();
   if (loaded.ok()) {

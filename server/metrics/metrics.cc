@@ -6,12 +6,12 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
 #include <prometheus/exposer.h>
 #include <unistd.h>
 
 #include "core/common/host_port.h"
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 
 namespace strata::server {
 namespace {
@@ -141,7 +141,7 @@ void AddProcess(MetricFamilies& families, absl::Time started) {
             kGauge,
             "strata_uptime_seconds",
             "Since the server began to listen",
-            {{{}, absl::ToDoubleSeconds(absl::Now() - started)}});
+            {{{}, absl::ToDoubleSeconds(SteadyNow() - started)}});
   AddFamily(families,
             kGauge,
             "strata_resident_bytes",

@@ -8,11 +8,11 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
 #include <glog/logging.h>
 #include <grpcpp/server_context.h>
 
 #include "core/common/log_line.h"
+#include "core/common/steady_time.h"
 #include "server/access/method_rights.h"
 
 namespace strata::server {
@@ -45,8 +45,9 @@ std::string RequestIdOf(const grpc::CallbackServerContext& context) {
 
 absl::Time DeadlineOf(const grpc::CallbackServerContext& context) {
   const std::chrono::system_clock::time_point deadline = context.deadline();
-  return deadline == std::chrono::system_clock::time_point::max() ? absl::InfiniteFuture()
-                                                                  : absl::FromChrono(deadline);
+  return deadline == std::chrono::system_clock::time_point::max()
+             ? absl::InfiniteFuture()
+             : SteadyNow() + absl::FromChrono(deadline - std::chrono::system_clock::now());
 }
 
 // gRPC's name of a peer without its port: a client that comes by many connections is one.
@@ -74,7 +75,7 @@ Request::Request(Runtime& runtime,
       kind_(kind),
       method_(method),
       peer_(context.peer()),
-      started_(absl::Now()) {
+      started_(SteadyNow()) {
   call_.stop = Stop(DeadlineOf(context));
   call_.request_id = RequestIdOf(context);
   context.AddInitialMetadata(kRequestIdKey, call_.request_id);
@@ -140,7 +141,7 @@ absl::Status Request::StillAllowed() {
 
 grpc::Status Request::Close(const absl::Status& status) {
   End();
-  const absl::Duration duration = absl::Now() - started_;
+  const absl::Duration duration = SteadyNow() - started_;
   const std::optional<v1::ErrorDetail> detail = translate::DetailOf(status);
   runtime_.metrics.Ended(method_,
                          status.code(),

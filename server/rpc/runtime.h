@@ -9,9 +9,11 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/string_view.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
 #include "absl/time/time.h"
 
 #include "core/api/database.h"
+#include "core/common/steady_time.h"
 #include "server/access/access.h"
 #include "server/metrics/metrics.h"
 #include "server/rpc/client_limits.h"
@@ -62,10 +64,13 @@ class CallGate {
     --here_;
   }
   // Returns when all have left, or after `timeout`.
-  void AwaitEmpty(absl::Duration timeout) {
-    const auto empty = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return here_ == 0; };
-    absl::MutexLock lock(&mutex_);
-    mutex_.AwaitWithTimeout(absl::Condition(&empty), timeout);
+  void AwaitEmpty(absl::Duration timeout) const {
+    const absl::Time until = SteadyNow() + timeout;
+    const auto empty = [this] {
+      absl::MutexLock lock(&mutex_);
+      return here_ == 0;
+    };
+    while (!empty() && SteadyNow() < until) absl::SleepFor(absl::Milliseconds(5));
   }
 
  private:

@@ -5,10 +5,17 @@
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 
+#include "core/common/steady_time.h"
 #include "core/common/this_thread.h"
 #include "proto/translate/status.h"
 
 namespace strata::server {
+namespace {
+
+// How soon the watch itself ends.
+constexpr absl::Duration kSlice = absl::Milliseconds(50);
+
+}  // namespace
 
 SilenceWatch::SilenceWatch(absl::Duration limit, Executor& executor)
     : limit_(limit), executor_(executor), thread_([this] { Loop(); }) {}
@@ -25,12 +32,20 @@ void SilenceWatch::Loop() {
   NameThisThread("silence");
   // A stream ends at most a quarter late.
   const absl::Duration interval = std::clamp(limit_ / 4, absl::Milliseconds(10), absl::Seconds(5));
-  absl::MutexLock lock(&mutex_);
-  while (!mutex_.AwaitWithTimeout(absl::Condition(&closing_), interval)) EndSilent();
+  absl::Time next = SteadyNow() + interval;
+  while (true) {
+    // AwaitWithTimeout would wait as long as a clock is set back.
+    absl::SleepFor(std::min(interval, kSlice));
+    absl::MutexLock lock(&mutex_);
+    if (closing_) return;
+    if (SteadyNow() < next) continue;
+    EndSilent();
+    next = SteadyNow() + interval;
+  }
 }
 
 void SilenceWatch::EndSilent() {
-  const absl::Time now = absl::Now();
+  const absl::Time now = SteadyNow();
   for (auto it = waiting_.begin(); it != waiting_.end();) {
     ExpectedMessage* stream = *it;
     if (now - stream->since_ < limit_) {
@@ -55,7 +70,7 @@ ExpectedMessage::~ExpectedMessage() {
 
 void ExpectedMessage::Expect() {
   absl::MutexLock lock(&watch_.mutex_);
-  since_ = absl::Now();
+  since_ = SteadyNow();
   watch_.waiting_.insert(this);
 }
 

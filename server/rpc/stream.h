@@ -12,6 +12,7 @@
 
 #include "core/api/call.h"
 #include "core/api/database.h"
+#include "core/common/steady_time.h"
 #include "server/rpc/request.h"
 #include "server/rpc/runtime.h"
 
@@ -64,7 +65,12 @@ class StreamReactor final : public grpc::ServerWriteReactor<Out> {
     this->StartWrite(&message);
     absl::MutexLock lock(&mutex_);
     const auto sent = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return !sending_; };
-    if (!mutex_.AwaitWithTimeout(absl::Condition(&sent), runtime_.options.slow_reader_timeout)) {
+    const absl::Time until = SteadyNow() + runtime_.options.slow_reader_timeout;
+    // A clock that is set forward ends a wait early.
+    while (!mutex_.AwaitWithTimeout(absl::Condition(&sent), until - SteadyNow()) &&
+           SteadyNow() < until) {
+    }
+    if (sending_) {
       // gRPC reads `message` until the write ends, and only the end of the call ends it now.
       context_.TryCancel();
       mutex_.Await(absl::Condition(&sent));

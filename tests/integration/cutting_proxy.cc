@@ -42,7 +42,7 @@ bool SendAll(int socket, const char* bytes, std::size_t size) {
 
 }  // namespace
 
-CuttingProxy::CuttingProxy(const std::string& server, std::function<std::uint64_t()> allowance)
+CuttingProxy::CuttingProxy(const std::string& server, std::function<Allowance()> allowance)
     : server_port_(PortOf(server)),
       allowance_(std::move(allowance)),
       listener_(::socket(AF_INET, SOCK_STREAM, 0)) {
@@ -79,7 +79,8 @@ void CuttingProxy::Loop() {
 }
 
 void CuttingProxy::Pass(int client, int server) {
-  std::uint64_t left = allowance_();
+  Allowance left = allowance_();
+  std::string answers;
   std::array<char, 16384> buffer{};
   auto cut_at = std::chrono::steady_clock::time_point::max();
   while (!ending_) {
@@ -87,22 +88,44 @@ void CuttingProxy::Pass(int client, int server) {
       ++cuts_;
       return;
     }
-    std::array<pollfd, 2> ends = {{{left == 0 ? -1 : client, POLLIN, 0}, {server, POLLIN, 0}}};
+    std::array<pollfd, 2> ends = {
+        {{left.bytes == 0 ? -1 : client, POLLIN, 0}, {server, POLLIN, 0}}};
     if (::poll(ends.data(), ends.size(), 20) <= 0) continue;
     if (ends[1].revents != 0) {
       const ssize_t size = ::recv(server, buffer.data(), buffer.size(), 0);
-      if (size <= 0 || !SendAll(client, buffer.data(), static_cast<std::size_t>(size))) return;
+      if (size <= 0) return;
+      answers.append(buffer.data(), static_cast<std::size_t>(size));
+      if (!PassAnswers(client, answers, left)) {
+        ++cuts_;
+        return;
+      }
     }
     if (ends[0].revents != 0) {
       const std::size_t most =
-          static_cast<std::size_t>(std::min<std::uint64_t>(left, buffer.size()));
+          static_cast<std::size_t>(std::min<std::uint64_t>(left.bytes, buffer.size()));
       const ssize_t size = ::recv(client, buffer.data(), most, 0);
       if (size <= 0 || !SendAll(server, buffer.data(), static_cast<std::size_t>(size))) return;
       bytes_ += static_cast<std::uint64_t>(size);
-      left -= static_cast<std::uint64_t>(size);
-      if (left == 0) cut_at = std::chrono::steady_clock::now() + kStall;
+      left.bytes -= static_cast<std::uint64_t>(size);
+      if (left.bytes == 0) cut_at = std::chrono::steady_clock::now() + kStall;
     }
   }
+}
+
+bool CuttingProxy::PassAnswers(int client, std::string& answers, Allowance& left) {
+  constexpr std::size_t kFrameHeader = 9;  // RFC 9113, 4.1; its first three bytes are the length
+  while (answers.size() >= kFrameHeader) {
+    std::size_t size = kFrameHeader;
+    for (int i = 0; i < 3; ++i) {
+      size += static_cast<std::size_t>(static_cast<unsigned char>(answers[i])) << (16 - 8 * i);
+    }
+    if (answers.size() < size) break;
+    if (left.answer_frames == 0) return false;
+    --left.answer_frames;
+    if (!SendAll(client, answers.data(), size)) return false;
+    answers.erase(0, size);
+  }
+  return true;
 }
 
 }  // namespace strata::testing

@@ -1,24 +1,21 @@
 // Uploads whose way breaks, whose server dies or whose sender dies arrive once and whole.
 #include <algorithm>
-#include <atomic>
 #include <csignal>
 #include <cstdint>
 #include <iostream>
 #include <memory>
 #include <random>
 #include <string>
-#include <thread>
 
-#include "absl/strings/numbers.h"
-#include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "client/sdk/client.h"
-#include "client/sdk/spool.h"
 #include "core/cloud/cloud_slice.h"
 #include "core/common/status.h"
+#include "tests/integration/campaign_scans.h"
+#include "tests/integration/campaign_world.h"
 #include "tests/integration/cutting_proxy.h"
 #include "tests/integration/numbered_scans.h"
 #include "tests/integration/stratad_process.h"
@@ -40,7 +37,7 @@ class ExactlyOnceTest : public ::testing::Test {
     return std::make_unique<StratadProcess>(std::vector<std::string>{
         "--data", (directory_.path() / "maps").string(), "--listen", listen});
   }
-  static std::unique_ptr<api::Database> ConnectTo(const std::string& address) {
+  static std::unique_ptr<api::Database> ConnectPatiently(const std::string& address) {
     ClientOptions options;
     options.target = address;
     options.backoff.initial = absl::Milliseconds(20);
@@ -71,15 +68,16 @@ class ExactlyOnceTest : public ::testing::Test {
 
 TEST_F(ExactlyOnceTest, AScanArrivesOverAWayThatBreaksInEveryChunk) {
   const auto process = Start();
-  const auto direct = ConnectTo(process->Address());
+  const auto direct = ConnectPatiently(process->Address());
   STRATA_ASSERT_OK(direct->maps().Create({}, kMap, {}));
   constexpr std::size_t kPoints = 10 * kChunk;
   std::mt19937_64 random(kSeed);
   // Somewhere in the second chunk of each connection.
-  CuttingProxy proxy(process->Address(),
-                     [&] { return kChunkBytes + kChunkBytes / 4 + random() % (kChunkBytes / 2); });
+  CuttingProxy proxy(process->Address(), [&]() -> CuttingProxy::Allowance {
+    return {.bytes = kChunkBytes + kChunkBytes / 4 + random() % (kChunkBytes / 2)};
+  });
   const PointCloud cloud = NumberedCloud(1, kPoints);
-  const auto db = ConnectTo(proxy.address());
+  const auto db = ConnectPatiently(proxy.address());
   STRATA_ASSERT_OK_AND_ASSIGN(const auto upload,
                               db->scans().Upload({}, kMap, NumberedHeader(1, cloud)));
   STRATA_ASSERT_OK(WriteUpTo(*upload, cloud, kPoints));
@@ -92,7 +90,7 @@ TEST_F(ExactlyOnceTest, AScanArrivesOverAWayThatBreaksInEveryChunk) {
 TEST_F(ExactlyOnceTest, AScanGoesOnAfterItsServerWasKilled) {
   auto process = Start();
   const std::string address = process->Address();
-  const auto db = ConnectTo(address);
+  const auto db = ConnectPatiently(address);
   STRATA_ASSERT_OK(db->maps().Create({}, kMap, {}));
   constexpr std::size_t kPoints = 600'000;
   const PointCloud cloud = NumberedCloud(1, kPoints);
@@ -120,7 +118,7 @@ TEST_F(ExactlyOnceTest, AScanGoesOnAfterItsServerWasKilled) {
 TEST_F(ExactlyOnceTest, TheUploadItselfOutlivesItsServer) {
   auto process = Start();
   const std::string address = process->Address();
-  const auto db = ConnectTo(address);
+  const auto db = ConnectPatiently(address);
   STRATA_ASSERT_OK(db->maps().Create({}, kMap, {}));
   constexpr std::size_t kPoints = 400'000;
   const PointCloud cloud = NumberedCloud(1, kPoints);
@@ -140,50 +138,25 @@ TEST_F(ExactlyOnceTest, TheUploadItselfOutlivesItsServer) {
 }
 
 TEST_F(ExactlyOnceTest, ARobotThatIsKilledLosesNoScanOfItsSpool) {
-  const auto process = Start();
-  const auto db = ConnectTo(process->Address());
-  STRATA_ASSERT_OK(db->maps().Create({}, kMap, {}));
-  constexpr std::uint64_t kScans = 30;
-  constexpr std::size_t kPoints = 50'000;
+  CampaignOptions options;
+  options.folder = directory_.path();
+  options.robots = 1;
+  options.period_ms = 0;
+  CampaignWorld world(options);
+  world.StartRobots();
   std::mt19937_64 random(kSeed);
-  std::uint64_t added = 0;
-  int kills = 0;
-  while (true) {
-    ChildProcess robot(STRATA_SPOOL_ROBOT,
-                       {(directory_.path() / "spool").string(),
-                        process->Address(),
-                        absl::StrCat(added + 1),
-                        absl::StrCat(kScans),
-                        absl::StrCat(kPoints)});
-    // Long enough to get somewhere, too short to get through.
-    const auto life = absl::Milliseconds(60 + static_cast<int>(random() % 200));
-    std::atomic<bool> ended = false;
-    std::thread killer([&] {
-      const absl::Time until = absl::Now() + life;
-      while (!ended && absl::Now() < until) absl::SleepFor(absl::Milliseconds(1));
-      if (!ended) robot.Signal(SIGKILL);
-    });
-    for (std::string line = robot.ReadLine(); !line.empty(); line = robot.ReadLine()) {
-      ASSERT_TRUE(absl::SimpleAtoi(line, &added));
-    }
-    ended = true;  // its stdout has: it has ended, but its number is still its own
-    killer.join();
-    if (robot.Wait() == 0) break;
-    ASSERT_LT(++kills, 1000);
+  for (int kill = 0; kill < 15 || world.Acknowledged().size() < 5; ++kill) {
+    ASSERT_LT(kill, 1000);
+    absl::SleepFor(absl::Milliseconds(60 + static_cast<int>(random() % 300)));
+    world.robot(0).Kill();
   }
-  std::cout << kills << " kills\n";
-  EXPECT_GE(kills, 3);
-  std::uint64_t stored = 0;
-  STRATA_ASSERT_OK(db->scans().List({}, kMap, {}, [&](const ScanInfo& info) {
-    const std::uint64_t sequence = info.header.id.sequence;
-    EXPECT_EQ(info.content_hash,
-              NumberedHeader(sequence, NumberedCloud(sequence, kPoints)).content_hash);
-    ++stored;
-    return absl::OkStatus();
-  }));
-  EXPECT_EQ(stored, kScans);
-  STRATA_ASSERT_OK_AND_ASSIGN(const SpoolStatus left, Spool::Look(directory_.path() / "spool"));
-  EXPECT_EQ(left.waiting + left.refused + left.damaged, 0U);
+  world.RetireRobotsAndCheck();
+  EXPECT_THAT(world.violations().All(), ::testing::IsEmpty());
+  const auto stored = world.StoredHashes();
+  for (const auto& [id, hash] : stored) {
+    const PointCloud cloud = CampaignCloud(id, options.columns);
+    EXPECT_EQ(hash, CampaignHeader(id, cloud, Alignment::kOff).content_hash) << id.ToString();
+  }
 }
 
 }  // namespace

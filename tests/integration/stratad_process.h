@@ -10,7 +10,8 @@
 
 namespace strata::testing {
 
-// Runs a program with `arguments`; its stderr is the test's.
+// Runs a program with `arguments`; its stderr is the test's. It is killed when the thread that
+// started it ends.
 class ChildProcess {
  public:
   ChildProcess(const std::string& program, const std::vector<std::string>& arguments);

@@ -1,0 +1,8 @@
+find_package(CLI11 REQUIRED)
+find_package(nlohmann_json REQUIRED)
+strata_executable(
+  kill_campaign
+  kill_campaign
+  SOURCES kill_campaign.cc
+  DEPS strata::campaigns CLI11::CLI11 nlohmann_json::nlohmann_json
+)
