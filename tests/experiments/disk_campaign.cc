@@ -4,7 +4,7 @@
 //   disk_campaign --flips N [--only blob|column|anywhere|TABLE.COLUMN…] [--seed N]
 //
 // Progress on stderr, a table on stdout; 1 where a promise was broken. A disk that ignores syncs
-// must break them: the row "power, syncs ignored" has to have violations.
+// must break them: the row "syncs ignored" has to have violations.
 #include "tests/core/engine/disk_campaign.h"
 
 #include <algorithm>
@@ -60,7 +60,7 @@ std::vector<Campaign> Campaigns() {
                          return disks.CutPower(false, sweep);
                        }});
   campaigns.push_back(
-      {"power, syncs ignored",
+      {"syncs ignored",
        [](const DiskCampaign& disks, const Sweep& sweep) { return disks.CutPower(true, sweep); },
        true});
   return campaigns;

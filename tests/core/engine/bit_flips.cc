@@ -197,7 +197,8 @@ WorldState Survey(api::Database& database) {
   const absl::Status before =
       database.tiles().Fetch({}, kHistoryMap, area, {}, [&](const api::TileUpdate& update) {
         state[absl::StrCat("first epoch, tile ", update.tile.key.ToString())] =
-            absl::StrCat(update.tile.bytes.size());
+            update.kind == api::TileUpdate::Kind::kDamaged ? "DATA_LOSS: damaged"
+                                                           : absl::StrCat(update.tile.bytes.size());
         return absl::OkStatus();
       });
   if (!before.ok()) state["first epoch"] = before.ToString();
