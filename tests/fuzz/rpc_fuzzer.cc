@@ -32,10 +32,8 @@ class World {
  public:
   World() {
     FLAGS_minloglevel = google::GLOG_ERROR;
-    database_ = OpenEngine({.directory = directory_.path(),
-                            .cache_bytes = std::size_t{8} << 20,
-                            .planner_cache_bytes = std::size_t{8} << 20})
-                    .value();
+    database_ =
+        OpenEngine({.directory = directory_.path(), .cache_bytes = std::size_t{16} << 20}).value();
     Require(database_->maps().Create({}, "world", testing::SmallMap()).ok(), "a map is made");
     for (std::uint64_t i = 1; i <= 3; ++i) {
       const PointCloud cloud = testing::MakeRoom(i, 500);
