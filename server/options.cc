@@ -21,7 +21,6 @@ struct Written {
   double max_message_mib = 4.0;
   std::uint64_t queue_mib = 64;
   std::uint64_t cache_mib = 256;
-  std::uint64_t planner_cache_mib = 512;
   std::uint64_t max_map_mib = 0;
   EngineOptions engine;
   ServerOptions server;
@@ -191,13 +190,7 @@ void AddMapLimits(CLI::App& app, Written& o) {
       kGroup,
       "--cache",
       o.cache_mib,
-      "Tiles, and features, kept in memory, each, a map [MiB]",
-      mebi);
-  Add(app,
-      kGroup,
-      "--planner-cache",
-      o.planner_cache_mib,
-      "What the planner keeps of a map between queries [MiB]",
+      "What is kept in memory of all maps together: tiles, features, what planning prepares [MiB]",
       mebi);
   Add(app,
       kGroup,
@@ -224,7 +217,6 @@ absl::StatusOr<ProgramOptions> Read(const Written& o) {
   options.engine.directory = o.data;
   options.engine.queue_bytes = o.queue_mib * kMebi;
   options.engine.cache_bytes = o.cache_mib * kMebi;
-  options.engine.planner_cache_bytes = o.planner_cache_mib * kMebi;
   options.engine.max_map_bytes = o.max_map_mib * kMebi;
   options.engine.optimize_interval = absl::Seconds(o.optimize_every_s);
   options.engine.upload_keep = absl::Seconds(o.upload_keep_s);

@@ -75,8 +75,9 @@ class Scans {
  public:
   virtual ~Scans() = default;
 
-  // Begins an upload. The header is checked here: INVALID_ARGUMENT; RESOURCE_EXHAUSTED beyond the
-  // limits; ALREADY_EXISTS if the scan is there with another content_hash than announced.
+  // Begins an upload. The header is checked here: INVALID_ARGUMENT, for more points than the server
+  // takes of a scan too; RESOURCE_EXHAUSTED where too much waits already; ALREADY_EXISTS if the
+  // scan is there with another content_hash than announced.
   virtual absl::StatusOr<std::unique_ptr<ScanUpload>> Upload(const Call& call,
                                                              absl::string_view map,
                                                              const ScanHeader& header) = 0;

@@ -12,7 +12,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "core/engine/lru_cache.h"
+#include "core/common/lru_cache.h"
 #include "core/engine/scan_source.h"
 #include "core/mls/mls_map.h"
 #include "core/registration/mls_registration.h"
@@ -39,7 +39,7 @@ struct Placement {
 // integrated before and on nothing else, so not on how scans were batched.
 class Aligner {
  public:
-  explicit Aligner(std::size_t cache_bytes) : features_(cache_bytes) {}
+  explicit Aligner(const std::shared_ptr<CacheBudget>& caches) : features_(caches) {}
 
   // Forgets everything and reads the integrated scans of `epoch`.
   absl::Status Load(StorageReader& reader, std::uint64_t epoch);
@@ -84,7 +84,7 @@ class Aligner {
   std::vector<PlacedEntry> scans_;
   std::vector<Pose> poses_;  // T_map_scan, beside scans_
   std::map<std::string, std::map<std::uint64_t, std::size_t>> trajectories_;  // index into scans_
-  LruCache<ScanNumber, ScanFeatures> features_;
+  LruCache<ScanNumber, const ScanFeatures> features_;
 };
 
 }  // namespace strata

@@ -24,11 +24,9 @@ struct EngineOptions {
   std::uint64_t max_pending_scans = 100'000;
   // Bytes of points of a map that may wait for the disk; uploads block beyond it. In [1 MiB, …).
   std::size_t queue_bytes = std::size_t{64} << 20;
-  // Decoded tiles and scan features kept in memory, each, a map; and an eighth of it for tiles as
-  // they are served.
+  // What is kept in memory of all maps together: tiles, features of scans, what planning prepares
+  // and the searches under way.
   std::size_t cache_bytes = std::size_t{256} << 20;
-  // What the planner keeps of a map between queries.
-  std::size_t planner_cache_bytes = std::size_t{512} << 20;
   // Maps there may be; one more is refused with RESOURCE_EXHAUSTED.
   std::uint64_t max_maps = 10'000;
   // Largest size of a map's file; 0: none.

@@ -1,7 +1,9 @@
 #include "core/engine/integrator.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <utility>
@@ -22,6 +24,25 @@ namespace strata {
 namespace {
 
 constexpr std::uint64_t kBatchPoints = 8'000'000;
+// Tiles of a batch, beyond which no scan joins it: they are in memory until it is committed.
+constexpr std::size_t kBatchBytes = std::size_t{96} << 20;
+
+std::size_t MemoryBytes(const MlsTileMap& tiles) {
+  std::size_t bytes = 0;
+  for (const auto& [key, tile] : tiles) bytes += tile == nullptr ? 0 : MemoryBytes(*tile);
+  return bytes;
+}
+
+// Joins the tiles one by one, so that none is in memory twice for long.
+void JoinAndForget(MlsMap contribution, MlsTileMap& tiles) {
+  for (MlsTile& tile : contribution.tiles) {
+    MlsMap part;
+    part.parameters = contribution.parameters;
+    part.tiles.push_back(std::move(tile));
+    JoinContribution(
+        part, [](const TileKey&) { return true; }, tiles);
+  }
+}
 
 // Errors that a scan's own bytes cause; others concern the store and may go away.
 bool IsFaultOfScan(const absl::Status& status) {
@@ -80,7 +101,13 @@ absl::Status Integrator::MakeServed(StorageReader& reader, TileChange& change, b
   for (const auto& [key, tile] : change.tiles) changed.insert(key);
   // A tile's annotation looks beyond its border, at heights only.
   if (geometry) changed = WithNeighbours(changed);
-  STRATA_ASSIGN_OR_RETURN(change.surfaces, maker.MakeBase(changed, Stop()));
+  for (const absl::btree_set<TileKey>& block : TileBlocks(changed)) {
+    STRATA_ASSIGN_OR_RETURN(SurfaceTileMaker::Rows rows, maker.MakeBase(block, Stop()));
+    std::move(rows.begin(), rows.end(), std::back_inserter(change.surfaces));
+  }
+  std::sort(change.surfaces.begin(),
+            change.surfaces.end(),
+            [](const SurfaceTileRow& a, const SurfaceTileRow& b) { return a.key < b.key; });
   const SurfaceTileMaker::Rows base = change.surfaces;
   return maker.MakePyramid(base, change.surfaces, Stop());
 }
@@ -120,11 +147,13 @@ absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
   done.scan = scan;
   const MapParameters parameters = core_.info().parameters;
   const SensorModel sensor = scan.header.sensor.value_or(parameters.sensor);
-  STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
-  STRATA_RETURN_IF_ERROR(CheckContributes(local_map, source.dropped(), scan.header, sensor));
-  STRATA_ASSIGN_OR_RETURN(done.placement, aligner_.Place(scan, local_map, reader, source));
-  if (!parameters.keep_points) done.local_map = EncodeLocalMap(local_map);
-  STRATA_ASSIGN_OR_RETURN(const MlsMap contribution,
+  {
+    STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
+    STRATA_RETURN_IF_ERROR(CheckContributes(local_map, source.dropped(), scan.header, sensor));
+    STRATA_ASSIGN_OR_RETURN(done.placement, aligner_.Place(scan, local_map, reader, source));
+    if (!parameters.keep_points) done.local_map = EncodeLocalMap(local_map);
+  }
+  STRATA_ASSIGN_OR_RETURN(MlsMap contribution,
                           source.Contribution(scan, done.placement.T_map_scan));
   STRATA_RETURN_IF_ERROR(CheckContributes(contribution, source.dropped(), scan.header, sensor));
   done.losses = DescribeLosses(source.dropped(), scan.header, sensor);
@@ -136,8 +165,7 @@ absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
     STRATA_ASSIGN_OR_RETURN(MlsTilePtr held, store_.Load(reader, tile.key, version));
     tiles[tile.key] = std::move(held);
   }
-  JoinContribution(
-      contribution, [](const TileKey&) { return true; }, tiles);
+  JoinAndForget(std::move(contribution), tiles);
   aligner_.Add(scan, done.placement.T_map_scan);
   batch.integrated.push_back(std::move(done));
   return absl::OkStatus();
@@ -153,16 +181,19 @@ absl::StatusOr<int> Integrator::IntegrateBatch() {
   if (pending.empty()) return 0;
   STRATA_RETURN_IF_ERROR(LoadAlignerOnce(*reader));
   const MapParameters parameters = core_.info().parameters;
-  ScanSource source(*reader, parameters);
+  std::optional<ScanSource> source(std::in_place, *reader, parameters);
   TileChange change;
   Batch batch;
   std::uint64_t points = 0;
   int count = 0;
   for (const PosedScan& posed : pending) {
-    if (count > 0 && points + posed.scan.header.point_count > kBatchPoints) break;
+    if (count > 0 && (points + posed.scan.header.point_count > kBatchPoints ||
+                      MemoryBytes(change.tiles) > kBatchBytes)) {
+      break;
+    }
     points += posed.scan.header.point_count;
     ++count;
-    const absl::Status done = IntegrateScan(posed.scan, *reader, source, change.tiles, batch);
+    const absl::Status done = IntegrateScan(posed.scan, *reader, *source, change.tiles, batch);
     if (done.ok()) continue;
     if (!IsFaultOfScan(done)) {
       aligner_loaded_ = false;
@@ -170,6 +201,7 @@ absl::StatusOr<int> Integrator::IntegrateBatch() {
     }
     batch.failed.push_back({posed.scan.number, posed.scan.header.id, std::string(done.message())});
   }
+  source.reset();  // its memory
   STRATA_ASSIGN_OR_RETURN(change.version, ReserveVersion());
   absl::Status made = MakeServed(*reader, change);
   if (made.ok()) made = CommitBatch(batch, change);

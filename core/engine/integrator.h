@@ -36,8 +36,7 @@ struct TileChange {
 // One thread at a time: the worker's.
 class Integrator {
  public:
-  explicit Integrator(MapCore& core)
-      : core_(core), aligner_(core.options().cache_bytes), store_(core) {}
+  explicit Integrator(MapCore& core) : core_(core), aligner_(core.caches()), store_(core) {}
 
   // Integrates pending scans in commit order, as many as make a good transaction; returns how many
   // (0: none is left). A scan that cannot be integrated is marked failed and counted; an error is

@@ -15,9 +15,10 @@ namespace strata {
 
 absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
                                                const std::filesystem::path& file,
-                                               const EngineOptions& options) {
+                                               const EngineOptions& options,
+                                               std::shared_ptr<CacheBudget> caches) {
   std::shared_ptr<Map> map(new Map());
-  STRATA_ASSIGN_OR_RETURN(map->core_, MapCore::Open(name, file, options));
+  STRATA_ASSIGN_OR_RETURN(map->core_, MapCore::Open(name, file, options, std::move(caches)));
   STRATA_ASSIGN_OR_RETURN(map->jobs_, JobBoard::Open(*map->core_));
   STRATA_ASSIGN_OR_RETURN(map->uploads_, UnfinishedUploads::Open(*map->core_));
   std::uint64_t pending = 0;

@@ -26,7 +26,8 @@ class Map {
  public:
   static absl::StatusOr<std::shared_ptr<Map>> Open(const std::string& name,
                                                    const std::filesystem::path& file,
-                                                   const EngineOptions& options);
+                                                   const EngineOptions& options,
+                                                   std::shared_ptr<CacheBudget> caches);
   ~Map() { Close(); }
 
   MapCore& core() { return *core_; }

@@ -31,7 +31,8 @@ absl::Status ClearLeftovers(StorageWriter& writer) {
 
 absl::StatusOr<std::unique_ptr<MapCore>> MapCore::Open(const std::string& name,
                                                        const std::filesystem::path& file,
-                                                       const EngineOptions& options) {
+                                                       const EngineOptions& options,
+                                                       std::shared_ptr<CacheBudget> caches) {
   STRATA_ASSIGN_OR_RETURN(
       std::unique_ptr<MapStorage> storage,
       OpenSqliteStorage(file, SqliteOptions{.max_file_bytes = options.max_map_bytes}));
@@ -41,18 +42,20 @@ absl::StatusOr<std::unique_ptr<MapCore>> MapCore::Open(const std::string& name,
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t last_upload, writer.reader().LastUpload());
   info.name = name;
-  return std::unique_ptr<MapCore>(
-      new MapCore(name, options, std::move(storage), std::move(info), clock, last_upload));
+  return std::unique_ptr<MapCore>(new MapCore(
+      name, options, std::move(caches), std::move(storage), std::move(info), clock, last_upload));
 }
 
 MapCore::MapCore(std::string name,
                  const EngineOptions& options,
+                 std::shared_ptr<CacheBudget> caches,
                  std::unique_ptr<MapStorage> storage,
                  MapInfo info,
                  const MapClock& clock,
                  std::uint64_t last_upload)
     : name_(std::move(name)),
       options_(options),
+      caches_(std::move(caches)),
       info_(std::move(info)),
       storage_(std::move(storage)),
       snapshots_({clock.epoch, clock.tile_version}),

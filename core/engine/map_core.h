@@ -15,6 +15,7 @@
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 
+#include "core/common/cache_budget.h"
 #include "core/engine/change_log.h"
 #include "core/engine/engine.h"
 #include "core/engine/reader_pool.h"
@@ -28,14 +29,16 @@ namespace strata {
 // Thread-safe.
 class MapCore {
  public:
-  // Opens the file and clears what a crash left half-done in it.
+  // Opens the file and clears what a crash left half-done in it. `caches`: of all maps.
   static absl::StatusOr<std::unique_ptr<MapCore>> Open(const std::string& name,
                                                        const std::filesystem::path& file,
-                                                       const EngineOptions& options);
+                                                       const EngineOptions& options,
+                                                       std::shared_ptr<CacheBudget> caches);
   ~MapCore() { Close(); }
 
   const std::string& name() const { return name_; }
   const EngineOptions& options() const { return options_; }
+  const std::shared_ptr<CacheBudget>& caches() const { return caches_; }
   MapInfo info() const;
   void set_default_profile(const RobotProfile& profile);
 
@@ -59,6 +62,7 @@ class MapCore {
  private:
   MapCore(std::string name,
           const EngineOptions& options,
+          std::shared_ptr<CacheBudget> caches,
           std::unique_ptr<MapStorage> storage,
           MapInfo info,
           const MapClock& clock,
@@ -66,6 +70,7 @@ class MapCore {
 
   const std::string name_;
   const EngineOptions options_;
+  const std::shared_ptr<CacheBudget> caches_;
   mutable absl::Mutex mutex_;
   MapInfo info_ ABSL_GUARDED_BY(mutex_);
   std::unique_ptr<MapStorage> storage_;

@@ -80,9 +80,8 @@ class MapPlanner::Source final : public TileSource {
 
 MapPlanner::MapPlanner(MapCore& core)
     : core_(core),
-      planner_({.cell_size_m = core.info().parameters.mls.cell_size_m,
-                .cache_bytes = core.options().planner_cache_bytes}),
-      tiles_(core.options().cache_bytes) {}
+      planner_({.cell_size_m = core.info().parameters.mls.cell_size_m, .budget = core.caches()}),
+      tiles_(core.caches()) {}
 
 absl::StatusOr<std::shared_ptr<const MapPlanner::Versions>> MapPlanner::VersionsOf(
     const MapView& view) {
@@ -105,11 +104,8 @@ absl::StatusOr<std::shared_ptr<const MapPlanner::Versions>> MapPlanner::Versions
 
 absl::StatusOr<std::shared_ptr<const SurfaceTile>> MapPlanner::LoadTile(const TileKey& key,
                                                                         std::uint64_t version) {
-  {
-    absl::MutexLock lock(&mutex_);
-    const auto held = tiles_.Find(key);
-    if (held != nullptr && held->version == version) return held->tile;
-  }
+  const auto held = tiles_.Find(key);
+  if (held != nullptr && held->version == version) return held->tile;
   std::optional<SurfaceTileRow> row;
   {
     STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
@@ -120,7 +116,6 @@ absl::StatusOr<std::shared_ptr<const SurfaceTile>> MapPlanner::LoadTile(const Ti
   if (!decoded.ok()) return DamagedTile(key, decoded.status());
   if (decoded->key != key) return DamagedTile(key, absl::DataLossError("it is another tile"));
   auto tile = std::make_shared<const SurfaceTile>(*std::move(decoded));
-  absl::MutexLock lock(&mutex_);
   tiles_.Put(key,
              std::make_shared<const Decoded>(Decoded{version, tile}),
              sizeof(SurfaceTile) + tile->surfaces.capacity() * sizeof(Surface));

@@ -15,8 +15,8 @@
 #include "absl/synchronization/mutex.h"
 #include <Eigen/Core>
 
+#include "core/common/lru_cache.h"
 #include "core/common/stop.h"
-#include "core/engine/lru_cache.h"
 #include "core/engine/map_core.h"
 #include "core/mls/surface_tile.h"
 #include "core/planning/planner.h"
@@ -58,7 +58,7 @@ class MapPlanner {
   absl::Mutex mutex_;
   MapView versions_view_ ABSL_GUARDED_BY(mutex_);
   std::shared_ptr<const Versions> versions_ ABSL_GUARDED_BY(mutex_);
-  LruCache<TileKey, Decoded> tiles_ ABSL_GUARDED_BY(mutex_);  // of each what was asked for last
+  LruCache<TileKey, const Decoded> tiles_;  // of each what was asked for last
 };
 
 }  // namespace strata

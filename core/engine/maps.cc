@@ -109,7 +109,8 @@ absl::StatusOr<std::unique_ptr<EngineMaps>> EngineMaps::Open(const EngineOptions
 }
 
 void EngineMaps::OpenMap(const std::string& name) {
-  absl::StatusOr<std::shared_ptr<Map>> map = Map::Open(name, directory_.FileOf(name), options_);
+  absl::StatusOr<std::shared_ptr<Map>> map =
+      Map::Open(name, directory_.FileOf(name), options_, caches_);
   if (!map.ok()) {
     LOG(ERROR) << LogLine("map").Add("map", name).Add("not_opened", map.status().message());
   }

@@ -15,6 +15,7 @@
 #include "absl/synchronization/mutex.h"
 
 #include "core/api/maps.h"
+#include "core/common/cache_budget.h"
 #include "core/engine/directory.h"
 #include "core/engine/engine.h"
 #include "core/engine/map.h"
@@ -56,7 +57,9 @@ class EngineMaps final : public api::Maps {
 
  private:
   EngineMaps(const EngineOptions& options, MapDirectory directory)
-      : options_(options), directory_(std::move(directory)) {}
+      : options_(options),
+        directory_(std::move(directory)),
+        caches_(std::make_shared<CacheBudget>(options.cache_bytes)) {}
   void OpenMap(const std::string& name) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Takes the map out of the list, so that nobody finds it any more; its name stays taken.
   absl::StatusOr<std::shared_ptr<Map>> Withdraw(absl::string_view name);
@@ -65,6 +68,7 @@ class EngineMaps final : public api::Maps {
 
   const EngineOptions options_;
   const MapDirectory directory_;
+  const std::shared_ptr<CacheBudget> caches_;  // of all maps
   mutable absl::Mutex mutex_;
   std::map<std::string, absl::StatusOr<std::shared_ptr<Map>>, std::less<>> maps_
       ABSL_GUARDED_BY(mutex_);

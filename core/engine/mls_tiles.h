@@ -13,9 +13,9 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/common/lru_cache.h"
 #include "core/common/stop.h"
 #include "core/engine/damaged_scans.h"
-#include "core/engine/lru_cache.h"
 #include "core/engine/map_core.h"
 #include "core/engine/scan_labels.h"
 #include "core/mls/mls_map.h"
@@ -60,7 +60,7 @@ absl::StatusOr<MlsTileMap> MakeTiles(MapCore& core,
 // Stored tiles, decoded ones kept. One thread at a time.
 class MlsTileStore {
  public:
-  explicit MlsTileStore(MapCore& core) : core_(core), cache_(core.options().cache_bytes) {}
+  explicit MlsTileStore(MapCore& core) : core_(core), cache_(core.caches()) {}
 
   // As of `version`; nullptr where there is nothing. A damaged tile is made again from its scans.
   absl::StatusOr<MlsTilePtr> Load(StorageReader& reader, const TileKey& key, std::uint64_t version);
@@ -70,7 +70,7 @@ class MlsTileStore {
 
  private:
   MapCore& core_;
-  LruCache<TileKey, MlsTile> cache_;
+  LruCache<TileKey, const MlsTile> cache_;
 };
 
 // All integrated scans with a tile in `keys`, by number, at their poses of `epoch`; damaged rows as

@@ -1,10 +1,13 @@
 #include "core/engine/scan_source.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <utility>
 
+#include "absl/container/flat_hash_set.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -15,11 +18,15 @@
 #include "core/common/status.h"
 #include "core/mls/build.h"
 #include "core/mls/join.h"
+#include "core/mls/tile_key.h"
 
 namespace strata {
 namespace {
 
 constexpr std::size_t kBlockPoints = 1'000'000;
+// Tiles a scan may touch. An almost empty one takes some kilobytes on its way into the map, and so
+// do those around it.
+constexpr std::size_t kMaxTiles = 4'096;
 
 template <typename T>
 void AppendTo(std::vector<T>& to, const std::vector<T>& from) {
@@ -32,6 +39,40 @@ void AppendPiece(const PointCloud& piece, PointCloud& block) {
   AppendTo(block.colour, piece.colour);
   AppendTo(block.label, piece.label);
 }
+
+// Holds a scan whose points are far apart against kMaxTiles.
+class SpreadCheck {
+ public:
+  // Only a scan with so large a box is looked at point by point.
+  SpreadCheck(const ScanRecord& scan, const Pose& T_map_scan, double cell_size_m)
+      : T_map_scan_(T_map_scan),
+        tile_m_(cell_size_m * kTileCells),
+        box_tiles_((FootprintOf(scan.box_scan, T_map_scan).sizes() / tile_m_).array() + 1.0) {}
+
+  absl::Status Add(const PointCloud& block, const SensorModel& sensor) {
+    if (box_tiles_.prod() <= static_cast<double>(kMaxTiles)) return absl::OkStatus();
+    for (const Eigen::Vector3f& p : block.points) {
+      if (!((p - block.sensor_origin).norm() <= sensor.max_range_m)) continue;
+      const Eigen::Vector3d tile = (T_map_scan_ * p.cast<double>()) / tile_m_;
+      if (!(tile.cwiseAbs().maxCoeff() < kMaxCellIndex)) continue;
+      tiles_.insert({static_cast<std::int64_t>(std::floor(tile.x())),
+                     static_cast<std::int64_t>(std::floor(tile.y()))});
+    }
+    if (tiles_.size() <= kMaxTiles) return absl::OkStatus();
+    return absl::InvalidArgumentError(
+        absl::StrCat("points in more than ",
+                     kMaxTiles,
+                     " tiles of ",
+                     tile_m_,
+                     " m, the most of one scan; set the sensor's max range, or split the scan"));
+  }
+
+ private:
+  const Pose T_map_scan_;
+  const double tile_m_;
+  const Eigen::Array2d box_tiles_;
+  absl::flat_hash_set<std::pair<std::int64_t, std::int64_t>> tiles_;
+};
 
 // The points of `block` that have not faded.
 PointCloud Lasting(const PointCloud& block, const std::vector<std::uint16_t>& faded) {
@@ -58,6 +99,8 @@ absl::Status ScanSource::ForEachBlock(const ScanRecord& scan,
   const auto begin_block = [&] {
     held_ = PointCloud();
     held_.sensor_origin = scan.header.sensor_origin;
+    held_.points.reserve(
+        std::min<std::uint64_t>(scan.header.point_count, kBlockPoints + kMaxEncodedPoints));
     held_faded_.clear();
   };
   begin_block();
@@ -87,7 +130,9 @@ absl::StatusOr<MlsMap> ScanSource::Build(const ScanRecord& scan,
   MlsMap map;
   map.parameters = parameters_.mls;
   dropped_ = DroppedPoints();
+  SpreadCheck spread(scan, T_map_scan, parameters_.mls.cell_size_m);
   STRATA_RETURN_IF_ERROR(ForEachBlock(scan, [&](const PointCloud& block) -> absl::Status {
+    STRATA_RETURN_IF_ERROR(spread.Add(block, sensor));
     const bool all = faded == Faded::kWith || held_faded_.empty();
     STRATA_ASSIGN_OR_RETURN(MlsBuildResult built,
                             BuildMlsMap(all ? block : Lasting(block, held_faded_),

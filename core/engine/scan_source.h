@@ -29,7 +29,8 @@ class ScanSource {
   ScanSource(StorageReader& reader, const MapParameters& parameters, const LabelView& labels = {})
       : reader_(reader), parameters_(parameters), labels_(labels) {}
 
-  // The scan in its own frame. DATA_LOSS naming the piece that is damaged.
+  // The scan in its own frame. DATA_LOSS naming the piece that is damaged; INVALID_ARGUMENT for
+  // points so far apart that the scan would touch more than 4,096 tiles.
   absl::StatusOr<MlsMap> LocalMap(const ScanRecord& scan);
   // What the scan adds to the map at this pose, without points that have faded: a pure function of
   // the scan, what is said of its points, the pose and the map's parameters, before and after

@@ -38,10 +38,7 @@ absl::StatusOr<ScanPlanes> PlanesOf(ScanSource& source,
 }  // namespace
 
 ScanViews::ScanViews(MapCore& core, std::vector<ScanRecord> scans, DamagedScans* damaged)
-    : core_(core),
-      scans_(std::move(scans)),
-      damaged_(damaged),
-      features_(core.options().cache_bytes) {}
+    : core_(core), scans_(std::move(scans)), damaged_(damaged), features_(core.caches()) {}
 
 void ScanViews::Remember(std::size_t node, const absl::Status& status) {
   if (damaged_ == nullptr) return;
@@ -60,13 +57,11 @@ absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::MakeFeatures(
 
 absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::Features(std::size_t node) {
   {
-    absl::MutexLock lock(&mutex_);
     if (auto held = features_.Find(node); held != nullptr) return held;
   }
   auto features = MakeFeatures(scans_[node]);
   Remember(node, features.status());
   if (!features.ok()) return features;
-  absl::MutexLock lock(&mutex_);
   features_.Put(node, *features, (*features)->memory_bytes());
   return features;
 }

@@ -6,12 +6,10 @@
 #include <memory>
 #include <vector>
 
-#include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/mutex.h"
 
+#include "core/common/lru_cache.h"
 #include "core/engine/damaged_scans.h"
-#include "core/engine/lru_cache.h"
 #include "core/engine/map_core.h"
 #include "core/mls/mls_map.h"
 #include "core/posegraph/alignment.h"
@@ -21,7 +19,7 @@
 namespace strata {
 
 // Nodes are the places of scans in the list it is made with. Thread-safe. Features are kept as far
-// as they fit into EngineOptions::cache_bytes; descriptors and planes are kept in the store. Scans
+// as they fit into the caches; descriptors and planes are kept in the store. Scans
 // that answer DATA_LOSS are put into `damaged`, unless it is nullptr.
 class ScanViews final : public AlignmentSource {
  public:
@@ -45,8 +43,7 @@ class ScanViews final : public AlignmentSource {
   MapCore& core_;
   const std::vector<ScanRecord> scans_;
   DamagedScans* const damaged_;
-  absl::Mutex mutex_;
-  LruCache<std::size_t, ScanFeatures> features_ ABSL_GUARDED_BY(mutex_);
+  LruCache<std::size_t, const ScanFeatures> features_;
 };
 
 }  // namespace strata

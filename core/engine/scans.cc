@@ -116,13 +116,13 @@ absl::StatusOr<std::unique_ptr<api::ScanUpload>> EngineScans::Upload(const api::
   STRATA_RETURN_IF_ERROR(ValidateScanHeader(header));
   const std::uint64_t most = found->core().options().max_points_per_scan;
   if (header.point_count > most) {
-    return absl::ResourceExhaustedError(absl::StrCat("scan ",
-                                                     header.id.ToString(),
-                                                     ": ",
-                                                     header.point_count,
-                                                     " points; at most ",
-                                                     most,
-                                                     ", split it"));
+    return absl::InvalidArgumentError(absl::StrCat("scan ",
+                                                   header.id.ToString(),
+                                                   ": ",
+                                                   header.point_count,
+                                                   " points; at most ",
+                                                   most,
+                                                   ", split it"));
   }
   return EngineUpload::Begin(std::move(found), call, header);
 }

@@ -10,7 +10,7 @@
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 
-#include "core/engine/lru_cache.h"
+#include "core/common/lru_cache.h"
 #include "core/engine/map_core.h"
 #include "core/engine/snapshots.h"
 #include "core/mls/tile_key.h"
@@ -26,9 +26,10 @@ class ServedTiles {
   };
   using Handle = std::shared_ptr<const Tile>;
 
-  // `core` must outlive this. Keeps an eighth of EngineOptions::cache_bytes.
+  // `core` must outlive this. Keeps at most an eighth of
+  // EngineOptions::cache_bytes.
   explicit ServedTiles(MapCore& core)
-      : core_(core), known_(core.options().cache_bytes / kCacheShare) {}
+      : core_(core), known_(core.caches(), core.options().cache_bytes / kCacheShare) {}
 
   // The tile that readers of `view`, which must be pinned, get; nullptr where there is nothing.
   // DATA_LOSS if it is damaged.
@@ -48,7 +49,7 @@ class ServedTiles {
 
   MapCore& core_;
   absl::Mutex mutex_;
-  LruCache<TileKey, Known> known_ ABSL_GUARDED_BY(mutex_);
+  LruCache<TileKey, const Known> known_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace strata

@@ -34,7 +34,7 @@ CellIndex CellAt(const PlanEndpoint& endpoint, double cell_size_m) {
 }
 
 // The patch of [first, first + count) that is meant; kNoPatchId if the level does not exist.
-PatchId Choose(const SearchSpace& space,
+PatchId Choose(SearchSpace& space,
                const PlanEndpoint& endpoint,
                PatchId first,
                std::uint32_t count) {

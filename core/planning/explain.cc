@@ -133,17 +133,17 @@ class TileReasons {
 
 bool Reached(const SearchSpace& space, const SearchWorkspace& workspace, PatchId patch) {
   const int slot = space.SlotOf(patch);
-  const SearchNode* nodes = workspace.NodesIfAny(slot, space.slots()[slot].tile->size());
+  const SearchNode* nodes = workspace.NodesIfAny(slot, space.slots()[slot].size);
   return nodes != nullptr && workspace.Reached(nodes[patch - space.slots()[slot].base]);
 }
 
 // True if the ground allows the move, whatever classes cost.
-bool HasMove(const SearchSpace& space, PatchId patch, int direction) {
+bool HasMove(SearchSpace& space, PatchId patch, int direction) {
   const SearchSpace::Slot& slot = space.SlotOfPatch(patch);
   return slot.tile->moves[patch - slot.base][direction].cost != Move::kNone;
 }
 
-Explanation OfClass(const SearchSpace& space, PatchId patch) {
+Explanation OfClass(SearchSpace& space, PatchId patch) {
   return {Obstruction::kClass, static_cast<double>(space.ClassOf(patch)), space.Position(patch)};
 }
 
@@ -167,7 +167,7 @@ class Frontier {
     std::vector<std::tuple<double, double, double, double, PatchId>> ranked;
     for (std::size_t slot = 0; slot < space_.slots().size(); ++slot) {
       const PatchId base = space_.slots()[slot].base;
-      const std::uint32_t size = space_.slots()[slot].tile->size();
+      const std::uint32_t size = space_.slots()[slot].size;
       const SearchNode* nodes = reached_.NodesIfAny(static_cast<int>(slot), size);
       if (nodes == nullptr) continue;
       for (std::uint32_t i = 0; i < size; ++i) {
@@ -277,7 +277,7 @@ absl::StatusOr<RefusedMove> ChooseMove(SearchSpace& space,
                                        const SearchWorkspace& reached,
                                        PatchId goal,
                                        const Stop& stop) {
-  SearchWorkspace from_goal;
+  SearchWorkspace from_goal(reached.budget());
   STRATA_RETURN_IF_ERROR(ReachAll(space, goal, from_goal, stop).status());
   Frontier frontier(space, reached, from_goal);
   const Eigen::Vector3d goal_position = space.Position(goal);
@@ -313,8 +313,7 @@ absl::StatusOr<Explanation> WhyNotStand(SearchSpace& space, PatchId patch) {
   if (slot.tile->CanStand(patch - slot.base) && space.Danger(patch) < 0.0F) {
     return OfClass(space, patch);
   }
-  STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles,
-                          LoadAround(space.source(), slot.tile->key));
+  STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles, LoadAround(space.source(), slot.key));
   const TileReasons reasons(space, slot, tiles);
   return reasons.WhyNotStand(reasons.SurfaceOf(patch));
 }
@@ -330,16 +329,14 @@ absl::StatusOr<Explanation> WhyNoMove(SearchSpace& space, PatchId patch, int dir
     }
   }
   const SearchSpace::Slot& slot = space.SlotOfPatch(patch);
-  STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles,
-                          LoadAround(space.source(), slot.tile->key));
+  STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles, LoadAround(space.source(), slot.key));
   const TileReasons reasons(space, slot, tiles);
   return reasons.WhyNoMove(reasons.SurfaceOf(patch), direction);
 }
 
 absl::StatusOr<Explanation> WhyTooNear(SearchSpace& space, PatchId patch, double within_m) {
   const SearchSpace::Slot& slot = space.SlotOfPatch(patch);
-  STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles,
-                          LoadAround(space.source(), slot.tile->key));
+  STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles, LoadAround(space.source(), slot.key));
   const TileReasons reasons(space, slot, tiles);
   return reasons.WhyTooNear(reasons.SurfaceOf(patch), within_m);
 }

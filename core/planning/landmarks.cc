@@ -26,9 +26,9 @@ template <typename Visit>
 void ForEachReached(const SearchSpace& space, const SearchWorkspace& workspace, Visit visit) {
   for (std::size_t slot = 0; slot < space.slots().size(); ++slot) {
     const SearchSpace::Slot& s = space.slots()[slot];
-    const SearchNode* nodes = workspace.NodesIfAny(static_cast<int>(slot), s.tile->size());
+    const SearchNode* nodes = workspace.NodesIfAny(static_cast<int>(slot), s.size);
     if (nodes == nullptr) continue;
-    for (std::uint32_t i = 0; i < s.tile->size(); ++i) {
+    for (std::uint32_t i = 0; i < s.size; ++i) {
       if (workspace.Reached(nodes[i])) visit(s.base + i, nodes[i].cost);
     }
   }
@@ -70,7 +70,7 @@ absl::StatusOr<PatchId> LargestPart(SearchSpace& space,
     STRATA_RETURN_IF_ERROR(space.status());
     if (slot < 0) continue;
     const PatchId base = space.slots()[slot].base;
-    const std::shared_ptr<const PreparedTile> tile = space.slots()[slot].tile;
+    const std::shared_ptr<const PreparedTile> tile = space.At(slot).tile;
     seen.resize(space.end());
     for (std::uint32_t i = 0; i < tile->size(); ++i) {
       if (!tile->CanStand(i) || seen[base + i]) continue;
@@ -122,9 +122,9 @@ absl::StatusOr<std::shared_ptr<const Landmarks>> Landmarks::Make(SearchSpace& sp
 void Landmarks::Store(const SearchSpace& space, const SearchWorkspace& workspace, int landmark) {
   std::vector<std::uint32_t*> of_slot;
   for (const SearchSpace::Slot& slot : space.slots()) {
-    std::vector<std::uint32_t>& costs = tiles_[slot.tile->key].costs;
-    costs.resize(static_cast<std::size_t>(slot.tile->size()) * count_, kUnreached);
-    of_slot.push_back(costs.data() + static_cast<std::size_t>(slot.tile->size()) * landmark);
+    std::vector<std::uint32_t>& costs = tiles_[slot.key].costs;
+    costs.resize(static_cast<std::size_t>(slot.size) * count_, kUnreached);
+    of_slot.push_back(costs.data() + static_cast<std::size_t>(slot.size) * landmark);
   }
   ForEachReached(space, workspace, [&](PatchId p, std::uint32_t cost) {
     const int slot = space.SlotOf(p);

@@ -1,6 +1,7 @@
 #include "core/planning/planner.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -28,6 +29,9 @@
 
 namespace strata {
 namespace {
+
+// A workspace above this share of the budget is not kept for the next query.
+constexpr std::size_t kIdleShare = 32;
 
 PlanResult NotOnSurface(PlanReason reason, absl::string_view end, const EndpointMatch& match) {
   PlanResult result;
@@ -74,7 +78,12 @@ absl::StatusOr<PlanResult> Answer(SearchSpace& space,
   switch (outcome.end) {
     case SearchOutcome::End::kLimit:
       result.reason = PlanReason::kSearchLimit;
-      result.message = absl::StrCat("no path within ", query.max_expanded, " expanded patches");
+      result.message =
+          workspace.full()
+              ? absl::StrCat("no path within the memory that searches have, half of ",
+                             workspace.budget()->max_bytes() >> 20,
+                             " MiB for all of them; plan in shorter legs")
+              : absl::StrCat("no path within ", query.max_expanded, " expanded patches");
       break;
     case SearchOutcome::End::kExhausted:
       STRATA_RETURN_IF_ERROR(FillRefusal(space, workspace, to.patch, stop, &result));
@@ -105,13 +114,14 @@ class Planner::WorkspaceLoan {
   explicit WorkspaceLoan(Planner& planner) : planner_(planner) {
     absl::MutexLock lock(&planner.mutex_);
     if (planner.idle_.empty()) {
-      workspace_ = std::make_unique<SearchWorkspace>();
+      workspace_ = std::make_unique<SearchWorkspace>(planner.options_.budget);
     } else {
       workspace_ = std::move(planner.idle_.back());
       planner.idle_.pop_back();
     }
   }
   ~WorkspaceLoan() {
+    if (workspace_->memory_bytes() > planner_.options_.budget->max_bytes() / kIdleShare) return;
     absl::MutexLock lock(&planner_.mutex_);
     planner_.idle_.push_back(std::move(workspace_));
   }
@@ -125,7 +135,7 @@ class Planner::WorkspaceLoan {
   std::unique_ptr<SearchWorkspace> workspace_;
 };
 
-Planner::Planner(const PlannerOptions& options) : options_(options), cache_(options.cache_bytes) {}
+Planner::Planner(const PlannerOptions& options) : options_(options), cache_(options.budget) {}
 
 absl::StatusOr<PlanResult> Planner::Plan(TileSource& source,
                                          const PlanQuery& query,

@@ -30,6 +30,7 @@
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 
+#include "core/common/cache_budget.h"
 #include "core/common/stop.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/landmarks.h"
@@ -42,8 +43,10 @@
 namespace strata {
 
 struct PlannerOptions {
-  double cell_size_m = 0.1;                        // of the map
-  std::size_t cache_bytes = std::size_t{1} << 30;  // of prepared tiles
+  double cell_size_m = 0.1;  // of the map
+  // Of prepared tiles and of searches, which may be shared with other caches. A query that needs
+  // more ends with PlanReason::kSearchLimit.
+  std::shared_ptr<CacheBudget> budget = std::make_shared<CacheBudget>(std::size_t{1} << 30);
 };
 
 // Plans in one map, in any of its epochs. Thread-safe; queries run in their callers' threads.

@@ -26,7 +26,7 @@ struct Sample {
   PatchId patch = 0;
 };
 
-Sample SampleAt(const SearchSpace& space, PatchId patch, const Eigen::Vector3d& position) {
+Sample SampleAt(SearchSpace& space, PatchId patch, const Eigen::Vector3d& position) {
   return {position, space.Danger(patch), space.ClassFactor(patch), patch};
 }
 
@@ -246,7 +246,7 @@ class RouteMaker {
       route_.length_m += (route_.waypoints[i] - route_.waypoints[i - 1]).norm();
     }
     for (const Sample& sample : samples_) {
-      const TileKey& key = space_.SlotOfPatch(sample.patch).tile->key;
+      const TileKey& key = space_.slots()[space_.SlotOf(sample.patch)].key;
       if (route_.tiles.empty() || !(route_.tiles.back() == key)) route_.tiles.push_back(key);
     }
     std::sort(route_.tiles.begin(), route_.tiles.end());

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -55,7 +56,7 @@ struct NoBound {
 class LandmarkBound {
  public:
   // REQUIRES: Measured(), for start and goal.
-  LandmarkBound(const SearchSpace& space, const Landmarks& landmarks, PatchId start, PatchId goal)
+  LandmarkBound(SearchSpace& space, const Landmarks& landmarks, PatchId start, PatchId goal)
       : octile_{space.CellOfPatch(goal)}, landmarks_(landmarks) {
     std::array<std::pair<std::uint32_t, int>, kMaxLandmarks> order;  // bound at the start, landmark
     for (int l = 0; l < landmarks.count(); ++l) {
@@ -68,17 +69,17 @@ class LandmarkBound {
     }
   }
 
-  static bool Measured(const SearchSpace& space, const Landmarks& landmarks, PatchId patch) {
-    return landmarks.Tile(space.SlotOfPatch(patch).tile->key) != nullptr &&
+  static bool Measured(SearchSpace& space, const Landmarks& landmarks, PatchId patch) {
+    return landmarks.Tile(space.slots()[space.SlotOf(patch)].key) != nullptr &&
            Cost(space, landmarks, patch, 0) != Landmarks::kUnreached;
   }
 
   void Enter(int slot, const SearchSpace::Slot& s) {
     if (static_cast<std::size_t>(slot) >= of_slot_.size()) of_slot_.resize(slot + 1, nullptr);
     // Never nullptr: the start is connected to the landmarks, and so is what a search enters.
-    if (of_slot_[slot] == nullptr) of_slot_[slot] = landmarks_.Tile(s.tile->key);
+    if (of_slot_[slot] == nullptr) of_slot_[slot] = landmarks_.Tile(s.key);
     for (int i = 0; i < kAsked; ++i) {
-      costs_[i] = of_slot_[slot] + static_cast<std::size_t>(s.tile->size()) * asked_[i];
+      costs_[i] = of_slot_[slot] + static_cast<std::size_t>(s.size) * asked_[i];
     }
   }
   std::uint32_t operator()(std::int32_t x, std::int32_t y, std::uint32_t local) const {
@@ -93,12 +94,9 @@ class LandmarkBound {
   static constexpr int kAsked = 4;
 
   static std::uint32_t Apart(std::uint32_t a, std::uint32_t b) { return a > b ? a - b : b - a; }
-  static std::uint32_t Cost(const SearchSpace& space,
-                            const Landmarks& landmarks,
-                            PatchId patch,
-                            int l) {
-    const SearchSpace::Slot& slot = space.SlotOfPatch(patch);
-    return landmarks.Tile(slot.tile->key)[std::size_t{slot.tile->size()} * l + patch - slot.base];
+  static std::uint32_t Cost(SearchSpace& space, const Landmarks& landmarks, PatchId patch, int l) {
+    const SearchSpace::Slot& slot = space.slots()[space.SlotOf(patch)];
+    return landmarks.Tile(slot.key)[std::size_t{slot.size} * l + patch - slot.base];
   }
 
   OctileBound octile_;
@@ -131,7 +129,7 @@ class Search {
       if (!Expand(patch)) continue;
       ++outcome.expanded;
       if (outcome.expanded % kExpansionsPerLook == 0) STRATA_RETURN_IF_ERROR(stop_.status());
-      if (outcome.expanded >= max_expanded) {
+      if (outcome.expanded >= max_expanded || workspace_.full()) {
         outcome.end = SearchOutcome::End::kLimit;
         return outcome;
       }
@@ -151,8 +149,8 @@ class Search {
   void EnterSlot(int slot) {
     if (slot == slot_) return;
     slot_ = slot;
-    const SearchSpace::Slot& s = space_.slots()[slot];
-    tile_ = s.tile.get();
+    const SearchSpace::Slot& s = space_.At(slot);
+    tile_ = s.tile;
     base_ = s.base;
     x0_ = s.x0;
     y0_ = s.y0;
@@ -219,13 +217,14 @@ class Search {
   }
 
   void ExpandFar(std::uint32_t local, std::uint32_t cost, unsigned directions) {
-    const int own_slot = slot_;
-    const PreparedTile& tile = *tile_;
-    const std::uint8_t own_class = kByClass ? tile.ClassOf(local) : std::uint8_t{0};
+    const std::shared_ptr<const PreparedTile> tile = tile_;
+    const std::uint8_t own_class = kByClass ? tile->ClassOf(local) : std::uint8_t{0};
+    const std::uint16_t cell = tile->cell[local];
+    const CellIndex from = {x0_ + (cell & (kTileCells - 1)), y0_ + (cell >> kTileShift)};
     for (int k = 0; k < 8; ++k) {
       if ((directions >> k & 1U) == 0) continue;
-      const FarMove& move = tile.Far(local, k);
-      const PatchId target = space_.Resolve(space_.slots()[own_slot], move);
+      const FarMove& move = tile->Far(local, k);
+      const PatchId target = space_.Resolve(from, move);
       if (target == kNoPatchId) continue;
       EnterSlot(space_.SlotOf(target));
       RelaxMove(own_class, target - base_, cost, move.cost, k);
@@ -256,7 +255,7 @@ class Search {
   std::uint32_t dearest_cost_ = 0;
   // The slot entered.
   int slot_ = -1;
-  const PreparedTile* tile_ = nullptr;
+  std::shared_ptr<const PreparedTile> tile_;
   PatchId base_ = 0;
   std::int32_t x0_ = 0;
   std::int32_t y0_ = 0;
@@ -286,13 +285,26 @@ void SearchWorkspace::Begin(int bucket_shift) {
       std::fill(nodes.begin(), nodes.end(), SearchNode{});
     generation_ = 1;
   }
+  full_ = false;
   queue_.Clear(bucket_shift);
+}
+
+SearchWorkspace::~SearchWorkspace() {
+  if (budget_ != nullptr) budget_->Release(memory_bytes());
 }
 
 SearchNode* SearchWorkspace::Nodes(int slot, std::uint32_t size) {
   if (static_cast<std::size_t>(slot) >= nodes_.size()) nodes_.resize(slot + 1);
   std::vector<SearchNode>& nodes = nodes_[slot];
-  if (nodes.size() < size) nodes.resize(size);
+  if (nodes.size() >= size) return nodes.data();
+  const std::size_t more = (size - nodes.capacity()) * sizeof(SearchNode);
+  if (budget_ != nullptr && !budget_->Reserve(more)) {
+    full_ = true;
+    spare_.resize(std::max<std::size_t>(spare_.size(), size));
+    return spare_.data();
+  }
+  nodes.reserve(size);  // not more
+  nodes.resize(size);
   return nodes.data();
 }
 

@@ -4,10 +4,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
 
+#include "core/common/cache_budget.h"
 #include "core/common/stop.h"
 #include "core/planning/bucket_queue.h"
 #include "core/planning/search_space.h"
@@ -26,9 +29,17 @@ struct SearchNode {
 // and never cleared. One search at a time.
 class SearchWorkspace {
  public:
+  // Takes its nodes from `budget`, if that is not nullptr.
+  explicit SearchWorkspace(std::shared_ptr<CacheBudget> budget = nullptr)
+      : budget_(std::move(budget)) {}
+  ~SearchWorkspace();
+  SearchWorkspace(const SearchWorkspace&) = delete;
+  SearchWorkspace& operator=(const SearchWorkspace&) = delete;
+
   // Starts anew, with a queue of buckets of 2^bucket_shift.
   void Begin(int bucket_shift);
-  // Nodes of a slot, at least `size` of them.
+  // Nodes of a slot, at least `size` of them; where the budget has none left, some that mean
+  // nothing, and the search is full().
   SearchNode* Nodes(int slot, std::uint32_t size);
   // nullptr if the search has not been in a slot of that size; nodes are kept from search to
   // search, so an earlier one's slot of the same number may be smaller.
@@ -37,16 +48,24 @@ class SearchWorkspace {
   std::uint32_t Stamp(int direction) const {
     return generation_ << 4 | static_cast<std::uint32_t>(direction);
   }
+  // The search must end.
+  bool full() const { return full_; }
   BucketQueue& queue() { return queue_; }
+  const std::shared_ptr<CacheBudget>& budget() const { return budget_; }
+  // Of the nodes.
   std::size_t memory_bytes() const;
 
  private:
   std::uint32_t generation_ = 0;
+  const std::shared_ptr<CacheBudget> budget_;
   std::vector<std::vector<SearchNode>> nodes_;  // per slot
+  std::vector<SearchNode> spare_;               // for whom there is no memory
+  bool full_ = false;
   BucketQueue queue_;
 };
 
 struct SearchOutcome {
+  // kLimit: of what may be expanded, or of memory (SearchWorkspace::full()).
   enum class End : std::uint8_t { kFound, kExhausted, kLimit };
   End end = End::kExhausted;
   std::uint64_t expanded = 0;

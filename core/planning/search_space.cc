@@ -1,6 +1,7 @@
 #include "core/planning/search_space.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
@@ -19,6 +20,7 @@ namespace strata {
 namespace {
 
 constexpr int kMaxSlots = 65535;
+constexpr std::size_t kHeldShare = 8;
 
 // Length of a straight move inside a tile.
 int CellsBetween(std::uint16_t a, std::uint16_t b) {
@@ -33,8 +35,7 @@ int SearchSpace::SlotOf(const TileKey& key) {
   if (!inserted || !status_.ok()) return found->second;
   absl::StatusOr<std::shared_ptr<const PreparedTile>> tile = cache_.Get(source_, key, checks_);
   if (tile.ok() && slots_.size() >= kMaxSlots) {
-    tile =
-        absl::ResourceExhaustedError(absl::StrCat("a query touches at most ", kMaxSlots, " tiles"));
+    tile = absl::OutOfRangeError(absl::StrCat("a query touches at most ", kMaxSlots, " tiles"));
   }
   if (!tile.ok()) {
     status_ = tile.status();
@@ -42,11 +43,48 @@ int SearchSpace::SlotOf(const TileKey& key) {
   }
   if (*tile == nullptr) return -1;
   const auto slot = static_cast<int>(slots_.size());
-  slots_.push_back({*tile, end(), key.x << kTileShift, key.y << kTileShift});
-  const std::uint32_t pages = ((*tile)->size() >> kPageShift) + 1;
-  page_slot_.insert(page_slot_.end(), pages, static_cast<std::uint16_t>(slot));
+  const std::uint32_t size = (*tile)->size();
+  slots_.push_back({key, nullptr, end(), size, key.x << kTileShift, key.y << kTileShift});
+  page_slot_.insert(page_slot_.end(), (size >> kPageShift) + 1, static_cast<std::uint16_t>(slot));
   found->second = slot;
+  Hold(slot, *std::move(tile));
   return slot;
+}
+
+const SearchSpace::Slot& SearchSpace::At(int slot) {
+  if (slots_[slot].tile == nullptr) Hold(slot, TileAgain(slots_[slot]));
+  return slots_[slot];
+}
+
+std::shared_ptr<const PreparedTile> SearchSpace::TileAgain(const Slot& slot) {
+  absl::StatusOr<std::shared_ptr<const PreparedTile>> tile = cache_.Get(source_, slot.key, checks_);
+  // The same versions of the same tile: the same patches.
+  if (tile.ok() && *tile != nullptr && (*tile)->size() == slot.size) return *std::move(tile);
+  if (status_.ok()) {
+    status_ = tile.ok() ? absl::InternalError(absl::StrCat(
+                              "tile ", slot.key.ToString(), " changed within one version"))
+                        : tile.status();
+  }
+  auto blank = std::make_shared<PreparedTile>();
+  blank->key = slot.key;
+  blank->moves.resize(slot.size);
+  blank->cell.resize(slot.size);
+  blank->z_m.resize(slot.size);
+  blank->danger.resize(slot.size, -1.0F);
+  blank->edge_distance.resize(slot.size);
+  return blank;
+}
+
+void SearchSpace::Hold(int slot, std::shared_ptr<const PreparedTile> tile) {
+  held_bytes_ += tile->memory_bytes();
+  slots_[slot].tile = std::move(tile);
+  held_.push_back(slot);
+  while (held_bytes_ > cache_.max_bytes() / kHeldShare && held_.size() > 1) {
+    Slot& first = slots_[held_.front()];
+    held_.pop_front();
+    held_bytes_ -= first.tile->memory_bytes();
+    first.tile.reset();
+  }
 }
 
 std::uint32_t SearchSpace::FindCell(CellIndex cell, PatchId* first) {
@@ -54,18 +92,22 @@ std::uint32_t SearchSpace::FindCell(CellIndex cell, PatchId* first) {
   if (slot < 0) return 0;
   std::uint32_t local = 0;
   std::uint32_t count = 0;
-  slots_[slot].tile->FindCell(CellInTile(cell), &local, &count);
+  At(slot).tile->FindCell(CellInTile(cell), &local, &count);
   *first = slots_[slot].base + local;
   return count;
 }
 
-PatchId SearchSpace::Resolve(const Slot& slot, const FarMove& move) {
-  const std::uint16_t from = slot.tile->cell[move.patch];
-  const CellIndex cell = {slot.x0 + (from & (kTileCells - 1)) + move.cells * kStepX[move.direction],
-                          slot.y0 + (from >> kTileShift) + move.cells * kStepY[move.direction]};
+PatchId SearchSpace::Resolve(CellIndex from, FarMove move) {
+  const CellIndex cell = {from.x + move.cells * kStepX[move.direction],
+                          from.y + move.cells * kStepY[move.direction]};
   PatchId first = 0;
   const std::uint32_t count = FindCell(cell, &first);
   return move.level < count ? first + move.level : kNoPatchId;
+}
+
+CellIndex SearchSpace::CellIn(const Slot& slot, std::uint32_t local) {
+  const std::uint16_t cell = slot.tile->cell[local];
+  return {slot.x0 + (cell & (kTileCells - 1)), slot.y0 + (cell >> kTileShift)};
 }
 
 PatchId SearchSpace::Follow(PatchId patch, int direction, std::uint32_t* cost, int* cells) {
@@ -91,37 +133,36 @@ PatchId SearchSpace::FollowGround(PatchId patch, int direction, std::uint32_t* c
   const FarMove& far = slot.tile->Far(patch - slot.base, direction);
   *cost = far.cost;
   *cells = far.cells;
-  return Resolve(slot, far);
+  return Resolve(CellIn(slot, patch - slot.base), far);
 }
 
-CellIndex SearchSpace::CellOfPatch(PatchId patch) const {
+CellIndex SearchSpace::CellOfPatch(PatchId patch) {
   const Slot& slot = SlotOfPatch(patch);
-  const std::uint16_t cell = slot.tile->cell[patch - slot.base];
-  return {slot.x0 + (cell & (kTileCells - 1)), slot.y0 + (cell >> kTileShift)};
+  return CellIn(slot, patch - slot.base);
 }
 
-float SearchSpace::Height(PatchId patch) const {
+float SearchSpace::Height(PatchId patch) {
   const Slot& slot = SlotOfPatch(patch);
   return slot.tile->z_m[patch - slot.base];
 }
 
-float SearchSpace::Danger(PatchId patch) const {
+float SearchSpace::Danger(PatchId patch) {
   const Slot& slot = SlotOfPatch(patch);
   if (classes_.Forbidden(slot.tile->ClassOf(patch - slot.base))) return -1.0F;
   return slot.tile->danger[patch - slot.base];
 }
 
-std::uint8_t SearchSpace::ClassOf(PatchId patch) const {
+std::uint8_t SearchSpace::ClassOf(PatchId patch) {
   const Slot& slot = SlotOfPatch(patch);
   return slot.tile->ClassOf(patch - slot.base);
 }
 
-float SearchSpace::EdgeDistance(PatchId patch) const {
+float SearchSpace::EdgeDistance(PatchId patch) {
   const Slot& slot = SlotOfPatch(patch);
   return static_cast<float>(slot.tile->edge_distance[patch - slot.base]) / 255.0F * checks_.reach_m;
 }
 
-Eigen::Vector3d SearchSpace::Position(PatchId patch) const {
+Eigen::Vector3d SearchSpace::Position(PatchId patch) {
   const CellIndex cell = CellOfPatch(patch);
   return {
       (cell.x + 0.5) * checks_.cell_size_m, (cell.y + 0.5) * checks_.cell_size_m, Height(patch)};

@@ -2,7 +2,9 @@
 #ifndef STRATA_CORE_PLANNING_SEARCH_SPACE_H_
 #define STRATA_CORE_PLANNING_SEARCH_SPACE_H_
 
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <vector>
 
@@ -24,13 +26,16 @@ using PatchId = std::uint32_t;
 inline constexpr PatchId kNoPatchId = 0xFFFFFFFFU;
 
 // For the thread of one query. After the first error of the source, status() holds it and lookups
-// find nothing.
+// find nothing. However far a query goes, it holds only the tiles it touched last, an eighth of the
+// cache's budget; others are had from the cache, or prepared, again.
 class SearchSpace {
  public:
   struct Slot {
-    std::shared_ptr<const PreparedTile> tile;
+    TileKey key;
+    std::shared_ptr<const PreparedTile> tile;  // nullptr while it is let go
     PatchId base = 0;
-    std::int32_t x0 = 0;  // map cell of the tile's corner
+    std::uint32_t size = 0;  // patches
+    std::int32_t x0 = 0;     // map cell of the tile's corner
     std::int32_t y0 = 0;
   };
 
@@ -45,38 +50,46 @@ class SearchSpace {
   const ClassFactors& classes() const { return classes_; }
   TileSource& source() const { return source_; }
   const std::vector<Slot>& slots() const { return slots_; }
+  // With its tile; of a tile that cannot be had again, one nobody can stand on. Until another slot
+  // is asked for: whoever needs the tile longer keeps `tile`.
+  const Slot& At(int slot);
   PatchId end() const { return static_cast<PatchId>(page_slot_.size()) << kPageShift; }
 
   // Number of the slot of a tile, prepared now if need be; -1 where the map has nothing.
   int SlotOf(const TileKey& key);
   int SlotOf(PatchId patch) const { return page_slot_[patch >> kPageShift]; }
-  const Slot& SlotOfPatch(PatchId patch) const { return slots_[SlotOf(patch)]; }
+  const Slot& SlotOfPatch(PatchId patch) { return At(SlotOf(patch)); }
 
   // Patches of a cell: [*first, *first + count), lowest first; returns the count.
   std::uint32_t FindCell(CellIndex cell, PatchId* first);
 
-  // Where a far move leads; kNoPatchId if its tile cannot be had.
-  PatchId Resolve(const Slot& slot, const FarMove& move);
+  // Where a far move from cell `from` leads; kNoPatchId if its tile cannot be had.
+  PatchId Resolve(CellIndex from, FarMove move);
   // Where a move in `direction` leads and what it costs; kNoPatchId if there is none, or if it
   // leads to a forbidden class.
   PatchId Follow(PatchId patch, int direction, std::uint32_t* cost, int* cells);
   // The same whatever classes cost.
   PatchId FollowGround(PatchId patch, int direction, std::uint32_t* cost, int* cells);
 
-  CellIndex CellOfPatch(PatchId patch) const;
-  float Height(PatchId patch) const;
+  CellIndex CellOfPatch(PatchId patch);
+  float Height(PatchId patch);
   // < 0: the robot cannot stand there, or its class is forbidden.
-  float Danger(PatchId patch) const;
-  std::uint8_t ClassOf(PatchId patch) const;
+  float Danger(PatchId patch);
+  std::uint8_t ClassOf(PatchId patch);
   // By what its class multiplies costs.
-  double ClassFactor(PatchId patch) const { return classes_.Factor(ClassOf(patch)); }
+  double ClassFactor(PatchId patch) { return classes_.Factor(ClassOf(patch)); }
   // Lower bound of the distance to the nearest edge [m].
-  float EdgeDistance(PatchId patch) const;
+  float EdgeDistance(PatchId patch);
   // Centre of the cell at the surface.
-  Eigen::Vector3d Position(PatchId patch) const;
+  Eigen::Vector3d Position(PatchId patch);
 
  private:
   static constexpr int kPageShift = 12;
+
+  static CellIndex CellIn(const Slot& slot, std::uint32_t local);
+  std::shared_ptr<const PreparedTile> TileAgain(const Slot& slot);
+  // Keeps the tile of a slot at hand, and lets go of those that came first.
+  void Hold(int slot, std::shared_ptr<const PreparedTile> tile);
 
   TileCache& cache_;
   TileSource& source_;
@@ -84,6 +97,8 @@ class SearchSpace {
   const ClassFactors classes_;
   absl::Status status_;
   std::vector<Slot> slots_;
+  std::deque<int> held_;  // slots with a tile, the first to come first
+  std::size_t held_bytes_ = 0;
   std::vector<std::uint16_t> page_slot_;  // of each page of patch numbers
   absl::flat_hash_map<TileKey, int> slot_of_;
 };

@@ -65,7 +65,7 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Get(TileSource& s
   auto tile = std::make_shared<PreparedTile>(PrepareTile(key, window, *fits, checks));
   tile->class_id = ClassesOf(*tile, *tiles[kMiddleTile]);
   entry->tile = tile;
-  Account(cache_key, *entry, tile->memory_bytes(), false);
+  Account(cache_key, entry, tile->memory_bytes(), false);
   return tile;
 }
 
@@ -77,7 +77,7 @@ std::shared_ptr<const std::vector<GroundFit>> TileCache::Fits(const TileKey& til
   absl::MutexLock lock(&entry->mutex);
   if (entry->fits == nullptr) {
     entry->fits = std::make_shared<const std::vector<GroundFit>>(FitTile(window));
-    Account(key, *entry, entry->fits->size() * sizeof(GroundFit), true);
+    Account(key, entry, entry->fits->size() * sizeof(GroundFit), true);
   }
   return entry->fits;
 }
@@ -85,38 +85,29 @@ std::shared_ptr<const std::vector<GroundFit>> TileCache::Fits(const TileKey& til
 std::shared_ptr<TileCache::Entry> TileCache::FindOrInsert(const Key& key,
                                                           const TileVersions& versions) {
   absl::MutexLock lock(&mutex_);
-  std::shared_ptr<Entry>& entry = entries_[key];
-  if (entry != nullptr) {
-    by_age_.splice(by_age_.begin(), by_age_, entry->age);
-    if (entry->versions == versions) return entry;
-    statistics_.bytes -= entry->bytes;
-  } else {
-    by_age_.push_front(key);
-  }
+  std::shared_ptr<Entry> entry = entries_.Find(key);
+  if (entry != nullptr && entry->versions == versions) return entry;
   entry = std::make_shared<Entry>(versions);
-  entry->age = by_age_.begin();
+  entries_.Put(key, entry, sizeof(Entry));
   return entry;
 }
 
-// Counts what was made and lets go of the oldest. Who still uses an evicted tile keeps it alive.
-void TileCache::Account(const Key& key, const Entry& entry, std::size_t bytes, bool fits) {
+// Who still uses an evicted tile keeps it alive.
+void TileCache::Account(const Key& key,
+                        const std::shared_ptr<Entry>& entry,
+                        std::size_t bytes,
+                        bool fits) {
   absl::MutexLock lock(&mutex_);
   ++(fits ? statistics_.fitted : statistics_.prepared);
-  const auto found = entries_.find(key);
-  if (found == entries_.end() || found->second.get() != &entry) return;  // evicted meanwhile
-  found->second->bytes = bytes;
-  statistics_.bytes += bytes;
-  while (statistics_.bytes > max_bytes_ && by_age_.size() > 1) {
-    const auto oldest = entries_.find(by_age_.back());
-    statistics_.bytes -= oldest->second->bytes;
-    entries_.erase(oldest);
-    by_age_.pop_back();
-  }
+  if (entries_.Find(key) != entry) return;  // evicted meanwhile
+  entries_.Put(key, entry, sizeof(Entry) + bytes);
 }
 
 TileCache::Statistics TileCache::statistics() const {
   absl::MutexLock lock(&mutex_);
-  return statistics_;
+  Statistics statistics = statistics_;
+  statistics.bytes = entries_.bytes();
+  return statistics;
 }
 
 }  // namespace strata

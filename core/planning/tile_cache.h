@@ -5,17 +5,16 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <list>
 #include <memory>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
-#include "absl/container/flat_hash_map.h"
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 
+#include "core/common/lru_cache.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/ground_fit.h"
 #include "core/planning/ground_window.h"
@@ -39,10 +38,14 @@ class TileCache {
   struct Statistics {
     std::uint64_t prepared = 0;  // preparations made so far, for any profile
     std::uint64_t fitted = 0;    // plane fits of a tile made so far
-    std::size_t bytes = 0;       // held now
+    std::size_t bytes = 0;       // kept now
   };
 
-  explicit TileCache(std::size_t max_bytes) : max_bytes_(max_bytes) {}
+  explicit TileCache(const std::shared_ptr<CacheBudget>& budget)
+      : max_bytes_(budget->max_bytes()), entries_(budget) {}
+
+  // Of the budget.
+  std::size_t max_bytes() const { return max_bytes_; }
 
   // nullptr where the map has nothing. Errors are those of the source, and INTERNAL for a tile that
   // breaks its contract.
@@ -67,20 +70,18 @@ class TileCache {
     absl::Mutex mutex;  // held while the content is made
     std::shared_ptr<const PreparedTile> tile ABSL_GUARDED_BY(mutex);
     std::shared_ptr<const std::vector<GroundFit>> fits ABSL_GUARDED_BY(mutex);
-    std::size_t bytes = 0;  // guarded by TileCache::mutex_
-    std::list<Key>::iterator age;
   };
 
   std::shared_ptr<Entry> FindOrInsert(const Key& key, const TileVersions& versions);
-  void Account(const Key& key, const Entry& entry, std::size_t bytes, bool fits);
+  // Counts what was made of an entry.
+  void Account(const Key& key, const std::shared_ptr<Entry>& entry, std::size_t bytes, bool fits);
   std::shared_ptr<const std::vector<GroundFit>> Fits(const TileKey& tile,
                                                      const TileVersions& versions,
                                                      const GroundWindow& window);
 
   const std::size_t max_bytes_;
   mutable absl::Mutex mutex_;
-  absl::flat_hash_map<Key, std::shared_ptr<Entry>> entries_ ABSL_GUARDED_BY(mutex_);
-  std::list<Key> by_age_ ABSL_GUARDED_BY(mutex_);  // the latest used first
+  LruCache<Key, Entry> entries_ ABSL_GUARDED_BY(mutex_);
   Statistics statistics_ ABSL_GUARDED_BY(mutex_);
 };
 

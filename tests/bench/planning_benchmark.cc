@@ -272,7 +272,7 @@ struct Column {
 int Compare(testing::MemoryTiles& source, std::size_t query_count, int repetitions) {
   const RobotProfile profile;
   const auto checks = MakeProfileChecks(profile, kCell);
-  TileCache cache(std::size_t{4} << 30);
+  TileCache cache(std::make_shared<CacheBudget>(std::size_t{4} << 30));
   SearchSpace space(cache, source, *checks);
   double begin = NowMs();
   for (const TileKey& key : source.Keys()) space.SlotOf(key);

@@ -37,8 +37,7 @@ class World {
   explicit World(const SmallWorld& content) {
     content.CopyTo(directory_.path() / "maps");
     database_ = OpenEngine({.directory = directory_.path() / "maps",
-                            .cache_bytes = std::size_t{8} << 20,
-                            .planner_cache_bytes = std::size_t{8} << 20,
+                            .cache_bytes = std::size_t{16} << 20,
                             .max_maps = 4})
                     .value();
     server::ServerOptions options;

@@ -53,7 +53,6 @@ TEST(OptionsTest, DefaultsAreThoseOfTheLibraries) {
   EXPECT_EQ(options.engine.directory, "maps");
   EXPECT_EQ(options.engine.queue_bytes, engine.queue_bytes);
   EXPECT_EQ(options.engine.cache_bytes, engine.cache_bytes);
-  EXPECT_EQ(options.engine.planner_cache_bytes, engine.planner_cache_bytes);
   EXPECT_EQ(options.engine.max_map_bytes, engine.max_map_bytes);
   EXPECT_EQ(options.server.drain_timeout, server.drain_timeout);
   EXPECT_EQ(options.server.slow_sender_timeout, server.slow_sender_timeout);

@@ -33,7 +33,8 @@ class ClosureWatchTest : public YardTest {
   std::shared_ptr<Map> OpenMap() {
     WaitIntegrated(db());
     Close();
-    absl::StatusOr<std::shared_ptr<Map>> map = Map::Open(kMapName, MapFile(), Options());
+    absl::StatusOr<std::shared_ptr<Map>> map = Map::Open(
+        kMapName, MapFile(), Options(), std::make_shared<CacheBudget>(Options().cache_bytes));
     EXPECT_THAT(map, IsOk());
     return map.value_or(nullptr);
   }

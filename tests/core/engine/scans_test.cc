@@ -1,5 +1,6 @@
 // What becomes of scans once they are acknowledged.
 #include <cstdint>
+#include <random>
 #include <string>
 #include <thread>
 #include <vector>
@@ -107,6 +108,26 @@ TEST_F(EngineScansTest, AScanThatLeavesTheMapIsNotLostInSilence) {
   EXPECT_THAT(db().posegraph().SetPose({}, kMapName, room, high),
               StatusIs(absl::StatusCode::kInvalidArgument, beyond));
   EXPECT_EQ(Digest(), digest);
+  ExpectSound();
+}
+
+TEST_F(EngineScansTest, AScanAllOverTheMapIsRefusedBeforeItTakesMemory) {
+  MakeMap();
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> anywhere(-1e6F, 1e6F);
+  PointCloud cloud;
+  for (int i = 0; i < 20'000; ++i) cloud.points.emplace_back(anywhere(random), anywhere(random), 0);
+  ScanHeader header = HeaderOf({"run", 1}, cloud, PoseAt(0, 0));
+  header.sensor = SensorModel{.max_range_m = 1e6};
+  STRATA_ASSERT_OK(Upload(db(), header, cloud));
+  WaitIntegrated(db());
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo scan, db().scans().Get({}, kMapName, header.id));
+  EXPECT_EQ(scan.state, ScanState::kFailed);
+  EXPECT_THAT(scan.message, HasSubstr("more than 4096 tiles"));
+  // Far points that the sensor cannot have seen do no harm.
+  cloud.points.front() = {1.0F, 0.0F, 0.0F};
+  STRATA_ASSERT_OK(Upload(db(), HeaderOf({"run", 2}, cloud, PoseAt(0, 0)), cloud));
+  EXPECT_EQ(WaitIntegrated(db()).scans_failed, 1U);
   ExpectSound();
 }
 

@@ -158,7 +158,7 @@ TEST_F(UploadTest, LimitsAreTold) {
   Reopen(options);
   const PointCloud cloud = MakeRoom(1, 1001);
   EXPECT_THAT(Upload(db(), HeaderOf({"run", 1}, cloud, PoseAt(0, 0)), cloud),
-              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("1000")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("at most 1000, split it")));
 }
 
 TEST_F(UploadTest, CancelledCallEnds) {

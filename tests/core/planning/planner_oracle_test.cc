@@ -228,7 +228,7 @@ Freedom FreedomOf(MemoryTiles& source, const RobotProfile& profile) {
   Freedom freedom;
   const auto checks = MakeProfileChecks(profile, kCell);
   STRATA_EXPECT_OK(checks);
-  TileCache cache(std::size_t{1} << 28);
+  TileCache cache(std::make_shared<CacheBudget>(std::size_t{1} << 28));
   SearchSpace space(cache, source, *checks);
   for (const TileKey& key : source.Keys()) space.SlotOf(key);
   const auto place = [&space](PatchId patch) {

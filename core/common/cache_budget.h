@@ -1,0 +1,57 @@
+// How much memory all caches of a process may take together.
+#ifndef STRATA_CORE_COMMON_CACHE_BUDGET_H_
+#define STRATA_CORE_COMMON_CACHE_BUDGET_H_
+
+#include <cstddef>
+#include <functional>
+#include <list>
+#include <memory>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/synchronization/mutex.h"
+
+namespace strata {
+
+// Where the caches that share it (LruCache) are full, the value that was used longest ago goes,
+// whichever cache it is in. Thread-safe; one mutex for all its caches.
+class CacheBudget {
+ public:
+  explicit CacheBudget(std::size_t max_bytes) : max_bytes_(max_bytes) {}
+  CacheBudget(const CacheBudget&) = delete;
+  CacheBudget& operator=(const CacheBudget&) = delete;
+
+  std::size_t max_bytes() const { return max_bytes_; }
+  // Held by caches now.
+  std::size_t cached_bytes() const;
+
+  // Takes memory for something that is no cache from what the caches may hold, until Release().
+  // False, and nothing is taken, where all that is taken would be more than half of the budget.
+  bool Reserve(std::size_t bytes);
+  void Release(std::size_t bytes);
+
+ private:
+  template <typename Key, typename Value>
+  friend class LruCache;
+
+  struct Item {
+    std::size_t bytes;
+    std::function<void()> evict;  // takes the value out of its cache, and this item out of order_
+  };
+  using Order = std::list<Item>;
+  using Values = std::vector<std::shared_ptr<const void>>;
+
+  // Evicts until all fits. What is evicted lies in dropped_, to be destroyed without the mutex.
+  void Trim() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  const std::size_t max_bytes_;
+  mutable absl::Mutex mutex_;
+  Order order_ ABSL_GUARDED_BY(mutex_);  // the latest used first
+  std::size_t cached_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::size_t reserved_ ABSL_GUARDED_BY(mutex_) = 0;
+  Values dropped_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_COMMON_CACHE_BUDGET_H_

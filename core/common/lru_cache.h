@@ -1,0 +1,121 @@
+// Values that were made at some cost, kept as long as they fit a budget that caches share.
+#ifndef STRATA_CORE_COMMON_LRU_CACHE_H_
+#define STRATA_CORE_COMMON_LRU_CACHE_H_
+
+#include <cstddef>
+#include <list>
+#include <memory>
+#include <utility>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/container/flat_hash_map.h"
+#include "absl/synchronization/mutex.h"
+
+#include "core/common/cache_budget.h"
+
+namespace strata {
+
+// Thread-safe; the values are shared, and immutable if `Value` is const.
+template <typename Key, typename Value>
+class LruCache {
+ public:
+  using Handle = std::shared_ptr<Value>;
+
+  // Holds at most `max_bytes` of the budget.
+  LruCache(std::shared_ptr<CacheBudget> budget, std::size_t max_bytes)
+      : budget_(std::move(budget)), mutex_(budget_->mutex_), max_bytes_(max_bytes) {}
+  explicit LruCache(const std::shared_ptr<CacheBudget>& budget)
+      : LruCache(budget, budget->max_bytes()) {}
+  ~LruCache() { Clear(); }
+  LruCache(const LruCache&) = delete;
+  LruCache& operator=(const LruCache&) = delete;
+
+  // nullptr if it is not there.
+  Handle Find(const Key& key) {
+    absl::MutexLock lock(&mutex_);
+    const auto found = index_.find(key);
+    if (found == index_.end()) return nullptr;
+    const auto it = found->second;
+    order_.splice(order_.begin(), order_, it);
+    budget_->order_.splice(budget_->order_.begin(), budget_->order_, it->item);
+    return it->value;
+  }
+
+  // Replaces what was there. A value larger than the cache may be is not kept.
+  void Put(const Key& key, Handle value, std::size_t bytes) {
+    CacheBudget::Values dropped;
+    absl::MutexLock lock(&mutex_);
+    EraseKey(key);
+    if (bytes <= max_bytes_) {
+      Insert(key, std::move(value), bytes);
+      while (bytes_ > max_bytes_) EraseAt(std::prev(order_.end()));
+      budget_->Trim();
+    }
+    dropped.swap(budget_->dropped_);
+  }
+
+  void Erase(const Key& key) {
+    CacheBudget::Values dropped;
+    absl::MutexLock lock(&mutex_);
+    EraseKey(key);
+    dropped.swap(budget_->dropped_);
+  }
+
+  void Clear() {
+    CacheBudget::Values dropped;
+    absl::MutexLock lock(&mutex_);
+    while (!order_.empty()) EraseAt(order_.begin());
+    dropped.swap(budget_->dropped_);
+  }
+
+  std::size_t bytes() const {
+    absl::MutexLock lock(&mutex_);
+    return bytes_;
+  }
+
+ private:
+  struct Entry {
+    Key key;
+    Handle value;
+    CacheBudget::Order::iterator item;
+  };
+  using Order = std::list<Entry>;
+
+  void Insert(const Key& key, Handle value, std::size_t bytes)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    order_.push_front({key, std::move(value), {}});
+    const auto it = order_.begin();
+    // Called with the mutex, which is the budget's own.
+    const auto evict = [this, it]() ABSL_NO_THREAD_SAFETY_ANALYSIS { EraseAt(it); };
+    budget_->order_.push_front({bytes, evict});
+    it->item = budget_->order_.begin();
+    index_[key] = it;
+    bytes_ += bytes;
+    budget_->cached_ += bytes;
+  }
+
+  void EraseKey(const Key& key) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    const auto found = index_.find(key);
+    if (found != index_.end()) EraseAt(found->second);
+  }
+
+  void EraseAt(typename Order::iterator it) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    bytes_ -= it->item->bytes;
+    budget_->cached_ -= it->item->bytes;
+    budget_->dropped_.push_back(std::move(it->value));
+    index_.erase(it->key);
+    budget_->order_.erase(it->item);
+    order_.erase(it);
+  }
+
+  const std::shared_ptr<CacheBudget> budget_;
+  absl::Mutex& mutex_;  // the budget's
+  const std::size_t max_bytes_;
+  std::size_t bytes_ ABSL_GUARDED_BY(mutex_) = 0;
+  Order order_ ABSL_GUARDED_BY(mutex_);  // the latest used first
+  absl::flat_hash_map<Key, typename Order::iterator> index_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_COMMON_LRU_CACHE_H_
