@@ -216,9 +216,7 @@ void Work(api::Database& database, const std::string& kind) {
 }
 
 void AskAll(const std::filesystem::path& maps, int then) {
-  const auto opened = OpenEngine({.directory = maps,
-                                  .cache_bytes = std::size_t{8} << 20,
-                                  .planner_cache_bytes = std::size_t{8} << 20});
+  const auto opened = OpenEngine({.directory = maps, .cache_bytes = std::size_t{16} << 20});
   RequireGoodRefusal(opened.status());
   if (!opened.ok()) return;
   api::Database& database = **opened;

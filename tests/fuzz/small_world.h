@@ -14,7 +14,7 @@ namespace strata::fuzz {
 // The map and the trajectory of its scans, which are numbered from 1 on.
 inline constexpr char kWorld[] = "world";
 inline constexpr int kWorldScans = 3;
-inline constexpr int kWorldPoints = 500;  // of each scan, all labelled 1 or 2
+inline constexpr int kWorldPoints = 500;        // of each scan, all labelled 1 or 2
 inline constexpr double kWorldCellSizeM = 0.4;  // its points lie densely enough to drive on
 inline constexpr char kWorldClassifier[] = "first";
 
