@@ -13,6 +13,7 @@
 #include "core/common/checksum.h"
 #include "core/common/status.h"
 #include "core/engine/mls_tiles.h"
+#include "core/engine/scan_source.h"
 #include "core/storage/storage.h"
 #include "core/world/scan_hash.h"
 
@@ -45,6 +46,10 @@ absl::Status CheckParameters(const MlsParameters& map, const MlsParameters& loca
 // The box around its surfaces in the scan frame.
 absl::StatusOr<Eigen::AlignedBox3f> BoxOf(const MlsMap& local_map) {
   constexpr double kMaxCoordinateM = 1e6;
+  if (local_map.tiles.size() > kMaxScanTiles) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "local map of ", local_map.tiles.size(), " tiles; at most ", kMaxScanTiles, ", split it"));
+  }
   Eigen::AlignedBox3d box;
   for (const MlsTile& tile : local_map.tiles) {
     if (tile.key.level != 0) {

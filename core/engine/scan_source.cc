@@ -24,9 +24,6 @@ namespace strata {
 namespace {
 
 constexpr std::size_t kBlockPoints = 1'000'000;
-// Tiles a scan may touch. An almost empty one takes some kilobytes on its way into the map, and so
-// do those around it.
-constexpr std::size_t kMaxTiles = 4'096;
 
 template <typename T>
 void AppendTo(std::vector<T>& to, const std::vector<T>& from) {
@@ -40,39 +37,19 @@ void AppendPiece(const PointCloud& piece, PointCloud& block) {
   AppendTo(block.label, piece.label);
 }
 
-// Holds a scan whose points are far apart against kMaxTiles.
-class SpreadCheck {
- public:
-  // Only a scan with so large a box is looked at point by point.
-  SpreadCheck(const ScanRecord& scan, const Pose& T_map_scan, double cell_size_m)
-      : T_map_scan_(T_map_scan),
-        tile_m_(cell_size_m * kTileCells),
-        box_tiles_((FootprintOf(scan.box_scan, T_map_scan).sizes() / tile_m_).array() + 1.0) {}
+// Tiles in which a sensor may have points.
+using TilePlaces = absl::flat_hash_set<std::pair<std::int64_t, std::int64_t>>;
 
-  absl::Status Add(const PointCloud& block, const SensorModel& sensor) {
-    if (box_tiles_.prod() <= static_cast<double>(kMaxTiles)) return absl::OkStatus();
-    for (const Eigen::Vector3f& p : block.points) {
-      if (!((p - block.sensor_origin).norm() <= sensor.max_range_m)) continue;
-      const Eigen::Vector3d tile = (T_map_scan_ * p.cast<double>()) / tile_m_;
-      if (!(tile.cwiseAbs().maxCoeff() < kMaxCellIndex)) continue;
-      tiles_.insert({static_cast<std::int64_t>(std::floor(tile.x())),
-                     static_cast<std::int64_t>(std::floor(tile.y()))});
-    }
-    if (tiles_.size() <= kMaxTiles) return absl::OkStatus();
-    return absl::InvalidArgumentError(
-        absl::StrCat("points in more than ",
-                     kMaxTiles,
-                     " tiles of ",
-                     tile_m_,
-                     " m, the most of one scan; set the sensor's max range, or split the scan"));
+void AddTiles(const PointCloud& block,
+              const SensorModel& sensor,
+              double tile_m,
+              TilePlaces& tiles) {
+  for (const Eigen::Vector3f& p : block.points) {
+    if (!((p - block.sensor_origin).norm() <= sensor.max_range_m)) continue;
+    tiles.insert({static_cast<std::int64_t>(std::floor(p.x() / tile_m)),
+                  static_cast<std::int64_t>(std::floor(p.y() / tile_m))});
   }
-
- private:
-  const Pose T_map_scan_;
-  const double tile_m_;
-  const Eigen::Array2d box_tiles_;
-  absl::flat_hash_set<std::pair<std::int64_t, std::int64_t>> tiles_;
-};
+}
 
 // The points of `block` that have not faded.
 PointCloud Lasting(const PointCloud& block, const std::vector<std::uint16_t>& faded) {
@@ -130,9 +107,7 @@ absl::StatusOr<MlsMap> ScanSource::Build(const ScanRecord& scan,
   MlsMap map;
   map.parameters = parameters_.mls;
   dropped_ = DroppedPoints();
-  SpreadCheck spread(scan, T_map_scan, parameters_.mls.cell_size_m);
   STRATA_RETURN_IF_ERROR(ForEachBlock(scan, [&](const PointCloud& block) -> absl::Status {
-    STRATA_RETURN_IF_ERROR(spread.Add(block, sensor));
     const bool all = faded == Faded::kWith || held_faded_.empty();
     STRATA_ASSIGN_OR_RETURN(MlsBuildResult built,
                             BuildMlsMap(all ? block : Lasting(block, held_faded_),
@@ -153,8 +128,33 @@ absl::StatusOr<MlsMap> ScanSource::Build(const ScanRecord& scan,
   return map;
 }
 
+absl::Status ScanSource::CheckSpread(const ScanRecord& scan) {
+  const double tile_m = parameters_.mls.cell_size_m * kTileCells;
+  const Eigen::Array2d box_tiles =
+      (scan.box_scan.sizes().head<2>().cast<double>() / tile_m).array() + 1.0;
+  // Only a scan with so large a box is looked at point by point.
+  if (scan.box_scan.isEmpty() || box_tiles.prod() <= static_cast<double>(kMaxScanTiles)) {
+    return absl::OkStatus();
+  }
+  const SensorModel sensor = scan.header.sensor.value_or(parameters_.sensor);
+  TilePlaces tiles;
+  return ForEachBlock(scan, [&](const PointCloud& block) -> absl::Status {
+    AddTiles(block, sensor, tile_m, tiles);
+    if (tiles.size() <= kMaxScanTiles) return absl::OkStatus();
+    return absl::InvalidArgumentError(
+        absl::StrCat("points in more than ",
+                     kMaxScanTiles,
+                     " tiles of ",
+                     tile_m,
+                     " m, the most of one scan; set the sensor's max range, or split the scan"));
+  });
+}
+
 absl::StatusOr<MlsMap> ScanSource::LocalMap(const ScanRecord& scan) {
-  if (scan.has_points) return Build(scan, Pose::Identity(), Faded::kWith);
+  if (scan.has_points) {
+    STRATA_RETURN_IF_ERROR(CheckSpread(scan));
+    return Build(scan, Pose::Identity(), Faded::kWith);
+  }
   dropped_ = DroppedPoints();
   STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader_.GetLocalMap(scan.number));
   return DecodeLocalMap(bytes, parameters_.mls);

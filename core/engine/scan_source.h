@@ -21,6 +21,10 @@
 
 namespace strata {
 
+// Tiles of its own frame that a scan may touch. An almost empty one takes some kilobytes on its way
+// into the map, and so do those around it.
+inline constexpr std::size_t kMaxScanTiles = 4'096;
+
 // One thread at a time. Memory is bounded whatever a scan's size: large ones are built block by
 // block and joined, which gives the same map.
 class ScanSource {
@@ -30,7 +34,7 @@ class ScanSource {
       : reader_(reader), parameters_(parameters), labels_(labels) {}
 
   // The scan in its own frame. DATA_LOSS naming the piece that is damaged; INVALID_ARGUMENT for
-  // points so far apart that the scan would touch more than 4,096 tiles.
+  // points in more than kMaxScanTiles tiles.
   absl::StatusOr<MlsMap> LocalMap(const ScanRecord& scan);
   // What the scan adds to the map at this pose, without points that have faded: a pure function of
   // the scan, what is said of its points, the pose and the map's parameters, before and after
@@ -46,6 +50,8 @@ class ScanSource {
 
  private:
   enum class Faded { kWith, kWithout };
+  // Of the scan frame: what was taken once may be moved anywhere.
+  absl::Status CheckSpread(const ScanRecord& scan);
   absl::StatusOr<MlsMap> Build(const ScanRecord& scan, const Pose& T_map_scan, Faded faded);
 
   StorageReader& reader_;

@@ -56,9 +56,7 @@ absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::MakeFeatures(
 }
 
 absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::Features(std::size_t node) {
-  {
-    if (auto held = features_.Find(node); held != nullptr) return held;
-  }
+  if (auto held = features_.Find(node); held != nullptr) return held;
   auto features = MakeFeatures(scans_[node]);
   Remember(node, features.status());
   if (!features.ok()) return features;

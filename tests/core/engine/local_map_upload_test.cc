@@ -126,6 +126,14 @@ TEST_F(LocalMapUploadTest, HostileBytesAreRefused) {
   for (MlsTile& tile : far.tiles) tile.key.x += 1 << 20;
   EXPECT_THAT(Send({"run", 1}, PoseAt(0, 0), EncodeLocalMap(far)),
               StatusIs(Code::kInvalidArgument, HasSubstr("1e6 m")));
+  MlsMap wide = *DecodeLocalMap(good, SmallMap().mls);
+  wide.tiles.resize(1);
+  while (wide.tiles.size() <= 4'096) {
+    wide.tiles.push_back(wide.tiles.back());
+    ++wide.tiles.back().key.x;
+  }
+  EXPECT_THAT(Send({"run", 1}, PoseAt(0, 0), EncodeLocalMap(wide)),
+              StatusIs(Code::kInvalidArgument, HasSubstr("4097 tiles; at most 4096")));
 }
 
 TEST_F(LocalMapUploadTest, AnEmptyOneFailsToBeIntegratedAndSaysWhy) {
