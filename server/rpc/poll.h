@@ -2,14 +2,10 @@
 #ifndef STRATA_SERVER_RPC_POLL_H_
 #define STRATA_SERVER_RPC_POLL_H_
 
-#include <chrono>
-#include <memory>
-
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include <google/protobuf/message.h>
-#include <grpcpp/alarm.h>
 #include <grpcpp/server_context.h>
 #include <grpcpp/support/server_callback.h>
 
@@ -59,8 +55,6 @@ class PollReactor : public grpc::ServerWriteReactor<Out> {
   Request& request() { return request_; }
 
  private:
-  static constexpr std::chrono::milliseconds kInterval{100};
-
   // Then exactly one of: a message, a wait, the end.
   void LookAndSend() {
     const absl::Status status = Guarded([this]() -> absl::Status {
@@ -85,10 +79,7 @@ class PollReactor : public grpc::ServerWriteReactor<Out> {
   }
 
   void WaitAndLook() {
-    // A new alarm each time: the former one's callback may still be returning.
-    alarm_ = std::make_unique<grpc::Alarm>();
-    alarm_->Set(std::chrono::system_clock::now() + kInterval,
-                [this](bool) { runtime_.queries.Submit([this] { LookAndSend(); }); });
+    runtime_.ticker.AtNextTick([this] { LookAndSend(); });
   }
 
   void OnWriteDone(bool ok) override {
@@ -111,7 +102,6 @@ class PollReactor : public grpc::ServerWriteReactor<Out> {
   bool received_ = false;
   Out out_;
   News news_ = News::kNone;
-  std::unique_ptr<grpc::Alarm> alarm_;
 };
 
 // Answers with what a `Reactor` sends.

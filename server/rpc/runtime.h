@@ -19,6 +19,7 @@
 #include "server/rpc/client_limits.h"
 #include "server/rpc/executor.h"
 #include "server/rpc/silence.h"
+#include "server/rpc/ticker.h"
 
 namespace strata::server {
 
@@ -97,6 +98,7 @@ struct Runtime {
         streams(runtime_options.stream_threads, "stream"),
         uploads(runtime_options.upload_threads, "upload"),
         silence(runtime_options.slow_sender_timeout, uploads),
+        ticker(absl::Milliseconds(100), queries),
         calls(runtime_options.max_calls, "calls"),
         watches(runtime_options.max_watches, "watches") {}
 
@@ -109,6 +111,7 @@ struct Runtime {
   Executor streams;
   Executor uploads;
   SilenceWatch silence;
+  Ticker ticker;  // of watches
   CallGate calls;
   CallGate watches;
   std::atomic<bool> shutting_down = false;  // calls without an end of their own should end

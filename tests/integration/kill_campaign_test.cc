@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/integration/clock_campaign.h"
 #include "tests/integration/term_campaign.h"
 #include "tests/support/temp_dir.h"
 
@@ -59,6 +60,13 @@ TEST_F(KillCampaignTest, AServerThatIsToldToEndEndsWell) {
   options.terms = 2;
   options.longest_s = 60.0;
   ExpectNoViolation(RunTermCampaign(options));
+}
+
+TEST_F(KillCampaignTest, NothingIsLostWhenTheClockIsSet) {
+  ClockOptions options;
+  options.world = world_;
+  options.jumps = 1;
+  ExpectNoViolation(RunClockCampaign(options));
 }
 
 }  // namespace

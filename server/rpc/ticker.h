@@ -1,0 +1,44 @@
+// Looks at what may have changed, again and again.
+#ifndef STRATA_SERVER_RPC_TICKER_H_
+#define STRATA_SERVER_RPC_TICKER_H_
+
+#include <functional>
+#include <thread>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+
+#include "server/rpc/executor.h"
+
+namespace strata::server {
+
+// One thread for all that wait, whatever becomes of the machine's clock: grpc::Alarm stands still
+// for as long as that is set back. Thread-safe.
+class Ticker {
+ public:
+  // Ticks every `interval` while anything waits; `executor` must outlive the ticker.
+  Ticker(absl::Duration interval, Executor& executor);
+  // REQUIRES: nothing waits.
+  ~Ticker();
+  Ticker(const Ticker&) = delete;
+  Ticker& operator=(const Ticker&) = delete;
+
+  // Runs `task` on the executor at the next tick.
+  void AtNextTick(std::function<void()> task);
+
+ private:
+  void Loop();
+
+  const absl::Duration interval_;
+  Executor& executor_;
+  absl::Mutex mutex_;
+  bool closing_ ABSL_GUARDED_BY(mutex_) = false;
+  std::vector<std::function<void()>> waiting_ ABSL_GUARDED_BY(mutex_);
+  std::thread thread_;
+};
+
+}  // namespace strata::server
+
+#endif  // STRATA_SERVER_RPC_TICKER_H_
