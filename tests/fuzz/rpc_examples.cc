@@ -30,6 +30,8 @@
 namespace strata::fuzz {
 namespace {
 
+using google::protobuf::MethodDescriptor;
+
 // Of the calls that take one message: path behind the package, and request. Those with variants
 // come more than once.
 const std::multimap<std::string, std::string>& Examples() {
@@ -232,15 +234,63 @@ void AddImport(RpcCall& call) {
   AddRequest<v1::ImportClassifierRequest>(call).set_bytes(ClassifierBytes());
 }
 
-void AddText(RpcCall& call, std::minstd_rand& random) {
-  const std::string key = absl::StrCat(call.method->service()->name(), "/", call.method->name());
-  const auto [begin, end] = Examples().equal_range(key);
-  const auto count = static_cast<unsigned>(std::distance(begin, end));
-  Require(count > 0, "every call has an example");
-  call.requests.push_back(NewRequest(*call.method));
-  const std::string& text = std::next(begin, static_cast<int>(random() % count))->second;
+RpcCall CallOf(const MethodDescriptor& method, const std::string& text) {
+  RpcCall call;
+  call.method = &method;
+  call.requests.push_back(NewRequest(method));
   Require(google::protobuf::TextFormat::ParseFromString(text, call.requests.back().get()),
           "an example is a request of its call");
+  return call;
+}
+
+std::string KeyOf(const MethodDescriptor& method) {
+  return absl::StrCat(method.service()->name(), "/", method.name());
+}
+
+const MethodDescriptor& MethodOf(absl::string_view key) {
+  for (const MethodDescriptor* method : AllMethods()) {
+    if (KeyOf(*method) == key) return *method;
+  }
+  Require(false, "a story has calls that there are");
+  return *AllMethods()[0];
+}
+
+RpcCall AnyText(const MethodDescriptor& method, std::minstd_rand& random) {
+  const auto [begin, end] = Examples().equal_range(KeyOf(method));
+  const auto count = static_cast<unsigned>(std::distance(begin, end));
+  Require(count > 0, "every call has an example");
+  return CallOf(method, std::next(begin, static_cast<int>(random() % count))->second);
+}
+
+// The next job of the small world is its second.
+constexpr char kNextJob[] = "map: 'world' id: 2";
+
+using Story = std::vector<std::pair<absl::string_view, std::string>>;
+
+const std::vector<Story>& Stories() {
+  static const auto* const stories = new std::vector<Story>{
+      {{"Jobs/Start", "map: 'world' kind: 'optimize' parameters { key: 'dry_run' value: '1' }"},
+       {"Jobs/Watch", kNextJob},
+       {"Jobs/Accept", kNextJob},
+       {"Tiles/Fetch", "map: 'world' area { epoch: 2 }"},
+       {"Jobs/Revert", kNextJob}},
+      {{"Jobs/Start", "map: 'world' kind: 'optimize'"},
+       {"Jobs/Watch", kNextJob},
+       {"Maps/Watch", "name: 'world' since: 3 epoch: 2 tiles: true once: true"},
+       {"Jobs/Start", "map: 'world' kind: 'revert' parameters { key: 'epoch' value: '1' }"},
+       {"Tiles/List", "map: 'world' area { epoch: 1 }"}},
+      {{"Jobs/Start", "map: 'world' kind: 'classify' parameters { key: 'model' value: 'first' }"},
+       {"Jobs/Watch", kNextJob},
+       {"Scans/GetPoints", "map: 'world' id { trajectory: 'world' sequence: 1 }"},
+       {"Classifiers/Delete", "map: 'world' name: 'first'"},
+       {"Jobs/Start", "map: 'world' kind: 'verify'"}},
+      {{"Scans/Delete", "map: 'world' id { trajectory: 'world' sequence: 2 }"},
+       {"PoseGraph/Get", "map: 'world'"},
+       {"Jobs/Start", "map: 'world' kind: 'rebuild'"},
+       {"Tiles/Fetch", "map: 'world' area { epoch: 1 }"},
+       {"Planning/SampleSurfaces", "map: 'world' places { x: -2 y: 1.4 }"}},
+  };
+  return *stories;
 }
 
 template <typename Request>
@@ -276,12 +326,10 @@ void AnnounceScans(RpcCall& call) {
   finish();
 }
 
-}  // namespace
-
-RpcCall AnyExample(std::minstd_rand& random) {
+RpcCall AnExample(const MethodDescriptor& method, std::minstd_rand& random) {
   RpcCall call;
-  call.method = AllMethods()[random() % AllMethods().size()];
-  const absl::string_view input = call.method->input_type()->name();
+  call.method = &method;
+  const absl::string_view input = method.input_type()->name();
   if (input == "UploadScanRequest") {
     AddScan<v1::UploadScanRequest>(call, random);
   } else if (input == "IngestScansRequest") {
@@ -298,9 +346,39 @@ RpcCall AnyExample(std::minstd_rand& random) {
   } else if (input == "ImportClassifierRequest") {
     AddImport(call);
   } else {
-    AddText(call, random);
+    return AnyText(method, random);
   }
   return call;
+}
+
+// A scan that comes in two tries, goes, and comes again.
+RpcScript ScanStory(std::minstd_rand& random) {
+  RpcScript script;
+  script.push_back(AnExample(MethodOf("Scans/Upload"), random));
+  script[0].cut = false;
+  script.push_back(CopyOf(script[0]));
+  script.insert(script.begin(), BreakOff(script[0], random));
+  script.insert(
+      script.begin() + 2,
+      CallOf(
+          MethodOf("Scans/Delete"),
+          absl::StrCat("map: 'world' id { trajectory: 'run' sequence: ", 1 + random() % 3, " }")));
+  script.push_back(CopyOf(script.back()));
+  return script;
+}
+
+}  // namespace
+
+RpcCall AnyExample(std::minstd_rand& random) {
+  return AnExample(*AllMethods()[random() % AllMethods().size()], random);
+}
+
+RpcScript AnyStory(std::minstd_rand& random) {
+  const std::size_t which = random() % (Stories().size() + 1);
+  if (which == Stories().size()) return ScanStory(random);
+  RpcScript script;
+  for (const auto& [key, text] : Stories()[which]) script.push_back(CallOf(MethodOf(key), text));
+  return script;
 }
 
 RpcCall BreakOff(RpcCall& call, std::minstd_rand& random) {

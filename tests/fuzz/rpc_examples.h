@@ -11,6 +11,9 @@ namespace strata::fuzz {
 // A call of any method.
 RpcCall AnyExample(std::minstd_rand& random);
 
+// Calls of which each needs what those before it did.
+RpcScript AnyStory(std::minstd_rand& random);
+
 // An earlier try of the same stream, of which only some requests came. Of a resumable upload `call`
 // then has only what was not sent. REQUIRES: `call` has a request.
 RpcCall BreakOff(RpcCall& call, std::minstd_rand& random);

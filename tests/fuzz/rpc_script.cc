@@ -89,15 +89,6 @@ std::string WriteCall(const RpcCall& call) {
   return bytes + bodies;
 }
 
-RpcCall CopyOf(const RpcCall& call) {
-  RpcCall copy{.method = call.method, .requests = {}, .cut = call.cut};
-  for (const std::unique_ptr<Message>& request : call.requests) {
-    copy.requests.push_back(NewRequest(*call.method));
-    copy.requests.back()->CopyFrom(*request);
-  }
-  return copy;
-}
-
 void MutateCall(RpcCall& call, std::minstd_rand& random) {
   auto& requests = call.requests;
   const bool one = requests.size() == 1 && !call.method->client_streaming();
@@ -127,6 +118,15 @@ std::unique_ptr<Message> NewRequest(const MethodDescriptor& method) {
                                       ->New());
 }
 
+RpcCall CopyOf(const RpcCall& call) {
+  RpcCall copy{.method = call.method, .requests = {}, .cut = call.cut};
+  for (const std::unique_ptr<Message>& request : call.requests) {
+    copy.requests.push_back(NewRequest(*call.method));
+    copy.requests.back()->CopyFrom(*request);
+  }
+  return copy;
+}
+
 std::string RpcCall::path() const {
   return absl::StrCat("/", method->service()->full_name(), "/", method->name());
 }
@@ -148,6 +148,10 @@ std::string WriteScript(const RpcScript& script, std::size_t most) {
 }
 
 void MutateScript(RpcScript& script, std::minstd_rand& random) {
+  if (script.empty() && random() % 2 == 0) {
+    script = AnyStory(random);
+    return;
+  }
   const auto place = [&] { return static_cast<std::ptrdiff_t>(random() % script.size()); };
   const unsigned what = script.empty() ? 0 : random() % 16;
   if (what < 3 && script.size() < kMostCalls) {

@@ -27,6 +27,8 @@ struct RpcCall {
   std::string path() const;
 };
 
+RpcCall CopyOf(const RpcCall& call);
+
 using RpcScript = std::vector<RpcCall>;
 
 std::unique_ptr<google::protobuf::Message> NewRequest(
