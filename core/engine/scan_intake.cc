@@ -11,6 +11,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
 #include <Eigen/Core>
 
 #include "core/api/chunk_check.h"
@@ -142,7 +143,8 @@ void ScanIntake::SealPiece() {
 
 absl::Status ScanIntake::StagePieces(const Stop& stop) {
   touched_ = SteadyNow();
-  const UnfinishedUpload unfinished = Unfinished();
+  UnfinishedUpload unfinished = Unfinished();
+  unfinished.touched = absl::Now();  // for later runs
   const auto put = [&, this](StorageWriter& writer) ABSL_NO_THREAD_SAFETY_ANALYSIS -> absl::Status {
     for (std::size_t i = 0; i < pieces_.size(); ++i) {
       STRATA_RETURN_IF_ERROR(

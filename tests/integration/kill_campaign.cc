@@ -83,11 +83,11 @@ void KillCampaign::KillServer() {
 }
 
 void KillCampaign::CheckEnd() {
-  world_.RetireRobotsAndCheck();
   if (work_ != nullptr) {
     work_->StopAndCheck(world_.db());
     for (const auto& [name, number] : work_->Numbers()) numbers_[name] = number;
   }
+  world_.RetireRobotsAndCheck();
   numbers_["scans"] = static_cast<double>(world_.CheckContent(!options_.work));
 }
 
