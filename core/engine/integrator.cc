@@ -75,9 +75,12 @@ absl::StatusOr<std::uint64_t> Integrator::ReserveVersion() {
   std::uint64_t version = 0;
   STRATA_RETURN_IF_ERROR(core_.writer().Run(
       Durability::kRelaxed, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
+        // Left by work that failed: they would be taken for what is stored, and be published too.
+        if (core_.tiles_staged()) STRATA_RETURN_IF_ERROR(writer.DiscardUnpublished());
         STRATA_ASSIGN_OR_RETURN(version, writer.NextCommitSequence());
         return absl::OkStatus();
       }));
+  core_.set_tiles_staged(false);
   return version;
 }
 

@@ -53,6 +53,9 @@ class MapCore {
   void Publish(const MapClock& clock,
                const std::vector<ScanId>& scans,
                const std::vector<api::TileChangeNotice>& tiles);
+  // Whether the store may hold tiles that were staged and neither published nor discarded.
+  bool tiles_staged() const { return tiles_staged_; }
+  void set_tiles_staged(bool staged) { tiles_staged_ = staged; }
   // A number for the chunks of one more upload.
   std::uint64_t NextUpload() { return last_upload_.fetch_add(1) + 1; }
 
@@ -80,6 +83,7 @@ class MapCore {
   ReaderPool readers_;
   WriterThread writer_;
   std::atomic<std::uint64_t> last_upload_;
+  std::atomic<bool> tiles_staged_ = false;
 };
 
 }  // namespace strata

@@ -12,13 +12,12 @@
 namespace strata {
 
 StagedTiles::~StagedTiles() {
-  if (published_) return;
-  core_.writer()
-      .Run(Durability::kRelaxed,
-           0,
-           Stop(),
-           [](StorageWriter& writer) { return writer.DiscardUnpublished(); })
-      .IgnoreError();
+  const absl::Status clean =
+      published_ ? absl::OkStatus()
+                 : core_.writer().Run(Durability::kRelaxed, 0, Stop(), [](StorageWriter& writer) {
+                     return writer.DiscardUnpublished();
+                   });
+  core_.set_tiles_staged(!clean.ok());
 }
 
 absl::Status StagedTiles::Put(const MlsTileMap& tiles, const SurfaceTileMaker::Rows& surfaces) {

@@ -16,11 +16,14 @@
 
 namespace strata {
 
-// One thread at a time. What is not published is discarded with it, or by the next start.
+// One thread at a time. What is not published is discarded with it; where the store fails, before
+// the next version is made, or by the next start.
 class StagedTiles {
  public:
   // `version`: newer than the current one; of all rows.
-  StagedTiles(MapCore& core, std::uint64_t version) : core_(core), version_(version) {}
+  StagedTiles(MapCore& core, std::uint64_t version) : core_(core), version_(version) {
+    core_.set_tiles_staged(true);
+  }
   ~StagedTiles();
   StagedTiles(const StagedTiles&) = delete;
   StagedTiles& operator=(const StagedTiles&) = delete;

@@ -1,6 +1,8 @@
 #include "core/engine/truth_check.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <utility>
@@ -16,6 +18,10 @@
 #include "core/common/status.h"
 #include "core/engine/scan_labels.h"
 #include "core/geometry/pose.h"
+#include "core/world/constraint.h"
+#include "core/world/epoch.h"
+#include "core/world/map_class.h"
+#include "core/world/robot_profile.h"
 #include "core/world/scan_hash.h"
 
 namespace strata {
@@ -104,6 +110,36 @@ void TruthCheck::CheckScan(StorageReader& reader, const PosedScan& posed, Report
   check(bytes.ok() ? DecodeLocalMap(*bytes, core_.info().parameters.mls).status() : bytes.status());
 }
 
+// Nothing of these carries a checksum, but not every number makes sense.
+absl::Status TruthCheck::CheckDecisions(StorageReader& reader, ScanNumber last, Report report) {
+  const auto check = [&](const std::string& what, const absl::Status& sound) {
+    if (!sound.ok()) report(absl::StrCat(what, ": ", sound.message()));
+  };
+  STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader.GetClock());
+  if (clock.commit_sequence < std::max(last, clock.tile_version)) {
+    report(absl::StrCat("the map's clock, ", clock.commit_sequence, ", is behind what it counted"));
+  }
+  STRATA_ASSIGN_OR_RETURN(const std::vector<EpochInfo> epochs, reader.ListEpochs());
+  for (std::size_t i = 0; i < epochs.size(); ++i) {
+    if (epochs[i].epoch == epochs.size() - i && epochs[i].current == (i == 0)) continue;
+    report(absl::StrCat("epoch ", epochs[i].epoch, " of ", epochs.size(), ", now ", clock.epoch));
+  }
+  STRATA_ASSIGN_OR_RETURN(const auto profiles, reader.ListProfiles());
+  for (const auto& [name, profile] : profiles) {
+    check(absl::StrCat("profile ", name), ValidateRobotProfile(profile));
+  }
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes, reader.ListClasses());
+  for (const MapClass& each : classes) {
+    check(absl::StrCat("class ", each.id), ValidateMapClass(each));
+  }
+  STRATA_ASSIGN_OR_RETURN(const std::vector<ConstraintRecord> constraints,
+                          reader.ListConstraints(clock.epoch));
+  for (const ConstraintRecord& record : constraints) {
+    check(absl::StrCat("constraint ", record.constraint.id), ValidateConstraint(record.constraint));
+  }
+  return reader.ListPlanes(clock.epoch).status();
+}
+
 absl::Status TruthCheck::Run(Report report) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
   STRATA_ASSIGN_OR_RETURN(const std::vector<ScanNumber> numbers, reader->ListScanNumbers());
@@ -123,10 +159,10 @@ absl::Status TruthCheck::Run(Report report) {
     });
   }
   CheckClassifiers(*reader, report);
-  absl::Status constraints = reader->ListConstraints(epoch).status();
-  if (constraints.ok()) constraints = reader->ListPlanes(epoch).status();
-  if (!absl::IsDataLoss(constraints)) return constraints;
-  report(std::string(constraints.message()));
+  const absl::Status decisions =
+      CheckDecisions(*reader, numbers.empty() ? 0 : numbers.back(), report);
+  if (!absl::IsDataLoss(decisions)) return decisions;
+  report(std::string(decisions.message()));
   return absl::OkStatus();
 }
 

@@ -31,6 +31,7 @@ class TruthCheck {
   void CheckScan(StorageReader& reader, const PosedScan& posed, Report report);
   void CheckPoints(StorageReader& reader, const ScanRecord& scan, Report report);
   void CheckLabels(StorageReader& reader, const ScanRecord& scan, Report report);
+  absl::Status CheckDecisions(StorageReader& reader, ScanNumber last, Report report);
   void CheckClassifiers(StorageReader& reader, Report report);
 
   MapCore& core_;

@@ -155,6 +155,29 @@ TEST_P(DiskFaultTest, AMapIsMadeAsAWholeOrNotAtAll) {
   }
 }
 
+// Its tiles were put into the store beside the current ones, and could not be discarded either.
+TEST_P(DiskFaultTest, NothingOfAMoveThatFailedIsTakenForAnother) {
+  EXPECT_EQ(PutAll(1, 4), 0);
+  WaitIntegrated(db());
+  std::uint64_t next = 5;
+  for (int sound = 0; sound < 400; sound += 1 + sound / 4) {
+    SCOPED_TRACE(sound);
+    const Pose T_map_scan = PoseAt(3.0, 0.1 * sound, 0.2);
+    disk_.Fail(GetParam().fault, sound);
+    const absl::Status moved = db().posegraph().SetPose({}, kMapName, {"run", 2}, T_map_scan);
+    disk_.Mend();
+    if (sound % 2 == 0) {
+      EXPECT_EQ(PutAll(next, next), 0);
+      ++next;
+    } else {
+      STRATA_EXPECT_OK(db().posegraph().SetPose({}, kMapName, {"run", 2}, T_map_scan));
+    }
+    WaitIntegrated(db());
+    ExpectSound();
+    if (moved.ok()) break;
+  }
+}
+
 // The end of a job is stored before anybody sees it.
 TEST_P(DiskFaultTest, AJobWhoseEndCannotBeStoredRunsAgain) {
   EXPECT_EQ(PutAll(1, 30), 0);

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <iterator>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -97,6 +98,30 @@ TEST_F(EngineVerifyTest, ADamagedPoseOfAnEarlierEpochIsNamed) {
       "WHERE epoch = 1 AND scan = (SELECT number FROM truth_scan WHERE sequence = 2)");
   Reopen();
   EXPECT_THAT(RunJob(db(), "verify").message, StartsWith("1 mismatch: scan run/2: in epoch 1: "));
+}
+
+// No checksum tells of these, but they cannot be.
+TEST_F(EngineVerifyTest, NumbersThatMakeNoSenseAreNamed) {
+  const std::pair<const char*, const char*> faults[] = {
+      {"UPDATE truth_map SET commit_sequence = 1", "the map's clock, 1, is behind"},
+      {"UPDATE truth_epoch SET epoch = 257", "epoch 257 of 1, now 1"},
+      {"UPDATE truth_profile SET radius_m = -0.4 WHERE name = 'cart'", "profile cart: "},
+      {"UPDATE truth_class SET id = 1025", "class 1025: "},
+      {"UPDATE truth_scan SET state = 18 WHERE sequence = 2", "scan run/2: state 18 is none"}};
+  int number = 0;
+  for (const auto& [sql, named] : faults) {
+    const std::string map = "map" + std::to_string(++number);
+    MakeMap(SmallMap(), map);
+    UploadRoom(1, RoomPose(1), map);
+    UploadRoom(2, RoomPose(2), map);
+    STRATA_ASSERT_OK(db().planning().SetProfile({}, map, "cart", RobotProfile()));
+    STRATA_ASSERT_OK(db().maps().SetClass({}, map, {1, "ground", {1, 2, 3}}));
+    WaitIntegrated(db(), map);
+    Close();
+    Sql(sql, map);
+    Reopen();
+    EXPECT_THAT(RunJob(db(), "verify", {}, map).message, HasSubstr(named)) << sql;
+  }
 }
 
 TEST_F(EngineVerifyTest, ADamagedRowHidesNoOtherFromAListing) {
