@@ -1,5 +1,6 @@
 // stratad: the database behind gRPC.
 #include <csignal>
+#include <ctime>
 #include <functional>
 #include <iostream>
 #include <memory>
@@ -10,7 +11,9 @@
 #include "absl/strings/str_cat.h"
 #include <CLI/CLI.hpp>
 #include <glog/logging.h>
+#include <malloc.h>
 #include <pthread.h>
+#include <sys/resource.h>
 
 #include "core/common/log_line.h"
 #include "core/common/status.h"
@@ -26,7 +29,8 @@ namespace {
 constexpr int kFailed = 1;
 constexpr int kUsage = 2;
 
-// SIGTERM and SIGINT wait for sigwait(). Called before there are other threads, which inherit it.
+// SIGTERM and SIGINT wait for AwaitSignal(). Called before there are other threads, which inherit
+// it.
 sigset_t BlockSignals() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -34,6 +38,31 @@ sigset_t BlockSignals() {
   sigaddset(&signals, SIGINT);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   return signals;
+}
+
+// Every connection is a file, and so are the maps: as many as the system lets this process have.
+void RaiseFileLimit() {
+  rlimit files{};
+  if (getrlimit(RLIMIT_NOFILE, &files) != 0) return;
+  files.rlim_cur = files.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &files);
+}
+
+// By default every thread has a heap of its own, and what it freed in the middle of it stays with
+// the process: beside hostile clients a gigabyte of which half was free.
+void KeepHeapsSmall() {
+  mallopt(M_ARENA_MAX, 4);
+  mallopt(M_MMAP_THRESHOLD, 1 << 20);  // larger blocks go back at once
+}
+
+// Gives free memory back from time to time.
+int AwaitSignal(const sigset_t& signals) {
+  constexpr timespec kInterval{10, 0};
+  while (true) {
+    const int signal = sigtimedwait(&signals, nullptr, &kInterval);
+    if (signal > 0) return signal;
+    malloc_trim(0);
+  }
 }
 
 LogLine StartLine(const ProgramOptions& options, const std::string& address) {
@@ -53,9 +82,11 @@ LogLine StartLine(const ProgramOptions& options, const std::string& address) {
 }
 
 absl::Status Serve(const ProgramOptions& options) {
+  KeepHeapsSmall();
   FLAGS_logtostderr = true;
   google::InitGoogleLogging("stratad");
   const sigset_t signals = BlockSignals();
+  RaiseFileLimit();
   STRATA_RETURN_IF_ERROR(CheckExposure(options.server));  // before a directory is made
   STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<api::Database> database,
                           OpenEngine(options.engine));
@@ -64,8 +95,7 @@ absl::Status Serve(const ProgramOptions& options) {
   // Before any other line with an address, for scripts that read both streams as one.
   std::cout << "listening " << server->address() << std::endl;
   LOG(INFO) << StartLine(options, server->address());
-  int signal = 0;
-  sigwait(&signals, &signal);
+  const int signal = AwaitSignal(signals);
   LOG(INFO) << LogLine("shutdown").Add("signal", signal);
   server->Shutdown();
   return absl::OkStatus();

@@ -10,6 +10,7 @@
 #include <glog/logging.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/resource_quota.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
 
@@ -40,6 +41,9 @@ constexpr int kKeepaliveMs = 30'000;
 constexpr int kMinPingIntervalMs = 10'000;
 constexpr int kMaxMetadataBytes = 16 << 10;
 constexpr int kHandshakeMs = 10'000;
+// Of all connections together: some 40 KB each, and the messages on their way. Where it is used up,
+// new connections are refused.
+constexpr std::size_t kTransportBytes = std::size_t{160} << 20;
 // A connection without calls; a client that comes again connects again by itself.
 constexpr int kIdleConnectionMs = 10 * 60 * 1000;
 
@@ -115,6 +119,7 @@ void LimitConnections(grpc::ServerBuilder& builder, const ServerOptions& options
                              options.client.max_calls + options.client.max_watches);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, kIdleConnectionMs);
+  builder.SetResourceQuota(grpc::ResourceQuota("connections").Resize(kTransportBytes));
 }
 
 void AddUnderWay(MetricFamilies& families, const Runtime& runtime) {

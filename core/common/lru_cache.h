@@ -23,7 +23,7 @@ class LruCache {
 
   // Holds at most `max_bytes` of the budget.
   LruCache(std::shared_ptr<CacheBudget> budget, std::size_t max_bytes)
-      : budget_(std::move(budget)), mutex_(budget_->mutex_), max_bytes_(max_bytes) {}
+      : budget_(std::move(budget)), max_bytes_(max_bytes) {}
   explicit LruCache(const std::shared_ptr<CacheBudget>& budget)
       : LruCache(budget, budget->max_bytes()) {}
   ~LruCache() { Clear(); }
@@ -32,7 +32,7 @@ class LruCache {
 
   // nullptr if it is not there.
   Handle Find(const Key& key) {
-    absl::MutexLock lock(&mutex_);
+    absl::MutexLock lock(&budget_->mutex_);
     const auto found = index_.find(key);
     if (found == index_.end()) return nullptr;
     const auto it = found->second;
@@ -44,7 +44,7 @@ class LruCache {
   // Replaces what was there. A value larger than the cache may be is not kept.
   void Put(const Key& key, Handle value, std::size_t bytes) {
     CacheBudget::Values dropped;
-    absl::MutexLock lock(&mutex_);
+    absl::MutexLock lock(&budget_->mutex_);
     EraseKey(key);
     if (bytes <= max_bytes_) {
       Insert(key, std::move(value), bytes);
@@ -56,20 +56,20 @@ class LruCache {
 
   void Erase(const Key& key) {
     CacheBudget::Values dropped;
-    absl::MutexLock lock(&mutex_);
+    absl::MutexLock lock(&budget_->mutex_);
     EraseKey(key);
     dropped.swap(budget_->dropped_);
   }
 
   void Clear() {
     CacheBudget::Values dropped;
-    absl::MutexLock lock(&mutex_);
+    absl::MutexLock lock(&budget_->mutex_);
     while (!order_.empty()) EraseAt(order_.begin());
     dropped.swap(budget_->dropped_);
   }
 
   std::size_t bytes() const {
-    absl::MutexLock lock(&mutex_);
+    absl::MutexLock lock(&budget_->mutex_);
     return bytes_;
   }
 
@@ -82,7 +82,7 @@ class LruCache {
   using Order = std::list<Entry>;
 
   void Insert(const Key& key, Handle value, std::size_t bytes)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(budget_->mutex_) {
     order_.push_front({key, std::move(value), {}});
     const auto it = order_.begin();
     // Called with the mutex, which is the budget's own.
@@ -94,12 +94,12 @@ class LruCache {
     budget_->cached_ += bytes;
   }
 
-  void EraseKey(const Key& key) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+  void EraseKey(const Key& key) ABSL_EXCLUSIVE_LOCKS_REQUIRED(budget_->mutex_) {
     const auto found = index_.find(key);
     if (found != index_.end()) EraseAt(found->second);
   }
 
-  void EraseAt(typename Order::iterator it) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+  void EraseAt(typename Order::iterator it) ABSL_EXCLUSIVE_LOCKS_REQUIRED(budget_->mutex_) {
     bytes_ -= it->item->bytes;
     budget_->cached_ -= it->item->bytes;
     budget_->dropped_.push_back(std::move(it->value));
@@ -109,11 +109,10 @@ class LruCache {
   }
 
   const std::shared_ptr<CacheBudget> budget_;
-  absl::Mutex& mutex_;  // the budget's
   const std::size_t max_bytes_;
-  std::size_t bytes_ ABSL_GUARDED_BY(mutex_) = 0;
-  Order order_ ABSL_GUARDED_BY(mutex_);  // the latest used first
-  absl::flat_hash_map<Key, typename Order::iterator> index_ ABSL_GUARDED_BY(mutex_);
+  std::size_t bytes_ ABSL_GUARDED_BY(budget_->mutex_) = 0;
+  Order order_ ABSL_GUARDED_BY(budget_->mutex_);  // the latest used first
+  absl::flat_hash_map<Key, typename Order::iterator> index_ ABSL_GUARDED_BY(budget_->mutex_);
 };
 
 }  // namespace strata

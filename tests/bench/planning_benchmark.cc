@@ -235,7 +235,7 @@ class BoostSearch {
 
 // ---- the comparison ----
 
-std::vector<std::pair<PatchId, PatchId>> PickQueries(const SearchSpace& space,
+std::vector<std::pair<PatchId, PatchId>> PickQueries(SearchSpace& space,
                                                      BoostSearch& peer,
                                                      const BoostGraph& graph,
                                                      std::size_t count) {
@@ -258,7 +258,7 @@ std::vector<std::pair<PatchId, PatchId>> PickQueries(const SearchSpace& space,
   return queries;
 }
 
-PlanEndpoint EndpointOf(const SearchSpace& space, PatchId patch) {
+PlanEndpoint EndpointOf(SearchSpace& space, PatchId patch) {
   const Eigen::Vector3d p = space.Position(patch);
   return {.x_m = p.x(), .y_m = p.y(), .z_m = p.z()};
 }
