@@ -46,11 +46,15 @@ absl::StatusOr<Line> MakeLine(const Eigen::Vector3d& origin, const Eigen::Vector
 }
 
 absl::StatusOr<Plane> MakePlane(const Eigen::Vector3d& normal, double distance) {
-  if (!std::isfinite(distance)) return absl::InvalidArgumentError("plane: distance is not finite");
   if (const absl::Status status = CheckDirection("plane: normal", normal); !status.ok()) {
     return status;
   }
-  return Plane{.normal = normal.stableNormalized(), .distance = distance / normal.stableNorm()};
+  // A short normal may also take a finite distance beyond all numbers.
+  const double from_origin = distance / normal.stableNorm();
+  if (!std::isfinite(from_origin)) {
+    return absl::InvalidArgumentError("plane: distance is not finite");
+  }
+  return Plane{.normal = normal.stableNormalized(), .distance = from_origin};
 }
 
 Plane Canonical(const Plane& plane) {

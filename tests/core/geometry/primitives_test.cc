@@ -58,6 +58,8 @@ TEST(PrimitivesTest, MakersNormaliseAndRefuseWhatHasNoDirection) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("normal")));
   EXPECT_THAT(MakePlane({1, 0, 0}, kNan),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("distance")));
+  EXPECT_THAT(MakePlane({0, 0, 1e-9}, 1e300),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("distance")));
 }
 
 TEST(PrimitivesTest, CanonicalKeepsThePointsAndFixesTheSign) {
