@@ -41,7 +41,12 @@ Kinds and their parameters (and threads=1..64 for the first three):
             folds=0..100        Of the validation over scans (5)
             region_m=M          Scans taken in one square of M metres are left out together (0: each alone)
   classify  The classifier model=NAME labels every scan that it has not labelled yet.
-  evaluate  The classifier model=NAME against labels that people gave.)";
+  evaluate  The classifier model=NAME against labels that people gave.
+  fade      Points through whose place later scans looked leave the tiles.
+            scans=1..1000       That have to have looked (3, or the map's own number)
+            rays=1..100000      Of theirs together (10)
+            clearance_m=0.05..10  How far beyond the place a ray must end (0.3)
+            undo=0|1            Everything comes back (0))";
 
 struct JobOptions {
   std::string map;
@@ -145,8 +150,9 @@ void AddParameters(CLI::App* verb, JobOptions& options) {
 
 void AddStart(CLI::App* start, JobOptions& options) {
   start
-      ->add_option(
-          "KIND", options.kind, "rebuild, verify, optimize, revert, train, classify or evaluate")
+      ->add_option("KIND",
+                   options.kind,
+                   "rebuild, verify, optimize, revert, train, classify, evaluate or fade")
       ->required();
   AddParameters(start, options);
   start->add_flag(
@@ -170,7 +176,7 @@ void AddJobCommands(Commands& commands) {
     return app;
   };
   AddStart(verb("start",
-                "Start a job: rebuild, verify, optimize, revert, train, classify or evaluate",
+                "Start a job: rebuild, verify, optimize, revert, train, classify, evaluate or fade",
                 "strata job start campus optimize rounds=3 --dry-run --wait",
                 Start),
            *options);

@@ -144,6 +144,10 @@ absl::StatusOr<Statement> Database::Prepare(const char* sql) {
   if (statement == nullptr) {
     const int code =
         sqlite3_prepare_v3(connection_, sql, -1, SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
+    // Our text is right, so the file lacks a table or a column that the text names.
+    if (code == SQLITE_ERROR) {
+      return absl::DataLossError(absl::StrCat("store: ", sqlite3_errmsg(connection_)));
+    }
     STRATA_RETURN_IF_ERROR(StatusOf(code, connection_));
   }
   return Statement(statement);
