@@ -33,10 +33,10 @@ constexpr int kMostEdits = 8;
 using Database = std::unique_ptr<sqlite3, decltype(&sqlite3_close)>;
 using Statement = std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_finalize)>;
 
+// nullptr for a table that an edit has damaged so that SQLite does not open it: those of an R-tree.
 Statement Prepare(sqlite3* database, const std::string& sql) {
   sqlite3_stmt* statement = nullptr;
-  Require(sqlite3_prepare_v2(database, sql.c_str(), -1, &statement, nullptr) == SQLITE_OK,
-          "SQL is sound");
+  sqlite3_prepare_v2(database, sql.c_str(), -1, &statement, nullptr);
   return {statement, &sqlite3_finalize};
 }
 
@@ -45,6 +45,7 @@ std::vector<std::string> TablesOf(sqlite3* database) {
       Prepare(database,
               "SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite%' "
               "ORDER BY name");
+  Require(statement != nullptr, "the tables are told");
   std::vector<std::string> names;
   while (sqlite3_step(statement.get()) == SQLITE_ROW) {
     names.emplace_back(reinterpret_cast<const char*>(sqlite3_column_text(statement.get(), 0)));
@@ -115,7 +116,7 @@ void Edit(FuzzedDataProvider& input, sqlite3* database, const std::vector<std::s
   const int row = input.ConsumeIntegralInRange(0, 15);
   const Statement select =
       Prepare(database, absl::StrCat("SELECT * FROM ", table, " LIMIT 1 OFFSET ", row));
-  if (sqlite3_step(select.get()) != SQLITE_ROW) return;
+  if (select == nullptr || sqlite3_step(select.get()) != SQLITE_ROW) return;
   const int columns = sqlite3_column_count(select.get());
   std::vector<std::string> same;
   for (int i = 0; i < columns; ++i) {
@@ -129,6 +130,7 @@ void Edit(FuzzedDataProvider& input, sqlite3* database, const std::vector<std::s
                    "UPDATE ", table, " SET ", sqlite3_column_name(select.get(), column), " = ?1");
   const Statement change =
       Prepare(database, absl::StrCat(what, " WHERE ", absl::StrJoin(same, " AND ")));
+  if (change == nullptr) return;
   for (int i = 0; i < columns; ++i) {
     sqlite3_bind_value(change.get(), i + 2, sqlite3_column_value(select.get(), i));
   }
