@@ -11,6 +11,16 @@
 
 namespace strata::testing {
 
+std::unique_ptr<api::Database> ConnectPatiently(const std::string& address) {
+  ClientOptions options;
+  options.target = address;
+  options.backoff.initial = absl::Milliseconds(20);
+  options.backoff.max_attempts = 20;
+  auto client = Connect(options);
+  EXPECT_THAT(client, IsOk());
+  return client.ok() ? *std::move(client) : nullptr;
+}
+
 void Clients::Add(const std::string& target, Step step) {
   ClientOptions options;
   options.target = target;

@@ -12,6 +12,9 @@
 
 namespace strata::testing {
 
+// A client that tries again soon and often, as beside a server that is cut off or killed.
+std::unique_ptr<api::Database> ConnectPatiently(const std::string& address);
+
 // A thread a client, each with a connection of its own.
 class Clients {
  public:

@@ -16,6 +16,7 @@
 #include "core/common/status.h"
 #include "tests/integration/campaign_scans.h"
 #include "tests/integration/campaign_world.h"
+#include "tests/integration/clients.h"
 #include "tests/integration/cutting_proxy.h"
 #include "tests/integration/numbered_scans.h"
 #include "tests/integration/stratad_process.h"
@@ -36,15 +37,6 @@ class ExactlyOnceTest : public ::testing::Test {
   std::unique_ptr<StratadProcess> Start(const std::string& listen = "127.0.0.1:0") const {
     return std::make_unique<StratadProcess>(std::vector<std::string>{
         "--data", (directory_.path() / "maps").string(), "--listen", listen});
-  }
-  static std::unique_ptr<api::Database> ConnectPatiently(const std::string& address) {
-    ClientOptions options;
-    options.target = address;
-    options.backoff.initial = absl::Milliseconds(20);
-    options.backoff.max_attempts = 20;
-    auto client = Connect(options);
-    EXPECT_THAT(client, IsOk());
-    return client.ok() ? *std::move(client) : nullptr;
   }
   static absl::Status WriteUpTo(api::ScanUpload& upload, const PointCloud& cloud, std::size_t end) {
     for (std::size_t begin = upload.points_held(); begin < end; begin += kChunk) {

@@ -13,6 +13,7 @@
 
 #include "client/sdk/client.h"
 #include "core/common/status.h"
+#include "tests/integration/clients.h"
 #include "tests/integration/cutting_proxy.h"
 #include "tests/integration/numbered_scans.h"
 #include "tests/integration/stratad_process.h"
@@ -30,19 +31,10 @@ class LostAnswersTest : public ::testing::Test {
   LostAnswersTest()
       : process_({"--data", (directory_.path() / "maps").string(), "--listen", "127.0.0.1:0"}) {}
   void SetUp() override {
-    direct_ = ConnectTo(process_.Address());
+    direct_ = ConnectPatiently(process_.Address());
     STRATA_ASSERT_OK(direct_->maps().Create({}, kMap, {}));
   }
 
-  static std::unique_ptr<api::Database> ConnectTo(const std::string& address) {
-    ClientOptions options;
-    options.target = address;
-    options.backoff.initial = absl::Milliseconds(20);
-    options.backoff.max_attempts = 20;
-    auto client = Connect(options);
-    EXPECT_THAT(client, IsOk());
-    return client.ok() ? *std::move(client) : nullptr;
-  }
   static absl::StatusOr<ScanAck> Put(api::Database& db, std::uint64_t sequence) {
     const PointCloud cloud = NumberedCloud(sequence, kPoints);
     STRATA_ASSIGN_OR_RETURN(const auto upload,
@@ -60,7 +52,7 @@ class LostAnswersTest : public ::testing::Test {
         if (std::exchange(broken, true)) return {};
         return {.answer_frames = frames};
       });
-      const auto db = ConnectTo(proxy.address());
+      const auto db = ConnectPatiently(proxy.address());
       SCOPED_TRACE(absl::StrCat("after ", frames, " frames"));
       if (db == nullptr) return frames;
       call(static_cast<std::uint64_t>(frames) + 1, *db);
