@@ -118,6 +118,19 @@ TEST_F(ResumeTest, WhatIsLeftIsFoundInWhateverOrderItsStreamsEnd) {
   ExpectStoredAsSent(header.id);
 }
 
+// What was put to disk of an upload that broke off is the scan's own once it is whole.
+TEST_F(ResumeTest, WhatHasBecomeAScanIsNotDroppedAsStale) {
+  EngineOptions options = Options();
+  options.upload_keep = absl::Milliseconds(300);
+  Reopen(options);
+  const ScanHeader header = Announce(1);
+  Break(header, 5 * kChunk);
+  Complete(header);
+  absl::SleepFor(absl::Milliseconds(350));
+  EXPECT_EQ(Held(Announce(2)), 0U);  // drops what is stale
+  ExpectStoredAsSent(header.id);
+}
+
 TEST_F(ResumeTest, AnAnnouncedScanThatIsThereNeedsNoPoints) {
   ScanHeader header = Announce(1);
   Complete(header);
