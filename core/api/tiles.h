@@ -3,6 +3,7 @@
 #define STRATA_CORE_API_TILES_H_
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -66,6 +67,13 @@ class Tiles {
   virtual absl::StatusOr<EncodedTile> Get(const Call& call,
                                           absl::string_view map,
                                           const TileKey& key) = 0;
+  // What Get() returns, where it is at hand: without waiting for a disk or a network. nullopt where
+  // it is not.
+  virtual absl::StatusOr<std::optional<EncodedTile>> GetAtHand(const Call& /*call*/,
+                                                               absl::string_view /*map*/,
+                                                               const TileKey& /*key*/) {
+    return std::nullopt;
+  }
   // By key. INVALID_ARGUMENT for a level outside 0 to kMaxLevel, and above 0 in an earlier epoch;
   // NOT_FOUND for an epoch that is not kept; DATA_LOSS naming a damaged scan, ABORTED naming one
   // that was deleted meanwhile, where tiles of an earlier epoch are made.

@@ -29,12 +29,8 @@ absl::StatusOr<std::uint64_t> VersionOf(StorageReader& reader,
 }  // namespace
 
 absl::StatusOr<ServedTiles::Handle> ServedTiles::Find(const TileKey& key, const MapView& view) {
-  const std::shared_ptr<const Known> known = FindKnown(key);
-  // Rows up to a published version are all there: none comes in between later.
-  if (known != nullptr && known->tile->version <= view.tile_version &&
-      view.tile_version <= known->until) {
-    return known->tile;
-  }
+  const std::shared_ptr<const Known> known = known_.Find(key);
+  if (known != nullptr && Serves(*known, view)) return known->tile;
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
   if (known != nullptr && known->until < view.tile_version) {
     STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, VersionOf(*reader, key, view));
@@ -60,14 +56,14 @@ absl::StatusOr<ServedTiles::Handle> ServedTiles::Read(StorageReader& reader,
   return std::make_shared<const Tile>(Tile{row->version, std::move(row->bytes)});
 }
 
-std::shared_ptr<const ServedTiles::Known> ServedTiles::FindKnown(const TileKey& key) {
-  absl::MutexLock lock(&mutex_);
-  return known_.Find(key);
+ServedTiles::Handle ServedTiles::FindAtHand(const TileKey& key, const MapView& view) {
+  const std::shared_ptr<const Known> known = known_.Find(key);
+  return known != nullptr && Serves(*known, view) ? known->tile : nullptr;
 }
 
 void ServedTiles::Keep(const TileKey& key, Known known) {
   const std::size_t bytes = sizeof(Known) + sizeof(Tile) + known.tile->bytes.capacity();
-  absl::MutexLock lock(&mutex_);
+  // Of two at once the older one may stay: it serves older views, and is looked up again.
   const auto there = known_.Find(key);
   if (there != nullptr && there->until > known.until) return;
   known_.Put(key, std::make_shared<const Known>(std::move(known)), bytes);

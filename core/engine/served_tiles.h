@@ -6,9 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/mutex.h"
 
 #include "core/common/lru_cache.h"
 #include "core/engine/map_core.h"
@@ -34,6 +32,8 @@ class ServedTiles {
   // The tile that readers of `view`, which must be pinned, get; nullptr where there is nothing.
   // DATA_LOSS if it is damaged.
   absl::StatusOr<Handle> Find(const TileKey& key, const MapView& view);
+  // The same where it is in memory; nullptr where it is not.
+  Handle FindAtHand(const TileKey& key, const MapView& view);
 
  private:
   static constexpr std::size_t kCacheShare = 8;
@@ -43,13 +43,16 @@ class ServedTiles {
     std::uint64_t until = 0;
   };
 
-  std::shared_ptr<const Known> FindKnown(const TileKey& key);
+  // Whether it is what readers of `view` get: rows up to a published version are all there, and
+  // none comes in between later.
+  static bool Serves(const Known& known, const MapView& view) {
+    return known.tile->version <= view.tile_version && view.tile_version <= known.until;
+  }
   void Keep(const TileKey& key, Known known);
   absl::StatusOr<Handle> Read(StorageReader& reader, const TileKey& key, const MapView& view);
 
   MapCore& core_;
-  absl::Mutex mutex_;
-  LruCache<TileKey, const Known> known_ ABSL_GUARDED_BY(mutex_);
+  LruCache<TileKey, const Known> known_;
 };
 
 }  // namespace strata

@@ -139,6 +139,17 @@ absl::StatusOr<api::EncodedTile> EngineTiles::Get(const api::Call& call,
   return api::EncodedTile{key, tile->version, pin.view().epoch, tile->bytes};
 }
 
+absl::StatusOr<std::optional<api::EncodedTile>> EngineTiles::GetAtHand(const api::Call& call,
+                                                                       absl::string_view map,
+                                                                       const TileKey& key) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
+  const ServedTiles::Handle tile = found->tiles().FindAtHand(key, pin.view());
+  if (tile == nullptr) return std::nullopt;
+  return api::EncodedTile{key, tile->version, pin.view().epoch, tile->bytes};
+}
+
 absl::StatusOr<std::vector<api::TileInfo>> EngineTiles::List(const api::Call& call,
                                                              absl::string_view map,
                                                              const api::TileArea& area) {

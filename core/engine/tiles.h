@@ -2,6 +2,7 @@
 #ifndef STRATA_CORE_ENGINE_TILES_H_
 #define STRATA_CORE_ENGINE_TILES_H_
 
+#include <optional>
 #include <vector>
 
 #include "absl/functional/function_ref.h"
@@ -21,6 +22,9 @@ class EngineTiles final : public api::Tiles {
   absl::StatusOr<api::EncodedTile> Get(const api::Call& call,
                                        absl::string_view map,
                                        const TileKey& key) override;
+  absl::StatusOr<std::optional<api::EncodedTile>> GetAtHand(const api::Call& call,
+                                                            absl::string_view map,
+                                                            const TileKey& key) override;
   absl::StatusOr<std::vector<api::TileInfo>> List(const api::Call& call,
                                                   absl::string_view map,
                                                   const api::TileArea& area) override;

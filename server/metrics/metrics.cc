@@ -91,13 +91,15 @@ CallMetrics::CallMetrics()
                  "strata_call_seconds",
                  "From a call's arrival to its end; of streams and watches their whole life")) {}
 
-CallMetrics::Method& CallMetrics::Of(const std::string& method) {
+CallMetrics::Method& CallMetrics::Of(absl::string_view method) {
   const auto found = methods_.find(method);
   if (found != methods_.end()) return found->second;
-  const Method made{seconds_.Add({{"method", method}}, SecondsBounds()),
-                    received_.Add({{"method", method}}),
-                    sent_.Add({{"method", method}})};
-  return methods_.emplace(method, made).first->second;
+  const std::string name(method);
+  Method made{seconds_.Add({{"method", name}}, SecondsBounds()),
+              received_.Add({{"method", name}}),
+              sent_.Add({{"method", name}}),
+              {}};
+  return methods_.emplace(name, std::move(made)).first->second;
 }
 
 void CallMetrics::Ended(absl::string_view method,
@@ -106,13 +108,17 @@ void CallMetrics::Ended(absl::string_view method,
                         std::size_t bytes_received,
                         std::size_t bytes_sent,
                         absl::string_view reason) {
-  const std::string name(method);
   absl::MutexLock lock(&mutex_);
-  Method& numbers = Of(name);
+  Method& numbers = Of(method);
   numbers.seconds.Observe(absl::ToDoubleSeconds(duration));
   numbers.received.Increment(static_cast<double>(bytes_received));
   numbers.sent.Increment(static_cast<double>(bytes_sent));
-  calls_.Add({{"method", name}, {"code", absl::StatusCodeToString(code)}}).Increment();
+  prometheus::Counter*& ended = numbers.ended[code];
+  if (ended == nullptr) {
+    ended =
+        &calls_.Add({{"method", std::string(method)}, {"code", absl::StatusCodeToString(code)}});
+  }
+  ended->Increment();
   if (!reason.empty()) rejected_.Add({{"reason", std::string(reason)}}).Increment();
 }
 

@@ -47,8 +47,9 @@ class CallMetrics {
     prometheus::Histogram& seconds;
     prometheus::Counter& received;
     prometheus::Counter& sent;
+    std::map<absl::StatusCode, prometheus::Counter*> ended;  // found by labels once
   };
-  Method& Of(const std::string& method) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Method& Of(absl::string_view method) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const std::shared_ptr<prometheus::Registry> registry_ = std::make_shared<prometheus::Registry>();
   prometheus::Family<prometheus::Counter>& calls_;
@@ -57,7 +58,7 @@ class CallMetrics {
   prometheus::Family<prometheus::Counter>& sent_;
   prometheus::Family<prometheus::Histogram>& seconds_;
   absl::Mutex mutex_;
-  std::map<std::string, Method> methods_ ABSL_GUARDED_BY(mutex_);
+  std::map<std::string, Method, std::less<>> methods_ ABSL_GUARDED_BY(mutex_);
 };
 
 using MetricFamilies = std::vector<prometheus::MetricFamily>;

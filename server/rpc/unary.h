@@ -5,11 +5,13 @@
 #include <type_traits>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include <grpcpp/support/server_callback.h>
 
 #include "core/api/call.h"
 #include "core/api/database.h"
+#include "core/common/status.h"
 #include "server/rpc/request.h"
 #include "server/rpc/runtime.h"
 
@@ -21,6 +23,10 @@ using UnaryHandler = absl::Status (*)(api::Database&, const api::Call&, const In
 template <typename In, typename Out>
 using RequestHandler = absl::Status (*)(api::Database&, const Request&, const In&, Out&);
 
+// Answers without waiting, on gRPC's own thread; false: it cannot, and the other handler does.
+template <typename In, typename Out>
+using AtHandHandler = absl::StatusOr<bool> (*)(api::Database&, const api::Call&, const In&, Out&);
+
 // Lives from the call's arrival to its end; owns itself.
 template <typename In, typename Out, typename Handler>
 class UnaryReactor final : public grpc::ServerUnaryReactor {
@@ -30,26 +36,35 @@ class UnaryReactor final : public grpc::ServerUnaryReactor {
                absl::string_view method,
                const In& in,
                Out& out,
-               Handler handler)
+               Handler handler,
+               AtHandHandler<In, Out> at_hand)
       : runtime_(runtime), request_(runtime, context, method), in_(in), out_(out) {
-    if (!request_.admission().ok()) {
-      Finish(request_.Close(request_.admission()));
-      return;
+    absl::StatusOr<bool> answered = false;
+    const absl::Status status = Guarded([&]() -> absl::Status {
+      STRATA_RETURN_IF_ERROR(request_.admission());
+      STRATA_RETURN_IF_ERROR(request_.Receive(in_));
+      if (at_hand != nullptr) answered = at_hand(runtime_.db, request_.call(), in_, out_);
+      return answered.status();
+    });
+    if (!status.ok() || *answered) {
+      End(status);
+    } else {
+      runtime.queries.Submit([this, handler] { Run(handler); });
     }
-    runtime.queries.Submit([this, handler] { Run(handler); });
   }
 
  private:
   void Run(Handler handler) {
-    const absl::Status status = Guarded([&]() -> absl::Status {
+    End(Guarded([&]() -> absl::Status {
       STRATA_RETURN_IF_ERROR(request_.call().stop.status());
-      STRATA_RETURN_IF_ERROR(request_.Receive(in_));
       if constexpr (std::is_same_v<Handler, RequestHandler<In, Out>>) {
         return handler(runtime_.db, request_, in_, out_);
       } else {
         return handler(runtime_.db, request_.call(), in_, out_);
       }
-    });
+    }));
+  }
+  void End(const absl::Status& status) {
     request_.CountSent(out_);
     Finish(request_.Close(status));
   }
@@ -63,15 +78,16 @@ class UnaryReactor final : public grpc::ServerUnaryReactor {
 };
 
 // Answers with what `handler`, of one of the two types above, does on one of the runtime's query
-// threads.
+// threads, or `at_hand` at once.
 template <typename In, typename Out, typename Handler>
 grpc::ServerUnaryReactor* RunUnary(Runtime& runtime,
                                    grpc::CallbackServerContext* context,
                                    absl::string_view method,
                                    const In* in,
                                    Out* out,
-                                   Handler handler) {
-  return new UnaryReactor<In, Out, Handler>(runtime, *context, method, *in, *out, handler);
+                                   Handler handler,
+                                   AtHandHandler<In, Out> at_hand = nullptr) {
+  return new UnaryReactor<In, Out, Handler>(runtime, *context, method, *in, *out, handler, at_hand);
 }
 
 }  // namespace strata::server

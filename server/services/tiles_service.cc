@@ -1,5 +1,6 @@
 #include "server/services/tiles_service.h"
 
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -24,6 +25,17 @@ absl::Status Get(api::Database& db,
   STRATA_ASSIGN_OR_RETURN(api::EncodedTile tile, db.tiles().Get(call, in.map(), key));
   *out.mutable_tile() = ToProto(std::move(tile));
   return absl::OkStatus();
+}
+
+absl::StatusOr<bool> GetAtHand(api::Database& db,
+                               const api::Call& call,
+                               const v1::GetTileRequest& in,
+                               v1::GetTileResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const TileKey key, AtTheDoor(FromProto(in.key())));
+  STRATA_ASSIGN_OR_RETURN(std::optional<api::EncodedTile> tile,
+                          db.tiles().GetAtHand(call, in.map(), key));
+  if (tile.has_value()) *out.mutable_tile() = ToProto(*std::move(tile));
+  return tile.has_value();
 }
 
 absl::Status List(api::Database& db,
@@ -69,7 +81,7 @@ absl::Status Fetch(api::Database& db,
 grpc::ServerUnaryReactor* TilesService::Get(grpc::CallbackServerContext* context,
                                             const v1::GetTileRequest* in,
                                             v1::GetTileResponse* out) {
-  return RunUnary(runtime_, context, "Tiles.Get", in, out, &server::Get);
+  return RunUnary(runtime_, context, "Tiles.Get", in, out, &server::Get, &server::GetAtHand);
 }
 
 grpc::ServerWriteReactor<v1::ListTilesResponse>* TilesService::List(

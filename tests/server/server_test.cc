@@ -223,6 +223,30 @@ TEST_F(ServerTest, AFullServerSaysWhenToComeBack) {
   holder.join();
 }
 
+TEST_F(ServerTest, WhatIsAtHandNeedsNoThread) {
+  ServerOptions options;
+  options.query_threads = 1;
+  Serve(options);
+  PlanUntilStopped();
+  EXPECT_CALL(db_.tiles(), GetAtHand)
+      .WillOnce(Return(api::EncodedTile{{0, 1, 2}, 7, 3, "bytes"}))
+      .WillOnce(Return(absl::NotFoundError("no such map")))
+      .WillOnce(Return(std::optional<api::EncodedTile>()));
+  EXPECT_CALL(db_.tiles(), Get).WillOnce(Return(absl::DataLossError("damaged")));
+  grpc::ClientContext context;
+  std::thread holder([&] { EXPECT_THAT(PlanPath(&context), StatusIs(Code::kCancelled, _)); });
+  planning_.WaitForNotification();
+  const v1::GetTileRequest in;
+  v1::GetTileResponse out;
+  EXPECT_THAT(Call<v1::Tiles>(&v1::Tiles::Stub::Get, in, &out), IsOk());
+  EXPECT_EQ(out.tile().bytes(), "bytes");
+  EXPECT_EQ(out.tile().version(), 7U);
+  EXPECT_THAT(Call<v1::Tiles>(&v1::Tiles::Stub::Get, in, &out), StatusIs(Code::kNotFound, _));
+  context.TryCancel();
+  holder.join();
+  EXPECT_THAT(Call<v1::Tiles>(&v1::Tiles::Stub::Get, in, &out), StatusIs(Code::kDataLoss, _));
+}
+
 TEST_F(ServerTest, OversizedRequestsAreRefusedAndTheServerGoesOn) {
   Serve();
   ON_CALL(db_.maps(), List(_)).WillByDefault(Return(std::vector<MapInfo>()));

@@ -4,6 +4,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -107,6 +108,13 @@ class MockScans : public api::Scans {
 
 class MockTiles : public api::Tiles {
  public:
+  MockTiles() {
+    ON_CALL(*this, GetAtHand).WillByDefault(::testing::Return(std::optional<api::EncodedTile>()));
+  }
+  MOCK_METHOD(absl::StatusOr<std::optional<api::EncodedTile>>,
+              GetAtHand,
+              (const api::Call&, absl::string_view, const TileKey&),
+              (override));
   MOCK_METHOD(absl::StatusOr<api::EncodedTile>,
               Get,
               (const api::Call&, absl::string_view, const TileKey&),

@@ -113,10 +113,19 @@ TEST_F(EngineTilesTest, TilesKeptInMemoryAreThoseOfTheStore) {
   SCOPED_TRACE(seed);
   std::mt19937 draw(seed);
   EngineOptions options = Options();
-  options.cache_bytes = 40'000;  // room for a few tiles
+  options.cache_bytes = 400'000;  // tiles have an eighth of it: room for a few
   Reopen(options);
   MakeMap();
   std::set<TileKey> ever;
+  int at_hand = 0;
+  const auto expect_at_hand = [&](const TileKey& key, const std::string* bytes) {
+    const auto tile = db().tiles().GetAtHand({}, kMapName, key);
+    STRATA_ASSERT_OK(tile.status());
+    if (!tile->has_value()) return;
+    ++at_hand;
+    ASSERT_NE(bytes, nullptr) << key.ToString();
+    EXPECT_EQ((*tile)->bytes, *bytes) << key.ToString();
+  };
   for (std::uint64_t step = 1; step <= 12; ++step) {
     switch (step < 4 ? 0 : draw() % 3) {
       case 0:
@@ -132,6 +141,8 @@ TEST_F(EngineTilesTest, TilesKeptInMemoryAreThoseOfTheStore) {
     const auto tiles = AllTiles(db());
     for (const auto& [key, _] : tiles) ever.insert(key);
     for (const TileKey& key : ever) {
+      const auto of_store = tiles.find(key);
+      expect_at_hand(key, of_store == tiles.end() ? nullptr : &of_store->second);
       const auto tile = db().tiles().Get({}, kMapName, key);
       ASSERT_EQ(tile.ok(), tiles.contains(key)) << key.ToString();
       EXPECT_TRUE(!tile.ok() || tile->bytes == tiles.at(key)) << key.ToString();
@@ -140,6 +151,7 @@ TEST_F(EngineTilesTest, TilesKeptInMemoryAreThoseOfTheStore) {
     Reopen(options);
     EXPECT_EQ(AllTiles(db()), tiles) << "after step " << step;
   }
+  EXPECT_GT(at_hand, 0);
 }
 
 TEST_F(EngineTilesTest, AStreamKeepsToTheStateItBeganWith) {
