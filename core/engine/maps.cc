@@ -104,17 +104,17 @@ absl::StatusOr<std::unique_ptr<EngineMaps>> EngineMaps::Open(const EngineOptions
   STRATA_ASSIGN_OR_RETURN(const std::vector<std::string> names, directory.ListNames());
   std::unique_ptr<EngineMaps> maps(new EngineMaps(options, std::move(directory)));
   absl::MutexLock lock(&maps->mutex_);
-  for (const std::string& name : names) maps->OpenMap(name);
+  for (const std::string& name : names) maps->maps_.emplace(name, maps->OpenMap(name));
   return maps;
 }
 
-void EngineMaps::OpenMap(const std::string& name) {
+absl::StatusOr<std::shared_ptr<Map>> EngineMaps::OpenMap(const std::string& name) const {
   absl::StatusOr<std::shared_ptr<Map>> map =
       Map::Open(name, directory_.FileOf(name), options_, caches_);
   if (!map.ok()) {
     LOG(ERROR) << LogLine("map").Add("map", name).Add("not_opened", map.status().message());
   }
-  maps_.insert_or_assign(name, std::move(map));
+  return map;
 }
 
 absl::StatusOr<std::shared_ptr<Map>> EngineMaps::Find(absl::string_view name) const {
@@ -132,19 +132,31 @@ absl::StatusOr<MapInfo> EngineMaps::Create(const api::Call& call,
   STRATA_RETURN_IF_ERROR(ValidateName("map name", name));
   STRATA_RETURN_IF_ERROR(ValidateMapParameters(parameters));
   const std::string key(name);
+  STRATA_RETURN_IF_ERROR(Reserve(key));
+  // Without the lock: every call looks for its map, and this waits for the disk.
+  const absl::Status made = directory_.CreateFile(key, parameters, absl::Now());
+  const absl::StatusOr<std::shared_ptr<Map>> map = made.ok() ? OpenMap(key) : made;
+  // Nobody has put anything into one that does not open.
+  const bool stays = map.ok() || (made.ok() && !directory_.RemoveFile(key).ok());
   absl::MutexLock lock(&mutex_);
-  if (maps_.contains(key)) return absl::AlreadyExistsError(absl::StrCat("map ", key, " exists"));
+  if (stays) {
+    maps_.insert_or_assign(key, map);
+  } else {
+    maps_.erase(key);
+  }
+  STRATA_RETURN_IF_ERROR(map.status());
+  return (*map)->core().info();
+}
+
+absl::Status EngineMaps::Reserve(const std::string& name) {
+  absl::MutexLock lock(&mutex_);
+  if (maps_.contains(name)) return absl::AlreadyExistsError(absl::StrCat("map ", name, " exists"));
   if (maps_.size() >= options_.max_maps) {
     return absl::ResourceExhaustedError(absl::StrCat(
         "there are ", maps_.size(), " maps, the most this server holds; delete one first"));
   }
-  STRATA_RETURN_IF_ERROR(directory_.CreateFile(key, parameters, absl::Now()));
-  OpenMap(key);
-  const absl::StatusOr<std::shared_ptr<Map>> map = maps_.find(key)->second;
-  if (map.ok()) return (*map)->core().info();
-  // Nobody has put anything into it.
-  if (directory_.RemoveFile(key).ok()) maps_.erase(key);
-  return map.status();
+  maps_.emplace(name, absl::AbortedError(absl::StrCat("map ", name, " is being made")));
+  return absl::OkStatus();
 }
 
 absl::StatusOr<MapInfo> EngineMaps::Get(const api::Call& call, absl::string_view name) {

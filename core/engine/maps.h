@@ -60,7 +60,9 @@ class EngineMaps final : public api::Maps {
       : options_(options),
         directory_(std::move(directory)),
         caches_(std::make_shared<CacheBudget>(options.cache_bytes)) {}
-  void OpenMap(const std::string& name) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::StatusOr<std::shared_ptr<Map>> OpenMap(const std::string& name) const;
+  // Takes a name for a map that is being made.
+  absl::Status Reserve(const std::string& name);
   // Takes the map out of the list, so that nobody finds it any more; its name stays taken.
   absl::StatusOr<std::shared_ptr<Map>> Withdraw(absl::string_view name);
 
