@@ -5,10 +5,10 @@
 #include <algorithm>
 
 #include "absl/status/status.h"
-#include "absl/time/clock.h"
 #include "absl/time/time.h"
 
 #include "client/cli/scan_uploader.h"
+#include "core/common/steady_time.h"
 
 namespace strata::cli {
 
@@ -22,8 +22,8 @@ class Patience {
       away_since_ = absl::InfiniteFuture();
       return status.ok();
     }
-    away_since_ = std::min(away_since_, absl::Now());
-    return absl::Now() - away_since_ < kPatience;
+    away_since_ = std::min(away_since_, SteadyNow());
+    return SteadyNow() - away_since_ < kPatience;
   }
 
  private:

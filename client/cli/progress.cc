@@ -8,8 +8,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "absl/time/clock.h"
 #include <unistd.h>
+
+#include "core/common/steady_time.h"
 
 namespace strata::cli {
 
@@ -17,11 +18,11 @@ Progress::Progress(std::ostream& talk, bool terminal, std::string what)
     : talk_(talk),
       terminal_(terminal),
       what_(std::move(what)),
-      start_(absl::Now()),
+      start_(SteadyNow()),
       last_(start_) {}
 
 bool Progress::Due() {
-  const absl::Time now = absl::Now();
+  const absl::Time now = SteadyNow();
   if (now - last_ < (terminal_ ? absl::Milliseconds(100) : absl::Seconds(5))) {
     return false;
   }
@@ -30,10 +31,8 @@ bool Progress::Due() {
 }
 
 std::string Progress::TimeLeft(double share) const {
-  if (share <= 0.0 || share >= 1.0) {
-    return "";
-  }
-  const absl::Duration left = (absl::Now() - start_) * ((1.0 - share) / share);
+  if (share < 0.01 || share >= 1.0) return "";  // too little is done to tell
+  const absl::Duration left = (SteadyNow() - start_) * ((1.0 - share) / share);
   return absl::StrCat(", ", absl::FormatDuration(absl::Ceil(left, absl::Seconds(1))), " left");
 }
 
@@ -41,7 +40,7 @@ void Progress::Update(std::uint64_t done, std::uint64_t total, std::uint64_t poi
   if (!Due()) {
     return;
   }
-  const double seconds = absl::ToDoubleSeconds(absl::Now() - start_);
+  const double seconds = absl::ToDoubleSeconds(SteadyNow() - start_);
   const double share = total == 0 ? 0.0 : static_cast<double>(done) / static_cast<double>(total);
   std::string line = absl::StrCat(what_, ": ", done, " of ", total);
   if (points > 0) {

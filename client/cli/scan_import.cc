@@ -1,19 +1,16 @@
 #include "client/cli/scan_import.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/string_view.h"
@@ -21,38 +18,19 @@
 #include "absl/time/clock.h"
 
 #include "client/cli/arguments.h"
+#include "client/cli/import_sources.h"
 #include "client/cli/json.h"
-#include "client/cli/label_classes.h"
-#include "client/cli/level_trajectory.h"
 #include "client/cli/patience.h"
 #include "client/cli/progress.h"
 #include "client/cli/scan_uploader.h"
 #include "client/cli/spool_commands.h"
-#include "client/formats/scan_list.h"
-#include "client/formats/scan_reader.h"
 #include "core/common/status.h"
-#include "core/world/map_class.h"
+#include "core/common/steady_time.h"
 
 namespace strata::cli {
 namespace {
 
 constexpr int kWorkers = 4;
-
-struct ImportOptions {
-  std::string map;
-  std::vector<std::string> paths;
-  std::string format = "auto";
-  std::string poses;
-  std::string pose_format = "auto";
-  std::string trajectory;
-  std::string align = "on";
-  std::string classes;  // as ReadLabelClasses(); empty: labels are ids of the map's classes
-  bool without_labels = false;
-  bool level = false;
-  bool wait = false;
-  std::string spool;  // a directory, if scans go there first
-  bool as_local_maps = false;
-};
 
 // What became of the files of one call.
 struct Summary {
@@ -76,165 +54,12 @@ struct Summary {
   }
 };
 
-// The folder's name, or that of the folder around one that is only called "scans", in the letters
-// that names may have.
-std::string TrajectoryOf(const std::string& path) {
-  std::filesystem::path folder = std::filesystem::absolute(path).lexically_normal();
-  if (!folder.has_filename()) {
-    folder = folder.parent_path();
-  }
-  if (!std::filesystem::is_directory(folder)) {
-    folder = folder.parent_path();
-  }
-  if (folder.filename() == "scans") {
-    folder = folder.parent_path();
-  }
-  std::string name;
-  for (const char c : folder.filename().string()) {
-    const bool allowed = absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '_' ||
-                         (!name.empty() && (c == '-' || c == '.'));
-    name += allowed ? c : '_';
-  }
-  return name.empty() ? "scans" : name.substr(0, 100);
-}
-
-absl::StatusOr<std::vector<ScanSource>> FindScans(const ImportOptions& options, Output& output) {
-  ScanListOptions list;
-  list.warn = [&output](const std::string& warning) { output.Talk("warning: " + warning); };
-  STRATA_ASSIGN_OR_RETURN(list.format, ParseScanFormat(options.format));
-  STRATA_ASSIGN_OR_RETURN(list.pose_format, ParsePoseFormat(options.pose_format));
-  list.poses = options.poses;
-  return ListScans({options.paths.begin(), options.paths.end()}, list);
-}
-
-// What the trajectory has, by sequence.
-using ScansThere = std::map<std::uint64_t, ScanHeader>;
-
-absl::StatusOr<ScansThere> FindScansThere(Context& context, const ImportOptions& options) {
-  ScansThere there;
-  api::ScanFilter filter;
-  filter.trajectory = options.trajectory;
-  STRATA_RETURN_IF_ERROR(
-      context.database.scans().List(context.call, options.map, filter, [&](const ScanInfo& info) {
-        there.emplace(info.header.id.sequence, info.header);
-        return absl::OkStatus();
-      }));
-  return there;
-}
-
-// Whether the file cannot be what is there, as far as its time and pose tell.
-bool Differs(const ScanSource& scan, const ScanHeader& there) {
-  constexpr double kRounding = 1e-6;
-  return absl::ToUnixMicros(scan.time.value_or(absl::UnixEpoch())) !=
-             absl::ToUnixMicros(there.time) ||
-         (scan.pose_status.ok() && !scan.T_map_scan.isApprox(there.T_map_scan, kRounding));
-}
-
-// Scans without poses and times are told apart by the points of the first one.
-bool HasOtherPoints(const ScanSource& scan, const ScanHeader& there) {
-  const absl::StatusOr<PointCloud> cloud = ReadScan(scan.path, scan.format);
-  return cloud.ok() && cloud->size() != there.point_count;
-}
-
-// Folders of the same name have the same trajectory unless it is given: what is skipped then is
-// not what the map has.
-void WarnOfOtherScans(const std::vector<ScanSource>& scans,
-                      const ScansThere& there,
-                      const ImportOptions& options,
-                      Output& output) {
-  std::size_t skipped = 0;
-  std::size_t other = 0;
-  for (const ScanSource& scan : scans) {
-    const auto it = there.find(scan.sequence);
-    if (it == there.end()) continue;
-    const bool first = skipped++ == 0;
-    if (Differs(scan, it->second) || (first && HasOtherPoints(scan, it->second))) ++other;
-  }
-  if (other == 0) return;
-  output.Talk(absl::StrCat("warning: trajectory ",
-                           options.trajectory,
-                           " has other scans under these numbers (",
-                           other,
-                           " of ",
-                           skipped,
-                           " skipped files differ in time, pose or points); --trajectory NAME "
-                           "uploads these as a run of their own"));
-}
-
-// What labels of files become in a map.
-using LabelsToMap = std::function<absl::Status(PointCloud&)>;
-
-// Without --classes.
-LabelsToMap PlainLabels(const ImportOptions& options) {
-  if (options.without_labels) {
-    return [](PointCloud& cloud) {
-      cloud.label.clear();
-      return absl::OkStatus();
-    };
-  }
-  return [](PointCloud& cloud) {
-    const absl::Status valid = ValidateLabels(cloud.label);
-    if (valid.ok()) return valid;
-    return absl::InvalidArgumentError(absl::StrCat(
-        valid.message(),
-        "; say with --classes which labels are which class, or leave them out with --no-labels"));
-  };
-}
-
-absl::StatusOr<LabelsToMap> LabelsFor(Context& context, const ImportOptions& options) {
-  if (options.without_labels || options.classes.empty()) return PlainLabels(options);
-  STRATA_ASSIGN_OR_RETURN(const LabelClasses given, ReadLabelClasses(options.classes));
-  STRATA_ASSIGN_OR_RETURN(
-      const LabelClasses labels,
-      ForClassesOfMap(context.database.maps(), context.call, options.map, given));
-  return [labels](PointCloud& cloud) {
-    labels.Apply(cloud);
-    return absl::OkStatus();
-  };
-}
-
-absl::StatusOr<PointCloud> ReadForMap(const ScanSource& scan, const LabelsToMap& labels) {
-  STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScan(scan.path, scan.format));
-  STRATA_RETURN_IF_ERROR(labels(cloud));
-  return cloud;
-}
-
-// Those scans that have a pose and are not there yet.
-std::vector<UploadSource> SourcesOf(const std::vector<ScanSource>& scans,
-                                    const ScansThere& there,
-                                    const ImportOptions& options,
-                                    const LabelsToMap& labels,
-                                    Summary& summary) {
-  std::vector<UploadSource> sources;
-  for (const ScanSource& scan : scans) {
-    const ScanId id = {options.trajectory, scan.sequence};
-    if (there.count(scan.sequence) > 0) {
-      ++summary.skipped;
-      summary.present.push_back(id);
-      continue;
-    }
-    if (!scan.pose_status.ok()) {
-      summary.AddError(scan.path.string(), scan.pose_status.message());
-      continue;
-    }
-    UploadSource source;
-    source.file = scan.path.string();
-    source.header.id = id;
-    source.header.time = scan.time.value_or(absl::UnixEpoch());
-    source.header.T_map_scan = scan.T_map_scan;
-    source.header.alignment = options.align == "on" ? Alignment::kOn : Alignment::kOff;
-    source.read = [scan, labels] { return ReadForMap(scan, labels); };
-    sources.push_back(std::move(source));
-  }
-  return sources;
-}
-
 void Upload(Context& context,
             const ImportOptions& options,
             const std::vector<UploadSource>& sources,
             Summary& summary) {
   Progress progress(context.output.talk(), TalksToTerminal(), "uploading");
-  const absl::Time start = absl::Now();
+  const absl::Time start = SteadyNow();
   const std::vector<UploadResult> results =
       UploadScans(context.database,
                   context.call,
@@ -245,7 +70,7 @@ void Upload(Context& context,
                     progress.Update(done.scans, sources.size(), done.points);
                   });
   progress.Clear();
-  summary.seconds = absl::ToDoubleSeconds(absl::Now() - start);
+  summary.seconds = absl::ToDoubleSeconds(SteadyNow() - start);
   summary.interrupted = context.call.stop.requested();
   for (std::size_t i = 0; i < sources.size(); ++i) {
     if (summary.interrupted && absl::IsCancelled(results[i].status)) {
@@ -288,20 +113,20 @@ absl::StatusOr<ScanInfo> AwaitScan(Context& context,
 absl::Status Wait(Context& context, const ImportOptions& options, Summary& summary) {
   Progress progress(context.output.talk(), TalksToTerminal(), "integrating");
   std::sort(summary.present.begin(), summary.present.end());
-  absl::Time moved = absl::Now();
+  absl::Time moved = SteadyNow();
   for (std::size_t i = 0; i < summary.present.size(); ++i) {
     const auto idle = [&] {
       progress.Update(i, summary.present.size(), 0);
-      if (absl::Now() - moved < kStuck) return;
+      if (SteadyNow() - moved < kStuck) return;
       progress.Clear();
       context.output.Talk(absl::StrCat("no scan integrated for ",
                                        absl::FormatDuration(kStuck),
                                        "; the log of stratad says why (is its disk full?)"));
-      moved = absl::Now();
+      moved = SteadyNow();
     };
     STRATA_ASSIGN_OR_RETURN(const ScanInfo info,
                             AwaitScan(context, options.map, summary.present[i], idle));
-    moved = absl::Now();
+    moved = SteadyNow();
     if (info.state == ScanState::kFailed) {
       ++summary.integration_failed;
       summary.AddError(summary.present[i].ToString(), info.message);
@@ -315,6 +140,13 @@ absl::Status Wait(Context& context, const ImportOptions& options, Summary& summa
     }
   }
   return absl::OkStatus();
+}
+
+void TalkOf(const Json& errors, Output& output) {
+  for (const Json& error : errors) {
+    output.Talk(absl::StrCat(
+        "error: ", error["scan"].get<std::string>(), ": ", error["error"].get<std::string>()));
+  }
 }
 
 void Print(const ImportOptions& options, const Summary& summary, Output& output) {
@@ -342,10 +174,7 @@ void Print(const ImportOptions& options, const Summary& summary, Output& output)
     json["interrupted"] = true;
   }
   json["errors"] = summary.errors;
-  for (const Json& error : summary.errors) {
-    output.Talk(absl::StrCat(
-        "error: ", error["scan"].get<std::string>(), ": ", error["error"].get<std::string>()));
-  }
+  TalkOf(summary.errors, output);
   if (!output.json()) {
     json.erase("errors");
     json["seconds"] = absl::StrFormat("%.2f", summary.seconds);
@@ -354,27 +183,32 @@ void Print(const ImportOptions& options, const Summary& summary, Output& output)
   output.Object(json);
 }
 
-absl::Status Import(Context& context, ImportOptions options) {
-  if (options.trajectory.empty()) {
-    options.trajectory = TrajectoryOf(options.paths.front());
-  }
-  STRATA_ASSIGN_OR_RETURN(std::vector<ScanSource> scans, FindScans(options, context.output));
-  STRATA_ASSIGN_OR_RETURN(const ScansThere there, FindScansThere(context, options));
-  STRATA_ASSIGN_OR_RETURN(const LabelsToMap labels, LabelsFor(context, options));
+// What of the files is clear before any of them is sent.
+Summary Begun(const ImportSources& sources) {
   Summary summary;
-  if (options.level) {
-    STRATA_ASSIGN_OR_RETURN(summary.level_rad, LevelTrajectory(scans));
-    context.output.Talk(absl::StrFormat("levelled by %.4f rad", *summary.level_rad));
-  }
-  WarnOfOtherScans(scans, there, options, context.output);
-  summary.files = scans.size();
-  std::vector<UploadSource> sources = SourcesOf(scans, there, options, labels, summary);
+  summary.files = sources.files;
+  summary.skipped = sources.there.size();
+  summary.present = sources.there;
+  summary.level_rad = sources.level_rad;
+  for (const auto& [file, message] : sources.errors) summary.AddError(file, message);
+  return summary;
+}
+
+absl::Status ErrorsOf(const Json& errors, std::size_t files) {
+  if (errors.empty()) return absl::OkStatus();
+  return absl::UnknownError(absl::StrCat(errors.size(), " of ", files, " scans failed"));
+}
+
+absl::Status Import(Context& context, ImportOptions options) {
+  if (options.trajectory.empty()) options.trajectory = TrajectoryOf(options.paths.front());
+  STRATA_ASSIGN_OR_RETURN(ImportSources sources, FindImportSources(context, options));
   if (options.as_local_maps) {
     STRATA_ASSIGN_OR_RETURN(const MapInfo map,
                             context.database.maps().Get(context.call, options.map));
-    for (UploadSource& source : sources) source.as_local_map = map.parameters;
+    for (UploadSource& source : sources.missing) source.as_local_map = map.parameters;
   }
-  Upload(context, options, sources, summary);
+  Summary summary = Begun(sources);
+  Upload(context, options, sources.missing, summary);
   const absl::Status waited =
       options.wait && !summary.interrupted ? Wait(context, options, summary) : absl::OkStatus();
   summary.interrupted = context.call.stop.requested();
@@ -383,39 +217,23 @@ absl::Status Import(Context& context, ImportOptions options) {
     return absl::CancelledError("interrupted; the same command goes on where this one stopped");
   }
   STRATA_RETURN_IF_ERROR(waited);
-  if (!summary.errors.empty()) {
-    return absl::UnknownError(
-        absl::StrCat(summary.errors.size(), " of ", summary.files, " scans failed"));
-  }
-  return absl::OkStatus();
+  return ErrorsOf(summary.errors, summary.files);
 }
 
 absl::Status ImportBySpool(FileContext& context, ImportOptions options) {
-  if (options.trajectory.empty()) {
-    options.trajectory = TrajectoryOf(options.paths.front());
-  }
-  STRATA_ASSIGN_OR_RETURN(std::vector<ScanSource> scans, FindScans(options, context.output));
-  Summary summary;
-  if (options.level) {
-    STRATA_ASSIGN_OR_RETURN(summary.level_rad, LevelTrajectory(scans));
-    context.output.Talk(absl::StrFormat("levelled by %.4f rad", *summary.level_rad));
-  }
-  const std::vector<UploadSource> sources =
-      SourcesOf(scans, {}, options, PlainLabels(options), summary);
+  if (options.trajectory.empty()) options.trajectory = TrajectoryOf(options.paths.front());
+  STRATA_ASSIGN_OR_RETURN(const ImportSources sources, FindImportSources(context.output, options));
   Json json = {{"map", options.map},
                {"trajectory", options.trajectory},
-               {"files", scans.size()},
-               {"errors", summary.errors}};
-  STRATA_RETURN_IF_ERROR(ImportIntoSpool(context, options.spool, options.map, sources, json));
+               {"files", sources.files},
+               {"errors", Begun(sources).errors}};
+  STRATA_RETURN_IF_ERROR(
+      ImportIntoSpool(context, options.spool, options.map, sources.missing, json));
   const Json errors = json["errors"];
-  for (const Json& error : errors) {
-    context.output.Talk(absl::StrCat(
-        "error: ", error["scan"].get<std::string>(), ": ", error["error"].get<std::string>()));
-  }
+  TalkOf(errors, context.output);
   if (!context.output.json()) json.erase("errors");
   context.output.Object(json);
-  if (errors.empty()) return absl::OkStatus();
-  return absl::UnknownError(absl::StrCat(errors.size(), " of ", scans.size(), " scans failed"));
+  return ErrorsOf(errors, sources.files);
 }
 
 // Of the two ways the one that the options say.

@@ -19,6 +19,7 @@
 #include "core/cloud/cloud_slice.h"
 #include "core/codec/local_map_codec.h"
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "core/mls/build.h"
 #include "core/world/scan_hash.h"
 
@@ -105,7 +106,7 @@ class Uploader {
   }
 
   absl::Status SendPatiently(std::size_t index, absl::FunctionRef<absl::Status()> send) {
-    absl::Time since = absl::Now();
+    absl::Time since = SteadyNow();
     absl::Duration delay = kFirstDelay;
     absl::Status status = send();
     while (WorthRetrying(status)) {
@@ -113,9 +114,9 @@ class Uploader {
       WaitForTurn(index);
       STRATA_RETURN_IF_ERROR(lost_server());
       if (delay == kFirstDelay) {
-        since = absl::Now();
+        since = SteadyNow();
       }
-      if (absl::Now() - since > kPatience) {
+      if (SteadyNow() - since > kPatience) {
         SetLostServer(status);
         return status;
       }
@@ -156,8 +157,8 @@ class Uploader {
   }
 
   absl::Status Pause(absl::Duration delay) {
-    const absl::Time until = absl::Now() + delay;
-    while (absl::Now() < until) {
+    const absl::Time until = SteadyNow() + delay;
+    while (SteadyNow() < until) {
       STRATA_RETURN_IF_ERROR(call_.stop.status());
       absl::SleepFor(absl::Milliseconds(50));
     }
