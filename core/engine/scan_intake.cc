@@ -15,7 +15,6 @@
 #include <Eigen/Core>
 
 #include "core/api/chunk_check.h"
-#include "core/cloud/cloud_slice.h"
 #include "core/codec/point_codec.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
@@ -115,18 +114,18 @@ absl::Status ScanIntake::Write(std::uint64_t ticket, const Stop& stop, const Poi
 }
 
 void ScanIntake::Append(const PointCloud& chunk, std::size_t begin, std::size_t end) {
-  PointCloud slice = SliceOf(chunk, begin, end);
-  QuietNans(slice);
-  for (const Eigen::Vector3f& p : slice.points) {
-    if (!std::isnan(p.x())) record_.box_scan.extend(p);
-  }
-  const auto append = [](const auto& from, auto& to) {
-    to.insert(to.end(), from.begin(), from.end());
+  const std::size_t first = piece_.size();
+  const auto append = [=](const auto& from, auto& to) {
+    if (!from.empty()) to.insert(to.end(), from.data() + begin, from.data() + end);
   };
-  append(slice.points, piece_.points);
-  append(slice.intensity, piece_.intensity);
-  append(slice.colour, piece_.colour);
-  append(slice.label, piece_.label);
+  append(chunk.points, piece_.points);
+  append(chunk.intensity, piece_.intensity);
+  append(chunk.colour, piece_.colour);
+  append(chunk.label, piece_.label);
+  QuietNans(piece_, first);
+  for (std::size_t i = first; i < piece_.size(); ++i) {
+    if (!std::isnan(piece_.points[i].x())) record_.box_scan.extend(piece_.points[i]);
+  }
 }
 
 void ScanIntake::SealPiece() {

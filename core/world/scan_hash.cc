@@ -102,13 +102,14 @@ std::string ScanHasher::Digest(const ScanHeader& header, unsigned other_way) con
   return all.HexDigest();
 }
 
-void QuietNans(PointCloud& cloud) {
+void QuietNans(PointCloud& cloud, std::size_t first) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-  for (Eigen::Vector3f& point : cloud.points) {
+  for (std::size_t i = first; i < cloud.points.size(); ++i) {
+    Eigen::Vector3f& point = cloud.points[i];
     if (point.array().isNaN().any()) point.setConstant(kNan);
   }
-  for (float& intensity : cloud.intensity) {
-    if (std::isnan(intensity)) intensity = kNan;
+  for (std::size_t i = first; i < cloud.intensity.size(); ++i) {
+    if (std::isnan(cloud.intensity[i])) cloud.intensity[i] = kNan;
   }
 }
 

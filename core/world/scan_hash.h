@@ -2,6 +2,7 @@
 #ifndef STRATA_CORE_WORLD_SCAN_HASH_H_
 #define STRATA_CORE_WORLD_SCAN_HASH_H_
 
+#include <cstddef>
 #include <string>
 
 #include "absl/strings/string_view.h"
@@ -34,8 +35,9 @@ class ScanHasher {
   ContentHasher label_;
 };
 
-// Makes every NaN the quiet one; a point with one in any coordinate has three.
-void QuietNans(PointCloud& cloud);
+// Makes every NaN from point `first` on the quiet one; a point with one in any coordinate has
+// three.
+void QuietNans(PointCloud& cloud, std::size_t first = 0);
 
 // Of a whole scan, whatever its NaN: what a client announces as ScanHeader::content_hash.
 std::string ContentHashOf(const ScanHeader& header, const PointCloud& cloud);
