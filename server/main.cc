@@ -9,6 +9,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include "absl/synchronization/mutex.h"
 #include <CLI/CLI.hpp>
 #include <glog/logging.h>
 #include <malloc.h>
@@ -83,6 +84,8 @@ LogLine StartLine(const ProgramOptions& options, const std::string& address) {
 
 absl::Status Serve(const ProgramOptions& options) {
   KeepHeapsSmall();
+  // Debian's Abseil is built to look for cycles whenever a mutex is locked, and to abort at one.
+  absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
   FLAGS_logtostderr = true;
   google::InitGoogleLogging("stratad");
   const sigset_t signals = BlockSignals();

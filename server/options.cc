@@ -20,7 +20,7 @@ struct Written {
   double slow_reader_s = 30.0;
   double max_message_mib = 4.0;
   std::uint64_t queue_mib = 64;
-  std::uint64_t cache_mib = 256;
+  std::uint64_t cache_mib = 160;
   std::uint64_t max_map_mib = 0;
   EngineOptions engine;
   ServerOptions server;

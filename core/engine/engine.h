@@ -26,7 +26,7 @@ struct EngineOptions {
   std::size_t queue_bytes = std::size_t{64} << 20;
   // What is kept in memory of all maps together: tiles, features of scans, what planning prepares
   // and the searches under way.
-  std::size_t cache_bytes = std::size_t{256} << 20;
+  std::size_t cache_bytes = std::size_t{160} << 20;
   // Maps there may be; one more is refused with RESOURCE_EXHAUSTED.
   std::uint64_t max_maps = 10'000;
   // Largest size of a map's file; 0: none.
