@@ -3,6 +3,7 @@
 #include <array>
 #include <csignal>
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -17,13 +18,13 @@ ChildProcess::ChildProcess(const std::string& program, const std::vector<std::st
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   std::array<int, 2> ends{};
-  EXPECT_EQ(pipe(ends.data()), 0);
+  // Not for the children that other threads start at this time: one that lives on would keep this
+  // one's output open.
+  EXPECT_EQ(pipe2(ends.data(), O_CLOEXEC), 0);
   pid_ = fork();
   if (pid_ == 0) {  // only async-signal-safe calls until exec
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     dup2(ends[1], STDOUT_FILENO);
-    close(ends[0]);
-    close(ends[1]);
     execv(argv[0], argv.data());
     _exit(127);
   }
