@@ -24,7 +24,7 @@ struct ImportOptions {
   std::string format = "auto";
   std::string poses;
   std::string pose_format = "auto";
-  std::string trajectory;  // empty: TrajectoryOf() the first path
+  std::string trajectory;
   std::string align = "on";
   std::string classes;  // as ReadLabelClasses(); empty: labels are ids of the map's classes
   bool without_labels = false;
@@ -47,7 +47,7 @@ struct ImportSources {
 std::string TrajectoryOf(const std::string& path);
 
 // What the paths have and the map lacks. Warns where the map has other scans under the same
-// numbers.
+// numbers. REQUIRES: the trajectory has a name, here and below.
 absl::StatusOr<ImportSources> FindImportSources(Context& context, const ImportOptions& options);
 // All that the paths have, whatever a map has; labels stay as the files have them.
 absl::StatusOr<ImportSources> FindImportSources(Output& output, const ImportOptions& options);
