@@ -1,6 +1,7 @@
 #include "client/cli/scan_uploader.h"
 
 #include <algorithm>
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>

@@ -1,4 +1,5 @@
 // strata tile list|get
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <string>

@@ -3,6 +3,7 @@
 #define STRATA_CORE_COMMON_LRU_CACHE_H_
 
 #include <cstddef>
+#include <iterator>
 #include <list>
 #include <memory>
 #include <utility>

@@ -3,6 +3,8 @@
 #ifndef STRATA_CORE_COMMON_STATUS_H_
 #define STRATA_CORE_COMMON_STATUS_H_
 
+#include <utility>
+
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"

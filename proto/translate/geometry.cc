@@ -1,6 +1,7 @@
 #include "proto/translate/geometry.h"
 
 #include <cmath>
+#include <cstdint>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"

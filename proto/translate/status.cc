@@ -1,5 +1,6 @@
 #include "proto/translate/status.h"
 
+#include <cstdint>
 #include <string>
 #include <utility>
 

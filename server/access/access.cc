@@ -1,6 +1,7 @@
 #include "server/access/access.h"
 
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/ascii.h"

@@ -3,6 +3,7 @@
 #define STRATA_SERVER_ACCESS_RIGHT_H_
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>

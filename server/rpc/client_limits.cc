@@ -1,6 +1,7 @@
 #include "server/rpc/client_limits.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "absl/strings/str_cat.h"
 

@@ -3,6 +3,7 @@
 #define STRATA_SERVER_RPC_CLIENT_LIMITS_H_
 
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <string>
 

@@ -1,6 +1,7 @@
 #include "server/rpc/request.h"
 
 #include <algorithm>
+#include <chrono>
 #include <optional>
 #include <random>
 #include <utility>

@@ -1,6 +1,7 @@
 #include "server/services/map_watch_reactor.h"
 
 #include <algorithm>
+#include <type_traits>
 
 #include "core/common/status.h"
 #include "proto/translate/watch.h"

@@ -5,6 +5,7 @@
 #include <complex>
 #include <cstddef>
 #include <numbers>
+#include <utility>
 
 #include <Eigen/Core>
 #include <Eigen/LU>

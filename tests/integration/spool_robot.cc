@@ -3,6 +3,7 @@
 //   acked N
 // Ends with 0 once all is sent; after SIGTERM it takes no further scan.
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstdint>
 #include <iostream>

@@ -1,4 +1,5 @@
 // A real server, real clients, and the worst that can happen to them.
+#include <cmath>
 #include <csignal>
 #include <map>
 #include <memory>

@@ -3,6 +3,7 @@
 #define STRATA_TESTS_SERVER_NEW_GRANT_H_
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <utility>

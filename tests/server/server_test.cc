@@ -1,5 +1,6 @@
 #include "server/server.h"
 
+#include <chrono>
 #include <limits>
 #include <new>
 #include <stdexcept>

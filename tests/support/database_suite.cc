@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <ostream>
+#include <type_traits>
 #include <vector>
 
 #include "absl/time/clock.h"

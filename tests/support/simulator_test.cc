@@ -1,5 +1,6 @@
 #include "tests/support/simulator.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <vector>

@@ -4,6 +4,7 @@
 #define STRATA_TESTS_SUPPORT_STATUS_MATCHERS_H_
 
 #include <string>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"

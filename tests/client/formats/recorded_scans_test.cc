@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <set>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>

@@ -1,6 +1,7 @@
 #include "core/classification/min_cut.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>

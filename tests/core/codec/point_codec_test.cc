@@ -1,5 +1,6 @@
 #include "core/codec/point_codec.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>

@@ -1,4 +1,5 @@
 // Uploads of announced scans that break off go on where they were.
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <string>

@@ -1,5 +1,6 @@
 #include "core/mls/elevation_map.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>

@@ -1,5 +1,6 @@
 #include "core/posegraph/plane_cost.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <vector>

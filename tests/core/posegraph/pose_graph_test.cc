@@ -1,5 +1,6 @@
 #include "core/posegraph/pose_graph.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>

@@ -1,5 +1,6 @@
 #include "core/registration/place_descriptor.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>

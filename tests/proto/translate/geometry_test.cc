@@ -1,6 +1,7 @@
 #include "proto/translate/geometry.h"
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <random>
 
