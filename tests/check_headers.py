@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Holds every header self-contained: it compiles as the first thing of a source.
 
-A header with a source of its own name is proved by the build, so of those this only sees that the source includes it
-first; the others are compiled alone. Needs a configured and built build/release.
+A header with a source of its own name is proved by a build without STRATA_BATCHES, so of those this only sees that the
+source includes it first; the others are compiled alone. Needs a configured and built build/release, and build/dev.
 """
 import concurrent.futures
 import json

@@ -104,7 +104,7 @@ class LandmarkBound {
   std::array<int, kAsked> asked_;
   std::array<std::uint32_t, kAsked> goal_costs_;
   std::vector<const std::uint32_t*> of_slot_;
-  std::array<const std::uint32_t*, kAsked> costs_;  // of the tile entered
+  std::array<const std::uint32_t*, kAsked> costs_{};  // of the tile entered
 };
 
 // `kByClass`: moves cost by the classes of both ends too; otherwise nobody asks for classes.

@@ -17,9 +17,6 @@ endif()
 if(STRATA_SANITIZER)
   target_compile_options(strata_build_options INTERFACE -fsanitize=${STRATA_SANITIZER} -fno-omit-frame-pointer)
   target_link_options(strata_build_options INTERFACE -fsanitize=${STRATA_SANITIZER})
-  if(STRATA_SANITIZER_KIND STREQUAL asan)
-    target_compile_options(strata_build_options INTERFACE -pthread) # everywhere alike, for strata_share_headers
-  endif()
   if(STRATA_SANITIZER MATCHES "undefined")
     # These four take a third of the build time and find little that the address sanitizer does not.
     target_compile_options(
@@ -28,12 +25,55 @@ if(STRATA_SANITIZER)
   endif()
 endif()
 
-# strata_share_headers(TARGET FROM): sanitized builds start from nothing and run for a few minutes, so they parse the
-# large headers of others once. All other builds do without, that every source has to include what it uses.
-function(strata_share_headers target from)
-  if(TARGET ${from})
-    target_precompile_headers(${target} REUSE_FROM ${from})
+# Most of the time of a build goes into the headers of others. With STRATA_BATCHES (on in all presets but dev) each is parsed
+# once for many sources: the largest are compiled beforehand, and sources of a target are compiled together.
+if(STRATA_BATCHES)
+  # Threads everywhere alike, or headers cannot be shared. g++ takes what a source includes for headers.
+  target_compile_options(strata_build_options INTERFACE -pthread $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+endif()
+
+# strata_shared_headers(NAME HEADERS... DEPS...): compiles HEADERS beforehand, for strata_batch.
+function(strata_shared_headers name)
+  cmake_parse_arguments(ARG "" "" "HEADERS;DEPS" ${ARGN})
+  file(WRITE ${PROJECT_BINARY_DIR}/empty.cc "")
+  add_library(${name} OBJECT ${PROJECT_BINARY_DIR}/empty.cc)
+  target_link_libraries(${name} PRIVATE strata_build_options ${ARG_DEPS})
+  target_precompile_headers(${name} PRIVATE ${ARG_HEADERS})
+endfunction()
+
+# strata_batch(TARGET HEADERS): the target's sources use what strata_shared_headers made of HEADERS, and each other's.
+function(strata_batch target headers)
+  if(STRATA_BATCHES)
+    target_precompile_headers(${target} REUSE_FROM ${headers})
+    target_compile_options(${target} PRIVATE $<TARGET_PROPERTY:${headers},COMPILE_OPTIONS>)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+    set_property(GLOBAL APPEND PROPERTY STRATA_BATCHED ${target})
   endif()
+endfunction()
+
+# strata_write_batches(): says which sources of the targets of strata_batch go together; after all of them. When a source
+# takes a name that another of its batch has, too, g++ says so: configure again.
+function(strata_write_batches)
+  get_property(targets GLOBAL PROPERTY STRATA_BATCHED)
+  set(lines "")
+  foreach(target ${targets})
+    get_target_property(sources ${target} SOURCES)
+    get_target_property(folder ${target} SOURCE_DIR)
+    foreach(source ${sources})
+      if(source MATCHES "\\.cc$")
+        cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${folder} NORMALIZE)
+        string(APPEND lines "${target}\t${source}\n")
+      endif()
+    endforeach()
+  endforeach()
+  file(WRITE ${PROJECT_BINARY_DIR}/batches.txt "${lines}")
+  find_package(Python3 REQUIRED COMPONENTS Interpreter)
+  execute_process(
+    COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/deploy/cmake/batches.py ${PROJECT_SOURCE_DIR}
+    INPUT_FILE ${PROJECT_BINARY_DIR}/batches.txt
+    OUTPUT_FILE ${PROJECT_BINARY_DIR}/batches.cmake COMMAND_ERROR_IS_FATAL ANY
+  )
+  include(${PROJECT_BINARY_DIR}/batches.cmake)
 endfunction()
 
 # strata_library(NAME [NO_INSTALL] SOURCES... HEADERS... DEPS... [PRIVATE_DEPS...])
@@ -47,7 +87,7 @@ function(strata_library name)
     add_library(${target} STATIC ${ARG_SOURCES})
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:strata_build_options> ${ARG_PRIVATE_DEPS})
-    strata_share_headers(${target} strata_large_headers)
+    strata_batch(${target} strata_large_headers)
   else()
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
@@ -69,13 +109,17 @@ function(strata_library name)
   endif()
 endfunction()
 
-# strata_executable(NAME OUTPUT SOURCES... DEPS...)
+# strata_executable(NAME OUTPUT SOURCES... DEPS... [SHARED_HEADERS NAME of strata_shared_headers])
 function(strata_executable name output)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "" "SHARED_HEADERS" "SOURCES;DEPS" ${ARGN})
+  if(NOT ARG_SHARED_HEADERS)
+    set(ARG_SHARED_HEADERS strata_large_headers)
+  endif()
   add_executable(${name} ${ARG_SOURCES})
   set_target_properties(${name} PROPERTIES OUTPUT_NAME ${output})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE strata_build_options ${ARG_DEPS})
+  strata_batch(${name} ${ARG_SHARED_HEADERS})
 endfunction()
 
 # strata_test(NAME SOURCES... DEPS... [LABELS...] [TIMEOUT seconds])
@@ -90,11 +134,12 @@ function(strata_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
-  strata_executable(${name} ${name} SOURCES ${ARG_SOURCES} DEPS ${ARG_DEPS} GTest::gmock_main)
+  strata_executable(
+    ${name} ${name} SOURCES ${ARG_SOURCES} DEPS ${ARG_DEPS} GTest::gmock_main SHARED_HEADERS strata_test_headers
+  )
   if(TARGET strata_tsan_absl_mutex)
     target_link_libraries(${name} PRIVATE strata_tsan_absl_mutex)
   endif()
-  strata_share_headers(${name} strata_test_headers)
   foreach(kind asan tsan)
     if(kind IN_LIST ARG_LABELS AND STRATA_SANITIZER_KIND STREQUAL kind)
       add_dependencies(sanitized_tests ${name})

@@ -316,32 +316,32 @@ TEST(TranslateRoundTripTest, Watch) {
 TEST(TranslateRoundTripTest, UnknownEnumeratorsAreRefused) {
   using ::strata::testing::StatusIs;
   using ::testing::HasSubstr;
-  constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+  constexpr auto kRefused = absl::StatusCode::kInvalidArgument;
   auto header = FilledHeader();
   header.set_alignment(static_cast<v1::Alignment>(9));
-  EXPECT_THAT(FromProto(header), StatusIs(kInvalid, HasSubstr("alignment: 9")));
+  EXPECT_THAT(FromProto(header), StatusIs(kRefused, HasSubstr("alignment: 9")));
   auto job = Filled<v1::Job>();
   job.set_state(v1::JOB_STATE_UNSPECIFIED);
-  EXPECT_THAT(FromProto(job), StatusIs(kInvalid, HasSubstr("state 0")));
+  EXPECT_THAT(FromProto(job), StatusIs(kRefused, HasSubstr("state 0")));
   v1::ListScansRequest list;
   list.set_state(static_cast<v1::ScanState>(77));
-  EXPECT_THAT(FromProto(list), StatusIs(kInvalid, HasSubstr("state: 77")));
+  EXPECT_THAT(FromProto(list), StatusIs(kRefused, HasSubstr("state: 77")));
   auto constraint = Filled<v1::Constraint>();
   constraint.mutable_information()->RemoveLast();
-  EXPECT_THAT(FromProto(constraint), StatusIs(kInvalid, HasSubstr("35 numbers")));
+  EXPECT_THAT(FromProto(constraint), StatusIs(kRefused, HasSubstr("35 numbers")));
   constraint = Filled<v1::Constraint>();
   constraint.set_origin(v1::CONSTRAINT_ORIGIN_UNSPECIFIED);
-  EXPECT_THAT(FromProto(constraint), StatusIs(kInvalid, HasSubstr("origin 0")));
+  EXPECT_THAT(FromProto(constraint), StatusIs(kRefused, HasSubstr("origin 0")));
   auto plane = Filled<v1::GlobalPlane>();
   plane.set_kind(static_cast<v1::PlaneKind>(4));
-  EXPECT_THAT(FromProto(plane), StatusIs(kInvalid, HasSubstr("kind 4")));
+  EXPECT_THAT(FromProto(plane), StatusIs(kRefused, HasSubstr("kind 4")));
   v1::TileKey key;
   key.set_level(13);
-  EXPECT_THAT(FromProto(key), StatusIs(kInvalid, HasSubstr("level 13 is not in [0, 12]")));
+  EXPECT_THAT(FromProto(key), StatusIs(kRefused, HasSubstr("level 13 is not in [0, 12]")));
   v1::TileArea area;
   area.set_x_min(5);
   area.set_x_max(4);
-  EXPECT_THAT(FromProto(area), StatusIs(kInvalid, HasSubstr("x from 5 to 4")));
+  EXPECT_THAT(FromProto(area), StatusIs(kRefused, HasSubstr("x from 5 to 4")));
 }
 
 }  // namespace
