@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Holds every file to including what it names, so that it compiles wherever it stands in a batch, and alone.
+"""Holds every file to including what it names, so that it compiles wherever it stands in a batch, and alone; and every
+type to a name of its own: of two that share one, a program takes the functions of either for both.
 
 Looks at words, not at meaning: a name of the table below, or a type of ours, must come from a header that the file
 includes itself, or that headers of ours among them include. Takes a second; tests/check_headers.py, which compiles, an hour.
@@ -58,6 +59,8 @@ FAMILIES = {r"\bEigen::": r"Eigen/", r"\bgrpc::": r"grpc", r"\bgoogle::protobuf:
             r"\bv1::": r".*\.pb\.h"}
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)
 NOT_CODE = re.compile(r'//[^\n]*|R"(\w*)\(.*?\)\1"|"(?:[^"\\\n]|\\.)*"|^\s*#\s*include[^\n]*|/\*.*?\*/', re.M | re.S)
+HIDDEN = re.compile(r"^namespace \{\n.*?^\}  // namespace\n", re.M | re.S)
+DEFINED = re.compile(r"^(?:struct|class|enum class|enum)\s+(\w+)\s*(?:final\s*)?(?::[^:{;][^{;]*)?\{", re.M)
 TYPE = re.compile(r"^(?:template <[^>]*>\s*)?(?:struct|class|enum class|enum)\s+(?:\[\[\w+\]\]\s+)?(\w+)[^;{]*\{", re.M)
 
 
@@ -100,6 +103,19 @@ def type_owners(headers):
     return owners
 
 
+def same_names(paths):
+    """Types outside unnamed namespaces that two files define in one namespace."""
+    owners = {}
+    for path in paths:
+        open_code = HIDDEN.sub("", text(path))
+        space = re.search(r"^namespace ([\w:]+) \{", open_code, re.M)
+        for name in DEFINED.findall(open_code):
+            owners.setdefault((space.group(1) if space else "", name), []).append(path)
+    for (space, name), files in owners.items():
+        if len(files) > 1:
+            yield f"{' and '.join(files)}: both define {space}::{name}"
+
+
 def faults(path, tables, owners):
     has = closure(path)
     for name in sorted(set(re.findall(r"\b(?:std|absl)::\w+", code(path)))):
@@ -123,8 +139,8 @@ def main():
     tables = [(re.compile(rf"std::(?:{names})"), header) for header, names in STANDARD.items()]
     tables += [(re.compile(rf"absl::(?:{names})"), f"absl/{header}") for header, names in ABSEIL.items()]
     owners = type_owners([path for path in listed if path.endswith(".h")])
-    found = [fault for path in listed for fault in faults(path, tables, owners)]
-    print("\n".join(found) if found else f"names: {len(listed)} files, each includes what it names")
+    found = [*same_names(listed), *(fault for path in listed for fault in faults(path, tables, owners))]
+    print("\n".join(found) if found else f"names: {len(listed)} files, each includes what it names, no type defined twice")
     return 1 if found else 0
 
 

@@ -21,7 +21,7 @@
 namespace strata::cli {
 namespace {
 
-absl::StatusOr<std::vector<ScanSource>> FindScans(const ImportOptions& options, Output& output) {
+absl::StatusOr<std::vector<ScanFile>> FindScans(const ImportOptions& options, Output& output) {
   ScanListOptions list;
   list.warn = [&output](const std::string& warning) { output.Talk("warning: " + warning); };
   STRATA_ASSIGN_OR_RETURN(list.format, ParseScanFormat(options.format));
@@ -46,7 +46,7 @@ absl::StatusOr<ScansThere> FindScansThere(Context& context, const ImportOptions&
 }
 
 // Whether the file cannot be what is there, as far as its time and pose tell.
-bool Differs(const ScanSource& scan, const ScanHeader& there) {
+bool Differs(const ScanFile& scan, const ScanHeader& there) {
   constexpr double kRounding = 1e-6;
   return absl::ToUnixMicros(scan.time.value_or(absl::UnixEpoch())) !=
              absl::ToUnixMicros(there.time) ||
@@ -54,20 +54,20 @@ bool Differs(const ScanSource& scan, const ScanHeader& there) {
 }
 
 // Scans without poses and times are told apart by the points of the first one.
-bool HasOtherPoints(const ScanSource& scan, const ScanHeader& there) {
+bool HasOtherPoints(const ScanFile& scan, const ScanHeader& there) {
   const absl::StatusOr<PointCloud> cloud = ReadScan(scan.path, scan.format);
   return cloud.ok() && cloud->size() != there.point_count;
 }
 
 // Folders of the same name have the same trajectory unless it is given: what is skipped then is
 // not what the map has.
-void WarnOfOtherScans(const std::vector<ScanSource>& scans,
+void WarnOfOtherScans(const std::vector<ScanFile>& scans,
                       const ScansThere& there,
                       const ImportOptions& options,
                       Output& output) {
   std::size_t skipped = 0;
   std::size_t other = 0;
-  for (const ScanSource& scan : scans) {
+  for (const ScanFile& scan : scans) {
     const auto it = there.find(scan.sequence);
     if (it == there.end()) continue;
     const bool first = skipped++ == 0;
@@ -116,19 +116,19 @@ absl::StatusOr<LabelsToMap> LabelsFor(Context& context, const ImportOptions& opt
   };
 }
 
-absl::StatusOr<PointCloud> ReadForMap(const ScanSource& scan, const LabelsToMap& labels) {
+absl::StatusOr<PointCloud> ReadForMap(const ScanFile& scan, const LabelsToMap& labels) {
   STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScan(scan.path, scan.format));
   STRATA_RETURN_IF_ERROR(labels(cloud));
   return cloud;
 }
 
-ImportSources SourcesOf(const std::vector<ScanSource>& scans,
+ImportSources SourcesOf(const std::vector<ScanFile>& scans,
                         const ScansThere& there,
                         const ImportOptions& options,
                         const LabelsToMap& labels) {
   ImportSources sources;
   sources.files = scans.size();
-  for (const ScanSource& scan : scans) {
+  for (const ScanFile& scan : scans) {
     const ScanId id = {options.trajectory, scan.sequence};
     if (there.count(scan.sequence) > 0) {
       sources.there.push_back(id);
@@ -151,7 +151,7 @@ ImportSources SourcesOf(const std::vector<ScanSource>& scans,
 }
 
 // With --level: turns their poses.
-absl::StatusOr<std::optional<double>> Level(std::vector<ScanSource>& scans,
+absl::StatusOr<std::optional<double>> Level(std::vector<ScanFile>& scans,
                                             const ImportOptions& options,
                                             Output& output) {
   if (!options.level) return std::nullopt;
@@ -183,7 +183,7 @@ std::string TrajectoryOf(const std::string& path) {
 }
 
 absl::StatusOr<ImportSources> FindImportSources(Context& context, const ImportOptions& options) {
-  STRATA_ASSIGN_OR_RETURN(std::vector<ScanSource> scans, FindScans(options, context.output));
+  STRATA_ASSIGN_OR_RETURN(std::vector<ScanFile> scans, FindScans(options, context.output));
   STRATA_ASSIGN_OR_RETURN(const ScansThere there, FindScansThere(context, options));
   STRATA_ASSIGN_OR_RETURN(const LabelsToMap labels, LabelsFor(context, options));
   STRATA_ASSIGN_OR_RETURN(const std::optional<double> level_rad,
@@ -195,7 +195,7 @@ absl::StatusOr<ImportSources> FindImportSources(Context& context, const ImportOp
 }
 
 absl::StatusOr<ImportSources> FindImportSources(Output& output, const ImportOptions& options) {
-  STRATA_ASSIGN_OR_RETURN(std::vector<ScanSource> scans, FindScans(options, output));
+  STRATA_ASSIGN_OR_RETURN(std::vector<ScanFile> scans, FindScans(options, output));
   STRATA_ASSIGN_OR_RETURN(const std::optional<double> level_rad, Level(scans, options, output));
   ImportSources sources = SourcesOf(scans, {}, options, PlainLabels(options));
   sources.level_rad = level_rad;

@@ -16,7 +16,7 @@ namespace {
 constexpr int kScans = 5;
 
 // The floor's upward normal in the map, times its share of the scan's points.
-absl::StatusOr<Eigen::Vector3d> WeightedNormal(const ScanSource& scan) {
+absl::StatusOr<Eigen::Vector3d> WeightedNormal(const ScanFile& scan) {
   STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScan(scan.path, scan.format));
   // In the axes of the map, so that a tilted mount that the pose knows of does not count as tilt.
   const Eigen::Matrix3f R_map_scan = scan.T_map_scan.linear().cast<float>();
@@ -29,11 +29,11 @@ absl::StatusOr<Eigen::Vector3d> WeightedNormal(const ScanSource& scan) {
 
 }  // namespace
 
-absl::StatusOr<double> LevelTrajectory(std::vector<ScanSource>& scans) {
+absl::StatusOr<double> LevelTrajectory(std::vector<ScanFile>& scans) {
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   int used = 0;
   absl::Status last = absl::NotFoundError("no scan with a pose");
-  for (const ScanSource& scan : scans) {
+  for (const ScanFile& scan : scans) {
     if (used == kScans || !scan.pose_status.ok()) {
       continue;
     }
@@ -53,7 +53,7 @@ absl::StatusOr<double> LevelTrajectory(std::vector<ScanSource>& scans) {
   // About the first scan, so that a map far from its origin stays in place.
   const Eigen::Vector3d centre = scans.front().T_map_scan.translation();
   const Pose T_level_map = MakePose(R_level_map, centre - R_level_map * centre);
-  for (ScanSource& scan : scans) {
+  for (ScanFile& scan : scans) {
     scan.T_map_scan = Normalized(T_level_map * scan.T_map_scan);
   }
   return RotationAngleRad(T_level_map);

@@ -14,7 +14,7 @@ namespace strata::cli {
 // floor of the first five scans level. A pure function of these files and poses, so that importing
 // the rest of a folder later turns it the same way. Returns the angle [rad].
 // FAILED_PRECONDITION if no floor is found.
-absl::StatusOr<double> LevelTrajectory(std::vector<ScanSource>& scans);
+absl::StatusOr<double> LevelTrajectory(std::vector<ScanFile>& scans);
 
 }  // namespace strata::cli
 

@@ -100,7 +100,7 @@ bool NaturalLess(absl::string_view a, absl::string_view b) {
   return a < b;
 }
 
-std::vector<ScanSource> Ordered(std::vector<fs::path> files, ScanFormat format) {
+std::vector<ScanFile> Ordered(std::vector<fs::path> files, ScanFormat format) {
   std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
     return NaturalLess(a.string(), b.string());
   });
@@ -110,14 +110,14 @@ std::vector<ScanSource> Ordered(std::vector<fs::path> files, ScanFormat format) 
     const std::optional<std::uint64_t> sequence = SequenceOfName(file);
     return sequence.has_value() && seen.insert(*sequence).second;
   });
-  std::vector<ScanSource> scans;
+  std::vector<ScanFile> scans;
   for (const fs::path& file : files) {
-    ScanSource& scan = scans.emplace_back();
+    ScanFile& scan = scans.emplace_back();
     scan.path = file;
     scan.format = format;
     scan.sequence = numbered ? *SequenceOfName(file) : scans.size() - 1;
   }
-  std::stable_sort(scans.begin(), scans.end(), [](const ScanSource& a, const ScanSource& b) {
+  std::stable_sort(scans.begin(), scans.end(), [](const ScanFile& a, const ScanFile& b) {
     return a.sequence < b.sequence;
   });
   return scans;
@@ -127,15 +127,15 @@ absl::Status NoPose(const fs::path& poses, absl::string_view of) {
   return absl::NotFoundError(absl::StrCat(poses.string(), ": no pose of ", of));
 }
 
-void Assign(const FilePose& pose, ScanSource& scan) {
+void Assign(const FilePose& pose, ScanFile& scan) {
   scan.T_map_scan = pose.T_map_scan;
   scan.time = pose.time;
 }
 
-void AssignByIndex(const PoseList& list, const fs::path& file, std::vector<ScanSource>& scans) {
+void AssignByIndex(const PoseList& list, const fs::path& file, std::vector<ScanFile>& scans) {
   std::map<std::uint64_t, const FilePose*> by_index;
   for (const FilePose& pose : list.poses) by_index[*pose.index] = &pose;
-  for (ScanSource& scan : scans) {
+  for (ScanFile& scan : scans) {
     const std::optional<std::uint64_t> index = SequenceOfName(scan.path);
     const auto found = index.has_value() ? by_index.find(*index) : by_index.end();
     if (found != by_index.end()) {
@@ -159,8 +159,8 @@ std::optional<absl::Time> TimeOfName(const fs::path& path) {
 
 void AssignByTime(const std::vector<FilePose>& sorted,
                   const fs::path& file,
-                  std::vector<ScanSource>& scans) {
-  for (ScanSource& scan : scans) {
+                  std::vector<ScanFile>& scans) {
+  for (ScanFile& scan : scans) {
     const absl::Time time = *TimeOfName(scan.path);
     const auto found = std::lower_bound(
         sorted.begin(), sorted.end(), time - kSameTime, [](const FilePose& pose, absl::Time t) {
@@ -177,7 +177,7 @@ void AssignByTime(const std::vector<FilePose>& sorted,
 
 void AssignInOrder(const std::vector<FilePose>& sorted,
                    const fs::path& file,
-                   std::vector<ScanSource>& scans) {
+                   std::vector<ScanFile>& scans) {
   for (std::size_t i = 0; i < scans.size(); ++i) {
     if (i < sorted.size()) {
       Assign(sorted[i], scans[i]);
@@ -188,11 +188,11 @@ void AssignInOrder(const std::vector<FilePose>& sorted,
   }
 }
 
-void AssignTum(PoseList list, const ScanListOptions& options, std::vector<ScanSource>& scans) {
+void AssignTum(PoseList list, const ScanListOptions& options, std::vector<ScanFile>& scans) {
   std::stable_sort(list.poses.begin(), list.poses.end(), [](const FilePose& a, const FilePose& b) {
     return *a.time < *b.time;
   });
-  const bool timed = std::all_of(scans.begin(), scans.end(), [](const ScanSource& scan) {
+  const bool timed = std::all_of(scans.begin(), scans.end(), [](const ScanFile& scan) {
     return TimeOfName(scan.path).has_value();
   });
   if (!timed && list.poses.size() > scans.size() && options.warn) {
@@ -210,10 +210,10 @@ void AssignTum(PoseList list, const ScanListOptions& options, std::vector<ScanSo
 
 // Poses in `folder`, or beside the scans where it is empty; where nobody asked for them and there
 // is none, nothing.
-void Assign3dtk(bool asked, const fs::path& folder, std::vector<ScanSource>& scans) {
+void Assign3dtk(bool asked, const fs::path& folder, std::vector<ScanFile>& scans) {
   std::vector<absl::StatusOr<Pose>> poses;
   bool any = asked;
-  for (const ScanSource& scan : scans) {
+  for (const ScanFile& scan : scans) {
     const bool is_3dtk =
         scan.format == ScanFormat::k3dtk || ScanFormatOfName(scan.path) == ScanFormat::k3dtk;
     const fs::path named = folder.empty() ? scan.path : folder / scan.path.filename();
@@ -241,8 +241,8 @@ std::optional<std::uint64_t> SequenceOfName(const fs::path& path) {
   return *number;
 }
 
-absl::StatusOr<std::vector<ScanSource>> ListScans(const std::vector<fs::path>& paths,
-                                                  const ScanListOptions& options) {
+absl::StatusOr<std::vector<ScanFile>> ListScans(const std::vector<fs::path>& paths,
+                                                const ScanListOptions& options) {
   std::vector<fs::path> files;
   for (const fs::path& path : paths) {
     STRATA_RETURN_IF_ERROR(AddPath(path, options.format, files));
@@ -250,7 +250,7 @@ absl::StatusOr<std::vector<ScanSource>> ListScans(const std::vector<fs::path>& p
   if (files.empty()) {
     return NoScans(paths, options.format);
   }
-  std::vector<ScanSource> scans = Ordered(std::move(files), options.format);
+  std::vector<ScanFile> scans = Ordered(std::move(files), options.format);
   std::error_code error;
   const bool folder =
       fs::is_directory(options.poses, error) &&

@@ -30,7 +30,7 @@ struct ScanListOptions {
 };
 
 // One scan to import.
-struct ScanSource {
+struct ScanFile {
   std::filesystem::path path;
   ScanFormat format = ScanFormat::kAuto;  // for ReadScan
   std::uint64_t sequence = 0;
@@ -57,8 +57,8 @@ std::optional<std::uint64_t> SequenceOfName(const std::filesystem::path& path);
 //
 // INVALID_ARGUMENT, NOT_FOUND: no scan at all, a path that is not there, a file of poses that
 // cannot be read. A scan without a pose is in its `pose_status`.
-absl::StatusOr<std::vector<ScanSource>> ListScans(const std::vector<std::filesystem::path>& paths,
-                                                  const ScanListOptions& options);
+absl::StatusOr<std::vector<ScanFile>> ListScans(const std::vector<std::filesystem::path>& paths,
+                                                const ScanListOptions& options);
 
 }  // namespace strata
 

@@ -118,7 +118,7 @@ class Matcher {
     const PlacedScan alone[] = {{&source_, Pose::Identity()}};
     source_grids_ = RegistrationTarget(alone, {});
     for (const SeenScan& scan : target) {
-      views_.push_back({RangeImage(*scan.features, scan.sensor_origin),
+      views_.push_back({ViewImage(*scan.features, scan.sensor_origin),
                         SampleOf(*scan.features),
                         scan.T_target_scan});
     }
@@ -165,7 +165,7 @@ class Matcher {
 
  private:
   struct View {
-    RangeImage image;
+    ViewImage image;
     std::vector<SampledPoint> sample;
     Pose T_target_scan;
   };
@@ -203,7 +203,7 @@ class Matcher {
   // Adds what `image` and the features `grids` of the other side say about `points`.
   static void Compare(const std::vector<SampledPoint>& points,
                       const Pose& T_image_points,
-                      const RangeImage& image,
+                      const ViewImage& image,
                       const Pose& T_grid_points,
                       const RegistrationTarget& grids,
                       Comparison& sum) {
@@ -238,7 +238,7 @@ class Matcher {
   const ScanFeatures& source_;
   RegistrationTarget target_;
   PlaceSearch search_;
-  RangeImage source_view_;
+  ViewImage source_view_;
   std::vector<SampledPoint> source_sample_;
   RegistrationTarget source_grids_;
   std::vector<View> views_;

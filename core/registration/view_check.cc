@@ -35,7 +35,7 @@ int CellOf(const Eigen::Vector3f& p, float range) {
 
 }  // namespace
 
-RangeImage::RangeImage(const ScanFeatures& features, const Eigen::Vector3d& sensor_origin)
+ViewImage::ViewImage(const ScanFeatures& features, const Eigen::Vector3d& sensor_origin)
     : origin_(sensor_origin.cast<float>()) {
   std::vector<Cell> own(kRows * kColumns);
   for (int c = 0; c < kFeatureClasses; ++c) {
@@ -78,7 +78,7 @@ RangeImage::RangeImage(const ScanFeatures& features, const Eigen::Vector3d& sens
   }
 }
 
-Sight RangeImage::At(const Eigen::Vector3f& p_scan) const {
+Sight ViewImage::At(const Eigen::Vector3f& p_scan) const {
   const Eigen::Vector3f p = p_scan - origin_;
   const float range = p.norm();
   if (cells_.empty() || !(range >= kMinRangeM && range <= kMaxRangeM)) return Sight::kUnknown;

@@ -22,10 +22,10 @@ enum class Sight {
 
 // How far a scan sees in every direction: a spherical image with the least and the greatest
 // distance of the features in each cell. Immutable.
-class RangeImage {
+class ViewImage {
  public:
-  RangeImage() = default;
-  RangeImage(const ScanFeatures& features, const Eigen::Vector3d& sensor_origin);
+  ViewImage() = default;
+  ViewImage(const ScanFeatures& features, const Eigen::Vector3d& sensor_origin);
 
   // `p_scan` in the frame of the scan. Points within 2 m and beyond 40 m are unknown.
   Sight At(const Eigen::Vector3f& p_scan) const;

@@ -67,7 +67,7 @@ TEST(RecordedScansTest, CorridorOf3dtkOverlapsByItsPosesOnly) {
   ASSERT_EQ(scans.size(), 3U);
   std::vector<std::vector<Eigen::Vector3d>> posed;
   std::vector<std::vector<Eigen::Vector3d>> unposed;
-  for (const ScanSource& scan : scans) {
+  for (const ScanFile& scan : scans) {
     STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, ReadScan(scan.path));
     EXPECT_EQ(cloud.size(), 81'360U);
     posed.push_back(ThinnedInMap(cloud, scan.T_map_scan, 0.1));
@@ -146,7 +146,7 @@ TEST(RecordedScansTest, SequencesHaveAPoseForEveryScan) {
     SCOPED_TRACE(poses);
     STRATA_ASSERT_OK_AND_ASSIGN(const auto list,
                                 ListScans({path / scans}, {.poses = path / poses}));
-    for (const ScanSource& scan : list) STRATA_EXPECT_OK(scan.pose_status) << scan.path;
+    for (const ScanFile& scan : list) STRATA_EXPECT_OK(scan.pose_status) << scan.path;
   }
 }
 

@@ -25,14 +25,14 @@ class ScanListTest : public ::testing::Test {
     STRATA_EXPECT_OK(WriteFileBytes(dir_.path() / name, text));
     return dir_.path() / name;
   }
-  static std::vector<std::string> Names(const std::vector<ScanSource>& scans) {
+  static std::vector<std::string> Names(const std::vector<ScanFile>& scans) {
     std::vector<std::string> names;
-    for (const ScanSource& scan : scans) names.push_back(scan.path.filename().string());
+    for (const ScanFile& scan : scans) names.push_back(scan.path.filename().string());
     return names;
   }
-  static std::vector<std::uint64_t> Sequences(const std::vector<ScanSource>& scans) {
+  static std::vector<std::uint64_t> Sequences(const std::vector<ScanFile>& scans) {
     std::vector<std::uint64_t> sequences;
-    for (const ScanSource& scan : scans) sequences.push_back(scan.sequence);
+    for (const ScanFile& scan : scans) sequences.push_back(scan.sequence);
     return sequences;
   }
   testing::TempDir dir_;

@@ -32,8 +32,8 @@ ScanFeatures RoundWall(double from_rad, double to_rad) {
 
 constexpr double kPi = std::numbers::pi;
 
-TEST(RangeImageTest, TellsWhatIsThereFromWhatIsSeenThroughAndHidden) {
-  const RangeImage image(RoundWall(-kPi, kPi), Vector3d::Zero());
+TEST(ViewImageTest, TellsWhatIsThereFromWhatIsSeenThroughAndHidden) {
+  const ViewImage image(RoundWall(-kPi, kPi), Vector3d::Zero());
   EXPECT_EQ(image.At({10.0F, 0.0F, 0.5F}), Sight::kAgreeing);
   EXPECT_EQ(image.At({-6.9F, -6.9F, 0.5F}), Sight::kAgreeing);
   EXPECT_EQ(image.At({5.0F, 0.0F, 0.5F}), Sight::kSeenThrough);
@@ -42,16 +42,16 @@ TEST(RangeImageTest, TellsWhatIsThereFromWhatIsSeenThroughAndHidden) {
   EXPECT_EQ(image.At({0.0F, 0.0F, 8.0F}), Sight::kUnknown) << "above where it looked";
 }
 
-TEST(RangeImageTest, LooksFromWhereTheSensorWas) {
-  const RangeImage image(RoundWall(-kPi, kPi), {4.0, 0.0, 0.0});
+TEST(ViewImageTest, LooksFromWhereTheSensorWas) {
+  const ViewImage image(RoundWall(-kPi, kPi), {4.0, 0.0, 0.0});
   EXPECT_EQ(image.At({10.0F, 0.0F, 0.0F}), Sight::kAgreeing);
   EXPECT_EQ(image.At({-10.0F, 0.0F, 0.0F}), Sight::kAgreeing);
   EXPECT_EQ(image.At({4.0F, 5.0F, 0.0F}), Sight::kSeenThrough);
 }
 
-TEST(RangeImageTest, NothingComesBackOnlyWhereASensorLooks) {
+TEST(ViewImageTest, NothingComesBackOnlyWhereASensorLooks) {
   // A sensor that turns, with posts around and a gap ahead.
-  const RangeImage around(RoundWall(0.2, 2.0 * kPi - 0.2), Vector3d::Zero());
+  const ViewImage around(RoundWall(0.2, 2.0 * kPi - 0.2), Vector3d::Zero());
   EXPECT_EQ(around.At({6.0F, 0.0F, 0.5F}), Sight::kUnknown) << "no beam is known to go there";
   std::array<std::vector<Vector3f>, kFeatureClasses> points;
   const ScanFeatures walls = RoundWall(0.2, 2.0 * kPi - 0.2);
@@ -61,19 +61,19 @@ TEST(RangeImageTest, NothingComesBackOnlyWhereASensorLooks) {
       points[static_cast<std::size_t>(FeatureClass::kTraversable)].emplace_back(x, y, -1.5F);
     }
   }
-  const RangeImage road(ScanFeatures::FromPoints(std::move(points)), Vector3d::Zero());
+  const ViewImage road(ScanFeatures::FromPoints(std::move(points)), Vector3d::Zero());
   EXPECT_EQ(road.At({6.0F, 0.0F, 1.0F}), Sight::kNoReturn);
   EXPECT_EQ(road.At({25.0F, 0.0F, 1.0F}), Sight::kUnknown) << "far things may not answer";
   // One that looks ahead only may just not have looked.
-  const RangeImage ahead(RoundWall(-0.5, 0.5), Vector3d::Zero());
+  const ViewImage ahead(RoundWall(-0.5, 0.5), Vector3d::Zero());
   EXPECT_EQ(ahead.At({0.0F, 10.0F, 0.0F}), Sight::kUnknown);
 }
 
-TEST(RangeImageTest, WithoutFeaturesNothingIsKnown) {
-  EXPECT_EQ(RangeImage().At({5.0F, 0.0F, 0.0F}), Sight::kUnknown);
-  EXPECT_EQ(RangeImage(ScanFeatures(), Vector3d::Zero()).At({5.0F, 0.0F, 0.0F}), Sight::kUnknown);
+TEST(ViewImageTest, WithoutFeaturesNothingIsKnown) {
+  EXPECT_EQ(ViewImage().At({5.0F, 0.0F, 0.0F}), Sight::kUnknown);
+  EXPECT_EQ(ViewImage(ScanFeatures(), Vector3d::Zero()).At({5.0F, 0.0F, 0.0F}), Sight::kUnknown);
   const float nan = std::nanf("");
-  EXPECT_EQ(RangeImage(RoundWall(-kPi, kPi), Vector3d::Zero()).At({nan, 0.0F, 0.0F}),
+  EXPECT_EQ(ViewImage(RoundWall(-kPi, kPi), Vector3d::Zero()).At({nan, 0.0F, 0.0F}),
             Sight::kUnknown);
 }
 
