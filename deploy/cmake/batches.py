@@ -20,7 +20,7 @@ ALIAS = re.compile(r"^using\s+(\w+)\s*=\s*([^;]+);", re.M)
 TYPES = [re.compile(r"^(?:struct|class|enum class|enum|union)\s+(\w+)", re.M), re.compile(r"^using\s+(\w+)\s*=", re.M)]
 VALUES = [
     re.compile(r"^namespace (\w+) =", re.M),
-    re.compile(r"^(?!using|namespace)[A-Za-z].*?\b(\w+)\s*[({=;[]", re.M),
+    re.compile(r"^(?!using|namespace|class|struct|enum|union|template)[A-Za-z].*?\b(\w+)\s*[({=;[]", re.M),
     re.compile(r"^\s+(k[A-Z]\w*)(?:,| =|$)", re.M),
 ]
 
