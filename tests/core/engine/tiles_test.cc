@@ -141,7 +141,7 @@ TEST_F(EngineTilesTest, TilesKeptInMemoryAreThoseOfTheStore) {
     WaitIntegrated(db());
     auto held = all_at_hand();  // of what the step before left in memory, only what is still so
     const auto tiles = AllTiles(db());
-    for (const auto& [key, _] : tiles) ever.insert(key);
+    for (const auto& tile : tiles) ever.insert(tile.first);
     held.merge(all_at_hand());
     at_hand += held.size();
     for (const auto& [key, bytes] : held) {
