@@ -196,11 +196,21 @@ TEST_P(DiskFaultTest, AJobWhoseEndCannotBeStoredRunsAgain) {
   EXPECT_EQ(job.state, JobState::kSucceeded) << job.message;
 }
 
+// Whichever way a write fails, the same code tidies up after it: the address sanitizer, many times
+// slower, sees it once.
+std::vector<Trouble> Troubles() {
+#ifdef __SANITIZE_ADDRESS__
+  return {{"WriteError", DiskFault::kWrite}};
+#else
+  return {{"Full", DiskFault::kFull},
+          {"WriteError", DiskFault::kWrite},
+          {"SyncError", DiskFault::kSync}};
+#endif
+}
+
 INSTANTIATE_TEST_SUITE_P(Disk,
                          DiskFaultTest,
-                         ::testing::Values(Trouble{"Full", DiskFault::kFull},
-                                           Trouble{"WriteError", DiskFault::kWrite},
-                                           Trouble{"SyncError", DiskFault::kSync}),
+                         ::testing::ValuesIn(Troubles()),
                          [](const auto& trouble) { return trouble.param.name; });
 
 }  // namespace
