@@ -134,6 +134,9 @@ function(strata_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
+  if(STRATA_SANITIZER)
+    math(EXPR ARG_TIMEOUT "${ARG_TIMEOUT} * 4")
+  endif()
   strata_executable(
     ${name} ${name} SOURCES ${ARG_SOURCES} DEPS ${ARG_DEPS} GTest::gmock_main SHARED_HEADERS strata_test_headers
   )

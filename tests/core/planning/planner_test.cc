@@ -406,6 +406,9 @@ TEST(PlannerTest, WorksWithACacheThatHoldsNothing) {
 }
 
 TEST(PlannerTest, ALongWayTakesLittleMemory) {
+#ifdef __SANITIZE_THREAD__
+  GTEST_SKIP() << "one thread, and three minutes of it";
+#endif
   // 120 m, five tiles: 1.6 MB once prepared, 0.3 MB of nodes.
   const std::string row(240, '.');
   MemoryTiles source(
