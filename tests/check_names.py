@@ -3,7 +3,7 @@
 type to a name of its own: of two that share one, a program takes the functions of either for both.
 
 Looks at words, not at meaning: a name of the table below, or a type of ours, must come from a header that the file
-includes itself, or that headers of ours among them include. Takes a second; tests/check_headers.py, which compiles, an hour.
+includes itself, or that headers of ours among them include. tests/check_headers.py is sure, for it compiles, and slow.
 """
 import functools
 import pathlib
