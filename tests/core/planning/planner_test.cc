@@ -7,7 +7,6 @@
 #include <numbers>
 #include <set>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -406,9 +405,6 @@ TEST(PlannerTest, WorksWithACacheThatHoldsNothing) {
 }
 
 TEST(PlannerTest, ALongWayTakesLittleMemory) {
-#ifdef __SANITIZE_THREAD__
-  GTEST_SKIP() << "one thread, and three minutes of it";
-#endif
   // 120 m, five tiles: 1.6 MB once prepared, 0.3 MB of nodes.
   const std::string row(240, '.');
   MemoryTiles source(
@@ -462,27 +458,6 @@ TEST(PlannerTest, LimitsStopsAndFailuresAreAnswered) {
   query.profile = SmallRobot();
   EXPECT_THAT(planner.Plan(broken, query, Stop()),
               StatusIs(absl::StatusCode::kDataLoss, HasSubstr("checksum")));
-}
-
-TEST(PlannerTest, ManyThreadsGetTheSameAnswers) {
-  const DrawnMap map = Bridge(1.5, 0.3, '#');
-  const PlanQuery query = {
-      .from = At(1.05, 3.75, 1.5), .to = At(13.05, 3.75, 1.5), .profile = SmallRobot()};
-  Planner planner({.cell_size_m = kCell});
-  std::vector<double> costs(4, -1.0);
-  std::vector<std::thread> threads;
-  for (double& cost : costs) {
-    threads.emplace_back([&planner, &map, &query, &cost] {
-      MemoryTiles source(map.Tiles());
-      for (int i = 0; i < 5; ++i) {
-        const auto result = planner.Plan(source, query, Stop());
-        cost = result.ok() ? result->cost : -2.0;
-      }
-    });
-  }
-  for (std::thread& thread : threads) thread.join();
-  for (const double cost : costs) EXPECT_DOUBLE_EQ(cost, costs[0]);
-  EXPECT_LE(planner.cache_statistics().prepared, map.Tiles().size());
 }
 
 }  // namespace
