@@ -43,7 +43,7 @@ stage "sanitizers"
 tests/run_sanitizers.sh
 
 stage "fuzzers"
-tests/fuzz/run.sh --smoke 60
+tests/fuzz/run.sh 60
 
 if [[ "${1:-}" == --full ]]; then
   stage "clang-tidy"

@@ -140,8 +140,8 @@ function(strata_test name)
   strata_executable(
     ${name} ${name} SOURCES ${ARG_SOURCES} DEPS ${ARG_DEPS} GTest::gmock_main SHARED_HEADERS strata_test_headers
   )
-  if(TARGET strata_tsan_absl_mutex)
-    target_link_libraries(${name} PRIVATE strata_tsan_absl_mutex)
+  if(TARGET strata_tsan_absl)
+    target_link_libraries(${name} PRIVATE strata_tsan_absl)
   endif()
   foreach(kind asan tsan)
     if(kind IN_LIST ARG_LABELS AND STRATA_SANITIZER_KIND STREQUAL kind)

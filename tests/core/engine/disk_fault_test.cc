@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/base/config.h"
 #include "absl/status/status.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -199,7 +200,7 @@ TEST_P(DiskFaultTest, AJobWhoseEndCannotBeStoredRunsAgain) {
 // Whichever way a write fails, the same code tidies up after it: the address sanitizer, many times
 // slower, sees it once.
 std::vector<Trouble> Troubles() {
-#ifdef __SANITIZE_ADDRESS__
+#ifdef ABSL_HAVE_ADDRESS_SANITIZER
   return {{"WriteError", DiskFault::kWrite}};
 #else
   return {{"Full", DiskFault::kFull},

@@ -1,7 +1,9 @@
-// What the thread sanitizer is told of absl::Mutex, and that it still sees what no mutex guards.
+// What the thread sanitizer is told of absl::Mutex and absl::Status, and that it still sees what no mutex guards.
 #include <cstdlib>
+#include <optional>
 #include <thread>
 
+#include "absl/status/status.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 #include <gtest/gtest.h>
@@ -15,7 +17,7 @@ void TwoThreads(const auto& work) {
   other.join();
 }
 
-TEST(TsanAbslMutexTest, LockOrders) {
+TEST(TsanAbslTest, LockOrders) {
   absl::Mutex mutex;
   int count = 0;
   TwoThreads([&] {
@@ -27,7 +29,7 @@ TEST(TsanAbslMutexTest, LockOrders) {
   EXPECT_EQ(count, 2000);
 }
 
-TEST(TsanAbslMutexTest, WaitingOrders) {
+TEST(TsanAbslTest, WaitingOrders) {
   absl::Mutex mutex;
   int waits = 0;
   int value = 0;
@@ -49,8 +51,18 @@ TEST(TsanAbslMutexTest, WaitingOrders) {
   other.join();
 }
 
+TEST(TsanAbslTest, CopiesOfAStatusAreFreedInOrder) {
+  for (int i = 0; i < 100; ++i) {
+    std::optional<absl::Status> status = absl::NotFoundError("tile 1/2/3");
+    std::thread other([copy = *status] { EXPECT_EQ(copy.message(), "tile 1/2/3"); });
+    EXPECT_EQ(status->message(), "tile 1/2/3");
+    status.reset();
+    other.join();
+  }
+}
+
 // Both threads lock the same mutex all the time, but not around `naked`.
-TEST(TsanAbslMutexDeathTest, RaceBesideAMutexIsReported) {
+TEST(TsanAbslDeathTest, RaceBesideAMutexIsReported) {
   ::testing::FLAGS_gtest_death_test_style = "threadsafe";
   const auto race = [] {
     absl::Mutex mutex;

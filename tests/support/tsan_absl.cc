@@ -1,32 +1,37 @@
 // Debian's Abseil is built without -fsanitize=thread, so ThreadSanitizer would not see that its
-// mutex orders anything. In the tsan build the linker sends every call of absl::Mutex in our own
-// objects here (--wrap, see tests/CMakeLists.txt) and each announces itself as Abseil's annotations
-// would. Between pre_… and post_… the thread is not watched: there Abseil may evaluate the
-// condition of another thread that waits for the same mutex.
+// mutex orders anything, nor that copies of a status count their owners. In the tsan build the
+// linker sends every such call of our own objects here (--wrap, see tests/CMakeLists.txt) and each
+// announces itself as Abseil's annotations would. Between pre_… and post_… the thread is not
+// watched: there Abseil may evaluate the condition of another thread that waits for the same mutex.
+#include <cstdint>
+
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 #include <sanitizer/tsan_interface.h>
 
-#define STRATA_WRAP(method) asm("__wrap__ZN4absl7debian35Mutex" method)
-#define STRATA_REAL(method) asm("__real__ZN4absl7debian35Mutex" method)
+#define STRATA_WRAP(function) asm("__wrap__ZN4absl7debian3" function)
+#define STRATA_REAL(function) asm("__real__ZN4absl7debian3" function)
 
 using absl::Condition;
 using absl::Duration;
 using absl::Mutex;
 
-void RealDestroy(Mutex* mutex) STRATA_REAL("D1Ev");
-void RealLock(Mutex* mutex) STRATA_REAL("4LockEv");
-void RealUnlock(Mutex* mutex) STRATA_REAL("6UnlockEv");
-void RealAwait(Mutex* mutex, const Condition& condition) STRATA_REAL("5AwaitERKNS0_9ConditionE");
+void RealDestroy(Mutex* mutex) STRATA_REAL("5MutexD1Ev");
+void RealLock(Mutex* mutex) STRATA_REAL("5Mutex4LockEv");
+void RealUnlock(Mutex* mutex) STRATA_REAL("5Mutex6UnlockEv");
+void RealAwait(Mutex* mutex, const Condition& condition) STRATA_REAL("5Mutex5AwaitERKNS0_9ConditionE");
 bool RealAwaitWithTimeout(Mutex* mutex, const Condition& condition, Duration timeout)
-    STRATA_REAL("16AwaitWithTimeoutERKNS0_9ConditionENS0_8DurationE");
+    STRATA_REAL("5Mutex16AwaitWithTimeoutERKNS0_9ConditionENS0_8DurationE");
 
-void WrapDestroy(Mutex* mutex) STRATA_WRAP("D1Ev");
-void WrapLock(Mutex* mutex) STRATA_WRAP("4LockEv");
-void WrapUnlock(Mutex* mutex) STRATA_WRAP("6UnlockEv");
-void WrapAwait(Mutex* mutex, const Condition& condition) STRATA_WRAP("5AwaitERKNS0_9ConditionE");
+void RealUnref(std::uintptr_t status) STRATA_REAL("6Status15UnrefNonInlinedEm");
+
+void WrapDestroy(Mutex* mutex) STRATA_WRAP("5MutexD1Ev");
+void WrapLock(Mutex* mutex) STRATA_WRAP("5Mutex4LockEv");
+void WrapUnlock(Mutex* mutex) STRATA_WRAP("5Mutex6UnlockEv");
+void WrapAwait(Mutex* mutex, const Condition& condition) STRATA_WRAP("5Mutex5AwaitERKNS0_9ConditionE");
 bool WrapAwaitWithTimeout(Mutex* mutex, const Condition& condition, Duration timeout)
-    STRATA_WRAP("16AwaitWithTimeoutERKNS0_9ConditionENS0_8DurationE");
+    STRATA_WRAP("5Mutex16AwaitWithTimeoutERKNS0_9ConditionENS0_8DurationE");
+void WrapUnref(std::uintptr_t status) STRATA_WRAP("6Status15UnrefNonInlinedEm");
 
 namespace {
 
@@ -76,8 +81,10 @@ bool WrapAwaitWithTimeout(Mutex* mutex, const Condition& condition, Duration tim
   return RealAwaitWithTimeout(mutex, condition, timeout);
 }
 
-extern "C" const char* __tsan_default_suppressions() {
-  // Copies of a status count their owners in Abseil's library, so that the last one seems to free
-  // what others still read.
-  return "race:absl::debian3::Status::Unref\n";
+// The last owner frees what the others have read.
+void WrapUnref(std::uintptr_t status) {
+  void* const owners = reinterpret_cast<void*>(status);
+  __tsan_release(owners);
+  __tsan_acquire(owners);
+  RealUnref(status);
 }
