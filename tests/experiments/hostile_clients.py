@@ -2,20 +2,23 @@
 """Well-behaved clients beside hostile ones: does the server stay up, healthy, within its memory, and quick?
 
     tests/experiments/hostile_clients.py --build build/release [--seconds 15] [--connections 10000] [--only garbage,claims]
-                                         [--limit-mb 512] [--seed 1] [-- STRATAD OPTIONS]
+                                         [--limit-mb 512] [--seed 1] [--proxy] [-- STRATAD OPTIONS]
 
 A real stratad with tokens. Robots upload, readers fetch and planners plan at a steady pace, first alone and then beside
 each attack; the attackers have a token of their own, and run at low priority so that their own work weighs less. A row
 an attack: p99 of the well-behaved calls and its ratio to the median of the p99s alone (measured before and after, too),
 the peak of the resident set during the attack (VmHWM), what health checks say after it, and how many connections, threads
 and megabytes are left. Exits 1 where the server dies, is not healthy, takes more than --limit-mb, refuses a well-behaved
-client for good, or a ratio is above 2 (and the p99 grows by more than 20 ms). Needs python3-grpcio and python3-numpy.
+client for good, or a ratio is above 2 (and the p99 grows by more than 20 ms). With --proxy all go through HAProxy as
+deploy/haproxy.cfg has it, without TLS. Attackers that speak HTTP/2 by hand come from 127.0.0.2. Needs python3-grpcio,
+python3-numpy and, with --proxy, haproxy.
 """
 import argparse
 import multiprocessing
 import os
 import pathlib
 import queue
+import re
 import resource
 import socket
 import struct
@@ -83,7 +86,7 @@ def call_headers(stream, path, token):
 
 def connect(address):
     host, port = address.rsplit(":", 1)
-    return socket.create_connection((host, int(port)), timeout=5)
+    return socket.create_connection((host, int(port)), timeout=5, source_address=("127.0.0.2", 0))
 
 
 def swallow(peer):
@@ -393,11 +396,27 @@ def add_token(build, file, name, right):
     return line.split()[-1]
 
 
+def start_proxy(folder, server):
+    """Puts HAProxy before `server`, whose address becomes the proxy's; its process."""
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{unused.getsockname()[1]}"
+    config = (ROOT / "deploy/haproxy.cfg").read_text()
+    config = re.sub(r"bind .*", f"bind {address} proto h2", config)
+    config = re.sub(r"server local \S+", f"server local {server.address}", config)
+    (folder / "haproxy.cfg").write_text(config)
+    proxy = subprocess.Popen(["haproxy", "-f", folder / "haproxy.cfg"])
+    time.sleep(1)
+    server.address = address
+    return proxy
+
+
 def campaign(build, options, folder):
     import strata
     tokens_file = folder / "tokens"
     good, bad = (add_token(build, tokens_file, name, "admin") for name in ("good", "bad"))
     server = Stratad(build, folder, "--tokens", tokens_file, *options.stratad)
+    proxy = start_proxy(folder, server) if options.proxy else None
     told, over = multiprocessing.Queue(), multiprocessing.Event()
     rows, workers = [], []
     try:
@@ -426,6 +445,8 @@ def campaign(build, options, folder):
             worker.join(10)
         if server.alive():
             server.stop()
+        if proxy:
+            proxy.kill()
     return alone, rows
 
 
@@ -480,6 +501,7 @@ def main():
     parser.add_argument("--limit-mb", type=float, default=512)
     parser.add_argument("--only", help="attacks, comma-separated")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--proxy", action="store_true", help="through HAProxy")
     parser.add_argument("stratad", nargs="*", help="options of the server")
     options = parser.parse_args()
     build = options.build.resolve()

@@ -19,7 +19,8 @@ using absl::Mutex;
 void RealDestroy(Mutex* mutex) STRATA_REAL("5MutexD1Ev");
 void RealLock(Mutex* mutex) STRATA_REAL("5Mutex4LockEv");
 void RealUnlock(Mutex* mutex) STRATA_REAL("5Mutex6UnlockEv");
-void RealAwait(Mutex* mutex, const Condition& condition) STRATA_REAL("5Mutex5AwaitERKNS0_9ConditionE");
+void RealAwait(Mutex* mutex, const Condition& condition)
+    STRATA_REAL("5Mutex5AwaitERKNS0_9ConditionE");
 bool RealAwaitWithTimeout(Mutex* mutex, const Condition& condition, Duration timeout)
     STRATA_REAL("5Mutex16AwaitWithTimeoutERKNS0_9ConditionENS0_8DurationE");
 
@@ -28,7 +29,8 @@ void RealUnref(std::uintptr_t status) STRATA_REAL("6Status15UnrefNonInlinedEm");
 void WrapDestroy(Mutex* mutex) STRATA_WRAP("5MutexD1Ev");
 void WrapLock(Mutex* mutex) STRATA_WRAP("5Mutex4LockEv");
 void WrapUnlock(Mutex* mutex) STRATA_WRAP("5Mutex6UnlockEv");
-void WrapAwait(Mutex* mutex, const Condition& condition) STRATA_WRAP("5Mutex5AwaitERKNS0_9ConditionE");
+void WrapAwait(Mutex* mutex, const Condition& condition)
+    STRATA_WRAP("5Mutex5AwaitERKNS0_9ConditionE");
 bool WrapAwaitWithTimeout(Mutex* mutex, const Condition& condition, Duration timeout)
     STRATA_WRAP("5Mutex16AwaitWithTimeoutERKNS0_9ConditionENS0_8DurationE");
 void WrapUnref(std::uintptr_t status) STRATA_WRAP("6Status15UnrefNonInlinedEm");

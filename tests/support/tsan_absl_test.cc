@@ -1,4 +1,5 @@
-// What the thread sanitizer is told of absl::Mutex and absl::Status, and that it still sees what no mutex guards.
+// What the thread sanitizer is told of absl::Mutex and absl::Status, and that it still sees what no
+// mutex guards.
 #include <cstdlib>
 #include <optional>
 #include <thread>
