@@ -304,7 +304,12 @@ void AnnounceScans(RpcCall& call) {
     if (header->content_hash().empty()) return;
     header->clear_content_hash();
     const auto translated = translate::FromProto(*header);
-    header->set_content_hash(translated.ok() ? ContentHashOf(*translated, cloud) : "unknown");
+    const auto fits = [&](const auto& column) {
+      return column.empty() || column.size() == cloud.size();
+    };
+    const bool even = fits(cloud.intensity) && fits(cloud.colour) && fits(cloud.label);
+    header->set_content_hash(translated.ok() && even ? ContentHashOf(*translated, cloud)
+                                                     : "unknown");
   };
   for (auto& message : call.requests) {
     auto& request = static_cast<Request&>(*message);
