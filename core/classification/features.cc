@@ -93,7 +93,7 @@ absl::StatusOr<FeatureMatrix> ComputeFeatures(const PointCloud& cloud,
   }
   STRATA_ASSIGN_OR_RETURN(FeatureMatrix features, ColumnsOf(finite, options, stop));
   if (rows.size() < cloud.size()) features = Spread(features, rows, cloud.size());
-  if (features.rows() > 0) features.rightCols(1).setOnes();
+  features.rightCols(1).setOnes();
   return features;
 }
 

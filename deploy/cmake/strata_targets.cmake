@@ -20,7 +20,9 @@ if(STRATA_SANITIZER)
   if(STRATA_SANITIZER MATCHES "undefined")
     # These four take a third of the build time and find little that the address sanitizer does not.
     target_compile_options(
-      strata_build_options INTERFACE -fno-sanitize=null,alignment,object-size,vptr -fno-sanitize-recover=undefined
+      strata_build_options
+      INTERFACE -fno-sanitize=null,alignment,object-size,vptr -fno-sanitize-recover=undefined
+                $<$<CXX_COMPILER_ID:Clang>:-fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/deploy/cmake/sanitizer_ignores.txt>
     )
   endif()
 endif()
