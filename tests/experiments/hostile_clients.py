@@ -20,6 +20,7 @@ import pathlib
 import queue
 import re
 import resource
+import shutil
 import socket
 import struct
 import subprocess
@@ -504,6 +505,8 @@ def main():
     parser.add_argument("--proxy", action="store_true", help="through HAProxy")
     parser.add_argument("stratad", nargs="*", help="options of the server")
     options = parser.parse_args()
+    if options.proxy and not shutil.which("haproxy"):
+        sys.exit("hostile_clients: --proxy needs haproxy: apt install haproxy")
     build = options.build.resolve()
     sys.path.append(str(build / "client/python"))
     raise_files()
