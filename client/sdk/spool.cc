@@ -266,7 +266,7 @@ absl::Status Spool::Add(absl::string_view map, const ScanHeader& header, const P
   STRATA_RETURN_IF_ERROR(ValidateScanHeader(scan.header));
   STRATA_RETURN_IF_ERROR(Annotate(CheckCloud(header, cloud), what));
   scan.header.content_hash = ContentHashOf(header, cloud);
-  const std::string bytes = sdk::EncodeSpoolFile(scan, cloud);
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes, sdk::EncodeSpoolFile(scan, cloud));
   return Annotate(files_->Add({scan.map, header.id, bytes.size()}, bytes), what);
 }
 

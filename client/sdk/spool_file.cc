@@ -75,7 +75,7 @@ std::optional<std::string> ReadBytes(std::ifstream& stream, std::size_t size) {
 
 }  // namespace
 
-std::string EncodeSpoolFile(const SpooledScan& scan, const PointCloud& cloud) {
+absl::StatusOr<std::string> EncodeSpoolFile(const SpooledScan& scan, const PointCloud& cloud) {
   std::string bytes(kMagic);
   PutFixed(bytes, kVersion);
   const std::string head = EncodeHead(scan);
@@ -83,8 +83,9 @@ std::string EncodeSpoolFile(const SpooledScan& scan, const PointCloud& cloud) {
   bytes += head;
   PutFixed(bytes, Checksum64(bytes));
   for (std::size_t begin = 0; begin < cloud.size(); begin += kMaxEncodedPoints) {
-    const std::string piece =
-        EncodePoints(SliceOf(cloud, begin, std::min(cloud.size(), begin + kMaxEncodedPoints)));
+    STRATA_ASSIGN_OR_RETURN(
+        const std::string piece,
+        EncodePoints(SliceOf(cloud, begin, std::min(cloud.size(), begin + kMaxEncodedPoints))));
     PutFixed(bytes, static_cast<std::uint32_t>(piece.size()));
     bytes += piece;
   }

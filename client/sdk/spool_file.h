@@ -26,8 +26,9 @@ struct SpooledScan {
 // head: map, trajectory and content_hash (each 16 bits of length before it), sequence (64 bits),
 // scan header (core/world/value_codec); XXH3-64 of all before; then for each piece its length (32
 // bits) and core/codec's point bytes.
-// REQUIRES: `cloud` is what the header says.
-std::string EncodeSpoolFile(const SpooledScan& scan, const PointCloud& cloud);
+// INVALID_ARGUMENT for columns of `cloud` that do not fit its points. REQUIRES: `cloud` is what the
+// header says.
+absl::StatusOr<std::string> EncodeSpoolFile(const SpooledScan& scan, const PointCloud& cloud);
 
 // Reads piece by piece. Its input is hostile: DATA_LOSS for whatever EncodeSpoolFile() would not
 // have written, memory is bounded.

@@ -22,11 +22,16 @@ absl::Status CheckColumn(const char* name, std::size_t length, std::size_t point
 
 }  // namespace
 
-absl::Status ValidateCloud(const PointCloud& cloud) {
+absl::Status CheckColumns(const PointCloud& cloud) {
   const std::size_t n = cloud.size();
   STRATA_RETURN_IF_ERROR(CheckColumn("intensity", cloud.intensity.size(), n));
   STRATA_RETURN_IF_ERROR(CheckColumn("colour", cloud.colour.size(), n));
-  STRATA_RETURN_IF_ERROR(CheckColumn("label", cloud.label.size(), n));
+  return CheckColumn("label", cloud.label.size(), n);
+}
+
+absl::Status ValidateCloud(const PointCloud& cloud) {
+  STRATA_RETURN_IF_ERROR(CheckColumns(cloud));
+  const std::size_t n = cloud.size();
   const bool half_a_grid = (cloud.rows == 0) != (cloud.columns == 0);
   if (half_a_grid || std::uint64_t{cloud.rows} * cloud.columns != (cloud.organised() ? n : 0)) {
     return absl::InvalidArgumentError(absl::StrCat(

@@ -39,6 +39,9 @@ struct PointCloud {
   bool organised() const { return rows != 0; }
 };
 
+// INVALID_ARGUMENT, naming the column, unless each is empty or as long as the points.
+absl::Status CheckColumns(const PointCloud& cloud);
+
 // INVALID_ARGUMENT if a column's length or the grid does not fit, or a point is infinite or beyond
 // 1e6 m of the origin (NaN is accepted in organised clouds only); names the first offending point.
 absl::Status ValidateCloud(const PointCloud& cloud);

@@ -78,8 +78,13 @@ absl::Status TakePlanes(ByteReader& reader, std::size_t count, Set set) {
 
 }  // namespace
 
-std::string EncodePoints(const PointCloud& chunk) {
+absl::StatusOr<std::string> EncodePoints(const PointCloud& chunk) {
   const std::size_t n = chunk.size();
+  if (n > kMaxEncodedPoints) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("points: ", n, " of them; at most ", kMaxEncodedPoints, " a piece"));
+  }
+  STRATA_RETURN_IF_ERROR(CheckColumns(chunk));
   std::string body;
   PutVarint(body, n);
   body.push_back(static_cast<char>((chunk.intensity.empty() ? 0 : kHasIntensity) |

@@ -19,8 +19,9 @@ inline constexpr std::size_t kMaxEncodedPoints = 40'000;
 // Points and columns of `chunk` in the format of FORMAT.md, envelope included, lossless: at most 21
 // bytes a point + 256, so below 1 MiB. Every float keeps its bits, but that all NaN become the same
 // one. Origins and grid belong to the scan and are not kept. A pure function of the chunk.
-// REQUIRES: at most kMaxEncodedPoints; columns empty or as long as the points. Thread-safe.
-std::string EncodePoints(const PointCloud& chunk);
+// INVALID_ARGUMENT for more than kMaxEncodedPoints and for a column that is neither empty nor as
+// long as the points. Thread-safe.
+absl::StatusOr<std::string> EncodePoints(const PointCloud& chunk);
 
 // The chunk, with zero origins and no grid. DATA_LOSS for bytes that are not an intact chunk,
 // UNIMPLEMENTED for those of a later version. Allocates less than 4 MiB. Thread-safe.

@@ -27,10 +27,9 @@ constexpr std::size_t kStageBytes = std::size_t{1} << 20;
 
 }  // namespace
 
-absl::StatusOr<std::uint64_t> ScanIntake::Take(const ScanHeader& header) {
+absl::StatusOr<std::uint64_t> ScanIntake::Take() {
   absl::MutexLock lock(&mutex_);
   const bool begun = hasher_.has_value() && !dead_;
-  record_.header = header;
   if (!begun) {
     BeginAnew();
     STRATA_RETURN_IF_ERROR(Load());
@@ -39,9 +38,8 @@ absl::StatusOr<std::uint64_t> ScanIntake::Take(const ScanHeader& header) {
 }
 
 void ScanIntake::BeginAnew() {
-  const ScanHeader header = std::move(record_.header);
   record_ = ScanRecord();
-  record_.header = header;
+  record_.header = header_;
   record_.upload = core_.NextUpload();
   hasher_.emplace();
   piece_ = PointCloud();
@@ -72,7 +70,7 @@ absl::Status ScanIntake::LoadPieces(StorageReader& reader, const UnfinishedUploa
   for (std::uint32_t ordinal = 0; ordinal < parked.chunks; ++ordinal) {
     STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader.GetChunk(parked.upload, ordinal));
     STRATA_ASSIGN_OR_RETURN(const PointCloud piece, DecodePoints(bytes));
-    STRATA_RETURN_IF_ERROR(api::CheckChunk(piece, record_.header, points_));
+    STRATA_RETURN_IF_ERROR(api::CheckChunk(piece, header_, points_));
     hasher_->Add(piece);
     for (const Eigen::Vector3f& p : piece.points) {
       if (!std::isnan(p.x())) record_.box_scan.extend(p);
@@ -100,14 +98,14 @@ absl::Status ScanIntake::Write(std::uint64_t ticket, const Stop& stop, const Poi
   absl::MutexLock lock(&mutex_);
   STRATA_RETURN_IF_ERROR(CheckTicket(ticket));
   if (chunk.size() == 0) return absl::OkStatus();
-  if (const absl::Status sound = api::CheckChunk(chunk, record_.header, points_); !sound.ok()) {
+  if (const absl::Status sound = api::CheckChunk(chunk, header_, points_); !sound.ok()) {
     Abandon();
     return sound;
   }
   for (std::size_t begin = 0, end = 0; begin < chunk.size(); begin = end) {
     end = std::min(chunk.size(), begin + kMaxEncodedPoints - piece_.size());
     Append(chunk, begin, end);
-    if (piece_.size() == kMaxEncodedPoints) SealPiece();
+    if (piece_.size() == kMaxEncodedPoints) STRATA_RETURN_IF_ERROR(SealPiece());
   }
   points_ += chunk.size();
   return pieces_bytes_ >= kStageBytes ? StagePieces(stop) : absl::OkStatus();
@@ -128,9 +126,10 @@ void ScanIntake::Append(const PointCloud& chunk, std::size_t begin, std::size_t 
   }
 }
 
-void ScanIntake::SealPiece() {
+absl::Status ScanIntake::SealPiece() {
+  STRATA_ASSIGN_OR_RETURN(std::string bytes, EncodePoints(piece_));
   hasher_->Add(piece_);
-  pieces_.push_back(EncodePoints(piece_));
+  pieces_.push_back(std::move(bytes));
   pieces_bytes_ += pieces_.back().size();
   record_.point_bytes += pieces_.back().size();
   ++record_.chunks;
@@ -138,6 +137,7 @@ void ScanIntake::SealPiece() {
   piece_.intensity.clear();
   piece_.colour.clear();
   piece_.label.clear();
+  return absl::OkStatus();
 }
 
 absl::Status ScanIntake::StagePieces(const Stop& stop) {
@@ -159,16 +159,15 @@ absl::Status ScanIntake::StagePieces(const Stop& stop) {
 }
 
 absl::Status ScanIntake::CheckWhole() const {
-  const ScanHeader& header = record_.header;
-  if (points_ != header.point_count) {
+  if (points_ != header_.point_count) {
     return absl::InvalidArgumentError(
-        absl::StrCat(points_, " points, but the header announced ", header.point_count));
+        absl::StrCat(points_, " points, but the header announced ", header_.point_count));
   }
-  if (announced() && !hasher_->Matches(header, header.content_hash)) {
+  if (announced() && !hasher_->Matches(header_, header_.content_hash)) {
     return absl::InvalidArgumentError(absl::StrCat("content_hash of what arrived is ",
-                                                   hasher_->Digest(header),
+                                                   hasher_->Digest(header_),
                                                    ", but the header announced ",
-                                                   header.content_hash,
+                                                   header_.content_hash,
                                                    "; nothing of it is kept"));
   }
   return absl::OkStatus();
@@ -203,13 +202,12 @@ absl::StatusOr<ScanAck> ScanIntake::Finish(std::uint64_t ticket,
                                            CheckRoom check_room) {
   absl::MutexLock lock(&mutex_);
   STRATA_RETURN_IF_ERROR(CheckTicket(ticket));
-  if (piece_.size() > 0) SealPiece();
+  if (piece_.size() > 0) STRATA_RETURN_IF_ERROR(SealPiece());
   if (const absl::Status whole = CheckWhole(); !whole.ok()) {
     Abandon();
     return whole;
   }
-  record_.content_hash =
-      announced() ? record_.header.content_hash : hasher_->Digest(record_.header);
+  record_.content_hash = announced() ? header_.content_hash : hasher_->Digest(header_);
   ScanAck ack;
   const absl::Status committed = core_.writer().Run(
       Durability::kFull,
@@ -243,8 +241,8 @@ void ScanIntake::Abandon() {
 
 UnfinishedUpload ScanIntake::Unfinished() const {
   return {.upload = record_.upload,
-          .id = record_.header.id,
-          .content_hash = record_.header.content_hash,
+          .id = header_.id,
+          .content_hash = header_.content_hash,
           .touched = touched_,
           .chunks = staged_,
           .bytes = record_.point_bytes};
@@ -257,8 +255,9 @@ void ScanIntake::EndStream(std::uint64_t ticket) {
     Abandon();
     return;
   }
-  if (piece_.size() > 0) SealPiece();
-  if (!pieces_.empty()) StagePieces(Stop()).IgnoreError();  // what does not get there is sent again
+  // What does not get there is sent again.
+  if (piece_.size() > 0 && !SealPiece().ok()) return;
+  if (!pieces_.empty()) StagePieces(Stop()).IgnoreError();
 }
 
 std::optional<UnfinishedUpload> ScanIntake::Rest() const {

@@ -1,5 +1,6 @@
 // The points of one scan on their way in: checked as they come, put to disk piece by piece, and
-// made a scan in one durable commit.
+// made a scan in one durable commit. An intake is of one whole header, content hash included: what
+// comes under another one is of another scan, even if it has the same id and claims the same hash.
 #ifndef STRATA_CORE_ENGINE_SCAN_INTAKE_H_
 #define STRATA_CORE_ENGINE_SCAN_INTAKE_H_
 
@@ -31,12 +32,14 @@ class ScanIntake {
   // OK if the map takes one more scan.
   using CheckRoom = absl::FunctionRef<absl::Status()>;
 
-  ScanIntake(MapCore& core, std::optional<UnfinishedUpload> parked)
-      : core_(core), parked_(std::move(parked)) {}
+  // `header` must be valid.
+  ScanIntake(MapCore& core, ScanHeader header, std::optional<UnfinishedUpload> parked)
+      : core_(core), header_(std::move(header)), parked_(std::move(parked)) {}
 
-  // Begins or goes on with the scan, whose header must be valid. Returns the ticket of the stream
-  // that writes from now on; what earlier ones do is ABORTED.
-  absl::StatusOr<std::uint64_t> Take(const ScanHeader& header);
+  // Begins or goes on with the scan. Returns the ticket of the stream that writes from now on; what
+  // earlier ones do is ABORTED.
+  absl::StatusOr<std::uint64_t> Take();
+  const ScanHeader& header() const { return header_; }
   // Points that need not be sent again.
   std::uint64_t points() const;
   absl::Status Write(std::uint64_t ticket, const Stop& stop, const PointCloud& chunk);
@@ -59,19 +62,18 @@ class ScanIntake {
   void Append(const PointCloud& chunk, std::size_t begin, std::size_t end)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Encodes the piece under way.
-  void SealPiece() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status SealPiece() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Sends the encoded pieces to disk.
   absl::Status StagePieces(const Stop& stop) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status CheckWhole() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<ScanAck> Commit(StorageWriter& writer, CheckRoom check_room)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Abandon() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  bool announced() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    return !record_.header.content_hash.empty();
-  }
+  bool announced() const { return !header_.content_hash.empty(); }
   UnfinishedUpload Unfinished() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   MapCore& core_;
+  const ScanHeader header_;
   mutable absl::Mutex mutex_;
   std::optional<UnfinishedUpload> parked_ ABSL_GUARDED_BY(mutex_);  // not read back yet
   std::uint64_t ticket_ ABSL_GUARDED_BY(mutex_) = 0;

@@ -67,7 +67,24 @@ PointCloud Lasting(const PointCloud& block, const std::vector<std::uint16_t>& fa
   return lasting;
 }
 
+// Pieces are joined column by column, so one without a column that others have would shift it.
+bool HasColumnsOf(const ScanHeader& header, const PointCloud& piece) {
+  return piece.intensity.empty() != header.has_intensity &&
+         piece.colour.empty() != header.has_colour && piece.label.empty() != header.has_label;
+}
+
 }  // namespace
+
+absl::StatusOr<PointCloud> ReadPoints(StorageReader& reader,
+                                      const ScanRecord& scan,
+                                      std::uint32_t ordinal) {
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader.GetChunk(scan.upload, ordinal));
+  absl::StatusOr<PointCloud> piece = DecodePoints(bytes);
+  if (!piece.ok()) return Annotate(piece.status(), absl::StrCat("piece ", ordinal));
+  if (piece->size() > 0 && HasColumnsOf(scan.header, *piece)) return piece;
+  return absl::DataLossError(
+      absl::StrCat("piece ", ordinal, ": columns are not those that the header announces"));
+}
 
 absl::Status ScanSource::ForEachBlock(const ScanRecord& scan,
                                       absl::FunctionRef<absl::Status(const PointCloud&)> body) {
@@ -87,13 +104,11 @@ absl::Status ScanSource::ForEachBlock(const ScanRecord& scan,
       STRATA_RETURN_IF_ERROR(body(held_));
       begin_block();
     }
-    STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader_.GetChunk(scan.upload, ordinal));
-    absl::StatusOr<PointCloud> piece = DecodePoints(bytes);
-    if (!piece.ok()) return Annotate(piece.status(), absl::StrCat("piece ", ordinal));
-    STRATA_RETURN_IF_ERROR(labels.Apply(reader_, *piece));
+    STRATA_ASSIGN_OR_RETURN(PointCloud piece, ReadPoints(reader_, scan, ordinal));
+    STRATA_RETURN_IF_ERROR(labels.Apply(reader_, piece));
     STRATA_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> faded,
-                            labels.Faded(reader_, piece->size()));
-    AppendPiece(*piece, held_);
+                            labels.Faded(reader_, piece.size()));
+    AppendPiece(piece, held_);
     AppendTo(held_faded_, faded);
   }
   if (held_.size() == scan.header.point_count) held_scan_ = scan.number;

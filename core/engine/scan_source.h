@@ -25,6 +25,12 @@ namespace strata {
 // into the map, and so do those around it.
 inline constexpr std::size_t kMaxScanTiles = 4'096;
 
+// Piece `ordinal` of the points of `scan`, with the labels it was uploaded with. DATA_LOSS, naming
+// the piece, unless it is intact and has the columns that the header announces.
+absl::StatusOr<PointCloud> ReadPoints(StorageReader& reader,
+                                      const ScanRecord& scan,
+                                      std::uint32_t ordinal);
+
 // One thread at a time. Memory is bounded whatever a scan's size: large ones are built block by
 // block and joined, which gives the same map.
 class ScanSource {

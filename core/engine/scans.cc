@@ -13,10 +13,10 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
-#include "core/codec/point_codec.h"
 #include "core/common/status.h"
 #include "core/engine/local_map_upload.h"
 #include "core/engine/scan_labels.h"
+#include "core/engine/scan_source.h"
 #include "core/engine/upload.h"
 #include "core/world/map_class.h"
 #include "core/world/names.h"
@@ -83,8 +83,7 @@ absl::StatusOr<PointCloud> ReadPiece(Map& map,
                                      std::uint32_t ordinal,
                                      ScanLabels& labels) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map.core().Reader());
-  STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader->GetChunk(scan.upload, ordinal));
-  STRATA_ASSIGN_OR_RETURN(PointCloud piece, DecodePoints(bytes));
+  STRATA_ASSIGN_OR_RETURN(PointCloud piece, ReadPoints(*reader, scan, ordinal));
   STRATA_RETURN_IF_ERROR(labels.Apply(*reader, piece));
   piece.sensor_origin = scan.header.sensor_origin;
   return piece;

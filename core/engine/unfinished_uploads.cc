@@ -13,6 +13,7 @@
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/storage/storage.h"
+#include "core/world/value_codec.h"
 
 namespace strata {
 
@@ -34,25 +35,26 @@ absl::StatusOr<std::unique_ptr<UnfinishedUploads>> UnfinishedUploads::Open(MapCo
 }
 
 std::shared_ptr<ScanIntake> UnfinishedUploads::Find(const ScanHeader& header) {
-  if (header.content_hash.empty()) return std::make_shared<ScanIntake>(core_, std::nullopt);
+  if (header.content_hash.empty()) return std::make_shared<ScanIntake>(core_, header, std::nullopt);
   std::vector<std::uint64_t> stale;
   std::shared_ptr<ScanIntake> found;
   {
     absl::MutexLock lock(&mutex_);
     stale = TakeStale(SteadyNow());
-    found = FindAnnounced({header.id, header.content_hash});
+    found = FindAnnounced(header);
   }
   Abandon(stale);
   return found;
 }
 
-std::shared_ptr<ScanIntake> UnfinishedUploads::FindAnnounced(const Key& key) {
+std::shared_ptr<ScanIntake> UnfinishedUploads::FindAnnounced(const ScanHeader& header) {
+  const Key key{header.id, header.content_hash};
   std::erase_if(active_, [](const auto& entry) { return entry.second.expired(); });
-  std::weak_ptr<ScanIntake>& active = active_[key];
+  std::weak_ptr<ScanIntake>& active = active_[{key, EncodeScanHeader(header)}];
   if (std::shared_ptr<ScanIntake> intake = active.lock(); intake != nullptr) return intake;
   std::optional<UnfinishedUpload> parked;
   if (auto node = parked_.extract(key); !node.empty()) parked = std::move(node.mapped());
-  auto intake = std::make_shared<ScanIntake>(core_, std::move(parked));
+  auto intake = std::make_shared<ScanIntake>(core_, header, std::move(parked));
   active = intake;
   return intake;
 }
@@ -66,9 +68,13 @@ void UnfinishedUploads::Release(std::shared_ptr<ScanIntake> intake, std::uint64_
     const std::optional<UnfinishedUpload> rest = intake->Rest();
     if (!rest.has_value()) return;
     const Key key{rest->id, rest->content_hash};
-    active_.erase(key);
+    active_.erase({key, EncodeScanHeader(intake->header())});
+    // Another one is left where two streams claimed the hash with different headers.
+    const auto other = parked_.find(key);
+    if (other != parked_.end()) stale.push_back(other->second.upload);
     parked_.insert_or_assign(key, *rest);
-    stale = TakeStale(SteadyNow());
+    const std::vector<std::uint64_t> old = TakeStale(SteadyNow());
+    stale.insert(stale.end(), old.begin(), old.end());
   }
   Abandon(stale);
 }

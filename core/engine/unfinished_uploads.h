@@ -29,7 +29,7 @@ class UnfinishedUploads {
   static absl::StatusOr<std::unique_ptr<UnfinishedUploads>> Open(MapCore& core);
 
   // Where the points of this scan go: with an announced hash the intake of an earlier stream of it,
-  // if there is one, under way or not.
+  // if there is one, under way or not. Of the same scan is what has the same whole header.
   std::shared_ptr<ScanIntake> Find(const ScanHeader& header);
   // A stream that holds `intake` has ended.
   void Release(std::shared_ptr<ScanIntake> intake, std::uint64_t ticket);
@@ -38,7 +38,8 @@ class UnfinishedUploads {
   using Key = std::pair<ScanId, std::string>;  // with the announced hash
 
   explicit UnfinishedUploads(MapCore& core) : core_(core) {}
-  std::shared_ptr<ScanIntake> FindAnnounced(const Key& key) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::shared_ptr<ScanIntake> FindAnnounced(const ScanHeader& header)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // What has stayed too long, and the oldest beyond the bound of bytes: nobody finds it any more.
   std::vector<std::uint64_t> TakeStale(absl::Time now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Drops it from the store. Waits for the writer, so without the lock.
@@ -46,7 +47,8 @@ class UnfinishedUploads {
 
   MapCore& core_;
   absl::Mutex mutex_;
-  std::map<Key, std::weak_ptr<ScanIntake>> active_ ABSL_GUARDED_BY(mutex_);
+  // With the encoded header: a hash may be claimed with headers that it does not belong to.
+  std::map<std::pair<Key, std::string>, std::weak_ptr<ScanIntake>> active_ ABSL_GUARDED_BY(mutex_);
   std::map<Key, UnfinishedUpload> parked_ ABSL_GUARDED_BY(mutex_);  // no stream has them
 };
 

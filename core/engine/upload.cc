@@ -25,7 +25,7 @@ absl::StatusOr<std::unique_ptr<EngineUpload>> EngineUpload::Begin(std::shared_pt
 
 absl::Status EngineUpload::Open(const ScanHeader& header) {
   // Waits for what an earlier stream of the scan is doing, so that its commit is seen.
-  STRATA_ASSIGN_OR_RETURN(ticket_, intake_->Take(header));
+  STRATA_ASSIGN_OR_RETURN(ticket_, intake_->Take());
   if (!header.content_hash.empty()) STRATA_RETURN_IF_ERROR(LookForPresent(header));
   if (present_.has_value()) return absl::OkStatus();
   held_ = intake_->points();

@@ -253,7 +253,7 @@ double Bare(const std::filesystem::path& file,
       std::string made;
       if (scans != nullptr) {
         const PointCloud& cloud = (*scans)[next % scans->size()];
-        made = EncodePoints(cloud);
+        made = EncodePoints(cloud).value();
         Require(ContentHashOf({}, cloud).size() == 32, "hash");
       }
       const std::string& piece = scans == nullptr ? run.pieces[next] : made;

@@ -41,7 +41,9 @@ void TryKind(int kind, const std::string& body, std::uint16_t version) {
   const auto sealed = [&](BlobKind blob) { return SealBlob(blob, version, body); };
   switch (kind) {
     case 0:
-      return TryBytes(sealed(BlobKind::kPoints), DecodePoints, EncodePoints);
+      return TryBytes(sealed(BlobKind::kPoints), DecodePoints, [](const auto& points) {
+        return EncodePoints(points).value();
+      });
     case 1:
       return TryBytes(sealed(BlobKind::kLabels), DecodeLabels, [](const auto& labels) {
         return EncodeLabels(labels);

@@ -25,6 +25,7 @@
 #include "strata/v1/classifiers.pb.h"
 #include "strata/v1/posegraph.pb.h"
 #include "strata/v1/scans.pb.h"
+#include "tests/fuzz/proto_mutator.h"
 #include "tests/fuzz/require.h"
 #include "tests/fuzz/small_world.h"
 
@@ -389,7 +390,8 @@ RpcScript AnyStory(std::minstd_rand& random) {
 
 RpcCall BreakOff(RpcCall& call, std::minstd_rand& random) {
   const std::size_t sent = 1 + random() % call.requests.size();
-  RpcCall first{.method = call.method, .requests = {}, .cut = true};
+  RpcCall first{.method = call.method, .requests = {}, .cut = random() % 2 == 0};
+  first.held = !first.cut;
   for (std::size_t i = 0; i < sent; ++i) {
     first.requests.push_back(NewRequest(*call.method));
     first.requests.back()->CopyFrom(*call.requests[i]);
@@ -399,6 +401,7 @@ RpcCall BreakOff(RpcCall& call, std::minstd_rand& random) {
     call.requests.erase(call.requests.begin() + 1,
                         call.requests.begin() + static_cast<std::ptrdiff_t>(sent));
   }
+  if (random() % 4 == 0) Mutate(*first.requests[0], random);  // claims the same, says another thing
   return first;
 }
 

@@ -14,8 +14,9 @@ RpcCall AnyExample(std::minstd_rand& random);
 // Calls of which each needs what those before it did.
 RpcScript AnyStory(std::minstd_rand& random);
 
-// An earlier try of the same stream, of which only some requests came. Of a resumable upload `call`
-// then has only what was not sent. REQUIRES: `call` has a request.
+// An earlier try of the same stream, broken off or still open, of which only some requests came;
+// now and then with another header. Of a resumable upload `call` then has only what was not sent.
+// REQUIRES: `call` has a request.
 RpcCall BreakOff(RpcCall& call, std::minstd_rand& random);
 
 // Where `call` uploads scans, makes every scan's announced number of points, and its hash if it has

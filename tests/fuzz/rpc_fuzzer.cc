@@ -11,6 +11,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <glog/logging.h>
 #include <grpcpp/create_channel.h>
@@ -49,10 +50,20 @@ class World {
         grpc::CreateCustomChannel(server_->address(), grpc::InsecureChannelCredentials(), own));
   }
 
-  grpc::Status Say(const RpcCall& call);
+  // All but the held ones in turn, those at last: what each was answered, in their order.
+  std::vector<grpc::Status> Say(const RpcScript& script);
   bool HasMap() { return database_->maps().Get({}, kWorld).ok(); }
 
  private:
+  // A call whose requests have been sent.
+  struct OpenCall {
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::GenericClientAsyncReaderWriter> call;
+  };
+
+  std::unique_ptr<OpenCall> Open(const RpcCall& said);
+  // Half-closes or cuts it, and reads what is answered.
+  grpc::Status End(const RpcCall& said, OpenCall& open);
   // Waits for what was just started; false at the end of the stream.
   bool Done() {
     void* tag = nullptr;
@@ -81,35 +92,54 @@ std::chrono::milliseconds PatienceFor(const RpcCall& call) {
   return watch ? std::chrono::milliseconds(20) : kPatience;
 }
 
-grpc::Status World::Say(const RpcCall& said) {
-  grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + PatienceFor(said));
-  const auto call = stub_->PrepareCall(&context, said.path(), &queue_);
-  call->StartCall(nullptr);
-  bool open = Done();
+std::unique_ptr<World::OpenCall> World::Open(const RpcCall& said) {
+  auto open = std::make_unique<OpenCall>();
+  open->context.set_deadline(std::chrono::system_clock::now() + PatienceFor(said));
+  open->call = stub_->PrepareCall(&open->context, said.path(), &queue_);
+  open->call->StartCall(nullptr);
+  bool alive = Done();
   for (const auto& request : said.requests) {
-    if (!open) break;
-    call->Write(BufferOf(*request), nullptr);
-    open = Done();
+    if (!alive) break;
+    open->call->Write(BufferOf(*request), nullptr);
+    alive = Done();
   }
+  return open;
+}
+
+grpc::Status World::End(const RpcCall& said, OpenCall& open) {
   if (said.cut) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));  // or nothing of it arrives
-    context.TryCancel();
+    open.context.TryCancel();
   } else {
-    call->WritesDone(nullptr);
+    open.call->WritesDone(nullptr);
     Done();
   }
   grpc::ByteBuffer answer;
   int answers = 0;
   for (bool more = true; more && answers < kMostAnswers; ++answers) {
-    call->Read(&answer, nullptr);
+    open.call->Read(&answer, nullptr);
     more = Done();
   }
-  if (answers == kMostAnswers) context.TryCancel();
+  if (answers == kMostAnswers) open.context.TryCancel();
   grpc::Status status;
-  call->Finish(&status, nullptr);
+  open.call->Finish(&status, nullptr);
   Done();
   return status;
+}
+
+std::vector<grpc::Status> World::Say(const RpcScript& script) {
+  std::vector<grpc::Status> answers(script.size());
+  std::map<std::size_t, std::unique_ptr<OpenCall>> held;
+  for (std::size_t i = 0; i < script.size(); ++i) {
+    std::unique_ptr<OpenCall> open = Open(script[i]);
+    if (script[i].held) {
+      held[i] = std::move(open);
+    } else {
+      answers[i] = End(script[i], *open);
+    }
+  }
+  for (const auto& [i, open] : held) answers[i] = End(script[i], *open);
+  return answers;
 }
 
 // How often each call was made and granted: what a run never reached can be seen at its end.
@@ -145,9 +175,8 @@ bool Blameless(const grpc::Status& status, const RpcCall& call) {
   }
 }
 
-void Say(const RpcCall& call, World& world) {
+void CheckAnswer(const RpcCall& call, const grpc::Status& status) {
   static Tally tally;
-  const grpc::Status status = world.Say(call);
   tally.Count(call, status);
   if (Blameless(status, call)) return;
   std::cerr << call.path() << ": " << status.error_code() << ' ' << status.error_message() << '\n';
@@ -185,6 +214,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     world.reset();
     world = std::make_unique<World>(*content);
   }
-  for (const RpcCall& call : ReadScript(data, size)) Say(call, *world);
+  const RpcScript script = ReadScript(data, size);
+  const std::vector<grpc::Status> answers = world->Say(script);
+  for (std::size_t i = 0; i < script.size(); ++i) CheckAnswer(script[i], answers[i]);
   return 0;
 }

@@ -28,6 +28,7 @@ using google::protobuf::MethodDescriptor;
 constexpr std::size_t kMostCalls = 6;
 constexpr std::size_t kMostRequests = 8;
 constexpr std::uint8_t kCut = 0x80;
+constexpr std::uint8_t kHeld = 0x40;
 
 std::vector<const MethodDescriptor*> FindMethods() {
   const std::array files = {v1::CreateMapRequest::descriptor()->file(),
@@ -62,7 +63,8 @@ RpcCall ReadCall(ByteReader& reader) {
   call.method = MethodOf(reader.Fixed<std::uint16_t>());
   const auto shape = reader.Fixed<std::uint8_t>();
   call.cut = (shape & kCut) != 0;
-  const std::size_t requests = std::min<std::size_t>(shape & ~kCut, kMostRequests);
+  call.held = (shape & kHeld) != 0 && call.method->client_streaming();
+  const std::size_t requests = std::min<std::size_t>(shape & ~(kCut | kHeld), kMostRequests);
   while (reader.remaining() > 0 && call.requests.size() < requests) {
     const std::size_t length = reader.Fixed<std::uint16_t>();
     const absl::string_view bytes = reader.Take(std::min(length, reader.remaining()));
@@ -75,7 +77,7 @@ RpcCall ReadCall(ByteReader& reader) {
 
 std::string WriteCall(const RpcCall& call) {
   std::string bodies;
-  std::uint8_t shape = call.cut ? kCut : 0;
+  auto shape = static_cast<std::uint8_t>((call.cut ? kCut : 0) | (call.held ? kHeld : 0));
   for (const std::unique_ptr<Message>& request : call.requests) {
     const std::string body = request->SerializePartialAsString();
     if (body.size() > UINT16_MAX) continue;
@@ -93,6 +95,7 @@ void MutateCall(RpcCall& call, std::minstd_rand& random) {
   auto& requests = call.requests;
   const bool one = requests.size() == 1 && !call.method->client_streaming();
   if (random() % 16 == 0) call.cut = !call.cut;
+  if (call.method->client_streaming() && random() % 4 == 0) call.held = !call.held;
   if (requests.empty() || (!one && requests.size() < kMostRequests && random() % 8 == 0)) {
     requests.push_back(NewRequest(*call.method));
   } else if (!one && random() % 16 == 0) {
@@ -119,7 +122,7 @@ std::unique_ptr<Message> NewRequest(const MethodDescriptor& method) {
 }
 
 RpcCall CopyOf(const RpcCall& call) {
-  RpcCall copy{.method = call.method, .requests = {}, .cut = call.cut};
+  RpcCall copy{.method = call.method, .requests = {}, .cut = call.cut, .held = call.held};
   for (const std::unique_ptr<Message>& request : call.requests) {
     copy.requests.push_back(NewRequest(*call.method));
     copy.requests.back()->CopyFrom(*request);

@@ -21,6 +21,7 @@ struct RpcCall {
   const google::protobuf::MethodDescriptor* method = nullptr;
   std::vector<std::unique_ptr<google::protobuf::Message>> requests;
   bool cut = false;       // the client goes away instead of half-closing
+  bool held = false;      // nor does it half-close before all other calls have ended
   bool parseable = true;  // false: some request was no message of the method
 
   // "/strata.v1.Maps/Get".
@@ -35,8 +36,8 @@ std::unique_ptr<google::protobuf::Message> NewRequest(
     const google::protobuf::MethodDescriptor& method);
 
 // Of each call: which method (16 bits of its path's hash, so that new methods leave recorded
-// scripts as they are), whether it is cut and its number of requests (8 bits), then each request
-// behind its length (16 bits). What is cut short counts.
+// scripts as they are), whether it is cut or held and its number of requests (8 bits), then each
+// request behind its length (16 bits). What is cut short counts.
 RpcScript ReadScript(const std::uint8_t* data, std::size_t size);
 // At most `most` bytes; calls that do not fit are left out.
 std::string WriteScript(const RpcScript& script, std::size_t most);

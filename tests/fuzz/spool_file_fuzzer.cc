@@ -64,7 +64,7 @@ std::string AnyFile(FuzzedDataProvider& input) {
   PutFixed(bytes, Checksum64(bytes));
   while (input.remaining_bytes() > 0) {
     const std::string piece =
-        input.ConsumeBool() ? EncodePoints(AnyPiece(input, header))
+        input.ConsumeBool() ? EncodePoints(AnyPiece(input, header)).value_or("")
                             : SealBlob(BlobKind::kPoints, 1, input.ConsumeRandomLengthString());
     PutFixed(bytes, static_cast<std::uint32_t>(piece.size()));
     bytes += piece;

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -67,18 +68,18 @@ TEST(PointCodecTest, RandomChunksRoundTripBitForBit) {
     SCOPED_TRACE(columns);
     for (const std::size_t n : {0, 1, 7, 3000}) {
       const PointCloud chunk = RandomChunk(columns + n, n, columns);
-      const std::string bytes = EncodePoints(chunk);
+      STRATA_ASSERT_OK_AND_ASSIGN(const std::string bytes, EncodePoints(chunk));
       STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud read, DecodePoints(bytes));
       ExpectSame(read, chunk);
-      EXPECT_EQ(EncodePoints(read), bytes);
+      EXPECT_EQ(*EncodePoints(read), bytes);
     }
   }
 }
 
 TEST(PointCodecTest, LargestNoisyChunkStaysBelowOneMebibyte) {
   const PointCloud chunk = RandomChunk(9, kMaxEncodedPoints, 7);
-  EXPECT_LE(EncodePoints(chunk).size(), 21 * kMaxEncodedPoints + 256);
-  EXPECT_LT(EncodePoints(chunk).size(), 1U << 20);
+  EXPECT_LE(EncodePoints(chunk)->size(), 21 * kMaxEncodedPoints + 256);
+  EXPECT_LT(EncodePoints(chunk)->size(), 1U << 20);
 }
 
 TEST(PointCodecTest, AnyNanBecomesTheSameNan) {
@@ -86,8 +87,8 @@ TEST(PointCodecTest, AnyNanBecomesTheSameNan) {
   a.points = {{std::bit_cast<float>(0xFFC12345U), 0.0F, -0.0F}};
   PointCloud b;
   b.points = {{std::numeric_limits<float>::quiet_NaN(), 0.0F, -0.0F}};
-  EXPECT_EQ(EncodePoints(a), EncodePoints(b));
-  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud read, DecodePoints(EncodePoints(a)));
+  EXPECT_EQ(*EncodePoints(a), *EncodePoints(b));
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud read, DecodePoints(*EncodePoints(a)));
   EXPECT_TRUE(std::signbit(read.points[0].z()));
 }
 
@@ -96,18 +97,18 @@ TEST(PointCodecTest, RealScanShrinksToHalf) {
   PointCloud chunk;
   chunk.points = testing::ReadPlainPcd(path / "scans" / "s000.pcd");
   chunk.points.resize(std::min(chunk.points.size(), kMaxEncodedPoints));
-  const std::string bytes = EncodePoints(chunk);
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::string bytes, EncodePoints(chunk));
   EXPECT_LT(bytes.size(), 6 * chunk.size());
   STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud read, DecodePoints(bytes));
   ExpectSame(read, chunk);
 }
 
 TEST(PointCodecTest, DamageIsDataLoss) {
-  testing::ExpectDamageIsDataLoss(EncodePoints(RandomChunk(3, 100, 7)), &DecodePoints, 3, 1000);
+  testing::ExpectDamageIsDataLoss(*EncodePoints(RandomChunk(3, 100, 7)), &DecodePoints, 3, 1000);
 }
 
 TEST(PointCodecTest, ForgedBytesNeverCrash) {
-  const std::string bytes = EncodePoints(RandomChunk(4, 10, 7));
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::string bytes, EncodePoints(RandomChunk(4, 10, 7)));
   const int accepted =
       testing::DecodeForgedBodies(BlobKind::kPoints, bytes, &DecodePoints, 4, 4000);
   EXPECT_GT(accepted, 0);
@@ -122,12 +123,28 @@ TEST(PointCodecTest, TooManyPointsAreRefusedBeforeAllocation) {
               StatusIs(absl::StatusCode::kDataLoss, HasSubstr("40001")));
 }
 
+TEST(PointCodecTest, ColumnsThatDoNotFitAreRefused) {
+  for (const unsigned column : {1U, 2U, 4U}) {
+    for (const std::size_t entries : {1, 9, 11}) {
+      PointCloud chunk = RandomChunk(5, 10, column);
+      if (column == 1) chunk.intensity.resize(entries);
+      if (column == 2) chunk.colour.resize(entries);
+      if (column == 4) chunk.label.resize(entries);
+      EXPECT_THAT(EncodePoints(chunk),
+                  StatusIs(absl::StatusCode::kInvalidArgument,
+                           HasSubstr(absl::StrCat(entries, " entries for 10 points"))));
+    }
+  }
+  EXPECT_THAT(EncodePoints(RandomChunk(6, kMaxEncodedPoints + 1, 0)),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("40001")));
+}
+
 TEST(PointCodecTest, TinyChunkHasGoldenBytes) {
   PointCloud chunk;
   chunk.points = {{1.0F, -2.0F, 0.5F}, {1.5F, -2.0F, 0.25F}};
   chunk.label = {7, 7};
   EXPECT_EQ(
-      absl::BytesToHexString(EncodePoints(chunk)),
+      absl::BytesToHexString(*EncodePoints(chunk)),
       "53505431010001003700000002040102000102000002008000027f000002ff000002ff000002ff0000027f0000"
       "0200ff000200ff000200ff00027e0000020e0001020080b156cbd5b20cf1");
 }
