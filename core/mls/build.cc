@@ -204,12 +204,6 @@ std::vector<MlsTile> MakeTiles(const PointCloud& cloud,
   return tiles;
 }
 
-absl::Status CheckColumn(const char* name, std::size_t length, std::size_t points) {
-  if (length == 0 || length == points) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat("cloud: ", name, " has ", length, " entries for ", points, " points"));
-}
-
 absl::Status CheckInputs(const PointCloud& cloud,
                          const Pose& T_map_scan,
                          const SensorModel& sensor,
@@ -217,8 +211,7 @@ absl::Status CheckInputs(const PointCloud& cloud,
   STRATA_RETURN_IF_ERROR(ValidateMlsParameters(parameters));
   STRATA_RETURN_IF_ERROR(ValidateSensorModel(sensor));
   STRATA_RETURN_IF_ERROR(ValidatePose(T_map_scan));
-  STRATA_RETURN_IF_ERROR(CheckColumn("colour", cloud.colour.size(), cloud.size()));
-  STRATA_RETURN_IF_ERROR(CheckColumn("label", cloud.label.size(), cloud.size()));
+  STRATA_RETURN_IF_ERROR(CheckColumns(cloud));
   if (cloud.size() >= std::numeric_limits<std::uint32_t>::max()) {
     return absl::InvalidArgumentError(
         absl::StrCat("cloud: ", cloud.size(), " points, at most 2^32 - 2"));
