@@ -157,18 +157,44 @@ absl::Status Database::Execute(const std::string& sql) {
   return StatusOf(sqlite3_exec(connection_, sql.c_str(), nullptr, nullptr, nullptr), connection_);
 }
 
-absl::Status Database::Execute(const std::string& sql, const Stop& stop) {
+absl::Status Database::CopyTo(const std::filesystem::path& file, const Stop& stop) {
+  constexpr int kPagesBetweenLooks = 128;
+  STRATA_RETURN_IF_ERROR(stop.status());
+  STRATA_ASSIGN_OR_RETURN(Database copy, Open(file, Mode::kCreate));
+  // Without one state for all steps, every commit meanwhile would make it begin again.
+  STRATA_ASSIGN_OR_RETURN(Transaction one_state, Transaction::Begin(*this, "BEGIN"));
+  STRATA_RETURN_IF_ERROR(Pragma("PRAGMA schema_version").status());
+  sqlite3_backup* const backup = sqlite3_backup_init(copy.connection_, "main", connection_, "main");
+  if (backup == nullptr) return StatusOf(sqlite3_errcode(copy.connection_), copy.connection_);
+  int code = SQLITE_OK;
+  while (code == SQLITE_OK && stop.status().ok()) {
+    code = sqlite3_backup_step(backup, kPagesBetweenLooks);
+  }
+  sqlite3_backup_finish(backup);
+  STRATA_RETURN_IF_ERROR(stop.status());
+  if (code != SQLITE_DONE) return StatusOf(code, nullptr);
+  STRATA_RETURN_IF_ERROR(one_state.Commit());
+  STRATA_RETURN_IF_ERROR(copy.Execute("PRAGMA journal_mode = DELETE"));  // one file is the whole
+  return copy.CheckPages(stop);
+}
+
+absl::Status Database::CheckPages(const Stop& stop) {
   constexpr int kInstructionsBetweenLooks = 10'000;
   const auto stopped = [](void* asked) {
     return static_cast<const Stop*>(asked)->status().ok() ? 0 : 1;
   };
   Stop asked = stop;
   sqlite3_progress_handler(connection_, kInstructionsBetweenLooks, stopped, &asked);
-  absl::Status done = Execute(sql);
+  const auto check = [this]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(Statement found, Prepare("PRAGMA quick_check(1)"));
+    STRATA_ASSIGN_OR_RETURN(const bool row, found.Step());
+    if (row && found.Text(0) == "ok") return absl::OkStatus();
+    return absl::DataLossError(absl::StrCat("store: ", row ? found.Text(0) : "no answer"));
+  };
+  const absl::Status checked = check();
   sqlite3_progress_handler(connection_, 0, nullptr, nullptr);
-  if (done.ok()) return done;
   STRATA_RETURN_IF_ERROR(stop.status());
-  return done;
+  return checked;
 }
 
 absl::StatusOr<std::int64_t> Database::Pragma(const char* sql) {

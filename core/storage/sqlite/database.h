@@ -90,11 +90,14 @@ class Database {
   // One or more statements without parameters or results.
   absl::Status Execute(const std::string& sql);
   absl::StatusOr<std::int64_t> Pragma(const char* sql);
-  // As Execute(), of work that may take long.
-  absl::Status Execute(const std::string& sql, const Stop& stop);
+  // Copies one committed state page by page, each to where it was: of two copies only those pages
+  // differ that were changed between them. ALREADY_EXISTS; DATA_LOSS if the pages do not hang
+  // together; CANCELLED, DEADLINE_EXCEEDED by `stop`. An error leaves an unusable file.
+  absl::Status CopyTo(const std::filesystem::path& file, const Stop& stop);
 
  private:
   explicit Database(sqlite3* connection) : connection_(connection) {}
+  absl::Status CheckPages(const Stop& stop);
 
   sqlite3* connection_;
   std::map<const char*, sqlite3_stmt*> statements_;

@@ -7,14 +7,12 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_replace.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
@@ -66,13 +64,7 @@ absl::Status SqliteReader::Snapshot(absl::FunctionRef<absl::Status()> body) {
 }
 
 absl::Status SqliteReader::CopyTo(const std::filesystem::path& file, const Stop& stop) {
-  STRATA_RETURN_IF_ERROR(stop.status());
-  std::error_code error;
-  if (std::filesystem::exists(file, error)) {
-    return absl::AlreadyExistsError(absl::StrCat(file.string(), " exists"));
-  }
-  const std::string quoted = absl::StrReplaceAll(file.string(), {{"'", "''"}});
-  return database_.Execute(absl::StrCat("VACUUM INTO '", quoted, "'"), stop);
+  return database_.CopyTo(file, stop);
 }
 
 absl::StatusOr<MapClock> SqliteReader::GetClock() {

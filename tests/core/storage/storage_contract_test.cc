@@ -1,4 +1,8 @@
 // What every store of a map must do; run against each implementation.
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -112,6 +116,29 @@ TEST_F(StorageContractTest, ACopyIsAStoreOfItsOwnAndCommitsGoOn) {
   EXPECT_THAT(copied->GetChunk(7, 0), IsOkAndHolds(std::string("bytes")));
   STRATA_ASSERT_OK_AND_ASSIGN(const MapClock clock, copied->GetClock());
   EXPECT_EQ(clock.commit_sequence, number);
+}
+
+// Or a nightly copy of a large map would be a whole one each night.
+TEST_F(StorageContractTest, CopiesShareThePagesThatDidNotChange) {
+  for (std::uint64_t i = 1; i <= 20; ++i) {
+    STRATA_ASSERT_OK(Commit([&] { return writer().PutChunk(i, 0, std::string(50'000, 'a')); }));
+  }
+  const auto pages_of = [&](const char* name) {
+    const std::filesystem::path file = directory_.path() / name;
+    EXPECT_THAT(reader().CopyTo(file, Stop()), IsOk());
+    std::ifstream stream(file, std::ios::binary);
+    std::vector<std::string> pages;
+    for (std::string page(8192, ' '); stream.read(page.data(), 8192);) pages.push_back(page);
+    return pages;
+  };
+  const std::vector<std::string> before = pages_of("before.strata");
+  STRATA_ASSERT_OK(Commit([&] { return writer().PutChunk(10, 1, std::string(50'000, 'b')); }));
+  const std::vector<std::string> after = pages_of("after.strata");
+  ASSERT_GT(before.size(), 20 * 50'000 / 8192);
+  ASSERT_GE(after.size(), before.size());
+  std::size_t changed = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) changed += before[i] == after[i] ? 0 : 1;
+  EXPECT_LE(changed, 10U);
 }
 
 TEST_F(StorageContractTest, ACopyStopsWhenAsked) {
