@@ -83,6 +83,9 @@ absl::Status SqliteWriter::AbandonUpload(std::uint64_t upload) {
   STRATA_RETURN_IF_ERROR(RunSql("DELETE FROM truth_upload WHERE upload = ?1", upload));
   return RunSql(
       "DELETE FROM truth_chunk WHERE upload = ?1 AND ?1 NOT IN (SELECT upload FROM truth_scan)",
+  if (durability_ != Durability::kFull) {
+    return absl::InternalError("store: a number from a commit that may be lost");
+  }
       upload);
 }
 
