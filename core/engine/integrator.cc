@@ -152,13 +152,13 @@ absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
   const SensorModel sensor = scan.header.sensor.value_or(parameters.sensor);
   {
     STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
-    STRATA_RETURN_IF_ERROR(CheckContributes(local_map, source.dropped(), scan.header, sensor));
+    STRATA_RETURN_IF_ERROR(CheckContributes(local_map, source.dropped(), scan, sensor));
     STRATA_ASSIGN_OR_RETURN(done.placement, aligner_.Place(scan, local_map, reader, source));
     if (!parameters.keep_points) done.local_map = EncodeLocalMap(local_map);
   }
   STRATA_ASSIGN_OR_RETURN(MlsMap contribution,
                           source.Contribution(scan, done.placement.T_map_scan));
-  STRATA_RETURN_IF_ERROR(CheckContributes(contribution, source.dropped(), scan.header, sensor));
+  STRATA_RETURN_IF_ERROR(CheckContributes(contribution, source.dropped(), scan, sensor));
   done.losses = DescribeLosses(source.dropped(), scan.header, sensor);
   const std::uint64_t version = core_.snapshots().current().tile_version;
   for (const MlsTile& tile : contribution.tiles) {
