@@ -153,8 +153,10 @@ absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
   {
     STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
     STRATA_RETURN_IF_ERROR(CheckContributes(local_map, source.dropped(), scan, sensor));
+    if (!parameters.keep_points) {
+      STRATA_ASSIGN_OR_RETURN(done.local_map, EncodeLocalMap(local_map));
+    }
     STRATA_ASSIGN_OR_RETURN(done.placement, aligner_.Place(scan, local_map, reader, source));
-    if (!parameters.keep_points) done.local_map = EncodeLocalMap(local_map);
   }
   STRATA_ASSIGN_OR_RETURN(MlsMap contribution,
                           source.Contribution(scan, done.placement.T_map_scan));
