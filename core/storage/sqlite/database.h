@@ -90,6 +90,10 @@ class Database {
   // One or more statements without parameters or results.
   absl::Status Execute(const std::string& sql);
   absl::StatusOr<std::int64_t> Pragma(const char* sql);
+  // Whether the file under its name is still the one that is open.
+  bool InPlace() const;
+  // Its write-ahead log, where there is one.
+  std::filesystem::path LogFile() const;
   // As Execute(), of work that may take long.
   absl::Status Execute(const std::string& sql, const Stop& stop);
 

@@ -131,6 +131,8 @@ absl::StatusOr<std::unique_ptr<MapStorage>> OpenSqliteStorage(const std::filesys
   if (ready.ok()) ready = database->Execute("PRAGMA journal_mode = WAL");
   if (ready.ok()) ready = database->Execute("PRAGMA synchronous = FULL");
   if (ready.ok()) ready = database->Execute("PRAGMA wal_autocheckpoint = 2000");
+  // What a long reader or a large commit made it beyond this is given back at the next commit.
+  if (ready.ok()) ready = database->Execute("PRAGMA journal_size_limit = 33554432");
   if (ready.ok()) ready = LimitSize(*database, options.max_file_bytes);
   if (!ready.ok()) return Annotate(ready, what);
   auto storage = std::make_unique<SqliteStorage>(file, *std::move(database));

@@ -2,6 +2,8 @@
 #include "core/storage/sqlite/sqlite_writer.h"
 
 #include <cstdint>
+#include <filesystem>
+#include <optional>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
@@ -10,12 +12,42 @@
 #include "absl/strings/string_view.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
+#include <sys/stat.h>
 
 #include "core/common/status.h"
 #include "core/storage/sqlite/database.h"
 #include "core/world/value_codec.h"
 
 namespace strata {
+namespace {
+
+std::optional<SqliteWriter::LogFile> LogFileAt(const std::filesystem::path& path) {
+  struct stat found = {};
+  if (::stat(path.c_str(), &found) != 0) return std::nullopt;
+  return SqliteWriter::LogFile{
+      found.st_dev, found.st_ino, static_cast<std::uint64_t>(found.st_size)};
+}
+
+absl::Status TakenAway(const std::filesystem::path& file) {
+  return absl::UnavailableError(absl::StrCat(
+      "store: ",
+      file.filename().string(),
+      " was removed, replaced or cut while it was open: nothing more is taken into the "
+      "map; stop the server, put the file back and start it again"));
+}
+
+}  // namespace
+
+absl::Status SqliteWriter::CheckFiles() const {
+  const std::filesystem::path log = database_.LogFile();
+  if (!database_.InPlace())
+    return TakenAway(std::filesystem::path(log).replace_extension(".strata"));
+  if (!log_.has_value()) return absl::OkStatus();
+  const std::optional<LogFile> now = LogFileAt(log);
+  const bool same = now.has_value() && now->device == log_->device && now->inode == log_->inode &&
+                    now->bytes >= log_->bytes;
+  return same ? absl::OkStatus() : TakenAway(log);
+}
 
 absl::Status SqliteWriter::Commit(Durability durability, absl::FunctionRef<absl::Status()> body) {
   if (durability != durability_) {
@@ -29,7 +61,10 @@ absl::Status SqliteWriter::Commit(Durability durability, absl::FunctionRef<absl:
   broken_ = absl::OkStatus();
   STRATA_RETURN_IF_ERROR(body());
   STRATA_RETURN_IF_ERROR(broken_);
-  return transaction.Commit();
+  STRATA_RETURN_IF_ERROR(CheckFiles());
+  STRATA_RETURN_IF_ERROR(transaction.Commit());
+  log_ = LogFileAt(database_.LogFile());
+  return absl::OkStatus();
 }
 
 // After some errors (a full disk, say) SQLite rolls back the whole transaction by itself. Then
@@ -48,6 +83,9 @@ absl::Status SqliteWriter::Part(absl::FunctionRef<absl::Status()> body) {
 }
 
 absl::StatusOr<std::uint64_t> SqliteWriter::NextCommitSequence() {
+  if (durability_ != Durability::kFull) {
+    return absl::InternalError("store: a number from a commit that may be lost");
+  }
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
       database_.Prepare("UPDATE truth_map SET commit_sequence = commit_sequence + 1 WHERE id = 1 "
@@ -83,9 +121,6 @@ absl::Status SqliteWriter::AbandonUpload(std::uint64_t upload) {
   STRATA_RETURN_IF_ERROR(RunSql("DELETE FROM truth_upload WHERE upload = ?1", upload));
   return RunSql(
       "DELETE FROM truth_chunk WHERE upload = ?1 AND ?1 NOT IN (SELECT upload FROM truth_scan)",
-  if (durability_ != Durability::kFull) {
-    return absl::InternalError("store: a number from a commit that may be lost");
-  }
       upload);
 }
 

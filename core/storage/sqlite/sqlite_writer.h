@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -20,6 +21,13 @@ namespace strata {
 
 class SqliteWriter final : public StorageWriter {
  public:
+  // A write-ahead log as a file: which one, and how long.
+  struct LogFile {
+    std::uint64_t device = 0;
+    std::uint64_t inode = 0;
+    std::uint64_t bytes = 0;
+  };
+
   explicit SqliteWriter(std::shared_ptr<Database> database)
       : connection_(std::move(database)), reader_(connection_) {}
 
@@ -82,6 +90,9 @@ class SqliteWriter final : public StorageWriter {
   absl::Status RunSql(const char* sql, const Values&... values);
   // Whether the last statement changed a row.
   absl::StatusOr<bool> Changed();
+  // UNAVAILABLE if somebody has taken away a file that is open: what is written to it would be gone
+  // with the process.
+  absl::Status CheckFiles() const;
   // The next id of a constraint or plane.
   absl::StatusOr<std::uint64_t> NextConstraint();
   // From the current epoch on; `job`: only proposed by it, unless 0.
@@ -93,6 +104,7 @@ class SqliteWriter final : public StorageWriter {
   SqliteReader reader_;
   Durability durability_ = Durability::kFull;  // what the connection is set to
   absl::Status broken_;                        // what ended the open transaction before its commit
+  std::optional<LogFile> log_;                 // as the last commit left it
 };
 
 template <typename... Values>
