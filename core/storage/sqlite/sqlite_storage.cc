@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -15,6 +16,7 @@
 
 #include "core/common/status.h"
 #include "core/storage/sqlite/database.h"
+#include "core/storage/sqlite/file_state.h"
 #include "core/storage/sqlite/schema.h"
 #include "core/storage/sqlite/sqlite_reader.h"
 #include "core/storage/sqlite/sqlite_writer.h"
@@ -25,16 +27,24 @@ namespace {
 class SqliteStorage final : public MapStorage {
  public:
   SqliteStorage(std::filesystem::path file, Database database)
-      : file_(std::move(file)), writer_(std::make_shared<Database>(std::move(database))) {}
+      : file_(std::move(file)),
+        opened_(StateOfFile(file_)),
+        writer_(std::make_shared<Database>(std::move(database))) {}
 
   absl::StatusOr<std::unique_ptr<StorageReader>> NewReader() override {
-    STRATA_ASSIGN_OR_RETURN(Database database, Database::Open(file_, Database::Mode::kRead));
+    absl::StatusOr<Database> opened = Database::Open(file_, Database::Mode::kRead);
+    const std::optional<FileState> now = StateOfFile(file_);
+    if (!now.has_value() || !opened_.has_value() || !now->SameFile(*opened_)) {
+      return TakenAway(file_);
+    }
+    STRATA_ASSIGN_OR_RETURN(Database database, std::move(opened));
     return std::make_unique<SqliteReader>(std::make_shared<Database>(std::move(database)));
   }
   StorageWriter& writer() override { return writer_; }
 
  private:
   std::filesystem::path file_;
+  const std::optional<FileState> opened_;
   SqliteWriter writer_;
 };
 

@@ -12,41 +12,20 @@
 #include "absl/strings/string_view.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
-#include <sys/stat.h>
 
 #include "core/common/status.h"
 #include "core/storage/sqlite/database.h"
 #include "core/world/value_codec.h"
 
 namespace strata {
-namespace {
-
-std::optional<SqliteWriter::LogFile> LogFileAt(const std::filesystem::path& path) {
-  struct stat found = {};
-  if (::stat(path.c_str(), &found) != 0) return std::nullopt;
-  return SqliteWriter::LogFile{
-      found.st_dev, found.st_ino, static_cast<std::uint64_t>(found.st_size)};
-}
-
-absl::Status TakenAway(const std::filesystem::path& file) {
-  return absl::UnavailableError(absl::StrCat(
-      "store: ",
-      file.filename().string(),
-      " was removed, replaced or cut while it was open: nothing more is taken into the "
-      "map; stop the server, put the file back and start it again"));
-}
-
-}  // namespace
-
 absl::Status SqliteWriter::CheckFiles() const {
   const std::filesystem::path log = database_.LogFile();
   if (!database_.InPlace())
     return TakenAway(std::filesystem::path(log).replace_extension(".strata"));
   if (!log_.has_value()) return absl::OkStatus();
-  const std::optional<LogFile> now = LogFileAt(log);
-  const bool same = now.has_value() && now->device == log_->device && now->inode == log_->inode &&
-                    now->bytes >= log_->bytes;
-  return same ? absl::OkStatus() : TakenAway(log);
+  const std::optional<FileState> now = StateOfFile(log);
+  const bool whole = now.has_value() && now->SameFile(*log_) && now->bytes >= log_->bytes;
+  return whole ? absl::OkStatus() : TakenAway(log);
 }
 
 absl::Status SqliteWriter::Commit(Durability durability, absl::FunctionRef<absl::Status()> body) {
@@ -63,7 +42,7 @@ absl::Status SqliteWriter::Commit(Durability durability, absl::FunctionRef<absl:
   STRATA_RETURN_IF_ERROR(broken_);
   STRATA_RETURN_IF_ERROR(CheckFiles());
   STRATA_RETURN_IF_ERROR(transaction.Commit());
-  log_ = LogFileAt(database_.LogFile());
+  log_ = StateOfFile(database_.LogFile());
   return absl::OkStatus();
 }
 

@@ -14,6 +14,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/storage/sqlite/database.h"
+#include "core/storage/sqlite/file_state.h"
 #include "core/storage/sqlite/sqlite_reader.h"
 #include "core/storage/storage.h"
 
@@ -21,13 +22,6 @@ namespace strata {
 
 class SqliteWriter final : public StorageWriter {
  public:
-  // A write-ahead log as a file: which one, and how long.
-  struct LogFile {
-    std::uint64_t device = 0;
-    std::uint64_t inode = 0;
-    std::uint64_t bytes = 0;
-  };
-
   explicit SqliteWriter(std::shared_ptr<Database> database)
       : connection_(std::move(database)), reader_(connection_) {}
 
@@ -104,7 +98,7 @@ class SqliteWriter final : public StorageWriter {
   SqliteReader reader_;
   Durability durability_ = Durability::kFull;  // what the connection is set to
   absl::Status broken_;                        // what ended the open transaction before its commit
-  std::optional<LogFile> log_;                 // as the last commit left it
+  std::optional<FileState> log_;               // as the last commit left it
 };
 
 template <typename... Values>
