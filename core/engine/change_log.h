@@ -38,6 +38,8 @@ class ChangeLog {
            const std::vector<ScanId>& scans,
            const std::vector<api::TileChangeNotice>& tiles);
   ChangeSet Since(std::uint64_t commit_sequence) const;
+  // The newest number.
+  std::uint64_t last() const;
   // Returns once there is something newer; CANCELLED, DEADLINE_EXCEEDED.
   absl::Status Await(std::uint64_t commit_sequence, const Stop& stop) const;
 

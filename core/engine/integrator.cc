@@ -184,6 +184,7 @@ absl::StatusOr<int> Integrator::IntegrateBatch() {
   query.limit = static_cast<std::uint32_t>(core_.options().max_batch_scans);
   STRATA_ASSIGN_OR_RETURN(const std::vector<PosedScan> pending, reader->ListScans(query, epoch()));
   if (pending.empty()) return 0;
+  STRATA_RETURN_IF_ERROR(core_.disk().CheckForIntegration());
   STRATA_RETURN_IF_ERROR(LoadAlignerOnce(*reader));
   const MapParameters parameters = core_.info().parameters;
   std::optional<ScanSource> source(std::in_place, *reader, parameters);

@@ -44,11 +44,18 @@ absl::StatusOr<std::unique_ptr<MapCore>> MapCore::Open(const std::string& name,
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t last_upload, writer.reader().LastUpload());
   info.name = name;
-  return std::unique_ptr<MapCore>(new MapCore(
-      name, options, std::move(caches), std::move(storage), std::move(info), clock, last_upload));
+  return std::unique_ptr<MapCore>(new MapCore(name,
+                                              file,
+                                              options,
+                                              std::move(caches),
+                                              std::move(storage),
+                                              std::move(info),
+                                              clock,
+                                              last_upload));
 }
 
 MapCore::MapCore(std::string name,
+                 const std::filesystem::path& file,
                  const EngineOptions& options,
                  std::shared_ptr<CacheBudget> caches,
                  std::unique_ptr<MapStorage> storage,
@@ -56,6 +63,7 @@ MapCore::MapCore(std::string name,
                  const MapClock& clock,
                  std::uint64_t last_upload)
     : name_(std::move(name)),
+      disk_(file),
       options_(options),
       caches_(std::move(caches)),
       info_(std::move(info)),
@@ -63,7 +71,7 @@ MapCore::MapCore(std::string name,
       snapshots_({clock.epoch, clock.tile_version}),
       changes_(clock.commit_sequence),
       readers_(*storage_),
-      writer_(storage_->writer(), options.queue_bytes),
+      writer_(storage_->writer(), disk_, options.queue_bytes),
       last_upload_(last_upload) {}
 
 MapInfo MapCore::info() const {

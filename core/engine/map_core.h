@@ -18,6 +18,7 @@
 
 #include "core/common/cache_budget.h"
 #include "core/engine/change_log.h"
+#include "core/engine/disk_space.h"
 #include "core/engine/engine.h"
 #include "core/engine/reader_pool.h"
 #include "core/engine/snapshots.h"
@@ -45,6 +46,7 @@ class MapCore {
 
   absl::StatusOr<ReaderPool::Lease> Reader() { return readers_.Take(); }
   WriterThread& writer() { return writer_; }
+  const DiskSpace& disk() const { return disk_; }
   Snapshots& snapshots() { return snapshots_; }
   ChangeLog& changes() { return changes_; }
   // What changed after a commit, and the state that it led to.
@@ -66,19 +68,21 @@ class MapCore {
 
  private:
   MapCore(std::string name,
+          const std::filesystem::path& file,
           const EngineOptions& options,
           std::shared_ptr<CacheBudget> caches,
           std::unique_ptr<MapStorage> storage,
           MapInfo info,
           const MapClock& clock,
           std::uint64_t last_upload);
-
-  const std::string name_;
-  const EngineOptions options_;
   // On the writer's thread, so that it happens in the order of commits.
   void Show(const MapClock& clock,
             const std::vector<ScanId>& scans,
             const std::vector<api::TileChangeNotice>& tiles);
+
+  const std::string name_;
+  const DiskSpace disk_;
+  const EngineOptions options_;
   const std::shared_ptr<CacheBudget> caches_;
   mutable absl::Mutex mutex_;
   MapInfo info_ ABSL_GUARDED_BY(mutex_);

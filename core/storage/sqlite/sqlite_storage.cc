@@ -48,11 +48,14 @@ class SqliteStorage final : public MapStorage {
   SqliteWriter writer_;
 };
 
-absl::Status InsertMap(Database& database, const MapParameters& parameters, absl::Time created) {
+absl::Status InsertMap(Database& database,
+                       const MapParameters& parameters,
+                       absl::Time created,
+                       std::uint64_t clock) {
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
       database.Prepare("INSERT INTO truth_map VALUES (1, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, "
-                       "?11, ?12, ?13, 0, 1, 0, 1, ?14)"));
+                       "?11, ?12, ?13, ?15, 1, 0, 1, ?14)"));
   const GeodeticOrigin origin = parameters.origin.value_or(GeodeticOrigin());
   row.Bind(absl::ToUnixMicros(created),
            parameters.mls.cell_size_m,
@@ -67,7 +70,8 @@ absl::Status InsertMap(Database& database, const MapParameters& parameters, absl
            origin.latitude_rad,
            origin.longitude_rad,
            origin.altitude_m,
-           parameters.fade_after);
+           parameters.fade_after,
+           clock);
   STRATA_RETURN_IF_ERROR(row.Run());
   STRATA_ASSIGN_OR_RETURN(Statement epoch,
                           database.Prepare("INSERT INTO truth_epoch (epoch, created_us, reason) "
@@ -118,14 +122,15 @@ absl::Status CheckIsSqliteMap(const std::filesystem::path& file) {
 
 absl::Status CreateSqliteMap(const std::filesystem::path& file,
                              const MapParameters& parameters,
-                             absl::Time created) {
+                             absl::Time created,
+                             std::uint64_t clock) {
   STRATA_RETURN_IF_ERROR(ValidateMapParameters(parameters));
   STRATA_ASSIGN_OR_RETURN(Database opened, Database::Open(file, Database::Mode::kCreate));
   const auto database = std::make_shared<Database>(std::move(opened));
   STRATA_RETURN_IF_ERROR(CreateSchema(*database));
   SqliteWriter writer(database);
   STRATA_RETURN_IF_ERROR(writer.Commit(Durability::kFull, [&]() -> absl::Status {
-    STRATA_RETURN_IF_ERROR(InsertMap(*database, parameters, created));
+    STRATA_RETURN_IF_ERROR(InsertMap(*database, parameters, created, clock));
     STRATA_RETURN_IF_ERROR(writer.PutProfile("default", parameters.default_profile));
     return writer.PublishTiles(0, true);
   }));
