@@ -75,7 +75,7 @@ class EngineMaps final : public api::Maps {
   const EngineOptions options_;
   const MapDirectory directory_;
   const std::shared_ptr<CacheBudget> caches_;  // of all maps
-  absl::Mutex removing_;  // one map's file is removed at a time
+  absl::Mutex removing_;                       // one map's file is removed at a time
   mutable absl::Mutex mutex_;
   std::map<std::string, absl::StatusOr<std::shared_ptr<Map>>, std::less<>> maps_
       ABSL_GUARDED_BY(mutex_);
