@@ -23,8 +23,8 @@ namespace strata::api {
 // From where a map is watched.
 struct WatchOptions {
   // Changes after this commit sequence. What happened long ago, before the server's last start, or
-  // in another map of that name cannot be told: the state comes as a whole then. 0: it does at
-  // once.
+  // in another map of that name that was deleted cannot be told: the state comes as a whole then.
+  // 0: it does at once, as it must after somebody put back an older file of the map.
   std::uint64_t since = 0;
   std::uint64_t epoch = 0;  // that the watcher knows; another one is announced with its reason
   std::string trajectory;   // scans of this one only; empty: of all

@@ -29,7 +29,14 @@ std::size_t ReadLength(absl::string_view bytes) {
 
 }  // namespace
 
-std::string EncodeLocalMap(const MlsMap& map) {
+absl::StatusOr<std::string> EncodeLocalMap(const MlsMap& map, std::size_t max_patches) {
+  if (const std::size_t patches = map.patch_count(); patches > max_patches) {
+    return absl::InvalidArgumentError(absl::StrCat("local map of ",
+                                                   patches,
+                                                   " patches; at most ",
+                                                   max_patches,
+                                                   ", split the scan or take larger cells"));
+  }
   std::string bytes;
   for (const MlsTile& tile : map.tiles) {
     const std::string encoded = EncodeMlsTile(tile);

@@ -46,6 +46,11 @@ ChangeSet ChangeLog::Since(std::uint64_t commit_sequence) const {
   return set;
 }
 
+std::uint64_t ChangeLog::last() const {
+  absl::MutexLock lock(&mutex_);
+  return last_;
+}
+
 absl::Status ChangeLog::Await(std::uint64_t commit_sequence, const Stop& stop) const {
   constexpr absl::Duration kPoll = absl::Milliseconds(50);
   absl::MutexLock lock(&mutex_);

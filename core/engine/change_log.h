@@ -32,11 +32,14 @@ class ChangeLog {
   explicit ChangeLog(std::uint64_t commit_sequence)
       : floor_(commit_sequence), last_(commit_sequence) {}
 
-  // Called after the commit that ended at `commit_sequence`, in the order of commits.
+  // Called after the commit that took the number `commit_sequence`, which is larger than that of
+  // every call before: whoever knows a number is told of later ones only.
   void Add(std::uint64_t commit_sequence,
            const std::vector<ScanId>& scans,
            const std::vector<api::TileChangeNotice>& tiles);
   ChangeSet Since(std::uint64_t commit_sequence) const;
+  // The newest number.
+  std::uint64_t last() const;
   // Returns once there is something newer; CANCELLED, DEADLINE_EXCEEDED.
   absl::Status Await(std::uint64_t commit_sequence, const Stop& stop) const;
 

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -35,6 +37,7 @@ constexpr absl::string_view kSuffix = ".strata";
 constexpr char kMakingPrefix[] = ".making-";
 constexpr char kCopyPrefix[] = ".copy-";
 constexpr char kLockName[] = ".lock";
+constexpr char kClockName[] = ".clock";
 // Of the files of a map, itself first.
 constexpr std::array<const char*, 4> kSuffixes = {"", "-wal", "-shm", "-journal"};
 
@@ -127,6 +130,10 @@ fs::path MapDirectory::CopyOf(absl::string_view name) const {
   return path_ / absl::StrCat(kCopyPrefix, name, kSuffix);
 }
 
+absl::Status MapDirectory::RemoveCopy(absl::string_view name) const {
+  return RemoveWithJournals(CopyOf(name));
+}
+
 absl::StatusOr<std::vector<std::string>> MapDirectory::NamesIn(const fs::path& directory) {
   std::error_code error;
   std::vector<std::string> names;
@@ -151,10 +158,16 @@ absl::Status MapDirectory::CreateFile(absl::string_view name,
   }
   const fs::path making = path_ / absl::StrCat(kMakingPrefix, name, kSuffix);
   STRATA_RETURN_IF_ERROR(RemoveWithJournals(making));
-  STRATA_RETURN_IF_ERROR(CreateSqliteMap(making, parameters, created));
-  fs::rename(making, file, error);
-  if (error) {
-    return absl::UnavailableError(absl::StrCat("cannot make map ", name, ": ", error.message()));
+  const std::uint64_t removed = RemovedClock();
+  const std::uint64_t clock = removed == 0 ? 0 : removed + 1;
+  absl::Status made = CreateSqliteMap(making, parameters, created, clock);
+  if (made.ok()) {
+    fs::rename(making, file, error);
+    if (error) made = absl::UnavailableError(error.message());
+  }
+  if (!made.ok()) {
+    RemoveWithJournals(making).IgnoreError();  // if this fails the next start does it
+    return Annotate(made, absl::StrCat("cannot make map ", name));
   }
   absl::Status synced = SyncDirectory(path_);
   if (!synced.ok()) RemoveWithJournals(file).IgnoreError();
@@ -169,9 +182,34 @@ absl::Status MapDirectory::CheckRemovable(absl::string_view name) const {
   return is_map.ok() ? is_map : Annotate(is_map, "not deleted");
 }
 
-absl::Status MapDirectory::RemoveFile(absl::string_view name) const {
-  STRATA_RETURN_IF_ERROR(RemoveWithJournals(FileOf(name)));
+std::uint64_t MapDirectory::RemovedClock() const {
+  std::uint64_t clock = 0;
+  std::ifstream(path_ / kClockName) >> clock;
+  return clock;
+}
+
+absl::Status MapDirectory::NoteRemovedClock(std::uint64_t clock) const {
+  if (clock <= RemovedClock()) return absl::OkStatus();
+  const fs::path making = path_ / absl::StrCat(kMakingPrefix, "clock");
+  const int fd = ::open(making.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (fd < 0) return ErrnoStatus("cannot open", making);
+  const std::string text = absl::StrCat(clock, "\n");
+  const bool written = ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
+                       ::fsync(fd) == 0;
+  absl::Status noted = written ? absl::OkStatus() : ErrnoStatus("cannot write", making);
+  ::close(fd);
+  if (!noted.ok()) return noted;
+  if (::rename(making.c_str(), (path_ / kClockName).c_str()) != 0) {
+    return ErrnoStatus("cannot rename", making);
+  }
   return SyncDirectory(path_);
+}
+
+absl::Status MapDirectory::RemoveFile(absl::string_view name, std::uint64_t clock) const {
+  const absl::Status noted = NoteRemovedClock(clock);
+  STRATA_RETURN_IF_ERROR(RemoveWithJournals(FileOf(name)));
+  STRATA_RETURN_IF_ERROR(SyncDirectory(path_));
+  return noted.ok() ? noted : NoteRemovedClock(clock);  // now that there is room for it
 }
 
 }  // namespace strata

@@ -2,6 +2,7 @@
 #ifndef STRATA_CORE_ENGINE_DIRECTORY_H_
 #define STRATA_CORE_ENGINE_DIRECTORY_H_
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -35,17 +36,23 @@ class MapDirectory {
   absl::StatusOr<std::vector<std::string>> ListNames() const { return NamesIn(path_); }
   // Where a copy of the map is made: no map's file, and removed by the next Open().
   std::filesystem::path CopyOf(absl::string_view name) const;
-  // All or nothing, also when the power fails. ALREADY_EXISTS.
+  // What is left of one that is not made any more.
+  absl::Status RemoveCopy(absl::string_view name) const;
+  // All or nothing, also when the power fails. ALREADY_EXISTS. The map's clock begins behind those
+  // of all maps that were removed, so that nobody takes it for one of them.
   absl::Status CreateFile(absl::string_view name,
                           const MapParameters& parameters,
                           absl::Time created) const;
   // FAILED_PRECONDITION for a file that no map was ever in; OK also where there is none.
   absl::Status CheckRemovable(absl::string_view name) const;
-  // No connection may be open.
-  absl::Status RemoveFile(absl::string_view name) const;
+  // No connection may be open; one thread at a time. `clock`: where the map's stood; 0: unknown.
+  absl::Status RemoveFile(absl::string_view name, std::uint64_t clock) const;
 
  private:
   MapDirectory(std::filesystem::path path, int lock) : path_(std::move(path)), lock_(lock) {}
+  // The latest clock of a map that was removed; 0: none was.
+  std::uint64_t RemovedClock() const;
+  absl::Status NoteRemovedClock(std::uint64_t clock) const;
 
   std::filesystem::path path_;
   int lock_;  // file descriptor

@@ -81,10 +81,10 @@ absl::Status Integrator::SetFaded(const std::map<ScanNumber, LabelChange>& chang
   TileChange change;
   STRATA_ASSIGN_OR_RETURN(change.tiles,
                           MakeTiles(core_, scans, keys, core_.options().worker_threads, Stop()));
-  STRATA_ASSIGN_OR_RETURN(change.version, ReserveVersion());
+  STRATA_ASSIGN_OR_RETURN(change.version, NextVersion());
   STRATA_RETURN_IF_ERROR(MakeServed(*reader, change));
   aligner_loaded_ = false;
-  return Commit(Durability::kFull, change, ids, [&](StorageWriter& writer) -> absl::Status {
+  return Commit(change, ids, [&](StorageWriter& writer) -> absl::Status {
     for (const auto& [number, scan] : changed) {
       const LabelChange& faded = *scan.placed.change;
       STRATA_RETURN_IF_ERROR(

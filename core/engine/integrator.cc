@@ -50,19 +50,17 @@ bool IsFaultOfScan(const absl::Status& status) {
          absl::IsUnimplemented(status) || absl::IsOutOfRange(status);
 }
 
-}  // namespace
-
+// Makes the rows of `change` the current ones; `rows` are of its tiles.
 absl::Status WriteTileChange(StorageWriter& writer,
                              const TileChange& change,
-                             double cell_size_m,
+                             const std::vector<MlsTileRow>& rows,
                              std::uint64_t collect_floor) {
   for (const auto& [key, tile] : change.tiles) {
-    if (tile == nullptr) {
-      STRATA_RETURN_IF_ERROR(writer.DeleteMlsTile(key));
-      continue;
-    }
-    STRATA_RETURN_IF_ERROR(writer.PutMlsTile(MakeMlsTileRow(*tile, change.version, cell_size_m)));
-    STRATA_RETURN_IF_ERROR(writer.DeleteOlderMlsTiles(key, change.version));
+    if (tile == nullptr) STRATA_RETURN_IF_ERROR(writer.DeleteMlsTile(key));
+  }
+  for (const MlsTileRow& row : rows) {
+    STRATA_RETURN_IF_ERROR(writer.DeleteOlderMlsTiles(row.key, change.version));
+    STRATA_RETURN_IF_ERROR(writer.PutMlsTile(row));
   }
   for (const SurfaceTileRow& row : change.surfaces) {
     STRATA_RETURN_IF_ERROR(writer.PutSurfaceTile(row));
@@ -71,17 +69,22 @@ absl::Status WriteTileChange(StorageWriter& writer,
   return writer.PublishTiles(change.version, true);
 }
 
-absl::StatusOr<std::uint64_t> Integrator::ReserveVersion() {
-  std::uint64_t version = 0;
-  STRATA_RETURN_IF_ERROR(core_.writer().Run(
-      Durability::kRelaxed, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
-        // Left by work that failed: they would be taken for what is stored, and be published too.
-        if (core_.tiles_staged()) STRATA_RETURN_IF_ERROR(writer.DiscardUnpublished());
-        STRATA_ASSIGN_OR_RETURN(version, writer.NextCommitSequence());
-        return absl::OkStatus();
-      }));
-  core_.set_tiles_staged(false);
-  return version;
+}  // namespace
+
+absl::StatusOr<std::uint64_t> Integrator::NextVersion() {
+  // Left by work that failed: they would be taken for what is stored, and be published too.
+  if (core_.tiles_staged()) {
+    STRATA_RETURN_IF_ERROR(
+        core_.writer().Run(Durability::kRelaxed, 0, Stop(), [](StorageWriter& writer) {
+          return writer.DiscardUnpublished();
+        }));
+    core_.set_tiles_staged(false);
+  }
+  // Every publication took a number that was not smaller than its version. Scans may take this one
+  // and later ones meanwhile; the publication of these tiles will have one that is later still.
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());
+  return clock.commit_sequence + 1;
 }
 
 absl::Status Integrator::LoadAlignerOnce(StorageReader& reader) {
@@ -115,24 +118,21 @@ absl::Status Integrator::MakeServed(StorageReader& reader, TileChange& change, b
   return maker.MakePyramid(base, change.surfaces, Stop());
 }
 
-absl::Status Integrator::Commit(Durability durability,
-                                const TileChange& change,
+absl::Status Integrator::Commit(const TileChange& change,
                                 const std::vector<ScanId>& scans,
                                 absl::FunctionRef<absl::Status(StorageWriter&)> decision) {
   const double cell_size_m = core_.info().parameters.mls.cell_size_m;
   const std::uint64_t floor = core_.snapshots().Floor();
-  MapClock clock;
-  absl::Status committed = core_.writer().Run(
-      durability,
-      0,
-      Stop(),
-      [&](StorageWriter& writer) -> absl::Status {
-        STRATA_RETURN_IF_ERROR(WriteTileChange(writer, change, cell_size_m, floor));
+  std::vector<MlsTileRow> rows;  // encoded here: acknowledgements wait for the writer
+  for (const auto& [key, tile] : change.tiles) {
+    if (tile != nullptr) rows.push_back(MakeMlsTileRow(*tile, change.version, cell_size_m));
+  }
+  absl::Status committed =
+      core_.Publish(scans, NoticesOf(change.surfaces), [&](StorageWriter& writer) -> absl::Status {
+        // First what may free pages: a scan can be deleted from a file that may not grow.
         STRATA_RETURN_IF_ERROR(decision(writer));
-        STRATA_ASSIGN_OR_RETURN(clock, writer.reader().GetClock());
-        return absl::OkStatus();
-      },
-      [&] { core_.Publish(clock, scans, NoticesOf(change.surfaces)); });
+        return WriteTileChange(writer, change, rows, floor);
+      });
   if (!committed.ok()) {
     aligner_loaded_ = false;  // it may know of scans that were not committed
     return committed;
@@ -152,13 +152,15 @@ absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
   const SensorModel sensor = scan.header.sensor.value_or(parameters.sensor);
   {
     STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
-    STRATA_RETURN_IF_ERROR(CheckContributes(local_map, source.dropped(), scan.header, sensor));
+    STRATA_RETURN_IF_ERROR(CheckContributes(local_map, source.dropped(), scan, sensor));
+    if (!parameters.keep_points) {
+      STRATA_ASSIGN_OR_RETURN(done.local_map, EncodeLocalMap(local_map));
+    }
     STRATA_ASSIGN_OR_RETURN(done.placement, aligner_.Place(scan, local_map, reader, source));
-    if (!parameters.keep_points) done.local_map = EncodeLocalMap(local_map);
   }
   STRATA_ASSIGN_OR_RETURN(MlsMap contribution,
                           source.Contribution(scan, done.placement.T_map_scan));
-  STRATA_RETURN_IF_ERROR(CheckContributes(contribution, source.dropped(), scan.header, sensor));
+  STRATA_RETURN_IF_ERROR(CheckContributes(contribution, source.dropped(), scan, sensor));
   done.losses = DescribeLosses(source.dropped(), scan.header, sensor);
   const std::uint64_t version = core_.snapshots().current().tile_version;
   for (const MlsTile& tile : contribution.tiles) {
@@ -182,6 +184,7 @@ absl::StatusOr<int> Integrator::IntegrateBatch() {
   query.limit = static_cast<std::uint32_t>(core_.options().max_batch_scans);
   STRATA_ASSIGN_OR_RETURN(const std::vector<PosedScan> pending, reader->ListScans(query, epoch()));
   if (pending.empty()) return 0;
+  STRATA_RETURN_IF_ERROR(core_.disk().CheckForIntegration());
   STRATA_RETURN_IF_ERROR(LoadAlignerOnce(*reader));
   const MapParameters parameters = core_.info().parameters;
   std::optional<ScanSource> source(std::in_place, *reader, parameters);
@@ -205,7 +208,7 @@ absl::StatusOr<int> Integrator::IntegrateBatch() {
     batch.failed.push_back({posed.scan.number, posed.scan.header.id, std::string(done.message())});
   }
   source.reset();  // its memory
-  STRATA_ASSIGN_OR_RETURN(change.version, ReserveVersion());
+  STRATA_ASSIGN_OR_RETURN(change.version, NextVersion());
   absl::Status made = MakeServed(*reader, change);
   if (made.ok()) made = CommitBatch(batch, change);
   if (!made.ok()) {
@@ -219,7 +222,7 @@ absl::Status Integrator::CommitBatch(const Batch& batch, const TileChange& chang
   std::vector<ScanId> scans;
   for (const Failed& failed : batch.failed) scans.push_back(failed.id);
   for (const Integrated& done : batch.integrated) scans.push_back(done.scan.header.id);
-  return Commit(Durability::kRelaxed, change, scans, [&](StorageWriter& writer) -> absl::Status {
+  return Commit(change, scans, [&](StorageWriter& writer) -> absl::Status {
     for (const Failed& failed : batch.failed) {
       STRATA_RETURN_IF_ERROR(
           writer.SetScanState(failed.number, ScanState::kFailed, failed.message));

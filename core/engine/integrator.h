@@ -70,8 +70,8 @@ class Integrator {
 
   MapCore& core() { return core_; }
   MlsTileStore& store() { return store_; }
-  // The next value of the map's clock, for tiles that are about to be written.
-  absl::StatusOr<std::uint64_t> ReserveVersion();
+  // The version of tiles that are about to be made and published: newer than all there have been.
+  absl::StatusOr<std::uint64_t> NextVersion();
 
  private:
   struct Integrated {
@@ -108,10 +108,9 @@ class Integrator {
                                      const LabelChange& change);
   // Fills in what is served of change.tiles, and of their neighbours if geometry changed.
   absl::Status MakeServed(StorageReader& reader, TileChange& change, bool geometry = true);
-  // Writes `change` and whatever `decision` adds in one transaction; then readers see it and
-  // watchers learn of it and of `scans`.
-  absl::Status Commit(Durability durability,
-                      const TileChange& change,
+  // Publishes `change` together with whatever `decision` writes; watchers learn of it and of
+  // `scans`. As MapCore::Publish().
+  absl::Status Commit(const TileChange& change,
                       const std::vector<ScanId>& scans,
                       absl::FunctionRef<absl::Status(StorageWriter&)> decision);
   // The tiles of `keys` from all their scans but `without`.
@@ -125,12 +124,6 @@ class Integrator {
   bool aligner_loaded_ = false;
   MlsTileStore store_;
 };
-
-// Writes the rows of `change` and makes them the current ones. Inside a commit.
-absl::Status WriteTileChange(StorageWriter& writer,
-                             const TileChange& change,
-                             double cell_size_m,
-                             std::uint64_t collect_floor);
 
 }  // namespace strata
 

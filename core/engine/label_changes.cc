@@ -79,9 +79,9 @@ absl::Status Integrator::ChangeLabels(StorageReader& reader,
     STRATA_ASSIGN_OR_RETURN(tiles.tiles, Revoted(reader, posed, change));
   }
   if (tiles.tiles.empty()) return core_.writer().Run(Durability::kFull, 0, Stop(), put);
-  STRATA_ASSIGN_OR_RETURN(tiles.version, ReserveVersion());
+  STRATA_ASSIGN_OR_RETURN(tiles.version, NextVersion());
   STRATA_RETURN_IF_ERROR(MakeServed(reader, tiles, /*geometry=*/false));
-  return Commit(Durability::kFull, tiles, {}, put);
+  return Commit(tiles, {}, put);
 }
 
 absl::Status Integrator::SetPersonLabels(const ScanId& id,

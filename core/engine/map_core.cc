@@ -7,11 +7,13 @@
 #include <utility>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 
 #include "core/common/status.h"
+#include "core/common/stop.h"
 #include "core/storage/sqlite/sqlite_storage.h"
 #include "core/storage/storage.h"
 
@@ -42,11 +44,18 @@ absl::StatusOr<std::unique_ptr<MapCore>> MapCore::Open(const std::string& name,
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t last_upload, writer.reader().LastUpload());
   info.name = name;
-  return std::unique_ptr<MapCore>(new MapCore(
-      name, options, std::move(caches), std::move(storage), std::move(info), clock, last_upload));
+  return std::unique_ptr<MapCore>(new MapCore(name,
+                                              file,
+                                              options,
+                                              std::move(caches),
+                                              std::move(storage),
+                                              std::move(info),
+                                              clock,
+                                              last_upload));
 }
 
 MapCore::MapCore(std::string name,
+                 const std::filesystem::path& file,
                  const EngineOptions& options,
                  std::shared_ptr<CacheBudget> caches,
                  std::unique_ptr<MapStorage> storage,
@@ -54,6 +63,7 @@ MapCore::MapCore(std::string name,
                  const MapClock& clock,
                  std::uint64_t last_upload)
     : name_(std::move(name)),
+      disk_(file),
       options_(options),
       caches_(std::move(caches)),
       info_(std::move(info)),
@@ -61,7 +71,7 @@ MapCore::MapCore(std::string name,
       snapshots_({clock.epoch, clock.tile_version}),
       changes_(clock.commit_sequence),
       readers_(*storage_),
-      writer_(storage_->writer(), options.queue_bytes),
+      writer_(storage_->writer(), disk_, options.queue_bytes),
       last_upload_(last_upload) {}
 
 MapInfo MapCore::info() const {
@@ -79,9 +89,29 @@ std::pair<ChangeSet, Snapshots::Pin> MapCore::ChangesSince(std::uint64_t commit_
   return {changes_.Since(commit_sequence), snapshots_.PinCurrent()};
 }
 
-void MapCore::Publish(const MapClock& clock,
-                      const std::vector<ScanId>& scans,
-                      const std::vector<api::TileChangeNotice>& tiles) {
+absl::Status MapCore::Publish(const std::vector<ScanId>& scans,
+                              const std::vector<api::TileChangeNotice>& tiles,
+                              absl::FunctionRef<absl::Status(StorageWriter&)> work) {
+  MapClock clock;
+  // Durable: what a reader saw of a version must not be given again with other bytes.
+  return writer_.Run(
+      Durability::kFull,
+      0,
+      Stop(),
+      [&](StorageWriter& writer) -> absl::Status {
+        STRATA_RETURN_IF_ERROR(work(writer));
+        // Scans that were acknowledged since the version was chosen have numbers that watchers
+        // know, and whoever knows a number is told of later ones only.
+        STRATA_RETURN_IF_ERROR(writer.NextCommitSequence().status());
+        STRATA_ASSIGN_OR_RETURN(clock, writer.reader().GetClock());
+        return absl::OkStatus();
+      },
+      [&] { Show(clock, scans, tiles); });
+}
+
+void MapCore::Show(const MapClock& clock,
+                   const std::vector<ScanId>& scans,
+                   const std::vector<api::TileChangeNotice>& tiles) {
   absl::MutexLock lock(&publishing_);
   snapshots_.Publish({clock.epoch, clock.tile_version});
   changes_.Add(clock.commit_sequence, scans, tiles);

@@ -11,12 +11,14 @@
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 
 #include "core/common/cache_budget.h"
 #include "core/engine/change_log.h"
+#include "core/engine/disk_space.h"
 #include "core/engine/engine.h"
 #include "core/engine/reader_pool.h"
 #include "core/engine/snapshots.h"
@@ -44,15 +46,17 @@ class MapCore {
 
   absl::StatusOr<ReaderPool::Lease> Reader() { return readers_.Take(); }
   WriterThread& writer() { return writer_; }
+  const DiskSpace& disk() const { return disk_; }
   Snapshots& snapshots() { return snapshots_; }
   ChangeLog& changes() { return changes_; }
   // What changed after a commit, and the state that it led to.
   std::pair<ChangeSet, Snapshots::Pin> ChangesSince(std::uint64_t commit_sequence);
-  // Makes what was committed the state that readers get, and tells watchers, as one. On the
-  // writer's thread, so that it happens in the order of commits.
-  void Publish(const MapClock& clock,
-               const std::vector<ScanId>& scans,
-               const std::vector<api::TileChangeNotice>& tiles);
+  // Carries out `work` in a durable commit with a number of its own, one that nobody has been told
+  // yet; then makes it the state that readers get and tells watchers of `scans` and `tiles`, as
+  // one. Nothing has changed after an error.
+  absl::Status Publish(const std::vector<ScanId>& scans,
+                       const std::vector<api::TileChangeNotice>& tiles,
+                       absl::FunctionRef<absl::Status(StorageWriter&)> work);
   // Whether the store may hold tiles that were staged and neither published nor discarded.
   bool tiles_staged() const { return tiles_staged_; }
   void set_tiles_staged(bool staged) { tiles_staged_ = staged; }
@@ -64,14 +68,20 @@ class MapCore {
 
  private:
   MapCore(std::string name,
+          const std::filesystem::path& file,
           const EngineOptions& options,
           std::shared_ptr<CacheBudget> caches,
           std::unique_ptr<MapStorage> storage,
           MapInfo info,
           const MapClock& clock,
           std::uint64_t last_upload);
+  // On the writer's thread, so that it happens in the order of commits.
+  void Show(const MapClock& clock,
+            const std::vector<ScanId>& scans,
+            const std::vector<api::TileChangeNotice>& tiles);
 
   const std::string name_;
+  const DiskSpace disk_;
   const EngineOptions options_;
   const std::shared_ptr<CacheBudget> caches_;
   mutable absl::Mutex mutex_;

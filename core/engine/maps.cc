@@ -1,5 +1,6 @@
 #include "core/engine/maps.h"
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -17,6 +18,7 @@
 
 #include "core/common/log_line.h"
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "core/engine/backup.h"
 #include "core/engine/map_stats.h"
 #include "core/engine/map_watch.h"
@@ -24,6 +26,14 @@
 
 namespace strata {
 namespace {
+
+// Between two tries to open a map.
+constexpr absl::Duration kRetryDelay = absl::Seconds(1);
+
+// Whether it was no fault of the file that it did not open.
+bool MayOpenLater(const absl::Status& status) {
+  return absl::IsResourceExhausted(status) || absl::IsUnavailable(status);
+}
 
 absl::Status NoSuchMap(absl::string_view name) {
   return absl::NotFoundError(absl::StrCat("map ", name.substr(0, 100), " does not exist"));
@@ -117,12 +127,27 @@ absl::StatusOr<std::shared_ptr<Map>> EngineMaps::OpenMap(const std::string& name
   return map;
 }
 
-absl::StatusOr<std::shared_ptr<Map>> EngineMaps::Find(absl::string_view name) const {
+absl::StatusOr<std::shared_ptr<Map>> EngineMaps::Find(absl::string_view name) {
   STRATA_RETURN_IF_ERROR(ValidateName("map name", name));
+  const std::string key(name);
+  {
+    absl::MutexLock lock(&mutex_);
+    const auto it = maps_.find(key);
+    if (it == maps_.end()) return NoSuchMap(name);
+    if (it->second.ok() || !MayOpenLater(it->second.status())) return it->second;
+    absl::Time& next_try = next_try_[key];
+    if (SteadyNow() < next_try || !opening_.insert(key).second) return it->second;
+    next_try = SteadyNow() + kRetryDelay;
+  }
+  return OpenAgain(key);
+}
+
+absl::StatusOr<std::shared_ptr<Map>> EngineMaps::OpenAgain(const std::string& name) {
+  absl::StatusOr<std::shared_ptr<Map>> map = OpenMap(name);
   absl::MutexLock lock(&mutex_);
-  const auto it = maps_.find(std::string(name));
-  if (it == maps_.end()) return NoSuchMap(name);
-  return it->second;
+  opening_.erase(name);
+  maps_.insert_or_assign(name, map);
+  return map;
 }
 
 absl::StatusOr<MapInfo> EngineMaps::Create(const api::Call& call,
@@ -137,7 +162,7 @@ absl::StatusOr<MapInfo> EngineMaps::Create(const api::Call& call,
   const absl::Status made = directory_.CreateFile(key, parameters, absl::Now());
   const absl::StatusOr<std::shared_ptr<Map>> map = made.ok() ? OpenMap(key) : made;
   // Nobody has put anything into one that does not open.
-  const bool stays = map.ok() || (made.ok() && !directory_.RemoveFile(key).ok());
+  const bool stays = map.ok() || (made.ok() && !directory_.RemoveFile(key, 0).ok());
   absl::MutexLock lock(&mutex_);
   if (stays) {
     maps_.insert_or_assign(key, map);
@@ -188,6 +213,8 @@ absl::StatusOr<std::shared_ptr<Map>> EngineMaps::Withdraw(absl::string_view name
     }
   } else if (absl::IsAborted(it->second.status())) {
     return NoSuchMap(name);
+  } else if (opening_.contains(it->first)) {
+    return absl::AbortedError(absl::StrCat("map ", it->first, " is being opened; retry"));
   } else {
     STRATA_RETURN_IF_ERROR(directory_.CheckRemovable(name));
   }
@@ -199,8 +226,16 @@ absl::Status EngineMaps::Delete(const api::Call& call, absl::string_view name) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_RETURN_IF_ERROR(ValidateName("map name", name));
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Withdraw(name));
-  if (map != nullptr) map->Close();
-  absl::Status removed = directory_.RemoveFile(name);
+  std::uint64_t clock = 0;
+  if (map != nullptr) {
+    map->Close();
+    clock = map->core().changes().last();
+  }
+  absl::Status removed;
+  {
+    absl::MutexLock lock(&removing_);
+    removed = directory_.RemoveFile(name, clock);
+  }
   absl::MutexLock lock(&mutex_);
   maps_.erase(std::string(name));
   return removed;
@@ -264,7 +299,9 @@ absl::Status EngineMaps::Backup(const api::Call& call,
     return absl::ResourceExhaustedError(
         absl::StrCat("map ", name, ": another backup of it runs; try again later"));
   }
-  return BackUp(map->core(), directory_.CopyOf(name), call.stop, sink);
+  absl::Status done = BackUp(map->core(), directory_.CopyOf(name), call.stop, sink);
+  directory_.RemoveCopy(name).IgnoreError();  // its journal, too; if this fails the next start does
+  return done;
 }
 
 }  // namespace strata

@@ -13,6 +13,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
 
 #include "core/api/maps.h"
 #include "core/common/cache_budget.h"
@@ -28,8 +29,9 @@ class EngineMaps final : public api::Maps {
   // Opens every map of the directory; one that does not open is kept with the reason.
   static absl::StatusOr<std::unique_ptr<EngineMaps>> Open(const EngineOptions& options);
 
-  // NOT_FOUND; or why its file did not open.
-  absl::StatusOr<std::shared_ptr<Map>> Find(absl::string_view name) const;
+  // NOT_FOUND; or why its file did not open. Where that was for want of room or of a disk that
+  // answers, it is tried again, once a second at most.
+  absl::StatusOr<std::shared_ptr<Map>> Find(absl::string_view name);
 
   EngineNumbers Numbers() const;
 
@@ -61,6 +63,8 @@ class EngineMaps final : public api::Maps {
         directory_(std::move(directory)),
         caches_(std::make_shared<CacheBudget>(options.cache_bytes)) {}
   absl::StatusOr<std::shared_ptr<Map>> OpenMap(const std::string& name) const;
+  // The map if it can be opened now.
+  absl::StatusOr<std::shared_ptr<Map>> OpenAgain(const std::string& name);
   // Takes a name for a map that is being made.
   absl::Status Reserve(const std::string& name);
   // Takes the map out of the list, so that nobody finds it any more; its name stays taken.
@@ -71,9 +75,12 @@ class EngineMaps final : public api::Maps {
   const EngineOptions options_;
   const MapDirectory directory_;
   const std::shared_ptr<CacheBudget> caches_;  // of all maps
+  absl::Mutex removing_;                       // one map's file is removed at a time
   mutable absl::Mutex mutex_;
   std::map<std::string, absl::StatusOr<std::shared_ptr<Map>>, std::less<>> maps_
       ABSL_GUARDED_BY(mutex_);
+  std::set<std::string, std::less<>> opening_ ABSL_GUARDED_BY(mutex_);  // those opened again
+  std::map<std::string, absl::Time, std::less<>> next_try_ ABSL_GUARDED_BY(mutex_);
   std::set<std::string, std::less<>> copied_
       ABSL_GUARDED_BY(mutex_);  // maps with a copy being made
 };

@@ -15,7 +15,7 @@ namespace strata {
 
 absl::Status Integrator::SetDefaultProfile(const RobotProfile& profile, const Stop& stop) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-  STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, ReserveVersion());
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, NextVersion());
   StagedTiles staged(core_, version);
   const MlsTileMap unchanged;
   SurfaceTileMaker maker(

@@ -94,7 +94,7 @@ absl::Status PutIndexes(StorageWriter& writer, const ScanIndexes& indexes) {
 
 absl::Status Rebuild(Integrator& integrator, int threads, JobContext& context) {
   integrator.store().Clear();
-  STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, integrator.ReserveVersion());
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, integrator.NextVersion());
   StagedTiles staged(integrator.core(), version);
   Repairs repairs(staged);
   DerivedPass pass(integrator, version, threads, context);

@@ -40,11 +40,10 @@ absl::Status Integrator::DeleteScan(const ScanId& id) {
   TileChange change;
   STRATA_ASSIGN_OR_RETURN(change.tiles,
                           TilesWithout(*reader, {tiles.begin(), tiles.end()}, number));
-  STRATA_ASSIGN_OR_RETURN(change.version, ReserveVersion());
+  STRATA_ASSIGN_OR_RETURN(change.version, NextVersion());
   STRATA_RETURN_IF_ERROR(MakeServed(*reader, change));
-  STRATA_RETURN_IF_ERROR(Commit(Durability::kFull, change, {id}, [&](StorageWriter& writer) {
-    return writer.DeleteScan(number);
-  }));
+  STRATA_RETURN_IF_ERROR(
+      Commit(change, {id}, [&](StorageWriter& writer) { return writer.DeleteScan(number); }));
   aligner_loaded_ = false;
   return absl::OkStatus();
 }
@@ -54,7 +53,7 @@ absl::StatusOr<MoveOutcome> Integrator::MoveScans(
     int threads,
     JobContext& context,
     absl::FunctionRef<absl::Status(StorageWriter&)> decision) {
-  STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, ReserveVersion());
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, NextVersion());
   // Decoded tiles are kept by key alone: those of the coming epoch must not outlive a failure.
   store_.Clear();
   absl::StatusOr<MoveOutcome> outcome =

@@ -29,13 +29,15 @@ std::string RangeOf(const ScanHeader& header, const SensorModel& sensor) {
 
 absl::Status CheckContributes(const MlsMap& contribution,
                               const DroppedPoints& dropped,
-                              const ScanHeader& header,
+                              const ScanRecord& scan,
                               const SensorModel& sensor) {
   const bool any = std::any_of(contribution.tiles.begin(),
                                contribution.tiles.end(),
                                [](const MlsTile& tile) { return !tile.patches.empty(); });
-  if (any) return absl::OkStatus();
-  const std::uint64_t points = header.point_count;
+  // A pose takes points out of the map's bounds only.
+  if (any || (scan.faded_points > 0 && dropped.outside_map == 0)) return absl::OkStatus();
+  const ScanHeader& header = scan.header;
+  const std::uint64_t points = header.point_count - scan.faded_points;
   const std::string what = absl::StrCat("scan ", header.id.ToString(), ": ");
   if (dropped.not_finite == points) {
     return absl::InvalidArgumentError(absl::StrCat(what, "none of ", points, " points is finite"));

@@ -41,7 +41,7 @@ absl::StatusOr<ScanMover::MovedScan> ScanMover::Move(const ProposedPose& pose) c
     return Annotate(contribution.status(), absl::StrCat("scan ", header.id.ToString()));
   }
   STRATA_RETURN_IF_ERROR(CheckContributes(
-      *contribution, source.dropped(), header, header.sensor.value_or(parameters.sensor)));
+      *contribution, source.dropped(), posed.scan, header.sensor.value_or(parameters.sensor)));
   for (const MlsTile& tile : contribution->tiles) {
     if (!tile.patches.empty()) moved.tiles.push_back(tile.key);
   }

@@ -59,20 +59,11 @@ absl::Status StagedTiles::RetireOld(StorageWriter& writer, std::uint64_t floor) 
 absl::Status StagedTiles::Publish(const std::vector<ScanId>& scans,
                                   absl::FunctionRef<absl::Status(StorageWriter&)> decision) {
   const std::uint64_t floor = core_.snapshots().Floor();
-  MapClock clock;
-  const absl::Status done = core_.writer().Run(
-      Durability::kFull,
-      0,
-      Stop(),
-      [&](StorageWriter& writer) -> absl::Status {
-        STRATA_RETURN_IF_ERROR(RetireOld(writer, floor));
-        STRATA_RETURN_IF_ERROR(writer.PublishTiles(version_, true));
-        STRATA_RETURN_IF_ERROR(decision(writer));
-        STRATA_ASSIGN_OR_RETURN(clock, writer.reader().GetClock());
-        return absl::OkStatus();
-      },
-      [&] { core_.Publish(clock, scans, notices_); });
-  STRATA_RETURN_IF_ERROR(done);
+  STRATA_RETURN_IF_ERROR(core_.Publish(scans, notices_, [&](StorageWriter& writer) -> absl::Status {
+    STRATA_RETURN_IF_ERROR(RetireOld(writer, floor));
+    STRATA_RETURN_IF_ERROR(writer.PublishTiles(version_, true));
+    return decision(writer);
+  }));
   published_ = true;
   return absl::OkStatus();
 }

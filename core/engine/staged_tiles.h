@@ -20,7 +20,7 @@ namespace strata {
 // the next version is made, or by the next start.
 class StagedTiles {
  public:
-  // `version`: newer than the current one; of all rows.
+  // `version`: of all rows; from Integrator::NextVersion().
   StagedTiles(MapCore& core, std::uint64_t version) : core_(core), version_(version) {
     core_.set_tiles_staged(true);
   }
@@ -31,7 +31,7 @@ class StagedTiles {
   absl::Status Put(const MlsTileMap& tiles, const SurfaceTileMaker::Rows& surfaces);
 
   // Makes all of it what readers see, together with what `decision` writes; watchers learn of it
-  // and of `scans`. Durable.
+  // and of `scans`. As MapCore::Publish().
   absl::Status Publish(const std::vector<ScanId>& scans,
                        absl::FunctionRef<absl::Status(StorageWriter&)> decision);
 

@@ -20,8 +20,8 @@ constexpr absl::Duration kStopPoll = absl::Milliseconds(50);
 
 }  // namespace
 
-WriterThread::WriterThread(StorageWriter& storage, std::size_t queue_bytes)
-    : storage_(storage), queue_bytes_(queue_bytes), thread_([this] { Loop(); }) {}
+WriterThread::WriterThread(StorageWriter& storage, const DiskSpace& disk, std::size_t queue_bytes)
+    : storage_(storage), disk_(disk), queue_bytes_(queue_bytes), thread_([this] { Loop(); }) {}
 
 WriterThread::~WriterThread() { Close(); }
 
@@ -35,6 +35,7 @@ void WriterThread::Close() {
 
 absl::Status WriterThread::Run(
     Durability durability, std::size_t bytes, const Stop& stop, Work work, Tell tell) {
+  if (bytes > 0) STRATA_RETURN_IF_ERROR(disk_.CheckForUpload());
   Task task{work, tell, bytes, absl::OkStatus()};
   absl::MutexLock lock(&mutex_);
   const auto has_room = [this, bytes]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {

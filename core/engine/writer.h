@@ -14,6 +14,7 @@
 #include "absl/time/time.h"
 
 #include "core/common/stop.h"
+#include "core/engine/disk_space.h"
 #include "core/storage/storage.h"
 
 namespace strata {
@@ -32,15 +33,16 @@ class WriterThread {
   using Work = absl::FunctionRef<absl::Status(StorageWriter&)>;
   using Tell = absl::FunctionRef<void()>;
 
-  // `storage` must outlive the thread and is written by nobody else. At most `queue_bytes` wait.
-  WriterThread(StorageWriter& storage, std::size_t queue_bytes);
+  // Both must outlive the thread; `storage` is written by nobody else. At most `queue_bytes` wait.
+  WriterThread(StorageWriter& storage, const DiskSpace& disk, std::size_t queue_bytes);
   ~WriterThread();
 
   // Runs `work` inside a commit on the writer's thread and returns when it is committed with that
   // durability. kFull goes before kRelaxed; all kFull that wait share one commit, in which work
-  // that fails is undone alone. `bytes`: how much memory the work holds; with a full queue the call
-  // waits (CANCELLED, DEADLINE_EXCEEDED by `stop`). Once queued, the work is carried out. `tell` is
-  // called on the writer's thread if and when it is committed: in the order of commits.
+  // that fails is undone alone. `bytes`: of points in memory that the work stores; with a full
+  // queue the call waits (CANCELLED, DEADLINE_EXCEEDED by `stop`), with a full disk it is
+  // RESOURCE_EXHAUSTED. Once queued, the work is carried out. `tell` is called on the writer's
+  // thread if and when it is committed: in the order of commits.
   absl::Status Run(Durability durability,
                    std::size_t bytes,
                    const Stop& stop,
@@ -70,6 +72,7 @@ class WriterThread {
   bool HasWorkOrClosed() const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
 
   StorageWriter& storage_;
+  const DiskSpace& disk_;
   const std::size_t queue_bytes_;
   mutable absl::Mutex mutex_;
   WriterNumbers numbers_ ABSL_GUARDED_BY(mutex_);  // without queued_bytes

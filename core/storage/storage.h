@@ -126,7 +126,8 @@ class StorageWriter {
   // Sees what the open transaction wrote.
   virtual StorageReader& reader() = 0;
 
-  // Ticks the clock of the map.
+  // Ticks the clock of the map. In a kFull commit only: a number that somebody was told is never
+  // given again.
   virtual absl::StatusOr<std::uint64_t> NextCommitSequence() = 0;
 
   // Points of an upload that is not a scan yet; `bytes` at most 1 MiB.

@@ -15,6 +15,7 @@
 #include "core/codec/point_codec.h"
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/checksum.h"
+#include "core/mls/mls_map.h"
 #include "core/planes/scan_planes_codec.h"
 #include "core/registration/place_descriptor.h"
 #include "core/world/value_codec.h"
@@ -70,7 +71,8 @@ void TryKind(int kind, const std::string& body, std::uint16_t version) {
     }
     default: {
       const auto decode = [](const std::string& bytes) { return DecodeLocalMap(bytes, {}); };
-      return TryBytes(body, decode, EncodeLocalMap);
+      const auto encode = [](const MlsMap& map) { return EncodeLocalMap(map).value(); };
+      return TryBytes(body, decode, encode);
     }
   }
 }

@@ -169,7 +169,7 @@ void AddLocalMap(RpcCall& call, std::minstd_rand& random) {
   start.set_cell_size_m(parameters.cell_size_m);
   start.set_gap_size_m(parameters.gap_size_m);
   start.set_thickness_m(parameters.thickness_m);
-  AddRequest<v1::UploadLocalMapRequest>(call).set_local_map(EncodeLocalMap(built->map));
+  AddRequest<v1::UploadLocalMapRequest>(call).set_local_map(*EncodeLocalMap(built->map));
 }
 
 void AddLabels(RpcCall& call, std::minstd_rand& random) {

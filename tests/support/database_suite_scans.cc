@@ -224,7 +224,7 @@ TEST_P(DatabaseSuite, ALocalMapIsAScanWithoutPoints) {
   const MlsParameters mls = map.parameters.mls;
   STRATA_ASSERT_OK_AND_ASSIGN(const MlsBuildResult built,
                               BuildMlsMap(floor, Pose::Identity(), map.parameters.sensor, mls));
-  const std::string bytes = EncodeLocalMap(built.map);
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::string bytes, EncodeLocalMap(built.map));
   ScanHeader header = FloorHeader({"run", 1}, {});
   STRATA_ASSERT_OK_AND_ASSIGN(const ScanAck ack,
                               db().scans().UploadLocalMap({}, kMap, header, mls, bytes));
@@ -245,7 +245,7 @@ TEST_P(DatabaseSuite, ALocalMapIsAScanWithoutPoints) {
   const auto refused = [&](const ScanHeader& h, const MlsParameters& p, const std::string& b) {
     return db().scans().UploadLocalMap({}, kMap, h, p, b).status();
   };
-  EXPECT_THAT(refused(header, mls, EncodeLocalMap(MlsMap{mls, {}})),
+  EXPECT_THAT(refused(header, mls, *EncodeLocalMap(MlsMap{mls, {}})),
               StatusIs(Code::kAlreadyExists, HasSubstr("run/1")));
   header.id.sequence = 2;
   MlsParameters coarse = mls;

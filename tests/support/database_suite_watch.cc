@@ -158,14 +158,26 @@ TEST_P(DatabaseSuite, AWatcherOfAMapThatWasReplacedTakesTheNewOneAsAWhole) {
   PutFloor(db(), {"run", 1});
   Known known;
   CatchUp(db(), known);
-  STRATA_ASSERT_OK(db().maps().Delete({}, kMap));
-  STRATA_ASSERT_OK(db().maps().Create({}, kMap, {}));
-  const std::uint64_t before = known.commit_sequence;
-  CatchUp(db(), known);
-  EXPECT_TRUE(known.whole);
-  EXPECT_LT(known.commit_sequence, before);
-  EXPECT_THAT(known.scans, IsEmpty());
-  EXPECT_THAT(known.tiles, IsEmpty());
+  // However much has happened in the new one.
+  for (const bool reopen : {false, true}) {
+    for (std::uint64_t scans = 0; scans < 3; ++scans) {
+      const std::uint64_t before = known.commit_sequence;
+      const std::map<TileKey, std::uint64_t> tiles = known.tiles;
+      STRATA_ASSERT_OK(db().maps().Delete({}, kMap));
+      if (reopen) Reopen();
+      STRATA_ASSERT_OK(db().maps().Create({}, kMap, {}));
+      for (std::uint64_t i = 1; i <= scans; ++i) PutFloor(db(), {"other", i});
+      CatchUp(db(), known);
+      EXPECT_TRUE(known.whole);
+      EXPECT_GT(known.commit_sequence, before);
+      EXPECT_THAT(known.scans, SizeIs(scans));
+      EXPECT_EQ(known.tiles, ListedTiles(db()));
+      for (const auto& [key, version] : known.tiles) {
+        const auto it = tiles.find(key);
+        EXPECT_TRUE(it == tiles.end() || it->second != version);
+      }
+    }
+  }
 }
 
 TEST_P(DatabaseSuite, AWatcherMayAskForATrajectoryAndForNoTiles) {

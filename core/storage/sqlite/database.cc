@@ -204,6 +204,16 @@ absl::StatusOr<std::int64_t> Database::Pragma(const char* sql) {
   return statement.Int(0);
 }
 
+bool Database::InPlace() const {
+  int moved = 0;
+  return sqlite3_file_control(connection_, "main", SQLITE_FCNTL_HAS_MOVED, &moved) != SQLITE_OK ||
+         moved == 0;
+}
+
+std::filesystem::path Database::LogFile() const {
+  return sqlite3_filename_wal(sqlite3_db_filename(connection_, "main"));
+}
+
 absl::StatusOr<Transaction> Transaction::Begin(Database& database, const char* begin) {
   STRATA_RETURN_IF_ERROR(database.Execute(begin));
   return Transaction(database);

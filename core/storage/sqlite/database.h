@@ -94,6 +94,10 @@ class Database {
   // differ that were changed between them. ALREADY_EXISTS; DATA_LOSS if the pages do not hang
   // together; CANCELLED, DEADLINE_EXCEEDED by `stop`. An error leaves an unusable file.
   absl::Status CopyTo(const std::filesystem::path& file, const Stop& stop);
+  // Whether the file under its name is still the one that is open.
+  bool InPlace() const;
+  // Its write-ahead log, where there is one.
+  std::filesystem::path LogFile() const;
 
  private:
   explicit Database(sqlite3* connection) : connection_(connection) {}

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -15,6 +16,7 @@
 
 #include "core/common/status.h"
 #include "core/storage/sqlite/database.h"
+#include "core/storage/sqlite/file_state.h"
 #include "core/storage/sqlite/schema.h"
 #include "core/storage/sqlite/sqlite_reader.h"
 #include "core/storage/sqlite/sqlite_writer.h"
@@ -25,24 +27,35 @@ namespace {
 class SqliteStorage final : public MapStorage {
  public:
   SqliteStorage(std::filesystem::path file, Database database)
-      : file_(std::move(file)), writer_(std::make_shared<Database>(std::move(database))) {}
+      : file_(std::move(file)),
+        opened_(StateOfFile(file_)),
+        writer_(std::make_shared<Database>(std::move(database))) {}
 
   absl::StatusOr<std::unique_ptr<StorageReader>> NewReader() override {
-    STRATA_ASSIGN_OR_RETURN(Database database, Database::Open(file_, Database::Mode::kRead));
+    absl::StatusOr<Database> opened = Database::Open(file_, Database::Mode::kRead);
+    const std::optional<FileState> now = StateOfFile(file_);
+    if (!now.has_value() || !opened_.has_value() || !now->SameFile(*opened_)) {
+      return TakenAway(file_);
+    }
+    STRATA_ASSIGN_OR_RETURN(Database database, std::move(opened));
     return std::make_unique<SqliteReader>(std::make_shared<Database>(std::move(database)));
   }
   StorageWriter& writer() override { return writer_; }
 
  private:
   std::filesystem::path file_;
+  const std::optional<FileState> opened_;
   SqliteWriter writer_;
 };
 
-absl::Status InsertMap(Database& database, const MapParameters& parameters, absl::Time created) {
+absl::Status InsertMap(Database& database,
+                       const MapParameters& parameters,
+                       absl::Time created,
+                       std::uint64_t clock) {
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
       database.Prepare("INSERT INTO truth_map VALUES (1, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, "
-                       "?11, ?12, ?13, 0, 1, 0, 1, ?14)"));
+                       "?11, ?12, ?13, ?15, 1, 0, 1, ?14)"));
   const GeodeticOrigin origin = parameters.origin.value_or(GeodeticOrigin());
   row.Bind(absl::ToUnixMicros(created),
            parameters.mls.cell_size_m,
@@ -57,7 +70,8 @@ absl::Status InsertMap(Database& database, const MapParameters& parameters, absl
            origin.latitude_rad,
            origin.longitude_rad,
            origin.altitude_m,
-           parameters.fade_after);
+           parameters.fade_after,
+           clock);
   STRATA_RETURN_IF_ERROR(row.Run());
   STRATA_ASSIGN_OR_RETURN(Statement epoch,
                           database.Prepare("INSERT INTO truth_epoch (epoch, created_us, reason) "
@@ -108,14 +122,15 @@ absl::Status CheckIsSqliteMap(const std::filesystem::path& file) {
 
 absl::Status CreateSqliteMap(const std::filesystem::path& file,
                              const MapParameters& parameters,
-                             absl::Time created) {
+                             absl::Time created,
+                             std::uint64_t clock) {
   STRATA_RETURN_IF_ERROR(ValidateMapParameters(parameters));
   STRATA_ASSIGN_OR_RETURN(Database opened, Database::Open(file, Database::Mode::kCreate));
   const auto database = std::make_shared<Database>(std::move(opened));
   STRATA_RETURN_IF_ERROR(CreateSchema(*database));
   SqliteWriter writer(database);
   STRATA_RETURN_IF_ERROR(writer.Commit(Durability::kFull, [&]() -> absl::Status {
-    STRATA_RETURN_IF_ERROR(InsertMap(*database, parameters, created));
+    STRATA_RETURN_IF_ERROR(InsertMap(*database, parameters, created, clock));
     STRATA_RETURN_IF_ERROR(writer.PutProfile("default", parameters.default_profile));
     return writer.PublishTiles(0, true);
   }));
@@ -131,6 +146,8 @@ absl::StatusOr<std::unique_ptr<MapStorage>> OpenSqliteStorage(const std::filesys
   if (ready.ok()) ready = database->Execute("PRAGMA journal_mode = WAL");
   if (ready.ok()) ready = database->Execute("PRAGMA synchronous = FULL");
   if (ready.ok()) ready = database->Execute("PRAGMA wal_autocheckpoint = 2000");
+  // What a long reader or a large commit made it beyond this is given back at the next commit.
+  if (ready.ok()) ready = database->Execute("PRAGMA journal_size_limit = 33554432");
   if (ready.ok()) ready = LimitSize(*database, options.max_file_bytes);
   if (!ready.ok()) return Annotate(ready, what);
   auto storage = std::make_unique<SqliteStorage>(file, *std::move(database));

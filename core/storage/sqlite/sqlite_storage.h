@@ -20,11 +20,13 @@ struct SqliteOptions {
   std::uint64_t max_file_bytes = 0;
 };
 
-// Makes the file with its parameters and default profile. ALREADY_EXISTS if there is one. It is
-// complete when this returns; a crash inside leaves a file that does not open as a map.
+// Makes the file with its parameters and default profile, its clock at `clock`. ALREADY_EXISTS if
+// there is one. It is complete when this returns; a crash inside leaves a file that does not open
+// as a map.
 absl::Status CreateSqliteMap(const std::filesystem::path& file,
                              const MapParameters& parameters,
-                             absl::Time created);
+                             absl::Time created,
+                             std::uint64_t clock = 0);
 
 // NOT_FOUND without a file; FAILED_PRECONDITION for another program's file or a newer format;
 // DATA_LOSS if it is damaged.

@@ -2,6 +2,8 @@
 #include "core/storage/sqlite/sqlite_writer.h"
 
 #include <cstdint>
+#include <filesystem>
+#include <optional>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
@@ -16,6 +18,15 @@
 #include "core/world/value_codec.h"
 
 namespace strata {
+absl::Status SqliteWriter::CheckFiles() const {
+  const std::filesystem::path log = database_.LogFile();
+  if (!database_.InPlace())
+    return TakenAway(std::filesystem::path(log).replace_extension(".strata"));
+  if (!log_.has_value()) return absl::OkStatus();
+  const std::optional<FileState> now = StateOfFile(log);
+  const bool whole = now.has_value() && now->SameFile(*log_) && now->bytes >= log_->bytes;
+  return whole ? absl::OkStatus() : TakenAway(log);
+}
 
 absl::Status SqliteWriter::Commit(Durability durability, absl::FunctionRef<absl::Status()> body) {
   if (durability != durability_) {
@@ -29,7 +40,10 @@ absl::Status SqliteWriter::Commit(Durability durability, absl::FunctionRef<absl:
   broken_ = absl::OkStatus();
   STRATA_RETURN_IF_ERROR(body());
   STRATA_RETURN_IF_ERROR(broken_);
-  return transaction.Commit();
+  STRATA_RETURN_IF_ERROR(CheckFiles());
+  STRATA_RETURN_IF_ERROR(transaction.Commit());
+  log_ = StateOfFile(database_.LogFile());
+  return absl::OkStatus();
 }
 
 // After some errors (a full disk, say) SQLite rolls back the whole transaction by itself. Then
@@ -48,6 +62,9 @@ absl::Status SqliteWriter::Part(absl::FunctionRef<absl::Status()> body) {
 }
 
 absl::StatusOr<std::uint64_t> SqliteWriter::NextCommitSequence() {
+  if (durability_ != Durability::kFull) {
+    return absl::InternalError("store: a number from a commit that may be lost");
+  }
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
       database_.Prepare("UPDATE truth_map SET commit_sequence = commit_sequence + 1 WHERE id = 1 "

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/storage/sqlite/database.h"
+#include "core/storage/sqlite/file_state.h"
 #include "core/storage/sqlite/sqlite_reader.h"
 #include "core/storage/storage.h"
 
@@ -82,6 +84,9 @@ class SqliteWriter final : public StorageWriter {
   absl::Status RunSql(const char* sql, const Values&... values);
   // Whether the last statement changed a row.
   absl::StatusOr<bool> Changed();
+  // UNAVAILABLE if somebody has taken away a file that is open: what is written to it would be gone
+  // with the process.
+  absl::Status CheckFiles() const;
   // The next id of a constraint or plane.
   absl::StatusOr<std::uint64_t> NextConstraint();
   // From the current epoch on; `job`: only proposed by it, unless 0.
@@ -93,6 +98,7 @@ class SqliteWriter final : public StorageWriter {
   SqliteReader reader_;
   Durability durability_ = Durability::kFull;  // what the connection is set to
   absl::Status broken_;                        // what ended the open transaction before its commit
+  std::optional<FileState> log_;               // as the last commit left it
 };
 
 template <typename... Values>

@@ -1,12 +1,17 @@
 // A disk that is full or fails: errors are values, what was acknowledged stays, and once the disk
 // is well again so is the map.
 #include <cstdint>
+#include <filesystem>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "absl/base/config.h"
 #include "absl/status/status.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -213,6 +218,70 @@ INSTANTIATE_TEST_SUITE_P(Disk,
                          DiskFaultTest,
                          ::testing::ValuesIn(Troubles()),
                          [](const auto& trouble) { return trouble.param.name; });
+
+class DiskMendedTest : public EngineTest {
+ protected:
+  ~DiskMendedTest() override { Close(); }  // before the disk goes
+
+  // Files beside those of the map.
+  std::vector<std::string> Leftovers() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(directory_.path())) {
+      const std::string name = entry.path().filename().string();
+      if (absl::StartsWith(name, ".making-") || absl::StartsWith(name, ".copy-")) {
+        names.push_back(name);
+      }
+    }
+    return names;
+  }
+
+  FaultyDisk disk_;
+};
+
+TEST_F(DiskMendedTest, AMapThatCouldNotBeOpenedIsOpenedOnceTheDiskIsWell) {
+  for (const DiskFault fault : {DiskFault::kOpen, DiskFault::kRead}) {
+    SCOPED_TRACE(static_cast<int>(fault));
+    const std::string map = absl::StrCat("map", static_cast<int>(fault));
+    MakeMap(SmallMap(), map);
+    UploadRoom(1, PoseAt(0, 0), map);
+    WaitIntegrated(db(), map);
+    Close();
+    disk_.Fail(fault, 0);
+    Reopen();
+    EXPECT_THAT(db().maps().Get({}, map).status().code(),
+                AnyOf(Code::kResourceExhausted, Code::kUnavailable));
+    disk_.Mend();
+    // It is tried once a second.
+    const absl::Time deadline = absl::Now() + absl::Seconds(60);
+    while (!db().maps().Get({}, map).ok() && absl::Now() < deadline) {
+      absl::SleepFor(absl::Milliseconds(20));
+    }
+    EXPECT_EQ(WaitIntegrated(db(), map).scans, 1U);
+    UploadRoom(2, PoseAt(0, 0), map);
+  }
+}
+
+TEST_F(DiskMendedTest, WhatCouldNotBeMadeLeavesNoFiles) {
+  MakeMap();
+  UploadRoom(1, PoseAt(0, 0));
+  WaitIntegrated(db());
+  const auto ignore = [](const api::BackupPiece&) { return absl::OkStatus(); };
+  for (std::int64_t sound = 0; sound < 40; sound += 3) {
+    SCOPED_TRACE(sound);
+    disk_.Fail(DiskFault::kFull, sound);
+    if (db().maps().Create({}, "other", SmallMap()).ok()) {
+      STRATA_EXPECT_OK(db().maps().Delete({}, "other"));
+    }
+    EXPECT_THAT(Leftovers(), ::testing::IsEmpty());
+    disk_.Fail(DiskFault::kFull, sound);
+    db().maps().Backup({}, kMapName, ignore).IgnoreError();
+    EXPECT_THAT(Leftovers(), ::testing::IsEmpty());
+  }
+  disk_.Mend();
+  STRATA_EXPECT_OK(db().maps().Create({}, "other", SmallMap()));
+  STRATA_EXPECT_OK(db().maps().Backup({}, kMapName, ignore));
+  EXPECT_THAT(Leftovers(), ::testing::IsEmpty());
+}
 
 }  // namespace
 }  // namespace strata::testing

@@ -156,6 +156,58 @@ TEST_F(FadeTest, DamagedEvidenceIsNamed) {
   ExpectSound();
 }
 
+// A wall, and before it, above the ground, a thing that only the first scan saw: nothing of that
+// scan lasts.
+TEST_F(EngineTest, AScanOfWhichNothingIsLeftMayBeMoved) {
+  MapParameters parameters;
+  parameters.mls.cell_size_m = 0.2;
+  MakeMap(parameters);
+  const auto upright = [](float x, float half, float step) {
+    PointCloud cloud;
+    const int count = static_cast<int>(half / step);
+    for (int y = -count; y <= count; ++y) {
+      for (int z = -count; z <= count; ++z) {
+        cloud.points.emplace_back(x, step * static_cast<float>(y), step * static_cast<float>(z));
+      }
+    }
+    return cloud;
+  };
+  const ScanId thing{"thing", 1};
+  const PointCloud seen = upright(4.0F, 0.1F, 0.05F);
+  STRATA_ASSERT_OK(Upload(db(), HeaderOf(thing, seen, PoseAt(0, 0)), seen));
+  PointCloud wall = upright(8.0F, 2.0F, 0.02F);
+  for (float x = 3.0F; x < 5.0F; x += 0.05F) {
+    for (float y = -0.5F; y < 0.5F; y += 0.05F) wall.points.emplace_back(x, y, -0.9F);
+  }
+  for (std::uint64_t i = 1; i <= 4; ++i) {
+    STRATA_ASSERT_OK(Upload(db(), HeaderOf({"wall", i}, wall, PoseAt(0, 0)), wall));
+  }
+  WaitIntegrated(db());
+  STRATA_ASSERT_OK(db().posegraph().SetPose({}, kMapName, thing, PoseAt(0.05, 0.0)));
+  const std::string before = Digest();
+  EXPECT_EQ(RunJob(db(), "fade", {{"scans", "2"}, {"rays", "1"}}).state, JobState::kSucceeded);
+  ASSERT_EQ(db().scans().Get({}, kMapName, thing)->faded_points, seen.size());
+
+  STRATA_EXPECT_OK(db().posegraph().SetPose({}, kMapName, thing, PoseAt(0.1, 0.0)));
+  ExpectSound();
+  for (const ScanId& id : {thing, ScanId{"wall", 1}}) {
+    Constraint prior;
+    prior.j = id;
+    prior.T_i_j = PoseAt(3.0, 0.0);
+    prior.information *= 1e4;
+    STRATA_ASSERT_OK(db().posegraph().AddConstraint({}, kMapName, prior));
+  }
+  const JobInfo optimized = RunJob(db(), "optimize");
+  EXPECT_EQ(optimized.state, JobState::kSucceeded) << optimized.message;
+  ExpectSound();
+  const JobInfo reverted = RunJob(db(), "revert", {{"epoch", "2"}});
+  EXPECT_EQ(reverted.state, JobState::kSucceeded) << reverted.message;
+  ExpectSound();
+  EXPECT_EQ(RunJob(db(), "rebuild").state, JobState::kSucceeded);
+  EXPECT_EQ(RunJob(db(), "fade", {{"undo", "1"}}).state, JobState::kSucceeded);
+  EXPECT_EQ(Digest(), before);
+}
+
 TEST_F(EngineTest, AMapThatLetsThingsFadeDoesSoByItself) {
   EngineOptions options = Options();
   options.optimize_interval = absl::Milliseconds(10);

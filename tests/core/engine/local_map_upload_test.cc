@@ -30,7 +30,7 @@ class LocalMapUploadTest : public EngineTest {
                                 const MapParameters& parameters = SmallMap()) {
     auto built = BuildMlsMap(cloud, Pose::Identity(), parameters.sensor, parameters.mls);
     EXPECT_THAT(built, IsOk());
-    return built.ok() ? EncodeLocalMap(built->map) : "";
+    return built.ok() ? EncodeLocalMap(built->map).value() : "";
   }
   absl::Status Send(const ScanId& id, const Pose& T_map_scan, const std::string& bytes) {
     return db()
@@ -124,7 +124,7 @@ TEST_F(LocalMapUploadTest, HostileBytesAreRefused) {
               StatusIs(Code::kResourceExhausted, HasSubstr("split it")));
   MlsMap far = *DecodeLocalMap(good, SmallMap().mls);
   for (MlsTile& tile : far.tiles) tile.key.x += 1 << 20;
-  EXPECT_THAT(Send({"run", 1}, PoseAt(0, 0), EncodeLocalMap(far)),
+  EXPECT_THAT(Send({"run", 1}, PoseAt(0, 0), *EncodeLocalMap(far)),
               StatusIs(Code::kInvalidArgument, HasSubstr("1e6 m")));
   MlsMap wide = *DecodeLocalMap(good, SmallMap().mls);
   wide.tiles.resize(1);
@@ -132,7 +132,7 @@ TEST_F(LocalMapUploadTest, HostileBytesAreRefused) {
     wide.tiles.push_back(wide.tiles.back());
     ++wide.tiles.back().key.x;
   }
-  EXPECT_THAT(Send({"run", 1}, PoseAt(0, 0), EncodeLocalMap(wide)),
+  EXPECT_THAT(Send({"run", 1}, PoseAt(0, 0), *EncodeLocalMap(wide)),
               StatusIs(Code::kInvalidArgument, HasSubstr("4097 tiles; at most 4096")));
 }
 

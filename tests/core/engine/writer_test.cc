@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "core/common/stop.h"
+#include "core/engine/disk_space.h"
 #include "core/storage/sqlite/sqlite_storage.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
@@ -21,7 +22,8 @@ TEST(WriterTest, CountsItsCommitsAndWhatIsInThem) {
   const std::filesystem::path file = dir.path() / "map.strata";
   STRATA_ASSERT_OK(CreateSqliteMap(file, {}, absl::Now()));
   STRATA_ASSERT_OK_AND_ASSIGN(const auto storage, OpenSqliteStorage(file, {}));
-  WriterThread writer(storage->writer(), 1 << 20);
+  const DiskSpace disk(file);
+  WriterThread writer(storage->writer(), disk, 1 << 20);
   EXPECT_EQ(writer.numbers().commits, 0);
   constexpr int kThreads = 8;
   constexpr int kEach = 20;

@@ -1,0 +1,32 @@
+// The last room of a disk is for what frees some.
+#ifndef STRATA_CORE_ENGINE_DISK_SPACE_H_
+#define STRATA_CORE_ENGINE_DISK_SPACE_H_
+
+#include <filesystem>
+#include <utility>
+
+#include "absl/status/status.h"
+
+namespace strata {
+
+// Uploads leave a quarter of a disk free, 64 MiB at most, and integration half of that: with the
+// rest scans can be deleted, logs be written back into their maps, and maps be opened. Thread-safe.
+class DiskSpace {
+ public:
+  explicit DiskSpace(std::filesystem::path file) : file_(std::move(file)) {}
+
+  // RESOURCE_EXHAUSTED, saying how much is free.
+  absl::Status CheckForUpload() const { return Check(1); }
+  absl::Status CheckForIntegration() const { return Check(2); }
+
+ private:
+  // Whether there is the `part`-th part of what uploads leave. A disk that does not say is taken
+  // for one with room.
+  absl::Status Check(int part) const;
+
+  const std::filesystem::path file_;  // on the disk
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_DISK_SPACE_H_
