@@ -94,6 +94,7 @@ class Database {
   absl::Status Execute(const std::string& sql, const Stop& stop);
 
  private:
+  friend class Transaction;
   explicit Database(sqlite3* connection) : connection_(connection) {}
 
   sqlite3* connection_;
