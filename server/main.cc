@@ -21,6 +21,7 @@
 #include "core/engine/engine.h"
 #include "server/check.h"
 #include "server/options.h"
+#include "server/quarantine_commands.h"
 #include "server/server.h"
 #include "server/token_commands.h"
 
@@ -134,14 +135,15 @@ int Main(int argc, char** argv) {
   check->footer(
       "Takes the options of serving. Exit code: 0 it could, 1 something is an error.\n\n"
       "Example:\n  stratad check --config /etc/strata/stratad.conf");
-  TokenAction token_action;
-  AddTokenCommands(app, token_action);
+  CommandAction action;
+  AddTokenCommands(app, action);
+  AddQuarantineCommands(app, action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : kUsage;
   }
-  if (token_action) return Exit(token_action(std::cout));
+  if (action) return Exit(action(std::cout));
   const absl::StatusOr<ProgramOptions> options = read_options();
   if (!options.ok()) {
     std::cerr << "stratad: " << options.status().message() << "\nSee stratad --help" << std::endl;

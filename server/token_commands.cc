@@ -113,7 +113,7 @@ void AddNameOption(CLI::App& verb, Written& written) {
   verb.add_option("NAME", written.name, "Of the client, as logs say it")->required();
 }
 
-void AddAdd(CLI::App& token, const std::shared_ptr<Written>& written, TokenAction& selected) {
+void AddAdd(CLI::App& token, const std::shared_ptr<Written>& written, CommandAction& selected) {
   CLI::App* add = token.add_subcommand(
       "add", "Give a client access; prints its token, once: the file keeps only a hash");
   AddNameOption(*add, *written);
@@ -155,7 +155,7 @@ absl::StatusOr<absl::Duration> ParseLifetime(absl::string_view text) {
       absl::StrCat("'", text, "': write 30d, 12h, 90m (at most 100 years) or never"));
 }
 
-void AddTokenCommands(CLI::App& app, TokenAction& selected) {
+void AddTokenCommands(CLI::App& app, CommandAction& selected) {
   const auto written = std::make_shared<Written>();
   CLI::App* token = app.add_subcommand("token", "Who may do what (the file of --tokens)");
   token->require_subcommand(1);

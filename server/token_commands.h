@@ -14,10 +14,10 @@
 namespace strata::server {
 
 // Writes what it found or made to `out`.
-using TokenAction = std::function<absl::Status(std::ostream& out)>;
+using CommandAction = std::function<absl::Status(std::ostream& out)>;
 
 // Adds `token add|list|revoke` to `app`; parsing sets `selected` to the verb that was written.
-void AddTokenCommands(CLI::App& app, TokenAction& selected);
+void AddTokenCommands(CLI::App& app, CommandAction& selected);
 
 // "30d", "12h", "90m": days, hours, minutes from now on, at most 100 years; "never":
 // InfiniteDuration(). INVALID_ARGUMENT for anything else.

@@ -4,7 +4,7 @@
 #include <new>
 #include <string>
 
-#include "absl/strings/str_format.h"
+#include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include <xxhash.h>
 
@@ -27,7 +27,9 @@ void ContentHasher::Add(absl::string_view bytes) {
 
 std::string ContentHasher::HexDigest() const {
   const XXH128_hash_t digest = XXH3_128bits_digest(static_cast<const XXH3_state_t*>(state_));
-  return absl::StrFormat("%016x%016x", digest.high64, digest.low64);
+  // Not StrFormat, which ends the process where there is no memory for the text.
+  return absl::StrCat(absl::Hex(digest.high64, absl::kZeroPad16),
+                      absl::Hex(digest.low64, absl::kZeroPad16));
 }
 
 }  // namespace strata

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <list>
 #include <memory>
+#include <new>
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
@@ -84,11 +85,17 @@ class LruCache {
 
   void Insert(const Key& key, Handle value, std::size_t bytes)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(budget_->mutex_) {
-    order_.push_front({key, std::move(value), {}});
-    const auto it = order_.begin();
+    // What may fail for want of memory comes first, so that a failure changes nothing.
+    index_.reserve(index_.size() + 1);
+    Order entry;
+    entry.push_front({key, std::move(value), {}});
+    const auto it = entry.begin();
     // Called with the mutex, which is the budget's own.
     const auto evict = [this, it]() ABSL_NO_THREAD_SAFETY_ANALYSIS { EraseAt(it); };
-    budget_->order_.push_front({bytes, evict});
+    CacheBudget::Order item;
+    item.push_front({bytes, evict});
+    order_.splice(order_.begin(), entry);
+    budget_->order_.splice(budget_->order_.begin(), item);
     it->item = budget_->order_.begin();
     index_[key] = it;
     bytes_ += bytes;
@@ -100,10 +107,15 @@ class LruCache {
     if (found != index_.end()) EraseAt(found->second);
   }
 
-  void EraseAt(typename Order::iterator it) ABSL_EXCLUSIVE_LOCKS_REQUIRED(budget_->mutex_) {
+  void EraseAt(typename Order::iterator it) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(budget_->mutex_) {
     bytes_ -= it->item->bytes;
     budget_->cached_ -= it->item->bytes;
-    budget_->dropped_.push_back(std::move(it->value));
+    try {
+      budget_->dropped_.push_back(std::move(it->value));
+    } catch (const std::bad_alloc&) {
+      it->value = nullptr;  // goes with the mutex held, then
+    }
     index_.erase(it->key);
     budget_->order_.erase(it->item);
     order_.erase(it);

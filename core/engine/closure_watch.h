@@ -24,6 +24,8 @@ class ClosureWatch {
  public:
   explicit ClosureWatch(MapCore& core) : core_(core) {}
 
+  // Whether there is anything to look at.
+  bool HasNews() const { return core_.snapshots().current() != seen_view_; }
   // Verified closures that no job has had a chance to use: fresh contacts and matches of new scans
   // that the graph did not foresee. A look that fails, or is stopped, is repeated by the next.
   absl::StatusOr<std::size_t> Look(const Stop& stop);

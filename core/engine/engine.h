@@ -39,6 +39,8 @@ struct EngineOptions {
   absl::Duration upload_keep = absl::Hours(1);
   // Bytes of such points a map keeps, the newest; those of streams under way are not counted.
   std::uint64_t max_kept_upload_bytes = std::uint64_t{4} << 30;
+  // And so many of them.
+  std::size_t max_kept_uploads = 10'000;
   // Scans integrated in one transaction when there is a backlog; at least 1. Tiles do not depend on
   // it.
   int max_batch_scans = 16;

@@ -36,8 +36,8 @@ absl::StatusOr<bool> FadingIsDue(MapCore& core, const std::vector<JobInfo>& jobs
 // where it was (core/mls/see_through.h), at the poses of the epoch in which the job begins. Points
 // that have gone stay in their scans and are no part of their contributions any more: a decision,
 // recorded with its evidence. The result depends on scans, poses and settings only, not on what
-// earlier jobs decided. Takes effect scan by scan, some in one transaction; a job that was killed
-// is done again. DATA_LOSS where a scan is damaged.
+// earlier jobs decided. Takes effect at once, at its end; a scan that is deleted meanwhile is left
+// out. DATA_LOSS where a scan is damaged.
 absl::Status RunFadeJob(MapCore& core, Worker& worker, const JobInfo& job, JobContext& context);
 
 }  // namespace strata

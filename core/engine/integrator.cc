@@ -176,12 +176,12 @@ absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
   return absl::OkStatus();
 }
 
-absl::StatusOr<int> Integrator::IntegrateBatch() {
+absl::StatusOr<int> Integrator::IntegrateBatch(int most_scans) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
   ScanQuery query;
   query.state = ScanState::kPending;
   query.skip_damaged = true;  // it stays pending, and verify names it
-  query.limit = static_cast<std::uint32_t>(core_.options().max_batch_scans);
+  query.limit = static_cast<std::uint32_t>(most_scans);
   STRATA_ASSIGN_OR_RETURN(const std::vector<PosedScan> pending, reader->ListScans(query, epoch()));
   if (pending.empty()) return 0;
   STRATA_RETURN_IF_ERROR(core_.disk().CheckForIntegration());

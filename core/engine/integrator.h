@@ -3,8 +3,8 @@
 #ifndef STRATA_CORE_ENGINE_INTEGRATOR_H_
 #define STRATA_CORE_ENGINE_INTEGRATOR_H_
 
+#include <cstddef>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,15 +33,21 @@ struct TileChange {
   SurfaceTileMaker::Rows surfaces;
 };
 
+// Scans and what has faded of them, asked for when it is needed, from several threads.
+struct FadingRequest {
+  std::vector<ScanNumber> scans;
+  absl::FunctionRef<LabelChange(const ScanRecord&)> change_of;
+};
+
 // One thread at a time: the worker's.
 class Integrator {
  public:
   explicit Integrator(MapCore& core) : core_(core), aligner_(core.caches()), store_(core) {}
 
-  // Integrates pending scans in commit order, as many as make a good transaction; returns how many
-  // (0: none is left). A scan that cannot be integrated is marked failed and counted; an error is
-  // one of the store, and nothing has changed then.
-  absl::StatusOr<int> IntegrateBatch();
+  // Integrates pending scans in commit order, as many as make a good transaction, at most
+  // `most_scans`; returns how many (0: none is left). A scan that cannot be integrated is marked
+  // failed and counted; an error is one of the store, and nothing has changed then.
+  absl::StatusOr<int> IntegrateBatch(int most_scans);
 
   // In any state. NOT_FOUND.
   absl::Status DeleteScan(const ScanId& id);
@@ -62,14 +68,19 @@ class Integrator {
   absl::Status SetModelLabels(ScanNumber number,
                               std::uint64_t model,
                               std::vector<std::uint16_t> labels);
-  // Which points of scans have faded, by number; scans that are gone or not integrated are left
-  // out. One transaction, so they should be few.
-  absl::Status SetFaded(const std::map<ScanNumber, LabelChange>& changes);
+  // Which points of scans have faded; scans that are gone, not integrated or stored so already are
+  // left out. Returns how many changed. All at once: nothing has changed after an error.
+  absl::StatusOr<std::size_t> SetFaded(const FadingRequest& request, JobContext& context);
   // Annotates all tiles for another robot.
   absl::Status SetDefaultProfile(const RobotProfile& profile, const Stop& stop);
 
   MapCore& core() { return core_; }
   MlsTileStore& store() { return store_; }
+  // What is kept in memory is read again: work was left in the middle.
+  void ForgetCaches() {
+    store_.Clear();
+    aligner_loaded_ = false;
+  }
   // The version of tiles that are about to be made and published: newer than all there have been.
   absl::StatusOr<std::uint64_t> NextVersion();
 

@@ -1,10 +1,12 @@
 #include "core/engine/job_board.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,6 +20,7 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 
+#include "core/common/guarded.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 
@@ -26,6 +29,8 @@ namespace {
 
 constexpr absl::Duration kReportInterval = absl::Milliseconds(100);
 constexpr absl::Duration kStoreInterval = absl::Seconds(2);
+
+absl::Time NowInMicros() { return absl::FromUnixMicros(absl::ToUnixMicros(absl::Now())); }
 
 absl::Status NoSuchJob(std::uint64_t id) {
   return absl::NotFoundError(absl::StrCat("job ", id, " does not exist"));
@@ -73,53 +78,149 @@ class JobBoard::Running final : public JobContext {
   bool proposed_ = false;
 };
 
-absl::StatusOr<std::unique_ptr<JobBoard>> JobBoard::Open(MapCore& core) {
+// A job that is about to be queued: counted among those that wait.
+class JobBoard::StartTurn {
+ public:
+  // `id`: of the job.
+  StartTurn(JobBoard& board, absl::string_view owner, std::uint64_t& id)
+      : board_(board), owner_(owner) {
+    absl::MutexLock lock(&board_.mutex_);
+    status_ = board_.CheckRoom(owner);
+    if (!status_.ok()) return;
+    board_.starting_.insert(owner_);
+    id = ++board_.last_id_;
+  }
+  ~StartTurn() {
+    if (!status_.ok()) return;
+    absl::MutexLock lock(&board_.mutex_);
+    board_.starting_.erase(board_.starting_.find(owner_));
+  }
+  StartTurn(const StartTurn&) = delete;
+  StartTurn& operator=(const StartTurn&) = delete;
+  const absl::Status& status() const { return status_; }
+
+ private:
+  JobBoard& board_;
+  const std::string owner_;
+  absl::Status status_;
+};
+
+absl::StatusOr<std::unique_ptr<JobBoard>> JobBoard::Open(MapCore& core, Quarantine& quarantine) {
   std::vector<JobInfo> stored;
   {
     STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
     STRATA_ASSIGN_OR_RETURN(stored, reader->ListJobs());
   }
-  std::unique_ptr<JobBoard> board(new JobBoard(core));
+  std::unique_ptr<JobBoard> board(new JobBoard(core, quarantine));
   absl::MutexLock lock(&board->mutex_);
   for (JobInfo& info : stored) {
     if (info.state == JobState::kRunning) info.state = JobState::kQueued;
     board->last_id_ = std::max(board->last_id_, info.id);
-    board->jobs_[info.id].info = std::move(info);
+    auto entry = std::make_shared<Entry>();
+    entry->info = std::move(info);
+    board->jobs_[entry->info.id] = std::move(entry);
   }
   return board;
 }
 
-absl::Status JobBoard::Store(const JobInfo& info, Durability durability, const Stop& stop) {
-  return core_.writer().Run(
-      durability, 0, stop, [&](StorageWriter& writer) { return writer.PutJob(info); });
+void JobBoard::Show(const JobInfo& info) {
+  absl::MutexLock lock(&mutex_);
+  std::shared_ptr<Entry>& entry = jobs_[info.id];
+  if (entry == nullptr) entry = std::make_shared<Entry>();
+  entry->info = info;
+  ++entry->changes;
 }
 
 absl::StatusOr<JobInfo> JobBoard::Change(std::uint64_t id,
-                                         absl::FunctionRef<void(JobInfo&)> change) {
+                                         Durability durability,
+                                         ChangeFunction change) {
+  JobInfo info;
+  STRATA_RETURN_IF_ERROR(core_.writer().Run(
+      durability,
+      0,
+      Stop(),
+      [&](StorageWriter& writer) -> absl::Status {
+        STRATA_ASSIGN_OR_RETURN(std::optional<JobInfo> stored, writer.reader().FindJob(id));
+        if (!stored.has_value()) return NoSuchJob(id);
+        info = *std::move(stored);
+        STRATA_RETURN_IF_ERROR(change(info, writer));
+        info.updated = NowInMicros();
+        return writer.PutJob(info);
+      },
+      [&] { Show(info); }));
+  return info;
+}
+
+absl::Status JobBoard::CheckRoom(absl::string_view owner) const {
+  std::size_t all = starting_.size();
+  std::size_t own = starting_.count(std::string(owner));
+  for (const auto& [id, entry] : jobs_) {
+    if (entry->info.state != JobState::kQueued) continue;
+    ++all;
+    own += entry->owner == owner ? 1 : 0;
+  }
+  if (all >= kMaxWaitingJobs || own >= kMaxWaitingJobsOfOne) {
+    return absl::ResourceExhaustedError(absl::StrCat(all,
+                                                     " jobs wait, ",
+                                                     own,
+                                                     " of them yours; at most ",
+                                                     kMaxWaitingJobs,
+                                                     " and ",
+                                                     kMaxWaitingJobsOfOne,
+                                                     "; wait for some, or cancel them"));
+  }
+  return absl::OkStatus();
+}
+
+std::vector<std::uint64_t> JobBoard::Outdated() const {
+  const auto epoch = static_cast<double>(core_.snapshots().current().epoch);
+  std::vector<std::uint64_t> ended;
+  std::set<std::string> last;  // kinds whose newest success has been seen
   absl::MutexLock lock(&mutex_);
-  const auto it = jobs_.find(id);
-  if (it == jobs_.end()) return NoSuchJob(id);
-  change(it->second.info);
-  it->second.info.updated = absl::FromUnixMicros(absl::ToUnixMicros(absl::Now()));
-  ++it->second.changes;
-  return it->second.info;
+  std::size_t kept = 0;
+  for (auto it = jobs_.rbegin(); it != jobs_.rend(); ++it) {
+    const JobInfo& job = it->second->info;
+    if (!IsFinal(job.state) || job.state == JobState::kProposed) continue;
+    if (kept < kKeptJobs) {
+      ++kept;
+      if (job.state == JobState::kSucceeded) last.insert(job.kind);
+      continue;
+    }
+    const auto made = job.metrics.find("epoch");
+    if (made != job.metrics.end() && made->second == epoch) continue;
+    if (job.state == JobState::kSucceeded && last.insert(job.kind).second) continue;
+    ended.push_back(job.id);
+  }
+  return ended;
 }
 
 absl::StatusOr<JobInfo> JobBoard::Start(const Stop& stop,
+                                        absl::string_view owner,
                                         absl::string_view kind,
                                         const std::map<std::string, std::string>& parameters) {
   JobInfo info;
   info.kind = std::string(kind);
   info.parameters = parameters;
-  info.created = absl::FromUnixMicros(absl::ToUnixMicros(absl::Now()));
+  info.created = NowInMicros();
   info.updated = info.created;
-  {
+  const StartTurn turn(*this, owner, info.id);
+  STRATA_RETURN_IF_ERROR(turn.status());
+  const std::vector<std::uint64_t> outdated = Outdated();
+  const auto show = [&] {
+    Show(info);
     absl::MutexLock lock(&mutex_);
-    info.id = ++last_id_;
-  }
-  STRATA_RETURN_IF_ERROR(Store(info, Durability::kFull, stop));
-  absl::MutexLock lock(&mutex_);
-  jobs_[info.id].info = info;
+    jobs_.at(info.id)->owner = std::string(owner);
+    for (const std::uint64_t id : outdated) jobs_.erase(id);
+  };
+  STRATA_RETURN_IF_ERROR(core_.writer().Run(
+      Durability::kFull,
+      0,
+      stop,
+      [&](StorageWriter& writer) -> absl::Status {
+        for (const std::uint64_t id : outdated) STRATA_RETURN_IF_ERROR(writer.DeleteJob(id));
+        return writer.PutJob(info);
+      },
+      show));
   return info;
 }
 
@@ -127,76 +228,68 @@ absl::StatusOr<JobInfo> JobBoard::Get(std::uint64_t id) const {
   absl::MutexLock lock(&mutex_);
   const auto it = jobs_.find(id);
   if (it == jobs_.end()) return NoSuchJob(id);
-  return it->second.info;
+  return it->second->info;
 }
 
 std::vector<JobInfo> JobBoard::List() const {
   std::vector<JobInfo> infos;
   absl::MutexLock lock(&mutex_);
   infos.reserve(jobs_.size());
-  for (const auto& [id, entry] : jobs_) infos.push_back(entry.info);
+  for (const auto& [id, entry] : jobs_) infos.push_back(entry->info);
   return infos;
 }
 
 absl::StatusOr<JobInfo> JobBoard::Cancel(std::uint64_t id) {
-  {
-    absl::MutexLock lock(&mutex_);
-    const auto it = jobs_.find(id);
-    if (it == jobs_.end()) return NoSuchJob(id);
-    if (it->second.info.state != JobState::kQueued) {
-      it->second.stop.Request();  // nobody hears it if the job has ended
-      return it->second.info;
+  while (true) {
+    {
+      absl::MutexLock lock(&mutex_);
+      const auto it = jobs_.find(id);
+      if (it == jobs_.end()) return NoSuchJob(id);
+      const Entry& entry = *it->second;
+      if (entry.info.state == JobState::kRunning) entry.stop.Request();
+      if (entry.info.state != JobState::kQueued) return entry.info;
     }
+    absl::StatusOr<JobInfo> cancelled =
+        Change(id, Durability::kFull, [](JobInfo& job, StorageWriter&) -> absl::Status {
+          // A job that was running when the last process ended is stored so, and waits.
+          if (IsFinal(job.state)) return absl::AbortedError("the job has ended");
+          job.state = JobState::kCancelled;
+          return absl::OkStatus();
+        });
+    // It began meanwhile, and will be seen so.
+    if (!absl::IsAborted(cancelled.status())) return cancelled;
   }
-  STRATA_ASSIGN_OR_RETURN(const JobInfo info, Change(id, [](JobInfo& job) {
-                            if (job.state == JobState::kQueued) job.state = JobState::kCancelled;
-                          }));
-  STRATA_RETURN_IF_ERROR(Store(info, Durability::kFull, Stop()));
-  return info;
 }
 
 void JobBoard::StopRunning() {
   absl::MutexLock lock(&mutex_);
   for (const auto& [id, entry] : jobs_) {
-    if (entry.info.state == JobState::kRunning) entry.stop.Request();
+    if (entry->info.state == JobState::kRunning) entry->stop.Request();
   }
 }
 
-absl::StatusOr<JobInfo> JobBoard::Decide(std::uint64_t id,
-                                         absl::FunctionRef<void(JobInfo&)> change,
-                                         WriterThread::Work work) {
-  STRATA_ASSIGN_OR_RETURN(JobInfo info, Get(id));
-  if (info.state != JobState::kProposed) {
+absl::StatusOr<JobInfo> JobBoard::Decide(std::uint64_t id, ChangeFunction change) {
+  return Change(id, Durability::kFull, [&](JobInfo& job, StorageWriter& writer) -> absl::Status {
+    if (job.state == JobState::kProposed) return change(job, writer);
     return absl::FailedPreconditionError(
         absl::StrCat("job ", id, " has no proposal that waits; start one with dry_run=1"));
-  }
-  change(info);
-  STRATA_RETURN_IF_ERROR(
-      core_.writer().Run(Durability::kFull, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
-        STRATA_RETURN_IF_ERROR(work(writer));
-        return writer.PutJob(info);
-      }));
-  return Change(id, [&](JobInfo& job) { job = info; });
+  });
 }
 
 absl::StatusOr<JobInfo> JobBoard::Accept(std::uint64_t id) {
-  return Decide(
-      id,
-      [](JobInfo& job) {
-        job.state = JobState::kQueued;
-        job.parameters.emplace(kAccepted, "1");
-      },
-      [](StorageWriter&) { return absl::OkStatus(); });
+  return Decide(id, [](JobInfo& job, StorageWriter&) {
+    job.state = JobState::kQueued;
+    job.parameters.emplace(kAccepted, "1");
+    return absl::OkStatus();
+  });
 }
 
 absl::StatusOr<JobInfo> JobBoard::Discard(std::uint64_t id) {
-  return Decide(
-      id,
-      [](JobInfo& job) {
-        job.state = JobState::kCancelled;
-        job.message = std::string("proposal discarded");
-      },
-      [id](StorageWriter& writer) { return writer.DiscardProposal(id); });
+  return Decide(id, [id](JobInfo& job, StorageWriter& writer) {
+    job.state = JobState::kCancelled;
+    job.message = std::string("proposal discarded");
+    return writer.DiscardProposal(id);
+  });
 }
 
 absl::Status JobBoard::Watch(const Stop& stop,
@@ -211,7 +304,8 @@ absl::Status JobBoard::Watch(const Stop& stop,
       absl::MutexLock lock(&mutex_);
       const auto it = jobs_.find(id);
       if (it == jobs_.end()) return NoSuchJob(id);
-      const Entry& entry = it->second;
+      const std::shared_ptr<const Entry> held = it->second;
+      const Entry& entry = *held;
       const auto ended = [&entry] { return IsFinal(entry.info.state); };
       while (SteadyNow() < next && !ended()) {
         STRATA_RETURN_IF_ERROR(stop.status());
@@ -234,64 +328,119 @@ absl::Status JobBoard::Watch(const Stop& stop,
 bool JobBoard::AnyIn(JobState state) const {
   absl::MutexLock lock(&mutex_);
   return std::any_of(jobs_.begin(), jobs_.end(), [state](const auto& entry) {
-    return entry.second.info.state == state;
+    return entry.second->info.state == state;
   });
+}
+
+bool JobBoard::LastIsQuarantined(absl::string_view kind) const {
+  absl::MutexLock lock(&mutex_);
+  const auto last = std::find_if(jobs_.rbegin(), jobs_.rend(), [kind](const auto& entry) {
+    return entry.second->info.kind == kind;
+  });
+  return last != jobs_.rend() && IsQuarantined(last->second->info);
+}
+
+std::optional<std::uint64_t> JobBoard::NextId() const {
+  absl::MutexLock lock(&mutex_);
+  return NextIdLocked();
+}
+
+std::optional<std::uint64_t> JobBoard::NextIdLocked() const {
+  std::optional<std::pair<std::uint64_t, std::uint64_t>> next;  // last turn of its owner, id
+  for (const auto& [id, entry] : jobs_) {
+    if (entry->info.state != JobState::kQueued) continue;
+    const auto turn = turns_.find(entry->owner);
+    const std::pair mine(turn == turns_.end() ? 0 : turn->second, id);
+    if (!next.has_value() || mine < *next) next = mine;
+  }
+  if (!next.has_value()) return std::nullopt;
+  return next->second;
 }
 
 void JobBoard::Report(std::uint64_t id, double progress, const std::string& phase, bool durable) {
-  const absl::StatusOr<JobInfo> info = Change(id, [&](JobInfo& job) {
+  const auto report = [&](JobInfo& job) {
     job.progress = progress;
     job.phase = phase;
-  });
+    job.updated = NowInMicros();
+  };
+  {
+    absl::MutexLock lock(&mutex_);
+    Entry& entry = *jobs_.at(id);
+    report(entry.info);
+    ++entry.changes;
+  }
+  if (!durable) return;
   // Progress is for people; losing it is no reason to end the job.
-  if (durable && info.ok()) Store(*info, Durability::kRelaxed, Stop()).IgnoreError();
+  Change(id, Durability::kRelaxed, [&](JobInfo& job, StorageWriter&) {
+    report(job);
+    return absl::OkStatus();
+  }).IgnoreError();
 }
 
 absl::StatusOr<std::optional<JobInfo>> JobBoard::TakeNext(Stop& stop) {
-  JobInfo taken;
-  {
-    absl::MutexLock lock(&mutex_);
-    const auto it = std::find_if(jobs_.begin(), jobs_.end(), [](const auto& entry) {
-      return entry.second.info.state == JobState::kQueued;
-    });
-    if (it == jobs_.end()) return std::optional<JobInfo>();
-    it->second.info.state = JobState::kRunning;
-    it->second.info.updated = absl::FromUnixMicros(absl::ToUnixMicros(absl::Now()));
-    ++it->second.changes;
-    stop = it->second.stop;
-    taken = it->second.info;
+  while (true) {
+    std::uint64_t id = 0;
+    {
+      absl::MutexLock lock(&mutex_);
+      const std::optional<std::uint64_t> next = NextIdLocked();
+      if (!next.has_value()) return std::optional<JobInfo>();
+      id = *next;
+      Entry& entry = *jobs_.at(id);
+      entry.stop = Stop();  // an earlier run may have been asked to end
+      stop = entry.stop;
+      turns_[entry.owner] = ++turn_;
+    }
+    const WorkId work{WorkKind::kJob, id};
+    absl::StatusOr<JobInfo> taken =
+        Change(id, Durability::kRelaxed, [&](JobInfo& job, StorageWriter& writer) -> absl::Status {
+          if (IsFinal(job.state)) return absl::AbortedError("the job has ended");
+          job.state = JobState::kRunning;
+          return quarantine_.Begin(writer, work);
+        });
+    if (absl::IsAborted(taken.status())) continue;  // it was cancelled
+    STRATA_RETURN_IF_ERROR(taken.status());
+    return std::optional<JobInfo>(*std::move(taken));
   }
-  if (const absl::Status stored = Store(taken, Durability::kRelaxed, Stop()); !stored.ok()) {
-    STRATA_RETURN_IF_ERROR(Requeue(taken.id));
-    return stored;
-  }
-  return std::optional<JobInfo>(std::move(taken));
 }
 
 absl::Status JobBoard::Requeue(std::uint64_t id) {
-  return Change(id, [](JobInfo& job) { job.state = JobState::kQueued; }).status();
+  const WorkId work{WorkKind::kJob, id};
+  const absl::Status stored = Guarded([&] {
+    return Change(id,
+                  Durability::kRelaxed,
+                  [&](JobInfo& job, StorageWriter& writer) {
+                    job.state = JobState::kQueued;
+                    return quarantine_.Pause(writer, work);
+                  })
+        .status();
+  });
+  if (stored.ok()) return stored;
+  absl::MutexLock lock(&mutex_);
+  Entry& entry = *jobs_.at(id);
+  entry.info.state = JobState::kQueued;
+  ++entry.changes;
+  return absl::OkStatus();
 }
 
 absl::Status JobBoard::Finish(std::uint64_t id, const absl::Status& ended, Running& context) {
-  JobInfo info;
-  STRATA_ASSIGN_OR_RETURN(info, Get(id));
-  for (const auto& [name, value] : context.metrics()) info.metrics[name] = value;
-  info.phase.clear();
-  if (ended.ok()) {
-    info.state = context.proposed() ? JobState::kProposed : JobState::kSucceeded;
-    info.progress = 1.0;
-    info.message = context.message();
-  } else {
-    info.state = absl::IsCancelled(ended) ? JobState::kCancelled : JobState::kFailed;
-    info.message = std::string(ended.message());
-  }
-  info.updated = absl::FromUnixMicros(absl::ToUnixMicros(absl::Now()));
-  // Durable before anybody sees that it ended; if that cannot be, it did not.
-  if (absl::Status stored = Store(info, Durability::kFull, Stop()); !stored.ok()) {
-    STRATA_RETURN_IF_ERROR(Requeue(id));
-    return stored;
-  }
-  return Change(id, [&](JobInfo& job) { job = info; }).status();
+  const WorkId work{WorkKind::kJob, id};
+  // Durable before anybody sees that it ended.
+  return Change(id,
+                Durability::kFull,
+                [&](JobInfo& job, StorageWriter& writer) {
+                  for (const auto& [name, value] : context.metrics()) job.metrics[name] = value;
+                  job.phase.clear();
+                  if (ended.ok()) {
+                    job.state = context.proposed() ? JobState::kProposed : JobState::kSucceeded;
+                    job.progress = 1.0;
+                    job.message = context.message();
+                  } else {
+                    job.state = absl::IsCancelled(ended) ? JobState::kCancelled : JobState::kFailed;
+                    job.message = std::string(ended.message());
+                  }
+                  return quarantine_.End(writer, work);
+                })
+      .status();
 }
 
 absl::Status JobBoard::RunNext(const Stop& closing,
@@ -299,10 +448,14 @@ absl::Status JobBoard::RunNext(const Stop& closing,
   Stop stop;
   STRATA_ASSIGN_OR_RETURN(const std::optional<JobInfo> job, TakeNext(stop));
   if (!job.has_value()) return absl::OkStatus();
+  if (closing.requested()) stop.Request();  // whoever closes may have looked before it ran
   Running context(*this, job->id, stop, closing);
-  const absl::Status ended = body(*job, context);
+  const absl::Status ended = Guarded([&] { return body(*job, context); });
   if (closing.requested() && !ended.ok()) return Requeue(job->id);
-  return Finish(job->id, ended, context);
+  absl::Status stored = Guarded([&] { return Finish(job->id, ended, context); });
+  // If that cannot be, it did not end.
+  if (!stored.ok()) STRATA_RETURN_IF_ERROR(Requeue(job->id));
+  return stored;
 }
 
 }  // namespace strata

@@ -2,13 +2,17 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 #include <glog/logging.h>
 
+#include "core/common/guarded.h"
 #include "core/common/log_line.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
@@ -26,6 +30,8 @@ namespace {
 
 // After an error of the store (a full disk, say): how long until the next try.
 constexpr absl::Duration kRetryDelay = absl::Seconds(1);
+// Who starts jobs that nobody asked for.
+constexpr absl::string_view kServer = "server";
 
 // Whether a job that begins has made its epoch already, and was killed before it could say so; a
 // second one would not be undone with the first. If so, tells what is known.
@@ -44,8 +50,9 @@ absl::StatusOr<bool> HasMadeItsEpoch(MapCore& core, const JobInfo& job, JobConte
 
 }  // namespace
 
-JobRunner::JobRunner(MapCore& core, JobBoard& jobs, Worker& worker)
+JobRunner::JobRunner(MapCore& core, Quarantine& quarantine, JobBoard& jobs, Worker& worker)
     : core_(core),
+      quarantine_(quarantine),
       jobs_(jobs),
       worker_(worker),
       closures_(core),
@@ -100,13 +107,25 @@ void JobRunner::Loop() {
   }
 }
 
+absl::StatusOr<bool> JobRunner::MustWait() {
+  const std::optional<std::uint64_t> next = jobs_.NextId();
+  if (!next.has_value() || !quarantine_.IsSuspect({WorkKind::kJob, *next})) return false;
+  return quarantine_.SuspectScanWaits();
+}
+
 void JobRunner::RunJob() {
-  const absl::Status done = jobs_.RunNext(
-      closing_, [this](const JobInfo& job, JobContext& context) { return Run(job, context); });
+  const absl::Status done = Guarded([this]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(const bool waits, MustWait());
+    if (waits) return absl::UnavailableError("a scan that the server may have died of goes first");
+    return jobs_.RunNext(
+        closing_, [this](const JobInfo& job, JobContext& context) { return Run(job, context); });
+  });
   absl::MutexLock lock(&mutex_);
   job_waits_ = jobs_.AnyIn(JobState::kQueued);
   if (done.ok()) return;
-  LOG(ERROR) << LogLine("job").Add("map", core_.name()).Add("error", done.message());
+  if (!IsOutOfMemory(done)) {
+    LOG(ERROR) << LogLine("job").Add("map", core_.name()).Add("error", done.message());
+  }
   mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
 }
 
@@ -123,16 +142,28 @@ absl::StatusOr<bool> JobRunner::OptimizeIsDue() {
   return found > 0;
 }
 
-void JobRunner::Look() {
+absl::Status JobRunner::StartWhatIsDue() {
   const auto start_if = [this](const absl::StatusOr<bool>& due,
                                absl::string_view kind,
                                const JobParameters& parameters) -> absl::Status {
-    if (!due.ok() || !*due) return due.status();
-    return jobs_.Start(closing_, kind, parameters).status();
+    if (!due.ok() || !*due || jobs_.LastIsQuarantined(kind)) return due.status();
+    return jobs_.Start(closing_, kServer, kind, parameters).status();
   };
-  absl::Status done = start_if(OptimizeIsDue(), kOptimizeJob, {{"automatic", "1"}});
-  if (done.ok()) done = start_if(FadingIsDue(core_, jobs_.List()), kFadeJob, {});
-  if (!done.ok() && !absl::IsCancelled(done)) {
+  STRATA_RETURN_IF_ERROR(start_if(OptimizeIsDue(), kOptimizeJob, {{"automatic", "1"}}));
+  return start_if(FadingIsDue(core_, jobs_.List()), kFadeJob, {});
+}
+
+void JobRunner::Look() {
+  const WorkId look{WorkKind::kLook, 0};
+  if (quarantine_.IsHeld(look)) return;
+  const absl::Status done = Guarded([&]() -> absl::Status {
+    if (!closures_.HasNews()) return StartWhatIsDue();
+    STRATA_RETURN_IF_ERROR(quarantine_.Begin(look));
+    const absl::Status started = Guarded([this] { return StartWhatIsDue(); });
+    STRATA_RETURN_IF_ERROR(quarantine_.End(look));
+    return started;
+  });
+  if (!done.ok() && !absl::IsCancelled(done) && !IsOutOfMemory(done)) {
     LOG(ERROR) << LogLine("look").Add("map", core_.name()).Add("error", done.message());
   }
   absl::MutexLock lock(&mutex_);

@@ -15,6 +15,7 @@
 #include "core/engine/closure_watch.h"
 #include "core/engine/job_board.h"
 #include "core/engine/map_core.h"
+#include "core/engine/quarantine.h"
 #include "core/engine/worker.h"
 
 namespace strata {
@@ -22,8 +23,9 @@ namespace strata {
 // Thread-safe.
 class JobRunner {
  public:
-  // All must outlive the runner. Jobs that are queued begin at once.
-  JobRunner(MapCore& core, JobBoard& jobs, Worker& worker);
+  // All must outlive the runner. Jobs that are queued begin at once, but for one that the process
+  // may have died of: after the scans of which that is true.
+  JobRunner(MapCore& core, Quarantine& quarantine, JobBoard& jobs, Worker& worker);
   ~JobRunner() { Close(); }
 
   // A job was queued.
@@ -40,15 +42,19 @@ class JobRunner {
   // Waits until there is something to do.
   Step NextStep();
   void RunJob();
+  // Whether the next job must wait for a scan.
+  absl::StatusOr<bool> MustWait();
   absl::Status Run(const JobInfo& job, JobContext& context);
   // Queues what nobody has asked for and is due.
   void Look();
+  absl::Status StartWhatIsDue();
   // Whether closures were found that no optimize job has had a chance to use.
   absl::StatusOr<bool> OptimizeIsDue();
   // After something that began at `begun`: leaves at least as much time to others.
   void PlanNextLook(absl::Time begun);
 
   MapCore& core_;
+  Quarantine& quarantine_;
   JobBoard& jobs_;
   Worker& worker_;
   ClosureWatch closures_;  // the thread's

@@ -147,7 +147,8 @@ absl::StatusOr<JobInfo> EngineJobs::Start(const api::Call& call,
   STRATA_RETURN_IF_ERROR(CheckJob(kind, parameters));
   STRATA_RETURN_IF_ERROR(CheckPointsKept(found->core(), kind));
   STRATA_RETURN_IF_ERROR(CheckClassifiers(found->core(), kind, parameters));
-  STRATA_ASSIGN_OR_RETURN(JobInfo info, found->jobs().Start(call.stop, kind, parameters));
+  STRATA_ASSIGN_OR_RETURN(JobInfo info,
+                          found->jobs().Start(call.stop, call.principal, kind, parameters));
   found->JobQueued();
   return info;
 }
@@ -195,7 +196,8 @@ absl::StatusOr<JobInfo> EngineJobs::Revert(const api::Call& call,
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t epoch,
                           EpochBefore(job, found->core().snapshots().current().epoch));
   STRATA_ASSIGN_OR_RETURN(
-      JobInfo revert, found->jobs().Start(call.stop, kRevertJob, {{"epoch", absl::StrCat(epoch)}}));
+      JobInfo revert,
+      found->jobs().Start(call.stop, call.principal, kRevertJob, {{"epoch", absl::StrCat(epoch)}}));
   found->JobQueued();
   return revert;
 }

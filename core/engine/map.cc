@@ -19,7 +19,8 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
                                                std::shared_ptr<CacheBudget> caches) {
   std::shared_ptr<Map> map(new Map());
   STRATA_ASSIGN_OR_RETURN(map->core_, MapCore::Open(name, file, options, std::move(caches)));
-  STRATA_ASSIGN_OR_RETURN(map->jobs_, JobBoard::Open(*map->core_));
+  STRATA_ASSIGN_OR_RETURN(map->quarantine_, Quarantine::Open(*map->core_));
+  STRATA_ASSIGN_OR_RETURN(map->jobs_, JobBoard::Open(*map->core_, *map->quarantine_));
   STRATA_ASSIGN_OR_RETURN(map->uploads_, UnfinishedUploads::Open(*map->core_));
   std::uint64_t pending = 0;
   {
@@ -30,8 +31,9 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
   map->planner_ = std::make_unique<MapPlanner>(*map->core_);
   map->tiles_ = std::make_unique<ServedTiles>(*map->core_);
   map->localizer_ = std::make_unique<Localizer>(*map->core_);
-  map->worker_ = std::make_unique<Worker>(*map->core_, pending);
-  map->runner_ = std::make_unique<JobRunner>(*map->core_, *map->jobs_, *map->worker_);
+  map->worker_ = std::make_unique<Worker>(*map->core_, *map->quarantine_, pending);
+  map->runner_ =
+      std::make_unique<JobRunner>(*map->core_, *map->quarantine_, *map->jobs_, *map->worker_);
   return map;
 }
 

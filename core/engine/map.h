@@ -15,6 +15,7 @@
 #include "core/engine/localizer.h"
 #include "core/engine/map_core.h"
 #include "core/engine/map_planner.h"
+#include "core/engine/quarantine.h"
 #include "core/engine/served_tiles.h"
 #include "core/engine/unfinished_uploads.h"
 #include "core/engine/worker.h"
@@ -52,6 +53,7 @@ class Map {
   Map() = default;
 
   std::unique_ptr<MapCore> core_;
+  std::unique_ptr<Quarantine> quarantine_;
   std::unique_ptr<JobBoard> jobs_;
   std::unique_ptr<MapPlanner> planner_;
   std::unique_ptr<ServedTiles> tiles_;

@@ -206,11 +206,7 @@ absl::StatusOr<std::shared_ptr<Map>> EngineMaps::Withdraw(absl::string_view name
   if (it == maps_.end()) return NoSuchMap(name);
   std::shared_ptr<Map> map;
   if (it->second.ok()) {
-    map = *it->second;
-    if (map->jobs().AnyIn(JobState::kRunning)) {
-      return absl::FailedPreconditionError(
-          absl::StrCat("map ", it->first, ": a job is running; cancel it first"));
-    }
+    map = *it->second;  // its jobs end with it
   } else if (absl::IsAborted(it->second.status())) {
     return NoSuchMap(name);
   } else if (opening_.contains(it->first)) {

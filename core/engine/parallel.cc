@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <exception>
 #include <thread>
 #include <vector>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/synchronization/mutex.h"
+
+#include "core/common/guarded.h"
 
 namespace strata {
 namespace {
@@ -38,7 +41,7 @@ absl::Status ParallelFor(int threads,
     while (!failed.load(std::memory_order_relaxed)) {
       const std::size_t i = next.fetch_add(1);
       if (i >= count) return;
-      const absl::Status done = body(thread, i);
+      const absl::Status done = Guarded([&] { return body(thread, i); });
       if (done.ok()) continue;
       error.Keep(done, i);
       failed = true;
@@ -49,8 +52,12 @@ absl::Status ParallelFor(int threads,
       static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(std::max(threads, 1)),
                                              std::max<std::size_t>(count, 1)) -
                        1);
-  helpers.reserve(static_cast<std::size_t>(helper_count));
-  for (int i = 1; i <= helper_count; ++i) helpers.emplace_back(run, i);
+  try {
+    helpers.reserve(static_cast<std::size_t>(helper_count));
+    for (int i = 1; i <= helper_count; ++i) helpers.emplace_back(run, i);
+  } catch (const std::exception&) {
+    // No memory or no thread for one more: those that are there do the work.
+  }
   run(0);
   for (std::thread& helper : helpers) helper.join();
   absl::MutexLock lock(&error.mutex);

@@ -8,14 +8,10 @@
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 
+#include "core/common/guarded.h"
 #include "core/storage/storage.h"
 
 namespace strata {
-namespace {
-
-constexpr std::size_t kMaxIdle = 8;
-
-}  // namespace
 
 absl::StatusOr<ReaderPool::Lease> ReaderPool::Take() {
   {
@@ -28,7 +24,9 @@ absl::StatusOr<ReaderPool::Lease> ReaderPool::Take() {
       return lease;
     }
   }
-  absl::StatusOr<std::unique_ptr<StorageReader>> reader = storage_.NewReader();
+  // It is on loan until it says otherwise, whatever happens.
+  absl::StatusOr<std::unique_ptr<StorageReader>> reader =
+      Guarded([this] { return storage_.NewReader(); });
   if (reader.ok()) return Lease(*this, *std::move(reader));
   absl::MutexLock lock(&mutex_);
   --on_loan_;

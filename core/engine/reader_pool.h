@@ -36,7 +36,9 @@ class ReaderPool {
     std::unique_ptr<StorageReader> reader_;
   };
 
-  explicit ReaderPool(MapStorage& storage) : storage_(storage) {}
+  explicit ReaderPool(MapStorage& storage) : storage_(storage) {
+    idle_.reserve(kMaxIdle);  // a reader goes back without a need for memory
+  }
 
   // CANCELLED once closed.
   absl::StatusOr<Lease> Take();
@@ -44,6 +46,8 @@ class ReaderPool {
   void Close();
 
  private:
+  static constexpr std::size_t kMaxIdle = 8;
+
   void Return(std::unique_ptr<StorageReader> reader);
 
   MapStorage& storage_;

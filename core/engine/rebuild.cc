@@ -151,16 +151,15 @@ absl::Status RunRebuildJob(Integrator& integrator, const JobInfo& job, JobContex
   return absl::InvalidArgumentError(absl::StrCat("job kind '", job.kind, "' is unknown"));
 }
 
+absl::StatusOr<bool> NeedsRecovery(MapCore& core) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());
+  return !clock.derived_complete;
+}
+
 absl::Status RecoverDerived(Integrator& integrator, const Stop& closing) {
-  MapCore& core = integrator.core();
-  MapClock clock;
-  {
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-    STRATA_ASSIGN_OR_RETURN(clock, reader->GetClock());
-  }
-  if (clock.derived_complete) return absl::OkStatus();
   SilentContext context(closing);
-  return Rebuild(integrator, core.options().worker_threads, context);
+  return Rebuild(integrator, integrator.core().options().worker_threads, context);
 }
 
 }  // namespace strata

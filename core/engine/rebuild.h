@@ -19,8 +19,11 @@ inline constexpr absl::string_view kVerifyJob = "verify";
 // Runs a job of either kind; DATA_LOSS naming what does not fit if `verify` finds anything.
 absl::Status RunRebuildJob(Integrator& integrator, const JobInfo& job, JobContext& context);
 
-// Rebuilds at once if the derived tables are marked incomplete: they were dropped, or written by a
-// program with another format.
+// Whether the derived tables are marked incomplete: they were dropped, or written by a program with
+// another format.
+absl::StatusOr<bool> NeedsRecovery(MapCore& core);
+
+// Rebuilds them at once.
 absl::Status RecoverDerived(Integrator& integrator, const Stop& closing);
 
 }  // namespace strata

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -24,6 +25,15 @@ namespace strata {
 namespace {
 
 constexpr std::size_t kBlockPoints = 1'000'000;
+constexpr std::size_t kAnyPatches = std::numeric_limits<std::size_t>::max();
+
+absl::Status CheckPatches(const MlsMap& map, std::size_t most) {
+  std::size_t patches = 0;
+  for (const MlsTile& tile : map.tiles) patches += tile.patches.size();
+  if (patches <= most) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "more than ", most, " surface patches, the most of one scan; split it, or use larger cells"));
+}
 
 template <typename T>
 void AppendTo(std::vector<T>& to, const std::vector<T>& from) {
@@ -117,7 +127,8 @@ absl::Status ScanSource::ForEachBlock(const ScanRecord& scan,
 
 absl::StatusOr<MlsMap> ScanSource::Build(const ScanRecord& scan,
                                          const Pose& T_map_scan,
-                                         Faded faded) {
+                                         Faded faded,
+                                         std::size_t most_patches) {
   const SensorModel sensor = scan.header.sensor.value_or(parameters_.sensor);
   MlsMap map;
   map.parameters = parameters_.mls;
@@ -138,7 +149,7 @@ absl::StatusOr<MlsMap> ScanSource::Build(const ScanRecord& scan,
     } else {
       JoinInto(map, built.map);
     }
-    return absl::OkStatus();
+    return CheckPatches(map, most_patches);
   }));
   return map;
 }
@@ -168,7 +179,8 @@ absl::Status ScanSource::CheckSpread(const ScanRecord& scan) {
 absl::StatusOr<MlsMap> ScanSource::LocalMap(const ScanRecord& scan) {
   if (scan.has_points) {
     STRATA_RETURN_IF_ERROR(CheckSpread(scan));
-    return Build(scan, Pose::Identity(), Faded::kWith);
+    const bool waits = scan.state == ScanState::kPending;  // what was taken once is taken
+    return Build(scan, Pose::Identity(), Faded::kWith, waits ? kMaxScanPatches : kAnyPatches);
   }
   dropped_ = DroppedPoints();
   STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader_.GetLocalMap(scan.number));
@@ -176,7 +188,9 @@ absl::StatusOr<MlsMap> ScanSource::LocalMap(const ScanRecord& scan) {
 }
 
 absl::StatusOr<MlsMap> ScanSource::Contribution(const ScanRecord& scan, const Pose& T_map_scan) {
-  if (parameters_.keep_points && scan.has_points) return Build(scan, T_map_scan, Faded::kWithout);
+  if (parameters_.keep_points && scan.has_points) {
+    return Build(scan, T_map_scan, Faded::kWithout, kAnyPatches);
+  }
   STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, LocalMap(scan));
   return TransformContribution(local_map, T_map_scan);
 }

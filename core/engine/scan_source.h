@@ -25,6 +25,10 @@ namespace strata {
 // into the map, and so do those around it.
 inline constexpr std::size_t kMaxScanTiles = 4'096;
 
+// Patches of its own frame that a scan may make: its tiles are in memory at once while it is
+// integrated, some 60 bytes a patch.
+inline constexpr std::size_t kMaxScanPatches = std::size_t{1} << 22;
+
 // Piece `ordinal` of the points of `scan`, with the labels it was uploaded with. DATA_LOSS, naming
 // the piece, unless it is intact and has the columns that the header announces.
 absl::StatusOr<PointCloud> ReadPoints(StorageReader& reader,
@@ -40,7 +44,8 @@ class ScanSource {
       : reader_(reader), parameters_(parameters), labels_(labels) {}
 
   // The scan in its own frame. DATA_LOSS naming the piece that is damaged; INVALID_ARGUMENT for
-  // points in more than kMaxScanTiles tiles.
+  // points in more than kMaxScanTiles tiles and, of a scan that waits for integration, more than
+  // kMaxScanPatches.
   absl::StatusOr<MlsMap> LocalMap(const ScanRecord& scan);
   // What the scan adds to the map at this pose, without points that have faded: a pure function of
   // the scan, what is said of its points, the pose and the map's parameters, before and after
@@ -58,7 +63,10 @@ class ScanSource {
   enum class Faded { kWith, kWithout };
   // Of the scan frame: what was taken once may be moved anywhere.
   absl::Status CheckSpread(const ScanRecord& scan);
-  absl::StatusOr<MlsMap> Build(const ScanRecord& scan, const Pose& T_map_scan, Faded faded);
+  absl::StatusOr<MlsMap> Build(const ScanRecord& scan,
+                               const Pose& T_map_scan,
+                               Faded faded,
+                               std::size_t most_patches);
 
   StorageReader& reader_;
   const MapParameters& parameters_;

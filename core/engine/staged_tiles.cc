@@ -7,16 +7,18 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/common/guarded.h"
 #include "core/common/status.h"
 
 namespace strata {
 
 StagedTiles::~StagedTiles() {
-  const absl::Status clean =
-      published_ ? absl::OkStatus()
-                 : core_.writer().Run(Durability::kRelaxed, 0, Stop(), [](StorageWriter& writer) {
-                     return writer.DiscardUnpublished();
-                   });
+  const absl::Status clean = Guarded([this] {
+    if (published_) return absl::OkStatus();
+    return core_.writer().Run(Durability::kRelaxed, 0, Stop(), [](StorageWriter& writer) {
+      return writer.DiscardUnpublished();
+    });
+  });
   core_.set_tiles_staged(!clean.ok());
 }
 

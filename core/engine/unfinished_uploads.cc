@@ -26,7 +26,7 @@ absl::StatusOr<std::unique_ptr<UnfinishedUploads>> UnfinishedUploads::Open(MapCo
     absl::MutexLock lock(&uploads->mutex_);
     for (UnfinishedUpload& upload : found) {
       upload.touched = std::min(upload.touched, SteadyNow());  // the clock may have been set back
-      uploads->parked_.insert_or_assign({upload.id, upload.content_hash}, upload);
+      uploads->Park(upload);
     }
     stale = uploads->TakeStale(SteadyNow());
   }
@@ -52,9 +52,7 @@ std::shared_ptr<ScanIntake> UnfinishedUploads::FindAnnounced(const ScanHeader& h
   std::erase_if(active_, [](const auto& entry) { return entry.second.expired(); });
   std::weak_ptr<ScanIntake>& active = active_[{key, EncodeScanHeader(header)}];
   if (std::shared_ptr<ScanIntake> intake = active.lock(); intake != nullptr) return intake;
-  std::optional<UnfinishedUpload> parked;
-  if (auto node = parked_.extract(key); !node.empty()) parked = std::move(node.mapped());
-  auto intake = std::make_shared<ScanIntake>(core_, header, std::move(parked));
+  auto intake = std::make_shared<ScanIntake>(core_, header, TakeParked(key));
   active = intake;
   return intake;
 }
@@ -67,36 +65,42 @@ void UnfinishedUploads::Release(std::shared_ptr<ScanIntake> intake, std::uint64_
     if (intake.use_count() > 1) return;  // who holds it, too, comes here after this one
     const std::optional<UnfinishedUpload> rest = intake->Rest();
     if (!rest.has_value()) return;
-    const Key key{rest->id, rest->content_hash};
-    active_.erase({key, EncodeScanHeader(intake->header())});
+    active_.erase({{rest->id, rest->content_hash}, EncodeScanHeader(intake->header())});
     // Another one is left where two streams claimed the hash with different headers.
-    const auto other = parked_.find(key);
-    if (other != parked_.end()) stale.push_back(other->second.upload);
-    parked_.insert_or_assign(key, *rest);
-    const std::vector<std::uint64_t> old = TakeStale(SteadyNow());
-    stale.insert(stale.end(), old.begin(), old.end());
+    const std::optional<UnfinishedUpload> other = TakeParked({rest->id, rest->content_hash});
+    Park(*rest);
+    stale = TakeStale(SteadyNow());
+    if (other.has_value()) stale.push_back(other->upload);
   }
   Abandon(stale);
 }
 
+void UnfinishedUploads::Park(const UnfinishedUpload& upload) {
+  const Key key{upload.id, upload.content_hash};
+  TakeParked(key);
+  parked_.emplace(key, upload);
+  by_age_.emplace(upload.touched, key);
+  parked_bytes_ += upload.bytes;
+}
+
+std::optional<UnfinishedUpload> UnfinishedUploads::TakeParked(const Key& key) {
+  auto node = parked_.extract(key);
+  if (node.empty()) return std::nullopt;
+  by_age_.erase({node.mapped().touched, key});
+  parked_bytes_ -= node.mapped().bytes;
+  return std::move(node.mapped());
+}
+
 std::vector<std::uint64_t> UnfinishedUploads::TakeStale(absl::Time now) {
-  std::vector<Key> by_age;
-  for (const auto& [key, upload] : parked_) by_age.push_back(key);
-  std::sort(by_age.begin(),
-            by_age.end(),
-            [this](const Key& a, const Key& b) ABSL_NO_THREAD_SAFETY_ANALYSIS {
-              return parked_.at(a).touched > parked_.at(b).touched;
-            });
+  const EngineOptions& options = core_.options();
   std::vector<std::uint64_t> stale;
-  std::uint64_t bytes = 0;
-  for (const Key& key : by_age) {
-    const UnfinishedUpload& upload = parked_.at(key);
-    bytes += upload.bytes;
-    const bool stays = now - upload.touched <= core_.options().upload_keep &&
-                       bytes <= core_.options().max_kept_upload_bytes;
-    if (stays) continue;
-    stale.push_back(upload.upload);
-    parked_.erase(key);
+  while (!by_age_.empty()) {
+    const auto& [touched, key] = *by_age_.begin();
+    const bool stays = now - touched <= options.upload_keep &&
+                       parked_bytes_ <= options.max_kept_upload_bytes &&
+                       by_age_.size() <= options.max_kept_uploads;
+    if (stays) break;
+    stale.push_back(TakeParked(Key(key))->upload);
   }
   return stale;
 }

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -40,7 +42,11 @@ class UnfinishedUploads {
   explicit UnfinishedUploads(MapCore& core) : core_(core) {}
   std::shared_ptr<ScanIntake> FindAnnounced(const ScanHeader& header)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // What has stayed too long, and the oldest beyond the bound of bytes: nobody finds it any more.
+  // Keeps it for its client, in place of an earlier one of the same scan.
+  void Park(const UnfinishedUpload& upload) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // nullopt: there is none.
+  std::optional<UnfinishedUpload> TakeParked(const Key& key) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // What has stayed too long, and the oldest beyond the bounds: nobody finds it any more.
   std::vector<std::uint64_t> TakeStale(absl::Time now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Drops it from the store. Waits for the writer, so without the lock.
   void Abandon(const std::vector<std::uint64_t>& uploads);
@@ -49,7 +55,9 @@ class UnfinishedUploads {
   absl::Mutex mutex_;
   // With the encoded header: a hash may be claimed with headers that it does not belong to.
   std::map<std::pair<Key, std::string>, std::weak_ptr<ScanIntake>> active_ ABSL_GUARDED_BY(mutex_);
-  std::map<Key, UnfinishedUpload> parked_ ABSL_GUARDED_BY(mutex_);  // no stream has them
+  std::map<Key, UnfinishedUpload> parked_ ABSL_GUARDED_BY(mutex_);       // no stream has them
+  std::set<std::pair<absl::Time, Key>> by_age_ ABSL_GUARDED_BY(mutex_);  // of parked_
+  std::uint64_t parked_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace strata

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
@@ -10,6 +11,7 @@
 #include "absl/time/time.h"
 #include <glog/logging.h>
 
+#include "core/common/guarded.h"
 #include "core/common/log_line.h"
 #include "core/common/status.h"
 #include "core/common/this_thread.h"
@@ -21,11 +23,21 @@ namespace {
 constexpr absl::Duration kStopPoll = absl::Milliseconds(50);
 // After an error of the store (a full disk, say): how long until the next try.
 constexpr absl::Duration kRetryDelay = absl::Seconds(1);
+// So often a scan is tried again alone when there was no memory.
+constexpr int kMemoryTries = 10;
+
+absl::Status Refusal() {
+  return absl::FailedPreconditionError(
+      "quarantined: the server died while it made the map's tiles again after a start; stratad "
+      "quarantine release has it try once more");
+}
 
 }  // namespace
 
-Worker::Worker(MapCore& core, std::uint64_t pending)
-    : core_(core), integrator_(core), pending_(pending), thread_([this] { Loop(); }) {}
+Worker::Worker(MapCore& core, Quarantine& quarantine, std::uint64_t pending)
+    : core_(core), quarantine_(quarantine), integrator_(core), pending_(pending), thread_([this] {
+        Loop();
+      }) {}
 
 Worker::~Worker() { Close(); }
 
@@ -46,9 +58,11 @@ absl::Status Worker::Execute(const Stop& stop, Command command) {
   Task task{command, absl::OkStatus()};
   absl::MutexLock lock(&mutex_);
   if (closed_) return absl::CancelledError("the map is being closed");
+  if (refuses_) return Refusal();
   tasks_.push_back(&task);
   while (!mutex_.AwaitWithTimeout(absl::Condition(&task.done), kStopPoll)) {
-    absl::Status waiting = stop.status();
+    // The task must leave the queue before this frame is left, in whatever way.
+    absl::Status waiting = Guarded([&stop] { return stop.status(); });
     if (waiting.ok() || task.begun) continue;
     tasks_.erase(std::find(tasks_.begin(), tasks_.end(), &task));
     return waiting;
@@ -69,19 +83,30 @@ Worker::Step Worker::NextStep() {
 void Worker::Loop() {
   NameThisThread("worker");
   YieldThisThread(5);  // what is acknowledged waits for nobody
-  RunRecovery();
+  if (!RunRecovery()) return Refuse();
   while (true) {
     switch (NextStep()) {
       case Step::kClosed:
-        return;
+        return quarantine_.EndScans();
       case Step::kCommand:
         RunCommand();
         break;
       case Step::kBatch:
-        RunBatch();
+        // What it has no memory to log is tried again.
+        Guarded([this] {
+          RunBatch();
+          return absl::OkStatus();
+        }).IgnoreError();
         break;
     }
   }
+}
+
+absl::Status Worker::GuardedStep(absl::FunctionRef<absl::Status()> step) {
+  absl::Status done = Guarded(step);
+  // Left in the middle of anything, its caches may be neither before nor after it.
+  if (absl::IsResourceExhausted(done)) integrator_.ForgetCaches();
+  return done;
 }
 
 void Worker::RunCommand() {
@@ -93,7 +118,7 @@ void Worker::RunCommand() {
     tasks_.pop_front();
     task->begun = true;
   }
-  const absl::Status status = task->command(integrator_);
+  const absl::Status status = GuardedStep([&] { return task->command(integrator_); });
   absl::MutexLock lock(&mutex_);
   task->status = status;
   task->done = true;
@@ -105,26 +130,71 @@ void Worker::RunBatch() {
     absl::MutexLock lock(&mutex_);
     waited = pending_;
   }
-  const absl::StatusOr<int> done = integrator_.IntegrateBatch();
+  int count = 0;
+  const absl::Status done = GuardedStep([&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(count, Integrate());
+    return absl::OkStatus();
+  });
+  if (!done.ok()) quarantine_.EndScans();
+  if (IsOutOfMemory(done)) return NoteNoMemory();
+  no_memory_ = 0;
   absl::MutexLock lock(&mutex_);
   if (done.ok()) {
     // Scans that were deleted while they waited are counted, but are not there any more.
-    pending_ -= *done == 0 ? waited : std::min(pending_, static_cast<std::uint64_t>(*done));
+    pending_ -= count == 0 ? waited : std::min(pending_, static_cast<std::uint64_t>(count));
     return;
   }
-  LOG(ERROR)
-      << LogLine("integration").Add("map", core_.name()).Add("stopped", done.status().message());
+  LOG(ERROR) << LogLine("integration").Add("map", core_.name()).Add("stopped", done.message());
   mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
 }
 
-void Worker::RunRecovery() {
+absl::StatusOr<int> Worker::Integrate() {
+  const int most = no_memory_ > 0 ? 1 : core_.options().max_batch_scans;
+  STRATA_ASSIGN_OR_RETURN(const int begun, quarantine_.BeginScans(most));
+  return begun == 0 ? 0 : integrator_.IntegrateBatch(begun);
+}
+
+// Somebody else may have the memory just now; a scan that never gets enough of it holds up those
+// behind it.
+void Worker::NoteNoMemory() {
+  if (++no_memory_ > kMemoryTries) {
+    const absl::Status held = GuardedStep(
+        [this] { return quarantine_.HoldNextScan("there is no memory to integrate it"); });
+    if (held.ok()) no_memory_ = 0;
+  }
+  absl::MutexLock lock(&mutex_);
+  mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
+}
+
+bool Worker::RunRecovery() {
+  const WorkId recovery{WorkKind::kRecovery, 0};
+  if (quarantine_.IsHeld(recovery)) return false;
   while (true) {
-    const absl::Status done = RecoverDerived(integrator_, closing_);
-    if (done.ok() || closing_.requested()) return;
+    const absl::Status done = GuardedStep([&]() -> absl::Status {
+      STRATA_ASSIGN_OR_RETURN(const bool needed, NeedsRecovery(core_));
+      if (!needed) return absl::OkStatus();
+      STRATA_RETURN_IF_ERROR(quarantine_.Begin(recovery));
+      const absl::Status recovered = Guarded([&] { return RecoverDerived(integrator_, closing_); });
+      quarantine_.End(recovery).IgnoreError();
+      return recovered;
+    });
+    if (done.ok() || closing_.requested()) return true;
     LOG(ERROR) << LogLine("recovery").Add("map", core_.name()).Add("stopped", done.message());
     absl::MutexLock lock(&mutex_);
-    if (mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay)) return;
+    if (mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay)) return true;
   }
+}
+
+void Worker::Refuse() {
+  LOG(ERROR) << LogLine("recovery").Add("map", core_.name()).Add("stopped", Refusal().message());
+  absl::MutexLock lock(&mutex_);
+  refuses_ = true;
+  for (Task* task : tasks_) {
+    task->status = Refusal();
+    task->done = true;
+  }
+  tasks_.clear();
+  mutex_.Await(absl::Condition(&closed_));
 }
 
 void Worker::Close() {

@@ -10,11 +10,13 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 
 #include "core/common/stop.h"
 #include "core/engine/integrator.h"
 #include "core/engine/map_core.h"
+#include "core/engine/quarantine.h"
 
 namespace strata {
 
@@ -23,8 +25,8 @@ class Worker {
  public:
   using Command = absl::FunctionRef<absl::Status(Integrator&)>;
 
-  // `core` must outlive the worker. Begins where the last run stopped; `pending` scans wait.
-  Worker(MapCore& core, std::uint64_t pending);
+  // All must outlive the worker. Begins where the last run stopped; `pending` scans wait.
+  Worker(MapCore& core, Quarantine& quarantine, std::uint64_t pending);
   ~Worker();
 
   // RESOURCE_EXHAUSTED while too many scans wait for integration.
@@ -49,20 +51,30 @@ class Worker {
   enum class Step { kClosed, kCommand, kBatch };
 
   void Loop();
-  // Rebuilds what is derived if it is not usable.
-  void RunRecovery();
+  // Rebuilds what is derived if it is not usable; whether it is then.
+  bool RunRecovery();
+  // Answers all commands with why nothing can be done, until the worker is closed.
+  void Refuse();
   Step NextStep() ABSL_LOCKS_EXCLUDED(mutex_);
   bool HasWork() const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
+  // Runs one step so that whatever it throws is an error of it alone.
+  absl::Status GuardedStep(absl::FunctionRef<absl::Status()> step);
   void RunCommand();
   void RunBatch();
+  absl::StatusOr<int> Integrate();
+  // After a batch for which there was no memory.
+  void NoteNoMemory();
 
   MapCore& core_;
+  Quarantine& quarantine_;
   Integrator integrator_;
+  int no_memory_ = 0;  // batches in a row; the thread's
   const Stop closing_;
   mutable absl::Mutex mutex_;
   std::deque<Task*> tasks_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t pending_ ABSL_GUARDED_BY(mutex_);
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+  bool refuses_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

@@ -4,9 +4,12 @@
 #include <utility>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
 #include "absl/time/time.h"
 
+#include "core/common/guarded.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/common/stop.h"
@@ -17,6 +20,7 @@ namespace strata {
 namespace {
 
 constexpr absl::Duration kStopPoll = absl::Milliseconds(50);
+constexpr absl::Duration kNoMemoryPause = absl::Milliseconds(10);
 
 }  // namespace
 
@@ -45,8 +49,8 @@ absl::Status WriterThread::Run(
     STRATA_RETURN_IF_ERROR(stop.status());
   }
   if (closed_) return absl::CancelledError("the map is being closed");
-  queued_bytes_ += bytes;
   (durability == Durability::kFull ? full_ : relaxed_).push_back(&task);
+  queued_bytes_ += bytes;
   mutex_.Await(absl::Condition(&task.done));
   return task.status;
 }
@@ -74,41 +78,59 @@ WriterThread::Queue WriterThread::TakeBatch(Durability& durability) {
 }
 
 void WriterThread::CommitBatch(Durability durability, const Queue& batch) {
-  const absl::Status committed = storage_.Commit(durability, [&]() -> absl::Status {
-    for (Task* task : batch) {
-      task->status = storage_.Part([&] { return task->work(storage_); });
-    }
-    return absl::OkStatus();
+  const absl::Status committed = Guarded([&] {
+    return storage_.Commit(durability, [&]() -> absl::Status {
+      for (Task* task : batch) {
+        task->status = storage_.Part([&] { return Guarded([&] { return task->work(storage_); }); });
+      }
+      return absl::OkStatus();
+    });
   });
   for (Task* task : batch) {
     if (!task->status.ok()) continue;
     task->status = committed;
-    if (committed.ok()) task->tell();
+    if (committed.ok()) TellOf(*task);
   }
+}
+
+// What is committed cannot be taken back: it is told as soon as there is memory for it.
+void WriterThread::TellOf(const Task& task) {
+  const auto tell = [&task] {
+    task.tell();
+    return absl::OkStatus();
+  };
+  while (!Guarded(tell).ok()) absl::SleepFor(kNoMemoryPause);
 }
 
 void WriterThread::Loop() {
   NameThisThread("writer");
   while (true) {
-    Durability durability = Durability::kFull;
-    Queue batch;
-    {
-      absl::MutexLock lock(&mutex_);
-      mutex_.Await(absl::Condition(this, &WriterThread::HasWorkOrClosed));
-      batch = TakeBatch(durability);
-      if (batch.empty()) return;
-    }
-    const absl::Time begun = SteadyNow();
-    CommitBatch(durability, batch);
-    absl::MutexLock lock(&mutex_);
-    ++numbers_.commits;
-    numbers_.parts += batch.size();
-    numbers_.time += SteadyNow() - begun;
-    for (Task* task : batch) {
-      queued_bytes_ -= task->bytes;
-      task->done = true;
-    }
+    const absl::StatusOr<bool> closed = Guarded([this] { return RunNext(); });
+    if (closed.ok() && *closed) return;
+    if (!closed.ok()) absl::SleepFor(kNoMemoryPause);  // nothing was taken from the queues
   }
+}
+
+absl::StatusOr<bool> WriterThread::RunNext() {
+  Durability durability = Durability::kFull;
+  Queue batch;
+  {
+    absl::MutexLock lock(&mutex_);
+    mutex_.Await(absl::Condition(this, &WriterThread::HasWorkOrClosed));
+    batch = TakeBatch(durability);
+    if (batch.empty()) return true;
+  }
+  const absl::Time begun = SteadyNow();
+  CommitBatch(durability, batch);
+  absl::MutexLock lock(&mutex_);
+  ++numbers_.commits;
+  numbers_.parts += batch.size();
+  numbers_.time += SteadyNow() - begun;
+  for (Task* task : batch) {
+    queued_bytes_ -= task->bytes;
+    task->done = true;
+  }
+  return false;
 }
 
 }  // namespace strata

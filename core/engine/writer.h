@@ -10,6 +10,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 
@@ -42,7 +43,8 @@ class WriterThread {
   // that fails is undone alone. `bytes`: of points in memory that the work stores; with a full
   // queue the call waits (CANCELLED, DEADLINE_EXCEEDED by `stop`), with a full disk it is
   // RESOURCE_EXHAUSTED. Once queued, the work is carried out. `tell` is called on the writer's
-  // thread if and when it is committed: in the order of commits.
+  // thread if and when it is committed: in the order of commits; again, where it throws for want of
+  // memory. Work that throws is RESOURCE_EXHAUSTED or INTERNAL, and undone.
   absl::Status Run(Durability durability,
                    std::size_t bytes,
                    const Stop& stop,
@@ -69,6 +71,9 @@ class WriterThread {
   // Takes what the next commit is made of.
   Queue TakeBatch(Durability& durability) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void CommitBatch(Durability durability, const Queue& batch);
+  static void TellOf(const Task& task);
+  // One commit; whether there is none any more.
+  absl::StatusOr<bool> RunNext();
   bool HasWorkOrClosed() const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
 
   StorageWriter& storage_;

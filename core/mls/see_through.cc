@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -42,6 +43,10 @@ SeeThrough::SeeThrough(const MlsMap& map, const SeeThroughOptions& options)
 }
 
 void SeeThrough::AddTile(const MlsTile& tile) {
+  const CellIndex corner = CellOf(tile.key, 0);
+  window_.low = {std::min(window_.low.x, corner.x), std::min(window_.low.y, corner.y)};
+  window_.high = {std::max(window_.high.x, corner.x + kTileCells),
+                  std::max(window_.high.y, corner.y + kTileCells)};
   std::vector<std::uint32_t>& begin = tiles_[tile.key].begin;
   begin.reserve(std::size_t{kTileCells} * kTileCells + 1);
   for (const Patch& patch : tile.patches) {
@@ -149,13 +154,33 @@ void SeeThrough::LookInto(CellIndex cell, double z_in, double z_out, double rest
   }
 }
 
+std::pair<double, double> SeeThrough::OverWindow(const Eigen::Vector3d& ray) const {
+  double in = 0.0;
+  double out = 1.0;
+  const auto clip = [&](double from, double along, std::int32_t low, std::int32_t high) {
+    const double low_m = low * cell_size_m_ - from;
+    const double high_m = high * cell_size_m_ - from;
+    if (along == 0.0) {
+      if (low_m > 0.0 || high_m <= 0.0) out = -1.0;
+      return;
+    }
+    in = std::max(in, std::min(low_m / along, high_m / along));
+    out = std::min(out, std::max(low_m / along, high_m / along));
+  };
+  clip(sensor_.x(), ray.x(), window_.low.x, window_.high.x);
+  clip(sensor_.y(), ray.y(), window_.low.y, window_.high.y);
+  return {in, out};
+}
+
 // From cell to cell along the ray (Amanatides and Woo, "A Fast Voxel Traversal Algorithm for Ray
 // Tracing", 1987), in the plane.
 void SeeThrough::LookAlong(const Eigen::Vector3d& end) {
   const Eigen::Vector3d ray = end - sensor_;
   const double length = ray.norm();
   if (!(length > options_.clearance_m)) return;
-  CellIndex cell = CellAt(sensor_);
+  const auto [begin, finish] = OverWindow(ray);
+  if (begin > finish) return;
+  CellIndex cell = CellAt(sensor_ + begin * ray);
   const CellIndex last = CellAt(end);
   const auto axis = [&](double from, double along, std::int32_t at) {
     Axis a;
@@ -167,8 +192,8 @@ void SeeThrough::LookAlong(const Eigen::Vector3d& end) {
   };
   Axis x = axis(sensor_.x(), ray.x(), cell.x);
   Axis y = axis(sensor_.y(), ray.y(), cell.y);
-  double in = 0.0;
-  while (cell != last && in < 1.0) {
+  double in = begin;
+  while (cell != last && in < finish) {
     const double out = std::min({x.next, y.next, 1.0});
     LookInto(cell,
              sensor_.z() + in * ray.z(),

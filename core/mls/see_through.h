@@ -17,6 +17,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
@@ -24,6 +25,7 @@
 #include <Eigen/Core>
 
 #include "core/mls/mls_map.h"
+#include "core/mls/tile_key.h"
 
 namespace strata {
 
@@ -40,7 +42,7 @@ struct SeeThroughOptions {
 class SeeThrough {
  public:
   // `map`: what all the scans made together; points and rays outside of its tiles count for
-  // nothing. REQUIRES: valid options.
+  // nothing, and rays cost their way over the tiles only. REQUIRES: valid options.
   SeeThrough(const MlsMap& map, const SeeThroughOptions& options);
 
   // Where the sensor stood, map frame [m].
@@ -83,7 +85,16 @@ class SeeThrough {
     float low = 0.0F, high = 0.0F;
   };
 
+  // Cells of all tiles: [low, high).
+  struct Window {
+    CellIndex low{kMaxCellIndex, kMaxCellIndex};
+    CellIndex high{-kMaxCellIndex, -kMaxCellIndex};
+  };
+
   void AddTile(const MlsTile& tile);
+  // The part of the ray to `end` that is over the window, in lengths of the ray; empty: first >
+  // second.
+  std::pair<double, double> OverWindow(const Eigen::Vector3d& ray) const;
   CellIndex CellAt(const Eigen::Vector3d& point) const;
   std::span<const Column> ColumnsOf(CellIndex cell) const;
   // Of the point, or nullptr.
@@ -102,6 +113,7 @@ class SeeThrough {
   const double cell_size_m_;
   const float thickness_m_;
   absl::flat_hash_map<TileKey, Tile> tiles_;
+  Window window_;
   std::vector<Column> columns_;
   std::vector<Stretch> stretches_;
   Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();

@@ -2,6 +2,7 @@
 #ifndef STRATA_CORE_STORAGE_RECORDS_H_
 #define STRATA_CORE_STORAGE_RECORDS_H_
 
+#include <compare>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -104,6 +105,26 @@ struct PlaneRecord {
 struct ProposedPose {
   ScanNumber scan = 0;
   Pose T_map_scan = Pose::Identity();
+};
+
+// What the process may die of.
+enum class WorkKind : std::uint8_t {  // stored
+  kScan = 1,                          // to be integrated
+  kJob = 2,                           // to be run
+  kRecovery = 3,                      // everything derived, to be made again after a start
+  kLook = 4,                          // whether a job is due that nobody asked for
+};
+struct WorkId {
+  WorkKind kind = WorkKind::kScan;
+  std::uint64_t id = 0;  // the scan's number, the job's id; 0 of the others
+  friend auto operator<=>(const WorkId&, const WorkId&) = default;
+};
+
+// Work that is under way, or was when the process died.
+struct Attempt {
+  WorkId work;
+  std::uint32_t deaths = 0;  // of the process while it was under way
+  bool under_way = false;
 };
 
 // What global consistency keeps of a scan in its own frame, so that it need not be made twice;

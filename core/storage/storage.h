@@ -88,6 +88,8 @@ class StorageReader {
   virtual absl::StatusOr<std::string> GetClassifier(std::uint64_t id) = 0;
   virtual absl::StatusOr<std::optional<JobInfo>> FindJob(std::uint64_t id) = 0;
   virtual absl::StatusOr<std::vector<JobInfo>> ListJobs() = 0;
+  // By kind and id.
+  virtual absl::StatusOr<std::vector<Attempt>> ListAttempts() = 0;
 
   // The newest row of `key` that is not newer than `version`; nullopt where there is none or it
   // says that the tile is gone.
@@ -189,6 +191,10 @@ class StorageWriter {
   virtual absl::Status DeleteClassifier(std::uint64_t id) = 0;
   // Inserts or replaces.
   virtual absl::Status PutJob(const JobInfo& job) = 0;
+  virtual absl::Status DeleteJob(std::uint64_t id) = 0;
+  // Inserts or replaces.
+  virtual absl::Status PutAttempt(const Attempt& attempt) = 0;
+  virtual absl::Status DeleteAttempt(const WorkId& work) = 0;
 
   // Derived data. Rows of several versions may lie beside each other; readers see the newest up to
   // MapClock::tile_version.

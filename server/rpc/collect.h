@@ -7,6 +7,7 @@
 #include <grpcpp/server_context.h>
 #include <grpcpp/support/server_callback.h>
 
+#include "core/common/guarded.h"
 #include "core/common/status.h"
 #include "server/rpc/request.h"
 #include "server/rpc/runtime.h"

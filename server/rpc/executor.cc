@@ -1,5 +1,6 @@
 #include "server/rpc/executor.h"
 
+#include <new>
 #include <system_error>
 #include <utility>
 
@@ -38,6 +39,7 @@ void Executor::Submit(std::function<void()> task) {
     AddThread();
   } catch (const std::system_error&) {
     // The system has no more to give; those that are there take it in their turn.
+  } catch (const std::bad_alloc&) {
   }
 }
 

@@ -4,7 +4,6 @@
 
 #include <atomic>
 #include <cstddef>
-#include <exception>
 #include <string>
 
 #include "absl/status/status.h"
@@ -98,19 +97,6 @@ template <typename T>
 absl::StatusOr<T> AtTheDoor(absl::StatusOr<T> result) {
   if (result.ok()) return result;
   return AtTheDoor(result.status());
-}
-
-// Runs `body` (which returns absl::Status); what it throws becomes a status: no exception reaches
-// gRPC or ends a thread.
-template <typename Body>
-absl::Status Guarded(const Body& body) {
-  try {
-    return body();
-  } catch (const std::bad_alloc&) {
-    return absl::ResourceExhaustedError("the server is out of memory");
-  } catch (const std::exception& e) {
-    return absl::InternalError(e.what());
-  }
 }
 
 }  // namespace strata::server

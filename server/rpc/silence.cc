@@ -2,9 +2,11 @@
 
 #include <algorithm>
 
+#include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 
+#include "core/common/guarded.h"
 #include "core/common/steady_time.h"
 #include "core/common/this_thread.h"
 #include "proto/translate/status.h"
@@ -39,7 +41,12 @@ void SilenceWatch::Loop() {
     absl::MutexLock lock(&mutex_);
     if (closing_) return;
     if (SteadyNow() < next) continue;
-    EndSilent();
+    // Those for which there is no memory now end a little later.
+    const auto end_silent = [this]() ABSL_NO_THREAD_SAFETY_ANALYSIS {
+      EndSilent();
+      return absl::OkStatus();
+    };
+    if (!Guarded(end_silent).ok()) continue;
     next = SteadyNow() + interval;
   }
 }
@@ -52,7 +59,6 @@ void SilenceWatch::EndSilent() {
       ++it;
       continue;
     }
-    it = waiting_.erase(it);
     const absl::Status status = translate::WithReason(
         absl::DeadlineExceededError(absl::StrCat("the client sent nothing for ",
                                                  absl::FormatDuration(limit_),
@@ -60,6 +66,7 @@ void SilenceWatch::EndSilent() {
         translate::kSlowSenderReason);
     // The stream lives until this task ends it, since Arrived() will be false.
     executor_.Submit([end = stream->on_silence_, status] { end(status); });
+    it = waiting_.erase(it);
   }
 }
 

@@ -12,6 +12,7 @@
 
 #include "core/api/call.h"
 #include "core/api/database.h"
+#include "core/common/guarded.h"
 #include "core/common/steady_time.h"
 #include "server/rpc/request.h"
 #include "server/rpc/runtime.h"

@@ -1,9 +1,13 @@
 #include "server/rpc/ticker.h"
 
+#include <functional>
 #include <utility>
+#include <vector>
 
+#include "absl/status/status.h"
 #include "absl/time/clock.h"
 
+#include "core/common/guarded.h"
 #include "core/common/this_thread.h"
 
 namespace strata::server {
@@ -24,6 +28,15 @@ void Ticker::AtNextTick(std::function<void()> task) {
   waiting_.push_back(std::move(task));
 }
 
+// Somebody waits for every task: one for which there is no memory now is tried again.
+void Ticker::Submit(const std::function<void()>& task) {
+  const auto submit = [&] {
+    executor_.Submit(task);
+    return absl::OkStatus();
+  };
+  while (!Guarded(submit).ok()) absl::SleepFor(interval_);
+}
+
 void Ticker::Loop() {
   NameThisThread("ticker");
   const auto needed = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
@@ -41,7 +54,7 @@ void Ticker::Loop() {
       absl::MutexLock lock(&mutex_);
       due.swap(waiting_);
     }
-    for (std::function<void()>& task : due) executor_.Submit(std::move(task));
+    for (const std::function<void()>& task : due) Submit(task);
   }
 }
 

@@ -30,6 +30,7 @@ class Ticker {
 
  private:
   void Loop();
+  void Submit(const std::function<void()>& task);
 
   const absl::Duration interval_;
   Executor& executor_;

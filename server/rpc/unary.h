@@ -11,6 +11,7 @@
 
 #include "core/api/call.h"
 #include "core/api/database.h"
+#include "core/common/guarded.h"
 #include "core/common/status.h"
 #include "server/rpc/request.h"
 #include "server/rpc/runtime.h"

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/common/guarded.h"
 #include "core/common/status.h"
 #include "proto/translate/scans.h"
 #include "proto/translate/status.h"

@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/api/chunk_check.h"
+#include "core/common/guarded.h"
 #include "core/common/status.h"
 #include "proto/translate/localize.h"
 #include "proto/translate/points.h"

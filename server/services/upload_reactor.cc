@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/common/guarded.h"
 #include "core/common/status.h"
 #include "proto/translate/scans.h"
 

@@ -99,7 +99,7 @@ TEST(OptionsTest, NamesWhatIsOutOfRange) {
 // The output of `stratad token …`.
 absl::StatusOr<std::string> RunToken(std::vector<std::string> words) {
   CLI::App app;
-  TokenAction selected;
+  CommandAction selected;
   AddTokenCommands(app, selected);
   words.insert(words.begin(), "token");
   std::reverse(words.begin(), words.end());

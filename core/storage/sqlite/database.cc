@@ -12,6 +12,7 @@
 #include "absl/strings/string_view.h"
 #include <sqlite3.h>
 
+#include "core/common/guarded.h"
 #include "core/common/status.h"
 
 namespace strata {
@@ -215,13 +216,18 @@ std::filesystem::path Database::LogFile() const {
 }
 
 absl::StatusOr<Transaction> Transaction::Begin(Database& database, const char* begin) {
+  // One that could not be rolled back for want of memory.
+  if (sqlite3_get_autocommit(database.connection_) == 0) {
+    STRATA_RETURN_IF_ERROR(database.Execute("ROLLBACK"));
+  }
   STRATA_RETURN_IF_ERROR(database.Execute(begin));
   return Transaction(database);
 }
 
 Transaction::~Transaction() {
   // After some errors SQLite has rolled back by itself; then this one fails and changes nothing.
-  if (database_ != nullptr) database_->Execute("ROLLBACK").IgnoreError();
+  if (database_ == nullptr) return;
+  Guarded([this] { return database_->Execute("ROLLBACK"); }).IgnoreError();
 }
 
 absl::Status Transaction::Commit() {

@@ -100,6 +100,7 @@ class Database {
   std::filesystem::path LogFile() const;
 
  private:
+  friend class Transaction;
   explicit Database(sqlite3* connection) : connection_(connection) {}
   absl::Status CheckPages(const Stop& stop);
 

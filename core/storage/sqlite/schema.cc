@@ -248,6 +248,18 @@ CREATE VIRTUAL TABLE derived_footprint USING rtree (
 );
 )sql";
 
+// Neither truth nor derived: what was under way when a process died (FORMAT.md). Programs that do
+// not know of it leave it alone, so it takes no format version.
+constexpr char kAttemptTable[] = R"sql(
+CREATE TABLE IF NOT EXISTS attempt (
+  kind INTEGER NOT NULL,
+  id INTEGER NOT NULL,
+  deaths INTEGER NOT NULL,
+  under_way INTEGER NOT NULL,
+  PRIMARY KEY (kind, id)
+) STRICT, WITHOUT ROWID;
+)sql";
+
 struct AddedColumn {
   const char* table;
   const char* name;
@@ -356,6 +368,7 @@ absl::Status UpgradeSchema(Database& database) {
   STRATA_ASSIGN_OR_RETURN(const std::int64_t version, database.Pragma("PRAGMA user_version"));
   if (version == 2) STRATA_RETURN_IF_ERROR(CompleteVersion2(database));
   STRATA_RETURN_IF_ERROR(Migrate(database, kMigrations));
+  STRATA_RETURN_IF_ERROR(database.Execute(kAttemptTable));
   const absl::StatusOr<bool> derived = HasDerivedTables(database);
   if (derived.ok() && *derived) return absl::OkStatus();
   STRATA_ASSIGN_OR_RETURN(Transaction transaction, Transaction::Begin(database, "BEGIN IMMEDIATE"));

@@ -57,6 +57,7 @@ class SqliteReader final : public StorageReader {
   absl::StatusOr<std::string> GetClassifier(std::uint64_t id) override;
   absl::StatusOr<std::optional<JobInfo>> FindJob(std::uint64_t id) override;
   absl::StatusOr<std::vector<JobInfo>> ListJobs() override;
+  absl::StatusOr<std::vector<Attempt>> ListAttempts() override;
   absl::StatusOr<std::optional<MlsTileRow>> FindMlsTile(const TileKey& key,
                                                         std::uint64_t version) override;
   absl::StatusOr<std::optional<SurfaceTileRow>> FindSurfaceTile(const TileKey& key,

@@ -62,6 +62,9 @@ class SqliteWriter final : public StorageWriter {
                                               absl::string_view bytes) override;
   absl::Status DeleteClassifier(std::uint64_t id) override;
   absl::Status PutJob(const JobInfo& job) override;
+  absl::Status DeleteJob(std::uint64_t id) override;
+  absl::Status PutAttempt(const Attempt& attempt) override;
+  absl::Status DeleteAttempt(const WorkId& work) override;
 
   absl::Status PutMlsTile(const MlsTileRow& row) override;
   absl::Status PutSurfaceTile(const SurfaceTileRow& row) override;

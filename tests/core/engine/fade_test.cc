@@ -208,6 +208,71 @@ TEST_F(EngineTest, AScanOfWhichNothingIsLeftMayBeMoved) {
   EXPECT_EQ(Digest(), before);
 }
 
+TEST_F(FadeTest, ACancelledJobChangesNothing) {
+  const std::string before = Digest();
+  const auto tiles = AllTiles(db());
+  int cancelled = 0;
+  for (const double enough : {0.0, 0.2, 0.6, 0.7, 0.8, 0.9, 0.95}) {
+    const JobInfo job = db().jobs().Start({}, kMapName, "fade", {}).value();
+    JobInfo last;
+    const auto cancel_when_there = [&](const JobInfo& now) -> absl::Status {
+      last = now;
+      if (now.progress < enough) return absl::OkStatus();
+      return db().jobs().Cancel({}, kMapName, job.id).status();
+    };
+    ASSERT_THAT(db().jobs().Watch({}, kMapName, job.id, cancel_when_there), IsOk());
+    if (last.state != JobState::kCancelled) {  // it was quicker
+      ASSERT_EQ(RunJob(db(), "fade", {{"undo", "1"}}).state, JobState::kSucceeded);
+      continue;
+    }
+    ++cancelled;
+    EXPECT_EQ(Digest(), before) << enough;
+    for (std::uint64_t i = 0; i < kScans; ++i) {
+      EXPECT_EQ(db().scans().Get({}, kMapName, {"robot", i})->faded_points, 0U) << i;
+    }
+  }
+  EXPECT_GT(cancelled, 0);
+  EXPECT_EQ(AllTiles(db()), tiles);
+  ExpectSound();
+}
+
+TEST_F(FadeTest, AScanThatIsDeletedMeanwhileIsLeftOut) {
+  const JobInfo job = db().jobs().Start({}, kMapName, "fade", {}).value();
+  ASSERT_THAT(db().scans().Delete({}, kMapName, {"robot", 0}), IsOk());
+  JobInfo last;
+  ASSERT_THAT(db().jobs().Watch({},
+                                kMapName,
+                                job.id,
+                                [&](const JobInfo& now) -> absl::Status {
+                                  last = now;
+                                  // Not before the first points were read.
+                                  if (now.progress == 0.0) return absl::OkStatus();
+                                  db().scans().Delete({}, kMapName, {"robot", 1}).IgnoreError();
+                                  return absl::OkStatus();
+                                }),
+              IsOk());
+  EXPECT_EQ(last.state, JobState::kSucceeded) << last.message;
+  ExpectSound();
+}
+
+// Points beyond the sensor's range are no part of the map, wherever they are; and those within it
+// may be far from each other.
+TEST_F(EngineTest, AFewPointsFarAwayDoNotHoldTheJobUp) {
+  MakeMap(MapParameters());
+  for (std::uint64_t i = 0; i < 4; ++i) {
+    PointCloud cloud = MakeRoom(i);
+    cloud.points.emplace_back(-5e5F, -5e5F, 0.0F);
+    cloud.points.emplace_back(5e5F, 5e5F, 0.0F);
+    ScanHeader header = HeaderOf({"stray", i}, cloud, RoomPose(0));
+    if (i % 2 == 1) header.sensor = SensorModel{.max_range_m = 1e6};
+    ASSERT_THAT(Upload(db(), header, cloud), IsOk());
+  }
+  EXPECT_EQ(WaitIntegrated(db()).scans_failed, 0U);
+  const JobInfo job = RunJob(db(), "fade", {{"scans", "1"}, {"rays", "1"}});
+  EXPECT_EQ(job.state, JobState::kSucceeded) << job.message;
+  ExpectSound();
+}
+
 TEST_F(EngineTest, AMapThatLetsThingsFadeDoesSoByItself) {
   EngineOptions options = Options();
   options.optimize_interval = absl::Milliseconds(10);

@@ -1,0 +1,115 @@
+// An allocation that fails anywhere ends the work it was for, and nothing else: no process, nothing
+// that was acknowledged, and no tile that would not follow from its scans.
+#include <cmath>
+#include <cstdint>
+#include <iostream>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/common/guarded.h"
+#include "core/common/random.h"
+#include "core/common/status.h"
+#include "tests/core/engine/engine_fixture.h"
+#include "tests/support/asked.h"
+#include "tests/support/failing_memory.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+class MemoryFaultTest : public EngineTest {
+ protected:
+  void Put(std::uint64_t sequence) {
+    Guarded([&]() -> absl::Status {
+      const PointCloud cloud = MakeRoom(sequence);
+      const ScanHeader header = HeaderOf({"run", sequence}, cloud, RoomPose(sequence));
+      STRATA_RETURN_IF_ERROR(Upload(db(), header, cloud).status());
+      acknowledged_.insert(header.id);
+      return absl::OkStatus();
+    }).IgnoreError();
+  }
+  // Follows a job for as long as memory lasts.
+  void Run(const std::string& kind, const std::map<std::string, std::string>& parameters) {
+    Guarded([&]() -> absl::Status {
+      const auto job = db().jobs().Start({}, kMapName, kind, parameters);
+      if (!job.ok()) return job.status();
+      return db().jobs().Watch(
+          {}, kMapName, job->id, [](const JobInfo&) { return absl::OkStatus(); });
+    }).IgnoreError();
+  }
+  // May throw.
+  void Step(int step, std::uint64_t& sequence) {
+    if (step <= 1) {
+      Put(++sequence);
+      Put(++sequence);
+      absl::SleepFor(absl::Milliseconds(20));  // integration
+    }
+    if (step == 2) Run("optimize", {{"rounds", "1"}});
+    if (step == 3) Run("fade", {{"scans", "1"}, {"rays", "1"}});
+    if (step == 4) Run("verify", {});
+    if (step == 5) Run("rebuild", {});
+  }
+  void AwaitJobs() {
+    const absl::Time deadline = absl::Now() + absl::Minutes(2);
+    while (absl::Now() < deadline) {
+      bool ended = true;
+      const std::vector<JobInfo> jobs = db().jobs().List({}, kMapName).value();
+      for (const JobInfo& job : jobs) ended = ended && IsFinal(job.state);
+      if (ended) return;
+      absl::SleepFor(absl::Milliseconds(5));
+    }
+    ADD_FAILURE() << "a job does not end";
+  }
+
+  std::set<ScanId> acknowledged_;
+};
+
+TEST_F(MemoryFaultTest, NothingEndsButTheWorkItWasFor) {
+  const std::uint64_t rounds = Asked("STRATA_MEMORY_FAULTS", 60);
+  const std::uint64_t seed = Asked("STRATA_SEED", 20261123);
+  SCOPED_TRACE(absl::StrCat("seed ", seed));
+  SplitMix64 random(seed);
+  MakeMap();
+  std::uint64_t sequence = 0;
+  std::int64_t all_failed = 0;
+  for (std::uint64_t round = 0; round < rounds; ++round) {
+    // Allocations of one step are some thousands.
+    const auto first = static_cast<std::int64_t>(std::pow(10.0, 5.0 * random.Uniform()));
+    const auto count = static_cast<std::int64_t>(std::pow(10.0, 2.0 * random.Uniform()));
+    const auto step = static_cast<int>(random.Below(6));
+    {
+      const FailingMemory failing(first, count);
+      Guarded([&] {
+        Step(step, sequence);
+        return absl::OkStatus();
+      }).IgnoreError();
+      all_failed += failing.failed();
+    }
+    AwaitJobs();
+    ASSERT_EQ(WaitIntegrated(db()).scans_failed, 0U);
+    if (round % 10 == 9) Reopen();
+  }
+  std::cout << all_failed << " allocations failed in " << rounds << " rounds" << std::endl;
+  EXPECT_GT(all_failed, static_cast<std::int64_t>(rounds) / 2);
+  std::set<ScanId> there;
+  STRATA_EXPECT_OK(db().scans().List({}, kMapName, {}, [&there](const ScanInfo& scan) {
+    there.insert(scan.header.id);
+    return absl::OkStatus();
+  }));
+  EXPECT_THAT(there, ::testing::IsSupersetOf(acknowledged_));
+  ExpectSound();
+  const std::string digest = Digest();
+  ASSERT_EQ(RunJob(db(), "rebuild").state, JobState::kSucceeded);
+  EXPECT_EQ(Digest(), digest);
+}
+
+}  // namespace
+}  // namespace strata::testing
