@@ -3,16 +3,19 @@
 #   deploy/demo.sh [--out DIR]                  simulated: two robots upload at once, plans over and under the bridge;
 #                                               then a loop of 300 m is closed, and what was learned at one building
 #                                               says what another one is made of
+#   deploy/demo.sh --short [--out DIR]          the bridge only
 #   deploy/demo.sh --data FOLDER [--out DIR]    recorded: FOLDER has scans/ and poses_*.txt (or .pose files)
 # Files go to DIR, default ./demo-out. A second run skips the installing and building that is done.
 set -euo pipefail
 
-usage() { sed -n '3,7p' "$0" >&2; exit 2; }
+usage() { sed -n '3,8p' "$0" >&2; exit 2; }
 out=demo-out
 data=
+short=
 while [[ $# -gt 0 ]]; do
   case "$1" in
     --out) [[ $# -ge 2 ]] || usage; out=$2; shift 2 ;;
+    --short) short=yes; shift ;;
     --data) [[ $# -ge 2 ]] || usage; data=$2; shift 2 ;;
     *) usage ;;
   esac
@@ -204,7 +207,12 @@ demo_recorded() {
 
 rm -f "$out"/{over,under,deck_to_road,path}.ply
 build
-if [[ -n $data ]]; then demo_recorded; else demo_simulated; demo_loop; demo_classes; fi
+if [[ -n $data ]]; then
+  demo_recorded
+else
+  demo_simulated
+  [[ -n $short ]] || { demo_loop; demo_classes; }
+fi
 step "stopping the server"
 kill -TERM "$server"
 wait "$server"

@@ -9,10 +9,9 @@ packages=(
   libabsl-dev libboost-dev libcli11-dev libeigen3-dev libgoogle-glog-dev libgrpc++-dev libnanoflann-dev
   libpng-dev libprotobuf-dev libsqlite3-dev libssl-dev libxxhash-dev libzstd-dev nlohmann-json3-dev prometheus-cpp-dev
   protobuf-compiler protobuf-compiler-grpc python3
-  libgmock-dev libgtest-dev
 )
 if [[ "${1:-}" == --dev ]]; then
-  packages+=(clang clang-format clang-tidy dpkg-dev file libbenchmark-dev libceres-dev libcgal-dev libclang-rt-dev libdlib-dev liboctomap-dev libpcl-dev openssl python3-grpcio python3-numpy python3-protobuf python3-xxhash python3-zstandard sqlite3)
+  packages+=(clang clang-format clang-tidy dpkg-dev file libbenchmark-dev libceres-dev libcgal-dev libclang-rt-dev libdlib-dev libgmock-dev libgtest-dev liboctomap-dev libpcl-dev openssl python3-grpcio python3-numpy python3-protobuf python3-xxhash python3-zstandard sqlite3 systemd)
 fi
 
 missing=()

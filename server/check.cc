@@ -74,6 +74,7 @@ Finding CheckTokens(const fs::path& file) {
   return nobody ? Warning("tokens", text + ": nobody comes in") : Ok("tokens", text);
 }
 
+// RESOURCE_EXHAUSTED for a full disk.
 absl::Status CheckWritable(const fs::path& directory) {
   std::string file = (directory / ".check-XXXXXX").string();
   const int fd = ::mkstemp(file.data());
@@ -94,7 +95,9 @@ Finding CheckDirectory(const fs::path& directory) {
     return Warning("data", absl::StrCat(directory.string(), " is not there; it will be made"));
   }
   if (const absl::Status writable = CheckWritable(directory); !writable.ok()) {
-    return Error("data", writable);
+    // What is there can be read from a full disk.
+    const bool full = absl::IsResourceExhausted(writable);
+    return full ? Warning("data", std::string(writable.message())) : Error("data", writable);
   }
   struct statvfs disk {};
   if (::statvfs(directory.c_str(), &disk) != 0) {
@@ -104,23 +107,6 @@ Finding CheckDirectory(const fs::path& directory) {
       static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize) / kMebi;
   const std::string text = absl::StrFormat("%s: %.0f MiB free", directory.string(), free_mib);
   return free_mib < kFewMebi ? Warning("data", text + ", which is little") : Ok("data", text);
-}
-
-void CheckMaps(const fs::path& directory, std::vector<Finding>& findings) {
-  std::error_code error;
-  if (!fs::exists(directory, error)) return;
-  const auto maps = CheckMapFiles(directory);
-  if (!maps.ok()) {
-    findings.push_back(Error("maps", maps.status()));
-    return;
-  }
-  for (const MapFileCheck& map : *maps) {
-    const std::string what = "map " + map.name;
-    const double mib = static_cast<double>(map.bytes) / kMebi;
-    findings.push_back(
-        map.status.ok() ? Ok(what, absl::StrFormat("sound, format %d, %.1f MiB", map.format, mib))
-                        : Error(what, map.status));
-  }
 }
 
 const char* NameOf(Verdict verdict) {
@@ -147,7 +133,22 @@ std::vector<Finding> CheckInstallation(const ProgramOptions& options) {
     findings.push_back(CheckTokens(options.server.token_file));
   }
   findings.push_back(CheckDirectory(options.engine.directory));
-  CheckMaps(options.engine.directory, findings);
+  return findings;
+}
+
+std::vector<Finding> CheckMaps(const fs::path& directory) {
+  std::error_code error;
+  if (!fs::exists(directory, error)) return {};
+  const auto maps = CheckMapFiles(directory);
+  if (!maps.ok()) return {Error("maps", maps.status())};
+  std::vector<Finding> findings;
+  for (const MapFileCheck& map : *maps) {
+    const std::string what = "map " + map.name;
+    const double mib = static_cast<double>(map.bytes) / kMebi;
+    findings.push_back(
+        map.status.ok() ? Ok(what, absl::StrFormat("sound, format %d, %.1f MiB", map.format, mib))
+                        : Error(what, map.status));
+  }
   return findings;
 }
 

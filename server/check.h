@@ -2,6 +2,7 @@
 #ifndef STRATA_SERVER_CHECK_H_
 #define STRATA_SERVER_CHECK_H_
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -17,10 +18,14 @@ struct Finding {
   std::string message;  // in one line
 };
 
-// Looks at all that `options` name: what would keep the server from starting or serving is an
-// error, what will soon or looks like a mistake is a warning. Reads every map file; changes
-// nothing but for a file of its own in the data directory, which goes again.
+// Looks at all that `options` name but the insides of maps, in a moment: what would keep the server
+// from starting is an error, what will soon, keeps it from taking more, or looks like a mistake is
+// a warning. Changes nothing but for a file of its own in the data directory, which goes again.
 std::vector<Finding> CheckInstallation(const ProgramOptions& options);
+
+// Reads every page of every map file. One that would not be served is an error, though the server
+// starts and serves the others.
+std::vector<Finding> CheckMaps(const std::filesystem::path& directory);
 
 // "ok      listen: …", one a line.
 std::string ToText(const std::vector<Finding>& findings);

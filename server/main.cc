@@ -5,6 +5,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -105,8 +106,13 @@ absl::Status Serve(const ProgramOptions& options) {
   return absl::OkStatus();
 }
 
-int Check(const ProgramOptions& options, bool json) {
-  const std::vector<Finding> findings = CheckInstallation(options);
+int Check(const ProgramOptions& options, bool maps, bool json) {
+  std::vector<Finding> findings = CheckInstallation(options);
+  if (maps) {
+    for (Finding& finding : CheckMaps(options.engine.directory)) {
+      findings.push_back(std::move(finding));
+    }
+  }
   std::cout << (json ? ToJson(findings) : ToText(findings)) << std::flush;
   return AnyError(findings) ? kFailed : 0;
 }
@@ -132,8 +138,12 @@ int Main(int argc, char** argv) {
   check->add_option("--output", output, "text for people, json for programs")
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
+  bool maps = false;
+  check->add_flag("--maps", maps, "Read every page of every map, too; takes as long as the disk");
   check->footer(
-      "Takes the options of serving. Exit code: 0 it could, 1 something is an error.\n\n"
+      "Takes the options of serving. Exit code: 0 it could, 1 something is an error; a map that "
+      "is\n"
+      "damaged or another program's file is one with --maps only: the others are served.\n\n"
       "Example:\n  stratad check --config /etc/strata/stratad.conf");
   CommandAction action;
   AddTokenCommands(app, action);
@@ -149,7 +159,7 @@ int Main(int argc, char** argv) {
     std::cerr << "stratad: " << options.status().message() << "\nSee stratad --help" << std::endl;
     return kUsage;
   }
-  return check->parsed() ? Check(*options, output == "json") : Exit(Serve(*options));
+  return check->parsed() ? Check(*options, maps, output == "json") : Exit(Serve(*options));
 }
 
 }  // namespace

@@ -139,6 +139,14 @@ void AddUnderWay(MetricFamilies& families, const Runtime& runtime) {
             {{{}, static_cast<double>(runtime.clients.clients())}});
 }
 
+void AddAccess(MetricFamilies& families, Access& access) {
+  AddFamily(families,
+            prometheus::MetricType::Gauge,
+            "strata_tokens_unread_seconds",
+            "For how long the token file cannot be read; what it said before holds meanwhile",
+            {{{}, absl::ToDoubleSeconds(access.TokensUnread())}});
+}
+
 std::shared_ptr<grpc::ServerCredentials> GrpcServer::Credentials() {
   if (!options_.tls.enabled()) return grpc::InsecureServerCredentials();
   std::shared_ptr<grpc::ServerCredentials> credentials = TlsCredentials(options_.tls);
@@ -171,6 +179,7 @@ absl::Status GrpcServer::OpenMetrics() {
   const auto gauges = [this, started = SteadyNow()](MetricFamilies& families) {
     AddProcess(families, started);
     AddUnderWay(families, runtime_);
+    AddAccess(families, runtime_.access);
     AddEngine(families, NumbersOf(runtime_.db));
   };
   STRATA_ASSIGN_OR_RETURN(metrics_,

@@ -20,7 +20,7 @@ stage "format"
 git ls-files '*.h' '*.cc' '*.proto' | xargs clang-format --dry-run --Werror
 
 stage "release build"
-cmake --preset release -DSTRATA_BUILD_BENCHMARKS=ON >/dev/null
+cmake --preset release -DSTRATA_BUILD_TESTS=ON -DSTRATA_BUILD_BENCHMARKS=ON >/dev/null
 cmake --build --preset release
 
 stage "tests"

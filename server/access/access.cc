@@ -109,6 +109,10 @@ bool Access::MayRead(const Caller& caller, absl::string_view map) {
   return Authorize(caller, Right::kRead, map).ok();
 }
 
+absl::Duration Access::TokensUnread() {
+  return grants_ == nullptr ? absl::ZeroDuration() : grants_->Unread();
+}
+
 std::string CertificateNameOf(const grpc::AuthContext& context) {
   if (!context.IsPeerAuthenticated()) return "";
   const std::vector<grpc::string_ref> names = context.FindPropertyValues("x509_common_name");

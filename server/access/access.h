@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "absl/time/time.h"
 #include <grpcpp/security/auth_context.h>
 
 #include "server/access/grant_table.h"
@@ -41,6 +42,8 @@ class Access {
   absl::Status Authorize(const Caller& caller, Right right, absl::string_view map);
   // Whether `map` may be shown to the caller.
   bool MayRead(const Caller& caller, absl::string_view map);
+  // GrantTable::Unread(); zero without grants.
+  absl::Duration TokensUnread();
 
  private:
   std::unique_ptr<GrantTable> grants_;  // may be null

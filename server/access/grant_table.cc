@@ -1,5 +1,6 @@
 #include "server/access/grant_table.h"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -13,6 +14,11 @@
 #include "server/access/token_file.h"
 
 namespace strata::server {
+namespace {
+
+constexpr absl::Duration kComplaintInterval = absl::Minutes(1);
+
+}  // namespace
 
 absl::StatusOr<std::unique_ptr<GrantTable>> GrantTable::Open(const std::filesystem::path& path,
                                                              absl::Duration interval) {
@@ -42,19 +48,39 @@ absl::Status GrantTable::Load() {
   return absl::OkStatus();
 }
 
+void GrantTable::Look() {
+  if (SteadyNow() - looked_ < interval_) return;
+  looked_ = SteadyNow();
+  const bool unread = unread_since_ != absl::InfiniteFuture();
+  // What made it unreadable need not show in the mark: a mode, a limit of the process.
+  if (!unread && MarkOf(path_) == mark_) return;
+  if (const absl::Status loaded = Load(); !loaded.ok()) return Complain(loaded);
+  unread_since_ = absl::InfiniteFuture();
+  complained_ = absl::InfinitePast();
+  LOG(INFO) << LogLine("tokens").Add("file", path_.string()).Add("grants", grants_->by_id.size());
+}
+
+void GrantTable::Complain(const absl::Status& status) {
+  unread_since_ = std::min(unread_since_, SteadyNow());
+  if (SteadyNow() - complained_ < kComplaintInterval) return;
+  complained_ = SteadyNow();
+  LOG(ERROR) << LogLine("tokens")
+                    .Add("file", path_.string())
+                    .Add("error", status.message())
+                    .Add("unread_s", absl::ToInt64Seconds(SteadyNow() - unread_since_))
+                    .Add("still_hold", grants_->by_id.size());
+}
+
 std::shared_ptr<const Grants> GrantTable::Current() {
   absl::MutexLock lock(&mutex_);
-  const absl::Duration since = SteadyNow() - looked_;
-  if (since < interval_) return grants_;
-  looked_ = SteadyNow();
-  if (MarkOf(path_) == mark_) return grants_;
-  const absl::Status loaded = Load();
-  if (loaded.ok()) {
-    LOG(INFO) << LogLine("tokens").Add("file", path_.string()).Add("grants", grants_->by_id.size());
-  } else {
-    LOG(ERROR) << LogLine("tokens").Add("file", path_.string()).Add("error", loaded.message());
-  }
+  Look();
   return grants_;
+}
+
+absl::Duration GrantTable::Unread() {
+  absl::MutexLock lock(&mutex_);
+  Look();
+  return std::max(absl::ZeroDuration(), SteadyNow() - unread_since_);
 }
 
 }  // namespace strata::server

@@ -27,8 +27,9 @@ struct Grants {
 };
 
 // Follows a token file: looks at most once in `interval` whether it is another one, so that adding
-// and revoking need no restart. A file that cannot be read is logged, and what held goes on
-// holding. Thread-safe.
+// and revoking need no restart. While the file cannot be read, what held goes on holding: a slip
+// of an editor must not stop every robot. It is tried again at every look and said in the log, at
+// once and every minute. Thread-safe.
 class GrantTable {
  public:
   // What ReadTokenFile answers.
@@ -37,6 +38,8 @@ class GrantTable {
 
   // Never null.
   std::shared_ptr<const Grants> Current();
+  // For how long the file cannot be read by now; zero where it can.
+  absl::Duration Unread();
 
  private:
   // What tells one content from another without reading it.
@@ -51,12 +54,16 @@ class GrantTable {
       : path_(std::move(path)), interval_(interval) {}
   static Mark MarkOf(const std::filesystem::path& path);
   absl::Status Load() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Look() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Complain(const absl::Status& status) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const std::filesystem::path path_;
   const absl::Duration interval_;
   absl::Mutex mutex_;
   absl::Time looked_ ABSL_GUARDED_BY(mutex_) = absl::InfinitePast();
   Mark mark_ ABSL_GUARDED_BY(mutex_);
+  absl::Time unread_since_ ABSL_GUARDED_BY(mutex_) = absl::InfiniteFuture();
+  absl::Time complained_ ABSL_GUARDED_BY(mutex_) = absl::InfinitePast();
   std::shared_ptr<const Grants> grants_ ABSL_GUARDED_BY(mutex_);
 };
 

@@ -105,6 +105,19 @@ TEST_F(DoorsTest, CheckSaysWhetherItCouldServe) {
   EXPECT_THAT(RunStratad(words, 1), HasSubstr("error   tokens: "));
 }
 
+TEST_F(DoorsTest, AFileThatIsNoMapKeepsNobodyFromStarting) {
+  std::filesystem::create_directory(Path("maps"));
+  std::ofstream(Path("maps/foreign.strata")) << "of another program";
+  const Words words = {"--data", Path("maps"), "--listen", "127.0.0.1:0"};
+  Words check = words;
+  check.insert(check.begin(), "check");
+  EXPECT_THAT(RunStratad(check), Not(HasSubstr("error")));
+  check.emplace_back("--maps");
+  EXPECT_THAT(RunStratad(check, 1), HasSubstr("error   map foreign: "));
+  StratadProcess stratad(words);
+  EXPECT_EQ(RunStrata({"--server", stratad.Address(), "map", "create", "campus"}).exit_code, 0);
+}
+
 TEST_F(DoorsTest, BeyondLoopbackItNeedsTlsAndTokens) {
   Give("ada", {"--right", "admin", "--all-maps"});
   RunStratad({"--data", Path("maps"), "--listen", "0.0.0.0:0"}, 1);

@@ -11,7 +11,14 @@ for name in stratad strata libstrata-dev python3-strata; do
 done
 root=$work/root
 sed -i "s|/var/lib/strata|$work/maps|" "$root/etc/strata/stratad.conf"
-"$root/usr/bin/stratad" check --config "$root/etc/strata/stratad.conf"
+# What the service does before it starts: no file in the folder of maps may keep it from that.
+mkdir "$work/maps"
+echo "of another program" >"$work/maps/foreign.strata"
+sed "s|/usr/bin|$root/usr/bin|; s|/etc/strata|$root/etc/strata|" "$root/lib/systemd/system/stratad.service" >"$work/stratad.service"
+before=$(sed -n 's/^ExecStartPre=//p' "$work/stratad.service")
+timeout 60 $before || { echo "packages: ExecStartPre=$before ends with $?" >&2; exit 1; }
+faults=$(systemd-analyze verify --man=no "$work/stratad.service" 2>&1)
+[[ -z $faults ]] || { echo "packages: $faults" >&2; exit 1; }
 "$root/usr/bin/strata" --embedded "$work/maps" map create yard >/dev/null
 PYTHONPATH=$root/usr/lib/python3/dist-packages /usr/bin/python3 -c 'import strata; strata.connect'
 for file in lib/systemd/system/stratad.service usr/share/doc/stratad/README.md usr/include/strata/core/api/database.h; do

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/time/clock.h"
@@ -205,7 +206,9 @@ class CheckTest : public ::testing::Test {
   }
   // The one finding about `what`.
   Finding Of(const std::string& what) {
-    for (const Finding& finding : CheckInstallation(options_)) {
+    std::vector<Finding> findings = CheckInstallation(options_);
+    for (Finding& map : CheckMaps(options_.engine.directory)) findings.push_back(std::move(map));
+    for (const Finding& finding : findings) {
       if (finding.what == what) return finding;
     }
     ADD_FAILURE() << "nothing about " << what;
@@ -230,8 +233,9 @@ TEST_F(CheckTest, ASoundInstallationIsSound) {
   EXPECT_THAT(findings, Each(Field(&Finding::verdict, ::testing::Ne(Verdict::kError))))
       << ToText(findings);
   EXPECT_FALSE(AnyError(findings));
-  EXPECT_THAT(ToText(findings), HasSubstr("ok      map campus: sound, format 3"));
-  EXPECT_THAT(ToJson(findings), AllOf(HasSubstr("\"ok\": true"), HasSubstr("\"map campus\"")));
+  const std::vector<Finding> maps = CheckMaps(options_.engine.directory);
+  EXPECT_THAT(ToText(maps), HasSubstr("ok      map campus: sound, format 3"));
+  EXPECT_THAT(ToJson(maps), AllOf(HasSubstr("\"ok\": true"), HasSubstr("\"map campus\"")));
 }
 
 TEST_F(CheckTest, NamesEachThingThatIsWrong) {
@@ -276,6 +280,8 @@ TEST_F(CheckTest, FindsDamageInAMap) {
   EXPECT_EQ(Of("map moon").verdict, Verdict::kOk);
   std::ofstream(file) << "no database";
   EXPECT_THAT(Of("map campus").message, HasSubstr("not a Strata map"));
+  EXPECT_TRUE(AnyError(CheckMaps(options_.engine.directory)));
+  EXPECT_FALSE(AnyError(CheckInstallation(options_)));  // the server starts and serves the moon
 }
 
 }  // namespace

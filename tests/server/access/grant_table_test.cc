@@ -4,8 +4,10 @@
 #include <fstream>
 #include <string>
 
+#include "absl/time/clock.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "server/access/token.h"
 #include "server/access/token_file.h"
@@ -58,6 +60,36 @@ TEST_F(GrantTableTest, ABrokenOrAbsentFileLeavesWhatHeld) {
   EXPECT_TRUE(table->Current()->by_id.contains("000000000007"));
   STRATA_ASSERT_OK(WriteTokenFile(path_, {}));
   EXPECT_TRUE(table->Current()->by_id.empty());
+}
+
+TEST_F(GrantTableTest, SaysForHowLongItsFileCannotBeRead) {
+  STRATA_ASSERT_OK(WriteTokenFile(path_, {robot7_}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto table, GrantTable::Open(path_, absl::ZeroDuration()));
+  EXPECT_EQ(table->Unread(), absl::ZeroDuration());
+  const std::filesystem::path away = dir_.path() / "away";
+  std::filesystem::rename(path_, away);
+  const absl::Duration first = table->Unread();
+  EXPECT_GE(first, absl::ZeroDuration());
+  absl::SleepFor(absl::Milliseconds(2));
+  EXPECT_GT(table->Unread(), first);
+  EXPECT_TRUE(table->Current()->by_id.contains("000000000007"));
+  std::filesystem::rename(away, path_);
+  EXPECT_EQ(table->Unread(), absl::ZeroDuration());
+}
+
+// A file whose mode was wrong for a while is the same file afterwards.
+TEST_F(GrantTableTest, TriesAgainWhatLooksTheSame) {
+  STRATA_ASSERT_OK(WriteTokenFile(path_, {robot7_}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto table, GrantTable::Open(path_, absl::ZeroDuration()));
+  STRATA_ASSERT_OK(WriteTokenFile(path_, {robot8_}));
+  rlimit files{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &files), 0);
+  const rlimit none{0, files.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
+  EXPECT_GE(table->Unread(), absl::ZeroDuration());
+  EXPECT_TRUE(table->Current()->by_id.contains("000000000007"));
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &files), 0);
+  EXPECT_TRUE(table->Current()->by_id.contains("000000000008"));
 }
 
 TEST_F(GrantTableTest, LooksAtMostOnceInAnInterval) {

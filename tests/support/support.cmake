@@ -1,0 +1,88 @@
+# What several test programs share. Never linked into the product.
+strata_library(
+  test_support
+  NO_INSTALL
+  SOURCES data_dir.cc drawing.cc park.cc temp_dir.cc
+  HEADERS asked.h data_dir.h drawing.h park.h status_matchers.h temp_dir.h
+  DEPS strata::common strata::mls absl::strings GTest::gmock
+)
+target_compile_definitions(strata_test_support PRIVATE STRATA_DEFAULT_DATA_DIR="${PROJECT_SOURCE_DIR}/../shared/data")
+
+# Allocations that fail on demand.
+strata_library(failing_memory NO_INSTALL SOURCES failing_memory.cc HEADERS failing_memory.h)
+
+# Recorded scans for experiments and benchmarks.
+strata_library(
+  test_recordings
+  NO_INSTALL
+  SOURCES pcd.cc
+  HEADERS pcd.h
+  DEPS strata::cloud strata::geometry absl::statusor
+)
+
+# Recorded clouds with known classes.
+strata_library(
+  labelled_clouds
+  NO_INSTALL
+  SOURCES labelled_clouds.cc
+  HEADERS labelled_clouds.h
+  DEPS strata::classification
+  PRIVATE_DEPS strata::test_support
+)
+
+# Robots driven through drawn worlds, to check paths against.
+strata_library(
+  sweep
+  NO_INSTALL
+  SOURCES sweep.cc
+  HEADERS sweep.h
+  DEPS strata::simulator strata::world
+  PRIVATE_DEPS absl::str_format
+)
+
+strata_test(
+  simulator_test
+  SOURCES scene_test.cc simulator_test.cc sweep_test.cc views_test.cc worlds_test.cc
+  DEPS strata::simulator strata::sweep
+)
+
+strata_library(
+  mock_database
+  NO_INSTALL
+  HEADERS mock_database.h
+  DEPS strata::api GTest::gmock
+)
+
+# Disks beneath SQLite that fail, and one that loses what was not synced.
+strata_library(
+  faulty_disk
+  NO_INSTALL
+  SOURCES disk_shim.cc faulty_disk.cc power_cut_disk.cc
+  HEADERS disk_shim.h faulty_disk.h power_cut_disk.h
+  PRIVATE_DEPS PkgConfig::sqlite3 ${CMAKE_DL_LIBS}
+)
+
+# The conformance suite of core/api; its tests run in every program that names a database for it. Objects, not an
+# archive: a linker leaves out of an archive what nobody calls.
+add_library(
+  strata_database_suite OBJECT
+  database_suite.cc database_suite_classes.cc database_suite_jobs.cc database_suite_maps.cc database_suite_planning.cc
+  database_suite_posegraph.cc database_suite_scans.cc database_suite_tiles.cc database_suite_watch.cc
+  database_suite_worlds.cc
+)
+add_library(strata::database_suite ALIAS strata_database_suite)
+target_include_directories(strata_database_suite PUBLIC ${PROJECT_SOURCE_DIR})
+target_link_libraries(
+  strata_database_suite
+  PUBLIC strata::api strata::test_support GTest::gmock
+  PRIVATE strata_build_options strata::codec absl::synchronization
+)
+strata_batch(strata_database_suite strata_test_headers)
+
+if(STRATA_SANITIZER_KIND STREQUAL tsan)
+  strata_test(tsan_absl_test SOURCES tsan_absl_test.cc DEPS absl::status absl::synchronization LABELS unit tsan)
+endif()
+
+# For LD_PRELOAD.
+add_library(strata_jumping_clock MODULE jumping_clock.cc)
+target_link_libraries(strata_jumping_clock PRIVATE strata_build_options ${CMAKE_DL_LIBS})
