@@ -19,6 +19,8 @@ struct Written {
   double upload_idle_s = 60.0;
   double slow_reader_s = 30.0;
   double max_message_mib = 4.0;
+  std::uint64_t client_memory_mib = 64;
+  std::uint64_t call_memory_mib = 160;
   std::uint64_t queue_mib = 64;
   std::uint64_t cache_mib = 160;
   std::uint64_t max_map_mib = 0;
@@ -103,6 +105,12 @@ void AddClientLimits(CLI::App& app, Written& o) {
       Between(1, 1e6, "calls"));
   Add(app,
       kGroup,
+      "--client-memory",
+      o.client_memory_mib,
+      "What its calls may hold in memory: requests, uploads on their way, answers not taken [MiB]",
+      Between(1, 1 << 20, "MiB"));
+  Add(app,
+      kGroup,
       "--max-message",
       o.max_message_mib,
       "Size of one request [MiB]; chunks of points of the SDK take below 1",
@@ -143,6 +151,12 @@ void AddServerLimits(CLI::App& app, Written& o) {
       o.server.max_watches,
       "Watches of maps and jobs under way before more are sent away; they are no calls",
       count);
+  Add(app,
+      kGroup,
+      "--call-memory",
+      o.call_memory_mib,
+      "What the calls of all clients together may hold in memory [MiB]; beside --cache and --queue",
+      Between(1, 1 << 20, "MiB"));
   Add(app, kGroup, "--query-threads", o.server.query_threads, "Calls answered at a time", threads);
   Add(app,
       kGroup,
@@ -223,6 +237,8 @@ absl::StatusOr<ProgramOptions> Read(const Written& o) {
   options.server.drain_timeout = absl::Seconds(o.drain_s);
   options.server.slow_sender_timeout = absl::Seconds(o.upload_idle_s);
   options.server.slow_reader_timeout = absl::Seconds(o.slow_reader_s);
+  options.server.client.max_bytes = o.client_memory_mib * kMebi;
+  options.server.max_call_bytes = o.call_memory_mib * kMebi;
   options.server.max_message_bytes =
       static_cast<int>(o.max_message_mib * static_cast<double>(kMebi));
   return options;

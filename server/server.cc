@@ -31,6 +31,13 @@
 #include "server/services/posegraph_service.h"
 #include "server/services/scans_service.h"
 #include "server/services/tiles_service.h"
+#include "strata/v1/classifiers.grpc.pb.h"
+#include "strata/v1/jobs.grpc.pb.h"
+#include "strata/v1/maps.grpc.pb.h"
+#include "strata/v1/planning.grpc.pb.h"
+#include "strata/v1/posegraph.grpc.pb.h"
+#include "strata/v1/scans.grpc.pb.h"
+#include "strata/v1/tiles.grpc.pb.h"
 
 namespace strata::server {
 namespace {
@@ -43,7 +50,7 @@ constexpr int kMaxMetadataBytes = 16 << 10;
 constexpr int kHandshakeMs = 10'000;
 // Of all connections together: some 40 KB each, and the messages on their way. Where it is used up,
 // new connections are refused.
-constexpr std::size_t kTransportBytes = std::size_t{96} << 20;
+constexpr std::size_t kTransportBytes = std::size_t{64} << 20;
 // A connection without calls; a client that comes again connects again by itself.
 constexpr int kIdleConnectionMs = 10 * 60 * 1000;
 
@@ -55,7 +62,9 @@ RuntimeOptions RuntimeOptionsOf(const ServerOptions& options) {
           .max_watches = options.max_watches,
           .slow_reader_timeout = options.slow_reader_timeout,
           .slow_sender_timeout = options.slow_sender_timeout,
-          .client = options.client};
+          .client = options.client,
+          .strangers = {},
+          .max_call_bytes = options.max_call_bytes};
 }
 
 class GrpcServer final : public Server {
@@ -119,6 +128,10 @@ void LimitConnections(grpc::ServerBuilder& builder, const ServerOptions& options
                              options.client.max_calls + options.client.max_watches);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, kIdleConnectionMs);
+  // gRPC unpacks a request before anybody is asked who sent it: 4 MiB may become 4 GiB.
+  for (const grpc_compression_algorithm packed : {GRPC_COMPRESS_DEFLATE, GRPC_COMPRESS_GZIP}) {
+    builder.SetCompressionAlgorithmSupportStatus(packed, false);
+  }
   builder.SetResourceQuota(grpc::ResourceQuota("connections").Resize(kTransportBytes));
 }
 
@@ -137,6 +150,11 @@ void AddUnderWay(MetricFamilies& families, const Runtime& runtime) {
             "strata_clients",
             "Clients that have calls under way or had some lately",
             {{{}, static_cast<double>(runtime.clients.clients())}});
+  AddFamily(families,
+            kGauge,
+            "strata_call_bytes",
+            "Memory booked for calls under way; at most --call-memory",
+            {{{}, static_cast<double>(runtime.clients.held_bytes())}});
 }
 
 void AddAccess(MetricFamilies& families, Access& access) {
@@ -219,6 +237,15 @@ absl::Status ServerOptions::Validate() const {
   check("client.max_calls", client.max_calls, 1, 1'000'000);
   check("client.max_watches", client.max_watches, 1, 1'000'000);
   check("max_message_bytes", max_message_bytes, 64 << 10, 64 << 20);
+  const auto check_bytes = [this, &faults](const char* name, std::size_t value) {
+    constexpr std::size_t kMost = std::size_t{1} << 40;
+    const auto least = static_cast<std::size_t>(max_message_bytes);
+    if (value >= least && value <= kMost) return;
+    faults.push_back(
+        absl::StrCat(name, " = ", value, " is not in [max_message_bytes = ", least, ", 2^40]"));
+  };
+  check_bytes("client.max_bytes", client.max_bytes);
+  check_bytes("max_call_bytes", max_call_bytes);
   if (!(client.calls_per_second >= 0.0 && client.calls_per_second <= 1e6)) {
     faults.emplace_back("client.calls_per_second is not in [0, 1000000]");
   }

@@ -2,6 +2,7 @@
 #ifndef STRATA_SERVER_SERVER_H_
 #define STRATA_SERVER_SERVER_H_
 
+#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -32,6 +33,9 @@ struct ServerOptions {
   int max_watches = 4096;
   ClientLimitOptions client;        // the same for one client, and how often it may call
   int max_message_bytes = 4 << 20;  // of a request; in [64 KiB, 64 MiB]
+  // Memory that the calls of all clients hold, beside that of one client (client.max_bytes): both
+  // in [max_message_bytes, 1 TiB].
+  std::size_t max_call_bytes = std::size_t{160} << 20;
   // A stream's reader that takes nothing for so long loses the stream.
   absl::Duration slow_reader_timeout = absl::Seconds(30);
   // A stream of requests that brings nothing for so long ends.

@@ -168,11 +168,13 @@ void ColumnEncoder::Finish(std::string& out) {
 
 absl::StatusOr<ColumnDecoder> ColumnDecoder::Open(ByteReader& reader,
                                                   int columns,
-                                                  std::size_t max_tokens) {
+                                                  std::size_t max_tokens,
+                                                  std::size_t max_bytes) {
   ColumnDecoder decoder;
   decoder.columns_.resize(columns);
   for (Column& column : decoder.columns_) {
-    STRATA_RETURN_IF_ERROR(TakeColumn(reader, max_tokens, column.bytes));
+    STRATA_RETURN_IF_ERROR(TakeColumn(reader, std::min(max_tokens, max_bytes), column.bytes));
+    max_bytes -= column.bytes.size();
   }
   const absl::string_view raw = reader.Take(reader.Varint());
   if (!reader.ok()) return Damaged("raw bits cut short");

@@ -11,6 +11,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -98,10 +99,13 @@ class ColumnEncoder {
 // yields zeros and Finish() answers DATA_LOSS.
 class ColumnDecoder {
  public:
-  // Expects at most `max_tokens` in a column.
-  static absl::StatusOr<ColumnDecoder> Open(ByteReader& reader,
-                                            int columns,
-                                            std::size_t max_tokens);
+  // Expects at most `max_tokens` in a column, and `max_bytes` of memory for all of them; what
+  // announces more is DATA_LOSS before it is decompressed.
+  static absl::StatusOr<ColumnDecoder> Open(
+      ByteReader& reader,
+      int columns,
+      std::size_t max_tokens,
+      std::size_t max_bytes = std::numeric_limits<std::size_t>::max());
 
   std::uint64_t Code(int column, std::uint64_t /*value*/) {
     const std::uint8_t token = NextByte(column);

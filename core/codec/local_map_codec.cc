@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -51,25 +52,39 @@ absl::StatusOr<std::string> EncodeLocalMap(const MlsMap& map, std::size_t max_pa
 absl::StatusOr<MlsMap> DecodeLocalMap(absl::string_view bytes, const MlsParameters& parameters) {
   MlsMap map;
   map.parameters = parameters;
+  STRATA_RETURN_IF_ERROR(VisitLocalMap(bytes, {}, [&map](MlsTile tile) {
+    map.tiles.push_back(std::move(tile));
+    return absl::OkStatus();
+  }));
+  return map;
+}
+
+absl::Status VisitLocalMap(absl::string_view bytes,
+                           const LocalMapBounds& bounds,
+                           absl::FunctionRef<absl::Status(MlsTile)> visit) {
+  std::optional<TileKey> previous;
   std::size_t patches = 0;
   while (!bytes.empty()) {
     if (bytes.size() < kLengthBytes || ReadLength(bytes) > bytes.size() - kLengthBytes) {
       return absl::DataLossError("local map: cut short");
     }
     const std::size_t length = ReadLength(bytes);
-    STRATA_ASSIGN_OR_RETURN(MlsTile tile, DecodeMlsTile(bytes.substr(kLengthBytes, length)));
-    if (!map.tiles.empty() && !(map.tiles.back().key < tile.key)) {
+    STRATA_ASSIGN_OR_RETURN(
+        MlsTile tile,
+        DecodeMlsTileWithin(bounds.max_tile_bytes, bytes.substr(kLengthBytes, length)));
+    if (previous.has_value() && !(*previous < tile.key)) {
       return absl::DataLossError("local map: tiles out of order");
     }
+    previous = tile.key;
     patches += tile.patches.size();
-    if (patches > kMaxLocalMapPatches) {
+    if (patches > bounds.max_patches) {
       return absl::ResourceExhaustedError(
-          absl::StrCat("local map: more than ", kMaxLocalMapPatches, " patches"));
+          absl::StrCat("local map: more than ", bounds.max_patches, " patches"));
     }
-    map.tiles.push_back(std::move(tile));
+    STRATA_RETURN_IF_ERROR(visit(std::move(tile)));
     bytes.remove_prefix(kLengthBytes + length);
   }
-  return map;
+  return absl::OkStatus();
 }
 
 }  // namespace strata

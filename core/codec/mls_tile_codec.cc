@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <utility>
@@ -224,6 +225,10 @@ bool Disjoint(const Patch& below, const Patch& above) {
   return below.cell != above.cell || below.z_max < above.z_min;
 }
 
+// A patch, its cell and what lies beside it.
+constexpr std::size_t kDecodedPatchBytes =
+    sizeof(Patch) + sizeof(std::uint16_t) + sizeof(SurfacesBeside);
+
 absl::Status Damaged(absl::string_view what) {
   return absl::DataLossError(absl::StrCat("MLS tile: ", what));
 }
@@ -271,18 +276,40 @@ std::string EncodeMlsTile(const MlsTile& tile) {
 }
 
 absl::StatusOr<MlsTile> DecodeMlsTile(absl::string_view bytes) {
+  return DecodeMlsTileWithin(std::numeric_limits<std::size_t>::max(), bytes);
+}
+
+absl::StatusOr<MlsTile> DecodeMlsTileWithin(std::size_t max_bytes, absl::string_view bytes) {
   STRATA_ASSIGN_OR_RETURN(const absl::string_view body,
                           OpenBlob(BlobKind::kMlsTile, kMlsTileVersion, bytes));
   ByteReader reader(body);
   MlsTile tile;
   STRATA_RETURN_IF_ERROR(TakeTileHeader(reader, tile.key));
-  STRATA_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> cells, TakeCells(reader));
+  STRATA_ASSIGN_OR_RETURN(
+      const std::vector<std::uint16_t> cells,
+      TakeCells(reader, std::min(kMaxTilePatches, max_bytes / kDecodedPatchBytes)));
   const bool has_colour = reader.Fixed<std::uint8_t>() != 0;
   const std::uint64_t vote_count = reader.Varint();
   if (vote_count > kMaxTileVotes) return Damaged(absl::StrCat(vote_count, " votes"));
-  STRATA_ASSIGN_OR_RETURN(
-      ColumnDecoder decoder,
-      ColumnDecoder::Open(reader, kColumnCount, std::max<std::size_t>(cells.size(), vote_count)));
+  const std::size_t decoded_bytes =
+      cells.size() * (kDecodedPatchBytes + (has_colour ? sizeof(ColourSum) : 0)) +
+      vote_count * sizeof(ClassVotes);
+  if (decoded_bytes > max_bytes) {
+    return absl::ResourceExhaustedError(absl::StrCat("MLS tile: ",
+                                                     cells.size(),
+                                                     " patches and ",
+                                                     vote_count,
+                                                     " votes take ",
+                                                     decoded_bytes,
+                                                     " bytes, at most ",
+                                                     max_bytes,
+                                                     " may be"));
+  }
+  STRATA_ASSIGN_OR_RETURN(ColumnDecoder decoder,
+                          ColumnDecoder::Open(reader,
+                                              kColumnCount,
+                                              std::max<std::size_t>(cells.size(), vote_count),
+                                              max_bytes - decoded_bytes));
   if (reader.remaining() != 0) return Damaged("bytes left over");
 
   STRATA_RETURN_IF_ERROR(DecodePatches(decoder, cells, tile.patches));

@@ -27,6 +27,9 @@ std::string EncodeMlsTile(const MlsTile& tile);
 // Every tile it yields keeps the rules of MlsTile. Never allocates more than 150 bytes ×
 // kMaxTilePatches. Thread-safe.
 absl::StatusOr<MlsTile> DecodeMlsTile(absl::string_view bytes);
+// The same, but a tile that would take more than about `max_bytes` of memory is refused with
+// RESOURCE_EXHAUSTED or DATA_LOSS before it is decompressed.
+absl::StatusOr<MlsTile> DecodeMlsTileWithin(std::size_t max_bytes, absl::string_view bytes);
 
 }  // namespace strata
 

@@ -48,7 +48,7 @@ void PutCells(std::string& out, std::span<const std::uint16_t> cells) {
   PutColumn(out, rest);
 }
 
-absl::StatusOr<std::vector<std::uint16_t>> TakeCells(ByteReader& reader) {
+absl::StatusOr<std::vector<std::uint16_t>> TakeCells(ByteReader& reader, std::size_t max_surfaces) {
   std::string codes;
   std::string rest;
   STRATA_RETURN_IF_ERROR(TakeColumn(reader, kCells / 4, codes));
@@ -68,8 +68,8 @@ absl::StatusOr<std::vector<std::uint16_t>> TakeCells(ByteReader& reader) {
         static_cast<std::uint8_t>(codes[BlockOf(cell)]) >> ShiftInBlock(cell) & 3U;
     if (count == 0) continue;
     if (count == kManyCode) count += rest_reader.Varint();
-    if (!rest_reader.ok() || count > kMaxTilePatches - cells.size()) {
-      return absl::DataLossError(absl::StrCat("more than ", kMaxTilePatches, " surfaces"));
+    if (!rest_reader.ok() || count > max_surfaces - cells.size()) {
+      return absl::DataLossError(absl::StrCat("more than ", max_surfaces, " surfaces in a tile"));
     }
     cells.insert(cells.end(), count, static_cast<std::uint16_t>(cell));
   }

@@ -19,8 +19,9 @@ inline constexpr std::size_t kMaxTilePatches = std::size_t{1} << 22;
 
 // Appends the cells of a tile's surfaces (ascending, a cell once for each surface).
 void PutCells(std::string& out, std::span<const std::uint16_t> cells);
-// DATA_LOSS if damaged or more than kMaxTilePatches.
-absl::StatusOr<std::vector<std::uint16_t>> TakeCells(ByteReader& reader);
+// DATA_LOSS if damaged or more than `max_surfaces`, before more memory is taken than those need.
+absl::StatusOr<std::vector<std::uint16_t>> TakeCells(ByteReader& reader,
+                                                     std::size_t max_surfaces = kMaxTilePatches);
 
 // Surfaces of the same layer (how many lie below in the cell), or the highest below it, in the
 // cells to the left (x − 1) and up (y − 1) and beside that (x − 1, y − 1) and (x + 1, y − 1):

@@ -43,37 +43,40 @@ absl::Status CheckParameters(const MlsParameters& map, const MlsParameters& loca
       absl::StrCat("local map of ", text(local_map), "; the map has ", text(map)));
 }
 
-// The box around its surfaces in the scan frame.
-absl::StatusOr<Eigen::AlignedBox3f> BoxOf(const MlsMap& local_map) {
+absl::Status CheckSize(absl::string_view bytes) {
+  if (bytes.size() <= api::kMaxLocalMapBytes) return absl::OkStatus();
+  return absl::ResourceExhaustedError(absl::StrCat(
+      "local map of ", bytes.size(), " bytes; at most ", api::kMaxLocalMapBytes, ", split it"));
+}
+
+// Reads the local map tile by tile: of what hostile bytes become only one is held at a time. The
+// box around its surfaces in the scan frame.
+absl::StatusOr<Eigen::AlignedBox3f> BoxOf(absl::string_view bytes,
+                                          const MlsParameters& parameters) {
   constexpr double kMaxCoordinateM = 1e6;
-  if (local_map.tiles.size() > kMaxScanTiles) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "local map of ", local_map.tiles.size(), " tiles; at most ", kMaxScanTiles, ", split it"));
-  }
   Eigen::AlignedBox3d box;
-  for (const MlsTile& tile : local_map.tiles) {
-    if (tile.key.level != 0) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("local map: a tile of level ", tile.key.level, "; its tiles have level 0"));
-    }
-    box.extend(MakeMlsTileRow(tile, 0, local_map.parameters.cell_size_m).box);
-  }
+  std::size_t tiles = 0;
+  const absl::Status visited =
+      VisitLocalMap(bytes, kUploadedLocalMap, [&](const MlsTile& tile) -> absl::Status {
+        if (++tiles > kMaxScanTiles) {
+          return absl::InvalidArgumentError(
+              absl::StrCat("local map of more than ", kMaxScanTiles, " tiles; split it"));
+        }
+        if (tile.key.level != 0) {
+          return absl::InvalidArgumentError(absl::StrCat(
+              "local map: a tile of level ", tile.key.level, "; its tiles have level 0"));
+        }
+        box.extend(MakeMlsTileRow(tile, 0, parameters.cell_size_m).box);
+        return absl::OkStatus();
+      });
+  if (absl::IsDataLoss(visited)) return absl::InvalidArgumentError(visited.message());
+  STRATA_RETURN_IF_ERROR(visited);
   if (!box.isEmpty() && box.min().cwiseMin(-box.max()).minCoeff() < -kMaxCoordinateM) {
     return absl::InvalidArgumentError("local map: reaches beyond ±1e6 m");
   }
   Eigen::AlignedBox3f rounded;
   if (!box.isEmpty()) rounded.extend(box.min().cast<float>()).extend(box.max().cast<float>());
   return rounded;
-}
-
-absl::StatusOr<MlsMap> Decode(absl::string_view bytes, const MlsParameters& parameters) {
-  if (bytes.size() > api::kMaxLocalMapBytes) {
-    return absl::ResourceExhaustedError(absl::StrCat(
-        "local map of ", bytes.size(), " bytes; at most ", api::kMaxLocalMapBytes, ", split it"));
-  }
-  absl::StatusOr<MlsMap> local_map = DecodeLocalMap(bytes, parameters);
-  if (!absl::IsDataLoss(local_map.status())) return local_map;
-  return absl::InvalidArgumentError(local_map.status().message());
 }
 
 std::string ContentHashOf(const ScanHeader& header, absl::string_view bytes) {
@@ -114,12 +117,12 @@ absl::StatusOr<ScanAck> UploadLocalMap(Map& map,
                                        absl::string_view bytes) {
   STRATA_RETURN_IF_ERROR(CheckHeader(header));
   STRATA_RETURN_IF_ERROR(CheckParameters(map.core().info().parameters.mls, parameters));
-  STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, Decode(bytes, parameters));
+  STRATA_RETURN_IF_ERROR(CheckSize(bytes));
   ScanRecord record;
   record.header = header;
   record.upload = map.core().NextUpload();
   record.content_hash = ContentHashOf(header, bytes);
-  STRATA_ASSIGN_OR_RETURN(record.box_scan, BoxOf(local_map));
+  STRATA_ASSIGN_OR_RETURN(record.box_scan, BoxOf(bytes, parameters));
   if (!header.content_hash.empty() && header.content_hash != record.content_hash) {
     return absl::InvalidArgumentError(absl::StrCat("content_hash of what arrived is ",
                                                    record.content_hash,

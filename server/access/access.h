@@ -32,6 +32,8 @@ class Access {
   // Without grants everybody who got through the door may do everything.
   explicit Access(std::unique_ptr<GrantTable> grants) : grants_(std::move(grants)) {}
 
+  // Whether there are grants.
+  bool asks() const { return grants_ != nullptr; }
   // `authorization`: the metadata, empty without; `certificate_name`: common name of the verified
   // client certificate, empty without. A token goes before the certificate. UNAUTHENTICATED.
   absl::StatusOr<Caller> Authenticate(absl::string_view authorization,

@@ -73,10 +73,12 @@ CallMetrics::CallMetrics()
                     *registry_,
                     "strata_calls_total",
                     "Calls that ended, by method and canonical code")),
-      rejected_(Family(prometheus::BuildCounter(),
-                       *registry_,
-                       "strata_calls_rejected_total",
-                       "Calls that were refused, by reason: ACCESS, CLIENT_LIMIT, …")),
+      rejected_(
+          Family(prometheus::BuildCounter(),
+                 *registry_,
+                 "strata_calls_rejected_total",
+                 "Calls that were refused, by reason: STRANGER (nobody knows who calls), ACCESS, "
+                 "CLIENT_LIMIT, …")),
       received_(Family(prometheus::BuildCounter(),
                        *registry_,
                        "strata_received_bytes_total",

@@ -35,7 +35,7 @@ absl::Duration ClientLimits::TakeAllowance(Client& client, absl::Time now) const
 }
 
 bool ClientLimits::Idle(const Client& client, absl::Time now) const {
-  if (client.calls > 0 || client.watches > 0) return false;
+  if (client.calls > 0 || client.watches > 0 || client.bytes > 0) return false;
   if (options_.calls_per_second <= 0.0) return true;
   // Its allowance is full again: forgetting it gives it nothing.
   const absl::Duration refill = absl::Seconds(options_.burst / options_.calls_per_second);
@@ -85,6 +85,67 @@ void ClientLimits::Leave(absl::string_view name, Kind kind) {
   absl::MutexLock lock(&mutex_);
   Client& client = clients_.find(name)->second;
   --(kind == Kind::kCall ? client.calls : client.watches);
+}
+
+absl::Status ClientLimits::Hold(absl::string_view name, std::size_t more, std::size_t all) {
+  if (all > options_.max_bytes) {
+    return translate::WithReason(
+        absl::ResourceExhaustedError(absl::StrCat("the call needs ",
+                                                  all,
+                                                  " bytes of memory; one client may hold ",
+                                                  options_.max_bytes,
+                                                  " (stratad --client-memory); ask in parts")),
+        translate::kRequestReason);
+  }
+  absl::MutexLock lock(&mutex_);
+  const auto found = clients_.find(name);
+  if (found->second.bytes + more > options_.max_bytes) {
+    return TooMuch(absl::StrCat("calls of client ",
+                                name,
+                                " hold ",
+                                found->second.bytes,
+                                " bytes of memory; with ",
+                                more,
+                                " more it were above the ",
+                                options_.max_bytes,
+                                " it may hold"),
+                   kLookAgain);
+  }
+  if (held_ + more > max_bytes_) {
+    return translate::WithRetryDelay(
+        absl::ResourceExhaustedError(absl::StrCat("the calls under way hold ",
+                                                  held_,
+                                                  " bytes of memory, of ",
+                                                  max_bytes_,
+                                                  " they may; try again later")),
+        translate::kServerBusyReason,
+        kLookAgain);
+  }
+  found->second.bytes += more;
+  held_ += more;
+  return absl::OkStatus();
+}
+
+void ClientLimits::Release(absl::string_view name, std::size_t bytes) {
+  absl::MutexLock lock(&mutex_);
+  clients_.find(name)->second.bytes -= bytes;
+  held_ -= bytes;
+}
+
+absl::Status Booking::Resize(std::size_t bytes) {
+  if (bytes > bytes_) {
+    const absl::Status held = limits_->Hold(client_, bytes - bytes_, bytes);
+    if (!held.ok()) return held;
+  } else if (bytes < bytes_) {
+    limits_->Release(client_, bytes_ - bytes);
+  }
+  bytes_ = bytes;
+  return absl::OkStatus();
+}
+
+std::size_t ClientLimits::held_bytes() const {
+  absl::MutexLock lock(&mutex_);
+  return held_;
 }
 
 std::size_t ClientLimits::clients() const {

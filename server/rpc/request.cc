@@ -11,15 +11,19 @@
 #include "absl/strings/str_cat.h"
 #include <glog/logging.h>
 #include <grpcpp/server_context.h>
+#include <grpcpp/support/proto_buffer_reader.h>
 
 #include "core/common/log_line.h"
 #include "core/common/steady_time.h"
 #include "server/access/method_rights.h"
+#include "server/rpc/wire_check.h"
 
 namespace strata::server {
 namespace {
 
 constexpr std::size_t kMaxLoggedName = 100;
+// In the metrics: who was refused because nobody knows him.
+constexpr absl::string_view kStranger = "STRANGER";
 
 // Unique among the calls of this process and, very likely, of all others.
 std::string NewRequestId() {
@@ -73,6 +77,7 @@ Request::Request(Runtime& runtime,
                  absl::string_view method,
                  Kind kind)
     : runtime_(runtime),
+      context_(context),
       kind_(kind),
       method_(method),
       peer_(context.peer()),
@@ -84,16 +89,20 @@ Request::Request(Runtime& runtime,
   // back before it goes.
   entered_ = gate().Enter();
   admission_ = Admit(context);
+  if (runtime_.access.asks() && admission_.ok()) runtime_.revocations.Add(*this);
 }
 
 Request::~Request() {
+  if (runtime_.access.asks() && admission_.ok()) runtime_.revocations.Remove(*this);
   End();
   gate().Leave();
 }
 
 void Request::End() {
-  if (ended_) return;
-  ended_ = true;
+  {
+    absl::MutexLock lock(&mutex_);
+    if (std::exchange(ended_, true)) return;
+  }
   if (!client_.empty()) runtime_.clients.Leave(client_, kind_);
   gate().End();
 }
@@ -103,11 +112,18 @@ absl::Status Request::Admit(const grpc::CallbackServerContext& context) {
     return translate::WithReason(absl::UnavailableError("the server is shutting down"),
                                  translate::kShuttingDownReason);
   }
-  STRATA_ASSIGN_OR_RETURN(caller_,
-                          runtime_.access.Authenticate(MetadataOf(context, kAuthorizationKey),
-                                                       CertificateNameOf(*context.auth_context())));
+  absl::StatusOr<Caller> caller = runtime_.access.Authenticate(
+      MetadataOf(context, kAuthorizationKey), CertificateNameOf(*context.auth_context()));
+  if (!caller.ok()) return Refuse(caller.status());
+  caller_ = *std::move(caller);
   call_.principal = caller_.principal;
   return EnterLimits();
+}
+
+absl::Status Request::Refuse(const absl::Status& status) {
+  stranger_ = true;
+  STRATA_RETURN_IF_ERROR(runtime_.strangers.Enter(HostOf(peer_), started_));
+  return status;
 }
 
 absl::Status Request::EnterLimits() {
@@ -121,46 +137,113 @@ absl::Status Request::EnterLimits() {
       translate::kServerBusyReason);
 }
 
-absl::Status Request::Receive(const google::protobuf::Message& message) {
-  bytes_received_ += message.ByteSizeLong();
-  const MethodRight* row = FindMethodRight(method_);
-  if (row == nullptr) return NobodyMay(method_);
-  if (row->map_field.empty()) return absl::OkStatus();
-  std::optional<std::string> map = MapNamedIn(message, row->map_field);
-  if (!map.has_value()) return absl::OkStatus();
-  map_ = *std::move(map);
-  has_map_ = true;
-  return runtime_.access.Authorize(caller_, row->right, map_);
+absl::Status Request::Open(grpc::ByteBuffer& bytes,
+                           google::protobuf::Message& message,
+                           Booking& memory) {
+  bytes_received_ += bytes.Length();
+  const absl::Status parsed = Parse(bytes, message, memory);
+  bytes.Clear();
+  STRATA_RETURN_IF_ERROR(parsed);
+  return Authorize(message);
 }
 
-absl::Status Request::StillAllowed() {
+absl::Status Request::Parse(grpc::ByteBuffer& bytes,
+                            google::protobuf::Message& message,
+                            Booking& memory) {
+  {
+    grpc::ProtoBufferReader reader(&bytes);
+    STRATA_ASSIGN_OR_RETURN(const std::size_t parsed_bytes,
+                            AtTheDoor(ParsedBytes(*message.GetDescriptor(), reader)));
+    STRATA_RETURN_IF_ERROR(memory.Resize(parsed_bytes));
+  }
+  grpc::ProtoBufferReader reader(&bytes);
+  if (message.ParseFromZeroCopyStream(&reader)) return absl::OkStatus();
+  return AtTheDoor(absl::InvalidArgumentError(
+      absl::StrCat("the request's bytes are no ", message.GetDescriptor()->full_name())));
+}
+
+absl::Status Request::Authorize(const google::protobuf::Message& message) {
+  const MethodRight* row = FindMethodRight(method_);
+  if (row == nullptr) return NobodyMay(method_);
+  std::optional<std::string> map = MapNamedIn(message, row->map_field);
+  absl::MutexLock lock(&mutex_);
+  if (map.has_value()) {
+    map_ = *std::move(map);
+    has_map_ = true;
+  }
+  const absl::Status allowed = MayGoOn();
+  allowed_ = allowed.ok();
+  return allowed;
+}
+
+absl::Status Request::MayGoOn() const {
   const MethodRight* row = FindMethodRight(method_);
   if (row == nullptr) return NobodyMay(method_);
   return has_map_ ? runtime_.access.Authorize(caller_, row->right, map_)
                   : runtime_.access.StillKnown(caller_);
 }
 
-grpc::Status Request::Close(const absl::Status& status) {
+absl::Status Request::StillAllowed() const {
+  absl::MutexLock lock(&mutex_);
+  return MayGoOn();
+}
+
+void Request::EndIfRevoked() {
+  absl::MutexLock lock(&mutex_);
+  if (ended_) return;
+  if (!revoked_.ok()) {
+    context_.TryCancel();
+    return;
+  }
+  // Who was refused a map may have another in the same stream.
+  revoked_ = allowed_ ? MayGoOn() : runtime_.access.StillKnown(caller_);
+  if (!revoked_.ok()) call_.stop.Request();
+}
+
+absl::Status Request::HoldAnswer(const google::protobuf::Message& message, Booking& memory) {
+  return memory.Resize(message.SpaceUsedLong() + message.ByteSizeLong());
+}
+
+grpc::Status Request::Close(const absl::Status& ended_with) {
   End();
+  absl::Status status = ended_with;
+  {
+    absl::MutexLock lock(&mutex_);
+    if (!status.ok() && !revoked_.ok()) status = revoked_;
+  }
   const absl::Duration duration = SteadyNow() - started_;
   const std::optional<v1::ErrorDetail> detail = translate::DetailOf(status);
-  runtime_.metrics.Ended(method_,
-                         status.code(),
-                         duration,
-                         bytes_received_,
-                         bytes_sent_,
-                         Rejection(detail.has_value() ? detail->reason() : ""));
-  LOG(INFO) << LogLine("call")
-                   .Add("method", method_)
-                   .Add("code", absl::StatusCodeToString(status.code()))
-                   .Add("duration_ms", absl::ToInt64Milliseconds(duration))
-                   .Add("bytes_received", bytes_received_.load())
-                   .Add("bytes_sent", bytes_sent_.load())
-                   .Add("principal", call_.principal.empty() ? "-" : call_.principal)
-                   .Add("map", has_map_ ? map_.substr(0, kMaxLoggedName) : "-")
-                   .Add("peer", peer_)
-                   .Add("id", call_.request_id);
+  runtime_.metrics.Ended(
+      method_,
+      status.code(),
+      duration,
+      bytes_received_,
+      bytes_sent_,
+      stranger_ ? kStranger : Rejection(detail.has_value() ? detail->reason() : ""));
+  Log(status, duration);
   return translate::ToGrpcStatus(status, call_.request_id);
+}
+
+void Request::Log(const absl::Status& status, absl::Duration duration) {
+  std::optional<std::uint64_t> strangers;
+  if (stranger_) {
+    strangers = runtime_.strangers.ToLog(SteadyNow());
+    if (!strangers.has_value()) return;
+  }
+  LogLine line("call");
+  line.Add("method", method_)
+      .Add("code", absl::StatusCodeToString(status.code()))
+      .Add("duration_ms", absl::ToInt64Milliseconds(duration))
+      .Add("bytes_received", bytes_received_.load())
+      .Add("bytes_sent", bytes_sent_.load())
+      .Add("principal", call_.principal.empty() ? "-" : call_.principal);
+  {
+    absl::MutexLock lock(&mutex_);
+    line.Add("map", has_map_ ? map_.substr(0, kMaxLoggedName) : "-");
+  }
+  line.Add("peer", peer_).Add("id", call_.request_id);
+  if (strangers.has_value()) line.Add("strangers", *strangers);
+  LOG(INFO) << line;
 }
 
 }  // namespace strata::server

@@ -6,10 +6,13 @@
 #include <cstddef>
 #include <string>
 
+#include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
+#include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 #include <google/protobuf/message.h>
+#include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/server_callback.h>
 
 #include "core/api/call.h"
@@ -17,6 +20,7 @@
 #include "proto/translate/status.h"
 #include "server/access/access.h"
 #include "server/rpc/client_limits.h"
+#include "server/rpc/revocation.h"
 #include "server/rpc/runtime.h"
 
 namespace strata::server {
@@ -26,10 +30,11 @@ namespace strata::server {
 inline constexpr char kRequestIdKey[] = "x-request-id";
 
 // The context of a call (deadline, cancellation, id, who calls), its place among the calls under
-// way, and its line in the log. Every message that comes in goes through Receive(), which is where
-// rights are checked. Thread-safe, but for Receive(), called one at a time, and Close(), called
-// once and last.
-class Request {
+// way, and its line in the log. Every message that comes in goes through Open(), which is where it
+// is parsed and rights are checked. Thread-safe, but for Open(), called one at a time, and Close(),
+// called once and last. A call whose caller may no longer do what it does is stopped, and ends with
+// the reason.
+class Request final : public Revocable {
  public:
   using Kind = ClientLimits::Kind;
 
@@ -38,27 +43,36 @@ class Request {
           grpc::CallbackServerContext& context,
           absl::string_view method,
           Kind kind = Kind::kCall);
-  ~Request();
+  ~Request() override;
   Request(const Request&) = delete;
   Request& operator=(const Request&) = delete;
 
   // UNAUTHENTICATED for a caller nobody knows, RESOURCE_EXHAUSTED when the server is full or the
   // caller has all it may have, UNAVAILABLE when the server shuts down: the call must end at once.
   const absl::Status& admission() const { return admission_; }
-  // Counts a message and checks that the caller may do to the map it names what the method does; a
-  // message without a map goes with the one before. UNAUTHENTICATED, PERMISSION_DENIED.
-  absl::Status Receive(const google::protobuf::Message& message);
-  // For a call that goes on and on: that the caller may still do what Receive() checked.
-  absl::Status StillAllowed();
+  // Makes `message` of the bytes of a caller who was let in, books in `memory` what it takes, and
+  // checks that the caller may do to the map it names what the method does; a message without a map
+  // goes with the one before. The bytes are freed in any case. INVALID_ARGUMENT or
+  // RESOURCE_EXHAUSTED before anything is parsed; UNAUTHENTICATED, PERMISSION_DENIED.
+  absl::Status Open(grpc::ByteBuffer& bytes, google::protobuf::Message& message, Booking& memory);
+  // For a call that goes on and on: that the caller may still do what Open() checked.
+  absl::Status StillAllowed() const;
+  // Memory of this call, which must be gone before it.
+  Booking NewBooking() { return Booking(runtime_.clients, client_); }
   // For the one answer that tells of many maps.
   bool MayRead(absl::string_view map) const { return runtime_.access.MayRead(caller_, map); }
   const api::Call& call() const { return call_; }
+  // The first time stops the call, which then ends itself; the next time, since it has not, cancels
+  // it under the hands of gRPC.
+  void EndIfRevoked() override;
   // The caller has gone: long work ends.
   void Cancel() { call_.stop.Request(); }
   // For the log.
   void CountSent(const google::protobuf::MessageLite& message) {
     bytes_sent_ += message.ByteSizeLong();
   }
+  // Books in `memory` an answer that goes out: as a message, and as the bytes that it becomes.
+  static absl::Status HoldAnswer(const google::protobuf::Message& message, Booking& memory);
 
   // Logs the call's one line; the result is what goes to the client.
   grpc::Status Close(const absl::Status& status);
@@ -69,20 +83,31 @@ class Request {
   absl::Status Admit(const grpc::CallbackServerContext& context);
   // Of the server and of this client.
   absl::Status EnterLimits();
+  absl::Status Parse(grpc::ByteBuffer& bytes, google::protobuf::Message& message, Booking& memory);
+  absl::Status Authorize(const google::protobuf::Message& message);
+  // What a caller whom nobody knows is told.
+  absl::Status Refuse(const absl::Status& status);
+  absl::Status MayGoOn() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Makes room for another one. Again: nothing.
   void End();
+  void Log(const absl::Status& status, absl::Duration duration);
 
   Runtime& runtime_;
+  grpc::CallbackServerContext& context_;
   const Kind kind_;
   const absl::string_view method_;
   const std::string peer_;
   const absl::Time started_;
   Caller caller_;
-  std::string map_;  // that the last message with a map named
-  bool has_map_ = false;
+  bool stranger_ = false;  // nobody knows who calls
+  mutable absl::Mutex mutex_;
+  std::string map_ ABSL_GUARDED_BY(mutex_);  // that the last message with a map named
+  bool has_map_ ABSL_GUARDED_BY(mutex_) = false;
+  bool allowed_ ABSL_GUARDED_BY(mutex_) = false;  // to do to that map what the method does
+  absl::Status revoked_ ABSL_GUARDED_BY(mutex_);  // not OK: why the call was stopped
+  bool ended_ ABSL_GUARDED_BY(mutex_) = false;
   std::string client_;    // whose limits hold; empty: none were booked
   bool entered_ = false;  // the server's gate
-  bool ended_ = false;
   api::Call call_;
   absl::Status admission_;
   std::atomic<std::size_t> bytes_received_ = 0;

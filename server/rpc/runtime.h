@@ -3,6 +3,7 @@
 #define STRATA_SERVER_RPC_RUNTIME_H_
 
 #include <atomic>
+#include <cstddef>
 #include <memory>
 #include <utility>
 
@@ -18,7 +19,9 @@
 #include "server/metrics/metrics.h"
 #include "server/rpc/client_limits.h"
 #include "server/rpc/executor.h"
+#include "server/rpc/revocation.h"
 #include "server/rpc/silence.h"
+#include "server/rpc/strangers.h"
 #include "server/rpc/ticker.h"
 
 namespace strata::server {
@@ -34,6 +37,9 @@ struct RuntimeOptions {
   // And a sender that brings nothing for so long.
   absl::Duration slow_sender_timeout = absl::Seconds(60);
   ClientLimitOptions client;
+  StrangerOptions strangers;
+  // Memory that the calls of all clients hold, as ClientLimitOptions::max_bytes.
+  std::size_t max_call_bytes = std::size_t{160} << 20;
 };
 
 // Counts what is under way, and says whether it is more than there may be. Thread-safe.
@@ -93,7 +99,8 @@ struct Runtime {
       : db(database),
         options(runtime_options),
         access(std::move(grants)),
-        clients(runtime_options.client),
+        clients(runtime_options.client, runtime_options.max_call_bytes),
+        strangers(runtime_options.strangers),
         queries(runtime_options.query_threads, "query"),
         streams(runtime_options.stream_threads, "stream"),
         uploads(runtime_options.upload_threads, "upload"),
@@ -106,6 +113,8 @@ struct Runtime {
   const RuntimeOptions options;
   Access access;
   ClientLimits clients;
+  Strangers strangers;
+  RevocationWatch revocations{absl::Milliseconds(500)};
   CallMetrics metrics;
   Executor queries;
   Executor streams;

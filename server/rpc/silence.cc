@@ -32,8 +32,9 @@ SilenceWatch::~SilenceWatch() {
 
 void SilenceWatch::Loop() {
   NameThisThread("silence");
-  // A stream ends at most a quarter late.
-  const absl::Duration interval = std::clamp(limit_ / 4, absl::Milliseconds(10), absl::Seconds(5));
+  // A stream ends at most a quarter late, and soon after its call was stopped.
+  const absl::Duration interval =
+      std::clamp(limit_ / 4, absl::Milliseconds(10), absl::Milliseconds(250));
   absl::Time next = SteadyNow() + interval;
   while (true) {
     // AwaitWithTimeout would wait as long as a clock is set back.
@@ -55,15 +56,18 @@ void SilenceWatch::EndSilent() {
   const absl::Time now = SteadyNow();
   for (auto it = waiting_.begin(); it != waiting_.end();) {
     ExpectedMessage* stream = *it;
-    if (now - stream->since_ < limit_) {
+    const bool stopped = stream->stop_.requested();
+    if (!stopped && now - stream->since_ < limit_) {
       ++it;
       continue;
     }
-    const absl::Status status = translate::WithReason(
-        absl::DeadlineExceededError(absl::StrCat("the client sent nothing for ",
-                                                 absl::FormatDuration(limit_),
-                                                 "; what was not acknowledged is abandoned")),
-        translate::kSlowSenderReason);
+    const absl::Status status =
+        stopped ? stream->stop_.status()
+                : translate::WithReason(absl::DeadlineExceededError(absl::StrCat(
+                                            "the client sent nothing for ",
+                                            absl::FormatDuration(limit_),
+                                            "; what was not acknowledged is abandoned")),
+                                        translate::kSlowSenderReason);
     // The stream lives until this task ends it, since Arrived() will be false.
     executor_.Submit([end = stream->on_silence_, status] { end(status); });
     it = waiting_.erase(it);

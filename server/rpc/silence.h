@@ -12,6 +12,7 @@
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 
+#include "core/common/stop.h"
 #include "server/rpc/executor.h"
 
 namespace strata::server {
@@ -19,8 +20,8 @@ namespace strata::server {
 // Watches over all streams with one thread. Thread-safe.
 class SilenceWatch {
  public:
-  // Streams that wait longer than `limit` for their client have ended; `executor`, which must
-  // outlive the watch, tells them.
+  // Streams that wait longer than `limit` for their client have ended, and those whose call was
+  // stopped; `executor`, which must outlive the watch, tells them.
   SilenceWatch(absl::Duration limit, Executor& executor);
   ~SilenceWatch();
 
@@ -40,13 +41,15 @@ class SilenceWatch {
 };
 
 // The next message of one stream. Expect() before the read begins, Arrived() when it has ended;
-// when the client was silent for too long between the two, Arrived() is false, and instead
-// `on_silence` is called once, on the executor, with the error that the stream ends with: of the
-// two exactly one goes on with the stream.
+// when the client was silent for too long between the two, or `stop` was requested, Arrived() is
+// false, and instead `on_silence` is called once, on the executor, with the error that the stream
+// ends with: of the two exactly one goes on with the stream.
 class ExpectedMessage {
  public:
-  ExpectedMessage(SilenceWatch& watch, std::function<void(const absl::Status&)> on_silence)
-      : watch_(watch), on_silence_(std::move(on_silence)) {}
+  ExpectedMessage(SilenceWatch& watch,
+                  const Stop& stop,
+                  std::function<void(const absl::Status&)> on_silence)
+      : watch_(watch), stop_(stop), on_silence_(std::move(on_silence)) {}
   ExpectedMessage(const ExpectedMessage&) = delete;
   ExpectedMessage& operator=(const ExpectedMessage&) = delete;
   ~ExpectedMessage();
@@ -58,6 +61,7 @@ class ExpectedMessage {
   friend class SilenceWatch;
 
   SilenceWatch& watch_;
+  const Stop stop_;
   const std::function<void(const absl::Status&)> on_silence_;
   absl::Time since_;  // guarded by the watch's mutex
 };

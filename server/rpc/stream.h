@@ -16,6 +16,7 @@
 #include "core/common/steady_time.h"
 #include "server/rpc/request.h"
 #include "server/rpc/runtime.h"
+#include "server/rpc/sealed.h"
 
 namespace strata::server {
 
@@ -35,10 +36,15 @@ class StreamReactor final : public grpc::ServerWriteReactor<Out> {
   StreamReactor(Runtime& runtime,
                 grpc::CallbackServerContext& context,
                 absl::string_view method,
-                const In& in,
+                Sealed<In>& in,
                 StreamHandler<In, Out> handler)
-      : runtime_(runtime), context_(context), request_(runtime, context, method), in_(in) {
+      : runtime_(runtime),
+        context_(context),
+        request_(runtime, context, method),
+        memory_(request_.NewBooking()),
+        sealed_(in) {
     if (!request_.admission().ok()) {
+      sealed_.bytes.Clear();
       this->Finish(request_.Close(request_.admission()));
       return;
     }
@@ -49,15 +55,17 @@ class StreamReactor final : public grpc::ServerWriteReactor<Out> {
   void Run(StreamHandler<In, Out> handler) {
     const absl::Status status = Guarded([&]() -> absl::Status {
       STRATA_RETURN_IF_ERROR(request_.call().stop.status());
-      STRATA_RETURN_IF_ERROR(request_.Receive(in_));
+      In in;
+      STRATA_RETURN_IF_ERROR(request_.Open(sealed_.bytes, in, memory_));
       return handler(
-          runtime_.db, request_.call(), in_, [this](const Out& message) { return Send(message); });
+          runtime_.db, request_.call(), in, [this](const Out& message) { return Send(message); });
     });
     this->Finish(request_.Close(status));
   }
 
   absl::Status Send(const Out& message) {
     STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+    STRATA_RETURN_IF_ERROR(request_.StillAllowed());
     {
       absl::MutexLock lock(&mutex_);
       sending_ = true;
@@ -94,21 +102,12 @@ class StreamReactor final : public grpc::ServerWriteReactor<Out> {
   Runtime& runtime_;
   grpc::CallbackServerContext& context_;
   Request request_;
-  const In& in_;
+  Booking memory_;  // of the request
+  Sealed<In>& sealed_;
   absl::Mutex mutex_;
   bool sending_ ABSL_GUARDED_BY(mutex_) = false;
   bool send_ok_ ABSL_GUARDED_BY(mutex_) = true;
 };
-
-// Answers with what `handler` sends from one of the runtime's stream threads.
-template <typename In, typename Out>
-grpc::ServerWriteReactor<Out>* RunStream(Runtime& runtime,
-                                         grpc::CallbackServerContext* context,
-                                         absl::string_view method,
-                                         const In* in,
-                                         StreamHandler<In, Out> handler) {
-  return new StreamReactor<In, Out>(runtime, *context, method, *in, handler);
-}
 
 }  // namespace strata::server
 

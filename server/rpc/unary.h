@@ -15,6 +15,7 @@
 #include "core/common/status.h"
 #include "server/rpc/request.h"
 #include "server/rpc/runtime.h"
+#include "server/rpc/sealed.h"
 
 namespace strata::server {
 
@@ -35,18 +36,23 @@ class UnaryReactor final : public grpc::ServerUnaryReactor {
   UnaryReactor(Runtime& runtime,
                grpc::CallbackServerContext& context,
                absl::string_view method,
-               const In& in,
+               Sealed<In>& in,
                Out& out,
                Handler handler,
                AtHandHandler<In, Out> at_hand)
-      : runtime_(runtime), request_(runtime, context, method), in_(in), out_(out) {
+      : runtime_(runtime),
+        request_(runtime, context, method),
+        in_memory_(request_.NewBooking()),
+        out_memory_(request_.NewBooking()),
+        out_(out) {
     absl::StatusOr<bool> answered = false;
     const absl::Status status = Guarded([&]() -> absl::Status {
       STRATA_RETURN_IF_ERROR(request_.admission());
-      STRATA_RETURN_IF_ERROR(request_.Receive(in_));
+      STRATA_RETURN_IF_ERROR(request_.Open(in.bytes, in_, in_memory_));
       if (at_hand != nullptr) answered = at_hand(runtime_.db, request_.call(), in_, out_);
       return answered.status();
     });
+    in.bytes.Clear();
     if (!status.ok() || *answered) {
       End(status);
     } else {
@@ -65,8 +71,9 @@ class UnaryReactor final : public grpc::ServerUnaryReactor {
       }
     }));
   }
-  void End(const absl::Status& status) {
-    request_.CountSent(out_);
+  void End(absl::Status status) {
+    if (status.ok()) status = Request::HoldAnswer(out_, out_memory_);
+    if (status.ok()) request_.CountSent(out_);
     Finish(request_.Close(status));
   }
   void OnCancel() override { request_.Cancel(); }
@@ -74,22 +81,11 @@ class UnaryReactor final : public grpc::ServerUnaryReactor {
 
   Runtime& runtime_;
   Request request_;
-  const In& in_;
+  Booking in_memory_;
+  Booking out_memory_;  // until the client has the answer
+  In in_;
   Out& out_;
 };
-
-// Answers with what `handler`, of one of the two types above, does on one of the runtime's query
-// threads, or `at_hand` at once.
-template <typename In, typename Out, typename Handler>
-grpc::ServerUnaryReactor* RunUnary(Runtime& runtime,
-                                   grpc::CallbackServerContext* context,
-                                   absl::string_view method,
-                                   const In* in,
-                                   Out* out,
-                                   Handler handler,
-                                   AtHandHandler<In, Out> at_hand = nullptr) {
-  return new UnaryReactor<In, Out, Handler>(runtime, *context, method, *in, *out, handler, at_hand);
-}
 
 }  // namespace strata::server
 

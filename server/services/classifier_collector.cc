@@ -5,6 +5,7 @@
 #include "core/common/status.h"
 #include "proto/translate/classifiers.h"
 #include "server/rpc/request.h"
+#include "server/services/append.h"
 
 namespace strata::server {
 namespace {
@@ -15,7 +16,10 @@ absl::Status Wrong(absl::string_view rule) {
 
 }  // namespace
 
-absl::Status ClassifierCollector::Take(api::Database& db, const api::Call& call, const In& in) {
+absl::Status ClassifierCollector::Take(api::Database& db,
+                                       const api::Call& call,
+                                       const In& in,
+                                       Booking& memory) {
   if (in.has_start() && !begun_) {
     map_ = in.start().map();
     name_ = in.start().name();
@@ -28,10 +32,11 @@ absl::Status ClassifierCollector::Take(api::Database& db, const api::Call& call,
     return Wrong(begun_ ? "every message after the first has bytes"
                         : "the first message is the start");
   }
-  bytes_ += in.bytes();
-  if (bytes_.size() <= kMaxClassifierBytes) return absl::OkStatus();
-  return AtTheDoor(absl::ResourceExhaustedError(
-      absl::StrCat("classifier ", name_, ": more than ", kMaxClassifierBytes, " bytes")));
+  if (bytes_.size() + in.bytes().size() > kMaxClassifierBytes) {
+    return AtTheDoor(absl::ResourceExhaustedError(
+        absl::StrCat("classifier ", name_, ": more than ", kMaxClassifierBytes, " bytes")));
+  }
+  return Append(in.bytes(), memory, bytes_);
 }
 
 absl::Status ClassifierCollector::Finish(api::Database& db, const api::Call& call, Out& out) {

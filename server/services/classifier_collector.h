@@ -7,6 +7,7 @@
 #include "absl/status/status.h"
 
 #include "core/api/database.h"
+#include "server/rpc/client_limits.h"
 #include "strata/v1/classifiers.pb.h"
 
 namespace strata::server {
@@ -17,7 +18,7 @@ class ClassifierCollector {
   using In = v1::ImportClassifierRequest;
   using Out = v1::ImportClassifierResponse;
 
-  absl::Status Take(api::Database& db, const api::Call& call, const In& in);
+  absl::Status Take(api::Database& db, const api::Call& call, const In& in, Booking& memory);
   absl::Status Finish(api::Database& db, const api::Call& call, Out& out);
 
  private:

@@ -5,9 +5,7 @@
 
 #include "core/common/status.h"
 #include "proto/translate/classifiers.h"
-#include "server/rpc/collect.h"
 #include "server/rpc/stream.h"
-#include "server/rpc/unary.h"
 #include "server/services/classifier_collector.h"
 
 namespace strata::server {
@@ -55,32 +53,12 @@ absl::Status Export(api::Database& db,
 
 }  // namespace
 
-grpc::ServerUnaryReactor* ClassifiersService::Get(grpc::CallbackServerContext* context,
-                                                  const v1::GetClassifierRequest* in,
-                                                  v1::GetClassifierResponse* out) {
-  return RunUnary(runtime_, context, "Classifiers.Get", in, out, &server::Get);
-}
-
-grpc::ServerUnaryReactor* ClassifiersService::List(grpc::CallbackServerContext* context,
-                                                   const v1::ListClassifiersRequest* in,
-                                                   v1::ListClassifiersResponse* out) {
-  return RunUnary(runtime_, context, "Classifiers.List", in, out, &server::List);
-}
-
-grpc::ServerUnaryReactor* ClassifiersService::Delete(grpc::CallbackServerContext* context,
-                                                     const v1::DeleteClassifierRequest* in,
-                                                     v1::DeleteClassifierResponse* out) {
-  return RunUnary(runtime_, context, "Classifiers.Delete", in, out, &server::Delete);
-}
-
-grpc::ServerWriteReactor<v1::ExportClassifierResponse>* ClassifiersService::Export(
-    grpc::CallbackServerContext* context, const v1::ExportClassifierRequest* in) {
-  return RunStream(runtime_, context, "Classifiers.Export", in, &server::Export);
-}
-
-grpc::ServerReadReactor<v1::ImportClassifierRequest>* ClassifiersService::Import(
-    grpc::CallbackServerContext* context, v1::ImportClassifierResponse* out) {
-  return new CollectReactor<ClassifierCollector>(runtime_, *context, "Classifiers.Import", *out);
+ClassifiersService::ClassifiersService(Runtime& runtime) : Service(runtime, "Classifiers") {
+  Unary("Get", &Get);
+  Unary("List", &List);
+  Unary("Delete", &Delete);
+  Stream("Export", &Export);
+  Collect<ClassifierCollector>("Import");
 }
 
 }  // namespace strata::server

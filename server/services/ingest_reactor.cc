@@ -22,7 +22,10 @@ constexpr std::size_t kMaxUnanswered = 16;
 IngestReactor::IngestReactor(Runtime& runtime, grpc::CallbackServerContext& context)
     : runtime_(runtime),
       request_(runtime, context, "Scans.Ingest"),
-      expected_(runtime.silence, [this](const absl::Status& status) { EndReading(status); }) {
+      in_memory_(request_.NewBooking()),
+      expected_(runtime.silence, request_.call().stop, [this](const absl::Status& status) {
+        EndReading(status);
+      }) {
   if (!request_.admission().ok()) {
     Finish(request_.Close(request_.admission()));
     return;
@@ -49,6 +52,7 @@ void IngestReactor::OnReadDone(bool ok) {
 
 void IngestReactor::Take() {
   const absl::Status status = Guarded([this] { return TakeMessage(); });
+  in_memory_.Release();
   if (!status.ok()) {
     EndReading(status);
     return;
@@ -60,16 +64,16 @@ void IngestReactor::Take() {
 
 absl::Status IngestReactor::TakeMessage() {
   STRATA_RETURN_IF_ERROR(request_.call().stop.status());
-  const absl::Status allowed = request_.Receive(message_);
-  if (absl::IsUnauthenticated(allowed)) return allowed;
+  In in;
+  const absl::Status allowed = request_.Open(message_.bytes, in, in_memory_);
   // Another scan's map may be his to write to.
-  if (message_.has_start()) {
+  if (!allowed.ok() && !absl::IsPermissionDenied(allowed)) return allowed;
+  if (in.has_start()) {
     AbandonIncomplete();
-    Begin(message_.start(), allowed);
+    Begin(in.start(), allowed);
     return absl::OkStatus();
   }
-  STRATA_RETURN_IF_ERROR(allowed);
-  if (message_.has_chunk()) return Add(message_.chunk());
+  if (in.has_chunk()) return Add(in.chunk(), allowed);
   return AtTheDoor(
       absl::InvalidArgumentError("ingest: a message is the start of a scan or a chunk"));
 }
@@ -77,7 +81,8 @@ absl::Status IngestReactor::TakeMessage() {
 void IngestReactor::Begin(const v1::ScanStart& start, const absl::Status& allowed) {
   current_id_ = start.header().id();
   absl::StatusOr<ScanReceiver> begun =
-      allowed.ok() ? ScanReceiver::Begin(runtime_.db, request_.call(), start) : allowed;
+      allowed.ok() ? ScanReceiver::Begin(runtime_.db, request_.call(), start, request_.NewBooking())
+                   : allowed;
   passing_over_ = !begun.ok();
   if (!begun.ok()) {
     EndScan(begun.status());
@@ -101,13 +106,13 @@ void IngestReactor::Accept(std::uint64_t points_held) {
   StartWriteIfIdle();
 }
 
-absl::Status IngestReactor::Add(const v1::PointChunk& chunk) {
+absl::Status IngestReactor::Add(const v1::PointChunk& chunk, const absl::Status& allowed) {
   if (passing_over_) return absl::OkStatus();
   if (!current_.has_value()) {
     return AtTheDoor(
         absl::InvalidArgumentError("ingest: a chunk belongs to no scan; send its start"));
   }
-  const absl::Status status = current_->Add(chunk);
+  const absl::Status status = allowed.ok() ? current_->Add(chunk) : allowed;
   passing_over_ = !status.ok();
   if (!status.ok() || current_->complete()) EndScan(status);
   return absl::OkStatus();

@@ -13,6 +13,7 @@
 #include "core/world/scan.h"
 #include "server/rpc/request.h"
 #include "server/rpc/runtime.h"
+#include "server/rpc/sealed.h"
 #include "server/services/scan_receiver.h"
 #include "strata/v1/scans.grpc.pb.h"
 
@@ -23,8 +24,11 @@ namespace strata::server {
 // resume) and writing answers. Reading pauses while kMaxUnanswered scans wait for their answers.
 // Lives from the call's arrival to its end; owns itself.
 class IngestReactor final
-    : public grpc::ServerBidiReactor<v1::IngestScansRequest, v1::IngestScansResponse> {
+    : public grpc::ServerBidiReactor<Sealed<v1::IngestScansRequest>, v1::IngestScansResponse> {
  public:
+  using In = v1::IngestScansRequest;
+  using Out = v1::IngestScansResponse;
+
   IngestReactor(Runtime& runtime, grpc::CallbackServerContext& context);
 
  private:
@@ -48,7 +52,7 @@ class IngestReactor final
   void Begin(const v1::ScanStart& start, const absl::Status& allowed);
   // Tells the client where the points of the scan begun are to go on.
   void Accept(std::uint64_t points_held);
-  absl::Status Add(const v1::PointChunk& chunk);
+  absl::Status Add(const v1::PointChunk& chunk, const absl::Status& allowed);
   // The scan under way will not be completed.
   void AbandonIncomplete();
   void EndScan(const absl::Status& error);
@@ -68,9 +72,10 @@ class IngestReactor final
 
   Runtime& runtime_;
   Request request_;
+  Booking in_memory_;
 
   // Of the reading chain alone.
-  v1::IngestScansRequest message_;
+  Sealed<In> message_;
   v1::ScanId current_id_;
   std::optional<ScanReceiver> current_;
   bool passing_over_ = false;  // the rest of a refused scan

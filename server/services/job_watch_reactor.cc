@@ -10,18 +10,17 @@
 
 namespace strata::server {
 
-JobWatchReactor::JobWatchReactor(Runtime& runtime,
-                                 grpc::CallbackServerContext& context,
-                                 const v1::WatchJobRequest& in)
-    : PollReactor(runtime, context, "Jobs.Watch", in), in_(in) {}
+absl::Status JobWatchReactor::Ask(const In& in) {
+  map_ = in.map();
+  id_ = in.id();
+  return absl::OkStatus();
+}
 
-absl::StatusOr<JobWatchReactor::News> JobWatchReactor::Look(v1::WatchJobResponse& out) {
-  STRATA_ASSIGN_OR_RETURN(const JobInfo info,
-                          runtime().db.jobs().Get(request().call(), in_.map(), in_.id()));
+absl::StatusOr<JobWatchReactor::News> JobWatchReactor::Look(Out& out) {
+  STRATA_ASSIGN_OR_RETURN(const JobInfo info, runtime().db.jobs().Get(request().call(), map_, id_));
   v1::Job job = translate::ToProto(info);
-  if (out.has_job() && google::protobuf::util::MessageDifferencer::Equals(out.job(), job)) {
-    return News::kNone;
-  }
+  if (google::protobuf::util::MessageDifferencer::Equals(told_, job)) return News::kNone;
+  told_ = job;
   *out.mutable_job() = std::move(job);
   return IsFinal(info.state) ? News::kLast : News::kSome;
 }

@@ -7,7 +7,6 @@
 #include "core/common/status.h"
 #include "core/world/job.h"
 #include "proto/translate/jobs.h"
-#include "server/rpc/unary.h"
 #include "server/services/job_watch_reactor.h"
 
 namespace strata::server {
@@ -74,45 +73,14 @@ absl::Status Revert(api::Database& db,
 
 }  // namespace
 
-grpc::ServerUnaryReactor* JobsService::Start(grpc::CallbackServerContext* context,
-                                             const v1::StartJobRequest* in,
-                                             v1::StartJobResponse* out) {
-  return RunUnary(runtime_, context, "Jobs.Start", in, out, &server::Start);
-}
-
-grpc::ServerUnaryReactor* JobsService::Get(grpc::CallbackServerContext* context,
-                                           const v1::GetJobRequest* in,
-                                           v1::GetJobResponse* out) {
-  return RunUnary(runtime_, context, "Jobs.Get", in, out, &server::Get);
-}
-
-grpc::ServerUnaryReactor* JobsService::List(grpc::CallbackServerContext* context,
-                                            const v1::ListJobsRequest* in,
-                                            v1::ListJobsResponse* out) {
-  return RunUnary(runtime_, context, "Jobs.List", in, out, &server::List);
-}
-
-grpc::ServerUnaryReactor* JobsService::Cancel(grpc::CallbackServerContext* context,
-                                              const v1::CancelJobRequest* in,
-                                              v1::CancelJobResponse* out) {
-  return RunUnary(runtime_, context, "Jobs.Cancel", in, out, &server::Cancel);
-}
-
-grpc::ServerUnaryReactor* JobsService::Accept(grpc::CallbackServerContext* context,
-                                              const v1::AcceptJobRequest* in,
-                                              v1::AcceptJobResponse* out) {
-  return RunUnary(runtime_, context, "Jobs.Accept", in, out, &server::Accept);
-}
-
-grpc::ServerUnaryReactor* JobsService::Revert(grpc::CallbackServerContext* context,
-                                              const v1::RevertJobRequest* in,
-                                              v1::RevertJobResponse* out) {
-  return RunUnary(runtime_, context, "Jobs.Revert", in, out, &server::Revert);
-}
-
-grpc::ServerWriteReactor<v1::WatchJobResponse>* JobsService::Watch(
-    grpc::CallbackServerContext* context, const v1::WatchJobRequest* in) {
-  return StartPolling<JobWatchReactor>(runtime_, *context, *in);
+JobsService::JobsService(Runtime& runtime) : Service(runtime, "Jobs") {
+  Unary("Start", &Start);
+  Unary("Get", &Get);
+  Unary("List", &List);
+  Unary("Cancel", &Cancel);
+  Unary("Accept", &Accept);
+  Unary("Revert", &Revert);
+  Poll<JobWatchReactor>("Watch");
 }
 
 }  // namespace strata::server

@@ -6,12 +6,16 @@
 #include "proto/translate/points.h"
 #include "proto/translate/scans.h"
 #include "server/rpc/request.h"
+#include "server/services/append.h"
 
 namespace strata::server {
 
-absl::Status LabelCollector::Take(api::Database& db, const api::Call& call, const In& in) {
+absl::Status LabelCollector::Take(api::Database& db,
+                                  const api::Call& call,
+                                  const In& in,
+                                  Booking& memory) {
   if (in.has_start() && !begun_) return Begin(db, call, in.start());
-  if (in.part_case() == In::kLabels && begun_) return AtTheDoor(Add(in.labels()));
+  if (in.part_case() == In::kLabels && begun_) return Add(in.labels(), memory);
   return AtTheDoor(
       absl::InvalidArgumentError(begun_ ? "labels: every message after the first has labels"
                                         : "labels: the first message is the start"));
@@ -29,14 +33,14 @@ absl::Status LabelCollector::Begin(api::Database& db,
   return absl::OkStatus();
 }
 
-absl::Status LabelCollector::Add(const std::string& bytes) {
-  STRATA_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> labels, translate::UnpackLabels(bytes));
+absl::Status LabelCollector::Add(const std::string& bytes, Booking& memory) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> labels,
+                          AtTheDoor(translate::UnpackLabels(bytes)));
   if (labels.size() > points_ - labels_.size()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("labels: more than the ", points_, " points of scan ", id_.ToString()));
+    return AtTheDoor(absl::InvalidArgumentError(
+        absl::StrCat("labels: more than the ", points_, " points of scan ", id_.ToString())));
   }
-  labels_.insert(labels_.end(), labels.begin(), labels.end());
-  return absl::OkStatus();
+  return Append(labels, memory, labels_);
 }
 
 absl::Status LabelCollector::Finish(api::Database& db, const api::Call& call, Out& /*out*/) {

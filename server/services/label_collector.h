@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 
 #include "core/api/database.h"
+#include "server/rpc/client_limits.h"
 #include "strata/v1/scans.pb.h"
 
 namespace strata::server {
@@ -19,12 +20,12 @@ class LabelCollector {
   using In = v1::SetScanLabelsRequest;
   using Out = v1::SetScanLabelsResponse;
 
-  absl::Status Take(api::Database& db, const api::Call& call, const In& in);
+  absl::Status Take(api::Database& db, const api::Call& call, const In& in, Booking& memory);
   absl::Status Finish(api::Database& db, const api::Call& call, Out& out);
 
  private:
   absl::Status Begin(api::Database& db, const api::Call& call, const v1::SetScanLabelsStart& start);
-  absl::Status Add(const std::string& bytes);
+  absl::Status Add(const std::string& bytes, Booking& memory);
 
   bool begun_ = false;
   std::string map_;

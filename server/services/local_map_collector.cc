@@ -6,6 +6,7 @@
 #include "core/common/status.h"
 #include "proto/translate/scans.h"
 #include "server/rpc/request.h"
+#include "server/services/append.h"
 
 namespace strata::server {
 namespace {
@@ -16,7 +17,10 @@ absl::Status Wrong(absl::string_view rule) {
 
 }  // namespace
 
-absl::Status LocalMapCollector::Take(api::Database& db, const api::Call& call, const In& in) {
+absl::Status LocalMapCollector::Take(api::Database& db,
+                                     const api::Call& call,
+                                     const In& in,
+                                     Booking& memory) {
   if (in.has_start() && !begun_) {
     const v1::UploadLocalMapStart& start = in.start();
     map_ = start.map();
@@ -33,13 +37,14 @@ absl::Status LocalMapCollector::Take(api::Database& db, const api::Call& call, c
     return Wrong(begun_ ? "every message after the first has bytes"
                         : "the first message is the start");
   }
-  bytes_ += in.local_map();
-  if (bytes_.size() <= api::kMaxLocalMapBytes) return absl::OkStatus();
-  return AtTheDoor(absl::ResourceExhaustedError(absl::StrCat("scan ",
-                                                             header_.id.ToString(),
-                                                             ": local map of more than ",
-                                                             api::kMaxLocalMapBytes,
-                                                             " bytes; split it")));
+  if (bytes_.size() + in.local_map().size() > api::kMaxLocalMapBytes) {
+    return AtTheDoor(absl::ResourceExhaustedError(absl::StrCat("scan ",
+                                                               header_.id.ToString(),
+                                                               ": local map of more than ",
+                                                               api::kMaxLocalMapBytes,
+                                                               " bytes; split it")));
+  }
+  return Append(in.local_map(), memory, bytes_);
 }
 
 absl::Status LocalMapCollector::Finish(api::Database& db, const api::Call& call, Out& out) {

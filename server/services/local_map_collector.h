@@ -9,6 +9,7 @@
 #include "core/api/database.h"
 #include "core/mls/mls_parameters.h"
 #include "core/world/scan.h"
+#include "server/rpc/client_limits.h"
 #include "strata/v1/scans.pb.h"
 
 namespace strata::server {
@@ -19,7 +20,7 @@ class LocalMapCollector {
   using In = v1::UploadLocalMapRequest;
   using Out = v1::UploadLocalMapResponse;
 
-  absl::Status Take(api::Database& db, const api::Call& call, const In& in);
+  absl::Status Take(api::Database& db, const api::Call& call, const In& in, Booking& memory);
   absl::Status Finish(api::Database& db, const api::Call& call, Out& out);
 
  private:

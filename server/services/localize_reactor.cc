@@ -9,6 +9,7 @@
 #include "core/common/status.h"
 #include "proto/translate/localize.h"
 #include "proto/translate/points.h"
+#include "server/services/append.h"
 
 namespace strata::server {
 namespace {
@@ -21,14 +22,15 @@ absl::Status OutOfOrder(absl::string_view rule) {
 
 }  // namespace
 
-LocalizeReactor::LocalizeReactor(Runtime& runtime,
-                                 grpc::CallbackServerContext& context,
-                                 v1::LocalizeResponse& out)
+LocalizeReactor::LocalizeReactor(Runtime& runtime, grpc::CallbackServerContext& context, Out& out)
     : runtime_(runtime),
       request_(runtime, context, "PoseGraph.Localize"),
+      in_memory_(request_.NewBooking()),
+      points_memory_(request_.NewBooking()),
       out_(out),
-      expected_(runtime.silence,
-                [this](const absl::Status& status) { Finish(request_.Close(status)); }) {
+      expected_(runtime.silence, request_.call().stop, [this](const absl::Status& status) {
+        Finish(request_.Close(status));
+      }) {
   if (!request_.admission().ok()) {
     Finish(request_.Close(request_.admission()));
     return;
@@ -52,6 +54,7 @@ void LocalizeReactor::OnReadDone(bool ok) {
 
 void LocalizeReactor::Take() {
   const absl::Status status = Guarded([this] { return TakeMessage(); });
+  in_memory_.Release();
   if (status.ok()) {
     Read();
   } else {
@@ -61,9 +64,10 @@ void LocalizeReactor::Take() {
 
 absl::Status LocalizeReactor::TakeMessage() {
   STRATA_RETURN_IF_ERROR(request_.call().stop.status());
-  STRATA_RETURN_IF_ERROR(request_.Receive(message_));
-  if (message_.has_start() && !begun_) return AtTheDoor(Begin(message_.start()));
-  if (message_.has_chunk() && begun_) return AtTheDoor(Add(message_.chunk()));
+  In in;
+  STRATA_RETURN_IF_ERROR(request_.Open(message_.bytes, in, in_memory_));
+  if (in.has_start() && !begun_) return AtTheDoor(Begin(in.start()));
+  if (in.has_chunk() && begun_) return Add(in.chunk());
   return AtTheDoor(OutOfOrder(begun_ ? "every message after the first is a chunk"
                                      : "the first message is the start of the scan"));
 }
@@ -86,11 +90,10 @@ absl::Status LocalizeReactor::Begin(const v1::LocalizeStart& start) {
 }
 
 absl::Status LocalizeReactor::Add(const v1::PointChunk& chunk) {
-  STRATA_ASSIGN_OR_RETURN(const PointCloud piece, translate::FromProto(chunk));
+  STRATA_ASSIGN_OR_RETURN(const PointCloud piece, AtTheDoor(translate::FromProto(chunk)));
   std::vector<Eigen::Vector3f>& points = query_.cloud.points;
-  STRATA_RETURN_IF_ERROR(api::CheckChunk(piece, shape_, points.size()));
-  points.insert(points.end(), piece.points.begin(), piece.points.end());
-  return absl::OkStatus();
+  STRATA_RETURN_IF_ERROR(AtTheDoor(api::CheckChunk(piece, shape_, points.size())));
+  return Append(piece.points, points_memory_, points);
 }
 
 absl::Status LocalizeReactor::CheckComplete() const {
@@ -106,6 +109,7 @@ void LocalizeReactor::Search() {
   const absl::Status status = Guarded([this]() -> absl::Status {
     // The stream also ends when the client has gone.
     STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+    STRATA_RETURN_IF_ERROR(request_.StillAllowed());
     STRATA_RETURN_IF_ERROR(AtTheDoor(CheckComplete()));
     STRATA_ASSIGN_OR_RETURN(const LocalizeResult result,
                             runtime_.db.posegraph().Localize(request_.call(), map_, query_));

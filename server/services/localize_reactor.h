@@ -10,17 +10,19 @@
 #include "core/world/scan.h"
 #include "server/rpc/request.h"
 #include "server/rpc/runtime.h"
+#include "server/rpc/sealed.h"
 #include "strata/v1/posegraph.grpc.pb.h"
 
 namespace strata::server {
 
 // Reads a message only when the one before is dealt with; memory is the scan, which is bounded. The
 // search itself holds a query thread. Lives from the call's arrival to its end; owns itself.
-class LocalizeReactor final : public grpc::ServerReadReactor<v1::LocalizeRequest> {
+class LocalizeReactor final : public grpc::ServerReadReactor<Sealed<v1::LocalizeRequest>> {
  public:
-  LocalizeReactor(Runtime& runtime,
-                  grpc::CallbackServerContext& context,
-                  v1::LocalizeResponse& out);
+  using In = v1::LocalizeRequest;
+  using Out = v1::LocalizeResponse;
+
+  LocalizeReactor(Runtime& runtime, grpc::CallbackServerContext& context, Out& out);
 
  private:
   void Read();
@@ -39,8 +41,10 @@ class LocalizeReactor final : public grpc::ServerReadReactor<v1::LocalizeRequest
 
   Runtime& runtime_;
   Request request_;
-  v1::LocalizeResponse& out_;
-  v1::LocalizeRequest message_;
+  Booking in_memory_;
+  Booking points_memory_;
+  Out& out_;
+  Sealed<In> message_;
   bool begun_ = false;
   std::string map_;
   ScanHeader shape_;  // grid and number of the points to come

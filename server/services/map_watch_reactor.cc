@@ -1,6 +1,7 @@
 #include "server/services/map_watch_reactor.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <type_traits>
 
 #include "core/common/status.h"
@@ -13,62 +14,64 @@ constexpr std::size_t kMaxPerMessage = 1024;
 
 }  // namespace
 
-MapWatchReactor::MapWatchReactor(Runtime& runtime,
-                                 grpc::CallbackServerContext& context,
-                                 const v1::WatchMapRequest& in)
-    : PollReactor(runtime, context, "Maps.Watch", in), in_(in), resume_from_(in.since()) {}
+absl::Status MapWatchReactor::Ask(const In& in) {
+  map_ = in.name();
+  once_ = in.once();
+  resume_from_ = in.since();
+  STRATA_ASSIGN_OR_RETURN(options_, AtTheDoor(translate::FromProto(in)));
+  options_.once = true;
+  return absl::OkStatus();
+}
 
-absl::StatusOr<MapWatchReactor::News> MapWatchReactor::Look(v1::WatchMapResponse& out) {
-  if (updates_.empty()) STRATA_RETURN_IF_ERROR(LookAtMap());
-  if (updates_.empty()) return News::kNone;
-  TakePart(out);
-  if (!updates_.empty()) return News::kMore;
-  return in_.once() ? News::kLast : News::kSome;
+absl::StatusOr<MapWatchReactor::News> MapWatchReactor::Look(Out& out) {
+  if (parts_.empty()) STRATA_RETURN_IF_ERROR(LookAtMap());
+  if (parts_.empty()) return News::kNone;
+  if (!out.ParseFromString(parts_.front())) return absl::InternalError("a part of an update");
+  parts_bytes_ -= parts_.front().size();
+  parts_.pop_front();
+  if (!parts_.empty()) return News::kMore;
+  return once_ ? News::kLast : News::kSome;
 }
 
 absl::Status MapWatchReactor::LookAtMap() {
-  const bool first = !options_.has_value();
-  if (first) {
-    STRATA_ASSIGN_OR_RETURN(options_, AtTheDoor(translate::FromProto(in_)));
-    options_->once = true;
-  }
   const auto take = [&](const api::MapUpdate& update) -> absl::Status {
-    const bool news = update.commit_sequence != options_->since ||
-                      update.epoch != options_->epoch || !update.scans.empty() ||
-                      !update.tiles.empty();
-    options_->since = update.commit_sequence;
-    options_->epoch = update.epoch;
-    if (first || news) updates_.push_back(update);
+    const bool news = update.commit_sequence != options_.since || update.epoch != options_.epoch ||
+                      !update.scans.empty() || !update.tiles.empty();
+    options_.since = update.commit_sequence;
+    options_.epoch = update.epoch;
+    if (!looked_ || news) AddParts(update);
+    looked_ = true;
     return absl::OkStatus();
   };
-  const api::WatchOptions options = *options_;
-  return runtime().db.maps().Watch(request().call(), in_.name(), options, take);
+  const api::WatchOptions options = options_;
+  return runtime().db.maps().Watch(request().call(), map_, options, take);
 }
 
-void MapWatchReactor::TakePart(v1::WatchMapResponse& out) {
-  const api::MapUpdate& update = updates_.front();
-  const auto next = [](const auto& all, std::size_t& sent) {
-    const std::size_t begin = sent;
-    sent = std::min(all.size(), sent + kMaxPerMessage);
+void MapWatchReactor::AddParts(const api::MapUpdate& update) {
+  std::size_t scans_added = 0;
+  std::size_t tiles_added = 0;
+  const auto next = [](const auto& all, std::size_t& added) {
+    const std::size_t begin = added;
+    added = std::min(all.size(), added + kMaxPerMessage);
     using All = std::decay_t<decltype(all)>;
     return All(all.begin() + static_cast<std::ptrdiff_t>(begin),
-               all.begin() + static_cast<std::ptrdiff_t>(sent));
+               all.begin() + static_cast<std::ptrdiff_t>(added));
   };
-  api::MapUpdate part;
-  part.epoch = update.epoch;
-  if (scans_sent_ == 0 && tiles_sent_ == 0) {
-    part.epoch_reason = update.epoch_reason;
-    part.whole = update.whole;
+  for (bool last = false; !last;) {
+    api::MapUpdate part;
+    part.epoch = update.epoch;
+    if (scans_added == 0 && tiles_added == 0) {
+      part.epoch_reason = update.epoch_reason;
+      part.whole = update.whole;
+    }
+    part.scans = next(update.scans, scans_added);
+    part.tiles = next(update.tiles, tiles_added);
+    last = scans_added == update.scans.size() && tiles_added == update.tiles.size();
+    if (last) resume_from_ = update.commit_sequence;
+    part.commit_sequence = resume_from_;
+    parts_.push_back(translate::ToProto(part).SerializeAsString());
+    parts_bytes_ += parts_.back().size();
   }
-  part.scans = next(update.scans, scans_sent_);
-  part.tiles = next(update.tiles, tiles_sent_);
-  const bool last = scans_sent_ == update.scans.size() && tiles_sent_ == update.tiles.size();
-  if (last) resume_from_ = update.commit_sequence;
-  part.commit_sequence = resume_from_;
-  out = translate::ToProto(part);
-  if (!last) return;
-  updates_.pop_front();
-  scans_sent_ = tiles_sent_ = 0;
 }
 
 absl::string_view MapWatchReactor::shutdown_message() const {

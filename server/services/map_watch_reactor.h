@@ -3,8 +3,9 @@
 #define STRATA_SERVER_SERVICES_MAP_WATCH_REACTOR_H_
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
-#include <optional>
+#include <string>
 
 #include "core/api/maps.h"
 #include "server/rpc/poll.h"
@@ -13,27 +14,29 @@
 namespace strata::server {
 
 // Asks the map again and again what has changed since the last look, and sends that in parts. What
-// it holds for a slow reader is one look's updates; the next look comes when they are sent.
-class MapWatchReactor final : public PollReactor<v1::WatchMapResponse> {
+// it holds for a slow reader is one look's updates, as they go out; the next look comes when they
+// are sent.
+class MapWatchReactor final : public PollReactor<v1::WatchMapRequest, v1::WatchMapResponse> {
  public:
-  MapWatchReactor(Runtime& runtime,
-                  grpc::CallbackServerContext& context,
-                  const v1::WatchMapRequest& in);
+  MapWatchReactor(Runtime& runtime, grpc::CallbackServerContext& context, Sealed<In>& in)
+      : PollReactor(runtime, context, "Maps.Watch", in) {}
 
  private:
-  absl::StatusOr<News> Look(v1::WatchMapResponse& out) override;
+  absl::Status Ask(const In& in) override;
+  absl::StatusOr<News> Look(Out& out) override;
+  std::size_t kept_bytes() const override { return parts_bytes_; }
   absl::string_view shutdown_message() const override;
 
-  // Fills `updates_` with what is new; the first look always finds something.
+  // Fills `parts_` with what is new; the first look always finds something.
   absl::Status LookAtMap();
-  // The next part of the first of `updates_`, which goes with its last part.
-  void TakePart(v1::WatchMapResponse& out);
+  void AddParts(const api::MapUpdate& update);
 
-  const v1::WatchMapRequest& in_;
-  std::optional<api::WatchOptions> options_;  // of the next look; nullopt: there was none yet
-  std::deque<api::MapUpdate> updates_;
-  std::size_t scans_sent_ = 0;  // of the first update
-  std::size_t tiles_sent_ = 0;
+  std::string map_;
+  bool once_ = false;
+  bool looked_ = false;
+  api::WatchOptions options_;      // of the next look
+  std::deque<std::string> parts_;  // messages to be sent
+  std::size_t parts_bytes_ = 0;
   std::uint64_t resume_from_ = 0;  // told last
 };
 

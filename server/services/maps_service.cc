@@ -7,7 +7,6 @@
 #include "proto/translate/watch.h"
 #include "server/rpc/request.h"
 #include "server/rpc/stream.h"
-#include "server/rpc/unary.h"
 #include "server/services/map_watch_reactor.h"
 
 namespace strata::server {
@@ -103,62 +102,17 @@ absl::Status Backup(api::Database& db,
 
 }  // namespace
 
-grpc::ServerUnaryReactor* MapsService::Create(grpc::CallbackServerContext* context,
-                                              const v1::CreateMapRequest* in,
-                                              v1::CreateMapResponse* out) {
-  return RunUnary(runtime_, context, "Maps.Create", in, out, &server::Create);
-}
-
-grpc::ServerUnaryReactor* MapsService::Get(grpc::CallbackServerContext* context,
-                                           const v1::GetMapRequest* in,
-                                           v1::GetMapResponse* out) {
-  return RunUnary(runtime_, context, "Maps.Get", in, out, &server::Get);
-}
-
-grpc::ServerUnaryReactor* MapsService::List(grpc::CallbackServerContext* context,
-                                            const v1::ListMapsRequest* in,
-                                            v1::ListMapsResponse* out) {
-  return RunUnary(runtime_, context, "Maps.List", in, out, &server::List);
-}
-
-grpc::ServerUnaryReactor* MapsService::Delete(grpc::CallbackServerContext* context,
-                                              const v1::DeleteMapRequest* in,
-                                              v1::DeleteMapResponse* out) {
-  return RunUnary(runtime_, context, "Maps.Delete", in, out, &server::Delete);
-}
-
-grpc::ServerUnaryReactor* MapsService::Stats(grpc::CallbackServerContext* context,
-                                             const v1::GetMapStatsRequest* in,
-                                             v1::GetMapStatsResponse* out) {
-  return RunUnary(runtime_, context, "Maps.Stats", in, out, &server::Stats);
-}
-
-grpc::ServerUnaryReactor* MapsService::History(grpc::CallbackServerContext* context,
-                                               const v1::GetMapHistoryRequest* in,
-                                               v1::GetMapHistoryResponse* out) {
-  return RunUnary(runtime_, context, "Maps.History", in, out, &server::History);
-}
-
-grpc::ServerUnaryReactor* MapsService::ListClasses(grpc::CallbackServerContext* context,
-                                                   const v1::ListMapClassesRequest* in,
-                                                   v1::ListMapClassesResponse* out) {
-  return RunUnary(runtime_, context, "Maps.ListClasses", in, out, &server::ListClasses);
-}
-
-grpc::ServerUnaryReactor* MapsService::SetClass(grpc::CallbackServerContext* context,
-                                                const v1::SetMapClassRequest* in,
-                                                v1::SetMapClassResponse* out) {
-  return RunUnary(runtime_, context, "Maps.SetClass", in, out, &server::SetClass);
-}
-
-grpc::ServerWriteReactor<v1::WatchMapResponse>* MapsService::Watch(
-    grpc::CallbackServerContext* context, const v1::WatchMapRequest* in) {
-  return StartPolling<MapWatchReactor>(runtime_, *context, *in);
-}
-
-grpc::ServerWriteReactor<v1::BackupMapResponse>* MapsService::Backup(
-    grpc::CallbackServerContext* context, const v1::BackupMapRequest* in) {
-  return RunStream(runtime_, context, "Maps.Backup", in, &server::Backup);
+MapsService::MapsService(Runtime& runtime) : Service(runtime, "Maps") {
+  Unary("Create", &Create);
+  Unary("Get", &Get);
+  Unary("List", &List);
+  Unary("Delete", &Delete);
+  Unary("Stats", &Stats);
+  Unary("History", &History);
+  Unary("ListClasses", &ListClasses);
+  Unary("SetClass", &SetClass);
+  Poll<MapWatchReactor>("Watch");
+  Stream("Backup", &Backup);
 }
 
 }  // namespace strata::server

@@ -2,7 +2,8 @@
 #ifndef STRATA_SERVER_SERVICES_PATH_WATCH_REACTOR_H_
 #define STRATA_SERVER_SERVICES_PATH_WATCH_REACTOR_H_
 
-#include <optional>
+#include <cstddef>
+#include <string>
 
 #include "core/world/plan.h"
 #include "server/rpc/poll.h"
@@ -10,20 +11,24 @@
 
 namespace strata::server {
 
-// Asks again and again, with the answer before as what is known, so that a look at a path where
-// nothing changed costs next to nothing. (api::Planning::WatchPath would block a thread.)
-class PathWatchReactor final : public PollReactor<v1::WatchPathResponse> {
+// Asks again when the map has changed, with the answer before as what is known.
+// (api::Planning::WatchPath would block a thread.)
+class PathWatchReactor final : public PollReactor<v1::WatchPathRequest, v1::WatchPathResponse> {
  public:
-  PathWatchReactor(Runtime& runtime,
-                   grpc::CallbackServerContext& context,
-                   const v1::WatchPathRequest& in);
+  PathWatchReactor(Runtime& runtime, grpc::CallbackServerContext& context, Sealed<In>& in)
+      : PollReactor(runtime, context, "Planning.WatchPath", in) {}
 
  private:
-  absl::StatusOr<News> Look(v1::WatchPathResponse& out) override;
+  absl::Status Ask(const In& in) override;
+  absl::StatusOr<News> Look(Out& out) override;
+  std::size_t kept_bytes() const override;
   absl::string_view shutdown_message() const override;
 
-  const v1::WatchPathRequest& in_;
-  std::optional<PathQuery> query_;  // nullopt: there was no look yet
+  // Whether the map is as it was at the look before.
+  absl::StatusOr<bool> Unchanged();
+
+  std::string map_;
+  PathQuery query_;
 };
 
 }  // namespace strata::server

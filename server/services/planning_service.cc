@@ -12,7 +12,6 @@
 #include "proto/translate/geometry.h"
 #include "proto/translate/maps.h"
 #include "proto/translate/planning.h"
-#include "server/rpc/unary.h"
 #include "server/services/path_watch_reactor.h"
 
 namespace strata::server {
@@ -20,9 +19,6 @@ namespace {
 
 using translate::FromProto;
 using translate::ToProto;
-
-// Bounds the answer: some levels a place, 30 bytes each, stay well below a message's 4 MiB.
-constexpr int kMaxPlaces = 10'000;
 
 absl::Status PlanPath(api::Database& db,
                       const api::Call& call,
@@ -45,10 +41,6 @@ absl::Status CheckPath(api::Database& db,
 }
 
 absl::StatusOr<std::vector<Eigen::Vector2d>> PlacesOf(const v1::SampleSurfacesRequest& in) {
-  if (in.places_size() > kMaxPlaces) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "places: ", in.places_size(), " are more than ", kMaxPlaces, "; ask in parts"));
-  }
   std::vector<Eigen::Vector2d> places;
   places.reserve(static_cast<std::size_t>(in.places_size()));
   for (int i = 0; i < in.places_size(); ++i) {
@@ -92,39 +84,13 @@ absl::Status ListProfiles(api::Database& db,
 
 }  // namespace
 
-grpc::ServerUnaryReactor* PlanningService::PlanPath(grpc::CallbackServerContext* context,
-                                                    const v1::PlanPathRequest* in,
-                                                    v1::PlanPathResponse* out) {
-  return RunUnary(runtime_, context, "Planning.PlanPath", in, out, &server::PlanPath);
-}
-
-grpc::ServerUnaryReactor* PlanningService::CheckPath(grpc::CallbackServerContext* context,
-                                                     const v1::CheckPathRequest* in,
-                                                     v1::CheckPathResponse* out) {
-  return RunUnary(runtime_, context, "Planning.CheckPath", in, out, &server::CheckPath);
-}
-
-grpc::ServerWriteReactor<v1::WatchPathResponse>* PlanningService::WatchPath(
-    grpc::CallbackServerContext* context, const v1::WatchPathRequest* in) {
-  return StartPolling<PathWatchReactor>(runtime_, *context, *in);
-}
-
-grpc::ServerUnaryReactor* PlanningService::SampleSurfaces(grpc::CallbackServerContext* context,
-                                                          const v1::SampleSurfacesRequest* in,
-                                                          v1::SampleSurfacesResponse* out) {
-  return RunUnary(runtime_, context, "Planning.SampleSurfaces", in, out, &server::SampleSurfaces);
-}
-
-grpc::ServerUnaryReactor* PlanningService::SetProfile(grpc::CallbackServerContext* context,
-                                                      const v1::SetProfileRequest* in,
-                                                      v1::SetProfileResponse* out) {
-  return RunUnary(runtime_, context, "Planning.SetProfile", in, out, &server::SetProfile);
-}
-
-grpc::ServerUnaryReactor* PlanningService::ListProfiles(grpc::CallbackServerContext* context,
-                                                        const v1::ListProfilesRequest* in,
-                                                        v1::ListProfilesResponse* out) {
-  return RunUnary(runtime_, context, "Planning.ListProfiles", in, out, &server::ListProfiles);
+PlanningService::PlanningService(Runtime& runtime) : Service(runtime, "Planning") {
+  Unary("PlanPath", &PlanPath);
+  Unary("CheckPath", &CheckPath);
+  Poll<PathWatchReactor>("WatchPath");
+  Unary("SampleSurfaces", &SampleSurfaces);
+  Unary("SetProfile", &SetProfile);
+  Unary("ListProfiles", &ListProfiles);
 }
 
 }  // namespace strata::server

@@ -5,7 +5,6 @@
 #include "proto/translate/posegraph.h"
 #include "proto/translate/scans.h"
 #include "server/rpc/stream.h"
-#include "server/rpc/unary.h"
 #include "server/services/localize_reactor.h"
 
 namespace strata::server {
@@ -95,46 +94,14 @@ absl::Status LookupPose(api::Database& db,
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::GetPoseGraphResponse>* PoseGraphService::Get(
-    grpc::CallbackServerContext* context, const v1::GetPoseGraphRequest* in) {
-  return RunStream(runtime_, context, "PoseGraph.Get", in, &server::Get);
-}
-
-grpc::ServerUnaryReactor* PoseGraphService::SetPose(grpc::CallbackServerContext* context,
-                                                    const v1::SetPoseRequest* in,
-                                                    v1::SetPoseResponse* out) {
-  return RunUnary(runtime_, context, "PoseGraph.SetPose", in, out, &server::SetPose);
-}
-
-grpc::ServerUnaryReactor* PoseGraphService::AddConstraint(grpc::CallbackServerContext* context,
-                                                          const v1::AddConstraintRequest* in,
-                                                          v1::AddConstraintResponse* out) {
-  return RunUnary(runtime_, context, "PoseGraph.AddConstraint", in, out, &server::AddConstraint);
-}
-
-grpc::ServerUnaryReactor* PoseGraphService::RemoveConstraint(grpc::CallbackServerContext* context,
-                                                             const v1::RemoveConstraintRequest* in,
-                                                             v1::RemoveConstraintResponse* out) {
-  return RunUnary(
-      runtime_, context, "PoseGraph.RemoveConstraint", in, out, &server::RemoveConstraint);
-}
-
-grpc::ServerUnaryReactor* PoseGraphService::EnableConstraint(grpc::CallbackServerContext* context,
-                                                             const v1::EnableConstraintRequest* in,
-                                                             v1::EnableConstraintResponse* out) {
-  return RunUnary(
-      runtime_, context, "PoseGraph.EnableConstraint", in, out, &server::EnableConstraint);
-}
-
-grpc::ServerUnaryReactor* PoseGraphService::LookupPose(grpc::CallbackServerContext* context,
-                                                       const v1::LookupPoseRequest* in,
-                                                       v1::LookupPoseResponse* out) {
-  return RunUnary(runtime_, context, "PoseGraph.LookupPose", in, out, &server::LookupPose);
-}
-
-grpc::ServerReadReactor<v1::LocalizeRequest>* PoseGraphService::Localize(
-    grpc::CallbackServerContext* context, v1::LocalizeResponse* out) {
-  return new LocalizeReactor(runtime_, *context, *out);
+PoseGraphService::PoseGraphService(Runtime& runtime) : Service(runtime, "PoseGraph") {
+  Stream("Get", &Get);
+  Unary("SetPose", &SetPose);
+  Unary("AddConstraint", &AddConstraint);
+  Unary("RemoveConstraint", &RemoveConstraint);
+  Unary("EnableConstraint", &EnableConstraint);
+  Unary("LookupPose", &LookupPose);
+  Receive<LocalizeReactor>("Localize");
 }
 
 }  // namespace strata::server

@@ -13,6 +13,7 @@
 #include "core/api/call.h"
 #include "core/api/database.h"
 #include "core/world/scan.h"
+#include "server/rpc/client_limits.h"
 #include "strata/v1/scans.pb.h"
 
 namespace strata::server {
@@ -21,10 +22,12 @@ namespace strata::server {
 // and come one at a time, from any thread.
 class ScanReceiver {
  public:
-  // INVALID_ARGUMENT for a bad header; what api::Scans::Upload answers.
+  // INVALID_ARGUMENT for a bad header; what api::Scans::Upload answers; RESOURCE_EXHAUSTED where
+  // `memory` cannot book what a scan takes on its way in.
   static absl::StatusOr<ScanReceiver> Begin(api::Database& db,
                                             const api::Call& call,
-                                            const v1::ScanStart& start);
+                                            const v1::ScanStart& start,
+                                            Booking memory);
 
   // INVALID_ARGUMENT for points that the header did not announce or that are not finite.
   // Those that were there already are passed over.
@@ -39,13 +42,18 @@ class ScanReceiver {
   bool complete() const { return std::max(held_, received_) == header_.point_count; }
 
  private:
-  ScanReceiver(ScanHeader header, std::unique_ptr<api::ScanUpload> upload, bool resume)
+  ScanReceiver(ScanHeader header,
+               Booking memory,
+               std::unique_ptr<api::ScanUpload> upload,
+               bool resume)
       : header_(std::move(header)),
+        memory_(std::move(memory)),
         upload_(std::move(upload)),
         held_(upload_->points_held()),
         received_(resume ? held_ : 0) {}
 
   ScanHeader header_;
+  Booking memory_;
   std::unique_ptr<api::ScanUpload> upload_;
   std::uint64_t held_;
   std::uint64_t received_;  // points, those included that the client knew to be there

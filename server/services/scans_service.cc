@@ -10,9 +10,7 @@
 #include "core/world/scan.h"
 #include "proto/translate/points.h"
 #include "proto/translate/scans.h"
-#include "server/rpc/collect.h"
 #include "server/rpc/stream.h"
-#include "server/rpc/unary.h"
 #include "server/services/ingest_reactor.h"
 #include "server/services/label_collector.h"
 #include "server/services/local_map_collector.h"
@@ -98,57 +96,17 @@ absl::Status Delete(api::Database& db,
 
 }  // namespace
 
-grpc::ServerReadReactor<v1::UploadScanRequest>* ScansService::Upload(
-    grpc::CallbackServerContext* context, v1::UploadScanResponse* out) {
-  return new UploadReactor(runtime_, *context, *out);
-}
-
-grpc::ServerBidiReactor<v1::IngestScansRequest, v1::IngestScansResponse>* ScansService::Ingest(
-    grpc::CallbackServerContext* context) {
-  return new IngestReactor(runtime_, *context);
-}
-
-grpc::ServerReadReactor<v1::UploadLocalMapRequest>* ScansService::UploadLocalMap(
-    grpc::CallbackServerContext* context, v1::UploadLocalMapResponse* out) {
-  return new CollectReactor<LocalMapCollector>(runtime_, *context, "Scans.UploadLocalMap", *out);
-}
-
-grpc::ServerUnaryReactor* ScansService::GetUploadState(grpc::CallbackServerContext* context,
-                                                       const v1::GetUploadStateRequest* in,
-                                                       v1::GetUploadStateResponse* out) {
-  return RunUnary(runtime_, context, "Scans.GetUploadState", in, out, &server::GetUploadState);
-}
-
-grpc::ServerUnaryReactor* ScansService::Get(grpc::CallbackServerContext* context,
-                                            const v1::GetScanRequest* in,
-                                            v1::GetScanResponse* out) {
-  return RunUnary(runtime_, context, "Scans.Get", in, out, &server::Get);
-}
-
-grpc::ServerWriteReactor<v1::ListScansResponse>* ScansService::List(
-    grpc::CallbackServerContext* context, const v1::ListScansRequest* in) {
-  return RunStream(runtime_, context, "Scans.List", in, &server::List);
-}
-
-grpc::ServerWriteReactor<v1::GetScanPointsResponse>* ScansService::GetPoints(
-    grpc::CallbackServerContext* context, const v1::GetScanPointsRequest* in) {
-  return RunStream(runtime_, context, "Scans.GetPoints", in, &server::GetPoints);
-}
-
-grpc::ServerWriteReactor<v1::GetFadedPointsResponse>* ScansService::GetFaded(
-    grpc::CallbackServerContext* context, const v1::GetFadedPointsRequest* in) {
-  return RunStream(runtime_, context, "Scans.GetFaded", in, &server::GetFaded);
-}
-
-grpc::ServerReadReactor<v1::SetScanLabelsRequest>* ScansService::SetLabels(
-    grpc::CallbackServerContext* context, v1::SetScanLabelsResponse* out) {
-  return new CollectReactor<LabelCollector>(runtime_, *context, "Scans.SetLabels", *out);
-}
-
-grpc::ServerUnaryReactor* ScansService::Delete(grpc::CallbackServerContext* context,
-                                               const v1::DeleteScanRequest* in,
-                                               v1::DeleteScanResponse* out) {
-  return RunUnary(runtime_, context, "Scans.Delete", in, out, &server::Delete);
+ScansService::ScansService(Runtime& runtime) : Service(runtime, "Scans") {
+  Receive<UploadReactor>("Upload");
+  Exchange<IngestReactor>("Ingest");
+  Collect<LocalMapCollector>("UploadLocalMap");
+  Unary("GetUploadState", &GetUploadState);
+  Unary("Get", &Get);
+  Stream("List", &List);
+  Stream("GetPoints", &GetPoints);
+  Stream("GetFaded", &GetFaded);
+  Collect<LabelCollector>("SetLabels");
+  Unary("Delete", &Delete);
 }
 
 }  // namespace strata::server

@@ -7,7 +7,6 @@
 #include "core/common/status.h"
 #include "proto/translate/tiles.h"
 #include "server/rpc/stream.h"
-#include "server/rpc/unary.h"
 
 namespace strata::server {
 namespace {
@@ -78,20 +77,10 @@ absl::Status Fetch(api::Database& db,
 
 }  // namespace
 
-grpc::ServerUnaryReactor* TilesService::Get(grpc::CallbackServerContext* context,
-                                            const v1::GetTileRequest* in,
-                                            v1::GetTileResponse* out) {
-  return RunUnary(runtime_, context, "Tiles.Get", in, out, &server::Get, &server::GetAtHand);
-}
-
-grpc::ServerWriteReactor<v1::ListTilesResponse>* TilesService::List(
-    grpc::CallbackServerContext* context, const v1::ListTilesRequest* in) {
-  return RunStream(runtime_, context, "Tiles.List", in, &server::List);
-}
-
-grpc::ServerWriteReactor<v1::FetchTilesResponse>* TilesService::Fetch(
-    grpc::CallbackServerContext* context, const v1::FetchTilesRequest* in) {
-  return RunStream(runtime_, context, "Tiles.Fetch", in, &server::Fetch);
+TilesService::TilesService(Runtime& runtime) : Service(runtime, "Tiles") {
+  Unary("Get", &Get, &GetAtHand);
+  Stream("List", &List);
+  Stream("Fetch", &Fetch);
 }
 
 }  // namespace strata::server

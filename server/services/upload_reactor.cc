@@ -10,14 +10,15 @@
 
 namespace strata::server {
 
-UploadReactor::UploadReactor(Runtime& runtime,
-                             grpc::CallbackServerContext& context,
-                             v1::UploadScanResponse& out)
+UploadReactor::UploadReactor(Runtime& runtime, grpc::CallbackServerContext& context, Out& out)
     : runtime_(runtime),
       context_(context),
       request_(runtime, context, "Scans.Upload"),
+      in_memory_(request_.NewBooking()),
       out_(out),
-      expected_(runtime.silence, [this](const absl::Status& status) { End(status); }) {
+      expected_(runtime.silence, request_.call().stop, [this](const absl::Status& status) {
+        End(status);
+      }) {
   if (!request_.admission().ok()) {
     Finish(request_.Close(request_.admission()));
     return;
@@ -40,8 +41,10 @@ void UploadReactor::OnReadDone(bool ok) {
 }
 
 void UploadReactor::Take() {
+  const bool begun = scan_.has_value();
   const absl::Status status = Guarded([this] { return TakeMessage(); });
-  if (status.ok() && message_.has_start() && scan_->points_held() > 0 && scan_->complete()) {
+  in_memory_.Release();
+  if (status.ok() && !begun && scan_->points_held() > 0 && scan_->complete()) {
     Commit();
     return;
   }
@@ -59,16 +62,18 @@ void UploadReactor::End(const absl::Status& error) {
 
 absl::Status UploadReactor::TakeMessage() {
   STRATA_RETURN_IF_ERROR(request_.call().stop.status());
-  STRATA_RETURN_IF_ERROR(request_.Receive(message_));
-  if (message_.has_start() && !scan_.has_value()) return Begin(message_.start());
-  if (message_.has_chunk() && scan_.has_value()) return scan_->Add(message_.chunk());
+  In in;
+  STRATA_RETURN_IF_ERROR(request_.Open(message_.bytes, in, in_memory_));
+  if (in.has_start() && !scan_.has_value()) return Begin(in.start());
+  if (in.has_chunk() && scan_.has_value()) return scan_->Add(in.chunk());
   return AtTheDoor(absl::InvalidArgumentError(
       scan_.has_value() ? "upload: every message after the first is a chunk"
                         : "upload: the first message is the start of the scan"));
 }
 
 absl::Status UploadReactor::Begin(const v1::ScanStart& start) {
-  STRATA_ASSIGN_OR_RETURN(scan_, ScanReceiver::Begin(runtime_.db, request_.call(), start));
+  STRATA_ASSIGN_OR_RETURN(
+      scan_, ScanReceiver::Begin(runtime_.db, request_.call(), start, request_.NewBooking()));
   // Tells the client that its points are welcome, and which of them are there.
   context_.AddInitialMetadata("x-upload-accepted", absl::StrCat(scan_->points_held()));
   StartSendInitialMetadata();
@@ -79,6 +84,7 @@ void UploadReactor::Commit() {
   const absl::Status status = Guarded([this]() -> absl::Status {
     // The stream also ends when the client has gone: what it did not confirm is abandoned.
     STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+    STRATA_RETURN_IF_ERROR(request_.StillAllowed());
     if (!scan_.has_value()) {
       return AtTheDoor(
           absl::InvalidArgumentError("upload: the stream ended before its scan began"));

@@ -8,6 +8,7 @@
 
 #include "server/rpc/request.h"
 #include "server/rpc/runtime.h"
+#include "server/rpc/sealed.h"
 #include "server/services/scan_receiver.h"
 #include "strata/v1/scans.grpc.pb.h"
 
@@ -15,11 +16,12 @@ namespace strata::server {
 
 // Reads a message only when the one before is dealt with: memory is one message a stream, and a
 // busy database slows its clients down. Lives from the call's arrival to its end; owns itself.
-class UploadReactor final : public grpc::ServerReadReactor<v1::UploadScanRequest> {
+class UploadReactor final : public grpc::ServerReadReactor<Sealed<v1::UploadScanRequest>> {
  public:
-  UploadReactor(Runtime& runtime,
-                grpc::CallbackServerContext& context,
-                v1::UploadScanResponse& out);
+  using In = v1::UploadScanRequest;
+  using Out = v1::UploadScanResponse;
+
+  UploadReactor(Runtime& runtime, grpc::CallbackServerContext& context, Out& out);
 
  private:
   void Read();
@@ -37,8 +39,9 @@ class UploadReactor final : public grpc::ServerReadReactor<v1::UploadScanRequest
   Runtime& runtime_;
   grpc::CallbackServerContext& context_;
   Request request_;
-  v1::UploadScanResponse& out_;
-  v1::UploadScanRequest message_;
+  Booking in_memory_;
+  Out& out_;
+  Sealed<In> message_;
   std::optional<ScanReceiver> scan_;
   ExpectedMessage expected_;
 };

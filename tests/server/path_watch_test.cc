@@ -46,6 +46,7 @@ class PathWatchTest : public ServedMock {
   std::atomic<bool> valid_ = true;
   std::atomic<bool> known_ = false;
   std::atomic<int> looks_ = 0;
+  std::atomic<int> asked_ = 0;  // whether the map has changed
   std::atomic<std::uint64_t> commit_ = 0;
   v1::WatchPathRequest in_;
   std::unique_ptr<v1::Planning::Stub> stub_;
@@ -71,6 +72,36 @@ TEST_F(PathWatchTest, TellsHowThePathStandsAndWhenThatChanges) {
   server_->Shutdown();
   EXPECT_FALSE(reader_->Read(&message_));
   EXPECT_THAT(End(), StatusIs(absl::StatusCode::kUnavailable, HasSubstr("ask again")));
+}
+
+TEST_F(PathWatchTest, IsCheckedAgainOnlyWhenTheMapHasChanged) {
+  commit_ = 7;
+  ON_CALL(db_.planning(), CheckPath(_, _, _)).WillByDefault([this](auto&, auto, auto&) {
+    ++looks_;
+    PathCheck check;
+    check.valid = looks_ % 2 == 1;
+    check.commit_sequence = commit_;
+    return absl::StatusOr<PathCheck>(check);
+  });
+  ON_CALL(db_.maps(), Watch(_, _, _, _))
+      .WillByDefault([this](auto&, auto, auto& options, auto sink) {
+        EXPECT_TRUE(options.once);
+        EXPECT_LE(options.since, commit_);
+        ++asked_;
+        api::MapUpdate update;
+        update.commit_sequence = commit_;
+        return sink(update);
+      });
+  Watch();
+  ASSERT_TRUE(reader_->Read(&message_));
+  while (asked_ < 3) absl::SleepFor(absl::Milliseconds(5));
+  EXPECT_EQ(looks_, 1);
+  commit_ = 8;
+  ASSERT_TRUE(reader_->Read(&message_));
+  EXPECT_EQ(message_.check().commit_sequence(), 8U);
+  EXPECT_EQ(looks_, 2);
+  context_.TryCancel();
+  EXPECT_THAT(End(), StatusIs(absl::StatusCode::kCancelled, _));
 }
 
 TEST_F(PathWatchTest, APathThatIsNoneIsRefusedAtTheDoor) {

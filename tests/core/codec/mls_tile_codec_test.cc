@@ -1,13 +1,21 @@
 #include "core/codec/mls_tile_codec.h"
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
 #include "absl/strings/escaping.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include "core/codec/blob.h"
+#include "core/codec/bytes.h"
+#include "core/codec/columns.h"
+#include "core/codec/occupancy.h"
+#include "core/codec/tile_header.h"
 #include "core/mls/patch.h"
+#include "core/mls/tile_key.h"
 #include "tests/core/codec/hostile.h"
 #include "tests/core/codec/tile_samples.h"
 #include "tests/support/data_dir.h"
@@ -71,6 +79,45 @@ TEST(MlsTileCodecTest, ForgedBytesNeverCrash) {
       testing::DecodeForgedBodies(BlobKind::kMlsTile, bytes, &DecodeMlsTile, 6, 4000);
   EXPECT_GT(accepted, 0);
   EXPECT_LT(accepted, 4000);
+}
+
+TEST(MlsTileCodecTest, ATileThatWouldTakeMoreThanItMayIsRefused) {
+  const MlsTile tile = RandomTile(5, 4096, true);
+  const std::string bytes = EncodeMlsTile(tile);
+  EXPECT_THAT(DecodeMlsTileWithin(std::size_t{1} << 20, bytes), IsOkAndHolds(tile));
+  for (const std::size_t bound : {std::size_t{0}, std::size_t{100'000}, std::size_t{250'000}}) {
+    EXPECT_FALSE(DecodeMlsTileWithin(bound, bytes).ok()) << bound;
+  }
+}
+
+// What some hundred bytes announce: four million patches in one cell, eight million votes, and
+// columns of one repeated byte each.
+TEST(MlsTileCodecTest, AFewBytesThatAnnounceMillionsTakeNoMemory) {
+  constexpr std::uint64_t kPatches = kMaxTilePatches;
+  constexpr std::uint64_t kVotes = kMaxTileVotes;
+  constexpr int kColumns = 24;
+  std::string codes(kTileCells * kTileCells / 4, '\0');
+  codes[0] = 3;
+  std::string rest;
+  PutVarint(rest, kPatches - 3);
+  std::string body;
+  PutTileHeader(body, TileKey{});
+  PutColumn(body, codes);
+  PutColumn(body, rest);
+  PutFixed(body, std::uint8_t{1});
+  PutVarint(body, kVotes);
+  for (int i = 0; i < kColumns; ++i) PutColumn(body, std::string(kVotes, '\0'));
+  PutVarint(body, 0);
+  const std::string bytes = SealBlob(BlobKind::kMlsTile, kMlsTileVersion, body);
+  ASSERT_LT(bytes.size(), 1000U);
+  rusage before{};
+  getrusage(RUSAGE_SELF, &before);
+  EXPECT_THAT(DecodeMlsTileWithin(std::size_t{16} << 20, bytes).status(),
+              testing::StatusIs(absl::StatusCode::kDataLoss, ::testing::HasSubstr("surfaces")));
+  rusage after{};
+  getrusage(RUSAGE_SELF, &after);
+  constexpr long kKilobytes = 4 << 10;
+  EXPECT_LT(after.ru_maxrss - before.ru_maxrss, kKilobytes);
 }
 
 TEST(MlsTileCodecTest, GoldenBytesOfATinyTileDecode) {

@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "absl/time/clock.h"
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.h>
@@ -170,13 +171,14 @@ class RightsMatrixTest : public ServedMock {
   }
   // What came of a call by whoever has `token`.
   absl::Status Knock(const MethodDescriptor& method,
-                     const std::optional<std::string>& authorization) {
+                     const std::optional<std::string>& authorization,
+                     const std::string& map = kMap) {
     std::map<std::string, std::string> metadata;
     if (authorization.has_value()) metadata["authorization"] = *authorization;
     const RawAnswer answer =
         CallRaw(channel_,
                 absl::StrCat("/", method.service()->full_name(), "/", method.name()),
-                RequestOf(method, kMap),
+                RequestOf(method, map),
                 metadata);
     // Ingest answers by scan.
     v1::IngestScansResponse scan;
@@ -285,6 +287,25 @@ TEST_F(RightsMatrixTest, ARightOpensWhatItIsForAndNothingElse) {
                       absl::StrCat("'", RightName(*needed), "' on map campus"));
       }
     }
+  }
+}
+
+TEST_F(RightsMatrixTest, AMapThatOneMayNotReadIsAsOneThatIsNotThere) {
+  const std::string token = "Bearer " + Give("other", {{"harbour", Right::kAdmin}});
+  ServeWithTokens();
+  // The database tells a map that is there from one that is not: it is not asked.
+  ON_CALL(db_.maps(), Get(_, absl::string_view(kMap))).WillByDefault(Return(MapInfo()));
+  ON_CALL(db_.maps(), Get(_, absl::string_view("nowhere")))
+      .WillByDefault(Return(absl::NotFoundError("map nowhere")));
+  for (const MethodDescriptor* method : AllMethods()) {
+    if (!Needed().at(NameOf(*method)).has_value()) continue;
+    SCOPED_TRACE(NameOf(*method));
+    const absl::Status there = Knock(*method, token, kMap);
+    const absl::Status nowhere = Knock(*method, token, "nowhere");
+    EXPECT_EQ(there.code(), Code::kPermissionDenied);
+    EXPECT_EQ(there.code(), nowhere.code());
+    EXPECT_EQ(absl::StrReplaceAll(there.message(), {{kMap, "nowhere"}}), nowhere.message());
+    EXPECT_EQ(ReasonOf(there), ReasonOf(nowhere));
   }
 }
 

@@ -1,0 +1,52 @@
+#include "server/rpc/revocation.h"
+
+#include <algorithm>
+
+#include "absl/time/clock.h"
+
+#include "core/common/steady_time.h"
+#include "core/common/this_thread.h"
+
+namespace strata::server {
+namespace {
+
+// How soon the watch itself ends.
+constexpr absl::Duration kSlice = absl::Milliseconds(50);
+
+}  // namespace
+
+RevocationWatch::RevocationWatch(absl::Duration interval)
+    : interval_(interval), thread_([this] { Loop(); }) {}
+
+RevocationWatch::~RevocationWatch() {
+  {
+    absl::MutexLock lock(&mutex_);
+    closing_ = true;
+  }
+  thread_.join();
+}
+
+void RevocationWatch::Add(Revocable& call) {
+  absl::MutexLock lock(&mutex_);
+  calls_.insert(&call);
+}
+
+void RevocationWatch::Remove(Revocable& call) {
+  absl::MutexLock lock(&mutex_);
+  calls_.erase(&call);
+}
+
+void RevocationWatch::Loop() {
+  NameThisThread("revocation");
+  absl::Time next = SteadyNow() + interval_;
+  while (true) {
+    absl::SleepFor(std::min(interval_, kSlice));
+    absl::MutexLock lock(&mutex_);
+    if (closing_) return;
+    if (SteadyNow() < next) continue;
+    for (Revocable* call : calls_) call->EndIfRevoked();
+    next = SteadyNow() + interval_;
+  }
+}
+
+}  // namespace strata::server

@@ -1,0 +1,57 @@
+#include "server/rpc/strangers.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/common/status.h"
+#include "proto/translate/status.h"
+
+namespace strata::server {
+namespace {
+
+constexpr absl::string_view kEverybody = "all strangers";
+constexpr absl::Duration kLogInterval = absl::Seconds(1);
+
+ClientLimitOptions Rate(double calls_per_second, double burst) {
+  ClientLimitOptions options;
+  options.calls_per_second = calls_per_second;
+  options.burst = burst;
+  return options;
+}
+
+// Takes one from the allowance of `name`.
+absl::Status Take(ClientLimits& limits, absl::string_view name, absl::Time now) {
+  const absl::Status status = limits.Enter(name, ClientLimits::Kind::kCall, now);
+  if (status.ok()) {
+    limits.Leave(name, ClientLimits::Kind::kCall);
+    return status;
+  }
+  return translate::WithRetryDelay(absl::ResourceExhaustedError(absl::StrCat(
+                                       "without a token of this server: ", status.message())),
+                                   translate::kClientLimitReason,
+                                   translate::RetryDelayOf(status).value_or(kLogInterval));
+}
+
+}  // namespace
+
+Strangers::Strangers(const StrangerOptions& options)
+    : all_(Rate(options.all_per_second, options.all_burst), 0),
+      by_address_(Rate(options.calls_per_second, options.burst), 0) {}
+
+absl::Status Strangers::Enter(absl::string_view address, absl::Time now) {
+  // All first: then there are never more addresses in the books than may come in a while.
+  STRATA_RETURN_IF_ERROR(Take(all_, kEverybody, now));
+  return Take(by_address_, address, now);
+}
+
+std::optional<std::uint64_t> Strangers::ToLog(absl::Time now) {
+  absl::MutexLock lock(&mutex_);
+  ++not_logged_;
+  // A clock that was set back does not silence it.
+  if (absl::AbsDuration(now - logged_) < kLogInterval) return std::nullopt;
+  logged_ = now;
+  return std::exchange(not_logged_, 0);
+}
+
+}  // namespace strata::server
