@@ -27,7 +27,7 @@ class PollReactor : public grpc::ServerWriteReactor<Out> {
       this->Finish(request_.Close(request_.admission()));
       return;
     }
-    runtime_.queries.Submit([this] { LookAndSend(); });
+    runtime_.queries.Submit(request_.client(), [this] { LookAndSend(); });
   }
 
  protected:
@@ -79,7 +79,7 @@ class PollReactor : public grpc::ServerWriteReactor<Out> {
   }
 
   void WaitAndLook() {
-    runtime_.ticker.AtNextTick([this] { LookAndSend(); });
+    runtime_.ticker.AtNextTick(request_.client(), [this] { LookAndSend(); });
   }
 
   void OnWriteDone(bool ok) override {
@@ -88,7 +88,7 @@ class PollReactor : public grpc::ServerWriteReactor<Out> {
     } else if (news_ == News::kLast) {
       this->Finish(request_.Close(absl::OkStatus()));
     } else if (news_ == News::kMore) {
-      runtime_.queries.Submit([this] { LookAndSend(); });
+      runtime_.queries.Submit(request_.client(), [this] { LookAndSend(); });
     } else {
       WaitAndLook();
     }

@@ -19,9 +19,9 @@ Ticker::~Ticker() {
   thread_.join();
 }
 
-void Ticker::AtNextTick(std::function<void()> task) {
+void Ticker::AtNextTick(absl::string_view client, std::function<void()> task) {
   absl::MutexLock lock(&mutex_);
-  waiting_.push_back(std::move(task));
+  waiting_.push_back({std::string(client), std::move(task)});
 }
 
 void Ticker::Loop() {
@@ -36,12 +36,12 @@ void Ticker::Loop() {
       if (closing_) return;
     }
     absl::SleepFor(interval_);
-    std::vector<std::function<void()>> due;
+    std::vector<Task> due;
     {
       absl::MutexLock lock(&mutex_);
       due.swap(waiting_);
     }
-    for (std::function<void()>& task : due) executor_.Submit(std::move(task));
+    for (Task& task : due) executor_.Submit(task.client, std::move(task.run));
   }
 }
 
