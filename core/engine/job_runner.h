@@ -41,6 +41,7 @@ class JobRunner {
   Step NextStep();
   void RunJob();
   absl::Status Run(const JobInfo& job, JobContext& context);
+  absl::Status RunVerify(const JobInfo& job, JobContext& context);
   // Queues what nobody has asked for and is due.
   void Look();
   // Whether closures were found that no optimize job has had a chance to use.
