@@ -13,6 +13,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
 
 #include "core/api/maps.h"
 #include "core/common/cache_budget.h"
@@ -32,6 +33,7 @@ class EngineMaps final : public api::Maps {
   absl::StatusOr<std::shared_ptr<Map>> Find(absl::string_view name) const;
 
   EngineNumbers Numbers() const;
+  EngineHealth Health() const;
 
   absl::StatusOr<MapInfo> Create(const api::Call& call,
                                  absl::string_view name,
@@ -76,6 +78,7 @@ class EngineMaps final : public api::Maps {
       ABSL_GUARDED_BY(mutex_);
   std::set<std::string, std::less<>> copied_
       ABSL_GUARDED_BY(mutex_);  // maps with a copy being made
+  std::map<std::string, absl::Time, std::less<>> backed_up_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace strata

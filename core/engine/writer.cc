@@ -7,6 +7,7 @@
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 
+#include "core/common/blocking.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/common/stop.h"
@@ -36,6 +37,7 @@ void WriterThread::Close() {
 absl::Status WriterThread::Run(
     Durability durability, std::size_t bytes, const Stop& stop, Work work, Tell tell) {
   Task task{work, tell, bytes, absl::OkStatus()};
+  const BlockingScope blocking;
   absl::MutexLock lock(&mutex_);
   const auto has_room = [this, bytes]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
     return closed_ || queued_bytes_ == 0 || queued_bytes_ + bytes <= queue_bytes_;
@@ -57,6 +59,11 @@ WriterNumbers WriterThread::numbers() const {
   return numbers;
 }
 
+absl::Status WriterThread::FailedWithin(absl::Duration time) const {
+  absl::MutexLock lock(&mutex_);
+  return SteadyNow() - last_commit_at_ <= time ? last_commit_ : absl::OkStatus();
+}
+
 bool WriterThread::HasWorkOrClosed() const {
   return closed_ || !full_.empty() || !relaxed_.empty();
 }
@@ -72,8 +79,8 @@ WriterThread::Queue WriterThread::TakeBatch(Durability& durability) {
   return batch;
 }
 
-void WriterThread::CommitBatch(Durability durability, const Queue& batch) {
-  const absl::Status committed = storage_.Commit(durability, [&]() -> absl::Status {
+absl::Status WriterThread::CommitBatch(Durability durability, const Queue& batch) {
+  absl::Status committed = storage_.Commit(durability, [&]() -> absl::Status {
     for (Task* task : batch) {
       task->status = storage_.Part([&] { return task->work(storage_); });
     }
@@ -84,6 +91,7 @@ void WriterThread::CommitBatch(Durability durability, const Queue& batch) {
     task->status = committed;
     if (committed.ok()) task->tell();
   }
+  return committed;
 }
 
 void WriterThread::Loop() {
@@ -98,8 +106,10 @@ void WriterThread::Loop() {
       if (batch.empty()) return;
     }
     const absl::Time begun = SteadyNow();
-    CommitBatch(durability, batch);
+    absl::Status committed = CommitBatch(durability, batch);
     absl::MutexLock lock(&mutex_);
+    last_commit_ = std::move(committed);
+    last_commit_at_ = SteadyNow();
     ++numbers_.commits;
     numbers_.parts += batch.size();
     numbers_.time += SteadyNow() - begun;
