@@ -15,11 +15,14 @@
 #include "core/common/log_line.h"
 #include "core/common/steady_time.h"
 #include "server/access/method_rights.h"
+#include "server/access/right.h"
+#include "server/rpc/call_object.h"
 
 namespace strata::server {
 namespace {
 
 constexpr std::size_t kMaxLoggedName = 100;
+constexpr std::size_t kMaxLoggedMessage = 300;
 
 // Unique among the calls of this process and, very likely, of all others.
 std::string NewRequestId() {
@@ -71,13 +74,15 @@ absl::Status NobodyMay(absl::string_view method) {
 Request::Request(Runtime& runtime,
                  grpc::CallbackServerContext& context,
                  absl::string_view method,
-                 Kind kind)
+                 Kind kind,
+                 absl::Duration limit)
     : runtime_(runtime),
       kind_(kind),
       method_(method),
       peer_(context.peer()),
-      started_(SteadyNow()) {
-  call_.stop = Stop(DeadlineOf(context));
+      started_(SteadyNow()),
+      limit_(limit) {
+  call_.stop = Stop(std::min(DeadlineOf(context), started_ + limit));
   call_.request_id = RequestIdOf(context);
   context.AddInitialMetadata(kRequestIdKey, call_.request_id);
   // In the gate also when it is refused: until the call has ended, it uses what a server must give
@@ -129,6 +134,7 @@ absl::Status Request::Receive(const google::protobuf::Message& message) {
   std::optional<std::string> map = MapNamedIn(message, row->map_field);
   if (!map.has_value()) return absl::OkStatus();
   map_ = *std::move(map);
+  object_ = ObjectNamedIn(message).substr(0, kMaxLoggedName);
   has_map_ = true;
   return runtime_.access.Authorize(caller_, row->right, map_);
 }
@@ -138,6 +144,17 @@ absl::Status Request::StillAllowed() {
   if (row == nullptr) return NobodyMay(method_);
   return has_map_ ? runtime_.access.Authorize(caller_, row->right, map_)
                   : runtime_.access.StillKnown(caller_);
+}
+
+absl::Status Request::NameLimit(const absl::Status& status) const {
+  const bool reached = absl::IsDeadlineExceeded(status) &&
+                       call_.stop.deadline() == started_ + limit_ &&
+                       SteadyNow() >= call_.stop.deadline();
+  if (!reached) return status;
+  return absl::DeadlineExceededError(absl::StrCat(method_,
+                                                  " took longer than a query may, ",
+                                                  absl::FormatDuration(limit_),
+                                                  " (--max-query-time); ask for less at a time"));
 }
 
 grpc::Status Request::Close(const absl::Status& status) {
@@ -150,17 +167,32 @@ grpc::Status Request::Close(const absl::Status& status) {
                          bytes_received_,
                          bytes_sent_,
                          Rejection(detail.has_value() ? detail->reason() : ""));
-  LOG(INFO) << LogLine("call")
-                   .Add("method", method_)
-                   .Add("code", absl::StatusCodeToString(status.code()))
-                   .Add("duration_ms", absl::ToInt64Milliseconds(duration))
-                   .Add("bytes_received", bytes_received_.load())
-                   .Add("bytes_sent", bytes_sent_.load())
-                   .Add("principal", call_.principal.empty() ? "-" : call_.principal)
-                   .Add("map", has_map_ ? map_.substr(0, kMaxLoggedName) : "-")
-                   .Add("peer", peer_)
-                   .Add("id", call_.request_id);
+  Log(status, duration);
   return translate::ToGrpcStatus(status, call_.request_id);
+}
+
+void Request::Log(const absl::Status& status, absl::Duration duration) const {
+  const auto add_who = [this, &status](LogLine& line) {
+    line.Add("method", method_)
+        .Add("code", absl::StatusCodeToString(status.code()))
+        .Add("principal", call_.principal.empty() ? "-" : call_.principal)
+        .Add("map", has_map_ ? map_.substr(0, kMaxLoggedName) : "-")
+        .Add("object", object_.empty() ? "-" : object_)
+        .Add("peer", peer_)
+        .Add("id", call_.request_id);
+  };
+  LogLine call("call");
+  add_who(call);
+  call.Add("duration_ms", absl::ToInt64Milliseconds(duration))
+      .Add("bytes_received", bytes_received_.load())
+      .Add("bytes_sent", bytes_sent_.load());
+  if (!status.ok()) call.Add("message", status.message().substr(0, kMaxLoggedMessage));
+  LOG(INFO) << call;
+  const MethodRight* row = FindMethodRight(method_);
+  if (row == nullptr || row->right == Right::kRead) return;
+  LogLine audit("audit");
+  add_who(audit);
+  LOG(INFO) << audit;
 }
 
 }  // namespace strata::server

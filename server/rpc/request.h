@@ -34,11 +34,13 @@ class Request {
  public:
   using Kind = ClientLimits::Kind;
 
-  // `method` as in "Maps.Create"; must outlive the request. `kind`: what it counts among.
+  // `method` as in "Maps.Create"; must outlive the request. `kind`: what it counts among. `limit`:
+  // how long it may take, whatever the caller allows.
   Request(Runtime& runtime,
           grpc::CallbackServerContext& context,
           absl::string_view method,
-          Kind kind = Kind::kCall);
+          Kind kind = Kind::kCall,
+          absl::Duration limit = absl::InfiniteDuration());
   ~Request();
   Request(const Request&) = delete;
   Request& operator=(const Request&) = delete;
@@ -54,12 +56,17 @@ class Request {
   // For the one answer that tells of many maps.
   bool MayRead(absl::string_view map) const { return runtime_.access.MayRead(caller_, map); }
   const api::Call& call() const { return call_; }
+  // Whose turn it is where calls wait for each other. Of a call that was let in.
+  const std::string& client() const { return client_; }
   // The caller has gone: long work ends.
   void Cancel() { call_.stop.Request(); }
   // For the log.
   void CountSent(const google::protobuf::MessageLite& message) {
     bytes_sent_ += message.ByteSizeLong();
   }
+
+  // `status`, or where the limit ended the call, that.
+  absl::Status NameLimit(const absl::Status& status) const;
 
   // Logs the call's one line; the result is what goes to the client.
   grpc::Status Close(const absl::Status& status);
@@ -72,15 +79,19 @@ class Request {
   absl::Status EnterLimits();
   // Makes room for another one. Again: nothing.
   void End();
+  // The lines of the log: one a call, and of what changes a map one for whoever asks later who did.
+  void Log(const absl::Status& status, absl::Duration duration) const;
 
   Runtime& runtime_;
   const Kind kind_;
   const absl::string_view method_;
   const std::string peer_;
   const absl::Time started_;
+  const absl::Duration limit_;
   Caller caller_;
   std::string map_;  // that the last message with a map named
   bool has_map_ = false;
+  std::string object_;    // of the map, that the last message with one named
   std::string client_;    // whose limits hold; empty: none were booked
   bool entered_ = false;  // the server's gate
   bool ended_ = false;

@@ -7,11 +7,14 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "absl/time/time.h"
 #include <grpcpp/support/server_callback.h>
 
 #include "core/api/call.h"
 #include "core/api/database.h"
 #include "core/common/status.h"
+#include "server/access/method_rights.h"
+#include "server/access/right.h"
 #include "server/rpc/request.h"
 #include "server/rpc/runtime.h"
 
@@ -38,7 +41,10 @@ class UnaryReactor final : public grpc::ServerUnaryReactor {
                Out& out,
                Handler handler,
                AtHandHandler<In, Out> at_hand)
-      : runtime_(runtime), request_(runtime, context, method), in_(in), out_(out) {
+      : runtime_(runtime),
+        request_(runtime, context, method, Request::Kind::kCall, LimitOf(runtime, method)),
+        in_(in),
+        out_(out) {
     absl::StatusOr<bool> answered = false;
     const absl::Status status = Guarded([&]() -> absl::Status {
       STRATA_RETURN_IF_ERROR(request_.admission());
@@ -49,11 +55,18 @@ class UnaryReactor final : public grpc::ServerUnaryReactor {
     if (!status.ok() || *answered) {
       End(status);
     } else {
-      runtime.queries.Submit([this, handler] { Run(handler); });
+      runtime.queries.Submit(request_.client(), [this, handler] { Run(handler); });
     }
   }
 
  private:
+  // What only reads may be asked again, for less. An edit waits for its map's worker as long as its
+  // caller likes.
+  static absl::Duration LimitOf(const Runtime& runtime, absl::string_view method) {
+    const MethodRight* row = FindMethodRight(method);
+    const bool reads = row != nullptr && row->right == Right::kRead;
+    return reads ? runtime.options.max_query_time : absl::InfiniteDuration();
+  }
   void Run(Handler handler) {
     End(Guarded([&]() -> absl::Status {
       STRATA_RETURN_IF_ERROR(request_.call().stop.status());
@@ -66,7 +79,7 @@ class UnaryReactor final : public grpc::ServerUnaryReactor {
   }
   void End(const absl::Status& status) {
     request_.CountSent(out_);
-    Finish(request_.Close(status));
+    Finish(request_.Close(request_.NameLimit(status)));
   }
   void OnCancel() override { request_.Cancel(); }
   void OnDone() override { delete this; }
