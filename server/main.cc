@@ -11,18 +11,22 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
 #include <CLI/CLI.hpp>
 #include <glog/logging.h>
 #include <malloc.h>
 #include <pthread.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include "core/common/log_line.h"
 #include "core/common/status.h"
 #include "core/engine/engine.h"
 #include "server/check.h"
+#include "server/log_writer.h"
 #include "server/options.h"
 #include "server/quarantine_commands.h"
+#include "server/readiness.h"
 #include "server/server.h"
 #include "server/token_commands.h"
 
@@ -68,6 +72,15 @@ int AwaitSignal(const sigset_t& signals) {
   }
 }
 
+ReadinessCheck LogCheck(const LogWriter& log) {
+  constexpr absl::Duration kLong = absl::Seconds(10);
+  return {"log", [&log] {
+            return log.stuck() < kLong
+                       ? ""
+                       : absl::StrCat("nobody reads stderr, ", log.dropped(), " lines are lost");
+          }};
+}
+
 LogLine StartLine(const ProgramOptions& options, const std::string& address) {
   const ServerOptions& server = options.server;
   LogLine line("start");
@@ -91,12 +104,14 @@ absl::Status Serve(const ProgramOptions& options) {
   FLAGS_logtostderr = true;
   google::InitGoogleLogging("stratad");
   const sigset_t signals = BlockSignals();
+  signal(SIGPIPE, SIG_IGN);  // that nobody reads the log is no reason to end
   RaiseFileLimit();
+  const LogWriter log(STDERR_FILENO);
   STRATA_RETURN_IF_ERROR(CheckExposure(options.server));  // before a directory is made
   STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<api::Database> database,
                           OpenEngine(options.engine));
   STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<Server> server,
-                          Server::Start(*database, options.server));
+                          Server::Start(*database, options.server, {LogCheck(log)}));
   // Before any other line with an address, for scripts that read both streams as one.
   std::cout << "listening " << server->address() << std::endl;
   LOG(INFO) << StartLine(options, server->address());

@@ -16,6 +16,7 @@ struct Written {
   double optimize_every_s = 60.0;
   double upload_keep_s = 3600.0;
   double drain_s = 5.0;
+  double max_query_s = 30.0;
   double upload_idle_s = 60.0;
   double slow_reader_s = 30.0;
   double max_message_mib = 4.0;
@@ -131,7 +132,7 @@ void AddClientLimits(CLI::App& app, Written& o) {
       kGroup,
       "--slow-reader",
       o.slow_reader_s,
-      "How long the reader of a stream may take nothing [s]",
+      "How long the reader of a stream may take nothing, or less than 32 KiB/s [s]",
       Between(0.1, 86400, "s"));
 }
 
@@ -170,6 +171,12 @@ void AddServerLimits(CLI::App& app, Written& o) {
       o.server.upload_threads,
       "Scans taken in at a time",
       threads);
+  Add(app,
+      kGroup,
+      "--max-query-time",
+      o.max_query_s,
+      "How long a call that only reads may take, but for downloads and watches [s]",
+      Between(0.1, 86400, "s"));
   Add(app,
       kGroup,
       "--drain",
@@ -235,6 +242,7 @@ absl::StatusOr<ProgramOptions> Read(const Written& o) {
   options.engine.optimize_interval = absl::Seconds(o.optimize_every_s);
   options.engine.upload_keep = absl::Seconds(o.upload_keep_s);
   options.server.drain_timeout = absl::Seconds(o.drain_s);
+  options.server.max_query_time = absl::Seconds(o.max_query_s);
   options.server.slow_sender_timeout = absl::Seconds(o.upload_idle_s);
   options.server.slow_reader_timeout = absl::Seconds(o.slow_reader_s);
   options.server.client.max_bytes = o.client_memory_mib * kMebi;

@@ -1,5 +1,9 @@
 #include "server/server.h"
 
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -20,8 +24,10 @@
 #include "core/common/steady_time.h"
 #include "core/engine/numbers.h"
 #include "server/access/grant_table.h"
+#include "server/listener.h"
 #include "server/metrics/engine_metrics.h"
 #include "server/metrics/metrics.h"
+#include "server/readiness.h"
 #include "server/reflection.h"
 #include "server/rpc/runtime.h"
 #include "server/services/classifiers_service.h"
@@ -53,11 +59,18 @@ constexpr int kHandshakeMs = 10'000;
 constexpr std::size_t kTransportBytes = std::size_t{64} << 20;
 // A connection without calls; a client that comes again connects again by itself.
 constexpr int kIdleConnectionMs = 10 * 60 * 1000;
+constexpr absl::Duration kReadinessInterval = absl::Seconds(1);
+// After the last connection that was refused, or the last commit that failed.
+constexpr absl::Duration kRecently = absl::Seconds(10);
+// With less room on the disk than both nothing may be committed soon.
+constexpr std::uint64_t kLeastDiskBytes = std::uint64_t{64} << 20;
+constexpr std::uint64_t kLeastDiskShare = 20;  // of which the disk holds one
 
 RuntimeOptions RuntimeOptionsOf(const ServerOptions& options) {
   return {.query_threads = options.query_threads,
           .stream_threads = options.stream_threads,
           .upload_threads = options.upload_threads,
+          .max_query_time = options.max_query_time,
           .max_calls = options.max_calls,
           .max_watches = options.max_watches,
           .slow_reader_timeout = options.slow_reader_timeout,
@@ -79,6 +92,7 @@ class GrpcServer final : public Server {
   const std::string& address() const override { return address_; }
   // After Listen().
   absl::Status OpenMetrics();
+  void WatchReadiness(std::vector<ReadinessCheck> checks);
   void Shutdown() override;
 
  private:
@@ -98,11 +112,14 @@ class GrpcServer final : public Server {
   PoseGraphService posegraph_{runtime_};
   ClassifiersService classifiers_{runtime_};
   std::string address_;
+  std::unique_ptr<Listener> listener_;
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
   std::unique_ptr<grpc::Server> server_;
+  std::unique_ptr<Readiness> readiness_;
   std::unique_ptr<MetricsEndpoint> metrics_;
 };
 
-void SetServingForEach(grpc::HealthCheckServiceInterface& health) {
+void SetReady(grpc::HealthCheckServiceInterface& health, bool ready) {
   for (const char* service : {v1::Maps::service_full_name(),
                               v1::Scans::service_full_name(),
                               v1::Tiles::service_full_name(),
@@ -110,16 +127,36 @@ void SetServingForEach(grpc::HealthCheckServiceInterface& health) {
                               v1::Jobs::service_full_name(),
                               v1::PoseGraph::service_full_name(),
                               v1::Classifiers::service_full_name()}) {
-    health.SetServingStatus(service, true);
+    health.SetServingStatus(service, ready);
   }
+}
+
+std::string WhyNoDisk(const EngineHealth& health) {
+  const std::uint64_t least = std::min(kLeastDiskBytes, health.disk_bytes / kLeastDiskShare);
+  if (health.disk_free_bytes >= least) return "";
+  return absl::StrCat(health.disk_free_bytes >> 20, " MiB are free where the maps are");
+}
+
+// Of the database and of the door.
+std::vector<ReadinessCheck> OwnChecks(api::Database& db, const Listener& listener) {
+  return {{"disk", [&db] { return WhyNoDisk(HealthOf(db)); }},
+          {"maps",
+           [&db] {
+             const std::vector<std::string> maps = HealthOf(db).maps_not_opened;
+             return maps.empty() ? "" : absl::StrCat("not opened: ", absl::StrJoin(maps, ", "));
+           }},
+          {"commits", [&db] { return absl::StrJoin(HealthOf(db).maps_not_written, "; "); }},
+          {"listener", [&listener] {
+             return listener.since_refused() > kRecently
+                        ? ""
+                        : absl::StrCat("connections are refused, ", listener.refused(), " so far");
+           }}};
 }
 
 // What a connection may cost before its first call, and what one costs that is forgotten.
 void LimitConnections(grpc::ServerBuilder& builder, const ServerOptions& options) {
   builder.SetMaxReceiveMessageSize(options.max_message_bytes);
   builder.SetMaxSendMessageSize(-1);
-  // A second server on the same port is an error, not a lottery.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
                              kMinPingIntervalMs);
@@ -165,6 +202,63 @@ void AddAccess(MetricFamilies& families, Access& access) {
             {{{}, absl::ToDoubleSeconds(access.TokensUnread())}});
 }
 
+void AddPools(MetricFamilies& families, const Runtime& runtime) {
+  std::vector<MetricRow> rows;
+  for (const Executor* pool : {&runtime.queries, &runtime.streams, &runtime.uploads}) {
+    const ExecutorNumbers numbers = pool->numbers();
+    const auto add = [&](const char* state, std::size_t count) {
+      rows.push_back({{{"pool", pool->name()}, {"state", state}}, static_cast<double>(count)});
+    };
+    add("running", numbers.running);
+    add("blocked", numbers.blocked);
+    add("queued", numbers.queued);
+  }
+  AddFamily(families,
+            prometheus::MetricType::Gauge,
+            "strata_pool_tasks",
+            "Steps of calls that run, wait for a map or a reader, or wait for a thread",
+            rows);
+}
+
+void AddDisk(MetricFamilies& families, const EngineHealth& health) {
+  constexpr auto kGauge = prometheus::MetricType::Gauge;
+  AddFamily(families,
+            kGauge,
+            "strata_disk_free_bytes",
+            "Free for the server where the maps are",
+            {{{}, static_cast<double>(health.disk_free_bytes)}});
+}
+
+// 0: it is not valid now, or not to be read.
+void AddCertificate(MetricFamilies& families, const TlsFiles& files) {
+  if (!files.enabled()) return;
+  const absl::StatusOr<TlsCertificate> certificate = CheckTls(files, absl::Now());
+  const double expires =
+      certificate.ok() ? absl::ToDoubleSeconds(certificate->expires - absl::UnixEpoch()) : 0.0;
+  AddFamily(families,
+            prometheus::MetricType::Gauge,
+            "strata_certificate_expiry_timestamp_seconds",
+            "When the server's certificate expires",
+            {{{}, expires}});
+}
+
+void AddDoor(MetricFamilies& families, const Listener& listener, const Readiness& readiness) {
+  AddFamily(families,
+            prometheus::MetricType::Counter,
+            "strata_connections_refused_total",
+            "Connections that were closed because files ran short",
+            {{{}, static_cast<double>(listener.refused())}});
+  std::vector<MetricRow> rows;
+  for (const auto& [cause, why] : readiness.state()) {
+    rows.push_back({{{"cause", cause}}, why.empty() ? 1.0 : 0.0});
+  }
+  AddFamily(families,
+            prometheus::MetricType::Gauge,
+            "strata_ready",
+            "0: this keeps the server from its work; the log says why",
+            rows);
+}
+
 std::shared_ptr<grpc::ServerCredentials> GrpcServer::Credentials() {
   if (!options_.tls.enabled()) return grpc::InsecureServerCredentials();
   std::shared_ptr<grpc::ServerCredentials> credentials = TlsCredentials(options_.tls);
@@ -173,23 +267,33 @@ std::shared_ptr<grpc::ServerCredentials> GrpcServer::Credentials() {
 }
 
 absl::Status GrpcServer::Listen(HostPort address) {
+  STRATA_ASSIGN_OR_RETURN(listener_, Listener::Open(address));
   grpc::ServerBuilder builder;
-  int port = 0;
-  builder.AddListeningPort(address.ToString(), Credentials(), &port);
+  acceptor_ = builder.experimental().AddExternalConnectionAcceptor(
+      grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, Credentials());
   LimitConnections(builder, options_);
   // gRPC has no guard for plain text.
   const bool guarded = options_.token_file.empty() || options_.tls.enabled();
   if (!guarded) LeaveOutReflection(builder);
   for (grpc::Service* service : Services()) builder.RegisterService(service);
   server_ = builder.BuildAndStart();
-  if (server_ == nullptr || port == 0) {
-    return absl::UnavailableError(
-        absl::StrCat("cannot listen on ", address.ToString(), "; is the port in use?"));
-  }
-  address.port = port;
+  if (server_ == nullptr) return absl::UnavailableError("gRPC's server does not start");
+  listener_->Accept([this](int fd) {
+    grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+    connection.fd = fd;
+    acceptor_->HandleNewConnection(&connection);
+  });
+  address.port = listener_->port();
   address_ = address.ToString();
-  SetServingForEach(*server_->GetHealthCheckService());
   return absl::OkStatus();
+}
+
+void GrpcServer::WatchReadiness(std::vector<ReadinessCheck> checks) {
+  for (ReadinessCheck& own : OwnChecks(runtime_.db, *listener_)) checks.push_back(std::move(own));
+  grpc::HealthCheckServiceInterface& health = *server_->GetHealthCheckService();
+  health.SetServingStatus("liveness", true);
+  readiness_ = std::make_unique<Readiness>(
+      std::move(checks), kReadinessInterval, [&health](bool ready) { SetReady(health, ready); });
 }
 
 absl::Status GrpcServer::OpenMetrics() {
@@ -198,7 +302,11 @@ absl::Status GrpcServer::OpenMetrics() {
     AddProcess(families, started);
     AddUnderWay(families, runtime_);
     AddAccess(families, runtime_.access);
+    AddPools(families, runtime_);
+    AddCertificate(families, options_.tls);
+    AddDoor(families, *listener_, *readiness_);
     AddEngine(families, NumbersOf(runtime_.db));
+    AddDisk(families, HealthOf(runtime_.db));
   };
   STRATA_ASSIGN_OR_RETURN(metrics_,
                           MetricsEndpoint::Open(options_.metrics_listen, runtime_.metrics, gauges));
@@ -209,11 +317,13 @@ absl::Status GrpcServer::OpenMetrics() {
 void GrpcServer::Shutdown() {
   if (server_ == nullptr || runtime_.shutting_down.exchange(true)) return;
   metrics_.reset();  // it looks at the database
+  readiness_.reset();
   server_->GetHealthCheckService()->SetServingStatus(false);
   // gRPC's own draining would also wait for clients that keep an idle connection.
   const absl::Time drained = SteadyNow() + options_.drain_timeout;
   runtime_.calls.AwaitEmpty(options_.drain_timeout);
   runtime_.watches.AwaitEmpty(drained - SteadyNow());
+  listener_->Close();
   server_->Shutdown(absl::ToChronoTime(absl::Now()));
   server_->Wait();
   // The last calls may still be giving back what they hold.
@@ -258,6 +368,9 @@ absl::Status ServerOptions::Validate() const {
   if (!tls.client_ca.empty() && !tls.enabled()) {
     faults.emplace_back("client certificates need a TLS certificate and its key");
   }
+  if (!(max_query_time > absl::ZeroDuration())) {
+    faults.emplace_back("max_query_time is not positive");
+  }
   if (!(slow_reader_timeout > absl::ZeroDuration())) {
     faults.emplace_back("slow_reader_timeout is not positive");
   }
@@ -301,7 +414,8 @@ absl::Status CheckExposure(const ServerOptions& options) {
 }
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(api::Database& database,
-                                                      const ServerOptions& options) {
+                                                      const ServerOptions& options,
+                                                      std::vector<ReadinessCheck> checks) {
   STRATA_RETURN_IF_ERROR(CheckExposure(options));
   STRATA_ASSIGN_OR_RETURN(const HostPort address, ParseHostPort(options.listen));
   if (options.tls.enabled()) STRATA_RETURN_IF_ERROR(CheckTls(options.tls, absl::Now()).status());
@@ -314,6 +428,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(api::Database& database,
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   auto server = std::make_unique<GrpcServer>(database, std::move(grants), options);
   STRATA_RETURN_IF_ERROR(server->Listen(address));
+  server->WatchReadiness(std::move(checks));
   STRATA_RETURN_IF_ERROR(server->OpenMetrics());
   return server;
 }

@@ -6,11 +6,13 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
 
 #include "core/api/database.h"
+#include "server/readiness.h"
 #include "server/rpc/client_limits.h"
 #include "server/tls.h"
 
@@ -24,8 +26,10 @@ struct ServerOptions {
   std::filesystem::path token_file;  // who may do what (token_file.h); empty: everybody everything
   // HOST:PORT that answers Prometheus at /metrics, in plain text and to anybody; empty: none.
   std::string metrics_listen;
-  int query_threads = 8;    // calls answered at a time; in [1, 1000]
-  int stream_threads = 8;   // listings and downloads served at a time; in [1, 1000]
+  int query_threads = 8;   // calls answered at a time; in [1, 1000]
+  int stream_threads = 8;  // listings and downloads served at a time; in [1, 1000]
+  // A unary call that only reads ends after so long, whatever its caller allows (Localize is none).
+  absl::Duration max_query_time = absl::Seconds(30);
   int upload_threads = 16;  // scans taken in at a time; in [1, 1000]
   // Calls under way, streams included but watches of maps and jobs, which cost little and have a
   // limit of their own; more are told to come back. In [1, 1'000'000].
@@ -36,7 +40,7 @@ struct ServerOptions {
   // Memory that the calls of all clients hold, beside that of one client (client.max_bytes): both
   // in [max_message_bytes, 1 TiB].
   std::size_t max_call_bytes = std::size_t{160} << 20;
-  // A stream's reader that takes nothing for so long loses the stream.
+  // A stream's reader that falls so far behind ReaderPace::kLeastBytesPerSecond loses the stream.
   absl::Duration slow_reader_timeout = absl::Seconds(30);
   // A stream of requests that brings nothing for so long ends.
   absl::Duration slow_sender_timeout = absl::Seconds(60);
@@ -52,14 +56,18 @@ struct ServerOptions {
 // `insecure`; INVALID_ARGUMENT for bad options.
 absl::Status CheckExposure(const ServerOptions& options);
 
-// Serves from Start() to Shutdown(): strata.v1, grpc.health.v1 (by server and by service, for
-// anybody) and reflection (for whoever is known; not in plain text with tokens). Thread-safe.
+// Serves from Start() to Shutdown(): strata.v1, grpc.health.v1 (for anybody) and reflection (for
+// whoever is known; not in plain text with tokens). Thread-safe. Health of the server as a whole
+// ("") and of "liveness" is SERVING as long as it lives; that of each strata.v1 service only while
+// nothing keeps it from its work (readiness.h).
 class Server {
  public:
-  // `database` must outlive the server. What CheckExposure, CheckTls and ReadTokenFile answer;
-  // UNAVAILABLE if the address cannot be listened on.
+  // `database` must outlive the server, and so must what `checks` look at: causes not to be ready
+  // beside the server's own (disk, maps, commits, listener). What CheckExposure, CheckTls and
+  // ReadTokenFile answer; UNAVAILABLE if the address cannot be listened on.
   static absl::StatusOr<std::unique_ptr<Server>> Start(api::Database& database,
-                                                       const ServerOptions& options);
+                                                       const ServerOptions& options,
+                                                       std::vector<ReadinessCheck> checks = {});
   virtual ~Server() = default;  // shuts down
 
   // HOST:PORT with the true port.

@@ -26,7 +26,8 @@ double Share(std::size_t i, std::size_t count) {
 }  // namespace
 
 absl::Status DerivedPass::Run(DerivedSink& sink) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  std::optional<ReaderPool::Lease> lease;
+  STRATA_ASSIGN_OR_RETURN(StorageReader * reader, ReaderOf(core_, options_.view, 0, lease));
   STRATA_RETURN_IF_ERROR(ListScans(*reader));
   STRATA_RETURN_IF_ERROR(IndexScans(*reader, sink));
   STRATA_RETURN_IF_ERROR(CheckMlsTiles(*reader, sink));
@@ -36,8 +37,7 @@ absl::Status DerivedPass::Run(DerivedSink& sink) {
 absl::Status DerivedPass::ListScans(StorageReader& reader) {
   ScanQuery query;
   while (true) {
-    STRATA_ASSIGN_OR_RETURN(std::vector<PosedScan> page,
-                            reader.ListScans(query, core_.snapshots().current().epoch));
+    STRATA_ASSIGN_OR_RETURN(std::vector<PosedScan> page, reader.ListScans(query, options_.epoch));
     if (page.empty()) return absl::OkStatus();
     query.after = page.back().scan.number;
     for (PosedScan& posed : page) {
@@ -55,12 +55,13 @@ absl::Status DerivedPass::IndexScans(StorageReader& reader, DerivedSink& sink) {
   const MapParameters parameters = core_.info().parameters;
   std::vector<std::vector<TileKey>> tiles(placed_.size());
   const absl::Status made =
-      ParallelFor(threads_, placed_.size(), [&](int thread, std::size_t i) -> absl::Status {
+      ParallelFor(options_.threads, placed_.size(), [&](int thread, std::size_t i) -> absl::Status {
         if (thread == 0) {
           STRATA_RETURN_IF_ERROR(
               context_.Progress(0.4 * Share(i, placed_.size()), "finding the tiles of scans"));
         }
-        STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease own, core_.Reader());
+        std::optional<ReaderPool::Lease> lease;
+        STRATA_ASSIGN_OR_RETURN(StorageReader * own, ReaderOf(core_, options_.view, thread, lease));
         ScanSource source(*own, parameters);
         const absl::StatusOr<MlsMap> contribution =
             source.Contribution(placed_[i].scan, placed_[i].T_map_scan);
@@ -94,7 +95,8 @@ absl::Status DerivedPass::CheckMlsTiles(StorageReader& reader, DerivedSink& sink
   KeySet keys;
   for (const auto& [key, scans] : scans_of_tile_) keys.insert(key);
   tiles_ = keys.size();
-  STRATA_ASSIGN_OR_RETURN(const std::vector<MlsTileRow> stored, reader.ListMlsTiles(version_));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MlsTileRow> stored,
+                          reader.ListMlsTiles(options_.version));
   for (const MlsTileRow& row : stored) {
     if (!keys.contains(row.key)) stored_.insert(row.key);
   }
@@ -116,13 +118,14 @@ absl::Status DerivedPass::CheckBlock(StorageReader& reader, const KeySet& keys, 
   std::vector<PlacedScanRecord> scans;
   scans.reserve(indices.size());
   for (const std::size_t i : indices) scans.push_back(placed_[i]);
-  STRATA_ASSIGN_OR_RETURN(const MlsTileMap made,
-                          MakeTiles(core_, scans, keys, threads_, context_.stop()));
+  STRATA_ASSIGN_OR_RETURN(
+      const MlsTileMap made,
+      MakeTiles(core_, scans, keys, options_.threads, context_.stop(), nullptr, options_.view));
   const double cell_size_m = core_.info().parameters.mls.cell_size_m;
   DerivedDifferences differences;
   for (const auto& [key, tile] : made) {
     STRATA_ASSIGN_OR_RETURN(const std::optional<MlsTileRow> stored,
-                            reader.FindMlsTile(key, version_));
+                            reader.FindMlsTile(key, options_.version));
     if (tile == nullptr && !stored.has_value()) continue;
     if (tile != nullptr && stored.has_value()) {
       const MlsTileRow row = MakeMlsTileRow(*tile, stored->version, cell_size_m);
@@ -141,13 +144,12 @@ absl::Status DerivedPass::CheckSurfaces(StorageReader& reader, DerivedSink& sink
   // A tile that no scan explains any more is still in the store until everything is published.
   MlsTileMap gone;
   for (const TileKey& key : stored_) gone[key] = nullptr;
-  SurfaceTileMaker maker(core_,
-                         reader,
-                         integrator_.store(),
-                         gone,
-                         {.version = version_,
-                          .threads = threads_,
-                          .profile = core_.info().parameters.default_profile});
+  SurfaceTileMaker maker(
+      core_,
+      reader,
+      store_,
+      gone,
+      {.version = options_.version, .threads = options_.threads, .profile = options_.profile});
   KeySet keys;
   for (const auto& [key, scans] : scans_of_tile_) keys.insert(key);
   return MakeAllSurfaces(

@@ -11,11 +11,13 @@
 #include "absl/status/status.h"
 #include <Eigen/Geometry>
 
-#include "core/engine/integrator.h"
 #include "core/engine/job_board.h"
+#include "core/engine/map_core.h"
 #include "core/engine/mls_tiles.h"
+#include "core/engine/steady_view.h"
 #include "core/engine/surface_tiles.h"
 #include "core/storage/storage.h"
+#include "core/world/robot_profile.h"
 
 namespace strata {
 
@@ -46,16 +48,22 @@ class DerivedSink {
   virtual absl::Status Differs(const DerivedDifferences& differences) = 0;
 };
 
-// Memory: a block of tiles at a time. Runs on the worker's thread, so nothing changes meanwhile.
+// Memory: a block of tiles at a time.
 class DerivedPass {
  public:
-  // Compares with rows as of `version`, which new rows get. Results do not depend on `threads`.
-  DerivedPass(Integrator& integrator, std::uint64_t version, int threads, JobContext& context)
-      : integrator_(integrator),
-        core_(integrator.core()),
-        version_(version),
-        threads_(threads),
-        context_(context) {}
+  struct Options {
+    std::uint64_t epoch = 0;    // whose poses hold
+    std::uint64_t version = 0;  // compares with rows as of it; new rows get it
+    RobotProfile profile;       // what tiles are annotated for
+    int threads = 1;            // results do not depend on it
+    // What is read, for that many threads; nullptr: the present state, which must stay as it is but
+    // for what the sink stores. So that runs on the worker's thread.
+    const SteadyView* view = nullptr;
+  };
+
+  // All must outlive the pass. `store`: of the same state.
+  DerivedPass(MapCore& core, MlsTileStore& store, const Options& options, JobContext& context)
+      : core_(core), store_(store), options_(options), context_(context) {}
 
   absl::Status Run(DerivedSink& sink);
 
@@ -73,10 +81,9 @@ class DerivedPass {
   absl::Status CheckBlock(StorageReader& reader, const KeySet& keys, DerivedSink& sink);
   absl::Status CheckSurfaces(StorageReader& reader, DerivedSink& sink);
 
-  Integrator& integrator_;
   MapCore& core_;
-  const std::uint64_t version_;
-  const int threads_;
+  MlsTileStore& store_;
+  const Options options_;
   JobContext& context_;
   std::vector<PlacedScanRecord> placed_;  // integrated scans, by number
   ScanIndexes indexes_;

@@ -35,6 +35,7 @@ class Engine final : public api::Database, public NumbersSource {
   api::PoseGraph& posegraph() override { return posegraph_; }
   api::Classifiers& classifiers() override { return classifiers_; }
   EngineNumbers Numbers() override { return maps_->Numbers(); }
+  EngineHealth Health() override { return maps_->Health(); }
 
  private:
   std::unique_ptr<EngineMaps> maps_;

@@ -76,10 +76,20 @@ absl::Status JobRunner::Run(const JobInfo& job, JobContext& context) {
   if (job.kind == kEvaluateJob) return RunEvaluateJob(core_, job, context);
   if (job.kind == kClassifyJob) return RunClassifyJob(core_, worker_, job, context);
   if (job.kind == kFadeJob) return RunFadeJob(core_, worker_, job, context);
-  return worker_.Execute(closing_, [&](Integrator& integrator) {
-    return job.kind == kRevertJob ? RunRevertJob(integrator, job, context)
-                                  : RunRebuildJob(integrator, job, context);
-  });
+  if (job.kind == kVerifyJob) return RunVerify(job, context);
+  return worker_.Execute(
+      closing_,
+      [&](Integrator& integrator) {
+        return job.kind == kRevertJob ? RunRevertJob(integrator, job, context)
+                                      : RunRebuildJob(integrator, job, context);
+      },
+      absl::StrCat("job ", job.id, " (", job.kind, ")"));
+}
+
+absl::Status JobRunner::RunVerify(const JobInfo& job, JobContext& context) {
+  // A map whose tiles are not usable makes them before it takes commands.
+  STRATA_RETURN_IF_ERROR(worker_.Execute(closing_, [](Integrator&) { return absl::OkStatus(); }));
+  return RunVerifyJob(core_, job, context);
 }
 
 JobRunner::Step JobRunner::NextStep() {

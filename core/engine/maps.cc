@@ -1,5 +1,6 @@
 #include "core/engine/maps.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -14,14 +15,17 @@
 #include "absl/strings/string_view.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include <glog/logging.h>
 
+#include "core/common/blocking.h"
 #include "core/common/log_line.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/engine/backup.h"
 #include "core/engine/map_stats.h"
 #include "core/engine/map_watch.h"
+#include "core/engine/rebuild.h"
 #include "core/world/names.h"
 
 namespace strata {
@@ -39,6 +43,8 @@ absl::Status NoSuchMap(absl::string_view name) {
   return absl::NotFoundError(absl::StrCat("map ", name.substr(0, 100), " does not exist"));
 }
 
+constexpr absl::Duration kRecently = absl::Seconds(10);
+
 // Numbers that cannot be read now stay zero: they are looked at again in some seconds.
 MapNumbers NumbersOfMap(Map& map, const std::filesystem::path& file) {
   MapNumbers numbers;
@@ -46,14 +52,20 @@ MapNumbers NumbersOfMap(Map& map, const std::filesystem::path& file) {
   for (const char* suffix : {"", "-wal"}) {
     std::error_code error;
     const std::uintmax_t bytes = std::filesystem::file_size(file.string() + suffix, error);
-    if (!error) numbers.file_bytes += bytes;
+    if (error) continue;
+    numbers.file_bytes += bytes;
+    if (*suffix != '\0') numbers.journal_bytes = bytes;
   }
   const WriterNumbers writer = map.core().writer().numbers();
   numbers.commits = writer.commits;
   numbers.commit_parts = writer.parts;
   numbers.commit_time = writer.time;
   numbers.queued_bytes = writer.queued_bytes;
-  for (const JobInfo& job : map.jobs().List()) ++numbers.jobs[{job.kind, job.state}];
+  for (const JobInfo& job : map.jobs().List()) {
+    ++numbers.jobs[{job.kind, job.state}];
+    if (job.kind != kVerifyJob || job.state != JobState::kSucceeded) continue;
+    numbers.verified = std::max(numbers.verified, job.updated);
+  }
   const auto reader = map.core().Reader();
   if (!reader.ok()) return numbers;
   if (const auto totals = (*reader)->GetScanTotals(); totals.ok()) {
@@ -82,9 +94,35 @@ EngineNumbers EngineMaps::Numbers() const {
     }
   }
   for (const std::shared_ptr<Map>& map : open) {
-    numbers.maps.push_back(NumbersOfMap(*map, directory_.FileOf(map->core().name())));
+    const std::string& name = map->core().name();
+    numbers.maps.push_back(NumbersOfMap(*map, directory_.FileOf(name)));
+    absl::MutexLock lock(&mutex_);
+    const auto backed_up = backed_up_.find(name);
+    if (backed_up != backed_up_.end()) numbers.maps.back().backed_up = backed_up->second;
   }
   return numbers;
+}
+
+EngineHealth EngineMaps::Health() const {
+  EngineHealth health;
+  {
+    absl::MutexLock lock(&mutex_);
+    for (const auto& [name, map] : maps_) {
+      if (map.ok()) {
+        const absl::Status failed = (*map)->core().writer().FailedWithin(kRecently);
+        if (failed.ok() || absl::IsResourceExhausted(failed)) continue;
+        health.maps_not_written.push_back(absl::StrCat(name, ": ", failed.message()));
+      } else if (!absl::IsAborted(map.status())) {  // being made or deleted
+        health.maps_not_opened.push_back(name);
+      }
+    }
+  }
+  std::error_code error;
+  const std::filesystem::space_info disk = std::filesystem::space(options_.directory, error);
+  if (error) return health;
+  health.disk_bytes = disk.capacity;
+  health.disk_free_bytes = disk.available;
+  return health;
 }
 
 // The one copy of a map that may be made at a time, from before the map's own file to after it.
@@ -224,6 +262,7 @@ absl::Status EngineMaps::Delete(const api::Call& call, absl::string_view name) {
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Withdraw(name));
   std::uint64_t clock = 0;
   if (map != nullptr) {
+    const BlockingScope blocking;  // for what its threads are at
     map->Close();
     clock = map->core().changes().last();
   }
@@ -234,6 +273,7 @@ absl::Status EngineMaps::Delete(const api::Call& call, absl::string_view name) {
   }
   absl::MutexLock lock(&mutex_);
   maps_.erase(std::string(name));
+  backed_up_.erase(std::string(name));
   return removed;
 }
 
@@ -295,9 +335,12 @@ absl::Status EngineMaps::Backup(const api::Call& call,
     return absl::ResourceExhaustedError(
         absl::StrCat("map ", name, ": another backup of it runs; try again later"));
   }
-  absl::Status done = BackUp(map->core(), directory_.CopyOf(name), call.stop, sink);
+  const absl::Status done = BackUp(map->core(), directory_.CopyOf(name), call.stop, sink);
   directory_.RemoveCopy(name).IgnoreError();  // its journal, too; if this fails the next start does
-  return done;
+  STRATA_RETURN_IF_ERROR(done);
+  absl::MutexLock lock(&mutex_);
+  backed_up_[std::string(name)] = absl::Now();
+  return absl::OkStatus();
 }
 
 }  // namespace strata

@@ -34,6 +34,7 @@ class EngineMaps final : public api::Maps {
   absl::StatusOr<std::shared_ptr<Map>> Find(absl::string_view name);
 
   EngineNumbers Numbers() const;
+  EngineHealth Health() const;
 
   absl::StatusOr<MapInfo> Create(const api::Call& call,
                                  absl::string_view name,
@@ -83,6 +84,7 @@ class EngineMaps final : public api::Maps {
   std::map<std::string, absl::Time, std::less<>> next_try_ ABSL_GUARDED_BY(mutex_);
   std::set<std::string, std::less<>> copied_
       ABSL_GUARDED_BY(mutex_);  // maps with a copy being made
+  std::map<std::string, absl::Time, std::less<>> backed_up_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace strata

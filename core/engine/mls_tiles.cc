@@ -68,14 +68,16 @@ absl::StatusOr<MlsTileMap> MakeTiles(MapCore& core,
                                      const absl::btree_set<TileKey>& keys,
                                      int threads,
                                      const Stop& stop,
-                                     DamagedScans* damaged) {
+                                     DamagedScans* damaged,
+                                     const SteadyView* view) {
   const MapParameters parameters = core.info().parameters;
   const auto wanted = [&keys](const TileKey& key) { return keys.contains(key); };
   std::vector<MlsTileMap> parts(static_cast<std::size_t>(std::max(threads, 1)));
   const absl::Status done =
       ParallelFor(threads, scans.size(), [&](int thread, std::size_t i) -> absl::Status {
         STRATA_RETURN_IF_ERROR(stop.status());
-        STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+        std::optional<ReaderPool::Lease> lease;
+        STRATA_ASSIGN_OR_RETURN(StorageReader * reader, ReaderOf(core, view, thread, lease));
         ScanSource source(*reader, parameters, {.change = scans[i].change});
         const absl::StatusOr<MlsMap> contribution =
             source.Contribution(scans[i].scan, scans[i].T_map_scan);

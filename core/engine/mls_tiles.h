@@ -18,6 +18,7 @@
 #include "core/engine/damaged_scans.h"
 #include "core/engine/map_core.h"
 #include "core/engine/scan_labels.h"
+#include "core/engine/steady_view.h"
 #include "core/mls/mls_map.h"
 #include "core/mls/tile_key.h"
 #include "core/storage/storage.h"
@@ -49,13 +50,15 @@ void JoinContribution(const MlsMap& contribution,
 
 // The tiles `keys` out of the contributions of `scans` alone, by `threads` threads; the same bytes
 // for any number. Keys that get nothing are nullptr. Memory: the tiles and a scan a thread. Damaged
-// scans are put into `damaged`; where that is nullptr, DATA_LOSS naming one.
+// scans are put into `damaged`; where that is nullptr, DATA_LOSS naming one. `view`: what is read,
+// by as many threads at most; nullptr: the present state.
 absl::StatusOr<MlsTileMap> MakeTiles(MapCore& core,
                                      const std::vector<PlacedScanRecord>& scans,
                                      const absl::btree_set<TileKey>& keys,
                                      int threads,
                                      const Stop& stop,
-                                     DamagedScans* damaged = nullptr);
+                                     DamagedScans* damaged = nullptr,
+                                     const SteadyView* view = nullptr);
 
 // Stored tiles, decoded ones kept. One thread at a time.
 class MlsTileStore {

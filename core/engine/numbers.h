@@ -19,7 +19,10 @@ namespace strata {
 // Of one map that is open. Counts of what happened begin with the engine.
 struct MapNumbers {
   std::string map;
-  std::uint64_t file_bytes = 0;  // with its journal
+  std::uint64_t file_bytes = 0;                 // with its journal
+  std::uint64_t journal_bytes = 0;              // of that
+  absl::Time verified = absl::InfinitePast();   // the last time that all was found sound
+  absl::Time backed_up = absl::InfinitePast();  // the last whole backup since the engine began
   std::uint64_t scans = 0;
   std::uint64_t scans_pending = 0;  // acknowledged, not joined yet
   std::uint64_t scans_failed = 0;
@@ -36,11 +39,22 @@ struct EngineNumbers {
   std::uint64_t maps_not_opened = 0;  // files that are damaged or of another version
 };
 
+// Whether an engine can do its work.
+struct EngineHealth {
+  std::vector<std::string> maps_not_opened;  // names
+  // Whose last commit failed in the store, seconds ago, as "NAME: why"; but for those that merely
+  // had no room.
+  std::vector<std::string> maps_not_written;
+  std::uint64_t disk_bytes = 0;       // of the file system that holds the maps
+  std::uint64_t disk_free_bytes = 0;  // for this process
+};
+
 // What a database is that has numbers.
 class NumbersSource {
  public:
   virtual ~NumbersSource() = default;
   virtual EngineNumbers Numbers() = 0;
+  virtual EngineHealth Health() = 0;
 };
 
 // `engine`: what OpenEngine returned; of another database there are none. Reads a little of every
@@ -48,6 +62,12 @@ class NumbersSource {
 inline EngineNumbers NumbersOf(api::Database& engine) {
   auto* const source = dynamic_cast<NumbersSource*>(&engine);
   return source == nullptr ? EngineNumbers() : source->Numbers();
+}
+
+// For once a second. Thread-safe.
+inline EngineHealth HealthOf(api::Database& engine) {
+  auto* const source = dynamic_cast<NumbersSource*>(&engine);
+  return source == nullptr ? EngineHealth() : source->Health();
 }
 
 }  // namespace strata

@@ -265,7 +265,7 @@ absl::Status RunOptimizeJob(MapCore& core,
     context.SetProposed();
   } else {
     PartOfJob part(context, accepted ? 0.0 : kAlignmentEnd, 1.0);
-    STRATA_RETURN_IF_ERROR(worker.Execute(context.stop(), [&](Integrator& integrator) {
+    const auto apply = [&](Integrator& integrator) {
       return ApplyProposal(integrator,
                            job,
                            proposed.base_epoch,
@@ -273,7 +273,9 @@ absl::Status RunOptimizeJob(MapCore& core,
                            optimizer.threads(),
                            damaged,
                            part);
-    }));
+    };
+    STRATA_RETURN_IF_ERROR(
+        worker.Execute(context.stop(), apply, absl::StrCat("job ", job.id, " (", job.kind, ")")));
   }
   const bool told = accepted && job.metrics.contains("left_out") &&
                     job.metrics.at("left_out") > 0.0;  // by the proposal

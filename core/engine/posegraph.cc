@@ -76,6 +76,11 @@ absl::Status EnginePoseGraph::SetPose(const api::Call& call,
   if (const absl::Status valid = ValidatePose(T_map_scan); !valid.ok()) {
     return Annotate(valid, absl::StrCat("scan ", id.ToString()));
   }
+  {
+    // Here, too: to hear of it nobody waits behind what the worker is at.
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
+    STRATA_RETURN_IF_ERROR(NumberOf(*reader, id).status());
+  }
   return found->worker().Execute(
       call.stop, [&](Integrator& integrator) { return integrator.SetPose(id, T_map_scan); });
 }

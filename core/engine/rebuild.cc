@@ -13,6 +13,7 @@
 #include "core/common/status.h"
 #include "core/engine/derived_pass.h"
 #include "core/engine/staged_tiles.h"
+#include "core/engine/steady_view.h"
 #include "core/engine/tile_check.h"
 #include "core/engine/truth_check.h"
 
@@ -97,7 +98,13 @@ absl::Status Rebuild(Integrator& integrator, int threads, JobContext& context) {
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, integrator.NextVersion());
   StagedTiles staged(integrator.core(), version);
   Repairs repairs(staged);
-  DerivedPass pass(integrator, version, threads, context);
+  DerivedPass pass(integrator.core(),
+                   integrator.store(),
+                   {.epoch = integrator.core().snapshots().current().epoch,
+                    .version = version,
+                    .profile = integrator.core().info().parameters.default_profile,
+                    .threads = threads},
+                   context);
   STRATA_RETURN_IF_ERROR(pass.Run(repairs));
   const absl::Status published =
       staged.Publish({}, [&](StorageWriter& writer) { return PutIndexes(writer, pass.indexes()); });
@@ -116,25 +123,31 @@ absl::Status Rebuild(Integrator& integrator, int threads, JobContext& context) {
   return absl::OkStatus();
 }
 
-absl::Status Verify(Integrator& integrator, int threads, JobContext& context) {
-  MapCore& core = integrator.core();
-  integrator.store().Clear();
+absl::Status Verify(MapCore& core, const SteadyView& view, int threads, JobContext& context) {
   Findings findings;
-  TruthCheck truth(core, context);
+  TruthCheck truth(core, view, context);
   STRATA_RETURN_IF_ERROR(truth.Run([&](const std::string& what) { findings.AddTruth(what); }));
   std::uint64_t tiles = 0;
   if (findings.count() == 0) {
-    DerivedPass pass(integrator, core.snapshots().current().tile_version, threads, context);
+    STRATA_ASSIGN_OR_RETURN(const MapInfo info, view.readers.front()->GetMapInfo());
+    MlsTileStore store(core);
+    DerivedPass pass(core,
+                     store,
+                     {.epoch = view.clock.epoch,
+                      .version = view.clock.tile_version,
+                      .profile = info.parameters.default_profile,
+                      .threads = threads,
+                      .view = &view},
+                     context);
     STRATA_RETURN_IF_ERROR(pass.Run(findings));
     tiles = pass.tiles();
   } else {
     // Without sound points nothing can be said about what should follow from them.
-    STRATA_ASSIGN_OR_RETURN(tiles, CheckTilesAlone(core, context, [&](const std::string& what) {
+    STRATA_ASSIGN_OR_RETURN(tiles, CheckTilesAlone(view, context, [&](const std::string& what) {
                               findings.Add(what);
                             }));
   }
   context.SetMetric("tiles_checked", static_cast<double>(tiles));
-  integrator.store().Clear();
   context.SetMetric("scans_checked", static_cast<double>(truth.scans()));
   context.SetMetric("pieces_checked", static_cast<double>(truth.pieces()));
   context.SetMetric("mismatches", static_cast<double>(findings.count()));
@@ -145,10 +158,17 @@ absl::Status Verify(Integrator& integrator, int threads, JobContext& context) {
 }  // namespace
 
 absl::Status RunRebuildJob(Integrator& integrator, const JobInfo& job, JobContext& context) {
-  const int threads = ThreadsOf(job, integrator.core().options().worker_threads);
-  if (job.kind == kRebuildJob) return Rebuild(integrator, threads, context);
-  if (job.kind == kVerifyJob) return Verify(integrator, threads, context);
-  return absl::InvalidArgumentError(absl::StrCat("job kind '", job.kind, "' is unknown"));
+  if (job.kind != kRebuildJob) {
+    return absl::InvalidArgumentError(absl::StrCat("job kind '", job.kind, "' is unknown"));
+  }
+  return Rebuild(integrator, ThreadsOf(job, integrator.core().options().worker_threads), context);
+}
+
+absl::Status RunVerifyJob(MapCore& core, const JobInfo& job, JobContext& context) {
+  const int threads = ThreadsOf(job, core.options().worker_threads);
+  return WithSteadyView(core, threads, context.stop(), [&](const SteadyView& view) {
+    return Verify(core, view, threads, context);
+  });
 }
 
 absl::StatusOr<bool> NeedsRecovery(MapCore& core) {

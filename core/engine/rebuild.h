@@ -1,5 +1,5 @@
-// Everything derived against everything it follows from: `verify` reports what differs, `rebuild`
-// puts it right. Both make all of it again from truth.
+// Everything derived against everything it follows from: `verify` reports what differs, beside all
+// other work; `rebuild` puts it right. Both make all of it again from truth.
 #ifndef STRATA_CORE_ENGINE_REBUILD_H_
 #define STRATA_CORE_ENGINE_REBUILD_H_
 
@@ -9,6 +9,7 @@
 #include "core/common/stop.h"
 #include "core/engine/integrator.h"
 #include "core/engine/job_board.h"
+#include "core/engine/map_core.h"
 #include "core/world/job.h"
 
 namespace strata {
@@ -16,7 +17,11 @@ namespace strata {
 inline constexpr absl::string_view kRebuildJob = "rebuild";
 inline constexpr absl::string_view kVerifyJob = "verify";
 
-// Runs a job of either kind; DATA_LOSS naming what does not fit if `verify` finds anything.
+// Looks at one state of the map while uploads, edits and integration go on; DATA_LOSS naming what
+// does not fit in it.
+absl::Status RunVerifyJob(MapCore& core, const JobInfo& job, JobContext& context);
+
+// On the worker's thread.
 absl::Status RunRebuildJob(Integrator& integrator, const JobInfo& job, JobContext& context);
 
 // Whether the derived tables are marked incomplete: they were dropped, or written by a program with

@@ -239,6 +239,8 @@ absl::Status EngineScans::SetLabels(const api::Call& call,
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
   STRATA_RETURN_IF_ERROR(CheckId(id));
   STRATA_RETURN_IF_ERROR(Annotate(ValidateLabels(labels), absl::StrCat("scan ", id.ToString())));
+  // Here, too: to hear of it nobody waits behind what the worker is at.
+  STRATA_RETURN_IF_ERROR(FindScan(*found, id).status());
   return found->worker().Execute(call.stop, [&](Integrator& integrator) {
     return integrator.SetPersonLabels(id, labels, mode == api::LabelMode::kUpdate);
   });
@@ -247,7 +249,7 @@ absl::Status EngineScans::SetLabels(const api::Call& call,
 absl::Status EngineScans::Delete(const api::Call& call, absl::string_view map, const ScanId& id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
-  STRATA_RETURN_IF_ERROR(CheckId(id));
+  STRATA_RETURN_IF_ERROR(FindScan(*found, id).status());
   return found->worker().Execute(call.stop,
                                  [&](Integrator& integrator) { return integrator.DeleteScan(id); });
 }

@@ -5,6 +5,8 @@
 
 #include "absl/synchronization/mutex.h"
 
+#include "core/common/blocking.h"
+
 namespace strata {
 
 MapView Snapshots::current() const {
@@ -24,6 +26,7 @@ void Snapshots::Publish(MapView view) {
 }
 
 void Snapshots::AwaitPublished(std::uint64_t tile_version) const {
+  const BlockingScope blocking;
   absl::MutexLock lock(&mutex_);
   const auto published = [this, tile_version]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
     return current_.tile_version >= tile_version;

@@ -31,32 +31,32 @@ absl::Status DamagedTile(const TileKey& key, const absl::Status& why) {
       "tile ", key.ToString(), " is damaged, a rebuild of the map mends it: ", why.message()));
 }
 
-absl::StatusOr<std::uint64_t> CheckTilesAlone(MapCore& core,
+absl::StatusOr<std::uint64_t> CheckTilesAlone(const SteadyView& view,
                                               JobContext& context,
                                               absl::FunctionRef<void(const std::string&)> report) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-  const std::uint64_t version = core.snapshots().current().tile_version;
+  StorageReader& reader = *view.readers.front();
+  const std::uint64_t version = view.clock.tile_version;
   std::uint64_t tiles = 0;
   const auto look = [&](const TileKey& key, const char* kind, const absl::Status& readable) {
     ++tiles;
     if (readable.ok()) return;
     report(absl::StrCat("tile ", key.ToString(), " (", kind, "): ", readable.message()));
   };
-  STRATA_ASSIGN_OR_RETURN(const std::vector<MlsTileRow> rows, reader->ListMlsTiles(version));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MlsTileRow> rows, reader.ListMlsTiles(version));
   for (const MlsTileRow& row : rows) {
     STRATA_RETURN_IF_ERROR(context.Progress(0.4, "reading tiles"));
     look(row.key,
          "statistics",
-         Readable(reader->FindMlsTile(row.key, version), row.key, DecodeMlsTile));
+         Readable(reader.FindMlsTile(row.key, version), row.key, DecodeMlsTile));
   }
   for (TileRange range; range.level <= kMaxLevel; ++range.level) {
     STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> served,
-                            reader->ListSurfaceTiles(range, version));
+                            reader.ListSurfaceTiles(range, version));
     for (const SurfaceTileRow& row : served) {
       STRATA_RETURN_IF_ERROR(context.Progress(0.7, "reading tiles"));
       look(row.key,
            "served",
-           Readable(reader->FindSurfaceTile(row.key, version), row.key, DecodeSurfaceTile));
+           Readable(reader.FindSurfaceTile(row.key, version), row.key, DecodeSurfaceTile));
     }
   }
   return tiles;

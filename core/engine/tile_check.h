@@ -11,7 +11,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/engine/job_board.h"
-#include "core/engine/map_core.h"
+#include "core/engine/steady_view.h"
 #include "core/mls/tile_key.h"
 
 namespace strata {
@@ -19,9 +19,9 @@ namespace strata {
 // DATA_LOSS naming the tile, the cure and why it cannot be read.
 absl::Status DamagedTile(const TileKey& key, const absl::Status& why);
 
-// Reads every tile of every level that readers see now and calls `report` with each one that cannot
+// Reads every tile of every level that `view` shows and calls `report` with each one that cannot
 // be read. Returns how many were looked at; an error is one of the store or of the job being ended.
-absl::StatusOr<std::uint64_t> CheckTilesAlone(MapCore& core,
+absl::StatusOr<std::uint64_t> CheckTilesAlone(const SteadyView& view,
                                               JobContext& context,
                                               absl::FunctionRef<void(const std::string&)> report);
 

@@ -141,26 +141,25 @@ absl::Status TruthCheck::CheckDecisions(StorageReader& reader, ScanNumber last, 
 }
 
 absl::Status TruthCheck::Run(Report report) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-  STRATA_ASSIGN_OR_RETURN(const std::vector<ScanNumber> numbers, reader->ListScanNumbers());
-  const std::uint64_t epoch = core_.snapshots().current().epoch;
+  StorageReader& reader = *view_.readers.front();
+  STRATA_ASSIGN_OR_RETURN(const std::vector<ScanNumber> numbers, reader.ListScanNumbers());
   for (const ScanNumber number : numbers) {
     const double share = static_cast<double>(scans_) / static_cast<double>(numbers.size());
     STRATA_RETURN_IF_ERROR(context_.Progress(0.4 * share, "checking scans"));
     ++scans_;
-    const absl::StatusOr<PosedScan> posed = reader->GetScan(number, epoch);
+    const absl::StatusOr<PosedScan> posed = reader.GetScan(number, view_.clock.epoch);
     if (absl::IsDataLoss(posed.status())) {
       report(absl::StrCat("row ", number, ": ", posed.status().message()));
       continue;
     }
     STRATA_RETURN_IF_ERROR(posed.status());
-    CheckScan(*reader, *posed, [&](const std::string& what) {
+    CheckScan(reader, *posed, [&](const std::string& what) {
       report(absl::StrCat("scan ", posed->scan.header.id.ToString(), ": ", what));
     });
   }
-  CheckClassifiers(*reader, report);
+  CheckClassifiers(reader, report);
   const absl::Status decisions =
-      CheckDecisions(*reader, numbers.empty() ? 0 : numbers.back(), report);
+      CheckDecisions(reader, numbers.empty() ? 0 : numbers.back(), report);
   if (!absl::IsDataLoss(decisions)) return decisions;
   report(std::string(decisions.message()));
   return absl::OkStatus();

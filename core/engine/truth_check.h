@@ -10,6 +10,7 @@
 
 #include "core/engine/job_board.h"
 #include "core/engine/map_core.h"
+#include "core/engine/steady_view.h"
 #include "core/storage/storage.h"
 
 namespace strata {
@@ -18,7 +19,9 @@ class TruthCheck {
  public:
   using Report = absl::FunctionRef<void(const std::string&)>;
 
-  TruthCheck(MapCore& core, JobContext& context) : core_(core), context_(context) {}
+  // Of the scans that `view` shows.
+  TruthCheck(MapCore& core, const SteadyView& view, JobContext& context)
+      : core_(core), view_(view), context_(context) {}
 
   // Calls `report` with every thing that is not as it was written. An error is one of the store or
   // of the job being ended.
@@ -35,6 +38,7 @@ class TruthCheck {
   void CheckClassifiers(StorageReader& reader, Report report);
 
   MapCore& core_;
+  const SteadyView& view_;
   JobContext& context_;
   std::uint64_t scans_ = 0;
   std::uint64_t pieces_ = 0;

@@ -11,6 +11,7 @@
 #include "absl/time/time.h"
 #include <glog/logging.h>
 
+#include "core/common/blocking.h"
 #include "core/common/guarded.h"
 #include "core/common/log_line.h"
 #include "core/common/status.h"
@@ -54,8 +55,9 @@ void Worker::ScanCommitted() {
   ++pending_;
 }
 
-absl::Status Worker::Execute(const Stop& stop, Command command) {
-  Task task{command, absl::OkStatus()};
+absl::Status Worker::Execute(const Stop& stop, Command command, absl::string_view what) {
+  Task task{command, what, absl::OkStatus()};
+  const BlockingScope blocking;  // for as long as the pass under way takes
   absl::MutexLock lock(&mutex_);
   if (closed_) return absl::CancelledError("the map is being closed");
   if (refuses_) return Refusal();
@@ -65,7 +67,7 @@ absl::Status Worker::Execute(const Stop& stop, Command command) {
     absl::Status waiting = Guarded([&stop] { return stop.status(); });
     if (waiting.ok() || task.begun) continue;
     tasks_.erase(std::find(tasks_.begin(), tasks_.end(), &task));
-    return waiting;
+    return Annotate(waiting, absl::StrCat("waited for ", running_, " of map ", core_.name()));
   }
   return task.status;
 }
@@ -117,6 +119,7 @@ void Worker::RunCommand() {
     task = tasks_.front();
     tasks_.pop_front();
     task->begun = true;
+    running_ = std::string(task->what);
   }
   const absl::Status status = GuardedStep([&] { return task->command(integrator_); });
   absl::MutexLock lock(&mutex_);
@@ -129,6 +132,7 @@ void Worker::RunBatch() {
   {
     absl::MutexLock lock(&mutex_);
     waited = pending_;
+    running_ = "integration";
   }
   int count = 0;
   const absl::Status done = GuardedStep([&]() -> absl::Status {

@@ -5,12 +5,14 @@
 
 #include <cstdint>
 #include <deque>
+#include <string>
 #include <thread>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "absl/synchronization/mutex.h"
 
 #include "core/common/stop.h"
@@ -35,8 +37,9 @@ class Worker {
   void ScanCommitted();
 
   // Runs `command` on the worker's thread, before the next batch, and returns its status. `stop`
-  // ends the waiting (CANCELLED, DEADLINE_EXCEEDED); once begun, a command is waited for.
-  absl::Status Execute(const Stop& stop, Command command);
+  // ends the waiting (CANCELLED, DEADLINE_EXCEEDED, naming what is waited for); once begun, a
+  // command is waited for. `what`, for those that wait for it: "job 3 (rebuild)".
+  absl::Status Execute(const Stop& stop, Command command, absl::string_view what = "an edit");
 
   // Ends the thread after the step it is in. What waits is answered CANCELLED. Safe to call again.
   void Close();
@@ -44,6 +47,7 @@ class Worker {
  private:
   struct Task {
     Command command;
+    absl::string_view what;
     absl::Status status;
     bool begun = false;
     bool done = false;
@@ -72,6 +76,7 @@ class Worker {
   const Stop closing_;
   mutable absl::Mutex mutex_;
   std::deque<Task*> tasks_ ABSL_GUARDED_BY(mutex_);
+  std::string running_ ABSL_GUARDED_BY(mutex_) = "recovery";  // what the thread is at
   std::uint64_t pending_ ABSL_GUARDED_BY(mutex_);
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   bool refuses_ ABSL_GUARDED_BY(mutex_) = false;

@@ -9,6 +9,7 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 
+#include "core/common/blocking.h"
 #include "core/common/guarded.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
@@ -41,6 +42,7 @@ absl::Status WriterThread::Run(
     Durability durability, std::size_t bytes, const Stop& stop, Work work, Tell tell) {
   if (bytes > 0) STRATA_RETURN_IF_ERROR(disk_.CheckForUpload());
   Task task{work, tell, bytes, absl::OkStatus()};
+  const BlockingScope blocking;
   absl::MutexLock lock(&mutex_);
   const auto has_room = [this, bytes]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
     return closed_ || queued_bytes_ == 0 || queued_bytes_ + bytes <= queue_bytes_;
@@ -62,6 +64,11 @@ WriterNumbers WriterThread::numbers() const {
   return numbers;
 }
 
+absl::Status WriterThread::FailedWithin(absl::Duration time) const {
+  absl::MutexLock lock(&mutex_);
+  return SteadyNow() - last_commit_at_ <= time ? last_commit_ : absl::OkStatus();
+}
+
 bool WriterThread::HasWorkOrClosed() const {
   return closed_ || !full_.empty() || !relaxed_.empty();
 }
@@ -77,8 +84,8 @@ WriterThread::Queue WriterThread::TakeBatch(Durability& durability) {
   return batch;
 }
 
-void WriterThread::CommitBatch(Durability durability, const Queue& batch) {
-  const absl::Status committed = Guarded([&] {
+absl::Status WriterThread::CommitBatch(Durability durability, const Queue& batch) {
+  absl::Status committed = Guarded([&] {
     return storage_.Commit(durability, [&]() -> absl::Status {
       for (Task* task : batch) {
         task->status = storage_.Part([&] { return Guarded([&] { return task->work(storage_); }); });
@@ -91,6 +98,7 @@ void WriterThread::CommitBatch(Durability durability, const Queue& batch) {
     task->status = committed;
     if (committed.ok()) TellOf(*task);
   }
+  return committed;
 }
 
 // What is committed cannot be taken back: it is told as soon as there is memory for it.
@@ -121,8 +129,10 @@ absl::StatusOr<bool> WriterThread::RunNext() {
     if (batch.empty()) return true;
   }
   const absl::Time begun = SteadyNow();
-  CommitBatch(durability, batch);
+  absl::Status committed = CommitBatch(durability, batch);
   absl::MutexLock lock(&mutex_);
+  last_commit_ = std::move(committed);
+  last_commit_at_ = SteadyNow();
   ++numbers_.commits;
   numbers_.parts += batch.size();
   numbers_.time += SteadyNow() - begun;

@@ -52,6 +52,8 @@ class WriterThread {
                    Tell tell = TellNobody);
 
   WriterNumbers numbers() const;
+  // Why the last commit failed, if it did, and not longer ago; otherwise OK.
+  absl::Status FailedWithin(absl::Duration time) const;
 
   // Carries out what is queued, then refuses everything with CANCELLED. Safe to call again.
   void Close();
@@ -70,7 +72,7 @@ class WriterThread {
   void Loop();
   // Takes what the next commit is made of.
   Queue TakeBatch(Durability& durability) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void CommitBatch(Durability durability, const Queue& batch);
+  absl::Status CommitBatch(Durability durability, const Queue& batch);
   static void TellOf(const Task& task);
   // One commit; whether there is none any more.
   absl::StatusOr<bool> RunNext();
@@ -80,6 +82,8 @@ class WriterThread {
   const DiskSpace& disk_;
   const std::size_t queue_bytes_;
   mutable absl::Mutex mutex_;
+  absl::Status last_commit_ ABSL_GUARDED_BY(mutex_);
+  absl::Time last_commit_at_ ABSL_GUARDED_BY(mutex_);
   WriterNumbers numbers_ ABSL_GUARDED_BY(mutex_);  // without queued_bytes
   Queue full_ ABSL_GUARDED_BY(mutex_);
   Queue relaxed_ ABSL_GUARDED_BY(mutex_);

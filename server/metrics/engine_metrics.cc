@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "absl/time/time.h"
+
 namespace strata::server {
 namespace {
 
@@ -36,6 +38,19 @@ void AddEngine(MetricFamilies& families, const EngineNumbers& numbers) {
             "Map files that could not be opened",
             {{{}, static_cast<double>(numbers.maps_not_opened)}});
   add("strata_map_file_bytes", "Map file with its journal", [](Map m) { return m.file_bytes; });
+  add("strata_map_journal_bytes", "Journal of the map file", [](Map m) { return m.journal_bytes; });
+  const auto add_time = [&](const char* name, const char* help, absl::Time MapNumbers::*time) {
+    add(name, help, [time](Map m) {
+      return m.*time == absl::InfinitePast() ? 0.0
+                                             : absl::ToDoubleSeconds(m.*time - absl::UnixEpoch());
+    });
+  };
+  add_time("strata_map_verified_timestamp_seconds",
+           "When a verify last found all sound; 0: never",
+           &MapNumbers::verified);
+  add_time("strata_map_backed_up_timestamp_seconds",
+           "When a backup was last whole; 0: not since the server began",
+           &MapNumbers::backed_up);
   add("strata_map_scans", "Acknowledged scans", [](Map m) { return m.scans; });
   add("strata_map_scans_pending", "Scans acknowledged, not joined yet", [](Map m) {
     return m.scans_pending;

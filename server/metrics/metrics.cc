@@ -87,11 +87,19 @@ CallMetrics::CallMetrics()
                    *registry_,
                    "strata_sent_bytes_total",
                    "Bytes of answers, before TLS")),
-      seconds_(
-          Family(prometheus::BuildHistogram(),
-                 *registry_,
-                 "strata_call_seconds",
-                 "From a call's arrival to its end; of streams and watches their whole life")) {}
+      seconds_(Family(prometheus::BuildHistogram(),
+                      *registry_,
+                      "strata_call_seconds",
+                      "From a call's arrival to its end; of streams and watches their whole life")),
+      acknowledged_(Family(prometheus::BuildHistogram(),
+                           *registry_,
+                           "strata_acknowledge_seconds",
+                           "From a scan's last point to its being durable")
+                        .Add({}, SecondsBounds())) {}
+
+void CallMetrics::Acknowledged(absl::Duration duration) {
+  acknowledged_.Observe(absl::ToDoubleSeconds(duration));
+}
 
 CallMetrics::Method& CallMetrics::Of(absl::string_view method) {
   const auto found = methods_.find(method);

@@ -40,6 +40,9 @@ class CallMetrics {
              std::size_t bytes_sent,
              absl::string_view reason);
 
+  // A scan was made durable, so long after its last point had come.
+  void Acknowledged(absl::Duration duration);
+
   const std::shared_ptr<prometheus::Registry>& registry() const { return registry_; }
 
  private:
@@ -57,6 +60,7 @@ class CallMetrics {
   prometheus::Family<prometheus::Counter>& received_;
   prometheus::Family<prometheus::Counter>& sent_;
   prometheus::Family<prometheus::Histogram>& seconds_;
+  prometheus::Histogram& acknowledged_;
   absl::Mutex mutex_;
   std::map<std::string, Method, std::less<>> methods_ ABSL_GUARDED_BY(mutex_);
 };

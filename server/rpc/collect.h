@@ -55,9 +55,9 @@ class CollectReactor final : public grpc::ServerReadReactor<Sealed<typename Coll
   void OnReadDone(bool ok) override {
     if (!expected_.Arrived()) return;
     if (ok) {
-      runtime_.uploads.Submit([this] { Take(); });
+      runtime_.uploads.Submit(request_.client(), [this] { Take(); });
     } else {
-      runtime_.queries.Submit([this] { End(); });
+      runtime_.queries.Submit(request_.client(), [this] { End(); });
     }
   }
   void OnCancel() override { request_.Cancel(); }

@@ -3,43 +3,103 @@
 #define STRATA_SERVER_RPC_EXECUTOR_H_
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
+#include <set>
+#include <string>
 #include <thread>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
+#include "absl/strings/string_view.h"
 #include "absl/synchronization/mutex.h"
 
 namespace strata::server {
 
-// Runs tasks in the order submitted, on as many threads as were ever needed at once, up to a bound.
-// Thread-safe. The queue is as long as there are calls under way, which Runtime bounds: a call has
-// few tasks at a time.
+struct ExecutorNumbers {
+  std::size_t running = 0;  // tasks that hold a place
+  std::size_t blocked = 0;  // tasks that gave theirs back for a while
+  std::size_t queued = 0;   // tasks that wait for their first one
+};
+
+// Runs tasks in `places`, each on a thread of its own. No client keeps another one waiting:
+// - a place that gets free goes to the client that holds the fewest, in turn among equals;
+// - a client that holds none waits for none: there are as many spare places for such;
+// - a task inside a BlockingScope gives its place back until the scope ends. Blocked tasks cost a
+//   thread each: up to kMostBlocked, of one client a quarter of that; further ones keep their
+//   places.
+// Tasks of one client begin in the order submitted. Threads beyond `places` end when they are idle.
+// Thread-safe. The queues are as long as there are calls under way, which Runtime bounds: a call
+// has few tasks at a time.
 class Executor {
  public:
-  // `name` is that of the threads and must outlive them. REQUIRES: most_threads ≥ 1.
-  Executor(int most_threads, const char* name);
+  static constexpr std::size_t kMostBlocked = 512;
+
+  // `name` is that of the threads and must outlive them. REQUIRES: places ≥ 1.
+  Executor(int places, const char* name);
   // Runs what was submitted, then joins the threads.
   ~Executor();
   Executor(const Executor&) = delete;
   Executor& operator=(const Executor&) = delete;
 
-  // `task` must not throw.
-  void Submit(std::function<void()> task);
+  // `client`: whose turn it is. `task` must not throw.
+  void Submit(absl::string_view client, std::function<void()> task);
+
+  const char* name() const { return name_; }
+  ExecutorNumbers numbers() const;
 
  private:
+  struct Client {
+    std::string name;
+    std::size_t running = 0;
+    std::size_t blocked = 0;
+    std::uint64_t turn = 0;     // when it got its last place
+    std::deque<bool*> resumed;  // blocked tasks that want their place again
+    std::deque<std::function<void()>> tasks;
+    bool waits() const { return !resumed.empty() || !tasks.empty(); }
+  };
+  struct Begun {
+    Client* client;
+    std::function<void()> task;
+  };
+  class LentThread;  // tells of a task's waits
+
+  Client& Of(absl::string_view name) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // `change` may do anything to the client but its name; afterwards it stands where it belongs.
+  void Change(Client& client, absl::FunctionRef<void()> change)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Gives places to whose turn it is.
+  void Dispatch() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool HasPlaceFor(const Client& client) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void GivePlaceTo(Client& client) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void AddThread() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Work();
-  bool Ready() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return closing_ || !tasks_.empty(); }
+  // False: the thread is not needed any more.
+  bool Take(Begun& begun) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Finished(Client& client);
+  bool Ready() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return closing_ || !begun_.empty(); }
 
-  const std::size_t most_threads_;
+  const std::size_t places_;
   const char* const name_;
-  absl::Mutex mutex_;
-  std::deque<std::function<void()>> tasks_ ABSL_GUARDED_BY(mutex_);
+  mutable absl::Mutex mutex_;
+  std::map<std::string, Client, std::less<>> clients_ ABSL_GUARDED_BY(mutex_);
+  // Those that wait for a place: running, turn.
+  std::set<std::tuple<std::size_t, std::uint64_t, Client*>> waiting_ ABSL_GUARDED_BY(mutex_);
+  std::uint64_t turns_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::size_t running_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::size_t blocked_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::size_t queued_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::deque<Begun> begun_ ABSL_GUARDED_BY(mutex_);  // have their place, wait for a thread
   bool closing_ ABSL_GUARDED_BY(mutex_) = false;
-  std::size_t idle_ ABSL_GUARDED_BY(mutex_) = 0;  // threads that wait for a task
-  std::vector<std::thread> threads_ ABSL_GUARDED_BY(mutex_);
+  std::size_t idle_ ABSL_GUARDED_BY(mutex_) = 0;      // threads that wait for a task
+  std::size_t starting_ ABSL_GUARDED_BY(mutex_) = 0;  // threads that will
+  std::map<std::thread::id, std::thread> threads_ ABSL_GUARDED_BY(mutex_);
+  std::vector<std::thread> ended_ ABSL_GUARDED_BY(mutex_);  // to be joined
 };
 
 }  // namespace strata::server

@@ -38,7 +38,7 @@ class PollReactor : public grpc::ServerWriteReactor<Told> {
       this->Finish(request_.Close(request_.admission()));
       return;
     }
-    runtime_.queries.Submit([this] { LookAndSend(); });
+    runtime_.queries.Submit(request_.client(), [this] { LookAndSend(); });
   }
 
  protected:
@@ -117,7 +117,7 @@ class PollReactor : public grpc::ServerWriteReactor<Told> {
   }
 
   void WaitAndLook() {
-    runtime_.ticker.AtNextTick([this] { LookAndSend(); });
+    runtime_.ticker.AtNextTick(request_.client(), [this] { LookAndSend(); });
   }
 
   void OnWriteDone(bool ok) override {
@@ -131,7 +131,7 @@ class PollReactor : public grpc::ServerWriteReactor<Told> {
       this->Finish(request_.Close(absl::OkStatus()));
     } else if (sent == News::kMore) {
       next_look_ = absl::InfinitePast();
-      runtime_.queries.Submit([this] { LookAndSend(); });
+      runtime_.queries.Submit(request_.client(), [this] { LookAndSend(); });
     } else {
       WaitAndLook();
     }

@@ -16,12 +16,15 @@
 #include "core/common/log_line.h"
 #include "core/common/steady_time.h"
 #include "server/access/method_rights.h"
+#include "server/access/right.h"
+#include "server/rpc/call_object.h"
 #include "server/rpc/wire_check.h"
 
 namespace strata::server {
 namespace {
 
 constexpr std::size_t kMaxLoggedName = 100;
+constexpr std::size_t kMaxLoggedMessage = 300;
 // In the metrics: who was refused because nobody knows him.
 constexpr absl::string_view kStranger = "STRANGER";
 
@@ -75,14 +78,16 @@ absl::Status NobodyMay(absl::string_view method) {
 Request::Request(Runtime& runtime,
                  grpc::CallbackServerContext& context,
                  absl::string_view method,
-                 Kind kind)
+                 Kind kind,
+                 absl::Duration limit)
     : runtime_(runtime),
       context_(context),
       kind_(kind),
       method_(method),
       peer_(context.peer()),
-      started_(SteadyNow()) {
-  call_.stop = Stop(DeadlineOf(context));
+      started_(SteadyNow()),
+      limit_(limit) {
+  call_.stop = Stop(std::min(DeadlineOf(context), started_ + limit));
   call_.request_id = RequestIdOf(context);
   context.AddInitialMetadata(kRequestIdKey, call_.request_id);
   // In the gate also when it is refused: until the call has ended, it uses what a server must give
@@ -169,6 +174,7 @@ absl::Status Request::Authorize(const google::protobuf::Message& message) {
   absl::MutexLock lock(&mutex_);
   if (map.has_value()) {
     map_ = *std::move(map);
+    object_ = ObjectNamedIn(message).substr(0, kMaxLoggedName);
     has_map_ = true;
   }
   const absl::Status allowed = MayGoOn();
@@ -204,6 +210,17 @@ absl::Status Request::HoldAnswer(const google::protobuf::Message& message, Booki
   return memory.Resize(message.SpaceUsedLong() + message.ByteSizeLong());
 }
 
+absl::Status Request::NameLimit(const absl::Status& status) const {
+  const bool reached = absl::IsDeadlineExceeded(status) &&
+                       call_.stop.deadline() == started_ + limit_ &&
+                       SteadyNow() >= call_.stop.deadline();
+  if (!reached) return status;
+  return absl::DeadlineExceededError(absl::StrCat(method_,
+                                                  " took longer than a query may, ",
+                                                  absl::FormatDuration(limit_),
+                                                  " (--max-query-time); ask for less at a time"));
+}
+
 grpc::Status Request::Close(const absl::Status& ended_with) {
   End();
   absl::Status status = ended_with;
@@ -230,20 +247,30 @@ void Request::Log(const absl::Status& status, absl::Duration duration) {
     strangers = runtime_.strangers.ToLog(SteadyNow());
     if (!strangers.has_value()) return;
   }
-  LogLine line("call");
-  line.Add("method", method_)
-      .Add("code", absl::StatusCodeToString(status.code()))
-      .Add("duration_ms", absl::ToInt64Milliseconds(duration))
+  const auto add_who = [this, &status](LogLine& line) {
+    line.Add("method", method_)
+        .Add("code", absl::StatusCodeToString(status.code()))
+        .Add("principal", call_.principal.empty() ? "-" : call_.principal);
+    {
+      absl::MutexLock lock(&mutex_);
+      line.Add("map", has_map_ ? map_.substr(0, kMaxLoggedName) : "-")
+          .Add("object", object_.empty() ? "-" : object_);
+    }
+    line.Add("peer", peer_).Add("id", call_.request_id);
+  };
+  LogLine call("call");
+  add_who(call);
+  call.Add("duration_ms", absl::ToInt64Milliseconds(duration))
       .Add("bytes_received", bytes_received_.load())
-      .Add("bytes_sent", bytes_sent_.load())
-      .Add("principal", call_.principal.empty() ? "-" : call_.principal);
-  {
-    absl::MutexLock lock(&mutex_);
-    line.Add("map", has_map_ ? map_.substr(0, kMaxLoggedName) : "-");
-  }
-  line.Add("peer", peer_).Add("id", call_.request_id);
-  if (strangers.has_value()) line.Add("strangers", *strangers);
-  LOG(INFO) << line;
+      .Add("bytes_sent", bytes_sent_.load());
+  if (strangers.has_value()) call.Add("strangers", *strangers);
+  if (!status.ok()) call.Add("message", status.message().substr(0, kMaxLoggedMessage));
+  LOG(INFO) << call;
+  const MethodRight* row = FindMethodRight(method_);
+  if (stranger_ || row == nullptr || row->right == Right::kRead) return;
+  LogLine audit("audit");
+  add_who(audit);
+  LOG(INFO) << audit;
 }
 
 }  // namespace strata::server

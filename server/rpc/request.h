@@ -38,11 +38,13 @@ class Request final : public Revocable {
  public:
   using Kind = ClientLimits::Kind;
 
-  // `method` as in "Maps.Create"; must outlive the request. `kind`: what it counts among.
+  // `method` as in "Maps.Create"; must outlive the request. `kind`: what it counts among. `limit`:
+  // how long it may take, whatever the caller allows.
   Request(Runtime& runtime,
           grpc::CallbackServerContext& context,
           absl::string_view method,
-          Kind kind = Kind::kCall);
+          Kind kind = Kind::kCall,
+          absl::Duration limit = absl::InfiniteDuration());
   ~Request() override;
   Request(const Request&) = delete;
   Request& operator=(const Request&) = delete;
@@ -65,6 +67,8 @@ class Request final : public Revocable {
   // The first time stops the call, which then ends itself; the next time, since it has not, cancels
   // it under the hands of gRPC.
   void EndIfRevoked() override;
+  // Whose turn it is where calls wait for each other. Of a call that was let in.
+  const std::string& client() const { return client_; }
   // The caller has gone: long work ends.
   void Cancel() { call_.stop.Request(); }
   // For the log.
@@ -73,6 +77,9 @@ class Request final : public Revocable {
   }
   // Books in `memory` an answer that goes out: as a message, and as the bytes that it becomes.
   static absl::Status HoldAnswer(const google::protobuf::Message& message, Booking& memory);
+
+  // `status`, or where the limit ended the call, that.
+  absl::Status NameLimit(const absl::Status& status) const;
 
   // Logs the call's one line; the result is what goes to the client.
   grpc::Status Close(const absl::Status& status);
@@ -90,6 +97,7 @@ class Request final : public Revocable {
   absl::Status MayGoOn() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Makes room for another one. Again: nothing.
   void End();
+  // The lines of the log: one a call, and of what changes a map one for whoever asks later who did.
   void Log(const absl::Status& status, absl::Duration duration);
 
   Runtime& runtime_;
@@ -98,11 +106,13 @@ class Request final : public Revocable {
   const absl::string_view method_;
   const std::string peer_;
   const absl::Time started_;
+  const absl::Duration limit_;
   Caller caller_;
   bool stranger_ = false;  // nobody knows who calls
   mutable absl::Mutex mutex_;
   std::string map_ ABSL_GUARDED_BY(mutex_);  // that the last message with a map named
   bool has_map_ ABSL_GUARDED_BY(mutex_) = false;
+  std::string object_ ABSL_GUARDED_BY(mutex_);  // of the map, that the last message with one named
   bool allowed_ ABSL_GUARDED_BY(mutex_) = false;  // to do to that map what the method does
   absl::Status revoked_ ABSL_GUARDED_BY(mutex_);  // not OK: why the call was stopped
   bool ended_ ABSL_GUARDED_BY(mutex_) = false;

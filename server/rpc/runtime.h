@@ -27,12 +27,14 @@
 namespace strata::server {
 
 struct RuntimeOptions {
-  int query_threads = 8;    // unary calls; each blocks one while it runs
-  int stream_threads = 8;   // listings and downloads; a slow reader holds one
-  int upload_threads = 16;  // scans coming in; a commit holds one until it is durable
-  int max_calls = 1024;     // calls under way; more are told SERVER_BUSY
-  int max_watches = 4096;   // watches under way, which are no calls; more are told SERVER_BUSY
-  // A stream's reader that takes nothing for so long loses the stream.
+  // At a time; those that wait for a map's worker, a commit or a reader are not counted (Executor).
+  int query_threads = 8;                              // unary calls
+  int stream_threads = 8;                             // listings and downloads
+  int upload_threads = 16;                            // scans coming in
+  absl::Duration max_query_time = absl::Seconds(30);  // of a unary call that only reads
+  int max_calls = 1024;                               // calls under way; more are told SERVER_BUSY
+  int max_watches = 4096;  // watches under way, which are no calls; more are told SERVER_BUSY
+  // A stream's reader that falls so far behind ReaderPace::kLeastBytesPerSecond loses the stream.
   absl::Duration slow_reader_timeout = absl::Seconds(30);
   // And a sender that brings nothing for so long.
   absl::Duration slow_sender_timeout = absl::Seconds(60);

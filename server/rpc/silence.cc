@@ -68,8 +68,9 @@ void SilenceWatch::EndSilent() {
                                             absl::FormatDuration(limit_),
                                             "; what was not acknowledged is abandoned")),
                                         translate::kSlowSenderReason);
-    // The stream lives until this task ends it, since Arrived() will be false.
-    executor_.Submit([end = stream->on_silence_, status] { end(status); });
+    // The stream lives until this task ends it, since Arrived() will be false. It is the server's,
+    // whose turn comes at once.
+    executor_.Submit("", [end = stream->on_silence_, status] { end(status); });
     it = waiting_.erase(it);
   }
 }

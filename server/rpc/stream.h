@@ -2,6 +2,8 @@
 #ifndef STRATA_SERVER_RPC_STREAM_H_
 #define STRATA_SERVER_RPC_STREAM_H_
 
+#include <cstddef>
+
 #include "absl/base/thread_annotations.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
@@ -12,15 +14,18 @@
 
 #include "core/api/call.h"
 #include "core/api/database.h"
+#include "core/common/blocking.h"
 #include "core/common/guarded.h"
 #include "core/common/steady_time.h"
+#include "server/rpc/reader_pace.h"
 #include "server/rpc/request.h"
 #include "server/rpc/runtime.h"
 #include "server/rpc/sealed.h"
 
 namespace strata::server {
 
-// Sends one message; returns when gRPC has taken it, an error when the reader is gone or too slow.
+// Sends one message; returns when gRPC has taken it and it is this stream's turn again, an error
+// when the reader is gone or too slow. No mutex may be held.
 template <typename Out>
 using StreamSink = absl::FunctionRef<absl::Status(const Out&)>;
 
@@ -28,8 +33,9 @@ template <typename In, typename Out>
 using StreamHandler =
     absl::Status (*)(api::Database&, const api::Call&, const In&, StreamSink<Out>);
 
-// Lives from the call's arrival to its end; owns itself. The handler blocks one of the runtime's
-// stream threads, since the database delivers into a sink; so memory is one message a stream.
+// Lives from the call's arrival to its end; owns itself. The handler has a thread, since the
+// database delivers into a sink, but its place among the runtime's streams only while it does not
+// wait for its reader. Memory is one message a stream.
 template <typename In, typename Out>
 class StreamReactor final : public grpc::ServerWriteReactor<Out> {
  public:
@@ -42,13 +48,14 @@ class StreamReactor final : public grpc::ServerWriteReactor<Out> {
         context_(context),
         request_(runtime, context, method),
         memory_(request_.NewBooking()),
-        sealed_(in) {
+        sealed_(in),
+        pace_(runtime.options.slow_reader_timeout) {
     if (!request_.admission().ok()) {
       sealed_.bytes.Clear();
       this->Finish(request_.Close(request_.admission()));
       return;
     }
-    runtime.streams.Submit([this, handler] { Run(handler); });
+    runtime.streams.Submit(request_.client(), [this, handler] { Run(handler); });
   }
 
  private:
@@ -71,10 +78,13 @@ class StreamReactor final : public grpc::ServerWriteReactor<Out> {
       sending_ = true;
     }
     request_.CountSent(message);
+    const std::size_t bytes = message.ByteSizeLong();
     this->StartWrite(&message);
+    const BlockingScope blocking(/*in_turn=*/true);
     absl::MutexLock lock(&mutex_);
     const auto sent = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return !sending_; };
-    const absl::Time until = SteadyNow() + runtime_.options.slow_reader_timeout;
+    const absl::Time begun = SteadyNow();
+    const absl::Time until = begun + pace_.patience();
     // A clock that is set forward ends a wait early.
     while (!mutex_.AwaitWithTimeout(absl::Condition(&sent), until - SteadyNow()) &&
            SteadyNow() < until) {
@@ -83,12 +93,20 @@ class StreamReactor final : public grpc::ServerWriteReactor<Out> {
       // gRPC reads `message` until the write ends, and only the end of the call ends it now.
       context_.TryCancel();
       mutex_.Await(absl::Condition(&sent));
-      return translate::WithReason(absl::DeadlineExceededError(absl::StrCat(
-                                       "the reader took nothing for ",
-                                       absl::FormatDuration(runtime_.options.slow_reader_timeout))),
-                                   translate::kSlowReaderReason);
+      return TooSlow();
     }
+    pace_.Took(bytes, SteadyNow() - begun);
     return send_ok_ ? absl::OkStatus() : absl::CancelledError("the reader has gone");
+  }
+
+  absl::Status TooSlow() const {
+    return translate::WithReason(absl::DeadlineExceededError(absl::StrCat(
+                                     "the reader fell ",
+                                     absl::FormatDuration(runtime_.options.slow_reader_timeout),
+                                     " behind ",
+                                     ReaderPace::kLeastBytesPerSecond >> 10,
+                                     " KiB/s; read faster, or ask for less")),
+                                 translate::kSlowReaderReason);
   }
 
   void OnWriteDone(bool ok) override {
@@ -104,6 +122,7 @@ class StreamReactor final : public grpc::ServerWriteReactor<Out> {
   Request request_;
   Booking memory_;  // of the request
   Sealed<In>& sealed_;
+  ReaderPace pace_;
   absl::Mutex mutex_;
   bool sending_ ABSL_GUARDED_BY(mutex_) = false;
   bool send_ok_ ABSL_GUARDED_BY(mutex_) = true;

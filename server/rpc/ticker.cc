@@ -23,15 +23,15 @@ Ticker::~Ticker() {
   thread_.join();
 }
 
-void Ticker::AtNextTick(std::function<void()> task) {
+void Ticker::AtNextTick(absl::string_view client, std::function<void()> task) {
   absl::MutexLock lock(&mutex_);
-  waiting_.push_back(std::move(task));
+  waiting_.push_back({std::string(client), std::move(task)});
 }
 
 // Somebody waits for every task: one for which there is no memory now is tried again.
-void Ticker::Submit(const std::function<void()>& task) {
+void Ticker::Submit(const Task& task) {
   const auto submit = [&] {
-    executor_.Submit(task);
+    executor_.Submit(task.client, task.run);
     return absl::OkStatus();
   };
   while (!Guarded(submit).ok()) absl::SleepFor(interval_);
@@ -49,12 +49,12 @@ void Ticker::Loop() {
       if (closing_) return;
     }
     absl::SleepFor(interval_);
-    std::vector<std::function<void()>> due;
+    std::vector<Task> due;
     {
       absl::MutexLock lock(&mutex_);
       due.swap(waiting_);
     }
-    for (const std::function<void()>& task : due) Submit(task);
+    for (const Task& task : due) Submit(task);
   }
 }
 

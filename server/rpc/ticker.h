@@ -3,10 +3,12 @@
 #define STRATA_SERVER_RPC_TICKER_H_
 
 #include <functional>
+#include <string>
 #include <thread>
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/strings/string_view.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 
@@ -25,18 +27,22 @@ class Ticker {
   Ticker(const Ticker&) = delete;
   Ticker& operator=(const Ticker&) = delete;
 
-  // Runs `task` on the executor at the next tick.
-  void AtNextTick(std::function<void()> task);
+  // Runs `task`, of `client`, on the executor at the next tick.
+  void AtNextTick(absl::string_view client, std::function<void()> task);
 
  private:
+  struct Task {
+    std::string client;
+    std::function<void()> run;
+  };
   void Loop();
-  void Submit(const std::function<void()>& task);
+  void Submit(const Task& task);
 
   const absl::Duration interval_;
   Executor& executor_;
   absl::Mutex mutex_;
   bool closing_ ABSL_GUARDED_BY(mutex_) = false;
-  std::vector<std::function<void()>> waiting_ ABSL_GUARDED_BY(mutex_);
+  std::vector<Task> waiting_ ABSL_GUARDED_BY(mutex_);
   std::thread thread_;
 };
 

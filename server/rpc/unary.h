@@ -7,12 +7,15 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "absl/time/time.h"
 #include <grpcpp/support/server_callback.h>
 
 #include "core/api/call.h"
 #include "core/api/database.h"
 #include "core/common/guarded.h"
 #include "core/common/status.h"
+#include "server/access/method_rights.h"
+#include "server/access/right.h"
 #include "server/rpc/request.h"
 #include "server/rpc/runtime.h"
 #include "server/rpc/sealed.h"
@@ -41,7 +44,7 @@ class UnaryReactor final : public grpc::ServerUnaryReactor {
                Handler handler,
                AtHandHandler<In, Out> at_hand)
       : runtime_(runtime),
-        request_(runtime, context, method),
+        request_(runtime, context, method, Request::Kind::kCall, LimitOf(runtime, method)),
         in_memory_(request_.NewBooking()),
         out_memory_(request_.NewBooking()),
         out_(out) {
@@ -56,11 +59,18 @@ class UnaryReactor final : public grpc::ServerUnaryReactor {
     if (!status.ok() || *answered) {
       End(status);
     } else {
-      runtime.queries.Submit([this, handler] { Run(handler); });
+      runtime.queries.Submit(request_.client(), [this, handler] { Run(handler); });
     }
   }
 
  private:
+  // What only reads may be asked again, for less. An edit waits for its map's worker as long as its
+  // caller likes.
+  static absl::Duration LimitOf(const Runtime& runtime, absl::string_view method) {
+    const MethodRight* row = FindMethodRight(method);
+    const bool reads = row != nullptr && row->right == Right::kRead;
+    return reads ? runtime.options.max_query_time : absl::InfiniteDuration();
+  }
   void Run(Handler handler) {
     End(Guarded([&]() -> absl::Status {
       STRATA_RETURN_IF_ERROR(request_.call().stop.status());
@@ -74,7 +84,7 @@ class UnaryReactor final : public grpc::ServerUnaryReactor {
   void End(absl::Status status) {
     if (status.ok()) status = Request::HoldAnswer(out_, out_memory_);
     if (status.ok()) request_.CountSent(out_);
-    Finish(request_.Close(status));
+    Finish(request_.Close(request_.NameLimit(status)));
   }
   void OnCancel() override { request_.Cancel(); }
   void OnDone() override { delete this; }

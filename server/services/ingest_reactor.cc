@@ -5,9 +5,11 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/time/time.h"
 
 #include "core/common/guarded.h"
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "proto/translate/scans.h"
 #include "proto/translate/status.h"
 
@@ -41,9 +43,9 @@ void IngestReactor::Read() {
 void IngestReactor::OnReadDone(bool ok) {
   if (!expected_.Arrived()) return;
   if (ok) {
-    runtime_.uploads.Submit([this] { Take(); });
+    runtime_.uploads.Submit(request_.client(), [this] { Take(); });
   } else {
-    runtime_.uploads.Submit([this] {
+    runtime_.uploads.Submit(request_.client(), [this] {
       AbandonIncomplete();
       EndReading(absl::OkStatus());
     });
@@ -165,7 +167,9 @@ v1::IngestScansResponse IngestReactor::Answer(Ended& ended) {
   if (status.ok()) {
     status = Guarded([&]() -> absl::Status {
       STRATA_RETURN_IF_ERROR(request_.call().stop.status());
+      const absl::Time begun = SteadyNow();
       STRATA_ASSIGN_OR_RETURN(const ScanAck ack, ended.scan->Finish());
+      runtime_.metrics.Acknowledged(SteadyNow() - begun);
       *answer.mutable_ack() = translate::ToProto(ack);
       return absl::OkStatus();
     });
@@ -197,7 +201,7 @@ void IngestReactor::OnDone() {
 void IngestReactor::StartCommitIfIdle() {
   if (committing_ || ended_.empty()) return;
   committing_ = true;
-  runtime_.uploads.Submit([this] { Commit(); });
+  runtime_.uploads.Submit(request_.client(), [this] { Commit(); });
 }
 
 void IngestReactor::StartWriteIfIdle() {

@@ -46,9 +46,9 @@ void LocalizeReactor::Read() {
 void LocalizeReactor::OnReadDone(bool ok) {
   if (!expected_.Arrived()) return;
   if (ok) {
-    runtime_.uploads.Submit([this] { Take(); });
+    runtime_.uploads.Submit(request_.client(), [this] { Take(); });
   } else {
-    runtime_.queries.Submit([this] { Search(); });
+    runtime_.queries.Submit(request_.client(), [this] { Search(); });
   }
 }
 

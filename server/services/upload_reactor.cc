@@ -3,9 +3,11 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/time/time.h"
 
 #include "core/common/guarded.h"
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "proto/translate/scans.h"
 
 namespace strata::server {
@@ -34,9 +36,9 @@ void UploadReactor::Read() {
 void UploadReactor::OnReadDone(bool ok) {
   if (!expected_.Arrived()) return;
   if (ok) {
-    runtime_.uploads.Submit([this] { Take(); });
+    runtime_.uploads.Submit(request_.client(), [this] { Take(); });
   } else {
-    runtime_.uploads.Submit([this] { Commit(); });
+    runtime_.uploads.Submit(request_.client(), [this] { Commit(); });
   }
 }
 
@@ -89,7 +91,9 @@ void UploadReactor::Commit() {
       return AtTheDoor(
           absl::InvalidArgumentError("upload: the stream ended before its scan began"));
     }
+    const absl::Time begun = SteadyNow();
     STRATA_ASSIGN_OR_RETURN(const ScanAck ack, scan_->Finish());
+    runtime_.metrics.Acknowledged(SteadyNow() - begun);
     *out_.mutable_ack() = translate::ToProto(ack);
     return absl::OkStatus();
   });

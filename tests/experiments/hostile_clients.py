@@ -26,6 +26,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 import numpy as np
@@ -320,7 +321,77 @@ def bombs(a, until):
                                                    metadata=a.metadata, compression=grpc.Compression.Gzip))
 
 
+def own_map(a, name, scans, half_m, cell_size, count):
+    """A map of the attacker's with `scans` floors of `count` points; made once."""
+    import strata
+    with strata.connect(a.address, token=a.token) as db:
+        try:
+            world = db.create_map(name, cell_size=cell_size)
+        except strata.AlreadyExists:
+            return
+        for _ in range(scans):
+            points = a.random.uniform(-half_m, half_m, (count, 3)).astype(np.float32)
+            points[:, 2] = a.random.normal(-1, 0.01, count)
+            world.upload(points, ([0, 0, 1], [0, 0, 0, 1]), trajectory="bad", align=False)
+        world.wait()
+
+
+def in_parallel(count, until, body):
+    """body() over and over on `count` threads; what it is refused does not matter."""
+    import grpc
+
+    def repeat():
+        while time.monotonic() < until:
+            try:
+                body()
+            except grpc.RpcError:
+                time.sleep(0.01)
+    threads = [threading.Thread(target=repeat, daemon=True) for _ in range(count)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+
+def waiting_edits(a, until):
+    """Edits behind rebuilds, each of which has the map to itself."""
+    from strata.v1 import geometry_pb2, jobs_pb2, posegraph_pb2, scans_pb2
+    own_map(a, "edited", 12, 10, 0.1, 60_000)
+    scan = scans_pb2.ScanId(trajectory="bad", sequence=1)
+    pose = geometry_pb2.Pose(translation=geometry_pb2.Vector3(z=1), rotation=geometry_pb2.Quaternion(w=1))
+    for _ in range(200):
+        a.jobs.Start(jobs_pb2.StartJobRequest(map="edited", kind="rebuild"), metadata=a.metadata)
+    in_parallel(64, until, lambda: a.posegraph.SetPose(
+        posegraph_pb2.SetPoseRequest(map="edited", id=scan, pose=pose), metadata=a.metadata, timeout=20))
+
+
+def long_plans(a, until):
+    """Each robot is another one, so that nothing is prepared for it."""
+    from strata.v1 import planning_pb2
+    own_map(a, "wide", 1, 50, 0.05, 4_000_000)
+
+    def plan():
+        query = planning_pb2.PlanPathRequest(map="wide", to=planning_pb2.PlanEndpoint(x_m=48, y_m=48))
+        getattr(query, "from").x_m, getattr(query, "from").y_m = -48, -48
+        query.profile.radius_m = 0.3 + 0.1 * np.random.random()
+        a.planning.PlanPath(query, metadata=a.metadata, timeout=60)
+    in_parallel(16, until, plan)
+
+
+def idle_readers(a, until):
+    """Downloads of which a message is read now and then."""
+    from strata.v1 import scans_pb2
+    own_map(a, "downloaded", 2, 20, 0.1, 1_000_000)
+    request = scans_pb2.GetScanPointsRequest(map="downloaded", id=scans_pb2.ScanId(trajectory="bad", sequence=1))
+
+    def read():
+        for _ in a.scans.GetPoints(request, metadata=a.metadata):
+            time.sleep(min(20.0, max(0.0, until - time.monotonic())))
+    in_parallel(64, until, read)
+
+
 ATTACKS = {
+    "waiting edits": waiting_edits, "long plans": long_plans, "idle readers": idle_readers,
     "slow senders": slow_senders, "silent streams": silent_streams, "connections": connections(b""),
     "connections h2": connections(PREFACE + frame(4, 0, 0)), "garbage": garbage, "http1": http1, "floods": floods,
     "rapid resets": rapid_resets, "cancelled": cancelled, "big headers": big_headers, "names": names, "tokens": tokens,
@@ -333,13 +404,15 @@ class Attacker:
     def __init__(self, build, address, token, options):
         sys.path.append(str(build / "client/python"))
         import grpc
-        from strata.v1 import maps_pb2_grpc, planning_pb2_grpc, scans_pb2_grpc
+        from strata.v1 import jobs_pb2_grpc, maps_pb2_grpc, planning_pb2_grpc, posegraph_pb2_grpc, scans_pb2_grpc
         self.address, self.token, self.options = address, token, options
         self.random = np.random.default_rng(options.seed)
         self.metadata = (("authorization", f"Bearer {token}"),)
         channel = grpc.insecure_channel(address, [("grpc.max_send_message_length", -1)])
         self.maps = maps_pb2_grpc.MapsStub(channel)
         self.scans = scans_pb2_grpc.ScansStub(channel)
+        self.jobs = jobs_pb2_grpc.JobsStub(channel)
+        self.posegraph = posegraph_pb2_grpc.PoseGraphStub(channel)
         self.planning = planning_pb2_grpc.PlanningStub(channel)
 
 

@@ -35,6 +35,9 @@ class ChildProcess {
 class StratadProcess : public ChildProcess {
  public:
   explicit StratadProcess(const std::vector<std::string>& arguments);
+  // By way of another program, which becomes a stratad: `arguments` are that one's.
+  StratadProcess(const std::string& program, const std::vector<std::string>& arguments)
+      : ChildProcess(program, arguments) {}
   // HOST:PORT out of "listening HOST:PORT", read once.
   const std::string& Address();
 

@@ -9,10 +9,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/cloud/point_cloud.h"
+#include "core/common/blocking.h"
 #include "strata/v1/classifiers.grpc.pb.h"
 #include "strata/v1/maps.grpc.pb.h"
+#include "strata/v1/planning.grpc.pb.h"
 #include "strata/v1/posegraph.grpc.pb.h"
 #include "strata/v1/scans.grpc.pb.h"
+#include "strata/v1/tiles.grpc.pb.h"
 #include "tests/server/new_grant.h"
 #include "tests/server/served_mock.h"
 #include "tests/support/temp_dir.h"
@@ -78,6 +82,120 @@ TEST_F(ClientLimitTest, OneClientsCallsDoNotKeepAnotherOut) {
   EXPECT_THAT(ListMaps(modest), IsOk());
   go.Notify();
   holder.join();
+}
+
+TEST_F(ClientLimitTest, OneClientsSearchesHoldUpNobodyElse) {
+  const std::string greedy = Give("greedy");
+  const std::string modest = Give("modest");
+  ServerOptions options;
+  options.token_file = file_;
+  options.query_threads = 2;
+  Serve(options);
+  absl::Notification inside;
+  ON_CALL(db_.planning(), PlanPath(_, _, _)).WillByDefault([&](const api::Call& call, auto, auto&) {
+    if (!inside.HasBeenNotified()) inside.Notify();
+    while (call.stop.status().ok()) absl::SleepFor(absl::Milliseconds(1));
+    return absl::StatusOr<PlanResult>(call.stop.status());
+  });
+  ON_CALL(db_.maps(), List(_)).WillByDefault(Return(std::vector<MapInfo>()));
+  constexpr int kSearches = 10;
+  std::vector<grpc::ClientContext> contexts(kSearches);
+  std::vector<std::thread> searches;
+  for (grpc::ClientContext& context : contexts) {
+    context.AddMetadata("authorization", greedy);
+    searches.emplace_back([this, &context] {
+      v1::PlanPathRequest in;
+      in.set_map("world");
+      v1::PlanPathResponse out;
+      EXPECT_THAT(Call<v1::Planning>(&v1::Planning::Stub::PlanPath, in, &out, &context),
+                  StatusIs(Code::kCancelled, _));
+    });
+  }
+  inside.WaitForNotification();
+  for (int i = 0; i < 20; ++i) EXPECT_THAT(ListMaps(modest), IsOk());
+  for (grpc::ClientContext& context : contexts) context.TryCancel();
+  for (std::thread& search : searches) search.join();
+}
+
+TEST_F(ClientLimitTest, WhatWaitsForAMapHoldsUpNothingElse) {
+  ServerOptions options;
+  options.query_threads = 1;
+  Serve(options);
+  absl::Notification over;
+  ON_CALL(db_.scans(), Delete(_, _, _)).WillByDefault([&](const auto&, auto, const auto&) {
+    const BlockingScope blocking;
+    over.WaitForNotification();
+    return absl::OkStatus();
+  });
+  ON_CALL(db_.maps(), List(_)).WillByDefault(Return(std::vector<MapInfo>()));
+  std::vector<std::thread> edits;
+  for (int i = 0; i < 10; ++i) {
+    edits.emplace_back([this] {
+      v1::DeleteScanResponse out;
+      EXPECT_THAT(Call<v1::Scans>(&v1::Scans::Stub::Delete, v1::DeleteScanRequest(), &out), IsOk());
+    });
+  }
+  for (int i = 0; i < 20; ++i) EXPECT_THAT(ListMaps(), IsOk());
+  over.Notify();
+  for (std::thread& edit : edits) edit.join();
+}
+
+TEST_F(ClientLimitTest, ReadersThatTakeNothingHoldUpNobody) {
+  ServerOptions options;
+  options.stream_threads = 1;
+  Serve(options);
+  ON_CALL(db_.scans(), GetPoints(_, _, _, _))
+      .WillByDefault([](const auto&, auto, const auto&, auto sink) {
+        PointCloud piece;
+        piece.points.assign(20'000, Eigen::Vector3f::Zero());
+        absl::Status sent;
+        while (sent.ok()) sent = sink(piece);
+        return sent;
+      });
+  ON_CALL(db_.tiles(), List(_, _, _)).WillByDefault(Return(std::vector<api::TileInfo>()));
+  const auto scans = v1::Scans::NewStub(channel_);
+  std::vector<grpc::ClientContext> contexts(10);
+  std::vector<std::unique_ptr<grpc::ClientReader<v1::GetScanPointsResponse>>> readers;
+  for (grpc::ClientContext& context : contexts) {
+    readers.push_back(scans->GetPoints(&context, v1::GetScanPointsRequest()));
+    v1::GetScanPointsResponse first;
+    EXPECT_TRUE(readers.back()->Read(&first));
+  }
+  const auto tiles = v1::Tiles::NewStub(channel_);
+  for (int i = 0; i < 20; ++i) {
+    grpc::ClientContext context;
+    const auto listing = tiles->List(&context, v1::ListTilesRequest());
+    v1::ListTilesResponse none;
+    EXPECT_FALSE(listing->Read(&none));
+    EXPECT_THAT(translate::FromGrpcStatus(listing->Finish()), IsOk());
+  }
+  for (grpc::ClientContext& context : contexts) context.TryCancel();
+  for (auto& reader : readers) reader->Finish();
+}
+
+TEST_F(ClientLimitTest, AReaderThatTakesNothingLosesItsStream) {
+  ServerOptions options;
+  options.slow_reader_timeout = absl::Milliseconds(200);
+  Serve(options);
+  absl::Status ended;
+  absl::Notification over;
+  ON_CALL(db_.scans(), GetPoints(_, _, _, _))
+      .WillByDefault([&](const auto&, auto, const auto&, auto sink) {
+        PointCloud piece;
+        piece.points.assign(20'000, Eigen::Vector3f::Zero());
+        absl::Status sent;
+        while (sent.ok()) sent = sink(piece);
+        ended = sent;
+        over.Notify();
+        return sent;
+      });
+  grpc::ClientContext context;
+  const auto reader = v1::Scans::NewStub(channel_)->GetPoints(&context, v1::GetScanPointsRequest());
+  over.WaitForNotification();
+  EXPECT_THAT(ended, StatusIs(Code::kDeadlineExceeded, HasSubstr("fell 200ms behind")));
+  EXPECT_EQ(ReasonOf(ended), "SLOW_READER");
+  context.TryCancel();
+  reader->Finish();
 }
 
 TEST_F(ClientLimitTest, WhoAsksTooOftenIsToldWhenToComeBack) {

@@ -78,6 +78,8 @@ TEST(MetricsTest, AScrapeHasWhatWasCounted) {
   MapNumbers map;
   map.map = "campus";
   map.file_bytes = 4096;
+  map.journal_bytes = 1024;
+  map.verified = absl::FromUnixSeconds(1'700'000'000);
   map.scans = 7;
   map.commits = 3;
   map.commit_parts = 12;
@@ -106,6 +108,9 @@ TEST(MetricsTest, AScrapeHasWhatWasCounted) {
   EXPECT_EQ(value("strata_call_seconds_bucket{method=\"Maps.Get\",le=\"0.05\"}"), 4);
   EXPECT_EQ(value("strata_maps_not_opened"), 2);
   EXPECT_EQ(value("strata_map_file_bytes{map=\"campus\"}"), 4096);
+  EXPECT_EQ(value("strata_map_journal_bytes{map=\"campus\"}"), 1024);
+  EXPECT_EQ(value("strata_map_verified_timestamp_seconds{map=\"campus\"}"), 1.7e9);
+  EXPECT_EQ(value("strata_map_backed_up_timestamp_seconds{map=\"campus\"}"), 0);
   EXPECT_EQ(value("strata_commits_total{map=\"campus\"}"), 3);
   EXPECT_EQ(value("strata_commit_parts_total{map=\"campus\"}"), 12);
   EXPECT_EQ(value("strata_commit_seconds_total{map=\"campus\"}"), 1.5);

@@ -57,6 +57,7 @@ TEST(OptionsTest, DefaultsAreThoseOfTheLibraries) {
   EXPECT_EQ(options.engine.max_map_bytes, engine.max_map_bytes);
   EXPECT_EQ(options.server.drain_timeout, server.drain_timeout);
   EXPECT_EQ(options.server.slow_sender_timeout, server.slow_sender_timeout);
+  EXPECT_EQ(options.server.max_query_time, server.max_query_time);
   EXPECT_EQ(options.server.slow_reader_timeout, server.slow_reader_timeout);
   EXPECT_EQ(options.server.max_message_bytes, server.max_message_bytes);
   EXPECT_EQ(options.engine.optimize_interval, absl::Seconds(60));

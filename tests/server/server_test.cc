@@ -207,6 +207,31 @@ TEST_F(ServerTest, TheDeadlineReachesIntoTheWork) {
   EXPECT_THAT(stopped_by_.code(), ::testing::AnyOf(Code::kDeadlineExceeded, Code::kCancelled));
 }
 
+TEST_F(ServerTest, AQueryHasATimeLimitWhateverItsCallerAllows) {
+  ServerOptions options;
+  options.max_query_time = absl::Milliseconds(200);
+  Serve(options);
+  PlanUntilStopped();
+  EXPECT_THAT(PlanPath(),
+              StatusIs(Code::kDeadlineExceeded, HasSubstr("200ms (--max-query-time); ask for")));
+  stopped_.WaitForNotification();
+  EXPECT_THAT(stopped_by_, StatusIs(Code::kDeadlineExceeded, _));
+}
+
+TEST_F(ServerTest, AnEditHasNone) {
+  ServerOptions options;
+  options.max_query_time = absl::Milliseconds(1);
+  Serve(options);
+  ON_CALL(db_.planning(), SetProfile(_, _, _, _)).WillByDefault([](const api::Call& call, auto...) {
+    EXPECT_EQ(call.stop.deadline(), absl::InfiniteFuture());
+    return absl::OkStatus();
+  });
+  v1::SetProfileRequest in;
+  in.set_name("crawler");
+  v1::SetProfileResponse out;
+  EXPECT_THAT(Call<v1::Planning>(&v1::Planning::Stub::SetProfile, in, &out), IsOk());
+}
+
 TEST_F(ServerTest, AFullServerSaysWhenToComeBack) {
   ServerOptions options;
   options.max_calls = 1;

@@ -15,7 +15,7 @@ TEST(TickerTest, RunsAllThatWaitAtTheNextTickAndOnce) {
     std::atomic<int> runs = 0;
     absl::BlockingCounter all(10);
     for (int i = 0; i < 10; ++i) {
-      ticker.AtNextTick([&] {
+      ticker.AtNextTick("robot", [&] {
         ++runs;
         all.DecrementCount();
       });

@@ -1,0 +1,122 @@
+// What goes on beside long work, and what waits for it.
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/common/blocking.h"
+#include "core/common/cache_budget.h"
+#include "core/common/stop.h"
+#include "core/engine/map.h"
+#include "core/engine/rebuild.h"
+#include "tests/core/engine/engine_fixture.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+class BesideTest : public EngineTest {
+ protected:
+  // The map's file in this test's hands; the engine is closed meanwhile.
+  std::shared_ptr<Map> OpenMap() {
+    WaitIntegrated(db());
+    Close();
+    absl::StatusOr<std::shared_ptr<Map>> map = Map::Open(
+        kMapName, MapFile(), Options(), std::make_shared<CacheBudget>(Options().cache_bytes));
+    EXPECT_THAT(map, IsOk());
+    return map.value_or(nullptr);
+  }
+};
+
+// Calls `step` each time the job says how far it is.
+class Stepping final : public JobContext {
+ public:
+  explicit Stepping(std::function<void()> step) : step_(std::move(step)) {}
+  absl::Status Progress(double, absl::string_view) override {
+    step_();
+    return absl::OkStatus();
+  }
+  const Stop& stop() const override { return stop_; }
+  void SetMetric(const std::string&, double) override {}
+  void SetMessage(std::string) override {}
+  void SetProposed() override {}
+
+ private:
+  const std::function<void()> step_;
+  const Stop stop_;
+};
+
+TEST_F(BesideTest, VerifyLooksAtOneStateWhileScansMoveAndLeave) {
+  MakeMap();
+  UploadRooms(12);
+  const std::shared_ptr<Map> map = OpenMap();
+  ASSERT_NE(map, nullptr);
+  std::uint64_t steps = 0;
+  Stepping context([&] {
+    ++steps;
+    STRATA_EXPECT_OK(map->worker().Execute(Stop(), [&](Integrator& integrator) {
+      const ScanId id{"run", 1 + steps % 12};
+      if (steps == 5 || steps == 30) return integrator.DeleteScan(id);
+      const absl::Status moved =
+          integrator.SetPose(id, PoseAt(0.3 * static_cast<double>(steps % 50), 1.0));
+      return absl::IsNotFound(moved) ? absl::OkStatus() : moved;
+    }));
+  });
+  JobInfo job;
+  job.kind = std::string(kVerifyJob);
+  EXPECT_THAT(RunVerifyJob(map->core(), job, context), IsOk());
+  EXPECT_GT(steps, 12U);
+  // And what came of it is sound, too.
+  SilentContext silent{Stop()};
+  EXPECT_THAT(RunVerifyJob(map->core(), job, silent), IsOk());
+}
+
+TEST_F(BesideTest, VerifyGoesOnBesideUploads) {
+  MakeMap();
+  UploadRooms(4);
+  std::atomic<bool> over = false;
+  std::thread robot([&] {
+    for (std::uint64_t i = 5; !over; ++i) UploadRoom(i, RoomPose(i % 8));
+  });
+  for (int round = 0; round < 5; ++round) {
+    const JobInfo verified = RunJob(db(), "verify");
+    EXPECT_EQ(verified.state, JobState::kSucceeded) << verified.message;
+  }
+  over = true;
+  robot.join();
+}
+
+class CountingWaits final : public BlockingObserver {
+ public:
+  void BlockingBegins() override { ++begun; }
+  void BlockingEnds(bool) override { ++ended; }
+  int begun = 0;
+  int ended = 0;
+};
+
+TEST_F(BesideTest, WhoWaitsForAMapSaysSo) {
+  MakeMap();
+  UploadRooms(1);
+  const std::shared_ptr<Map> map = OpenMap();
+  ASSERT_NE(map, nullptr);
+  CountingWaits waits;
+  SetBlockingObserver(&waits);
+  STRATA_EXPECT_OK(map->worker().Execute(Stop(), [](Integrator&) { return absl::OkStatus(); }));
+  EXPECT_EQ(waits.begun, 1) << "for the worker";
+  STRATA_EXPECT_OK(map->core().writer().Run(
+      Durability::kFull, 0, Stop(), [](StorageWriter&) { return absl::OkStatus(); }));
+  EXPECT_EQ(waits.begun, 2) << "for the writer";
+  EXPECT_EQ(waits.ended, waits.begun);
+  SetBlockingObserver(nullptr);
+}
+
+}  // namespace
+}  // namespace strata::testing

@@ -1,0 +1,83 @@
+#include "server/readiness.h"
+
+#include <atomic>
+#include <string>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/server/raw_call.h"
+#include "tests/server/served_mock.h"
+
+namespace strata::server {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::Pair;
+
+// A hang, not a slow machine.
+constexpr absl::Duration kPatience = absl::Seconds(60);
+
+TEST(ReadinessTest, TellsEachChangeOnce) {
+  std::atomic<bool> full = false;
+  absl::Mutex mutex;
+  std::vector<bool> told ABSL_GUARDED_BY(mutex);
+  const auto told_times = [&](std::size_t times) {
+    const auto enough = [&]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) { return told.size() >= times; };
+    absl::MutexLock lock(&mutex);
+    return mutex.AwaitWithTimeout(absl::Condition(&enough), kPatience);
+  };
+  const Readiness readiness(
+      {{"disk", [&full] { return full ? "full" : ""; }}, {"log", [] { return ""; }}},
+      absl::Milliseconds(1),
+      [&](bool ready) {
+        absl::MutexLock lock(&mutex);
+        told.push_back(ready);
+      });
+  EXPECT_TRUE(told_times(1));
+  full = true;
+  EXPECT_TRUE(told_times(2));
+  full = false;
+  EXPECT_TRUE(told_times(3));
+  EXPECT_THAT(readiness.state(), ElementsAre(Pair("disk", ""), Pair("log", "")));
+  absl::MutexLock lock(&mutex);
+  EXPECT_THAT(told, ElementsAre(true, false, true));
+}
+
+class ReadyServerTest : public ServedMock {
+ protected:
+  std::string Health(const std::string& service) {
+    const std::string request =
+        service.empty() ? "" : std::string("\x0A") + static_cast<char>(service.size()) + service;
+    const RawAnswer answer = CallRaw(channel_, "/grpc.health.v1.Health/Check", request);
+    if (!answer.status.ok() || answer.messages.empty()) return answer.status.error_message();
+    return answer.messages.front() == std::string("\x08\x01", 2) ? "SERVING" : "NOT_SERVING";
+  }
+};
+
+TEST_F(ReadyServerTest, WhatKeepsTheServerFromItsWorkIsNotItsDeath) {
+  std::atomic<bool> full = true;
+  ServerOptions options;
+  options.listen = "127.0.0.1:0";
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      server_, Server::Start(db_, options, {{"log", [&full] { return full ? "full" : ""; }}}));
+  channel_ = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
+  EXPECT_EQ(Health("strata.v1.Scans"), "NOT_SERVING");
+  EXPECT_EQ(Health(""), "SERVING");
+  EXPECT_EQ(Health("liveness"), "SERVING");
+  full = false;
+  const absl::Time until = absl::Now() + kPatience;
+  while (Health("strata.v1.Scans") != "SERVING" && absl::Now() < until) {
+    absl::SleepFor(absl::Milliseconds(10));
+  }
+  EXPECT_EQ(Health("strata.v1.Scans"), "SERVING");
+  server_.reset();
+}
+
+}  // namespace
+}  // namespace strata::server
