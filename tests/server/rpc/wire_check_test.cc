@@ -1,6 +1,7 @@
 #include "server/rpc/wire_check.h"
 
 #include <cstddef>
+#include <cstdint>
 #include <set>
 #include <string>
 #include <vector>
