@@ -1,5 +1,6 @@
 #include "server/listener.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <memory>
