@@ -1,6 +1,7 @@
 // What goes on beside long work, and what waits for it.
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
+#include "absl/synchronization/notification.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,12 +18,16 @@
 #include "core/common/cache_budget.h"
 #include "core/common/stop.h"
 #include "core/engine/map.h"
+#include "core/engine/numbers.h"
 #include "core/engine/rebuild.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {
 namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 class BesideTest : public EngineTest {
  protected:
@@ -92,6 +98,40 @@ TEST_F(BesideTest, VerifyGoesOnBesideUploads) {
   }
   over = true;
   robot.join();
+}
+
+TEST_F(BesideTest, WhoGivesUpWaitingIsToldWhatItWaitedFor) {
+  MakeMap();
+  const std::shared_ptr<Map> map = OpenMap();
+  ASSERT_NE(map, nullptr);
+  absl::Notification begun;
+  absl::Notification over;
+  const auto long_work = [&](Integrator&) {
+    begun.Notify();
+    over.WaitForNotification();
+    return absl::OkStatus();
+  };
+  std::thread job(
+      [&] { STRATA_EXPECT_OK(map->worker().Execute(Stop(), long_work, "job 3 (rebuild)")); });
+  begun.WaitForNotification();
+  const Stop given_up;
+  given_up.Request();
+  EXPECT_THAT(map->worker().Execute(given_up, [](Integrator&) { return absl::OkStatus(); }),
+              StatusIs(absl::StatusCode::kCancelled, HasSubstr("job 3 (rebuild) of map world")));
+  over.Notify();
+  job.join();
+}
+
+TEST_F(BesideTest, HealthNamesMapsThatAreNotOpenAndTheDisk) {
+  MakeMap();
+  MakeMap(SmallMap(), "other");
+  EXPECT_TRUE(HealthOf(db()).maps_not_opened.empty());
+  EXPECT_TRUE(HealthOf(db()).maps_not_written.empty());
+  EXPECT_GT(HealthOf(db()).disk_bytes, 0U);
+  Close();
+  std::filesystem::resize_file(MapFile("other"), 1000);
+  Reopen();
+  EXPECT_THAT(HealthOf(db()).maps_not_opened, ElementsAre("other"));
 }
 
 class CountingWaits final : public BlockingObserver {
