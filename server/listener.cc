@@ -40,18 +40,18 @@ int MostConnectionFd() {
   return static_cast<int>(std::min<rlim_t>(files.rlim_cur / 4 * 3, INT_MAX));
 }
 
-void SetOption(int socket, int level, int option) {
-  const int on = 1;
-  setsockopt(socket, level, option, &on, sizeof(on));
+void SetOption(int socket, int level, int option, int value) {
+  setsockopt(socket, level, option, &value, sizeof(value));
 }
 
 // A listening socket, or -1 with errno.
 int ListenOn(const addrinfo& where, int port) {
   const int made = socket(where.ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (made < 0) return -1;
-  SetOption(made, SOL_SOCKET, SO_REUSEADDR);
-  SetOption(made, IPPROTO_TCP, TCP_NODELAY);  // connections take after it
-  if (where.ai_family == AF_INET6) SetOption(made, IPPROTO_IPV6, IPV6_V6ONLY);
+  SetOption(made, SOL_SOCKET, SO_REUSEADDR, 1);
+  SetOption(made, IPPROTO_TCP, TCP_NODELAY, 1);  // connections take after it
+  // [::] means IPv4, too, whatever the system's default is.
+  if (where.ai_family == AF_INET6) SetOption(made, IPPROTO_IPV6, IPV6_V6ONLY, 0);
   sockaddr_storage address{};
   std::memcpy(&address, where.ai_addr, where.ai_addrlen);
   // At the same place in both.

@@ -53,9 +53,11 @@ void Readiness::Look() {
     }
   }
   const bool well = AllWell(now);
+  {
+    absl::MutexLock lock(&mutex_);
+    state_ = std::move(now);
+  }
   if (well != AllWell(before)) tell_(well);
-  absl::MutexLock lock(&mutex_);
-  state_ = std::move(now);
 }
 
 void Readiness::Loop() {

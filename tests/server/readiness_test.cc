@@ -1,6 +1,7 @@
 #include "server/readiness.h"
 
 #include <atomic>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -23,30 +24,41 @@ using ::testing::Pair;
 // A hang, not a slow machine.
 constexpr absl::Duration kPatience = absl::Seconds(60);
 
+// What was told, in order.
+class Told {
+ public:
+  void Add(bool ready) {
+    absl::MutexLock lock(&mutex_);
+    told_.push_back(ready);
+  }
+  // Once it was told `times` times.
+  std::vector<bool> Await(std::size_t times) {
+    absl::MutexLock lock(&mutex_);
+    const auto enough = [&]()
+                            ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return told_.size() >= times; };
+    mutex_.AwaitWithTimeout(absl::Condition(&enough), kPatience);
+    return told_;
+  }
+
+ private:
+  absl::Mutex mutex_;
+  std::vector<bool> told_ ABSL_GUARDED_BY(mutex_);
+};
+
 TEST(ReadinessTest, TellsEachChangeOnce) {
   std::atomic<bool> full = false;
-  absl::Mutex mutex;
-  std::vector<bool> told ABSL_GUARDED_BY(mutex);
-  const auto told_times = [&](std::size_t times) {
-    const auto enough = [&]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) { return told.size() >= times; };
-    absl::MutexLock lock(&mutex);
-    return mutex.AwaitWithTimeout(absl::Condition(&enough), kPatience);
-  };
+  Told told;
   const Readiness readiness(
       {{"disk", [&full] { return full ? "full" : ""; }}, {"log", [] { return ""; }}},
       absl::Milliseconds(1),
-      [&](bool ready) {
-        absl::MutexLock lock(&mutex);
-        told.push_back(ready);
-      });
-  EXPECT_TRUE(told_times(1));
+      [&told](bool ready) { told.Add(ready); });
+  EXPECT_THAT(told.Await(1), ElementsAre(true));
   full = true;
-  EXPECT_TRUE(told_times(2));
+  EXPECT_THAT(told.Await(2), ElementsAre(true, false));
+  EXPECT_THAT(readiness.state(), ElementsAre(Pair("disk", "full"), Pair("log", "")));
   full = false;
-  EXPECT_TRUE(told_times(3));
+  EXPECT_THAT(told.Await(3), ElementsAre(true, false, true));
   EXPECT_THAT(readiness.state(), ElementsAre(Pair("disk", ""), Pair("log", "")));
-  absl::MutexLock lock(&mutex);
-  EXPECT_THAT(told, ElementsAre(true, false, true));
 }
 
 class ReadyServerTest : public ServedMock {

@@ -1,6 +1,7 @@
 // What goes on beside long work, and what waits for it.
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
+#include "absl/synchronization/notification.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,12 +18,16 @@
 #include "core/common/cache_budget.h"
 #include "core/common/stop.h"
 #include "core/engine/map.h"
+#include "core/engine/numbers.h"
 #include "core/engine/rebuild.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {
 namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 class BesideTest : public EngineTest {
  protected:
@@ -61,10 +67,10 @@ TEST_F(BesideTest, VerifyLooksAtOneStateWhileScansMoveAndLeave) {
   ASSERT_NE(map, nullptr);
   std::uint64_t steps = 0;
   Stepping context([&] {
-    ++steps;
+    if (++steps % 5 != 0) return;
     STRATA_EXPECT_OK(map->worker().Execute(Stop(), [&](Integrator& integrator) {
       const ScanId id{"run", 1 + steps % 12};
-      if (steps == 5 || steps == 30) return integrator.DeleteScan(id);
+      if (steps == 10 || steps == 30) return integrator.DeleteScan(id);
       const absl::Status moved =
           integrator.SetPose(id, PoseAt(0.3 * static_cast<double>(steps % 50), 1.0));
       return absl::IsNotFound(moved) ? absl::OkStatus() : moved;
@@ -84,14 +90,48 @@ TEST_F(BesideTest, VerifyGoesOnBesideUploads) {
   UploadRooms(4);
   std::atomic<bool> over = false;
   std::thread robot([&] {
-    for (std::uint64_t i = 5; !over; ++i) UploadRoom(i, RoomPose(i % 8));
+    for (std::uint64_t i = 5; i < 60 && !over; ++i) UploadRoom(i, RoomPose(i % 8));
   });
-  for (int round = 0; round < 5; ++round) {
+  for (int round = 0; round < 3; ++round) {
     const JobInfo verified = RunJob(db(), "verify");
     EXPECT_EQ(verified.state, JobState::kSucceeded) << verified.message;
   }
   over = true;
   robot.join();
+}
+
+TEST_F(BesideTest, WhoGivesUpWaitingIsToldWhatItWaitedFor) {
+  MakeMap();
+  const std::shared_ptr<Map> map = OpenMap();
+  ASSERT_NE(map, nullptr);
+  absl::Notification begun;
+  absl::Notification over;
+  const auto long_work = [&](Integrator&) {
+    begun.Notify();
+    over.WaitForNotification();
+    return absl::OkStatus();
+  };
+  std::thread job(
+      [&] { STRATA_EXPECT_OK(map->worker().Execute(Stop(), long_work, "job 3 (rebuild)")); });
+  begun.WaitForNotification();
+  const Stop given_up;
+  given_up.Request();
+  EXPECT_THAT(map->worker().Execute(given_up, [](Integrator&) { return absl::OkStatus(); }),
+              StatusIs(absl::StatusCode::kCancelled, HasSubstr("job 3 (rebuild) of map world")));
+  over.Notify();
+  job.join();
+}
+
+TEST_F(BesideTest, HealthNamesMapsThatAreNotOpenAndTheDisk) {
+  MakeMap();
+  MakeMap(SmallMap(), "other");
+  EXPECT_TRUE(HealthOf(db()).maps_not_opened.empty());
+  EXPECT_TRUE(HealthOf(db()).maps_not_written.empty());
+  EXPECT_GT(HealthOf(db()).disk_bytes, 0U);
+  Close();
+  std::filesystem::resize_file(MapFile("other"), 1000);
+  Reopen();
+  EXPECT_THAT(HealthOf(db()).maps_not_opened, ElementsAre("other"));
 }
 
 class CountingWaits final : public BlockingObserver {
