@@ -49,6 +49,10 @@ class WriterThread {
                    Work work,
                    Tell tell = TellNobody);
 
+  // As Run() with kFull, but in a commit of its own and behind every kFull that waits: for what
+  // nobody waits for.
+  absl::Status RunBehind(Work work, Tell tell);
+
   WriterNumbers numbers() const;
 
   // Carries out what is queued, then refuses everything with CANCELLED. Safe to call again.
@@ -59,6 +63,7 @@ class WriterThread {
   struct Task {
     Work work;
     Tell tell;
+    Durability durability;
     std::size_t bytes;
     absl::Status status;
     bool done = false;
@@ -66,6 +71,8 @@ class WriterThread {
   using Queue = std::deque<Task*>;
 
   void Loop();
+  // Queues the task and waits until it is carried out.
+  absl::Status Await(Task& task, Queue& queue) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Takes what the next commit is made of.
   Queue TakeBatch(Durability& durability) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void CommitBatch(Durability durability, const Queue& batch);
@@ -77,7 +84,7 @@ class WriterThread {
   mutable absl::Mutex mutex_;
   WriterNumbers numbers_ ABSL_GUARDED_BY(mutex_);  // without queued_bytes
   Queue full_ ABSL_GUARDED_BY(mutex_);
-  Queue relaxed_ ABSL_GUARDED_BY(mutex_);
+  Queue behind_ ABSL_GUARDED_BY(mutex_);  // one a commit, once full_ is empty
   std::size_t queued_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
