@@ -120,15 +120,16 @@ absl::Status Integrator::MakeServed(StorageReader& reader, TileChange& change, b
 
 absl::Status Integrator::Commit(const TileChange& change,
                                 const std::vector<ScanId>& scans,
-                                absl::FunctionRef<absl::Status(StorageWriter&)> decision) {
+                                absl::FunctionRef<absl::Status(StorageWriter&)> decision,
+                                bool awaited) {
   const double cell_size_m = core_.info().parameters.mls.cell_size_m;
   const std::uint64_t floor = core_.snapshots().Floor();
   std::vector<MlsTileRow> rows;  // encoded here: acknowledgements wait for the writer
   for (const auto& [key, tile] : change.tiles) {
     if (tile != nullptr) rows.push_back(MakeMlsTileRow(*tile, change.version, cell_size_m));
   }
-  absl::Status committed =
-      core_.Publish(scans, NoticesOf(change.surfaces), [&](StorageWriter& writer) -> absl::Status {
+  absl::Status committed = core_.Publish(
+      scans, NoticesOf(change.surfaces), awaited, [&](StorageWriter& writer) -> absl::Status {
         // First what may free pages: a scan can be deleted from a file that may not grow.
         STRATA_RETURN_IF_ERROR(decision(writer));
         return WriteTileChange(writer, change, rows, floor);
@@ -222,7 +223,7 @@ absl::Status Integrator::CommitBatch(const Batch& batch, const TileChange& chang
   std::vector<ScanId> scans;
   for (const Failed& failed : batch.failed) scans.push_back(failed.id);
   for (const Integrated& done : batch.integrated) scans.push_back(done.scan.header.id);
-  return Commit(change, scans, [&](StorageWriter& writer) -> absl::Status {
+  const auto decision = [&](StorageWriter& writer) -> absl::Status {
     for (const Failed& failed : batch.failed) {
       STRATA_RETURN_IF_ERROR(
           writer.SetScanState(failed.number, ScanState::kFailed, failed.message));
@@ -244,7 +245,8 @@ absl::Status Integrator::CommitBatch(const Batch& batch, const TileChange& chang
       STRATA_RETURN_IF_ERROR(writer.SetScanState(number, ScanState::kIntegrated, done.losses));
     }
     return absl::OkStatus();
-  });
+  };
+  return Commit(change, scans, decision, /*awaited=*/false);
 }
 
 }  // namespace strata

@@ -123,7 +123,8 @@ class Integrator {
   // `scans`. As MapCore::Publish().
   absl::Status Commit(const TileChange& change,
                       const std::vector<ScanId>& scans,
-                      absl::FunctionRef<absl::Status(StorageWriter&)> decision);
+                      absl::FunctionRef<absl::Status(StorageWriter&)> decision,
+                      bool awaited = true);
   // The tiles of `keys` from all their scans but `without`.
   absl::StatusOr<MlsTileMap> TilesWithout(StorageReader& reader,
                                           const absl::btree_set<TileKey>& keys,

@@ -91,22 +91,21 @@ std::pair<ChangeSet, Snapshots::Pin> MapCore::ChangesSince(std::uint64_t commit_
 
 absl::Status MapCore::Publish(const std::vector<ScanId>& scans,
                               const std::vector<api::TileChangeNotice>& tiles,
+                              bool awaited,
                               absl::FunctionRef<absl::Status(StorageWriter&)> work) {
   MapClock clock;
+  const auto publish = [&](StorageWriter& writer) -> absl::Status {
+    STRATA_RETURN_IF_ERROR(work(writer));
+    // Scans that were acknowledged since the version was chosen have numbers that watchers know,
+    // and whoever knows a number is told of later ones only.
+    STRATA_RETURN_IF_ERROR(writer.NextCommitSequence().status());
+    STRATA_ASSIGN_OR_RETURN(clock, writer.reader().GetClock());
+    return absl::OkStatus();
+  };
+  const auto show = [&] { Show(clock, scans, tiles); };
   // Durable: what a reader saw of a version must not be given again with other bytes.
-  return writer_.Run(
-      Durability::kFull,
-      0,
-      Stop(),
-      [&](StorageWriter& writer) -> absl::Status {
-        STRATA_RETURN_IF_ERROR(work(writer));
-        // Scans that were acknowledged since the version was chosen have numbers that watchers
-        // know, and whoever knows a number is told of later ones only.
-        STRATA_RETURN_IF_ERROR(writer.NextCommitSequence().status());
-        STRATA_ASSIGN_OR_RETURN(clock, writer.reader().GetClock());
-        return absl::OkStatus();
-      },
-      [&] { Show(clock, scans, tiles); });
+  return awaited ? writer_.Run(Durability::kFull, 0, Stop(), publish, show)
+                 : writer_.RunBehind(publish, show);
 }
 
 void MapCore::Show(const MapClock& clock,

@@ -53,9 +53,11 @@ class MapCore {
   std::pair<ChangeSet, Snapshots::Pin> ChangesSince(std::uint64_t commit_sequence);
   // Carries out `work` in a durable commit with a number of its own, one that nobody has been told
   // yet; then makes it the state that readers get and tells watchers of `scans` and `tiles`, as
-  // one. Nothing has changed after an error.
+  // one. Nothing has changed after an error. `awaited`: together with acknowledgements that wait;
+  // else behind them.
   absl::Status Publish(const std::vector<ScanId>& scans,
                        const std::vector<api::TileChangeNotice>& tiles,
+                       bool awaited,
                        absl::FunctionRef<absl::Status(StorageWriter&)> work);
   // Whether the store may hold tiles that were staged and neither published nor discarded.
   bool tiles_staged() const { return tiles_staged_; }

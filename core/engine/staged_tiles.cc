@@ -61,11 +61,12 @@ absl::Status StagedTiles::RetireOld(StorageWriter& writer, std::uint64_t floor) 
 absl::Status StagedTiles::Publish(const std::vector<ScanId>& scans,
                                   absl::FunctionRef<absl::Status(StorageWriter&)> decision) {
   const std::uint64_t floor = core_.snapshots().Floor();
-  STRATA_RETURN_IF_ERROR(core_.Publish(scans, notices_, [&](StorageWriter& writer) -> absl::Status {
-    STRATA_RETURN_IF_ERROR(RetireOld(writer, floor));
-    STRATA_RETURN_IF_ERROR(writer.PublishTiles(version_, true));
-    return decision(writer);
-  }));
+  STRATA_RETURN_IF_ERROR(
+      core_.Publish(scans, notices_, true, [&](StorageWriter& writer) -> absl::Status {
+        STRATA_RETURN_IF_ERROR(RetireOld(writer, floor));
+        STRATA_RETURN_IF_ERROR(writer.PublishTiles(version_, true));
+        return decision(writer);
+      }));
   published_ = true;
   return absl::OkStatus();
 }

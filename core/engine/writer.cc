@@ -41,7 +41,7 @@ void WriterThread::Close() {
 absl::Status WriterThread::Run(
     Durability durability, std::size_t bytes, const Stop& stop, Work work, Tell tell) {
   if (bytes > 0) STRATA_RETURN_IF_ERROR(disk_.CheckForUpload());
-  Task task{work, tell, bytes, absl::OkStatus()};
+  Task task{work, tell, durability, bytes, absl::OkStatus()};
   const BlockingScope blocking;
   absl::MutexLock lock(&mutex_);
   const auto has_room = [this, bytes]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
@@ -50,9 +50,19 @@ absl::Status WriterThread::Run(
   while (!mutex_.AwaitWithTimeout(absl::Condition(&has_room), kStopPoll)) {
     STRATA_RETURN_IF_ERROR(stop.status());
   }
+  return Await(task, durability == Durability::kFull ? full_ : behind_);
+}
+
+absl::Status WriterThread::RunBehind(Work work, Tell tell) {
+  Task task{work, tell, Durability::kFull, 0, absl::OkStatus()};
+  absl::MutexLock lock(&mutex_);
+  return Await(task, behind_);
+}
+
+absl::Status WriterThread::Await(Task& task, Queue& queue) {
   if (closed_) return absl::CancelledError("the map is being closed");
-  (durability == Durability::kFull ? full_ : relaxed_).push_back(&task);
-  queued_bytes_ += bytes;
+  queue.push_back(&task);
+  queued_bytes_ += task.bytes;
   mutex_.Await(absl::Condition(&task.done));
   return task.status;
 }
@@ -69,17 +79,16 @@ absl::Status WriterThread::FailedWithin(absl::Duration time) const {
   return SteadyNow() - last_commit_at_ <= time ? last_commit_ : absl::OkStatus();
 }
 
-bool WriterThread::HasWorkOrClosed() const {
-  return closed_ || !full_.empty() || !relaxed_.empty();
-}
+bool WriterThread::HasWorkOrClosed() const { return closed_ || !full_.empty() || !behind_.empty(); }
 
 WriterThread::Queue WriterThread::TakeBatch(Durability& durability) {
-  durability = full_.empty() ? Durability::kRelaxed : Durability::kFull;
+  durability = Durability::kFull;
   if (!full_.empty()) return std::exchange(full_, {});
   Queue batch;
-  if (!relaxed_.empty()) {
-    batch.push_back(relaxed_.front());
-    relaxed_.pop_front();
+  if (!behind_.empty()) {
+    durability = behind_.front()->durability;
+    batch.push_back(behind_.front());
+    behind_.pop_front();
   }
   return batch;
 }

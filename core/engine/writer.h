@@ -51,6 +51,10 @@ class WriterThread {
                    Work work,
                    Tell tell = TellNobody);
 
+  // As Run() with kFull, but in a commit of its own and behind every kFull that waits: for what
+  // nobody waits for.
+  absl::Status RunBehind(Work work, Tell tell);
+
   WriterNumbers numbers() const;
   // Why the last commit failed, if it did, and not longer ago; otherwise OK.
   absl::Status FailedWithin(absl::Duration time) const;
@@ -63,6 +67,7 @@ class WriterThread {
   struct Task {
     Work work;
     Tell tell;
+    Durability durability;
     std::size_t bytes;
     absl::Status status;
     bool done = false;
@@ -70,6 +75,8 @@ class WriterThread {
   using Queue = std::deque<Task*>;
 
   void Loop();
+  // Queues the task and waits until it is carried out.
+  absl::Status Await(Task& task, Queue& queue) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Takes what the next commit is made of.
   Queue TakeBatch(Durability& durability) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status CommitBatch(Durability durability, const Queue& batch);
@@ -86,7 +93,7 @@ class WriterThread {
   absl::Time last_commit_at_ ABSL_GUARDED_BY(mutex_);
   WriterNumbers numbers_ ABSL_GUARDED_BY(mutex_);  // without queued_bytes
   Queue full_ ABSL_GUARDED_BY(mutex_);
-  Queue relaxed_ ABSL_GUARDED_BY(mutex_);
+  Queue behind_ ABSL_GUARDED_BY(mutex_);  // one a commit, once full_ is empty
   std::size_t queued_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
