@@ -1,7 +1,6 @@
 #include "core/engine/writer.h"
 
 #include <cstddef>
-#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -65,15 +64,18 @@ bool WriterThread::HasWorkOrClosed() const {
   return closed_ || !full_.empty() || !relaxed_.empty();
 }
 
-WriterThread::Queue WriterThread::TakeBatch(Durability& durability) {
-  durability = full_.empty() ? Durability::kRelaxed : Durability::kFull;
-  if (!full_.empty()) return std::exchange(full_, {});
-  Queue batch;
+// Into `batch`, not as a result: even to move a queue may take memory, and what was taken from the
+// queues must not be lost.
+Durability WriterThread::TakeBatch(Queue& batch) {
+  if (!full_.empty()) {
+    batch.swap(full_);
+    return Durability::kFull;
+  }
   if (!relaxed_.empty()) {
     batch.push_back(relaxed_.front());
     relaxed_.pop_front();
   }
-  return batch;
+  return Durability::kRelaxed;
 }
 
 void WriterThread::CommitBatch(Durability durability, const Queue& batch) {
@@ -116,7 +118,7 @@ absl::StatusOr<bool> WriterThread::RunNext() {
   {
     absl::MutexLock lock(&mutex_);
     mutex_.Await(absl::Condition(this, &WriterThread::HasWorkOrClosed));
-    batch = TakeBatch(durability);
+    durability = TakeBatch(batch);
     if (batch.empty()) return true;
   }
   const absl::Time begun = SteadyNow();

@@ -67,8 +67,8 @@ class WriterThread {
   using Queue = std::deque<Task*>;
 
   void Loop();
-  // Takes what the next commit is made of.
-  Queue TakeBatch(Durability& durability) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Takes what the next commit is made of into an empty `batch`; how that is committed.
+  Durability TakeBatch(Queue& batch) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void CommitBatch(Durability durability, const Queue& batch);
   static void TellOf(const Task& task);
   // One commit; whether there is none any more.
