@@ -101,7 +101,11 @@ void Worker::Loop() {
         RunCommand();
         break;
       case Step::kBatch:
-        RunBatch();
+        // What there is no memory to say of it is not said.
+        Guarded([this] {
+          RunBatch();
+          return absl::OkStatus();
+        }).IgnoreError();
         break;
     }
   }
