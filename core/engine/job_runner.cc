@@ -33,6 +33,14 @@ constexpr absl::Duration kRetryDelay = absl::Seconds(1);
 // Who starts jobs that nobody asked for.
 constexpr absl::string_view kServer = "server";
 
+// What there is no memory to log is not logged.
+void LogError(absl::string_view event, absl::string_view map, const absl::Status& error) {
+  Guarded([&] {
+    LOG(ERROR) << LogLine(event).Add("map", map).Add("error", error.message());
+    return absl::OkStatus();
+  }).IgnoreError();
+}
+
 // Whether a job that begins has made its epoch already, and was killed before it could say so; a
 // second one would not be undone with the first. If so, tells what is known.
 absl::StatusOr<bool> HasMadeItsEpoch(MapCore& core, const JobInfo& job, JobContext& context) {
@@ -133,9 +141,7 @@ void JobRunner::RunJob() {
   absl::MutexLock lock(&mutex_);
   job_waits_ = jobs_.AnyIn(JobState::kQueued);
   if (done.ok()) return;
-  if (!IsOutOfMemory(done)) {
-    LOG(ERROR) << LogLine("job").Add("map", core_.name()).Add("error", done.message());
-  }
+  LogError("job", core_.name(), done);
   mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
 }
 
@@ -173,9 +179,7 @@ void JobRunner::Look() {
     STRATA_RETURN_IF_ERROR(quarantine_.End(look));
     return started;
   });
-  if (!done.ok() && !absl::IsCancelled(done) && !IsOutOfMemory(done)) {
-    LOG(ERROR) << LogLine("look").Add("map", core_.name()).Add("error", done.message());
-  }
+  if (!done.ok() && !absl::IsCancelled(done)) LogError("look", core_.name(), done);
   absl::MutexLock lock(&mutex_);
   job_waits_ = jobs_.AnyIn(JobState::kQueued);
 }

@@ -18,6 +18,7 @@
 #include "absl/time/time.h"
 #include <glog/logging.h>
 
+#include "core/common/guarded.h"
 #include "core/common/log_line.h"
 #include "core/common/status.h"
 
@@ -246,13 +247,14 @@ absl::Status Quarantine::PutScansUnderWay(std::set<WorkId> scans) {
 }
 
 void Quarantine::EndScans() {
-  const absl::Status ended = core_.writer().Run(
-      Durability::kRelaxed, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
-        for (const WorkId& work : scans_under_way_) {
-          STRATA_RETURN_IF_ERROR(Pause(writer, work));
-        }
-        return absl::OkStatus();
-      });
+  const auto pause = [this](StorageWriter& writer) -> absl::Status {
+    for (const WorkId& work : scans_under_way_) {
+      STRATA_RETURN_IF_ERROR(Pause(writer, work));
+    }
+    return absl::OkStatus();
+  };
+  const absl::Status ended =
+      Guarded([&] { return core_.writer().Run(Durability::kRelaxed, 0, Stop(), pause); });
   if (ended.ok()) scans_under_way_.clear();
 }
 

@@ -7,6 +7,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 #include <glog/logging.h>
@@ -26,6 +27,14 @@ constexpr absl::Duration kStopPoll = absl::Milliseconds(50);
 constexpr absl::Duration kRetryDelay = absl::Seconds(1);
 // So often a scan is tried again alone when there was no memory.
 constexpr int kMemoryTries = 10;
+
+// What there is no memory to log is not logged.
+void LogStopped(absl::string_view event, absl::string_view map, const absl::Status& why) {
+  Guarded([&] {
+    LOG(ERROR) << LogLine(event).Add("map", map).Add("stopped", why.message());
+    return absl::OkStatus();
+  }).IgnoreError();
+}
 
 absl::Status Refusal() {
   return absl::FailedPreconditionError(
@@ -94,7 +103,7 @@ void Worker::Loop() {
         RunCommand();
         break;
       case Step::kBatch:
-        // What it has no memory to log is tried again.
+        // What there is no memory to say of it is not said.
         Guarded([this] {
           RunBatch();
           return absl::OkStatus();
@@ -148,7 +157,7 @@ void Worker::RunBatch() {
     pending_ -= count == 0 ? waited : std::min(pending_, static_cast<std::uint64_t>(count));
     return;
   }
-  LOG(ERROR) << LogLine("integration").Add("map", core_.name()).Add("stopped", done.message());
+  LogStopped("integration", core_.name(), done);
   mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
 }
 
@@ -183,14 +192,14 @@ bool Worker::RunRecovery() {
       return recovered;
     });
     if (done.ok() || closing_.requested()) return true;
-    LOG(ERROR) << LogLine("recovery").Add("map", core_.name()).Add("stopped", done.message());
+    LogStopped("recovery", core_.name(), done);
     absl::MutexLock lock(&mutex_);
     if (mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay)) return true;
   }
 }
 
 void Worker::Refuse() {
-  LOG(ERROR) << LogLine("recovery").Add("map", core_.name()).Add("stopped", Refusal().message());
+  LogStopped("recovery", core_.name(), Refusal());
   absl::MutexLock lock(&mutex_);
   refuses_ = true;
   for (Task* task : tasks_) {

@@ -1,7 +1,6 @@
 #include "core/engine/writer.h"
 
 #include <cstddef>
-#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -81,16 +80,17 @@ absl::Status WriterThread::FailedWithin(absl::Duration time) const {
 
 bool WriterThread::HasWorkOrClosed() const { return closed_ || !full_.empty() || !behind_.empty(); }
 
-WriterThread::Queue WriterThread::TakeBatch(Durability& durability) {
-  durability = Durability::kFull;
-  if (!full_.empty()) return std::exchange(full_, {});
-  Queue batch;
-  if (!behind_.empty()) {
-    durability = behind_.front()->durability;
-    batch.push_back(behind_.front());
-    behind_.pop_front();
+// Into `batch`, not as a result: even to move a queue may take memory, and what was taken from the
+// queues must not be lost.
+Durability WriterThread::TakeBatch(Queue& batch) {
+  if (!full_.empty()) {
+    batch.swap(full_);
+    return Durability::kFull;
   }
-  return batch;
+  if (behind_.empty()) return Durability::kFull;
+  batch.push_back(behind_.front());
+  behind_.pop_front();
+  return batch.front()->durability;
 }
 
 absl::Status WriterThread::CommitBatch(Durability durability, const Queue& batch) {
@@ -134,7 +134,7 @@ absl::StatusOr<bool> WriterThread::RunNext() {
   {
     absl::MutexLock lock(&mutex_);
     mutex_.Await(absl::Condition(this, &WriterThread::HasWorkOrClosed));
-    batch = TakeBatch(durability);
+    durability = TakeBatch(batch);
     if (batch.empty()) return true;
   }
   const absl::Time begun = SteadyNow();

@@ -77,8 +77,8 @@ class WriterThread {
   void Loop();
   // Queues the task and waits until it is carried out.
   absl::Status Await(Task& task, Queue& queue) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // Takes what the next commit is made of.
-  Queue TakeBatch(Durability& durability) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Takes what the next commit is made of into an empty `batch`; how that is committed.
+  Durability TakeBatch(Queue& batch) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status CommitBatch(Durability durability, const Queue& batch);
   static void TellOf(const Task& task);
   // One commit; whether there is none any more.

@@ -1,5 +1,7 @@
 // A real server that dies of its work: it comes back, says of what it died, and goes on without.
+#include <algorithm>
 #include <csignal>
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,6 +17,7 @@
 #include <gtest/gtest.h>
 
 #include "client/sdk/client.h"
+#include "core/cloud/cloud_slice.h"
 #include "core/common/status.h"
 #include "tests/integration/stratad_process.h"
 #include "tests/support/status_matchers.h"
@@ -26,6 +29,7 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr char kMap[] = "world";
+constexpr std::size_t kPiece = 40'000;
 const ScanId kBig{"big", 1};
 const ScanId kSmall{"small", 1};
 
@@ -60,7 +64,10 @@ class ServerQuarantineTest : public ::testing::Test {
     header.alignment = Alignment::kOff;
     header.point_count = cloud.size();
     STRATA_ASSIGN_OR_RETURN(const auto upload, db_->scans().Upload({}, kMap, header));
-    STRATA_RETURN_IF_ERROR(upload->Write(cloud));
+    for (std::size_t at = 0; at < cloud.size(); at += kPiece) {
+      STRATA_RETURN_IF_ERROR(
+          upload->Write(SliceOf(cloud, at, std::min(cloud.size(), at + kPiece))));
+    }
     return upload->Finish().status();
   }
   // The server must be down: what `stratad quarantine list` says of `work` behind its name.
