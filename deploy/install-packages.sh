@@ -11,7 +11,7 @@ packages=(
   protobuf-compiler protobuf-compiler-grpc python3
 )
 if [[ "${1:-}" == --dev ]]; then
-  packages+=(clang clang-format clang-tidy dpkg-dev file libbenchmark-dev libceres-dev libcgal-dev libclang-rt-dev libdlib-dev libgmock-dev libgtest-dev liboctomap-dev libpcl-dev openssl python3-grpcio python3-numpy python3-protobuf python3-xxhash python3-zstandard sqlite3 systemd)
+  packages+=(clang clang-format clang-tidy dpkg-dev file libbenchmark-dev libceres-dev libcgal-dev libclang-rt-dev libdlib-dev libgmock-dev libgtest-dev liboctomap-dev libpcl-dev mmdebstrap openssl python3-grpcio python3-numpy python3-protobuf python3-xxhash python3-zstandard sqlite3 systemd)
 fi
 
 missing=()

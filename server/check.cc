@@ -106,6 +106,10 @@ Finding CheckDirectory(const fs::path& directory) {
   const double free_mib =
       static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize) / kMebi;
   const std::string text = absl::StrFormat("%s: %.0f MiB free", directory.string(), free_mib);
+  struct stat info {};
+  if (::stat(directory.c_str(), &info) == 0 && (info.st_mode & 0007U) != 0) {
+    return Warning("data", text + ", and everybody on this machine can look into it; chmod 750");
+  }
   return free_mib < kFewMebi ? Warning("data", text + ", which is little") : Ok("data", text);
 }
 

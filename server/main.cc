@@ -17,6 +17,7 @@
 #include <malloc.h>
 #include <pthread.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "core/common/log_line.h"
@@ -54,6 +55,9 @@ void RaiseFileLimit() {
   files.rlim_cur = files.rlim_max;
   setrlimit(RLIMIT_NOFILE, &files);
 }
+
+// What is in maps is nobody else's: folders and files that it makes are 0750 and 0640, or stricter.
+void KeepFilesPrivate() { ::umask(::umask(0077) | 0027); }
 
 // By default every thread has a heap of its own, and what it freed in the middle of it stays with
 // the process: beside hostile clients a gigabyte of which half was free.
@@ -99,6 +103,7 @@ LogLine StartLine(const ProgramOptions& options, const std::string& address) {
 
 absl::Status Serve(const ProgramOptions& options) {
   KeepHeapsSmall();
+  KeepFilesPrivate();
   // Debian's Abseil is built to look for cycles whenever a mutex is locked, and to abort at one.
   absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
   FLAGS_logtostderr = true;

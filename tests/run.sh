@@ -23,6 +23,9 @@ stage "release build"
 cmake --preset release -DSTRATA_BUILD_TESTS=ON -DSTRATA_BUILD_BENCHMARKS=ON >/dev/null
 cmake --build --preset release
 
+stage "a bare machine"
+tests/bare/run.sh
+
 stage "tests"
 ctest --preset release
 

@@ -28,12 +28,13 @@ struct BackupOptions {
   bool force = false;
 };
 
-// A file that takes its name only when it is whole and on the disk. Removed unless it did.
+// A file that takes its name only when it is whole and on the disk, and that others than user and
+// group cannot read. Removed unless it did.
 class NewFile {
  public:
   explicit NewFile(fs::path path) : path_(std::move(path)), part_(path_) {
     part_ += absl::StrCat(".", ::getpid(), ".part");
-    file_ = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    file_ = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640);
     if (file_ < 0) status_ = CannotWrite();
   }
   ~NewFile() {

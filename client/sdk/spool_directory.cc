@@ -34,7 +34,7 @@ absl::Status ErrnoStatus(absl::string_view what, const fs::path& path) {
 class Descriptor {
  public:
   Descriptor(const fs::path& path, int flags)
-      : fd_(::open(path.c_str(), flags | O_CLOEXEC, 0644)) {}
+      : fd_(::open(path.c_str(), flags | O_CLOEXEC, 0640)) {}
   ~Descriptor() {
     if (fd_ >= 0) ::close(fd_);
   }
@@ -95,13 +95,15 @@ absl::StatusOr<std::vector<SpoolFile>> ListSpoolFiles(const fs::path& folder) {
 absl::StatusOr<SpoolDirectory> SpoolDirectory::Open(const fs::path& path) {
   std::error_code error;
   for (const char* folder : {"waiting", "refused", "damaged", "adding"}) {
-    fs::create_directories(path / folder, error);
+    if (fs::create_directories(path / folder, error)) {
+      fs::permissions(path / folder, fs::perms::others_all, fs::perm_options::remove, error);
+    }
     if (!fs::is_directory(path / folder, error)) {
       return absl::InvalidArgumentError(
           absl::StrCat("spool ", path.string(), " cannot be made or is no directory"));
     }
   }
-  const int lock = ::open((path / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  const int lock = ::open((path / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0640);
   if (lock < 0) return ErrnoStatus("cannot open", path / ".lock");
   SpoolDirectory directory(path, lock);
   if (::flock(lock, LOCK_EX | LOCK_NB) != 0) {

@@ -101,13 +101,15 @@ absl::Status RemoveLeftovers(const fs::path& directory) {
 
 absl::StatusOr<MapDirectory> MapDirectory::Open(const fs::path& path) {
   std::error_code error;
-  fs::create_directories(path, error);
+  if (fs::create_directories(path, error)) {
+    fs::permissions(path, fs::perms::others_all, fs::perm_options::remove, error);
+  }
   if (!fs::is_directory(path, error)) {
     return absl::InvalidArgumentError(
         absl::StrCat("directory ", path.string(), " cannot be made or is no directory"));
   }
   const fs::path lock_file = path / kLockName;
-  const int lock = ::open(lock_file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  const int lock = ::open(lock_file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0640);
   if (lock < 0) return ErrnoStatus("cannot open", lock_file);
   MapDirectory directory(path, lock);
   if (::flock(lock, LOCK_EX | LOCK_NB) != 0) {

@@ -20,8 +20,8 @@ namespace strata {
 // Locked for as long as it lives. Map names must be valid (ValidateName): they become file names.
 class MapDirectory {
  public:
-  // Makes the directory if needed and removes what a crash left of half-made and half-deleted maps
-  // and of copies. FAILED_PRECONDITION if another engine has it.
+  // Makes the directory if needed, closed to others, and removes what a crash left of half-made and
+  // half-deleted maps and of copies. FAILED_PRECONDITION if another engine has it.
   static absl::StatusOr<MapDirectory> Open(const std::filesystem::path& path);
   ~MapDirectory();
   MapDirectory(MapDirectory&& other) noexcept

@@ -8,6 +8,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "tests/client/cli/run_strata.h"
 #include "tests/integration/stratad_process.h"
@@ -116,6 +117,23 @@ TEST_F(DoorsTest, AFileThatIsNoMapKeepsNobodyFromStarting) {
   EXPECT_THAT(RunStratad(check, 1), HasSubstr("error   map foreign: "));
   StratadProcess stratad(words);
   EXPECT_EQ(RunStrata({"--server", stratad.Address(), "map", "create", "campus"}).exit_code, 0);
+}
+
+TEST_F(DoorsTest, WhatItMakesIsNotForEverybodyOfTheMachine) {
+  const mode_t before = ::umask(0);
+  StratadProcess stratad({"--data", Path("maps"), "--listen", "127.0.0.1:0"});
+  ::umask(before);
+  EXPECT_EQ(RunStrata({"--server", stratad.Address(), "map", "create", "campus"}).exit_code, 0);
+  std::vector<std::filesystem::path> made = {Path("maps")};
+  for (const auto& entry : std::filesystem::directory_iterator(Path("maps"))) {
+    made.push_back(entry.path());
+  }
+  EXPECT_GE(made.size(), 3);  // the folder, its lock, the map
+  for (const std::filesystem::path& path : made) {
+    const std::filesystem::perms mode = std::filesystem::status(path).permissions();
+    EXPECT_EQ(mode & std::filesystem::perms::others_all, std::filesystem::perms::none) << path;
+    EXPECT_EQ(mode & std::filesystem::perms::group_write, std::filesystem::perms::none) << path;
+  }
 }
 
 TEST_F(DoorsTest, BeyondLoopbackItNeedsTlsAndTokens) {

@@ -10,6 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
 
 #include "client/formats/geometry_writer.h"
 #include "tests/client/cli/run_strata.h"
@@ -231,7 +232,11 @@ TEST_F(StrataTest, BackupsAndMapsAreMergedIntoOne) {
   RunOk({"map", "create", "m"});
   Import({"--align", "off"});
   const std::string file = (dir_.path() / "m copy.strata").string();
+  const mode_t before = ::umask(0);
   const json written = RunOk({"map", "backup", "m", file});
+  ::umask(before);
+  EXPECT_EQ(std::filesystem::status(file).permissions() & std::filesystem::perms::others_all,
+            std::filesystem::perms::none);
   EXPECT_EQ(std::filesystem::file_size(file), written["bytes"]);
   EXPECT_EQ(written["content_hash"].get<std::string>().size(), 32U);
   const Ran again = Run({"map", "backup", "m", file});

@@ -19,6 +19,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include "core/engine/engine.h"
 #include "core/geometry/pose.h"
@@ -138,6 +139,22 @@ TEST_F(SpoolTest, ScansAreSentInOrderAndTheirFilesGo) {
   Add(2);  // again: is there, and goes
   STRATA_ASSERT_OK(spool_->Send({}, *db_));
   EXPECT_THAT(Stored(), ElementsAre(3, 1, 2));
+}
+
+TEST_F(SpoolTest, OthersOfTheMachineCannotReadIt) {
+  spool_ = nullptr;
+  fs::remove_all(directory_.path() / "spool");
+  const mode_t before = ::umask(0);
+  Open();
+  Add(1);
+  ::umask(before);
+  const auto others = [](const fs::path& path) {
+    return fs::status(path).permissions() & fs::perms::others_all;
+  };
+  EXPECT_EQ(others(Folder("waiting")), fs::perms::none);
+  for (const fs::path& file : FilesIn(Folder("waiting"))) {
+    EXPECT_EQ(others(file), fs::perms::none) << file;
+  }
 }
 
 TEST_F(SpoolTest, OnlyWhatTheServerLacksIsSent) {
