@@ -159,7 +159,7 @@ absl::Status Request::Parse(grpc::ByteBuffer& bytes,
     grpc::ProtoBufferReader reader(&bytes);
     STRATA_ASSIGN_OR_RETURN(const std::size_t parsed_bytes,
                             AtTheDoor(ParsedBytes(*message.GetDescriptor(), reader)));
-    STRATA_RETURN_IF_ERROR(memory.Resize(parsed_bytes));
+    if (parsed_bytes > memory.bytes()) STRATA_RETURN_IF_ERROR(memory.Resize(parsed_bytes));
   }
   grpc::ProtoBufferReader reader(&bytes);
   if (message.ParseFromZeroCopyStream(&reader)) return absl::OkStatus();

@@ -52,10 +52,11 @@ class Request final : public Revocable {
   // UNAUTHENTICATED for a caller nobody knows, RESOURCE_EXHAUSTED when the server is full or the
   // caller has all it may have, UNAVAILABLE when the server shuts down: the call must end at once.
   const absl::Status& admission() const { return admission_; }
-  // Makes `message` of the bytes of a caller who was let in, books in `memory` what it takes, and
-  // checks that the caller may do to the map it names what the method does; a message without a map
-  // goes with the one before. The bytes are freed in any case. INVALID_ARGUMENT or
-  // RESOURCE_EXHAUSTED before anything is parsed; UNAUTHENTICATED, PERMISSION_DENIED.
+  // Makes `message` of the bytes of a caller who was let in, books in `memory` what it takes,
+  // unless as much is booked there, and checks that the caller may do to the map it names what the
+  // method does; a message without a map goes with the one before. The bytes are freed in any case.
+  // INVALID_ARGUMENT or RESOURCE_EXHAUSTED before anything is parsed; UNAUTHENTICATED,
+  // PERMISSION_DENIED.
   absl::Status Open(grpc::ByteBuffer& bytes, google::protobuf::Message& message, Booking& memory);
   // For a call that goes on and on: that the caller may still do what Open() checked.
   absl::Status StillAllowed() const;

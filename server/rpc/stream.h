@@ -48,6 +48,7 @@ class StreamReactor final : public grpc::ServerWriteReactor<Out> {
         context_(context),
         request_(runtime, context, method),
         memory_(request_.NewBooking()),
+        out_memory_(request_.NewBooking()),
         sealed_(in),
         pace_(runtime.options.slow_reader_timeout) {
     if (!request_.admission().ok()) {
@@ -73,6 +74,7 @@ class StreamReactor final : public grpc::ServerWriteReactor<Out> {
   absl::Status Send(const Out& message) {
     STRATA_RETURN_IF_ERROR(request_.call().stop.status());
     STRATA_RETURN_IF_ERROR(request_.StillAllowed());
+    STRATA_RETURN_IF_ERROR(Request::HoldAnswer(message, out_memory_));
     {
       absl::MutexLock lock(&mutex_);
       sending_ = true;
@@ -120,7 +122,8 @@ class StreamReactor final : public grpc::ServerWriteReactor<Out> {
   Runtime& runtime_;
   grpc::CallbackServerContext& context_;
   Request request_;
-  Booking memory_;  // of the request
+  Booking memory_;      // of the request
+  Booking out_memory_;  // of the message that is sent, or was sent last
   Sealed<In>& sealed_;
   ReaderPace pace_;
   absl::Mutex mutex_;

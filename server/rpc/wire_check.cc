@@ -197,9 +197,11 @@ class Walk {
     const std::size_t all = counts_[field.index] += items;
     if (all <= field.max_items) return absl::OkStatus();
     return absl::InvalidArgumentError(absl::StrCat(field.descriptor->name(),
-                                                   ": more than ",
+                                                   ": ",
+                                                   all,
+                                                   " or more; at most ",
                                                    field.max_items,
-                                                   " in one request; ask in parts"));
+                                                   " in one request, ask in parts"));
   }
 
   CodedInputStream& in_;

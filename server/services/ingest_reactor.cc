@@ -54,7 +54,6 @@ void IngestReactor::OnReadDone(bool ok) {
 
 void IngestReactor::Take() {
   const absl::Status status = Guarded([this] { return TakeMessage(); });
-  in_memory_.Release();
   if (!status.ok()) {
     EndReading(status);
     return;
@@ -82,9 +81,10 @@ absl::Status IngestReactor::TakeMessage() {
 
 void IngestReactor::Begin(const v1::ScanStart& start, const absl::Status& allowed) {
   current_id_ = start.header().id();
+  const absl::Status held = allowed.ok() ? HoldChunk(start.header(), in_memory_) : allowed;
   absl::StatusOr<ScanReceiver> begun =
-      allowed.ok() ? ScanReceiver::Begin(runtime_.db, request_.call(), start, request_.NewBooking())
-                   : allowed;
+      held.ok() ? ScanReceiver::Begin(runtime_.db, request_.call(), start, request_.NewBooking())
+                : held;
   passing_over_ = !begun.ok();
   if (!begun.ok()) {
     EndScan(begun.status());

@@ -66,7 +66,11 @@ absl::Status LocalizeReactor::TakeMessage() {
   STRATA_RETURN_IF_ERROR(request_.call().stop.status());
   In in;
   STRATA_RETURN_IF_ERROR(request_.Open(message_.bytes, in, in_memory_));
-  if (in.has_start() && !begun_) return AtTheDoor(Begin(in.start()));
+  if (in.has_start() && !begun_) {
+    STRATA_RETURN_IF_ERROR(AtTheDoor(Begin(in.start())));
+    // All at once: a scan that was begun is not refused in the middle.
+    return Reserve(shape_.point_count, points_memory_, query_.cloud.points);
+  }
   if (in.has_chunk() && begun_) return Add(in.chunk());
   return AtTheDoor(OutOfOrder(begun_ ? "every message after the first is a chunk"
                                      : "the first message is the start of the scan"));

@@ -14,26 +14,40 @@
 namespace strata::server {
 namespace {
 
+constexpr std::uint64_t kStagedBytes = 1 << 20;
+
+std::uint64_t PointBytes(const v1::ScanHeader& header) {
+  return 12 + (header.has_intensity() ? 4 : 0) + (header.has_colour() ? 3 : 0) +
+         (header.has_label() ? 2 : 0);
+}
+
+std::uint64_t PieceBytes(const v1::ScanHeader& header) {
+  return PointBytes(header) *
+         std::min<std::uint64_t>(header.point_count(), api::kMaxPointsPerChunk);
+}
+
 // What a map keeps of a scan that comes in: the points of the piece under way, and pieces that wait
 // until it is worth while to put them to disk.
-std::size_t BytesOnTheWay(const ScanHeader& header) {
-  constexpr std::uint64_t kStagedBytes = 1 << 20;
-  const std::uint64_t point_bytes = 12 + (header.has_intensity ? 4 : 0) +
-                                    (header.has_colour ? 3 : 0) + (header.has_label ? 2 : 0);
-  const std::uint64_t piece = std::min<std::uint64_t>(header.point_count, api::kMaxPointsPerChunk);
-  const std::uint64_t points = std::min(header.point_count, kStagedBytes);
-  return static_cast<std::size_t>(piece * point_bytes +
-                                  std::min(kStagedBytes, points * point_bytes));
+std::size_t BytesOnTheWay(const v1::ScanHeader& header) {
+  const std::uint64_t points = std::min(header.point_count(), kStagedBytes);
+  return static_cast<std::size_t>(PieceBytes(header) +
+                                  std::min(kStagedBytes, PointBytes(header) * points));
 }
 
 }  // namespace
+
+absl::Status HoldChunk(const v1::ScanHeader& header, Booking& memory) {
+  constexpr std::uint64_t kOverheadBytes = 1024;  // of a message and its columns
+  const auto bytes = static_cast<std::size_t>(PieceBytes(header) + kOverheadBytes);
+  return bytes > memory.bytes() ? memory.Resize(bytes) : absl::OkStatus();
+}
 
 absl::StatusOr<ScanReceiver> ScanReceiver::Begin(api::Database& db,
                                                  const api::Call& call,
                                                  const v1::ScanStart& start,
                                                  Booking memory) {
   STRATA_ASSIGN_OR_RETURN(ScanHeader header, AtTheDoor(translate::FromProto(start.header())));
-  STRATA_RETURN_IF_ERROR(memory.Resize(BytesOnTheWay(header)));
+  STRATA_RETURN_IF_ERROR(memory.Resize(BytesOnTheWay(start.header())));
   STRATA_ASSIGN_OR_RETURN(std::unique_ptr<api::ScanUpload> upload,
                           db.scans().Upload(call, start.map(), header));
   return ScanReceiver(std::move(header), std::move(memory), std::move(upload), start.resume());

@@ -18,6 +18,10 @@
 
 namespace strata::server {
 
+// Books in `memory` what a message with points of the scan takes: a scan that was begun is not
+// refused in the middle because others have begun since.
+absl::Status HoldChunk(const v1::ScanHeader& header, Booking& memory);
+
 // Checks what arrives and hands it on; destroying it before Finish() abandons the scan. Calls block
 // and come one at a time, from any thread.
 class ScanReceiver {

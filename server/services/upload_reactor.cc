@@ -45,7 +45,6 @@ void UploadReactor::OnReadDone(bool ok) {
 void UploadReactor::Take() {
   const bool begun = scan_.has_value();
   const absl::Status status = Guarded([this] { return TakeMessage(); });
-  in_memory_.Release();
   if (status.ok() && !begun && scan_->points_held() > 0 && scan_->complete()) {
     Commit();
     return;
@@ -74,6 +73,7 @@ absl::Status UploadReactor::TakeMessage() {
 }
 
 absl::Status UploadReactor::Begin(const v1::ScanStart& start) {
+  STRATA_RETURN_IF_ERROR(HoldChunk(start.header(), in_memory_));
   STRATA_ASSIGN_OR_RETURN(
       scan_, ScanReceiver::Begin(runtime_.db, request_.call(), start, request_.NewBooking()));
   // Tells the client that its points are welcome, and which of them are there.

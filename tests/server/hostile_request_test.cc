@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/synchronization/mutex.h"
-#include "absl/synchronization/notification.h"
+#include "absl/time/clock.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -59,6 +58,7 @@ class HostileRequestTest : public ServedMock {
     return translate::FromGrpcStatus(CallRaw(channel_, path, request, metadata).status);
   }
 
+  ScanSink sink_{db_};
   testing::TempDir dir_;
   const std::filesystem::path file_ = dir_.path() / "tokens.json";
 };
@@ -75,7 +75,6 @@ TEST_F(HostileRequestTest, AStrangersBytesAreNotParsed) {
 }
 
 TEST_F(HostileRequestTest, BytesThatAreNoMessageAreNoHalfClose) {
-  ScanSink sink(db_);
   Serve();
   v1::UploadScanRequest start;
   *start.mutable_start() = StartOf(1, 1);
@@ -92,7 +91,7 @@ TEST_F(HostileRequestTest, BytesThatAreNoMessageAreNoHalfClose) {
   ASSERT_TRUE(writer->Write(points));
   writer->Write(bad);
   EXPECT_THAT(translate::FromGrpcStatus(writer->Finish()), StatusIs(Code::kInvalidArgument, _));
-  EXPECT_THAT(sink.committed(), IsEmpty());
+  EXPECT_THAT(sink_.committed(), IsEmpty());
 }
 
 TEST_F(HostileRequestTest, MillionsOfEmptyItemsAreRefusedByNameAndBound) {
@@ -100,15 +99,15 @@ TEST_F(HostileRequestTest, MillionsOfEmptyItemsAreRefusedByNameAndBound) {
   std::string items;
   for (int i = 0; i < 2'000'000; ++i) items += std::string("\x1A\x00", 2);
   EXPECT_THAT(Say("/strata.v1.Tiles/Fetch", items),
-              StatusIs(Code::kInvalidArgument, HasSubstr("held: more than 262144")));
+              StatusIs(Code::kInvalidArgument, HasSubstr("held: 262145 or more; at most 262144")));
   v1::WatchPathRequest watch;
   for (int i = 0; i < 10'001; ++i) watch.add_waypoints();
   EXPECT_THAT(Say("/strata.v1.Planning/WatchPath", watch.SerializeAsString()),
-              StatusIs(Code::kInvalidArgument, HasSubstr("waypoints: more than 10000")));
+              StatusIs(Code::kInvalidArgument, HasSubstr("waypoints: 10001 or more")));
   v1::SampleSurfacesRequest sample;
   for (int i = 0; i < 10'001; ++i) sample.add_places();
   EXPECT_THAT(Say("/strata.v1.Planning/SampleSurfaces", sample.SerializeAsString()),
-              StatusIs(Code::kInvalidArgument, HasSubstr("places: more than 10000")));
+              StatusIs(Code::kInvalidArgument, HasSubstr("places: 10001 or more")));
 }
 
 // A server where one client may hold 4 MiB.
@@ -165,7 +164,15 @@ TEST_F(SmallBudgetTest, AnAnswerThatIsTooLargeIsRefused) {
   // Nothing stays booked.
   jobs[0].message = std::string(1 << 20, 'x');
   ON_CALL(db_.jobs(), List(_, _)).WillByDefault(Return(jobs));
-  for (int i = 0; i < 10; ++i) EXPECT_THAT(Say("/strata.v1.Jobs/List", ""), IsOk());
+  for (int i = 0; i < 10; ++i) {
+    // gRPC tells a little later that the answer before was taken.
+    absl::Status again = Say("/strata.v1.Jobs/List", "");
+    while (translate::RetryDelayOf(again).has_value()) {
+      absl::SleepFor(*translate::RetryDelayOf(again));
+      again = Say("/strata.v1.Jobs/List", "");
+    }
+    EXPECT_THAT(again, IsOk());
+  }
 }
 
 TEST_F(SmallBudgetTest, WhatAWatchKeepsForItsReaderIsBooked) {
@@ -187,7 +194,6 @@ TEST_F(SmallBudgetTest, WhatAWatchKeepsForItsReaderIsBooked) {
 }
 
 TEST_F(SmallBudgetTest, UploadsUnderWayAreBooked) {
-  ScanSink sink(db_);
   Serve(Options());
   const auto stub = v1::Scans::NewStub(channel_);
   v1::UploadScanRequest start;

@@ -46,6 +46,7 @@ class RevocationTest : public ServedMock {
     EXPECT_THAT(status, StatusIs(Code::kUnauthenticated, HasSubstr("revoked")));
   }
 
+  ScanSink sink_{db_};
   testing::TempDir dir_;
   const std::filesystem::path file_ = dir_.path() / "tokens.json";
   std::string token_;
@@ -53,7 +54,6 @@ class RevocationTest : public ServedMock {
 };
 
 TEST_F(RevocationTest, AnUploadThatWaitsForItsClientEndsAndIsAbandoned) {
-  ScanSink sink(db_);
   const auto stub = v1::Scans::NewStub(channel_);
   v1::UploadScanResponse out;
   const auto writer = stub->Upload(&context_, &out);
@@ -63,12 +63,11 @@ TEST_F(RevocationTest, AnUploadThatWaitsForItsClientEndsAndIsAbandoned) {
   writer->WaitForInitialMetadata();
   Revoke();
   ExpectRevoked(translate::FromGrpcStatus(writer->Finish()));
-  sink.AwaitAbandoned();
-  EXPECT_THAT(sink.committed(), IsEmpty());
+  sink_.AwaitAbandoned();
+  EXPECT_THAT(sink_.committed(), IsEmpty());
 }
 
 TEST_F(RevocationTest, AnUploadThatGoesOnEnds) {
-  ScanSink sink(db_);
   const auto stub = v1::Scans::NewStub(channel_);
   v1::UploadScanResponse out;
   const auto writer = stub->Upload(&context_, &out);
@@ -79,7 +78,7 @@ TEST_F(RevocationTest, AnUploadThatGoesOnEnds) {
   *message.mutable_chunk() = Points(1);
   while (writer->Write(message)) absl::SleepFor(absl::Milliseconds(10));
   ExpectRevoked(translate::FromGrpcStatus(writer->Finish()));
-  EXPECT_THAT(sink.committed(), IsEmpty());
+  EXPECT_THAT(sink_.committed(), IsEmpty());
 }
 
 TEST_F(RevocationTest, ADownloadEnds) {
@@ -144,7 +143,6 @@ TEST_F(RevocationTest, AWatchEndsAlsoWhereNobodyReadsIt) {
 }
 
 TEST_F(RevocationTest, WhoKeepsHisRightsKeepsWhatRuns) {
-  ScanSink sink(db_);
   const Grant other = NewGrant("other", {{kAllMaps, Right::kRead}}).first;
   const auto stub = v1::Scans::NewStub(channel_);
   v1::UploadScanResponse out;

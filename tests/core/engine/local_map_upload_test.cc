@@ -133,7 +133,13 @@ TEST_F(LocalMapUploadTest, HostileBytesAreRefused) {
     ++wide.tiles.back().key.x;
   }
   EXPECT_THAT(Send({"run", 1}, PoseAt(0, 0), *EncodeLocalMap(wide)),
-              StatusIs(Code::kInvalidArgument, HasSubstr("4097 tiles; at most 4096")));
+              StatusIs(Code::kResourceExhausted, HasSubstr("more than 2097152 patches")));
+  for (MlsTile& tile : wide.tiles) {
+    tile.patches.resize(1);
+    tile.IndexRows();
+  }
+  EXPECT_THAT(Send({"run", 1}, PoseAt(0, 0), *EncodeLocalMap(wide)),
+              StatusIs(Code::kInvalidArgument, HasSubstr("more than 4096 tiles")));
 }
 
 TEST_F(LocalMapUploadTest, AnEmptyOneFailsToBeIntegratedAndSaysWhy) {

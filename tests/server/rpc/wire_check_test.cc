@@ -114,19 +114,19 @@ TEST(WireCheckTest, MoreItemsThanTheContractAllowsAreRefusedByName) {
   std::string held;
   for (int i = 0; i <= 262'144; ++i) held += std::string("\x1A\x00", 2);
   EXPECT_THAT(Check<v1::FetchTilesRequest>(held),
-              StatusIs(Code::kInvalidArgument, HasSubstr("held: more than 262144")));
+              StatusIs(Code::kInvalidArgument, HasSubstr("held: 262145 or more; at most 262144")));
   // Also where they come in several messages that are merged.
   v1::CheckPathRequest check;
   for (int i = 0; i < 6000; ++i) check.mutable_known()->add_tiles();
   const std::string half = check.SerializeAsString();
   EXPECT_THAT(Check<v1::CheckPathRequest>(half), IsOk());
   EXPECT_THAT(Check<v1::CheckPathRequest>(half + half),
-              StatusIs(Code::kInvalidArgument, HasSubstr("tiles: more than 10000")));
+              StatusIs(Code::kInvalidArgument, HasSubstr("tiles: 10001 or more")));
   // And packed.
   v1::AddConstraintRequest constraint;
   for (int i = 0; i < 37; ++i) constraint.mutable_constraint()->add_information(i);
   EXPECT_THAT(Check<v1::AddConstraintRequest>(constraint.SerializeAsString()),
-              StatusIs(Code::kInvalidArgument, HasSubstr("information: more than 36")));
+              StatusIs(Code::kInvalidArgument, HasSubstr("information: 37 or more")));
 }
 
 TEST(WireCheckTest, FieldsOfANewerClientAreTakenButNotAnyNumber) {
