@@ -43,7 +43,7 @@ class TileReasons {
       : checks_(space.checks()),
         slot_(slot),
         window_(tiles, checks_.margin, checks_.cell_size_m),
-        ground_(window_, checks_) {}
+        ground_(window_, checks_, GroundChecks::Edges::kAll) {}
 
   std::uint32_t SurfaceOf(PatchId patch) const {
     const std::uint32_t local = patch - slot_.base;

@@ -371,7 +371,6 @@ TEST(PlannerTest, ChangedTilesAreNeverUsedStaleAndUnchangedOnesPreparedOnce) {
   other.profile.radius_m = 0.3;
   EXPECT_EQ(reason(closed, other), PlanReason::kBlocked);
   EXPECT_EQ(planner.cache_statistics().prepared, 3U);
-  EXPECT_EQ(planner.cache_statistics().fitted, 2U);
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(reason(open, query), PlanReason::kFound);
     EXPECT_EQ(reason(closed, query), PlanReason::kBlocked);
