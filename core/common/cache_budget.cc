@@ -4,26 +4,60 @@
 #include <functional>
 #include <utility>
 
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+
+#include "core/common/status.h"
+#include "core/common/stop.h"
+
 namespace strata {
+namespace {
+
+constexpr absl::Duration kLookInterval = absl::Milliseconds(50);  // at who waits no more
+
+}  // namespace
 
 std::size_t CacheBudget::cached_bytes() const {
   absl::MutexLock lock(&mutex_);
   return cached_;
 }
 
-bool CacheBudget::Reserve(std::size_t bytes) {
-  Values dropped;
-  absl::MutexLock lock(&mutex_);
+bool CacheBudget::TryReserve(std::size_t bytes) {
   if (bytes > max_bytes_ / 2 || reserved_ + bytes > max_bytes_ / 2) return false;
   reserved_ += bytes;
   Trim();
+  return true;
+}
+
+bool CacheBudget::Reserve(std::size_t bytes) {
+  Values dropped;
+  absl::MutexLock lock(&mutex_);
+  if (!TryReserve(bytes)) return false;
   dropped.swap(dropped_);
   return true;
+}
+
+absl::Status CacheBudget::AwaitReserve(std::size_t bytes, const Stop& stop) {
+  if (bytes > max_bytes_ / 2) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        bytes, " bytes are more than half of the caches' ", max_bytes_, "; give them more"));
+  }
+  Values dropped;
+  absl::MutexLock lock(&mutex_);
+  while (!TryReserve(bytes)) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+    released_.WaitWithTimeout(&mutex_, kLookInterval);
+  }
+  dropped.swap(dropped_);
+  return absl::OkStatus();
 }
 
 void CacheBudget::Release(std::size_t bytes) {
   absl::MutexLock lock(&mutex_);
   reserved_ -= bytes;
+  released_.SignalAll();
 }
 
 void CacheBudget::Trim() {

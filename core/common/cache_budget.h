@@ -9,7 +9,10 @@
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
 #include "absl/synchronization/mutex.h"
+
+#include "core/common/stop.h"
 
 namespace strata {
 
@@ -28,6 +31,9 @@ class CacheBudget {
   // Takes memory for something that is no cache from what the caches may hold, until Release().
   // False, and nothing is taken, where all that is taken would be more than half of the budget.
   bool Reserve(std::size_t bytes);
+  // The same once others have released enough. RESOURCE_EXHAUSTED for more than half of the budget,
+  // else as `stop` says.
+  absl::Status AwaitReserve(std::size_t bytes, const Stop& stop);
   void Release(std::size_t bytes);
 
  private:
@@ -41,11 +47,13 @@ class CacheBudget {
   using Order = std::list<Item>;
   using Values = std::vector<std::shared_ptr<const void>>;
 
+  bool TryReserve(std::size_t bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Evicts until all fits. What is evicted lies in dropped_, to be destroyed without the mutex.
   void Trim() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const std::size_t max_bytes_;
   mutable absl::Mutex mutex_;
+  absl::CondVar released_;
   Order order_ ABSL_GUARDED_BY(mutex_);  // the latest used first
   std::size_t cached_ ABSL_GUARDED_BY(mutex_) = 0;
   std::size_t reserved_ ABSL_GUARDED_BY(mutex_) = 0;

@@ -27,6 +27,9 @@
 namespace strata {
 namespace {
 
+// Of the caches, for decoded tiles: what is prepared of them is asked for far more often.
+constexpr std::size_t kDecodedShare = 16;
+
 // Whether an answer given before is the one that would be given now. What a robot may do in a tile
 // depends on the tiles around it too.
 bool StillKnown(const PathCheck& known,
@@ -81,7 +84,7 @@ class MapPlanner::Source final : public TileSource {
 MapPlanner::MapPlanner(MapCore& core)
     : core_(core),
       planner_({.cell_size_m = core.info().parameters.mls.cell_size_m, .budget = core.caches()}),
-      tiles_(core.caches()) {}
+      tiles_(core.caches(), core.options().cache_bytes / kDecodedShare) {}
 
 absl::StatusOr<std::shared_ptr<const MapPlanner::Versions>> MapPlanner::VersionsOf(
     const MapView& view) {

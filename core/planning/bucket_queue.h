@@ -13,11 +13,12 @@ namespace strata {
 // a bucket. The caller copes with the order inside a bucket by expanding again what got cheaper.
 class BucketQueue {
  public:
-  BucketQueue() : ring_(1024) {}
+  BucketQueue() : ring_(kFirstBuckets) {}
 
   // Starts anew with buckets of 2^shift.
   void Clear(int shift) {
     shift_ = shift;
+    if (ring_.size() > kKeptBuckets) ring_ = std::vector<std::vector<std::uint32_t>>(kFirstBuckets);
     for (std::vector<std::uint32_t>& bucket : ring_) bucket.clear();
     size_ = 0;
     next_ = 0;
@@ -41,7 +42,11 @@ class BucketQueue {
   std::uint32_t Pop() {
     std::vector<std::uint32_t>* bucket = &ring_[current_ & (ring_.size() - 1)];
     while (next_ == bucket->size()) {
-      bucket->clear();
+      if (ring_.size() > kKeptBuckets) {
+        *bucket = {};
+      } else {
+        bucket->clear();
+      }
       next_ = 0;
       bucket = &ring_[++current_ & (ring_.size() - 1)];
     }
@@ -50,6 +55,10 @@ class BucketQueue {
   }
 
  private:
+  static constexpr std::size_t kFirstBuckets = 1024;
+  // A longer ring gives back the memory of buckets that are empty.
+  static constexpr std::size_t kKeptBuckets = 4096;
+
   void Grow(std::uint32_t bucket) {
     std::size_t size = ring_.size();
     while (bucket - current_ >= size) size *= 2;

@@ -43,7 +43,7 @@ class TileReasons {
       : checks_(space.checks()),
         slot_(slot),
         window_(tiles, checks_.margin, checks_.cell_size_m),
-        ground_(window_, checks_) {}
+        ground_(window_, checks_, GroundChecks::Edges::kAll) {}
 
   std::uint32_t SurfaceOf(PatchId patch) const {
     const std::uint32_t local = patch - slot_.base;
@@ -132,9 +132,9 @@ class TileReasons {
 };
 
 bool Reached(const SearchSpace& space, const SearchWorkspace& workspace, PatchId patch) {
-  const int slot = space.SlotOf(patch);
-  const SearchNode* nodes = workspace.NodesIfAny(slot, space.slots()[slot].size);
-  return nodes != nullptr && workspace.Reached(nodes[patch - space.slots()[slot].base]);
+  const int number = space.SlotOf(patch);
+  const SearchSpace::Slot& slot = space.slots()[number];
+  return workspace.DirectionOf(slot, number, patch - slot.base) != ParkedTile::kUnreached;
 }
 
 // True if the ground allows the move, whatever classes cost.
@@ -168,10 +168,8 @@ class Frontier {
     for (std::size_t slot = 0; slot < space_.slots().size(); ++slot) {
       const PatchId base = space_.slots()[slot].base;
       const std::uint32_t size = space_.slots()[slot].size;
-      const SearchNode* nodes = reached_.NodesIfAny(static_cast<int>(slot), size);
-      if (nodes == nullptr) continue;
       for (std::uint32_t i = 0; i < size; ++i) {
-        if (!reached_.Reached(nodes[i]) || !HasRefusedMove(base + i)) continue;
+        if (!Reached(space_, reached_, base + i) || !HasRefusedMove(base + i)) continue;
         const Eigen::Vector3d p = space_.Position(base + i);
         ranked.emplace_back((p - goal).squaredNorm(), p.x(), p.y(), p.z(), base + i);
       }

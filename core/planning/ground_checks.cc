@@ -19,41 +19,67 @@ constexpr int kReportedHoleCells = 64;
 
 }  // namespace
 
-GroundChecks::GroundChecks(const GroundWindow& window, const ProfileChecks& checks)
+GroundChecks::GroundChecks(const GroundWindow& window, const ProfileChecks& checks, Edges edges)
     : window_(window), checks_(checks) {
   for (const DiscCell& d : checks.disc) disc_step_.push_back(d.dy * window.width() + d.dx);
   // Cells this close to the window's border are not reached by any disc of the tile.
   const int rim = checks.sight_cells;
-  std::vector<GroundEdge> edges;
-  for (int y = rim; y < window.width() - rim; ++y) {
-    const int row = y * window.width();
-    const std::uint32_t end = window.begin(row + window.width() - rim);
-    for (std::uint32_t i = window.begin(row + rim); i < end; ++i) CollectEdges(i, &edges);
+  const auto for_each_surface = [&](auto&& visit) {
+    for (int y = rim; y < window.width() - rim; ++y) {
+      const int row = y * window.width();
+      const std::uint32_t end = window.begin(row + window.width() - rim);
+      for (std::uint32_t i = window.begin(row + rim); i < end; ++i) visit(i);
+    }
+  };
+  corners_count_ =
+      static_cast<float>(std::hypot(0.5, 0.5) * checks.cell_size_m) < checks.footprint_m;
+  ground_.assign(window.surface_count(), Ground::kEnds);
+  std::vector<std::uint8_t> near(static_cast<std::size_t>(window.cell_count()), 0);
+  for_each_surface([&](std::uint32_t i) {
+    ground_[i] = GroundAround(i);
+    if (OnGround(i)) near[window.surface(i).cell] = 1;
+  });
+  if (edges == Edges::kOfGround) {
+    // A surface's edges are up to the footprint away from it; over gaps, too, a disc looks at them.
+    near = Dilated(near, checks.disc_cells + checks.behind_cells[0] + 1 + checks.gap_cells[0] + 1);
+  } else {
+    near.assign(near.size(), 1);
   }
-  IndexEdges(std::move(edges));
-  MarkNearCells();
+  std::vector<GroundEdge> found;
+  for_each_surface([&](std::uint32_t i) {
+    if (ground_[i] != Ground::kEven && near[window.surface(i).cell] != 0) CollectEdges(i, &found);
+  });
+  IndexEdges(found);
+  std::vector<std::uint8_t> has_edge(near.size());
+  for (std::size_t cell = 0; cell < has_edge.size(); ++cell) {
+    has_edge[cell] = edge_first_[cell] != edge_first_[cell + 1] ? 1 : 0;
+  }
+  near_edge_ = Dilated(has_edge, checks.disc_cells);
 }
 
-Footing GroundChecks::Meet(int cell, float z, float rise_m) const {
-  Footing footing;
-  float nearest = rise_m;
-  for (std::uint32_t i = window_.begin(cell); i < window_.begin(cell + 1); ++i) {
-    const WindowSurface& surface = window_.surface(i);
-    const float dz = surface.z_m - z;
-    if (surface.bottom_m - z <= rise_m) footing.open = false;
-    if (dz < -rise_m) {
-      footing.below = i;
-    } else if (dz > 0.0F && surface.bottom_m - z >= checks_.height_m) {
-      continue;
-    } else if (dz <= rise_m) {
-      if (footing.ground != kNoSurface && std::abs(dz) >= nearest) continue;
-      nearest = std::abs(dz);
-      footing.ground = i;
-    } else if (footing.above == kNoSurface) {
-      footing.above = i;
+// What CollectEdges() would find in the cells next to the surface, the cheap looks first.
+GroundChecks::Ground GroundChecks::GroundAround(std::uint32_t i) const {
+  const WindowSurface& surface = window_.surface(i);
+  if (Clearance(i) < checks_.height_m) return Ground::kEnds;
+  unsigned holes = 0;
+  bool even = true;
+  for (int k = 0; k < 8; ++k) {
+    const int cell = static_cast<int>(surface.cell) + window_.Step(k);
+    const Footing footing = Meet(cell, surface.z_m, checks_.step_m);
+    if (footing.ground != kNoSurface) continue;
+    even = false;
+    const bool counts = (k & 1) == 0 || corners_count_;
+    if (counts && (footing.above != kNoSurface || footing.below != kNoSurface)) {
+      return Ground::kEnds;
     }
+    if (counts && footing.open) holes |= 1U << k;
   }
-  return footing;
+  for (int k = 0; k < 8; ++k) {
+    if ((holes >> k & 1U) == 0) continue;
+    const int cell = static_cast<int>(surface.cell) + window_.Step(k);
+    if (!HoleIsTolerated(cell, surface.z_m)) return Ground::kEnds;
+  }
+  return even ? Ground::kEven : Ground::kBroken;
 }
 
 float GroundChecks::Clearance(std::uint32_t i) const {
@@ -195,52 +221,71 @@ std::uint32_t GroundChecks::Target(std::uint32_t i, int direction, int* cells) c
 }
 
 // Sorts by cell and joins what overlaps and is of one kind.
-void GroundChecks::IndexEdges(std::vector<GroundEdge> edges) {
-  std::sort(edges.begin(), edges.end(), [](const GroundEdge& a, const GroundEdge& b) {
-    return std::tie(a.cell, a.kind, a.z_low_m, a.z_high_m, a.value, a.seen_from_m) <
-           std::tie(b.cell, b.kind, b.z_low_m, b.z_high_m, b.value, b.seen_from_m);
-  });
-  edge_first_.assign(static_cast<std::size_t>(window_.cell_count()) + 1, 0);
-  for (const GroundEdge& edge : edges) {
-    if (!edges_.empty() && edges_.back().cell == edge.cell && edges_.back().kind == edge.kind &&
-        edge.z_low_m <= edges_.back().z_high_m) {
-      edges_.back().z_high_m = std::max(edges_.back().z_high_m, edge.z_high_m);
-      continue;
+void GroundChecks::IndexEdges(const std::vector<GroundEdge>& edges) {
+  std::vector<std::uint32_t> begin(static_cast<std::size_t>(window_.cell_count()) + 1, 0);
+  for (const GroundEdge& edge : edges) ++begin[edge.cell + 1];
+  for (int cell = 0; cell < window_.cell_count(); ++cell) begin[cell + 1] += begin[cell];
+  std::vector<GroundEdge> sorted(edges.size());
+  std::vector<std::uint32_t> next = begin;
+  for (const GroundEdge& edge : edges) sorted[next[edge.cell]++] = edge;
+  edge_first_.assign(begin.size(), 0);
+  for (int cell = 0; cell < window_.cell_count(); ++cell) {
+    const auto first = sorted.begin() + begin[cell];
+    const auto last = sorted.begin() + begin[cell + 1];
+    std::sort(first, last, [](const GroundEdge& a, const GroundEdge& b) {
+      return std::tie(a.kind, a.z_low_m, a.z_high_m, a.value, a.seen_from_m) <
+             std::tie(b.kind, b.z_low_m, b.z_high_m, b.value, b.seen_from_m);
+    });
+    for (auto edge = first; edge != last; ++edge) {
+      const bool joins = edges_.size() > edge_first_[cell] && edges_.back().kind == edge->kind &&
+                         edge->z_low_m <= edges_.back().z_high_m;
+      if (joins) {
+        edges_.back().z_high_m = std::max(edges_.back().z_high_m, edge->z_high_m);
+      } else {
+        edges_.push_back(*edge);
+      }
     }
-    edges_.push_back(edge);
-    ++edge_first_[edge.cell + 1];
+    edge_first_[cell + 1] = static_cast<std::uint32_t>(edges_.size());
   }
-  for (int cell = 0; cell < window_.cell_count(); ++cell)
-    edge_first_[cell + 1] += edge_first_[cell];
 }
 
-// Dilates the cells with edges by the square around the disc: rows first, then columns.
-void GroundChecks::MarkNearCells() {
+// Rows first, then columns, each there and back.
+std::vector<std::uint8_t> GroundChecks::Dilated(const std::vector<std::uint8_t>& marked,
+                                                int reach) const {
   const int width = window_.width();
-  const int reach = checks_.disc_cells;
-  std::vector<std::uint8_t> rows(static_cast<std::size_t>(window_.cell_count()), 0);
-  near_edge_.assign(rows.size(), 0);
+  std::vector<std::uint8_t> rows(marked.size(), 0);
+  std::vector<std::uint8_t> dilated(marked.size(), 0);
   for (int y = 0; y < width; ++y) {
-    int last = -2 * width;  // the latest edge to the left, then to the right
+    int last = -2 * width;  // the latest mark to the left, then to the right
     for (int x = 0; x < width; ++x) {
       const int cell = y * width + x;
-      if (edge_first_[cell] != edge_first_[cell + 1]) last = x;
+      if (marked[cell] != 0) last = x;
       if (x - last <= reach) rows[cell] = 1;
     }
     last = 3 * width;
     for (int x = width - 1; x >= 0; --x) {
       const int cell = y * width + x;
-      if (edge_first_[cell] != edge_first_[cell + 1]) last = x;
+      if (marked[cell] != 0) last = x;
       if (last - x <= reach) rows[cell] = 1;
     }
   }
+  std::vector<int> last(static_cast<std::size_t>(width), -2 * width);
   for (int y = 0; y < width; ++y) {
-    for (int v = std::max(0, y - reach); v <= std::min(width - 1, y + reach); ++v) {
-      std::uint8_t* target = &near_edge_[static_cast<std::size_t>(y) * width];
-      const std::uint8_t* source = &rows[static_cast<std::size_t>(v) * width];
-      for (int x = 0; x < width; ++x) target[x] |= source[x];
+    for (int x = 0; x < width; ++x) {
+      const int cell = y * width + x;
+      if (rows[cell] != 0) last[x] = y;
+      dilated[cell] = y - last[x] <= reach ? 1 : 0;
     }
   }
+  last.assign(last.size(), 3 * width);
+  for (int y = width - 1; y >= 0; --y) {
+    for (int x = 0; x < width; ++x) {
+      const int cell = y * width + x;
+      if (rows[cell] != 0) last[x] = y;
+      if (last[x] - y <= reach) dilated[cell] = 1;
+    }
+  }
+  return dilated;
 }
 
 const GroundEdge* GroundChecks::NearestEdge(int cell, float z, float within_m) const {

@@ -21,6 +21,7 @@
 #ifndef STRATA_CORE_PLANNING_GROUND_CHECKS_H_
 #define STRATA_CORE_PLANNING_GROUND_CHECKS_H_
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -55,8 +56,15 @@ class GroundChecks {
  public:
   static constexpr std::uint32_t kNoSurface = 0xFFFFFFFFU;
 
+  // Which edges are looked for: all, or those within reach of surfaces that are OnGround().
+  enum class Edges : std::uint8_t { kAll, kOfGround };
+
   // Keeps references. REQUIRES: window.margin() ≥ checks.margin.
-  GroundChecks(const GroundWindow& window, const ProfileChecks& checks);
+  GroundChecks(const GroundWindow& window, const ProfileChecks& checks, Edges edges);
+
+  // False if an edge of the surface's own, in its cell or next to it, keeps the robot away. Of
+  // surfaces at least sight_cells inside the window.
+  bool OnGround(std::uint32_t i) const { return ground_[i] != Ground::kEnds; }
 
   // What a robot of level z meets in `cell` if it may rise or sink by `rise_m`; what hangs higher
   // than the robot is not met.
@@ -84,6 +92,9 @@ class GroundChecks {
   double HoleWidth(int cell, float z) const;
 
  private:
+  // Around a surface: ends next to it, goes on but not everywhere, goes on without any edge.
+  enum class Ground : std::uint8_t { kEnds, kBroken, kEven };
+
   GroundEdge Seen(std::uint32_t i) const;
   void CollectEdges(std::uint32_t i, std::vector<GroundEdge>* edges) const;
   void CollectMet(GroundEdge seen, const Footing& footing, std::vector<GroundEdge>* edges) const;
@@ -92,16 +103,42 @@ class GroundChecks {
   bool HoleIsTolerated(int cell, float z) const;
   int HoleRun(int cell, float z, int direction, int limit) const;
   std::uint32_t OneWayTarget(std::uint32_t i, int direction, int* cells) const;
-  void IndexEdges(std::vector<GroundEdge> edges);
-  void MarkNearCells();
+  Ground GroundAround(std::uint32_t i) const;
+  void IndexEdges(const std::vector<GroundEdge>& edges);
+  // Per cell: whether a cell that is marked is within the square of `reach` cells around it.
+  std::vector<std::uint8_t> Dilated(const std::vector<std::uint8_t>& marked, int reach) const;
 
   const GroundWindow& window_;
   const ProfileChecks& checks_;
+  bool corners_count_ = false;  // an edge in a cell that touches a corner keeps the robot away
+  std::vector<Ground> ground_;  // per surface
   std::vector<GroundEdge> edges_;
   std::vector<std::uint32_t> edge_first_;  // per cell
   std::vector<std::uint8_t> near_edge_;    // per cell: an edge may be within reach
   std::vector<std::int32_t> disc_step_;    // per disc cell
 };
+
+inline Footing GroundChecks::Meet(int cell, float z, float rise_m) const {
+  Footing footing;
+  float nearest = rise_m;
+  for (std::uint32_t i = window_.begin(cell); i < window_.begin(cell + 1); ++i) {
+    const WindowSurface& surface = window_.surface(i);
+    const float dz = surface.z_m - z;
+    if (surface.bottom_m - z <= rise_m) footing.open = false;
+    if (dz < -rise_m) {
+      footing.below = i;
+    } else if (dz > 0.0F && surface.bottom_m - z >= checks_.height_m) {
+      continue;
+    } else if (dz <= rise_m) {
+      if (footing.ground != kNoSurface && std::abs(dz) >= nearest) continue;
+      nearest = std::abs(dz);
+      footing.ground = i;
+    } else if (footing.above == kNoSurface) {
+      footing.above = i;
+    }
+  }
+  return footing;
+}
 
 }  // namespace strata
 

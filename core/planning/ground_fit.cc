@@ -6,10 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <vector>
 
 #include "core/mls/local_plane.h"
-#include "core/mls/tile_key.h"
 #include "core/planning/ground_window.h"
 
 namespace strata {
@@ -82,17 +80,6 @@ GroundFit FitGround(const GroundWindow& window, std::uint32_t i) {
   return {.slope_rad = static_cast<float>(plane->slope_rad()),
           .certain_slope_tan = static_cast<float>(std::max(0.0, certain)),
           .roughness_m = static_cast<float>(plane->roughness_m())};
-}
-
-std::vector<GroundFit> FitTile(const GroundWindow& window) {
-  std::vector<GroundFit> fits;
-  for (int y = 0; y < kTileCells; ++y) {
-    const int row = (y + window.margin()) * window.width() + window.margin();
-    for (std::uint32_t i = window.begin(row); i < window.begin(row + kTileCells); ++i) {
-      fits.push_back(FitGround(window, i));
-    }
-  }
-  return fits;
 }
 
 }  // namespace strata

@@ -4,7 +4,6 @@
 #define STRATA_CORE_PLANNING_GROUND_FIT_H_
 
 #include <cstdint>
-#include <vector>
 
 #include "core/planning/ground_window.h"
 
@@ -26,9 +25,6 @@ struct GroundFit {
 // line: flat and smooth. Independent of a profile. REQUIRES: the surface is at least kFitRadius
 // cells inside the window.
 GroundFit FitGround(const GroundWindow& window, std::uint32_t i);
-
-// Fits of the surfaces of the middle tile, in the tile's order.
-std::vector<GroundFit> FitTile(const GroundWindow& window);
 
 }  // namespace strata
 

@@ -21,15 +21,15 @@
 namespace strata {
 namespace {
 
-// Patches of a workspace's last search, by slot.
+// Patches of the last search of a workspace that keeps all tiles at hand.
 template <typename Visit>
-void ForEachReached(const SearchSpace& space, const SearchWorkspace& workspace, Visit visit) {
-  for (std::size_t slot = 0; slot < space.slots().size(); ++slot) {
-    const SearchSpace::Slot& s = space.slots()[slot];
-    const SearchNode* nodes = workspace.NodesIfAny(static_cast<int>(slot), s.size);
-    if (nodes == nullptr) continue;
-    for (std::uint32_t i = 0; i < s.size; ++i) {
-      if (workspace.Reached(nodes[i])) visit(s.base + i, nodes[i].cost);
+void ForEachReached(const SearchSpace& space, SearchWorkspace& workspace, Visit visit) {
+  for (const int slot : workspace.at_hand()) {
+    const PatchId base = space.slots()[slot].base;
+    const std::vector<SearchNode>& nodes = workspace.member(slot).nodes;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      if ((nodes[i].stamp & SearchNode::kReached) == 0) continue;
+      visit(base + static_cast<PatchId>(i), nodes[i].cost);
     }
   }
 }
@@ -89,13 +89,13 @@ absl::StatusOr<PatchId> LargestPart(SearchSpace& space,
 absl::StatusOr<std::shared_ptr<const Landmarks>> Landmarks::Make(SearchSpace& space,
                                                                  const std::vector<TileKey>& tiles,
                                                                  int count,
-                                                                 SearchWorkspace& workspace,
                                                                  const Stop& stop) {
   if (count < 1 || count > kMaxLandmarks) {
     return absl::InvalidArgumentError(
         absl::StrCat("count = ", count, " landmarks is not in [1, ", kMaxLandmarks, "]"));
   }
   auto landmarks = std::make_shared<Landmarks>();
+  SearchWorkspace workspace;
   landmarks->count_ = count;
   landmarks->profile_ = space.checks().profile;
   STRATA_ASSIGN_OR_RETURN(const PatchId part, LargestPart(space, tiles, stop));
@@ -119,7 +119,7 @@ absl::StatusOr<std::shared_ptr<const Landmarks>> Landmarks::Make(SearchSpace& sp
   return landmarks;
 }
 
-void Landmarks::Store(const SearchSpace& space, const SearchWorkspace& workspace, int landmark) {
+void Landmarks::Store(const SearchSpace& space, SearchWorkspace& workspace, int landmark) {
   std::vector<std::uint32_t*> of_slot;
   for (const SearchSpace::Slot& slot : space.slots()) {
     std::vector<std::uint32_t>& costs = tiles_[slot.key].costs;

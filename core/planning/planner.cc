@@ -12,6 +12,7 @@
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 
+#include "core/common/cache_budget.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/common/stop.h"
@@ -29,9 +30,6 @@
 
 namespace strata {
 namespace {
-
-// A workspace above this share of the budget is not kept for the next query.
-constexpr std::size_t kIdleShare = 32;
 
 PlanResult NotOnSurface(PlanReason reason, absl::string_view end, const EndpointMatch& match) {
   PlanResult result;
@@ -64,12 +62,13 @@ absl::Status FillRefusal(SearchSpace& space,
 absl::StatusOr<PlanResult> Answer(SearchSpace& space,
                                   const PlanQuery& query,
                                   const Landmarks* landmarks,
-                                  SearchWorkspace& workspace,
+                                  const std::shared_ptr<CacheBudget>& budget,
                                   const Stop& stop) {
   STRATA_ASSIGN_OR_RETURN(const EndpointMatch from, MatchEndpoint(space, query.from));
   if (from.patch == kNoPatchId) return NotOnSurface(PlanReason::kStartNotOnSurface, "start", from);
   STRATA_ASSIGN_OR_RETURN(const EndpointMatch to, MatchEndpoint(space, query.to));
   if (to.patch == kNoPatchId) return NotOnSurface(PlanReason::kGoalNotOnSurface, "goal", to);
+  SearchWorkspace workspace(budget);
   STRATA_ASSIGN_OR_RETURN(
       const SearchOutcome outcome,
       FindPath(space, from.patch, to.patch, landmarks, query.max_expanded, workspace, stop));
@@ -78,12 +77,13 @@ absl::StatusOr<PlanResult> Answer(SearchSpace& space,
   switch (outcome.end) {
     case SearchOutcome::End::kLimit:
       result.reason = PlanReason::kSearchLimit;
-      result.message =
-          workspace.full()
-              ? absl::StrCat("no path within the memory that searches have, half of ",
-                             workspace.budget()->max_bytes() >> 20,
-                             " MiB for all of them; plan in shorter legs")
-              : absl::StrCat("no path within ", query.max_expanded, " expanded patches");
+      result.message = absl::StrCat("no path within ", query.max_expanded, " expanded patches");
+      break;
+    case SearchOutcome::End::kFull:
+      result.reason = PlanReason::kSearchLimit;
+      result.message = absl::StrCat("no path within the memory that searches have, half of ",
+                                    budget->max_bytes() >> 20,
+                                    " MiB for all of them; plan in shorter legs");
       break;
     case SearchOutcome::End::kExhausted:
       STRATA_RETURN_IF_ERROR(FillRefusal(space, workspace, to.patch, stop, &result));
@@ -108,33 +108,6 @@ absl::StatusOr<PlanResult> Answer(SearchSpace& space,
 
 }  // namespace
 
-// A workspace for one query, given back at its end.
-class Planner::WorkspaceLoan {
- public:
-  explicit WorkspaceLoan(Planner& planner) : planner_(planner) {
-    absl::MutexLock lock(&planner.mutex_);
-    if (planner.idle_.empty()) {
-      workspace_ = std::make_unique<SearchWorkspace>(planner.options_.budget);
-    } else {
-      workspace_ = std::move(planner.idle_.back());
-      planner.idle_.pop_back();
-    }
-  }
-  ~WorkspaceLoan() {
-    if (workspace_->memory_bytes() > planner_.options_.budget->max_bytes() / kIdleShare) return;
-    absl::MutexLock lock(&planner_.mutex_);
-    planner_.idle_.push_back(std::move(workspace_));
-  }
-  WorkspaceLoan(const WorkspaceLoan&) = delete;
-  WorkspaceLoan& operator=(const WorkspaceLoan&) = delete;
-
-  SearchWorkspace& workspace() { return *workspace_; }
-
- private:
-  Planner& planner_;
-  std::unique_ptr<SearchWorkspace> workspace_;
-};
-
 Planner::Planner(const PlannerOptions& options) : options_(options), cache_(options.budget) {}
 
 absl::StatusOr<PlanResult> Planner::Plan(TileSource& source,
@@ -148,9 +121,8 @@ absl::StatusOr<PlanResult> Planner::Plan(TileSource& source,
   STRATA_ASSIGN_OR_RETURN(const ProfileChecks checks,
                           MakeProfileChecks(query.profile, options_.cell_size_m));
   const std::shared_ptr<const Landmarks> landmarks = LandmarksFor(source, query.profile);
-  WorkspaceLoan loan(*this);
   SearchSpace space(cache_, source, checks, ClassFactors(query.class_costs));
-  absl::StatusOr<PlanResult> result = Answer(space, query, landmarks.get(), loan.workspace(), stop);
+  absl::StatusOr<PlanResult> result = Answer(space, query, landmarks.get(), options_.budget, stop);
   if (result.ok()) result->elapsed_ms = absl::ToDoubleMilliseconds(SteadyNow() - begin);
   return result;
 }
@@ -173,10 +145,9 @@ absl::Status Planner::PrepareLandmarks(TileSource& source,
                                        const Stop& stop) {
   STRATA_ASSIGN_OR_RETURN(const ProfileChecks checks,
                           MakeProfileChecks(profile, options_.cell_size_m));
-  WorkspaceLoan loan(*this);
   SearchSpace space(cache_, source, checks);
   STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const Landmarks> made,
-                          Landmarks::Make(space, tiles, count, loan.workspace(), stop));
+                          Landmarks::Make(space, tiles, count, stop));
   absl::MutexLock lock(&mutex_);
   landmarks_.erase(std::remove_if(landmarks_.begin(),
                                   landmarks_.end(),

@@ -42,17 +42,22 @@ std::uint32_t MortonOfCell(std::uint16_t cell) {
 class Preparation {
  public:
   Preparation(const GroundWindow& window, const ProfileChecks& checks)
-      : window_(window), checks_(checks), ground_(window, checks) {}
+      : window_(window), checks_(checks), ground_(window, checks, GroundChecks::Edges::kOfGround) {}
 
-  PreparedTile Run(const TileKey& key, const std::vector<GroundFit>& fits) {
+  PreparedTile Run(const TileKey& key) {
     tile_.key = key;
-    CheckSurfaces(fits);
+    CheckSurfaces();
     NumberPatches();
     tile_.moves.resize(tile_.size());
     for (std::uint32_t patch = 0; patch < tile_.size(); ++patch) {
       if (!tile_.CanStand(patch)) continue;
-      for (int k = 0; k < 8; ++k) AddMove(patch, k);
+      for (int k = 0; k < 4; ++k) AddMove(patch, k);
+      for (int k = 4; k < 8; ++k) AddMoveOut(patch, k);
     }
+    std::sort(
+        tile_.far_moves.begin(), tile_.far_moves.end(), [](const FarMove& a, const FarMove& b) {
+          return std::tie(a.patch, a.direction) < std::tie(b.patch, b.direction);
+        });
     tile_.far_moves.shrink_to_fit();
     return std::move(tile_);
   }
@@ -64,36 +69,43 @@ class Preparation {
   }
 
   // Danger and distance of all surfaces of the tile and of the ring that moves lead to.
-  void CheckSurfaces(const std::vector<GroundFit>& fits) {
+  void CheckSurfaces() {
     danger_.assign(window_.surface_count(), -1.0F);
     distance_.assign(window_.surface_count(), 0.0F);
     const int ring = checks_.gap_cells[0] + 1;
     const int low = window_.margin() - ring;
     const int high = window_.margin() + kTileCells + ring;
-    std::size_t fit = 0;
     for (int y = low; y < high; ++y) {
-      for (int x = low; x < high; ++x) {
-        const int cell = y * window_.width() + x;
-        const bool own = InTile(x, y);
-        for (std::uint32_t i = window_.begin(cell); i < window_.begin(cell + 1); ++i) {
-          CheckSurface(i, own ? &fits[fit++] : nullptr);
-        }
+      const int row = y * window_.width();
+      for (std::uint32_t i = window_.begin(row + low); i < window_.begin(row + high); ++i) {
+        CheckSurface(i);
       }
     }
   }
 
-  void CheckSurface(std::uint32_t i, const GroundFit* known) {
+  void CheckSurface(std::uint32_t i) {
+    if (!ground_.OnGround(i)) return;
     const WindowSurface& surface = window_.surface(i);
     const float distance = ground_.EdgeDistance(static_cast<int>(surface.cell), surface.z_m);
     distance_[i] = distance;
     if (distance < checks_.footprint_m) return;
-    const GroundFit fit = known != nullptr ? *known : FitGround(window_, i);
+    const GroundFit fit = FitGround(window_, i);
     if (fit.certain_slope_tan > checks_.slope_tan || fit.roughness_m > checks_.roughness_m) return;
     danger_[i] = static_cast<float>(checks_.Danger(fit, std::sqrt(surface.variance_m2), distance));
   }
 
   void NumberPatches() {
     number_.assign(window_.surface_count(), PreparedTile::kNoPatch);
+    std::size_t patches = 0;
+    for (int y = 0; y < kTileCells; ++y) {
+      const int row = window_.CellOfTile(static_cast<std::uint16_t>(y << kTileShift));
+      patches += window_.begin(row + kTileCells) - window_.begin(row);
+    }
+    surface_.reserve(patches);
+    tile_.cell.reserve(patches);
+    tile_.z_m.reserve(patches);
+    tile_.danger.reserve(patches);
+    tile_.edge_distance.reserve(patches);
     for (std::uint32_t morton = 0; morton < kCells; ++morton) {
       if (morton % 64 == 0) tile_.block_begin[morton / 64] = tile_.size();
       const std::uint16_t cell = CellOfMorton(morton);
@@ -111,6 +123,7 @@ class Preparation {
     tile_.block_begin[kCells / 64] = tile_.size();
   }
 
+  // A move and its opposite, which costs the same.
   void AddMove(std::uint32_t patch, int k) {
     const std::uint32_t from = surface_[patch];
     int cells = 0;
@@ -124,6 +137,24 @@ class Preparation {
     const double rise = window_.surface(to).z_m - window_.surface(from).z_m;
     const std::uint32_t cost =
         MoveCost(cells * checks_.StepLength(k), rise, danger, checks_.cell_size_m);
+    SetMove(from, to, k, cells, cost);
+    if (number_[to] != PreparedTile::kNoPatch) SetMove(to, from, k ^ 4, cells, cost);
+  }
+
+  // The same if it leads out of the tile; AddMove() adds the others from where they lead to.
+  void AddMoveOut(std::uint32_t patch, int k) {
+    const int reach = checks_.GapCells(k) + 1;
+    const int x = (tile_.cell[patch] & (kTileCells - 1)) + kStepX[k] * reach;
+    const int y = (tile_.cell[patch] >> kTileShift) + kStepY[k] * reach;
+    if (x >= 0 && y >= 0 && x < kTileCells && y < kTileCells) return;
+    int cells = 0;
+    const std::uint32_t to = ground_.Target(surface_[patch], k, &cells);
+    if (to == GroundChecks::kNoSurface || number_[to] != PreparedTile::kNoPatch) return;
+    AddMove(patch, k);
+  }
+
+  void SetMove(std::uint32_t from, std::uint32_t to, int k, int cells, std::uint32_t cost) {
+    const std::uint32_t patch = number_[from];
     Move& move = tile_.moves[patch][k];
     const std::int64_t delta = static_cast<std::int64_t>(number_[to]) - patch;
     const bool near =
@@ -183,17 +214,16 @@ std::size_t PreparedTile::memory_bytes() const {
 
 std::uint32_t MoveCost(double run_m, double rise_m, double danger, double cell_size_m) {
   const double length_cells = std::sqrt(run_m * run_m + rise_m * rise_m) / cell_size_m;
-  const double cost = std::round(kCostPerCell * length_cells * (1.0 + danger));
-  // Never below what the search's heuristic takes for the same stretch.
+  const double cost = kCostPerCell * length_cells * (1.0 + danger);
+  // To nearest, and never below what the search's heuristic takes for the same stretch.
   return static_cast<std::uint32_t>(
-      std::min(cost, static_cast<double>(std::numeric_limits<std::int32_t>::max())));
+      std::min(cost + 0.5, static_cast<double>(std::numeric_limits<std::int32_t>::max())));
 }
 
 PreparedTile PrepareTile(const TileKey& key,
                          const GroundWindow& window,
-                         const std::vector<GroundFit>& fits,
                          const ProfileChecks& checks) {
-  return Preparation(window, checks).Run(key, fits);
+  return Preparation(window, checks).Run(key);
 }
 
 std::vector<std::uint8_t> ClassesOf(const PreparedTile& tile, const SurfaceTile& surfaces) {

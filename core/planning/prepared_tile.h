@@ -9,7 +9,6 @@
 
 #include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
-#include "core/planning/ground_fit.h"
 #include "core/planning/ground_window.h"
 #include "core/planning/profile_checks.h"
 
@@ -27,6 +26,8 @@ struct Move {
 
   static constexpr std::uint16_t kNone = 0;      // no such move
   static constexpr std::uint16_t kFar = 0xFFFF;  // see PreparedTile::far_moves
+
+  friend bool operator==(const Move&, const Move&) = default;
 };
 
 // A move into another tile, or one that does not fit into a Move.
@@ -36,6 +37,8 @@ struct FarMove {
   std::uint8_t level = 0;   // of the target among the surfaces of its cell, 0 = lowest
   std::uint16_t cells = 0;  // length; > 1: over a gap
   std::uint32_t cost = 0;
+
+  friend bool operator==(const FarMove&, const FarMove&) = default;
 };
 
 // Patches are numbered along a Morton curve over the tile's cells, lowest first within a cell, so
@@ -46,8 +49,9 @@ struct PreparedTile {
   std::vector<FarMove> far_moves;   // by (patch, direction)
   std::vector<std::uint16_t> cell;  // CellInTile
   std::vector<float> z_m;
-  std::vector<float> danger;                      // < 0: the robot cannot stand there
-  std::vector<std::uint8_t> edge_distance;        // ⌊255 · EdgeDistance / reach⌋
+  std::vector<float> danger;  // < 0: the robot cannot stand there
+  // ⌊255 · EdgeDistance / reach⌋; 0 where an edge next to the surface keeps the robot away.
+  std::vector<std::uint8_t> edge_distance;
   std::vector<std::uint8_t> class_id;             // empty where no surface has a class
   std::array<std::uint32_t, 1025> block_begin{};  // first patch of each 8 × 8 block of cells
 
@@ -60,6 +64,8 @@ struct PreparedTile {
   void FindCell(std::uint16_t cell_in_tile, std::uint32_t* first, std::uint32_t* count) const;
   const FarMove& Far(std::uint32_t patch, int direction) const;
   std::size_t memory_bytes() const;
+
+  friend bool operator==(const PreparedTile&, const PreparedTile&) = default;
 };
 
 // Cost of a move of `run_m` sideways and `rise_m` up or down between patches of two dangers.
@@ -67,10 +73,9 @@ struct PreparedTile {
 inline constexpr double kGapDanger = 1.0;
 std::uint32_t MoveCost(double run_m, double rise_m, double danger, double cell_size_m);
 
-// `fits` are those of FitTile over the same tile. REQUIRES: window.margin() == checks.margin.
+// REQUIRES: window.margin() == checks.margin.
 PreparedTile PrepareTile(const TileKey& key,
                          const GroundWindow& window,
-                         const std::vector<GroundFit>& fits,
                          const ProfileChecks& checks);
 
 // The class of each patch of `tile`, which was prepared from `surfaces`; empty if none has one.

@@ -20,7 +20,8 @@ namespace strata {
 namespace {
 
 constexpr int kMaxSlots = 65535;
-constexpr std::size_t kHeldShare = 8;
+constexpr std::size_t kHeldShare = 32;
+constexpr std::size_t kMinHeld = 2;  // to and fro over a border
 
 // Length of a straight move inside a tile.
 int CellsBetween(std::uint16_t a, std::uint16_t b) {
@@ -79,7 +80,7 @@ void SearchSpace::Hold(int slot, std::shared_ptr<const PreparedTile> tile) {
   held_bytes_ += tile->memory_bytes();
   slots_[slot].tile = std::move(tile);
   held_.push_back(slot);
-  while (held_bytes_ > cache_.max_bytes() / kHeldShare && held_.size() > 1) {
+  while (held_bytes_ > cache_.max_bytes() / kHeldShare && held_.size() > kMinHeld) {
     Slot& first = slots_[held_.front()];
     held_.pop_front();
     held_bytes_ -= first.tile->memory_bytes();

@@ -26,7 +26,7 @@ using PatchId = std::uint32_t;
 inline constexpr PatchId kNoPatchId = 0xFFFFFFFFU;
 
 // For the thread of one query. After the first error of the source, status() holds it and lookups
-// find nothing. However far a query goes, it holds only the tiles it touched last, an eighth of the
+// find nothing. However far a query goes, it holds only the tiles it touched last, 1/32 of the
 // cache's budget; others are had from the cache, or prepared, again.
 class SearchSpace {
  public:
@@ -57,6 +57,11 @@ class SearchSpace {
 
   // Number of the slot of a tile, prepared now if need be; -1 where the map has nothing.
   int SlotOf(const TileKey& key);
+  // The same of a tile that was asked for before; else -1.
+  int SlotIfAny(const TileKey& key) const {
+    const auto found = slot_of_.find(key);
+    return found == slot_of_.end() ? -1 : found->second;
+  }
   int SlotOf(PatchId patch) const { return page_slot_[patch >> kPageShift]; }
   const Slot& SlotOfPatch(PatchId patch) { return At(SlotOf(patch)); }
 

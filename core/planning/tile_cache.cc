@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <memory>
 #include <utility>
-#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -12,8 +11,8 @@
 
 #include "core/common/status.h"
 #include "core/mls/tile_key.h"
-#include "core/planning/ground_fit.h"
 #include "core/planning/ground_window.h"
+#include "core/planning/packed_tile.h"
 #include "core/planning/prepared_tile.h"
 #include "core/planning/profile_checks.h"
 #include "core/planning/tile_source.h"
@@ -26,6 +25,25 @@ TileKey Neighbour(const TileKey& key, int index) {
 }
 
 }  // namespace
+
+// One of few preparations at a time.
+class TileCache::Turn {
+ public:
+  explicit Turn(TileCache& cache) : cache_(cache) {
+    absl::MutexLock lock(&cache.mutex_);
+    cache.mutex_.Await(absl::Condition(&cache, &TileCache::MayPrepare));
+    ++cache.preparing_;
+  }
+  ~Turn() {
+    absl::MutexLock lock(&cache_.mutex_);
+    --cache_.preparing_;
+  }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+
+ private:
+  TileCache& cache_;
+};
 
 TileVersions VersionsAround(TileSource& source, const TileKey& key) {
   TileVersions versions;
@@ -57,29 +75,40 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Get(TileSource& s
       key, {p.radius_m, p.height_m, p.max_step_m, p.max_slope_rad, p.max_gap_m, p.max_roughness_m}};
   const std::shared_ptr<Entry> entry = FindOrInsert(cache_key, versions);
   absl::MutexLock lock(&entry->mutex);
-  if (entry->tile != nullptr) return entry->tile;
-  STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles, LoadAround(source, key));
-  if (tiles[kMiddleTile] == nullptr) return nullptr;
-  const GroundWindow window(tiles, checks.margin, checks.cell_size_m);
-  const auto fits = Fits(key, versions, window);
-  auto tile = std::make_shared<PreparedTile>(PrepareTile(key, window, *fits, checks));
-  tile->class_id = ClassesOf(*tile, *tiles[kMiddleTile]);
-  entry->tile = tile;
-  Account(cache_key, entry, tile->memory_bytes(), false);
-  return tile;
+  if (entry->tile == nullptr) {
+    STRATA_ASSIGN_OR_RETURN(entry->tile, Make(source, cache_key, versions, checks));
+    if (entry->tile == nullptr) return nullptr;
+    absl::MutexLock books(&mutex_);
+    // Who uses an evicted tile keeps it alive.
+    if (entries_.Find(cache_key) == entry) {
+      entries_.Put(cache_key, entry, sizeof(Entry) + entry->tile->memory_bytes());
+    }
+  }
+  return entry->tile;
 }
 
-std::shared_ptr<const std::vector<GroundFit>> TileCache::Fits(const TileKey& tile,
-                                                              const TileVersions& versions,
-                                                              const GroundWindow& window) {
-  const Key key{tile, {}};
-  const std::shared_ptr<Entry> entry = FindOrInsert(key, versions);
-  absl::MutexLock lock(&entry->mutex);
-  if (entry->fits == nullptr) {
-    entry->fits = std::make_shared<const std::vector<GroundFit>>(FitTile(window));
-    Account(key, entry, entry->fits->size() * sizeof(GroundFit), true);
+absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Make(TileSource& source,
+                                                                    const Key& key,
+                                                                    const TileVersions& versions,
+                                                                    const ProfileChecks& checks) {
+  const std::shared_ptr<const Packed> packed = packed_.Find(key);
+  if (packed != nullptr && packed->versions == versions) {
+    auto tile = std::make_shared<const PreparedTile>(UnpackTile(packed->bytes, checks.cell_size_m));
+    absl::MutexLock lock(&mutex_);
+    ++statistics_.unpacked;
+    return tile;
   }
-  return entry->fits;
+  const Turn turn(*this);
+  STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles, LoadAround(source, key.tile));
+  if (tiles[kMiddleTile] == nullptr) return std::shared_ptr<const PreparedTile>();
+  const GroundWindow window(tiles, checks.margin, checks.cell_size_m);
+  auto tile = std::make_shared<PreparedTile>(PrepareTile(key.tile, window, checks));
+  tile->class_id = ClassesOf(*tile, *tiles[kMiddleTile]);
+  auto made = std::make_shared<const Packed>(Packed{versions, PackTile(*tile, checks.cell_size_m)});
+  packed_.Put(key, made, sizeof(Packed) + made->bytes.capacity());
+  absl::MutexLock lock(&mutex_);
+  ++statistics_.prepared;
+  return tile;
 }
 
 std::shared_ptr<TileCache::Entry> TileCache::FindOrInsert(const Key& key,
@@ -92,21 +121,10 @@ std::shared_ptr<TileCache::Entry> TileCache::FindOrInsert(const Key& key,
   return entry;
 }
 
-// Who still uses an evicted tile keeps it alive.
-void TileCache::Account(const Key& key,
-                        const std::shared_ptr<Entry>& entry,
-                        std::size_t bytes,
-                        bool fits) {
-  absl::MutexLock lock(&mutex_);
-  ++(fits ? statistics_.fitted : statistics_.prepared);
-  if (entries_.Find(key) != entry) return;  // evicted meanwhile
-  entries_.Put(key, entry, sizeof(Entry) + bytes);
-}
-
 TileCache::Statistics TileCache::statistics() const {
   absl::MutexLock lock(&mutex_);
   Statistics statistics = statistics_;
-  statistics.bytes = entries_.bytes();
+  statistics.bytes = entries_.bytes() + packed_.bytes();
   return statistics;
 }
 

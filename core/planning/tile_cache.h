@@ -6,9 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <tuple>
+#include <string>
 #include <utility>
-#include <vector>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
@@ -16,7 +15,6 @@
 
 #include "core/common/lru_cache.h"
 #include "core/mls/tile_key.h"
-#include "core/planning/ground_fit.h"
 #include "core/planning/ground_window.h"
 #include "core/planning/prepared_tile.h"
 #include "core/planning/profile_checks.h"
@@ -32,17 +30,19 @@ absl::StatusOr<TileNeighbourhood> LoadAround(TileSource& source, const TileKey& 
 
 // Thread-safe. A tile of unchanged versions is prepared once, however many threads ask for it at
 // the same time; of a tile and a profile only what was asked for last is kept, so that a map that
-// changes takes no more than one that does not.
+// changes takes no more than one that does not. A sixth of the budget holds tiles as searches read
+// them, the rest what is packed of them and of many more. Two tiles are prepared at a time: each
+// takes up to some 50 MB while it is.
 class TileCache {
  public:
   struct Statistics {
     std::uint64_t prepared = 0;  // preparations made so far, for any profile
-    std::uint64_t fitted = 0;    // plane fits of a tile made so far
+    std::uint64_t unpacked = 0;  // had from what was packed of them
     std::size_t bytes = 0;       // kept now
   };
 
   explicit TileCache(const std::shared_ptr<CacheBudget>& budget)
-      : max_bytes_(budget->max_bytes()), entries_(budget) {}
+      : max_bytes_(budget->max_bytes()), entries_(budget, max_bytes_ / 6), packed_(budget) {}
 
   // Of the budget.
   std::size_t max_bytes() const { return max_bytes_; }
@@ -55,9 +55,11 @@ class TileCache {
   Statistics statistics() const;
 
  private:
+  class Turn;
+
   struct Key {
     TileKey tile;
-    std::array<double, 6> profile{};  // all zero: the fits, which know no profile
+    std::array<double, 6> profile{};
     friend bool operator==(const Key&, const Key&) = default;
     template <typename H>
     friend H AbslHashValue(H h, const Key& key) {
@@ -67,22 +69,29 @@ class TileCache {
   struct Entry {
     explicit Entry(const TileVersions& of) : versions(of) {}
     const TileVersions versions;
-    absl::Mutex mutex;  // held while the content is made
+    absl::Mutex mutex;  // held while the tile is made
     std::shared_ptr<const PreparedTile> tile ABSL_GUARDED_BY(mutex);
-    std::shared_ptr<const std::vector<GroundFit>> fits ABSL_GUARDED_BY(mutex);
+  };
+  struct Packed {
+    TileVersions versions{};
+    std::string bytes;
   };
 
   std::shared_ptr<Entry> FindOrInsert(const Key& key, const TileVersions& versions);
-  // Counts what was made of an entry.
-  void Account(const Key& key, const std::shared_ptr<Entry>& entry, std::size_t bytes, bool fits);
-  std::shared_ptr<const std::vector<GroundFit>> Fits(const TileKey& tile,
-                                                     const TileVersions& versions,
-                                                     const GroundWindow& window);
+  // nullptr where the map has nothing.
+  absl::StatusOr<std::shared_ptr<const PreparedTile>> Make(TileSource& source,
+                                                           const Key& key,
+                                                           const TileVersions& versions,
+                                                           const ProfileChecks& checks);
+
+  bool MayPrepare() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return preparing_ < 2; }
 
   const std::size_t max_bytes_;
   mutable absl::Mutex mutex_;
   LruCache<Key, Entry> entries_ ABSL_GUARDED_BY(mutex_);
+  LruCache<Key, const Packed> packed_;
   Statistics statistics_ ABSL_GUARDED_BY(mutex_);
+  int preparing_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace strata

@@ -6,3 +6,8 @@ strata_executable(
 )
 # g++ 12 sees writes out of bounds in Boost 1.74's CSR constructor where there are none.
 target_compile_options(planning_benchmark PRIVATE -Wno-array-bounds -Wno-stringop-overflow)
+strata_executable(
+  long_plan_benchmark long_plan_benchmark
+  SOURCES long_plan_benchmark.cc
+  DEPS strata::planning strata::codec
+)

@@ -287,7 +287,7 @@ int Compare(testing::MemoryTiles& source, std::size_t query_count, int repetitio
   BoostSearch peer(graph);
   SearchWorkspace workspace;
   begin = NowMs();
-  const auto landmarks = Landmarks::Make(space, source.Keys(), kLandmarks, workspace, Stop());
+  const auto landmarks = Landmarks::Make(space, source.Keys(), kLandmarks, Stop());
   const double landmarks_ms = NowMs() - begin;
   Planner planner({.cell_size_m = kCell});
   Planner alt({.cell_size_m = kCell});

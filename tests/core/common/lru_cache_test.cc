@@ -5,7 +5,11 @@
 #include <thread>
 #include <vector>
 
+#include "absl/status/status.h"
 #include <gtest/gtest.h>
+
+#include "core/common/cache_budget.h"
+#include "core/common/stop.h"
 
 namespace strata {
 namespace {
@@ -93,6 +97,23 @@ TEST(LruCacheTest, ManyThreadsShareABudget) {
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(budget->cached_bytes(), 0U);
+}
+
+TEST(CacheBudgetTest, WhatIsAwaitedComesWhenOthersRelease) {
+  CacheBudget budget(100);
+  EXPECT_EQ(budget.AwaitReserve(51, Stop()).code(), absl::StatusCode::kResourceExhausted);
+  ASSERT_TRUE(budget.AwaitReserve(40, Stop()).ok());
+  const Stop stop;
+  stop.Request();
+  EXPECT_EQ(budget.AwaitReserve(20, stop).code(), absl::StatusCode::kCancelled);
+  absl::Status waited = absl::InternalError("not asked");
+  {
+    std::jthread waiter([&] { waited = budget.AwaitReserve(20, Stop()); });
+    budget.Release(40);
+  }
+  EXPECT_TRUE(waited.ok()) << waited;
+  EXPECT_TRUE(budget.Reserve(30));
+  EXPECT_FALSE(budget.Reserve(1));
 }
 
 }  // namespace
