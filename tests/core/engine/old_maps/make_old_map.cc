@@ -4,10 +4,13 @@
 //   of it.
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <iostream>
 #include <memory>
 #include <string>
 #include <vector>
+
+#include "absl/time/clock.h"
 
 #include "core/engine/engine.h"
 #include "core/geometry/pose.h"
