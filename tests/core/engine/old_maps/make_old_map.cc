@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "absl/time/clock.h"
+
 #include "core/engine/engine.h"
 #include "core/geometry/pose.h"
 
