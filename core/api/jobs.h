@@ -17,16 +17,16 @@
 
 namespace strata::api {
 
-// Thread-safe. Jobs of a map run one at a time by id, survive a restart, and leave the world as it
-// was when they fail or are cancelled, but for "classify" and "fade": these go scan by scan.
+// Thread-safe. Jobs of a map run one at a time, those of a client by id, clients in turn. They
+// survive a restart, and leave the world as it was when they fail or are cancelled; only "classify"
+// goes scan by scan. A job that was running twice when the process died has failed. The last
+// thousand that have ended are kept, beside proposals.
 class Jobs {
  public:
   virtual ~Jobs() = default;
 
-  // Kinds: "rebuild" (all derived data again from truth), "verify" (everything checked; a mismatch
-  // fails the job), "optimize" (poses made globally consistent; with dry_run=1 it only proposes),
-  // "revert" (poses and constraints of an earlier epoch). INVALID_ARGUMENT for an unknown kind or
-  // parameter.
+  // Kinds and their parameters: proto/strata/v1/jobs.proto. INVALID_ARGUMENT for an unknown kind or
+  // parameter; RESOURCE_EXHAUSTED while 100 jobs of the map wait, or 50 of this client.
   virtual absl::StatusOr<JobInfo> Start(const Call& call,
                                         absl::string_view map,
                                         absl::string_view kind,
@@ -40,7 +40,8 @@ class Jobs {
                                          absl::string_view map,
                                          std::uint64_t id) = 0;
   // Makes what a dry run proposed real; the job is queued again and then ends as succeeded.
-  // FAILED_PRECONDITION unless it is proposed.
+  // FAILED_PRECONDITION unless it is proposed; of several calls of Accept and Revert at once one is
+  // OK.
   virtual absl::StatusOr<JobInfo> Accept(const Call& call,
                                          absl::string_view map,
                                          std::uint64_t id) = 0;

@@ -77,7 +77,7 @@ class Maps {
   virtual absl::StatusOr<MapInfo> Get(const Call& call, absl::string_view name) = 0;
   // By name.
   virtual absl::StatusOr<std::vector<MapInfo>> List(const Call& call) = 0;
-  // Deletes the map and its file. FAILED_PRECONDITION while a job runs on it, and for a file of
+  // Deletes the map and its file; a job that runs on it ends. FAILED_PRECONDITION for a file of
   // that name that is no map.
   virtual absl::Status Delete(const Call& call, absl::string_view name) = 0;
   virtual absl::StatusOr<MapStats> Stats(const Call& call, absl::string_view name) = 0;
