@@ -250,15 +250,22 @@ absl::StatusOr<JobInfo> JobBoard::Cancel(std::uint64_t id) {
       if (entry.info.state != JobState::kQueued) return entry.info;
     }
     absl::StatusOr<JobInfo> cancelled =
-        Change(id, Durability::kFull, [](JobInfo& job, StorageWriter&) -> absl::Status {
-          // A job that was running when the last process ended is stored so, and waits.
-          if (IsFinal(job.state)) return absl::AbortedError("the job has ended");
+        Change(id, Durability::kFull, [&](JobInfo& job, StorageWriter&) -> absl::Status {
+          // A job that was running when the last process ended is stored so, and waits; one that
+          // has begun in this one was shown so before this commit began.
+          if (IsFinal(job.state) || !Waits(id)) return absl::AbortedError("the job has begun");
           job.state = JobState::kCancelled;
           return absl::OkStatus();
         });
     // It began meanwhile, and will be seen so.
     if (!absl::IsAborted(cancelled.status())) return cancelled;
   }
+}
+
+bool JobBoard::Waits(std::uint64_t id) const {
+  absl::MutexLock lock(&mutex_);
+  const auto it = jobs_.find(id);
+  return it != jobs_.end() && it->second->info.state == JobState::kQueued;
 }
 
 void JobBoard::StopRunning() {

@@ -124,6 +124,7 @@ class JobBoard {
   // Progress of the running job; `durable`: also to the store.
   void Report(std::uint64_t id, double progress, const std::string& phase, bool durable);
   absl::Status CheckRoom(absl::string_view owner) const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
+  bool Waits(std::uint64_t id) const;
   std::optional<std::uint64_t> NextIdLocked() const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
   // Ended jobs beyond those that are kept.
   std::vector<std::uint64_t> Outdated() const;

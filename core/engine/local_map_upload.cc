@@ -139,9 +139,10 @@ absl::StatusOr<ScanAck> UploadLocalMap(Map& map,
         return absl::OkStatus();
       },
       [&] {
-        if (!ack.already_present) map.core().changes().Add(ack.commit_sequence, {ack.id}, {});
+        if (ack.already_present) return;
+        map.core().changes().Add(ack.commit_sequence, {ack.id}, {});
+        map.ScanCommitted();
       }));
-  if (!ack.already_present) map.ScanCommitted();
   return ack;
 }
 

@@ -199,7 +199,8 @@ absl::StatusOr<ScanAck> ScanIntake::Commit(StorageWriter& writer, CheckRoom chec
 
 absl::StatusOr<ScanAck> ScanIntake::Finish(std::uint64_t ticket,
                                            const Stop& stop,
-                                           CheckRoom check_room) {
+                                           CheckRoom check_room,
+                                           absl::FunctionRef<void()> committed) {
   absl::MutexLock lock(&mutex_);
   STRATA_RETURN_IF_ERROR(CheckTicket(ticket));
   if (piece_.size() > 0) STRATA_RETURN_IF_ERROR(SealPiece());
@@ -209,7 +210,7 @@ absl::StatusOr<ScanAck> ScanIntake::Finish(std::uint64_t ticket,
   }
   record_.content_hash = announced() ? header_.content_hash : hasher_->Digest(header_);
   ScanAck ack;
-  const absl::Status committed = core_.writer().Run(
+  const absl::Status done = core_.writer().Run(
       Durability::kFull,
       pieces_bytes_,
       stop,
@@ -218,10 +219,12 @@ absl::StatusOr<ScanAck> ScanIntake::Finish(std::uint64_t ticket,
         return absl::OkStatus();
       },
       [&] {
-        if (!ack.already_present) core_.changes().Add(ack.commit_sequence, {ack.id}, {});
+        if (ack.already_present) return;
+        core_.changes().Add(ack.commit_sequence, {ack.id}, {});
+        committed();
       });
-  if (absl::IsAlreadyExists(committed)) Abandon();
-  STRATA_RETURN_IF_ERROR(committed);
+  if (absl::IsAlreadyExists(done)) Abandon();
+  STRATA_RETURN_IF_ERROR(done);
   dead_ = true;
   return ack;
 }

@@ -43,8 +43,12 @@ class ScanIntake {
   // Points that need not be sent again.
   std::uint64_t points() const;
   absl::Status Write(std::uint64_t ticket, const Stop& stop, const PointCloud& chunk);
-  // Makes it a scan; `check_room` is asked on the writer's thread unless the scan is there already.
-  absl::StatusOr<ScanAck> Finish(std::uint64_t ticket, const Stop& stop, CheckRoom check_room);
+  // Makes it a scan; `check_room` is asked on the writer's thread unless the scan is there already,
+  // and `committed` is called there once it is durable, whatever becomes of the caller.
+  absl::StatusOr<ScanAck> Finish(std::uint64_t ticket,
+                                 const Stop& stop,
+                                 CheckRoom check_room,
+                                 absl::FunctionRef<void()> committed);
   // The stream has ended. Of an announced scan everything that came goes to disk; any other is
   // forgotten.
   void EndStream(std::uint64_t ticket);

@@ -61,10 +61,12 @@ absl::StatusOr<ScanAck> EngineUpload::Finish() {
   STRATA_RETURN_IF_ERROR(Annotate(failed_, what));
   STRATA_RETURN_IF_ERROR(call_.stop.status());
   if (present_.has_value()) return *present_;
-  absl::StatusOr<ScanAck> ack =
-      intake_->Finish(ticket_, call_.stop, [this] { return map_->CheckRoomForPending(); });
+  absl::StatusOr<ScanAck> ack = intake_->Finish(
+      ticket_,
+      call_.stop,
+      [this] { return map_->CheckRoomForPending(); },
+      [this] { map_->ScanCommitted(); });
   if (!ack.ok()) return Annotate(ack.status(), what);
-  if (!ack->already_present) map_->ScanCommitted();
   return ack;
 }
 

@@ -88,9 +88,9 @@ class CampaignWorld {
   void RetireRobotsAndCheck();
   // Runs a job to its end; what it ends with must be success.
   JobInfo RunJob(const std::string& kind);
-  // The map verifies and is what a rebuild makes of its scans; and, if `compare`, what a server of
-  // its own makes of them that gets the same scans and is left in peace. Returns how many there
-  // are.
+  // After another start, which takes back scans that two kills met: the map verifies and is what a
+  // rebuild makes of its scans; and, if `compare`, what a server of its own makes of them that gets
+  // the same scans and is left in peace. Returns how many there are.
   std::size_t CheckContent(bool compare);
 
  private:

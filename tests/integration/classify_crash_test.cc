@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_split.h"
 #include "absl/time/clock.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -49,14 +48,7 @@ class World {
   void TakeBackScans() {
     process_->Signal(SIGTERM);
     EXPECT_EQ(process_->Wait(), 0);
-    ChildProcess list(STRATA_STRATAD, {"quarantine", "list", kMap, "--data", data_});
-    for (std::string line = list.ReadLine(); !line.empty(); line = list.ReadLine()) {
-      const std::vector<std::string> words = absl::StrSplit(line, ' ', absl::SkipEmpty());
-      if (words[0] != "scan" || words[2] != "quarantined") continue;
-      ChildProcess release(STRATA_STRATAD,
-                           {"quarantine", "release", kMap, "scan", words[1], "--data", data_});
-      EXPECT_EQ(release.Wait(), 0);
-    }
+    testing::TakeBackScans(data_, kMap);
     Start();
   }
 

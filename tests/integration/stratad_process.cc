@@ -2,7 +2,10 @@
 
 #include <array>
 #include <csignal>
+#include <string>
+#include <vector>
 
+#include "absl/strings/str_split.h"
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/prctl.h>
@@ -70,6 +73,17 @@ int ChildProcess::Wait() {
   EXPECT_EQ(waitpid(pid_, &status, 0), pid_);
   pid_ = -1;
   return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+void TakeBackScans(const std::string& data, const std::string& map) {
+  ChildProcess list(STRATA_STRATAD, {"quarantine", "list", map, "--data", data});
+  for (std::string line = list.ReadLine(); !line.empty(); line = list.ReadLine()) {
+    const std::vector<std::string> words = absl::StrSplit(line, ' ', absl::SkipEmpty());
+    if (words[0] != "scan" || words[2] != "quarantined") continue;
+    ChildProcess release(STRATA_STRATAD,
+                         {"quarantine", "release", map, "scan", words[1], "--data", data});
+    EXPECT_EQ(release.Wait(), 0) << line;
+  }
 }
 
 }  // namespace strata::testing

@@ -41,8 +41,9 @@ absl::Status SqliteWriter::Commit(Durability durability, absl::FunctionRef<absl:
   STRATA_RETURN_IF_ERROR(body());
   STRATA_RETURN_IF_ERROR(broken_);
   STRATA_RETURN_IF_ERROR(CheckFiles());
+  const std::filesystem::path log = database_.LogFile();
   STRATA_RETURN_IF_ERROR(transaction.Commit());
-  log_ = StateOfFile(database_.LogFile());
+  log_ = StateOfFile(log);  // takes no memory: what is committed must not fail any more
   return absl::OkStatus();
 }
 
