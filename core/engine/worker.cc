@@ -128,10 +128,11 @@ void Worker::RunCommand() {
     task = tasks_.front();
     tasks_.pop_front();
     task->begun = true;
-    running_ = std::string(task->what);
+    running_ = task->what;
   }
   const absl::Status status = GuardedStep([&] { return task->command(integrator_); });
   absl::MutexLock lock(&mutex_);
+  running_ = "the next step";  // the task's own words go with its caller
   task->status = status;
   task->done = true;
 }

@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <deque>
-#include <string>
 #include <thread>
 
 #include "absl/base/thread_annotations.h"
@@ -76,7 +75,7 @@ class Worker {
   const Stop closing_;
   mutable absl::Mutex mutex_;
   std::deque<Task*> tasks_ ABSL_GUARDED_BY(mutex_);
-  std::string running_ ABSL_GUARDED_BY(mutex_) = "recovery";  // what the thread is at
+  absl::string_view running_ ABSL_GUARDED_BY(mutex_) = "recovery";  // what the thread is at
   std::uint64_t pending_ ABSL_GUARDED_BY(mutex_);
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   bool refuses_ ABSL_GUARDED_BY(mutex_) = false;

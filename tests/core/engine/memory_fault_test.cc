@@ -73,7 +73,7 @@ class MemoryFaultTest : public EngineTest {
 };
 
 TEST_F(MemoryFaultTest, NothingEndsButTheWorkItWasFor) {
-  const std::uint64_t rounds = Asked("STRATA_MEMORY_FAULTS", 60);
+  const std::uint64_t rounds = Asked("STRATA_MEMORY_FAULTS", 20);
   const std::uint64_t seed = Asked("STRATA_SEED", 20261123);
   SCOPED_TRACE(absl::StrCat("seed ", seed));
   SplitMix64 random(seed);

@@ -155,7 +155,10 @@ class PathWatcher {
  public:
   void Start(api::Database& db, const PathQuery& path, std::uint64_t seed) {
     stop_ = Stop();
-    told_.reset();
+    {
+      absl::MutexLock lock(&mutex_);
+      told_.reset();
+    }
     threads_.emplace_back([this, &db, path] {
       const absl::Status ended =
           db.planning().WatchPath({stop_, "", ""}, kMapName, path, [this](const PathCheck& check) {
