@@ -24,8 +24,12 @@ std::size_t CacheBudget::cached_bytes() const {
   return cached_;
 }
 
+bool CacheBudget::Fits(std::size_t bytes) const {
+  return bytes <= max_bytes_ / 2 && reserved_ + bytes <= max_bytes_ / 2;
+}
+
 bool CacheBudget::TryReserve(std::size_t bytes) {
-  if (bytes > max_bytes_ / 2 || reserved_ + bytes > max_bytes_ / 2) return false;
+  if (!Fits(bytes)) return false;
   reserved_ += bytes;
   Trim();
   return true;
@@ -46,10 +50,11 @@ absl::Status CacheBudget::AwaitReserve(std::size_t bytes, const Stop& stop) {
   }
   Values dropped;
   absl::MutexLock lock(&mutex_);
-  while (!TryReserve(bytes)) {
+  const auto has_room = [this, bytes]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return Fits(bytes); };
+  while (!mutex_.AwaitWithTimeout(absl::Condition(&has_room), kLookInterval)) {
     STRATA_RETURN_IF_ERROR(stop.status());
-    released_.WaitWithTimeout(&mutex_, kLookInterval);
   }
+  TryReserve(bytes);
   dropped.swap(dropped_);
   return absl::OkStatus();
 }
@@ -57,7 +62,6 @@ absl::Status CacheBudget::AwaitReserve(std::size_t bytes, const Stop& stop) {
 void CacheBudget::Release(std::size_t bytes) {
   absl::MutexLock lock(&mutex_);
   reserved_ -= bytes;
-  released_.SignalAll();
 }
 
 void CacheBudget::Trim() {

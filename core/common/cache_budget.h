@@ -47,13 +47,13 @@ class CacheBudget {
   using Order = std::list<Item>;
   using Values = std::vector<std::shared_ptr<const void>>;
 
+  bool Fits(std::size_t bytes) const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
   bool TryReserve(std::size_t bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Evicts until all fits. What is evicted lies in dropped_, to be destroyed without the mutex.
   void Trim() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const std::size_t max_bytes_;
   mutable absl::Mutex mutex_;
-  absl::CondVar released_;
   Order order_ ABSL_GUARDED_BY(mutex_);  // the latest used first
   std::size_t cached_ ABSL_GUARDED_BY(mutex_) = 0;
   std::size_t reserved_ ABSL_GUARDED_BY(mutex_) = 0;
