@@ -77,7 +77,7 @@ int AwaitSignal(const sigset_t& signals) {
 }
 
 ReadinessCheck LogCheck(const LogWriter& log) {
-  constexpr absl::Duration kLong = absl::Seconds(10);
+  static constexpr absl::Duration kLong = absl::Seconds(10);
   return {"log", [&log] {
             return log.stuck() < kLong
                        ? ""

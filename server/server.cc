@@ -56,7 +56,7 @@ constexpr int kMaxMetadataBytes = 16 << 10;
 constexpr int kHandshakeMs = 10'000;
 // Of all connections together: some 40 KB each, and the messages on their way. Where it is used up,
 // new connections are refused.
-constexpr std::size_t kTransportBytes = std::size_t{40} << 20;
+constexpr std::size_t kTransportBytes = std::size_t{36} << 20;
 // A connection without calls; a client that comes again connects again by itself.
 constexpr int kIdleConnectionMs = 10 * 60 * 1000;
 constexpr absl::Duration kReadinessInterval = absl::Seconds(1);

@@ -88,10 +88,10 @@ class HostileMemoryTest : public ::testing::Test {
               << " MB, after " << Megabytes("VmRSS:") << " MB" << std::endl;
     EXPECT_LE(Megabytes("VmHWM:") - before_, bound);
     // The server gives back what is free every ten seconds.
-    for (int i = 0; i < 300 && Megabytes("VmRSS:") - before_ > bound / 4; ++i) {
+    for (int i = 0; i < 300 && Megabytes("VmRSS:") - before_ > bound / 2; ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
-    EXPECT_LE(Megabytes("VmRSS:") - before_, bound / 4);
+    EXPECT_LE(Megabytes("VmRSS:") - before_, bound / 2);
     stratad_->Signal(SIGTERM);
     EXPECT_EQ(stratad_->Wait(), 0);
   }
