@@ -1,6 +1,7 @@
 #include "core/codec/surface_tile_codec.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -90,21 +91,33 @@ Codes Quantised(const Surface& surface) {
   return codes;
 }
 
-Surface Restored(const Codes& codes) {
-  Surface surface{.cell = codes.cell,
-                  .traversability = static_cast<Traversability>(codes.traversability),
-                  .class_id = codes.class_id,
-                  .confidence = codes.confidence,
-                  .z_m = static_cast<float>(codes.height) / kStepsPerMetre,
-                  .depth_m = static_cast<float>(codes.depth) / kStepsPerMetre};
-  surface.sigma_m =
-      std::exp2(static_cast<float>(codes.sigma) / kSigmaCodesPerOctave + kMinSigmaOctave);
-  surface.cost =
-      codes.cost == kInfiniteCost
-          ? std::numeric_limits<float>::infinity()
-          : std::exp2(static_cast<float>(codes.cost) / CostCodesPerOctave(codes.traversability)) -
-                1.0F;
-  return surface;
+// What the 256 codes of sigma, and those of cost of each traversability, stand for [m; factor].
+struct CodeTables {
+  std::array<float, 256> sigma_m;
+  std::array<std::array<float, 256>, kMaxTraversability + 1> cost;
+
+  CodeTables() {
+    for (int code = 0; code < 256; ++code) {
+      const auto value = static_cast<float>(code);
+      sigma_m[code] = std::exp2(value / kSigmaCodesPerOctave + kMinSigmaOctave);
+      for (int kind = 0; kind <= kMaxTraversability; ++kind) {
+        const float octaves = value / CostCodesPerOctave(static_cast<std::uint8_t>(kind));
+        cost[kind][code] = code == kInfiniteCost ? std::numeric_limits<float>::infinity()
+                                                 : std::exp2(octaves) - 1.0F;
+      }
+    }
+  }
+};
+
+Surface Restored(const Codes& codes, const CodeTables& tables) {
+  return {.cell = codes.cell,
+          .traversability = static_cast<Traversability>(codes.traversability),
+          .class_id = codes.class_id,
+          .confidence = codes.confidence,
+          .z_m = static_cast<float>(codes.height) / kStepsPerMetre,
+          .sigma_m = tables.sigma_m[codes.sigma],
+          .depth_m = static_cast<float>(codes.depth) / kStepsPerMetre,
+          .cost = tables.cost[codes.traversability][codes.cost]};
 }
 
 // Columns. Heights and the like go to one of several columns by what is known of their
@@ -315,6 +328,7 @@ absl::StatusOr<SurfaceTile> DecodeSurfaceTile(absl::string_view bytes) {
   STRATA_ASSIGN_OR_RETURN(ColumnDecoder decoder,
                           ColumnDecoder::Open(reader, ColumnsOf(with_confidence), cells.size()));
   if (reader.remaining() != 0) return absl::DataLossError("surface tile: bytes left over");
+  static const CodeTables tables;
   const std::vector<SurfacesBeside> neighbours = FindNeighbours(cells);
   std::vector<Codes> surfaces(cells.size());
   tile.surfaces.reserve(cells.size());
@@ -323,7 +337,7 @@ absl::StatusOr<SurfaceTile> DecodeSurfaceTile(absl::string_view bytes) {
     if (!CodeSurface(decoder, neighbours[i], surfaces, with_confidence, surfaces[i])) {
       return absl::DataLossError(absl::StrCat("surface tile: surface ", i, " is out of range"));
     }
-    tile.surfaces.push_back(Restored(surfaces[i]));
+    tile.surfaces.push_back(Restored(surfaces[i], tables));
   }
   STRATA_RETURN_IF_ERROR(decoder.Finish());
   if (with_confidence != AnyConfidence(surfaces)) {

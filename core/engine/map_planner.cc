@@ -20,6 +20,7 @@
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/status.h"
 #include "core/engine/change_log.h"
+#include "core/engine/parallel.h"
 #include "core/engine/surface_tiles.h"
 #include "core/engine/tile_check.h"
 #include "core/planning/path_check.h"
@@ -83,7 +84,14 @@ class MapPlanner::Source final : public TileSource {
 
 MapPlanner::MapPlanner(MapCore& core)
     : core_(core),
-      planner_({.cell_size_m = core.info().parameters.mls.cell_size_m, .budget = core.caches()}),
+      planner_({.cell_size_m = core.info().parameters.mls.cell_size_m,
+                .budget = core.caches(),
+                .loop =
+                    [threads = core.options().worker_threads](
+                        std::size_t count, absl::FunctionRef<absl::Status(std::size_t)> body) {
+                      return ParallelFor(
+                          threads, count, [&](int /*thread*/, std::size_t i) { return body(i); });
+                    }}),
       tiles_(core.caches(), core.options().cache_bytes / kDecodedShare) {}
 
 absl::StatusOr<std::shared_ptr<const MapPlanner::Versions>> MapPlanner::VersionsOf(

@@ -1,8 +1,11 @@
 #include "core/planning/ground_checks.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <limits>
 #include <tuple>
 #include <utility>
@@ -10,6 +13,7 @@
 
 #include "core/planning/ground_window.h"
 #include "core/planning/profile_checks.h"
+#include "core/planning/rows.h"
 #include "core/world/plan.h"
 
 namespace strata {
@@ -19,42 +23,52 @@ constexpr int kReportedHoleCells = 64;
 
 }  // namespace
 
-GroundChecks::GroundChecks(const GroundWindow& window, const ProfileChecks& checks, Edges edges)
+GroundChecks::GroundChecks(const GroundWindow& window,
+                           const ProfileChecks& checks,
+                           Edges edges,
+                           const ParallelLoop& loop)
     : window_(window), checks_(checks) {
-  for (const DiscCell& d : checks.disc) disc_step_.push_back(d.dy * window.width() + d.dx);
+  for (const DiscCell& d : checks.disc) {
+    const int ring = std::max(std::abs(d.dx), std::abs(d.dy));
+    while (static_cast<int>(ring_first_.size()) <= ring) ring_first_.push_back(disc_step_.size());
+    disc_step_.push_back(d.dy * window.width() + d.dx);
+  }
+  ring_first_.push_back(disc_step_.size());
   // Cells this close to the window's border are not reached by any disc of the tile.
   const int rim = checks.sight_cells;
   const auto for_each_surface = [&](auto&& visit) {
-    for (int y = rim; y < window.width() - rim; ++y) {
+    ForRows(loop, rim, window.width() - rim, [&](int band, int y) {
       const int row = y * window.width();
       const std::uint32_t end = window.begin(row + window.width() - rim);
-      for (std::uint32_t i = window.begin(row + rim); i < end; ++i) visit(i);
-    }
+      for (std::uint32_t i = window.begin(row + rim); i < end; ++i) visit(band, i);
+    });
   };
   corners_count_ =
       static_cast<float>(std::hypot(0.5, 0.5) * checks.cell_size_m) < checks.footprint_m;
   ground_.assign(window.surface_count(), Ground::kEnds);
   std::vector<std::uint8_t> near(static_cast<std::size_t>(window.cell_count()), 0);
-  for_each_surface([&](std::uint32_t i) {
+  for_each_surface([&](int /*band*/, std::uint32_t i) {
     ground_[i] = GroundAround(i);
     if (OnGround(i)) near[window.surface(i).cell] = 1;
   });
   if (edges == Edges::kOfGround) {
     // A surface's edges are up to the footprint away from it; over gaps, too, a disc looks at them.
-    near = Dilated(near, checks.disc_cells + checks.behind_cells[0] + 1 + checks.gap_cells[0] + 1);
+    near = CellsFrom(near);
   } else {
-    near.assign(near.size(), 1);
+    near.assign(near.size(), 0);
   }
-  std::vector<GroundEdge> found;
-  for_each_surface([&](std::uint32_t i) {
-    if (ground_[i] != Ground::kEven && near[window.surface(i).cell] != 0) CollectEdges(i, &found);
+  const int reach = checks.disc_cells + checks.behind_cells[0] + 1 + checks.gap_cells[0] + 1;
+  std::array<std::vector<GroundEdge>, kRowBands> found;
+  for_each_surface([&](int band, std::uint32_t i) {
+    if (ground_[i] == Ground::kEven || near[window.surface(i).cell] > reach) return;
+    CollectEdges(i, &found[band]);
   });
   IndexEdges(found);
   std::vector<std::uint8_t> has_edge(near.size());
   for (std::size_t cell = 0; cell < has_edge.size(); ++cell) {
     has_edge[cell] = edge_first_[cell] != edge_first_[cell + 1] ? 1 : 0;
   }
-  near_edge_ = Dilated(has_edge, checks.disc_cells);
+  edge_cells_ = CellsFrom(has_edge);
 }
 
 // What CollectEdges() would find in the cells next to the surface, the cheap looks first.
@@ -221,13 +235,17 @@ std::uint32_t GroundChecks::Target(std::uint32_t i, int direction, int* cells) c
 }
 
 // Sorts by cell and joins what overlaps and is of one kind.
-void GroundChecks::IndexEdges(const std::vector<GroundEdge>& edges) {
+void GroundChecks::IndexEdges(const std::array<std::vector<GroundEdge>, kRowBands>& found) {
   std::vector<std::uint32_t> begin(static_cast<std::size_t>(window_.cell_count()) + 1, 0);
-  for (const GroundEdge& edge : edges) ++begin[edge.cell + 1];
+  for (const std::vector<GroundEdge>& edges : found) {
+    for (const GroundEdge& edge : edges) ++begin[edge.cell + 1];
+  }
   for (int cell = 0; cell < window_.cell_count(); ++cell) begin[cell + 1] += begin[cell];
-  std::vector<GroundEdge> sorted(edges.size());
+  std::vector<GroundEdge> sorted(begin.back());
   std::vector<std::uint32_t> next = begin;
-  for (const GroundEdge& edge : edges) sorted[next[edge.cell]++] = edge;
+  for (const std::vector<GroundEdge>& edges : found) {
+    for (const GroundEdge& edge : edges) sorted[next[edge.cell]++] = edge;
+  }
   edge_first_.assign(begin.size(), 0);
   for (int cell = 0; cell < window_.cell_count(); ++cell) {
     const auto first = sorted.begin() + begin[cell];
@@ -249,47 +267,34 @@ void GroundChecks::IndexEdges(const std::vector<GroundEdge>& edges) {
   }
 }
 
-// Rows first, then columns, each there and back.
-std::vector<std::uint8_t> GroundChecks::Dilated(const std::vector<std::uint8_t>& marked,
-                                                int reach) const {
+std::vector<std::uint8_t> GroundChecks::CellsFrom(const std::vector<std::uint8_t>& marked) const {
   const int width = window_.width();
-  std::vector<std::uint8_t> rows(marked.size(), 0);
-  std::vector<std::uint8_t> dilated(marked.size(), 0);
-  for (int y = 0; y < width; ++y) {
-    int last = -2 * width;  // the latest mark to the left, then to the right
-    for (int x = 0; x < width; ++x) {
-      const int cell = y * width + x;
-      if (marked[cell] != 0) last = x;
-      if (x - last <= reach) rows[cell] = 1;
-    }
-    last = 3 * width;
-    for (int x = width - 1; x >= 0; --x) {
-      const int cell = y * width + x;
-      if (marked[cell] != 0) last = x;
-      if (last - x <= reach) rows[cell] = 1;
-    }
-  }
-  std::vector<int> last(static_cast<std::size_t>(width), -2 * width);
+  std::vector<std::uint8_t> cells(marked.size(), kFarCells);
+  const auto from = [&](int x, int y) {
+    return x < 0 || y < 0 || x >= width || y >= width ? int{kFarCells} : cells[y * width + x];
+  };
   for (int y = 0; y < width; ++y) {
     for (int x = 0; x < width; ++x) {
+      const int least =
+          std::min({from(x - 1, y), from(x - 1, y - 1), from(x, y - 1), from(x + 1, y - 1)});
       const int cell = y * width + x;
-      if (rows[cell] != 0) last[x] = y;
-      dilated[cell] = y - last[x] <= reach ? 1 : 0;
+      cells[cell] =
+          marked[cell] != 0 ? 0 : static_cast<std::uint8_t>(std::min(least + 1, +kFarCells));
     }
   }
-  last.assign(last.size(), 3 * width);
   for (int y = width - 1; y >= 0; --y) {
-    for (int x = 0; x < width; ++x) {
-      const int cell = y * width + x;
-      if (rows[cell] != 0) last[x] = y;
-      if (last[x] - y <= reach) dilated[cell] = 1;
+    for (int x = width - 1; x >= 0; --x) {
+      const int least =
+          std::min({from(x + 1, y), from(x + 1, y + 1), from(x, y + 1), from(x - 1, y + 1)});
+      std::uint8_t& cell = cells[y * width + x];
+      cell = static_cast<std::uint8_t>(std::min<int>(cell, least + 1));
     }
   }
-  return dilated;
+  return cells;
 }
 
 const GroundEdge* GroundChecks::NearestEdge(int cell, float z, float within_m) const {
-  for (std::size_t k = 0; k < disc_step_.size(); ++k) {
+  for (std::size_t k = FirstOfRing(edge_cells_[cell]); k < disc_step_.size(); ++k) {
     if (checks_.disc[k].distance_m >= within_m) break;
     const int at = cell + disc_step_[k];
     for (std::uint32_t e = edge_first_[at]; e < edge_first_[at + 1]; ++e) {
@@ -300,8 +305,7 @@ const GroundEdge* GroundChecks::NearestEdge(int cell, float z, float within_m) c
 }
 
 float GroundChecks::EdgeDistance(int cell, float z) const {
-  if (near_edge_[cell] == 0) return checks_.reach_m;
-  for (std::size_t k = 0; k < disc_step_.size(); ++k) {
+  for (std::size_t k = FirstOfRing(edge_cells_[cell]); k < disc_step_.size(); ++k) {
     const int at = cell + disc_step_[k];
     for (std::uint32_t e = edge_first_[at]; e < edge_first_[at + 1]; ++e) {
       if (edges_[e].z_low_m <= z && z <= edges_[e].z_high_m) return checks_.disc[k].distance_m;

@@ -21,13 +21,17 @@
 #ifndef STRATA_CORE_PLANNING_GROUND_CHECKS_H_
 #define STRATA_CORE_PLANNING_GROUND_CHECKS_H_
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
 #include "core/planning/ground_window.h"
 #include "core/planning/profile_checks.h"
+#include "core/planning/rows.h"
 #include "core/world/plan.h"
 
 namespace strata {
@@ -60,7 +64,10 @@ class GroundChecks {
   enum class Edges : std::uint8_t { kAll, kOfGround };
 
   // Keeps references. REQUIRES: window.margin() ≥ checks.margin.
-  GroundChecks(const GroundWindow& window, const ProfileChecks& checks, Edges edges);
+  GroundChecks(const GroundWindow& window,
+               const ProfileChecks& checks,
+               Edges edges,
+               const ParallelLoop& loop = {});
 
   // False if an edge of the surface's own, in its cell or next to it, keeps the robot away. Of
   // surfaces at least sight_cells inside the window.
@@ -92,6 +99,8 @@ class GroundChecks {
   double HoleWidth(int cell, float z) const;
 
  private:
+  static constexpr int kFarCells = 255;
+
   // Around a surface: ends next to it, goes on but not everywhere, goes on without any edge.
   enum class Ground : std::uint8_t { kEnds, kBroken, kEven };
 
@@ -104,9 +113,15 @@ class GroundChecks {
   int HoleRun(int cell, float z, int direction, int limit) const;
   std::uint32_t OneWayTarget(std::uint32_t i, int direction, int* cells) const;
   Ground GroundAround(std::uint32_t i) const;
-  void IndexEdges(const std::vector<GroundEdge>& edges);
-  // Per cell: whether a cell that is marked is within the square of `reach` cells around it.
-  std::vector<std::uint8_t> Dilated(const std::vector<std::uint8_t>& marked, int reach) const;
+  void IndexEdges(const std::array<std::vector<GroundEdge>, kRowBands>& found);
+  // Per cell: half the width of the smallest square of cells around it with one that is marked, at
+  // most kFarCells.
+  std::vector<std::uint8_t> CellsFrom(const std::vector<std::uint8_t>& marked) const;
+  // The first of the disc's cells that an edge may be in, where no square of less than `cells` has
+  // one.
+  std::size_t FirstOfRing(int cells) const {
+    return ring_first_[std::min<std::size_t>(cells, ring_first_.size() - 1)];
+  }
 
   const GroundWindow& window_;
   const ProfileChecks& checks_;
@@ -114,8 +129,9 @@ class GroundChecks {
   std::vector<Ground> ground_;  // per surface
   std::vector<GroundEdge> edges_;
   std::vector<std::uint32_t> edge_first_;  // per cell
-  std::vector<std::uint8_t> near_edge_;    // per cell: an edge may be within reach
+  std::vector<std::uint8_t> edge_cells_;   // CellsFrom() cells with an edge
   std::vector<std::int32_t> disc_step_;    // per disc cell
+  std::vector<std::size_t> ring_first_;    // see FirstOfRing()
 };
 
 inline Footing GroundChecks::Meet(int cell, float z, float rise_m) const {

@@ -108,7 +108,8 @@ absl::StatusOr<PlanResult> Answer(SearchSpace& space,
 
 }  // namespace
 
-Planner::Planner(const PlannerOptions& options) : options_(options), cache_(options.budget) {}
+Planner::Planner(const PlannerOptions& options)
+    : options_(options), cache_(options.budget, options.loop) {}
 
 absl::StatusOr<PlanResult> Planner::Plan(TileSource& source,
                                          const PlanQuery& query,

@@ -34,6 +34,7 @@
 #include "core/common/stop.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/landmarks.h"
+#include "core/planning/rows.h"
 #include "core/planning/tile_cache.h"
 #include "core/planning/tile_source.h"
 #include "core/world/plan.h"
@@ -46,6 +47,7 @@ struct PlannerOptions {
   // Of prepared tiles and of searches, which may be shared with other caches. A query that needs
   // more, for the tiles that it has left (10 to 50 kB each), ends with PlanReason::kSearchLimit.
   std::shared_ptr<CacheBudget> budget = std::make_shared<CacheBudget>(std::size_t{1} << 30);
+  ParallelLoop loop = {};  // what tiles are prepared by
 };
 
 // Plans in one map, in any of its epochs. Thread-safe; queries run in their callers' threads.

@@ -13,6 +13,7 @@
 #include "core/planning/ground_fit.h"
 #include "core/planning/ground_window.h"
 #include "core/planning/profile_checks.h"
+#include "core/planning/rows.h"
 
 namespace strata {
 namespace {
@@ -41,19 +42,17 @@ std::uint32_t MortonOfCell(std::uint16_t cell) {
 // Builds one PreparedTile; holds what is known of the window's surfaces while it does.
 class Preparation {
  public:
-  Preparation(const GroundWindow& window, const ProfileChecks& checks)
-      : window_(window), checks_(checks), ground_(window, checks, GroundChecks::Edges::kOfGround) {}
+  Preparation(const GroundWindow& window, const ProfileChecks& checks, const ParallelLoop& loop)
+      : window_(window),
+        checks_(checks),
+        loop_(loop),
+        ground_(window, checks, GroundChecks::Edges::kOfGround, loop) {}
 
   PreparedTile Run(const TileKey& key) {
     tile_.key = key;
     CheckSurfaces();
     NumberPatches();
-    tile_.moves.resize(tile_.size());
-    for (std::uint32_t patch = 0; patch < tile_.size(); ++patch) {
-      if (!tile_.CanStand(patch)) continue;
-      for (int k = 0; k < 4; ++k) AddMove(patch, k);
-      for (int k = 4; k < 8; ++k) AddMoveOut(patch, k);
-    }
+    AddMoves();
     std::sort(
         tile_.far_moves.begin(), tile_.far_moves.end(), [](const FarMove& a, const FarMove& b) {
           return std::tie(a.patch, a.direction) < std::tie(b.patch, b.direction);
@@ -75,12 +74,12 @@ class Preparation {
     const int ring = checks_.gap_cells[0] + 1;
     const int low = window_.margin() - ring;
     const int high = window_.margin() + kTileCells + ring;
-    for (int y = low; y < high; ++y) {
+    ForRows(loop_, low, high, [&](int /*band*/, int y) {
       const int row = y * window_.width();
       for (std::uint32_t i = window_.begin(row + low); i < window_.begin(row + high); ++i) {
         CheckSurface(i);
       }
-    }
+    });
   }
 
   void CheckSurface(std::uint32_t i) {
@@ -123,8 +122,27 @@ class Preparation {
     tile_.block_begin[kCells / 64] = tile_.size();
   }
 
+  // Blocks of 8 × 8 cells, in whose order patches are numbered, in rows of 32. Every move of every
+  // patch is set by one of its ends.
+  void AddMoves() {
+    constexpr int kRow = 32;
+    tile_.moves.resize(tile_.size());
+    std::array<std::vector<FarMove>, kRowBands> far;
+    ForRows(loop_, 0, kRow, [&](int band, int row) {
+      const std::uint32_t end = tile_.block_begin[(row + 1) * kRow];
+      for (std::uint32_t patch = tile_.block_begin[row * kRow]; patch < end; ++patch) {
+        if (!tile_.CanStand(patch)) continue;
+        for (int k = 0; k < 4; ++k) AddMove(patch, k, &far[band]);
+        for (int k = 4; k < 8; ++k) AddMoveOut(patch, k, &far[band]);
+      }
+    });
+    for (const std::vector<FarMove>& moves : far) {
+      tile_.far_moves.insert(tile_.far_moves.end(), moves.begin(), moves.end());
+    }
+  }
+
   // A move and its opposite, which costs the same.
-  void AddMove(std::uint32_t patch, int k) {
+  void AddMove(std::uint32_t patch, int k, std::vector<FarMove>* far) {
     const std::uint32_t from = surface_[patch];
     int cells = 0;
     const std::uint32_t to = ground_.Target(from, k, &cells);
@@ -137,12 +155,12 @@ class Preparation {
     const double rise = window_.surface(to).z_m - window_.surface(from).z_m;
     const std::uint32_t cost =
         MoveCost(cells * checks_.StepLength(k), rise, danger, checks_.cell_size_m);
-    SetMove(from, to, k, cells, cost);
-    if (number_[to] != PreparedTile::kNoPatch) SetMove(to, from, k ^ 4, cells, cost);
+    SetMove(from, to, k, cells, cost, far);
+    if (number_[to] != PreparedTile::kNoPatch) SetMove(to, from, k ^ 4, cells, cost, far);
   }
 
   // The same if it leads out of the tile; AddMove() adds the others from where they lead to.
-  void AddMoveOut(std::uint32_t patch, int k) {
+  void AddMoveOut(std::uint32_t patch, int k, std::vector<FarMove>* far) {
     const int reach = checks_.GapCells(k) + 1;
     const int x = (tile_.cell[patch] & (kTileCells - 1)) + kStepX[k] * reach;
     const int y = (tile_.cell[patch] >> kTileShift) + kStepY[k] * reach;
@@ -150,10 +168,15 @@ class Preparation {
     int cells = 0;
     const std::uint32_t to = ground_.Target(surface_[patch], k, &cells);
     if (to == GroundChecks::kNoSurface || number_[to] != PreparedTile::kNoPatch) return;
-    AddMove(patch, k);
+    AddMove(patch, k, far);
   }
 
-  void SetMove(std::uint32_t from, std::uint32_t to, int k, int cells, std::uint32_t cost) {
+  void SetMove(std::uint32_t from,
+               std::uint32_t to,
+               int k,
+               int cells,
+               std::uint32_t cost,
+               std::vector<FarMove>* far) {
     const std::uint32_t patch = number_[from];
     Move& move = tile_.moves[patch][k];
     const std::int64_t delta = static_cast<std::int64_t>(number_[to]) - patch;
@@ -165,15 +188,16 @@ class Preparation {
     }
     move.cost = Move::kFar;
     const auto level = to - window_.begin(static_cast<int>(window_.surface(to).cell));
-    tile_.far_moves.push_back({patch,
-                               static_cast<std::uint8_t>(k),
-                               static_cast<std::uint8_t>(level),
-                               static_cast<std::uint16_t>(cells),
-                               cost});
+    far->push_back({patch,
+                    static_cast<std::uint8_t>(k),
+                    static_cast<std::uint8_t>(level),
+                    static_cast<std::uint16_t>(cells),
+                    cost});
   }
 
   const GroundWindow& window_;
   const ProfileChecks& checks_;
+  const ParallelLoop& loop_;
   const GroundChecks ground_;
   PreparedTile tile_;
   // Per surface of the window.
@@ -212,18 +236,11 @@ std::size_t PreparedTile::memory_bytes() const {
          edge_distance.capacity() + class_id.capacity();
 }
 
-std::uint32_t MoveCost(double run_m, double rise_m, double danger, double cell_size_m) {
-  const double length_cells = std::sqrt(run_m * run_m + rise_m * rise_m) / cell_size_m;
-  const double cost = kCostPerCell * length_cells * (1.0 + danger);
-  // To nearest, and never below what the search's heuristic takes for the same stretch.
-  return static_cast<std::uint32_t>(
-      std::min(cost + 0.5, static_cast<double>(std::numeric_limits<std::int32_t>::max())));
-}
-
 PreparedTile PrepareTile(const TileKey& key,
                          const GroundWindow& window,
-                         const ProfileChecks& checks) {
-  return Preparation(window, checks).Run(key);
+                         const ProfileChecks& checks,
+                         const ParallelLoop& loop) {
+  return Preparation(window, checks, loop).Run(key);
 }
 
 std::vector<std::uint8_t> ClassesOf(const PreparedTile& tile, const SurfaceTile& surfaces) {

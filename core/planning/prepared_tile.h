@@ -2,15 +2,19 @@
 #ifndef STRATA_CORE_PLANNING_PREPARED_TILE_H_
 #define STRATA_CORE_PLANNING_PREPARED_TILE_H_
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/ground_window.h"
 #include "core/planning/profile_checks.h"
+#include "core/planning/rows.h"
 
 namespace strata {
 
@@ -71,12 +75,19 @@ struct PreparedTile {
 // Cost of a move of `run_m` sideways and `rise_m` up or down between patches of two dangers.
 // kGapDanger comes on top over unobserved ground.
 inline constexpr double kGapDanger = 1.0;
-std::uint32_t MoveCost(double run_m, double rise_m, double danger, double cell_size_m);
+inline std::uint32_t MoveCost(double run_m, double rise_m, double danger, double cell_size_m) {
+  const double length_cells = std::sqrt(run_m * run_m + rise_m * rise_m) / cell_size_m;
+  const double cost = kCostPerCell * length_cells * (1.0 + danger);
+  // To nearest, and never below what the search's heuristic takes for the same stretch.
+  return static_cast<std::uint32_t>(
+      std::min(cost + 0.5, static_cast<double>(std::numeric_limits<std::int32_t>::max())));
+}
 
-// REQUIRES: window.margin() == checks.margin.
+// REQUIRES: window.margin() == checks.margin. The same with any `loop`.
 PreparedTile PrepareTile(const TileKey& key,
                          const GroundWindow& window,
-                         const ProfileChecks& checks);
+                         const ProfileChecks& checks,
+                         const ParallelLoop& loop = {});
 
 // The class of each patch of `tile`, which was prepared from `surfaces`; empty if none has one.
 std::vector<std::uint8_t> ClassesOf(const PreparedTile& tile, const SurfaceTile& surfaces);

@@ -102,7 +102,7 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Make(TileSource& 
   STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles, LoadAround(source, key.tile));
   if (tiles[kMiddleTile] == nullptr) return std::shared_ptr<const PreparedTile>();
   const GroundWindow window(tiles, checks.margin, checks.cell_size_m);
-  auto tile = std::make_shared<PreparedTile>(PrepareTile(key.tile, window, checks));
+  auto tile = std::make_shared<PreparedTile>(PrepareTile(key.tile, window, checks, loop_));
   tile->class_id = ClassesOf(*tile, *tiles[kMiddleTile]);
   auto made = std::make_shared<const Packed>(Packed{versions, PackTile(*tile, checks.cell_size_m)});
   packed_.Put(key, made, sizeof(Packed) + made->bytes.capacity());

@@ -18,6 +18,7 @@
 #include "core/planning/ground_window.h"
 #include "core/planning/prepared_tile.h"
 #include "core/planning/profile_checks.h"
+#include "core/planning/rows.h"
 #include "core/planning/tile_source.h"
 
 namespace strata {
@@ -30,7 +31,7 @@ absl::StatusOr<TileNeighbourhood> LoadAround(TileSource& source, const TileKey& 
 
 // Thread-safe. A tile of unchanged versions is prepared once, however many threads ask for it at
 // the same time; of a tile and a profile only what was asked for last is kept, so that a map that
-// changes takes no more than one that does not. A sixth of the budget holds tiles as searches read
+// changes takes no more than one that does not. A tenth of the budget holds tiles as searches read
 // them, the rest what is packed of them and of many more. Two tiles are prepared at a time: each
 // takes up to some 50 MB while it is.
 class TileCache {
@@ -41,8 +42,11 @@ class TileCache {
     std::size_t bytes = 0;       // kept now
   };
 
-  explicit TileCache(const std::shared_ptr<CacheBudget>& budget)
-      : max_bytes_(budget->max_bytes()), entries_(budget, max_bytes_ / 6), packed_(budget) {}
+  explicit TileCache(const std::shared_ptr<CacheBudget>& budget, ParallelLoop loop = {})
+      : max_bytes_(budget->max_bytes()),
+        loop_(std::move(loop)),
+        entries_(budget, max_bytes_ / 10),
+        packed_(budget) {}
 
   // Of the budget.
   std::size_t max_bytes() const { return max_bytes_; }
@@ -87,6 +91,7 @@ class TileCache {
   bool MayPrepare() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return preparing_ < 2; }
 
   const std::size_t max_bytes_;
+  const ParallelLoop loop_;
   mutable absl::Mutex mutex_;
   LruCache<Key, Entry> entries_ ABSL_GUARDED_BY(mutex_);
   LruCache<Key, const Packed> packed_;

@@ -23,16 +23,22 @@
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include <sys/resource.h>
+#include "absl/time/time.h"
 
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/cache_budget.h"
 #include "core/common/lru_cache.h"
+#include "core/common/steady_time.h"
 #include "core/common/stop.h"
+#include "core/engine/engine.h"
+#include "core/engine/parallel.h"
 #include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/planner.h"
+#include "core/planning/rows.h"
 #include "core/planning/tile_source.h"
 #include "core/world/plan.h"
 
@@ -236,7 +242,13 @@ struct Measured {
 double Measure(const TileBytes& bytes, const World& world, std::size_t cache_mib, int times) {
   const auto budget = std::make_shared<CacheBudget>(cache_mib << 20);
   DecodedTiles source(bytes, budget);
-  Planner planner({.cell_size_m = world.cell_size_m, .budget = budget});
+  const ParallelLoop loop = [](std::size_t count,
+                               absl::FunctionRef<absl::Status(std::size_t)> body) {
+    return ParallelFor(EngineOptions().worker_threads, count, [&](int /*thread*/, std::size_t i) {
+      return body(i);
+    });
+  };
+  Planner planner({.cell_size_m = world.cell_size_m, .budget = budget, .loop = loop});
   double graph_cost = 0.0;
   for (int i = 0; i < times; ++i) {
     ForgetPeak();
@@ -245,22 +257,26 @@ double Measure(const TileBytes& bytes, const World& world, std::size_t cache_mib
     const std::uint64_t unpacked = planner.cache_statistics().unpacked;
     const std::uint64_t decoded = source.decodings;
     const double begin = ProcessorSeconds();
+    const absl::Time asked = SteadyNow();
     const absl::StatusOr<PlanResult> result = planner.Plan(
         source,
         {.from = world.from, .to = world.to, .profile = {}, .max_expanded = 1000'000'000},
         Stop());
     const double seconds = ProcessorSeconds() - begin;
+    const double waited = absl::ToDoubleSeconds(SteadyNow() - asked);
     if (!result.ok()) {
       std::printf("%s\n", result.status().ToString().c_str());
       return 0.0;
     }
     graph_cost = result->graph_cost;
     std::printf(
-        "%5zu MiB  %-4s %7.2f s  expanded %9llu  prepared %5llu  unpacked %5llu  decoded %6llu  "
+        "%5zu MiB  %-4s %7.2f s (%.2f s of processor)  expanded %9llu  prepared %5llu  unpacked "
+        "%5llu  decoded %6llu  "
         "peak %6.0f MB (+%.0f)"
         "  length %.2f  cost %.4f  graph cost %.4f  %zu waypoints  %s\n",
         cache_mib,
         i == 0 ? "cold" : "warm",
+        waited,
         seconds,
         static_cast<unsigned long long>(result->expanded),
         static_cast<unsigned long long>(planner.cache_statistics().prepared - prepared),

@@ -9,5 +9,5 @@ target_compile_options(planning_benchmark PRIVATE -Wno-array-bounds -Wno-stringo
 strata_executable(
   long_plan_benchmark long_plan_benchmark
   SOURCES long_plan_benchmark.cc
-  DEPS strata::planning strata::codec
+  DEPS strata::engine strata::planning strata::codec
 )
