@@ -66,7 +66,7 @@ absl::StatusOr<Eigen::AlignedBox3f> BoxOf(absl::string_view bytes,
           return absl::InvalidArgumentError(absl::StrCat(
               "local map: a tile of level ", tile.key.level, "; its tiles have level 0"));
         }
-        box.extend(MakeMlsTileRow(tile, 0, parameters.cell_size_m).box);
+        box.extend(BoxOf(tile, parameters.cell_size_m));
         return absl::OkStatus();
       });
   if (absl::IsDataLoss(visited)) return absl::InvalidArgumentError(visited.message());
