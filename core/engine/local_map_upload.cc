@@ -141,7 +141,7 @@ absl::StatusOr<ScanAck> UploadLocalMap(Map& map,
       [&] {
         if (ack.already_present) return;
         map.core().changes().Add(ack.commit_sequence, {ack.id}, {});
-        map.ScanCommitted();
+        map.ScanCommitted(ack.commit_sequence);
       }));
   return ack;
 }

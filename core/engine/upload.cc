@@ -72,7 +72,7 @@ absl::StatusOr<ScanAck> EngineUpload::Finish() {
       ticket_,
       call_.stop,
       [this] { return map_->CheckRoomForPending(); },
-      [this] { map_->ScanCommitted(); });
+      [this](ScanNumber number) { map_->ScanCommitted(number); });
   if (!ack.ok()) return Annotate(ack.status(), what);
   return ack;
 }
