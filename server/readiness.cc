@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/status/status.h"
 #include <glog/logging.h>
 
+#include "core/common/guarded.h"
 #include "core/common/log_line.h"
 #include "core/common/this_thread.h"
 
@@ -67,7 +69,11 @@ void Readiness::Loop() {
       absl::MutexLock lock(&mutex_);
       if (mutex_.AwaitWithTimeout(absl::Condition(&closing_), interval_)) return;
     }
-    Look();
+    // What there is no memory to look at now is looked at next time.
+    Guarded([this] {
+      Look();
+      return absl::OkStatus();
+    }).IgnoreError();
   }
 }
 

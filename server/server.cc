@@ -142,8 +142,13 @@ std::vector<ReadinessCheck> OwnChecks(api::Database& db, const Listener& listene
   return {{"disk", [&db] { return WhyNoDisk(HealthOf(db)); }},
           {"maps",
            [&db] {
-             const std::vector<std::string> maps = HealthOf(db).maps_not_opened;
-             return maps.empty() ? "" : absl::StrCat("not opened: ", absl::StrJoin(maps, ", "));
+             const EngineHealth health = HealthOf(db);
+             std::vector<std::string> faults = health.maps_taken_away;
+             if (!health.maps_not_opened.empty()) {
+               faults.push_back(
+                   absl::StrCat("not opened: ", absl::StrJoin(health.maps_not_opened, ", ")));
+             }
+             return absl::StrJoin(faults, "; ");
            }},
           {"commits", [&db] { return absl::StrJoin(HealthOf(db).maps_not_written, "; "); }},
           {"listener", [&listener] {

@@ -8,7 +8,6 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "absl/strings/str_join.h"
 #include "absl/time/clock.h"
 
 #include "core/common/status.h"
@@ -79,9 +78,6 @@ absl::Status List(const Written& written, std::ostream& out) {
   constexpr char kRow[] = "%-24s %-12s %-11s %-20s %-20s %s\n";
   out << absl::StreamFormat(kRow, "name", "id", "by", "created", "expires", "maps");
   for (const Grant& grant : grants) {
-    const auto map = [](std::string* text, const auto& entry) {
-      absl::StrAppend(text, entry.first, ":", RightName(entry.second));
-    };
     const bool expired = absl::Now() >= grant.expires;
     out << absl::StreamFormat(kRow,
                               grant.name,
@@ -89,7 +85,7 @@ absl::Status List(const Written& written, std::ostream& out) {
                               grant.by_certificate() ? "certificate" : "token",
                               TimeText(grant.created),
                               expired ? "expired" : TimeText(grant.expires),
-                              absl::StrJoin(grant.maps, " ", map));
+                              grant.RightsText());
   }
   return absl::OkStatus();
 }

@@ -40,7 +40,7 @@ absl::StatusOr<std::string> EncodeLocalMap(const MlsMap& map, std::size_t max_pa
   }
   std::string bytes;
   for (const MlsTile& tile : map.tiles) {
-    const std::string encoded = EncodeMlsTile(tile);
+    STRATA_ASSIGN_OR_RETURN(const std::string encoded, EncodeMlsTile(tile));
     for (std::size_t i = 0; i < kLengthBytes; ++i) {
       bytes.push_back(static_cast<char>((encoded.size() >> (8 * i)) & 0xFF));
     }

@@ -19,7 +19,7 @@ namespace strata {
 inline constexpr std::size_t kMaxLocalMapPatches = std::size_t{1} << 24;
 
 // Every tile as core/codec writes it, its length (32 bits, little-endian) in front. Exact.
-// INVALID_ARGUMENT beyond `max_patches`: what is written can be read.
+// INVALID_ARGUMENT beyond `max_patches`, and errors of EncodeMlsTile: what is written can be read.
 absl::StatusOr<std::string> EncodeLocalMap(const MlsMap& map,
                                            std::size_t max_patches = kMaxLocalMapPatches);
 // DATA_LOSS for anything else. RESOURCE_EXHAUSTED beyond kMaxLocalMapPatches, before more is

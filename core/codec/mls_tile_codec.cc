@@ -221,8 +221,8 @@ bool CodeVotes(Coder& coder, std::size_t patch_count, std::span<ClassVotes> vote
   return true;
 }
 
-bool Disjoint(const Patch& below, const Patch& above) {
-  return below.cell != above.cell || below.z_max < above.z_min;
+bool InOrder(const Patch& before, const Patch& after) {
+  return before.cell != after.cell ? before.cell < after.cell : before.z_max < after.z_min;
 }
 
 // A patch, its cell and what lies beside it.
@@ -241,8 +241,27 @@ absl::Status DecodePatches(ColumnDecoder& decoder,
   for (std::size_t i = 0; i < cells.size(); ++i) {
     patches[i].cell = cells[i];
     if (!CodePatch(decoder, neighbours[i], patches, patches[i]) ||
-        (i > 0 && !Disjoint(patches[i - 1], patches[i]))) {
+        (i > 0 && !InOrder(patches[i - 1], patches[i]))) {
       return Damaged(absl::StrCat("patch ", i, " is out of range or order"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status NotATile(const TileKey& key, absl::string_view what) {
+  return absl::InvalidArgumentError(absl::StrCat("MLS tile ", key.ToString(), ": ", what));
+}
+
+absl::Status EncodePatches(ColumnEncoder& encoder,
+                           const MlsTile& tile,
+                           std::span<const std::uint16_t> cells) {
+  const std::vector<Patch>& patches = tile.patches;
+  const std::vector<SurfacesBeside> neighbours = FindNeighbours(cells);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    Patch patch = patches[i];
+    if (!CodePatch(encoder, neighbours[i], patches, patch) ||
+        (i > 0 && !InOrder(patches[i - 1], patches[i]))) {
+      return NotATile(tile.key, absl::StrCat("patch ", i, " is out of range or order"));
     }
   }
   return absl::OkStatus();
@@ -250,21 +269,42 @@ absl::Status DecodePatches(ColumnDecoder& decoder,
 
 }  // namespace
 
-std::string EncodeMlsTile(const MlsTile& tile) {
+absl::Status CheckTileSize(const MlsTile& tile) {
+  const auto check = [&tile](std::size_t count, absl::string_view what, std::size_t most) {
+    if (count <= most) return absl::OkStatus();
+    return absl::ResourceExhaustedError(absl::StrCat("tile ",
+                                                     tile.key.ToString(),
+                                                     " of ",
+                                                     count,
+                                                     " ",
+                                                     what,
+                                                     "; at most ",
+                                                     most,
+                                                     " can be kept of one"));
+  };
+  STRATA_RETURN_IF_ERROR(check(tile.patches.size(), "patches", kMaxTilePatches));
+  return check(tile.votes.size(), "votes", kMaxTileVotes);
+}
+
+absl::StatusOr<std::string> EncodeMlsTile(const MlsTile& tile) {
+  STRATA_RETURN_IF_ERROR(CheckTileSize(tile));
+  if (!tile.colour.empty() && tile.colour.size() != tile.patches.size()) {
+    return NotATile(
+        tile.key,
+        absl::StrCat(tile.colour.size(), " colours for ", tile.patches.size(), " patches"));
+  }
   std::vector<std::uint16_t> cells(tile.patches.size());
   for (std::size_t i = 0; i < cells.size(); ++i) {
     cells[i] = static_cast<std::uint16_t>(tile.patches[i].cell);
   }
-  const std::vector<SurfacesBeside> neighbours = FindNeighbours(cells);
   ColumnEncoder encoder(kColumnCount);
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    Patch patch = tile.patches[i];
-    CodePatch(encoder, neighbours[i], tile.patches, patch);
-  }
+  STRATA_RETURN_IF_ERROR(EncodePatches(encoder, tile, cells));
   std::vector<ColourSum> colours = tile.colour;
   CodeColours(encoder, tile.patches, colours);
   std::vector<ClassVotes> votes = tile.votes;
-  CodeVotes(encoder, tile.patches.size(), votes);
+  if (!CodeVotes(encoder, tile.patches.size(), votes)) {
+    return NotATile(tile.key, "votes out of range or order");
+  }
 
   std::string body;
   PutTileHeader(body, tile.key);

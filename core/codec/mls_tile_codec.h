@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <string>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
@@ -17,11 +18,15 @@ namespace strata {
 inline constexpr std::uint16_t kMlsTileVersion = 1;
 inline constexpr std::size_t kMaxTileVotes = std::size_t{1} << 23;
 
-// The tile in the format of FORMAT.md, envelope included; *DecodeMlsTile(EncodeMlsTile(tile)) ==
-// tile, bit for bit. A pure function of the tile. REQUIRES: patches sorted by (cell, z_min) and
-// disjoint within a cell, at most kMaxTilePatches; layers as MlsTile says, at most kMaxTileVotes
-// votes. row_begin is not looked at. Thread-safe.
-std::string EncodeMlsTile(const MlsTile& tile);
+// RESOURCE_EXHAUSTED, naming the tile and the bound, beyond kMaxTilePatches or kMaxTileVotes: what
+// no decoder takes.
+absl::Status CheckTileSize(const MlsTile& tile);
+
+// The tile in the format of FORMAT.md, envelope included; *DecodeMlsTile(*EncodeMlsTile(tile)) ==
+// tile, bit for bit. A pure function of the tile. row_begin is not looked at. RESOURCE_EXHAUSTED as
+// CheckTileSize; INVALID_ARGUMENT naming what is wrong unless patches are in range, sorted by
+// (cell, z_min) and disjoint within a cell, and layers as MlsTile says. Thread-safe.
+absl::StatusOr<std::string> EncodeMlsTile(const MlsTile& tile);
 
 // DATA_LOSS for bytes that are not an intact tile, UNIMPLEMENTED for those of a later version.
 // Every tile it yields keeps the rules of MlsTile. Never allocates more than 150 bytes ×

@@ -293,7 +293,16 @@ bool CodeSurface(Coder& coder,
 
 }  // namespace
 
-std::string EncodeSurfaceTile(const SurfaceTile& tile) {
+absl::StatusOr<std::string> EncodeSurfaceTile(const SurfaceTile& tile) {
+  if (tile.surfaces.size() > kMaxTilePatches) {
+    return absl::ResourceExhaustedError(absl::StrCat("tile ",
+                                                     tile.key.ToString(),
+                                                     " of ",
+                                                     tile.surfaces.size(),
+                                                     " surfaces; at most ",
+                                                     kMaxTilePatches,
+                                                     " can be kept of one"));
+  }
   std::vector<Codes> surfaces(tile.surfaces.size());
   std::vector<std::uint16_t> cells(tile.surfaces.size());
   for (std::size_t i = 0; i < surfaces.size(); ++i) {

@@ -15,7 +15,7 @@ namespace strata {
 inline constexpr std::uint16_t kSurfaceTileVersion = 2;
 
 // The tile in the format of FORMAT.md, envelope included. A pure function of the tile, and
-// EncodeSurfaceTile(*DecodeSurfaceTile(bytes)) == bytes. What a reader gets back:
+// *EncodeSurfaceTile(*DecodeSurfaceTile(bytes)) == bytes. What a reader gets back:
 //   key, version, cell, traversability, class_id, confidence, vertical()   exactly
 //   z_m       within 1/1024 m (0.98 mm): a multiple of 1/512 m; |z| ≤ 32,767 m
 //   depth_m   the same, but never 0 when it was not: a depth below 1/1024 m becomes 1/512 m
@@ -23,9 +23,9 @@ inline constexpr std::uint16_t kSurfaceTileVersion = 2;
 //   cost      where traversable 1 + cost within 6 % (clamped at 5e12); elsewhere within a
 //   factor 1.19;
 //             0 and infinity exactly
-// Not a number becomes 0. REQUIRES: surfaces sorted by (cell, z), at most kMaxTilePatches.
-// row_begin is not looked at. Thread-safe.
-std::string EncodeSurfaceTile(const SurfaceTile& tile);
+// Not a number becomes 0. row_begin is not looked at. RESOURCE_EXHAUSTED, naming the tile and the
+// bound, beyond kMaxTilePatches. REQUIRES: surfaces sorted by (cell, z). Thread-safe.
+absl::StatusOr<std::string> EncodeSurfaceTile(const SurfaceTile& tile);
 
 // DATA_LOSS for bytes that are not an intact tile, UNIMPLEMENTED for those of a later version.
 // Never allocates more than 100 bytes × kMaxTilePatches. Thread-safe.

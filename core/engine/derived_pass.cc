@@ -128,7 +128,8 @@ absl::Status DerivedPass::CheckBlock(StorageReader& reader, const KeySet& keys, 
                             reader.FindMlsTile(key, options_.version));
     if (tile == nullptr && !stored.has_value()) continue;
     if (tile != nullptr && stored.has_value()) {
-      const MlsTileRow row = MakeMlsTileRow(*tile, stored->version, cell_size_m);
+      STRATA_ASSIGN_OR_RETURN(const MlsTileRow row,
+                              MakeMlsTileRow(*tile, stored->version, cell_size_m));
       if (row.bytes == stored->bytes && row.digest == stored->digest &&
           row.patches == stored->patches && row.cells == stored->cells &&
           row.box.min() == stored->box.min() && row.box.max() == stored->box.max()) {

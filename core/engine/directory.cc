@@ -193,7 +193,7 @@ std::uint64_t MapDirectory::RemovedClock() const {
 absl::Status MapDirectory::NoteRemovedClock(std::uint64_t clock) const {
   if (clock <= RemovedClock()) return absl::OkStatus();
   const fs::path making = path_ / absl::StrCat(kMakingPrefix, "clock");
-  const int fd = ::open(making.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  const int fd = ::open(making.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640);
   if (fd < 0) return ErrnoStatus("cannot open", making);
   const std::string text = absl::StrCat(clock, "\n");
   const bool written = ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&

@@ -126,7 +126,9 @@ absl::Status Integrator::Commit(const TileChange& change,
   const std::uint64_t floor = core_.snapshots().Floor();
   std::vector<MlsTileRow> rows;  // encoded here: acknowledgements wait for the writer
   for (const auto& [key, tile] : change.tiles) {
-    if (tile != nullptr) rows.push_back(MakeMlsTileRow(*tile, change.version, cell_size_m));
+    if (tile == nullptr) continue;
+    STRATA_ASSIGN_OR_RETURN(MlsTileRow row, MakeMlsTileRow(*tile, change.version, cell_size_m));
+    rows.push_back(std::move(row));
   }
   absl::Status committed = core_.Publish(
       scans, NoticesOf(change.surfaces), awaited, [&](StorageWriter& writer) -> absl::Status {
@@ -155,6 +157,7 @@ absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
     STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
     STRATA_RETURN_IF_ERROR(CheckContributes(local_map, source.dropped(), scan, sensor));
     if (!parameters.keep_points) {
+      STRATA_RETURN_IF_ERROR(CheckRoomInTiles(local_map, {}));
       STRATA_ASSIGN_OR_RETURN(done.local_map, EncodeLocalMap(local_map));
     }
     STRATA_ASSIGN_OR_RETURN(done.placement, aligner_.Place(scan, local_map, reader, source));
@@ -171,6 +174,7 @@ absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
     STRATA_ASSIGN_OR_RETURN(MlsTilePtr held, store_.Load(reader, tile.key, version));
     tiles[tile.key] = std::move(held);
   }
+  STRATA_RETURN_IF_ERROR(CheckRoomInTiles(contribution, tiles));
   JoinAndForget(std::move(contribution), tiles);
   aligner_.Add(scan, done.placement.T_map_scan);
   batch.integrated.push_back(std::move(done));

@@ -66,7 +66,7 @@ absl::StatusOr<Eigen::AlignedBox3f> BoxOf(absl::string_view bytes,
           return absl::InvalidArgumentError(absl::StrCat(
               "local map: a tile of level ", tile.key.level, "; its tiles have level 0"));
         }
-        box.extend(MakeMlsTileRow(tile, 0, parameters.cell_size_m).box);
+        box.extend(BoxOf(tile, parameters.cell_size_m));
         return absl::OkStatus();
       });
   if (absl::IsDataLoss(visited)) return absl::InvalidArgumentError(visited.message());
@@ -141,7 +141,7 @@ absl::StatusOr<ScanAck> UploadLocalMap(Map& map,
       [&] {
         if (ack.already_present) return;
         map.core().changes().Add(ack.commit_sequence, {ack.id}, {});
-        map.ScanCommitted();
+        map.ScanCommitted(ack.commit_sequence);
       }));
   return ack;
 }

@@ -42,7 +42,7 @@ class Map {
   // RESOURCE_EXHAUSTED while too many scans wait for integration.
   absl::Status CheckRoomForPending() const { return worker_->CheckRoom(); }
   // A scan became durable.
-  void ScanCommitted() { worker_->ScanCommitted(); }
+  void ScanCommitted(ScanNumber number) { worker_->ScanCommitted(number); }
   // A job was queued.
   void JobQueued() { runner_->JobQueued(); }
 

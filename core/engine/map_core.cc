@@ -79,6 +79,11 @@ MapInfo MapCore::info() const {
   return info_;
 }
 
+absl::Status MapCore::CheckInPlace() const {
+  absl::MutexLock lock(&mutex_);
+  return storage_ == nullptr ? absl::OkStatus() : storage_->CheckInPlace();
+}
+
 void MapCore::set_default_profile(const RobotProfile& profile) {
   absl::MutexLock lock(&mutex_);
   info_.parameters.default_profile = profile;

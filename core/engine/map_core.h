@@ -46,6 +46,8 @@ class MapCore {
 
   absl::StatusOr<ReaderPool::Lease> Reader() { return readers_.Take(); }
   WriterThread& writer() { return writer_; }
+  // UNAVAILABLE once the map's file was removed or replaced; not of a map that is closed.
+  absl::Status CheckInPlace() const;
   const DiskSpace& disk() const { return disk_; }
   Snapshots& snapshots() { return snapshots_; }
   ChangeLog& changes() { return changes_; }

@@ -45,6 +45,16 @@ absl::Status NoSuchMap(absl::string_view name) {
 
 constexpr absl::Duration kRecently = absl::Seconds(10);
 
+absl::Duration PendingAge(Map& map, StorageReader& reader) {
+  ScanQuery query;
+  query.state = ScanState::kPending;
+  query.skip_damaged = true;  // it waits for ever, and verify names it
+  query.limit = 1;
+  const auto oldest = reader.ListScans(query, map.core().snapshots().current().epoch);
+  if (!oldest.ok() || oldest->empty()) return absl::ZeroDuration();
+  return SteadyNow() - map.worker().WaitingSince(oldest->front().scan.number);
+}
+
 // Numbers that cannot be read now stay zero: they are looked at again in some seconds.
 MapNumbers NumbersOfMap(Map& map, const std::filesystem::path& file) {
   MapNumbers numbers;
@@ -73,6 +83,7 @@ MapNumbers NumbersOfMap(Map& map, const std::filesystem::path& file) {
     numbers.scans_pending = totals->pending;
     numbers.scans_failed = totals->failed;
   }
+  if (numbers.scans_pending > 0) numbers.pending_age = PendingAge(map, **reader);
   const auto tiles = (*reader)->ListMlsTiles(map.core().snapshots().current().tile_version);
   if (tiles.ok()) numbers.tiles = tiles->size();
   return numbers;
@@ -105,17 +116,26 @@ EngineNumbers EngineMaps::Numbers() const {
 
 EngineHealth EngineMaps::Health() const {
   EngineHealth health;
+  std::vector<std::shared_ptr<Map>> open;
   {
     absl::MutexLock lock(&mutex_);
     for (const auto& [name, map] : maps_) {
       if (map.ok()) {
-        const absl::Status failed = (*map)->core().writer().FailedWithin(kRecently);
-        if (failed.ok() || absl::IsResourceExhausted(failed)) continue;
-        health.maps_not_written.push_back(absl::StrCat(name, ": ", failed.message()));
+        open.push_back(*map);
       } else if (!absl::IsAborted(map.status())) {  // being made or deleted
         health.maps_not_opened.push_back(name);
       }
     }
+  }
+  for (const std::shared_ptr<Map>& map : open) {
+    const std::string& name = map->core().name();
+    if (const absl::Status taken = map->core().CheckInPlace(); !taken.ok()) {
+      health.maps_taken_away.push_back(absl::StrCat(name, ": ", taken.message()));
+      continue;  // which is why it is not written
+    }
+    const absl::Status failed = map->core().writer().FailedWithin(kRecently);
+    if (failed.ok() || absl::IsResourceExhausted(failed)) continue;
+    health.maps_not_written.push_back(absl::StrCat(name, ": ", failed.message()));
   }
   std::error_code error;
   const std::filesystem::space_info disk = std::filesystem::space(options_.directory, error);

@@ -18,6 +18,7 @@
 #include <Eigen/Geometry>
 
 #include "core/codec/mls_tile_codec.h"
+#include "core/codec/occupancy.h"
 #include "core/common/checksum.h"
 #include "core/common/status.h"
 #include "core/engine/parallel.h"
@@ -31,24 +32,50 @@ std::size_t MemoryBytes(const MlsTile& tile) {
          tile.colour.capacity() * sizeof(ColourSum) + tile.votes.capacity() * sizeof(ClassVotes);
 }
 
-MlsTileRow MakeMlsTileRow(const MlsTile& tile, std::uint64_t version, double cell_size_m) {
+Eigen::AlignedBox3d BoxOf(const MlsTile& tile, double cell_size_m) {
+  Eigen::AlignedBox3d box;
+  for (const Patch& patch : tile.patches) {
+    const CellIndex cell = CellOf(tile.key, static_cast<std::uint16_t>(patch.cell));
+    box.extend(Eigen::Vector3d(cell.x * cell_size_m, cell.y * cell_size_m, patch.bottom_m()));
+    box.extend(
+        Eigen::Vector3d((cell.x + 1) * cell_size_m, (cell.y + 1) * cell_size_m, patch.top_m()));
+  }
+  return box;
+}
+
+absl::StatusOr<MlsTileRow> MakeMlsTileRow(const MlsTile& tile,
+                                          std::uint64_t version,
+                                          double cell_size_m) {
   MlsTileRow row;
   row.key = tile.key;
   row.version = version;
   row.patches = tile.patches.size();
   for (std::size_t i = 0; i < tile.patches.size(); ++i) {
-    const Patch& patch = tile.patches[i];
-    if (i == 0 || patch.cell != tile.patches[i - 1].cell) ++row.cells;
-    const CellIndex cell = CellOf(tile.key, static_cast<std::uint16_t>(patch.cell));
-    row.box.extend(Eigen::Vector3d(cell.x * cell_size_m, cell.y * cell_size_m, patch.bottom_m()));
-    row.box.extend(
-        Eigen::Vector3d((cell.x + 1) * cell_size_m, (cell.y + 1) * cell_size_m, patch.top_m()));
+    if (i == 0 || tile.patches[i].cell != tile.patches[i - 1].cell) ++row.cells;
   }
-  row.bytes = EncodeMlsTile(tile);
+  row.box = BoxOf(tile, cell_size_m);
+  STRATA_ASSIGN_OR_RETURN(row.bytes, EncodeMlsTile(tile));
   ContentHasher hasher;
   hasher.Add(row.bytes);
   row.digest = hasher.HexDigest();
   return row;
+}
+
+absl::Status CheckRoomInTiles(const MlsMap& contribution, const MlsTileMap& tiles) {
+  for (const MlsTile& tile : contribution.tiles) {
+    const auto found = tiles.find(tile.key);
+    const MlsTile* const held = found == tiles.end() ? nullptr : found->second.get();
+    absl::Status fits = CheckTileSize(tile);
+    if (fits.ok() && held != nullptr &&
+        (tile.patches.size() + held->patches.size() > kMaxTilePatches ||
+         tile.votes.size() + held->votes.size() > kMaxTileVotes)) {
+      fits = CheckTileSize(JoinTiles(*held, tile, contribution.parameters));
+    }
+    if (fits.ok()) continue;
+    return absl::OutOfRangeError(absl::StrCat(
+        "no room in the map: ", fits.message(), "; take a map of larger cells or gaps"));
+  }
+  return absl::OkStatus();
 }
 
 void JoinContribution(const MlsMap& contribution,

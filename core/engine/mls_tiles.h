@@ -12,6 +12,7 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include <Eigen/Geometry>
 
 #include "core/common/lru_cache.h"
 #include "core/common/stop.h"
@@ -39,8 +40,17 @@ struct PlacedScanRecord {
 // Bytes a tile takes in memory.
 std::size_t MemoryBytes(const MlsTile& tile);
 
-// The row of a tile. `cell_size_m` of the map.
-MlsTileRow MakeMlsTileRow(const MlsTile& tile, std::uint64_t version, double cell_size_m);
+// Around all patches of a tile. `cell_size_m` of the map.
+Eigen::AlignedBox3d BoxOf(const MlsTile& tile, double cell_size_m);
+
+// The row of a tile; errors of EncodeMlsTile.
+absl::StatusOr<MlsTileRow> MakeMlsTileRow(const MlsTile& tile,
+                                          std::uint64_t version,
+                                          double cell_size_m);
+
+// Whether each tile of `contribution`, joined with what `tiles` has there, can be kept:
+// OUT_OF_RANGE, naming the first that cannot, the bound and the cure.
+absl::Status CheckRoomInTiles(const MlsMap& contribution, const MlsTileMap& tiles);
 
 // Joins the tiles of `contribution` into `tiles`, which must hold (maybe as nullptr) every tile it
 // touches, but those that `wanted` does not take.

@@ -25,6 +25,7 @@ struct MapNumbers {
   absl::Time backed_up = absl::InfinitePast();  // the last whole backup since the engine began
   std::uint64_t scans = 0;
   std::uint64_t scans_pending = 0;  // acknowledged, not joined yet
+  absl::Duration pending_age;       // of the oldest of those, since the engine began at most
   std::uint64_t scans_failed = 0;
   std::uint64_t tiles = 0;         // level of detail 0
   std::uint64_t queued_bytes = 0;  // points that wait for the disk
@@ -42,6 +43,8 @@ struct EngineNumbers {
 // Whether an engine can do its work.
 struct EngineHealth {
   std::vector<std::string> maps_not_opened;  // names
+  // Whose file was removed or replaced while it was open, as "NAME: what to do".
+  std::vector<std::string> maps_taken_away;
   // Whose last commit failed in the store, seconds ago, as "NAME: why"; but for those that merely
   // had no room.
   std::vector<std::string> maps_not_written;

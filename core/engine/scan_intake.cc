@@ -200,7 +200,7 @@ absl::StatusOr<ScanAck> ScanIntake::Commit(StorageWriter& writer, CheckRoom chec
 absl::StatusOr<ScanAck> ScanIntake::Finish(std::uint64_t ticket,
                                            const Stop& stop,
                                            CheckRoom check_room,
-                                           absl::FunctionRef<void()> committed) {
+                                           absl::FunctionRef<void(ScanNumber)> committed) {
   absl::MutexLock lock(&mutex_);
   STRATA_RETURN_IF_ERROR(CheckTicket(ticket));
   if (piece_.size() > 0) STRATA_RETURN_IF_ERROR(SealPiece());
@@ -221,7 +221,7 @@ absl::StatusOr<ScanAck> ScanIntake::Finish(std::uint64_t ticket,
       [&] {
         if (ack.already_present) return;
         core_.changes().Add(ack.commit_sequence, {ack.id}, {});
-        committed();
+        committed(ack.commit_sequence);
       });
   if (absl::IsAlreadyExists(done)) Abandon();
   STRATA_RETURN_IF_ERROR(done);

@@ -48,7 +48,7 @@ class ScanIntake {
   absl::StatusOr<ScanAck> Finish(std::uint64_t ticket,
                                  const Stop& stop,
                                  CheckRoom check_room,
-                                 absl::FunctionRef<void()> committed);
+                                 absl::FunctionRef<void(ScanNumber)> committed);
   // The stream has ended. Of an announced scan everything that came goes to disk; any other is
   // forgotten.
   void EndStream(std::uint64_t ticket);

@@ -1,6 +1,7 @@
 #include "core/engine/staged_tiles.h"
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "absl/functional/function_ref.h"
@@ -30,7 +31,8 @@ absl::Status StagedTiles::Put(const MlsTileMap& tiles, const SurfaceTileMaker::R
     if (tile == nullptr) {
       gone_.insert(key);
     } else {
-      rows.push_back(MakeMlsTileRow(*tile, version_, cell_size_m));
+      STRATA_ASSIGN_OR_RETURN(MlsTileRow row, MakeMlsTileRow(*tile, version_, cell_size_m));
+      rows.push_back(std::move(row));
     }
   }
   for (const SurfaceTileRow& row : surfaces) served_.insert(row.key);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/codec/occupancy.h"
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/status.h"
 #include "core/engine/parallel.h"
@@ -93,11 +95,12 @@ absl::StatusOr<std::optional<SurfaceTileRow>> SurfaceTileMaker::Differs(
   }
   if (stored.has_value()) {
     tile.version = stored->version;
-    if (EncodeSurfaceTile(tile) == stored->bytes) return std::optional<SurfaceTileRow>();
+    STRATA_ASSIGN_OR_RETURN(const std::string same, EncodeSurfaceTile(tile));
+    if (same == stored->bytes) return std::optional<SurfaceTileRow>();
   }
   tile.version = options_.version;
   row.patches = tile.surfaces.size();
-  row.bytes = EncodeSurfaceTile(tile);
+  STRATA_ASSIGN_OR_RETURN(row.bytes, EncodeSurfaceTile(tile));
   row.size_bytes = row.bytes.size();
   return std::optional<SurfaceTileRow>(std::move(row));
 }
@@ -153,6 +156,7 @@ absl::StatusOr<SurfaceTile> SurfaceTileMaker::Derive(const TileKey& key) {
     STRATA_ASSIGN_OR_RETURN(held[static_cast<std::size_t>(i)], Served(ChildOf(key, i)));
     children[static_cast<std::size_t>(i)] = held[static_cast<std::size_t>(i)].get();
   }
+  static_assert(kMaxOverviewSurfaces <= kMaxTilePatches);
   return MakeOverviewTile(key, children, parameters_.mls);
 }
 
@@ -170,7 +174,8 @@ absl::StatusOr<SurfaceTileMaker::SurfacePtr> SurfaceTileMaker::Served(const Tile
   absl::StatusOr<SurfaceTile> tile = DecodeSurfaceTile(bytes);
   if (tile.ok()) return std::make_shared<const SurfaceTile>(*std::move(tile));
   STRATA_ASSIGN_OR_RETURN(const SurfaceTile derived, Derive(key));
-  tile = DecodeSurfaceTile(EncodeSurfaceTile(derived));
+  STRATA_ASSIGN_OR_RETURN(bytes, EncodeSurfaceTile(derived));
+  tile = DecodeSurfaceTile(bytes);
   if (!tile.ok()) return tile.status();
   return std::make_shared<const SurfaceTile>(*std::move(tile));
 }

@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 
+#include "core/common/guarded.h"
 #include "core/common/status.h"
 #include "core/storage/storage.h"
 
@@ -45,7 +46,13 @@ absl::Status EngineUpload::LookForPresent(const ScanHeader& header) {
   return absl::OkStatus();
 }
 
-EngineUpload::~EngineUpload() { map_->uploads().Release(std::move(intake_), ticket_); }
+// What there is no memory to keep is sent again.
+EngineUpload::~EngineUpload() {
+  Guarded([this] {
+    map_->uploads().Release(std::move(intake_), ticket_);
+    return absl::OkStatus();
+  }).IgnoreError();
+}
 
 absl::Status EngineUpload::Write(const PointCloud& chunk) {
   if (failed_.ok()) failed_ = call_.stop.status();
@@ -65,7 +72,7 @@ absl::StatusOr<ScanAck> EngineUpload::Finish() {
       ticket_,
       call_.stop,
       [this] { return map_->CheckRoomForPending(); },
-      [this] { map_->ScanCommitted(); });
+      [this](ScanNumber number) { map_->ScanCommitted(number); });
   if (!ack.ok()) return Annotate(ack.status(), what);
   return ack;
 }

@@ -16,6 +16,7 @@
 #include "core/common/guarded.h"
 #include "core/common/log_line.h"
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "core/common/this_thread.h"
 #include "core/engine/rebuild.h"
 
@@ -45,9 +46,12 @@ absl::Status Refusal() {
 }  // namespace
 
 Worker::Worker(MapCore& core, Quarantine& quarantine, std::uint64_t pending)
-    : core_(core), quarantine_(quarantine), integrator_(core), pending_(pending), thread_([this] {
-        Loop();
-      }) {}
+    : core_(core),
+      quarantine_(quarantine),
+      integrator_(core),
+      pending_(pending),
+      waiting_(SteadyNow()),
+      thread_([this] { Loop(); }) {}
 
 Worker::~Worker() { Close(); }
 
@@ -59,9 +63,15 @@ absl::Status Worker::CheckRoom() const {
       absl::StrCat(pending_, " scans wait for integration, at most ", most, "; retry later"));
 }
 
-void Worker::ScanCommitted() {
+void Worker::ScanCommitted(ScanNumber number) {
   absl::MutexLock lock(&mutex_);
   ++pending_;
+  waiting_.Add(number, SteadyNow());
+}
+
+absl::Time Worker::WaitingSince(ScanNumber oldest) {
+  absl::MutexLock lock(&mutex_);
+  return waiting_.Since(oldest);
 }
 
 absl::Status Worker::Execute(const Stop& stop, Command command, absl::string_view what) {
@@ -156,6 +166,7 @@ void Worker::RunBatch() {
   if (done.ok()) {
     // Scans that were deleted while they waited are counted, but are not there any more.
     pending_ -= count == 0 ? waited : std::min(pending_, static_cast<std::uint64_t>(count));
+    if (pending_ == 0) waiting_.Clear();
     return;
   }
   LogStopped("integration", core_.name(), done);

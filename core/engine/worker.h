@@ -13,11 +13,14 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
 
 #include "core/common/stop.h"
 #include "core/engine/integrator.h"
 #include "core/engine/map_core.h"
 #include "core/engine/quarantine.h"
+#include "core/engine/waiting_scans.h"
+#include "core/storage/records.h"
 
 namespace strata {
 
@@ -32,8 +35,10 @@ class Worker {
 
   // RESOURCE_EXHAUSTED while too many scans wait for integration.
   absl::Status CheckRoom() const;
-  // One more scan waits.
-  void ScanCommitted();
+  // One more scan waits. Takes no memory.
+  void ScanCommitted(ScanNumber number);
+  // Since when the scan waits that is the first of those that do; as of this process at most.
+  absl::Time WaitingSince(ScanNumber oldest);
 
   // Runs `command` on the worker's thread, before the next batch, and returns its status. `stop`
   // ends the waiting (CANCELLED, DEADLINE_EXCEEDED, naming what is waited for); once begun, a
@@ -77,6 +82,7 @@ class Worker {
   std::deque<Task*> tasks_ ABSL_GUARDED_BY(mutex_);
   absl::string_view running_ ABSL_GUARDED_BY(mutex_) = "recovery";  // what the thread is at
   std::uint64_t pending_ ABSL_GUARDED_BY(mutex_);
+  WaitingScans waiting_ ABSL_GUARDED_BY(mutex_);
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   bool refuses_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;

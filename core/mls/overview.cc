@@ -163,6 +163,19 @@ class RowReader {
   const Surface* end_;
 };
 
+// `surfaces` are sorted by (cell, z).
+void KeepHighest(std::vector<Surface>& surfaces) {
+  std::size_t kept = 0;
+  for (std::size_t begin = 0; begin < surfaces.size();) {
+    std::size_t end = begin + 1;
+    while (end < surfaces.size() && surfaces[end].cell == surfaces[begin].cell) ++end;
+    const std::size_t first = end - std::min(end - begin, kOverviewLayers);
+    for (std::size_t i = first; i < end; ++i) surfaces[kept++] = surfaces[i];
+    begin = end;
+  }
+  surfaces.resize(kept);
+}
+
 class OverviewMaker {
  public:
   OverviewMaker(const TileKey& parent, const MlsParameters& parameters)
@@ -190,6 +203,7 @@ class OverviewMaker {
   }
 
   SurfaceTile Finish() {
+    if (tile_.surfaces.size() > kMaxOverviewSurfaces) KeepHighest(tile_.surfaces);
     tile_.IndexRows();
     return std::move(tile_);
   }

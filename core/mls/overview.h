@@ -4,12 +4,18 @@
 #define STRATA_CORE_MLS_OVERVIEW_H_
 
 #include <array>
+#include <cstddef>
 
 #include "core/mls/mls_parameters.h"
 #include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
 
 namespace strata {
+
+// Highest surfaces of each cell that are left of an overview that would have more in all than a
+// tile may.
+inline constexpr std::size_t kOverviewLayers = 64;
+inline constexpr std::size_t kMaxOverviewSurfaces = kOverviewLayers * kTileCells * kTileCells;
 
 // The tile that `key` is a quarter of. REQUIRES: key.level < kMaxLevel.
 TileKey ParentOf(const TileKey& key);
@@ -32,6 +38,7 @@ TileKey ChildOf(const TileKey& parent, int index);
 //   class      that of most among those that have one, the smaller id on a tie
 //   traversability  that of most, the worse on a tie; unknown only if none is known
 //   cost       the plain mean
+// Beyond kMaxOverviewSurfaces each cell keeps its kOverviewLayers highest.
 SurfaceTile MakeOverviewTile(const TileKey& parent,
                              const std::array<const SurfaceTile*, 4>& children,
                              const MlsParameters& parameters);

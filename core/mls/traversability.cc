@@ -105,8 +105,23 @@ double Noise(const HeightSample& a, const HeightSample& b) {
   return kNoiseGate * std::sqrt(double{a.variance_m2} + b.variance_m2);
 }
 
-// Of an empty column whatever lies there.
+// The part of a column, lowest first, that has its nearest top: thousands may lie above each other,
+// and every surface beside them asks.
+std::span<const HeightSample> AroundHeight(std::span<const HeightSample> column, float z_m) {
+  const auto distance = [z_m](const HeightSample& sample) { return std::abs(sample.z_m - z_m); };
+  const auto above = std::lower_bound(
+      column.begin(), column.end(), z_m, [](const HeightSample& sample, float height_m) {
+        return sample.z_m < height_m;
+      });
+  auto first = above == column.begin() ? above : above - 1;
+  while (first != column.begin() && distance(*(first - 1)) == distance(*first)) --first;
+  return {first, above == column.end() ? above : above + 1};
+}
+
+// The lowest of those that are nearest; of an empty column whatever lies there.
 const HeightSample& Nearest(std::span<const HeightSample> column, float z_m) {
+  constexpr std::size_t kFew = 16;
+  if (column.size() > kFew) column = AroundHeight(column, z_m);
   const HeightSample* nearest = column.data();
   for (std::size_t i = 1; i < column.size(); ++i) {
     if (std::abs(column[i].z_m - z_m) < std::abs(nearest->z_m - z_m)) nearest = &column[i];

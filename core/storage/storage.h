@@ -230,6 +230,8 @@ class MapStorage {
   // Thread-safe; each reader is used by one thread at a time and must not outlive the storage.
   virtual absl::StatusOr<std::unique_ptr<StorageReader>> NewReader() = 0;
   virtual StorageWriter& writer() = 0;
+  // UNAVAILABLE once what it was opened from was removed or replaced. Thread-safe.
+  virtual absl::Status CheckInPlace() const = 0;
 };
 
 }  // namespace strata

@@ -12,13 +12,48 @@
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "server/access/token_file.h"
+#include "server/access/utc_text.h"
 
 namespace strata::server {
 namespace {
 
 constexpr absl::Duration kComplaintInterval = absl::Minutes(1);
 
+LogLine LineOf(absl::string_view change, const Grant& grant) {
+  LogLine line("audit");
+  line.Add("tokens", change)
+      .Add("object", grant.name)
+      .Add("grant", grant.id)
+      .Add("by", grant.by_certificate() ? "certificate" : "token")
+      .Add("rights", grant.RightsText())
+      .Add("expires", grant.expires == absl::InfiniteFuture() ? "never" : UtcText(grant.expires));
+  return line;
+}
+
+bool Same(const Grant& a, const Grant& b) {
+  return a.name == b.name && a.secret_sha256 == b.secret_sha256 && a.maps == b.maps &&
+         a.expires == b.expires;
+}
+
 }  // namespace
+
+std::vector<LogLine> ChangesBetween(const Grants& before, const Grants& after) {
+  std::vector<LogLine> lines;
+  for (const auto& [id, was] : before.by_id) {
+    const auto now = after.by_id.find(id);
+    if (now == after.by_id.end()) {
+      lines.push_back(LineOf("removed", was));
+    } else if (!Same(was, now->second)) {
+      lines.push_back(LineOf("changed", now->second));
+      lines.back().Add("was", was.name).Add("rights_before", was.RightsText());
+      if (was.secret_sha256 != now->second.secret_sha256) lines.back().Add("secret", "another");
+    }
+  }
+  for (const auto& [id, now] : after.by_id) {
+    if (!before.by_id.contains(id)) lines.push_back(LineOf("added", now));
+  }
+  return lines;
+}
 
 absl::StatusOr<std::unique_ptr<GrantTable>> GrantTable::Open(const std::filesystem::path& path,
                                                              absl::Duration interval) {
@@ -43,6 +78,9 @@ absl::Status GrantTable::Load() {
   for (Grant& grant : list) {
     if (grant.by_certificate()) grants->ids_by_certificate[grant.name] = grant.id;
     grants->by_id.emplace(grant.id, std::move(grant));
+  }
+  if (grants_ != nullptr) {
+    for (const LogLine& line : ChangesBetween(*grants_, *grants)) LOG(INFO) << line;
   }
   grants_ = std::move(grants);
   return absl::OkStatus();

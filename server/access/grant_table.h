@@ -9,6 +9,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
@@ -16,6 +17,7 @@
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 
+#include "core/common/log_line.h"
 #include "server/access/right.h"
 
 namespace strata::server {
@@ -26,10 +28,14 @@ struct Grants {
   std::map<std::string, std::string, std::less<>> ids_by_certificate;  // common name → id
 };
 
+// What the log says of grants that came, went or are others, a line for each: event=audit, and who
+// has which rights now and had before. Nothing of secrets but that one is another.
+std::vector<LogLine> ChangesBetween(const Grants& before, const Grants& after);
+
 // Follows a token file: looks at most once in `interval` whether it is another one, so that adding
 // and revoking need no restart. While the file cannot be read, what held goes on holding: a slip
 // of an editor must not stop every robot. It is tried again at every look and said in the log, at
-// once and every minute. Thread-safe.
+// once and every minute. What changes is said there, too. Thread-safe.
 class GrantTable {
  public:
   // What ReadTokenFile answers.

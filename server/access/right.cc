@@ -1,5 +1,10 @@
 #include "server/access/right.h"
 
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+
 namespace strata::server {
 
 absl::string_view RightName(Right right) {
@@ -19,6 +24,12 @@ std::optional<Right> ParseRight(absl::string_view name) {
     if (name == RightName(right)) return right;
   }
   return std::nullopt;
+}
+
+std::string Grant::RightsText() const {
+  return absl::StrJoin(maps, " ", [](std::string* text, const auto& entry) {
+    absl::StrAppend(text, entry.first, ":", RightName(entry.second));
+  });
 }
 
 bool Grant::Allows(Right right, absl::string_view map) const {

@@ -39,6 +39,8 @@ struct Grant {
   absl::Time created;
   absl::Time expires = absl::InfiniteFuture();
 
+  // "campus:write yard:read".
+  std::string RightsText() const;
   bool by_certificate() const { return secret_sha256.empty(); }
   bool Allows(Right right, absl::string_view map) const;
 };

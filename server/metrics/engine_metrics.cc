@@ -55,6 +55,9 @@ void AddEngine(MetricFamilies& families, const EngineNumbers& numbers) {
   add("strata_map_scans_pending", "Scans acknowledged, not joined yet", [](Map m) {
     return m.scans_pending;
   });
+  add("strata_map_pending_age_seconds",
+      "For how long the oldest of them waits, since the server began at most; 0: none does",
+      [](Map m) { return absl::ToDoubleSeconds(m.pending_age); });
   add("strata_map_scans_failed", "Scans that could not be joined", [](Map m) {
     return m.scans_failed;
   });

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 
+#include "absl/status/status.h"
 #include "absl/time/clock.h"
 
+#include "core/common/guarded.h"
 #include "core/common/steady_time.h"
 #include "core/common/this_thread.h"
 
@@ -44,7 +46,12 @@ void RevocationWatch::Loop() {
     absl::MutexLock lock(&mutex_);
     if (closing_) return;
     if (SteadyNow() < next) continue;
-    for (Revocable* call : calls_) call->EndIfRevoked();
+    // Where there is no memory for it, or to read who may still do what, at the next look.
+    const auto end_revoked = [this]() ABSL_NO_THREAD_SAFETY_ANALYSIS {
+      for (Revocable* call : calls_) call->EndIfRevoked();
+      return absl::OkStatus();
+    };
+    if (!Guarded(end_revoked).ok()) continue;
     next = SteadyNow() + interval_;
   }
 }

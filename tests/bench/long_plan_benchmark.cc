@@ -202,7 +202,7 @@ TileBytes Draw(const World& world, std::uint64_t seed) {
       }
       if (tile.surfaces.empty()) continue;
       tile.IndexRows();
-      bytes[tile.key] = EncodeSurfaceTile(tile);
+      bytes[tile.key] = EncodeSurfaceTile(tile).value();
     }
   }
   return bytes;

@@ -6,14 +6,16 @@ import time
 
 
 class Stratad:
-    def __init__(self, build, folder, *arguments):
-        begun = time.monotonic()
+    """`log`: the file that its log is added to; else stratad.log in `folder`."""
+
+    def __init__(self, build, folder, *arguments, log=None):
+        begun, log = time.monotonic(), log or pathlib.Path(folder) / "stratad.log"
         self.process = subprocess.Popen(
             [build / "server/stratad", "--data", folder, "--listen", "127.0.0.1:0", *map(str, arguments)],
-            stdout=subprocess.PIPE, stderr=open(pathlib.Path(folder) / "stratad.log", "a"), text=True)
+            stdout=subprocess.PIPE, stderr=open(log, "a"), text=True)
         line = self.process.stdout.readline().split()
         if len(line) < 2:
-            sys.exit(f"stratad does not start; see {folder}/stratad.log")
+            sys.exit(f"stratad does not start; see {log}")
         self.address, self.opened_s = line[1], time.monotonic() - begun
 
     def status(self, field):

@@ -54,9 +54,13 @@ void TryKind(int kind, const std::string& body, std::uint16_t version) {
     case 3:
       return TryBytes(sealed(BlobKind::kClassifier), DecodeClassifier, EncodeClassifier);
     case 4:
-      return TryBytes(sealed(BlobKind::kSurfaceTile), DecodeSurfaceTile, EncodeSurfaceTile);
+      return TryBytes(sealed(BlobKind::kSurfaceTile), DecodeSurfaceTile, [](const auto& tile) {
+        return EncodeSurfaceTile(tile).value();
+      });
     case 5:
-      return TryBytes(sealed(BlobKind::kMlsTile), DecodeMlsTile, EncodeMlsTile);
+      return TryBytes(sealed(BlobKind::kMlsTile), DecodeMlsTile, [](const auto& tile) {
+        return EncodeMlsTile(tile).value();
+      });
     case 6:
       return TryBytes(body, DecodePlace, EncodePlace);
     case 7:

@@ -46,10 +46,10 @@ SurfaceTile AnyTile(FuzzedDataProvider& input) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace strata;
   FuzzedDataProvider input(data, size);
-  const std::string bytes = EncodeSurfaceTile(fuzz::AnyTile(input));
+  const std::string bytes = EncodeSurfaceTile(fuzz::AnyTile(input)).value();
   const auto decoded = DecodeSurfaceTile(bytes);
   fuzz::Require(decoded.ok(), "what was encoded can be decoded");
-  fuzz::Require(EncodeSurfaceTile(*decoded) == bytes, "and has the same bytes again");
+  fuzz::Require(EncodeSurfaceTile(*decoded).value() == bytes, "and has the same bytes again");
 
   fuzz::TileParts parts = fuzz::TakeApart(BlobKind::kSurfaceTile, bytes);
   const std::uint16_t version = input.ConsumeBool() ? 1 : VersionOfBlob(bytes);
@@ -57,7 +57,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto damaged = DecodeSurfaceTile(fuzz::PutTogether(BlobKind::kSurfaceTile, version, parts));
   fuzz::RequireGoodRefusal(damaged.status());
   if (damaged.ok()) {
-    fuzz::Require(DecodeSurfaceTile(EncodeSurfaceTile(*damaged)).value() == *damaged,
+    fuzz::Require(DecodeSurfaceTile(EncodeSurfaceTile(*damaged).value()).value() == *damaged,
                   "what is read can be written");
   }
   return 0;

@@ -136,6 +136,18 @@ TEST_F(DoorsTest, WhatItMakesIsNotForEverybodyOfTheMachine) {
   }
 }
 
+TEST_F(DoorsTest, NorIsWhatTheCommandLineMakesByItself) {
+  std::filesystem::create_directory(Path("open"));
+  const mode_t before = ::umask(0);
+  EXPECT_EQ(RunStrata({"--embedded", Path("open"), "map", "create", "campus"}).exit_code, 0);
+  ::umask(before);
+  for (const auto& entry : std::filesystem::directory_iterator(Path("open"))) {
+    EXPECT_EQ(entry.status().permissions() & std::filesystem::perms::others_all,
+              std::filesystem::perms::none)
+        << entry.path();
+  }
+}
+
 TEST_F(DoorsTest, BeyondLoopbackItNeedsTlsAndTokens) {
   Give("ada", {"--right", "admin", "--all-maps"});
   RunStratad({"--data", Path("maps"), "--listen", "0.0.0.0:0"}, 1);

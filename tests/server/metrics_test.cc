@@ -81,6 +81,8 @@ TEST(MetricsTest, AScrapeHasWhatWasCounted) {
   map.journal_bytes = 1024;
   map.verified = absl::FromUnixSeconds(1'700'000'000);
   map.scans = 7;
+  map.scans_pending = 2;
+  map.pending_age = absl::Milliseconds(2500);
   map.commits = 3;
   map.commit_parts = 12;
   map.commit_time = absl::Milliseconds(1500);
@@ -114,6 +116,8 @@ TEST(MetricsTest, AScrapeHasWhatWasCounted) {
   EXPECT_EQ(value("strata_commits_total{map=\"campus\"}"), 3);
   EXPECT_EQ(value("strata_commit_parts_total{map=\"campus\"}"), 12);
   EXPECT_EQ(value("strata_commit_seconds_total{map=\"campus\"}"), 1.5);
+  EXPECT_EQ(value("strata_map_scans_pending{map=\"campus\"}"), 2);
+  EXPECT_EQ(value("strata_map_pending_age_seconds{map=\"campus\"}"), 2.5);
   EXPECT_EQ(value("strata_map_scans{map=\"campus\"}"), 7);
   EXPECT_EQ(value("strata_jobs{kind=\"rebuild\",map=\"campus\",state=\"running\"}"), 1);
   EXPECT_NEAR(value("strata_uptime_seconds"), 5.0, 4.0);

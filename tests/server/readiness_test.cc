@@ -2,7 +2,9 @@
 
 #include <atomic>
 #include <cstddef>
+#include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
@@ -12,8 +14,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/api/database.h"
+#include "core/engine/engine.h"
+#include "core/world/map_info.h"
+#include "server/server.h"
 #include "tests/server/raw_call.h"
 #include "tests/server/served_mock.h"
+#include "tests/support/status_matchers.h"
+#include "tests/support/temp_dir.h"
 
 namespace strata::server {
 namespace {
@@ -70,24 +78,48 @@ class ReadyServerTest : public ServedMock {
     if (!answer.status.ok() || answer.messages.empty()) return answer.status.error_message();
     return answer.messages.front() == std::string("\x08\x01", 2) ? "SERVING" : "NOT_SERVING";
   }
+  void Start(api::Database& db, std::vector<ReadinessCheck> checks) {
+    ServerOptions options;
+    options.listen = "127.0.0.1:0";
+    STRATA_ASSERT_OK_AND_ASSIGN(server_, Server::Start(db, options, std::move(checks)));
+    channel_ = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
+  }
+  // What a service's health is at last.
+  std::string Await(const std::string& state) {
+    const absl::Time until = absl::Now() + kPatience;
+    while (Health("strata.v1.Scans") != state && absl::Now() < until) {
+      absl::SleepFor(absl::Milliseconds(10));
+    }
+    return Health("strata.v1.Scans");
+  }
 };
 
 TEST_F(ReadyServerTest, WhatKeepsTheServerFromItsWorkIsNotItsDeath) {
   std::atomic<bool> full = true;
-  ServerOptions options;
-  options.listen = "127.0.0.1:0";
-  STRATA_ASSERT_OK_AND_ASSIGN(
-      server_, Server::Start(db_, options, {{"log", [&full] { return full ? "full" : ""; }}}));
-  channel_ = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
+  Start(db_, {{"log", [&full] { return full ? "full" : ""; }}});
   EXPECT_EQ(Health("strata.v1.Scans"), "NOT_SERVING");
   EXPECT_EQ(Health(""), "SERVING");
   EXPECT_EQ(Health("liveness"), "SERVING");
   full = false;
-  const absl::Time until = absl::Now() + kPatience;
-  while (Health("strata.v1.Scans") != "SERVING" && absl::Now() < until) {
-    absl::SleepFor(absl::Milliseconds(10));
-  }
+  EXPECT_EQ(Await("SERVING"), "SERVING");
+  server_.reset();
+}
+
+TEST_F(ReadyServerTest, AMapWhoseFileIsTakenAwayKeepsItFromItsWorkUntilItIsBack) {
+  const testing::TempDir directory;
+  EngineOptions options;
+  options.directory = directory.path();
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto engine, OpenEngine(options));
+  STRATA_ASSERT_OK(engine->maps().Create({}, "campus", MapParameters()));
+  Start(*engine, {});
   EXPECT_EQ(Health("strata.v1.Scans"), "SERVING");
+  const std::filesystem::path file = directory.path() / "campus.strata";
+  const std::filesystem::path away = directory.path() / "away";
+  std::filesystem::rename(file, away);
+  EXPECT_EQ(Await("NOT_SERVING"), "NOT_SERVING");
+  EXPECT_EQ(Health("liveness"), "SERVING");
+  std::filesystem::rename(away, file);
+  EXPECT_EQ(Await("SERVING"), "SERVING");
   server_.reset();
 }
 

@@ -49,6 +49,14 @@ absl::Status StatusOf(int code, sqlite3* connection) {
   return absl::Status(CodeOf(code), absl::StrCat("store: ", detail, " (sqlite ", code, ")"));
 }
 
+// SQLite makes files that everybody may read. This one is still empty, and what comes to lie beside
+// it gets its mode.
+void CloseToOthers(const std::filesystem::path& file) {
+  namespace fs = std::filesystem;
+  std::error_code error;  // of a file system without modes
+  fs::permissions(file, fs::perms::others_all, fs::perm_options::remove, error);
+}
+
 }  // namespace
 
 Statement::~Statement() {
@@ -128,6 +136,7 @@ absl::StatusOr<Database> Database::Open(const std::filesystem::path& file, Mode 
   const int code = sqlite3_open_v2(file.c_str(), &connection, flags, nullptr);
   Database database(connection);
   STRATA_RETURN_IF_ERROR(StatusOf(code, connection));
+  if (mode == Mode::kCreate) CloseToOthers(file);
   sqlite3_busy_timeout(connection, 10'000);
   // Stored bytes are hostile: no schema in a file may run functions or write shadow tables.
   sqlite3_db_config(connection, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);

@@ -76,7 +76,8 @@ class Database {
  public:
   enum class Mode { kCreate, kWrite, kRead };
 
-  // kCreate makes a new file and fails with ALREADY_EXISTS if there is one; the others want one.
+  // kCreate makes a new file, closed to others than user and group, and fails with ALREADY_EXISTS
+  // if there is one; the others want one.
   static absl::StatusOr<Database> Open(const std::filesystem::path& file, Mode mode);
   ~Database();
   Database(Database&& other) noexcept

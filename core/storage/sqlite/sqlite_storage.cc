@@ -33,14 +33,16 @@ class SqliteStorage final : public MapStorage {
 
   absl::StatusOr<std::unique_ptr<StorageReader>> NewReader() override {
     absl::StatusOr<Database> opened = Database::Open(file_, Database::Mode::kRead);
-    const std::optional<FileState> now = StateOfFile(file_);
-    if (!now.has_value() || !opened_.has_value() || !now->SameFile(*opened_)) {
-      return TakenAway(file_);
-    }
+    STRATA_RETURN_IF_ERROR(CheckInPlace());
     STRATA_ASSIGN_OR_RETURN(Database database, std::move(opened));
     return std::make_unique<SqliteReader>(std::make_shared<Database>(std::move(database)));
   }
   StorageWriter& writer() override { return writer_; }
+  absl::Status CheckInPlace() const override {
+    const std::optional<FileState> now = StateOfFile(file_);
+    const bool same = now.has_value() && opened_.has_value() && now->SameFile(*opened_);
+    return same ? absl::OkStatus() : TakenAway(file_);
+  }
 
  private:
   std::filesystem::path file_;

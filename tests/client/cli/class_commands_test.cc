@@ -53,7 +53,7 @@ class ClassCommandsTest : public ::testing::Test {
     ON_CALL(db_.tiles(), Fetch(_, _, _, _, _))
         .WillByDefault([](auto&, auto, auto&, auto&, const auto& sink) {
           api::TileUpdate update;
-          update.tile.bytes = EncodeSurfaceTile(TwoFields());
+          update.tile.bytes = EncodeSurfaceTile(TwoFields()).value();
           return sink(update);
         });
   }

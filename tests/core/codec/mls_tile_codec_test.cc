@@ -3,7 +3,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "absl/status/status.h"
 #include "absl/strings/escaping.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -26,15 +29,19 @@ namespace {
 
 using ::strata::testing::IsOkAndHolds;
 using ::strata::testing::RandomTile;
+using ::strata::testing::StatusIs;
+using ::testing::HasSubstr;
+
+std::string Encoded(const MlsTile& tile) { return EncodeMlsTile(tile).value(); }
 
 TEST(MlsTileCodecTest, RandomTilesRoundTripBitForBit) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
     MlsTile tile = RandomTile(seed, 1 << seed % 13, seed % 2 == 0);
     tile.key = {static_cast<int>(seed % 13), -static_cast<int>(seed), 1 << 30};
-    const std::string bytes = EncodeMlsTile(tile);
+    const std::string bytes = Encoded(tile);
     ASSERT_THAT(DecodeMlsTile(bytes), IsOkAndHolds(tile));
-    EXPECT_EQ(EncodeMlsTile(*DecodeMlsTile(bytes)), bytes);
+    EXPECT_EQ(Encoded(*DecodeMlsTile(bytes)), bytes);
   }
 }
 
@@ -48,12 +55,12 @@ TEST(MlsTileCodecTest, PatchesNoJoinMakesRoundTripToo) {
   patch.z_max = kMaxZTicks;
   tile.patches = {patch};
   tile.IndexRows();
-  EXPECT_THAT(DecodeMlsTile(EncodeMlsTile(tile)), IsOkAndHolds(tile));
+  EXPECT_THAT(DecodeMlsTile(Encoded(tile)), IsOkAndHolds(tile));
 }
 
 TEST(MlsTileCodecTest, EmptyTileRoundTrips) {
   const MlsTile tile;
-  EXPECT_THAT(DecodeMlsTile(EncodeMlsTile(tile)), IsOkAndHolds(tile));
+  EXPECT_THAT(DecodeMlsTile(Encoded(tile)), IsOkAndHolds(tile));
 }
 
 TEST(MlsTileCodecTest, RealTilesRoundTripWithinTheirBound) {
@@ -61,7 +68,7 @@ TEST(MlsTileCodecTest, RealTilesRoundTripWithinTheirBound) {
   const MlsMap map = testing::NcltMap(path, 40);
   std::size_t bytes = 0;
   for (const MlsTile& tile : map.tiles) {
-    const std::string encoded = EncodeMlsTile(tile);
+    const std::string encoded = Encoded(tile);
     bytes += encoded.size();
     ASSERT_THAT(DecodeMlsTile(encoded), IsOkAndHolds(tile));
   }
@@ -70,20 +77,54 @@ TEST(MlsTileCodecTest, RealTilesRoundTripWithinTheirBound) {
 }
 
 TEST(MlsTileCodecTest, DamageIsDataLoss) {
-  testing::ExpectDamageIsDataLoss(EncodeMlsTile(RandomTile(5, 300, true)), &DecodeMlsTile, 5, 1000);
+  testing::ExpectDamageIsDataLoss(Encoded(RandomTile(5, 300, true)), &DecodeMlsTile, 5, 1000);
 }
 
 TEST(MlsTileCodecTest, ForgedBytesNeverCrash) {
-  const std::string bytes = EncodeMlsTile(RandomTile(6, 60, true));
+  const std::string bytes = Encoded(RandomTile(6, 60, true));
   const int accepted =
       testing::DecodeForgedBodies(BlobKind::kMlsTile, bytes, &DecodeMlsTile, 6, 4000);
   EXPECT_GT(accepted, 0);
   EXPECT_LT(accepted, 4000);
 }
 
+// What stands behind a vector that is too short must not become bytes of a map.
+TEST(MlsTileCodecTest, LayersThatAreNotThoseOfThePatchesAreRefused) {
+  const MlsTile tile = RandomTile(7, 100, true);
+  ASSERT_FALSE(tile.colour.empty());
+  ASSERT_GT(tile.votes.size(), 2U);
+  std::vector<MlsTile> wrong(7, tile);
+  wrong[0].colour.pop_back();
+  wrong[1].colour.push_back({});
+  wrong[2].patches.clear();
+  wrong[3].votes.back().patch = static_cast<std::uint32_t>(tile.patches.size());
+  std::swap(wrong[4].votes.front(), wrong[4].votes.back());
+  std::swap(wrong[5].patches.front(), wrong[5].patches.back());
+  wrong[6].patches[1] = wrong[6].patches[0];
+  for (std::size_t i = 0; i < wrong.size(); ++i) {
+    EXPECT_THAT(EncodeMlsTile(wrong[i]),
+                StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(tile.key.ToString())))
+        << i;
+  }
+}
+
+TEST(MlsTileCodecTest, WhatNoDecoderTakesIsNotWritten) {
+  MlsTile tile;
+  tile.key = {0, 7, -3};
+  tile.patches.resize(kMaxTilePatches + 1);
+  EXPECT_THAT(EncodeMlsTile(tile),
+              StatusIs(absl::StatusCode::kResourceExhausted,
+                       HasSubstr("tile 0/7/-3 of 4194305 patches; at most 4194304")));
+  tile.patches.resize(1);
+  tile.votes.resize(kMaxTileVotes + 1);
+  EXPECT_THAT(EncodeMlsTile(tile),
+              StatusIs(absl::StatusCode::kResourceExhausted,
+                       HasSubstr("tile 0/7/-3 of 8388609 votes; at most 8388608")));
+}
+
 TEST(MlsTileCodecTest, ATileThatWouldTakeMoreThanItMayIsRefused) {
   const MlsTile tile = RandomTile(5, 4096, true);
-  const std::string bytes = EncodeMlsTile(tile);
+  const std::string bytes = Encoded(tile);
   EXPECT_THAT(DecodeMlsTileWithin(std::size_t{1} << 20, bytes), IsOkAndHolds(tile));
   for (const std::size_t bound : {std::size_t{0}, std::size_t{100'000}, std::size_t{250'000}}) {
     EXPECT_FALSE(DecodeMlsTileWithin(bound, bytes).ok()) << bound;
@@ -113,7 +154,7 @@ TEST(MlsTileCodecTest, AFewBytesThatAnnounceMillionsTakeNoMemory) {
   rusage before{};
   getrusage(RUSAGE_SELF, &before);
   EXPECT_THAT(DecodeMlsTileWithin(std::size_t{16} << 20, bytes).status(),
-              testing::StatusIs(absl::StatusCode::kDataLoss, ::testing::HasSubstr("surfaces")));
+              StatusIs(absl::StatusCode::kDataLoss, HasSubstr("surfaces")));
   rusage after{};
   getrusage(RUSAGE_SELF, &after);
   constexpr long kKilobytes = 4 << 10;

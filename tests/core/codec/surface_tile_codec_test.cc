@@ -6,11 +6,13 @@
 #include <random>
 #include <string>
 
+#include "absl/status/status.h"
 #include "absl/strings/escaping.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/codec/blob.h"
+#include "core/codec/occupancy.h"
 #include "core/mls/surface_tile.h"
 #include "tests/core/codec/hostile.h"
 #include "tests/core/codec/tile_samples.h"
@@ -38,6 +40,8 @@ SurfaceTile Annotated(const MlsTile& tile, std::uint64_t seed) {
   return surfaces;
 }
 
+std::string Encoded(const SurfaceTile& tile) { return EncodeSurfaceTile(tile).value(); }
+
 void ExpectWithinTolerance(const Surface& read, const Surface& written) {
   EXPECT_EQ(read.cell, written.cell);
   EXPECT_EQ(read.traversability, written.traversability);
@@ -56,7 +60,7 @@ void ExpectWithinTolerance(const Surface& read, const Surface& written) {
 }
 
 void ExpectRoundTrip(const SurfaceTile& tile) {
-  const std::string bytes = EncodeSurfaceTile(tile);
+  const std::string bytes = Encoded(tile);
   STRATA_ASSERT_OK_AND_ASSIGN(const SurfaceTile read, DecodeSurfaceTile(bytes));
   EXPECT_EQ(read.key, tile.key);
   EXPECT_EQ(read.version, tile.version);
@@ -66,7 +70,7 @@ void ExpectRoundTrip(const SurfaceTile& tile) {
     SCOPED_TRACE(i);
     ExpectWithinTolerance(read.surfaces[i], tile.surfaces[i]);
   }
-  EXPECT_EQ(EncodeSurfaceTile(read), bytes);
+  EXPECT_EQ(Encoded(read), bytes);
 }
 
 TEST(SurfaceTileCodecTest, RandomTilesRoundTripWithinTolerance) {
@@ -102,9 +106,9 @@ TEST(SurfaceTileCodecTest, AbsurdValuesAreClampedAndDecodable) {
                              .depth_m = value,
                              .cost = value});
   }
-  const std::string bytes = EncodeSurfaceTile(tile);
+  const std::string bytes = Encoded(tile);
   STRATA_ASSERT_OK_AND_ASSIGN(const SurfaceTile read, DecodeSurfaceTile(bytes));
-  EXPECT_EQ(EncodeSurfaceTile(read), bytes);
+  EXPECT_EQ(Encoded(read), bytes);
   EXPECT_FLOAT_EQ(read.surfaces[0].z_m, 32768.0F);
 }
 
@@ -115,7 +119,7 @@ TEST(SurfaceTileCodecTest, RealTilesRoundTripWithinTheirBound) {
   for (const MlsTile& tile : map.tiles) {
     const SurfaceTile surfaces = SurfacesOf(tile);
     ExpectRoundTrip(surfaces);
-    bytes += EncodeSurfaceTile(surfaces).size();
+    bytes += Encoded(surfaces).size();
   }
   EXPECT_LE(static_cast<double>(bytes) / static_cast<double>(map.patch_count()), 2.9);
 }
@@ -123,24 +127,34 @@ TEST(SurfaceTileCodecTest, RealTilesRoundTripWithinTheirBound) {
 // What has no class costs nothing, and is read by those who know of no confidence.
 TEST(SurfaceTileCodecTest, OnlyTilesWithConfidencesAreOfTheSecondVersion) {
   SurfaceTile tile = Annotated(RandomTile(7, 300, true), 7);
-  EXPECT_EQ(VersionOfBlob(EncodeSurfaceTile(tile)), 2);
+  EXPECT_EQ(VersionOfBlob(Encoded(tile)), 2);
   for (Surface& surface : tile.surfaces) surface.confidence = 0;
-  const std::string plain = EncodeSurfaceTile(tile);
+  const std::string plain = Encoded(tile);
   EXPECT_EQ(VersionOfBlob(plain), 1);
   ExpectRoundTrip(tile);
   for (Surface& surface : tile.surfaces) {
     if (surface.class_id == 0) surface.confidence = 50;
   }
-  EXPECT_EQ(EncodeSurfaceTile(tile), plain);
+  EXPECT_EQ(Encoded(tile), plain);
+}
+
+TEST(SurfaceTileCodecTest, WhatNoDecoderTakesIsNotWritten) {
+  SurfaceTile tile;
+  tile.key = {2, 7, -3};
+  tile.surfaces.resize(kMaxTilePatches + 1);
+  EXPECT_THAT(
+      EncodeSurfaceTile(tile),
+      testing::StatusIs(absl::StatusCode::kResourceExhausted,
+                        ::testing::HasSubstr("tile 2/7/-3 of 4194305 surfaces; at most 4194304")));
 }
 
 TEST(SurfaceTileCodecTest, DamageIsDataLoss) {
   const SurfaceTile tile = Annotated(RandomTile(5, 300, true), 5);
-  testing::ExpectDamageIsDataLoss(EncodeSurfaceTile(tile), &DecodeSurfaceTile, 5, 1000);
+  testing::ExpectDamageIsDataLoss(Encoded(tile), &DecodeSurfaceTile, 5, 1000);
 }
 
 TEST(SurfaceTileCodecTest, ForgedBytesNeverCrash) {
-  const std::string bytes = EncodeSurfaceTile(Annotated(RandomTile(6, 60, true), 6));
+  const std::string bytes = Encoded(Annotated(RandomTile(6, 60, true), 6));
   const int accepted =
       testing::DecodeForgedBodies(BlobKind::kSurfaceTile, bytes, &DecodeSurfaceTile, 6, 4000);
   EXPECT_GT(accepted, 0);

@@ -326,7 +326,7 @@ std::string Shown(const std::string& bytes) {
   absl::StatusOr<SurfaceTile> tile = DecodeSurfaceTile(bytes);
   if (!tile.ok()) return tile.status().ToString();
   tile->version = 0;
-  return absl::StrFormat("%016x", Checksum64(EncodeSurfaceTile(*tile)));
+  return absl::StrFormat("%016x", Checksum64(EncodeSurfaceTile(*tile).value()));
 }
 
 void ObserveTiles(api::Database& database, WorldState& state) {

@@ -4,19 +4,25 @@
 #include <cstdint>
 #include <iostream>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/api/scans.h"
+#include "core/cloud/cloud_slice.h"
 #include "core/common/guarded.h"
 #include "core/common/random.h"
 #include "core/common/status.h"
+#include "core/world/scan_hash.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/asked.h"
 #include "tests/support/failing_memory.h"
@@ -109,6 +115,26 @@ TEST_F(MemoryFaultTest, NothingEndsButTheWorkItWasFor) {
   const std::string digest = Digest();
   ASSERT_EQ(RunJob(db(), "rebuild").state, JobState::kSucceeded);
   EXPECT_EQ(Digest(), digest);
+}
+
+// What came of it is kept where there is memory for that; nobody is there to be told otherwise.
+TEST_F(MemoryFaultTest, AStreamThatBreaksOffEndsNothingElse) {
+  MakeMap();
+  const PointCloud cloud = MakeRoom(1);
+  const PointCloud half = SliceOf(cloud, 0, cloud.size() / 2);
+  for (std::uint64_t sound = 0; sound < 60; ++sound) {
+    SCOPED_TRACE(sound);
+    ScanHeader header = HeaderOf({"run", sound}, cloud, RoomPose(1));
+    header.content_hash = ContentHashOf(header, cloud);
+    absl::StatusOr<std::unique_ptr<api::ScanUpload>> upload =
+        db().scans().Upload({}, kMapName, header);
+    STRATA_ASSERT_OK(upload);
+    STRATA_ASSERT_OK((*upload)->Write(half));
+    const FailingMemory failing(static_cast<std::int64_t>(sound), 10);
+    upload->reset();
+  }
+  UploadRoom(100, RoomPose(1));
+  ExpectSound();
 }
 
 }  // namespace

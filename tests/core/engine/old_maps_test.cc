@@ -1,5 +1,5 @@
 // Map files that earlier versions wrote, kept for good (old_maps/): each has all it had, and
-// becomes one of today.
+// becomes one of today. old_maps/README.md says how one is added.
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -21,7 +21,9 @@
 namespace strata::testing {
 namespace {
 
+using ::testing::Contains;
 using ::testing::Each;
+using ::testing::Field;
 using ::testing::Le;
 
 struct OldMap {
@@ -118,11 +120,20 @@ TEST_P(OldMapTest, ItsSurfacesAreThere) {
   EXPECT_NEAR(columns[0].surfaces[0].z_m, 0.01, 0.011);
 }
 
+constexpr OldMap kOldMaps[] = {
+    {"v1", 1, false, false}, {"v2", 2, true, true}, {"v3", 3, true, true}};
+
 INSTANTIATE_TEST_SUITE_P(EveryFormat,
                          OldMapTest,
-                         ::testing::Values(OldMap{"v1", 1, false, false},
-                                           OldMap{"v3", 3, true, true}),
+                         ::testing::ValuesIn(kOldMaps),
                          [](const auto& test) { return std::string(test.param.name); });
+
+TEST(OldMapsTest, EveryFormatBeforeThatOfTodayHasAFile) {
+  for (std::int64_t format = 1; format < kTruthVersion; ++format) {
+    EXPECT_THAT(kOldMaps, Contains(Field(&OldMap::format, format)))
+        << "tests/core/engine/old_maps/README.md says how to add one";
+  }
+}
 
 }  // namespace
 }  // namespace strata::testing

@@ -6,9 +6,12 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/engine/numbers.h"
 #include "core/engine/quarantine_file.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/status_matchers.h"
@@ -139,6 +142,24 @@ TEST_F(QuarantineTest, AScanThatWaitsIsPutAsideByHand) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("dog 1")));
   EXPECT_THAT(AddToQuarantine(directory_.path(), "nomap", "job 1"),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("nomap")));
+}
+
+// The worker takes nothing until the rebuild is released.
+TEST_F(QuarantineTest, WhoWatchesSeesForHowLongTheOldestScanWaits) {
+  const auto age = [this] { return NumbersOf(db()).maps.at(0).pending_age; };
+  Reopen();
+  WaitIntegrated(db());
+  EXPECT_EQ(age(), absl::ZeroDuration());
+  Close();
+  Sql("DROP TABLE derived_state; INSERT INTO attempt VALUES (3, 0, 1, 1)");
+  Reopen();
+  EXPECT_EQ(age(), absl::ZeroDuration());
+  UploadRoom(77, PoseAt(0, 0));
+  absl::SleepFor(absl::Milliseconds(2));
+  const absl::Duration first = age();
+  EXPECT_GT(first, absl::ZeroDuration());
+  absl::SleepFor(absl::Milliseconds(2));
+  EXPECT_GT(age(), first);
 }
 
 TEST_F(QuarantineTest, ARebuildThatDiedTwiceIsNotBegun) {

@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/engine/numbers.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/status_matchers.h"
 
@@ -17,7 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::_;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 struct Hand {
   std::string name;
@@ -64,6 +68,22 @@ INSTANTIATE_TEST_SUITE_P(
              }},
         Hand{"removes the log", [](const fs::path& file) { fs::remove(LogOf(file)); }},
         Hand{"cuts the log", [](const fs::path& file) { fs::resize_file(LogOf(file), 0); }}));
+
+// Said without anybody writing anything.
+TEST_F(EngineTest, WhoWatchesIsToldOfAFileThatWasTakenAwayUntilItIsBack) {
+  MakeMap();
+  MakeMap(SmallMap(), "other");
+  const fs::path away = MapFile().string() + ".old";
+  EXPECT_THAT(HealthOf(db()).maps_taken_away, IsEmpty());
+  fs::rename(MapFile(), away);
+  EXPECT_THAT(HealthOf(db()).maps_taken_away,
+              ElementsAre(AllOf(HasSubstr("world: "), HasSubstr("put the file back"))));
+  EXPECT_THAT(HealthOf(db()).maps_not_written, IsEmpty());
+  fs::copy_file(away, MapFile());
+  EXPECT_THAT(HealthOf(db()).maps_taken_away, ElementsAre(HasSubstr("world: ")));
+  fs::rename(away, MapFile());
+  EXPECT_THAT(HealthOf(db()).maps_taken_away, IsEmpty());
+}
 
 TEST_F(EngineTest, AFileThatWasPutBackIsGoneOnWith) {
   MakeMap();

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -62,6 +63,35 @@ TEST(OverviewTest, MeanIsWeightedByPrecisionAndSigmaTellsTheSpread) {
   EXPECT_NEAR(tile.surfaces[0].z_m, 1.1, 1e-5);
   EXPECT_NEAR(tile.surfaces[0].sigma_m, std::sqrt(1.0 / 125.0 + 5.0 / 125.0), 1e-5);
   EXPECT_EQ(tile.surfaces[0].depth_m, 0.0F);
+}
+
+// As full as a tile may be, with room for nothing else; of another child with one surface more.
+TEST(OverviewTest, BeyondWhatATileHoldsEachCellKeepsItsHighest) {
+  constexpr std::size_t kLayers = 4 * kOverviewLayers;
+  SurfaceTile full;
+  for (int cell = 0; cell < kTileCells * kTileCells; ++cell) {
+    if (cell % 2 != 0 || cell / kTileCells % 2 != 0) continue;
+    for (std::size_t layer = 0; layer < kLayers; ++layer) {
+      full.surfaces.push_back({.cell = static_cast<std::uint16_t>(cell),
+                               .z_m = 2.0F * static_cast<float>(layer),
+                               .sigma_m = 0.01F});
+    }
+  }
+  full.IndexRows();
+  ASSERT_EQ(full.surfaces.size(), kMaxOverviewSurfaces);
+  const SurfaceTile whole = MakeOverviewTile({1, 0, 0}, {&full, nullptr, nullptr, nullptr}, {});
+  EXPECT_EQ(whole.surfaces.size(), kMaxOverviewSurfaces);
+
+  SurfaceTile other;
+  other.surfaces = {{.cell = 0, .z_m = 1.0F, .sigma_m = 0.01F}};
+  other.IndexRows();
+  const SurfaceTile cut = MakeOverviewTile({1, 0, 0}, {&full, &other, nullptr, nullptr}, {});
+  EXPECT_EQ(cut.surfaces.size(), kMaxOverviewSurfaces / 4 + 1);
+  const std::span<const Surface> cell = cut.Cell(0);
+  ASSERT_EQ(cell.size(), kOverviewLayers);
+  EXPECT_EQ(cell.front().z_m, 2.0F * static_cast<float>(kLayers - kOverviewLayers));
+  EXPECT_EQ(cell.back().z_m, 2.0F * static_cast<float>(kLayers - 1));
+  ASSERT_EQ(cut.Cell(kTileCells / 2).size(), 1U);
 }
 
 TEST(OverviewTest, TopsAGapApartStayTwoAndCloserOnesChain) {

@@ -1,6 +1,7 @@
 #include "core/mls/traversability.h"
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <random>
 #include <vector>
@@ -91,6 +92,44 @@ Drawing Step(double height_m, double sigma_m = 0.002) {
   return [=](CellIndex cell) {
     return std::vector<Level>{{.z_m = X(cell) < 0.0 ? 0.0 : height_m, .sigma_m = sigma_m}};
   };
+}
+
+// Rough ground, the same on every storey; heights are such that floats hold them exactly.
+Drawing Storeys(int storeys) {
+  return [=](CellIndex cell) {
+    constexpr double kStoreyM = 4.0;
+    const unsigned noise = (static_cast<unsigned>(cell.x) * 2654435761U ^
+                            static_cast<unsigned>(cell.y) * 2246822519U) >>
+                           16U;
+    std::vector<Level> levels;
+    for (int storey = 0; storey < storeys; ++storey) {
+      if (noise % 11 == 0) continue;  // nothing was seen here
+      levels.push_back({.z_m = kStoreyM * storey + (noise % 16) / 64.0});
+    }
+    return levels;
+  };
+}
+
+TEST(TraversabilityTest, AStoreyOfManyIsWhatItIsOfThree) {
+  constexpr int kMany = 60;
+  const SurfaceWorld few = Annotated(Storeys(3));
+  const SurfaceWorld many = Annotated(Storeys(kMany));
+  int compared = 0;
+  for (int y = 108; y < 148; ++y) {
+    for (int x = 108; x < 148; ++x) {
+      const std::uint16_t cell = CellInTile({x, y});
+      const auto three = few.begin()->second.Cell(cell);
+      const auto all = many.begin()->second.Cell(cell);
+      if (three.empty()) continue;
+      ASSERT_EQ(all.size(), static_cast<std::size_t>(kMany));
+      for (std::size_t storey = 1; storey + 1 < all.size(); ++storey) {
+        EXPECT_EQ(all[storey].traversability, three[1].traversability) << x << ", " << y;
+        EXPECT_EQ(all[storey].cost, three[1].cost) << x << ", " << y;
+        ++compared;
+      }
+    }
+  }
+  EXPECT_GT(compared, 1000 * kMany);
 }
 
 TEST(TraversabilityTest, StepBelowTheLimitIsPassedEverywhere) {

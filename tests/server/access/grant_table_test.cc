@@ -3,12 +3,16 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <vector>
 
 #include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include "core/common/log_line.h"
+#include "server/access/right.h"
 #include "server/access/token.h"
 #include "server/access/token_file.h"
 #include "tests/support/status_matchers.h"
@@ -49,6 +53,30 @@ TEST_F(GrantTableTest, FollowsItsFile) {
   EXPECT_TRUE(table->Current()->by_id.contains("000000000008"));
   STRATA_ASSERT_OK(WriteTokenFile(path_, {robot8_}));
   EXPECT_FALSE(table->Current()->by_id.contains("000000000007"));
+}
+
+TEST_F(GrantTableTest, WhoCameWentAndMayNowDoMoreIsSaidWithoutSecrets) {
+  Grants before;
+  before.by_id = {{robot7_.id, robot7_}, {robot8_.id, robot8_}};
+  EXPECT_THAT(ChangesBetween(before, before), ::testing::IsEmpty());
+  Grant more = robot7_;
+  more.maps = {{"campus", Right::kWrite}, {"yard", Right::kRead}};
+  more.secret_sha256 = SecretHash("other");
+  Grant robot9 = GrantNamed("robot9", "000000000009");
+  robot9.expires = absl::FromUnixSeconds(1'800'000'000);
+  Grants after;
+  after.by_id = {{more.id, more}, {robot9.id, robot9}};
+  std::vector<std::string> said;
+  for (const LogLine& line : ChangesBetween(before, after)) said.push_back(line.text());
+  EXPECT_THAT(said,
+              ::testing::ElementsAre(
+                  "event=audit tokens=changed object=robot7 grant=000000000007 by=token "
+                  "rights=\"campus:write yard:read\" expires=never was=robot7 rights_before=*:read "
+                  "secret=another",
+                  "event=audit tokens=removed object=robot8 grant=000000000008 by=token "
+                  "rights=*:read expires=never",
+                  "event=audit tokens=added object=robot9 grant=000000000009 by=token "
+                  "rights=*:read expires=2027-01-15T08:00:00Z"));
 }
 
 TEST_F(GrantTableTest, ABrokenOrAbsentFileLeavesWhatHeld) {

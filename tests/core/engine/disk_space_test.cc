@@ -1,0 +1,84 @@
+#include "core/engine/disk_space.h"
+
+#include <cerrno>
+#include <cstdint>
+
+#include "absl/status/status.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/statvfs.h>
+
+#include "tests/support/status_matchers.h"
+
+namespace {
+
+struct Disk {
+  bool says = true;
+  std::uint64_t bytes = 0;
+  std::uint64_t free = 0;
+};
+Disk disk;  // what the system says of all disks in this program
+constexpr std::uint64_t kBlock = 4096;
+
+}  // namespace
+
+// In place of the C library's.
+extern "C" int statvfs(const char* /*file*/, struct statvfs* found) noexcept {
+  if (!disk.says) {
+    errno = EACCES;
+    return -1;
+  }
+  *found = {};
+  found->f_frsize = kBlock;
+  found->f_blocks = disk.bytes / kBlock;
+  found->f_bfree = disk.bytes / kBlock;  // with what only root gets
+  found->f_bavail = disk.free / kBlock;
+  return 0;
+}
+
+namespace strata {
+namespace {
+
+using ::strata::testing::StatusIs;
+using ::testing::HasSubstr;
+
+constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
+
+class DiskSpaceTest : public ::testing::Test {
+ protected:
+  const DiskSpace space_{"maps/world.strata"};
+};
+
+TEST_F(DiskSpaceTest, UploadsLeave64MebibytesAndIntegrationHalfOfThat) {
+  disk = {.bytes = 1000 * kMiB, .free = 64 * kMiB};
+  STRATA_EXPECT_OK(space_.CheckForUpload());
+  disk.free -= kBlock;
+  EXPECT_THAT(space_.CheckForUpload(),
+              StatusIs(absl::StatusCode::kResourceExhausted,
+                       HasSubstr("63 MiB free, of which the last 64 MiB are kept")));
+  STRATA_EXPECT_OK(space_.CheckForIntegration());
+  disk.free = 32 * kMiB;
+  STRATA_EXPECT_OK(space_.CheckForIntegration());
+  disk.free -= kBlock;
+  EXPECT_THAT(space_.CheckForIntegration(),
+              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("31 MiB free")));
+}
+
+TEST_F(DiskSpaceTest, OfASmallDiskAQuarterIsLeft) {
+  disk = {.bytes = 40 * kMiB, .free = 10 * kMiB};
+  STRATA_EXPECT_OK(space_.CheckForUpload());
+  disk.free -= kBlock;
+  EXPECT_FALSE(space_.CheckForUpload().ok());
+  STRATA_EXPECT_OK(space_.CheckForIntegration());
+  disk.free = 5 * kMiB - kBlock;
+  EXPECT_FALSE(space_.CheckForIntegration().ok());
+}
+
+TEST_F(DiskSpaceTest, ADiskThatDoesNotSayIsTakenForOneWithRoom) {
+  disk = {.says = false};
+  STRATA_EXPECT_OK(space_.CheckForUpload());
+  STRATA_EXPECT_OK(space_.CheckForIntegration());
+}
+
+}  // namespace
+}  // namespace strata
