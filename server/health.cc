@@ -64,8 +64,9 @@ class HealthReactor final : public grpc::ServerBidiReactor<Sealed<Asked>, Told> 
     health_.runtime_.arrivals.Leave(PathOf(kind_), SteadyNow());
   }
 
-  // Sends what it was not told yet.
-  void Tell() ABSL_EXCLUSIVE_LOCKS_REQUIRED(health_.mutex_) {
+  // Sends what it was not told yet. The mutex of `health` must be held.
+  void Tell() {
+    health_.mutex_.AssertHeld();
     const int state = health_.StateOf(service_);
     if (writing_ || state == out_.value()) return;
     out_.set_value(state);
