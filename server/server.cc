@@ -13,7 +13,6 @@
 #include "absl/time/clock.h"
 #include <glog/logging.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
-#include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
@@ -24,6 +23,8 @@
 #include "core/common/steady_time.h"
 #include "core/engine/numbers.h"
 #include "server/access/grant_table.h"
+#include "server/door.h"
+#include "server/health.h"
 #include "server/listener.h"
 #include "server/metrics/engine_metrics.h"
 #include "server/metrics/metrics.h"
@@ -96,10 +97,10 @@ class GrpcServer final : public Server {
   void Shutdown() override;
 
  private:
-  // How connections are made, and who may use what strata.v1's own checks do not see: reflection.
+  // How connections are made, and what becomes of calls before their requests are read.
   std::shared_ptr<grpc::ServerCredentials> Credentials();
   std::vector<grpc::Service*> Services() {
-    return {&maps_, &scans_, &tiles_, &planning_, &jobs_, &posegraph_, &classifiers_};
+    return {&maps_, &scans_, &tiles_, &planning_, &jobs_, &posegraph_, &classifiers_, &health_};
   }
 
   const ServerOptions options_;
@@ -111,6 +112,7 @@ class GrpcServer final : public Server {
   JobsService jobs_{runtime_};
   PoseGraphService posegraph_{runtime_};
   ClassifiersService classifiers_{runtime_};
+  Health health_{runtime_};
   std::string address_;
   std::unique_ptr<Listener> listener_;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
@@ -119,7 +121,7 @@ class GrpcServer final : public Server {
   std::unique_ptr<MetricsEndpoint> metrics_;
 };
 
-void SetReady(grpc::HealthCheckServiceInterface& health, bool ready) {
+void SetReady(Health& health, bool ready) {
   for (const char* service : {v1::Maps::service_full_name(),
                               v1::Scans::service_full_name(),
                               v1::Tiles::service_full_name(),
@@ -127,7 +129,7 @@ void SetReady(grpc::HealthCheckServiceInterface& health, bool ready) {
                               v1::Jobs::service_full_name(),
                               v1::PoseGraph::service_full_name(),
                               v1::Classifiers::service_full_name()}) {
-    health.SetServingStatus(service, ready);
+    health.Set(service, ready);
   }
 }
 
@@ -265,9 +267,10 @@ void AddDoor(MetricFamilies& families, const Listener& listener, const Readiness
 }
 
 std::shared_ptr<grpc::ServerCredentials> GrpcServer::Credentials() {
-  if (!options_.tls.enabled()) return grpc::InsecureServerCredentials();
+  auto door = std::make_shared<Door>(runtime_);
+  if (!options_.tls.enabled()) return PlainCredentials(std::move(door));
   std::shared_ptr<grpc::ServerCredentials> credentials = TlsCredentials(options_.tls);
-  credentials->SetAuthMetadataProcessor(GuardReflection(runtime_.access));
+  credentials->SetAuthMetadataProcessor(std::move(door));
   return credentials;
 }
 
@@ -277,9 +280,9 @@ absl::Status GrpcServer::Listen(HostPort address) {
   acceptor_ = builder.experimental().AddExternalConnectionAcceptor(
       grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, Credentials());
   LimitConnections(builder, options_);
-  // gRPC has no guard for plain text.
   const bool guarded = options_.token_file.empty() || options_.tls.enabled();
   if (!guarded) LeaveOutReflection(builder);
+  health_.Set("liveness", true);
   for (grpc::Service* service : Services()) builder.RegisterService(service);
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) return absl::UnavailableError("gRPC's server does not start");
@@ -295,10 +298,8 @@ absl::Status GrpcServer::Listen(HostPort address) {
 
 void GrpcServer::WatchReadiness(std::vector<ReadinessCheck> checks) {
   for (ReadinessCheck& own : OwnChecks(runtime_.db, *listener_)) checks.push_back(std::move(own));
-  grpc::HealthCheckServiceInterface& health = *server_->GetHealthCheckService();
-  health.SetServingStatus("liveness", true);
   readiness_ = std::make_unique<Readiness>(
-      std::move(checks), kReadinessInterval, [&health](bool ready) { SetReady(health, ready); });
+      std::move(checks), kReadinessInterval, [this](bool ready) { SetReady(health_, ready); });
 }
 
 absl::Status GrpcServer::OpenMetrics() {
@@ -323,7 +324,7 @@ void GrpcServer::Shutdown() {
   if (server_ == nullptr || runtime_.shutting_down.exchange(true)) return;
   metrics_.reset();  // it looks at the database
   readiness_.reset();
-  server_->GetHealthCheckService()->SetServingStatus(false);
+  health_.Shutdown();
   // gRPC's own draining would also wait for clients that keep an idle connection.
   const absl::Time drained = SteadyNow() + options_.drain_timeout;
   runtime_.calls.AwaitEmpty(options_.drain_timeout);
@@ -428,8 +429,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(api::Database& database,
   if (!options.token_file.empty()) {
     STRATA_ASSIGN_OR_RETURN(grants, GrantTable::Open(options.token_file));
   }
-  // Both are process-wide and idempotent; they must precede the builder.
-  grpc::EnableDefaultHealthCheckService(true);
+  // Process-wide and idempotent; it must precede the builder.
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   auto server = std::make_unique<GrpcServer>(database, std::move(grants), options);
   STRATA_RETURN_IF_ERROR(server->Listen(address));

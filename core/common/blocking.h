@@ -4,7 +4,8 @@
 
 namespace strata {
 
-// Whoever lends a thread out. Called on that thread.
+// Whoever lends a thread out. Called on that thread; must not throw, since waits end in
+// destructors.
 class BlockingObserver {
  public:
   virtual ~BlockingObserver() = default;

@@ -35,11 +35,15 @@ class Executor::LentThread final : public BlockingObserver {
   void BlockingEnds(bool in_turn) override {
     if (!blocked_) return;
     absl::MutexLock lock(&executor_.mutex_);
-    bool has_place = !in_turn;
     if (in_turn) {
-      executor_.Change(client_, [&] { client_.resumed.push_back(&has_place); });
+      Resumed resumed;
+      executor_.Change(client_, [&] {
+        Resumed*& last = client_.last_resumed;
+        (last == nullptr ? client_.first_resumed : last->next) = &resumed;
+        last = &resumed;
+      });
       executor_.Dispatch();
-      executor_.mutex_.Await(absl::Condition(&has_place));
+      executor_.mutex_.Await(absl::Condition(&resumed.has_place));
     } else {
       ++executor_.running_;
       executor_.Change(client_, [this] { ++client_.running; });
@@ -63,26 +67,27 @@ Executor::Executor(int places, const char* name)
 void Executor::AddThread() {
   for (std::thread& thread : ended_) thread.join();
   ended_.clear();
-  std::thread thread([this] {
+  std::list<std::thread> added(1);
+  const auto self = added.begin();
+  *self = std::thread([this, self] {
     NameThisThread(name_);
-    Work();
+    Work(self);
   });
   ++starting_;
-  const std::thread::id id = thread.get_id();
-  threads_.emplace(id, std::move(thread));
+  threads_.splice(threads_.end(), added);
 }
 
 Executor::~Executor() {
   // What blocks may need further threads to get on.
   for (bool more = true; more;) {
-    std::map<std::thread::id, std::thread> threads;
+    std::list<std::thread> threads;
     {
       absl::MutexLock lock(&mutex_);
       closing_ = true;
       threads.swap(threads_);
     }
     more = !threads.empty();
-    for (auto& [id, thread] : threads) thread.join();
+    for (std::thread& thread : threads) thread.join();
   }
   absl::MutexLock lock(&mutex_);
   for (std::thread& thread : ended_) thread.join();
@@ -96,21 +101,31 @@ ExecutorNumbers Executor::numbers() const {
 Executor::Client& Executor::Of(absl::string_view name) {
   const auto found = clients_.find(name);
   if (found != clients_.end()) return found->second;
-  Client& client = clients_[std::string(name)];
-  client.name = std::string(name);
-  return client;
+  Client made;
+  made.name = std::string(name);
+  Waiting one{{0, 0, nullptr}};
+  made.entry = one.extract(one.begin());
+  std::string key = made.name;
+  return clients_.emplace(std::move(key), std::move(made)).first->second;
 }
 
 void Executor::Change(Client& client, absl::FunctionRef<void()> change) {
-  waiting_.erase({client.running, client.turn, &client});
+  if (client.entry.empty()) {
+    client.entry = waiting_.extract({client.running, client.turn, &client});
+  }
   change();
-  if (client.waits()) waiting_.insert({client.running, client.turn, &client});
+  if (!client.waits()) return;
+  client.entry.value() = {client.running, client.turn, &client};
+  waiting_.insert(std::move(client.entry));
 }
 
 void Executor::Submit(absl::string_view client, std::function<void()> task) {
+  std::list<Task> added;
+  added.push_back({nullptr, std::move(task)});
   absl::MutexLock lock(&mutex_);
   Client& whose = Of(client);
-  Change(whose, [&] { whose.tasks.push_back(std::move(task)); });
+  added.front().client = &whose;
+  Change(whose, [&] { whose.tasks.splice(whose.tasks.end(), added); });
   ++queued_;
   Dispatch();
 }
@@ -132,13 +147,14 @@ void Executor::GivePlaceTo(Client& client) {
   Change(client, [&]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     ++client.running;
     client.turn = ++turns_;
-    if (!client.resumed.empty()) {
-      *client.resumed.front() = true;
-      client.resumed.pop_front();
+    if (client.first_resumed != nullptr) {
+      Resumed& resumed = *client.first_resumed;
+      client.first_resumed = resumed.next;
+      if (resumed.next == nullptr) client.last_resumed = nullptr;
+      resumed.has_place = true;
       return;
     }
-    begun_.push_back({&client, std::move(client.tasks.front())});
-    client.tasks.pop_front();
+    begun_.splice(begun_.end(), client.tasks, client.tasks.begin());
     --queued_;
   });
   if (begun_.size() <= idle_ + starting_) return;
@@ -150,38 +166,37 @@ void Executor::GivePlaceTo(Client& client) {
   }
 }
 
-bool Executor::Take(Begun& begun) {
-  if (begun_.empty() && !closing_ && idle_ >= places_) return false;
+std::list<Executor::Task> Executor::Take() {
+  std::list<Task> begun;
+  if (begun_.empty() && !closing_ && idle_ >= places_) return begun;
   ++idle_;
   mutex_.Await(absl::Condition(this, &Executor::Ready));
   --idle_;
-  if (begun_.empty()) return false;
-  begun = std::move(begun_.front());
-  begun_.pop_front();
-  return true;
+  if (!begun_.empty()) begun.splice(begun.end(), begun_, begun_.begin());
+  return begun;
 }
 
-void Executor::Work() {
+void Executor::Work(std::list<std::thread>::iterator self) {
   bool started = false;
   while (true) {
-    Begun begun;
+    std::list<Task> begun;
     {
       absl::MutexLock lock(&mutex_);
       if (!std::exchange(started, true)) --starting_;
-      if (!Take(begun)) {
-        const auto self = threads_.find(std::this_thread::get_id());
-        if (self == threads_.end()) return;  // the destructor joins it
-        ended_.push_back(std::move(self->second));
-        threads_.erase(self);
+      begun = Take();
+      if (begun.empty()) {
+        // While it closes, the destructor has the threads.
+        if (!closing_) ended_.splice(ended_.end(), threads_, self);
         return;
       }
     }
+    Client& client = *begun.front().client;
     {
-      const LentThread lent(*this, *begun.client);
-      begun.task();
-      begun.task = nullptr;  // what it holds may be much
+      const LentThread lent(*this, client);
+      begun.front().run();
+      begun.clear();  // what it holds may be much
     }
-    Finished(*begun.client);
+    Finished(client);
   }
 }
 

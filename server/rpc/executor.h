@@ -4,15 +4,14 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
+#include <list>
 #include <map>
 #include <set>
 #include <string>
 #include <thread>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/functional/function_ref.h"
@@ -47,25 +46,37 @@ class Executor {
   Executor(const Executor&) = delete;
   Executor& operator=(const Executor&) = delete;
 
-  // `client`: whose turn it is. `task` must not throw.
+  // `client`: whose turn it is. `task` must not throw; where there is no memory for it, nothing was
+  // submitted.
   void Submit(absl::string_view client, std::function<void()> task);
 
   const char* name() const { return name_; }
   ExecutorNumbers numbers() const;
 
  private:
+  struct Client;
+  struct Task {
+    Client* client;
+    std::function<void()> run;
+  };
+  // A blocked task that wants its place again; on its thread's stack.
+  struct Resumed {
+    bool has_place = false;
+    Resumed* next = nullptr;
+  };
+  // Those that wait for a place: running, turn.
+  using Waiting = std::set<std::tuple<std::size_t, std::uint64_t, Client*>>;
+  // Once there, it goes through its states without memory: waits end in destructors.
   struct Client {
     std::string name;
     std::size_t running = 0;
     std::size_t blocked = 0;
-    std::uint64_t turn = 0;     // when it got its last place
-    std::deque<bool*> resumed;  // blocked tasks that want their place again
-    std::deque<std::function<void()>> tasks;
-    bool waits() const { return !resumed.empty() || !tasks.empty(); }
-  };
-  struct Begun {
-    Client* client;
-    std::function<void()> task;
+    std::uint64_t turn = 0;  // when it got its last place
+    Resumed* first_resumed = nullptr;
+    Resumed* last_resumed = nullptr;
+    std::list<Task> tasks;
+    Waiting::node_type entry;  // while it does not wait for a place
+    bool waits() const { return first_resumed != nullptr || !tasks.empty(); }
   };
   class LentThread;  // tells of a task's waits
 
@@ -78,9 +89,10 @@ class Executor {
   bool HasPlaceFor(const Client& client) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void GivePlaceTo(Client& client) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void AddThread() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void Work();
-  // False: the thread is not needed any more.
-  bool Take(Begun& begun) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // `self`: where the thread is among threads_.
+  void Work(std::list<std::thread>::iterator self);
+  // Empty: the thread is not needed any more.
+  std::list<Task> Take() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Finished(Client& client);
   bool Ready() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return closing_ || !begun_.empty(); }
 
@@ -88,18 +100,17 @@ class Executor {
   const char* const name_;
   mutable absl::Mutex mutex_;
   std::map<std::string, Client, std::less<>> clients_ ABSL_GUARDED_BY(mutex_);
-  // Those that wait for a place: running, turn.
-  std::set<std::tuple<std::size_t, std::uint64_t, Client*>> waiting_ ABSL_GUARDED_BY(mutex_);
+  Waiting waiting_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t turns_ ABSL_GUARDED_BY(mutex_) = 0;
   std::size_t running_ ABSL_GUARDED_BY(mutex_) = 0;
   std::size_t blocked_ ABSL_GUARDED_BY(mutex_) = 0;
   std::size_t queued_ ABSL_GUARDED_BY(mutex_) = 0;
-  std::deque<Begun> begun_ ABSL_GUARDED_BY(mutex_);  // have their place, wait for a thread
+  std::list<Task> begun_ ABSL_GUARDED_BY(mutex_);  // have their place, wait for a thread
   bool closing_ ABSL_GUARDED_BY(mutex_) = false;
   std::size_t idle_ ABSL_GUARDED_BY(mutex_) = 0;      // threads that wait for a task
   std::size_t starting_ ABSL_GUARDED_BY(mutex_) = 0;  // threads that will
-  std::map<std::thread::id, std::thread> threads_ ABSL_GUARDED_BY(mutex_);
-  std::vector<std::thread> ended_ ABSL_GUARDED_BY(mutex_);  // to be joined
+  std::list<std::thread> threads_ ABSL_GUARDED_BY(mutex_);
+  std::list<std::thread> ended_ ABSL_GUARDED_BY(mutex_);  // to be joined
 };
 
 }  // namespace strata::server

@@ -25,8 +25,6 @@ namespace {
 
 constexpr std::size_t kMaxLoggedName = 100;
 constexpr std::size_t kMaxLoggedMessage = 300;
-// In the metrics: who was refused because nobody knows him.
-constexpr absl::string_view kStranger = "STRANGER";
 
 // Unique among the calls of this process and, very likely, of all others.
 std::string NewRequestId() {
@@ -58,11 +56,6 @@ absl::Time DeadlineOf(const grpc::CallbackServerContext& context) {
              : SteadyNow() + absl::FromChrono(deadline - std::chrono::system_clock::now());
 }
 
-// gRPC's name of a peer without its port: a client that comes by many connections is one.
-std::string HostOf(absl::string_view peer) {
-  return std::string(absl::StartsWith(peer, "ipv") ? peer.substr(0, peer.rfind(':')) : peer);
-}
-
 // `reason` if it says that the call was not let in, or thrown out; else empty.
 absl::string_view Rejection(absl::string_view reason) {
   const bool answered = reason == translate::kDatabaseReason || reason == translate::kRequestReason;
@@ -74,6 +67,10 @@ absl::Status NobodyMay(absl::string_view method) {
 }
 
 }  // namespace
+
+std::string HostOf(absl::string_view peer) {
+  return std::string(absl::StartsWith(peer, "ipv") ? peer.substr(0, peer.rfind(':')) : peer);
+}
 
 Request::Request(Runtime& runtime,
                  grpc::CallbackServerContext& context,
@@ -101,6 +98,7 @@ Request::~Request() {
   if (runtime_.access.asks() && admission_.ok()) runtime_.revocations.Remove(*this);
   End();
   gate().Leave();
+  if (arrived_) runtime_.arrivals.Leave(caller_.principal, SteadyNow());
 }
 
 void Request::End() {
@@ -121,6 +119,7 @@ absl::Status Request::Admit(const grpc::CallbackServerContext& context) {
       MetadataOf(context, kAuthorizationKey), CertificateNameOf(*context.auth_context()));
   if (!caller.ok()) return Refuse(caller.status());
   caller_ = *std::move(caller);
+  arrived_ = true;
   call_.principal = caller_.principal;
   return EnterLimits();
 }

@@ -28,6 +28,8 @@ namespace strata::server {
 // Metadata key of the call's id, in requests (chosen by the client: 1 to 64 printable characters
 // without spaces; otherwise the server chooses) and in the answer's initial metadata.
 inline constexpr char kRequestIdKey[] = "x-request-id";
+// In the metrics: who was refused because nobody knows him.
+inline constexpr absl::string_view kStranger = "STRANGER";
 
 // The context of a call (deadline, cancellation, id, who calls), its place among the calls under
 // way, and its line in the log. Every message that comes in goes through Open(), which is where it
@@ -109,6 +111,7 @@ class Request final : public Revocable {
   const absl::Time started_;
   const absl::Duration limit_;
   Caller caller_;
+  bool arrived_ = false;   // among the arrivals
   bool stranger_ = false;  // nobody knows who calls
   mutable absl::Mutex mutex_;
   std::string map_ ABSL_GUARDED_BY(mutex_);  // that the last message with a map named
@@ -125,9 +128,16 @@ class Request final : public Revocable {
   std::atomic<std::size_t> bytes_sent_ = 0;
 };
 
+// gRPC's name of a peer without its port: a client that comes by many connections is one.
+std::string HostOf(absl::string_view peer);
+
 // What of a request the door refused.
 inline absl::Status AtTheDoor(const absl::Status& status) {
   return translate::WithReason(status, translate::kRequestReason);
+}
+// Of a call that should bring one message.
+inline absl::Status NoRequest() {
+  return AtTheDoor(absl::InvalidArgumentError("the call ended before it brought a request"));
 }
 template <typename T>
 absl::StatusOr<T> AtTheDoor(absl::StatusOr<T> result) {

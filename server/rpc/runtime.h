@@ -17,6 +17,7 @@
 #include "core/common/steady_time.h"
 #include "server/access/access.h"
 #include "server/metrics/metrics.h"
+#include "server/rpc/arrivals.h"
 #include "server/rpc/client_limits.h"
 #include "server/rpc/executor.h"
 #include "server/rpc/revocation.h"
@@ -103,6 +104,7 @@ struct Runtime {
         access(std::move(grants)),
         clients(runtime_options.client, runtime_options.max_call_bytes),
         strangers(runtime_options.strangers),
+        arrivals(runtime_options.client.max_calls + runtime_options.client.max_watches + kGoing),
         queries(runtime_options.query_threads, "query"),
         streams(runtime_options.stream_threads, "stream"),
         uploads(runtime_options.upload_threads, "upload"),
@@ -111,11 +113,15 @@ struct Runtime {
         calls(runtime_options.max_calls, "calls"),
         watches(runtime_options.max_watches, "watches") {}
 
+  // Of one client's calls, that are refused or have ended and are not freed yet.
+  static constexpr int kGoing = 256;
+
   api::Database& db;
   const RuntimeOptions options;
   Access access;
   ClientLimits clients;
   Strangers strangers;
+  Arrivals arrivals;
   RevocationWatch revocations{absl::Milliseconds(500)};
   CallMetrics metrics;
   Executor queries;

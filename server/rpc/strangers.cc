@@ -37,7 +37,15 @@ absl::Status Take(ClientLimits& limits, absl::string_view name, absl::Time now) 
 
 Strangers::Strangers(const StrangerOptions& options)
     : all_(Rate(options.all_per_second, options.all_burst), 0),
-      by_address_(Rate(options.calls_per_second, options.burst), 0) {}
+      by_address_(Rate(options.calls_per_second, options.burst), 0),
+      heard_(Rate(options.heard_per_second, options.heard_burst), 0) {}
+
+bool Strangers::IsHeard(absl::Time now) {
+  if (Take(heard_, kEverybody, now).ok()) return true;
+  absl::MutexLock lock(&mutex_);
+  ++not_logged_;
+  return false;
+}
 
 absl::Status Strangers::Enter(absl::string_view address, absl::Time now) {
   // All first: then there are never more addresses in the books than may come in a while.

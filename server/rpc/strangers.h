@@ -20,6 +20,9 @@ struct StrangerOptions {
   double burst = 1000.0;           // at once after a pause
   double all_per_second = 100.0;   // of all addresses
   double all_burst = 10'000.0;
+  // Of all addresses: whose requests are read before they are refused, and logged.
+  double heard_per_second = 8.0;
+  double heard_burst = 8.0;
 };
 
 // How often who is not known may ask and be told why, and how much of that is logged. Whoever shows
@@ -31,6 +34,8 @@ class Strangers {
   // OK: a stranger from `address` is told why he is refused. RESOURCE_EXHAUSTED with the time to
   // wait: there were too many lately.
   absl::Status Enter(absl::string_view address, absl::Time now);
+  // False: the door refuses him by a word, and nothing else is done about him.
+  bool IsHeard(absl::Time now);
   // At most once a second: how many were refused since the last time, this one included. nullopt:
   // this one needs no line in the log.
   std::optional<std::uint64_t> ToLog(absl::Time now);
@@ -38,6 +43,7 @@ class Strangers {
  private:
   ClientLimits all_;
   ClientLimits by_address_;
+  ClientLimits heard_;
   absl::Mutex mutex_;
   absl::Time logged_ ABSL_GUARDED_BY(mutex_) = absl::InfinitePast();
   std::uint64_t not_logged_ ABSL_GUARDED_BY(mutex_) = 0;

@@ -129,8 +129,8 @@ std::vector<PointCloud> RecordedScans() {
   return scans;
 }
 
-// The thread that integrates scans gets only what nobody else wants.
-void HoldIntegration() {
+// The thread that integrates scans gets only what nobody else wants. How many such there are.
+int HoldThreadsThatIntegrate() {
   int held = 0;
   for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
     std::string name;
@@ -138,6 +138,18 @@ void HoldIntegration() {
     if (name != "worker") continue;
     const sched_param none{};
     held += sched_setscheduler(std::stoi(task.path().filename()), SCHED_IDLE, &none) == 0 ? 1 : 0;
+  }
+  return held;
+}
+
+// It gets its name when it first runs.
+void HoldIntegration() {
+  constexpr double kPatienceSeconds = 60.0;
+  const Clock::time_point begun = Clock::now();
+  int held = HoldThreadsThatIntegrate();
+  while (held == 0 && SecondsSince(begun) < kPatienceSeconds) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    held = HoldThreadsThatIntegrate();
   }
   Require(held == 1, "the thread that integrates was not found");
 }

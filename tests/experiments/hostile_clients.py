@@ -182,17 +182,30 @@ def floods(a, until):
     repeat_on_sockets(a.address, until, flood)
 
 
-def rapid_resets(a, until):
+def rapid_resets(path, known=True):
     """RPCs begun and cancelled at once, all on one connection after another."""
-    def reset(peer):
-        peer.send(PREFACE + frame(4, 0, 0))
-        for stream in range(1, 200_001, 2):
-            peer.sendall(call_headers(stream, "/strata.v1.Maps/List", a.token) + frame(3, 0, stream, struct.pack(">I", 8)))
-            if stream % 512 == 1:
-                swallow(peer)
-            if time.monotonic() > until:
-                return
-    repeat_on_sockets(a.address, until, reset)
+    def attack(a, until):
+        def reset(peer):
+            peer.send(PREFACE + frame(4, 0, 0))
+            for stream in range(1, 200_001, 2):
+                peer.sendall(call_headers(stream, path, a.token if known else "") +
+                             frame(3, 0, stream, struct.pack(">I", 8)))
+                if stream % 512 == 1:
+                    swallow(peer)
+                if time.monotonic() > until:
+                    return
+        repeat_on_sockets(a.address, until, reset)
+    return attack
+
+
+def stranger_bodies(path):
+    """Requests of 4 MB of empty items, without a token."""
+    def attack(a, until):
+        import grpc
+        with grpc.insecure_channel(a.address) as channel:
+            call = channel.unary_unary(path)
+            in_parallel(40, until, lambda: call(b"\x1a\x00" * 2_000_000, timeout=20))
+    return attack
 
 
 def cancelled(a, until):
@@ -394,7 +407,13 @@ ATTACKS = {
     "waiting edits": waiting_edits, "long plans": long_plans, "idle readers": idle_readers,
     "slow senders": slow_senders, "silent streams": silent_streams, "connections": connections(b""),
     "connections h2": connections(PREFACE + frame(4, 0, 0)), "garbage": garbage, "http1": http1, "floods": floods,
-    "rapid resets": rapid_resets, "cancelled": cancelled, "big headers": big_headers, "names": names, "tokens": tokens,
+    "rapid resets": rapid_resets("/strata.v1.Maps/List"),
+    "upload resets": rapid_resets("/strata.v1.Scans/Upload"),
+    "stranger resets": rapid_resets("/strata.v1.Scans/Upload", known=False),
+    "health resets": rapid_resets("/grpc.health.v1.Health/Check", known=False),
+    "stranger bodies": stranger_bodies("/strata.v1.Tiles/Fetch"),
+    "health bodies": stranger_bodies("/grpc.health.v1.Health/Check"),
+    "cancelled": cancelled, "big headers": big_headers, "names": names, "tokens": tokens,
     "bad numbers": bad_numbers, "absurd extents": absurd_extents, "claims": claims, "disorder": disorder,
     "big messages": big_messages, "bombs": bombs,
 }

@@ -171,14 +171,18 @@ TEST_F(AccessTest, IngestAsksAgainForEveryScan) {
 }
 
 TEST_F(AccessTest, HealthNeedsNoTokenAndReflectionIsNotThere) {
-  Give("robot", {{kAllMaps, Right::kRead}});
+  const std::string token = Give("robot", {{kAllMaps, Right::kRead}});
   ServeWithTokens();
   EXPECT_TRUE(CallRaw(channel_, "/grpc.health.v1.Health/Check", "").status.ok());
-  const RawAnswer reflection =
-      CallRaw(channel_,
-              "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
-              std::string("\x3A\x00", 2));
-  EXPECT_EQ(reflection.status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
+  const auto reflection = [this](const std::map<std::string, std::string>& metadata) {
+    return CallRaw(channel_,
+                   "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
+                   std::string("\x3A\x00", 2),
+                   metadata)
+        .status.error_code();
+  };
+  EXPECT_EQ(reflection({}), grpc::StatusCode::UNAUTHENTICATED);
+  EXPECT_EQ(reflection({{"authorization", token}}), grpc::StatusCode::UNIMPLEMENTED);
 }
 
 TEST_F(AccessTest, WithoutItsTokenFileAServerDoesNotStart) {

@@ -37,6 +37,15 @@ TEST(StrangersTest, ManyAddressesTogetherAreLimitedToo) {
   EXPECT_EQ(taken, 10);
 }
 
+TEST(StrangersTest, FewAreHeardAndTheOthersAreCounted) {
+  Strangers strangers({.heard_per_second = 1.0, .heard_burst = 2.0});
+  EXPECT_TRUE(strangers.IsHeard(kStart));
+  EXPECT_TRUE(strangers.IsHeard(kStart));
+  EXPECT_FALSE(strangers.IsHeard(kStart));
+  EXPECT_EQ(strangers.ToLog(kStart), 2U);
+  EXPECT_TRUE(strangers.IsHeard(kStart + absl::Seconds(1)));
+}
+
 TEST(StrangersTest, OneLineASecondTellsOfAll) {
   Strangers strangers({});
   EXPECT_EQ(strangers.ToLog(kStart), 1U);
