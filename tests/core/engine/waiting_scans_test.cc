@@ -6,9 +6,7 @@
 namespace strata {
 namespace {
 
-absl::Time At(double seconds) {
-  return absl::FromUnixSeconds(1000) + absl::Seconds(seconds);
-}
+absl::Time At(double seconds) { return absl::FromUnixSeconds(1000) + absl::Seconds(seconds); }
 
 TEST(WaitingScansTest, EachWaitsSinceItWasAcknowledged) {
   WaitingScans scans(At(0));
