@@ -122,7 +122,7 @@ absl::StatusOr<PlanResult> Planner::Plan(TileSource& source,
   STRATA_ASSIGN_OR_RETURN(const ProfileChecks checks,
                           MakeProfileChecks(query.profile, options_.cell_size_m));
   const std::shared_ptr<const Landmarks> landmarks = LandmarksFor(source, query.profile);
-  SearchSpace space(cache_, source, checks, ClassFactors(query.class_costs));
+  SearchSpace space(cache_, source, checks, ClassFactors(query.class_costs), stop);
   absl::StatusOr<PlanResult> result = Answer(space, query, landmarks.get(), options_.budget, stop);
   if (result.ok()) result->elapsed_ms = absl::ToDoubleMilliseconds(SteadyNow() - begin);
   return result;
@@ -135,7 +135,7 @@ absl::StatusOr<PathCheck> Planner::Check(TileSource& source,
   STRATA_RETURN_IF_ERROR(ValidateClassCosts(query.class_costs));
   STRATA_ASSIGN_OR_RETURN(const ProfileChecks checks,
                           MakeProfileChecks(query.profile, options_.cell_size_m));
-  SearchSpace space(cache_, source, checks, ClassFactors(query.class_costs));
+  SearchSpace space(cache_, source, checks, ClassFactors(query.class_costs), stop);
   return CheckPath(space, query.waypoints, stop);
 }
 
@@ -146,7 +146,7 @@ absl::Status Planner::PrepareLandmarks(TileSource& source,
                                        const Stop& stop) {
   STRATA_ASSIGN_OR_RETURN(const ProfileChecks checks,
                           MakeProfileChecks(profile, options_.cell_size_m));
-  SearchSpace space(cache_, source, checks);
+  SearchSpace space(cache_, source, checks, {}, stop);
   STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const Landmarks> made,
                           Landmarks::Make(space, tiles, count, stop));
   absl::MutexLock lock(&mutex_);

@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include <Eigen/Core>
 
+#include "core/common/status.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/ground_window.h"
 #include "core/planning/prepared_tile.h"
@@ -34,7 +35,7 @@ int CellsBetween(std::uint16_t a, std::uint16_t b) {
 int SearchSpace::SlotOf(const TileKey& key) {
   const auto [found, inserted] = slot_of_.try_emplace(key, -1);
   if (!inserted || !status_.ok()) return found->second;
-  absl::StatusOr<std::shared_ptr<const PreparedTile>> tile = cache_.Get(source_, key, checks_);
+  absl::StatusOr<std::shared_ptr<const PreparedTile>> tile = Fetch(key);
   if (tile.ok() && slots_.size() >= kMaxSlots) {
     tile = absl::OutOfRangeError(absl::StrCat("a query touches at most ", kMaxSlots, " tiles"));
   }
@@ -52,13 +53,18 @@ int SearchSpace::SlotOf(const TileKey& key) {
   return slot;
 }
 
+absl::StatusOr<std::shared_ptr<const PreparedTile>> SearchSpace::Fetch(const TileKey& key) {
+  STRATA_RETURN_IF_ERROR(stop_.status());
+  return cache_.Get(source_, key, checks_);
+}
+
 const SearchSpace::Slot& SearchSpace::At(int slot) {
   if (slots_[slot].tile == nullptr) Hold(slot, TileAgain(slots_[slot]));
   return slots_[slot];
 }
 
 std::shared_ptr<const PreparedTile> SearchSpace::TileAgain(const Slot& slot) {
-  absl::StatusOr<std::shared_ptr<const PreparedTile>> tile = cache_.Get(source_, slot.key, checks_);
+  absl::StatusOr<std::shared_ptr<const PreparedTile>> tile = Fetch(slot.key);
   // The same versions of the same tile: the same patches.
   if (tile.ok() && *tile != nullptr && (*tile)->size() == slot.size) return *std::move(tile);
   if (status_.ok()) {

@@ -10,8 +10,10 @@
 
 #include "absl/container/flat_hash_map.h"
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include <Eigen/Core>
 
+#include "core/common/stop.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/class_factors.h"
 #include "core/planning/prepared_tile.h"
@@ -25,9 +27,10 @@ namespace strata {
 using PatchId = std::uint32_t;
 inline constexpr PatchId kNoPatchId = 0xFFFFFFFFU;
 
-// For the thread of one query. After the first error of the source, status() holds it and lookups
-// find nothing. However far a query goes, it holds only the tiles it touched last, 1/32 of the
-// cache's budget; others are had from the cache, or prepared, again.
+// For the thread of one query. After the first error of the source, or once `stop` stops while a
+// tile is asked for, status() holds it and lookups find nothing. However far a query goes, it holds
+// only the tiles it touched last, 1/32 of the cache's budget; others are had from the cache, or
+// prepared, again.
 class SearchSpace {
  public:
   struct Slot {
@@ -42,8 +45,9 @@ class SearchSpace {
   SearchSpace(TileCache& cache,
               TileSource& source,
               const ProfileChecks& checks,
-              const ClassFactors& classes = {})
-      : cache_(cache), source_(source), checks_(checks), classes_(classes) {}
+              const ClassFactors& classes = {},
+              const Stop& stop = {})
+      : cache_(cache), source_(source), checks_(checks), classes_(classes), stop_(stop) {}
 
   const absl::Status& status() const { return status_; }
   const ProfileChecks& checks() const { return checks_; }
@@ -92,6 +96,7 @@ class SearchSpace {
   static constexpr int kPageShift = 12;
 
   static CellIndex CellIn(const Slot& slot, std::uint32_t local);
+  absl::StatusOr<std::shared_ptr<const PreparedTile>> Fetch(const TileKey& key);
   std::shared_ptr<const PreparedTile> TileAgain(const Slot& slot);
   // Keeps the tile of a slot at hand, and lets go of those that came first.
   void Hold(int slot, std::shared_ptr<const PreparedTile> tile);
@@ -100,6 +105,7 @@ class SearchSpace {
   TileSource& source_;
   const ProfileChecks& checks_;
   const ClassFactors classes_;
+  const Stop stop_;
   absl::Status status_;
   std::vector<Slot> slots_;
   std::deque<int> held_;  // slots with a tile, the first to come first

@@ -1,13 +1,30 @@
-// One planner and its cache, asked by several threads at once.
+// One planner and its cache, asked by several threads at once; tiles prepared by several threads.
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <new>
+#include <random>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
 #include <gtest/gtest.h>
 
+#include "core/common/cache_budget.h"
+#include "core/common/stop.h"
+#include "core/mls/tile_key.h"
+#include "core/planning/ground_window.h"
 #include "core/planning/planner.h"
+#include "core/planning/prepared_tile.h"
+#include "core/planning/profile_checks.h"
+#include "core/planning/rows.h"
+#include "core/planning/search_space.h"
+#include "core/planning/tile_cache.h"
 #include "tests/core/planning/memory_tiles.h"
 #include "tests/support/drawing.h"
+#include "tests/support/status_matchers.h"
 
 namespace strata {
 namespace {
@@ -15,6 +32,60 @@ namespace {
 using ::strata::testing::DrawnMap;
 using ::strata::testing::MapFromDrawing;
 using ::strata::testing::MemoryTiles;
+
+// Bands side by side, a thread each.
+absl::Status InThreads(std::size_t count, absl::FunctionRef<absl::Status(std::size_t)> body) {
+  std::vector<std::jthread> threads;
+  for (std::size_t i = 0; i < count; ++i) {
+    threads.emplace_back([&body, i] { STRATA_EXPECT_OK(body(i)); });
+  }
+  return absl::OkStatus();
+}
+
+TEST(PlannerThreadsTest, ATileIsTheSameByAnyLoop) {
+  const std::uint64_t seed = 20261123;
+  SCOPED_TRACE(seed);
+  std::mt19937_64 random(seed);
+  for (int world = 0; world < 3; ++world) {
+    std::string drawing;
+    for (int i = 0; i < 60 * 60; ++i) {
+      if (i > 0 && i % 60 == 0) drawing += '\n';
+      drawing += "......#= "[random() % 9];
+    }
+    MemoryTiles source(
+        MapFromDrawing(
+            drawing, {{'.', {{0.0}}}, {'#', {{0.7, 0.7}}}, {'=', {{0.0}, {1.5, 0.2}}}}, 5)
+            .Tiles());
+    STRATA_ASSERT_OK_AND_ASSIGN(const ProfileChecks checks,
+                                MakeProfileChecks({.radius_m = 0.15, .max_gap_m = 0.6}, 0.1));
+    for (const TileKey& key : source.Keys()) {
+      STRATA_ASSERT_OK_AND_ASSIGN(const TileNeighbourhood tiles, LoadAround(source, key));
+      const GroundWindow window(tiles, checks.margin, 0.1);
+      const PreparedTile tile = PrepareTile(key, window, checks);
+      EXPECT_FALSE(tile.far_moves.empty());
+      EXPECT_EQ(PrepareTile(key, window, checks, InThreads), tile) << key.ToString();
+    }
+  }
+}
+
+TEST(PlannerThreadsTest, ALoopWithoutMemoryIsAnAllocationThatFailed) {
+  const ParallelLoop none = [](std::size_t, absl::FunctionRef<absl::Status(std::size_t)>) {
+    return absl::ResourceExhaustedError("no memory");
+  };
+  EXPECT_THROW(ForRows(none, 0, 10, [](int, int) {}), std::bad_alloc);
+}
+
+TEST(PlannerThreadsTest, WhoIsToldToStopIsGivenNoTile) {
+  MemoryTiles source(MapFromDrawing("....\n....", {{'.', {{0.0}}}}, 5).Tiles());
+  STRATA_ASSERT_OK_AND_ASSIGN(const ProfileChecks checks, MakeProfileChecks({}, 0.1));
+  TileCache cache(std::make_shared<CacheBudget>(std::size_t{1} << 24));
+  const Stop stop;
+  SearchSpace space(cache, source, checks, {}, stop);
+  stop.Request();
+  EXPECT_EQ(space.SlotOf(source.Keys().front()), -1);
+  EXPECT_EQ(space.status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(source.loads, 0);
+}
 
 TEST(PlannerThreadsTest, ManyThreadsGetTheSameAnswers) {
   const std::string road(28, '.');
