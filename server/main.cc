@@ -24,6 +24,7 @@
 #include "core/common/status.h"
 #include "core/engine/engine.h"
 #include "server/check.h"
+#include "server/last_end.h"
 #include "server/log_writer.h"
 #include "server/options.h"
 #include "server/quarantine_commands.h"
@@ -113,8 +114,9 @@ absl::Status Serve(const ProgramOptions& options) {
   RaiseFileLimit();
   const LogWriter log(STDERR_FILENO);
   STRATA_RETURN_IF_ERROR(CheckExposure(options.server));  // before a directory is made
-  STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<api::Database> database,
-                          OpenEngine(options.engine));
+  EngineOptions engine = options.engine;
+  engine.killed_from_outside = BeginRun(engine.directory);
+  STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<api::Database> database, OpenEngine(engine));
   STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<Server> server,
                           Server::Start(*database, options.server, {LogCheck(log)}));
   // Before any other line with an address, for scripts that read both streams as one.

@@ -47,6 +47,10 @@ struct EngineOptions {
   // After a verified closure, and at most so often, a map's poses are optimised without being
   // asked; zero: never.
   absl::Duration optimize_interval = absl::ZeroDuration();
+  // How the last process that had the directory ended, if not well: killed by somebody or with the
+  // machine, neither by a fault of its own nor for want of memory. What was under way then is tried
+  // alone, but not put aside.
+  bool killed_from_outside = false;
 
   // INVALID_ARGUMENT naming every field out of its range.
   absl::Status Validate() const;

@@ -161,7 +161,8 @@ absl::Status Quarantine::CountDeaths(StorageWriter& writer) {
   std::map<WorkId, std::uint32_t> deaths;
   for (Attempt& attempt : attempts) {
     const bool died = std::exchange(attempt.under_way, false);
-    if (died) ++attempt.deaths;
+    // Whom somebody else killed may have had innocent work: it becomes a suspect, no more.
+    if (died && (attempt.deaths == 0 || !core_.options().killed_from_outside)) ++attempt.deaths;
     STRATA_ASSIGN_OR_RETURN(const bool matters, Matters(writer, attempt));
     if (!matters || attempt.deaths == 0) {
       STRATA_RETURN_IF_ERROR(writer.DeleteAttempt(attempt.work));

@@ -20,7 +20,8 @@
 
 namespace strata {
 
-// So often the process may die while the same work is under way.
+// So often the process may die while the same work is under way, but for what killed it from
+// outside (EngineOptions::killed_from_outside).
 inline constexpr std::uint32_t kMostDeaths = 2;
 
 // Messages of scans and jobs in quarantine begin so.

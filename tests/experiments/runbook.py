@@ -13,6 +13,7 @@ import os
 import pathlib
 import re
 import shutil
+import signal
 import socket
 import sqlite3
 import struct
@@ -121,9 +122,9 @@ class Site:
         self.server.stop()
         self.look()
 
-    def kill(self):
+    def die(self):
         self.look()
-        self.server.process.kill()
+        self.server.process.send_signal(signal.SIGSEGV)
         self.server.process.wait()
 
     def look(self, times=1):
@@ -190,12 +191,12 @@ class Site:
 
 
 def die_while_it_joins(site, scan, deaths):
-    """kill -9 until the server has died `deaths` times with the scan under way; it is down then."""
+    """Faults until the server has died `deaths` times with the scan under way; it is down then."""
     says = re.compile(rf"scan {scan} .*under way +{deaths}\b")
     wait_s = 0.02
     while True:
         time.sleep(wait_s)
-        site.kill()
+        site.die()
         if says.search(site.stratad("quarantine", "list", MAP, "--data", site.data)):
             return
         expect(wait_s < 5, f"{scan} is not met while it is joined")
@@ -266,7 +267,7 @@ def full_disk(site, step):
     expect("MiB free" in said, said)
     step("uploads are refused and say why")
     expect("traversable" in site.strata("surface", MAP, "--at", "5,5"), "what is there is served")
-    site.kill()
+    site.die()
     site.start()
     step("killed and started on the full disk")
     site.await_(lambda: site.strata("scan", "list", MAP, code=None).count("robot/1") > 0, "the map opens")

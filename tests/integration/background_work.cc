@@ -8,7 +8,6 @@
 #include <system_error>
 #include <utility>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
@@ -81,7 +80,6 @@ void BackgroundWork::StepJobs(api::Database& db, const api::Call& call) {
   }
   ++jobs_[absl::StrCat(kind, last.state == JobState::kSucceeded ? "_succeeded" : "_ended")];
   if (last.state != JobState::kFailed) return;
-  if (absl::StartsWith(last.message, "quarantined: ")) return;  // it was killed twice
   const std::string what = absl::StrCat("job ", kind, " failed: ", last.message);
   if (kind != "train" && kind != "classify") world_.violations().Add(what);
 }

@@ -44,14 +44,6 @@ class World {
     EXPECT_EQ(process_->Wait(), -SIGKILL);
     Start();
   }
-  // A scan that two servers died of by chance is taken back.
-  void TakeBackScans() {
-    process_->Signal(SIGTERM);
-    EXPECT_EQ(process_->Wait(), 0);
-    testing::TakeBackScans(data_, kMap);
-    Start();
-  }
-
   // Every second of the first scans is labelled.
   absl::Status Put(std::uint64_t i) {
     PointCloud park = MakePark(i);
@@ -147,14 +139,6 @@ class ClassifyCrashTest : public ::testing::Test {
     absl::SleepFor(absl::Milliseconds(random_() % most_ms));
     world.Kill();
   }
-  // A job that two servers died of is not tried a third time by itself.
-  void AgainIfPutAside(World& world, JobInfo& job) {
-    STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo now, world.db().jobs().Get({}, kMap, job.id));
-    if (now.state != JobState::kFailed) return;
-    EXPECT_THAT(now.message, ::testing::StartsWith("quarantined: "));
-    STRATA_ASSERT_OK_AND_ASSIGN(job, world.db().jobs().Start({}, kMap, job.kind, job.parameters));
-  }
-
   const std::uint64_t kills_ = Asked("STRATA_KILLS", 3);
   const std::uint64_t seed_ = Asked("STRATA_SEED", 20261122);
   const ::testing::ScopedTrace trace_{__FILE__, __LINE__, absl::StrCat("seed ", seed_)};
@@ -183,9 +167,7 @@ TEST_F(ClassifyCrashTest, LabelsAreThoseOfAnUndisturbedJob) {
   for (std::uint64_t round = 0; round < kills_; ++round) {
     for (std::uint64_t k = 0; k < kPerRound; ++k) STRATA_ASSERT_OK(world.Put(next++));
     KillWithin(world, 150);
-    AgainIfPutAside(world, job);
   }
-  world.TakeBackScans();
   world.Follow(job.id);
   // What came in after the job had ended, if it was quick.
   world.Run("classify", {{"model", "street"}});
@@ -204,7 +186,6 @@ TEST_F(ClassifyCrashTest, AClassifierIsLearnedOnceAndIsThatOfAnUndisturbedJob) {
   STRATA_ASSERT_OK_AND_ASSIGN(JobInfo job, world.db().jobs().Start({}, kMap, "train", parameters));
   for (std::uint64_t round = 0; round < kills_; ++round) {
     KillWithin(world, 400);
-    AgainIfPutAside(world, job);
   }
   world.Follow(job.id);
   const std::vector<std::string> all = world.Classifiers();

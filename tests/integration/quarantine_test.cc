@@ -53,10 +53,12 @@ class ServerQuarantineTest : public ::testing::Test {
     options.target = server_->Address();
     STRATA_ASSERT_OK_AND_ASSIGN(db_, Connect(options));
   }
-  void Kill() {
-    server_->Signal(SIGKILL);
-    EXPECT_EQ(server_->Wait(), -SIGKILL);
+  void End(int signal) {
+    server_->Signal(signal);
+    EXPECT_EQ(server_->Wait(), -signal);
   }
+  // A death of its own, as it takes a SIGSEGV from anywhere.
+  void Die() { End(SIGSEGV); }
   absl::Status Put(const ScanId& id, const PointCloud& cloud) {
     ScanHeader header;
     header.id = id;
@@ -119,12 +121,12 @@ TEST_F(ServerQuarantineTest, AScanAndAJobThatItDiesOfTwice) {
   STRATA_ASSERT_OK(Put(kSmall, Floor(50)));
   for (int death = 1; death <= 2; ++death) {
     const std::string says = absl::StrCat("under way    ", death);
-    // Killed before the integration began it has not died of it.
+    // Dead before the integration began it has not died of it.
     std::string listed;
     for (int wait_ms = 10; !absl::StrContains(listed, says); wait_ms *= 2) {
       ASSERT_LT(wait_ms, 3000) << listed;
       absl::SleepFor(absl::Milliseconds(wait_ms));
-      Kill();
+      Die();
       listed = Listed("scan big/1");
       if (!absl::StrContains(listed, says)) Start();
     }
@@ -135,7 +137,7 @@ TEST_F(ServerQuarantineTest, AScanAndAJobThatItDiesOfTwice) {
   EXPECT_THAT(held.message, HasSubstr("quarantined: the server died 2 times"));
   EXPECT_EQ(AwaitEnd(kSmall).state, ScanState::kIntegrated);
   EXPECT_EQ(Run("verify").state, JobState::kSucceeded);
-  Kill();
+  Die();
   EXPECT_THAT(Listed("scan big/1"), HasSubstr("quarantined"));
   Release({"scan", "big/1"});
   Start();
@@ -147,7 +149,7 @@ TEST_F(ServerQuarantineTest, AScanAndAJobThatItDiesOfTwice) {
     while (db_->jobs().Get({}, kMap, job->id)->state == JobState::kQueued) {
       absl::SleepFor(absl::Milliseconds(1));
     }
-    Kill();
+    Die();
     EXPECT_THAT(Listed(absl::StrCat("job ", job->id, " (rebuild)")),
                 HasSubstr(absl::StrCat("under way    ", death)));
     Start();
@@ -157,6 +159,22 @@ TEST_F(ServerQuarantineTest, AScanAndAJobThatItDiesOfTwice) {
   EXPECT_THAT(put_aside.message, HasSubstr("quarantined: the server died 2 times while it ran"));
   EXPECT_EQ(Run("verify").state, JobState::kSucceeded);
   STRATA_EXPECT_OK(db_->maps().Delete({}, kMap));
+}
+
+// Somebody kills it, again and again, and always while the same scan is under way.
+TEST_F(ServerQuarantineTest, AScanThatItIsKilledWithIsInnocent) {
+  Start();
+  STRATA_ASSERT_OK(db_->maps().Create({}, kMap, {}));
+  STRATA_ASSERT_OK(Put(kBig, Floor(1'500)));
+  int killed = 0;  // with the scan under way
+  for (int wait_ms = 20; wait_ms < 3000 && killed < 3; wait_ms += wait_ms / 4) {
+    absl::SleepFor(absl::Milliseconds(wait_ms));
+    End(SIGKILL);
+    killed += absl::StrContains(Listed("scan big/1"), "under way") ? 1 : 0;
+    Start();
+  }
+  EXPECT_EQ(killed, 3);
+  EXPECT_EQ(AwaitEnd(kBig).state, ScanState::kIntegrated);
 }
 
 }  // namespace

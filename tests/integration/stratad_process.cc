@@ -75,15 +75,4 @@ int ChildProcess::Wait() {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
 }
 
-void TakeBackScans(const std::string& data, const std::string& map) {
-  ChildProcess list(STRATA_STRATAD, {"quarantine", "list", map, "--data", data});
-  for (std::string line = list.ReadLine(); !line.empty(); line = list.ReadLine()) {
-    const std::vector<std::string> words = absl::StrSplit(line, ' ', absl::SkipEmpty());
-    if (words[0] != "scan" || words[2] != "quarantined") continue;
-    ChildProcess release(STRATA_STRATAD,
-                         {"quarantine", "release", map, "scan", words[1], "--data", data});
-    EXPECT_EQ(release.Wait(), 0) << line;
-  }
-}
-
 }  // namespace strata::testing

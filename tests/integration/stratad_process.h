@@ -45,10 +45,6 @@ class StratadProcess : public ChildProcess {
   std::string address_;
 };
 
-// Scans of a map that servers died of by chance, since somebody killed them, are taken back. No
-// server may have the directory `data`.
-void TakeBackScans(const std::string& data, const std::string& map);
-
 }  // namespace strata::testing
 
 #endif  // STRATA_TESTS_INTEGRATION_STRATAD_PROCESS_H_
