@@ -212,7 +212,9 @@ TEST_F(OptimizeCrashTest, TheJobEndsAfterEveryRestartAndNoAnswerMixesEpochs) {
     EXPECT_EQ(Follow(id, 2.0).state, JobState::kSucceeded);
     id = 0;
   }
-  if (id != 0) EXPECT_EQ(Follow(id, 2.0).state, JobState::kSucceeded);
+  if (id != 0) {
+    EXPECT_EQ(Follow(id, 2.0).state, JobState::kSucceeded);
+  }
   AwaitIntegrated();
   readers.Stop();
   watcher.ExpectKnowsAll(db());
