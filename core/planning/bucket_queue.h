@@ -2,6 +2,7 @@
 #ifndef STRATA_CORE_PLANNING_BUCKET_QUEUE_H_
 #define STRATA_CORE_PLANNING_BUCKET_QUEUE_H_
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -9,8 +10,9 @@
 
 namespace strata {
 
-// Buckets of 2^shift priorities in a ring that grows to the span in use; first in, first out within
-// a bucket. The caller copes with the order inside a bucket by expanding again what got cheaper.
+// Buckets of 2^shift priorities in a ring that grows to the span in use, up to kMostBuckets; what
+// lies beyond waits in one list until the ring is empty. First in, first out within a bucket. The
+// caller copes with the order inside a bucket by expanding again what got cheaper.
 class BucketQueue {
  public:
   BucketQueue() : ring_(kFirstBuckets) {}
@@ -20,23 +22,26 @@ class BucketQueue {
     shift_ = shift;
     if (ring_.size() > kKeptBuckets) ring_ = std::vector<std::vector<std::uint32_t>>(kFirstBuckets);
     for (std::vector<std::uint32_t>& bucket : ring_) bucket.clear();
-    size_ = 0;
+    beyond_ = {};
+    in_ring_ = 0;
     next_ = 0;
     begun_ = false;
   }
-  bool empty() const { return size_ == 0; }
+  bool empty() const { return in_ring_ == 0 && beyond_.empty(); }
   // No queued priority is lower.
   std::uint32_t lower_bound() const { return current_ << shift_; }
 
   // A priority below lower_bound() counts as lower_bound(). The first one after Clear() sets it.
   void Push(std::uint32_t priority, std::uint32_t value) {
     std::uint32_t bucket = priority >> shift_;
-    if (!begun_) current_ = bucket;
+    if (!begun_) Begin(bucket);
     begun_ = true;
     if (bucket < current_) bucket = current_;
-    if (bucket - current_ >= ring_.size()) Grow(bucket);
-    ring_[bucket & (ring_.size() - 1)].push_back(value);
-    ++size_;
+    if (bucket < horizon_) {
+      Put(bucket, value);
+    } else {
+      beyond_.emplace_back(bucket, value);
+    }
   }
   // REQUIRES: !empty().
   std::uint32_t Pop() {
@@ -48,9 +53,11 @@ class BucketQueue {
         bucket->clear();
       }
       next_ = 0;
-      bucket = &ring_[++current_ & (ring_.size() - 1)];
+      ++current_;
+      if (in_ring_ == 0) TakeNext();
+      bucket = &ring_[current_ & (ring_.size() - 1)];
     }
-    --size_;
+    --in_ring_;
     return (*bucket)[next_++];
   }
 
@@ -58,6 +65,34 @@ class BucketQueue {
   static constexpr std::size_t kFirstBuckets = 1024;
   // A longer ring gives back the memory of buckets that are empty.
   static constexpr std::size_t kKeptBuckets = 4096;
+  // 1.5 MB; a ring for all that a search of many kilometres spans would take hundreds.
+  static constexpr std::uint32_t kMostBuckets = 65536;
+
+  void Begin(std::uint32_t bucket) {
+    current_ = bucket;
+    horizon_ = bucket + kMostBuckets;
+  }
+
+  void Put(std::uint32_t bucket, std::uint32_t value) {
+    if (bucket - current_ >= ring_.size()) Grow(bucket);
+    ring_[bucket & (ring_.size() - 1)].push_back(value);
+    ++in_ring_;
+  }
+
+  // Goes on with the lowest of what lies beyond, in the order in which it came.
+  void TakeNext() {
+    const auto lower = [](const auto& a, const auto& b) { return a.first < b.first; };
+    Begin(std::min_element(beyond_.begin(), beyond_.end(), lower)->first);
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> still;
+    for (const auto& [bucket, value] : beyond_) {
+      if (bucket < horizon_) {
+        Put(bucket, value);
+      } else {
+        still.emplace_back(bucket, value);
+      }
+    }
+    beyond_ = std::move(still);
+  }
 
   void Grow(std::uint32_t bucket) {
     std::size_t size = ring_.size();
@@ -74,8 +109,10 @@ class BucketQueue {
   bool begun_ = false;
   std::uint32_t current_ = 0;  // the bucket that values are popped from,
   std::size_t next_ = 0;       // and where in it the next one is
-  std::size_t size_ = 0;
+  std::uint32_t horizon_ = 0;  // the ring is for buckets below
+  std::size_t in_ring_ = 0;
   std::vector<std::vector<std::uint32_t>> ring_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> beyond_;  // bucket, value
 };
 
 }  // namespace strata
