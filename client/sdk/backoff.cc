@@ -31,8 +31,10 @@ Backoff::Backoff(const BackoffOptions& options) : Backoff(options, DrawByChance(
 
 std::optional<absl::Duration> Backoff::NextPause(const absl::Status& status) {
   const std::optional<absl::Duration> asked = translate::RetryDelayOf(status);
-  const bool again =
-      absl::IsUnavailable(status) || (absl::IsResourceExhausted(status) && asked.has_value());
+  // A server that ends cancels what comes in last; what the caller cancelled, Wait() sees by
+  // `stop`.
+  const bool gone = absl::IsUnavailable(status) || absl::IsCancelled(status);
+  const bool again = gone || (absl::IsResourceExhausted(status) && asked.has_value());
   const bool exhausted = options_.max_attempts > 0 && attempts_ >= options_.max_attempts;
   if (!again || exhausted) return std::nullopt;
   const absl::Duration doubled = options_.initial * std::exp2(attempts_ - 1);
@@ -42,6 +44,7 @@ std::optional<absl::Duration> Backoff::NextPause(const absl::Status& status) {
 }
 
 bool Backoff::Wait(const absl::Status& status, const Stop& stop) {
+  if (stop.requested()) return false;
   const std::optional<absl::Duration> pause = NextPause(status);
   if (!pause.has_value()) return false;
   const absl::Time until = SteadyNow() + *pause;

@@ -22,7 +22,8 @@ class Backoff {
   explicit Backoff(const BackoffOptions& options);
 
   // The pause before the next attempt after one that ended with `status`; nullopt if it is not to
-  // be repeated: another error, or no attempts left.
+  // be repeated: another error, or no attempts left. CANCELLED is: callers know whether they
+  // cancelled.
   std::optional<absl::Duration> NextPause(const absl::Status& status);
 
   // Sleeps the next pause. False if there is none, or `stop` comes first.

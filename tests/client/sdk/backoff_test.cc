@@ -45,6 +45,16 @@ TEST(BackoffTest, OtherErrorsAreNotRepeated) {
   EXPECT_EQ(backoff.NextPause(absl::ResourceExhaustedError("x")), std::nullopt);
 }
 
+// A server that is ending: gRPC cancels the calls that still come in.
+TEST(BackoffTest, WhatTheCallerDidNotCancelIsRepeated) {
+  Backoff backoff(kOptions, [] { return 0.0; });
+  EXPECT_EQ(backoff.NextPause(absl::CancelledError("CANCELLED")), absl::Milliseconds(100));
+  EXPECT_TRUE(backoff.Wait(absl::CancelledError("CANCELLED"), Stop()));
+  const Stop stopped;
+  stopped.Request();
+  EXPECT_FALSE(backoff.Wait(absl::CancelledError("CANCELLED"), stopped));
+}
+
 TEST(BackoffTest, NoPauseOutlivesItsCall) {
   Backoff backoff(kOptions, [] { return 0.0; });
   const absl::Status away = absl::UnavailableError("away");
