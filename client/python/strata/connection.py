@@ -1,5 +1,6 @@
 """The channel to a server, and calls that are made again while it is away or busy."""
 import random
+import threading
 import time
 
 import grpc
@@ -12,29 +13,35 @@ _CHANNEL_OPTIONS = [
     ("grpc.max_receive_message_length", 64 << 20),
     ("grpc.max_reconnect_backoff_ms", 1000),
     ("grpc.initial_reconnect_backoff_ms", 100),
+    ("grpc.enable_retries", 0),  # Backoff repeats; beside it, gRPC 1.51's own lost a call made while a server ended
     ("grpc.primary_user_agent", "strata-python"),
 ]
 
 
 class Backoff:
-    """Pauses between the attempts of one call, until `patience` seconds have passed since its first failure."""
+    """Pauses between the attempts of one call, until `patience` seconds have passed since its first failure or the
+    event `closed` is set."""
 
-    def __init__(self, patience):
+    def __init__(self, patience, closed):
         self._patience = patience
+        self._closed = closed
         self._pause = _FIRST_PAUSE_S
         self._until = None
 
     def wait(self, failure):
         """Sleeps if `failure` may be gone after a while; raises it otherwise."""
         busy = isinstance(failure, errors.ResourceExhausted) and failure.retry_delay is not None
-        if not busy and not isinstance(failure, errors.Unavailable):
+        # A server that ends cancels what comes in last.
+        gone = isinstance(failure, (errors.Unavailable, errors.Cancelled))
+        if self._closed.is_set() or not (busy or gone):
             raise failure
         now = time.monotonic()
         self._until = self._until or now + self._patience
         pause = max(self._pause * random.uniform(0.5, 1.0), failure.retry_delay or 0.0)
         if now + pause > self._until:
             raise failure
-        time.sleep(pause)
+        if self._closed.wait(pause):
+            raise failure
         self._pause = min(2 * self._pause, _LONGEST_PAUSE_S)
 
 
@@ -62,6 +69,7 @@ class Connection:
         self._metadata = (("authorization", f"Bearer {token}"),) if token else ()
         self._timeout = timeout
         self._patience = patience
+        self._closed = threading.Event()
         self.channel = open_channel(target, ca, certificate, key)
         connect_timeout = min(_CONNECT_TIMEOUT_S, timeout or _CONNECT_TIMEOUT_S)
         try:
@@ -71,8 +79,13 @@ class Connection:
             raise errors.Unavailable(f"no server answers at {target} within {connect_timeout:g} s; "
                                      "is stratad running there, with or without TLS as here?") from None
 
+    def close(self):
+        """Ends all calls, with Cancelled."""
+        self._closed.set()
+        self.channel.close()
+
     def new_backoff(self):
-        return Backoff(self._patience)
+        return Backoff(self._patience, self._closed)
 
     def once(self, method, request):
         """One attempt of a call with one answer; `request` is a message, or an iterator of messages."""

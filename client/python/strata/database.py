@@ -34,7 +34,7 @@ class Database:
         self.close()
 
     def close(self):
-        self._connection.channel.close()
+        self._connection.close()
 
     def create_map(self, name, *, cell_size=None, gap_size=None, thickness=None, profile=None, keep_points=True,
                    fade_after=0, exist_ok=False):

@@ -130,6 +130,21 @@ class BusyTest(unittest.TestCase):
         self.assertEqual(len(self.maps.calls), 3)
         self.assertTrue((np.diff(self.maps.calls) >= 0.7).all())
 
+    def test_what_a_server_that_ends_cancels_is_asked_for_again(self):
+        self.maps.refusals = [(grpc.StatusCode.CANCELLED, "")] * 2
+        self.assertEqual(self.db.maps(), ["nobody"])
+        self.assertEqual(len(self.maps.calls), 3)
+
+    def test_a_call_ends_when_the_database_is_closed(self):
+        self.maps.refusals = [(grpc.StatusCode.UNAVAILABLE, "")] * 100
+        with concurrent.futures.ThreadPoolExecutor() as pool:
+            asking = pool.submit(self.db.maps)
+            while not self.maps.calls:
+                time.sleep(0.01)
+            self.db.close()
+            with self.assertRaises((strata.Unavailable, strata.Cancelled)):
+                asking.result()
+
     def test_what_will_not_pass_is_told_at_once(self):
         for code, kind in ((grpc.StatusCode.RESOURCE_EXHAUSTED, strata.ResourceExhausted),
                            (grpc.StatusCode.PERMISSION_DENIED, strata.PermissionDenied),
