@@ -44,6 +44,14 @@ void JoinAndForget(MlsMap contribution, MlsTileMap& tiles) {
   }
 }
 
+// What the rows of a change take on the disk, all but a few that are small.
+std::uint64_t BytesOf(const std::vector<MlsTileRow>& rows, const TileChange& change) {
+  std::uint64_t bytes = 0;
+  for (const MlsTileRow& row : rows) bytes += row.bytes.size();
+  for (const SurfaceTileRow& row : change.surfaces) bytes += row.bytes.size();
+  return bytes;
+}
+
 // Errors that a scan's own bytes cause; others concern the store and may go away.
 bool IsFaultOfScan(const absl::Status& status) {
   return absl::IsDataLoss(status) || absl::IsInvalidArgument(status) ||
@@ -130,6 +138,10 @@ absl::Status Integrator::Commit(const TileChange& change,
     STRATA_ASSIGN_OR_RETURN(MlsTileRow row, MakeMlsTileRow(*tile, change.version, cell_size_m));
     rows.push_back(std::move(row));
   }
+  // What nobody waits for leaves room for what somebody may: to delete.
+  if (!awaited) {
+    STRATA_RETURN_IF_ERROR(core_.disk().CheckForIntegration(BytesOf(rows, change)));
+  }
   absl::Status committed = core_.Publish(
       scans, NoticesOf(change.surfaces), awaited, [&](StorageWriter& writer) -> absl::Status {
         // First what may free pages: a scan can be deleted from a file that may not grow.
@@ -189,7 +201,7 @@ absl::StatusOr<int> Integrator::IntegrateBatch(int most_scans) {
   query.limit = static_cast<std::uint32_t>(most_scans);
   STRATA_ASSIGN_OR_RETURN(const std::vector<PosedScan> pending, reader->ListScans(query, epoch()));
   if (pending.empty()) return 0;
-  STRATA_RETURN_IF_ERROR(core_.disk().CheckForIntegration());
+  STRATA_RETURN_IF_ERROR(core_.disk().CheckForIntegration(0));
   STRATA_RETURN_IF_ERROR(LoadAlignerOnce(*reader));
   const MapParameters parameters = core_.info().parameters;
   std::optional<ScanSource> source(std::in_place, *reader, parameters);

@@ -160,6 +160,7 @@ void Worker::RunBatch() {
     return absl::OkStatus();
   });
   if (!done.ok()) quarantine_.EndScans();
+  after_failure_ = !done.ok();
   if (IsOutOfMemory(done)) return NoteNoMemory();
   no_memory_ = 0;
   absl::MutexLock lock(&mutex_);
@@ -174,7 +175,8 @@ void Worker::RunBatch() {
 }
 
 absl::StatusOr<int> Worker::Integrate() {
-  const int most = no_memory_ > 0 ? 1 : core_.options().max_batch_scans;
+  // What memory or the disk has no room for all at once, it may have room for one by one.
+  const int most = after_failure_ ? 1 : core_.options().max_batch_scans;
   STRATA_ASSIGN_OR_RETURN(const int begun, quarantine_.BeginScans(most));
   return begun == 0 ? 0 : integrator_.IntegrateBatch(begun);
 }

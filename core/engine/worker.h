@@ -76,7 +76,9 @@ class Worker {
   MapCore& core_;
   Quarantine& quarantine_;
   Integrator integrator_;
-  int no_memory_ = 0;  // batches in a row; the thread's
+  // The thread's.
+  int no_memory_ = 0;           // batches in a row
+  bool after_failure_ = false;  // of a batch
   const Stop closing_;
   mutable absl::Mutex mutex_;
   std::deque<Task*> tasks_ ABSL_GUARDED_BY(mutex_);

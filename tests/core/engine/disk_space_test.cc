@@ -56,12 +56,19 @@ TEST_F(DiskSpaceTest, UploadsLeave64MebibytesAndIntegrationHalfOfThat) {
   EXPECT_THAT(space_.CheckForUpload(),
               StatusIs(absl::StatusCode::kResourceExhausted,
                        HasSubstr("63 MiB free, of which the last 64 MiB are kept")));
-  STRATA_EXPECT_OK(space_.CheckForIntegration());
+  STRATA_EXPECT_OK(space_.CheckForIntegration(0));
   disk.free = 32 * kMiB;
-  STRATA_EXPECT_OK(space_.CheckForIntegration());
+  STRATA_EXPECT_OK(space_.CheckForIntegration(0));
   disk.free -= kBlock;
-  EXPECT_THAT(space_.CheckForIntegration(),
+  EXPECT_THAT(space_.CheckForIntegration(0),
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("31 MiB free")));
+}
+
+TEST_F(DiskSpaceTest, IntegrationLeavesItAfterItsOwnRowsInTheLogAndInTheMap) {
+  disk = {.bytes = 1000 * kMiB, .free = 42 * kMiB};
+  STRATA_EXPECT_OK(space_.CheckForIntegration(5 * kMiB));
+  EXPECT_THAT(space_.CheckForIntegration(5 * kMiB + kBlock),
+              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("up to 11 MiB would be")));
 }
 
 TEST_F(DiskSpaceTest, OfASmallDiskAQuarterIsLeft) {
@@ -69,15 +76,15 @@ TEST_F(DiskSpaceTest, OfASmallDiskAQuarterIsLeft) {
   STRATA_EXPECT_OK(space_.CheckForUpload());
   disk.free -= kBlock;
   EXPECT_FALSE(space_.CheckForUpload().ok());
-  STRATA_EXPECT_OK(space_.CheckForIntegration());
+  STRATA_EXPECT_OK(space_.CheckForIntegration(0));
   disk.free = 5 * kMiB - kBlock;
-  EXPECT_FALSE(space_.CheckForIntegration().ok());
+  EXPECT_FALSE(space_.CheckForIntegration(0).ok());
 }
 
 TEST_F(DiskSpaceTest, ADiskThatDoesNotSayIsTakenForOneWithRoom) {
   disk = {.says = false};
   STRATA_EXPECT_OK(space_.CheckForUpload());
-  STRATA_EXPECT_OK(space_.CheckForIntegration());
+  STRATA_EXPECT_OK(space_.CheckForIntegration(0));
 }
 
 }  // namespace
