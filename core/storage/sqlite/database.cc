@@ -220,6 +220,8 @@ bool Database::InPlace() const {
          moved == 0;
 }
 
+std::filesystem::path Database::File() const { return sqlite3_db_filename(connection_, "main"); }
+
 std::filesystem::path Database::LogFile() const {
   return sqlite3_filename_wal(sqlite3_db_filename(connection_, "main"));
 }

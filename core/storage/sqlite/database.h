@@ -97,6 +97,7 @@ class Database {
   absl::Status CopyTo(const std::filesystem::path& file, const Stop& stop);
   // Whether the file under its name is still the one that is open.
   bool InPlace() const;
+  std::filesystem::path File() const;
   // Its write-ahead log, where there is one.
   std::filesystem::path LogFile() const;
 

@@ -1,5 +1,6 @@
 #include "core/storage/sqlite/sqlite_storage.h"
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -39,14 +40,20 @@ class SqliteStorage final : public MapStorage {
   }
   StorageWriter& writer() override { return writer_; }
   absl::Status CheckInPlace() const override {
+    std::uint64_t seen = seen_bytes_;  // before the look: a map's file never becomes smaller
     const std::optional<FileState> now = StateOfFile(file_);
-    const bool same = now.has_value() && opened_.has_value() && now->SameFile(*opened_);
-    return same ? absl::OkStatus() : TakenAway(file_);
+    const bool whole =
+        now.has_value() && opened_.has_value() && now->SameFile(*opened_) && now->bytes >= seen;
+    if (!whole) return TakenAway(file_);
+    while (seen < now->bytes && !seen_bytes_.compare_exchange_weak(seen, now->bytes)) {
+    }
+    return absl::OkStatus();
   }
 
  private:
   std::filesystem::path file_;
   const std::optional<FileState> opened_;
+  mutable std::atomic<std::uint64_t> seen_bytes_{0};  // the most that the file had
   SqliteWriter writer_;
 };
 

@@ -18,14 +18,22 @@
 #include "core/world/value_codec.h"
 
 namespace strata {
+namespace {
+
+// Whether it is the file that it was, and has not become smaller.
+bool IsWhole(const std::optional<FileState>& before, const std::filesystem::path& file) {
+  if (!before.has_value()) return true;
+  const std::optional<FileState> now = StateOfFile(file);
+  return now.has_value() && now->SameFile(*before) && now->bytes >= before->bytes;
+}
+
+}  // namespace
+
 absl::Status SqliteWriter::CheckFiles() const {
+  const std::filesystem::path file = database_.File();
+  if (!database_.InPlace() || !IsWhole(file_, file)) return TakenAway(file);
   const std::filesystem::path log = database_.LogFile();
-  if (!database_.InPlace())
-    return TakenAway(std::filesystem::path(log).replace_extension(".strata"));
-  if (!log_.has_value()) return absl::OkStatus();
-  const std::optional<FileState> now = StateOfFile(log);
-  const bool whole = now.has_value() && now->SameFile(*log_) && now->bytes >= log_->bytes;
-  return whole ? absl::OkStatus() : TakenAway(log);
+  return IsWhole(log_, log) ? absl::OkStatus() : TakenAway(log);
 }
 
 absl::Status SqliteWriter::Commit(Durability durability, absl::FunctionRef<absl::Status()> body) {
@@ -41,9 +49,11 @@ absl::Status SqliteWriter::Commit(Durability durability, absl::FunctionRef<absl:
   STRATA_RETURN_IF_ERROR(body());
   STRATA_RETURN_IF_ERROR(broken_);
   STRATA_RETURN_IF_ERROR(CheckFiles());
+  const std::filesystem::path file = database_.File();
   const std::filesystem::path log = database_.LogFile();
   STRATA_RETURN_IF_ERROR(transaction.Commit());
-  log_ = StateOfFile(log);  // takes no memory: what is committed must not fail any more
+  file_ = StateOfFile(file);  // takes no memory: what is committed must not fail any more
+  log_ = StateOfFile(log);
   return absl::OkStatus();
 }
 

@@ -101,7 +101,9 @@ class SqliteWriter final : public StorageWriter {
   SqliteReader reader_;
   Durability durability_ = Durability::kFull;  // what the connection is set to
   absl::Status broken_;                        // what ended the open transaction before its commit
-  std::optional<FileState> log_;               // as the last commit left it
+  // As the last commit left them.
+  std::optional<FileState> file_;
+  std::optional<FileState> log_;
 };
 
 template <typename... Values>

@@ -66,6 +66,8 @@ INSTANTIATE_TEST_SUITE_P(
                fs::copy_file(file, file.string() + ".new");
                fs::rename(file.string() + ".new", file);
              }},
+        Hand{"cuts the file",
+             [](const fs::path& file) { fs::resize_file(file, fs::file_size(file) / 2); }},
         Hand{"removes the log", [](const fs::path& file) { fs::remove(LogOf(file)); }},
         Hand{"cuts the log", [](const fs::path& file) { fs::resize_file(LogOf(file), 0); }}));
 
@@ -83,6 +85,13 @@ TEST_F(EngineTest, WhoWatchesIsToldOfAFileThatWasTakenAwayUntilItIsBack) {
   EXPECT_THAT(HealthOf(db()).maps_taken_away, ElementsAre(HasSubstr("world: ")));
   fs::rename(away, MapFile());
   EXPECT_THAT(HealthOf(db()).maps_taken_away, IsEmpty());
+}
+
+TEST_F(EngineTest, WhoWatchesIsToldOfAFileThatWasCut) {
+  MakeMap();
+  EXPECT_THAT(HealthOf(db()).maps_taken_away, IsEmpty());
+  fs::resize_file(MapFile(), fs::file_size(MapFile()) / 2);
+  EXPECT_THAT(HealthOf(db()).maps_taken_away, ElementsAre(HasSubstr("world: ")));
 }
 
 TEST_F(EngineTest, AFileThatWasPutBackIsGoneOnWith) {
