@@ -94,14 +94,14 @@ absl::Status Door::Judge(absl::string_view path,
                          absl::string_view certificate_name) {
   const absl::Time now = SteadyNow();
   if (path == Health::kCheck || path == Health::kWatch) {
-    return runtime_.arrivals.Enter(path, now) ? absl::OkStatus() : TooFast();
+    return runtime_.ArrivalsOf(path).Enter(path, now) ? absl::OkStatus() : TooFast();
   }
   const absl::StatusOr<Caller> caller =
       runtime_.access.Authenticate(authorization, certificate_name);
   const std::string method = MethodOf(path);
   if (caller.ok()) {
     if (method.empty() && !absl::StartsWith(path, kReflection)) return Unknown();
-    return runtime_.arrivals.Enter(caller->principal, now) ? absl::OkStatus() : TooFast();
+    return runtime_.ArrivalsOf(path).Enter(caller->principal, now) ? absl::OkStatus() : TooFast();
   }
   const bool known_method = FindMethodRight(method) != nullptr;
   // Few, since what each may send is as much as the largest request.

@@ -50,6 +50,7 @@ class HealthReactor final : public grpc::ServerBidiReactor<Sealed<Asked>, Told> 
 
   HealthReactor(Health& health, grpc::CallbackServerContext& context, Kind kind)
       : health_(health), context_(context), kind_(kind), host_(HostOf(context.peer())) {
+    health_.runtime_.ArrivalsOf(PathOf(kind_)).Begin(PathOf(kind_), SteadyNow());
     const absl::Status entered = Enter();
     if (entered.ok()) {
       health_.readers_.Submit(host_, [this] { Read(); });
@@ -61,7 +62,7 @@ class HealthReactor final : public grpc::ServerBidiReactor<Sealed<Asked>, Told> 
     if (counted_) health_.hosts_.Leave(host_, kind_);
     health_.requests_.End();
     health_.requests_.Leave();
-    health_.runtime_.arrivals.Leave(PathOf(kind_), SteadyNow());
+    health_.runtime_.ArrivalsOf(PathOf(kind_)).Leave(PathOf(kind_));
   }
 
   // Sends what it was not told yet. The mutex of `health` must be held.

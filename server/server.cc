@@ -55,6 +55,8 @@ constexpr int kKeepaliveMs = 30'000;
 constexpr int kMinPingIntervalMs = 10'000;
 constexpr int kMaxMetadataBytes = 16 << 10;
 constexpr int kHandshakeMs = 10'000;
+// At a time: all calls that begin in it are made before the first of them is judged.
+constexpr int kReadBytes = 8 << 10;
 // Of all connections together: some 40 KB each, and the messages on their way. Where it is used up,
 // new connections are refused.
 constexpr std::size_t kTransportBytes = std::size_t{36} << 20;
@@ -168,6 +170,7 @@ void LimitConnections(grpc::ServerBuilder& builder, const ServerOptions& options
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
                              kMinPingIntervalMs);
   builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, kMaxMetadataBytes);
+  builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kReadBytes);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
                              options.client.max_calls + options.client.max_watches);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);

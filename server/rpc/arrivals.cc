@@ -1,11 +1,17 @@
 #include "server/rpc/arrivals.h"
 
+#include <cstddef>
+
 namespace strata::server {
 namespace {
 
-// A call that is cancelled in the very moment never gets to its handler, which would see it leave.
-// There are few of those; when nobody has left for so long, they are all there is.
-constexpr absl::Duration kForgotten = absl::Seconds(5);
+// By when handlers of calls run in turn: of a call that came in this long before one that has
+// begun, nothing will be heard any more.
+constexpr absl::Duration kInTurn = absl::Seconds(5);
+constexpr std::size_t kMostWaiting = 1024;
+constexpr absl::Duration kLetIn = absl::Milliseconds(20);
+constexpr int kHammering = 250;  // refused within kCounted
+constexpr absl::Duration kCounted = absl::Seconds(1);
 
 }  // namespace
 
@@ -13,21 +19,41 @@ bool Arrivals::Enter(absl::string_view client, absl::Time now) {
   absl::MutexLock lock(&mutex_);
   const auto found = clients_.find(client);
   Client& entry = found == clients_.end() ? clients_[std::string(client)] : found->second;
-  if (entry.here == 0) entry.left = now;
-  if (entry.here >= most_) {
-    if (now - entry.left < kForgotten) return false;
-    entry = {.here = 0, .left = now};
+  const bool full = entry.waiting.size() >= kMostWaiting ||
+                    entry.running + entry.waiting.size() >= static_cast<std::size_t>(most_);
+  if (now - entry.counted > kCounted) {
+    entry.counted = now;
+    entry.refused = 0;
   }
-  ++entry.here;
+  if (full && now - entry.let_in < kLetIn) {
+    ++entry.refused;
+    return false;
+  }
+  entry.waiting.push_back(now);
+  entry.let_in = now;
   return true;
 }
 
-void Arrivals::Leave(absl::string_view client, absl::Time now) {
+bool Arrivals::Begin(absl::string_view client, absl::Time now) {
+  absl::MutexLock lock(&mutex_);
+  Client& entry = clients_[std::string(client)];
+  ++entry.running;
+  // Which of them it is is not told; the first are missed least.
+  if (!entry.waiting.empty()) entry.waiting.pop_front();
+  while (!entry.waiting.empty() && now - entry.waiting.front() > kInTurn) {
+    entry.waiting.pop_front();
+  }
+  const bool hammers = entry.refused >= kHammering;
+  if (hammers) entry.refused = 0;
+  return hammers;
+}
+
+void Arrivals::Leave(absl::string_view client) {
   absl::MutexLock lock(&mutex_);
   const auto found = clients_.find(client);
   if (found == clients_.end()) return;
-  found->second.left = now;
-  if (--found->second.here <= 0) clients_.erase(found);
+  --found->second.running;
+  if (found->second.running <= 0 && found->second.waiting.empty()) clients_.erase(found);
 }
 
 }  // namespace strata::server

@@ -2,6 +2,7 @@
 #ifndef STRATA_SERVER_RPC_ARRIVALS_H_
 #define STRATA_SERVER_RPC_ARRIVALS_H_
 
+#include <deque>
 #include <functional>
 #include <map>
 #include <string>
@@ -21,15 +22,22 @@ class Arrivals {
   // `most`: of one client.
   explicit Arrivals(int most) : most_(most) {}
 
-  // False: the client has all it may have, and the call must be refused there and then. True:
-  // Leave() must follow.
+  // False: the client has all it may have, and the call must be refused there and then. Of such a
+  // client fifty calls a second are let in all the same. True: Begin() follows when the handler
+  // runs, and never for a call that is cancelled before.
   bool Enter(absl::string_view client, absl::Time now);
-  void Leave(absl::string_view client, absl::Time now);
+  // Leave() must follow. True: so many of the client's calls were refused within a second that the
+  // connection of this one must go; what a client does who waits for answers makes no such number.
+  bool Begin(absl::string_view client, absl::Time now);
+  void Leave(absl::string_view client);
 
  private:
   struct Client {
-    int here = 0;
-    absl::Time left;  // the last one, or when the first came
+    std::deque<absl::Time> waiting;  // when calls came in whose handlers have not begun
+    int running = 0;
+    absl::Time let_in;  // when a call was, last
+    int refused = 0;    // since `counted`
+    absl::Time counted;
   };
 
   const int most_;

@@ -18,6 +18,7 @@
 #include "server/access/method_rights.h"
 #include "server/access/right.h"
 #include "server/rpc/call_object.h"
+#include "server/rpc/connections.h"
 #include "server/rpc/wire_check.h"
 
 namespace strata::server {
@@ -98,7 +99,7 @@ Request::~Request() {
   if (runtime_.access.asks() && admission_.ok()) runtime_.revocations.Remove(*this);
   End();
   gate().Leave();
-  if (arrived_) runtime_.arrivals.Leave(caller_.principal, SteadyNow());
+  if (arrived_) runtime_.ArrivalsOf(method_).Leave(caller_.principal);
 }
 
 void Request::End() {
@@ -119,7 +120,9 @@ absl::Status Request::Admit(const grpc::CallbackServerContext& context) {
       MetadataOf(context, kAuthorizationKey), CertificateNameOf(*context.auth_context()));
   if (!caller.ok()) return Refuse(caller.status());
   caller_ = *std::move(caller);
+  const bool hammers = runtime_.ArrivalsOf(method_).Begin(caller_.principal, started_);
   arrived_ = true;
+  if (hammers) CutConnection(peer_);
   call_.principal = caller_.principal;
   return EnterLimits();
 }

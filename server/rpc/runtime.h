@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/strings/match.h"
 #include "absl/strings/string_view.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/clock.h"
@@ -104,7 +105,8 @@ struct Runtime {
         access(std::move(grants)),
         clients(runtime_options.client, runtime_options.max_call_bytes),
         strangers(runtime_options.strangers),
-        arrivals(runtime_options.client.max_calls + runtime_options.client.max_watches + kGoing),
+        arriving_calls(runtime_options.client.max_calls + kGoing),
+        arriving_watches(runtime_options.client.max_watches + kGoing),
         queries(runtime_options.query_threads, "query"),
         streams(runtime_options.stream_threads, "stream"),
         uploads(runtime_options.upload_threads, "upload"),
@@ -112,6 +114,12 @@ struct Runtime {
         ticker(absl::Milliseconds(100), queries),
         calls(runtime_options.max_calls, "calls"),
         watches(runtime_options.max_watches, "watches") {}
+
+  // Where calls of a method are counted that have come in, "Maps.Watch" or "/strata.v1.Maps/Watch".
+  Arrivals& ArrivalsOf(absl::string_view method) {
+    const absl::string_view name = method.substr(method.find_last_of("./") + 1);
+    return absl::StartsWith(name, "Watch") ? arriving_watches : arriving_calls;
+  }
 
   // Of one client's calls, that are refused or have ended and are not freed yet.
   static constexpr int kGoing = 256;
@@ -121,7 +129,8 @@ struct Runtime {
   Access access;
   ClientLimits clients;
   Strangers strangers;
-  Arrivals arrivals;
+  Arrivals arriving_calls;
+  Arrivals arriving_watches;
   RevocationWatch revocations{absl::Milliseconds(500)};
   CallMetrics metrics;
   Executor queries;

@@ -12,11 +12,17 @@
 #include <thread>
 #include <vector>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <unistd.h>
 
 #include "core/codec/blob.h"
 #include "core/codec/bytes.h"
@@ -67,6 +73,7 @@ class HostileMemoryTest : public ::testing::Test {
     stratad_ = std::make_unique<StratadProcess>(std::vector<std::string>{
         "--data", Path("maps"), "--listen", "127.0.0.1:0", "--tokens", Path("tokens.json")});
     const std::string address = stratad_->Address();
+    ASSERT_TRUE(absl::SimpleAtoi(address.substr(address.rfind(':') + 1), &port_));
     for (int i = 0; i < 4; ++i) {
       grpc::ChannelArguments own;  // or all channels to one address share a connection
       own.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
@@ -104,6 +111,8 @@ class HostileMemoryTest : public ::testing::Test {
     return context;
   }
   const std::shared_ptr<grpc::Channel>& Channel(int i) const { return channels_[i % 4]; }
+  const std::string& token() const { return token_; }
+  int port() const { return port_; }
   // Makes `call` so often, all at a time.
   static void AtOnce(int times, const std::function<void(int)>& call) {
     std::vector<std::thread> threads;
@@ -155,7 +164,61 @@ class HostileMemoryTest : public ::testing::Test {
   std::unique_ptr<StratadProcess> stratad_;
   std::vector<std::shared_ptr<grpc::Channel>> channels_;
   double before_ = 0.0;
+  int port_ = 0;
 };
+
+// HTTP/2 by hand (RFC 9113, RFC 7541).
+std::string Frame(char kind, char flags, std::uint32_t stream, const std::string& payload) {
+  std::string frame;
+  for (const int shift : {16, 8, 0}) frame += static_cast<char>(payload.size() >> shift);
+  frame += {kind, flags};
+  for (const int shift : {24, 16, 8, 0}) frame += static_cast<char>(stream >> shift);
+  return frame + payload;
+}
+std::string Header(const std::string& name, const std::string& value) {
+  return absl::StrCat(std::string(1, '\x10'),
+                      std::string(1, static_cast<char>(name.size())),
+                      name,
+                      std::string(1, static_cast<char>(value.size())),
+                      value);
+}
+
+// Begins calls and resets them at once, as fast as the wire is, on one connection after another.
+void BeginAndReset(int port, const std::string& path, const std::string& token) {
+  constexpr auto kTime = std::chrono::seconds(6);
+  constexpr int kTogether = 64;
+  const std::string headers = absl::StrCat(Header(":method", "POST"),
+                                           Header(":scheme", "http"),
+                                           Header(":path", path),
+                                           Header(":authority", "x"),
+                                           Header("te", "trailers"),
+                                           Header("content-type", "application/grpc"),
+                                           Header("authorization", "Bearer " + token));
+  const auto until = std::chrono::steady_clock::now() + kTime;
+  while (std::chrono::steady_clock::now() < until) {
+    const int peer = ::socket(AF_INET, SOCK_STREAM, 0);
+    sockaddr_in server = {};
+    server.sin_family = AF_INET;
+    server.sin_port = htons(static_cast<std::uint16_t>(port));
+    server.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    const timeval patience = {.tv_sec = 1, .tv_usec = 0};
+    ::setsockopt(peer, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof(patience));
+    ::connect(peer, reinterpret_cast<const sockaddr*>(&server), sizeof(server));
+    std::string wire = "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + Frame(4, 0, 0, "");
+    std::uint32_t stream = 1;
+    while (std::chrono::steady_clock::now() < until) {
+      for (int i = 0; i < kTogether; ++i, stream += 2) {
+        wire += Frame(1, 4, stream, headers) + Frame(3, 0, stream, std::string("\0\0\0\x08", 4));
+      }
+      if (::send(peer, wire.data(), wire.size(), MSG_NOSIGNAL) < 0) break;
+      wire.clear();
+      std::string told(1 << 16, '\0');
+      while (::recv(peer, told.data(), told.size(), MSG_DONTWAIT) > 0) {
+      }
+    }
+    ::close(peer);
+  }
+}
 
 // Two bytes an item.
 std::string EmptyItems(char tag, std::size_t bytes) {
@@ -186,6 +249,18 @@ TEST_F(HostileMemoryTest, AClientWhoSendsMillionsOfItems) {
   // As many as the contract allows.
   SayAtOnce("/strata.v1.Tiles/Fetch", EmptyItems('\x1A', 2 * 262'000), true);
   SayAtOnce("/strata.v1.Maps/Get", EmptyItems('\x7A', 4'000'000), true);
+  ExpectBounded(kClientMegabytes);
+}
+
+TEST_F(HostileMemoryTest, AClientWhoResetsCallsAsFastAsTheyBegin) {
+  Serve();
+  AtOnce(8, [&](int /*i*/) { BeginAndReset(port(), "/strata.v1.Maps/List", token()); });
+  ExpectBounded(kClientMegabytes);
+}
+
+TEST_F(HostileMemoryTest, AClientWhoResetsWatchesAsFastAsTheyBegin) {
+  Serve();
+  AtOnce(8, [&](int /*i*/) { BeginAndReset(port(), "/strata.v1.Maps/Watch", token()); });
   ExpectBounded(kClientMegabytes);
 }
 
