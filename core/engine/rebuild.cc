@@ -147,6 +147,13 @@ absl::Status Verify(MapCore& core, const SteadyView& view, int threads, JobConte
                               findings.Add(what);
                             }));
   }
+  const absl::StatusOr<std::uint64_t> damaged = CheckKeptTiles(core, view, context);
+  if (absl::IsDataLoss(damaged.status())) {
+    findings.Add(absl::StrCat("prepared tiles: ", damaged.status().message()));
+  } else {
+    STRATA_RETURN_IF_ERROR(damaged.status());
+    context.SetMetric("prepared_tiles_damaged", static_cast<double>(*damaged));
+  }
   context.SetMetric("tiles_checked", static_cast<double>(tiles));
   context.SetMetric("scans_checked", static_cast<double>(truth.scans()));
   context.SetMetric("pieces_checked", static_cast<double>(truth.pieces()));
