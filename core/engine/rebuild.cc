@@ -147,12 +147,10 @@ absl::Status Verify(MapCore& core, const SteadyView& view, int threads, JobConte
                               findings.Add(what);
                             }));
   }
-  const absl::StatusOr<std::uint64_t> damaged = CheckKeptTiles(core, view, context);
-  if (absl::IsDataLoss(damaged.status())) {
-    findings.Add(absl::StrCat("prepared tiles: ", damaged.status().message()));
+  if (const absl::Status kept = CheckKeptTiles(core, view, context); absl::IsDataLoss(kept)) {
+    findings.Add(absl::StrCat("prepared tiles: ", kept.message()));
   } else {
-    STRATA_RETURN_IF_ERROR(damaged.status());
-    context.SetMetric("prepared_tiles_damaged", static_cast<double>(*damaged));
+    STRATA_RETURN_IF_ERROR(kept);
   }
   context.SetMetric("tiles_checked", static_cast<double>(tiles));
   context.SetMetric("scans_checked", static_cast<double>(truth.scans()));

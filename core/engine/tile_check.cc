@@ -85,9 +85,7 @@ absl::StatusOr<std::uint64_t> CheckTilesAlone(const SteadyView& view,
   return tiles;
 }
 
-absl::StatusOr<std::uint64_t> CheckKeptTiles(MapCore& core,
-                                             const SteadyView& view,
-                                             JobContext& context) {
+absl::Status CheckKeptTiles(MapCore& core, const SteadyView& view, JobContext& context) {
   StorageReader& reader = *view.readers.front();
   STRATA_ASSIGN_OR_RETURN(const std::vector<PreparedTileRow> rows, reader.ListPreparedTiles());
   std::uint64_t damaged = 0;
@@ -99,7 +97,9 @@ absl::StatusOr<std::uint64_t> CheckKeptTiles(MapCore& core,
     core.NoteUnreadable(row.key);
     ++damaged;
   }
-  return damaged;
+  context.SetMetric("prepared_tiles", static_cast<double>(rows.size()));
+  context.SetMetric("prepared_tiles_damaged", static_cast<double>(damaged));
+  return absl::OkStatus();
 }
 
 }  // namespace strata

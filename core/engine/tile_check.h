@@ -33,11 +33,9 @@ absl::StatusOr<std::uint64_t> CheckTilesAlone(const SteadyView& view,
                                               JobContext& context,
                                               absl::FunctionRef<void(const std::string&)> report);
 
-// Reads all that is kept of prepared tiles and has what is damaged prepared anew. Returns how many
-// are; DATA_LOSS where the store cannot list or read them.
-absl::StatusOr<std::uint64_t> CheckKeptTiles(MapCore& core,
-                                             const SteadyView& view,
-                                             JobContext& context);
+// Reads all that is kept of prepared tiles, has what is damaged prepared anew, and sets metrics of
+// both. DATA_LOSS where the store cannot list or read them.
+absl::Status CheckKeptTiles(MapCore& core, const SteadyView& view, JobContext& context);
 
 }  // namespace strata
 
