@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -108,8 +109,8 @@ absl::StatusOr<absl::Duration> TileKeeper::TryStep() {
     return absl::InfiniteDuration();
   }
   STRATA_RETURN_IF_ERROR(Look());
-  const TileKey* const due = NextDue();
-  if (due == nullptr) {
+  const std::optional<TileKey> due = NextDue();
+  if (!due.has_value()) {
     STRATA_RETURN_IF_ERROR(End());
     return std::max(quiet_, kShortestLook);
   }
@@ -171,11 +172,11 @@ absl::Status TileKeeper::List(const MapView& view) {
   return absl::OkStatus();
 }
 
-const TileKey* TileKeeper::NextDue() const {
+std::optional<TileKey> TileKeeper::NextDue() const {
   const absl::Time until = SteadyNow() - quiet_;
   const auto due = std::find_if(
       stale_.begin(), stale_.end(), [until](const auto& tile) { return tile.second <= until; });
-  return due == stale_.end() ? nullptr : &due->first;
+  return due == stale_.end() ? std::nullopt : std::optional<TileKey>(due->first);
 }
 
 // The process may have died of it: the next death must say whether it did.

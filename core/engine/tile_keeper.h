@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "absl/container/btree_map.h"
 #include "absl/status/status.h"
@@ -42,8 +43,8 @@ class TileKeeper {
   // Brings versions_ and stale_ up to date with the map.
   absl::Status Look();
   absl::Status List(const MapView& view);
-  // A tile that is to be prepared now, or whose row is to go; nullptr: none.
-  const TileKey* NextDue() const;
+  // A tile that is to be prepared now, or whose row is to go.
+  std::optional<TileKey> NextDue() const;
   // Whether preparing tiles may go on as far as the deaths of the process tell.
   absl::StatusOr<bool> Begin();
   absl::Status End();
