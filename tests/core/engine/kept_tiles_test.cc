@@ -186,6 +186,17 @@ TEST_F(KeptTilesTest, AreWhatPreparingMakesBitForBit) {
   ExpectAllKept();
 }
 
+TEST_F(KeptTilesTest, AMapIsClosedWhateverItPrepares) {
+  MakeRooms();
+  for (int i = 0; i < 5; ++i) {
+    Reopen(Resting());
+    absl::SleepFor(absl::Milliseconds(7 * i));
+    const Kept kept = Look();
+    EXPECT_EQ(kept.current, kept.rows);
+  }
+  ExpectAllKept();
+}
+
 TEST_F(KeptTilesTest, APlanAfterARestartPreparesNothing) {
   MakeStrip();
   const Answer before = PlanAnew(74.0);
