@@ -90,7 +90,7 @@ absl::Status CheckKeptTiles(MapCore& core, const SteadyView& view, JobContext& c
   STRATA_ASSIGN_OR_RETURN(const std::vector<PreparedTileRow> rows, reader.ListPreparedTiles());
   std::uint64_t damaged = 0;
   for (const PreparedTileRow& row : rows) {
-    STRATA_RETURN_IF_ERROR(context.Progress(0.99, "reading prepared tiles"));
+    STRATA_RETURN_IF_ERROR(context.Progress(1.0, "reading prepared tiles"));
     STRATA_ASSIGN_OR_RETURN(std::optional<std::string> bytes,
                             reader.FindPreparedTile(row.key, row.made_of));
     if (bytes.has_value() && UnsealTile(row.key, row.made_of, *std::move(bytes)).ok()) continue;
