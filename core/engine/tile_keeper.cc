@@ -69,12 +69,13 @@ class TileKeeper::Source final : public TileSource {
   ~Source() override { keeper_.decoded_ = std::move(used_); }
 
   absl::StatusOr<std::shared_ptr<const SurfaceTile>> Load(const TileKey& key) override {
-    std::shared_ptr<const SurfaceTile>& tile = used_[key];
+    std::shared_ptr<const SurfaceTile> tile;
     if (const auto it = keeper_.decoded_.find(key); it != keeper_.decoded_.end()) {
       tile = it->second;
     } else {
       STRATA_ASSIGN_OR_RETURN(tile, ReadSurfaceTile(keeper_.core_, key, Version(key)));
     }
+    used_[key] = tile;
     return tile;
   }
   std::uint64_t Version(const TileKey& key) override {
@@ -112,6 +113,7 @@ absl::StatusOr<absl::Duration> TileKeeper::TryStep() {
   const std::optional<TileKey> due = NextDue();
   if (!due.has_value()) {
     STRATA_RETURN_IF_ERROR(End());
+    failed_ = false;
     return std::max(quiet_, kShortestLook);
   }
   const Turn turn;
@@ -147,8 +149,8 @@ absl::Status TileKeeper::Look() {
       versions_[key] = notice.version;
     }
     for (int i = 0; i < 9; ++i) {
-      if (const TileKey around = Neighbour(key, i); versions_.contains(around))
-        stale_[around] = now;
+      const TileKey around = Neighbour(key, i);
+      if (versions_.contains(around)) stale_[around] = now;
     }
   }
   if (!changes.tiles.empty()) {

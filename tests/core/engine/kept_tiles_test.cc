@@ -349,6 +349,22 @@ TEST_F(TileKeeperTest, GoesOnWhereItStopped) {
   EXPECT_EQ(kept.current, kept.tiles);
 }
 
+// Nothing is made of what lies beside a damaged tile: it would be as if nothing were there.
+TEST_F(TileKeeperTest, ADamagedTileAndThoseBesideItAreLeftOut) {
+  MakeStrip();
+  Close();
+  DamageSurfaceTile({0, 2, 0});
+  Open(Resting());
+  while (keeper_->Step() == absl::ZeroDuration()) {
+  }
+  EXPECT_EQ(Rows(), 3U);
+  keeper_->Pause();
+  CloseKeeper();
+  Reopen(Busy());
+  EXPECT_EQ(RunJob(db(), "rebuild").state, JobState::kSucceeded);
+  ExpectAllKept();
+}
+
 TEST_F(TileKeeperTest, TilesThatChangedLatelyWait) {
   MakeStrip();
   EngineOptions options = Resting();
