@@ -382,6 +382,23 @@ TEST_F(TileKeeperTest, TilesThatChangedLatelyWait) {
   EXPECT_EQ(Rows(), 5U);  // 0/0/0 was the first, 0/1/0 is beside it
 }
 
+TEST_F(TileKeeperTest, ListsAgainWhereMoreChangedThanIsRemembered) {
+  MakeStrip();
+  Open(Resting());
+  while (keeper_->Step() == absl::ZeroDuration()) {
+  }
+  ASSERT_EQ(Rows(), 6U);
+  std::vector<api::TileChangeNotice> many;
+  for (std::int32_t i = 0; i < 70'000; ++i) many.push_back({{0, 1000 + i, 0}, 99, true});
+  STRATA_ASSERT_OK(core_->Publish({}, many, true, [](StorageWriter& writer) {
+    return writer.DeletePreparedTile({0, 3, 0});
+  }));
+  EXPECT_EQ(keeper_->Step(), absl::ZeroDuration());
+  EXPECT_EQ(Rows(), 6U);
+  EXPECT_GT(keeper_->Step(), absl::ZeroDuration());
+  keeper_->Pause();
+}
+
 TEST_F(TileKeeperTest, WhatKilledTheProcessTwiceIsNotBegun) {
   MakeStrip();
   Open(Resting());
