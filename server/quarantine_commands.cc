@@ -83,7 +83,7 @@ void AddQuarantineCommands(CLI::App& app, CommandAction& selected) {
                               "release",
                               "Take it back: it waits again, and its deaths are forgotten",
                               *written);
-  AddWork(*release, "scan TRAJECTORY/SEQUENCE, job ID, rebuild or look", *written);
+  AddWork(*release, "scan TRAJECTORY/SEQUENCE, job ID, rebuild, look or prepare", *written);
   release->footer("Example:\n  stratad quarantine release campus job 3 --data ./maps");
   release->callback([written, &selected] {
     selected = [written](std::ostream&) {

@@ -120,6 +120,7 @@ Json ToJson(const MapInfo& info, const MapStats& stats) {
   json["patches"] = stats.patches;
   json["occupied_cells"] = stats.occupied_cells;
   json["tiles"] = stats.tiles;
+  json["tiles_prepared"] = stats.tiles_prepared;
   json["tile_bytes"] = stats.tile_bytes;
   json["point_bytes"] = stats.point_bytes;
   json["epoch"] = stats.epoch;

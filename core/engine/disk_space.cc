@@ -2,20 +2,35 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <filesystem>
+#include <system_error>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include <sys/statvfs.h>
 
+#include "core/common/status.h"
+
 namespace strata {
 
-absl::Status DiskSpace::Check(int part, std::uint64_t taken_bytes) const {
+absl::Status DiskSpace::CheckForKeeping(std::uint64_t max_file_bytes) const {
+  STRATA_RETURN_IF_ERROR(Check(4, 0));
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(file_, error);
+  if (max_file_bytes == 0 || error || bytes <= max_file_bytes / 4 * 3) return absl::OkStatus();
+  return absl::ResourceExhaustedError(absl::StrCat("the map's file has ",
+                                                   bytes >> 20,
+                                                   " MiB of at most ",
+                                                   max_file_bytes >> 20,
+                                                   ", of which the last quarter is left to scans"));
+}
+
+absl::Status DiskSpace::Check(std::uint64_t halves, std::uint64_t taken_bytes) const {
   constexpr std::uint64_t kMostLeft = std::uint64_t{64} << 20;
   struct statvfs disk = {};
   if (::statvfs(file_.c_str(), &disk) != 0) return absl::OkStatus();
   const std::uint64_t unit = disk.f_frsize;
-  const std::uint64_t left =
-      std::min(kMostLeft, disk.f_blocks * unit / 4) / static_cast<std::uint64_t>(part);
+  const std::uint64_t left = std::min(kMostLeft, disk.f_blocks * unit / 4) * halves / 2;
   const std::uint64_t free = disk.f_bavail * unit;
   if (free >= left + taken_bytes) return absl::OkStatus();
   return absl::ResourceExhaustedError(absl::StrCat(

@@ -66,6 +66,10 @@ absl::Status EngineOptions::Validate() const {
     faults.push_back(absl::StrCat(
         "optimize_interval = ", absl::FormatDuration(optimize_interval), " is negative"));
   }
+  if (prepare_after < absl::ZeroDuration()) {
+    faults.push_back(
+        absl::StrCat("prepare_after = ", absl::FormatDuration(prepare_after), " is negative"));
+  }
   if (upload_keep < absl::ZeroDuration()) {
     faults.push_back(
         absl::StrCat("upload_keep = ", absl::FormatDuration(upload_keep), " is negative"));

@@ -47,6 +47,9 @@ struct EngineOptions {
   // After a verified closure, and at most so often, a map's poses are optimised without being
   // asked; zero: never.
   absl::Duration optimize_interval = absl::ZeroDuration();
+  // Tiles that nothing has changed for so long are prepared for plans of the map's default robot
+  // when its worker has nothing else to do, and kept in its file; infinite: never.
+  absl::Duration prepare_after = absl::Seconds(10);
   // How the last process that had the directory ended, if not well: killed by somebody or with the
   // machine, neither by a fault of its own nor for want of memory. What was under way then is tried
   // alone, but not put aside.

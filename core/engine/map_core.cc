@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/container/btree_set.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -87,6 +88,16 @@ absl::Status MapCore::CheckInPlace() const {
 void MapCore::set_default_profile(const RobotProfile& profile) {
   absl::MutexLock lock(&mutex_);
   info_.parameters.default_profile = profile;
+}
+
+void MapCore::NoteUnreadable(const TileKey& key) {
+  absl::MutexLock lock(&mutex_);
+  unreadable_.insert(key);
+}
+
+absl::btree_set<TileKey> MapCore::TakeUnreadable() {
+  absl::MutexLock lock(&mutex_);
+  return std::exchange(unreadable_, {});
 }
 
 std::pair<ChangeSet, Snapshots::Pin> MapCore::ChangesSince(std::uint64_t commit_sequence) {

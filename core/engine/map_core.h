@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/container/btree_set.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -23,6 +24,7 @@
 #include "core/engine/reader_pool.h"
 #include "core/engine/snapshots.h"
 #include "core/engine/writer.h"
+#include "core/mls/tile_key.h"
 #include "core/storage/storage.h"
 #include "core/world/map_info.h"
 
@@ -64,6 +66,10 @@ class MapCore {
   // Whether the store may hold tiles that were staged and neither published nor discarded.
   bool tiles_staged() const { return tiles_staged_; }
   void set_tiles_staged(bool staged) { tiles_staged_ = staged; }
+  // A prepared tile that the store keeps is damaged.
+  void NoteUnreadable(const TileKey& key);
+  // Those noted since the last call.
+  absl::btree_set<TileKey> TakeUnreadable();
   // A number for the chunks of one more upload.
   std::uint64_t NextUpload() { return last_upload_.fetch_add(1) + 1; }
 
@@ -90,6 +96,7 @@ class MapCore {
   const std::shared_ptr<CacheBudget> caches_;
   mutable absl::Mutex mutex_;
   MapInfo info_ ABSL_GUARDED_BY(mutex_);
+  absl::btree_set<TileKey> unreadable_ ABSL_GUARDED_BY(mutex_);
   std::unique_ptr<MapStorage> storage_;
   absl::Mutex publishing_;  // what snapshots_ and changes_ say is of one commit
   Snapshots snapshots_;

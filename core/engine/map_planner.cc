@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -16,14 +17,17 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
+#include <glog/logging.h>
 
-#include "core/codec/surface_tile_codec.h"
+#include "core/common/log_line.h"
 #include "core/common/status.h"
 #include "core/engine/change_log.h"
+#include "core/engine/kept_tiles.h"
 #include "core/engine/parallel.h"
 #include "core/engine/surface_tiles.h"
 #include "core/engine/tile_check.h"
 #include "core/planning/path_check.h"
+#include "core/planning/tile_source.h"
 
 namespace strata {
 namespace {
@@ -53,7 +57,7 @@ bool StillKnown(const PathCheck& known,
 // The tiles of one pinned state.
 class MapPlanner::Source final : public TileSource {
  public:
-  Source(MapPlanner& planner, Snapshots::Pin pin, std::shared_ptr<const Versions> versions)
+  Source(MapPlanner& planner, Snapshots::Pin pin, std::shared_ptr<const TileVersionMap> versions)
       : planner_(planner), pin_(std::move(pin)), versions_(std::move(versions)) {}
 
   absl::StatusOr<std::shared_ptr<const SurfaceTile>> Load(const TileKey& key) override {
@@ -65,13 +69,18 @@ class MapPlanner::Source final : public TileSource {
     const auto it = versions_->find(key);
     return it == versions_->end() ? 0 : it->second;
   }
+  absl::StatusOr<std::optional<std::string>> LoadPrepared(const TileKey& key,
+                                                          const TileVersions& versions,
+                                                          const RobotProfile& profile) override {
+    return planner_.LoadPrepared(key, MadeOf(versions, profile));
+  }
   std::uint64_t epoch() const { return pin_.view().epoch; }
 
   static absl::StatusOr<Source> OfNow(MapPlanner& planner) {
     return Of(planner, planner.core_.snapshots().PinCurrent());
   }
   static absl::StatusOr<Source> Of(MapPlanner& planner, Snapshots::Pin pin) {
-    STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const Versions> versions,
+    STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const TileVersionMap> versions,
                             planner.VersionsOf(pin.view()));
     return Source(planner, std::move(pin), std::move(versions));
   }
@@ -79,7 +88,7 @@ class MapPlanner::Source final : public TileSource {
  private:
   MapPlanner& planner_;
   Snapshots::Pin pin_;
-  std::shared_ptr<const Versions> versions_;
+  std::shared_ptr<const TileVersionMap> versions_;
 };
 
 MapPlanner::MapPlanner(MapCore& core)
@@ -94,18 +103,17 @@ MapPlanner::MapPlanner(MapCore& core)
                     }}),
       tiles_(core.caches(), core.options().cache_bytes / kDecodedShare) {}
 
-absl::StatusOr<std::shared_ptr<const MapPlanner::Versions>> MapPlanner::VersionsOf(
-    const MapView& view) {
+absl::StatusOr<std::shared_ptr<const TileVersionMap>> MapPlanner::VersionsOf(const MapView& view) {
   {
     absl::MutexLock lock(&mutex_);
     if (versions_ != nullptr && versions_view_ == view) return versions_;
   }
-  auto versions = std::make_shared<Versions>();
+  std::shared_ptr<const TileVersionMap> versions;
   {
     STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
     STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> rows,
                             reader->ListSurfaceTiles(TileRange{}, view.tile_version));
-    for (const SurfaceTileRow& row : rows) (*versions)[row.key] = row.version;
+    versions = std::make_shared<const TileVersionMap>(VersionsOfTiles(rows));
   }
   absl::MutexLock lock(&mutex_);
   versions_view_ = view;
@@ -117,20 +125,28 @@ absl::StatusOr<std::shared_ptr<const SurfaceTile>> MapPlanner::LoadTile(const Ti
                                                                         std::uint64_t version) {
   const auto held = tiles_.Find(key);
   if (held != nullptr && held->version == version) return held->tile;
-  std::optional<SurfaceTileRow> row;
-  {
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-    STRATA_ASSIGN_OR_RETURN(row, reader->FindSurfaceTile(key, version));
-  }
-  if (!row.has_value()) return std::shared_ptr<const SurfaceTile>();
-  absl::StatusOr<SurfaceTile> decoded = DecodeSurfaceTile(row->bytes);
-  if (!decoded.ok()) return DamagedTile(key, decoded.status());
-  if (decoded->key != key) return DamagedTile(key, absl::DataLossError("it is another tile"));
-  auto tile = std::make_shared<const SurfaceTile>(*std::move(decoded));
+  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const SurfaceTile> tile,
+                          ReadSurfaceTile(core_, key, version));
+  if (tile == nullptr) return tile;
   tiles_.Put(key,
              std::make_shared<const Decoded>(Decoded{version, tile}),
              sizeof(SurfaceTile) + tile->surfaces.capacity() * sizeof(Surface));
   return tile;
+}
+
+absl::StatusOr<std::optional<std::string>> MapPlanner::LoadPrepared(const TileKey& key,
+                                                                    const std::string& made_of) {
+  std::optional<std::string> bytes;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    STRATA_ASSIGN_OR_RETURN(bytes, reader->FindPreparedTile(key, made_of));
+  }
+  if (!bytes.has_value()) return bytes;
+  absl::StatusOr<std::string> packed = UnsealTile(key, made_of, *std::move(bytes));
+  if (packed.ok()) return std::optional<std::string>(*std::move(packed));
+  LOG(WARNING) << LogLine("prepare").Add("map", core_.name()).Add("damaged", key.ToString());
+  core_.NoteUnreadable(key);
+  return std::optional<std::string>();
 }
 
 absl::StatusOr<PlanResult> MapPlanner::Plan(const PlanQuery& query, const Stop& stop) {

@@ -4,11 +4,12 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
-#include "absl/container/flat_hash_map.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -17,9 +18,11 @@
 
 #include "core/common/lru_cache.h"
 #include "core/common/stop.h"
+#include "core/engine/kept_tiles.h"
 #include "core/engine/map_core.h"
 #include "core/mls/surface_tile.h"
 #include "core/planning/planner.h"
+#include "core/planning/tile_cache.h"
 #include "core/world/plan.h"
 
 namespace strata {
@@ -38,26 +41,27 @@ class MapPlanner {
   // INVALID_ARGUMENT for a place that is not finite.
   absl::StatusOr<std::vector<SurfaceColumn>> Sample(const std::vector<Eigen::Vector2d>& places,
                                                     const Stop& stop);
+  TileCache::Statistics cache_statistics() const { return planner_.cache_statistics(); }
 
  private:
   class Source;
-  // Versions of all level-0 tiles of one state.
-  using Versions = absl::flat_hash_map<TileKey, std::uint64_t>;
-
   struct Decoded {
     std::uint64_t version = 0;
     std::shared_ptr<const SurfaceTile> tile;
   };
 
-  absl::StatusOr<std::shared_ptr<const Versions>> VersionsOf(const MapView& view);
+  absl::StatusOr<std::shared_ptr<const TileVersionMap>> VersionsOf(const MapView& view);
   absl::StatusOr<std::shared_ptr<const SurfaceTile>> LoadTile(const TileKey& key,
                                                               std::uint64_t version);
+  // What the store keeps, unless it is damaged: that is noted.
+  absl::StatusOr<std::optional<std::string>> LoadPrepared(const TileKey& key,
+                                                          const std::string& made_of);
 
   MapCore& core_;
   Planner planner_;
   absl::Mutex mutex_;
   MapView versions_view_ ABSL_GUARDED_BY(mutex_);
-  std::shared_ptr<const Versions> versions_ ABSL_GUARDED_BY(mutex_);
+  std::shared_ptr<const TileVersionMap> versions_ ABSL_GUARDED_BY(mutex_);
   LruCache<TileKey, const Decoded> tiles_;  // of each what was asked for last
 };
 

@@ -8,6 +8,7 @@
 
 #include "core/common/checksum.h"
 #include "core/common/status.h"
+#include "core/engine/kept_tiles.h"
 #include "core/storage/records.h"
 #include "core/storage/storage.h"
 
@@ -45,6 +46,13 @@ absl::Status AddTiles(StorageReader& reader, const MapClock& clock, MapStats& st
   STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> served,
                           reader.ListSurfaceTiles(TileRange{}, clock.tile_version));
   for (const SurfaceTileRow& tile : served) stats.tile_bytes += tile.size_bytes;
+  STRATA_ASSIGN_OR_RETURN(const MapInfo info, reader.GetMapInfo());
+  const auto kept = reader.ListPreparedTiles();
+  if (!kept.ok()) return absl::OkStatus();  // they can be done without
+  const TileVersionMap versions = VersionsOfTiles(served);
+  for (const PreparedTileRow& row : *kept) {
+    if (IsCurrent(row, versions, info.parameters.default_profile)) ++stats.tiles_prepared;
+  }
   return absl::OkStatus();
 }
 

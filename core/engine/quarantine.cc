@@ -1,5 +1,6 @@
 #include "core/engine/quarantine.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -40,6 +41,8 @@ std::string NameOf(const WorkId& work) {
       return "the rebuild after a start";
     case WorkKind::kLook:
       return "the look for jobs that are due";
+    case WorkKind::kPrepare:
+      return "preparing tiles";
   }
   return "unknown work";
 }
@@ -290,6 +293,20 @@ absl::Status Quarantine::Pause(StorageWriter& writer, const WorkId& work) const 
 absl::Status Quarantine::Begin(const WorkId& work) {
   return core_.writer().Run(
       Durability::kRelaxed, 0, Stop(), [&](StorageWriter& writer) { return Begin(writer, work); });
+}
+
+absl::Status Quarantine::Pause(const WorkId& work) {
+  return core_.writer().Run(
+      Durability::kRelaxed, 0, Stop(), [&](StorageWriter& writer) { return Pause(writer, work); });
+}
+
+absl::StatusOr<bool> Quarantine::NothingElseUnderWay(const WorkId& work) {
+  if (!scans_under_way_.empty()) EndScans();  // those of the last batch
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  STRATA_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, reader->ListAttempts());
+  return std::none_of(attempts.begin(), attempts.end(), [&work](const Attempt& attempt) {
+    return attempt.under_way && attempt.work != work;
+  });
 }
 
 absl::Status Quarantine::End(const WorkId& work) {

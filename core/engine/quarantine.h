@@ -58,6 +58,10 @@ class Quarantine {
   absl::Status Pause(StorageWriter& writer, const WorkId& work) const;
   absl::Status Begin(const WorkId& work);
   absl::Status End(const WorkId& work);
+  absl::Status Pause(const WorkId& work);
+  // Whether the process, if it died now, would have died of `work`. From the worker's thread, with
+  // no scan under way.
+  absl::StatusOr<bool> NothingElseUnderWay(const WorkId& work);
 
   // The process died while it was under way.
   bool IsSuspect(const WorkId& work) const { return DeathsOf(work) > 0; }

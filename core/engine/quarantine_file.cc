@@ -29,6 +29,13 @@ namespace {
 
 constexpr absl::string_view kRebuild = "rebuild";
 constexpr absl::string_view kLook = "look";
+constexpr absl::string_view kPrepare = "prepare";
+
+// Work of which a map has one.
+absl::string_view NameOfKind(WorkKind kind) {
+  if (kind == WorkKind::kRecovery) return kRebuild;
+  return kind == WorkKind::kLook ? kLook : kPrepare;
+}
 
 // Runs `body` in one durable transaction on the file.
 absl::Status OnFile(const std::filesystem::path& directory,
@@ -63,12 +70,19 @@ absl::StatusOr<WorkId> ParseWork(StorageReader& reader, absl::string_view what) 
   std::uint64_t job = 0;
   if (what == kRebuild) return WorkId{WorkKind::kRecovery, 0};
   if (what == kLook) return WorkId{WorkKind::kLook, 0};
+  if (what == kPrepare) return WorkId{WorkKind::kPrepare, 0};
   if (absl::ConsumePrefix(&rest, "job ") && absl::SimpleAtoi(rest, &job)) {
     return WorkId{WorkKind::kJob, job};
   }
   if (!absl::ConsumePrefix(&rest, "scan ")) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "'", what, "': write scan TRAJECTORY/SEQUENCE, job ID, ", kRebuild, " or ", kLook));
+    return absl::InvalidArgumentError(absl::StrCat("'",
+                                                   what,
+                                                   "': write scan TRAJECTORY/SEQUENCE, job ID, ",
+                                                   kRebuild,
+                                                   ", ",
+                                                   kLook,
+                                                   " or ",
+                                                   kPrepare));
   }
   STRATA_ASSIGN_OR_RETURN(const ScanId id, ParseScan(rest));
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader.GetClock());
@@ -121,7 +135,7 @@ absl::StatusOr<std::vector<QuarantineEntry>> ListQuarantine(const std::filesyste
       } else if (attempt.work.kind == WorkKind::kJob) {
         STRATA_RETURN_IF_ERROR(DescribeJob(reader, entry, matters));
       } else {
-        entry.name = std::string(attempt.work.kind == WorkKind::kRecovery ? kRebuild : kLook);
+        entry.name = std::string(NameOfKind(attempt.work.kind));
         entry.held = attempt.deaths >= kMostDeaths;
       }
       if (matters) entries.push_back(std::move(entry));

@@ -147,6 +147,11 @@ absl::Status Verify(MapCore& core, const SteadyView& view, int threads, JobConte
                               findings.Add(what);
                             }));
   }
+  if (const absl::Status kept = CheckKeptTiles(core, view, context); absl::IsDataLoss(kept)) {
+    findings.Add(absl::StrCat("prepared tiles: ", kept.message()));
+  } else {
+    STRATA_RETURN_IF_ERROR(kept);
+  }
   context.SetMetric("tiles_checked", static_cast<double>(tiles));
   context.SetMetric("scans_checked", static_cast<double>(truth.scans()));
   context.SetMetric("pieces_checked", static_cast<double>(truth.pieces()));

@@ -1,13 +1,21 @@
 #include "core/engine/tile_check.h"
 
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 
 #include "core/codec/mls_tile_codec.h"
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/status.h"
+#include "core/engine/kept_tiles.h"
+#include "core/engine/reader_pool.h"
 #include "core/mls/tile_key.h"
 #include "core/storage/storage.h"
 
@@ -29,6 +37,21 @@ absl::Status Readable(const Row& row, const TileKey& key, Decode decode) {
 absl::Status DamagedTile(const TileKey& key, const absl::Status& why) {
   return absl::DataLossError(absl::StrCat(
       "tile ", key.ToString(), " is damaged, a rebuild of the map mends it: ", why.message()));
+}
+
+absl::StatusOr<std::shared_ptr<const SurfaceTile>> ReadSurfaceTile(MapCore& core,
+                                                                   const TileKey& key,
+                                                                   std::uint64_t version) {
+  std::optional<SurfaceTileRow> row;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+    STRATA_ASSIGN_OR_RETURN(row, reader->FindSurfaceTile(key, version));
+  }
+  if (!row.has_value()) return std::shared_ptr<const SurfaceTile>();
+  absl::StatusOr<SurfaceTile> decoded = DecodeSurfaceTile(row->bytes);
+  if (!decoded.ok()) return DamagedTile(key, decoded.status());
+  if (decoded->key != key) return DamagedTile(key, absl::DataLossError("it is another tile"));
+  return std::make_shared<const SurfaceTile>(*std::move(decoded));
 }
 
 absl::StatusOr<std::uint64_t> CheckTilesAlone(const SteadyView& view,
@@ -60,6 +83,23 @@ absl::StatusOr<std::uint64_t> CheckTilesAlone(const SteadyView& view,
     }
   }
   return tiles;
+}
+
+absl::Status CheckKeptTiles(MapCore& core, const SteadyView& view, JobContext& context) {
+  StorageReader& reader = *view.readers.front();
+  STRATA_ASSIGN_OR_RETURN(const std::vector<PreparedTileRow> rows, reader.ListPreparedTiles());
+  std::uint64_t damaged = 0;
+  for (const PreparedTileRow& row : rows) {
+    STRATA_RETURN_IF_ERROR(context.Progress(1.0, "reading prepared tiles"));
+    STRATA_ASSIGN_OR_RETURN(std::optional<std::string> bytes,
+                            reader.FindPreparedTile(row.key, row.made_of));
+    if (bytes.has_value() && UnsealTile(row.key, row.made_of, *std::move(bytes)).ok()) continue;
+    core.NoteUnreadable(row.key);
+    ++damaged;
+  }
+  context.SetMetric("prepared_tiles", static_cast<double>(rows.size()));
+  context.SetMetric("prepared_tiles_damaged", static_cast<double>(damaged));
+  return absl::OkStatus();
 }
 
 }  // namespace strata

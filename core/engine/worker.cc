@@ -49,6 +49,8 @@ Worker::Worker(MapCore& core, Quarantine& quarantine, std::uint64_t pending)
     : core_(core),
       quarantine_(quarantine),
       integrator_(core),
+      keeper_(core, quarantine),
+      next_rest_(SteadyNow() + core.options().prepare_after),
       pending_(pending),
       waiting_(SteadyNow()),
       thread_([this] { Loop(); }) {}
@@ -96,7 +98,11 @@ bool Worker::HasWork() const { return closed_ || !tasks_.empty() || pending_ > 0
 // Commands go first, since somebody waits for them.
 Worker::Step Worker::NextStep() {
   absl::MutexLock lock(&mutex_);
-  mutex_.Await(absl::Condition(this, &Worker::HasWork));
+  while (
+      !mutex_.AwaitWithTimeout(absl::Condition(this, &Worker::HasWork), next_rest_ - SteadyNow())) {
+    // A clock that is set forward ends a wait early.
+    if (SteadyNow() >= next_rest_) return Step::kRest;
+  }
   if (closed_) return Step::kClosed;
   return tasks_.empty() ? Step::kBatch : Step::kCommand;
 }
@@ -106,9 +112,14 @@ void Worker::Loop() {
   YieldThisThread(5);  // what is acknowledged waits for nobody
   if (!RunRecovery()) return Refuse();
   while (true) {
-    switch (NextStep()) {
+    const Step step = NextStep();
+    if (step != Step::kRest) keeper_.Pause();
+    switch (step) {
       case Step::kClosed:
         return quarantine_.EndScans();
+      case Step::kRest:
+        RunRest();
+        break;
       case Step::kCommand:
         RunCommand();
         break;
@@ -128,6 +139,14 @@ absl::Status Worker::GuardedStep(absl::FunctionRef<absl::Status()> step) {
   // Left in the middle of anything, its caches may be neither before nor after it.
   if (absl::IsResourceExhausted(done)) integrator_.ForgetCaches();
   return done;
+}
+
+void Worker::RunRest() {
+  {
+    absl::MutexLock lock(&mutex_);
+    running_ = "the tile that is prepared";
+  }
+  next_rest_ = SteadyNow() + keeper_.Step();
 }
 
 void Worker::RunCommand() {

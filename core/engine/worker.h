@@ -1,5 +1,5 @@
 // The one thread behind a map that changes what is derived: integrates scans in commit order, and
-// between batches runs what callers and jobs ask for.
+// between batches runs what callers and jobs ask for. At rest it prepares tiles for plans to come.
 #ifndef STRATA_CORE_ENGINE_WORKER_H_
 #define STRATA_CORE_ENGINE_WORKER_H_
 
@@ -19,6 +19,7 @@
 #include "core/engine/integrator.h"
 #include "core/engine/map_core.h"
 #include "core/engine/quarantine.h"
+#include "core/engine/tile_keeper.h"
 #include "core/engine/waiting_scans.h"
 #include "core/storage/records.h"
 
@@ -56,7 +57,7 @@ class Worker {
     bool begun = false;
     bool done = false;
   };
-  enum class Step { kClosed, kCommand, kBatch };
+  enum class Step { kClosed, kCommand, kBatch, kRest };
 
   void Loop();
   // Rebuilds what is derived if it is not usable; whether it is then.
@@ -67,6 +68,8 @@ class Worker {
   bool HasWork() const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
   // Runs one step so that whatever it throws is an error of it alone.
   absl::Status GuardedStep(absl::FunctionRef<absl::Status()> step);
+  // What there is time for when nothing else is to be done.
+  void RunRest();
   void RunCommand();
   void RunBatch();
   absl::StatusOr<int> Integrate();
@@ -76,7 +79,9 @@ class Worker {
   MapCore& core_;
   Quarantine& quarantine_;
   Integrator integrator_;
+  TileKeeper keeper_;
   // The thread's.
+  absl::Time next_rest_;
   int no_memory_ = 0;           // batches in a row
   bool after_failure_ = false;  // of a batch
   const Stop closing_;

@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
+#include <string>
 #include <utility>
 
 #include "absl/status/status.h"
@@ -18,13 +20,6 @@
 #include "core/planning/tile_source.h"
 
 namespace strata {
-namespace {
-
-TileKey Neighbour(const TileKey& key, int index) {
-  return {key.level, key.x + index % 3 - 1, key.y + index / 3 - 1};
-}
-
-}  // namespace
 
 // One of few preparations at a time.
 class TileCache::Turn {
@@ -65,6 +60,18 @@ absl::StatusOr<TileNeighbourhood> LoadAround(TileSource& source, const TileKey& 
   return tiles;
 }
 
+absl::StatusOr<std::shared_ptr<const PreparedTile>> PrepareFrom(TileSource& source,
+                                                                const TileKey& key,
+                                                                const ProfileChecks& checks,
+                                                                const ParallelLoop& loop) {
+  STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles, LoadAround(source, key));
+  if (tiles[kMiddleTile] == nullptr) return std::shared_ptr<const PreparedTile>();
+  const GroundWindow window(tiles, checks.margin, checks.cell_size_m);
+  auto tile = std::make_shared<PreparedTile>(PrepareTile(key, window, checks, loop));
+  tile->class_id = ClassesOf(*tile, *tiles[kMiddleTile]);
+  return std::shared_ptr<const PreparedTile>(std::move(tile));
+}
+
 absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Get(TileSource& source,
                                                                    const TileKey& key,
                                                                    const ProfileChecks& checks) {
@@ -87,25 +94,43 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Get(TileSource& s
   return entry->tile;
 }
 
+std::shared_ptr<const PreparedTile> TileCache::Unpack(TileSource& source,
+                                                      const Key& key,
+                                                      const TileVersions& versions,
+                                                      const ProfileChecks& checks) {
+  const std::shared_ptr<const Packed> packed = packed_.Find(key);
+  const bool here = packed != nullptr && packed->versions == versions;
+  std::string kept;
+  if (!here) {
+    absl::StatusOr<std::optional<std::string>> found =
+        source.LoadPrepared(key.tile, versions, checks.profile);
+    if (!found.ok() || !found->has_value()) return nullptr;
+    kept = **std::move(found);
+  }
+  absl::StatusOr<PreparedTile> tile = UnpackTile(here ? packed->bytes : kept, checks.cell_size_m);
+  const bool usable = tile.ok() && tile->key == key.tile;
+  if (usable && !here) Keep(key, versions, std::move(kept));
+  absl::MutexLock lock(&mutex_);
+  statistics_.kept += usable && !here ? 1 : 0;
+  ++(usable ? statistics_.unpacked : statistics_.unusable);
+  return usable ? std::make_shared<const PreparedTile>(*std::move(tile)) : nullptr;
+}
+
+void TileCache::Keep(const Key& key, const TileVersions& versions, std::string bytes) {
+  auto packed = std::make_shared<const Packed>(Packed{versions, std::move(bytes)});
+  packed_.Put(key, packed, sizeof(Packed) + packed->bytes.capacity());
+}
+
 absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Make(TileSource& source,
                                                                     const Key& key,
                                                                     const TileVersions& versions,
                                                                     const ProfileChecks& checks) {
-  const std::shared_ptr<const Packed> packed = packed_.Find(key);
-  if (packed != nullptr && packed->versions == versions) {
-    auto tile = std::make_shared<const PreparedTile>(UnpackTile(packed->bytes, checks.cell_size_m));
-    absl::MutexLock lock(&mutex_);
-    ++statistics_.unpacked;
-    return tile;
-  }
+  if (auto unpacked = Unpack(source, key, versions, checks)) return unpacked;
   const Turn turn(*this);
-  STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles, LoadAround(source, key.tile));
-  if (tiles[kMiddleTile] == nullptr) return std::shared_ptr<const PreparedTile>();
-  const GroundWindow window(tiles, checks.margin, checks.cell_size_m);
-  auto tile = std::make_shared<PreparedTile>(PrepareTile(key.tile, window, checks, loop_));
-  tile->class_id = ClassesOf(*tile, *tiles[kMiddleTile]);
-  auto made = std::make_shared<const Packed>(Packed{versions, PackTile(*tile, checks.cell_size_m)});
-  packed_.Put(key, made, sizeof(Packed) + made->bytes.capacity());
+  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const PreparedTile> tile,
+                          PrepareFrom(source, key.tile, checks, loop_));
+  if (tile == nullptr) return tile;
+  Keep(key, versions, PackTile(*tile, checks.cell_size_m));
   absl::MutexLock lock(&mutex_);
   ++statistics_.prepared;
   return tile;

@@ -23,11 +23,18 @@
 
 namespace strata {
 
-// What one tile's preparation was made of: the versions of the tile and of its eight neighbours.
-using TileVersions = std::array<std::uint64_t, 9>;
+// Tile `index` of the TileNeighbourhood and the TileVersions of `key`.
+inline TileKey Neighbour(const TileKey& key, int index) {
+  return {key.level, key.x + index % 3 - 1, key.y + index / 3 - 1};
+}
 TileVersions VersionsAround(TileSource& source, const TileKey& key);
 // The tiles themselves; INTERNAL if the source gives another tile than asked for.
 absl::StatusOr<TileNeighbourhood> LoadAround(TileSource& source, const TileKey& key);
+// Prepares one tile as a cache does; nullptr where the map has nothing. Takes up to some 50 MB.
+absl::StatusOr<std::shared_ptr<const PreparedTile>> PrepareFrom(TileSource& source,
+                                                                const TileKey& key,
+                                                                const ProfileChecks& checks,
+                                                                const ParallelLoop& loop = {});
 
 // Thread-safe. A tile of unchanged versions is prepared once, however many threads ask for it at
 // the same time; of a tile and a profile only what was asked for last is kept, so that a map that
@@ -39,6 +46,8 @@ class TileCache {
   struct Statistics {
     std::uint64_t prepared = 0;  // preparations made so far, for any profile
     std::uint64_t unpacked = 0;  // had from what was packed of them
+    std::uint64_t kept = 0;      // of those, from what the source keeps
+    std::uint64_t unusable = 0;  // packed, but not to be unpacked: prepared anew
     std::size_t bytes = 0;       // kept now
   };
 
@@ -82,6 +91,12 @@ class TileCache {
   };
 
   std::shared_ptr<Entry> FindOrInsert(const Key& key, const TileVersions& versions);
+  // From what is packed of it, here or by the source; nullptr where nothing is.
+  std::shared_ptr<const PreparedTile> Unpack(TileSource& source,
+                                             const Key& key,
+                                             const TileVersions& versions,
+                                             const ProfileChecks& checks);
+  void Keep(const Key& key, const TileVersions& versions, std::string bytes);
   // nullptr where the map has nothing.
   absl::StatusOr<std::shared_ptr<const PreparedTile>> Make(TileSource& source,
                                                            const Key& key,

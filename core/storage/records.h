@@ -113,6 +113,7 @@ enum class WorkKind : std::uint8_t {  // stored
   kJob = 2,                           // to be run
   kRecovery = 3,                      // everything derived, to be made again after a start
   kLook = 4,                          // whether a job is due that nobody asked for
+  kPrepare = 5,                       // tiles, for plans to come
 };
 struct WorkId {
   WorkKind kind = WorkKind::kScan;
@@ -172,6 +173,13 @@ struct SurfaceTileRow {
   std::uint64_t patches = 0;
   std::uint64_t size_bytes = 0;
   std::string bytes;  // empty in listings
+};
+
+// What planning has prepared of a tile of level 0 for the map's default robot.
+struct PreparedTileRow {
+  TileKey key;
+  std::string made_of;  // equal where preparing it again would give the same
+  std::string bytes;    // empty in listings
 };
 
 // Tiles [x_min, x_max) × [y_min, y_max) of one level.

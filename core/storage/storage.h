@@ -101,6 +101,11 @@ class StorageReader {
   virtual absl::StatusOr<std::vector<MlsTileRow>> ListMlsTiles(std::uint64_t version) = 0;
   virtual absl::StatusOr<std::vector<SurfaceTileRow>> ListSurfaceTiles(const TileRange& range,
                                                                        std::uint64_t version) = 0;
+  // The bytes kept of `key` if they are made of `made_of`; nullopt otherwise.
+  virtual absl::StatusOr<std::optional<std::string>> FindPreparedTile(
+      const TileKey& key, absl::string_view made_of) = 0;
+  // By key, without bytes.
+  virtual absl::StatusOr<std::vector<PreparedTileRow>> ListPreparedTiles() = 0;
   // Scan ↔ tile relation of integrated scans, level 0, each in ascending order.
   virtual absl::StatusOr<std::vector<ScanNumber>> ScansOfTile(const TileKey& key) = 0;
   virtual absl::StatusOr<std::vector<TileKey>> TilesOfScan(ScanNumber number) = 0;
@@ -209,6 +214,9 @@ class StorageWriter {
   virtual absl::Status CollectSurfaceTile(const TileKey& key, std::uint64_t floor) = 0;
   // The same for all tiles.
   virtual absl::Status CollectAllSurfaceTiles(std::uint64_t floor) = 0;
+  // In place of whatever is kept of the tile.
+  virtual absl::Status PutPreparedTile(const PreparedTileRow& row) = 0;
+  virtual absl::Status DeletePreparedTile(const TileKey& key) = 0;
   // Rows newer than the current version: an unfinished rebuild.
   virtual absl::Status DiscardUnpublished() = 0;
   virtual absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) = 0;

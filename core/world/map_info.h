@@ -57,9 +57,10 @@ struct MapStats {
   std::uint64_t points = 0;   // of all scans, as uploaded
   std::uint64_t patches = 0;  // level of detail 0
   std::uint64_t occupied_cells = 0;
-  std::uint64_t tiles = 0;        // level of detail 0
-  std::uint64_t tile_bytes = 0;   // served tiles of level 0 as stored
-  std::uint64_t point_bytes = 0;  // points as stored (compressed)
+  std::uint64_t tiles = 0;           // level of detail 0
+  std::uint64_t tiles_prepared = 0;  // of those, kept ready for plans of the default robot
+  std::uint64_t tile_bytes = 0;      // served tiles of level 0 as stored
+  std::uint64_t point_bytes = 0;     // points as stored (compressed)
   std::uint64_t epoch = 0;
   std::uint64_t commit_sequence = 0;
   // Hash of the epoch's level-0 tiles with all their statistics; equal worlds have equal digests.

@@ -125,6 +125,7 @@ v1::MapStats ToProto(const MapStats& stats) {
   proto.set_patches(stats.patches);
   proto.set_occupied_cells(stats.occupied_cells);
   proto.set_tiles(stats.tiles);
+  proto.set_tiles_prepared(stats.tiles_prepared);
   proto.set_tile_bytes(stats.tile_bytes);
   proto.set_point_bytes(stats.point_bytes);
   proto.set_epoch(stats.epoch);
@@ -144,6 +145,7 @@ absl::StatusOr<MapStats> FromProto(const v1::MapStats& proto) {
   stats.patches = proto.patches();
   stats.occupied_cells = proto.occupied_cells();
   stats.tiles = proto.tiles();
+  stats.tiles_prepared = proto.tiles_prepared();
   stats.tile_bytes = proto.tile_bytes();
   stats.point_bytes = proto.point_bytes();
   stats.epoch = proto.epoch();

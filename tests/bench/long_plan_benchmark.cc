@@ -5,7 +5,8 @@
 // it is served). Tiles are kept as bytes and decoded on demand, as in a map: only what the planner
 // and the decoded tiles take counts.
 // Usage: long_plan_benchmark street|yard|decks|FILE [cache MiB] [length m] [seed] [from x,y,z to
-// x,y,z]
+// x,y,z] [q: without the planner that has enough] [kept: tiles were prepared before, as a map at
+// rest keeps them]
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -17,6 +18,7 @@
 #include <functional>
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <random>
 #include <string>
 #include <utility>
@@ -26,21 +28,27 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/cache_budget.h"
 #include "core/common/lru_cache.h"
+#include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/common/stop.h"
 #include "core/engine/engine.h"
 #include "core/engine/parallel.h"
 #include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
+#include "core/planning/packed_tile.h"
 #include "core/planning/planner.h"
+#include "core/planning/profile_checks.h"
 #include "core/planning/rows.h"
+#include "core/planning/tile_cache.h"
 #include "core/planning/tile_source.h"
 #include "core/world/plan.h"
+#include "core/world/robot_profile.h"
 
 namespace strata {
 namespace {
@@ -73,11 +81,31 @@ class DecodedTiles : public TileSource {
     return made;
   }
   std::uint64_t Version(const TileKey& key) override { return bytes_.contains(key) ? 1 : 0; }
+  absl::StatusOr<std::optional<std::string>> LoadPrepared(
+      const TileKey& key,
+      const TileVersions& /*versions*/,
+      const RobotProfile& /*profile*/) override {
+    const auto found = kept_.find(key);
+    return found == kept_.end() ? std::optional<std::string>() : found->second;
+  }
+  // What a map at rest would keep of all tiles; returns its bytes.
+  absl::StatusOr<std::size_t> Keep(double cell_size_m) {
+    std::size_t size = 0;
+    STRATA_ASSIGN_OR_RETURN(const ProfileChecks checks, MakeProfileChecks({}, cell_size_m));
+    for (const auto& [key, tile] : bytes_) {
+      STRATA_ASSIGN_OR_RETURN(const auto made, PrepareFrom(*this, key, checks));
+      if (made == nullptr) continue;
+      kept_[key] = PackTile(*made, cell_size_m);
+      size += kept_[key].size();
+    }
+    return size;
+  }
 
   std::uint64_t decodings = 0;
 
  private:
   const TileBytes& bytes_;
+  TileBytes kept_;
   LruCache<TileKey, const SurfaceTile> decoded_;
 };
 
@@ -239,9 +267,19 @@ struct Measured {
 };
 
 // Plans `times` times with caches of `cache_mib` and tells of each.
-double Measure(const TileBytes& bytes, const World& world, std::size_t cache_mib, int times) {
+double Measure(
+    const TileBytes& bytes, const World& world, std::size_t cache_mib, int times, bool kept) {
   const auto budget = std::make_shared<CacheBudget>(cache_mib << 20);
   DecodedTiles source(bytes, budget);
+  if (kept) {
+    const double begin = ProcessorSeconds();
+    const absl::StatusOr<std::size_t> size = source.Keep(world.cell_size_m);
+    if (!size.ok()) std::printf("%s\n", size.status().ToString().c_str());
+    std::printf("kept %zu bytes, made in %.1f s of processor\n",
+                size.value_or(0),
+                ProcessorSeconds() - begin);
+    source.decodings = 0;
+  }
   const ParallelLoop loop = [](std::size_t count,
                                absl::FunctionRef<absl::Status(std::size_t)> body) {
     return ParallelFor(EngineOptions().worker_threads, count, [&](int /*thread*/, std::size_t i) {
@@ -326,8 +364,10 @@ int Run(int argc, char** argv) {
               static_cast<unsigned long long>(seed),
               bytes.size(),
               patches);
-  const double frugal = Measure(bytes, world, cache_mib, 3);
-  const double ample = argc > 7 ? frugal : Measure(bytes, world, 8192, 2);
+  const bool kept = std::any_of(
+      argv, argv + argc, [](const char* word) { return absl::string_view(word) == "kept"; });
+  const double frugal = Measure(bytes, world, cache_mib, 3, kept);
+  const double ample = argc > 7 ? frugal : Measure(bytes, world, 8192, 2, kept);
   std::printf("cost in %zu MiB beside the cheapest: %.6f\n", cache_mib, frugal / ample);
   return 0;
 }

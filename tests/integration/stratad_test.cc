@@ -11,6 +11,8 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -124,6 +126,31 @@ TEST_F(StratadTest, PrintsItsAddressAndEndsWellOnSigterm) {
   stratad.Signal(SIGTERM);
   EXPECT_EQ(stratad.Wait(), 0);
   EXPECT_EQ(stratad.ReadLine(), "");  // nothing else was printed
+}
+
+// Ten seconds after the last change; what is prepared then outlives the process.
+TEST_F(StratadTest, AMapAtRestIsPreparedForPlansAndStaysSo) {
+  MapStats rested;
+  {
+    StratadProcess stratad(Arguments());
+    const auto db = ConnectTo(stratad);
+    STRATA_ASSERT_OK(db->maps().Create({}, kMap, {}));
+    STRATA_ASSERT_OK(Upload(*db, {"robot", 1}));
+    STRATA_ASSERT_OK(Upload(*db, {"robot", 60}));
+    const absl::Time deadline = absl::Now() + absl::Minutes(2);
+    do {
+      ASSERT_LT(absl::Now(), deadline);
+      absl::SleepFor(absl::Milliseconds(100));
+      STRATA_ASSERT_OK_AND_ASSIGN(rested, db->maps().Stats({}, kMap));
+    } while (rested.scans_pending > 0 || rested.tiles_prepared < rested.tiles);
+    EXPECT_GT(rested.tiles_prepared, 1U);
+    stratad.Signal(SIGKILL);
+    EXPECT_EQ(stratad.Wait(), -SIGKILL);
+  }
+  StratadProcess stratad(Arguments());
+  const auto db = ConnectTo(stratad);
+  EXPECT_EQ(db->maps().Stats({}, kMap)->tiles_prepared, rested.tiles_prepared);
+  ExpectVerified(*db);
 }
 
 TEST_F(StratadTest, RefusesToListenBeyondLoopback) {

@@ -1,10 +1,12 @@
 // Derived data: tiles and the indexes over scans.
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include <Eigen/Geometry>
 
 #include "core/common/status.h"
@@ -106,6 +108,30 @@ absl::StatusOr<std::vector<SurfaceTileRow>> SqliteReader::ListSurfaceTiles(const
     return absl::OkStatus();
   }));
   std::erase_if(tiles, [](const SurfaceTileRow& tile) { return tile.gone; });
+  return tiles;
+}
+
+absl::StatusOr<std::optional<std::string>> SqliteReader::FindPreparedTile(
+    const TileKey& key, absl::string_view made_of) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare(
+          "SELECT bytes FROM derived_prepared_tile WHERE x = ?1 AND y = ?2 AND made_of = ?3"));
+  row.Bind(key.x, key.y, Blob{made_of});
+  STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
+  if (!found) return std::optional<std::string>();
+  return std::optional<std::string>(row.Text(0));
+}
+
+absl::StatusOr<std::vector<PreparedTileRow>> SqliteReader::ListPreparedTiles() {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT 0, x, y, made_of FROM derived_prepared_tile ORDER BY x, y"));
+  std::vector<PreparedTileRow> tiles;
+  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
+    tiles.push_back({ReadKey(row), row.Text(3), ""});
+    return absl::OkStatus();
+  }));
   return tiles;
 }
 

@@ -88,6 +88,19 @@ absl::Status SqliteWriter::CollectAllSurfaceTiles(std::uint64_t floor) {
   return RunSql("DELETE FROM derived_surface_tile WHERE gone = 1 AND version <= ?1", floor);
 }
 
+absl::Status SqliteWriter::PutPreparedTile(const PreparedTileRow& row) {
+  STRATA_RETURN_IF_ERROR(DeletePreparedTile(row.key));
+  return RunSql("INSERT INTO derived_prepared_tile (x, y, made_of, bytes) VALUES (?1, ?2, ?3, ?4)",
+                row.key.x,
+                row.key.y,
+                Blob{row.made_of},
+                Blob{row.bytes});
+}
+
+absl::Status SqliteWriter::DeletePreparedTile(const TileKey& key) {
+  return RunSql("DELETE FROM derived_prepared_tile WHERE x = ?1 AND y = ?2", key.x, key.y);
+}
+
 absl::Status SqliteWriter::DiscardUnpublished() {
   STRATA_RETURN_IF_ERROR(
       RunSql("DELETE FROM derived_mls_tile WHERE version > (SELECT tile_version FROM "

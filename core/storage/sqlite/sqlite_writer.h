@@ -73,6 +73,8 @@ class SqliteWriter final : public StorageWriter {
   absl::Status DeleteAllMlsTilesBelow(std::uint64_t version) override;
   absl::Status CollectSurfaceTile(const TileKey& key, std::uint64_t floor) override;
   absl::Status CollectAllSurfaceTiles(std::uint64_t floor) override;
+  absl::Status PutPreparedTile(const PreparedTileRow& row) override;
+  absl::Status DeletePreparedTile(const TileKey& key) override;
   absl::Status DiscardUnpublished() override;
   absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) override;
   absl::Status SetFootprint(ScanNumber number, const Eigen::AlignedBox2d& footprint) override;

@@ -422,6 +422,7 @@ TEST_F(StrataTest, MapShowHasTheKeysThatScriptsRead) {
                           "patches",
                           "occupied_cells",
                           "tiles",
+                          "tiles_prepared",
                           "tile_bytes",
                           "point_bytes",
                           "epoch",

@@ -16,6 +16,8 @@
 #include "absl/status/status.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include <sqlite3.h>
 
 #include "core/common/status.h"
@@ -214,12 +216,25 @@ WorldState Survey(api::Database& database) {
   return state;
 }
 
-std::string Reopen(const fs::path& directory, std::unique_ptr<api::Database>& database) {
+std::string Reopen(const fs::path& directory,
+                   std::unique_ptr<api::Database>& database,
+                   absl::Duration prepare_after = absl::InfiniteDuration()) {
   database.reset();
-  auto opened = OpenEngine(HistoryOptions(directory));
+  EngineOptions options = HistoryOptions(directory);
+  options.prepare_after = prepare_after;
+  auto opened = OpenEngine(options);
   if (!opened.ok()) return opened.status().ToString();
   database = *std::move(opened);
   return "";
+}
+
+// Until the map has nothing left to do at rest.
+absl::Status Rest(api::Database& database) {
+  while (true) {
+    STRATA_ASSIGN_OR_RETURN(const MapStats stats, database.maps().Stats({}, kHistoryMap));
+    if (stats.tiles_prepared == stats.tiles) return absl::OkStatus();
+    absl::SleepFor(absl::Milliseconds(2));
+  }
 }
 
 absl::Status LiveWithPoints(api::Database& database) {
@@ -255,8 +270,9 @@ absl::StatusOr<BitFlips> BitFlips::Prepare(bool keep_points) {
     std::unique_ptr<api::Database> database;
     Reopen(directory, database);
     STRATA_RETURN_IF_ERROR(keep_points ? LiveWithPoints(*database) : LiveWithoutPoints(*database));
-    Reopen(directory, database);
+    Reopen(directory, database, absl::ZeroDuration());
     STRATA_RETURN_IF_ERROR(Settle(*database));
+    STRATA_RETURN_IF_ERROR(Rest(*database));
     STRATA_RETURN_IF_ERROR(RunToEnd(*database, "verify"));
     flips.sound_ = Survey(*database);
   }

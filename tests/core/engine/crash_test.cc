@@ -5,6 +5,7 @@
 #include <set>
 #include <vector>
 
+#include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -21,7 +22,9 @@ class CrashTest : public EngineTest {
  protected:
   // Uploads scans `first`, `first` + 1, … and writes each number to `out` once it is acknowledged.
   [[noreturn]] void Uploader(std::uint64_t first, int out) {
-    absl::StatusOr<std::unique_ptr<api::Database>> opened = OpenEngine(Options());
+    EngineOptions options = Options();
+    options.prepare_after = absl::ZeroDuration();  // between the scans
+    absl::StatusOr<std::unique_ptr<api::Database>> opened = OpenEngine(options);
     if (!opened.ok()) _exit(1);
     for (std::uint64_t i = first;; ++i) {
       const PointCloud cloud = MakeRoom(i, 400 + i % 7 * 500);
@@ -80,6 +83,7 @@ TEST_F(CrashTest, EveryAcknowledgedScanIsThereAfterAKill) {
   EXPECT_EQ(WaitIntegrated(db()).scans, next - 1);
   const JobInfo verified = RunJob(db(), "verify");
   EXPECT_EQ(verified.state, JobState::kSucceeded) << verified.message;
+  EXPECT_EQ(verified.metrics.at("prepared_tiles_damaged"), 0.0);
 }
 
 }  // namespace

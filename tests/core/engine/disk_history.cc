@@ -514,6 +514,7 @@ EngineOptions HistoryOptions(const std::filesystem::path& directory) {
   EngineOptions options;
   options.directory = directory;
   options.worker_threads = 1;
+  options.prepare_after = absl::Milliseconds(5);  // beside all else
   return options;
 }
 

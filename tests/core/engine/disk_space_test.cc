@@ -71,6 +71,15 @@ TEST_F(DiskSpaceTest, IntegrationLeavesItAfterItsOwnRowsInTheLogAndInTheMap) {
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("up to 11 MiB would be")));
 }
 
+TEST_F(DiskSpaceTest, WhatCouldBeDoneWithoutLeavesTwiceThat) {
+  disk = {.bytes = 1000 * kMiB, .free = 128 * kMiB};
+  STRATA_EXPECT_OK(space_.CheckForKeeping(0));
+  disk.free -= kBlock;
+  EXPECT_THAT(space_.CheckForKeeping(0),
+              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("127 MiB free")));
+  STRATA_EXPECT_OK(space_.CheckForUpload());
+}
+
 TEST_F(DiskSpaceTest, OfASmallDiskAQuarterIsLeft) {
   disk = {.bytes = 40 * kMiB, .free = 10 * kMiB};
   STRATA_EXPECT_OK(space_.CheckForUpload());

@@ -83,6 +83,9 @@ TEST_F(MemoryFaultTest, NothingEndsButTheWorkItWasFor) {
   const std::uint64_t seed = Asked("STRATA_SEED", 20261123);
   SCOPED_TRACE(absl::StrCat("seed ", seed));
   SplitMix64 random(seed);
+  EngineOptions options = Options();
+  options.prepare_after = absl::Milliseconds(1);  // beside all else
+  Reopen(options);
   MakeMap();
   std::uint64_t sequence = 0;
   std::int64_t all_failed = 0;
@@ -101,7 +104,7 @@ TEST_F(MemoryFaultTest, NothingEndsButTheWorkItWasFor) {
     }
     AwaitJobs();
     ASSERT_EQ(WaitIntegrated(db()).scans_failed, 0U);
-    if (round % 10 == 9) Reopen();
+    if (round % 10 == 9) Reopen(options);
   }
   std::cout << all_failed << " allocations failed in " << rounds << " rounds" << std::endl;
   EXPECT_GT(all_failed, static_cast<std::int64_t>(rounds) / 2);

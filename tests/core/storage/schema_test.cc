@@ -105,5 +105,18 @@ TEST_F(SchemaTest, AnEarlyFileOfVersion2GetsWhatVersion2HadLater) {
   }
 }
 
+// As programs left it that knew of no prepared tiles; nothing derived is made again for them.
+TEST_F(SchemaTest, AFileWithoutPreparedTilesGetsTheirTableAndKeepsWhatIsDerived) {
+  auto database = Database::Open(directory_.path() / "earlier", Database::Mode::kCreate);
+  STRATA_ASSERT_OK(database);
+  STRATA_ASSERT_OK(CreateSchema(*database));
+  STRATA_ASSERT_OK(
+      database->Execute("DROP TABLE derived_prepared_tile;"
+                        "UPDATE derived_state SET tile_version = 7, complete = 1"));
+  STRATA_ASSERT_OK(UpgradeSchema(*database));
+  EXPECT_EQ(Ask(*database, "SELECT tile_version + complete FROM derived_state"), 8);
+  EXPECT_EQ(Ask(*database, "SELECT count(*) FROM derived_prepared_tile"), 0);
+}
+
 }  // namespace
 }  // namespace strata::testing

@@ -537,6 +537,38 @@ TEST_F(StorageContractTest, DropDerivedKeepsTruth) {
   EXPECT_EQ(reader().GetScanTotals()->scans, 1U);
 }
 
+TEST_F(StorageContractTest, APreparedTileIsFoundOnlyByWhatItIsMadeOf) {
+  const TileKey key{0, -3, 7};
+  const std::string first("a\0b", 3);  // bytes, not text
+  const auto put = [&](const TileKey& at, const std::string& made_of, const std::string& bytes) {
+    return Commit([&] { return writer().PutPreparedTile({at, made_of, bytes}); });
+  };
+  STRATA_ASSERT_OK(put(key, first, "old"));
+  STRATA_ASSERT_OK(put({0, -4, 9}, "c", "other"));
+  EXPECT_THAT(reader().FindPreparedTile(key, first),
+              IsOkAndHolds(::testing::Optional(std::string("old"))));
+  EXPECT_THAT(reader().FindPreparedTile(key, "a"), IsOkAndHolds(::testing::Eq(std::nullopt)));
+  EXPECT_THAT(reader().FindPreparedTile(key, "c"), IsOkAndHolds(::testing::Eq(std::nullopt)));
+  STRATA_ASSERT_OK(put(key, "c", "new"));  // in place of the first
+  EXPECT_THAT(reader().FindPreparedTile(key, first), IsOkAndHolds(::testing::Eq(std::nullopt)));
+  EXPECT_THAT(reader().FindPreparedTile(key, "c"),
+              IsOkAndHolds(::testing::Optional(std::string("new"))));
+  Reopen();
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::vector<PreparedTileRow> rows,
+                              reader().ListPreparedTiles());
+  ASSERT_EQ(rows.size(), 2U);
+  EXPECT_EQ(rows[0].key, (TileKey{0, -4, 9}));
+  EXPECT_EQ(rows[1].key, key);
+  EXPECT_EQ(rows[1].made_of, "c");
+  EXPECT_TRUE(rows[1].bytes.empty());
+  STRATA_ASSERT_OK(Commit([&] { return writer().DeletePreparedTile(key); }));
+  EXPECT_THAT(reader().FindPreparedTile(key, "c"), IsOkAndHolds(::testing::Eq(std::nullopt)));
+  EXPECT_EQ(reader().ListPreparedTiles()->size(), 1U);
+  // Numbers of tiles begin anew then, as far as the store knows.
+  STRATA_ASSERT_OK(Commit([&] { return writer().DropDerived(); }));
+  EXPECT_TRUE(reader().ListPreparedTiles()->empty());
+}
+
 TEST_F(StorageContractTest, FullStoreIsAnErrorAndLosesNothing) {
   Put(1);
   Reopen({.max_file_bytes = 400'000});
