@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <memory>
-#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -12,7 +11,6 @@
 #include "core/common/status.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/ground_window.h"
-#include "core/planning/packed_tile.h"
 #include "core/planning/prepared_tile.h"
 #include "core/planning/profile_checks.h"
 #include "core/planning/tile_source.h"
@@ -87,25 +85,17 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Get(TileSource& s
   return entry->tile;
 }
 
-absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Make(TileSource& source,
-                                                                    const Key& key,
-                                                                    const TileVersions& versions,
-                                                                    const ProfileChecks& checks) {
-  const std::shared_ptr<const Packed> packed = packed_.Find(key);
-  if (packed != nullptr && packed->versions == versions) {
-    auto tile = std::make_shared<const PreparedTile>(UnpackTile(packed->bytes, checks.cell_size_m));
-    absl::MutexLock lock(&mutex_);
-    ++statistics_.unpacked;
-    return tile;
-  }
+absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Make(
+    TileSource& source,
+    const Key& key,
+    const TileVersions& /*versions*/,
+    const ProfileChecks& checks) {
   const Turn turn(*this);
   STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles, LoadAround(source, key.tile));
   if (tiles[kMiddleTile] == nullptr) return std::shared_ptr<const PreparedTile>();
   const GroundWindow window(tiles, checks.margin, checks.cell_size_m);
-  auto tile = std::make_shared<PreparedTile>(PrepareTile(key.tile, window, checks, loop_));
-  tile->class_id = ClassesOf(*tile, *tiles[kMiddleTile]);
-  auto made = std::make_shared<const Packed>(Packed{versions, PackTile(*tile, checks.cell_size_m)});
-  packed_.Put(key, made, sizeof(Packed) + made->bytes.capacity());
+  auto tile =
+      std::make_shared<const PreparedTile>(PrepareTile(*tiles[kMiddleTile], window, checks, loop_));
   absl::MutexLock lock(&mutex_);
   ++statistics_.prepared;
   return tile;
@@ -124,7 +114,7 @@ std::shared_ptr<TileCache::Entry> TileCache::FindOrInsert(const Key& key,
 TileCache::Statistics TileCache::statistics() const {
   absl::MutexLock lock(&mutex_);
   Statistics statistics = statistics_;
-  statistics.bytes = entries_.bytes() + packed_.bytes();
+  statistics.bytes = entries_.bytes();
   return statistics;
 }
 

@@ -254,7 +254,6 @@ double Measure(const TileBytes& bytes, const World& world, std::size_t cache_mib
     ForgetPeak();
     const double base = PeakMb();
     const std::uint64_t prepared = planner.cache_statistics().prepared;
-    const std::uint64_t unpacked = planner.cache_statistics().unpacked;
     const std::uint64_t decoded = source.decodings;
     const double begin = ProcessorSeconds();
     const absl::Time asked = SteadyNow();
@@ -270,8 +269,8 @@ double Measure(const TileBytes& bytes, const World& world, std::size_t cache_mib
     }
     graph_cost = result->graph_cost;
     std::printf(
-        "%5zu MiB  %-4s %7.2f s (%.2f s of processor)  expanded %9llu  prepared %5llu  unpacked "
-        "%5llu  decoded %6llu  "
+        "%5zu MiB  %-4s %7.2f s (%.2f s of processor)  expanded %9llu  prepared %5llu  "
+        "decoded %6llu  "
         "peak %6.0f MB (+%.0f)"
         "  length %.2f  cost %.4f  graph cost %.4f  %zu waypoints  %s\n",
         cache_mib,
@@ -280,7 +279,6 @@ double Measure(const TileBytes& bytes, const World& world, std::size_t cache_mib
         seconds,
         static_cast<unsigned long long>(result->expanded),
         static_cast<unsigned long long>(planner.cache_statistics().prepared - prepared),
-        static_cast<unsigned long long>(planner.cache_statistics().unpacked - unpacked),
         static_cast<unsigned long long>(source.decodings - decoded),
         PeakMb(),
         PeakMb() - base,
