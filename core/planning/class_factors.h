@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "core/planning/move_cost.h"
 #include "core/world/plan.h"
 
 namespace strata {
@@ -36,14 +37,11 @@ class ClassFactors {
   std::uint32_t Scaled(std::uint32_t cost, std::uint8_t from, std::uint8_t to) const {
     const std::uint64_t twice = std::uint64_t{cost} * (factor_[from] + factor_[to]);
     const std::uint64_t scaled = (twice + kOne) / (2 * std::uint64_t{kOne});  // to nearest
-    return static_cast<std::uint32_t>(std::min<std::uint64_t>(scaled, kDearest));
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(scaled, kDearestMove));
   }
 
  private:
   static constexpr std::uint32_t kOne = 256;
-  // Below what a search may add to the largest cost it goes on from.
-  static constexpr std::uint32_t kDearest = 0x0FFFFFFF;
-
   std::array<std::uint32_t, 256> factor_;
   bool plain_ = true;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <limits>
@@ -33,19 +34,20 @@ CellIndex CellAt(const PlanEndpoint& endpoint, double cell_size_m) {
           static_cast<std::int32_t>(std::floor(endpoint.y_m / cell_size_m))};
 }
 
-// The patch of [first, first + count) that is meant; kNoPatchId if the level does not exist.
+// The surface of the endpoint's cell that is meant; kNoPatchId if the level does not exist.
 PatchId Choose(SearchSpace& space,
                const PlanEndpoint& endpoint,
-               PatchId first,
-               std::uint32_t count) {
+               const SearchSpace::Column& column) {
   if (endpoint.level.has_value()) {
     const auto level = static_cast<std::int64_t>(*endpoint.level);
-    return level >= 0 && level < count ? first + static_cast<PatchId>(level) : kNoPatchId;
+    return level >= 0 && level < static_cast<std::int64_t>(column.size())
+               ? column[static_cast<std::size_t>(level)]
+               : kNoPatchId;
   }
-  if (count == 0) return kNoPatchId;
-  PatchId best = first;
+  if (column.empty()) return kNoPatchId;
+  PatchId best = column.front();
   if (!endpoint.z_m.has_value()) return best;
-  for (PatchId patch = first + 1; patch < first + count; ++patch) {
+  for (const PatchId patch : column) {
     if (std::abs(space.Height(patch) - *endpoint.z_m) <
         std::abs(space.Height(best) - *endpoint.z_m)) {
       best = patch;
@@ -81,14 +83,13 @@ PatchId Snap(SearchSpace& space, const PlanEndpoint& endpoint, PatchId named) {
   std::tuple<double, double, double, double> best_rank;
   for (int dy = -cells; dy <= cells; ++dy) {
     for (int dx = -cells; dx <= cells; ++dx) {
-      PatchId first = 0;
-      const std::uint32_t count = space.FindCell({middle.x + dx, middle.y + dy}, &first);
-      for (std::uint32_t level = 0; level < count; ++level) {
-        const PatchId patch = first + level;
+      std::uint32_t level = 0;
+      for (const PatchId patch : space.FindCell({middle.x + dx, middle.y + dy})) {
+        const std::uint32_t own_level = level++;
         if (space.Danger(patch) < 0.0F) continue;
         const Eigen::Vector3d p = space.Position(patch);
         const double d = std::hypot(p.x() - endpoint.x_m, p.y() - endpoint.y_m);
-        if (d > reach || !SameLevel(space, endpoint, named, patch, level, d)) continue;
+        if (d > reach || !SameLevel(space, endpoint, named, patch, own_level, d)) continue;
         const double off = std::abs(p.z() - endpoint.z_m.value_or(p.z()));
         const std::tuple rank(d, off, p.x(), p.y());
         if (best != kNoPatchId && rank >= best_rank) continue;
@@ -110,9 +111,7 @@ std::optional<Eigen::Vector3d> NearestStandable(SearchSpace& space,
   std::optional<Eigen::Vector3d> best;
   double best_distance = std::numeric_limits<double>::infinity();
   const auto look_at = [&](int dx, int dy) {
-    PatchId first = 0;
-    const std::uint32_t count = space.FindCell({middle.x + dx, middle.y + dy}, &first);
-    for (PatchId patch = first; patch < first + count; ++patch) {
+    for (const PatchId patch : space.FindCell({middle.x + dx, middle.y + dy})) {
       if (space.Danger(patch) < 0.0F) continue;
       const Eigen::Vector3d p = space.Position(patch);
       const Eigen::Vector3d wanted(endpoint.x_m, endpoint.y_m, z.value_or(p.z()));
@@ -159,11 +158,10 @@ absl::Status ValidateEndpoint(absl::string_view name,
 
 absl::StatusOr<EndpointMatch> MatchEndpoint(SearchSpace& space, const PlanEndpoint& endpoint) {
   EndpointMatch match;
-  PatchId first = 0;
   const CellIndex cell = CellAt(endpoint, space.checks().cell_size_m);
-  const std::uint32_t count = space.FindCell(cell, &first);
+  const SearchSpace::Column column = space.FindCell(cell);
   STRATA_RETURN_IF_ERROR(space.status());
-  const PatchId patch = Choose(space, endpoint, first, count);
+  const PatchId patch = Choose(space, endpoint, column);
   if (patch != kNoPatchId && space.Danger(patch) >= 0.0F) {
     match.patch = patch;
     return match;
@@ -173,11 +171,14 @@ absl::StatusOr<EndpointMatch> MatchEndpoint(SearchSpace& space, const PlanEndpoi
   if (patch == kNoPatchId) {
     match.reason = {
         Obstruction::kUnknown, 0.0, Eigen::Vector3d(endpoint.x_m, endpoint.y_m, z.value_or(0.0))};
-    match.message =
-        count == 0
-            ? absl::StrCat("no surface at ", place)
-            : absl::StrCat(
-                  "no level ", *endpoint.level, " at ", place, ", which has ", count, " surfaces");
+    match.message = column.empty() ? absl::StrCat("no surface at ", place)
+                                   : absl::StrCat("no level ",
+                                                  *endpoint.level,
+                                                  " at ",
+                                                  place,
+                                                  ", which has ",
+                                                  column.size(),
+                                                  " surfaces");
   } else {
     STRATA_ASSIGN_OR_RETURN(match.reason, WhyNotStand(space, patch));
     match.message = absl::StrFormat("cannot stand at (%.2f, %.2f, %.2f): %s",

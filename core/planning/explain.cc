@@ -24,6 +24,7 @@
 #include "core/planning/profile_checks.h"
 #include "core/planning/search.h"
 #include "core/planning/search_space.h"
+#include "core/planning/search_workspace.h"
 #include "core/planning/tile_cache.h"
 #include "core/world/plan.h"
 
@@ -37,20 +38,18 @@ constexpr int kCrestCells = 10;
 // The checks of one tile, made again to ask them for reasons.
 class TileReasons {
  public:
-  TileReasons(const SearchSpace& space,
-              const SearchSpace::Slot& slot,
-              const TileNeighbourhood& tiles)
-      : checks_(space.checks()),
+  TileReasons(SearchSpace& space, const SearchSpace::Slot& slot, const TileNeighbourhood& tiles)
+      : space_(space),
+        checks_(space.checks()),
         slot_(slot),
         window_(tiles, checks_.margin, checks_.cell_size_m),
         ground_(window_, checks_, GroundChecks::Edges::kAll) {}
 
   std::uint32_t SurfaceOf(PatchId patch) const {
-    const std::uint32_t local = patch - slot_.base;
-    std::uint32_t first = 0;
-    std::uint32_t count = 0;
-    slot_.tile->FindCell(slot_.tile->cell[local], &first, &count);
-    return window_.begin(window_.CellOfTile(slot_.tile->cell[local])) + local - first;
+    const CellIndex cell = space_.CellOfPatch(patch);
+    const SearchSpace::Column column = space_.FindCell(cell);
+    const auto level = std::find(column.begin(), column.end(), patch) - column.begin();
+    return window_.begin(window_.CellOfTile(CellInTile(cell))) + static_cast<std::uint32_t>(level);
   }
 
   Explanation WhyNotStand(std::uint32_t i) const {
@@ -125,22 +124,18 @@ class TileReasons {
     return ground > kCrestCells;
   }
 
+  SearchSpace& space_;
   const ProfileChecks& checks_;
   const SearchSpace::Slot& slot_;
   const GroundWindow window_;
   const GroundChecks ground_;
 };
 
-bool Reached(const SearchSpace& space, const SearchWorkspace& workspace, PatchId patch) {
-  const int number = space.SlotOf(patch);
-  const SearchSpace::Slot& slot = space.slots()[number];
-  return workspace.DirectionOf(slot, number, patch - slot.base) != ParkedTile::kUnreached;
-}
-
-// True if the ground allows the move, whatever classes cost.
-bool HasMove(SearchSpace& space, PatchId patch, int direction) {
+bool Reached(SearchSpace& space, const SearchWorkspace& workspace, PatchId patch) {
   const SearchSpace::Slot& slot = space.SlotOfPatch(patch);
-  return slot.tile->moves[patch - slot.base][direction].cost != Move::kNone;
+  const std::uint32_t place = patch - slot.base;
+  return slot.tile->CanStand(place) &&
+         workspace.DirectionOf(space.SlotOf(patch), *slot.tile, place) != ParkedTile::kUnreached;
 }
 
 Explanation OfClass(SearchSpace& space, PatchId patch) {
@@ -166,13 +161,13 @@ class Frontier {
   std::vector<PatchId> Patches(const Eigen::Vector3d& goal) const {
     std::vector<std::tuple<double, double, double, double, PatchId>> ranked;
     for (std::size_t slot = 0; slot < space_.slots().size(); ++slot) {
-      const PatchId base = space_.slots()[slot].base;
-      const std::uint32_t size = space_.slots()[slot].size;
-      for (std::uint32_t i = 0; i < size; ++i) {
-        if (!Reached(space_, reached_, base + i) || !HasRefusedMove(base + i)) continue;
-        const Eigen::Vector3d p = space_.Position(base + i);
-        ranked.emplace_back((p - goal).squaredNorm(), p.x(), p.y(), p.z(), base + i);
-      }
+      const SearchSpace::Slot held = space_.At(static_cast<int>(slot));
+      held.tile->standing.ForEach([&](std::uint32_t place, std::uint32_t /*number*/) {
+        const PatchId patch = held.base + place;
+        if (!Reached(space_, reached_, patch) || !HasRefusedMove(patch)) return;
+        const Eigen::Vector3d p = space_.Position(patch);
+        ranked.emplace_back((p - goal).squaredNorm(), p.x(), p.y(), p.z(), patch);
+      });
     }
     std::sort(ranked.begin(), ranked.end());
     std::vector<PatchId> patches;
@@ -210,13 +205,12 @@ class Frontier {
     bool unknown = false;
     for (int n = 1; n <= limit; ++n) {
       cell = {cell.x + kStepX[move.direction], cell.y + kStepY[move.direction]};
-      PatchId first = 0;
-      const std::uint32_t count = space_.FindCell(cell, &first);
-      const PatchId next = Nearest(first, count, level);
+      const SearchSpace::Column column = space_.FindCell(cell);
+      const PatchId next = Nearest(column, level);
       if (next == kNoPatchId) {
-        if (count > 0 && space_.Height(first) < level) break;  // a drop
-        wall = wall || count > 0;
-        even = even && count == 0;
+        if (!column.empty() && space_.Height(column.front()) < level) break;  // a drop
+        wall = wall || !column.empty();
+        even = even && column.empty();
         ++unobserved;
         unknown = unknown || (even && unobserved > unknown_limit);
         continue;
@@ -239,7 +233,7 @@ class Frontier {
  private:
   // The ground refuses, or a forbidden class.
   bool IsRefused(PatchId patch, int direction) const {
-    if (!HasMove(space_, patch, direction)) return true;
+    if (!space_.HasMove(patch, direction)) return true;
     if (space_.classes().plain()) return false;
     std::uint32_t cost = 0;
     int cells = 0;
@@ -254,10 +248,10 @@ class Frontier {
   }
 
   // The surface nearest to the level, if it is within the robot's height of it.
-  PatchId Nearest(PatchId first, std::uint32_t count, float level) const {
+  PatchId Nearest(const SearchSpace::Column& column, float level) const {
     PatchId best = kNoPatchId;
     float best_off = space_.checks().height_m;
-    for (PatchId patch = first; patch < first + count; ++patch) {
+    for (const PatchId patch : column) {
       const float off = std::abs(space_.Height(patch) - level);
       if (off >= best_off) continue;
       best_off = off;
@@ -317,7 +311,7 @@ absl::StatusOr<Explanation> WhyNotStand(SearchSpace& space, PatchId patch) {
 }
 
 absl::StatusOr<Explanation> WhyNoMove(SearchSpace& space, PatchId patch, int direction) {
-  if (HasMove(space, patch, direction)) {
+  if (space.HasMove(patch, direction)) {
     std::uint32_t cost = 0;
     int cells = 0;
     const PatchId target = space.FollowGround(patch, direction, &cost, &cells);

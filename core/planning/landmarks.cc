@@ -16,6 +16,7 @@
 #include "core/planning/prepared_tile.h"
 #include "core/planning/search.h"
 #include "core/planning/search_space.h"
+#include "core/planning/search_workspace.h"
 #include "core/planning/tile_cache.h"
 
 namespace strata {
@@ -26,11 +27,11 @@ template <typename Visit>
 void ForEachReached(const SearchSpace& space, SearchWorkspace& workspace, Visit visit) {
   for (const int slot : workspace.at_hand()) {
     const PatchId base = space.slots()[slot].base;
-    const std::vector<SearchNode>& nodes = workspace.member(slot).nodes;
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      if ((nodes[i].stamp & SearchNode::kReached) == 0) continue;
-      visit(base + static_cast<PatchId>(i), nodes[i].cost);
-    }
+    const SearchWorkspace::Member& member = workspace.member(slot);
+    member.tile->standing.ForEach([&](std::uint32_t place, std::uint32_t number) {
+      const std::uint32_t cost = member.costs[place];
+      if (cost != SearchWorkspace::Member::kUnreached) visit(slot, base + place, number, cost);
+    });
   }
 }
 
@@ -72,13 +73,13 @@ absl::StatusOr<PatchId> LargestPart(SearchSpace& space,
     const PatchId base = space.slots()[slot].base;
     const std::shared_ptr<const PreparedTile> tile = space.At(slot).tile;
     seen.resize(space.end());
-    for (std::uint32_t i = 0; i < tile->size(); ++i) {
-      if (!tile->CanStand(i) || seen[base + i]) continue;
-      const std::size_t size = Flood(space, base + i, seen);
-      if (size <= best_size) continue;
+    tile->standing.ForEach([&](std::uint32_t place, std::uint32_t /*number*/) {
+      if (seen[base + place]) return;
+      const std::size_t size = Flood(space, base + place, seen);
+      if (size <= best_size) return;
       best_size = size;
-      best = base + i;
-    }
+      best = base + place;
+    });
   }
   STRATA_RETURN_IF_ERROR(space.status());
   return best;
@@ -106,12 +107,14 @@ absl::StatusOr<std::shared_ptr<const Landmarks>> Landmarks::Make(SearchSpace& sp
     STRATA_RETURN_IF_ERROR(ReachAll(space, next, workspace, stop).status());
     landmarks->Store(space, workspace, l);
     std::uint32_t farthest = 0;
-    ForEachReached(space, workspace, [&](PatchId p, std::uint32_t cost) {
-      nearest[p] = std::min(nearest[p], cost);
-      if (nearest[p] <= farthest) return;
-      farthest = nearest[p];
-      next = p;
-    });
+    ForEachReached(space,
+                   workspace,
+                   [&](int /*slot*/, PatchId p, std::uint32_t /*number*/, std::uint32_t cost) {
+                     nearest[p] = std::min(nearest[p], cost);
+                     if (nearest[p] <= farthest) return;
+                     farthest = nearest[p];
+                     next = p;
+                   });
   }
   for (auto& [key, tile] : landmarks->tiles_) {
     tile.versions = VersionsAround(space.source(), key);
@@ -126,10 +129,10 @@ void Landmarks::Store(const SearchSpace& space, SearchWorkspace& workspace, int 
     costs.resize(static_cast<std::size_t>(slot.size) * count_, kUnreached);
     of_slot.push_back(costs.data() + static_cast<std::size_t>(slot.size) * landmark);
   }
-  ForEachReached(space, workspace, [&](PatchId p, std::uint32_t cost) {
-    const int slot = space.SlotOf(p);
-    of_slot[slot][p - space.slots()[slot].base] = cost;
-  });
+  ForEachReached(
+      space, workspace, [&](int slot, PatchId /*p*/, std::uint32_t number, std::uint32_t cost) {
+        of_slot[slot][number] = cost;
+      });
 }
 
 bool Landmarks::Fits(TileSource& source) const {

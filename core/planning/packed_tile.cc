@@ -1,235 +1,324 @@
 #include "core/planning/packed_tile.h"
 
-#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
-#include <cstring>
+#include <optional>
 #include <string>
+#include <tuple>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
 #include <zstd.h>
 
+#include "core/common/checksum.h"
+#include "core/common/status.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/ground_window.h"
+#include "core/planning/move_cost.h"
+#include "core/planning/patch_index.h"
 #include "core/planning/prepared_tile.h"
 
 namespace strata {
 namespace {
 
-constexpr int kCells = kTileCells * kTileCells;
+constexpr std::uint32_t kFormat = 1;
 constexpr int kLevel = 1;  // of zstd: 3 saves another twentieth and takes twice the time
+constexpr std::size_t kHeaderBytes = 16;  // format, size of the columns, size of cells
+constexpr std::size_t kChecksumBytes = 8;
+// No tile that fits a map has as much.
+constexpr std::uint64_t kMaxColumnBytes = std::uint64_t{1} << 28;
 
-// A move that is not what PredictMoves says.
-struct Exception {
-  std::uint32_t patch = 0;
-  std::uint32_t direction = 0;
-  Move move;
-};
+void PutNumber(std::string& out, std::uint64_t value, int bytes) {
+  for (int byte = 0; byte < bytes; ++byte) out.push_back(static_cast<char>(value >> (8 * byte)));
+}
+std::uint64_t NumberAt(absl::string_view bytes, std::size_t at, int count) {
+  std::uint64_t value = 0;
+  for (int byte = 0; byte < count; ++byte) {
+    value |= std::uint64_t{static_cast<std::uint8_t>(bytes[at + byte])} << (8 * byte);
+  }
+  return value;
+}
 
-constexpr int kForward = 4;  // directions; the others are their opposites
+absl::Status Damaged(absl::string_view what) {
+  return absl::DataLossError(absl::StrCat("prepared tile: ", what));
+}
 
-// Columns of one kind of value, byte by byte: what is alike lies together.
-class Columns {
+// Columns of whole numbers, byte by byte: what is alike lies together.
+class ColumnWriter {
  public:
   template <typename T>
   void Put(const std::vector<T>& values) {
-    static_assert(std::is_trivially_copyable_v<T>);
-    const std::uint64_t count = values.size();
-    raw_.append(reinterpret_cast<const char*>(&count), sizeof(count));
-    const char* const from = reinterpret_cast<const char*>(values.data());
+    static_assert(std::is_unsigned_v<T>);
+    PutNumber(bytes_, values.size(), 4);
     for (std::size_t byte = 0; byte < sizeof(T); ++byte) {
-      for (std::size_t i = 0; i < values.size(); ++i) raw_.push_back(from[i * sizeof(T) + byte]);
+      for (const T value : values) {
+        bytes_.push_back(static_cast<char>(static_cast<std::uint64_t>(value) >> (8 * byte)));
+      }
     }
   }
-  std::string Compressed() const {
-    std::string packed(sizeof(std::uint64_t) + ZSTD_compressBound(raw_.size()), '\0');
-    const std::uint64_t size = raw_.size();
-    std::memcpy(packed.data(), &size, sizeof(size));
-    const std::size_t used = ZSTD_compress(packed.data() + sizeof(size),
-                                           packed.size() - sizeof(size),
-                                           raw_.data(),
-                                           raw_.size(),
-                                           kLevel);
-    packed.resize(sizeof(size) + used);
-    packed.shrink_to_fit();
-    return packed;
-  }
-
-  Columns() = default;
-  explicit Columns(const std::string& packed) {
-    std::uint64_t size = 0;
-    std::memcpy(&size, packed.data(), sizeof(size));
-    raw_.resize(size);
-    ZSTD_decompress(raw_.data(), size, packed.data() + sizeof(size), packed.size() - sizeof(size));
-  }
-  template <typename T>
-  std::vector<T> Take() {
-    std::uint64_t count = 0;
-    std::memcpy(&count, &raw_[at_], sizeof(count));
-    at_ += sizeof(count);
-    std::vector<T> values(count);
-    char* const to = reinterpret_cast<char*>(values.data());
-    for (std::size_t byte = 0; byte < sizeof(T); ++byte) {
-      for (std::size_t i = 0; i < count; ++i) to[i * sizeof(T) + byte] = raw_[at_++];
-    }
-    return values;
-  }
+  const std::string& bytes() const { return bytes_; }
 
  private:
-  std::string raw_;
-  std::size_t at_ = 0;
+  std::string bytes_;
 };
 
-// Zigzag differences of heights in units of 1/512 m, which is what tiles have; empty if they are
-// not.
-std::vector<std::uint32_t> HeightSteps(const std::vector<float>& heights) {
-  std::vector<std::uint32_t> steps;
-  steps.reserve(heights.size());
-  std::int32_t last = 0;
-  for (const float z : heights) {
-    const float units = z * 512.0F;
-    if (!(std::abs(units) < 1e8F) || units != std::floor(units) || (z == 0.0F && std::signbit(z))) {
-      return {};
-    }
-    const std::int32_t step = static_cast<std::int32_t>(units) - last;
-    last += step;
-    steps.push_back(static_cast<std::uint32_t>(step) << 1 ^ static_cast<std::uint32_t>(step >> 31));
-  }
-  return steps;
-}
+class ColumnReader {
+ public:
+  explicit ColumnReader(absl::string_view bytes) : bytes_(bytes) {}
 
-std::vector<float> HeightsOf(const std::vector<std::uint32_t>& steps) {
-  std::vector<float> heights;
-  heights.reserve(steps.size());
-  std::int32_t last = 0;
-  for (const std::uint32_t step : steps) {
-    last += static_cast<std::int32_t>(step >> 1) ^ -static_cast<std::int32_t>(step & 1U);
-    heights.push_back(static_cast<float>(last) / 512.0F);
-  }
-  return heights;
-}
-
-// The moves of one cell inside the tile to where the robot can stand nearest in height, both ways.
-void PredictMoves(PreparedTile& tile, double cell_size_m) {
-  tile.moves.assign(tile.size(), {});
-  std::vector<std::uint32_t> first(kCells, PreparedTile::kNoPatch);
-  for (std::uint32_t i = tile.size(); i-- > 0;) first[tile.cell[i]] = i;
-  for (std::uint32_t i = 0; i < tile.size(); ++i) {
-    if (!tile.CanStand(i)) continue;
-    const int x = tile.cell[i] & (kTileCells - 1);
-    const int y = tile.cell[i] >> kTileShift;
-    for (int k = 0; k < kForward; ++k) {
-      const int to_x = x + kStepX[k];
-      const int to_y = y + kStepY[k];
-      if (to_x < 0 || to_x >= kTileCells || to_y >= kTileCells) continue;
-      const auto cell = static_cast<std::uint16_t>(to_y << kTileShift | to_x);
-      std::uint32_t to = PreparedTile::kNoPatch;
-      for (std::uint32_t j = first[cell]; j < tile.size() && tile.cell[j] == cell; ++j) {
-        if (!tile.CanStand(j)) continue;
-        if (to == PreparedTile::kNoPatch ||
-            std::abs(tile.z_m[j] - tile.z_m[i]) < std::abs(tile.z_m[to] - tile.z_m[i])) {
-          to = j;
-        }
+  template <typename T>
+  std::vector<T> Take() {
+    static_assert(std::is_unsigned_v<T>);
+    if (bytes_.size() < 4) return Fail<T>();
+    const std::uint64_t count = NumberAt(bytes_, 0, 4);
+    bytes_.remove_prefix(4);
+    if (count * sizeof(T) > bytes_.size()) return Fail<T>();
+    std::vector<T> values(count, 0);
+    for (std::size_t byte = 0; byte < sizeof(T); ++byte) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto bits = std::uint64_t{static_cast<std::uint8_t>(bytes_[byte * count + i])};
+        values[i] = static_cast<T>(values[i] | bits << (8 * byte));
       }
-      if (to == PreparedTile::kNoPatch) continue;
-      const double run = (k & 1) != 0 ? cell_size_m * 1.4142135623730951 : cell_size_m;
-      const double danger = 0.5 * (static_cast<double>(tile.danger[i]) + tile.danger[to]);
-      const double rise = tile.z_m[to] - tile.z_m[i];
-      const std::uint32_t cost = MoveCost(run, rise, danger, cell_size_m);
-      const std::int64_t delta = static_cast<std::int64_t>(to) - i;
-      if (cost >= Move::kFar || std::abs(delta) > INT16_MAX) continue;
-      tile.moves[i][k] = {static_cast<std::int16_t>(delta), static_cast<std::uint16_t>(cost)};
-      tile.moves[to][k + kForward] = {static_cast<std::int16_t>(-delta),
-                                      static_cast<std::uint16_t>(cost)};
     }
+    bytes_.remove_prefix(count * sizeof(T));
+    return values;
   }
-  for (const FarMove& move : tile.far_moves) {
-    tile.moves[move.patch][move.direction] = {0, Move::kFar};
+  // True if all was there, and nothing else.
+  bool Finished() const { return ok_ && bytes_.empty(); }
+
+ private:
+  template <typename T>
+  std::vector<T> Fail() {
+    ok_ = false;
+    bytes_ = absl::string_view();
+    return {};
   }
+
+  absl::string_view bytes_;
+  bool ok_ = true;
+};
+
+// Differences between neighbours are small.
+template <typename T>
+std::vector<T> Differences(const std::vector<T>& values) {
+  std::vector<T> differences;
+  differences.reserve(values.size());
+  T last = 0;
+  for (const T value : values) {
+    const auto step = static_cast<std::make_signed_t<T>>(static_cast<T>(value - last));
+    differences.push_back(static_cast<T>(static_cast<T>(value - last) << 1 ^ (step < 0 ? -1 : 0)));
+    last = value;
+  }
+  return differences;
+}
+template <typename T>
+std::vector<T> Sums(std::vector<T> values) {
+  T last = 0;
+  for (T& value : values) {
+    last = static_cast<T>(last + (value >> 1 ^ ((value & 1) != 0 ? -1 : 0)));
+    value = last;
+  }
+  return values;
 }
 
-std::vector<Exception> ExceptionsOf(const PreparedTile& tile, double cell_size_m) {
-  PreparedTile predicted;
-  predicted.far_moves = tile.far_moves;
-  predicted.cell = tile.cell;
-  predicted.z_m = tile.z_m;
-  predicted.danger = tile.danger;
-  PredictMoves(predicted, cell_size_m);
-  std::vector<Exception> exceptions;
-  for (std::uint32_t i = 0; i < tile.size(); ++i) {
-    for (std::uint32_t k = 0; k < 8; ++k) {
-      const Move& move = tile.moves[i][k];
-      if (move == predicted.moves[i][k]) continue;
-      exceptions.push_back({i, k, move});
-    }
+template <typename Row, typename T>
+std::vector<T> ColumnOf(const std::vector<Row>& rows, T Row::*member) {
+  std::vector<T> column;
+  column.reserve(rows.size());
+  for (const Row& row : rows) column.push_back(row.*member);
+  return column;
+}
+// False if it is not as long.
+template <typename Row, typename T>
+bool SetColumn(std::vector<Row>& rows, T Row::*member, const std::vector<T>& column) {
+  if (column.size() != rows.size()) return false;
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i].*member = column[i];
+  return true;
+}
+
+void PutIndex(ColumnWriter& columns, const PatchIndex& index) {
+  columns.Put(index.sheets());
+  columns.Put(index.upper_blocks());
+}
+bool TakeIndex(ColumnReader& columns, PatchIndex* index) {
+  auto sheets = columns.Take<std::uint64_t>();
+  auto upper_blocks = columns.Take<std::uint16_t>();
+  std::optional<PatchIndex> made = PatchIndex::OfSheets(std::move(sheets), std::move(upper_blocks));
+  if (made.has_value()) *index = *std::move(made);
+  return made.has_value();
+}
+
+std::vector<std::uint32_t> Bits(const std::vector<float>& values) {
+  std::vector<std::uint32_t> bits;
+  for (const float value : values) bits.push_back(std::bit_cast<std::uint32_t>(value));
+  return bits;
+}
+
+bool TakeHeights(ColumnReader& columns, PreparedTile& tile) {
+  const auto base = columns.Take<std::uint32_t>();
+  if (base.size() != 1) return false;
+  tile.base_steps = std::bit_cast<std::int32_t>(base.front());
+  const bool fit =
+      SetColumn(tile.patches, &PreparedPatch::height, Sums(columns.Take<std::uint16_t>()));
+  tile.other_heights = Sums(columns.Take<std::uint16_t>());
+  for (const std::uint32_t bits : columns.Take<std::uint32_t>()) {
+    tile.exact_heights.push_back(std::bit_cast<float>(bits));
+    if (!std::isfinite(tile.exact_heights.back())) return false;
   }
-  return exceptions;
+  return fit && std::abs(std::int64_t{tile.base_steps}) < 1 << 24 &&
+         tile.other_heights.size() == tile.other.size() &&
+         (tile.exact_heights.empty() ||
+          tile.exact_heights.size() == tile.standing.size() + tile.other.size());
+}
+
+// True if the cells around, of the same block, all have patches.
+bool HasAllAround(const PatchIndex& index, std::uint32_t place) {
+  constexpr std::uint64_t kAround = 0x070507;  // of place 9
+  const std::uint32_t x = place % 8;
+  const std::uint32_t y = place % 64 / 8;
+  if (x == 0 || y == 0 || x == 7 || y == 7) return false;
+  const std::uint64_t around = kAround << (place % 64 - 9);
+  return (index.sheets()[place / 64] & around) == around;
+}
+
+// Searches look for targets without looking where the tile ends.
+bool MovesLeadSomewhere(const PreparedTile& tile) {
+  bool all = true;
+  tile.standing.ForEach([&](std::uint32_t place, std::uint32_t number) {
+    const std::uint16_t cell = tile.standing.CellOf(place);
+    if (HasAllAround(tile.standing, tile.standing.OnFirstSheet(place))) return;
+    for (unsigned k = 0; k < 8; ++k) {
+      if ((tile.patches[number].moves >> k & 1U) == 0) continue;
+      int x = cell & (kTileCells - 1);
+      int y = cell >> kTileShift;
+      bool found = false;
+      while (!found) {
+        x += kStepX[k];
+        y += kStepY[k];
+        if (x < 0 || y < 0 || x >= kTileCells || y >= kTileCells) break;
+        const auto to = static_cast<std::uint16_t>(y << kTileShift | x);
+        found = tile.standing.Has(PatchIndex::FirstSheetPlace(to));
+      }
+      all = all && found;
+    }
+  });
+  return all;
+}
+
+bool FarMovesFit(const PreparedTile& tile) {
+  for (std::size_t i = 0; i < tile.far_moves.size(); ++i) {
+    const FarMove& move = tile.far_moves[i];
+    if (!tile.standing.Has(move.place) || move.direction >= 8 || move.cells < 1 ||
+        move.cells > kTileCells || move.cost == 0 || move.cost > kDearestMove) {
+      return false;
+    }
+    if (i == 0) continue;
+    const FarMove& last = tile.far_moves[i - 1];
+    if (std::tie(last.place, last.direction) >= std::tie(move.place, move.direction)) return false;
+  }
+  return true;
+}
+
+absl::StatusOr<std::string> Decompressed(absl::string_view packed, std::uint64_t size) {
+  std::string columns(size, '\0');
+  const std::size_t used =
+      ZSTD_decompress(columns.data(), columns.size(), packed.data(), packed.size());
+  if (ZSTD_isError(used) != 0U || used != size) return Damaged("columns cannot be decompressed");
+  return columns;
+}
+
+absl::StatusOr<PreparedTile> TileOfColumns(absl::string_view raw) {
+  ColumnReader columns(raw);
+  PreparedTile tile;
+  const auto key = columns.Take<std::uint32_t>();
+  if (key.size() != 3) return Damaged("no key");
+  tile.key = {std::bit_cast<std::int32_t>(key[0]),
+              std::bit_cast<std::int32_t>(key[1]),
+              std::bit_cast<std::int32_t>(key[2])};
+  if (!TakeIndex(columns, &tile.standing) || !TakeIndex(columns, &tile.other)) {
+    return Damaged("sheets that contradict each other");
+  }
+  tile.patches.resize(tile.standing.size());
+  if (!SetColumn(tile.patches, &PreparedPatch::moves, columns.Take<std::uint8_t>()) ||
+      !SetColumn(tile.patches, &PreparedPatch::edge_distance, columns.Take<std::uint8_t>()) ||
+      !SetColumn(tile.patches, &PreparedPatch::danger, columns.Take<std::uint16_t>()) ||
+      !TakeHeights(columns, tile)) {
+    return Damaged("columns that do not fit the patches");
+  }
+  tile.class_id = columns.Take<std::uint8_t>();
+  const auto places = Sums(columns.Take<std::uint32_t>());
+  tile.far_moves.resize(places.size());
+  if ((!tile.class_id.empty() && tile.class_id.size() != tile.standing.size()) ||
+      !SetColumn(tile.far_moves, &FarMove::place, places) ||
+      !SetColumn(tile.far_moves, &FarMove::direction, columns.Take<std::uint8_t>()) ||
+      !SetColumn(tile.far_moves, &FarMove::level, columns.Take<std::uint8_t>()) ||
+      !SetColumn(tile.far_moves, &FarMove::cells, columns.Take<std::uint16_t>()) ||
+      !SetColumn(tile.far_moves, &FarMove::cost, columns.Take<std::uint32_t>()) ||
+      !columns.Finished() || !FarMovesFit(tile) || !MovesLeadSomewhere(tile)) {
+    return Damaged("moves that lead nowhere");
+  }
+  IndexFarMoves(tile);
+  return tile;
 }
 
 }  // namespace
 
 std::string PackTile(const PreparedTile& tile, double cell_size_m) {
-  // Nobody asks how dangerous it is where nobody can stand: all that is < 0 is alike.
-  std::vector<std::uint8_t> stands;
-  std::vector<float> danger;
-  for (std::uint32_t i = 0; i < tile.size(); ++i) {
-    stands.push_back(tile.CanStand(i) ? 1 : 0);
-    if (tile.CanStand(i)) danger.push_back(tile.danger[i]);
-  }
-  Columns columns;
-  columns.Put(std::vector<TileKey>{tile.key});
-  columns.Put(tile.far_moves);
-  std::vector<std::uint16_t> steps;  // along the cells' own order
-  std::uint16_t last = 0;
-  for (const std::uint16_t cell : tile.cell) {
-    steps.push_back(cell ^ last);
-    last = cell;
-  }
-  columns.Put(steps);
-  const std::vector<std::uint32_t> heights = HeightSteps(tile.z_m);
-  columns.Put(heights);
-  columns.Put(heights.empty() ? tile.z_m : std::vector<float>());
-  columns.Put(stands);
-  columns.Put(danger);
-  columns.Put(tile.edge_distance);
+  ColumnWriter columns;
+  columns.Put(std::vector<std::uint32_t>{static_cast<std::uint32_t>(tile.key.level),
+                                         static_cast<std::uint32_t>(tile.key.x),
+                                         static_cast<std::uint32_t>(tile.key.y)});
+  PutIndex(columns, tile.standing);
+  PutIndex(columns, tile.other);
+  columns.Put(ColumnOf(tile.patches, &PreparedPatch::moves));
+  columns.Put(ColumnOf(tile.patches, &PreparedPatch::edge_distance));
+  columns.Put(ColumnOf(tile.patches, &PreparedPatch::danger));
+  columns.Put(std::vector<std::uint32_t>{std::bit_cast<std::uint32_t>(tile.base_steps)});
+  columns.Put(Differences(ColumnOf(tile.patches, &PreparedPatch::height)));
+  columns.Put(Differences(tile.other_heights));
+  columns.Put(Bits(tile.exact_heights));
   columns.Put(tile.class_id);
-  columns.Put(std::vector<std::uint32_t>(tile.block_begin.begin(), tile.block_begin.end()));
-  columns.Put(ExceptionsOf(tile, cell_size_m));
-  return columns.Compressed();
+  columns.Put(Differences(ColumnOf(tile.far_moves, &FarMove::place)));
+  columns.Put(ColumnOf(tile.far_moves, &FarMove::direction));
+  columns.Put(ColumnOf(tile.far_moves, &FarMove::level));
+  columns.Put(ColumnOf(tile.far_moves, &FarMove::cells));
+  columns.Put(ColumnOf(tile.far_moves, &FarMove::cost));
+
+  const std::string& raw = columns.bytes();
+  std::string packed;
+  PutNumber(packed, kFormat, 4);
+  PutNumber(packed, raw.size(), 4);
+  PutNumber(packed, std::bit_cast<std::uint64_t>(cell_size_m), 8);
+  packed.resize(kHeaderBytes + ZSTD_compressBound(raw.size()));
+  const std::size_t used = ZSTD_compress(
+      packed.data() + kHeaderBytes, packed.size() - kHeaderBytes, raw.data(), raw.size(), kLevel);
+  packed.resize(kHeaderBytes + used);
+  PutNumber(packed, Checksum64(packed), kChecksumBytes);
+  packed.shrink_to_fit();
+  return packed;
 }
 
-PreparedTile UnpackTile(const std::string& packed, double cell_size_m) {
-  Columns columns(packed);
-  PreparedTile tile;
-  tile.key = columns.Take<TileKey>().front();
-  tile.far_moves = columns.Take<FarMove>();
-  tile.cell = columns.Take<std::uint16_t>();
-  std::uint16_t last = 0;
-  for (std::uint16_t& cell : tile.cell) {
-    cell ^= last;
-    last = cell;
+absl::StatusOr<PreparedTile> UnpackTile(absl::string_view packed, double cell_size_m) {
+  if (packed.size() < kHeaderBytes + kChecksumBytes) return Damaged("cut short");
+  const absl::string_view body = packed.substr(0, packed.size() - kChecksumBytes);
+  if (Checksum64(body) != NumberAt(packed, body.size(), 8)) return Damaged("wrong checksum");
+  if (const std::uint64_t format = NumberAt(body, 0, 4); format != kFormat) {
+    return Damaged(absl::StrCat("format ", format, " is not ", kFormat));
   }
-  tile.z_m = HeightsOf(columns.Take<std::uint32_t>());
-  if (const std::vector<float> z_m = columns.Take<float>(); !z_m.empty()) tile.z_m = z_m;
-  const auto stands = columns.Take<std::uint8_t>();
-  const auto danger = columns.Take<float>();
-  tile.danger.reserve(tile.cell.size());
-  std::size_t standing = 0;
-  for (const std::uint8_t stand : stands) {
-    tile.danger.push_back(stand != 0 ? danger[standing++] : -1.0F);
+  if (NumberAt(body, 8, 8) != std::bit_cast<std::uint64_t>(cell_size_m)) {
+    return Damaged(absl::StrCat("not of cells of ", cell_size_m, " m"));
   }
-  tile.edge_distance = columns.Take<std::uint8_t>();
-  tile.class_id = columns.Take<std::uint8_t>();
-  const auto blocks = columns.Take<std::uint32_t>();
-  std::copy(blocks.begin(), blocks.end(), tile.block_begin.begin());
-  PredictMoves(tile, cell_size_m);
-  for (const Exception& exception : columns.Take<Exception>()) {
-    tile.moves[exception.patch][exception.direction] = exception.move;
-  }
-  return tile;
+  const std::uint64_t size = NumberAt(body, 4, 4);
+  if (size > kMaxColumnBytes) return Damaged(absl::StrCat(size, " bytes of columns"));
+  STRATA_ASSIGN_OR_RETURN(const std::string raw, Decompressed(body.substr(kHeaderBytes), size));
+  return TileOfColumns(raw);
 }
 
 }  // namespace strata

@@ -1,19 +1,23 @@
-// Prepared tiles in a tenth of their memory, for the time that no search is in them.
+// Prepared tiles as bytes, to be kept on disk.
 #ifndef STRATA_CORE_PLANNING_PACKED_TILE_H_
 #define STRATA_CORE_PLANNING_PACKED_TILE_H_
 
 #include <string>
 
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
 #include "core/planning/prepared_tile.h"
 
 namespace strata {
 
-// Some 4 bytes a patch. What follows from heights and dangers, which are most moves, is left out.
+// Some 3 bytes a surface: a format number, the size of cells, zstd of columns, and XXH3-64 of all
+// before.
 std::string PackTile(const PreparedTile& tile, double cell_size_m);
 
-// The tile that was packed, bit for bit, in far less time than preparing it takes.
-// REQUIRES: `packed` is PackTile(tile, cell_size_m) of this process.
-PreparedTile UnpackTile(const std::string& packed, double cell_size_m);
+// The tile that was packed, bit for bit. DATA_LOSS for all that is no intact tile of this format
+// and size of cells: whatever the bytes are, what is made of them can be searched.
+absl::StatusOr<PreparedTile> UnpackTile(absl::string_view packed, double cell_size_m);
 
 }  // namespace strata
 

@@ -95,9 +95,7 @@ class Checker {
 
   absl::Status Start() {
     const Vector3d& begin = waypoints_.front();
-    PatchId first = 0;
-    const std::uint32_t count = space_.FindCell(CellAt(begin.head<2>() / cell_m_), &first);
-    for (PatchId patch = first; patch < first + count; ++patch) {
+    for (const PatchId patch : space_.FindCell(CellAt(begin.head<2>() / cell_m_))) {
       if (patch_ == kNoPatchId || std::abs(space_.Height(patch) - begin.z()) <
                                       std::abs(space_.Height(patch_) - begin.z())) {
         patch_ = patch;

@@ -20,12 +20,13 @@
 #include "core/planning/endpoint.h"
 #include "core/planning/explain.h"
 #include "core/planning/landmarks.h"
+#include "core/planning/move_cost.h"
 #include "core/planning/path_check.h"
-#include "core/planning/prepared_tile.h"
 #include "core/planning/profile_checks.h"
 #include "core/planning/route.h"
 #include "core/planning/search.h"
 #include "core/planning/search_space.h"
+#include "core/planning/search_workspace.h"
 #include "core/world/plan.h"
 
 namespace strata {

@@ -14,8 +14,8 @@
 // bounds costs without classes stays a lower bound, and nothing is prepared anew.
 //
 // What is prepared, per tile and profile, when a query first touches a tile, and kept while it fits
-// the cache: all of the above as moves with their costs (45 bytes a patch), and packed, for tiles
-// that no search was in lately (4 bytes a patch).
+// the cache: heights, dangers and which moves there are, 6 bytes a patch to stand on and some 3 of
+// all else; what a move costs is computed when a search comes by.
 // A preparation is a pure function of the tile and its eight neighbours and is keyed by their
 // versions: unchanged tiles are prepared once, changed ones never used stale.
 #ifndef STRATA_CORE_PLANNING_PLANNER_H_
@@ -45,7 +45,7 @@ namespace strata {
 struct PlannerOptions {
   double cell_size_m = 0.1;  // of the map
   // Of prepared tiles and of searches, which may be shared with other caches. A query that needs
-  // more, for the tiles that it has left (10 to 50 kB each), ends with PlanReason::kSearchLimit.
+  // more, for the tiles that it has left (20 to 50 kB each), ends with PlanReason::kSearchLimit.
   std::shared_ptr<CacheBudget> budget = std::make_shared<CacheBudget>(std::size_t{1} << 30);
   ParallelLoop loop = {};  // what tiles are prepared by
 };
@@ -55,11 +55,12 @@ class Planner {
  public:
   explicit Planner(const PlannerOptions& options);
 
-  // A path, or why there is none; both are OK. The path is the cheapest where an eighth of the
-  // budget holds what the search touches (with 160 MiB some 400,000 patches); where it does not, it
-  // costs at most 1 % more (core/planning/search.h). Where others search, it waits for its share of
-  // the memory. Sensors do not see the ground they stand over: a start or goal where the robot
-  // cannot stand moves to the nearest place on the same level, at most radius + max_gap away
+  // A path, or why there is none; both are OK. The path is the cheapest where a sixteenth of the
+  // budget holds the tiles that the search touches (with 160 MiB 32 of one level) and start and
+  // goal are not so far apart that it surely will not (32,000 cells); else it costs at most 1 %
+  // more (core/planning/search.h). Where others search, it waits for its share of the memory.
+  // Sensors do not see the ground they stand over: a start or goal where the robot cannot stand
+  // moves to the nearest place on the same level, at most radius + max_gap away
   // (core/planning/endpoint.h); the path begins or ends there and the message says so ("start moved
   // 0.32 m to ..."). Fills all of PlanResult but `epoch`.
   //   INVALID_ARGUMENT    query not finite or beyond the map's range, profile or class costs out of

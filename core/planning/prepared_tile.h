@@ -1,96 +1,139 @@
-// One tile as one robot profile sees it: which surfaces it may stand on and what every move costs.
+// One tile as one robot profile sees it: which surfaces it may stand on, and all that moves cost.
 #ifndef STRATA_CORE_PLANNING_PREPARED_TILE_H_
 #define STRATA_CORE_PLANNING_PREPARED_TILE_H_
 
-#include <algorithm>
-#include <array>
-#include <cmath>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
+#include <cstdlib>
 #include <vector>
 
 #include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/ground_window.h"
+#include "core/planning/move_cost.h"
+#include "core/planning/patch_index.h"
 #include "core/planning/profile_checks.h"
 #include "core/planning/rows.h"
 
 namespace strata {
 
-// Costs are whole numbers: a move of one cell over ground without danger costs kCostPerCell.
-inline constexpr std::uint32_t kCostPerCell = 2048;
-inline constexpr std::uint32_t kCostPerDiagonal = 2896;  // ⌊2048 √2⌋
+// A place to stand.
+struct PreparedPatch {
+  // Directions, a bit each, in which the robot may move to the next cell of the tile with patches,
+  // over a gap if need be: to the one of them that is nearest in height.
+  std::uint8_t moves = 0;
+  // ⌊255 · EdgeDistance / reach⌋.
+  std::uint8_t edge_distance = 0;
+  std::uint16_t height = 0;  // steps above PreparedTile::base_steps
+  std::uint16_t danger = 0;  // DangerCode()
 
-// A move in one of the eight directions, over a gap too: target = own number + delta, in the same
-// tile.
-struct Move {
-  std::int16_t delta = 0;
-  std::uint16_t cost = kNone;
-
-  static constexpr std::uint16_t kNone = 0;      // no such move
-  static constexpr std::uint16_t kFar = 0xFFFF;  // see PreparedTile::far_moves
-
-  friend bool operator==(const Move&, const Move&) = default;
+  friend bool operator==(const PreparedPatch&, const PreparedPatch&) = default;
 };
 
-// A move into another tile, or one that does not fit into a Move.
+// Dangers d ∈ [0, 255) are kept to 1/16,000 of 1 + d: that with 13 bits behind the point.
+std::uint16_t DangerCode(double danger);
+inline float OnePlusDanger(std::uint16_t code) {
+  return std::bit_cast<float>(0x3F800000U + (std::uint32_t{code} << 10));
+}
+
+// Any other move: into another tile, or not to the patch nearest in height.
 struct FarMove {
-  std::uint32_t patch = 0;  // from
+  std::uint32_t place = 0;  // from
   std::uint8_t direction = 0;
-  std::uint8_t level = 0;   // of the target among the surfaces of its cell, 0 = lowest
+  std::uint8_t level = 0;   // of the target among the patches of its cell, 0 = lowest
   std::uint16_t cells = 0;  // length; > 1: over a gap
   std::uint32_t cost = 0;
 
   friend bool operator==(const FarMove&, const FarMove&) = default;
 };
 
-// Patches are numbered along a Morton curve over the tile's cells, lowest first within a cell, so
-// that what a search touches together lies together. 45 bytes a patch, 46 with classes. Immutable.
+// Six bytes a patch, one more with classes, two a surface where the robot cannot stand, and the
+// indices of both. Immutable. Places of `standing` are followed by those of `other`.
 struct PreparedTile {
   TileKey key;
-  std::vector<std::array<Move, 8>> moves;
-  std::vector<FarMove> far_moves;   // by (patch, direction)
-  std::vector<std::uint16_t> cell;  // CellInTile
-  std::vector<float> z_m;
-  std::vector<float> danger;  // < 0: the robot cannot stand there
-  // ⌊255 · EdgeDistance / reach⌋; 0 where an edge next to the surface keeps the robot away.
-  std::vector<std::uint8_t> edge_distance;
-  std::vector<std::uint8_t> class_id;             // empty where no surface has a class
-  std::array<std::uint32_t, 1025> block_begin{};  // first patch of each 8 × 8 block of cells
+  PatchIndex standing;
+  std::vector<PreparedPatch> patches;     // of `standing`, by number
+  std::vector<std::uint8_t> class_id;     // of `standing`; empty where no surface has a class
+  std::vector<FarMove> far_moves;         // by (place, direction)
+  std::vector<std::uint64_t> far_places;  // sheets of `standing`: who has any
+  PatchIndex other;                       // surfaces where the robot cannot stand
+  std::vector<std::uint16_t> other_heights;
+  std::int32_t base_steps = 0;
+  // Of `standing`, then of `other`, where a height is no whole step or they are more than 128 m
+  // apart; else empty. Then the others are 0.
+  std::vector<float> exact_heights;
 
-  static constexpr std::uint32_t kNoPatch = 0xFFFFFFFFU;
+  std::uint32_t places() const { return standing.places() + other.places(); }
+  bool CanStand(std::uint32_t place) const { return standing.Has(place); }
+  bool HasSurface(std::uint32_t place) const {
+    return CanStand(place) || (place >= standing.places() && other.Has(place - standing.places()));
+  }
+  // REQUIRES: HasSurface(place).
+  float Height(std::uint32_t place) const;
+  float HeightOf(std::uint32_t number) const {
+    if (!exact_heights.empty()) return exact_heights[number];
+    return static_cast<float>(base_steps + patches[number].height) / kHeightStepsPerM;
+  }
+  std::uint8_t ClassOf(std::uint32_t number) const {
+    return class_id.empty() ? 0 : class_id[number];
+  }
+  // REQUIRES: place < places().
+  std::uint16_t CellOf(std::uint32_t place) const {
+    return place < standing.places() ? standing.CellOf(place)
+                                     : other.CellOf(place - standing.places());
+  }
+  // Where a move of PreparedPatch::moves leads, and how many cells far that is.
+  [[gnu::always_inline]] std::uint32_t Target(std::uint32_t place,
+                                              std::uint32_t number,
+                                              int direction,
+                                              int* cells) const {
+    *cells = 1;
+    const std::uint32_t beside = PatchIndex::Beside(standing.OnFirstSheet(place), direction);
+    if (standing.HasOne(beside)) return beside;
+    return FarTarget(place, number, direction, cells);
+  }
+  // What it costs, between patches of these numbers.
+  [[gnu::always_inline]] std::uint32_t Cost(const StepCosts& costs,
+                                            std::uint32_t from,
+                                            std::uint32_t to,
+                                            int direction,
+                                            int cells) const {
+    const PreparedPatch& a = patches[from];
+    const PreparedPatch& b = patches[to];
+    const double dangers = static_cast<double>(OnePlusDanger(a.danger)) + OnePlusDanger(b.danger);
+    const auto rise = static_cast<std::uint32_t>(std::abs(int{a.height} - int{b.height}));
+    if (cells == 1 && exact_heights.empty()) return costs.OfSteps(direction, rise, dangers);
+    return costs.OfRise(direction, cells, HeightOf(from) - HeightOf(to), dangers);
+  }
+  bool HasFarMoves(std::uint32_t place) const {
+    return (far_places[place / 64] >> (place % 64) & 1U) != 0;
+  }
+  // In far_moves, where those of a place begin.
+  std::size_t FirstFarMove(std::uint32_t place) const;
+  // nullptr if there is none.
+  const FarMove* Far(std::uint32_t place, int direction) const;
 
-  std::uint32_t size() const { return static_cast<std::uint32_t>(cell.size()); }
-  bool CanStand(std::uint32_t patch) const { return danger[patch] >= 0.0F; }
-  std::uint8_t ClassOf(std::uint32_t patch) const { return class_id.empty() ? 0 : class_id[patch]; }
-  // Patches of a cell: [first, first + count).
-  void FindCell(std::uint16_t cell_in_tile, std::uint32_t* first, std::uint32_t* count) const;
-  const FarMove& Far(std::uint32_t patch, int direction) const;
   std::size_t memory_bytes() const;
 
   friend bool operator==(const PreparedTile&, const PreparedTile&) = default;
+
+ private:
+  std::uint32_t FarTarget(std::uint32_t place,
+                          std::uint32_t number,
+                          int direction,
+                          int* cells) const;
 };
 
-// Cost of a move of `run_m` sideways and `rise_m` up or down between patches of two dangers.
-// kGapDanger comes on top over unobserved ground.
-inline constexpr double kGapDanger = 1.0;
-inline std::uint32_t MoveCost(double run_m, double rise_m, double danger, double cell_size_m) {
-  const double length_cells = std::sqrt(run_m * run_m + rise_m * rise_m) / cell_size_m;
-  const double cost = kCostPerCell * length_cells * (1.0 + danger);
-  // To nearest, and never below what the search's heuristic takes for the same stretch.
-  return static_cast<std::uint32_t>(
-      std::min(cost + 0.5, static_cast<double>(std::numeric_limits<std::int32_t>::max())));
-}
+// Fills far_places from far_moves.
+void IndexFarMoves(PreparedTile& tile);
 
-// REQUIRES: window.margin() == checks.margin. The same with any `loop`.
-PreparedTile PrepareTile(const TileKey& key,
+// `surfaces` is the tile that the window was made around. REQUIRES: window.margin() ==
+// checks.margin. The same with any `loop`.
+PreparedTile PrepareTile(const SurfaceTile& surfaces,
                          const GroundWindow& window,
                          const ProfileChecks& checks,
                          const ParallelLoop& loop = {});
-
-// The class of each patch of `tile`, which was prepared from `surfaces`; empty if none has one.
-std::vector<std::uint8_t> ClassesOf(const PreparedTile& tile, const SurfaceTile& surfaces);
 
 }  // namespace strata
 

@@ -11,7 +11,7 @@
 
 #include "core/mls/tile_key.h"
 #include "core/planning/ground_window.h"
-#include "core/planning/prepared_tile.h"
+#include "core/planning/move_cost.h"
 #include "core/planning/search_space.h"
 #include "core/world/plan.h"
 

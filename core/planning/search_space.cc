@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
 #include <utility>
 
@@ -15,20 +14,15 @@
 #include "core/common/status.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/ground_window.h"
+#include "core/planning/patch_index.h"
 #include "core/planning/prepared_tile.h"
 
 namespace strata {
 namespace {
 
-constexpr int kMaxSlots = 65535;
+constexpr std::size_t kMaxSlots = 65535;
 constexpr std::size_t kHeldShare = 32;
 constexpr std::size_t kMinHeld = 2;  // to and fro over a border
-
-// Length of a straight move inside a tile.
-int CellsBetween(std::uint16_t a, std::uint16_t b) {
-  return std::max(std::abs((a & (kTileCells - 1)) - (b & (kTileCells - 1))),
-                  std::abs((a >> kTileShift) - (b >> kTileShift)));
-}
 
 }  // namespace
 
@@ -36,8 +30,9 @@ int SearchSpace::SlotOf(const TileKey& key) {
   const auto [found, inserted] = slot_of_.try_emplace(key, -1);
   if (!inserted || !status_.ok()) return found->second;
   absl::StatusOr<std::shared_ptr<const PreparedTile>> tile = Fetch(key);
-  if (tile.ok() && slots_.size() >= kMaxSlots) {
-    tile = absl::OutOfRangeError(absl::StrCat("a query touches at most ", kMaxSlots, " tiles"));
+  if (tile.ok() && *tile != nullptr && !HasRoomFor(**tile)) {
+    tile = absl::OutOfRangeError(
+        absl::StrCat("a query touches at most ", slots_.size(), " tiles of this map"));
   }
   if (!tile.ok()) {
     status_ = tile.status();
@@ -45,12 +40,23 @@ int SearchSpace::SlotOf(const TileKey& key) {
   }
   if (*tile == nullptr) return -1;
   const auto slot = static_cast<int>(slots_.size());
-  const std::uint32_t size = (*tile)->size();
-  slots_.push_back({key, nullptr, end(), size, key.x << kTileShift, key.y << kTileShift});
-  page_slot_.insert(page_slot_.end(), (size >> kPageShift) + 1, static_cast<std::uint16_t>(slot));
+  const std::uint32_t places = (*tile)->places();
+  slots_.push_back({.key = key,
+                    .tile = nullptr,
+                    .base = end(),
+                    .places = places,
+                    .size = (*tile)->standing.size(),
+                    .x0 = key.x << kTileShift,
+                    .y0 = key.y << kTileShift});
+  page_slot_.insert(page_slot_.end(), (places >> kPageShift) + 1, static_cast<std::uint16_t>(slot));
   found->second = slot;
   Hold(slot, *std::move(tile));
   return slot;
+}
+
+bool SearchSpace::HasRoomFor(const PreparedTile& tile) const {
+  const std::uint64_t pages = page_slot_.size() + (tile.places() >> kPageShift) + 1;
+  return slots_.size() < kMaxSlots && pages << kPageShift <= kMaxPatchIds;
 }
 
 absl::StatusOr<std::shared_ptr<const PreparedTile>> SearchSpace::Fetch(const TileKey& key) {
@@ -66,7 +72,10 @@ const SearchSpace::Slot& SearchSpace::At(int slot) {
 std::shared_ptr<const PreparedTile> SearchSpace::TileAgain(const Slot& slot) {
   absl::StatusOr<std::shared_ptr<const PreparedTile>> tile = Fetch(slot.key);
   // The same versions of the same tile: the same patches.
-  if (tile.ok() && *tile != nullptr && (*tile)->size() == slot.size) return *std::move(tile);
+  if (tile.ok() && *tile != nullptr && (*tile)->standing.size() == slot.size &&
+      (*tile)->places() == slot.places) {
+    return *std::move(tile);
+  }
   if (status_.ok()) {
     status_ = tile.ok() ? absl::InternalError(absl::StrCat(
                               "tile ", slot.key.ToString(), " changed within one version"))
@@ -74,11 +83,6 @@ std::shared_ptr<const PreparedTile> SearchSpace::TileAgain(const Slot& slot) {
   }
   auto blank = std::make_shared<PreparedTile>();
   blank->key = slot.key;
-  blank->moves.resize(slot.size);
-  blank->cell.resize(slot.size);
-  blank->z_m.resize(slot.size);
-  blank->danger.resize(slot.size, -1.0F);
-  blank->edge_distance.resize(slot.size);
   return blank;
 }
 
@@ -94,27 +98,44 @@ void SearchSpace::Hold(int slot, std::shared_ptr<const PreparedTile> tile) {
   }
 }
 
-std::uint32_t SearchSpace::FindCell(CellIndex cell, PatchId* first) {
+SearchSpace::Column SearchSpace::FindCell(CellIndex cell) {
+  Column column;
   const int slot = SlotOf(TileOfCell(cell));
-  if (slot < 0) return 0;
-  std::uint32_t local = 0;
-  std::uint32_t count = 0;
-  At(slot).tile->FindCell(CellInTile(cell), &local, &count);
-  *first = slots_[slot].base + local;
-  return count;
+  if (slot < 0) return column;
+  const PreparedTile& tile = *At(slot).tile;
+  const PatchId base = slots_[slot].base;
+  const PatchIndex* const indices[] = {&tile.standing, &tile.other};
+  for (const PatchIndex* const index : indices) {
+    const PatchId begin = index == &tile.standing ? base : base + tile.standing.places();
+    for (std::uint32_t level = 0;; ++level) {
+      const std::uint32_t place = index->Place(CellInTile(cell), level);
+      if (place == PatchIndex::kNone) break;
+      column.push_back(begin + place);
+    }
+  }
+  if (column.size() > 1) {
+    std::stable_sort(column.begin(), column.end(), [&tile, base](PatchId a, PatchId b) {
+      return tile.Height(a - base) < tile.Height(b - base);
+    });
+  }
+  return column;
 }
 
-PatchId SearchSpace::Resolve(CellIndex from, FarMove move) {
+PatchId SearchSpace::Resolve(CellIndex from, const FarMove& move) {
   const CellIndex cell = {from.x + move.cells * kStepX[move.direction],
                           from.y + move.cells * kStepY[move.direction]};
-  PatchId first = 0;
-  const std::uint32_t count = FindCell(cell, &first);
-  return move.level < count ? first + move.level : kNoPatchId;
+  const int slot = SlotOf(TileOfCell(cell));
+  if (slot < 0) return kNoPatchId;
+  const std::uint32_t place = At(slot).tile->standing.Place(CellInTile(cell), move.level);
+  return place == PatchIndex::kNone ? kNoPatchId : slots_[slot].base + place;
 }
 
-CellIndex SearchSpace::CellIn(const Slot& slot, std::uint32_t local) {
-  const std::uint16_t cell = slot.tile->cell[local];
-  return {slot.x0 + (cell & (kTileCells - 1)), slot.y0 + (cell >> kTileShift)};
+bool SearchSpace::HasMove(PatchId patch, int direction) {
+  const Slot& slot = SlotOfPatch(patch);
+  const std::uint32_t place = patch - slot.base;
+  if (!slot.tile->CanStand(place)) return false;
+  const PreparedPatch& own = slot.tile->patches[slot.tile->standing.Number(place)];
+  return (own.moves >> direction & 1U) != 0 || slot.tile->Far(place, direction) != nullptr;
 }
 
 PatchId SearchSpace::Follow(PatchId patch, int direction, std::uint32_t* cost, int* cells) {
@@ -129,18 +150,20 @@ PatchId SearchSpace::Follow(PatchId patch, int direction, std::uint32_t* cost, i
 
 PatchId SearchSpace::FollowGround(PatchId patch, int direction, std::uint32_t* cost, int* cells) {
   const Slot& slot = SlotOfPatch(patch);
-  const Move move = slot.tile->moves[patch - slot.base][direction];
-  if (move.cost == Move::kNone) return kNoPatchId;
-  if (move.cost != Move::kFar) {
-    const std::uint16_t* const own = &slot.tile->cell[patch - slot.base];
-    *cost = move.cost;
-    *cells = CellsBetween(own[0], own[move.delta]);
-    return patch + move.delta;
+  const PreparedTile& tile = *slot.tile;
+  const std::uint32_t place = patch - slot.base;
+  if (!tile.CanStand(place)) return kNoPatchId;
+  const std::uint32_t number = tile.standing.Number(place);
+  if ((tile.patches[number].moves >> direction & 1U) != 0) {
+    const std::uint32_t to = tile.Target(place, number, direction, cells);
+    *cost = tile.Cost(step_costs_, number, tile.standing.Number(to), direction, *cells);
+    return slot.base + to;
   }
-  const FarMove& far = slot.tile->Far(patch - slot.base, direction);
-  *cost = far.cost;
-  *cells = far.cells;
-  return Resolve(CellIn(slot, patch - slot.base), far);
+  const FarMove* const far = tile.Far(place, direction);
+  if (far == nullptr) return kNoPatchId;
+  *cost = far->cost;
+  *cells = far->cells;
+  return Resolve(CellIn(slot, place), FarMove(*far));
 }
 
 CellIndex SearchSpace::CellOfPatch(PatchId patch) {
@@ -150,23 +173,30 @@ CellIndex SearchSpace::CellOfPatch(PatchId patch) {
 
 float SearchSpace::Height(PatchId patch) {
   const Slot& slot = SlotOfPatch(patch);
-  return slot.tile->z_m[patch - slot.base];
+  const std::uint32_t place = patch - slot.base;
+  return slot.tile->HasSurface(place) ? slot.tile->Height(place) : 0.0F;
 }
 
 float SearchSpace::Danger(PatchId patch) {
   const Slot& slot = SlotOfPatch(patch);
-  if (classes_.Forbidden(slot.tile->ClassOf(patch - slot.base))) return -1.0F;
-  return slot.tile->danger[patch - slot.base];
+  const PreparedTile& tile = *slot.tile;
+  if (!tile.CanStand(patch - slot.base)) return -1.0F;
+  const std::uint32_t number = tile.standing.Number(patch - slot.base);
+  if (classes_.Forbidden(tile.ClassOf(number))) return -1.0F;
+  return OnePlusDanger(tile.patches[number].danger) - 1.0F;
 }
 
 std::uint8_t SearchSpace::ClassOf(PatchId patch) {
   const Slot& slot = SlotOfPatch(patch);
-  return slot.tile->ClassOf(patch - slot.base);
+  if (!slot.tile->CanStand(patch - slot.base)) return 0;
+  return slot.tile->ClassOf(slot.tile->standing.Number(patch - slot.base));
 }
 
 float SearchSpace::EdgeDistance(PatchId patch) {
   const Slot& slot = SlotOfPatch(patch);
-  return static_cast<float>(slot.tile->edge_distance[patch - slot.base]) / 255.0F * checks_.reach_m;
+  if (!slot.tile->CanStand(patch - slot.base)) return 0.0F;
+  const PreparedPatch& own = slot.tile->patches[slot.tile->standing.Number(patch - slot.base)];
+  return static_cast<float>(own.edge_distance) / 255.0F * checks_.reach_m;
 }
 
 Eigen::Vector3d SearchSpace::Position(PatchId patch) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
+#include "absl/container/inlined_vector.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
@@ -16,6 +17,7 @@
 #include "core/common/stop.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/class_factors.h"
+#include "core/planning/move_cost.h"
 #include "core/planning/prepared_tile.h"
 #include "core/planning/profile_checks.h"
 #include "core/planning/tile_cache.h"
@@ -23,9 +25,10 @@
 
 namespace strata {
 
-// A patch in a query: numbers of one tile are contiguous.
+// A surface in a query: places of one tile (PreparedTile) are contiguous.
 using PatchId = std::uint32_t;
 inline constexpr PatchId kNoPatchId = 0xFFFFFFFFU;
+inline constexpr PatchId kMaxPatchIds = 0xFF000000U;  // all others are below
 
 // For the thread of one query. After the first error of the source, or once `stop` stops while a
 // tile is asked for, status() holds it and lookups find nothing. However far a query goes, it holds
@@ -37,7 +40,8 @@ class SearchSpace {
     TileKey key;
     std::shared_ptr<const PreparedTile> tile;  // nullptr while it is let go
     PatchId base = 0;
-    std::uint32_t size = 0;  // patches
+    std::uint32_t places = 0;
+    std::uint32_t size = 0;  // patches where the robot can stand
     std::int32_t x0 = 0;     // map cell of the tile's corner
     std::int32_t y0 = 0;
   };
@@ -47,10 +51,16 @@ class SearchSpace {
               const ProfileChecks& checks,
               const ClassFactors& classes = {},
               const Stop& stop = {})
-      : cache_(cache), source_(source), checks_(checks), classes_(classes), stop_(stop) {}
+      : cache_(cache),
+        source_(source),
+        checks_(checks),
+        step_costs_(checks.cell_size_m, checks.step_m),
+        classes_(classes),
+        stop_(stop) {}
 
   const absl::Status& status() const { return status_; }
   const ProfileChecks& checks() const { return checks_; }
+  const StepCosts& step_costs() const { return step_costs_; }
   const ClassFactors& classes() const { return classes_; }
   TileSource& source() const { return source_; }
   const std::vector<Slot>& slots() const { return slots_; }
@@ -69,11 +79,12 @@ class SearchSpace {
   int SlotOf(PatchId patch) const { return page_slot_[patch >> kPageShift]; }
   const Slot& SlotOfPatch(PatchId patch) { return At(SlotOf(patch)); }
 
-  // Patches of a cell: [*first, *first + count), lowest first; returns the count.
-  std::uint32_t FindCell(CellIndex cell, PatchId* first);
+  // Surfaces of a cell, lowest first.
+  using Column = absl::InlinedVector<PatchId, 4>;
+  Column FindCell(CellIndex cell);
 
-  // Where a far move from cell `from` leads; kNoPatchId if its tile cannot be had.
-  PatchId Resolve(CellIndex from, FarMove move);
+  // True if the ground allows it, whatever classes cost.
+  bool HasMove(PatchId patch, int direction);
   // Where a move in `direction` leads and what it costs; kNoPatchId if there is none, or if it
   // leads to a forbidden class.
   PatchId Follow(PatchId patch, int direction, std::uint32_t* cost, int* cells);
@@ -82,7 +93,7 @@ class SearchSpace {
 
   CellIndex CellOfPatch(PatchId patch);
   float Height(PatchId patch);
-  // < 0: the robot cannot stand there, or its class is forbidden.
+  // To 1/16,000 of 1 + it; < 0: the robot cannot stand there, or its class is forbidden.
   float Danger(PatchId patch);
   std::uint8_t ClassOf(PatchId patch);
   // By what its class multiplies costs.
@@ -95,7 +106,14 @@ class SearchSpace {
  private:
   static constexpr int kPageShift = 12;
 
-  static CellIndex CellIn(const Slot& slot, std::uint32_t local);
+  static CellIndex CellIn(const Slot& slot, std::uint32_t place) {
+    // Of a tile that cannot be had again nothing is known.
+    const std::uint16_t cell = place < slot.tile->places() ? slot.tile->CellOf(place) : 0;
+    return {slot.x0 + (cell & (kTileCells - 1)), slot.y0 + (cell >> kTileShift)};
+  }
+  // Where a far move from cell `from` leads; kNoPatchId if its tile cannot be had.
+  PatchId Resolve(CellIndex from, const FarMove& move);
+  bool HasRoomFor(const PreparedTile& tile) const;
   absl::StatusOr<std::shared_ptr<const PreparedTile>> Fetch(const TileKey& key);
   std::shared_ptr<const PreparedTile> TileAgain(const Slot& slot);
   // Keeps the tile of a slot at hand, and lets go of those that came first.
@@ -104,6 +122,7 @@ class SearchSpace {
   TileCache& cache_;
   TileSource& source_;
   const ProfileChecks& checks_;
+  const StepCosts step_costs_;
   const ClassFactors classes_;
   const Stop stop_;
   absl::Status status_;

@@ -14,7 +14,6 @@
 #include "core/common/status.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/ground_window.h"
-#include "core/planning/packed_tile.h"
 #include "core/planning/prepared_tile.h"
 #include "core/planning/profile_checks.h"
 #include "core/planning/tile_source.h"
@@ -67,9 +66,8 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> PrepareFrom(TileSource& sour
   STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles, LoadAround(source, key));
   if (tiles[kMiddleTile] == nullptr) return std::shared_ptr<const PreparedTile>();
   const GroundWindow window(tiles, checks.margin, checks.cell_size_m);
-  auto tile = std::make_shared<PreparedTile>(PrepareTile(key, window, checks, loop));
-  tile->class_id = ClassesOf(*tile, *tiles[kMiddleTile]);
-  return std::shared_ptr<const PreparedTile>(std::move(tile));
+  return std::make_shared<const PreparedTile>(
+      PrepareTile(*tiles[kMiddleTile], window, checks, loop));
 }
 
 absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Get(TileSource& source,
@@ -98,27 +96,14 @@ std::shared_ptr<const PreparedTile> TileCache::Unpack(TileSource& source,
                                                       const Key& key,
                                                       const TileVersions& versions,
                                                       const ProfileChecks& checks) {
-  const std::shared_ptr<const Packed> packed = packed_.Find(key);
-  const bool here = packed != nullptr && packed->versions == versions;
-  std::string kept;
-  if (!here) {
-    absl::StatusOr<std::optional<std::string>> found =
-        source.LoadPrepared(key.tile, versions, checks.profile);
-    if (!found.ok() || !found->has_value()) return nullptr;
-    kept = **std::move(found);
-  }
-  absl::StatusOr<PreparedTile> tile = UnpackTile(here ? packed->bytes : kept, checks.cell_size_m);
+  const absl::StatusOr<std::optional<std::string>> kept =
+      source.LoadPrepared(key.tile, versions, checks.profile);
+  if (!kept.ok() || !kept->has_value()) return nullptr;
+  absl::StatusOr<PreparedTile> tile = UnpackTile(**kept, checks.cell_size_m);
   const bool usable = tile.ok() && tile->key == key.tile;
-  if (usable && !here) Keep(key, versions, std::move(kept));
   absl::MutexLock lock(&mutex_);
-  statistics_.kept += usable && !here ? 1 : 0;
-  ++(usable ? statistics_.unpacked : statistics_.unusable);
+  ++(usable ? statistics_.kept : statistics_.unusable);
   return usable ? std::make_shared<const PreparedTile>(*std::move(tile)) : nullptr;
-}
-
-void TileCache::Keep(const Key& key, const TileVersions& versions, std::string bytes) {
-  auto packed = std::make_shared<const Packed>(Packed{versions, std::move(bytes)});
-  packed_.Put(key, packed, sizeof(Packed) + packed->bytes.capacity());
 }
 
 absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Make(TileSource& source,
@@ -130,7 +115,6 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Make(TileSource& 
   STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const PreparedTile> tile,
                           PrepareFrom(source, key.tile, checks, loop_));
   if (tile == nullptr) return tile;
-  Keep(key, versions, PackTile(*tile, checks.cell_size_m));
   absl::MutexLock lock(&mutex_);
   ++statistics_.prepared;
   return tile;
@@ -149,7 +133,7 @@ std::shared_ptr<TileCache::Entry> TileCache::FindOrInsert(const Key& key,
 TileCache::Statistics TileCache::statistics() const {
   absl::MutexLock lock(&mutex_);
   Statistics statistics = statistics_;
-  statistics.bytes = entries_.bytes() + packed_.bytes();
+  statistics.bytes = entries_.bytes();
   return statistics;
 }
 

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <string>
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
@@ -38,24 +37,19 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> PrepareFrom(TileSource& sour
 
 // Thread-safe. A tile of unchanged versions is prepared once, however many threads ask for it at
 // the same time; of a tile and a profile only what was asked for last is kept, so that a map that
-// changes takes no more than one that does not. A tenth of the budget holds tiles as searches read
-// them, the rest what is packed of them and of many more. Two tiles are prepared at a time: each
+// changes takes no more than one that does not. Two tiles are prepared at a time: each
 // takes up to some 50 MB while it is.
 class TileCache {
  public:
   struct Statistics {
     std::uint64_t prepared = 0;  // preparations made so far, for any profile
-    std::uint64_t unpacked = 0;  // had from what was packed of them
-    std::uint64_t kept = 0;      // of those, from what the source keeps
-    std::uint64_t unusable = 0;  // packed, but not to be unpacked: prepared anew
+    std::uint64_t kept = 0;      // had from what the source keeps
+    std::uint64_t unusable = 0;  // kept, but not to be unpacked: prepared anew
     std::size_t bytes = 0;       // kept now
   };
 
   explicit TileCache(const std::shared_ptr<CacheBudget>& budget, ParallelLoop loop = {})
-      : max_bytes_(budget->max_bytes()),
-        loop_(std::move(loop)),
-        entries_(budget, max_bytes_ / 10),
-        packed_(budget) {}
+      : max_bytes_(budget->max_bytes()), loop_(std::move(loop)), entries_(budget) {}
 
   // Of the budget.
   std::size_t max_bytes() const { return max_bytes_; }
@@ -85,18 +79,13 @@ class TileCache {
     absl::Mutex mutex;  // held while the tile is made
     std::shared_ptr<const PreparedTile> tile ABSL_GUARDED_BY(mutex);
   };
-  struct Packed {
-    TileVersions versions{};
-    std::string bytes;
-  };
 
   std::shared_ptr<Entry> FindOrInsert(const Key& key, const TileVersions& versions);
-  // From what is packed of it, here or by the source; nullptr where nothing is.
+  // From what the source keeps of it; nullptr where that is nothing.
   std::shared_ptr<const PreparedTile> Unpack(TileSource& source,
                                              const Key& key,
                                              const TileVersions& versions,
                                              const ProfileChecks& checks);
-  void Keep(const Key& key, const TileVersions& versions, std::string bytes);
   // nullptr where the map has nothing.
   absl::StatusOr<std::shared_ptr<const PreparedTile>> Make(TileSource& source,
                                                            const Key& key,
@@ -109,7 +98,6 @@ class TileCache {
   const ParallelLoop loop_;
   mutable absl::Mutex mutex_;
   LruCache<Key, Entry> entries_ ABSL_GUARDED_BY(mutex_);
-  LruCache<Key, const Packed> packed_;
   Statistics statistics_ ABSL_GUARDED_BY(mutex_);
   int preparing_ ABSL_GUARDED_BY(mutex_) = 0;
 };

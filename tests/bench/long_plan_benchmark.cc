@@ -292,7 +292,6 @@ double Measure(
     ForgetPeak();
     const double base = PeakMb();
     const std::uint64_t prepared = planner.cache_statistics().prepared;
-    const std::uint64_t unpacked = planner.cache_statistics().unpacked;
     const std::uint64_t decoded = source.decodings;
     const double begin = ProcessorSeconds();
     const absl::Time asked = SteadyNow();
@@ -308,8 +307,8 @@ double Measure(
     }
     graph_cost = result->graph_cost;
     std::printf(
-        "%5zu MiB  %-4s %7.2f s (%.2f s of processor)  expanded %9llu  prepared %5llu  unpacked "
-        "%5llu  decoded %6llu  "
+        "%5zu MiB  %-4s %7.2f s (%.2f s of processor)  expanded %9llu  prepared %5llu  "
+        "decoded %6llu  "
         "peak %6.0f MB (+%.0f)"
         "  length %.2f  cost %.4f  graph cost %.4f  %zu waypoints  %s\n",
         cache_mib,
@@ -318,7 +317,6 @@ double Measure(
         seconds,
         static_cast<unsigned long long>(result->expanded),
         static_cast<unsigned long long>(planner.cache_statistics().prepared - prepared),
-        static_cast<unsigned long long>(planner.cache_statistics().unpacked - unpacked),
         static_cast<unsigned long long>(source.decodings - decoded),
         PeakMb(),
         PeakMb() - base,

@@ -12,6 +12,7 @@
 #include <ctime>
 #include <memory>
 #include <random>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -19,11 +20,14 @@
 #include <boost/graph/compressed_sparse_row_graph.hpp>
 #include <boost/property_map/vector_property_map.hpp>
 
+#include "core/planning/move_cost.h"
+#include "core/planning/packed_tile.h"
 #include "core/planning/planner.h"
 #include "core/planning/prepared_tile.h"
 #include "core/planning/route.h"
 #include "core/planning/search.h"
 #include "core/planning/search_space.h"
+#include "core/planning/search_workspace.h"
 #include "tests/core/planning/memory_tiles.h"
 #include "tests/support/drawing.h"
 
@@ -64,7 +68,10 @@ class Campus {
     testing::DrawnMap map;
     for (int y = 0; y < kCampusY; ++y) {
       for (int x = 0; x < kCampusX; ++x) {
-        if (!At(x, y).empty()) map[{x - 600, y - 500}] = At(x, y);
+        if (At(x, y).empty()) continue;
+        // Tiles have heights in whole steps.
+        for (testing::DrawnSurface& s : At(x, y)) s.z_m = std::round(s.z_m * 512.0) / 512.0;
+        map[{x - 600, y - 500}] = At(x, y);
       }
     }
     return map.Tiles();
@@ -151,10 +158,10 @@ BoostGraph MakeBoostGraph(SearchSpace& space) {
   std::vector<PatchId> patches;
   result.vertex_of.assign(space.end(), 0);
   for (const SearchSpace::Slot& slot : space.slots()) {
-    for (std::uint32_t i = 0; i < slot.tile->size(); ++i) {
-      result.vertex_of[slot.base + i] = static_cast<std::uint32_t>(patches.size());
-      patches.push_back(slot.base + i);
-    }
+    slot.tile->standing.ForEach([&](std::uint32_t place, std::uint32_t /*number*/) {
+      result.vertex_of[slot.base + place] = static_cast<std::uint32_t>(patches.size());
+      patches.push_back(slot.base + place);
+    });
   }
   std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
   std::vector<EdgeCost> costs;
@@ -242,9 +249,9 @@ std::vector<std::pair<PatchId, PatchId>> PickQueries(SearchSpace& space,
   std::mt19937_64 random(kSeed + 1);
   std::vector<PatchId> standable;
   for (const SearchSpace::Slot& slot : space.slots()) {
-    for (std::uint32_t i = 0; i < slot.tile->size(); ++i) {
-      if (slot.tile->CanStand(i)) standable.push_back(slot.base + i);
-    }
+    slot.tile->standing.ForEach([&](std::uint32_t place, std::uint32_t /*number*/) {
+      standable.push_back(slot.base + place);
+    });
   }
   std::vector<std::pair<PatchId, PatchId>> queries;
   for (int attempt = 0; attempt < 1'000'000 && queries.size() < count; ++attempt) {
@@ -269,6 +276,25 @@ struct Column {
   double expanded = 0.0;
 };
 
+// What is kept of prepared tiles on disk.
+void ReportPacked(const SearchSpace& space, std::size_t patches) {
+  std::vector<std::string> packed;
+  std::size_t bytes = 0;
+  double begin = NowMs();
+  for (const SearchSpace::Slot& slot : space.slots()) {
+    bytes += packed.emplace_back(PackTile(*slot.tile, kCell)).size();
+  }
+  const double pack_ms = NowMs() - begin;
+  begin = NowMs();
+  for (const std::string& tile : packed) {
+    if (!UnpackTile(tile, kCell).ok()) std::abort();
+  }
+  std::printf("packed: %.2f bytes a patch, in %.0f ns; unpacked in %.0f ns\n",
+              static_cast<double>(bytes) / patches,
+              pack_ms * 1e6 / patches,
+              (NowMs() - begin) * 1e6 / patches);
+}
+
 int Compare(testing::MemoryTiles& source, std::size_t query_count, int repetitions) {
   const RobotProfile profile;
   const auto checks = MakeProfileChecks(profile, kCell);
@@ -280,8 +306,8 @@ int Compare(testing::MemoryTiles& source, std::size_t query_count, int repetitio
   std::size_t patches = 0;
   std::size_t standable = 0;
   for (const SearchSpace::Slot& slot : space.slots()) {
-    patches += slot.tile->size();
-    for (std::uint32_t i = 0; i < slot.tile->size(); ++i) standable += slot.tile->CanStand(i);
+    patches += slot.tile->standing.size() + slot.tile->other.size();
+    standable += slot.tile->standing.size();
   }
   const BoostGraph graph = MakeBoostGraph(space);
   BoostSearch peer(graph);
@@ -341,6 +367,7 @@ int Compare(testing::MemoryTiles& source, std::size_t query_count, int repetitio
               prepare_ms,
               prepare_ms * 1e6 / patches,
               static_cast<double>(cache.statistics().bytes) / patches);
+  ReportPacked(space, patches);
   std::printf("%d landmarks: %.0f ms, %.1f bytes a patch\n",
               kLandmarks,
               landmarks_ms,

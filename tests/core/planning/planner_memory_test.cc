@@ -13,12 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "core/common/cache_budget.h"
-#include "core/planning/ground_window.h"
-#include "core/planning/packed_tile.h"
 #include "core/planning/planner.h"
-#include "core/planning/prepared_tile.h"
-#include "core/planning/profile_checks.h"
-#include "core/planning/tile_cache.h"
 #include "tests/core/planning/memory_tiles.h"
 #include "tests/support/drawing.h"
 #include "tests/support/status_matchers.h"
@@ -194,29 +189,6 @@ TEST(PlannerMemoryTest, ASearchThatWaitsForMemoryCanBeStopped) {
   std::jthread canceller([&stop] { stop.Request(); });
   EXPECT_THAT(planner.Plan(source, queries[0], stop),
               testing::StatusIs(absl::StatusCode::kCancelled, ::testing::_));
-}
-
-TEST(PackedTileTest, UnpacksToTheSameTile) {
-  std::size_t packed_bytes = 0;
-  std::size_t patches = 0;
-  for (std::uint64_t seed = 11; seed <= 13; ++seed) {
-    SCOPED_TRACE(seed);
-    MemoryTiles source(Labyrinth(seed));
-    for (const double radius_m : {0.0, 0.3}) {
-      STRATA_ASSERT_OK_AND_ASSIGN(const ProfileChecks checks,
-                                  MakeProfileChecks({.radius_m = radius_m}, kCell));
-      for (const TileKey& key : source.Keys()) {
-        STRATA_ASSERT_OK_AND_ASSIGN(const TileNeighbourhood tiles, LoadAround(source, key));
-        PreparedTile tile = PrepareTile(key, GroundWindow(tiles, checks.margin, kCell), checks);
-        tile.class_id = ClassesOf(tile, *tiles[kMiddleTile]);
-        const std::string packed = PackTile(tile, kCell);
-        EXPECT_EQ(UnpackTile(packed, kCell), tile) << key.ToString();
-        packed_bytes += packed.size();
-        patches += tile.size();
-      }
-    }
-  }
-  EXPECT_LT(packed_bytes, 8 * patches);
 }
 
 }  // namespace

@@ -236,8 +236,9 @@ Freedom FreedomOf(MemoryTiles& source, const RobotProfile& profile) {
     return Place(cell.x, cell.y, space.Height(patch));
   };
   for (const SearchSpace::Slot& slot : space.slots()) {
-    for (PatchId patch = slot.base; patch < slot.base + slot.tile->size(); ++patch) {
-      if (space.Danger(patch) < 0.0F) continue;
+    const std::shared_ptr<const PreparedTile> tile = slot.tile;
+    tile->standing.ForEach([&](std::uint32_t local, std::uint32_t /*number*/) {
+      const PatchId patch = slot.base + local;
       freedom.places.insert(place(patch));
       for (int k = 0; k < 8; ++k) {
         std::uint32_t cost = 0;
@@ -245,7 +246,7 @@ Freedom FreedomOf(MemoryTiles& source, const RobotProfile& profile) {
         const PatchId to = space.Follow(patch, k, &cost, &cells);
         if (to != kNoPatchId) freedom.moves.emplace(place(patch), place(to));
       }
-    }
+    });
   }
   return freedom;
 }
