@@ -32,6 +32,10 @@ absl::Status DiskSpace::Check(std::uint64_t halves, std::uint64_t taken_bytes) c
   const std::uint64_t unit = disk.f_frsize;
   const std::uint64_t left = std::min(kMostLeft, disk.f_blocks * unit / 4) * halves / 2;
   const std::uint64_t free = disk.f_bavail * unit;
+  // What the log holds will be in the map's file as well.
+  std::error_code error;
+  const std::uintmax_t log = std::filesystem::file_size(file_.string() + "-wal", error);
+  if (!error) taken_bytes += log;
   if (free >= left + taken_bytes) return absl::OkStatus();
   return absl::ResourceExhaustedError(absl::StrCat(
       "the disk has ",

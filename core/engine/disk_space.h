@@ -26,8 +26,8 @@ class DiskSpace {
   absl::Status CheckForKeeping(std::uint64_t max_file_bytes) const;
 
  private:
-  // Whether there is `halves` / 2 of what uploads leave when `taken_bytes` are gone. A disk that
-  // does not say is taken for one with room.
+  // Whether there is `halves` / 2 of what uploads leave when `taken_bytes` are gone and the log is
+  // in the map. A disk that does not say is taken for one with room.
   absl::Status Check(std::uint64_t halves, std::uint64_t taken_bytes) const;
 
   const std::filesystem::path file_;  // on the disk

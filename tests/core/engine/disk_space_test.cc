@@ -2,6 +2,8 @@
 
 #include <cerrno>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 
 #include "absl/status/status.h"
 #include <gmock/gmock.h>
@@ -9,6 +11,7 @@
 #include <sys/statvfs.h>
 
 #include "tests/support/status_matchers.h"
+#include "tests/support/temp_dir.h"
 
 namespace {
 
@@ -40,6 +43,7 @@ namespace strata {
 namespace {
 
 using ::strata::testing::StatusIs;
+using ::strata::testing::TempDir;
 using ::testing::HasSubstr;
 
 constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
@@ -69,6 +73,21 @@ TEST_F(DiskSpaceTest, IntegrationLeavesItAfterItsOwnRowsInTheLogAndInTheMap) {
   STRATA_EXPECT_OK(space_.CheckForIntegration(5 * kMiB));
   EXPECT_THAT(space_.CheckForIntegration(5 * kMiB + kBlock),
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("up to 11 MiB would be")));
+}
+
+TEST_F(DiskSpaceTest, WhatTheLogHoldsIsTakenAlready) {
+  const TempDir directory;
+  const std::filesystem::path file = directory.path() / "world.strata";
+  std::ofstream(file.string() + "-wal").close();
+  std::filesystem::resize_file(file.string() + "-wal", 5 * kMiB);
+  const DiskSpace space(file);
+  disk = {.bytes = 1000 * kMiB, .free = 69 * kMiB};
+  STRATA_EXPECT_OK(space.CheckForUpload());
+  disk.free -= kBlock;
+  EXPECT_FALSE(space.CheckForUpload().ok());
+  disk.free = 37 * kMiB;
+  STRATA_EXPECT_OK(space.CheckForIntegration(0));
+  EXPECT_FALSE(space.CheckForIntegration(1).ok());
 }
 
 TEST_F(DiskSpaceTest, WhatCouldBeDoneWithoutLeavesTwiceThat) {
