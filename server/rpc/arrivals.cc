@@ -10,7 +10,8 @@ namespace {
 constexpr absl::Duration kInTurn = absl::Seconds(5);
 constexpr std::size_t kMostWaiting = 1024;
 constexpr absl::Duration kLetIn = absl::Milliseconds(20);
-constexpr int kHammering = 250;  // refused within kCounted
+// Refused within kCounted: with pauses between their attempts, hundreds of robots stay below.
+constexpr int kHammering = 1000;
 constexpr absl::Duration kCounted = absl::Seconds(1);
 
 }  // namespace
