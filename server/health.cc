@@ -16,6 +16,7 @@
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "proto/translate/status.h"
+#include "server/rpc/connections.h"
 #include "server/rpc/request.h"
 #include "server/rpc/sealed.h"
 
@@ -50,7 +51,9 @@ class HealthReactor final : public grpc::ServerBidiReactor<Sealed<Asked>, Told> 
 
   HealthReactor(Health& health, grpc::CallbackServerContext& context, Kind kind)
       : health_(health), context_(context), kind_(kind), host_(HostOf(context.peer())) {
-    health_.runtime_.ArrivalsOf(PathOf(kind_)).Begin(PathOf(kind_), SteadyNow());
+    if (health_.runtime_.ArrivalsOf(PathOf(kind_)).Begin(PathOf(kind_), SteadyNow())) {
+      CutConnection(context.peer());
+    }
     const absl::Status entered = Enter();
     if (entered.ok()) {
       health_.readers_.Submit(host_, [this] { Read(); });

@@ -8,11 +8,8 @@ namespace {
 // By when handlers of calls run in turn: of a call that came in this long before one that has
 // begun, nothing will be heard any more.
 constexpr absl::Duration kInTurn = absl::Seconds(5);
-constexpr std::size_t kMostWaiting = 1024;
-constexpr absl::Duration kLetIn = absl::Milliseconds(20);
-// Refused within kCounted: with pauses between their attempts, hundreds of robots stay below.
-constexpr int kHammering = 1000;
-constexpr absl::Duration kCounted = absl::Seconds(1);
+constexpr std::size_t kMostWaiting = 512;
+constexpr absl::Duration kLetIn = absl::Milliseconds(10);
 
 }  // namespace
 
@@ -22,12 +19,8 @@ bool Arrivals::Enter(absl::string_view client, absl::Time now) {
   Client& entry = found == clients_.end() ? clients_[std::string(client)] : found->second;
   const bool full = entry.waiting.size() >= kMostWaiting ||
                     entry.running + entry.waiting.size() >= static_cast<std::size_t>(most_);
-  if (now - entry.counted > kCounted) {
-    entry.counted = now;
-    entry.refused = 0;
-  }
   if (full && now - entry.let_in < kLetIn) {
-    ++entry.refused;
+    entry.refusals.Add(now);
     return false;
   }
   entry.waiting.push_back(now);
@@ -44,9 +37,7 @@ bool Arrivals::Begin(absl::string_view client, absl::Time now) {
   while (!entry.waiting.empty() && now - entry.waiting.front() > kInTurn) {
     entry.waiting.pop_front();
   }
-  const bool hammers = entry.refused >= kHammering;
-  if (hammers) entry.refused = 0;
-  return hammers;
+  return entry.refusals.TakeMany();
 }
 
 void Arrivals::Leave(absl::string_view client) {

@@ -12,6 +12,8 @@
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 
+#include "server/rpc/refusals.h"
+
 namespace strata::server {
 
 // Counts calls by client from where gRPC takes them in to where they are freed. In between a call
@@ -23,11 +25,11 @@ class Arrivals {
   explicit Arrivals(int most) : most_(most) {}
 
   // False: the client has all it may have, and the call must be refused there and then. Of such a
-  // client fifty calls a second are let in all the same. True: Begin() follows when the handler
+  // client a hundred calls a second are let in all the same. True: Begin() follows when the handler
   // runs, and never for a call that is cancelled before.
   bool Enter(absl::string_view client, absl::Time now);
-  // Leave() must follow. True: so many of the client's calls were refused within a second that the
-  // connection of this one must go; what a client does who waits for answers makes no such number.
+  // Leave() must follow. True: so many of the client's calls were refused that the connection of
+  // this one must be cut.
   bool Begin(absl::string_view client, absl::Time now);
   void Leave(absl::string_view client);
 
@@ -36,8 +38,7 @@ class Arrivals {
     std::deque<absl::Time> waiting;  // when calls came in whose handlers have not begun
     int running = 0;
     absl::Time let_in;  // when a call was, last
-    int refused = 0;    // since `counted`
-    absl::Time counted;
+    Refusals refusals;
   };
 
   const int most_;

@@ -120,15 +120,15 @@ absl::Status Request::Admit(const grpc::CallbackServerContext& context) {
       MetadataOf(context, kAuthorizationKey), CertificateNameOf(*context.auth_context()));
   if (!caller.ok()) return Refuse(caller.status());
   caller_ = *std::move(caller);
-  const bool hammers = runtime_.ArrivalsOf(method_).Begin(caller_.principal, started_);
   arrived_ = true;
-  if (hammers) CutConnection(peer_);
+  if (runtime_.ArrivalsOf(method_).Begin(caller_.principal, started_)) CutConnection(peer_);
   call_.principal = caller_.principal;
   return EnterLimits();
 }
 
 absl::Status Request::Refuse(const absl::Status& status) {
   stranger_ = true;
+  if (runtime_.strangers.TakeMany()) CutConnection(peer_);
   STRATA_RETURN_IF_ERROR(runtime_.strangers.Enter(HostOf(peer_), started_));
   return status;
 }

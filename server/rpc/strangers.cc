@@ -12,6 +12,8 @@ namespace {
 
 constexpr absl::string_view kEverybody = "all strangers";
 constexpr absl::Duration kLogInterval = absl::Seconds(1);
+// Of one who is heard only for his connection to be cut.
+constexpr absl::Duration kCutInterval = absl::Milliseconds(10);
 
 ClientLimitOptions Rate(double calls_per_second, double burst) {
   ClientLimitOptions options;
@@ -43,8 +45,18 @@ Strangers::Strangers(const StrangerOptions& options)
 bool Strangers::IsHeard(absl::Time now) {
   if (Take(heard_, kEverybody, now).ok()) return true;
   absl::MutexLock lock(&mutex_);
+  if (refusals_.many() && now - cut_ >= kCutInterval) {
+    cut_ = now;
+    return true;
+  }
   ++not_logged_;
+  refusals_.Add(now);
   return false;
+}
+
+bool Strangers::TakeMany() {
+  absl::MutexLock lock(&mutex_);
+  return refusals_.TakeMany();
 }
 
 absl::Status Strangers::Enter(absl::string_view address, absl::Time now) {

@@ -12,6 +12,7 @@
 #include "absl/time/time.h"
 
 #include "server/rpc/client_limits.h"
+#include "server/rpc/refusals.h"
 
 namespace strata::server {
 
@@ -36,6 +37,8 @@ class Strangers {
   absl::Status Enter(absl::string_view address, absl::Time now);
   // False: the door refuses him by a word, and nothing else is done about him.
   bool IsHeard(absl::Time now);
+  // Whether so many were refused so that the connection of one who is heard must be cut.
+  bool TakeMany();
   // At most once a second: how many were refused since the last time, this one included. nullopt:
   // this one needs no line in the log.
   std::optional<std::uint64_t> ToLog(absl::Time now);
@@ -45,6 +48,8 @@ class Strangers {
   ClientLimits by_address_;
   ClientLimits heard_;
   absl::Mutex mutex_;
+  Refusals refusals_ ABSL_GUARDED_BY(mutex_);
+  absl::Time cut_ ABSL_GUARDED_BY(mutex_) = absl::InfinitePast();
   absl::Time logged_ ABSL_GUARDED_BY(mutex_) = absl::InfinitePast();
   std::uint64_t not_logged_ ABSL_GUARDED_BY(mutex_) = 0;
 };

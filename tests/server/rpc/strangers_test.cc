@@ -46,6 +46,16 @@ TEST(StrangersTest, FewAreHeardAndTheOthersAreCounted) {
   EXPECT_TRUE(strangers.IsHeard(kStart + absl::Seconds(1)));
 }
 
+TEST(StrangersTest, WhereThousandsASecondAreRefusedTheConnectionsOfThoseHeardMustGo) {
+  Strangers strangers({.heard_per_second = 1.0, .heard_burst = 1.0});
+  EXPECT_TRUE(strangers.IsHeard(kStart));
+  for (int i = 0; i < 100'000; ++i) strangers.IsHeard(kStart + absl::Milliseconds(3 * i));
+  EXPECT_FALSE(strangers.TakeMany());
+  for (int i = 0; i < 1'500; ++i) strangers.IsHeard(kStart + absl::Minutes(10));
+  EXPECT_TRUE(strangers.TakeMany());
+  EXPECT_FALSE(strangers.TakeMany());
+}
+
 TEST(StrangersTest, OneLineASecondTellsOfAll) {
   Strangers strangers({});
   EXPECT_EQ(strangers.ToLog(kStart), 1U);
