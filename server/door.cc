@@ -94,20 +94,27 @@ absl::Status Door::Judge(absl::string_view path,
                          absl::string_view certificate_name) {
   const absl::Time now = SteadyNow();
   if (path == Health::kCheck || path == Health::kWatch) {
-    return runtime_.ArrivalsOf(path).Enter(path, now) ? absl::OkStatus() : TooFast();
+    return Take(runtime_.ArrivalsOf(path).Enter(path, lane_, now), now) ? absl::OkStatus()
+                                                                        : TooFast();
   }
   const absl::StatusOr<Caller> caller =
       runtime_.access.Authenticate(authorization, certificate_name);
   const std::string method = MethodOf(path);
   if (caller.ok()) {
     if (method.empty() && !absl::StartsWith(path, kReflection)) return Unknown();
-    return runtime_.ArrivalsOf(path).Enter(caller->principal, now) ? absl::OkStatus() : TooFast();
+    const bool in = Take(runtime_.ArrivalsOf(path).Enter(caller->principal, lane_, now), now);
+    return in ? absl::OkStatus() : TooFast();
   }
   const bool known_method = FindMethodRight(method) != nullptr;
   // Few, since what each may send is as much as the largest request.
-  if (known_method && runtime_.strangers.IsHeard(now)) return absl::OkStatus();
+  if (known_method && Take(runtime_.strangers.Hear(lane_, now), now)) return absl::OkStatus();
   if (known_method) runtime_.metrics.Ended(method, caller.status().code(), {}, 0, 0, kStranger);
   return caller.status();
+}
+
+bool Door::Take(const Arrival& arrival, absl::Time now) {
+  for (const int lane : arrival.cut_lanes) connections_.Cut(lane, now);
+  return arrival.in;
 }
 
 grpc::Status Door::Process(const InputMetadata& metadata,

@@ -9,6 +9,8 @@
 #include <grpcpp/security/auth_metadata_processor.h>
 #include <grpcpp/security/server_credentials.h>
 
+#include "server/rpc/connections.h"
+#include "server/rpc/refusals.h"
 #include "server/rpc/runtime.h"
 
 namespace strata::server {
@@ -16,10 +18,13 @@ namespace strata::server {
 // gRPC asks it on its own thread as soon as a call's metadata are there: the request of a call that
 // it refuses is not read, and no handler hears of it. Refused are those whom nobody knows, but for
 // few, who get on to be told why and to be logged like everybody, and calls of clients who begin
-// them faster than they end. Health is for anybody. Must not outlive `runtime`. Thread-safe.
+// them faster than they end; of those who go on by the hundreds the connections are cut. Health is
+// for anybody. Must not outlive what it is given. Thread-safe.
 class Door final : public grpc::AuthMetadataProcessor {
  public:
-  explicit Door(Runtime& runtime) : runtime_(runtime) {}
+  // Of the connections of one lane.
+  Door(Runtime& runtime, Connections& connections, int lane)
+      : runtime_(runtime), connections_(connections), lane_(lane) {}
 
   // What it does is as quick as another thread would be found.
   bool IsBlocking() const override { return false; }
@@ -33,7 +38,12 @@ class Door final : public grpc::AuthMetadataProcessor {
                      absl::string_view certificate_name);
 
  private:
+  // Whether to let it in.
+  bool Take(const Arrival& arrival, absl::Time now);
+
   Runtime& runtime_;
+  Connections& connections_;
+  const int lane_;
 };
 
 // Of connections in plain text, for which gRPC's C++ has no processor.

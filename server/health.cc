@@ -16,7 +16,6 @@
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "proto/translate/status.h"
-#include "server/rpc/connections.h"
 #include "server/rpc/request.h"
 #include "server/rpc/sealed.h"
 
@@ -51,9 +50,7 @@ class HealthReactor final : public grpc::ServerBidiReactor<Sealed<Asked>, Told> 
 
   HealthReactor(Health& health, grpc::CallbackServerContext& context, Kind kind)
       : health_(health), context_(context), kind_(kind), host_(HostOf(context.peer())) {
-    if (health_.runtime_.ArrivalsOf(PathOf(kind_)).Begin(PathOf(kind_), SteadyNow())) {
-      CutConnection(context.peer());
-    }
+    health_.runtime_.ArrivalsOf(PathOf(kind_)).Begin(PathOf(kind_), SteadyNow());
     const absl::Status entered = Enter();
     if (entered.ok()) {
       health_.readers_.Submit(host_, [this] { Read(); });

@@ -30,7 +30,8 @@
 namespace strata::server {
 namespace {
 
-// Where the files have run out altogether: until somebody gives one back.
+// Where the files have run out altogether: until somebody gives one back. Also between offers of a
+// connection that was not taken.
 constexpr absl::Duration kPause = absl::Milliseconds(100);
 constexpr std::uint64_t kRefusalsALogLine = 1000;
 
@@ -121,6 +122,8 @@ void Listener::Close() {
   }
   for (const int socket : sockets_) close(socket);
   sockets_.clear();
+  for (const int held : held_) close(held);
+  held_.clear();
   if (wake_ >= 0) close(std::exchange(wake_, -1));
 }
 
@@ -136,8 +139,10 @@ void Listener::Loop() {
     waited.push_back({.fd = socket, .events = POLLIN, .revents = 0});
   waited.push_back({.fd = wake_, .events = POLLIN, .revents = 0});
   while (true) {
-    if (poll(waited.data(), waited.size(), -1) < 0) continue;
+    const int patience_ms = held_.empty() ? -1 : static_cast<int>(kPause / absl::Milliseconds(1));
+    if (poll(waited.data(), waited.size(), patience_ms) < 0) continue;
     if (waited.back().revents != 0) return;
+    OfferHeld();
     bool files_left = true;
     for (const int socket : sockets_) files_left = AcceptAll(socket) && files_left;
     if (!files_left) absl::SleepFor(kPause);
@@ -150,7 +155,7 @@ bool Listener::AcceptAll(int socket) {
     if (fd > most_fd_) {
       Refuse(fd);
     } else if (fd >= 0) {
-      take_(fd);
+      if (!take_(fd)) held_.push_back(fd);
     } else if (errno == EAGAIN) {
       return true;
     } else if (errno != ECONNABORTED && errno != EINTR) {
@@ -158,6 +163,13 @@ bool Listener::AcceptAll(int socket) {
       return false;
     }
   }
+}
+
+void Listener::OfferHeld() {
+  const absl::Time now = SteadyNow();
+  if (now - offered_ < kPause) return;
+  offered_ = now;
+  std::erase_if(held_, [this](int fd) { return take_(fd); });
 }
 
 void Listener::Refuse(int fd) {

@@ -21,8 +21,9 @@ namespace strata::server {
 // comes beyond that is closed at once. Thread-safe.
 class Listener {
  public:
-  // Takes over the descriptor; must not block.
-  using Take = std::function<void(int fd)>;
+  // Takes over the descriptor, or returns false to be offered it again a moment later. Must not
+  // block.
+  using Take = std::function<bool(int fd)>;
 
   // Connections wait in the system until Accept(). All addresses that the host's name has.
   // NOT_FOUND for a name that has none; UNAVAILABLE if none can be listened on.
@@ -49,12 +50,16 @@ class Listener {
   // Takes what waits at one of the sockets. False: the system has nothing left to take it with.
   bool AcceptAll(int socket);
   void Refuse(int fd);
+  // Those that were not taken yet.
+  void OfferHeld();
 
   int port_ = 0;
   int most_fd_ = 0;  // a connection with a higher number is refused
   int wake_ = -1;    // an eventfd that ends the loop
   std::vector<int> sockets_;
   Take take_;
+  std::vector<int> held_;
+  absl::Time offered_ = absl::InfinitePast();
   std::atomic<std::uint64_t> refused_ = 0;
   std::atomic<std::int64_t> refused_at_ms_ = -1;  // of SteadyNow()
   std::thread thread_;

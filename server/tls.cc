@@ -97,7 +97,8 @@ absl::StatusOr<TlsCertificate> CheckTls(const TlsFiles& files, absl::Time now) {
   return result;
 }
 
-std::shared_ptr<grpc::ServerCredentials> TlsCredentials(const TlsFiles& files) {
+std::vector<std::shared_ptr<grpc::ServerCredentials>> TlsCredentials(const TlsFiles& files,
+                                                                     int count) {
   namespace tls = grpc::experimental;
   const auto provider = std::make_shared<tls::FileWatcherCertificateProvider>(
       files.key.string(), files.certificate.string(), files.client_ca.string(), kRefreshSeconds);
@@ -107,7 +108,9 @@ std::shared_ptr<grpc::ServerCredentials> TlsCredentials(const TlsFiles& files) {
     options.watch_root_certs();
     options.set_cert_request_type(GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
   }
-  return tls::TlsServerCredentials(options);
+  std::vector<std::shared_ptr<grpc::ServerCredentials>> result;
+  for (int i = 0; i < count; ++i) result.push_back(tls::TlsServerCredentials(options));
+  return result;
 }
 
 }  // namespace strata::server

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
@@ -32,8 +33,9 @@ struct TlsCertificate {
 absl::StatusOr<TlsCertificate> CheckTls(const TlsFiles& files, absl::Time now);
 
 // Follows the files: another certificate is taken up within seconds, connections that are there
-// keep theirs. TLS 1.2 and 1.3.
-std::shared_ptr<grpc::ServerCredentials> TlsCredentials(const TlsFiles& files);
+// keep theirs. TLS 1.2 and 1.3. `count` times, for a processor each.
+std::vector<std::shared_ptr<grpc::ServerCredentials>> TlsCredentials(const TlsFiles& files,
+                                                                     int count);
 
 }  // namespace strata::server
 

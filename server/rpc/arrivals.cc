@@ -13,22 +13,19 @@ constexpr absl::Duration kLetIn = absl::Milliseconds(10);
 
 }  // namespace
 
-bool Arrivals::Enter(absl::string_view client, absl::Time now) {
+Arrival Arrivals::Enter(absl::string_view client, int lane, absl::Time now) {
   absl::MutexLock lock(&mutex_);
   const auto found = clients_.find(client);
   Client& entry = found == clients_.end() ? clients_[std::string(client)] : found->second;
   const bool full = entry.waiting.size() >= kMostWaiting ||
                     entry.running + entry.waiting.size() >= static_cast<std::size_t>(most_);
-  if (full && now - entry.let_in < kLetIn) {
-    entry.refusals.Add(now);
-    return false;
-  }
+  if (full && now - entry.let_in < kLetIn) return entry.refusals.Add(lane, now);
   entry.waiting.push_back(now);
   entry.let_in = now;
-  return true;
+  return {};
 }
 
-bool Arrivals::Begin(absl::string_view client, absl::Time now) {
+void Arrivals::Begin(absl::string_view client, absl::Time now) {
   absl::MutexLock lock(&mutex_);
   Client& entry = clients_[std::string(client)];
   ++entry.running;
@@ -37,7 +34,6 @@ bool Arrivals::Begin(absl::string_view client, absl::Time now) {
   while (!entry.waiting.empty() && now - entry.waiting.front() > kInTurn) {
     entry.waiting.pop_front();
   }
-  return entry.refusals.TakeMany();
 }
 
 void Arrivals::Leave(absl::string_view client) {

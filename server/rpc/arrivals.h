@@ -24,13 +24,12 @@ class Arrivals {
   // `most`: of one client.
   explicit Arrivals(int most) : most_(most) {}
 
-  // False: the client has all it may have, and the call must be refused there and then. Of such a
-  // client a hundred calls a second are let in all the same. True: Begin() follows when the handler
-  // runs, and never for a call that is cancelled before.
-  bool Enter(absl::string_view client, absl::Time now);
-  // Leave() must follow. True: so many of the client's calls were refused that the connection of
-  // this one must be cut.
-  bool Begin(absl::string_view client, absl::Time now);
+  // In: Begin() follows when the handler runs, and never for a call that is cancelled before. Else
+  // the client has all it may have, and the call must be refused there and then. Of such a client a
+  // hundred calls a second are let in all the same.
+  Arrival Enter(absl::string_view client, int lane, absl::Time now);
+  // Leave() must follow.
+  void Begin(absl::string_view client, absl::Time now);
   void Leave(absl::string_view client);
 
  private:

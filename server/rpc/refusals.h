@@ -1,28 +1,36 @@
-// When refusing is not enough.
+// Calls that are refused where they come in.
 #ifndef STRATA_SERVER_RPC_REFUSALS_H_
 #define STRATA_SERVER_RPC_REFUSALS_H_
+
+#include <set>
+#include <utility>
+#include <vector>
 
 #include "absl/time/time.h"
 
 namespace strata::server {
 
-// Counts the calls of somebody that are refused where they come in. Not thread-safe.
+// What becomes of a call where it comes in.
+struct Arrival {
+  bool in = true;              // false: it is refused
+  std::vector<int> cut_lanes;  // of which the connections must be cut; see Connections
+};
+
+// Counts the calls of somebody. Not thread-safe.
 class Refusals {
  public:
   Refusals() = default;
 
-  void Add(absl::Time now) {
+  // With the five hundredth within a second all lanes are cut that they came by. Hundreds of
+  // clients that pause between their attempts stay below.
+  Arrival Add(int lane, absl::Time now) {
     // A clock that was set back begins anew as well.
     if (absl::AbsDuration(now - since_) > kCounted) *this = Refusals(now);
-    ++count_;
-  }
-  bool many() const { return count_ >= kMany; }
-  // True once for each five hundred within a second: a connection they come by must be cut.
-  // Hundreds of clients that pause between their attempts stay below.
-  bool TakeMany() {
-    const bool taken = many();
-    if (taken) count_ = 0;
-    return taken;
+    lanes_.insert(lane);
+    if (++count_ < kMany) return {.in = false, .cut_lanes = {}};
+    count_ = 0;
+    const std::set<int> lanes = std::exchange(lanes_, {});
+    return {.in = false, .cut_lanes = {lanes.begin(), lanes.end()}};
   }
 
  private:
@@ -33,6 +41,7 @@ class Refusals {
 
   absl::Time since_;
   int count_ = 0;
+  std::set<int> lanes_;
 };
 
 }  // namespace strata::server

@@ -18,7 +18,6 @@
 #include "server/access/method_rights.h"
 #include "server/access/right.h"
 #include "server/rpc/call_object.h"
-#include "server/rpc/connections.h"
 #include "server/rpc/wire_check.h"
 
 namespace strata::server {
@@ -121,14 +120,13 @@ absl::Status Request::Admit(const grpc::CallbackServerContext& context) {
   if (!caller.ok()) return Refuse(caller.status());
   caller_ = *std::move(caller);
   arrived_ = true;
-  if (runtime_.ArrivalsOf(method_).Begin(caller_.principal, started_)) CutConnection(peer_);
+  runtime_.ArrivalsOf(method_).Begin(caller_.principal, started_);
   call_.principal = caller_.principal;
   return EnterLimits();
 }
 
 absl::Status Request::Refuse(const absl::Status& status) {
   stranger_ = true;
-  if (runtime_.strangers.TakeMany()) CutConnection(peer_);
   STRATA_RETURN_IF_ERROR(runtime_.strangers.Enter(HostOf(peer_), started_));
   return status;
 }

@@ -12,8 +12,6 @@ namespace {
 
 constexpr absl::string_view kEverybody = "all strangers";
 constexpr absl::Duration kLogInterval = absl::Seconds(1);
-// Of one who is heard only for his connection to be cut.
-constexpr absl::Duration kCutInterval = absl::Milliseconds(10);
 
 ClientLimitOptions Rate(double calls_per_second, double burst) {
   ClientLimitOptions options;
@@ -42,21 +40,11 @@ Strangers::Strangers(const StrangerOptions& options)
       by_address_(Rate(options.calls_per_second, options.burst), 0),
       heard_(Rate(options.heard_per_second, options.heard_burst), 0) {}
 
-bool Strangers::IsHeard(absl::Time now) {
-  if (Take(heard_, kEverybody, now).ok()) return true;
+Arrival Strangers::Hear(int lane, absl::Time now) {
+  if (Take(heard_, kEverybody, now).ok()) return {};
   absl::MutexLock lock(&mutex_);
-  if (refusals_.many() && now - cut_ >= kCutInterval) {
-    cut_ = now;
-    return true;
-  }
   ++not_logged_;
-  refusals_.Add(now);
-  return false;
-}
-
-bool Strangers::TakeMany() {
-  absl::MutexLock lock(&mutex_);
-  return refusals_.TakeMany();
+  return refusals_.Add(lane, now);
 }
 
 absl::Status Strangers::Enter(absl::string_view address, absl::Time now) {

@@ -35,10 +35,8 @@ class Strangers {
   // OK: a stranger from `address` is told why he is refused. RESOURCE_EXHAUSTED with the time to
   // wait: there were too many lately.
   absl::Status Enter(absl::string_view address, absl::Time now);
-  // False: the door refuses him by a word, and nothing else is done about him.
-  bool IsHeard(absl::Time now);
-  // Whether so many were refused so that the connection of one who is heard must be cut.
-  bool TakeMany();
+  // In: he is heard. Else the door refuses him by a word, and nothing else is done about him.
+  Arrival Hear(int lane, absl::Time now);
   // At most once a second: how many were refused since the last time, this one included. nullopt:
   // this one needs no line in the log.
   std::optional<std::uint64_t> ToLog(absl::Time now);
@@ -49,7 +47,6 @@ class Strangers {
   ClientLimits heard_;
   absl::Mutex mutex_;
   Refusals refusals_ ABSL_GUARDED_BY(mutex_);
-  absl::Time cut_ ABSL_GUARDED_BY(mutex_) = absl::InfinitePast();
   absl::Time logged_ ABSL_GUARDED_BY(mutex_) = absl::InfinitePast();
   std::uint64_t not_logged_ ABSL_GUARDED_BY(mutex_) = 0;
 };

@@ -264,6 +264,18 @@ TEST_F(HostileMemoryTest, AClientWhoResetsWatchesAsFastAsTheyBegin) {
   ExpectBounded(kClientMegabytes);
 }
 
+TEST_F(HostileMemoryTest, StrangersWhoResetCallsAsFastAsTheyBegin) {
+  Serve();
+  AtOnce(8, [&](int /*i*/) { BeginAndReset(port(), "/strata.v1.Maps/List", "none"); });
+  ExpectBounded(kStrangersMegabytes);
+}
+
+TEST_F(HostileMemoryTest, StrangersWhoAskForTheirHealthAndReset) {
+  Serve();
+  AtOnce(8, [&](int /*i*/) { BeginAndReset(port(), "/grpc.health.v1.Health/Check", "none"); });
+  ExpectBounded(kStrangersMegabytes);
+}
+
 TEST_F(HostileMemoryTest, AClientWhoWatchesManyLongPaths) {
   Serve();
   v1::WatchPathRequest in;

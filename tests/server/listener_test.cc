@@ -9,6 +9,7 @@
 
 #include "absl/status/status.h"
 #include "absl/synchronization/notification.h"
+#include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
@@ -64,11 +65,31 @@ TEST(ListenerTest, HandsConnectionsOnAndTellsItsPort) {
   listener->Accept([&taken](int fd) {
     close(fd);
     taken.Notify();
+    return true;
   });
   EXPECT_TRUE(taken.WaitForNotificationWithTimeout(kPatience));
   EXPECT_TRUE(early.Ended());
   EXPECT_EQ(listener->refused(), 0U);
   EXPECT_EQ(listener->since_refused(), absl::InfiniteDuration());
+}
+
+TEST(ListenerTest, WhatIsNotTakenIsOfferedAgainOrClosedAtTheEnd) {
+  STRATA_ASSERT_OK_AND_ASSIGN(auto listener, Listener::Open({"127.0.0.1", 0}));
+  std::atomic<int> offers = 0;
+  absl::Notification taken;
+  listener->Accept([&](int fd) {
+    if (++offers != 3) return false;
+    close(fd);
+    taken.Notify();
+    return true;
+  });
+  const Peer peer(listener->port());
+  EXPECT_TRUE(taken.WaitForNotificationWithTimeout(kPatience));
+  EXPECT_TRUE(peer.Ended());
+  const Peer never(listener->port());
+  while (offers < 5) absl::SleepFor(absl::Milliseconds(1));
+  listener.reset();
+  EXPECT_TRUE(never.Ended());
 }
 
 TEST(ListenerTest, ANameMayHaveSeveralAddresses) {
@@ -77,6 +98,7 @@ TEST(ListenerTest, ANameMayHaveSeveralAddresses) {
   listener->Accept([&taken](int fd) {
     close(fd);
     taken.Notify();
+    return true;
   });
   const Peer peer(listener->port());
   EXPECT_TRUE(taken.WaitForNotificationWithTimeout(kPatience));
@@ -104,7 +126,7 @@ TEST(ListenerTest, AQuarterOfTheFilesStaysForOthers) {
     listener->Accept([&](int fd) {
       highest = std::max(highest.load(), fd);
       ++taken;
-      // stays open
+      return true;  // stays open
     });
     // Both ends are files of this process, so the peers use them up, too.
     while (listener->refused() == 0 && peers.size() < 399) peers.emplace_back(listener->port());

@@ -1,9 +1,11 @@
 #include "server/rpc/connections.h"
 
+#include <cerrno>
+#include <optional>
 #include <string>
+#include <utility>
 
-#include "absl/strings/str_cat.h"
-#include <arpa/inet.h>
+#include "absl/time/time.h"
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -31,50 +33,90 @@ class Pair {
       client_ = ::socket(family, SOCK_STREAM, 0);
       ::connect(client_, reinterpret_cast<sockaddr*>(&address), size);
       server_ = ::accept(listener, reinterpret_cast<sockaddr*>(&address), &size);
-      port_ = family == AF_INET ? ntohs(reinterpret_cast<sockaddr_in&>(address).sin_port)
-                                : ntohs(reinterpret_cast<sockaddr_in6&>(address).sin6_port);
     }
     ::close(listener);
   }
   ~Pair() {
     ::close(client_);
-    ::close(server_);
+    if (server_ >= 0) ::close(server_);
   }
   Pair(const Pair&) = delete;
   Pair& operator=(const Pair&) = delete;
 
   bool there() const { return server_ >= 0; }
-  int port() const { return port_; }  // the client's
+  int server() const { return server_; }
+  void CloseServer() { ::close(std::exchange(server_, -1)); }
+  void Send(const std::string& bytes) const {
+    ASSERT_EQ(::send(client_, bytes.data(), bytes.size(), MSG_NOSIGNAL),
+              static_cast<ssize_t>(bytes.size()));
+  }
   bool IsCut() const {
     char byte = 0;
-    return ::recv(client_, &byte, 1, MSG_DONTWAIT) == 0;
+    return ::recv(client_, &byte, 1, MSG_DONTWAIT) < 0 && errno == ECONNRESET;
+  }
+  // What the server can read at once, or -1.
+  ssize_t Readable() const {
+    char bytes[100];
+    return ::recv(server_, bytes, sizeof(bytes), MSG_DONTWAIT);
   }
 
  private:
   int client_ = -1;
   int server_ = -1;
-  int port_ = 0;
 };
 
-TEST(CutConnectionTest, EndsTheOneConnectionWithThePeer) {
-  const Pair one(AF_INET);
-  const Pair other(AF_INET);
-  ASSERT_TRUE(one.there());
-  ASSERT_TRUE(other.there());
-  EXPECT_FALSE(CutConnection("ipv4:127.0.0.1:1"));
-  EXPECT_FALSE(CutConnection("unix:/nowhere"));
-  EXPECT_FALSE(CutConnection(""));
-  EXPECT_FALSE(one.IsCut());
-  EXPECT_TRUE(CutConnection(absl::StrCat("ipv4:127.0.0.1:", one.port())));
-  EXPECT_TRUE(one.IsCut());
-  EXPECT_FALSE(other.IsCut());
+const absl::Time kNow = absl::FromUnixSeconds(1'000'000);
+
+TEST(ConnectionsTest, CutsALaneAndDropsWhatWasNotRead) {
+  for (const int family : {AF_INET, AF_INET6}) {
+    const Pair one(family);
+    const Pair other(family);
+    if (!one.there()) continue;  // no loopback of version 6 on this machine
+    Connections connections(2);
+    EXPECT_EQ(connections.Add(one.server(), kNow), 0);
+    EXPECT_EQ(connections.Add(other.server(), kNow), 1);
+    one.Send("calls");
+    other.Send("calls");
+    connections.Cut(0, kNow);
+    EXPECT_TRUE(one.IsCut());
+    EXPECT_EQ(one.Readable(), -1);
+    EXPECT_FALSE(other.IsCut());
+    EXPECT_EQ(other.Readable(), 5);
+    EXPECT_EQ(connections.cut(), 1U);
+  }
 }
 
-TEST(CutConnectionTest, KnowsAddressesOfVersion6AsGrpcWritesThem) {
-  const Pair one(AF_INET6);
-  if (!one.there()) GTEST_SKIP() << "no loopback of version 6 on this machine";
-  EXPECT_TRUE(CutConnection(absl::StrCat("ipv6:%5B::1%5D:", one.port())));
-  EXPECT_TRUE(one.IsCut());
+TEST(ConnectionsTest, ALaneForgetsWhatWasClosed) {
+  Pair closed(AF_INET);
+  Connections connections(1);
+  EXPECT_EQ(connections.Add(closed.server(), kNow), 0);
+  closed.CloseServer();
+  const Pair next(AF_INET);  // mostly with the same number, and not handed in
+  connections.Cut(0, kNow);
+  EXPECT_FALSE(next.IsCut());
+  EXPECT_EQ(connections.Add(next.server(), kNow), 0);
+}
+
+TEST(ConnectionsTest, LanesAreTakenInTurn) {
+  const Pair pairs[] = {Pair(AF_INET), Pair(AF_INET), Pair(AF_INET), Pair(AF_INET)};
+  Connections connections(3);
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(connections.Add(pairs[i].server(), kNow), i % 3);
+  connections.Cut(0, kNow);
+  EXPECT_TRUE(pairs[0].IsCut());
+  EXPECT_FALSE(pairs[1].IsCut());
+  EXPECT_TRUE(pairs[3].IsCut());
+  EXPECT_EQ(connections.cut(), 2U);
+}
+
+TEST(ConnectionsTest, AHostThatWasCutWaitsASecond) {
+  const Pair one(AF_INET);
+  const Pair again(AF_INET);
+  Connections connections(4);
+  EXPECT_EQ(connections.Add(one.server(), kNow), 0);
+  connections.Cut(0, kNow);
+  EXPECT_EQ(connections.Add(again.server(), kNow + absl::Milliseconds(999)), std::nullopt);
+  EXPECT_NE(connections.Add(again.server(), kNow + absl::Milliseconds(1'001)), std::nullopt);
+  connections.Cut(3, kNow);  // empty
 }
 
 }  // namespace

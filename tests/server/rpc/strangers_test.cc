@@ -39,21 +39,23 @@ TEST(StrangersTest, ManyAddressesTogetherAreLimitedToo) {
 
 TEST(StrangersTest, FewAreHeardAndTheOthersAreCounted) {
   Strangers strangers({.heard_per_second = 1.0, .heard_burst = 2.0});
-  EXPECT_TRUE(strangers.IsHeard(kStart));
-  EXPECT_TRUE(strangers.IsHeard(kStart));
-  EXPECT_FALSE(strangers.IsHeard(kStart));
+  EXPECT_TRUE(strangers.Hear(0, kStart).in);
+  EXPECT_TRUE(strangers.Hear(0, kStart).in);
+  EXPECT_FALSE(strangers.Hear(0, kStart).in);
   EXPECT_EQ(strangers.ToLog(kStart), 2U);
-  EXPECT_TRUE(strangers.IsHeard(kStart + absl::Seconds(1)));
+  EXPECT_TRUE(strangers.Hear(0, kStart + absl::Seconds(1)).in);
 }
 
-TEST(StrangersTest, WhereThousandsASecondAreRefusedTheConnectionsOfThoseHeardMustGo) {
+TEST(StrangersTest, WhereHundredsASecondAreRefusedTheirConnectionsMustGo) {
   Strangers strangers({.heard_per_second = 1.0, .heard_burst = 1.0});
-  EXPECT_TRUE(strangers.IsHeard(kStart));
-  for (int i = 0; i < 100'000; ++i) strangers.IsHeard(kStart + absl::Milliseconds(3 * i));
-  EXPECT_FALSE(strangers.TakeMany());
-  for (int i = 0; i < 1'500; ++i) strangers.IsHeard(kStart + absl::Minutes(10));
-  EXPECT_TRUE(strangers.TakeMany());
-  EXPECT_FALSE(strangers.TakeMany());
+  EXPECT_TRUE(strangers.Hear(0, kStart).in);
+  for (int i = 0; i < 100'000; ++i) {
+    EXPECT_TRUE(strangers.Hear(0, kStart + absl::Milliseconds(3 * i)).cut_lanes.empty());
+  }
+  const absl::Time later = kStart + absl::Minutes(10);
+  EXPECT_TRUE(strangers.Hear(1, later).in);
+  for (int i = 0; i < 499; ++i) EXPECT_TRUE(strangers.Hear(2, later).cut_lanes.empty());
+  EXPECT_EQ(strangers.Hear(2, later).cut_lanes, std::vector<int>{2});
 }
 
 TEST(StrangersTest, OneLineASecondTellsOfAll) {
