@@ -64,12 +64,12 @@ void KeepFilesPrivate() { ::umask(::umask(0077) | 0027); }
 // the process: beside hostile clients a gigabyte of which half was free.
 void KeepHeapsSmall() {
   mallopt(M_ARENA_MAX, 4);
-  mallopt(M_MMAP_THRESHOLD, 1 << 20);  // larger blocks go back at once
+  mallopt(M_MMAP_THRESHOLD, 256 << 10);  // larger blocks go back at once
 }
 
 // Gives free memory back from time to time.
 int AwaitSignal(const sigset_t& signals) {
-  constexpr timespec kInterval{10, 0};
+  constexpr timespec kInterval{1, 0};
   while (true) {
     const int signal = sigtimedwait(&signals, nullptr, &kInterval);
     if (signal > 0) return signal;

@@ -14,6 +14,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/parallel.h"
+#include "core/engine/scan_share.h"
 #include "core/engine/scan_source.h"
 
 namespace strata {
@@ -62,6 +63,7 @@ absl::Status DerivedPass::IndexScans(StorageReader& reader, DerivedSink& sink) {
         }
         std::optional<ReaderPool::Lease> lease;
         STRATA_ASSIGN_OR_RETURN(StorageReader * own, ReaderOf(core_, options_.view, thread, lease));
+        const ScanShare share(core_.caches(), placed_[i].scan);
         ScanSource source(*own, parameters);
         const absl::StatusOr<MlsMap> contribution =
             source.Contribution(placed_[i].scan, placed_[i].T_map_scan);

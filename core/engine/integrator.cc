@@ -18,6 +18,7 @@
 #include "core/codec/local_map_codec.h"
 #include "core/common/status.h"
 #include "core/engine/scan_losses.h"
+#include "core/engine/scan_share.h"
 #include "core/engine/scan_source.h"
 
 namespace strata {
@@ -161,6 +162,7 @@ absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
                                        ScanSource& source,
                                        MlsTileMap& tiles,
                                        Batch& batch) {
+  const ScanShare share(core_.caches(), scan);
   Integrated done;
   done.scan = scan;
   const MapParameters parameters = core_.info().parameters;

@@ -22,6 +22,7 @@
 #include "core/common/checksum.h"
 #include "core/common/status.h"
 #include "core/engine/parallel.h"
+#include "core/engine/scan_share.h"
 #include "core/engine/scan_source.h"
 #include "core/mls/join.h"
 
@@ -105,6 +106,7 @@ absl::StatusOr<MlsTileMap> MakeTiles(MapCore& core,
         STRATA_RETURN_IF_ERROR(stop.status());
         std::optional<ReaderPool::Lease> lease;
         STRATA_ASSIGN_OR_RETURN(StorageReader * reader, ReaderOf(core, view, thread, lease));
+        const ScanShare share(core.caches(), scans[i].scan);
         ScanSource source(*reader, parameters, {.change = scans[i].change});
         const absl::StatusOr<MlsMap> contribution =
             source.Contribution(scans[i].scan, scans[i].T_map_scan);

@@ -8,6 +8,7 @@
 #include "core/common/status.h"
 #include "core/engine/parallel.h"
 #include "core/engine/scan_losses.h"
+#include "core/engine/scan_share.h"
 #include "core/engine/scan_source.h"
 #include "core/engine/surface_tiles.h"
 
@@ -28,6 +29,7 @@ absl::StatusOr<ScanMover::MovedScan> ScanMover::Move(const ProposedPose& pose) c
   STRATA_ASSIGN_OR_RETURN(PosedScan posed, reader->GetScan(pose.scan, epoch_));
   const ScanHeader& header = posed.scan.header;
   const MapParameters parameters = core_.info().parameters;
+  const ScanShare share(core_.caches(), posed.scan);
   ScanSource source(*reader, parameters);
   MovedScan moved;
   moved.T_map_scan = pose.T_map_scan;

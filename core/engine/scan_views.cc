@@ -6,6 +6,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/aligner.h"
+#include "core/engine/scan_share.h"
 #include "core/engine/scan_source.h"
 #include "core/planes/extraction.h"
 #include "core/planes/scan_planes_codec.h"
@@ -18,13 +19,15 @@ constexpr std::uint64_t kMaxPlanePoints = 2'000'000;
 
 absl::StatusOr<ScanPlanes> PlanesOf(ScanSource& source,
                                     const ScanRecord& scan,
-                                    const MlsMap& local_map,
+                                    MlsMap local_map,
                                     const MapParameters& parameters) {
   PlaneExtractionOptions options;
   options.sensor = scan.header.sensor.value_or(parameters.sensor);
   if (!scan.has_points || scan.header.point_count > kMaxPlanePoints) {
     return ExtractPlanes(local_map, options);
   }
+  local_map.tiles.clear();
+  local_map.tiles.shrink_to_fit();
   PointCloud cloud;
   STRATA_RETURN_IF_ERROR(source.ForEachBlock(scan, [&cloud](const PointCloud& block) {
     cloud.points.insert(cloud.points.end(), block.points.begin(), block.points.end());
@@ -47,6 +50,7 @@ void ScanViews::Remember(std::size_t node, const absl::Status& status) {
 
 absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::MakeFeatures(
     const ScanRecord& scan) {
+  const ScanShare share(core_.caches(), scan);
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
   const MapParameters parameters = core_.info().parameters;
   ScanSource source(*reader, parameters);
@@ -65,11 +69,14 @@ absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::Features(std::siz
 }
 
 absl::StatusOr<ScanView> ScanViews::MakeView(StorageReader& reader, const ScanRecord& scan) {
+  const ScanShare share(core_.caches(), scan);
   const MapParameters parameters = core_.info().parameters;
   ScanSource source(reader, parameters);
-  STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
-  STRATA_ASSIGN_OR_RETURN(const ScanPlanes planes, PlanesOf(source, scan, local_map, parameters));
-  const ScanView view{EncodePlace(DescribePlace(local_map)), EncodeScanPlanes(planes)};
+  STRATA_ASSIGN_OR_RETURN(MlsMap local_map, source.LocalMap(scan));
+  ScanView view{.place = EncodePlace(DescribePlace(local_map)), .planes = ""};
+  STRATA_ASSIGN_OR_RETURN(const ScanPlanes planes,
+                          PlanesOf(source, scan, std::move(local_map), parameters));
+  view.planes = EncodeScanPlanes(planes);
   // Kept for the next time; a store that is full is no reason to stop.
   core_.writer()
       .Run(Durability::kRelaxed,

@@ -167,9 +167,13 @@ ScanPlanes ExtractPlanes(const PointCloud& cloud, const PlaneExtractionOptions& 
 }
 
 ScanPlanes ExtractPlanes(const MlsMap& local_map, const PlaneExtractionOptions& options) {
-  const std::vector<Feature> features = ExtractFeatures(local_map).value();  // default options
   std::vector<Eigen::Vector3f> points;
-  for (const Feature& feature : features) points.push_back(feature.p_map.cast<float>());
+  points.reserve(local_map.patch_count());
+  for (const MlsTile& tile : local_map.tiles) {  // one by one: features take four times as much
+    const MlsMap part{local_map.parameters, {tile}};
+    const std::vector<Feature> features = ExtractFeatures(part).value();  // default options
+    for (const Feature& feature : features) points.push_back(feature.p_map.cast<float>());
+  }
   PlaneExtractionOptions blurred = options;
   blurred.max_rms_m = std::max(options.max_rms_m, kCellSpread * local_map.parameters.cell_size_m);
   ScanPlanes planes = PatchesAndCreases(points, Eigen::Vector3f::Zero(), blurred);
