@@ -102,14 +102,16 @@ std::vector<std::shared_ptr<grpc::ServerCredentials>> TlsCredentials(const TlsFi
   namespace tls = grpc::experimental;
   const auto provider = std::make_shared<tls::FileWatcherCertificateProvider>(
       files.key.string(), files.certificate.string(), files.client_ca.string(), kRefreshSeconds);
-  tls::TlsServerCredentialsOptions options(provider);
-  options.watch_identity_key_cert_pairs();
-  if (!files.client_ca.empty()) {
-    options.watch_root_certs();
-    options.set_cert_request_type(GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
-  }
   std::vector<std::shared_ptr<grpc::ServerCredentials>> result;
-  for (int i = 0; i < count; ++i) result.push_back(tls::TlsServerCredentials(options));
+  for (int i = 0; i < count; ++i) {
+    tls::TlsServerCredentialsOptions options(provider);  // credentials take what it holds
+    options.watch_identity_key_cert_pairs();
+    if (!files.client_ca.empty()) {
+      options.watch_root_certs();
+      options.set_cert_request_type(GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
+    }
+    result.push_back(tls::TlsServerCredentials(options));
+  }
   return result;
 }
 
