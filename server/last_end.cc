@@ -69,10 +69,13 @@ bool BeginRun(const std::filesystem::path& directory) {
   const bool from_outside =
       noted && machine.oom_kills >= 0 && (boot != machine.boot || oom_kills == machine.oom_kills);
 
-  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0640);
+  // Whoever is killed here has one of both whole.
+  const std::filesystem::path next = path.string() + ".new";
+  const int file = open(next.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0640);
   if (file < 0) return false;
   const std::string line = absl::StrCat(machine.boot, " ", machine.oom_kills, "\n");
-  if (write(file, line.data(), line.size()) != static_cast<ssize_t>(line.size())) {
+  if (write(file, line.data(), line.size()) != static_cast<ssize_t>(line.size()) ||
+      rename(next.c_str(), path.c_str()) != 0) {
     close(file);
     return false;
   }
