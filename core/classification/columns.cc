@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "absl/container/flat_hash_map.h"
+#include "core/common/hash_map.h"
 
 namespace strata {
 namespace {
@@ -50,7 +50,7 @@ class Columns {
     const auto cell = [edge_m](float x) {
       return static_cast<std::int32_t>(std::floor(static_cast<double>(x) / edge_m));
     };
-    absl::flat_hash_map<std::pair<std::int32_t, std::int32_t>, std::uint32_t> known;
+    HashMap<std::pair<std::int32_t, std::int32_t>, std::uint32_t> known;
     std::vector<std::uint32_t> columns(points.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
       const auto fresh = static_cast<std::uint32_t>(known.size());

@@ -4,10 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "absl/container/flat_hash_map.h"
-
 #include "core/cloud/point_cloud.h"
 #include "core/cloud/sensor_model.h"
+#include "core/common/hash_map.h"
 #include "core/common/status.h"
 #include "core/mls/build.h"
 #include "core/mls/mls_map.h"
@@ -28,7 +27,7 @@ struct CellKey {
   }
   friend bool operator==(const CellKey&, const CellKey&) = default;
 };
-using Heights = absl::flat_hash_map<CellKey, float>;
+using Heights = HashMap<CellKey, float>;
 
 void Lower(Heights& heights, CellIndex cell, float z) {
   const auto [it, added] = heights.try_emplace(CellKey{cell}, z);

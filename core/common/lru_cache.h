@@ -10,10 +10,10 @@
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
-#include "absl/container/flat_hash_map.h"
 #include "absl/synchronization/mutex.h"
 
 #include "core/common/cache_budget.h"
+#include "core/common/hash_map.h"
 
 namespace strata {
 
@@ -125,7 +125,7 @@ class LruCache {
   const std::size_t max_bytes_;
   std::size_t bytes_ ABSL_GUARDED_BY(budget_->mutex_) = 0;
   Order order_ ABSL_GUARDED_BY(budget_->mutex_);  // the latest used first
-  absl::flat_hash_map<Key, typename Order::iterator> index_ ABSL_GUARDED_BY(budget_->mutex_);
+  HashMap<Key, typename Order::iterator> index_ ABSL_GUARDED_BY(budget_->mutex_);
 };
 
 }  // namespace strata

@@ -124,10 +124,12 @@ absl::StatusOr<std::unique_ptr<JobBoard>> JobBoard::Open(MapCore& core, Quaranti
 }
 
 void JobBoard::Show(const JobInfo& info) {
+  JobInfo shown = info;
+  auto made =
+      std::make_shared<Entry>();  // without memory there is no entry, rather than half of one
   absl::MutexLock lock(&mutex_);
-  std::shared_ptr<Entry>& entry = jobs_[info.id];
-  if (entry == nullptr) entry = std::make_shared<Entry>();
-  entry->info = info;
+  std::shared_ptr<Entry>& entry = jobs_.try_emplace(info.id, std::move(made)).first->second;
+  entry->info = std::move(shown);
   ++entry->changes;
 }
 

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
+#include "core/common/hash_map.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/tile_source.h"
 #include "core/storage/records.h"
@@ -19,7 +19,7 @@
 namespace strata {
 
 // Versions of all level-0 tiles of one state.
-using TileVersionMap = absl::flat_hash_map<TileKey, std::uint64_t>;
+using TileVersionMap = HashMap<TileKey, std::uint64_t>;
 TileVersionMap VersionsOfTiles(const std::vector<SurfaceTileRow>& rows);
 TileVersions VersionsAround(const TileVersionMap& versions, const TileKey& key);
 

@@ -8,7 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "absl/container/flat_hash_set.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -16,6 +15,7 @@
 
 #include "core/codec/local_map_codec.h"
 #include "core/codec/point_codec.h"
+#include "core/common/hash_map.h"
 #include "core/common/status.h"
 #include "core/mls/build.h"
 #include "core/mls/join.h"
@@ -48,7 +48,7 @@ void AppendPiece(const PointCloud& piece, PointCloud& block) {
 }
 
 // Tiles in which a sensor may have points.
-using TilePlaces = absl::flat_hash_set<std::pair<std::int64_t, std::int64_t>>;
+using TilePlaces = HashSet<std::pair<std::int64_t, std::int64_t>>;
 
 void AddTiles(const PointCloud& block,
               const SensorModel& sensor,

@@ -20,10 +20,10 @@
 #include <utility>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "absl/status/status.h"
 #include <Eigen/Core>
 
+#include "core/common/hash_map.h"
 #include "core/mls/mls_map.h"
 #include "core/mls/tile_key.h"
 
@@ -112,7 +112,7 @@ class SeeThrough {
   const SeeThroughOptions options_;
   const double cell_size_m_;
   const float thickness_m_;
-  absl::flat_hash_map<TileKey, Tile> tiles_;
+  HashMap<TileKey, Tile> tiles_;
   Window window_;
   std::vector<Column> columns_;
   std::vector<Stretch> stretches_;

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include <Eigen/Core>
 
+#include "core/common/hash_map.h"
 #include "core/mls/local_plane.h"
 #include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
@@ -223,7 +223,7 @@ class MeshMaker {
   std::span<const SurfaceTile* const> tiles_;
   double tan_slope_;
   double cell_m_ = 0.0;
-  absl::flat_hash_map<TileKey, std::size_t> tile_of_key_;
+  HashMap<TileKey, std::size_t> tile_of_key_;
   SurfaceMesh mesh_;
   std::vector<std::uint32_t> right_, up_, left_, down_;  // links by vertex; kNone
   std::vector<std::uint8_t> used_;                       // Side bits of a vertex' right and up link

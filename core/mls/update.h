@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include <Eigen/Core>
 
+#include "core/common/hash_map.h"
 #include "core/mls/mls_map.h"
 #include "core/mls/mls_parameters.h"
 #include "core/mls/patch.h"
@@ -68,7 +68,7 @@ class MlsUpdater {
 
   MlsParameters parameters_;
   std::vector<Node> nodes_;
-  absl::flat_hash_map<std::uint64_t, std::uint32_t> first_;  // by cell: head of its chain
+  HashMap<std::uint64_t, std::uint32_t> first_;  // by cell: head of its chain
 };
 
 }  // namespace strata

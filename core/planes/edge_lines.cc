@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include <Eigen/Core>
 
+#include "core/common/hash_map.h"
 #include "core/geometry/primitives.h"
 #include "core/planes/moments.h"
 #include "core/planes/scan_planes.h"
@@ -53,7 +53,7 @@ class PointGrid {
   }
   std::span<const Eigen::Vector3d> points_;
   double size_m_;
-  absl::flat_hash_map<Cube, std::vector<std::uint32_t>> cubes_;
+  HashMap<Cube, std::vector<std::uint32_t>> cubes_;
 };
 
 struct Tangent {

@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include <Eigen/Core>
 
+#include "core/common/hash_map.h"
 #include "core/geometry/primitives.h"
 #include "core/planes/moments.h"
 #include "core/planes/posed_patch.h"
@@ -69,7 +69,7 @@ class PatchIndex {
       }
     }
   }
-  absl::flat_hash_map<Cube, std::vector<std::uint32_t>> cubes_;
+  HashMap<Cube, std::vector<std::uint32_t>> cubes_;
 };
 
 // What patches say together.

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include <Eigen/Core>
 
+#include "core/common/hash_map.h"
 #include "core/planes/extraction.h"
 #include "core/planes/moments.h"
 
@@ -193,7 +193,7 @@ std::vector<PlanarCell> FindPlanarCells(std::span<const Eigen::Vector3f> points,
 }
 
 std::vector<std::vector<std::uint32_t>> TouchingCells(std::span<const PlanarCell> cells) {
-  absl::flat_hash_map<std::uint64_t, std::uint32_t> index;
+  HashMap<std::uint64_t, std::uint32_t> index;
   index.reserve(cells.size());
   for (std::uint32_t i = 0; i < cells.size(); ++i) index[KeyOf(cells[i].level, cells[i].at)] = i;
   std::vector<std::vector<std::uint32_t>> touching(cells.size());

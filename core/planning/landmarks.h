@@ -8,9 +8,9 @@
 #include <memory>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "absl/status/statusor.h"
 
+#include "core/common/hash_map.h"
 #include "core/common/stop.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/search.h"
@@ -56,7 +56,7 @@ class Landmarks {
 
   int count_ = 0;
   RobotProfile profile_;
-  absl::flat_hash_map<TileKey, TileDistances> tiles_;
+  HashMap<TileKey, TileDistances> tiles_;
 };
 
 }  // namespace strata

@@ -8,12 +8,12 @@
 #include <memory>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "absl/container/inlined_vector.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
 
+#include "core/common/hash_map.h"
 #include "core/common/stop.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/class_factors.h"
@@ -130,7 +130,7 @@ class SearchSpace {
   std::deque<int> held_;  // slots with a tile, the first to come first
   std::size_t held_bytes_ = 0;
   std::vector<std::uint16_t> page_slot_;  // of each page of patch numbers
-  absl::flat_hash_map<TileKey, int> slot_of_;
+  HashMap<TileKey, int> slot_of_;
 };
 
 }  // namespace strata

@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "absl/status/status.h"
 
 #include "core/common/cache_budget.h"
+#include "core/common/hash_map.h"
 #include "core/common/stop.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/bucket_queue.h"
@@ -100,7 +100,7 @@ class SearchWorkspace {
   // Lets go of a tile at hand.
   void Dismiss(int slot);
 
-  absl::flat_hash_map<TileKey, ParkedTile>& parked() { return parked_; }
+  HashMap<TileKey, ParkedTile>& parked() { return parked_; }
   // Takes what parked tiles need from the budget; false where there is not that much.
   bool AccountParked();
   // Gives back all but what is parked.
@@ -122,7 +122,7 @@ class SearchWorkspace {
   std::vector<Member> members_;  // by slot
   std::vector<int> at_hand_;
   std::vector<Member> spare_;  // memory of members that were dismissed
-  absl::flat_hash_map<TileKey, ParkedTile> parked_;
+  HashMap<TileKey, ParkedTile> parked_;
   BucketQueue queue_;
 };
 

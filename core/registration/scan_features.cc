@@ -10,11 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "absl/status/status.h"
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
+#include "core/common/hash_map.h"
 #include "core/common/option_checks.h"
 #include "core/common/random.h"
 #include "core/mls/features.h"
@@ -82,7 +82,7 @@ void SeparateUndersides(const Eigen::Vector3f& sensor_origin, ClassPoints& point
       std::stable_partition(horizontal.begin(), horizontal.end(), [&](const Eigen::Vector3f& p) {
         return !SeenFromBelow(p, sensor_origin);
       });
-  absl::flat_hash_map<Column, Spread> spreads;
+  HashMap<Column, Spread> spreads;
   std::for_each(above, horizontal.end(), [&](const auto& p) { spreads[column_of(p)].Add(p.z()); });
   const auto undersides = std::stable_partition(
       above, horizontal.end(), [&](const auto& p) { return !spreads[column_of(p)].IsLevel(); });

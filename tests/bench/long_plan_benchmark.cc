@@ -24,7 +24,6 @@
 #include <utility>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -33,6 +32,7 @@
 
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/cache_budget.h"
+#include "core/common/hash_map.h"
 #include "core/common/lru_cache.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
@@ -61,7 +61,7 @@ double ProcessorSeconds() {
 
 // ---- tiles ----
 
-using TileBytes = absl::flat_hash_map<TileKey, std::string>;
+using TileBytes = HashMap<TileKey, std::string>;
 
 class DecodedTiles : public TileSource {
  public:

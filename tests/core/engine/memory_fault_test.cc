@@ -1,6 +1,7 @@
 // An allocation that fails anywhere ends the work it was for, and nothing else: no process, nothing
 // that was acknowledged, and no tile that would not follow from its scans.
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <iostream>
 #include <map>
@@ -20,6 +21,7 @@
 #include "core/api/scans.h"
 #include "core/cloud/cloud_slice.h"
 #include "core/common/guarded.h"
+#include "core/common/hash_map.h"
 #include "core/common/random.h"
 #include "core/common/status.h"
 #include "core/world/scan_hash.h"
@@ -118,6 +120,25 @@ TEST_F(MemoryFaultTest, NothingEndsButTheWorkItWasFor) {
   const std::string digest = Digest();
   ASSERT_EQ(RunJob(db(), "rebuild").state, JobState::kSucceeded);
   EXPECT_EQ(Digest(), digest);
+}
+
+TEST(HashMapTest, OneThatCannotGrowIsWhatItWas) {
+  for (std::int64_t sound = 0; sound < 200; ++sound) {
+    SCOPED_TRACE(sound);
+    HashMap<int, int> map;
+    int put = 0;
+    {
+      const FailingMemory failing(sound, 1);
+      Guarded([&] {
+        for (; put < 1000; ++put) map[put] = put;
+        return absl::OkStatus();
+      }).IgnoreError();
+    }
+    ASSERT_EQ(map.size(), static_cast<std::size_t>(put));
+    for (int i = 0; i < put; ++i) ASSERT_TRUE(map.contains(i));
+    map[-1] = -1;
+    EXPECT_EQ(map.size(), static_cast<std::size_t>(put) + 1);
+  }
 }
 
 // What came of it is kept where there is memory for that; nobody is there to be told otherwise.
