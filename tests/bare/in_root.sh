@@ -60,6 +60,7 @@ done
 inside() {
   root=$1 count=$2
   shift 2
+  mount --bind "$root" "$root" # so that / is a mount: a bare root can be made within a bare root
   mount -t proc proc "$root/proc"
   mount --rbind /dev "$root/dev"
   for _ in $(seq "$count"); do
