@@ -99,6 +99,7 @@ Request::~Request() {
   End();
   gate().Leave();
   if (arrived_) runtime_.ArrivalsOf(method_).Leave(caller_.principal);
+  if (stranger_) runtime_.strangers.Leave();
 }
 
 void Request::End() {

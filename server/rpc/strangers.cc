@@ -12,6 +12,8 @@ namespace {
 
 constexpr absl::string_view kEverybody = "all strangers";
 constexpr absl::Duration kLogInterval = absl::Seconds(1);
+// Of whom nothing was heard for so long his call was cancelled before.
+constexpr absl::Duration kForgotten = absl::Seconds(30);
 
 ClientLimitOptions Rate(double calls_per_second, double burst) {
   ClientLimitOptions options;
@@ -38,13 +40,23 @@ absl::Status Take(ClientLimits& limits, absl::string_view name, absl::Time now) 
 Strangers::Strangers(const StrangerOptions& options)
     : all_(Rate(options.all_per_second, options.all_burst), 0),
       by_address_(Rate(options.calls_per_second, options.burst), 0),
-      heard_(Rate(options.heard_per_second, options.heard_burst), 0) {}
+      heard_(Rate(options.heard_per_second, options.heard_burst), 0),
+      heard_at_once_(options.heard_at_once) {}
 
 Arrival Strangers::Hear(int lane, absl::Time now) {
-  if (Take(heard_, kEverybody, now).ok()) return {};
   absl::MutexLock lock(&mutex_);
+  while (!hearing_.empty() && now - hearing_.front() > kForgotten) hearing_.pop_front();
+  if (hearing_.size() < heard_at_once_ && Take(heard_, kEverybody, now).ok()) {
+    hearing_.push_back(now);
+    return {};
+  }
   ++not_logged_;
   return refusals_.Add(lane, now);
+}
+
+void Strangers::Leave() {
+  absl::MutexLock lock(&mutex_);
+  if (!hearing_.empty()) hearing_.pop_front();  // which of them it is does not matter
 }
 
 absl::Status Strangers::Enter(absl::string_view address, absl::Time now) {

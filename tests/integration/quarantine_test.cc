@@ -117,7 +117,7 @@ class ServerQuarantineTest : public ::testing::Test {
 TEST_F(ServerQuarantineTest, AScanAndAJobThatItDiesOfTwice) {
   Start();
   STRATA_ASSERT_OK(db_->maps().Create({}, kMap, {}));
-  STRATA_ASSERT_OK(Put(kBig, Floor(1'500)));
+  STRATA_ASSERT_OK(Put(kBig, Floor(1'000)));
   STRATA_ASSERT_OK(Put(kSmall, Floor(50)));
   for (int death = 1; death <= 2; ++death) {
     const std::string says = absl::StrCat("under way    ", death);
@@ -165,7 +165,7 @@ TEST_F(ServerQuarantineTest, AScanAndAJobThatItDiesOfTwice) {
 TEST_F(ServerQuarantineTest, AScanThatItIsKilledWithIsInnocent) {
   Start();
   STRATA_ASSERT_OK(db_->maps().Create({}, kMap, {}));
-  STRATA_ASSERT_OK(Put(kBig, Floor(1'500)));
+  STRATA_ASSERT_OK(Put(kBig, Floor(1'000)));
   int killed = 0;  // with the scan under way
   for (int wait_ms = 20; wait_ms < 3000 && killed < 3; wait_ms += wait_ms / 4) {
     absl::SleepFor(absl::Milliseconds(wait_ms));

@@ -32,6 +32,8 @@ class Stats:
     """Hash of what the map is made of; equal worlds have equal digests."""
     box: np.ndarray
     """(2, 3) lower and upper corner of the box around all surfaces, map frame [m]."""
+    tiles_prepared: int
+    """Of the tiles, those kept ready for plans of the default robot."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -158,7 +160,8 @@ class Map:
         """Stats of the current epoch."""
         s = self._connection.unary(self._maps.Stats, maps_pb2.GetMapStatsRequest(name=self.name)).stats
         return Stats(s.scans, s.scans_pending, s.scans_failed, s.points, s.patches, s.tiles, s.epoch,
-                     s.commit_sequence, s.content_digest, np.array([poses.array3(s.box_min), poses.array3(s.box_max)]))
+                     s.commit_sequence, s.content_digest, np.array([poses.array3(s.box_min), poses.array3(s.box_max)]),
+                     s.tiles_prepared)
 
     def wait(self, timeout=None):
         """Returns Stats once every scan is integrated or has failed; TimeoutError after `timeout` seconds."""

@@ -46,6 +46,21 @@ TEST(StrangersTest, FewAreHeardAndTheOthersAreCounted) {
   EXPECT_TRUE(strangers.Hear(0, kStart + absl::Seconds(1)).in);
 }
 
+// However slowly their requests come in: each may be as large as the largest.
+TEST(StrangersTest, FewAreHeardAtOnce) {
+  Strangers strangers({.heard_at_once = 2});
+  EXPECT_TRUE(strangers.Hear(0, kStart).in);
+  EXPECT_TRUE(strangers.Hear(0, kStart).in);
+  const absl::Time later = kStart + absl::Seconds(20);
+  EXPECT_FALSE(strangers.Hear(0, later).in);
+  strangers.Leave();
+  EXPECT_TRUE(strangers.Hear(0, later).in);
+  EXPECT_FALSE(strangers.Hear(0, later).in);
+  // Those whose calls were cancelled before their handlers ran never leave.
+  EXPECT_TRUE(strangers.Hear(0, kStart + absl::Seconds(31)).in);
+  EXPECT_FALSE(strangers.Hear(0, kStart + absl::Seconds(31)).in);
+}
+
 TEST(StrangersTest, WhereHundredsASecondAreRefusedTheirConnectionsMustGo) {
   Strangers strangers({.heard_per_second = 1.0, .heard_burst = 1.0});
   EXPECT_TRUE(strangers.Hear(0, kStart).in);
