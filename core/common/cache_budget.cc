@@ -15,6 +15,8 @@
 namespace strata {
 namespace {
 
+// What the heap loses between blocks that come and go, and who still holds what has gone.
+constexpr std::size_t kHeapShare = 8;
 constexpr absl::Duration kLookInterval = absl::Milliseconds(50);  // at who waits no more
 
 }  // namespace
@@ -65,7 +67,7 @@ void CacheBudget::Release(std::size_t bytes) {
 }
 
 void CacheBudget::Trim() {
-  while (cached_ + reserved_ > max_bytes_ && !order_.empty()) {
+  while (cached_ + reserved_ > max_bytes_ - max_bytes_ / kHeapShare && !order_.empty()) {
     const std::function<void()> evict = std::move(order_.back().evict);
     evict();
   }

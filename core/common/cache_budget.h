@@ -16,8 +16,9 @@
 
 namespace strata {
 
-// Where the caches that share it (LruCache) are full, the value that was used longest ago goes,
-// whichever cache it is in. Thread-safe; one mutex for all its caches.
+// Where the caches that share it (LruCache) have filled seven eighths of it, the value that was
+// used longest ago goes, whichever cache it is in: the rest is the heap's. Thread-safe; one mutex
+// for all its caches.
 class CacheBudget {
  public:
   explicit CacheBudget(std::size_t max_bytes) : max_bytes_(max_bytes) {}

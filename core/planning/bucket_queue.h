@@ -28,6 +28,7 @@ class BucketQueue {
     begun_ = false;
   }
   bool empty() const { return in_ring_ == 0 && beyond_.empty(); }
+  std::size_t size() const { return in_ring_ + beyond_.size(); }
   // No queued priority is lower.
   std::uint32_t lower_bound() const { return current_ << shift_; }
 
@@ -59,6 +60,21 @@ class BucketQueue {
     }
     --in_ring_;
     return (*bucket)[next_++];
+  }
+  // Forgets the values that are not `wanted`, with most of their memory. Others stay in order.
+  template <typename Wanted>
+  void Keep(const Wanted& wanted) {
+    std::vector<std::uint32_t>& begun = ring_[current_ & (ring_.size() - 1)];
+    begun.erase(begun.begin(), begun.begin() + static_cast<std::ptrdiff_t>(next_));
+    next_ = 0;
+    in_ring_ = 0;
+    for (std::vector<std::uint32_t>& bucket : ring_) {
+      std::erase_if(bucket, [&](std::uint32_t value) { return !wanted(value); });
+      if (bucket.capacity() > 2 * bucket.size()) bucket.shrink_to_fit();
+      in_ring_ += bucket.size();
+    }
+    std::erase_if(beyond_, [&](const auto& item) { return !wanted(item.second); });
+    beyond_.shrink_to_fit();
   }
 
  private:

@@ -55,9 +55,9 @@ class Planner {
  public:
   explicit Planner(const PlannerOptions& options);
 
-  // A path, or why there is none; both are OK. The path is the cheapest where a sixteenth of the
-  // budget holds the tiles that the search touches (with 160 MiB 32 of one level) and start and
-  // goal are not so far apart that it surely will not (32,000 cells); else it costs at most 1 %
+  // A path, or why there is none; both are OK. The path is the cheapest where a ninth of the
+  // budget holds the tiles that the search touches (with 160 MiB 56 of one level) and start and
+  // goal are not so far apart that it surely will not (58,000 cells); else it costs at most 1 %
   // more (core/planning/search.h). Where others search, it waits for its share of the memory.
   // Sensors do not see the ground they stand over: a start or goal where the robot cannot stand
   // moves to the nearest place on the same level, at most radius + max_gap away

@@ -38,6 +38,9 @@ constexpr std::uint32_t kMaxCost = 0xF0000000U;
 // to come back again would cost more.
 constexpr std::uint32_t kPatience = 32 * kCostPerCell;
 constexpr std::uint32_t kLargeSlack = 100;  // large searches may cost 1/100 more than the cheapest
+// What is queued is looked through once it is more: four of five wait for a turn at which their
+// patch has been expanded long before.
+constexpr std::size_t kMostQueued = std::size_t{1} << 20;
 // No move costs less: along an axis, along a diagonal.
 constexpr std::array<std::uint32_t, 2> kLeastCost = {kCostPerCell, kCostPerDiagonal};
 
@@ -82,6 +85,11 @@ class Search {
   absl::Status ExpandAll() {
     BucketQueue& queue = workspace_.queue();
     while (!queue.empty() && outcome_.end == SearchOutcome::End::kExhausted) {
+      if (queue.size() > most_queued_) {
+        queue.Keep([this](std::uint32_t value) { return IsLeft(value); });
+        most_queued_ = std::max(kMostQueued, 2 * queue.size());
+        continue;
+      }
       const PatchId patch = queue.Pop();
       if (goal_cost_ <= queue.lower_bound()) break;
       if (patch >= kFirstAwaited) {
@@ -91,6 +99,15 @@ class Search {
       }
     }
     return space_.status();
+  }
+
+  // Whether a value of the queue stands for a tile, or for a patch at hand that is not expanded.
+  bool IsLeft(std::uint32_t value) {
+    if (value >= kFirstAwaited) return true;
+    const int slot = space_.SlotOf(value);
+    if (!workspace_.AtHand(slot)) return false;
+    const PatchId base = space_.slots()[slot].base;
+    return (workspace_.member(slot).states[value - base] & kClosed) == 0;
   }
 
   absl::Status ExpandOne(PatchId patch) {
@@ -437,6 +454,7 @@ class Search {
   std::vector<TileKey> awaited_;  // by ParkedTile::awaited
   // Of the tile that is searched again: what comes before the rest of the search goes on.
   BucketQueue again_;
+  std::size_t most_queued_ = kMostQueued;
   int again_slot_ = -1;
   std::uint32_t again_end_ = 0;
   std::vector<std::uint8_t> again_directions_;  // ParkedTile::directions

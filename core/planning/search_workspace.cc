@@ -20,8 +20,8 @@ namespace {
 // Parts of the budget: what every search has at once; what a large one waits for, some of the tiles
 // that it parks included; and of that what the tiles at hand may take.
 constexpr std::size_t kSmallShare = 32;
-constexpr std::size_t kLargeShare = 10;
-constexpr std::size_t kAtHandShare = 16;
+constexpr std::size_t kLargeShare = 8;
+constexpr std::size_t kAtHandShare = 9;
 // A way of n cells makes a search expand more than n times this.
 constexpr std::size_t kLeastBreadth = 64;
 

@@ -58,7 +58,7 @@ struct ParkedTile {
   }
 };
 
-// Memory of one search. With a budget it has few tiles at hand at a time, a sixteenth of it with
+// Memory of one search. With a budget it has few tiles at hand at a time, a ninth of it with
 // 0.33 MB a tile of one level, and parks the others. The prepared tiles themselves are the cache's.
 class SearchWorkspace {
  public:

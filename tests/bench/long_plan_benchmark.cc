@@ -29,6 +29,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
+#include <malloc.h>
 
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/cache_budget.h"
@@ -339,6 +340,8 @@ PlanEndpoint EndpointOf(const char* text) {
 }
 
 int Run(int argc, char** argv) {
+  mallopt(M_ARENA_MAX, 4);  // as stratad does, with what the process takes in mind
+  mallopt(M_MMAP_THRESHOLD, 256 << 10);
   const std::string kind = argc > 1 ? argv[1] : "street";
   const std::size_t cache_mib = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : 160;
   const double length_m = argc > 3 ? std::atof(argv[3]) : kind == "yard" ? 269.0 : 7000.0;

@@ -1,8 +1,10 @@
 #include "core/planning/bucket_queue.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <iterator>
 #include <map>
 #include <random>
 
@@ -30,7 +32,18 @@ class Model {
     if (lowest->second.empty()) buckets_.erase(lowest);
     return value;
   }
+  void KeepEven() {
+    for (auto it = buckets_.begin(); it != buckets_.end();) {
+      std::erase_if(it->second, [](std::uint32_t value) { return value % 2 != 0; });
+      it = it->second.empty() ? buckets_.erase(it) : std::next(it);
+    }
+  }
   bool empty() const { return buckets_.empty(); }
+  std::size_t size() const {
+    std::size_t size = 0;
+    for (const auto& [bucket, values] : buckets_) size += values.size();
+    return size;
+  }
   std::uint32_t lower_bound() const { return current_ << shift_; }
 
  private:
@@ -51,6 +64,10 @@ TEST(BucketQueueTest, GivesBackInTheOrderOfBucketsHoweverFarTheySpan) {
     queue.Clear(shift);
     Model model(shift);
     for (std::uint32_t step = 0; step < 4000; ++step) {
+      if (random() % 500 == 0) {
+        queue.Keep([](std::uint32_t value) { return value % 2 == 0; });
+        model.KeepEven();
+      }
       if (model.empty() || random() % 100 < (step < 2500 ? 60 : 30)) {
         const std::uint32_t priority = model.lower_bound() + random() % span;
         if (priority >= 0xF0000000U) continue;
@@ -61,6 +78,7 @@ TEST(BucketQueueTest, GivesBackInTheOrderOfBucketsHoweverFarTheySpan) {
         ASSERT_EQ(queue.lower_bound(), model.lower_bound());
       }
       ASSERT_EQ(queue.empty(), model.empty());
+      ASSERT_EQ(queue.size(), model.size());
     }
   }
 }
