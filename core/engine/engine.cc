@@ -11,14 +11,14 @@
 #include "absl/strings/str_join.h"
 
 #include "core/common/status.h"
-#include "core/engine/classifiers.h"
-#include "core/engine/jobs.h"
-#include "core/engine/maps.h"
-#include "core/engine/numbers.h"
-#include "core/engine/planning.h"
-#include "core/engine/posegraph.h"
-#include "core/engine/scans.h"
-#include "core/engine/tiles.h"
+#include "core/engine/doors/classifiers.h"
+#include "core/engine/doors/jobs.h"
+#include "core/engine/doors/maps.h"
+#include "core/engine/doors/planning.h"
+#include "core/engine/doors/posegraph.h"
+#include "core/engine/doors/scans.h"
+#include "core/engine/doors/tiles.h"
+#include "core/engine/map/numbers.h"
 
 namespace strata {
 namespace {

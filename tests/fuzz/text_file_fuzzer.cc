@@ -5,10 +5,10 @@
 
 #include <fuzzer/FuzzedDataProvider.h>
 
-#include "client/cli/label_classes.h"
-#include "client/cli/number_file.h"
+#include "client/cli/classifier/label_classes.h"
 #include "client/cli/path_file.h"
-#include "client/cli/posegraph_exchange.h"
+#include "client/cli/posegraph/posegraph_exchange.h"
+#include "client/cli/terminal/number_file.h"
 #include "client/formats/graph_file.h"
 #include "client/formats/plain_readers.h"
 #include "client/formats/pose_reader.h"
