@@ -18,8 +18,8 @@
 #include "core/api/maps.h"
 #include "core/common/cache_budget.h"
 #include "core/engine/doors/map.h"
-#include "core/engine/engine.h"
 #include "core/engine/map/directory.h"
+#include "core/engine/map/engine_options.h"
 #include "core/engine/map/numbers.h"
 
 namespace strata {

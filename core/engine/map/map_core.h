@@ -18,9 +18,9 @@
 #include "absl/synchronization/mutex.h"
 
 #include "core/common/cache_budget.h"
-#include "core/engine/engine.h"
 #include "core/engine/map/change_log.h"
 #include "core/engine/map/disk_space.h"
+#include "core/engine/map/engine_options.h"
 #include "core/engine/map/reader_pool.h"
 #include "core/engine/map/snapshots.h"
 #include "core/engine/map/writer.h"
