@@ -10,7 +10,7 @@
 
 #include "core/engine/consistency/graph_world.h"
 #include "core/engine/consistency/optimize_settings.h"
-#include "core/engine/jobs/job_board.h"
+#include "core/engine/map/job_context.h"
 #include "core/engine/scans/scan_views.h"
 
 namespace strata {

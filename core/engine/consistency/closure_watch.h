@@ -8,7 +8,7 @@
 
 #include "core/common/stop.h"
 #include "core/engine/consistency/graph_world.h"
-#include "core/engine/jobs/job_board.h"
+#include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/map/snapshots.h"
 #include "core/storage/storage.h"

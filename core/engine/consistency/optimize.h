@@ -5,7 +5,7 @@
 #include "absl/status/status.h"
 
 #include "core/engine/ingest/worker.h"
-#include "core/engine/jobs/job_board.h"
+#include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
 #include "core/world/job.h"
 

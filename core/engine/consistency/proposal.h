@@ -8,7 +8,7 @@
 
 #include "core/engine/ingest/integrator.h"
 #include "core/engine/ingest/pose_change.h"
-#include "core/engine/jobs/job_board.h"
+#include "core/engine/map/job_context.h"
 #include "core/engine/scans/damaged_scans.h"
 #include "core/world/job.h"
 

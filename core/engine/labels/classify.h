@@ -6,7 +6,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/engine/ingest/worker.h"
-#include "core/engine/jobs/job_board.h"
+#include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
 
 namespace strata {

@@ -9,7 +9,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/engine/ingest/worker.h"
-#include "core/engine/jobs/job_board.h"
+#include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
 #include "core/mls/see_through.h"
 #include "core/world/job.h"

@@ -11,7 +11,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/classification/classifier.h"
-#include "core/engine/jobs/job_board.h"
+#include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/scans/damaged_scans.h"
 #include "core/storage/storage.h"

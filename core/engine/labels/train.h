@@ -9,7 +9,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/classification/classifier.h"
-#include "core/engine/jobs/job_board.h"
+#include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
 
 namespace strata {

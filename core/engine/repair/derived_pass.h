@@ -11,7 +11,7 @@
 #include "absl/status/status.h"
 #include <Eigen/Geometry>
 
-#include "core/engine/jobs/job_board.h"
+#include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/map/steady_view.h"
 #include "core/engine/tiles/mls_tiles.h"

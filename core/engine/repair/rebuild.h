@@ -8,7 +8,7 @@
 
 #include "core/common/stop.h"
 #include "core/engine/ingest/integrator.h"
-#include "core/engine/jobs/job_board.h"
+#include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
 #include "core/world/job.h"
 
