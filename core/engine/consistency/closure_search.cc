@@ -9,8 +9,8 @@
 #include "absl/strings/str_format.h"
 
 #include "core/common/status.h"
-#include "core/engine/ingest/aligner.h"
 #include "core/engine/map/parallel.h"
+#include "core/engine/scans/matching.h"
 #include "core/posegraph/closure_candidates.h"
 #include "core/posegraph/closure_consistency.h"
 #include "core/posegraph/information.h"

@@ -15,8 +15,8 @@
 
 #include "core/common/status.h"
 #include "core/engine/consistency/graph_world.h"
-#include "core/engine/ingest/aligner.h"
 #include "core/engine/map/parallel.h"
+#include "core/engine/scans/matching.h"
 #include "core/engine/scans/scan_views.h"
 #include "core/mls/build.h"
 #include "core/posegraph/information.h"

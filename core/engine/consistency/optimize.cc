@@ -20,6 +20,7 @@
 #include "core/engine/consistency/proposal.h"
 #include "core/engine/map/parallel.h"
 #include "core/engine/scans/damaged_scans.h"
+#include "core/engine/scans/matching.h"
 #include "core/engine/scans/scan_views.h"
 #include "core/posegraph/alignment.h"
 

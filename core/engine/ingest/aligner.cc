@@ -13,6 +13,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/common/status.h"
+#include "core/engine/scans/matching.h"
 #include "core/registration/mls_registration.h"
 #include "core/registration/neighbours.h"
 
@@ -22,10 +23,6 @@ namespace {
 // A match to many scans at once is recorded as constraints to the nearest few, which share its
 // information: more would repeat the same measurement.
 constexpr std::size_t kMaxConstraints = 3;
-
-// Twice the default: a chain of hundreds of scans then drifts little whatever the sample
-// (neighbours.h has numbers).
-constexpr int kSamples = 4000;
 
 bool Accepted(Termination termination) {
   return termination == Termination::kConverged || termination == Termination::kMaxIterations ||
@@ -54,19 +51,6 @@ void NearestFirst(const std::vector<Pose>& poses,
 }
 
 }  // namespace
-
-ScanFeatureOptions FeatureOptionsOf(const ScanRecord& scan) {
-  ScanFeatureOptions options;
-  options.sample_count = kSamples;
-  options.sensor_origin = scan.header.sensor_origin.cast<double>();
-  return options;
-}
-
-MlsRegistrationOptions EngineRegistrationOptions() {
-  MlsRegistrationOptions options;
-  options.max_samples = kSamples;
-  return options;
-}
 
 absl::Status Aligner::Load(StorageReader& reader, std::uint64_t epoch) {
   scans_.clear();
@@ -162,7 +146,7 @@ absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
                                          ScanSource& source) {
   Placement placement;
   placement.T_map_scan = scan.header.T_map_scan;
-  const Features own = Keep(scan, local_map, kSamples);
+  const Features own = Keep(scan, local_map, FeatureOptionsOf(scan).sample_count);
   if (scan.header.alignment == Alignment::kOff) {
     placement.report.message = "alignment off: pose as uploaded";
     return placement;

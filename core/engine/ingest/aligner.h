@@ -15,18 +15,12 @@
 #include "core/common/lru_cache.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/mls/mls_map.h"
-#include "core/registration/mls_registration.h"
 #include "core/registration/registration_target.h"
 #include "core/registration/scan_features.h"
 #include "core/storage/storage.h"
 #include "core/world/scan.h"
 
 namespace strata {
-
-// How features of a scan are made everywhere in the engine.
-ScanFeatureOptions FeatureOptionsOf(const ScanRecord& scan);
-// How scans are matched everywhere in the engine.
-MlsRegistrationOptions EngineRegistrationOptions();
 
 // A decision about a scan's pose and what supports it.
 struct Placement {

@@ -5,7 +5,7 @@
 #include "absl/status/status.h"
 
 #include "core/common/status.h"
-#include "core/engine/ingest/aligner.h"
+#include "core/engine/scans/matching.h"
 #include "core/engine/scans/scan_share.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/planes/extraction.h"
