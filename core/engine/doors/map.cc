@@ -10,6 +10,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/common/status.h"
+#include "core/engine/repair/rebuild.h"
 
 namespace strata {
 
@@ -31,7 +32,7 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
   map->planner_ = std::make_unique<MapPlanner>(*map->core_);
   map->tiles_ = std::make_unique<ServedTiles>(*map->core_);
   map->localizer_ = std::make_unique<Localizer>(*map->core_);
-  map->worker_ = std::make_unique<Worker>(*map->core_, *map->quarantine_, pending);
+  map->worker_ = std::make_unique<Worker>(*map->core_, *map->quarantine_, &RecoverDerived, pending);
   map->runner_ =
       std::make_unique<JobRunner>(*map->core_, *map->quarantine_, *map->jobs_, *map->worker_);
   return map;

@@ -18,7 +18,6 @@
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/common/this_thread.h"
-#include "core/engine/repair/rebuild.h"
 
 namespace strata {
 namespace {
@@ -43,11 +42,20 @@ absl::Status Refusal() {
       "quarantine release has it try once more");
 }
 
+// Whether the derived tables are marked incomplete: they were dropped, or written by a program with
+// another format.
+absl::StatusOr<bool> NeedsRecovery(MapCore& core) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());
+  return !clock.derived_complete;
+}
+
 }  // namespace
 
-Worker::Worker(MapCore& core, Quarantine& quarantine, std::uint64_t pending)
+Worker::Worker(MapCore& core, Quarantine& quarantine, Recovery recover, std::uint64_t pending)
     : core_(core),
       quarantine_(quarantine),
+      recover_(recover),
       integrator_(core),
       keeper_(core, quarantine),
       next_rest_(SteadyNow() + core.options().prepare_after),
@@ -220,7 +228,7 @@ bool Worker::RunRecovery() {
       STRATA_ASSIGN_OR_RETURN(const bool needed, NeedsRecovery(core_));
       if (!needed) return absl::OkStatus();
       STRATA_RETURN_IF_ERROR(quarantine_.Begin(recovery));
-      const absl::Status recovered = Guarded([&] { return RecoverDerived(integrator_, closing_); });
+      const absl::Status recovered = Guarded([&] { return recover_(integrator_, closing_); });
       quarantine_.End(recovery).IgnoreError();
       return recovered;
     });

@@ -29,9 +29,12 @@ namespace strata {
 class Worker {
  public:
   using Command = absl::FunctionRef<absl::Status(Integrator&)>;
+  // Makes all that is derived again; `closing` ends it.
+  using Recovery = absl::Status (*)(Integrator&, const Stop& closing);
 
-  // All must outlive the worker. Begins where the last run stopped; `pending` scans wait.
-  Worker(MapCore& core, Quarantine& quarantine, std::uint64_t pending);
+  // All must outlive the worker. Begins where the last run stopped; `pending` scans wait. `recover`
+  // is called first where what is derived is not usable, and again until it succeeds.
+  Worker(MapCore& core, Quarantine& quarantine, Recovery recover, std::uint64_t pending);
   ~Worker();
 
   // RESOURCE_EXHAUSTED while too many scans wait for integration.
@@ -60,7 +63,7 @@ class Worker {
   enum class Step { kClosed, kCommand, kBatch, kRest };
 
   void Loop();
-  // Rebuilds what is derived if it is not usable; whether it is then.
+  // Calls recover_ if what is derived is not usable; whether it is then.
   bool RunRecovery();
   // Answers all commands with why nothing can be done, until the worker is closed.
   void Refuse();
@@ -78,6 +81,7 @@ class Worker {
 
   MapCore& core_;
   Quarantine& quarantine_;
+  const Recovery recover_;
   Integrator integrator_;
   TileKeeper keeper_;
   // The thread's.

@@ -176,12 +176,6 @@ absl::Status RunVerifyJob(MapCore& core, const JobInfo& job, JobContext& context
   });
 }
 
-absl::StatusOr<bool> NeedsRecovery(MapCore& core) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-  STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());
-  return !clock.derived_complete;
-}
-
 absl::Status RecoverDerived(Integrator& integrator, const Stop& closing) {
   SilentContext context(closing);
   return Rebuild(integrator, integrator.core().options().worker_threads, context);

@@ -24,11 +24,7 @@ absl::Status RunVerifyJob(MapCore& core, const JobInfo& job, JobContext& context
 // On the worker's thread.
 absl::Status RunRebuildJob(Integrator& integrator, const JobInfo& job, JobContext& context);
 
-// Whether the derived tables are marked incomplete: they were dropped, or written by a program with
-// another format.
-absl::StatusOr<bool> NeedsRecovery(MapCore& core);
-
-// Rebuilds them at once.
+// Rebuilds at once, as a Worker::Recovery.
 absl::Status RecoverDerived(Integrator& integrator, const Stop& closing);
 
 }  // namespace strata
