@@ -17,6 +17,7 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 
+#include "client/cli/terminal/patience.h"
 #include "core/cloud/cloud_slice.h"
 #include "core/codec/local_map_codec.h"
 #include "core/common/status.h"

@@ -10,7 +10,6 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/time/time.h"
 
 #include "core/api/database.h"
 #include "core/cloud/point_cloud.h"
@@ -18,9 +17,6 @@
 #include "core/world/scan.h"
 
 namespace strata::cli {
-
-// How long an import puts up with a server that is away or busy.
-inline constexpr absl::Duration kPatience = absl::Minutes(1);
 
 // A scan to upload. `header` has id, time, alignment and the pose of the points as `read` returns
 // them; what depends on the points is filled in by the uploader.

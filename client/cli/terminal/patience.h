@@ -7,16 +7,18 @@
 #include "absl/status/status.h"
 #include "absl/time/time.h"
 
-#include "client/cli/scan/scan_uploader.h"
 #include "core/common/steady_time.h"
 
 namespace strata::cli {
 
+// How long a command puts up with a server that is away or busy.
+inline constexpr absl::Duration kPatience = absl::Minutes(1);
+
 // Counts from the first of several failures in a row. Not thread-safe.
 class Patience {
  public:
-  // True if it is worth asking again after `status`: always after OK, for kPatience, as an
-  // import, while the server is UNAVAILABLE, never after another error.
+  // True if it is worth asking again after `status`: always after OK, for kPatience while the
+  // server is UNAVAILABLE, never after another error.
   bool Has(const absl::Status& status) {
     if (!absl::IsUnavailable(status)) {
       away_since_ = absl::InfiniteFuture();
