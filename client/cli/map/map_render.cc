@@ -16,13 +16,13 @@
 
 #include "client/cli/map/map_files.h"
 #include "client/cli/map/tile_source.h"
-#include "client/cli/path_file.h"
 #include "client/cli/picture/map_picture.h"
 #include "client/cli/posegraph/graph_overlay.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
 #include "client/formats/file_bytes.h"
+#include "client/formats/path_file.h"
 #include "core/common/status.h"
 #include "core/world/map_class.h"
 

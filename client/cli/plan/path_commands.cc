@@ -5,10 +5,10 @@
 
 #include "absl/status/statusor.h"
 
-#include "client/cli/path_file.h"
 #include "client/cli/plan/driver_options.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/json.h"
+#include "client/formats/path_file.h"
 #include "core/common/status.h"
 
 namespace strata::cli {

@@ -10,13 +10,13 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
-#include "client/cli/path_file.h"
 #include "client/cli/plan/driver_options.h"
 #include "client/cli/plan/path_commands.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
 #include "client/cli/terminal/number_file.h"
+#include "client/formats/path_file.h"
 #include "core/common/status.h"
 
 namespace strata::cli {

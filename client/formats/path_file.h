@@ -1,6 +1,6 @@
 // Paths as PLY files: vertices in order, joined by edges.
-#ifndef STRATA_CLIENT_CLI_PATH_FILE_H_
-#define STRATA_CLIENT_CLI_PATH_FILE_H_
+#ifndef STRATA_CLIENT_FORMATS_PATH_FILE_H_
+#define STRATA_CLIENT_FORMATS_PATH_FILE_H_
 
 #include <string>
 #include <vector>
@@ -9,7 +9,7 @@
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
 
-namespace strata::cli {
+namespace strata {
 
 // UNAVAILABLE if the file cannot be written.
 absl::Status WritePath(const std::string& path, const std::vector<Eigen::Vector3d>& waypoints);
@@ -17,6 +17,6 @@ absl::Status WritePath(const std::string& path, const std::vector<Eigen::Vector3
 // The vertices of any PLY file in their order. INVALID_ARGUMENT or NOT_FOUND naming the file.
 absl::StatusOr<std::vector<Eigen::Vector3d>> ReadPath(const std::string& path);
 
-}  // namespace strata::cli
+}  // namespace strata
 
-#endif  // STRATA_CLIENT_CLI_PATH_FILE_H_
+#endif  // STRATA_CLIENT_FORMATS_PATH_FILE_H_

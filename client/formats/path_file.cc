@@ -1,4 +1,4 @@
-#include "client/cli/path_file.h"
+#include "client/formats/path_file.h"
 
 #include <string>
 #include <vector>
@@ -8,7 +8,7 @@
 #include "client/formats/scan_reader.h"
 #include "core/common/status.h"
 
-namespace strata::cli {
+namespace strata {
 
 absl::Status WritePath(const std::string& path, const std::vector<Eigen::Vector3d>& waypoints) {
   STRATA_ASSIGN_OR_RETURN(const std::string bytes, PlyBytes(PathGeometry(waypoints)));
@@ -20,4 +20,4 @@ absl::StatusOr<std::vector<Eigen::Vector3d>> ReadPath(const std::string& path) {
   return GeometryOf(cloud).vertices;
 }
 
-}  // namespace strata::cli
+}  // namespace strata
