@@ -21,7 +21,7 @@ class EngineJobs final : public api::Jobs {
  public:
   explicit EngineJobs(EngineMaps& maps) : maps_(maps) {}
 
-  // Parameters: rebuild.h, optimize.h, revert.h, train.h, classify.h.
+  // Kinds and parameters: rebuild.h, optimize_settings.h, revert.h, train.h, classify.h, fade.h.
   absl::StatusOr<JobInfo> Start(const api::Call& call,
                                 absl::string_view map,
                                 absl::string_view kind,

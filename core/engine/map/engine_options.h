@@ -27,7 +27,9 @@ struct EngineOptions {
   std::uint64_t max_maps = 10'000;
   // Largest size of a map's file; 0: none.
   std::uint64_t max_map_bytes = 0;
-  // Threads that rebuild and verify use, each map; at least 1. Results do not depend on it.
+  // Threads that each map uses for integration, edits, plans, the search for places and, where a
+  // job says no other number, for jobs; in [1, 64]. Results do not depend on it. No flag of a
+  // program sets it.
   int worker_threads = 2;
   // How long the points of an announced scan (ScanHeader::content_hash) whose stream ended stay for
   // its client to go on with; zero: not at all. What has stayed longer goes when the next stream
