@@ -15,7 +15,7 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
-#include "core/engine/map_check.h"
+#include "core/engine/map/map_check.h"
 #include "server/access/token_file.h"
 #include "server/access/utc_text.h"
 #include "server/tls.h"

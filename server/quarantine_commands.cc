@@ -11,7 +11,7 @@
 #include "absl/strings/str_join.h"
 
 #include "core/common/status.h"
-#include "core/engine/quarantine_file.h"
+#include "core/engine/map/quarantine_file.h"
 
 namespace strata::server {
 namespace {

@@ -22,7 +22,7 @@
 #include "core/common/log_line.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
-#include "core/engine/numbers.h"
+#include "core/engine/map/numbers.h"
 #include "server/access/grant_table.h"
 #include "server/door.h"
 #include "server/health.h"

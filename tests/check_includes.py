@@ -1,16 +1,18 @@
 #!/usr/bin/env python3
-"""Holds every #include of the tree against the table of allowed arrows.
+"""Holds every #include of the tree against the table of allowed arrows, and every folder to a size.
 
-A room may include itself and the rooms named beside it, nothing else of ours; external headers that only one room
-may know are listed below. Prints each wrong arrow and exits 1.
+A room may include itself and the rooms named beside it, nothing else of ours; of the rooms inside it each may include
+itself and those below. External headers that only one room may know are listed below. Prints each wrong arrow, and each
+folder where nobody finds anything by its name any more, and exits 1.
 """
+import collections
 import pathlib
 import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# room: rooms it may include. The same table as in README.md and core/README.md; a change here is a decision.
+# room: rooms it may include. The rows of core are those of core/README.md; a change here is a decision.
 ARROWS = {
     "core/common": [],
     "core/geometry": ["core/common"],
@@ -38,6 +40,21 @@ ARROWS = {
                    "core/common"],
 }
 
+# room: the rooms inside it, highest first, as in core/README.md; HERE: the files of the folder itself.
+HERE = "."
+STOREYS = {
+    "core/mls": ["elevation", HERE],
+    "core/classification": [HERE, "learners", "amn", "features"],
+    "core/planning": [HERE, "ground"],
+    "core/storage": ["sqlite", HERE],
+    "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "ingest", "tiles", "scans", "map"],
+    "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "job", "picture", "terminal"],
+}
+
+# Sources a folder may hold, and those that hold more until they are divided.
+MOST_FILES = 40
+CROWDED = ["core/posegraph"]
+
 # external header pattern: rooms that may include it
 EXTERNAL = {
     r"sqlite3\.h": ["core/storage/sqlite"],
@@ -58,6 +75,29 @@ def room_of(path: str) -> str | None:
     return max(rooms, key=len) if rooms else None
 
 
+def storey_of(room: str, path: str) -> str:
+    """Which of STOREYS[room] the file is in."""
+    inside = path.removeprefix(room + "/")
+    return inside.split("/")[0] if "/" in inside else HERE
+
+
+def points_up(room: str, name: str, target: str) -> bool:
+    """Whether a room inside `room` includes one that stands above it, or one of the two is in no list."""
+    storeys = STOREYS.get(room)
+    if storeys is None or not target.startswith(room + "/"):
+        return False
+    own, other = storey_of(room, name), storey_of(room, target)
+    return own not in storeys or other not in storeys or storeys.index(other) < storeys.index(own)
+
+
+def crowded(files: list[pathlib.Path]) -> list[str]:
+    sizes = collections.Counter(path.parent.relative_to(ROOT).as_posix() for path in files)
+    faults = [f"{folder}: {size} files, more than {MOST_FILES}: divide it into rooms"
+              for folder, size in sizes.items() if size > MOST_FILES and folder not in CROWDED]
+    return faults + [f"{folder}: strike it from CROWDED in tests/check_includes.py, it holds {sizes[folder]} files"
+                     for folder in CROWDED if sizes[folder] <= MOST_FILES]
+
+
 def check(path: pathlib.Path) -> list[str]:
     name = path.relative_to(ROOT).as_posix()
     room = room_of(name)
@@ -70,6 +110,8 @@ def check(path: pathlib.Path) -> list[str]:
             generated = target.startswith("proto/") and target.endswith(".pb.h")
             if not any(target.startswith(a if a.endswith("/") else a + "/") for a in allowed):
                 faults.append(f"{name}: {room} may not include {target}")
+            elif points_up(room, name, target):
+                faults.append(f"{name}: {target} stands above it, or one of them in no room of STOREYS")
             elif bracket == "<":
                 faults.append(f"{name}: write \"{target}\", it is ours")
             elif not generated and not (ROOT / target).is_file():
@@ -83,7 +125,7 @@ def check(path: pathlib.Path) -> list[str]:
 def main() -> int:
     files = [p for top in ("core", "client", "server", "proto") for p in sorted((ROOT / top).rglob("*"))
              if p.suffix in (".h", ".cc")]
-    faults = [fault for path in files for fault in check(path)]
+    faults = [fault for path in files for fault in check(path)] + crowded(files)
     print("\n".join(faults) if faults else f"include arrows: {len(files)} files, all as in the table")
     return 1 if faults else 0
 

@@ -13,9 +13,9 @@
 #include "absl/strings/str_cat.h"
 #include <CLI/CLI.hpp>
 
-#include "client/cli/command.h"
 #include "client/cli/connect.h"
-#include "client/cli/output.h"
+#include "client/cli/terminal/command.h"
+#include "client/cli/terminal/output.h"
 #include "client/cli/usage.h"
 #include "core/common/status.h"
 #include "core/common/stop.h"

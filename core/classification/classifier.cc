@@ -5,9 +5,9 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "core/classification/amn_inference.h"
-#include "core/classification/instance_features.h"
-#include "core/classification/instances.h"
+#include "core/classification/amn/amn_inference.h"
+#include "core/classification/features/instance_features.h"
+#include "core/classification/learners/instances.h"
 #include "core/common/option_checks.h"
 #include "core/common/status.h"
 

@@ -13,12 +13,12 @@
 #include "absl/strings/string_view.h"
 #include <Eigen/Core>
 
-#include "core/classification/adaboost.h"
-#include "core/classification/amn.h"
-#include "core/classification/features.h"
-#include "core/classification/labelled_features.h"
-#include "core/classification/naive_bayes.h"
-#include "core/classification/network.h"
+#include "core/classification/amn/amn.h"
+#include "core/classification/amn/network.h"
+#include "core/classification/features/features.h"
+#include "core/classification/features/labelled_features.h"
+#include "core/classification/learners/adaboost.h"
+#include "core/classification/learners/naive_bayes.h"
 #include "core/classification/reduction.h"
 #include "core/cloud/point_cloud.h"
 #include "core/common/stop.h"

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "core/classification/labelled_features.h"
+#include "core/classification/features/labelled_features.h"
 
 namespace strata {
 

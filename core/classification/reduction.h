@@ -22,7 +22,7 @@
 #include "absl/strings/string_view.h"
 #include <Eigen/Core>
 
-#include "core/classification/labelled_features.h"
+#include "core/classification/features/labelled_features.h"
 
 namespace strata {
 

@@ -7,9 +7,9 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "core/classification/amn_learning.h"
-#include "core/classification/instance_features.h"
-#include "core/classification/instances.h"
+#include "core/classification/amn/amn_learning.h"
+#include "core/classification/features/instance_features.h"
+#include "core/classification/learners/instances.h"
 #include "core/common/status.h"
 
 namespace strata {

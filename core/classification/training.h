@@ -11,9 +11,9 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/classification/amn/network.h"
 #include "core/classification/classifier.h"
-#include "core/classification/labelled_features.h"
-#include "core/classification/network.h"
+#include "core/classification/features/labelled_features.h"
 #include "core/cloud/point_cloud.h"
 #include "core/common/stop.h"
 

@@ -1,24 +1,19 @@
 #include "core/engine/engine.h"
 
 #include <memory>
-#include <string>
 #include <utility>
-#include <vector>
 
-#include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
 
 #include "core/common/status.h"
-#include "core/engine/classifiers.h"
-#include "core/engine/jobs.h"
-#include "core/engine/maps.h"
-#include "core/engine/numbers.h"
-#include "core/engine/planning.h"
-#include "core/engine/posegraph.h"
-#include "core/engine/scans.h"
-#include "core/engine/tiles.h"
+#include "core/engine/doors/classifiers.h"
+#include "core/engine/doors/jobs.h"
+#include "core/engine/doors/maps.h"
+#include "core/engine/doors/planning.h"
+#include "core/engine/doors/posegraph.h"
+#include "core/engine/doors/scans.h"
+#include "core/engine/doors/tiles.h"
+#include "core/engine/map/numbers.h"
 
 namespace strata {
 namespace {
@@ -48,35 +43,6 @@ class Engine final : public api::Database, public NumbersSource {
 };
 
 }  // namespace
-
-absl::Status EngineOptions::Validate() const {
-  std::vector<std::string> faults;
-  if (directory.empty()) faults.emplace_back("directory is empty");
-  if (queue_bytes < (std::size_t{1} << 20)) faults.emplace_back("queue_bytes is below 1 MiB");
-  if (max_points_per_scan == 0) faults.emplace_back("max_points_per_scan is 0");
-  if (max_maps == 0) faults.emplace_back("max_maps is 0");
-  if (max_pending_scans == 0) faults.emplace_back("max_pending_scans is 0");
-  if (worker_threads < 1 || worker_threads > 64) {
-    faults.push_back(absl::StrCat("worker_threads = ", worker_threads, " is not in [1, 64]"));
-  }
-  if (max_batch_scans < 1 || max_batch_scans > 1000) {
-    faults.push_back(absl::StrCat("max_batch_scans = ", max_batch_scans, " is not in [1, 1000]"));
-  }
-  if (optimize_interval < absl::ZeroDuration()) {
-    faults.push_back(absl::StrCat(
-        "optimize_interval = ", absl::FormatDuration(optimize_interval), " is negative"));
-  }
-  if (prepare_after < absl::ZeroDuration()) {
-    faults.push_back(
-        absl::StrCat("prepare_after = ", absl::FormatDuration(prepare_after), " is negative"));
-  }
-  if (upload_keep < absl::ZeroDuration()) {
-    faults.push_back(
-        absl::StrCat("upload_keep = ", absl::FormatDuration(upload_keep), " is negative"));
-  }
-  if (faults.empty()) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("engine: ", absl::StrJoin(faults, "; ")));
-}
 
 absl::StatusOr<std::unique_ptr<api::Database>> OpenEngine(const EngineOptions& options) {
   STRATA_RETURN_IF_ERROR(options.Validate());

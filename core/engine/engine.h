@@ -2,62 +2,14 @@
 #ifndef STRATA_CORE_ENGINE_ENGINE_H_
 #define STRATA_CORE_ENGINE_ENGINE_H_
 
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
 #include <memory>
 
-#include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/time/time.h"
 
 #include "core/api/database.h"
+#include "core/engine/map/engine_options.h"
 
 namespace strata {
-
-struct EngineOptions {
-  // Where the maps lie, one file each; made if it is not there. Owned by one engine at a time.
-  std::filesystem::path directory;
-  // Larger scans are refused.
-  std::uint64_t max_points_per_scan = 100'000'000;
-  // Acknowledged scans of a map that may wait for integration; more are refused until it caught up.
-  std::uint64_t max_pending_scans = 100'000;
-  // Bytes of points of a map that may wait for the disk; uploads block beyond it. In [1 MiB, …).
-  std::size_t queue_bytes = std::size_t{64} << 20;
-  // What is kept in memory of all maps together: tiles, features of scans, what planning prepares
-  // and the searches under way.
-  std::size_t cache_bytes = std::size_t{160} << 20;
-  // Maps there may be; one more is refused with RESOURCE_EXHAUSTED.
-  std::uint64_t max_maps = 10'000;
-  // Largest size of a map's file; 0: none.
-  std::uint64_t max_map_bytes = 0;
-  // Threads that rebuild and verify use, each map; at least 1. Results do not depend on it.
-  int worker_threads = 2;
-  // How long the points of an announced scan (ScanHeader::content_hash) whose stream ended stay for
-  // its client to go on with; zero: not at all. What has stayed longer goes when the next stream
-  // begins or ends.
-  absl::Duration upload_keep = absl::Hours(1);
-  // Bytes of such points a map keeps, the newest; those of streams under way are not counted.
-  std::uint64_t max_kept_upload_bytes = std::uint64_t{4} << 30;
-  // And so many of them.
-  std::size_t max_kept_uploads = 10'000;
-  // Scans integrated in one transaction when there is a backlog; at least 1. Tiles do not depend on
-  // it.
-  int max_batch_scans = 16;
-  // After a verified closure, and at most so often, a map's poses are optimised without being
-  // asked; zero: never.
-  absl::Duration optimize_interval = absl::ZeroDuration();
-  // Tiles that nothing has changed for so long are prepared for plans of the map's default robot
-  // when its worker has nothing else to do, and kept in its file; infinite: never.
-  absl::Duration prepare_after = absl::Seconds(10);
-  // How the last process that had the directory ended, if not well: killed by somebody or with the
-  // machine, neither by a fault of its own nor for want of memory. What was under way then is tried
-  // alone, but not put aside.
-  bool killed_from_outside = false;
-
-  // INVALID_ARGUMENT naming every field out of its range.
-  absl::Status Validate() const;
-};
 
 // Opens the directory: unfinished uploads are dropped but for announced ones, pending scans and
 // jobs go on by themselves. FAILED_PRECONDITION while another engine has it. A map whose file is

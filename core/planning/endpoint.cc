@@ -20,7 +20,7 @@
 #include "core/common/status.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/explain.h"
-#include "core/planning/profile_checks.h"
+#include "core/planning/ground/profile_checks.h"
 #include "core/planning/search_space.h"
 #include "core/world/plan.h"
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/mls/tile_key.h"
-#include "core/planning/ground_window.h"
+#include "core/planning/ground/ground_window.h"
 
 namespace strata {
 

@@ -12,7 +12,7 @@
 
 #include "core/common/status.h"
 #include "core/planning/explain.h"
-#include "core/planning/ground_window.h"
+#include "core/planning/ground/ground_window.h"
 #include "core/planning/route.h"
 
 namespace strata {

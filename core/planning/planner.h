@@ -2,16 +2,16 @@
 // some size can take, and what the safest short way is.
 //
 // A patch (its top, that of a vertical one too) is a state. A robot may stand on it if
-//   - slope and roughness of the local plane hold (core/planning/ground_fit.h),
-//   - no edge of its level (core/planning/ground_checks.h: obstacle, step, drop, too little
+//   - slope and roughness of the local plane hold (core/planning/ground/ground_fit.h),
+//   - no edge of its level (core/planning/ground/ground_checks.h: obstacle, step, drop, too little
 //     clearance, unknown ground wider than max_gap) comes within its radius.
 // It moves to the eight neighbouring cells over steps of at most max_step, and over up to max_gap
 // of unobserved cells between fitting rims. Where a robot may stand and move grows with max_step,
 // max_slope and max_gap, and as radius and height shrink (see ground_checks.h). A move of length l
-// costs l · (1 + danger), the mean of both ends' danger (core/planning/profile_checks.h), plus
-// kGapDanger over unobserved ground. A query may bring costs of classes: a move is then multiplied
-// by the mean factor of both ends' classes, and forbidden classes are no place to stand; what
-// bounds costs without classes stays a lower bound, and nothing is prepared anew.
+// costs l · (1 + danger), the mean of both ends' danger (core/planning/ground/profile_checks.h),
+// plus kGapDanger over unobserved ground. A query may bring costs of classes: a move is then
+// multiplied by the mean factor of both ends' classes, and forbidden classes are no place to stand;
+// what bounds costs without classes stays a lower bound, and nothing is prepared anew.
 //
 // What is prepared, per tile and profile, when a query first touches a tile, and kept while it fits
 // the cache: heights, dangers and which moves there are, 6 bytes a patch to stand on and some 3 of
@@ -33,8 +33,8 @@
 #include "core/common/cache_budget.h"
 #include "core/common/stop.h"
 #include "core/mls/tile_key.h"
+#include "core/planning/ground/rows.h"
 #include "core/planning/landmarks.h"
-#include "core/planning/rows.h"
 #include "core/planning/tile_cache.h"
 #include "core/planning/tile_source.h"
 #include "core/world/plan.h"

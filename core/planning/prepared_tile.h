@@ -10,11 +10,11 @@
 
 #include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
-#include "core/planning/ground_window.h"
+#include "core/planning/ground/ground_window.h"
+#include "core/planning/ground/profile_checks.h"
+#include "core/planning/ground/rows.h"
 #include "core/planning/move_cost.h"
 #include "core/planning/patch_index.h"
-#include "core/planning/profile_checks.h"
-#include "core/planning/rows.h"
 
 namespace strata {
 

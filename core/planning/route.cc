@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include "core/mls/tile_key.h"
-#include "core/planning/ground_window.h"
+#include "core/planning/ground/ground_window.h"
 #include "core/planning/move_cost.h"
 #include "core/planning/search_space.h"
 #include "core/world/plan.h"

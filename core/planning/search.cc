@@ -17,7 +17,7 @@
 #include "core/common/stop.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/bucket_queue.h"
-#include "core/planning/ground_window.h"
+#include "core/planning/ground/ground_window.h"
 #include "core/planning/landmarks.h"
 #include "core/planning/move_cost.h"
 #include "core/planning/patch_index.h"

@@ -13,7 +13,7 @@
 
 #include "core/common/status.h"
 #include "core/mls/tile_key.h"
-#include "core/planning/ground_window.h"
+#include "core/planning/ground/ground_window.h"
 #include "core/planning/patch_index.h"
 #include "core/planning/prepared_tile.h"
 

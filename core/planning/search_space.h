@@ -17,9 +17,9 @@
 #include "core/common/stop.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/class_factors.h"
+#include "core/planning/ground/profile_checks.h"
 #include "core/planning/move_cost.h"
 #include "core/planning/prepared_tile.h"
-#include "core/planning/profile_checks.h"
 #include "core/planning/tile_cache.h"
 #include "core/planning/tile_source.h"
 

@@ -13,10 +13,9 @@
 
 #include "core/common/status.h"
 #include "core/mls/tile_key.h"
-#include "core/planning/ground_window.h"
+#include "core/planning/ground/ground_window.h"
 #include "core/planning/packed_tile.h"
 #include "core/planning/prepared_tile.h"
-#include "core/planning/profile_checks.h"
 #include "core/planning/tile_source.h"
 
 namespace strata {

@@ -14,10 +14,10 @@
 
 #include "core/common/lru_cache.h"
 #include "core/mls/tile_key.h"
-#include "core/planning/ground_window.h"
+#include "core/planning/ground/ground_window.h"
+#include "core/planning/ground/profile_checks.h"
+#include "core/planning/ground/rows.h"
 #include "core/planning/prepared_tile.h"
-#include "core/planning/profile_checks.h"
-#include "core/planning/rows.h"
 #include "core/planning/tile_source.h"
 
 namespace strata {

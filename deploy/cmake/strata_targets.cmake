@@ -1,4 +1,5 @@
-# How every folder of Strata becomes one target. Sources are listed by hand; dependencies are direct ones only.
+# How every room of Strata becomes one target, with the rooms inside it. Sources are listed by hand; dependencies are direct
+# ones only.
 
 add_library(strata_build_options INTERFACE)
 target_compile_features(strata_build_options INTERFACE cxx_std_20)

@@ -2,7 +2,7 @@
 #ifndef STRATA_SERVER_METRICS_ENGINE_METRICS_H_
 #define STRATA_SERVER_METRICS_ENGINE_METRICS_H_
 
-#include "core/engine/numbers.h"
+#include "core/engine/map/numbers.h"
 #include "server/metrics/metrics.h"
 
 namespace strata::server {

@@ -21,9 +21,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "core/classification/amn_inference.h"
-#include "core/classification/amn_learning.h"
-#include "core/classification/neighbours.h"
+#include "core/classification/amn/amn_inference.h"
+#include "core/classification/amn/amn_learning.h"
+#include "core/classification/features/neighbours.h"
 #include "core/classification/training.h"
 #include "tests/bench/classification_peers.h"
 #include "tests/support/labelled_clouds.h"

@@ -10,8 +10,8 @@
 
 #include <Eigen/Core>
 
-#include "core/classification/amn.h"
-#include "core/classification/labelled_features.h"
+#include "core/classification/amn/amn.h"
+#include "core/classification/features/labelled_features.h"
 
 namespace strata::bench {
 

@@ -24,14 +24,14 @@
 #include <utility>
 #include <vector>
 
-#include "core/classification/adaboost.h"
-#include "core/classification/amn_inference.h"
-#include "core/classification/amn_learning.h"
+#include "core/classification/amn/amn_inference.h"
+#include "core/classification/amn/amn_learning.h"
+#include "core/classification/amn/network.h"
 #include "core/classification/evaluation.h"
-#include "core/classification/instance_features.h"
-#include "core/classification/instances.h"
-#include "core/classification/neighbours.h"
-#include "core/classification/network.h"
+#include "core/classification/features/instance_features.h"
+#include "core/classification/features/neighbours.h"
+#include "core/classification/learners/adaboost.h"
+#include "core/classification/learners/instances.h"
 #include "core/classification/training.h"
 #include "core/common/stop.h"
 #include "tests/experiments/classification_cases.h"

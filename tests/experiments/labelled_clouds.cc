@@ -22,7 +22,7 @@
 #include <CLI/CLI.hpp>
 
 #include "core/classification/evaluation.h"
-#include "core/classification/neighbours.h"
+#include "core/classification/features/neighbours.h"
 #include "core/classification/training.h"
 #include "tests/bench/classification_peers.h"
 

@@ -20,12 +20,12 @@
 #include <CLI/CLI.hpp>
 #include <Eigen/Eigenvalues>
 
-#include "core/classification/adaboost.h"
-#include "core/classification/amn_inference.h"
-#include "core/classification/amn_learning.h"
+#include "core/classification/amn/amn_inference.h"
+#include "core/classification/amn/amn_learning.h"
 #include "core/classification/evaluation.h"
-#include "core/classification/ground_height.h"
-#include "core/classification/neighbours.h"
+#include "core/classification/features/ground_height.h"
+#include "core/classification/features/neighbours.h"
+#include "core/classification/learners/adaboost.h"
 #include "core/classification/training.h"
 #include "tests/support/labelled_clouds.h"
 

@@ -18,7 +18,7 @@
 #include "core/codec/bytes.h"
 #include "core/common/checksum.h"
 #include "core/engine/engine.h"
-#include "core/engine/map_check.h"
+#include "core/engine/map/map_check.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/fuzz/require.h"
 #include "tests/fuzz/small_world.h"

@@ -5,11 +5,11 @@
 
 #include <fuzzer/FuzzedDataProvider.h>
 
-#include "client/cli/label_classes.h"
-#include "client/cli/number_file.h"
-#include "client/cli/path_file.h"
-#include "client/cli/posegraph_exchange.h"
+#include "client/cli/classifier/label_classes.h"
+#include "client/cli/posegraph/posegraph_exchange.h"
+#include "client/cli/terminal/number_file.h"
 #include "client/formats/graph_file.h"
+#include "client/formats/path_file.h"
 #include "client/formats/plain_readers.h"
 #include "client/formats/pose_reader.h"
 #include "core/classification/reduction.h"
@@ -42,7 +42,7 @@ absl::Status Try(int kind, const std::string& text) {
     case 4:
       return cli::ReadNumberFile(InputFile(text).path(), 2, 5).status();
     case 5:
-      return cli::ReadPath(InputFile(text).path()).status();
+      return ReadPath(InputFile(text).path()).status();
     case 6:
       return Parse3dtkPose(text).status();
     case 7:

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/cli/command.h"
+#include "client/cli/terminal/command.h"
 #include "client/formats/scan_reader.h"
 #include "core/codec/surface_tile_codec.h"
 #include "tests/support/mock_database.h"

@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/cli/command.h"
+#include "client/cli/terminal/command.h"
 #include "tests/support/mock_database.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"

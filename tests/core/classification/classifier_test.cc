@@ -11,7 +11,7 @@
 #include "core/classification/classifier_codec.h"
 #include "core/classification/training.h"
 #include "core/codec/blob.h"
-#include "tests/core/classification/random_networks.h"
+#include "tests/core/classification/amn/random_networks.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {

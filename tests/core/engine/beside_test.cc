@@ -17,9 +17,9 @@
 #include "core/common/blocking.h"
 #include "core/common/cache_budget.h"
 #include "core/common/stop.h"
-#include "core/engine/map.h"
-#include "core/engine/numbers.h"
-#include "core/engine/rebuild.h"
+#include "core/engine/doors/map.h"
+#include "core/engine/map/numbers.h"
+#include "core/engine/repair/rebuild.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/status_matchers.h"
 

@@ -13,7 +13,7 @@
 #include <gtest/gtest.h>
 #include <zstd.h>
 
-#include "core/engine/map_check.h"
+#include "core/engine/map/map_check.h"
 #include "core/storage/sqlite/schema.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/status_matchers.h"

@@ -14,8 +14,8 @@
 
 #include "core/mls/local_plane.h"
 #include "core/mls/traversability.h"
+#include "core/planning/ground/profile_checks.h"
 #include "core/planning/prepared_tile.h"
-#include "core/planning/profile_checks.h"
 
 namespace strata::testing {
 namespace {

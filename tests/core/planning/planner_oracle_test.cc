@@ -13,8 +13,8 @@
 #include "absl/strings/match.h"
 #include <gtest/gtest.h>
 
+#include "core/planning/ground/profile_checks.h"
 #include "core/planning/planner.h"
-#include "core/planning/profile_checks.h"
 #include "core/planning/search_space.h"
 #include "core/planning/tile_cache.h"
 #include "tests/core/planning/memory_tiles.h"

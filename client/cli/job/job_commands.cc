@@ -1,0 +1,205 @@
+// strata job start|list|show|watch|cancel|accept|revert
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_split.h"
+
+#include "client/cli/job/job_runner.h"
+#include "client/cli/terminal/arguments.h"
+#include "client/cli/terminal/command.h"
+#include "client/cli/terminal/json.h"
+#include "core/common/status.h"
+
+namespace strata::cli {
+namespace {
+
+constexpr char kKinds[] = R"(
+
+Kinds and their parameters (and threads=1..64 for the first three):
+  rebuild   All derived data again from the scans.
+  verify    Everything checked; a mismatch fails the job.
+  optimize  Poses made globally consistent, in a new epoch.
+            dry_run=0|1         Only propose (0)
+            closures=0|1        Look for loops that nobody closed yet (1)
+            planes=0|1          Walls and floors hold the scans that see them (1)
+            robust=0|1          Leave out closures that contradict the rest (1)
+            rounds=1..20        Most rounds of matching and optimising (5)
+            pool=1..50          Consecutive scans that move as one (5)
+            weighting=covariance|local_global
+            local_weight=0..1   With local_global: of matches against planes (0.5)
+            tolerance_m=, tolerance_rad=
+                                Scans that would move less stay (0.005, 0.0005)
+  revert    Poses and constraints of an earlier epoch: epoch=N, see map history.
+  train     A classifier from all labelled scans; see classifier train.
+            name=, method=amn|iamn|bayes|knn|adaboost (amn), features=shape|wall|spin (shape)
+            reduce=auto|pure|none|depth=N|random=N (auto), neighbours=1..100 (5), rounds=1..10000 (100)
+            slack_weight= (100)
+            folds=0..100        Of the validation over scans (5)
+            region_m=M          Scans taken in one square of M metres are left out together (0: each alone)
+  classify  The classifier model=NAME labels every scan that it has not labelled yet.
+  evaluate  The classifier model=NAME against labels that people gave.
+  fade      Points through whose place later scans looked leave the tiles.
+            scans=1..1000       That have to have looked (3, or the map's own number)
+            rays=1..100000      Of theirs together (10)
+            clearance_m=0.05..10  How far beyond the place a ray must end (0.3)
+            undo=0|1            Everything comes back (0))";
+
+struct JobOptions {
+  std::string map;
+  std::string kind;
+  std::map<std::string, std::string> parameters;
+  bool dry_run = false;
+  bool wait = false;
+  std::uint64_t id = 0;
+};
+
+absl::Status Start(Context& context, JobOptions options) {
+  if (options.dry_run) options.parameters["dry_run"] = "1";
+  if (options.wait) {
+    return RunJob(context, options.map, options.kind, options.parameters);
+  }
+  STRATA_ASSIGN_OR_RETURN(
+      const JobInfo job,
+      context.database.jobs().Start(context.call, options.map, options.kind, options.parameters));
+  PrintJob(job, context.output);
+  return absl::OkStatus();
+}
+
+absl::Status List(Context& context, const JobOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<JobInfo> jobs,
+                          context.database.jobs().List(context.call, options.map));
+  Json rows = Json::array();
+  for (const JobInfo& job : jobs) {
+    rows.push_back(ToJson(job));
+  }
+  context.output.List(rows,
+                      {{"id", "ID"},
+                       {"kind", "KIND"},
+                       {"state", "STATE"},
+                       {"progress", "PROGRESS"},
+                       {"created", "CREATED"},
+                       {"message", "MESSAGE"}});
+  return absl::OkStatus();
+}
+
+absl::Status Show(Context& context, const JobOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job,
+                          context.database.jobs().Get(context.call, options.map, options.id));
+  PrintJob(job, context.output);
+  return absl::OkStatus();
+}
+
+absl::Status Watch(Context& context, const JobOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job, FollowJob(context, options.map, options.id));
+  PrintJob(job, context.output);
+  return StatusOf(job);
+}
+
+absl::Status Cancel(Context& context, const JobOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job,
+                          context.database.jobs().Cancel(context.call, options.map, options.id));
+  PrintJob(job, context.output);
+  return absl::OkStatus();
+}
+
+// What became of a decision; with --wait, of the job that carries it out.
+absl::Status ShowDecided(Context& context, const JobInfo& job, const JobOptions& options) {
+  if (!options.wait || IsFinal(job.state)) {
+    PrintJob(job, context.output);
+    return absl::OkStatus();
+  }
+  STRATA_ASSIGN_OR_RETURN(const JobInfo ended, FollowJob(context, options.map, job.id));
+  PrintJob(ended, context.output);
+  return StatusOf(ended);
+}
+
+absl::Status Accept(Context& context, const JobOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job,
+                          context.database.jobs().Accept(context.call, options.map, options.id));
+  return ShowDecided(context, job, options);
+}
+
+absl::Status Revert(Context& context, const JobOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job,
+                          context.database.jobs().Revert(context.call, options.map, options.id));
+  return ShowDecided(context, job, options);
+}
+
+void AddParameters(CLI::App* verb, JobOptions& options) {
+  const auto take = [&options](const std::vector<std::string>& texts) {
+    for (const std::string& text : texts) {
+      const std::pair<std::string, std::string> pair =
+          absl::StrSplit(text, absl::MaxSplits('=', 1));
+      if (text.find('=') == std::string::npos || pair.first.empty()) {
+        throw CLI::ValidationError("KEY=VALUE", "expected as in rounds=3, got " + text);
+      }
+      options.parameters.insert(pair);
+    }
+  };
+  constexpr char kText[] = "Parameter of the job, as in threads=4; may be given several times";
+  verb->add_option_function<std::vector<std::string>>("PARAMETER", take, kText)
+      ->type_name("KEY=VALUE");
+  verb->add_option_function<std::vector<std::string>>("--param", take, kText)
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+}
+
+void AddStart(CLI::App* start, JobOptions& options) {
+  start
+      ->add_option("KIND",
+                   options.kind,
+                   "rebuild, verify, optimize, revert, train, classify, evaluate or fade")
+      ->required();
+  AddParameters(start, options);
+  start->add_flag(
+      "--dry-run", options.dry_run, "optimize: only propose; see job accept and revert");
+  start->add_flag("--wait", options.wait, "Return when it has ended; exit 1 unless it succeeded");
+  start->footer(start->get_footer() + kKinds);
+}
+
+}  // namespace
+
+void AddJobCommands(Commands& commands) {
+  auto options = std::make_shared<JobOptions>();
+  CLI::App* noun = commands.Noun(
+      "job", "Durable background work on a map", "strata job start campus verify --wait");
+  const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
+    CLI::App* app =
+        commands.Verb(noun, name, description, example, [options, run](Context& context) {
+          return run(context, *options);
+        });
+    AddMapName(app, options->map);
+    return app;
+  };
+  AddStart(verb("start",
+                "Start a job: rebuild, verify, optimize, revert, train, classify, evaluate or fade",
+                "strata job start campus optimize rounds=3 --dry-run --wait",
+                Start),
+           *options);
+  verb("list", "All jobs of a map", "strata job list campus", List);
+  const auto with_id = [&](CLI::App* app) {
+    app->add_option("ID", options->id, "Number of the job")->check(CLI::PositiveNumber)->required();
+  };
+  with_id(verb("show", "One job", "strata job show campus 3", Show));
+  with_id(verb("watch",
+               "Follow a job to its end; exit 1 unless it succeeded",
+               "strata job watch campus 3",
+               Watch));
+  with_id(verb("cancel", "Ask a job to end", "strata job cancel campus 3", Cancel));
+  const auto decided = [&](CLI::App* app) {
+    with_id(app);
+    app->add_flag("--wait", options->wait, "Return when it is done; exit 1 unless it succeeded");
+  };
+  decided(verb(
+      "accept", "Make real what a dry run proposed", "strata job accept campus 3 --wait", Accept));
+  decided(verb("revert",
+               "Forget a proposal, or bring back the epoch before the one that the job made",
+               "strata job revert campus 3 --wait",
+               Revert));
+}
+
+}  // namespace strata::cli

@@ -1,0 +1,207 @@
+// strata map create|list|show|delete|verify|rebuild|history|revert; backup, classes, diff, export,
+// merge, render and watch have files of their own.
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+
+#include "client/cli/job/job_runner.h"
+#include "client/cli/map/map_files.h"
+#include "client/cli/terminal/arguments.h"
+#include "client/cli/terminal/command.h"
+#include "client/cli/terminal/json.h"
+#include "client/cli/terminal/world_json.h"
+#include "core/common/status.h"
+
+namespace strata::cli {
+namespace {
+
+struct MapOptions {
+  std::string map;
+  MapParameters parameters;
+  ProfileOverrides profile;
+  bool drop_points = false;
+  std::uint64_t epoch = 0;
+  bool wait = false;
+};
+
+absl::Status Create(Context& context, MapOptions options) {
+  options.parameters.keep_points = !options.drop_points;
+  options.parameters.default_profile = options.profile.Over(options.parameters.default_profile);
+  STRATA_ASSIGN_OR_RETURN(
+      const MapInfo info,
+      context.database.maps().Create(context.call, options.map, options.parameters));
+  context.output.Object(ToJson(info));
+  return absl::OkStatus();
+}
+
+absl::Status List(Context& context) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MapInfo> maps,
+                          context.database.maps().List(context.call));
+  Json rows = Json::array();
+  for (const MapInfo& map : maps) {
+    rows.push_back(ToJson(map));
+  }
+  context.output.List(rows,
+                      {{"name", "NAME"},
+                       {"cell_size_m", "CELL SIZE"},
+                       {"gap_size_m", "GAP SIZE"},
+                       {"thickness_m", "THICKNESS"},
+                       {"created", "CREATED"}});
+  return absl::OkStatus();
+}
+
+absl::Status Show(Context& context, const MapOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const MapInfo info,
+                          context.database.maps().Get(context.call, options.map));
+  STRATA_ASSIGN_OR_RETURN(const MapStats stats,
+                          context.database.maps().Stats(context.call, options.map));
+  context.output.Object(ToJson(info, stats));
+  return absl::OkStatus();
+}
+
+absl::Status Delete(Context& context, const MapOptions& options) {
+  STRATA_RETURN_IF_ERROR(context.database.maps().Delete(context.call, options.map));
+  context.output.Object({{"deleted", options.map}});
+  return absl::OkStatus();
+}
+
+absl::Status History(Context& context, const MapOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<EpochInfo> epochs,
+                          context.database.maps().History(context.call, options.map));
+  Json rows = Json::array();
+  for (const EpochInfo& epoch : epochs) {
+    rows.push_back(ToJson(epoch));
+  }
+  context.output.List(rows,
+                      {{"epoch", "EPOCH"},
+                       {"created", "CREATED"},
+                       {"decided", "POSES"},
+                       {"job", "JOB"},
+                       {"current", "CURRENT"},
+                       {"kept", "KEPT"},
+                       {"reason", "REASON"}});
+  return absl::OkStatus();
+}
+
+absl::Status Revert(Context& context, const MapOptions& options) {
+  const std::map<std::string, std::string> parameters = {{"epoch", std::to_string(options.epoch)}};
+  if (options.wait) return RunJob(context, options.map, "revert", parameters);
+  STRATA_ASSIGN_OR_RETURN(
+      const JobInfo job,
+      context.database.jobs().Start(context.call, options.map, "revert", parameters));
+  PrintJob(job, context.output);
+  return absl::OkStatus();
+}
+
+void AddRevert(Commands& commands, CLI::App* noun, const std::shared_ptr<MapOptions>& options) {
+  CLI::App* revert =
+      commands.Verb(noun,
+                    "revert",
+                    "Bring back poses and constraints of an earlier epoch, as a new one",
+                    "strata map revert campus 3 --wait",
+                    [options](Context& context) { return Revert(context, *options); });
+  AddMapName(revert, options->map);
+  revert->add_option("EPOCH", options->epoch, "Number of the epoch; see map history")
+      ->check(CLI::PositiveNumber)
+      ->required();
+  revert->add_flag("--wait", options->wait, "Return when it is done; exit 1 unless it succeeded");
+}
+
+void AddCreate(Commands& commands, CLI::App* noun, const std::shared_ptr<MapOptions>& options) {
+  CLI::App* create =
+      commands.Verb(noun,
+                    "create",
+                    "Create a map",
+                    "strata map create campus --cell-size 0.1",
+                    [options](Context& context) { return Create(context, *options); });
+  create->parse_complete_callback([&commands] { commands.creates = true; });
+  AddMapName(create, options->map);
+  MapParameters& parameters = options->parameters;
+  create->add_option("--cell-size", parameters.mls.cell_size_m, "Edge of a cell [m]")
+      ->capture_default_str();
+  create
+      ->add_option(
+          "--gap-size", parameters.mls.gap_size_m, "Heights closer than this are one surface [m]")
+      ->capture_default_str();
+  create->add_option("--thickness", parameters.mls.thickness_m, "Taller surfaces are vertical [m]")
+      ->capture_default_str();
+  create->add_option("--sigma", parameters.sensor.sigma_m, "Range noise of the sensor at 0 m [m]")
+      ->capture_default_str();
+  create
+      ->add_option(
+          "--sigma-per-metre", parameters.sensor.sigma_per_metre, "Growth of the noise with range")
+      ->capture_default_str();
+  create->add_option("--min-range", parameters.sensor.min_range_m, "Closer returns are ignored [m]")
+      ->capture_default_str();
+  create
+      ->add_option("--max-range", parameters.sensor.max_range_m, "Farther returns are ignored [m]")
+      ->capture_default_str();
+  create->add_flag("--drop-points", options->drop_points, "Drop points once a scan is integrated");
+  create
+      ->add_option(
+          "--fade-after",
+          parameters.fade_after,
+          "Let what has gone fade once so many later scans looked through where it was; 0: "
+          "nothing fades")
+      ->check(CLI::Range(0U, kMaxFadeAfter))
+      ->capture_default_str();
+  AddNumbers(
+      create,
+      "--origin",
+      "LAT,LON,ALT",
+      3,
+      3,
+      [options](const std::vector<double>& n) {
+        options->parameters.origin = {
+            .latitude_rad = n[0], .longitude_rad = n[1], .altitude_m = n[2]};
+      },
+      "Where the map's origin is on earth (WGS 84) [rad, rad, m]");
+  AddProfileOptions(create, options->profile);
+}
+
+}  // namespace
+
+void AddMapCommands(Commands& commands) {
+  auto options = std::make_shared<MapOptions>();
+  CLI::App* noun = commands.Noun("map", "Whole worlds", "strata map show campus --output json");
+  AddCreate(commands, noun, options);
+  commands.Verb(noun, "list", "All maps", "strata map list", List);
+  const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
+    CLI::App* app =
+        commands.Verb(noun, name, description, example, [options, run](Context& context) {
+          return run(context, *options);
+        });
+    AddMapName(app, options->map);
+  };
+  verb("show",
+       "Parameters, counts and content digest",
+       "strata map show campus --output json",
+       Show);
+  verb("delete", "Delete a map and its file", "strata map delete campus", Delete);
+  verb("verify",
+       "Check every checksum, count and derived thing; exit 1 on a mismatch",
+       "strata map verify campus",
+       [](Context& context, const MapOptions& o) { return RunJob(context, o.map, "verify", {}); });
+  verb("rebuild",
+       "Make all derived data again from the scans",
+       "strata map rebuild campus",
+       [](Context& context, const MapOptions& o) { return RunJob(context, o.map, "rebuild", {}); });
+  verb("history",
+       "The epochs of a map, newest first: what made them, and which can be brought back",
+       "strata map history campus",
+       History);
+  AddRevert(commands, noun, options);
+  AddMapBackup(commands, noun);
+  AddMapClasses(commands, noun);
+  AddMapWatch(commands, noun);
+  AddMapDiff(commands, noun);
+  AddMapExport(commands, noun);
+  AddMapMerge(commands, noun);
+  AddMapRender(commands, noun);
+}
+
+}  // namespace strata::cli

@@ -1,0 +1,196 @@
+// strata map export
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+
+#include "client/cli/map/map_files.h"
+#include "client/cli/map/tile_source.h"
+#include "client/cli/picture/map_picture.h"
+#include "client/cli/terminal/arguments.h"
+#include "client/cli/terminal/command.h"
+#include "client/cli/terminal/json.h"
+#include "client/formats/file_bytes.h"
+#include "client/formats/geometry_writer.h"
+#include "core/common/status.h"
+#include "core/mls/surface_mesh.h"
+
+namespace strata::cli {
+namespace {
+
+struct ExportOptions {
+  std::string map;
+  std::string format;
+  std::string out;
+  std::int32_t level = 0;
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+};
+
+Colour ColourOf(const Surface& surface) {
+  switch (surface.traversability) {
+    case Traversability::kTraversable:
+      return picture::kTraversableColour;
+    case Traversability::kNonTraversable:
+      return surface.vertical() ? picture::kVerticalColour : picture::kNonTraversableColour;
+    case Traversability::kUnknown:
+      break;
+  }
+  return surface.vertical() ? picture::kVerticalColour : picture::kUnknownColour;
+}
+
+// No labels rather than none but zeros.
+void DropIfNone(std::vector<std::uint16_t>& labels) {
+  if (std::all_of(labels.begin(), labels.end(), [](auto label) { return label == 0; })) {
+    labels.clear();
+  }
+}
+
+// Vertical segments become lines down to a vertex of their own.
+Geometry GeometryOf(const std::vector<SurfaceTile>& tiles, SurfaceMesh mesh) {
+  Geometry geometry;
+  geometry.vertices = std::move(mesh.vertices);
+  geometry.triangles = std::move(mesh.triangles);
+  geometry.lines = std::move(mesh.lines);
+  for (const SurfaceTile& tile : tiles) {
+    for (const Surface& surface : tile.surfaces) {
+      geometry.colour.push_back(ColourOf(surface));
+      geometry.label.push_back(surface.class_id);
+    }
+  }
+  for (const auto& [a, b, c, d] : mesh.quads) {
+    geometry.triangles.push_back({a, b, c});
+    geometry.triangles.push_back({a, c, d});
+  }
+  for (const SurfaceMesh::VerticalSegment& segment : mesh.verticals) {
+    Eigen::Vector3d foot = geometry.vertices[segment.vertex];
+    foot.z() = segment.bottom_m;
+    geometry.lines.push_back(
+        {segment.vertex, static_cast<std::uint32_t>(geometry.vertices.size())});
+    geometry.vertices.push_back(foot);
+    geometry.colour.push_back(picture::kVerticalColour);
+    geometry.label.push_back(geometry.label[segment.vertex]);
+  }
+  DropIfNone(geometry.label);
+  return geometry;
+}
+
+// What is damaged is left out and said in `damage`.
+absl::StatusOr<Geometry> MeshOf(Context& context,
+                                const ExportOptions& options,
+                                absl::Status& damage) {
+  STRATA_ASSIGN_OR_RETURN(const MapInfo info,
+                          context.database.maps().Get(context.call, options.map));
+  STRATA_ASSIGN_OR_RETURN(const FetchedTiles fetched,
+                          FetchTiles(context, options.map, options.level));
+  damage = fetched.damage;
+  std::vector<const SurfaceTile*> pointers;
+  pointers.reserve(fetched.tiles.size());
+  for (const SurfaceTile& tile : fetched.tiles) {
+    pointers.push_back(&tile);
+  }
+  return GeometryOf(fetched.tiles, MakeSurfaceMesh(pointers, info.parameters.mls.cell_size_m));
+}
+
+// Every integrated scan's points at their poses.
+absl::StatusOr<Geometry> PointsOf(Context& context, const ExportOptions& options) {
+  std::vector<ScanInfo> scans;
+  api::ScanFilter filter;
+  filter.state = ScanState::kIntegrated;
+  STRATA_RETURN_IF_ERROR(
+      context.database.scans().List(context.call, options.map, filter, [&](const ScanInfo& info) {
+        scans.push_back(info);
+        return absl::OkStatus();
+      }));
+  Geometry geometry;
+  for (const ScanInfo& scan : scans) {
+    STRATA_RETURN_IF_ERROR(context.database.scans().GetPoints(
+        context.call, options.map, scan.header.id, [&](const PointCloud& chunk) {
+          for (std::size_t i = 0; i < chunk.size(); ++i) {
+            if (!std::isfinite(chunk.points[i].x())) continue;
+            geometry.vertices.emplace_back(scan.T_map_scan * chunk.points[i].cast<double>());
+            geometry.label.push_back(chunk.label.empty() ? 0 : chunk.label[i]);
+          }
+          return absl::OkStatus();
+        }));
+  }
+  DropIfNone(geometry.label);
+  return geometry;
+}
+
+absl::Status Export(Context& context, const ExportOptions& options) {
+  const bool points = options.format == "pcd";
+  absl::Status damage;
+  STRATA_ASSIGN_OR_RETURN(Geometry geometry,
+                          points ? PointsOf(context, options) : MeshOf(context, options, damage));
+  for (Eigen::Vector3d& vertex : geometry.vertices) {
+    vertex -= options.origin;
+  }
+  const bool as_double = options.format != "obj" && NeedsDouble(geometry);
+  if (as_double) {
+    context.output.Talk(
+        "coordinates beyond 8 km are written as doubles, which PCL's point types do not read; "
+        "--relative-to X,Y,Z makes them small");
+  }
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes,
+                          points                    ? PcdBytes(geometry)
+                          : options.format == "ply" ? PlyBytes(geometry)
+                                                    : ObjText(geometry));
+  STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, bytes));
+  context.output.Object({{"file", options.out},
+                         {"format", options.format},
+                         {"vertices", geometry.vertices.size()},
+                         {"triangles", geometry.triangles.size()},
+                         {"lines", geometry.lines.size()},
+                         {"coordinates",
+                          options.format == "obj" ? "text"
+                          : as_double             ? "double"
+                                                  : "float"},
+                         {"relative_to", ToJson(options.origin)},
+                         {"bytes", bytes.size()}});
+  return damage;
+}
+
+}  // namespace
+
+void AddMapExport(Commands& commands, CLI::App* noun) {
+  auto options = std::make_shared<ExportOptions>();
+  CLI::App* app = commands.Verb(noun,
+                                "export",
+                                "Write a map for other programs: its surfaces as a mesh (ply, obj) "
+                                "or the points of its scans (pcd)",
+                                "strata map export campus --format ply --out campus.ply",
+                                [options](Context& context) { return Export(context, *options); });
+  AddMapName(app, options->map);
+  app->add_option(
+         "--format",
+         options->format,
+         "ply: triangles and edges, colour by traversability and the class as label where there "
+         "are classes, binary; obj: the same as text, without label; pcd: all points, binary x y z "
+         "and label")
+      ->check(CLI::IsMember({"ply", "obj", "pcd"}))
+      ->required();
+  app->add_option("--out", options->out, "The file to write")->type_name("FILE")->required();
+  AddNumbers(
+      app,
+      "--relative-to",
+      "X,Y,Z",
+      3,
+      3,
+      [options](const std::vector<double>& n) {
+        options->origin = {n[0], n[1], n[2]};
+      },
+      "Coordinates relative to this place, for maps far from their origin [m]");
+  app->add_option("--level", options->level, "Level of detail of the mesh, 0 = finest")
+      ->check(CLI::Range(0, kMaxLevel))
+      ->capture_default_str();
+}
+
+}  // namespace strata::cli

@@ -1,0 +1,219 @@
+// strata map render
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_split.h"
+
+#include "client/cli/map/map_files.h"
+#include "client/cli/map/tile_source.h"
+#include "client/cli/picture/map_picture.h"
+#include "client/cli/posegraph/graph_overlay.h"
+#include "client/cli/terminal/arguments.h"
+#include "client/cli/terminal/command.h"
+#include "client/cli/terminal/json.h"
+#include "client/formats/file_bytes.h"
+#include "client/formats/path_file.h"
+#include "core/common/status.h"
+#include "core/world/map_class.h"
+
+namespace strata::cli {
+namespace {
+
+struct RenderOptions {
+  std::string map;
+  std::string out;
+  std::vector<std::string> path_files;
+  std::string view = "top";
+  std::string layer = "traversability";
+  double azimuth_rad = -1.0;
+  double elevation_rad = 0.6;
+  std::optional<int> level;
+  bool trajectories = false;
+  bool constraints = false;
+  picture::PictureOptions picture;
+};
+
+// The coarsest level whose cells are no larger than a pixel.
+std::int32_t LevelFor(const MapStats& stats,
+                      double cell_size_m,
+                      const picture::PictureOptions& options) {
+  const Eigen::Vector3d size = stats.box_max - stats.box_min;
+  const double metres_per_pixel = std::max(size.x() / options.width, size.y() / options.height);
+  const double ratio = metres_per_pixel / cell_size_m;
+  return ratio < 2.0 ? 0 : std::min(static_cast<int>(std::log2(ratio)), kMaxLevel);
+}
+
+absl::StatusOr<picture::Overlay> OverlayOf(Context& context, const RenderOptions& options) {
+  picture::Overlay overlay;
+  if (!options.trajectories && !options.constraints) return overlay;
+  STRATA_ASSIGN_OR_RETURN(const api::PoseGraphState state,
+                          context.database.posegraph().Get(context.call, options.map));
+  if (options.constraints) AddConstraints(state, overlay);
+  if (options.trajectories) AddTrajectories(state, overlay);
+  return overlay;
+}
+
+// Every class that surfaces have, by the map's table.
+absl::StatusOr<picture::ClassStyles> StylesOf(Context& context,
+                                              const std::string& map,
+                                              const std::vector<SurfaceTile>& tiles) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes,
+                          context.database.maps().ListClasses(context.call, map));
+  picture::ClassStyles styles;
+  for (const SurfaceTile& tile : tiles) {
+    for (const Surface& surface : tile.surfaces) {
+      const std::uint8_t id = surface.class_id;
+      if (id == 0 || styles.contains(id)) continue;
+      const MapClass map_class = ClassOf(classes, id);
+      styles[id] = {map_class.name, map_class.colour};
+    }
+  }
+  return styles;
+}
+
+Json LegendJson(const picture::ClassStyles& styles) {
+  Json legend = Json::array();
+  for (const auto& [id, style] : styles)
+    legend.push_back(ToJson(MapClass{id, style.name, style.colour}));
+  return legend;
+}
+
+absl::Status Render(Context& context, RenderOptions options) {
+  if (options.view == "oblique") {
+    options.picture.azimuth_rad = options.azimuth_rad;
+    options.picture.elevation_rad = options.elevation_rad;
+  }
+  std::vector<picture::Path> paths;
+  for (const std::string& file : options.path_files) {
+    STRATA_ASSIGN_OR_RETURN(picture::Path path, ReadPath(file));
+    paths.push_back(std::move(path));
+  }
+  STRATA_ASSIGN_OR_RETURN(const MapInfo info,
+                          context.database.maps().Get(context.call, options.map));
+  STRATA_ASSIGN_OR_RETURN(const MapStats stats,
+                          context.database.maps().Stats(context.call, options.map));
+  const double cell = info.parameters.mls.cell_size_m;
+  const std::int32_t level = options.level.value_or(LevelFor(stats, cell, options.picture));
+  STRATA_ASSIGN_OR_RETURN(const FetchedTiles fetched, FetchTiles(context, options.map, level));
+  if (options.layer == "class") {
+    STRATA_ASSIGN_OR_RETURN(options.picture.classes, StylesOf(context, options.map, fetched.tiles));
+  }
+  STRATA_ASSIGN_OR_RETURN(const picture::Overlay overlay, OverlayOf(context, options));
+  const picture::Picture picture = picture::DrawMap(
+      fetched.tiles, cell * static_cast<double>(1 << level), paths, options.picture, overlay);
+  STRATA_ASSIGN_OR_RETURN(const std::string png, picture::PngBytes(picture.image));
+  STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, png));
+  const picture::Camera& camera = picture.camera;
+  context.output.Object(
+      {{"file", options.out},
+       {"view", options.view},
+       {"layer", options.layer},
+       {"classes", LegendJson(options.picture.classes.value_or(picture::ClassStyles()))},
+       {"width", picture.image.width},
+       {"height", picture.image.height},
+       {"legend_height", picture::kLegendPixels},
+       {"metres_per_pixel", camera.metres_per_pixel},
+       {"centre", ToJson(camera.centre)},
+       {"right", ToJson(camera.right)},
+       {"up", ToJson(camera.up)},
+       {"level", level},
+       {"tiles", fetched.tiles.size()},
+       {"paths", paths.size()},
+       {"lines", overlay.strokes.size()}});
+  return fetched.damage;
+}
+
+void SetSize(const std::string& text, picture::PictureOptions& options) {
+  const std::vector<std::string> parts = absl::StrSplit(text, 'x');
+  constexpr int kLeast = 200;
+  constexpr int kMost = 8000;
+  int width = 0;
+  int height = 0;
+  if (parts.size() != 2 || !absl::SimpleAtoi(parts[0], &width) ||
+      !absl::SimpleAtoi(parts[1], &height) || std::min(width, height) < kLeast ||
+      std::max(width, height) > kMost) {
+    throw CLI::ValidationError("--size",
+                               "expected WIDTHxHEIGHT of 200 to 8000 pixels, got " + text);
+  }
+  options.width = width;
+  options.height = height;
+}
+
+void AddViewOptions(CLI::App* render, const std::shared_ptr<RenderOptions>& options) {
+  render->add_option("--view", options->view, "top, or oblique from above and aside")
+      ->check(CLI::IsMember({"top", "oblique"}))
+      ->capture_default_str();
+  render->add_option("--azimuth", options->azimuth_rad, "Where an oblique view looks from [rad]")
+      ->capture_default_str();
+  render->add_option("--elevation", options->elevation_rad, "Its angle above the ground [rad]")
+      ->check(CLI::Range(0.05, 1.57))
+      ->capture_default_str();
+  render
+      ->add_option_function<std::string>(
+          "--size",
+          [options](const std::string& text) { SetSize(text, options->picture); },
+          "Size of the picture in pixels")
+      ->type_name("WIDTHxHEIGHT")
+      ->default_str("1600x1100");
+  render->add_option("--level", options->level, "Level of detail; default: as fine as the pixels")
+      ->check(CLI::Range(0, kMaxLevel));
+}
+
+}  // namespace
+
+void AddMapRender(Commands& commands, CLI::App* noun) {
+  auto options = std::make_shared<RenderOptions>();
+  CLI::App* render = commands.Verb(
+      noun,
+      "render",
+      "Draw a map: traversable yellow, horizontal but not traversable red, vertical blue; or "
+      "every class in its colour",
+      "strata map render campus campus.png --view oblique --path route.ply",
+      [options](Context& context) { return Render(context, *options); });
+  AddMapName(render, options->map);
+  render
+      ->add_option("OUT",
+                   options->out,
+                   "The PNG file to write: RGB, the legend, a scale bar and the map's axes on it")
+      ->type_name("FILE.png")
+      ->required();
+  AddNumbers(
+      render,
+      "--slice",
+      "Z0,Z1",
+      2,
+      2,
+      [options](const std::vector<double>& n) {
+        if (n[0] >= n[1]) {
+          throw CLI::ValidationError("--slice", "expected Z0 < Z1");
+        }
+        options->picture.slice_m = {n[0], n[1]};
+      },
+      "Only what lies between these heights [m]");
+  render
+      ->add_option(
+          "--path", options->path_files, "PLY file of a path to draw; may be given several times")
+      ->type_name("FILE.ply")
+      ->allow_extra_args(false);
+  render->add_flag(
+      "--trajectories", options->trajectories, "The way of each trajectory through its scans");
+  render->add_flag("--constraints",
+                   options->constraints,
+                   "What holds the scans together, coloured by how well the poses keep it");
+  render->add_option("--layer", options->layer, "What the colours of surfaces say")
+      ->check(CLI::IsMember({"traversability", "class"}))
+      ->capture_default_str();
+  AddViewOptions(render, options);
+}
+
+}  // namespace strata::cli

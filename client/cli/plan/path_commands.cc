@@ -1,0 +1,85 @@
+// strata path check|watch
+#include "client/cli/plan/path_commands.h"
+
+#include <memory>
+
+#include "absl/status/statusor.h"
+
+#include "client/cli/plan/driver_options.h"
+#include "client/cli/terminal/arguments.h"
+#include "client/cli/terminal/json.h"
+#include "client/formats/path_file.h"
+#include "core/common/status.h"
+
+namespace strata::cli {
+namespace {
+
+struct PathOptions {
+  std::string map;
+  std::string file;
+  DriverOptions driver;
+};
+
+absl::StatusOr<PathQuery> QueryOf(Context& context, const PathOptions& options) {
+  PathQuery query;
+  STRATA_ASSIGN_OR_RETURN(query.waypoints, ReadPath(options.file));
+  STRATA_ASSIGN_OR_RETURN(query.profile, ProfileOf(context, options.map, options.driver));
+  STRATA_ASSIGN_OR_RETURN(query.class_costs, ClassCostsOf(context, options.map, options.driver));
+  return query;
+}
+
+absl::Status Check(Context& context, const PathOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const PathQuery query, QueryOf(context, options));
+  STRATA_ASSIGN_OR_RETURN(const PathCheck check,
+                          context.database.planning().CheckPath(context.call, options.map, query));
+  context.output.Object(ToJson(check));
+  return absl::OkStatus();
+}
+
+absl::Status Watch(Context& context, const PathOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const PathQuery query, QueryOf(context, options));
+  return FollowPath(context, options.map, query);
+}
+
+}  // namespace
+
+absl::Status FollowPath(Context& context, const std::string& map, const PathQuery& query) {
+  const absl::Status ended = context.database.planning().WatchPath(
+      context.call, map, query, [&context](const PathCheck& check) {
+        if (context.output.json()) {
+          context.output.JsonLine(ToJson(check));
+        } else {
+          context.output.Text(check.message);
+        }
+        return absl::OkStatus();
+      });
+  // A watch without an end is ended by its user.
+  return context.call.stop.requested() ? absl::OkStatus() : ended;
+}
+
+void AddPathCommands(Commands& commands) {
+  auto options = std::make_shared<PathOptions>();
+  CLI::App* noun =
+      commands.Noun("path", "Paths that there are already", "strata path check campus route.ply");
+  const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
+    CLI::App* app =
+        commands.Verb(noun, name, description, example, [options, run](Context& context) {
+          return run(context, *options);
+        });
+    AddMapName(app, options->map);
+    app->add_option("FILE", options->file, "PLY file of the path, as plan --out writes it")
+        ->type_name("FILE.ply")
+        ->required();
+    AddDriverOptions(app, options->driver);
+  };
+  verb("check",
+       "Whether a path may still be driven, and where it may not",
+       "strata path check campus route.ply --radius 0.4",
+       Check);
+  verb("watch",
+       "Say whether a path may be driven, and whenever that changes, until Ctrl-C",
+       "strata path watch campus route.ply --output json",
+       Watch);
+}
+
+}  // namespace strata::cli

@@ -1,0 +1,196 @@
+// strata plan
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+#include "client/cli/plan/driver_options.h"
+#include "client/cli/plan/path_commands.h"
+#include "client/cli/terminal/arguments.h"
+#include "client/cli/terminal/command.h"
+#include "client/cli/terminal/json.h"
+#include "client/cli/terminal/number_file.h"
+#include "client/formats/path_file.h"
+#include "core/common/status.h"
+
+namespace strata::cli {
+namespace {
+
+struct PlanOptions {
+  std::string map;
+  PlanQuery query;
+  std::optional<int> from_level, to_level;
+  std::string queries_file;
+  DriverOptions driver;
+  std::string out;
+  bool watch = false;
+};
+
+void PrintText(const PlanResult& plan, Output& output) {
+  if (!plan.found()) {
+    output.Text(absl::StrCat("no path: ",
+                             plan.message.empty() ? absl::string_view(strata::ToString(plan.reason))
+                                                  : absl::string_view(plan.message)));
+    return;
+  }
+  output.Text(absl::StrFormat("path of %.2f m, cost %.2f, %d waypoints (%.1f ms, %d expanded)",
+                              plan.length_m,
+                              plan.cost,
+                              plan.waypoints.size(),
+                              plan.elapsed_ms,
+                              plan.expanded));
+  for (const Eigen::Vector3d& p : plan.waypoints) {
+    output.Text(absl::StrFormat("  %.3f  %.3f  %.3f", p.x(), p.y(), p.z()));
+  }
+  for (const PlanGap& gap : plan.gaps) {
+    output.Text(absl::StrFormat("  unobserved for %.2f m from %.2f, %.2f, %.2f",
+                                gap.length_m,
+                                gap.from.x(),
+                                gap.from.y(),
+                                gap.from.z()));
+  }
+}
+
+absl::Status PlanOne(Context& context, PlanOptions options) {
+  STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options.map, options.driver));
+  STRATA_ASSIGN_OR_RETURN(options.query.class_costs,
+                          ClassCostsOf(context, options.map, options.driver));
+  options.query.from.level = options.from_level;
+  options.query.to.level = options.to_level;
+  STRATA_ASSIGN_OR_RETURN(
+      const PlanResult plan,
+      context.database.planning().PlanPath(context.call, options.map, options.query));
+  if (!options.out.empty() && plan.found()) {
+    STRATA_RETURN_IF_ERROR(WritePath(options.out, plan.waypoints));
+    context.output.Talk(absl::StrCat("wrote ", options.out));
+  }
+  if (context.output.json()) {
+    context.output.Object(ToJson(plan));
+  } else {
+    PrintText(plan, context.output);
+  }
+  if (!options.watch || !plan.found()) return absl::OkStatus();
+  return FollowPath(
+      context, options.map, {plan.waypoints, options.query.profile, options.query.class_costs});
+}
+
+// A query that was refused, with the keys of an answer.
+Json Refused(const absl::Status& status) {
+  Json json = ToJson(PlanResult{});
+  json["found"] = false;
+  json["reason"] = "error";
+  json["message"] = std::string(status.message());
+  return json;
+}
+
+// A JSON line for each query; one that is refused has the reason "error" and the rest goes on.
+absl::Status PlanMany(Context& context, PlanOptions options) {
+  STRATA_ASSIGN_OR_RETURN(const auto rows, ReadNumberFile(options.queries_file, 6, 6));
+  STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options.map, options.driver));
+  STRATA_ASSIGN_OR_RETURN(options.query.class_costs,
+                          ClassCostsOf(context, options.map, options.driver));
+  absl::Status first_error;
+  for (const std::vector<double>& row : rows) {
+    options.query.from = {.x_m = row[0], .y_m = row[1], .z_m = row[2], .level = {}};
+    options.query.to = {.x_m = row[3], .y_m = row[4], .z_m = row[5], .level = {}};
+    const auto plan =
+        context.database.planning().PlanPath(context.call, options.map, options.query);
+    if (!plan.ok()) {
+      first_error.Update(plan.status());
+      context.output.JsonLine(Refused(plan.status()));
+      if (context.call.stop.requested() || absl::IsUnavailable(plan.status())) {
+        break;
+      }
+      continue;
+    }
+    context.output.JsonLine(ToJson(*plan));
+  }
+  return first_error;
+}
+
+PlanEndpoint EndpointOf(const std::vector<double>& numbers) {
+  PlanEndpoint endpoint{.x_m = numbers[0], .y_m = numbers[1], .z_m = {}, .level = {}};
+  if (numbers.size() == 3) {
+    endpoint.z_m = numbers[2];
+  }
+  return endpoint;
+}
+
+void AddEndpoints(CLI::App* verb, const std::shared_ptr<PlanOptions>& options) {
+  CLI::Option* from = AddNumbers(
+      verb,
+      "--from",
+      "X,Y[,Z]",
+      2,
+      3,
+      [options](const std::vector<double>& n) { options->query.from = EndpointOf(n); },
+      "Start [m]; the surface nearest to Z, without Z the lowest");
+  CLI::Option* to = AddNumbers(
+      verb,
+      "--to",
+      "X,Y[,Z]",
+      2,
+      3,
+      [options](const std::vector<double>& n) { options->query.to = EndpointOf(n); },
+      "Goal [m]");
+  from->needs(to);
+  to->needs(from);
+  verb->add_option("--from-level", options->from_level, "Start on this surface, 0 = lowest")
+      ->needs(from)
+      ->check(CLI::NonNegativeNumber);
+  verb->add_option("--to-level", options->to_level, "End on this surface, 0 = lowest")
+      ->needs(to)
+      ->check(CLI::NonNegativeNumber);
+  verb->add_option(
+          "--queries",
+          options->queries_file,
+          "File with X,Y,Z,X,Y,Z (start, goal) on each line; the answer is a JSON line each")
+      ->type_name("FILE.csv")
+      ->excludes(from)
+      ->excludes(to);
+}
+
+}  // namespace
+
+void AddPlanCommand(Commands& commands) {
+  auto options = std::make_shared<PlanOptions>();
+  CLI::App* verb =
+      commands.Verb(&commands.root,
+                    "plan",
+                    "A path for a robot, or the reason why there is none",
+                    "strata plan campus --from -14,0,0 --to 20,5,0 --radius 0.4 --out path.ply\n"
+                    "  strata plan campus --from -14,0 --to 20,5 --avoid vegetation=5 "
+                    "--avoid water=never",
+                    [options](Context& context) {
+                      return options->queries_file.empty() ? PlanOne(context, *options)
+                                                           : PlanMany(context, *options);
+                    });
+  AddMapName(verb, options->map);
+  AddEndpoints(verb, options);
+  AddDriverOptions(verb, options->driver);
+  verb->add_option("--max-expanded", options->query.max_expanded, "Search limit: patches looked at")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  verb->add_option("--out",
+                   options->out,
+                   "Write the path, if there is one, as PLY: its waypoints as vertices in order, "
+                   "joined by edges; map render --path reads it")
+      ->type_name("FILE.ply");
+  verb->add_flag("--watch",
+                 options->watch,
+                 "Then say whenever the path stops to hold or holds again, until Ctrl-C")
+      ->excludes("--queries");
+  verb->parse_complete_callback([verb] {
+    if (verb->count("--from") == 0 && verb->count("--queries") == 0) {
+      throw CLI::RequiredError("--from and --to, or --queries");
+    }
+  });
+}
+
+}  // namespace strata::cli

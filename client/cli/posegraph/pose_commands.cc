@@ -1,0 +1,149 @@
+// strata pose list|export|set|lookup
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+
+#include "client/cli/terminal/arguments.h"
+#include "client/cli/terminal/command.h"
+#include "client/cli/terminal/json.h"
+#include "client/cli/terminal/world_json.h"
+#include "client/formats/file_bytes.h"
+#include "client/formats/pose_writer.h"
+#include "core/common/status.h"
+
+namespace strata::cli {
+namespace {
+
+struct PoseOptions {
+  std::string map;
+  std::string trajectory;
+  std::string format = "tum";
+  std::string which = "current";
+  std::string out;
+  ScanId id;
+  Pose T_map_scan = Pose::Identity();
+};
+
+absl::StatusOr<std::vector<PoseNode>> Nodes(Context& context, const PoseOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(api::PoseGraphState state,
+                          context.database.posegraph().Get(context.call, options.map));
+  if (!options.trajectory.empty()) {
+    std::erase_if(state.nodes,
+                  [&](const PoseNode& node) { return node.id.trajectory != options.trajectory; });
+  }
+  return std::move(state.nodes);
+}
+
+absl::Status List(Context& context, const PoseOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<PoseNode> nodes, Nodes(context, options));
+  Json rows = Json::array();
+  for (const PoseNode& node : nodes) {
+    rows.push_back(ToJson(node));
+  }
+  context.output.List(rows,
+                      {{"id", "ID"},
+                       {"state", "STATE"},
+                       {"time_s", "TIME"},
+                       {"correction_m", "CORRECTION"},
+                       {"correction_rad", "TURN"},
+                       {"pose", "X, Y, Z, QX, QY, QZ, QW"}});
+  return absl::OkStatus();
+}
+
+absl::Status Export(Context& context, const PoseOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(std::vector<PoseNode> nodes, Nodes(context, options));
+  std::sort(nodes.begin(), nodes.end(), [](const PoseNode& a, const PoseNode& b) {
+    return std::tie(a.time, a.id) < std::tie(b.time, b.id);
+  });
+  std::vector<TimedPose> poses;
+  poses.reserve(nodes.size());
+  for (const PoseNode& node : nodes) {
+    poses.push_back(
+        {node.time, options.which == "current" ? node.T_map_scan : node.T_map_scan_uploaded});
+  }
+  STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, TumText(poses)));
+  context.output.Object({{"file", options.out}, {"which", options.which}, {"poses", nodes.size()}});
+  return absl::OkStatus();
+}
+
+absl::Status Set(Context& context, const PoseOptions& options) {
+  STRATA_RETURN_IF_ERROR(context.database.posegraph().SetPose(
+      context.call, options.map, options.id, options.T_map_scan));
+  context.output.Object({{"id", options.id.ToString()}, {"pose", ToJson(options.T_map_scan)}});
+  return absl::OkStatus();
+}
+
+absl::Status Lookup(Context& context, const PoseOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(
+      const api::PoseLookup lookup,
+      context.database.posegraph().LookupPose(context.call, options.map, options.id));
+  Json json = {{"id", options.id.ToString()}};
+  json.update(ToJson(lookup));
+  context.output.Object(json);
+  return absl::OkStatus();
+}
+
+void AddExport(Commands& commands, CLI::App* noun, const std::shared_ptr<PoseOptions>& options) {
+  CLI::App* app =
+      commands.Verb(noun,
+                    "export",
+                    "Write poses of the scans in the map, by time",
+                    "strata pose export campus --format tum --which current --out poses.txt",
+                    [options](Context& context) { return Export(context, *options); });
+  AddMapName(app, options->map);
+  app->add_option(
+         "--format",
+         options->format,
+         "tum: a line 'time x y z qx qy qz qw' for each scan, T_map_scan, seconds and metres")
+      ->check(CLI::IsMember({"tum"}))
+      ->capture_default_str();
+  app->add_option("--which", options->which, "uploaded, or those of the current epoch")
+      ->check(CLI::IsMember({"uploaded", "current"}))
+      ->capture_default_str();
+  app->add_option("--trajectory", options->trajectory, "Only this trajectory");
+  app->add_option("--out", options->out, "The file to write")->type_name("FILE")->required();
+}
+
+}  // namespace
+
+void AddPoseCommands(Commands& commands) {
+  auto options = std::make_shared<PoseOptions>();
+  CLI::App* noun = commands.Noun(
+      "pose", "Where scans are in the map", "strata pose export campus --out poses.txt");
+  CLI::App* list = commands.Verb(noun,
+                                 "list",
+                                 "Poses of all scans and how far they are from the uploaded ones",
+                                 "strata pose list campus --trajectory segway",
+                                 [options](Context& context) { return List(context, *options); });
+  AddMapName(list, options->map);
+  list->add_option("--trajectory", options->trajectory, "Only this trajectory");
+  AddExport(commands, noun, options);
+  CLI::App* set = commands.Verb(noun,
+                                "set",
+                                "Move a scan by hand",
+                                "strata pose set campus segway/12 --pose 3.5,-1,0,0,0,0,1",
+                                [options](Context& context) { return Set(context, *options); });
+  AddMapName(set, options->map);
+  AddScanId(set, options->id);
+  AddPose(
+      set,
+      "--pose",
+      [options](const Pose& pose, std::size_t) { options->T_map_scan = pose; },
+      "Where the scan's frame is in the map [m, rad]; X,Y,Z keeps the axes of the map")
+      ->required();
+  CLI::App* lookup =
+      commands.Verb(noun,
+                    "lookup",
+                    "Where a scan is now, or why that is not known yet",
+                    "strata pose lookup campus segway/12",
+                    [options](Context& context) { return Lookup(context, *options); });
+  AddMapName(lookup, options->map);
+  AddScanId(lookup, options->id);
+}
+
+}  // namespace strata::cli

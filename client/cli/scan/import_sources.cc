@@ -1,0 +1,205 @@
+#include "client/cli/scan/import_sources.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+
+#include "absl/status/status.h"
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/time/time.h"
+
+#include "client/cli/classifier/label_classes.h"
+#include "client/cli/scan/level_trajectory.h"
+#include "client/formats/scan_list.h"
+#include "client/formats/scan_reader.h"
+#include "core/common/status.h"
+#include "core/world/map_class.h"
+
+namespace strata::cli {
+namespace {
+
+absl::StatusOr<std::vector<ScanFile>> FindScans(const ImportOptions& options, Output& output) {
+  ScanListOptions list;
+  list.warn = [&output](const std::string& warning) { output.Talk("warning: " + warning); };
+  STRATA_ASSIGN_OR_RETURN(list.format, ParseScanFormat(options.format));
+  STRATA_ASSIGN_OR_RETURN(list.pose_format, ParsePoseFormat(options.pose_format));
+  list.poses = options.poses;
+  return ListScans({options.paths.begin(), options.paths.end()}, list);
+}
+
+// What the trajectory has, by sequence.
+using ScansThere = std::map<std::uint64_t, ScanHeader>;
+
+absl::StatusOr<ScansThere> FindScansThere(Context& context, const ImportOptions& options) {
+  ScansThere there;
+  api::ScanFilter filter;
+  filter.trajectory = options.trajectory;
+  STRATA_RETURN_IF_ERROR(
+      context.database.scans().List(context.call, options.map, filter, [&](const ScanInfo& info) {
+        there.emplace(info.header.id.sequence, info.header);
+        return absl::OkStatus();
+      }));
+  return there;
+}
+
+// Whether the file cannot be what is there, as far as its time and pose tell.
+bool Differs(const ScanFile& scan, const ScanHeader& there) {
+  constexpr double kRounding = 1e-6;
+  return absl::ToUnixMicros(scan.time.value_or(absl::UnixEpoch())) !=
+             absl::ToUnixMicros(there.time) ||
+         (scan.pose_status.ok() && !scan.T_map_scan.isApprox(there.T_map_scan, kRounding));
+}
+
+// Scans without poses and times are told apart by the points of the first one.
+bool HasOtherPoints(const ScanFile& scan, const ScanHeader& there) {
+  const absl::StatusOr<PointCloud> cloud = ReadScan(scan.path, scan.format);
+  return cloud.ok() && cloud->size() != there.point_count;
+}
+
+// Folders of the same name have the same trajectory unless it is given: what is skipped then is
+// not what the map has.
+void WarnOfOtherScans(const std::vector<ScanFile>& scans,
+                      const ScansThere& there,
+                      const ImportOptions& options,
+                      Output& output) {
+  std::size_t skipped = 0;
+  std::size_t other = 0;
+  for (const ScanFile& scan : scans) {
+    const auto it = there.find(scan.sequence);
+    if (it == there.end()) continue;
+    const bool first = skipped++ == 0;
+    if (Differs(scan, it->second) || (first && HasOtherPoints(scan, it->second))) ++other;
+  }
+  if (other == 0) return;
+  output.Talk(absl::StrCat("warning: trajectory ",
+                           options.trajectory,
+                           " has other scans under these numbers (",
+                           other,
+                           " of ",
+                           skipped,
+                           " skipped files differ in time, pose or points); --trajectory NAME "
+                           "uploads these as a run of their own"));
+}
+
+// What labels of files become in a map.
+using LabelsToMap = std::function<absl::Status(PointCloud&)>;
+
+// Without --classes.
+LabelsToMap PlainLabels(const ImportOptions& options) {
+  if (options.without_labels) {
+    return [](PointCloud& cloud) {
+      cloud.label.clear();
+      return absl::OkStatus();
+    };
+  }
+  return [](PointCloud& cloud) {
+    const absl::Status valid = ValidateLabels(cloud.label);
+    if (valid.ok()) return valid;
+    return absl::InvalidArgumentError(absl::StrCat(
+        valid.message(),
+        "; say with --classes which labels are which class, or leave them out with --no-labels"));
+  };
+}
+
+absl::StatusOr<LabelsToMap> LabelsFor(Context& context, const ImportOptions& options) {
+  if (options.without_labels || options.classes.empty()) return PlainLabels(options);
+  STRATA_ASSIGN_OR_RETURN(const LabelClasses given, ReadLabelClasses(options.classes));
+  STRATA_ASSIGN_OR_RETURN(
+      const LabelClasses labels,
+      ForClassesOfMap(context.database.maps(), context.call, options.map, given));
+  return [labels](PointCloud& cloud) {
+    labels.Apply(cloud);
+    return absl::OkStatus();
+  };
+}
+
+absl::StatusOr<PointCloud> ReadForMap(const ScanFile& scan, const LabelsToMap& labels) {
+  STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScan(scan.path, scan.format));
+  STRATA_RETURN_IF_ERROR(labels(cloud));
+  return cloud;
+}
+
+ImportSources SourcesOf(const std::vector<ScanFile>& scans,
+                        const ScansThere& there,
+                        const ImportOptions& options,
+                        const LabelsToMap& labels) {
+  ImportSources sources;
+  sources.files = scans.size();
+  for (const ScanFile& scan : scans) {
+    const ScanId id = {options.trajectory, scan.sequence};
+    if (there.count(scan.sequence) > 0) {
+      sources.there.push_back(id);
+      continue;
+    }
+    if (!scan.pose_status.ok()) {
+      sources.errors.emplace_back(scan.path.string(), scan.pose_status.message());
+      continue;
+    }
+    UploadSource source;
+    source.file = scan.path.string();
+    source.header.id = id;
+    source.header.time = scan.time.value_or(absl::UnixEpoch());
+    source.header.T_map_scan = scan.T_map_scan;
+    source.header.alignment = options.align == "on" ? Alignment::kOn : Alignment::kOff;
+    source.read = [scan, labels] { return ReadForMap(scan, labels); };
+    sources.missing.push_back(std::move(source));
+  }
+  return sources;
+}
+
+// With --level: turns their poses.
+absl::StatusOr<std::optional<double>> Level(std::vector<ScanFile>& scans,
+                                            const ImportOptions& options,
+                                            Output& output) {
+  if (!options.level) return std::nullopt;
+  STRATA_ASSIGN_OR_RETURN(const double level_rad, LevelTrajectory(scans));
+  output.Talk(absl::StrFormat("levelled by %.4f rad", level_rad));
+  return level_rad;
+}
+
+}  // namespace
+
+std::string TrajectoryOf(const std::string& path) {
+  std::filesystem::path folder = std::filesystem::absolute(path).lexically_normal();
+  if (!folder.has_filename()) {
+    folder = folder.parent_path();
+  }
+  if (!std::filesystem::is_directory(folder)) {
+    folder = folder.parent_path();
+  }
+  if (folder.filename() == "scans") {
+    folder = folder.parent_path();
+  }
+  std::string name;
+  for (const char c : folder.filename().string()) {
+    const bool allowed = absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '_' ||
+                         (!name.empty() && (c == '-' || c == '.'));
+    name += allowed ? c : '_';
+  }
+  return name.empty() ? "scans" : name.substr(0, 100);
+}
+
+absl::StatusOr<ImportSources> FindImportSources(Context& context, const ImportOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(std::vector<ScanFile> scans, FindScans(options, context.output));
+  STRATA_ASSIGN_OR_RETURN(const ScansThere there, FindScansThere(context, options));
+  STRATA_ASSIGN_OR_RETURN(const LabelsToMap labels, LabelsFor(context, options));
+  STRATA_ASSIGN_OR_RETURN(const std::optional<double> level_rad,
+                          Level(scans, options, context.output));
+  WarnOfOtherScans(scans, there, options, context.output);
+  ImportSources sources = SourcesOf(scans, there, options, labels);
+  sources.level_rad = level_rad;
+  return sources;
+}
+
+absl::StatusOr<ImportSources> FindImportSources(Output& output, const ImportOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(std::vector<ScanFile> scans, FindScans(options, output));
+  STRATA_ASSIGN_OR_RETURN(const std::optional<double> level_rad, Level(scans, options, output));
+  ImportSources sources = SourcesOf(scans, {}, options, PlainLabels(options));
+  sources.level_rad = level_rad;
+  return sources;
+}
+
+}  // namespace strata::cli

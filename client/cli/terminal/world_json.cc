@@ -1,0 +1,138 @@
+#include "client/cli/terminal/world_json.h"
+
+#include <string>
+
+#include "client/cli/terminal/json.h"
+
+namespace strata::cli {
+
+std::string ToString(ConstraintOrigin origin) {
+  switch (origin) {
+    case ConstraintOrigin::kIngest:
+      return "ingest";
+    case ConstraintOrigin::kPerson:
+      return "person";
+    case ConstraintOrigin::kOptimize:
+      return "optimize";
+  }
+  return "unknown";
+}
+
+std::string ToString(PlaneKind kind) {
+  switch (kind) {
+    case PlaneKind::kWall:
+      return "wall";
+    case PlaneKind::kLevel:
+      return "level";
+    case PlaneKind::kSloped:
+      return "sloped";
+  }
+  return "unknown";
+}
+
+Json ToJson(const EpochInfo& epoch) {
+  return {{"epoch", epoch.epoch},
+          {"created", TimeText(epoch.created)},
+          {"reason", epoch.reason},
+          {"job", epoch.job == 0 ? Json() : Json(epoch.job)},
+          {"decided", epoch.decided},
+          {"current", epoch.current},
+          {"kept", epoch.kept}};
+}
+
+Json ToJson(const api::ScanChange& scan) {
+  if (scan.gone) return {{"id", scan.id.ToString()}, {"gone", true}};
+  return {{"id", scan.id.ToString()},
+          {"state", ToString(scan.state)},
+          {"pose", ToJson(scan.T_map_scan)},
+          {"gone", false}};
+}
+
+Json ToJson(const api::TileChangeNotice& tile) {
+  return {{"key", tile.key.ToString()}, {"version", tile.version}, {"gone", tile.gone}};
+}
+
+Json ToJson(const api::MapUpdate& update) {
+  Json scans = Json::array();
+  for (const api::ScanChange& scan : update.scans) scans.push_back(ToJson(scan));
+  Json tiles = Json::array();
+  for (const api::TileChangeNotice& tile : update.tiles) tiles.push_back(ToJson(tile));
+  return {{"whole", update.whole},
+          {"commit_sequence", update.commit_sequence},
+          {"epoch", update.epoch},
+          {"epoch_reason", update.epoch_reason},
+          {"scans", scans},
+          {"tiles", tiles}};
+}
+
+Json ToJson(const Matrix6d& matrix) {
+  Json rows = Json::array();
+  for (int r = 0; r < 6; ++r) {
+    Json row = Json::array();
+    for (int c = 0; c < 6; ++c) row.push_back(matrix(r, c));
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+Json ToJson(const Constraint& constraint) {
+  return {{"id", constraint.id},
+          {"kind", constraint.is_prior() ? "prior" : "relative"},
+          {"i", constraint.is_prior() ? Json() : Json(constraint.i.ToString())},
+          {"j", constraint.j.ToString()},
+          {"origin", ToString(constraint.origin)},
+          {"enabled", constraint.enabled},
+          {"may_be_false", constraint.may_be_false},
+          {"pose", ToJson(constraint.T_i_j)},
+          {"information", ToJson(constraint.information)},
+          {"note", constraint.note}};
+}
+
+Json ToJson(const GlobalPlane& plane) {
+  Json supports = Json::array();
+  double weight = 0.0;
+  for (const PlaneSupport& support : plane.supports) {
+    supports.push_back(
+        {{"scan", support.scan.ToString()}, {"weight", support.weight}, {"rms_m", support.rms_m}});
+    weight += support.weight;
+  }
+  return {{"id", plane.id},
+          {"kind", ToString(plane.kind)},
+          {"normal", ToJson(plane.plane.normal)},
+          {"distance_m", plane.plane.distance},
+          {"from", plane.from_edges ? "edges" : "surfaces"},
+          {"supporters", plane.supports.size()},
+          {"weight", weight},
+          {"enabled", plane.enabled},
+          {"note", plane.note},
+          {"supports", supports}};
+}
+
+Json ToJson(const api::PoseLookup& lookup) {
+  return {{"known", lookup.known},
+          {"message", lookup.message},
+          {"pose", ToJson(lookup.T_map_scan)},
+          {"epoch", lookup.epoch}};
+}
+
+Json ToJson(const LocalizeCandidate& candidate) {
+  return {{"place", candidate.place.ToString()},
+          {"pose", ToJson(candidate.T_map_scan)},
+          {"confidence", candidate.confidence},
+          {"overlap", candidate.overlap},
+          {"rms_m", candidate.rms_m}};
+}
+
+Json ToJson(const LocalizeResult& result) {
+  Json json = {{"found", result.found}, {"message", result.message}, {"epoch", result.epoch}};
+  if (result.found) {
+    json.update(ToJson(result.best));
+    json["covariance"] = ToJson(result.covariance);
+  }
+  Json others = Json::array();
+  for (const LocalizeCandidate& other : result.others) others.push_back(ToJson(other));
+  json["others"] = others;
+  return json;
+}
+
+}  // namespace strata::cli

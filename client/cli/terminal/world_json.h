@@ -1,0 +1,32 @@
+// Epochs, what watchers are told, and what holds scans in their places, as JSON objects.
+#ifndef STRATA_CLIENT_CLI_TERMINAL_WORLD_JSON_H_
+#define STRATA_CLIENT_CLI_TERMINAL_WORLD_JSON_H_
+
+#include <string>
+
+#include "client/cli/terminal/output.h"
+#include "core/api/maps.h"
+#include "core/api/posegraph.h"
+#include "core/world/constraint.h"
+#include "core/world/epoch.h"
+#include "core/world/localization.h"
+
+namespace strata::cli {
+
+Json ToJson(const EpochInfo& epoch);
+Json ToJson(const api::ScanChange& scan);
+Json ToJson(const api::TileChangeNotice& tile);
+Json ToJson(const api::MapUpdate& update);
+Json ToJson(const Constraint& constraint);
+Json ToJson(const GlobalPlane& plane);
+Json ToJson(const api::PoseLookup& lookup);
+Json ToJson(const LocalizeCandidate& candidate);
+Json ToJson(const LocalizeResult& result);
+Json ToJson(const Matrix6d& matrix);  // six rows of six
+
+std::string ToString(ConstraintOrigin origin);
+std::string ToString(PlaneKind kind);
+
+}  // namespace strata::cli
+
+#endif  // STRATA_CLIENT_CLI_TERMINAL_WORLD_JSON_H_

@@ -1,0 +1,67 @@
+#include "core/engine/consistency/revert.h"
+
+#include <cstdint>
+#include <utility>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/common/status.h"
+#include "core/engine/ingest/pose_change.h"
+#include "core/engine/tiles/epoch_tiles.h"
+
+namespace strata {
+namespace {
+
+absl::StatusOr<PoseChange> ReadChange(MapCore& core, std::uint64_t epoch) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  STRATA_RETURN_IF_ERROR(CheckEpochKept(*reader, epoch, absl::StatusCode::kFailedPrecondition));
+  STRATA_ASSIGN_OR_RETURN(PoseChange change,
+                          PoseChange::Read(*reader, core.snapshots().current().epoch));
+  STRATA_ASSIGN_OR_RETURN(const PoseChange then, PoseChange::Read(*reader, epoch));
+  for (const PosedScan& posed : then.scans()) {
+    change.Decide(posed.scan.number, posed.pose->T_map_scan);
+  }
+  return change;
+}
+
+}  // namespace
+
+absl::Status RunRevertJob(Integrator& integrator, const JobInfo& job, JobContext& context) {
+  MapCore& core = integrator.core();
+  std::uint64_t epoch = 0;
+  const auto parameter = job.parameters.find("epoch");
+  if (parameter == job.parameters.end() || !absl::SimpleAtoi(parameter->second, &epoch)) {
+    return absl::InvalidArgumentError("job parameter epoch: missing; see map history");
+  }
+  STRATA_ASSIGN_OR_RETURN(const PoseChange change, ReadChange(core, epoch));
+  PoseChange::Outcome outcome = change.Resolve({.translation_m = 0.0, .rotation_rad = 0.0});
+  ScanMoves moves;
+  moves.poses = std::move(outcome.moves);
+  moves.origin = PoseOrigin::kRevert;
+  moves.reason = absl::StrCat("back to epoch ", epoch, ", job ", job.id);
+  moves.job = job.id;
+  DamagedScans damaged;
+  moves.damaged = &damaged;
+  context.SetMetric("epoch_before", static_cast<double>(core.snapshots().current().epoch));
+  context.SetMetric("scans_moved", static_cast<double>(moves.poses.size()));
+  context.SetMetric("scans_carried", static_cast<double>(outcome.carried));
+  STRATA_ASSIGN_OR_RETURN(
+      const MoveOutcome moved,
+      integrator.MoveScans(
+          moves, core.options().worker_threads, context, [&](StorageWriter& writer) {
+            return writer.RestoreConstraints(epoch);
+          }));
+  context.SetMetric("epoch", static_cast<double>(moved.epoch));
+  context.SetMetric("tiles_changed", static_cast<double>(moved.tiles));
+  damaged.SetMetrics(context);
+  context.SetMessage(absl::StrCat("poses and constraints of epoch ",
+                                  epoch,
+                                  " are back as epoch ",
+                                  moved.epoch,
+                                  damaged.Message()));
+  return absl::OkStatus();
+}
+
+}  // namespace strata

@@ -1,0 +1,23 @@
+// Goes back to the poses and constraints of an earlier epoch, never to its scans.
+#ifndef STRATA_CORE_ENGINE_CONSISTENCY_REVERT_H_
+#define STRATA_CORE_ENGINE_CONSISTENCY_REVERT_H_
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+
+#include "core/engine/ingest/integrator.h"
+#include "core/engine/map/job_context.h"
+#include "core/world/job.h"
+
+namespace strata {
+
+inline constexpr absl::string_view kRevertJob = "revert";
+
+// On the worker: makes the poses of the epoch in the job's parameter "epoch" those of a new epoch.
+// Scans that had none then are carried by their partners. NOT_FOUND for an epoch that never was,
+// FAILED_PRECONDITION for one that is not kept.
+absl::Status RunRevertJob(Integrator& integrator, const JobInfo& job, JobContext& context);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_CONSISTENCY_REVERT_H_

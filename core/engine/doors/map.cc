@@ -1,0 +1,47 @@
+#include "core/engine/doors/map.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/common/status.h"
+#include "core/engine/repair/rebuild.h"
+
+namespace strata {
+
+absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
+                                               const std::filesystem::path& file,
+                                               const EngineOptions& options,
+                                               std::shared_ptr<CacheBudget> caches) {
+  std::shared_ptr<Map> map(new Map());
+  STRATA_ASSIGN_OR_RETURN(map->core_, MapCore::Open(name, file, options, std::move(caches)));
+  STRATA_ASSIGN_OR_RETURN(map->quarantine_, Quarantine::Open(*map->core_));
+  STRATA_ASSIGN_OR_RETURN(map->jobs_, JobBoard::Open(*map->core_, *map->quarantine_));
+  STRATA_ASSIGN_OR_RETURN(map->uploads_, UnfinishedUploads::Open(*map->core_));
+  std::uint64_t pending = 0;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map->core_->Reader());
+    STRATA_ASSIGN_OR_RETURN(const ScanTotals totals, reader->GetScanTotals());
+    pending = totals.pending;
+  }
+  map->planner_ = std::make_unique<MapPlanner>(*map->core_);
+  map->tiles_ = std::make_unique<ServedTiles>(*map->core_);
+  map->localizer_ = std::make_unique<Localizer>(*map->core_);
+  map->worker_ = std::make_unique<Worker>(*map->core_, *map->quarantine_, &RecoverDerived, pending);
+  map->runner_ =
+      std::make_unique<JobRunner>(*map->core_, *map->quarantine_, *map->jobs_, *map->worker_);
+  return map;
+}
+
+void Map::Close() {
+  if (runner_ != nullptr) runner_->Close();
+  if (worker_ != nullptr) worker_->Close();
+  if (core_ != nullptr) core_->Close();
+}
+
+}  // namespace strata

@@ -1,0 +1,68 @@
+// One map in use: its shared core, the worker that integrates scans, and the runner of its jobs.
+#ifndef STRATA_CORE_ENGINE_DOORS_MAP_H_
+#define STRATA_CORE_ENGINE_DOORS_MAP_H_
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/engine/consistency/localizer.h"
+#include "core/engine/doors/map_planner.h"
+#include "core/engine/ingest/unfinished_uploads.h"
+#include "core/engine/ingest/worker.h"
+#include "core/engine/jobs/job_board.h"
+#include "core/engine/jobs/job_runner.h"
+#include "core/engine/map/map_core.h"
+#include "core/engine/map/quarantine.h"
+#include "core/engine/tiles/served_tiles.h"
+
+namespace strata {
+
+// Thread-safe.
+class Map {
+ public:
+  static absl::StatusOr<std::shared_ptr<Map>> Open(const std::string& name,
+                                                   const std::filesystem::path& file,
+                                                   const EngineOptions& options,
+                                                   std::shared_ptr<CacheBudget> caches);
+  ~Map() { Close(); }
+
+  MapCore& core() { return *core_; }
+  JobBoard& jobs() { return *jobs_; }
+  MapPlanner& planner() { return *planner_; }
+  ServedTiles& tiles() { return *tiles_; }
+  Localizer& localizer() { return *localizer_; }
+  Worker& worker() { return *worker_; }
+  UnfinishedUploads& uploads() { return *uploads_; }
+
+  // RESOURCE_EXHAUSTED while too many scans wait for integration.
+  absl::Status CheckRoomForPending() const { return worker_->CheckRoom(); }
+  // A scan became durable.
+  void ScanCommitted(ScanNumber number) { worker_->ScanCommitted(number); }
+  // A job was queued.
+  void JobQueued() { runner_->JobQueued(); }
+
+  // Ends all threads, waiting for what they do now, and closes the file.
+  void Close();
+
+ private:
+  Map() = default;
+
+  std::unique_ptr<MapCore> core_;
+  std::unique_ptr<Quarantine> quarantine_;
+  std::unique_ptr<JobBoard> jobs_;
+  std::unique_ptr<MapPlanner> planner_;
+  std::unique_ptr<ServedTiles> tiles_;
+  std::unique_ptr<Localizer> localizer_;
+  std::unique_ptr<UnfinishedUploads> uploads_;
+  std::unique_ptr<Worker> worker_;
+  std::unique_ptr<JobRunner> runner_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_DOORS_MAP_H_

@@ -1,0 +1,221 @@
+#include "core/engine/doors/map_planner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/container/btree_set.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/synchronization/mutex.h"
+#include <glog/logging.h>
+
+#include "core/common/log_line.h"
+#include "core/common/status.h"
+#include "core/engine/map/change_log.h"
+#include "core/engine/map/parallel.h"
+#include "core/engine/tiles/kept_tiles.h"
+#include "core/engine/tiles/surface_tiles.h"
+#include "core/engine/tiles/tile_check.h"
+#include "core/planning/path_check.h"
+#include "core/planning/tile_source.h"
+
+namespace strata {
+namespace {
+
+// Of the caches, for decoded tiles: what is prepared of them is asked for far more often.
+constexpr std::size_t kDecodedShare = 16;
+
+// Whether an answer given before is the one that would be given now. What a robot may do in a tile
+// depends on the tiles around it too.
+bool StillKnown(const PathCheck& known,
+                const PathQuery& query,
+                const ChangeSet& changes,
+                double cell_size_m) {
+  if (!changes.complete || known.commit_sequence > changes.last) return false;
+  if (!ValidateWaypoints(query.waypoints, cell_size_m).ok() ||
+      known.tiles != TilesUnder(query.waypoints, cell_size_m)) {
+    return false;
+  }
+  const absl::btree_set<TileKey> around = WithNeighbours({known.tiles.begin(), known.tiles.end()});
+  return std::none_of(changes.tiles.begin(), changes.tiles.end(), [&](const auto& change) {
+    return around.contains(change.first);
+  });
+}
+
+}  // namespace
+
+// The tiles of one pinned state.
+class MapPlanner::Source final : public TileSource {
+ public:
+  Source(MapPlanner& planner, Snapshots::Pin pin, std::shared_ptr<const TileVersionMap> versions)
+      : planner_(planner), pin_(std::move(pin)), versions_(std::move(versions)) {}
+
+  absl::StatusOr<std::shared_ptr<const SurfaceTile>> Load(const TileKey& key) override {
+    const std::uint64_t version = Version(key);
+    if (version == 0) return std::shared_ptr<const SurfaceTile>();
+    return planner_.LoadTile(key, version);
+  }
+  std::uint64_t Version(const TileKey& key) override {
+    const auto it = versions_->find(key);
+    return it == versions_->end() ? 0 : it->second;
+  }
+  absl::StatusOr<std::optional<std::string>> LoadPrepared(const TileKey& key,
+                                                          const TileVersions& versions,
+                                                          const RobotProfile& profile) override {
+    return planner_.LoadPrepared(key, MadeOf(versions, profile));
+  }
+  std::uint64_t epoch() const { return pin_.view().epoch; }
+
+  static absl::StatusOr<Source> OfNow(MapPlanner& planner) {
+    return Of(planner, planner.core_.snapshots().PinCurrent());
+  }
+  static absl::StatusOr<Source> Of(MapPlanner& planner, Snapshots::Pin pin) {
+    STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const TileVersionMap> versions,
+                            planner.VersionsOf(pin.view()));
+    return Source(planner, std::move(pin), std::move(versions));
+  }
+
+ private:
+  MapPlanner& planner_;
+  Snapshots::Pin pin_;
+  std::shared_ptr<const TileVersionMap> versions_;
+};
+
+MapPlanner::MapPlanner(MapCore& core)
+    : core_(core),
+      planner_({.cell_size_m = core.info().parameters.mls.cell_size_m,
+                .budget = core.caches(),
+                .loop =
+                    [threads = core.options().worker_threads](
+                        std::size_t count, absl::FunctionRef<absl::Status(std::size_t)> body) {
+                      return ParallelFor(
+                          threads, count, [&](int /*thread*/, std::size_t i) { return body(i); });
+                    }}),
+      tiles_(core.caches(), core.options().cache_bytes / kDecodedShare) {}
+
+absl::StatusOr<std::shared_ptr<const TileVersionMap>> MapPlanner::VersionsOf(const MapView& view) {
+  {
+    absl::MutexLock lock(&mutex_);
+    if (versions_ != nullptr && versions_view_ == view) return versions_;
+  }
+  std::shared_ptr<const TileVersionMap> versions;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> rows,
+                            reader->ListSurfaceTiles(TileRange{}, view.tile_version));
+    versions = std::make_shared<const TileVersionMap>(VersionsOfTiles(rows));
+  }
+  absl::MutexLock lock(&mutex_);
+  versions_view_ = view;
+  versions_ = versions;
+  return versions_;
+}
+
+absl::StatusOr<std::shared_ptr<const SurfaceTile>> MapPlanner::LoadTile(const TileKey& key,
+                                                                        std::uint64_t version) {
+  const auto held = tiles_.Find(key);
+  if (held != nullptr && held->version == version) return held->tile;
+  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const SurfaceTile> tile,
+                          ReadSurfaceTile(core_, key, version));
+  if (tile == nullptr) return tile;
+  tiles_.Put(key,
+             std::make_shared<const Decoded>(Decoded{version, tile}),
+             sizeof(SurfaceTile) + tile->surfaces.capacity() * sizeof(Surface));
+  return tile;
+}
+
+absl::StatusOr<std::optional<std::string>> MapPlanner::LoadPrepared(const TileKey& key,
+                                                                    const std::string& made_of) {
+  std::optional<std::string> bytes;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    STRATA_ASSIGN_OR_RETURN(bytes, reader->FindPreparedTile(key, made_of));
+  }
+  if (!bytes.has_value()) return bytes;
+  absl::StatusOr<std::string> packed = UnsealTile(key, made_of, *std::move(bytes));
+  if (packed.ok()) return std::optional<std::string>(*std::move(packed));
+  LOG(WARNING) << LogLine("prepare").Add("map", core_.name()).Add("damaged", key.ToString());
+  core_.NoteUnreadable(key);
+  return std::optional<std::string>();
+}
+
+absl::StatusOr<PlanResult> MapPlanner::Plan(const PlanQuery& query, const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this));
+  STRATA_ASSIGN_OR_RETURN(PlanResult result, planner_.Plan(source, query, stop));
+  result.epoch = source.epoch();
+  return result;
+}
+
+absl::StatusOr<PathCheck> MapPlanner::Check(const PathQuery& query, const Stop& stop) {
+  const double cell_size_m = core_.info().parameters.mls.cell_size_m;
+  const std::uint64_t since = query.known.has_value() ? query.known->commit_sequence
+                                                      : std::numeric_limits<std::uint64_t>::max();
+  std::pair<ChangeSet, Snapshots::Pin> told = core_.ChangesSince(since);
+  const ChangeSet& changes = told.first;
+  const std::uint64_t epoch = told.second.view().epoch;
+  PathCheck check;
+  if (query.known.has_value() && StillKnown(*query.known, query, changes, cell_size_m)) {
+    check = *query.known;
+  } else {
+    STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, std::move(told.second)));
+    STRATA_ASSIGN_OR_RETURN(check, planner_.Check(source, query, stop));
+  }
+  check.epoch = epoch;
+  check.commit_sequence = changes.last;
+  return check;
+}
+
+absl::Status MapPlanner::Watch(const PathQuery& query,
+                               const Stop& stop,
+                               absl::FunctionRef<absl::Status(const PathCheck&)> sink) {
+  PathQuery asked = query;
+  asked.known.reset();
+  while (true) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+    STRATA_ASSIGN_OR_RETURN(const PathCheck check, Check(asked, stop));
+    if (!asked.known.has_value() || asked.known->valid != check.valid) {
+      STRATA_RETURN_IF_ERROR(sink(check));
+    }
+    asked.known = check;
+    STRATA_RETURN_IF_ERROR(core_.changes().Await(check.commit_sequence, stop));
+  }
+}
+
+absl::StatusOr<std::vector<SurfaceColumn>> MapPlanner::Sample(
+    const std::vector<Eigen::Vector2d>& places, const Stop& stop) {
+  constexpr std::size_t kStopInterval = 1024;
+  const double cell_size_m = core_.info().parameters.mls.cell_size_m;
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this));
+  std::vector<SurfaceColumn> columns;
+  columns.reserve(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (i % kStopInterval == 0) STRATA_RETURN_IF_ERROR(stop.status());
+    if (!places[i].allFinite()) {
+      return absl::InvalidArgumentError(absl::StrCat("place ", i, " is not finite"));
+    }
+    SurfaceColumn& column = columns.emplace_back();
+    column.x_m = places[i].x();
+    column.y_m = places[i].y();
+    const Eigen::Vector2d cell = (places[i] / cell_size_m).array().floor();
+    if (cell.cwiseAbs().maxCoeff() >= kMaxCellIndex) continue;
+    const CellIndex index{static_cast<std::int32_t>(cell.x()), static_cast<std::int32_t>(cell.y())};
+    STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<const SurfaceTile> tile,
+                            source.Load(TileOfCell(index)));
+    if (tile == nullptr) continue;
+    const auto surfaces = tile->Cell(CellInTile(index));
+    column.surfaces.assign(surfaces.begin(), surfaces.end());
+  }
+  return columns;
+}
+
+}  // namespace strata

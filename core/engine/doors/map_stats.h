@@ -1,0 +1,18 @@
+// Counts of a map.
+#ifndef STRATA_CORE_ENGINE_DOORS_MAP_STATS_H_
+#define STRATA_CORE_ENGINE_DOORS_MAP_STATS_H_
+
+#include "absl/status/statusor.h"
+
+#include "core/storage/storage.h"
+#include "core/world/map_info.h"
+
+namespace strata {
+
+// All of one committed state. The content digest is the hash over key and content hash of every
+// level-0 tile with all its statistics, in key order.
+absl::StatusOr<MapStats> CollectStats(StorageReader& reader);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_DOORS_MAP_STATS_H_

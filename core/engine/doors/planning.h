@@ -1,0 +1,49 @@
+// api::Planning on the maps of an engine.
+#ifndef STRATA_CORE_ENGINE_DOORS_PLANNING_H_
+#define STRATA_CORE_ENGINE_DOORS_PLANNING_H_
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/api/planning.h"
+#include "core/engine/doors/maps.h"
+
+namespace strata {
+
+class EnginePlanning final : public api::Planning {
+ public:
+  explicit EnginePlanning(EngineMaps& maps) : maps_(maps) {}
+
+  absl::StatusOr<PlanResult> PlanPath(const api::Call& call,
+                                      absl::string_view map,
+                                      const PlanQuery& query) override;
+  absl::StatusOr<PathCheck> CheckPath(const api::Call& call,
+                                      absl::string_view map,
+                                      const PathQuery& query) override;
+  absl::Status WatchPath(const api::Call& call,
+                         absl::string_view map,
+                         const PathQuery& query,
+                         absl::FunctionRef<absl::Status(const PathCheck&)> sink) override;
+  absl::StatusOr<std::vector<SurfaceColumn>> SampleSurfaces(
+      const api::Call& call,
+      absl::string_view map,
+      const std::vector<Eigen::Vector2d>& places) override;
+  absl::Status SetProfile(const api::Call& call,
+                          absl::string_view map,
+                          absl::string_view name,
+                          const RobotProfile& profile) override;
+  absl::StatusOr<std::map<std::string, RobotProfile>> ListProfiles(const api::Call& call,
+                                                                   absl::string_view map) override;
+
+ private:
+  EngineMaps& maps_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_DOORS_PLANNING_H_

@@ -1,0 +1,174 @@
+#include "core/engine/doors/posegraph.h"
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+
+#include "core/common/status.h"
+#include "core/engine/doors/scans.h"
+#include "core/world/names.h"
+
+namespace strata {
+namespace {
+
+absl::Status AddNodes(StorageReader& reader, api::PoseGraphState& state) {
+  ScanQuery query;
+  while (true) {
+    STRATA_ASSIGN_OR_RETURN(const std::vector<PosedScan> page,
+                            reader.ListScans(query, state.epoch));
+    for (const PosedScan& posed : page) {
+      const ScanInfo info = ToScanInfo(posed);
+      state.nodes.push_back(
+          {info.header.id, info.header.time, info.state, info.header.T_map_scan, info.T_map_scan});
+    }
+    if (page.size() < query.limit) return absl::OkStatus();
+    query.after = page.back().scan.number;
+  }
+}
+
+absl::StatusOr<ScanNumber> NumberOf(StorageReader& reader, const ScanId& id) {
+  STRATA_ASSIGN_OR_RETURN(const std::optional<PosedScan> posed, reader.FindScan(id, 0));
+  if (posed.has_value()) return posed->scan.number;
+  return absl::NotFoundError(absl::StrCat("scan ", id.ToString(), " does not exist"));
+}
+
+}  // namespace
+
+absl::StatusOr<api::PoseGraphState> EnginePoseGraph::Get(const api::Call& call,
+                                                         absl::string_view map) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
+  api::PoseGraphState state;
+  MapClock clock;
+  const absl::Status read = reader->Snapshot([&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(clock, reader->GetClock());
+    state.epoch = clock.epoch;
+    STRATA_RETURN_IF_ERROR(AddNodes(*reader, state));
+    STRATA_ASSIGN_OR_RETURN(std::vector<ConstraintRecord> records,
+                            reader->ListConstraints(clock.epoch));
+    for (ConstraintRecord& record : records) {
+      state.constraints.push_back(std::move(record.constraint));
+    }
+    STRATA_ASSIGN_OR_RETURN(std::vector<PlaneRecord> planes, reader->ListPlanes(clock.epoch));
+    for (PlaneRecord& record : planes) state.planes.push_back(std::move(record.plane));
+    return absl::OkStatus();
+  });
+  STRATA_RETURN_IF_ERROR(read);
+  found->core().snapshots().AwaitPublished(clock.tile_version);
+  return state;
+}
+
+absl::Status EnginePoseGraph::SetPose(const api::Call& call,
+                                      absl::string_view map,
+                                      const ScanId& id,
+                                      const Pose& T_map_scan) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", id.trajectory));
+  if (const absl::Status valid = ValidatePose(T_map_scan); !valid.ok()) {
+    return Annotate(valid, absl::StrCat("scan ", id.ToString()));
+  }
+  {
+    // Here, too: to hear of it nobody waits behind what the worker is at.
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
+    STRATA_RETURN_IF_ERROR(NumberOf(*reader, id).status());
+  }
+  return found->worker().Execute(
+      call.stop, [&](Integrator& integrator) { return integrator.SetPose(id, T_map_scan); });
+}
+
+absl::StatusOr<Constraint> EnginePoseGraph::AddConstraint(const api::Call& call,
+                                                          absl::string_view map,
+                                                          const Constraint& constraint) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_RETURN_IF_ERROR(ValidateConstraint(constraint));
+  ConstraintRecord record;
+  record.constraint = constraint;
+  record.constraint.origin = ConstraintOrigin::kPerson;
+  STRATA_RETURN_IF_ERROR(found->core().writer().Run(
+      Durability::kFull, 0, call.stop, [&](StorageWriter& writer) -> absl::Status {
+        if (!constraint.is_prior()) {
+          STRATA_ASSIGN_OR_RETURN(record.scan_i, NumberOf(writer.reader(), constraint.i));
+        }
+        STRATA_ASSIGN_OR_RETURN(record.scan_j, NumberOf(writer.reader(), constraint.j));
+        STRATA_ASSIGN_OR_RETURN(record.constraint.id, writer.PutConstraint(record));
+        return absl::OkStatus();
+      }));
+  return record.constraint;
+}
+
+absl::Status EnginePoseGraph::RemoveConstraint(const api::Call& call,
+                                               absl::string_view map,
+                                               std::uint64_t id) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  return found->core().writer().Run(
+      Durability::kFull, 0, call.stop, [&](StorageWriter& writer) -> absl::Status {
+        STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
+        STRATA_ASSIGN_OR_RETURN(const std::vector<PlaneRecord> planes,
+                                writer.reader().ListPlanes(clock.epoch));
+        for (const PlaneRecord& record : planes) {
+          if (record.plane.id != id) continue;
+          return absl::FailedPreconditionError(absl::StrCat(
+              "constraint ", id, " is a plane, which the next job would find again; disable it"));
+        }
+        return writer.DeleteConstraint(id);
+      });
+}
+
+absl::Status EnginePoseGraph::EnableConstraint(const api::Call& call,
+                                               absl::string_view map,
+                                               std::uint64_t id,
+                                               bool enabled) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  return found->core().writer().Run(Durability::kFull, 0, call.stop, [&](StorageWriter& writer) {
+    return writer.EnableConstraint(id, enabled);
+  });
+}
+
+absl::StatusOr<api::PoseLookup> EnginePoseGraph::LookupPose(const api::Call& call,
+                                                            absl::string_view map,
+                                                            const ScanId& id) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", id.trajectory));
+  const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
+  STRATA_ASSIGN_OR_RETURN(const std::optional<PosedScan> posed,
+                          reader->FindScan(id, pin.view().epoch));
+  if (!posed.has_value()) {
+    return absl::NotFoundError(absl::StrCat("scan ", id.ToString(), " does not exist"));
+  }
+  const ScanInfo info = ToScanInfo(*posed);
+  api::PoseLookup lookup;
+  lookup.epoch = pin.view().epoch;
+  lookup.T_map_scan = info.T_map_scan;
+  lookup.known = info.state == ScanState::kIntegrated;
+  if (info.state == ScanState::kFailed) {
+    lookup.message = absl::StrCat("could not be integrated: ", info.message);
+  } else if (!lookup.known) {
+    STRATA_ASSIGN_OR_RETURN(const ScanTotals totals, reader->GetScanTotals());
+    lookup.message = absl::StrCat("waits for integration, one of ", totals.pending, " scans");
+  }
+  return lookup;
+}
+
+absl::StatusOr<LocalizeResult> EnginePoseGraph::Localize(const api::Call& call,
+                                                         absl::string_view map,
+                                                         const LocalizeQuery& query) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  return found->localizer().Localize(query, call.stop);
+}
+
+}  // namespace strata

@@ -1,0 +1,48 @@
+// api::PoseGraph on the maps of an engine.
+#ifndef STRATA_CORE_ENGINE_DOORS_POSEGRAPH_H_
+#define STRATA_CORE_ENGINE_DOORS_POSEGRAPH_H_
+
+#include <cstdint>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/api/posegraph.h"
+#include "core/engine/doors/maps.h"
+
+namespace strata {
+
+class EnginePoseGraph final : public api::PoseGraph {
+ public:
+  explicit EnginePoseGraph(EngineMaps& maps) : maps_(maps) {}
+
+  absl::StatusOr<api::PoseGraphState> Get(const api::Call& call, absl::string_view map) override;
+  absl::Status SetPose(const api::Call& call,
+                       absl::string_view map,
+                       const ScanId& id,
+                       const Pose& T_map_scan) override;
+  absl::StatusOr<Constraint> AddConstraint(const api::Call& call,
+                                           absl::string_view map,
+                                           const Constraint& constraint) override;
+  absl::Status RemoveConstraint(const api::Call& call,
+                                absl::string_view map,
+                                std::uint64_t id) override;
+  absl::Status EnableConstraint(const api::Call& call,
+                                absl::string_view map,
+                                std::uint64_t id,
+                                bool enabled) override;
+  absl::StatusOr<api::PoseLookup> LookupPose(const api::Call& call,
+                                             absl::string_view map,
+                                             const ScanId& id) override;
+  absl::StatusOr<LocalizeResult> Localize(const api::Call& call,
+                                          absl::string_view map,
+                                          const LocalizeQuery& query) override;
+
+ private:
+  EngineMaps& maps_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_DOORS_POSEGRAPH_H_

@@ -1,0 +1,257 @@
+#include "core/engine/doors/scans.h"
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+
+#include "core/common/status.h"
+#include "core/engine/doors/local_map_upload.h"
+#include "core/engine/doors/upload.h"
+#include "core/engine/scans/scan_labels.h"
+#include "core/engine/scans/scan_source.h"
+#include "core/world/map_class.h"
+#include "core/world/names.h"
+
+namespace strata {
+namespace {
+
+constexpr std::uint32_t kPageScans = 256;
+
+absl::Status NoSuchScan(const ScanId& id) {
+  return absl::NotFoundError(absl::StrCat("scan ", id.ToString(), " does not exist"));
+}
+
+absl::Status CheckId(const ScanId& id) { return ValidateName("trajectory name", id.trajectory); }
+
+// Reads one state of the store and returns once its tiles are what readers get: who is told that a
+// scan is integrated finds it in the tiles.
+absl::Status ReadVisible(Map& map,
+                         absl::FunctionRef<absl::Status(StorageReader&, const MapClock&)> body) {
+  MapClock clock;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map.core().Reader());
+    STRATA_RETURN_IF_ERROR(reader->Snapshot([&]() -> absl::Status {
+      STRATA_ASSIGN_OR_RETURN(clock, reader->GetClock());
+      return body(*reader, clock);
+    }));
+  }
+  map.core().snapshots().AwaitPublished(clock.tile_version);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<PosedScan> FindScan(Map& map, const ScanId& id) {
+  STRATA_RETURN_IF_ERROR(CheckId(id));
+  std::optional<PosedScan> scan;
+  STRATA_RETURN_IF_ERROR(
+      ReadVisible(map, [&](StorageReader& reader, const MapClock& clock) -> absl::Status {
+        STRATA_ASSIGN_OR_RETURN(scan, reader.FindScan(id, clock.epoch));
+        return absl::OkStatus();
+      }));
+  if (!scan.has_value()) return NoSuchScan(id);
+  return *std::move(scan);
+}
+
+absl::StatusOr<ScanQuery> ToQuery(const api::ScanFilter& filter) {
+  ScanQuery query;
+  if (filter.trajectory.has_value()) {
+    STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", *filter.trajectory));
+  }
+  if (filter.box.has_value() &&
+      !(filter.box->min().allFinite() && filter.box->max().allFinite() && !filter.box->isEmpty())) {
+    return absl::InvalidArgumentError("box: not finite, or its minimum is beyond its maximum");
+  }
+  query.trajectory = filter.trajectory;
+  query.state = filter.state;
+  query.from = filter.from;
+  query.until = filter.until;
+  query.box = filter.box;
+  query.limit = kPageScans;
+  return query;
+}
+
+absl::StatusOr<PointCloud> ReadPiece(Map& map,
+                                     const ScanRecord& scan,
+                                     std::uint32_t ordinal,
+                                     ScanLabels& labels) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map.core().Reader());
+  STRATA_ASSIGN_OR_RETURN(PointCloud piece, ReadPoints(*reader, scan, ordinal));
+  STRATA_RETURN_IF_ERROR(labels.Apply(*reader, piece));
+  piece.sensor_origin = scan.header.sensor_origin;
+  return piece;
+}
+
+}  // namespace
+
+ScanInfo ToScanInfo(const PosedScan& posed) {
+  ScanInfo info;
+  info.header = posed.scan.header;
+  info.state = posed.scan.state;
+  info.T_map_scan = posed.pose.has_value() ? posed.pose->T_map_scan : info.header.T_map_scan;
+  info.commit_sequence = posed.scan.number;
+  info.point_bytes = posed.scan.point_bytes;
+  info.content_hash = posed.scan.content_hash;
+  info.message = posed.scan.message;
+  if (posed.pose.has_value()) info.alignment = posed.pose->report;
+  info.person_labels = posed.scan.person_labels;
+  info.label_model = posed.scan.label_model;
+  info.faded_points = posed.scan.faded_points;
+  return info;
+}
+
+absl::StatusOr<std::unique_ptr<api::ScanUpload>> EngineScans::Upload(const api::Call& call,
+                                                                     absl::string_view map,
+                                                                     const ScanHeader& header) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_RETURN_IF_ERROR(ValidateScanHeader(header));
+  const std::uint64_t most = found->core().options().max_points_per_scan;
+  if (header.point_count > most) {
+    return absl::InvalidArgumentError(absl::StrCat("scan ",
+                                                   header.id.ToString(),
+                                                   ": ",
+                                                   header.point_count,
+                                                   " points; at most ",
+                                                   most,
+                                                   ", split it"));
+  }
+  return EngineUpload::Begin(std::move(found), call, header);
+}
+
+absl::StatusOr<ScanAck> EngineScans::UploadLocalMap(const api::Call& call,
+                                                    absl::string_view map,
+                                                    const ScanHeader& header,
+                                                    const MlsParameters& parameters,
+                                                    absl::string_view local_map) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_RETURN_IF_ERROR(ValidateScanHeader(header));
+  absl::StatusOr<ScanAck> ack = strata::UploadLocalMap(*found, call, header, parameters, local_map);
+  if (ack.ok()) return ack;
+  return Annotate(ack.status(), absl::StrCat("scan ", header.id.ToString()));
+}
+
+absl::StatusOr<UploadState> EngineScans::GetUploadState(const api::Call& call,
+                                                        absl::string_view map,
+                                                        absl::string_view trajectory) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", trajectory));
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
+  return reader->GetUploadState(trajectory);
+}
+
+absl::StatusOr<ScanInfo> EngineScans::Get(const api::Call& call,
+                                          absl::string_view map,
+                                          const ScanId& id) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan scan, FindScan(*found, id));
+  return ToScanInfo(scan);
+}
+
+absl::Status EngineScans::List(const api::Call& call,
+                               absl::string_view map,
+                               const api::ScanFilter& filter,
+                               absl::FunctionRef<absl::Status(const ScanInfo&)> sink) {
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(ScanQuery query, ToQuery(filter));
+  const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
+  absl::Status damaged;  // the first that cannot be read; it hides no other
+  while (true) {
+    STRATA_RETURN_IF_ERROR(call.stop.status());
+    std::vector<PosedScan> page;
+    STRATA_RETURN_IF_ERROR(
+        ReadVisible(*found, [&](StorageReader& reader, const MapClock&) -> absl::Status {
+          absl::StatusOr<std::vector<PosedScan>> read = reader.ListScans(query, pin.view().epoch);
+          if (absl::IsDataLoss(read.status()) && !query.skip_damaged) {
+            damaged = read.status();
+            query.skip_damaged = true;
+            read = reader.ListScans(query, pin.view().epoch);
+          }
+          STRATA_ASSIGN_OR_RETURN(page, std::move(read));
+          return absl::OkStatus();
+        }));
+    for (const PosedScan& scan : page) STRATA_RETURN_IF_ERROR(sink(ToScanInfo(scan)));
+    if (page.size() < query.limit) return damaged;
+    query.after = page.back().scan.number;
+  }
+}
+
+absl::Status EngineScans::GetPoints(const api::Call& call,
+                                    absl::string_view map,
+                                    const ScanId& id,
+                                    absl::FunctionRef<absl::Status(const PointCloud&)> sink) {
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(*found, id));
+  const std::string what = absl::StrCat("scan ", id.ToString());
+  if (!posed.scan.has_points) {
+    return absl::FailedPreconditionError(
+        absl::StrCat(what,
+                     found->core().info().parameters.keep_points
+                         ? ": it was sent as a local map, without points"
+                         : ": the map drops points once a scan is integrated"));
+  }
+  ScanLabels labels(posed.scan, {});
+  for (std::uint32_t ordinal = 0; ordinal < posed.scan.chunks; ++ordinal) {
+    STRATA_RETURN_IF_ERROR(call.stop.status());
+    const absl::StatusOr<PointCloud> piece = ReadPiece(*found, posed.scan, ordinal, labels);
+    if (!piece.ok()) {
+      // Deleted or dropped while we were reading?
+      STRATA_ASSIGN_OR_RETURN(const PosedScan now, FindScan(*found, id));
+      if (!now.scan.has_points)
+        return absl::FailedPreconditionError(absl::StrCat(what, ": points dropped"));
+      return Annotate(piece.status(), absl::StrCat(what, ", piece ", ordinal));
+    }
+    STRATA_RETURN_IF_ERROR(sink(*piece));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<std::uint16_t>> EngineScans::GetFaded(const api::Call& call,
+                                                                 absl::string_view map,
+                                                                 const ScanId& id) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(*found, id));
+  if (posed.scan.faded_points == 0) return std::vector<std::uint16_t>();
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
+  absl::StatusOr<std::vector<std::uint16_t>> faded =
+      ReadLabels(*reader, posed.scan, LabelOrigin::kFaded);
+  if (!faded.ok()) return Annotate(faded.status(), absl::StrCat("scan ", id.ToString()));
+  return faded;
+}
+
+absl::Status EngineScans::SetLabels(const api::Call& call,
+                                    absl::string_view map,
+                                    const ScanId& id,
+                                    const std::vector<std::uint16_t>& labels,
+                                    api::LabelMode mode) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_RETURN_IF_ERROR(CheckId(id));
+  STRATA_RETURN_IF_ERROR(Annotate(ValidateLabels(labels), absl::StrCat("scan ", id.ToString())));
+  // Here, too: to hear of it nobody waits behind what the worker is at.
+  STRATA_RETURN_IF_ERROR(FindScan(*found, id).status());
+  return found->worker().Execute(call.stop, [&](Integrator& integrator) {
+    return integrator.SetPersonLabels(id, labels, mode == api::LabelMode::kUpdate);
+  });
+}
+
+absl::Status EngineScans::Delete(const api::Call& call, absl::string_view map, const ScanId& id) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_RETURN_IF_ERROR(FindScan(*found, id).status());
+  return found->worker().Execute(call.stop,
+                                 [&](Integrator& integrator) { return integrator.DeleteScan(id); });
+}
+
+}  // namespace strata

@@ -1,0 +1,86 @@
+// Where a new scan belongs: predicted along its trajectory, then registered to the scans around.
+#ifndef STRATA_CORE_ENGINE_INGEST_ALIGNER_H_
+#define STRATA_CORE_ENGINE_INGEST_ALIGNER_H_
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/common/lru_cache.h"
+#include "core/engine/scans/scan_source.h"
+#include "core/mls/mls_map.h"
+#include "core/registration/registration_target.h"
+#include "core/registration/scan_features.h"
+#include "core/storage/storage.h"
+#include "core/world/scan.h"
+
+namespace strata {
+
+// A decision about a scan's pose and what supports it.
+struct Placement {
+  Pose T_map_scan = Pose::Identity();
+  AlignmentReport report;
+  std::vector<ConstraintRecord> constraints;
+};
+
+// Knows the integrated scans and their poses. One thread at a time. Decisions depend on what was
+// integrated before and on nothing else, so not on how scans were batched.
+class Aligner {
+ public:
+  explicit Aligner(const std::shared_ptr<CacheBudget>& caches) : features_(caches) {}
+
+  // Forgets everything and reads the integrated scans of `epoch`.
+  absl::Status Load(StorageReader& reader, std::uint64_t epoch);
+
+  // `local_map` is the scan's own. Alignment::kOff: the uploaded pose. Otherwise the guess (the
+  // predecessor's pose and the uploaded motion since; the uploaded pose for the first of a
+  // trajectory) registered to the nearest scans of any trajectory, or the guess if that fails.
+  absl::StatusOr<Placement> Place(const ScanRecord& scan,
+                                  const MlsMap& local_map,
+                                  StorageReader& reader,
+                                  ScanSource& source);
+  // The scan is integrated at this pose.
+  void Add(const ScanRecord& scan, const Pose& T_map_scan);
+
+ private:
+  struct PlacedEntry {
+    ScanNumber number;
+    Pose T_map_scan_uploaded;
+  };
+  using Features = std::shared_ptr<const ScanFeatures>;
+  // The scans to align to.
+  struct Neighbourhood {
+    std::vector<Features> held;  // keeps alive what `placed` points to
+    std::vector<PlacedScan> placed;
+    std::vector<std::size_t> indices;  // into scans_
+  };
+
+  Pose Guess(const ScanRecord& scan) const;
+  absl::StatusOr<Features> FeaturesOf(ScanNumber number, StorageReader& reader, ScanSource& source);
+  absl::StatusOr<Neighbourhood> NeighboursOf(const Pose& guess,
+                                             StorageReader& reader,
+                                             ScanSource& source);
+  // What a match to `partners` says about the scan, as constraints to the nearest of them.
+  std::vector<ConstraintRecord> ConstraintsOf(ScanNumber number,
+                                              const Placement& placement,
+                                              const Matrix6d& information,
+                                              std::vector<std::size_t> partners) const;
+  // `samples`: 0 for a scan that others are matched to, and that is not matched itself.
+  Features Keep(const ScanRecord& scan, const MlsMap& local_map, int samples);
+
+  // By commit order.
+  std::vector<PlacedEntry> scans_;
+  std::vector<Pose> poses_;  // T_map_scan, beside scans_
+  std::map<std::string, std::map<std::uint64_t, std::size_t>> trajectories_;  // index into scans_
+  LruCache<ScanNumber, const ScanFeatures> features_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_INGEST_ALIGNER_H_

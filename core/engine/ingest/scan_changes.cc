@@ -1,0 +1,89 @@
+// Scans that leave or move.
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/container/btree_set.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/common/status.h"
+#include "core/engine/ingest/integrator.h"
+
+namespace strata {
+namespace {
+
+absl::StatusOr<PosedScan> FindScan(StorageReader& reader, const ScanId& id, std::uint64_t epoch) {
+  STRATA_ASSIGN_OR_RETURN(std::optional<PosedScan> scan, reader.FindScan(id, epoch));
+  if (scan.has_value()) return *std::move(scan);
+  return absl::NotFoundError(absl::StrCat("scan ", id.ToString(), " does not exist"));
+}
+
+}  // namespace
+
+absl::StatusOr<MlsTileMap> Integrator::TilesWithout(StorageReader& reader,
+                                                    const absl::btree_set<TileKey>& keys,
+                                                    ScanNumber without) {
+  STRATA_ASSIGN_OR_RETURN(std::vector<PlacedScanRecord> scans, ScansOfTiles(reader, keys, epoch()));
+  std::erase_if(
+      scans, [without](const PlacedScanRecord& placed) { return placed.scan.number == without; });
+  return MakeTiles(core_, scans, keys, core_.options().worker_threads, Stop());
+}
+
+absl::Status Integrator::DeleteScan(const ScanId& id) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(*reader, id, epoch()));
+  const ScanNumber number = posed.scan.number;
+  STRATA_ASSIGN_OR_RETURN(const std::vector<TileKey> tiles, reader->TilesOfScan(number));
+  TileChange change;
+  STRATA_ASSIGN_OR_RETURN(change.tiles,
+                          TilesWithout(*reader, {tiles.begin(), tiles.end()}, number));
+  STRATA_ASSIGN_OR_RETURN(change.version, NextVersion());
+  STRATA_RETURN_IF_ERROR(MakeServed(*reader, change));
+  STRATA_RETURN_IF_ERROR(
+      Commit(change, {id}, [&](StorageWriter& writer) { return writer.DeleteScan(number); }));
+  aligner_loaded_ = false;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<MoveOutcome> Integrator::MoveScans(
+    const ScanMoves& moves,
+    int threads,
+    JobContext& context,
+    absl::FunctionRef<absl::Status(StorageWriter&)> decision) {
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, NextVersion());
+  // Decoded tiles are kept by key alone: those of the coming epoch must not outlive a failure.
+  store_.Clear();
+  absl::StatusOr<MoveOutcome> outcome =
+      ScanMover(core_, store_, moves, version, threads, context).Run(decision);
+  store_.Clear();
+  aligner_loaded_ = false;
+  return outcome;
+}
+
+absl::Status Integrator::SetPose(const ScanId& id, const Pose& T_map_scan) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(*reader, id, epoch()));
+  const ScanRecord& scan = posed.scan;
+  if (scan.state != ScanState::kIntegrated) {
+    return absl::FailedPreconditionError(absl::StrCat("scan ",
+                                                      id.ToString(),
+                                                      scan.state == ScanState::kPending
+                                                          ? " is not integrated yet; wait for it"
+                                                          : " failed to integrate; delete it"));
+  }
+  ScanMoves moves;
+  moves.poses.push_back({scan.number, T_map_scan});
+  moves.origin = PoseOrigin::kPerson;
+  moves.reason = absl::StrCat("pose of ", id.ToString());
+  SilentContext context{Stop()};
+  return MoveScans(moves,
+                   core_.options().worker_threads,
+                   context,
+                   [](StorageWriter&) { return absl::OkStatus(); })
+      .status();
+}
+
+}  // namespace strata

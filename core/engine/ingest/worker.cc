@@ -1,0 +1,268 @@
+#include "core/engine/ingest/worker.h"
+
+#include <algorithm>
+#include <cstdint>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+#include <glog/logging.h>
+
+#include "core/common/blocking.h"
+#include "core/common/guarded.h"
+#include "core/common/log_line.h"
+#include "core/common/status.h"
+#include "core/common/steady_time.h"
+#include "core/common/this_thread.h"
+
+namespace strata {
+namespace {
+
+constexpr absl::Duration kStopPoll = absl::Milliseconds(50);
+// After an error of the store (a full disk, say): how long until the next try.
+constexpr absl::Duration kRetryDelay = absl::Seconds(1);
+// So often a scan is tried again alone when there was no memory.
+constexpr int kMemoryTries = 10;
+
+// What there is no memory to log is not logged.
+void LogStopped(absl::string_view event, absl::string_view map, const absl::Status& why) {
+  Guarded([&] {
+    LOG(ERROR) << LogLine(event).Add("map", map).Add("stopped", why.message());
+    return absl::OkStatus();
+  }).IgnoreError();
+}
+
+absl::Status Refusal() {
+  return absl::FailedPreconditionError(
+      "quarantined: the server died while it made the map's tiles again after a start; stratad "
+      "quarantine release has it try once more");
+}
+
+// Whether the derived tables are marked incomplete: they were dropped, or written by a program with
+// another format.
+absl::StatusOr<bool> NeedsRecovery(MapCore& core) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());
+  return !clock.derived_complete;
+}
+
+}  // namespace
+
+Worker::Worker(MapCore& core, Quarantine& quarantine, Recovery recover, std::uint64_t pending)
+    : core_(core),
+      quarantine_(quarantine),
+      recover_(recover),
+      integrator_(core),
+      keeper_(core, quarantine),
+      next_rest_(SteadyNow() + core.options().prepare_after),
+      pending_(pending),
+      waiting_(SteadyNow()),
+      thread_([this] { Loop(); }) {}
+
+Worker::~Worker() { Close(); }
+
+absl::Status Worker::CheckRoom() const {
+  absl::MutexLock lock(&mutex_);
+  const std::uint64_t most = core_.options().max_pending_scans;
+  if (pending_ < most) return absl::OkStatus();
+  return absl::ResourceExhaustedError(
+      absl::StrCat(pending_, " scans wait for integration, at most ", most, "; retry later"));
+}
+
+void Worker::ScanCommitted(ScanNumber number) {
+  absl::MutexLock lock(&mutex_);
+  ++pending_;
+  waiting_.Add(number, SteadyNow());
+}
+
+absl::Time Worker::WaitingSince(ScanNumber oldest) {
+  absl::MutexLock lock(&mutex_);
+  return waiting_.Since(oldest);
+}
+
+absl::Status Worker::Execute(const Stop& stop, Command command, absl::string_view what) {
+  Task task{command, what, absl::OkStatus()};
+  const BlockingScope blocking;  // for as long as the pass under way takes
+  absl::MutexLock lock(&mutex_);
+  if (closed_) return absl::CancelledError("the map is being closed");
+  if (refuses_) return Refusal();
+  tasks_.push_back(&task);
+  while (!mutex_.AwaitWithTimeout(absl::Condition(&task.done), kStopPoll)) {
+    // The task must leave the queue before this frame is left, in whatever way.
+    absl::Status waiting = Guarded([&stop] { return stop.status(); });
+    if (waiting.ok() || task.begun) continue;
+    tasks_.erase(std::find(tasks_.begin(), tasks_.end(), &task));
+    return Annotate(waiting, absl::StrCat("waited for ", running_, " of map ", core_.name()));
+  }
+  return task.status;
+}
+
+bool Worker::HasWork() const { return closed_ || !tasks_.empty() || pending_ > 0; }
+
+// Commands go first, since somebody waits for them.
+Worker::Step Worker::NextStep() {
+  absl::MutexLock lock(&mutex_);
+  while (
+      !mutex_.AwaitWithTimeout(absl::Condition(this, &Worker::HasWork), next_rest_ - SteadyNow())) {
+    // A clock that is set forward ends a wait early.
+    if (SteadyNow() >= next_rest_) return Step::kRest;
+  }
+  if (closed_) return Step::kClosed;
+  return tasks_.empty() ? Step::kBatch : Step::kCommand;
+}
+
+void Worker::Loop() {
+  NameThisThread("worker");
+  YieldThisThread(5);  // what is acknowledged waits for nobody
+  if (!RunRecovery()) return Refuse();
+  while (true) {
+    const Step step = NextStep();
+    if (step != Step::kRest) keeper_.Pause();
+    switch (step) {
+      case Step::kClosed:
+        return quarantine_.EndScans();
+      case Step::kRest:
+        RunRest();
+        break;
+      case Step::kCommand:
+        RunCommand();
+        break;
+      case Step::kBatch:
+        // What there is no memory to say of it is not said.
+        Guarded([this] {
+          RunBatch();
+          return absl::OkStatus();
+        }).IgnoreError();
+        break;
+    }
+  }
+}
+
+absl::Status Worker::GuardedStep(absl::FunctionRef<absl::Status()> step) {
+  absl::Status done = Guarded(step);
+  // Left in the middle of anything, its caches may be neither before nor after it.
+  if (absl::IsResourceExhausted(done)) integrator_.ForgetCaches();
+  return done;
+}
+
+void Worker::RunRest() {
+  {
+    absl::MutexLock lock(&mutex_);
+    running_ = "the tile that is prepared";
+  }
+  next_rest_ = SteadyNow() + keeper_.Step();
+}
+
+void Worker::RunCommand() {
+  Task* task = nullptr;
+  {
+    absl::MutexLock lock(&mutex_);
+    if (tasks_.empty()) return;  // its caller gave up
+    task = tasks_.front();
+    tasks_.pop_front();
+    task->begun = true;
+    running_ = task->what;
+  }
+  const absl::Status status = GuardedStep([&] { return task->command(integrator_); });
+  absl::MutexLock lock(&mutex_);
+  running_ = "the next step";  // the task's own words go with its caller
+  task->status = status;
+  task->done = true;
+}
+
+void Worker::RunBatch() {
+  std::uint64_t waited = 0;
+  {
+    absl::MutexLock lock(&mutex_);
+    waited = pending_;
+    running_ = "integration";
+  }
+  int count = 0;
+  const absl::Status done = GuardedStep([&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(count, Integrate());
+    return absl::OkStatus();
+  });
+  if (!done.ok()) quarantine_.EndScans();
+  after_failure_ = !done.ok();
+  if (IsOutOfMemory(done)) return NoteNoMemory();
+  no_memory_ = 0;
+  absl::MutexLock lock(&mutex_);
+  if (done.ok()) {
+    // Scans that were deleted while they waited are counted, but are not there any more.
+    pending_ -= count == 0 ? waited : std::min(pending_, static_cast<std::uint64_t>(count));
+    if (pending_ == 0) waiting_.Clear();
+    return;
+  }
+  LogStopped("integration", core_.name(), done);
+  mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
+}
+
+absl::StatusOr<int> Worker::Integrate() {
+  // What memory or the disk has no room for all at once, it may have room for one by one.
+  const int most = after_failure_ ? 1 : core_.options().max_batch_scans;
+  STRATA_ASSIGN_OR_RETURN(const int begun, quarantine_.BeginScans(most));
+  return begun == 0 ? 0 : integrator_.IntegrateBatch(begun);
+}
+
+// Somebody else may have the memory just now; a scan that never gets enough of it holds up those
+// behind it.
+void Worker::NoteNoMemory() {
+  if (++no_memory_ > kMemoryTries) {
+    const absl::Status held = GuardedStep(
+        [this] { return quarantine_.HoldNextScan("there is no memory to integrate it"); });
+    if (held.ok()) no_memory_ = 0;
+  }
+  absl::MutexLock lock(&mutex_);
+  mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
+}
+
+bool Worker::RunRecovery() {
+  const WorkId recovery{WorkKind::kRecovery, 0};
+  if (quarantine_.IsHeld(recovery)) return false;
+  while (true) {
+    const absl::Status done = GuardedStep([&]() -> absl::Status {
+      STRATA_ASSIGN_OR_RETURN(const bool needed, NeedsRecovery(core_));
+      if (!needed) return absl::OkStatus();
+      STRATA_RETURN_IF_ERROR(quarantine_.Begin(recovery));
+      const absl::Status recovered = Guarded([&] { return recover_(integrator_, closing_); });
+      quarantine_.End(recovery).IgnoreError();
+      return recovered;
+    });
+    if (done.ok() || closing_.requested()) return true;
+    LogStopped("recovery", core_.name(), done);
+    absl::MutexLock lock(&mutex_);
+    if (mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay)) return true;
+  }
+}
+
+void Worker::Refuse() {
+  LogStopped("recovery", core_.name(), Refusal());
+  absl::MutexLock lock(&mutex_);
+  refuses_ = true;
+  for (Task* task : tasks_) {
+    task->status = Refusal();
+    task->done = true;
+  }
+  tasks_.clear();
+  mutex_.Await(absl::Condition(&closed_));
+}
+
+void Worker::Close() {
+  {
+    absl::MutexLock lock(&mutex_);
+    closed_ = true;
+    for (Task* task : tasks_) {
+      task->status = absl::CancelledError("the map is being closed");
+      task->done = true;
+    }
+    tasks_.clear();
+  }
+  closing_.Request();
+  if (thread_.joinable()) thread_.join();
+}
+
+}  // namespace strata

@@ -1,0 +1,470 @@
+#include "core/engine/jobs/job_board.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+
+#include "core/common/guarded.h"
+#include "core/common/status.h"
+#include "core/common/steady_time.h"
+
+namespace strata {
+namespace {
+
+constexpr absl::Duration kReportInterval = absl::Milliseconds(100);
+constexpr absl::Duration kStoreInterval = absl::Seconds(2);
+
+absl::Time NowInMicros() { return absl::FromUnixMicros(absl::ToUnixMicros(absl::Now())); }
+
+absl::Status NoSuchJob(std::uint64_t id) {
+  return absl::NotFoundError(absl::StrCat("job ", id, " does not exist"));
+}
+
+}  // namespace
+
+// The context of the job that runs now.
+class JobBoard::Running final : public JobContext {
+ public:
+  Running(JobBoard& board, std::uint64_t id, Stop stop, const Stop& closing)
+      : board_(board), id_(id), stop_(std::move(stop)), closing_(closing) {}
+
+  absl::Status Progress(double progress, absl::string_view phase) override {
+    STRATA_RETURN_IF_ERROR(closing_.status());
+    STRATA_RETURN_IF_ERROR(stop_.status());
+    const absl::Time now = SteadyNow();
+    if (now - reported_ < kReportInterval && phase == phase_) return absl::OkStatus();
+    const bool store = now - stored_ >= kStoreInterval;
+    reported_ = now;
+    phase_ = std::string(phase);
+    if (store) stored_ = now;
+    board_.Report(id_, progress, phase_, store);
+    return absl::OkStatus();
+  }
+  const Stop& stop() const override { return stop_; }
+  void SetMetric(const std::string& name, double value) override { metrics_[name] = value; }
+  void SetMessage(std::string message) override { message_ = std::move(message); }
+  void SetProposed() override { proposed_ = true; }
+
+  std::map<std::string, double>& metrics() { return metrics_; }
+  std::string& message() { return message_; }
+  bool proposed() const { return proposed_; }
+
+ private:
+  JobBoard& board_;
+  const std::uint64_t id_;
+  const Stop stop_;
+  const Stop& closing_;
+  absl::Time reported_ = absl::InfinitePast();
+  absl::Time stored_ = SteadyNow();
+  std::string phase_;
+  std::map<std::string, double> metrics_;
+  std::string message_;
+  bool proposed_ = false;
+};
+
+// A job that is about to be queued: counted among those that wait.
+class JobBoard::StartTurn {
+ public:
+  // `id`: of the job.
+  StartTurn(JobBoard& board, absl::string_view owner, std::uint64_t& id)
+      : board_(board), owner_(owner) {
+    absl::MutexLock lock(&board_.mutex_);
+    status_ = board_.CheckRoom(owner);
+    if (!status_.ok()) return;
+    board_.starting_.insert(owner_);
+    id = ++board_.last_id_;
+  }
+  ~StartTurn() {
+    if (!status_.ok()) return;
+    absl::MutexLock lock(&board_.mutex_);
+    board_.starting_.erase(board_.starting_.find(owner_));
+  }
+  StartTurn(const StartTurn&) = delete;
+  StartTurn& operator=(const StartTurn&) = delete;
+  const absl::Status& status() const { return status_; }
+
+ private:
+  JobBoard& board_;
+  const std::string owner_;
+  absl::Status status_;
+};
+
+absl::StatusOr<std::unique_ptr<JobBoard>> JobBoard::Open(MapCore& core, Quarantine& quarantine) {
+  std::vector<JobInfo> stored;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+    STRATA_ASSIGN_OR_RETURN(stored, reader->ListJobs());
+  }
+  std::unique_ptr<JobBoard> board(new JobBoard(core, quarantine));
+  absl::MutexLock lock(&board->mutex_);
+  for (JobInfo& info : stored) {
+    if (info.state == JobState::kRunning) info.state = JobState::kQueued;
+    board->last_id_ = std::max(board->last_id_, info.id);
+    auto entry = std::make_shared<Entry>();
+    entry->info = std::move(info);
+    board->jobs_[entry->info.id] = std::move(entry);
+  }
+  return board;
+}
+
+void JobBoard::Show(const JobInfo& info) {
+  JobInfo shown = info;
+  auto made =
+      std::make_shared<Entry>();  // without memory there is no entry, rather than half of one
+  absl::MutexLock lock(&mutex_);
+  std::shared_ptr<Entry>& entry = jobs_.try_emplace(info.id, std::move(made)).first->second;
+  entry->info = std::move(shown);
+  ++entry->changes;
+}
+
+absl::StatusOr<JobInfo> JobBoard::Change(std::uint64_t id,
+                                         Durability durability,
+                                         ChangeFunction change) {
+  JobInfo info;
+  STRATA_RETURN_IF_ERROR(core_.writer().Run(
+      durability,
+      0,
+      Stop(),
+      [&](StorageWriter& writer) -> absl::Status {
+        STRATA_ASSIGN_OR_RETURN(std::optional<JobInfo> stored, writer.reader().FindJob(id));
+        if (!stored.has_value()) return NoSuchJob(id);
+        info = *std::move(stored);
+        STRATA_RETURN_IF_ERROR(change(info, writer));
+        info.updated = NowInMicros();
+        return writer.PutJob(info);
+      },
+      [&] { Show(info); }));
+  return info;
+}
+
+absl::Status JobBoard::CheckRoom(absl::string_view owner) const {
+  std::size_t all = starting_.size();
+  std::size_t own = starting_.count(std::string(owner));
+  for (const auto& [id, entry] : jobs_) {
+    if (entry->info.state != JobState::kQueued) continue;
+    ++all;
+    own += entry->owner == owner ? 1 : 0;
+  }
+  if (all >= kMaxWaitingJobs || own >= kMaxWaitingJobsOfOne) {
+    return absl::ResourceExhaustedError(absl::StrCat(all,
+                                                     " jobs wait, ",
+                                                     own,
+                                                     " of them yours; at most ",
+                                                     kMaxWaitingJobs,
+                                                     " and ",
+                                                     kMaxWaitingJobsOfOne,
+                                                     "; wait for some, or cancel them"));
+  }
+  return absl::OkStatus();
+}
+
+std::vector<std::uint64_t> JobBoard::Outdated() const {
+  const auto epoch = static_cast<double>(core_.snapshots().current().epoch);
+  std::vector<std::uint64_t> ended;
+  std::set<std::string> last;  // kinds whose newest success has been seen
+  absl::MutexLock lock(&mutex_);
+  std::size_t kept = 0;
+  for (auto it = jobs_.rbegin(); it != jobs_.rend(); ++it) {
+    const JobInfo& job = it->second->info;
+    if (!IsFinal(job.state) || job.state == JobState::kProposed) continue;
+    if (kept < kKeptJobs) {
+      ++kept;
+      if (job.state == JobState::kSucceeded) last.insert(job.kind);
+      continue;
+    }
+    const auto made = job.metrics.find("epoch");
+    if (made != job.metrics.end() && made->second == epoch) continue;
+    if (job.state == JobState::kSucceeded && last.insert(job.kind).second) continue;
+    ended.push_back(job.id);
+  }
+  return ended;
+}
+
+absl::StatusOr<JobInfo> JobBoard::Start(const Stop& stop,
+                                        absl::string_view owner,
+                                        absl::string_view kind,
+                                        const std::map<std::string, std::string>& parameters) {
+  JobInfo info;
+  info.kind = std::string(kind);
+  info.parameters = parameters;
+  info.created = NowInMicros();
+  info.updated = info.created;
+  const StartTurn turn(*this, owner, info.id);
+  STRATA_RETURN_IF_ERROR(turn.status());
+  const std::vector<std::uint64_t> outdated = Outdated();
+  const auto show = [&] {
+    Show(info);
+    absl::MutexLock lock(&mutex_);
+    jobs_.at(info.id)->owner = std::string(owner);
+    for (const std::uint64_t id : outdated) jobs_.erase(id);
+  };
+  STRATA_RETURN_IF_ERROR(core_.writer().Run(
+      Durability::kFull,
+      0,
+      stop,
+      [&](StorageWriter& writer) -> absl::Status {
+        for (const std::uint64_t id : outdated) STRATA_RETURN_IF_ERROR(writer.DeleteJob(id));
+        return writer.PutJob(info);
+      },
+      show));
+  return info;
+}
+
+absl::StatusOr<JobInfo> JobBoard::Get(std::uint64_t id) const {
+  absl::MutexLock lock(&mutex_);
+  const auto it = jobs_.find(id);
+  if (it == jobs_.end()) return NoSuchJob(id);
+  return it->second->info;
+}
+
+std::vector<JobInfo> JobBoard::List() const {
+  std::vector<JobInfo> infos;
+  absl::MutexLock lock(&mutex_);
+  infos.reserve(jobs_.size());
+  for (const auto& [id, entry] : jobs_) infos.push_back(entry->info);
+  return infos;
+}
+
+absl::StatusOr<JobInfo> JobBoard::Cancel(std::uint64_t id) {
+  while (true) {
+    {
+      absl::MutexLock lock(&mutex_);
+      const auto it = jobs_.find(id);
+      if (it == jobs_.end()) return NoSuchJob(id);
+      const Entry& entry = *it->second;
+      if (entry.info.state == JobState::kRunning) entry.stop.Request();
+      if (entry.info.state != JobState::kQueued) return entry.info;
+    }
+    absl::StatusOr<JobInfo> cancelled =
+        Change(id, Durability::kFull, [&](JobInfo& job, StorageWriter&) -> absl::Status {
+          // A job that was running when the last process ended is stored so, and waits; one that
+          // has begun in this one was shown so before this commit began.
+          if (IsFinal(job.state) || !Waits(id)) return absl::AbortedError("the job has begun");
+          job.state = JobState::kCancelled;
+          return absl::OkStatus();
+        });
+    // It began meanwhile, and will be seen so.
+    if (!absl::IsAborted(cancelled.status())) return cancelled;
+  }
+}
+
+bool JobBoard::Waits(std::uint64_t id) const {
+  absl::MutexLock lock(&mutex_);
+  const auto it = jobs_.find(id);
+  return it != jobs_.end() && it->second->info.state == JobState::kQueued;
+}
+
+void JobBoard::StopRunning() {
+  absl::MutexLock lock(&mutex_);
+  for (const auto& [id, entry] : jobs_) {
+    if (entry->info.state == JobState::kRunning) entry->stop.Request();
+  }
+}
+
+absl::StatusOr<JobInfo> JobBoard::Decide(std::uint64_t id, ChangeFunction change) {
+  return Change(id, Durability::kFull, [&](JobInfo& job, StorageWriter& writer) -> absl::Status {
+    if (job.state == JobState::kProposed) return change(job, writer);
+    return absl::FailedPreconditionError(
+        absl::StrCat("job ", id, " has no proposal that waits; start one with dry_run=1"));
+  });
+}
+
+absl::StatusOr<JobInfo> JobBoard::Accept(std::uint64_t id) {
+  return Decide(id, [](JobInfo& job, StorageWriter&) {
+    job.state = JobState::kQueued;
+    job.parameters.emplace(kAccepted, "1");
+    return absl::OkStatus();
+  });
+}
+
+absl::StatusOr<JobInfo> JobBoard::Discard(std::uint64_t id) {
+  return Decide(id, [id](JobInfo& job, StorageWriter& writer) {
+    job.state = JobState::kCancelled;
+    job.message = std::string("proposal discarded");
+    return writer.DiscardProposal(id);
+  });
+}
+
+absl::Status JobBoard::Watch(const Stop& stop,
+                             std::uint64_t id,
+                             absl::FunctionRef<absl::Status(const JobInfo&)> sink) const {
+  constexpr absl::Duration kPoll = absl::Milliseconds(50);
+  std::uint64_t seen = 0;
+  absl::Time next = absl::InfinitePast();  // not more often than that
+  for (bool first = true;; first = false) {
+    JobInfo info;
+    {
+      absl::MutexLock lock(&mutex_);
+      const auto it = jobs_.find(id);
+      if (it == jobs_.end()) return NoSuchJob(id);
+      const std::shared_ptr<const Entry> held = it->second;
+      const Entry& entry = *held;
+      const auto ended = [&entry] { return IsFinal(entry.info.state); };
+      while (SteadyNow() < next && !ended()) {
+        STRATA_RETURN_IF_ERROR(stop.status());
+        mutex_.AwaitWithTimeout(absl::Condition(&ended), std::min(kPoll, next - SteadyNow()));
+      }
+      const auto changed = [&entry, &seen, first] { return first || entry.changes != seen; };
+      while (!mutex_.AwaitWithTimeout(absl::Condition(&changed), kPoll)) {
+        STRATA_RETURN_IF_ERROR(stop.status());
+      }
+      seen = entry.changes;
+      info = entry.info;
+    }
+    STRATA_RETURN_IF_ERROR(stop.status());
+    STRATA_RETURN_IF_ERROR(sink(info));
+    next = SteadyNow() + kReportInterval;
+    if (IsFinal(info.state)) return absl::OkStatus();
+  }
+}
+
+bool JobBoard::AnyIn(JobState state) const {
+  absl::MutexLock lock(&mutex_);
+  return std::any_of(jobs_.begin(), jobs_.end(), [state](const auto& entry) {
+    return entry.second->info.state == state;
+  });
+}
+
+bool JobBoard::LastIsQuarantined(absl::string_view kind) const {
+  absl::MutexLock lock(&mutex_);
+  const auto last = std::find_if(jobs_.rbegin(), jobs_.rend(), [kind](const auto& entry) {
+    return entry.second->info.kind == kind;
+  });
+  return last != jobs_.rend() && IsQuarantined(last->second->info);
+}
+
+std::optional<std::uint64_t> JobBoard::NextId() const {
+  absl::MutexLock lock(&mutex_);
+  return NextIdLocked();
+}
+
+std::optional<std::uint64_t> JobBoard::NextIdLocked() const {
+  std::optional<std::pair<std::uint64_t, std::uint64_t>> next;  // last turn of its owner, id
+  for (const auto& [id, entry] : jobs_) {
+    if (entry->info.state != JobState::kQueued) continue;
+    const auto turn = turns_.find(entry->owner);
+    const std::pair mine(turn == turns_.end() ? 0 : turn->second, id);
+    if (!next.has_value() || mine < *next) next = mine;
+  }
+  if (!next.has_value()) return std::nullopt;
+  return next->second;
+}
+
+void JobBoard::Report(std::uint64_t id, double progress, const std::string& phase, bool durable) {
+  const auto report = [&](JobInfo& job) {
+    job.progress = progress;
+    job.phase = phase;
+    job.updated = NowInMicros();
+  };
+  {
+    absl::MutexLock lock(&mutex_);
+    Entry& entry = *jobs_.at(id);
+    report(entry.info);
+    ++entry.changes;
+  }
+  if (!durable) return;
+  // Progress is for people; losing it is no reason to end the job.
+  Change(id, Durability::kRelaxed, [&](JobInfo& job, StorageWriter&) {
+    report(job);
+    return absl::OkStatus();
+  }).IgnoreError();
+}
+
+absl::StatusOr<std::optional<JobInfo>> JobBoard::TakeNext(Stop& stop) {
+  while (true) {
+    std::uint64_t id = 0;
+    {
+      absl::MutexLock lock(&mutex_);
+      const std::optional<std::uint64_t> next = NextIdLocked();
+      if (!next.has_value()) return std::optional<JobInfo>();
+      id = *next;
+      Entry& entry = *jobs_.at(id);
+      entry.stop = Stop();  // an earlier run may have been asked to end
+      stop = entry.stop;
+      turns_[entry.owner] = ++turn_;
+    }
+    const WorkId work{WorkKind::kJob, id};
+    absl::StatusOr<JobInfo> taken =
+        Change(id, Durability::kRelaxed, [&](JobInfo& job, StorageWriter& writer) -> absl::Status {
+          if (IsFinal(job.state)) return absl::AbortedError("the job has ended");
+          job.state = JobState::kRunning;
+          return quarantine_.Begin(writer, work);
+        });
+    if (absl::IsAborted(taken.status())) continue;  // it was cancelled
+    STRATA_RETURN_IF_ERROR(taken.status());
+    return std::optional<JobInfo>(*std::move(taken));
+  }
+}
+
+absl::Status JobBoard::Requeue(std::uint64_t id) {
+  const WorkId work{WorkKind::kJob, id};
+  const absl::Status stored = Guarded([&] {
+    return Change(id,
+                  Durability::kRelaxed,
+                  [&](JobInfo& job, StorageWriter& writer) {
+                    job.state = JobState::kQueued;
+                    return quarantine_.Pause(writer, work);
+                  })
+        .status();
+  });
+  if (stored.ok()) return stored;
+  absl::MutexLock lock(&mutex_);
+  Entry& entry = *jobs_.at(id);
+  entry.info.state = JobState::kQueued;
+  ++entry.changes;
+  return absl::OkStatus();
+}
+
+absl::Status JobBoard::Finish(std::uint64_t id, const absl::Status& ended, Running& context) {
+  const WorkId work{WorkKind::kJob, id};
+  // Durable before anybody sees that it ended.
+  return Change(id,
+                Durability::kFull,
+                [&](JobInfo& job, StorageWriter& writer) {
+                  for (const auto& [name, value] : context.metrics()) job.metrics[name] = value;
+                  job.phase.clear();
+                  if (ended.ok()) {
+                    job.state = context.proposed() ? JobState::kProposed : JobState::kSucceeded;
+                    job.progress = 1.0;
+                    job.message = context.message();
+                  } else {
+                    job.state = absl::IsCancelled(ended) ? JobState::kCancelled : JobState::kFailed;
+                    job.message = std::string(ended.message());
+                  }
+                  return quarantine_.End(writer, work);
+                })
+      .status();
+}
+
+absl::Status JobBoard::RunNext(const Stop& closing,
+                               absl::FunctionRef<absl::Status(const JobInfo&, JobContext&)> body) {
+  Stop stop;
+  STRATA_ASSIGN_OR_RETURN(const std::optional<JobInfo> job, TakeNext(stop));
+  if (!job.has_value()) return absl::OkStatus();
+  if (closing.requested()) stop.Request();  // whoever closes may have looked before it ran
+  Running context(*this, job->id, stop, closing);
+  const absl::Status ended = Guarded([&] { return body(*job, context); });
+  if (closing.requested() && !ended.ok()) return Requeue(job->id);
+  absl::Status stored = Guarded([&] { return Finish(job->id, ended, context); });
+  // If that cannot be, it did not end.
+  if (!stored.ok()) STRATA_RETURN_IF_ERROR(Requeue(job->id));
+  return stored;
+}
+
+}  // namespace strata

@@ -1,0 +1,45 @@
+// The job "fade": what has gone leaves the map.
+#ifndef STRATA_CORE_ENGINE_LABELS_FADE_H_
+#define STRATA_CORE_ENGINE_LABELS_FADE_H_
+
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/engine/ingest/worker.h"
+#include "core/engine/map/job_context.h"
+#include "core/engine/map/map_core.h"
+#include "core/mls/see_through.h"
+#include "core/world/job.h"
+
+namespace strata {
+
+inline constexpr absl::string_view kFadeJob = "fade";
+
+struct FadeSettings {
+  SeeThroughOptions evidence;
+  bool scans_given = false;  // else the map's fade_after, if it has one
+  bool undo = false;         // everything comes back
+  int threads = 2;
+};
+
+// INVALID_ARGUMENT naming the parameter: scans, rays, clearance_m, undo, threads.
+absl::StatusOr<FadeSettings> ParseFadeSettings(const JobParameters& parameters);
+
+// Whether the map lets things fade by itself, and has enough scans that no job of `jobs` has taken
+// into account.
+absl::StatusOr<bool> FadingIsDue(MapCore& core, const std::vector<JobInfo>& jobs);
+
+// Asks of every point of an integrated scan whether later scans, in commit order, looked through
+// where it was (core/mls/see_through.h), at the poses of the epoch in which the job begins. Points
+// that have gone stay in their scans and are no part of their contributions any more: a decision,
+// recorded with its evidence. The result depends on scans, poses and settings only, not on what
+// earlier jobs decided. Takes effect at once, at its end; a scan that is deleted meanwhile is left
+// out. DATA_LOSS where a scan is damaged.
+absl::Status RunFadeJob(MapCore& core, Worker& worker, const JobInfo& job, JobContext& context);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_LABELS_FADE_H_

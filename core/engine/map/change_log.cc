@@ -1,0 +1,65 @@
+#include "core/engine/map/change_log.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/time/time.h"
+
+#include "core/common/status.h"
+
+namespace strata {
+
+void ChangeLog::Append(Change change) {
+  changes_.push_back(std::move(change));
+  if (changes_.size() <= kMaxChanges) return;
+  floor_ = changes_.front().commit_sequence;
+  changes_.pop_front();
+}
+
+void ChangeLog::Add(std::uint64_t commit_sequence,
+                    const std::vector<ScanId>& scans,
+                    const std::vector<api::TileChangeNotice>& tiles) {
+  absl::MutexLock lock(&mutex_);
+  for (const ScanId& scan : scans) Append({commit_sequence, scan, {}});
+  for (const api::TileChangeNotice& tile : tiles) Append({commit_sequence, {}, tile});
+  last_ = std::max(last_, commit_sequence);
+}
+
+ChangeSet ChangeLog::Since(std::uint64_t commit_sequence) const {
+  ChangeSet set;
+  absl::MutexLock lock(&mutex_);
+  set.last = last_;
+  set.complete = commit_sequence >= floor_;
+  if (!set.complete) return set;
+  const auto first = std::upper_bound(
+      changes_.begin(),
+      changes_.end(),
+      commit_sequence,
+      [](std::uint64_t at, const Change& change) { return at < change.commit_sequence; });
+  for (auto it = first; it != changes_.end(); ++it) {
+    if (it->scan.trajectory.empty()) {
+      set.tiles[it->tile.key] = it->tile;
+    } else {
+      set.scans.insert(it->scan);
+    }
+  }
+  return set;
+}
+
+std::uint64_t ChangeLog::last() const {
+  absl::MutexLock lock(&mutex_);
+  return last_;
+}
+
+absl::Status ChangeLog::Await(std::uint64_t commit_sequence, const Stop& stop) const {
+  constexpr absl::Duration kPoll = absl::Milliseconds(50);
+  absl::MutexLock lock(&mutex_);
+  const auto newer = [this, commit_sequence]()
+                         ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return last_ > commit_sequence; };
+  while (!mutex_.AwaitWithTimeout(absl::Condition(&newer), kPoll)) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace strata

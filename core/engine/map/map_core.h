@@ -1,0 +1,112 @@
+// What everything that works on one map shares: its store, its writer, its readers, its clock.
+#ifndef STRATA_CORE_ENGINE_MAP_MAP_CORE_H_
+#define STRATA_CORE_ENGINE_MAP_MAP_CORE_H_
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/container/btree_set.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+
+#include "core/common/cache_budget.h"
+#include "core/engine/map/change_log.h"
+#include "core/engine/map/disk_space.h"
+#include "core/engine/map/engine_options.h"
+#include "core/engine/map/reader_pool.h"
+#include "core/engine/map/snapshots.h"
+#include "core/engine/map/writer.h"
+#include "core/mls/tile_key.h"
+#include "core/storage/storage.h"
+#include "core/world/map_info.h"
+
+namespace strata {
+
+// Thread-safe.
+class MapCore {
+ public:
+  // Opens the file and clears what a crash left half-done in it. `caches`: of all maps.
+  static absl::StatusOr<std::unique_ptr<MapCore>> Open(const std::string& name,
+                                                       const std::filesystem::path& file,
+                                                       const EngineOptions& options,
+                                                       std::shared_ptr<CacheBudget> caches);
+  ~MapCore() { Close(); }
+
+  const std::string& name() const { return name_; }
+  const EngineOptions& options() const { return options_; }
+  const std::shared_ptr<CacheBudget>& caches() const { return caches_; }
+  MapInfo info() const;
+  void set_default_profile(const RobotProfile& profile);
+
+  absl::StatusOr<ReaderPool::Lease> Reader() { return readers_.Take(); }
+  WriterThread& writer() { return writer_; }
+  // UNAVAILABLE once the map's file was removed or replaced; not of a map that is closed.
+  absl::Status CheckInPlace() const;
+  const DiskSpace& disk() const { return disk_; }
+  Snapshots& snapshots() { return snapshots_; }
+  ChangeLog& changes() { return changes_; }
+  // What changed after a commit, and the state that it led to.
+  std::pair<ChangeSet, Snapshots::Pin> ChangesSince(std::uint64_t commit_sequence);
+  // Carries out `work` in a durable commit with a number of its own, one that nobody has been told
+  // yet; then makes it the state that readers get and tells watchers of `scans` and `tiles`, as
+  // one. Nothing has changed after an error. `awaited`: together with acknowledgements that wait;
+  // else behind them.
+  absl::Status Publish(const std::vector<ScanId>& scans,
+                       const std::vector<api::TileChangeNotice>& tiles,
+                       bool awaited,
+                       absl::FunctionRef<absl::Status(StorageWriter&)> work);
+  // Whether the store may hold tiles that were staged and neither published nor discarded.
+  bool tiles_staged() const { return tiles_staged_; }
+  void set_tiles_staged(bool staged) { tiles_staged_ = staged; }
+  // A prepared tile that the store keeps is damaged.
+  void NoteUnreadable(const TileKey& key);
+  // Those noted since the last call.
+  absl::btree_set<TileKey> TakeUnreadable();
+  // A number for the chunks of one more upload.
+  std::uint64_t NextUpload() { return last_upload_.fetch_add(1) + 1; }
+
+  // Ends the writer and closes all connections, waiting for reads under way.
+  void Close();
+
+ private:
+  MapCore(std::string name,
+          const std::filesystem::path& file,
+          const EngineOptions& options,
+          std::shared_ptr<CacheBudget> caches,
+          std::unique_ptr<MapStorage> storage,
+          MapInfo info,
+          const MapClock& clock,
+          std::uint64_t last_upload);
+  // On the writer's thread, so that it happens in the order of commits.
+  void Show(const MapClock& clock,
+            const std::vector<ScanId>& scans,
+            const std::vector<api::TileChangeNotice>& tiles);
+
+  const std::string name_;
+  const DiskSpace disk_;
+  const EngineOptions options_;
+  const std::shared_ptr<CacheBudget> caches_;
+  mutable absl::Mutex mutex_;
+  MapInfo info_ ABSL_GUARDED_BY(mutex_);
+  absl::btree_set<TileKey> unreadable_ ABSL_GUARDED_BY(mutex_);
+  std::unique_ptr<MapStorage> storage_;
+  absl::Mutex publishing_;  // what snapshots_ and changes_ say is of one commit
+  Snapshots snapshots_;
+  ChangeLog changes_;
+  ReaderPool readers_;
+  WriterThread writer_;
+  std::atomic<std::uint64_t> last_upload_;
+  std::atomic<bool> tiles_staged_ = false;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_MAP_MAP_CORE_H_

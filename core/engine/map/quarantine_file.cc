@@ -1,0 +1,166 @@
+#include "core/engine/map/quarantine_file.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
+
+#include "core/common/status.h"
+#include "core/engine/map/directory.h"
+#include "core/engine/map/quarantine.h"
+#include "core/storage/sqlite/sqlite_storage.h"
+#include "core/storage/storage.h"
+#include "core/world/names.h"
+
+namespace strata {
+namespace {
+
+constexpr absl::string_view kRebuild = "rebuild";
+constexpr absl::string_view kLook = "look";
+constexpr absl::string_view kPrepare = "prepare";
+
+// Work of which a map has one.
+absl::string_view NameOfKind(WorkKind kind) {
+  if (kind == WorkKind::kRecovery) return kRebuild;
+  return kind == WorkKind::kLook ? kLook : kPrepare;
+}
+
+// Runs `body` in one durable transaction on the file.
+absl::Status OnFile(const std::filesystem::path& directory,
+                    absl::string_view name,
+                    absl::FunctionRef<absl::Status(StorageWriter&)> body) {
+  STRATA_RETURN_IF_ERROR(ValidateName("map name", name));
+  std::error_code error;
+  if (!std::filesystem::exists(MapDirectory::FileIn(directory, name), error)) {
+    return absl::NotFoundError(
+        absl::StrCat("map ", name, " does not exist in ", directory.string()));
+  }
+  STRATA_ASSIGN_OR_RETURN(const MapDirectory owned, MapDirectory::Open(directory));
+  STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<MapStorage> storage,
+                          OpenSqliteStorage(owned.FileOf(name), SqliteOptions()));
+  StorageWriter& writer = storage->writer();
+  return writer.Commit(Durability::kFull, [&] { return body(writer); });
+}
+
+absl::StatusOr<ScanId> ParseScan(absl::string_view text) {
+  const std::size_t slash = text.rfind('/');
+  ScanId id;
+  if (slash != absl::string_view::npos && absl::SimpleAtoi(text.substr(slash + 1), &id.sequence)) {
+    id.trajectory = std::string(text.substr(0, slash));
+    return id;
+  }
+  return absl::InvalidArgumentError(
+      absl::StrCat("scan '", text, "': write TRAJECTORY/SEQUENCE, as robot/7"));
+}
+
+absl::StatusOr<WorkId> ParseWork(StorageReader& reader, absl::string_view what) {
+  absl::string_view rest = what;
+  std::uint64_t job = 0;
+  if (what == kRebuild) return WorkId{WorkKind::kRecovery, 0};
+  if (what == kLook) return WorkId{WorkKind::kLook, 0};
+  if (what == kPrepare) return WorkId{WorkKind::kPrepare, 0};
+  if (absl::ConsumePrefix(&rest, "job ") && absl::SimpleAtoi(rest, &job)) {
+    return WorkId{WorkKind::kJob, job};
+  }
+  if (!absl::ConsumePrefix(&rest, "scan ")) {
+    return absl::InvalidArgumentError(absl::StrCat("'",
+                                                   what,
+                                                   "': write scan TRAJECTORY/SEQUENCE, job ID, ",
+                                                   kRebuild,
+                                                   ", ",
+                                                   kLook,
+                                                   " or ",
+                                                   kPrepare));
+  }
+  STRATA_ASSIGN_OR_RETURN(const ScanId id, ParseScan(rest));
+  STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader.GetClock());
+  STRATA_ASSIGN_OR_RETURN(const std::optional<PosedScan> scan, reader.FindScan(id, clock.epoch));
+  if (scan.has_value()) return WorkId{WorkKind::kScan, scan->scan.number};
+  return absl::NotFoundError(absl::StrCat("scan ", rest, " does not exist"));
+}
+
+absl::Status DescribeScan(StorageReader& reader, QuarantineEntry& entry, bool& matters) {
+  STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader.GetClock());
+  const absl::StatusOr<PosedScan> scan = reader.GetScan(entry.attempt.work.id, clock.epoch);
+  if (!scan.ok()) {
+    matters = !absl::IsNotFound(scan.status());
+    entry.name = absl::StrCat("scan number ", entry.attempt.work.id);
+    entry.message = std::string(scan.status().message());
+    return absl::OkStatus();
+  }
+  entry.name = absl::StrCat("scan ", scan->scan.header.id.ToString());
+  entry.message = scan->scan.message;
+  entry.held = scan->scan.state == ScanState::kFailed;
+  matters = entry.held || scan->scan.state == ScanState::kPending;
+  return absl::OkStatus();
+}
+
+absl::Status DescribeJob(StorageReader& reader, QuarantineEntry& entry, bool& matters) {
+  STRATA_ASSIGN_OR_RETURN(const std::optional<JobInfo> job, reader.FindJob(entry.attempt.work.id));
+  matters = job.has_value() && (!IsFinal(job->state) || IsQuarantined(*job));
+  if (!matters) return absl::OkStatus();
+  entry.name = absl::StrCat("job ", job->id, " (", job->kind, ")");
+  entry.message = job->message;
+  entry.held = IsQuarantined(*job);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<QuarantineEntry>> ListQuarantine(const std::filesystem::path& directory,
+                                                            absl::string_view name) {
+  std::vector<QuarantineEntry> entries;
+  STRATA_RETURN_IF_ERROR(OnFile(directory, name, [&](StorageWriter& writer) -> absl::Status {
+    StorageReader& reader = writer.reader();
+    STRATA_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, reader.ListAttempts());
+    for (const Attempt& attempt : attempts) {
+      QuarantineEntry entry;
+      entry.attempt = attempt;
+      entry.attempt.deaths += attempt.under_way ? 1 : 0;
+      bool matters = true;
+      if (attempt.work.kind == WorkKind::kScan) {
+        STRATA_RETURN_IF_ERROR(DescribeScan(reader, entry, matters));
+      } else if (attempt.work.kind == WorkKind::kJob) {
+        STRATA_RETURN_IF_ERROR(DescribeJob(reader, entry, matters));
+      } else {
+        entry.name = std::string(NameOfKind(attempt.work.kind));
+        entry.held = attempt.deaths >= kMostDeaths;
+      }
+      if (matters) entries.push_back(std::move(entry));
+    }
+    return absl::OkStatus();
+  }));
+  return entries;
+}
+
+absl::Status AddToQuarantine(const std::filesystem::path& directory,
+                             absl::string_view name,
+                             absl::string_view what) {
+  return OnFile(directory, name, [&](StorageWriter& writer) -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(const WorkId work, ParseWork(writer.reader(), what));
+    return Hold(writer, work, "put aside by hand; stratad quarantine release takes it back");
+  });
+}
+
+absl::Status ReleaseFromQuarantine(const std::filesystem::path& directory,
+                                   absl::string_view name,
+                                   absl::string_view what) {
+  return OnFile(directory, name, [&](StorageWriter& writer) -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(const WorkId work, ParseWork(writer.reader(), what));
+    return Release(writer, work);
+  });
+}
+
+}  // namespace strata

@@ -1,0 +1,84 @@
+// Scans out of the store, as what they are good for: local maps and contributions to the map.
+#ifndef STRATA_CORE_ENGINE_SCANS_SCAN_SOURCE_H_
+#define STRATA_CORE_ENGINE_SCANS_SCAN_SOURCE_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "core/cloud/point_cloud.h"
+#include "core/engine/scans/scan_labels.h"
+#include "core/geometry/pose.h"
+#include "core/mls/build.h"
+#include "core/mls/measurement.h"
+#include "core/mls/mls_map.h"
+#include "core/storage/storage.h"
+#include "core/world/map_info.h"
+
+namespace strata {
+
+// Tiles of its own frame that a scan may touch. An almost empty one takes some kilobytes on its way
+// into the map, and so do those around it.
+inline constexpr std::size_t kMaxScanTiles = 4'096;
+
+// Patches of its own frame that a scan may make: its tiles are in memory at once while it is
+// integrated, some 60 bytes a patch.
+inline constexpr std::size_t kMaxScanPatches = std::size_t{1} << 22;
+
+// Piece `ordinal` of the points of `scan`, with the labels it was uploaded with. DATA_LOSS, naming
+// the piece, unless it is intact and has the columns that the header announces.
+absl::StatusOr<PointCloud> ReadPoints(StorageReader& reader,
+                                      const ScanRecord& scan,
+                                      std::uint32_t ordinal);
+
+// One thread at a time. Memory is bounded whatever a scan's size: large ones are built block by
+// block and joined, which gives the same map.
+class ScanSource {
+ public:
+  // All must outlive the source. `labels`: which labels its points have.
+  ScanSource(StorageReader& reader, const MapParameters& parameters, const LabelView& labels = {})
+      : reader_(reader), parameters_(parameters), labels_(labels) {}
+
+  // The scan in its own frame. DATA_LOSS naming the piece that is damaged; INVALID_ARGUMENT for
+  // points in more than kMaxScanTiles tiles and, of a scan that waits for integration, more than
+  // kMaxScanPatches.
+  absl::StatusOr<MlsMap> LocalMap(const ScanRecord& scan);
+  // What the scan adds to the map at this pose, without points that have faded: a pure function of
+  // the scan, what is said of its points, the pose and the map's parameters, before and after
+  // points were dropped.
+  absl::StatusOr<MlsMap> Contribution(const ScanRecord& scan, const Pose& T_map_scan);
+
+  // What the last map built from points had to leave out of them.
+  const DroppedPoints& dropped() const { return dropped_; }
+
+  // The points in blocks of about a million, in order.
+  absl::Status ForEachBlock(const ScanRecord& scan,
+                            absl::FunctionRef<absl::Status(const PointCloud&)> body);
+
+ private:
+  enum class Faded { kWith, kWithout };
+  // Of the scan frame: what was taken once may be moved anywhere.
+  absl::Status CheckSpread(const ScanRecord& scan);
+  absl::StatusOr<MlsMap> Build(const ScanRecord& scan,
+                               const Pose& T_map_scan,
+                               Faded faded,
+                               std::size_t most_patches);
+
+  StorageReader& reader_;
+  const MapParameters& parameters_;
+  const LabelView labels_;
+  MlsScratch scratch_;
+  DroppedPoints dropped_;
+  // The last scan that fitted one block: its local map and its contribution read it twice.
+  ScanNumber held_scan_ = 0;
+  PointCloud held_;
+  std::vector<std::uint16_t> held_faded_;  // ScanLabels::Faded() of the points held
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_SCANS_SCAN_SOURCE_H_

@@ -1,0 +1,66 @@
+// Extended elevation maps: one height a cell, chosen so that underpasses stay open (thesis 6.4).
+#ifndef STRATA_CORE_MLS_ELEVATION_EXTENDED_ELEVATION_MAP_H_
+#define STRATA_CORE_MLS_ELEVATION_EXTENDED_ELEVATION_MAP_H_
+
+#include <cstdint>
+#include <vector>
+
+#include "core/mls/mls_map.h"
+#include "core/mls/tile_key.h"
+#include "core/mls/traversability.h"
+
+namespace strata {
+
+// The four classes of 6.4.2.
+enum class ElevationClass : std::uint8_t {
+  kTraversable = 1,     // horizontal, and planar enough
+  kNonTraversable = 2,  // horizontal; too steep, rough or stepped, or too little around to tell
+  kVertical = 3,  // one interval taller than τ, or several without room for the robot between
+  kGap = 4,       // several intervals with room for the robot between two of them
+};
+
+struct ExtendedElevationCell {
+  std::uint16_t cell = 0;  // CellInTile
+  ElevationClass elevation_class = ElevationClass::kVertical;
+  // The cell's one height: the surface of its interval; of a gap cell the minimum traversable
+  // elevation, which is the lowest surface with room for the robot above; of other cells with
+  // several intervals the highest.
+  float z_m = 0.0F;
+  float sigma_m = 0.0F;
+  // How far below z the cell is filled: the interval's length, of a vertical cell down to the
+  // lowest measurement, 0 of a horizontal one.
+  float depth_m = 0.0F;
+
+  // Whether a robot may be on it.
+  bool passable() const {
+    return elevation_class == ElevationClass::kTraversable ||
+           elevation_class == ElevationClass::kGap;
+  }
+  friend bool operator==(const ExtendedElevationCell&, const ExtendedElevationCell&) = default;
+};
+
+// Occupied cells of one tile, sorted by cell.
+struct ExtendedElevationTile {
+  TileKey key;
+  std::vector<ExtendedElevationCell> cells;
+
+  // nullptr where nothing was measured.
+  const ExtendedElevationCell* Find(std::uint16_t cell_in_tile) const;
+};
+
+struct ExtendedElevationMap {
+  std::vector<ExtendedElevationTile> tiles;  // sorted by key
+
+  const ExtendedElevationCell* Find(CellIndex cell) const;
+};
+
+// The extended elevation map of the measurements in `map`: the height intervals of 6.4.2 are those
+// of the multi-level surface map (same cells, γ and τ), of which one height a cell is kept. Room
+// for the robot is limits.clearance_m. Planarity is judged by AssessSurfaces over these heights, so
+// a cell next to a wall, or next to a gap cell below it, has a step beside it.
+ExtendedElevationMap MakeExtendedElevationMap(const MlsMap& map,
+                                              const TraversabilityLimits& limits);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_MLS_ELEVATION_EXTENDED_ELEVATION_MAP_H_
