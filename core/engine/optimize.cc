@@ -21,7 +21,7 @@
 #include "core/engine/parallel.h"
 #include "core/engine/proposal.h"
 #include "core/engine/scan_views.h"
-#include "core/posegraph/alignment.h"
+#include "core/posegraph/alignment/alignment.h"
 
 namespace strata {
 namespace {

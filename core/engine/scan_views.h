@@ -12,7 +12,7 @@
 #include "core/engine/damaged_scans.h"
 #include "core/engine/map_core.h"
 #include "core/mls/mls_map.h"
-#include "core/posegraph/alignment.h"
+#include "core/posegraph/alignment/alignment.h"
 #include "core/registration/place_descriptor.h"
 #include "core/storage/storage.h"
 
