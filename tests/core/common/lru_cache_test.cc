@@ -58,8 +58,8 @@ TEST(LruCacheTest, ReplacesErasesAndKeepsNothingTooLarge) {
 TEST(LruCacheTest, WhatIsReservedIsTakenFromTheCachesUpToHalf) {
   const auto budget = std::make_shared<CacheBudget>(100);
   Cache cache(budget);
-  cache.Put(1, Text("a"), 60);
-  cache.Put(2, Text("b"), 40);
+  cache.Put(1, Text("a"), 50);
+  cache.Put(2, Text("b"), 30);
   EXPECT_TRUE(budget->Reserve(30));
   EXPECT_EQ(cache.Find(1), nullptr);
   EXPECT_NE(cache.Find(2), nullptr);
@@ -69,8 +69,16 @@ TEST(LruCacheTest, WhatIsReservedIsTakenFromTheCachesUpToHalf) {
   EXPECT_TRUE(budget->Reserve(50));
 }
 
+TEST(LruCacheTest, AnEighthOfTheBudgetIsLeftToTheHeap) {
+  const auto budget = std::make_shared<CacheBudget>(80);
+  Cache cache(budget);
+  for (int i = 0; i < 8; ++i) cache.Put(i, Text("value"), 10);
+  EXPECT_EQ(cache.bytes(), 70U);
+  EXPECT_EQ(cache.Find(0), nullptr);
+}
+
 TEST(LruCacheTest, WhoHoldsAValueKeepsIt) {
-  const auto budget = std::make_shared<CacheBudget>(10);
+  const auto budget = std::make_shared<CacheBudget>(16);
   Cache cache(budget);
   cache.Put(1, Text("kept"), 10);
   const Cache::Handle held = cache.Find(1);
