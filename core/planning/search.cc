@@ -424,8 +424,8 @@ class Search {
       STRATA_RETURN_IF_ERROR(space_.status());
       // Whatever bytes a tile was made from.
       if (back == kNoPatchId || path.size() > outcome_.expanded) {
-        return absl::InternalError(
-            absl::StrCat("tile ", s.key.ToString(), " has a move that does not lead back"));
+        return absl::DataLossError(absl::StrCat(
+            "prepared tile ", s.key.ToString(), ": a move does not lead back; rebuild the map"));
       }
       path.push_back(back);
       outcome_.cost += cost;
