@@ -38,8 +38,8 @@ constexpr std::uint32_t kMaxCost = 0xF0000000U;
 // to come back again would cost more.
 constexpr std::uint32_t kPatience = 32 * kCostPerCell;
 constexpr std::uint32_t kLargeSlack = 100;  // large searches may cost 1/100 more than the cheapest
-// What is queued is looked through once it is more: four of five wait for a turn at which their
-// patch has been expanded long before.
+// What is queued is looked through once it is more: most of it waits for a turn at which its patch
+// has been expanded long before.
 constexpr std::size_t kMostQueued = std::size_t{1} << 20;
 // No move costs less: along an axis, along a diagonal.
 constexpr std::array<std::uint32_t, 2> kLeastCost = {kCostPerCell, kCostPerDiagonal};
