@@ -80,6 +80,7 @@ TEST_F(EnginePlanningTest, OnlyWhatNeedsADamagedTileIsDataLoss) {
   EXPECT_TRUE(sound.found()) << sound.message;
   Close();
   DamageSurfaceTile(damaged);
+  Sql("DELETE FROM derived_prepared_tile");  // those made in time: plans over them need no other
   Reopen();
   const auto data_loss =
       StatusIs(absl::StatusCode::kDataLoss,
