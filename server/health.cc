@@ -1,5 +1,6 @@
 #include "server/health.h"
 
+#include <optional>
 #include <utility>
 
 #include "absl/status/status.h"
@@ -34,10 +35,11 @@ const char* PathOf(ClientLimits::Kind kind) {
   return kind == ClientLimits::Kind::kCall ? Health::kCheck : Health::kWatch;
 }
 
-ClientLimitOptions HostLimits(int most) {
+// A watch counts among the calls until it is read.
+ClientLimitOptions HostLimits(int max_requests, int max_watches) {
   ClientLimitOptions options;
-  options.max_calls = most;
-  options.max_watches = most;
+  options.max_calls = max_requests;
+  options.max_watches = max_watches;
   return options;
 }
 
@@ -59,7 +61,7 @@ class HealthReactor final : public grpc::ServerBidiReactor<Sealed<Asked>, Told> 
     }
   }
   ~HealthReactor() override {
-    if (counted_) health_.hosts_.Leave(host_, kind_);
+    if (counted_.has_value()) health_.hosts_.Leave(host_, *counted_);
     health_.requests_.End();
     health_.requests_.Leave();
     health_.runtime_.ArrivalsOf(PathOf(kind_)).Leave(PathOf(kind_));
@@ -78,10 +80,16 @@ class HealthReactor final : public grpc::ServerBidiReactor<Sealed<Asked>, Told> 
  private:
   absl::Status Enter() {
     const bool room = health_.requests_.Enter();
-    STRATA_RETURN_IF_ERROR(health_.hosts_.Enter(host_, kind_, SteadyNow()));
-    counted_ = true;
+    STRATA_RETURN_IF_ERROR(CountAs(Kind::kCall));
     if (room) return absl::OkStatus();
     return absl::ResourceExhaustedError("too many ask for health; try again later");
+  }
+
+  absl::Status CountAs(Kind kind) {
+    STRATA_RETURN_IF_ERROR(health_.hosts_.Enter(host_, kind, SteadyNow()));
+    if (counted_.has_value()) health_.hosts_.Leave(host_, *counted_);
+    counted_ = kind;
+    return absl::OkStatus();
   }
 
   // On a thread of its own, as long as the request is coming in.
@@ -134,6 +142,7 @@ class HealthReactor final : public grpc::ServerBidiReactor<Sealed<Asked>, Told> 
   }
 
   void Watch() {
+    if (const absl::Status entered = CountAs(Kind::kWatch); !entered.ok()) return End(entered);
     {
       absl::MutexLock lock(&health_.mutex_);
       if (!gone_) {
@@ -172,7 +181,7 @@ class HealthReactor final : public grpc::ServerBidiReactor<Sealed<Asked>, Told> 
   grpc::CallbackServerContext& context_;
   const Kind kind_;
   const std::string host_;
-  bool counted_ = false;  // among those of its host
+  std::optional<Kind> counted_;  // as what of its host
   absl::Mutex mutex_;
   bool read_ ABSL_GUARDED_BY(mutex_) = false;
   bool read_ok_ ABSL_GUARDED_BY(mutex_) = false;
@@ -185,7 +194,7 @@ class HealthReactor final : public grpc::ServerBidiReactor<Sealed<Asked>, Told> 
 
 Health::Health(Runtime& runtime)
     : runtime_(runtime),
-      hosts_(HostLimits(kHostRequests), 0),
+      hosts_(HostLimits(kHostRequests, kHostWatches), 0),
       requests_(kRequests, "health requests"),
       serving_({{"", true}}),
       readers_(kReads, "health") {

@@ -38,7 +38,9 @@ class Health final : public grpc::Service {
   friend class HealthReactor;
 
   static constexpr int kReads = 4;  // at a time; each up to the largest message
-  static constexpr int kHostRequests = 64;
+  // Of one host, until they are read; meanwhile a window's worth of each is kept.
+  static constexpr int kHostRequests = 8;
+  static constexpr int kHostWatches = 64;
   static constexpr int kRequests = 512;
   static constexpr absl::Duration kPatience = absl::Seconds(1);
 

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <google/protobuf/wrappers.pb.h>
@@ -96,6 +97,22 @@ TEST_F(HealthTest, AWatchIsToldEachChange) {
   EXPECT_EQ(scans.Next(), kServing);
   server_->Shutdown();
   EXPECT_THAT(scans.Next(), ::testing::AnyOf(kNotServing, 0));
+}
+
+// A fleet behind one address, each robot watching: what is read is no longer bounded as what waits.
+TEST_F(HealthTest, AHostMayHaveManyWatchesOpen) {
+  std::vector<std::unique_ptr<HealthWatcher>> watches;
+  for (int i = 0; i < 60; ++i) {
+    watches.push_back(std::make_unique<HealthWatcher>(channel_, ""));
+    ASSERT_EQ(watches.back()->Next(), kServing) << i;
+  }
+  EXPECT_EQ(Check(""), grpc::StatusCode::OK);
+  for (int i = 60; i < 64; ++i) {
+    watches.push_back(std::make_unique<HealthWatcher>(channel_, ""));
+    ASSERT_EQ(watches.back()->Next(), kServing) << i;
+  }
+  EXPECT_EQ(HealthWatcher(channel_, "").Next(), 0);
+  EXPECT_EQ(Check(""), grpc::StatusCode::OK);
 }
 
 TEST_F(HealthTest, WhatIsNoRequestForHealthIsRefused) {
