@@ -66,6 +66,10 @@ std::vector<Campaign> Campaigns() {
   return campaigns;
 }
 
+void PrintAll(const std::string& what, const std::vector<std::string>& texts) {
+  for (const std::string& text : texts) std::cerr << what << ": " << text << '\n';
+}
+
 int RunCampaigns(const std::vector<std::string>& only, Sweep sweep) {
   const auto prepared = DiskCampaign::Prepare();
   if (!prepared.ok()) {
@@ -99,6 +103,7 @@ int RunCampaigns(const std::vector<std::string>& only, Sweep sweep) {
                                     result.restarts,
                                     result.violations.size())
               << std::flush;
+    if (!campaign.must_break) PrintAll("violation", result.violations);
     broken = broken || result.violations.empty() == campaign.must_break;
   }
   return broken ? 1 : 0;
@@ -118,8 +123,8 @@ void PrintFlips(const std::string& name, const FlipResult& r) {
                                   r.mended,
                                   r.violations.size())
             << std::flush;
-  for (const std::string& text : r.violations) std::cerr << "violation: " << text << '\n';
-  for (const std::string& text : r.wrong_answers) std::cerr << "wrong: " << text << '\n';
+  PrintAll("violation", r.violations);
+  PrintAll("wrong", r.wrong_answers);
 }
 
 // `seeds` of every column, and ten times as many anywhere.

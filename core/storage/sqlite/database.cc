@@ -1,6 +1,8 @@
 #include "core/storage/sqlite/database.h"
 
+#include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <system_error>
@@ -47,6 +49,19 @@ absl::Status StatusOf(int code, sqlite3* connection) {
   if (code == SQLITE_OK) return absl::OkStatus();
   const char* detail = connection == nullptr ? sqlite3_errstr(code) : sqlite3_errmsg(connection);
   return absl::Status(CodeOf(code), absl::StrCat("store: ", detail, " (sqlite ", code, ")"));
+}
+
+// Of what quick_check found first. Pages that the disk did not give are no damage; it says so with
+// a code, or in chains of pages without (numbers beyond the file's end it tells apart before).
+absl::Status StatusOfCheck(const std::string& found) {
+  if (found == "ok") return absl::OkStatus();
+  constexpr char kCode[] = "error code=";
+  const std::size_t at = found.find(kCode);
+  const int code = at == std::string::npos ? 0 : std::atoi(found.c_str() + at + sizeof(kCode) - 1);
+  const bool unread =
+      (code & 0xFF) == SQLITE_IOERR || found.find("failed to get page") != std::string::npos;
+  return absl::Status(unread ? absl::StatusCode::kUnavailable : absl::StatusCode::kDataLoss,
+                      absl::StrCat("store: ", found));
 }
 
 // SQLite makes files that everybody may read. This one is still empty, and what comes to lie beside
@@ -198,8 +213,7 @@ absl::Status Database::CheckPages(const Stop& stop) {
   const auto check = [this]() -> absl::Status {
     STRATA_ASSIGN_OR_RETURN(Statement found, Prepare("PRAGMA quick_check(1)"));
     STRATA_ASSIGN_OR_RETURN(const bool row, found.Step());
-    if (row && found.Text(0) == "ok") return absl::OkStatus();
-    return absl::DataLossError(absl::StrCat("store: ", row ? found.Text(0) : "no answer"));
+    return StatusOfCheck(row ? found.Text(0) : "no answer");
   };
   const absl::Status checked = check();
   sqlite3_progress_handler(connection_, 0, nullptr, nullptr);

@@ -95,6 +95,9 @@ class Database {
   // differ that were changed between them. ALREADY_EXISTS; DATA_LOSS if the pages do not hang
   // together; CANCELLED, DEADLINE_EXCEEDED by `stop`. An error leaves an unusable file.
   absl::Status CopyTo(const std::filesystem::path& file, const Stop& stop);
+  // DATA_LOSS, naming the first fault, if the pages do not hang together; UNAVAILABLE if the disk
+  // does not give them; CANCELLED, DEADLINE_EXCEEDED by `stop`.
+  absl::Status CheckPages(const Stop& stop);
   // Whether the file under its name is still the one that is open.
   bool InPlace() const;
   std::filesystem::path File() const;
@@ -104,7 +107,6 @@ class Database {
  private:
   friend class Transaction;
   explicit Database(sqlite3* connection) : connection_(connection) {}
-  absl::Status CheckPages(const Stop& stop);
 
   sqlite3* connection_;
   std::map<const char*, sqlite3_stmt*> statements_;

@@ -1,10 +1,9 @@
 #include "core/storage/sqlite/map_file_check.h"
 
-#include <string>
-
 #include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
+#include "core/common/stop.h"
 #include "core/storage/sqlite/database.h"
 #include "core/storage/sqlite/schema.h"
 #include "core/storage/sqlite/sqlite_storage.h"
@@ -19,10 +18,7 @@ absl::Status CheckSqliteMapFile(const std::filesystem::path& file, std::int64_t&
     return absl::FailedPreconditionError(absl::StrCat(
         "format ", format, " is newer than ", kTruthVersion, ", the newest this program reads"));
   }
-  STRATA_ASSIGN_OR_RETURN(Statement check, database.Prepare("PRAGMA quick_check(1)"));
-  STRATA_ASSIGN_OR_RETURN(const bool row, check.Step());
-  const std::string found = row ? check.Text(0) : "no answer";
-  return found == "ok" ? absl::OkStatus() : absl::DataLossError(found);
+  return database.CheckPages(Stop());
 }
 
 }  // namespace strata

@@ -17,6 +17,7 @@
 
 #include "core/common/checksum.h"
 #include "tests/core/engine/engine_fixture.h"
+#include "tests/support/faulty_disk.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {
@@ -140,6 +141,31 @@ TEST_F(EngineBackupTest, NothingIsLeftBehind) {
   Reopen();
   Close();
   EXPECT_THAT(Files(), ElementsAre(".lock", "world.strata"));
+}
+
+// A page that is not read is no damage: nobody is told to mend the map.
+TEST_F(EngineBackupTest, ADiskThatDoesNotReadIsUnavailable) {
+  Close();
+  FaultyDisk disk;
+  Reopen();
+  MakeMap();
+  UploadRooms(2);
+  WaitIntegrated(db());
+  const std::int64_t before = disk.operations(DiskFault::kRead);
+  STRATA_EXPECT_OK(BackUp());
+  const std::int64_t reads = disk.operations(DiskFault::kRead) - before;
+  int unavailable = 0;
+  for (std::int64_t sound = 0; sound < reads; sound += 1 + reads / 40) {
+    disk.Fail(DiskFault::kRead, sound);
+    const absl::Status status = BackUp();
+    disk.Mend();
+    if (status.ok()) continue;
+    EXPECT_THAT(status, StatusIs(absl::StatusCode::kUnavailable, _)) << "read " << sound;
+    ++unavailable;
+  }
+  EXPECT_GT(unavailable, 0);
+  STRATA_EXPECT_OK(BackUp());
+  Close();
 }
 
 }  // namespace
