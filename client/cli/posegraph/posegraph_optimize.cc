@@ -15,9 +15,11 @@
 #include "client/formats/file_bytes.h"
 #include "client/formats/graph_file.h"
 #include "core/common/status.h"
-#include "core/posegraph/initial_poses.h"
 #include "core/posegraph/planar_pose_graph.h"
 #include "core/posegraph/pose_graph.h"
+#include "core/posegraph/solver/initial_poses.h"
+#include "core/posegraph/solver/optimize_planar_pose_graph.h"
+#include "core/posegraph/solver/optimize_pose_graph.h"
 
 namespace strata::cli {
 namespace {
