@@ -60,8 +60,9 @@ absl::Status StatusOfCheck(const std::string& found) {
   const int code = at == std::string::npos ? 0 : std::atoi(found.c_str() + at + sizeof(kCode) - 1);
   const bool unread =
       (code & 0xFF) == SQLITE_IOERR || found.find("failed to get page") != std::string::npos;
-  return absl::Status(unread ? absl::StatusCode::kUnavailable : absl::StatusCode::kDataLoss,
-                      absl::StrCat("store: ", found));
+  if (!unread) return absl::DataLossError(absl::StrCat("store: ", found));
+  return absl::UnavailableError(
+      absl::StrCat("store: the disk did not give a page: ", found, "; look after it, then retry"));
 }
 
 // SQLite makes files that everybody may read. This one is still empty, and what comes to lie beside

@@ -92,8 +92,8 @@ class Database {
   absl::Status Execute(const std::string& sql);
   absl::StatusOr<std::int64_t> Pragma(const char* sql);
   // Copies one committed state page by page, each to where it was: of two copies only those pages
-  // differ that were changed between them. ALREADY_EXISTS; DATA_LOSS if the pages do not hang
-  // together; CANCELLED, DEADLINE_EXCEEDED by `stop`. An error leaves an unusable file.
+  // differ that were changed between them. ALREADY_EXISTS; the errors of CheckPages(), which the
+  // copy has to pass. An error leaves an unusable file.
   absl::Status CopyTo(const std::filesystem::path& file, const Stop& stop);
   // DATA_LOSS, naming the first fault, if the pages do not hang together; UNAVAILABLE if the disk
   // does not give them; CANCELLED, DEADLINE_EXCEEDED by `stop`.

@@ -107,9 +107,11 @@ absl::Status ChangeProfile(api::Database& database) {
   return database.planning().SetProfile({}, kHistoryMap, api::kDefaultProfile, profile);
 }
 
-absl::Status NameClasses(api::Database& database) {
-  STRATA_RETURN_IF_ERROR(
-      database.maps().SetClass({}, kHistoryMap, {kGround, "ground", {120, 90, 60}}));
+absl::Status NameGround(api::Database& database) {
+  return database.maps().SetClass({}, kHistoryMap, {kGround, "ground", {120, 90, 60}});
+}
+
+absl::Status NameStructure(api::Database& database) {
   return database.maps().SetClass({}, kHistoryMap, {kStructure, "structure", {90, 90, 90}});
 }
 
@@ -365,7 +367,8 @@ const std::vector<HistoryStep>& DiskHistory() {
       Step("label", LabelScan),
       Step("delete", DeleteScan),
       Step("profile", ChangeProfile),
-      Step("classes", NameClasses),
+      Step("name ground", NameGround),
+      Step("name structure", NameStructure),
       Step("constrain", Constrain),
       JobStep("train", {{"name", "yard"}, {"method", "bayes"}, {"reduce", "random=300"}}),
       JobStep("classify", {{"model", "yard"}}, true),
