@@ -11,7 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "core/common/random.h"
-#include "core/posegraph/closure_candidates.h"
+#include "core/posegraph/closures/closure_candidates.h"
 #include "core/registration/place_index.h"
 
 namespace strata {

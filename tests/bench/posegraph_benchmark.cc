@@ -21,9 +21,9 @@
 #include <unistd.h>
 
 #include "client/formats/graph_file.h"
-#include "core/posegraph/initial_poses.h"
+#include "core/posegraph/costs/relative_pose_cost.h"
 #include "core/posegraph/pose_graph.h"
-#include "core/posegraph/relative_pose_cost.h"
+#include "core/posegraph/solver/initial_poses.h"
 #include "tests/bench/posegraph_peer.h"
 #include "tests/support/data_dir.h"
 

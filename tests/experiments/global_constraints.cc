@@ -27,7 +27,7 @@
 #include "core/planes/extraction.h"
 #include "core/planes/moments.h"
 #include "core/planes/shared_planes.h"
-#include "core/posegraph/alignment.h"
+#include "core/posegraph/alignment/alignment.h"
 #include "core/registration/scan_features.h"
 #include "tests/experiments/global_constraint_cases.h"
 #include "tests/support/data_dir.h"

@@ -24,8 +24,8 @@
 
 #include "core/cloud/sensor_model.h"
 #include "core/mls/build.h"
-#include "core/posegraph/closure_candidates.h"
-#include "core/posegraph/closure_consistency.h"
+#include "core/posegraph/closures/closure_candidates.h"
+#include "core/posegraph/closures/closure_consistency.h"
 #include "core/registration/place_descriptor.h"
 #include "core/registration/place_index.h"
 #include "core/registration/place_match.h"

@@ -15,9 +15,9 @@
 #include "client/formats/file_bytes.h"
 #include "client/formats/graph_file.h"
 #include "core/common/status.h"
-#include "core/posegraph/initial_poses.h"
 #include "core/posegraph/planar_pose_graph.h"
 #include "core/posegraph/pose_graph.h"
+#include "core/posegraph/solver/initial_poses.h"
 
 namespace strata::cli {
 namespace {

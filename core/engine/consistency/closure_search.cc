@@ -11,10 +11,10 @@
 #include "core/common/status.h"
 #include "core/engine/map/parallel.h"
 #include "core/engine/scans/matching.h"
-#include "core/posegraph/closure_candidates.h"
-#include "core/posegraph/closure_consistency.h"
+#include "core/posegraph/closures/closure_candidates.h"
+#include "core/posegraph/closures/closure_consistency.h"
+#include "core/posegraph/closures/pooling.h"
 #include "core/posegraph/information.h"
-#include "core/posegraph/pooling.h"
 #include "core/registration/place_index.h"
 #include "core/registration/place_match.h"
 

@@ -12,8 +12,8 @@
 #include "core/engine/consistency/optimize_settings.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/scans/damaged_scans.h"
-#include "core/posegraph/alignment.h"
-#include "core/posegraph/path_uncertainty.h"
+#include "core/posegraph/alignment/alignment.h"
+#include "core/posegraph/closures/path_uncertainty.h"
 #include "core/storage/storage.h"
 
 namespace strata {

@@ -22,7 +22,7 @@
 #include "core/engine/scans/damaged_scans.h"
 #include "core/engine/scans/matching.h"
 #include "core/engine/scans/scan_views.h"
-#include "core/posegraph/alignment.h"
+#include "core/posegraph/alignment/alignment.h"
 
 namespace strata {
 namespace {

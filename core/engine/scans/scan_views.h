@@ -12,7 +12,7 @@
 #include "core/engine/map/map_core.h"
 #include "core/engine/scans/damaged_scans.h"
 #include "core/mls/mls_map.h"
-#include "core/posegraph/alignment.h"
+#include "core/posegraph/alignment/alignment.h"
 #include "core/registration/place_descriptor.h"
 #include "core/storage/storage.h"
 

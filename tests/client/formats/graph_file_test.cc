@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "client/formats/file_bytes.h"
-#include "core/posegraph/initial_poses.h"
+#include "core/posegraph/solver/initial_poses.h"
 #include "tests/support/data_dir.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"

@@ -1,0 +1,459 @@
+#include "core/posegraph/alignment/alignment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include <Eigen/Eigenvalues>
+
+#include "core/common/status.h"
+#include "core/posegraph/alignment/odometry_noise.h"
+#include "core/posegraph/alignment/stretches.h"
+#include "core/posegraph/information.h"
+#include "core/registration/registration_target.h"
+
+namespace strata {
+namespace {
+
+// A scan registered to a stretch of way.
+struct Match {
+  Stretch stretch;
+  bool good = false;
+  // T_i_scan as measured, i being scans of the stretch, nearest first.
+  std::vector<std::pair<std::size_t, Pose>> T_i_scan;
+  Matrix6d information = Matrix6d::Zero();  // of the match, to be shared by all of them
+};
+
+// Within these of what was measured a match has the same correspondences.
+constexpr double kSamePlaceM = 0.02;
+constexpr double kSamePlaceRad = 0.002;
+// Within these of what was measured when a scan came in, it still holds.
+constexpr double kMeasuredPlaceM = 0.1;
+constexpr double kMeasuredPlaceRad = 0.02;
+// What may be false must look the same at least to this share.
+constexpr double kMinSuspectOverlap = 0.5;
+// A match is recorded as relative poses to the nearest few.
+constexpr std::size_t kMaxPartners = 3;
+
+bool Acceptable(Termination termination) {
+  return termination == Termination::kConverged || termination == Termination::kMaxIterations ||
+         termination == Termination::kDegenerate;
+}
+
+bool Near(const Pose& a, const Pose& b, double distance_m, double turn_rad) {
+  const Pose difference = a.inverse() * b;
+  return difference.translation().norm() <= distance_m && RotationAngleRad(difference) <= turn_rad;
+}
+
+double Turn(const Pose& a, const Pose& b) { return RotationAngleRad(a.inverse() * b); }
+
+// Whether `found` is what was excluded: the same plane to 3° and 0.2 m, and a scan in common.
+bool IsExcluded(const SharedPlane& found, const ExcludedPlane& excluded) {
+  constexpr double kSameCosine = 0.9986;
+  constexpr double kSameDistanceM = 0.2;
+  if (found.plane.normal.dot(excluded.plane_map.normal) < kSameCosine) return false;
+  if (std::abs(found.plane.distance - excluded.plane_map.distance) > kSameDistanceM) return false;
+  return std::any_of(found.views.begin(), found.views.end(), [&](const SharedPlane::View& view) {
+    return std::find(excluded.nodes.begin(), excluded.nodes.end(), view.scan) !=
+           excluded.nodes.end();
+  });
+}
+
+// Σ w (n · p − d)² of the plane that fits best to what has these moments.
+double BestPlaneCost(const PointMoments& moments) {
+  const Eigen::Vector3d mean = moments.topRightCorner<3, 1>() / moments(3, 3);
+  const Eigen::Matrix3d scatter =
+      moments.topLeftCorner<3, 3>() - moments(3, 3) * mean * mean.transpose();
+  return std::max(0.0,
+                  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter, Eigen::EigenvaluesOnly)
+                      .eigenvalues()
+                      .x());
+}
+
+// By how much the views of one plane disagree beyond their noise: χ² per degree of freedom of what
+// they say together over what each says alone, three for every view after the first. About 1 for a
+// plane; much more where the poses are still wrong, or where the surface is none.
+double Disagreement(const SharedPlane& plane, const std::vector<Pose>& T_map_scan) {
+  PointMoments together = PointMoments::Zero();
+  double alone = 0.0;
+  for (const SharedPlane::View& view : plane.views) {
+    const Eigen::Matrix4d T = T_map_scan[view.scan].matrix();
+    together += T * view.moments * T.transpose();
+    alone += BestPlaneCost(view.moments);
+  }
+  const double freedom = 3.0 * static_cast<double>(plane.views.size() - 1);
+  return std::max(0.0, BestPlaneCost(together) - alone) / freedom;
+}
+
+class Alignment {
+ public:
+  Alignment(const AlignmentProblem& problem,
+            AlignmentSource& source,
+            const AlignmentOptions& options,
+            ForEach for_each,
+            const Stop& stop)
+      : problem_(problem),
+        source_(source),
+        options_(options),
+        for_each_(for_each),
+        stop_(stop),
+        stretches_(problem, options.neighbours),
+        matches_(problem.T_map_scan.size()),
+        measured_(problem.T_map_scan.size()),
+        odometry_(problem.T_map_scan.size(), nullptr) {
+    result_.T_map_scan = problem.T_map_scan;
+    for (const ScanPair& pair : problem.pairs) {
+      if (pair.measured.has_value()) measured_[pair.j].push_back(&pair);
+    }
+    for (const RelativePoseTerm& motion : problem.odometry) odometry_[motion.j] = &motion;
+  }
+
+  absl::StatusOr<AlignmentResult> Run(AlignmentProgress progress) {
+    for (int round = 0; round < options_.max_rounds; ++round) {
+      STRATA_RETURN_IF_ERROR(progress(static_cast<double>(round) / options_.max_rounds));
+      STRATA_RETURN_IF_ERROR(Round());
+      const AlignmentRound& done = result_.rounds.back();
+      if (done.max_shift_m <= options_.settled_m && done.max_turn_rad <= options_.settled_rad) {
+        result_.termination = AlignmentTermination::kSettled;
+        break;
+      }
+    }
+    STRATA_RETURN_IF_ERROR(progress(1.0));
+    return std::move(result_);
+  }
+
+ private:
+  const Pose& pose(std::size_t node) const { return result_.T_map_scan[node]; }
+
+  absl::Status Round() {
+    AlignmentRound round;
+    STRATA_RETURN_IF_ERROR(Register(round));
+    PoseGraphProblem graph = Graph(round);
+    STRATA_RETURN_IF_ERROR(AddPlanes(graph, round));
+    STRATA_ASSIGN_OR_RETURN(PoseGraphSolution solution,
+                            OptimizePoseGraph(graph, options_.pose_graph, stop_));
+    for (std::size_t k = 0; k < solution.T_map_scan.size(); ++k) {
+      const Pose& after = solution.T_map_scan[k];
+      round.max_shift_m =
+          std::max(round.max_shift_m, (after.translation() - pose(k).translation()).norm());
+      round.max_turn_rad = std::max(round.max_turn_rad, Turn(pose(k), after));
+    }
+    round.before = solution.summary.before;
+    round.after = solution.summary.after;
+    Keep(graph, std::move(solution));
+    result_.rounds.push_back(round);
+    return absl::OkStatus();
+  }
+
+  absl::Status Register(AlignmentRound& round) {
+    std::vector<std::size_t> registered(matches_.size(), 0);
+    STRATA_RETURN_IF_ERROR(for_each_(matches_.size(), [&](std::size_t node) -> absl::Status {
+      STRATA_RETURN_IF_ERROR(stop_.status());
+      std::vector<Match> before = std::exchange(matches_[node], {});
+      for (Stretch& stretch : stretches_.Around(node, result_.T_map_scan)) {
+        if (stretch.own && MeasuredHolds(node)) continue;
+        const auto known = std::find_if(before.begin(), before.end(), [&](const Match& match) {
+          return match.stretch.nodes == stretch.nodes && StillHolds(node, match);
+        });
+        if (known != before.end()) {
+          matches_[node].push_back(*std::move(known));
+          continue;
+        }
+        STRATA_ASSIGN_OR_RETURN(Match match, RegisterTo(node, std::move(stretch)));
+        matches_[node].push_back(std::move(match));
+        ++registered[node];
+      }
+      return absl::OkStatus();
+    }));
+    for (std::size_t node = 0; node < matches_.size(); ++node) {
+      round.registered += registered[node];
+      for (const Match& match : matches_[node]) round.matches += match.good ? 1 : 0;
+    }
+    return absl::OkStatus();
+  }
+
+  // Whether what was measured when the scan came in still tells where it is on its own way.
+  bool MeasuredHolds(std::size_t node) const {
+    return !measured_[node].empty() &&
+           std::all_of(measured_[node].begin(), measured_[node].end(), [&](const ScanPair* pair) {
+             return Near(pose(pair->i).inverse() * pose(node),
+                         pair->measured->T_i_j,
+                         kMeasuredPlaceM,
+                         kMeasuredPlaceRad);
+           });
+  }
+
+  // The poses are still about what was measured.
+  bool StillHolds(std::size_t node, const Match& match) const {
+    if (!match.good) return false;
+    return std::all_of(match.T_i_scan.begin(), match.T_i_scan.end(), [&](const auto& measured) {
+      return Near(
+          pose(measured.first).inverse() * pose(node), measured.second, kSamePlaceM, kSamePlaceRad);
+    });
+  }
+
+  absl::StatusOr<Match> RegisterTo(std::size_t node, Stretch stretch) {
+    Match match;
+    match.stretch = std::move(stretch);
+    STRATA_ASSIGN_OR_RETURN(const auto own, FeaturesOf(node));
+    if (own == nullptr) return match;
+    std::vector<std::shared_ptr<const ScanFeatures>> held;
+    std::vector<PlacedScan> placed;
+    std::vector<std::size_t> seen;  // nothing is measured about damaged ones
+    for (const std::size_t i : match.stretch.nodes) {
+      STRATA_ASSIGN_OR_RETURN(auto features, FeaturesOf(i));
+      if (features == nullptr) continue;
+      seen.push_back(i);
+      held.push_back(std::move(features));
+      placed.push_back({held.back().get(), pose(i)});
+    }
+    const RegistrationTarget target(placed, {.centre = pose(node).translation()});
+    const RegistrationResult result = RegisterScan(*own, target, pose(node), options_.registration);
+    match.good = Acceptable(result.termination) &&
+                 (!match.stretch.may_be_false || result.overlap >= kMinSuspectOverlap);
+    if (!match.good) return match;
+    match.information = LoosenedInformation(
+        result.information,
+        IsotropicInformation(options_.registration_sigma_rad, options_.registration_sigma_m));
+    // A match that may be false is one relative pose, so that it is believed or not as a whole.
+    const std::size_t partners = match.stretch.may_be_false ? 1 : kMaxPartners;
+    for (const std::size_t i : Nearest(seen, result.T_target_source, partners)) {
+      match.T_i_scan.push_back({i, Normalized(pose(i).inverse() * result.T_target_source)});
+    }
+    return match;
+  }
+
+  std::vector<std::size_t> Nearest(std::vector<std::size_t> nodes,
+                                   const Pose& T_map_scan,
+                                   std::size_t count) const {
+    const auto distance = [&](std::size_t i) {
+      return (pose(i).translation() - T_map_scan.translation()).squaredNorm();
+    };
+    std::stable_sort(nodes.begin(), nodes.end(), [&](std::size_t a, std::size_t b) {
+      return distance(a) < distance(b);
+    });
+    nodes.resize(std::min(nodes.size(), count));
+    return nodes;
+  }
+
+  // nullptr: damaged.
+  absl::StatusOr<std::shared_ptr<const ScanFeatures>> FeaturesOf(std::size_t node) {
+    absl::StatusOr<std::shared_ptr<const ScanFeatures>> features = source_.Features(node);
+    if (absl::IsDataLoss(features.status())) return std::shared_ptr<const ScanFeatures>();
+    return features;
+  }
+
+  PoseGraphProblem Graph(const AlignmentRound& round) const {
+    PoseGraphProblem graph;
+    graph.T_map_scan = result_.T_map_scan;
+    graph.fixed = problem_.fixed;
+    graph.priors = problem_.priors;
+    graph.relative = problem_.relative;
+    graph.relative.reserve(graph.relative.size() + kMaxPartners * round.matches);
+    std::vector<bool> known(matches_.size(), false);
+    std::vector<Matrix6d> information(matches_.size(), Matrix6d::Zero());
+    for (std::size_t node = 0; node < matches_.size(); ++node) {
+      for (const Match& match : matches_[node]) {
+        for (const auto& [i, T_i_scan] : match.T_i_scan) {
+          graph.relative.push_back({i,
+                                    node,
+                                    T_i_scan,
+                                    match.information / static_cast<double>(match.T_i_scan.size()),
+                                    match.stretch.may_be_false});
+        }
+        if (!match.good || match.stretch.may_be_false) continue;
+        known[node] = true;
+        information[node] += match.information;
+      }
+      if (!MeasuredHolds(node)) continue;
+      for (const ScanPair* pair : measured_[node]) {
+        const Matrix6d loosened = LoosenedInformation(
+            pair->measured->information,
+            IsotropicInformation(options_.registration_sigma_rad, options_.registration_sigma_m));
+        graph.relative.push_back(
+            {pair->i, node, pair->measured->T_i_j, loosened, pair->may_be_false});
+        information[node] += loosened;
+      }
+      known[node] = true;
+    }
+    for (const ScanPair& pair : problem_.pairs) {
+      if (known[pair.j] || pair.may_be_false) continue;
+      graph.relative.push_back(
+          {pair.i,
+           pair.j,
+           Normalized(problem_.T_map_scan[pair.i].inverse() * problem_.T_map_scan[pair.j]),
+           IsotropicInformation(pair.sigma_rad, pair.sigma_m)});
+    }
+    AddOdometry(known, information, graph);
+    return graph;
+  }
+
+  // What robots say of their motion: as good as it has proved to be, or where that is not known in
+  // the directions that registration leaves loose.
+  void AddOdometry(const std::vector<bool>& known,
+                   const std::vector<Matrix6d>& information,
+                   PoseGraphProblem& graph) const {
+    for (const std::vector<std::size_t>& trajectory : problem_.trajectories) {
+      const std::optional<OdometryNoise> noise = NoiseOf(trajectory);
+      for (const std::size_t node : trajectory) {
+        if (odometry_[node] == nullptr || !known[node]) continue;
+        RelativePoseTerm term = *odometry_[node];
+        term.information = noise.has_value()
+                               ? IsotropicInformation(noise->sigma_rad, noise->sigma_m)
+                               : WhereLess(information[node], term.information, kLooseShare);
+        if (!term.information.isZero()) graph.relative.push_back(std::move(term));
+      }
+    }
+  }
+
+  std::optional<OdometryNoise> NoiseOf(const std::vector<std::size_t>& trajectory) const {
+    std::vector<std::optional<Pose>> errors;
+    for (const std::size_t node : trajectory) {
+      if (odometry_[node] == nullptr) continue;
+      const std::optional<Pose> T_i_j = MeasuredMotion(odometry_[node]->i, node);
+      errors.push_back(std::nullopt);
+      if (T_i_j.has_value()) errors.back() = odometry_[node]->T_i_j.inverse() * *T_i_j;
+    }
+    return EstimateOdometryNoise(errors);
+  }
+
+  // From scan i to scan j, as registration has it.
+  std::optional<Pose> MeasuredMotion(std::size_t i, std::size_t j) const {
+    if (MeasuredHolds(j)) {
+      for (const ScanPair* pair : measured_[j]) {
+        if (pair->i == i) return pair->measured->T_i_j;
+      }
+    }
+    for (const Match& match : matches_[j]) {
+      if (match.stretch.may_be_false) continue;
+      for (const auto& [partner, T_i_scan] : match.T_i_scan) {
+        if (partner == i) return T_i_scan;
+      }
+    }
+    return std::nullopt;
+  }
+
+  absl::Status AddPlanes(PoseGraphProblem& graph, AlignmentRound& round) {
+    shared_.clear();
+    if (!options_.planes) return absl::OkStatus();
+    std::vector<std::shared_ptr<const ScanPlanes>> held(graph.T_map_scan.size());
+    STRATA_RETURN_IF_ERROR(for_each_(held.size(), [&](std::size_t k) -> absl::Status {
+      absl::StatusOr<std::shared_ptr<const ScanPlanes>> planes = source_.Planes(k);
+      if (absl::IsDataLoss(planes.status())) {
+        held[k] = std::make_shared<const ScanPlanes>();
+        return absl::OkStatus();
+      }
+      STRATA_RETURN_IF_ERROR(planes.status());
+      held[k] = *std::move(planes);
+      return absl::OkStatus();
+    }));
+    std::vector<PosedPlanes> posed;
+    for (std::size_t k = 0; k < held.size(); ++k) posed.push_back({held[k].get(), pose(k)});
+    shared_ = FindSharedPlanes(posed, options_.shared_planes);
+    std::erase_if(shared_, [this](const SharedPlane& plane) {
+      return std::any_of(
+          problem_.excluded_planes.begin(),
+          problem_.excluded_planes.end(),
+          [&](const ExcludedPlane& excluded) { return IsExcluded(plane, excluded); });
+    });
+    for (const SharedPlane& plane : shared_) {
+      PlaneTerm term;
+      term.plane_map = plane.plane;
+      // Ground that bends agrees with itself from nearby scans and would tilt them all: a plane
+      // counts as much as its views agree (weights as of Geman and McClure), and more from round to
+      // round if it was the poses.
+      const double disagreement = std::max(1.0, Disagreement(plane, result_.T_map_scan));
+      const double weight = 1.0 / (disagreement * disagreement);
+      for (const SharedPlane::View& view : plane.views) {
+        term.views.push_back({view.scan, weight * view.moments});
+        ++round.supports;
+      }
+      graph.planes.push_back(std::move(term));
+    }
+    round.planes = shared_.size();
+    return absl::OkStatus();
+  }
+
+  void Keep(const PoseGraphProblem& graph, PoseGraphSolution solution) {
+    result_.T_map_scan = std::move(solution.T_map_scan);
+    result_.measured.clear();
+    result_.rejected.clear();
+    std::vector<bool> rejected(graph.relative.size(), false);
+    const std::size_t given = problem_.relative.size();
+    for (const auto& [k, chi2] : solution.summary.rejected_relative) {
+      rejected[k] = true;
+      result_.rejected.push_back({graph.relative[k], chi2, k < given});
+    }
+    for (std::size_t k = given; k < graph.relative.size(); ++k) {
+      if (!rejected[k]) result_.measured.push_back(graph.relative[k]);
+    }
+    for (std::size_t p = 0; p < shared_.size(); ++p) shared_[p].plane = solution.planes[p];
+    result_.planes = shared_;
+    result_.worst_nodes = std::move(solution.summary.worst_nodes);
+  }
+
+  const AlignmentProblem& problem_;
+  AlignmentSource& source_;
+  const AlignmentOptions& options_;
+  const ForEach for_each_;
+  const Stop& stop_;
+  const Stretches stretches_;
+  std::vector<std::vector<Match>> matches_;             // of every node
+  std::vector<std::vector<const ScanPair*>> measured_;  // of every node j
+  std::vector<const RelativePoseTerm*> odometry_;       // of every node j; nullptr: none
+  std::vector<SharedPlane> shared_;
+  AlignmentResult result_;
+};
+
+absl::Status CheckProblem(const AlignmentProblem& problem) {
+  const std::size_t nodes = problem.T_map_scan.size();
+  for (const Pose& T_map_scan : problem.T_map_scan) {
+    STRATA_RETURN_IF_ERROR(ValidatePose(T_map_scan));
+  }
+  for (const ScanPair& pair : problem.pairs) {
+    if (pair.i >= nodes || pair.j >= nodes || pair.i == pair.j) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "pair of scans ", pair.i, " and ", pair.j, ": not two different ones of ", nodes));
+    }
+  }
+  for (const RelativePoseTerm& motion : problem.odometry) {
+    if (motion.i >= nodes || motion.j >= nodes || motion.i == motion.j) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "odometry from ", motion.i, " to ", motion.j, ": not two different ones of ", nodes));
+    }
+  }
+  std::vector<int> seen(nodes, 0);
+  for (const std::vector<std::size_t>& trajectory : problem.trajectories) {
+    for (const std::size_t node : trajectory) {
+      if (node >= nodes || ++seen[node] > 1) {
+        return absl::InvalidArgumentError(
+            absl::StrCat("trajectories: node ", node, " is none or there twice"));
+      }
+    }
+  }
+  if (std::find(seen.begin(), seen.end(), 0) != seen.end()) {
+    return absl::InvalidArgumentError("trajectories: a node is in none");
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status ForEachInTurn(std::size_t count, absl::FunctionRef<absl::Status(std::size_t)> body) {
+  for (std::size_t k = 0; k < count; ++k) STRATA_RETURN_IF_ERROR(body(k));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<AlignmentResult> AlignScans(const AlignmentProblem& problem,
+                                           AlignmentSource& source,
+                                           const AlignmentOptions& options,
+                                           ForEach for_each,
+                                           AlignmentProgress progress,
+                                           const Stop& stop) {
+  STRATA_RETURN_IF_ERROR(CheckProblem(problem));
+  return Alignment(problem, source, options, for_each, stop).Run(progress);
+}
+
+}  // namespace strata

@@ -1,0 +1,78 @@
+#include "core/posegraph/alignment/stretches.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/registration/neighbours.h"
+
+namespace strata {
+namespace {
+
+// Scans farther apart than this in the order of their trajectory are of different passes.
+constexpr std::size_t kSamePass = 5;
+// Of another pass, scans higher or lower than this are on another storey, which may look the same.
+constexpr double kSameStoreyM = 1.5;
+// A robot that comes back to a place later than this is on another pass.
+constexpr std::size_t kOwnPass = 30;
+
+}  // namespace
+
+Stretches::Stretches(const AlignmentProblem& problem, const NeighbourPolicy& policy)
+    : policy_(policy) {
+  ++policy_.max_scans;  // a scan is its own nearest
+  const std::size_t nodes = problem.T_map_scan.size();
+  way_.resize(nodes);
+  partners_.resize(nodes);
+  for (std::size_t t = 0; t < problem.trajectories.size(); ++t) {
+    for (std::size_t k = 0; k < problem.trajectories[t].size(); ++k) {
+      way_[problem.trajectories[t][k]] = {t, k};
+    }
+  }
+  for (const ScanPair& pair : problem.pairs) {
+    if (pair.measured.has_value()) continue;  // that says it all
+    partners_[pair.i].push_back({pair.j, pair.may_be_false});
+    partners_[pair.j].push_back({pair.i, pair.may_be_false});
+  }
+  for (const auto& [i, j] : problem.excluded_pairs) excluded_.insert(std::minmax(i, j));
+}
+
+bool Stretches::OwnPass(std::size_t node, std::size_t other) const {
+  const auto [trajectory, place] = way_[node];
+  const auto [other_trajectory, other_place] = way_[other];
+  return trajectory == other_trajectory &&
+         std::max(place, other_place) - std::min(place, other_place) <= kOwnPass;
+}
+
+std::vector<Stretch> Stretches::Around(std::size_t node, std::span<const Pose> T_map_scan) const {
+  // By trajectory and place, with whether more than nearness speaks for it.
+  std::vector<std::pair<std::pair<std::size_t, std::size_t>, std::pair<std::size_t, bool>>> around;
+  const auto add = [&](std::size_t other, bool known) {
+    if (other == node || excluded_.contains(std::minmax(node, other))) return;
+    if (OwnPass(node, other) && way_[other].second > way_[node].second) return;
+    around.push_back({way_[other], {other, known}});
+  };
+  for (const std::size_t other : SelectNeighbours(T_map_scan, T_map_scan[node], policy_)) {
+    const double rise_m =
+        std::abs(T_map_scan[other].translation().z() - T_map_scan[node].translation().z());
+    if (OwnPass(node, other) || rise_m <= kSameStoreyM) add(other, false);
+  }
+  for (const Partner& partner : partners_[node]) add(partner.node, !partner.may_be_false);
+  std::sort(around.begin(), around.end());
+  std::vector<Stretch> stretches;
+  std::pair<std::size_t, std::size_t> last;
+  for (const auto& [way, other] : around) {
+    const bool same_pass =
+        !stretches.empty() && way.first == last.first && way.second - last.second <= kSamePass;
+    if (!same_pass) stretches.push_back({{}, false, true});
+    Stretch& stretch = stretches.back();
+    stretch.own = stretch.own || OwnPass(node, other.first);
+    if (stretch.own || other.second) stretch.may_be_false = false;
+    if (stretch.nodes.empty() || stretch.nodes.back() != other.first) {
+      stretch.nodes.push_back(other.first);
+    }
+    last = way;
+  }
+  return stretches;
+}
+
+}  // namespace strata

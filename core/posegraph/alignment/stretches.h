@@ -1,0 +1,49 @@
+// What a scan is registered to: the stretches of way around it (thesis 7.3.4, pooled local maps).
+#ifndef STRATA_CORE_POSEGRAPH_ALIGNMENT_STRETCHES_H_
+#define STRATA_CORE_POSEGRAPH_ALIGNMENT_STRETCHES_H_
+
+#include <cstddef>
+#include <set>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/geometry/pose.h"
+#include "core/posegraph/alignment/alignment.h"
+
+namespace strata {
+
+// Scans that follow each other on a trajectory, near to some scan.
+struct Stretch {
+  std::vector<std::size_t> nodes;  // in the order of the way, at least one
+  bool own = false;                // the scan's own way, up to it
+  bool may_be_false = false;       // only nearness says that it overlaps with the scan
+};
+
+// Chooses for every scan of a problem. Immutable; must not outlive the problem.
+class Stretches {
+ public:
+  Stretches(const AlignmentProblem& problem, const NeighbourPolicy& policy);
+
+  // Around `node` at these poses: of the scans near by and of those that the problem pairs it with,
+  // one stretch for every pass of a robot. Of its own pass only what is behind it, or nothing that
+  // was measured about it would be independent of where it is.
+  std::vector<Stretch> Around(std::size_t node, std::span<const Pose> T_map_scan) const;
+
+ private:
+  bool OwnPass(std::size_t node, std::size_t other) const;
+
+  struct Partner {
+    std::size_t node = 0;
+    bool may_be_false = false;
+  };
+
+  NeighbourPolicy policy_;
+  std::vector<std::pair<std::size_t, std::size_t>> way_;  // of every node: trajectory, place in it
+  std::vector<std::vector<Partner>> partners_;            // of every node, by the problem's pairs
+  std::set<std::pair<std::size_t, std::size_t>> excluded_;  // smaller node first
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_POSEGRAPH_ALIGNMENT_STRETCHES_H_

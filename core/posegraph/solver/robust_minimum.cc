@@ -1,0 +1,92 @@
+#include "core/posegraph/solver/robust_minimum.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "absl/status/statusor.h"
+
+#include "core/common/status.h"
+
+namespace strata {
+namespace {
+
+constexpr double kControlFactor = 1.4;  // the paper's
+// Solved roughly along the way: the next member moves the minimum on.
+constexpr ConvergenceOptions kAlongTheWay = {
+    .max_iterations = 4, .cost_tolerance = 1e-3, .step_tolerance = 1e-6};
+
+double WorstChi2(const Suspects& suspects) {
+  double worst = 0.0;
+  for (std::size_t k = 0; k < suspects.size(); ++k) worst = std::max(worst, suspects.Chi2(k));
+  return worst;
+}
+
+void SetAll(Suspects& suspects, double weight) {
+  for (std::size_t k = 0; k < suspects.size(); ++k) suspects.Weight(k) = weight;
+}
+
+// True if every weight is 0 or 1.
+bool SetWeights(Suspects& suspects, double max_chi2, double control) {
+  bool decided = true;
+  for (std::size_t k = 0; k < suspects.size(); ++k) {
+    double& weight = suspects.Weight(k);
+    weight = TruncatedWeight(suspects.Chi2(k), max_chi2, control);
+    decided = decided && (weight == 0.0 || weight == 1.0);
+  }
+  return decided;
+}
+
+// True if a term that counts is above the bound: it counts no longer.
+bool RejectMore(Suspects& suspects, double max_chi2) {
+  bool more = false;
+  for (std::size_t k = 0; k < suspects.size(); ++k) {
+    if (suspects.Weight(k) == 0.0 || suspects.Chi2(k) <= max_chi2) continue;
+    suspects.Weight(k) = 0.0;
+    more = true;
+  }
+  return more;
+}
+
+}  // namespace
+
+double TruncatedWeight(double chi2, double max_chi2, double control) {
+  if (chi2 >= (control + 1.0) / control * max_chi2) return 0.0;
+  if (chi2 <= control / (control + 1.0) * max_chi2) return 1.0;
+  return std::clamp(std::sqrt(max_chi2 / chi2 * control * (control + 1.0)) - control, 0.0, 1.0);
+}
+
+absl::StatusOr<Minimum> MinimiseRobustly(LeastSquares& squares,
+                                         Suspects& suspects,
+                                         double max_chi2,
+                                         const ConvergenceOptions& convergence,
+                                         BlockCholesky& H,
+                                         const Stop& stop) {
+  int iterations = 0;
+  const auto go_down = [&](const ConvergenceOptions& options) -> absl::StatusOr<Minimum> {
+    STRATA_ASSIGN_OR_RETURN(Minimum minimum, Minimise(squares, H, options, stop));
+    iterations += minimum.iterations;
+    minimum.iterations = iterations;
+    return minimum;
+  };
+  if (suspects.size() == 0 || std::isinf(max_chi2)) return go_down(convergence);
+
+  // Not from the minimum of all terms, as in the paper: strong false ones fold the graph.
+  SetAll(suspects, 0.0);
+  STRATA_RETURN_IF_ERROR(go_down(kAlongTheWay).status());
+  SetAll(suspects, 1.0);
+  const double worst = WorstChi2(suspects);
+  if (worst > max_chi2) {
+    double control = max_chi2 / (2.0 * worst - max_chi2);
+    while (!SetWeights(suspects, max_chi2, control)) {
+      STRATA_RETURN_IF_ERROR(go_down(kAlongTheWay).status());
+      control *= kControlFactor;
+    }
+  }
+  while (true) {
+    STRATA_ASSIGN_OR_RETURN(const Minimum minimum, go_down(convergence));
+    if (!RejectMore(suspects, max_chi2)) return minimum;
+  }
+}
+
+}  // namespace strata

@@ -1,0 +1,41 @@
+// Which terms that may be false are, and the minimum without them.
+// Internal to core/posegraph, not installed.
+#ifndef STRATA_CORE_POSEGRAPH_SOLVER_ROBUST_MINIMUM_H_
+#define STRATA_CORE_POSEGRAPH_SOLVER_ROBUST_MINIMUM_H_
+
+#include <cstddef>
+
+#include "absl/status/statusor.h"
+
+#include "core/common/stop.h"
+#include "core/posegraph/solver/block_cholesky.h"
+#include "core/posegraph/solver/levenberg_marquardt.h"
+
+namespace strata {
+
+// The terms that may be false of a sum of squares.
+class Suspects {
+ public:
+  virtual ~Suspects() = default;
+  virtual std::size_t size() const = 0;
+  virtual double Chi2(std::size_t k) const = 0;  // in the current state, without its weight
+  virtual double& Weight(std::size_t k) = 0;
+};
+
+// Graduated non-convexity (Yang, Antonante, Tzoumas, Carlone 2020) for truncated least squares: a
+// suspect counts min(χ², max_chi2), reached through a family of costs that begins convex. Leaves
+// the weights at 0 or 1; a suspect whose χ² at the minimum is above the bound has 0.
+absl::StatusOr<Minimum> MinimiseRobustly(LeastSquares& squares,
+                                         Suspects& suspects,
+                                         double max_chi2,
+                                         const ConvergenceOptions& convergence,
+                                         BlockCholesky& H,
+                                         const Stop& stop);
+
+// The weight of a term of χ² `chi2` in the family's member `control`: near 0 the convex cost,
+// towards infinity the truncated one (eq. 14 there).
+double TruncatedWeight(double chi2, double max_chi2, double control);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_POSEGRAPH_SOLVER_ROBUST_MINIMUM_H_

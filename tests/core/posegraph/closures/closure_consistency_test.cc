@@ -1,0 +1,147 @@
+#include "core/posegraph/closures/closure_consistency.h"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/status_matchers.h"
+
+namespace strata {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::StatusIs;
+
+Pose Step(double yaw, double x, double y, double z) {
+  Vector6d step;
+  step << 0.0, 0.0, yaw, x, y, z;
+  return Retract(Pose::Identity(), step);
+}
+
+// Two robots drive the same winding street; each knows only its own odometry, which drifts, and has
+// its own origin.
+class TwoRobots {
+ public:
+  static constexpr std::size_t kScans = 60;
+
+  explicit TwoRobots(std::uint64_t seed) : random_(seed) {
+    Pose T = Pose::Identity();
+    for (std::size_t i = 0; i < kScans; ++i) {
+      truth_.push_back(T);
+      T = T * Step(0.08 * std::sin(0.2 * static_cast<double>(i)), 2.0, 0.0, 0.0);
+    }
+    for (std::size_t i = 0; i < kScans; ++i) truth_.push_back(truth_[i] * Step(0.3, 0.5, 1.0, 0.0));
+    const Matrix6d information = Sigmas(0.003, 0.03).cwiseAbs2().cwiseInverse().asDiagonal();
+    for (const std::size_t first : {std::size_t{0}, kScans}) {
+      poses.push_back(first == 0 ? Pose::Identity() : Step(2.0, 300.0, -50.0, 7.0));
+      for (std::size_t i = first + 1; i < first + kScans; ++i) {
+        poses.push_back(poses.back() *
+                        Noisy(truth_[i - 1].inverse() * truth_[i], Sigmas(0.003, 0.03)));
+        edges.push_back({i - 1, i, information});
+      }
+    }
+  }
+
+  Closure True(std::size_t i, std::size_t j) {
+    return {i, j, Noisy(truth_[i].inverse() * truth_[j], Sigmas(0.003, 0.02)), 0.1, 0.01};
+  }
+  Closure False(std::size_t i, std::size_t j) {
+    std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+    return {i,
+            j,
+            Step(3.0 * uniform(random_), 8 * uniform(random_), 8 * uniform(random_), 0.0),
+            0.1,
+            0.01};
+  }
+
+  std::vector<Pose> poses;
+  std::vector<GraphEdge> edges;
+
+ private:
+  static Vector6d Sigmas(double rad, double m) {
+    Vector6d sigmas;
+    sigmas << rad, rad, rad, m, m, m;
+    return sigmas;
+  }
+  Pose Noisy(const Pose& T, const Vector6d& sigmas) {
+    std::normal_distribution<double> normal;
+    Vector6d step;
+    for (int k = 0; k < 6; ++k) step[k] = sigmas[k] * normal(random_);
+    return Retract(T, step);
+  }
+
+  std::mt19937_64 random_;
+  std::vector<Pose> truth_;
+};
+
+TEST(ClosureConsistencyTest, TheTrueOnesAgreeAndTheFalseOnesDoNot) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    TwoRobots robots(seed);
+    std::vector<Closure> closures;
+    for (std::size_t k = 0; k < 8; ++k) {
+      closures.push_back(robots.True(7 * k, TwoRobots::kScans + 7 * k + 2));
+      closures.push_back(robots.False(6 * k + 3, TwoRobots::kScans + 50 - 5 * k));
+    }
+    closures.push_back({TwoRobots::kScans + 30,
+                        29,  // the other way round
+                        robots.True(TwoRobots::kScans + 30, 29).T_i_j,
+                        0.1,
+                        0.01});
+    STRATA_ASSERT_OK_AND_ASSIGN(const ConsistentClosureSet set,
+                                ConsistentClosures(robots.poses, robots.edges, closures));
+    EXPECT_THAT(set.kept, ElementsAre(0, 2, 4, 6, 8, 10, 12, 14, 16)) << "seed " << seed;
+    EXPECT_GE(set.support[0], 7);
+    EXPECT_LE(set.support[1], 3);
+  }
+}
+
+TEST(ClosureConsistencyTest, OneAloneBetweenTwoRobotsIsNotBelieved) {
+  TwoRobots robots(1);
+  const std::vector<Closure> one = {robots.True(5, TwoRobots::kScans + 5)};
+  STRATA_ASSERT_OK_AND_ASSIGN(ConsistentClosureSet set,
+                              ConsistentClosures(robots.poses, robots.edges, one));
+  EXPECT_THAT(set.kept, IsEmpty());
+  ClosureConsistencyOptions trusting;
+  trusting.min_between_parts = 1;
+  STRATA_ASSERT_OK_AND_ASSIGN(set, ConsistentClosures(robots.poses, robots.edges, one, trusting));
+  EXPECT_THAT(set.kept, ElementsAre(0));
+}
+
+TEST(ClosureConsistencyTest, WithinOneTrajectoryTheGraphItselfIsAsked) {
+  TwoRobots robots(1);
+  Closure fits = robots.True(0, 40);
+  Closure contradicts = fits;
+  contradicts.T_i_j.translation().z() += 30.0;
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const ConsistentClosureSet set,
+      ConsistentClosures(robots.poses, robots.edges, std::vector<Closure>{contradicts, fits}));
+  EXPECT_THAT(set.kept, ElementsAre(1));
+}
+
+TEST(ClosureConsistencyTest, RefusesNonsense) {
+  TwoRobots robots(1);
+  Closure closure = robots.True(0, 70);
+  closure.sigma_m = 0.0;
+  const auto check = [&] {
+    return ConsistentClosures(robots.poses, robots.edges, std::vector<Closure>{closure}).status();
+  };
+  EXPECT_THAT(check(), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("sigma_m 0")));
+  closure = robots.True(0, 70);
+  closure.j = 500;
+  EXPECT_THAT(check(), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("closure 0 joins")));
+  closure = robots.True(0, 70);
+  closure.T_i_j.translation().x() = std::numeric_limits<double>::infinity();
+  EXPECT_THAT(check(), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("closure 0")));
+  EXPECT_THAT(ConsistentClosures({}, {}, {})->kept, IsEmpty());
+}
+
+}  // namespace
+}  // namespace strata
