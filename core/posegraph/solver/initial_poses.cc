@@ -4,20 +4,20 @@
 #include <cmath>
 #include <cstddef>
 #include <numeric>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
 
-#include "core/posegraph/solver/block_cholesky.h"
 #include "core/posegraph/solver/gauge.h"
 
 namespace strata {
 namespace {
 
-constexpr std::size_t kHeld = static_cast<std::size_t>(-1);
+constexpr Eigen::Index kHeld = -1;
 // Keeps the linear problems definite where informations are zero.
 constexpr double kRidge = 1e-12;
 
@@ -144,16 +144,9 @@ class LinearLinks {
   using Block = Eigen::Matrix<double, dim, dim>;
   using Rows = Eigen::Matrix<double, dim, Eigen::Dynamic>;
 
-  LinearLinks(const Graph<dim>& graph, Eigen::Index columns) : columns_(columns) {
+  LinearLinks(const Graph<dim>& graph, Eigen::Index columns) {
     for (const bool held : graph.held) block_of_node_.push_back(held ? kHeld : blocks_++);
-    std::vector<std::pair<std::size_t, std::size_t>> pattern;
-    for (const Link<dim>& link : graph.links) {
-      const std::size_t i = block_of_node_[link.i];
-      const std::size_t j = block_of_node_[link.j];
-      if (i != kHeld && j != kHeld) pattern.emplace_back(i, j);
-    }
-    H_.emplace_back(dim, blocks_, pattern);
-    right_ = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(blocks_) * dim, columns);
+    right_ = Eigen::MatrixXd::Zero(blocks_ * dim, columns);
   }
 
   // `known_i`, `known_j`: the values of held nodes.
@@ -163,8 +156,8 @@ class LinearLinks {
            const Block& W,
            const Rows& known_i,
            const Rows& known_j) {
-    const std::size_t i = block_of_node_[link.i];
-    const std::size_t j = block_of_node_[link.j];
+    const Eigen::Index i = block_of_node_[link.i];
+    const Eigen::Index j = block_of_node_[link.j];
     const Block WA = W * A;
     const Rows from_i = i == kHeld ? Rows(A * known_i + b) : b;
     if (j != kHeld) {
@@ -176,39 +169,45 @@ class LinearLinks {
       AddBlock(i, i, A.transpose() * WA);
       Right(i) += WA.transpose() * target;
     }
-    if (i != kHeld && j != kHeld) AddBlock(j, i, -WA);
+    if (i != kHeld && j != kHeld) {
+      if (i < j) {
+        AddBlock(j, i, -WA);
+      } else {
+        AddBlock(i, j, -WA.transpose());
+      }
+    }
   }
 
   // The values of the free nodes; false if there are none or the numbers are too bad.
   bool Solve() {
     if (blocks_ == 0) return false;
-    const Eigen::VectorXd diagonal = H_[0].Diagonal();
-    const double ridge = std::max(kRidge * diagonal.maxCoeff(), 1e-300);
-    if (!H_[0].Factor(Eigen::VectorXd::Constant(diagonal.size(), ridge))) return false;
-    for (Eigen::Index c = 0; c < columns_; ++c) right_.col(c) = H_[0].Solve(right_.col(c));
+    Eigen::SparseMatrix<double> H(right_.rows(), right_.rows());
+    H.setFromTriplets(lower_.begin(), lower_.end());
+    const double ridge = std::max(kRidge * H.diagonal().maxCoeff(), 1e-300);
+    Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> ldlt;
+    ldlt.setShift(ridge);
+    ldlt.compute(H);
+    if (ldlt.info() != Eigen::Success) return false;
+    right_ = ldlt.solve(right_).eval();
     return right_.allFinite();
   }
   bool IsFree(std::size_t node) const { return block_of_node_[node] != kHeld; }
   Rows Value(std::size_t node) { return Right(block_of_node_[node]); }
 
  private:
-  auto Right(std::size_t block) {
-    return right_.middleRows<dim>(static_cast<Eigen::Index>(block) * dim);
-  }
-  void AddBlock(std::size_t i, std::size_t j, const Block& block) {
-    const BlockSlot slot = H_[0].Slot(i, j);
-    Eigen::Map<Block> values(H_[0].values().data() + slot.offset);
-    if (slot.transposed) {
-      values += block.transpose();
-    } else {
-      values += block;
+  auto Right(Eigen::Index block) { return right_.template middleRows<dim>(block * dim); }
+  // Of the lower triangle: i ≥ j.
+  void AddBlock(Eigen::Index i, Eigen::Index j, const Block& block) {
+    for (int column = 0; column < dim; ++column) {
+      for (int row = i == j ? column : 0; row < dim; ++row) {
+        lower_.emplace_back(i * dim + row, j * dim + column, block(row, column));
+      }
     }
   }
 
-  Eigen::Index columns_;
-  std::vector<std::size_t> block_of_node_;
-  std::size_t blocks_ = 0;
-  std::vector<BlockCholesky> H_;  // one
+  std::vector<Eigen::Index> block_of_node_;
+  Eigen::Index blocks_ = 0;
+  std::vector<Eigen::Triplet<double>> lower_;
   Eigen::MatrixXd right_;
 };
 
