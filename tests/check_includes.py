@@ -58,7 +58,7 @@ MOST_FILES = 40
 # external header pattern: rooms that may include it
 EXTERNAL = {
     r"sqlite3\.h": ["core/storage/sqlite"],
-    r"ceres/.*": ["core/posegraph"],
+    r"ceres/.*": ["core/posegraph/costs", "core/posegraph/solver"],
     r"(grpc|grpcpp)/.*|google/protobuf/.*|.*\.pb\.h": ["proto", "server", "client/sdk"],
     r"openssl/.*": ["server"],
     r"prometheus/.*": ["server/metrics"],

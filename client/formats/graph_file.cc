@@ -22,6 +22,7 @@
 #include "client/formats/text_cursor.h"
 #include "core/common/status.h"
 #include "core/geometry/euler.h"
+#include "core/posegraph/information.h"
 #include "core/posegraph/semidefinite.h"
 
 namespace strata {

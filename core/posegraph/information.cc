@@ -4,6 +4,17 @@
 #include <Eigen/Eigenvalues>
 
 namespace strata {
+namespace {
+
+// diag(½, ½, ½, 1, 1, 1) P: from [translation, vec q] to [rotation, translation].
+Matrix6d FromG2oErrors() {
+  Matrix6d A = Matrix6d::Zero();
+  A.topRightCorner<3, 3>() = 0.5 * Eigen::Matrix3d::Identity();
+  A.bottomLeftCorner<3, 3>().setIdentity();
+  return A;
+}
+
+}  // namespace
 
 Matrix6d IsotropicInformation(double sigma_rad, double sigma_m) {
   Vector6d information;
@@ -28,6 +39,16 @@ Matrix6d WhereLess(const Matrix6d& information, const Matrix6d& other, double sh
     where += u * u.transpose();
   }
   return where;
+}
+
+Matrix6d InformationFromG2o(const Matrix6d& information) {
+  const Matrix6d A = FromG2oErrors();
+  return A * information * A.transpose();
+}
+
+Matrix6d InformationToG2o(const Matrix6d& information) {
+  const Matrix6d A = FromG2oErrors().inverse();
+  return A * information * A.transpose();
 }
 
 }  // namespace strata

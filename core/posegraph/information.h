@@ -17,6 +17,12 @@ Matrix6d LoosenedInformation(const Matrix6d& information, const Matrix6d& extra)
 // zero if there is none. `information` may be singular, `other` not.
 Matrix6d WhereLess(const Matrix6d& information, const Matrix6d& other, double share);
 
+// The information [rotation, translation] of a right-hand step on T_i_j from that of g2o's
+// EDGE_SE3:QUAT, [translation, vec q].
+Matrix6d InformationFromG2o(const Matrix6d& information);
+// Its inverse.
+Matrix6d InformationToG2o(const Matrix6d& information);
+
 }  // namespace strata
 
 #endif  // STRATA_CORE_POSEGRAPH_INFORMATION_H_

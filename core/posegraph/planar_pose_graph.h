@@ -6,10 +6,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "absl/status/statusor.h"
 #include <Eigen/Core>
 
-#include "core/common/stop.h"
 #include "core/posegraph/convergence.h"
 
 namespace strata {
@@ -45,14 +43,6 @@ struct PlanarSolution {
   PoseGraphTermination termination = PoseGraphTermination::kConverged;
   std::vector<std::size_t> rejected;  // terms, ascending
 };
-
-// As OptimizePoseGraph().
-absl::StatusOr<PlanarSolution> OptimizePlanarPoseGraph(const PlanarPoseGraph& graph,
-                                                       const PlanarOptions& options = {},
-                                                       const Stop& stop = Stop());
-
-// Σ eᵀΩe. REQUIRES: a valid graph.
-double Chi2(const PlanarPoseGraph& graph);
 
 }  // namespace strata
 

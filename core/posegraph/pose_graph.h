@@ -17,10 +17,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "absl/status/statusor.h"
 #include <Eigen/Core>
 
-#include "core/common/stop.h"
 #include "core/geometry/pose.h"
 #include "core/geometry/primitives.h"
 #include "core/posegraph/convergence.h"
@@ -133,26 +131,6 @@ struct PoseGraphSolution {
   std::vector<Plane> planes;  // of each PlaneTerm, its normal on the side it was given
   PoseGraphSummary summary;
 };
-
-// Levenberg–Marquardt with analytic derivatives on SE(3) and on planes (3 parameters each), sparse
-// Cholesky. A component of the graph in which nothing is fixed and that has no prior is held at its
-// first node. What no term determines moves as little as possible. Deterministic, one thread.
-// INVALID_ARGUMENT naming the term, the field and the bound for indices out of range, i = j,
-// numbers that are not finite, matrices that are not symmetric and positive semidefinite (to 1e-9
-// of their largest entry), options out of range; CANCELLED or DEADLINE_EXCEEDED by `stop`, asked
-// before each iteration.
-absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& problem,
-                                                    const PoseGraphOptions& options = {},
-                                                    const Stop& stop = Stop());
-
-// Σ eᵀΩe of the relative poses where they are. REQUIRES: a valid problem.
-double Chi2(const PoseGraphProblem& problem);
-
-// The information [rotation, translation] of a right-hand step on T_i_j from that of g2o's
-// EDGE_SE3:QUAT, [translation, vec q].
-Matrix6d InformationFromG2o(const Matrix6d& information);
-// Its inverse.
-Matrix6d InformationToG2o(const Matrix6d& information);
 
 }  // namespace strata
 

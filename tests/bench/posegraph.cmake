@@ -1,4 +1,3 @@
-find_package(Ceres 2.1 REQUIRED)
 strata_executable(
   posegraph_benchmark posegraph_benchmark
   SOURCES posegraph_benchmark.cc posegraph_peer.cc

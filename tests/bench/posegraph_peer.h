@@ -1,10 +1,15 @@
-// Ceres with automatic differentiation, as its own pose_graph_3d example does it, with g2o's error.
+// A plain use of Ceres on a pose graph: automatic differentiation, g2o's error, one block a pose.
 #ifndef STRATA_TESTS_BENCH_POSEGRAPH_PEER_H_
 #define STRATA_TESTS_BENCH_POSEGRAPH_PEER_H_
 
+#include <cstddef>
 #include <memory>
+#include <utility>
+#include <vector>
 
-#include "core/geometry/pose.h"
+#include <ceres/cost_function.h>
+
+#include "core/posegraph/costs/pose_block.h"
 #include "core/posegraph/pose_graph.h"
 
 namespace strata::bench {
@@ -14,21 +19,22 @@ struct PeerSolution {
   int iterations = 0;
 };
 
-// Solves from the problem's poses with sparse Cholesky (SuiteSparse), one thread, the first node
-// fixed, until the cost falls by less than a share of 1e-7 (Strata's default).
+// Solves from the problem's poses with the options of core/posegraph/solver/minimise.cc, the first
+// node fixed, until the cost falls by less than a share of 1e-7 (Strata's default).
 PeerSolution SolveWithCeres(const PoseGraphProblem& problem);
 
-// Whitened residuals and their Jacobians of all relative poses, differentiated automatically.
-class PeerEdges {
+// Whitened residuals and Jacobians of all relative poses, as Ceres asks for them.
+class EdgeCosts {
  public:
-  explicit PeerEdges(const PoseGraphProblem& problem);
-  ~PeerEdges();
+  enum class Kind { kOurs, kAutomatic };
+  EdgeCosts(const PoseGraphProblem& problem, Kind kind);
   // Evaluates every edge; answers the sum of all numbers, so that nothing is left out.
   double Evaluate() const;
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  std::vector<PoseBlock> blocks_;
+  std::vector<std::unique_ptr<ceres::CostFunction>> costs_;
+  std::vector<std::pair<std::size_t, std::size_t>> ends_;
 };
 
 }  // namespace strata::bench

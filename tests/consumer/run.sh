@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs a build into a temporary prefix and builds and runs a stranger's program against it.
+# Installs a build into a temporary prefix and builds and runs a stranger's programs against it.
 #   tests/consumer/run.sh BUILD_DIR
 set -euo pipefail
 build=$(realpath "${1:?usage: tests/consumer/run.sh BUILD_DIR}")
@@ -11,4 +11,6 @@ cmake -S "$here" -B "$work/build" -G Ninja -DCMAKE_PREFIX_PATH="$work/prefix" -D
 cmake --build "$work/build"
 output=$("$work/build/consumer")
 [[ "$output" == "2 patches" ]] || { echo "consumer printed '$output', expected '2 patches'" >&2; exit 1; }
-echo "consumer: $output"
+metres=$("$work/build/graph")
+[[ "$metres" == "3.00 m" ]] || { echo "graph printed '$metres', expected '3.00 m'" >&2; exit 1; }
+echo "consumer: $output, $metres"

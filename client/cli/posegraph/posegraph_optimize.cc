@@ -18,6 +18,8 @@
 #include "core/posegraph/planar_pose_graph.h"
 #include "core/posegraph/pose_graph.h"
 #include "core/posegraph/solver/initial_poses.h"
+#include "core/posegraph/solver/optimize_planar_pose_graph.h"
+#include "core/posegraph/solver/optimize_pose_graph.h"
 
 namespace strata::cli {
 namespace {

@@ -15,6 +15,7 @@
 #include "core/posegraph/closures/closure_consistency.h"
 #include "core/posegraph/closures/pooling.h"
 #include "core/posegraph/information.h"
+#include "core/posegraph/solver/optimize_pose_graph.h"
 #include "core/registration/place_index.h"
 #include "core/registration/place_match.h"
 

@@ -12,6 +12,7 @@
 #include "core/posegraph/alignment/odometry_noise.h"
 #include "core/posegraph/alignment/stretches.h"
 #include "core/posegraph/information.h"
+#include "core/posegraph/solver/optimize_pose_graph.h"
 #include "core/registration/registration_target.h"
 
 namespace strata {

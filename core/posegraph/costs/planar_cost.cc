@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 
+#include "core/posegraph/costs/information_root.h"
+
 namespace strata {
 namespace {
 
@@ -13,6 +15,11 @@ Eigen::Matrix2d Turn(double angle_rad) {
   Eigen::Matrix2d R;
   R << c, -s, s, c;
   return R;
+}
+
+void WriteJacobian(const Eigen::Matrix3d& by_step, double* jacobian) {
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> out(jacobian);
+  out = by_step;
 }
 
 }  // namespace
@@ -46,6 +53,29 @@ PlanarDerivatives DifferentiatePlanar(const PlanarPose& i,
   result.by_j.topLeftCorner<2, 2>() = Turn(j.z() - i.z() - T_i_j.z());
   result.by_j(2, 2) = 1.0;
   return result;
+}
+
+PlanarRelativeCost::PlanarRelativeCost(const PlanarPose& T_i_j,
+                                       const Eigen::Matrix3d& information,
+                                       const double* weight)
+    : T_i_j_(T_i_j), root_(InformationRoot(information)), weight_(weight) {}
+
+bool PlanarRelativeCost::Evaluate(double const* const* blocks,
+                                  double* residuals,
+                                  double** jacobians) const {
+  const PlanarPose i(blocks[0]);
+  const PlanarPose j(blocks[1]);
+  const Eigen::Matrix3d root = std::sqrt(*weight_) * root_;
+  Eigen::Map<Eigen::Vector3d> weighted(residuals);
+  if (jacobians == nullptr) {
+    weighted = root * PlanarError(i, j, T_i_j_);
+    return weighted.allFinite();
+  }
+  const PlanarDerivatives d = DifferentiatePlanar(i, j, T_i_j_);
+  weighted = root * d.error;
+  if (jacobians[0] != nullptr) WriteJacobian(root * d.by_i, jacobians[0]);
+  if (jacobians[1] != nullptr) WriteJacobian(root * d.by_j, jacobians[1]);
+  return weighted.allFinite();
 }
 
 PlanarPose Moved(const PlanarPose& pose, const Eigen::Vector3d& step) {

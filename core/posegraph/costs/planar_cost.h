@@ -3,6 +3,7 @@
 #define STRATA_CORE_POSEGRAPH_COSTS_PLANAR_COST_H_
 
 #include <Eigen/Core>
+#include <ceres/sized_cost_function.h>
 
 #include "core/posegraph/planar_pose_graph.h"
 
@@ -20,6 +21,22 @@ struct PlanarDerivatives {
 PlanarDerivatives DifferentiatePlanar(const PlanarPose& i,
                                       const PlanarPose& j,
                                       const PlanarPose& T_i_j);
+
+// weight · eᵀΩe of two blocks (x, y, angle), with derivatives by steps: PlanarPoseManifold's
+// PlusJacobian() is the identity.
+class PlanarRelativeCost final : public ceres::SizedCostFunction<3, 3, 3> {
+ public:
+  // `weight` is read whenever this is evaluated.
+  PlanarRelativeCost(const PlanarPose& T_i_j,
+                     const Eigen::Matrix3d& information,
+                     const double* weight);
+  bool Evaluate(double const* const* blocks, double* residuals, double** jacobians) const override;
+
+ private:
+  const PlanarPose T_i_j_;
+  const Eigen::Matrix3d root_;
+  const double* const weight_;
+};
 
 // A step (x, y, angle) in the robot's own frame, along a circle: steps that turn all poses about
 // one centre turn them as one body.

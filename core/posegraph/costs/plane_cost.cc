@@ -6,6 +6,8 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
+#include "core/posegraph/costs/pose_block.h"
+
 namespace strata {
 namespace {
 
@@ -22,34 +24,22 @@ Eigen::Matrix<double, 3, 4> AboutCentre(const PlaneView& view,
 
 Eigen::Vector4d Distances(const Eigen::Matrix<double, 3, 4>& x,
                           double weight,
-                          const MovingPlane& plane) {
-  Eigen::Vector4d distances = x.transpose() * plane.normal();
-  distances[kMean] -= weight * plane.height();
+                          const double* plane_block) {
+  Eigen::Vector4d distances = x.transpose() * Eigen::Map<const Eigen::Vector3d>(plane_block);
+  distances[kMean] -= weight * plane_block[3];
   return distances;
 }
 
 }  // namespace
 
-MovingPlane::MovingPlane(const Plane& plane_map, const Eigen::Vector3d& centre)
-    : centre_(centre), height_(plane_map.distance - plane_map.normal.dot(centre)) {
-  SetNormal(plane_map.normal);
+PlaneBlock PlaneBlockOf(const Plane& plane_map, const Eigen::Vector3d& centre) {
+  const Eigen::Vector3d n = plane_map.normal.normalized();
+  return {n.x(), n.y(), n.z(), plane_map.distance - plane_map.normal.dot(centre)};
 }
 
-void MovingPlane::SetNormal(const Eigen::Vector3d& normal) {
-  normal_ = normal.normalized();
-  tangents_.col(0) = normal_.unitOrthogonal();
-  tangents_.col(1) = normal_.cross(tangents_.col(0));
-}
-
-MovingPlane MovingPlane::Retracted(const Eigen::Vector3d& step) const {
-  MovingPlane result = *this;
-  result.SetNormal(normal_ + tangents_ * step.head<2>());
-  result.height_ += step[2];
-  return result;
-}
-
-Plane MovingPlane::plane() const {
-  return Plane{.normal = normal_, .distance = height_ + normal_.dot(centre_)};
+Plane PlaneOf(const PlaneBlock& block, const Eigen::Vector3d& centre) {
+  const Eigen::Vector3d normal(block[0], block[1], block[2]);
+  return Plane{.normal = normal, .distance = block[3] + normal.dot(centre)};
 }
 
 PlaneView SummariseView(const PointMoments& moments) {
@@ -68,31 +58,40 @@ PlaneView SummariseView(const PointMoments& moments) {
   return view;
 }
 
-double PlaneViewCost(const PlaneView& view, const Pose& T, const MovingPlane& plane) {
-  return Distances(AboutCentre(view, T, plane.centre()), view.weight, plane).squaredNorm();
+Eigen::Vector4d PlaneViewDistances(const PlaneView& view,
+                                   const Pose& T,
+                                   const double* plane_block,
+                                   const Eigen::Vector3d& centre) {
+  return Distances(AboutCentre(view, T, centre), view.weight, plane_block);
 }
 
-PlaneViewDerivatives DifferentiatePlaneView(const PlaneView& view,
-                                            const Pose& T,
-                                            const MovingPlane& plane) {
-  const Eigen::Matrix<double, 3, 4> x = AboutCentre(view, T, plane.centre());
-  const Eigen::Vector4d e = Distances(x, view.weight, plane);
-  const Eigen::Vector3d normal_scan = T.linear().transpose() * plane.normal();
-  Eigen::Matrix<double, 4, 6> by_pose;
-  Eigen::Matrix<double, 4, 3> by_plane;
-  for (int k = 0; k <= kMean; ++k) {
-    const double s = k == kMean ? view.weight : 0.0;
-    by_pose.row(k) << view.points.col(k).cross(normal_scan).transpose(),
-        s * normal_scan.transpose();
-    by_plane.row(k) << x.col(k).transpose() * plane.tangents(), -s;
+PlaneViewCost::PlaneViewCost(const PlaneView& view, const Eigen::Vector3d& centre, double factor)
+    : view_(view), centre_(centre), root_(std::sqrt(factor)) {}
+
+bool PlaneViewCost::Evaluate(double const* const* blocks,
+                             double* residuals,
+                             double** jacobians) const {
+  const Pose T = PoseOf(blocks[0]);
+  const Eigen::Matrix<double, 3, 4> x = AboutCentre(view_, T, centre_);
+  Eigen::Map<Eigen::Vector4d> weighted(residuals);
+  weighted = root_ * Distances(x, view_.weight, blocks[1]);
+  if (jacobians != nullptr && jacobians[0] != nullptr) {
+    const Eigen::Vector3d normal_scan =
+        T.linear().transpose() * Eigen::Map<const Eigen::Vector3d>(blocks[1]);
+    Eigen::Matrix<double, 4, 6> by_pose;
+    for (int k = 0; k <= kMean; ++k) {
+      const double s = k == kMean ? view_.weight : 0.0;
+      by_pose.row(k) << view_.points.col(k).cross(normal_scan).transpose(),
+          s * normal_scan.transpose();
+    }
+    WritePoseJacobian(root_ * by_pose, jacobians[0]);
   }
-  PlaneViewDerivatives result;
-  result.poses.noalias() = by_pose.transpose() * by_pose;
-  result.mixed.noalias() = by_pose.transpose() * by_plane;
-  result.planes.noalias() = by_plane.transpose() * by_plane;
-  result.gradient_pose.noalias() = by_pose.transpose() * e;
-  result.gradient_plane.noalias() = by_plane.transpose() * e;
-  return result;
+  if (jacobians != nullptr && jacobians[1] != nullptr) {
+    Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> by_plane(jacobians[1]);
+    by_plane.leftCols<3>() = root_ * x.transpose();
+    by_plane.col(3) << 0.0, 0.0, 0.0, -root_ * view_.weight;
+  }
+  return weighted.allFinite();
 }
 
 }  // namespace strata

@@ -3,7 +3,10 @@
 #ifndef STRATA_CORE_POSEGRAPH_COSTS_PLANE_COST_H_
 #define STRATA_CORE_POSEGRAPH_COSTS_PLANE_COST_H_
 
+#include <array>
+
 #include <Eigen/Core>
+#include <ceres/sized_cost_function.h>
 
 #include "core/geometry/pose.h"
 #include "core/geometry/primitives.h"
@@ -11,31 +14,13 @@
 
 namespace strata {
 
-// A plane n · (x − centre) = height about a centre near its points: far from the map's origin,
-// turning n · x = d would move it far away.
-class MovingPlane {
- public:
-  MovingPlane() = default;
-  MovingPlane(const Plane& plane_map, const Eigen::Vector3d& centre);
+// A plane as the solver holds it: its unit normal n and its height, n · (x − centre) = height,
+// about a centre near its points: far from the map's origin, turning n · x = d would move it far
+// away.
+using PlaneBlock = std::array<double, 4>;
 
-  // Steps are [two turns of the normal, height].
-  MovingPlane Retracted(const Eigen::Vector3d& step) const;
-  Plane plane() const;
-
-  const Eigen::Vector3d& normal() const { return normal_; }
-  const Eigen::Vector3d& centre() const { return centre_; }
-  double height() const { return height_; }
-  // Two unit vectors across the normal.
-  const Eigen::Matrix<double, 3, 2>& tangents() const { return tangents_; }
-
- private:
-  void SetNormal(const Eigen::Vector3d& normal);
-
-  Eigen::Vector3d normal_ = Eigen::Vector3d::UnitZ();
-  Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
-  Eigen::Matrix<double, 3, 2> tangents_ = Eigen::Matrix<double, 3, 2>::Zero();
-  double height_ = 0.0;
-};
+PlaneBlock PlaneBlockOf(const Plane& plane_map, const Eigen::Vector3d& centre);
+Plane PlaneOf(const PlaneBlock& block, const Eigen::Vector3d& centre);
 
 // Three directions that stand for the scatter of a view's points and their mean, all times the
 // square root of their weight.
@@ -46,19 +31,24 @@ struct PlaneView {
 // REQUIRES: `moments` positive semidefinite.
 PlaneView SummariseView(const PointMoments& moments);
 
-double PlaneViewCost(const PlaneView& view, const Pose& T, const MovingPlane& plane);
+// Of the view's four points. The sum of their squares is that of all points.
+Eigen::Vector4d PlaneViewDistances(const PlaneView& view,
+                                   const Pose& T,
+                                   const double* plane_block,
+                                   const Eigen::Vector3d& centre);
 
-struct PlaneViewDerivatives {
-  // Gauss–Newton blocks and JᵀΩe by a right-hand step on T and by a step of the plane.
-  Matrix6d poses;
-  Eigen::Matrix<double, 6, 3> mixed;
-  Eigen::Matrix3d planes;
-  Vector6d gradient_pose;
-  Eigen::Vector3d gradient_plane;
+// factor · Σ w d² of a pose block and a plane block.
+class PlaneViewCost final : public ceres::SizedCostFunction<4, 7, 4> {
+ public:
+  // `view` and `centre` outlive this.
+  PlaneViewCost(const PlaneView& view, const Eigen::Vector3d& centre, double factor);
+  bool Evaluate(double const* const* blocks, double* residuals, double** jacobians) const override;
+
+ private:
+  const PlaneView& view_;
+  const Eigen::Vector3d& centre_;
+  const double root_;  // of the factor
 };
-PlaneViewDerivatives DifferentiatePlaneView(const PlaneView& view,
-                                            const Pose& T,
-                                            const MovingPlane& plane);
 
 }  // namespace strata
 

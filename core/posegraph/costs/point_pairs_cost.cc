@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 
+#include "core/posegraph/costs/pose_block.h"
 #include "core/posegraph/costs/skew.h"
 
 namespace strata {
@@ -63,35 +64,36 @@ PointPairs SummarisePairs(const PairMoments& moments) {
   return pairs;
 }
 
-double PointPairsCost(const PointPairs& pairs, const Pose& T_i, const Pose& T_j) {
+double PointPairsChi2(const PointPairs& pairs, const Pose& T_i, const Pose& T_j) {
   return Differences(pairs, T_i, T_j, T_i.linear().transpose() * T_j.linear()).squaredNorm();
 }
 
-PointPairsDerivatives DifferentiatePointPairs(const PointPairs& pairs,
-                                              const Pose& T_i,
-                                              const Pose& T_j) {
+PointPairsCost::PointPairsCost(const PointPairs& pairs, double factor, const double* weight)
+    : pairs_(pairs), factor_(factor), weight_(weight) {}
+
+bool PointPairsCost::Evaluate(double const* const* blocks,
+                              double* residuals,
+                              double** jacobians) const {
+  const Pose T_i = PoseOf(blocks[0]);
+  const Pose T_j = PoseOf(blocks[1]);
   const Eigen::Matrix3d R = T_i.linear().transpose() * T_j.linear();
-  const Eigen::Matrix<double, 3, 7> e = Differences(pairs, T_i, T_j, R);
-  PointPairsDerivatives result;
-  result.cost = e.squaredNorm();
-  result.ii.setZero();
-  result.ij.setZero();
-  result.jj.setZero();
-  result.gradient_i.setZero();
-  result.gradient_j.setZero();
-  for (int k = 0; k <= kMeans; ++k) {
-    const double s = k == kMeans ? pairs.weight : 0.0;
-    Eigen::Matrix<double, 3, 6> by_i;
-    Eigen::Matrix<double, 3, 6> by_j;
-    by_i << Skew(e.col(k) - pairs.a.col(k)), s * Eigen::Matrix3d::Identity();
-    by_j << R * Skew(pairs.b.col(k)), -s * R;
-    result.ii.noalias() += by_i.transpose() * by_i;
-    result.ij.noalias() += by_i.transpose() * by_j;
-    result.jj.noalias() += by_j.transpose() * by_j;
-    result.gradient_i.noalias() += by_i.transpose() * e.col(k);
-    result.gradient_j.noalias() += by_j.transpose() * e.col(k);
+  const Eigen::Matrix<double, 3, 7> e = Differences(pairs_, T_i, T_j, R);
+  const double root = std::sqrt(factor_ * *weight_);
+  Eigen::Map<Eigen::Matrix<double, 3, 7>> weighted(residuals);
+  weighted = root * e;
+  if (jacobians != nullptr) {
+    Eigen::Matrix<double, 21, 6> by_i;
+    Eigen::Matrix<double, 21, 6> by_j;
+    for (int k = 0; k <= kMeans; ++k) {
+      const double s = k == kMeans ? pairs_.weight : 0.0;
+      by_i.middleRows<3>(3 * k) << Skew(e.col(k) - pairs_.a.col(k)),
+          s * Eigen::Matrix3d::Identity();
+      by_j.middleRows<3>(3 * k) << R * Skew(pairs_.b.col(k)), -s * R;
+    }
+    if (jacobians[0] != nullptr) WritePoseJacobian(root * by_i, jacobians[0]);
+    if (jacobians[1] != nullptr) WritePoseJacobian(root * by_j, jacobians[1]);
   }
-  return result;
+  return weighted.allFinite();
 }
 
 }  // namespace strata

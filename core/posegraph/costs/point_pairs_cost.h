@@ -4,6 +4,7 @@
 #define STRATA_CORE_POSEGRAPH_COSTS_POINT_PAIRS_COST_H_
 
 #include <Eigen/Core>
+#include <ceres/sized_cost_function.h>
 
 #include "core/geometry/pose.h"
 #include "core/posegraph/pose_graph.h"
@@ -22,17 +23,20 @@ struct PointPairs {
 // REQUIRES: `moments` positive semidefinite with the homogeneous rows alike.
 PointPairs SummarisePairs(const PairMoments& moments);
 
-double PointPairsCost(const PointPairs& pairs, const Pose& T_i, const Pose& T_j);
+double PointPairsChi2(const PointPairs& pairs, const Pose& T_i, const Pose& T_j);
 
-struct PointPairsDerivatives {
-  double cost = 0.0;
-  // Gauss–Newton blocks and JᵀΩe, by right-hand steps on T_i and T_j.
-  Matrix6d ii, ij, jj;
-  Vector6d gradient_i, gradient_j;
+// weight · factor · the pairs' cost, of two pose blocks.
+class PointPairsCost final : public ceres::SizedCostFunction<21, 7, 7> {
+ public:
+  // `pairs` outlives this; `weight` is read whenever this is evaluated.
+  PointPairsCost(const PointPairs& pairs, double factor, const double* weight);
+  bool Evaluate(double const* const* blocks, double* residuals, double** jacobians) const override;
+
+ private:
+  const PointPairs& pairs_;
+  const double factor_;
+  const double* const weight_;
 };
-PointPairsDerivatives DifferentiatePointPairs(const PointPairs& pairs,
-                                              const Pose& T_i,
-                                              const Pose& T_j);
 
 }  // namespace strata
 

@@ -1,7 +1,11 @@
 #include "core/posegraph/costs/relative_pose_cost.h"
 
+#include <cmath>
+
 #include <Eigen/Geometry>
 
+#include "core/posegraph/costs/information_root.h"
+#include "core/posegraph/costs/pose_block.h"
 #include "core/posegraph/costs/skew.h"
 
 namespace strata {
@@ -49,6 +53,29 @@ RelativePoseDerivatives DifferentiateRelativePose(const Pose& T_i,
   result.by_j.bottomLeftCorner<3, 3>().setZero();
   result.by_j.bottomRightCorner<3, 3>() = R;
   return result;
+}
+
+RelativePoseCost::RelativePoseCost(const Pose& T_i_j,
+                                   const Matrix6d& information,
+                                   const double* weight)
+    : T_i_j_(T_i_j), root_(InformationRoot(information)), weight_(weight) {}
+
+bool RelativePoseCost::Evaluate(double const* const* blocks,
+                                double* residuals,
+                                double** jacobians) const {
+  const Pose T_i = PoseOf(blocks[0]);
+  const Pose T_j = PoseOf(blocks[1]);
+  const Matrix6d root = std::sqrt(*weight_) * root_;
+  Eigen::Map<Vector6d> weighted(residuals);
+  if (jacobians == nullptr) {
+    weighted = root * RelativePoseError(T_i, T_j, T_i_j_);
+    return weighted.allFinite();
+  }
+  const RelativePoseDerivatives d = DifferentiateRelativePose(T_i, T_j, T_i_j_);
+  weighted = root * d.error;
+  if (jacobians[0] != nullptr) WritePoseJacobian(root * d.by_i, jacobians[0]);
+  if (jacobians[1] != nullptr) WritePoseJacobian(root * d.by_j, jacobians[1]);
+  return weighted.allFinite();
 }
 
 }  // namespace strata

@@ -3,6 +3,8 @@
 #ifndef STRATA_CORE_POSEGRAPH_COSTS_RELATIVE_POSE_COST_H_
 #define STRATA_CORE_POSEGRAPH_COSTS_RELATIVE_POSE_COST_H_
 
+#include <ceres/sized_cost_function.h>
+
 #include "core/geometry/pose.h"
 
 namespace strata {
@@ -17,6 +19,19 @@ struct RelativePoseDerivatives {
 RelativePoseDerivatives DifferentiateRelativePose(const Pose& T_i,
                                                   const Pose& T_j,
                                                   const Pose& T_i_j);
+
+// weight · eᵀΩe of two pose blocks.
+class RelativePoseCost final : public ceres::SizedCostFunction<6, 7, 7> {
+ public:
+  // `weight` is read whenever this is evaluated.
+  RelativePoseCost(const Pose& T_i_j, const Matrix6d& information, const double* weight);
+  bool Evaluate(double const* const* blocks, double* residuals, double** jacobians) const override;
+
+ private:
+  const Pose T_i_j_;
+  const Matrix6d root_;
+  const double* const weight_;
+};
 
 }  // namespace strata
 

@@ -1,3 +1,5 @@
+#include "core/posegraph/solver/optimize_pose_graph.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -9,10 +11,9 @@
 
 #include "core/common/status.h"
 #include "core/posegraph/costs/relative_pose_cost.h"
-#include "core/posegraph/pose_graph.h"
 #include "core/posegraph/solver/gauge.h"
-#include "core/posegraph/solver/graph_least_squares.h"
-#include "core/posegraph/solver/levenberg_marquardt.h"
+#include "core/posegraph/solver/graph_problem.h"
+#include "core/posegraph/solver/minimise.h"
 #include "core/posegraph/solver/pose_graph_checks.h"
 #include "core/posegraph/solver/robust_minimum.h"
 
@@ -24,7 +25,7 @@ constexpr std::size_t kWorstNodes = 10;
 // Relative poses first.
 class GraphSuspects : public Suspects {
  public:
-  GraphSuspects(const PoseGraphProblem& problem, GraphLeastSquares& squares) : squares_(squares) {
+  GraphSuspects(const PoseGraphProblem& problem, GraphProblem& graph) : graph_(graph) {
     for (std::size_t k = 0; k < problem.relative.size(); ++k) {
       if (problem.relative[k].may_be_false) relative_.push_back(k);
     }
@@ -34,68 +35,60 @@ class GraphSuspects : public Suspects {
   }
   std::size_t size() const override { return relative_.size() + pairs_.size(); }
   double Chi2(std::size_t k) const override {
-    return k < relative_.size() ? squares_.RelativeChi2(relative_[k])
-                                : squares_.PairsExcess(pairs_[k - relative_.size()]);
+    return k < relative_.size() ? graph_.RelativeChi2(relative_[k])
+                                : graph_.PairsExcess(pairs_[k - relative_.size()]);
   }
   double& Weight(std::size_t k) override {
-    return k < relative_.size() ? squares_.relative_weights()[relative_[k]]
-                                : squares_.pairs_weights()[pairs_[k - relative_.size()]];
+    return k < relative_.size() ? graph_.relative_weights()[relative_[k]]
+                                : graph_.pairs_weights()[pairs_[k - relative_.size()]];
   }
 
  private:
-  GraphLeastSquares& squares_;
+  GraphProblem& graph_;
   std::vector<std::size_t> relative_, pairs_;
 };
 
-PoseGraphCosts CostsOf(const PoseGraphProblem& problem, const GraphLeastSquares& squares) {
+PoseGraphCosts CostsOf(const PoseGraphProblem& problem, const GraphProblem& graph) {
   PoseGraphCosts costs;
   for (std::size_t k = 0; k < problem.relative.size(); ++k) {
-    costs.relative += squares.RelativeChi2(k);
+    costs.relative += graph.RelativeChi2(k);
   }
-  for (std::size_t k = 0; k < problem.pairs.size(); ++k) costs.pairs += squares.PairsChi2(k);
+  for (std::size_t k = 0; k < problem.pairs.size(); ++k) costs.pairs += graph.PairsChi2(k);
   for (std::size_t p = 0; p < problem.planes.size(); ++p) {
     for (std::size_t v = 0; v < problem.planes[p].views.size(); ++v) {
-      costs.planes += squares.ViewChi2(p, v);
+      costs.planes += graph.ViewChi2(p, v);
     }
   }
-  for (std::size_t k = 0; k < problem.priors.size(); ++k) costs.priors += squares.PriorChi2(k);
+  for (std::size_t k = 0; k < problem.priors.size(); ++k) costs.priors += graph.PriorChi2(k);
   return costs;
 }
 
-std::vector<NodeResidual> WorstNodes(const PoseGraphProblem& problem, GraphLeastSquares& squares) {
+std::vector<NodeResidual> WorstNodes(const PoseGraphProblem& problem, GraphProblem& graph) {
   std::vector<NodeResidual> nodes(problem.T_map_scan.size());
   for (std::size_t n = 0; n < nodes.size(); ++n) nodes[n].node = n;
   for (std::size_t k = 0; k < problem.relative.size(); ++k) {
-    const double half = 0.5 * squares.relative_weights()[k] * squares.RelativeChi2(k);
+    const double half = 0.5 * graph.relative_weights()[k] * graph.RelativeChi2(k);
     nodes[problem.relative[k].i].chi2 += half;
     nodes[problem.relative[k].j].chi2 += half;
   }
   for (std::size_t k = 0; k < problem.pairs.size(); ++k) {
-    const double half = 0.5 * squares.pairs_weights()[k] * squares.PairsChi2(k);
+    const double half = 0.5 * graph.pairs_weights()[k] * graph.PairsChi2(k);
     nodes[problem.pairs[k].i].chi2 += half;
     nodes[problem.pairs[k].j].chi2 += half;
   }
   for (std::size_t p = 0; p < problem.planes.size(); ++p) {
     for (std::size_t v = 0; v < problem.planes[p].views.size(); ++v) {
-      nodes[problem.planes[p].views[v].i].chi2 += squares.ViewChi2(p, v);
+      nodes[problem.planes[p].views[v].i].chi2 += graph.ViewChi2(p, v);
     }
   }
   for (std::size_t k = 0; k < problem.priors.size(); ++k) {
-    nodes[problem.priors[k].i].chi2 += squares.PriorChi2(k);
+    nodes[problem.priors[k].i].chi2 += graph.PriorChi2(k);
   }
   std::stable_sort(nodes.begin(), nodes.end(), [](const NodeResidual& a, const NodeResidual& b) {
     return a.chi2 > b.chi2;
   });
   nodes.resize(std::min(nodes.size(), kWorstNodes));
   return nodes;
-}
-
-// diag(½, ½, ½, 1, 1, 1) P: from [translation, vec q] to [rotation, translation].
-Matrix6d FromG2oErrors() {
-  Matrix6d A = Matrix6d::Zero();
-  A.topRightCorner<3, 3>() = 0.5 * Eigen::Matrix3d::Identity();
-  A.bottomLeftCorner<3, 3>().setIdentity();
-  return A;
 }
 
 }  // namespace
@@ -114,35 +107,37 @@ absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& prob
 
   const bool by_sums = options.weighting == Weighting::kLocalGlobal;
   // Twice (7.21), so that ½ is kCovariance.
-  GraphLeastSquares squares(problem,
-                            held,
-                            by_sums ? 2.0 * options.local_weight : 1.0,
-                            by_sums ? 2.0 * (1.0 - options.local_weight) : 1.0);
-  summary.before = CostsOf(problem, squares);
-  if (squares.blocks() == 0) {
+  GraphProblem graph(problem,
+                     held,
+                     by_sums ? 2.0 * options.local_weight : 1.0,
+                     by_sums ? 2.0 * (1.0 - options.local_weight) : 1.0);
+  summary.before = CostsOf(problem, graph);
+  if (problem.planes.empty() && std::find(held.begin(), held.end(), false) == held.end()) {
     summary.termination = PoseGraphTermination::kNothingToDo;
   } else {
-    BlockCholesky H = squares.MakeSystem();
-    GraphSuspects suspects(problem, squares);
-    STRATA_ASSIGN_OR_RETURN(
-        const Minimum minimum,
-        MinimiseRobustly(
-            squares, suspects, options.max_closure_chi2, options.convergence, H, stop));
+    GraphSuspects suspects(problem, graph);
+    STRATA_ASSIGN_OR_RETURN(const Minimum minimum,
+                            MinimiseRobustly(suspects,
+                                             options.max_closure_chi2,
+                                             options.convergence,
+                                             [&](const ConvergenceOptions& convergence) {
+                                               return Minimise(graph.problem(), convergence, stop);
+                                             }));
     summary.iterations = minimum.iterations;
     summary.termination = minimum.termination;
   }
-  summary.after = CostsOf(problem, squares);
+  summary.after = CostsOf(problem, graph);
   for (std::size_t k = 0; k < problem.relative.size(); ++k) {
-    if (squares.relative_weights()[k] > 0.0) continue;
-    summary.rejected_relative.push_back({.term = k, .chi2 = squares.RelativeChi2(k)});
+    if (graph.relative_weights()[k] > 0.0) continue;
+    summary.rejected_relative.push_back({.term = k, .chi2 = graph.RelativeChi2(k)});
   }
   for (std::size_t k = 0; k < problem.pairs.size(); ++k) {
-    if (squares.pairs_weights()[k] > 0.0) continue;
-    summary.rejected_pairs.push_back({.term = k, .chi2 = squares.PairsExcess(k)});
+    if (graph.pairs_weights()[k] > 0.0) continue;
+    summary.rejected_pairs.push_back({.term = k, .chi2 = graph.PairsExcess(k)});
   }
-  summary.worst_nodes = WorstNodes(problem, squares);
-  solution.T_map_scan = squares.poses();
-  solution.planes = squares.planes();
+  summary.worst_nodes = WorstNodes(problem, graph);
+  solution.T_map_scan = graph.poses();
+  solution.planes = graph.planes();
   return solution;
 }
 
@@ -154,16 +149,6 @@ double Chi2(const PoseGraphProblem& problem) {
     chi2 += e.dot(term.information * e);
   }
   return chi2;
-}
-
-Matrix6d InformationFromG2o(const Matrix6d& information) {
-  const Matrix6d A = FromG2oErrors();
-  return A * information * A.transpose();
-}
-
-Matrix6d InformationToG2o(const Matrix6d& information) {
-  const Matrix6d A = FromG2oErrors().inverse();
-  return A * information * A.transpose();
 }
 
 }  // namespace strata

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/statusor.h"
 
 #include "core/common/status.h"
@@ -56,15 +57,14 @@ double TruncatedWeight(double chi2, double max_chi2, double control) {
   return std::clamp(std::sqrt(max_chi2 / chi2 * control * (control + 1.0)) - control, 0.0, 1.0);
 }
 
-absl::StatusOr<Minimum> MinimiseRobustly(LeastSquares& squares,
-                                         Suspects& suspects,
-                                         double max_chi2,
-                                         const ConvergenceOptions& convergence,
-                                         BlockCholesky& H,
-                                         const Stop& stop) {
+absl::StatusOr<Minimum> MinimiseRobustly(
+    Suspects& suspects,
+    double max_chi2,
+    const ConvergenceOptions& convergence,
+    absl::FunctionRef<absl::StatusOr<Minimum>(const ConvergenceOptions&)> minimise) {
   int iterations = 0;
   const auto go_down = [&](const ConvergenceOptions& options) -> absl::StatusOr<Minimum> {
-    STRATA_ASSIGN_OR_RETURN(Minimum minimum, Minimise(squares, H, options, stop));
+    STRATA_ASSIGN_OR_RETURN(Minimum minimum, minimise(options));
     iterations += minimum.iterations;
     minimum.iterations = iterations;
     return minimum;

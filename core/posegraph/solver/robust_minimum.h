@@ -5,11 +5,11 @@
 
 #include <cstddef>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/statusor.h"
 
-#include "core/common/stop.h"
-#include "core/posegraph/solver/block_cholesky.h"
-#include "core/posegraph/solver/levenberg_marquardt.h"
+#include "core/posegraph/convergence.h"
+#include "core/posegraph/solver/minimise.h"
 
 namespace strata {
 
@@ -25,12 +25,12 @@ class Suspects {
 // Graduated non-convexity (Yang, Antonante, Tzoumas, Carlone 2020) for truncated least squares: a
 // suspect counts min(χ², max_chi2), reached through a family of costs that begins convex. Leaves
 // the weights at 0 or 1; a suspect whose χ² at the minimum is above the bound has 0.
-absl::StatusOr<Minimum> MinimiseRobustly(LeastSquares& squares,
-                                         Suspects& suspects,
-                                         double max_chi2,
-                                         const ConvergenceOptions& convergence,
-                                         BlockCholesky& H,
-                                         const Stop& stop);
+// `minimise` goes down from the current state with the current weights.
+absl::StatusOr<Minimum> MinimiseRobustly(
+    Suspects& suspects,
+    double max_chi2,
+    const ConvergenceOptions& convergence,
+    absl::FunctionRef<absl::StatusOr<Minimum>(const ConvergenceOptions&)> minimise);
 
 // The weight of a term of χ² `chi2` in the family's member `control`: near 0 the convex cost,
 // towards infinity the truncated one (eq. 14 there).

@@ -11,6 +11,8 @@
 
 #include "client/formats/file_bytes.h"
 #include "core/posegraph/solver/initial_poses.h"
+#include "core/posegraph/solver/optimize_planar_pose_graph.h"
+#include "core/posegraph/solver/optimize_pose_graph.h"
 #include "tests/support/data_dir.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"

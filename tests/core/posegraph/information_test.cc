@@ -83,5 +83,15 @@ TEST(InformationTest, NothingKnownStaysNothing) {
   EXPECT_EQ(LoosenedInformation(Matrix6d::Zero(), IsotropicInformation(0.1, 0.1)).norm(), 0.0);
 }
 
+TEST(G2oInformationTest, ChangesTheErrorNotTheCost) {
+  RandomPoses random(5);
+  const Matrix6d g2o = random.Information();
+  const Vector6d error = random.Step(1.0, 1.0);
+  Vector6d g2o_error;  // [translation, vec q]
+  g2o_error << error.tail<3>(), 0.5 * error.head<3>();
+  EXPECT_NEAR(error.dot(InformationFromG2o(g2o) * error), g2o_error.dot(g2o * g2o_error), 1e-12);
+  EXPECT_LT((InformationToG2o(InformationFromG2o(g2o)) - g2o).norm(), 1e-12);
+}
+
 }  // namespace
 }  // namespace strata

@@ -10,6 +10,8 @@
 
 #include "client/formats/file_bytes.h"
 #include "client/formats/graph_file.h"
+#include "core/posegraph/solver/optimize_planar_pose_graph.h"
+#include "core/posegraph/solver/optimize_pose_graph.h"
 #include "tests/client/cli/run_strata.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"

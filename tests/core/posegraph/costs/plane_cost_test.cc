@@ -1,12 +1,14 @@
 #include "core/posegraph/costs/plane_cost.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "core/posegraph/costs/pose_block.h"
+#include "core/posegraph/solver/manifolds.h"
+#include "tests/core/posegraph/cost_jacobian.h"
 #include "tests/core/posegraph/random_poses.h"
 
 namespace strata {
@@ -42,32 +44,49 @@ class PlaneCostTest : public ::testing::TestWithParam<std::uint64_t> {
 
 TEST_P(PlaneCostTest, FourPointsCostWhatAllCost) {
   const PlaneView view = SummariseView(moments_);
+  const Eigen::Vector3d centre = T_.translation();
   const double brute = Distances(T_, plane_).squaredNorm();
-  EXPECT_NEAR(PlaneViewCost(view, T_, MovingPlane(plane_, T_.translation())), brute, 1e-10 * brute);
+  const PlaneBlock block = PlaneBlockOf(plane_, centre);
+  EXPECT_NEAR(
+      PlaneViewDistances(view, T_, block.data(), centre).squaredNorm(), brute, 1e-10 * brute);
 }
 
 TEST_P(PlaneCostTest, DerivativesAreThoseOfAllPoints) {
-  const MovingPlane moving(plane_, T_.translation() + random_.Vector(5.0));
-  const PlaneViewDerivatives d = DifferentiatePlaneView(SummariseView(moments_), T_, moving);
+  const PoseManifold poses;
+  const PlaneManifold planes;
+  const Eigen::Vector3d centre = T_.translation() + random_.Vector(5.0);
+  const PlaneView view = SummariseView(moments_);
+  const PlaneViewCost cost(view, centre, 0.3);
+  const PoseBlock pose = PoseBlockOf(T_);
+  const PlaneBlock block = PlaneBlockOf(plane_, centre);
+  const testing::Blocks blocks = {{pose.begin(), pose.end()}, {block.begin(), block.end()}};
+  testing::ExpectTrueJacobians(cost, blocks, {&poses, &planes}, 1e-6);
+
+  const std::vector<Eigen::MatrixXd> by = testing::JacobiansOf(cost, blocks, {&poses, &planes});
   const Eigen::MatrixXd J = testing::NumericJacobian(
       [&](const Eigen::VectorXd& step) { return Distances(Retract(T_, step), plane_); }, 6);
   const Eigen::MatrixXd K = testing::NumericJacobian(
-      [&](const Eigen::VectorXd& step) { return Distances(T_, moving.Retracted(step).plane()); },
+      [&](const Eigen::VectorXd& step) {
+        PlaneBlock moved = block;
+        EXPECT_TRUE(planes.Plus(block.data(), step.data(), moved.data()));
+        return Distances(T_, PlaneOf(moved, centre));
+      },
       3);
   const Eigen::VectorXd e = Distances(T_, plane_);
-  const double scale = std::max(d.poses.cwiseAbs().maxCoeff(), d.planes.cwiseAbs().maxCoeff());
-  EXPECT_LT((J.transpose() * J - d.poses).cwiseAbs().maxCoeff(), 1e-6 * scale);
-  EXPECT_LT((J.transpose() * K - d.mixed).cwiseAbs().maxCoeff(), 1e-6 * scale);
-  EXPECT_LT((K.transpose() * K - d.planes).cwiseAbs().maxCoeff(), 1e-6 * scale);
-  EXPECT_LT((J.transpose() * e - d.gradient_pose).cwiseAbs().maxCoeff(), 1e-6 * scale);
-  EXPECT_LT((K.transpose() * e - d.gradient_plane).cwiseAbs().maxCoeff(), 1e-6 * scale);
+  const Eigen::VectorXd r = testing::ResidualsOf(cost, blocks);
+  const double scale = J.squaredNorm() + K.squaredNorm();
+  EXPECT_LT((0.3 * J.transpose() * J - by[0].transpose() * by[0]).norm(), 1e-6 * scale);
+  EXPECT_LT((0.3 * J.transpose() * K - by[0].transpose() * by[1]).norm(), 1e-6 * scale);
+  EXPECT_LT((0.3 * K.transpose() * K - by[1].transpose() * by[1]).norm(), 1e-6 * scale);
+  EXPECT_LT((0.3 * J.transpose() * e - by[0].transpose() * r).norm(), 1e-6 * scale);
+  EXPECT_LT((0.3 * K.transpose() * e - by[1].transpose() * r).norm(), 1e-6 * scale);
 }
 
 TEST_P(PlaneCostTest, TheCentreIsNoPartOfThePlane) {
-  const MovingPlane moving(plane_, random_.Vector(100.0));
-  EXPECT_NEAR(moving.plane().distance, plane_.distance, 1e-9);
-  EXPECT_LT((moving.plane().normal - plane_.normal).norm(), 1e-12);
-  EXPECT_NEAR(moving.Retracted(random_.Vector(0.3)).plane().normal.norm(), 1.0, 1e-12);
+  const Eigen::Vector3d centre = random_.Vector(100.0);
+  const Plane back = PlaneOf(PlaneBlockOf(plane_, centre), centre);
+  EXPECT_NEAR(back.distance, plane_.distance, 1e-9);
+  EXPECT_LT((back.normal - plane_.normal).norm(), 1e-12);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, PlaneCostTest, ::testing::Values(1, 2, 3));

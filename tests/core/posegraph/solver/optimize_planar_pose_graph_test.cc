@@ -1,3 +1,5 @@
+#include "core/posegraph/solver/optimize_planar_pose_graph.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -7,7 +9,6 @@
 #include <gtest/gtest.h>
 
 #include "core/posegraph/costs/planar_cost.h"
-#include "core/posegraph/planar_pose_graph.h"
 #include "core/posegraph/solver/initial_poses.h"
 #include "tests/core/posegraph/random_poses.h"
 #include "tests/support/status_matchers.h"
@@ -47,28 +48,6 @@ class PlanarPoseGraphTest : public ::testing::TestWithParam<std::uint64_t> {
   std::vector<PlanarPose> truth_;
   PlanarPoseGraph graph_;
 };
-
-TEST_P(PlanarPoseGraphTest, DerivativesAreThoseByDifferences) {
-  for (int n = 0; n < 20; ++n) {
-    const PlanarPose i = AnyPose();
-    const PlanarPose j = AnyPose();
-    const PlanarPose T_i_j = Moved(Between(i, j), random_.Vector(0.5));
-    const PlanarDerivatives d = DifferentiatePlanar(i, j, T_i_j);
-    EXPECT_LT((d.error - PlanarError(i, j, T_i_j)).norm(), 1e-12);
-    const auto by_i = testing::NumericJacobian(
-        [&](const Eigen::VectorXd& step) {
-          return Eigen::VectorXd(PlanarError(Moved(i, step), j, T_i_j));
-        },
-        3);
-    const auto by_j = testing::NumericJacobian(
-        [&](const Eigen::VectorXd& step) {
-          return Eigen::VectorXd(PlanarError(i, Moved(j, step), T_i_j));
-        },
-        3);
-    EXPECT_LT((by_i - d.by_i).cwiseAbs().maxCoeff(), 1e-7);
-    EXPECT_LT((by_j - d.by_j).cwiseAbs().maxCoeff(), 1e-7);
-  }
-}
 
 TEST_P(PlanarPoseGraphTest, WithoutNoiseStartsAndOptimumAreTheTruth) {
   MakeGraph(30, 0.0);
@@ -123,13 +102,6 @@ TEST(PlanarErrorsTest, NameTheTerm) {
   graph.poses[1].x() = NAN;
   EXPECT_THAT(OptimizePlanarPoseGraph(graph),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("pose 1: pose: not finite")));
-}
-
-TEST(WrapAngleTest, IsHalfOpen) {
-  EXPECT_DOUBLE_EQ(WrapAngle(3.0 * M_PI), M_PI);
-  EXPECT_DOUBLE_EQ(WrapAngle(-M_PI), M_PI);
-  EXPECT_NEAR(WrapAngle(2.0 * M_PI + 0.5), 0.5, 1e-12);
-  EXPECT_NEAR(WrapAngle(-2.0 * M_PI - 0.5), -0.5, 1e-12);
 }
 
 }  // namespace

@@ -1,3 +1,5 @@
+#include "core/posegraph/solver/optimize_pose_graph.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -7,7 +9,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/posegraph/pose_graph.h"
 #include "tests/core/posegraph/random_poses.h"
 #include "tests/support/status_matchers.h"
 
@@ -324,16 +325,6 @@ TEST(PoseGraphErrorsTest, NothingToDoIsNoError) {
   STRATA_ASSERT_OK_AND_ASSIGN(const auto solution, OptimizePoseGraph(alone));
   EXPECT_EQ(solution.summary.termination, PoseGraphTermination::kNothingToDo);
   EXPECT_THAT(solution.summary.held, ElementsAre(0, 1, 2));
-}
-
-TEST(G2oInformationTest, ChangesTheErrorNotTheCost) {
-  testing::RandomPoses random(5);
-  const Matrix6d g2o = random.Information();
-  const Vector6d error = random.Step(1.0, 1.0);
-  Vector6d g2o_error;  // [translation, vec q]
-  g2o_error << error.tail<3>(), 0.5 * error.head<3>();
-  EXPECT_NEAR(error.dot(InformationFromG2o(g2o) * error), g2o_error.dot(g2o * g2o_error), 1e-12);
-  EXPECT_LT((InformationToG2o(InformationFromG2o(g2o)) - g2o).norm(), 1e-12);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "core/posegraph/pose_graph.h"
+#include "core/posegraph/solver/optimize_pose_graph.h"
 #include "tests/core/posegraph/random_poses.h"
 #include "tests/support/status_matchers.h"
 

@@ -1,0 +1,25 @@
+#include "core/posegraph/costs/prior_cost.h"
+
+#include <Eigen/Core>
+
+#include "core/posegraph/costs/information_root.h"
+#include "core/posegraph/costs/pose_block.h"
+#include "core/posegraph/costs/relative_pose_cost.h"
+
+namespace strata {
+
+PriorCost::PriorCost(const Pose& T_map_scan, const Matrix6d& information)
+    : T_map_scan_(T_map_scan), root_(InformationRoot(information)) {}
+
+bool PriorCost::Evaluate(double const* const* blocks, double* residuals, double** jacobians) const {
+  const RelativePoseDerivatives d =
+      DifferentiateRelativePose(Pose::Identity(), PoseOf(blocks[0]), T_map_scan_);
+  Eigen::Map<Vector6d> weighted(residuals);
+  weighted = root_ * d.error;
+  if (jacobians != nullptr && jacobians[0] != nullptr) {
+    WritePoseJacobian(root_ * d.by_j, jacobians[0]);
+  }
+  return weighted.allFinite();
+}
+
+}  // namespace strata

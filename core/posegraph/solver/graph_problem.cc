@@ -1,0 +1,174 @@
+#include "core/posegraph/solver/graph_problem.h"
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+#include <ceres/problem.h>
+
+#include "core/posegraph/costs/inertia_cost.h"
+#include "core/posegraph/costs/prior_cost.h"
+#include "core/posegraph/costs/relative_pose_cost.h"
+
+namespace strata {
+namespace {
+
+// Of the terms of poses that only planes bind: two of them, or parallel ones, leave directions
+// open.
+constexpr double kInertia = 1e-6;
+
+// The centre of all that was seen of a plane; where nothing has weight, the plane's point nearest
+// to the origin.
+Eigen::Vector3d CentreOf(const PlaneTerm& term, const std::vector<Pose>& T_map_scan) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double weight = 0.0;
+  for (const PlaneTerm::View& view : term.views) {
+    sum += T_map_scan[view.i].linear() * view.moments.block<3, 1>(0, 3) +
+           T_map_scan[view.i].translation() * view.moments(3, 3);
+    weight += view.moments(3, 3);
+  }
+  if (!(weight > 0.0)) return term.plane_map.normal * term.plane_map.distance;
+  return sum / weight;
+}
+
+}  // namespace
+
+GraphProblem::GraphProblem(const PoseGraphProblem& graph,
+                           const std::vector<bool>& held,
+                           double local_factor,
+                           double global_factor)
+    : graph_(graph),
+      held_(held),
+      relative_weights_(graph.relative.size(), 1.0),
+      pairs_weights_(graph.pairs.size(), 1.0),
+      problem_(KeepingManifolds()) {
+  AddNodes();
+  AddRelative(local_factor);
+  AddPairs(local_factor);
+  AddPlanes(global_factor);
+  AddPriors(global_factor);
+  HoldBack(global_factor);
+}
+
+void GraphProblem::AddNodes() {
+  for (const Pose& T : graph_.T_map_scan) poses_.push_back(PoseBlockOf(T));
+  for (std::size_t n = 0; n < poses_.size(); ++n) {
+    problem_.AddParameterBlock(poses_[n].data(), 7, &pose_manifold_);
+    if (held_[n]) problem_.SetParameterBlockConstant(poses_[n].data());
+  }
+}
+
+void GraphProblem::AddRelative(double factor) {
+  for (std::size_t k = 0; k < graph_.relative.size(); ++k) {
+    const RelativePoseTerm& term = graph_.relative[k];
+    auto cost = std::make_unique<RelativePoseCost>(
+        term.T_i_j, factor * term.information, &relative_weights_[k]);
+    problem_.AddResidualBlock(
+        cost.release(), nullptr, poses_[term.i].data(), poses_[term.j].data());
+  }
+}
+
+void GraphProblem::AddPairs(double factor) {
+  for (const PointPairsTerm& term : graph_.pairs) pairs_.push_back(SummarisePairs(term.moments));
+  for (std::size_t k = 0; k < graph_.pairs.size(); ++k) {
+    auto cost = std::make_unique<PointPairsCost>(pairs_[k], factor, &pairs_weights_[k]);
+    problem_.AddResidualBlock(cost.release(),
+                              nullptr,
+                              poses_[graph_.pairs[k].i].data(),
+                              poses_[graph_.pairs[k].j].data());
+  }
+}
+
+void GraphProblem::AddPlanes(double factor) {
+  for (const PlaneTerm& term : graph_.planes) {
+    centres_.push_back(CentreOf(term, graph_.T_map_scan));
+    planes_.push_back(PlaneBlockOf(term.plane_map, centres_.back()));
+    views_.emplace_back();
+    for (const PlaneTerm::View& view : term.views) {
+      views_.back().push_back(SummariseView(view.moments));
+    }
+  }
+  for (std::size_t p = 0; p < planes_.size(); ++p) {
+    problem_.AddParameterBlock(planes_[p].data(), 4, &plane_manifold_);
+    for (std::size_t v = 0; v < views_[p].size(); ++v) {
+      auto cost = std::make_unique<PlaneViewCost>(views_[p][v], centres_[p], factor);
+      problem_.AddResidualBlock(
+          cost.release(), nullptr, poses_[graph_.planes[p].views[v].i].data(), planes_[p].data());
+    }
+  }
+}
+
+void GraphProblem::AddPriors(double factor) {
+  for (const PriorTerm& term : graph_.priors) {
+    auto cost = std::make_unique<PriorCost>(term.T_map_scan, factor * term.information);
+    problem_.AddResidualBlock(cost.release(), nullptr, poses_[term.i].data());
+  }
+}
+
+void GraphProblem::HoldBack(double factor) {
+  std::vector<bool> bound = held_;
+  for (const RelativePoseTerm& term : graph_.relative) bound[term.i] = bound[term.j] = true;
+  for (const PointPairsTerm& term : graph_.pairs) bound[term.i] = bound[term.j] = true;
+  for (const PriorTerm& term : graph_.priors) bound[term.i] = true;
+  std::vector<double> rotation(poses_.size(), 0.0);
+  std::vector<double> translation(poses_.size(), 0.0);
+  for (std::size_t p = 0; p < planes_.size(); ++p) {
+    for (std::size_t v = 0; v < views_[p].size(); ++v) {
+      const std::size_t node = graph_.planes[p].views[v].i;
+      rotation[node] += views_[p][v].points.squaredNorm();
+      translation[node] += views_[p][v].weight * views_[p][v].weight;
+    }
+  }
+  for (std::size_t n = 0; n < poses_.size(); ++n) {
+    if (bound[n] || translation[n] == 0.0) continue;
+    auto cost = std::make_unique<InertiaCost>(kInertia * factor * rotation[n],
+                                              kInertia * factor * translation[n]);
+    problem_.AddResidualBlock(cost.release(), nullptr, poses_[n].data());
+  }
+}
+
+double GraphProblem::RelativeChi2(std::size_t term) const {
+  const RelativePoseTerm& t = graph_.relative[term];
+  const Vector6d e = RelativePoseError(pose(t.i), pose(t.j), t.T_i_j);
+  return e.dot(t.information * e);
+}
+
+double GraphProblem::PairsChi2(std::size_t term) const {
+  const PointPairsTerm& t = graph_.pairs[term];
+  return PointPairsChi2(pairs_[term], pose(t.i), pose(t.j));
+}
+
+double GraphProblem::PairsExcess(std::size_t term) const {
+  return PairsChi2(term) - pairs_[term].least;
+}
+
+double GraphProblem::ViewChi2(std::size_t plane, std::size_t view) const {
+  const Pose T = pose(graph_.planes[plane].views[view].i);
+  return PlaneViewDistances(views_[plane][view], T, planes_[plane].data(), centres_[plane])
+      .squaredNorm();
+}
+
+double GraphProblem::PriorChi2(std::size_t term) const {
+  const PriorTerm& t = graph_.priors[term];
+  const Vector6d e = RelativePoseError(Pose::Identity(), pose(t.i), t.T_map_scan);
+  return e.dot(t.information * e);
+}
+
+std::vector<Pose> GraphProblem::poses() const {
+  std::vector<Pose> poses;
+  for (std::size_t n = 0; n < poses_.size(); ++n) {
+    poses.push_back(held_[n] ? graph_.T_map_scan[n] : pose(n));
+  }
+  return poses;
+}
+
+std::vector<Plane> GraphProblem::planes() const {
+  std::vector<Plane> planes;
+  for (std::size_t p = 0; p < planes_.size(); ++p) {
+    planes.push_back(PlaneOf(planes_[p], centres_[p]));
+  }
+  return planes;
+}
+
+}  // namespace strata

@@ -1,0 +1,74 @@
+// A pose graph as a problem of Ceres. Internal to core/posegraph, not installed.
+#ifndef STRATA_CORE_POSEGRAPH_SOLVER_GRAPH_PROBLEM_H_
+#define STRATA_CORE_POSEGRAPH_SOLVER_GRAPH_PROBLEM_H_
+
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+#include <ceres/problem.h>
+
+#include "core/geometry/pose.h"
+#include "core/geometry/primitives.h"
+#include "core/posegraph/costs/plane_cost.h"
+#include "core/posegraph/costs/point_pairs_cost.h"
+#include "core/posegraph/costs/pose_block.h"
+#include "core/posegraph/pose_graph.h"
+#include "core/posegraph/solver/manifolds.h"
+
+namespace strata {
+
+// Built once; the weights of its terms may change between minimisations.
+class GraphProblem {
+ public:
+  // `graph` is valid and outlives this; `held` marks the nodes that do not move; the factors weigh
+  // local (relative, pairs) and global terms (planes, priors).
+  GraphProblem(const PoseGraphProblem& graph,
+               const std::vector<bool>& held,
+               double local_factor,
+               double global_factor);
+  GraphProblem(const GraphProblem&) = delete;
+  GraphProblem& operator=(const GraphProblem&) = delete;
+
+  ceres::Problem& problem() { return problem_; }
+
+  // What the terms count, 1 at first; by PoseGraphProblem::relative and pairs.
+  std::vector<double>& relative_weights() { return relative_weights_; }
+  std::vector<double>& pairs_weights() { return pairs_weights_; }
+
+  // Where the blocks are, without weights and factors.
+  double RelativeChi2(std::size_t term) const;
+  double PairsChi2(std::size_t term) const;
+  // Beyond what the pairs' own best relative pose leaves.
+  double PairsExcess(std::size_t term) const;
+  double ViewChi2(std::size_t plane, std::size_t view) const;
+  double PriorChi2(std::size_t term) const;
+
+  std::vector<Pose> poses() const;
+  std::vector<Plane> planes() const;
+
+ private:
+  void AddNodes();
+  void AddRelative(double factor);
+  void AddPairs(double factor);
+  void AddPlanes(double factor);
+  void AddPriors(double factor);
+  void HoldBack(double factor);
+  Pose pose(std::size_t node) const { return PoseOf(poses_[node].data()); }
+
+  const PoseGraphProblem& graph_;
+  const std::vector<bool>& held_;
+  std::vector<PoseBlock> poses_;
+  std::vector<PlaneBlock> planes_;
+  std::vector<Eigen::Vector3d> centres_;  // of the planes
+  std::vector<PointPairs> pairs_;
+  std::vector<std::vector<PlaneView>> views_;
+  std::vector<double> relative_weights_, pairs_weights_;
+  PoseManifold pose_manifold_;
+  PlaneManifold plane_manifold_;
+  ceres::Problem problem_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_POSEGRAPH_SOLVER_GRAPH_PROBLEM_H_
