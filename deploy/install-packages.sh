@@ -5,13 +5,13 @@
 set -euo pipefail
 
 packages=(
-  ca-certificates ccache cmake coinor-libclp-dev coinor-libipopt-dev g++ git mold ninja-build pkg-config
+  ca-certificates ccache cmake g++ git mold ninja-build pkg-config
   libabsl-dev libboost-dev libceres-dev libcli11-dev libeigen3-dev libgoogle-glog-dev libgrpc++-dev libnanoflann-dev
   libpng-dev libprotobuf-dev libsqlite3-dev libssl-dev libxxhash-dev libzstd-dev nlohmann-json3-dev prometheus-cpp-dev
   protobuf-compiler protobuf-compiler-grpc python3
 )
 if [[ "${1:-}" == --dev ]]; then
-  packages+=(clang clang-format clang-tidy dpkg-dev file libbenchmark-dev libcgal-dev libclang-rt-dev libdlib-dev libgmock-dev libgtest-dev liboctomap-dev libpcl-dev mmdebstrap openssl python3-grpcio python3-numpy python3-protobuf python3-xxhash python3-zstandard sqlite3 systemd)
+  packages+=(clang clang-format clang-tidy coinor-libclp-dev coinor-libipopt-dev dpkg-dev file libbenchmark-dev libcgal-dev libclang-rt-dev libdlib-dev libgmock-dev libgtest-dev liboctomap-dev libpcl-dev mmdebstrap openssl python3-grpcio python3-numpy python3-protobuf python3-xxhash python3-zstandard sqlite3 systemd)
 fi
 
 missing=()

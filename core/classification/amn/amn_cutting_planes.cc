@@ -4,7 +4,6 @@
 
 #include "core/classification/amn/amn_inference.h"
 #include "core/classification/amn/amn_learning.h"
-#include "core/classification/amn/amn_relaxation.h"
 #include "core/classification/amn/margin_program.h"
 #include "core/common/option_checks.h"
 #include "core/common/status.h"
@@ -112,31 +111,11 @@ class CuttingPlanes {
   }
 
   absl::StatusOr<Plane> MostViolated(const Eigen::VectorXd& w, const Stop& stop) const {
-    return options_.relaxed ? MostViolatedRelaxed(w) : MostViolatedLabels(w, stop);
-  }
-
-  absl::StatusOr<Plane> MostViolatedLabels(const Eigen::VectorXd& w, const Stop& stop) const {
     STRATA_ASSIGN_OR_RETURN(const AmnLabels worst, MaximizeScore(Augmented(w), stop));
     Plane plane;
     plane.a = psi_right_ - PsiOf(worst.labels);
     for (std::size_t i = 0; i < worst.labels.size(); ++i) {
       plane.b += worst.labels[i] != set_.labels[i] ? set_.Count(i) : 0.0;
-    }
-    return plane;
-  }
-
-  absl::StatusOr<Plane> MostViolatedRelaxed(const Eigen::VectorXd& w) const {
-    STRATA_ASSIGN_OR_RETURN(const AmnRelaxation worst, RelaxScore(Augmented(w)));
-    const Eigen::Index d = features_.cols();
-    Plane plane;
-    plane.a = psi_right_;
-    const Eigen::MatrixXd node = worst.share.transpose() * features_;
-    for (Eigen::Index k = 0; k < classes_; ++k) plane.a.segment(k * d, d) -= node.row(k);
-    plane.a.tail(classes_) -= worst.edge_share.colwise().sum();
-    for (std::size_t i = 0; i < set_.labels.size(); ++i) {
-      const auto share = worst.share.row(static_cast<Eigen::Index>(i));
-      plane.a.tail(classes_) -= set_.InnerEdges(i) * share.transpose();
-      plane.b += set_.Count(i) * (1.0 - share[set_.labels[i]]);
     }
     return plane;
   }

@@ -44,10 +44,6 @@ struct AmnLearningOptions {
   // Ends once the objective is known to this, relative; in [1e-12, 1].
   double tolerance = 1e-4;
   int max_iterations = 1000;  // cutting planes, in [1, 100000]
-  // Cutting planes by the linear relaxation instead of by labelings. Both are exact for two
-  // classes; for more the relaxation is what eq. 9.7 minimises, while α-expansion may overlook
-  // planes.
-  bool relaxed = false;
 
   absl::Status Validate() const;
 };
@@ -60,13 +56,9 @@ struct AmnLearning {
   bool converged = false;
 };
 
-// The quadratic program 9.7 as it stands, by an interior point method (Ipopt): exact, for some
-// 10,000 dual variables of edges. RESOURCE_EXHAUSTED if the solver gives up.
-absl::StatusOr<AmnLearning> LearnByQuadraticProgram(const AmnTrainingSet& set,
-                                                    const AmnLearningOptions& options);
-
-// The same objective by cutting planes with loss-augmented inference (Joachims, Finley, Yu 2009,
-// one slack): for any size. Errors are those of `stop`.
+// By cutting planes with loss-augmented inference (Joachims, Finley, Yu 2009, one slack) instead of
+// the quadratic program 9.7, for any size. Exact for two classes; for more α-expansion may overlook
+// planes. Errors are those of `stop`.
 absl::StatusOr<AmnLearning> LearnByCuttingPlanes(const AmnTrainingSet& set,
                                                  const AmnLearningOptions& options,
                                                  const Stop& stop);

@@ -7,16 +7,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/classification/amn/amn_relaxation.h"
 #include "tests/core/classification/amn/random_networks.h"
+#include "tests/core/classification/amn/relaxation.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {
 namespace {
 
+using testing::AmnRelaxation;
 using testing::BestScoreByEnumeration;
 using testing::RandomEdges;
 using testing::RandomProblem;
+using testing::RelaxScore;
 
 TEST(AmnInferenceTest, TwoClassesAreExact) {
   constexpr std::uint64_t kSeed = 91;

@@ -1,12 +1,13 @@
-// The linear relaxation of inference in a network (thesis eq. 9.8, with Σ_k y_i^k = 1 for every i).
-#ifndef STRATA_CORE_CLASSIFICATION_AMN_AMN_RELAXATION_H_
-#define STRATA_CORE_CLASSIFICATION_AMN_AMN_RELAXATION_H_
+// The linear relaxation of inference in a network (thesis eq. 9.8, with Σ_k y_i^k = 1 for every i):
+// what inference and learning are held against.
+#ifndef STRATA_TESTS_CORE_CLASSIFICATION_AMN_RELAXATION_H_
+#define STRATA_TESTS_CORE_CLASSIFICATION_AMN_RELAXATION_H_
 
 #include "absl/status/statusor.h"
 
 #include "core/classification/amn/amn.h"
 
-namespace strata {
+namespace strata::testing {
 
 // Solved by Clp; for networks of up to some 10,000 variables y_ij^k.
 struct AmnRelaxation {
@@ -19,6 +20,6 @@ struct AmnRelaxation {
 // fractions for more.
 absl::StatusOr<AmnRelaxation> RelaxScore(const AmnProblem& problem);
 
-}  // namespace strata
+}  // namespace strata::testing
 
-#endif  // STRATA_CORE_CLASSIFICATION_AMN_AMN_RELAXATION_H_
+#endif  // STRATA_TESTS_CORE_CLASSIFICATION_AMN_RELAXATION_H_

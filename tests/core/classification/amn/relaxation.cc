@@ -1,4 +1,4 @@
-#include "core/classification/amn/amn_relaxation.h"
+#include "tests/core/classification/amn/relaxation.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -9,7 +9,7 @@
 #include <coin/ClpSimplex.hpp>
 #include <coin/CoinPackedMatrix.hpp>
 
-namespace strata {
+namespace strata::testing {
 namespace {
 
 // Columns: y_i^k, then y_ij^k. Rows: a sum a point, then two bounds an edge and class.
@@ -112,4 +112,4 @@ absl::StatusOr<AmnRelaxation> RelaxScore(const AmnProblem& problem) {
   return Program(problem).Solve();
 }
 
-}  // namespace strata
+}  // namespace strata::testing

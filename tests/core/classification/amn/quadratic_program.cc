@@ -1,3 +1,5 @@
+#include "tests/core/classification/amn/quadratic_program.h"
+
 #include <algorithm>
 #include <cstddef>
 #include <utility>
@@ -9,10 +11,9 @@
 #include <coin/IpSolveStatistics.hpp>
 #include <coin/IpTNLP.hpp>
 
-#include "core/classification/amn/amn_learning.h"
 #include "core/common/status.h"
 
-namespace strata {
+namespace strata::testing {
 namespace {
 
 using Ipopt::Index;
@@ -277,4 +278,4 @@ absl::StatusOr<AmnLearning> LearnByQuadraticProgram(const AmnTrainingSet& set,
                                                    "); use fewer points, or cutting planes"));
 }
 
-}  // namespace strata
+}  // namespace strata::testing
