@@ -4,30 +4,36 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
+#include <pcl/common/transforms.h>
+#include <pcl/correspondence.h>
+#include <pcl/features/normal_3d.h>
+#include <pcl/memory.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+#include <pcl/registration/correspondence_estimation.h>
+#include <pcl/registration/correspondence_rejection_surface_normal.h>
+#include <pcl/registration/correspondence_rejection_trimmed.h>
+#include <pcl/registration/gicp.h>
 
 #include "core/common/option_checks.h"
 #include "core/common/random.h"
 #include "core/common/status.h"
 #include "core/registration/extrapolation.h"
-#include "core/registration/point_index.h"
+#include "core/registration/projection_image.h"
 #include "core/registration/umeyama.h"
 
 namespace strata {
 namespace {
 
-struct IcpPair {
-  std::size_t source = 0;
-  std::size_t target = 0;
-  double distance_m = 0.0;
-  double weight = 1.0;
-};
+using Point = pcl::PointNormal;
+using Cloud = pcl::PointCloud<Point>;
 
 // Solution of one iteration.
 struct IcpStep {
@@ -37,31 +43,46 @@ struct IcpStep {
   double mean_squared_error_after = 0.0;
 };
 
-// Finite points relative to `centre`.
-std::vector<Eigen::Vector3d> FinitePoints(const PointCloud& cloud, const Eigen::Vector3d& centre) {
-  std::vector<Eigen::Vector3d> points;
-  points.reserve(cloud.size());
+class Gicp : public pcl::GeneralizedIterativeClosestPoint<Point, Point> {
+ public:
+  int iterations() const { return nr_iterations_; }
+};
+
+Eigen::Vector3d PointOf(const Point& p) { return p.getVector3fMap().cast<double>(); }
+Eigen::Vector3d NormalOf(const Point& p) { return p.getNormalVector3fMap().cast<double>(); }
+
+// Finite points, relative to the cloud's origin.
+Cloud::Ptr FinitePoints(const PointCloud& cloud) {
+  auto points = pcl::make_shared<Cloud>();
   for (const Eigen::Vector3f& p : cloud.points) {
-    if (p.allFinite()) points.emplace_back(p.cast<double>() + (cloud.origin - centre));
+    if (p.allFinite()) points->emplace_back(p.x(), p.y(), p.z());
   }
   return points;
 }
 
-std::vector<Eigen::Vector3d> Select(std::vector<Eigen::Vector3d> points,
-                                    const IcpOptions& options) {
-  const auto count = static_cast<std::size_t>(options.max_points);
-  if (options.selection == IcpSelection::kAll || points.size() <= count) return points;
-  std::vector<Eigen::Vector3d> selected;
+Cloud::Ptr Select(const Cloud::Ptr& points, const IcpOptions& options) {
+  const auto count = static_cast<std::uint32_t>(options.max_points);
+  const auto size = static_cast<std::uint32_t>(points->size());
+  if (options.selection == IcpSelection::kAll || size <= count) return points;
+  auto selected = pcl::make_shared<Cloud>();
   if (options.selection == IcpSelection::kEveryNth) {
-    for (std::size_t i = 0; i < count; ++i) selected.push_back(points[i * points.size() / count]);
+    for (std::size_t i = 0; i < count; ++i) selected->push_back((*points)[i * size / count]);
     return selected;
   }
   SplitMix64 random(options.seed);
-  for (const std::uint32_t i : SampleIndices(
-           static_cast<std::uint32_t>(points.size()), static_cast<std::uint32_t>(count), random)) {
-    selected.push_back(points[i]);
+  for (const std::uint32_t i : SampleIndices(size, count, random)) {
+    selected->push_back((*points)[i]);
   }
   return selected;
+}
+
+// Unit normals towards `sensor`; not finite where neighbours are too few.
+void AddNormals(const Cloud::Ptr& points, const Eigen::Vector3f& sensor, int neighbours) {
+  pcl::NormalEstimation<Point, Point> estimation;
+  estimation.setInputCloud(points);
+  estimation.setKSearch(std::min(neighbours, static_cast<int>(points->size())));
+  estimation.setViewPoint(sensor.x(), sensor.y(), sensor.z());
+  estimation.compute(*points);
 }
 
 // One registration; all coordinates relative to the clouds' own origins.
@@ -72,105 +93,132 @@ class Icp {
   RegistrationResult Run(const Pose& T_guess);
 
  private:
-  std::vector<IcpPair> Match(const Pose& T) const;
-  void KeepMutual(const Pose& T, std::vector<IcpPair>& pairs) const;
-  void Trim(std::vector<IcpPair>& pairs) const;
-  void Weigh(const Pose& T, std::vector<IcpPair>& pairs) const;
-  IcpStep PointToPointStep(const Pose& T, const std::vector<IcpPair>& pairs) const;
-  IcpStep PointToPlaneStep(const Pose& T, const std::vector<IcpPair>& pairs) const;
+  pcl::Correspondences Match(const Pose& T);
+  pcl::Correspondences Project() const;
+  double WeightOf(const pcl::Correspondence& pair) const;
+  // Counts the pairs; false, with the guess as the answer, if they are too few.
+  bool Overlaps(const pcl::Correspondences& pairs,
+                const Pose& T_guess,
+                RegistrationResult& result) const;
+  IcpStep StepOf(const Pose& T, const pcl::Correspondences& pairs) const;
+  IcpStep PointToPointStep(const Pose& T, const pcl::Correspondences& pairs) const;
+  IcpStep PointToPlaneStep(const Pose& T, const pcl::Correspondences& pairs) const;
+  RegistrationResult RunGeneralised(const Pose& T_guess);
   bool WithinBounds(const Pose& T, const Pose& T_guess) const;
 
   const IcpOptions& options_;
-  std::vector<Eigen::Vector3d> source_;  // selected
-  std::vector<Eigen::Vector3d> target_;
-  std::vector<Eigen::Vector3d> source_normals_;  // where a choice needs them
-  std::vector<Eigen::Vector3d> target_normals_;
-  std::unique_ptr<PointIndex> target_index_;
-  std::unique_ptr<PointIndex> source_index_;  // for mutual pairs
+  bool compares_normals_ = false;
+  Cloud::Ptr source_;  // selected
+  Cloud::Ptr target_;
+  Cloud::Ptr moved_ = pcl::make_shared<Cloud>();  // the source where it was matched
+  std::vector<Eigen::Vector3d> target_points_;    // of the image
+  std::optional<ProjectionImage> image_;
+  pcl::registration::CorrespondenceEstimation<Point, Point> closest_;
   double radius_m_ = 1.0;
 };
 
 Icp::Icp(const PointCloud& source, const PointCloud& target, const IcpOptions& options)
     : options_(options),
-      source_(Select(FinitePoints(source, source.origin), options)),
-      target_(FinitePoints(target, target.origin)) {
-  const bool compares_normals = options.weighting == IcpWeighting::kNormalCompatibility ||
-                                options.max_normal_angle_rad < 0.5 * std::numbers::pi;
-  if (compares_normals) source_normals_ = EstimateNormals(source_, options.normal_neighbours);
-  if (compares_normals || options.metric == IcpMetric::kPointToPlane) {
-    target_normals_ = EstimateNormals(target_, options.normal_neighbours);
+      compares_normals_(options.weighting == IcpWeighting::kNormalCompatibility ||
+                        options.max_normal_angle_rad < std::numbers::pi),
+      source_(Select(FinitePoints(source), options)),
+      target_(FinitePoints(target)) {
+  if (source_->empty() || target_->empty()) return;
+  if (compares_normals_) AddNormals(source_, source.sensor_origin, options.normal_neighbours);
+  if (compares_normals_ || options.metric != IcpMetric::kPointToPoint) {
+    AddNormals(target_, target.sensor_origin, options.normal_neighbours);
   }
-  target_index_ =
-      options.matching == IcpMatching::kClosestPoint
-          ? MakeClosestPointIndex(target_)
-          : MakeProjectionIndex(
-                target_, target.sensor_origin.cast<double>(), options.projection_cell_rad);
-  if (options.mutual) source_index_ = MakeClosestPointIndex(source_);
+  if (options.matching == IcpMatching::kClosestPoint) {
+    closest_.setInputTarget(target_);
+  } else {
+    for (const Point& p : *target_) target_points_.push_back(PointOf(p));
+    image_.emplace(
+        target_points_, target.sensor_origin.cast<double>(), options.projection_cell_rad);
+  }
   double squared = 0.0;
-  for (const Eigen::Vector3d& p : source_) squared += p.squaredNorm();
-  if (!source_.empty()) radius_m_ = std::sqrt(squared / static_cast<double>(source_.size()));
+  for (const Point& p : *source_) squared += PointOf(p).squaredNorm();
+  radius_m_ = std::sqrt(squared / static_cast<double>(source_->size()));
 }
 
-std::vector<IcpPair> Icp::Match(const Pose& T) const {
-  std::vector<IcpPair> pairs;
-  const double min_cosine = std::cos(options_.max_normal_angle_rad);
-  for (std::size_t i = 0; i < source_.size(); ++i) {
-    const Eigen::Vector3d p = T * source_[i];
-    const std::size_t j = target_index_->Find(p, options_.max_distance_m);
-    if (j == PointIndex::kNone) continue;
-    if (!source_normals_.empty() &&
-        std::abs((T.linear() * source_normals_[i]).dot(target_normals_[j])) < min_cosine - 1e-12) {
-      continue;
+pcl::Correspondences Icp::Match(const Pose& T) {
+  pcl::Correspondences pairs;
+  if (source_->empty() || target_->empty()) return pairs;
+  pcl::transformPointCloudWithNormals(*source_, *moved_, T.matrix());
+  if (image_.has_value()) {
+    pairs = Project();
+  } else {
+    closest_.setInputSource(moved_);
+    if (options_.mutual) {
+      closest_.determineReciprocalCorrespondences(pairs, options_.max_distance_m);
+    } else {
+      closest_.determineCorrespondences(pairs, options_.max_distance_m);
     }
-    pairs.push_back({i, j, (p - target_[j]).norm(), 1.0});
   }
-  if (options_.mutual) KeepMutual(T, pairs);
-  if (options_.keep_share < 1.0) Trim(pairs);
-  Weigh(T, pairs);
+  if (options_.max_normal_angle_rad < std::numbers::pi) {
+    pcl::registration::CorrespondenceRejectorSurfaceNormal rejector;
+    rejector.initializeDataContainer<Point, Point>();
+    rejector.setInputSource<Point>(moved_);
+    rejector.setInputNormals<Point, Point>(moved_);
+    rejector.setInputTarget<Point>(target_);
+    rejector.setTargetNormals<Point, Point>(target_);
+    rejector.setThreshold(std::cos(options_.max_normal_angle_rad));
+    pcl::Correspondences kept;
+    rejector.getRemainingCorrespondences(pairs, kept);
+    pairs.swap(kept);
+  }
+  if (options_.keep_share < 1.0) {
+    pcl::registration::CorrespondenceRejectorTrimmed rejector;
+    rejector.setOverlapRatio(static_cast<float>(options_.keep_share));
+    pcl::Correspondences kept;
+    rejector.getRemainingCorrespondences(pairs, kept);
+    pairs.swap(kept);
+  }
   return pairs;
 }
 
-void Icp::KeepMutual(const Pose& T, std::vector<IcpPair>& pairs) const {
-  const Pose T_source_target = T.inverse();
-  std::erase_if(pairs, [&](const IcpPair& pair) {
-    const std::size_t back =
-        source_index_->Find(T_source_target * target_[pair.target], 2.0 * options_.max_distance_m);
-    return back != pair.source;
-  });
-}
-
-void Icp::Trim(std::vector<IcpPair>& pairs) const {
-  std::stable_sort(pairs.begin(), pairs.end(), [](const IcpPair& a, const IcpPair& b) {
-    return a.distance_m < b.distance_m;
-  });
-  pairs.resize(
-      static_cast<std::size_t>(std::ceil(options_.keep_share * static_cast<double>(pairs.size()))));
-}
-
-void Icp::Weigh(const Pose& T, std::vector<IcpPair>& pairs) const {
-  if (options_.weighting == IcpWeighting::kUniform) return;
-  for (IcpPair& pair : pairs) {
-    pair.weight =
-        options_.weighting == IcpWeighting::kDistance
-            ? 1.0 - pair.distance_m / options_.max_distance_m
-            : std::abs(
-                  (T.linear() * source_normals_[pair.source]).dot(target_normals_[pair.target]));
+pcl::Correspondences Icp::Project() const {
+  pcl::Correspondences pairs;
+  for (std::size_t i = 0; i < moved_->size(); ++i) {
+    const Eigen::Vector3d p = PointOf((*moved_)[i]);
+    const std::size_t j = image_->Find(p, options_.max_distance_m);
+    if (j == ProjectionImage::kNone) continue;
+    pairs.emplace_back(static_cast<int>(i),
+                       static_cast<int>(j),
+                       static_cast<float>((p - target_points_[j]).squaredNorm()));
   }
+  return pairs;
 }
 
-IcpStep Icp::PointToPointStep(const Pose& T, const std::vector<IcpPair>& pairs) const {
+// 0: a normal that is needed is not there.
+double Icp::WeightOf(const pcl::Correspondence& pair) const {
+  const Eigen::Vector3d n_target = NormalOf((*target_)[pair.index_match]);
+  if (options_.metric != IcpMetric::kPointToPoint && !n_target.allFinite()) return 0.0;
+  if (options_.weighting == IcpWeighting::kUniform) return 1.0;
+  if (options_.weighting == IcpWeighting::kDistance) {
+    return std::max(0.0, 1.0 - std::sqrt(pair.distance) / options_.max_distance_m);
+  }
+  const double cosine = std::abs(NormalOf((*moved_)[pair.index_query]).dot(n_target));
+  return std::isfinite(cosine) ? cosine : 0.0;
+}
+
+IcpStep Icp::StepOf(const Pose& T, const pcl::Correspondences& pairs) const {
+  return options_.metric == IcpMetric::kPointToPoint ? PointToPointStep(T, pairs)
+                                                     : PointToPlaneStep(T, pairs);
+}
+
+IcpStep Icp::PointToPointStep(const Pose& T, const pcl::Correspondences& pairs) const {
   std::vector<Eigen::Vector3d> x;
   std::vector<Eigen::Vector3d> y;
   std::vector<double> weights;
   const Pose T_source_target = T.inverse();
   IcpStep step;
   double total = 0.0;
-  for (const IcpPair& pair : pairs) {
-    x.push_back(source_[pair.source]);
-    y.push_back(T_source_target * target_[pair.target]);
-    weights.push_back(pair.weight);
-    total += pair.weight;
-    step.mean_squared_error_before += pair.weight * pair.distance_m * pair.distance_m;
+  for (const pcl::Correspondence& pair : pairs) {
+    x.push_back(PointOf((*source_)[pair.index_query]));
+    y.push_back(T_source_target * PointOf((*target_)[pair.index_match]));
+    weights.push_back(WeightOf(pair));
+    total += weights.back();
+    step.mean_squared_error_before += weights.back() * (x.back() - y.back()).squaredNorm();
   }
   step.mean_squared_error_before /= std::max(total, 1e-300);
   const UmeyamaResult fit = FitRigidTransform(x, y, weights);
@@ -181,22 +229,25 @@ IcpStep Icp::PointToPointStep(const Pose& T, const std::vector<IcpPair>& pairs) 
   return step;
 }
 
-IcpStep Icp::PointToPlaneStep(const Pose& T, const std::vector<IcpPair>& pairs) const {
+IcpStep Icp::PointToPlaneStep(const Pose& T, const pcl::Correspondences& pairs) const {
   Matrix6d H = Matrix6d::Zero();
   Vector6d b = Vector6d::Zero();
   double error = 0.0;
   double total = 0.0;
-  for (const IcpPair& pair : pairs) {
-    const Eigen::Vector3d& p = source_[pair.source];
+  for (const pcl::Correspondence& pair : pairs) {
+    const double weight = WeightOf(pair);
+    if (weight == 0.0) continue;
+    const Eigen::Vector3d p = PointOf((*source_)[pair.index_query]);
+    const Point& q = (*target_)[pair.index_match];
     // The plane in the source frame; a right-hand step moves p by ω × p + v.
-    const Eigen::Vector3d n = T.linear().transpose() * target_normals_[pair.target];
-    const double r = target_normals_[pair.target].dot(target_[pair.target] - T * p);
+    const Eigen::Vector3d n = T.linear().transpose() * NormalOf(q);
+    const double r = NormalOf(q).dot(PointOf(q) - T * p);
     Vector6d J;
     J << p.cross(n), n;
-    H.noalias() += pair.weight * J * J.transpose();
-    b += pair.weight * r * J;
-    error += pair.weight * r * r;
-    total += pair.weight;
+    H.noalias() += weight * J * J.transpose();
+    b += weight * r * J;
+    error += weight * r * r;
+    total += weight;
   }
   total = std::max(total, 1e-300);
   IcpStep step;
@@ -215,26 +266,30 @@ bool Icp::WithinBounds(const Pose& T, const Pose& T_guess) const {
          RotationAngleRad(moved) <= options_.max_rotation_rad;
 }
 
-RegistrationResult Icp::Run(const Pose& T_guess) {
-  RegistrationResult result;
+bool Icp::Overlaps(const pcl::Correspondences& pairs,
+                   const Pose& T_guess,
+                   RegistrationResult& result) const {
+  result.inliers = static_cast<int>(pairs.size());
+  result.overlap = source_->empty()
+                       ? 0.0
+                       : static_cast<double>(pairs.size()) / static_cast<double>(source_->size());
+  if (pairs.size() >= 3 && result.overlap >= options_.min_overlap) return true;
+  result.termination = Termination::kTooLittleOverlap;
   result.T_target_source = T_guess;
+  return false;
+}
+
+RegistrationResult Icp::Run(const Pose& T_guess) {
+  if (options_.metric == IcpMetric::kPlaneToPlane) return RunGeneralised(T_guess);
+  RegistrationResult result;
   Pose T = T_guess;
   StepExtrapolator extrapolator(options_.extrapolation == IcpExtrapolation::kQuadratic,
                                 options_.max_extrapolation,
                                 radius_m_);
   for (result.iterations = 1;; ++result.iterations) {
-    const std::vector<IcpPair> pairs = Match(T);
-    result.inliers = static_cast<int>(pairs.size());
-    result.overlap = source_.empty()
-                         ? 0.0
-                         : static_cast<double>(pairs.size()) / static_cast<double>(source_.size());
-    if (pairs.size() < 3 || result.overlap < options_.min_overlap) {
-      result.termination = Termination::kTooLittleOverlap;
-      result.T_target_source = T_guess;
-      return result;
-    }
-    const IcpStep step = options_.metric == IcpMetric::kPointToPoint ? PointToPointStep(T, pairs)
-                                                                     : PointToPlaneStep(T, pairs);
+    const pcl::Correspondences pairs = Match(T);
+    if (!Overlaps(pairs, T_guess, result)) return result;
+    const IcpStep step = StepOf(T, pairs);
     result.rms_m = std::sqrt(step.mean_squared_error_before);
     result.information = step.information;
     result.degenerate_directions = step.solution.degenerate_directions;
@@ -260,6 +315,48 @@ RegistrationResult Icp::Run(const Pose& T_guess) {
   }
 }
 
+// What its answer is worth is told by the planes at its end, as for kPointToPlane.
+RegistrationResult Icp::RunGeneralised(const Pose& T_guess) {
+  RegistrationResult result;
+  result.T_target_source = T_guess;
+  const auto enough = static_cast<std::size_t>(options_.normal_neighbours);
+  if (!Overlaps(Match(T_guess), T_guess, result)) return result;
+  if (source_->size() < enough || target_->size() < enough) {
+    result.termination = Termination::kTooLittleOverlap;
+    return result;
+  }
+  Gicp gicp;
+  gicp.setInputSource(source_);
+  gicp.setInputTarget(target_);
+  gicp.setMaxCorrespondenceDistance(options_.max_distance_m);
+  gicp.setMaximumIterations(options_.max_iterations);
+  gicp.setRotationEpsilon(options_.rotation_tolerance_rad);
+  gicp.setTransformationEpsilon(options_.translation_tolerance_m);
+  gicp.setCorrespondenceRandomness(options_.normal_neighbours);
+  Cloud aligned;
+  gicp.align(aligned, T_guess.matrix().cast<float>());
+  Pose T = Pose::Identity();
+  T.matrix() = gicp.getFinalTransformation().cast<double>();
+  result.iterations = gicp.iterations();
+  if (!WithinBounds(T, T_guess)) {
+    result.termination = Termination::kDiverged;
+    result.T_target_source = T_guess;
+    return result;
+  }
+  T = Normalized(T);
+  const pcl::Correspondences pairs = Match(T);
+  if (!Overlaps(pairs, T_guess, result)) return result;
+  const IcpStep step = StepOf(T, pairs);
+  result.T_target_source = T;
+  result.rms_m = std::sqrt(step.mean_squared_error_before);
+  result.information = step.information;
+  result.degenerate_directions = step.solution.degenerate_directions;
+  result.termination = !result.degenerate_directions.empty()         ? Termination::kDegenerate
+                       : gicp.iterations() < options_.max_iterations ? Termination::kConverged
+                                                                     : Termination::kMaxIterations;
+  return result;
+}
+
 }  // namespace
 
 absl::Status IcpOptions::Validate() const {
@@ -269,7 +366,7 @@ absl::Status IcpOptions::Validate() const {
   checks.InRange("max_extrapolation", max_extrapolation, 0.0, 100.0);
   checks.InRange("max_distance_m", max_distance_m, 1e-6, 1e4);
   checks.InRange("keep_share", keep_share, 1e-6, 1.0);
-  checks.InRange("max_normal_angle_rad", max_normal_angle_rad, 1e-3, 0.5 * std::numbers::pi);
+  checks.InRange("max_normal_angle_rad", max_normal_angle_rad, 1e-3, std::numbers::pi);
   checks.InRange("normal_neighbours", normal_neighbours, 3, 64);
   checks.InRange("max_iterations", max_iterations, 1, 10000);
   checks.InRange("rotation_tolerance_rad", rotation_tolerance_rad, 0.0, 1.0);
@@ -278,7 +375,12 @@ absl::Status IcpOptions::Validate() const {
   checks.InRange("max_translation_m", max_translation_m, 0.0, 1e6);
   checks.InRange("max_rotation_rad", max_rotation_rad, 0.0, 3.15);
   checks.InRange("min_eigenvalue_ratio", min_eigenvalue_ratio, 0.0, 1.0);
-  return checks.status();
+  STRATA_RETURN_IF_ERROR(checks.status());
+  if (matching == IcpMatching::kProjection && (mutual || metric == IcpMetric::kPlaneToPlane)) {
+    return absl::InvalidArgumentError(
+        "icp options: mutual pairs and plane-to-plane need closest points; leave out projection");
+  }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<RegistrationResult> RegisterClouds(const PointCloud& source,

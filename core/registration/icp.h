@@ -1,6 +1,6 @@
 // The Iterative Closest Point algorithm on plain point sets (thesis Alg. 3) with the choices of
-// 7.2.2 (Rusinkiewicz and Levoy 2001). For local maps use mls_registration.h: it is faster and
-// drifts less; this one takes any points.
+// 7.2.2 (Rusinkiewicz and Levoy 2001), put together of PCL's parts. For local maps use
+// mls_registration.h: it is faster and drifts less; this one takes any points.
 #ifndef STRATA_CORE_REGISTRATION_ICP_H_
 #define STRATA_CORE_REGISTRATION_ICP_H_
 
@@ -22,7 +22,7 @@ enum class IcpSelection {
 };
 
 enum class IcpMatching {
-  kClosestPoint,  // exact, kd-tree
+  kClosestPoint,  // exact
   // The point whose direction from the target's sensor falls into the same cell of a spherical
   // image of the target (and, while that is empty, of the eight around it): constant time, needs a
   // target seen from one place.
@@ -35,7 +35,13 @@ enum class IcpWeighting {
   kNormalCompatibility  // |n_source · n_target|
 };
 
-enum class IcpMetric { kPointToPoint, kPointToPlane };
+enum class IcpMetric {
+  kPointToPoint,
+  kPointToPlane,
+  // Generalised ICP (Segal, Haehnel, Thrun 2009), which has its own selection (all), matching
+  // (closest points), weighting and steps.
+  kPlaneToPlane
+};
 
 // Longer steps while the last ones point the same way; see extrapolation.h.
 enum class IcpExtrapolation { kNone, kLinear, kQuadratic };
@@ -54,9 +60,11 @@ struct IcpOptions {
   double max_distance_m = 1.0;  // farther pairs are rejected; in (0, 10⁴]
   // Of the pairs left, the share with the smallest distances that is kept (trimmed ICP); in (0, 1].
   double keep_share = 1.0;
-  bool mutual = false;  // keep only pairs that are each other's closest points
-  // Pairs whose normals meet at a larger angle are rejected; in (0, π/2], π/2 rejects none.
-  double max_normal_angle_rad = 1.5707963267948966;
+  // Keep only pairs that are each other's closest points; not with kProjection.
+  bool mutual = false;
+  // Pairs whose normals, towards their sensors, meet at a larger angle are rejected; in (0, π], π
+  // rejects none.
+  double max_normal_angle_rad = 3.141592653589793;
   int normal_neighbours = 10;  // that span a normal; in [3, 64]
 
   int max_iterations = 50;  // in [1, 10000]
@@ -75,8 +83,9 @@ struct IcpOptions {
 
 // Moves `source` onto `target`, starting at the guess. Points that are not finite are ignored, the
 // clouds' double origins are taken into account: T_target_source maps origin + point to origin +
-// point. Deterministic; safe to call from several threads.
-// INVALID_ARGUMENT for invalid options or a guess that is no pose; everything else is an outcome.
+// point. Distances are those of floats, 0.01 mm at 100 m. Deterministic; safe to call from several
+// threads. INVALID_ARGUMENT for invalid options or a guess that is no pose; everything else is an
+// outcome.
 absl::StatusOr<RegistrationResult> RegisterClouds(const PointCloud& source,
                                                   const PointCloud& target,
                                                   const Pose& T_target_source_guess,

@@ -2,8 +2,6 @@
 #ifndef STRATA_CORE_REGISTRATION_LEVELING_H_
 #define STRATA_CORE_REGISTRATION_LEVELING_H_
 
-#include <cstdint>
-
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
@@ -15,10 +13,8 @@ namespace strata {
 struct LevelingOptions {
   double max_tilt_rad = 0.35;  // of the floor's normal to z; in (0, 1]
   double thickness_m = 0.05;   // points within ± this belong to the plane; in [0.001, 1]
-  int hypotheses = 500;        // planes tried; in [10, 100000]
-  int max_points = 20000;      // of the cloud, evenly spread; in [100, 10⁷]
+  int hypotheses = 500;        // planes tried at most; in [10, 100000]
   double min_support = 0.05;   // less is no floor; in (0, 1]
-  std::uint64_t seed = 1;
 
   absl::Status Validate() const;
 };
@@ -32,10 +28,10 @@ struct Leveling {
   double support = 0.0;    // share of the points on the floor, in [0, 1]
 };
 
-// The dominant plane whose normal is within `max_tilt_rad` of z: random triples, most points of a
-// space-thinned cloud win (near surfaces would outvote large ones by their density), then a
-// least-squares fit to them. A pure function. NOT_FOUND when no such plane has `min_support`;
-// INVALID_ARGUMENT for invalid options.
+// The dominant plane whose normal is within `max_tilt_rad` of z, within 100 m of the sensor: random
+// triples, most points of a space-thinned cloud win (near surfaces would outvote large ones by
+// their density), then least-squares fits to them. A pure function. NOT_FOUND when no such plane
+// has `min_support`; INVALID_ARGUMENT for invalid options.
 absl::StatusOr<Leveling> LevelByFloor(const PointCloud& cloud, const LevelingOptions& options = {});
 
 }  // namespace strata

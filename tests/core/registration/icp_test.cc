@@ -93,6 +93,9 @@ INSTANTIATE_TEST_SUITE_P(
         Choice{"PointToPlane",
                With([](IcpOptions& o) { o.metric = IcpMetric::kPointToPlane; }),
                0.003},
+        Choice{"PlaneToPlane",
+               With([](IcpOptions& o) { o.metric = IcpMetric::kPlaneToPlane; }),
+               0.003},
         Choice{"EveryNth",
                With([](IcpOptions& o) {
                  o.selection = IcpSelection::kEveryNth;
@@ -242,6 +245,25 @@ TEST(IcpTest, InvalidOptionsNameEveryViolation) {
   EXPECT_THAT(RegisterClouds(PointCloud(), PointCloud(), Pose::Identity(), options),
               StatusIs(absl::StatusCode::kInvalidArgument,
                        AllOf(HasSubstr("keep_share is 0"), HasSubstr("max_distance_m is nan"))));
+}
+
+TEST(IcpTest, ProjectionHasNoMutualPairs) {
+  IcpOptions options;
+  options.matching = IcpMatching::kProjection;
+  options.mutual = true;
+  EXPECT_THAT(RegisterClouds(PointCloud(), PointCloud(), Pose::Identity(), options),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("projection")));
+}
+
+TEST(IcpTest, TooFewPointsForPlanesAreTooLittleOverlap) {
+  PointCloud few;
+  for (int i = 0; i < 5; ++i) few.points.emplace_back(i, i * i, 0.0F);
+  IcpOptions options;
+  options.metric = IcpMetric::kPlaneToPlane;
+  const Pose guess = MakePose(Eigen::Quaterniond::Identity(), {0.1, 0.0, 0.0});
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto r, RegisterClouds(few, few, guess, options));
+  EXPECT_EQ(r.termination, Termination::kTooLittleOverlap);
+  EXPECT_TRUE(r.T_target_source.isApprox(guess));
 }
 
 TEST(StepExtrapolatorTest, ParabolaFindsItsMinimum) {
