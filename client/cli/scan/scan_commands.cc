@@ -1,4 +1,4 @@
-// strata scan list|show|export|delete; import and label have files of their own.
+// strata scan list|show|export|delete; import, label and register have files of their own.
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,6 +9,7 @@
 
 #include "client/cli/scan/scan_import.h"
 #include "client/cli/scan/scan_label.h"
+#include "client/cli/scan/scan_register.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
@@ -207,6 +208,7 @@ void AddScanCommands(Commands& commands) {
        Show);
   AddExport(commands, noun, options);
   AddScanLabel(commands, noun);
+  AddScanRegister(commands, noun);
   verb("delete",
        "Take a scan and its contribution out of the map",
        "strata scan delete campus segway/12",
