@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
+#include "core/engine/map/scan_pages.h"
 #include "core/posegraph/information.h"
 
 namespace strata {
@@ -38,17 +39,11 @@ absl::Status GraphWorld::ReadScans(StorageReader& reader) {
   ScanQuery query;
   query.state = ScanState::kIntegrated;
   query.skip_damaged = true;  // FindDamagedRows() names them
-  for (bool more = true; more;) {
-    STRATA_ASSIGN_OR_RETURN(std::vector<PosedScan> page, reader.ListScans(query, epoch_));
-    more = page.size() == query.limit;
-    if (!page.empty()) query.after = page.back().scan.number;
-    for (PosedScan& posed : page) {
-      if (!posed.pose.has_value()) continue;
-      nodes_[posed.scan.number] = scans_.size();
-      poses_.push_back(posed.pose->T_map_scan);
-      scans_.push_back(std::move(posed.scan));
-    }
-  }
+  STRATA_RETURN_IF_ERROR(ForEachPosedScan(reader, query, epoch_, [&](PosedScan posed) {
+    nodes_[posed.scan.number] = scans_.size();
+    poses_.push_back(posed.pose->T_map_scan);
+    scans_.push_back(std::move(posed.scan));
+  }));
   std::map<std::string, std::map<std::uint64_t, std::size_t>> by_name;
   for (std::size_t k = 0; k < scans_.size(); ++k) by_name[id(k).trajectory][id(k).sequence] = k;
   places_.resize(scans_.size());

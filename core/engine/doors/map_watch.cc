@@ -9,6 +9,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/map/change_log.h"
+#include "core/engine/map/scan_pages.h"
 
 namespace strata {
 namespace {
@@ -89,13 +90,8 @@ class Watcher {
     ScanQuery query;
     query.skip_damaged = true;
     if (!options_.trajectory.empty()) query.trajectory = options_.trajectory;
-    while (true) {
-      STRATA_ASSIGN_OR_RETURN(const std::vector<PosedScan> page,
-                              reader.ListScans(query, update.epoch));
-      for (const PosedScan& posed : page) AddScan(posed, update);
-      if (page.size() < query.limit) break;
-      query.after = page.back().scan.number;
-    }
+    STRATA_RETURN_IF_ERROR(ForEachScan(
+        reader, query, update.epoch, [&](const PosedScan& posed) { AddScan(posed, update); }));
     if (!options_.tiles) return absl::OkStatus();
     STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> tiles,
                             reader.ListSurfaceTiles(TileRange(), pin.view().tile_version));

@@ -13,24 +13,18 @@
 
 #include "core/common/status.h"
 #include "core/engine/doors/scans.h"
+#include "core/engine/map/scan_pages.h"
 #include "core/world/names.h"
 
 namespace strata {
 namespace {
 
 absl::Status AddNodes(StorageReader& reader, api::PoseGraphState& state) {
-  ScanQuery query;
-  while (true) {
-    STRATA_ASSIGN_OR_RETURN(const std::vector<PosedScan> page,
-                            reader.ListScans(query, state.epoch));
-    for (const PosedScan& posed : page) {
-      const ScanInfo info = ToScanInfo(posed);
-      state.nodes.push_back(
-          {info.header.id, info.header.time, info.state, info.header.T_map_scan, info.T_map_scan});
-    }
-    if (page.size() < query.limit) return absl::OkStatus();
-    query.after = page.back().scan.number;
-  }
+  return ForEachScan(reader, ScanQuery(), state.epoch, [&](const PosedScan& posed) {
+    const ScanInfo info = ToScanInfo(posed);
+    state.nodes.push_back(
+        {info.header.id, info.header.time, info.state, info.header.T_map_scan, info.T_map_scan});
+  });
 }
 
 absl::StatusOr<ScanNumber> NumberOf(StorageReader& reader, const ScanId& id) {

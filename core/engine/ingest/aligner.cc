@@ -13,6 +13,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/common/status.h"
+#include "core/engine/map/scan_pages.h"
 #include "core/engine/scans/matching.h"
 #include "core/registration/mls_registration.h"
 #include "core/registration/neighbours.h"
@@ -59,14 +60,9 @@ absl::Status Aligner::Load(StorageReader& reader, std::uint64_t epoch) {
   ScanQuery query;
   query.state = ScanState::kIntegrated;
   query.skip_damaged = true;  // no neighbour, but no reason to stop either
-  while (true) {
-    STRATA_ASSIGN_OR_RETURN(const std::vector<PosedScan> page, reader.ListScans(query, epoch));
-    for (const PosedScan& posed : page) {
-      if (posed.pose.has_value()) Add(posed.scan, posed.pose->T_map_scan);
-    }
-    if (page.size() < query.limit) return absl::OkStatus();
-    query.after = page.back().scan.number;
-  }
+  return ForEachPosedScan(reader, query, epoch, [&](const PosedScan& posed) {
+    Add(posed.scan, posed.pose->T_map_scan);
+  });
 }
 
 void Aligner::Add(const ScanRecord& scan, const Pose& T_map_scan) {

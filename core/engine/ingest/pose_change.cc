@@ -10,6 +10,7 @@
 #include "absl/status/status.h"
 
 #include "core/common/status.h"
+#include "core/engine/map/scan_pages.h"
 
 namespace strata {
 namespace {
@@ -27,14 +28,8 @@ absl::StatusOr<PoseChange> PoseChange::Read(StorageReader& reader, std::uint64_t
   ScanQuery query;
   query.state = ScanState::kIntegrated;
   query.skip_damaged = true;  // it keeps its pose, and verify names it
-  for (bool more = true; more;) {
-    STRATA_ASSIGN_OR_RETURN(std::vector<PosedScan> page, reader.ListScans(query, epoch));
-    more = page.size() == query.limit;
-    if (!page.empty()) query.after = page.back().scan.number;
-    for (PosedScan& posed : page) {
-      if (posed.pose.has_value()) change.scans_.push_back(std::move(posed));
-    }
-  }
+  STRATA_RETURN_IF_ERROR(ForEachPosedScan(
+      reader, query, epoch, [&](PosedScan posed) { change.scans_.push_back(std::move(posed)); }));
   change.partners_.resize(change.scans_.size());
   std::map<ScanNumber, std::size_t> index;
   std::map<std::string, std::map<std::uint64_t, std::size_t>> trajectories;

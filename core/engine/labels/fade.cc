@@ -20,6 +20,7 @@
 #include "core/common/status.h"
 #include "core/engine/map/job_parameters.h"
 #include "core/engine/map/parallel.h"
+#include "core/engine/map/scan_pages.h"
 #include "core/engine/scans/scan_labels.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/engine/tiles/mls_tiles.h"
@@ -75,14 +76,9 @@ class Fading {
     const std::uint64_t epoch = core_.snapshots().current().epoch;
     ScanQuery query;
     query.state = ScanState::kIntegrated;
-    while (true) {
-      STRATA_ASSIGN_OR_RETURN(std::vector<PosedScan> page, reader->ListScans(query, epoch));
-      if (page.empty()) break;
-      query.after = page.back().scan.number;
-      for (PosedScan& posed : page) {
-        if (posed.pose.has_value()) AddScan(std::move(posed.scan), posed.pose->T_map_scan);
-      }
-    }
+    STRATA_RETURN_IF_ERROR(ForEachPosedScan(*reader, query, epoch, [&](PosedScan posed) {
+      AddScan(std::move(posed.scan), posed.pose->T_map_scan);
+    }));
     std::reverse(scans_.begin(), scans_.end());
     return absl::OkStatus();
   }

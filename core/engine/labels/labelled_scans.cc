@@ -6,6 +6,7 @@
 
 #include "core/classification/regions.h"
 #include "core/common/status.h"
+#include "core/engine/map/scan_pages.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/world/map_class.h"
 
@@ -31,16 +32,11 @@ absl::StatusOr<std::vector<PosedScan>> ScansWithLabels(MapCore& core) {
   std::vector<PosedScan> scans;
   ScanQuery query;
   query.skip_damaged = true;  // verify names it
-  for (bool more = true; more;) {
-    STRATA_ASSIGN_OR_RETURN(std::vector<PosedScan> page,
-                            reader->ListScans(query, core.snapshots().current().epoch));
-    more = page.size() == query.limit;
-    if (!page.empty()) query.after = page.back().scan.number;
-    for (PosedScan& posed : page) {
-      const bool labelled = posed.scan.header.has_label || posed.scan.person_labels;
-      if (labelled && posed.scan.has_points) scans.push_back(std::move(posed));
-    }
-  }
+  const std::uint64_t epoch = core.snapshots().current().epoch;
+  STRATA_RETURN_IF_ERROR(ForEachScan(*reader, query, epoch, [&](PosedScan posed) {
+    const bool labelled = posed.scan.header.has_label || posed.scan.person_labels;
+    if (labelled && posed.scan.has_points) scans.push_back(std::move(posed));
+  }));
   return scans;
 }
 

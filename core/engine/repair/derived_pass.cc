@@ -14,6 +14,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/map/parallel.h"
+#include "core/engine/map/scan_pages.h"
 #include "core/engine/scans/scan_share.h"
 #include "core/engine/scans/scan_source.h"
 
@@ -36,20 +37,14 @@ absl::Status DerivedPass::Run(DerivedSink& sink) {
 }
 
 absl::Status DerivedPass::ListScans(StorageReader& reader) {
-  ScanQuery query;
-  while (true) {
-    STRATA_ASSIGN_OR_RETURN(std::vector<PosedScan> page, reader.ListScans(query, options_.epoch));
-    if (page.empty()) return absl::OkStatus();
-    query.after = page.back().scan.number;
-    for (PosedScan& posed : page) {
-      const Pose& T_map_scan =
-          posed.pose.has_value() ? posed.pose->T_map_scan : posed.scan.header.T_map_scan;
-      indexes_[posed.scan.number].footprint = FootprintOf(posed.scan.box_scan, T_map_scan);
-      if (posed.scan.state == ScanState::kIntegrated) {
-        placed_.push_back({std::move(posed.scan), T_map_scan});
-      }
+  return ForEachScan(reader, ScanQuery(), options_.epoch, [&](PosedScan posed) {
+    const Pose T_map_scan =
+        posed.pose.has_value() ? posed.pose->T_map_scan : posed.scan.header.T_map_scan;
+    indexes_[posed.scan.number].footprint = FootprintOf(posed.scan.box_scan, T_map_scan);
+    if (posed.scan.state == ScanState::kIntegrated) {
+      placed_.push_back({std::move(posed.scan), T_map_scan});
     }
-  }
+  });
 }
 
 absl::Status DerivedPass::IndexScans(StorageReader& reader, DerivedSink& sink) {

@@ -5,32 +5,15 @@
 #include <string>
 #include <utility>
 
-#include "absl/functional/function_ref.h"
 #include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
+#include "core/engine/map/scan_pages.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/world/epoch.h"
 
 namespace strata {
 namespace {
-
-// Integrated scans, by number, at their poses of `epoch`; those that have none are left out.
-absl::Status ForEachPlaced(StorageReader& reader,
-                           std::uint64_t epoch,
-                           absl::FunctionRef<void(PosedScan)> body) {
-  ScanQuery query;
-  query.state = ScanState::kIntegrated;
-  for (bool more = true; more;) {
-    STRATA_ASSIGN_OR_RETURN(std::vector<PosedScan> page, reader.ListScans(query, epoch));
-    more = page.size() == query.limit;
-    if (!page.empty()) query.after = page.back().scan.number;
-    for (PosedScan& posed : page) {
-      if (posed.pose.has_value()) body(std::move(posed));
-    }
-  }
-  return absl::OkStatus();
-}
 
 // Whether a scan may touch the range or the tiles around it.
 bool MayTouch(const PlacedScanRecord& scan, const TileRange& range, double cell_size_m) {
@@ -86,11 +69,14 @@ absl::StatusOr<bool> EpochTiles::Read(StorageReader& reader,
     core_.snapshots().AwaitPublished(clock.tile_version);
     return false;
   }
+  ScanQuery integrated;
+  integrated.state = ScanState::kIntegrated;
   absl::btree_map<ScanNumber, Pose> now;
-  STRATA_RETURN_IF_ERROR(ForEachPlaced(reader, clock.epoch, [&](const PosedScan& posed) {
-    now[posed.scan.number] = posed.pose->T_map_scan;
-  }));
-  STRATA_RETURN_IF_ERROR(ForEachPlaced(reader, epoch, [&](PosedScan posed) {
+  STRATA_RETURN_IF_ERROR(
+      ForEachPosedScan(reader, integrated, clock.epoch, [&](const PosedScan& posed) {
+        now[posed.scan.number] = posed.pose->T_map_scan;
+      }));
+  STRATA_RETURN_IF_ERROR(ForEachPosedScan(reader, integrated, epoch, [&](PosedScan posed) {
     const Pose T_map_scan = posed.pose->T_map_scan;
     scans_.push_back({std::move(posed.scan), T_map_scan});
   }));

@@ -1,0 +1,34 @@
+#include "core/engine/map/scan_pages.h"
+
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+#include "core/common/status.h"
+
+namespace strata {
+
+absl::Status ForEachScan(StorageReader& reader,
+                         ScanQuery query,
+                         std::uint64_t epoch,
+                         absl::FunctionRef<void(PosedScan)> body) {
+  for (bool more = true; more;) {
+    STRATA_ASSIGN_OR_RETURN(std::vector<PosedScan> page, reader.ListScans(query, epoch));
+    more = page.size() == query.limit;
+    if (!page.empty()) query.after = page.back().scan.number;
+    for (PosedScan& posed : page) body(std::move(posed));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ForEachPosedScan(StorageReader& reader,
+                              const ScanQuery& query,
+                              std::uint64_t epoch,
+                              absl::FunctionRef<void(PosedScan)> body) {
+  return ForEachScan(reader, query, epoch, [&](PosedScan posed) {
+    if (posed.pose.has_value()) body(std::move(posed));
+  });
+}
+
+}  // namespace strata

@@ -1,0 +1,29 @@
+// The one loop over the scans of a map.
+#ifndef STRATA_CORE_ENGINE_MAP_SCAN_PAGES_H_
+#define STRATA_CORE_ENGINE_MAP_SCAN_PAGES_H_
+
+#include <cstdint>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+
+#include "core/storage/storage.h"
+
+namespace strata {
+
+// Each scan that `query` asks for, by number, with its pose of `epoch`; a page of query.limit is in
+// memory at a time. Errors are those of StorageReader::ListScans().
+absl::Status ForEachScan(StorageReader& reader,
+                         ScanQuery query,
+                         std::uint64_t epoch,
+                         absl::FunctionRef<void(PosedScan)> body);
+
+// Of those the ones that have a pose in it.
+absl::Status ForEachPosedScan(StorageReader& reader,
+                              const ScanQuery& query,
+                              std::uint64_t epoch,
+                              absl::FunctionRef<void(PosedScan)> body);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_MAP_SCAN_PAGES_H_
