@@ -15,6 +15,7 @@ deploy/install-packages.sh --dev
 stage "includes"
 python3 tests/check_includes.py
 python3 tests/check_names.py
+python3 tests/check_doors.py
 
 stage "format"
 git ls-files '*.h' '*.cc' '*.proto' | xargs clang-format --dry-run --Werror
