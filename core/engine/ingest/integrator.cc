@@ -20,6 +20,7 @@
 #include "core/engine/scans/scan_losses.h"
 #include "core/engine/scans/scan_share.h"
 #include "core/engine/scans/scan_source.h"
+#include "core/engine/tiles/tile_rows.h"
 
 namespace strata {
 namespace {
@@ -57,25 +58,6 @@ std::uint64_t BytesOf(const std::vector<MlsTileRow>& rows, const TileChange& cha
 bool IsFaultOfScan(const absl::Status& status) {
   return absl::IsDataLoss(status) || absl::IsInvalidArgument(status) ||
          absl::IsUnimplemented(status) || absl::IsOutOfRange(status);
-}
-
-// Makes the rows of `change` the current ones; `rows` are of its tiles.
-absl::Status WriteTileChange(StorageWriter& writer,
-                             const TileChange& change,
-                             const std::vector<MlsTileRow>& rows,
-                             std::uint64_t collect_floor) {
-  for (const auto& [key, tile] : change.tiles) {
-    if (tile == nullptr) STRATA_RETURN_IF_ERROR(writer.DeleteMlsTile(key));
-  }
-  for (const MlsTileRow& row : rows) {
-    STRATA_RETURN_IF_ERROR(writer.DeleteOlderMlsTiles(row.key, change.version));
-    STRATA_RETURN_IF_ERROR(writer.PutMlsTile(row));
-  }
-  for (const SurfaceTileRow& row : change.surfaces) {
-    STRATA_RETURN_IF_ERROR(writer.PutSurfaceTile(row));
-    STRATA_RETURN_IF_ERROR(writer.CollectSurfaceTile(row.key, collect_floor));
-  }
-  return writer.PublishTiles(change.version, true);
 }
 
 }  // namespace
@@ -131,14 +113,12 @@ absl::Status Integrator::Commit(const TileChange& change,
                                 const std::vector<ScanId>& scans,
                                 absl::FunctionRef<absl::Status(StorageWriter&)> decision,
                                 bool awaited) {
-  const double cell_size_m = core_.info().parameters.mls.cell_size_m;
   const std::uint64_t floor = core_.snapshots().Floor();
-  std::vector<MlsTileRow> rows;  // encoded here: acknowledgements wait for the writer
-  for (const auto& [key, tile] : change.tiles) {
-    if (tile == nullptr) continue;
-    STRATA_ASSIGN_OR_RETURN(MlsTileRow row, MakeMlsTileRow(*tile, change.version, cell_size_m));
-    rows.push_back(std::move(row));
-  }
+  STRATA_ASSIGN_OR_RETURN(
+      const std::vector<MlsTileRow> rows,
+      EncodeTileRows(change.tiles, change.version, core_.info().parameters.mls.cell_size_m));
+  TileRowKeys keys;
+  keys.Add(change.tiles, change.surfaces);
   // What nobody waits for leaves room for what somebody may: to delete.
   if (!awaited) {
     STRATA_RETURN_IF_ERROR(core_.disk().CheckForIntegration(BytesOf(rows, change)));
@@ -147,7 +127,9 @@ absl::Status Integrator::Commit(const TileChange& change,
       scans, NoticesOf(change.surfaces), awaited, [&](StorageWriter& writer) -> absl::Status {
         // First what may free pages: a scan can be deleted from a file that may not grow.
         STRATA_RETURN_IF_ERROR(decision(writer));
-        return WriteTileChange(writer, change, rows, floor);
+        STRATA_RETURN_IF_ERROR(RetireTileRows(writer, keys, change.version, floor));
+        STRATA_RETURN_IF_ERROR(PutTileRows(writer, rows, change.surfaces));
+        return writer.PublishTiles(change.version, true);
       });
   if (!committed.ok()) {
     aligner_loaded_ = false;  // it may know of scans that were not committed

@@ -24,40 +24,15 @@ StagedTiles::~StagedTiles() {
 }
 
 absl::Status StagedTiles::Put(const MlsTileMap& tiles, const SurfaceTileMaker::Rows& surfaces) {
-  const double cell_size_m = core_.info().parameters.mls.cell_size_m;
-  std::vector<MlsTileRow> rows;
-  for (const auto& [key, tile] : tiles) {
-    changed_.insert(key);
-    if (tile == nullptr) {
-      gone_.insert(key);
-    } else {
-      STRATA_ASSIGN_OR_RETURN(MlsTileRow row, MakeMlsTileRow(*tile, version_, cell_size_m));
-      rows.push_back(std::move(row));
-    }
-  }
-  for (const SurfaceTileRow& row : surfaces) served_.insert(row.key);
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MlsTileRow> rows,
+                          EncodeTileRows(tiles, version_, core_.info().parameters.mls.cell_size_m));
+  keys_.Add(tiles, surfaces);
   const std::vector<api::TileChangeNotice> notices = NoticesOf(surfaces);
   notices_.insert(notices_.end(), notices.begin(), notices.end());
   if (rows.empty() && surfaces.empty()) return absl::OkStatus();
-  return core_.writer().Run(
-      Durability::kRelaxed, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
-        for (const MlsTileRow& row : rows) STRATA_RETURN_IF_ERROR(writer.PutMlsTile(row));
-        for (const SurfaceTileRow& row : surfaces) {
-          STRATA_RETURN_IF_ERROR(writer.PutSurfaceTile(row));
-        }
-        return absl::OkStatus();
-      });
-}
-
-absl::Status StagedTiles::RetireOld(StorageWriter& writer, std::uint64_t floor) const {
-  for (const TileKey& key : changed_) {
-    STRATA_RETURN_IF_ERROR(gone_.contains(key) ? writer.DeleteMlsTile(key)
-                                               : writer.DeleteOlderMlsTiles(key, version_));
-  }
-  for (const TileKey& key : served_) {
-    STRATA_RETURN_IF_ERROR(writer.CollectSurfaceTile(key, floor));
-  }
-  return absl::OkStatus();
+  return core_.writer().Run(Durability::kRelaxed, 0, Stop(), [&](StorageWriter& writer) {
+    return PutTileRows(writer, rows, surfaces);
+  });
 }
 
 absl::Status StagedTiles::Publish(const std::vector<ScanId>& scans,
@@ -65,7 +40,7 @@ absl::Status StagedTiles::Publish(const std::vector<ScanId>& scans,
   const std::uint64_t floor = core_.snapshots().Floor();
   STRATA_RETURN_IF_ERROR(
       core_.Publish(scans, notices_, true, [&](StorageWriter& writer) -> absl::Status {
-        STRATA_RETURN_IF_ERROR(RetireOld(writer, floor));
+        STRATA_RETURN_IF_ERROR(RetireTileRows(writer, keys_, version_, floor));
         STRATA_RETURN_IF_ERROR(writer.PublishTiles(version_, true));
         return decision(writer);
       }));

@@ -6,13 +6,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "absl/container/btree_set.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 
 #include "core/engine/map/map_core.h"
 #include "core/engine/tiles/mls_tiles.h"
 #include "core/engine/tiles/surface_tiles.h"
+#include "core/engine/tiles/tile_rows.h"
 
 namespace strata {
 
@@ -36,17 +36,15 @@ class StagedTiles {
                        absl::FunctionRef<absl::Status(StorageWriter&)> decision);
 
   // Tiles that were put, of either kind.
-  std::size_t changed() const { return changed_.size() + served_.size(); }
+  std::size_t changed() const {
+    return keys_.tiles.size() + keys_.gone.size() + keys_.surfaces.size();
+  }
 
  private:
-  absl::Status RetireOld(StorageWriter& writer, std::uint64_t floor) const;
-
   MapCore& core_;
   const std::uint64_t version_;
   bool published_ = false;
-  absl::btree_set<TileKey> changed_;
-  absl::btree_set<TileKey> gone_;
-  absl::btree_set<TileKey> served_;
+  TileRowKeys keys_;
   std::vector<api::TileChangeNotice> notices_;
 };
 
