@@ -39,6 +39,7 @@ set(CPACK_DEBIAN_PYTHON_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3-grpcio, python3-numpy, python3-protobuf, python3-xxhash, python3-zstandard")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "strata") # strata.register
 set(CPACK_COMPONENT_PYTHON_DESCRIPTION "Python client of the map database Strata
  Arrays of points in, arrays of surfaces and paths out.")
 include(CPack)

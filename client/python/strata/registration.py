@@ -1,0 +1,80 @@
+"""Where one scan is in the frame of another, without a map or a server: `strata scan register`, which must be installed."""
+import dataclasses
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+
+import numpy as np
+
+from strata import errors, poses
+
+_METHODS = ("mls", "icp", "plane", "trimmed", "gicp")
+
+
+@dataclasses.dataclass(frozen=True)
+class Registration:
+    """Where a scan was found to be."""
+
+    T_target_source: np.ndarray  # 4 × 4
+    converged: bool
+    termination: str  # why it ended, in words
+    overlap: float  # share of the source that lies on the target, in [0, 1]
+    rms_m: float  # of the pairs that count
+    sigma_m: float  # standard deviation along the least certain axis; 0 where one is open
+    sigma_rad: float
+    undetermined_directions: int  # of six, in which the pairs say nothing
+    iterations: int
+
+
+def _file(points, folder, name):
+    """The path of a scan: its own, or that of a PCD file of an N × 3 array."""
+    if isinstance(points, (str, os.PathLike)):
+        return os.fspath(points)
+    xyz = np.asarray(points)
+    if xyz.ndim != 2 or xyz.shape[1] != 3 or not len(xyz):
+        raise ValueError(f"{name} of shape {xyz.shape}; expected (N, 3) or a file")
+    path = os.path.join(folder, name + ".pcd")
+    with open(path, "wb") as file:
+        file.write(f"VERSION 0.7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {len(xyz)}\nHEIGHT 1\n"
+                   f"VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {len(xyz)}\nDATA binary\n".encode())
+        file.write(np.ascontiguousarray(xyz, dtype="<f8").tobytes())
+    return path
+
+
+def _guess(pose):
+    """x,y,z,qx,qy,qz,qw: what a command line takes, without losing a digit."""
+    message = poses.to_proto(poses.matrix(pose))
+    t, q = message.translation, message.rotation
+    return ",".join(repr(number) for number in (t.x, t.y, t.z, q.x, q.y, q.z, q.w))
+
+
+def register(source, target, guess=None, *, method="mls", picture=None, max_distance=None, program="strata"):
+    """Where `source` is in the frame of `target` → Registration; both N × 3 arrays of metres, or files that
+    `strata scan import` reads.
+
+    `guess`: T_target_source roughly, as every pose; None: where it says. `method`: "mls", as maps are aligned; of points
+    "icp", "plane", "trimmed" or "gicp". `max_distance`: farther pairs are none [m]. `picture`: a PNG of both is written
+    there. Raises ValueError, StrataError, and FileNotFoundError where `program` is not installed.
+    """
+    if method not in _METHODS:
+        raise ValueError(f"method {method!r}; expected one of {', '.join(_METHODS)}")
+    found = shutil.which(program)
+    if found is None:
+        raise FileNotFoundError(f"{program} is not on the PATH; install the package strata, or name the program")
+    with tempfile.TemporaryDirectory() as folder:
+        command = [found, "scan", "register", "--output", "json", _file(source, folder, "source"),
+                   _file(target, folder, "target"), "--method", method, "--guess", _guess(guess)]
+        if max_distance is not None:
+            command += ["--max-distance", repr(float(max_distance))]
+        if picture is not None:
+            command += ["--picture", os.fspath(pathlib.Path(picture).absolute())]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise errors.StrataError(done.stderr.strip() or f"{program} ended with {done.returncode}")
+    answer = json.loads(done.stdout)
+    fields = {field.name: answer[field.name] for field in dataclasses.fields(Registration)}
+    pose = fields["T_target_source"]
+    return Registration(**{**fields, "T_target_source": poses.matrix((pose[:3], pose[3:]))})
