@@ -36,7 +36,7 @@ sys.path.append(str(ROOT / "tests/bench"))
 from endurance import HALF_M, MAP, scan_at  # pylint: disable=wrong-import-position
 from stratad import Stratad  # pylint: disable=wrong-import-position
 
-PERIOD_S = 0.2  # of a well-behaved client
+PERIOD_S = 0.5  # of a well-behaved client: four of them leave half of two cores idle
 GOOD = ("upload", "upload", "fetch", "plan")
 PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 
