@@ -22,7 +22,7 @@ namespace strata::server {
 // for anybody. Must not outlive what it is given. Thread-safe.
 class Door final : public grpc::AuthMetadataProcessor {
  public:
-  // Of the connections of one lane.
+  // The door of the connections of one lane.
   Door(Runtime& runtime, Connections& connections, int lane)
       : runtime_(runtime), connections_(connections), lane_(lane) {}
 
@@ -46,7 +46,7 @@ class Door final : public grpc::AuthMetadataProcessor {
   const int lane_;
 };
 
-// Of connections in plain text, for which gRPC's C++ has no processor.
+// Credentials of connections in plain text, for which gRPC's C++ has no processor.
 std::shared_ptr<grpc::ServerCredentials> PlainCredentials(std::shared_ptr<Door> door);
 
 }  // namespace strata::server

@@ -23,7 +23,7 @@
 namespace strata::server {
 namespace {
 
-// Of the same bytes as HealthCheckRequest and HealthCheckResponse.
+// Their bytes are those of HealthCheckRequest and HealthCheckResponse.
 using Asked = google::protobuf::StringValue;
 using Told = google::protobuf::Int32Value;
 

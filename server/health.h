@@ -29,7 +29,7 @@ class Health final : public grpc::Service {
   // Its calls leave the arrivals of `runtime` under these names.
   explicit Health(Runtime& runtime);
 
-  // Of the server as a whole: "", which is serving from the beginning. Watches are told.
+  // The server as a whole is "", which is serving from the beginning. Watches are told.
   void Set(const std::string& service, bool serving);
   // Nothing is serving from now on.
   void Shutdown();
@@ -38,7 +38,7 @@ class Health final : public grpc::Service {
   friend class HealthReactor;
 
   static constexpr int kReads = 4;  // at a time; each up to the largest message
-  // Of one host, until they are read; meanwhile a window's worth of each is kept.
+  // Requests of one host until they are read; meanwhile a window's worth of each is kept.
   static constexpr int kHostRequests = 8;
   static constexpr int kHostWatches = 64;
   static constexpr int kRequests = 512;

@@ -59,13 +59,13 @@ constexpr int kMaxMetadataBytes = 16 << 10;
 constexpr int kHandshakeMs = 10'000;
 // At a time: all calls that begin in it are made before the first of them is judged.
 constexpr int kReadBytes = 8 << 10;
-// Of all connections together: some 40 KB each, and the messages on their way. Where it is used up,
-// new connections are refused.
+// Memory of all connections together: some 40 KB each, and the messages on their way. Where it is
+// used up, new connections are refused.
 constexpr std::size_t kTransportBytes = std::size_t{36} << 20;
 // A connection without calls; a client that comes again connects again by itself.
 constexpr int kIdleConnectionMs = 10 * 60 * 1000;
-// Of connections that are cut together. gRPC copies all lanes' names for each connection: with 256
-// of them ten thousand connections took half a core for ten seconds.
+// Connections of one lane are cut together. gRPC copies all lanes' names for each connection: with
+// 256 of them ten thousand connections took half a core for ten seconds.
 constexpr int kLanes = 32;
 constexpr absl::Duration kReadinessInterval = absl::Seconds(1);
 // After the last connection that was refused, or the last commit that failed.
@@ -149,7 +149,7 @@ std::string WhyNoDisk(const EngineHealth& health) {
   return absl::StrCat(health.disk_free_bytes >> 20, " MiB are free where the maps are");
 }
 
-// Of the database and of the door.
+// Checks of the database and of the door.
 std::vector<ReadinessCheck> OwnChecks(api::Database& db, const Listener& listener) {
   return {{"disk", [&db] { return WhyNoDisk(HealthOf(db)); }},
           {"maps",

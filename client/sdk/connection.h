@@ -29,7 +29,7 @@ class Connection {
   Canceller& canceller() { return canceller_; }
   const std::string& token() const { return options_.token; }
   Backoff NewBackoff() const { return Backoff(options_.backoff); }
-  // Of one who waits for the server as long as it takes.
+  // For one who waits for the server as long as it takes.
   Backoff NewEndlessBackoff() const {
     BackoffOptions endless = options_.backoff;
     endless.max_attempts = 0;

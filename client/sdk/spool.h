@@ -66,7 +66,7 @@ class Spool {
   absl::Status Send(const api::Call& call, api::Database& database);
 
   SpoolStatus status() const;
-  // Of this map and trajectory, whatever became of them; in the order of Add().
+  // Scans of this map and trajectory, whatever became of them; in the order of Add().
   std::vector<ScanId> Waiting(absl::string_view map) const;
 
  private:

@@ -23,7 +23,7 @@ class ConfusionMatrix {
   }
   // Both of equal length.
   void Add(std::span<const ClassIndex> truth, std::span<const ClassIndex> given);
-  // Of the same classes.
+  // `other` is of the same classes.
   void Add(const ConfusionMatrix& other);
 
   std::size_t classes() const { return classes_; }
@@ -34,9 +34,9 @@ class ConfusionMatrix {
 
   // Share of all points that are right; 0 without points.
   double Accuracy() const;
-  // Of the points that were given the class, the share that is of it; nullopt if none was.
+  // Share of the points given the class that is of it; nullopt if none was.
   std::optional<double> Precision(std::size_t k) const;
-  // Of the points of the class, the share that was found; nullopt if there is none.
+  // Share of the points of the class that was found; nullopt if there is none.
   std::optional<double> Recall(std::size_t k) const;
   // Intersection over union; nullopt if no point is of the class or was given it.
   std::optional<double> Iou(std::size_t k) const;

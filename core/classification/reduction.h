@@ -57,7 +57,7 @@ struct ReducedPoints {
   std::vector<Eigen::Vector3f> positions;
   LabelledFeatures data;
   std::vector<std::uint32_t> counts;  // how many points each stands for
-  // Of trees (kDepth, kPure): for every point given, which of these stands for it. Empty where
+  // With trees (kDepth, kPure): for every point given, which of these stands for it. Empty where
   // points were drawn, or all are kept: they stand for themselves.
   std::vector<std::uint32_t> row_of;
 };

@@ -17,7 +17,7 @@ namespace {
 
 // Features are half of the work, learning the other.
 constexpr double kFeaturesShare = 0.5;
-// Of all clouds together, where the reduction draws by class: more say little more.
+// Most points of all clouds together, where the reduction draws by class: more say little more.
 constexpr std::size_t kMostDrawn = 100'000;
 // Whatever the reduction: a gigabyte of features, with what learning adds.
 constexpr std::size_t kMostRows = 1'000'000;

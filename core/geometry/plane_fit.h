@@ -14,7 +14,7 @@ namespace strata {
 struct PointsPlaneFit {
   Plane plane;           // Canonical(); contains `mean`
   Eigen::Vector3d mean;  // weighted
-  // Of the weighted covariance of the points, ascending [m²]; the normal belongs to the first.
+  // Eigenvalues of the points' weighted covariance, ascending [m²]; the first is the normal's.
   Eigen::Vector3d eigenvalues;
   double mean_squared_residual_m2 = 0.0;  // weighted mean of the squared distances to the plane
 };

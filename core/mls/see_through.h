@@ -37,7 +37,7 @@ struct SeeThroughOptions {
   absl::Status Validate() const;
 };
 
-// Of one scan after the other, newest first; for each BeginScan(), TakePoints() for all of its
+// Takes one scan after the other, newest first; for each BeginScan(), TakePoints() for all of its
 // points, LookAlong() for all of its points, EndScan(). Not thread-safe. Some 60 bytes a stretch.
 class SeeThrough {
  public:
@@ -97,7 +97,7 @@ class SeeThrough {
   std::pair<double, double> OverWindow(const Eigen::Vector3d& ray) const;
   CellIndex CellAt(const Eigen::Vector3d& point) const;
   std::span<const Column> ColumnsOf(CellIndex cell) const;
-  // Of the point, or nullptr.
+  // The stretch that the point is in, or nullptr.
   Stretch* StretchAt(const Eigen::Vector3d& point);
   bool Gone(const Stretch& stretch) const;
   void LookAlong(const Eigen::Vector3d& end);

@@ -50,7 +50,7 @@ using SurfaceNeighbourhood = std::array<const SurfaceTile*, 9>;
 // What was found out about one surface.
 struct SurfaceAssessment {
   Traversability traversability = Traversability::kUnknown;
-  // Of the plane; a zero normal, slope 0 and roughness 0 where there are too few neighbours.
+  // The plane's; a zero normal, slope 0 and roughness 0 where there are too few neighbours.
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   float slope_rad = 0.0F;
   float roughness_m = 0.0F;

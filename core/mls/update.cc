@@ -73,7 +73,7 @@ MlsUpdater::Outcome MlsUpdater::Update(CellIndex cell,
     Patch& patch = nodes_[i].patch;
     const double distance_m = std::abs(patch.mean_m() - z_m);
     inside_vertical = inside_vertical || InsideVertical(patch, z_ticks);
-    // Of two patches equally near the lower one, so that the order of the chain decides nothing.
+    // The lower of two patches equally near, so that the order of the chain decides nothing.
     if (distance_m < nearest_distance_m ||
         (distance_m == nearest_distance_m && patch.z_min < nearest->z_min)) {
       nearest_distance_m = distance_m;

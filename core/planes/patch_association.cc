@@ -25,8 +25,8 @@ namespace strata {
 namespace {
 
 constexpr double kCubeM = 8.0;
-// Of areas: a much smaller patch brings no larger one in (it may bridge a kerb), and in the same
-// scan neither wins against it nor makes a draw.
+// Ratio of areas: a much smaller patch brings no larger one in (it may bridge a kerb), and in the
+// same scan neither wins against it nor makes a draw.
 constexpr double kMinShare = 0.25;
 constexpr double kByFar = 2.0;
 
@@ -169,9 +169,8 @@ class PatchAssociation {
     });
   }
 
-  // Of surfaces of one scan that are not one plane, the poses cannot say which is the group's (a
-  // floor and a ramp, a road and its kerb): the nearest to what the other scans saw is, if by far,
-  // and otherwise none.
+  // Poses cannot say which of several surfaces of one scan is the group's (a floor and a ramp, a
+  // road and its kerb): the nearest to what the other scans saw is, if by far, and otherwise none.
   void SettleRivals(const std::vector<std::uint32_t>& rivals, std::vector<std::uint32_t>& group) {
     std::map<std::size_t, std::vector<std::uint32_t>> of_scan;
     for (const std::uint32_t i : rivals) of_scan[patches_[i].scan].push_back(i);

@@ -41,8 +41,8 @@ struct SharedPlane {
 // max(rms, sigma_floor_m)² + s², where rms is the feature's own and s that of the plane's views
 // about it: what disagrees pulls less.
 struct SharedPlaneOptions {
-  // Of a scan's pose relative to the others that see a plane: what the gates of 3σ allow for beside
-  // the spread of the features. Larger finds more planes and joins more that are none; in
+  // Error of a scan's pose relative to the others that see a plane: what the gates of 3σ allow for
+  // beside the spread of the features. Larger finds more planes and joins more that are none; in
   // [0, 10] and [0, 0.3].
   double pose_sigma_m = 0.03;
   double pose_sigma_rad = 0.005;

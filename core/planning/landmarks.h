@@ -22,7 +22,7 @@ namespace strata {
 
 inline constexpr int kMaxLandmarks = 16;
 
-// Of one snapshot and one profile. Immutable.
+// Distances from landmarks, for one snapshot and one profile. Immutable.
 class Landmarks {
  public:
   // Distances from `count` landmarks, in [1, kMaxLandmarks], chosen farthest first in the largest

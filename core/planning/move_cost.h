@@ -56,7 +56,7 @@ class StepCosts {
     }
     return static_cast<std::uint32_t>(lengths_[direction & 1][rise_steps] * (0.5 * dangers) + 0.5);
   }
-  // Of any move, over `cells` cells.
+  // The cost of any move, over `cells` cells.
   [[gnu::noinline]] std::uint32_t OfRise(int direction,
                                          int cells,
                                          double rise_m,

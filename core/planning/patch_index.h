@@ -23,9 +23,9 @@ class PatchIndex {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
   PatchIndex() : sheets_(kBlocks, 0), first_(kBlocks, 0) {}  // no patches
-  // Of so many patches in each cell (by CellInTile).
+  // From the number of patches in each cell (by CellInTile).
   explicit PatchIndex(const std::vector<std::uint8_t>& counts);
-  // Of sheets() and upper_blocks(); none if they contradict each other.
+  // From sheets() and upper_blocks(); none if they contradict each other.
   static std::optional<PatchIndex> OfSheets(std::vector<std::uint64_t> sheets,
                                             std::vector<std::uint16_t> upper_blocks);
 

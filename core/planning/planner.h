@@ -44,7 +44,7 @@ namespace strata {
 
 struct PlannerOptions {
   double cell_size_m = 0.1;  // of the map
-  // Of prepared tiles and of searches, which may be shared with other caches. A query that needs
+  // Memory for prepared tiles and searches, maybe shared with other caches. A query that needs
   // more, for the tiles that it has left (20 to 50 kB each), ends with PlanReason::kSearchLimit.
   std::shared_ptr<CacheBudget> budget = std::make_shared<CacheBudget>(std::size_t{1} << 30);
   ParallelLoop loop = {};  // what tiles are prepared by

@@ -60,7 +60,7 @@ struct PreparedTile {
   PatchIndex other;                       // surfaces where the robot cannot stand
   std::vector<std::uint16_t> other_heights;
   std::int32_t base_steps = 0;
-  // Of `standing`, then of `other`, where a height is no whole step or they are more than 128 m
+  // Heights of `standing`, then of `other`, where one is no whole step or they are more than 128 m
   // apart; else empty. Then the others are 0.
   std::vector<float> exact_heights;
 

@@ -256,7 +256,7 @@ class RouteMaker {
   SearchSpace& space_;
   const std::vector<PatchId>& path_;
   Route route_;
-  // Of the patches of the path: where they are, cost up to each, extra danger of the move to it.
+  // The patches of the path: where they are, cost up to each, extra danger of the move to it.
   std::vector<Sample> original_;
   std::vector<double> cost_to_;
   std::vector<double> gap_danger_;

@@ -452,7 +452,7 @@ class Search {
   std::uint32_t goal_cost_ = kMaxCost;
   bool large_ = false;            // more than what may be at hand
   std::vector<TileKey> awaited_;  // by ParkedTile::awaited
-  // Of the tile that is searched again: what comes before the rest of the search goes on.
+  // The queue of the tile that is searched again, emptied before the rest of the search goes on.
   BucketQueue again_;
   std::size_t most_queued_ = kMostQueued;
   int again_slot_ = -1;

@@ -30,7 +30,7 @@ struct OctileBound {
     return kCostPerCell * (std::max(dx, dy) - std::min(dx, dy)) +
            kCostPerDiagonal * std::min(dx, dy);
   }
-  // Of a tile that is not at hand.
+  // The bound for a tile that is not at hand.
   std::uint32_t Outside(CellIndex cell) const { return (*this)(cell.x, cell.y, 0); }
 };
 

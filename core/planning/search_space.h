@@ -107,7 +107,7 @@ class SearchSpace {
   static constexpr int kPageShift = 12;
 
   static CellIndex CellIn(const Slot& slot, std::uint32_t place) {
-    // Of a tile that cannot be had again nothing is known.
+    // Nothing is known of a tile that cannot be had again.
     const std::uint16_t cell = place < slot.tile->places() ? slot.tile->CellOf(place) : 0;
     return {slot.x0 + (cell & (kTileCells - 1)), slot.y0 + (cell >> kTileShift)};
   }

@@ -95,7 +95,7 @@ class SearchWorkspace {
   // REQUIRES: AtHand(slot).
   Member& member(int slot) { return members_[slot]; }
   const std::vector<int>& at_hand() const { return at_hand_; }
-  // Of those at hand. REQUIRES: one is.
+  // The slot at hand that was used longest ago. REQUIRES: one is.
   int LongestUnused() const;
   // Lets go of a tile at hand.
   void Dismiss(int slot);

@@ -51,7 +51,7 @@ class TileCache {
   explicit TileCache(const std::shared_ptr<CacheBudget>& budget, ParallelLoop loop = {})
       : max_bytes_(budget->max_bytes()), loop_(std::move(loop)), entries_(budget) {}
 
-  // Of the budget.
+  // The size of the budget.
   std::size_t max_bytes() const { return max_bytes_; }
 
   // nullptr where the map has nothing. Errors are those of the source, and INTERNAL for a tile that

@@ -19,7 +19,7 @@ namespace strata {
 // What one tile's preparation was made of: the versions of the tile and of its eight neighbours.
 using TileVersions = std::array<std::uint64_t, 9>;
 
-// Of what tiles are prepared to, and how that is packed. Whoever changes either raises it: what a
+// The form of prepared tiles and of their packing. Whoever changes either raises it: what a
 // map's file keeps of an earlier one is prepared again.
 inline constexpr std::uint32_t kPreparationForm = 1;
 

@@ -6,7 +6,7 @@
 
 namespace strata {
 
-// Of independent errors, the same along every axis; both > 0.
+// Information of independent errors, the same along every axis; both > 0.
 Matrix6d IsotropicInformation(double sigma_rad, double sigma_m);
 
 // (information⁻¹ + extra⁻¹)⁻¹: an error of its own and an `extra` one. `information` may be

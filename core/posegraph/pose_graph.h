@@ -112,8 +112,8 @@ struct RejectedTerm {
 
 struct NodeResidual {
   std::size_t node = 0;
-  // Of the terms that touch the node: a term of two nodes counts half for each, a plane by views;
-  // rejected terms do not count.
+  // Sum over the terms that touch the node: a term of two nodes counts half for each, a plane by
+  // views; rejected terms do not count.
   double chi2 = 0.0;
 };
 

@@ -58,7 +58,7 @@ struct IcpOptions {
   double max_extrapolation = 5.0;  // in [0, 100]
 
   double max_distance_m = 1.0;  // farther pairs are rejected; in (0, 10⁴]
-  // Of the pairs left, the share with the smallest distances that is kept (trimmed ICP); in (0, 1].
+  // Share of the pairs left that is kept, the closest ones (trimmed ICP); in (0, 1].
   double keep_share = 1.0;
   // Keep only pairs that are each other's closest points; not with kProjection.
   bool mutual = false;

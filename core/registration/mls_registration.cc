@@ -22,7 +22,7 @@
 namespace strata {
 namespace {
 
-// Of the tolerances; at 5 to 10 results are the same and times least.
+// Times the tolerances; at 5 to 10 results are the same and times least.
 constexpr double kSettledFactor = 10.0;
 
 // One iteration's matches, whatever the metric.

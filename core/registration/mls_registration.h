@@ -54,7 +54,7 @@ struct MlsRegistrationOptions {
   double max_translation_m = 5.0;
   double max_rotation_rad = 0.5;
   double min_eigenvalue_ratio = 1e-3;  // see SolveNormalEquations; in [0, 1]
-  // Of kPlaneToPlane: a direction that a smaller share of the features holds is left as guessed.
+  // For kPlaneToPlane: a direction that a smaller share of the features holds is left as guessed.
   // What is seen all around a sensor moves with it: floors slide to where they overlap most. 0 for
   // an object seen from outside, whose overlap is right. Normals that err hold up to 0.004;
   // recorded streets, halls and campus hold nearly always more than 0.01. In [0, 1].

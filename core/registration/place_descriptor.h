@@ -47,7 +47,7 @@ struct PlaceDescriptorOptions {
   absl::Status Validate() const;
 };
 
-// Of a local map in the frame of its scan, z up within some 10°. A pure function; some ms a scan.
+// Describes a local map in the frame of its scan, z up within some 10°. Pure; some ms a scan.
 // REQUIRES: valid options.
 PlaceDescriptor DescribePlace(const MlsMap& local_map, const PlaceDescriptorOptions& options = {});
 

@@ -38,7 +38,7 @@ constexpr double kNoReturnCounts = 0.5;
 constexpr double kContradictionScale = 0.05;
 constexpr double kTiltMatters = 0.03;
 
-// Of the features of one scan, those another one could see at the pose.
+// Counts over the features of one scan that another one could see at the pose.
 struct Comparison {
   int seen_through = 0;
   int no_return = 0;

@@ -85,8 +85,8 @@ struct PlaceMatch {
   Matrix6d information = Matrix6d::Zero();  // as RegistrationResult::information
   double rms_m = 0.0;
   double overlap = 0.0;  // the smaller of both directions, in [0, 1]
-  // Of the features that the other side looked at, the share of those it looked through, and half
-  // the share of near ones where it looked and nothing came back; the larger of both directions.
+  // Share of the features the other side looked at that it looked through, and half the share of
+  // near ones where it looked and nothing came back; the larger of both directions.
   double contradiction = 0.0;
   // Mean of (n · d)² over the matched surfaces' normals n, d being the horizontal direction in
   // which it is least: how firmly the match is held where it may slide most. A corridor has 0.007

@@ -48,7 +48,7 @@ class PlaceSearch {
   std::vector<Structure> structure_;     // of the source
   std::vector<Eigen::Vector3d> ground_;  // of the source, a sample
   Eigen::Vector3d origin_;               // of the target's coordinates
-  // Of the target: columns of the image, row after row.
+  // The target's image, row after row.
   Eigen::Vector2d corner_ = Eigen::Vector2d::Zero();
   int columns_ = 0;
   int rows_ = 0;

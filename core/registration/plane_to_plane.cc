@@ -18,7 +18,7 @@ namespace {
 // How far a query may move before its nearest feature is looked up again; more makes the look-up
 // slower. Features are a cell apart.
 constexpr float kMaxSlackM = 0.03F;
-// Of coordinates and distances in float.
+// Rounding of coordinates and distances in float.
 constexpr float kRoundingM = 1e-4F;
 
 // Sines of the angles at which a surface is seen; closer to its own plane nobody knows the side.

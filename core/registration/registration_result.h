@@ -30,8 +30,8 @@ struct RegistrationResult {
   double rms_m = 0.0;    // of the error metric over the inliers of the last iteration
   int inliers = 0;       // matches of the last iteration that were not rejected
   double overlap = 0.0;  // inliers / selected source points, in [0, 1]
-  // Of a right-hand step on T_target_source, tangent order [rotation, translation]; 1/rad², 1/m².
-  // None along degenerate_directions.
+  // Information of a right-hand step on T_target_source, tangent order [rotation, translation];
+  // 1/rad², 1/m². None along degenerate_directions.
   Matrix6d information = Matrix6d::Zero();
   // Unit tangent vectors that the matches leave undetermined: eigenvectors of the information (its
   // rotation scaled to metres) with an eigenvalue below a share of the largest one.

@@ -45,7 +45,7 @@ class RegistrationTarget {
   // Where all of it was seen from, in the grids' coordinates: of a single scan; of several nobody
   // knows which saw what.
   const std::optional<Eigen::Vector3d>& sensor() const { return sensor_; }
-  // Of the grids' coordinates, in the target frame.
+  // Origin of the grids' coordinates, in the target frame.
   const Eigen::Vector3d& origin() const { return origin_; }
   std::size_t size() const;
   std::size_t memory_bytes() const;

@@ -54,7 +54,7 @@ void AppendPatch(
   }
 }
 
-// Of heights.
+// Mean and variance of heights, as they come.
 struct Spread {
   int n = 0;
   double sum = 0.0;

@@ -50,7 +50,7 @@ class StorageReader {
   virtual absl::StatusOr<std::optional<PosedScan>> FindScan(const ScanId& id,
                                                             std::uint64_t epoch) = 0;
   virtual absl::StatusOr<PosedScan> GetScan(ScanNumber number, std::uint64_t epoch) = 0;
-  // Of all scans, ascending. Reads nothing else of their rows, so a damaged one hides no other.
+  // Numbers of all scans, ascending. Reads nothing else of their rows, so a damaged one hides none.
   virtual absl::StatusOr<std::vector<ScanNumber>> ListScanNumbers() = 0;
   // DATA_LOSS if points or time, which it is found by, are not its header's, and for damaged poses.
   virtual absl::Status CheckScanRow(ScanNumber number) = 0;
@@ -68,7 +68,7 @@ class StorageReader {
   // By upload number.
   virtual absl::StatusOr<std::vector<UnfinishedUpload>> ListUnfinishedUploads() = 0;
   virtual absl::StatusOr<std::string> GetChunk(std::uint64_t upload, std::uint32_t ordinal) = 0;
-  // Of a scan whose points were dropped.
+  // The local map of a scan whose points were dropped.
   virtual absl::StatusOr<std::string> GetLocalMap(ScanNumber number) = 0;
   // Those of `epoch`, by id; proposed ones are left out.
   virtual absl::StatusOr<std::vector<ConstraintRecord>> ListConstraints(std::uint64_t epoch) = 0;
@@ -169,7 +169,7 @@ class StorageWriter {
   virtual absl::StatusOr<std::uint64_t> PutConstraint(const ConstraintRecord& constraint) = 0;
   // In every epoch. NOT_FOUND.
   virtual absl::Status DeleteConstraint(std::uint64_t id) = 0;
-  // Of a constraint or a plane. NOT_FOUND.
+  // A constraint or a plane by its id. NOT_FOUND.
   virtual absl::Status EnableConstraint(std::uint64_t id, bool enabled) = 0;
   // What a job would change; nobody sees it until it is adopted. Poses replace earlier ones.
   virtual absl::Status ProposePose(std::uint64_t job, const ProposedPose& pose) = 0;

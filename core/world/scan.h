@@ -54,7 +54,7 @@ struct ScanHeader {
   bool has_intensity = false;
   bool has_colour = false;
   bool has_label = false;
-  // Of an upload: the scan's ScanHasher digest if its sender has announced it, else empty. In what
+  // In an upload the scan's ScanHasher digest if its sender has announced it, else empty. In what
   // the map says of a scan always empty: see ScanInfo.
   std::string content_hash;
 };

@@ -39,7 +39,7 @@ class ScanHasher {
 // three.
 void QuietNans(PointCloud& cloud, std::size_t first = 0);
 
-// Of a whole scan, whatever its NaN: what a client announces as ScanHeader::content_hash.
+// Digest of a whole scan, whatever its NaN: what a client announces as ScanHeader::content_hash.
 // REQUIRES: columns empty or as long as the points.
 std::string ContentHashOf(const ScanHeader& header, const PointCloud& cloud);
 

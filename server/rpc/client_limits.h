@@ -50,7 +50,7 @@ class ClientLimits {
 
   // Clients in the books: those with calls under way and those that came lately.
   std::size_t clients() const;
-  // Of memory that is booked.
+  // Memory that is booked.
   std::size_t held_bytes() const;
 
  private:

@@ -91,7 +91,7 @@ class Request final : public Revocable {
   CallGate& gate() { return kind_ == Kind::kCall ? runtime_.calls : runtime_.watches; }
   // Finds out who calls, and books the call.
   absl::Status Admit(const grpc::CallbackServerContext& context);
-  // Of the server and of this client.
+  // Limits of the server and of this client.
   absl::Status EnterLimits();
   absl::Status Parse(grpc::ByteBuffer& bytes, google::protobuf::Message& message, Booking& memory);
   absl::Status Authorize(const google::protobuf::Message& message);
@@ -135,7 +135,7 @@ std::string HostOf(absl::string_view peer);
 inline absl::Status AtTheDoor(const absl::Status& status) {
   return translate::WithReason(status, translate::kRequestReason);
 }
-// Of a call that should bring one message.
+// What a call gets that should have brought one message.
 inline absl::Status NoRequest() {
   return AtTheDoor(absl::InvalidArgumentError("the call ended before it brought a request"));
 }

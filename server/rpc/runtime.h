@@ -121,7 +121,7 @@ struct Runtime {
     return absl::StartsWith(name, "Watch") ? arriving_watches : arriving_calls;
   }
 
-  // Of one client's calls, that are refused or have ended and are not freed yet.
+  // Calls of one client that are refused or have ended and are not freed yet.
   static constexpr int kGoing = 256;
 
   api::Database& db;

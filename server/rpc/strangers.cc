@@ -12,7 +12,7 @@ namespace {
 
 constexpr absl::string_view kEverybody = "all strangers";
 constexpr absl::Duration kLogInterval = absl::Seconds(1);
-// Of whom nothing was heard for so long his call was cancelled before.
+// Whoever was not heard of for so long has been forgotten: his call was cancelled before.
 constexpr absl::Duration kForgotten = absl::Seconds(30);
 
 ClientLimitOptions Rate(double calls_per_second, double burst) {

@@ -23,7 +23,7 @@ struct StrangerOptions {
   double burst = 1000.0;           // at once after a pause
   double all_per_second = 100.0;   // of all addresses
   double all_burst = 10'000.0;
-  // Of all addresses: whose requests are read before they are refused, and logged.
+  // Over all addresses: whose requests are read before they are refused, and logged.
   double heard_per_second = 8.0;
   double heard_burst = 8.0;
   std::size_t heard_at_once = 4;  // each may send as much as the largest request

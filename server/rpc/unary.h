@@ -24,7 +24,7 @@ namespace strata::server {
 
 template <typename In, typename Out>
 using UnaryHandler = absl::Status (*)(api::Database&, const api::Call&, const In&, Out&);
-// Of a call whose answer depends on who asks.
+// Answers a call whose answer depends on who asks.
 template <typename In, typename Out>
 using RequestHandler = absl::Status (*)(api::Database&, const Request&, const In&, Out&);
 

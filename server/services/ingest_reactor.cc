@@ -93,7 +93,7 @@ void IngestReactor::Begin(const v1::ScanStart& start, const absl::Status& allowe
   current_ = *std::move(begun);
   if (start.resume()) Accept(current_->points_held());
   if (!current_->complete()) return;
-  // Of a scan that is there, a client that does not resume sends all points all the same.
+  // A client that does not resume sends all points of a scan that is there all the same.
   passing_over_ = current_->points_held() > 0;
   EndScan(absl::OkStatus());
 }

@@ -74,7 +74,7 @@ class IngestReactor final
   Request request_;
   Booking in_memory_;
 
-  // Of the reading chain alone.
+  // Touched by the reading chain alone.
   Sealed<In> message_;
   v1::ScanId current_id_;
   std::optional<ScanReceiver> current_;

@@ -22,7 +22,7 @@ constexpr double kOutermost = 0.005;
 
 using Range = std::pair<double, double>;
 
-// Of one coordinate, without the outermost at either end.
+// The range of one coordinate, without the outermost at either end.
 Range RangeOf(const std::vector<PictureCloud>& clouds, int axis) {
   std::vector<double> values;
   for (const PictureCloud& cloud : clouds) {

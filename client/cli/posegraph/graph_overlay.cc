@@ -28,7 +28,7 @@ constexpr Colour kStressedColour = {245, 140, 0};
 constexpr Colour kViolatedColour = {210, 0, 150};
 constexpr Colour kDisabledColour = {150, 150, 150};
 constexpr Colour kResidualColour = {0, 0, 0};
-// Of the normalised residual.
+// Bounds of the normalised residual.
 constexpr double kStressed = 1.0;
 constexpr double kViolated = 9.0;
 

@@ -17,7 +17,7 @@
 
 namespace strata::cli {
 
-// Of the command.
+// Options of the command.
 struct ImportOptions {
   std::string map;
   std::vector<std::string> paths;

@@ -236,7 +236,7 @@ absl::Status ImportBySpool(FileContext& context, ImportOptions options) {
   return ErrorsOf(errors, sources.files);
 }
 
-// Of the two ways the one that the options say.
+// Selects the one of the two ways that the options say.
 void Select(Commands& commands, const std::shared_ptr<ImportOptions>& options) {
   if (!options->spool.empty()) {
     commands.selected_on_files = [options](FileContext& context) {

@@ -36,7 +36,7 @@ bool WorthRetrying(const absl::Status& status) {
          absl::IsAborted(status);
 }
 
-// Of the points relative to the cloud's origin.
+// The local map of the points relative to the cloud's origin.
 absl::StatusOr<std::string> LocalMapOf(const PointCloud& cloud, const MapParameters& parameters) {
   PointCloud points = cloud;
   points.origin.setZero();

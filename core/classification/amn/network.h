@@ -21,7 +21,8 @@ struct NetworkEdge {
 struct NetworkOptions {
   int max_degree = 3;  // edges of a point, at most; in [1, 16]
   int draws = 8;       // tries of a point to find a neighbour; in [1, 1000]
-  // Of the Gaussian by which neighbours are drawn, in spacings of the points around; in (0, 100].
+  // Width of the Gaussian by which neighbours are drawn, in spacings of the points around; in
+  // (0, 100].
   double sigma_spacings = 2.0;
   std::uint64_t seed = 1;
 
@@ -32,7 +33,7 @@ struct NetworkOptions {
 // is there once and no point has more than `max_degree`. By i, then j. `options` must be valid. The
 // same for the same neighbours and seed.
 std::vector<NetworkEdge> DrawNetwork(const Neighbours& neighbours, const NetworkOptions& options);
-// Of points whose neighbours are looked for first: 16 of each.
+// Draws a network of points, whose neighbours are looked for first: 16 of each.
 std::vector<NetworkEdge> DrawNetwork(std::span<const Eigen::Vector3f> points,
                                      const NetworkOptions& options);
 

@@ -19,8 +19,8 @@ struct ColumnPlace {
   float filled = 1.0F;
 };
 
-// Of every point in the square column of `edge_m` that it is in. `ground_m`: heights of the ground
-// under the points. Points must be finite and within 2³⁰ columns of zero.
+// Where every point is in its square column of `edge_m`. `ground_m`: heights of the ground under
+// the points. Points must be finite and within 2³⁰ columns of zero.
 std::vector<ColumnPlace> ColumnPlaces(std::span<const Eigen::Vector3f> points,
                                       std::span<const float> ground_m,
                                       double edge_m);

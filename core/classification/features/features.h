@@ -18,13 +18,12 @@ namespace strata {
 
 enum class FeatureSet : std::uint8_t {  // stored in models
   // Linearity, planarity, scattering, verticality, the direction of the longest axis and how far
-  // the
-  // neighbours reach, at several scales; height above the lowest patch around; what is above and
-  // below in upright columns of two widths.
+  // the neighbours reach, at several scales; height above the lowest patch around; what is above
+  // and below in upright columns of two widths.
   kShape = 1,
-  // Of the thesis' facades (9.3.4): histogram of the angles between the neighbours' normals and
-  // that of the wall, or of the ground where there is no wall; neighbours in front of, in and
-  // behind the plane through the point; normalised height.
+  // The thesis' features of facades (9.3.4): histogram of the angles between the neighbours'
+  // normals and that of the wall, or of the ground where there is no wall; neighbours in front of,
+  // in and behind the plane through the point; normalised height.
   kWall = 2,
   // Spin images of 5 × 10 bins (9.4.3; Johnson 1997): roots of the shares of the points around.
   kSpin = 3,

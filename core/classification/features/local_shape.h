@@ -30,7 +30,7 @@ struct LocalShape {
   float Ratio(float part) const { return values[0] > 0.0F ? part / values[0] : 0.0F; }
 };
 
-// Of the points `around` with the numbers `indices` and `centre` itself.
+// The shape of the points `around` with the numbers `indices` and of `centre` itself.
 LocalShape DescribeShape(const Eigen::Vector3f& centre,
                          std::span<const Eigen::Vector3f> around,
                          std::span<const std::uint32_t> indices);

@@ -70,7 +70,7 @@ class Search {
   // So many points around surely hold `count` besides the query.
   std::size_t needed() const { return count_ + (without_self_ ? 1 : 0); }
 
-  // Of points at one place nobody needs more than the first.
+  // Nobody needs more than the first of points at one place.
   std::uint32_t EndOf(const Node& leaf) const {
     const bool one_place = (leaf.box.low == leaf.box.high).all();
     return one_place ? std::min<std::size_t>(leaf.end, leaf.begin + needed()) : leaf.end;

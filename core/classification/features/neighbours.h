@@ -19,7 +19,7 @@ class Neighbours {
  public:
   // `count` ≥ 1, or as many as there are other points. Points must be finite.
   static Neighbours Find(std::span<const Eigen::Vector3f> points, std::size_t count);
-  // Of every one of `queries` among other points; at most as many as there are.
+  // Neighbours of every one of `queries` among other points; at most as many as there are.
   static Neighbours Find(std::span<const Eigen::Vector3f> queries,
                          std::span<const Eigen::Vector3f> points,
                          std::size_t count);

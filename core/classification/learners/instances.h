@@ -35,7 +35,7 @@ class Instances {
     Eigen::RowVectorXf squared_norms;
     std::vector<Eigen::Index> rows;  // in the data
 
-    // Of a row of the data among `rows`; their number if it is none of them.
+    // The place of a row of the data among `rows`; their number if it is none of them.
     std::size_t PlaceOf(Eigen::Index row) const;
   };
 

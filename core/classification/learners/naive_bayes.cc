@@ -12,7 +12,7 @@
 namespace strata {
 namespace {
 
-// Of a feature's variance over all points: what a class has at least.
+// Share of a feature's variance over all points that a class has at least.
 constexpr double kLeastShare = 1e-6;
 
 }  // namespace

@@ -26,7 +26,7 @@ namespace {
 constexpr std::size_t kAlikeScans = 4;
 // Closing loops moves poses, which makes other pairs likely.
 constexpr int kMaxPasses = 3;
-// Of a match, beside what its information says.
+// Errors of a match beside what its information says.
 constexpr double kMatchSigmaM = 0.05;
 constexpr double kMatchSigmaRad = 0.005;
 
@@ -199,7 +199,7 @@ class Searcher {
     return absl::OkStatus();
   }
 
-  // Of everything that matched, what agrees with the graph and with each other.
+  // Keeps of everything that matched what agrees with the graph and with each other.
   absl::Status KeepConsistent() {
     std::vector<Closure> closures;
     for (const FoundClosure& found : matched_) {

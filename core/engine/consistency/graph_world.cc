@@ -28,8 +28,8 @@ PlaneKind KindOf(const Eigen::Vector3d& normal) {
 constexpr double kMatchSigmaM = 0.01;
 constexpr double kMatchSigmaRad = 0.001;
 
-// Of uploaded poses from scan to scan. Nobody says how good they are; they count only where nothing
-// else does.
+// Errors of uploaded poses from scan to scan. Nobody says how good they are; they count only where
+// nothing else does.
 constexpr double kOdometrySigmaM = 0.05;
 constexpr double kOdometrySigmaRad = 0.005;
 

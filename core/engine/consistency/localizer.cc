@@ -38,7 +38,7 @@ constexpr double kAlikeRadiusM = 15.0;
 // To both sides of a guess's heading, and of the heading that looks say.
 constexpr double kGuessHeadingRad = 0.6;
 constexpr double kAlikeHeadingRad = 0.1;
-// Of a match beside what its information says.
+// Errors of a match beside what its information says.
 constexpr double kMatchSigmaM = 0.05;
 constexpr double kMatchSigmaRad = 0.005;
 

@@ -28,7 +28,7 @@ class Localizer {
   struct Places;
   class Search;
 
-  // Of the present state.
+  // The places of the present state.
   absl::StatusOr<std::shared_ptr<Places>> CurrentPlaces(const Stop& stop);
 
   MapCore& core_;

@@ -32,7 +32,7 @@
 namespace strata {
 namespace {
 
-// Of the caches, for decoded tiles: what is prepared of them is asked for far more often.
+// One part of the caches in so many is for decoded tiles: prepared ones are asked for more often.
 constexpr std::size_t kDecodedShare = 16;
 
 // Whether an answer given before is the one that would be given now. What a robot may do in a tile

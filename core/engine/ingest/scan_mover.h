@@ -78,7 +78,7 @@ class ScanMover {
   // Returns the tiles where nothing is any more.
   absl::StatusOr<MlsTileMap> StageMlsTiles(StorageReader& reader, const KeySet& keys);
   absl::Status StageSurfaces(StorageReader& reader, const KeySet& keys, const MlsTileMap& gone);
-  // Of damaged scans that stay where they are: all but those made again.
+  // Keeps the tiles of damaged scans that stay where they are: all but those made again.
   absl::Status KeepOtherTiles(StorageReader& reader, const KeySet& keys);
   absl::Status PutMoves(StorageWriter& writer, std::uint64_t epoch) const;
 

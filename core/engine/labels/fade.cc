@@ -33,7 +33,7 @@ namespace {
 constexpr std::uint32_t kFreshScans = 10;
 constexpr std::size_t kRaysBetweenStops = 10'000;
 
-// Of a scan: index of the point, and how many scans looked through its place.
+// Faded points of a scan: index, and how many scans looked through the place.
 using FadedPoints = std::vector<std::pair<std::uint64_t, std::uint16_t>>;
 
 // A scan with the box of its rays.

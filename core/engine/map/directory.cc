@@ -38,7 +38,7 @@ constexpr char kMakingPrefix[] = ".making-";
 constexpr char kCopyPrefix[] = ".copy-";
 constexpr char kLockName[] = ".lock";
 constexpr char kClockName[] = ".clock";
-// Of the files of a map, itself first.
+// Endings of the files of a map, its own first.
 constexpr std::array<const char*, 4> kSuffixes = {"", "-wal", "-shm", "-journal"};
 
 absl::Status ErrnoStatus(absl::string_view what, const fs::path& path) {

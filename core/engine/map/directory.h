@@ -28,7 +28,7 @@ class MapDirectory {
       : path_(std::move(other.path_)), lock_(std::exchange(other.lock_, -1)) {}
   MapDirectory& operator=(MapDirectory&&) = delete;
 
-  // Of a directory that nobody need have opened: the file of a map, and the names of all, sorted.
+  // The file of a map, and the names of all, sorted, in a directory that nobody need have opened.
   static std::filesystem::path FileIn(const std::filesystem::path& directory,
                                       absl::string_view name);
   static absl::StatusOr<std::vector<std::string>> NamesIn(const std::filesystem::path& directory);

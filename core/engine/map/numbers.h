@@ -16,7 +16,7 @@
 
 namespace strata {
 
-// Of one map that is open. Counts of what happened begin with the engine.
+// What is measured of one open map. Counts of what happened begin with the engine.
 struct MapNumbers {
   std::string map;
   std::uint64_t file_bytes = 0;                 // with its journal

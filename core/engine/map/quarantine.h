@@ -51,7 +51,7 @@ class Quarantine {
   // Puts the scan aside whose turn it is.
   absl::Status HoldNextScan(absl::string_view why);
 
-  // Of other work; with a writer, inside a commit.
+  // Other work begins or has ended; with a writer, inside a commit.
   absl::Status Begin(StorageWriter& writer, const WorkId& work) const;
   absl::Status End(StorageWriter& writer, const WorkId& work);
   // It ended without an end of the process, and will begin again.

@@ -18,7 +18,7 @@ absl::Status ForEachScan(StorageReader& reader,
                          std::uint64_t epoch,
                          absl::FunctionRef<void(PosedScan)> body);
 
-// Of those the ones that have a pose in it.
+// The same, for those that have a pose in the epoch.
 absl::Status ForEachPosedScan(StorageReader& reader,
                               const ScanQuery& query,
                               std::uint64_t epoch,

@@ -67,7 +67,7 @@ class DerivedPass {
 
   absl::Status Run(DerivedSink& sink);
 
-  // Of every scan, as they should be; complete after Run().
+  // Indexes of every scan as they should be; complete after Run().
   const ScanIndexes& indexes() const { return indexes_; }
   std::size_t scans() const { return indexes_.size(); }
   std::size_t tiles() const { return tiles_; }

@@ -19,7 +19,7 @@ class TruthCheck {
  public:
   using Report = absl::FunctionRef<void(const std::string&)>;
 
-  // Of the scans that `view` shows.
+  // Checks the scans that `view` shows.
   TruthCheck(MapCore& core, const SteadyView& view, JobContext& context)
       : core_(core), view_(view), context_(context) {}
 

@@ -51,8 +51,8 @@ class ScanLabels {
   // The next piece in order: its label column becomes the one that counts; empty if the scan has no
   // label at all. DATA_LOSS naming the labels that are damaged.
   absl::Status Apply(StorageReader& reader, PointCloud& piece);
-  // Of the next `count` points in order, how many scans looked through their places where that made
-  // them fade, else 0; empty if none of the scan has. DATA_LOSS.
+  // For each of the next `count` points how many scans looked through its place where that made it
+  // fade, else 0; empty if no point of the scan has faded. DATA_LOSS.
   absl::StatusOr<std::vector<std::uint16_t>> Faded(StorageReader& reader, std::size_t count);
 
  private:

@@ -8,7 +8,7 @@
 namespace strata {
 namespace {
 
-// Of a cloud while its local map, its planes and its features are made: measured.
+// What a cloud takes while its local map, its planes and its features are made: measured.
 constexpr std::uint64_t kBytesAPoint = 90;
 constexpr std::uint64_t kSmallBytes = std::uint64_t{16} << 20;
 

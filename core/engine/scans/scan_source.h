@@ -61,7 +61,7 @@ class ScanSource {
 
  private:
   enum class Faded { kWith, kWithout };
-  // Of the scan frame: what was taken once may be moved anywhere.
+  // Looks at the scan frame: what was taken once may be moved anywhere.
   absl::Status CheckSpread(const ScanRecord& scan);
   absl::StatusOr<MlsMap> Build(const ScanRecord& scan,
                                const Pose& T_map_scan,

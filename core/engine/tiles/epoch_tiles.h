@@ -32,8 +32,8 @@ absl::Status CheckEpochKept(StorageReader& reader,
 // at a time. Memory: the rows of the scans, and what is asked for.
 class EpochTiles {
  public:
-  // Of `epoch`, earlier than the current one, inside `range` of level 0. DATA_LOSS naming a damaged
-  // scan; NOT_FOUND for an epoch that is not kept.
+  // The tiles of `epoch`, earlier than the current one, inside `range` of level 0. DATA_LOSS naming
+  // a damaged scan; NOT_FOUND for an epoch that is not kept.
   static absl::StatusOr<std::unique_ptr<EpochTiles>> Find(MapCore& core,
                                                           std::uint64_t epoch,
                                                           const TileRange& range,
@@ -43,8 +43,8 @@ class EpochTiles {
   const MapView& view() const { return pin_.view(); }
   // Those of the range that may not be as they are stored.
   const absl::btree_set<TileKey>& differing() const { return differing_; }
-  // Of `keys`, all of differing(), those that are not as they are stored: rows of version 0, by
-  // key. DATA_LOSS naming a damaged scan; ABORTED naming one that was deleted since Find().
+  // Makes those of `keys`, all of differing(), that are not as they are stored: rows of version 0,
+  // by key. DATA_LOSS naming a damaged scan; ABORTED naming one that was deleted since Find().
   absl::StatusOr<SurfaceTileMaker::Rows> Make(const absl::btree_set<TileKey>& keys,
                                               const Stop& stop) const;
 

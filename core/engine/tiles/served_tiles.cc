@@ -63,7 +63,7 @@ ServedTiles::Handle ServedTiles::FindAtHand(const TileKey& key, const MapView& v
 
 void ServedTiles::Keep(const TileKey& key, Known known) {
   const std::size_t bytes = sizeof(Known) + sizeof(Tile) + known.tile->bytes.capacity();
-  // Of two at once the older one may stay: it serves older views, and is looked up again.
+  // The older one of two at once may stay: it serves older views, and is looked up again.
   const auto there = known_.Find(key);
   if (there != nullptr && there->until > known.until) return;
   known_.Put(key, std::make_shared<const Known>(std::move(known)), bytes);

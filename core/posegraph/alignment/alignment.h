@@ -125,8 +125,8 @@ struct AlignmentResult {
   std::vector<Pose> T_map_scan;
   std::vector<AlignmentRound> rounds;
   AlignmentTermination termination = AlignmentTermination::kMaxRounds;
-  // Of the last round. `rejected`: those that turned out to be false, AlignmentProblem::relative
-  // first; `measured`: matches that did not.
+  // What the last round held. `rejected`: terms that turned out to be false, those of
+  // AlignmentProblem::relative first; `measured`: matches that did not.
   std::vector<RelativePoseTerm> measured;
   std::vector<RejectedMatch> rejected;
   std::vector<SharedPlane> planes;  // of the last round, at the final poses

@@ -9,7 +9,7 @@
 
 namespace strata {
 
-// Of one step and axis, as of independent errors.
+// Standard deviations of one step along one axis, as of independent errors.
 struct OdometryNoise {
   double sigma_rad = 0.0;
   double sigma_m = 0.0;

@@ -176,7 +176,7 @@ class CandidateSearch {
     return c;
   }
 
-  // Of the two headings those that the graph allows.
+  // Those of the two headings that the graph allows.
   std::vector<PlaceHypothesis> LooksHypotheses(const AlikePair& pair,
                                                const ClosureCandidate& c) const {
     PlaceSimilarity similarity = pair.similarity;

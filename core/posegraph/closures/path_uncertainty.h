@@ -28,7 +28,7 @@ struct DriftOptions {
   absl::Status Validate() const;
 };
 
-// Of one node relative to another: roots of the covariance's traces.
+// How uncertain one node is relative to another: roots of the covariance's traces.
 struct PathUncertainty {
   bool connected = false;
   double sigma_m = 0.0;    // of the position
@@ -48,7 +48,7 @@ class PathUncertainties {
                     std::span<const GraphEdge> edges,
                     const DriftOptions& options = {});
 
-  // Of every node relative to `node`. O(E log V), 3 ms for 20,000 nodes.
+  // The uncertainty of every node relative to `node`. O(E log V), 3 ms for 20,000 nodes.
   std::vector<PathUncertainty> From(std::size_t node) const;
 
   // The first node of the connected part that each node belongs to.

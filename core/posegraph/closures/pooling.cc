@@ -13,7 +13,7 @@ namespace {
 constexpr double kStepSigmaM = 0.01;
 constexpr double kStepSigmaRad = 0.001;
 
-// Of every node, the last pool it is in: the one it is first in, if it is shared.
+// The last pool that each node is in: the one it is first in, if it is shared.
 std::vector<std::size_t> PoolOfNodes(std::span<const Pool> pools, std::size_t nodes) {
   std::vector<std::size_t> pool_of(nodes, 0);
   for (std::size_t p = 0; p < pools.size(); ++p) {

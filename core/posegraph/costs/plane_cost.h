@@ -31,7 +31,7 @@ struct PlaneView {
 // REQUIRES: `moments` positive semidefinite.
 PlaneView SummariseView(const PointMoments& moments);
 
-// Of the view's four points. The sum of their squares is that of all points.
+// Distances of the view's four points. The sum of their squares is that of all points.
 Eigen::Vector4d PlaneViewDistances(const PlaneView& view,
                                    const Pose& T,
                                    const double* plane_block,

@@ -14,7 +14,7 @@
 namespace strata {
 namespace {
 
-// Of the terms of poses that only planes bind: two of them, or parallel ones, leave directions
+// Share of the terms of poses that only planes bind: two planes, or parallel ones, leave directions
 // open.
 constexpr double kInertia = 1e-6;
 

@@ -196,7 +196,7 @@ class LinearLinks {
 
  private:
   auto Right(Eigen::Index block) { return right_.template middleRows<dim>(block * dim); }
-  // Of the lower triangle: i ≥ j.
+  // Blocks of the lower triangle: i ≥ j.
   void AddBlock(Eigen::Index i, Eigen::Index j, const Block& block) {
     for (int column = 0; column < dim; ++column) {
       for (int row = i == j ? column : 0; row < dim; ++row) {

@@ -10,7 +10,7 @@
 
 namespace strata {
 
-// Of a problem that leaves manifolds to their owner.
+// Options of a problem that leaves manifolds to their owner.
 ceres::Problem::Options KeepingManifolds();
 
 class SteppedManifold : public ceres::Manifold {

@@ -11,7 +11,7 @@
 
 #include "core/common/status.h"
 
-// Of GCC's libgomp, whose header clang does not find.
+// Functions of GCC's libgomp, whose header clang does not find.
 extern "C" {
 int omp_get_max_active_levels(void);
 void omp_set_max_active_levels(int levels);

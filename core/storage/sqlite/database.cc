@@ -51,8 +51,9 @@ absl::Status StatusOf(int code, sqlite3* connection) {
   return absl::Status(CodeOf(code), absl::StrCat("store: ", detail, " (sqlite ", code, ")"));
 }
 
-// Of what quick_check found first. Pages that the disk did not give are no damage; it says so with
-// a code, or in chains of pages without (numbers beyond the file's end it tells apart before).
+// The status of what quick_check found first. Pages that the disk did not give are no damage; it
+// says so with a code, or in chains of pages without (numbers beyond the file's end it tells apart
+// before).
 absl::Status StatusOfCheck(const std::string& found) {
   if (found == "ok") return absl::OkStatus();
   constexpr char kCode[] = "error code=";
