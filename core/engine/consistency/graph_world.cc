@@ -9,7 +9,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
-#include "core/engine/map/scan_pages.h"
+#include "core/engine/map/scan_lookup.h"
 #include "core/posegraph/information.h"
 
 namespace strata {

@@ -9,7 +9,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/map/change_log.h"
-#include "core/engine/map/scan_pages.h"
+#include "core/engine/map/scan_lookup.h"
 
 namespace strata {
 namespace {

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -13,7 +12,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/doors/scans.h"
-#include "core/engine/map/scan_pages.h"
+#include "core/engine/map/scan_lookup.h"
 #include "core/world/names.h"
 
 namespace strata {
@@ -28,9 +27,8 @@ absl::Status AddNodes(StorageReader& reader, api::PoseGraphState& state) {
 }
 
 absl::StatusOr<ScanNumber> NumberOf(StorageReader& reader, const ScanId& id) {
-  STRATA_ASSIGN_OR_RETURN(const std::optional<PosedScan> posed, reader.FindScan(id, 0));
-  if (posed.has_value()) return posed->scan.number;
-  return absl::NotFoundError(absl::StrCat("scan ", id.ToString(), " does not exist"));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, GetScanById(reader, id, 0));
+  return posed.scan.number;
 }
 
 }  // namespace
@@ -138,12 +136,8 @@ absl::StatusOr<api::PoseLookup> EnginePoseGraph::LookupPose(const api::Call& cal
   STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", id.trajectory));
   const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
-  STRATA_ASSIGN_OR_RETURN(const std::optional<PosedScan> posed,
-                          reader->FindScan(id, pin.view().epoch));
-  if (!posed.has_value()) {
-    return absl::NotFoundError(absl::StrCat("scan ", id.ToString(), " does not exist"));
-  }
-  const ScanInfo info = ToScanInfo(*posed);
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, GetScanById(*reader, id, pin.view().epoch));
+  const ScanInfo info = ToScanInfo(posed);
   api::PoseLookup lookup;
   lookup.epoch = pin.view().epoch;
   lookup.T_map_scan = info.T_map_scan;

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +15,7 @@
 #include "core/common/status.h"
 #include "core/engine/doors/local_map_upload.h"
 #include "core/engine/doors/upload.h"
+#include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/scan_labels.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/world/map_class.h"
@@ -25,10 +25,6 @@ namespace strata {
 namespace {
 
 constexpr std::uint32_t kPageScans = 256;
-
-absl::Status NoSuchScan(const ScanId& id) {
-  return absl::NotFoundError(absl::StrCat("scan ", id.ToString(), " does not exist"));
-}
 
 absl::Status CheckId(const ScanId& id) { return ValidateName("trajectory name", id.trajectory); }
 
@@ -50,14 +46,13 @@ absl::Status ReadVisible(Map& map,
 
 absl::StatusOr<PosedScan> FindScan(Map& map, const ScanId& id) {
   STRATA_RETURN_IF_ERROR(CheckId(id));
-  std::optional<PosedScan> scan;
+  PosedScan posed;
   STRATA_RETURN_IF_ERROR(
       ReadVisible(map, [&](StorageReader& reader, const MapClock& clock) -> absl::Status {
-        STRATA_ASSIGN_OR_RETURN(scan, reader.FindScan(id, clock.epoch));
+        STRATA_ASSIGN_OR_RETURN(posed, GetScanById(reader, id, clock.epoch));
         return absl::OkStatus();
       }));
-  if (!scan.has_value()) return NoSuchScan(id);
-  return *std::move(scan);
+  return posed;
 }
 
 absl::StatusOr<ScanQuery> ToQuery(const api::ScanFilter& filter) {

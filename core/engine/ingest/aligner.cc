@@ -13,7 +13,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/common/status.h"
-#include "core/engine/map/scan_pages.h"
+#include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/matching.h"
 #include "core/registration/mls_registration.h"
 #include "core/registration/neighbours.h"

@@ -13,6 +13,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/ingest/integrator.h"
+#include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/mls/revote.h"
 
@@ -88,21 +89,18 @@ absl::Status Integrator::SetPersonLabels(const ScanId& id,
                                          const std::vector<std::uint16_t>& labels,
                                          bool update) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-  STRATA_ASSIGN_OR_RETURN(const std::optional<PosedScan> posed, reader->FindScan(id, epoch()));
-  if (!posed.has_value()) {
-    return absl::NotFoundError(absl::StrCat("scan ", id.ToString(), " does not exist"));
-  }
-  STRATA_RETURN_IF_ERROR(CheckLabels(posed->scan, labels.size()));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, GetScanById(*reader, id, epoch()));
+  STRATA_RETURN_IF_ERROR(CheckLabels(posed.scan, labels.size()));
   LabelChange change;
   change.labels = labels;
-  if (update && posed->scan.person_labels) {
+  if (update && posed.scan.person_labels) {
     STRATA_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> said,
-                            ReadLabels(*reader, posed->scan, LabelOrigin::kPerson));
+                            ReadLabels(*reader, posed.scan, LabelOrigin::kPerson));
     for (std::size_t i = 0; i < said.size(); ++i) {
       if (change.labels[i] == 0) change.labels[i] = said[i];
     }
   }
-  return ChangeLabels(*reader, *posed, change);
+  return ChangeLabels(*reader, posed, change);
 }
 
 absl::Status Integrator::SetModelLabels(ScanNumber number,

@@ -10,7 +10,7 @@
 #include "absl/status/status.h"
 
 #include "core/common/status.h"
-#include "core/engine/map/scan_pages.h"
+#include "core/engine/map/scan_lookup.h"
 
 namespace strata {
 namespace {

@@ -1,7 +1,5 @@
 // Scans that leave or move.
 #include <cstdint>
-#include <optional>
-#include <utility>
 #include <vector>
 
 #include "absl/container/btree_set.h"
@@ -11,18 +9,9 @@
 
 #include "core/common/status.h"
 #include "core/engine/ingest/integrator.h"
+#include "core/engine/map/scan_lookup.h"
 
 namespace strata {
-namespace {
-
-absl::StatusOr<PosedScan> FindScan(StorageReader& reader, const ScanId& id, std::uint64_t epoch) {
-  STRATA_ASSIGN_OR_RETURN(std::optional<PosedScan> scan, reader.FindScan(id, epoch));
-  if (scan.has_value()) return *std::move(scan);
-  return absl::NotFoundError(absl::StrCat("scan ", id.ToString(), " does not exist"));
-}
-
-}  // namespace
-
 absl::StatusOr<MlsTileMap> Integrator::TilesWithout(StorageReader& reader,
                                                     const absl::btree_set<TileKey>& keys,
                                                     ScanNumber without) {
@@ -34,7 +23,7 @@ absl::StatusOr<MlsTileMap> Integrator::TilesWithout(StorageReader& reader,
 
 absl::Status Integrator::DeleteScan(const ScanId& id) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(*reader, id, epoch()));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, GetScanById(*reader, id, epoch()));
   const ScanNumber number = posed.scan.number;
   STRATA_ASSIGN_OR_RETURN(const std::vector<TileKey> tiles, reader->TilesOfScan(number));
   TileChange change;
@@ -65,7 +54,7 @@ absl::StatusOr<MoveOutcome> Integrator::MoveScans(
 
 absl::Status Integrator::SetPose(const ScanId& id, const Pose& T_map_scan) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(*reader, id, epoch()));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, GetScanById(*reader, id, epoch()));
   const ScanRecord& scan = posed.scan;
   if (scan.state != ScanState::kIntegrated) {
     return absl::FailedPreconditionError(absl::StrCat("scan ",

@@ -1,7 +1,10 @@
 #include "core/engine/ingest/scan_mover.h"
 
-#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 
@@ -10,7 +13,6 @@
 #include "core/engine/scans/scan_losses.h"
 #include "core/engine/scans/scan_share.h"
 #include "core/engine/scans/scan_source.h"
-#include "core/engine/tiles/surface_tiles.h"
 
 namespace strata {
 namespace {
@@ -24,14 +26,14 @@ double Share(std::size_t i, std::size_t count) {
 
 }  // namespace
 
-absl::StatusOr<ScanMover::MovedScan> ScanMover::Move(const ProposedPose& pose) const {
+absl::StatusOr<ChangedScan> ScanMover::Move(const ProposedPose& pose) const {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
   STRATA_ASSIGN_OR_RETURN(PosedScan posed, reader->GetScan(pose.scan, epoch_));
   const ScanHeader& header = posed.scan.header;
   const MapParameters parameters = core_.info().parameters;
   const ScanShare share(core_.caches(), posed.scan);
   ScanSource source(*reader, parameters);
-  MovedScan moved;
+  ChangedScan moved;
   moved.T_map_scan = pose.T_map_scan;
   const absl::StatusOr<MlsMap> contribution = source.Contribution(posed.scan, pose.T_map_scan);
   if (moves_.damaged != nullptr &&
@@ -44,15 +46,13 @@ absl::StatusOr<ScanMover::MovedScan> ScanMover::Move(const ProposedPose& pose) c
   }
   STRATA_RETURN_IF_ERROR(CheckContributes(
       *contribution, source.dropped(), posed.scan, header.sensor.value_or(parameters.sensor)));
-  for (const MlsTile& tile : contribution->tiles) {
-    if (!tile.patches.empty()) moved.tiles.push_back(tile.key);
-  }
+  moved.tiles = TilesOf(*contribution);
   moved.scan = std::move(posed.scan);
   return moved;
 }
 
 absl::Status ScanMover::MoveAll() {
-  std::vector<MovedScan> list(moves_.poses.size());
+  std::vector<ChangedScan> list(moves_.poses.size());
   STRATA_RETURN_IF_ERROR(
       ParallelFor(threads_, list.size(), [&](int thread, std::size_t i) -> absl::Status {
         if (thread == 0) {
@@ -61,82 +61,20 @@ absl::Status ScanMover::MoveAll() {
         STRATA_ASSIGN_OR_RETURN(list[i], Move(moves_.poses[i]));
         return absl::OkStatus();
       }));
-  for (MovedScan& scan : list) {
+  for (ChangedScan& scan : list) {
     const ScanNumber number = scan.scan.number;
     moved_[number] = std::move(scan);
   }
   return absl::OkStatus();
 }
 
-// Where the scans were and where they come to.
-absl::StatusOr<ScanMover::KeySet> ScanMover::TilesTouched(StorageReader& reader) const {
-  KeySet keys;
-  for (const auto& [number, scan] : moved_) {
-    STRATA_ASSIGN_OR_RETURN(const std::vector<TileKey> old, reader.TilesOfScan(number));
-    keys.insert(old.begin(), old.end());
-    keys.insert(scan.tiles.begin(), scan.tiles.end());
-  }
-  return keys;
-}
-
-absl::StatusOr<std::vector<PlacedScanRecord>> ScanMover::ScansOfBlock(StorageReader& reader,
-                                                                      const KeySet& keys) const {
-  STRATA_ASSIGN_OR_RETURN(std::vector<PlacedScanRecord> scans,
-                          ScansOfTiles(reader, keys, epoch_, moves_.damaged));
-  std::erase_if(scans, [this](const PlacedScanRecord& placed) {
-    return moved_.contains(placed.scan.number);
-  });
-  for (const auto& [number, scan] : moved_) {
-    const bool touches = std::any_of(scan.tiles.begin(), scan.tiles.end(), [&](const TileKey& key) {
-      return keys.contains(key);
-    });
-    if (touches) scans.push_back({scan.scan, scan.T_map_scan});
-  }
-  return scans;
-}
-
-absl::StatusOr<MlsTileMap> ScanMover::StageMlsTiles(StorageReader& reader, const KeySet& keys) {
-  MlsTileMap gone;
-  const std::vector<KeySet> blocks = TileBlocks(keys);
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    STRATA_RETURN_IF_ERROR(context_.Progress(0.2 + 0.5 * Share(i, blocks.size()), "joining tiles"));
-    STRATA_ASSIGN_OR_RETURN(const std::vector<PlacedScanRecord> scans,
-                            ScansOfBlock(reader, blocks[i]));
-    STRATA_ASSIGN_OR_RETURN(
-        const MlsTileMap tiles,
-        MakeTiles(core_, scans, blocks[i], threads_, context_.stop(), moves_.damaged));
-    for (const auto& [key, tile] : tiles) {
-      if (tile == nullptr) gone[key] = nullptr;
-    }
-    STRATA_RETURN_IF_ERROR(staged_.Put(tiles, {}));
-  }
-  return gone;
-}
-
-absl::Status ScanMover::StageSurfaces(StorageReader& reader,
-                                      const KeySet& keys,
-                                      const MlsTileMap& gone) {
-  SurfaceTileMaker maker(core_,
-                         reader,
-                         store_,
-                         gone,
-                         {.version = version_,
-                          .threads = threads_,
-                          .profile = core_.info().parameters.default_profile});
-  return MakeChangedSurfaces(
-      maker,
-      WithNeighbours(keys),
-      context_.stop(),
-      [&](double share) { return context_.Progress(0.7 + 0.3 * share, "annotating tiles"); },
-      [&](const SurfaceTileMaker::Rows& rows) { return staged_.Put({}, rows); });
-}
-
-absl::Status ScanMover::KeepOtherTiles(StorageReader& reader, const KeySet& keys) {
+absl::Status ScanMover::KeepOtherTiles(StorageReader& reader,
+                                       const absl::btree_set<TileKey>& made) {
   if (moves_.damaged == nullptr) return absl::OkStatus();
   for (const ScanNumber number : moves_.damaged->Scans()) {
     if (moved_.contains(number)) continue;
     STRATA_ASSIGN_OR_RETURN(std::vector<TileKey> tiles, reader.TilesOfScan(number));
-    std::erase_if(tiles, [&keys](const TileKey& key) { return keys.contains(key); });
+    std::erase_if(tiles, [&made](const TileKey& key) { return made.contains(key); });
     tiles_of_damaged_[number] = std::move(tiles);
   }
   return absl::OkStatus();
@@ -162,10 +100,19 @@ absl::StatusOr<MoveOutcome> ScanMover::Run(
   STRATA_RETURN_IF_ERROR(MoveAll());
   {
     STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-    STRATA_ASSIGN_OR_RETURN(const KeySet keys, TilesTouched(*reader));
-    STRATA_ASSIGN_OR_RETURN(const MlsTileMap gone, StageMlsTiles(*reader, keys));
-    STRATA_RETURN_IF_ERROR(StageSurfaces(*reader, keys, gone));
-    STRATA_RETURN_IF_ERROR(KeepOtherTiles(*reader, keys));
+    ChangedTiles tiles(core_,
+                       store_,
+                       staged_,
+                       moved_,
+                       {.version = version_,
+                        .threads = threads_,
+                        .joining = 0.2,
+                        .annotating = 0.7,
+                        .damaged = moves_.damaged,
+                        .change_of = std::nullopt},
+                       context_);
+    STRATA_ASSIGN_OR_RETURN(const auto made, tiles.Stage(*reader));
+    STRATA_RETURN_IF_ERROR(KeepOtherTiles(*reader, made));
   }
   MoveOutcome outcome;
   outcome.tiles = staged_.changed();

@@ -13,6 +13,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/engine/ingest/changed_tiles.h"
 #include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/scans/damaged_scans.h"
@@ -63,23 +64,10 @@ class ScanMover {
   absl::StatusOr<MoveOutcome> Run(absl::FunctionRef<absl::Status(StorageWriter&)> decision);
 
  private:
-  using KeySet = absl::btree_set<TileKey>;
-  struct MovedScan {
-    ScanRecord scan;
-    Pose T_map_scan = Pose::Identity();
-    std::vector<TileKey> tiles;  // that it touches from now on
-  };
-
-  absl::StatusOr<MovedScan> Move(const ProposedPose& pose) const;
+  absl::StatusOr<ChangedScan> Move(const ProposedPose& pose) const;
   absl::Status MoveAll();
-  absl::StatusOr<KeySet> TilesTouched(StorageReader& reader) const;
-  absl::StatusOr<std::vector<PlacedScanRecord>> ScansOfBlock(StorageReader& reader,
-                                                             const KeySet& keys) const;
-  // Returns the tiles where nothing is any more.
-  absl::StatusOr<MlsTileMap> StageMlsTiles(StorageReader& reader, const KeySet& keys);
-  absl::Status StageSurfaces(StorageReader& reader, const KeySet& keys, const MlsTileMap& gone);
   // Keeps the tiles of damaged scans that stay where they are: all but those made again.
-  absl::Status KeepOtherTiles(StorageReader& reader, const KeySet& keys);
+  absl::Status KeepOtherTiles(StorageReader& reader, const absl::btree_set<TileKey>& made);
   absl::Status PutMoves(StorageWriter& writer, std::uint64_t epoch) const;
 
   MapCore& core_;
@@ -90,7 +78,7 @@ class ScanMover {
   const std::uint64_t epoch_;  // the current one
   const std::uint64_t version_;
   StagedTiles staged_;
-  absl::btree_map<ScanNumber, MovedScan> moved_;
+  ChangedScans moved_;
   absl::btree_map<ScanNumber, std::vector<TileKey>> tiles_of_damaged_;
 };
 

@@ -20,7 +20,7 @@
 #include "core/common/status.h"
 #include "core/engine/map/job_parameters.h"
 #include "core/engine/map/parallel.h"
-#include "core/engine/map/scan_pages.h"
+#include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/scan_labels.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/engine/tiles/mls_tiles.h"

@@ -6,7 +6,7 @@
 
 #include "core/classification/regions.h"
 #include "core/common/status.h"
-#include "core/engine/map/scan_pages.h"
+#include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/world/map_class.h"
 

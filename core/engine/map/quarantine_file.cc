@@ -20,6 +20,7 @@
 #include "core/common/status.h"
 #include "core/engine/map/directory.h"
 #include "core/engine/map/quarantine.h"
+#include "core/engine/map/scan_lookup.h"
 #include "core/storage/sqlite/sqlite_storage.h"
 #include "core/storage/storage.h"
 #include "core/world/names.h"
@@ -86,9 +87,8 @@ absl::StatusOr<WorkId> ParseWork(StorageReader& reader, absl::string_view what) 
   }
   STRATA_ASSIGN_OR_RETURN(const ScanId id, ParseScan(rest));
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader.GetClock());
-  STRATA_ASSIGN_OR_RETURN(const std::optional<PosedScan> scan, reader.FindScan(id, clock.epoch));
-  if (scan.has_value()) return WorkId{WorkKind::kScan, scan->scan.number};
-  return absl::NotFoundError(absl::StrCat("scan ", rest, " does not exist"));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, GetScanById(reader, id, clock.epoch));
+  return WorkId{WorkKind::kScan, posed.scan.number};
 }
 
 absl::Status DescribeScan(StorageReader& reader, QuarantineEntry& entry, bool& matters) {

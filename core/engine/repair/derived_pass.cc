@@ -14,7 +14,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/map/parallel.h"
-#include "core/engine/map/scan_pages.h"
+#include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/scan_share.h"
 #include "core/engine/scans/scan_source.h"
 
@@ -66,9 +66,7 @@ absl::Status DerivedPass::IndexScans(StorageReader& reader, DerivedSink& sink) {
           return Annotate(contribution.status(),
                           absl::StrCat("scan ", placed_[i].scan.header.id.ToString()));
         }
-        for (const MlsTile& tile : contribution->tiles) {
-          if (!tile.patches.empty()) tiles[i].push_back(tile.key);
-        }
+        tiles[i] = TilesOf(*contribution);
         return absl::OkStatus();
       });
   STRATA_RETURN_IF_ERROR(made);

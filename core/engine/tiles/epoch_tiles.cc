@@ -8,7 +8,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
-#include "core/engine/map/scan_pages.h"
+#include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/world/epoch.h"
 
@@ -106,9 +106,7 @@ absl::Status EpochTiles::FindTiles(StorageReader& reader,
       if (!made.ok()) {
         return Annotate(made.status(), absl::StrCat("scan ", placed.scan.header.id.ToString()));
       }
-      for (const MlsTile& tile : made->tiles) {
-        if (!tile.patches.empty()) keys.push_back(tile.key);
-      }
+      keys = TilesOf(*made);
       changed.insert(keys.begin(), keys.end());
     }
     for (const TileKey& key : keys) {

@@ -28,6 +28,14 @@
 
 namespace strata {
 
+std::vector<TileKey> TilesOf(const MlsMap& contribution) {
+  std::vector<TileKey> keys;
+  for (const MlsTile& tile : contribution.tiles) {
+    if (!tile.patches.empty()) keys.push_back(tile.key);
+  }
+  return keys;
+}
+
 std::size_t MemoryBytes(const MlsTile& tile) {
   return sizeof(tile) + tile.patches.capacity() * sizeof(Patch) +
          tile.colour.capacity() * sizeof(ColourSum) + tile.votes.capacity() * sizeof(ClassVotes);

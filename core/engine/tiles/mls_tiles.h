@@ -37,6 +37,9 @@ struct PlacedScanRecord {
   const LabelChange* change = nullptr;  // as if this had been stored already
 };
 
+// Keys of the tiles that have patches.
+std::vector<TileKey> TilesOf(const MlsMap& contribution);
+
 // Bytes a tile takes in memory.
 std::size_t MemoryBytes(const MlsTile& tile);
 

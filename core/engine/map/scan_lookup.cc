@@ -1,9 +1,13 @@
-#include "core/engine/map/scan_pages.h"
+#include "core/engine/map/scan_lookup.h"
 
+#include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
 
@@ -29,6 +33,14 @@ absl::Status ForEachPosedScan(StorageReader& reader,
   return ForEachScan(reader, query, epoch, [&](PosedScan posed) {
     if (posed.pose.has_value()) body(std::move(posed));
   });
+}
+
+absl::StatusOr<PosedScan> GetScanById(StorageReader& reader,
+                                      const ScanId& id,
+                                      std::uint64_t epoch) {
+  STRATA_ASSIGN_OR_RETURN(std::optional<PosedScan> posed, reader.FindScan(id, epoch));
+  if (posed.has_value()) return *std::move(posed);
+  return absl::NotFoundError(absl::StrCat("scan ", id.ToString(), " does not exist"));
 }
 
 }  // namespace strata

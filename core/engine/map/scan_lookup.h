@@ -1,4 +1,4 @@
-// The one loop over the scans of a map.
+// Scans of a map: one by its id, or all in one loop.
 #ifndef STRATA_CORE_ENGINE_MAP_SCAN_PAGES_H_
 #define STRATA_CORE_ENGINE_MAP_SCAN_PAGES_H_
 
@@ -6,8 +6,10 @@
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 
 #include "core/storage/storage.h"
+#include "core/world/scan.h"
 
 namespace strata {
 
@@ -23,6 +25,9 @@ absl::Status ForEachPosedScan(StorageReader& reader,
                               const ScanQuery& query,
                               std::uint64_t epoch,
                               absl::FunctionRef<void(PosedScan)> body);
+
+// NOT_FOUND.
+absl::StatusOr<PosedScan> GetScanById(StorageReader& reader, const ScanId& id, std::uint64_t epoch);
 
 }  // namespace strata
 
