@@ -6,3 +6,4 @@ strata_executable(
        ${OCTOMAP_LIBRARIES}
 )
 target_include_directories(codec_benchmark SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
+strata_smoke(codec_benchmark --benchmark_filter=Tile|Points --benchmark_min_time=0.01)

@@ -1,6 +1,6 @@
 // How fast scans become durable through a server, beside a bare program that writes the same bytes.
 //
-//   durable_upload_benchmark [SCANS [REPEATS]]
+//   durable_upload_benchmark [SCANS [REPEATS [smoke]]]
 //
 // Robots (threads with the SDK) send recorded scans over loopback to a server in this process, each
 // the next when the one before is acknowledged. Every commit is noted down as SQLite runs it; the
@@ -329,6 +329,7 @@ double Measure(
 int Main(int argc, char** argv) {
   const int count = argc > 1 ? std::atoi(argv[1]) : 450;
   const int repeats = argc > 2 ? std::atoi(argv[2]) : 3;
+  const bool smoke = argc > 3;  // time is held against nothing
   FLAGS_minloglevel = google::GLOG_WARNING;
   google::InitGoogleLogging(argv[0]);
   CommitLog::Instance();
@@ -342,7 +343,7 @@ int Main(int argc, char** argv) {
     reached = Measure(scans, robots, count, repeats, true) >= kBound && reached;
     Measure(scans, robots, count, repeats, false);
   }
-  return reached ? 0 : 1;
+  return reached || smoke ? 0 : 1;
 }
 
 }  // namespace

@@ -5,3 +5,4 @@ strata_executable(
   SOURCES mls_benchmark.cc
   DEPS strata::mls strata::test_support ${OCTOMAP_LIBRARIES}
 )
+strata_smoke(mls_benchmark 1 0)

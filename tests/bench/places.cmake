@@ -3,3 +3,4 @@ strata_executable(
   SOURCES places_benchmark.cc
   DEPS strata::posegraph strata::registration
 )
+strata_smoke(places_benchmark --runs 1)

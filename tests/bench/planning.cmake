@@ -11,3 +11,5 @@ strata_executable(
   SOURCES long_plan_benchmark.cc
   DEPS strata::engine strata::planning strata::codec
 )
+strata_smoke(planning_benchmark 2 1)
+strata_smoke(long_plan_benchmark street 160 300)

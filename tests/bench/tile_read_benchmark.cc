@@ -1,7 +1,7 @@
 // Tiles a second through a server, beside a bare gRPC service that answers with equal messages from
 // memory; and what Fetch sends after one tile in a hundred has changed.
 //
-//   tile_read_benchmark [SECONDS [REPEATS]]
+//   tile_read_benchmark [SECONDS [REPEATS [smoke]]]
 //
 // Server, bare service (gRPC's callback API, no work, no log) and clients share this process and
 // its processors; each client is a thread with a connection of its own that asks for the next tile
@@ -218,6 +218,7 @@ bool MeasureFetch(api::Database& db, const std::string& address, const Fetched& 
 int Main(int argc, char** argv) {
   const double seconds = argc > 1 ? std::atof(argv[1]) : 3.0;
   const int repeats = argc > 2 ? std::atoi(argv[2]) : 5;
+  const bool smoke = argc > 3;  // time is held against nothing
   FLAGS_minloglevel = google::GLOG_WARNING;
   google::InitGoogleLogging(argv[0]);
   const testing::TempDir folder;
@@ -239,7 +240,7 @@ int Main(int argc, char** argv) {
               static_cast<double>(all.bytes) / 1e3 / static_cast<double>(all.tiles.size()));
   const bool fast = MeasureGets((*server)->address(), all, seconds, repeats);
   const bool small = MeasureFetch(**db, (*server)->address(), all);
-  return fast && small ? 0 : 1;
+  return (fast || smoke) && small ? 0 : 1;
 }
 
 }  // namespace
