@@ -1,0 +1,123 @@
+#!/usr/bin/python3
+"""RESULTS.md: the tables of the thesis and of the README beside ours, each with its command and commit.
+
+    tests/experiments/results.py --build build/release [NAME…]   runs experiments anew and writes what they print there
+    tests/experiments/results.py --check                         names results older than the sources they measure
+
+Without NAME all are run; benchmarks want a machine that does nothing else. A result is old when one of its sources has
+been committed to since. --check says so and ends with 0: a table may be old, but not unnoticed. Exits 1 where an
+experiment's own bound does not hold.
+"""
+import argparse
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+FILE = pathlib.Path(__file__).with_name("RESULTS.md")
+
+POSES = ("core/posegraph", "core/planes", "core/registration")
+LABELS = ("core/classification",)
+
+# name: (title, command, sources that it measures)
+RESULTS = {
+    "table_7_1": ("Thesis, table 7.1: four views of a small house", "experiments/global_constraints table_7_1", POSES),
+    "fig_7_9": ("Thesis, figure 7.9: two to six views", "experiments/global_constraints fig_7_9", POSES),
+    "sigma_alpha": ("Thesis, 7.4.4: deviation from planes on a large building", "experiments/global_constraints sigma_alpha",
+                    POSES),
+    "facade_planes": ("Thesis, 7.4.4: a recorded facade", "experiments/global_constraints facade 4", POSES),
+    **{f"thesis_{what}": (f"Thesis, 9.3 and 9.4: {what}", f"experiments/classification_thesis {what}", LABELS)
+       for what in ("facade", "depths", "transform", "objects", "people", "places")},
+    "oakland": ("Recorded streets named", "experiments/labelled_clouds --data oakland", LABELS),
+    "recordings": ("Recorded drives through a real server",
+                   "/usr/bin/python3 tests/experiments/real_data.py --build {build}", ("core", "server", "client")),
+    "posegraphs": ("Recorded pose graphs", "/usr/bin/python3 tests/experiments/pose_graphs.py --build {build}",
+                   ("core/posegraph", "client/formats")),
+    "mls": ("Points to maps beside OctoMap", "bench/mls_benchmark 5 3", ("core/mls",)),
+    "registration": ("Registration beside PCL", "bench/registration_benchmark --pairs 60", ("core/registration", "core/mls")),
+    "posegraph": ("Our use of Ceres beside a plain one", "bench/posegraph_benchmark 5", ("core/posegraph",)),
+    "planning": ("Warm plans beside boost::astar_search", "bench/planning_benchmark 60 3", ("core/planning",)),
+    "cuts": ("Features, cuts, training and scans beside CGAL", "bench/classification_benchmark --rounds 3", LABELS),
+    "codec": ("Bytes and time a tile", "bench/codec_benchmark", ("core/codec",)),
+    "uploads": ("Durable uploads beside a bare program", "bench/durable_upload_benchmark", ("core/engine", "core/storage", "server")),
+    "tiles": ("Tiles read beside a bare service", "bench/tile_read_benchmark", ("core/engine", "server")),
+}
+
+SECTION = re.compile(r"^## (?P<title>.*) \(`(?P<name>\w+)`\)\n\n`(?P<command>[^`]*)` at (?P<commit>\w+)[^\n]*\n\n```\n"
+                     r"(?P<text>.*?)```\n", re.M | re.S)
+HEAD = """# Results
+
+What experiments and benchmarks printed, with command and commit; `tests/experiments/results.py` writes this file, and
+`--check` names what is older than the sources that it measures. Times are of whatever machine ran them: what counts is the
+ratio to the peer in the same run.
+"""
+
+
+def git(*words):
+    return subprocess.run(["git", "-C", ROOT, *words], check=True, capture_output=True, text=True).stdout.strip()
+
+
+def read():
+    text = FILE.read_text(encoding="utf-8") if FILE.exists() else ""
+    return {match["name"]: match for match in SECTION.finditer(text)}
+
+
+def write(sections):
+    ordered = [sections[name] for name in RESULTS if name in sections]
+    FILE.write_text("\n".join([HEAD, *ordered]), encoding="utf-8")
+
+
+def run(name, build):
+    """(its section, whether its bound holds)."""
+    title, command, _ = RESULTS[name]
+    words = command.format(build=build).split()
+    if "/" in words[0] and not words[0].startswith("/"):
+        words[0] = str(build / "tests" / words[0])
+    done = subprocess.run(words, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
+    commit, date = git("log", "-1", "--format=%h %cs").split()
+    dirty = " with changes" if git("status", "--porcelain", "--untracked-files=no") else ""
+    section = f"## {title} (`{name}`)\n\n`{command.format(build='build/release')}` at {commit}{dirty}, {date}\n\n```\n{done.stdout.rstrip()}\n```\n"
+    return section, done.returncode in (0, 77)
+
+
+def old_results():
+    """Lines that say which results are absent or older than what they measure."""
+    known = read()
+    for name, (_, _, sources) in RESULTS.items():
+        if name not in known:
+            yield f"{name}: never run"
+            continue
+        commit = known[name]["commit"]
+        since = git("log", "--oneline", f"{commit}..HEAD", "--", *sources).splitlines()
+        if since:
+            yield f"{name}: of {commit}; since then {len(since)} commits to {', '.join(sources)}"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(RESULTS))
+    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
+    parser.add_argument("--check", action="store_true")
+    options = parser.parse_args()
+    unknown = set(options.names) - set(RESULTS)
+    if unknown:
+        parser.error(f"no result {', '.join(sorted(unknown))}; there are {', '.join(RESULTS)}")
+    if options.check:
+        print("\n".join(old_results()) or "all results are as new as their sources")
+        return 0
+    sections = {name: match[0] for name, match in read().items()}
+    holds = True
+    for name in options.names or RESULTS:
+        print(f"== {name}", file=sys.stderr, flush=True)
+        sections[name], bound = run(name, options.build.absolute())
+        print(f"{'holds' if bound else 'DOES NOT HOLD'}", file=sys.stderr, flush=True)
+        holds = holds and bound
+        write(sections)
+    return 0 if holds else 1
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("STRATA_DATA", str(ROOT.parent / "shared/data"))
+    sys.exit(main())
