@@ -30,8 +30,7 @@ using JobParameters = std::map<std::string, std::string>;
 
 struct JobInfo {
   std::uint64_t id = 0;  // unique in the map
-  std::string kind;  // "rebuild", "verify", "optimize", "revert", "train", "classify", "evaluate",
-                     // "fade"
+  std::string kind;      // see job_kinds.h
   JobParameters parameters;
   JobState state = JobState::kQueued;
   double progress = 0.0;                  // in [0, 1]
