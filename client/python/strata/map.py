@@ -296,8 +296,7 @@ class Map:
                 backoff.wait(failure)
 
     def start_job(self, kind, **parameters):
-        """Queues a Job, "rebuild", "verify", "optimize", "fade", "revert", "train", "classify" or
-        "evaluate"."""
+        """Queues a Job of a kind that `strata job start --help` lists, with its parameters."""
         answer = self._connection.once(self._jobs.Start, jobs_pb2.StartJobRequest(
             map=self.name, kind=kind, parameters=job.parameters(parameters)))
         return job.from_proto(answer.job)

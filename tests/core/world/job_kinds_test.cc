@@ -1,5 +1,7 @@
 #include "core/world/job_kinds.h"
 
+#include <fstream>
+#include <iterator>
 #include <set>
 #include <string>
 #include <vector>
@@ -22,6 +24,21 @@ using ::testing::Each;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
+
+// Comment lines of a proto file, as text.
+std::string CommentsOf(const char* proto) {
+  std::ifstream file(proto);
+  const std::string all(std::istreambuf_iterator<char>(file), {});
+  std::string comments;
+  for (absl::string_view line : absl::StrSplit(all, '\n')) {
+    if (line.substr(0, 3) == "// ") absl::StrAppend(&comments, line.substr(3), "\n");
+  }
+  return comments;
+}
+
+TEST(JobKindsTest, TheProtoHasEveryKindParameterBoundAndDefault) {
+  EXPECT_THAT(CommentsOf(STRATA_JOBS_PROTO), HasSubstr(JobKindsText()));
+}
 
 TEST(JobKindsTest, TextsAreLinesForAProtoAndATerminal) {
   const std::vector<std::string> lines = absl::StrSplit(JobKindsText(), '\n');
