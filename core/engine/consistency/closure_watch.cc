@@ -13,7 +13,7 @@ namespace strata {
 
 std::size_t CountFreshContacts(const GraphWorld& world, std::size_t first_new) {
   std::vector<bool> joined(world.size(), false);  // the younger one to another pass
-  for (const ScanPair& pair : world.Problem({}).pairs) {
+  for (const ScanPair& pair : world.Problem(DefaultOptimizeSettings()).pairs) {
     if (!pair.measured.has_value() || world.SamePass(pair.i, pair.j)) continue;
     joined[std::max(pair.i, pair.j)] = true;
   }
@@ -42,9 +42,13 @@ absl::StatusOr<std::size_t> ClosureWatch::Look(const Stop& stop) {
     found = CountFreshContacts(world, first_new);
     ScanViews views(core_, scans);
     SilentContext context(stop);
-    STRATA_ASSIGN_OR_RETURN(
-        const ClosureSearch search,
-        SearchClosures(world, views, first_new, {}, core_.options().worker_threads, context));
+    STRATA_ASSIGN_OR_RETURN(const ClosureSearch search,
+                            SearchClosures(world,
+                                           views,
+                                           first_new,
+                                           DefaultOptimizeSettings(),
+                                           core_.options().worker_threads,
+                                           context));
     found += search.closures.size();
     seen_ = scans.back().number;
   }

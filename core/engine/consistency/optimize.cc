@@ -62,10 +62,16 @@ class Optimizer {
  public:
   Optimizer(MapCore& core,
             const OptimizeSettings& settings,
+            int threads,
             const JobInfo& job,
             DamagedScans& damaged,
             JobContext& context)
-      : core_(core), settings_(settings), job_(job), damaged_(damaged), context_(context) {}
+      : core_(core),
+        settings_(settings),
+        threads_(threads),
+        job_(job),
+        damaged_(damaged),
+        context_(context) {}
 
   // Leaves the proposal in the store.
   absl::StatusOr<Proposed> Propose() {
@@ -77,7 +83,7 @@ class Optimizer {
     if (settings_.closures) {
       PartOfJob part(context_, 0.0, kClosuresEnd);
       STRATA_ASSIGN_OR_RETURN(ClosureSearch search,
-                              SearchClosures(world, views, 0, settings_, threads(), part));
+                              SearchClosures(world, views, 0, settings_, threads_, part));
       closures = std::move(search.closures);
       start = std::move(search.T_map_scan);
       context_.SetMetric("closures_tried", static_cast<double>(search.tried));
@@ -90,10 +96,6 @@ class Optimizer {
     STRATA_ASSIGN_OR_RETURN(const AlignmentResult result, Align(problem, views));
     STRATA_RETURN_IF_ERROR(Store(world, result, KeptClosures(world, closures, result)));
     return Proposed{world.epoch(), Report(world, result)};
-  }
-
-  int threads() const {
-    return settings_.threads > 0 ? settings_.threads : core_.options().worker_threads;
   }
 
  private:
@@ -109,7 +111,7 @@ class Optimizer {
         views,
         options,
         [this](std::size_t count, absl::FunctionRef<absl::Status(std::size_t)> body) {
-          return ParallelFor(threads(), count, [&](int, std::size_t k) { return body(k); });
+          return ParallelFor(threads_, count, [&](int, std::size_t k) { return body(k); });
         },
         [this](double progress) {
           return context_.Progress(kClosuresEnd + (kAlignmentEnd - kClosuresEnd) * progress,
@@ -239,6 +241,7 @@ class Optimizer {
 
   MapCore& core_;
   const OptimizeSettings& settings_;
+  const int threads_;
   const JobInfo& job_;
   DamagedScans& damaged_;
   JobContext& context_;
@@ -249,16 +252,17 @@ class Optimizer {
 absl::Status RunOptimizeJob(MapCore& core,
                             Worker& worker,
                             const JobInfo& job,
+                            const JobArguments& arguments,
                             JobContext& context) {
-  JobParameters parameters = job.parameters;
-  const bool accepted = parameters.erase(kAccepted) > 0;
-  STRATA_ASSIGN_OR_RETURN(const OptimizeSettings settings, ParseOptimizeSettings(parameters));
+  const bool accepted = job.parameters.contains(kAccepted);
+  const OptimizeSettings settings(arguments);
+  const int threads = ThreadsOf(arguments, core.options());
   DamagedScans damaged;
-  Optimizer optimizer(core, settings, job, damaged, context);
   Proposed proposed;
   if (accepted) {
     proposed = {static_cast<std::uint64_t>(job.metrics.at("epoch_before")), job.message};
   } else {
+    Optimizer optimizer(core, settings, threads, job, damaged, context);
     STRATA_ASSIGN_OR_RETURN(proposed, optimizer.Propose());
   }
   context.SetMetric("epoch_before", static_cast<double>(proposed.base_epoch));
@@ -267,13 +271,8 @@ absl::Status RunOptimizeJob(MapCore& core,
   } else {
     PartOfJob part(context, accepted ? 0.0 : kAlignmentEnd, 1.0);
     const auto apply = [&](Integrator& integrator) {
-      return ApplyProposal(integrator,
-                           job,
-                           proposed.base_epoch,
-                           settings.tolerance,
-                           optimizer.threads(),
-                           damaged,
-                           part);
+      return ApplyProposal(
+          integrator, job, proposed.base_epoch, settings.tolerance, threads, damaged, part);
     };
     STRATA_RETURN_IF_ERROR(
         worker.Execute(context.stop(), apply, absl::StrCat("job ", job.id, " (", job.kind, ")")));

@@ -8,12 +8,17 @@
 #include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
 #include "core/world/job.h"
+#include "core/world/job_arguments.h"
 
 namespace strata {
 
 // Runs the job beside uploads, integration and reads; only the making of the next epoch is the
 // worker's. A dry run, and any run until then, leaves nothing but a proposal.
-absl::Status RunOptimizeJob(MapCore& core, Worker& worker, const JobInfo& job, JobContext& context);
+absl::Status RunOptimizeJob(MapCore& core,
+                            Worker& worker,
+                            const JobInfo& job,
+                            const JobArguments& arguments,
+                            JobContext& context);
 
 }  // namespace strata
 

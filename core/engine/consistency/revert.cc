@@ -1,10 +1,8 @@
 #include "core/engine/consistency/revert.h"
 
-#include <cstdint>
 #include <utility>
 
 #include "absl/status/statusor.h"
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
@@ -28,13 +26,11 @@ absl::StatusOr<PoseChange> ReadChange(MapCore& core, std::uint64_t epoch) {
 
 }  // namespace
 
-absl::Status RunRevertJob(Integrator& integrator, const JobInfo& job, JobContext& context) {
+absl::Status RunRevertJob(Integrator& integrator,
+                          const JobInfo& job,
+                          std::uint64_t epoch,
+                          JobContext& context) {
   MapCore& core = integrator.core();
-  std::uint64_t epoch = 0;
-  const auto parameter = job.parameters.find("epoch");
-  if (parameter == job.parameters.end() || !absl::SimpleAtoi(parameter->second, &epoch)) {
-    return absl::InvalidArgumentError("job parameter epoch: missing; see map history");
-  }
   STRATA_ASSIGN_OR_RETURN(const PoseChange change, ReadChange(core, epoch));
   PoseChange::Outcome outcome = change.Resolve({.translation_m = 0.0, .rotation_rad = 0.0});
   ScanMoves moves;

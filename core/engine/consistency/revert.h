@@ -2,8 +2,9 @@
 #ifndef STRATA_CORE_ENGINE_CONSISTENCY_REVERT_H_
 #define STRATA_CORE_ENGINE_CONSISTENCY_REVERT_H_
 
+#include <cstdint>
+
 #include "absl/status/status.h"
-#include "absl/strings/string_view.h"
 
 #include "core/engine/ingest/integrator.h"
 #include "core/engine/map/job_context.h"
@@ -11,12 +12,13 @@
 
 namespace strata {
 
-inline constexpr absl::string_view kRevertJob = "revert";
-
-// On the worker: makes the poses of the epoch in the job's parameter "epoch" those of a new epoch.
+// On the worker: makes the poses of `epoch` those of a new epoch.
 // Scans that had none then are carried by their partners. NOT_FOUND for an epoch that never was,
 // FAILED_PRECONDITION for one that is not kept.
-absl::Status RunRevertJob(Integrator& integrator, const JobInfo& job, JobContext& context);
+absl::Status RunRevertJob(Integrator& integrator,
+                          const JobInfo& job,
+                          std::uint64_t epoch,
+                          JobContext& context);
 
 }  // namespace strata
 

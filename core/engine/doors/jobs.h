@@ -21,7 +21,6 @@ class EngineJobs final : public api::Jobs {
  public:
   explicit EngineJobs(EngineMaps& maps) : maps_(maps) {}
 
-  // Kinds and parameters: rebuild.h, optimize_settings.h, revert.h, train.h, classify.h, fade.h.
   absl::StatusOr<JobInfo> Start(const api::Call& call,
                                 absl::string_view map,
                                 absl::string_view kind,

@@ -25,7 +25,7 @@
 #include "core/engine/doors/backup.h"
 #include "core/engine/doors/map_stats.h"
 #include "core/engine/doors/map_watch.h"
-#include "core/engine/repair/rebuild.h"
+#include "core/world/job_kinds.h"
 #include "core/world/names.h"
 
 namespace strata {

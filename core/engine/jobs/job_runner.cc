@@ -17,13 +17,10 @@
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/common/this_thread.h"
-#include "core/engine/consistency/optimize.h"
-#include "core/engine/consistency/optimize_settings.h"
-#include "core/engine/consistency/revert.h"
-#include "core/engine/labels/classify.h"
+#include "core/engine/jobs/job_handlers.h"
 #include "core/engine/labels/fade.h"
-#include "core/engine/labels/train.h"
-#include "core/engine/repair/rebuild.h"
+#include "core/world/job_arguments.h"
+#include "core/world/job_kinds.h"
 
 namespace strata {
 namespace {
@@ -79,25 +76,11 @@ void JobRunner::JobQueued() {
 absl::Status JobRunner::Run(const JobInfo& job, JobContext& context) {
   STRATA_ASSIGN_OR_RETURN(const bool done, HasMadeItsEpoch(core_, job, context));
   if (done) return absl::OkStatus();
-  if (job.kind == kOptimizeJob) return RunOptimizeJob(core_, worker_, job, context);
-  if (job.kind == kTrainJob) return RunTrainJob(core_, job, context);
-  if (job.kind == kEvaluateJob) return RunEvaluateJob(core_, job, context);
-  if (job.kind == kClassifyJob) return RunClassifyJob(core_, worker_, job, context);
-  if (job.kind == kFadeJob) return RunFadeJob(core_, worker_, job, context);
-  if (job.kind == kVerifyJob) return RunVerify(job, context);
-  return worker_.Execute(
-      closing_,
-      [&](Integrator& integrator) {
-        return job.kind == kRevertJob ? RunRevertJob(integrator, job, context)
-                                      : RunRebuildJob(integrator, job, context);
-      },
-      absl::StrCat("job ", job.id, " (", job.kind, ")"));
-}
-
-absl::Status JobRunner::RunVerify(const JobInfo& job, JobContext& context) {
-  // A map whose tiles are not usable makes them before it takes commands.
-  STRATA_RETURN_IF_ERROR(worker_.Execute(closing_, [](Integrator&) { return absl::OkStatus(); }));
-  return RunVerifyJob(core_, job, context);
+  STRATA_ASSIGN_OR_RETURN(const JobHandler* const handler, FindJobHandler(job.kind));
+  JobParameters parameters = job.parameters;
+  parameters.erase(kAccepted);  // the board's, of no kind
+  STRATA_ASSIGN_OR_RETURN(const JobArguments arguments, ReadJobArguments(job.kind, parameters));
+  return handler->run({core_, worker_, job, arguments, context});
 }
 
 JobRunner::Step JobRunner::NextStep() {

@@ -45,7 +45,6 @@ class JobRunner {
   // Whether the next job must wait for a scan.
   absl::StatusOr<bool> MustWait();
   absl::Status Run(const JobInfo& job, JobContext& context);
-  absl::Status RunVerify(const JobInfo& job, JobContext& context);
   // Queues what nobody has asked for and is due.
   void Look();
   absl::Status StartWhatIsDue();

@@ -121,10 +121,9 @@ class ScanClassifier {
 
 absl::Status RunClassifyJob(MapCore& core,
                             Worker& worker,
-                            const JobInfo& job,
+                            absl::string_view model,
                             JobContext& context) {
-  STRATA_ASSIGN_OR_RETURN(StoredClassifier stored,
-                          LoadClassifier(core, job.parameters.at("model")));
+  STRATA_ASSIGN_OR_RETURN(StoredClassifier stored, LoadClassifier(core, model));
   return ScanClassifier(core, worker, std::move(stored), context).Run();
 }
 

@@ -11,14 +11,15 @@
 
 namespace strata {
 
-inline constexpr absl::string_view kClassifyJob = "classify";
-
-// The classifier of parameter "model" labels every scan that it has not labelled yet, in commit
+// The classifier `model` labels every scan that it has not labelled yet, in commit
 // order, and goes on until there is none: also those that come in meanwhile. Each scan is one
 // transaction, its labels and the tiles that count them, so a job that ended in between goes on
 // where it stopped when it is started again. What it says depends on the classifier and on the
 // uploaded scan only. Scans without points, and damaged ones, are left out and counted.
-absl::Status RunClassifyJob(MapCore& core, Worker& worker, const JobInfo& job, JobContext& context);
+absl::Status RunClassifyJob(MapCore& core,
+                            Worker& worker,
+                            absl::string_view model,
+                            JobContext& context);
 
 }  // namespace strata
 

@@ -18,13 +18,14 @@
 #include "absl/synchronization/mutex.h"
 
 #include "core/common/status.h"
-#include "core/engine/map/job_parameters.h"
 #include "core/engine/map/parallel.h"
 #include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/scan_labels.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/engine/tiles/mls_tiles.h"
 #include "core/engine/tiles/surface_tiles.h"
+#include "core/mls/see_through.h"
+#include "core/world/job_kinds.h"
 
 namespace strata {
 namespace {
@@ -35,6 +36,25 @@ constexpr std::size_t kRaysBetweenStops = 10'000;
 
 // Faded points of a scan: index, and how many scans looked through the place.
 using FadedPoints = std::vector<std::pair<std::uint64_t, std::uint16_t>>;
+
+struct FadeSettings {
+  SeeThroughOptions evidence;
+  bool undo = false;  // everything comes back
+  int threads = 2;
+};
+
+FadeSettings SettingsOf(const JobArguments& arguments, const MapCore& core) {
+  FadeSettings settings;
+  SeeThroughOptions& evidence = settings.evidence;
+  const std::uint32_t fade_after = core.info().parameters.fade_after;
+  if (fade_after > 0) evidence.scans = static_cast<int>(fade_after);
+  if (arguments.Has("scans")) evidence.scans = static_cast<int>(arguments.Whole("scans"));
+  evidence.rays = static_cast<int>(arguments.Whole("rays"));
+  evidence.clearance_m = arguments.Real("clearance_m");
+  settings.undo = arguments.Flag("undo");
+  settings.threads = ThreadsOf(arguments, core.options());
+  return settings;
+}
 
 // A scan with the box of its rays.
 struct SeenScan {
@@ -306,21 +326,6 @@ class Fading {
 
 }  // namespace
 
-absl::StatusOr<FadeSettings> ParseFadeSettings(const JobParameters& parameters) {
-  FadeSettings settings;
-  SeeThroughOptions& evidence = settings.evidence;
-  STRATA_RETURN_IF_ERROR(ReadJobParameters(
-      kFadeJob,
-      parameters,
-      {{"scans", {WholeParameter(evidence.scans, 1, kMaxFadeAfter), "in [1, 1000]"}},
-       {"rays", {WholeParameter(evidence.rays, 1, 100'000), "in [1, 100000]"}},
-       {"clearance_m", {RealParameter(evidence.clearance_m, 0.05, 10.0), "in [0.05, 10]"}},
-       {"undo", {FlagParameter(settings.undo), "0 or 1"}},
-       {"threads", {WholeParameter(settings.threads, 1, 64), "in [1, 64]"}}}));
-  settings.scans_given = parameters.contains("scans");
-  return settings;
-}
-
 absl::StatusOr<bool> FadingIsDue(MapCore& core, const std::vector<JobInfo>& jobs) {
   if (core.info().parameters.fade_after == 0) return false;
   ScanQuery fresh;
@@ -339,13 +344,11 @@ absl::StatusOr<bool> FadingIsDue(MapCore& core, const std::vector<JobInfo>& jobs
   return scans.size() == kFreshScans;
 }
 
-absl::Status RunFadeJob(MapCore& core, Worker& worker, const JobInfo& job, JobContext& context) {
-  STRATA_ASSIGN_OR_RETURN(FadeSettings settings, ParseFadeSettings(job.parameters));
-  const std::uint32_t fade_after = core.info().parameters.fade_after;
-  if (!settings.scans_given && fade_after > 0) {
-    settings.evidence.scans = static_cast<int>(fade_after);
-  }
-  return Fading(core, worker, settings, context).Run();
+absl::Status RunFadeJob(MapCore& core,
+                        Worker& worker,
+                        const JobArguments& arguments,
+                        JobContext& context) {
+  return Fading(core, worker, SettingsOf(arguments, core), context).Run();
 }
 
 }  // namespace strata

@@ -6,27 +6,14 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/strings/string_view.h"
 
 #include "core/engine/ingest/worker.h"
 #include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
-#include "core/mls/see_through.h"
 #include "core/world/job.h"
+#include "core/world/job_arguments.h"
 
 namespace strata {
-
-inline constexpr absl::string_view kFadeJob = "fade";
-
-struct FadeSettings {
-  SeeThroughOptions evidence;
-  bool scans_given = false;  // else the map's fade_after, if it has one
-  bool undo = false;         // everything comes back
-  int threads = 2;
-};
-
-// INVALID_ARGUMENT naming the parameter: scans, rays, clearance_m, undo, threads.
-absl::StatusOr<FadeSettings> ParseFadeSettings(const JobParameters& parameters);
 
 // Whether the map lets things fade by itself, and has enough scans that no job of `jobs` has taken
 // into account.
@@ -38,7 +25,10 @@ absl::StatusOr<bool> FadingIsDue(MapCore& core, const std::vector<JobInfo>& jobs
 // recorded with its evidence. The result depends on scans, poses and settings only, not on what
 // earlier jobs decided. Takes effect at once, at its end; a scan that is deleted meanwhile is left
 // out. DATA_LOSS where a scan is damaged.
-absl::Status RunFadeJob(MapCore& core, Worker& worker, const JobInfo& job, JobContext& context);
+absl::Status RunFadeJob(MapCore& core,
+                        Worker& worker,
+                        const JobArguments& arguments,
+                        JobContext& context);
 
 }  // namespace strata
 

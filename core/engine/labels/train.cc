@@ -15,9 +15,7 @@
 #include "core/common/status.h"
 #include "core/engine/labels/classifier_store.h"
 #include "core/engine/labels/labelled_scans.h"
-#include "core/engine/map/job_parameters.h"
 #include "core/engine/scans/damaged_scans.h"
-#include "core/world/names.h"
 
 namespace strata {
 namespace {
@@ -42,39 +40,6 @@ class Part {
   const double end_;
   const absl::string_view phase_;
 };
-
-// Reads with `parse`, whose message nobody needs: the bound says it.
-template <typename T, typename Parse>
-ReadParameter ParsedParameter(T& to, Parse parse) {
-  return [&to, parse](const std::string& text) {
-    const auto value = parse(text);
-    if (value.ok()) to = *value;
-    return value.ok();
-  };
-}
-
-KnownParameters ParametersOf(TrainSettings& settings) {
-  TrainingOptions& options = settings.options;
-  return {{"name",
-           {[&settings](const std::string& text) {
-              settings.name = text;
-              return ValidateName("", text).ok();
-            },
-            "1 to 100 of A-Z a-z 0-9 _ . -"}},
-          {"method",
-           {ParsedParameter(options.method, ClassifierMethodFromName),
-            "amn, iamn, bayes, knn or adaboost"}},
-          {"features",
-           {ParsedParameter(options.features.set, FeatureSetFromName), "shape, wall or spin"}},
-          {"reduce",
-           {ParsedParameter(options.reduction, ParseReduction),
-            "auto, pure, none, depth=N or random=N"}},
-          {"neighbours", {WholeParameter(options.neighbours, 1, 100), "in [1, 100]"}},
-          {"rounds", {WholeParameter(options.rounds, 1, 10000), "in [1, 10000]"}},
-          {"slack_weight", {RealParameter(options.slack_weight, 1e-12, 1e12), "in [1e-12, 1e12]"}},
-          {"folds", {WholeParameter(settings.folds, 0, 100), "in [0, 100]"}},
-          {"region_m", {RealParameter(settings.region_m, 0.0, 1e6), "in [0, 1000000]"}}};
-}
 
 // A classifier that this job made before a restart.
 absl::StatusOr<std::optional<ClassifierInfo>> MadeBy(MapCore& core, const JobInfo& job) {
@@ -142,19 +107,33 @@ void Report(const ClassifierInfo& info, JobContext& context) {
 
 }  // namespace
 
-absl::StatusOr<TrainSettings> ParseTrainSettings(const JobParameters& parameters) {
+absl::StatusOr<TrainSettings> ParseTrainSettings(const JobArguments& arguments) {
   TrainSettings settings;
-  STRATA_RETURN_IF_ERROR(ReadJobParameters(kTrainJob, parameters, ParametersOf(settings)));
+  TrainingOptions& options = settings.options;
+  const absl::StatusOr<ReductionOptions> reduction = ParseReduction(arguments.Text("reduce"));
+  if (!reduction.ok()) return Annotate(reduction.status(), "job parameter reduce");
+  options.reduction = *reduction;
+  if (arguments.Has("name")) settings.name = arguments.Text("name");
+  STRATA_ASSIGN_OR_RETURN(options.method, ClassifierMethodFromName(arguments.Text("method")));
+  STRATA_ASSIGN_OR_RETURN(options.features.set, FeatureSetFromName(arguments.Text("features")));
+  options.neighbours = static_cast<int>(arguments.Whole("neighbours"));
+  options.rounds = static_cast<int>(arguments.Whole("rounds"));
+  options.slack_weight = arguments.Real("slack_weight");
+  settings.folds = static_cast<int>(arguments.Whole("folds"));
+  settings.region_m = arguments.Real("region_m");
   return settings;
 }
 
-absl::Status RunTrainJob(MapCore& core, const JobInfo& job, JobContext& context) {
+absl::Status RunTrainJob(MapCore& core,
+                         const JobInfo& job,
+                         const JobArguments& arguments,
+                         JobContext& context) {
   STRATA_ASSIGN_OR_RETURN(const std::optional<ClassifierInfo> made, MadeBy(core, job));
   if (made.has_value()) {
     Report(*made, context);
     return absl::OkStatus();
   }
-  STRATA_ASSIGN_OR_RETURN(const TrainSettings settings, ParseTrainSettings(job.parameters));
+  STRATA_ASSIGN_OR_RETURN(const TrainSettings settings, ParseTrainSettings(arguments));
   DamagedScans damaged;
   STRATA_ASSIGN_OR_RETURN(const LabelledScans scans, LabelledScans::Read(core, damaged, context));
   if (scans.size() == 0) {
@@ -194,9 +173,8 @@ absl::Status RunTrainJob(MapCore& core, const JobInfo& job, JobContext& context)
   return absl::OkStatus();
 }
 
-absl::Status RunEvaluateJob(MapCore& core, const JobInfo& job, JobContext& context) {
-  STRATA_ASSIGN_OR_RETURN(const StoredClassifier stored,
-                          LoadClassifier(core, job.parameters.at("model")));
+absl::Status RunEvaluateJob(MapCore& core, absl::string_view model, JobContext& context) {
+  STRATA_ASSIGN_OR_RETURN(const StoredClassifier stored, LoadClassifier(core, model));
   DamagedScans damaged;
   STRATA_ASSIGN_OR_RETURN(const LabelledScans scans, LabelledScans::Read(core, damaged, context));
   const std::vector<ClassName>& classes = stored.classifier.classes;

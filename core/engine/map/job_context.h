@@ -9,6 +9,8 @@
 #include "absl/strings/string_view.h"
 
 #include "core/common/stop.h"
+#include "core/engine/map/engine_options.h"
+#include "core/world/job_arguments.h"
 
 namespace strata {
 
@@ -25,6 +27,12 @@ class JobContext {
   // The job will end as proposed instead of succeeded.
   virtual void SetProposed() = 0;
 };
+
+// The parameter "threads", or else what the engine has a map use.
+inline int ThreadsOf(const JobArguments& arguments, const EngineOptions& options) {
+  return arguments.Has("threads") ? static_cast<int>(arguments.Whole("threads"))
+                                  : options.worker_threads;
+}
 
 // Set on a job whose proposal was accepted.
 inline constexpr char kAccepted[] = "accepted";

@@ -6,7 +6,6 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
@@ -19,12 +18,6 @@
 
 namespace strata {
 namespace {
-
-int ThreadsOf(const JobInfo& job, int threads) {
-  const auto it = job.parameters.find("threads");
-  if (it != job.parameters.end() && !absl::SimpleAtoi(it->second, &threads)) return 1;
-  return threads;
-}
 
 // Counts mismatches and names them, up to as many as a person would read.
 class Findings final : public DerivedSink {
@@ -93,36 +86,6 @@ absl::Status PutIndexes(StorageWriter& writer, const ScanIndexes& indexes) {
   return absl::OkStatus();
 }
 
-absl::Status Rebuild(Integrator& integrator, int threads, JobContext& context) {
-  integrator.store().Clear();
-  STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, integrator.NextVersion());
-  StagedTiles staged(integrator.core(), version);
-  Repairs repairs(staged);
-  DerivedPass pass(integrator.core(),
-                   integrator.store(),
-                   {.epoch = integrator.core().snapshots().current().epoch,
-                    .version = version,
-                    .profile = integrator.core().info().parameters.default_profile,
-                    .threads = threads},
-                   context);
-  STRATA_RETURN_IF_ERROR(pass.Run(repairs));
-  const absl::Status published =
-      staged.Publish({}, [&](StorageWriter& writer) { return PutIndexes(writer, pass.indexes()); });
-  integrator.store().Clear();
-  STRATA_RETURN_IF_ERROR(published);
-  context.SetMetric("scans", static_cast<double>(pass.scans()));
-  context.SetMetric("tiles", static_cast<double>(pass.tiles()));
-  context.SetMetric("tiles_changed", static_cast<double>(staged.changed()));
-  context.SetMessage(absl::StrCat("rebuilt ",
-                                  pass.tiles(),
-                                  " tiles from ",
-                                  pass.scans(),
-                                  " scans, ",
-                                  staged.changed(),
-                                  " changed"));
-  return absl::OkStatus();
-}
-
 absl::Status Verify(MapCore& core, const SteadyView& view, int threads, JobContext& context) {
   Findings findings;
   TruthCheck truth(core, view, context);
@@ -162,15 +125,37 @@ absl::Status Verify(MapCore& core, const SteadyView& view, int threads, JobConte
 
 }  // namespace
 
-absl::Status RunRebuildJob(Integrator& integrator, const JobInfo& job, JobContext& context) {
-  if (job.kind != kRebuildJob) {
-    return absl::InvalidArgumentError(absl::StrCat("job kind '", job.kind, "' is unknown"));
-  }
-  return Rebuild(integrator, ThreadsOf(job, integrator.core().options().worker_threads), context);
+absl::Status RunRebuildJob(Integrator& integrator, int threads, JobContext& context) {
+  integrator.store().Clear();
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, integrator.NextVersion());
+  StagedTiles staged(integrator.core(), version);
+  Repairs repairs(staged);
+  DerivedPass pass(integrator.core(),
+                   integrator.store(),
+                   {.epoch = integrator.core().snapshots().current().epoch,
+                    .version = version,
+                    .profile = integrator.core().info().parameters.default_profile,
+                    .threads = threads},
+                   context);
+  STRATA_RETURN_IF_ERROR(pass.Run(repairs));
+  const absl::Status published =
+      staged.Publish({}, [&](StorageWriter& writer) { return PutIndexes(writer, pass.indexes()); });
+  integrator.store().Clear();
+  STRATA_RETURN_IF_ERROR(published);
+  context.SetMetric("scans", static_cast<double>(pass.scans()));
+  context.SetMetric("tiles", static_cast<double>(pass.tiles()));
+  context.SetMetric("tiles_changed", static_cast<double>(staged.changed()));
+  context.SetMessage(absl::StrCat("rebuilt ",
+                                  pass.tiles(),
+                                  " tiles from ",
+                                  pass.scans(),
+                                  " scans, ",
+                                  staged.changed(),
+                                  " changed"));
+  return absl::OkStatus();
 }
 
-absl::Status RunVerifyJob(MapCore& core, const JobInfo& job, JobContext& context) {
-  const int threads = ThreadsOf(job, core.options().worker_threads);
+absl::Status RunVerifyJob(MapCore& core, int threads, JobContext& context) {
   return WithSteadyView(core, threads, context.stop(), [&](const SteadyView& view) {
     return Verify(core, view, threads, context);
   });
@@ -178,7 +163,7 @@ absl::Status RunVerifyJob(MapCore& core, const JobInfo& job, JobContext& context
 
 absl::Status RecoverDerived(Integrator& integrator, const Stop& closing) {
   SilentContext context(closing);
-  return Rebuild(integrator, integrator.core().options().worker_threads, context);
+  return RunRebuildJob(integrator, integrator.core().options().worker_threads, context);
 }
 
 }  // namespace strata

@@ -4,25 +4,20 @@
 #define STRATA_CORE_ENGINE_REPAIR_REBUILD_H_
 
 #include "absl/status/status.h"
-#include "absl/strings/string_view.h"
 
 #include "core/common/stop.h"
 #include "core/engine/ingest/integrator.h"
 #include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
-#include "core/world/job.h"
 
 namespace strata {
 
-inline constexpr absl::string_view kRebuildJob = "rebuild";
-inline constexpr absl::string_view kVerifyJob = "verify";
-
 // Looks at one state of the map while uploads, edits and integration go on; DATA_LOSS naming what
 // does not fit in it.
-absl::Status RunVerifyJob(MapCore& core, const JobInfo& job, JobContext& context);
+absl::Status RunVerifyJob(MapCore& core, int threads, JobContext& context);
 
 // On the worker's thread.
-absl::Status RunRebuildJob(Integrator& integrator, const JobInfo& job, JobContext& context);
+absl::Status RunRebuildJob(Integrator& integrator, int threads, JobContext& context);
 
 // Rebuilds at once, as a Worker::Recovery.
 absl::Status RecoverDerived(Integrator& integrator, const Stop& closing);

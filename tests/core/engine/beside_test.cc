@@ -9,17 +9,21 @@
 #include <utility>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/synchronization/notification.h"
+#include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/common/blocking.h"
 #include "core/common/cache_budget.h"
+#include "core/common/steady_time.h"
 #include "core/common/stop.h"
 #include "core/engine/doors/map.h"
 #include "core/engine/map/numbers.h"
 #include "core/engine/repair/rebuild.h"
+#include "core/world/job_kinds.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/status_matchers.h"
 
@@ -76,13 +80,11 @@ TEST_F(BesideTest, VerifyLooksAtOneStateWhileScansMoveAndLeave) {
       return absl::IsNotFound(moved) ? absl::OkStatus() : moved;
     }));
   });
-  JobInfo job;
-  job.kind = std::string(kVerifyJob);
-  EXPECT_THAT(RunVerifyJob(map->core(), job, context), IsOk());
+  EXPECT_THAT(RunVerifyJob(map->core(), 2, context), IsOk());
   EXPECT_GT(steps, 12U);
   // And what came of it is sound, too.
   SilentContext silent{Stop()};
-  EXPECT_THAT(RunVerifyJob(map->core(), job, silent), IsOk());
+  EXPECT_THAT(RunVerifyJob(map->core(), 2, silent), IsOk());
 }
 
 TEST_F(BesideTest, VerifyGoesOnBesideUploads) {
@@ -120,6 +122,33 @@ TEST_F(BesideTest, WhoGivesUpWaitingIsToldWhatItWaitedFor) {
               StatusIs(absl::StatusCode::kCancelled, HasSubstr("job 3 (rebuild) of map world")));
   over.Notify();
   job.join();
+}
+
+TEST_F(BesideTest, AJobThatWaitsForTheWorkerEndsWhenItIsCancelled) {
+  MakeMap();
+  const std::shared_ptr<Map> map = OpenMap();
+  ASSERT_NE(map, nullptr);
+  absl::Notification begun;
+  absl::Notification over;
+  const auto long_work = [&](Integrator&) {
+    begun.Notify();
+    over.WaitForNotification();
+    return absl::OkStatus();
+  };
+  std::thread edit([&] { STRATA_EXPECT_OK(map->worker().Execute(Stop(), long_work)); });
+  begun.WaitForNotification();
+  const absl::StatusOr<JobInfo> job = map->jobs().Start(Stop(), "a", kRebuildJob, {});
+  map->JobQueued();
+  JobInfo last = job.value_or(JobInfo());
+  const Stop patience(SteadyNow() + absl::Seconds(60));
+  STRATA_EXPECT_OK(map->jobs().Watch(patience, last.id, [&](const JobInfo& now) {
+    last = now;
+    const bool runs = now.state == JobState::kRunning;
+    return runs ? map->jobs().Cancel(now.id).status() : absl::OkStatus();
+  }));
+  EXPECT_EQ(last.state, JobState::kCancelled) << last.message;
+  over.Notify();
+  edit.join();
 }
 
 TEST_F(BesideTest, HealthNamesMapsThatAreNotOpenAndTheDisk) {

@@ -4,11 +4,15 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/mls/see_through.h"
+#include "core/world/job_arguments.h"
+#include "core/world/job_kinds.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/scene.h"
 #include "tests/support/simulator.h"
@@ -294,6 +298,15 @@ TEST_F(EngineTest, AMapThatLetsThingsFadeDoesSoByItself) {
   ASSERT_FALSE(fades.empty());
   EXPECT_EQ(fades[0].state, JobState::kSucceeded) << fades[0].message;
   EXPECT_GE(fades[0].metrics.at("scans"), 10.0);
+}
+
+TEST(FadeArgumentsTest, WhatNobodySaysIsAsTheLibraryHasIt) {
+  const SeeThroughOptions library;
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobArguments arguments, ReadJobArguments(kFadeJob, {}));
+  EXPECT_EQ(arguments.Whole("rays"), library.rays);
+  EXPECT_EQ(arguments.Real("clearance_m"), library.clearance_m);
+  EXPECT_THAT(std::string(JobParameterOf(kFadeJob, "scans").help),
+              ::testing::HasSubstr(absl::StrCat("or ", library.scans)));
 }
 
 TEST_F(EngineTest, MapsThatDropPointsDoNotFade) {

@@ -1,0 +1,112 @@
+#include "core/engine/jobs/job_handlers.h"
+
+#include <cstdint>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/common/status.h"
+#include "core/engine/consistency/optimize.h"
+#include "core/engine/consistency/revert.h"
+#include "core/engine/ingest/integrator.h"
+#include "core/engine/labels/classifier_store.h"
+#include "core/engine/labels/classify.h"
+#include "core/engine/labels/fade.h"
+#include "core/engine/labels/train.h"
+#include "core/engine/repair/rebuild.h"
+#include "core/world/job_kinds.h"
+
+namespace strata {
+namespace {
+
+absl::Status NeedsNothing(MapCore&, const JobArguments&) { return absl::OkStatus(); }
+
+absl::Status NeedsPoints(MapCore& core, const JobArguments&) {
+  if (core.info().parameters.keep_points) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      "fade: the map drops points; what has faded is told by the rays of scans");
+}
+
+absl::Status NeedsClassifier(MapCore& core, const JobArguments& arguments) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  return FindClassifier(*reader, arguments.Text("model")).status();
+}
+
+absl::Status NeedsFreeName(MapCore& core, const JobArguments& arguments) {
+  STRATA_ASSIGN_OR_RETURN(const TrainSettings settings, ParseTrainSettings(arguments));
+  if (settings.name.empty()) return absl::OkStatus();
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  if (absl::IsNotFound(FindClassifier(*reader, settings.name).status())) return absl::OkStatus();
+  return absl::AlreadyExistsError(
+      absl::StrCat("classifier ", settings.name, " exists; choose another name, or delete it"));
+}
+
+// On the worker's thread, between its batches.
+absl::Status RunOnWorker(const JobRun& run, Worker::Command command) {
+  return run.worker.Execute(
+      run.context.stop(), command, absl::StrCat("job ", run.job.id, " (", run.job.kind, ")"));
+}
+
+absl::Status RunRebuild(const JobRun& run) {
+  const int threads = ThreadsOf(run.arguments, run.core.options());
+  return RunOnWorker(
+      run, [&](Integrator& integrator) { return RunRebuildJob(integrator, threads, run.context); });
+}
+
+absl::Status RunVerify(const JobRun& run) {
+  // A map whose tiles are not usable makes them before it takes commands.
+  STRATA_RETURN_IF_ERROR(RunOnWorker(run, [](Integrator&) { return absl::OkStatus(); }));
+  return RunVerifyJob(run.core, ThreadsOf(run.arguments, run.core.options()), run.context);
+}
+
+absl::Status RunOptimize(const JobRun& run) {
+  return RunOptimizeJob(run.core, run.worker, run.job, run.arguments, run.context);
+}
+
+absl::Status RunRevert(const JobRun& run) {
+  const auto epoch = static_cast<std::uint64_t>(run.arguments.Whole("epoch"));
+  return RunOnWorker(run, [&](Integrator& integrator) {
+    return RunRevertJob(integrator, run.job, epoch, run.context);
+  });
+}
+
+absl::Status RunTrain(const JobRun& run) {
+  return RunTrainJob(run.core, run.job, run.arguments, run.context);
+}
+
+absl::Status RunClassify(const JobRun& run) {
+  return RunClassifyJob(run.core, run.worker, run.arguments.Text("model"), run.context);
+}
+
+absl::Status RunEvaluate(const JobRun& run) {
+  return RunEvaluateJob(run.core, run.arguments.Text("model"), run.context);
+}
+
+absl::Status RunFade(const JobRun& run) {
+  return RunFadeJob(run.core, run.worker, run.arguments, run.context);
+}
+
+}  // namespace
+
+const std::vector<JobHandler>& JobHandlers() {
+  static const auto* const handlers = new std::vector<JobHandler>{
+      {kRebuildJob, NeedsNothing, RunRebuild},
+      {kVerifyJob, NeedsNothing, RunVerify},
+      {kOptimizeJob, NeedsNothing, RunOptimize},
+      {kRevertJob, NeedsNothing, RunRevert},
+      {kTrainJob, NeedsFreeName, RunTrain},
+      {kClassifyJob, NeedsClassifier, RunClassify},
+      {kEvaluateJob, NeedsClassifier, RunEvaluate},
+      {kFadeJob, NeedsPoints, RunFade},
+  };
+  return *handlers;
+}
+
+absl::StatusOr<const JobHandler*> FindJobHandler(absl::string_view kind) {
+  for (const JobHandler& handler : JobHandlers()) {
+    if (handler.kind == kind) return &handler;
+  }
+  return absl::InvalidArgumentError(
+      absl::StrCat("job kind '", kind.substr(0, 100), "' is unknown"));
+}
+
+}  // namespace strata

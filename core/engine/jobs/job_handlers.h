@@ -1,0 +1,44 @@
+// What the engine does for each kind of job: the other half of the table in core/world/job_kinds.h.
+#ifndef STRATA_CORE_ENGINE_JOBS_JOB_HANDLERS_H_
+#define STRATA_CORE_ENGINE_JOBS_JOB_HANDLERS_H_
+
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/engine/ingest/worker.h"
+#include "core/engine/map/job_context.h"
+#include "core/engine/map/map_core.h"
+#include "core/world/job.h"
+#include "core/world/job_arguments.h"
+
+namespace strata {
+
+// A job whose turn it is.
+struct JobRun {
+  MapCore& core;
+  Worker& worker;
+  const JobInfo& job;
+  const JobArguments& arguments;  // of job.parameters
+  JobContext& context;
+};
+
+struct JobHandler {
+  absl::string_view kind;
+  // What the job needs that is not there, said before it waits for its turn; INVALID_ARGUMENT for
+  // arguments that do not go together.
+  absl::Status (*check)(MapCore& core, const JobArguments& arguments);
+  // On the thread of jobs.
+  absl::Status (*run)(const JobRun& run);
+};
+
+// One of each of JobKinds().
+const std::vector<JobHandler>& JobHandlers();
+// INVALID_ARGUMENT for a kind that there is not.
+absl::StatusOr<const JobHandler*> FindJobHandler(absl::string_view kind);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_JOBS_JOB_HANDLERS_H_
