@@ -17,6 +17,7 @@
 #include "client/cli/terminal/json.h"
 #include "client/formats/file_bytes.h"
 #include "core/common/status.h"
+#include "core/world/job_kinds.h"
 
 namespace strata::cli {
 namespace {
@@ -123,10 +124,10 @@ absl::Status TrainOnMap(Context& context,
   if (!training.name.empty()) parameters["name"] = training.name;
   if (training.folds >= 0) parameters["folds"] = absl::StrCat(training.folds);
   if (training.region_m > 0.0) parameters["region_m"] = absl::StrCat(training.region_m);
-  if (training.wait) return RunJob(context, training.map, "train", parameters);
+  if (training.wait) return RunJob(context, training.map, kTrainJob, parameters);
   STRATA_ASSIGN_OR_RETURN(
       const JobInfo job,
-      context.database.jobs().Start(context.call, training.map, "train", parameters));
+      context.database.jobs().Start(context.call, training.map, kTrainJob, parameters));
   PrintJob(job, context.output);
   return absl::OkStatus();
 }
@@ -136,7 +137,7 @@ absl::Status EvaluateOnMap(Context& context, const std::string& map, const std::
                           context.database.classifiers().Get(context.call, map, model));
   STRATA_ASSIGN_OR_RETURN(
       const JobInfo started,
-      context.database.jobs().Start(context.call, map, "evaluate", {{"model", model}}));
+      context.database.jobs().Start(context.call, map, kEvaluateJob, {{"model", model}}));
   STRATA_ASSIGN_OR_RETURN(const JobInfo job, FollowJob(context, map, started.id));
   STRATA_RETURN_IF_ERROR(StatusOf(job));
   const auto text = info.parameters.find("classes");

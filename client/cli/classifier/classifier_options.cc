@@ -1,8 +1,11 @@
 #include "client/cli/classifier/classifier_options.h"
 
 #include <utility>
+#include <variant>
 
 #include "absl/status/statusor.h"
+
+#include "core/world/job_kinds.h"
 
 namespace strata::cli {
 namespace {
@@ -24,7 +27,7 @@ void AddTrainingOptions(CLI::App* verb, TrainingOptions& options) {
           },
           "amn and iamn respect neighbourhoods (associative Markov networks, on features and on "
           "distances to instances); bayes, knn and adaboost look at each point for itself")
-      ->type_name("amn|iamn|bayes|knn|adaboost")
+      ->type_name(ToString(JobParameterOf(kTrainJob, "method").type))
       ->default_str(std::string(ToString(options.method)));
   verb->add_option_function<std::string>(
           "--features",
@@ -33,7 +36,7 @@ void AddTrainingOptions(CLI::App* verb, TrainingOptions& options) {
           },
           "What is seen of a point: shape of its surroundings at several scales and height above "
           "ground; angles and sides of walls; spin images")
-      ->type_name("shape|wall|spin")
+      ->type_name(ToString(JobParameterOf(kTrainJob, "features").type))
       ->default_str(std::string(ToString(options.features.set)));
   verb->add_option_function<std::string>(
           "--reduce",
@@ -42,12 +45,13 @@ void AddTrainingOptions(CLI::App* verb, TrainingOptions& options) {
           },
           "Points to learn from: drawn so that rare classes count, one for each region of one "
           "class (thesis 9.3.2), one for each leaf of a tree of N levels, N drawn ones, or all")
-      ->type_name("auto|pure|depth=N|random=N|none")
-      ->default_str("auto");
+      ->type_name(ToString(JobParameterOf(kTrainJob, "reduce").type))
+      ->default_str(ToString(options.reduction));
+  const auto& neighbours = std::get<WholeType>(JobParameterOf(kTrainJob, "neighbours").type);
   verb->add_option("--neighbours",
                    options.neighbours,
                    "Nearest instances of each class that knn and iamn look at")
-      ->check(CLI::Range(1, 100))
+      ->check(CLI::Range(neighbours.least, neighbours.most))
       ->capture_default_str();
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 
 #include "client/cli/job/job_runner.h"
@@ -13,40 +14,10 @@
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
 #include "core/common/status.h"
+#include "core/world/job_kinds.h"
 
 namespace strata::cli {
 namespace {
-
-constexpr char kKinds[] = R"(
-
-Kinds and their parameters (and threads=1..64 for the first three):
-  rebuild   All derived data again from the scans.
-  verify    Everything checked; a mismatch fails the job.
-  optimize  Poses made globally consistent, in a new epoch.
-            dry_run=0|1         Only propose (0)
-            closures=0|1        Look for loops that nobody closed yet (1)
-            planes=0|1          Walls and floors hold the scans that see them (1)
-            robust=0|1          Leave out closures that contradict the rest (1)
-            rounds=1..20        Most rounds of matching and optimising (5)
-            pool=1..50          Consecutive scans that move as one (5)
-            weighting=covariance|local_global
-            local_weight=0..1   With local_global: of matches against planes (0.5)
-            tolerance_m=, tolerance_rad=
-                                Scans that would move less stay (0.005, 0.0005)
-  revert    Poses and constraints of an earlier epoch: epoch=N, see map history.
-  train     A classifier from all labelled scans; see classifier train.
-            name=, method=amn|iamn|bayes|knn|adaboost (amn), features=shape|wall|spin (shape)
-            reduce=auto|pure|none|depth=N|random=N (auto), neighbours=1..100 (5), rounds=1..10000 (100)
-            slack_weight= (100)
-            folds=0..100        Of the validation over scans (5)
-            region_m=M          Scans taken in one square of M metres are left out together (0: each alone)
-  classify  The classifier model=NAME labels every scan that it has not labelled yet.
-  evaluate  The classifier model=NAME against labels that people gave.
-  fade      Points through whose place later scans looked leave the tiles.
-            scans=1..1000       That have to have looked (3, or the map's own number)
-            rays=1..100000      Of theirs together (10)
-            clearance_m=0.05..10  How far beyond the place a ray must end (0.3)
-            undo=0|1            Everything comes back (0))";
 
 struct JobOptions {
   std::string map;
@@ -149,16 +120,13 @@ void AddParameters(CLI::App* verb, JobOptions& options) {
 }
 
 void AddStart(CLI::App* start, JobOptions& options) {
-  start
-      ->add_option("KIND",
-                   options.kind,
-                   "rebuild, verify, optimize, revert, train, classify, evaluate or fade")
-      ->required();
+  start->add_option("KIND", options.kind, JobKindNames())->required();
   AddParameters(start, options);
   start->add_flag(
       "--dry-run", options.dry_run, "optimize: only propose; see job accept and revert");
   start->add_flag("--wait", options.wait, "Return when it has ended; exit 1 unless it succeeded");
-  start->footer(start->get_footer() + kKinds);
+  start->footer(
+      absl::StrCat(start->get_footer(), "\n\nKinds and their parameters:\n", JobKindsText()));
 }
 
 }  // namespace
@@ -176,7 +144,7 @@ void AddJobCommands(Commands& commands) {
     return app;
   };
   AddStart(verb("start",
-                "Start a job: rebuild, verify, optimize, revert, train, classify, evaluate or fade",
+                "Start a job; --help has its kinds and their parameters",
                 "strata job start campus optimize rounds=3 --dry-run --wait",
                 Start),
            *options);

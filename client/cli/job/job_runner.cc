@@ -70,7 +70,7 @@ absl::Status StatusOf(const JobInfo& job) {
 
 absl::Status RunJob(Context& context,
                     const std::string& map,
-                    const std::string& kind,
+                    absl::string_view kind,
                     const std::map<std::string, std::string>& parameters) {
   STRATA_ASSIGN_OR_RETURN(JobInfo started,
                           context.database.jobs().Start(context.call, map, kind, parameters));

@@ -8,6 +8,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 
 #include "client/cli/terminal/command.h"
 #include "core/world/job.h"
@@ -20,7 +21,7 @@ absl::StatusOr<JobInfo> FollowJob(Context& context, const std::string& map, std:
 // Starts, follows and prints the job; a job that did not succeed is an error with its message.
 absl::Status RunJob(Context& context,
                     const std::string& map,
-                    const std::string& kind,
+                    absl::string_view kind,
                     const std::map<std::string, std::string>& parameters);
 
 // The job; as text with a line for each number of its result.

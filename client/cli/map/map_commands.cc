@@ -15,6 +15,7 @@
 #include "client/cli/terminal/json.h"
 #include "client/cli/terminal/world_json.h"
 #include "core/common/status.h"
+#include "core/world/job_kinds.h"
 
 namespace strata::cli {
 namespace {
@@ -89,10 +90,10 @@ absl::Status History(Context& context, const MapOptions& options) {
 
 absl::Status Revert(Context& context, const MapOptions& options) {
   const std::map<std::string, std::string> parameters = {{"epoch", std::to_string(options.epoch)}};
-  if (options.wait) return RunJob(context, options.map, "revert", parameters);
+  if (options.wait) return RunJob(context, options.map, kRevertJob, parameters);
   STRATA_ASSIGN_OR_RETURN(
       const JobInfo job,
-      context.database.jobs().Start(context.call, options.map, "revert", parameters));
+      context.database.jobs().Start(context.call, options.map, kRevertJob, parameters));
   PrintJob(job, context.output);
   return absl::OkStatus();
 }
@@ -182,14 +183,17 @@ void AddMapCommands(Commands& commands) {
        "strata map show campus --output json",
        Show);
   verb("delete", "Delete a map and its file", "strata map delete campus", Delete);
-  verb("verify",
-       "Check every checksum, count and derived thing; exit 1 on a mismatch",
-       "strata map verify campus",
-       [](Context& context, const MapOptions& o) { return RunJob(context, o.map, "verify", {}); });
+  verb(
+      "verify",
+      "Check every checksum, count and derived thing; exit 1 on a mismatch",
+      "strata map verify campus",
+      [](Context& context, const MapOptions& o) { return RunJob(context, o.map, kVerifyJob, {}); });
   verb("rebuild",
        "Make all derived data again from the scans",
        "strata map rebuild campus",
-       [](Context& context, const MapOptions& o) { return RunJob(context, o.map, "rebuild", {}); });
+       [](Context& context, const MapOptions& o) {
+         return RunJob(context, o.map, kRebuildJob, {});
+       });
   verb("history",
        "The epochs of a map, newest first: what made them, and which can be brought back",
        "strata map history campus",

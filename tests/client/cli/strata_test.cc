@@ -140,6 +140,12 @@ TEST_F(StrataTest, EveryCommandHasHelpWithAnExample) {
   }
 }
 
+TEST_F(StrataTest, TheHelpOfJobsHasTheirKindsAndParameters) {
+  const std::string help = RunStrata({"job", "start", "--help"}).out;
+  EXPECT_THAT(help, HasSubstr("\nfade      Points through whose place"));
+  EXPECT_THAT(help, HasSubstr("\n  rounds=1..20          Most rounds"));
+}
+
 TEST_F(StrataTest, WrongUsageExitsWithTwo) {
   const std::vector<std::vector<std::string>> wrong = {
       {},
