@@ -59,6 +59,16 @@ std::vector<JobParameter> TrainParameters() {
       {"neighbours", WholeType{1, 100}, "5", "Nearest instances that knn and iamn look at"},
       {"rounds", WholeType{1, 10'000}, "100", "Rounds of adaboost"},
       {"slack_weight", RealType{1e-12, 1e12}, "100", "What misfits cost amn and iamn"},
+      {"feature_neighbours", WholeType{4, 64}, "16", "Points around that features look at"},
+      {"scales", WholeType{1, 8}, "4", "shape: scales, each twice as coarse"},
+      {"voxel_m", RealType{0.01, 10.0}, "0.15", "shape: voxels of the second scale [m]"},
+      {"max_height_m", RealType{0.01, 1000.0}, "15", "Height that counts as 1 [m]"},
+      {"plane_side_m", RealType{0.001, 1.0}, "0.05", "wall: nearer is in the plane [m]"},
+      {"wall_distance_m", RealType{0.01, 10.0}, "0.5", "wall: farther is not of it [m]"},
+      {"spin_radius_m", RealType{0.0, 100.0}, "0", "spin: radius [m]; 0: ten spacings"},
+      {"network_degree", WholeType{1, 16}, "3", "amn, iamn: most edges of a point"},
+      {"network_draws", WholeType{1, 1000}, "8", "Tries of a point to find a neighbour"},
+      {"network_sigma", RealType{0.01, 100.0}, "2", "Width of the draws, in spacings"},
       {"folds", WholeType{0, 100}, "5", "Folds of the validation over scans; 0: none"},
       {"region_m", RealType{0.0, 1e6}, "0", "Leave out squares so wide [m]; 0: scans"},
   };
@@ -166,20 +176,24 @@ std::string JobKindNames() {
   return OneOf(names);
 }
 
+std::string JobParametersText(const JobKind& kind) {
+  std::string text;
+  for (const JobParameter& parameter : kind.parameters) {
+    std::string help(parameter.help);
+    if (!parameter.default_text.empty()) {
+      absl::StrAppend(&help, " (", parameter.default_text, ")");
+    }
+    AppendColumns(
+        text, absl::StrCat("  ", parameter.name, "=", ToString(parameter.type)), kHelpColumn, help);
+  }
+  return text;
+}
+
 std::string JobKindsText() {
   std::string text;
   for (const JobKind& kind : JobKinds()) {
     AppendColumns(text, std::string(kind.name), kSummaryColumn, kind.summary);
-    for (const JobParameter& parameter : kind.parameters) {
-      std::string help(parameter.help);
-      if (!parameter.default_text.empty()) {
-        absl::StrAppend(&help, " (", parameter.default_text, ")");
-      }
-      AppendColumns(text,
-                    absl::StrCat("  ", parameter.name, "=", ToString(parameter.type)),
-                    kHelpColumn,
-                    help);
-    }
+    absl::StrAppend(&text, JobParametersText(kind));
   }
   return text;
 }

@@ -71,6 +71,8 @@ std::string BoundOf(const JobParameterType& type);
 
 // "rebuild, verify, optimize, … or fade".
 std::string JobKindNames();
+// The parameters of a kind with bounds and defaults, a line or two each.
+std::string JobParametersText(const JobKind& kind);
 // All kinds with their parameters and defaults, in lines of at most 77 characters. The comment of
 // StartJobRequest in proto/strata/v1/jobs.proto holds the same lines.
 std::string JobKindsText();

@@ -54,7 +54,7 @@ void AddTrain(Commands& commands, CLI::App* noun) {
       [training, on_map](Context& context) {
         on_map->folds = training->folds > 0 ? training->folds : -1;
         on_map->region_m = training->region_m;
-        return TrainOnMap(context, *on_map, training->options);
+        return TrainOnMap(context, *on_map, training->parameters);
       });
   CLI::Option* map = verb->add_option("MAP", on_map->map, "Name of the map");
   CLI::Option* data =
@@ -72,7 +72,7 @@ void AddTrain(Commands& commands, CLI::App* noun) {
   verb->parse_complete_callback([map, data] {
     if (map->empty() && data->empty()) throw CLI::RequiredError("MAP or --data");
   });
-  AddTrainingOptions(verb, training->options);
+  AddTrainingOptions(verb, training->parameters);
   verb->add_option(
           "--folds",
           training->folds,

@@ -24,6 +24,9 @@
 #include "core/classification/regions.h"
 #include "core/classification/validation.h"
 #include "core/common/status.h"
+#include "core/engine/labels/train.h"
+#include "core/world/job_arguments.h"
+#include "core/world/job_kinds.h"
 
 namespace strata::cli {
 namespace {
@@ -137,6 +140,7 @@ absl::StatusOr<ConfusionMatrix> EvaluateAll(const Classifier& classifier,
 }
 
 absl::StatusOr<ConfusionMatrix> Validated(const FileTraining& training,
+                                          const TrainingOptions& options,
                                           const std::vector<ClassName>& classes,
                                           const std::vector<PointCloud>& clouds,
                                           FileContext& context) {
@@ -151,7 +155,7 @@ absl::StatusOr<ConfusionMatrix> Validated(const FileTraining& training,
                               parts.size(),
                               SourceOf(parts),
                               classes,
-                              training.options,
+                              options,
                               [&](double share) {
                                 progress.Update(0.5 * share, "features");
                                 return absl::OkStatus();
@@ -172,6 +176,9 @@ absl::StatusOr<ConfusionMatrix> Validated(const FileTraining& training,
 }  // namespace
 
 absl::Status TrainOnFiles(FileContext& context, const FileTraining& training) {
+  STRATA_ASSIGN_OR_RETURN(const JobArguments arguments,
+                          ReadJobArguments(kTrainJob, training.parameters));
+  STRATA_ASSIGN_OR_RETURN(const TrainSettings settings, ParseTrainSettings(arguments));
   STRATA_ASSIGN_OR_RETURN(std::vector<PointCloud> clouds, ReadAll(training.data, context.stop));
   LabelClasses labels = EveryLabel(clouds);
   if (!training.classes.empty()) {
@@ -180,7 +187,8 @@ absl::Status TrainOnFiles(FileContext& context, const FileTraining& training) {
   for (PointCloud& cloud : clouds) labels.Apply(cloud);
   std::optional<ConfusionMatrix> confusion;
   if (training.folds > 0) {
-    STRATA_ASSIGN_OR_RETURN(confusion, Validated(training, labels.classes, clouds, context));
+    STRATA_ASSIGN_OR_RETURN(confusion,
+                            Validated(training, settings.options, labels.classes, clouds, context));
   }
   const auto begin = std::chrono::steady_clock::now();
   absl::StatusOr<Classifier> classifier = absl::UnknownError("not trained");
@@ -189,7 +197,7 @@ absl::Status TrainOnFiles(FileContext& context, const FileTraining& training) {
     classifier = TrainClassifier(
         clouds,
         labels.classes,
-        training.options,
+        settings.options,
         [&](double share) {
           progress.Update(share, share < 0.5 ? "features" : "learning");
           return absl::OkStatus();

@@ -8,7 +8,7 @@
 #include "absl/status/status.h"
 
 #include "client/cli/terminal/command.h"
-#include "core/classification/classifier.h"
+#include "core/world/job.h"
 
 namespace strata::cli {
 
@@ -20,7 +20,7 @@ struct FileTraining {
   std::string out;                // the classifier's file
   int folds = 0;                  // > 0: also scored by validation, whole files left out
   double region_m = 0.0;          // > 0: squares of this edge are left out instead
-  TrainingOptions options;
+  JobParameters parameters;       // of the job "train", as it takes them
 };
 absl::Status TrainOnFiles(FileContext& context, const FileTraining& training);
 

@@ -2,8 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -16,6 +16,8 @@
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/json.h"
 #include "client/formats/file_bytes.h"
+#include "core/classification/classifier.h"
+#include "core/classification/evaluation.h"
 #include "core/common/status.h"
 #include "core/world/job_kinds.h"
 
@@ -113,14 +115,7 @@ absl::Status Delete(Context& context, const ClassifierVerb& verb) {
 
 }  // namespace
 
-absl::Status TrainOnMap(Context& context,
-                        const MapTraining& training,
-                        const TrainingOptions& options) {
-  std::map<std::string, std::string> parameters = {
-      {"method", std::string(ToString(options.method))},
-      {"features", std::string(ToString(options.features.set))},
-      {"reduce", ToString(options.reduction)},
-      {"neighbours", absl::StrCat(options.neighbours)}};
+absl::Status TrainOnMap(Context& context, const MapTraining& training, JobParameters parameters) {
   if (!training.name.empty()) parameters["name"] = training.name;
   if (training.folds >= 0) parameters["folds"] = absl::StrCat(training.folds);
   if (training.region_m > 0.0) parameters["region_m"] = absl::StrCat(training.region_m);

@@ -7,7 +7,7 @@
 #include "absl/status/status.h"
 
 #include "client/cli/terminal/command.h"
-#include "core/classification/classifier.h"
+#include "core/world/job.h"
 
 namespace strata::cli {
 
@@ -19,9 +19,7 @@ struct MapTraining {
   bool wait = false;
 };
 // Starts the job; with `wait` an error unless it succeeds.
-absl::Status TrainOnMap(Context& context,
-                        const MapTraining& training,
-                        const TrainingOptions& options);
+absl::Status TrainOnMap(Context& context, const MapTraining& training, JobParameters parameters);
 
 // Runs the job "evaluate" and prints its scores as EvaluateOnFiles() does.
 absl::Status EvaluateOnMap(Context& context, const std::string& map, const std::string& model);

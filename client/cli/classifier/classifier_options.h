@@ -4,13 +4,13 @@
 
 #include <CLI/CLI.hpp>
 
-#include "core/classification/classifier.h"
+#include "core/world/job.h"
 
 namespace strata::cli {
 
-// --method, --features, --reduce, --neighbours. Written to `options` while the command line is
-// parsed.
-void AddTrainingOptions(CLI::App* verb, TrainingOptions& options);
+// --method, --features, --reduce, --neighbours, and --set for every other parameter of the job
+// "train". Written to `parameters` while the command line is parsed, each as that job takes it.
+void AddTrainingOptions(CLI::App* verb, JobParameters& parameters);
 
 }  // namespace strata::cli
 

@@ -119,6 +119,16 @@ absl::StatusOr<TrainSettings> ParseTrainSettings(const JobArguments& arguments) 
   options.neighbours = static_cast<int>(arguments.Whole("neighbours"));
   options.rounds = static_cast<int>(arguments.Whole("rounds"));
   options.slack_weight = arguments.Real("slack_weight");
+  options.features.neighbours = static_cast<int>(arguments.Whole("feature_neighbours"));
+  options.features.scales = static_cast<int>(arguments.Whole("scales"));
+  options.features.voxel_m = arguments.Real("voxel_m");
+  options.features.max_height_m = arguments.Real("max_height_m");
+  options.features.plane_side_m = arguments.Real("plane_side_m");
+  options.features.wall_distance_m = arguments.Real("wall_distance_m");
+  options.features.spin_radius_m = arguments.Real("spin_radius_m");
+  options.network.max_degree = static_cast<int>(arguments.Whole("network_degree"));
+  options.network.draws = static_cast<int>(arguments.Whole("network_draws"));
+  options.network.sigma_spacings = arguments.Real("network_sigma");
   settings.folds = static_cast<int>(arguments.Whole("folds"));
   settings.region_m = arguments.Real("region_m");
   return settings;

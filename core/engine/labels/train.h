@@ -20,7 +20,6 @@ namespace strata {
 // (core/world/job_kinds.h).
 struct TrainSettings {
   std::string name;  // of the classifier; empty: the method's and the job's number
-  // method, features, reduce (ParseReduction), neighbours, rounds, slack_weight
   TrainingOptions options;
   int folds = 0;  // of the validation over scans or regions, at most as many as there are; 0: none
   // > 0: scans taken in one square of this edge are left out together; 0: each scan alone.

@@ -12,6 +12,7 @@
 #include "client/formats/file_bytes.h"
 #include "client/formats/geometry_writer.h"
 #include "client/formats/scan_reader.h"
+#include "core/classification/classifier_codec.h"
 #include "core/common/random.h"
 #include "tests/client/cli/run_strata.h"
 #include "tests/support/status_matchers.h"
@@ -137,6 +138,26 @@ TEST_F(ClassifierFilesTest, WithoutClassesEveryLabelIsOne) {
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("CLASS  PRECISION"));
   EXPECT_THAT(ran.out, HasSubstr("over 2420 points"));
+}
+
+TEST_F(ClassifierFilesTest, SetReachesEveryNumberOfFeaturesAndNetworks) {
+  Train({"--set", "voxel_m=0.3", "--set", "feature_neighbours=8", "--set", "network_degree=2"});
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::string bytes, ReadFileBytes(model_));
+  STRATA_ASSERT_OK_AND_ASSIGN(const Classifier classifier, DecodeClassifier(bytes));
+  EXPECT_EQ(classifier.features.voxel_m, 0.3);
+  EXPECT_EQ(classifier.features.neighbours, 8);
+  EXPECT_EQ(classifier.network.max_degree, 2);
+  const auto refused = [this](const std::string& set, const std::string& message) {
+    const Ran ran =
+        RunStrata({"classifier", "train", "--data", WriteYard(1), "--out", model_, "--set", set});
+    EXPECT_EQ(ran.exit_code, 2);
+    EXPECT_THAT(ran.err, HasSubstr(message));
+  };
+  refused("voxel_m=11", "voxel_m = '11' is not in [0.01, 10]");
+  refused("voxels=0.2", "'voxels' is unknown; train takes name method");
+  refused("folds=3", "use --folds for folds");
+  EXPECT_THAT(RunStrata({"classifier", "train", "--help"}).out,
+              HasSubstr("  spin_radius_m=0..100  spin: radius [m]"));
 }
 
 TEST_F(ClassifierFilesTest, ErrorsNameTheFileAndTheCure) {
