@@ -1,10 +1,13 @@
 #include "client/formats/cloud_builder.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -81,6 +84,54 @@ std::uint8_t ChannelOf(double value) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0)));
 }
 
+// What makes 0–255 of the channels of a file.
+double ColourScale(const std::vector<Eigen::Vector3f>& channels) {
+  float largest = 0.0F;
+  bool fractions = false;
+  for (const Eigen::Vector3f& colour : channels) {
+    largest = std::max(largest, colour.maxCoeff());
+    fractions = fractions || (colour.array() != colour.array().floor()).any();
+  }
+  if (largest > 255.0F) return 255.0 / 65535.0;
+  return fractions && largest <= 1.0F ? 255.0 : 1.0;
+}
+
+bool AreFinite(std::span<const double> values) {
+  // What is not finite has no difference to itself.
+  const Eigen::Map<const Eigen::ArrayXd> v(values.data(), std::ssize(values));
+  return (v - v).sum() == 0.0;
+}
+
+bool AreBytes(std::span<const double> values) {
+  return std::all_of(values.begin(), values.end(), [](double value) {
+    return value >= 0.0 && value <= 255.0 && value == static_cast<std::uint8_t>(value);
+  });
+}
+
+std::array<std::span<double>, 3> Coordinates(const PointBlock& block) {
+  return {block.of(Meaning::kX), block.of(Meaning::kY), block.of(Meaning::kZ)};
+}
+
+template <typename T>
+void AppendPoints(const PointBlock& block, std::vector<Eigen::Matrix<T, 3, 1>>& points) {
+  const auto [x, y, z] = Coordinates(block);
+  const std::size_t before = points.size();
+  points.resize(before + block.count);
+  for (std::size_t i = 0; i < block.count; ++i) {
+    points[before + i] = Eigen::Vector3d(x[i], y[i], z[i]).cast<T>();
+  }
+}
+
+template <typename T>
+std::vector<Eigen::Vector3f> Shifted(const std::vector<Eigen::Matrix<T, 3, 1>>& points,
+                                     const Eigen::Vector3d& origin) {
+  std::vector<Eigen::Vector3f> shifted(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    shifted[i] = (points[i].template cast<double>() - origin).template cast<float>();
+  }
+  return shifted;
+}
+
 }  // namespace
 
 Meaning MeaningOf(absl::string_view field_name) {
@@ -113,7 +164,7 @@ CloudBuilder::CloudBuilder(std::vector<Meaning> meanings) : meanings_(std::move(
 }
 
 void CloudBuilder::Reserve(std::size_t points) {
-  points_.reserve(points);
+  hold_floats_ ? floats_.reserve(points) : doubles_.reserve(points);
   if (Has(Meaning::kIntensity)) intensity_.reserve(points);
   if (has_colour_) colour_.reserve(points);
   if (Has(Meaning::kLabel)) label_.reserve(points);
@@ -129,41 +180,99 @@ void CloudBuilder::Add(const double* values) {
   for (std::size_t i = 0; i < meanings_.size(); ++i) {
     of[static_cast<std::size_t>(meanings_[i])] = values[i];
   }
-  const auto value = [&of](Meaning meaning) { return of[static_cast<std::size_t>(meaning)]; };
-  Eigen::Vector3d point(value(Meaning::kX), value(Meaning::kY), value(Meaning::kZ));
-  ++added_;
-  if (!point.allFinite()) {
-    if (rows_ == 0) return;
-    point.setConstant(std::numeric_limits<double>::quiet_NaN());
-  }
-  points_.push_back(point);
+  PointBlock block{.count = 1, .columns = {}};
+  for (std::size_t m = 0; m < kMeanings; ++m) block.columns[m] = &of[m];
+  AddBlock(block);
+}
+
+void CloudBuilder::AddBlock(PointBlock block) {
+  added_ += block.count;
+  SettleHoles(block);
+  WidenBox(block);
+  hold_floats_ ? AppendPoints(block, floats_) : AppendPoints(block, doubles_);
   if (Has(Meaning::kIntensity)) {
-    intensity_.push_back(static_cast<float>(value(Meaning::kIntensity)));
+    const std::span<const double> intensity = block.of(Meaning::kIntensity);
+    intensity_.insert(intensity_.end(), intensity.begin(), intensity.end());
   }
-  if (Has(Meaning::kLabel)) {
-    const double label = value(Meaning::kLabel);
-    whole_labels_ = whole_labels_ && (label == std::floor(label) || !std::isfinite(label));
-    label_.push_back(LabelOf(label));
+  if (Has(Meaning::kLabel)) AddLabels(block.of(Meaning::kLabel));
+  if (has_colour_) AddColours(block);
+}
+
+// Takes points out that are not finite, or makes holes of the grid of them.
+void CloudBuilder::SettleHoles(PointBlock& block) {
+  const auto [x, y, z] = Coordinates(block);
+  if (AreFinite(x) && AreFinite(y) && AreFinite(z)) {
+    finite_ += block.count;
+    return;
   }
-  if (!has_colour_) return;
-  if (Has(Meaning::kPackedColour)) {
-    const auto bits = static_cast<std::uint32_t>(value(Meaning::kPackedColour));
-    colour_.emplace_back(bits >> 16 & 0xFF, bits >> 8 & 0xFF, bits & 0xFF);
-  } else {
-    colour_.push_back(
-        Eigen::Vector3d(value(Meaning::kRed), value(Meaning::kGreen), value(Meaning::kBlue))
-            .cast<float>());
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < block.count; ++i) {
+    const bool finite = std::isfinite(x[i]) && std::isfinite(y[i]) && std::isfinite(z[i]);
+    if (finite) ++finite_;
+    if (!finite && rows_ == 0) continue;
+    if (!finite) x[i] = y[i] = z[i] = std::numeric_limits<double>::quiet_NaN();
+    for (double* const column : block.columns) {
+      if (column != nullptr) column[kept] = column[i];
+    }
+    ++kept;
+  }
+  block.count = kept;
+}
+
+void CloudBuilder::WidenBox(const PointBlock& block) {
+  const auto [x, y, z] = Coordinates(block);
+  std::array<Range, 3> box = box_;
+  for (std::size_t i = 0; i < block.count; ++i) {
+    box[0].Widen(x[i]);
+    box[1].Widen(y[i]);
+    box[2].Widen(z[i]);
+  }
+  box_ = box;
+}
+
+void CloudBuilder::AddLabels(std::span<const double> labels) {
+  for (const double label : labels) {
+    const std::uint16_t id = LabelOf(label);
+    label_.push_back(id);
+    const bool whole = label == id || label == std::floor(label) || !std::isfinite(label);
+    whole_labels_ = whole_labels_ && whole;
+  }
+}
+
+void CloudBuilder::AddColours(const PointBlock& block) {
+  if (!Has(Meaning::kPackedColour)) return AddChannels(block);
+  for (const double value : block.of(Meaning::kPackedColour)) {
+    const auto bits = static_cast<std::uint32_t>(value);
+    colour_.push_back({static_cast<std::uint8_t>(bits >> 16),
+                       static_cast<std::uint8_t>(bits >> 8),
+                       static_cast<std::uint8_t>(bits)});
+  }
+}
+
+void CloudBuilder::AddChannels(const PointBlock& block) {
+  const std::span<const double> red = block.of(Meaning::kRed);
+  const std::span<const double> green = block.of(Meaning::kGreen);
+  const std::span<const double> blue = block.of(Meaning::kBlue);
+  if (channels_.empty() && AreBytes(red) && AreBytes(green) && AreBytes(blue)) {
+    for (std::size_t i = 0; i < block.count; ++i) {
+      colour_.push_back({static_cast<std::uint8_t>(red[i]),
+                         static_cast<std::uint8_t>(green[i]),
+                         static_cast<std::uint8_t>(blue[i])});
+    }
+    return;
+  }
+  if (channels_.empty()) channels_.reserve(colour_.capacity());
+  for (const Colour& colour : std::exchange(colour_, {})) {
+    channels_.emplace_back(colour.r, colour.g, colour.b);
+  }
+  for (std::size_t i = 0; i < block.count; ++i) {
+    channels_.push_back(Eigen::Vector3d(red[i], green[i], blue[i]).cast<float>());
   }
 }
 
 Eigen::Vector3d CloudBuilder::ChooseOrigin() const {
-  Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity());
-  Eigen::Array3d high = -low;
-  for (const Eigen::Vector3d& point : points_) {
-    if (std::isnan(point.x())) continue;
-    low = low.min(point.array());
-    high = high.max(point.array());
-  }
+  const Eigen::Array3d low = Low();
+  const Eigen::Array3d high = High();
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   for (int k = 0; k < 3; ++k) {
     const double middle = 0.5 * low[k] + 0.5 * high[k];
@@ -179,44 +288,50 @@ Eigen::Vector3d CloudBuilder::ChooseOrigin() const {
   return (0.5 * low + 0.5 * high).round();
 }
 
-double CloudBuilder::ColourScale() const {
-  float largest = 0.0F;
-  bool fractions = false;
-  for (const Eigen::Vector3f& colour : colour_) {
-    largest = std::max(largest, colour.maxCoeff());
-    fractions = fractions || (colour.array() != colour.array().floor()).any();
+absl::Status CloudBuilder::CheckDistances(const Eigen::Vector3d& origin) const {
+  const auto is_far = [&origin](const auto& point) {
+    const Eigen::Vector3d local = point.template cast<double>() - origin;
+    return local.cwiseAbs().maxCoeff() > kFarthestMetres;
+  };
+  if (!is_far(Low().matrix()) && !is_far(High().matrix())) return absl::OkStatus();
+  if (!hold_floats_) return TooFar(*std::find_if(doubles_.begin(), doubles_.end(), is_far));
+  return TooFar(std::find_if(floats_.begin(), floats_.end(), is_far)->cast<double>());
+}
+
+std::vector<Eigen::Vector3f> CloudBuilder::TakeLocalPoints(const Eigen::Vector3d& origin) {
+  if (!hold_floats_) return Shifted(doubles_, origin);
+  return origin.isZero(0.0) ? std::move(floats_) : Shifted(floats_, origin);
+}
+
+std::vector<Colour> CloudBuilder::ScaledColours() const {
+  const double scale = ColourScale(channels_);
+  std::vector<Colour> colours;
+  colours.reserve(channels_.size());
+  for (const Eigen::Vector3f& channels : channels_) {
+    colours.push_back({ChannelOf(channels.x() * scale),
+                       ChannelOf(channels.y() * scale),
+                       ChannelOf(channels.z() * scale)});
   }
-  if (largest > 255.0F) return 255.0 / 65535.0;
-  return fractions && largest <= 1.0F ? 255.0 : 1.0;
+  return colours;
 }
 
 absl::StatusOr<PointCloud> CloudBuilder::Build() && {
-  PointCloud cloud;
-  cloud.origin = ChooseOrigin();
-  cloud.rows = rows_;
-  cloud.columns = columns_;
-  cloud.intensity = std::move(intensity_);
-  if (whole_labels_) cloud.label = std::move(label_);
-  if (!sensor_origin_.isZero(0.0)) {
-    cloud.sensor_origin = (sensor_origin_ - cloud.origin).cast<float>();
-  }
-  cloud.points.reserve(points_.size());
-  for (const Eigen::Vector3d& point : points_) {
-    const Eigen::Vector3d local = point - cloud.origin;
-    if (local.cwiseAbs().maxCoeff() > kFarthestMetres) return TooFar(point);
-    cloud.points.push_back(local.cast<float>());
-  }
-  const double scale = ColourScale();
-  cloud.colour.reserve(colour_.size());
-  for (const Eigen::Vector3f& colour : colour_) {
-    cloud.colour.push_back({ChannelOf(colour.x() * scale),
-                            ChannelOf(colour.y() * scale),
-                            ChannelOf(colour.z() * scale)});
-  }
-  if (CountFinite(cloud) == 0) {
+  if (finite_ == 0) {
     return absl::InvalidArgumentError(
         absl::StrCat("no finite point among ", added_, "; expected at least one"));
   }
+  PointCloud cloud;
+  cloud.origin = ChooseOrigin();
+  STRATA_RETURN_IF_ERROR(CheckDistances(cloud.origin));
+  if (!sensor_origin_.isZero(0.0)) {
+    cloud.sensor_origin = (sensor_origin_ - cloud.origin).cast<float>();
+  }
+  cloud.rows = rows_;
+  cloud.columns = columns_;
+  cloud.points = TakeLocalPoints(cloud.origin);
+  cloud.intensity = std::move(intensity_);
+  cloud.colour = channels_.empty() ? std::move(colour_) : ScaledColours();
+  if (whole_labels_) cloud.label = std::move(label_);
   STRATA_RETURN_IF_ERROR(ValidateCloud(cloud));
   return cloud;
 }

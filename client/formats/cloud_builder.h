@@ -5,6 +5,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <span>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -35,15 +37,31 @@ inline constexpr std::size_t kMeanings = 10;
 // rgb, label, class, classification, ….
 Meaning MeaningOf(absl::string_view field_name);
 
+// The values of points that follow each other, column by column: `count` numbers for each meaning
+// of their fields, null for the others.
+struct PointBlock {
+  std::size_t count = 0;
+  std::array<double*, kMeanings> columns{};
+
+  std::span<double> of(Meaning meaning) const {
+    return {columns[static_cast<std::size_t>(meaning)], count};
+  }
+};
+
 class CloudBuilder {
  public:
   // `meanings`: of each field of a point, in order. INVALID_ARGUMENT naming what is missing of x, y
   // and z.
   static absl::StatusOr<CloudBuilder> Create(std::vector<Meaning> meanings);
 
+  // All coordinates will be numbers that floats hold: half the memory. REQUIRES: no point was
+  // added.
+  void HoldFloats() { hold_floats_ = true; }
   void Reserve(std::size_t points);
   // The values of the fields; a packed colour as its 24 bits. REQUIRES: one for each meaning.
   void Add(const double* values);
+  // As Add for each of many points, but faster; the columns serve as scratch.
+  void AddBlock(PointBlock block);
 
   void SetGrid(std::uint32_t rows, std::uint32_t columns);
   // Where the file says the sensor stood, in the file's coordinates; zero stands for not saying.
@@ -62,20 +80,43 @@ class CloudBuilder {
   absl::StatusOr<PointCloud> Build() &&;
 
  private:
+  struct Range {
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    void Widen(double value) {  // NaN does not
+      low = value < low ? value : low;
+      high = value > high ? value : high;
+    }
+  };
+
   explicit CloudBuilder(std::vector<Meaning> meanings);
   bool Has(Meaning meaning) const { return has_[static_cast<std::size_t>(meaning)]; }
+  Eigen::Array3d Low() const { return {box_[0].low, box_[1].low, box_[2].low}; }
+  Eigen::Array3d High() const { return {box_[0].high, box_[1].high, box_[2].high}; }
+  void SettleHoles(PointBlock& block);
+  void WidenBox(const PointBlock& block);
+  void AddLabels(std::span<const double> labels);
+  void AddColours(const PointBlock& block);
+  void AddChannels(const PointBlock& block);
   Eigen::Vector3d ChooseOrigin() const;
-  double ColourScale() const;
+  absl::Status CheckDistances(const Eigen::Vector3d& origin) const;
+  std::vector<Eigen::Vector3f> TakeLocalPoints(const Eigen::Vector3d& origin);
+  std::vector<Colour> ScaledColours() const;
 
   std::vector<Meaning> meanings_;
   std::array<bool, kMeanings> has_{};
   bool has_colour_ = false;
-  std::vector<Eigen::Vector3d> points_;
+  bool hold_floats_ = false;
+  std::vector<Eigen::Vector3f> floats_;   // the points, if hold_floats_,
+  std::vector<Eigen::Vector3d> doubles_;  // else here
+  std::array<Range, 3> box_;              // of the finite points
   std::vector<float> intensity_;
-  std::vector<Eigen::Vector3f> colour_;
+  std::vector<Colour> colour_;             // as long as all channels are whole and in 0–255,
+  std::vector<Eigen::Vector3f> channels_;  // else here
   std::vector<std::uint16_t> label_;
   bool whole_labels_ = true;
   std::size_t added_ = 0;  // finite or not
+  std::size_t finite_ = 0;
   std::uint32_t rows_ = 0;
   std::uint32_t columns_ = 0;
   Eigen::Vector3d sensor_origin_ = Eigen::Vector3d::Zero();

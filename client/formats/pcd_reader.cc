@@ -211,7 +211,6 @@ absl::Status ReadBinary(const Header& header,
   if (points > 0 && header.record_size() > block.size() / points) {
     return TooShort(points, points * header.record_size(), cursor.position(), block.size());
   }
-  builder.Reserve(points);
   AddBlock(header, block, false, builder);
   return absl::OkStatus();
 }
@@ -243,7 +242,6 @@ absl::Status ReadCompressed(const Header& header,
   if (packed > block.size() - 8) return TooShort(*header.points, packed, at + 8, block.size() - 8);
   STRATA_ASSIGN_OR_RETURN(const std::string plain,
                           DecompressLzf(block.substr(8, packed), unpacked));
-  builder.Reserve(*header.points);
   AddBlock(header, plain, true, builder);
   return absl::OkStatus();
 }

@@ -189,7 +189,6 @@ absl::StatusOr<PointCloud> ReadKitti(absl::string_view bytes) {
   for (std::size_t k = 0; k < 4; ++k) {
     fields.push_back({meanings[k], ScalarType::kFloat32, bytes.data() + 4 * k, kPointBytes});
   }
-  builder.Reserve(bytes.size() / kPointBytes);
   AddPoints(fields, bytes.size() / kPointBytes, false, builder);
   return std::move(builder).Build();
 }

@@ -18,8 +18,8 @@ struct PointField {
   std::size_t stride = 0;
 };
 
-// Adds `count` points to a builder made for the meanings of `fields`. REQUIRES: all bytes are
-// there.
+// Adds `count` points to a builder made for the meanings of `fields`, that has none. REQUIRES: all
+// bytes are there.
 void AddPoints(std::span<const PointField> fields,
                std::size_t count,
                bool big_endian,

@@ -1,9 +1,13 @@
 #include "client/formats/scalar.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <optional>
+#include <span>
 
 #include "absl/strings/string_view.h"
 
@@ -29,9 +33,20 @@ constexpr NamedType kNames[] = {
     {"double", ScalarType::kFloat64},      {"float64", ScalarType::kFloat64},
 };
 
+template <typename T, bool kSwapped>
+void Read(const char* first, std::size_t stride, std::span<double> values) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    std::array<char, sizeof(T)> bytes;
+    std::memcpy(bytes.data(), first + i * stride, sizeof(T));
+    if constexpr (kSwapped) std::reverse(bytes.begin(), bytes.end());
+    values[i] = static_cast<double>(std::bit_cast<T>(bytes));
+  }
+}
+
 template <typename T>
-double As(std::uint64_t bits) {
-  return static_cast<double>(static_cast<T>(bits));
+void Read(const char* first, std::size_t stride, bool big_endian, std::span<double> values) {
+  const bool swapped = big_endian != (std::endian::native == std::endian::big);
+  swapped ? Read<T, true>(first, stride, values) : Read<T, false>(first, stride, values);
 }
 
 }  // namespace
@@ -82,33 +97,39 @@ std::optional<ScalarType> ScalarTypeOfPcd(char letter, std::size_t size) {
   }
 }
 
-double ScalarAt(const char* bytes, ScalarType type, bool big_endian) {
-  const std::size_t size = SizeOf(type);
-  std::uint64_t bits = 0;
-  for (std::size_t i = 0; i < size; ++i) {
-    const std::size_t shift = 8 * (big_endian ? size - 1 - i : i);
-    bits |= std::uint64_t{static_cast<std::uint8_t>(bytes[i])} << shift;
-  }
+void ReadScalars(const char* first,
+                 std::size_t stride,
+                 ScalarType type,
+                 bool big_endian,
+                 std::span<double> values) {
   switch (type) {
     case ScalarType::kInt8:
-      return As<std::int8_t>(bits);
-    case ScalarType::kInt16:
-      return As<std::int16_t>(bits);
-    case ScalarType::kInt32:
-      return As<std::int32_t>(bits);
-    case ScalarType::kInt64:
-      return As<std::int64_t>(bits);
+      return Read<std::int8_t>(first, stride, big_endian, values);
     case ScalarType::kUint8:
+      return Read<std::uint8_t>(first, stride, big_endian, values);
+    case ScalarType::kInt16:
+      return Read<std::int16_t>(first, stride, big_endian, values);
     case ScalarType::kUint16:
+      return Read<std::uint16_t>(first, stride, big_endian, values);
+    case ScalarType::kInt32:
+      return Read<std::int32_t>(first, stride, big_endian, values);
     case ScalarType::kUint32:
+      return Read<std::uint32_t>(first, stride, big_endian, values);
+    case ScalarType::kInt64:
+      return Read<std::int64_t>(first, stride, big_endian, values);
     case ScalarType::kUint64:
-      return As<std::uint64_t>(bits);
+      return Read<std::uint64_t>(first, stride, big_endian, values);
     case ScalarType::kFloat32:
-      return double{std::bit_cast<float>(static_cast<std::uint32_t>(bits))};
+      return Read<float>(first, stride, big_endian, values);
     case ScalarType::kFloat64:
-      return std::bit_cast<double>(bits);
+      return Read<double>(first, stride, big_endian, values);
   }
-  return 0.0;
+}
+
+double ScalarAt(const char* bytes, ScalarType type, bool big_endian) {
+  double value = 0.0;
+  ReadScalars(bytes, 0, type, big_endian, {&value, 1});
+  return value;
 }
 
 }  // namespace strata

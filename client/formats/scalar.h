@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "absl/strings/string_view.h"
 
@@ -31,6 +32,12 @@ std::optional<ScalarType> ScalarTypeOfPcd(char letter, std::size_t size);
 
 // The number at the beginning of `bytes`, which must have SizeOf(type) of them.
 double ScalarAt(const char* bytes, ScalarType type, bool big_endian);
+// values[i] = ScalarAt(first + i · stride, …), for all of `values`.
+void ReadScalars(const char* first,
+                 std::size_t stride,
+                 ScalarType type,
+                 bool big_endian,
+                 std::span<double> values);
 
 }  // namespace strata
 

@@ -47,6 +47,7 @@ absl::StatusOr<PointsSection> FindPoints(TextCursor& cursor) {
 }
 
 absl::Status ReadAscii(const PointsSection& section, TextCursor& cursor, CloudBuilder& builder) {
+  builder.Reserve(section.count);
   for (std::size_t i = 0; i < section.count; ++i) {
     double values[3];
     for (double& value : values) {
@@ -91,7 +92,6 @@ absl::StatusOr<PointCloud> ReadVtk(absl::string_view bytes) {
         section.count, " points do not fit the ", cursor.remaining(), " bytes that follow"));
   }
   STRATA_ASSIGN_OR_RETURN(CloudBuilder builder, CloudBuilder::Create(Coordinates()));
-  builder.Reserve(section.count);
   if (ascii) {
     STRATA_RETURN_IF_ERROR(ReadAscii(section, cursor, builder));
   } else {
