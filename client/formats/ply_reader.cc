@@ -86,11 +86,20 @@ absl::StatusOr<Header> ReadHeader(TextCursor& cursor) {
   }
 }
 
+std::vector<std::size_t> PackedColours(const Element& element) {
+  std::vector<std::size_t> colours;
+  for (std::size_t k = 0; k < element.properties.size(); ++k) {
+    if (MeaningOf(element.properties[k].name) == Meaning::kPackedColour) colours.push_back(k);
+  }
+  return colours;
+}
+
 // Walks over elements value by value: `Source` yields numbers, ascii or binary.
 template <typename Source>
 absl::Status WalkElement(const Element& element, Source& source, CloudBuilder* builder) {
   if (element.properties.empty()) return absl::OkStatus();
   std::vector<double> values(element.properties.size());
+  const std::vector<std::size_t> colours = PackedColours(element);
   for (std::size_t i = 0; i < element.count; ++i) {
     for (std::size_t k = 0; k < values.size(); ++k) {
       const Property& property = element.properties[k];
@@ -105,10 +114,8 @@ absl::Status WalkElement(const Element& element, Source& source, CloudBuilder* b
       }
     }
     if (builder == nullptr) continue;
-    for (std::size_t k = 0; k < values.size(); ++k) {
-      if (MeaningOf(element.properties[k].name) == Meaning::kPackedColour) {
-        values[k] = PackedColourOf(values[k], element.properties[k].type);
-      }
+    for (const std::size_t k : colours) {
+      values[k] = PackedColourOf(values[k], element.properties[k].type);
     }
     builder->Add(values.data());
   }
@@ -146,6 +153,8 @@ class BinarySource {
   absl::Status Error(absl::string_view what) const {
     return absl::InvalidArgumentError(absl::StrCat("byte ", position_, ": ", what));
   }
+  absl::string_view rest() const { return bytes_.substr(position_); }
+  bool big_endian() const { return big_endian_; }
 
  private:
   absl::string_view bytes_;
@@ -153,14 +162,56 @@ class BinarySource {
   bool big_endian_;
 };
 
+// Walks over what comes before the vertices.
 template <typename Source>
-absl::Status ReadVertices(const Header& header, Source source, CloudBuilder& builder) {
+absl::Status SkipToVertices(const Header& header, Source& source) {
   for (const Element& element : header.elements) {
-    const bool is_vertex = element.name == "vertex";
-    STRATA_RETURN_IF_ERROR(WalkElement(element, source, is_vertex ? &builder : nullptr));
-    if (is_vertex) break;
+    if (element.name == "vertex") break;
+    STRATA_RETURN_IF_ERROR(WalkElement(element, source, nullptr));
   }
   return absl::OkStatus();
+}
+
+template <typename Source>
+absl::Status WalkVertices(const Element& vertex, Source& source, CloudBuilder& builder) {
+  builder.Reserve(vertex.count);
+  return WalkElement(vertex, source, &builder);
+}
+
+// The fields of elements that follow each other from `first` on; none if they have lists.
+std::vector<PointField> FieldsOf(const Element& element, const char* first) {
+  std::vector<PointField> fields;
+  std::size_t size = 0;
+  for (const Property& property : element.properties) {
+    if (property.list_count_type.has_value()) return {};
+    fields.push_back({MeaningOf(property.name), property.type, first + size});
+    size += SizeOf(property.type);
+  }
+  for (PointField& field : fields) field.stride = size;
+  return fields;
+}
+
+absl::Status ReadBinary(const Header& header,
+                        const Element& vertex,
+                        BinarySource source,
+                        CloudBuilder& builder) {
+  STRATA_RETURN_IF_ERROR(SkipToVertices(header, source));
+  const absl::string_view rest = source.rest();
+  const std::vector<PointField> fields = FieldsOf(vertex, rest.data());
+  // Where there are too few bytes, the walk says where they end.
+  if (fields.empty() || vertex.count > rest.size() / fields.front().stride) {
+    return WalkVertices(vertex, source, builder);
+  }
+  AddPoints(fields, vertex.count, source.big_endian(), builder);
+  return absl::OkStatus();
+}
+
+absl::Status ReadAscii(const Header& header,
+                       const Element& vertex,
+                       AsciiSource source,
+                       CloudBuilder& builder) {
+  STRATA_RETURN_IF_ERROR(SkipToVertices(header, source));
+  return WalkVertices(vertex, source, builder);
 }
 
 // Bytes that one vertex takes at least.
@@ -196,10 +247,10 @@ absl::StatusOr<PointCloud> ReadPly(absl::string_view bytes) {
                                                             : MeaningOf(property.name));
   }
   STRATA_ASSIGN_OR_RETURN(CloudBuilder builder, CloudBuilder::Create(std::move(meanings)));
-  builder.Reserve(vertex->count);
   STRATA_RETURN_IF_ERROR(
-      ascii ? ReadVertices(header, AsciiSource(cursor), builder)
-            : ReadVertices(header, BinarySource(bytes, cursor.position(), big_endian), builder));
+      ascii ? ReadAscii(header, *vertex, AsciiSource(cursor), builder)
+            : ReadBinary(
+                  header, *vertex, BinarySource(bytes, cursor.position(), big_endian), builder));
   return std::move(builder).Build();
 }
 

@@ -1,7 +1,12 @@
 #include "client/formats/ply_reader.h"
 
+#include <algorithm>
+#include <array>
+#include <bit>
 #include <string>
 
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -53,6 +58,40 @@ TEST(PlyReaderTest, EveryEncodingWithAnyPropertiesGivesTheSamePoints) {
   ExpectTheTwoPoints(ReadPly(Ascii()));
   ExpectTheTwoPoints(ReadPly(LittleEndian()));
   ExpectTheTwoPoints(ReadPly(BigEndian()));
+}
+
+// Vertices that are all of one size, as most programs write them, behind another element.
+std::string OneSize(bool big_endian) {
+  std::string file = absl::StrCat("ply\nformat binary_",
+                                  big_endian ? "big" : "little",
+                                  "_endian 1.0\nelement camera 1\nproperty uchar a\n"
+                                  "element vertex 2\nproperty float x\nproperty float y\n"
+                                  "property float z\nproperty uchar label\nend_header\nc");
+  for (const Eigen::Vector3f& point : {Eigen::Vector3f(1.5F, -2, 3), Eigen::Vector3f(4, 5, 6)}) {
+    for (const float value : point) {
+      auto bytes = std::bit_cast<std::array<char, 4>>(value);
+      if (big_endian != (std::endian::native == std::endian::big)) {
+        std::reverse(bytes.begin(), bytes.end());
+      }
+      file.append(bytes.data(), bytes.size());
+    }
+    file += '\7';
+  }
+  return file;
+}
+
+TEST(PlyReaderTest, VerticesOfOneSizeReadInBothByteOrders) {
+  for (const bool big_endian : {false, true}) {
+    const std::string file = OneSize(big_endian);
+    STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, ReadPly(file));
+    EXPECT_THAT(cloud.points, ElementsAre(Eigen::Vector3f(1.5F, -2, 3), Eigen::Vector3f(4, 5, 6)));
+    EXPECT_THAT(cloud.label, ElementsAre(7, 7));
+    // One byte too few, which the announced number alone does not tell.
+    EXPECT_THAT(ReadPly(file.substr(0, file.size() - 1)),
+                StatusIs(absl::StatusCode::kInvalidArgument,
+                         HasSubstr(absl::StrCat("byte ", file.size() - 1, ": expected more"))));
+    testing::ExpectSoundOnDamage(file, &ReadPly, 4);
+  }
 }
 
 TEST(PlyReaderTest, ColoursWithFractionsAreScaled) {
