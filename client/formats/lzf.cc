@@ -1,7 +1,9 @@
 #include "client/formats/lzf.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <string>
 
 #include "absl/status/status.h"
@@ -13,10 +15,21 @@ namespace strata {
 namespace {
 
 constexpr std::size_t kLongestCopy = 264;  // made of 3 bytes
+// Of the output at a time: a processor's cache keeps it between filling with zeros and writing.
+constexpr std::size_t kGrowth = 1 << 16;
 
 absl::Status Broken(std::size_t position) {
   return absl::InvalidArgumentError(
       absl::StrCat("compressed data do not decompress at their byte ", position));
+}
+
+// What is copied may be what this copies.
+void CopyFromBack(char* to, std::size_t back, std::size_t length) {
+  if (length <= back) {
+    std::memcpy(to, to - back, length);
+  } else {
+    for (std::size_t k = 0; k < length; ++k) to[k] = *(to + k - back);
+  }
 }
 
 }  // namespace
@@ -28,15 +41,18 @@ absl::StatusOr<std::string> DecompressLzf(absl::string_view packed, std::size_t 
   }
   std::string out;
   out.reserve(size);
+  std::size_t done = 0;
   for (std::size_t i = 0; i < packed.size();) {
+    if (out.size() - done < kLongestCopy) out.resize(std::min(size, done + kGrowth));
     const auto byte = [&](std::size_t k) -> std::size_t {
       return static_cast<std::uint8_t>(packed[i + k]);
     };
     const std::size_t control = byte(0);
     if (control < 32) {
       const std::size_t length = control + 1;
-      if (length > packed.size() - i - 1 || length > size - out.size()) return Broken(i);
-      out.append(packed.data() + i + 1, length);
+      if (length > packed.size() - i - 1 || length > size - done) return Broken(i);
+      std::memcpy(out.data() + done, packed.data() + i + 1, length);
+      done += length;
       i += 1 + length;
       continue;
     }
@@ -45,11 +61,12 @@ absl::StatusOr<std::string> DecompressLzf(absl::string_view packed, std::size_t 
     if (used > packed.size() - i) return Broken(i);
     const std::size_t length = (control >> 5) + 2 + (is_long ? byte(1) : 0);
     const std::size_t back = (control & 31) * 256 + byte(used - 1) + 1;
-    if (back > out.size() || length > size - out.size()) return Broken(i);
-    for (std::size_t k = 0; k < length; ++k) out.push_back(out[out.size() - back]);
+    if (back > done || length > size - done) return Broken(i);
+    CopyFromBack(out.data() + done, back, length);
+    done += length;
     i += used;
   }
-  if (out.size() != size) return Broken(packed.size());
+  if (done != size) return Broken(packed.size());
   return out;
 }
 
