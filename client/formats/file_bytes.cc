@@ -1,6 +1,8 @@
 #include "client/formats/file_bytes.h"
 
+#include <algorithm>
 #include <cerrno>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -19,6 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{16} << 30;
+// At a time: a processor's cache keeps them between filling with zeros and reading.
+constexpr std::size_t kReadBytes = 1 << 18;
 
 absl::Status CannotWrite(const fs::path& path, absl::string_view why) {
   return absl::UnavailableError(absl::StrCat(path.string(), ": cannot be written: ", why));
@@ -48,11 +52,15 @@ absl::StatusOr<std::string> ReadFileBytes(const std::filesystem::path& path) {
     return absl::ResourceExhaustedError(
         absl::StrCat(path.string(), ": ", size, " bytes, at most ", kMaxFileBytes, " are read"));
   }
-  std::string bytes(size, '\0');
+  std::string bytes;
+  bytes.reserve(size);
   std::ifstream in(path, std::ios::binary);
-  if (!in.read(bytes.data(), static_cast<std::streamsize>(size))) {
-    return absl::UnavailableError(absl::StrCat(path.string(), ": cannot be read"));
+  while (in && bytes.size() < size) {
+    const std::size_t step = std::min<std::size_t>(kReadBytes, size - bytes.size());
+    bytes.resize(bytes.size() + step);
+    in.read(bytes.data() + bytes.size() - step, static_cast<std::streamsize>(step));
   }
+  if (!in) return absl::UnavailableError(absl::StrCat(path.string(), ": cannot be read"));
   return bytes;
 }
 
