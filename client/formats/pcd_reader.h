@@ -13,8 +13,8 @@ namespace strata {
 // the sensor's place. INVALID_ARGUMENT with the line (header, ascii) or byte (binary) and what was
 // expected; announced sizes are checked against the file's before anything is allocated.
 //
-// Not PCL's reader: that one prints to stdout, throws on hostile headers, and makes floats of UTM
-// doubles.
+// Not PCL's reader: that one prints to stdout, throws on hostile headers, makes zeros of UTM
+// doubles, and is slower (docs/decisions/0083).
 absl::StatusOr<PointCloud> ReadPcd(absl::string_view bytes);
 
 }  // namespace strata
