@@ -86,10 +86,10 @@ absl::StatusOr<Header> ReadHeader(TextCursor& cursor) {
   }
 }
 
-std::vector<std::size_t> PackedColours(const Element& element) {
-  std::vector<std::size_t> colours;
-  for (std::size_t k = 0; k < element.properties.size(); ++k) {
-    if (MeaningOf(element.properties[k].name) == Meaning::kPackedColour) colours.push_back(k);
+std::vector<bool> PackedColours(const Element& element) {
+  std::vector<bool> colours;
+  for (const Property& property : element.properties) {
+    colours.push_back(MeaningOf(property.name) == Meaning::kPackedColour);
   }
   return colours;
 }
@@ -99,12 +99,13 @@ template <typename Source>
 absl::Status WalkElement(const Element& element, Source& source, CloudBuilder* builder) {
   if (element.properties.empty()) return absl::OkStatus();
   std::vector<double> values(element.properties.size());
-  const std::vector<std::size_t> colours = PackedColours(element);
+  const std::vector<bool> colours = PackedColours(element);
   for (std::size_t i = 0; i < element.count; ++i) {
     for (std::size_t k = 0; k < values.size(); ++k) {
       const Property& property = element.properties[k];
       if (!property.list_count_type.has_value()) {
-        STRATA_ASSIGN_OR_RETURN(values[k], source.Next(property.type));
+        STRATA_ASSIGN_OR_RETURN(
+            values[k], colours[k] ? source.NextColour(property.type) : source.Next(property.type));
         continue;
       }
       STRATA_ASSIGN_OR_RETURN(const double length, source.Next(*property.list_count_type));
@@ -113,11 +114,7 @@ absl::Status WalkElement(const Element& element, Source& source, CloudBuilder* b
         STRATA_RETURN_IF_ERROR(source.Next(property.type).status());
       }
     }
-    if (builder == nullptr) continue;
-    for (const std::size_t k : colours) {
-      values[k] = PackedColourOf(values[k], element.properties[k].type);
-    }
-    builder->Add(values.data());
+    if (builder != nullptr) builder->Add(values.data());
   }
   return absl::OkStatus();
 }
@@ -131,6 +128,10 @@ class AsciiSource {
     if (number.has_value()) return *number;
     if (word.empty()) return Error("expected a number, found the end of the file");
     return Error(absl::StrCat("expected a number, found '", word.substr(0, 40), "'"));
+  }
+  absl::StatusOr<double> NextColour(ScalarType type) {
+    STRATA_ASSIGN_OR_RETURN(const double value, Next(type));
+    return PackedColourOf(value, type);
   }
   absl::Status Error(absl::string_view what) const { return cursor_.Error(what); }
 
@@ -149,6 +150,11 @@ class BinarySource {
     }
     position_ += size;
     return ScalarAt(bytes_.data() + position_ - size, type, big_endian_);
+  }
+  absl::StatusOr<double> NextColour(ScalarType type) {
+    const ScalarType bits = BitsOfColour(type);
+    STRATA_ASSIGN_OR_RETURN(const double value, Next(bits));
+    return PackedColourOf(value, bits);
   }
   absl::Status Error(absl::string_view what) const {
     return absl::InvalidArgumentError(absl::StrCat("byte ", position_, ": ", what));

@@ -37,12 +37,18 @@ void ReadField(const PointField& field,
                std::size_t begin,
                bool big_endian,
                std::span<double> values) {
-  ReadScalars(field.first + begin * field.stride, field.stride, field.type, big_endian, values);
-  if (field.meaning != Meaning::kPackedColour) return;
-  for (double& value : values) value = PackedColourOf(value, field.type);
+  const bool packed = field.meaning == Meaning::kPackedColour;
+  const ScalarType type = packed ? BitsOfColour(field.type) : field.type;
+  ReadScalars(field.first + begin * field.stride, field.stride, type, big_endian, values);
+  if (!packed) return;
+  for (double& value : values) value = PackedColourOf(value, type);
 }
 
 }  // namespace
+
+ScalarType BitsOfColour(ScalarType type) {
+  return type == ScalarType::kFloat32 ? ScalarType::kUint32 : type;
+}
 
 double PackedColourOf(double value, ScalarType type) {
   constexpr std::uint32_t kMask = 0xFFFFFF;

@@ -25,6 +25,10 @@ void AddPoints(std::span<const PointField> fields,
                bool big_endian,
                CloudBuilder& builder);
 
+// As what the bits of a packed colour of `type` are read: a float with an opacity in its highest
+// byte may be a NaN that signals, which no conversion leaves as it is.
+ScalarType BitsOfColour(ScalarType type);
+
 // A packed colour read as a number of a field of `type`: its 24 bits. A float holds them as its
 // bits.
 double PackedColourOf(double value, ScalarType type);

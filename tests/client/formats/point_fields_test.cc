@@ -5,6 +5,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <string>
 #include <utility>
@@ -157,6 +158,25 @@ TEST(ScalarTest, EveryTypeReadsInBothByteOrders) {
   ExpectReads<std::uint64_t>(ScalarType::kUint64, 0xFEDCBA9876543210U);
   ExpectReads<float>(ScalarType::kFloat32, -1.5e-3F);
   ExpectReads<double>(ScalarType::kFloat64, 512345.678);
+}
+
+TEST(PackedColourTest, AnOpacityLeavesTheColourAsItIs) {
+  constexpr std::uint32_t kOpaque = 0xFFA01020;  // as a float a NaN that signals
+  std::string bytes(16, '\0');
+  std::memcpy(bytes.data() + 12, &kOpaque, sizeof kOpaque);
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      CloudBuilder builder,
+      CloudBuilder::Create({Meaning::kX, Meaning::kY, Meaning::kZ, Meaning::kPackedColour}));
+  std::vector<PointField> fields;
+  for (std::size_t k = 0; k < 4; ++k) {
+    fields.push_back({.meaning = k < 3 ? static_cast<Meaning>(k) : Meaning::kPackedColour,
+                      .type = ScalarType::kFloat32,
+                      .first = bytes.data() + 4 * k,
+                      .stride = bytes.size()});
+  }
+  AddPoints(fields, 1, false, builder);
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, std::move(builder).Build());
+  EXPECT_THAT(cloud.colour, ::testing::ElementsAre(Colour{0xA0, 0x10, 0x20}));
 }
 
 }  // namespace
