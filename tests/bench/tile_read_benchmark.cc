@@ -109,6 +109,16 @@ void AwaitIntegration(api::Database& db) {
   }
 }
 
+// A map at rest prepares its tiles for plans, some ten seconds of work that is another measurement.
+void AwaitPreparation(api::Database& db) {
+  while (true) {
+    const auto stats = db.maps().Stats({}, kMap);
+    Require(stats.ok(), "no stats");
+    if (stats->tiles_prepared >= kTilesAcross * kTilesAcross) return;
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+}
+
 struct Fetched {
   std::map<std::string, v1::EncodedTile> tiles;  // by serialised key
   std::uint64_t bytes = 0;                       // of all messages
@@ -230,6 +240,7 @@ int Main(int argc, char** argv) {
     for (int x = 0; x < kTilesAcross; ++x) UploadTile(**db, x, y, 1);
   }
   AwaitIntegration(**db);
+  if (!smoke) AwaitPreparation(**db);
   server::ServerOptions server_options;
   server_options.listen = "127.0.0.1:0";
   const auto server = server::Server::Start(**db, server_options);
