@@ -16,6 +16,7 @@ stage "includes"
 python3 tests/check_includes.py
 python3 tests/check_names.py
 python3 tests/check_doors.py
+python3 tests/experiments/results.py --check
 
 stage "format"
 git ls-files '*.h' '*.cc' '*.proto' | xargs clang-format --dry-run --Werror

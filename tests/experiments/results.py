@@ -77,7 +77,7 @@ def run(name, build):
         words[0] = str(build / "tests" / words[0])
     done = subprocess.run(words, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
     commit, date = git("log", "-1", "--format=%h %cs").split()
-    dirty = " with changes" if git("status", "--porcelain", "--untracked-files=no") else ""
+    dirty = " with changes" if git("status", "--porcelain", "--untracked-files=no", "--", ".", f":!{FILE.relative_to(ROOT)}") else ""
     section = f"## {title} (`{name}`)\n\n`{command.format(build='build/release')}` at {commit}{dirty}, {date}\n\n```\n{done.stdout.rstrip()}\n```\n"
     return section, done.returncode in (0, 77)
 
@@ -90,6 +90,9 @@ def old_results():
             yield f"{name}: never run"
             continue
         commit = known[name]["commit"]
+        if subprocess.run(["git", "-C", ROOT, "cat-file", "-e", commit], stderr=subprocess.DEVNULL, check=False).returncode != 0:
+            yield f"{name}: of {commit}, which this clone does not have"
+            continue
         since = git("log", "--oneline", f"{commit}..HEAD", "--", *sources).splitlines()
         if since:
             yield f"{name}: of {commit}; since then {len(since)} commits to {', '.join(sources)}"
