@@ -45,7 +45,7 @@ RESULTS = {
     "tiles": ("Tiles read beside a bare service", "bench/tile_read_benchmark", ("core/engine", "server")),
 }
 
-SECTION = re.compile(r"^## (?P<title>.*) \(`(?P<name>\w+)`\)\n\n`(?P<command>[^`]*)` at (?P<commit>\w+)[^\n]*\n\n```\n"
+SECTION = re.compile(r"^## (?P<title>[^\n]*) \(`(?P<name>\w+)`\)\n\n`(?P<command>[^`]*)` at (?P<commit>\w+)[^\n]*\n\n```\n"
                      r"(?P<text>.*?)```\n", re.M | re.S)
 HEAD = """# Results
 
