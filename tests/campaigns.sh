@@ -23,7 +23,7 @@ watchers|20|a change that a watcher is not told of|env STRATA_RUNS=1000 STRATA_S
 optimize_crash|8|a map that an optimize job leaves half done|env STRATA_KILLS=30 STRATA_SEED=$seed $build/tests/integration/optimize_crash_test
 classify_crash|8|the same for jobs that learn and label|env STRATA_KILLS=30 STRATA_SEED=$seed $build/tests/integration/classify_crash_test
 hostile|9|an attack that slows others down, takes memory or stops the server|/usr/bin/python3 tests/experiments/hostile_clients.py --build $build --seconds 12 --seed $seed
-fuzzers|15|an input that a decoder, reader or call does not survive|tests/fuzz/run.sh 60
+fuzzers|15|an input that a decoder, reader or call does not survive|tests/fuzz/run.sh 720
 endurance|11|memory or latency that grows|/usr/bin/python3 tests/bench/endurance.py --build $build
 loops|10|simulated loops that do not close|/usr/bin/python3 tests/experiments/loops.py --build $build
 recordings|4|recorded drives that end off|/usr/bin/python3 tests/experiments/real_data.py --build $build
