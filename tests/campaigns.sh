@@ -10,24 +10,24 @@ build=${STRATA_BUILD:-build/release}
 experiments=$build/tests/experiments
 seed=1
 
-# name | minutes on two cores | what it would find | command; $seed is put in
+# name | minutes on two cores, ~ where nobody has timed it | what it would find | command; $seed is put in
 campaigns() {
   cat <<LIST
 kills|35|an acknowledged scan, deletion or label that is lost or there twice after SIGKILL|$experiments/kill_campaign --seed $seed kills --work
 aligned_kills|10|the same where scans are aligned|$experiments/kill_campaign --seed $seed --align kills --server-kills 30 --robot-kills 20
-terms|5|the same after SIGTERM|$experiments/kill_campaign --seed $seed terms
-clocks|2|the same where the wall clock is set back and forward|$experiments/kill_campaign --seed $seed clock
+terms|~5|the same after SIGTERM|$experiments/kill_campaign --seed $seed terms
+clocks|~2|the same where the wall clock is set back and forward|$experiments/kill_campaign --seed $seed clock
 disks|90|a broken promise on a disk that fails, fills up or loses power|env TMPDIR=/dev/shm $experiments/disk_campaign --every 40 --seed $seed
-flips|10|a flipped bit of a map's file that nobody notices|env TMPDIR=/dev/shm $experiments/disk_campaign --flips 2000 --seed $seed
-watchers|20|a change that a watcher is not told of|env STRATA_RUNS=1000 STRATA_SEED=$seed $build/tests/core/engine/engine_watch_model_test
+flips|~10|a flipped bit of a map's file that nobody notices|env TMPDIR=/dev/shm $experiments/disk_campaign --flips 2000 --seed $seed
+watchers|~20|a change that a watcher is not told of|env STRATA_RUNS=1000 $build/tests/core/engine/engine_watch_model_test
 optimize_crash|8|a map that an optimize job leaves half done|env STRATA_KILLS=30 STRATA_SEED=$seed $build/tests/integration/optimize_crash_test
 classify_crash|8|the same for jobs that learn and label|env STRATA_KILLS=30 STRATA_SEED=$seed $build/tests/integration/classify_crash_test
 hostile|9|an attack that slows others down, takes memory or stops the server|/usr/bin/python3 tests/experiments/hostile_clients.py --build $build --seconds 12 --seed $seed
 fuzzers|15|an input that a decoder, reader or call does not survive|tests/fuzz/run.sh 720
 endurance|11|memory or latency that grows|/usr/bin/python3 tests/bench/endurance.py --build $build
-loops|10|simulated loops that do not close|/usr/bin/python3 tests/experiments/loops.py --build $build
+loops|~10|simulated loops that do not close|/usr/bin/python3 tests/experiments/loops.py --build $build
 recordings|4|recorded drives that end off|/usr/bin/python3 tests/experiments/real_data.py --build $build
-runbook|6|a page of the runbook that does not help (as root)|/usr/bin/python3 tests/experiments/runbook.py --build $build
+runbook|~6|a page of the runbook that does not help (as root)|/usr/bin/python3 tests/experiments/runbook.py --build $build
 LIST
 }
 

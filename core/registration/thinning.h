@@ -8,7 +8,8 @@ namespace strata {
 
 // The centre of gravity of the points of each cube of `edge_m`, without columns and grid; origins
 // are kept, points that are not finite left out. Cubes are larger where the cloud extends over more
-// than 2³¹ of them. A pure function. REQUIRES: 0.001 ≤ edge_m ≤ 1000.
+// than two thousand million of them. A pure function. REQUIRES: 0.001 ≤ edge_m ≤ 1000, points as
+// ValidateCloud() takes them.
 PointCloud ThinCloud(const PointCloud& cloud, double edge_m);
 
 }  // namespace strata

@@ -2,7 +2,7 @@
 """Well-behaved clients beside hostile ones: does the server stay up, healthy, within its memory, and quick?
 
     tests/experiments/hostile_clients.py --build build/release [--seconds 15] [--connections 10000] [--only garbage,claims]
-                                         [--limit-mb 512] [--seed 1] [--proxy] [-- STRATAD OPTIONS]
+                                         [--limit-mb 512] [--period-s 0.2] [--seed 1] [--proxy] [-- STRATAD OPTIONS]
 
 A real stratad with tokens. Robots upload, readers fetch and planners plan at a steady pace, first alone and then beside
 each attack; the attackers have a token of their own, and run at low priority so that their own work weighs less. A row
@@ -36,14 +36,13 @@ sys.path.append(str(ROOT / "tests/bench"))
 from endurance import HALF_M, MAP, scan_at  # pylint: disable=wrong-import-position
 from stratad import Stratad  # pylint: disable=wrong-import-position
 
-PERIOD_S = 0.5  # of a well-behaved client: four of them leave half of two cores idle
 GOOD = ("upload", "upload", "fetch", "plan")
 PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 
 
 # The well-behaved.
 
-def good_client(kind, build, address, token, seed, told, over):
+def good_client(kind, build, address, token, seed, period_s, told, over):
     sys.path.append(str(build / "client/python"))
     import strata
     random = np.random.default_rng(seed)
@@ -63,7 +62,7 @@ def good_client(kind, build, address, token, seed, told, over):
                 told.put((kind, time.monotonic() - begun, ""))
             except strata.StrataError as error:
                 told.put((kind, time.monotonic() - begun, f"{type(error).__name__}: {error}"))
-            time.sleep(max(0.0, PERIOD_S - (time.monotonic() - begun)))
+            time.sleep(max(0.0, period_s - (time.monotonic() - begun)))
     told.cancel_join_thread()
 
 
@@ -521,7 +520,7 @@ def campaign(build, options, folder):
             world.wait()
         for i, kind in enumerate(GOOD):
             workers.append(multiprocessing.Process(target=good_client, daemon=True, args=(
-                kind, build, server.address, good, i, told, over)))
+                kind, build, server.address, good, i, options.period_s, told, over)))
             workers[-1].start()
         measure(told, 5)  # warming up
         before = measure(told, options.seconds)[0]
@@ -593,6 +592,7 @@ def main():
     parser.add_argument("--connections", type=int, default=10_000)
     parser.add_argument("--limit-mb", type=float, default=512)
     parser.add_argument("--only", help="attacks, comma-separated")
+    parser.add_argument("--period-s", type=float, default=0.2, help="of the calls of a well-behaved client")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--proxy", action="store_true", help="through HAProxy")
     parser.add_argument("stratad", nargs="*", help="options of the server")

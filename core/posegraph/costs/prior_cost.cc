@@ -12,11 +12,11 @@ PriorCost::PriorCost(const Pose& T_map_scan, const Matrix6d& information)
     : T_map_scan_(T_map_scan), root_(InformationRoot(information)) {}
 
 bool PriorCost::Evaluate(double const* const* blocks, double* residuals, double** jacobians) const {
-  const RelativePoseDerivatives d =
-      DifferentiateRelativePose(Pose::Identity(), PoseOf(blocks[0]), T_map_scan_);
+  const Pose T = PoseOf(blocks[0]);
   Eigen::Map<Vector6d> weighted(residuals);
-  weighted = root_ * d.error;
+  weighted = root_ * RelativePoseError(Pose::Identity(), T, T_map_scan_);
   if (jacobians != nullptr && jacobians[0] != nullptr) {
+    const RelativePoseDerivatives d = DifferentiateRelativePose(Pose::Identity(), T, T_map_scan_);
     WritePoseJacobian(root_ * d.by_j, jacobians[0]);
   }
   return weighted.allFinite();

@@ -21,6 +21,7 @@
 #include "core/common/steady_time.h"
 #include "core/common/stop.h"
 #include "core/engine/doors/map.h"
+#include "core/engine/ingest/worker.h"
 #include "core/engine/map/numbers.h"
 #include "core/engine/repair/rebuild.h"
 #include "core/world/job_kinds.h"
@@ -102,41 +103,48 @@ TEST_F(BesideTest, VerifyGoesOnBesideUploads) {
   robot.join();
 }
 
+// Keeps a map's worker at work until its end.
+class BusyWorker {
+ public:
+  BusyWorker(Worker& worker, const std::string& what)
+      : thread_([this, &worker, what] {
+          const auto work = [this](Integrator&) {
+            begun_.Notify();
+            over_.WaitForNotification();
+            return absl::OkStatus();
+          };
+          STRATA_EXPECT_OK(worker.Execute(Stop(), work, what));
+        }) {
+    begun_.WaitForNotification();
+  }
+  ~BusyWorker() {
+    over_.Notify();
+    thread_.join();
+  }
+  BusyWorker(const BusyWorker&) = delete;
+  BusyWorker& operator=(const BusyWorker&) = delete;
+
+ private:
+  absl::Notification begun_, over_;
+  std::thread thread_;
+};
+
 TEST_F(BesideTest, WhoGivesUpWaitingIsToldWhatItWaitedFor) {
   MakeMap();
   const std::shared_ptr<Map> map = OpenMap();
   ASSERT_NE(map, nullptr);
-  absl::Notification begun;
-  absl::Notification over;
-  const auto long_work = [&](Integrator&) {
-    begun.Notify();
-    over.WaitForNotification();
-    return absl::OkStatus();
-  };
-  std::thread job(
-      [&] { STRATA_EXPECT_OK(map->worker().Execute(Stop(), long_work, "job 3 (rebuild)")); });
-  begun.WaitForNotification();
+  const BusyWorker busy(map->worker(), "job 3 (rebuild)");
   const Stop given_up;
   given_up.Request();
   EXPECT_THAT(map->worker().Execute(given_up, [](Integrator&) { return absl::OkStatus(); }),
               StatusIs(absl::StatusCode::kCancelled, HasSubstr("job 3 (rebuild) of map world")));
-  over.Notify();
-  job.join();
 }
 
 TEST_F(BesideTest, AJobThatWaitsForTheWorkerEndsWhenItIsCancelled) {
   MakeMap();
   const std::shared_ptr<Map> map = OpenMap();
   ASSERT_NE(map, nullptr);
-  absl::Notification begun;
-  absl::Notification over;
-  const auto long_work = [&](Integrator&) {
-    begun.Notify();
-    over.WaitForNotification();
-    return absl::OkStatus();
-  };
-  std::thread edit([&] { STRATA_EXPECT_OK(map->worker().Execute(Stop(), long_work)); });
-  begun.WaitForNotification();
+  const BusyWorker busy(map->worker(), "an edit");
   const absl::StatusOr<JobInfo> job = map->jobs().Start(Stop(), "a", kRebuildJob, {});
   map->JobQueued();
   JobInfo last = job.value_or(JobInfo());
@@ -147,8 +155,6 @@ TEST_F(BesideTest, AJobThatWaitsForTheWorkerEndsWhenItIsCancelled) {
     return runs ? map->jobs().Cancel(now.id).status() : absl::OkStatus();
   }));
   EXPECT_EQ(last.state, JobState::kCancelled) << last.message;
-  over.Notify();
-  edit.join();
 }
 
 TEST_F(BesideTest, HealthNamesMapsThatAreNotOpenAndTheDisk) {
