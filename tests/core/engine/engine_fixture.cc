@@ -232,6 +232,18 @@ void EngineTest::Sql(const std::string& sql, const std::string& map) const {
   sqlite3_close(file);
 }
 
+std::int64_t EngineTest::Number(const std::string& sql) const {
+  sqlite3* file = nullptr;
+  EXPECT_EQ(sqlite3_open(MapFile(kMapName).c_str(), &file), SQLITE_OK);
+  sqlite3_stmt* query = nullptr;
+  EXPECT_EQ(sqlite3_prepare_v2(file, sql.c_str(), -1, &query, nullptr), SQLITE_OK) << sql;
+  EXPECT_EQ(sqlite3_step(query), SQLITE_ROW) << sql;
+  const std::int64_t number = sqlite3_column_int64(query, 0);
+  sqlite3_finalize(query);
+  sqlite3_close(file);
+  return number;
+}
+
 void EngineTest::DamageSurfaceTile(const TileKey& key) const {
   Sql("UPDATE derived_surface_tile SET bytes = CAST(substr(bytes, 1, 40) || x'5a5a' || "
       "substr(bytes, 43) AS BLOB) WHERE (level, x, y) = (" +

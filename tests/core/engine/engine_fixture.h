@@ -85,6 +85,8 @@ class EngineTest : public ::testing::Test {
   void ExpectSound();
   // Changes a map's file behind the engine's back, which must be closed.
   void Sql(const std::string& sql, const std::string& map = kMapName) const;
+  // The first number that a query answers; the engine must be closed.
+  std::int64_t Number(const std::string& sql) const;
 
   // Spoils a served tile; the engine must be closed.
   void DamageSurfaceTile(const TileKey& key) const;
