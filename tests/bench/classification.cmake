@@ -18,4 +18,4 @@ strata_executable(
   SOURCES classification_benchmark.cc
   DEPS strata::classification strata::classification_peers strata::labelled_clouds
 )
-strata_smoke(classification_benchmark --rounds 1 --only cut)
+strata_smoke(classification_benchmark --rounds 1 --only cut --points 20000)

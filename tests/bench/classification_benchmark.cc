@@ -1,7 +1,7 @@
 // Classification of points beside CGAL 5.5's: ratios of one run, medians, processor time of one
 // thread, on the clouds of Oakland 3-D.
 //
-//   classification_benchmark [--rounds 3] [--only NAME]
+//   classification_benchmark [--rounds 3] [--only NAME] [--points N]
 //
 //   features   eigenvalue shape at one scale and wall histograms, 16 neighbours, against CGAL's
 //              feature set at one scale
@@ -254,8 +254,10 @@ int Main(int argc, char** argv) {
   CLI::App app("classification beside CGAL's");
   int rounds = 3;
   std::string only;
+  std::size_t points = SIZE_MAX;
   app.add_option("--rounds", rounds)->check(CLI::Range(1, 100));
   app.add_option("--only", only);
+  app.add_option("--points", points, "most of the cloud that is asked for");
   CLI11_PARSE(app, argc, argv);
   const testing::LabelledClouds oakland = testing::ReadOakland("part3");
   const testing::LabelledClouds asked = testing::ReadOakland("part2");
@@ -263,7 +265,7 @@ int Main(int argc, char** argv) {
     std::printf("no data\n");
     return 0;
   }
-  const PointCloud& cloud = asked.clouds.front();
+  const PointCloud cloud = FirstPoints(asked.clouds.front(), points);
   const auto wanted = [&only](const std::string& name) { return only.empty() || only == name; };
   if (wanted("memory")) MeasureMemory(oakland, cloud);
   if (wanted("features")) MeasureFeatures(cloud, rounds);

@@ -116,7 +116,7 @@ struct Run {
   std::uint64_t bytes = 0;  // of the pieces
 };
 
-std::vector<PointCloud> RecordedScans() {
+std::vector<PointCloud> RecordedScans(std::size_t most) {
   const auto folder = testing::FindData("nclt_campus_loop");
   Require(folder.has_value(), "no recorded data: set STRATA_DATA");
   std::vector<std::filesystem::path> files;
@@ -124,6 +124,7 @@ std::vector<PointCloud> RecordedScans() {
     files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
+  files.resize(std::min(files.size(), most));
   std::vector<PointCloud> scans;
   for (const auto& file : files) scans.emplace_back().points = testing::ReadPlainPcd(file);
   return scans;
@@ -333,7 +334,7 @@ int Main(int argc, char** argv) {
   FLAGS_minloglevel = google::GLOG_WARNING;
   google::InitGoogleLogging(argv[0]);
   CommitLog::Instance();
-  const std::vector<PointCloud> scans = RecordedScans();
+  const std::vector<PointCloud> scans = RecordedScans(static_cast<std::size_t>(count));
   std::printf("%d scans, medians of %d runs; MB are of encoded pieces\n", count, repeats);
   std::printf(
       "robots  integr.     MB/s    bare   encoded   ratio   ack p50    p95    p99 ms   scans a "

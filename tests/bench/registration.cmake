@@ -16,4 +16,4 @@ strata_executable(
   SOURCES registration_benchmark.cc simulated_bridge.cc
   DEPS strata::registration strata::registration_peers strata::mls strata::test_support strata::test_recordings
 )
-strata_smoke(registration_benchmark --pairs 2)
+strata_smoke(registration_benchmark --pairs 1)

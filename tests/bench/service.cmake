@@ -10,4 +10,4 @@ strata_executable(
   DEPS strata::engine strata::proto strata::server strata::test_support gRPC::grpc++ PkgConfig::glog
 )
 strata_smoke(durable_upload_benchmark 16 1 smoke)
-strata_smoke(tile_read_benchmark 0.2 1 smoke)
+strata_smoke(tile_read_benchmark 0.1 1 smoke)
