@@ -11,9 +11,9 @@
 #include "absl/strings/str_cat.h"
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 
 #include "core/common/status.h"
+#include "core/geometry/eigen_solvers.h"
 #include "core/geometry/primitives.h"
 
 namespace strata {

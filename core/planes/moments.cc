@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 
+#include "core/geometry/eigen_solvers.h"
 #include "core/geometry/pose.h"
 #include "core/geometry/primitives.h"
 

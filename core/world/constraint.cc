@@ -1,9 +1,9 @@
 #include "core/world/constraint.h"
 
 #include "absl/strings/str_cat.h"
-#include <Eigen/Eigenvalues>
 
 #include "core/common/status.h"
+#include "core/geometry/eigen_solvers.h"
 #include "core/world/names.h"
 
 namespace strata {

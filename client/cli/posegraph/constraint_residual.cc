@@ -5,7 +5,7 @@
 #include <map>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
+#include "core/geometry/eigen_solvers.h"
 
 namespace strata::cli {
 namespace {

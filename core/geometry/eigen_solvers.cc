@@ -1,0 +1,5 @@
+#include "core/geometry/eigen_solvers.h"
+
+STRATA_SYMMETRIC_SOLVER(2);
+STRATA_SYMMETRIC_SOLVER(3);
+STRATA_SYMMETRIC_SOLVER(6);
