@@ -43,6 +43,7 @@ class ImportTest : public CliTest {
       const auto state = (*database)->scans().GetUploadState({}, "m", kRobot);
       EXPECT_THAT(state, IsOk());
       if (!state.ok() || state->scans >= scans) return state.value_or(UploadState()).scans;
+      absl::SleepFor(absl::Milliseconds(2));
     }
     return 0;
   }
