@@ -140,6 +140,7 @@ void KeepLongest(int count, std::vector<EdgeFeature>& edges) {
 absl::Status PlaneExtractionOptions::Validate() const {
   STRATA_RETURN_IF_ERROR(ValidateSensorModel(sensor));
   OptionChecks checks("plane extraction");
+  checks.InRange("|sensor_origin|", sensor_origin.norm(), 0.0F, 1e6F);
   checks.InRange("max_range_m", max_range_m, 1e-3, 1000.0);
   checks.InRange("cell_size_m", cell_size_m, 0.2, 20.0);
   checks.InRange("max_rms_m", max_rms_m, 0.001, 1.0);
@@ -176,7 +177,7 @@ ScanPlanes ExtractPlanes(const MlsMap& local_map, const PlaneExtractionOptions& 
   }
   PlaneExtractionOptions blurred = options;
   blurred.max_rms_m = std::max(options.max_rms_m, kCellSpread * local_map.parameters.cell_size_m);
-  ScanPlanes planes = PatchesAndCreases(points, Eigen::Vector3f::Zero(), blurred);
+  ScanPlanes planes = PatchesAndCreases(points, options.sensor_origin, blurred);
   KeepLongest(options.max_edges, planes.edges);
   return planes;
 }

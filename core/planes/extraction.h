@@ -3,6 +3,7 @@
 #define STRATA_CORE_PLANES_EXTRACTION_H_
 
 #include "absl/status/status.h"
+#include <Eigen/Core>
 
 #include "core/cloud/point_cloud.h"
 #include "core/cloud/sensor_model.h"
@@ -13,6 +14,8 @@ namespace strata {
 
 struct PlaneExtractionOptions {
   SensorModel sensor;
+  // Of a local map: where it was seen from, in its frame; within ±1e6 m. A cloud has its own.
+  Eigen::Vector3f sensor_origin = Eigen::Vector3f::Zero();
   // Points farther away are not looked at; in (0, 1000].
   double max_range_m = 100.0;
   // Edge of the largest cells in which flatness is judged; in [0.2, 20]. A cell that is not flat is
@@ -40,8 +43,8 @@ struct PlaneExtractionOptions {
 ScanPlanes ExtractPlanes(const PointCloud& cloud, const PlaneExtractionOptions& options = {});
 
 // The same of what remains where points were dropped: the patches of a local map in the scan frame,
-// the sensor at its origin. A cell blurs what is in it: surfaces are allowed 0.4 cells of spread.
-// The edges are creases only.
+// seen from options.sensor_origin. A cell blurs what is in it: surfaces are allowed 0.4 cells of
+// spread. The edges are creases only.
 ScanPlanes ExtractPlanes(const MlsMap& local_map, const PlaneExtractionOptions& options = {});
 
 }  // namespace strata

@@ -17,6 +17,7 @@
 #include "core/engine/consistency/graph_world.h"
 #include "core/engine/map/parallel.h"
 #include "core/engine/scans/matching.h"
+#include "core/engine/scans/scan_source.h"
 #include "core/engine/scans/scan_views.h"
 #include "core/mls/build.h"
 #include "core/posegraph/information.h"
@@ -88,19 +89,26 @@ class Localizer::Search {
 
  private:
   absl::Status Describe() {
-    const MapParameters parameters = core_.info().parameters;
-    MlsScratch scratch;
-    STRATA_ASSIGN_OR_RETURN(const MlsBuildResult built,
-                            BuildMlsMap(query_.cloud,
-                                        Pose::Identity(),
-                                        query_.sensor.value_or(parameters.sensor),
-                                        parameters.mls,
-                                        scratch));
-    place_ = DescribePlace(built.map);
+    MlsParameters parameters = core_.info().parameters.mls;
+    STRATA_ASSIGN_OR_RETURN(const MlsMap seen, Seen(parameters));
+    place_ = DescribePlace(seen);
+    parameters.cell_size_m = std::min(parameters.cell_size_m, kRegistrationCellM);
+    STRATA_ASSIGN_OR_RETURN(const MlsMap finer, Seen(parameters));
     ScanRecord scan;
     scan.header.sensor_origin = query_.cloud.sensor_origin;
-    features_ = ScanFeatures::FromMap(built.map, FeatureOptionsOf(scan));
+    features_ = ScanFeatures::FromMap(finer, FeatureOptionsOf(scan));
     return absl::OkStatus();
+  }
+
+  absl::StatusOr<MlsMap> Seen(const MlsParameters& parameters) const {
+    MlsScratch scratch;
+    STRATA_ASSIGN_OR_RETURN(MlsBuildResult built,
+                            BuildMlsMap(query_.cloud,
+                                        Pose::Identity(),
+                                        query_.sensor.value_or(core_.info().parameters.sensor),
+                                        parameters,
+                                        scratch));
+    return std::move(built.map);
   }
 
   // The scans around the guess, nearest first, not all of the same place.

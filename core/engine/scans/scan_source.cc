@@ -127,20 +127,19 @@ absl::Status ScanSource::ForEachBlock(const ScanRecord& scan,
 
 absl::StatusOr<MlsMap> ScanSource::Build(const ScanRecord& scan,
                                          const Pose& T_map_scan,
+                                         const MlsParameters& parameters,
                                          Faded faded,
                                          std::size_t most_patches) {
   const SensorModel sensor = scan.header.sensor.value_or(parameters_.sensor);
   MlsMap map;
-  map.parameters = parameters_.mls;
+  map.parameters = parameters;
   dropped_ = DroppedPoints();
   STRATA_RETURN_IF_ERROR(ForEachBlock(scan, [&](const PointCloud& block) -> absl::Status {
     const bool all = faded == Faded::kWith || held_faded_.empty();
-    STRATA_ASSIGN_OR_RETURN(MlsBuildResult built,
-                            BuildMlsMap(all ? block : Lasting(block, held_faded_),
-                                        T_map_scan,
-                                        sensor,
-                                        parameters_.mls,
-                                        scratch_));
+    STRATA_ASSIGN_OR_RETURN(
+        MlsBuildResult built,
+        BuildMlsMap(
+            all ? block : Lasting(block, held_faded_), T_map_scan, sensor, parameters, scratch_));
     dropped_.not_finite += built.dropped.not_finite;
     dropped_.out_of_range += built.dropped.out_of_range;
     dropped_.outside_map += built.dropped.outside_map;
@@ -180,16 +179,28 @@ absl::StatusOr<MlsMap> ScanSource::LocalMap(const ScanRecord& scan) {
   if (scan.has_points) {
     STRATA_RETURN_IF_ERROR(CheckSpread(scan));
     const bool waits = scan.state == ScanState::kPending;  // what was taken once is taken
-    return Build(scan, Pose::Identity(), Faded::kWith, waits ? kMaxScanPatches : kAnyPatches);
+    return Build(scan,
+                 Pose::Identity(),
+                 parameters_.mls,
+                 Faded::kWith,
+                 waits ? kMaxScanPatches : kAnyPatches);
   }
   dropped_ = DroppedPoints();
   STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader_.GetLocalMap(scan.number));
   return DecodeLocalMap(bytes, parameters_.mls);
 }
 
+absl::StatusOr<MlsMap> ScanSource::RegistrationMap(const ScanRecord& scan) {
+  if (!IsTooCoarse(scan)) return LocalMap(scan);
+  STRATA_RETURN_IF_ERROR(CheckSpread(scan));
+  MlsParameters finer = parameters_.mls;
+  finer.cell_size_m = kRegistrationCellM;
+  return Build(scan, Pose::Identity(), finer, Faded::kWith, kMaxScanPatches);
+}
+
 absl::StatusOr<MlsMap> ScanSource::Contribution(const ScanRecord& scan, const Pose& T_map_scan) {
   if (parameters_.keep_points && scan.has_points) {
-    return Build(scan, T_map_scan, Faded::kWithout, kAnyPatches);
+    return Build(scan, T_map_scan, parameters_.mls, Faded::kWithout, kAnyPatches);
   }
   STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, LocalMap(scan));
   return TransformContribution(local_map, T_map_scan);

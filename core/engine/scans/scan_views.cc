@@ -23,12 +23,14 @@ absl::StatusOr<ScanPlanes> PlanesOf(ScanSource& source,
                                     const MapParameters& parameters) {
   PlaneExtractionOptions options;
   options.sensor = scan.header.sensor.value_or(parameters.sensor);
+  options.sensor_origin = scan.header.sensor_origin;
   if (!scan.has_points || scan.header.point_count > kMaxPlanePoints) {
     return ExtractPlanes(local_map, options);
   }
   local_map.tiles.clear();
   local_map.tiles.shrink_to_fit();
   PointCloud cloud;
+  cloud.sensor_origin = scan.header.sensor_origin;
   STRATA_RETURN_IF_ERROR(source.ForEachBlock(scan, [&cloud](const PointCloud& block) {
     cloud.points.insert(cloud.points.end(), block.points.begin(), block.points.end());
     return absl::OkStatus();
@@ -54,9 +56,8 @@ absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::MakeFeatures(
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
   const MapParameters parameters = core_.info().parameters;
   ScanSource source(*reader, parameters);
-  STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
-  return std::make_shared<const ScanFeatures>(
-      ScanFeatures::FromMap(local_map, FeatureOptionsOf(scan)));
+  STRATA_ASSIGN_OR_RETURN(const MlsMap map, source.RegistrationMap(scan));
+  return std::make_shared<const ScanFeatures>(ScanFeatures::FromMap(map, FeatureOptionsOf(scan)));
 }
 
 absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::Features(std::size_t node) {

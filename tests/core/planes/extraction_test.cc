@@ -154,6 +154,26 @@ TEST(PlaneExtractionTest, AMapOfTheScanGivesTheSamePlanes) {
   EXPECT_TRUE(wall);
 }
 
+// The same scan in a frame that is moved has the planes moved by as much: it is seen from where the
+// sensor was, not from the frame's origin.
+TEST(PlaneExtractionTest, AFrameThatIsMovedMovesThePlanesAlone) {
+  PointCloud cloud = SimulateScan(Yard(), {}, SensorAt(0, 0, 1.5), 6);
+  const ScanPlanes before = ExtractPlanes(cloud);
+  const Eigen::Vector3f shift(0.0F, 0.0F, 2.0F);  // the frame: below the floor
+  for (Eigen::Vector3f& p : cloud.points) p += shift;
+  cloud.sensor_origin = shift;
+  PlaneExtractionOptions options;
+  options.sensor_origin = shift;
+  const MlsMap map = BuildMlsMap(cloud, Pose::Identity(), {}, MlsParameters{}).value().map;
+  for (const ScanPlanes& planes : {ExtractPlanes(cloud), ExtractPlanes(map, options)}) {
+    EXPECT_NE(PatchNear(planes, {.normal = {0, 0, 1}, .distance = 0.5}), nullptr);
+    for (const PlanePatch& patch : planes.patches) {
+      EXPECT_GT(SignedDistance(shift.cast<double>(), patch.plane), 0.0);
+    }
+  }
+  EXPECT_EQ(ExtractPlanes(cloud).patches.size(), before.patches.size());
+}
+
 TEST(PlaneExtractionTest, TakesEmptyAndHolesAndStrayPoints) {
   EXPECT_EQ(ExtractPlanes(PointCloud{}), ScanPlanes{});
   PointCloud cloud;

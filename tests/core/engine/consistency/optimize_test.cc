@@ -357,6 +357,30 @@ TEST_F(OptimizeTest, ADisabledPlaneIsNotUsedButRemembered) {
   EXPECT_EQ(Optimize({{"planes", "0"}}).metrics.at("planes"), 0.0);
 }
 
+// A robot may upload in the frame of its base. Taken for seen from the floor itself, some scans saw
+// the floor from below, and it became two planes.
+TEST_F(OptimizeTest, PlanesAreSeenFromTheSensorWhereverTheFrameIs) {
+  MakeMap(MapParameters());
+  const Eigen::Vector3f sensor(0.0F, 0.0F, 1.2F);
+  for (std::uint64_t k = 1; k <= kScans; ++k) {
+    PointCloud cloud = See(TruthOf(k), k);
+    for (Eigen::Vector3f& p : cloud.points) p += sensor;
+    Pose said = SaidOf(k);
+    said.translation().z() = 0.0;
+    ScanHeader header = HeaderOf({"run", k}, cloud, said);
+    header.sensor_origin = sensor;
+    STRATA_ASSERT_OK(Upload(db(), header, cloud, 6000));
+  }
+  WaitIntegrated(db());
+  ASSERT_EQ(Optimize().state, JobState::kSucceeded);
+  int floors = 0;
+  for (const GlobalPlane& plane : Graph().planes) {
+    EXPECT_GT(plane.plane.normal.z(), -0.9) << "seen from below at " << plane.plane.distance;
+    floors += plane.plane.normal.z() > 0.99 && std::abs(plane.plane.distance) < 0.05 ? 1 : 0;
+  }
+  EXPECT_EQ(floors, 1);
+}
+
 // Root of the mean squared distance from the truth, best aligned [m].
 double Ate(const std::vector<Pose>& poses, const std::vector<Pose>& truth) {
   const auto count = static_cast<Eigen::Index>(poses.size());
