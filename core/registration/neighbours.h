@@ -25,6 +25,13 @@
 
 namespace strata {
 
+// A robot that comes back to a place after more scans than this is on another pass.
+inline constexpr std::size_t kOwnPass = 30;
+
+// Scans of another pass that are higher or lower than this are on another storey, which may look
+// the same.
+inline constexpr double kSameStoreyM = 1.5;
+
 struct NeighbourPolicy {
   // Scans whose origins are farther than this from the guess are no neighbours [m]; in (0, 1000].
   // Less, and a robot whose only neighbours look down on it from a bridge tilts with them.

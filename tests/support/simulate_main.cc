@@ -32,13 +32,14 @@ struct Options {
   std::filesystem::path out;
   std::uint64_t seed = 1;
   int districts = 1;
+  double slab_m = 0.3;
   std::vector<std::string> robots;
   RobotFiles files;
 };
 
-World WorldOf(const std::string& name, std::uint64_t seed, int districts) {
+World WorldOf(const std::string& name, std::uint64_t seed, int districts, double slab_m) {
   if (name == "car_park") {
-    return CarParkWorld();
+    return CarParkWorld(slab_m);
   }
   if (name == "building") {
     return BuildingWorld(seed);
@@ -88,7 +89,7 @@ std::string ClassLines(const Scene& scene) {
 }
 
 absl::Status Simulate(const Options& options) {
-  const World world = WorldOf(options.world, options.seed, options.districts);
+  const World world = WorldOf(options.world, options.seed, options.districts, options.slab_m);
   STRATA_ASSIGN_OR_RETURN(const std::vector<Robot> robots, RobotsOf(world, options.robots));
   std::filesystem::create_directories(options.out);
   std::string places;
@@ -133,6 +134,9 @@ int Main(int argc, char** argv) {
                  options.robots,
                  "Only these; the ones that drive loops (car_park: loop, bridge: eight) are "
                  " written only when asked for");
+  app.add_option("--slab", options.slab_m, "Of the car park's upper storey [m]")
+      ->capture_default_str()
+      ->check(CLI::Range(0.05, 2.0));
   app.add_option("--districts", options.districts, "Of the city, a robot in each")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();

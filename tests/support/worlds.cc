@@ -142,26 +142,25 @@ World BridgeWorld(const BridgeOptions& options) {
   return world;
 }
 
-World CarParkWorld() {
+World CarParkWorld(double slab_m) {
   constexpr double kFloor = 3.2;  // top of the upper slab
-  constexpr double kSlab = 0.3;
   World world;
   Scene& scene = world.scene;
   scene.Add(Labelled(Box({-30.0, -22.0, -1.0}, {30.0, 22.0, 0.0}), kGround));
   // The upper slab leaves out the ramp's well: x from -8 to 8, y from -2.5 to 2.5.
-  scene.Add(Labelled(Box({-20.0, 2.5, kFloor - kSlab}, {20.0, 12.0, kFloor}), kGround));
-  scene.Add(Labelled(Box({-20.0, -12.0, kFloor - kSlab}, {20.0, -2.5, kFloor}), kGround));
-  scene.Add(Labelled(Box({-20.0, -2.5, kFloor - kSlab}, {-8.0, 2.5, kFloor}), kGround));
-  scene.Add(Labelled(Box({8.0, -2.5, kFloor - kSlab}, {20.0, 2.5, kFloor}), kGround));
+  scene.Add(Labelled(Box({-20.0, 2.5, kFloor - slab_m}, {20.0, 12.0, kFloor}), kGround));
+  scene.Add(Labelled(Box({-20.0, -12.0, kFloor - slab_m}, {20.0, -2.5, kFloor}), kGround));
+  scene.Add(Labelled(Box({-20.0, -2.5, kFloor - slab_m}, {-8.0, 2.5, kFloor}), kGround));
+  scene.Add(Labelled(Box({8.0, -2.5, kFloor - slab_m}, {20.0, 2.5, kFloor}), kGround));
   scene.Add(Labelled(RampX(-8.0, 8.0, -2.0, 2.0, 0.0, kFloor), kGround));
   for (const double side : {-1.0, 1.0}) {  // a kerb wall along the well
     scene.Add(Labelled(
-        Box({-8.0, side * 2.6 - 0.1, kFloor - kSlab}, {8.0, side * 2.6 + 0.1, kFloor + 1.0}),
+        Box({-8.0, side * 2.6 - 0.1, kFloor - slab_m}, {8.0, side * 2.6 + 0.1, kFloor + 1.0}),
         kWall));
   }
   for (const double x : {-14.0, -5.0, 5.0, 14.0}) {
     for (const double y : {-7.0, 7.0})
-      scene.Add(Labelled(Box({x - 0.2, y - 0.2, 0.0}, {x + 0.2, y + 0.2, kFloor - kSlab}), kWall));
+      scene.Add(Labelled(Box({x - 0.2, y - 0.2, 0.0}, {x + 0.2, y + 0.2, kFloor - slab_m}), kWall));
   }
   for (const double base : {0.0, kFloor}) {  // breast walls on both storeys, open above
     for (const double side : {-1.0, 1.0}) {

@@ -42,11 +42,11 @@ struct BridgeOptions {
 World BridgeWorld(const BridgeOptions& options = {});
 
 // Two storeys of 40 × 24 m with columns, walls with windows around them, and a ramp between. Floors
-// are z = 0 and 3.2.
+// are z = 0 and 3.2, the upper one on a slab of `slab_m`.
 //   robots: "visitor" goes round below, up the ramp and round above.
 //   loops: "loop" goes round below, up, round above and down to its start, 230 m.
 //   places: "below" and "above" at the same x, y; "ramp_foot", "ramp_head".
-World CarParkWorld();
+World CarParkWorld(double slab_m = 0.3);
 
 // Rolling terrain of 300 × 300 m with houses and trees.
 //   robots: "north_loop" and "south_loop", each some 500 m, sharing the street in the middle.

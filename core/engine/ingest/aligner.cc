@@ -1,11 +1,12 @@
 #include "core/engine/ingest/aligner.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
 #include <memory>
-#include <string>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -15,7 +16,6 @@
 #include "core/common/status.h"
 #include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/matching.h"
-#include "core/registration/mls_registration.h"
 #include "core/registration/neighbours.h"
 
 namespace strata {
@@ -25,19 +25,11 @@ namespace {
 // information: more would repeat the same measurement.
 constexpr std::size_t kMaxConstraints = 3;
 
-bool Accepted(Termination termination) {
-  return termination == Termination::kConverged || termination == Termination::kMaxIterations ||
-         termination == Termination::kDegenerate;
-}
+// So few scans of a pass are matched whatever their height: a ramp leads from one to the next.
+constexpr std::size_t kJustBefore = 3;
 
-AlignmentReport ReportOf(const RegistrationResult& match) {
-  AlignmentReport report;
-  report.aligned = Accepted(match.termination);
-  report.message = std::string(ToString(match.termination));
-  report.overlap = match.overlap;
-  report.rms_m = match.rms_m;
-  report.iterations = static_cast<std::uint32_t>(match.iterations);
-  return report;
+bool OnOneStorey(const Pose& a, const Pose& b) {
+  return std::abs(a.translation().z() - b.translation().z()) <= kSameStoreyM;
 }
 
 void NearestFirst(const std::vector<Pose>& poses,
@@ -61,14 +53,17 @@ absl::Status Aligner::Load(StorageReader& reader, std::uint64_t epoch) {
   query.state = ScanState::kIntegrated;
   query.skip_damaged = true;  // no neighbour, but no reason to stop either
   return ForEachPosedScan(reader, query, epoch, [&](const PosedScan& posed) {
-    Add(posed.scan, posed.pose->T_map_scan);
+    Add(posed.scan, posed.pose->T_map_scan, posed.pose->report);
   });
 }
 
-void Aligner::Add(const ScanRecord& scan, const Pose& T_map_scan) {
+void Aligner::Add(const ScanRecord& scan, const Pose& T_map_scan, const AlignmentReport& report) {
   const ScanId& id = scan.header.id;
   trajectories_[id.trajectory][id.sequence] = scans_.size();
-  scans_.push_back({scan.number, scan.header.T_map_scan});
+  scans_.push_back({scan.number,
+                    scan.header.T_map_scan,
+                    scan.header.sensor_origin.cast<double>(),
+                    !report.aligned && report.iterations > 0});
   poses_.push_back(T_map_scan);
 }
 
@@ -83,10 +78,10 @@ Pose Aligner::Guess(const ScanRecord& scan) const {
                     header.T_map_scan);
 }
 
-Aligner::Features Aligner::Keep(const ScanRecord& scan, const MlsMap& local_map, int samples) {
+Aligner::Features Aligner::Keep(const ScanRecord& scan, const MlsMap& map, int samples) {
   ScanFeatureOptions options = FeatureOptionsOf(scan);
   options.sample_count = samples;
-  auto features = std::make_shared<const ScanFeatures>(ScanFeatures::FromMap(local_map, options));
+  auto features = std::make_shared<const ScanFeatures>(ScanFeatures::FromMap(map, options));
   features_.Put(scan.number, features, features->memory_bytes());
   return features;
 }
@@ -96,70 +91,130 @@ absl::StatusOr<Aligner::Features> Aligner::FeaturesOf(ScanNumber number,
                                                       ScanSource& source) {
   if (Features held = features_.Find(number); held != nullptr) return held;
   STRATA_ASSIGN_OR_RETURN(const PosedScan posed, reader.GetScan(number, 0));
-  STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(posed.scan));
-  return Keep(posed.scan, local_map, 0);
+  STRATA_ASSIGN_OR_RETURN(const MlsMap map, source.RegistrationMap(posed.scan));
+  return Keep(posed.scan, map, 0);
+}
+
+std::vector<std::size_t> Aligner::OwnPass(const ScanRecord& scan, const Pose& guess) const {
+  std::vector<std::size_t> pass;
+  const auto found = trajectories_.find(scan.header.id.trajectory);
+  if (found == trajectories_.end()) return pass;
+  const std::map<std::uint64_t, std::size_t>& trajectory = found->second;
+  const auto next = trajectory.lower_bound(scan.header.id.sequence);
+  const auto add = [&](std::size_t apart, std::size_t i) {
+    if (apart < kJustBefore || OnOneStorey(poses_[i], guess)) pass.push_back(i);
+  };
+  auto after = next;
+  for (std::size_t k = 0; k < kOwnPass && after != trajectory.end(); ++k) {
+    add(k, (after++)->second);
+  }
+  auto before = next;
+  for (std::size_t k = 0; k < kOwnPass && before != trajectory.begin(); ++k) {
+    add(k, (--before)->second);
+  }
+  std::sort(pass.begin(), pass.end());
+  return pass;
+}
+
+std::vector<std::size_t> Aligner::All() const {
+  std::vector<std::size_t> all(scans_.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return all;
+}
+
+std::vector<std::size_t> Aligner::Believed(const std::vector<std::size_t>& scans) const {
+  std::vector<std::size_t> believed;
+  std::copy_if(scans.begin(), scans.end(), std::back_inserter(believed), [this](std::size_t i) {
+    return !scans_[i].is_lost;
+  });
+  return believed.empty() ? scans : believed;
+}
+
+std::vector<std::size_t> Aligner::Around(const Pose& T_map_scan,
+                                         const std::vector<std::size_t>& pass) const {
+  std::vector<std::size_t> around = Believed(All());
+  std::erase_if(around, [&](std::size_t i) {
+    return !OnOneStorey(poses_[i], T_map_scan) && !std::binary_search(pass.begin(), pass.end(), i);
+  });
+  return around;
 }
 
 absl::StatusOr<Aligner::Neighbourhood> Aligner::NeighboursOf(const Pose& guess,
+                                                             const std::vector<std::size_t>& among,
                                                              StorageReader& reader,
                                                              ScanSource& source) {
+  std::vector<Pose> poses;
+  for (const std::size_t i : among) poses.push_back(poses_[i]);
   Neighbourhood around;
-  for (const std::size_t i : SelectNeighbours(poses_, guess)) {
+  for (const std::size_t k : SelectNeighbours(poses, guess)) {
+    const std::size_t i = among[k];
     // A scan whose data are damaged is no reason to refuse this one.
     absl::StatusOr<Features> features = FeaturesOf(scans_[i].number, reader, source);
     if (absl::IsDataLoss(features.status())) continue;
     STRATA_RETURN_IF_ERROR(features.status());
     around.held.push_back(*std::move(features));
-    around.placed.push_back({around.held.back().get(), poses_[i]});
+    around.seen.push_back({around.held.back().get(), poses_[i], scans_[i].sensor_origin});
     around.indices.push_back(i);
   }
   return around;
 }
 
 std::vector<ConstraintRecord> Aligner::ConstraintsOf(ScanNumber number,
-                                                     const Placement& placement,
-                                                     const Matrix6d& information,
+                                                     const Link& link,
                                                      std::vector<std::size_t> partners) const {
-  NearestFirst(poses_, placement.T_map_scan, partners);
+  NearestFirst(poses_, link.T_map_scan, partners);
   partners.resize(std::min(partners.size(), kMaxConstraints));
   std::vector<ConstraintRecord> records;
   for (const std::size_t i : partners) {
     ConstraintRecord record;
     record.scan_i = scans_[i].number;
     record.scan_j = number;
-    record.constraint.T_i_j = Normalized(poses_[i].inverse() * placement.T_map_scan);
-    record.constraint.information = information / static_cast<double>(partners.size());
+    record.constraint.T_i_j = Normalized(poses_[i].inverse() * link.T_map_scan);
+    record.constraint.information = link.information / static_cast<double>(partners.size());
     record.constraint.origin = ConstraintOrigin::kIngest;
-    record.constraint.note = placement.report.message;
+    record.constraint.note = link.report.message;
     records.push_back(std::move(record));
   }
   return records;
 }
 
 absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
-                                         const MlsMap& local_map,
+                                         const MlsMap& registration_map,
                                          StorageReader& reader,
                                          ScanSource& source) {
   Placement placement;
   placement.T_map_scan = scan.header.T_map_scan;
-  const Features own = Keep(scan, local_map, FeatureOptionsOf(scan).sample_count);
+  const Features own = Keep(scan, registration_map, FeatureOptionsOf(scan).sample_count);
   if (scan.header.alignment == Alignment::kOff) {
     placement.report.message = "alignment off: pose as uploaded";
     return placement;
   }
   const Pose guess = Guess(scan);
   placement.T_map_scan = guess;
-  STRATA_ASSIGN_OR_RETURN(const Neighbourhood around, NeighboursOf(guess, reader, source));
-  if (around.placed.empty()) {
+  const SeenScan seen{own.get(), guess, scan.header.sensor_origin.cast<double>()};
+  const std::vector<std::size_t> pass = Believed(OwnPass(scan, guess));
+  Nearness nearness = Nearness::kSamePass;
+  STRATA_ASSIGN_OR_RETURN(Neighbourhood around, NeighboursOf(guess, pass, reader, source));
+  if (around.seen.empty()) {
+    nearness = Nearness::kSaid;
+    STRATA_ASSIGN_OR_RETURN(around, NeighboursOf(guess, Believed(All()), reader, source));
+  }
+  if (around.seen.empty()) {
     placement.report.message = "no scan around to align to";
     return placement;
   }
-  const RegistrationTarget target(around.placed, TargetOptions{.centre = guess.translation()});
-  const RegistrationResult match = RegisterScan(*own, target, guess, EngineRegistrationOptions());
-  placement.report = ReportOf(match);
-  if (!placement.report.aligned) return placement;
-  placement.T_map_scan = Normalized(match.T_target_source);
-  placement.constraints = ConstraintsOf(scan.number, placement, match.information, around.indices);
+  const Link link = LinkScan(seen, around.seen, guess, nearness);
+  placement.report = link.report;
+  if (!link.report.aligned) return placement;
+  placement.T_map_scan = link.T_map_scan;
+  placement.constraints = ConstraintsOf(scan.number, link, around.indices);
+  if (nearness == Nearness::kSaid) return placement;
+  STRATA_ASSIGN_OR_RETURN(
+      const Neighbourhood all,
+      NeighboursOf(link.T_map_scan, Around(link.T_map_scan, pass), reader, source));
+  if (all.indices == around.indices) return placement;
+  const Link joint = AgreeingLink(seen, all.seen, link.T_map_scan);
+  if (joint.report.aligned) placement.T_map_scan = joint.T_map_scan;
   return placement;
 }
 

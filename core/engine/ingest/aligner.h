@@ -11,11 +11,13 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include <Eigen/Core>
 
 #include "core/common/lru_cache.h"
+#include "core/engine/ingest/link.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/mls/mls_map.h"
-#include "core/registration/registration_target.h"
+#include "core/registration/place_match.h"
 #include "core/registration/scan_features.h"
 #include "core/storage/storage.h"
 #include "core/world/scan.h"
@@ -38,41 +40,56 @@ class Aligner {
   // Forgets everything and reads the integrated scans of `epoch`.
   absl::Status Load(StorageReader& reader, std::uint64_t epoch);
 
-  // `local_map` is the scan's own. Alignment::kOff: the uploaded pose. Otherwise the guess (the
-  // predecessor's pose and the uploaded motion since; the uploaded pose for the first of a
-  // trajectory) registered to the nearest scans of any trajectory, or the guess if that fails.
+  // `registration_map` is the scan's own. Alignment::kOff: the uploaded pose. Otherwise the guess
+  // (the predecessor's pose and the uploaded motion since; the uploaded pose for the first of a
+  // trajectory), registered to the nearest scans of its own pass, which is what constraints say,
+  // and to all around where those agree with it. A match far from the guess, or to others alone, is
+  // verified as a place is. The guess if nothing holds.
   absl::StatusOr<Placement> Place(const ScanRecord& scan,
-                                  const MlsMap& local_map,
+                                  const MlsMap& registration_map,
                                   StorageReader& reader,
                                   ScanSource& source);
   // The scan is integrated at this pose.
-  void Add(const ScanRecord& scan, const Pose& T_map_scan);
+  void Add(const ScanRecord& scan, const Pose& T_map_scan, const AlignmentReport& report);
 
  private:
   struct PlacedEntry {
     ScanNumber number;
     Pose T_map_scan_uploaded;
+    Eigen::Vector3d sensor_origin;  // scan frame
+    bool is_lost = false;           // others were around, and none said where it is
   };
   using Features = std::shared_ptr<const ScanFeatures>;
   // The scans to align to.
   struct Neighbourhood {
-    std::vector<Features> held;  // keeps alive what `placed` points to
-    std::vector<PlacedScan> placed;
+    std::vector<Features> held;  // keeps alive what `seen` points to
+    std::vector<SeenScan> seen;
     std::vector<std::size_t> indices;  // into scans_
   };
 
   Pose Guess(const ScanRecord& scan) const;
+  // Indices into scans_, ascending: scans of its trajectory just before and after, on its storey or
+  // on the way there,
+  std::vector<std::size_t> OwnPass(const ScanRecord& scan, const Pose& guess) const;
   absl::StatusOr<Features> FeaturesOf(ScanNumber number, StorageReader& reader, ScanSource& source);
+  // all,
+  std::vector<std::size_t> All() const;
+  // without those that found no place among others, unless all are such,
+  std::vector<std::size_t> Believed(const std::vector<std::size_t>& scans) const;
+  // and `pass` with the scans of others that are not on another storey, which may look the same.
+  std::vector<std::size_t> Around(const Pose& T_map_scan,
+                                  const std::vector<std::size_t>& pass) const;
+  // Those of `among` around `guess`.
   absl::StatusOr<Neighbourhood> NeighboursOf(const Pose& guess,
+                                             const std::vector<std::size_t>& among,
                                              StorageReader& reader,
                                              ScanSource& source);
-  // What a match to `partners` says about the scan, as constraints to the nearest of them.
+  // What a link to `partners` says about the scan, as constraints to the nearest of them.
   std::vector<ConstraintRecord> ConstraintsOf(ScanNumber number,
-                                              const Placement& placement,
-                                              const Matrix6d& information,
+                                              const Link& link,
                                               std::vector<std::size_t> partners) const;
   // `samples`: 0 for a scan that others are matched to, and that is not matched itself.
-  Features Keep(const ScanRecord& scan, const MlsMap& local_map, int samples);
+  Features Keep(const ScanRecord& scan, const MlsMap& map, int samples);
 
   // By commit order.
   std::vector<PlacedEntry> scans_;

@@ -139,6 +139,15 @@ absl::Status Integrator::Commit(const TileChange& change,
   return absl::OkStatus();
 }
 
+absl::StatusOr<Placement> Integrator::Placed(const ScanRecord& scan,
+                                             const MlsMap& local_map,
+                                             StorageReader& reader,
+                                             ScanSource& source) {
+  if (!source.IsTooCoarse(scan)) return aligner_.Place(scan, local_map, reader, source);
+  STRATA_ASSIGN_OR_RETURN(const MlsMap finer, source.RegistrationMap(scan));
+  return aligner_.Place(scan, finer, reader, source);
+}
+
 absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
                                        StorageReader& reader,
                                        ScanSource& source,
@@ -156,7 +165,7 @@ absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
       STRATA_RETURN_IF_ERROR(CheckRoomInTiles(local_map, {}));
       STRATA_ASSIGN_OR_RETURN(done.local_map, EncodeLocalMap(local_map));
     }
-    STRATA_ASSIGN_OR_RETURN(done.placement, aligner_.Place(scan, local_map, reader, source));
+    STRATA_ASSIGN_OR_RETURN(done.placement, Placed(scan, local_map, reader, source));
   }
   STRATA_ASSIGN_OR_RETURN(MlsMap contribution,
                           source.Contribution(scan, done.placement.T_map_scan));
@@ -172,7 +181,7 @@ absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
   }
   STRATA_RETURN_IF_ERROR(CheckRoomInTiles(contribution, tiles));
   JoinAndForget(std::move(contribution), tiles);
-  aligner_.Add(scan, done.placement.T_map_scan);
+  aligner_.Add(scan, done.placement.T_map_scan, done.placement.report);
   batch.integrated.push_back(std::move(done));
   return absl::OkStatus();
 }

@@ -103,6 +103,10 @@ class Integrator {
   };
 
   absl::Status LoadAlignerOnce(StorageReader& reader);
+  absl::StatusOr<Placement> Placed(const ScanRecord& scan,
+                                   const MlsMap& local_map,
+                                   StorageReader& reader,
+                                   ScanSource& source);
   absl::Status IntegrateScan(const ScanRecord& scan,
                              StorageReader& reader,
                              ScanSource& source,

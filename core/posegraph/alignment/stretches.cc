@@ -10,11 +10,6 @@ namespace {
 
 // Scans farther apart than this in the order of their trajectory are of different passes.
 constexpr std::size_t kSamePass = 5;
-// Scans of another pass that are higher or lower than this are on another storey, which may look
-// the same.
-constexpr double kSameStoreyM = 1.5;
-// A robot that comes back to a place later than this is on another pass.
-constexpr std::size_t kOwnPass = 30;
 
 }  // namespace
 

@@ -1,5 +1,10 @@
-// Two robots with noisy odometry in one simulated world: where ingest puts their scans.
+// Robots in simulated worlds, with noisy odometry or frames of their own: where ingest puts their
+// scans.
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <functional>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -48,6 +53,107 @@ TEST_P(WorldAlignmentTest, UnderABridgeTheGroundIsWhereItIsFromAbove) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, WorldAlignmentTest, ::testing::Values(1, 2));
+
+class LinksTest : public EngineTest {
+ protected:
+  // Uploads what a robot sees at these poses as being at said(pose), and waits.
+  void Record(const Scene& scene,
+              const std::string& robot,
+              const std::vector<Pose>& truth,
+              const std::function<Pose(const Pose&)>& said,
+              const std::string& map = kMapName) {
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      const PointCloud cloud = SimulateScan(scene, {}, truth[i], i + 100 * robot.size());
+      STRATA_ASSERT_OK(Upload(
+          db(), HeaderOf({robot, i}, cloud, said(truth[i]), Alignment::kOn), cloud, 40'000, map));
+    }
+    ASSERT_EQ(WaitIntegrated(db(), map).scans_failed, 0U);
+  }
+  std::vector<Pose> PosesOf(const std::string& robot, const std::string& map = kMapName) {
+    std::vector<Pose> poses;
+    const auto graph = db().posegraph().Get({}, map);
+    STRATA_EXPECT_OK(graph.status());
+    for (const PoseNode& node : graph->nodes) {
+      if (node.id.trajectory == robot) poses.push_back(node.T_map_scan);
+    }
+    return poses;
+  }
+  static double Farthest(const std::vector<Pose>& poses, const std::vector<Pose>& truth) {
+    EXPECT_EQ(poses.size(), truth.size());
+    double farthest = 0.0;
+    for (std::size_t i = 0; i < poses.size() && i < truth.size(); ++i) {
+      farthest = std::max(farthest, (poses[i].translation() - truth[i].translation()).norm());
+    }
+    return farthest;
+  }
+  static Pose Same(const Pose& T) { return T; }
+
+  const Scene yard_ = YardScene();
+  const std::vector<Pose> way_ = Drive(yard_, {{-8, 0, 0}, {8, 0, 0}}, 1.0, 1.2);
+};
+
+TEST_F(LinksTest, ASecondRobotWhoseFrameIsOffByMetresBecomesNoGhost) {
+  MakeMap(MapParameters());
+  Record(yard_, "first", way_, Same);
+  const Pose off = way_[0] * PoseAt(2.0, -2.0, 0.25) * way_[0].inverse();
+  Record(yard_, "second", way_, [&](const Pose& T) { return off * T; });
+  EXPECT_LT(Farthest(PosesOf("second"), way_), 0.05);
+}
+
+TEST_F(LinksTest, ARobotThatIsNotWhereItSaysIsLinkedToNothing) {
+  MakeMap(MapParameters());
+  Record(yard_, "first", way_, Same);
+  const Pose off = PoseAt(0.0, 25.0, 1.5);
+  Record(yard_, "second", way_, [&](const Pose& T) { return off * T; });
+  std::vector<Pose> said;
+  for (const Pose& T : way_) said.push_back(off * T);
+  EXPECT_LT(Farthest(PosesOf("second"), said), 0.1);
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo info, db().scans().Get({}, kMapName, {"second", 0}));
+  EXPECT_FALSE(info.alignment.aligned);
+  STRATA_ASSERT_OK_AND_ASSIGN(const api::PoseGraphState graph, db().posegraph().Get({}, kMapName));
+  for (const Constraint& c : graph.constraints) EXPECT_EQ(c.i.trajectory, c.j.trajectory);
+}
+
+TEST_F(LinksTest, MotionThatIsWrongByMetresIsMendedByWhatTheScansShow) {
+  MakeMap(MapParameters());
+  Random random(3);
+  Record(yard_, "shaken", way_, [&](const Pose& T) {
+    if (T.isApprox(way_[0])) return T;
+    return Pose(T * PoseAt(random.Gaussian(), random.Gaussian(), 0.09 * random.Gaussian()));
+  });
+  EXPECT_LT(Farthest(PosesOf("shaken"), way_), 0.05);
+}
+
+TEST_F(LinksTest, CellsOfTheMapDoNotChangeWhereScansAre) {
+  MapParameters coarse;
+  coarse.mls.cell_size_m = 0.5;
+  MakeMap(MapParameters());
+  MakeMap(coarse, "coarse");
+  for (const std::string map : {kMapName, "coarse"}) Record(yard_, "robot", way_, Same, map);
+  const std::vector<Pose> fine = PosesOf("robot");
+  const std::vector<Pose> same = PosesOf("robot", "coarse");
+  ASSERT_EQ(fine.size(), same.size());
+  for (std::size_t i = 0; i < fine.size(); ++i) EXPECT_TRUE(fine[i].isApprox(same[i], 0.0)) << i;
+}
+
+// Its underside is as near to an upper storey's scans as its top.
+TEST_F(LinksTest, AnUpperStoreyDoesNotSinkOntoItsUnderside) {
+  const World world = CarParkWorld(0.25);
+  const std::vector<Pose> truth = Drive(world.scene, world.loops[0].waypoints, 2.0, 1.1);
+  MakeMap(MapParameters());
+  Record(world.scene, "loop", truth, Same);
+  const std::vector<Pose> poses = PosesOf("loop");
+  ASSERT_EQ(poses.size(), truth.size());
+  double sum = 0.0;
+  int above = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (truth[i].translation().z() < 4.0) continue;
+    sum += poses[i].translation().z() - truth[i].translation().z();
+    ++above;
+  }
+  ASSERT_GT(above, 30);
+  EXPECT_LT(std::abs(sum / above), 0.03);
+}
 
 }  // namespace
 }  // namespace strata::testing

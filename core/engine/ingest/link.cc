@@ -1,0 +1,119 @@
+#include "core/engine/ingest/link.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+
+#include "core/engine/scans/matching.h"
+#include "core/registration/mls_registration.h"
+#include "core/registration/registration_target.h"
+
+namespace strata {
+namespace {
+
+// Within these of the guess, registration and the robot say the same.
+constexpr double kSameM = 0.3;
+constexpr double kSameRad = 0.05;
+// Scans farther than these from where they were believed are looked for in vain.
+constexpr double kSearchedM = 5.0;
+constexpr double kSearchedHeightM = 1.5;
+constexpr double kSearchedRad = 0.4;
+// What is searched for a place: the nearest few.
+constexpr std::size_t kPlaceScans = 5;
+// Scans of another pass show the same at least to this share.
+constexpr double kLeastAgreement = 0.5;
+
+bool Same(const Pose& a, const Pose& b) {
+  const Pose T_a_b = a.inverse() * b;
+  return T_a_b.translation().norm() <= kSameM && RotationAngleRad(T_a_b) <= kSameRad;
+}
+
+bool Accepted(Termination termination) {
+  return termination == Termination::kConverged || termination == Termination::kMaxIterations ||
+         termination == Termination::kDegenerate;
+}
+
+Link LinkOf(const RegistrationResult& match) {
+  Link link;
+  link.report.aligned = true;
+  link.report.message = std::string(ToString(match.termination));
+  link.report.overlap = match.overlap;
+  link.report.rms_m = match.rms_m;
+  link.report.iterations = static_cast<std::uint32_t>(match.iterations);
+  link.T_map_scan = Normalized(match.T_target_source);
+  link.information = match.information;
+  return link;
+}
+
+RegistrationResult Register(const SeenScan& scan,
+                            std::span<const SeenScan> around,
+                            const Pose& guess) {
+  std::vector<PlacedScan> placed;
+  for (const SeenScan& other : around) placed.push_back({other.features, other.T_target_scan});
+  const RegistrationTarget target(placed, TargetOptions{.centre = guess.translation()});
+  return RegisterScan(*scan.features, target, guess, EngineRegistrationOptions());
+}
+
+// What is near for sure may be seen through more: glass, and people on their way.
+PlaceMatchOptions PlaceOptions(Nearness nearness) {
+  PlaceMatchOptions options;
+  options.registration = EngineRegistrationOptions();
+  if (nearness == Nearness::kSamePass) {
+    options.min_overlap = 0.6;
+    options.max_contradiction = 0.1;
+  }
+  return options;
+}
+
+std::vector<SeenScan> Nearest(std::span<const SeenScan> around, const Pose& place) {
+  std::vector<SeenScan> nearest(around.begin(), around.end());
+  const auto distance = [&](const SeenScan& s) {
+    return (s.T_target_scan.translation() - place.translation()).squaredNorm();
+  };
+  std::stable_sort(nearest.begin(), nearest.end(), [&](const SeenScan& a, const SeenScan& b) {
+    return distance(a) < distance(b);
+  });
+  if (nearest.size() > kPlaceScans) nearest.resize(kPlaceScans);
+  return nearest;
+}
+
+}  // namespace
+
+Link LinkScan(const SeenScan& scan,
+              std::span<const SeenScan> around,
+              const Pose& guess,
+              Nearness nearness) {
+  const RegistrationResult match = Register(scan, around, guess);
+  Link link = LinkOf(match);
+  if (Accepted(match.termination) && Same(match.T_target_source, guess)) return link;
+  const PlaceMatchOptions options = PlaceOptions(nearness);
+  const PlaceHypothesis window{guess, kSearchedM, kSearchedHeightM, kSearchedRad};
+  const PlaceMatch place = MatchPlace(scan, Nearest(around, guess), {&window, 1}, options);
+  if (place.matched()) {
+    const RegistrationResult found = Register(scan, around, place.T_target_source);
+    if (Accepted(found.termination) && Same(found.T_target_source, place.T_target_source)) {
+      return LinkOf(found);
+    }
+  }
+  link.report.aligned = false;
+  link.report.message =
+      absl::StrCat(Accepted(match.termination) ? "too far from what the robot says"
+                                               : ToString(match.termination),
+                   "; as a place: ",
+                   ToString(place.verdict));
+  link.T_map_scan = guess;
+  return link;
+}
+
+Link AgreeingLink(const SeenScan& scan, std::span<const SeenScan> around, const Pose& known) {
+  const RegistrationResult match = Register(scan, around, known);
+  Link link = LinkOf(match);
+  link.report.aligned = Accepted(match.termination) && match.overlap >= kLeastAgreement &&
+                        Same(match.T_target_source, known);
+  return link;
+}
+
+}  // namespace strata
