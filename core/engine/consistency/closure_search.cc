@@ -13,7 +13,6 @@
 #include "core/engine/scans/matching.h"
 #include "core/posegraph/closures/closure_candidates.h"
 #include "core/posegraph/closures/closure_consistency.h"
-#include "core/posegraph/closures/pooling.h"
 #include "core/posegraph/information.h"
 #include "core/posegraph/solver/optimize_pose_graph.h"
 #include "core/registration/place_index.h"
@@ -60,6 +59,7 @@ class Searcher {
       STRATA_RETURN_IF_ERROR(KeepConsistent());
       STRATA_RETURN_IF_ERROR(CloseLoops());
     }
+    search_.matched = matched_.size();
     return std::move(search_);
   }
 
@@ -218,17 +218,12 @@ class Searcher {
       graph.relative.push_back(
           {closure.i, closure.j, closure.T_i_j, closure.information, settings_.robust});
     }
-    if (settings_.pool < 2) {
-      STRATA_ASSIGN_OR_RETURN(PoseGraphSolution solution,
-                              OptimizePoseGraph(graph, {}, context_.stop()));
-      search_.T_map_scan = std::move(solution.T_map_scan);
-      return absl::OkStatus();
-    }
-    const std::vector<Pool> pools =
-        MakePools(world_.Trajectories(), static_cast<std::size_t>(settings_.pool));
-    STRATA_ASSIGN_OR_RETURN(const PoseGraphSolution solution,
-                            OptimizePoseGraph(PoolGraph(graph, pools), {}, context_.stop()));
-    search_.T_map_scan = UnpoolPoses(pools, solution.T_map_scan, world_.Poses());
+    STRATA_ASSIGN_OR_RETURN(PoseGraphSolution solution,
+                            OptimizePoseGraph(graph, {}, context_.stop()));
+    search_.T_map_scan = std::move(solution.T_map_scan);
+    std::erase_if(search_.closures, [this](const FoundClosure& found) {
+      return !ClosureHolds(found.T_i_j, search_.T_map_scan[found.i], search_.T_map_scan[found.j]);
+    });
     return absl::OkStatus();
   }
 

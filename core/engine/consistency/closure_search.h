@@ -24,9 +24,10 @@ struct FoundClosure {
 };
 
 struct ClosureSearch {
-  std::vector<FoundClosure> closures;
-  std::vector<Pose> T_map_scan;  // with the closures closed, where alignment begins
+  std::vector<FoundClosure> closures;  // believed
+  std::vector<Pose> T_map_scan;        // with the closures closed, where alignment begins
   std::size_t tried = 0;
+  std::size_t matched = 0;  // of them, as places; `closures` of these agree with each other and all
 };
 
 // Candidates by the uncertainty of relative poses and by what places look like; each verified by

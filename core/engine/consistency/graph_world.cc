@@ -10,6 +10,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/map/scan_lookup.h"
+#include "core/posegraph/closures/closure_consistency.h"
 #include "core/posegraph/information.h"
 
 namespace strata {
@@ -24,9 +25,21 @@ PlaneKind KindOf(const Eigen::Vector3d& normal) {
   return tilt > M_PI_2 - kStraightRad ? PlaneKind::kWall : PlaneKind::kSloped;
 }
 
-// What repeats from match to match, and so is not in a registration's information.
+// Errors of a match beside what its points' noise leaves, and how the two know each other better
+// the nearer they are: part of the error repeats from match to match, so that chains drift.
 constexpr double kMatchSigmaM = 0.01;
 constexpr double kMatchSigmaRad = 0.001;
+
+// What a match to one of `partners` at once, which share its information, says of the two.
+Matrix6d MatchInformation(const Matrix6d& information, double partners, double way_m) {
+  const DriftOptions drift;
+  const double root = std::sqrt(way_m);
+  return LoosenedInformation(
+             partners * information,
+             IsotropicInformation(std::hypot(kMatchSigmaRad, drift.drift_rad * root),
+                                  std::hypot(kMatchSigmaM, drift.drift_m * root))) /
+         partners;
+}
 
 // Errors of uploaded poses from scan to scan. Nobody says how good they are; they count only where
 // nothing else does.
@@ -122,7 +135,9 @@ AlignmentProblem GraphWorld::Problem(const OptimizeSettings& settings) const {
       if (!suspect) held[std::max(i, j)] = true;
     } else {
       const bool closure = constraint.origin == ConstraintOrigin::kOptimize;
-      ScanPair& pair = problem.pairs.emplace_back(ScanPair{i, j, closure && settings.robust});
+      const bool doubtful =
+          closure && settings.robust && !ClosureHolds(constraint.T_i_j, poses_[i], poses_[j]);
+      ScanPair& pair = problem.pairs.emplace_back(ScanPair{i, j, doubtful});
       if (!closure) pair.measured = MeasuredPose{constraint.T_i_j, constraint.information};
       if (!closure) held[std::max(i, j)] = true;
     }
@@ -159,9 +174,11 @@ MeasuredGraph GraphWorld::Measured(const OptimizeSettings& settings) const {
     if (!term.may_be_false) measured.edges.push_back({term.i, term.j, term.information});
   }
   std::map<std::pair<std::size_t, std::size_t>, const ConstraintRecord*> recorded;
+  std::map<ScanNumber, double> partners;  // that a scan was matched to at once
   for (const ConstraintRecord& record : constraints_) {
     if (record.constraint.is_prior()) continue;
     recorded[{nodes_.at(record.scan_i), nodes_.at(record.scan_j)}] = &record;
+    if (record.constraint.origin == ConstraintOrigin::kIngest) partners[record.scan_j] += 1.0;
   }
   std::map<std::size_t, Matrix6d> information;  // of what was recorded as nodes came in
   for (const ScanPair& pair : problem.pairs) {
@@ -170,8 +187,9 @@ MeasuredGraph GraphWorld::Measured(const OptimizeSettings& settings) const {
     const auto record = recorded.find({pair.i, pair.j});
     if (record != recorded.end()) {
       term.T_i_j = record->second->constraint.T_i_j;
-      term.information = LoosenedInformation(record->second->constraint.information,
-                                             IsotropicInformation(kMatchSigmaRad, kMatchSigmaM));
+      term.information = MatchInformation(record->second->constraint.information,
+                                          std::max(1.0, partners[record->second->scan_j]),
+                                          term.T_i_j.translation().norm());
       if (!term.may_be_false) {
         information.insert({pair.j, Matrix6d::Zero()}).first->second += term.information;
       }

@@ -23,6 +23,7 @@
 #include "core/engine/scans/matching.h"
 #include "core/engine/scans/scan_views.h"
 #include "core/posegraph/alignment/alignment.h"
+#include "core/posegraph/closures/closure_consistency.h"
 
 namespace strata {
 namespace {
@@ -30,9 +31,6 @@ namespace {
 // Shares of the whole job.
 constexpr double kClosuresEnd = 0.3;
 constexpr double kAlignmentEnd = 0.8;
-// A closure that is farther off than these in the end was none.
-constexpr double kSamePlaceM = 0.5;
-constexpr double kSamePlaceRad = 0.05;
 
 // Progress of a part of the job, as the job's own.
 class PartOfJob final : public JobContext {
@@ -87,11 +85,12 @@ class Optimizer {
       closures = std::move(search.closures);
       start = std::move(search.T_map_scan);
       context_.SetMetric("closures_tried", static_cast<double>(search.tried));
+      context_.SetMetric("closures_matched", static_cast<double>(search.matched));
     }
     AlignmentProblem problem = world.Problem(settings_);
     problem.T_map_scan = std::move(start);
     for (const FoundClosure& closure : closures) {
-      problem.pairs.push_back({closure.i, closure.j, settings_.robust});
+      problem.pairs.push_back({closure.i, closure.j});
     }
     STRATA_ASSIGN_OR_RETURN(const AlignmentResult result, Align(problem, views));
     STRATA_RETURN_IF_ERROR(Store(world, result, KeptClosures(world, closures, result)));
@@ -126,10 +125,8 @@ class Optimizer {
                                              const AlignmentResult& result) const {
     std::vector<ConstraintRecord> kept;
     for (const FoundClosure& closure : closures) {
-      const Pose difference = closure.T_i_j.inverse() * result.T_map_scan[closure.i].inverse() *
-                              result.T_map_scan[closure.j];
-      if (difference.translation().norm() > kSamePlaceM ||
-          RotationAngleRad(difference) > kSamePlaceRad) {
+      if (!ClosureHolds(
+              closure.T_i_j, result.T_map_scan[closure.i], result.T_map_scan[closure.j])) {
         continue;
       }
       ConstraintRecord record;

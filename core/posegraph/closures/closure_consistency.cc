@@ -19,6 +19,9 @@
 namespace strata {
 namespace {
 
+constexpr double kHoldsM = 0.5;
+constexpr double kHoldsRad = 0.05;
+
 // Consistency as a graph over the closures of one group.
 class Cliques {
  public:
@@ -212,6 +215,11 @@ absl::Status CheckInput(std::span<const Pose> poses,
 }
 
 }  // namespace
+
+bool ClosureHolds(const Pose& T_i_j, const Pose& T_map_i, const Pose& T_map_j) {
+  const Pose difference = T_i_j.inverse() * T_map_i.inverse() * T_map_j;
+  return difference.translation().norm() <= kHoldsM && RotationAngleRad(difference) <= kHoldsRad;
+}
 
 absl::Status ClosureConsistencyOptions::Validate() const {
   OptionChecks checks("closure consistency options");

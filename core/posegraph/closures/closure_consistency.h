@@ -25,6 +25,10 @@ struct Closure {
   double sigma_rad = 0.01;  // of its rotation's; > 0
 };
 
+// Whether poses agree with a closure: to 0.5 m and 0.05 rad. One that is farther off once a graph
+// is optimised with it was none.
+bool ClosureHolds(const Pose& T_i_j, const Pose& T_map_i, const Pose& T_map_j);
+
 struct ClosureConsistencyOptions {
   DriftOptions drift;
   // Two closures and the graph between their ends make a loop. They are consistent if going round

@@ -126,6 +126,14 @@ TEST(ClosureConsistencyTest, WithinOneTrajectoryTheGraphItselfIsAsked) {
   EXPECT_THAT(set.kept, ElementsAre(1));
 }
 
+TEST(ClosureConsistencyTest, HoldsWherePosesAreNear) {
+  const Pose T_map_i = Step(1.0, 30.0, -4.0, 2.0);
+  const Pose T_i_j = Step(0.5, 3.0, 1.0, 0.0);
+  EXPECT_TRUE(ClosureHolds(T_i_j, T_map_i, T_map_i * T_i_j * Step(0.04, 0.4, 0.0, 0.0)));
+  EXPECT_FALSE(ClosureHolds(T_i_j, T_map_i, T_map_i * T_i_j * Step(0.06, 0.0, 0.0, 0.0)));
+  EXPECT_FALSE(ClosureHolds(T_i_j, T_map_i, T_map_i * T_i_j * Step(0.0, 0.0, 0.4, 0.4)));
+}
+
 TEST(ClosureConsistencyTest, RefusesNonsense) {
   TwoRobots robots(1);
   Closure closure = robots.True(0, 70);
