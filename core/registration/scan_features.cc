@@ -28,10 +28,16 @@ namespace {
 // often in the first.
 constexpr float kColumnSizeM = 0.4F;
 
-// An underside is level: all that is seen above a square metre spreads little in height, unlike
-// leaves, a hillside, or the lines that beams draw on a wall, one above the other.
+// The surface around a point is judged in cubes of this edge [m], and is none where points spread
+// more about it [m].
+constexpr float kFacingCubeM = 1.0F;
 constexpr double kMaxSpreadM = 0.05;
-constexpr int kMinLevelPoints = 3;
+constexpr int kMinSurfacePoints = 4;
+// Of the normal to the vertical, as a cosine: what is level, and what leans too much to be.
+constexpr double kLevel = 0.9;
+// A ceiling shows in layers of this height [m] with as many points as this.
+constexpr float kCeilingLayerM = 0.25F;
+constexpr int kMinCeilingPoints = 50;
 
 using ClassPoints = std::array<std::vector<Eigen::Vector3f>, kFeatureClasses>;
 
@@ -54,40 +60,86 @@ void AppendPatch(
   }
 }
 
-// Mean and variance of heights, as they come.
-struct Spread {
+// Moments of points, from the first of them.
+struct Moments {
   int n = 0;
-  double sum = 0.0;
-  double squares = 0.0;
+  Eigen::Vector3d first = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
 
-  void Add(double z) {
-    ++n;
-    sum += z;
-    squares += z * z;
-  }
-  bool IsLevel() const {
-    const double mean = sum / n;
-    return n >= kMinLevelPoints && squares / n - mean * mean < kMaxSpreadM * kMaxSpreadM;
+  void Add(const Eigen::Vector3d& p) {
+    if (n++ == 0) first = p;
+    sum += p - first;
+    squares += (p - first) * (p - first).transpose();
   }
 };
 
-// Moves the undersides of decks and ceilings out of the traversable class.
+enum class Side { kTop, kUnderside, kUnknown };
+
+// Which side of what its points span was seen from `origin`. What spans no surface, or one that is
+// not level, is taken for a top: leaves, a hillside, the lines that beams draw on a wall.
+Side SideOf(const Moments& m, const Eigen::Vector3d& origin) {
+  if (m.n < kMinSurfacePoints) return Side::kUnknown;
+  const Eigen::Vector3d mean = m.sum / m.n;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(m.squares / m.n - mean * mean.transpose());
+  const Eigen::Vector3d variances = eigen.eigenvalues();
+  if (variances[0] > kMaxSpreadM * kMaxSpreadM) return Side::kTop;
+  if (variances[1] < kMaxSpreadM * kMaxSpreadM) return Side::kUnknown;  // a line
+  Eigen::Vector3d normal = eigen.eigenvectors().col(0);
+  if (normal.dot(origin - m.first - mean) < 0.0) normal = -normal;
+  return normal.z() < -kLevel ? Side::kUnderside : Side::kTop;
+}
+
+// Heights at which a scan shows undersides.
+class Ceilings {
+ public:
+  void Add(float z) { ++counts_[LayerOf(z)]; }
+  bool MayBeAt(float z) const {
+    const int layer = LayerOf(z);
+    return IsAt(layer - 1) || IsAt(layer) || IsAt(layer + 1);
+  }
+
+ private:
+  static int LayerOf(float z) { return static_cast<int>(std::floor(z / kCeilingLayerM)); }
+  bool IsAt(int layer) const {
+    const auto found = counts_.find(layer);
+    return found != counts_.end() && found->second >= kMinCeilingPoints;
+  }
+  HashMap<int, int> counts_;
+};
+
+// Moves the undersides of decks and ceilings out of the traversable class. What may be of either
+// side and is as high as a ceiling is left out: taken for a top it pulls a storey down onto it.
 void SeparateUndersides(const Eigen::Vector3f& sensor_origin, ClassPoints& points) {
-  using Column = std::array<int, 2>;
-  const auto column_of = [](const Eigen::Vector3f& p) {
-    return Column{static_cast<int>(std::floor(p.x())), static_cast<int>(std::floor(p.y()))};
+  using Cube = std::array<int, 3>;
+  const auto cube_of = [](const Eigen::Vector3f& p) {
+    const Eigen::Vector3f at = (p / kFacingCubeM).array().floor();
+    return Cube{static_cast<int>(at.x()), static_cast<int>(at.y()), static_cast<int>(at.z())};
   };
   std::vector<Eigen::Vector3f>& horizontal = ListOf(FeatureClass::kTraversable, points);
   const auto above =
       std::stable_partition(horizontal.begin(), horizontal.end(), [&](const Eigen::Vector3f& p) {
-        return !SeenFromBelow(p, sensor_origin);
+        return p.z() <= sensor_origin.z();
       });
-  HashMap<Column, Spread> spreads;
-  std::for_each(above, horizontal.end(), [&](const auto& p) { spreads[column_of(p)].Add(p.z()); });
-  const auto undersides = std::stable_partition(
-      above, horizontal.end(), [&](const auto& p) { return !spreads[column_of(p)].IsLevel(); });
+  HashMap<Cube, Moments> cubes;
+  std::for_each(above, horizontal.end(), [&](const auto& p) {
+    cubes[cube_of(p)].Add(p.template cast<double>());
+  });
+  HashMap<Cube, Side> sides;
+  for (const auto& [cube, moments] : cubes) {
+    sides[cube] = SideOf(moments, sensor_origin.cast<double>());
+  }
+  Ceilings ceilings;
+  const auto undersides = std::stable_partition(above, horizontal.end(), [&](const auto& p) {
+    return sides[cube_of(p)] != Side::kUnderside;
+  });
+  std::for_each(undersides, horizontal.end(), [&](const auto& p) { ceilings.Add(p.z()); });
   ListOf(FeatureClass::kNonTraversable, points).assign(undersides, horizontal.end());
-  horizontal.erase(undersides, horizontal.end());
+  const auto doubtful = std::stable_partition(above, undersides, [&](const auto& p) {
+    return sides[cube_of(p)] == Side::kTop || !ceilings.MayBeAt(p.z());
+  });
+  horizontal.erase(doubtful, horizontal.end());
 }
 
 std::uint64_t ContentHash(const ClassPoints& points) {

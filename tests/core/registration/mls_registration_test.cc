@@ -182,6 +182,26 @@ TEST(ScanFeaturesTest, WhatWasSeenFromBelowIsNotWhatWasSeenFromAbove) {
   EXPECT_THAT(above.points(FeatureClass::kNonTraversable), IsEmpty());
 }
 
+TEST(ScanFeaturesTest, WhatMayBePartOfACeilingIsNoGround) {
+  PointCloud cloud = YardWithDeck(Step(0, 0, 0, 1, 0, 1), 1, 3.0);
+  const std::size_t whole = cloud.size();
+  for (int i = 0; i < 40; ++i) {  // single points of the same deck, far off, and twigs above it
+    cloud.points.emplace_back(
+        20.0F + 2.0F * static_cast<float>(i % 8), 2.0F * static_cast<float>(i / 8), 2.0F);
+    cloud.points.emplace_back(
+        20.0F + 2.0F * static_cast<float>(i % 8), 2.0F * static_cast<float>(i / 8), 4.0F);
+  }
+  ASSERT_GT(cloud.size(), whole);
+  const ScanFeatures features = Features(cloud);
+  const auto at = [&](float z) {
+    return std::ranges::count_if(
+        features.points(FeatureClass::kTraversable),
+        [z](const Eigen::Vector3f& p) { return p.x() > 15.0F && std::abs(p.z() - z) < 0.1F; });
+  };
+  EXPECT_EQ(at(2.0F), 0);
+  EXPECT_EQ(at(4.0F), 40);
+}
+
 TEST(ScanFeaturesTest, AHillsideIsSeenFromAbove) {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> wide(-15.0, 15.0);
