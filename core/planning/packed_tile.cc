@@ -1,5 +1,6 @@
 #include "core/planning/packed_tile.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -21,6 +22,7 @@
 #include "core/common/status.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/ground/ground_window.h"
+#include "core/planning/least_dangers.h"
 #include "core/planning/move_cost.h"
 #include "core/planning/patch_index.h"
 #include "core/planning/prepared_tile.h"
@@ -28,9 +30,11 @@
 namespace strata {
 namespace {
 
-constexpr std::uint32_t kFormat = 1;
+constexpr std::uint32_t kFormat = 2;
 constexpr int kLevel = 1;  // of zstd: 3 saves another twentieth and takes twice the time
-constexpr std::size_t kHeaderBytes = 16;  // format, size of the columns, size of cells
+// Format, size of the columns, size of cells, packed size of the first columns.
+constexpr std::size_t kHeaderBytes = 20;
+constexpr std::uint64_t kFirstColumnBytes = 20 + 2 * PatchIndex::kBlocks;
 constexpr std::size_t kChecksumBytes = 8;
 // No tile that fits a map has as much.
 constexpr std::uint64_t kMaxColumnBytes = std::uint64_t{1} << 28;
@@ -178,22 +182,12 @@ bool TakeHeights(ColumnReader& columns, PreparedTile& tile) {
           tile.exact_heights.size() == tile.standing.size() + tile.other.size());
 }
 
-// True if the cells around, of the same block, all have patches.
-bool HasAllAround(const PatchIndex& index, std::uint32_t place) {
-  constexpr std::uint64_t kAround = 0x070507;  // of place 9
-  const std::uint32_t x = place % 8;
-  const std::uint32_t y = place % 64 / 8;
-  if (x == 0 || y == 0 || x == 7 || y == 7) return false;
-  const std::uint64_t around = kAround << (place % 64 - 9);
-  return (index.sheets()[place / 64] & around) == around;
-}
-
 // Searches look for targets without looking where the tile ends.
 bool MovesLeadSomewhere(const PreparedTile& tile) {
   bool all = true;
   tile.standing.ForEach([&](std::uint32_t place, std::uint32_t number) {
     const std::uint16_t cell = tile.standing.CellOf(place);
-    if (HasAllAround(tile.standing, tile.standing.OnFirstSheet(place))) return;
+    if (tile.standing.HasAllAround(place)) return;
     for (unsigned k = 0; k < 8; ++k) {
       if ((tile.patches[number].moves >> k & 1U) == 0) continue;
       int x = cell & (kTileCells - 1);
@@ -234,14 +228,10 @@ absl::StatusOr<std::string> Decompressed(absl::string_view packed, std::uint64_t
   return columns;
 }
 
-absl::StatusOr<PreparedTile> TileOfColumns(absl::string_view raw) {
+absl::StatusOr<PreparedTile> TileOfColumns(const TileKey& key, absl::string_view raw) {
   ColumnReader columns(raw);
   PreparedTile tile;
-  const auto key = columns.Take<std::uint32_t>();
-  if (key.size() != 3) return Damaged("no key");
-  tile.key = {std::bit_cast<std::int32_t>(key[0]),
-              std::bit_cast<std::int32_t>(key[1]),
-              std::bit_cast<std::int32_t>(key[2])};
+  tile.key = key;
   if (!TakeIndex(columns, &tile.standing) || !TakeIndex(columns, &tile.other)) {
     return Damaged("sheets that contradict each other");
   }
@@ -268,13 +258,66 @@ absl::StatusOr<PreparedTile> TileOfColumns(absl::string_view raw) {
   return tile;
 }
 
+// Apart from the others, as most who ask for them need nothing else.
+std::string FirstColumns(const TileKey& key, const LeastDangers& least) {
+  ColumnWriter columns;
+  columns.Put(std::vector<std::uint32_t>{static_cast<std::uint32_t>(key.level),
+                                         static_cast<std::uint32_t>(key.x),
+                                         static_cast<std::uint32_t>(key.y)});
+  columns.Put(std::vector<std::uint16_t>(least.begin(), least.end()));
+  return columns.bytes();
+}
+
+absl::StatusOr<PackedLeastDangers> FirstOfColumns(absl::string_view raw) {
+  ColumnReader columns(raw);
+  const auto key = columns.Take<std::uint32_t>();
+  const auto least = columns.Take<std::uint16_t>();
+  PackedLeastDangers first;
+  if (!columns.Finished() || key.size() != 3 || least.size() != first.least.size()) {
+    return Damaged("no key or no dangers");
+  }
+  first.key = {std::bit_cast<std::int32_t>(key[0]),
+               std::bit_cast<std::int32_t>(key[1]),
+               std::bit_cast<std::int32_t>(key[2])};
+  std::copy(least.begin(), least.end(), first.least.begin());
+  return first;
+}
+
+std::string Compressed(absl::string_view raw) {
+  std::string packed(ZSTD_compressBound(raw.size()), '\0');
+  packed.resize(ZSTD_compress(packed.data(), packed.size(), raw.data(), raw.size(), kLevel));
+  return packed;
+}
+
+// What was packed, between header and checksum.
+absl::StatusOr<absl::string_view> IntactBody(absl::string_view packed, double cell_size_m) {
+  if (packed.size() < kHeaderBytes + kChecksumBytes) return Damaged("cut short");
+  const absl::string_view body = packed.substr(0, packed.size() - kChecksumBytes);
+  if (Checksum64(body) != NumberAt(packed, body.size(), 8)) return Damaged("wrong checksum");
+  if (const std::uint64_t format = NumberAt(body, 0, 4); format != kFormat) {
+    return Damaged(absl::StrCat("format ", format, " is not ", kFormat));
+  }
+  if (NumberAt(body, 8, 8) != std::bit_cast<std::uint64_t>(cell_size_m)) {
+    return Damaged(absl::StrCat("not of cells of ", cell_size_m, " m"));
+  }
+  if (NumberAt(body, 16, 4) > body.size() - kHeaderBytes) return Damaged("cut short");
+  return body.substr(kHeaderBytes);
+}
+
+absl::StatusOr<PackedLeastDangers> FirstOfBody(absl::string_view body, std::uint64_t size) {
+  STRATA_ASSIGN_OR_RETURN(const std::string raw,
+                          Decompressed(body.substr(0, size), kFirstColumnBytes));
+  return FirstOfColumns(raw);
+}
+
 }  // namespace
 
 std::string PackTile(const PreparedTile& tile, double cell_size_m) {
+  return PackTile(tile, LeastDangersOf(tile), cell_size_m);
+}
+
+std::string PackTile(const PreparedTile& tile, const LeastDangers& least, double cell_size_m) {
   ColumnWriter columns;
-  columns.Put(std::vector<std::uint32_t>{static_cast<std::uint32_t>(tile.key.level),
-                                         static_cast<std::uint32_t>(tile.key.x),
-                                         static_cast<std::uint32_t>(tile.key.y)});
   PutIndex(columns, tile.standing);
   PutIndex(columns, tile.other);
   columns.Put(ColumnOf(tile.patches, &PreparedPatch::moves));
@@ -291,34 +334,34 @@ std::string PackTile(const PreparedTile& tile, double cell_size_m) {
   columns.Put(ColumnOf(tile.far_moves, &FarMove::cells));
   columns.Put(ColumnOf(tile.far_moves, &FarMove::cost));
 
-  const std::string& raw = columns.bytes();
+  const std::string first = Compressed(FirstColumns(tile.key, least));
   std::string packed;
   PutNumber(packed, kFormat, 4);
-  PutNumber(packed, raw.size(), 4);
+  PutNumber(packed, columns.bytes().size(), 4);
   PutNumber(packed, std::bit_cast<std::uint64_t>(cell_size_m), 8);
-  packed.resize(kHeaderBytes + ZSTD_compressBound(raw.size()));
-  const std::size_t used = ZSTD_compress(
-      packed.data() + kHeaderBytes, packed.size() - kHeaderBytes, raw.data(), raw.size(), kLevel);
-  packed.resize(kHeaderBytes + used);
+  PutNumber(packed, first.size(), 4);
+  absl::StrAppend(&packed, first, Compressed(columns.bytes()));
   PutNumber(packed, Checksum64(packed), kChecksumBytes);
   packed.shrink_to_fit();
   return packed;
 }
 
+absl::StatusOr<PackedLeastDangers> UnpackLeastDangers(absl::string_view packed,
+                                                      double cell_size_m) {
+  STRATA_ASSIGN_OR_RETURN(const absl::string_view body, IntactBody(packed, cell_size_m));
+  return FirstOfBody(body, NumberAt(packed, 16, 4));
+}
+
 absl::StatusOr<PreparedTile> UnpackTile(absl::string_view packed, double cell_size_m) {
-  if (packed.size() < kHeaderBytes + kChecksumBytes) return Damaged("cut short");
-  const absl::string_view body = packed.substr(0, packed.size() - kChecksumBytes);
-  if (Checksum64(body) != NumberAt(packed, body.size(), 8)) return Damaged("wrong checksum");
-  if (const std::uint64_t format = NumberAt(body, 0, 4); format != kFormat) {
-    return Damaged(absl::StrCat("format ", format, " is not ", kFormat));
-  }
-  if (NumberAt(body, 8, 8) != std::bit_cast<std::uint64_t>(cell_size_m)) {
-    return Damaged(absl::StrCat("not of cells of ", cell_size_m, " m"));
-  }
-  const std::uint64_t size = NumberAt(body, 4, 4);
+  STRATA_ASSIGN_OR_RETURN(const absl::string_view body, IntactBody(packed, cell_size_m));
+  const std::uint64_t size = NumberAt(packed, 4, 4);
   if (size > kMaxColumnBytes) return Damaged(absl::StrCat(size, " bytes of columns"));
-  STRATA_ASSIGN_OR_RETURN(const std::string raw, Decompressed(body.substr(kHeaderBytes), size));
-  return TileOfColumns(raw);
+  const std::uint64_t first_size = NumberAt(packed, 16, 4);
+  STRATA_ASSIGN_OR_RETURN(const PackedLeastDangers first, FirstOfBody(body, first_size));
+  STRATA_ASSIGN_OR_RETURN(const std::string raw, Decompressed(body.substr(first_size), size));
+  STRATA_ASSIGN_OR_RETURN(PreparedTile tile, TileOfColumns(first.key, raw));
+  if (LeastDangersOf(tile) != first.least) return Damaged("dangers of other patches");
+  return tile;
 }
 
 }  // namespace strata

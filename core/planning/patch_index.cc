@@ -86,6 +86,15 @@ std::uint32_t PatchIndex::Place(std::uint16_t cell, std::uint32_t level) const {
   return Has(place) ? place : kNone;
 }
 
+bool PatchIndex::HasAllAround(std::uint32_t place) const {
+  constexpr std::uint64_t kAround = 0x070507;  // of place 9
+  const std::uint32_t x = place % 8;
+  const std::uint32_t y = place % 64 / 8;
+  if (x == 0 || y == 0 || x == 7 || y == 7) return false;
+  const std::uint64_t around = kAround << (place % 64 - 9);
+  return (sheets_[OnFirstSheet(place) / 64] & around) == around;
+}
+
 std::uint32_t PatchIndex::LevelOf(std::uint32_t place) const {
   if (place < kBlocks * 64) return 0;
   const std::uint32_t upper = place / 64 - kBlocks;

@@ -60,6 +60,9 @@ class PatchIndex {
   // The patch of a cell on the sheet `level`; kNone if there is none.
   std::uint32_t Place(std::uint16_t cell, std::uint32_t level) const;
   std::uint32_t LevelOf(std::uint32_t place) const;
+  // True if the cells around a place, of the same block, all have patches; false for those of a
+  // block's rim.
+  bool HasAllAround(std::uint32_t place) const;
   // Numbers of a block's patches are [FirstOf(block), FirstOf(block + 1)).
   std::uint32_t FirstOf(std::uint32_t block) const {
     return block < kBlocks ? first_[block] : size_;

@@ -21,7 +21,7 @@ using TileVersions = std::array<std::uint64_t, 9>;
 
 // The form of prepared tiles and of their packing. Whoever changes either raises it: what a
 // map's file keeps of an earlier one is prepared again.
-inline constexpr std::uint32_t kPreparationForm = 1;
+inline constexpr std::uint32_t kPreparationForm = 2;
 
 // One consistent state (epoch) of a map's level-0 tiles; a query keeps to one source. A planner
 // calls it from the thread of the query only.

@@ -22,6 +22,7 @@
 #include "core/mls/tile_key.h"
 #include "core/planning/ground/ground_window.h"
 #include "core/planning/ground/profile_checks.h"
+#include "core/planning/least_dangers.h"
 #include "core/planning/move_cost.h"
 #include "core/planning/packed_tile.h"
 #include "core/planning/patch_index.h"
@@ -252,6 +253,26 @@ TEST(PackedTileTest, DamagedBytesAreRefused) {
   }
 }
 
+TEST(PackedTileTest, LeastDangersAreHadByThemselvesAndCheckedAgainstThePatches) {
+  for (const PreparedTile& tile : ManyTiles(kHeights[0])) {
+    const std::string packed = PackTile(tile, kCell);
+    STRATA_ASSERT_OK_AND_ASSIGN(const PackedLeastDangers first, UnpackLeastDangers(packed, kCell));
+    EXPECT_EQ(first.key, tile.key);
+    EXPECT_EQ(first.least, LeastDangersOf(tile));
+    LeastDangers wrong = first.least;
+    wrong[tile.key.x & 1023] ^= 1;
+    EXPECT_THAT(UnpackTile(PackTile(tile, wrong, kCell), kCell),
+                testing::StatusIs(absl::StatusCode::kDataLoss, ::testing::HasSubstr("dangers")));
+    std::string damaged = packed;
+    damaged[24] ^= 1;
+    EXPECT_THAT(UnpackLeastDangers(damaged, kCell),
+                testing::StatusIs(absl::StatusCode::kDataLoss, ::testing::_));
+    Seal(&damaged);
+    EXPECT_FALSE(UnpackLeastDangers(damaged, kCell).value_or(first).least != first.least &&
+                 UnpackTile(damaged, kCell).ok());
+  }
+}
+
 // What a hand has changed and sealed is refused, or can be searched.
 TEST(PackedTileTest, WhateverUnpacksCanBeSearched) {
   std::mt19937_64 random(7);
@@ -284,8 +305,8 @@ TEST(PackedTileTest, WhateverUnpacksCanBeSearched) {
           changed.patches[any(changed.patches.size())].danger ^= 0xFF00;
           break;
       }
-      std::string packed = PackTile(changed, kCell);
-      if (any(2) == 0) packed[16 + any(packed.size() - 24)] ^= static_cast<char>(1 << any(8));
+      std::string packed = PackTile(changed, LeastDangersOf(tile), kCell);
+      if (any(2) == 0) packed[20 + any(packed.size() - 28)] ^= static_cast<char>(1 << any(8));
       Seal(&packed);
       const absl::StatusOr<PreparedTile> unpacked = UnpackTile(packed, kCell);
       if (!unpacked.ok()) {
