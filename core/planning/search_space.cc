@@ -14,6 +14,7 @@
 #include "core/common/status.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/ground/ground_window.h"
+#include "core/planning/least_dangers.h"
 #include "core/planning/patch_index.h"
 #include "core/planning/prepared_tile.h"
 
@@ -62,6 +63,11 @@ bool SearchSpace::HasRoomFor(const PreparedTile& tile) const {
 absl::StatusOr<std::shared_ptr<const PreparedTile>> SearchSpace::Fetch(const TileKey& key) {
   STRATA_RETURN_IF_ERROR(stop_.status());
   return cache_.Get(source_, key, checks_);
+}
+
+absl::StatusOr<std::shared_ptr<const LeastDangers>> SearchSpace::KeptDangers(const TileKey& key) {
+  STRATA_RETURN_IF_ERROR(stop_.status());
+  return cache_.KeptDangers(source_, key, checks_);
 }
 
 const SearchSpace::Slot& SearchSpace::At(int slot) {

@@ -18,6 +18,7 @@
 #include "core/mls/tile_key.h"
 #include "core/planning/class_factors.h"
 #include "core/planning/ground/profile_checks.h"
+#include "core/planning/least_dangers.h"
 #include "core/planning/move_cost.h"
 #include "core/planning/prepared_tile.h"
 #include "core/planning/tile_cache.h"
@@ -67,6 +68,9 @@ class SearchSpace {
   // With its tile; of a tile that cannot be had again, one nobody can stand on. Until another slot
   // is asked for: whoever needs the tile longer keeps `tile`.
   const Slot& At(int slot);
+  // As TileCache has them.
+  absl::StatusOr<std::shared_ptr<const LeastDangers>> KeptDangers(const TileKey& key);
+  bool IsKept(const TileKey& key) { return cache_.IsKept(source_, key, checks_); }
   PatchId end() const { return static_cast<PatchId>(page_slot_.size()) << kPageShift; }
 
   // Number of the slot of a tile, prepared now if need be; -1 where the map has nothing.

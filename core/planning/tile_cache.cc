@@ -14,6 +14,7 @@
 #include "core/common/status.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/ground/ground_window.h"
+#include "core/planning/least_dangers.h"
 #include "core/planning/packed_tile.h"
 #include "core/planning/prepared_tile.h"
 #include "core/planning/tile_source.h"
@@ -70,14 +71,18 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> PrepareFrom(TileSource& sour
       PrepareTile(*tiles[kMiddleTile], window, checks, loop));
 }
 
+TileCache::Key TileCache::KeyOf(const TileKey& key, const ProfileChecks& checks) {
+  const RobotProfile& p = checks.profile;
+  return {key,
+          {p.radius_m, p.height_m, p.max_step_m, p.max_slope_rad, p.max_gap_m, p.max_roughness_m}};
+}
+
 absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Get(TileSource& source,
                                                                    const TileKey& key,
                                                                    const ProfileChecks& checks) {
   const TileVersions versions = VersionsAround(source, key);
   if (versions[kMiddleTile] == 0) return nullptr;
-  const RobotProfile& p = checks.profile;
-  const Key cache_key = {
-      key, {p.radius_m, p.height_m, p.max_step_m, p.max_slope_rad, p.max_gap_m, p.max_roughness_m}};
+  const Key cache_key = KeyOf(key, checks);
   const std::shared_ptr<Entry> entry = FindOrInsert(cache_key, versions);
   absl::MutexLock lock(&entry->mutex);
   if (entry->tile == nullptr) {
@@ -118,6 +123,44 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Make(TileSource& 
   absl::MutexLock lock(&mutex_);
   ++statistics_.prepared;
   return tile;
+}
+
+std::shared_ptr<const LeastDangers> TileCache::FindDangers(TileSource& source,
+                                                           const TileKey& key,
+                                                           const TileVersions& versions,
+                                                           const ProfileChecks& checks) {
+  const Key cache_key = KeyOf(key, checks);
+  std::shared_ptr<const Dangers> dangers = dangers_.Find(cache_key);
+  if (dangers == nullptr || dangers->versions != versions) {
+    const absl::StatusOr<std::optional<std::string>> kept =
+        source.LoadPrepared(key, versions, checks.profile);
+    if (!kept.ok() || !kept->has_value()) return nullptr;
+    const auto unpacked = UnpackLeastDangers(**kept, checks.cell_size_m);
+    if (!unpacked.ok() || unpacked->key != key) return nullptr;
+    dangers = std::make_shared<const Dangers>(Dangers{versions, unpacked->least});
+    dangers_.Put(cache_key, dangers, sizeof(Dangers));
+  }
+  return {dangers, &dangers->least};
+}
+
+std::shared_ptr<const LeastDangers> TileCache::KeptDangers(TileSource& source,
+                                                           const TileKey& key,
+                                                           const ProfileChecks& checks) {
+  static const auto closed = [] {
+    LeastDangers all;
+    all.fill(kClosedBlock);
+    return std::make_shared<const LeastDangers>(all);
+  }();
+  static const auto open = std::make_shared<const LeastDangers>();
+  const TileVersions versions = VersionsAround(source, key);
+  if (versions[kMiddleTile] == 0) return closed;
+  std::shared_ptr<const LeastDangers> kept = FindDangers(source, key, versions, checks);
+  return kept != nullptr ? kept : open;
+}
+
+bool TileCache::IsKept(TileSource& source, const TileKey& key, const ProfileChecks& checks) {
+  const TileVersions versions = VersionsAround(source, key);
+  return versions[kMiddleTile] != 0 && FindDangers(source, key, versions, checks) != nullptr;
 }
 
 std::shared_ptr<TileCache::Entry> TileCache::FindOrInsert(const Key& key,

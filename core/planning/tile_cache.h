@@ -17,6 +17,7 @@
 #include "core/planning/ground/ground_window.h"
 #include "core/planning/ground/profile_checks.h"
 #include "core/planning/ground/rows.h"
+#include "core/planning/least_dangers.h"
 #include "core/planning/prepared_tile.h"
 #include "core/planning/tile_source.h"
 
@@ -49,7 +50,10 @@ class TileCache {
   };
 
   explicit TileCache(const std::shared_ptr<CacheBudget>& budget, ParallelLoop loop = {})
-      : max_bytes_(budget->max_bytes()), loop_(std::move(loop)), entries_(budget) {}
+      : max_bytes_(budget->max_bytes()),
+        loop_(std::move(loop)),
+        entries_(budget),
+        dangers_(budget) {}
 
   // The size of the budget.
   std::size_t max_bytes() const { return max_bytes_; }
@@ -59,6 +63,12 @@ class TileCache {
   absl::StatusOr<std::shared_ptr<const PreparedTile>> Get(TileSource& source,
                                                           const TileKey& key,
                                                           const ProfileChecks& checks);
+  // Of a tile that the source keeps prepared; of any other, whatever the cache holds, that all of
+  // it is without danger, and where the map has nothing, that all is closed.
+  std::shared_ptr<const LeastDangers> KeptDangers(TileSource& source,
+                                                  const TileKey& key,
+                                                  const ProfileChecks& checks);
+  bool IsKept(TileSource& source, const TileKey& key, const ProfileChecks& checks);
   Statistics statistics() const;
 
  private:
@@ -80,6 +90,17 @@ class TileCache {
     std::shared_ptr<const PreparedTile> tile ABSL_GUARDED_BY(mutex);
   };
 
+  struct Dangers {
+    TileVersions versions;
+    LeastDangers least;
+  };
+
+  static Key KeyOf(const TileKey& key, const ProfileChecks& checks);
+  // nullptr if the source does not keep the tile.
+  std::shared_ptr<const LeastDangers> FindDangers(TileSource& source,
+                                                  const TileKey& key,
+                                                  const TileVersions& versions,
+                                                  const ProfileChecks& checks);
   std::shared_ptr<Entry> FindOrInsert(const Key& key, const TileVersions& versions);
   // From what the source keeps of it; nullptr where that is nothing.
   std::shared_ptr<const PreparedTile> Unpack(TileSource& source,
@@ -98,6 +119,7 @@ class TileCache {
   const ParallelLoop loop_;
   mutable absl::Mutex mutex_;
   LruCache<Key, Entry> entries_ ABSL_GUARDED_BY(mutex_);
+  LruCache<Key, const Dangers> dangers_;
   Statistics statistics_ ABSL_GUARDED_BY(mutex_);
   int preparing_ ABSL_GUARDED_BY(mutex_) = 0;
 };
