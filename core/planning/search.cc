@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include "core/common/stop.h"
 #include "core/mls/tile_key.h"
 #include "core/planning/bucket_queue.h"
+#include "core/planning/corridor.h"
 #include "core/planning/ground/ground_window.h"
 #include "core/planning/landmarks.h"
 #include "core/planning/move_cost.h"
@@ -38,6 +40,8 @@ constexpr std::uint32_t kMaxCost = 0xF0000000U;
 // to come back again would cost more.
 constexpr std::uint32_t kPatience = 32 * kCostPerCell;
 constexpr std::uint32_t kLargeSlack = 100;  // large searches may cost 1/100 more than the cheapest
+// How many times as long as the straight way one may be that a corridor is looked for.
+constexpr std::uint32_t kMostDetour = 4;
 // What is queued is looked through once it is more: most of it waits for a turn at which its patch
 // has been expanded long before.
 constexpr std::size_t kMostQueued = std::size_t{1} << 20;
@@ -55,11 +59,15 @@ class Search {
         bound_(bound),
         stop_(stop) {}
 
-  // Expands until `goal` (kNoPatchId: nothing) is settled or nothing is left.
-  absl::StatusOr<SearchOutcome> Run(PatchId start, PatchId goal, std::uint64_t max_expanded) {
-    STRATA_RETURN_IF_ERROR(workspace_.Begin(kBucketShift, stop_));
+  // Expands until `goal` (kNoPatchId: nothing) is settled or nothing is left of what may lie on a
+  // path that costs less than `below`. The workspace has begun.
+  absl::StatusOr<SearchOutcome> Run(PatchId start,
+                                    PatchId goal,
+                                    std::uint64_t max_expanded,
+                                    std::uint32_t below = kMaxCost) {
     start_ = start;
     goal_ = goal;
+    goal_cost_ = below;
     max_expanded_ = max_expanded;
     const int slot = space_.SlotOf(start);
     STRATA_RETURN_IF_ERROR(TakeIn(space_.slots()[slot].key));
@@ -71,7 +79,7 @@ class Search {
     }
     if (outcome_.end != SearchOutcome::End::kExhausted) return outcome_;
     outcome_.dearest = dearest_;
-    if (goal_cost_ != kMaxCost) {
+    if (goal_cost_ < below) {
       outcome_.end = SearchOutcome::End::kFound;
       STRATA_RETURN_IF_ERROR(Backtrack());
     } else if (workspace_.budget() != nullptr) {
@@ -156,11 +164,12 @@ class Search {
   absl::Status SearchAgain(ParkedTile& parked) {
     std::vector<std::pair<std::uint32_t, std::uint32_t>> order;  // total, place
     const auto take = [&](const TileEntry& entry, std::uint32_t cost, std::uint32_t place) {
-      if (cost >= costs_[place]) return;
+      const std::uint32_t remaining = Remaining(place);
+      if (cost >= costs_[place] || remaining == kNoUse) return;
       costs_[place] = cost;
       states_[place] = entry.direction;
       if (base_ + place == goal_) goal_cost_ = std::min(goal_cost_, cost);
-      order.emplace_back(cost + Remaining(place), place);
+      order.emplace_back(cost + remaining, place);
     };
     for (const TileEntry& entry : parked.known) {
       const std::uint32_t place = index_->Place(entry.cell, entry.level);
@@ -261,7 +270,9 @@ class Search {
       cost = entry.cost + MoveBetween(entry.class_id, known->class_id, entry.move);
       if (cost >= known->cost) return false;
     }
-    *total = cost + Weighted(bound_.Outside(cell));
+    const std::uint32_t remaining = bound_.Outside(cell);
+    if (remaining == kNoUse) return false;
+    *total = cost + Weighted(remaining);
     return *total < goal_cost_ && *total < kMaxCost;
   }
 
@@ -284,10 +295,12 @@ class Search {
   // Offers a way to a patch of the slot entered.
   void Relax(std::uint32_t place, std::uint32_t cost, int direction) {
     if (cost >= costs_[place]) return;
+    const std::uint32_t remaining = Remaining(place);
+    if (remaining == kNoUse) return;
     costs_[place] = cost;
     states_[place] = static_cast<std::uint8_t>(direction);
     if (base_ + place == goal_) goal_cost_ = std::min(goal_cost_, cost);
-    Enqueue(cost + Remaining(place), place);
+    Enqueue(cost + remaining, place);
   }
 
   void Enqueue(std::uint32_t total, std::uint32_t place) {
@@ -310,10 +323,12 @@ class Search {
     const std::uint16_t cell = index_->CellOf(place);
     const CellIndex at = {x0_ + (cell & (kTileCells - 1)), y0_ + (cell >> kTileShift)};
     const std::uint32_t bound = bound_(at.x, at.y, Bound::kByNumber ? index_->Number(place) : 0);
-    return large_ ? Weighted(bound) : bound;
+    return large_ && bound != kNoUse ? Weighted(bound) : bound;
   }
   // What is left out for g + 1.01 h ≥ goal lies on no path of less than goal / 1.01.
-  static std::uint32_t Weighted(std::uint32_t bound) { return bound + bound / kLargeSlack; }
+  static std::uint32_t Weighted(std::uint32_t bound) {
+    return Bound::kMayWeigh ? bound + bound / kLargeSlack : bound;
+  }
 
   // False if the patch was expanded before.
   bool Expand(PatchId patch) {
@@ -479,11 +494,81 @@ absl::StatusOr<SearchOutcome> RunSearch(SearchSpace& space,
                                         PatchId start,
                                         PatchId goal,
                                         std::uint64_t max_expanded,
-                                        const Stop& stop) {
+                                        const Stop& stop,
+                                        std::uint32_t below = kMaxCost) {
   if (space.classes().plain()) {
-    return Search<Bound, false>(space, workspace, bound, stop).Run(start, goal, max_expanded);
+    return Search<Bound, false>(space, workspace, bound, stop)
+        .Run(start, goal, max_expanded, below);
   }
-  return Search<Bound, true>(space, workspace, bound, stop).Run(start, goal, max_expanded);
+  return Search<Bound, true>(space, workspace, bound, stop).Run(start, goal, max_expanded, below);
+}
+
+// A path, or none, that costs at most 1 % more than the cheapest: that of a corridor, unless
+// another one is cheaper by more. kFull where that cannot be told.
+absl::StatusOr<SearchOutcome> FindBelow(SearchSpace& space,
+                                        const Corridor& corridor,
+                                        PatchId start,
+                                        PatchId goal,
+                                        std::uint64_t max_expanded,
+                                        SearchWorkspace& workspace,
+                                        const Stop& stop) {
+  SearchOutcome none;
+  none.end = SearchOutcome::End::kFull;
+  STRATA_ASSIGN_OR_RETURN(SearchOutcome found,
+                          RunSearch(space,
+                                    workspace,
+                                    CorridorBound(corridor),
+                                    start,
+                                    goal,
+                                    max_expanded,
+                                    stop,
+                                    corridor.limit()));
+  none.expanded = found.expanded;
+  if (found.end == SearchOutcome::End::kLimit) return found;
+  if (found.end != SearchOutcome::End::kFound) return none;
+  const std::uint32_t below = found.cost - found.cost / (kLargeSlack + 1);
+  if (below <= corridor.least_cost()) return found;
+  STRATA_RETURN_IF_ERROR(workspace.BeginLarge(kBucketShift, stop));
+  STRATA_ASSIGN_OR_RETURN(SearchOutcome better,
+                          RunSearch(space,
+                                    workspace,
+                                    BlockBound(corridor, {space.CellOfPatch(goal)}),
+                                    start,
+                                    goal,
+                                    max_expanded - found.expanded,
+                                    stop,
+                                    below));
+  better.expanded += found.expanded;
+  if (better.end != SearchOutcome::End::kExhausted) return better;
+  found.expanded = better.expanded;
+  return found;
+}
+
+// The same for a way that may be long; kFull also where no corridor leads along it.
+absl::StatusOr<SearchOutcome> FindInCorridor(SearchSpace& space,
+                                             PatchId start,
+                                             PatchId goal,
+                                             std::uint64_t max_expanded,
+                                             SearchWorkspace& workspace,
+                                             const Stop& stop) {
+  SearchOutcome none;
+  none.end = SearchOutcome::End::kFull;
+  const CellIndex from = space.CellOfPatch(start);
+  const CellIndex to = space.CellOfPatch(goal);
+  if (!space.IsKept(TileOfCell(from)) || !space.IsKept(TileOfCell(to))) return none;
+  STRATA_RETURN_IF_ERROR(workspace.BeginLarge(kBucketShift, stop));
+  STRATA_ASSIGN_OR_RETURN(
+      const std::optional<Corridor> corridor,
+      Corridor::Find([&space](const TileKey& key) { return space.KeptDangers(key); },
+                     from,
+                     to,
+                     space.checks().GapCells(1),
+                     workspace.large_share(),
+                     stop));
+  if (!corridor.has_value() || !workspace.IsLarge(corridor->least_cost() / kCostPerCell)) {
+    return none;
+  }
+  return FindBelow(space, *corridor, start, goal, max_expanded, workspace, stop);
 }
 
 }  // namespace
@@ -497,17 +582,31 @@ absl::StatusOr<SearchOutcome> FindPath(SearchSpace& space,
                                        const Stop& stop) {
   if (landmarks != nullptr && LandmarkBound::Measured(space, *landmarks, start) &&
       LandmarkBound::Measured(space, *landmarks, goal)) {
+    STRATA_RETURN_IF_ERROR(workspace.Begin(kBucketShift, stop));
     const LandmarkBound bound(space, *landmarks, start, goal);
     return RunSearch(space, workspace, bound, start, goal, max_expanded, stop);
   }
   const OctileBound bound{space.CellOfPatch(goal)};
-  return RunSearch(space, workspace, bound, start, goal, max_expanded, stop);
+  SearchOutcome first;
+  const std::uint64_t cells = bound.Outside(space.CellOfPatch(start)) / kCostPerCell;
+  if (workspace.IsLarge(kMostDetour * cells)) {
+    STRATA_ASSIGN_OR_RETURN(first,
+                            FindInCorridor(space, start, goal, max_expanded, workspace, stop));
+    if (first.end != SearchOutcome::End::kFull) return first;
+  }
+  STRATA_RETURN_IF_ERROR(workspace.Begin(kBucketShift, stop));
+  STRATA_ASSIGN_OR_RETURN(
+      SearchOutcome outcome,
+      RunSearch(space, workspace, bound, start, goal, max_expanded - first.expanded, stop));
+  outcome.expanded += first.expanded;
+  return outcome;
 }
 
 absl::StatusOr<PatchId> ReachAll(SearchSpace& space,
                                  PatchId start,
                                  SearchWorkspace& workspace,
                                  const Stop& stop) {
+  STRATA_RETURN_IF_ERROR(workspace.Begin(kBucketShift, stop));
   STRATA_ASSIGN_OR_RETURN(
       const SearchOutcome outcome,
       RunSearch(space, workspace, NoBound{}, start, kNoPatchId, UINT64_MAX, stop));

@@ -10,16 +10,21 @@
 #include <vector>
 
 #include "core/mls/tile_key.h"
+#include "core/planning/corridor.h"
 #include "core/planning/landmarks.h"
 #include "core/planning/move_cost.h"
 #include "core/planning/search_space.h"
 
 namespace strata {
 
+// The bound of where no search needs to go.
+inline constexpr std::uint32_t kNoUse = 0xFFFFFFFFU;
+
 // Cost of the shortest way over cells without danger; consistent, since a move of any length costs
 // at least as much.
 struct OctileBound {
   static constexpr bool kByNumber = false;  // whether it reads the number of a patch
+  static constexpr bool kMayWeigh = true;   // whether a large search may weigh it
 
   CellIndex goal;
 
@@ -34,8 +39,66 @@ struct OctileBound {
   std::uint32_t Outside(CellIndex cell) const { return (*this)(cell.x, cell.y, 0); }
 };
 
+// What a Corridor tells of a place.
+class CorridorTiles {
+ public:
+  explicit CorridorTiles(const Corridor& corridor) : corridor_(&corridor) {}
+
+  void Enter(int /*slot*/, const SearchSpace::Slot& s) { tile_ = corridor_->Find(s.key); }
+  const Corridor::Tile* entered() const { return tile_; }
+  const Corridor::Tile* At(CellIndex cell) const { return corridor_->Find(TileOfCell(cell)); }
+
+ private:
+  const Corridor* corridor_;
+  const Corridor::Tile* tile_ = nullptr;
+};
+
+// Nothing but the corridor is of use, all of it in the order of costs: however long the way, a
+// search then goes on in few tiles at a time.
+class CorridorBound : public CorridorTiles {
+ public:
+  static constexpr bool kByNumber = false;
+  static constexpr bool kMayWeigh = false;
+
+  using CorridorTiles::CorridorTiles;
+
+  std::uint32_t operator()(std::int32_t x, std::int32_t y, std::uint32_t /*number*/) const {
+    return In(entered(), {x, y});
+  }
+  std::uint32_t Outside(CellIndex cell) const { return In(At(cell), cell); }
+
+ private:
+  static std::uint32_t In(const Corridor::Tile* tile, CellIndex cell) {
+    return tile != nullptr && tile->inside.test(Corridor::BlockOf(cell)) ? 0 : kNoUse;
+  }
+};
+
+// For a search below Corridor::limit().
+class BlockBound : public CorridorTiles {
+ public:
+  static constexpr bool kByNumber = false;
+  static constexpr bool kMayWeigh = false;
+
+  BlockBound(const Corridor& corridor, const OctileBound& octile)
+      : CorridorTiles(corridor), octile_(octile) {}
+
+  std::uint32_t operator()(std::int32_t x, std::int32_t y, std::uint32_t /*number*/) const {
+    return In(entered(), {x, y});
+  }
+  std::uint32_t Outside(CellIndex cell) const { return In(At(cell), cell); }
+
+ private:
+  std::uint32_t In(const Corridor::Tile* tile, CellIndex cell) const {
+    if (tile == nullptr) return kNoUse;
+    return std::max(octile_.Outside(cell), tile->costs[Corridor::BlockOf(cell)]);
+  }
+
+  OctileBound octile_;
+};
+
 struct NoBound {
   static constexpr bool kByNumber = false;
+  static constexpr bool kMayWeigh = true;
 
   void Enter(int /*slot*/, const SearchSpace::Slot& /*s*/) {}
   std::uint32_t operator()(std::int32_t /*x*/, std::int32_t /*y*/, std::uint32_t /*number*/) const {
@@ -49,6 +112,7 @@ struct NoBound {
 class LandmarkBound {
  public:
   static constexpr bool kByNumber = true;
+  static constexpr bool kMayWeigh = true;
 
   // REQUIRES: Measured(), for start and goal.
   LandmarkBound(SearchSpace& space, const Landmarks& landmarks, PatchId start, PatchId goal);

@@ -33,11 +33,22 @@ std::size_t BytesAtHand(const PreparedTile& tile) {
 }  // namespace
 
 absl::Status SearchWorkspace::Begin(int bucket_shift, const Stop& stop) {
+  Clear(bucket_shift);
+  return budget_ == nullptr ? absl::OkStatus() : Exchange(budget_->max_bytes() / kSmallShare, stop);
+}
+
+absl::Status SearchWorkspace::BeginLarge(int bucket_shift, const Stop& stop) {
+  Clear(bucket_shift);
+  return Exchange(large_share(), stop);
+}
+
+std::size_t SearchWorkspace::large_share() const { return budget_->max_bytes() / kLargeShare; }
+
+void SearchWorkspace::Clear(int bucket_shift) {
   while (!at_hand_.empty()) Dismiss(at_hand_.back());
   parked_.clear();
   AccountParked();
   queue_.Clear(bucket_shift);
-  return budget_ == nullptr ? absl::OkStatus() : Exchange(budget_->max_bytes() / kSmallShare, stop);
 }
 
 // Whoever waits holds nothing: searches that wait for each other would wait for ever.
@@ -54,9 +65,8 @@ absl::Status SearchWorkspace::Admit(int slot,
                                     const Stop& stop) {
   bytes_at_hand_ += BytesAtHand(*tile);
   if (budget_ != nullptr) {
-    const std::size_t large = budget_->max_bytes() / kLargeShare;
-    if (bytes_at_hand_ > granted_ && granted_ < large) {
-      STRATA_RETURN_IF_ERROR(Exchange(large, stop));
+    if (bytes_at_hand_ > granted_ && granted_ < large_share()) {
+      STRATA_RETURN_IF_ERROR(Exchange(large_share(), stop));
     }
   }
   if (static_cast<std::size_t>(slot) >= members_.size()) members_.resize(slot + 1);

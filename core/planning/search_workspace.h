@@ -83,6 +83,10 @@ class SearchWorkspace {
   // Starts anew, with a queue of buckets of 2^bucket_shift. Waits while other searches have the
   // memory that it needs; errors are those of `stop`.
   absl::Status Begin(int bucket_shift, const Stop& stop);
+  // The same with all that a large search has: large_share(), which is its own until it takes
+  // tiles in. REQUIRES: budget() != nullptr.
+  absl::Status BeginLarge(int bucket_shift, const Stop& stop);
+  std::size_t large_share() const;
   // Whether this tile too may be at hand.
   bool HasRoomFor(const PreparedTile& tile) const;
   // Whether a search over a way of so many cells will not have room for all that it touches.
@@ -113,6 +117,7 @@ class SearchWorkspace {
   const std::shared_ptr<CacheBudget>& budget() const { return budget_; }
 
  private:
+  void Clear(int bucket_shift);
   absl::Status Exchange(std::size_t bytes, const Stop& stop);
 
   const std::shared_ptr<CacheBudget> budget_;

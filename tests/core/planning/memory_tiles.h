@@ -5,12 +5,18 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/common/status.h"
+#include "core/planning/ground/profile_checks.h"
+#include "core/planning/packed_tile.h"
+#include "core/planning/tile_cache.h"
 #include "core/planning/tile_source.h"
 
 namespace strata::testing {
@@ -45,6 +51,34 @@ class MemoryTiles : public TileSource {
 
  private:
   std::map<TileKey, std::shared_ptr<const SurfaceTile>> tiles_;
+};
+
+// The same of which some are kept prepared, as a map at rest keeps them.
+class KeptTiles : public MemoryTiles {
+ public:
+  using MemoryTiles::MemoryTiles;
+
+  absl::StatusOr<std::optional<std::string>> LoadPrepared(const TileKey& key,
+                                                          const TileVersions& /*versions*/,
+                                                          const RobotProfile& profile) override {
+    const auto found = kept.find(key);
+    return found == kept.end() || profile != profile_ ? std::optional<std::string>()
+                                                      : found->second;
+  }
+  // Keeps all tiles for one profile.
+  absl::Status Keep(const ProfileChecks& checks) {
+    profile_ = checks.profile;
+    for (const TileKey& key : Keys()) {
+      STRATA_ASSIGN_OR_RETURN(const auto tile, PrepareFrom(*this, key, checks));
+      kept[key] = PackTile(*tile, checks.cell_size_m);
+    }
+    return absl::OkStatus();
+  }
+
+  std::map<TileKey, std::string> kept;
+
+ private:
+  RobotProfile profile_;
 };
 
 }  // namespace strata::testing
