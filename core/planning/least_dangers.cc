@@ -48,8 +48,10 @@ LeastDangers LeastDangersOf(const PreparedTile& tile) {
   }
   tile.standing.ForEach([&](std::uint32_t place, std::uint32_t number) {
     if (tile.standing.HasAllAround(place)) return;
+    const std::uint32_t below = tile.standing.OnFirstSheet(place);
     for (unsigned left = tile.patches[number].moves; left != 0; left &= left - 1) {
       const int k = std::countr_zero(left);
+      if (tile.standing.Has(PatchIndex::Beside(below, k))) continue;
       int cells = 0;
       tile.Target(place, number, k, &cells);
       if (cells > 1) LowerAlong(least, tile.standing.CellOf(place), k, cells);
