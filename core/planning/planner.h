@@ -56,13 +56,13 @@ class Planner {
   explicit Planner(const PlannerOptions& options);
 
   // A path, or why there is none; both are OK. The path is the cheapest where a ninth of the
-  // budget holds the tiles that the search touches (with 160 MiB 56 of one level) and start and
-  // goal are not so far apart that it surely will not (58,000 cells); else it costs at most 1 %
-  // more (core/planning/search.h). Where others search, it waits for its share of the memory.
-  // Sensors do not see the ground they stand over: a start or goal where the robot cannot stand
-  // moves to the nearest place on the same level, at most radius + max_gap away
-  // (core/planning/endpoint.h); the path begins or ends there and the message says so ("start moved
-  // 0.32 m to ..."). Fills all of PlanResult but `epoch`.
+  // budget holds the tiles that the search touches (with 160 MiB 56 of one level) and the way is
+  // not so long that it surely will not (58,000 cells; straight, or over blocks where the map keeps
+  // tiles); else it costs at most 1 % more (core/planning/search.h). Where others search, it waits
+  // for its share of the memory. Sensors do not see the ground they stand over: a start or goal
+  // where the robot cannot stand moves to the nearest place on the same level, at most radius +
+  // max_gap away (core/planning/endpoint.h); the path begins or ends there and the message says so
+  // ("start moved 0.32 m to ..."). Fills all of PlanResult but `epoch`.
   //   INVALID_ARGUMENT    query not finite or beyond the map's range, profile or class costs out of
   //                       range
   //   CANCELLED, DEADLINE_EXCEEDED   by `stop`

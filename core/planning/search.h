@@ -5,7 +5,15 @@
 // parks the tile that it has not been in for longest: costs at the border and ways back stay. When
 // something in a parked tile has its turn again, for it was left to expand or a cheaper way into
 // the tile was found since, it is searched again from its border. The path then costs at most 1 %
-// more than the cheapest. What is found depends on the size of the budget, not on what caches hold.
+// more than the cheapest.
+//
+// Between tiles that the map keeps prepared a way that is surely larger is measured over blocks
+// first (corridor.h), then searched in the corridor around that, in the order of costs: few tiles
+// are at hand at a time, each once. The path stands unless one may be cheaper by more than 1 %; a
+// search for such a one goes only where blocks leave that open.
+//
+// What is found depends on the size of the budget and on what the map keeps, not on what caches
+// hold.
 #ifndef STRATA_CORE_PLANNING_SEARCH_H_
 #define STRATA_CORE_PLANNING_SEARCH_H_
 
