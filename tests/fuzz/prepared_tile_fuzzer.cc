@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/string_view.h"
 #include <fuzzer/FuzzedDataProvider.h>
 #include <zstd.h>
 
@@ -27,7 +28,8 @@ namespace strata::fuzz {
 namespace {
 
 constexpr double kCell = 0.1;
-constexpr std::size_t kHeaderBytes = 16;  // format, size of the columns, size of cells
+// Format, size of the columns, size of cells, packed size of the least dangers.
+constexpr std::size_t kHeaderBytes = 20;
 constexpr std::size_t kChecksumBytes = 8;
 
 // Two tiles of ground with holes and posts, in places under a second storey.
@@ -66,28 +68,35 @@ class KeptTiles : public testing::MemoryTiles {
   std::optional<std::pair<TileKey, std::string>> changed_;
 };
 
+// Of the least dangers, as they are packed.
+std::size_t FirstBytes(const std::string& packed) {
+  return ByteReader(absl::string_view(packed).substr(16)).Fixed<std::uint32_t>();
+}
+
 std::string ColumnsOf(const std::string& packed) {
+  const std::size_t begin = kHeaderBytes + FirstBytes(packed);
   std::string columns(1 << 20, '\0');
   const std::size_t used = ZSTD_decompress(columns.data(),
                                            columns.size(),
-                                           packed.data() + kHeaderBytes,
-                                           packed.size() - kHeaderBytes - kChecksumBytes);
+                                           packed.data() + begin,
+                                           packed.size() - begin - kChecksumBytes);
   Require(ZSTD_isError(used) == 0U, "what was packed can be decompressed");
   columns.resize(used);
   return columns;
 }
 
-std::string Packed(const std::string& columns) {
+// With the least dangers of `whole`.
+std::string Packed(const std::string& columns, const std::string& whole) {
+  const std::size_t begin = kHeaderBytes + FirstBytes(whole);
   std::string packed;
-  PutFixed(packed, std::uint32_t{1});
+  PutFixed(packed, std::uint32_t{2});
   PutFixed(packed, static_cast<std::uint32_t>(columns.size()));
   PutFixed(packed, std::bit_cast<std::uint64_t>(kCell));
-  packed.resize(kHeaderBytes + ZSTD_compressBound(columns.size()));
-  packed.resize(kHeaderBytes + ZSTD_compress(packed.data() + kHeaderBytes,
-                                             packed.size() - kHeaderBytes,
-                                             columns.data(),
-                                             columns.size(),
-                                             1));
+  packed += whole.substr(packed.size(), begin - packed.size());
+  packed.resize(begin + ZSTD_compressBound(columns.size()));
+  packed.resize(
+      begin + ZSTD_compress(
+                  packed.data() + begin, packed.size() - begin, columns.data(), columns.size(), 1));
   PutFixed(packed, Checksum64(packed));
   return packed;
 }
@@ -131,9 +140,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   auto tile = packed.begin();
   if (input.ConsumeBool()) ++tile;
   std::string columns = fuzz::ColumnsOf(tile->second);
-  fuzz::Require(fuzz::Packed(columns) == tile->second, "the format is what this fuzzer writes");
+  fuzz::Require(fuzz::Packed(columns, tile->second) == tile->second,
+                "the format is what this fuzzer writes");
   fuzz::Damage(input, columns);
-  const std::string changed = fuzz::Packed(columns);
+  const std::string changed = fuzz::Packed(columns, tile->second);
   const auto unpacked = UnpackTile(changed, fuzz::kCell);
   fuzz::RequireGoodRefusal(unpacked.status());
   if (!unpacked.ok()) return 0;  // it would be prepared anew
