@@ -16,13 +16,14 @@
 namespace strata {
 namespace {
 
-// Edges in a plane of patches that one of their scans sees are creases and borders of that surface.
-// For scans that see the patches too they say nothing new; scans that see only the border (a corner
-// from the other side, the eaves from below) get a view of the plane by it. True if so.
-bool LendViews(const SharedPlane& edges,
-               std::span<const PosedPlanes> scans,
-               double corridor_m,
-               SharedPlane& plane) {
+// Whether these edges are creases and borders of a plane of patches that one of their scans sees:
+// for it they say nothing new. Scans that see the border alone get no view of the plane by it: the
+// last beam that meets a surface is up to a beam's spacing inside of its border, always to the same
+// side, and an upper storey whose rim was seen from below was pulled down by 0.07 m.
+bool IsBorderOf(const SharedPlane& plane,
+                const SharedPlane& edges,
+                std::span<const PosedPlanes> scans,
+                double corridor_m) {
   const auto has_view = [&plane](std::size_t scan) {
     return std::any_of(plane.views.begin(), plane.views.end(), [scan](const auto& view) {
       return view.scan == scan;
@@ -34,18 +35,7 @@ bool LendViews(const SharedPlane& edges,
     all += Moved(scans[view.scan].T_map_scan, view.moments);
     seen = seen || has_view(view.scan);
   }
-  if (!seen || RmsDistance(all, plane.plane) > corridor_m) return false;
-  for (SharedPlane::View view : edges.views) {
-    if (has_view(view.scan)) continue;
-    view.rms_m = RmsDistance(Moved(scans[view.scan].T_map_scan, view.moments), plane.plane);
-    if (view.rms_m > corridor_m) continue;
-    plane.support_value += view.weight;
-    plane.views.push_back(view);
-  }
-  std::sort(plane.views.begin(), plane.views.end(), [](const auto& x, const auto& y) {
-    return x.scan < y.scan;
-  });
-  return true;
+  return seen && RmsDistance(all, plane.plane) <= corridor_m;
 }
 
 void Append(std::vector<SharedPlane> found, std::vector<SharedPlane>& planes) {
@@ -79,8 +69,8 @@ std::vector<SharedPlane> FindSharedPlanes(std::span<const PosedPlanes> scans,
   Append(FindPatchPlanes(scans, options), planes);
   std::vector<SharedPlane> of_edges = FindEdgePlanes(scans, options);
   std::erase_if(of_edges, [&](const SharedPlane& edges) {
-    return std::any_of(planes.begin(), planes.end(), [&](SharedPlane& plane) {
-      return LendViews(edges, scans, options.corridor_m, plane);
+    return std::any_of(planes.begin(), planes.end(), [&](const SharedPlane& plane) {
+      return IsBorderOf(plane, edges, scans, options.corridor_m);
     });
   });
   Append(std::move(of_edges), planes);

@@ -70,10 +70,9 @@ struct SharedPlaneOptions {
 // of the same facing side while offset and tilt pass the gates; of two surfaces of one scan that
 // are not one plane by that scan's own accuracy at most one is in a plane; views that do not
 // fit the plane of all others leave. Edges: RANSAC over pairs of edges by length, corridor, hill
-// climbing (5.2.3); those that are the border of a plane of patches lend it the views of scans
-// that see only the border. A patch is in at most one plane. Order: patches' planes
-// by falling support value, then edges'. `options` must be valid and poses finite. A pure function,
-// thread-safe.
+// climbing (5.2.3); those that are the border of a plane of patches are left out. A patch is in at
+// most one plane. Order: patches' planes by falling support value, then edges'. `options` must be
+// valid and poses finite. A pure function, thread-safe.
 std::vector<SharedPlane> FindSharedPlanes(std::span<const PosedPlanes> scans,
                                           const SharedPlaneOptions& options = {});
 

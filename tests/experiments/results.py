@@ -33,6 +33,8 @@ RESULTS = {
     "oakland": ("Recorded streets named", "experiments/labelled_clouds --data oakland", LABELS),
     "recordings": ("Recorded drives through a real server",
                    "/usr/bin/python3 tests/experiments/real_data.py --build {build}", ("core", "server", "client")),
+    "subsets": ("Recorded drives in parts, backwards, by two robots, with more noise",
+                "/usr/bin/python3 tests/experiments/subsets.py --build {build}", ("core",)),
     "posegraphs": ("Recorded pose graphs", "/usr/bin/python3 tests/experiments/pose_graphs.py --build {build}",
                    ("core/posegraph", "client/formats")),
     "mls": ("Points to maps beside OctoMap", "bench/mls_benchmark 5 3", ("core/mls",)),

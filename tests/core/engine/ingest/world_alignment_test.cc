@@ -136,23 +136,30 @@ TEST_F(LinksTest, CellsOfTheMapDoNotChangeWhereScansAre) {
   for (std::size_t i = 0; i < fine.size(); ++i) EXPECT_TRUE(fine[i].isApprox(same[i], 0.0)) << i;
 }
 
-// Its underside is as near to an upper storey's scans as its top.
-TEST_F(LinksTest, AnUpperStoreyDoesNotSinkOntoItsUnderside) {
+// Mean height above the truth of those scans that were taken above `z_m`.
+double MeanRise(const std::vector<Pose>& poses, const std::vector<Pose>& truth, double z_m) {
+  double sum = 0.0;
+  int above = 0;
+  for (std::size_t i = 0; i < poses.size() && i < truth.size(); ++i) {
+    if (truth[i].translation().z() < z_m) continue;
+    sum += poses[i].translation().z() - truth[i].translation().z();
+    ++above;
+  }
+  EXPECT_GT(above, 30);
+  return sum / std::max(above, 1);
+}
+
+// Its underside is as near to an upper storey's scans as its top, and the rim of the slab, seen
+// from below, ends at the last beam that meets it: as a border of the top that pulled it down by
+// 0.07 m.
+TEST_F(LinksTest, AnUpperStoreyStaysWhereItIs) {
   const World world = CarParkWorld(0.25);
   const std::vector<Pose> truth = Drive(world.scene, world.loops[0].waypoints, 2.0, 1.1);
   MakeMap(MapParameters());
   Record(world.scene, "loop", truth, Same);
-  const std::vector<Pose> poses = PosesOf("loop");
-  ASSERT_EQ(poses.size(), truth.size());
-  double sum = 0.0;
-  int above = 0;
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    if (truth[i].translation().z() < 4.0) continue;
-    sum += poses[i].translation().z() - truth[i].translation().z();
-    ++above;
-  }
-  ASSERT_GT(above, 30);
-  EXPECT_LT(std::abs(sum / above), 0.03);
+  EXPECT_LT(std::abs(MeanRise(PosesOf("loop"), truth, 4.0)), 0.03);
+  ASSERT_EQ(RunJob(db(), "optimize").state, JobState::kSucceeded);
+  EXPECT_LT(std::abs(MeanRise(PosesOf("loop"), truth, 4.0)), 0.03);
 }
 
 }  // namespace
