@@ -72,12 +72,12 @@ TEST_F(LocalMapUploadTest, MakesTheMapThatItsPointsMakeWhereTheyAreDropped) {
 
 TEST_F(LocalMapUploadTest, IsAlignedMovedAndDeletedLikeAnyScan) {
   MapParameters parameters = SmallMap();
-  parameters.mls.cell_size_m = 0.2;
+  parameters.mls.cell_size_m = 0.1;  // of which points are matched, too
   MakeMap(parameters);
   const Pose first = PoseAt(0.0, 0.0);
   const Pose second = PoseAt(2.0, 1.0, 0.3);
-  const PointCloud cloud = SeeWorld(first, 1, 60'000);
-  const PointCloud later = SeeWorld(second, 2, 60'000);
+  const PointCloud cloud = SeeWorld(first, 1, 200'000);
+  const PointCloud later = SeeWorld(second, 2, 200'000);
   STRATA_ASSERT_OK(Upload(db(), HeaderOf({"run", 1}, cloud, first), cloud));
   const std::string alone = Digest();
   Pose guess = second;

@@ -40,7 +40,7 @@ TEST_F(EngineScansTest, ScansAreAlignedToThoseAround) {
   double uploaded_error = 0.0;
   for (std::uint64_t i = 0; i < 6; ++i) {
     const Pose truth = PoseAt(1.5 * static_cast<double>(i), 0.0, 0.05 * static_cast<double>(i));
-    const PointCloud cloud = SeeWorld(truth, i + 1, 60'000);
+    const PointCloud cloud = SeeWorld(truth, i + 1, 200'000);
     const Pose rough = i == 0 ? truth : truth * PoseAt(0.15, -0.1, 0.01);
     uploaded_error = (rough.translation() - truth.translation()).norm();
     STRATA_ASSERT_OK(Upload(db(), HeaderOf({"run", i}, cloud, rough, Alignment::kOn), cloud));
