@@ -49,22 +49,52 @@ absl::Status Aligner::Load(StorageReader& reader, std::uint64_t epoch) {
   scans_.clear();
   poses_.clear();
   trajectories_.clear();
+  indices_.clear();
+  parts_.clear();
   ScanQuery query;
   query.state = ScanState::kIntegrated;
   query.skip_damaged = true;  // no neighbour, but no reason to stop either
-  return ForEachPosedScan(reader, query, epoch, [&](const PosedScan& posed) {
-    Add(posed.scan, posed.pose->T_map_scan, posed.pose->report);
-  });
+  STRATA_RETURN_IF_ERROR(ForEachPosedScan(reader, query, epoch, [&](const PosedScan& posed) {
+    Add(posed.scan, {posed.pose->T_map_scan, posed.pose->report, {}});
+  }));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<ConstraintRecord> constraints,
+                          reader.ListConstraints(epoch));
+  JoinParts(constraints);
+  return absl::OkStatus();
 }
 
-void Aligner::Add(const ScanRecord& scan, const Pose& T_map_scan, const AlignmentReport& report) {
+void Aligner::Add(const ScanRecord& scan, const Placement& placement) {
   const ScanId& id = scan.header.id;
-  trajectories_[id.trajectory][id.sequence] = scans_.size();
+  std::map<std::uint64_t, std::size_t>& trajectory = trajectories_[id.trajectory];
+  const std::size_t begun =
+      trajectory.empty() ? scans_.size() : scans_[trajectory.begin()->second].trajectory;
+  trajectory[id.sequence] = scans_.size();
+  indices_[scan.number] = scans_.size();
   scans_.push_back({scan.number,
                     scan.header.T_map_scan,
                     scan.header.sensor_origin.cast<double>(),
-                    !report.aligned && report.iterations > 0});
-  poses_.push_back(T_map_scan);
+                    !placement.report.aligned && placement.report.iterations > 0,
+                    begun});
+  poses_.push_back(placement.T_map_scan);
+  JoinParts(placement.constraints);
+}
+
+void Aligner::JoinParts(const std::vector<ConstraintRecord>& constraints) {
+  for (const ConstraintRecord& record : constraints) {
+    const auto i = indices_.find(record.scan_i);
+    const auto j = indices_.find(record.scan_j);
+    if (i == indices_.end() || j == indices_.end()) continue;  // a prior, or a damaged scan's
+    parts_.Join(scans_[i->second].trajectory, scans_[j->second].trajectory);
+  }
+}
+
+std::vector<std::size_t> Aligner::Apart(const ScanRecord& scan, std::vector<std::size_t> scans) {
+  const auto own = trajectories_.find(scan.header.id.trajectory);
+  if (own == trajectories_.end()) return scans;
+  const std::size_t trajectory = scans_[own->second.begin()->second].trajectory;
+  std::erase_if(scans,
+                [&](std::size_t i) { return parts_.AreJoined(scans_[i].trajectory, trajectory); });
+  return scans;
 }
 
 Pose Aligner::Guess(const ScanRecord& scan) const {
@@ -209,12 +239,19 @@ absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
   placement.T_map_scan = link.T_map_scan;
   placement.constraints = ConstraintsOf(scan.number, link, around.indices);
   if (nearness == Nearness::kSaid) return placement;
-  STRATA_ASSIGN_OR_RETURN(
-      const Neighbourhood all,
-      NeighboursOf(link.T_map_scan, Around(link.T_map_scan, pass), reader, source));
+  const std::vector<std::size_t> level = Around(link.T_map_scan, pass);
+  STRATA_ASSIGN_OR_RETURN(const Neighbourhood all,
+                          NeighboursOf(link.T_map_scan, level, reader, source));
   if (all.indices == around.indices) return placement;
   const Link joint = AgreeingLink(seen, all.seen, link.T_map_scan);
   if (joint.report.aligned) placement.T_map_scan = joint.T_map_scan;
+  STRATA_ASSIGN_OR_RETURN(const Neighbourhood apart,
+                          NeighboursOf(placement.T_map_scan, Apart(scan, level), reader, source));
+  if (apart.seen.empty()) return placement;
+  const Link tie = VerifiedLink(seen, apart.seen, placement.T_map_scan);
+  if (!tie.report.aligned) return placement;
+  std::vector<ConstraintRecord> ties = ConstraintsOf(scan.number, tie, apart.indices);
+  std::move(ties.begin(), ties.end(), std::back_inserter(placement.constraints));
   return placement;
 }
 

@@ -15,6 +15,7 @@
 
 #include "core/common/lru_cache.h"
 #include "core/engine/ingest/link.h"
+#include "core/engine/ingest/trajectory_parts.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/mls/mls_map.h"
 #include "core/registration/place_match.h"
@@ -44,13 +45,14 @@ class Aligner {
   // (the predecessor's pose and the uploaded motion since; the uploaded pose for the first of a
   // trajectory), registered to the nearest scans of its own pass, which is what constraints say,
   // and to all around where those agree with it. A match far from the guess, or to others alone, is
-  // verified as a place is. The guess if nothing holds.
+  // verified as a place is; so is a constraint to a trajectory that nothing holds to its own yet.
+  // The guess if nothing holds.
   absl::StatusOr<Placement> Place(const ScanRecord& scan,
                                   const MlsMap& registration_map,
                                   StorageReader& reader,
                                   ScanSource& source);
   // The scan is integrated at this pose.
-  void Add(const ScanRecord& scan, const Pose& T_map_scan, const AlignmentReport& report);
+  void Add(const ScanRecord& scan, const Placement& placement);
 
  private:
   struct PlacedEntry {
@@ -58,6 +60,7 @@ class Aligner {
     Pose T_map_scan_uploaded;
     Eigen::Vector3d sensor_origin;  // scan frame
     bool is_lost = false;           // others were around, and none said where it is
+    std::size_t trajectory = 0;     // by its first scan's place in scans_
   };
   using Features = std::shared_ptr<const ScanFeatures>;
   // The scans to align to.
@@ -79,6 +82,9 @@ class Aligner {
   // and `pass` with the scans of others that are not on another storey, which may look the same.
   std::vector<std::size_t> Around(const Pose& T_map_scan,
                                   const std::vector<std::size_t>& pass) const;
+  // Without those of trajectories that constraints hold together with the scan's.
+  std::vector<std::size_t> Apart(const ScanRecord& scan, std::vector<std::size_t> scans);
+  void JoinParts(const std::vector<ConstraintRecord>& constraints);
   // Those of `among` around `guess`.
   absl::StatusOr<Neighbourhood> NeighboursOf(const Pose& guess,
                                              const std::vector<std::size_t>& among,
@@ -95,6 +101,8 @@ class Aligner {
   std::vector<PlacedEntry> scans_;
   std::vector<Pose> poses_;  // T_map_scan, beside scans_
   std::map<std::string, std::map<std::uint64_t, std::size_t>> trajectories_;  // index into scans_
+  std::map<ScanNumber, std::size_t> indices_;                                 // into scans_
+  TrajectoryParts parts_;
   LruCache<ScanNumber, const ScanFeatures> features_;
 };
 

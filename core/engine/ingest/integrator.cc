@@ -181,7 +181,7 @@ absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
   }
   STRATA_RETURN_IF_ERROR(CheckRoomInTiles(contribution, tiles));
   JoinAndForget(std::move(contribution), tiles);
-  aligner_.Add(scan, done.placement.T_map_scan, done.placement.report);
+  aligner_.Add(scan, done.placement);
   batch.integrated.push_back(std::move(done));
   return absl::OkStatus();
 }

@@ -80,6 +80,14 @@ std::vector<SeenScan> Nearest(std::span<const SeenScan> around, const Pose& plac
   return nearest;
 }
 
+PlaceMatch PlaceOf(const SeenScan& scan,
+                   std::span<const SeenScan> around,
+                   const Pose& guess,
+                   Nearness nearness) {
+  const PlaceHypothesis window{guess, kSearchedM, kSearchedHeightM, kSearchedRad};
+  return MatchPlace(scan, Nearest(around, guess), {&window, 1}, PlaceOptions(nearness));
+}
+
 }  // namespace
 
 Link LinkScan(const SeenScan& scan,
@@ -89,9 +97,7 @@ Link LinkScan(const SeenScan& scan,
   const RegistrationResult match = Register(scan, around, guess);
   Link link = LinkOf(match);
   if (Accepted(match.termination) && Same(match.T_target_source, guess)) return link;
-  const PlaceMatchOptions options = PlaceOptions(nearness);
-  const PlaceHypothesis window{guess, kSearchedM, kSearchedHeightM, kSearchedRad};
-  const PlaceMatch place = MatchPlace(scan, Nearest(around, guess), {&window, 1}, options);
+  const PlaceMatch place = PlaceOf(scan, around, guess, nearness);
   if (place.matched()) {
     const RegistrationResult found = Register(scan, around, place.T_target_source);
     if (Accepted(found.termination) && Same(found.T_target_source, place.T_target_source)) {
@@ -113,6 +119,14 @@ Link AgreeingLink(const SeenScan& scan, std::span<const SeenScan> around, const 
   Link link = LinkOf(match);
   link.report.aligned = Accepted(match.termination) && match.overlap >= kLeastAgreement &&
                         Same(match.T_target_source, known);
+  return link;
+}
+
+Link VerifiedLink(const SeenScan& scan, std::span<const SeenScan> around, const Pose& known) {
+  Link link = AgreeingLink(scan, around, known);
+  if (!link.report.aligned) return link;
+  const PlaceMatch place = PlaceOf(scan, around, known, Nearness::kSaid);
+  link.report.aligned = place.matched() && Same(place.T_target_source, link.T_map_scan);
   return link;
 }
 

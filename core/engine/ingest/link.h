@@ -37,6 +37,11 @@ Link AgreeingLink(const SeenScan& scan,
                   std::span<const SeenScan> around,
                   const Pose& T_map_scan_known);
 
+// The same, and they are verified to show one place.
+Link VerifiedLink(const SeenScan& scan,
+                  std::span<const SeenScan> around,
+                  const Pose& T_map_scan_known);
+
 }  // namespace strata
 
 #endif  // STRATA_CORE_ENGINE_INGEST_LINK_H_

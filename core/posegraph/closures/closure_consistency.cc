@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -68,7 +69,7 @@ class ConsistencyCheck {
                    const ClosureConsistencyOptions& options)
       : poses_(T_map_scan), closures_(closures), options_(options) {
     const PathUncertainties graph(T_map_scan, edges, options.drift);
-    const std::vector<std::size_t> part = graph.Parts();
+    part_ = graph.Parts();
     std::vector<std::size_t> ends;
     for (const Closure& c : closures) ends.insert(ends.end(), {c.i, c.j});
     for (const std::size_t node : ends) {
@@ -78,7 +79,7 @@ class ConsistencyCheck {
       for (const std::size_t other : ends) kept.push_back(all[other]);
     }
     for (std::size_t c = 0; c < closures.size(); ++c) {
-      groups_[std::minmax({part[closures[c].i], part[closures[c].j]})].push_back(c);
+      groups_[std::minmax({part_[closures[c].i], part_[closures[c].j]})].push_back(c);
     }
   }
 
@@ -101,7 +102,8 @@ class ConsistencyCheck {
         set.support[believable[a]] = cliques.Degree(a);
       }
       const std::vector<std::size_t> largest = cliques.Largest();
-      if (!one_part && largest.size() < static_cast<std::size_t>(options_.min_between_parts)) {
+      if (!one_part &&
+          FewestScans(believable, largest) < static_cast<std::size_t>(options_.min_between_parts)) {
         continue;
       }
       for (const std::size_t a : largest) set.kept.push_back(believable[a]);
@@ -121,6 +123,20 @@ class ConsistencyCheck {
   bool Within(const Pose& error, double variance_m2, double variance_rad2) const {
     return error.translation().norm() <= options_.max_sigmas * std::sqrt(variance_m2) &&
            RotationAngleRad(error) <= options_.max_sigmas * std::sqrt(variance_rad2);
+  }
+
+  // Scans of the part that has fewer in these closures between two parts.
+  std::size_t FewestScans(const std::vector<std::size_t>& believable,
+                          const std::vector<std::size_t>& chosen) const {
+    std::map<std::size_t, std::set<std::size_t>> scans;  // by part
+    for (const std::size_t a : chosen) {
+      const Closure& closure = closures_[believable[a]];
+      scans[part_[closure.i]].insert(closure.i);
+      scans[part_[closure.j]].insert(closure.j);
+    }
+    std::size_t fewest = chosen.size();
+    for (const auto& [part, seen] : scans) fewest = std::min(fewest, seen.size());
+    return fewest;
   }
 
   bool AgreesWithGraph(std::size_t c) const {
@@ -166,6 +182,7 @@ class ConsistencyCheck {
   std::span<const Pose> poses_;
   std::span<const Closure> closures_;
   const ClosureConsistencyOptions& options_;
+  std::vector<std::size_t> part_;       // of each node
   std::map<std::size_t, Known> known_;  // of each node that ends a closure: to all ends
   std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> groups_;
 };

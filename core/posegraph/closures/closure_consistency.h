@@ -34,8 +34,9 @@ struct ClosureConsistencyOptions {
   // Two closures and the graph between their ends make a loop. They are consistent if going round
   // comes back within this many σ of all that the loop is made of; (0, 100].
   double max_sigmas = 3.0;
-  // Closures between parts that the graph does not connect otherwise are kept from this many
-  // consistent ones on: one alone says nothing that could be checked; [1, 1000].
+  // Closures between parts that the graph does not connect otherwise are kept from this many scans
+  // on both sides on: those of one scan, wherever it looks alike, agree with each other and say
+  // nothing that could be checked; [1, 1000].
   int min_between_parts = 2;
 
   absl::Status Validate() const;

@@ -115,6 +115,18 @@ TEST(ClosureConsistencyTest, OneAloneBetweenTwoRobotsIsNotBelieved) {
   EXPECT_THAT(set.kept, ElementsAre(0));
 }
 
+TEST(ClosureConsistencyTest, ClosuresOfOneScanBetweenTwoRobotsAreNotBelieved) {
+  TwoRobots robots(1);
+  std::vector<Closure> closures;
+  for (const std::size_t i : {4, 5, 6}) closures.push_back(robots.True(i, TwoRobots::kScans + 5));
+  STRATA_ASSERT_OK_AND_ASSIGN(ConsistentClosureSet set,
+                              ConsistentClosures(robots.poses, robots.edges, closures));
+  EXPECT_THAT(set.kept, IsEmpty());
+  closures.push_back(robots.True(7, TwoRobots::kScans + 8));
+  STRATA_ASSERT_OK_AND_ASSIGN(set, ConsistentClosures(robots.poses, robots.edges, closures));
+  EXPECT_THAT(set.kept, ElementsAre(0, 1, 2, 3));
+}
+
 TEST(ClosureConsistencyTest, WithinOneTrajectoryTheGraphItselfIsAsked) {
   TwoRobots robots(1);
   Closure fits = robots.True(0, 40);
