@@ -162,6 +162,8 @@ TEST_F(AlignmentTest, DisturbedPosesComeBack) {
 }
 
 TEST_F(AlignmentTest, WhereNothingMovesCorrespondencesAreKept) {
+  options_.settled_m = 0.002;
+  options_.settled_rad = 0.0002;
   STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align());
   EXPECT_EQ(result.rounds.front().registered, result.rounds.front().matches);
   EXPECT_LT(result.rounds.back().registered, result.rounds.front().registered / 2);

@@ -1,0 +1,33 @@
+// Whether what an optimize job found may become an epoch by itself (thesis 7.4.3, Algorithm 4,
+// which returns FAILURE where nothing settles).
+#ifndef STRATA_CORE_ENGINE_CONSISTENCY_OPTIMIZE_VERDICT_H_
+#define STRATA_CORE_ENGINE_CONSISTENCY_OPTIMIZE_VERDICT_H_
+
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/engine/consistency/graph_world.h"
+#include "core/posegraph/alignment/alignment.h"
+
+namespace strata {
+
+struct OptimizeVerdict {
+  // False: most of what moved was moved by nothing that was measured.
+  bool is_sound = true;
+  std::size_t steps = 0;  // from scan to scan along trajectories
+  // Those whose two scans no match, closure or given constraint joins, on any way: nodes.
+  std::vector<std::pair<std::size_t, std::size_t>> loose_steps;
+  std::string message;  // two sentences: what holds the scans, and what that means
+};
+
+// Planes that scans share are found at poses that are nearly right; a scan that nothing is matched
+// to is drawn to whatever wall is near. Where more than a quarter of the steps is loose there is
+// nothing that planes could be trusted with: recordings too sparse to overlap, poses of another
+// recording, scans of two places under one name.
+OptimizeVerdict VerdictOn(const GraphWorld& world, const AlignmentResult& result);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_CONSISTENCY_OPTIMIZE_VERDICT_H_
