@@ -168,10 +168,11 @@ absl::Status ScanFeatureOptions::Validate() const {
 SurfaceElement FitSurfaceElement(const ColumnGrid& grid,
                                  const Eigen::Vector3f& p,
                                  int neighbours,
-                                 float radius_m) {
+                                 float radius_m,
+                                 FacingSet among) {
   SurfaceElement element{p, Eigen::Vector3f::Zero()};
   std::array<std::uint32_t, ColumnGrid::kMaxNeighbours> indices;
-  const int n = grid.Nearest(p, neighbours, radius_m, indices.data());
+  const int n = grid.Nearest(p, neighbours, radius_m, indices.data(), among);
   if (n < 4) return element;
   Eigen::Vector3f sum = Eigen::Vector3f::Zero();
   Eigen::Matrix3f moments = Eigen::Matrix3f::Zero();
@@ -227,10 +228,14 @@ ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const ScanFeatureOptio
   ScanFeatures features;
   features.points_ = std::move(points);
   features.sensor_origin_ = options.sensor_origin;
+  features.facings_ =
+      FacingsOf(features.points(FeatureClass::kVertical), options.sensor_origin.cast<float>());
   std::array<ColumnGrid, kFeatureClasses> grids;
   if (options.sample_count == 0) return features;
   for (int c = 0; c < kFeatureClasses; ++c) {
-    grids[c] = ColumnGrid(features.points_[c], kColumnSizeM);
+    const bool upright = static_cast<FeatureClass>(c) == FeatureClass::kVertical;
+    grids[c] = ColumnGrid(
+        features.points_[c], kColumnSizeM, upright ? features.facings_ : std::span<const Facing>());
   }
   // Not the same places in every scan, or their bias would add up along a chain of scans.
   SplitMix64 random(options.seed ^ ContentHash(features.points_));
@@ -245,10 +250,14 @@ ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const ScanFeatureOptio
     while (place >= features.points_[c].size()) place -= features.points_[c++].size();
     SampledFeature& sampled = features.sample_[i];
     sampled.feature_class = static_cast<FeatureClass>(c);
+    if (sampled.feature_class == FeatureClass::kVertical) {
+      sampled.facing = features.facings_[place];
+    }
     sampled.element = FitSurfaceElement(grids[c],
                                         features.points_[c][place],
                                         options.neighbours,
-                                        static_cast<float>(options.neighbour_radius_m));
+                                        static_cast<float>(options.neighbour_radius_m),
+                                        CompatibleWith(sampled.facing));
   }
   return features;
 }
@@ -260,7 +269,8 @@ std::size_t ScanFeatures::size() const {
 }
 
 std::size_t ScanFeatures::memory_bytes() const {
-  std::size_t bytes = sizeof(*this) + sample_.capacity() * sizeof(SampledFeature);
+  std::size_t bytes = sizeof(*this) + sample_.capacity() * sizeof(SampledFeature) +
+                      facings_.capacity() * sizeof(Facing);
   for (const auto& list : points_) bytes += list.capacity() * sizeof(Eigen::Vector3f);
   return bytes;
 }
