@@ -35,6 +35,8 @@ RESULTS = {
                    "/usr/bin/python3 tests/experiments/real_data.py --build {build}", ("core", "server", "client")),
     "subsets": ("Recorded drives in parts, backwards, by two robots, with more noise",
                 "/usr/bin/python3 tests/experiments/subsets.py --build {build}", ("core",)),
+    "localisation": ("Scans asked for in maps of the same place and of others",
+                     "/usr/bin/python3 tests/experiments/localisation.py --build {build}", ("core",)),
     "posegraphs": ("Recorded pose graphs", "/usr/bin/python3 tests/experiments/pose_graphs.py --build {build}",
                    ("core/posegraph", "client/formats")),
     "mls": ("Points to maps beside OctoMap", "bench/mls_benchmark 5 3", ("core/mls",)),
