@@ -147,7 +147,7 @@ def main():
         strata = Strata(options.build.resolve(), pathlib.Path(out))
         strata.most = options.most
         drives = {name: Recording(data / RECORDED[name][0], RECORDED[name][1])
-                  for name in RECORDED if any(name in RECORDED for name in wanted)}
+                  for name in RECORDED if RECORDED.keys() & set(wanted)}
         drives |= {name: draw(strata, name, options.seed) for name in DRAWN if name in wanted}
         try:
             print(f"{'map':34} {'queries':>40}  right  wrong  unknown  median     max  [deg]  confidence of wrong ones")
