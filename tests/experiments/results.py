@@ -37,6 +37,8 @@ RESULTS = {
                 "/usr/bin/python3 tests/experiments/subsets.py --build {build}", ("core",)),
     "two_sides": ("Decks and walls seen from both sides", "/usr/bin/python3 tests/experiments/two_sides.py --build {build}",
                   ("core/registration", "core/planes", "core/engine")),
+    "localisation": ("Scans asked for in maps of the same place and of others",
+                     "/usr/bin/python3 tests/experiments/localisation.py --build {build}", ("core",)),
     "posegraphs": ("Recorded pose graphs", "/usr/bin/python3 tests/experiments/pose_graphs.py --build {build}",
                    ("core/posegraph", "client/formats")),
     "mls": ("Points to maps beside OctoMap", "bench/mls_benchmark 5 3", ("core/mls",)),
