@@ -27,9 +27,7 @@ struct Candidate {
 
 }  // namespace
 
-ColumnGrid::ColumnGrid(std::span<const Eigen::Vector3f> points,
-                       float column_size_m,
-                       std::span<const Facing> facings)
+ColumnGrid::ColumnGrid(std::span<const Eigen::Vector3f> points, float column_size_m)
     : column_size_m_(column_size_m) {
   if (points.empty()) return;
   Eigen::Vector2f low = points[0].head<2>();
@@ -55,23 +53,20 @@ ColumnGrid::ColumnGrid(std::span<const Eigen::Vector3f> points,
   }
   std::uint32_t sum = 0;
   for (std::uint32_t& count : begin_) sum += std::exchange(count, sum);
-  std::vector<std::uint32_t> order(points.size());
+  points_.resize(points.size());
   std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    order[next[column[i]]++] = static_cast<std::uint32_t>(i);
-  }
+  for (std::size_t i = 0; i < points.size(); ++i) points_[next[column[i]]++] = points[i];
+  SortColumns();
+}
+
+void ColumnGrid::SortColumns() {
   for (std::size_t c = 0; c + 1 < begin_.size(); ++c) {
     if (begin_[c + 1] - begin_[c] < kLongRun) continue;
     std::stable_sort(
-        order.begin() + begin_[c],
-        order.begin() + begin_[c + 1],
-        [&](std::uint32_t a, std::uint32_t b) { return points[a].z() < points[b].z(); });
+        points_.begin() + begin_[c],
+        points_.begin() + begin_[c + 1],
+        [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) { return a.z() < b.z(); });
   }
-  points_.reserve(points.size());
-  for (const std::uint32_t i : order) points_.push_back(points[i]);
-  if (facings.empty()) return;
-  facings_.reserve(points.size());
-  for (const std::uint32_t i : order) facings_.push_back(facings[i]);
 }
 
 ColumnGrid::Place ColumnGrid::PlaceOf(const Eigen::Vector3f& p) const {
@@ -148,13 +143,10 @@ void ColumnGrid::VisitNear(const Eigen::Vector3f& p,
   }
 }
 
-std::uint32_t ColumnGrid::Nearest(const Eigen::Vector3f& p,
-                                  float max_distance_m,
-                                  FacingSet among) const {
+std::uint32_t ColumnGrid::Nearest(const Eigen::Vector3f& p, float max_distance_m) const {
   float best_m2 = max_distance_m * max_distance_m;
   std::uint32_t best = kNone;
   VisitNear(p, best_m2, [&](std::uint32_t index, float squared_m2) {
-    if (!IsAmong(index, among)) return;
     best_m2 = squared_m2;
     best = index;
   });
@@ -164,8 +156,7 @@ std::uint32_t ColumnGrid::Nearest(const Eigen::Vector3f& p,
 ColumnGrid::SlackMatch ColumnGrid::NearestWithSlack(const Eigen::Vector3f& p,
                                                     float max_distance_m,
                                                     float max_slack_m,
-                                                    std::uint32_t hint,
-                                                    FacingSet among) const {
+                                                    std::uint32_t hint) const {
   // Everything within the nearest distance and twice the slack is looked at.
   const float margin_m = 2.0F * max_slack_m;
   float best_m2 = (max_distance_m + max_slack_m) * (max_distance_m + max_slack_m);
@@ -173,7 +164,6 @@ ColumnGrid::SlackMatch ColumnGrid::NearestWithSlack(const Eigen::Vector3f& p,
   float second_m2 = best_m2;
   SlackMatch match;
   const auto offer = [&](std::uint32_t index, float squared_m2) {
-    if (!IsAmong(index, among)) return;
     if (squared_m2 >= best_m2) {
       if (index != match.index) second_m2 = std::min(second_m2, squared_m2);
       return;
@@ -201,13 +191,11 @@ ColumnGrid::SlackMatch ColumnGrid::NearestWithSlack(const Eigen::Vector3f& p,
 int ColumnGrid::Nearest(const Eigen::Vector3f& p,
                         int count,
                         float max_distance_m,
-                        std::uint32_t* indices,
-                        FacingSet among) const {
+                        std::uint32_t* indices) const {
   std::array<Candidate, kMaxNeighbours> nearest;  // sorted
   int found = 0;
   float bound_m2 = max_distance_m * max_distance_m;
   VisitNear(p, bound_m2, [&](std::uint32_t index, float squared_m2) {
-    if (!IsAmong(index, among)) return;
     int at = found < count ? found++ : count - 1;
     for (; at > 0 && squared_m2 < nearest[at - 1].squared_m2; --at) nearest[at] = nearest[at - 1];
     nearest[at] = {squared_m2, index};
@@ -219,7 +207,7 @@ int ColumnGrid::Nearest(const Eigen::Vector3f& p,
 
 std::size_t ColumnGrid::memory_bytes() const {
   return sizeof(*this) + begin_.capacity() * sizeof(std::uint32_t) +
-         points_.capacity() * sizeof(Eigen::Vector3f) + facings_.capacity() * sizeof(Facing);
+         points_.capacity() * sizeof(Eigen::Vector3f);
 }
 
 }  // namespace strata

@@ -10,11 +10,9 @@
 
 #include <Eigen/Core>
 
-#include "core/registration/facing.h"
-
 namespace strata {
 
-// Points in upright square columns, row after row, long columns sorted by z. Maps are flat: a dense
+// Points in upright square columns, row after row, each column sorted by z. Maps are flat: a dense
 // array of columns finds neighbours with two loads where a tree walks, and is built by one counting
 // sort. Immutable; concurrent queries are safe.
 class ColumnGrid {
@@ -24,23 +22,14 @@ class ColumnGrid {
   ColumnGrid() = default;
   // REQUIRES: finite points, `column_size_m` > 0. Columns become wider where the points' extent
   // would need more than 2²² of them.
-  // `facings`: one a point, or none at all where all are unknown.
-  ColumnGrid(std::span<const Eigen::Vector3f> points,
-             float column_size_m,
-             std::span<const Facing> facings = {});
+  ColumnGrid(std::span<const Eigen::Vector3f> points, float column_size_m);
 
   // In the grid's own order; indices below are into this.
   const std::vector<Eigen::Vector3f>& points() const { return points_; }
-  Facing facing(std::uint32_t index) const {
-    return facings_.empty() ? kFacingUnknown : facings_[index];
-  }
 
-  // Index of the point nearest to `p` among those that face as `among` says and are closer than
-  // `max_distance_m`, or kNone; of equally near ones, one that depends only on the points and their
-  // order.
-  std::uint32_t Nearest(const Eigen::Vector3f& p,
-                        float max_distance_m,
-                        FacingSet among = kAnyFacing) const;
+  // Index of the point nearest to `p` and closer than `max_distance_m`, or kNone; of equally near
+  // ones, one that depends only on the points and their order.
+  std::uint32_t Nearest(const Eigen::Vector3f& p, float max_distance_m) const;
 
   struct SlackMatch {
     std::uint32_t index = kNone;
@@ -54,8 +43,7 @@ class ColumnGrid {
   SlackMatch NearestWithSlack(const Eigen::Vector3f& p,
                               float max_distance_m,
                               float max_slack_m,
-                              std::uint32_t hint,
-                              FacingSet among = kAnyFacing) const;
+                              std::uint32_t hint) const;
 
   // Up to `count` (≤ kMaxNeighbours) nearest points closer than `max_distance_m`, `p` itself
   // included when it is a point; returns how many were written to `indices`, in no order.
@@ -63,8 +51,7 @@ class ColumnGrid {
   int Nearest(const Eigen::Vector3f& p,
               int count,
               float max_distance_m,
-              std::uint32_t* indices,
-              FacingSet among = kAnyFacing) const;
+              std::uint32_t* indices) const;
 
   std::size_t memory_bytes() const;
 
@@ -87,9 +74,7 @@ class ColumnGrid {
                 const Eigen::Vector3f& p,
                 const float& bound_m2,
                 const Offer& offer) const;
-  bool IsAmong(std::uint32_t index, FacingSet among) const {
-    return facings_.empty() || (among >> facings_[index] & 1U) != 0;
-  }
+  void SortColumns();
 
   float column_size_m_ = 1.0F;
   Eigen::Vector2f origin_ = Eigen::Vector2f::Zero();
@@ -97,7 +82,6 @@ class ColumnGrid {
   int columns_y_ = 0;
   std::vector<std::uint32_t> begin_;  // of each column, and the end
   std::vector<Eigen::Vector3f> points_;
-  std::vector<Facing> facings_;  // of the points, or empty
 };
 
 }  // namespace strata

@@ -15,7 +15,6 @@
 #include "core/geometry/pose.h"
 #include "core/mls/features.h"
 #include "core/registration/column_grid.h"
-#include "core/registration/facing.h"
 #include "core/registration/plane_to_plane.h"
 #include "core/registration/sliding.h"
 #include "core/registration/umeyama.h"
@@ -84,12 +83,10 @@ Round RoundSolver::PointToPoint(const Pose& T_local_source, double gate_m) {
   Round round;
   const Eigen::Matrix3f R = T_local_source.linear().cast<float>();
   const Eigen::Vector3f t = T_local_source.translation().cast<float>();
-  const FacingTurn turn(YawOf(T_local_source.linear()));
-  const auto match = [&](const Eigen::Vector3f& p, FeatureClass c, Facing facing) {
+  const auto match = [&](const Eigen::Vector3f& p, FeatureClass c) {
     ++round.selected;
     const ColumnGrid& grid = target_.grid(c);
-    const std::uint32_t j =
-        grid.Nearest(R * p + t, static_cast<float>(gate_m), CompatibleWith(turn(facing)));
+    const std::uint32_t j = grid.Nearest(R * p + t, static_cast<float>(gate_m));
     if (j == ColumnGrid::kNone) return;
     from.push_back(p.cast<double>());
     to.push_back(T_local_source.inverse() * grid.points()[j].cast<double>());
@@ -97,16 +94,12 @@ Round RoundSolver::PointToPoint(const Pose& T_local_source, double gate_m) {
   if (options_.max_samples > 0) {
     for (int i = 0; i < options_.max_samples && i < static_cast<int>(source_.sample().size());
          ++i) {
-      const SampledFeature& sampled = source_.sample()[i];
-      match(sampled.element.point, sampled.feature_class, sampled.facing);
+      match(source_.sample()[i].element.point, source_.sample()[i].feature_class);
     }
   } else {
     for (const FeatureClass c :
          {FeatureClass::kTraversable, FeatureClass::kNonTraversable, FeatureClass::kVertical}) {
-      const std::vector<Eigen::Vector3f>& points = source_.points(c);
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        match(points[i], c, c == FeatureClass::kVertical ? source_.facings()[i] : kFacingUnknown);
-      }
+      for (const Eigen::Vector3f& p : source_.points(c)) match(p, c);
     }
   }
   round.inliers = static_cast<int>(from.size());

@@ -27,8 +27,7 @@ enum class MlsErrorMetric {
 
 struct MlsRegistrationOptions {
   MlsErrorMetric metric = MlsErrorMetric::kPlaneToPlane;
-  // A feature is matched to the nearest one of its class, and seen from its side, closer than the
-  // gate. The gate shrinks
+  // A feature is matched to the nearest one of its class closer than the gate. The gate shrinks
   // from the first to the last value by `gate_factor` an iteration. The first must exceed the
   // guess's error where the features are; the last decides what is an outlier and what overlap
   // means. In (0, 100], last ≤ first.

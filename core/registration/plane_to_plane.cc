@@ -74,24 +74,23 @@ const SurfaceElement& PlaneToPlaneMatcher::TargetElement(FeatureClass c, std::ui
     elements_.push_back(FitSurfaceElement(grid,
                                           grid.points()[index],
                                           options_.neighbours,
-                                          static_cast<float>(options_.neighbour_radius_m),
-                                          CompatibleWith(grid.facing(index))));
+                                          static_cast<float>(options_.neighbour_radius_m)));
     known = static_cast<std::uint32_t>(elements_.size());
   }
   return elements_[known - 1];
 }
 
-std::uint32_t PlaneToPlaneMatcher::Match(
-    std::size_t sample, const Eigen::Vector3f& p_target, float gate_m, FacingSet among, bool fine) {
+std::uint32_t PlaneToPlaneMatcher::Match(std::size_t sample,
+                                         const Eigen::Vector3f& p_target,
+                                         float gate_m,
+                                         bool fine) {
   const ColumnGrid& grid = target_.grid(source_.sample()[sample].feature_class);
-  if (!fine) return grid.Nearest(p_target, gate_m, among);
+  if (!fine) return grid.Nearest(p_target, gate_m);
   KnownMatch& known = known_[sample];
   const float slack_m = known.match.slack_m - kRoundingM;
-  if (slack_m <= 0.0F || (p_target - known.p_target).squaredNorm() >= slack_m * slack_m ||
-      known.among != among) {
-    known.match = grid.NearestWithSlack(p_target, gate_m, kMaxSlackM, known.match.index, among);
+  if (slack_m <= 0.0F || (p_target - known.p_target).squaredNorm() >= slack_m * slack_m) {
+    known.match = grid.NearestWithSlack(p_target, gate_m, kMaxSlackM, known.match.index);
     known.p_target = p_target;
-    known.among = among;
   }
   const std::uint32_t j = known.match.index;
   if (j == ColumnGrid::kNone || (grid.points()[j] - p_target).squaredNorm() >= gate_m * gate_m) {
@@ -106,7 +105,6 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
   PlaneToPlaneSums sums;
   const Eigen::Matrix3d R = T_target_source.linear();
   const Eigen::Vector3d t = T_target_source.translation();
-  const FacingTurn turn(YawOf(R));
   const Eigen::Vector3d sensor = T_target_source * source_.sensor_origin();
   const double tangent2 = options_.tangent_sigma_m * options_.tangent_sigma_m;
   const double flattening = tangent2 - options_.normal_sigma_m * options_.normal_sigma_m;
@@ -120,11 +118,7 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
     const Eigen::Vector3d p = sampled.element.point.cast<double>();
     const ColumnGrid& grid = target_.grid(sampled.feature_class);
     const Eigen::Vector3d p_target = R * p + t;
-    const std::uint32_t j = Match(i,
-                                  p_target.cast<float>(),
-                                  static_cast<float>(gate_m),
-                                  CompatibleWith(turn(sampled.facing)),
-                                  fine);
+    const std::uint32_t j = Match(i, p_target.cast<float>(), static_cast<float>(gate_m), fine);
     if (j == ColumnGrid::kNone) continue;
     const SurfaceElement q =
         fine ? TargetElement(sampled.feature_class, j)

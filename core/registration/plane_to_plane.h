@@ -13,7 +13,6 @@
 
 #include "core/geometry/pose.h"
 #include "core/registration/column_grid.h"
-#include "core/registration/facing.h"
 #include "core/registration/registration_target.h"
 #include "core/registration/scan_features.h"
 
@@ -47,18 +46,13 @@ class PlaneToPlaneMatcher {
                       const MlsRegistrationOptions& options);
 
   // `fine` uses `max_samples` and both sides' normals; otherwise `coarse_samples` and only the
-  // source's, which are at hand. A vertical feature is matched among those that were seen from its
-  // side; what else was seen from two sides is no match where the target is one scan. Normals of
-  // the target are computed at its first match and kept.
+  // source's, which are at hand. Two sides of a thin wall are no match where the target is one
+  // scan. Normals of the target are computed at its first match and kept.
   PlaneToPlaneSums Linearise(const Pose& T_target_source, double gate_m, bool fine);
 
  private:
-  // The nearest feature of the class that faces as `among` says and closer than the gate, or kNone.
-  std::uint32_t Match(std::size_t sample,
-                      const Eigen::Vector3f& p_target,
-                      float gate_m,
-                      FacingSet among,
-                      bool fine);
+  // The nearest feature of the class and closer than the gate, or kNone.
+  std::uint32_t Match(std::size_t sample, const Eigen::Vector3f& p_target, float gate_m, bool fine);
   const SurfaceElement& TargetElement(FeatureClass c, std::uint32_t index);
 
   const ScanFeatures& source_;
@@ -68,7 +62,6 @@ class PlaneToPlaneMatcher {
   std::vector<SurfaceElement> elements_;
   struct KnownMatch {
     Eigen::Vector3f p_target = Eigen::Vector3f::Zero();  // it was looked up for
-    FacingSet among = 0;
     ColumnGrid::SlackMatch match;
   };
   std::vector<KnownMatch> known_;  // of the sample; the last iterations hardly move

@@ -14,7 +14,6 @@
 
 #include "core/common/option_checks.h"
 #include "core/registration/column_grid.h"
-#include "core/registration/facing.h"
 #include "core/registration/scan_features.h"
 
 namespace strata {
@@ -22,73 +21,40 @@ namespace {
 
 constexpr float kColumnSizeM = 0.4F;
 
-// Points of a class, and how each faces or nothing.
-struct FacingPoints {
-  std::vector<Eigen::Vector3f> points;
-  std::vector<Facing> facings;
-};
-
-// Averages points that share a cube and can be of one surface. Open addressing over cube keys;
-// cubes keep the order in which they are first seen, so the result depends on the points and their
-// order only.
-FacingPoints AverageInCubes(const FacingPoints& all, float cube_m) {
-  FacingPoints means;
+// Averages points that share a cube. Open addressing over cube keys; cubes keep the order in which
+// they are first seen, so the result depends on the points and their order only.
+std::vector<Eigen::Vector3f> AverageInCubes(const std::vector<Eigen::Vector3f>& points,
+                                            float cube_m) {
+  std::vector<Eigen::Vector3f> means;
   std::vector<float> counts;
   std::vector<std::uint64_t> keys;
-  means.points.reserve(all.points.size() / 2);
-  counts.reserve(all.points.size() / 2);
-  keys.reserve(all.points.size() / 2);
-  const bool faces = !all.facings.empty();
-  const std::size_t slots = std::bit_ceil(all.points.size() * 2 + 1);
+  means.reserve(points.size() / 2);
+  counts.reserve(points.size() / 2);
+  keys.reserve(points.size() / 2);
+  const std::size_t slots = std::bit_ceil(points.size() * 2 + 1);
   const int shift = 64 - std::countr_zero(slots);
   std::vector<std::uint32_t> table(slots, ColumnGrid::kNone);
   const auto coordinate = [&](float v) {
     return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(v / cube_m))) & 0x1FFFFF;
   };
-  for (std::size_t k = 0; k < all.points.size(); ++k) {
-    const Eigen::Vector3f& p = all.points[k];
+  for (const Eigen::Vector3f& p : points) {
     const std::uint64_t key = coordinate(p.x()) | coordinate(p.y()) << 21 | coordinate(p.z()) << 42;
-    const auto joins = [&](std::uint32_t mean) {
-      return keys[mean] == key && (!faces || OfOneSide(means.facings[mean], all.facings[k]));
-    };
     std::size_t slot = (key * 0x9E3779B97F4A7C15U) >> shift;
-    while (table[slot] != ColumnGrid::kNone && !joins(table[slot])) {
+    while (table[slot] != ColumnGrid::kNone && keys[table[slot]] != key) {
       slot = (slot + 1) & (slots - 1);
     }
     if (table[slot] == ColumnGrid::kNone) {
-      table[slot] = static_cast<std::uint32_t>(means.points.size());
-      means.points.push_back(p);
-      if (faces) means.facings.push_back(all.facings[k]);
+      table[slot] = static_cast<std::uint32_t>(means.size());
+      means.push_back(p);
       counts.push_back(1.0F);
       keys.push_back(key);
     } else {
       const std::uint32_t i = table[slot];
       counts[i] += 1.0F;
-      means.points[i] += (p - means.points[i]) / counts[i];
+      means[i] += (p - means[i]) / counts[i];
     }
   }
   return means;
-}
-
-// What the scans have of a class around the origin.
-FacingPoints Gathered(std::span<const PlacedScan> scans,
-                      FeatureClass c,
-                      const Eigen::Vector3d& origin,
-                      float radius_m2) {
-  FacingPoints all;
-  for (const PlacedScan& scan : scans) {
-    const Eigen::Matrix3f R = scan.T_target_scan.linear().cast<float>();
-    const Eigen::Vector3f t = (scan.T_target_scan.translation() - origin).cast<float>();
-    const FacingTurn turn(YawOf(scan.T_target_scan.linear()));
-    const std::vector<Eigen::Vector3f>& points = scan.features->points(c);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const Eigen::Vector3f moved = R * points[i] + t;
-      if (moved.head<2>().squaredNorm() > radius_m2) continue;
-      all.points.push_back(moved);
-      if (c == FeatureClass::kVertical) all.facings.push_back(turn(scan.features->facings()[i]));
-    }
-  }
-  return all;
 }
 
 }  // namespace
@@ -109,11 +75,19 @@ RegistrationTarget::RegistrationTarget(std::span<const PlacedScan> scans,
   }
   const auto radius_m2 = static_cast<float>(options.radius_m * options.radius_m);
   for (int c = 0; c < kFeatureClasses; ++c) {
-    FacingPoints all = Gathered(scans, static_cast<FeatureClass>(c), origin_, radius_m2);
-    if (scans.size() > 1 && options.thinning_m > 0.0) {
-      all = AverageInCubes(all, static_cast<float>(options.thinning_m));
+    std::vector<Eigen::Vector3f> points;
+    for (const PlacedScan& scan : scans) {
+      const Eigen::Matrix3f R = scan.T_target_scan.linear().cast<float>();
+      const Eigen::Vector3f t = (scan.T_target_scan.translation() - origin_).cast<float>();
+      for (const Eigen::Vector3f& p : scan.features->points(static_cast<FeatureClass>(c))) {
+        const Eigen::Vector3f moved = R * p + t;
+        if (moved.head<2>().squaredNorm() <= radius_m2) points.push_back(moved);
+      }
     }
-    grids_[c] = std::make_shared<const ColumnGrid>(all.points, kColumnSizeM, all.facings);
+    if (scans.size() > 1 && options.thinning_m > 0.0) {
+      points = AverageInCubes(points, static_cast<float>(options.thinning_m));
+    }
+    grids_[c] = std::make_shared<const ColumnGrid>(points, kColumnSizeM);
   }
 }
 

@@ -23,8 +23,8 @@ struct PlacedScan {
 };
 
 struct TargetOptions {
-  // Features of several scans that share a cube of this edge and a class, and were seen from one
-  // side, are averaged into one [m]; in [0, 10], 0 keeps all. A single scan is never thinned.
+  // Features of several scans that share a cube of this edge and a class are averaged into one
+  // [m]; in [0, 10], 0 keeps all. A single scan is never thinned.
   double thinning_m = 0.1;
   // Features farther than this (horizontally) from the centre are left out [m]; in [1, 10000].
   double radius_m = 120.0;

@@ -168,11 +168,10 @@ absl::Status ScanFeatureOptions::Validate() const {
 SurfaceElement FitSurfaceElement(const ColumnGrid& grid,
                                  const Eigen::Vector3f& p,
                                  int neighbours,
-                                 float radius_m,
-                                 FacingSet among) {
+                                 float radius_m) {
   SurfaceElement element{p, Eigen::Vector3f::Zero()};
   std::array<std::uint32_t, ColumnGrid::kMaxNeighbours> indices;
-  const int n = grid.Nearest(p, neighbours, radius_m, indices.data(), among);
+  const int n = grid.Nearest(p, neighbours, radius_m, indices.data());
   if (n < 4) return element;
   Eigen::Vector3f sum = Eigen::Vector3f::Zero();
   Eigen::Matrix3f moments = Eigen::Matrix3f::Zero();
@@ -228,14 +227,10 @@ ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const ScanFeatureOptio
   ScanFeatures features;
   features.points_ = std::move(points);
   features.sensor_origin_ = options.sensor_origin;
-  features.facings_ =
-      FacingsOf(features.points(FeatureClass::kVertical), options.sensor_origin.cast<float>());
   std::array<ColumnGrid, kFeatureClasses> grids;
   if (options.sample_count == 0) return features;
   for (int c = 0; c < kFeatureClasses; ++c) {
-    const bool upright = static_cast<FeatureClass>(c) == FeatureClass::kVertical;
-    grids[c] = ColumnGrid(
-        features.points_[c], kColumnSizeM, upright ? features.facings_ : std::span<const Facing>());
+    grids[c] = ColumnGrid(features.points_[c], kColumnSizeM);
   }
   // Not the same places in every scan, or their bias would add up along a chain of scans.
   SplitMix64 random(options.seed ^ ContentHash(features.points_));
@@ -250,14 +245,10 @@ ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const ScanFeatureOptio
     while (place >= features.points_[c].size()) place -= features.points_[c++].size();
     SampledFeature& sampled = features.sample_[i];
     sampled.feature_class = static_cast<FeatureClass>(c);
-    if (sampled.feature_class == FeatureClass::kVertical) {
-      sampled.facing = features.facings_[place];
-    }
     sampled.element = FitSurfaceElement(grids[c],
                                         features.points_[c][place],
                                         options.neighbours,
-                                        static_cast<float>(options.neighbour_radius_m),
-                                        CompatibleWith(sampled.facing));
+                                        static_cast<float>(options.neighbour_radius_m));
   }
   return features;
 }
@@ -269,8 +260,7 @@ std::size_t ScanFeatures::size() const {
 }
 
 std::size_t ScanFeatures::memory_bytes() const {
-  std::size_t bytes = sizeof(*this) + sample_.capacity() * sizeof(SampledFeature) +
-                      facings_.capacity() * sizeof(Facing);
+  std::size_t bytes = sizeof(*this) + sample_.capacity() * sizeof(SampledFeature);
   for (const auto& list : points_) bytes += list.capacity() * sizeof(Eigen::Vector3f);
   return bytes;
 }

@@ -13,7 +13,6 @@
 
 #include "core/mls/features.h"
 #include "core/mls/mls_map.h"
-#include "core/registration/facing.h"
 
 namespace strata {
 
@@ -56,24 +55,20 @@ inline bool SeenFromBelow(const Eigen::Vector3f& p, const Eigen::Vector3f& origi
 struct SampledFeature {
   SurfaceElement element;
   FeatureClass feature_class = FeatureClass::kTraversable;
-  Facing facing = kFacingUnknown;  // of a vertical one
 };
 
-// The plane through up to `neighbours` points of `grid` around its feature `p`, among those that
-// face as `among` says. When fewer than
+// The plane through up to `neighbours` points of `grid` around its feature `p`. When fewer than
 // four lie within `radius_m`, or they do not span a plane, the normal is zero and the point `p`.
 SurfaceElement FitSurfaceElement(const ColumnGrid& grid,
                                  const Eigen::Vector3f& p,
                                  int neighbours,
-                                 float radius_m,
-                                 FacingSet among = kAnyFacing);
+                                 float radius_m);
 
 // Registration features of one local map in its scan frame: one point per horizontal patch (cell
 // centre, mean height), evenly spaced points along each vertical one, and a sample of both with
 // normals. Features are matched within their class only (thesis 7.2.3); so that the underside of
 // a deck is not drawn onto its top, level surfaces seen from below are in the class of what cannot
-// be driven on. A vertical one also says to which side it was seen from, and is matched to that
-// side of things only. Flat float arrays, immutable, safe to share between threads.
+// be driven on. Flat float arrays, immutable, safe to share between threads.
 class ScanFeatures {
  public:
   ScanFeatures() = default;
@@ -91,8 +86,6 @@ class ScanFeatures {
   const std::vector<Eigen::Vector3f>& points(FeatureClass c) const {
     return points_[static_cast<std::size_t>(c)];
   }
-  // Of the vertical points, in their order.
-  const std::vector<Facing>& facings() const { return facings_; }
   // In random order: any prefix is a uniform sample.
   const std::vector<SampledFeature>& sample() const { return sample_; }
   // ScanFeatureOptions::sensor_origin.
@@ -103,7 +96,6 @@ class ScanFeatures {
  private:
   Eigen::Vector3d sensor_origin_ = Eigen::Vector3d::Zero();
   std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points_;
-  std::vector<Facing> facings_;
   std::vector<SampledFeature> sample_;
 };
 

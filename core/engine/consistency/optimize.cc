@@ -96,7 +96,8 @@ class Optimizer {
     }
     STRATA_ASSIGN_OR_RETURN(const AlignmentResult result, Align(problem, views));
     STRATA_RETURN_IF_ERROR(Store(world, result, KeptClosures(world, closures, result)));
-    STRATA_ASSIGN_OR_RETURN(const OptimizeVerdict verdict, VerdictOn(world, views, result));
+    STRATA_ASSIGN_OR_RETURN(const OptimizeVerdict verdict,
+                            VerdictOn(world, views, result, damaged_));
     context_.SetMetric("steps", static_cast<double>(verdict.steps));
     context_.SetMetric("steps_loose", static_cast<double>(verdict.loose_steps.size()));
     context_.SetMetric("pairs_compared", static_cast<double>(verdict.compared));

@@ -16,8 +16,9 @@
 namespace strata {
 namespace {
 
-// Of steps that may be loose, and of pairs that may be contradicted.
+// Of steps that may be loose, and of pairs that may be contradicted; a few may always be.
 constexpr double kMostDoubtful = 0.25;
+constexpr std::size_t kFew = 4;
 constexpr std::size_t kNamed = 3;
 // Scans that are looked at closely, spread over the map.
 constexpr std::size_t kMostLookedAt = 60;
@@ -85,8 +86,10 @@ absl::Status Compare(const GraphWorld& world,
 
 void FindLooseSteps(const GraphWorld& world,
                     const std::vector<std::size_t>& parts,
+                    const std::set<ScanNumber>& damaged,
                     OptimizeVerdict& verdict) {
-  for (const std::vector<std::size_t>& trajectory : world.Trajectories()) {
+  for (std::vector<std::size_t> trajectory : world.Trajectories()) {
+    std::erase_if(trajectory, [&](std::size_t k) { return damaged.contains(world.number(k)); });
     for (std::size_t k = 1; k < trajectory.size(); ++k) {
       ++verdict.steps;
       if (parts[trajectory[k - 1]] == parts[trajectory[k]]) continue;
@@ -96,7 +99,8 @@ void FindLooseSteps(const GraphWorld& world,
 }
 
 bool IsTooMany(std::size_t doubtful, std::size_t all) {
-  return static_cast<double>(doubtful) > kMostDoubtful * static_cast<double>(all);
+  return doubtful > kFew &&
+         static_cast<double>(doubtful) > kMostDoubtful * static_cast<double>(all);
 }
 
 std::string StepsMessage(const GraphWorld& world, const OptimizeVerdict& verdict) {
@@ -135,9 +139,10 @@ absl::string_view Meaning(const OptimizeVerdict& verdict, AlignmentTermination t
 
 absl::StatusOr<OptimizeVerdict> VerdictOn(const GraphWorld& world,
                                           ScanViews& views,
-                                          const AlignmentResult& result) {
+                                          const AlignmentResult& result,
+                                          const DamagedScans& damaged) {
   OptimizeVerdict verdict;
-  if (!result.parts.empty()) FindLooseSteps(world, result.parts, verdict);
+  if (!result.parts.empty()) FindLooseSteps(world, result.parts, damaged.Scans(), verdict);
   STRATA_RETURN_IF_ERROR(Compare(world, views, result.T_map_scan, verdict));
   verdict.is_sound = !IsTooMany(verdict.loose_steps.size(), verdict.steps) &&
                      !IsTooMany(verdict.contradicted, verdict.compared);

@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/engine/consistency/graph_world.h"
+#include "core/engine/scans/damaged_scans.h"
 #include "core/engine/scans/scan_views.h"
 #include "core/posegraph/alignment/alignment.h"
 
@@ -33,11 +34,12 @@ struct OptimizeVerdict {
 // Planes that scans share are found at poses that are nearly right; a scan that nothing is matched
 // to is drawn to whatever wall is near. Where more than a quarter of the steps is loose, or of the
 // pairs contradicted, there is nothing that planes could be trusted with: recordings too sparse to
-// overlap, poses of another recording, scans of two places under one name. DATA_LOSS only leaves
-// out a pair.
+// overlap, poses of another recording, scans of two places under one name. Damaged scans are left
+// out.
 absl::StatusOr<OptimizeVerdict> VerdictOn(const GraphWorld& world,
                                           ScanViews& views,
-                                          const AlignmentResult& result);
+                                          const AlignmentResult& result,
+                                          const DamagedScans& damaged);
 
 }  // namespace strata
 

@@ -83,40 +83,6 @@ TEST(ColumnGridTest, AnswersHoldWithinTheirSlack) {
   EXPECT_GT(slack_left, 100);
 }
 
-TEST(ColumnGridTest, OnlyPointsThatFaceAsAskedForAreFound) {
-  const std::vector<Eigen::Vector3f> points = RandomPoints(2000, 8);
-  std::vector<Facing> facings;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    facings.push_back(static_cast<Facing>(i * 7 % (kFacingSectors + 1)));
-  }
-  const ColumnGrid grid(points, 0.4F, facings);
-  for (std::uint32_t i = 0; i < points.size(); ++i) {  // they stay with their points
-    const auto at = std::find(points.begin(), points.end(), grid.points()[i]);
-    ASSERT_EQ(grid.facing(i), facings[static_cast<std::size_t>(at - points.begin())]);
-  }
-  for (const Eigen::Vector3f& p : RandomPoints(300, 9)) {
-    const FacingSet among = CompatibleWith(static_cast<Facing>(1 + p.z() * p.z() * 0.4F));
-    std::vector<float> all;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const float d = (p - points[i]).squaredNorm();
-      if (d < 4.0F && (among >> facings[i] & 1U) != 0) all.push_back(d);
-    }
-    std::sort(all.begin(), all.end());
-    const std::uint32_t found = grid.Nearest(p, 2.0F, among);
-    const auto slack = grid.NearestWithSlack(p, 2.0F, 0.1F, found, among);
-    std::uint32_t indices[ColumnGrid::kMaxNeighbours];
-    const int n = grid.Nearest(p, 20, 2.0F, indices, among);
-    ASSERT_EQ(n, std::min<int>(static_cast<int>(all.size()), 20));
-    if (all.empty()) {
-      EXPECT_EQ(found, ColumnGrid::kNone);
-      continue;
-    }
-    EXPECT_EQ((grid.points()[found] - p).squaredNorm(), all[0]);
-    EXPECT_EQ(slack.index, found);
-    for (int i = 0; i < n; ++i) EXPECT_NE(among >> grid.facing(indices[i]) & 1U, 0U);
-  }
-}
-
 TEST(ColumnGridTest, OutsideOfTheGridIsSearchedToo) {
   const std::vector<Eigen::Vector3f> points = {{0, 0, 0}, {1, 0, 0}};
   const ColumnGrid grid(points, 0.4F);

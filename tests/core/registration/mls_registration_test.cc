@@ -257,28 +257,6 @@ TEST(RegisterScanTest, TheTwoSidesOfAThinWallAreNotDrawnOntoEachOther) {
   EXPECT_TRUE(RegisterScan(again, target, Pose::Identity()).inliers > 500);
 }
 
-// Both faces of a wall stand within one cell of the target: neither is averaged with the other, nor
-// taken for it.
-TEST(RegisterScanTest, AmongScansOfBothSidesOfAWallOnlyThoseOfTheOwnSideCount) {
-  const Pose outside = MakePose(Eigen::Quaterniond::Identity(), {6.0, 7.0, 1.2});
-  const Pose inside = MakePose(Eigen::Quaterniond::Identity(), {0.0, 0.0, 1.2});
-  for (const double wall_m : {0.08, 0.15}) {
-    const ScanFeatures from_outside = Features(Hut(3.0, outside, 1));
-    const ScanFeatures from_inside = Features(Hut(3.0 - wall_m, inside, 2));
-    const PlacedScan placed[] = {{&from_outside, outside}, {&from_inside, inside}};
-    const RegistrationTarget target(placed);
-    const Pose truth = MakePose(Eigen::Quaterniond::Identity(), {0.3, -0.4, 1.2});
-    const ScanFeatures again = Features(Hut(3.0 - wall_m, truth, 3));
-    const RegistrationResult in = RegisterScan(again, target, truth);
-    EXPECT_LT((in.T_target_source.translation() - truth.translation()).head<2>().norm(), 0.005)
-        << wall_m;
-    const Pose beside = MakePose(Eigen::Quaterniond::Identity(), {6.5, 5.5, 1.2});
-    const RegistrationResult out = RegisterScan(Features(Hut(3.0, beside, 4)), target, beside);
-    EXPECT_LT((out.T_target_source.translation() - beside.translation()).head<2>().norm(), 0.005)
-        << wall_m;
-  }
-}
-
 TEST(RegisterScanTest, ClassesAreMatchedAmongThemselvesOnly) {
   std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points;
   for (int i = 0; i < 400; ++i) {
