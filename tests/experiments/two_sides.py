@@ -9,7 +9,8 @@ ones (0.03 m and 0.005 rad a step and axis). Both sides of the deck and of the w
 ingest and after optimize the table has, of the worst world: the bias of each storey's or room's scans (mean error of their
 positions: across the deck, or across the walls), how far the thickness of the deck or wall in the map is from the truth,
 and the error of all positions, each after rigid alignment with the truth, and the last one without it, too: the first
-scan's turn moves all others and says nothing of sides. Exits 1 if a bias exceeds 1 cm. Worlds come from --seed, by default the day's number. Needs python3-numpy.
+scan's turn moves all others and says nothing of sides. Exits 1 if a bias exceeds 1 cm. Worlds come from --seed, by default
+the day's number. Needs python3-numpy.
 """
 import argparse
 import concurrent.futures

@@ -127,8 +127,9 @@ std::string PairsMessage(const OptimizeVerdict& verdict) {
 
 absl::string_view Meaning(const OptimizeVerdict& verdict, AlignmentTermination termination) {
   if (!verdict.is_sound) {
-    return "Not applied: scans nearer to each other, poses of this recording, or one map for each "
-           "place would help; job accept applies it all the same.";
+    return "Too little to be applied by itself: scans nearer to each other, poses of this "
+           "recording, "
+           "or one map for each place would help; job accept applies it.";
   }
   if (!verdict.loose_steps.empty()) return "Usable; look at these steps.";
   return termination == AlignmentTermination::kSettled ? "Good."

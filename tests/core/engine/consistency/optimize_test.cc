@@ -126,7 +126,7 @@ TEST_F(OptimizeOfTwoPlacesTest, IsProposedWithTheReason) {
   const std::vector<Pose> before = Poses();
   const JobInfo job = Optimize();
   EXPECT_EQ(job.state, JobState::kProposed);
-  EXPECT_THAT(job.message, HasSubstr("Not applied"));
+  EXPECT_THAT(job.message, HasSubstr("Too little to be applied by itself"));
   EXPECT_GT(job.metrics.at("steps_loose") + job.metrics.at("pairs_contradicted"), 5.0);
   ExpectEqual(Poses(), before);
   STRATA_ASSERT_OK(db().jobs().Accept({}, kMapName, job.id));  // a person may know better
@@ -138,7 +138,7 @@ TEST_F(OptimizeOfTwoPlacesTest, ThatNobodyAskedForChangesNothing) {
   const std::vector<Pose> before = Poses();
   const JobInfo job = Optimize({{"automatic", "1"}});
   EXPECT_EQ(job.state, JobState::kSucceeded);
-  EXPECT_THAT(job.message, HasSubstr("Not applied"));
+  EXPECT_THAT(job.message, HasSubstr("Too little to be applied by itself"));
   ExpectEqual(Poses(), before);
   EXPECT_EQ(WaitIntegrated(db()).epoch, 1U);
   EXPECT_THAT(db().jobs().Accept({}, kMapName, job.id), StatusIs(Code::kFailedPrecondition, _));

@@ -297,6 +297,10 @@ TEST_F(AlignmentTest, ExcludedPairsAreNotMeasured) {
   for (const RelativePoseTerm& term : result.measured) {
     EXPECT_EQ(term.i < YardScans::kFirst, term.j < YardScans::kFirst) << term.i << " " << term.j;
   }
+  ASSERT_EQ(result.parts.size(), std::size_t{YardScans::kScans});
+  for (std::size_t k = 0; k < YardScans::kScans; ++k) {
+    EXPECT_EQ(result.parts[k], k < YardScans::kFirst ? 0U : YardScans::kFirst) << k;
+  }
 }
 
 TEST_F(AlignmentTest, TheResultDoesNotDependOnTheOrderOfWork) {
