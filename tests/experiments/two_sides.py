@@ -153,6 +153,8 @@ def main():
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--verbose", action="store_true", help="a line for every world")
     options = parser.parse_args()
+    if unknown := set(options.only.split(",")) - set(THICKNESS):
+        parser.error(f"--only {','.join(sorted(unknown))}: use {','.join(THICKNESS)}")
     print(f"two_sides: seed {options.seed}, {options.worlds} worlds each; errors of the worst one, of all in the mean [mm]")
     print("                           bias           thickness      positions      unfitted")
     bad = 0

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
@@ -93,7 +94,7 @@ void FindLooseSteps(const GraphWorld& world,
     for (std::size_t k = 1; k < trajectory.size(); ++k) {
       ++verdict.steps;
       if (parts[trajectory[k - 1]] == parts[trajectory[k]]) continue;
-      verdict.loose_steps.push_back({trajectory[k - 1], trajectory[k]});
+      verdict.loose_steps.push_back(trajectory[k]);
     }
   }
 }
@@ -113,7 +114,7 @@ std::string StepsMessage(const GraphWorld& world, const OptimizeVerdict& verdict
                       loose.size(),
                       verdict.steps);
   for (std::size_t k = 0; k < std::min(kNamed, loose.size()); ++k) {
-    absl::StrAppend(&message, k == 0 ? "" : ", ", world.id(loose[k].second).ToString());
+    absl::StrAppend(&message, k == 0 ? "" : ", ", world.id(loose[k]).ToString());
   }
   return absl::StrCat(message, loose.size() > kNamed ? ", …)" : ")");
 }

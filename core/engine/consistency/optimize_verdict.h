@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -22,8 +21,9 @@ struct OptimizeVerdict {
   // up.
   bool is_sound = true;
   std::size_t steps = 0;  // from scan to scan along trajectories
-  // Those whose two scans no match, closure or given constraint joins, on any way: nodes.
-  std::vector<std::pair<std::size_t, std::size_t>> loose_steps;
+  // Those whose two scans no match, closure or given constraint joins, on any way: the nodes that
+  // they lead to.
+  std::vector<std::size_t> loose_steps;
   // Pairs of scans near each other, along trajectories and across, spread over the map; and those
   // of them where one looked through much of what the other saw.
   std::size_t compared = 0;
