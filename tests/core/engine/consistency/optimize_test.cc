@@ -144,6 +144,21 @@ TEST_F(OptimizeOfTwoPlacesTest, ThatNobodyAskedForChangesNothing) {
   EXPECT_THAT(db().jobs().Accept({}, kMapName, job.id), StatusIs(Code::kFailedPrecondition, _));
 }
 
+TEST_F(OptimizeTest, ScansThatNothingIsMatchedToAreNotMoved) {
+  MakeMap(MapParameters());
+  PointCloud cloud;  // too little to be matched
+  for (int i = 0; i < 20; ++i) cloud.points.emplace_back(5.0F, 0.3F * static_cast<float>(i), 0.5F);
+  for (std::uint64_t k = 1; k <= 7; ++k) {
+    const Pose said = PoseAt(2.0 * static_cast<double>(k), 0.0);
+    STRATA_ASSERT_OK(Upload(db(), HeaderOf({"run", k}, cloud, said), cloud));
+  }
+  WaitIntegrated(db());
+  const JobInfo job = Optimize();
+  EXPECT_EQ(job.state, JobState::kProposed);
+  EXPECT_EQ(job.metrics.at("steps_loose"), 6.0);
+  EXPECT_THAT(job.message, HasSubstr("6 of 6 steps"));
+}
+
 TEST_F(OptimizeTest, WhatAPersonSetMeanwhileStays) {
   MakeWorld();
   const JobInfo job = Optimize({{"dry_run", "1"}});

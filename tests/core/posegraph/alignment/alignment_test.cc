@@ -170,6 +170,33 @@ TEST_F(AlignmentTest, WhereNothingMovesCorrespondencesAreKept) {
   EXPECT_LT(ErrorsOf(result.T_map_scan).max_m, 0.02);
 }
 
+// Counts how often planes are asked for.
+class CountedPlanes final : public AlignmentSource {
+ public:
+  explicit CountedPlanes(AlignmentSource& source) : source_(source) {}
+  absl::StatusOr<std::shared_ptr<const ScanFeatures>> Features(std::size_t node) override {
+    return source_.Features(node);
+  }
+  absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t node) override {
+    ++count;
+    return source_.Planes(node);
+  }
+  std::size_t count = 0;
+
+ private:
+  AlignmentSource& source_;
+};
+
+TEST_F(AlignmentTest, PlanesAreKeptOncePosesAreNearlyRight) {
+  options_.settled_m = 0.0;
+  options_.settled_rad = 0.0;
+  CountedPlanes source(yard());
+  STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align(source));
+  ASSERT_GT(result.rounds.size(), 1U);
+  EXPECT_EQ(source.count, std::size_t{YardScans::kScans});
+  EXPECT_EQ(result.rounds.back().planes, result.rounds.front().planes);
+}
+
 TEST_F(AlignmentTest, PlanesDoNoHarm) {
   for (const std::uint64_t seed : {1, 2}) {
     SCOPED_TRACE(::testing::Message() << "seed " << seed);
