@@ -32,7 +32,8 @@ constexpr double kMinNewShare = 0.5;  // of a plane's support, in no plane accep
 struct PosedEdge {
   const EdgeFeature* edge = nullptr;
   std::size_t scan = 0;
-  Line line;  // in the map, as the points
+  Line line;               // in the map, as the points
+  Eigen::Vector3d sensor;  // which saw it
   std::vector<Eigen::Vector3d> points;
 };
 
@@ -47,7 +48,11 @@ std::vector<PosedEdge> EdgesInMap(std::span<const PosedPlanes> scans) {
   for (std::size_t scan = 0; scan < scans.size(); ++scan) {
     const Pose& T = scans[scan].T_map_scan;
     for (const EdgeFeature& edge : scans[scan].planes->edges) {
-      PosedEdge posed = {.edge = &edge, .scan = scan, .line = {}, .points = {}};
+      PosedEdge posed = {.edge = &edge,
+                         .scan = scan,
+                         .line = {},
+                         .sensor = T * scans[scan].sensor_origin,
+                         .points = {}};
       posed.line = {.origin = T * edge.line.origin, .direction = T.linear() * edge.line.direction};
       for (const Eigen::Vector3d& p : edge.points) posed.points.push_back(T * p);
       edges.push_back(std::move(posed));
@@ -157,10 +162,19 @@ class EdgePlaneFinder {
     });
   }
 
+  // A border is seen up to a beam's spacing inside of where it is: from above a deck's rim seems to
+  // be higher, from below lower, and one plane through both pulled storeys together by 0.04 m.
+  bool SeenFromOneSide(std::uint32_t a, std::uint32_t b, const Plane& plane) const {
+    return SignedDistance(edges_[a].sensor, plane) * SignedDistance(edges_[b].sensor, plane) >= 0.0;
+  }
+
   Candidate SupportOf(const Plane& plane, std::uint32_t around) const {
     Candidate candidate{.plane = plane, .support = {}, .value_m = 0.0};
     for (std::uint32_t i = 0; i < edges_.size(); ++i) {
-      if (Apart(i, around) > options_.max_extent_m || !InCorridor(edges_[i], plane)) continue;
+      if (Apart(i, around) > options_.max_extent_m || !InCorridor(edges_[i], plane) ||
+          !SeenFromOneSide(i, around, plane)) {
+        continue;
+      }
       candidate.support.push_back(i);
       candidate.value_m += edges_[i].edge->length_m;
     }
@@ -241,7 +255,9 @@ class EdgePlaneFinder {
   }
 
   SharedPlane PlaneOf(const Candidate& candidate) const {
-    SharedPlane shared{.plane = candidate.plane,
+    const Plane& plane = candidate.plane;
+    const bool faces = SignedDistance(edges_[candidate.support.front()].sensor, plane) >= 0.0;
+    SharedPlane shared{.plane = faces ? plane : Plane{-plane.normal, -plane.distance},
                        .from_edges = true,
                        .views = {},
                        .support_value = candidate.value_m};

@@ -19,6 +19,7 @@ namespace strata {
 struct PosedPlanes {
   const ScanPlanes* planes = nullptr;  // not null
   Pose T_map_scan = Pose::Identity();
+  Eigen::Vector3d sensor_origin = Eigen::Vector3d::Zero();  // scan frame [m]
 };
 
 // A plane of the world and what scans have in it.
@@ -29,7 +30,7 @@ struct SharedPlane {
     double weight = 0.0;      // area [m²] of its patches, or length [m] of its edges
     double rms_m = 0.0;       // of their distance to `plane` at the given poses
   };
-  Plane plane;                 // in the map; of patches, the normal points to the seen side
+  Plane plane;                 // in the map; the normal points to where it was seen from
   bool from_edges = false;     // otherwise from patches
   std::vector<View> views;     // at least two, one a scan, by scan
   double support_value = 0.0;  // sum of the weights (5.2.3)
@@ -70,9 +71,9 @@ struct SharedPlaneOptions {
 // of the same facing side while offset and tilt pass the gates; of two surfaces of one scan that
 // are not one plane by that scan's own accuracy at most one is in a plane; views that do not
 // fit the plane of all others leave. Edges: RANSAC over pairs of edges by length, corridor, hill
-// climbing (5.2.3); those that are the border of a plane of patches are left out. A patch is in at
-// most one plane. Order: patches' planes by falling support value, then edges'. `options` must be
-// valid and poses finite. A pure function, thread-safe.
+// climbing (5.2.3), all seen from one side of the plane; those that are the border of a plane of
+// patches are left out. A patch is in at most one plane. Order: patches' planes by falling support
+// value, then edges'. `options` must be valid and poses finite. A pure function, thread-safe.
 std::vector<SharedPlane> FindSharedPlanes(std::span<const PosedPlanes> scans,
                                           const SharedPlaneOptions& options = {});
 

@@ -27,6 +27,9 @@ class ScanViews final : public AlignmentSource {
 
   absl::StatusOr<std::shared_ptr<const ScanFeatures>> Features(std::size_t node) override;
   absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t node) override;
+  Eigen::Vector3d SensorOrigin(std::size_t node) const override {
+    return scans_[node].header.sensor_origin.cast<double>();
+  }
   absl::StatusOr<PlaceDescriptor> Place(std::size_t node);
 
   std::size_t size() const { return scans_.size(); }

@@ -359,7 +359,9 @@ class Alignment {
       return absl::OkStatus();
     }));
     std::vector<PosedPlanes> posed;
-    for (std::size_t k = 0; k < held.size(); ++k) posed.push_back({held[k].get(), pose(k)});
+    for (std::size_t k = 0; k < held.size(); ++k) {
+      posed.push_back({held[k].get(), pose(k), source_.SensorOrigin(k)});
+    }
     shared_ = FindSharedPlanes(posed, options_.shared_planes);
     std::erase_if(shared_, [this](const SharedPlane& plane) {
       return std::any_of(

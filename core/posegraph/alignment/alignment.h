@@ -38,6 +38,10 @@ class AlignmentSource {
   // With a sample, in the scan's frame.
   virtual absl::StatusOr<std::shared_ptr<const ScanFeatures>> Features(std::size_t node) = 0;
   virtual absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t node) = 0;
+  // Scan frame [m].
+  virtual Eigen::Vector3d SensorOrigin(std::size_t /*node*/) const {
+    return Eigen::Vector3d::Zero();
+  }
 };
 
 struct MeasuredPose {

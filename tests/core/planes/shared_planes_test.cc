@@ -204,6 +204,41 @@ TEST(SharedPlanesTest, OppositeSidesOfAThinWallAreTwoPlanes) {
   EXPECT_EQ(north->views.size(), 2U);
 }
 
+// The rim of a deck: a line at its lower border, seen from below somewhat too low and from above
+// somewhat too high, by half a beam's spacing each.
+TEST(SharedPlanesTest, EdgesSeenFromAboveAndFromBelowAreTwoPlanes) {
+  const auto rim = [](const Eigen::Vector3d& from, double z) {
+    ScanPlanes planes;
+    for (const Eigen::Vector3d& corner :
+         {Eigen::Vector3d(-6, -4, z), Eigen::Vector3d(-6, 4, z), Eigen::Vector3d(5, -3, z)}) {
+      const Eigen::Vector3d along =
+          planes.edges.size() == 2 ? Eigen::Vector3d::UnitY() : Eigen::Vector3d::UnitX();
+      EdgeFeature edge;
+      for (int k = 0; k <= 10; ++k) edge.points.push_back(corner + 0.8 * k * along - from);
+      edge.line = {.origin = corner + 4.0 * along - from, .direction = along};
+      edge.length_m = 8.0;
+      planes.edges.push_back(edge);
+    }
+    return planes;
+  };
+  const std::vector<Eigen::Vector3d> places = {{-2, 0, 1}, {2, 0, 1}, {-2, 0, 4}, {2, 0, 4}};
+  std::vector<ScanPlanes> seen;
+  std::vector<PosedPlanes> posed;
+  for (const Eigen::Vector3d& at : places) seen.push_back(rim(at, at.z() < 3 ? 2.97 : 3.03));
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    posed.push_back({&seen[k], MakePose(Eigen::Quaterniond::Identity(), places[k])});
+  }
+  const std::vector<SharedPlane> planes = FindSharedPlanes(posed);
+  ASSERT_EQ(planes.size(), 2U);
+  for (const SharedPlane& plane : planes) {
+    ASSERT_EQ(plane.views.size(), 2U);
+    const bool above = plane.views.front().scan >= 2;
+    EXPECT_EQ(plane.views.back().scan, plane.views.front().scan + 1);
+    EXPECT_NEAR(std::abs(plane.plane.distance), above ? 3.03 : 2.97, 1e-6);
+    EXPECT_NEAR(plane.plane.normal.z(), above ? 1.0 : -1.0, 1e-6);
+  }
+}
+
 TEST(SharedPlanesTest, OneScanOrNoneGivesNone) {
   const Views views = Look(Yard(), {{0, 0, 1.5}}, 50);
   EXPECT_TRUE(FindSharedPlanes(views.At(views.truth)).empty());
