@@ -13,6 +13,7 @@
 
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 
 #include "core/common/random.h"
 #include "core/geometry/plane_fit.h"
@@ -25,7 +26,9 @@ namespace strata {
 namespace {
 
 constexpr double kMinSpreadM = 0.5;  // σ of the support across its longest direction
+constexpr double kLevel = 0.7;       // of the normal to the vertical, as a cosine
 constexpr std::size_t kMinLines = 3;
+constexpr double kMinAcross = 0.1;  // share of the length that runs across the main direction
 constexpr double kMinContrast = 3.0;
 constexpr double kMinNewShare = 0.5;  // of a plane's support, in no plane accepted before
 
@@ -164,7 +167,9 @@ class EdgePlaneFinder {
 
   // A border is seen up to a beam's spacing inside of where it is: from above a deck's rim seems to
   // be higher, from below lower, and one plane through both pulled storeys together by 0.04 m.
-  bool SeenFromOneSide(std::uint32_t a, std::uint32_t b, const Plane& plane) const {
+  // Beams are close beside each other: edges in upright planes are where they seem to be.
+  bool MayShare(std::uint32_t a, std::uint32_t b, const Plane& plane) const {
+    if (std::abs(plane.normal.z()) < kLevel) return true;
     return SignedDistance(edges_[a].sensor, plane) * SignedDistance(edges_[b].sensor, plane) >= 0.0;
   }
 
@@ -172,7 +177,7 @@ class EdgePlaneFinder {
     Candidate candidate{.plane = plane, .support = {}, .value_m = 0.0};
     for (std::uint32_t i = 0; i < edges_.size(); ++i) {
       if (Apart(i, around) > options_.max_extent_m || !InCorridor(edges_[i], plane) ||
-          !SeenFromOneSide(i, around, plane)) {
+          !MayShare(i, around, plane)) {
         continue;
       }
       candidate.support.push_back(i);
@@ -231,6 +236,7 @@ class EdgePlaneFinder {
       return false;
     }
     if (LineCount(candidate.support) < kMinLines) return false;
+    if (ShareAcross(candidate.support) < kMinAcross) return false;
     double beside = 0.0;
     for (const int k : {-4, -3, -2, 2, 3, 4}) {
       const Plane shifted = {.normal = candidate.plane.normal,
@@ -238,6 +244,20 @@ class EdgePlaneFinder {
       beside += SupportOf(shifted, candidate.support.front()).value_m / 6;
     }
     return candidate.value_m >= kMinContrast * beside;
+  }
+
+  // Parallel borders lie in one plane by chance: the rims of a deck's openings and a kerb below.
+  double ShareAcross(std::span<const std::uint32_t> support) const {
+    Eigen::Matrix3d directions = Eigen::Matrix3d::Zero();
+    for (const std::uint32_t i : support) {
+      const Eigen::Vector3d& d = edges_[i].line.direction;
+      directions += edges_[i].edge->length_m * d * d.transpose();
+    }
+    const Eigen::Vector3d shares =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(directions, Eigen::EigenvaluesOnly)
+            .eigenvalues() /
+        directions.trace();
+    return 1.0 - shares(2);
   }
 
   // Different lines among the edges; the same border seen from many scans is one.

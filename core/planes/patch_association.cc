@@ -249,15 +249,20 @@ class PatchAssociation {
     }
   }
 
+  // Square of what a patch's distance to the plane exceeds its own spread by [m²].
+  static double Excess(const PosedPatch& patch, const Plane& plane) {
+    const double own = RmsDistance(patch.information, patch.plane);
+    const double rms = RmsDistance(patch.information, plane);
+    return std::max(0.0, rms * rms - own * own);
+  }
+
   // Mean square of what the patches' distances to the plane exceed their own spread by.
   double Disagreement(std::span<const std::uint32_t> group, const Plane& plane) const {
     double sum = 0.0;
     double weight = 0.0;
     for (const std::uint32_t i : group) {
       const PosedPatch& p = patches_[i];
-      const double own = RmsDistance(p.information, p.plane);
-      const double rms = RmsDistance(p.information, plane);
-      sum += p.measurements * std::max(0.0, rms * rms - own * own);
+      sum += p.measurements * Excess(p, plane);
       weight += p.measurements;
     }
     return sum / weight;
@@ -275,7 +280,8 @@ class PatchAssociation {
               .try_emplace(p.scan,
                            SharedPlane::View{.scan = p.scan, .moments = Eigen::Matrix4d::Zero()})
               .first->second;
-      const double weight = p.measurements / (p.variance_m2 + disagreement);
+      const double doubt = std::max(disagreement, Excess(p, shared.plane));
+      const double weight = p.measurements / (p.variance_m2 + doubt);
       view.moments += weight / p.patch->moments(3, 3) * p.patch->moments;
       view.weight += p.patch->area_m2;
       view.rms_m += p.patch->area_m2 * std::pow(RmsDistance(p.information, shared.plane), 2);
