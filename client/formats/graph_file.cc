@@ -71,7 +71,13 @@ struct Lines {
   bool empty() const { return vertices.empty() && edges.empty(); }
 };
 
+struct Clipped {
+  std::size_t count = 0;
+  double least_eigenvalue = 0.0;
+};
+
 struct Parsed {
+  Clipped clipped;
   Lines<Pose, RelativePoseTerm> spatial;
   Lines<PlanarPose, PlanarRelativeTerm> planar;
   std::vector<Line<bool>> fixed;
@@ -113,9 +119,24 @@ Matrix6d InformationFromToro(const Matrix6d& toro) {
   return information;
 }
 
+template <int size>
+absl::Status Settle(const TextCursor& cursor,
+                    Eigen::Matrix<double, size, size>& information,
+                    Clipped& clipped) {
+  if (ValidateSemidefinite<size>(information, "information").ok()) return absl::OkStatus();
+  if (information.allFinite()) {
+    clipped.least_eigenvalue =
+        std::min(clipped.least_eigenvalue, ClipToSemidefinite<size>(information));
+    ++clipped.count;
+  }
+  const absl::Status status = ValidateSemidefinite<size>(information, "information");
+  return status.ok() ? status : cursor.Error(status.message());
+}
+
 absl::StatusOr<RelativePoseTerm> SpatialTerm(const TextCursor& cursor,
                                              Dialect dialect,
-                                             const std::vector<double>& v) {
+                                             const std::vector<double>& v,
+                                             Clipped& clipped) {
   RelativePoseTerm term;
   STRATA_ASSIGN_OR_RETURN(term.T_i_j, SpatialPose(cursor, dialect, v.data()));
   if (dialect == Dialect::kG2o) {
@@ -123,14 +144,14 @@ absl::StatusOr<RelativePoseTerm> SpatialTerm(const TextCursor& cursor,
   } else if (v.size() > kBareToroEdge) {
     term.information = InformationFromToro(UpperTriangle<6>(v.data() + kBareToroEdge));
   }
-  const absl::Status status = ValidateSemidefinite<6>(term.information, "information");
-  if (!status.ok()) return cursor.Error(status.message());
+  STRATA_RETURN_IF_ERROR(Settle<6>(cursor, term.information, clipped));
   return term;
 }
 
 absl::StatusOr<PlanarRelativeTerm> PlanarTerm(const TextCursor& cursor,
                                               Dialect dialect,
-                                              const std::vector<double>& v) {
+                                              const std::vector<double>& v,
+                                              Clipped& clipped) {
   PlanarRelativeTerm term;
   term.T_i_j = PlanarPose(v[0], v[1], v[2]);
   if (dialect == Dialect::kG2o) {
@@ -138,8 +159,7 @@ absl::StatusOr<PlanarRelativeTerm> PlanarTerm(const TextCursor& cursor,
   } else {  // Ixx Ixy Iyy Itt Ixt Iyt
     term.information << v[3], v[4], v[7], v[4], v[5], v[8], v[7], v[8], v[6];
   }
-  const absl::Status status = ValidateSemidefinite<3>(term.information, "information");
-  if (!status.ok()) return cursor.Error(status.message());
+  STRATA_RETURN_IF_ERROR(Settle<3>(cursor, term.information, clipped));
   return term;
 }
 
@@ -224,11 +244,11 @@ absl::Status ParseEdge(const TextCursor& cursor,
   STRATA_ASSIGN_OR_RETURN(const std::vector<double> v, NumbersOf(cursor, tag, words, 3));
   const std::size_t line = cursor.line_number();
   if (tag.kind == Kind::kEdge2) {
-    STRATA_ASSIGN_OR_RETURN(const auto term, PlanarTerm(cursor, tag.dialect, v));
+    STRATA_ASSIGN_OR_RETURN(const auto term, PlanarTerm(cursor, tag.dialect, v, parsed.clipped));
     parsed.planar.edges.push_back({.line = line, .i = i, .j = j, .value = term});
     return absl::OkStatus();
   }
-  STRATA_ASSIGN_OR_RETURN(const auto term, SpatialTerm(cursor, tag.dialect, v));
+  STRATA_ASSIGN_OR_RETURN(const auto term, SpatialTerm(cursor, tag.dialect, v, parsed.clipped));
   parsed.spatial.edges.push_back({.line = line, .i = i, .j = j, .value = term});
   return absl::OkStatus();
 }
@@ -397,14 +417,33 @@ absl::StatusOr<GraphFile> ParseGraph(absl::string_view text) {
     if (words.empty() || words[0][0] == '#') continue;
     STRATA_RETURN_IF_ERROR(ParseLine(cursor, words, parsed));
   }
-  if (!parsed.planar.empty()) {
-    return Assemble(parsed.planar, parsed.fixed, &PlanarPoseGraph::poses, PlanarPose(0, 0, 0));
+  if (parsed.planar.empty() && parsed.spatial.empty()) {
+    return cursor.Error("expected vertices or edges, found the end of the file");
   }
-  if (!parsed.spatial.empty()) {
-    return Assemble(
-        parsed.spatial, parsed.fixed, &PoseGraphProblem::T_map_scan, Pose(Pose::Identity()));
+  absl::StatusOr<GraphFile> file =
+      parsed.spatial.empty()
+          ? Assemble(parsed.planar, parsed.fixed, &PlanarPoseGraph::poses, PlanarPose(0, 0, 0))
+          : Assemble(parsed.spatial,
+                     parsed.fixed,
+                     &PoseGraphProblem::T_map_scan,
+                     Pose(Pose::Identity()));
+  if (file.ok()) {
+    file->clipped = parsed.clipped.count;
+    file->least_eigenvalue = parsed.clipped.least_eigenvalue;
   }
-  return cursor.Error("expected vertices or edges, found the end of the file");
+  return file;
+}
+
+std::string ClippedWarning(const GraphFile& file) {
+  if (file.clipped == 0) return "";
+  const std::size_t edges =
+      std::visit([](const auto& graph) { return graph.relative.size(); }, file.graph);
+  return absl::StrCat(file.clipped,
+                      " of ",
+                      edges,
+                      " informations have a negative eigenvalue, the least ",
+                      file.least_eigenvalue,
+                      "; each is replaced by the nearest positive semidefinite matrix");
 }
 
 absl::StatusOr<GraphFile> ReadGraph(const std::filesystem::path& path) {
