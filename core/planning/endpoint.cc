@@ -34,7 +34,8 @@ CellIndex CellAt(const PlanEndpoint& endpoint, double cell_size_m) {
           static_cast<std::int32_t>(std::floor(endpoint.y_m / cell_size_m))};
 }
 
-// The surface of the endpoint's cell that is meant; kNoPatchId if the level does not exist.
+// The surface of the endpoint's cell that is meant; kNoPatchId if the level does not exist or no
+// surface is within the robot's height of z.
 PatchId Choose(SearchSpace& space,
                const PlanEndpoint& endpoint,
                const SearchSpace::Column& column) {
@@ -44,16 +45,58 @@ PatchId Choose(SearchSpace& space,
                ? column[static_cast<std::size_t>(level)]
                : kNoPatchId;
   }
-  if (column.empty()) return kNoPatchId;
-  PatchId best = column.front();
-  if (!endpoint.z_m.has_value()) return best;
+  if (!endpoint.z_m.has_value()) return column.empty() ? kNoPatchId : column.front();
+  PatchId best = kNoPatchId;
+  double best_off = space.checks().height_m;
   for (const PatchId patch : column) {
-    if (std::abs(space.Height(patch) - *endpoint.z_m) <
-        std::abs(space.Height(best) - *endpoint.z_m)) {
-      best = patch;
-    }
+    const double off = std::abs(space.Height(patch) - *endpoint.z_m);
+    if (off > best_off || (off == best_off && best != kNoPatchId)) continue;
+    best = patch;
+    best_off = off;
   }
   return best;
+}
+
+// The highest surface of the endpoint's cell on which a robot stands whose body reaches z;
+// kNoPatchId if there is none.
+PatchId FloorBelow(SearchSpace& space,
+                   const PlanEndpoint& endpoint,
+                   const SearchSpace::Column& column) {
+  if (!endpoint.z_m.has_value()) return kNoPatchId;
+  PatchId best = kNoPatchId;
+  for (const PatchId patch : column) {
+    const double below = *endpoint.z_m - space.Height(patch);
+    if (below < 0.0 || below > space.checks().height_m || space.Danger(patch) < 0.0F) continue;
+    if (best == kNoPatchId || space.Height(patch) > space.Height(best)) best = patch;
+  }
+  return best;
+}
+
+// Why no surface of the endpoint's cell is meant.
+std::string WhyNoneChosen(SearchSpace& space,
+                          const PlanEndpoint& endpoint,
+                          const SearchSpace::Column& column) {
+  const std::string place = absl::StrFormat("(%.2f, %.2f)", endpoint.x_m, endpoint.y_m);
+  if (column.empty()) return absl::StrCat("no surface at ", place);
+  if (endpoint.level.has_value()) {
+    return absl::StrCat(
+        "no level ", *endpoint.level, " at ", place, ", which has ", column.size(), " surfaces");
+  }
+  return absl::StrFormat("no surface within %.2f m, the robot's height, of z = %.2f at %s",
+                         space.checks().profile.height_m,
+                         *endpoint.z_m,
+                         place);
+}
+
+// "(1.05, 2.15, 2.90), 2.90 m above the z asked for".
+std::string DescribeNearest(const PlanEndpoint& endpoint, const Eigen::Vector3d& nearest) {
+  std::string text = absl::StrFormat("(%.2f, %.2f, %.2f)", nearest.x(), nearest.y(), nearest.z());
+  if (endpoint.z_m.has_value()) {
+    const double up = nearest.z() - *endpoint.z_m;
+    absl::StrAppendFormat(
+        &text, ", %.2f m %s the z asked for", std::abs(up), up < 0.0 ? "below" : "above");
+  }
+  return text;
 }
 
 // True if a patch of the endpoint's surroundings, `d` away, is on the level that the endpoint
@@ -167,18 +210,10 @@ absl::StatusOr<EndpointMatch> MatchEndpoint(SearchSpace& space, const PlanEndpoi
     return match;
   }
   std::optional<double> z = endpoint.z_m;
-  const std::string place = absl::StrFormat("(%.2f, %.2f)", endpoint.x_m, endpoint.y_m);
   if (patch == kNoPatchId) {
     match.reason = {
         Obstruction::kUnknown, 0.0, Eigen::Vector3d(endpoint.x_m, endpoint.y_m, z.value_or(0.0))};
-    match.message = column.empty() ? absl::StrCat("no surface at ", place)
-                                   : absl::StrCat("no level ",
-                                                  *endpoint.level,
-                                                  " at ",
-                                                  place,
-                                                  ", which has ",
-                                                  column.size(),
-                                                  " surfaces");
+    match.message = WhyNoneChosen(space, endpoint, column);
   } else {
     STRATA_ASSIGN_OR_RETURN(match.reason, WhyNotStand(space, patch));
     match.message = absl::StrFormat("cannot stand at (%.2f, %.2f, %.2f): %s",
@@ -186,9 +221,10 @@ absl::StatusOr<EndpointMatch> MatchEndpoint(SearchSpace& space, const PlanEndpoi
                                     endpoint.y_m,
                                     space.Height(patch),
                                     match.reason.ToString());
-    z = space.Height(patch);
+    if (!z.has_value()) z = space.Height(patch);
   }
   match.patch = Snap(space, endpoint, patch);
+  if (match.patch == kNoPatchId) match.patch = FloorBelow(space, endpoint, column);
   STRATA_RETURN_IF_ERROR(space.status());
   if (match.patch != kNoPatchId) {
     const Eigen::Vector3d p = space.Position(match.patch);
@@ -203,10 +239,8 @@ absl::StatusOr<EndpointMatch> MatchEndpoint(SearchSpace& space, const PlanEndpoi
   match.nearest = NearestStandable(space, endpoint, z);
   STRATA_RETURN_IF_ERROR(space.status());
   if (match.nearest.has_value()) {
-    match.message += absl::StrFormat("; nearest place to stand (%.2f, %.2f, %.2f)",
-                                     match.nearest->x(),
-                                     match.nearest->y(),
-                                     match.nearest->z());
+    absl::StrAppend(
+        &match.message, "; nearest place to stand ", DescribeNearest(endpoint, *match.nearest));
   }
   return match;
 }

@@ -31,12 +31,16 @@ absl::Status ValidateEndpoint(absl::string_view name,
                               const PlanEndpoint& endpoint,
                               double cell_size_m);
 
-// The surface of the endpoint's cell that `endpoint` names, if the robot can stand there. Otherwise
+// The surface of the endpoint's cell that `endpoint` names, if the robot can stand there: the
+// level, the lowest, or the one nearest to z that is at most the robot's height from it. Otherwise
 // the nearest place to stand, by horizontal distance d between (x, y) and centres of cells, then by
 // height, x and y: at most radius + max_gap away, and
 //   with z         within max_step + tan(max_slope) · d of it, or of the named surface
 //   with a level   on the surface of that level in its cell
 //   with neither   on the lowest surface of its cell.
+// Failing that, with z, the highest surface of the cell at or below z on which the robot can stand
+// and reaches z: z may be a sensor's, and a ceiling nearer to it than the floor. Never another
+// storey: `message` then says where the nearest place to stand is and how far from z.
 absl::StatusOr<EndpointMatch> MatchEndpoint(SearchSpace& space, const PlanEndpoint& endpoint);
 
 }  // namespace strata

@@ -64,6 +64,15 @@ struct Comparison {
   }
 };
 
+// Adds what `image` says of a point, in the image's frame.
+Sight Look(const Eigen::Vector3f& p_image, const ViewImage& image, Comparison& sum) {
+  const Sight sight = image.At(p_image);
+  sum.no_return += sight == Sight::kNoReturn ? 1 : 0;
+  sum.seen_through += sight == Sight::kSeenThrough ? 1 : 0;
+  sum.visible += sight == Sight::kSeenThrough || sight == Sight::kAgreeing ? 1 : 0;
+  return sight;
+}
+
 // A registered start and how well it fits.
 struct Fit {
   RegistrationResult registration;
@@ -211,14 +220,8 @@ class Matcher {
     const Eigen::Isometry3f to_grid = T_grid_points.cast<float>();
     for (const SampledPoint& point : points) {
       const Eigen::Vector3f p_image = to_image * point.p;
-      const Sight sight = image.At(p_image);
-      if (sight == Sight::kUnknown) continue;
-      if (sight == Sight::kNoReturn) {
-        ++sum.no_return;
-        continue;
-      }
-      ++sum.visible;
-      sum.seen_through += sight == Sight::kSeenThrough ? 1 : 0;
+      const Sight sight = Look(p_image, image, sum);
+      if (sight == Sight::kUnknown || sight == Sight::kNoReturn) continue;
       if (p_image.norm() > kComparedRangeM) continue;
       Comparison::Share& share = point.upright ? sum.upright : sum.level;
       ++share.all;
@@ -305,6 +308,20 @@ absl::Status PlaceMatchOptions::Validate() const {
   checks.InRange("same_place_rad", same_place_rad, 1e-3, 3.15);
   if (!checks.status().ok()) return checks.status();
   return registration.Validate();
+}
+
+double ContradictionOf(const SeenScan& a, const SeenScan& b) {
+  const auto seen = [](const SeenScan& looked_at, const SeenScan& looking) {
+    const ViewImage image(*looking.features, looking.sensor_origin);
+    const Pose T = looking.T_target_scan.inverse() * looked_at.T_target_scan;
+    const Eigen::Isometry3f to_image = T.cast<float>();
+    Comparison sum;
+    for (const SampledPoint& point : SampleOf(*looked_at.features)) {
+      Look(to_image * point.p, image, sum);
+    }
+    return sum.Contradiction();
+  };
+  return std::max(seen(a, b), seen(b, a));
 }
 
 PlaceMatch MatchPlace(const SeenScan& source,

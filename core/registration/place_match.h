@@ -101,6 +101,10 @@ struct PlaceMatch {
   bool matched() const { return verdict == PlaceVerdict::kMatched; }
 };
 
+// PlaceMatch::contradiction of two scans where they are, 0 if neither looked to where the other saw
+// anything. A pure function; costs some ms.
+double ContradictionOf(const SeenScan& a, const SeenScan& b);
+
 // The best fit of `source` to the scans of `target` within the windows: images of both from above
 // are searched for the best starts, each start is registered exactly, and the fits are compared and
 // checked both ways. A pure function of its arguments and their order. Costs some ten ms and some

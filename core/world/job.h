@@ -17,7 +17,8 @@ enum class JobState : std::uint8_t {  // stored
   kSucceeded = 3,
   kFailed = 4,
   kCancelled = 5,
-  kProposed = 6,  // a dry run has ended; what it found waits to be accepted or reverted
+  kProposed =
+      6,  // what a dry run, or an optimize that nothing speaks for, found waits for a person
 };
 
 // As clients and metrics say it: "queued", "running" …; "unknown" for a number that is no state.

@@ -30,7 +30,7 @@ std::vector<JobParameter> OptimizeParameters() {
       {"closures", FlagType(), "1", "Look for loops that nobody closed yet"},
       {"planes", FlagType(), "1", "Walls and floors hold the scans that see them"},
       {"robust", FlagType(), "1", "Leave out closures that contradict the rest"},
-      {"rounds", WholeType{1, 20}, "5", "Most rounds of matching and optimising"},
+      {"rounds", WholeType{1, 50}, "30", "Most rounds of matching and optimising"},
       {"pool", WholeType{1, 50}, "5", "Consecutive scans that move as one"},
       {"weighting",
        ChoiceType{{"covariance", "local_global"}},

@@ -20,8 +20,8 @@
 
 namespace strata {
 
-// A place on a surface: the one nearest in height to `z_m`, or the `level`-th from below (0 =
-// lowest). Neither: the lowest.
+// A place on a surface: the one nearest in height to `z_m`, at most the robot's height from it, or
+// the `level`-th from below (0 = lowest). Neither: the lowest.
 struct PlanEndpoint {
   double x_m = 0.0;
   double y_m = 0.0;

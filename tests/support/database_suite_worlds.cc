@@ -167,7 +167,7 @@ TEST_P(DatabaseSuite, BadParametersOfAJobAreNamed) {
   const std::vector<std::pair<std::string, std::string>> bad = {{"dry_run", "maybe"},
                                                                 {"closures", "2"},
                                                                 {"rounds", "0"},
-                                                                {"rounds", "21"},
+                                                                {"rounds", "51"},
                                                                 {"pool", "51"},
                                                                 {"local_weight", "1.5"},
                                                                 {"weighting", "by_taste"},

@@ -33,25 +33,30 @@ struct Options {
   std::uint64_t seed = 1;
   int districts = 1;
   double slab_m = 0.3;
+  double wall_m = 0.1;
   std::vector<std::string> robots;
   RobotFiles files;
 };
 
-World WorldOf(const std::string& name, std::uint64_t seed, int districts, double slab_m) {
+World WorldOf(const Options& options) {
+  const std::string& name = options.world;
   if (name == "car_park") {
-    return CarParkWorld(slab_m);
+    return CarParkWorld(options.slab_m);
+  }
+  if (name == "rooms") {
+    return RoomsWorld(options.wall_m, options.seed);
   }
   if (name == "building") {
-    return BuildingWorld(seed);
+    return BuildingWorld(options.seed);
   }
   if (name == "campus") {
-    return CampusWorld(seed);
+    return CampusWorld(options.seed);
   }
   if (name == "city") {
-    return CityWorld(districts, seed);
+    return CityWorld(options.districts, options.seed);
   }
   if (name == "campus_loop") {
-    return CampusLoopWorld(seed);
+    return CampusLoopWorld(options.seed);
   }
   if (name == "low_bridge") {
     return BridgeWorld({.parapets = true, .clearance_m = 1.5});
@@ -89,7 +94,7 @@ std::string ClassLines(const Scene& scene) {
 }
 
 absl::Status Simulate(const Options& options) {
-  const World world = WorldOf(options.world, options.seed, options.districts, options.slab_m);
+  const World world = WorldOf(options);
   STRATA_ASSIGN_OR_RETURN(const std::vector<Robot> robots, RobotsOf(world, options.robots));
   std::filesystem::create_directories(options.out);
   std::string places;
@@ -124,10 +129,12 @@ int Main(int argc, char** argv) {
                              "car_park",
                              "campus",
                              "campus_loop",
-                             "city"}));
+                             "city",
+                             "rooms"}));
   app.add_option("OUT", options.out, "Folder to write to")->required();
-  app.add_option(
-         "--seed", options.seed, "Of all noise, and of what campus, city and building look like")
+  app.add_option("--seed",
+                 options.seed,
+                 "Of all noise, and of what campus, city, building and rooms look like")
       ->capture_default_str();
   app.add_flag("--labels", options.files.sensor.labelled, "Say of every point what it is of");
   app.add_option("--robot",
@@ -137,6 +144,9 @@ int Main(int argc, char** argv) {
   app.add_option("--slab", options.slab_m, "Of the car park's upper storey [m]")
       ->capture_default_str()
       ->check(CLI::Range(0.05, 2.0));
+  app.add_option("--wall", options.wall_m, "Of the rooms [m]")
+      ->capture_default_str()
+      ->check(CLI::Range(0.02, 1.0));
   app.add_option("--districts", options.districts, "Of the city, a robot in each")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();

@@ -48,6 +48,14 @@ World BridgeWorld(const BridgeOptions& options = {});
 //   places: "below" and "above" at the same x, y; "ramp_foot", "ramp_head".
 World CarParkWorld(double slab_m = 0.3);
 
+// Four rooms around (0, 0), some 14 × 11 m together and 2.8 m high, with a ceiling; walls between
+// and around them are `wall_m` thick, with a door in each inner one and cupboards, boxes and
+// columns that stand free; sizes, doors and things by the seed.
+//   robots: "round" goes through all of them, and through the first two once more.
+//   places: "crossing", where the middles of the inner walls along x and y cross; "room0" to
+//   "room3", counterclockwise from the one with the least x and y.
+World RoomsWorld(double wall_m = 0.1, std::uint64_t seed = 1);
+
 // Rolling terrain of 300 × 300 m with houses and trees.
 //   robots: "north_loop" and "south_loop", each some 500 m, sharing the street in the middle.
 //   places: "start" and "far".

@@ -152,6 +152,24 @@ TEST(WorldsTest, BuildingsCanBeDrivenRound) {
   }
 }
 
+TEST(WorldsTest, RoomsCanBeDrivenThroughAndTheirWallsAreAsThickAsAskedFor) {
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    const double wall_m = seed % 2 == 0 ? 0.08 : 0.15;
+    const World world = RoomsWorld(wall_m, seed);
+    ExpectPlacesOnSurfaces(world);
+    ExpectDrivesAreFree(world);
+    const Vector3d room = world.places.at("room0");
+    for (const int axis : {0, 1}) {  // seen from both sides, above all things
+      Vector3d from(room.x(), room.y(), 2.6);
+      const double near = world.scene.Cast(from, Vector3d::Unit(axis), 50).value();
+      EXPECT_NEAR(from[axis] + near, -0.5 * wall_m, 1e-9);
+      from[axis] = 3.0;
+      const double far = world.scene.Cast(from, -Vector3d::Unit(axis), 50).value();
+      EXPECT_NEAR(from[axis] - far, 0.5 * wall_m, 1e-9);
+    }
+  }
+}
+
 // Where a labelled scan of the first building says windows are, and of what else there is much.
 TEST(WorldsTest, WhatABuildingIsMadeOfIsSeenFromItsRound) {
   const World world = BuildingWorld(1);

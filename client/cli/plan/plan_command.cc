@@ -130,7 +130,7 @@ void AddEndpoints(CLI::App* verb, const std::shared_ptr<PlanOptions>& options) {
       2,
       3,
       [options](const std::vector<double>& n) { options->query.from = EndpointOf(n); },
-      "Start [m]; the surface nearest to Z, without Z the lowest");
+      "Start [m]; the surface nearest to Z, within the robot's height of it; without Z the lowest");
   CLI::Option* to = AddNumbers(
       verb,
       "--to",
@@ -138,7 +138,7 @@ void AddEndpoints(CLI::App* verb, const std::shared_ptr<PlanOptions>& options) {
       2,
       3,
       [options](const std::vector<double>& n) { options->query.to = EndpointOf(n); },
-      "Goal [m]");
+      "Goal [m]; its surface as for --from");
   from->needs(to);
   to->needs(from);
   verb->add_option("--from-level", options->from_level, "Start on this surface, 0 = lowest")

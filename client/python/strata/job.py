@@ -16,7 +16,7 @@ class Job:
     kind: str
     parameters: dict
     state: str
-    """queued, running, succeeded, failed, cancelled, or proposed (a dry run has ended)."""
+    """queued, running, succeeded, failed, cancelled, or proposed (found by a dry run, or too little speaks for it)."""
     progress: float
     """Share of the work done."""
     phase: str

@@ -340,7 +340,7 @@ class Map:
         return job.from_proto(answer.job)
 
     def accept_job(self, which):
-        """Makes what a dry run proposed real; the Job, queued again."""
+        """Makes what is proposed real; the Job, queued again."""
         answer = self._connection.once(self._jobs.Accept, jobs_pb2.AcceptJobRequest(map=self.name, id=which.id))
         return job.from_proto(answer.job)
 

@@ -17,6 +17,7 @@
 #include "core/engine/consistency/closure_search.h"
 #include "core/engine/consistency/graph_world.h"
 #include "core/engine/consistency/optimize_settings.h"
+#include "core/engine/consistency/optimize_verdict.h"
 #include "core/engine/consistency/proposal.h"
 #include "core/engine/map/parallel.h"
 #include "core/engine/scans/damaged_scans.h"
@@ -54,6 +55,7 @@ class PartOfJob final : public JobContext {
 struct Proposed {
   std::uint64_t base_epoch = 0;  // that the proposal is of
   std::string summary;           // for people
+  bool is_sound = true;          // worth an epoch without a person's word
 };
 
 class Optimizer {
@@ -94,7 +96,14 @@ class Optimizer {
     }
     STRATA_ASSIGN_OR_RETURN(const AlignmentResult result, Align(problem, views));
     STRATA_RETURN_IF_ERROR(Store(world, result, KeptClosures(world, closures, result)));
-    return Proposed{world.epoch(), Report(world, result)};
+    STRATA_ASSIGN_OR_RETURN(const OptimizeVerdict verdict,
+                            VerdictOn(world, views, result, damaged_));
+    context_.SetMetric("steps", static_cast<double>(verdict.steps));
+    context_.SetMetric("steps_loose", static_cast<double>(verdict.loose_steps.size()));
+    context_.SetMetric("pairs_compared", static_cast<double>(verdict.compared));
+    context_.SetMetric("pairs_contradicted", static_cast<double>(verdict.contradicted));
+    return Proposed{
+        world.epoch(), absl::StrCat(Report(world, result), " ", verdict.message), verdict.is_sound};
   }
 
  private:
@@ -204,7 +213,7 @@ class Optimizer {
     context_.SetMetric("shift_rms_m", rms);
     context_.SetMetric("shift_max_m", largest);
     return absl::StrFormat(
-        "%d scans, %d planes: moved by %.3f m rms, %.3f m at most; %s after %d rounds",
+        "%d scans, %d planes: moved by %.3f m rms, %.3f m at most; %s after %d rounds.",
         world.size(),
         result.planes.size(),
         rms,
@@ -244,6 +253,13 @@ class Optimizer {
   JobContext& context_;
 };
 
+// Nobody waits for a proposal that nobody asked for; the next closure brings another.
+absl::Status Drop(MapCore& core, const JobInfo& job, const Stop& stop) {
+  return core.writer().Run(Durability::kFull, 0, stop, [&](StorageWriter& writer) {
+    return writer.DiscardProposal(job.id);
+  });
+}
+
 }  // namespace
 
 absl::Status RunOptimizeJob(MapCore& core,
@@ -263,7 +279,10 @@ absl::Status RunOptimizeJob(MapCore& core,
     STRATA_ASSIGN_OR_RETURN(proposed, optimizer.Propose());
   }
   context.SetMetric("epoch_before", static_cast<double>(proposed.base_epoch));
-  if (settings.dry_run && !accepted) {
+  const bool is_refused = !accepted && !proposed.is_sound;
+  if (is_refused && arguments.Flag("automatic")) {
+    STRATA_RETURN_IF_ERROR(Drop(core, job, context.stop()));
+  } else if (!accepted && (settings.dry_run || is_refused)) {
     context.SetProposed();
   } else {
     PartOfJob part(context, accepted ? 0.0 : kAlignmentEnd, 1.0);

@@ -6,12 +6,13 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include <Eigen/Eigenvalues>
 
 #include "core/common/status.h"
 #include "core/posegraph/alignment/odometry_noise.h"
+#include "core/posegraph/alignment/plane_terms.h"
 #include "core/posegraph/alignment/stretches.h"
 #include "core/posegraph/information.h"
+#include "core/posegraph/solver/gauge.h"
 #include "core/posegraph/solver/optimize_pose_graph.h"
 #include "core/registration/registration_target.h"
 
@@ -35,6 +36,8 @@ constexpr double kMeasuredPlaceM = 0.1;
 constexpr double kMeasuredPlaceRad = 0.02;
 // What may be false must look the same at least to this share.
 constexpr double kMinSuspectOverlap = 0.5;
+// Of a pose, that the search for planes allows for.
+constexpr double kGateSigmas = 3.0;
 // A match is recorded as relative poses to the nearest few.
 constexpr std::size_t kMaxPartners = 3;
 
@@ -48,45 +51,14 @@ bool Near(const Pose& a, const Pose& b, double distance_m, double turn_rad) {
   return difference.translation().norm() <= distance_m && RotationAngleRad(difference) <= turn_rad;
 }
 
+Pose HalfWay(const Pose& a, const Pose& b) {
+  Pose half = a;
+  half.translation() = 0.5 * (a.translation() + b.translation());
+  half.linear() = a.linear() * So3Exp(0.5 * So3Log(a.linear().transpose() * b.linear()));
+  return half;
+}
+
 double Turn(const Pose& a, const Pose& b) { return RotationAngleRad(a.inverse() * b); }
-
-// Whether `found` is what was excluded: the same plane to 3° and 0.2 m, and a scan in common.
-bool IsExcluded(const SharedPlane& found, const ExcludedPlane& excluded) {
-  constexpr double kSameCosine = 0.9986;
-  constexpr double kSameDistanceM = 0.2;
-  if (found.plane.normal.dot(excluded.plane_map.normal) < kSameCosine) return false;
-  if (std::abs(found.plane.distance - excluded.plane_map.distance) > kSameDistanceM) return false;
-  return std::any_of(found.views.begin(), found.views.end(), [&](const SharedPlane::View& view) {
-    return std::find(excluded.nodes.begin(), excluded.nodes.end(), view.scan) !=
-           excluded.nodes.end();
-  });
-}
-
-// Σ w (n · p − d)² of the plane that fits best to what has these moments.
-double BestPlaneCost(const PointMoments& moments) {
-  const Eigen::Vector3d mean = moments.topRightCorner<3, 1>() / moments(3, 3);
-  const Eigen::Matrix3d scatter =
-      moments.topLeftCorner<3, 3>() - moments(3, 3) * mean * mean.transpose();
-  return std::max(0.0,
-                  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter, Eigen::EigenvaluesOnly)
-                      .eigenvalues()
-                      .x());
-}
-
-// By how much the views of one plane disagree beyond their noise: χ² per degree of freedom of what
-// they say together over what each says alone, three for every view after the first. About 1 for a
-// plane; much more where the poses are still wrong, or where the surface is none.
-double Disagreement(const SharedPlane& plane, const std::vector<Pose>& T_map_scan) {
-  PointMoments together = PointMoments::Zero();
-  double alone = 0.0;
-  for (const SharedPlane::View& view : plane.views) {
-    const Eigen::Matrix4d T = T_map_scan[view.scan].matrix();
-    together += T * view.moments * T.transpose();
-    alone += BestPlaneCost(view.moments);
-  }
-  const double freedom = 3.0 * static_cast<double>(plane.views.size() - 1);
-  return std::max(0.0, BestPlaneCost(together) - alone) / freedom;
-}
 
 class Alignment {
  public:
@@ -112,14 +84,23 @@ class Alignment {
   }
 
   absl::StatusOr<AlignmentResult> Run(AlignmentProgress progress) {
+    std::vector<Pose> before_last;
     for (int round = 0; round < options_.max_rounds; ++round) {
       STRATA_RETURN_IF_ERROR(progress(static_cast<double>(round) / options_.max_rounds));
+      std::vector<Pose> last = result_.T_map_scan;
       STRATA_RETURN_IF_ERROR(Round());
-      const AlignmentRound& done = result_.rounds.back();
-      if (done.max_shift_m <= options_.settled_m && done.max_turn_rad <= options_.settled_rad) {
+      if (IsSettled(last)) {
         result_.termination = AlignmentTermination::kSettled;
         break;
       }
+      if (!before_last.empty() && IsSettled(before_last)) {  // it swings between two states
+        for (std::size_t k = 0; k < last.size(); ++k) {
+          result_.T_map_scan[k] = HalfWay(last[k], result_.T_map_scan[k]);
+        }
+        result_.termination = AlignmentTermination::kSettled;
+        break;
+      }
+      before_last = std::move(last);
     }
     STRATA_RETURN_IF_ERROR(progress(1.0));
     return std::move(result_);
@@ -127,6 +108,14 @@ class Alignment {
 
  private:
   const Pose& pose(std::size_t node) const { return result_.T_map_scan[node]; }
+
+  // Whether every scan is where it was.
+  bool IsSettled(const std::vector<Pose>& before) const {
+    for (std::size_t k = 0; k < before.size(); ++k) {
+      if (!Near(before[k], pose(k), options_.settled_m, options_.settled_rad)) return false;
+    }
+    return true;
+  }
 
   absl::Status Round() {
     AlignmentRound round;
@@ -246,7 +235,7 @@ class Alignment {
     return features;
   }
 
-  PoseGraphProblem Graph(const AlignmentRound& round) const {
+  PoseGraphProblem Graph(const AlignmentRound& round) {
     PoseGraphProblem graph;
     graph.T_map_scan = result_.T_map_scan;
     graph.fixed = problem_.fixed;
@@ -279,6 +268,7 @@ class Alignment {
       }
       known[node] = true;
     }
+    measured_end_ = graph.relative.size();
     for (const ScanPair& pair : problem_.pairs) {
       if (known[pair.j] || pair.may_be_false) continue;
       graph.relative.push_back(
@@ -337,9 +327,27 @@ class Alignment {
   }
 
   absl::Status AddPlanes(PoseGraphProblem& graph, AlignmentRound& round) {
-    shared_.clear();
     if (!options_.planes) return absl::OkStatus();
-    std::vector<std::shared_ptr<const ScanPlanes>> held(graph.T_map_scan.size());
+    if (!PlanesHold()) STRATA_RETURN_IF_ERROR(FindPlanes());
+    for (const SharedPlane& plane : shared_) {
+      graph.planes.push_back(TermOf(plane, result_.T_map_scan));
+      round.supports += plane.views.size();
+    }
+    round.planes = shared_.size();
+    return absl::OkStatus();
+  }
+
+  // Planes found anew at poses that differ by less than the search allows for are others by chance
+  // alone: poses would follow them for ever.
+  bool PlanesHold() const {
+    if (result_.rounds.empty()) return false;
+    const AlignmentRound& last = result_.rounds.back();
+    return last.max_shift_m <= kGateSigmas * options_.shared_planes.pose_sigma_m &&
+           last.max_turn_rad <= kGateSigmas * options_.shared_planes.pose_sigma_rad;
+  }
+
+  absl::Status FindPlanes() {
+    std::vector<std::shared_ptr<const ScanPlanes>> held(result_.T_map_scan.size());
     STRATA_RETURN_IF_ERROR(for_each_(held.size(), [&](std::size_t k) -> absl::Status {
       absl::StatusOr<std::shared_ptr<const ScanPlanes>> planes = source_.Planes(k);
       if (absl::IsDataLoss(planes.status())) {
@@ -359,21 +367,6 @@ class Alignment {
           problem_.excluded_planes.end(),
           [&](const ExcludedPlane& excluded) { return IsExcluded(plane, excluded); });
     });
-    for (const SharedPlane& plane : shared_) {
-      PlaneTerm term;
-      term.plane_map = plane.plane;
-      // Ground that bends agrees with itself from nearby scans and would tilt them all: a plane
-      // counts as much as its views agree (weights as of Geman and McClure), and more from round to
-      // round if it was the poses.
-      const double disagreement = std::max(1.0, Disagreement(plane, result_.T_map_scan));
-      const double weight = 1.0 / (disagreement * disagreement);
-      for (const SharedPlane::View& view : plane.views) {
-        term.views.push_back({view.scan, weight * view.moments});
-        ++round.supports;
-      }
-      graph.planes.push_back(std::move(term));
-    }
-    round.planes = shared_.size();
     return absl::OkStatus();
   }
 
@@ -390,9 +383,21 @@ class Alignment {
     for (std::size_t k = given; k < graph.relative.size(); ++k) {
       if (!rejected[k]) result_.measured.push_back(graph.relative[k]);
     }
+    result_.parts = PartsOf(graph, rejected);
     for (std::size_t p = 0; p < shared_.size(); ++p) shared_[p].plane = solution.planes[p];
     result_.planes = shared_;
     result_.worst_nodes = std::move(solution.summary.worst_nodes);
+  }
+
+  std::vector<std::size_t> PartsOf(const PoseGraphProblem& graph,
+                                   const std::vector<bool>& rejected) const {
+    Components joined(graph.T_map_scan.size());
+    for (std::size_t k = 0; k < measured_end_; ++k) {
+      if (!rejected[k]) joined.Join(graph.relative[k].i, graph.relative[k].j);
+    }
+    std::vector<std::size_t> parts;
+    for (std::size_t k = 0; k < graph.T_map_scan.size(); ++k) parts.push_back(joined.Root(k));
+    return parts;
   }
 
   const AlignmentProblem& problem_;
@@ -405,6 +410,7 @@ class Alignment {
   std::vector<std::vector<const ScanPair*>> measured_;  // of every node j
   std::vector<const RelativePoseTerm*> odometry_;       // of every node j; nullptr: none
   std::vector<SharedPlane> shared_;
+  std::size_t measured_end_ = 0;  // of the graph's relative terms: what is given or a match
   AlignmentResult result_;
 };
 

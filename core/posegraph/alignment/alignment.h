@@ -90,10 +90,11 @@ struct AlignmentOptions {
   bool planes = true;
   SharedPlaneOptions shared_planes;
   PoseGraphOptions pose_graph;
-  int max_rounds = 5;  // in [1, 100]
-  // Settled once no scan moved farther in a round than both.
-  double settled_m = 0.002;
-  double settled_rad = 0.0002;
+  int max_rounds = 30;  // in [1, 100]
+  // Settled once no scan moved farther in a round, or in two where poses swing: as much as a
+  // registration is good for.
+  double settled_m = 0.01;
+  double settled_rad = 0.001;
   // A registration is good to this beside what its information says: neighbouring features err
   // together, and scans are not rigid.
   double registration_sigma_m = 0.01;
@@ -131,6 +132,9 @@ struct AlignmentResult {
   std::vector<RejectedMatch> rejected;
   std::vector<SharedPlane> planes;  // of the last round, at the final poses
   std::vector<NodeResidual> worst_nodes;
+  // Beside T_map_scan: nodes that matches and given terms join have the same number. What only
+  // odometry, poses as they were or planes hold is a part of its own.
+  std::vector<std::size_t> parts;
 };
 
 // Runs body(k) for every k in [0, count), in any order, maybe from several threads.

@@ -18,9 +18,10 @@ class Components {
   bool Join(std::size_t a, std::size_t b);
   // The first node of each component in which no node is `anchored`, ascending.
   std::vector<std::size_t> Unanchored(const std::vector<bool>& anchored);
+  // The first node of the set that `node` is in.
+  std::size_t Root(std::size_t node);
 
  private:
-  std::size_t Root(std::size_t node);
   std::vector<std::size_t> parent_;  // a root is the first node of its component
 };
 

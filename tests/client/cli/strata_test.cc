@@ -143,7 +143,7 @@ TEST_F(StrataTest, EveryCommandHasHelpWithAnExample) {
 TEST_F(StrataTest, TheHelpOfJobsHasTheirKindsAndParameters) {
   const std::string help = RunStrata({"job", "start", "--help"}).out;
   EXPECT_THAT(help, HasSubstr("\nfade      Points through whose place"));
-  EXPECT_THAT(help, HasSubstr("\n  rounds=1..20          Most rounds"));
+  EXPECT_THAT(help, HasSubstr("\n  rounds=1..50          Most rounds"));
 }
 
 TEST_F(StrataTest, WrongUsageExitsWithTwo) {

@@ -293,7 +293,9 @@ int PlainPlanner::Place(const PlanEndpoint& endpoint) const {
   for (std::size_t i = 0; i < patches_.size(); ++i) {
     const bool own = patches_[i].cell.x == std::floor(endpoint.x_m / cell_size_) &&
                      patches_[i].cell.y == std::floor(endpoint.y_m / cell_size_);
-    if (own && (named < 0 || std::abs(patches_[i].z - z) < std::abs(patches_[named].z - z))) {
+    const double off = std::abs(patches_[i].z - z);
+    if (!own || off > profile_.height_m + kTolerance) continue;
+    if (named < 0 || off < std::abs(patches_[named].z - z)) {
       named = static_cast<int>(i);
     }
   }
@@ -316,7 +318,21 @@ int PlainPlanner::Place(const PlanEndpoint& endpoint) const {
     best = static_cast<int>(i);
     best_rank = rank;
   }
-  return best;
+  return best >= 0 ? best : PlaceOnFloor(endpoint);
+}
+
+int PlainPlanner::PlaceOnFloor(const PlanEndpoint& endpoint) const {
+  int floor = -1;
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    const Patch& patch = patches_[i];
+    const double below = *endpoint.z_m - patch.z;
+    const bool own = patch.cell.x == std::floor(endpoint.x_m / cell_size_) &&
+                     patch.cell.y == std::floor(endpoint.y_m / cell_size_);
+    if (!own || patch.danger < 0.0) continue;
+    if (below < 0.0 || below > profile_.height_m + kTolerance) continue;
+    if (floor < 0 || patch.z > patches_[floor].z) floor = static_cast<int>(i);
+  }
+  return floor;
 }
 
 double PlainPlanner::Cost(int from, int to) const {

@@ -51,6 +51,8 @@ class PlainPlanner {
     bool Nothing() const { return ground < 0 && obstacle < 0 && drop < 0; }
   };
   Meeting Meet(CellIndex cell, double z, double rise) const;
+  // The highest place to stand of the endpoint's cell on which the robot reaches z.
+  int PlaceOnFloor(const PlanEndpoint& endpoint) const;
   bool Concerns(const Edge& edge, double z) const;
   bool DiscFree(CellIndex cell, double z) const;
   bool Tolerated(CellIndex hole, double z) const;

@@ -206,6 +206,40 @@ TEST(PlannerOracleTest, CostsAreThoseOfDijkstraAndPathsHitNothing) {
   EXPECT_GT(tally.moved, 5);
 }
 
+TEST(PlannerOracleTest, EndpointsAtAnyHeightAreWhereTheyShouldBe) {
+  int above = 0, below = 0, none = 0;
+  for (std::uint64_t seed = 201; seed <= 212; ++seed) {
+    SCOPED_TRACE(::testing::Message() << "seed " << seed);
+    const World world = RandomWorld(seed);
+    const PlainPlanner plain(world.map, world.profile, kCell);
+    MemoryTiles source(world.map.Tiles());
+    Planner planner({.cell_size_m = kCell});
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> off(-2.0, 2.0);
+    for (int q = 0; q < 40; ++q) {
+      PlanEndpoint end = EndpointOf(plain.patches()[random() % plain.patches().size()]);
+      *end.z_m += off(random);
+      const int place = plain.Place(end);
+      const PlanQuery query = {.from = end, .to = end, .profile = world.profile};
+      STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult result, planner.Plan(source, query, Stop()));
+      ASSERT_EQ(result.found(), place >= 0) << result.message;
+      if (place < 0) {
+        EXPECT_EQ(result.reason, PlanReason::kStartNotOnSurface);
+        ++none;
+        continue;
+      }
+      const PlainPlanner::Patch& p = plain.patches()[place];
+      EXPECT_NEAR(result.waypoints.front().x(), (p.cell.x + 0.5) * kCell, 1e-5);
+      EXPECT_NEAR(result.waypoints.front().y(), (p.cell.y + 0.5) * kCell, 1e-5);
+      EXPECT_NEAR(result.waypoints.front().z(), p.z, 1e-5);
+      ++(p.z > *end.z_m ? above : below);
+    }
+  }
+  EXPECT_GT(above, 20);
+  EXPECT_GT(below, 20);
+  EXPECT_GT(none, 50);
+}
+
 TEST(PlannerOracleTest, CostsOfClassesAreThoseOfDijkstraToo) {
   Tally tally;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {

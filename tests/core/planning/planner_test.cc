@@ -310,6 +310,40 @@ TEST(PlannerTest, EndpointsMoveToTheNearestPlaceOnTheirLevel) {
   }
 }
 
+// The floor below the deck was not seen around (7, 3.75): a goal there is no goal on the deck.
+TEST(PlannerTest, AGoalIsNeverTakenToAnotherStorey) {
+  DrawnMap map = Bridge(2.9, 0.3, '=');
+  for (int y = 25; y < 50; ++y) {
+    for (int x = 55; x < 85; ++x) map[{x, y}] = {{2.9, 0.3}};
+  }
+  const PlanEndpoint deck = At(3.05, 3.75, 2.9);
+  const PlanResult lost = PlanIn(map, deck, At(7.05, 3.75, 0.0));
+  EXPECT_EQ(lost.reason, PlanReason::kGoalNotOnSurface) << lost.message;
+  EXPECT_THAT(lost.message, HasSubstr("no surface within 1.00 m, the robot's height, of z = 0.00"));
+  ASSERT_TRUE(lost.nearest.has_value());
+  EXPECT_THAT(lost.message, HasSubstr("m above the z asked for"));
+  // Up to the robot's height off is the storey that was meant, from above and from below.
+  for (const double off : {-0.99, 0.0, 0.99}) {
+    const PlanResult meant = PlanIn(map, deck, At(7.05, 3.75, 2.9 + off));
+    ASSERT_TRUE(meant.found()) << meant.message;
+    EXPECT_NEAR(meant.waypoints.back().z(), 2.9, 1e-6);
+  }
+  for (const double off : {-1.01, 1.01}) {
+    EXPECT_EQ(PlanIn(map, deck, At(7.05, 3.75, 2.9 + off)).reason, PlanReason::kGoalNotOnSurface);
+    EXPECT_EQ(PlanIn(map, At(7.05, 3.75, 2.9 + off), deck).reason, PlanReason::kStartNotOnSurface);
+  }
+}
+
+// Half a metre below a beam on which nobody can stand, and 0.95 m above the floor.
+TEST(PlannerTest, AGoalAtTheHeightOfASensorIsOnTheFloorAndNotOnTheBeamAbove) {
+  DrawnMap map = MapFromDrawing("......\n......\n......", {{'.', {{0.0}}}}, 10);
+  for (int y = 0; y < 30; ++y) map[{40, y}] = {{0.0}, {1.45, 0.1}};
+  const PlanResult result = PlanIn(map, At(1.05, 1.55, 0), At(4.05, 1.55, 0.95));
+  ASSERT_TRUE(result.found()) << result.message;
+  EXPECT_NEAR(result.waypoints.back().z(), 0.0, 1e-6);
+  EXPECT_THAT(result.message, HasSubstr("; goal moved 0.00 m to (4.05, 1.55, 0.00)"));
+}
+
 // A storey above the goal whose wall is nearest to it; the ramp leads to ground that
 // unobserved cells separate from the goal's.
 TEST(PlannerTest, NamesTheMoveThatSeparatesAndNotTheWallAboveTheGoal) {

@@ -142,6 +142,30 @@ TEST_F(PlaceMatchTest, ACorridorTellsNoPlace) {
   }
 }
 
+TEST_F(PlaceMatchTest, ScansOfOnePlaceDoNotContradictEachOtherAndOfTwoDo) {
+  const testing::World campus = testing::CampusWorld();
+  const Pose T_a = StandingAt(campus.scene, 0, 0, 50, 0.2);
+  const Pose T_b = StandingAt(campus.scene, 4, 1, 50, 1.4);
+  const ScanFeatures a = FeaturesAt(campus.scene, T_a, 1);
+  const ScanFeatures b = FeaturesAt(campus.scene, T_b, 2);
+  EXPECT_LT(ContradictionOf({&a, T_a}, {&b, T_b}), 0.05);
+  // Four metres into a wall.
+  const double moved = ContradictionOf({&a, T_a}, {&b, T_b * Off(0.0, 4.0, 4.0, 0.0)});
+  EXPECT_GT(moved, ContradictionOf({&a, T_a}, {&b, T_b}));
+  Scene room;
+  room.Add(Box({-3, -3, -1.5}, {3, 3, -1.2}));
+  for (const double side : {-3.0, 3.0}) {
+    room.Add(Box({side - 0.1, -3, -1.2}, {side + 0.1, 3, 2}));
+    room.Add(Box({-3, side - 0.1, -1.2}, {3, side + 0.1, 2}));
+  }
+  room.Build();
+  const ScanFeatures elsewhere = FeaturesAt(room, Pose::Identity(), 3);
+  const double other = ContradictionOf({&a, T_a}, {&elsewhere, T_a});
+  EXPECT_GT(other, 0.2);
+  EXPECT_EQ(other, ContradictionOf({&elsewhere, T_a}, {&a, T_a}));
+  EXPECT_EQ(ContradictionOf({&a, T_a}, {&elsewhere, T_a * Off(0.0, 500.0, 0.0, 0.0)}), 0.0);
+}
+
 TEST_F(PlaceMatchTest, WithoutScansOrGuessesThereIsNoFit) {
   const ScanFeatures empty;
   const SeenScan target[] = {{&empty}};

@@ -37,7 +37,7 @@ std::vector<Expected> AllParameters() {
       {"optimize", "planes", "1", {"0", "1"}, kNoFlags},
       {"optimize", "robust", "1", {"0", "1"}, kNoFlags},
       {"optimize", "automatic", "0", {"0", "1"}, kNoFlags},
-      {"optimize", "rounds", "5", {"1", "20"}, {"0", "21", "2.5", "many", ""}},
+      {"optimize", "rounds", "30", {"1", "50"}, {"0", "51", "2.5", "many", ""}},
       {"optimize", "pool", "5", {"1", "50"}, {"0", "51"}},
       {"optimize", "weighting", "covariance", {"covariance", "local_global"}, {"local", ""}},
       {"optimize", "local_weight", "0.5", {"0.000001", "0.5", "0.999999"}, {"0", "1", "1.5"}},
@@ -144,7 +144,7 @@ TEST(JobArgumentsTest, BoundsAreSaid) {
   const auto refusal = [](const JobParameters& parameters) {
     return std::string(ReadJobArguments("optimize", parameters).status().message());
   };
-  EXPECT_EQ(refusal({{"rounds", "21"}}), "job parameter rounds = '21' is not in [1, 20]");
+  EXPECT_EQ(refusal({{"rounds", "51"}}), "job parameter rounds = '51' is not in [1, 50]");
   EXPECT_EQ(refusal({{"dry_run", "maybe"}}), "job parameter dry_run = 'maybe' is not 0 or 1");
   EXPECT_EQ(refusal({{"weighting", "by_taste"}}),
             "job parameter weighting = 'by_taste' is not covariance or local_global");

@@ -44,8 +44,8 @@ TEST(JobKindsTest, TextsAreLinesForAProtoAndATerminal) {
   const std::vector<std::string> lines = absl::StrSplit(JobKindsText(), '\n');
   EXPECT_THAT(lines, Each(SizeIs(::testing::Le(77U))));
   EXPECT_THAT(lines,
-              ::testing::Contains("  rounds=1..20          Most rounds of matching and "
-                                  "optimising (5)"));
+              ::testing::Contains("  rounds=1..50          Most rounds of matching and "
+                                  "optimising (30)"));
   EXPECT_EQ(JobKindNames(), "rebuild, verify, optimize, revert, train, classify, evaluate or fade");
 }
 

@@ -14,7 +14,7 @@ TEST(OptimizeSettingsTest, WhatNobodySaysIsAsTheLibraryHasIt) {
   EXPECT_TRUE(settings.closures);
   EXPECT_TRUE(settings.planes);
   EXPECT_TRUE(settings.robust);
-  EXPECT_EQ(settings.rounds, 5);
+  EXPECT_EQ(settings.rounds, 30);
   EXPECT_EQ(settings.pool, 5);
   EXPECT_EQ(settings.weighting, PoseGraphOptions().weighting);
   EXPECT_EQ(settings.local_weight, PoseGraphOptions().local_weight);

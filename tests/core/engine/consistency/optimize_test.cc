@@ -104,6 +104,61 @@ TEST_F(OptimizeTest, ADryRunIsAppliedLaterAndCarriesWhatCameMeanwhile) {
   ExpectSound();
 }
 
+// Every second scan is of another place; said to be of one.
+class OptimizeOfTwoPlacesTest : public OptimizeTest {
+ protected:
+  static constexpr std::uint64_t kBoth = 12;
+  void MakeMixedWorld() {
+    MakeMap(MapParameters());
+    const Scene campus = CampusWorld().scene;
+    for (std::uint64_t k = 1; k <= kBoth; ++k) {
+      const Pose said = TruthOf((k + 1) / 2);
+      const PointCloud cloud =
+          k % 2 == 0 ? SimulateScan(campus, SensorOptions(), said, k) : See(said, k);
+      STRATA_ASSERT_OK(Upload(db(), HeaderOf({"run", k}, cloud, said), cloud));
+    }
+    WaitIntegrated(db());
+  }
+};
+
+TEST_F(OptimizeOfTwoPlacesTest, IsProposedWithTheReason) {
+  MakeMixedWorld();
+  const std::vector<Pose> before = Poses();
+  const JobInfo job = Optimize();
+  EXPECT_EQ(job.state, JobState::kProposed);
+  EXPECT_THAT(job.message, HasSubstr("Too little to be applied by itself"));
+  EXPECT_GT(job.metrics.at("steps_loose") + job.metrics.at("pairs_contradicted"), 5.0);
+  ExpectEqual(Poses(), before);
+  STRATA_ASSERT_OK(db().jobs().Accept({}, kMapName, job.id));  // a person may know better
+  EXPECT_EQ(Follow(job.id).state, JobState::kSucceeded);
+}
+
+TEST_F(OptimizeOfTwoPlacesTest, ThatNobodyAskedForChangesNothing) {
+  MakeMixedWorld();
+  const std::vector<Pose> before = Poses();
+  const JobInfo job = Optimize({{"automatic", "1"}});
+  EXPECT_EQ(job.state, JobState::kSucceeded);
+  EXPECT_THAT(job.message, HasSubstr("Too little to be applied by itself"));
+  ExpectEqual(Poses(), before);
+  EXPECT_EQ(WaitIntegrated(db()).epoch, 1U);
+  EXPECT_THAT(db().jobs().Accept({}, kMapName, job.id), StatusIs(Code::kFailedPrecondition, _));
+}
+
+TEST_F(OptimizeTest, ScansThatNothingIsMatchedToAreNotMoved) {
+  MakeMap(MapParameters());
+  PointCloud cloud;  // too little to be matched
+  for (int i = 0; i < 20; ++i) cloud.points.emplace_back(5.0F, 0.3F * static_cast<float>(i), 0.5F);
+  for (std::uint64_t k = 1; k <= 7; ++k) {
+    const Pose said = PoseAt(2.0 * static_cast<double>(k), 0.0);
+    STRATA_ASSERT_OK(Upload(db(), HeaderOf({"run", k}, cloud, said), cloud));
+  }
+  WaitIntegrated(db());
+  const JobInfo job = Optimize();
+  EXPECT_EQ(job.state, JobState::kProposed);
+  EXPECT_EQ(job.metrics.at("steps_loose"), 6.0);
+  EXPECT_THAT(job.message, HasSubstr("6 of 6 steps"));
+}
+
 TEST_F(OptimizeTest, WhatAPersonSetMeanwhileStays) {
   MakeWorld();
   const JobInfo job = Optimize({{"dry_run", "1"}});

@@ -162,10 +162,39 @@ TEST_F(AlignmentTest, DisturbedPosesComeBack) {
 }
 
 TEST_F(AlignmentTest, WhereNothingMovesCorrespondencesAreKept) {
+  options_.settled_m = 0.002;
+  options_.settled_rad = 0.0002;
   STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align());
   EXPECT_EQ(result.rounds.front().registered, result.rounds.front().matches);
   EXPECT_LT(result.rounds.back().registered, result.rounds.front().registered / 2);
   EXPECT_LT(ErrorsOf(result.T_map_scan).max_m, 0.02);
+}
+
+// Counts how often planes are asked for.
+class CountedPlanes final : public AlignmentSource {
+ public:
+  explicit CountedPlanes(AlignmentSource& source) : source_(source) {}
+  absl::StatusOr<std::shared_ptr<const ScanFeatures>> Features(std::size_t node) override {
+    return source_.Features(node);
+  }
+  absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t node) override {
+    ++count;
+    return source_.Planes(node);
+  }
+  std::size_t count = 0;
+
+ private:
+  AlignmentSource& source_;
+};
+
+TEST_F(AlignmentTest, PlanesAreKeptOncePosesAreNearlyRight) {
+  options_.settled_m = 0.0;
+  options_.settled_rad = 0.0;
+  CountedPlanes source(yard());
+  STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align(source));
+  ASSERT_GT(result.rounds.size(), 1U);
+  EXPECT_EQ(source.count, std::size_t{YardScans::kScans});
+  EXPECT_EQ(result.rounds.back().planes, result.rounds.front().planes);
 }
 
 TEST_F(AlignmentTest, PlanesDoNoHarm) {
@@ -294,6 +323,10 @@ TEST_F(AlignmentTest, ExcludedPairsAreNotMeasured) {
   STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align());
   for (const RelativePoseTerm& term : result.measured) {
     EXPECT_EQ(term.i < YardScans::kFirst, term.j < YardScans::kFirst) << term.i << " " << term.j;
+  }
+  ASSERT_EQ(result.parts.size(), std::size_t{YardScans::kScans});
+  for (std::size_t k = 0; k < YardScans::kScans; ++k) {
+    EXPECT_EQ(result.parts[k], k < YardScans::kFirst ? 0U : YardScans::kFirst) << k;
   }
 }
 

@@ -1,0 +1,46 @@
+// Whether what an optimize job found may become an epoch by itself (thesis 7.4.3, Algorithm 4,
+// which returns FAILURE where nothing settles).
+#ifndef STRATA_CORE_ENGINE_CONSISTENCY_OPTIMIZE_VERDICT_H_
+#define STRATA_CORE_ENGINE_CONSISTENCY_OPTIMIZE_VERDICT_H_
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+#include "core/engine/consistency/graph_world.h"
+#include "core/engine/scans/damaged_scans.h"
+#include "core/engine/scans/scan_views.h"
+#include "core/posegraph/alignment/alignment.h"
+
+namespace strata {
+
+struct OptimizeVerdict {
+  // False: too little was measured to move scans by, or scans contradict each other where they end
+  // up.
+  bool is_sound = true;
+  std::size_t steps = 0;  // from scan to scan along trajectories
+  // Those whose two scans no match, closure or given constraint joins, on any way: the nodes that
+  // they lead to.
+  std::vector<std::size_t> loose_steps;
+  // Pairs of scans near each other, along trajectories and across, spread over the map; and those
+  // of them where one looked through much of what the other saw.
+  std::size_t compared = 0;
+  std::size_t contradicted = 0;
+  std::string message;  // two sentences or three: what holds the scans, and what that means
+};
+
+// Planes that scans share are found at poses that are nearly right; a scan that nothing is matched
+// to is drawn to whatever wall is near. Where more than a quarter of the steps is loose, or of the
+// pairs contradicted, there is nothing that planes could be trusted with: recordings too sparse to
+// overlap, poses of another recording, scans of two places under one name. Damaged scans are left
+// out.
+absl::StatusOr<OptimizeVerdict> VerdictOn(const GraphWorld& world,
+                                          ScanViews& views,
+                                          const AlignmentResult& result,
+                                          const DamagedScans& damaged);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_CONSISTENCY_OPTIMIZE_VERDICT_H_

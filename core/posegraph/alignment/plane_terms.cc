@@ -1,0 +1,64 @@
+#include "core/posegraph/alignment/plane_terms.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+namespace strata {
+namespace {
+
+// Σ w (n · p − d)² of the plane that fits best to what has these moments.
+double BestPlaneCost(const PointMoments& moments) {
+  const Eigen::Vector3d mean = moments.topRightCorner<3, 1>() / moments(3, 3);
+  const Eigen::Matrix3d scatter =
+      moments.topLeftCorner<3, 3>() - moments(3, 3) * mean * mean.transpose();
+  return std::max(0.0,
+                  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter, Eigen::EigenvaluesOnly)
+                      .eigenvalues()
+                      .x());
+}
+
+// By how much the views of one plane disagree beyond their noise: χ² per degree of freedom of what
+// they say together over what each says alone, three for every view after the first. About 1 for a
+// plane; much more where the poses are still wrong, or where the surface is none.
+double Disagreement(const SharedPlane& plane, const std::vector<Pose>& T_map_scan) {
+  PointMoments together = PointMoments::Zero();
+  double alone = 0.0;
+  for (const SharedPlane::View& view : plane.views) {
+    const Eigen::Matrix4d T = T_map_scan[view.scan].matrix();
+    together += T * view.moments * T.transpose();
+    alone += BestPlaneCost(view.moments);
+  }
+  const double freedom = 3.0 * static_cast<double>(plane.views.size() - 1);
+  return std::max(0.0, BestPlaneCost(together) - alone) / freedom;
+}
+
+}  // namespace
+
+bool IsExcluded(const SharedPlane& found, const ExcludedPlane& excluded) {
+  constexpr double kSameCosine = 0.9986;
+  constexpr double kSameDistanceM = 0.2;
+  if (found.plane.normal.dot(excluded.plane_map.normal) < kSameCosine) return false;
+  if (std::abs(found.plane.distance - excluded.plane_map.distance) > kSameDistanceM) return false;
+  return std::any_of(found.views.begin(), found.views.end(), [&](const SharedPlane::View& view) {
+    return std::find(excluded.nodes.begin(), excluded.nodes.end(), view.scan) !=
+           excluded.nodes.end();
+  });
+}
+
+PlaneTerm TermOf(const SharedPlane& plane, const std::vector<Pose>& T_map_scan) {
+  PlaneTerm term;
+  term.plane_map = plane.plane;
+  // Ground that bends agrees with itself from nearby scans and would tilt them all: a plane counts
+  // as much as its views agree (weights as of Geman and McClure), and more from round to round if
+  // it was the poses.
+  const double disagreement = std::max(1.0, Disagreement(plane, T_map_scan));
+  const double weight = 1.0 / (disagreement * disagreement);
+  for (const SharedPlane::View& view : plane.views) {
+    term.views.push_back({view.scan, weight * view.moments});
+  }
+  return term;
+}
+
+}  // namespace strata

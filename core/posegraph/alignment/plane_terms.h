@@ -1,0 +1,23 @@
+// How planes that scans share hold poses.
+// Internal to core/posegraph, not installed.
+#ifndef STRATA_CORE_POSEGRAPH_ALIGNMENT_PLANE_TERMS_H_
+#define STRATA_CORE_POSEGRAPH_ALIGNMENT_PLANE_TERMS_H_
+
+#include <vector>
+
+#include "core/geometry/pose.h"
+#include "core/planes/shared_planes.h"
+#include "core/posegraph/alignment/alignment.h"
+#include "core/posegraph/pose_graph.h"
+
+namespace strata {
+
+// Whether `found` is what was excluded: the same plane to 3° and 0.2 m, and a scan in common.
+bool IsExcluded(const SharedPlane& found, const ExcludedPlane& excluded);
+
+// The term of a plane, as much as its views agree at these poses.
+PlaneTerm TermOf(const SharedPlane& plane, const std::vector<Pose>& T_map_scan);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_POSEGRAPH_ALIGNMENT_PLANE_TERMS_H_
