@@ -73,6 +73,7 @@ struct Lines {
 
 struct Clipped {
   std::size_t count = 0;
+  std::size_t dropped = 0;
   double least_eigenvalue = 0.0;
 };
 
@@ -242,14 +243,21 @@ absl::Status ParseEdge(const TextCursor& cursor,
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t j, VertexNumber(cursor, words[2]));
   if (i == j) return cursor.Error(absl::StrCat("an edge from vertex ", i, " to itself"));
   STRATA_ASSIGN_OR_RETURN(const std::vector<double> v, NumbersOf(cursor, tag, words, 3));
-  const std::size_t line = cursor.line_number();
+  // What says nothing holds nothing, and no constraint of a map may be so.
+  const auto add = [&](const auto& term, auto& edges) {
+    if (term.information.isZero(0.0)) {
+      ++parsed.clipped.dropped;
+    } else {
+      edges.push_back({.line = cursor.line_number(), .i = i, .j = j, .value = term});
+    }
+  };
   if (tag.kind == Kind::kEdge2) {
     STRATA_ASSIGN_OR_RETURN(const auto term, PlanarTerm(cursor, tag.dialect, v, parsed.clipped));
-    parsed.planar.edges.push_back({.line = line, .i = i, .j = j, .value = term});
+    add(term, parsed.planar.edges);
     return absl::OkStatus();
   }
   STRATA_ASSIGN_OR_RETURN(const auto term, SpatialTerm(cursor, tag.dialect, v, parsed.clipped));
-  parsed.spatial.edges.push_back({.line = line, .i = i, .j = j, .value = term});
+  add(term, parsed.spatial.edges);
   return absl::OkStatus();
 }
 
@@ -429,21 +437,32 @@ absl::StatusOr<GraphFile> ParseGraph(absl::string_view text) {
                      Pose(Pose::Identity()));
   if (file.ok()) {
     file->clipped = parsed.clipped.count;
+    file->dropped = parsed.clipped.dropped;
     file->least_eigenvalue = parsed.clipped.least_eigenvalue;
   }
   return file;
 }
 
 std::string ClippedWarning(const GraphFile& file) {
-  if (file.clipped == 0) return "";
-  const std::size_t edges =
+  const std::size_t kept =
       std::visit([](const auto& graph) { return graph.relative.size(); }, file.graph);
-  return absl::StrCat(file.clipped,
-                      " of ",
-                      edges,
-                      " informations have a negative eigenvalue, the least ",
-                      file.least_eigenvalue,
-                      "; each is replaced by the nearest positive semidefinite matrix");
+  const std::string of = absl::StrCat(" of ", kept + file.dropped, " informations ");
+  std::string text;
+  if (file.clipped > 0) {
+    text = absl::StrCat(file.clipped,
+                        of,
+                        "have a negative eigenvalue, the least ",
+                        file.least_eigenvalue,
+                        "; each is replaced by the nearest positive semidefinite matrix");
+  }
+  if (file.dropped > 0) {
+    absl::StrAppend(&text,
+                    text.empty() ? "" : "; ",
+                    file.dropped,
+                    of,
+                    "have no positive eigenvalue: their edges are left out");
+  }
+  return text;
 }
 
 absl::StatusOr<GraphFile> ReadGraph(const std::filesystem::path& path) {

@@ -26,9 +26,10 @@ struct GraphFile {
   // Informations with a negative eigenvalue, which were made semidefinite, and the least of those.
   std::size_t clipped = 0;
   double least_eigenvalue = 0.0;
+  std::size_t dropped = 0;  // edges of which nothing positive was left, or that said nothing at all
 };
 
-// What to tell people of clipped informations; empty if there are none.
+// What to tell people of clipped informations and dropped edges; empty if there are none.
 std::string ClippedWarning(const GraphFile& file);
 
 // g2o: VERTEX_SE3:QUAT, EDGE_SE3:QUAT, VERTEX_SE2, EDGE_SE2, FIX. TORO: VERTEX2, EDGE2
@@ -43,7 +44,8 @@ std::string ClippedWarning(const GraphFile& file);
 // finite, quaternions off unit length by more than 1 %, spatial beside planar lines, vertices that
 // come twice or are missing (unless there are none), edges from a vertex to itself. Informations
 // with negative eigenvalues, of which public graphs have thousands, are clipped to the nearest
-// positive semidefinite matrix and counted.
+// positive semidefinite matrix and counted; edges whose information is zero then are dropped and
+// counted.
 absl::StatusOr<GraphFile> ReadGraph(const std::filesystem::path& path);
 absl::StatusOr<GraphFile> ParseGraph(absl::string_view text);
 

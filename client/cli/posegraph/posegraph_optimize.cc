@@ -126,7 +126,9 @@ Json RejectedEdges(const GraphFile& file, const Graph& graph, const Report& repo
 absl::Status Run(FileContext& context, const OptimizeOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   STRATA_ASSIGN_OR_RETURN(GraphFile file, ReadGraph(options.in));
-  if (file.clipped != 0) context.output.Talk("warning: " + ClippedWarning(file));
+  if (const std::string warning = ClippedWarning(file); !warning.empty()) {
+    context.output.Talk("warning: " + warning);
+  }
   if (options.start == "file" && !file.has_poses) {
     return absl::InvalidArgumentError(absl::StrCat(
         options.in, " has edges only; --start odometry or chordal makes poses out of them"));
@@ -155,6 +157,7 @@ absl::Status Run(FileContext& context, const OptimizeOptions& options) {
   json["rejected"] =
       std::visit([&](const auto& graph) { return RejectedEdges(file, graph, report); }, file.graph);
   json["clipped"] = file.clipped;
+  json["dropped"] = file.dropped;
   json["out"] = options.out;
   context.output.Object(json);
   return absl::OkStatus();

@@ -154,6 +154,21 @@ TEST(GraphFileTest, IndefiniteInformationIsClippedAndCounted) {
   EXPECT_EQ(ClippedWarning(sound), "");
 }
 
+// The nearest semidefinite matrix to a negative one is zero, which no constraint may have.
+TEST(GraphFileTest, EdgesThatSayNothingAreDroppedAndCounted) {
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const GraphFile file,
+      ParseGraph("VERTEX_SE2 1 0 0 0\nVERTEX_SE2 2 1 0 0\nVERTEX_SE2 3 2 0 0\n"
+                 "EDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\nEDGE_SE2 2 3 1 0 0 -2 0 0 -3 0 -1\n"
+                 "EDGE_SE2 1 3 2 0 0 0 0 0 0 0 0\n"));
+  EXPECT_EQ(std::get<PlanarPoseGraph>(file.graph).relative.size(), 1U);
+  EXPECT_EQ(file.ids.size(), 3U);
+  EXPECT_EQ(file.clipped, 1U);
+  EXPECT_EQ(file.dropped, 2U);
+  EXPECT_THAT(ClippedWarning(file), HasSubstr("1 of 3 informations have a negative eigenvalue"));
+  EXPECT_THAT(ClippedWarning(file), HasSubstr("2 of 3 informations have no positive eigenvalue"));
+}
+
 TEST(GraphFileTest, DamageIsAStatus) {
   std::mt19937_64 random(11);
   for (const std::string text : {kSpatial, kPlanar}) {
