@@ -402,7 +402,7 @@ TEST_F(StrataTest, ImportWarnsWhenTheTrajectoryHasOtherScans) {
                               std::filesystem::copy_options::overwrite_existing);
     std::vector<std::string> words = {
         "scan", "import", "m", (dir_.path() / run / "walk").string(), "--align", "off"};
-    if (poses) words.insert(words.end(), {"--poses", poses_});
+    words.insert(words.end(), {"--poses", poses ? poses_ : "none"});
     const Ran ran = Run(words);
     EXPECT_EQ(ran.exit_code, 0) << ran.err;
     return ran.err;
