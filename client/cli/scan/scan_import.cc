@@ -180,6 +180,13 @@ void Print(const ImportOptions& options, const Summary& summary, Output& output)
   if (!output.json()) {
     json.erase("errors");
     if (summary.at_sensor == 0) json.erase("range_0");
+    if (summary.uploaded == 0 && summary.skipped > 0) {
+      json = {{"map", options.map},
+              {"trajectory", options.trajectory},
+              {"already there", summary.skipped},
+              {"failed", summary.errors.size()}};
+      return output.Object(json);
+    }
     json["seconds"] = absl::StrFormat("%.2f", summary.seconds);
     json["points_per_second"] = absl::StrFormat("%.0f", json["points_per_second"].get<double>());
   }

@@ -129,6 +129,19 @@ TEST_F(ImportTruthTest, ReturnsOfRangeZeroAreCountedAndNoSurface) {
   EXPECT_EQ(at.at("surfaces").size(), 0U);
 }
 
+TEST_F(ImportTruthTest, WhatIsThereAlreadyIsSaidAndATimeThatIsNoneIsNotOf1970) {
+  const std::string file = Write("s1.xyz", Floor(0, 0));
+  EXPECT_EQ(Import({file, "--trajectory", "t", "--wait"}).exit_code, 0);
+  const Ran again = RunStrata(
+      {"scan", "import", "m", file, "--trajectory", "t", "--wait", "--embedded", Path("db")});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_THAT(again.out, HasSubstr("already there  1\n"));
+  EXPECT_THAT(again.out, ::testing::Not(HasSubstr("aligned")));
+  EXPECT_TRUE(json::parse(Run({"scan", "show", "m", "t/1"}).out).at("time").is_null());
+  const Ran listed = RunStrata({"scan", "list", "m", "--embedded", Path("db")});
+  EXPECT_THAT(listed.out, ::testing::Not(HasSubstr("1970")));
+}
+
 TEST_F(ImportTruthTest, RecordedSetsWithPosesAreUnderstood) {
   STRATA_REQUIRE_DATA(data, "");
   const auto refused = [&](const std::string& set) {
