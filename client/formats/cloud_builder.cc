@@ -223,6 +223,7 @@ void CloudBuilder::WidenBox(const PointBlock& block) {
   const auto [x, y, z] = Coordinates(block);
   std::array<Range, 3> box = box_;
   for (std::size_t i = 0; i < block.count; ++i) {
+    if (x[i] == 0.0 && y[i] == 0.0 && z[i] == 0.0) continue;
     box[0].Widen(x[i]);
     box[1].Widen(y[i]);
     box[2].Widen(z[i]);
@@ -320,6 +321,7 @@ absl::StatusOr<PointCloud> CloudBuilder::Build() && {
     return absl::InvalidArgumentError(
         absl::StrCat("no finite point among ", added_, "; expected at least one"));
   }
+  if (!(box_[0].low <= box_[0].high)) box_.fill({0.0, 0.0});
   PointCloud cloud;
   cloud.origin = ChooseOrigin();
   STRATA_RETURN_IF_ERROR(CheckDistances(cloud.origin));

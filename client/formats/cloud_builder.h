@@ -68,7 +68,8 @@ class CloudBuilder {
   void SetSensorOrigin(const Eigen::Vector3d& position) { sensor_origin_ = position; }
 
   // The cloud. Without a grid points that are not finite are left out; in one they become NaN.
-  // Along an axis where all points lie on one side of zero and their middle beyond 1000 m, `origin`
+  // Along an axis where all points but (0, 0, 0), which stands for no return, lie on one side of
+  // zero and their middle beyond 1000 m, `origin`
   // is that middle rounded to 100 m: floats inside are then as fine as those of a local cloud, and
   // the difference to a float of the file is exact. Where no sensor position was set and what would
   // stand for it, `origin`, is farther from the points' box than 100 m and than the box's diagonal,
@@ -109,7 +110,7 @@ class CloudBuilder {
   bool hold_floats_ = false;
   std::vector<Eigen::Vector3f> floats_;   // the points, if hold_floats_,
   std::vector<Eigen::Vector3d> doubles_;  // else here
-  std::array<Range, 3> box_;              // of the finite points
+  std::array<Range, 3> box_;              // of the finite points but (0, 0, 0)
   std::vector<float> intensity_;
   std::vector<Colour> colour_;             // as long as all channels are whole and in 0–255,
   std::vector<Eigen::Vector3f> channels_;  // else here

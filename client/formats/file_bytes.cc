@@ -25,7 +25,7 @@ constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{16} << 30;
 constexpr std::size_t kReadBytes = 1 << 18;
 
 absl::Status CannotWrite(const fs::path& path, absl::string_view why) {
-  return absl::UnavailableError(absl::StrCat(path.string(), ": cannot be written: ", why));
+  return absl::FailedPreconditionError(absl::StrCat(path.string(), ": cannot be written: ", why));
 }
 
 // `path` is the name that the user knows.

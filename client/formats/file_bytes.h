@@ -16,8 +16,8 @@ namespace strata {
 absl::StatusOr<std::string> ReadFileBytes(const std::filesystem::path& path);
 
 // Replaces the file as a whole: a reader sees the old bytes or the new ones, whatever happens in
-// between. What is no regular file (/dev/stdout, a pipe) is written into. UNAVAILABLE, naming the
-// file and the reason, if that fails.
+// between. What is no regular file (/dev/stdout, a pipe) is written into. FAILED_PRECONDITION,
+// naming the file and the reason, if that fails: UNAVAILABLE is a server's.
 absl::Status WriteFileBytes(const std::filesystem::path& path, absl::string_view bytes);
 
 }  // namespace strata

@@ -71,7 +71,14 @@ struct Lines {
   bool empty() const { return vertices.empty() && edges.empty(); }
 };
 
+struct Clipped {
+  std::size_t count = 0;
+  std::size_t dropped = 0;
+  double least_eigenvalue = 0.0;
+};
+
 struct Parsed {
+  Clipped clipped;
   Lines<Pose, RelativePoseTerm> spatial;
   Lines<PlanarPose, PlanarRelativeTerm> planar;
   std::vector<Line<bool>> fixed;
@@ -113,9 +120,24 @@ Matrix6d InformationFromToro(const Matrix6d& toro) {
   return information;
 }
 
+template <int size>
+absl::Status Settle(const TextCursor& cursor,
+                    Eigen::Matrix<double, size, size>& information,
+                    Clipped& clipped) {
+  if (ValidateSemidefinite<size>(information, "information").ok()) return absl::OkStatus();
+  if (information.allFinite()) {
+    clipped.least_eigenvalue =
+        std::min(clipped.least_eigenvalue, ClipToSemidefinite<size>(information));
+    ++clipped.count;
+  }
+  const absl::Status status = ValidateSemidefinite<size>(information, "information");
+  return status.ok() ? status : cursor.Error(status.message());
+}
+
 absl::StatusOr<RelativePoseTerm> SpatialTerm(const TextCursor& cursor,
                                              Dialect dialect,
-                                             const std::vector<double>& v) {
+                                             const std::vector<double>& v,
+                                             Clipped& clipped) {
   RelativePoseTerm term;
   STRATA_ASSIGN_OR_RETURN(term.T_i_j, SpatialPose(cursor, dialect, v.data()));
   if (dialect == Dialect::kG2o) {
@@ -123,14 +145,14 @@ absl::StatusOr<RelativePoseTerm> SpatialTerm(const TextCursor& cursor,
   } else if (v.size() > kBareToroEdge) {
     term.information = InformationFromToro(UpperTriangle<6>(v.data() + kBareToroEdge));
   }
-  const absl::Status status = ValidateSemidefinite<6>(term.information, "information");
-  if (!status.ok()) return cursor.Error(status.message());
+  STRATA_RETURN_IF_ERROR(Settle<6>(cursor, term.information, clipped));
   return term;
 }
 
 absl::StatusOr<PlanarRelativeTerm> PlanarTerm(const TextCursor& cursor,
                                               Dialect dialect,
-                                              const std::vector<double>& v) {
+                                              const std::vector<double>& v,
+                                              Clipped& clipped) {
   PlanarRelativeTerm term;
   term.T_i_j = PlanarPose(v[0], v[1], v[2]);
   if (dialect == Dialect::kG2o) {
@@ -138,8 +160,7 @@ absl::StatusOr<PlanarRelativeTerm> PlanarTerm(const TextCursor& cursor,
   } else {  // Ixx Ixy Iyy Itt Ixt Iyt
     term.information << v[3], v[4], v[7], v[4], v[5], v[8], v[7], v[8], v[6];
   }
-  const absl::Status status = ValidateSemidefinite<3>(term.information, "information");
-  if (!status.ok()) return cursor.Error(status.message());
+  STRATA_RETURN_IF_ERROR(Settle<3>(cursor, term.information, clipped));
   return term;
 }
 
@@ -222,14 +243,21 @@ absl::Status ParseEdge(const TextCursor& cursor,
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t j, VertexNumber(cursor, words[2]));
   if (i == j) return cursor.Error(absl::StrCat("an edge from vertex ", i, " to itself"));
   STRATA_ASSIGN_OR_RETURN(const std::vector<double> v, NumbersOf(cursor, tag, words, 3));
-  const std::size_t line = cursor.line_number();
+  // What says nothing holds nothing, and no constraint of a map may be so.
+  const auto add = [&](const auto& term, auto& edges) {
+    if (term.information.isZero(0.0)) {
+      ++parsed.clipped.dropped;
+    } else {
+      edges.push_back({.line = cursor.line_number(), .i = i, .j = j, .value = term});
+    }
+  };
   if (tag.kind == Kind::kEdge2) {
-    STRATA_ASSIGN_OR_RETURN(const auto term, PlanarTerm(cursor, tag.dialect, v));
-    parsed.planar.edges.push_back({.line = line, .i = i, .j = j, .value = term});
+    STRATA_ASSIGN_OR_RETURN(const auto term, PlanarTerm(cursor, tag.dialect, v, parsed.clipped));
+    add(term, parsed.planar.edges);
     return absl::OkStatus();
   }
-  STRATA_ASSIGN_OR_RETURN(const auto term, SpatialTerm(cursor, tag.dialect, v));
-  parsed.spatial.edges.push_back({.line = line, .i = i, .j = j, .value = term});
+  STRATA_ASSIGN_OR_RETURN(const auto term, SpatialTerm(cursor, tag.dialect, v, parsed.clipped));
+  add(term, parsed.spatial.edges);
   return absl::OkStatus();
 }
 
@@ -397,14 +425,44 @@ absl::StatusOr<GraphFile> ParseGraph(absl::string_view text) {
     if (words.empty() || words[0][0] == '#') continue;
     STRATA_RETURN_IF_ERROR(ParseLine(cursor, words, parsed));
   }
-  if (!parsed.planar.empty()) {
-    return Assemble(parsed.planar, parsed.fixed, &PlanarPoseGraph::poses, PlanarPose(0, 0, 0));
+  if (parsed.planar.empty() && parsed.spatial.empty()) {
+    return cursor.Error("expected vertices or edges, found the end of the file");
   }
-  if (!parsed.spatial.empty()) {
-    return Assemble(
-        parsed.spatial, parsed.fixed, &PoseGraphProblem::T_map_scan, Pose(Pose::Identity()));
+  absl::StatusOr<GraphFile> file =
+      parsed.spatial.empty()
+          ? Assemble(parsed.planar, parsed.fixed, &PlanarPoseGraph::poses, PlanarPose(0, 0, 0))
+          : Assemble(parsed.spatial,
+                     parsed.fixed,
+                     &PoseGraphProblem::T_map_scan,
+                     Pose(Pose::Identity()));
+  if (file.ok()) {
+    file->clipped = parsed.clipped.count;
+    file->dropped = parsed.clipped.dropped;
+    file->least_eigenvalue = parsed.clipped.least_eigenvalue;
   }
-  return cursor.Error("expected vertices or edges, found the end of the file");
+  return file;
+}
+
+std::string ClippedWarning(const GraphFile& file) {
+  const std::size_t kept =
+      std::visit([](const auto& graph) { return graph.relative.size(); }, file.graph);
+  const std::string of = absl::StrCat(" of ", kept + file.dropped, " informations ");
+  std::string text;
+  if (file.clipped > 0) {
+    text = absl::StrCat(file.clipped,
+                        of,
+                        "have a negative eigenvalue, the least ",
+                        file.least_eigenvalue,
+                        "; each is replaced by the nearest positive semidefinite matrix");
+  }
+  if (file.dropped > 0) {
+    absl::StrAppend(&text,
+                    text.empty() ? "" : "; ",
+                    file.dropped,
+                    of,
+                    "have no positive eigenvalue: their edges are left out");
+  }
+  return text;
 }
 
 absl::StatusOr<GraphFile> ReadGraph(const std::filesystem::path& path) {

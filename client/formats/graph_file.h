@@ -2,6 +2,7 @@
 #ifndef STRATA_CLIENT_FORMATS_GRAPH_FILE_H_
 #define STRATA_CLIENT_FORMATS_GRAPH_FILE_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -22,7 +23,14 @@ struct GraphFile {
   bool has_poses = false;
   // Relative poses and fixed nodes only. The information is in Strata's order and units.
   std::variant<PoseGraphProblem, PlanarPoseGraph> graph;
+  // Informations with a negative eigenvalue, which were made semidefinite, and the least of those.
+  std::size_t clipped = 0;
+  double least_eigenvalue = 0.0;
+  std::size_t dropped = 0;  // edges of which nothing positive was left, or that said nothing at all
 };
+
+// What to tell people of clipped informations and dropped edges; empty if there are none.
+std::string ClippedWarning(const GraphFile& file);
 
 // g2o: VERTEX_SE3:QUAT, EDGE_SE3:QUAT, VERTEX_SE2, EDGE_SE2, FIX. TORO: VERTEX2, EDGE2
 // (information Ixx Ixy Iyy Itt Ixt Iyt), VERTEX3, EDGE3 (x y z roll pitch yaw, information
@@ -34,8 +42,10 @@ struct GraphFile {
 //
 // NOT_FOUND; INVALID_ARGUMENT naming file, line, value and cure: wrong counts, numbers that are not
 // finite, quaternions off unit length by more than 1 %, spatial beside planar lines, vertices that
-// come twice or are missing (unless there are none), edges from a vertex to itself, informations
-// that are not positive semidefinite.
+// come twice or are missing (unless there are none), edges from a vertex to itself. Informations
+// with negative eigenvalues, of which public graphs have thousands, are clipped to the nearest
+// positive semidefinite matrix and counted; edges whose information is zero then are dropped and
+// counted.
 absl::StatusOr<GraphFile> ReadGraph(const std::filesystem::path& path);
 absl::StatusOr<GraphFile> ParseGraph(absl::string_view text);
 

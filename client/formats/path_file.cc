@@ -5,7 +5,7 @@
 
 #include "client/formats/file_bytes.h"
 #include "client/formats/geometry_writer.h"
-#include "client/formats/scan_reader.h"
+#include "client/formats/ply_reader.h"
 #include "core/common/status.h"
 
 namespace strata {
@@ -16,8 +16,10 @@ absl::Status WritePath(const std::string& path, const std::vector<Eigen::Vector3
 }
 
 absl::StatusOr<std::vector<Eigen::Vector3d>> ReadPath(const std::string& path) {
-  STRATA_ASSIGN_OR_RETURN(const PointCloud cloud, ReadScan(path, ScanFormat::kPly));
-  return GeometryOf(cloud).vertices;
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(path));
+  const absl::StatusOr<PointCloud> cloud = ReadPly(bytes);
+  if (!cloud.ok()) return Annotate(cloud.status(), path);
+  return GeometryOf(*cloud).vertices;
 }
 
 }  // namespace strata

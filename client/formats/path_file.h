@@ -11,7 +11,7 @@
 
 namespace strata {
 
-// UNAVAILABLE if the file cannot be written.
+// FAILED_PRECONDITION if the file cannot be written.
 absl::Status WritePath(const std::string& path, const std::vector<Eigen::Vector3d>& waypoints);
 
 // The vertices of any PLY file in their order. INVALID_ARGUMENT or NOT_FOUND naming the file.

@@ -306,4 +306,10 @@ absl::StatusOr<PointCloud> ReadPcd(absl::string_view bytes) {
   return std::move(builder).Build();
 }
 
+bool HasPcdViewpoint(absl::string_view beginning) {
+  TextCursor cursor(beginning);
+  const absl::StatusOr<Header> header = ReadHeader(cursor);
+  return header.ok() && !header->viewpoint.isZero(0.0);
+}
+
 }  // namespace strata

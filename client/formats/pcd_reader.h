@@ -17,6 +17,9 @@ namespace strata {
 // doubles, and is slower (docs/decisions/0083).
 absl::StatusOr<PointCloud> ReadPcd(absl::string_view bytes);
 
+// Whether the header that `beginning` of a file begins with says where the sensor stood.
+bool HasPcdViewpoint(absl::string_view beginning);
+
 }  // namespace strata
 
 #endif  // STRATA_CLIENT_FORMATS_PCD_READER_H_

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 #include <numbers>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -167,6 +169,69 @@ class ColumnText {
   std::optional<CloudBuilder> builder_;
 };
 
+// No lidar of a car sees farther.
+constexpr float kFarthestReturnM = 300.0F;
+
+float FloatAt(absl::string_view bytes, std::size_t index) {
+  float value = 0.0F;
+  std::memcpy(&value, bytes.data() + 4 * index, sizeof value);
+  return value;
+}
+
+// Whether the bytes are records of five floats of which the last is the number of a laser.
+bool HasRings(absl::string_view bytes) {
+  constexpr float kLasers = 128.0F;
+  const std::size_t records = bytes.size() / 20;
+  if (bytes.size() % 20 != 0 || records == 0) return false;
+  bool any = false;
+  for (std::size_t i = 0; i < records; ++i) {
+    const float ring = FloatAt(bytes, 5 * i + 4);
+    if (!(ring >= 0.0F && ring < kLasers && ring == std::floor(ring))) return false;
+    any = any || ring > 0.0F;
+  }
+  return any;
+}
+
+// Records of `columns` float32 each, which begin with x y z intensity. Nothing but their values
+// tells such files from those of `other`, or of anything else.
+absl::StatusOr<PointCloud> ReadFloats(absl::string_view bytes,
+                                      std::size_t columns,
+                                      absl::string_view names,
+                                      absl::string_view other) {
+  const std::size_t point_bytes = 4 * columns;
+  const std::string cure = absl::StrCat("; --format ", other, " reads files of another layout");
+  if (bytes.size() % point_bytes != 0) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        bytes.size(), " bytes; expected a multiple of ", point_bytes, " (", names, ")", cure));
+  }
+  const std::size_t points = bytes.size() / point_bytes;
+  std::size_t odd = 0;
+  for (std::size_t i = 0; i < points; ++i) {
+    const Eigen::Vector3f p(FloatAt(bytes, i * columns),
+                            FloatAt(bytes, i * columns + 1),
+                            FloatAt(bytes, i * columns + 2));
+    odd += p.norm() <= kFarthestReturnM ? 0 : 1;
+  }
+  if (100 * odd > points) {
+    return absl::InvalidArgumentError(absl::StrCat(odd,
+                                                   " of ",
+                                                   points,
+                                                   " points are farther than ",
+                                                   kFarthestReturnM,
+                                                   " m or not finite: these bytes are no ",
+                                                   names,
+                                                   cure));
+  }
+  const std::vector<Meaning> meanings = UnnamedColumns(4);
+  STRATA_ASSIGN_OR_RETURN(CloudBuilder builder, CloudBuilder::Create(meanings));
+  std::vector<PointField> fields;
+  for (std::size_t k = 0; k < 4; ++k) {
+    fields.push_back({meanings[k], ScalarType::kFloat32, bytes.data() + 4 * k, point_bytes});
+  }
+  AddPoints(fields, points, false, builder);
+  return std::move(builder).Build();
+}
+
 }  // namespace
 
 absl::StatusOr<PointCloud> ReadXyz(absl::string_view bytes) {
@@ -178,19 +243,16 @@ absl::StatusOr<PointCloud> ReadOakland(absl::string_view bytes) {
 }
 
 absl::StatusOr<PointCloud> ReadKitti(absl::string_view bytes) {
-  constexpr std::size_t kPointBytes = 16;
-  if (bytes.size() % kPointBytes != 0) {
+  if (HasRings(bytes)) {
     return absl::InvalidArgumentError(
-        absl::StrCat(bytes.size(), " bytes; expected a multiple of 16 (x y z reflectance)"));
+        "every fifth number is a ring: these are x y z intensity ring of nuScenes; read them with "
+        "--format nuscenes");
   }
-  const std::vector<Meaning> meanings = UnnamedColumns(4);
-  STRATA_ASSIGN_OR_RETURN(CloudBuilder builder, CloudBuilder::Create(meanings));
-  std::vector<PointField> fields;
-  for (std::size_t k = 0; k < 4; ++k) {
-    fields.push_back({meanings[k], ScalarType::kFloat32, bytes.data() + 4 * k, kPointBytes});
-  }
-  AddPoints(fields, bytes.size() / kPointBytes, false, builder);
-  return std::move(builder).Build();
+  return ReadFloats(bytes, 4, "x y z reflectance", "nuscenes");
+}
+
+absl::StatusOr<PointCloud> ReadNuscenes(absl::string_view bytes) {
+  return ReadFloats(bytes, 5, "x y z intensity ring", "kitti");
 }
 
 absl::StatusOr<PointCloud> Read3dtk(absl::string_view bytes) {

@@ -1,4 +1,4 @@
-// Files without a real header: text columns, KITTI's velodyne files, 3DTK's scans.
+// Files without a real header: text columns, KITTI's velodyne files and nuScenes', 3DTK's scans.
 #ifndef STRATA_CLIENT_FORMATS_PLAIN_READERS_H_
 #define STRATA_CLIENT_FORMATS_PLAIN_READERS_H_
 
@@ -22,8 +22,13 @@ absl::StatusOr<PointCloud> ReadXyz(absl::string_view bytes);
 absl::StatusOr<PointCloud> ReadOakland(absl::string_view bytes);
 
 // x y z reflectance, float32 little-endian, metres, x forward, z up. INVALID_ARGUMENT unless the
-// size is a multiple of 16.
+// size is a multiple of 16, at most 1 % of the points are farther than 300 m or not finite, and the
+// numbers do not have nuScenes' rings: files of other columns have the same ending, and often such
+// sizes.
 absl::StatusOr<PointCloud> ReadKitti(absl::string_view bytes);
+
+// The same of nuScenes, a multiple of 20: x y z intensity ring; x right, y forward.
+absl::StatusOr<PointCloud> ReadNuscenes(absl::string_view bytes);
 
 // 3DTK's uos scans: "x y z …" a line in centimetres, left-handed (x right, y up, z forward); a
 // fourth number is reflectance. Converted to metres, right-handed, x forward, y left, z up:

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <optional>
 #include <set>
@@ -19,8 +20,11 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/time/time.h"
 
+#include "client/formats/pcd_reader.h"
+#include "client/formats/scan_folder.h"
 #include "client/formats/text_cursor.h"
 #include "core/common/status.h"
 
@@ -31,45 +35,6 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t kMaxSequence = std::uint64_t{1} << 53;
 constexpr absl::Duration kSameTime = absl::Milliseconds(1);
-
-bool IsScanOfFolder(const fs::path& path, ScanFormat format) {
-  const ScanFormat named = ScanFormatOfName(path);
-  if (format != ScanFormat::kAuto) return named == format;
-  // Folders of scans also hold read-me and pose files.
-  return named != ScanFormat::kAuto && absl::AsciiStrToLower(path.extension().string()) != ".txt";
-}
-
-absl::Status AddPath(const fs::path& path, ScanFormat format, std::vector<fs::path>& files) {
-  std::error_code error;
-  if (!fs::exists(path, error)) {
-    return absl::NotFoundError(absl::StrCat(path.string(), ": no such file or folder"));
-  }
-  if (!fs::is_directory(path, error)) {
-    files.push_back(path);
-    return absl::OkStatus();
-  }
-  for (fs::directory_iterator it(path, error), end; !error && it != end; it.increment(error)) {
-    std::error_code ignored;
-    // Neither a link to nothing nor what cannot be read is passed over: reading it will say so.
-    if (!it->is_directory(ignored) && IsScanOfFolder(it->path(), format)) {
-      files.push_back(it->path());
-    }
-  }
-  if (!error) return absl::OkStatus();
-  return absl::UnavailableError(absl::StrCat(path.string(), ": ", error.message()));
-}
-
-absl::Status NoScans(const std::vector<fs::path>& paths, ScanFormat format) {
-  const std::string where = paths.empty() ? std::string("nowhere") : paths.front().string();
-  if (format == ScanFormat::kAuto) {
-    return absl::NotFoundError(absl::StrCat(where,
-                                            ": no scan by its ending (.pcd .ply .bin .vtk .3d .xyz "
-                                            ".csv .asc .pts); say --format xyz for "
-                                            "points in .txt files"));
-  }
-  return absl::NotFoundError(
-      absl::StrCat(where, ": no scan of format ", ScanFormatName(format), " by its ending"));
-}
 
 // Runs of digits compare as numbers, so that s2 comes before s10.
 bool NaturalLess(absl::string_view a, absl::string_view b) {
@@ -195,8 +160,9 @@ void AssignTum(PoseList list, const ScanListOptions& options, std::vector<ScanFi
   const bool timed = std::all_of(scans.begin(), scans.end(), [](const ScanFile& scan) {
     return TimeOfName(scan.path).has_value();
   });
-  if (!timed && list.poses.size() > scans.size() && options.warn) {
-    options.warn(absl::StrCat(options.poses.string(),
+  if (!timed && list.poses.size() > scans.size() && options.tell) {
+    options.tell(absl::StrCat("warning: ",
+                              options.poses.string(),
                               " has ",
                               list.poses.size(),
                               " poses for ",
@@ -209,8 +175,8 @@ void AssignTum(PoseList list, const ScanListOptions& options, std::vector<ScanFi
 }
 
 // Poses in `folder`, or beside the scans where it is empty; where nobody asked for them and there
-// is none, nothing.
-void Assign3dtk(bool asked, const fs::path& folder, std::vector<ScanFile>& scans) {
+// is none, nothing, and false.
+bool Assign3dtk(bool asked, const fs::path& folder, std::vector<ScanFile>& scans) {
   std::vector<absl::StatusOr<Pose>> poses;
   bool any = asked;
   for (const ScanFile& scan : scans) {
@@ -225,6 +191,75 @@ void Assign3dtk(bool asked, const fs::path& folder, std::vector<ScanFile>& scans
     scans[i].pose_status = poses[i].status();
     if (poses[i].ok()) scans[i].T_map_scan = *poses[i];
   }
+  return any;
+}
+
+bool SaysWhereItStood(const ScanFile& scan) {
+  if (scan.format != ScanFormat::kPcd && ScanFormatOfName(scan.path) != ScanFormat::kPcd) {
+    return false;
+  }
+  std::string beginning(std::size_t{1} << 16, '\0');
+  std::ifstream file(scan.path, std::ios::binary);
+  file.read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
+  beginning.resize(static_cast<std::size_t>(file.gcount()));
+  return HasPcdViewpoint(beginning);
+}
+
+std::string Joined(const std::vector<fs::path>& files) {
+  return absl::StrJoin(
+      files, ", ", [](std::string* out, const fs::path& file) { out->append(file.string()); });
+}
+
+std::vector<fs::path> PoseFilesOf(const std::vector<fs::path>& folders) {
+  std::vector<fs::path> files;
+  for (const fs::path& folder : folders) {
+    for (const fs::path& file : PoseFilesIn(folder)) files.push_back(file);
+  }
+  return files;
+}
+
+absl::Status NoPoses(const std::vector<fs::path>& paths, std::size_t scans) {
+  std::set<fs::path> around;  // up to the folder above that of the scans
+  for (const fs::path& path : paths) {
+    std::error_code error;
+    const fs::path above = fs::canonical(path, error).parent_path();
+    around.insert(above);
+    if (!fs::is_directory(path, error)) around.insert(above.parent_path());
+  }
+  const std::vector<fs::path> near = PoseFilesOf({around.begin(), around.end()});
+  return absl::InvalidArgumentError(
+      absl::StrCat(scans,
+                   " scans and no poses: all of them would lie at the origin; name the file of "
+                   "poses with --poses FILE",
+                   near.empty() ? "" : absl::StrCat(" (there is ", Joined(near), ")"),
+                   ", or say --poses none if their points are in one frame already"));
+}
+
+// The file of poses of several scans for which none is named; empty if they need none.
+absl::StatusOr<fs::path> ChoosePoses(const std::vector<fs::path>& paths,
+                                     const std::vector<ScanFile>& scans,
+                                     const ScanListOptions& options) {
+  const std::vector<fs::path> files = PoseFilesOf(paths);
+  if (files.size() == 1) {
+    if (options.tell) options.tell(absl::StrCat("poses of ", files.front().string()));
+    return files.front();
+  }
+  if (scans.size() == 1 || std::any_of(scans.begin(), scans.end(), SaysWhereItStood)) {
+    return fs::path();
+  }
+  if (files.empty()) return NoPoses(paths, scans.size());
+  return absl::InvalidArgumentError(absl::StrCat(
+      "several files of poses: ", Joined(files), "; choose one of them with --poses FILE"));
+}
+
+absl::Status AssignFromFile(const ScanListOptions& options, std::vector<ScanFile>& scans) {
+  STRATA_ASSIGN_OR_RETURN(PoseList list, ReadPoses(options.poses, options.pose_format));
+  if (list.format == PoseFormat::kTum) {
+    AssignTum(std::move(list), options, scans);
+  } else {
+    AssignByIndex(list, options.poses, scans);
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -242,29 +277,27 @@ std::optional<std::uint64_t> SequenceOfName(const fs::path& path) {
 }
 
 absl::StatusOr<std::vector<ScanFile>> ListScans(const std::vector<fs::path>& paths,
-                                                const ScanListOptions& options) {
+                                                const ScanListOptions& given) {
+  ScanListOptions options = given;
   std::vector<fs::path> files;
   for (const fs::path& path : paths) {
-    STRATA_RETURN_IF_ERROR(AddPath(path, options.format, files));
+    STRATA_ASSIGN_OR_RETURN(const auto found, ScansAt(path, options.format, options.tell));
+    files.insert(files.end(), found.begin(), found.end());
   }
-  if (files.empty()) {
-    return NoScans(paths, options.format);
-  }
+  if (files.empty()) return absl::NotFoundError("no scan: name files or folders of scans");
   std::vector<ScanFile> scans = Ordered(std::move(files), options.format);
+  if (options.poses == kNoPoses) return scans;
   std::error_code error;
   const bool folder =
       fs::is_directory(options.poses, error) &&
       (options.pose_format == PoseFormat::kAuto || options.pose_format == PoseFormat::k3dtk);
   if (options.poses.empty() || folder) {
-    Assign3dtk(folder || options.pose_format == PoseFormat::k3dtk, options.poses, scans);
-    return scans;
+    if (Assign3dtk(folder || options.pose_format == PoseFormat::k3dtk, options.poses, scans)) {
+      return scans;
+    }
+    STRATA_ASSIGN_OR_RETURN(options.poses, ChoosePoses(paths, scans, options));
   }
-  STRATA_ASSIGN_OR_RETURN(PoseList list, ReadPoses(options.poses, options.pose_format));
-  if (list.format == PoseFormat::kTum) {
-    AssignTum(std::move(list), options, scans);
-  } else {
-    AssignByIndex(list, options.poses, scans);
-  }
+  if (!options.poses.empty()) STRATA_RETURN_IF_ERROR(AssignFromFile(options, scans));
   return scans;
 }
 

@@ -19,14 +19,18 @@
 
 namespace strata {
 
+// In place of a file of poses: there is none, and every scan is at the origin.
+inline constexpr char kNoPoses[] = "none";
+
 struct ScanListOptions {
   ScanFormat format = ScanFormat::kAuto;
-  // The file of poses, or a folder of 3DTK's .pose files; empty: none, but 3DTK scans read the
-  // .pose files beside them if any is there.
+  // The file of poses, or a folder of 3DTK's .pose files, or kNoPoses; empty: what lies there, see
+  // below.
   std::filesystem::path poses = {};
   PoseFormat pose_format = PoseFormat::kAuto;
-  // Told, if set, what is no error but may not be what was meant.
-  std::function<void(const std::string&)> warn = {};
+  // Told, if set, what was chosen, and, after "warning: ", what is no error but may not be what was
+  // meant.
+  std::function<void(const std::string&)> tell = {};
 };
 
 // One scan to import.
@@ -43,20 +47,24 @@ struct ScanFile {
 // or beyond 2^53.
 std::optional<std::uint64_t> SequenceOfName(const std::filesystem::path& path);
 
-// Scans of `paths` in the order of their sequence numbers. A file counts as it is; of a folder (not
-// of those below it) the files whose name has the format's ending, with kAuto any ending that
-// ScanFormatOfName knows but .txt.
+// Scans of `paths`, each as ScansAt() has it, in the order of their sequence numbers.
 //
 // The sequence number is SequenceOfName where every file has one and no two are equal; else the
 // files are numbered from 0 in natural order of their names (s2 before s10).
 //
 // Poses: index-tum and kitti by index = SequenceOfName. tum has no index: where every stem is a
 // time in seconds (it has a decimal point) by time, to a millisecond; else one after the other, the
-// scans in order and the poses in order of time; `warn` is told where the file has more poses.
+// scans in order and the poses in order of time; `tell` is told where the file has more poses.
 // 3dtk: the .pose file beside each scan or in the folder named.
 //
-// INVALID_ARGUMENT, NOT_FOUND: no scan at all, a path that is not there, a file of poses that
-// cannot be read. A scan without a pose is in its `pose_status`.
+// Where none are named: those beside 3DTK scans; else the one file of poses (PoseFilesIn) in the
+// folder that is named; else none for a single scan and for PCD files with a VIEWPOINT, whose
+// points lie in one frame already. Several scans that nothing is said of would all lie at the
+// origin.
+//
+// INVALID_ARGUMENT, NOT_FOUND: no scan at all, a path that is not there, several scans and no poses
+// or several files of them, a file of poses that cannot be read. A scan without a pose is in its
+// `pose_status`.
 absl::StatusOr<std::vector<ScanFile>> ListScans(const std::vector<std::filesystem::path>& paths,
                                                 const ScanListOptions& options);
 

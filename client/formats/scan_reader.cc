@@ -1,8 +1,12 @@
 #include "client/formats/scan_reader.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -32,6 +36,7 @@ constexpr NamedFormat kFormats[] = {
     {"pcd", ScanFormat::kPcd},
     {"ply", ScanFormat::kPly},
     {"kitti", ScanFormat::kKitti},
+    {"nuscenes", ScanFormat::kNuscenes},
     {"vtk", ScanFormat::kVtk},
     {"xyz", ScanFormat::kXyz},
     {"oakland", ScanFormat::kOakland},
@@ -50,6 +55,40 @@ constexpr NamedFormat kEndings[] = {
     {".pts", ScanFormat::kXyz},
 };
 
+struct UnreadFormat {
+  absl::string_view ending;
+  absl::string_view what;  // it is, and the cure
+};
+
+constexpr absl::string_view kSurveyCure =
+    "is not read yet; convert it, for instance with 'pdal translate IN OUT.ply' or CloudCompare";
+constexpr absl::string_view kRosCure =
+    "is not read yet; play it and save its point clouds as PCD, as pcl_ros does, and the poses as "
+    "'time x y z qx qy qz qw' a line";
+constexpr absl::string_view kPacketsCure =
+    "holds a sensor's packets, which are not read; the sensor's own program writes PCD or CSV";
+constexpr absl::string_view kPackedCure = "is packed; unpack it first";
+
+constexpr UnreadFormat kUnread[] = {
+    {".las", kSurveyCure},
+    {".laz", kSurveyCure},
+    {".e57", kSurveyCure},
+    {".ptx", kSurveyCure},
+    {".bag", kRosCure},
+    {".db3", kRosCure},
+    {".mcap", kRosCure},
+    {".pcap", kPacketsCure},
+    {".rawlog", kPacketsCure},
+    {".bt", "holds voxels of an OctoMap, no scan; convert it with octree2pointcloud to PCD"},
+    {".ot", "holds voxels of an OctoMap, no scan; convert it with octree2pointcloud to PCD"},
+    {".gz", kPackedCure},
+    {".zip", kPackedCure},
+};
+
+std::string EndingOf(const std::filesystem::path& path) {
+  return absl::AsciiStrToLower(path.extension().string());
+}
+
 ScanFormat FormatOfBytes(absl::string_view bytes) {
   const absl::string_view start = bytes.substr(0, 64);
   if (absl::StartsWith(start, "ply\n") || absl::StartsWith(start, "ply\r")) return ScanFormat::kPly;
@@ -58,6 +97,46 @@ ScanFormat FormatOfBytes(absl::string_view bytes) {
     return ScanFormat::kPcd;
   }
   return ScanFormat::kAuto;
+}
+
+// Whether each point is a return of range 0.
+std::vector<bool> AreAtSensor(const PointCloud& cloud) {
+  const Eigen::Vector3f zero = (-cloud.origin).cast<float>();
+  const bool said = !cloud.sensor_origin.isZero(0.0F);
+  std::vector<bool> at_sensor(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Eigen::Vector3f& p = cloud.points[i];
+    at_sensor[i] = p == zero || (said && p == cloud.sensor_origin);
+  }
+  return at_sensor;
+}
+
+template <typename Value>
+void Drop(const std::vector<bool>& dropped, std::vector<Value>& column) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < column.size(); ++i) {
+    if (!dropped[i]) column[kept++] = column[i];
+  }
+  column.resize(kept);
+}
+
+// Takes returns of range 0 out, or makes holes of the grid of them; how many.
+std::size_t DropAtSensor(PointCloud& cloud) {
+  const std::vector<bool> dropped = AreAtSensor(cloud);
+  const auto count = static_cast<std::size_t>(std::count(dropped.begin(), dropped.end(), true));
+  if (count == 0) return 0;
+  if (cloud.organised()) {
+    constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      if (dropped[i]) cloud.points[i].setConstant(kNaN);
+    }
+    return count;
+  }
+  Drop(dropped, cloud.points);
+  Drop(dropped, cloud.intensity);
+  Drop(dropped, cloud.colour);
+  Drop(dropped, cloud.label);
+  return count;
 }
 
 absl::StatusOr<PointCloud> Parse(absl::string_view bytes, ScanFormat format) {
@@ -70,6 +149,8 @@ absl::StatusOr<PointCloud> Parse(absl::string_view bytes, ScanFormat format) {
       return ReadPly(bytes);
     case ScanFormat::kKitti:
       return ReadKitti(bytes);
+    case ScanFormat::kNuscenes:
+      return ReadNuscenes(bytes);
     case ScanFormat::kVtk:
       return ReadVtk(bytes);
     case ScanFormat::kXyz:
@@ -80,7 +161,8 @@ absl::StatusOr<PointCloud> Parse(absl::string_view bytes, ScanFormat format) {
       break;
   }
   return absl::InvalidArgumentError(
-      "unknown format; say which of 3dtk, pcd, ply, kitti, vtk, xyz, oakland");
+      "unknown format; say which with --format: 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, "
+      "oakland");
 }
 
 }  // namespace
@@ -92,7 +174,7 @@ absl::StatusOr<ScanFormat> ParseScanFormat(absl::string_view name) {
   return absl::InvalidArgumentError(
       absl::StrCat("scan format '",
                    name.substr(0, 40),
-                   "' is none of auto, 3dtk, pcd, ply, kitti, vtk, xyz, oakland"));
+                   "' is none of auto, 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, oakland"));
 }
 
 absl::string_view ScanFormatName(ScanFormat format) {
@@ -103,14 +185,25 @@ absl::string_view ScanFormatName(ScanFormat format) {
 }
 
 ScanFormat ScanFormatOfName(const std::filesystem::path& path) {
-  const std::string ending = absl::AsciiStrToLower(path.extension().string());
+  const std::string ending = EndingOf(path);
+  if (ending == ".bin" && EndingOf(path.stem()) == ".pcd") return ScanFormat::kNuscenes;
   for (const NamedFormat& named : kEndings) {
     if (named.name == ending) return named.format;
   }
   return absl::StartsWith(ending, ".xyz") ? ScanFormat::kXyz : ScanFormat::kAuto;
 }
 
-absl::StatusOr<PointCloud> ReadScan(const std::filesystem::path& path, ScanFormat format) {
+std::string WhyNotRead(const std::filesystem::path& path) {
+  const std::string ending = EndingOf(path);
+  for (const UnreadFormat& unread : kUnread) {
+    if (unread.ending == ending) return absl::StrCat(ending, " ", unread.what);
+  }
+  return "";
+}
+
+absl::StatusOr<PointCloud> ReadScan(const std::filesystem::path& path,
+                                    ScanFormat format,
+                                    std::size_t* at_sensor) {
   STRATA_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(path));
   if (bytes.empty()) {
     return absl::InvalidArgumentError(
@@ -118,8 +211,18 @@ absl::StatusOr<PointCloud> ReadScan(const std::filesystem::path& path, ScanForma
   }
   if (format == ScanFormat::kAuto) format = FormatOfBytes(bytes);
   if (format == ScanFormat::kAuto) format = ScanFormatOfName(path);
+  const std::string unread = format == ScanFormat::kAuto ? WhyNotRead(path) : "";
+  if (!unread.empty()) {
+    return absl::InvalidArgumentError(absl::StrCat(path.string(), ": ", unread));
+  }
   absl::StatusOr<PointCloud> cloud = Parse(bytes, format);
   if (!cloud.ok()) return Annotate(cloud.status(), path.string());
+  const std::size_t dropped = DropAtSensor(*cloud);
+  if (at_sensor != nullptr) *at_sensor = dropped;
+  if (dropped > 0 && CountFinite(*cloud) == 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(path.string(), ": all of ", dropped, " returns have range 0"));
+  }
   return cloud;
 }
 

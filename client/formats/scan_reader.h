@@ -2,8 +2,10 @@
 #ifndef STRATA_CLIENT_FORMATS_SCAN_READER_H_
 #define STRATA_CLIENT_FORMATS_SCAN_READER_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
@@ -12,24 +14,42 @@
 
 namespace strata {
 
-enum class ScanFormat : std::uint8_t { kAuto, k3dtk, kPcd, kPly, kKitti, kVtk, kXyz, kOakland };
+enum class ScanFormat : std::uint8_t {
+  kAuto,
+  k3dtk,
+  kPcd,
+  kPly,
+  kKitti,
+  kNuscenes,
+  kVtk,
+  kXyz,
+  kOakland
+};
 
-// "auto", "3dtk", "pcd", "ply", "kitti", "vtk", "xyz", "oakland"; INVALID_ARGUMENT listing them
-// otherwise.
+// "auto", "3dtk", "pcd", "ply", "kitti", "nuscenes", "vtk", "xyz", "oakland"; INVALID_ARGUMENT
+// listing them otherwise.
 absl::StatusOr<ScanFormat> ParseScanFormat(absl::string_view name);
 absl::string_view ScanFormatName(ScanFormat format);
 
-// The format of a file by its name: .pcd, .ply, .bin (KITTI), .3d (3DTK), .vtk, and .xyz…, .txt,
-// .csv, .asc, .pts (text), and of those .xyz_label_conf (Oakland); kAuto for any other.
+// The format of a file by its name: .pcd, .ply, .bin (KITTI), .pcd.bin (nuScenes), .3d (3DTK),
+// .vtk, and .xyz…, .txt, .csv, .asc, .pts (text), and of those .xyz_label_conf (Oakland); kAuto for
+// any other.
 ScanFormat ScanFormatOfName(const std::filesystem::path& path);
+
+// What a file is that holds points and is not read, by its ending (.las, .e57, .mcap, …), and what
+// makes of it one that is; empty for any other file.
+std::string WhyNotRead(const std::filesystem::path& path);
 
 // The cloud of a file, in metres, z up; kAuto goes by the first bytes (PCD, PLY and VTK say what
 // they are), else by the name. Points that are not finite are left out, but kept as NaN in
-// organised clouds. Far coordinates keep their precision by PointCloud::origin. Passes
-// ValidateCloud. NOT_FOUND; UNAVAILABLE if it cannot be read; INVALID_ARGUMENT with file, line or
-// byte and what was expected. Memory is bounded by about 20 times the file's size.
+// organised clouds; so are returns of range 0, at (0, 0, 0) or where the sensor stood, which are
+// counted in `at_sensor` if it is not null. Far coordinates keep their precision by
+// PointCloud::origin. Passes ValidateCloud. NOT_FOUND; UNAVAILABLE if it cannot be read;
+// INVALID_ARGUMENT with file, line or byte and what was expected, or if no point is left. Memory is
+// bounded by about 20 times the file's size.
 absl::StatusOr<PointCloud> ReadScan(const std::filesystem::path& path,
-                                    ScanFormat format = ScanFormat::kAuto);
+                                    ScanFormat format = ScanFormat::kAuto,
+                                    std::size_t* at_sensor = nullptr);
 
 }  // namespace strata
 

@@ -157,7 +157,9 @@ void Quantize(const Eigen::Vector3f* points,
   constexpr std::size_t kFloatsAhead = 1024;
   constexpr float kLargest = std::numeric_limits<float>::max();
   constexpr Float4 kTickBound = {0x1p30F, 0x1p30F, 0x1p30F, 0x1p30F};  // still an int
-  const auto near2 = static_cast<float>(sensor.min_range_m * sensor.min_range_m);
+  // As SensorModel::Takes(): range 0 is no return.
+  const float near2 = std::max(static_cast<float>(sensor.min_range_m * sensor.min_range_m),
+                               std::numeric_limits<float>::min());
   const auto far2 = static_cast<float>(sensor.max_range_m * sensor.max_range_m);
   const Bounds bounds(frame);
   const ScanFrame f = frame;  // a copy that the stores below cannot alias

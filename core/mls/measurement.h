@@ -68,7 +68,7 @@ inline std::uint8_t SigmaCodeOfKey(std::uint64_t key) {
 // Why points did not become measurements.
 struct DroppedPoints {
   std::uint64_t not_finite = 0;    // NaN (no return) or infinite
-  std::uint64_t out_of_range = 0;  // nearer than min_range_m or farther than max_range_m
+  std::uint64_t out_of_range = 0;  // see SensorModel::Takes()
   std::uint64_t outside_map = 0;   // beyond ±kMaxZTicks or ±kMaxCellIndex
 
   std::uint64_t total() const { return not_finite + out_of_range + outside_map; }

@@ -71,11 +71,10 @@ class CellFinder {
   };
 
   void CodePoints() {
-    const double reach = std::min(options_.max_range_m, options_.sensor.max_range_m);
     coded_.reserve(points_.size());
     for (std::uint32_t i = 0; i < points_.size(); ++i) {
       const double range = (points_[i] - sensor_).norm();
-      if (!(range >= options_.sensor.min_range_m && range <= reach)) continue;
+      if (!options_.sensor.Takes(range) || range > options_.max_range_m) continue;
       std::uint64_t code = 0;
       for (int axis = 0; axis < 3; ++axis) {
         const double cell = std::floor((points_[i] - sensor_)(axis) / smallest_m_) + kOffset;

@@ -1,4 +1,4 @@
-// The check that a matrix can be an information or a moment.
+// The check that a matrix can be an information or a moment, and the nearest one that can.
 #ifndef STRATA_CORE_POSEGRAPH_SEMIDEFINITE_H_
 #define STRATA_CORE_POSEGRAPH_SEMIDEFINITE_H_
 
@@ -7,6 +7,7 @@
 #include "absl/strings/string_view.h"
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 
 namespace strata {
 
@@ -33,6 +34,19 @@ absl::Status ValidateSemidefinite(const Eigen::Matrix<double, size, size>& matri
         absl::StrCat(field, ": has a negative eigenvalue; it must be positive semidefinite"));
   }
   return absl::OkStatus();
+}
+
+// Makes of `matrix` the positive semidefinite one that is nearest by Frobenius norm (Higham 1988):
+// negative eigenvalues become zero. Returns the least eigenvalue that it had.
+// REQUIRES: finite and symmetric.
+template <int size>
+double ClipToSemidefinite(Eigen::Matrix<double, size, size>& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, size, size>> solver(matrix);
+  const auto& V = solver.eigenvectors();
+  const Eigen::Matrix<double, size, size> clipped =
+      V * solver.eigenvalues().cwiseMax(0.0).asDiagonal() * V.transpose();
+  matrix = 0.5 * (clipped + clipped.transpose());
+  return solver.eigenvalues().minCoeff();
 }
 
 }  // namespace strata

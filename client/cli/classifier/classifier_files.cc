@@ -49,7 +49,7 @@ absl::StatusOr<PointCloud> ReadLabelled(const std::string& path) {
 // The files, and those in the folders, in the order of import.
 absl::StatusOr<std::vector<std::string>> FilesOf(const std::vector<std::string>& data) {
   STRATA_ASSIGN_OR_RETURN(const std::vector<ScanFile> scans,
-                          ListScans({data.begin(), data.end()}, {}));
+                          ListScans({data.begin(), data.end()}, {.poses = kNoPoses}));
   std::vector<std::string> paths;
   for (const ScanFile& scan : scans) paths.push_back(scan.path.string());
   return paths;

@@ -69,7 +69,7 @@ class NewFile {
 
  private:
   absl::Status CannotWrite() const {
-    return absl::UnavailableError(
+    return absl::FailedPreconditionError(
         absl::StrCat(path_.string(), ": cannot be written: ", std::strerror(errno)));
   }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -157,10 +158,12 @@ void AddCreate(Commands& commands, CLI::App* noun, const std::shared_ptr<MapOpti
       3,
       3,
       [options](const std::vector<double>& n) {
-        options->parameters.origin = {
-            .latitude_rad = n[0], .longitude_rad = n[1], .altitude_m = n[2]};
+        constexpr double kRadPerDegree = std::numbers::pi / 180.0;
+        options->parameters.origin = {.latitude_rad = n[0] * kRadPerDegree,
+                                      .longitude_rad = n[1] * kRadPerDegree,
+                                      .altitude_m = n[2]};
       },
-      "Where the map's origin is on earth (WGS 84) [rad, rad, m]");
+      "Where the map's origin is on earth (WGS 84), as in 52.5,13.4,34 [degrees, degrees, m]");
   AddProfileOptions(create, options->profile);
 }
 

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <numbers>
@@ -11,6 +13,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/strings/ascii.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_split.h"
 
@@ -149,6 +152,16 @@ void SetSize(const std::string& text, picture::PictureOptions& options) {
   options.height = height;
 }
 
+// For CLI11: empty, or what is wrong. Names without an ending of pictures (/dev/stdout) will do.
+std::string IsNoOtherPicture(const std::string& file) {
+  const std::string ending =
+      absl::AsciiStrToLower(std::filesystem::path(file).extension().string());
+  constexpr const char* kOthers[] = {
+      ".jpg", ".jpeg", ".gif", ".bmp", ".tif", ".tiff", ".webp", ".svg", ".pdf"};
+  const bool other = std::find(std::begin(kOthers), std::end(kOthers), ending) != std::end(kOthers);
+  return other ? "pictures are written as PNG; expected FILE.png, got " + file : "";
+}
+
 void AddViewOptions(CLI::App* render, const std::shared_ptr<RenderOptions>& options) {
   render->add_option("--view", options->view, "top, or oblique from above and aside")
       ->check(CLI::IsMember({"top", "oblique"}))
@@ -186,6 +199,7 @@ void AddMapRender(Commands& commands, CLI::App* noun) {
                    options->out,
                    "The PNG file to write: RGB, the legend, a scale bar and the map's axes on it")
       ->type_name("FILE.png")
+      ->check(IsNoOtherPicture)
       ->required();
   AddNumbers(
       render,

@@ -1,4 +1,6 @@
 // strata plan
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -32,6 +34,9 @@ struct PlanOptions {
   bool watch = false;
 };
 
+// Waypoints that people are shown; JSON and files have all.
+constexpr std::size_t kMostShown = 10;
+
 void PrintText(const PlanResult& plan, Output& output) {
   if (!plan.found()) {
     output.Text(absl::StrCat("no path: ",
@@ -45,8 +50,13 @@ void PrintText(const PlanResult& plan, Output& output) {
                               plan.waypoints.size(),
                               plan.elapsed_ms,
                               plan.expanded));
-  for (const Eigen::Vector3d& p : plan.waypoints) {
+  const std::size_t shown = std::min(kMostShown, plan.waypoints.size());
+  for (std::size_t i = 0; i < shown; ++i) {
+    const Eigen::Vector3d& p = plan.waypoints[i];
     output.Text(absl::StrFormat("  %.3f  %.3f  %.3f", p.x(), p.y(), p.z()));
+  }
+  if (shown < plan.waypoints.size()) {
+    output.Text(absl::StrFormat("  … %d more; --out FILE.ply", plan.waypoints.size() - shown));
   }
   for (const PlanGap& gap : plan.gaps) {
     output.Text(absl::StrFormat("  unobserved for %.2f m from %.2f, %.2f, %.2f",

@@ -116,6 +116,7 @@ absl::StatusOr<ImportedGraph> ParseGraphImport(absl::string_view text) {
   }
   STRATA_ASSIGN_OR_RETURN(const std::vector<ScanId> scans, ScansOf(file, text));
   ImportedGraph imported;
+  imported.warning = ClippedWarning(file);
   for (std::size_t i = 0; i < scans.size(); ++i) {
     if (scans[i].trajectory.empty() || !file.has_poses) continue;
     if (!imported.poses.emplace(scans[i], graph->T_map_scan[i]).second) {

@@ -28,6 +28,7 @@ ExportedGraph ExportGraph(const api::PoseGraphState& state);
 struct ImportedGraph {
   std::map<ScanId, Pose> poses;         // T_map_scan
   std::vector<Constraint> constraints;  // in the file's order
+  std::string warning;                  // what was mended; empty: nothing
 };
 
 // INVALID_ARGUMENT as ReadGraph, and for a planar graph, a vertex without the name of its scan, a

@@ -97,6 +97,7 @@ absl::Status Import(Context& context, const ExchangeOptions& options) {
   STRATA_ASSIGN_OR_RETURN(const std::string text, ReadFileBytes(options.file));
   absl::StatusOr<ImportedGraph> graph = ParseGraphImport(text);
   if (!graph.ok()) return Annotate(graph.status(), options.file);
+  if (!graph->warning.empty()) context.output.Talk("warning: " + graph->warning);
   STRATA_ASSIGN_OR_RETURN(const api::PoseGraphState state,
                           context.database.posegraph().Get(context.call, options.map));
   STRATA_RETURN_IF_ERROR(CheckScans(*graph, state));

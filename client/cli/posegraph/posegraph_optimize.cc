@@ -126,6 +126,9 @@ Json RejectedEdges(const GraphFile& file, const Graph& graph, const Report& repo
 absl::Status Run(FileContext& context, const OptimizeOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   STRATA_ASSIGN_OR_RETURN(GraphFile file, ReadGraph(options.in));
+  if (const std::string warning = ClippedWarning(file); !warning.empty()) {
+    context.output.Talk("warning: " + warning);
+  }
   if (options.start == "file" && !file.has_poses) {
     return absl::InvalidArgumentError(absl::StrCat(
         options.in, " has edges only; --start odometry or chordal makes poses out of them"));
@@ -153,6 +156,8 @@ absl::Status Run(FileContext& context, const OptimizeOptions& options) {
   json["stopped"] = std::string(ToString(report.termination));
   json["rejected"] =
       std::visit([&](const auto& graph) { return RejectedEdges(file, graph, report); }, file.graph);
+  json["clipped"] = file.clipped;
+  json["dropped"] = file.dropped;
   json["out"] = options.out;
   context.output.Object(json);
   return absl::OkStatus();

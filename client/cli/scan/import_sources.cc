@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/time/time.h"
+#include <Eigen/Geometry>
 
 #include "client/cli/classifier/label_classes.h"
 #include "client/cli/scan/level_trajectory.h"
@@ -23,7 +24,7 @@ namespace {
 
 absl::StatusOr<std::vector<ScanFile>> FindScans(const ImportOptions& options, Output& output) {
   ScanListOptions list;
-  list.warn = [&output](const std::string& warning) { output.Talk("warning: " + warning); };
+  list.tell = [&output](const std::string& text) { output.Talk(text); };
   STRATA_ASSIGN_OR_RETURN(list.format, ParseScanFormat(options.format));
   STRATA_ASSIGN_OR_RETURN(list.pose_format, ParsePoseFormat(options.pose_format));
   list.poses = options.poses;
@@ -116,8 +117,12 @@ absl::StatusOr<LabelsToMap> LabelsFor(Context& context, const ImportOptions& opt
   };
 }
 
-absl::StatusOr<PointCloud> ReadForMap(const ScanFile& scan, const LabelsToMap& labels) {
-  STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScan(scan.path, scan.format));
+absl::StatusOr<PointCloud> ReadForMap(const ScanFile& scan,
+                                      const LabelsToMap& labels,
+                                      std::atomic<std::uint64_t>& at_sensor) {
+  std::size_t dropped = 0;
+  STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScan(scan.path, scan.format, &dropped));
+  at_sensor += dropped;
   STRATA_RETURN_IF_ERROR(labels(cloud));
   return cloud;
 }
@@ -144,10 +149,74 @@ ImportSources SourcesOf(const std::vector<ScanFile>& scans,
     source.header.time = scan.time.value_or(absl::UnixEpoch());
     source.header.T_map_scan = scan.T_map_scan;
     source.header.alignment = options.align == "on" ? Alignment::kOn : Alignment::kOff;
-    source.read = [scan, labels] { return ReadForMap(scan, labels); };
+    source.read = [scan, labels, at_sensor = sources.at_sensor] {
+      return ReadForMap(scan, labels, *at_sensor);
+    };
     sources.missing.push_back(std::move(source));
   }
   return sources;
+}
+
+using Box = Eigen::AlignedBox3d;
+
+constexpr double kFarM = 10e3;
+
+absl::Status CheckNear(const Eigen::Vector3d& place, const Box& world, absl::string_view file) {
+  const double distance_m = world.isEmpty() ? 0.0 : world.exteriorDistance(place);
+  if (distance_m <= kFarM) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "%s: lies at (%.1f, %.1f, %.1f), %.1f km from all else in the map; are these the --poses of "
+      "other scans, or coordinates of a survey (UTM)? --far takes the scan all the same; "
+      "strata map create --origin makes a map of its own",
+      file,
+      place.x(),
+      place.y(),
+      place.z(),
+      distance_m / 1000.0));
+}
+
+// Without --far: checks all poses, with the points of the first scan that can be read, before
+// anything is sent, and the points of each scan when it is read. `world`: what the map has; it
+// grows along the way.
+absl::Status CheckPlaces(Box world,
+                         const ImportOptions& options,
+                         std::vector<UploadSource>& sources) {
+  STRATA_ASSIGN_OR_RETURN(const ScanFormat format, ParseScanFormat(options.format));
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const UploadSource& source : sources) {
+    const absl::StatusOr<PointCloud> first = ReadScan(source.file, format);
+    if (!first.ok()) continue;
+    middle = first->origin;
+    break;
+  }
+  for (const UploadSource& source : sources) {
+    const Eigen::Vector3d place = source.header.T_map_scan * middle;
+    const absl::Status near = CheckNear(place, world, source.file);
+    if (!near.ok()) {
+      return absl::InvalidArgumentError(absl::StrCat(near.message(), "; nothing was uploaded"));
+    }
+    world.extend(place);
+  }
+  for (UploadSource& source : sources) {
+    source.read = [read = source.read,
+                   T = source.header.T_map_scan,
+                   file = source.file,
+                   world]() -> absl::StatusOr<PointCloud> {
+      STRATA_ASSIGN_OR_RETURN(PointCloud cloud, read());
+      STRATA_RETURN_IF_ERROR(CheckNear(T * cloud.origin, world, file));
+      return cloud;
+    };
+  }
+  return absl::OkStatus();
+}
+
+// Empty if nothing says where the map is.
+absl::StatusOr<Box> WorldOf(Context& context, const std::string& map, const ScansThere& there) {
+  STRATA_ASSIGN_OR_RETURN(const MapStats stats, context.database.maps().Stats(context.call, map));
+  Box world;
+  if (stats.box_min != stats.box_max) world = Box(stats.box_min, stats.box_max);
+  for (const auto& [sequence, header] : there) world.extend(header.T_map_scan.translation());
+  return world;
 }
 
 // With --level: turns their poses.
@@ -191,6 +260,9 @@ absl::StatusOr<ImportSources> FindImportSources(Context& context, const ImportOp
   WarnOfOtherScans(scans, there, options, context.output);
   ImportSources sources = SourcesOf(scans, there, options, labels);
   sources.level_rad = level_rad;
+  if (options.far) return sources;
+  STRATA_ASSIGN_OR_RETURN(const Box world, WorldOf(context, options.map, there));
+  STRATA_RETURN_IF_ERROR(CheckPlaces(world, options, sources.missing));
   return sources;
 }
 
@@ -199,6 +271,7 @@ absl::StatusOr<ImportSources> FindImportSources(Output& output, const ImportOpti
   STRATA_ASSIGN_OR_RETURN(const std::optional<double> level_rad, Level(scans, options, output));
   ImportSources sources = SourcesOf(scans, {}, options, PlainLabels(options));
   sources.level_rad = level_rad;
+  if (!options.far) STRATA_RETURN_IF_ERROR(CheckPlaces(Box(), options, sources.missing));
   return sources;
 }
 

@@ -2,7 +2,10 @@
 #ifndef STRATA_CLIENT_CLI_SCAN_IMPORT_SOURCES_H_
 #define STRATA_CLIENT_CLI_SCAN_IMPORT_SOURCES_H_
 
+#include <atomic>
 #include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -29,6 +32,7 @@ struct ImportOptions {
   std::string classes;  // as ReadLabelClasses(); empty: labels are ids of the map's classes
   bool without_labels = false;
   bool level = false;
+  bool far = false;  // scans may lie far from the map
   bool wait = false;
   std::string spool;  // a directory, if scans go there first
   bool as_local_maps = false;
@@ -40,6 +44,9 @@ struct ImportSources {
   std::vector<ScanId> there;
   std::vector<std::pair<std::string, std::string>> errors;  // file, and why it cannot be uploaded
   std::optional<double> level_rad;                          // with --level
+  // Returns of range 0 that reading `missing` has left out so far.
+  std::shared_ptr<std::atomic<std::uint64_t>> at_sensor =
+      std::make_shared<std::atomic<std::uint64_t>>(0);
 };
 
 // The folder's name, or that of the folder around one that is only called "scans", in the letters
@@ -47,7 +54,10 @@ struct ImportSources {
 std::string TrajectoryOf(const std::string& path);
 
 // What the paths have and the map lacks. Warns where the map has other scans under the same
-// numbers. REQUIRES: the trajectory has a name, here and below.
+// numbers. INVALID_ARGUMENT if, without `far`, the pose of a scan is more than 10 km from the map
+// and the scans before it, or from the first one where there is no map yet; a scan whose points
+// are, which only reading it shows, says so in place of its points. REQUIRES: the trajectory has a
+// name, here and below.
 absl::StatusOr<ImportSources> FindImportSources(Context& context, const ImportOptions& options);
 // All that the paths have, whatever a map has; labels stay as the files have them.
 absl::StatusOr<ImportSources> FindImportSources(Output& output, const ImportOptions& options);

@@ -39,6 +39,7 @@ struct Summary {
   std::size_t uploaded = 0;
   std::size_t skipped = 0;
   std::uint64_t points = 0;
+  std::uint64_t at_sensor = 0;        // returns of range 0, left out
   std::uint64_t local_map_bytes = 0;  // with --local-maps
   double seconds = 0.0;
   std::size_t integrated = 0, aligned = 0, integration_failed = 0;  // with --wait
@@ -158,6 +159,7 @@ void Print(const ImportOptions& options, const Summary& summary, Output& output)
       {"skipped", summary.skipped},
       {"failed", summary.errors.size()},
       {"points", summary.points},
+      {"range_0", summary.at_sensor},
       {"seconds", summary.seconds},
       {"points_per_second",
        summary.seconds > 0.0 ? static_cast<double>(summary.points) / summary.seconds : 0.0}};
@@ -177,6 +179,14 @@ void Print(const ImportOptions& options, const Summary& summary, Output& output)
   TalkOf(summary.errors, output);
   if (!output.json()) {
     json.erase("errors");
+    if (summary.at_sensor == 0) json.erase("range_0");
+    if (summary.uploaded == 0 && summary.skipped > 0) {
+      json = {{"map", options.map},
+              {"trajectory", options.trajectory},
+              {"already there", summary.skipped},
+              {"failed", summary.errors.size()}};
+      return output.Object(json);
+    }
     json["seconds"] = absl::StrFormat("%.2f", summary.seconds);
     json["points_per_second"] = absl::StrFormat("%.0f", json["points_per_second"].get<double>());
   }
@@ -209,6 +219,7 @@ absl::Status Import(Context& context, ImportOptions options) {
   }
   Summary summary = Begun(sources);
   Upload(context, options, sources.missing, summary);
+  summary.at_sensor = *sources.at_sensor;
   const absl::Status waited =
       options.wait && !summary.interrupted ? Wait(context, options, summary) : absl::OkStatus();
   summary.interrupted = context.call.stop.requested();
@@ -229,6 +240,7 @@ absl::Status ImportBySpool(FileContext& context, ImportOptions options) {
                {"errors", Begun(sources).errors}};
   STRATA_RETURN_IF_ERROR(
       ImportIntoSpool(context, options.spool, options.map, sources.missing, json));
+  json["range_0"] = sources.at_sensor->load();
   const Json errors = json["errors"];
   TalkOf(errors, context.output);
   if (!context.output.json()) json.erase("errors");
@@ -251,29 +263,32 @@ void Select(Commands& commands, const std::shared_ptr<ImportOptions>& options) {
 
 void AddScanImport(Commands& commands, CLI::App* noun) {
   auto options = std::make_shared<ImportOptions>();
-  CLI::App* import =
-      commands.Verb(noun,
-                    "import",
-                    "Upload files or folders of scans; what the trajectory already has is skipped",
-                    "strata scan import campus scans/ --poses poses.txt --trajectory segway --wait",
-                    [options](Context& context) { return Import(context, *options); });
+  CLI::App* import = commands.Verb(
+      noun,
+      "import",
+      "Upload files or folders of scans, or a folder with a folder of scans; what the trajectory "
+      "already has is skipped",
+      "strata scan import campus scans/ --poses poses.txt --trajectory segway --wait",
+      [options](Context& context) { return Import(context, *options); });
   AddMapName(import, options->map);
   import->add_option("PATH", options->paths, "Files or folders of scans")->required();
   import
       ->add_option(
           "--format",
           options->format,
-          "Format of the scans; auto: by content or ending (.pcd .ply .bin .vtk .3d .xyz .csv "
-          ".asc .pts, .txt if named)")
-      ->check(CLI::IsMember({"auto", "3dtk", "pcd", "ply", "kitti", "vtk", "xyz", "oakland"}))
+          "Format of the scans; auto: by content or ending (.pcd .ply .bin .pcd.bin .vtk .3d .xyz "
+          ".csv .asc .pts, .txt if named)")
+      ->check(CLI::IsMember(
+          {"auto", "3dtk", "pcd", "ply", "kitti", "nuscenes", "vtk", "xyz", "oakland"}))
       ->capture_default_str();
   import
       ->add_option(
           "--poses",
           options->poses,
-          "File with the poses T_map_scan of the scans, or a folder of .pose files; without "
-          "it .pose files beside .3d files, else every scan is at the origin")
-      ->type_name("FILE");
+          "File with the poses T_map_scan of the scans, or a folder of .pose files; without it "
+          ".pose files beside .3d files, or the one poses*.txt|tum|csv in the folder; none: every "
+          "scan is at the origin")
+      ->type_name("FILE|none");
   import
       ->add_option(
           "--pose-format",
@@ -297,6 +312,7 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
           ->type_name("'NAME=LABEL,…;…'|FILE");
   import->add_flag("--no-labels", options->without_labels, "Leave out what files say points are")
       ->excludes(classes);
+  import->add_flag("--far", options->far, "Also scans more than 10 km from the map and each other");
   import->add_flag("--level", options->level, "Turn all poses so that the dominant floor is level");
   CLI::Option* wait =
       import->add_flag("--wait", options->wait, "Return when every scan is integrated or failed");

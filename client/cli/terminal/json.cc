@@ -4,6 +4,7 @@
 #include <string>
 
 #include "absl/strings/str_format.h"
+#include "absl/time/civil_time.h"
 #include "absl/time/time.h"
 #include <Eigen/Geometry>
 
@@ -14,6 +15,11 @@ namespace {
 double Short(float value) { return std::round(static_cast<double>(value) * 1e6) / 1e6; }
 
 double Seconds(absl::Time time) { return static_cast<double>(absl::ToUnixMicros(time)) * 1e-6; }
+
+// No lidar scanned in 1970: files without times have 0, and some clocks begin with the robot.
+bool HasDate(absl::Time time) {
+  return time >= absl::FromCivil(absl::CivilDay(1971), absl::UTCTimeZone());
+}
 
 Json Alignment(const AlignmentReport& report) {
   return {{"aligned", report.aligned},
@@ -136,7 +142,7 @@ Json ToJson(const ScanInfo& info) {
   return {{"id", header.id.ToString()},
           {"trajectory", header.id.trajectory},
           {"sequence", header.id.sequence},
-          {"time", TimeText(header.time)},
+          {"time", HasDate(header.time) ? Json(TimeText(header.time)) : Json()},
           {"time_s", Seconds(header.time)},
           {"state", ToString(info.state)},
           {"message", info.message},

@@ -160,7 +160,7 @@ class Fading {
     std::vector<Eigen::Vector3d> points;
     for (std::size_t i = 0; i < block.size(); ++i) {
       const float range = (block.points[i] - block.sensor_origin).norm();
-      if (!(range >= sensor.min_range_m && range <= sensor.max_range_m)) continue;
+      if (!sensor.Takes(range)) continue;
       const Eigen::Vector3d point = scan.placed.T_map_scan * block.points[i].cast<double>();
       if (!(point.head<2>().cwiseAbs().maxCoeff() < most_m)) continue;
       points.push_back(point);

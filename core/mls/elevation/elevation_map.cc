@@ -51,7 +51,7 @@ absl::StatusOr<std::vector<Measurement>> Measure(const PointCloud& cloud,
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     if (!cloud.points[i].allFinite()) continue;
     const double range = (cloud.points[i] - cloud.sensor_origin).cast<double>().norm();
-    if (range < sensor.min_range_m || range > sensor.max_range_m) continue;
+    if (!sensor.Takes(range)) continue;
     const Eigen::Vector3d p = T_map_scan * (cloud.origin + cloud.points[i].cast<double>());
     const double sigma = sensor.SigmaAt(range);
     measurements[i] = {.x = p.x() / cell_size_m,

@@ -314,6 +314,13 @@ TEST_F(StrataTest, OutputThatCannotBeWrittenIsAFailure) {
   EXPECT_THAT(ran.err, HasSubstr("/dev/full: cannot be written: No space left on device"));
 }
 
+TEST_F(StrataTest, APictureOfAnotherFormatIsRefused) {
+  RunOk({"map", "create", "m"});
+  const Ran ran = Run({"map", "render", "m", "/nonexistent/x.JPG"});
+  EXPECT_EQ(ran.exit_code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("pictures are written as PNG"));
+}
+
 TEST_F(StrataTest, UnknownMapExitsWithOneAndKeepsStdoutEmpty) {
   RunOk({"map", "create", "m"});
   const Ran ran = Run({"map", "show", "nowhere"});
@@ -395,7 +402,7 @@ TEST_F(StrataTest, ImportWarnsWhenTheTrajectoryHasOtherScans) {
                               std::filesystem::copy_options::overwrite_existing);
     std::vector<std::string> words = {
         "scan", "import", "m", (dir_.path() / run / "walk").string(), "--align", "off"};
-    if (poses) words.insert(words.end(), {"--poses", poses_});
+    words.insert(words.end(), {"--poses", poses ? poses_ : "none"});
     const Ran ran = Run(words);
     EXPECT_EQ(ran.exit_code, 0) << ran.err;
     return ran.err;

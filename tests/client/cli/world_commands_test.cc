@@ -1,7 +1,9 @@
 // The commands around epochs, constraints and places, in this process on a database that the test
 // decides on.
 #include <algorithm>
+#include <cmath>
 #include <fstream>
+#include <map>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -40,6 +42,7 @@ class WorldCommandsTest : public ::testing::Test {
     AddPosegraphCommands(commands);
     AddPlanesCommands(commands);
     AddLocalizeCommand(commands);
+    AddPlanCommand(commands);
     std::reverse(words.begin(), words.end());  // as CLI11 takes them
     root.parse(words);
     Output output(format, data_, talk_);
@@ -90,6 +93,37 @@ class WorldCommandsTest : public ::testing::Test {
   ::strata::testing::MockDatabase db_;
   std::ostringstream data_, talk_;
 };
+
+TEST_F(WorldCommandsTest, TheOriginOfAMapIsInDegrees) {
+  MapParameters created;
+  ON_CALL(db_.maps(), Create(_, _, _))
+      .WillByDefault([&](auto&, auto name, const MapParameters& parameters) {
+        created = parameters;
+        return absl::StatusOr<MapInfo>(MapInfo{std::string(name), parameters, {}});
+      });
+  EXPECT_THAT(Run({"map", "create", "m", "--origin", "45,-90,34"}), IsOk());
+  ASSERT_TRUE(created.origin.has_value());
+  EXPECT_NEAR(created.origin->latitude_rad, std::acos(std::sqrt(0.5)), 1e-12);
+  EXPECT_NEAR(created.origin->longitude_rad, std::asin(-1.0), 1e-12);
+  EXPECT_EQ(created.origin->altitude_m, 34.0);
+}
+
+TEST_F(WorldCommandsTest, ALongPlanShowsTenWaypointsAndJsonAll) {
+  PlanResult plan;
+  plan.reason = PlanReason::kFound;
+  for (int i = 0; i < 773; ++i) plan.waypoints.emplace_back(i, 0.5, 0.25);
+  ON_CALL(db_.planning(), ListProfiles(_, _)).WillByDefault([](auto&, auto) {
+    return absl::StatusOr<std::map<std::string, RobotProfile>>({{"default", RobotProfile()}});
+  });
+  ON_CALL(db_.planning(), PlanPath(_, _, _)).WillByDefault([&](auto&, auto, auto&) {
+    return absl::StatusOr<PlanResult>(plan);
+  });
+  const std::vector<std::string> words = {"plan", "m", "--from", "0,0", "--to", "772,0"};
+  const std::string text = RunText(words);
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1 + 10 + 1) << text;
+  EXPECT_THAT(text, HasSubstr("9.000  0.500  0.250\n  … 763 more; --out"));
+  EXPECT_EQ(RunJson(words)["waypoints"].size(), 773U);
+}
 
 TEST_F(WorldCommandsTest, AJobTakesItsParametersByPlaceByNameAndByFlag) {
   const ::strata::testing::StringMap expected = {

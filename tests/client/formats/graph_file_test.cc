@@ -121,10 +121,52 @@ TEST(GraphFileTest, ErrorsNameLineValueAndCure) {
   expect("VERTEX_SE2 1 0 0 0\nFIX 3\n", "line 2: vertex 3 is not in the file");
   expect("EDGE_SE2 1 1 0 0 0 1 0 0 1 0 1\n", "an edge from vertex 1 to itself");
   expect("EDGE_SE2 1\n", "EDGE_SE2 without two vertices");
-  expect("EDGE_SE2 1 2 0 0 0 1 0 0 -1 0 1\n", "line 1: information: has a negative eigenvalue");
   expect("VERTEX_SE2 1 0 0 0\nVERTEX3 2 0 0 0 0 0 0\n", "split it into two graphs");
   EXPECT_THAT(ReadGraph("/nowhere/x.g2o"),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("x.g2o")));
+}
+
+// [1 2; 2 1] has the eigenvalues 3 and -1; without the latter 1.5 [1 1; 1 1] is left.
+TEST(GraphFileTest, IndefiniteInformationIsClippedAndCounted) {
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const GraphFile planar,
+      ParseGraph("EDGE_SE2 1 2 0 0 0 1 2 0 1 0 7\nEDGE_SE2 2 3 0 0 0 1 0 0 1 0 1\n"
+                 "EDGE_SE2 3 4 0 0 0 -4 0 0 1 0 1\n"));
+  const auto& edges = std::get<PlanarPoseGraph>(planar.graph).relative;
+  Eigen::Matrix3d nearest;
+  nearest << 1.5, 1.5, 0, 1.5, 1.5, 0, 0, 0, 7;
+  EXPECT_TRUE(edges[0].information.isApprox(nearest, 1e-12)) << edges[0].information;
+  EXPECT_EQ(edges[1].information, Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
+  EXPECT_TRUE(
+      edges[2].information.isApprox(Eigen::Matrix3d(Eigen::Vector3d(0, 1, 1).asDiagonal()), 1e-12));
+  EXPECT_EQ(planar.clipped, 2U);
+  EXPECT_NEAR(planar.least_eigenvalue, -4.0, 1e-12);
+  EXPECT_THAT(ClippedWarning(planar), HasSubstr("2 of 3 "));
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const GraphFile spatial,
+      ParseGraph("EDGE3 0 1 0 0 0 0 0 0 1 2 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n"));
+  EXPECT_EQ(spatial.clipped, 1U);
+  EXPECT_NEAR(spatial.least_eigenvalue, -1.0, 1e-12);
+  const Matrix6d& clipped = std::get<PoseGraphProblem>(spatial.graph).relative[0].information;
+  EXPECT_NEAR(clipped(3, 4), 1.5, 1e-12);
+  STRATA_ASSERT_OK_AND_ASSIGN(const GraphFile sound, ParseGraph(kPlanar));
+  EXPECT_EQ(sound.clipped, 0U);
+  EXPECT_EQ(ClippedWarning(sound), "");
+}
+
+// The nearest semidefinite matrix to a negative one is zero, which no constraint may have.
+TEST(GraphFileTest, EdgesThatSayNothingAreDroppedAndCounted) {
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const GraphFile file,
+      ParseGraph("VERTEX_SE2 1 0 0 0\nVERTEX_SE2 2 1 0 0\nVERTEX_SE2 3 2 0 0\n"
+                 "EDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\nEDGE_SE2 2 3 1 0 0 -2 0 0 -3 0 -1\n"
+                 "EDGE_SE2 1 3 2 0 0 0 0 0 0 0 0\n"));
+  EXPECT_EQ(std::get<PlanarPoseGraph>(file.graph).relative.size(), 1U);
+  EXPECT_EQ(file.ids.size(), 3U);
+  EXPECT_EQ(file.clipped, 1U);
+  EXPECT_EQ(file.dropped, 2U);
+  EXPECT_THAT(ClippedWarning(file), HasSubstr("1 of 3 informations have a negative eigenvalue"));
+  EXPECT_THAT(ClippedWarning(file), HasSubstr("2 of 3 informations have no positive eigenvalue"));
 }
 
 TEST(GraphFileTest, DamageIsAStatus) {

@@ -1,6 +1,11 @@
 #include "client/formats/plain_readers.h"
 
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <limits>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,6 +17,7 @@ namespace strata {
 namespace {
 
 using ::strata::testing::StatusIs;
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -90,6 +96,61 @@ TEST(KittiReaderTest, FourFloatsAPoint) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("17 bytes")));
   EXPECT_THAT(ReadKitti(""), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("no finite")));
   testing::ExpectSoundOnDamage(point + point, &ReadKitti, 1);
+}
+
+std::string Floats(const std::vector<float>& values) {
+  std::string bytes(4 * values.size(), '\0');
+  std::memcpy(bytes.data(), values.data(), bytes.size());
+  return bytes;
+}
+
+// 400 points around a sensor, of nuScenes: x y z intensity ring.
+std::string NuscenesFile() {
+  std::vector<float> values;
+  for (int i = 0; i < 400; ++i) {
+    const auto k = static_cast<float>(i);
+    const auto ring = static_cast<float>(i % 32);
+    values.insert(values.end(), {20.0F * std::sin(k), 20.0F * std::cos(k), -1.5F, k / 4.0F, ring});
+  }
+  return Floats(values);
+}
+
+TEST(NuscenesReaderTest, FiveFloatsAPoint) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, ReadNuscenes(NuscenesFile()));
+  ASSERT_EQ(cloud.size(), 400U);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    ASSERT_NEAR(cloud.points[i].head<2>().norm(), 20.0F, 1e-4F);
+    ASSERT_EQ(cloud.points[i].z(), -1.5F);
+    ASSERT_EQ(cloud.intensity[i], static_cast<float>(i) / 4.0F);
+  }
+  EXPECT_THAT(ReadNuscenes(Floats({1, 2, 3, 4})),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("multiple of 20")));
+  testing::ExpectSoundOnDamage(NuscenesFile().substr(0, 60), &ReadNuscenes, 1);
+}
+
+// A multiple of both sizes: only the values tell.
+TEST(KittiReaderTest, OtherColumnsAreRefusedByTheirValues) {
+  std::vector<float> values;
+  for (int i = 0; i < 1000; ++i) values.insert(values.end(), {3.0F, 4.0F, 0.5F, 0.25F});
+  const auto with_odd = [&](int odd, float value) {
+    std::vector<float> some = values;
+    for (int i = 0; i < odd; ++i) some[static_cast<std::size_t>(4 * i + 1)] = value;
+    return ReadKitti(Floats(some)).status();
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  STRATA_EXPECT_OK(with_odd(10, 301.0F));
+  STRATA_EXPECT_OK(with_odd(10, nan));
+  for (const float value : {301.0F, nan}) {
+    EXPECT_THAT(with_odd(11, value),
+                StatusIs(absl::StatusCode::kInvalidArgument,
+                         AllOf(HasSubstr("11 of 1000 points"), HasSubstr("--format nuscenes"))));
+  }
+}
+
+// None of its values is odd; 400 points of 20 bytes are 500 of 16.
+TEST(KittiReaderTest, RingsTellNuscenes) {
+  EXPECT_THAT(ReadKitti(NuscenesFile()),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("--format nuscenes")));
 }
 
 TEST(ThreeDtkReaderTest, CentimetresLeftHandedBecomeMetresRightHanded) {

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -16,14 +17,21 @@ namespace strata {
 namespace {
 
 using ::strata::testing::StatusIs;
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 class ScanListTest : public ::testing::Test {
  protected:
   std::filesystem::path Write(const std::string& name, const std::string& text = "1 2 3\n") {
+    std::filesystem::create_directories((dir_.path() / name).parent_path());
     STRATA_EXPECT_OK(WriteFileBytes(dir_.path() / name, text));
     return dir_.path() / name;
+  }
+  // A PCD file of one point, whose sensor stood there.
+  static std::string Pcd(const std::string& sensor) {
+    return "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nVIEWPOINT " +
+           sensor + " 1 0 0 0\nPOINTS 1\nDATA ascii\n1 2 3\n";
   }
   static std::vector<std::string> Names(const std::vector<ScanFile>& scans) {
     std::vector<std::string> names;
@@ -49,12 +57,12 @@ TEST_F(ScanListTest, FoldersGiveTheirScansByNumber) {
   for (const char* name : {"s10.xyz", "s2.xyz", "s1.pcd", "README.txt", "poses.txt", "x.pose"}) {
     Write(name);
   }
-  STRATA_ASSERT_OK_AND_ASSIGN(const auto all, ListScans({dir_.path()}, {}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto all, ListScans({dir_.path()}, {.poses = kNoPoses}));
   EXPECT_THAT(Names(all), ElementsAre("s1.pcd", "s2.xyz", "s10.xyz"));
   EXPECT_THAT(Sequences(all), ElementsAre(1, 2, 10));
   EXPECT_TRUE(all[0].pose_status.ok());
-  STRATA_ASSERT_OK_AND_ASSIGN(const auto xyz,
-                              ListScans({dir_.path()}, {.format = ScanFormat::kPcd}));
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const auto xyz, ListScans({dir_.path()}, {.format = ScanFormat::kPcd, .poses = kNoPoses}));
   EXPECT_THAT(Names(xyz), ElementsAre("s1.pcd"));
 }
 
@@ -62,7 +70,7 @@ TEST_F(ScanListTest, NamesWithoutOwnNumbersAreCounted) {
   const auto b = Write("b.xyz");
   const auto a10 = Write("a10.xyz");
   const auto a9 = Write("a9.xyz");
-  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({b, a10, a9, b}, {}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({b, a10, a9, b}, {.poses = kNoPoses}));
   EXPECT_THAT(Names(scans), ElementsAre("a9.xyz", "a10.xyz", "b.xyz"));
   EXPECT_THAT(Sequences(scans), ElementsAre(0, 1, 2));
 }
@@ -128,14 +136,14 @@ TEST_F(ScanListTest, MoreTumPosesThanScansAreAWarning) {
   Write("a.xyz");
   const auto poses = Write("poses", "1 10 0 0 0 0 0 1\n2 20 0 0 0 0 0 1\n");
   std::string warning;
-  const auto warn = [&warning](const std::string& text) { warning += text; };
+  const auto tell = [&warning](const std::string& text) { warning += text; };
   STRATA_ASSERT_OK_AND_ASSIGN(const auto scans,
-                              ListScans({dir_.path()}, {.poses = poses, .warn = warn}));
+                              ListScans({dir_.path()}, {.poses = poses, .tell = tell}));
   EXPECT_EQ(scans.at(0).T_map_scan.translation().x(), 10);
   EXPECT_THAT(warning, HasSubstr("2 poses for 1 scans"));
   warning.clear();
   Write("b.xyz");
-  STRATA_EXPECT_OK(ListScans({dir_.path()}, {.poses = poses, .warn = warn}));
+  STRATA_EXPECT_OK(ListScans({dir_.path()}, {.poses = poses, .tell = tell}));
   EXPECT_EQ(warning, "");
 }
 
@@ -155,10 +163,105 @@ TEST_F(ScanListTest, AFolderOf3dtkPosesMayBeNamed) {
       StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("not a file")));
 }
 
+TEST_F(ScanListTest, SeveralScansOfNoPlaceAreAnErrorThatNamesTheCure) {
+  Write("set/scans/a1.pcd", Pcd("0 0 0"));
+  STRATA_EXPECT_OK(ListScans({dir_.path() / "set"}, {}));
+  Write("set/scans/a2.pcd", Pcd("0 0 0"));
+  const auto refused = [](const std::vector<std::filesystem::path>& paths) {
+    const absl::Status status = ListScans(paths, {}).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+    return std::string(status.message());
+  };
+  const std::filesystem::path scans = dir_.path() / "set" / "scans";
+  EXPECT_THAT(refused({scans}),
+              AllOf(HasSubstr("2 scans and no poses"),
+                    HasSubstr("--poses FILE, or"),
+                    HasSubstr("--poses none")));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto insisted, ListScans({scans}, {.poses = kNoPoses}));
+  EXPECT_EQ(insisted.size(), 2U);
+  // Poses that lie about are named, and only those of a folder that is named are taken.
+  const auto poses =
+      Write("set/poses_odometry.txt", "1 1.5 70 0 0 0 0 0 1\n2 2.5 71 0 0 0 0 0 1\n");
+  EXPECT_THAT(refused({scans}), HasSubstr("(there is " + poses.string() + ")"));
+  EXPECT_THAT(refused({scans / "a1.pcd", scans / "a2.pcd"}), HasSubstr(poses.string()));
+}
+
+TEST_F(ScanListTest, PcdFilesThatSayWhereTheSensorStoodNeedNoPoses) {
+  Write("a1.pcd", Pcd("0 0 0"));
+  Write("a2.pcd", Pcd("0 4 0"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({dir_.path()}, {}));
+  EXPECT_TRUE(scans.at(1).T_map_scan.isApprox(Pose::Identity()));
+}
+
+TEST_F(ScanListTest, AFolderOfADataSetIsUnderstood) {
+  Write("set/README.txt");
+  Write("set/scans/a1.xyz");
+  Write("set/scans/a2.xyz");
+  const auto poses = Write("set/poses.tum", "1 10 0 0 0 0 0 1\n2 20 0 0 0 0 0 1\n");
+  std::string told;
+  const auto tell = [&told](const std::string& text) { told += text; };
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({dir_.path() / "set"}, {.tell = tell}));
+  ASSERT_EQ(scans.size(), 2U);
+  EXPECT_EQ(scans[1].T_map_scan.translation().x(), 20);
+  EXPECT_EQ(told, "poses of " + poses.string());
+  // Scans beside the poses are a data set, too.
+  Write("flat/a1.xyz");
+  Write("flat/a2.xyz");
+  Write("flat/poses.csv", "1,30,0,0,0,0,0,1\n2,40,0,0,0,0,0,1\n");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto flat, ListScans({dir_.path() / "flat"}, {}));
+  ASSERT_EQ(flat.size(), 2U);
+  EXPECT_EQ(flat[0].T_map_scan.translation().x(), 30);
+}
+
+TEST_F(ScanListTest, SeveralPoseFilesOrFoldersAreNamed) {
+  Write("set/velodyne/a1.xyz");
+  Write("set/velodyne/a2.xyz");
+  Write("set/empty/notes.md");
+  const auto b = Write("set/poses_b.txt", "1 1 0 0 0 0 0 0 1\n2 2 0 0 0 0 0 0 1\n");
+  const auto a = Write("set/poses_a.txt", "1 1 5 0 0 0 0 0 1\n2 2 6 0 0 0 0 0 1\n");
+  const std::filesystem::path set = dir_.path() / "set";
+  EXPECT_THAT(
+      ListScans({set}, {}),
+      StatusIs(absl::StatusCode::kInvalidArgument,
+               AllOf(HasSubstr(a.string() + ", " + b.string()), HasSubstr("--poses FILE"))));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto chosen, ListScans({set}, {.poses = a}));
+  EXPECT_EQ(chosen.at(1).T_map_scan.translation().x(), 6);
+  Write("set/other/a1.xyz");
+  EXPECT_THAT(ListScans({set}, {.poses = a}),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       AllOf(HasSubstr("set/other, "), HasSubstr("set/velodyne; name one"))));
+  Write("set/scans/a1.xyz");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({set}, {.poses = a}));
+  EXPECT_THAT(Names(scans), ElementsAre("a1.xyz"));
+}
+
+TEST_F(ScanListTest, FilesThatAreNotReadSayWhatToDo) {
+  for (const auto& [name, cure] :
+       std::vector<std::pair<std::string, std::string>>{{"a.LAZ", "pdal translate"},
+                                                        {"a.e57", "CloudCompare"},
+                                                        {"a.mcap", "save its point clouds as PCD"},
+                                                        {"a.pcap", "the sensor's own program"},
+                                                        {"a.bt", "octree2pointcloud"},
+                                                        {"a.bin.gz", "unpack it first"}}) {
+    const auto file = Write("files/" + name);
+    EXPECT_THAT(
+        ListScans({file}, {}),
+        StatusIs(absl::StatusCode::kInvalidArgument, AllOf(HasSubstr(name), HasSubstr(cure))));
+    EXPECT_THAT(ReadScan(file), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(cure)));
+  }
+  EXPECT_THAT(ListScans({dir_.path() / "files"}, {}),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("6 files (.bt .e57 .gz")));
+  Write("files/b.xyz");
+  std::string told;
+  const auto tell = [&told](const std::string& text) { told += text; };
+  STRATA_EXPECT_OK(ListScans({dir_.path() / "files"}, {.tell = tell}));
+  EXPECT_THAT(told, HasSubstr("6 files (.bt .e57 .gz .laz .mcap .pcap) are not read: left out"));
+}
+
 TEST_F(ScanListTest, ALinkToNothingIsAScanThatCannotBeRead) {
   Write("s0.xyz");
   std::filesystem::create_symlink("/nowhere/s1.xyz", dir_.path() / "s1.xyz");
-  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({dir_.path()}, {}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({dir_.path()}, {.poses = kNoPoses}));
   EXPECT_THAT(Names(scans), ElementsAre("s0.xyz", "s1.xyz"));
   EXPECT_THAT(ReadScan(scans[1].path).status(),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("no such file")));

@@ -96,7 +96,7 @@ TEST(PoseWriterTest, TumTextReadsBackToTheLastDigit) {
 TEST(FileBytesTest, WhatCannotBeWrittenOrReadSaysWhich) {
   testing::TempDir dir;
   EXPECT_THAT(WriteFileBytes(dir.path() / "no" / "file", "x"),
-              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("no/file")));
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("no/file")));
   EXPECT_THAT(ReadFileBytes(dir.path()),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("not a file")));
 }
@@ -123,12 +123,12 @@ TEST(WriteFileBytesTest, FailureNamesFileAndReasonAndLeavesNothing) {
   const testing::TempDir dir;
   EXPECT_THAT(
       WriteFileBytes(dir.path() / "no" / "file", "x"),
-      StatusIs(absl::StatusCode::kUnavailable, HasSubstr("no/file: cannot be written: No")));
+      StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("no/file: cannot be written: No")));
   std::filesystem::create_directory(dir.path() / "folder");
   EXPECT_THAT(WriteFileBytes(dir.path() / "folder", "x"),
-              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("Is a directory")));
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("Is a directory")));
   EXPECT_THAT(WriteFileBytes("/dev/full", "x"),
-              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("No space left")));
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("No space left")));
   STRATA_EXPECT_OK(WriteFileBytes("/dev/null", "x"));
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(dir.path()), {}), 1);
 }

@@ -140,6 +140,7 @@ TEST(BuildMlsMapTest, UtmCoordinatesLoseNothing) {
 TEST(BuildMlsMapTest, CellsAreHalfOpenOnBothSidesOfZero) {
   PointCloud cloud;
   cloud.points = {{0.0F, 0.0F, 0.0F}, {-0.5F, 0.0F, 0.0F}, {0.5F, -0.25F, 0.0F}};
+  cloud.sensor_origin = {0.0F, 0.0F, 1.0F};
   const MlsMap map = Build(cloud, Pose::Identity(), {}, {.cell_size_m = 0.5});
   EXPECT_EQ(map.Cell({0, 0}).size(), 1U);
   EXPECT_EQ(map.Cell({-1, 0}).size(), 1U);
@@ -163,6 +164,17 @@ TEST(BuildMlsMapTest, CountsWhatItDrops) {
   EXPECT_EQ(result.dropped, (DroppedPoints{.not_finite = 3, .out_of_range = 2, .outside_map = 1}));
   EXPECT_EQ(result.map.patch_count(), 2U);
   EXPECT_EQ(BuildMlsMap({}, T_map_scan, {}, {})->map.tiles.size(), 0U);
+}
+
+// What sensors write where nothing came back: of no use however near the sensor may measure.
+TEST(BuildMlsMapTest, ReturnsOfRangeZeroAreNoSurface) {
+  PointCloud cloud;
+  cloud.sensor_origin = {1, 2, 3};
+  cloud.points = {{1, 2, 3}, {1, 2, 3}, {1, 2, 3.01F}, {0, 0, 0}};
+  STRATA_ASSERT_OK_AND_ASSIGN(const MlsBuildResult result,
+                              BuildMlsMap(cloud, Pose::Identity(), {}, {}));
+  EXPECT_EQ(result.dropped, (DroppedPoints{.out_of_range = 2}));
+  EXPECT_EQ(result.map.patch_count(), 2U);
 }
 
 TEST(BuildMlsMapTest, BeyondTheLastCellIsDropped) {

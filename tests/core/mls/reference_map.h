@@ -140,6 +140,7 @@ inline std::vector<ReferenceMeasurement> ReferenceMeasurements(const PointCloud&
     if (!cloud.points[i].allFinite()) continue;
     const Eigen::Vector3f d = cloud.points[i] - cloud.sensor_origin;
     const float r2 = d.x() * d.x() + d.y() * d.y() + d.z() * d.z();
+    if (r2 == 0.0F) continue;
     if (r2 < static_cast<float>(sensor.min_range_m * sensor.min_range_m)) continue;
     if (r2 > static_cast<float>(sensor.max_range_m * sensor.max_range_m)) continue;
     std::int64_t q[3];
