@@ -204,31 +204,45 @@ TEST(SharedPlanesTest, OppositeSidesOfAThinWallAreTwoPlanes) {
   EXPECT_EQ(north->views.size(), 2U);
 }
 
-// The rim of a deck: a line at its lower border, seen from below somewhat too low and from above
-// somewhat too high, by half a beam's spacing each.
-TEST(SharedPlanesTest, EdgesSeenFromAboveAndFromBelowAreTwoPlanes) {
-  const auto rim = [](const Eigen::Vector3d& from, double z) {
-    ScanPlanes planes;
-    for (const Eigen::Vector3d& corner :
-         {Eigen::Vector3d(-6, -4, z), Eigen::Vector3d(-6, 4, z), Eigen::Vector3d(5, -3, z)}) {
-      const Eigen::Vector3d along =
-          planes.edges.size() == 2 ? Eigen::Vector3d::UnitY() : Eigen::Vector3d::UnitX();
-      EdgeFeature edge;
-      for (int k = 0; k <= 10; ++k) edge.points.push_back(corner + 0.8 * k * along - from);
-      edge.line = {.origin = corner + 4.0 * along - from, .direction = along};
-      edge.length_m = 8.0;
-      planes.edges.push_back(edge);
-    }
-    return planes;
-  };
-  const std::vector<Eigen::Vector3d> places = {{-2, 0, 1}, {2, 0, 1}, {-2, 0, 4}, {2, 0, 4}};
+struct Rim {
+  Eigen::Vector3d from, along;
+};
+
+// Edges of 8 m in the map, as a scan at `at` has them.
+ScanPlanes EdgesSeenFrom(const Eigen::Vector3d& at, const std::vector<Rim>& rims) {
+  ScanPlanes planes;
+  for (const Rim& rim : rims) {
+    EdgeFeature edge;
+    for (int k = 0; k <= 10; ++k) edge.points.push_back(rim.from + 0.8 * k * rim.along - at);
+    edge.line = {.origin = rim.from + 4.0 * rim.along - at, .direction = rim.along};
+    edge.length_m = 8.0;
+    planes.edges.push_back(edge);
+  }
+  return planes;
+}
+
+std::vector<SharedPlane> PlanesOfEdges(const std::vector<Eigen::Vector3d>& places,
+                                       const std::vector<std::vector<Rim>>& rims) {
   std::vector<ScanPlanes> seen;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    seen.push_back(EdgesSeenFrom(places[k], rims[k]));
+  }
   std::vector<PosedPlanes> posed;
-  for (const Eigen::Vector3d& at : places) seen.push_back(rim(at, at.z() < 3 ? 2.97 : 3.03));
   for (std::size_t k = 0; k < places.size(); ++k) {
     posed.push_back({&seen[k], MakePose(Eigen::Quaterniond::Identity(), places[k])});
   }
-  const std::vector<SharedPlane> planes = FindSharedPlanes(posed);
+  return FindSharedPlanes(posed);
+}
+
+const Eigen::Vector3d kAlongX(1, 0, 0), kAlongY(0, 1, 0);
+
+// The rim of a deck's underside seems somewhat too low from below and too high from above.
+TEST(SharedPlanesTest, EdgesSeenFromAboveAndFromBelowAreTwoPlanes) {
+  const auto rim = [](double z) {
+    return std::vector<Rim>{{{-6, -4, z}, kAlongX}, {{-6, 4, z}, kAlongX}, {{5, -3, z}, kAlongY}};
+  };
+  const std::vector<SharedPlane> planes = PlanesOfEdges(
+      {{-2, 0, 1}, {2, 0, 1}, {-2, 0, 4}, {2, 0, 4}}, {rim(2.97), rim(2.97), rim(3.03), rim(3.03)});
   ASSERT_EQ(planes.size(), 2U);
   for (const SharedPlane& plane : planes) {
     ASSERT_EQ(plane.views.size(), 2U);
@@ -236,6 +250,37 @@ TEST(SharedPlanesTest, EdgesSeenFromAboveAndFromBelowAreTwoPlanes) {
     EXPECT_EQ(plane.views.back().scan, plane.views.front().scan + 1);
     EXPECT_NEAR(std::abs(plane.plane.distance), above ? 3.03 : 2.97, 1e-6);
     EXPECT_NEAR(plane.plane.normal.z(), above ? 1.0 : -1.0, 1e-6);
+  }
+}
+
+// Beams are close beside each other: what stands upright is where it seems to be from either side.
+TEST(SharedPlanesTest, EdgesInAnUprightPlaneAreOnePlaneFromBothSides) {
+  const std::vector<Rim> rims = {
+      {{0, -4, 1}, kAlongY}, {{0, -4, 3}, kAlongY}, {{0, 4, 0}, Eigen::Vector3d(0, 0, 1)}};
+  const std::vector<SharedPlane> planes = PlanesOfEdges({{-5, 0, 1}, {5, 0, 1}}, {rims, rims});
+  ASSERT_EQ(planes.size(), 1U);
+  EXPECT_EQ(planes[0].views.size(), 2U);
+}
+
+TEST(SharedPlanesTest, ParallelEdgesAreNoPlane) {
+  std::vector<Rim> rims;
+  for (const double y : {-3.0, 0.0, 3.0}) rims.push_back({{-4, y, 1.5 + 0.3 * y}, kAlongX});
+  const std::vector<Eigen::Vector3d> places = {{-2, 0, 4}, {2, 0, 4}};
+  EXPECT_THAT(PlanesOfEdges(places, {rims, rims}), ::testing::IsEmpty());
+  rims.push_back({{5, -4, 1.5 - 0.3 * 4}, Eigen::Vector3d(0, 1, 0.3).normalized()});
+  EXPECT_EQ(PlanesOfEdges(places, {rims, rims}).size(), 1U);
+}
+
+TEST(SharedPlanesTest, AViewThatIsOffPullsLess) {
+  const Views views = Look(Yard(), AroundTheYard(), 30);
+  std::vector<Pose> poses = views.truth;
+  poses[0].translation().z() += 0.08;
+  const std::vector<SharedPlane> planes = FindSharedPlanes(views.At(poses));
+  const SharedPlane* floor = PlaneNear(planes, {.normal = {0, 0, 1}, .distance = 0.0}, 0.05);
+  ASSERT_NE(floor, nullptr);
+  ASSERT_EQ(floor->views.size(), 6U);
+  for (std::size_t k = 1; k < 6; ++k) {
+    EXPECT_LT(floor->views[0].moments(3, 3), 0.5 * floor->views[k].moments(3, 3));
   }
 }
 
