@@ -165,11 +165,13 @@ class EdgePlaneFinder {
     });
   }
 
+  static bool IsLevel(const Plane& plane) { return std::abs(plane.normal.z()) >= kLevel; }
+
   // A border is seen up to a beam's spacing inside of where it is: from above a deck's rim seems to
   // be higher, from below lower, and one plane through both pulled storeys together by 0.04 m.
   // Beams are close beside each other: edges in upright planes are where they seem to be.
   bool MayShare(std::uint32_t a, std::uint32_t b, const Plane& plane) const {
-    if (std::abs(plane.normal.z()) < kLevel) return true;
+    if (!IsLevel(plane)) return true;
     return SignedDistance(edges_[a].sensor, plane) * SignedDistance(edges_[b].sensor, plane) >= 0.0;
   }
 
@@ -236,7 +238,7 @@ class EdgePlaneFinder {
       return false;
     }
     if (LineCount(candidate.support) < kMinLines) return false;
-    if (ShareAcross(candidate.support) < kMinAcross) return false;
+    if (IsLevel(candidate.plane) && ShareAcross(candidate.support) < kMinAcross) return false;
     double beside = 0.0;
     for (const int k : {-4, -3, -2, 2, 3, 4}) {
       const Plane shifted = {.normal = candidate.plane.normal,

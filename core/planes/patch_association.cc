@@ -29,6 +29,8 @@ constexpr double kCubeM = 8.0;
 // same scan neither wins against it nor makes a draw.
 constexpr double kMinShare = 0.25;
 constexpr double kByFar = 2.0;
+// A patch so many times as far from the plane as the others are is more likely none of it.
+constexpr double kOff = 2.0;
 
 // Patches by the cubes of space that their boxes touch.
 class PatchIndex {
@@ -280,7 +282,8 @@ class PatchAssociation {
               .try_emplace(p.scan,
                            SharedPlane::View{.scan = p.scan, .moments = Eigen::Matrix4d::Zero()})
               .first->second;
-      const double doubt = std::max(disagreement, Excess(p, shared.plane));
+      const double excess = Excess(p, shared.plane);
+      const double doubt = excess > kOff * kOff * disagreement ? excess : disagreement;
       const double weight = p.measurements / (p.variance_m2 + doubt);
       view.moments += weight / p.patch->moments(3, 3) * p.patch->moments;
       view.weight += p.patch->area_m2;

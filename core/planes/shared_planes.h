@@ -40,7 +40,7 @@ struct SharedPlane {
 // it is worth one independent measurement for every `independent_area_m2` of a patch or
 // `independent_length_m` of an edge, at most `max_measurements`, each with the variance
 // max(rms, sigma_floor_m)² + s², where rms is the feature's own and s that of the plane's views
-// about it, or of a patch its own if that is more: what disagrees pulls less.
+// about it, or of a patch its own if that is more than twice as much: what disagrees pulls less.
 struct SharedPlaneOptions {
   // Error of a scan's pose relative to the others that see a plane: what the gates of 3σ allow for
   // beside the spread of the features. Larger finds more planes and joins more that are none; in
@@ -67,14 +67,14 @@ struct SharedPlaneOptions {
   absl::Status Validate() const;
 };
 
-// The planes with views from at least two scans. Patches: grown from patch to overlapping patch
-// of the same facing side while offset and tilt pass the gates; of two surfaces of one scan that
-// are not one plane by that scan's own accuracy at most one is in a plane; views that do not
-// fit the plane of all others leave. Edges: RANSAC over pairs of edges by length, corridor, hill
-// climbing (5.2.3), of more than one direction, and if the plane is level all seen from one side of
-// it; those that are the border of a plane of
-// patches are left out. A patch is in at most one plane. Order: patches' planes by falling support
-// value, then edges'. `options` must be valid and poses finite. A pure function, thread-safe.
+// The planes with views from at least two scans. Patches: grown from patch to overlapping patch of
+// the same facing side while offset and tilt pass the gates; of two surfaces of one scan that are
+// not one plane by that scan's own accuracy at most one is in a plane; views that do not fit the
+// plane of all others leave. Edges: RANSAC over pairs of edges by length, corridor, hill climbing
+// (5.2.3); in a level plane all seen from one side and of more than one direction; those that are
+// the border of a plane of patches are left out. A patch is in at most one plane. Order: patches'
+// planes by falling support value, then edges'. `options` must be valid and poses finite. A pure
+// function, thread-safe.
 std::vector<SharedPlane> FindSharedPlanes(std::span<const PosedPlanes> scans,
                                           const SharedPlaneOptions& options = {});
 

@@ -14,6 +14,7 @@
 #include "client/cli/classifier/classifier_scores.h"
 #include "client/cli/job/job_runner.h"
 #include "client/cli/terminal/arguments.h"
+#include "client/cli/terminal/confirm.h"
 #include "client/cli/terminal/json.h"
 #include "client/formats/file_bytes.h"
 #include "core/classification/classifier.h"
@@ -28,6 +29,7 @@ struct ClassifierVerb {
   std::string map;
   std::string name;
   std::string file;
+  bool yes = false;
 };
 
 // "1=ground,2=wall": names beside ids.
@@ -108,6 +110,8 @@ absl::Status Import(Context& context, const ClassifierVerb& verb) {
 }
 
 absl::Status Delete(Context& context, const ClassifierVerb& verb) {
+  STRATA_RETURN_IF_ERROR(Confirm(
+      verb.yes, absl::StrCat("delete classifier ", verb.name, " of ", verb.map, " for good?")));
   STRATA_RETURN_IF_ERROR(context.database.classifiers().Delete(context.call, verb.map, verb.name));
   context.output.Object({{"deleted", verb.name}});
   return absl::OkStatus();
@@ -182,10 +186,11 @@ void AddClassifierMapVerbs(Commands& commands, CLI::App* noun) {
                           Import);
   import->add_option("FILE", options->file, "The classifier's file")->type_name("FILE")->required();
   import->add_option("--name", options->name, "What it is called from now on")->required();
-  with_name(verb("delete",
-                 "Forget a classifier; labels that it gave stay",
-                 "strata classifier delete campus street",
-                 Delete));
+  AddYes(with_name(verb("delete",
+                        "Forget a classifier; labels that it gave stay",
+                        "strata classifier delete campus street",
+                        Delete)),
+         options->yes);
 }
 
 }  // namespace strata::cli

@@ -8,11 +8,14 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
 
 #include "client/cli/job/job_runner.h"
 #include "client/cli/map/map_files.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
+#include "client/cli/terminal/confirm.h"
 #include "client/cli/terminal/json.h"
 #include "client/cli/terminal/world_json.h"
 #include "core/common/status.h"
@@ -28,6 +31,7 @@ struct MapOptions {
   bool drop_points = false;
   std::uint64_t epoch = 0;
   bool wait = false;
+  bool yes = false;
 };
 
 absl::Status Create(Context& context, MapOptions options) {
@@ -66,6 +70,11 @@ absl::Status Show(Context& context, const MapOptions& options) {
 }
 
 absl::Status Delete(Context& context, const MapOptions& options) {
+  const absl::StatusOr<MapStats> stats =
+      context.database.maps().Stats(context.call, options.map);  // fails where the map is damaged
+  const std::string scans = stats.ok() ? absl::StrCat(" of ", stats->scans, " scans") : "";
+  STRATA_RETURN_IF_ERROR(Confirm(
+      options.yes, absl::StrCat("delete map ", options.map, scans, " and its file for good?")));
   STRATA_RETURN_IF_ERROR(context.database.maps().Delete(context.call, options.map));
   context.output.Object({{"deleted", options.map}});
   return absl::OkStatus();
@@ -180,12 +189,14 @@ void AddMapCommands(Commands& commands) {
           return run(context, *options);
         });
     AddMapName(app, options->map);
+    return app;
   };
   verb("show",
        "Parameters, counts and content digest",
        "strata map show campus --output json",
        Show);
-  verb("delete", "Delete a map and its file", "strata map delete campus", Delete);
+  AddYes(verb("delete", "Delete a map and its file", "strata map delete campus", Delete),
+         options->yes);
   verb(
       "verify",
       "Check every checksum, count and derived thing; exit 1 on a mismatch",

@@ -12,6 +12,7 @@
 #include "client/cli/scan/scan_register.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
+#include "client/cli/terminal/confirm.h"
 #include "client/cli/terminal/json.h"
 #include "client/formats/file_bytes.h"
 #include "client/formats/geometry_writer.h"
@@ -28,6 +29,7 @@ struct ScanOptions {
   std::string frame = "scan";
   std::string out;
   std::string faded = "with";
+  bool yes = false;
 };
 
 absl::Status List(Context& context, const ScanOptions& options) {
@@ -119,6 +121,9 @@ absl::Status Export(Context& context, const ScanOptions& options) {
 }
 
 absl::Status Delete(Context& context, const ScanOptions& options) {
+  STRATA_RETURN_IF_ERROR(Confirm(
+      options.yes,
+      absl::StrCat("delete scan ", options.id.ToString(), " of ", options.map, " for good?")));
   STRATA_RETURN_IF_ERROR(context.database.scans().Delete(context.call, options.map, options.id));
   context.output.Object({{"deleted", options.id.ToString()}});
   return absl::OkStatus();
@@ -201,6 +206,7 @@ void AddScanCommands(Commands& commands) {
         });
     AddMapName(app, options->map);
     AddScanId(app, options->id);
+    return app;
   };
   verb("show",
        "One scan, its state and how it was aligned",
@@ -209,10 +215,11 @@ void AddScanCommands(Commands& commands) {
   AddExport(commands, noun, options);
   AddScanLabel(commands, noun);
   AddScanRegister(commands, noun);
-  verb("delete",
-       "Take a scan and its contribution out of the map",
-       "strata scan delete campus segway/12",
-       Delete);
+  AddYes(verb("delete",
+              "Take a scan and its contribution out of the map",
+              "strata scan delete campus segway/12",
+              Delete),
+         options->yes);
 }
 
 }  // namespace strata::cli

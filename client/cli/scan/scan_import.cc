@@ -17,6 +17,7 @@
 #include "absl/strings/strip.h"
 #include "absl/time/clock.h"
 
+#include "client/cli/scan/alignment_health.h"
 #include "client/cli/scan/import_sources.h"
 #include "client/cli/scan/scan_uploader.h"
 #include "client/cli/scan/spool_commands.h"
@@ -43,6 +44,7 @@ struct Summary {
   std::uint64_t local_map_bytes = 0;  // with --local-maps
   double seconds = 0.0;
   std::size_t integrated = 0, aligned = 0, integration_failed = 0;  // with --wait
+  AlignmentHealth health;                                           // likewise
   std::optional<double> level_rad;                                  // with --level
   bool interrupted = false;                                         // by the user
   Json errors = Json::array();
@@ -135,6 +137,7 @@ absl::Status Wait(Context& context, const ImportOptions& options, Summary& summa
     }
     ++summary.integrated;
     summary.aligned += info.alignment.aligned ? 1 : 0;
+    summary.health.Add(info);
     if (!info.message.empty()) {
       progress.Clear();
       context.output.Talk(absl::StrCat(summary.present[i].ToString(), ": ", info.message));
@@ -149,6 +152,21 @@ void TalkOf(const Json& errors, Output& output) {
         "error: ", error["scan"].get<std::string>(), ": ", error["error"].get<std::string>()));
   }
 }
+
+void AddHealth(const AlignmentHealth& health, bool for_programs, Json& json) {
+  if (health.compared() == 0) return;
+  if (!for_programs) {
+    json["alignment"] = health.Summary();
+    return;
+  }
+  json["median_overlap"] = health.MedianOverlap();
+  json["at_step_limit"] = health.at_step_limit();
+  json["poses_doubtful"] = health.Doubtful();
+}
+
+constexpr absl::string_view kDoubtful =
+    "the poses are probably those of other scans, or far off; see 'map render', and 'map delete' "
+    "to begin again with other --poses";
 
 void Print(const ImportOptions& options, const Summary& summary, Output& output) {
   Json json = {
@@ -168,6 +186,7 @@ void Print(const ImportOptions& options, const Summary& summary, Output& output)
     json["integrated"] = summary.integrated;
     json["aligned"] = summary.aligned;
     json["integration_failed"] = summary.integration_failed;
+    AddHealth(summary.health, output.json(), json);
   }
   if (summary.level_rad.has_value()) {
     json["level_rad"] = *summary.level_rad;
@@ -177,6 +196,9 @@ void Print(const ImportOptions& options, const Summary& summary, Output& output)
   }
   json["errors"] = summary.errors;
   TalkOf(summary.errors, output);
+  if (summary.health.Doubtful()) {
+    output.Talk(absl::StrCat("warning: ", summary.health.Summary(), ": ", kDoubtful));
+  }
   if (!output.json()) {
     json.erase("errors");
     if (summary.at_sensor == 0) json.erase("range_0");

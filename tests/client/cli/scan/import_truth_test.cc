@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -140,6 +141,47 @@ TEST_F(ImportTruthTest, WhatIsThereAlreadyIsSaidAndATimeThatIsNoneIsNotOf1970) {
   EXPECT_TRUE(json::parse(Run({"scan", "show", "m", "t/1"}).out).at("time").is_null());
   const Ran listed = RunStrata({"scan", "list", "m", "--embedded", Path("db")});
   EXPECT_THAT(listed.out, ::testing::Not(HasSubstr("1970")));
+}
+
+// Lines of poses whose numbers and times stay and whose places come in reverse.
+std::string Reversed(const std::filesystem::path& poses) {
+  std::ifstream file(poses);
+  std::vector<std::pair<std::string, std::string>> lines;
+  for (std::string line; std::getline(file, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    const std::size_t end = line.find(' ', line.find(' ') + 1);
+    lines.emplace_back(line.substr(0, end), line.substr(end));
+  }
+  std::string text;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    text += lines[i].first + lines[lines.size() - 1 - i].second + "\n";
+  }
+  return text;
+}
+
+TEST_F(ImportTruthTest, PosesOfOtherScansAreDoubtedAndTheirOwnAreNot) {
+  STRATA_REQUIRE_DATA(data, "");
+  const auto import = [&](const std::string& trajectory, const std::string& poses) {
+    return Import({(data / "hall_livox_loop/scans").string(),
+                   "--poses",
+                   poses,
+                   "--pose-format",
+                   "index-tum",
+                   "--trajectory",
+                   trajectory,
+                   "--wait"});
+  };
+  const std::filesystem::path own = data / "hall_livox_loop/poses_reference.txt";
+  const Ran others = import("others", Write("reversed.txt", Reversed(own)));
+  EXPECT_TRUE(json::parse(others.out).at("poses_doubtful").get<bool>()) << others.out;
+  EXPECT_THAT(others.err, HasSubstr("the poses are probably those of other scans"));
+  EXPECT_EQ(Run({"map", "delete", "m"}).exit_code, 0);
+  EXPECT_EQ(Run({"map", "create", "m"}).exit_code, 0);
+  const Ran right = import("own", own.string());
+  const json summary = json::parse(right.out);
+  EXPECT_FALSE(summary.at("poses_doubtful").get<bool>()) << right.out;
+  EXPECT_GT(summary.at("median_overlap").get<double>(), 0.9);
+  EXPECT_THAT(right.err, ::testing::Not(HasSubstr("warning")));
 }
 
 TEST_F(ImportTruthTest, RecordedSetsWithPosesAreUnderstood) {
