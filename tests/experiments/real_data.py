@@ -418,7 +418,7 @@ def others(strata, table, data):
         "corridor": (data / "slam6d_corridor", "--format", "3dtk"),
         "kitti00": (data / "kitti00_gt/velodyne", "--poses", data / "kitti00_gt/poses_00_velo.txt", "--pose-format",
                     "index-tum"),
-        "vtk": (data / "libpointmatcher_scans/cloud_0.vtk", data / "libpointmatcher_scans/cloud_1.vtk"),
+        "vtk": (data / "libpointmatcher_scans/cloud_0.vtk", data / "libpointmatcher_scans/cloud_1.vtk", "--poses", "none"),
         "pair": (data / "registration_pairs/small_gicp/target.ply",),
         "lille": (data / "lille_facade",),
     }
