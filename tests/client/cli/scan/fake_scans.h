@@ -89,10 +89,10 @@ class FakeScans : public api::Scans {
     }
     absl::StatusOr<ScanAck> Finish() override {
       const std::lock_guard lock(scans_.mutex_);
-      std::vector<absl::Status>& troubles = scans_.troubles[header_.id.sequence];
-      if (!troubles.empty()) {
-        const absl::Status trouble = troubles.front();
-        troubles.erase(troubles.begin());
+      std::vector<absl::Status>& waiting = scans_.troubles[header_.id.sequence];
+      if (!waiting.empty()) {
+        const absl::Status trouble = waiting.front();
+        waiting.erase(waiting.begin());
         return trouble;
       }
       scans_.finished.emplace_back(header_, points_);
