@@ -13,9 +13,9 @@
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
 
+#include "core/common/disjoint_sets.h"
 #include "core/common/lru_cache.h"
 #include "core/engine/ingest/link.h"
-#include "core/engine/ingest/trajectory_parts.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/mls/mls_map.h"
 #include "core/registration/place_match.h"
@@ -102,7 +102,7 @@ class Aligner {
   std::vector<Pose> poses_;  // T_map_scan, beside scans_
   std::map<std::string, std::map<std::uint64_t, std::size_t>> trajectories_;  // index into scans_
   std::map<ScanNumber, std::size_t> indices_;                                 // into scans_
-  TrajectoryParts parts_;
+  DisjointSets parts_;
   LruCache<ScanNumber, const ScanFeatures> features_;
 };
 

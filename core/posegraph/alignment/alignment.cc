@@ -7,12 +7,12 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/common/disjoint_sets.h"
 #include "core/common/status.h"
 #include "core/posegraph/alignment/odometry_noise.h"
 #include "core/posegraph/alignment/plane_terms.h"
 #include "core/posegraph/alignment/stretches.h"
 #include "core/posegraph/information.h"
-#include "core/posegraph/solver/gauge.h"
 #include "core/posegraph/solver/optimize_pose_graph.h"
 #include "core/registration/registration_target.h"
 
@@ -393,7 +393,7 @@ class Alignment {
 
   std::vector<std::size_t> PartsOf(const PoseGraphProblem& graph,
                                    const std::vector<bool>& rejected) const {
-    Components joined(graph.T_map_scan.size());
+    DisjointSets joined;
     for (std::size_t k = 0; k < measured_end_; ++k) {
       if (!rejected[k]) joined.Join(graph.relative[k].i, graph.relative[k].j);
     }

@@ -12,6 +12,7 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 
+#include "core/common/disjoint_sets.h"
 #include "core/posegraph/solver/gauge.h"
 
 namespace strata {
@@ -48,11 +49,11 @@ template <int dim>
 std::vector<bool> HeldNodes(const std::vector<Link<dim>>& links,
                             const std::vector<bool>& fixed,
                             std::size_t nodes) {
-  Components components(nodes);
-  for (const Link<dim>& link : links) components.Join(link.i, link.j);
+  DisjointSets joined;
+  for (const Link<dim>& link : links) joined.Join(link.i, link.j);
   std::vector<bool> held = fixed;
   held.resize(nodes, false);
-  for (const std::size_t node : components.Unanchored(held)) held[node] = true;
+  for (const std::size_t node : FirstUnheld(joined, held)) held[node] = true;
   return held;
 }
 
@@ -102,7 +103,7 @@ void FollowSpanningTree(Graph<dim>& graph) {
 
   // A held node is a root of its own: joined to all others at once.
   const std::size_t nodes = graph.poses.size();
-  Components joined(nodes + 1);
+  DisjointSets joined;
   for (std::size_t n = 0; n < nodes; ++n) {
     if (graph.held[n]) joined.Join(n, nodes);
   }

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <ceres/problem.h>
 
+#include "core/common/disjoint_sets.h"
 #include "core/common/status.h"
 #include "core/posegraph/costs/planar_cost.h"
 #include "core/posegraph/solver/gauge.h"
@@ -66,11 +67,11 @@ class PlanarProblem : public Suspects {
 };
 
 std::vector<bool> HeldNodes(const PlanarPoseGraph& graph) {
-  Components components(graph.poses.size());
-  for (const PlanarRelativeTerm& term : graph.relative) components.Join(term.i, term.j);
+  DisjointSets joined;
+  for (const PlanarRelativeTerm& term : graph.relative) joined.Join(term.i, term.j);
   std::vector<bool> held = graph.fixed;
   held.resize(graph.poses.size(), false);
-  for (const std::size_t node : components.Unanchored(held)) held[node] = true;
+  for (const std::size_t node : FirstUnheld(joined, held)) held[node] = true;
   return held;
 }
 
