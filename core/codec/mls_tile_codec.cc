@@ -25,8 +25,12 @@
 namespace strata {
 namespace {
 
+// Tiles in which no patch's side is known are of version 1.
+constexpr std::uint16_t kVersionWithoutSides = 1;
+constexpr std::uint8_t kShapes = 5;
+
 enum Column : std::uint8_t {
-  kShape,
+  kShape,   // + 5 · sides
   kBottom,  // + whether vertical
   kBottomLast = kBottom + 1,
   kTop,  // of vertical patches, from neighbours; 1: alone
@@ -157,9 +161,13 @@ bool CodePatch(Coder& coder,
                std::span<const Patch> patches,
                Patch& patch) {
   OtherMeasurements others;
-  const auto shape = static_cast<PatchShape>(
-      coder.CodeByte(kShape, static_cast<std::uint8_t>(ShapeOf(patch, others))));
-  if (shape > PatchShape::kSums) return false;
+  const std::uint8_t shape_and_sides =
+      coder.CodeByte(kShape,
+                     static_cast<std::uint8_t>(static_cast<int>(ShapeOf(patch, others)) +
+                                               kShapes * static_cast<int>(patch.sides)));
+  const auto shape = static_cast<PatchShape>(shape_and_sides % kShapes);
+  patch.sides = shape_and_sides / kShapes & 3U;
+  if (shape_and_sides >= 4 * kShapes) return false;
   const Surroundings around(patches, neighbours, shape == PatchShape::kVertical);
   Numbers n{.z_min = patch.z_min,
             .z_max = patch.z_max,
@@ -219,6 +227,12 @@ bool CodeVotes(Coder& coder, std::size_t patch_count, std::span<ClassVotes> vote
     previous = vote;
   }
   return true;
+}
+
+std::uint16_t VersionOf(const std::vector<Patch>& patches) {
+  const bool sides = std::any_of(
+      patches.begin(), patches.end(), [](const Patch& patch) { return patch.sides != 0; });
+  return sides ? kMlsTileVersion : kVersionWithoutSides;
 }
 
 bool InOrder(const Patch& before, const Patch& after) {
@@ -312,7 +326,7 @@ absl::StatusOr<std::string> EncodeMlsTile(const MlsTile& tile) {
   PutFixed(body, static_cast<std::uint8_t>(!tile.colour.empty()));
   PutVarint(body, votes.size());
   encoder.Finish(body);
-  return SealBlob(BlobKind::kMlsTile, kMlsTileVersion, body);
+  return SealBlob(BlobKind::kMlsTile, VersionOf(tile.patches), body);
 }
 
 absl::StatusOr<MlsTile> DecodeMlsTile(absl::string_view bytes) {
@@ -353,6 +367,7 @@ absl::StatusOr<MlsTile> DecodeMlsTileWithin(std::size_t max_bytes, absl::string_
   if (reader.remaining() != 0) return Damaged("bytes left over");
 
   STRATA_RETURN_IF_ERROR(DecodePatches(decoder, cells, tile.patches));
+  if (VersionOf(tile.patches) != VersionOfBlob(bytes)) return Damaged("sides of another version");
   if (has_colour) tile.colour.resize(cells.size());
   CodeColours(decoder, tile.patches, tile.colour);
   tile.votes.resize(vote_count);

@@ -15,7 +15,7 @@
 
 namespace strata {
 
-inline constexpr std::uint16_t kMlsTileVersion = 1;
+inline constexpr std::uint16_t kMlsTileVersion = 2;
 inline constexpr std::size_t kMaxTileVotes = std::size_t{1} << 23;
 
 // RESOURCE_EXHAUSTED, naming the tile and the bound, beyond kMaxTilePatches or kMaxTileVotes: what

@@ -108,6 +108,7 @@ void JoinInto(Patch& a, const Patch& b, const MlsParameters& parameters) {
       std::min<std::uint64_t>(std::uint64_t{a.count} + b.count, Patch::kMaxCount));
   joined.top_sigma_code = static_cast<std::uint8_t>(
       a.z_max == b.z_max ? std::min(a.top_sigma_code, b.top_sigma_code) : top.top_sigma_code);
+  joined.sides = static_cast<std::uint8_t>(a.sides | b.sides);
 
   const std::int32_t thickness = parameters.thickness_ticks();
   if (low.vertical() || high.vertical() || joined.z_max - joined.z_min > thickness) {

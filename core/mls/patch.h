@@ -26,20 +26,21 @@ inline constexpr double kPrecisionPerWeight = 1.0 / (65536.0 * 0.002 * 0.002);
 //   z_min, z_max   lowest and highest height
 //   top_sigma_code σ of the highest measurement; the smallest σ wins a tie
 //   count          number of measurements, saturating at kMaxCount
+//   sides          kSeenFromAbove, kSeenFromBelow, both or neither (nobody knows); see sides.h
 //   sum_w, sum_wz, sum_wzz   Σw, Σw(z − z_min), Σw(z − z_min)² with w = WeightOfCode(σ code), while
 //   the interval is
 //                  horizontal (z_max − z_min ≤ τ); all zero once it is vertical, where only the
 //                  highest measurement counts (6.5.2). A patch whose Σw reaches MaxWeightSum(τ) is
 //                  *full*: sum_w stays there and the other sums are zero; its height is the middle
 //                  of the interval.
-// In memory and in files the four words are sum_wzz; sum_wz | top_sigma_code · 2⁵⁴; sum_w | count ·
-// 2⁴⁴; cell | z_min mod 2²⁴ · 2¹⁶ | z_max mod 2²⁴ · 2⁴⁰, little-endian.
-// Widths: with τ ≤ 1 m, (z − z_min) ≤ 2¹² and MaxWeightSum keeps every sum inside its field.
+// In memory the four words are sum_wzz; sum_wz | top_sigma_code · 2⁵⁴ | sides · 2⁶²; sum_w | count
+// · 2⁴⁴; cell | z_min mod 2²⁴ · 2¹⁶ | z_max mod 2²⁴ · 2⁴⁰, little-endian. Widths: with τ ≤ 1 m, (z
+// − z_min) ≤ 2¹² and MaxWeightSum keeps every sum inside its field.
 struct Patch {
   std::uint64_t sum_wzz = 0;
   std::uint64_t sum_wz : 54 = 0;
   std::uint64_t top_sigma_code : 8 = 0;
-  std::uint64_t : 2;
+  std::uint64_t sides : 2 = 0;
   std::uint64_t sum_w : 44 = 0;
   std::uint64_t count : 20 = 0;
   std::uint64_t cell : 16 = 0;  // CellInTile
@@ -47,10 +48,14 @@ struct Patch {
   std::int64_t z_max : 24 = 0;  // ticks
 
   static constexpr std::uint32_t kMaxCount = (1U << 20) - 1;
+  static constexpr std::uint8_t kSeenFromAbove = 1;
+  static constexpr std::uint8_t kSeenFromBelow = 2;
 
   // Taller than τ: stands for a wall, a trunk, or a deck seen from both sides. Steers matching,
   // sampling and drawing only; the top of every patch may be driven on.
   bool vertical() const { return sum_w == 0; }
+  // Seen from below only: its top is higher, nobody knows by how much.
+  bool underside() const { return sides == kSeenFromBelow; }
   std::int32_t height_ticks() const { return static_cast<std::int32_t>(z_max - z_min); }
 
   // Height of the surface [m]: the fused mean (eq. 6.1), or of a vertical patch its highest
@@ -82,11 +87,13 @@ struct PatchFields {
   std::int32_t z_max = 0;
   std::uint16_t cell = 0;
   std::uint8_t top_sigma_code = 0;
+  std::uint8_t sides = 0;
 };
 // Writes a patch in four whole words. (Bit-fields written one by one, and words gathered in a
 // temporary that is then copied, cost a round trip through memory each: half of the time of a map.)
 inline void StorePatch(const PatchFields& f, Patch& patch) {
-  const std::uint64_t sum_wz_and_top = f.sum_wz | std::uint64_t{f.top_sigma_code} << 54;
+  const std::uint64_t sum_wz_and_top =
+      f.sum_wz | std::uint64_t{f.top_sigma_code} << 54 | std::uint64_t{f.sides} << 62;
   const std::uint64_t sum_w_and_count = f.sum_w | std::uint64_t{f.count} << 44;
   const std::uint64_t place = f.cell | (static_cast<std::uint64_t>(f.z_min) & 0xFFFFFF) << 16 |
                               (static_cast<std::uint64_t>(f.z_max) & 0xFFFFFF) << 40;

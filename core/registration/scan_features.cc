@@ -14,11 +14,11 @@
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
-#include "core/common/hash_map.h"
 #include "core/common/option_checks.h"
 #include "core/common/random.h"
 #include "core/mls/features.h"
 #include "core/mls/mls_map.h"
+#include "core/mls/sides.h"
 #include "core/registration/column_grid.h"
 
 namespace strata {
@@ -28,118 +28,20 @@ namespace {
 // often in the first.
 constexpr float kColumnSizeM = 0.4F;
 
-// The surface around a point is judged in cubes of this edge [m], and is none where points spread
-// more about it [m].
-constexpr float kFacingCubeM = 1.0F;
-constexpr double kMaxSpreadM = 0.05;
-constexpr int kMinSurfacePoints = 4;
-// Of the normal to the vertical, as a cosine: what is level, and what leans too much to be.
-constexpr double kLevel = 0.9;
-// A ceiling shows in layers of this height [m] with as many points as this.
-constexpr float kCeilingLayerM = 0.25F;
-constexpr int kMinCeilingPoints = 50;
-
 using ClassPoints = std::array<std::vector<Eigen::Vector3f>, kFeatureClasses>;
 
 std::vector<Eigen::Vector3f>& ListOf(FeatureClass c, ClassPoints& points) {
   return points[static_cast<std::size_t>(c)];
 }
 
-void AppendPatch(
+void AppendVertical(
     const Patch& patch, float x, float y, double samples_per_metre, ClassPoints& points) {
-  if (!patch.vertical()) {
-    ListOf(FeatureClass::kTraversable, points)
-        .emplace_back(x, y, static_cast<float>(patch.mean_m()));
-    return;
-  }
   const double depth = patch.depth_m();
   const int n = std::max(1, static_cast<int>(std::lround(depth * samples_per_metre)));
   for (int i = 0; i < n; ++i) {
     ListOf(FeatureClass::kVertical, points)
         .emplace_back(x, y, static_cast<float>(patch.bottom_m() + (i + 0.5) * depth / n));
   }
-}
-
-// Moments of points, from the first of them.
-struct Moments {
-  int n = 0;
-  Eigen::Vector3d first = Eigen::Vector3d::Zero();
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-
-  void Add(const Eigen::Vector3d& p) {
-    if (n++ == 0) first = p;
-    sum += p - first;
-    squares += (p - first) * (p - first).transpose();
-  }
-};
-
-enum class Side { kTop, kUnderside, kUnknown };
-
-// Which side of what its points span was seen from `origin`. What spans no surface, or one that is
-// not level, is taken for a top: leaves, a hillside, the lines that beams draw on a wall.
-Side SideOf(const Moments& m, const Eigen::Vector3d& origin) {
-  if (m.n < kMinSurfacePoints) return Side::kUnknown;
-  const Eigen::Vector3d mean = m.sum / m.n;
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-  eigen.computeDirect(m.squares / m.n - mean * mean.transpose());
-  const Eigen::Vector3d variances = eigen.eigenvalues();
-  if (variances[0] > kMaxSpreadM * kMaxSpreadM) return Side::kTop;
-  if (variances[1] < kMaxSpreadM * kMaxSpreadM) return Side::kUnknown;  // a line
-  Eigen::Vector3d normal = eigen.eigenvectors().col(0);
-  if (normal.dot(origin - m.first - mean) < 0.0) normal = -normal;
-  return normal.z() < -kLevel ? Side::kUnderside : Side::kTop;
-}
-
-// Heights at which a scan shows undersides.
-class Ceilings {
- public:
-  void Add(float z) { ++counts_[LayerOf(z)]; }
-  bool MayBeAt(float z) const {
-    const int layer = LayerOf(z);
-    return IsAt(layer - 1) || IsAt(layer) || IsAt(layer + 1);
-  }
-
- private:
-  static int LayerOf(float z) { return static_cast<int>(std::floor(z / kCeilingLayerM)); }
-  bool IsAt(int layer) const {
-    const auto found = counts_.find(layer);
-    return found != counts_.end() && found->second >= kMinCeilingPoints;
-  }
-  HashMap<int, int> counts_;
-};
-
-// Moves the undersides of decks and ceilings out of the traversable class. What may be of either
-// side and is as high as a ceiling is left out: taken for a top it pulls a storey down onto it.
-void SeparateUndersides(const Eigen::Vector3f& sensor_origin, ClassPoints& points) {
-  using Cube = std::array<int, 3>;
-  const auto cube_of = [](const Eigen::Vector3f& p) {
-    const Eigen::Vector3f at = (p / kFacingCubeM).array().floor();
-    return Cube{static_cast<int>(at.x()), static_cast<int>(at.y()), static_cast<int>(at.z())};
-  };
-  std::vector<Eigen::Vector3f>& horizontal = ListOf(FeatureClass::kTraversable, points);
-  const auto above =
-      std::stable_partition(horizontal.begin(), horizontal.end(), [&](const Eigen::Vector3f& p) {
-        return p.z() <= sensor_origin.z();
-      });
-  HashMap<Cube, Moments> cubes;
-  std::for_each(above, horizontal.end(), [&](const auto& p) {
-    cubes[cube_of(p)].Add(p.template cast<double>());
-  });
-  HashMap<Cube, Side> sides;
-  for (const auto& [cube, moments] : cubes) {
-    sides[cube] = SideOf(moments, sensor_origin.cast<double>());
-  }
-  Ceilings ceilings;
-  const auto undersides = std::stable_partition(above, horizontal.end(), [&](const auto& p) {
-    return sides[cube_of(p)] != Side::kUnderside;
-  });
-  std::for_each(undersides, horizontal.end(), [&](const auto& p) { ceilings.Add(p.z()); });
-  ListOf(FeatureClass::kNonTraversable, points).assign(undersides, horizontal.end());
-  const auto doubtful = std::stable_partition(above, undersides, [&](const auto& p) {
-    return sides[cube_of(p)] == Side::kTop || !ceilings.MayBeAt(p.z());
-  });
-  horizontal.erase(doubtful, horizontal.end());
 }
 
 std::uint64_t ContentHash(const ClassPoints& points) {
@@ -197,17 +99,29 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const ScanFeatureOpt
   for (const FeatureClass c : {FeatureClass::kTraversable, FeatureClass::kVertical}) {
     ListOf(c, points).reserve(local_map.patch_count());
   }
+  const std::vector<Side> sides = SidesOf(local_map, options.sensor_origin);
+  std::vector<Eigen::Vector3f> overhead;  // tops above the sensor
+  std::size_t place = 0;
   for (const MlsTile& tile : local_map.tiles) {
     for (const Patch& patch : tile.patches) {
+      const Side side = sides[place++];
       const CellIndex cell = CellOf(tile.key, static_cast<std::uint16_t>(patch.cell));
       const double x = (cell.x + 0.5) * cell_size;
       const double y = (cell.y + 0.5) * cell_size;
       if (x * x + y * y > max_range_m2) continue;
-      AppendPatch(
-          patch, static_cast<float>(x), static_cast<float>(y), options.samples_per_metre, points);
+      const Eigen::Vector3f p = Eigen::Vector3d(x, y, patch.mean_m()).cast<float>();
+      if (patch.vertical()) {
+        AppendVertical(patch, p.x(), p.y(), options.samples_per_metre, points);
+      } else if (side == Side::kUnderside) {
+        ListOf(FeatureClass::kNonTraversable, points).push_back(p);
+      } else if (side != Side::kDoubtful) {  // taken for a top it pulls a storey down onto it
+        const bool above = patch.mean_m() > options.sensor_origin.z();
+        (above ? overhead : ListOf(FeatureClass::kTraversable, points)).push_back(p);
+      }
     }
   }
-  SeparateUndersides(options.sensor_origin.cast<float>(), points);
+  std::vector<Eigen::Vector3f>& tops = ListOf(FeatureClass::kTraversable, points);
+  tops.insert(tops.end(), overhead.begin(), overhead.end());
   for (auto& list : points) list.shrink_to_fit();
   return FromPoints(std::move(points), options);
 }

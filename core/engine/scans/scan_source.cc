@@ -19,6 +19,8 @@
 #include "core/common/status.h"
 #include "core/mls/build.h"
 #include "core/mls/join.h"
+#include "core/mls/patch.h"
+#include "core/mls/sides.h"
 #include "core/mls/tile_key.h"
 
 namespace strata {
@@ -75,6 +77,15 @@ PointCloud Lasting(const PointCloud& block, const std::vector<std::uint16_t>& fa
   keep(block.colour, lasting.colour);
   keep(block.label, lasting.label);
   return lasting;
+}
+
+// Robots send local maps without, and so did servers of before.
+bool HasSides(const MlsMap& map) {
+  return std::any_of(map.tiles.begin(), map.tiles.end(), [](const MlsTile& tile) {
+    return std::any_of(tile.patches.begin(), tile.patches.end(), [](const Patch& patch) {
+      return patch.sides != 0;
+    });
+  });
 }
 
 // Pieces are joined column by column, so one without a column that others have would shift it.
@@ -150,6 +161,7 @@ absl::StatusOr<MlsMap> ScanSource::Build(const ScanRecord& scan,
     }
     return CheckPatches(map, most_patches);
   }));
+  MarkSides(T_map_scan * scan.header.sensor_origin.cast<double>(), map);
   return map;
 }
 
@@ -187,7 +199,9 @@ absl::StatusOr<MlsMap> ScanSource::LocalMap(const ScanRecord& scan) {
   }
   dropped_ = DroppedPoints();
   STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader_.GetLocalMap(scan.number));
-  return DecodeLocalMap(bytes, parameters_.mls);
+  STRATA_ASSIGN_OR_RETURN(MlsMap map, DecodeLocalMap(bytes, parameters_.mls));
+  if (!HasSides(map)) MarkSides(scan.header.sensor_origin.cast<double>(), map);
+  return map;
 }
 
 absl::StatusOr<MlsMap> ScanSource::RegistrationMap(const ScanRecord& scan) {

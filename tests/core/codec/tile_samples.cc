@@ -87,6 +87,7 @@ MlsTile RandomTile(std::uint64_t seed, int patches, bool with_layers) {
   MlsTile tile = map.tiles.empty() ? MlsTile() : map.tiles[0];
   const std::uint64_t full = MaxWeightSum(parameters.thickness_ticks());
   for (Patch& patch : tile.patches) {
+    if (seed % 2 == 0) patch.sides = below(4);
     if (below(20) != 0 || patch.vertical()) continue;
     patch.sum_w = full;  // as after very many measurements
     patch.sum_wz = 0;

@@ -64,11 +64,11 @@ TEST_P(OldMapTest, HasAllItHadAndIsBroughtUpToDate) {
   const MapStats stats = WaitIntegrated(db());
   EXPECT_EQ(stats.scans, 3U);
   EXPECT_EQ(stats.points, 2700U);
-  EXPECT_EQ(stats.content_digest, "b81097b9d321c971c7a59a8ccbfd0279");
+  EXPECT_EQ(stats.content_digest, "f49f8a5cd66e53f2c2e780932a99b3e8");
   Close();
   EXPECT_EQ(Format(), kTruthVersion);
   Reopen();
-  EXPECT_EQ(Digest(), "b81097b9d321c971c7a59a8ccbfd0279");
+  EXPECT_EQ(Digest(), "f49f8a5cd66e53f2c2e780932a99b3e8");
 }
 
 TEST_P(OldMapTest, ScansAreAsTheyWereUploaded) {

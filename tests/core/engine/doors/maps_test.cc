@@ -144,7 +144,7 @@ TEST_F(EngineMapsTest, AFileOfVersion1HasAllItHad) {
   EXPECT_EQ(stats.points, 80U);
   EXPECT_EQ(stats.patches, 69U);
   EXPECT_EQ(stats.epoch, 2U);
-  EXPECT_EQ(stats.content_digest, "047a46f59d369c9b63a2f7cc455a3fd4");
+  EXPECT_EQ(stats.content_digest, "4e0604ee80d7fd19c477521250e5b021");
   STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo moved, db().scans().Get({}, kMapName, {"run", 1}));
   EXPECT_EQ(moved.header.time, absl::FromUnixMillis(11'500));
   EXPECT_TRUE(moved.T_map_scan.translation().isApprox(Eigen::Vector3d(2.0, 0.5, 1.1)));

@@ -1,0 +1,38 @@
+// From which side a scan saw its surfaces. The top of a deck and its underside are two things: one
+// is not matched to the other, and nobody drives on what was seen from below only.
+#ifndef STRATA_CORE_MLS_SIDES_H_
+#define STRATA_CORE_MLS_SIDES_H_
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/mls/mls_map.h"
+
+namespace strata {
+
+enum class Side : std::uint8_t {
+  kUnknown,    // nothing says which
+  kTop,        // seen from above
+  kUnderside,  // seen from below
+  kDoubtful,   // too few points to tell, as high as undersides that the scan saw
+};
+
+// The side of every patch, tile by tile, of the map of one scan that was taken from `p_sensor`, in
+// the map's frame [m]. What is not above the sensor is seen from above. Of the horizontal patches
+// above it the planes of cubes of 1 m are judged: those that are level (within 26°) and face the
+// sensor from above it are undersides, all that spans a surface of another kind, or none, is a top.
+// A pure function of its arguments.
+std::vector<Side> SidesOf(const MlsMap& map, const Eigen::Vector3d& p_sensor);
+
+// Sets Patch::sides to what SidesOf() says, but for seen from below only of what the sensor looked
+// up to by more than 3° and under which, within 1 to 2 m around, something lies 1.5 m lower or
+// more; what is doubtful is taken for seen from below there. Nothing is set where the ground is not
+// below the sensor: a merged cloud, with its origin anywhere, says nothing of sides. Joining marked
+// maps joins their sides, so whatever is seen from above once is ground to be judged.
+void MarkSides(const Eigen::Vector3d& p_sensor, MlsMap& map);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_MLS_SIDES_H_
