@@ -33,7 +33,8 @@ constexpr float kCostCodesPerOctave = 6.0F;        // steps of 12 %, where a rob
 constexpr float kCoarseCostCodesPerOctave = 2.0F;  // steps of 41 %, elsewhere
 constexpr std::int32_t kInfiniteCost = 255;
 constexpr std::uint8_t kMaxConfidence = 100;
-constexpr int kMaxTraversability = static_cast<int>(Traversability::kNonTraversable);
+constexpr int kMaxTraversability = static_cast<int>(Traversability::kUnderside);
+constexpr auto kUnderside = static_cast<std::uint8_t>(Traversability::kUnderside);
 
 // A surface in whole numbers, as it is stored.
 struct Codes {
@@ -85,7 +86,9 @@ Codes Quantised(const Surface& surface) {
               .class_id = surface.class_id,
               .height = LengthCode(surface.z_m),
               .sigma = SigmaCodeOf(surface.sigma_m)};
-  codes.cost = CostCodeOf(surface.cost, codes.traversability);
+  if (codes.traversability != kUnderside) {
+    codes.cost = CostCodeOf(surface.cost, codes.traversability);
+  }
   if (codes.class_id != 0) codes.confidence = std::min(surface.confidence, kMaxConfidence);
   if (surface.vertical()) codes.depth = std::max(1, LengthCode(surface.depth_m));
   return codes;
@@ -133,7 +136,7 @@ enum Column : std::uint8_t {
   kDepthLast = kDepth + 1,
   kSigma,  // + vertical
   kSigmaLast = kSigma + 1,
-  kCost,  // + traversability
+  kCost,  // + traversability; not of undersides
   kCostLast = kCost + 2,
   kConfidence,  // where there is a class
   kColumnCount
@@ -237,15 +240,20 @@ struct ExpectedKind {
   }
 };
 
-// Tiles in which nothing is known of any class are of version 1, without the last column.
-constexpr std::uint16_t kVersionWithoutConfidence = 1;
+// Tiles with undersides are of the latest version; of the others those with classes are of version
+// 2, and those without of version 1, without the last column.
+constexpr std::uint16_t kVersionWithConfidence = 2;
+
+std::uint16_t VersionOf(const std::vector<Codes>& surfaces) {
+  std::uint16_t version = 1;
+  for (const Codes& codes : surfaces) {
+    if (codes.traversability == kUnderside) return kSurfaceTileVersion;
+    if (codes.confidence != 0) version = kVersionWithConfidence;
+  }
+  return version;
+}
 
 int ColumnsOf(bool with_confidence) { return with_confidence ? kColumnCount : kConfidence; }
-
-bool AnyConfidence(const std::vector<Codes>& surfaces) {
-  return std::any_of(
-      surfaces.begin(), surfaces.end(), [](const Codes& codes) { return codes.confidence != 0; });
-}
 
 // One surface, in either direction; false if what was read is none. `codes.cell` is known.
 template <typename Coder>
@@ -282,7 +290,8 @@ bool CodeSurface(Coder& coder,
     const std::int32_t expected = known ? around.depth + codes.height - around.height : 0;
     if (!CodeWithin(coder, kDepth + known, expected, 1, kMaxHeightCode, codes.depth)) return false;
   }
-  return CodeWithin(coder, kSigma + vertical, around.sigma, 0, 255, codes.sigma) &&
+  if (!CodeWithin(coder, kSigma + vertical, around.sigma, 0, 255, codes.sigma)) return false;
+  return codes.traversability == kUnderside ||
          CodeWithin(coder,
                     kCost + codes.traversability,
                     ExpectedCost(surfaces, neighbours, codes.traversability),
@@ -310,7 +319,8 @@ absl::StatusOr<std::string> EncodeSurfaceTile(const SurfaceTile& tile) {
     cells[i] = surfaces[i].cell;
   }
   const std::vector<SurfacesBeside> neighbours = FindNeighbours(cells);
-  const bool with_confidence = AnyConfidence(surfaces);
+  const std::uint16_t version = VersionOf(surfaces);
+  const bool with_confidence = version >= kVersionWithConfidence;
   ColumnEncoder encoder(ColumnsOf(with_confidence));
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     CodeSurface(encoder, neighbours[i], surfaces, with_confidence, surfaces[i]);
@@ -320,15 +330,14 @@ absl::StatusOr<std::string> EncodeSurfaceTile(const SurfaceTile& tile) {
   PutFixed(body, tile.version);
   PutCells(body, cells);
   encoder.Finish(body);
-  return SealBlob(BlobKind::kSurfaceTile,
-                  with_confidence ? kSurfaceTileVersion : kVersionWithoutConfidence,
-                  body);
+  return SealBlob(BlobKind::kSurfaceTile, version, body);
 }
 
 absl::StatusOr<SurfaceTile> DecodeSurfaceTile(absl::string_view bytes) {
   STRATA_ASSIGN_OR_RETURN(const absl::string_view body,
                           OpenBlob(BlobKind::kSurfaceTile, kSurfaceTileVersion, bytes));
-  const bool with_confidence = VersionOfBlob(bytes) > kVersionWithoutConfidence;
+  const std::uint16_t version = VersionOfBlob(bytes);
+  const bool with_confidence = version >= kVersionWithConfidence;
   ByteReader reader(body);
   SurfaceTile tile;
   STRATA_RETURN_IF_ERROR(TakeTileHeader(reader, tile.key));
@@ -349,8 +358,8 @@ absl::StatusOr<SurfaceTile> DecodeSurfaceTile(absl::string_view bytes) {
     tile.surfaces.push_back(Restored(surfaces[i], tables));
   }
   STRATA_RETURN_IF_ERROR(decoder.Finish());
-  if (with_confidence != AnyConfidence(surfaces)) {
-    return absl::DataLossError("surface tile: a column of confidences without any");
+  if (version != VersionOf(surfaces)) {
+    return absl::DataLossError("surface tile: of another version than what it holds");
   }
   tile.IndexRows();
   return tile;

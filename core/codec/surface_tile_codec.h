@@ -12,7 +12,7 @@
 
 namespace strata {
 
-inline constexpr std::uint16_t kSurfaceTileVersion = 2;
+inline constexpr std::uint16_t kSurfaceTileVersion = 3;
 
 // The tile in the format of FORMAT.md, envelope included. A pure function of the tile, and
 // *EncodeSurfaceTile(*DecodeSurfaceTile(bytes)) == bytes. What a reader gets back:
@@ -21,8 +21,7 @@ inline constexpr std::uint16_t kSurfaceTileVersion = 2;
 //   depth_m   the same, but never 0 when it was not: a depth below 1/1024 m becomes 1/512 m
 //   sigma_m   within 4.8 %, from 60 nm to 0.99 km (clamped outside)
 //   cost      where traversable 1 + cost within 6 % (clamped at 5e12); elsewhere within a
-//   factor 1.19;
-//             0 and infinity exactly
+//             factor 1.19; 0 and infinity exactly; of undersides 0
 // Not a number becomes 0. row_begin is not looked at. RESOURCE_EXHAUSTED, naming the tile and the
 // bound, beyond kMaxTilePatches. REQUIRES: surfaces sorted by (cell, z). Thread-safe.
 absl::StatusOr<std::string> EncodeSurfaceTile(const SurfaceTile& tile);

@@ -56,8 +56,9 @@ std::vector<Feature> Pick(std::span<const Feature> features,
 
 FeatureClass ClassOf(const Patch& patch, Traversability traversability) {
   if (patch.vertical()) return FeatureClass::kVertical;
-  return traversability == Traversability::kNonTraversable ? FeatureClass::kNonTraversable
-                                                           : FeatureClass::kTraversable;
+  const bool ground = traversability != Traversability::kNonTraversable &&
+                      traversability != Traversability::kUnderside;
+  return ground ? FeatureClass::kTraversable : FeatureClass::kNonTraversable;
 }
 
 // Appends the points of one patch, `feature` being the topmost.

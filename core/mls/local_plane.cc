@@ -20,10 +20,11 @@ constexpr double kMinSpreadCells2 = 0.1;
 HeightSample SampleOf(const Surface& surface, double cell_size_m) {
   const double variance = double{surface.sigma_m} * surface.sigma_m;
   const double floor = cell_size_m * kFloorPerCell;
-  return {.z_m = surface.z_m,
-          .bottom_m = surface.bottom_m(),
-          .variance_m2 = static_cast<float>(variance),
-          .weight = static_cast<float>(1.0 / (variance + floor * floor))};
+  return {
+      .z_m = surface.z_m,
+      .bottom_m = surface.bottom_m(),
+      .variance_m2 = static_cast<float>(variance),
+      .weight = surface.underside() ? 0.0F : static_cast<float>(1.0 / (variance + floor * floor))};
 }
 
 double LocalPlane::slope_rad() const { return std::atan(gradient.norm()); }

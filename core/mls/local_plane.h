@@ -20,9 +20,15 @@ struct HeightSample {
   float bottom_m = 0.0F;
   float variance_m2 = 0.0F;
   // 1 / (σ² + (cell/20)²): a fused σ tends to 0, but a cell's height is never known better than
-  // what the ground does inside the cell.
+  // what the ground does inside the cell. 0 of an underside, which is no ground.
   float weight = 0.0F;
+
+  bool underside() const { return weight == 0.0F; }
 };
+
+// A deck whose underside is at most so far below a surface may be what the surface goes on with:
+// where its top was not seen, that is unknown ground and no drop to what lies below the deck [m].
+inline constexpr float kMaxDeckM = 1.0F;
 
 HeightSample SampleOf(const Surface& surface, double cell_size_m);
 

@@ -81,13 +81,16 @@ Majority MajorityClass(std::span<const ChildSurface> chain) {
 }
 
 Traversability MajorityTraversability(std::span<const ChildSurface> chain) {
-  std::array<int, 3> count{};
+  std::array<int, 4> count{};
   for (const ChildSurface& child : chain) {
     ++count[static_cast<std::size_t>(child.surface->traversability)];
   }
   const int yes = count[static_cast<std::size_t>(Traversability::kTraversable)];
   const int no = count[static_cast<std::size_t>(Traversability::kNonTraversable)];
-  if (yes == 0 && no == 0) return Traversability::kUnknown;
+  if (yes == 0 && no == 0) {
+    const bool some_unknown = count[static_cast<std::size_t>(Traversability::kUnknown)] > 0;
+    return some_unknown ? Traversability::kUnknown : Traversability::kUnderside;
+  }
   return yes > no ? Traversability::kTraversable : Traversability::kNonTraversable;
 }
 

@@ -54,6 +54,8 @@ SurfaceTile SurfacesOf(const MlsTile& tile) {
   result.surfaces.reserve(tile.patches.size());
   for (const Patch& patch : tile.patches) {
     result.surfaces.push_back({.cell = static_cast<std::uint16_t>(patch.cell),
+                               .traversability = patch.underside() ? Traversability::kUnderside
+                                                                   : Traversability::kUnknown,
                                .z_m = static_cast<float>(patch.mean_m()),
                                .sigma_m = static_cast<float>(patch.sigma_m()),
                                .depth_m = static_cast<float>(patch.depth_m())});

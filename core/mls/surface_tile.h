@@ -13,11 +13,13 @@
 
 namespace strata {
 
-// What a patch's top is for a robot (thesis 6.5.4, 6.5.5): kUnknown before annotation.
+// What a patch's top is for a robot (thesis 6.5.4, 6.5.5): kUnknown before annotation. Of a
+// kUnderside (Patch::underside) the top was not seen: no ground for anybody.
 enum class Traversability : std::uint8_t {  // stored in tiles
   kUnknown = 0,
   kTraversable = 1,
   kNonTraversable = 2,
+  kUnderside = 3,
 };
 
 // One patch as served, 24 bytes.
@@ -32,6 +34,7 @@ struct Surface {
   float cost = 0.0F;  // path cost factor of the default profile, ≥ 0 (6.2.2); see traversability.h
 
   bool vertical() const { return depth_m > 0.0F; }
+  bool underside() const { return traversability == Traversability::kUnderside; }
   // Underside of what stands below this surface.
   float bottom_m() const { return z_m - depth_m; }
 
@@ -52,8 +55,8 @@ struct SurfaceTile {
   friend bool operator==(const SurfaceTile&, const SurfaceTile&) = default;
 };
 
-// The surfaces of a tile, not annotated: traversability kUnknown, cost 0. Votes for classes beyond
-// what class_id holds are not counted.
+// The surfaces of a tile, not annotated: traversability kUnknown or kUnderside, cost 0. Votes for
+// classes beyond what class_id holds are not counted.
 SurfaceTile SurfacesOf(const MlsTile& tile);
 
 }  // namespace strata

@@ -26,7 +26,7 @@ constexpr int kPaddedCells = kTileCells + 2 * kMargin;
 constexpr double kMaxRatio = 4.0;
 constexpr std::array<std::array<int, 2>, 4> kQuarters = {{{1, 1}, {-1, 1}, {1, -1}, {-1, -1}}};
 
-// The samples of a tile and of the margin around it, cell by cell in one array.
+// The samples of a tile and of the margin around it, cell by cell in one array; undersides apart.
 class PaddedTile {
  public:
   PaddedTile(const SurfaceTile& tile, const SurfaceNeighbourhood& neighbours, double cell_size_m)
@@ -43,6 +43,7 @@ class PaddedTile {
     }
     while (next_cell < begin_.size()) begin_[next_cell++] = size();
     samples_.emplace_back();  // so that the last cells, too, have something to read
+    IndexUndersides();
   }
 
   // Index of cell (x, y) of the tile; x, y in [−kMargin, kTileCells + kMargin).
@@ -50,6 +51,12 @@ class PaddedTile {
   // data() may be read even when the cell is empty.
   std::span<const HeightSample> Cell(int index) const {
     return {samples_.data() + begin_[index], begin_[index + 1] - begin_[index]};
+  }
+  bool has_undersides() const { return !undersides_.empty(); }
+  // REQUIRES: has_undersides().
+  std::span<const HeightSample> Undersides(int index) const {
+    const std::uint32_t first = underside_begin_[index];
+    return {undersides_.data() + first, underside_begin_[index + 1] - first};
   }
 
  private:
@@ -63,12 +70,28 @@ class PaddedTile {
       if (x < -kMargin || x >= kTileCells + kMargin) continue;
       const std::size_t cell = IndexOf(x, y);
       while (next_cell <= cell) begin_[next_cell++] = size();
-      samples_.push_back(SampleOf(source.surfaces[i], cell_size_m));
+      const HeightSample sample = SampleOf(source.surfaces[i], cell_size_m);
+      if (sample.underside()) {
+        undersides_.push_back(sample);
+        cells_of_undersides_.push_back(static_cast<std::uint32_t>(cell));
+      } else {
+        samples_.push_back(sample);
+      }
     }
+  }
+
+  void IndexUndersides() {
+    if (!has_undersides()) return;
+    underside_begin_.assign(begin_.size(), 0);
+    for (const std::uint32_t cell : cells_of_undersides_) ++underside_begin_[cell + 1];
+    for (std::size_t i = 1; i < begin_.size(); ++i) underside_begin_[i] += underside_begin_[i - 1];
   }
 
   std::vector<HeightSample> samples_;
   std::vector<std::uint32_t> begin_;  // of each cell, and the end
+  std::vector<HeightSample> undersides_;
+  std::vector<std::uint32_t> cells_of_undersides_;
+  std::vector<std::uint32_t> underside_begin_;  // of each cell, and the end; empty without any
 };
 
 // A cell of the window around a surface.
@@ -161,15 +184,15 @@ class Judge {
         limits_(limits),
         tan_limit_(std::tan(limits.max_slope_rad)) {}
 
-  // Surface number `level` of cell (x, y).
+  // Surface number `level`, undersides not counted, of cell (x, y).
   Finding Examine(int x, int y, std::size_t level) const {
     const int cell = PaddedTile::IndexOf(x, y);
     const std::span<const HeightSample> column = padded_.Cell(cell);
     const HeightSample& self = column[level];
     Finding finding;
     FitAndCheckSteps(cell, self, finding);
-    const bool too_low = level + 1 < column.size() &&
-                         double{column[level + 1].bottom_m} - self.z_m < limits_.clearance_m;
+    const bool too_low = (level + 1 < column.size() && IsOverhead(column[level + 1], self)) ||
+                         UndersideBlocks(cell, self, 0.0);
     double slope = limits_.max_slope_rad;
     double roughness = limits_.max_roughness_m;
     if (finding.plane.has_value()) {
@@ -227,19 +250,51 @@ class Judge {
       if (!offset.adjacent) continue;
       const double beyond_noise = std::abs(dz) - noise;
       if (beyond_noise > offset.step_m && std::abs(dz) > step_m) [[unlikely]] {
-        if (Blocks(column, self)) step_m = std::numeric_limits<double>::infinity();
+        if (Blocks(cell + offset.cells, self, offset.step_m)) {
+          step_m = std::numeric_limits<double>::infinity();
+        }
       } else {
         step_m = std::max(step_m, beyond_noise);
+        if (column.empty() && UndersideBlocks(cell + offset.cells, self, offset.step_m)) {
+          step_m = std::numeric_limits<double>::infinity();
+        }
       }
     }
     return step_m;
   }
 
   // True of a column whose nearest top is out of a step's reach: a wall or a drop; false of one
-  // that is all above the robot's head.
-  bool Blocks(std::span<const HeightSample> column, const HeightSample& self) const {
+  // that is all above the robot's head, or below a deck.
+  bool Blocks(int cell, const HeightSample& self, double step_m) const {
+    if (UndersideBlocks(cell, self, step_m)) return true;
+    const bool hidden = HidesGround(cell, self, step_m);
+    const std::span<const HeightSample> column = padded_.Cell(cell);
     return std::any_of(column.begin(), column.end(), [&](const HeightSample& sample) {
-      return sample.z_m < self.z_m || sample.bottom_m - self.z_m < limits_.clearance_m;
+      return sample.z_m < self.z_m ? !hidden : IsOverhead(sample, self);
+    });
+  }
+
+  // True if a robot on `self` would hit the body of `other`, which is above it.
+  bool IsOverhead(const HeightSample& other, const HeightSample& self) const {
+    return double{other.bottom_m} - self.z_m < limits_.clearance_m;
+  }
+
+  // True if a deck whose top was not seen may go on where `self` is.
+  bool HidesGround(int cell, const HeightSample& self, double step_m) const {
+    if (!padded_.has_undersides()) return false;
+    const std::span<const HeightSample> undersides = padded_.Undersides(cell);
+    return std::any_of(undersides.begin(), undersides.end(), [&](const HeightSample& underside) {
+      const double dz = double{underside.z_m} - self.z_m;
+      return dz >= -kMaxDeckM && dz <= step_m;
+    });
+  }
+
+  // True if an underside more than a step above `self` is lower than the robot.
+  bool UndersideBlocks(int cell, const HeightSample& self, double step_m) const {
+    if (!padded_.has_undersides()) return false;
+    const std::span<const HeightSample> undersides = padded_.Undersides(cell);
+    return std::any_of(undersides.begin(), undersides.end(), [&](const HeightSample& underside) {
+      return double{underside.z_m} - self.z_m > step_m && IsOverhead(underside, self);
     });
   }
 
@@ -274,14 +329,15 @@ class Judge {
   double tan_limit_;
 };
 
-// Calls visit(i, finding) for every surface of the tile.
+// Calls visit(i, finding) for every surface of the tile that is no underside.
 template <typename Visit>
-void ForEachSurface(const SurfaceTile& tile, const Judge& judge, Visit visit) {
+void ForEachTop(const SurfaceTile& tile, const Judge& judge, Visit visit) {
   std::size_t level = 0;
   for (std::size_t i = 0; i < tile.surfaces.size(); ++i) {
     const std::uint16_t cell = tile.surfaces[i].cell;
-    level = i > 0 && tile.surfaces[i - 1].cell == cell ? level + 1 : 0;
-    visit(i, judge.Examine(cell & (kTileCells - 1), cell >> kTileShift, level));
+    if (i > 0 && tile.surfaces[i - 1].cell != cell) level = 0;
+    if (tile.surfaces[i].underside()) continue;
+    visit(i, judge.Examine(cell & (kTileCells - 1), cell >> kTileShift, level++));
   }
 }
 
@@ -318,9 +374,10 @@ std::vector<SurfaceAssessment> AssessSurfaces(const SurfaceTile& tile,
                                               const SurfaceNeighbourhood& neighbours,
                                               double cell_size_m,
                                               const TraversabilityLimits& limits) {
-  std::vector<SurfaceAssessment> result(tile.surfaces.size());
+  std::vector<SurfaceAssessment> result(tile.surfaces.size(),
+                                        {.traversability = Traversability::kUnderside});
   const Judge judge(tile, neighbours, cell_size_m, limits);
-  ForEachSurface(tile, judge, [&result](std::size_t i, const Finding& finding) {
+  ForEachTop(tile, judge, [&result](std::size_t i, const Finding& finding) {
     result[i] = AssessmentOf(finding);
   });
   return result;
@@ -331,7 +388,7 @@ void AnnotateTraversability(SurfaceTile& tile,
                             double cell_size_m,
                             const TraversabilityLimits& limits) {
   const Judge judge(tile, neighbours, cell_size_m, limits);
-  ForEachSurface(tile, judge, [&tile](std::size_t i, const Finding& finding) {
+  ForEachTop(tile, judge, [&tile](std::size_t i, const Finding& finding) {
     tile.surfaces[i].traversability = finding.traversability;
     tile.surfaces[i].cost = static_cast<float>(finding.danger);
   });
@@ -343,7 +400,7 @@ std::vector<Eigen::Vector3f> EstimateNormals(const SurfaceTile& tile,
                                              const TraversabilityLimits& limits) {
   std::vector<Eigen::Vector3f> normals(tile.surfaces.size(), Eigen::Vector3f::Zero());
   const Judge judge(tile, neighbours, cell_size_m, limits);
-  ForEachSurface(tile, judge, [&normals](std::size_t i, const Finding& finding) {
+  ForEachTop(tile, judge, [&normals](std::size_t i, const Finding& finding) {
     if (finding.plane.has_value()) normals[i] = finding.plane->Normal().cast<float>();
   });
   return normals;

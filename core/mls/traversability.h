@@ -18,6 +18,10 @@
 //     that reaches into the robot's height blocks; ground only below is a drop. Cells with nothing,
 //     or with surfaces above the robot's head only, say nothing.
 //   - Clearance: the underside of the next surface of the same cell is at least clearance_m above.
+//   - Undersides (kUnderside) are no ground and part of no plane. Where one is within max_step
+//   above
+//     the surface, or up to kMaxDeckM below it, a deck goes on whose top was not seen: ground below
+//     is no drop. Higher ones are bodies that block.
 // Traversable: all limits hold. Non-traversable: one does not, or a vertical patch has no plane
 // around it (a pole). Unknown: a horizontal patch with too few neighbours to fit a plane to.
 #ifndef STRATA_CORE_MLS_TRAVERSABILITY_H_
@@ -70,21 +74,24 @@ double Danger(double slope_rad,
               double sigma_m,
               const TraversabilityLimits& limits);
 
-// One entry a surface, in order. A pure function of the surfaces (height, σ, depth) of the tile and
-// of its neighbours within kPlaneRadiusCells of it. REQUIRES: surfaces sorted and rows indexed.
+// One entry a surface, in order; that of an underside says just that. A pure function of the
+// surfaces (height, σ, depth) of the tile and of its neighbours within kPlaneRadiusCells of it.
+// REQUIRES: surfaces sorted and rows indexed.
 std::vector<SurfaceAssessment> AssessSurfaces(const SurfaceTile& tile,
                                               const SurfaceNeighbourhood& neighbours,
                                               double cell_size_m,
                                               const TraversabilityLimits& limits);
 
-// Sets traversability and cost (= danger) of every surface to AssessSurfaces'. Thread-safe for
+// Sets traversability and cost (= danger) of every surface to AssessSurfaces'; undersides stay what
+// they are, at cost 0. Thread-safe for
 // different tiles as long as nobody changes z, σ or depth of the neighbours.
 void AnnotateTraversability(SurfaceTile& tile,
                             const SurfaceNeighbourhood& neighbours,
                             double cell_size_m,
                             const TraversabilityLimits& limits);
 
-// Upward unit normals (12.2.1), one a surface; zero where there are too few neighbours.
+// Upward unit normals (12.2.1), one a surface; zero of undersides and where there are too few
+// neighbours.
 std::vector<Eigen::Vector3f> EstimateNormals(const SurfaceTile& tile,
                                              const SurfaceNeighbourhood& neighbours,
                                              double cell_size_m,

@@ -55,6 +55,7 @@ class TileReasons {
   Explanation WhyNotStand(std::uint32_t i) const {
     const WindowSurface& surface = window_.surface(i);
     const auto cell = static_cast<int>(surface.cell);
+    if (surface.underside()) return {Obstruction::kUnknown, 0.0, Place(cell, surface.z_m)};
     const GroundEdge* edge = ground_.BlockingEdge(cell, surface.z_m);
     if (edge != nullptr) return OfEdge(*edge, surface.z_m);
     const GroundFit fit = FitGround(window_, i);

@@ -29,6 +29,7 @@ static_assert(v1::OBSTRUCTION_CLASS == static_cast<int>(Obstruction::kClass));
 static_assert(v1::TRAVERSABILITY_TRAVERSABLE == static_cast<int>(Traversability::kTraversable));
 static_assert(v1::TRAVERSABILITY_NON_TRAVERSABLE ==
               static_cast<int>(Traversability::kNonTraversable));
+static_assert(v1::TRAVERSABILITY_UNDERSIDE == static_cast<int>(Traversability::kUnderside));
 
 v1::PlanEndpoint EndpointToProto(const PlanEndpoint& endpoint) {
   v1::PlanEndpoint proto;

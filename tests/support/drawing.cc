@@ -20,6 +20,8 @@ std::vector<SurfaceTile> DrawnMap::Tiles(std::uint64_t version) const {
     SurfaceTile& tile = tiles[TileOfCell(cell)];
     for (const DrawnSurface& drawn : column) {
       tile.surfaces.push_back({.cell = CellInTile(cell),
+                               .traversability = drawn.underside ? Traversability::kUnderside
+                                                                 : Traversability::kUnknown,
                                .z_m = static_cast<float>(drawn.z_m),
                                .sigma_m = static_cast<float>(drawn.sigma_m),
                                .depth_m = static_cast<float>(drawn.depth_m)});

@@ -18,6 +18,7 @@ struct DrawnSurface {
   double z_m = 0.0;
   double depth_m = 0.0;
   double sigma_m = 0.01;
+  bool underside = false;
 };
 
 // Columns of cells, edited by hand and cut into tiles.

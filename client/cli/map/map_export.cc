@@ -41,6 +41,7 @@ Colour ColourOf(const Surface& surface) {
     case Traversability::kNonTraversable:
       return surface.vertical() ? picture::kVerticalColour : picture::kNonTraversableColour;
     case Traversability::kUnknown:
+    case Traversability::kUnderside:
       break;
   }
   return surface.vertical() ? picture::kVerticalColour : picture::kUnknownColour;

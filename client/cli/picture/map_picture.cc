@@ -45,6 +45,7 @@ Colour TraversabilityColour(const Surface& surface, bool cut) {
     case Traversability::kNonTraversable:
       return surface.vertical() ? kVerticalColour : kNonTraversableColour;
     case Traversability::kUnknown:
+    case Traversability::kUnderside:
       break;
   }
   return surface.vertical() ? kVerticalColour : kUnknownColour;

@@ -1,5 +1,6 @@
 // Maps as pictures, in the colours of the thesis (Fig. 6.6): traversable yellow, horizontal but not
-// traversable red, vertical blue; surfaces that nobody judged are grey. Or in those of classes.
+// traversable red, vertical blue; surfaces that nobody judged, or saw from below only, are grey. Or
+// in those of classes.
 #ifndef STRATA_CLIENT_CLI_PICTURE_MAP_PICTURE_H_
 #define STRATA_CLIENT_CLI_PICTURE_MAP_PICTURE_H_
 

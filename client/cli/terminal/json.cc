@@ -55,6 +55,8 @@ std::string ToString(Traversability traversability) {
       return "traversable";
     case Traversability::kNonTraversable:
       return "non_traversable";
+    case Traversability::kUnderside:
+      return "underside";
   }
   return "unknown";
 }

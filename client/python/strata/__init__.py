@@ -15,11 +15,11 @@ from strata.map import Change, Map, ScanChange, Stats
 from strata.plan import Path
 from strata.registration import Registration, register
 from strata.scan import Ack, Points, Scan
-from strata.tiles import NON_TRAVERSABLE, SURFACE, TRAVERSABLE, UNKNOWN, Tile, TileKey, decode_tile
+from strata.tiles import NON_TRAVERSABLE, SURFACE, TRAVERSABLE, UNDERSIDE, UNKNOWN, Tile, TileKey, decode_tile
 
 __all__ = [
     "AlreadyExists", "Cancelled", "DataLoss", "DeadlineExceeded", "FailedPrecondition", "InvalidArgument", "NotFound",
     "PermissionDenied", "ResourceExhausted", "StrataError", "Unauthenticated", "Unavailable", "Unimplemented",
     "Ack", "Change", "Database", "Job", "Map", "NON_TRAVERSABLE", "Path", "Points", "Registration", "SURFACE", "Scan", "ScanChange",
-    "Stats", "TRAVERSABLE", "Tile", "TileKey", "UNKNOWN", "connect", "decode_tile", "register",
+    "Stats", "TRAVERSABLE", "Tile", "TileKey", "UNDERSIDE", "UNKNOWN", "connect", "decode_tile", "register",
 ]

@@ -19,18 +19,19 @@ SURFACE = np.dtype([
     ("sigma", "f4"),  # standard deviation of the height [m]
     ("depth", "f4"),  # length of a vertical interval below z [m]; 0: horizontal
     ("cost", "f4"),  # path cost factor of the default profile; inf: never
-    ("traversability", "u1"),  # for the default profile: UNKNOWN, TRAVERSABLE, NON_TRAVERSABLE
+    ("traversability", "u1"),  # for the default profile: UNKNOWN, TRAVERSABLE, NON_TRAVERSABLE, or UNDERSIDE
     ("class_id", "u1"),  # with the most votes; 0: none
     ("confidence", "u1"),  # share of the votes that class_id has [%]
 ])
-UNKNOWN, TRAVERSABLE, NON_TRAVERSABLE = 0, 1, 2
+UNKNOWN, TRAVERSABLE, NON_TRAVERSABLE, UNDERSIDE = 0, 1, 2, 3  # UNDERSIDE: seen from below only, no ground
 
 TILE_CELLS = 256  # along an edge
 MAX_LEVEL = 12
 _CELLS = TILE_CELLS * TILE_CELLS
 _MAX_SURFACES = 1 << 22
-_READER_VERSION = 2
+_READER_VERSION = 3
 _VERSION_WITH_CONFIDENCE = 2
+_VERSION_WITH_UNDERSIDES = 3
 _OVERHEAD_BYTES = 20
 
 # Columns, see FORMAT.md.
@@ -138,7 +139,7 @@ def _kinds(beside, columns):
                 else:
                     others = (kinds[up] == expected) + (kinds[up_left] == expected) + (kinds[up_right] == expected)
                 kind = expected if next(same[others]) else next(told)
-                if kind > 5:
+                if kind > 2 * UNDERSIDE + 1:
                     raise DataLoss(f"surface tile: surface {i} is out of range")
                 kinds[i] = kind
                 i += 1
@@ -230,13 +231,13 @@ def _codes(cells, counts, columns, raw):
     confidences = np.zeros(len(cells), np.uint8)
     if len(columns) > _CONFIDENCE:
         confidences = _scattered({_CONFIDENCE: columns[_CONFIDENCE]}, np.where(classes > 0, _CONFIDENCE, _NOBODY))
-        _check(confidences.any() and confidences.max() <= 100)
+        _check(confidences.max(initial=0) <= 100)
     heights = np.where(vertical, _HEIGHT + 1, np.where(around.alike == 1, _HEIGHT + 2, _HEIGHT + 3))
     routes = (
         np.where(around.alike == 0, _HEIGHT, heights),
         np.where(vertical, _DEPTH + (around.alike > 0), _NOBODY),
         _SIGMA + vertical,
-        _COST + (kinds >> 1),
+        np.where(kinds >> 1 == UNDERSIDE, _NOBODY, _COST + (kinds >> 1)),
     )
     bounds = (_HEIGHT, _DEPTH, _SIGMA, _COST, _CONFIDENCE)
     tokens = np.empty((len(cells), 4), np.uint8)
@@ -250,7 +251,7 @@ def _codes(cells, counts, columns, raw):
 _STEPS = np.arange(256, dtype=np.float32)
 _SIGMA_M = np.exp2((_STEPS / np.float32(7.5) - np.float32(24)).astype(float)).astype(np.float32)
 _COSTS = np.stack([np.exp2((_STEPS / np.float32(k)).astype(float)).astype(np.float32) - np.float32(1)
-                   for k in (2, 6, 2)])  # by traversability
+                   for k in (2, 6, 2, 2)])  # by traversability
 _COSTS[:, 255] = np.inf
 
 
@@ -272,6 +273,9 @@ def decode_tile(data, cell_size):
     raw = np.frombuffer(reader.take(reader.varint()), np.uint8)
     _check(not reader.remaining, "surface tile: bytes left over")
     kinds, classes, confidences, codes = _codes(cells, counts, columns, raw)
+    undersides = (kinds >> 1 == UNDERSIDE).any()
+    needed = _VERSION_WITH_UNDERSIDES if undersides else _VERSION_WITH_CONFIDENCE if confidences.any() else 1
+    _check(oldest_reader == needed, "surface tile: of another version than what it holds")
     size = cell_size * 2.0**key.level
     surfaces = np.empty(len(cells), SURFACE)
     surfaces["x"] = (key.x * TILE_CELLS + cells % TILE_CELLS + 0.5) * size

@@ -60,7 +60,8 @@ GroundChecks::GroundChecks(const GroundWindow& window,
   const int reach = checks.disc_cells + checks.behind_cells[0] + 1 + checks.gap_cells[0] + 1;
   std::array<std::vector<GroundEdge>, kRowBands> found;
   for_each_surface([&](int band, std::uint32_t i) {
-    if (ground_[i] == Ground::kEven || near[window.surface(i).cell] > reach) return;
+    const WindowSurface& surface = window.surface(i);
+    if (ground_[i] == Ground::kEven || surface.underside() || near[surface.cell] > reach) return;
     CollectEdges(i, &found[band]);
   });
   IndexEdges(found);
@@ -74,7 +75,7 @@ GroundChecks::GroundChecks(const GroundWindow& window,
 // What CollectEdges() would find in the cells next to the surface, the cheap looks first.
 GroundChecks::Ground GroundChecks::GroundAround(std::uint32_t i) const {
   const WindowSurface& surface = window_.surface(i);
-  if (Clearance(i) < checks_.height_m) return Ground::kEnds;
+  if (surface.underside() || Clearance(i) < checks_.height_m) return Ground::kEnds;
   unsigned holes = 0;
   bool even = true;
   for (int k = 0; k < 8; ++k) {

@@ -7,10 +7,12 @@
 //   obstacle  without ground, a surface above whose underside is lower than z + height
 //   drop      without ground, a surface below
 //   hole      without ground, if nothing reaches down to z + max_step: no ground was observed
-// more than one of the last three at times. A hole is tolerated if along an axis or a diagonal
-// through it no more than max_gap is unobserved and it ends on both sides. Obstacles, drops (also
-// those up to a radius behind a hole) and holes that are not tolerated are *edges* seen from the
-// surface; too little clearance above it is an edge in its own cell.
+// more than one of the last three at times. An underside is never ground, and no robot is on it:
+// within max_step of z, or up to kMaxDeckM below it, there is a deck whose top was not seen, a hole
+// that hides what lies under it. A hole is tolerated if along an axis or a diagonal through it no
+// more than max_gap is unobserved and it ends on both sides. Obstacles, drops (also those up to a
+// radius behind a hole) and holes that are not tolerated are *edges* seen from the surface; too
+// little clearance above it is an edge in its own cell.
 //
 // An edge concerns a robot of level z if the surface that it is seen from is nearer to z than all
 // else in that surface's cell and than the obstacle's or drop's own surface, and within the robot's
@@ -140,6 +142,10 @@ inline Footing GroundChecks::Meet(int cell, float z, float rise_m) const {
   for (std::uint32_t i = window_.begin(cell); i < window_.begin(cell + 1); ++i) {
     const WindowSurface& surface = window_.surface(i);
     const float dz = surface.z_m - z;
+    if (surface.underside() && dz >= -std::max(kMaxDeckM, rise_m) && dz <= rise_m) {
+      if (footing.ground == kNoSurface) footing = Footing();
+      continue;
+    }
     if (surface.bottom_m - z <= rise_m) footing.open = false;
     if (dz < -rise_m) {
       footing.below = i;

@@ -24,7 +24,7 @@ std::uint32_t NearestInCell(const GroundWindow& window, int cell, float z, float
   std::uint32_t nearest = kNothing;
   for (std::uint32_t i = window.begin(cell); i < window.begin(cell + 1); ++i) {
     const float dz = std::abs(window.surface(i).z_m - z);
-    if (dz > reach_m) continue;
+    if (dz > reach_m || window.surface(i).underside()) continue;
     reach_m = dz;
     nearest = i;
   }

@@ -19,11 +19,11 @@ struct GroundFit {
 };
 
 // The plane through the (2 · kFitRadius + 1)² cells around surface `i`; each cell gives its surface
-// nearest in height, if |Δz| ≤ 2 d + 5 cm. Where that plane leaves more than noise and one of the
-// four corner quadrants has a plane with less than half its residual, the best such is taken: the
-// ground is broken there and the surface belongs to that side. Fewer than 4 cells, or cells in a
-// line: flat and smooth. Independent of a profile. REQUIRES: the surface is at least kFitRadius
-// cells inside the window.
+// nearest in height that is no underside, if |Δz| ≤ 2 d + 5 cm. Where that plane leaves more than
+// noise and one of the four corner quadrants has a plane with less than half its residual, the best
+// such is taken: the ground is broken there and the surface belongs to that side. Fewer than 4
+// cells, or cells in a line: flat and smooth. Independent of a profile. REQUIRES: the surface is at
+// least kFitRadius cells inside the window.
 GroundFit FitGround(const GroundWindow& window, std::uint32_t i);
 
 }  // namespace strata

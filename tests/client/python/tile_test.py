@@ -45,7 +45,7 @@ class TileTest(ServerTest):
         for name, kind in (("vertical", decoded["depth"] > 0),
                            ("of two classes", (decoded["confidence"] > 0) & (decoded["confidence"] < 100))):
             self.assertTrue(kind.any(), name)
-        self.assertEqual(set(decoded["traversability"]), {0, 1, 2})
+        self.assertEqual(set(decoded["traversability"]), {0, 1, 2, 3})
         cells = np.unique(decoded[["x", "y"]])
         asked = np.concatenate(self.map.surfaces(np.stack([cells["x"], cells["y"]], axis=1)))
         order = ["x", "y", "z"]

@@ -36,6 +36,10 @@ SurfaceTile Annotated(const MlsTile& tile, std::uint64_t seed) {
     surface.confidence = static_cast<std::uint8_t>(surface.class_id == 0 ? 0 : 1 + random() % 100);
     surface.cost = std::exp2(static_cast<float>(random() % 1000) / 50.0F) - 1.0F;
     if (random() % 8 == 0) surface.cost = std::numeric_limits<float>::infinity();
+    if (seed % 2 == 0 && random() % 6 == 0) {
+      surface.traversability = Traversability::kUnderside;
+      surface.cost = 0.0F;
+    }
   }
   return surfaces;
 }

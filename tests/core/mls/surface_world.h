@@ -19,6 +19,7 @@ struct Level {
   double z_m = 0.0;
   double depth_m = 0.0;
   double sigma_m = 0.002;
+  bool underside = false;
 };
 
 // The levels of a cell, in any order.
@@ -40,6 +41,8 @@ inline SurfaceWorld Draw(const Drawing& drawing, int x_min, int x_max, int y_min
       SurfaceTile& tile = world[TileOfCell({x, y})];
       for (const Level& level : levels) {
         tile.surfaces.push_back({.cell = CellInTile({x, y}),
+                                 .traversability = level.underside ? Traversability::kUnderside
+                                                                   : Traversability::kUnknown,
                                  .z_m = static_cast<float>(level.z_m),
                                  .sigma_m = static_cast<float>(level.sigma_m),
                                  .depth_m = static_cast<float>(level.depth_m)});

@@ -217,6 +217,62 @@ TEST(TraversabilityTest, DeckOverGroundIsTraversableOnBothLevelsButForItsEdge) {
   EXPECT_NEAR(SurfaceAt(world, {128, 128}, 1).cost, SurfaceAt(world, {128, 128}, 0).cost, 1e-6);
 }
 
+// Ground everywhere, and over |x| < 1 m a deck of whose cells only every third was seen from above,
+// the others from below.
+Drawing SparseDeck(double underside_m, double top_m) {
+  return [=](CellIndex cell) {
+    std::vector<Level> levels = {{.z_m = 0.0}};
+    if (std::abs(X(cell)) >= 1.0) return levels;
+    if ((cell.x + cell.y) % 3 == 0) {
+      levels.push_back({.z_m = top_m, .depth_m = top_m - underside_m});
+    } else {
+      levels.push_back({.z_m = underside_m, .underside = true});
+    }
+    return levels;
+  };
+}
+
+TEST(TraversabilityTest, UndersidesAreNoGroundAndHideTheDropThroughTheirDeck) {
+  for (const double thickness : {0.15, 0.4, 0.9}) {
+    SCOPED_TRACE(thickness);
+    const SurfaceWorld world = Annotated(SparseDeck(2.0, 2.0 + thickness));
+    for (int y = 110; y < 146; ++y) {
+      for (int x = 120; x < 136; ++x) {
+        const Surface& deck = SurfaceAt(world, {x, y}, 1);
+        EXPECT_EQ(SurfaceAt(world, {x, y}, 0).traversability, kYes) << x << ", " << y;
+        if ((x + y) % 3 == 0) {
+          EXPECT_EQ(deck.traversability, kYes) << x << ", " << y;
+        } else {
+          EXPECT_EQ(deck.traversability, Traversability::kUnderside);
+          EXPECT_EQ(deck.cost, 0.0F);
+        }
+      }
+    }
+  }
+  // Nobody takes a deck of 1.5 m for what goes on: something may lie on it, and one may fall.
+  const SurfaceWorld thick = Annotated(SparseDeck(2.0, 3.5));
+  EXPECT_EQ(SurfaceAt(thick, {129, 129}, 1).traversability, kNo);
+}
+
+TEST(TraversabilityTest, ALowUndersideBlocksTheGroundBelowAndBesideIt) {
+  const Drawing ceiling = [](CellIndex cell) {
+    std::vector<Level> levels = {{.z_m = 0.0}};
+    if (std::abs(X(cell)) < 1.0) levels.push_back({.z_m = 1.2, .underside = true});
+    return levels;
+  };
+  const SurfaceWorld low = Annotated(ceiling, {.clearance_m = 1.3});
+  EXPECT_EQ(SurfaceAt(low, {128, 128}).traversability, kNo);
+  EXPECT_EQ(SurfaceAt(low, {117, 128}).traversability, kYes);  // its floor goes on
+  const SurfaceWorld high = Annotated(ceiling, {.clearance_m = 1.1});
+  EXPECT_EQ(SurfaceAt(high, {128, 128}).traversability, kYes);
+  const SurfaceWorld alone = Annotated([](CellIndex cell) {
+    const Level level = X(cell) < 1.0 ? Level{.z_m = 0.0} : Level{.z_m = 0.7, .underside = true};
+    return std::vector<Level>{level};
+  });
+  EXPECT_EQ(SurfaceAt(alone, {137, 128}).traversability, kNo);
+  EXPECT_EQ(SurfaceAt(alone, {136, 128}).traversability, kYes);
+}
+
 TEST(TraversabilityTest, LowDeckBlocksTheGroundBelowItByClearanceOnly) {
   const SurfaceWorld world = Annotated(Deck(1.2, 1.5), {.clearance_m = 1.3});
   EXPECT_EQ(SurfaceAt(world, {128, 128}, 0).traversability, kNo);

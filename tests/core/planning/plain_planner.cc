@@ -41,12 +41,16 @@ PlainPlanner::PlainPlanner(const DrawnMap& map, const RobotProfile& profile, dou
                           static_cast<float>(s.z_m),
                           static_cast<float>(s.z_m) - static_cast<float>(s.depth_m),
                           static_cast<float>(s.sigma_m),
+                          s.underside,
                           -1.0,
                           {}});
     }
   }
-  for (std::size_t i = 0; i < patches_.size(); ++i) FindEdges(static_cast<int>(i));
   for (std::size_t i = 0; i < patches_.size(); ++i) {
+    if (!patches_[i].underside) FindEdges(static_cast<int>(i));
+  }
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    if (patches_[i].underside) continue;
     const double distance = EdgeDistance(patches_[i].cell, patches_[i].z);
     if (distance >= footprint_) patches_[i].danger = DangerAt(static_cast<int>(i), distance);
   }
@@ -62,8 +66,20 @@ PlainPlanner::Meeting PlainPlanner::Meet(CellIndex cell, double z, double rise) 
   Meeting meeting;
   const auto column = columns_.find(cell);
   if (column == columns_.end()) return meeting;
+  // The top of a deck that was seen from below only could be where the robot is.
+  const auto may_be_deck = [&](const Patch& patch) {
+    return patch.underside && patch.z <= z + rise && patch.z >= z - std::max(rise, 1.0);
+  };
+  const bool grounded = std::any_of(column->second.begin(), column->second.end(), [&](int i) {
+    return !patches_[i].underside && std::abs(patches_[i].z - z) <= rise;
+  });
+  double hidden_below = -1e9;
+  for (const int i : column->second) {
+    if (!grounded && may_be_deck(patches_[i])) hidden_below = patches_[i].z;
+  }
   for (const int i : column->second) {
     const Patch& patch = patches_[i];
+    if (may_be_deck(patch) || patch.z < hidden_below) continue;
     const double dz = patch.z - z;
     if (patch.bottom <= z + rise) meeting.hole = false;
     if (dz > 0 && patch.bottom >= z + profile_.height_m - kTolerance) continue;
@@ -187,10 +203,12 @@ double PlainPlanner::DangerAt(int i, double distance) const {
         const Patch* nearest = nullptr;
         for (const int k : column->second) {
           const Patch& other = patches_[k];
+          if (other.underside) continue;
           if (nearest == nullptr || std::abs(other.z - patch.z) <= std::abs(nearest->z - patch.z)) {
             nearest = &other;
           }
         }
+        if (nearest == nullptr) continue;
         const double dz = nearest->z - patch.z;
         if (std::abs(dz) > 2.0 * std::hypot(dx, dy) * cell_size_ + 0.05) continue;
         const Surface surface = {.z_m = static_cast<float>(nearest->z),
@@ -381,6 +399,7 @@ std::string Collision(const DrawnMap& map,
           for (const DrawnSurface& surface : column->second) {
             const double top = surface.z_m - p.z();
             const double bottom = top - surface.depth_m;
+            if (surface.underside && top <= allowed && top >= -1.0) all_below = false;
             all_below &= top < -allowed;
             if (top > allowed && bottom < profile.height_m - allowed) {
               return absl::StrFormat("(%.3f, %.3f, %.3f) hits %.3f m at cell (%d, %d)",

@@ -25,6 +25,7 @@ class PlainPlanner {
     double z = 0.0;
     double bottom = 0.0;
     double sigma = 0.0;
+    bool underside = false;
     double danger = -1.0;                       // < 0: cannot stand
     std::vector<std::pair<int, double>> moves;  // target, cost [m]
   };

@@ -39,7 +39,7 @@ struct World {
 };
 
 // Rolling ground with noise, kerbs, walls, poles, holes, a platform over part of it and a ramp up
-// to it, across tile borders of either sign.
+// to it, across tile borders of either sign. Of some of the platform the underside was seen alone.
 World RandomWorld(std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise(0.0, 0.008);
@@ -74,8 +74,13 @@ World RandomWorld(std::uint64_t seed) {
     }
   }
   const double deck = uniform(0.9, 1.6);  // sometimes too low to pass under
+  std::mt19937_64 sight(seed);
   for (int y = 20; y < 20 + 14; ++y) {
-    for (int x = 15; x < 35; ++x) at(x, y).push_back({deck + noise(random), 0.2});
+    for (int x = 15; x < 35; ++x) {
+      at(x, y).push_back({deck + noise(random), 0.2});
+      if (sight() % 8 != 0) continue;
+      at(x, y).back() = {deck - 0.2 + 0.01 * static_cast<double>(sight() % 4), 0.0, 0.01, true};
+    }
     const int run = static_cast<int>(deck / 0.03);
     for (int i = 0; i < run && 35 + i < kWidth; ++i) at(35 + i, y) = {{deck - 0.03 * (i + 1), 0.3}};
   }

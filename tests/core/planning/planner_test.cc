@@ -270,6 +270,35 @@ TEST(PlannerTest, BridgesAnUnobservedStretchUpToTheLimitAndListsIt) {
   EXPECT_NEAR(wide.obstruction_value, 0.4, 1e-6);
 }
 
+// A deck over a road with a strip across it whose top no beam has hit: its underside alone, and the
+// road below.
+TEST(PlannerTest, AStripOfWhichOnlyTheUndersideWasSeenIsAGapAndNoDrop) {
+  const auto deck = [](int strip_cells, bool underside) {
+    DrawnMap map = MapFromDrawing("........\n........", {{'.', {{0.0}, {3.0, 0.3}}}}, 10);
+    for (int y = 0; y < 20; ++y) {
+      for (int x = 40; x < 40 + strip_cells; ++x) {
+        map[{x, y}] = {{0.0}};
+        if (underside) map[{x, y}].push_back({.z_m = 2.7, .underside = true});
+      }
+    }
+    return map;
+  };
+  const PlanEndpoint from = At(1.05, 1.05, 3.0);
+  const PlanEndpoint to = At(7.05, 1.05, 3.0);
+  const PlanResult bridged = PlanIn(deck(3, true), from, to);
+  ASSERT_TRUE(bridged.found()) << bridged.message;
+  ASSERT_EQ(bridged.gaps.size(), 1U);
+  EXPECT_NEAR(bridged.gaps[0].length_m, 0.4, 1e-6);
+  EXPECT_EQ(PlanIn(deck(4, true), from, to).reason, PlanReason::kUnknownGround);
+  const PlanResult through = PlanIn(deck(3, false), from, to);
+  EXPECT_EQ(through.obstruction, Obstruction::kDrop) << through.message;
+  // The road is free below either, and nobody is asked to stand on the underside.
+  EXPECT_TRUE(PlanIn(deck(4, true), At(1.05, 1.05, 0.0), At(7.05, 1.05, 0.0)).found());
+  const PlanResult onto = PlanIn(deck(4, true), from, At(4.15, 1.05, 2.7));
+  EXPECT_EQ(onto.reason, PlanReason::kFound) << onto.message;
+  EXPECT_NEAR(onto.waypoints.back().z(), 3.0, 1e-6);
+}
+
 TEST(PlannerTest, StartAndGoalOffTheMapNameTheNearestPlace) {
   const DrawnMap map = MapFromDrawing("....\n....", {{'.', {{0.0}}}}, 10);
   const PlanResult start = PlanIn(map, At(-1.0, 1.05, 0), At(2.05, 1.05, 0));

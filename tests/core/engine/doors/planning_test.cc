@@ -12,6 +12,7 @@
 namespace strata::testing {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 class EnginePlanningTest : public EngineTest {};
@@ -32,6 +33,49 @@ TEST_F(EnginePlanningTest, ProfileChangeIsReversibleAndRaisesOnlyChangedVersions
   const auto after = AllTiles(db());
   for (const auto& [key, bytes] : before) {
     EXPECT_EQ(DecodeSurfaceTile(bytes)->surfaces, DecodeSurfaceTile(after.at(key))->surfaces);
+  }
+}
+
+// A floor and a deck of 0.2 m over it, which one robot sees from below and the other from above.
+TEST_F(EnginePlanningTest, ADeckIsGroundOnceItWasSeenFromAbove) {
+  const auto square = [](double half_m, double z_m, PointCloud& cloud) {
+    for (double y = -half_m; y < half_m; y += 0.05) {
+      for (double x = -half_m; x < half_m; x += 0.05) {
+        cloud.points.push_back(Eigen::Vector3d(x, y, z_m).cast<float>());
+      }
+    }
+  };
+  PointCloud below;
+  square(6.0, -1.0, below);
+  square(3.0, 1.5, below);
+  PointCloud above;
+  square(3.0, -1.2, above);
+  const auto traversability = [&] {
+    WaitIntegrated(db());
+    std::vector<Traversability> result;
+    const auto columns = db().planning().SampleSurfaces({}, kMapName, {{0.05, 0.05}});
+    EXPECT_THAT(columns, testing::IsOk());
+    if (!columns.ok()) return result;
+    for (const Surface& s : columns->at(0).surfaces) result.push_back(s.traversability);
+    return result;
+  };
+  for (const bool keep_points : {true, false}) {
+    SCOPED_TRACE(keep_points);
+    MapParameters parameters = SmallMap();
+    parameters.keep_points = keep_points;
+    MakeMap(parameters);
+    const auto at_height = [](double z_m) { return Pose(Eigen::Translation3d(0.0, 0.0, z_m)); };
+    STRATA_ASSERT_OK(Upload(db(), HeaderOf({"low", 1}, below, at_height(1.0)), below));
+    EXPECT_THAT(traversability(),
+                ElementsAre(Traversability::kTraversable, Traversability::kUnderside));
+    STRATA_ASSERT_OK(Upload(db(), HeaderOf({"high", 1}, above, at_height(3.9)), above));
+    EXPECT_THAT(traversability(),
+                ElementsAre(Traversability::kTraversable, Traversability::kTraversable));
+    ExpectSound();
+    STRATA_ASSERT_OK(db().scans().Delete({}, kMapName, {"high", 1}));
+    EXPECT_THAT(traversability(),
+                ElementsAre(Traversability::kTraversable, Traversability::kUnderside));
+    STRATA_ASSERT_OK(db().maps().Delete({}, kMapName));
   }
 }
 
