@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -81,10 +82,8 @@ class Ceilings {
 class Overhead {
  public:
   void Add(std::uint32_t patch, const Eigen::Vector3d& p) {
-    const Eigen::Array3d at = (p / kCubeM).array().floor();
     const auto number = static_cast<std::uint32_t>(cubes_.size());
-    const std::uint32_t cube =
-        numbers_.try_emplace(Cube{at.x(), at.y(), at.z()}, number).first->second;
+    const std::uint32_t cube = numbers_.try_emplace(CubeOf(p), number).first->second;
     if (cube == number) cubes_.emplace_back();
     cubes_[cube].Add(p);
     points_.push_back({patch, cube, p.z()});
@@ -106,13 +105,22 @@ class Overhead {
   }
 
  private:
-  using Cube = std::array<double, 3>;
+  // 21 bits an axis.
+  static std::uint64_t CubeOf(const Eigen::Vector3d& p) {
+    std::uint64_t cube = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto at = static_cast<std::int64_t>(std::floor(p[axis] / kCubeM));
+      cube = cube << 21 | (static_cast<std::uint64_t>(at) & 0x1FFFFF);
+    }
+    return cube;
+  }
+
   struct Point {
     std::uint32_t patch, cube;
     double z_m;
   };
 
-  HashMap<Cube, std::uint32_t> numbers_;
+  HashMap<std::uint64_t, std::uint32_t> numbers_;
   std::vector<Moments> cubes_;
   std::vector<Point> points_;
 };
@@ -128,26 +136,40 @@ Eigen::Vector3d PlaceOf(const MlsMap& map, const MlsTile& tile, const Patch& pat
 // that is higher is no underside.
 class Floor {
  public:
-  Floor(const MlsMap& map, const Eigen::Vector3d& p_sensor) {
+  Floor(const MlsMap& map, const Eigen::Vector3d& p_sensor)
+      : cell_size_m_(map.parameters.cell_size_m), p_sensor_(p_sensor) {
     for (const MlsTile& tile : map.tiles) {
-      for (const Patch& patch : tile.patches) {
-        const Eigen::Vector3d p = PlaceOf(map, tile, patch) - p_sensor;
-        if (!IsNear(p)) continue;
-        float& lowest_m = lowest_m_[SquareOf(p)];
-        lowest_m = std::min(lowest_m, static_cast<float>(patch.bottom_m() - p_sensor.z()));
-        if (p.z() < -kSensorHeightM && p.head<2>().norm() < kFloorReachM) ++below_sensor_;
+      const CellIndex corner = CellOf(tile.key, 0);
+      for (int i = 0; i < kTileCells; ++i) {
+        columns_[i] = SquareOf((corner.x + i + 0.5) * cell_size_m_ - p_sensor.x());
+        rows_[i] = SquareOf((corner.y + i + 0.5) * cell_size_m_ - p_sensor.y());
       }
+      for (const Patch& patch : tile.patches) Add(patch);
     }
   }
 
-  bool IsBelowSensor() const { return below_sensor_ >= kMinPatches; }
-  // True if the sensor looked up to p, from it, and something lies below p.
+  bool IsBelowSensor() const {
+    const std::int32_t sensor = TicksOf(p_sensor_.z() - kSensorHeightM);
+    constexpr int kMiddle = kSquares / 2;
+    int squares = 0;
+    for (int y = kMiddle - kFloorReach; y < kMiddle + kFloorReach; ++y) {
+      for (int x = kMiddle - kFloorReach; x < kMiddle + kFloorReach; ++x) {
+        squares += lowest_[At(x, y)] < sensor ? 1 : 0;
+      }
+    }
+    return squares >= kMinSquares;
+  }
+
+  // True if the sensor looked up to `p`, and something lies below it.
   bool IsBelow(const Eigen::Vector3d& p) const {
-    if (p.z() < kMinSine * p.norm() || !IsNear(p)) return false;
-    const std::size_t middle = SquareOf(p);
-    for (const std::size_t row : {middle - kSquares, middle, middle + kSquares}) {
-      for (const std::size_t at : {row - 1, row, row + 1}) {
-        if (lowest_m_[at] < p.z() - kRoomM) return true;
+    const Eigen::Vector3d up = p - p_sensor_;
+    const int column = SquareOf(up.x());
+    const int row = SquareOf(up.y());
+    if (up.z() < kMinSine * up.norm() || column <= kFar + 1 || row <= kFar + 1) return false;
+    const std::int32_t room = TicksOf(p.z() - kRoomM);
+    for (int y = row - 1; y <= row + 1; ++y) {
+      for (int x = column - 1; x <= column + 1; ++x) {
+        if (lowest_[At(x, y)] < room) return true;
       }
     }
     return false;
@@ -155,23 +177,36 @@ class Floor {
 
  private:
   static constexpr double kSensorHeightM = 0.15;
-  static constexpr double kFloorReachM = 20.0;
-  static constexpr int kMinPatches = 20;
+  static constexpr int kFloorReach = 16;  // squares
+  static constexpr int kMinSquares = 8;
   static constexpr double kMinSine = 0.05;
   static constexpr double kRoomM = 1.5;  // more than a level slope of 26° falls over 2 m and a bit
-  static constexpr std::size_t kSquares = 256;  // along an edge, the sensor in the middle
+  static constexpr int kSquares = 256;   // along an edge, the sensor in the middle
+  static constexpr int kFar = 0;
 
-  static bool IsNear(const Eigen::Vector3d& p) {
-    return p.head<2>().cwiseAbs().maxCoeff() < static_cast<double>(kSquares) / 2 - 1;
+  static std::size_t At(int x, int y) { return static_cast<std::size_t>(y) * kSquares + x; }
+  static std::int32_t TicksOf(double z_m) {
+    return static_cast<std::int32_t>(std::clamp(z_m * kTicksPerMetre, -1e9, 1e9));
   }
-  static std::size_t SquareOf(const Eigen::Vector3d& p) {
-    const Eigen::Array2d at = p.head<2>().array() + static_cast<double>(kSquares) / 2;
-    return static_cast<std::size_t>(at.y()) * kSquares + static_cast<std::size_t>(at.x());
+  // Row or column of what is so far from the sensor; kFar for all that is outside.
+  static int SquareOf(double offset_m) {
+    const double at = std::floor(offset_m) + kSquares / 2;
+    return at > kFar && at < kSquares - 1 ? static_cast<int>(at) : kFar;
   }
 
-  std::vector<float> lowest_m_ =
-      std::vector<float>(kSquares * kSquares, std::numeric_limits<float>::infinity());
-  int below_sensor_ = 0;
+  void Add(const Patch& patch) {
+    const auto cell = static_cast<int>(patch.cell);
+    std::int32_t& lowest = lowest_[At(columns_[cell % kTileCells], rows_[cell / kTileCells])];
+    lowest = std::min(lowest, static_cast<std::int32_t>(patch.z_min));
+  }
+
+  double cell_size_m_;
+  Eigen::Vector3d p_sensor_;
+  std::array<int, kTileCells> columns_{};  // of the tile that is being added
+  std::array<int, kTileCells> rows_{};
+  // [ticks]
+  std::vector<std::int32_t> lowest_ = std::vector<std::int32_t>(
+      std::size_t{kSquares} * kSquares, std::numeric_limits<std::int32_t>::max());
 };
 
 }  // namespace
@@ -182,8 +217,7 @@ std::vector<Side> SidesOf(const MlsMap& map, const Eigen::Vector3d& p_sensor) {
   Overhead overhead;
   for (const MlsTile& tile : map.tiles) {
     for (const Patch& patch : tile.patches) {
-      const double z_m = patch.mean_m();
-      const bool below = z_m <= p_sensor.z();
+      const bool below = patch.top_m() <= p_sensor.z() || patch.mean_m() <= p_sensor.z();
       if (!below && !patch.vertical()) {
         overhead.Add(static_cast<std::uint32_t>(sides.size()),
                      PlaceOf(map, tile, patch) - p_sensor);
@@ -197,15 +231,19 @@ std::vector<Side> SidesOf(const MlsMap& map, const Eigen::Vector3d& p_sensor) {
 
 void MarkSides(const Eigen::Vector3d& p_sensor, MlsMap& map) {
   const std::vector<Side> sides = SidesOf(map, p_sensor);
-  const Floor floor(map, p_sensor);
-  if (!floor.IsBelowSensor()) return;
+  const bool looked_up = std::any_of(sides.begin(), sides.end(), [](Side side) {
+    return side == Side::kUnderside || side == Side::kDoubtful;
+  });
+  std::optional<Floor> floor;
+  if (looked_up) floor.emplace(map, p_sensor);
+  if (looked_up && !floor->IsBelowSensor()) return;
   std::size_t next = 0;
   for (MlsTile& tile : map.tiles) {
     for (Patch& patch : tile.patches) {
       const Side side = sides[next++];
       if (side == Side::kTop) {
         patch.sides = Patch::kSeenFromAbove;
-      } else if (side != Side::kUnknown && floor.IsBelow(PlaceOf(map, tile, patch) - p_sensor)) {
+      } else if (side != Side::kUnknown && floor->IsBelow(PlaceOf(map, tile, patch))) {
         patch.sides = Patch::kSeenFromBelow;
       }
     }
