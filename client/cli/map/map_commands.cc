@@ -13,6 +13,7 @@
 
 #include "client/cli/job/job_runner.h"
 #include "client/cli/map/map_files.h"
+#include "client/cli/map/map_quality.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/confirm.h"
@@ -65,7 +66,14 @@ absl::Status Show(Context& context, const MapOptions& options) {
                           context.database.maps().Get(context.call, options.map));
   STRATA_ASSIGN_OR_RETURN(const MapStats stats,
                           context.database.maps().Stats(context.call, options.map));
-  context.output.Object(ToJson(info, stats));
+  Json json = ToJson(info, stats);
+  const absl::StatusOr<MapQuality> quality = QualityOf(context.database, context.call, options.map);
+  if (quality.ok()) {
+    AddQuality(*quality, context.output.json(), json);
+  } else {
+    context.output.Talk(absl::StrCat("its quality is unknown: ", quality.status().message()));
+  }
+  context.output.Object(json);
   return absl::OkStatus();
 }
 
@@ -192,7 +200,7 @@ void AddMapCommands(Commands& commands) {
     return app;
   };
   verb("show",
-       "Parameters, counts and content digest",
+       "Parameters, counts, content digest, and how well scans and loops agree",
        "strata map show campus --output json",
        Show);
   AddYes(verb("delete", "Delete a map and its file", "strata map delete campus", Delete),

@@ -43,4 +43,15 @@ bool AlignmentHealth::Doubtful() const {
   return compared() >= kFew && (MedianOverlap() < kLowOverlap || 2 * aligned_ < compared());
 }
 
+void AddHealth(const AlignmentHealth& health, bool for_programs, Json& json) {
+  if (health.compared() == 0) return;
+  if (!for_programs) {
+    json["alignment"] = health.Summary();
+    return;
+  }
+  json["median_overlap"] = health.MedianOverlap();
+  json["at_step_limit"] = health.at_step_limit();
+  json["poses_doubtful"] = health.Doubtful();
+}
+
 }  // namespace strata::cli

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "client/cli/terminal/json.h"
 #include "core/world/scan.h"
 
 namespace strata::cli {
@@ -33,6 +34,9 @@ class AlignmentHealth {
   std::size_t aligned_ = 0;
   std::size_t at_step_limit_ = 0;
 };
+
+// Adds a summary for people, or numbers for programs; nothing where nothing was compared.
+void AddHealth(const AlignmentHealth& health, bool for_programs, Json& json);
 
 }  // namespace strata::cli
 

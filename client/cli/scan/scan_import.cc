@@ -153,17 +153,6 @@ void TalkOf(const Json& errors, Output& output) {
   }
 }
 
-void AddHealth(const AlignmentHealth& health, bool for_programs, Json& json) {
-  if (health.compared() == 0) return;
-  if (!for_programs) {
-    json["alignment"] = health.Summary();
-    return;
-  }
-  json["median_overlap"] = health.MedianOverlap();
-  json["at_step_limit"] = health.at_step_limit();
-  json["poses_doubtful"] = health.Doubtful();
-}
-
 constexpr absl::string_view kDoubtful =
     "the poses are probably those of other scans, or far off; see 'map render', and 'map delete' "
     "to begin again with other --poses";

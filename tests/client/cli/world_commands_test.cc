@@ -251,6 +251,65 @@ TEST_F(WorldCommandsTest, AnEndedWatchSaysWhereItGoesOn) {
   EXPECT_THAT(talk_.str(), HasSubstr("--since 40"));
 }
 
+TEST_F(WorldCommandsTest, AMapSaysHowWellItsScansAndLoopsAgree) {
+  ON_CALL(db_.maps(), Get(_, _)).WillByDefault(Return(MapInfo()));
+  ON_CALL(db_.maps(), Stats(_, _)).WillByDefault(Return(MapStats()));
+  absl::Status listed;
+  ON_CALL(db_.scans(), List(_, _, _, _))
+      .WillByDefault([&listed](auto&, auto, auto&, auto sink) -> absl::Status {
+        for (const double overlap : {0.5, 0.8, 0.9}) {
+          ScanInfo scan;
+          scan.state = ScanState::kIntegrated;
+          scan.alignment.aligned = overlap > 0.6;
+          scan.alignment.overlap = overlap;
+          EXPECT_THAT(sink(scan), IsOk());
+          scan.alignment = {};
+          scan.alignment.message = "optimize, job 7";
+          EXPECT_THAT(sink(scan), IsOk());
+          scan.state = ScanState::kPending;  // says nothing yet
+          EXPECT_THAT(sink(scan), IsOk());
+        }
+        return listed;
+      });
+  api::PoseGraphState state;
+  state.nodes = {Node({"a", 1}, 0.0), Node({"a", 2}, 1.5)};
+  const auto add = [&state](double x_m, ConstraintOrigin origin, bool enabled) {
+    Constraint constraint;
+    constraint.i = {"a", 1};
+    constraint.j = {"a", 2};
+    constraint.T_i_j = Pose(Eigen::Translation3d(x_m, 0.0, 0.0));
+    constraint.origin = origin;
+    constraint.enabled = enabled;
+    state.constraints.push_back(constraint);
+  };
+  add(1.5, ConstraintOrigin::kIngest, true);  // no loop
+  add(1.4, ConstraintOrigin::kOptimize, true);
+  add(1.6, ConstraintOrigin::kPerson, true);
+  add(3.5, ConstraintOrigin::kPerson, true);
+  add(9.0, ConstraintOrigin::kOptimize, false);
+  ON_CALL(db_.posegraph(), Get(_, _)).WillByDefault(Return(state));
+  JobInfo optimize = Job(7, JobState::kSucceeded);
+  optimize.message = "settled. Good.";
+  const std::vector<JobInfo> jobs = {optimize, Job(9, JobState::kFailed)};
+  ON_CALL(db_.jobs(), List(_, _)).WillByDefault(Return(jobs));
+  const Json shown = RunJson({"map", "show", "m"});
+  EXPECT_EQ(shown["scans_moved_by_jobs"], 3);
+  EXPECT_EQ(shown["optimized"], "job 7: settled. Good.");
+  EXPECT_EQ(shown["median_overlap"], 0.8);
+  EXPECT_EQ(shown["poses_doubtful"], false);
+  EXPECT_EQ(shown["loops_closed"], 2);
+  EXPECT_EQ(shown["loops_open"], 1);
+  EXPECT_EQ(shown["loops_not_believed"], 1);
+  const std::string text = RunText({"map", "show", "m"});
+  EXPECT_THAT(text, HasSubstr("median overlap 0.80, 2 of 3 aligned, 0 at the step limit"));
+  EXPECT_THAT(text, HasSubstr("2 closed, 1 open, 1 not believed"));
+  listed = absl::DataLossError("1 scan is damaged");  // the others count
+  EXPECT_EQ(RunJson({"map", "show", "m"})["median_overlap"], 0.8);
+  listed = absl::UnavailableError("gone");
+  EXPECT_FALSE(RunJson({"map", "show", "m"}).contains("median_overlap"));
+  EXPECT_THAT(talk_.str(), HasSubstr("its quality is unknown: gone"));
+}
+
 TEST_F(WorldCommandsTest, APoseThatIsNotKnownSaysWhy) {
   EXPECT_CALL(db_.posegraph(), LookupPose(_, absl::string_view("m"), ScanId{"run", 4}))
       .WillOnce(Return(api::PoseLookup{false, "pending behind 3 scans", Pose::Identity(), 2}));
