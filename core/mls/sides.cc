@@ -81,11 +81,11 @@ class Ceilings {
 // Horizontal patches above the sensor, from it, and the cubes that they lie in.
 class Overhead {
  public:
-  void Add(std::uint32_t patch, const Eigen::Vector3d& p) {
+  void Add(std::uint32_t patch, const Eigen::Vector3f& p) {
     const auto number = static_cast<std::uint32_t>(cubes_.size());
     const std::uint32_t cube = numbers_.try_emplace(CubeOf(p), number).first->second;
     if (cube == number) cubes_.emplace_back();
-    cubes_[cube].Add(p);
+    cubes_[cube].Add(p.cast<double>());
     points_.push_back({patch, cube, p.z()});
   }
 
@@ -106,10 +106,10 @@ class Overhead {
 
  private:
   // 21 bits an axis.
-  static std::uint64_t CubeOf(const Eigen::Vector3d& p) {
+  static std::uint64_t CubeOf(const Eigen::Vector3f& p) {
     std::uint64_t cube = 0;
     for (int axis = 0; axis < 3; ++axis) {
-      const auto at = static_cast<std::int64_t>(std::floor(p[axis] / kCubeM));
+      const auto at = static_cast<std::int64_t>(std::floor(p[axis] / static_cast<float>(kCubeM)));
       cube = cube << 21 | (static_cast<std::uint64_t>(at) & 0x1FFFFF);
     }
     return cube;
@@ -117,7 +117,7 @@ class Overhead {
 
   struct Point {
     std::uint32_t patch, cube;
-    double z_m;
+    float z_m;
   };
 
   HashMap<std::uint64_t, std::uint32_t> numbers_;
@@ -211,7 +211,7 @@ class Floor {
 
 }  // namespace
 
-std::vector<Side> SidesOf(const MlsMap& map, const Eigen::Vector3d& p_sensor) {
+std::vector<Side> SidesOf(const MlsMap& map, const Eigen::Vector3d& p_sensor, double max_range_m) {
   std::vector<Side> sides;
   sides.reserve(map.patch_count());
   Overhead overhead;
@@ -219,8 +219,10 @@ std::vector<Side> SidesOf(const MlsMap& map, const Eigen::Vector3d& p_sensor) {
     for (const Patch& patch : tile.patches) {
       const bool below = patch.top_m() <= p_sensor.z() || patch.mean_m() <= p_sensor.z();
       if (!below && !patch.vertical()) {
-        overhead.Add(static_cast<std::uint32_t>(sides.size()),
-                     PlaceOf(map, tile, patch) - p_sensor);
+        const Eigen::Vector3d p = PlaceOf(map, tile, patch);
+        if (p.head<2>().norm() <= max_range_m) {
+          overhead.Add(static_cast<std::uint32_t>(sides.size()), (p - p_sensor).cast<float>());
+        }
       }
       sides.push_back(below ? Side::kTop : Side::kUnknown);
     }

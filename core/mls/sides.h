@@ -4,6 +4,7 @@
 #define STRATA_CORE_MLS_SIDES_H_
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
@@ -23,8 +24,11 @@ enum class Side : std::uint8_t {
 // the map's frame [m]. What is not above the sensor is seen from above. Of the horizontal patches
 // above it the planes of cubes of 1 m are judged: those that are level (within 26°) and face the
 // sensor from above it are undersides, all that spans a surface of another kind, or none, is a top.
+// What lies horizontally farther than `max_range_m` from the map's origin is left out: kUnknown.
 // A pure function of its arguments.
-std::vector<Side> SidesOf(const MlsMap& map, const Eigen::Vector3d& p_sensor);
+std::vector<Side> SidesOf(const MlsMap& map,
+                          const Eigen::Vector3d& p_sensor,
+                          double max_range_m = std::numeric_limits<double>::infinity());
 
 // Sets Patch::sides to what SidesOf() says, but for seen from below only of what the sensor looked
 // up to by more than 3° and under which, within 1 to 2 m around, something lies 1.5 m lower or

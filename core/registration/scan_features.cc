@@ -99,7 +99,7 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const ScanFeatureOpt
   for (const FeatureClass c : {FeatureClass::kTraversable, FeatureClass::kVertical}) {
     ListOf(c, points).reserve(local_map.patch_count());
   }
-  const std::vector<Side> sides = SidesOf(local_map, options.sensor_origin);
+  const std::vector<Side> sides = SidesOf(local_map, options.sensor_origin, options.max_range_m);
   std::vector<Eigen::Vector3f> overhead;  // tops above the sensor
   std::size_t place = 0;
   for (const MlsTile& tile : local_map.tiles) {
