@@ -152,6 +152,23 @@ TEST(OverviewTest, ClassTraversabilityAndCostOfMost) {
   EXPECT_EQ(Parent({make(0, 0, unknown, 0)}).surfaces[0].traversability, unknown);
 }
 
+TEST(OverviewTest, UndersidesAreThatUnlessAnythingElseIsAmongThem) {
+  const auto make = [](std::uint16_t cell, Traversability t) {
+    return Surface{.cell = cell, .traversability = t, .z_m = 2.0F, .sigma_m = 0.1F};
+  };
+  constexpr auto kUnderside = Traversability::kUnderside;
+  const auto of = [&](Traversability other) {
+    return Parent({make(0, kUnderside), make(1, kUnderside), make(kRow, other)})
+        .surfaces.at(0)
+        .traversability;
+  };
+  EXPECT_EQ(of(kUnderside), kUnderside);
+  for (const Traversability other :
+       {Traversability::kUnknown, Traversability::kTraversable, Traversability::kNonTraversable}) {
+    EXPECT_EQ(of(other), other);
+  }
+}
+
 TEST(OverviewTest, ConfidenceIsTheMeanOfTheClassAmongThoseWithAClass) {
   const auto make = [](std::uint16_t cell, std::uint8_t id, std::uint8_t confidence) {
     return Surface{.cell = cell, .class_id = id, .confidence = confidence, .sigma_m = 0.01F};
