@@ -265,12 +265,16 @@ TEST(TraversabilityTest, ALowUndersideBlocksTheGroundBelowAndBesideIt) {
   EXPECT_EQ(SurfaceAt(low, {117, 128}).traversability, kYes);  // its floor goes on
   const SurfaceWorld high = Annotated(ceiling, {.clearance_m = 1.1});
   EXPECT_EQ(SurfaceAt(high, {128, 128}).traversability, kYes);
-  const SurfaceWorld alone = Annotated([](CellIndex cell) {
-    const Level level = X(cell) < 1.0 ? Level{.z_m = 0.0} : Level{.z_m = 0.7, .underside = true};
-    return std::vector<Level>{level};
-  });
-  EXPECT_EQ(SurfaceAt(alone, {137, 128}).traversability, kNo);
-  EXPECT_EQ(SurfaceAt(alone, {136, 128}).traversability, kYes);
+  for (const bool upper_deck : {false, true}) {  // what is high above it says nothing
+    const SurfaceWorld alone = Annotated([&](CellIndex cell) {
+      if (X(cell) < 1.0) return std::vector<Level>{{.z_m = 0.0}};
+      std::vector<Level> levels = {{.z_m = 0.7, .underside = true}};
+      if (upper_deck) levels.push_back({.z_m = 4.0});
+      return levels;
+    });
+    EXPECT_EQ(SurfaceAt(alone, {137, 128}).traversability, kNo);
+    EXPECT_EQ(SurfaceAt(alone, {136, 128}).traversability, kYes);
+  }
 }
 
 TEST(TraversabilityTest, LowDeckBlocksTheGroundBelowItByClearanceOnly) {
