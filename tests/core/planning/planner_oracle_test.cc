@@ -75,10 +75,11 @@ World RandomWorld(std::uint64_t seed) {
   }
   const double deck = uniform(0.9, 1.6);  // sometimes too low to pass under
   std::mt19937_64 sight(seed);
+  const int ceiling_from = 15 + static_cast<int>(sight() % 40);  // of the platform, by its column
   for (int y = 20; y < 20 + 14; ++y) {
     for (int x = 15; x < 35; ++x) {
       at(x, y).push_back({deck + noise(random), 0.2});
-      if (sight() % 8 != 0) continue;
+      if (x < ceiling_from && sight() % 8 != 0) continue;
       at(x, y).back() = {deck - 0.2 + 0.01 * static_cast<double>(sight() % 4), 0.0, 0.01, true};
     }
     const int run = static_cast<int>(deck / 0.03);

@@ -294,9 +294,21 @@ TEST(PlannerTest, AStripOfWhichOnlyTheUndersideWasSeenIsAGapAndNoDrop) {
   EXPECT_EQ(through.obstruction, Obstruction::kDrop) << through.message;
   // The road is free below either, and nobody is asked to stand on the underside.
   EXPECT_TRUE(PlanIn(deck(4, true), At(1.05, 1.05, 0.0), At(7.05, 1.05, 0.0)).found());
+  const PlanResult ceiling = PlanIn(deck(40, true), from, At(6.05, 1.05, 2.7));
+  EXPECT_EQ(ceiling.reason, PlanReason::kGoalNotOnSurface) << ceiling.message;
+  EXPECT_THAT(ceiling.message, HasSubstr("cannot stand at (6.05, 1.05, 2.70): unknown ground"));
   const PlanResult onto = PlanIn(deck(4, true), from, At(4.15, 1.05, 2.7));
   EXPECT_EQ(onto.reason, PlanReason::kFound) << onto.message;
   EXPECT_NEAR(onto.waypoints.back().z(), 3.0, 1e-6);
+}
+
+TEST(PlannerTest, NobodyStandsOnAnUndersideAmongTopsThatAStepWouldReach) {
+  DrawnMap map = MapFromDrawing("....\n....", {{'.', {{3.0, 0.05}}}}, 10);
+  map[{20, 10}] = {{.z_m = 2.95, .underside = true}};
+  const PlanResult result = PlanIn(map, At(2.05, 1.05, 2.95), At(3.05, 1.05, 3.0));
+  ASSERT_TRUE(result.found()) << result.message;
+  EXPECT_NEAR(result.waypoints.front().z(), 3.0, 1e-6);
+  EXPECT_THAT(result.message, HasSubstr("start moved 0.10 m"));
 }
 
 TEST(PlannerTest, StartAndGoalOffTheMapNameTheNearestPlace) {
