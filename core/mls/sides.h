@@ -32,9 +32,10 @@ std::vector<Side> SidesOf(const MlsMap& map,
 
 // Sets Patch::sides to what SidesOf() says, but for seen from below only of what the sensor looked
 // up to by more than 3° and under which, within 1 to 2 m around, something lies 1.5 m lower or
-// more; what is doubtful is taken for seen from below there. Nothing is set where the ground is not
-// below the sensor: a merged cloud, with its origin anywhere, says nothing of sides. Joining marked
-// maps joins their sides, so whatever is seen from above once is ground to be judged.
+// more; what is doubtful is taken for seen from below there. Where there seem to be undersides and
+// the ground is not below the sensor nothing is set: a merged cloud, with its origin anywhere, says
+// nothing of sides. Joining marked maps joins their sides, so whatever is seen from above once is
+// ground to be judged.
 void MarkSides(const Eigen::Vector3d& p_sensor, MlsMap& map);
 
 }  // namespace strata

@@ -100,7 +100,9 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const ScanFeatureOpt
     ListOf(c, points).reserve(local_map.patch_count());
   }
   const std::vector<Side> sides = SidesOf(local_map, options.sensor_origin, options.max_range_m);
-  std::vector<Eigen::Vector3f> overhead;  // tops above the sensor
+  // Tops above the sensor, behind the others: samples are drawn by place, and recorded figures with
+  // them.
+  std::vector<Eigen::Vector3f> overhead;
   std::size_t place = 0;
   for (const MlsTile& tile : local_map.tiles) {
     for (const Patch& patch : tile.patches) {
