@@ -17,6 +17,8 @@ namespace {
 
 // What the heap loses between blocks that come and go, and who still holds what has gone.
 constexpr std::size_t kHeapShare = 8;
+// With the half that may be reserved, all that caches have.
+constexpr std::size_t kSmallShares = 12;
 constexpr absl::Duration kLookInterval = absl::Milliseconds(50);  // at who waits no more
 
 }  // namespace
@@ -30,19 +32,21 @@ bool CacheBudget::Fits(std::size_t bytes) const {
   return bytes <= max_bytes_ / 2 && reserved_ + bytes <= max_bytes_ / 2;
 }
 
-bool CacheBudget::TryReserve(std::size_t bytes) {
-  if (!Fits(bytes)) return false;
-  reserved_ += bytes;
-  Trim();
-  return true;
-}
-
 bool CacheBudget::Reserve(std::size_t bytes) {
   Values dropped;
   absl::MutexLock lock(&mutex_);
-  if (!TryReserve(bytes)) return false;
+  if (!Fits(bytes)) return false;
+  reserved_ += bytes;
+  Trim();
   dropped.swap(dropped_);
   return true;
+}
+
+absl::Status CacheBudget::Await(const absl::Condition& condition, const Stop& stop) {
+  while (!mutex_.AwaitWithTimeout(condition, kLookInterval)) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+  }
+  return absl::OkStatus();
 }
 
 absl::Status CacheBudget::AwaitReserve(std::size_t bytes, const Stop& stop) {
@@ -52,13 +56,35 @@ absl::Status CacheBudget::AwaitReserve(std::size_t bytes, const Stop& stop) {
   }
   Values dropped;
   absl::MutexLock lock(&mutex_);
-  const auto has_room = [this, bytes]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return Fits(bytes); };
-  while (!mutex_.AwaitWithTimeout(absl::Condition(&has_room), kLookInterval)) {
-    STRATA_RETURN_IF_ERROR(stop.status());
-  }
-  TryReserve(bytes);
+  const auto self = waiting_.insert(waiting_.end(), bytes);
+  const auto is_next = [this, self]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
+    return self == waiting_.begin() && Fits(*self);
+  };
+  const absl::Status status = Await(absl::Condition(&is_next), stop);
+  waiting_.erase(self);
+  STRATA_RETURN_IF_ERROR(status);
+  reserved_ += bytes;
+  Trim();
   dropped.swap(dropped_);
   return absl::OkStatus();
+}
+
+absl::Status CacheBudget::AwaitSmallShare(const Stop& stop) {
+  Values dropped;
+  absl::MutexLock lock(&mutex_);
+  const auto is_left = [this]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
+    return small_shares_ < kSmallShares;
+  };
+  STRATA_RETURN_IF_ERROR(Await(absl::Condition(&is_left), stop));
+  ++small_shares_;
+  Trim();
+  dropped.swap(dropped_);
+  return absl::OkStatus();
+}
+
+void CacheBudget::ReleaseSmallShare() {
+  absl::MutexLock lock(&mutex_);
+  --small_shares_;
 }
 
 void CacheBudget::Release(std::size_t bytes) {
@@ -67,7 +93,8 @@ void CacheBudget::Release(std::size_t bytes) {
 }
 
 void CacheBudget::Trim() {
-  while (cached_ + reserved_ > max_bytes_ - max_bytes_ / kHeapShare && !order_.empty()) {
+  const std::size_t taken = reserved_ + small_shares_ * small_share();
+  while (cached_ + taken > max_bytes_ - max_bytes_ / kHeapShare && !order_.empty()) {
     const std::function<void()> evict = std::move(order_.back().evict);
     evict();
   }

@@ -32,10 +32,16 @@ class CacheBudget {
   // Takes memory for something that is no cache from what the caches may hold, until Release().
   // False, and nothing is taken, where all that is taken would be more than half of the budget.
   bool Reserve(std::size_t bytes);
-  // The same once others have released enough. RESOURCE_EXHAUSTED for more than half of the budget,
-  // else as `stop` says.
+  // The same once others have released enough, in the order of those who wait. RESOURCE_EXHAUSTED
+  // for more than half of the budget, else as `stop` says.
   absl::Status AwaitReserve(std::size_t bytes, const Stop& stop);
   void Release(std::size_t bytes);
+
+  // small_share() for work that has to begin at once: of three eighths of the budget that nothing
+  // else is taken from, so that it never waits for what takes long. Errors are those of `stop`.
+  absl::Status AwaitSmallShare(const Stop& stop);
+  void ReleaseSmallShare();
+  std::size_t small_share() const { return max_bytes_ / 32; }
 
  private:
   template <typename Key, typename Value>
@@ -49,7 +55,9 @@ class CacheBudget {
   using Values = std::vector<std::shared_ptr<const void>>;
 
   bool Fits(std::size_t bytes) const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
-  bool TryReserve(std::size_t bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Returns with mutex_ held once `condition` holds, or as `stop` says.
+  absl::Status Await(const absl::Condition& condition, const Stop& stop)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Evicts until all fits. What is evicted lies in dropped_, to be destroyed without the mutex.
   void Trim() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
@@ -58,6 +66,8 @@ class CacheBudget {
   Order order_ ABSL_GUARDED_BY(mutex_);  // the latest used first
   std::size_t cached_ ABSL_GUARDED_BY(mutex_) = 0;
   std::size_t reserved_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::size_t small_shares_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::list<std::size_t> waiting_ ABSL_GUARDED_BY(mutex_);  // what is asked for, in order
   Values dropped_ ABSL_GUARDED_BY(mutex_);
 };
 

@@ -110,7 +110,7 @@ absl::StatusOr<PlanResult> Answer(SearchSpace& space,
 }  // namespace
 
 Planner::Planner(const PlannerOptions& options)
-    : options_(options), cache_(options.budget, options.loop) {}
+    : options_(options), cache_(options.budget, options.loop, options.preparations) {}
 
 absl::StatusOr<PlanResult> Planner::Plan(TileSource& source,
                                          const PlanQuery& query,

@@ -48,6 +48,7 @@ struct PlannerOptions {
   // more, for the tiles that it has left (20 to 50 kB each), ends with PlanReason::kSearchLimit.
   std::shared_ptr<CacheBudget> budget = std::make_shared<CacheBudget>(std::size_t{1} << 30);
   ParallelLoop loop = {};  // what tiles are prepared by
+  int preparations = 1;    // tiles that are prepared at a time, each up to some 50 MB
 };
 
 // Plans in one map, in any of its epochs. Thread-safe; queries run in their callers' threads.

@@ -17,9 +17,8 @@
 namespace strata {
 namespace {
 
-// Parts of the budget: what every search has at once; what a large one waits for, some of the tiles
-// that it parks included; and of that what the tiles at hand may take.
-constexpr std::size_t kSmallShare = 32;
+// Parts of the budget, beside the small share that every search begins with: what a large one waits
+// for, some of the tiles that it parks included; and of that what the tiles at hand may take.
 constexpr std::size_t kLargeShare = 8;
 constexpr std::size_t kAtHandShare = 9;
 // A way of n cells makes a search expand more than n times this.
@@ -34,12 +33,17 @@ std::size_t BytesAtHand(const PreparedTile& tile) {
 
 absl::Status SearchWorkspace::Begin(int bucket_shift, const Stop& stop) {
   Clear(bucket_shift);
-  return budget_ == nullptr ? absl::OkStatus() : Exchange(budget_->max_bytes() / kSmallShare, stop);
+  if (budget_ == nullptr) return absl::OkStatus();
+  GiveBackShare();
+  STRATA_RETURN_IF_ERROR(budget_->AwaitSmallShare(stop));
+  has_small_share_ = true;
+  granted_ = budget_->small_share();
+  return absl::OkStatus();
 }
 
 absl::Status SearchWorkspace::BeginLarge(int bucket_shift, const Stop& stop) {
   Clear(bucket_shift);
-  return Exchange(large_share(), stop);
+  return TakeLargeShare(stop);
 }
 
 std::size_t SearchWorkspace::large_share() const { return budget_->max_bytes() / kLargeShare; }
@@ -52,12 +56,21 @@ void SearchWorkspace::Clear(int bucket_shift) {
 }
 
 // Whoever waits holds nothing: searches that wait for each other would wait for ever.
-absl::Status SearchWorkspace::Exchange(std::size_t bytes, const Stop& stop) {
-  budget_->Release(granted_);
-  granted_ = 0;
-  STRATA_RETURN_IF_ERROR(budget_->AwaitReserve(bytes, stop));
-  granted_ = bytes;
+absl::Status SearchWorkspace::TakeLargeShare(const Stop& stop) {
+  GiveBackShare();
+  STRATA_RETURN_IF_ERROR(budget_->AwaitReserve(large_share(), stop));
+  granted_ = large_share();
   return absl::OkStatus();
+}
+
+void SearchWorkspace::GiveBackShare() {
+  if (has_small_share_) {
+    budget_->ReleaseSmallShare();
+  } else {
+    budget_->Release(granted_);
+  }
+  has_small_share_ = false;
+  granted_ = 0;
 }
 
 absl::Status SearchWorkspace::Admit(int slot,
@@ -66,7 +79,7 @@ absl::Status SearchWorkspace::Admit(int slot,
   bytes_at_hand_ += BytesAtHand(*tile);
   if (budget_ != nullptr) {
     if (bytes_at_hand_ > granted_ && granted_ < large_share()) {
-      STRATA_RETURN_IF_ERROR(Exchange(large_share(), stop));
+      STRATA_RETURN_IF_ERROR(TakeLargeShare(stop));
     }
   }
   if (static_cast<std::size_t>(slot) >= members_.size()) members_.resize(slot + 1);
@@ -129,13 +142,14 @@ void SearchWorkspace::EndSearch() {
   while (!at_hand_.empty()) Dismiss(at_hand_.back());
   spare_ = {};
   queue_ = {};
-  budget_->Release(granted_);
-  granted_ = 0;
+  GiveBackShare();
   AccountParked();
 }
 
 SearchWorkspace::~SearchWorkspace() {
-  if (budget_ != nullptr) budget_->Release(granted_ + granted_parked_);
+  if (budget_ == nullptr) return;
+  GiveBackShare();
+  budget_->Release(granted_parked_);
 }
 
 std::uint8_t SearchWorkspace::DirectionOf(int slot,

@@ -118,10 +118,12 @@ class SearchWorkspace {
 
  private:
   void Clear(int bucket_shift);
-  absl::Status Exchange(std::size_t bytes, const Stop& stop);
+  absl::Status TakeLargeShare(const Stop& stop);
+  void GiveBackShare();
 
   const std::shared_ptr<CacheBudget> budget_;
-  std::size_t granted_ = 0;  // of the budget, for tiles at hand
+  std::size_t granted_ = 0;       // of the budget, for tiles at hand
+  bool has_small_share_ = false;  // which then is what was granted
   std::size_t granted_parked_ = 0;
   std::size_t bytes_at_hand_ = 0;
   std::vector<Member> members_;  // by slot

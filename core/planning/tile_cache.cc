@@ -21,13 +21,15 @@
 
 namespace strata {
 
-// One of few preparations at a time.
+// One of the few preparations at a time.
 class TileCache::Turn {
  public:
   explicit Turn(TileCache& cache) : cache_(cache) {
     absl::MutexLock lock(&cache.mutex_);
+    ++cache.waiting_;
     cache.mutex_.Await(absl::Condition(&cache, &TileCache::MayPrepare));
     ++cache.preparing_;
+    alone_ = --cache.waiting_ == 0;
   }
   ~Turn() {
     absl::MutexLock lock(&cache_.mutex_);
@@ -36,8 +38,12 @@ class TileCache::Turn {
   Turn(const Turn&) = delete;
   Turn& operator=(const Turn&) = delete;
 
+  // Whether nobody waited for its end when it began.
+  bool alone() const { return alone_; }
+
  private:
   TileCache& cache_;
+  bool alone_ = false;
 };
 
 TileVersions VersionsAround(TileSource& source, const TileKey& key) {
@@ -117,8 +123,9 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Make(TileSource& 
                                                                     const ProfileChecks& checks) {
   if (auto unpacked = Unpack(source, key, versions, checks)) return unpacked;
   const Turn turn(*this);
-  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const PreparedTile> tile,
-                          PrepareFrom(source, key.tile, checks, loop_));
+  STRATA_ASSIGN_OR_RETURN(
+      std::shared_ptr<const PreparedTile> tile,
+      PrepareFrom(source, key.tile, checks, turn.alone() ? loop_ : ParallelLoop()));
   if (tile == nullptr) return tile;
   absl::MutexLock lock(&mutex_);
   ++statistics_.prepared;

@@ -38,8 +38,9 @@ absl::StatusOr<std::shared_ptr<const PreparedTile>> PrepareFrom(TileSource& sour
 
 // Thread-safe. A tile of unchanged versions is prepared once, however many threads ask for it at
 // the same time; of a tile and a profile only what was asked for last is kept, so that a map that
-// changes takes no more than one that does not. Two tiles are prepared at a time: each
-// takes up to some 50 MB while it is.
+// changes takes no more than one that does not. Few tiles are prepared at a time: each takes up to
+// some 50 MB while it is. Where others wait for that it takes one thread, so that those who search
+// in tiles that are there have the other processors.
 class TileCache {
  public:
   struct Statistics {
@@ -49,9 +50,13 @@ class TileCache {
     std::size_t bytes = 0;       // kept now
   };
 
-  explicit TileCache(const std::shared_ptr<CacheBudget>& budget, ParallelLoop loop = {})
+  // REQUIRES: preparations ≥ 1, the tiles that are prepared at a time.
+  explicit TileCache(const std::shared_ptr<CacheBudget>& budget,
+                     ParallelLoop loop = {},
+                     int preparations = 1)
       : max_bytes_(budget->max_bytes()),
         loop_(std::move(loop)),
+        preparations_(preparations),
         entries_(budget),
         dangers_(budget) {}
 
@@ -113,14 +118,18 @@ class TileCache {
                                                            const TileVersions& versions,
                                                            const ProfileChecks& checks);
 
-  bool MayPrepare() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return preparing_ < 2; }
+  bool MayPrepare() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    return preparing_ < preparations_;
+  }
 
   const std::size_t max_bytes_;
   const ParallelLoop loop_;
+  const int preparations_;
   mutable absl::Mutex mutex_;
   LruCache<Key, Entry> entries_ ABSL_GUARDED_BY(mutex_);
   LruCache<Key, const Dangers> dangers_;
   Statistics statistics_ ABSL_GUARDED_BY(mutex_);
+  int waiting_ ABSL_GUARDED_BY(mutex_) = 0;
   int preparing_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -34,6 +35,11 @@ namespace {
 
 // One part of the caches in so many is for decoded tiles: prepared ones are asked for more often.
 constexpr std::size_t kDecodedShare = 16;
+
+// One processor is left to those whose tiles are there.
+int PreparationsAtATime() {
+  return std::clamp(static_cast<int>(std::thread::hardware_concurrency()) - 1, 1, 2);
+}
 
 // Whether an answer given before is the one that would be given now. What a robot may do in a tile
 // depends on the tiles around it too.
@@ -100,7 +106,8 @@ MapPlanner::MapPlanner(MapCore& core)
                         std::size_t count, absl::FunctionRef<absl::Status(std::size_t)> body) {
                       return ParallelFor(
                           threads, count, [&](int /*thread*/, std::size_t i) { return body(i); });
-                    }}),
+                    },
+                .preparations = PreparationsAtATime()}),
       tiles_(core.caches(), core.options().cache_bytes / kDecodedShare) {}
 
 absl::StatusOr<std::shared_ptr<const TileVersionMap>> MapPlanner::VersionsOf(const MapView& view) {

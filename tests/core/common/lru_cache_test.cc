@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include <gtest/gtest.h>
 
 #include "core/common/cache_budget.h"
@@ -122,6 +124,43 @@ TEST(CacheBudgetTest, WhatIsAwaitedComesWhenOthersRelease) {
   EXPECT_TRUE(waited.ok()) << waited;
   EXPECT_TRUE(budget.Reserve(30));
   EXPECT_FALSE(budget.Reserve(1));
+}
+
+TEST(CacheBudgetTest, WhoAsksForMuchIsNotPassedByWhoAsksLater) {
+  CacheBudget budget(100);
+  ASSERT_TRUE(budget.AwaitReserve(30, Stop()).ok());
+  const Stop much;
+  const Stop little;
+  absl::Status first;
+  absl::Status second;
+  std::jthread asks_for_much([&] { first = budget.AwaitReserve(40, much); });
+  absl::SleepFor(absl::Milliseconds(20));
+  std::jthread asks_for_little([&] { second = budget.AwaitReserve(10, little); });
+  absl::SleepFor(absl::Milliseconds(20));
+  little.Request();
+  asks_for_little.join();
+  EXPECT_EQ(second.code(), absl::StatusCode::kCancelled) << "it went before who came first";
+  much.Request();
+  asks_for_much.join();
+  EXPECT_EQ(first.code(), absl::StatusCode::kCancelled);
+  EXPECT_TRUE(budget.AwaitReserve(20, Stop()).ok()) << "who left still stands in the way";
+}
+
+TEST(CacheBudgetTest, SmallSharesDoNotWaitForWhatIsReserved) {
+  const auto budget = std::make_shared<CacheBudget>(320);
+  Cache cache(budget);
+  for (int i = 0; i < 10; ++i) cache.Put(i, Text("x"), 28);
+  ASSERT_TRUE(budget->Reserve(160));
+  for (int i = 0; i < 12; ++i) ASSERT_TRUE(budget->AwaitSmallShare(Stop()).ok()) << i;
+  EXPECT_EQ(budget->cached_bytes(), 0U) << "all is taken";
+  const Stop stop;
+  stop.Request();
+  EXPECT_EQ(budget->AwaitSmallShare(stop).code(), absl::StatusCode::kCancelled);
+  EXPECT_FALSE(budget->Reserve(1));
+  budget->Release(160);
+  budget->ReleaseSmallShare();
+  EXPECT_TRUE(budget->AwaitSmallShare(Stop()).ok());
+  EXPECT_TRUE(budget->Reserve(160));
 }
 
 }  // namespace
