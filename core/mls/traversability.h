@@ -7,9 +7,8 @@
 // Rules, for a surface at height z with the limits of one robot. A height difference counts only
 // beyond what the σ of both heights explain: 3·√(σ₁² + σ₂²).
 //   - Neighbours: in each cell within kPlaneRadiusCells the surface whose top is nearest to z, if
-//   it
-//     is within reach: the steps a robot could climb on the way (at most half its height), or the
-//     steepest slope it could drive, whichever is more. Levels of one cell are never mixed.
+//     it is within reach: the steps a robot could climb on the way (at most half its height), or
+//     the steepest slope it could drive, whichever is more. Levels of one cell are never mixed.
 //   - Slope and roughness: those of the plane through these tops (LocalPlane). If that plane is too
 //     steep and leaves more residual than noise, a step lies in the window; the surface then stands
 //     on the quarter of the window that a plane explains best, if σ explains that one's residual.
@@ -19,9 +18,8 @@
 //     or with surfaces above the robot's head only, say nothing.
 //   - Clearance: the underside of the next surface of the same cell is at least clearance_m above.
 //   - Undersides (kUnderside) are no ground and part of no plane. Where one is within max_step
-//   above
-//     the surface, or up to kMaxDeckM below it, a deck goes on whose top was not seen: ground below
-//     is no drop. Higher ones are bodies that block.
+//     above the surface, or up to kMaxDeckM below it, a deck goes on whose top was not seen: ground
+//     below is no drop. Higher ones are bodies that block.
 // Traversable: all limits hold. Non-traversable: one does not, or a vertical patch has no plane
 // around it (a pole). Unknown: a horizontal patch with too few neighbours to fit a plane to.
 #ifndef STRATA_CORE_MLS_TRAVERSABILITY_H_

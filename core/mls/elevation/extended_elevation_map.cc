@@ -17,41 +17,57 @@
 namespace strata {
 namespace {
 
-// What a cell is by its intervals alone (lowest first); horizontal cells are judged later.
-ExtendedElevationCell Analyse(std::span<const Patch> intervals, double clearance_m) {
-  const auto of = [&](const Patch& patch, ElevationClass elevation_class) {
+// What a cell is by its intervals alone (lowest first); a cell of one horizontal interval is
+// traversable until it is judged beside the others' heights. `judged`: each interval's surface
+// among those of all levels.
+ExtendedElevationCell Analyse(std::span<const Patch> intervals,
+                              std::span<const Surface> judged,
+                              double clearance_m) {
+  const auto of = [](const Patch& patch, ElevationClass elevation_class) {
     return ExtendedElevationCell{.cell = static_cast<std::uint16_t>(patch.cell),
                                  .elevation_class = elevation_class,
                                  .z_m = static_cast<float>(patch.mean_m()),
                                  .sigma_m = static_cast<float>(patch.sigma_m()),
                                  .depth_m = static_cast<float>(patch.depth_m())};
   };
-  for (std::size_t i = 0; i + 1 < intervals.size(); ++i) {
-    if (intervals[i + 1].bottom_m() - intervals[i].top_m() >= clearance_m) {
-      return of(intervals[i], ElevationClass::kGap);
-    }
-  }
+  const auto has_room = [&](std::size_t i) {
+    return i + 1 == intervals.size() ||
+           intervals[i + 1].bottom_m() - intervals[i].top_m() >= clearance_m;
+  };
+  std::size_t lowest = 0;
+  while (!has_room(lowest)) ++lowest;
   const Patch& top = intervals.back();
-  if (intervals.size() == 1 && !top.vertical()) return of(top, ElevationClass::kNonTraversable);
+  if (lowest + 1 < intervals.size()) {
+    for (std::size_t i = lowest; i < intervals.size(); ++i) {
+      if (has_room(i) && judged[i].traversability == Traversability::kTraversable) {
+        return of(intervals[i], ElevationClass::kGap);
+      }
+    }
+    return of(intervals[lowest], ElevationClass::kNonTraversable);
+  }
+  if (intervals.size() == 1 && !top.vertical()) return of(top, ElevationClass::kTraversable);
   ExtendedElevationCell result = of(top, ElevationClass::kVertical);
   result.depth_m = static_cast<float>(top.mean_m() - intervals.front().bottom_m());
   return result;
 }
 
-ExtendedElevationTile AnalyseTile(const MlsTile& tile, double clearance_m) {
+ExtendedElevationTile AnalyseTile(const MlsTile& tile,
+                                  std::span<const Surface> judged,
+                                  double clearance_m) {
   ExtendedElevationTile result = {.key = tile.key, .cells = {}};
-  for (std::size_t begin = 0; begin < tile.patches.size();) {
+  const std::span<const Patch> patches = tile.patches;
+  for (std::size_t begin = 0; begin < patches.size();) {
     std::size_t end = begin + 1;
-    while (end < tile.patches.size() && tile.patches[end].cell == tile.patches[begin].cell) ++end;
-    result.cells.push_back(
-        Analyse(std::span(tile.patches).subspan(begin, end - begin), clearance_m));
+    while (end < patches.size() && patches[end].cell == patches[begin].cell) ++end;
+    result.cells.push_back(Analyse(
+        patches.subspan(begin, end - begin), judged.subspan(begin, end - begin), clearance_m));
     begin = end;
   }
   return result;
 }
 
 // One surface a cell, in the cells' order.
-SurfaceTile SurfacesOf(const ExtendedElevationTile& tile) {
+SurfaceTile HeightsOf(const ExtendedElevationTile& tile) {
   SurfaceTile result;
   result.key = tile.key;
   for (const ExtendedElevationCell& cell : tile.cells) {
@@ -93,20 +109,24 @@ const ExtendedElevationCell* ExtendedElevationMap::Find(CellIndex cell) const {
 
 ExtendedElevationMap MakeExtendedElevationMap(const MlsMap& map,
                                               const TraversabilityLimits& limits) {
+  const double cell_size_m = map.parameters.cell_size_m;
+  std::map<TileKey, SurfaceTile> levels;
+  for (const MlsTile& tile : map.tiles) levels.emplace(tile.key, SurfacesOf(tile));
   ExtendedElevationMap result;
   std::map<TileKey, SurfaceTile> heights;
   for (const MlsTile& tile : map.tiles) {
-    result.tiles.push_back(AnalyseTile(tile, limits.clearance_m));
-    heights.emplace(tile.key, SurfacesOf(result.tiles.back()));
+    SurfaceTile& judged = levels.at(tile.key);
+    AnnotateTraversability(judged, Around(levels, tile.key), cell_size_m, limits);
+    result.tiles.push_back(AnalyseTile(tile, judged.surfaces, limits.clearance_m));
+    heights.emplace(tile.key, HeightsOf(result.tiles.back()));
   }
   for (ExtendedElevationTile& tile : result.tiles) {
-    const std::vector<SurfaceAssessment> assessments = AssessSurfaces(
-        heights.at(tile.key), Around(heights, tile.key), map.parameters.cell_size_m, limits);
+    const std::vector<SurfaceAssessment> assessments =
+        AssessSurfaces(heights.at(tile.key), Around(heights, tile.key), cell_size_m, limits);
     for (std::size_t i = 0; i < tile.cells.size(); ++i) {
-      const bool horizontal = tile.cells[i].elevation_class == ElevationClass::kNonTraversable;
-      if (horizontal && assessments[i].traversability == Traversability::kTraversable) {
-        tile.cells[i].elevation_class = ElevationClass::kTraversable;
-      }
+      const bool planar = assessments[i].traversability == Traversability::kTraversable;
+      ElevationClass& of = tile.cells[i].elevation_class;
+      if (of == ElevationClass::kTraversable && !planar) of = ElevationClass::kNonTraversable;
     }
   }
   return result;

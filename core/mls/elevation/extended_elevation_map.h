@@ -13,8 +13,10 @@ namespace strata {
 
 // The four classes of 6.4.2.
 enum class ElevationClass : std::uint8_t {
-  kTraversable = 1,     // horizontal, and planar enough
-  kNonTraversable = 2,  // horizontal; too steep, rough or stepped, or too little around to tell
+  kTraversable = 1,  // horizontal, and planar enough
+  // Horizontal; too steep, rough or stepped, or too little around to tell. Also several intervals
+  // with room for the robot between two of them of which none is traversable.
+  kNonTraversable = 2,
   kVertical = 3,  // one interval taller than τ, or several without room for the robot between
   kGap = 4,       // several intervals with room for the robot between two of them
 };
@@ -23,8 +25,9 @@ struct ExtendedElevationCell {
   std::uint16_t cell = 0;  // CellInTile
   ElevationClass elevation_class = ElevationClass::kVertical;
   // The cell's one height: the surface of its interval; of a gap cell the minimum traversable
-  // elevation, which is the lowest surface with room for the robot above; of other cells with
-  // several intervals the highest.
+  // elevation, which is the lowest surface with room for the robot above that can be driven on
+  // among those of all levels around; where none can, the lowest with room; of vertical cells the
+  // highest.
   float z_m = 0.0F;
   float sigma_m = 0.0F;
   // How far below z the cell is filled: the interval's length, of a vertical cell down to the
@@ -56,8 +59,9 @@ struct ExtendedElevationMap {
 
 // The extended elevation map of the measurements in `map`: the height intervals of 6.4.2 are those
 // of the multi-level surface map (same cells, γ and τ), of which one height a cell is kept. Room
-// for the robot is limits.clearance_m. Planarity is judged by AssessSurfaces over these heights, so
-// a cell next to a wall, or next to a gap cell below it, has a step beside it.
+// for the robot is limits.clearance_m. Gap cells are judged by AssessSurfaces over the surfaces of
+// all levels; planarity of cells of one interval over the one height a cell, so that one next to a
+// wall, or next to a gap cell below it, has a step beside it.
 ExtendedElevationMap MakeExtendedElevationMap(const MlsMap& map,
                                               const TraversabilityLimits& limits);
 

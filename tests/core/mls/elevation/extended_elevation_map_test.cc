@@ -63,10 +63,22 @@ MlsMap MapOf(const std::vector<Eigen::Vector3f>& points) {
   return map;
 }
 
-ElevationClass ClassOfOnly(const std::vector<float>& heights) {
+// The middle of `half` cells to either side that all have these heights.
+ExtendedElevationCell MiddleOf(const std::vector<float>& heights, int half, double clearance_m) {
   std::vector<Eigen::Vector3f> points;
-  for (const float z : heights) points.emplace_back(0.1F, 0.1F, z);
-  return MakeExtendedElevationMap(MapOf(points), {}).Find({0, 0})->elevation_class;
+  for (int y = -half; y <= half; ++y) {
+    for (int x = -half; x <= half; ++x) {
+      for (const float z : heights) {
+        points.emplace_back(
+            0.2F * static_cast<float>(x) + 0.1F, 0.2F * static_cast<float>(y) + 0.1F, z);
+      }
+    }
+  }
+  return *MakeExtendedElevationMap(MapOf(points), {.clearance_m = clearance_m}).Find({0, 0});
+}
+
+ElevationClass ClassOfOnly(const std::vector<float>& heights) {
+  return MiddleOf(heights, 0, 1.0).elevation_class;
 }
 
 TEST(ExtendedElevationMapTest, ClassesOfSingleCells) {
@@ -74,14 +86,13 @@ TEST(ExtendedElevationMapTest, ClassesOfSingleCells) {
   EXPECT_EQ(ClassOfOnly({0.0F, 0.05F}), ElevationClass::kNonTraversable);
   EXPECT_EQ(ClassOfOnly({0.0F, 0.5F}), ElevationClass::kVertical);
   EXPECT_EQ(ClassOfOnly({0.0F, 0.8F, 1.6F}), ElevationClass::kVertical);
-  EXPECT_EQ(ClassOfOnly({0.0F, 2.5F}), ElevationClass::kGap);
+  EXPECT_EQ(ClassOfOnly({0.0F, 2.5F}), ElevationClass::kNonTraversable);
+  EXPECT_EQ(MiddleOf({0.0F, 2.5F}, 3, 1.0).elevation_class, ElevationClass::kGap);
 }
 
 TEST(ExtendedElevationMapTest, GapNeedsRoomForTheRobotAndGivesTheLowestSuchSurface) {
   const auto find = [](double clearance_m) {
-    std::vector<Eigen::Vector3f> points;
-    for (const float z : {0.0F, 1.2F, 3.5F, 6.5F}) points.emplace_back(0.1F, 0.1F, z);
-    return *MakeExtendedElevationMap(MapOf(points), {.clearance_m = clearance_m}).Find({0, 0});
+    return MiddleOf({0.0F, 1.2F, 3.5F, 6.5F}, 3, clearance_m);
   };
   EXPECT_EQ(find(1.1).elevation_class, ElevationClass::kGap);
   EXPECT_NEAR(find(1.1).z_m, 0.0, 1e-6);
@@ -91,6 +102,51 @@ TEST(ExtendedElevationMapTest, GapNeedsRoomForTheRobotAndGivesTheLowestSuchSurfa
   EXPECT_NEAR(find(4.0).z_m, 6.5, 1e-3);
   EXPECT_NEAR(find(4.0).depth_m, 6.5, 1e-3);
   EXPECT_EQ(find(1.1).depth_m, 0.0F);
+}
+
+// Flat ground with a canopy above it, 4 m high, and something beneath in the middle row of cells.
+ExtendedElevationCell UnderACanopy(const std::vector<float>& middle) {
+  std::vector<Eigen::Vector3f> points;
+  for (int y = -5; y <= 5; ++y) {
+    for (int x = -5; x <= 5; ++x) {
+      const auto add = [&](float z) {
+        points.emplace_back(
+            0.2F * static_cast<float>(x) + 0.1F, 0.2F * static_cast<float>(y) + 0.1F, z);
+      };
+      if (x == 0) std::for_each(middle.begin(), middle.end(), add);
+      if (x != 0) add(0.0F);
+      add(4.0F);
+    }
+  }
+  return *MakeExtendedElevationMap(MapOf(points), {}).Find({0, 0});
+}
+
+TEST(ExtendedElevationMapTest, AGapIsPassableWhereItsGroundIs) {
+  EXPECT_EQ(UnderACanopy({0.0F}).elevation_class, ElevationClass::kGap);
+  EXPECT_NEAR(UnderACanopy({0.0F}).z_m, 0.0, 1e-6);
+  // A hedge of 0.8 m. Its top cannot be driven on, the canopy's can.
+  const ExtendedElevationCell hedge = UnderACanopy({0.0F, 0.2F, 0.4F, 0.6F, 0.8F});
+  EXPECT_EQ(hedge.elevation_class, ElevationClass::kGap);
+  EXPECT_NEAR(hedge.z_m, 4.0, 1e-3);
+}
+
+TEST(ExtendedElevationMapTest, AGapWithoutGroundIsNotPassable) {
+  std::vector<Eigen::Vector3f> points;
+  for (int y = -5; y <= 5; ++y) {
+    for (int x = -5; x <= 5; ++x) {
+      const Eigen::Vector3f at(
+          0.2F * static_cast<float>(x) + 0.1F, 0.2F * static_cast<float>(y) + 0.1F, 0.0F);
+      if (x == 0) {
+        for (const float z : {0.2F, 0.4F, 0.6F, 0.8F}) points.emplace_back(at.x(), at.y(), z);
+      }
+      points.push_back(at);
+      points.emplace_back(at.x(), at.y(), (x + y) % 2 == 0 ? 4.0F : 4.5F);  // branches
+    }
+  }
+  const ExtendedElevationCell hedge = *MakeExtendedElevationMap(MapOf(points), {}).Find({0, 0});
+  EXPECT_EQ(hedge.elevation_class, ElevationClass::kNonTraversable);
+  EXPECT_NEAR(hedge.z_m, 0.8, 1e-3);
+  EXPECT_FALSE(hedge.passable());
 }
 
 // The world of Fig. 6.1: flat ground, a road under a bridge (|x| ≤ 2, along y) whose deck, 3.0 to
