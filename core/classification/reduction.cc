@@ -39,7 +39,7 @@ class Reducer {
     if (options_.kind == ReductionKind::kBalanced) order_ = DrawBalanced();
     if (options_.kind == ReductionKind::kDepth || options_.kind == ReductionKind::kPure) {
       reduced_.row_of.resize(order_.size());
-      Split(order_, 0, leaves);
+      if (!order_.empty()) Split(order_, 0, leaves);
     } else {
       for (std::uint32_t& row : order_) leaves.emplace_back(&row, 1);
     }
@@ -74,14 +74,8 @@ class Reducer {
     });
   }
 
-  void Split(std::span<std::uint32_t> rows,
-             int depth,
-             std::vector<std::span<std::uint32_t>>& leaves) {
-    if (rows.empty()) return;
-    if (IsLeaf(rows, depth)) {
-      leaves.push_back(rows);
-      return;
-    }
+  // How many of the rows, brought to the front, lie in the lower part of their box.
+  std::size_t Halve(std::span<std::uint32_t> rows) const {
     Eigen::Vector3f low = positions_[rows.front()];
     Eigen::Vector3f high = low;
     for (const std::uint32_t row : rows) {
@@ -90,14 +84,32 @@ class Reducer {
     }
     Eigen::Index axis = 0;
     (high - low).maxCoeff(&axis);
+    if (options_.kind == ReductionKind::kDepth) {
+      const float middle = low[axis] + (high[axis] - low[axis]) / 2.0F;
+      const auto upper = std::partition(rows.begin(), rows.end(), [&](std::uint32_t row) {
+        return positions_[row][axis] <= middle;
+      });
+      return static_cast<std::size_t>(upper - rows.begin());
+    }
     const auto middle = rows.begin() + static_cast<std::ptrdiff_t>(rows.size() / 2);
     std::nth_element(rows.begin(), middle, rows.end(), [&](std::uint32_t a, std::uint32_t b) {
       const float x = positions_[a][axis];
       const float y = positions_[b][axis];
       return x != y ? x < y : a < b;
     });
-    Split(rows.first(rows.size() / 2), depth + 1, leaves);
-    Split(rows.subspan(rows.size() / 2), depth + 1, leaves);
+    return rows.size() / 2;
+  }
+
+  void Split(std::span<std::uint32_t> rows,
+             int depth,
+             std::vector<std::span<std::uint32_t>>& leaves) {
+    const std::size_t lower = IsLeaf(rows, depth) ? rows.size() : Halve(rows);
+    if (lower == rows.size()) {  // also where all are at one place
+      leaves.push_back(rows);
+      return;
+    }
+    Split(rows.first(lower), depth + 1, leaves);
+    Split(rows.subspan(lower), depth + 1, leaves);
   }
 
   ClassIndex CommonestLabel(std::span<const std::uint32_t> rows) const {

@@ -9,6 +9,8 @@
 // weighs as many points as it stands for, and keeps the edges of its points (Contract() in
 // network.h). A network drawn among the leaves themselves would be one of borders: neighbours there
 // differ far more often than they do where inference will look, and its edges are learned too weak.
+// Points that were drawn are joined to the nearest that were drawn, too: their whole neighbourhoods
+// were tried and are no better (docs/decisions/0099).
 #ifndef STRATA_CORE_CLASSIFICATION_REDUCTION_H_
 #define STRATA_CORE_CLASSIFICATION_REDUCTION_H_
 
@@ -62,8 +64,9 @@ struct ReducedPoints {
   std::vector<std::uint32_t> row_of;
 };
 
-// `positions` beside the rows of `data`, which must be valid, as must `options`. The tree halves
-// points at the median along their widest axis. Deterministic.
+// `positions` beside the rows of `data`, which must be valid, as must `options`. Trees
+// cut along the widest axis of the points: kDepth halves space, so that what is left depends less
+// on how densely it was sampled, kPure halves the points. Deterministic.
 ReducedPoints Reduce(std::span<const Eigen::Vector3f> positions,
                      const LabelledFeatures& data,
                      const ReductionOptions& options);

@@ -66,10 +66,11 @@ void Expect(bool holds, const std::string& what) {
   failures += holds ? 0 : 1;
 }
 
+// Not a number where there are none, so that nothing holds of it.
 double Mean(const std::vector<double>& values) {
   double sum = 0.0;
   for (const double v : values) sum += v;
-  return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
+  return sum / static_cast<double>(values.size());
 }
 
 // `a` is ahead of `b` in enough of the seeds, and not by chance.
@@ -474,11 +475,14 @@ void Depths(Seeds seeds) {
   const std::size_t deepest = testing::kTreeDepths.size() - 1;
   static_assert(testing::kTreeDepths[testing::kTreeDepths.size() - 2] == 15);
   const double deep = Mean(rate[deepest - 1]);
-  // Shallow trees may lose a class in every world, and then there is nothing to ask.
   Expect(!rate[deepest].empty() && !rate[deepest - 1].empty() && !rate.back().empty(),
          "depths: deep trees and pure leaves keep every class in some world");
   Expect(Mean(rate[deepest]) <= deep + 0.005, "depths: beyond d_max = 15 nothing is gained");
-  Expect(Mean(rate[0]) <= deep - 0.02, "depths: a shallow tree says too little");
+  Expect(rate[0].size() < seeds.size() / 2, "depths: a shallow tree loses a class in most worlds");
+  Expect(Mean(rate[2]) <= deep - 0.02,
+         "depths: at d_max = 11 a tree that keeps all says too little");
+  Expect(Mean(points[deepest - 1]) < Mean(points[deepest]),
+         "depths: d_max = 15 reduces the points");
   Expect(Mean(rate.back()) >= deep - 0.01, "depths: pure leaves are as good, to one percent");
   Expect(Mean(points.back()) <= 0.2 * Mean(points[deepest - 1]),
          "depths: pure leaves are a fifth of those at d_max = 15, or less");
