@@ -1,5 +1,6 @@
-// Poses that agree best with everything known about them (thesis 7.3, 7.4): relative poses, pairs
-// of corresponding points, planes seen from any number of scans, and absolute poses.
+// Poses that agree best with everything known about them (thesis 7.3, 7.4): relative poses,
+// planes seen from any number of scans, and absolute poses. Corresponding points (7.17) come as the
+// relative pose that fits them best and its information (docs/decisions/0100).
 //
 // Frames: T_map_scan maps a scan's coordinates into the map; nodes are numbered by their place in
 // PoseGraphProblem::T_map_scan. Metres and radians. Information matrices have the order [rotation,
@@ -29,23 +30,12 @@ namespace strata {
 // know of the points of one scan, exactly.
 using PointMoments = Eigen::Matrix4d;
 
-// Σ w (ã; b̃)(ã; b̃)ᵀ over pairs of points, a in the scan of i, b in that of j:
-// Σ w |T_i a − T_j b|² is a function of it alone, however many pairs there are (thesis 7.17).
-using PairMoments = Eigen::Matrix<double, 8, 8>;
-
 // What a node pair knows of its relative pose (thesis 7.10–7.15).
 struct RelativePoseTerm {
   std::size_t i = 0, j = 0;
   Pose T_i_j = Pose::Identity();
   Matrix6d information = Matrix6d::Identity();
   bool may_be_false = false;  // a loop closure, which may be rejected as a whole
-};
-
-// Corresponding points of two scans (7.17), their weights being 1 / variance [1/m²].
-struct PointPairsTerm {
-  std::size_t i = 0, j = 0;
-  PairMoments moments = PairMoments::Zero();
-  bool may_be_false = false;
 };
 
 // One plane and what all scans saw of it (7.19), edge vertices and plane patches alike: the squared
@@ -73,7 +63,6 @@ struct PoseGraphProblem {
   std::vector<Pose> T_map_scan;  // where to start from
   std::vector<bool> fixed;       // empty: none
   std::vector<RelativePoseTerm> relative;
-  std::vector<PointPairsTerm> pairs;
   std::vector<PlaneTerm> planes;
   std::vector<PriorTerm> priors;
 };
@@ -85,28 +74,27 @@ enum class Weighting : std::uint8_t {
 
 struct PoseGraphOptions {
   Weighting weighting = Weighting::kCovariance;
-  // l sums relative poses and pairs, g planes and priors. The thesis does not normalise the two
+  // l sums relative poses, g planes and priors. The thesis does not normalise the two
   // sums. Ours are both in units of their measurements' variance, and then equal weights are the
   // most likely poses: ½ is the default and gives what kCovariance gives. More than ½ trusts
   // correspondences more than their variance says, less trusts planes more. [1e-6, 1 − 1e-6]
   double local_weight = 0.5;
   ConvergenceOptions convergence;
-  // Terms that may be false are rejected if they cannot be had below this χ² (of a relative pose,
-  // or of point pairs beyond what their own best relative pose leaves) together with the rest. By
-  // graduated non-convexity with truncated least squares (Yang et al. 2020). The default is the
-  // 99.9 % quantile for 6 degrees of freedom. > 0; infinity believes everything.
+  // Terms that may be false are rejected if they cannot be had below this χ² together with the
+  // rest. By graduated non-convexity with truncated least squares (Yang et al. 2020). The default
+  // is the 99.9 % quantile for 6 degrees of freedom. > 0; infinity believes everything.
   double max_closure_chi2 = 22.458;
 };
 
 // Σ eᵀΩe of every kind of term, rejected ones included, whatever the weighting.
 struct PoseGraphCosts {
-  double relative = 0.0, pairs = 0.0, planes = 0.0, priors = 0.0;
-  double total() const { return relative + pairs + planes + priors; }
+  double relative = 0.0, planes = 0.0, priors = 0.0;
+  double total() const { return relative + planes + priors; }
 };
 
 // A term that may be false and in the end counts nothing; all others count in full.
 struct RejectedTerm {
-  std::size_t term = 0;  // index into PoseGraphProblem::relative or pairs
+  std::size_t term = 0;  // index into PoseGraphProblem::relative
   double chi2 = 0.0;     // at the solution, as max_closure_chi2 counts it
 };
 
@@ -122,8 +110,8 @@ struct PoseGraphSummary {
   int iterations = 0;  // linear systems solved
   PoseGraphTermination termination = PoseGraphTermination::kConverged;
   std::vector<std::size_t> held;  // nodes held only because nothing else fixes their component
-  std::vector<RejectedTerm> rejected_relative, rejected_pairs;  // ascending
-  std::vector<NodeResidual> worst_nodes;                        // the 10 worst, worst first
+  std::vector<RejectedTerm> rejected_relative;  // ascending
+  std::vector<NodeResidual> worst_nodes;        // the 10 worst, worst first
 };
 
 struct PoseGraphSolution {

@@ -48,7 +48,7 @@ std::vector<PlanarPose>& PosesOf(PlanarPoseGraph& graph) { return graph.poses; }
 
 // Closures join vertices that do not follow each other.
 template <typename Graph>
-void SuspectClosures(Graph& graph) {
+void LetClosuresBeFalse(Graph& graph) {
   for (auto& term : graph.relative) {
     term.may_be_false = term.i + 1 != term.j && term.j + 1 != term.i;
   }
@@ -135,7 +135,7 @@ absl::Status Run(FileContext& context, const OptimizeOptions& options) {
   }
   Report report;
   const auto optimize = [&](auto& graph) -> absl::Status {
-    if (options.robust) SuspectClosures(graph);
+    if (options.robust) LetClosuresBeFalse(graph);
     ChooseStart(options, file.has_poses, graph, report);
     return Solve(graph, options, context.stop, report);
   };

@@ -11,7 +11,7 @@
 #include "core/common/status.h"
 #include "core/posegraph/alignment/odometry_noise.h"
 #include "core/posegraph/alignment/plane_terms.h"
-#include "core/posegraph/alignment/stretches.h"
+#include "core/posegraph/alignment/scan_chains.h"
 #include "core/posegraph/information.h"
 #include "core/posegraph/solver/optimize_pose_graph.h"
 #include "core/registration/registration_target.h"
@@ -19,11 +19,11 @@
 namespace strata {
 namespace {
 
-// A scan registered to a stretch of way.
+// A scan registered to a chain of scans.
 struct Match {
-  Stretch stretch;
+  ScanChain chain;
   bool good = false;
-  // T_i_scan as measured, i being scans of the stretch, nearest first.
+  // T_i_scan as measured, i being scans of the chain, nearest first.
   std::vector<std::pair<std::size_t, Pose>> T_i_scan;
   Matrix6d information = Matrix6d::Zero();  // of the match, to be shared by all of them
 };
@@ -35,7 +35,7 @@ constexpr double kSamePlaceRad = 0.002;
 constexpr double kMeasuredPlaceM = 0.1;
 constexpr double kMeasuredPlaceRad = 0.02;
 // What may be false must look the same at least to this share.
-constexpr double kMinSuspectOverlap = 0.5;
+constexpr double kMinDoubtfulOverlap = 0.5;
 // Of a pose, that the search for planes allows for.
 constexpr double kGateSigmas = 3.0;
 // A match is recorded as relative poses to the nearest few.
@@ -72,7 +72,7 @@ class Alignment {
         options_(options),
         for_each_(for_each),
         stop_(stop),
-        stretches_(problem, options.neighbours),
+        chains_(problem, options.neighbours),
         matches_(problem.T_map_scan.size()),
         measured_(problem.T_map_scan.size()),
         odometry_(problem.T_map_scan.size(), nullptr) {
@@ -142,16 +142,16 @@ class Alignment {
     STRATA_RETURN_IF_ERROR(for_each_(matches_.size(), [&](std::size_t node) -> absl::Status {
       STRATA_RETURN_IF_ERROR(stop_.status());
       std::vector<Match> before = std::exchange(matches_[node], {});
-      for (Stretch& stretch : stretches_.Around(node, result_.T_map_scan)) {
-        if (stretch.own && MeasuredHolds(node)) continue;
+      for (ScanChain& chain : chains_.Around(node, result_.T_map_scan)) {
+        if (chain.own && MeasuredHolds(node)) continue;
         const auto known = std::find_if(before.begin(), before.end(), [&](const Match& match) {
-          return match.stretch.nodes == stretch.nodes && StillHolds(node, match);
+          return match.chain.nodes == chain.nodes && StillHolds(node, match);
         });
         if (known != before.end()) {
           matches_[node].push_back(*std::move(known));
           continue;
         }
-        STRATA_ASSIGN_OR_RETURN(Match match, RegisterTo(node, std::move(stretch)));
+        STRATA_ASSIGN_OR_RETURN(Match match, RegisterTo(node, std::move(chain)));
         matches_[node].push_back(std::move(match));
         ++registered[node];
       }
@@ -184,15 +184,15 @@ class Alignment {
     });
   }
 
-  absl::StatusOr<Match> RegisterTo(std::size_t node, Stretch stretch) {
+  absl::StatusOr<Match> RegisterTo(std::size_t node, ScanChain chain) {
     Match match;
-    match.stretch = std::move(stretch);
+    match.chain = std::move(chain);
     STRATA_ASSIGN_OR_RETURN(const auto own, FeaturesOf(node));
     if (own == nullptr) return match;
     std::vector<std::shared_ptr<const ScanFeatures>> held;
     std::vector<PlacedScan> placed;
     std::vector<std::size_t> seen;  // nothing is measured about damaged ones
-    for (const std::size_t i : match.stretch.nodes) {
+    for (const std::size_t i : match.chain.nodes) {
       STRATA_ASSIGN_OR_RETURN(auto features, FeaturesOf(i));
       if (features == nullptr) continue;
       seen.push_back(i);
@@ -202,13 +202,13 @@ class Alignment {
     const RegistrationTarget target(placed, {.centre = pose(node).translation()});
     const RegistrationResult result = RegisterScan(*own, target, pose(node), options_.registration);
     match.good = Acceptable(result.termination) &&
-                 (!match.stretch.may_be_false || result.overlap >= kMinSuspectOverlap);
+                 (!match.chain.may_be_false || result.overlap >= kMinDoubtfulOverlap);
     if (!match.good) return match;
     match.information = LoosenedInformation(
         result.information,
         IsotropicInformation(options_.registration_sigma_rad, options_.registration_sigma_m));
     // A match that may be false is one relative pose, so that it is believed or not as a whole.
-    const std::size_t partners = match.stretch.may_be_false ? 1 : kMaxPartners;
+    const std::size_t partners = match.chain.may_be_false ? 1 : kMaxPartners;
     for (const std::size_t i : Nearest(seen, result.T_target_source, partners)) {
       match.T_i_scan.push_back({i, Normalized(pose(i).inverse() * result.T_target_source)});
     }
@@ -251,9 +251,9 @@ class Alignment {
                                     node,
                                     T_i_scan,
                                     match.information / static_cast<double>(match.T_i_scan.size()),
-                                    match.stretch.may_be_false});
+                                    match.chain.may_be_false});
         }
-        if (!match.good || match.stretch.may_be_false) continue;
+        if (!match.good || match.chain.may_be_false) continue;
         known[node] = true;
         information[node] += match.information;
       }
@@ -318,7 +318,7 @@ class Alignment {
       }
     }
     for (const Match& match : matches_[j]) {
-      if (match.stretch.may_be_false) continue;
+      if (match.chain.may_be_false) continue;
       for (const auto& [partner, T_i_scan] : match.T_i_scan) {
         if (partner == i) return T_i_scan;
       }
@@ -407,7 +407,7 @@ class Alignment {
   const AlignmentOptions& options_;
   const ForEach for_each_;
   const Stop& stop_;
-  const Stretches stretches_;
+  const ScanChains chains_;
   std::vector<std::vector<Match>> matches_;             // of every node
   std::vector<std::vector<const ScanPair*>> measured_;  // of every node j
   std::vector<const RelativePoseTerm*> odometry_;       // of every node j; nullptr: none

@@ -3,7 +3,7 @@
 //
 // A round: every scan is registered to the scans around it (class-wise ICP), the planes that
 // several scans see are looked for at the current poses, and all poses are optimised under both. A
-// scan is registered to a stretch of way as a whole, a pooled local map (7.3.4): against single
+// scan is registered to a chain of scans as a whole, a pooled local map (7.3.4): against single
 // scans of a sparse sensor the campus loop of tests/experiments drifts eight times as far. Where it
 // has hardly moved since, its correspondences are kept.
 #ifndef STRATA_CORE_POSEGRAPH_ALIGNMENT_ALIGNMENT_H_
@@ -109,7 +109,7 @@ struct AlignmentOptions {
 
 // The numbers of one round.
 struct AlignmentRound {
-  std::size_t matches = 0;     // of a scan to a stretch of way, in force
+  std::size_t matches = 0;     // of a scan to a chain of scans, in force
   std::size_t registered = 0;  // anew in this round, successful or not
   std::size_t planes = 0;
   std::size_t supports = 0;  // of planes

@@ -34,15 +34,15 @@ constexpr double kMostHeightM = 10.0;
 constexpr double kLeastHeading = 0.1;
 
 // A piece of one trajectory.
-using Stretch = std::pair<std::uint32_t, std::int64_t>;
+using Segment = std::pair<std::uint32_t, std::int64_t>;
 
 struct Layout {
-  std::vector<Stretch> stretches;      // of each node
+  std::vector<Segment> segments;       // of each node
   std::vector<std::size_t> sources;    // nodes from which the graph is searched
   std::vector<std::size_t> source_of;  // of each node: index into sources, the last before it
 };
 
-Layout LayOut(std::span<const ClosureNode> nodes, double stretch_m) {
+Layout LayOut(std::span<const ClosureNode> nodes, double segment_m) {
   std::map<std::uint32_t, std::pair<std::size_t, double>> last;  // node and way
   std::vector<double> way(nodes.size(), 0.0);
   double all = 0.0;
@@ -57,12 +57,12 @@ Layout LayOut(std::span<const ClosureNode> nodes, double stretch_m) {
       at->second = {i, way[i]};
     }
   }
-  const double spacing = std::max(0.5 * stretch_m, all / kMaxSources);
+  const double spacing = std::max(0.5 * segment_m, all / kMaxSources);
   Layout layout;
   std::map<std::uint32_t, std::size_t> last_source;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    layout.stretches.emplace_back(nodes[i].trajectory,
-                                  static_cast<std::int64_t>(std::floor(way[i] / stretch_m)));
+    layout.segments.emplace_back(nodes[i].trajectory,
+                                 static_cast<std::int64_t>(std::floor(way[i] / segment_m)));
     const auto [at, is_new] = last_source.try_emplace(nodes[i].trajectory, layout.sources.size());
     if (is_new || way[i] - way[layout.sources[at->second]] >= spacing) {
       at->second = layout.sources.size();
@@ -87,7 +87,7 @@ class CandidateSearch {
                   const ClosureCandidateOptions& options)
       : nodes_(nodes),
         options_(options),
-        layout_(LayOut(nodes, options.stretch_m)),
+        layout_(LayOut(nodes, options.segment_m)),
         graph_(Poses(nodes), edges, options.drift),
         alike_of_(layout_.sources.size()) {
     for (const AlikePair& pair : alike) {
@@ -123,9 +123,9 @@ class CandidateSearch {
     return apart_m <= options_.view_range_m + options_.sigmas * known.sigma_m;
   }
 
-  // The likeliest pair of `i` with each stretch.
+  // The likeliest pair of `i` with each segment.
   void AddNear(std::size_t i, const std::vector<PathUncertainty>& known) {
-    std::map<Stretch, ClosureCandidate> best;
+    std::map<Segment, ClosureCandidate> best;
     for (std::size_t j = 0; j < nodes_.size(); ++j) {
       const PathUncertainty& u = known[j];
       if (j == i || !u.connected || SaysNothingNew(u)) continue;
@@ -135,11 +135,11 @@ class CandidateSearch {
       const double range = options_.view_range_m;
       const double spread = range * range + u.sigma_m * u.sigma_m;
       const double likely = range * range / spread * std::exp(-0.5 * apart * apart / spread);
-      ClosureCandidate& held = best[layout_.stretches[j]];
+      ClosureCandidate& held = best[layout_.segments[j]];
       const double score = likely * Telling(u.sigma_m);
       if (score > held.score) held = Candidate(i, j, u, ClosureReason::kNear, score);
     }
-    for (auto& [stretch, candidate] : best) {
+    for (auto& [segment, candidate] : best) {
       candidate.hypotheses = {GraphHypothesis(candidate)};
       candidates_.push_back(std::move(candidate));
     }
@@ -198,19 +198,19 @@ class CandidateSearch {
             std::clamp(options_.sigmas * c.sigma_rad, kLeastHeading, std::numbers::pi)};
   }
 
-  // Best first, a few of every two stretches.
+  // Best first, a few of every two segments.
   std::vector<ClosureCandidate> Spread() {
     std::stable_sort(candidates_.begin(), candidates_.end(), [](const auto& a, const auto& b) {
       return std::tuple(-a.score, a.i, a.j) < std::tuple(-b.score, b.i, b.j);
     });
-    std::map<std::tuple<Stretch, Stretch, ClosureReason>, int> taken;
+    std::map<std::tuple<Segment, Segment, ClosureReason>, int> taken;
     std::map<std::pair<std::size_t, std::size_t>, bool> pairs;
     std::vector<ClosureCandidate> spread;
     for (ClosureCandidate& c : candidates_) {
       if (static_cast<int>(spread.size()) >= options_.max_candidates) break;
       if (pairs.contains({c.i, c.j})) continue;
-      const auto [a, b] = std::minmax(layout_.stretches[c.i], layout_.stretches[c.j]);
-      if (++taken[{a, b, c.reason}] > options_.per_stretch) continue;
+      const auto [a, b] = std::minmax(layout_.segments[c.i], layout_.segments[c.j]);
+      if (++taken[{a, b, c.reason}] > options_.per_segment) continue;
       pairs[{c.i, c.j}] = true;
       spread.push_back(std::move(c));
     }
@@ -262,8 +262,8 @@ absl::Status ClosureCandidateOptions::Validate() const {
   checks.InRange("min_hops", min_hops, 0, 1000000);
   checks.InRange("min_way_m", min_way_m, 0.0, 1e6);
   checks.InRange("max_alike_distance", max_alike_distance, 0.0, 2.0);
-  checks.InRange("stretch_m", stretch_m, 0.1, 1e4);
-  checks.InRange("per_stretch", per_stretch, 1, 1000);
+  checks.InRange("segment_m", segment_m, 0.1, 1e4);
+  checks.InRange("per_segment", per_segment, 1, 1000);
   checks.InRange("max_window_m", max_window_m, 1.0, 200.0);
   checks.InRange("max_candidates", max_candidates, 1, 1000000);
   STRATA_RETURN_IF_ERROR(checks.status());

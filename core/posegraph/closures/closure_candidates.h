@@ -58,9 +58,9 @@ struct ClosureCandidateOptions {
   double min_way_m = 25.0;
   // Alike pairs with a greater distance are left out; in [0, 2].
   double max_alike_distance = 0.6;
-  // One stretch of way and another one give `per_stretch` candidates of each reason.
-  double stretch_m = 10.0;  // in [0.1, 10000]
-  int per_stretch = 2;      // in [1, 1000]
+  // One segment of way and another one give `per_segment` candidates of each reason.
+  double segment_m = 10.0;  // in [0.1, 10000]
+  int per_segment = 2;      // in [1, 1000]
   // The widest window that is searched around a guess: larger uncertainty leaves a pair to what
   // places look like. In [1, 200].
   double max_window_m = 25.0;

@@ -20,7 +20,6 @@ std::vector<std::size_t> FirstUnheld(DisjointSets& sets, const std::vector<bool>
 std::vector<std::size_t> NodesToHold(const PoseGraphProblem& problem) {
   DisjointSets joined;
   for (const RelativePoseTerm& term : problem.relative) joined.Join(term.i, term.j);
-  for (const PointPairsTerm& term : problem.pairs) joined.Join(term.i, term.j);
   for (const PlaneTerm& term : problem.planes) {
     for (const PlaneTerm::View& view : term.views) joined.Join(view.i, term.views[0].i);
   }

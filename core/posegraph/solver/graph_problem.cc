@@ -41,14 +41,12 @@ GraphProblem::GraphProblem(const PoseGraphProblem& graph,
     : graph_(graph),
       held_(held),
       relative_weights_(graph.relative.size(), 1.0),
-      pairs_weights_(graph.pairs.size(), 1.0),
       problem_(KeepingManifolds()) {
   AddNodes();
   AddRelative(local_factor);
-  AddPairs(local_factor);
   AddPlanes(global_factor);
   AddPriors(global_factor);
-  HoldBack(global_factor);
+  Damp(global_factor);
 }
 
 void GraphProblem::AddNodes() {
@@ -66,17 +64,6 @@ void GraphProblem::AddRelative(double factor) {
         term.T_i_j, factor * term.information, &relative_weights_[k]);
     problem_.AddResidualBlock(
         cost.release(), nullptr, poses_[term.i].data(), poses_[term.j].data());
-  }
-}
-
-void GraphProblem::AddPairs(double factor) {
-  for (const PointPairsTerm& term : graph_.pairs) pairs_.push_back(SummarisePairs(term.moments));
-  for (std::size_t k = 0; k < graph_.pairs.size(); ++k) {
-    auto cost = std::make_unique<PointPairsCost>(pairs_[k], factor, &pairs_weights_[k]);
-    problem_.AddResidualBlock(cost.release(),
-                              nullptr,
-                              poses_[graph_.pairs[k].i].data(),
-                              poses_[graph_.pairs[k].j].data());
   }
 }
 
@@ -106,10 +93,9 @@ void GraphProblem::AddPriors(double factor) {
   }
 }
 
-void GraphProblem::HoldBack(double factor) {
+void GraphProblem::Damp(double factor) {
   std::vector<bool> bound = held_;
   for (const RelativePoseTerm& term : graph_.relative) bound[term.i] = bound[term.j] = true;
-  for (const PointPairsTerm& term : graph_.pairs) bound[term.i] = bound[term.j] = true;
   for (const PriorTerm& term : graph_.priors) bound[term.i] = true;
   std::vector<double> rotation(poses_.size(), 0.0);
   std::vector<double> translation(poses_.size(), 0.0);
@@ -132,15 +118,6 @@ double GraphProblem::RelativeChi2(std::size_t term) const {
   const RelativePoseTerm& t = graph_.relative[term];
   const Vector6d e = RelativePoseError(pose(t.i), pose(t.j), t.T_i_j);
   return e.dot(t.information * e);
-}
-
-double GraphProblem::PairsChi2(std::size_t term) const {
-  const PointPairsTerm& t = graph_.pairs[term];
-  return PointPairsChi2(pairs_[term], pose(t.i), pose(t.j));
-}
-
-double GraphProblem::PairsExcess(std::size_t term) const {
-  return PairsChi2(term) - pairs_[term].least;
 }
 
 double GraphProblem::ViewChi2(std::size_t plane, std::size_t view) const {

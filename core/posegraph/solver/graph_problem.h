@@ -11,7 +11,6 @@
 #include "core/geometry/pose.h"
 #include "core/geometry/primitives.h"
 #include "core/posegraph/costs/plane_cost.h"
-#include "core/posegraph/costs/point_pairs_cost.h"
 #include "core/posegraph/costs/pose_block.h"
 #include "core/posegraph/pose_graph.h"
 #include "core/posegraph/solver/manifolds.h"
@@ -22,7 +21,7 @@ namespace strata {
 class GraphProblem {
  public:
   // `graph` is valid and outlives this; `held` marks the nodes that do not move; the factors weigh
-  // local (relative, pairs) and global terms (planes, priors).
+  // local (relative) and global terms (planes, priors).
   GraphProblem(const PoseGraphProblem& graph,
                const std::vector<bool>& held,
                double local_factor,
@@ -32,15 +31,11 @@ class GraphProblem {
 
   ceres::Problem& problem() { return problem_; }
 
-  // What the terms count, 1 at first; by PoseGraphProblem::relative and pairs.
+  // What the terms count, 1 at first; by PoseGraphProblem::relative.
   std::vector<double>& relative_weights() { return relative_weights_; }
-  std::vector<double>& pairs_weights() { return pairs_weights_; }
 
   // Where the blocks are, without weights and factors.
   double RelativeChi2(std::size_t term) const;
-  double PairsChi2(std::size_t term) const;
-  // Beyond what the pairs' own best relative pose leaves.
-  double PairsExcess(std::size_t term) const;
   double ViewChi2(std::size_t plane, std::size_t view) const;
   double PriorChi2(std::size_t term) const;
 
@@ -50,10 +45,9 @@ class GraphProblem {
  private:
   void AddNodes();
   void AddRelative(double factor);
-  void AddPairs(double factor);
   void AddPlanes(double factor);
   void AddPriors(double factor);
-  void HoldBack(double factor);
+  void Damp(double factor);
   Pose pose(std::size_t node) const { return PoseOf(poses_[node].data()); }
 
   const PoseGraphProblem& graph_;
@@ -61,9 +55,8 @@ class GraphProblem {
   std::vector<PoseBlock> poses_;
   std::vector<PlaneBlock> planes_;
   std::vector<Eigen::Vector3d> centres_;  // of the planes
-  std::vector<PointPairs> pairs_;
   std::vector<std::vector<PlaneView>> views_;
-  std::vector<double> relative_weights_, pairs_weights_;
+  std::vector<double> relative_weights_;
   PoseManifold pose_manifold_;
   PlaneManifold plane_manifold_;
   ceres::Problem problem_;

@@ -21,7 +21,7 @@
 namespace strata {
 namespace {
 
-class PlanarProblem : public Suspects {
+class PlanarProblem : public OutlierCandidates {
  public:
   PlanarProblem(const PlanarPoseGraph& graph, const std::vector<bool>& held)
       : graph_(graph),
@@ -34,7 +34,7 @@ class PlanarProblem : public Suspects {
     }
     for (std::size_t k = 0; k < graph.relative.size(); ++k) {
       const PlanarRelativeTerm& term = graph.relative[k];
-      if (term.may_be_false) suspects_.push_back(k);
+      if (term.may_be_false) candidates_.push_back(k);
       auto cost = std::make_unique<PlanarRelativeCost>(term.T_i_j, term.information, &weights_[k]);
       problem_.AddResidualBlock(
           cost.release(), nullptr, poses_[term.i].data(), poses_[term.j].data());
@@ -52,16 +52,16 @@ class PlanarProblem : public Suspects {
     return e.dot(t.information * e);
   }
 
-  // Suspects
-  std::size_t size() const override { return suspects_.size(); }
-  double Chi2(std::size_t k) const override { return Chi2Of(suspects_[k]); }
-  double& Weight(std::size_t k) override { return weights_[suspects_[k]]; }
+  // OutlierCandidates
+  std::size_t size() const override { return candidates_.size(); }
+  double Chi2(std::size_t k) const override { return Chi2Of(candidates_[k]); }
+  double& Weight(std::size_t k) override { return weights_[candidates_[k]]; }
 
  private:
   const PlanarPoseGraph& graph_;
   std::vector<PlanarPose> poses_;
   std::vector<double> weights_;
-  std::vector<std::size_t> suspects_;
+  std::vector<std::size_t> candidates_;
   PlanarPoseManifold manifold_;
   ceres::Problem problem_;
 };

@@ -22,30 +22,20 @@ namespace {
 
 constexpr std::size_t kWorstNodes = 10;
 
-// Relative poses first.
-class GraphSuspects : public Suspects {
+class RelativeCandidates : public OutlierCandidates {
  public:
-  GraphSuspects(const PoseGraphProblem& problem, GraphProblem& graph) : graph_(graph) {
+  RelativeCandidates(const PoseGraphProblem& problem, GraphProblem& graph) : graph_(graph) {
     for (std::size_t k = 0; k < problem.relative.size(); ++k) {
-      if (problem.relative[k].may_be_false) relative_.push_back(k);
-    }
-    for (std::size_t k = 0; k < problem.pairs.size(); ++k) {
-      if (problem.pairs[k].may_be_false) pairs_.push_back(k);
+      if (problem.relative[k].may_be_false) terms_.push_back(k);
     }
   }
-  std::size_t size() const override { return relative_.size() + pairs_.size(); }
-  double Chi2(std::size_t k) const override {
-    return k < relative_.size() ? graph_.RelativeChi2(relative_[k])
-                                : graph_.PairsExcess(pairs_[k - relative_.size()]);
-  }
-  double& Weight(std::size_t k) override {
-    return k < relative_.size() ? graph_.relative_weights()[relative_[k]]
-                                : graph_.pairs_weights()[pairs_[k - relative_.size()]];
-  }
+  std::size_t size() const override { return terms_.size(); }
+  double Chi2(std::size_t k) const override { return graph_.RelativeChi2(terms_[k]); }
+  double& Weight(std::size_t k) override { return graph_.relative_weights()[terms_[k]]; }
 
  private:
   GraphProblem& graph_;
-  std::vector<std::size_t> relative_, pairs_;
+  std::vector<std::size_t> terms_;
 };
 
 PoseGraphCosts CostsOf(const PoseGraphProblem& problem, const GraphProblem& graph) {
@@ -53,7 +43,6 @@ PoseGraphCosts CostsOf(const PoseGraphProblem& problem, const GraphProblem& grap
   for (std::size_t k = 0; k < problem.relative.size(); ++k) {
     costs.relative += graph.RelativeChi2(k);
   }
-  for (std::size_t k = 0; k < problem.pairs.size(); ++k) costs.pairs += graph.PairsChi2(k);
   for (std::size_t p = 0; p < problem.planes.size(); ++p) {
     for (std::size_t v = 0; v < problem.planes[p].views.size(); ++v) {
       costs.planes += graph.ViewChi2(p, v);
@@ -70,11 +59,6 @@ std::vector<NodeResidual> WorstNodes(const PoseGraphProblem& problem, GraphProbl
     const double half = 0.5 * graph.relative_weights()[k] * graph.RelativeChi2(k);
     nodes[problem.relative[k].i].chi2 += half;
     nodes[problem.relative[k].j].chi2 += half;
-  }
-  for (std::size_t k = 0; k < problem.pairs.size(); ++k) {
-    const double half = 0.5 * graph.pairs_weights()[k] * graph.PairsChi2(k);
-    nodes[problem.pairs[k].i].chi2 += half;
-    nodes[problem.pairs[k].j].chi2 += half;
   }
   for (std::size_t p = 0; p < problem.planes.size(); ++p) {
     for (std::size_t v = 0; v < problem.planes[p].views.size(); ++v) {
@@ -115,9 +99,9 @@ absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& prob
   if (problem.planes.empty() && std::find(held.begin(), held.end(), false) == held.end()) {
     summary.termination = PoseGraphTermination::kNothingToDo;
   } else {
-    GraphSuspects suspects(problem, graph);
+    RelativeCandidates candidates(problem, graph);
     STRATA_ASSIGN_OR_RETURN(const Minimum minimum,
-                            MinimiseRobustly(suspects,
+                            MinimiseRobustly(candidates,
                                              options.max_closure_chi2,
                                              options.convergence,
                                              [&](const ConvergenceOptions& convergence) {
@@ -130,10 +114,6 @@ absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& prob
   for (std::size_t k = 0; k < problem.relative.size(); ++k) {
     if (graph.relative_weights()[k] > 0.0) continue;
     summary.rejected_relative.push_back({.term = k, .chi2 = graph.RelativeChi2(k)});
-  }
-  for (std::size_t k = 0; k < problem.pairs.size(); ++k) {
-    if (graph.pairs_weights()[k] > 0.0) continue;
-    summary.rejected_pairs.push_back({.term = k, .chi2 = graph.PairsExcess(k)});
   }
   summary.worst_nodes = WorstNodes(problem, graph);
   solution.T_map_scan = graph.poses();

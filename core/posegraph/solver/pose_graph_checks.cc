@@ -44,18 +44,6 @@ absl::Status Validate(const RelativePoseTerm& term, std::size_t nodes) {
   return ValidateSemidefinite<6>(term.information, "information");
 }
 
-absl::Status Validate(const PointPairsTerm& term, std::size_t nodes) {
-  STRATA_RETURN_IF_ERROR(ValidateEnds(term.i, term.j, nodes));
-  STRATA_RETURN_IF_ERROR(ValidateSemidefinite<8>(term.moments, "moments"));
-  const double scale = term.moments.cwiseAbs().maxCoeff();
-  const double unlike = (term.moments.row(3) - term.moments.row(7)).cwiseAbs().maxCoeff();
-  if (unlike > kSemidefiniteTolerance * scale) {
-    return absl::InvalidArgumentError(
-        "moments: rows 3 and 7 differ; both are the sums of weights times the points");
-  }
-  return absl::OkStatus();
-}
-
 absl::Status Validate(const PlaneTerm& term, std::size_t nodes) {
   const Plane& plane = term.plane_map;
   if (!plane.normal.allFinite() || !std::isfinite(plane.distance) ||
@@ -125,7 +113,6 @@ absl::Status ValidateProblem(const PoseGraphProblem& problem) {
     if (!status.ok()) return Annotate(status, absl::StrCat("pose graph: T_map_scan ", i));
   }
   STRATA_RETURN_IF_ERROR(ValidateAll(problem.relative, nodes, "relative pose"));
-  STRATA_RETURN_IF_ERROR(ValidateAll(problem.pairs, nodes, "point pairs"));
   STRATA_RETURN_IF_ERROR(ValidateAll(problem.planes, nodes, "plane"));
   return ValidateAll(problem.priors, nodes, "prior");
 }

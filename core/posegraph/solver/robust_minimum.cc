@@ -17,33 +17,33 @@ constexpr double kControlFactor = 1.4;  // the paper's
 constexpr ConvergenceOptions kAlongTheWay = {
     .max_iterations = 4, .cost_tolerance = 1e-3, .step_tolerance = 1e-6};
 
-double WorstChi2(const Suspects& suspects) {
+double WorstChi2(const OutlierCandidates& candidates) {
   double worst = 0.0;
-  for (std::size_t k = 0; k < suspects.size(); ++k) worst = std::max(worst, suspects.Chi2(k));
+  for (std::size_t k = 0; k < candidates.size(); ++k) worst = std::max(worst, candidates.Chi2(k));
   return worst;
 }
 
-void SetAll(Suspects& suspects, double weight) {
-  for (std::size_t k = 0; k < suspects.size(); ++k) suspects.Weight(k) = weight;
+void SetAll(OutlierCandidates& candidates, double weight) {
+  for (std::size_t k = 0; k < candidates.size(); ++k) candidates.Weight(k) = weight;
 }
 
 // True if every weight is 0 or 1.
-bool SetWeights(Suspects& suspects, double max_chi2, double control) {
+bool SetWeights(OutlierCandidates& candidates, double max_chi2, double control) {
   bool decided = true;
-  for (std::size_t k = 0; k < suspects.size(); ++k) {
-    double& weight = suspects.Weight(k);
-    weight = TruncatedWeight(suspects.Chi2(k), max_chi2, control);
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    double& weight = candidates.Weight(k);
+    weight = TruncatedWeight(candidates.Chi2(k), max_chi2, control);
     decided = decided && (weight == 0.0 || weight == 1.0);
   }
   return decided;
 }
 
 // True if a term that counts is above the bound: it counts no longer.
-bool RejectMore(Suspects& suspects, double max_chi2) {
+bool RejectMore(OutlierCandidates& candidates, double max_chi2) {
   bool more = false;
-  for (std::size_t k = 0; k < suspects.size(); ++k) {
-    if (suspects.Weight(k) == 0.0 || suspects.Chi2(k) <= max_chi2) continue;
-    suspects.Weight(k) = 0.0;
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    if (candidates.Weight(k) == 0.0 || candidates.Chi2(k) <= max_chi2) continue;
+    candidates.Weight(k) = 0.0;
     more = true;
   }
   return more;
@@ -58,7 +58,7 @@ double TruncatedWeight(double chi2, double max_chi2, double control) {
 }
 
 absl::StatusOr<Minimum> MinimiseRobustly(
-    Suspects& suspects,
+    OutlierCandidates& candidates,
     double max_chi2,
     const ConvergenceOptions& convergence,
     absl::FunctionRef<absl::StatusOr<Minimum>(const ConvergenceOptions&)> minimise) {
@@ -69,23 +69,23 @@ absl::StatusOr<Minimum> MinimiseRobustly(
     minimum.iterations = iterations;
     return minimum;
   };
-  if (suspects.size() == 0 || std::isinf(max_chi2)) return go_down(convergence);
+  if (candidates.size() == 0 || std::isinf(max_chi2)) return go_down(convergence);
 
   // Not from the minimum of all terms, as in the paper: strong false ones fold the graph.
-  SetAll(suspects, 0.0);
+  SetAll(candidates, 0.0);
   STRATA_RETURN_IF_ERROR(go_down(kAlongTheWay).status());
-  SetAll(suspects, 1.0);
-  const double worst = WorstChi2(suspects);
+  SetAll(candidates, 1.0);
+  const double worst = WorstChi2(candidates);
   if (worst > max_chi2) {
     double control = max_chi2 / (2.0 * worst - max_chi2);
-    while (!SetWeights(suspects, max_chi2, control)) {
+    while (!SetWeights(candidates, max_chi2, control)) {
       STRATA_RETURN_IF_ERROR(go_down(kAlongTheWay).status());
       control *= kControlFactor;
     }
   }
   while (true) {
     STRATA_ASSIGN_OR_RETURN(const Minimum minimum, go_down(convergence));
-    if (!RejectMore(suspects, max_chi2)) return minimum;
+    if (!RejectMore(candidates, max_chi2)) return minimum;
   }
 }
 

@@ -14,20 +14,20 @@
 namespace strata {
 
 // The terms that may be false of a sum of squares.
-class Suspects {
+class OutlierCandidates {
  public:
-  virtual ~Suspects() = default;
+  virtual ~OutlierCandidates() = default;
   virtual std::size_t size() const = 0;
   virtual double Chi2(std::size_t k) const = 0;  // in the current state, without its weight
   virtual double& Weight(std::size_t k) = 0;
 };
 
 // Graduated non-convexity (Yang, Antonante, Tzoumas, Carlone 2020) for truncated least squares: a
-// suspect counts min(χ², max_chi2), reached through a family of costs that begins convex. Leaves
-// the weights at 0 or 1; a suspect whose χ² at the minimum is above the bound has 0.
+// candidate counts min(χ², max_chi2), reached through a family of costs that begins convex. Leaves
+// the weights at 0 or 1; a candidate whose χ² at the minimum is above the bound has 0.
 // `minimise` goes down from the current state with the current weights.
 absl::StatusOr<Minimum> MinimiseRobustly(
-    Suspects& suspects,
+    OutlierCandidates& candidates,
     double max_chi2,
     const ConvergenceOptions& convergence,
     absl::FunctionRef<absl::StatusOr<Minimum>(const ConvergenceOptions&)> minimise);

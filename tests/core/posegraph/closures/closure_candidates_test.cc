@@ -88,17 +88,17 @@ TEST(ClosureCandidatesTest, ASecondRoundIsTriedAllAroundAndEvenly) {
                               FindClosureCandidates(graph.nodes, graph.edges, {}));
   const double step =
       (graph.nodes[1].T_map_scan.translation() - graph.nodes[0].T_map_scan.translation()).norm();
-  const auto stretch_of = [&](std::size_t node) {
+  const auto segment_of = [&](std::size_t node) {
     return static_cast<std::size_t>(static_cast<double>(node) * step / 10.0);
   };
   std::vector<int> by_quarter(4, 0);
-  std::map<std::pair<std::size_t, std::size_t>, int> by_stretches;
+  std::map<std::pair<std::size_t, std::size_t>, int> by_segments;
   for (const ClosureCandidate& c : candidates) {
     ++by_quarter[std::min<std::size_t>(3, c.j % 100 / 25)];
-    ++by_stretches[{stretch_of(c.i), stretch_of(c.j)}];
+    ++by_segments[{segment_of(c.i), segment_of(c.j)}];
   }
   EXPECT_THAT(by_quarter, Each(::testing::Gt(5)));
-  for (const auto& [stretches, count] : by_stretches) EXPECT_LE(count, 2);
+  for (const auto& [segments, count] : by_segments) EXPECT_LE(count, 2);
 }
 
 TEST(ClosureCandidatesTest, WhatIsClosedIsNotTriedAgain) {
@@ -173,9 +173,9 @@ TEST(ClosureCandidatesTest, RefusesNonsense) {
   EXPECT_THAT(FindClosureCandidates(graph.nodes, graph.edges, {}),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("closure node 3")));
   ClosureCandidateOptions options;
-  options.per_stretch = 0;
+  options.per_segment = 0;
   EXPECT_THAT(FindClosureCandidates({}, {}, {}, options),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("per_stretch is 0")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("per_segment is 0")));
 }
 
 }  // namespace

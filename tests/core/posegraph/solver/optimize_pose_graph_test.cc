@@ -51,16 +51,6 @@ class PoseGraphTest : public ::testing::TestWithParam<std::uint64_t> {
          .T_i_j = Retract(truth_[i].inverse() * truth_[j], random_.Step(0.1 * noise, noise)),
          .information = random_.Information() / std::max(noise * noise, 1e-4)});
   }
-  void AddPairs(std::size_t i, std::size_t j, double noise = 0.0) {
-    PointPairsTerm term{.i = i, .j = j};
-    for (int k = 0; k < 30; ++k) {
-      const Eigen::Vector3d p = random_.Vector(10.0);
-      Eigen::Matrix<double, 8, 1> ab;
-      ab << truth_[i].inverse() * p + random_.Vector(noise), 1.0, truth_[j].inverse() * p, 1.0;
-      term.moments += ab * ab.transpose() / 0.01;
-    }
-    problem_.pairs.push_back(term);
-  }
   // Points of the plane as every pose sees them: spread over it, or along `line` through its
   // middle.
   void AddPlane(const Plane& plane, const Eigen::Vector3d& line = Eigen::Vector3d::Zero()) {
@@ -98,14 +88,6 @@ TEST_P(PoseGraphTest, RelativePosesWithoutNoiseGiveTheTruth) {
   EXPECT_THAT(solution.summary.held, ElementsAre(0));
   EXPECT_GT(solution.summary.before.relative, 1.0);
   EXPECT_LT(solution.summary.after.total(), 1e-9);
-}
-
-TEST_P(PoseGraphTest, PointPairsWithoutNoiseGiveTheTruth) {
-  MakePoses(8, 0.3, 2.0);
-  for (std::size_t n = 1; n < 8; ++n) AddPairs(n - 1, n);
-  AddPairs(7, 0);
-  STRATA_ASSERT_OK_AND_ASSIGN(const auto solution, OptimizePoseGraph(problem_));
-  ExpectTruth(solution, 1e-5);
 }
 
 TEST_P(PoseGraphTest, ThreePlanesGiveTheTruth) {
@@ -200,7 +182,7 @@ class MixedGraphTest : public PoseGraphTest {
   void SetUp() override {
     MakePoses(12, 0.1, 0.5);
     for (std::size_t n = 1; n < 12; ++n) AddRelative(n - 1, n, 0.1);
-    for (int k = 0; k < 6; ++k) AddPairs(random_.Below(6), 6 + random_.Below(6), 0.1);
+    for (int k = 0; k < 6; ++k) AddRelative(random_.Below(6), 6 + random_.Below(6), 0.1);
     AddPlane({Eigen::Vector3d(1, 0.1, 0).normalized(), 4.0});
     AddPlane({Eigen::Vector3d(0, 0.1, 1).normalized(), 1.0});
     problem_.priors.push_back({.i = 4,
@@ -236,12 +218,9 @@ TEST_P(MixedGraphTest, EqualWeightsAreCovarianceAndOthersTrade) {
   for (std::size_t n = 0; n < truth_.size(); ++n) {
     EXPECT_EQ(by_covariance.T_map_scan[n].matrix(), equal.T_map_scan[n].matrix());
   }
-  const auto local = [](const PoseGraphSolution& s) {
-    return s.summary.after.relative + s.summary.after.pairs;
-  };
   options.local_weight = 0.95;
   STRATA_ASSERT_OK_AND_ASSIGN(const auto trusting, OptimizePoseGraph(problem_, options));
-  EXPECT_LT(local(trusting), local(equal));
+  EXPECT_LT(trusting.summary.after.relative, equal.summary.after.relative);
   EXPECT_GT(trusting.summary.after.planes + trusting.summary.after.priors,
             equal.summary.after.planes + equal.summary.after.priors);
 }
@@ -286,7 +265,6 @@ TEST(PoseGraphErrorsTest, NameTheTermTheFieldAndTheBound) {
   PoseGraphProblem good;
   good.T_map_scan.assign(2, Pose::Identity());
   good.relative.push_back({.i = 0, .j = 1});
-  good.pairs.push_back({.i = 0, .j = 1});
   good.planes.push_back({.plane_map = {}, .views = {{.i = 1}}});
   good.priors.push_back({.i = 1});
   STRATA_EXPECT_OK(OptimizePoseGraph(good));
@@ -306,9 +284,7 @@ TEST(PoseGraphErrorsTest, NameTheTermTheFieldAndTheBound) {
   expect([](auto& p, auto&) { p.relative[0].T_i_j.linear() *= 2.0; }, "T_i_j: pose: linear part");
   expect([](auto& p, auto&) { p.relative[0].information(0, 1) = 1.0; }, "not symmetric");
   expect([](auto& p, auto&) { p.relative[0].information(2, 2) = -1.0; }, "negative eigenvalue");
-  expect([](auto& p, auto&) { p.pairs[0].moments(0, 0) = kNan; },
-         "point pairs 0: moments: not fin");
-  expect([](auto& p, auto&) { p.pairs[0].moments(3, 3) = 1.0; }, "rows 3 and 7 differ");
+  expect([](auto& p, auto&) { p.planes[0].views[0].moments(0, 0) = kNan; }, "not fin");
   expect([](auto& p, auto&) { p.planes[0].plane_map.normal *= 2.0; }, "unit normal");
   expect([](auto& p, auto&) { p.planes[0].views[0].i = 9; }, "a view's i is 9");
   expect([](auto& p, auto&) { p.priors[0].i = 2; }, "prior 0: i is 2");

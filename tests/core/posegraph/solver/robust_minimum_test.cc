@@ -140,20 +140,6 @@ TEST_P(PlantedClosuresTest, TwoRobotsThatOnlyClosuresJoinEndInOneWorld) {
   EXPECT_LT(Error(solution.T_map_scan), 1.5);
 }
 
-TEST_P(PlantedClosuresTest, FalsePointPairsAreFoundOut) {
-  PointPairsTerm term{.i = 5, .j = 35, .may_be_false = true};
-  for (int k = 0; k < 40; ++k) {
-    const Eigen::Vector3d p = random_.Vector(5.0);
-    Eigen::Matrix<double, 8, 1> ab;
-    ab << p, 1.0, p + random_.Vector(0.05), 1.0;
-    term.moments += ab * ab.transpose() / (0.05 * 0.05);
-  }
-  problem_.pairs.push_back(term);
-  STRATA_ASSERT_OK_AND_ASSIGN(const auto solution, OptimizePoseGraph(problem_));
-  ASSERT_EQ(solution.summary.rejected_pairs.size(), 1U);
-  EXPECT_GT(solution.summary.rejected_pairs[0].chi2, 100.0);
-}
-
 INSTANTIATE_TEST_SUITE_P(Seeds, PlantedClosuresTest, ::testing::Values(1, 2, 3));
 
 TEST(TruncatedWeightTest, GoesFromConvexToTruncated) {

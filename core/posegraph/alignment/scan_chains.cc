@@ -1,4 +1,4 @@
-#include "core/posegraph/alignment/stretches.h"
+#include "core/posegraph/alignment/scan_chains.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +13,7 @@ constexpr std::size_t kSamePass = 5;
 
 }  // namespace
 
-Stretches::Stretches(const AlignmentProblem& problem, const NeighbourPolicy& policy)
+ScanChains::ScanChains(const AlignmentProblem& problem, const NeighbourPolicy& policy)
     : policy_(policy) {
   ++policy_.max_scans;  // a scan is its own nearest
   const std::size_t nodes = problem.T_map_scan.size();
@@ -32,14 +32,15 @@ Stretches::Stretches(const AlignmentProblem& problem, const NeighbourPolicy& pol
   for (const auto& [i, j] : problem.excluded_pairs) excluded_.insert(std::minmax(i, j));
 }
 
-bool Stretches::OwnPass(std::size_t node, std::size_t other) const {
+bool ScanChains::OwnPass(std::size_t node, std::size_t other) const {
   const auto [trajectory, place] = way_[node];
   const auto [other_trajectory, other_place] = way_[other];
   return trajectory == other_trajectory &&
          std::max(place, other_place) - std::min(place, other_place) <= kOwnPass;
 }
 
-std::vector<Stretch> Stretches::Around(std::size_t node, std::span<const Pose> T_map_scan) const {
+std::vector<ScanChain> ScanChains::Around(std::size_t node,
+                                          std::span<const Pose> T_map_scan) const {
   // By trajectory and place, with whether more than nearness speaks for it.
   std::vector<std::pair<std::pair<std::size_t, std::size_t>, std::pair<std::size_t, bool>>> around;
   const auto add = [&](std::size_t other, bool known) {
@@ -54,21 +55,21 @@ std::vector<Stretch> Stretches::Around(std::size_t node, std::span<const Pose> T
   }
   for (const Partner& partner : partners_[node]) add(partner.node, !partner.may_be_false);
   std::sort(around.begin(), around.end());
-  std::vector<Stretch> stretches;
+  std::vector<ScanChain> chains;
   std::pair<std::size_t, std::size_t> last;
   for (const auto& [way, other] : around) {
     const bool same_pass =
-        !stretches.empty() && way.first == last.first && way.second - last.second <= kSamePass;
-    if (!same_pass) stretches.push_back({{}, false, true});
-    Stretch& stretch = stretches.back();
-    stretch.own = stretch.own || OwnPass(node, other.first);
-    if (stretch.own || other.second) stretch.may_be_false = false;
-    if (stretch.nodes.empty() || stretch.nodes.back() != other.first) {
-      stretch.nodes.push_back(other.first);
+        !chains.empty() && way.first == last.first && way.second - last.second <= kSamePass;
+    if (!same_pass) chains.push_back({{}, false, true});
+    ScanChain& chain = chains.back();
+    chain.own = chain.own || OwnPass(node, other.first);
+    if (chain.own || other.second) chain.may_be_false = false;
+    if (chain.nodes.empty() || chain.nodes.back() != other.first) {
+      chain.nodes.push_back(other.first);
     }
     last = way;
   }
-  return stretches;
+  return chains;
 }
 
 }  // namespace strata

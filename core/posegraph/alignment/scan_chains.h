@@ -1,6 +1,6 @@
-// What a scan is registered to: the stretches of way around it (thesis 7.3.4, pooled local maps).
-#ifndef STRATA_CORE_POSEGRAPH_ALIGNMENT_STRETCHES_H_
-#define STRATA_CORE_POSEGRAPH_ALIGNMENT_STRETCHES_H_
+// What a scan is registered to: the chains of scans around it (thesis 7.3.4, pooled local maps).
+#ifndef STRATA_CORE_POSEGRAPH_ALIGNMENT_SCAN_CHAINS_H_
+#define STRATA_CORE_POSEGRAPH_ALIGNMENT_SCAN_CHAINS_H_
 
 #include <cstddef>
 #include <set>
@@ -14,21 +14,21 @@
 namespace strata {
 
 // Scans that follow each other on a trajectory, near to some scan.
-struct Stretch {
+struct ScanChain {
   std::vector<std::size_t> nodes;  // in the order of the way, at least one
   bool own = false;                // the scan's own way, up to it
   bool may_be_false = false;       // only nearness says that it overlaps with the scan
 };
 
 // Chooses for every scan of a problem. Immutable; must not outlive the problem.
-class Stretches {
+class ScanChains {
  public:
-  Stretches(const AlignmentProblem& problem, const NeighbourPolicy& policy);
+  ScanChains(const AlignmentProblem& problem, const NeighbourPolicy& policy);
 
   // Around `node` at these poses: of the scans near by and of those that the problem pairs it with,
-  // one stretch for every pass of a robot. Of its own pass only what is behind it, or nothing that
+  // one chain for every pass of a robot. Of its own pass only what is behind it, or nothing that
   // was measured about it would be independent of where it is.
-  std::vector<Stretch> Around(std::size_t node, std::span<const Pose> T_map_scan) const;
+  std::vector<ScanChain> Around(std::size_t node, std::span<const Pose> T_map_scan) const;
 
  private:
   bool OwnPass(std::size_t node, std::size_t other) const;
@@ -46,4 +46,4 @@ class Stretches {
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_POSEGRAPH_ALIGNMENT_STRETCHES_H_
+#endif  // STRATA_CORE_POSEGRAPH_ALIGNMENT_SCAN_CHAINS_H_

@@ -1,4 +1,4 @@
-#include "core/posegraph/alignment/stretches.h"
+#include "core/posegraph/alignment/scan_chains.h"
 
 #include <vector>
 
@@ -17,7 +17,7 @@ Pose At(double x, double y) { return MakePose(Eigen::Quaterniond::Identity(), {x
 
 // Three robots on one road along x, a scan every metre: the first goes there and, 60 m on, comes
 // back on the other side; the second goes with it; the third is far away.
-class StretchesTest : public ::testing::Test {
+class ScanChainsTest : public ::testing::Test {
  protected:
   static constexpr std::size_t kLength = 60;
   static constexpr std::size_t kBack = kLength;       // first node on the way back
@@ -25,7 +25,7 @@ class StretchesTest : public ::testing::Test {
   static constexpr std::size_t kAway = 3 * kLength;   // first of the third
   static constexpr std::size_t kNodes = 3 * kLength + 5;
 
-  StretchesTest() {
+  ScanChainsTest() {
     Nodes there_and_back, other, away;
     for (std::size_t k = 0; k < kNodes; ++k) {
       const auto x = static_cast<double>(k % kLength);
@@ -45,8 +45,8 @@ class StretchesTest : public ::testing::Test {
     policy_.max_scans = 100;
   }
 
-  std::vector<Stretch> Around(std::size_t node) const {
-    return Stretches(problem_, policy_).Around(node, problem_.T_map_scan);
+  std::vector<ScanChain> Around(std::size_t node) const {
+    return ScanChains(problem_, policy_).Around(node, problem_.T_map_scan);
   }
   // Where the way back passes x.
   static std::size_t BackAt(std::size_t x) { return kBack + kLength - 1 - x; }
@@ -55,78 +55,78 @@ class StretchesTest : public ::testing::Test {
   NeighbourPolicy policy_;
 };
 
-TEST_F(StretchesTest, OfItsOwnPassOnlyWhatIsBehindOfOthersAll) {
-  const std::vector<Stretch> stretches = Around(10);
-  ASSERT_THAT(stretches, SizeIs(3));
-  EXPECT_THAT(stretches[0].nodes, ElementsAre(7, 8, 9));
-  EXPECT_TRUE(stretches[0].own);
-  EXPECT_FALSE(stretches[0].may_be_false);
+TEST_F(ScanChainsTest, OfItsOwnPassOnlyWhatIsBehindOfOthersAll) {
+  const std::vector<ScanChain> chains = Around(10);
+  ASSERT_THAT(chains, SizeIs(3));
+  EXPECT_THAT(chains[0].nodes, ElementsAre(7, 8, 9));
+  EXPECT_TRUE(chains[0].own);
+  EXPECT_FALSE(chains[0].may_be_false);
   // √(3.5² − 2²) = 2.9 m to both sides.
-  EXPECT_THAT(stretches[1].nodes,
+  EXPECT_THAT(chains[1].nodes,
               ElementsAre(BackAt(12), BackAt(11), BackAt(10), BackAt(9), BackAt(8)));
-  EXPECT_FALSE(stretches[1].own);
-  EXPECT_TRUE(stretches[1].may_be_false);
+  EXPECT_FALSE(chains[1].own);
+  EXPECT_TRUE(chains[1].may_be_false);
   EXPECT_THAT(
-      stretches[2].nodes,
+      chains[2].nodes,
       ElementsAre(
           kOther + 7, kOther + 8, kOther + 9, kOther + 10, kOther + 11, kOther + 12, kOther + 13));
-  EXPECT_FALSE(stretches[2].own);
-  EXPECT_TRUE(stretches[2].may_be_false);
+  EXPECT_FALSE(chains[2].own);
+  EXPECT_TRUE(chains[2].may_be_false);
 }
 
-TEST_F(StretchesTest, ThePassBeforeSeesTheOneAfterAsAnother) {
-  const std::vector<Stretch> stretches = Around(BackAt(10));
-  ASSERT_THAT(stretches, SizeIs(3));
-  EXPECT_THAT(stretches[0].nodes, ElementsAre(8, 9, 10, 11, 12));
-  EXPECT_TRUE(stretches[0].may_be_false);
-  EXPECT_THAT(stretches[1].nodes, ElementsAre(BackAt(13), BackAt(12), BackAt(11)));
-  EXPECT_TRUE(stretches[1].own);
+TEST_F(ScanChainsTest, ThePassBeforeSeesTheOneAfterAsAnother) {
+  const std::vector<ScanChain> chains = Around(BackAt(10));
+  ASSERT_THAT(chains, SizeIs(3));
+  EXPECT_THAT(chains[0].nodes, ElementsAre(8, 9, 10, 11, 12));
+  EXPECT_TRUE(chains[0].may_be_false);
+  EXPECT_THAT(chains[1].nodes, ElementsAre(BackAt(13), BackAt(12), BackAt(11)));
+  EXPECT_TRUE(chains[1].own);
 }
 
-TEST_F(StretchesTest, AfterATurnTheWayBackIsStillTheSamePass) {
-  const std::vector<Stretch> stretches = Around(BackAt(57));
-  // The way there begins five scans before: one stretch, and nothing ahead.
-  ASSERT_THAT(stretches, SizeIs(2));
-  EXPECT_TRUE(stretches[0].own);
-  EXPECT_THAT(stretches[0].nodes, ElementsAre(55, 56, 57, 58, 59, BackAt(59), BackAt(58)));
-  EXPECT_FALSE(stretches[1].own);
+TEST_F(ScanChainsTest, AfterATurnTheWayBackIsStillTheSamePass) {
+  const std::vector<ScanChain> chains = Around(BackAt(57));
+  // The way there begins five scans before: one chain, and nothing ahead.
+  ASSERT_THAT(chains, SizeIs(2));
+  EXPECT_TRUE(chains[0].own);
+  EXPECT_THAT(chains[0].nodes, ElementsAre(55, 56, 57, 58, 59, BackAt(59), BackAt(58)));
+  EXPECT_FALSE(chains[1].own);
 }
 
-TEST_F(StretchesTest, AScanWithNothingAroundHasNoStretch) {
+TEST_F(ScanChainsTest, AScanWithNothingAroundHasNoChain) {
   problem_.T_map_scan[kAway] = At(0.0, -1000.0);
   EXPECT_THAT(Around(kAway), IsEmpty());
 }
 
-TEST_F(StretchesTest, AtMostSoManyOfTheNearest) {
+TEST_F(ScanChainsTest, AtMostSoManyOfTheNearest) {
   policy_.max_scans = 1;  // beside the scan itself
-  const std::vector<Stretch> stretches = Around(10);
+  const std::vector<ScanChain> chains = Around(10);
   // Four are one metre away; of those the last.
-  ASSERT_THAT(stretches, SizeIs(1));
-  EXPECT_THAT(stretches[0].nodes, ElementsAre(kOther + 10));
+  ASSERT_THAT(chains, SizeIs(1));
+  EXPECT_THAT(chains[0].nodes, ElementsAre(kOther + 10));
 }
 
-TEST_F(StretchesTest, PairsCountHoweverFarTheyAre) {
+TEST_F(ScanChainsTest, PairsCountHoweverFarTheyAre) {
   problem_.pairs.push_back({.i = 3, .j = kAway + 2});
   problem_.pairs.push_back({.i = 40, .j = 10, .may_be_false = true});
-  const std::vector<Stretch> far = Around(kAway + 2);
+  const std::vector<ScanChain> far = Around(kAway + 2);
   ASSERT_THAT(far, SizeIs(2));
   EXPECT_THAT(far[0].nodes, ElementsAre(3));
   EXPECT_FALSE(far[0].may_be_false);  // known, not near
   EXPECT_TRUE(far[1].own);
   // From both ends.
-  const std::vector<Stretch> other_end = Around(3);
+  const std::vector<ScanChain> other_end = Around(3);
   ASSERT_THAT(other_end, SizeIs(4));
   EXPECT_THAT(other_end[3].nodes, ElementsAre(kAway + 2));
   EXPECT_FALSE(other_end[3].may_be_false);
   // 40 is ahead of 10 by exactly as much as is still the same pass.
   EXPECT_THAT(Around(10), SizeIs(3));
-  const std::vector<Stretch> back = Around(40);
+  const std::vector<ScanChain> back = Around(40);
   ASSERT_THAT(back, SizeIs(4));
   EXPECT_THAT(back[0].nodes, ElementsAre(10));
   EXPECT_TRUE(back[0].own);
 }
 
-TEST_F(StretchesTest, AClosureMayBeFalseButAKnownPairSpeaksForItsStretch) {
+TEST_F(ScanChainsTest, AClosureMayBeFalseButAKnownPairSpeaksForItsChain) {
   problem_.pairs.push_back({.i = kOther + 11, .j = 10, .may_be_false = true});
   EXPECT_TRUE(Around(10)[2].may_be_false);
   problem_.pairs.push_back({.i = kOther + 12, .j = 10});
@@ -134,25 +134,25 @@ TEST_F(StretchesTest, AClosureMayBeFalseButAKnownPairSpeaksForItsStretch) {
   EXPECT_THAT(Around(10)[2].nodes, SizeIs(7));  // each once, though named twice
 }
 
-TEST_F(StretchesTest, ExcludedPairsAreNeverHeldAgainstEachOther) {
+TEST_F(ScanChainsTest, ExcludedPairsAreNeverHeldAgainstEachOther) {
   problem_.pairs.push_back({.i = kOther + 9, .j = 10});
   problem_.excluded_pairs = {{kOther + 9, 10}, {10, kOther + 8}, {9, 10}};
-  const std::vector<Stretch> stretches = Around(10);
-  ASSERT_THAT(stretches, SizeIs(3));
-  EXPECT_THAT(stretches[0].nodes, ElementsAre(7, 8));
-  EXPECT_THAT(stretches[2].nodes,
+  const std::vector<ScanChain> chains = Around(10);
+  ASSERT_THAT(chains, SizeIs(3));
+  EXPECT_THAT(chains[0].nodes, ElementsAre(7, 8));
+  EXPECT_THAT(chains[2].nodes,
               ElementsAre(kOther + 7, kOther + 10, kOther + 11, kOther + 12, kOther + 13));
-  EXPECT_TRUE(stretches[2].may_be_false);
+  EXPECT_TRUE(chains[2].may_be_false);
   // The others still are.
   EXPECT_THAT(Around(11)[0].nodes, ElementsAre(8, 9, 10));
 }
 
-TEST_F(StretchesTest, TheyFollowThePoses) {
+TEST_F(ScanChainsTest, TheyFollowThePoses) {
   std::vector<Pose> moved = problem_.T_map_scan;
   for (std::size_t k = kOther; k < kAway; ++k) moved[k].translation().y() = 500.0;
-  const Stretches stretches(problem_, policy_);
-  EXPECT_THAT(stretches.Around(10, problem_.T_map_scan), SizeIs(3));
-  EXPECT_THAT(stretches.Around(10, moved), SizeIs(2));
+  const ScanChains chains(problem_, policy_);
+  EXPECT_THAT(chains.Around(10, problem_.T_map_scan), SizeIs(3));
+  EXPECT_THAT(chains.Around(10, moved), SizeIs(2));
 }
 
 }  // namespace
