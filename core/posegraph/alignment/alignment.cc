@@ -36,8 +36,8 @@ constexpr double kMeasuredPlaceM = 0.1;
 constexpr double kMeasuredPlaceRad = 0.02;
 // What may be false must look the same at least to this share.
 constexpr double kMinDoubtfulOverlap = 0.5;
-// Of a pose, that the search for planes allows for.
-constexpr double kGateSigmas = 3.0;
+// Planes are kept once no pose moves by more of the σ that they were found by.
+constexpr double kHoldSigmas = 1.0;
 // A match is recorded as relative poses to the nearest few.
 constexpr std::size_t kMaxPartners = 3;
 
@@ -89,7 +89,7 @@ class Alignment {
       STRATA_RETURN_IF_ERROR(progress(static_cast<double>(round) / options_.max_rounds));
       std::vector<Pose> last = result_.T_map_scan;
       STRATA_RETURN_IF_ERROR(Round());
-      if (IsSettled(last)) {
+      if (IsSettled(last) && !GatesMayNarrow()) {
         result_.termination = AlignmentTermination::kSettled;
         break;
       }
@@ -338,12 +338,33 @@ class Alignment {
   }
 
   // Planes found anew at poses that differ by less than the search allows for are others by chance
-  // alone: poses would follow them for ever.
+  // alone: poses would follow them for ever. Where the search allows for much, as rough poses need,
+  // what it finds is sorted out once poses have settled in it.
   bool PlanesHold() const {
     if (result_.rounds.empty()) return false;
     const AlignmentRound& last = result_.rounds.back();
-    return last.max_shift_m <= kGateSigmas * options_.shared_planes.pose_sigma_m &&
-           last.max_turn_rad <= kGateSigmas * options_.shared_planes.pose_sigma_rad;
+    return last.max_shift_m <= kHoldSigmas * gates_.pose_sigma_m &&
+           last.max_turn_rad <= kHoldSigmas * gates_.pose_sigma_rad && !GatesMayNarrow();
+  }
+
+  bool GatesMayNarrow() const {
+    if (!options_.planes || result_.rounds.empty()) return false;
+    const SharedPlaneOptions narrower = GatesOfNow();
+    return narrower.pose_sigma_m < gates_.pose_sigma_m / 2.0 ||
+           narrower.pose_sigma_rad < gates_.pose_sigma_rad / 2.0;
+  }
+
+  // Poses are as far off as they still move.
+  SharedPlaneOptions GatesOfNow() const {
+    SharedPlaneOptions gates = options_.shared_planes;
+    if (result_.rounds.empty()) return gates;
+    const SharedPlaneOptions finest;
+    const AlignmentRound& last = result_.rounds.back();
+    gates.pose_sigma_m =
+        std::min(gates.pose_sigma_m, std::max(finest.pose_sigma_m, last.max_shift_m));
+    gates.pose_sigma_rad =
+        std::min(gates.pose_sigma_rad, std::max(finest.pose_sigma_rad, last.max_turn_rad));
+    return gates;
   }
 
   absl::Status FindPlanes() {
@@ -362,7 +383,8 @@ class Alignment {
     for (std::size_t k = 0; k < held.size(); ++k) {
       posed.push_back({held[k].get(), pose(k), source_.SensorOrigin(k)});
     }
-    shared_ = FindSharedPlanes(posed, options_.shared_planes);
+    gates_ = GatesOfNow();
+    shared_ = FindSharedPlanes(posed, gates_);
     std::erase_if(shared_, [this](const SharedPlane& plane) {
       return std::any_of(
           problem_.excluded_planes.begin(),
@@ -412,6 +434,7 @@ class Alignment {
   std::vector<std::vector<const ScanPair*>> measured_;  // of every node j
   std::vector<const RelativePoseTerm*> odometry_;       // of every node j; nullptr: none
   std::vector<SharedPlane> shared_;
+  SharedPlaneOptions gates_;      // that they were found by
   std::size_t measured_end_ = 0;  // of the graph's relative terms: what is given or a match
   AlignmentResult result_;
 };

@@ -197,6 +197,16 @@ TEST_F(AlignmentTest, PlanesAreKeptOncePosesAreNearlyRight) {
   EXPECT_EQ(result.rounds.back().planes, result.rounds.front().planes);
 }
 
+TEST_F(AlignmentTest, WhatWideGatesFoundIsSortedOutOncePosesHaveSettled) {
+  options_.max_rounds = 10;
+  CountedPlanes source(yard());
+  options_.shared_planes.pose_sigma_m *= 10.0;
+  options_.shared_planes.pose_sigma_rad *= 10.0;
+  STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align(source));
+  EXPECT_EQ(result.termination, AlignmentTermination::kSettled);
+  EXPECT_EQ(source.count, std::size_t{2 * YardScans::kScans}) << "once wide, once narrow";
+}
+
 TEST_F(AlignmentTest, PlanesDoNoHarm) {
   for (const std::uint64_t seed : {1, 2}) {
     SCOPED_TRACE(::testing::Message() << "seed " << seed);
