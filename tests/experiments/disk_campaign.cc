@@ -25,6 +25,8 @@
 namespace strata::testing {
 namespace {
 
+constexpr std::int64_t kPageBytes = 4096;  // a disk fills up byte by byte, a map by pages
+
 struct Campaign {
   std::string name;
   std::function<SweepResult(const DiskCampaign&, const Sweep&)> run;
@@ -54,8 +56,11 @@ std::vector<Campaign> Campaigns() {
            return disks.FailOnOpening(kind, sweep);
          }});
   }
-  campaigns.push_back(
-      {"full", [](const DiskCampaign& disks, const Sweep& sweep) { return disks.FillUp(sweep); }});
+  campaigns.push_back({"full", [](const DiskCampaign& disks, const Sweep& sweep) {
+                         Sweep pages = sweep;
+                         pages.every *= kPageBytes;
+                         return disks.FillUp(pages);
+                       }});
   campaigns.push_back({"power", [](const DiskCampaign& disks, const Sweep& sweep) {
                          return disks.CutPower(false, sweep);
                        }});
@@ -178,7 +183,9 @@ int main(int argc, char** argv) {
   std::vector<std::string> only;
   strata::testing::Sweep sweep;
   app.add_option("--only", only, "rows of the table that begin so");
-  app.add_option("--every", sweep.every, "moments from trial to trial")->check(CLI::PositiveNumber);
+  app.add_option(
+         "--every", sweep.every, "moments from trial to trial; of a disk that fills up, pages")
+      ->check(CLI::PositiveNumber);
   app.add_option("--first", sweep.first, "moment of the first trial")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--seed", sweep.seed, "of what survives a cut");
