@@ -92,8 +92,8 @@ struct AlignmentProblem {
 struct AlignmentOptions {
   MlsRegistrationOptions registration;
   bool planes = true;
-  // Its pose_sigma is that of the poses given: where it is more than the default, the search narrows
-  // to the default as poses settle.
+  // Its pose_sigma is that of the poses given: where it is more than the default, the search
+  // narrows to the default as poses settle.
   SharedPlaneOptions shared_planes;
   PoseGraphOptions pose_graph;
   int max_rounds = 30;  // in [1, 100]
