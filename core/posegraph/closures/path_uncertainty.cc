@@ -82,9 +82,8 @@ PathUncertainties::PathUncertainties(std::span<const Pose> T_map_scan,
 }
 
 std::vector<PathUncertainty> PathUncertainties::From(std::size_t node) const {
-  constexpr double kInfinite = std::numeric_limits<double>::infinity();
   std::vector<PathUncertainty> answers(size());
-  std::vector<double> best(size(), kInfinite);
+  std::vector<double> best(size(), std::numeric_limits<double>::infinity());
   std::vector<PathSums> sums(size());
   using Entry = std::pair<double, std::size_t>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
