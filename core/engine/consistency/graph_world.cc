@@ -130,9 +130,9 @@ AlignmentProblem GraphWorld::Problem(const OptimizeSettings& settings) const {
     if (!constraint.enabled) {
       problem.excluded_pairs.emplace_back(i, j);
     } else if (constraint.origin == ConstraintOrigin::kPerson) {
-      const bool suspect = constraint.may_be_false && settings.robust;
-      problem.relative.push_back({i, j, constraint.T_i_j, constraint.information, suspect});
-      if (!suspect) held[std::max(i, j)] = true;
+      const bool may_be_false = constraint.may_be_false && settings.robust;
+      problem.relative.push_back({i, j, constraint.T_i_j, constraint.information, may_be_false});
+      if (!may_be_false) held[std::max(i, j)] = true;
     } else {
       const bool closure = constraint.origin == ConstraintOrigin::kOptimize;
       const bool doubtful =

@@ -36,8 +36,6 @@ constexpr double kMeasuredPlaceM = 0.1;
 constexpr double kMeasuredPlaceRad = 0.02;
 // What may be false must look the same at least to this share.
 constexpr double kMinDoubtfulOverlap = 0.5;
-// Planes are kept once no pose moves by more of the σ that they were found by.
-constexpr double kHoldSigmas = 1.0;
 // A match is recorded as relative poses to the nearest few.
 constexpr std::size_t kMaxPartners = 3;
 
@@ -343,8 +341,8 @@ class Alignment {
   bool PlanesHold() const {
     if (result_.rounds.empty()) return false;
     const AlignmentRound& last = result_.rounds.back();
-    return last.max_shift_m <= kHoldSigmas * gates_.pose_sigma_m &&
-           last.max_turn_rad <= kHoldSigmas * gates_.pose_sigma_rad && !GatesMayNarrow();
+    return last.max_shift_m <= gates_.pose_sigma_m && last.max_turn_rad <= gates_.pose_sigma_rad &&
+           !GatesMayNarrow();
   }
 
   bool GatesMayNarrow() const {
