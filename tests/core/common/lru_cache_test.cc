@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "core/common/cache_budget.h"
+#include "core/common/steady_time.h"
 #include "core/common/stop.h"
 
 namespace strata {
@@ -143,7 +144,8 @@ TEST(CacheBudgetTest, WhoAsksForMuchIsNotPassedByWhoAsksLater) {
   much.Request();
   asks_for_much.join();
   EXPECT_EQ(first.code(), absl::StatusCode::kCancelled);
-  EXPECT_TRUE(budget.AwaitReserve(20, Stop()).ok()) << "who left still stands in the way";
+  const Stop soon(SteadyNow() + absl::Seconds(20));
+  EXPECT_TRUE(budget.AwaitReserve(20, soon).ok()) << "who left still stands in the way";
 }
 
 TEST(CacheBudgetTest, SmallSharesDoNotWaitForWhatIsReserved) {

@@ -12,6 +12,7 @@
 
 #include "core/planning/planner.h"
 #include "tests/core/planning/memory_tiles.h"
+#include "tests/core/planning/small_robot.h"
 #include "tests/support/drawing.h"
 #include "tests/support/status_matchers.h"
 
@@ -19,16 +20,12 @@ namespace strata {
 namespace {
 
 using ::strata::testing::DrawnMap;
+using ::strata::testing::kCell;
 using ::strata::testing::MemoryTiles;
+using ::strata::testing::SmallRobot;
 using ::strata::testing::StatusIs;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-constexpr double kCell = 0.1;
-
-RobotProfile SmallRobot() {
-  return {.radius_m = 0.2, .height_m = 1.0, .max_step_m = 0.15, .max_slope_rad = 0.35};
-}
 
 // 10 m × 4 m of level ground with its corner in the origin.
 DrawnMap Ground() {
