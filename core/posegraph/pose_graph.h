@@ -50,6 +50,20 @@ struct PlaneTerm {
   std::vector<View> views;
 };
 
+// A direction in which surfaces of the world face (thesis 5.3), and the normals of the surfaces
+// that scans saw facing along it: sin² of their angles to it, which is free to turn. Surfaces that
+// face it or face away are the same, and need not be the same surface: two scans that saw two
+// parallel walls are turned alike. Seen by one node only it says next to nothing about it.
+struct DirectionTerm {
+  struct View {
+    std::size_t i = 0;
+    Eigen::Vector3d normal_scan = Eigen::Vector3d::UnitX();
+    double information = 0.0;  // 1 / variance of its angle [1/rad²]
+  };
+  Eigen::Vector3d direction_map = Eigen::Vector3d::UnitX();  // where to start from
+  std::vector<View> views;
+};
+
 // An absolute pose (GPS, landmark). With the rotation's rows and columns 0 it is a position; it is
 // then the translation's information in the axes of T_map_scan's rotation: the identity for the
 // axes of the map.
@@ -64,6 +78,7 @@ struct PoseGraphProblem {
   std::vector<bool> fixed;       // empty: none
   std::vector<RelativePoseTerm> relative;
   std::vector<PlaneTerm> planes;
+  std::vector<DirectionTerm> directions;
   std::vector<PriorTerm> priors;
 };
 
@@ -74,7 +89,7 @@ enum class Weighting : std::uint8_t {
 
 struct PoseGraphOptions {
   Weighting weighting = Weighting::kCovariance;
-  // l sums relative poses, g planes and priors. The thesis does not normalise the two
+  // l sums relative poses, g planes, directions and priors. The thesis does not normalise the two
   // sums. Ours are both in units of their measurements' variance, and then equal weights are the
   // most likely poses: ½ is the default and gives what kCovariance gives. More than ½ trusts
   // correspondences more than their variance says, less trusts planes more. [1e-6, 1 − 1e-6]
@@ -88,8 +103,8 @@ struct PoseGraphOptions {
 
 // Σ eᵀΩe of every kind of term, rejected ones included, whatever the weighting.
 struct PoseGraphCosts {
-  double relative = 0.0, planes = 0.0, priors = 0.0;
-  double total() const { return relative + planes + priors; }
+  double relative = 0.0, planes = 0.0, directions = 0.0, priors = 0.0;
+  double total() const { return relative + planes + directions + priors; }
 };
 
 // A term that may be false and in the end counts nothing; all others count in full.
@@ -100,8 +115,8 @@ struct RejectedTerm {
 
 struct NodeResidual {
   std::size_t node = 0;
-  // Sum over the terms that touch the node: a term of two nodes counts half for each, a plane by
-  // views; rejected terms do not count.
+  // Sum over the terms that touch the node: a term of two nodes counts half for each, planes
+  // and directions by views; rejected terms do not count.
   double chi2 = 0.0;
 };
 

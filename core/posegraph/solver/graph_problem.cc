@@ -5,8 +5,10 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <ceres/problem.h>
 
+#include "core/posegraph/costs/direction_cost.h"
 #include "core/posegraph/costs/inertia_cost.h"
 #include "core/posegraph/costs/prior_cost.h"
 #include "core/posegraph/costs/relative_pose_cost.h"
@@ -45,6 +47,7 @@ GraphProblem::GraphProblem(const PoseGraphProblem& graph,
   AddNodes();
   AddRelative(local_factor);
   AddPlanes(global_factor);
+  AddDirections(global_factor);
   AddPriors(global_factor);
   Damp(global_factor);
 }
@@ -82,6 +85,21 @@ void GraphProblem::AddPlanes(double factor) {
       auto cost = std::make_unique<PlaneViewCost>(views_[p][v], centres_[p], factor);
       problem_.AddResidualBlock(
           cost.release(), nullptr, poses_[graph_.planes[p].views[v].i].data(), planes_[p].data());
+    }
+  }
+}
+
+void GraphProblem::AddDirections(double factor) {
+  for (const DirectionTerm& term : graph_.directions) {
+    const Eigen::Vector3d d = term.direction_map.normalized();
+    directions_.push_back({d.x(), d.y(), d.z()});
+  }
+  for (std::size_t d = 0; d < directions_.size(); ++d) {
+    problem_.AddParameterBlock(directions_[d].data(), 3, &direction_manifold_);
+    for (const DirectionTerm::View& view : graph_.directions[d].views) {
+      auto cost = std::make_unique<DirectionCost>(view.normal_scan, factor * view.information);
+      problem_.AddResidualBlock(
+          cost.release(), nullptr, poses_[view.i].data(), directions_[d].data());
     }
   }
 }
@@ -124,6 +142,12 @@ double GraphProblem::ViewChi2(std::size_t plane, std::size_t view) const {
   const Pose T = pose(graph_.planes[plane].views[view].i);
   return PlaneViewDistances(views_[plane][view], T, planes_[plane].data(), centres_[plane])
       .squaredNorm();
+}
+
+double GraphProblem::DirectionChi2(std::size_t direction, std::size_t view) const {
+  const DirectionTerm::View& v = graph_.directions[direction].views[view];
+  const Eigen::Map<const Eigen::Vector3d> d(directions_[direction].data());
+  return v.information * (pose(v.i).linear() * v.normal_scan).cross(d).squaredNorm();
 }
 
 double GraphProblem::PriorChi2(std::size_t term) const {

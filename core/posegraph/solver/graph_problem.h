@@ -6,10 +6,13 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <ceres/manifold.h>
 #include <ceres/problem.h>
+#include <ceres/sphere_manifold.h>
 
 #include "core/geometry/pose.h"
 #include "core/geometry/primitives.h"
+#include "core/posegraph/costs/direction_cost.h"
 #include "core/posegraph/costs/plane_cost.h"
 #include "core/posegraph/costs/pose_block.h"
 #include "core/posegraph/pose_graph.h"
@@ -21,7 +24,8 @@ namespace strata {
 class GraphProblem {
  public:
   // `graph` is valid and outlives this; `held` marks the nodes that do not move; the factors weigh
-  // local (relative) and global terms (planes, priors).
+  // local (relative) and global terms (planes, directions,
+  // priors).
   GraphProblem(const PoseGraphProblem& graph,
                const std::vector<bool>& held,
                double local_factor,
@@ -37,6 +41,7 @@ class GraphProblem {
   // Where the blocks are, without weights and factors.
   double RelativeChi2(std::size_t term) const;
   double ViewChi2(std::size_t plane, std::size_t view) const;
+  double DirectionChi2(std::size_t direction, std::size_t view) const;
   double PriorChi2(std::size_t term) const;
 
   std::vector<Pose> poses() const;
@@ -46,6 +51,7 @@ class GraphProblem {
   void AddNodes();
   void AddRelative(double factor);
   void AddPlanes(double factor);
+  void AddDirections(double factor);
   void AddPriors(double factor);
   void Damp(double factor);
   Pose pose(std::size_t node) const { return PoseOf(poses_[node].data()); }
@@ -56,9 +62,11 @@ class GraphProblem {
   std::vector<PlaneBlock> planes_;
   std::vector<Eigen::Vector3d> centres_;  // of the planes
   std::vector<std::vector<PlaneView>> views_;
+  std::vector<DirectionBlock> directions_;
   std::vector<double> relative_weights_;
   PoseManifold pose_manifold_;
   PlaneManifold plane_manifold_;
+  ceres::SphereManifold<3> direction_manifold_;
   ceres::Problem problem_;
 };
 

@@ -48,6 +48,11 @@ PoseGraphCosts CostsOf(const PoseGraphProblem& problem, const GraphProblem& grap
       costs.planes += graph.ViewChi2(p, v);
     }
   }
+  for (std::size_t d = 0; d < problem.directions.size(); ++d) {
+    for (std::size_t v = 0; v < problem.directions[d].views.size(); ++v) {
+      costs.directions += graph.DirectionChi2(d, v);
+    }
+  }
   for (std::size_t k = 0; k < problem.priors.size(); ++k) costs.priors += graph.PriorChi2(k);
   return costs;
 }
@@ -63,6 +68,11 @@ std::vector<NodeResidual> WorstNodes(const PoseGraphProblem& problem, GraphProbl
   for (std::size_t p = 0; p < problem.planes.size(); ++p) {
     for (std::size_t v = 0; v < problem.planes[p].views.size(); ++v) {
       nodes[problem.planes[p].views[v].i].chi2 += graph.ViewChi2(p, v);
+    }
+  }
+  for (std::size_t d = 0; d < problem.directions.size(); ++d) {
+    for (std::size_t v = 0; v < problem.directions[d].views.size(); ++v) {
+      nodes[problem.directions[d].views[v].i].chi2 += graph.DirectionChi2(d, v);
     }
   }
   for (std::size_t k = 0; k < problem.priors.size(); ++k) {
@@ -96,7 +106,8 @@ absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& prob
                      by_sums ? 2.0 * options.local_weight : 1.0,
                      by_sums ? 2.0 * (1.0 - options.local_weight) : 1.0);
   summary.before = CostsOf(problem, graph);
-  if (problem.planes.empty() && std::find(held.begin(), held.end(), false) == held.end()) {
+  if (problem.planes.empty() && problem.directions.empty() &&
+      std::find(held.begin(), held.end(), false) == held.end()) {
     summary.termination = PoseGraphTermination::kNothingToDo;
   } else {
     RelativeCandidates candidates(problem, graph);

@@ -60,6 +60,28 @@ absl::Status Validate(const PlaneTerm& term, std::size_t nodes) {
   return absl::OkStatus();
 }
 
+absl::Status ValidateUnit(const Eigen::Vector3d& vector, absl::string_view field) {
+  if (vector.allFinite() && std::abs(vector.norm() - 1.0) <= 1e-6) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat(field, ": has the length ", vector.norm(), ", must be a unit vector"));
+}
+
+absl::Status Validate(const DirectionTerm& term, std::size_t nodes) {
+  STRATA_RETURN_IF_ERROR(ValidateUnit(term.direction_map, "direction_map"));
+  for (const DirectionTerm::View& view : term.views) {
+    STRATA_RETURN_IF_ERROR(ValidateNode(view.i, nodes, "a view's i"));
+    STRATA_RETURN_IF_ERROR(ValidateUnit(view.normal_scan, "a view's normal_scan"));
+    if (!(view.information >= 0.0 && view.information <= kLargest)) {
+      return absl::InvalidArgumentError(absl::StrCat("information of the view from pose ",
+                                                     view.i,
+                                                     " is ",
+                                                     view.information,
+                                                     ", must be finite and not negative"));
+    }
+  }
+  return absl::OkStatus();
+}
+
 absl::Status Validate(const PriorTerm& term, std::size_t nodes) {
   STRATA_RETURN_IF_ERROR(ValidateNode(term.i, nodes, "i"));
   STRATA_RETURN_IF_ERROR(Annotate(ValidatePose(term.T_map_scan), "T_map_scan"));
@@ -114,6 +136,7 @@ absl::Status ValidateProblem(const PoseGraphProblem& problem) {
   }
   STRATA_RETURN_IF_ERROR(ValidateAll(problem.relative, nodes, "relative pose"));
   STRATA_RETURN_IF_ERROR(ValidateAll(problem.planes, nodes, "plane"));
+  STRATA_RETURN_IF_ERROR(ValidateAll(problem.directions, nodes, "direction"));
   return ValidateAll(problem.priors, nodes, "prior");
 }
 

@@ -67,6 +67,17 @@ class PoseGraphTest : public ::testing::TestWithParam<std::uint64_t> {
     }
     problem_.planes.push_back(term);
   }
+  // The normal of a surface of each node's own that faces along it, or away.
+  void AddDirection(const Eigen::Vector3d& direction) {
+    DirectionTerm term{.direction_map = direction, .views = {}};
+    for (std::size_t n = 0; n < truth_.size(); ++n) {
+      const double side = random_.Below(2) == 0 ? 1.0 : -1.0;
+      term.views.push_back({.i = n,
+                            .normal_scan = side * truth_[n].linear().transpose() * direction,
+                            .information = 1e5});
+    }
+    problem_.directions.push_back(term);
+  }
   void ExpectTruth(const PoseGraphSolution& solution, double tolerance) const {
     for (std::size_t n = 0; n < truth_.size(); ++n) {
       EXPECT_LT(LargestStep(truth_[n], solution.T_map_scan[n]), tolerance) << "node " << n;
@@ -99,6 +110,23 @@ TEST_P(PoseGraphTest, ThreePlanesGiveTheTruth) {
   STRATA_ASSERT_OK_AND_ASSIGN(const auto solution, OptimizePoseGraph(problem_));
   ExpectTruth(solution, 1e-4);
   EXPECT_NEAR(solution.planes[1].distance, -3.0, 1e-4);
+}
+
+TEST_P(PoseGraphTest, TwoDirectionsTurnScansThatShareNoSurface) {
+  MakePoses(6, 0.1, 0.0);
+  for (std::size_t n = 1; n < 6; ++n) {
+    AddRelative(n - 1, n);
+    problem_.relative.back().information.setZero();
+    problem_.relative.back().information(5, 5) = 1.0;  // joins them, and says nothing of turns
+  }
+  AddDirection(Eigen::Vector3d(1, 0.1, 0).normalized());
+  AddDirection(Eigen::Vector3d(0, 1, 0.2).normalized());
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto solution, OptimizePoseGraph(problem_));
+  EXPECT_GT(solution.summary.before.directions, 1.0);
+  EXPECT_LT(solution.summary.after.directions, 1e-9);
+  for (std::size_t n = 0; n < truth_.size(); ++n) {
+    EXPECT_LT(RotationAngleRad(truth_[n].inverse() * solution.T_map_scan[n]), 1e-6) << n;
+  }
 }
 
 TEST_P(PoseGraphTest, WhatPlanesLeaveOpenStays) {
@@ -185,6 +213,9 @@ class MixedGraphTest : public PoseGraphTest {
     for (int k = 0; k < 6; ++k) AddRelative(random_.Below(6), 6 + random_.Below(6), 0.1);
     AddPlane({Eigen::Vector3d(1, 0.1, 0).normalized(), 4.0});
     AddPlane({Eigen::Vector3d(0, 0.1, 1).normalized(), 1.0});
+    AddDirection(Retract(Pose::Identity(), random_.Step(0.01, 0.0)).linear().col(0));
+    problem_.directions[0].direction_map = Eigen::Vector3d::UnitX();
+    for (DirectionTerm::View& view : problem_.directions[0].views) view.information = 1e3;
     problem_.priors.push_back({.i = 4,
                                .T_map_scan = Retract(truth_[4], random_.Step(0.1, 0.1)),
                                .information = random_.Information()});
@@ -266,6 +297,7 @@ TEST(PoseGraphErrorsTest, NameTheTermTheFieldAndTheBound) {
   good.T_map_scan.assign(2, Pose::Identity());
   good.relative.push_back({.i = 0, .j = 1});
   good.planes.push_back({.plane_map = {}, .views = {{.i = 1}}});
+  good.directions.push_back({.views = {{.i = 1}}});
   good.priors.push_back({.i = 1});
   STRATA_EXPECT_OK(OptimizePoseGraph(good));
 
@@ -287,6 +319,10 @@ TEST(PoseGraphErrorsTest, NameTheTermTheFieldAndTheBound) {
   expect([](auto& p, auto&) { p.planes[0].views[0].moments(0, 0) = kNan; }, "not fin");
   expect([](auto& p, auto&) { p.planes[0].plane_map.normal *= 2.0; }, "unit normal");
   expect([](auto& p, auto&) { p.planes[0].views[0].i = 9; }, "a view's i is 9");
+  expect([](auto& p, auto&) { p.directions[0].direction_map *= 2.0; }, "direction_map: has the le");
+  expect([](auto& p, auto&) { p.directions[0].views[0].normal_scan(1) = kNan; }, "length nan");
+  expect([](auto& p, auto&) { p.directions[0].views[0].information = -1.0; }, "not negative");
+  expect([](auto& p, auto&) { p.directions[0].views[0].i = 3; }, "direction 0: a view's i is 3");
   expect([](auto& p, auto&) { p.priors[0].i = 2; }, "prior 0: i is 2");
   expect([](auto&, auto& o) { o.local_weight = 1.5; }, "local_weight is 1.5");
   expect([](auto&, auto& o) { o.max_closure_chi2 = 0.0; }, "max_closure_chi2 is 0");
