@@ -29,6 +29,7 @@ std::vector<JobParameter> OptimizeParameters() {
       {"dry_run", FlagType(), "0", "Only propose"},
       {"closures", FlagType(), "1", "Look for loops that nobody closed yet"},
       {"planes", FlagType(), "1", "Walls and floors hold the scans that see them"},
+      {"directions", FlagType(), "1", "Parallel walls turn the scans that see them alike"},
       {"robust", FlagType(), "1", "Leave out closures that contradict the rest"},
       {"rounds", WholeType{1, 50}, "30", "Most rounds of matching and optimising"},
       {"pool", WholeType{1, 50}, "5", "Consecutive scans that move as one"},

@@ -5,7 +5,7 @@ strata_executable(
        strata::test_recordings
 )
 # Table 7.1 stopped to hold once without anybody seeing it.
-foreach(table table_7_1 fig_7_9)
+foreach(table table_7_1 fig_7_9 directions)
   add_test(NAME thesis_${table} COMMAND global_constraints ${table})
   set_tests_properties(thesis_${table} PROPERTIES LABELS smoke TIMEOUT 300 COST 100)
 endforeach()

@@ -25,6 +25,7 @@ LABELS = ("core/classification",)
 RESULTS = {
     "table_7_1": ("Thesis, table 7.1: four views of a small house", "experiments/global_constraints table_7_1", POSES),
     "fig_7_9": ("Thesis, figure 7.9: two to six views", "experiments/global_constraints fig_7_9", POSES),
+    "directions": ("Main directions at two and three views", "experiments/global_constraints directions", POSES),
     "sigma_alpha": ("Thesis, 7.4.4: deviation from planes on a large building", "experiments/global_constraints sigma_alpha",
                     POSES),
     "facade_planes": ("Thesis, 7.4.4: a recorded facade", "experiments/global_constraints facade 4", POSES),

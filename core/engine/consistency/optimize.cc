@@ -111,6 +111,7 @@ class Optimizer {
     AlignmentOptions options;
     options.registration = EngineRegistrationOptions();
     options.planes = settings_.planes;
+    options.directions = settings_.directions;
     options.max_rounds = settings_.rounds;
     options.pose_graph.weighting = settings_.weighting;
     options.pose_graph.local_weight = settings_.local_weight;
@@ -182,6 +183,7 @@ class Optimizer {
       context_.SetMetric(name + "matches", static_cast<double>(round.matches));
       context_.SetMetric(name + "registered", static_cast<double>(round.registered));
       context_.SetMetric(name + "planes", static_cast<double>(round.planes));
+      context_.SetMetric(name + "directions", static_cast<double>(round.directions));
       context_.SetMetric(name + "cost_before", round.before.total());
       context_.SetMetric(name + "cost_after", round.after.total());
       context_.SetMetric(name + "max_shift_m", round.max_shift_m);
@@ -191,6 +193,7 @@ class Optimizer {
       const PoseGraphCosts& costs = result.rounds.back().after;
       context_.SetMetric("cost.relative", costs.relative);
       context_.SetMetric("cost.planes", costs.planes);
+      context_.SetMetric("cost.directions", costs.directions);
       context_.SetMetric("cost.priors", costs.priors);
     }
     for (const NodeResidual& worst : result.worst_nodes) {

@@ -8,6 +8,7 @@ OptimizeSettings::OptimizeSettings(const JobArguments& arguments)
     : dry_run(arguments.Flag("dry_run")),
       closures(arguments.Flag("closures")),
       planes(arguments.Flag("planes")),
+      directions(arguments.Flag("directions")),
       robust(arguments.Flag("robust")),
       rounds(arguments.Whole("rounds")),
       pool(arguments.Whole("pool")),

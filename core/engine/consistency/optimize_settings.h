@@ -13,12 +13,13 @@ namespace strata {
 struct OptimizeSettings {
   explicit OptimizeSettings(const JobArguments& arguments);
 
-  bool dry_run;   // propose only
-  bool closures;  // look for closures nobody has tried
-  bool planes;    // hold planes against all scans that see them
-  bool robust;    // closures may turn out to be false
-  int rounds;     // of correspondences and planes from the current poses
-  int pool;       // consecutive scans of a pooled local map
+  bool dry_run;     // propose only
+  bool closures;    // look for closures nobody has tried
+  bool planes;      // hold planes against all scans that see them
+  bool directions;  // turn scans alike by the directions that walls face in; needs planes
+  bool robust;      // closures may turn out to be false
+  int rounds;       // of correspondences and planes from the current poses
+  int pool;         // consecutive scans of a pooled local map
   Weighting weighting;
   double local_weight;      // of local_global
   MoveTolerance tolerance;  // tolerance_m, tolerance_rad

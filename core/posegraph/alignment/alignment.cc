@@ -332,6 +332,10 @@ class Alignment {
       round.supports += plane.views.size();
     }
     round.planes = shared_.size();
+    for (const SharedDirection& direction : directions_) {
+      graph.directions.push_back(TermOf(direction, result_.T_map_scan));
+    }
+    round.directions = directions_.size();
     return absl::OkStatus();
   }
 
@@ -383,6 +387,7 @@ class Alignment {
     }
     gates_ = GatesOfNow();
     shared_ = FindSharedPlanes(posed, gates_);
+    if (options_.directions) directions_ = FindSharedDirections(posed, gates_);
     std::erase_if(shared_, [this](const SharedPlane& plane) {
       return std::any_of(
           problem_.excluded_planes.begin(),
@@ -432,6 +437,7 @@ class Alignment {
   std::vector<std::vector<const ScanPair*>> measured_;  // of every node j
   std::vector<const RelativePoseTerm*> odometry_;       // of every node j; nullptr: none
   std::vector<SharedPlane> shared_;
+  std::vector<SharedDirection> directions_;
   SharedPlaneOptions gates_;      // that they were found by
   std::size_t measured_end_ = 0;  // of the graph's relative terms: what is given or a match
   AlignmentResult result_;

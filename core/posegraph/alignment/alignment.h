@@ -92,6 +92,8 @@ struct AlignmentProblem {
 struct AlignmentOptions {
   MlsRegistrationOptions registration;
   bool planes = true;
+  // Scans of a built world are turned alike by the directions its surfaces face in, shared or not.
+  bool directions = false;
   // Its pose_sigma is that of the poses given: where it is more than the default, the search
   // narrows to the default as poses settle.
   SharedPlaneOptions shared_planes;
@@ -115,6 +117,7 @@ struct AlignmentRound {
   std::size_t registered = 0;  // anew in this round, successful or not
   std::size_t planes = 0;
   std::size_t supports = 0;  // of planes
+  std::size_t directions = 0;
   PoseGraphCosts before, after;
   double max_shift_m = 0.0, max_turn_rad = 0.0;  // of a scan in this round
 };

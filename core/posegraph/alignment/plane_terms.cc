@@ -61,4 +61,17 @@ PlaneTerm TermOf(const SharedPlane& plane, const std::vector<Pose>& T_map_scan) 
   return term;
 }
 
+DirectionTerm TermOf(const SharedDirection& direction, const std::vector<Pose>& T_map_scan) {
+  DirectionTerm term{.direction_map = direction.direction_map, .views = {}};
+  for (const SharedDirection::View& view : direction.views) {
+    const Eigen::Vector3d normal = T_map_scan[view.scan].linear() * view.normal_scan;
+    const double sin2 = normal.cross(direction.direction_map).squaredNorm();
+    // As planes: what does not agree counts less, and more from round to round if it was the poses.
+    const double disagreement = std::max(1.0, view.information * sin2 / 2.0);
+    term.views.push_back(
+        {view.scan, view.normal_scan, view.information / (disagreement * disagreement)});
+  }
+  return term;
+}
+
 }  // namespace strata

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/geometry/pose.h"
+#include "core/planes/shared_directions.h"
 #include "core/planes/shared_planes.h"
 #include "core/posegraph/alignment/alignment.h"
 #include "core/posegraph/pose_graph.h"
@@ -14,6 +15,9 @@ namespace strata {
 
 // Whether `found` is what was excluded: the same plane to 3° and 0.2 m, and a scan in common.
 bool IsExcluded(const SharedPlane& found, const ExcludedPlane& excluded);
+
+// The term of a direction, each view as much as it agrees with the others.
+DirectionTerm TermOf(const SharedDirection& direction, const std::vector<Pose>& T_map_scan);
 
 // The term of a plane, as much as its views agree at these poses.
 PlaneTerm TermOf(const SharedPlane& plane, const std::vector<Pose>& T_map_scan);
