@@ -18,7 +18,7 @@ aligned_kills|10|the same where scans are aligned|$experiments/kill_campaign --s
 terms|~5|the same after SIGTERM|$experiments/kill_campaign --seed $seed terms
 clocks|~2|the same where the wall clock is set back and forward|$experiments/kill_campaign --seed $seed clock
 disks|90|a broken promise on a disk that fails, fills up or loses power|env TMPDIR=/dev/shm $experiments/disk_campaign --every 40 --seed $seed
-flips|~10|a flipped bit of a map's file that nobody notices|env TMPDIR=/dev/shm $experiments/disk_campaign --flips 2000 --seed $seed
+flips|~10|a flipped bit of a map's file that nobody notices|env TMPDIR=/dev/shm $experiments/disk_campaign --flips 60 --seed $seed
 watchers|~20|a change that a watcher is not told of|env STRATA_RUNS=1000 $build/tests/core/engine/engine_watch_model_test
 optimize_crash|8|a map that an optimize job leaves half done|env STRATA_KILLS=30 STRATA_SEED=$seed $build/tests/integration/optimize_crash_test
 classify_crash|8|the same for jobs that learn and label|env STRATA_KILLS=30 STRATA_SEED=$seed $build/tests/integration/classify_crash_test

@@ -16,6 +16,15 @@ struct Colour {
   std::uint8_t r = 0, g = 0, b = 0;
   friend bool operator==(const Colour&, const Colour&) = default;
 };
+// As 0xRRGGBB, and back.
+inline std::uint32_t PackedRgb(const Colour& colour) {
+  return std::uint32_t{colour.r} << 16 | std::uint32_t{colour.g} << 8 | colour.b;
+}
+inline Colour ColourOfRgb(std::uint32_t rgb) {
+  return {static_cast<std::uint8_t>(rgb >> 16),
+          static_cast<std::uint8_t>(rgb >> 8),
+          static_cast<std::uint8_t>(rgb)};
+}
 
 // Structure of arrays. `points` are float metres relative to `origin`, so that coordinates far from
 // zero (UTM) lose nothing; whoever uploads folds `origin` into the pose. The optional columns are

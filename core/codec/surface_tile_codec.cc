@@ -33,6 +33,7 @@ constexpr float kCostCodesPerOctave = 6.0F;        // steps of 12 %, where a rob
 constexpr float kCoarseCostCodesPerOctave = 2.0F;  // steps of 41 %, elsewhere
 constexpr std::int32_t kInfiniteCost = 255;
 constexpr std::uint8_t kMaxConfidence = 100;
+constexpr std::int32_t kMaxShade = 63;
 constexpr int kMaxTraversability = static_cast<int>(Traversability::kUnderside);
 constexpr auto kUnderside = static_cast<std::uint8_t>(Traversability::kUnderside);
 
@@ -42,6 +43,8 @@ struct Codes {
   std::uint8_t traversability = 0;
   std::uint8_t class_id = 0;
   std::uint8_t confidence = 0;
+  bool coloured = false;
+  std::int32_t red = 0, green = 0, blue = 0;  // of 64
   std::int32_t height = 0;
   std::int32_t depth = 0;  // > 0: vertical
   std::int32_t sigma = 0;
@@ -80,6 +83,11 @@ std::int32_t CostCodeOf(float cost, std::uint8_t traversability) {
   return Rounded(std::min(code, kInfiniteCost - 1.0F));
 }
 
+std::int32_t ShadeCode(std::uint8_t shade) { return (shade * kMaxShade + 127) / 255; }
+std::uint8_t Shade(std::int32_t code) {
+  return static_cast<std::uint8_t>((code * 255 + kMaxShade / 2) / kMaxShade);
+}
+
 Codes Quantised(const Surface& surface) {
   Codes codes{.cell = surface.cell,
               .traversability = static_cast<std::uint8_t>(surface.traversability),
@@ -90,6 +98,12 @@ Codes Quantised(const Surface& surface) {
     codes.cost = CostCodeOf(surface.cost, codes.traversability);
   }
   if (codes.class_id != 0) codes.confidence = std::min(surface.confidence, kMaxConfidence);
+  if (surface.coloured()) {
+    codes.coloured = true;
+    codes.red = ShadeCode(surface.colour.r);
+    codes.green = ShadeCode(surface.colour.g);
+    codes.blue = ShadeCode(surface.colour.b);
+  }
   if (surface.vertical()) codes.depth = std::max(1, LengthCode(surface.depth_m));
   return codes;
 }
@@ -112,11 +126,17 @@ struct CodeTables {
   }
 };
 
+Colour RestoredColour(const Codes& codes) {
+  if (!codes.coloured) return {};
+  return Known({.r = Shade(codes.red), .g = Shade(codes.green), .b = Shade(codes.blue)});
+}
+
 Surface Restored(const Codes& codes, const CodeTables& tables) {
   return {.cell = codes.cell,
           .traversability = static_cast<Traversability>(codes.traversability),
           .class_id = codes.class_id,
           .confidence = codes.confidence,
+          .colour = RestoredColour(codes),
           .z_m = static_cast<float>(codes.height) / kStepsPerMetre,
           .sigma_m = tables.sigma_m[codes.sigma],
           .depth_m = static_cast<float>(codes.depth) / kStepsPerMetre,
@@ -139,6 +159,10 @@ enum Column : std::uint8_t {
   kCost,  // + traversability; not of undersides
   kCostLast = kCost + 2,
   kConfidence,  // where there is a class
+  kColoured,    // bits
+  kGreen,       // and what follows, where coloured
+  kRed,
+  kBlue,
   kColumnCount
 };
 
@@ -240,27 +264,84 @@ struct ExpectedKind {
   }
 };
 
-// Tiles with undersides are of the latest version; of the others those with classes are of version
-// 2, and those without of version 1, without the last column.
+// Tiles with colours are of the latest version; of the others those with undersides of version 3,
+// those with classes of version 2, and those without of version 1, without the column of classes'
+// confidences.
 constexpr std::uint16_t kVersionWithConfidence = 2;
+constexpr std::uint16_t kVersionWithUndersides = 3;
+constexpr std::uint16_t kVersionWithColours = kSurfaceTileVersion;
 
 std::uint16_t VersionOf(const std::vector<Codes>& surfaces) {
   std::uint16_t version = 1;
   for (const Codes& codes : surfaces) {
-    if (codes.traversability == kUnderside) return kSurfaceTileVersion;
-    if (codes.confidence != 0) version = kVersionWithConfidence;
+    if (codes.coloured) return kVersionWithColours;
+    if (codes.traversability == kUnderside) {
+      version = kVersionWithUndersides;
+    } else if (codes.confidence != 0) {
+      version = std::max(version, kVersionWithConfidence);
+    }
   }
   return version;
 }
 
-int ColumnsOf(bool with_confidence) { return with_confidence ? kColumnCount : kConfidence; }
+int ColumnsOf(std::uint16_t version) {
+  if (version >= kVersionWithColours) return kColumnCount;
+  return version >= kVersionWithConfidence ? kColoured : kConfidence;
+}
+
+// The mean colour of the surfaces around that have one; 0 without any.
+struct ExpectedColour {
+  std::int32_t red = 0, green = 0, blue = 0;
+
+  ExpectedColour(std::span<const Codes> surfaces, const SurfacesBeside& n) {
+    int count = 0;
+    for (const std::uint32_t index : {n.left, n.up, n.up_right, n.up_left}) {
+      if (index == SurfacesBeside::kNone || !surfaces[index].coloured) continue;
+      red += surfaces[index].red;
+      green += surfaces[index].green;
+      blue += surfaces[index].blue;
+      ++count;
+    }
+    red = MeanOf(red, count);
+    green = MeanOf(green, count);
+    blue = MeanOf(blue, count);
+  }
+};
+
+// A shade as its difference to what is expected, modulo 64.
+template <typename Coder>
+bool CodeShade(Coder& coder, int column, std::int32_t expected, std::int32_t& shade) {
+  const std::uint8_t difference =
+      coder.CodeByte(column, static_cast<std::uint8_t>((shade - expected) & kMaxShade));
+  if (difference > kMaxShade) return false;
+  shade = (expected + difference) & kMaxShade;
+  return true;
+}
+
+// In either direction, as CodeSurface(). Red and blue mostly change as green does.
+template <typename Coder>
+bool CodeColour(Coder& coder,
+                const SurfacesBeside& neighbours,
+                std::span<const Codes> surfaces,
+                Codes& codes) {
+  codes.coloured = coder.CodeBit(kColoured, codes.coloured);
+  if (!codes.coloured) return true;
+  const ExpectedColour expected(surfaces, neighbours);
+  if (!CodeShade(coder, kGreen, expected.green, codes.green)) return false;
+  const std::int32_t change = codes.green - expected.green;
+  const auto changed = [change](std::int32_t shade) {
+    return std::clamp(shade + change, 0, kMaxShade);
+  };
+  return CodeShade(coder, kRed, changed(expected.red), codes.red) &&
+         CodeShade(coder, kBlue, changed(expected.blue), codes.blue);
+}
 
 // One surface, in either direction; false if what was read is none. `codes.cell` is known.
 template <typename Coder>
 bool CodeSurface(Coder& coder,
                  const SurfacesBeside& neighbours,
                  std::span<const Codes> surfaces,
-                 bool with_confidence,
+                 std::uint16_t version,
                  Codes& codes) {
   const ExpectedKind expected_kind(surfaces, neighbours);
   std::uint8_t kind = expected_kind.kind;
@@ -270,9 +351,12 @@ bool CodeSurface(Coder& coder,
   codes.traversability = kind >> 1;
   if (codes.traversability > kMaxTraversability) return false;
   codes.class_id = coder.CodeByte(kClass, codes.class_id);
-  if (with_confidence && codes.class_id != 0) {
+  if (version >= kVersionWithConfidence && codes.class_id != 0) {
     codes.confidence = coder.CodeByte(kConfidence, codes.confidence);
     if (codes.confidence > kMaxConfidence) return false;
+  }
+  if (version >= kVersionWithColours && !CodeColour(coder, neighbours, surfaces, codes)) {
+    return false;
   }
   const bool vertical = (kind & 1) != 0;
   const Surroundings around(surfaces, neighbours, vertical);
@@ -320,10 +404,9 @@ absl::StatusOr<std::string> EncodeSurfaceTile(const SurfaceTile& tile) {
   }
   const std::vector<SurfacesBeside> neighbours = FindNeighbours(cells);
   const std::uint16_t version = VersionOf(surfaces);
-  const bool with_confidence = version >= kVersionWithConfidence;
-  ColumnEncoder encoder(ColumnsOf(with_confidence));
+  ColumnEncoder encoder(ColumnsOf(version));
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
-    CodeSurface(encoder, neighbours[i], surfaces, with_confidence, surfaces[i]);
+    CodeSurface(encoder, neighbours[i], surfaces, version, surfaces[i]);
   }
   std::string body;
   PutTileHeader(body, tile.key);
@@ -337,14 +420,13 @@ absl::StatusOr<SurfaceTile> DecodeSurfaceTile(absl::string_view bytes) {
   STRATA_ASSIGN_OR_RETURN(const absl::string_view body,
                           OpenBlob(BlobKind::kSurfaceTile, kSurfaceTileVersion, bytes));
   const std::uint16_t version = VersionOfBlob(bytes);
-  const bool with_confidence = version >= kVersionWithConfidence;
   ByteReader reader(body);
   SurfaceTile tile;
   STRATA_RETURN_IF_ERROR(TakeTileHeader(reader, tile.key));
   tile.version = reader.Fixed<std::uint64_t>();
   STRATA_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> cells, TakeCells(reader));
   STRATA_ASSIGN_OR_RETURN(ColumnDecoder decoder,
-                          ColumnDecoder::Open(reader, ColumnsOf(with_confidence), cells.size()));
+                          ColumnDecoder::Open(reader, ColumnsOf(version), cells.size()));
   if (reader.remaining() != 0) return absl::DataLossError("surface tile: bytes left over");
   static const CodeTables tables;
   const std::vector<SurfacesBeside> neighbours = FindNeighbours(cells);
@@ -352,7 +434,7 @@ absl::StatusOr<SurfaceTile> DecodeSurfaceTile(absl::string_view bytes) {
   tile.surfaces.reserve(cells.size());
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     surfaces[i].cell = cells[i];
-    if (!CodeSurface(decoder, neighbours[i], surfaces, with_confidence, surfaces[i])) {
+    if (!CodeSurface(decoder, neighbours[i], surfaces, version, surfaces[i])) {
       return absl::DataLossError(absl::StrCat("surface tile: surface ", i, " is out of range"));
     }
     tile.surfaces.push_back(Restored(surfaces[i], tables));

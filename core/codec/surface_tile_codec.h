@@ -12,11 +12,12 @@
 
 namespace strata {
 
-inline constexpr std::uint16_t kSurfaceTileVersion = 3;
+inline constexpr std::uint16_t kSurfaceTileVersion = 4;
 
 // The tile in the format of FORMAT.md, envelope included. A pure function of the tile, and
 // *EncodeSurfaceTile(*DecodeSurfaceTile(bytes)) == bytes. What a reader gets back:
 //   key, version, cell, traversability, class_id, confidence, vertical()   exactly
+//   colour    within 2 of 255 a channel; known or not exactly
 //   z_m       within 1/1024 m (0.98 mm): a multiple of 1/512 m; |z| ≤ 32,767 m
 //   depth_m   the same, but never 0 when it was not: a depth below 1/1024 m becomes 1/512 m
 //   sigma_m   within 4.8 %, from 60 nm to 0.99 km (clamped outside)

@@ -94,6 +94,19 @@ Traversability MajorityTraversability(std::span<const ChildSurface> chain) {
   return yes > no ? Traversability::kTraversable : Traversability::kNonTraversable;
 }
 
+// The mean of those that have one.
+Colour MeanColour(std::span<const ChildSurface> chain) {
+  ColourSum sum;
+  for (const ChildSurface& child : chain) {
+    if (!child.surface->coloured()) continue;
+    sum.r += child.surface->colour.r;
+    sum.g += child.surface->colour.g;
+    sum.b += child.surface->colour.b;
+    ++sum.count;
+  }
+  return MeanColour(sum);
+}
+
 float DepthOf(std::span<const ChildSurface> chain, double z_m, double thickness_m) {
   std::size_t vertical = 0;
   double bottom_m = std::numeric_limits<double>::infinity();
@@ -129,6 +142,7 @@ Surface Summarise(std::uint16_t cell, std::span<const ChildSurface> chain, doubl
           .traversability = MajorityTraversability(chain),
           .class_id = majority.class_id,
           .confidence = majority.confidence,
+          .colour = MeanColour(chain),
           .z_m = static_cast<float>(z_m),
           .sigma_m = static_cast<float>(std::sqrt(1.0 / sum_w + spread)),
           .depth_m = DepthOf(chain, z_m, thickness_m),

@@ -30,6 +30,14 @@ void Elect(std::span<const ClassVotes> votes, Surface& surface) {
 
 }  // namespace
 
+Colour MeanColour(const ColourSum& sum) {
+  if (sum.count == 0) return {};
+  const auto mean = [&sum](std::uint64_t channel) {
+    return static_cast<std::uint8_t>((2 * channel + sum.count) / (2 * sum.count));
+  };
+  return Known({.r = mean(sum.r), .g = mean(sum.g), .b = mean(sum.b)});
+}
+
 void SurfaceTile::IndexRows() {
   row_begin.fill(0);
   for (const Surface& surface : surfaces) ++row_begin[(surface.cell >> kTileShift) + 1];
@@ -59,6 +67,9 @@ SurfaceTile SurfacesOf(const MlsTile& tile) {
                                .z_m = static_cast<float>(patch.mean_m()),
                                .sigma_m = static_cast<float>(patch.sigma_m()),
                                .depth_m = static_cast<float>(patch.depth_m())});
+  }
+  for (std::size_t i = 0; i < tile.colour.size(); ++i) {
+    result.surfaces[i].colour = MeanColour(tile.colour[i]);
   }
   for (auto vote = tile.votes.begin(); vote != tile.votes.end();) {
     const auto of_other = std::find_if(

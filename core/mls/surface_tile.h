@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "core/cloud/point_cloud.h"
 #include "core/mls/mls_map.h"
 #include "core/mls/tile_key.h"
 
@@ -28,18 +29,28 @@ struct Surface {
   Traversability traversability = Traversability::kUnknown;
   std::uint8_t class_id = 0;    // class with the most votes, the smaller id on a tie; 0 = none
   std::uint8_t confidence = 0;  // share of the votes that class_id has [%], 1 to 100; 0 without
+  Colour colour = {};           // mean of its points'; all 0 = none known, black is (1, 1, 1)
   float z_m = 0.0F;             // Patch::mean_m()
   float sigma_m = 0.0F;         // Patch::sigma_m()
   float depth_m = 0.0F;         // Patch::depth_m(); > 0 means vertical
   float cost = 0.0F;  // path cost factor of the default profile, ≥ 0 (6.2.2); see traversability.h
 
   bool vertical() const { return depth_m > 0.0F; }
+  bool coloured() const { return colour != Colour(); }
   bool underside() const { return traversability == Traversability::kUnderside; }
   // Underside of what stands below this surface.
   float bottom_m() const { return z_m - depth_m; }
 
   friend bool operator==(const Surface&, const Surface&) = default;
 };
+static_assert(sizeof(Surface) == 24);
+
+// A known colour as Surface::colour has it.
+inline Colour Known(const Colour& colour) {
+  return colour == Colour() ? Colour{.r = 1, .g = 1, .b = 1} : colour;
+}
+// The same of what was summed; all 0 where that is nothing.
+Colour MeanColour(const ColourSum& sum);
 
 // Surfaces sorted by (cell, z).
 struct SurfaceTile {

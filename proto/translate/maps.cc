@@ -160,8 +160,7 @@ v1::MapClass ToProto(const MapClass& map_class) {
   v1::MapClass proto;
   proto.set_id(map_class.id);
   proto.set_name(map_class.name);
-  const Colour& c = map_class.colour;
-  proto.set_colour(std::uint32_t{c.r} << 16 | std::uint32_t{c.g} << 8 | c.b);
+  proto.set_colour(PackedRgb(map_class.colour));
   return proto;
 }
 
@@ -173,11 +172,8 @@ absl::StatusOr<MapClass> FromProto(const v1::MapClass& proto) {
                                                    proto.colour(),
                                                    " does not fit; at most 255 and 0xFFFFFF"));
   }
-  const auto channel = [&](int shift) {
-    return static_cast<std::uint8_t>(proto.colour() >> shift & 0xFF);
-  };
   return MapClass{
-      static_cast<std::uint16_t>(proto.id()), proto.name(), {channel(16), channel(8), channel(0)}};
+      static_cast<std::uint16_t>(proto.id()), proto.name(), ColourOfRgb(proto.colour())};
 }
 
 v1::BackupMapResponse ToProto(const api::BackupPiece& piece) {

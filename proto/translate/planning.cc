@@ -132,19 +132,22 @@ v1::Surface SurfaceToProto(const Surface& surface) {
   proto.set_depth_m(surface.depth_m);
   proto.set_cost(surface.cost);
   proto.set_confidence(surface.confidence);
+  proto.set_colour(PackedRgb(surface.colour));
   return proto;
 }
 
 absl::StatusOr<Surface> SurfaceFromProto(const v1::Surface& proto) {
   if (proto.cell() > std::numeric_limits<std::uint16_t>::max() ||
       proto.class_id() > std::numeric_limits<std::uint8_t>::max() || proto.confidence() > 100 ||
-      !v1::Traversability_IsValid(proto.traversability())) {
+      proto.colour() > 0xFFFFFF || !v1::Traversability_IsValid(proto.traversability())) {
     return absl::InvalidArgumentError(absl::StrCat("surface: cell ",
                                                    proto.cell(),
                                                    ", class_id ",
                                                    proto.class_id(),
                                                    ", confidence ",
                                                    proto.confidence(),
+                                                   ", colour ",
+                                                   proto.colour(),
                                                    " or traversability ",
                                                    static_cast<int>(proto.traversability()),
                                                    " is out of range"));
@@ -158,6 +161,7 @@ absl::StatusOr<Surface> SurfaceFromProto(const v1::Surface& proto) {
   surface.depth_m = proto.depth_m();
   surface.cost = proto.cost();
   surface.confidence = static_cast<std::uint8_t>(proto.confidence());
+  surface.colour = ColourOfRgb(proto.colour());
   return surface;
 }
 

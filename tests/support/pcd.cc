@@ -73,12 +73,20 @@ absl::StatusOr<PointCloud> ReadBinaryPcd(const std::filesystem::path& path) {
   cloud.points.reserve(layout.points);
   const std::size_t offsets[3] = {
       layout.offset.at("x"), layout.offset.at("y"), layout.offset.at("z")};
+  const auto rgb = layout.offset.find("rgb");
   for (std::size_t i = 0; i < layout.points; ++i) {
     Eigen::Vector3f p;
     for (int k = 0; k < 3; ++k) {
       std::memcpy(&p[k], bytes.data() + i * layout.point_bytes + offsets[k], sizeof(float));
     }
-    if (p.allFinite()) cloud.points.push_back(p);
+    if (!p.allFinite()) continue;
+    cloud.points.push_back(p);
+    if (rgb == layout.offset.end()) continue;
+    Colour colour;  // packed as 0x00rrggbb
+    std::memcpy(&colour.b, bytes.data() + i * layout.point_bytes + rgb->second, 1);
+    std::memcpy(&colour.g, bytes.data() + i * layout.point_bytes + rgb->second + 1, 1);
+    std::memcpy(&colour.r, bytes.data() + i * layout.point_bytes + rgb->second + 2, 1);
+    cloud.colour.push_back(colour);
   }
   return cloud;
 }

@@ -30,11 +30,12 @@ struct ExportOptions {
   std::string map;
   std::string format;
   std::string out;
+  std::string layer = "traversability";
   std::int32_t level = 0;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
 };
 
-Colour ColourOf(const Surface& surface) {
+Colour TraversabilityColour(const Surface& surface) {
   switch (surface.traversability) {
     case Traversability::kTraversable:
       return picture::kTraversableColour;
@@ -47,6 +48,10 @@ Colour ColourOf(const Surface& surface) {
   return surface.vertical() ? picture::kVerticalColour : picture::kUnknownColour;
 }
 
+Colour OwnColour(const Surface& surface) {
+  return surface.coloured() ? surface.colour : picture::kUnknownColour;
+}
+
 // No labels rather than none but zeros.
 void DropIfNone(std::vector<std::uint16_t>& labels) {
   if (std::all_of(labels.begin(), labels.end(), [](auto label) { return label == 0; })) {
@@ -55,14 +60,14 @@ void DropIfNone(std::vector<std::uint16_t>& labels) {
 }
 
 // Vertical segments become lines down to a vertex of their own.
-Geometry GeometryOf(const std::vector<SurfaceTile>& tiles, SurfaceMesh mesh) {
+Geometry GeometryOf(const std::vector<SurfaceTile>& tiles, SurfaceMesh mesh, bool own_colours) {
   Geometry geometry;
   geometry.vertices = std::move(mesh.vertices);
   geometry.triangles = std::move(mesh.triangles);
   geometry.lines = std::move(mesh.lines);
   for (const SurfaceTile& tile : tiles) {
     for (const Surface& surface : tile.surfaces) {
-      geometry.colour.push_back(ColourOf(surface));
+      geometry.colour.push_back(own_colours ? OwnColour(surface) : TraversabilityColour(surface));
       geometry.label.push_back(surface.class_id);
     }
   }
@@ -76,7 +81,8 @@ Geometry GeometryOf(const std::vector<SurfaceTile>& tiles, SurfaceMesh mesh) {
     geometry.lines.push_back(
         {segment.vertex, static_cast<std::uint32_t>(geometry.vertices.size())});
     geometry.vertices.push_back(foot);
-    geometry.colour.push_back(picture::kVerticalColour);
+    geometry.colour.push_back(own_colours ? geometry.colour[segment.vertex]
+                                          : picture::kVerticalColour);
     geometry.label.push_back(geometry.label[segment.vertex]);
   }
   DropIfNone(geometry.label);
@@ -92,12 +98,15 @@ absl::StatusOr<Geometry> MeshOf(Context& context,
   STRATA_ASSIGN_OR_RETURN(const FetchedTiles fetched,
                           FetchTiles(context, options.map, options.level));
   damage = fetched.damage;
+  const bool own_colours = options.layer == "colour";
+  if (own_colours) STRATA_RETURN_IF_ERROR(ExpectColours(options.map, fetched.tiles));
   std::vector<const SurfaceTile*> pointers;
   pointers.reserve(fetched.tiles.size());
   for (const SurfaceTile& tile : fetched.tiles) {
     pointers.push_back(&tile);
   }
-  return GeometryOf(fetched.tiles, MakeSurfaceMesh(pointers, info.parameters.mls.cell_size_m));
+  return GeometryOf(
+      fetched.tiles, MakeSurfaceMesh(pointers, info.parameters.mls.cell_size_m), own_colours);
 }
 
 // Every integrated scan's points at their poses.
@@ -111,6 +120,7 @@ absl::StatusOr<Geometry> PointsOf(Context& context, const ExportOptions& options
         return absl::OkStatus();
       }));
   Geometry geometry;
+  bool coloured = false;
   for (const ScanInfo& scan : scans) {
     STRATA_RETURN_IF_ERROR(context.database.scans().GetPoints(
         context.call, options.map, scan.header.id, [&](const PointCloud& chunk) {
@@ -118,11 +128,15 @@ absl::StatusOr<Geometry> PointsOf(Context& context, const ExportOptions& options
             if (!std::isfinite(chunk.points[i].x())) continue;
             geometry.vertices.emplace_back(scan.T_map_scan * chunk.points[i].cast<double>());
             geometry.label.push_back(chunk.label.empty() ? 0 : chunk.label[i]);
+            geometry.colour.push_back(chunk.colour.empty() ? picture::kUnknownColour
+                                                           : chunk.colour[i]);
+            coloured = coloured || !chunk.colour.empty();
           }
           return absl::OkStatus();
         }));
   }
   DropIfNone(geometry.label);
+  if (!coloured) geometry.colour.clear();
   return geometry;
 }
 
@@ -175,7 +189,7 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
          options->format,
          "ply: triangles and edges, colour by traversability and the class as label where there "
          "are classes, binary; obj: the same as text, without label; pcd: all points, binary x y z "
-         "and label")
+         "and, where there are, rgb and label")
       ->check(CLI::IsMember({"ply", "obj", "pcd"}))
       ->required();
   app->add_option("--out", options->out, "The file to write")->type_name("FILE")->required();
@@ -189,6 +203,9 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
         options->origin = {n[0], n[1], n[2]};
       },
       "Coordinates relative to this place, for maps far from their origin [m]");
+  app->add_option("--layer", options->layer, "What the colours of a mesh say")
+      ->check(CLI::IsMember({"traversability", "colour"}))
+      ->capture_default_str();
   app->add_option("--level", options->level, "Level of detail of the mesh, 0 = finest")
       ->check(CLI::Range(0, kMaxLevel))
       ->capture_default_str();

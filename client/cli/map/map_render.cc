@@ -111,6 +111,10 @@ absl::Status Render(Context& context, RenderOptions options) {
   if (options.layer == "class") {
     STRATA_ASSIGN_OR_RETURN(options.picture.classes, StylesOf(context, options.map, fetched.tiles));
   }
+  if (options.layer == "colour") {
+    STRATA_RETURN_IF_ERROR(ExpectColours(options.map, fetched.tiles));
+    options.picture.own_colours = true;
+  }
   STRATA_ASSIGN_OR_RETURN(const picture::Overlay overlay, OverlayOf(context, options));
   const picture::Picture picture = picture::DrawMap(
       fetched.tiles, cell * static_cast<double>(1 << level), paths, options.picture, overlay);
@@ -190,7 +194,7 @@ void AddMapRender(Commands& commands, CLI::App* noun) {
       noun,
       "render",
       "Draw a map: traversable yellow, horizontal but not traversable red, vertical blue; or "
-      "every class in its colour",
+      "every class in its colour; or all in the colours of the points",
       "strata map render campus campus.png --view oblique --path route.ply",
       [options](Context& context) { return Render(context, *options); });
   AddMapName(render, options->map);
@@ -225,7 +229,7 @@ void AddMapRender(Commands& commands, CLI::App* noun) {
                    options->constraints,
                    "What holds the scans together, coloured by how well the poses keep it");
   render->add_option("--layer", options->layer, "What the colours of surfaces say")
-      ->check(CLI::IsMember({"traversability", "class"}))
+      ->check(CLI::IsMember({"traversability", "class", "colour"}))
       ->capture_default_str();
   AddViewOptions(render, options);
 }

@@ -55,4 +55,17 @@ absl::StatusOr<FetchedTiles> FetchTiles(Context& context,
   return fetched;
 }
 
+absl::Status ExpectColours(const std::string& map, const std::vector<SurfaceTile>& tiles) {
+  bool empty = true;
+  for (const SurfaceTile& tile : tiles) {
+    for (const Surface& surface : tile.surfaces) {
+      if (surface.coloured()) return absl::OkStatus();
+      empty = false;
+    }
+  }
+  if (empty) return absl::OkStatus();
+  return absl::FailedPreconditionError(absl::StrCat(
+      "map ", map, " has no colours: its scans have none; --layer traversability draws it"));
+}
+
 }  // namespace strata::cli

@@ -24,6 +24,9 @@ absl::StatusOr<FetchedTiles> FetchTiles(Context& context,
                                         const std::string& map,
                                         std::int32_t level);
 
+// FAILED_PRECONDITION where there are surfaces and none of them has a colour.
+absl::Status ExpectColours(const std::string& map, const std::vector<SurfaceTile>& tiles);
+
 }  // namespace strata::cli
 
 #endif  // STRATA_CLIENT_CLI_MAP_TILE_SOURCE_H_

@@ -58,6 +58,10 @@ Colour ClassColour(const Surface& surface, const ClassStyles& classes) {
 
 // `cut`: the top is where the slice ends.
 BlockColours ColoursOf(const Surface& surface, bool cut, const PictureOptions& options) {
+  if (options.own_colours) {
+    const Colour colour = surface.coloured() ? surface.colour : kUnknownColour;
+    return {colour, colour};
+  }
   if (options.classes.has_value()) {
     const Colour colour = ClassColour(surface, *options.classes);
     return {colour, colour};
@@ -237,10 +241,10 @@ int DrawScaleBar(Image& image, const Camera& camera, int scale) {
   return begin;
 }
 
-// As large as fits; the scale bar alone where nothing else does, or for classes, whose names stand
-// elsewhere.
-void DrawLegend(Image& image, const Camera& camera, bool classes) {
-  if (classes) {
+// As large as fits; the scale bar alone where nothing else does, or where colours do not say what
+// is traversable.
+void DrawLegend(Image& image, const Camera& camera, bool traversability) {
+  if (!traversability) {
     DrawScaleBar(image, camera, image.width >= 1000 ? 2 : 1);
     return;
   }
@@ -389,7 +393,7 @@ Picture DrawMap(const std::vector<SurfaceTile>& tiles,
   std::copy(map.pixels.begin(), map.pixels.end(), picture.image.pixels.begin());
   DrawAxes(picture.image, picture.camera);
   DrawColumnLegend(picture.image, ClassEntries(tiles, options), overlay);
-  DrawLegend(picture.image, picture.camera, options.classes.has_value());
+  DrawLegend(picture.image, picture.camera, !options.classes.has_value() && !options.own_colours);
   return picture;
 }
 

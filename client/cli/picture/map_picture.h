@@ -1,6 +1,6 @@
 // Maps as pictures, in the colours of the thesis (Fig. 6.6): traversable yellow, horizontal but not
 // traversable red, vertical blue; surfaces that nobody judged, or saw from below only, are grey. Or
-// in those of classes.
+// in those of classes, or in their own.
 #ifndef STRATA_CLIENT_CLI_PICTURE_MAP_PICTURE_H_
 #define STRATA_CLIENT_CLI_PICTURE_MAP_PICTURE_H_
 
@@ -60,6 +60,8 @@ struct PictureOptions {
   std::optional<std::pair<double, double>> slice_m = std::nullopt;
   // Instead of by traversability: tops and sides by class; grey without one that is here.
   std::optional<ClassStyles> classes = std::nullopt;
+  // Instead of both: tops and sides as their points are; grey where none had a colour.
+  bool own_colours = false;
 };
 
 struct Picture {

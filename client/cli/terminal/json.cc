@@ -112,11 +112,10 @@ Json ToJson(const ClassifierInfo& classifier) {
           {"bytes", classifier.bytes}};
 }
 
+Json ToJson(const Colour& colour) { return absl::StrFormat("#%06x", PackedRgb(colour)); }
+
 Json ToJson(const MapClass& map_class) {
-  const Colour& c = map_class.colour;
-  return {{"id", map_class.id},
-          {"name", map_class.name},
-          {"colour", absl::StrFormat("#%02x%02x%02x", c.r, c.g, c.b)}};
+  return {{"id", map_class.id}, {"name", map_class.name}, {"colour", ToJson(map_class.colour)}};
 }
 
 Json ToJson(const MapInfo& info, const MapStats& stats) {
@@ -249,6 +248,7 @@ Json ToJson(const Surface& surface) {
           {"traversability", ToString(surface.traversability)},
           {"class", surface.class_id},
           {"confidence", surface.class_id == 0 ? Json() : Json(surface.confidence / 100.0)},
+          {"colour", surface.coloured() ? ToJson(surface.colour) : Json()},
           {"cost", Short(surface.cost)}};
 }
 

@@ -24,7 +24,8 @@ Json ToJson(const Pose& pose);              // [x, y, z, qx, qy, qz, qw]
 Json ToJson(const RobotProfile& profile);
 Json ToJson(const MapInfo& info);
 Json ToJson(const ClassifierInfo& classifier);
-Json ToJson(const MapClass& map_class);  // colour as "#rrggbb"
+Json ToJson(const Colour& colour);  // "#rrggbb"
+Json ToJson(const MapClass& map_class);
 Json ToJson(const MapInfo& info, const MapStats& stats);
 Json ToJson(const ScanInfo& info);
 Json ToJson(const PoseNode& node);

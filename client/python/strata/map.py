@@ -236,7 +236,8 @@ class Map:
                 request.places.add(x=x, y=y)
             columns += self._connection.unary(self._planning.SampleSurfaces, request).columns
         return [np.array([(column.x_m, column.y_m, s.z_m, s.sigma_m, s.depth_m, s.cost, s.traversability, s.class_id,
-                           s.confidence) for s in column.surfaces], SURFACE) for column in columns]
+                           s.confidence, tuple(s.colour.to_bytes(3, "big"))) for s in column.surfaces], SURFACE)
+                for column in columns]
 
     # Planning
 

@@ -22,6 +22,7 @@ SURFACE = np.dtype([
     ("traversability", "u1"),  # for the default profile: UNKNOWN, TRAVERSABLE, NON_TRAVERSABLE, or UNDERSIDE
     ("class_id", "u1"),  # with the most votes; 0: none
     ("confidence", "u1"),  # share of the votes that class_id has [%]
+    ("rgb", "u1", (3,)),  # red, green, blue, the mean of the points'; all 0: none known, black is 1, 1, 1
 ])
 UNKNOWN, TRAVERSABLE, NON_TRAVERSABLE, UNDERSIDE = 0, 1, 2, 3  # UNDERSIDE: seen from below only, no ground
 
@@ -29,13 +30,17 @@ TILE_CELLS = 256  # along an edge
 MAX_LEVEL = 12
 _CELLS = TILE_CELLS * TILE_CELLS
 _MAX_SURFACES = 1 << 22
-_READER_VERSION = 3
+_READER_VERSION = 4
 _VERSION_WITH_CONFIDENCE = 2
 _VERSION_WITH_UNDERSIDES = 3
+_VERSION_WITH_COLOURS = 4
 _OVERHEAD_BYTES = 20
 
 # Columns, see FORMAT.md.
 _SAME_KIND, _KIND, _CLASS, _HEIGHT, _DEPTH, _SIGMA, _COST, _CONFIDENCE = 0, 4, 5, 6, 10, 12, 14, 17
+_COLOURED, _GREEN, _RED, _BLUE = 18, 19, 20, 21
+_COLUMN_COUNT = {1: 17, 2: 18, 3: 18, 4: 22}  # by version
+_MAX_SHADE = 63
 _MAX_HEIGHT = (1 << 24) - 1
 _NOBODY = -1  # index of a surface beside that is not there
 
@@ -183,33 +188,66 @@ class _Surroundings:
         self.cost_count = np.maximum(same_cost.sum(axis=1), 1)
 
 
-def _summed(cells, around, vertical, differences):
-    """(n, 4) codes of height, depth, sigma and cost out of their differences to what is expected."""
+def _waves(cells):
+    """The order of surfaces in which they depend on earlier waves only, their places in it, and each wave's slice."""
     n = len(cells)
     wave = cells % TILE_CELLS + 2 * (cells // TILE_CELLS)
     order = np.argsort(wave, kind="stable")
     rank = np.empty(n + 1, np.int32)
     rank[order] = np.arange(n)
     rank[_NOBODY] = n  # a row of zeros
+    ends = np.append(np.flatnonzero(np.diff(wave[order])) + 1, n) if n else []
+    return order, rank, [slice(begin, end) for begin, end in zip([0, *ends], ends)]
+
+
+def _summed(cells, around, vertical, differences):
+    """(n, 4) codes of height, depth, sigma and cost out of their differences to what is expected."""
+    n = len(cells)
+    order, rank, waves = _waves(cells)
     shape_of, cost_of = rank[around.shape_of[order]], rank[around.cost_of[order]]
     shape_count, cost_count = around.shape_count[order, None], around.cost_count[order]
     expects_depth = (vertical & (around.alike > 0))[order]
     differences = differences[order]
     codes = np.zeros((n + 1, 4), np.int64)
-    ends = np.append(np.flatnonzero(np.diff(wave[order])) + 1, n)
-    begin = 0
-    for end in ends if n else ():
-        now = slice(begin, end)
+    for now in waves:
         count = shape_count[now]
         mean = (codes[shape_of[now]].sum(axis=1) + (count >> 1)) // count
         mean[:, 1] = expects_depth[now] * (mean[:, 1] + differences[now, 0])  # undersides continue
         count = cost_count[now]
         mean[:, 3] = (codes[cost_of[now], 3].sum(axis=1) + (count >> 1)) // count
         codes[now] = mean + differences[now]
-        begin = end
     result = np.empty((n, 4), np.int64)
     result[order] = codes[:n]
     return result
+
+
+def _colours(cells, counts, columns):
+    """(n, 3) colours; zeros where none is known."""
+    n = len(cells)
+    if len(columns) <= _COLOURED:
+        return np.zeros((n, 3), np.uint8)
+    _check(len(columns[_COLOURED]) == (n + 7) // 8, "column: colours of other surfaces than the tile has")
+    known = np.unpackbits(columns[_COLOURED], bitorder="little", count=n).astype(bool)
+    differences = np.zeros((n, 3), np.int64)  # green, red, blue
+    for k in range(3):
+        differences[:, k] = _scattered({0: columns[_GREEN + k]}, np.where(known, 0, _NOBODY))
+    _check(differences.max(initial=0) <= _MAX_SHADE)
+    beside = _beside(cells, counts)
+    of = np.where(np.append(known, False)[beside], beside, _NOBODY)
+    count = np.maximum((of != _NOBODY).sum(axis=1), 1)
+    order, rank, waves = _waves(cells)
+    of, count, differences = rank[of[order]], count[order, None], differences[order]
+    coloured = known[order, None]
+    codes = np.zeros((n + 1, 3), np.int64)
+    for now in waves:
+        mean = (codes[of[now]].sum(axis=1) + (count[now] >> 1)) // count[now]
+        green = (mean[:, 0] + differences[now, 0]) & _MAX_SHADE
+        mean[:, 1:] = np.clip(mean[:, 1:] + (green - mean[:, 0])[:, None], 0, _MAX_SHADE)
+        codes[now] = coloured[now] * ((mean + differences[now]) & _MAX_SHADE)
+    colours = np.zeros((n, 3), np.uint8)
+    colours[order] = (codes[:n, [1, 0, 2]] * 255 + _MAX_SHADE // 2) // _MAX_SHADE
+    colours[known & ~colours.any(axis=1)] = 1  # black
+    return colours
 
 
 def _checked(codes, vertical):
@@ -269,12 +307,14 @@ def decode_tile(data, cell_size):
     counts = _counts(reader)
     cells = np.repeat(np.arange(_CELLS, dtype=np.int32), counts)
     columns = [reader.column(len(cells))
-               for _ in range(_CONFIDENCE + (oldest_reader >= _VERSION_WITH_CONFIDENCE))]
+               for _ in range(_COLUMN_COUNT.get(oldest_reader, _CONFIDENCE))]
     raw = np.frombuffer(reader.take(reader.varint()), np.uint8)
     _check(not reader.remaining, "surface tile: bytes left over")
     kinds, classes, confidences, codes = _codes(cells, counts, columns, raw)
+    colours = _colours(cells, counts, columns)
     undersides = (kinds >> 1 == UNDERSIDE).any()
-    needed = _VERSION_WITH_UNDERSIDES if undersides else _VERSION_WITH_CONFIDENCE if confidences.any() else 1
+    needed = (_VERSION_WITH_COLOURS if colours.any() else _VERSION_WITH_UNDERSIDES if undersides
+              else _VERSION_WITH_CONFIDENCE if confidences.any() else 1)
     _check(oldest_reader == needed, "surface tile: of another version than what it holds")
     size = cell_size * 2.0**key.level
     surfaces = np.empty(len(cells), SURFACE)
@@ -286,4 +326,5 @@ def decode_tile(data, cell_size):
     surfaces["traversability"] = kinds >> 1
     surfaces["cost"] = _COSTS[kinds >> 1, codes[:, 3]]
     surfaces["class_id"], surfaces["confidence"] = classes, confidences
+    surfaces["rgb"] = colours
     return Tile(key, version, size, surfaces)

@@ -53,6 +53,29 @@ class TileTest(ServerTest):
         for field in strata.SURFACE.names:
             np.testing.assert_array_equal(decoded[field], asked[field], field)
 
+    def test_colours_are_those_of_the_points_and_equal_the_servers(self):
+        coloured = self.db.create_map("coloured")
+        random_numbers = np.random.default_rng(7)
+        points = np.column_stack([random_numbers.uniform(-6, 6, (40_000, 2)), np.zeros(40_000)])
+        points[:, 2] = 0.1 * points[:, 0]
+        rgb = np.column_stack([20 * (points[:, 0] + 6), 10 * (points[:, 1] + 6), np.full(len(points), 40)])
+        rgb[np.hypot(points[:, 0], points[:, 1]) < 1] = 0  # black
+        coloured.upload(points, rgb=rgb.astype(np.uint8), align=False)
+        coloured.upload(points[:500] + [30, 0, 0], align=False)
+        coloured.wait(timeout=60)
+        decoded = np.concatenate([tile.surfaces for tile in coloured.fetch().values()])
+        asked = np.concatenate(coloured.surfaces(np.stack([decoded["x"], decoded["y"]], axis=1)))
+        np.testing.assert_array_equal(decoded["rgb"], asked["rgb"])
+        near = np.abs(decoded["x"]) < 5.9
+        known = decoded["rgb"].any(axis=1)
+        np.testing.assert_array_equal(known[near], True)
+        np.testing.assert_array_equal(known[decoded["x"] > 20], False)
+        r = np.hypot(decoded["x"], decoded["y"])
+        np.testing.assert_array_equal(decoded["rgb"][r < 0.9], 1)
+        bright = near & (r > 1.2)
+        expected = np.column_stack([20 * (decoded["x"] + 6), 10 * (decoded["y"] + 6), np.full(len(decoded), 40)])
+        self.assertLess(np.abs(decoded["rgb"][bright] - expected[bright]).max(), 8)
+
     def test_coarse_levels_are_read_too(self):
         for level in (2, 5):
             tile = strata.decode_tile(self.encoded[level][0], 0.1)

@@ -65,6 +65,16 @@ TEST(OverviewTest, MeanIsWeightedByPrecisionAndSigmaTellsTheSpread) {
   EXPECT_EQ(tile.surfaces[0].depth_m, 0.0F);
 }
 
+TEST(OverviewTest, ColourIsTheMeanOfThoseThatHaveOne) {
+  const SurfaceTile tile =
+      Parent({{.cell = 0, .colour = {.r = 10, .g = 20, .b = 30}, .sigma_m = 0.1F},
+              {.cell = 1, .sigma_m = 0.1F},
+              {.cell = kRow, .colour = {.r = 13, .g = 0, .b = 31}, .sigma_m = 0.1F}});
+  ASSERT_EQ(tile.surfaces.size(), 1U);
+  EXPECT_EQ(tile.surfaces[0].colour, (Colour{.r = 12, .g = 10, .b = 31}));
+  EXPECT_FALSE(Parent({{.cell = 0, .sigma_m = 0.1F}}).surfaces[0].coloured());
+}
+
 // As full as a tile may be, with room for nothing else; of another child with one surface more.
 TEST(OverviewTest, BeyondWhatATileHoldsEachCellKeepsItsHighest) {
   constexpr std::size_t kLayers = 4 * kOverviewLayers;

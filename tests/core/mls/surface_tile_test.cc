@@ -44,6 +44,18 @@ TEST(SurfaceTileTest, SurfacesHaveTheValuesOfTheirPatches) {
   EXPECT_EQ(surfaces.surfaces[2].cost, 0.0F);
 }
 
+TEST(SurfaceTileTest, ColoursAreTheMeansOfWhatHadOneAndBlackIsAColour) {
+  MlsTile tile;
+  tile.patches = {At(0, 0.0), At(1, 0.0), At(2, 0.0)};
+  tile.colour = {{.r = 300, .g = 3, .b = 5, .count = 2}, {.count = 4}, {}};
+  tile.IndexRows();
+  const std::vector<Surface> surfaces = SurfacesOf(tile).surfaces;
+  EXPECT_EQ(surfaces[0].colour, (Colour{.r = 150, .g = 2, .b = 3}));
+  EXPECT_EQ(surfaces[1].colour, (Colour{.r = 1, .g = 1, .b = 1}));
+  EXPECT_TRUE(surfaces[1].coloured());
+  EXPECT_FALSE(surfaces[2].coloured());
+}
+
 TEST(SurfaceTileTest, ClassOfMostVotesAndOfTheSmallerIdOnATie) {
   MlsTile tile;
   tile.patches = {At(0, 0.0), At(1, 0.0), At(2, 0.0), At(3, 0.0)};

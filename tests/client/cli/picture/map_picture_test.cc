@@ -62,6 +62,22 @@ TEST(MapPictureTest, PlanShowsEachKindOfSurfaceInItsColour) {
   EXPECT_TRUE(IsBlue(PixelAt(picture, {5.0, 3.0, 2.0})));
 }
 
+TEST(MapPictureTest, SurfacesHaveTheirOwnColours) {
+  const SurfaceTile tile = TileOf(60, [](int x, int) {
+    Surface surface = Ground(Traversability::kTraversable);
+    if (x < 20) surface.colour = {20, 200, 40};
+    if (x >= 40) surface.colour = {200, 30, 40};
+    return surface;
+  });
+  const Picture picture =
+      DrawMap({tile}, 0.1, {}, {.width = 400, .height = 444, .own_colours = true});
+  const Colour green = PixelAt(picture, {1.0, 3.0, 0.0});
+  EXPECT_GT(green.g, green.r + 60);
+  const Colour none = PixelAt(picture, {3.0, 3.0, 0.0});
+  EXPECT_LT(std::abs(none.r - none.b), 30);
+  EXPECT_TRUE(IsRed(PixelAt(picture, {5.0, 3.0, 0.0})));
+}
+
 TEST(MapPictureTest, ClassesHaveTheirColoursAndALegend) {
   const SurfaceTile tile = TileOf(60, [](int x, int) {
     Surface surface = Ground(Traversability::kTraversable, x < 40 ? 0.0F : 2.0F);
