@@ -35,6 +35,7 @@ std::vector<Expected> AllParameters() {
       {"optimize", "dry_run", "0", {"0", "1"}, kNoFlags},
       {"optimize", "closures", "1", {"0", "1"}, kNoFlags},
       {"optimize", "planes", "1", {"0", "1"}, kNoFlags},
+      {"optimize", "directions", "1", {"0", "1"}, kNoFlags},
       {"optimize", "robust", "1", {"0", "1"}, kNoFlags},
       {"optimize", "automatic", "0", {"0", "1"}, kNoFlags},
       {"optimize", "rounds", "30", {"1", "50"}, {"0", "51", "2.5", "many", ""}},
