@@ -17,6 +17,7 @@ ARROWS = {
     "core/common": [],
     "core/geometry": ["core/common"],
     "core/cloud": ["core/geometry", "core/common"],
+    "core/mesh": ["core/cloud", "core/geometry", "core/common"],
     "core/mls": ["core/cloud", "core/geometry", "core/common"],
     "core/world": ["core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/codec": ["core/mls", "core/cloud", "core/geometry", "core/common"],
@@ -36,7 +37,7 @@ ARROWS = {
                    "core/common"],
     "client/formats": ["core/posegraph", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "client/cli": ["client/sdk", "client/formats", "core/api", "core/engine", "core/codec", "core/registration",
-                   "core/classification", "core/posegraph", "core/world", "core/mls", "core/cloud", "core/geometry",
+                   "core/classification", "core/posegraph", "core/world", "core/mls", "core/mesh", "core/cloud", "core/geometry",
                    "core/common"],
 }
 
@@ -62,7 +63,8 @@ EXTERNAL = {
     r"(grpc|grpcpp)/.*|google/protobuf/.*|.*\.pb\.h": ["proto", "server", "client/sdk"],
     r"openssl/.*": ["server"],
     r"prometheus/.*": ["server/metrics"],
-    r"pcl/.*": ["core/registration", "core/planes", "core/classification", "client/formats"],
+    r"pcl/.*": ["core/registration", "core/planes", "core/classification", "core/mesh", "client/formats"],
+    r"libqhull_r/.*|meshoptimizer\.h": ["core/mesh"],
     r"(thread|mutex|condition_variable)": ["core/engine", "server", "client", "core/common"],
 }
 

@@ -1,0 +1,73 @@
+#include "core/mesh/alpha_shape.h"
+
+#include <limits>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/mesh/mesh_check.h"
+#include "tests/core/mesh/shapes.h"
+#include "tests/support/simulator.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata {
+namespace {
+
+using Eigen::Vector3d;
+using testing::StatusIs;
+
+TEST(AlphaShapeTest, SphereOfPointsIsClosed) {
+  const std::vector<Vector3d> points = testing::SpherePoints(2000, 1.0, {400.0, 0.0, 9.0});
+  // Large enough for the ball within: all is inside, the hull remains.
+  const auto shape = MakeAlphaShape(points, 4.0, Stop());
+  STRATA_ASSERT_OK(shape);
+  const MeshCheck check = CheckMesh(shape->mesh);
+  EXPECT_TRUE(check.closed());
+  EXPECT_TRUE(check.manifold());
+  EXPECT_EQ(check.euler_characteristic, 2);
+  EXPECT_NEAR(VolumeOf(shape->mesh), testing::SphereVolume(1.0), 0.01 * testing::SphereVolume(1.0));
+}
+
+TEST(AlphaShapeTest, AloneItJoinsThePoints) {
+  const auto shape =
+      MakeAlphaShape(testing::SpherePoints(2000, 1.0, Vector3d::Zero()), std::nullopt, Stop());
+  STRATA_ASSERT_OK(shape);
+  EXPECT_GT(shape->mesh.vertices.size(), 1900);
+  EXPECT_GT(shape->alpha_m2, 0.001);
+  EXPECT_LT(shape->alpha_m2, 0.1);
+}
+
+TEST(AlphaShapeTest, FewAndOddPoints) {
+  for (const std::size_t count : {0, 1, 3, 4}) {
+    const auto shape =
+        MakeAlphaShape(testing::SpherePoints(count, 1.0, Vector3d::Zero()), std::nullopt, Stop());
+    STRATA_ASSERT_OK(shape);
+  }
+  std::vector<Vector3d> flat;
+  for (int i = 0; i < 30; ++i) flat.emplace_back(i % 6, i / 6, 0.0);
+  const auto shape = MakeAlphaShape(flat, std::nullopt, Stop());
+  STRATA_ASSERT_OK(shape);
+  EXPECT_TRUE(shape->mesh.triangles.empty());
+  flat[3].x() = std::numeric_limits<double>::infinity();
+  EXPECT_THAT(MakeAlphaShape(flat, std::nullopt, Stop()),
+              StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr("point 3")));
+  const std::vector<Vector3d> many(kMostAlphaPoints + 1);
+  EXPECT_THAT(
+      MakeAlphaShape(many, std::nullopt, Stop()),
+      StatusIs(absl::StatusCode::kResourceExhausted, ::testing::HasSubstr("at most 200000")));
+}
+
+// The corners of a lattice lie on common balls, many at a time.
+TEST(AlphaShapeTest, LatticeIsItsBox) {
+  std::vector<Vector3d> points;
+  for (int i = 0; i < 125; ++i) points.emplace_back(i % 5, i / 5 % 5, i / 25);
+  const auto shape = MakeAlphaShape(points, 1.0, Stop());
+  STRATA_ASSERT_OK(shape);
+  EXPECT_NEAR(VolumeOf(shape->mesh), 64.0, 1e-9);
+  EXPECT_TRUE(CheckMesh(shape->mesh).closed());
+}
+
+}  // namespace
+}  // namespace strata
