@@ -14,6 +14,7 @@
 #include "client/cli/job/job_runner.h"
 #include "client/cli/map/map_files.h"
 #include "client/cli/map/map_quality.h"
+#include "client/cli/mesh/mesh_commands.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/confirm.h"
@@ -227,6 +228,7 @@ void AddMapCommands(Commands& commands) {
   AddMapDiff(commands, noun);
   AddMapExport(commands, noun);
   AddMapMerge(commands, noun);
+  AddMapMesh(commands, noun);
   AddMapRender(commands, noun);
 }
 

@@ -1,4 +1,4 @@
-// strata scan list|show|export|delete; import, label and register have files of their own.
+// strata scan list|show|export|delete; import, label, mesh and register have files of their own.
 #include <memory>
 #include <optional>
 #include <string>
@@ -7,6 +7,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 
+#include "client/cli/mesh/mesh_commands.h"
 #include "client/cli/scan/scan_import.h"
 #include "client/cli/scan/scan_label.h"
 #include "client/cli/scan/scan_register.h"
@@ -214,6 +215,7 @@ void AddScanCommands(Commands& commands) {
        Show);
   AddExport(commands, noun, options);
   AddScanLabel(commands, noun);
+  AddScanMesh(commands, noun);
   AddScanRegister(commands, noun);
   AddYes(verb("delete",
               "Take a scan and its contribution out of the map",

@@ -12,6 +12,7 @@ from strata.errors import (AlreadyExists, Cancelled, DataLoss, DeadlineExceeded,
                            Unimplemented)
 from strata.job import Job
 from strata.map import Change, Map, ScanChange, Stats
+from strata.mesh import Mesh
 from strata.plan import Path
 from strata.registration import Registration, register
 from strata.scan import Ack, Points, Scan
@@ -20,6 +21,6 @@ from strata.tiles import NON_TRAVERSABLE, SURFACE, TRAVERSABLE, UNDERSIDE, UNKNO
 __all__ = [
     "AlreadyExists", "Cancelled", "DataLoss", "DeadlineExceeded", "FailedPrecondition", "InvalidArgument", "NotFound",
     "PermissionDenied", "ResourceExhausted", "StrataError", "Unauthenticated", "Unavailable", "Unimplemented",
-    "Ack", "Change", "Database", "Job", "Map", "NON_TRAVERSABLE", "Path", "Points", "Registration", "SURFACE", "Scan", "ScanChange",
-    "Stats", "TRAVERSABLE", "Tile", "TileKey", "UNDERSIDE", "UNKNOWN", "connect", "decode_tile", "register",
+    "Ack", "Change", "Database", "Job", "Map", "Mesh", "NON_TRAVERSABLE", "Path", "Points", "Registration", "SURFACE", "Scan",
+    "ScanChange", "Stats", "TRAVERSABLE", "Tile", "TileKey", "UNDERSIDE", "UNKNOWN", "connect", "decode_tile", "register",
 ]

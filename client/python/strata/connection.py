@@ -9,6 +9,7 @@ from strata import errors
 
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.1, 5.0
 _CONNECT_TIMEOUT_S = 10.0
+_SYSTEM_ROOTS = "/etc/ssl/certs/ca-certificates.crt"
 _CHANNEL_OPTIONS = [
     ("grpc.max_receive_message_length", 64 << 20),
     ("grpc.max_reconnect_backoff_ms", 1000),
@@ -66,6 +67,7 @@ class Connection:
     """Calls on one channel. Thread-safe."""
 
     def __init__(self, target, *, token=None, ca=None, certificate=None, key=None, timeout=None, patience=60.0):
+        self._program = [target, token, ca, certificate, key]
         self._metadata = (("authorization", f"Bearer {token}"),) if token else ()
         self._timeout = timeout
         self._patience = patience
@@ -78,6 +80,17 @@ class Connection:
             self.channel.close()
             raise errors.Unavailable(f"no server answers at {target} within {connect_timeout:g} s; "
                                      "is stratad running there, with or without TLS as here?") from None
+
+    def program_options(self):
+        """What makes the program `strata` speak to the same server as the same user: options, and its environment."""
+        target, token, ca, certificate, key = self._program
+        files = {"--tls-ca": _SYSTEM_ROOTS if ca is True else ca, "--tls-cert": certificate, "--tls-key": key}
+        options = ["--server", target]
+        for option, file in files.items():
+            options += [option, str(file)] if file else []
+        # Whoever gave a token here without TLS has accepted that it can be read.
+        options += ["--insecure"] if token and ca is None else []
+        return options, {"STRATA_TOKEN": token} if token else {}
 
     def close(self):
         """Ends all calls, with Cancelled."""

@@ -7,7 +7,7 @@ import time as clock
 
 import numpy as np
 
-from strata import errors, job, plan, poses, scan
+from strata import errors, job, mesh, plan, poses, scan
 from strata.tiles import SURFACE, TILE_CELLS, TileKey, decode_tile
 from strata.v1 import (geometry_pb2, jobs_pb2, jobs_pb2_grpc, maps_pb2, maps_pb2_grpc, planning_pb2, planning_pb2_grpc,
                        scans_pb2, scans_pb2_grpc, tiles_pb2, tiles_pb2_grpc)
@@ -223,6 +223,17 @@ class Map:
                               for number in area)
             message.x_min, message.y_min, message.x_max, message.y_max = x0, y0, x1 + 1, y1 + 1
         return message
+
+    def mesh(self, region=None, *, voxel=0.05, method="tsdf", of_class=None, simplify=None, program="strata"):
+        """The surface of the map's scans as triangles → Mesh; by the program `strata`, which must be installed.
+
+        region: (2, 2) or (2, 3) lower and upper corner of the part that is meshed [m]; None: all. voxel: edge of a voxel
+        [m]. method: "tsdf", "contour" or "alpha", see `strata map mesh --help`. of_class: points of this class only, its
+        name or id. simplify: at most so many triangles. Raises ValueError, StrataError, and FileNotFoundError where
+        `program` is not installed.
+        """
+        return mesh.mesh(self._connection, self.name, region, voxel=voxel, method=method, of_class=of_class,
+                         simplify=simplify, program=program)
 
     def surfaces(self, places):
         """All levels at places (n, 2) or (n, 3), map frame [m]: a list of arrays of dtype SURFACE, lowest first."""

@@ -1,15 +1,13 @@
 """Where one scan is in the frame of another, without a map or a server: `strata scan register`, which must be installed."""
 import dataclasses
-import json
 import os
 import pathlib
-import shutil
-import subprocess
 import tempfile
 
 import numpy as np
 
-from strata import errors, poses
+from strata import poses
+from strata import program as strata_program
 
 _METHODS = ("mls", "icp", "plane", "trimmed", "gicp")
 
@@ -61,20 +59,14 @@ def register(source, target, guess=None, *, method="mls", picture=None, max_dist
     """
     if method not in _METHODS:
         raise ValueError(f"method {method!r}; expected one of {', '.join(_METHODS)}")
-    found = shutil.which(program)
-    if found is None:
-        raise FileNotFoundError(f"{program} is not on the PATH; install the package strata, or name the program")
     with tempfile.TemporaryDirectory() as folder:
-        command = [found, "scan", "register", "--output", "json", _file(source, folder, "source"),
-                   _file(target, folder, "target"), "--method", method, "--guess", _guess(guess)]
+        arguments = ["scan", "register", _file(source, folder, "source"), _file(target, folder, "target"), "--method",
+                     method, "--guess", _guess(guess)]
         if max_distance is not None:
-            command += ["--max-distance", repr(float(max_distance))]
+            arguments += ["--max-distance", repr(float(max_distance))]
         if picture is not None:
-            command += ["--picture", os.fspath(pathlib.Path(picture).absolute())]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise errors.StrataError(done.stderr.strip() or f"{program} ended with {done.returncode}")
-    answer = json.loads(done.stdout)
+            arguments += ["--picture", os.fspath(pathlib.Path(picture).absolute())]
+        answer = strata_program.run(program, arguments)
     fields = {field.name: answer[field.name] for field in dataclasses.fields(Registration)}
     pose = fields["T_target_source"]
     return Registration(**{**fields, "T_target_source": poses.matrix((pose[:3], pose[3:]))})

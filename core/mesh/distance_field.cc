@@ -1,4 +1,4 @@
-#include "core/mesh/signed_distance.h"
+#include "core/mesh/distance_field.h"
 
 #include <algorithm>
 #include <cmath>
@@ -95,8 +95,8 @@ Stretch Clip(const Vector3d& from,
 
 }  // namespace
 
-absl::Status SignedDistanceOptions::Validate() const {
-  OptionChecks checks("signed distance");
+absl::Status DistanceFieldOptions::Validate() const {
+  OptionChecks checks("distance field");
   checks.InRange("voxel_m", voxel_m, 0.001, 10.0);
   for (const Vector3d& corner : {region.min(), region.max()}) {
     for (const double x : corner) checks.InRange("region", x, -1e9, 1e9);
@@ -104,9 +104,9 @@ absl::Status SignedDistanceOptions::Validate() const {
   return checks.status();
 }
 
-class SignedDistance::Field {
+class DistanceField::Field {
  public:
-  explicit Field(const SignedDistanceOptions& options) : options_(options) {
+  explicit Field(const DistanceFieldOptions& options) : options_(options) {
     grid_.spacing_m = options.voxel_m;
   }
 
@@ -260,33 +260,33 @@ class SignedDistance::Field {
     return std::max(step, 0.0) + 1e-3;
   }
 
-  const SignedDistanceOptions options_;
+  const DistanceFieldOptions options_;
   NodeGrid grid_;
   bool placed_ = false;
   VoxelBlocks<Node> voxels_;
   std::uint64_t points_ = 0;
 };
 
-SignedDistance::SignedDistance(const SignedDistanceOptions& options)
+DistanceField::DistanceField(const DistanceFieldOptions& options)
     : field_(std::make_unique<Field>(options)) {}
-SignedDistance::~SignedDistance() = default;
-SignedDistance::SignedDistance(SignedDistance&&) noexcept = default;
+DistanceField::~DistanceField() = default;
+DistanceField::DistanceField(DistanceField&&) noexcept = default;
 
-absl::Status SignedDistance::Add(const PointCloud& cloud,
-                                 const Pose& T_map_scan,
-                                 const SensorModel& sensor,
-                                 const Stop& stop) {
+absl::Status DistanceField::Add(const PointCloud& cloud,
+                                const Pose& T_map_scan,
+                                const SensorModel& sensor,
+                                const Stop& stop) {
   return field_->Add(cloud, T_map_scan, sensor, stop);
 }
-absl::Status SignedDistance::Carve(const PointCloud& cloud,
-                                   const Pose& T_map_scan,
-                                   const SensorModel& sensor,
-                                   const Stop& stop) {
+absl::Status DistanceField::Carve(const PointCloud& cloud,
+                                  const Pose& T_map_scan,
+                                  const SensorModel& sensor,
+                                  const Stop& stop) {
   return field_->Carve(cloud, T_map_scan, sensor, stop);
 }
-std::uint64_t SignedDistance::points() const { return field_->points(); }
-std::size_t SignedDistance::bytes() const { return field_->bytes(); }
-absl::StatusOr<TriangleMesh> SignedDistance::Mesh(const Stop& stop) const {
+std::uint64_t DistanceField::points() const { return field_->points(); }
+std::size_t DistanceField::bytes() const { return field_->bytes(); }
+absl::StatusOr<TriangleMesh> DistanceField::Mesh(const Stop& stop) const {
   return field_->Mesh(stop);
 }
 

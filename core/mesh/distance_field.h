@@ -1,7 +1,7 @@
 // One surface from many scans, each of which knows from where it was seen: a sparse signed distance
 // (Curless and Levoy 1996).
-#ifndef STRATA_CORE_MESH_SIGNED_DISTANCE_H_
-#define STRATA_CORE_MESH_SIGNED_DISTANCE_H_
+#ifndef STRATA_CORE_MESH_DISTANCE_FIELD_H_
+#define STRATA_CORE_MESH_DISTANCE_FIELD_H_
 
 #include <cstddef>
 #include <cstdint>
@@ -19,7 +19,7 @@
 
 namespace strata {
 
-struct SignedDistanceOptions {
+struct DistanceFieldOptions {
   // Edge of a voxel [m]; in [0.001, 10]. Things thinner than two voxels are lost.
   double voxel_m = 0.05;
   // Only what is in here is meshed; in the map [m].
@@ -35,12 +35,12 @@ struct SignedDistanceOptions {
 // inside and the outside of the object can not be distinguished". What later scans look through is
 // taken out again: people, and the streaks behind edges. The same scans in the same order give the
 // same bytes. One thread at a time.
-class SignedDistance {
+class DistanceField {
  public:
   // REQUIRES: options.Validate().
-  explicit SignedDistance(const SignedDistanceOptions& options);
-  ~SignedDistance();
-  SignedDistance(SignedDistance&&) noexcept;
+  explicit DistanceField(const DistanceFieldOptions& options);
+  ~DistanceField();
+  DistanceField(DistanceField&&) noexcept;
 
   // RESOURCE_EXHAUSTED beyond max_bytes; OUT_OF_RANGE for a scan farther than 10⁹ voxels from the
   // first; the stop's status. `cloud`: as ValidateCloud() takes it; `sensor`: whose returns count.
@@ -67,4 +67,4 @@ class SignedDistance {
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_MESH_SIGNED_DISTANCE_H_
+#endif  // STRATA_CORE_MESH_DISTANCE_FIELD_H_

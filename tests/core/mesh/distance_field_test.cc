@@ -1,4 +1,4 @@
-#include "core/mesh/signed_distance.h"
+#include "core/mesh/distance_field.h"
 
 #include <algorithm>
 #include <cmath>
@@ -26,8 +26,8 @@ struct PosedCloud {
   Pose T_map_scan;
 };
 
-TriangleMesh MeshOf(const std::vector<PosedCloud>& scans, const SignedDistanceOptions& options) {
-  SignedDistance field(options);
+TriangleMesh MeshOf(const std::vector<PosedCloud>& scans, const DistanceFieldOptions& options) {
+  DistanceField field(options);
   for (const PosedCloud& scan : scans) {
     STRATA_EXPECT_OK(field.Add(scan.cloud, scan.T_map_scan, SensorModel(), Stop()));
   }
@@ -60,7 +60,7 @@ PointCloud WallAt(double x) {
   return cloud;
 }
 
-TEST(SignedDistanceTest, BallIsClosedAndHasItsVolume) {
+TEST(DistanceFieldTest, BallIsClosedAndHasItsVolume) {
   const Vector3d centre(1000.3, -2000.1, 7.0);
   const TriangleMesh mesh = MeshOf(BallScans(centre), {.voxel_m = 0.05});
   const MeshCheck check = CheckMesh(mesh);
@@ -71,7 +71,7 @@ TEST(SignedDistanceTest, BallIsClosedAndHasItsVolume) {
   for (const Vector3d& v : mesh.vertices) EXPECT_NEAR((v - centre).norm(), 1.0, 0.01);
 }
 
-TEST(SignedDistanceTest, NoiseAveragesOut) {
+TEST(DistanceFieldTest, NoiseAveragesOut) {
   std::vector<PosedCloud> scans = BallScans(Vector3d::Zero());
   testing::Random random(1);
   for (PosedCloud& scan : scans) {
@@ -86,7 +86,7 @@ TEST(SignedDistanceTest, NoiseAveragesOut) {
   EXPECT_LT(std::sqrt(squared / static_cast<double>(mesh.vertices.size())), 0.008);
 }
 
-TEST(SignedDistanceTest, WallFacesTheSensorOnOneSide) {
+TEST(DistanceFieldTest, WallFacesTheSensorOnOneSide) {
   const TriangleMesh mesh = MeshOf({{WallAt(3.0), Pose::Identity()}}, {.voxel_m = 0.05});
   ASSERT_FALSE(mesh.triangles.empty());
   EXPECT_NEAR(AreaOf(mesh), 8.0, 0.8);
@@ -94,7 +94,7 @@ TEST(SignedDistanceTest, WallFacesTheSensorOnOneSide) {
   for (const Vector3d& v : mesh.vertices) EXPECT_NEAR(v.x(), 3.0, 1e-3);
 }
 
-TEST(SignedDistanceTest, ThinWallKeepsItsTwoSides) {
+TEST(DistanceFieldTest, ThinWallKeepsItsTwoSides) {
   PointCloud front = WallAt(3.0);
   PointCloud back = WallAt(2.8);  // from the other side, 6 m away: at x = 3.2
   Pose T_map_back = At({6.0, 0.0, 0.0});
@@ -114,7 +114,7 @@ TEST(SignedDistanceTest, ThinWallKeepsItsTwoSides) {
   EXPECT_LT(AreaOf(mesh) - area_front - area_back, 0.8);
 }
 
-TEST(SignedDistanceTest, WhatOthersLookThroughIsTakenOut) {
+TEST(DistanceFieldTest, WhatOthersLookThroughIsTakenOut) {
   PointCloud person;
   for (double y = -0.3; y <= 0.3; y += 0.02) {
     for (double z = -0.4; z <= 0.4; z += 0.02) {
@@ -133,8 +133,8 @@ TEST(SignedDistanceTest, WhatOthersLookThroughIsTakenOut) {
   EXPECT_NEAR(AreaOf(mesh), 8.0, 0.8);
 }
 
-TEST(SignedDistanceTest, OnlyTheRegionIsMeshed) {
-  SignedDistanceOptions options{.voxel_m = 0.05};
+TEST(DistanceFieldTest, OnlyTheRegionIsMeshed) {
+  DistanceFieldOptions options{.voxel_m = 0.05};
   options.region = Eigen::AlignedBox3d(Vector3d(0, 0, -10), Vector3d(10, 10, 10));
   const TriangleMesh mesh = MeshOf({{WallAt(3.0), Pose::Identity()}}, options);
   ASSERT_FALSE(mesh.triangles.empty());
@@ -143,7 +143,7 @@ TEST(SignedDistanceTest, OnlyTheRegionIsMeshed) {
   EXPECT_TRUE(MeshOf({{WallAt(3.0), Pose::Identity()}}, options).triangles.empty());
 }
 
-TEST(SignedDistanceTest, SameBytesAgain) {
+TEST(DistanceFieldTest, SameBytesAgain) {
   const std::vector<PosedCloud> scans = BallScans(Vector3d::Zero());
   const TriangleMesh a = MeshOf(scans, {.voxel_m = 0.1});
   const TriangleMesh b = MeshOf(scans, {.voxel_m = 0.1});
@@ -151,25 +151,25 @@ TEST(SignedDistanceTest, SameBytesAgain) {
   EXPECT_EQ(a.triangles, b.triangles);
 }
 
-TEST(SignedDistanceTest, SaysWhatDoesNotFit) {
-  SignedDistance small({.voxel_m = 0.001, .max_bytes = std::size_t{8} << 20});
+TEST(DistanceFieldTest, SaysWhatDoesNotFit) {
+  DistanceField small({.voxel_m = 0.001, .max_bytes = std::size_t{8} << 20});
   EXPECT_THAT(small.Add(WallAt(3.0), Pose::Identity(), SensorModel(), Stop()),
               StatusIs(absl::StatusCode::kResourceExhausted,
                        ::testing::AllOf(::testing::HasSubstr("8 MiB"),
                                         ::testing::HasSubstr("larger voxels"))));
-  SignedDistanceOptions anywhere{.voxel_m = 0.01};
+  DistanceFieldOptions anywhere{.voxel_m = 0.01};
   anywhere.region = {Vector3d::Constant(-1e9), Vector3d::Constant(1e9)};
-  SignedDistance far(anywhere);
+  DistanceField far(anywhere);
   STRATA_EXPECT_OK(far.Add(WallAt(3.0), Pose::Identity(), SensorModel(), Stop()));
   EXPECT_THAT(far.Add(WallAt(3.0), At({5e7, 0, 0}), SensorModel(), Stop()),
               StatusIs(absl::StatusCode::kOutOfRange, ::testing::HasSubstr("region")));
-  EXPECT_THAT(SignedDistanceOptions{.voxel_m = 0.0}.Validate(),
+  EXPECT_THAT(DistanceFieldOptions{.voxel_m = 0.0}.Validate(),
               StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr("voxel_m is 0")));
-  EXPECT_THAT(SignedDistanceOptions{.voxel_m = std::numeric_limits<double>::quiet_NaN()}.Validate(),
+  EXPECT_THAT(DistanceFieldOptions{.voxel_m = std::numeric_limits<double>::quiet_NaN()}.Validate(),
               StatusIs(absl::StatusCode::kInvalidArgument, ::testing::_));
 }
 
-TEST(SignedDistanceTest, OddCloudsGiveNothing) {
+TEST(DistanceFieldTest, OddCloudsGiveNothing) {
   PointCloud line;
   for (int i = 0; i < 100; ++i) line.points.emplace_back(3.0F, 0.01F * static_cast<float>(i), 0.0F);
   PointCloud same;

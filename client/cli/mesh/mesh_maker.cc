@@ -1,0 +1,160 @@
+#include "client/cli/mesh/mesh_maker.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include <Eigen/Core>
+
+#include "client/cli/terminal/progress.h"
+#include "core/common/status.h"
+#include "core/mesh/alpha_shape.h"
+#include "core/mesh/density_contour.h"
+#include "core/mesh/distance_field.h"
+#include "core/mesh/organised_mesh.h"
+#include "core/mesh/point_thinner.h"
+
+namespace strata::cli {
+namespace {
+
+// Goes over all scans, `rounds` times in all.
+class ScanLoop {
+ public:
+  ScanLoop(Context& context, const ScanClouds& clouds, std::size_t rounds)
+      : context_(context),
+        clouds_(clouds),
+        rounds_(rounds),
+        progress_(context.output.talk(), TalksToTerminal(), "mesh") {}
+
+  absl::Status ForEach(const char* phase, absl::FunctionRef<absl::Status(PosedCloud&)> body) {
+    for (std::size_t i = 0; i < clouds_.size(); ++i) {
+      STRATA_RETURN_IF_ERROR(context_.call.stop.status());
+      progress_.Update(static_cast<double>(done_++) / static_cast<double>(rounds_ * clouds_.size()),
+                       phase);
+      STRATA_ASSIGN_OR_RETURN(PosedCloud posed, clouds_.Read(context_, i));
+      STRATA_RETURN_IF_ERROR(body(posed));
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  Context& context_;
+  const ScanClouds& clouds_;
+  const std::size_t rounds_;
+  std::size_t done_ = 0;
+  Progress progress_;
+};
+
+absl::StatusOr<MadeMesh> ByDistance(Context& context,
+                                    const ScanClouds& clouds,
+                                    const MeshOptions& options) {
+  DistanceFieldOptions field_options;
+  field_options.voxel_m = options.voxel_m;
+  if (options.region.has_value()) field_options.region = *options.region;
+  STRATA_RETURN_IF_ERROR(field_options.Validate());
+  DistanceField field(field_options);
+  const Stop& stop = context.call.stop;
+  ScanLoop loop(context, clouds, 2);
+  STRATA_RETURN_IF_ERROR(loop.ForEach("surfaces", [&](PosedCloud& posed) {
+    clouds.KeepClass(posed.cloud);
+    return field.Add(posed.cloud, posed.T_mesh_scan, posed.sensor, stop);
+  }));
+  if (field.points() == 0) return MadeMesh();
+  STRATA_RETURN_IF_ERROR(loop.ForEach("free space", [&](const PosedCloud& posed) {
+    return field.Carve(posed.cloud, posed.T_mesh_scan, posed.sensor, stop);
+  }));
+  MadeMesh made;
+  made.points = field.points();
+  STRATA_ASSIGN_OR_RETURN(made.mesh, field.Mesh(stop));
+  return made;
+}
+
+absl::StatusOr<std::vector<Eigen::Vector3d>> ThinnedPoints(Context& context,
+                                                           const ScanClouds& clouds,
+                                                           const MeshOptions& options,
+                                                           double edge_m) {
+  PointThinnerOptions thinner_options;
+  thinner_options.edge_m = edge_m;
+  if (options.region.has_value()) thinner_options.region = *options.region;
+  STRATA_RETURN_IF_ERROR(thinner_options.Validate());
+  PointThinner thinner(thinner_options);
+  ScanLoop loop(context, clouds, 1);
+  STRATA_RETURN_IF_ERROR(loop.ForEach("points", [&](PosedCloud& posed) {
+    clouds.KeepClass(posed.cloud);
+    return thinner.Add(posed.cloud, posed.T_mesh_scan, posed.sensor, context.call.stop);
+  }));
+  return thinner.Points();
+}
+
+absl::StatusOr<MadeMesh> ByContour(Context& context,
+                                   const ScanClouds& clouds,
+                                   const MeshOptions& options) {
+  // Finer than the voxels, so that their counts tell a surface from single points.
+  STRATA_ASSIGN_OR_RETURN(const std::vector<Eigen::Vector3d> points,
+                          ThinnedPoints(context, clouds, options, options.voxel_m / 2.0));
+  DensityContourOptions contour;
+  contour.voxel_m = options.voxel_m;
+  MadeMesh made;
+  made.points = points.size();
+  STRATA_ASSIGN_OR_RETURN(made.mesh, ContourDensity(points, contour, context.call.stop));
+  return made;
+}
+
+absl::StatusOr<MadeMesh> ByAlphaShape(Context& context,
+                                      const ScanClouds& clouds,
+                                      const MeshOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<Eigen::Vector3d> points,
+                          ThinnedPoints(context, clouds, options, options.voxel_m));
+  STRATA_ASSIGN_OR_RETURN(AlphaShape shape,
+                          MakeAlphaShape(points, std::nullopt, context.call.stop));
+  return MadeMesh{std::move(shape.mesh), points.size(), shape.alpha_m2};
+}
+
+absl::StatusOr<MadeMesh> ByGrid(Context& context, const ScanClouds& clouds) {
+  STRATA_ASSIGN_OR_RETURN(PosedCloud posed, clouds.Read(context, 0));
+  clouds.KeepClass(posed.cloud);
+  MadeMesh made;
+  made.points = CountFinite(posed.cloud);
+  STRATA_ASSIGN_OR_RETURN(made.mesh, MeshOrganised(posed.cloud));
+  return made;
+}
+
+absl::StatusOr<MadeMesh> ByMethod(Context& context,
+                                  const ScanClouds& clouds,
+                                  const MeshOptions& options) {
+  if (options.method == "organised") return ByGrid(context, clouds);
+  if (options.method == "contour") return ByContour(context, clouds, options);
+  if (options.method == "alpha") return ByAlphaShape(context, clouds, options);
+  return ByDistance(context, clouds, options);
+}
+
+}  // namespace
+
+absl::StatusOr<MadeMesh> MakeMesh(Context& context,
+                                  const ScanClouds& clouds,
+                                  const MeshOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(MadeMesh made, ByMethod(context, clouds, options));
+  const char* const where = options.region.has_value() ? " in the region" : "";
+  const char* const what = options.class_name.empty() ? "" : " of that class";
+  if (made.points == 0) {
+    return absl::NotFoundError(absl::StrCat("no points", what, where, " to mesh"));
+  }
+  if (made.mesh.triangles.empty()) {
+    return absl::FailedPreconditionError(absl::StrFormat(
+        "%d points%s%s make no triangle: they are too few or too far apart for voxels of %g m; "
+        "larger ones may do",
+        made.points,
+        what,
+        where,
+        options.voxel_m));
+  }
+  return made;
+}
+
+}  // namespace strata::cli
