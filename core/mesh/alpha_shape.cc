@@ -30,6 +30,7 @@ using Eigen::Vector3d;
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr double kJoinedShare = 0.95;
 constexpr double kSpacings = 3.0;
+constexpr double kMostSpacings = 6.0;
 
 struct Ball {
   Vector3d centre;
@@ -159,6 +160,15 @@ double MedianSpacing(const std::vector<Face>& faces, std::span<const Vector3d> p
   return std::isfinite(*middle) ? *middle : 0.0;
 }
 
+double UsualAlpha(const std::vector<Face>& faces,
+                  std::span<const Vector3d> points,
+                  double spacing_m) {
+  if (spacing_m == 0.0) spacing_m = MedianSpacing(faces, points);
+  return std::clamp(JoiningAlpha(faces, points.size()),
+                    std::pow(kSpacings * spacing_m, 2),
+                    std::pow(kMostSpacings * spacing_m, 2));
+}
+
 Triangle FacingAwayFrom(const Vector3d& behind, Triangle t, std::span<const Vector3d> points) {
   const Vector3d normal = (points[t[1]] - points[t[0]]).cross(points[t[2]] - points[t[0]]);
   if (normal.dot(behind - points[t[0]]) > 0.0) std::swap(t[1], t[2]);
@@ -168,7 +178,7 @@ Triangle FacingAwayFrom(const Vector3d& behind, Triangle t, std::span<const Vect
 }  // namespace
 
 absl::StatusOr<AlphaShape> MakeAlphaShape(std::span<const Vector3d> points,
-                                          std::optional<double> alpha_m2,
+                                          const AlphaShapeOptions& options,
                                           const Stop& stop) {
   if (points.size() > kMostAlphaPoints) {
     return absl::ResourceExhaustedError(
@@ -186,10 +196,8 @@ absl::StatusOr<AlphaShape> MakeAlphaShape(std::span<const Vector3d> points,
   STRATA_RETURN_IF_ERROR(stop.status());
   const std::vector<Face> faces = FacesOf(tetrahedra, points);
   AlphaShape shape;
-  shape.alpha_m2 = alpha_m2.has_value()
-                       ? *alpha_m2
-                       : std::max(std::pow(kSpacings * MedianSpacing(faces, points), 2),
-                                  JoiningAlpha(faces, points.size()));
+  shape.alpha_m2 = options.alpha_m2.has_value() ? *options.alpha_m2
+                                                : UsualAlpha(faces, points, options.spacing_m);
   STRATA_RETURN_IF_ERROR(stop.status());
   shape.mesh.vertices.assign(points.begin(), points.end());
   for (const Face& face : faces) {

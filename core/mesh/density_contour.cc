@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -26,6 +27,7 @@ using Eigen::Vector3i;
 
 constexpr int kRadius = 2;  // voxels within which a point counts
 constexpr double kShare = 0.99;
+constexpr float kAnyStep = std::numeric_limits<float>::infinity();
 
 using Counts = VoxelBlocks<std::uint16_t>;
 
@@ -119,8 +121,9 @@ absl::StatusOr<TriangleMesh> ContourDensity(std::span<const Vector3d> points,
     return static_cast<float>(level - counts.block(i)[node]);
   };
   const NodeGrid grid{.origin = Vector3d::Zero(), .spacing_m = options.voxel_m};
-  STRATA_ASSIGN_OR_RETURN(TriangleMesh mesh,
-                          MarchCubes(counts.keys(), read, static_cast<float>(level), grid, stop));
+  STRATA_ASSIGN_OR_RETURN(
+      TriangleMesh mesh,
+      MarchCubes(counts.keys(), read, static_cast<float>(level), kAnyStep, grid, stop));
   for (Vector3d& v : mesh.vertices) v = box.R_box_map.transpose() * v + box.mean;
   return mesh;
 }

@@ -34,6 +34,8 @@ constexpr double kAlong = 1.25;      // σ of a point's weight along its normal
 constexpr double kReachSpacings = 1.5;
 constexpr double kLeastReach = 1.5;
 constexpr double kMostReach = 6.0;
+// Points rougher than this may lie on no surface at all and speak for themselves only.
+constexpr double kRough = 0.5;
 // The largest weight of a point, at its place.
 constexpr double kFullWeight = 256.0;
 // Nodes that have less are at the fringe of what was seen.
@@ -44,7 +46,9 @@ constexpr double kGrazing = 0.08;
 constexpr double kMargin = 4.0;
 // A ray through a node counts as much as this of a point at it; by depth behind the surface.
 constexpr double kRayWeight = 96.0;
-constexpr int kSmallPart = 24;  // triangles; less is noise
+// A distance grows by one from node to node, by noise a little more.
+constexpr float kSteepest = 2.0F;
+constexpr int kSmallPart = 100;  // triangles; less is noise
 
 struct Node {
   float sum = 0.0F;          // of weight · distance [voxels]
@@ -115,6 +119,7 @@ class DistanceField::Field {
                    const SensorModel& sensor,
                    const Stop& stop) {
     Place(cloud, T_map_scan);
+    points_ += CountInRegion(cloud, T_map_scan);
     std::size_t done = 0;
     for (const OrientedPoint& point : OrientPoints(cloud, options_.voxel_m)) {
       if (done++ % 1024 == 0) STRATA_RETURN_IF_ERROR(Check(stop));
@@ -127,13 +132,15 @@ class DistanceField::Field {
       const double cosine = point.normal.dot(cloud.sensor_origin - point.position) / range_m;
       if (cosine < kGrazing) continue;
       // Relative to a sensor that stands before it; noise across the voxel counts the same.
+      // Nothing joins points so far apart.
+      if (point.spacing_m > kMostReach * options_.voxel_m) continue;
+      const bool rough = point.roughness_m > kRough * options_.voxel_m + sensor.SigmaAt(range_m);
       const double sigma_m = std::hypot(sensor.SigmaAt(range_m), double{point.roughness_m});
       const double weight = 1.0 / (1.0 + std::pow(sigma_m / options_.voxel_m, 2));
       Splat(at,
             T_map_scan.linear() * point.normal.cast<double>(),
-            point.spacing_m / options_.voxel_m,
+            rough ? 0.0 : point.spacing_m / options_.voxel_m,
             kFullWeight * weight * std::min(1.0, cosine + 0.25));
-      ++points_;
     }
     return Check(stop);
   }
@@ -168,6 +175,7 @@ class DistanceField::Field {
             voxels_.keys(),
             [this](std::size_t i, std::size_t node) { return DistanceAt(voxels_.block(i)[node]); },
             std::numeric_limits<float>::quiet_NaN(),
+            kSteepest,
             grid_,
             stop));
     DropSmallParts(kSmallPart, mesh);
@@ -184,6 +192,14 @@ class DistanceField::Field {
     grid_.origin =
         (T_map_scan * cloud.origin / options_.voxel_m).array().round() * options_.voxel_m;
     placed_ = true;
+  }
+
+  std::uint64_t CountInRegion(const PointCloud& cloud, const Pose& T_map_scan) const {
+    return static_cast<std::uint64_t>(
+        std::count_if(cloud.points.begin(), cloud.points.end(), [&](const Eigen::Vector3f& p) {
+          return p.allFinite() &&
+                 options_.region.contains(T_map_scan * (p.cast<double>() + cloud.origin));
+        }));
   }
 
   absl::Status TooFar() const {

@@ -52,7 +52,7 @@ class DistanceField {
                      const Pose& T_map_scan,
                      const SensorModel& sensor,
                      const Stop& stop);
-  // Points that were taken in, thinned to one a voxel and scan.
+  // That were added and lie in the region.
   std::uint64_t points() const;
   std::size_t bytes() const;
 

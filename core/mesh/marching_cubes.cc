@@ -80,8 +80,9 @@ class CubeMarcher {
   CubeMarcher(const std::vector<BlockKey>& keys,
               NodeReader read,
               float outside,
+              float steepest,
               const NodeGrid& grid)
-      : read_(read), outside_(outside), grid_(grid) {
+      : read_(read), outside_(outside), steepest_(steepest), grid_(grid) {
     for (std::size_t i = 0; i < keys.size(); ++i) source_.emplace(keys[i], i);
     bases_ = keys;
     if (!std::isnan(outside)) AddBlocksBefore();
@@ -164,7 +165,8 @@ class CubeMarcher {
     }
   }
 
-  // The case of the cube from a node of the block gathered last; nullopt where a corner is unknown.
+  // The case of the cube from a node of the block gathered last; nullopt where a corner is unknown
+  // or a jump too steep.
   std::optional<unsigned> CaseOf(int x, int y, int z) const {
     unsigned cube = 0;
     for (std::size_t corner = 0; corner < 8; ++corner) {
@@ -172,6 +174,14 @@ class CubeMarcher {
       const float value = values_[ValueIndex(x + dx, y + dy, z + dz)];
       if (std::isnan(value)) return std::nullopt;
       if (value < 0.0F) cube |= 1U << corner;
+    }
+    if (cube == 0 || cube == 0xFF) return cube;
+    for (const CubeEdge& e : kEdges) {
+      const Vector3i from(x + e.from[0], y + e.from[1], z + e.from[2]);
+      const Vector3i to = from + Vector3i::Unit(e.axis);
+      const float a = values_[ValueIndex(from.x(), from.y(), from.z())];
+      const float b = values_[ValueIndex(to.x(), to.y(), to.z())];
+      if (Crosses(a, b) && std::abs(a - b) > steepest_) return std::nullopt;
     }
     return cube;
   }
@@ -202,6 +212,7 @@ class CubeMarcher {
 
   NodeReader read_;
   const float outside_;
+  const float steepest_;
   const NodeGrid& grid_;
   HashMap<BlockKey, std::size_t> source_;  // index of the keys given
   std::vector<BlockKey> bases_;            // blocks that own cubes and edges, in order
@@ -216,9 +227,10 @@ class CubeMarcher {
 absl::StatusOr<TriangleMesh> MarchCubes(const std::vector<BlockKey>& keys,
                                         NodeReader read,
                                         float outside,
+                                        float steepest,
                                         const NodeGrid& grid,
                                         const Stop& stop) {
-  return CubeMarcher(keys, read, outside, grid).March(stop);
+  return CubeMarcher(keys, read, outside, steepest, grid).March(stop);
 }
 
 }  // namespace strata

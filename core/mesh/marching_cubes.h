@@ -19,12 +19,15 @@ namespace strata {
 using NodeReader = absl::FunctionRef<float(std::size_t i, std::size_t node)>;
 
 // Negative is inside, NaN unknown: no triangle reaches there. Nodes of no block have the value
-// `outside`; where that is a number, the surface is closed. Each vertex stands once, between two
-// nodes; vertices and triangles come in the order of the blocks' keys, whatever the order given.
-// RESOURCE_EXHAUSTED for 2³¹ vertices and more; the stop's status.
+// `outside`; where that is a number, the surface is closed. Where the value goes from one node to
+// the next by more than `steepest` through zero there is no surface but two things side by side.
+// Each vertex stands once, between two nodes; vertices and triangles come in the order of the
+// blocks' keys, whatever the order given. RESOURCE_EXHAUSTED for 2³¹ vertices and more; the stop's
+// status.
 absl::StatusOr<TriangleMesh> MarchCubes(const std::vector<BlockKey>& keys,
                                         NodeReader read,
                                         float outside,
+                                        float steepest,
                                         const NodeGrid& grid,
                                         const Stop& stop);
 

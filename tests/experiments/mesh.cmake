@@ -1,7 +1,20 @@
 find_package(nanoflann REQUIRED)
+pkg_check_modules(pcl_mesh_peers REQUIRED pcl_features)
+
+# From PCL's headers: its library for surfaces brings VTK.
+strata_library(
+  mesh_peers
+  NO_INSTALL
+  SOURCES mesh_peers.cc
+  HEADERS mesh_peers.h stool.h
+  DEPS strata::mesh strata::simulator
+  PRIVATE_DEPS pcl_features pcl_search pcl_kdtree pcl_common
+)
+target_include_directories(strata_mesh_peers SYSTEM PRIVATE ${pcl_mesh_peers_INCLUDE_DIRS})
+set_source_files_properties(mesh_peers.cc PROPERTIES COMPILE_OPTIONS -Wno-array-bounds)
 
 strata_executable(
   mesh_methods mesh_methods
   SOURCES mesh_methods.cc
-  DEPS strata::mesh strata::mls strata::simulator strata::test_support strata::test_recordings nanoflann::nanoflann
+  DEPS strata::mesh strata::mesh_peers strata::mls strata::test_support strata::test_recordings nanoflann::nanoflann
 )

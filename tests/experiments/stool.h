@@ -18,6 +18,9 @@
 
 namespace strata::testing {
 
+// What it is meshed with: half the thickness of its thinnest part has three.
+inline constexpr double kStoolVoxelM = 0.008;
+
 struct StoolView {
   PointCloud cloud;  // organised
   Pose T_world_scan = Pose::Identity();

@@ -133,6 +133,7 @@ void AddMapMesh(Commands& commands, CLI::App* noun) {
 
 void AddScanMesh(Commands& commands, CLI::App* noun) {
   auto options = std::make_shared<MeshOptions>();
+  options->one_scan = true;
   CLI::App* app =
       commands.Verb(noun,
                     "mesh",

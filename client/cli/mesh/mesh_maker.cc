@@ -111,8 +111,9 @@ absl::StatusOr<MadeMesh> ByAlphaShape(Context& context,
                                       const MeshOptions& options) {
   STRATA_ASSIGN_OR_RETURN(const std::vector<Eigen::Vector3d> points,
                           ThinnedPoints(context, clouds, options, options.voxel_m));
-  STRATA_ASSIGN_OR_RETURN(AlphaShape shape,
-                          MakeAlphaShape(points, std::nullopt, context.call.stop));
+  STRATA_ASSIGN_OR_RETURN(
+      AlphaShape shape,
+      MakeAlphaShape(points, {.alpha_m2 = {}, .spacing_m = options.voxel_m}, context.call.stop));
   return MadeMesh{std::move(shape.mesh), points.size(), shape.alpha_m2};
 }
 

@@ -91,7 +91,7 @@ TEST(AlphaShapeOracleTest, FacetsAreCgals) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     for (const auto& points : {InACube(600, seed), OnANoisySphere(800, seed)}) {
       for (const double alpha_m2 : {1e-4, 0.002, 0.006, 0.02, 0.3, 10.0}) {
-        const auto shape = MakeAlphaShape(points, alpha_m2, Stop());
+        const auto shape = MakeAlphaShape(points, {.alpha_m2 = alpha_m2}, Stop());
         STRATA_ASSERT_OK(shape);
         const Facets theirs = PeersFacets(points, alpha_m2);
         EXPECT_EQ(FacetsOf(shape->mesh), theirs) << "seed " << seed << ", α " << alpha_m2;

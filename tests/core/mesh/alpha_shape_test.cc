@@ -21,7 +21,7 @@ using testing::StatusIs;
 TEST(AlphaShapeTest, SphereOfPointsIsClosed) {
   const std::vector<Vector3d> points = testing::SpherePoints(2000, 1.0, {400.0, 0.0, 9.0});
   // Large enough for the ball within: all is inside, the hull remains.
-  const auto shape = MakeAlphaShape(points, 4.0, Stop());
+  const auto shape = MakeAlphaShape(points, {.alpha_m2 = 4.0}, Stop());
   STRATA_ASSERT_OK(shape);
   const MeshCheck check = CheckMesh(shape->mesh);
   EXPECT_TRUE(check.closed());
@@ -31,8 +31,7 @@ TEST(AlphaShapeTest, SphereOfPointsIsClosed) {
 }
 
 TEST(AlphaShapeTest, AloneItJoinsThePoints) {
-  const auto shape =
-      MakeAlphaShape(testing::SpherePoints(2000, 1.0, Vector3d::Zero()), std::nullopt, Stop());
+  const auto shape = MakeAlphaShape(testing::SpherePoints(2000, 1.0, Vector3d::Zero()), {}, Stop());
   STRATA_ASSERT_OK(shape);
   EXPECT_GT(shape->mesh.vertices.size(), 1900);
   EXPECT_GT(shape->alpha_m2, 0.001);
@@ -42,20 +41,20 @@ TEST(AlphaShapeTest, AloneItJoinsThePoints) {
 TEST(AlphaShapeTest, FewAndOddPoints) {
   for (const std::size_t count : {0, 1, 3, 4}) {
     const auto shape =
-        MakeAlphaShape(testing::SpherePoints(count, 1.0, Vector3d::Zero()), std::nullopt, Stop());
+        MakeAlphaShape(testing::SpherePoints(count, 1.0, Vector3d::Zero()), {}, Stop());
     STRATA_ASSERT_OK(shape);
   }
   std::vector<Vector3d> flat;
   for (int i = 0; i < 30; ++i) flat.emplace_back(i % 6, i / 6, 0.0);
-  const auto shape = MakeAlphaShape(flat, std::nullopt, Stop());
+  const auto shape = MakeAlphaShape(flat, {}, Stop());
   STRATA_ASSERT_OK(shape);
   EXPECT_TRUE(shape->mesh.triangles.empty());
   flat[3].x() = std::numeric_limits<double>::infinity();
-  EXPECT_THAT(MakeAlphaShape(flat, std::nullopt, Stop()),
+  EXPECT_THAT(MakeAlphaShape(flat, {}, Stop()),
               StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr("point 3")));
   const std::vector<Vector3d> many(kMostAlphaPoints + 1);
   EXPECT_THAT(
-      MakeAlphaShape(many, std::nullopt, Stop()),
+      MakeAlphaShape(many, {}, Stop()),
       StatusIs(absl::StatusCode::kResourceExhausted, ::testing::HasSubstr("at most 200000")));
 }
 
@@ -63,7 +62,7 @@ TEST(AlphaShapeTest, FewAndOddPoints) {
 TEST(AlphaShapeTest, LatticeIsItsBox) {
   std::vector<Vector3d> points;
   for (int i = 0; i < 125; ++i) points.emplace_back(i % 5, i / 5 % 5, i / 25);
-  const auto shape = MakeAlphaShape(points, 1.0, Stop());
+  const auto shape = MakeAlphaShape(points, {.alpha_m2 = 1.0}, Stop());
   STRATA_ASSERT_OK(shape);
   EXPECT_NEAR(VolumeOf(shape->mesh), 64.0, 1e-9);
   EXPECT_TRUE(CheckMesh(shape->mesh).closed());

@@ -152,10 +152,10 @@ TEST(DistanceFieldTest, SameBytesAgain) {
 }
 
 TEST(DistanceFieldTest, SaysWhatDoesNotFit) {
-  DistanceField small({.voxel_m = 0.001, .max_bytes = std::size_t{8} << 20});
+  DistanceField small({.voxel_m = 0.01, .max_bytes = std::size_t{2} << 20});
   EXPECT_THAT(small.Add(WallAt(3.0), Pose::Identity(), SensorModel(), Stop()),
               StatusIs(absl::StatusCode::kResourceExhausted,
-                       ::testing::AllOf(::testing::HasSubstr("8 MiB"),
+                       ::testing::AllOf(::testing::HasSubstr("2 MiB"),
                                         ::testing::HasSubstr("larger voxels"))));
   DistanceFieldOptions anywhere{.voxel_m = 0.01};
   anywhere.region = {Vector3d::Constant(-1e9), Vector3d::Constant(1e9)};

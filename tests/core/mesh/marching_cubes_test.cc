@@ -23,6 +23,7 @@ namespace {
 using Eigen::Vector3d;
 using testing::StatusIs;
 
+constexpr float kAnyStep = std::numeric_limits<float>::infinity();
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 std::vector<BlockKey> CubeOfBlocks(int from, int to) {
@@ -49,6 +50,7 @@ TriangleMesh March(const std::vector<BlockKey>& keys,
       keys,
       [&](std::size_t i, std::size_t node) { return f(NodeAt(keys[i], node)); },
       outside,
+      kAnyStep,
       grid,
       Stop());
   EXPECT_THAT(mesh, testing::IsOk());
@@ -94,6 +96,7 @@ TEST(MarchingCubesTest, NoiseIsClosed) {
         keys,
         [&](std::size_t i, std::size_t node) { return values[i * kBlockNodes + node]; },
         1.0F,
+        kAnyStep,
         NodeGrid(),
         Stop());
     STRATA_ASSERT_OK(mesh);
@@ -129,12 +132,26 @@ TEST(MarchingCubesTest, UnknownNodesLeaveABorder) {
   for (const Vector3d& v : mesh.vertices) EXPECT_LE(v.z(), 3.8 + 1e-9);
 }
 
+// Inside up to the middle, then outside at once: two things side by side, no surface.
+TEST(MarchingCubesTest, SteepStepsAreNoSurface) {
+  const std::vector<BlockKey> keys = CubeOfBlocks(-1, 1);
+  const auto step = [&](std::size_t i, std::size_t node) {
+    return NodeAt(keys[i], node).x() < 0.0 ? -1.5F : 1.5F;
+  };
+  const auto all = MarchCubes(keys, step, kNaN, 3.5F, NodeGrid(), Stop());
+  STRATA_ASSERT_OK(all);
+  EXPECT_FALSE(all->triangles.empty());
+  const auto none = MarchCubes(keys, step, kNaN, 2.5F, NodeGrid(), Stop());
+  STRATA_ASSERT_OK(none);
+  EXPECT_TRUE(none->triangles.empty());
+}
+
 TEST(MarchingCubesTest, NothingGivesNothingAndStopStops) {
   EXPECT_TRUE(March({}, Sphere).triangles.empty());
   Stop stop;
   stop.Request();
   EXPECT_THAT(MarchCubes(
-                  {{0, 0, 0}}, [](auto, auto) { return 1.0F; }, 1.0F, NodeGrid(), stop),
+                  {{0, 0, 0}}, [](auto, auto) { return 1.0F; }, 1.0F, kAnyStep, NodeGrid(), stop),
               StatusIs(absl::StatusCode::kCancelled, ::testing::_));
 }
 

@@ -13,7 +13,7 @@ namespace {
 
 TEST(SimplificationTest, FewerTrianglesOfTheSameBall) {
   const auto shape =
-      MakeAlphaShape(testing::SpherePoints(5000, 1.0, {4e5, 5e6, 30.0}), 4.0, Stop());
+      MakeAlphaShape(testing::SpherePoints(5000, 1.0, {4e5, 5e6, 30.0}), {.alpha_m2 = 4.0}, Stop());
   STRATA_ASSERT_OK(shape);
   ASSERT_GT(shape->mesh.triangles.size(), 9000);
   const TriangleMesh simple = Simplify(shape->mesh, 1000);
