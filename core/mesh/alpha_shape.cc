@@ -192,6 +192,13 @@ absl::StatusOr<AlphaShape> MakeAlphaShape(std::span<const Vector3d> points,
     if (points[i].allFinite()) continue;
     return absl::InvalidArgumentError(absl::StrCat("alpha shape: point ", i, " is not finite"));
   }
+  if (!options.towards.empty() && options.towards.size() != points.size()) {
+    return absl::InvalidArgumentError(absl::StrCat("alpha shape: towards has ",
+                                                   options.towards.size(),
+                                                   " entries for ",
+                                                   points.size(),
+                                                   " points"));
+  }
   STRATA_ASSIGN_OR_RETURN(const std::vector<Tetrahedron> tetrahedra, Triangulate(points));
   STRATA_RETURN_IF_ERROR(stop.status());
   const std::vector<Face> faces = FacesOf(tetrahedra, points);
@@ -203,7 +210,12 @@ absl::StatusOr<AlphaShape> MakeAlphaShape(std::span<const Vector3d> points,
   for (const Face& face : faces) {
     const bool inside_both = face.beside[1] <= shape.alpha_m2;
     if (!(face.from <= shape.alpha_m2) || inside_both) continue;
-    shape.mesh.triangles.push_back(FacingAwayFrom(points[face.behind], face.corners, points));
+    Vector3d behind = points[face.behind];
+    if (face.beside[0] > shape.alpha_m2 && !options.towards.empty()) {
+      behind = points[face.corners[0]];
+      for (const std::uint32_t v : face.corners) behind -= options.towards[v].cast<double>();
+    }
+    shape.mesh.triangles.push_back(FacingAwayFrom(behind, face.corners, points));
   }
   DropUnusedVertices(shape.mesh);
   return shape;

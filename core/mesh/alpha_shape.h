@@ -23,7 +23,9 @@ struct AlphaShape {
 };
 
 struct AlphaShapeOptions {
-  std::optional<double> alpha_m2;
+  // From each point to where it was seen from; empty: not known.
+  std::span<const Eigen::Vector3f> towards = {};
+  std::optional<double> alpha_m2 = std::nullopt;
   // How far apart the points are, where that is known (thinned ones); 0: the median distance of
   // neighbours. Without `alpha_m2` only.
   double spacing_m = 0.0;
@@ -32,15 +34,15 @@ struct AlphaShapeOptions {
 // The triangles between inside and outside, and those that have outside on either side: faces of
 // the Delaunay triangulation with an empty ball through their corners of a squared radius of at
 // most `alpha_m2` (the thesis' α, and CGAL's, is that square), but without those between two such
-// tetrahedra. Triangles between outside and outside have no side and face anywhere.
+// tetrahedra. Triangles between outside and outside face to where their points were seen from.
 //
 // Without `alpha_m2`: the smallest that joins 95 % of the points, but at least (three times
 // their spacing)², since the smallest alone leaves a sieve, and at most (six
 // times)², since what stands apart need not be joined.
 //
-// Without triangles for fewer than four points or for all in a plane. INVALID_ARGUMENT for points
-// that are not finite; RESOURCE_EXHAUSTED for more than kMostAlphaPoints; the stop's status.
-// A pure function.
+// Without triangles for fewer than five points or for all in a plane. INVALID_ARGUMENT for points
+// that are not finite, or `towards` of another number; RESOURCE_EXHAUSTED for more than
+// kMostAlphaPoints; the stop's status. A pure function.
 absl::StatusOr<AlphaShape> MakeAlphaShape(std::span<const Eigen::Vector3d> points,
                                           const AlphaShapeOptions& options,
                                           const Stop& stop);

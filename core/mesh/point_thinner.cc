@@ -28,6 +28,7 @@ absl::Status PointThinner::Add(const PointCloud& cloud,
     grid_.origin = (T_map_scan * cloud.origin / options_.edge_m).array().round() * options_.edge_m;
     placed_ = true;
   }
+  const Eigen::Matrix3f R = T_map_scan.linear().cast<float>();
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     if (i % 4096 == 0) STRATA_RETURN_IF_ERROR(stop.status());
     const Eigen::Vector3f& p = cloud.points[i];
@@ -43,6 +44,7 @@ absl::Status PointThinner::Add(const PointCloud& cloud,
     const Eigen::Vector3i node = at.array().floor().cast<int>();
     Cube& cube = cubes_[{node.x(), node.y(), node.z()}];
     cube.sum += (at - node.cast<double>()).cast<float>();
+    cube.towards += R * (cloud.sensor_origin - p).normalized();
     ++cube.count;
     if (cubes_.size() > options_.max_points) return TooMany();
   }
@@ -56,20 +58,22 @@ absl::Status PointThinner::TooMany() const {
       options_.edge_m));
 }
 
-std::vector<Eigen::Vector3d> PointThinner::Points() const {
+ThinnedPoints PointThinner::Points() const {
   std::vector<BlockKey> keys;
   keys.reserve(cubes_.size());
   for (const auto& [key, cube] : cubes_) keys.push_back(key);
   std::sort(keys.begin(), keys.end());
-  std::vector<Eigen::Vector3d> points;
-  points.reserve(keys.size());
+  ThinnedPoints thinned;
+  thinned.points.reserve(keys.size());
+  thinned.towards.reserve(keys.size());
   for (const BlockKey& key : keys) {
     const Cube& cube = cubes_.at(key);
     const Eigen::Vector3d mean = cube.sum.cast<double>() / cube.count;
-    points.emplace_back(grid_.origin +
-                        grid_.spacing_m * (Eigen::Vector3d(key.x, key.y, key.z) + mean));
+    thinned.towards.push_back(cube.towards / static_cast<float>(cube.count));
+    thinned.points.emplace_back(grid_.origin +
+                                grid_.spacing_m * (Eigen::Vector3d(key.x, key.y, key.z) + mean));
   }
-  return points;
+  return thinned;
 }
 
 }  // namespace strata

@@ -22,9 +22,15 @@ struct PointThinnerOptions {
   double edge_m = 0.05;  // of the cubes that keep one point; in [0.001, 10]
   // Only points in here count; in the map [m].
   Eigen::AlignedBox3d region{Eigen::Vector3d::Constant(-1e7), Eigen::Vector3d::Constant(1e7)};
-  std::size_t max_points = 4'000'000;  // some 80 bytes each
+  std::size_t max_points = 4'000'000;  // some 90 bytes each
 
   absl::Status Validate() const;
+};
+
+struct ThinnedPoints {
+  std::vector<Eigen::Vector3d> points;  // in the map
+  std::vector<Eigen::Vector3f>
+      towards;  // from each to where it was seen from; a mean of unit vectors
 };
 
 // One thread at a time.
@@ -40,8 +46,8 @@ class PointThinner {
                    const SensorModel& sensor,
                    const Stop& stop);
   std::size_t size() const { return cubes_.size(); }
-  // The centre of gravity of each cube's points, in the map, in the order of the cubes.
-  std::vector<Eigen::Vector3d> Points() const;
+  // The centre of gravity of each cube's points, in the order of the cubes.
+  ThinnedPoints Points() const;
 
  private:
   absl::Status TooMany() const;
@@ -49,6 +55,7 @@ class PointThinner {
   struct Cube {
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();  // from its corner [cubes]
     std::uint32_t count = 0;
+    Eigen::Vector3f towards = Eigen::Vector3f::Zero();
   };
 
   PointThinnerOptions options_;

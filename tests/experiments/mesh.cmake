@@ -18,3 +18,6 @@ strata_executable(
   SOURCES mesh_methods.cc
   DEPS strata::mesh strata::mesh_peers strata::mls strata::test_support strata::test_recordings nanoflann::nanoflann
 )
+# Table 4.1's bounds: what is closed, and how near meshes come with noise.
+add_test(NAME thesis_table_4_1 COMMAND mesh_methods stool)
+set_tests_properties(thesis_table_4_1 PROPERTIES LABELS smoke TIMEOUT 300 COST 100)

@@ -29,6 +29,9 @@ RESULTS = {
     "sigma_alpha": ("Thesis, 7.4.4: deviation from planes on a large building", "experiments/global_constraints sigma_alpha",
                     POSES),
     "facade_planes": ("Thesis, 7.4.4: a recorded facade", "experiments/global_constraints facade 4", POSES),
+    "table_4_1": ("Thesis, table 4.1: triangulations of a piano stool", "experiments/mesh_methods stool", ("core/mesh",)),
+    "table_4_2": ("Thesis, table 4.2: bytes of representations", "experiments/mesh_methods memory", ("core/mesh", "core/mls")),
+    "meshes": ("Meshes of recorded scans", "experiments/mesh_methods recorded", ("core/mesh",)),
     **{f"thesis_{what}": (f"Thesis, 9.3 and 9.4: {what}", f"experiments/classification_thesis {what}", LABELS)
        for what in ("facade", "depths", "transform", "objects", "people", "places")},
     "oakland": ("Recorded streets named", "experiments/labelled_clouds --data oakland", LABELS),

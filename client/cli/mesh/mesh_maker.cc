@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
@@ -75,10 +74,10 @@ absl::StatusOr<MadeMesh> ByDistance(Context& context,
   return made;
 }
 
-absl::StatusOr<std::vector<Eigen::Vector3d>> ThinnedPoints(Context& context,
-                                                           const ScanClouds& clouds,
-                                                           const MeshOptions& options,
-                                                           double edge_m) {
+absl::StatusOr<ThinnedPoints> Thin(Context& context,
+                                   const ScanClouds& clouds,
+                                   const MeshOptions& options,
+                                   double edge_m) {
   PointThinnerOptions thinner_options;
   thinner_options.edge_m = edge_m;
   if (options.region.has_value()) thinner_options.region = *options.region;
@@ -96,25 +95,25 @@ absl::StatusOr<MadeMesh> ByContour(Context& context,
                                    const ScanClouds& clouds,
                                    const MeshOptions& options) {
   // Finer than the voxels, so that their counts tell a surface from single points.
-  STRATA_ASSIGN_OR_RETURN(const std::vector<Eigen::Vector3d> points,
-                          ThinnedPoints(context, clouds, options, options.voxel_m / 2.0));
+  STRATA_ASSIGN_OR_RETURN(const ThinnedPoints thinned,
+                          Thin(context, clouds, options, options.voxel_m / 2.0));
   DensityContourOptions contour;
   contour.voxel_m = options.voxel_m;
   MadeMesh made;
-  made.points = points.size();
-  STRATA_ASSIGN_OR_RETURN(made.mesh, ContourDensity(points, contour, context.call.stop));
+  made.points = thinned.points.size();
+  STRATA_ASSIGN_OR_RETURN(made.mesh, ContourDensity(thinned.points, contour, context.call.stop));
   return made;
 }
 
 absl::StatusOr<MadeMesh> ByAlphaShape(Context& context,
                                       const ScanClouds& clouds,
                                       const MeshOptions& options) {
-  STRATA_ASSIGN_OR_RETURN(const std::vector<Eigen::Vector3d> points,
-                          ThinnedPoints(context, clouds, options, options.voxel_m));
-  STRATA_ASSIGN_OR_RETURN(
-      AlphaShape shape,
-      MakeAlphaShape(points, {.alpha_m2 = {}, .spacing_m = options.voxel_m}, context.call.stop));
-  return MadeMesh{std::move(shape.mesh), points.size(), shape.alpha_m2};
+  STRATA_ASSIGN_OR_RETURN(const ThinnedPoints thinned,
+                          Thin(context, clouds, options, options.voxel_m));
+  const AlphaShapeOptions shape_options{.towards = thinned.towards, .spacing_m = options.voxel_m};
+  STRATA_ASSIGN_OR_RETURN(AlphaShape shape,
+                          MakeAlphaShape(thinned.points, shape_options, context.call.stop));
+  return MadeMesh{std::move(shape.mesh), thinned.points.size(), shape.alpha_m2};
 }
 
 absl::StatusOr<MadeMesh> ByGrid(Context& context, const ScanClouds& clouds) {

@@ -1,6 +1,7 @@
 #include "core/mesh/alpha_shape.h"
 
 #include <limits>
+#include <span>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -36,6 +37,30 @@ TEST(AlphaShapeTest, AloneItJoinsThePoints) {
   EXPECT_GT(shape->mesh.vertices.size(), 1900);
   EXPECT_GT(shape->alpha_m2, 0.001);
   EXPECT_LT(shape->alpha_m2, 0.1);
+}
+
+// A sheet has no inside: it faces its sensor all over.
+TEST(AlphaShapeTest, SheetsFaceWhereTheyWereSeenFrom) {
+  testing::Random random(5);
+  std::vector<Vector3d> points;
+  for (int i = 0; i < 900; ++i) {
+    points.emplace_back(0.1 * (i % 30), 0.1 * (i / 30), 0.004 * random.Gaussian());
+  }
+  const std::vector<Eigen::Vector3f> towards(points.size(), Eigen::Vector3f(0, 0, -1));
+  const auto shape = MakeAlphaShape(points, {.towards = towards, .spacing_m = 0.1}, Stop());
+  STRATA_ASSERT_OK(shape);
+  std::size_t sheet = 0;
+  std::size_t wrong = 0;
+  for (const Triangle& t : shape->mesh.triangles) {
+    const Vector3d normal = AreaNormal(shape->mesh, t).normalized();
+    ++sheet;
+    wrong += normal.z() > 0.5 ? 1 : 0;
+  }
+  EXPECT_GT(sheet, 1500);
+  // The backs of the flat tetrahedra that four neighbours make.
+  EXPECT_LT(wrong, sheet / 2);
+  EXPECT_THAT(MakeAlphaShape(points, {.towards = std::span(towards).first(3)}, Stop()),
+              StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr("3 entries")));
 }
 
 TEST(AlphaShapeTest, FewAndOddPoints) {

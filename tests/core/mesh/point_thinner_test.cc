@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -40,7 +41,7 @@ TEST(PointThinnerTest, KeepsTheMeanOfEachCube) {
     STRATA_ASSERT_OK(thinner.Add(cloud, testing::At({double(scan), 0, 0}), SensorModel(), Stop()));
   }
   EXPECT_EQ(thinner.size(), expected.size());
-  const std::vector<Vector3d> points = thinner.Points();
+  const std::vector<Vector3d> points = thinner.Points().points;
   ASSERT_EQ(points.size(), expected.size());
   for (const Vector3d& p : points) {
     const auto& [sum, count] = expected.at({static_cast<int>(std::floor(p.x() / 0.25)),
@@ -48,6 +49,19 @@ TEST(PointThinnerTest, KeepsTheMeanOfEachCube) {
                                             static_cast<int>(std::floor(p.z() / 0.25))});
     EXPECT_NEAR((p - sum / count).norm(), 0.0, 1e-5);
   }
+}
+
+TEST(PointThinnerTest, KnowsWherePointsWereSeenFrom) {
+  PointCloud cloud;
+  cloud.points = {{0.0F, 0.0F, 2.1F}};
+  cloud.sensor_origin = {0.0F, 0.0F, 1.0F};
+  Pose T = testing::At({5, 5, 5});
+  T.rotate(Eigen::AngleAxisd(std::numbers::pi / 2, Vector3d::UnitX()));
+  PointThinner thinner({.edge_m = 0.25});
+  STRATA_ASSERT_OK(thinner.Add(cloud, T, SensorModel(), Stop()));
+  // Down in the scan is along y in the map.
+  ASSERT_EQ(thinner.Points().towards.size(), 1);
+  EXPECT_LT((thinner.Points().towards[0] - Eigen::Vector3f(0, 1, 0)).norm(), 1e-6F);
 }
 
 TEST(PointThinnerTest, SaysWhatDoesNotFit) {
