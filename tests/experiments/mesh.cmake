@@ -15,7 +15,7 @@ set_source_files_properties(mesh_peers.cc PROPERTIES COMPILE_OPTIONS -Wno-array-
 
 strata_executable(
   mesh_methods mesh_methods
-  SOURCES mesh_methods.cc
+  SOURCES mesh_methods.cc mesh_recorded.cc
   DEPS strata::mesh strata::mesh_peers strata::mls strata::test_support strata::test_recordings nanoflann::nanoflann
 )
 # Table 4.1's bounds: what is closed, and how near meshes come with noise.

@@ -1,5 +1,6 @@
 #include "core/mesh/organised_mesh.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
