@@ -37,6 +37,7 @@ Json ReportOf(const MadeMesh& made, const MeshCheck& check, const MeshOptions& o
   json["boundary_edges"] = check.boundary_edges;
   json["nonmanifold_edges"] = check.nonmanifold_edges;
   json["euler_characteristic"] = check.euler_characteristic;
+  json["coloured"] = !made.mesh.colour.empty();
   json["relative_to"] = ToJson(options.relative_to);
   return json;
 }
@@ -58,6 +59,7 @@ absl::Status Mesh(Context& context, const MeshOptions& options) {
   STRATA_ASSIGN_OR_RETURN(const ScanClouds clouds, ScanClouds::Find(context, options));
   STRATA_ASSIGN_OR_RETURN(MadeMesh made, MakeMesh(context, clouds, options));
   if (options.simplify.has_value()) made.mesh = Simplify(std::move(made.mesh), *options.simplify);
+  STRATA_RETURN_IF_ERROR(ColourMesh(context, clouds, options, made.mesh));
   Json report = ReportOf(made, CheckMesh(made.mesh), options);
   report["scans"] = clouds.size();
   STRATA_RETURN_IF_ERROR(Write(std::move(made.mesh), format, options, report));

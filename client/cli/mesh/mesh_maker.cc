@@ -18,9 +18,13 @@
 #include "core/mesh/distance_field.h"
 #include "core/mesh/organised_mesh.h"
 #include "core/mesh/point_thinner.h"
+#include "core/mesh/vertex_colours.h"
 
 namespace strata::cli {
 namespace {
+
+// Voxels within which a point colours a vertex: a contour lies two before its points.
+constexpr double kColourReach = 2.5;
 
 // Goes over all scans, `rounds` times in all.
 class ScanLoop {
@@ -155,6 +159,22 @@ absl::StatusOr<MadeMesh> MakeMesh(Context& context,
         options.voxel_m));
   }
   return made;
+}
+
+absl::Status ColourMesh(Context& context,
+                        const ScanClouds& clouds,
+                        const MeshOptions& options,
+                        TriangleMesh& mesh) {
+  // Those of the scan's grid have their points'.
+  if (!clouds.has_colour() || options.method == "organised") return absl::OkStatus();
+  VertexColours colours(mesh, kColourReach * options.voxel_m);
+  ScanLoop loop(context, clouds, 1);
+  STRATA_RETURN_IF_ERROR(loop.ForEach("colours", [&](PosedCloud& posed) {
+    clouds.KeepClass(posed.cloud);
+    return colours.Add(posed.cloud, posed.T_mesh_scan, context.call.stop);
+  }));
+  mesh.colour = colours.Colours();
+  return absl::OkStatus();
 }
 
 }  // namespace strata::cli

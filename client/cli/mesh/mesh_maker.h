@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
 #include "client/cli/mesh/mesh_options.h"
@@ -25,6 +26,12 @@ struct MadeMesh {
 absl::StatusOr<MadeMesh> MakeMesh(Context& context,
                                   const ScanClouds& clouds,
                                   const MeshOptions& options);
+
+// Gives the vertices the colours of the scans, if they have any.
+absl::Status ColourMesh(Context& context,
+                        const ScanClouds& clouds,
+                        const MeshOptions& options,
+                        TriangleMesh& mesh);
 
 }  // namespace strata::cli
 

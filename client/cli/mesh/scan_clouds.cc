@@ -1,5 +1,6 @@
 #include "client/cli/mesh/scan_clouds.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -98,6 +99,11 @@ absl::StatusOr<ScanClouds> ScanClouds::Find(Context& context, const MeshOptions&
   if (clouds.scans_.empty()) return NoScans(context, options);
   if (!info.parameters.keep_points) return DroppedPoints(options.map);
   return clouds;
+}
+
+bool ScanClouds::has_colour() const {
+  return std::any_of(
+      scans_.begin(), scans_.end(), [](const ScanInfo& scan) { return scan.header.has_colour; });
 }
 
 absl::StatusOr<PosedCloud> ScanClouds::Read(Context& context, std::size_t i) const {

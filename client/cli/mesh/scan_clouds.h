@@ -32,6 +32,8 @@ class ScanClouds {
   static absl::StatusOr<ScanClouds> Find(Context& context, const MeshOptions& options);
 
   std::size_t size() const { return scans_.size(); }
+  // Whether any of them has colours.
+  bool has_colour() const;
   // Scan `i` without the points that have faded; of all classes.
   absl::StatusOr<PosedCloud> Read(Context& context, std::size_t i) const;
   // The same without the points that are not of the class asked for.
