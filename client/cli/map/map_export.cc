@@ -140,6 +140,12 @@ absl::StatusOr<Geometry> PointsOf(Context& context, const ExportOptions& options
   return geometry;
 }
 
+absl::StatusOr<std::string> BytesOf(const Geometry& geometry, const std::string& format) {
+  if (format == "pcd") return PcdBytes(geometry);
+  STRATA_ASSIGN_OR_RETURN(const MeshFormat mesh_format, MeshFormatOf(format));
+  return MeshBytes(mesh_format, geometry);
+}
+
 absl::Status Export(Context& context, const ExportOptions& options) {
   const bool points = options.format == "pcd";
   absl::Status damage;
@@ -148,16 +154,13 @@ absl::Status Export(Context& context, const ExportOptions& options) {
   for (Eigen::Vector3d& vertex : geometry.vertices) {
     vertex -= options.origin;
   }
-  const bool as_double = options.format != "obj" && NeedsDouble(geometry);
+  const bool as_double = (points || options.format == "ply") && NeedsDouble(geometry);
   if (as_double) {
     context.output.Talk(
         "coordinates beyond 8 km are written as doubles, which PCL's point types do not read; "
         "--relative-to X,Y,Z makes them small");
   }
-  STRATA_ASSIGN_OR_RETURN(const std::string bytes,
-                          points                    ? PcdBytes(geometry)
-                          : options.format == "ply" ? PlyBytes(geometry)
-                                                    : ObjText(geometry));
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes, BytesOf(geometry, options.format));
   STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, bytes));
   context.output.Object({{"file", options.out},
                          {"format", options.format},
@@ -179,8 +182,8 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
   auto options = std::make_shared<ExportOptions>();
   CLI::App* app = commands.Verb(noun,
                                 "export",
-                                "Write a map for other programs: its surfaces as a mesh (ply, obj) "
-                                "or the points of its scans (pcd)",
+                                "Write a map for other programs: its surfaces as a mesh (ply, obj, "
+                                "stl, glb) or the points of its scans (pcd)",
                                 "strata map export campus --format ply --out campus.ply",
                                 [options](Context& context) { return Export(context, *options); });
   AddMapName(app, options->map);
@@ -188,9 +191,10 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
          "--format",
          options->format,
          "ply: triangles and edges, colour by traversability and the class as label where there "
-         "are classes, binary; obj: the same as text, without label; pcd: all points, binary x y z "
-         "and, where there are, rgb and label")
-      ->check(CLI::IsMember({"ply", "obj", "pcd"}))
+         "are classes, binary; obj: the same as text, without label; stl: triangles alone; glb: "
+         "triangles and colour, for viewers; pcd: all points, binary x y z and, where there are, rgb "
+         "and label")
+      ->check(CLI::IsMember({"ply", "obj", "stl", "glb", "pcd"}))
       ->required();
   app->add_option("--out", options->out, "The file to write")->type_name("FILE")->required();
   AddNumbers(

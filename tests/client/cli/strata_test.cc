@@ -535,7 +535,7 @@ TEST_F(StrataTest, SurfacePlanRenderAndExportOfADrive) {
   const std::string png = (dir_.path() / "map.png").string();
   EXPECT_EQ(RunOk({"map", "render", "m", png, "--path", path}).at("paths"), 1);
   EXPECT_GT(std::filesystem::file_size(png), 5000U);
-  for (const std::string format : {"ply", "obj", "pcd"}) {
+  for (const std::string format : {"ply", "obj", "stl", "glb", "pcd"}) {
     const std::string file = (dir_.path() / ("map." + format)).string();
     const json written = RunOk({"map", "export", "m", "--format", format, "--out", file});
     EXPECT_EQ(std::filesystem::file_size(file), written.at("bytes").get<std::size_t>());

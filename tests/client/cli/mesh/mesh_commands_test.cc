@@ -71,6 +71,7 @@ class MeshCommandsTest : public ::testing::Test {
       const std::string name = absl::StrFormat("scan%d.pcd", i);
       Write("organised/" + name, OrganisedPcd(cloud));
       cloud.rows = cloud.columns = 0;
+      if (i > 0) cloud.colour.assign(cloud.size(), {200, 100, 50});
       Write("scans/" + name, *PcdBytes(GeometryOf(cloud)));
       absl::StrAppendFormat(
           &poses, "%d %d %f %f %f 0 0 0 1\n", i, i, places[i].x(), places[i].y(), places[i].z());
@@ -133,6 +134,7 @@ TEST_F(MeshCommandsTest, EveryMethodWritesItsSurface) {
   // Floor, walls and chest.
   EXPECT_NEAR(tsdf["area_m2"].get<double>(), 64.0 + 4 * 16.0 + 3.2, 0.08 * 131.0);
   EXPECT_EQ(std::filesystem::file_size(Path("a.ply")), tsdf["bytes"]);
+  EXPECT_TRUE(tsdf["coloured"]);
   const json contour = RunOk({"map", "mesh", "room", Path("a.obj"), "--method", "contour"});
   EXPECT_TRUE(contour["closed"]);
   EXPECT_GT(contour["volume_m3"], 10.0);
@@ -160,6 +162,7 @@ TEST_F(MeshCommandsTest, PartsClassesAndFewerTriangles) {
 TEST_F(MeshCommandsTest, AScanInItsOwnFrame) {
   const json grid = RunOk({"scan", "mesh", "grids", "t/4", Path("c.ply"), "--method", "organised"});
   EXPECT_GT(grid["triangles"], 50'000);
+  EXPECT_FALSE(grid["coloured"]);
   EXPECT_EQ(grid["scans"], 1);
   const json tsdf = RunOk({"scan", "mesh", "room", "t/4", Path("c.glb")});
   EXPECT_GT(tsdf["triangles"], 10'000);
