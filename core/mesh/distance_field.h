@@ -24,7 +24,7 @@ struct DistanceFieldOptions {
   double voxel_m = 0.05;
   // Only what is in here is meshed; in the map [m].
   Eigen::AlignedBox3d region{Eigen::Vector3d::Constant(-1e7), Eigen::Vector3d::Constant(1e7)};
-  // Of the voxels, 8 bytes each where a surface is near; the mesh comes to a fifth of that.
+  // Of the voxels, 8 bytes each where a surface is near; the mesh takes half as much beside them.
   std::size_t max_bytes = std::size_t{640} << 20;
 
   absl::Status Validate() const;

@@ -67,7 +67,7 @@ bool TooLong(const TriangleMesh& mesh, const Triangle& t) {
 }  // namespace
 
 absl::StatusOr<TriangleMesh> MeshOrganised(const PointCloud& cloud) {
-  if (!cloud.organised() || cloud.size() < 4) {
+  if (cloud.rows < 2 || cloud.columns < 2) {
     return absl::FailedPreconditionError(
         "the scan has no rows and columns, so nothing says which points are neighbours; the other "
         "methods need none");
@@ -93,7 +93,8 @@ absl::StatusOr<TriangleMesh> MeshOrganised(const PointCloud& cloud) {
   };
   for (const pcl::Vertices& p : polygons) {
     Triangle t = {point_of(p.vertices[0]), point_of(p.vertices[1]), point_of(p.vertices[2])};
-    if (TooLong(mesh, t)) continue;
+    const bool across_seam_only = t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+    if (across_seam_only || TooLong(mesh, t)) continue;
     if (AreaNormal(mesh, t).dot(sensor - mesh.vertices[t[0]]) < 0.0) std::swap(t[1], t[2]);
     mesh.triangles.push_back(t);
   }

@@ -12,8 +12,8 @@ namespace strata {
 // Triangles between neighbours of the scan's grid, in the scan frame and facing the sensor, with
 // the points' colours. None across an edge of a thing: where a side is longer than four times the
 // usual distance of neighbours at that range, or than half a metre, or seen at less than 3°.
-// FAILED_PRECONDITION for a cloud that is not organised. A pure function. REQUIRES: a cloud as
-// ValidateCloud() takes it.
+// FAILED_PRECONDITION for a cloud without two rows and columns. A pure function. REQUIRES: a cloud
+// as ValidateCloud() takes it.
 absl::StatusOr<TriangleMesh> MeshOrganised(const PointCloud& cloud);
 
 }  // namespace strata

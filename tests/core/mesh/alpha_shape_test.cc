@@ -74,6 +74,17 @@ TEST(AlphaShapeTest, FewAndOddPoints) {
   const auto shape = MakeAlphaShape(flat, {}, Stop());
   STRATA_ASSERT_OK(shape);
   EXPECT_TRUE(shape->mesh.triangles.empty());
+  // All at one place, on one line, and far apart.
+  const std::vector<Vector3d> same(50, Vector3d(1, 2, 3));
+  std::vector<Vector3d> line;
+  for (int i = 0; i < 50; ++i) line.emplace_back(i, i, i);
+  std::vector<Vector3d> far = testing::SpherePoints(100, 1e-3, {1e8, 0, 0});
+  far.emplace_back(-1e8, 0, 0);
+  for (const auto& points : {same, line, far}) {
+    EXPECT_THAT(
+        MakeAlphaShape(points, {}, Stop()),
+        ::testing::AnyOf(testing::IsOk(), StatusIs(absl::StatusCode::kInternal, ::testing::_)));
+  }
   flat[3].x() = std::numeric_limits<double>::infinity();
   EXPECT_THAT(MakeAlphaShape(flat, {}, Stop()),
               StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr("point 3")));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Geometry>
 #include <gmock/gmock.h>
@@ -84,6 +85,14 @@ TEST(OrganisedMeshTest, OddClouds) {
   const auto empty = MeshOrganised(none);
   STRATA_ASSERT_OK(empty);
   EXPECT_TRUE(empty->triangles.empty());
+  // One column, and one row.
+  PointCloud column;
+  column.points = {{1, 0, 0}, {1, 0, 0.1F}, {1, 0, 0.2F}, {1, 0, 0.3F}};
+  column.rows = 4;
+  column.columns = 1;
+  EXPECT_THAT(MeshOrganised(column), StatusIs(absl::StatusCode::kFailedPrecondition, ::testing::_));
+  std::swap(column.rows, column.columns);
+  EXPECT_THAT(MeshOrganised(column), StatusIs(absl::StatusCode::kFailedPrecondition, ::testing::_));
   cloud.rows = cloud.columns = 0;
   EXPECT_THAT(MeshOrganised(cloud),
               StatusIs(absl::StatusCode::kFailedPrecondition, ::testing::HasSubstr("rows")));
