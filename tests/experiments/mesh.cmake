@@ -1,17 +1,21 @@
 find_package(nanoflann REQUIRED)
 pkg_check_modules(pcl_mesh_peers REQUIRED pcl_features)
 
+find_path(CGAL_MESH_INCLUDE_DIR CGAL/Alpha_shape_3.h REQUIRED)
+
 # From PCL's headers: its library for surfaces brings VTK.
 strata_library(
   mesh_peers
   NO_INSTALL
-  SOURCES mesh_peers.cc
+  SOURCES mesh_peers.cc mesh_peers_cgal.cc
   HEADERS mesh_peers.h stool.h
   DEPS strata::mesh strata::simulator
-  PRIVATE_DEPS pcl_features pcl_search pcl_kdtree pcl_common
+  PRIVATE_DEPS pcl_features pcl_search pcl_kdtree pcl_common gmp mpfr
 )
-target_include_directories(strata_mesh_peers SYSTEM PRIVATE ${pcl_mesh_peers_INCLUDE_DIRS})
-set_source_files_properties(mesh_peers.cc PROPERTIES COMPILE_OPTIONS -Wno-array-bounds)
+target_include_directories(strata_mesh_peers SYSTEM PRIVATE ${pcl_mesh_peers_INCLUDE_DIRS} ${CGAL_MESH_INCLUDE_DIR})
+set_source_files_properties(
+  mesh_peers.cc mesh_peers_cgal.cc PROPERTIES COMPILE_OPTIONS -Wno-array-bounds SKIP_UNITY_BUILD_INCLUSION ON
+)
 
 strata_executable(
   mesh_methods mesh_methods

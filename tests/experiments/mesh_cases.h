@@ -2,11 +2,11 @@
 #ifndef STRATA_TESTS_EXPERIMENTS_MESH_CASES_H_
 #define STRATA_TESTS_EXPERIMENTS_MESH_CASES_H_
 
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <functional>
 #include <string>
 #include <utility>
@@ -38,10 +38,11 @@ inline void OrDie(const absl::Status& status) {
   std::exit(1);
 }
 
+// Of the processor, of which others may want some.
 inline double Seconds(const std::function<void()>& work) {
-  const auto begin = std::chrono::steady_clock::now();
+  const std::clock_t begin = std::clock();
   work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
 }
 
 // nanoflann's view of points; its method names are given.

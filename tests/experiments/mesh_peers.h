@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "core/mesh/triangle_mesh.h"
 #include "tests/experiments/stool.h"
 
@@ -13,6 +15,9 @@ namespace strata::testing {
 // plane of the nearest point (Hoppe et al. 1992); normals of 16 neighbours in each view, towards
 // its sensor. Corners at the same place are joined.
 TriangleMesh PclContour(const std::vector<StoolView>& views);
+
+// CGAL's Alpha_shape_3 in its general mode; triangles face anywhere.
+TriangleMesh CgalAlphaShape(const std::vector<Eigen::Vector3d>& points, double alpha_m2);
 
 }  // namespace strata::testing
 
