@@ -96,7 +96,8 @@ void AddSharedOptions(CLI::App* app, const std::shared_ptr<MeshOptions>& options
 
 constexpr char kMethods[] =
     "tsdf: signed distance to what the scans saw, without what others look through, open where "
-    "nothing was seen; contour: closed around the points, two voxels thick; alpha: the points "
+    "nothing was seen (not for clouds merged of several scans, which no sensor saw); contour: "
+    "closed around the points, two voxels thick; alpha: the points "
     "themselves, joined";
 
 }  // namespace
