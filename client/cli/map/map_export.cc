@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -22,6 +23,7 @@
 #include "client/formats/geometry_writer.h"
 #include "core/common/status.h"
 #include "core/mls/surface_mesh.h"
+#include "core/mls/traversability.h"
 
 namespace strata::cli {
 namespace {
@@ -52,6 +54,25 @@ Colour OwnColour(const Surface& surface) {
   return surface.coloured() ? surface.colour : picture::kUnknownColour;
 }
 
+// Where too little lies around a surface, it is level.
+std::vector<Eigen::Vector3f> NormalsOf(const std::vector<SurfaceTile>& tiles, double cell_size_m) {
+  std::map<TileKey, const SurfaceTile*> by_key;
+  for (const SurfaceTile& tile : tiles) by_key[tile.key] = &tile;
+  std::vector<Eigen::Vector3f> normals;
+  for (const SurfaceTile& tile : tiles) {
+    SurfaceNeighbourhood around{};
+    for (int i = 0; i < 9; ++i) {
+      const auto found =
+          by_key.find({tile.key.level, tile.key.x + i % 3 - 1, tile.key.y + i / 3 - 1});
+      if (found != by_key.end()) around[i] = found->second;
+    }
+    for (const Eigen::Vector3f& normal : EstimateNormals(tile, around, cell_size_m)) {
+      normals.push_back(normal.isZero() ? Eigen::Vector3f::UnitZ() : normal);
+    }
+  }
+  return normals;
+}
+
 // No labels rather than none but zeros.
 void DropIfNone(std::vector<std::uint16_t>& labels) {
   if (std::all_of(labels.begin(), labels.end(), [](auto label) { return label == 0; })) {
@@ -60,8 +81,17 @@ void DropIfNone(std::vector<std::uint16_t>& labels) {
 }
 
 // Vertical segments become lines down to a vertex of their own.
-Geometry GeometryOf(const std::vector<SurfaceTile>& tiles, SurfaceMesh mesh, bool own_colours) {
+// `cell_size_m` is that of level 0, the tiles are of level `level`.
+Geometry GeometryOf(const std::vector<SurfaceTile>& tiles,
+                    double cell_size_m,
+                    int level,
+                    bool own_colours) {
+  std::vector<const SurfaceTile*> pointers;
+  pointers.reserve(tiles.size());
+  for (const SurfaceTile& tile : tiles) pointers.push_back(&tile);
+  SurfaceMesh mesh = MakeSurfaceMesh(pointers, cell_size_m);
   Geometry geometry;
+  geometry.normals = NormalsOf(tiles, std::ldexp(cell_size_m, level));
   geometry.vertices = std::move(mesh.vertices);
   geometry.triangles = std::move(mesh.triangles);
   geometry.lines = std::move(mesh.lines);
@@ -84,6 +114,7 @@ Geometry GeometryOf(const std::vector<SurfaceTile>& tiles, SurfaceMesh mesh, boo
     geometry.colour.push_back(own_colours ? geometry.colour[segment.vertex]
                                           : picture::kVerticalColour);
     geometry.label.push_back(geometry.label[segment.vertex]);
+    geometry.normals.push_back(geometry.normals[segment.vertex]);
   }
   DropIfNone(geometry.label);
   return geometry;
@@ -100,13 +131,7 @@ absl::StatusOr<Geometry> MeshOf(Context& context,
   damage = fetched.damage;
   const bool own_colours = options.layer == "colour";
   if (own_colours) STRATA_RETURN_IF_ERROR(ExpectColours(options.map, fetched.tiles));
-  std::vector<const SurfaceTile*> pointers;
-  pointers.reserve(fetched.tiles.size());
-  for (const SurfaceTile& tile : fetched.tiles) {
-    pointers.push_back(&tile);
-  }
-  return GeometryOf(
-      fetched.tiles, MakeSurfaceMesh(pointers, info.parameters.mls.cell_size_m), own_colours);
+  return GeometryOf(fetched.tiles, info.parameters.mls.cell_size_m, options.level, own_colours);
 }
 
 // Every integrated scan's points at their poses.
@@ -192,7 +217,8 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
          options->format,
          "ply: triangles and edges, colour by traversability and the class as label where there "
          "are classes, binary; obj: the same as text, without label; stl: triangles alone; glb: "
-         "triangles and colour, for viewers; pcd: all points, binary x y z and, where there are, rgb "
+         "triangles and colour, for viewers; pcd: all points, binary x y z and, where there are, "
+         "rgb "
          "and label")
       ->check(CLI::IsMember({"ply", "obj", "stl", "glb", "pcd"}))
       ->required();

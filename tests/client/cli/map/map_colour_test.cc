@@ -76,6 +76,14 @@ TEST_F(MapColourTest, MeshesAndSurfacesHaveTheColoursOfThePoints) {
   EXPECT_GT(RunOk({"map", "render", "m", Path("m.png"), "--layer", "colour"}).at("tiles"), 0);
 }
 
+TEST_F(MapColourTest, MeshesHaveNormals) {
+  Make("m", false);
+  RunOk({"map", "export", "m", "--format", "ply", "--out", Path("mesh.ply")});
+  std::ostringstream bytes;
+  bytes << std::ifstream(Path("mesh.ply"), std::ios::binary).rdbuf();
+  EXPECT_THAT(bytes.str(), HasSubstr("property float nx\nproperty float ny\nproperty float nz\n"));
+}
+
 TEST_F(MapColourTest, AMapWithoutColoursSaysSo) {
   Make("grey", false);
   for (const std::vector<std::string>& words :
