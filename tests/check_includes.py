@@ -46,7 +46,7 @@ HERE = "."
 STOREYS = {
     "core/mls": ["elevation", HERE],
     "core/classification": [HERE, "learners", "amn", "features"],
-    "core/planning": [HERE, "ground"],
+    "core/planning": ["floors", HERE, "ground"],
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
     "core/storage": ["sqlite", HERE],
     "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "ingest", "tiles", "scans", "map"],

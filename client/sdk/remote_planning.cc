@@ -77,6 +77,19 @@ absl::Status RemotePlanning::WatchPath(const api::Call& call,
   }
 }
 
+absl::StatusOr<FloorPlan> RemotePlanning::ListFloors(const api::Call& call,
+                                                     absl::string_view map,
+                                                     const FloorQuery& query) {
+  STRATA_ASSIGN_OR_RETURN(const v1::ListFloorsResponse out,
+                          CallUnary(connection_,
+                                    *stub_,
+                                    &v1::Planning::Stub::ListFloors,
+                                    call,
+                                    Repeat::kOnTrouble,
+                                    ToProto(map, query)));
+  return FromProto(out);
+}
+
 absl::StatusOr<std::vector<SurfaceColumn>> RemotePlanning::SampleSurfaces(
     const api::Call& call, absl::string_view map, const std::vector<Eigen::Vector2d>& places) {
   std::vector<SurfaceColumn> columns;

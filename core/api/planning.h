@@ -13,6 +13,7 @@
 #include <Eigen/Core>
 
 #include "core/api/call.h"
+#include "core/world/floor.h"
 #include "core/world/plan.h"
 #include "core/world/robot_profile.h"
 
@@ -44,6 +45,11 @@ class Planning {
                                  absl::string_view map,
                                  const PathQuery& query,
                                  absl::FunctionRef<absl::Status(const PathCheck&)> sink) = 0;
+  // The map's floors for a robot (core/planning/floors); none is OK. INVALID_ARGUMENT for a bad
+  // query; RESOURCE_EXHAUSTED for a map too large; DATA_LOSS naming a damaged tile.
+  virtual absl::StatusOr<FloorPlan> ListFloors(const Call& call,
+                                               absl::string_view map,
+                                               const FloorQuery& query) = 0;
   // All levels at each place, in the order asked; a place without surfaces has an empty column.
   // DATA_LOSS naming a damaged tile where one of the places lies.
   virtual absl::StatusOr<std::vector<SurfaceColumn>> SampleSurfaces(

@@ -94,6 +94,8 @@ class Planner {
                                 int count,
                                 const Stop& stop);
 
+  // Prepared tiles, for others that ask what a robot can do.
+  TileCache& cache() { return cache_; }
   TileCache::Statistics cache_statistics() const { return cache_.statistics(); }
 
  private:

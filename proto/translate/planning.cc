@@ -316,6 +316,90 @@ absl::StatusOr<PathCheck> FromProto(const v1::PathCheck& proto) {
   return check;
 }
 
+v1::ListFloorsRequest ToProto(absl::string_view map, const FloorQuery& query) {
+  v1::ListFloorsRequest proto;
+  proto.set_map(std::string(map));
+  *proto.mutable_profile() = ToProto(query.profile);
+  if (query.at.has_value()) *proto.mutable_at() = EndpointToProto(*query.at);
+  proto.set_min_area_m2(query.min_area_m2);
+  proto.set_cells(query.cells);
+  return proto;
+}
+
+absl::StatusOr<FloorQuery> FromProto(const v1::ListFloorsRequest& proto) {
+  FloorQuery query;
+  query.profile = FromProto(proto.profile());
+  STRATA_RETURN_IF_ERROR(ValidateRobotProfile(query.profile));
+  if (proto.has_at()) {
+    STRATA_ASSIGN_OR_RETURN(query.at, EndpointFromProto("at", proto.at()));
+  }
+  if (proto.has_min_area_m2()) query.min_area_m2 = proto.min_area_m2();
+  query.cells = proto.cells();
+  return query;
+}
+
+v1::ListFloorsResponse ToProto(const FloorPlan& plan) {
+  v1::ListFloorsResponse proto;
+  for (const Floor& floor : plan.floors) {
+    v1::Floor& out = *proto.add_floors();
+    out.set_area_m2(floor.area_m2);
+    *out.mutable_low() = ToProto(floor.low);
+    *out.mutable_high() = ToProto(floor.high);
+    out.set_mean_z_m(floor.mean_z_m);
+    *out.mutable_place() = ToProto(floor.place);
+    for (const FloorBlock& block : floor.blocks) {
+      v1::FloorBlock& added = *out.add_blocks();
+      added.set_x(block.x);
+      added.set_y(block.y);
+      added.set_free(block.free);
+      added.set_occupied(block.occupied);
+      added.set_ground(block.ground);
+    }
+  }
+  for (const FloorLink& link : plan.links) {
+    v1::FloorLink& out = *proto.add_links();
+    out.set_a(link.a);
+    out.set_b(link.b);
+    *out.mutable_place() = ToProto(link.place);
+    out.set_width_m(link.width_m);
+    out.set_slope_rad(link.slope_rad);
+  }
+  if (plan.at.has_value()) proto.set_at(*plan.at);
+  proto.set_cell_size_m(plan.cell_size_m);
+  proto.set_epoch(plan.epoch);
+  proto.set_commit_sequence(plan.commit_sequence);
+  return proto;
+}
+
+absl::StatusOr<FloorPlan> FromProto(const v1::ListFloorsResponse& proto) {
+  FloorPlan plan;
+  for (const v1::Floor& floor : proto.floors()) {
+    Floor& added = plan.floors.emplace_back();
+    added.area_m2 = floor.area_m2();
+    STRATA_ASSIGN_OR_RETURN(added.low, FromProto("low", floor.low()));
+    STRATA_ASSIGN_OR_RETURN(added.high, FromProto("high", floor.high()));
+    added.mean_z_m = floor.mean_z_m();
+    STRATA_ASSIGN_OR_RETURN(added.place, FromProto("place", floor.place()));
+    for (const v1::FloorBlock& block : floor.blocks()) {
+      added.blocks.push_back(
+          {block.x(), block.y(), block.free(), block.occupied(), block.ground()});
+    }
+  }
+  for (const v1::FloorLink& link : proto.links()) {
+    FloorLink& added = plan.links.emplace_back();
+    added.a = link.a();
+    added.b = link.b();
+    STRATA_ASSIGN_OR_RETURN(added.place, FromProto("place", link.place()));
+    added.width_m = link.width_m();
+    added.slope_rad = link.slope_rad();
+  }
+  if (proto.has_at()) plan.at = proto.at();
+  plan.cell_size_m = proto.cell_size_m();
+  plan.epoch = proto.epoch();
+  plan.commit_sequence = proto.commit_sequence();
+  return plan;
+}
+
 v1::CheckPathRequest CheckToProto(absl::string_view map, const PathQuery& query) {
   v1::CheckPathRequest proto = PathToProto<v1::CheckPathRequest>(map, query);
   if (query.known.has_value()) *proto.mutable_known() = ToProto(*query.known);

@@ -5,6 +5,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
+#include "core/world/floor.h"
 #include "core/world/plan.h"
 #include "strata/v1/planning.pb.h"
 
@@ -14,6 +15,8 @@ v1::PlanPathRequest ToProto(absl::string_view map, const PlanQuery& query);
 v1::PlanPathResponse ToProto(const PlanResult& result);
 v1::SurfaceColumn ToProto(const SurfaceColumn& column);
 v1::PathCheck ToProto(const PathCheck& check);
+v1::ListFloorsRequest ToProto(absl::string_view map, const FloorQuery& query);
+v1::ListFloorsResponse ToProto(const FloorPlan& plan);
 v1::CheckPathRequest CheckToProto(absl::string_view map, const PathQuery& query);
 // Without what is known.
 v1::WatchPathRequest WatchToProto(absl::string_view map, const PathQuery& query);
@@ -24,6 +27,8 @@ absl::StatusOr<PlanQuery> FromProto(const v1::PlanPathRequest& request);
 absl::StatusOr<PlanResult> FromProto(const v1::PlanPathResponse& result);
 absl::StatusOr<SurfaceColumn> FromProto(const v1::SurfaceColumn& column);
 absl::StatusOr<PathCheck> FromProto(const v1::PathCheck& check);
+absl::StatusOr<FloorQuery> FromProto(const v1::ListFloorsRequest& request);
+absl::StatusOr<FloorPlan> FromProto(const v1::ListFloorsResponse& plan);
 absl::StatusOr<PathQuery> FromProto(const v1::CheckPathRequest& request);
 absl::StatusOr<PathQuery> FromProto(const v1::WatchPathRequest& request);
 

@@ -40,6 +40,16 @@ absl::Status CheckPath(api::Database& db,
   return absl::OkStatus();
 }
 
+absl::Status ListFloors(api::Database& db,
+                        const api::Call& call,
+                        const v1::ListFloorsRequest& in,
+                        v1::ListFloorsResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const FloorQuery query, AtTheDoor(FromProto(in)));
+  STRATA_ASSIGN_OR_RETURN(const FloorPlan plan, db.planning().ListFloors(call, in.map(), query));
+  out = ToProto(plan);
+  return absl::OkStatus();
+}
+
 absl::StatusOr<std::vector<Eigen::Vector2d>> PlacesOf(const v1::SampleSurfacesRequest& in) {
   std::vector<Eigen::Vector2d> places;
   places.reserve(static_cast<std::size_t>(in.places_size()));
@@ -88,6 +98,7 @@ PlanningService::PlanningService(Runtime& runtime) : Service(runtime, "Planning"
   Unary("PlanPath", &PlanPath);
   Unary("CheckPath", &CheckPath);
   Poll<PathWatchReactor>("WatchPath");
+  Unary("ListFloors", &ListFloors);
   Unary("SampleSurfaces", &SampleSurfaces);
   Unary("SetProfile", &SetProfile);
   Unary("ListProfiles", &ListProfiles);

@@ -78,6 +78,9 @@ const std::multimap<std::string, std::string>& Examples() {
       {"Planning/WatchPath",
        "map: 'world' waypoints { x: -6 y: 0.7 } waypoints { x: -5 y: 1 } "
        "profile { radius_m: 0.2 height_m: 0.3 max_step_m: 2 max_gap_m: 1 max_roughness_m: 5 }"},
+      {"Planning/ListFloors",
+       "map: 'world' at { x_m: -6 y_m: 0.7 } min_area_m2: 0 cells: true "
+       "profile { radius_m: 0.1 height_m: 0.3 max_step_m: 2 max_gap_m: 1 max_roughness_m: 5 }"},
       {"Planning/SampleSurfaces", "map: 'world' places { x: -6 y: 0.7 } places { x: 2 y: 2 }"},
       {"Planning/SetProfile", "map: 'world' name: 'slim' profile { radius_m: 0.1 height_m: 0.3 }"},
       {"Planning/ListProfiles", "map: 'world'"},

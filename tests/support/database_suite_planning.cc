@@ -1,5 +1,7 @@
 // Conformance: planning.
+#include <bit>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <thread>
 #include <vector>
@@ -152,6 +154,37 @@ TEST_P(DatabaseSuite, APathHoldsUntilSomethingStandsInItsWay) {
               StatusIs(Code::kInvalidArgument, HasSubstr("waypoints: 0")));
   EXPECT_THAT(db().planning().CheckPath({}, "none", {plan.waypoints, {}}),
               StatusIs(Code::kNotFound, _));
+}
+
+TEST_P(DatabaseSuite, AFloorIsWhatARobotCanDrive) {
+  FloorQuery query;
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan none, db().planning().ListFloors({}, kMap, query));
+  EXPECT_TRUE(none.floors.empty());
+  EXPECT_FALSE(none.at.has_value());
+  PutFloor(db(), {"run", 1});
+  query.at = PlanEndpoint{.x_m = 0.0, .y_m = 0.0};
+  query.cells = true;
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan plan, db().planning().ListFloors({}, kMap, query));
+  ASSERT_EQ(plan.floors.size(), 1U);
+  EXPECT_EQ(plan.at, 0);
+  EXPECT_TRUE(plan.links.empty());
+  EXPECT_GT(plan.commit_sequence, none.commit_sequence);
+  const Floor& floor = plan.floors[0];
+  std::size_t cells = 0;
+  for (const FloorBlock& block : floor.blocks) cells += std::popcount(block.free);
+  EXPECT_GT(cells, 100U);
+  EXPECT_NEAR(floor.area_m2, cells * plan.cell_size_m * plan.cell_size_m, 1e-6);
+  EXPECT_TRUE(((floor.high - floor.low).head<2>().array() > 0.0).all());
+  query.at = PlanEndpoint{.x_m = 500.0, .y_m = 0.0};
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan off, db().planning().ListFloors({}, kMap, query));
+  EXPECT_FALSE(off.at.has_value());
+  query.profile.radius_m = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(db().planning().ListFloors({}, kMap, query),
+              StatusIs(Code::kInvalidArgument, HasSubstr("radius")));
+  query = {.profile = {}, .min_area_m2 = -1.0};
+  EXPECT_THAT(db().planning().ListFloors({}, kMap, query),
+              StatusIs(Code::kInvalidArgument, HasSubstr("min_area_m2")));
+  EXPECT_THAT(db().planning().ListFloors({}, "none", {}), StatusIs(Code::kNotFound, _));
 }
 
 TEST_P(DatabaseSuite, AStoppedCallSaysSo) {

@@ -147,6 +147,10 @@ class MockPlanning : public api::Planning {
               WatchPath,
               (const api::Call&, absl::string_view, const PathQuery&, Sink<PathCheck>),
               (override));
+  MOCK_METHOD(absl::StatusOr<FloorPlan>,
+              ListFloors,
+              (const api::Call&, absl::string_view, const FloorQuery&),
+              (override));
   MOCK_METHOD(absl::StatusOr<std::vector<SurfaceColumn>>,
               SampleSurfaces,
               (const api::Call&, absl::string_view, const std::vector<Eigen::Vector2d>&),

@@ -1,4 +1,4 @@
-// strata map create|list|show|delete|verify|rebuild|history|revert; backup, classes, diff, export,
+// strata map create|list|show|delete|verify|rebuild|history|revert; backup, classes, diff, export, floors,
 // merge, render and watch have files of their own.
 #include <cstdint>
 #include <map>
@@ -227,6 +227,7 @@ void AddMapCommands(Commands& commands) {
   AddMapWatch(commands, noun);
   AddMapDiff(commands, noun);
   AddMapExport(commands, noun);
+  AddMapFloors(commands, noun);
   AddMapMerge(commands, noun);
   AddMapMesh(commands, noun);
   AddMapRender(commands, noun);

@@ -13,6 +13,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 
+#include "client/cli/map/floor_files.h"
 #include "client/cli/map/map_files.h"
 #include "client/cli/map/tile_source.h"
 #include "client/cli/picture/map_picture.h"
@@ -35,6 +36,8 @@ struct ExportOptions {
   std::string layer = "traversability";
   std::int32_t level = 0;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  FloorOptions floor;
+  std::string mode = "trinary";
 };
 
 Colour TraversabilityColour(const Surface& surface) {
@@ -172,6 +175,13 @@ absl::StatusOr<std::string> BytesOf(const Geometry& geometry, const std::string&
 }
 
 absl::Status Export(Context& context, const ExportOptions& options) {
+  if (options.format == "nav2") {
+    return ExportFloors(context,
+                        options.map,
+                        options.floor,
+                        options.mode == "scale" ? GridMode::kScale : GridMode::kTrinary,
+                        options.out);
+  }
   const bool points = options.format == "pcd";
   absl::Status damage;
   STRATA_ASSIGN_OR_RETURN(Geometry geometry,
@@ -205,12 +215,13 @@ absl::Status Export(Context& context, const ExportOptions& options) {
 
 void AddMapExport(Commands& commands, CLI::App* noun) {
   auto options = std::make_shared<ExportOptions>();
-  CLI::App* app = commands.Verb(noun,
-                                "export",
-                                "Write a map for other programs: its surfaces as a mesh (ply, obj, "
-                                "stl, glb) or the points of its scans (pcd)",
-                                "strata map export campus --format ply --out campus.ply",
-                                [options](Context& context) { return Export(context, *options); });
+  CLI::App* app = commands.Verb(
+      noun,
+      "export",
+      "Write a map for other programs: its surfaces as a mesh (ply, obj, stl, glb), the points of "
+      "its scans (pcd), or its floors as grids (nav2)",
+      "strata map export campus --format ply --out campus.ply",
+      [options](Context& context) { return Export(context, *options); });
   AddMapName(app, options->map);
   app->add_option(
          "--format",
@@ -219,8 +230,9 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
          "are classes, binary; obj: the same as text, without label; stl: triangles alone; glb: "
          "triangles and colour, for viewers; pcd: all points, binary x y z and, where there are, "
          "rgb "
-         "and label")
-      ->check(CLI::IsMember({"ply", "obj", "stl", "glb", "pcd"}))
+         "and label; nav2: a picture (pgm) and a yaml file for map_server, of one floor or a pair "
+         "each of all")
+      ->check(CLI::IsMember({"ply", "obj", "stl", "glb", "pcd", "nav2"}))
       ->required();
   app->add_option("--out", options->out, "The file to write")->type_name("FILE")->required();
   AddNumbers(
@@ -235,6 +247,13 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
       "Coordinates relative to this place, for maps far from their origin [m]");
   app->add_option("--layer", options->layer, "What the colours of a mesh say")
       ->check(CLI::IsMember({"traversability", "colour"}))
+      ->capture_default_str();
+  AddFloorOptions(app, options->floor, true);
+  app->add_option("--mode",
+                  options->mode,
+                  "nav2: free, occupied and unknown alone, or with costs where ground was seen "
+                  "on which the robot cannot be")
+      ->check(CLI::IsMember({"trinary", "scale"}))
       ->capture_default_str();
   app->add_option("--level", options->level, "Level of detail of the mesh, 0 = finest")
       ->check(CLI::Range(0, kMaxLevel))

@@ -27,6 +27,7 @@
 #include "core/engine/tiles/kept_tiles.h"
 #include "core/engine/tiles/surface_tiles.h"
 #include "core/engine/tiles/tile_check.h"
+#include "core/planning/floors/floors.h"
 #include "core/planning/path_check.h"
 #include "core/planning/tile_source.h"
 
@@ -81,6 +82,14 @@ class MapPlanner::Source final : public TileSource {
     return planner_.LoadPrepared(key, MadeOf(versions, profile));
   }
   std::uint64_t epoch() const { return pin_.view().epoch; }
+  std::vector<TileKey> Keys() const {
+    std::vector<TileKey> keys;
+    for (const auto& [key, version] : *versions_) {
+      if (key.level == 0) keys.push_back(key);
+    }
+    std::sort(keys.begin(), keys.end());
+    return keys;
+  }
 
   static absl::StatusOr<Source> OfNow(MapPlanner& planner) {
     return Of(planner, planner.core_.snapshots().PinCurrent());
@@ -180,6 +189,22 @@ absl::StatusOr<PathCheck> MapPlanner::Check(const PathQuery& query, const Stop& 
   check.epoch = epoch;
   check.commit_sequence = changes.last;
   return check;
+}
+
+absl::StatusOr<FloorPlan> MapPlanner::Floors(const FloorQuery& query, const Stop& stop) {
+  std::pair<ChangeSet, Snapshots::Pin> now =
+      core_.ChangesSince(std::numeric_limits<std::uint64_t>::max());
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, std::move(now.second)));
+  STRATA_ASSIGN_OR_RETURN(FloorPlan plan,
+                          FindFloors(planner_.cache(),
+                                     source,
+                                     source.Keys(),
+                                     core_.info().parameters.mls.cell_size_m,
+                                     query,
+                                     stop));
+  plan.epoch = source.epoch();
+  plan.commit_sequence = now.first.last;
+  return plan;
 }
 
 absl::Status MapPlanner::Watch(const PathQuery& query,

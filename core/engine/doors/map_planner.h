@@ -23,6 +23,7 @@
 #include "core/mls/surface_tile.h"
 #include "core/planning/planner.h"
 #include "core/planning/tile_cache.h"
+#include "core/world/floor.h"
 #include "core/world/plan.h"
 
 namespace strata {
@@ -38,6 +39,8 @@ class MapPlanner {
   absl::Status Watch(const PathQuery& query,
                      const Stop& stop,
                      absl::FunctionRef<absl::Status(const PathCheck&)> sink);
+  // As api::Planning::ListFloors. Made anew on each call, from prepared tiles as they are cached.
+  absl::StatusOr<FloorPlan> Floors(const FloorQuery& query, const Stop& stop);
   // INVALID_ARGUMENT for a place that is not finite.
   absl::StatusOr<std::vector<SurfaceColumn>> Sample(const std::vector<Eigen::Vector2d>& places,
                                                     const Stop& stop);

@@ -38,6 +38,14 @@ absl::Status EnginePlanning::WatchPath(const api::Call& call,
   return found->planner().Watch(query, call.stop, sink);
 }
 
+absl::StatusOr<FloorPlan> EnginePlanning::ListFloors(const api::Call& call,
+                                                     absl::string_view map,
+                                                     const FloorQuery& query) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  return found->planner().Floors(query, call.stop);
+}
+
 absl::StatusOr<std::vector<SurfaceColumn>> EnginePlanning::SampleSurfaces(
     const api::Call& call, absl::string_view map, const std::vector<Eigen::Vector2d>& places) {
   STRATA_RETURN_IF_ERROR(call.stop.status());

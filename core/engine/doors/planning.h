@@ -29,6 +29,9 @@ class EnginePlanning final : public api::Planning {
                          absl::string_view map,
                          const PathQuery& query,
                          absl::FunctionRef<absl::Status(const PathCheck&)> sink) override;
+  absl::StatusOr<FloorPlan> ListFloors(const api::Call& call,
+                                       absl::string_view map,
+                                       const FloorQuery& query) override;
   absl::StatusOr<std::vector<SurfaceColumn>> SampleSurfaces(
       const api::Call& call,
       absl::string_view map,

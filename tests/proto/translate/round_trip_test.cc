@@ -209,6 +209,10 @@ TEST(TranslateRoundTripTest, Planning) {
   ExpectRoundTrip(Filled<v1::PlanPathResponse>());
   ExpectRoundTrip(Filled<v1::SurfaceColumn>());
   ExpectRoundTrip(Filled<v1::PathCheck>());
+  ExpectRoundTrip(Filled<v1::ListFloorsResponse>());
+  const auto floors = Filled<v1::ListFloorsRequest>();
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorQuery asked, FromProto(floors));
+  ExpectSame(floors, ToProto(floors.map(), asked));
   const auto check = Filled<v1::CheckPathRequest>();
   STRATA_ASSERT_OK_AND_ASSIGN(const PathQuery checked, FromProto(check));
   ExpectSame(check, CheckToProto(check.map(), checked));

@@ -78,6 +78,7 @@ const std::map<std::string, std::optional<Right>>& Needed() {
          "Classifiers.List",
          "Classifiers.Export",
          "Planning.CheckPath",
+         "Planning.ListFloors",
          "Planning.WatchPath"});
     add(Right::kWrite,
         {"Maps.SetClass",

@@ -1,0 +1,171 @@
+#include "client/cli/map/floor_files.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+
+#include "client/cli/plan/driver_options.h"
+#include "client/cli/terminal/arguments.h"
+#include "client/cli/terminal/json.h"
+#include "client/formats/file_bytes.h"
+#include "core/common/status.h"
+
+namespace strata::cli {
+namespace {
+
+constexpr std::int64_t kMostCells = std::int64_t{1} << 28;
+
+absl::Status NoFloor(const std::string& map, const FloorPlan& plan, int asked) {
+  if (plan.floors.empty()) {
+    return absl::NotFoundError(absl::StrCat("map ", map, " has no floor for this robot"));
+  }
+  return absl::NotFoundError(
+      absl::StrCat("map ", map, ": no floor ", asked, "; it has 0 to ", plan.floors.size() - 1));
+}
+
+// Both files of a floor.
+absl::StatusOr<Json> WriteFloor(const FloorPlan& plan,
+                                std::size_t number,
+                                GridMode mode,
+                                const std::filesystem::path& stem) {
+  STRATA_ASSIGN_OR_RETURN(const OccupancyGrid grid, GridOf(plan.floors[number], plan.cell_size_m));
+  const std::string image = stem.string() + ".pgm";
+  const std::string yaml = stem.string() + ".yaml";
+  STRATA_RETURN_IF_ERROR(WriteFileBytes(image, PgmBytes(grid, mode)));
+  STRATA_RETURN_IF_ERROR(
+      WriteFileBytes(yaml, Nav2Yaml(grid, mode, std::filesystem::path(image).filename().string())));
+  const auto count = [&grid](GridCell cell) {
+    return std::count(grid.cells.begin(), grid.cells.end(), cell);
+  };
+  return Json{{"floor", number},
+              {"file", yaml},
+              {"image", image},
+              {"width", grid.width},
+              {"height", grid.height},
+              {"free", count(GridCell::kFree)},
+              {"occupied", count(GridCell::kOccupied)},
+              {"unknown", count(GridCell::kUnknown) + count(GridCell::kGround)}};
+}
+
+}  // namespace
+
+void AddFloorOptions(CLI::App* verb, FloorOptions& options, bool with_number) {
+  verb->add_option("--profile", options.profile, "The map's robot profile whose floors they are")
+      ->capture_default_str();
+  if (with_number) {
+    verb->add_option("--floor", options.floor, "The floor of this number, as map floors has it")
+        ->check(CLI::Range(0, std::numeric_limits<int>::max()));
+  }
+  AddNumbers(
+      verb,
+      "--at",
+      "X,Y,Z",
+      3,
+      3,
+      [&options](const std::vector<double>& n) {
+        options.at = PlanEndpoint{.x_m = n[0], .y_m = n[1], .z_m = n[2]};
+      },
+      "The floor under a robot at this place [m]");
+}
+
+absl::StatusOr<FloorPlan> FloorsOf(Context& context,
+                                   const std::string& map,
+                                   const FloorOptions& options,
+                                   bool cells) {
+  if (options.floor.has_value() && options.at.has_value()) {
+    return absl::InvalidArgumentError("--floor and --at: give one of them");
+  }
+  FloorQuery query;
+  query.at = options.at;
+  query.cells = cells;
+  STRATA_ASSIGN_OR_RETURN(query.profile,
+                          ProfileOf(context, map, DriverOptions{.profile = options.profile}));
+  STRATA_ASSIGN_OR_RETURN(FloorPlan plan,
+                          context.database.planning().ListFloors(context.call, map, query));
+  const int asked = options.floor.value_or(0);
+  if (options.floor.has_value() && static_cast<std::size_t>(asked) >= plan.floors.size()) {
+    return NoFloor(map, plan, asked);
+  }
+  if (options.at.has_value() && !plan.at.has_value()) {
+    return absl::NotFoundError(absl::StrCat("map ",
+                                            map,
+                                            ": no floor at ",
+                                            options.at->x_m,
+                                            ", ",
+                                            options.at->y_m,
+                                            ", ",
+                                            options.at->z_m.value_or(0.0)));
+  }
+  return plan;
+}
+
+absl::StatusOr<OccupancyGrid> GridOf(const Floor& floor, double cell_size_m) {
+  OccupancyGrid grid;
+  if (floor.blocks.empty()) return grid;
+  std::int64_t low[2] = {std::numeric_limits<std::int64_t>::max(), floor.blocks.front().y};
+  std::int64_t high[2] = {std::numeric_limits<std::int64_t>::min(), floor.blocks.back().y};
+  for (const FloorBlock& block : floor.blocks) {
+    low[0] = std::min<std::int64_t>(low[0], block.x);
+    high[0] = std::max<std::int64_t>(high[0], block.x);
+  }
+  const std::int64_t width = (high[0] - low[0] + 1) * kFloorBlockCells;
+  const std::int64_t height = (high[1] - low[1] + 1) * kFloorBlockCells;
+  if (width > kMostCells || height > kMostCells || width * height > kMostCells) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "a grid of ", width, " x ", height, " cells; at most ", kMostCells, " are written"));
+  }
+  grid.width = static_cast<int>(width);
+  grid.height = static_cast<int>(height);
+  grid.resolution_m = cell_size_m;
+  grid.x_m = static_cast<double>(low[0] * kFloorBlockCells) * cell_size_m;
+  grid.y_m = static_cast<double>(low[1] * kFloorBlockCells) * cell_size_m;
+  grid.cells.assign(static_cast<std::size_t>(width * height), GridCell::kUnknown);
+  for (const FloorBlock& block : floor.blocks) {
+    for (int cell = 0; cell < kFloorBlockCells * kFloorBlockCells; ++cell) {
+      const auto has = [cell](std::uint64_t mask) { return (mask >> cell & 1U) != 0; };
+      const std::int64_t x = (block.x - low[0]) * kFloorBlockCells + cell % kFloorBlockCells;
+      const std::int64_t y = (block.y - low[1]) * kFloorBlockCells + cell / kFloorBlockCells;
+      grid.cells[static_cast<std::size_t>(y * width + x)] =
+          has(block.free)       ? GridCell::kFree
+          : has(block.occupied) ? GridCell::kOccupied
+          : has(block.ground)   ? GridCell::kGround
+                                : GridCell::kUnknown;
+    }
+  }
+  return grid;
+}
+
+absl::Status ExportFloors(Context& context,
+                          const std::string& map,
+                          const FloorOptions& options,
+                          GridMode mode,
+                          const std::string& out) {
+  STRATA_ASSIGN_OR_RETURN(const FloorPlan plan, FloorsOf(context, map, options, true));
+  if (plan.floors.empty()) return NoFloor(map, plan, 0);
+  std::filesystem::path stem = out;
+  if (stem.extension() == ".yaml" || stem.extension() == ".pgm") stem.replace_extension();
+  const std::optional<int> one = options.floor.has_value() ? options.floor : plan.at;
+  Json written = Json::array();
+  for (std::size_t i = 0; i < plan.floors.size(); ++i) {
+    if (one.has_value() && static_cast<std::size_t>(*one) != i) continue;
+    const std::filesystem::path own =
+        one.has_value() ? stem : std::filesystem::path(absl::StrCat(stem.string(), "-", i));
+    STRATA_ASSIGN_OR_RETURN(Json row, WriteFloor(plan, i, mode, own));
+    written.push_back(std::move(row));
+  }
+  context.output.List(written,
+                      {{"floor", "FLOOR"},
+                       {"file", "FILE"},
+                       {"width", "WIDTH"},
+                       {"height", "HEIGHT"},
+                       {"free", "FREE"},
+                       {"occupied", "OCCUPIED"}});
+  return absl::OkStatus();
+}
+
+}  // namespace strata::cli

@@ -1,0 +1,46 @@
+// Floors as commands ask for them, and as files.
+#ifndef STRATA_CLIENT_CLI_MAP_FLOOR_FILES_H_
+#define STRATA_CLIENT_CLI_MAP_FLOOR_FILES_H_
+
+#include <optional>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+#include "client/cli/terminal/command.h"
+#include "client/formats/grid_writer.h"
+#include "core/world/floor.h"
+
+namespace strata::cli {
+
+struct FloorOptions {
+  std::string profile = std::string(api::kDefaultProfile);
+  std::optional<int> floor;
+  std::optional<PlanEndpoint> at;
+};
+
+// --profile, --floor, --at.
+void AddFloorOptions(CLI::App* verb, FloorOptions& options, bool with_number);
+
+// The map's floors, with the cells of those that are asked for. NOT_FOUND: --profile, --floor, or
+// no floor at --at.
+absl::StatusOr<FloorPlan> FloorsOf(Context& context,
+                                   const std::string& map,
+                                   const FloorOptions& options,
+                                   bool cells);
+
+// RESOURCE_EXHAUSTED for a box of more than 2^28 cells.
+absl::StatusOr<OccupancyGrid> GridOf(const Floor& floor, double cell_size_m);
+
+// Writes STEM.pgm and STEM.yaml of one floor, or STEM-N.pgm and STEM-N.yaml of all where none is
+// asked for; `out` is STEM or one of the two files.
+absl::Status ExportFloors(Context& context,
+                          const std::string& map,
+                          const FloorOptions& options,
+                          GridMode mode,
+                          const std::string& out);
+
+}  // namespace strata::cli
+
+#endif  // STRATA_CLIENT_CLI_MAP_FLOOR_FILES_H_
