@@ -31,7 +31,7 @@ struct OccupancyGrid {
 
 // A binary PGM, the highest y first. Trinary: 254 free, 205 unknown and ground, 0 occupied. Scale:
 // 254 free, 110 ground, and 150 unknown, for a PGM has no transparency, which alone says unknown in
-// this mode; read with the thresholds of Nav2Yaml that is 82 and 47 of 100.
+// this mode; read with the thresholds of Nav2Yaml that is 82 and 48 of 100.
 std::string PgmBytes(const OccupancyGrid& grid, GridMode mode);
 
 // `image`: name of the PGM, beside the YAML file. Free is below 0.196, so that 205 is not.

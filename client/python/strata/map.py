@@ -7,7 +7,7 @@ import time as clock
 
 import numpy as np
 
-from strata import errors, job, mesh, plan, poses, scan
+from strata import errors, floors, job, mesh, plan, poses, scan
 from strata.tiles import SURFACE, TILE_CELLS, TileKey, decode_tile
 from strata.v1 import (geometry_pb2, jobs_pb2, jobs_pb2_grpc, maps_pb2, maps_pb2_grpc, planning_pb2, planning_pb2_grpc,
                        scans_pb2, scans_pb2_grpc, tiles_pb2, tiles_pb2_grpc)
@@ -267,6 +267,19 @@ class Map:
             max_expanded=max_expanded, class_costs=[plan.class_cost(*item) for item in (class_costs or {}).items()],
             **{"from": plan.endpoint(start)})
         return plan.from_proto(self._connection.unary(self._planning.PlanPath, request))
+
+    def floors(self, at=None, *, profile=None, min_area=4.0, cells=False):
+        """Floors: what a robot can drive in one go without ever being above itself, and the links between them.
+
+        at: (x, y, z) or (x, y), map frame [m]: whose floor is Floors.at. profile: as for plan. min_area: smaller ones are
+        left out [m²]. cells: also the grid of the floor at `at`, or of all of them.
+        """
+        if isinstance(profile, str):
+            profile = self._named_profile(profile)
+        request = planning_pb2.ListFloorsRequest(
+            map=self.name, at=None if at is None else plan.endpoint(at), profile=plan.profile_to_proto(profile or {}),
+            min_area_m2=min_area, cells=cells)
+        return floors.from_proto(self._connection.unary(self._planning.ListFloors, request))
 
     def _named_profile(self, name):
         profiles = self.profiles()
