@@ -83,8 +83,9 @@ absl::StatusOr<FloorPlan> FloorsOf(Context& context,
   FloorQuery query;
   query.at = options.at;
   query.cells = cells;
-  STRATA_ASSIGN_OR_RETURN(query.profile,
-                          ProfileOf(context, map, DriverOptions{.profile = options.profile}));
+  DriverOptions driver;
+  driver.profile = options.profile;
+  STRATA_ASSIGN_OR_RETURN(query.profile, ProfileOf(context, map, driver));
   STRATA_ASSIGN_OR_RETURN(FloorPlan plan,
                           context.database.planning().ListFloors(context.call, map, query));
   const int asked = options.floor.value_or(0);

@@ -59,7 +59,7 @@ absl::Status Floors(Context& context, const FloorsOptions& options) {
     return absl::OkStatus();
   }
   if (plan.floors.empty()) {
-    context.output.Text("no floor: this robot can stand nowhere on 4 m² or more");
+    context.output.Text("no floor: this robot can stand nowhere on 10 m² or more");
     return absl::OkStatus();
   }
   context.output.List(floors,

@@ -268,7 +268,7 @@ class Map:
             **{"from": plan.endpoint(start)})
         return plan.from_proto(self._connection.unary(self._planning.PlanPath, request))
 
-    def floors(self, at=None, *, profile=None, min_area=4.0, cells=False):
+    def floors(self, at=None, *, profile=None, min_area=10.0, cells=False):
         """Floors: what a robot can drive in one go without ever being above itself, and the links between them.
 
         at: (x, y, z) or (x, y), map frame [m]: whose floor is Floors.at. profile: as for plan. min_area: smaller ones are
