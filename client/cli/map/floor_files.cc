@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -26,6 +28,14 @@ absl::Status NoFloor(const std::string& map, const FloorPlan& plan, int asked) {
   }
   return absl::NotFoundError(
       absl::StrCat("map ", map, ": no floor ", asked, "; it has 0 to ", plan.floors.size() - 1));
+}
+
+absl::StatusOr<RobotProfile> DriverOf(Context& context,
+                                      const std::string& map,
+                                      const FloorOptions& options) {
+  DriverOptions driver;
+  driver.profile = options.profile;
+  return ProfileOf(context, map, driver);
 }
 
 // Both files of a floor.
@@ -83,9 +93,7 @@ absl::StatusOr<FloorPlan> FloorsOf(Context& context,
   FloorQuery query;
   query.at = options.at;
   query.cells = cells;
-  DriverOptions driver;
-  driver.profile = options.profile;
-  STRATA_ASSIGN_OR_RETURN(query.profile, ProfileOf(context, map, driver));
+  STRATA_ASSIGN_OR_RETURN(query.profile, DriverOf(context, map, options));
   STRATA_ASSIGN_OR_RETURN(FloorPlan plan,
                           context.database.planning().ListFloors(context.call, map, query));
   const int asked = options.floor.value_or(0);
@@ -103,6 +111,34 @@ absl::StatusOr<FloorPlan> FloorsOf(Context& context,
                                             options.at->z_m.value_or(0.0)));
   }
   return plan;
+}
+
+absl::Status KeepFloor(Context& context,
+                       const std::string& map,
+                       const FloorOptions& options,
+                       std::vector<SurfaceTile>& tiles) {
+  if (!options.floor.has_value() && !options.at.has_value()) return absl::OkStatus();
+  STRATA_ASSIGN_OR_RETURN(const RobotProfile profile, DriverOf(context, map, options));
+  STRATA_ASSIGN_OR_RETURN(const FloorPlan plan, FloorsOf(context, map, options, true));
+  const Floor& floor = plan.floors[options.at.has_value() ? *plan.at : *options.floor];
+  std::map<std::pair<std::int32_t, std::int32_t>, std::uint64_t> blocks;
+  for (const FloorBlock& block : floor.blocks) {
+    blocks[{block.x, block.y}] = block.free | block.occupied | block.ground;
+  }
+  const double low_m = floor.low.z() - profile.max_step_m;
+  const double high_m = floor.high.z() + profile.height_m;
+  for (SurfaceTile& tile : tiles) {
+    std::erase_if(tile.surfaces, [&](const Surface& surface) {
+      const CellIndex cell = CellOf(tile.key, surface.cell);
+      const auto found = blocks.find({cell.x >> 3, cell.y >> 3});
+      const int bit = (cell.y & 7) * kFloorBlockCells + (cell.x & 7);
+      return found == blocks.end() || (found->second >> bit & 1U) == 0 || surface.z_m < low_m ||
+             surface.bottom_m() > high_m;
+    });
+    tile.IndexRows();
+  }
+  std::erase_if(tiles, [](const SurfaceTile& tile) { return tile.surfaces.empty(); });
+  return absl::OkStatus();
 }
 
 absl::StatusOr<OccupancyGrid> GridOf(const Floor& floor, double cell_size_m) {

@@ -4,12 +4,14 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
 #include "client/cli/terminal/command.h"
 #include "client/formats/grid_writer.h"
+#include "core/mls/surface_tile.h"
 #include "core/world/floor.h"
 
 namespace strata::cli {
@@ -29,6 +31,13 @@ absl::StatusOr<FloorPlan> FloorsOf(Context& context,
                                    const std::string& map,
                                    const FloorOptions& options,
                                    bool cells);
+
+// Leaves of finest tiles what lies on the floor that is asked for, and up to the robot's height
+// above; all where none is. Errors of FloorsOf, and NOT_FOUND where the map has no floor.
+absl::Status KeepFloor(Context& context,
+                       const std::string& map,
+                       const FloorOptions& options,
+                       std::vector<SurfaceTile>& tiles);
 
 // RESOURCE_EXHAUSTED for a box of more than 2^28 cells.
 absl::StatusOr<OccupancyGrid> GridOf(const Floor& floor, double cell_size_m);

@@ -1,5 +1,5 @@
-// strata map create|list|show|delete|verify|rebuild|history|revert; backup, classes, diff, export, floors,
-// merge, render and watch have files of their own.
+// strata map create|list|show|delete|verify|rebuild|history|revert; backup, classes, diff, export,
+// floors, merge, render and watch have files of their own.
 #include <cstdint>
 #include <map>
 #include <memory>

@@ -182,6 +182,9 @@ absl::Status Export(Context& context, const ExportOptions& options) {
                         options.mode == "scale" ? GridMode::kScale : GridMode::kTrinary,
                         options.out);
   }
+  if (options.floor.floor.has_value() || options.floor.at.has_value()) {
+    return absl::InvalidArgumentError("--floor and --at are for --format nav2");
+  }
   const bool points = options.format == "pcd";
   absl::Status damage;
   STRATA_ASSIGN_OR_RETURN(Geometry geometry,

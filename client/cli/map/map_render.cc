@@ -17,6 +17,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_split.h"
 
+#include "client/cli/map/floor_files.h"
 #include "client/cli/map/map_files.h"
 #include "client/cli/map/tile_source.h"
 #include "client/cli/picture/map_picture.h"
@@ -41,6 +42,7 @@ struct RenderOptions {
   double azimuth_rad = -1.0;
   double elevation_rad = 0.6;
   std::optional<int> level;
+  FloorOptions floor;
   bool trajectories = false;
   bool constraints = false;
   picture::PictureOptions picture;
@@ -106,8 +108,14 @@ absl::Status Render(Context& context, RenderOptions options) {
   STRATA_ASSIGN_OR_RETURN(const MapStats stats,
                           context.database.maps().Stats(context.call, options.map));
   const double cell = info.parameters.mls.cell_size_m;
-  const std::int32_t level = options.level.value_or(LevelFor(stats, cell, options.picture));
-  STRATA_ASSIGN_OR_RETURN(const FetchedTiles fetched, FetchTiles(context, options.map, level));
+  const bool whole = !options.floor.floor.has_value() && !options.floor.at.has_value();
+  if (!whole && options.level.value_or(0) != 0) {
+    return absl::InvalidArgumentError("floors are of level 0; leave --level out");
+  }
+  const std::int32_t level =
+      whole ? options.level.value_or(LevelFor(stats, cell, options.picture)) : 0;
+  STRATA_ASSIGN_OR_RETURN(FetchedTiles fetched, FetchTiles(context, options.map, level));
+  STRATA_RETURN_IF_ERROR(KeepFloor(context, options.map, options.floor, fetched.tiles));
   if (options.layer == "class") {
     STRATA_ASSIGN_OR_RETURN(options.picture.classes, StylesOf(context, options.map, fetched.tiles));
   }
@@ -231,6 +239,7 @@ void AddMapRender(Commands& commands, CLI::App* noun) {
   render->add_option("--layer", options->layer, "What the colours of surfaces say")
       ->check(CLI::IsMember({"traversability", "class", "colour"}))
       ->capture_default_str();
+  AddFloorOptions(render, options->floor, true);
   AddViewOptions(render, options);
 }
 

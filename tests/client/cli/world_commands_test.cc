@@ -125,6 +125,33 @@ TEST_F(WorldCommandsTest, ALongPlanShowsTenWaypointsAndJsonAll) {
   EXPECT_EQ(RunJson(words)["waypoints"].size(), 773U);
 }
 
+TEST_F(WorldCommandsTest, FloorsAreToldWithTheWaysBetweenThem) {
+  ON_CALL(db_.planning(), ListProfiles(_, _)).WillByDefault([](auto&, auto) {
+    return absl::StatusOr<std::map<std::string, RobotProfile>>({{"default", RobotProfile()}});
+  });
+  FloorPlan plan;
+  ON_CALL(db_.planning(), ListFloors(_, _, _)).WillByDefault([&](auto&, auto, auto&) {
+    return absl::StatusOr<FloorPlan>(plan);
+  });
+  EXPECT_THAT(RunText({"map", "floors", "m"}), HasSubstr("no floor"));
+  EXPECT_TRUE(RunJson({"map", "floors", "m"})["floors"].empty());
+  EXPECT_THAT(Run({"map", "floors", "m", "--at", "0,0,0"}), StatusIs(Code::kNotFound, _));
+  EXPECT_THAT(Run({"map", "floors", "m", "--profile", "giant"}), StatusIs(Code::kNotFound, _));
+  EXPECT_THAT(Run({"map", "export", "m", "--format", "nav2", "--floor", "2", "--out", "x"}),
+              StatusIs(Code::kNotFound, HasSubstr("no floor")));
+  EXPECT_THAT(Run({"map", "export", "m", "--format", "ply", "--floor", "2", "--out", "x"}),
+              StatusIs(Code::kInvalidArgument, HasSubstr("nav2")));
+  plan.floors.resize(2);
+  plan.floors[1].area_m2 = 12.5;
+  plan.links.push_back({0, 1, {1.0, 2.0, 3.0}, 4.0, 0.25});
+  plan.at = 1;
+  const auto json = RunJson({"map", "floors", "m", "--at", "0,0,0"});
+  EXPECT_EQ(json["floors"][1]["area_m2"], 12.5);
+  EXPECT_EQ(json["links"][0]["floors"][1], 1);
+  EXPECT_EQ(json["links"][0]["slope_rad"], 0.25);
+  EXPECT_EQ(json["at"], 1);
+}
+
 TEST_F(WorldCommandsTest, AJobTakesItsParametersByPlaceByNameAndByFlag) {
   const ::strata::testing::StringMap expected = {
       {"rounds", "3"}, {"pool", "2"}, {"threads", "4"}, {"dry_run", "1"}};

@@ -15,7 +15,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/planning/endpoint.h"
 #include "core/planning/planner.h"
+#include "core/planning/search.h"
+#include "core/planning/search_workspace.h"
 #include "tests/core/planning/memory_tiles.h"
 #include "tests/support/drawing.h"
 #include "tests/support/status_matchers.h"
@@ -37,6 +40,29 @@ class World {
 
   absl::StatusOr<FloorPlan> Floors(const FloorQuery& query) {
     return FindFloors(planner_.cache(), source_, source_.Keys(), kCell, query, Stop());
+  }
+  // Of these cells, how many have no surface that the planner's search reaches from a place.
+  int NotReached(const Eigen::Vector3d& from, const std::vector<CellIndex>& cells) {
+    const absl::StatusOr<ProfileChecks> checks = MakeProfileChecks({}, kCell);
+    SearchSpace space(planner_.cache(), source_, *checks);
+    const auto start = MatchEndpoint(space, {from.x(), from.y(), from.z()});
+    SearchWorkspace workspace;
+    if (!start.ok() || start->patch == kNoPatchId ||
+        !ReachAll(space, start->patch, workspace, Stop()).ok()) {
+      return static_cast<int>(cells.size());
+    }
+    int missed = 0;
+    for (const CellIndex& cell : cells) {
+      bool reached = false;
+      for (const PatchId patch : space.FindCell(cell)) {
+        const int slot = space.SlotOf(patch);
+        const std::uint32_t place = patch - space.slots()[slot].base;
+        reached = reached || workspace.DirectionOf(slot, *space.At(slot).tile, place) !=
+                                 ParkedTile::kUnreached;
+      }
+      missed += reached ? 0 : 1;
+    }
+    return missed;
   }
   bool Reaches(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
     PlanQuery query;
@@ -117,7 +143,13 @@ TEST(FloorsTest, FreeCellsAreReachedAndNoneIsAboveAnother) {
     }
     EXPECT_NEAR(floor.area_m2, cells.size() * kCell * kCell, 1e-6);
     EXPECT_EQ(std::set(cells.begin(), cells.end()).size(), cells.size());
-    for (int i = 0; i < 200; ++i) {
+    std::vector<CellIndex> samples;
+    for (int i = 0; i < 5000; ++i) {
+      const auto [x, y] = cells[random() % cells.size()];
+      samples.push_back({x, y});
+    }
+    EXPECT_EQ(world.NotReached(floor.place, samples), 0);
+    for (int i = 0; i < 100; ++i) {
       const auto [x, y] = cells[random() % cells.size()];
       bool reached = false;
       for (const double z : world.HeightsAt(x, y)) {
@@ -128,6 +160,45 @@ TEST(FloorsTest, FreeCellsAreReachedAndNoneIsAboveAnother) {
     }
   }
   EXPECT_EQ(wrong, 0) << "of " << asked;
+}
+
+TEST(FloorsTest, TheSameMapHasTheSameFloors) {
+  DrawnMap map = Bridge(3);
+  FloorQuery query;
+  query.cells = true;
+  World first(map);
+  World second(map);
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan one, first.Floors(query));
+  query.at = PlanEndpoint{0.0, 0.0, 3.4};
+  STRATA_ASSERT_OK(second.Floors(query));  // tiles are prepared in another order, and kept
+  query.at.reset();
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan two, second.Floors(query));
+  ASSERT_EQ(one.floors.size(), two.floors.size());
+  for (std::size_t i = 0; i < one.floors.size(); ++i) {
+    EXPECT_EQ(one.floors[i].blocks, two.floors[i].blocks);
+    EXPECT_EQ(one.floors[i].place, two.floors[i].place);
+  }
+}
+
+TEST(FloorsTest, AHillIsOneHoweverHigh) {
+  DrawnMap map;
+  for (int y = 0; y < 60; ++y) {
+    for (int x = 0; x < 600; ++x) map[{x, y}] = {{x * kCell * 0.2, 0.0, 0.01}};
+  }
+  World world(map);
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan plan, world.Floors({}));
+  ASSERT_EQ(plan.floors.size(), 1U);
+  EXPECT_GT(plan.floors[0].high.z() - plan.floors[0].low.z(), 10.0);
+}
+
+TEST(FloorsTest, AnswersEndWhenTheyAreStopped) {
+  DrawnMap map = Bridge(4);
+  MemoryTiles source(map.Tiles());
+  Planner planner({.cell_size_m = kCell});
+  const Stop stop;
+  stop.Request();
+  EXPECT_THAT(FindFloors(planner.cache(), source, source.Keys(), kCell, {}, stop),
+              StatusIs(Code::kCancelled, ::testing::_));
 }
 
 TEST(FloorsTest, AParapetIsOccupiedAndTheUnseenIsNeither) {
