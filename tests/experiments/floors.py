@@ -9,8 +9,8 @@ are asked for as goals of plans from its place: a cell that no level of is reach
 number is another, a cell contradicts, or the floors of prepared tiles take longer than --seconds. Needs python3-numpy.
 """
 import argparse
+import os
 import pathlib
-import subprocess
 import sys
 import time
 
@@ -18,6 +18,7 @@ import numpy as np
 
 import strata
 from strata import floors as grids
+from stratad import Stratad
 
 
 def contradictions(world, told, samples, random):
@@ -59,23 +60,20 @@ def main():
     parser.add_argument("--seconds", type=float, default=1.0)
     parser.add_argument("expected", nargs="+", metavar="NAME=LEAST:MOST")
     options = parser.parse_args()
-    server = subprocess.Popen([options.build / "server/stratad", "--data", options.maps, "--listen", "127.0.0.1:0"],
-                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    server = Stratad(options.build, options.maps, log=os.devnull)
     try:
-        address = server.stdout.readline().split()[1]
         random = np.random.default_rng(1)
         print("| map | floors | expected | links | first call [s] | prepared [s] | cells asked | contradictions | holds |")
         print("|---|---|---|---|---|---|---|---|---|")
         good = True
-        with strata.connect(address) as db:
+        with strata.connect(server.address) as db:
             for text in options.expected:
                 name, _, bounds = text.partition("=")
                 least, _, most = bounds.partition(":")
                 good &= measure(db.map(name), int(least), int(most or least), options, random)
         return 0 if good else 1
     finally:
-        server.terminate()
-        server.wait()
+        server.stop()
 
 
 if __name__ == "__main__":
