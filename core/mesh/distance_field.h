@@ -33,9 +33,9 @@ struct DistanceFieldOptions {
 // Give every scan to Add(), then every one to Carve(), then take the mesh. What was near a point
 // gets the distance to its plane, positive towards the sensor, where thesis 4.5.2 has none: "the
 // inside and the outside of the object can not be distinguished". What later scans look through is
-// taken out again: people, and the streaks behind edges. A cloud that
-// somebody merged of several scans was seen from no one place, and faces its origin everywhere. The
-// same scans in the same order give the same bytes. One thread at a time.
+// taken out again: people, and the streaks behind edges. A cloud that somebody merged of several
+// scans was seen from no one place, and faces its origin everywhere. The same scans in the same
+// order give the same bytes. One thread at a time.
 class DistanceField {
  public:
   // REQUIRES: options.Validate().
