@@ -47,7 +47,7 @@ std::string PgmBytes(const OccupancyGrid& grid, GridMode mode) {
 
 std::string Nav2Yaml(const OccupancyGrid& grid, GridMode mode, absl::string_view image) {
   return absl::StrFormat(
-      "image: %s\nmode: %s\nresolution: %.17g\norigin: [%.9g, %.9g, 0.0]\nnegate: 0\n"
+      "image: %s\nmode: %s\nresolution: %.15g\norigin: [%.9g, %.9g, 0.0]\nnegate: 0\n"
       "occupied_thresh: 0.65\nfree_thresh: 0.196\n",
       Quoted(image),
       mode == GridMode::kScale ? "scale" : "trinary",
