@@ -52,7 +52,7 @@ struct FloorLink {
 struct FloorQuery {
   RobotProfile profile;
   std::optional<PlanEndpoint> at = std::nullopt;  // whose floor is asked for
-  double min_area_m2 = 10.0;                       // smaller ones are left out; finite, ≥ 0
+  double min_area_m2 = 10.0;                      // smaller ones are left out; finite, ≥ 0
   bool cells = false;  // fills Floor::blocks: of the floor at `at`, or of all
 };
 
