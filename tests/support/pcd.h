@@ -12,8 +12,8 @@
 
 namespace strata::testing {
 
-// x, y, z and rgb, where there, of a binary (not compressed) PCD file with float coordinates; points
-// that are not finite are left out.
+// x, y, z and rgb, where there, of a binary (not compressed) PCD file with float coordinates;
+// points that are not finite are left out.
 absl::StatusOr<PointCloud> ReadBinaryPcd(const std::filesystem::path& path);
 
 struct TimedPose {
