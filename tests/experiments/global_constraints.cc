@@ -344,9 +344,9 @@ void Directions() {
                   local.angle_rad,
                   local.position_m);
     }
-    std::printf("turned better: %d, placed better: %d of 20\n", turned_better, better);
-    Expect(turned_better >= kSignTest && better >= kSignTest, "directions make poses better");
   }
+  std::printf("turned better: %d, placed better: %d of 20\n", turned_better, better);
+  Expect(turned_better >= kSignTest && better >= kSignTest, "directions make poses better");
 }
 
 // The edges' deviation from the tangents of their planes. Which edges are in which plane is found
