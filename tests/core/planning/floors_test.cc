@@ -57,8 +57,9 @@ class World {
       for (const PatchId patch : space.FindCell(cell)) {
         const int slot = space.SlotOf(patch);
         const std::uint32_t place = patch - space.slots()[slot].base;
-        reached = reached || workspace.DirectionOf(slot, *space.At(slot).tile, place) !=
-                                 ParkedTile::kUnreached;
+        const PreparedTile& tile = *space.At(slot).tile;
+        if (!tile.CanStand(place)) continue;
+        reached = reached || workspace.DirectionOf(slot, tile, place) != ParkedTile::kUnreached;
       }
       missed += reached ? 0 : 1;
     }
