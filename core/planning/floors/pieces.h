@@ -40,8 +40,8 @@ struct Pieces {
   std::vector<std::vector<std::uint32_t>> piece_of;  // of each tile given, by number of the patch
 };
 
-// At most so many places to stand are made floors of: half a gigabyte is needed then.
-inline constexpr std::uint64_t kMaxFloorPatches = 50'000'000;
+// At most so many places to stand are made floors of: some 180 MB are needed then.
+inline constexpr std::uint64_t kMaxFloorPatches = 10'000'000;
 
 // Of the tiles `tiles`, sorted. Linear in the patches, 12 bytes each. RESOURCE_EXHAUSTED beyond
 // kMaxFloorPatches; errors of the source and of `stop`.
