@@ -41,7 +41,7 @@ absl::StatusOr<std::unique_ptr<api::Database>> OpenDirectory(const std::string& 
   // What the engine does not say through a call (a map that cannot be opened), as plain talk.
   FLAGS_logtostderr = true;
   FLAGS_log_prefix = false;
-  FLAGS_minloglevel = google::GLOG_ERROR;
+  FLAGS_minloglevel = google::GLOG_WARNING;
   if (!google::IsGoogleLoggingInitialized()) google::InitGoogleLogging("strata");
   EngineOptions options;
   options.directory = directory;

@@ -200,6 +200,14 @@ absl::StatusOr<std::shared_ptr<Map>> EngineMaps::Find(absl::string_view name) {
   return OpenAgain(key);
 }
 
+absl::StatusOr<std::shared_ptr<Map>> EngineMaps::FindWithTiles(const api::Call& call,
+                                                               absl::string_view name) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<Map> map, Find(name));
+  STRATA_RETURN_IF_ERROR(map->worker().AwaitDerived(call.stop));
+  return map;
+}
+
 absl::StatusOr<std::shared_ptr<Map>> EngineMaps::OpenAgain(const std::string& name) {
   absl::StatusOr<std::shared_ptr<Map>> map = OpenMap(name);
   absl::MutexLock lock(&mutex_);
@@ -300,6 +308,9 @@ absl::Status EngineMaps::Delete(const api::Call& call, absl::string_view name) {
 absl::StatusOr<MapStats> EngineMaps::Stats(const api::Call& call, absl::string_view name) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(name));
+  // It counts tiles, but says what there is of a map in quarantine, too.
+  const absl::Status made = map->worker().AwaitDerived(call.stop);
+  if (!absl::IsFailedPrecondition(made)) STRATA_RETURN_IF_ERROR(made);
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map->core().Reader());
   STRATA_ASSIGN_OR_RETURN(MapStats stats, CollectStats(*reader));
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());

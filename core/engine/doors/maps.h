@@ -33,6 +33,9 @@ class EngineMaps final : public api::Maps {
   // answers, it is tried again, once a second at most.
   absl::StatusOr<std::shared_ptr<Map>> Find(absl::string_view name);
 
+  // The same for those who read its tiles: waits while they are made again (Worker::AwaitDerived).
+  absl::StatusOr<std::shared_ptr<Map>> FindWithTiles(const api::Call& call, absl::string_view name);
+
   EngineNumbers Numbers() const;
   EngineHealth Health() const;
 

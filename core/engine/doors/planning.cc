@@ -17,16 +17,14 @@ namespace strata {
 absl::StatusOr<PlanResult> EnginePlanning::PlanPath(const api::Call& call,
                                                     absl::string_view map,
                                                     const PlanQuery& query) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.FindWithTiles(call, map));
   return found->planner().Plan(query, call.stop);
 }
 
 absl::StatusOr<PathCheck> EnginePlanning::CheckPath(const api::Call& call,
                                                     absl::string_view map,
                                                     const PathQuery& query) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.FindWithTiles(call, map));
   return found->planner().Check(query, call.stop);
 }
 
@@ -34,22 +32,20 @@ absl::Status EnginePlanning::WatchPath(const api::Call& call,
                                        absl::string_view map,
                                        const PathQuery& query,
                                        absl::FunctionRef<absl::Status(const PathCheck&)> sink) {
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.FindWithTiles(call, map));
   return found->planner().Watch(query, call.stop, sink);
 }
 
 absl::StatusOr<FloorPlan> EnginePlanning::ListFloors(const api::Call& call,
                                                      absl::string_view map,
                                                      const FloorQuery& query) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.FindWithTiles(call, map));
   return found->planner().Floors(query, call.stop);
 }
 
 absl::StatusOr<std::vector<SurfaceColumn>> EnginePlanning::SampleSurfaces(
     const api::Call& call, absl::string_view map, const std::vector<Eigen::Vector2d>& places) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.FindWithTiles(call, map));
   return found->planner().Sample(places, call.stop);
 }
 

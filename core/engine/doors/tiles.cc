@@ -128,9 +128,8 @@ absl::StatusOr<std::uint64_t> VisitTiles(Map& map,
 absl::StatusOr<api::EncodedTile> EngineTiles::Get(const api::Call& call,
                                                   absl::string_view map,
                                                   const TileKey& key) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_RETURN_IF_ERROR(CheckLevel(key.level));
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.FindWithTiles(call, map));
   const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
   STRATA_ASSIGN_OR_RETURN(const ServedTiles::Handle tile, found->tiles().Find(key, pin.view()));
   if (tile == nullptr) {
@@ -153,9 +152,8 @@ absl::StatusOr<std::optional<api::EncodedTile>> EngineTiles::GetAtHand(const api
 absl::StatusOr<std::vector<api::TileInfo>> EngineTiles::List(const api::Call& call,
                                                              absl::string_view map,
                                                              const api::TileArea& area) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_RETURN_IF_ERROR(CheckLevel(area.level));
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.FindWithTiles(call, map));
   std::vector<api::TileInfo> infos;
   const auto take = [&](const SurfaceTileRow& row, const MapView&) {
     infos.push_back({row.key, row.version, row.size_bytes, row.patches});
@@ -174,7 +172,7 @@ absl::Status EngineTiles::Fetch(const api::Call& call,
                                 const std::vector<api::HeldTile>& held,
                                 absl::FunctionRef<absl::Status(const api::TileUpdate&)> sink) {
   STRATA_RETURN_IF_ERROR(CheckLevel(area.level));
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.FindWithTiles(call, map));
   HeldVersions versions;
   for (const api::HeldTile& tile : held) {
     if (Contains(area, tile.key)) versions[tile.key] = tile.version;

@@ -101,6 +101,23 @@ absl::Status Worker::Execute(const Stop& stop, Command command, absl::string_vie
   return task.status;
 }
 
+absl::Status Worker::AwaitDerived(const Stop& stop) {
+  if (derived_usable_) return absl::OkStatus();
+  const BlockingScope blocking(/*in_turn=*/true);
+  absl::MutexLock lock(&mutex_);
+  const auto ended = [this]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
+    return derived_usable_ || refuses_ || closed_;
+  };
+  while (!mutex_.AwaitWithTimeout(absl::Condition(&ended), kStopPoll)) {
+    const absl::Status waiting = stop.status();
+    if (waiting.ok()) continue;
+    return Annotate(waiting,
+                    absl::StrCat("waited for the tiles of map ", core_.name(), ", made again"));
+  }
+  if (derived_usable_) return absl::OkStatus();
+  return refuses_ ? Refusal() : absl::CancelledError("the map is being closed");
+}
+
 bool Worker::HasWork() const { return closed_ || !tasks_.empty() || pending_ > 0; }
 
 // Commands go first, since somebody waits for them.
@@ -227,11 +244,13 @@ bool Worker::RunRecovery() {
     const absl::Status done = GuardedStep([&]() -> absl::Status {
       STRATA_ASSIGN_OR_RETURN(const bool needed, NeedsRecovery(core_));
       if (!needed) return absl::OkStatus();
+      LOG(WARNING) << LogLine("recovery").Add("map", core_.name()).Add("made_again", "tiles");
       STRATA_RETURN_IF_ERROR(quarantine_.Begin(recovery));
       const absl::Status recovered = Guarded([&] { return recover_(integrator_, closing_); });
       quarantine_.End(recovery).IgnoreError();
       return recovered;
     });
+    if (done.ok()) derived_usable_ = true;
     if (done.ok() || closing_.requested()) return true;
     LogStopped("recovery", core_.name(), done);
     absl::MutexLock lock(&mutex_);

@@ -3,6 +3,7 @@
 #ifndef STRATA_CORE_ENGINE_INGEST_WORKER_H_
 #define STRATA_CORE_ENGINE_INGEST_WORKER_H_
 
+#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <thread>
@@ -43,6 +44,11 @@ class Worker {
   void ScanCommitted(ScanNumber number);
   // Since when the scan waits that is the first of those that do; as of this process at most.
   absl::Time WaitingSince(ScanNumber oldest);
+
+  // Returns once what is derived is usable: at once, but where it is made again after an update of
+  // its format or a repair. `stop` ends the waiting, as in Execute; FAILED_PRECONDITION where making
+  // it again is in quarantine, CANCELLED once closed.
+  absl::Status AwaitDerived(const Stop& stop);
 
   // Runs `command` on the worker's thread, before the next batch, and returns its status. `stop`
   // ends the waiting (CANCELLED, DEADLINE_EXCEEDED, naming what is waited for); once begun, a
@@ -89,6 +95,7 @@ class Worker {
   int no_memory_ = 0;           // batches in a row
   bool after_failure_ = false;  // of a batch
   const Stop closing_;
+  std::atomic<bool> derived_usable_ = false;
   mutable absl::Mutex mutex_;
   std::deque<Task*> tasks_ ABSL_GUARDED_BY(mutex_);
   absl::string_view running_ ABSL_GUARDED_BY(mutex_) = "recovery";  // what the thread is at

@@ -166,6 +166,28 @@ TEST_F(EngineMapsTest, DerivedTablesOfAnotherFormatAreMadeAgain) {
   EXPECT_EQ(Digest(), digest);
 }
 
+// A short command opens a map and reads it at once.
+TEST_F(EngineMapsTest, WhoReadsTilesWaitsWhileTheyAreMadeAgain) {
+  MakeMap();
+  UploadRooms(2);
+  const std::string digest = Digest();
+  const MapStats before = WaitIntegrated(db());
+  for (const bool at_once : {true, false}) {
+    Close();
+    Sql("UPDATE derived_state SET schema = 0");
+    Reopen();
+    if (at_once) {
+      Close();  // in the middle of it
+      Reopen();
+    }
+    STRATA_ASSERT_OK_AND_ASSIGN(const auto tiles, db().tiles().List({}, kMapName, {}));
+    EXPECT_GT(tiles.size(), 0U);
+    EXPECT_EQ(Digest(), digest);
+    STRATA_ASSERT_OK_AND_ASSIGN(const MapStats after, db().maps().Stats({}, kMapName));
+    EXPECT_EQ(after.tiles, before.tiles);
+  }
+}
+
 TEST_F(EngineMapsTest, MapWithoutPointsKeepsItsContent) {
   MapParameters parameters = SmallMap();
   parameters.keep_points = false;

@@ -167,6 +167,9 @@ TEST_F(QuarantineTest, ARebuildThatDiedTwiceIsNotBegun) {
   Reopen();
   EXPECT_THAT(db().scans().Delete({}, kMapName, Info(1).header.id),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("quarantined")));
+  EXPECT_THAT(db().planning().SampleSurfaces({}, kMapName, {{0.0, 0.0}}),
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("quarantined")));
+  STRATA_EXPECT_OK(db().maps().Stats({}, kMapName));
   Close();
   STRATA_ASSERT_OK(ReleaseFromQuarantine(directory_.path(), kMapName, "rebuild"));
   Reopen();
