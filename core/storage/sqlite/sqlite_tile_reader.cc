@@ -1,5 +1,6 @@
 // Derived data: tiles and the indexes over scans.
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -81,9 +82,14 @@ absl::StatusOr<std::vector<MlsTileRow>> SqliteReader::ListMlsTiles(std::uint64_t
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
       database_.Prepare("SELECT level, x, y, version, patches, cells, min_x, min_y, min_z, max_x, "
-                        "max_y, max_z, digest FROM derived_mls_tile WHERE version <= ?1 "
+                        "max_y, max_z, digest FROM derived_mls_tile WHERE version <= ?1 AND "
+                        "level BETWEEN 0 AND ?2 AND x BETWEEN ?3 AND ?4 AND y BETWEEN ?3 AND ?4 "
                         "ORDER BY level, x, y, version"));
-  row.Bind(version);
+  // A damaged key beyond them would be read as another tile's, and no repair would find its row.
+  row.Bind(version,
+           kMaxLevel,
+           std::numeric_limits<std::int32_t>::min(),
+           std::numeric_limits<std::int32_t>::max());
   std::vector<MlsTileRow> tiles;
   STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
     if (!tiles.empty() && tiles.back().key == ReadKey(row)) tiles.pop_back();

@@ -34,6 +34,19 @@ TEST_P(BitFlipTest, ABitIsTheDamageOfItsThingAlone) {
   EXPECT_THAT(result.violations, IsEmpty());
 }
 
+// Among these seeds are bits that take a tile's key out of the range of keys.
+TEST(BitFlip, ARebuildMendsTheKeysOfTiles) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const BitFlips flips, BitFlips::Prepare(true));
+  FlipResult result;
+  for (const FlipKind& kind : flips.kinds()) {
+    if (kind.table != "derived_mls_tile" || (kind.column != "level" && kind.column != "x"))
+      continue;
+    for (std::uint64_t seed = 1135; seed < 1145; ++seed) flips.FlipIn(kind, seed, result);
+  }
+  EXPECT_EQ(result.trials, 20);
+  EXPECT_THAT(result.violations, IsEmpty());
+}
+
 INSTANTIATE_TEST_SUITE_P(Maps, BitFlipTest, ::testing::Bool(), [](const auto& points) {
   return points.param ? "ThatKeepPoints" : "ThatDropPoints";
 });
