@@ -1,0 +1,212 @@
+#include "core/planes/models/joined_planes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include <Eigen/Core>
+
+#include "core/common/disjoint_sets.h"
+#include "core/common/hash_map.h"
+#include "core/common/status.h"
+#include "core/common/stop.h"
+#include "core/planes/models/model_selection.h"
+#include "core/planes/models/plane_mixture.h"
+#include "core/planes/moments.h"
+
+namespace strata {
+namespace {
+
+constexpr double kJoinCosine = 0.99;  // 8°: beyond that one plane cannot fit both
+constexpr double kJoinSpread = 1.2;   // of one plane, over that of two
+constexpr double kJoinFloorM = 0.02;
+constexpr double kStraightRad = 0.17;  // of a wall or floor, as of global planes
+constexpr int kSteps = 50;
+
+PlaneKind KindOf(const Eigen::Vector3d& normal) {
+  const double tilt = std::acos(std::min(1.0, std::abs(normal.z())));
+  if (tilt < kStraightRad) return PlaneKind::kLevel;
+  return tilt > M_PI_2 - kStraightRad ? PlaneKind::kWall : PlaneKind::kSloped;
+}
+
+bool AreOne(const SquarePlane& a, const SquarePlane& b) {
+  if (std::abs(a.plane.normal.dot(b.plane.normal)) < kJoinCosine) return false;
+  const Eigen::Matrix4d both = a.moments + b.moments;
+  const double joint = RmsDistance(both, FitMoments(both).plane);
+  const double apart = std::sqrt(
+      (a.moments(3, 3) * std::pow(RmsDistance(a.moments, FitMoments(a.moments).plane), 2) +
+       b.moments(3, 3) * std::pow(RmsDistance(b.moments, FitMoments(b.moments).plane), 2)) /
+      both(3, 3));
+  return joint <= std::max(kJoinFloorM, kJoinSpread * apart);
+}
+
+void AddTo(SquarePlane& sum, const SquarePlane& part) {
+  if (sum.voxels.empty()) sum.plane = part.plane;
+  sum.moments += part.moments;
+  sum.measurements += part.measurements;
+  sum.information += part.information;
+  sum.point_count += part.point_count;
+  std::vector<Voxel> all;
+  std::set_union(sum.voxels.begin(),
+                 sum.voxels.end(),
+                 part.voxels.begin(),
+                 part.voxels.end(),
+                 std::back_inserter(all));
+  sum.voxels = std::move(all);
+}
+
+// Joined over the borders of squares.
+std::vector<SquarePlane> Joined(const std::vector<std::vector<SquarePlane>>& squares) {
+  std::vector<const SquarePlane*> all;
+  std::vector<std::size_t> square_of;
+  HashMap<Voxel, std::vector<std::uint32_t>> at;
+  for (std::size_t s = 0; s < squares.size(); ++s) {
+    for (const SquarePlane& plane : squares[s]) {
+      for (const Voxel voxel : plane.voxels) {
+        at[voxel].push_back(static_cast<std::uint32_t>(all.size()));
+      }
+      all.push_back(&plane);
+      square_of.push_back(s);
+    }
+  }
+  DisjointSets sets;
+  for (std::uint32_t i = 0; i < all.size(); ++i) {
+    HashSet<std::uint32_t> met;
+    for (const Voxel voxel : all[i]->voxels) {
+      for (const Voxel around : VoxelsAround(voxel)) {
+        const auto found = at.find(around);
+        if (found == at.end()) continue;
+        for (const std::uint32_t other : found->second) {
+          if (other >= i || square_of[other] == square_of[i] || !met.insert(other).second) continue;
+          if (AreOne(*all[i], *all[other])) sets.Join(i, other);
+        }
+      }
+    }
+  }
+  std::vector<SquarePlane> sums(all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) AddTo(sums[sets.Root(i)], *all[i]);
+  std::erase_if(sums, [](const SquarePlane& sum) { return sum.voxels.empty(); });
+  return sums;
+}
+
+// A joined plane as one cell of a mixture, so that EM over all planes finds their directions.
+MixtureCell CellOf(const SquarePlane& plane, const PlaneModelOptions& options) {
+  const MomentsFit fit = FitMoments(plane.moments);
+  MixtureCell cell;
+  cell.mean = fit.mean;
+  cell.covariance = fit.eigenvectors * fit.eigenvalues.asDiagonal() * fit.eigenvectors.transpose();
+  cell.measurements = plane.measurements;
+  // What spreads more about the plane than its cells about theirs is wavy, and says less.
+  cell.variance_m2 = std::max(
+      {plane.measurements / plane.information, fit.eigenvalues(0), options.rho_m * options.rho_m});
+  cell.area_m2 = plane.moments(3, 3);
+  return cell;
+}
+
+absl::StatusOr<PlaneMixture> WithDirections(const std::vector<SquarePlane>& sums,
+                                            const PlaneModelOptions& options,
+                                            const Stop& stop) {
+  std::vector<MixtureCell> cells;
+  for (const SquarePlane& sum : sums) cells.push_back(CellOf(sum, options));
+  MixtureOptions mixing;
+  mixing.direction_sigma_rad = options.sigma_rad;
+  mixing.directions = options.directions;
+  PlaneMixture mixture(std::move(cells), mixing);
+  for (std::size_t m = 0; m < sums.size(); ++m) {
+    const Plane plane = FitMoments(sums[m].moments).plane;
+    mixture.planes.push_back({plane, {VoxelOf(mixture.cells()[m].mean)}, 1.0});
+    if (options.directions) mixture.directions.push_back(plane.normal);
+  }
+  mixture.Prepare();
+  do {
+    STRATA_RETURN_IF_ERROR(mixture.Run(kSteps, stop));
+  } while (options.directions && DropDirections(mixture));
+  return mixture;
+}
+
+ModelPlane ModelOf(const SquarePlane& sum, const PlaneMixture& mixture, std::size_t m) {
+  ModelPlane model;
+  model.plane = mixture.planes[m].plane;
+  model.kind = KindOf(model.plane.normal);
+  const MixtureCell& cell = mixture.cells()[m];
+  model.area_m2 = cell.area_m2;
+  model.point_count = sum.point_count;
+  model.rms_m = RmsDistance(sum.moments, model.plane);
+  const MomentsFit fit = FitMoments(sum.moments);
+  model.sigma_m = std::sqrt(cell.variance_m2 / cell.measurements);
+  model.sigma_rad = model.sigma_m / std::sqrt(std::max(1e-9, fit.eigenvalues(1)));
+  if (!mixture.options().directions) return model;
+  Eigen::Index most = 0;
+  mixture.direction_shares().row(static_cast<Eigen::Index>(m)).maxCoeff(&most);
+  if (most < std::ssize(mixture.directions)) model.direction = static_cast<std::uint32_t>(most);
+  return model;
+}
+
+Eigen::Vector3d WithLargestPositive(const Eigen::Vector3d& v) {
+  Eigen::Index largest = 0;
+  v.cwiseAbs().maxCoeff(&largest);
+  return v(largest) < 0.0 ? Eigen::Vector3d(-v) : v;
+}
+
+// Those with planes, by falling number; the planes' indices follow.
+std::vector<MainDirection> DirectionsOf(const PlaneMixture& mixture,
+                                        std::vector<JoinedPlane>& planes) {
+  std::vector<MainDirection> all(mixture.directions.size());
+  for (const JoinedPlane& plane : planes) {
+    if (plane.model.direction == kNoDirection) continue;
+    MainDirection& direction = all[plane.model.direction];
+    direction.direction = WithLargestPositive(mixture.directions[plane.model.direction]);
+    const double cosine = direction.direction.dot(plane.model.plane.normal);
+    ++direction.planes;
+    direction.sigma_rad += std::max(0.0, 1.0 - cosine * cosine);
+  }
+  std::vector<std::uint32_t> order(all.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(), [&all](std::uint32_t a, std::uint32_t b) {
+    return all[a].planes > all[b].planes;
+  });
+  std::vector<std::uint32_t> place(all.size(), kNoDirection);
+  std::vector<MainDirection> kept;
+  for (const std::uint32_t k : order) {
+    if (all[k].planes == 0) continue;
+    place[k] = static_cast<std::uint32_t>(kept.size());
+    kept.push_back(all[k]);
+    kept.back().sigma_rad = std::sqrt(all[k].sigma_rad / all[k].planes);
+  }
+  for (JoinedPlane& plane : planes) {
+    if (plane.model.direction != kNoDirection) plane.model.direction = place[plane.model.direction];
+  }
+  return kept;
+}
+
+}  // namespace
+
+absl::StatusOr<JoinedPlanes> JoinSquares(const std::vector<std::vector<SquarePlane>>& squares,
+                                         const PlaneModelOptions& options,
+                                         const Stop& stop) {
+  std::vector<SquarePlane> sums = Joined(squares);
+  std::erase_if(sums,
+                [&](const SquarePlane& sum) { return sum.moments(3, 3) < options.min_area_m2; });
+  std::stable_sort(sums.begin(), sums.end(), [](const SquarePlane& a, const SquarePlane& b) {
+    return a.moments(3, 3) > b.moments(3, 3);
+  });
+  STRATA_ASSIGN_OR_RETURN(const PlaneMixture mixture, WithDirections(sums, options, stop));
+  JoinedPlanes joined;
+  for (std::size_t m = 0; m < sums.size(); ++m) {
+    JoinedPlane plane{std::move(sums[m]), {}};
+    plane.model = ModelOf(plane.sum, mixture, m);
+    plane.model.id = m + 1;
+    plane.sum.plane = plane.model.plane;
+    joined.planes.push_back(std::move(plane));
+  }
+  joined.directions = DirectionsOf(mixture, joined.planes);
+  return joined;
+}
+
+}  // namespace strata

@@ -1,0 +1,242 @@
+#include "core/planes/models/model_selection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include <Eigen/Core>
+
+#include "core/common/random.h"
+#include "core/common/status.h"
+#include "core/common/stop.h"
+#include "core/planes/models/plane_mixture.h"
+#include "core/planes/moments.h"
+
+namespace strata {
+namespace {
+
+constexpr double kPlaneParameters = 3.0;
+constexpr double kDirectionParameters = 2.0;
+constexpr double kMergeCosine = 0.9;  // between the normals of planes that may be one
+
+double LogN(const PlaneMixture& mixture) { return std::log(std::max(2.0, mixture.measurements())); }
+
+// One plane less: `gone` is left out, or goes into `into`, which becomes `plane`.
+struct Reduction {
+  std::size_t gone = 0;
+  std::optional<std::size_t> into;
+  Plane plane;
+  double bic_change = 0.0;
+};
+
+// The likelihood of the cells around planes, and what it would be without some of them.
+class LeaveOneOut {
+ public:
+  explicit LeaveOneOut(const PlaneMixture& mixture)
+      : mixture_(mixture),
+        cells_of_(mixture.planes.size()),
+        moments_(mixture.planes.size(), Eigen::Matrix4d::Zero()) {
+    for (std::uint32_t j = 0; j < mixture.cells().size(); ++j) {
+      const MixtureCell& cell = mixture.cells()[j];
+      for (const Membership& member : mixture.memberships(j)) {
+        cells_of_[member.plane].push_back(j);
+        if (member.share < 1e-3) continue;
+        const double weight = member.share * cell.measurements / cell.variance_m2;
+        moments_[member.plane] += MomentsOf(weight, cell.mean, cell.covariance);
+      }
+    }
+  }
+
+  // The planes that compete for cells with m.
+  std::vector<std::size_t> Rivals(std::size_t m) const {
+    std::map<std::size_t, double> shared;
+    for (const std::uint32_t j : cells_of_[m]) {
+      for (const Membership& other : mixture_.memberships(j)) shared[other.plane] += 1.0;
+    }
+    shared.erase(m);
+    std::vector<std::size_t> rivals;
+    for (const auto& [plane, count] : shared) rivals.push_back(plane);
+    return rivals;
+  }
+
+  Reduction Best(std::size_t m) const {
+    const double saved = kPlaneParameters * LogN(mixture_);
+    Reduction best{m, std::nullopt, {}, -2.0 * Without(m) - saved};
+    for (const std::size_t t : Rivals(m)) {
+      const Plane& a = mixture_.planes[m].plane;
+      const Plane& b = mixture_.planes[t].plane;
+      const Eigen::Matrix4d both = moments_[m] + moments_[t];
+      if (std::abs(a.normal.dot(b.normal)) < kMergeCosine || !(both(3, 3) > 0.0)) continue;
+      const Plane joint = FitMoments(both).plane;
+      const double change = -2.0 * Merged(m, t, joint) - saved;
+      if (change < best.bic_change) best = {m, t, joint, change};
+    }
+    return best;
+  }
+
+ private:
+  // Change of the log-likelihood.
+  double Without(std::size_t m) const {
+    double change = 0.0;
+    for (const std::uint32_t j : cells_of_[m]) {
+      for (const Membership& member : mixture_.memberships(j)) {
+        if (member.plane != m) continue;
+        change += Measurements(j) * std::log(std::max(1e-300, Rest(j, 1.0 - member.share)));
+      }
+    }
+    return change;
+  }
+
+  double Merged(std::size_t m, std::size_t t, const Plane& joint) const {
+    std::vector<std::uint32_t> cells;
+    std::set_union(cells_of_[m].begin(),
+                   cells_of_[m].end(),
+                   cells_of_[t].begin(),
+                   cells_of_[t].end(),
+                   std::back_inserter(cells));
+    const MixturePlane plane{joint, {}, 1.0};
+    double change = 0.0;
+    for (const std::uint32_t j : cells) {
+      double rest = 1.0, now = 0.0;
+      for (const Membership& member : mixture_.memberships(j)) {
+        if (member.plane == m || member.plane == t) rest -= member.share;
+      }
+      now = std::exp(mixture_.CellLog(mixture_.cells()[j], plane) - Total(j));
+      change += Measurements(j) * std::log(std::max(1e-300, Rest(j, rest) + now));
+    }
+    return change;
+  }
+
+  double Measurements(std::uint32_t j) const { return mixture_.cells()[j].measurements; }
+  // Shares sum to 1 with clutter, which never has less than this.
+  double Rest(std::uint32_t j, double share) const {
+    return std::max(share, std::exp(mixture_.ClutterLog() - Total(j)));
+  }
+  // ln of the sum over planes and clutter.
+  double Total(std::uint32_t j) const {
+    double sum = std::exp(mixture_.ClutterLog());
+    for (const Membership& member : mixture_.memberships(j)) {
+      sum += std::exp(mixture_.CellLog(mixture_.cells()[j], mixture_.planes[member.plane]));
+    }
+    return std::log(sum);
+  }
+
+  const PlaneMixture& mixture_;
+  std::vector<std::vector<std::uint32_t>> cells_of_;  // that may be in it, ascending
+  std::vector<Eigen::Matrix4d> moments_;              // of what is in it, weighted n/ρ²
+};
+
+// Those of the reductions, best first, that do not touch planes around an earlier one.
+std::vector<Reduction> Independent(const LeaveOneOut& models, std::vector<Reduction> wanted) {
+  std::stable_sort(wanted.begin(), wanted.end(), [](const Reduction& a, const Reduction& b) {
+    return a.bic_change < b.bic_change;
+  });
+  std::vector<Reduction> taken;
+  std::map<std::size_t, bool> touched;
+  for (const Reduction& one : wanted) {
+    if (touched[one.gone] || (one.into.has_value() && touched[*one.into])) continue;
+    for (const std::size_t rival : models.Rivals(one.gone)) touched[rival] = true;
+    if (one.into.has_value()) {
+      for (const std::size_t rival : models.Rivals(*one.into)) touched[rival] = true;
+    }
+    touched[one.gone] = true;
+    taken.push_back(one);
+  }
+  return taken;
+}
+
+void Apply(const std::vector<Reduction>& reductions, PlaneMixture& mixture) {
+  std::vector<bool> gone(mixture.planes.size(), false);
+  for (const Reduction& one : reductions) {
+    gone[one.gone] = true;
+    if (!one.into.has_value()) continue;
+    MixturePlane& into = mixture.planes[*one.into];
+    into.plane = one.plane;
+    const std::vector<Voxel>& more = mixture.planes[one.gone].voxels;
+    std::vector<Voxel> all;
+    std::set_union(
+        into.voxels.begin(), into.voxels.end(), more.begin(), more.end(), std::back_inserter(all));
+    into.voxels = std::move(all);
+  }
+  std::size_t kept = 0;
+  for (std::size_t m = 0; m < gone.size(); ++m) {
+    if (gone[m]) continue;
+    if (kept != m) mixture.planes[kept] = std::move(mixture.planes[m]);
+    ++kept;
+  }
+  mixture.planes.resize(kept);
+}
+
+}  // namespace
+
+double Bic(const PlaneMixture& mixture) {
+  const auto planes = static_cast<double>(mixture.planes.size());
+  const auto directions = static_cast<double>(mixture.directions.size());
+  return -2.0 * mixture.LogLikelihood() +
+         (kPlaneParameters * planes + kDirectionParameters * directions) * LogN(mixture);
+}
+
+bool DropDirections(PlaneMixture& mixture) {
+  const std::size_t M = mixture.planes.size();
+  std::vector<std::size_t> left(mixture.directions.size());
+  for (std::size_t k = 0; k < left.size(); ++k) left[k] = k;
+  Eigen::MatrixXd density(static_cast<Eigen::Index>(M), static_cast<Eigen::Index>(left.size() + 1));
+  for (std::size_t m = 0; m < M; ++m) {
+    for (std::size_t k = 0; k <= left.size(); ++k) {
+      density(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(k)) =
+          std::exp(mixture.DirectionLog(m, k));
+    }
+  }
+  Eigen::VectorXd sums = density.rowwise().sum();
+  const double none = std::exp(-std::log(2.0 * M_PI));
+  bool dropped = false;
+  while (!left.empty()) {
+    double best_change = 0.0;
+    std::optional<std::size_t> best;
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      const auto column = density.col(static_cast<Eigen::Index>(left[i])).array();
+      const double loss = (sums.array().log() - (sums.array() - column).max(none).log()).sum();
+      const double change = 2.0 * loss - kDirectionParameters * LogN(mixture);
+      if (change < best_change) {
+        best_change = change;
+        best = i;
+      }
+    }
+    if (!best.has_value()) break;
+    sums = (sums - density.col(static_cast<Eigen::Index>(left[*best]))).cwiseMax(none);
+    left.erase(left.begin() + static_cast<std::ptrdiff_t>(*best));
+    dropped = true;
+  }
+  std::vector<Eigen::Vector3d> kept;
+  for (const std::size_t k : left) kept.push_back(mixture.directions[k]);
+  mixture.directions = std::move(kept);
+  mixture.EStep();
+  return dropped;
+}
+
+absl::StatusOr<bool> DropPlanes(PlaneMixture& mixture, const Stop& stop) {
+  bool dropped = false;
+  while (true) {
+    const LeaveOneOut models(mixture);
+    std::vector<Reduction> wanted;
+    for (std::size_t m = 0; m < mixture.planes.size(); ++m) {
+      STRATA_RETURN_IF_ERROR(stop.status());
+      Reduction best = models.Best(m);
+      if (best.bic_change < 0.0) wanted.push_back(std::move(best));
+    }
+    if (wanted.empty()) return dropped;
+    Apply(Independent(models, std::move(wanted)), mixture);
+    mixture.Prepare();
+    dropped = true;
+  }
+}
+
+}  // namespace strata

@@ -1,0 +1,232 @@
+#include "core/planes/models/plane_mixture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/status.h"
+#include <Eigen/Core>
+
+#include "core/common/hash_map.h"
+#include "core/common/status.h"
+#include "core/common/stop.h"
+#include "core/geometry/eigen_solvers.h"
+
+namespace strata {
+namespace {
+
+constexpr int kVoxelBits = 21;
+constexpr std::int64_t kVoxelOffset = std::int64_t{1} << (kVoxelBits - 1);
+constexpr std::uint64_t kVoxelMask = (std::uint64_t{1} << kVoxelBits) - 1;
+constexpr double kClutterShare = 0.1;  // of the measurements
+constexpr double kSettledGain = 1e-6;  // of the objective, a measurement
+constexpr int kTurns = 3;              // of planes and directions in an M-step
+
+Voxel VoxelKey(std::int64_t x, std::int64_t y, std::int64_t z) {
+  const auto bits = [](std::int64_t v) {
+    return static_cast<std::uint64_t>(v + kVoxelOffset) & kVoxelMask;
+  };
+  return bits(x) << (2 * kVoxelBits) | bits(y) << kVoxelBits | bits(z);
+}
+
+// ln Σ exp of two or more, by their largest.
+double AddLogs(double a, double b) {
+  const double most = std::max(a, b);
+  return most + std::log1p(std::exp(std::min(a, b) - most));
+}
+
+}  // namespace
+
+Voxel VoxelOf(const Eigen::Vector3d& point) {
+  const auto at = [](double v) { return static_cast<std::int64_t>(std::floor(v / kVoxelM)); };
+  return VoxelKey(at(point.x()), at(point.y()), at(point.z()));
+}
+
+std::vector<Voxel> VoxelsAround(Voxel voxel) {
+  const auto axis = [voxel](int shift) {
+    return static_cast<std::int64_t>(voxel >> shift & kVoxelMask) - kVoxelOffset;
+  };
+  std::vector<Voxel> around;
+  around.reserve(27);
+  for (int k = 0; k < 27; ++k) {
+    around.push_back(VoxelKey(
+        axis(2 * kVoxelBits) + k / 9 - 1, axis(kVoxelBits) + k / 3 % 3 - 1, axis(0) + k % 3 - 1));
+  }
+  return around;
+}
+
+double PlaneMixture::CellLog(const MixtureCell& cell, const MixturePlane& plane) const {
+  const Eigen::Vector3d& n = plane.plane.normal;
+  const double off = n.dot(cell.mean) - plane.plane.distance;
+  const double squared = off * off + n.dot(cell.covariance * n);
+  return std::log(1.0 - kClutterShare) - 0.5 * std::log(2.0 * M_PI * cell.variance_m2) -
+         squared / (2.0 * cell.variance_m2);
+}
+
+double PlaneMixture::ClutterLog() const {
+  return std::log(kClutterShare) - std::log(2.0 * options_.clutter_half_m);
+}
+
+double PlaneMixture::DirectionLog(std::size_t m, std::size_t k) const {
+  if (k == directions.size()) return -std::log(2.0 * M_PI);  // even on the half sphere
+  const double cosine = planes[m].plane.normal.dot(directions[k]);
+  const double precision = planes[m].weight / std::pow(options_.direction_sigma_rad, 2);
+  return std::log(precision / (2.0 * M_PI)) - 0.5 * precision * (1.0 - cosine * cosine);
+}
+
+void PlaneMixture::Prepare() {
+  HashMap<Voxel, std::vector<std::uint32_t>> near;
+  for (std::uint32_t m = 0; m < planes.size(); ++m) {
+    for (const Voxel voxel : planes[m].voxels) {
+      for (const Voxel around : VoxelsAround(voxel)) {
+        std::vector<std::uint32_t>& list = near[around];
+        if (list.empty() || list.back() != m) list.push_back(m);
+      }
+    }
+  }
+  members_.assign(cells_.size(), {});
+  measurements_ = 0.0;
+  for (std::size_t j = 0; j < cells_.size(); ++j) {
+    measurements_ += cells_[j].measurements;
+    const auto found = near.find(VoxelOf(cells_[j].mean));
+    if (found == near.end()) continue;
+    for (const std::uint32_t m : found->second) members_[j].push_back({m, 0.0});
+  }
+  EStep();
+  std::vector<double> area(planes.size(), 0.0);
+  for (std::size_t j = 0; j < cells_.size(); ++j) {
+    for (const Membership& member : members_[j]) {
+      area[member.plane] += member.share * cells_[j].area_m2;
+    }
+  }
+  for (std::size_t m = 0; m < planes.size(); ++m) {
+    planes[m].weight =
+        std::clamp(area[m] / options_.independent_area_m2, 1.0, options_.max_measurements);
+  }
+  EStep();
+}
+
+void PlaneMixture::EStep() {
+  data_log_ = 0.0;
+  const double clutter = ClutterLog();
+  for (std::size_t j = 0; j < cells_.size(); ++j) {
+    double sum = clutter;
+    for (Membership& member : members_[j]) {
+      member.share = CellLog(cells_[j], planes[member.plane]);
+      sum = AddLogs(sum, member.share);
+    }
+    for (Membership& member : members_[j]) member.share = std::exp(member.share - sum);
+    data_log_ += cells_[j].measurements * sum;
+  }
+  prior_log_ = 0.0;
+  if (!options_.directions) return;
+  const auto K = static_cast<Eigen::Index>(directions.size());
+  beta_.resize(static_cast<Eigen::Index>(planes.size()), K + 1);
+  for (Eigen::Index m = 0; m < beta_.rows(); ++m) {
+    for (Eigen::Index k = 0; k <= K; ++k) {
+      beta_(m, k) = DirectionLog(static_cast<std::size_t>(m), static_cast<std::size_t>(k));
+    }
+    const double most = beta_.row(m).maxCoeff();
+    beta_.row(m) = (beta_.row(m).array() - most).exp();
+    const double sum = beta_.row(m).sum();
+    beta_.row(m) /= sum;
+    prior_log_ += most + std::log(sum);
+  }
+}
+
+std::vector<PlaneMixture::Scatter> PlaneMixture::Scatters() const {
+  std::vector<Scatter> scatters(planes.size());
+  for (std::size_t j = 0; j < cells_.size(); ++j) {
+    const MixtureCell& cell = cells_[j];
+    for (const Membership& member : members_[j]) {
+      if (member.share < 1e-12) continue;
+      const double w = member.share * cell.measurements / cell.variance_m2;
+      Scatter& scatter = scatters[member.plane];
+      // About a point of the plane: far from the frame's origin the sums would lose their digits.
+      const Plane& plane = planes[member.plane].plane;
+      const Eigen::Vector3d x = cell.mean - plane.distance * plane.normal;
+      scatter.weight += w;
+      scatter.first += w * x;
+      scatter.second += w * (cell.covariance + x * x.transpose());
+    }
+  }
+  return scatters;
+}
+
+void PlaneMixture::MStep() {
+  const std::vector<Scatter> scatters = Scatters();
+  const std::vector<MixturePlane> before = planes;
+  const double prior = 1.0 / std::pow(options_.direction_sigma_rad, 2);
+  for (int turn = 0; turn < (options_.directions ? kTurns : 1); ++turn) {
+    for (std::size_t m = 0; m < planes.size(); ++m) {
+      const Scatter& scatter = scatters[m];
+      if (!(scatter.weight > 0.0)) continue;
+      const Eigen::Vector3d mean = scatter.first / scatter.weight;
+      Eigen::Matrix3d squares = scatter.second - scatter.weight * mean * mean.transpose();
+      for (std::size_t k = 0; options_.directions && k < directions.size(); ++k) {
+        const double share = beta_(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(k));
+        squares -= prior * planes[m].weight * share * directions[k] * directions[k].transpose();
+      }
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(squares);
+      Plane& plane = planes[m].plane;
+      const Eigen::Vector3d normal = solver.eigenvectors().col(0);
+      plane.normal = normal.dot(before[m].plane.normal) < 0.0 ? Eigen::Vector3d(-normal) : normal;
+      const Plane& old = before[m].plane;
+      plane.distance = plane.normal.dot(mean + old.distance * old.normal);
+    }
+    for (std::size_t k = 0; options_.directions && k < directions.size(); ++k) {
+      Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+      for (std::size_t m = 0; m < planes.size(); ++m) {
+        const Eigen::Vector3d& n = planes[m].plane.normal;
+        const double share = beta_(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(k));
+        sum += planes[m].weight * share * n * n.transpose();
+      }
+      if (!(sum.trace() > 1e-9)) continue;
+      directions[k] = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(sum).eigenvectors().col(2);
+    }
+  }
+}
+
+double PlaneMixture::ExpectedLogLikelihood() const {
+  double sum = 0.0;
+  for (std::size_t j = 0; j < cells_.size(); ++j) {
+    for (const Membership& member : members_[j]) {
+      sum += cells_[j].measurements * member.share * CellLog(cells_[j], planes[member.plane]);
+    }
+  }
+  for (Eigen::Index m = 0; options_.directions && m < beta_.rows(); ++m) {
+    for (Eigen::Index k = 0; k < beta_.cols(); ++k) {
+      sum += beta_(m, k) * DirectionLog(static_cast<std::size_t>(m), static_cast<std::size_t>(k));
+    }
+  }
+  return sum;
+}
+
+absl::Status PlaneMixture::Run(int max_steps, const Stop& stop) {
+  EStep();
+  for (int step = 0; step < max_steps; ++step) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+    const double before = LogLikelihood();
+    MStep();
+    EStep();
+    if (LogLikelihood() - before < kSettledGain * measurements_) break;
+  }
+  return absl::OkStatus();
+}
+
+void PlaneMixture::RefreshSupport() {
+  for (MixturePlane& plane : planes) plane.voxels.clear();
+  for (std::size_t j = 0; j < cells_.size(); ++j) {
+    for (const Membership& member : members_[j]) {
+      if (member.share > 0.5) planes[member.plane].voxels.push_back(VoxelOf(cells_[j].mean));
+    }
+  }
+  for (MixturePlane& plane : planes) {
+    std::sort(plane.voxels.begin(), plane.voxels.end());
+    plane.voxels.erase(std::unique(plane.voxels.begin(), plane.voxels.end()), plane.voxels.end());
+  }
+}
+
+}  // namespace strata

@@ -1,0 +1,118 @@
+// Cells of surface as a mixture of planes, whose normals are a mixture of main directions
+// (thesis 5.3, 5.4).
+// Internal to core/planes, not installed.
+//
+// Differs from the thesis: the data are flat cells with their covariances instead of points, all
+// points of a cell sharing their responsibilities (a bound on the likelihood that keeps EM
+// monotone: Verbeek, Nunnink, Vlassis 2006); what no plane explains is clutter, what no direction
+// explains has none; a plane is only where it has support, so that distant walls in one plane stay
+// two.
+#ifndef STRATA_CORE_PLANES_MODELS_PLANE_MIXTURE_H_
+#define STRATA_CORE_PLANES_MODELS_PLANE_MIXTURE_H_
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include <Eigen/Core>
+
+#include "core/common/hash_map.h"
+#include "core/common/stop.h"
+#include "core/geometry/primitives.h"
+
+namespace strata {
+
+using Voxel = std::uint64_t;  // a cube of kVoxelM in the frame of the cells
+inline constexpr double kVoxelM = 1.0;
+Voxel VoxelOf(const Eigen::Vector3d& point);
+// The 27 around it, itself included.
+std::vector<Voxel> VoxelsAround(Voxel voxel);
+
+struct MixtureCell {
+  Eigen::Vector3d mean;
+  Eigen::Matrix3d covariance;  // of its points about the mean [m²]
+  double measurements = 1.0;   // independent ones: n_j
+  double variance_m2 = 1e-4;   // ρ² of each
+  double area_m2 = 0.0;
+};
+
+struct MixturePlane {
+  Plane plane;
+  std::vector<Voxel> voxels;  // where it has support; ascending
+  // Held during a run of EM, see PlaneMixture::Prepare().
+  double weight = 1.0;  // w_m (5.20): measurements of its normal, as many as may count
+};
+
+// Of a cell, by plane.
+struct Membership {
+  std::uint32_t plane = 0;
+  double share = 0.0;  // E[α_jm]
+};
+
+struct MixtureOptions {
+  double direction_sigma_rad = 0.03;  // σ of 5.13, of one measurement
+  double max_measurements = 25.0;     // of a normal, w_m
+  double independent_area_m2 = 0.25;  // of surface for one of those
+  double clutter_half_m = 1.0;        // h: what is clutter is evenly spread over 2h
+  bool directions = true;
+};
+
+class PlaneMixture {
+ public:
+  PlaneMixture(std::vector<MixtureCell> cells, const MixtureOptions& options)
+      : cells_(std::move(cells)), options_(options) {}
+
+  const std::vector<MixtureCell>& cells() const { return cells_; }
+  const MixtureOptions& options() const { return options_; }
+  std::vector<MixturePlane> planes;
+  std::vector<Eigen::Vector3d> directions;  // φ_k, unit; the sign is arbitrary
+
+  // Which cells may be in which planes by their voxels and one around them, the planes' weights,
+  // and the E-step. To be called whenever planes came, left or grew; within a run of EM it holds.
+  void Prepare();
+  void EStep();
+  // The planes and directions that maximise the expected log-likelihood for the expectations of
+  // the last E-step, one given the others in turns, each in closed form.
+  void MStep();
+  // EM until the objective gains less than 1e-6 of a measurement each, at most `max_steps`. The
+  // objective never falls. CANCELLED and DEADLINE_EXCEEDED by `stop`.
+  absl::Status Run(int max_steps, const Stop& stop);
+
+  // What EM maximises, for the expectations of the last E-step at their best.
+  double LogLikelihood() const { return data_log_ + prior_log_; }
+  // Q: what an M-step maximises, for the last E-step's expectations and the current planes.
+  double ExpectedLogLikelihood() const;
+  double measurements() const { return measurements_; }
+
+  // Of cell j those planes that it may be in. After EStep().
+  const std::vector<Membership>& memberships(std::size_t j) const { return members_[j]; }
+  // ln p(cell, plane), a measurement's mean.
+  double CellLog(const MixtureCell& cell, const MixturePlane& plane) const;
+  double ClutterLog() const;  // the same of clutter
+  // E[β_mk] of the last E-step; row m; the last column is "none".
+  const Eigen::MatrixXd& direction_shares() const { return beta_; }
+  // ln of the density of plane m's normal given direction k, K included: none.
+  double DirectionLog(std::size_t m, std::size_t k) const;
+  // Voxels of the cells that are more of the plane than of anything else.
+  void RefreshSupport();
+
+ private:
+  struct Scatter {  // Σ α n/ρ² (1, x, x xᵀ)
+    double weight = 0.0;
+    Eigen::Vector3d first = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+  };
+  std::vector<Scatter> Scatters() const;
+
+  std::vector<MixtureCell> cells_;
+  MixtureOptions options_;
+  std::vector<std::vector<Membership>> members_;
+  Eigen::MatrixXd beta_;
+  double measurements_ = 0.0;
+  double data_log_ = 0.0, prior_log_ = 0.0;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_PLANES_MODELS_PLANE_MIXTURE_H_

@@ -1,0 +1,225 @@
+#include "core/planes/models/plane_model_finder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "core/common/hash_map.h"
+#include "core/common/option_checks.h"
+#include "core/common/status.h"
+#include "core/common/stop.h"
+#include "core/planes/models/joined_planes.h"
+#include "core/planes/models/plane_mixture.h"
+#include "core/planes/models/plane_polygons.h"
+#include "core/planes/models/plane_raster.h"
+#include "core/planes/models/square_planes.h"
+#include "core/planes/moments.h"
+
+namespace strata {
+namespace {
+
+constexpr double kSquaresInEpsilon = 4.0;  // 5.4.2: points are thinned to ε/4
+constexpr double kBandM = 0.1;             // 5.4.2: how near a plane its points are, at least
+constexpr double kBandSigmas = 3.0;
+constexpr double kBeyondM = 0.3;            // that a ray has to go on behind a plane it crossed
+constexpr std::size_t kMostRays = 1000000;  // of a square; of more, every so many
+constexpr std::size_t kStopEvery = 8192;
+
+struct FacedPlane {
+  SeenPlane seen;
+  double band_m = kBandM;
+  std::int64_t facing = 0;     // points seen from the normal's side less those from the other
+  Eigen::AlignedBox2d extent;  // in its frame
+};
+
+bool Holds(const PlanSquare& square, const Eigen::Vector3d& p) {
+  return (p.head<2>().array() >= square.min().array()).all() &&
+         (p.head<2>().array() < square.max().array()).all();
+}
+
+void Flip(PlanePolygon& polygon) {
+  std::reverse(polygon.outer.begin(), polygon.outer.end());
+  for (PlaneHole& hole : polygon.holes) std::reverse(hole.ring.begin(), hole.ring.end());
+}
+
+}  // namespace
+
+absl::Status PlaneModelOptions::Validate() const {
+  OptionChecks checks("plane model");
+  checks.InRange("rho_m", rho_m, 0.0, 1.0);
+  checks.InRange("sigma_rad", sigma_rad, 0.001, 0.5);
+  checks.InRange("max_planes", max_planes, 1, 10000);
+  checks.InRange("cell_size_m", cell_size_m, 0.2, 20.0);
+  checks.InRange("min_area_m2", min_area_m2, 0.01, 10000.0);
+  checks.InRange("epsilon_m", epsilon_m, 0.05, 5.0);
+  return checks.status();
+}
+
+struct PlaneModelFinder::State {
+  PlaneModelOptions options;
+  bool has_reference = false;
+  Eigen::Vector3d reference = Eigen::Vector3d::Zero();  // of all that is inside
+  std::vector<std::vector<SquarePlane>> squares;
+  JoinedPlanes joined;
+  std::vector<FacedPlane> faced;  // as joined.planes
+  HashMap<Voxel, std::vector<std::uint32_t>> near;
+
+  void AddHit(const Eigen::Vector3d& p, const Eigen::Vector3d& sensor);
+  void AddRay(const Eigen::Vector3d& p,
+              const Eigen::Vector3d& sensor,
+              const std::vector<double>& sensor_distances);
+  void BeginLooking();
+};
+
+PlaneModelFinder::PlaneModelFinder(const PlaneModelOptions& options)
+    : state_(std::make_unique<State>()) {
+  state_->options = options;
+}
+
+PlaneModelFinder::~PlaneModelFinder() = default;
+
+absl::Status PlaneModelFinder::FindPlanes(const PosedPoints& points,
+                                          const PlanSquare& square,
+                                          const Stop& stop) {
+  if (!state_->has_reference) state_->reference = points.origin;
+  state_->has_reference = true;
+  STRATA_ASSIGN_OR_RETURN(
+      std::vector<SquarePlane> planes,
+      FindSquarePlanes(points, square, state_->reference, state_->options, stop));
+  state_->squares.push_back(std::move(planes));
+  return absl::OkStatus();
+}
+
+absl::Status PlaneModelFinder::JoinPlanes(const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(state_->joined, JoinSquares(state_->squares, state_->options, stop));
+  state_->squares.clear();
+  state_->BeginLooking();
+  return absl::OkStatus();
+}
+
+void PlaneModelFinder::State::BeginLooking() {
+  const double square = options.epsilon_m / kSquaresInEpsilon;
+  for (std::uint32_t m = 0; m < joined.planes.size(); ++m) {
+    const JoinedPlane& plane = joined.planes[m];
+    const PlaneFrame frame = FrameOf(plane.model.plane, FitMoments(plane.sum.moments).mean);
+    FacedPlane one{{plane.model.plane, frame, PlaneRaster(square, 2.0 * square)},
+                   std::max({kBandM, kBandSigmas * options.rho_m, kBandSigmas * plane.model.rms_m}),
+                   0,
+                   {}};
+    faced.push_back(std::move(one));
+    for (const Voxel voxel : plane.sum.voxels) {
+      for (const Voxel around : VoxelsAround(voxel)) {
+        std::vector<std::uint32_t>& list = near[around];
+        if (list.empty() || list.back() != m) list.push_back(m);
+      }
+    }
+  }
+}
+
+void PlaneModelFinder::State::AddHit(const Eigen::Vector3d& p, const Eigen::Vector3d& sensor) {
+  const auto found = near.find(VoxelOf(p));
+  if (found == near.end()) return;
+  FacedPlane* nearest = nullptr;
+  double least = 1e9;
+  for (const std::uint32_t m : found->second) {
+    const double off = std::abs(SignedDistance(p, faced[m].seen.plane));
+    if (off > faced[m].band_m || off >= least) continue;
+    least = off;
+    nearest = &faced[m];
+  }
+  if (nearest == nullptr) return;
+  const Eigen::Vector2d at = nearest->seen.frame.Flat(p);
+  nearest->seen.raster.AddHit(at);
+  nearest->extent.extend(at);
+  nearest->facing += SignedDistance(sensor, nearest->seen.plane) > 0.0 ? 1 : -1;
+}
+
+void PlaneModelFinder::State::AddRay(const Eigen::Vector3d& p,
+                                     const Eigen::Vector3d& sensor,
+                                     const std::vector<double>& sensor_distances) {
+  for (std::size_t m = 0; m < faced.size(); ++m) {
+    const double from = sensor_distances[m];
+    const double to = SignedDistance(p, faced[m].seen.plane);
+    if (from * to >= 0.0 || std::abs(to) < std::max(kBeyondM, faced[m].band_m)) continue;
+    const Eigen::Vector3d at = sensor + from / (from - to) * (p - sensor);
+    const Eigen::Vector2d flat = faced[m].seen.frame.Flat(at);
+    if (faced[m].extent.contains(flat)) faced[m].seen.raster.AddLook(flat);
+  }
+}
+
+absl::Status PlaneModelFinder::Look(const PosedPoints& points,
+                                    const PlanSquare& square,
+                                    const Stop& stop) {
+  if (!state_->options.polygons) return absl::OkStatus();
+  const Eigen::Vector3d shift = points.origin - state_->reference;
+  const PlanSquare own(square.min() - state_->reference.head<2>(),
+                       square.max() - state_->reference.head<2>());
+  const std::size_t every = points.points.size() / kMostRays + 1;
+  for (const bool rays : {false, true}) {  // rays only where there is surface around
+    std::size_t i = 0;
+    for (const PosedPoints::View& view : points.views) {
+      const Eigen::Vector3d sensor = view.sensor.cast<double>() + shift;
+      std::vector<double> distances;
+      for (const FacedPlane& one : state_->faced) {
+        distances.push_back(SignedDistance(sensor, one.seen.plane));
+      }
+      for (; i < view.end; ++i) {
+        if (i % kStopEvery == 0) STRATA_RETURN_IF_ERROR(stop.status());
+        const Eigen::Vector3d p = points.points[i].cast<double>() + shift;
+        if (!rays && Holds(own, p)) state_->AddHit(p, sensor);
+        if (rays && i % every == 0) state_->AddRay(p, sensor, distances);
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<PlaneModel> PlaneModelFinder::Finish(const Stop& stop) {
+  std::vector<SeenPlane> seen;
+  for (FacedPlane& one : state_->faced) seen.push_back(std::move(one.seen));
+  const PolygonOptions options{state_->options.epsilon_m, state_->options.min_area_m2};
+  PlaneModel model;
+  model.directions = state_->joined.directions;
+  for (std::size_t m = 0; m < seen.size(); ++m) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+    ModelPlane plane = state_->joined.planes[m].model;
+    if (state_->options.polygons) plane.polygons = PolygonsOf(seen, m, options);
+    if (state_->faced[m].facing < 0) {
+      plane.plane = {-plane.plane.normal, -plane.plane.distance};
+      for (PlanePolygon& polygon : plane.polygons) Flip(polygon);
+    }
+    plane.plane.distance += plane.plane.normal.dot(state_->reference);
+    for (PlanePolygon& polygon : plane.polygons) {
+      for (Eigen::Vector3d& p : polygon.outer) p += state_->reference;
+      for (PlaneHole& hole : polygon.holes) {
+        for (Eigen::Vector3d& p : hole.ring) p += state_->reference;
+      }
+    }
+    model.planes.push_back(std::move(plane));
+  }
+  return model;
+}
+
+absl::StatusOr<PlaneModel> FindPlaneModel(const PosedPoints& points,
+                                          const PlaneModelOptions& options,
+                                          const Stop& stop) {
+  STRATA_RETURN_IF_ERROR(options.Validate());
+  const PlanSquare everything(points.origin.head<2>().array() - 1e4,
+                              points.origin.head<2>().array() + 1e4);
+  PlaneModelFinder finder(options);
+  STRATA_RETURN_IF_ERROR(finder.FindPlanes(points, everything, stop));
+  STRATA_RETURN_IF_ERROR(finder.JoinPlanes(stop));
+  STRATA_RETURN_IF_ERROR(finder.Look(points, everything, stop));
+  return finder.Finish(stop);
+}
+
+}  // namespace strata

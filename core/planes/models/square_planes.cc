@@ -1,0 +1,162 @@
+#include "core/planes/models/square_planes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include <Eigen/Core>
+
+#include "core/common/random.h"
+#include "core/common/status.h"
+#include "core/common/stop.h"
+#include "core/planes/extraction.h"
+#include "core/planes/models/model_selection.h"
+#include "core/planes/models/plane_mixture.h"
+#include "core/planes/moments.h"
+#include "core/planes/planar_cells.h"
+#include "core/planes/region_growing.h"
+
+namespace strata {
+namespace {
+
+constexpr int kMostRounds = 8;
+constexpr int kMostSteps = 40;
+constexpr double kFloorM = 0.01;             // of ρ, beside what is measured
+constexpr double kIndependentAreaM2 = 0.04;  // of surface for a measurement of a plane's place
+constexpr double kStartShare = 0.25;         // of min_area_m2, of a region that begins a plane
+
+PlaneExtractionOptions CellOptions(const PlaneModelOptions& options) {
+  PlaneExtractionOptions cells;
+  cells.sensor.sigma_m = std::max(kFloorM, options.rho_m);
+  cells.sensor.sigma_per_metre = 0.0;
+  cells.max_range_m = 1000.0;
+  cells.cell_size_m = options.cell_size_m;
+  cells.max_rms_m = std::max(0.06, 1.5 * options.rho_m);
+  return cells;
+}
+
+MixtureCell MixtureCellOf(const PlanarCell& cell,
+                          const Eigen::Vector3d& shift,
+                          const PlaneModelOptions& options) {
+  MixtureCell out;
+  out.mean = cell.mean + shift;
+  out.covariance =
+      cell.moments.topLeftCorner<3, 3>() / cell.moments(3, 3) - cell.mean * cell.mean.transpose();
+  out.measurements =
+      std::clamp(cell.area_m2 / kIndependentAreaM2, 1.0, static_cast<double>(cell.point_count));
+  const double rho = options.rho_m > 0.0 ? options.rho_m : std::hypot(cell.rms_m, kFloorM);
+  out.variance_m2 = rho * rho;
+  out.area_m2 = cell.area_m2;
+  return out;
+}
+
+std::vector<MixturePlane> StartPlanes(const std::vector<PlanarCell>& cells,
+                                      const std::vector<MixtureCell>& moved,
+                                      const PlaneModelOptions& options) {
+  std::vector<PlanarRegion> regions = GrowRegions(cells, CellOptions(options));
+  std::erase_if(regions, [&](const PlanarRegion& region) {
+    return region.moments(3, 3) < kStartShare * options.min_area_m2;
+  });
+  std::stable_sort(regions.begin(), regions.end(), [](const auto& a, const auto& b) {
+    return a.moments(3, 3) > b.moments(3, 3);
+  });
+  if (std::ssize(regions) > options.max_planes) {
+    regions.resize(static_cast<std::size_t>(options.max_planes));
+  }
+  std::vector<MixturePlane> planes;
+  for (const PlanarRegion& region : regions) {
+    MixturePlane plane;
+    Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
+    for (const std::uint32_t i : region.cells) {
+      moments += MomentsOf(moved[i].area_m2, moved[i].mean, moved[i].covariance);
+      plane.voxels.push_back(VoxelOf(moved[i].mean));
+    }
+    plane.plane = FitMoments(moments).plane;
+    std::sort(plane.voxels.begin(), plane.voxels.end());
+    plane.voxels.erase(std::unique(plane.voxels.begin(), plane.voxels.end()), plane.voxels.end());
+    planes.push_back(std::move(plane));
+  }
+  return planes;
+}
+
+// Each cell to the plane that has more of it than all else.
+std::vector<SquarePlane> PlanesIn(const PlanSquare& square,
+                                  const std::vector<PlanarCell>& cells,
+                                  const PlaneMixture& mixture,
+                                  const Eigen::Vector3d& reference) {
+  std::vector<SquarePlane> planes(mixture.planes.size());
+  for (std::size_t m = 0; m < planes.size(); ++m) planes[m].plane = mixture.planes[m].plane;
+  for (std::size_t j = 0; j < cells.size(); ++j) {
+    const MixtureCell& cell = mixture.cells()[j];
+    const Eigen::Vector2d at = (cell.mean + reference).head<2>();
+    if ((at.array() < square.min().array()).any() || (at.array() >= square.max().array()).any()) {
+      continue;
+    }
+    for (const Membership& member : mixture.memberships(j)) {
+      if (member.share <= 0.5) continue;
+      SquarePlane& plane = planes[member.plane];
+      plane.moments += MomentsOf(cell.area_m2, cell.mean, cell.covariance);
+      plane.measurements += cell.measurements;
+      plane.information += cell.measurements / cell.variance_m2;
+      plane.point_count += cells[j].point_count;
+      plane.voxels.push_back(VoxelOf(cell.mean));
+    }
+  }
+  std::erase_if(planes, [](const SquarePlane& plane) { return plane.voxels.empty(); });
+  for (SquarePlane& plane : planes) {
+    std::sort(plane.voxels.begin(), plane.voxels.end());
+    plane.voxels.erase(std::unique(plane.voxels.begin(), plane.voxels.end()), plane.voxels.end());
+  }
+  return planes;
+}
+
+}  // namespace
+
+absl::Status FitMixture(std::size_t max_planes, PlaneMixture& mixture, const Stop& stop) {
+  SplitMix64 random(1);
+  mixture.Prepare();
+  for (int round = 0; round < kMostRounds; ++round) {
+    STRATA_RETURN_IF_ERROR(mixture.Run(kMostSteps, stop));
+    bool changed = DropDirections(mixture);
+    STRATA_ASSIGN_OR_RETURN(const bool dropped, DropPlanes(mixture, stop));
+    mixture.RefreshSupport();
+    mixture.Prepare();
+    const std::size_t most = max_planes - std::min(max_planes, mixture.planes.size());
+    STRATA_ASSIGN_OR_RETURN(const std::size_t added, AddPlanes(mixture, most, random, stop));
+    if (!changed && !dropped && added == 0) break;
+  }
+  return mixture.Run(kMostSteps, stop);
+}
+
+absl::StatusOr<std::vector<SquarePlane>> FindSquarePlanes(const PosedPoints& points,
+                                                          const PlanSquare& square,
+                                                          const Eigen::Vector3d& reference,
+                                                          const PlaneModelOptions& options,
+                                                          const Stop& stop) {
+  const std::vector<PlanarCell> cells =
+      FindPlanarCells(points.points, Eigen::Vector3f::Zero(), CellOptions(options));
+  STRATA_RETURN_IF_ERROR(stop.status());
+  std::vector<MixtureCell> moved;
+  moved.reserve(cells.size());
+  const Eigen::Vector3d shift = points.origin - reference;
+  for (const PlanarCell& cell : cells) moved.push_back(MixtureCellOf(cell, shift, options));
+  std::vector<MixturePlane> start = StartPlanes(cells, moved, options);
+  MixtureOptions mixing;
+  mixing.direction_sigma_rad = options.sigma_rad;
+  mixing.directions = options.directions;
+  PlaneMixture mixture(std::move(moved), mixing);
+  mixture.planes = std::move(start);
+  for (const MixturePlane& plane : mixture.planes) {
+    if (options.directions) mixture.directions.push_back(plane.plane.normal);
+  }
+  const auto most = static_cast<std::size_t>(options.max_planes);
+  STRATA_RETURN_IF_ERROR(FitMixture(most, mixture, stop));
+  return PlanesIn(square, cells, mixture, reference);
+}
+
+}  // namespace strata
