@@ -1,0 +1,159 @@
+#include "core/planes/models/plane_model_finder.h"
+
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "core/common/stop.h"
+#include "core/geometry/primitives.h"
+#include "core/planes/models/alpha_shape.h"
+#include "core/planes/models/plane_mixture.h"
+#include "core/world/constraint.h"
+#include "core/world/plane_model.h"
+#include "tests/support/simulator.h"
+
+namespace strata {
+namespace {
+
+using testing::Random;
+
+// A wall at x = 2, 6 m long and 3 m high, with a window of 1.5 × 1 m, and a floor of 4 × 6 m.
+PosedPoints WallAndFloor(double turn_rad) {
+  Random random(1);
+  PosedPoints points;
+  const Eigen::AngleAxisd turn(turn_rad, Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d sensor(0.0, 0.0, 1.5);
+  points.origin = {100.0, -50.0, 0.0};
+  const auto add = [&](const Eigen::Vector3d& p) {
+    points.points.push_back((turn * p).cast<float>());
+  };
+  for (int i = 0; i < 60000; ++i) {
+    const double y = random.Uniform(-3.0, 3.0), z = random.Uniform(0.0, 3.0);
+    if (std::abs(y) < 0.75 && z > 1.0 && z < 2.0) {
+      // Through the window to a wall far behind it.
+      const Eigen::Vector3d way(2.0, y, z - 1.5);
+      add(sensor + way * 4.0);
+      continue;
+    }
+    add({2.0 + 0.01 * random.Gaussian(), y, z});
+  }
+  for (int i = 0; i < 60000; ++i) {
+    add({random.Uniform(-2.0, 2.0), random.Uniform(-3.0, 3.0), 0.01 * random.Gaussian()});
+  }
+  points.views = {{(turn * sensor).cast<float>(), points.points.size()}};
+  return points;
+}
+
+TEST(AlphaShape, KeepsAHole) {
+  std::vector<Eigen::Vector2d> grid;
+  for (int i = 0; i <= 40; ++i) {
+    for (int j = 0; j <= 40; ++j) {
+      if (i > 10 && i < 20 && j > 10 && j < 20) continue;  // open from 1.0 to 2.0
+      grid.emplace_back(0.1 * i, 0.1 * j);
+    }
+  }
+  grid.emplace_back(9.0, 9.0);
+  const std::vector<FlatPolygon> shapes = AlphaShape(grid, 0.25);
+  ASSERT_EQ(shapes.size(), 1U);
+  ASSERT_EQ(shapes[0].holes.size(), 1U);
+  EXPECT_NEAR(SignedArea(shapes[0].outer), 16.0, 1e-3);
+  // The corners of a hole are cut: a triangle of legs 0.2 m there has a circle of 0.14 m.
+  EXPECT_NEAR(SignedArea(shapes[0].holes[0]), -(1.0 - 4 * 0.02), 1e-3);
+}
+
+TEST(FindPlaneModel, WallWithWindowMeetsTheFloor) {
+  const PosedPoints points = WallAndFloor(0.4);
+  PlaneModelOptions options;
+  const absl::StatusOr<PlaneModel> model = FindPlaneModel(points, options, Stop());
+  ASSERT_TRUE(model.ok()) << model.status();
+  const ModelPlane *wall = nullptr, *floor = nullptr;
+  for (const ModelPlane& plane : model->planes) {
+    const double off = std::abs(SignedDistance({100.0, -50.0, 1.5}, plane.plane));
+    if (plane.kind == PlaneKind::kWall && off < 3.0) wall = &plane;
+    if (plane.kind == PlaneKind::kLevel && floor == nullptr) floor = &plane;
+  }
+  ASSERT_NE(wall, nullptr);
+  ASSERT_NE(floor, nullptr);
+  const Eigen::Vector3d truth(-std::cos(0.4), -std::sin(0.4), 0.0);  // towards the sensor
+  EXPECT_GT(wall->plane.normal.dot(truth), std::cos(0.003));
+  EXPECT_GT(floor->plane.normal.z(), std::cos(0.003));
+  EXPECT_NEAR(SignedDistance({100.0, -50.0, 0.0}, floor->plane), 0.0, 0.002);
+  ASSERT_EQ(wall->polygons.size(), 1U);
+  ASSERT_EQ(wall->polygons[0].holes.size(), 1U);
+  EXPECT_TRUE(wall->polygons[0].holes[0].seen_open);
+  EXPECT_NEAR(wall->polygons[0].area_m2, 18.0 - 1.5, 0.8);
+  ASSERT_EQ(floor->polygons.size(), 1U);
+  EXPECT_NEAR(floor->polygons[0].area_m2, 24.0, 0.8);
+  EXPECT_TRUE(floor->polygons[0].holes.empty());
+}
+
+TEST(FindPlaneModel, SaysTheSameTwice) {
+  const PosedPoints points = WallAndFloor(0.0);
+  const auto a = FindPlaneModel(points, {}, Stop());
+  const auto b = FindPlaneModel(points, {}, Stop());
+  ASSERT_TRUE(a.ok() && b.ok());
+  ASSERT_EQ(a->planes.size(), b->planes.size());
+  for (std::size_t i = 0; i < a->planes.size(); ++i) {
+    EXPECT_EQ(a->planes[i].plane.normal, b->planes[i].plane.normal);
+    EXPECT_EQ(a->planes[i].polygons, b->planes[i].polygons);
+  }
+}
+
+TEST(FindPlaneModel, NothingGivesNothing) {
+  const auto model = FindPlaneModel({}, {}, Stop());
+  ASSERT_TRUE(model.ok()) << model.status();
+  EXPECT_TRUE(model->planes.empty());
+}
+
+// Two slanted walls 4° apart and a floor, in cells: the likelihood never falls.
+TEST(PlaneMixture, ObjectiveNeverFalls) {
+  Random random(3);
+  std::vector<MixtureCell> cells;
+  const std::vector<Eigen::Vector3d> normals = {
+      {1.0, 0.0, 0.0}, {std::cos(0.07), std::sin(0.07), 0.0}, {0.0, 0.0, 1.0}};
+  std::vector<MixturePlane> start;
+  for (std::size_t m = 0; m < normals.size(); ++m) {
+    const Eigen::Vector3d n = normals[m];
+    const Eigen::Vector3d u = n.unitOrthogonal(), v = n.cross(u);
+    MixturePlane plane;
+    for (int i = 0; i < 80; ++i) {
+      MixtureCell cell;
+      cell.mean = (3.0 * static_cast<double>(m) + 0.02 * random.Gaussian()) * n +
+                  random.Uniform(-2.0, 2.0) * u + random.Uniform(-2.0, 2.0) * v;
+      cell.covariance = 0.01 * (u * u.transpose() + v * v.transpose());
+      cell.measurements = 4.0;
+      cell.variance_m2 = 4e-4;
+      cell.area_m2 = 0.1;
+      plane.voxels.push_back(VoxelOf(cell.mean));
+      cells.push_back(cell);
+    }
+    plane.plane.normal =
+        (n + 0.05 * Eigen::Vector3d(random.Gaussian(), random.Gaussian(), random.Gaussian()))
+            .normalized();
+    plane.plane.distance = 3.0 * static_cast<double>(m);
+    start.push_back(plane);
+  }
+  PlaneMixture mixture(cells, {});
+  mixture.planes = start;
+  for (const MixturePlane& plane : start) mixture.directions.push_back(plane.plane.normal);
+  mixture.Prepare();
+  double last = mixture.LogLikelihood();
+  const double first = last;
+  for (int step = 0; step < 30; ++step) {
+    const double expected = mixture.ExpectedLogLikelihood();
+    mixture.MStep();
+    EXPECT_GE(mixture.ExpectedLogLikelihood(), expected - 1e-9 * std::abs(expected)) << step;
+    mixture.EStep();
+    EXPECT_GE(mixture.LogLikelihood(), last - 1e-9 * std::abs(last)) << step;
+    last = mixture.LogLikelihood();
+  }
+  EXPECT_GT(last, first + 1.0);
+}
+
+}  // namespace
+}  // namespace strata
