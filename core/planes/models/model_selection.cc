@@ -46,12 +46,15 @@ class LeaveOneOut {
         moments_(mixture.planes.size(), Eigen::Matrix4d::Zero()) {
     for (std::uint32_t j = 0; j < mixture.cells().size(); ++j) {
       const MixtureCell& cell = mixture.cells()[j];
+      double sum = std::exp(mixture.ClutterLog());
       for (const Membership& member : mixture.memberships(j)) {
+        sum += std::exp(mixture.CellLog(cell, mixture.planes[member.plane]));
         cells_of_[member.plane].push_back(j);
         if (member.share < 1e-3) continue;
         const double weight = member.share * cell.measurements / cell.variance_m2;
         moments_[member.plane] += MomentsOf(weight, cell.mean, cell.covariance);
       }
+      totals_.push_back(std::log(sum));
     }
   }
 
@@ -121,17 +124,12 @@ class LeaveOneOut {
     return std::max(share, std::exp(mixture_.ClutterLog() - Total(j)));
   }
   // ln of the sum over planes and clutter.
-  double Total(std::uint32_t j) const {
-    double sum = std::exp(mixture_.ClutterLog());
-    for (const Membership& member : mixture_.memberships(j)) {
-      sum += std::exp(mixture_.CellLog(mixture_.cells()[j], mixture_.planes[member.plane]));
-    }
-    return std::log(sum);
-  }
+  double Total(std::uint32_t j) const { return totals_[j]; }
 
   const PlaneMixture& mixture_;
   std::vector<std::vector<std::uint32_t>> cells_of_;  // that may be in it, ascending
-  std::vector<Eigen::Matrix4d> moments_;              // of what is in it, weighted n/ρ²
+  std::vector<double> totals_;
+  std::vector<Eigen::Matrix4d> moments_;  // of what is in it, weighted n/ρ²
 };
 
 // Those of the reductions, best first, that do not touch planes around an earlier one.
