@@ -9,3 +9,8 @@ foreach(table table_7_1 fig_7_9 directions)
   add_test(NAME thesis_${table} COMMAND global_constraints ${table})
   set_tests_properties(thesis_${table} PROPERTIES LABELS smoke TIMEOUT 300 COST 100)
 endforeach()
+strata_executable(
+  plane_models plane_models
+  SOURCES plane_models.cc
+  DEPS strata::planes strata::simulator strata::test_support strata::test_recordings
+)

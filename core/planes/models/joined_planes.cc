@@ -5,14 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
-#include <numeric>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
 
-#include "core/common/disjoint_sets.h"
 #include "core/common/hash_map.h"
 #include "core/common/status.h"
 #include "core/common/stop.h"
@@ -23,9 +22,8 @@
 namespace strata {
 namespace {
 
-constexpr double kJoinCosine = 0.99;  // 8°: beyond that one plane cannot fit both
-constexpr double kJoinSpread = 1.2;   // of one plane, over that of two
-constexpr double kJoinFloorM = 0.02;
+constexpr double kJoinCosine = 0.99;   // 8°: beyond that one plane cannot fit both
+constexpr double kJoinFloorM = 0.02;   // by which a surface may bend
 constexpr double kStraightRad = 0.17;  // of a wall or floor, as of global planes
 constexpr int kSteps = 50;
 
@@ -35,20 +33,24 @@ PlaneKind KindOf(const Eigen::Vector3d& normal) {
   return tilt > M_PI_2 - kStraightRad ? PlaneKind::kWall : PlaneKind::kSloped;
 }
 
-bool AreOne(const SquarePlane& a, const SquarePlane& b) {
-  if (std::abs(a.plane.normal.dot(b.plane.normal)) < kJoinCosine) return false;
-  const Eigen::Matrix4d both = a.moments + b.moments;
-  const double joint = RmsDistance(both, FitMoments(both).plane);
-  const double apart = std::sqrt(
-      (a.moments(3, 3) * std::pow(RmsDistance(a.moments, FitMoments(a.moments).plane), 2) +
-       b.moments(3, 3) * std::pow(RmsDistance(b.moments, FitMoments(b.moments).plane), 2)) /
-      both(3, 3));
-  return joint <= std::max(kJoinFloorM, kJoinSpread * apart);
+// How much more one plane leaves of the surface of each of two than its own does, beside what is
+// allowed; above 1 they are two.
+double Strain(const SquarePlane& a, const SquarePlane& b) {
+  if (std::abs(a.plane.normal.dot(b.plane.normal)) < kJoinCosine) return 2.0;
+  const Plane joint = FitMoments(a.moments + b.moments).plane;
+  double strain = 0.0;
+  for (const SquarePlane* part : {&a, &b}) {
+    const double own = RmsDistance(part->moments, FitMoments(part->moments).plane);
+    const double off = RmsDistance(part->moments, joint);
+    const double allowed = std::max(kJoinFloorM, own);
+    strain = std::max(strain, (off * off - own * own) / (allowed * allowed));
+  }
+  return strain;
 }
 
 void AddTo(SquarePlane& sum, const SquarePlane& part) {
-  if (sum.voxels.empty()) sum.plane = part.plane;
   sum.moments += part.moments;
+  sum.plane = FitMoments(sum.moments).plane;
   sum.measurements += part.measurements;
   sum.information += part.information;
   sum.point_count += part.point_count;
@@ -61,38 +63,58 @@ void AddTo(SquarePlane& sum, const SquarePlane& part) {
   sum.voxels = std::move(all);
 }
 
-// Joined over the borders of squares.
-std::vector<SquarePlane> Joined(const std::vector<std::vector<SquarePlane>>& squares) {
-  std::vector<const SquarePlane*> all;
-  std::vector<std::size_t> square_of;
+struct Match {
+  std::uint32_t a = 0, b = 0;
+  double strain = 0.0;
+};
+
+// Planes that touch and may be one, those first that surely are.
+absl::StatusOr<std::vector<Match>> Matches(const std::vector<SquarePlane>& planes,
+                                           const Stop& stop) {
   HashMap<Voxel, std::vector<std::uint32_t>> at;
-  for (std::size_t s = 0; s < squares.size(); ++s) {
-    for (const SquarePlane& plane : squares[s]) {
-      for (const Voxel voxel : plane.voxels) {
-        at[voxel].push_back(static_cast<std::uint32_t>(all.size()));
-      }
-      all.push_back(&plane);
-      square_of.push_back(s);
-    }
-  }
-  DisjointSets sets;
-  for (std::uint32_t i = 0; i < all.size(); ++i) {
+  std::vector<Match> matches;
+  for (std::uint32_t i = 0; i < planes.size(); ++i) {
+    STRATA_RETURN_IF_ERROR(stop.status());
     HashSet<std::uint32_t> met;
-    for (const Voxel voxel : all[i]->voxels) {
+    for (const Voxel voxel : planes[i].voxels) {
       for (const Voxel around : VoxelsAround(voxel)) {
         const auto found = at.find(around);
         if (found == at.end()) continue;
-        for (const std::uint32_t other : found->second) {
-          if (other >= i || square_of[other] == square_of[i] || !met.insert(other).second) continue;
-          if (AreOne(*all[i], *all[other])) sets.Join(i, other);
-        }
+        met.insert(found->second.begin(), found->second.end());
       }
     }
+    for (const std::uint32_t other : met) {
+      const double strain = Strain(planes[i], planes[other]);
+      if (strain <= 1.0) matches.push_back({other, i, strain});
+    }
+    for (const Voxel voxel : planes[i].voxels) at[voxel].push_back(i);
   }
-  std::vector<SquarePlane> sums(all.size());
-  for (std::size_t i = 0; i < all.size(); ++i) AddTo(sums[sets.Root(i)], *all[i]);
-  std::erase_if(sums, [](const SquarePlane& sum) { return sum.voxels.empty(); });
-  return sums;
+  std::sort(matches.begin(), matches.end(), [](const Match& a, const Match& b) {
+    return std::tie(a.strain, a.a, a.b) < std::tie(b.strain, b.a, b.b);
+  });
+  return matches;
+}
+
+// One plane where a surface was found in parts: over the borders of squares, or around what stands
+// before it. Pair by pair, so that what bends slowly ends where it has bent too far.
+absl::StatusOr<std::vector<SquarePlane>> Joined(
+    const std::vector<std::vector<SquarePlane>>& squares, const Stop& stop) {
+  std::vector<SquarePlane> planes;
+  for (const std::vector<SquarePlane>& square : squares) {
+    planes.insert(planes.end(), square.begin(), square.end());
+  }
+  while (true) {
+    STRATA_ASSIGN_OR_RETURN(const std::vector<Match> matches, Matches(planes, stop));
+    if (matches.empty()) return planes;
+    std::vector<bool> taken(planes.size(), false);
+    for (const Match& match : matches) {
+      if (taken[match.a] || taken[match.b]) continue;
+      taken[match.a] = taken[match.b] = true;
+      AddTo(planes[match.a], planes[match.b]);
+      planes[match.b].voxels.clear();
+    }
+    std::erase_if(planes, [](const SquarePlane& plane) { return plane.voxels.empty(); });
+  }
 }
 
 // A joined plane as one cell of a mixture, so that EM over all planes finds their directions.
@@ -121,7 +143,7 @@ absl::StatusOr<PlaneMixture> WithDirections(const std::vector<SquarePlane>& sums
   for (std::size_t m = 0; m < sums.size(); ++m) {
     const Plane plane = FitMoments(sums[m].moments).plane;
     mixture.planes.push_back({plane, {VoxelOf(mixture.cells()[m].mean)}, 1.0});
-    if (options.directions) mixture.directions.push_back(plane.normal);
+    mixture.AddDirection(plane.normal);
   }
   mixture.Prepare();
   do {
@@ -190,7 +212,7 @@ std::vector<MainDirection> DirectionsOf(const PlaneMixture& mixture,
 absl::StatusOr<JoinedPlanes> JoinSquares(const std::vector<std::vector<SquarePlane>>& squares,
                                          const PlaneModelOptions& options,
                                          const Stop& stop) {
-  std::vector<SquarePlane> sums = Joined(squares);
+  STRATA_ASSIGN_OR_RETURN(std::vector<SquarePlane> sums, Joined(squares, stop));
   std::erase_if(sums,
                 [&](const SquarePlane& sum) { return sum.moments(3, 3) < options.min_area_m2; });
   std::stable_sort(sums.begin(), sums.end(), [](const SquarePlane& a, const SquarePlane& b) {

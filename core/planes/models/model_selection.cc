@@ -6,7 +6,9 @@
 #include <cstdint>
 #include <iterator>
 #include <map>
+#include <numeric>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -24,8 +26,8 @@ namespace strata {
 namespace {
 
 constexpr double kPlaneParameters = 3.0;
-constexpr double kDirectionParameters = 2.0;
-constexpr double kMergeCosine = 0.9;  // between the normals of planes that may be one
+constexpr double kDirectionParameters = 3.0;  // its chance among them
+constexpr double kMergeCosine = 0.9;          // between the normals of planes that may be one
 
 double LogN(const PlaneMixture& mixture) { return std::log(std::max(2.0, mixture.measurements())); }
 
@@ -58,15 +60,16 @@ class LeaveOneOut {
     }
   }
 
-  // The planes that compete for cells with m.
+  // The planes that compete for cells with m, ascending.
   std::vector<std::size_t> Rivals(std::size_t m) const {
-    std::map<std::size_t, double> shared;
-    for (const std::uint32_t j : cells_of_[m]) {
-      for (const Membership& other : mixture_.memberships(j)) shared[other.plane] += 1.0;
-    }
-    shared.erase(m);
     std::vector<std::size_t> rivals;
-    for (const auto& [plane, count] : shared) rivals.push_back(plane);
+    for (const std::uint32_t j : cells_of_[m]) {
+      for (const Membership& other : mixture_.memberships(j)) {
+        if (other.plane != m) rivals.push_back(other.plane);
+      }
+    }
+    std::sort(rivals.begin(), rivals.end());
+    rivals.erase(std::unique(rivals.begin(), rivals.end()), rivals.end());
     return rivals;
   }
 
@@ -132,45 +135,44 @@ class LeaveOneOut {
   std::vector<Eigen::Matrix4d> moments_;  // of what is in it, weighted n/ρ²
 };
 
-// Those of the reductions, best first, that do not touch planes around an earlier one.
-std::vector<Reduction> Independent(const LeaveOneOut& models, std::vector<Reduction> wanted) {
+// Those of the reductions, best first, that do not touch planes around an earlier one; `touched`
+// gets all planes around them.
+std::vector<Reduction> Independent(const LeaveOneOut& models,
+                                   std::vector<Reduction> wanted,
+                                   std::set<std::size_t>& touched) {
   std::stable_sort(wanted.begin(), wanted.end(), [](const Reduction& a, const Reduction& b) {
     return a.bic_change < b.bic_change;
   });
   std::vector<Reduction> taken;
-  std::map<std::size_t, bool> touched;
-  for (const Reduction& one : wanted) {
-    if (touched[one.gone] || (one.into.has_value() && touched[*one.into])) continue;
-    for (const std::size_t rival : models.Rivals(one.gone)) touched[rival] = true;
-    if (one.into.has_value()) {
-      for (const std::size_t rival : models.Rivals(*one.into)) touched[rival] = true;
+  for (Reduction& one : wanted) {
+    if (touched.contains(one.gone) || (one.into.has_value() && touched.contains(*one.into))) {
+      continue;
     }
-    touched[one.gone] = true;
-    taken.push_back(one);
+    const std::vector<std::size_t> around = models.Rivals(one.gone);
+    touched.insert(around.begin(), around.end());
+    touched.insert(one.gone);
+    if (one.into.has_value()) {
+      const std::vector<std::size_t> rivals = models.Rivals(*one.into);
+      touched.insert(rivals.begin(), rivals.end());
+    }
+    taken.push_back(std::move(one));
   }
   return taken;
 }
 
+// Leaves planes that are gone without support, so that the others keep their places.
 void Apply(const std::vector<Reduction>& reductions, PlaneMixture& mixture) {
-  std::vector<bool> gone(mixture.planes.size(), false);
   for (const Reduction& one : reductions) {
-    gone[one.gone] = true;
+    const std::vector<Voxel> more = std::move(mixture.planes[one.gone].voxels);
+    mixture.planes[one.gone].voxels.clear();
     if (!one.into.has_value()) continue;
     MixturePlane& into = mixture.planes[*one.into];
     into.plane = one.plane;
-    const std::vector<Voxel>& more = mixture.planes[one.gone].voxels;
     std::vector<Voxel> all;
     std::set_union(
         into.voxels.begin(), into.voxels.end(), more.begin(), more.end(), std::back_inserter(all));
     into.voxels = std::move(all);
   }
-  std::size_t kept = 0;
-  for (std::size_t m = 0; m < gone.size(); ++m) {
-    if (gone[m]) continue;
-    if (kept != m) mixture.planes[kept] = std::move(mixture.planes[m]);
-    ++kept;
-  }
-  mixture.planes.resize(kept);
 }
 
 }  // namespace
@@ -183,58 +185,76 @@ double Bic(const PlaneMixture& mixture) {
 }
 
 bool DropDirections(PlaneMixture& mixture) {
-  const std::size_t M = mixture.planes.size();
-  std::vector<std::size_t> left(mixture.directions.size());
-  for (std::size_t k = 0; k < left.size(); ++k) left[k] = k;
-  Eigen::MatrixXd density(static_cast<Eigen::Index>(M), static_cast<Eigen::Index>(left.size() + 1));
-  for (std::size_t m = 0; m < M; ++m) {
-    for (std::size_t k = 0; k <= left.size(); ++k) {
-      density(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(k)) =
-          std::exp(mixture.DirectionLog(m, k));
+  const auto M = static_cast<Eigen::Index>(mixture.planes.size());
+  std::vector<std::size_t> left(mixture.chances.size());  // at last none, which stays
+  std::iota(left.begin(), left.end(), 0U);
+  Eigen::MatrixXd density(M, static_cast<Eigen::Index>(left.size()));
+  for (Eigen::Index m = 0; m < M; ++m) {
+    for (std::size_t k = 0; k < left.size(); ++k) {
+      density(m, static_cast<Eigen::Index>(k)) =
+          std::exp(mixture.DirectionLog(static_cast<std::size_t>(m), k));
     }
   }
+  const Eigen::VectorXd none = density.rightCols<1>();
   Eigen::VectorXd sums = density.rowwise().sum();
-  const double none = std::exp(-std::log(2.0 * M_PI));
-  bool dropped = false;
-  while (!left.empty()) {
+  double chances = 1.0;  // of those that are left
+  while (left.size() > 1) {
     double best_change = 0.0;
     std::optional<std::size_t> best;
-    for (std::size_t i = 0; i < left.size(); ++i) {
+    for (std::size_t i = 0; i + 1 < left.size(); ++i) {
       const auto column = density.col(static_cast<Eigen::Index>(left[i])).array();
-      const double loss = (sums.array().log() - (sums.array() - column).max(none).log()).sum();
-      const double change = 2.0 * loss - kDirectionParameters * LogN(mixture);
-      if (change < best_change) {
-        best_change = change;
-        best = i;
-      }
+      const double loss =
+          (sums.array().log() - (sums.array() - column).max(none.array()).log()).sum();
+      // Those that stay share its chance.
+      const double rise = std::log(chances / (chances - mixture.chances[left[i]]));
+      const double change =
+          2.0 * (loss - static_cast<double>(M) * rise) - kDirectionParameters * LogN(mixture);
+      if (change >= best_change) continue;
+      best_change = change;
+      best = i;
     }
     if (!best.has_value()) break;
+    chances -= mixture.chances[left[*best]];
     sums = (sums - density.col(static_cast<Eigen::Index>(left[*best]))).cwiseMax(none);
     left.erase(left.begin() + static_cast<std::ptrdiff_t>(*best));
-    dropped = true;
   }
+  if (left.size() == mixture.chances.size()) return false;
   std::vector<Eigen::Vector3d> kept;
-  for (const std::size_t k : left) kept.push_back(mixture.directions[k]);
+  std::vector<double> kept_chances;
+  for (const std::size_t k : left) {
+    if (k < mixture.directions.size()) kept.push_back(mixture.directions[k]);
+    kept_chances.push_back(mixture.chances[k] / chances);
+  }
   mixture.directions = std::move(kept);
+  mixture.chances = std::move(kept_chances);
   mixture.EStep();
-  return dropped;
+  return true;
 }
 
 absl::StatusOr<bool> DropPlanes(PlaneMixture& mixture, const Stop& stop) {
-  bool dropped = false;
+  std::set<std::size_t> changed;
+  for (std::size_t m = 0; m < mixture.planes.size(); ++m) changed.insert(m);
+  std::map<std::size_t, Reduction> wanted;
   while (true) {
     const LeaveOneOut models(mixture);
-    std::vector<Reduction> wanted;
-    for (std::size_t m = 0; m < mixture.planes.size(); ++m) {
+    for (const std::size_t m : changed) {
       STRATA_RETURN_IF_ERROR(stop.status());
-      Reduction best = models.Best(m);
-      if (best.bic_change < 0.0) wanted.push_back(std::move(best));
+      wanted.erase(m);
+      if (mixture.planes[m].voxels.empty()) continue;
+      const Reduction best = models.Best(m);
+      if (best.bic_change < 0.0) wanted[m] = best;
     }
-    if (wanted.empty()) return dropped;
-    Apply(Independent(models, std::move(wanted)), mixture);
+    if (wanted.empty()) break;
+    std::vector<Reduction> all;
+    for (const auto& [m, reduction] : wanted) all.push_back(reduction);
+    changed.clear();
+    Apply(Independent(models, std::move(all), changed), mixture);
     mixture.Prepare();
-    dropped = true;
   }
+  const std::size_t dropped =
+      std::erase_if(mixture.planes, [](const MixturePlane& plane) { return plane.voxels.empty(); });
+  if (dropped > 0) mixture.Prepare();
+  return dropped > 0;
 }
 
 }  // namespace strata

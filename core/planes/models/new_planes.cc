@@ -150,7 +150,7 @@ absl::StatusOr<std::size_t> AddPlanes(PlaneMixture& mixture,
     }
   }
   for (MixturePlane& plane : added) {
-    mixture.directions.push_back(plane.plane.normal);
+    mixture.AddDirection(plane.plane.normal);
     mixture.planes.push_back(std::move(plane));
   }
   if (!added.empty()) mixture.Prepare();

@@ -22,7 +22,8 @@ constexpr std::int64_t kVoxelOffset = std::int64_t{1} << (kVoxelBits - 1);
 constexpr std::uint64_t kVoxelMask = (std::uint64_t{1} << kVoxelBits) - 1;
 constexpr double kClutterShare = 0.1;  // of the measurements
 constexpr double kSettledGain = 1e-6;  // of the objective, a measurement
-constexpr int kTurns = 3;              // of planes and directions in an M-step
+constexpr std::size_t kMostDirections = 64;
+constexpr int kTurns = 3;  // of planes and directions in an M-step
 
 Voxel VoxelKey(std::int64_t x, std::int64_t y, std::int64_t z) {
   const auto bits = [](std::int64_t v) {
@@ -70,10 +71,24 @@ double PlaneMixture::ClutterLog() const {
 }
 
 double PlaneMixture::DirectionLog(std::size_t m, std::size_t k) const {
-  if (k == directions.size()) return -std::log(2.0 * M_PI);  // even on the half sphere
+  const double chance = std::log(chances[k]);
+  if (k == directions.size()) return chance - std::log(2.0 * M_PI);  // even on the half sphere
   const double cosine = planes[m].plane.normal.dot(directions[k]);
   const double precision = planes[m].weight / std::pow(options_.direction_sigma_rad, 2);
-  return std::log(precision / (2.0 * M_PI)) - 0.5 * precision * (1.0 - cosine * cosine);
+  return chance + std::log(precision / (2.0 * M_PI)) - 0.5 * precision * (1.0 - cosine * cosine);
+}
+
+void PlaneMixture::AddDirection(const Eigen::Vector3d& direction) {
+  if (!options_.directions || directions.size() >= kMostDirections) return;
+  const double near = std::cos(options_.direction_sigma_rad);
+  const bool known = std::any_of(directions.begin(), directions.end(), [&](const auto& other) {
+    return std::abs(other.dot(direction)) > near;
+  });
+  if (known) return;
+  const double chance = 1.0 / static_cast<double>(planes.size() + directions.size() + 2);
+  for (double& other : chances) other *= 1.0 - chance;
+  directions.push_back(direction);
+  chances.insert(chances.end() - 1, chance);
 }
 
 void PlaneMixture::Prepare() {
@@ -122,6 +137,7 @@ void PlaneMixture::EStep() {
   }
   prior_log_ = 0.0;
   if (!options_.directions) return;
+  for (const double chance : chances) prior_log_ += std::log(chance);
   const auto K = static_cast<Eigen::Index>(directions.size());
   beta_.resize(static_cast<Eigen::Index>(planes.size()), K + 1);
   for (Eigen::Index m = 0; m < beta_.rows(); ++m) {
@@ -156,6 +172,13 @@ std::vector<PlaneMixture::Scatter> PlaneMixture::Scatters() const {
 }
 
 void PlaneMixture::MStep() {
+  if (options_.directions) {
+    const Eigen::VectorXd sums = beta_.colwise().sum();
+    const double all = sums.sum() + static_cast<double>(chances.size());
+    for (std::size_t k = 0; k < chances.size(); ++k) {
+      chances[k] = (sums(static_cast<Eigen::Index>(k)) + 1.0) / all;
+    }
+  }
   const std::vector<Scatter> scatters = Scatters();
   const std::vector<MixturePlane> before = planes;
   const double prior = 1.0 / std::pow(options_.direction_sigma_rad, 2);
@@ -196,7 +219,9 @@ double PlaneMixture::ExpectedLogLikelihood() const {
       sum += cells_[j].measurements * member.share * CellLog(cells_[j], planes[member.plane]);
     }
   }
-  for (Eigen::Index m = 0; options_.directions && m < beta_.rows(); ++m) {
+  if (!options_.directions) return sum;
+  for (const double chance : chances) sum += std::log(chance);
+  for (Eigen::Index m = 0; m < beta_.rows(); ++m) {
     for (Eigen::Index k = 0; k < beta_.cols(); ++k) {
       sum += beta_(m, k) * DirectionLog(static_cast<std::size_t>(m), static_cast<std::size_t>(k));
     }

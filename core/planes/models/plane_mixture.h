@@ -67,6 +67,13 @@ class PlaneMixture {
   const MixtureOptions& options() const { return options_; }
   std::vector<MixturePlane> planes;
   std::vector<Eigen::Vector3d> directions;  // φ_k, unit; the sign is arbitrary
+  // Of a plane to have direction k, at last none (the thesis' all are 1/K: two of one main
+  // direction would do better than one). Their logarithms are part of the objective, so that none
+  // gets 0.
+  std::vector<double> chances = {1.0};
+
+  // A main direction, if there is none as near as σ and not too many; it gets a plane's chance.
+  void AddDirection(const Eigen::Vector3d& direction);
 
   // Which cells may be in which planes by their voxels and one around them, the planes' weights,
   // and the E-step. To be called whenever planes came, left or grew; within a run of EM it holds.

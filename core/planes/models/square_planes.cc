@@ -27,8 +27,8 @@ namespace {
 
 constexpr int kMostRounds = 8;
 constexpr int kMostSteps = 40;
-constexpr double kFloorM = 0.01;             // of ρ, beside what is measured
-constexpr double kIndependentAreaM2 = 0.04;  // of surface for a measurement of a plane's place
+constexpr double kFloorM = 0.02;             // of ρ, beside what is measured: waves of a surface
+constexpr double kIndependentAreaM2 = 0.25;  // of surface for a measurement of a plane's place
 constexpr double kStartShare = 0.25;         // of min_area_m2, of a region that begins a plane
 
 PlaneExtractionOptions CellOptions(const PlaneModelOptions& options) {
@@ -48,8 +48,7 @@ MixtureCell MixtureCellOf(const PlanarCell& cell,
   out.mean = cell.mean + shift;
   out.covariance =
       cell.moments.topLeftCorner<3, 3>() / cell.moments(3, 3) - cell.mean * cell.mean.transpose();
-  out.measurements =
-      std::clamp(cell.area_m2 / kIndependentAreaM2, 1.0, static_cast<double>(cell.point_count));
+  out.measurements = std::min(cell.area_m2 / kIndependentAreaM2, 1.0 * cell.point_count);
   const double rho = options.rho_m > 0.0 ? options.rho_m : std::hypot(cell.rms_m, kFloorM);
   out.variance_m2 = rho * rho;
   out.area_m2 = cell.area_m2;
@@ -153,7 +152,7 @@ absl::StatusOr<std::vector<SquarePlane>> FindSquarePlanes(const PosedPoints& poi
   PlaneMixture mixture(std::move(moved), mixing);
   mixture.planes = std::move(start);
   for (const MixturePlane& plane : mixture.planes) {
-    if (options.directions) mixture.directions.push_back(plane.plane.normal);
+    mixture.AddDirection(plane.plane.normal);
   }
   const auto most = static_cast<std::size_t>(options.max_planes);
   STRATA_RETURN_IF_ERROR(FitMixture(most, mixture, stop));

@@ -140,7 +140,7 @@ TEST(PlaneMixture, ObjectiveNeverFalls) {
   }
   PlaneMixture mixture(cells, {});
   mixture.planes = start;
-  for (const MixturePlane& plane : start) mixture.directions.push_back(plane.plane.normal);
+  for (const MixturePlane& plane : start) mixture.AddDirection(plane.plane.normal);
   mixture.Prepare();
   double last = mixture.LogLikelihood();
   const double first = last;
