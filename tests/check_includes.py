@@ -50,7 +50,7 @@ STOREYS = {
     "core/planes": ["models", HERE],
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
     "core/storage": ["sqlite", HERE],
-    "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "ingest", "tiles", "scans", "map"],
+    "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "models", "ingest", "tiles", "scans", "map"],
     "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "job", "mesh", "picture", "terminal"],
 }
 

@@ -10,6 +10,7 @@
 #include "core/world/constraint.h"
 #include "core/world/epoch.h"
 #include "core/world/localization.h"
+#include "core/world/plane_model.h"
 
 namespace strata::cli {
 
@@ -19,6 +20,8 @@ Json ToJson(const api::TileChangeNotice& tile);
 Json ToJson(const api::MapUpdate& update);
 Json ToJson(const Constraint& constraint);
 Json ToJson(const GlobalPlane& plane);
+Json ToJson(const ModelPlane& plane);
+Json ToJson(const PlaneModelInfo& info);
 Json ToJson(const api::PoseLookup& lookup);
 Json ToJson(const LocalizeCandidate& candidate);
 Json ToJson(const LocalizeResult& result);

@@ -32,6 +32,10 @@ Voxel VoxelKey(std::int64_t x, std::int64_t y, std::int64_t z) {
   return bits(x) << (2 * kVoxelBits) | bits(y) << kVoxelBits | bits(z);
 }
 
+std::int64_t Axis(Voxel voxel, int shift) {
+  return static_cast<std::int64_t>(voxel >> shift & kVoxelMask) - kVoxelOffset;
+}
+
 // ln Σ exp of two or more, by their largest.
 double AddLogs(double a, double b) {
   const double most = std::max(a, b);
@@ -46,16 +50,20 @@ Voxel VoxelOf(const Eigen::Vector3d& point) {
 }
 
 std::vector<Voxel> VoxelsAround(Voxel voxel) {
-  const auto axis = [voxel](int shift) {
-    return static_cast<std::int64_t>(voxel >> shift & kVoxelMask) - kVoxelOffset;
-  };
+  const std::int64_t x = Axis(voxel, 2 * kVoxelBits), y = Axis(voxel, kVoxelBits),
+                     z = Axis(voxel, 0);
   std::vector<Voxel> around;
   around.reserve(27);
   for (int k = 0; k < 27; ++k) {
-    around.push_back(VoxelKey(
-        axis(2 * kVoxelBits) + k / 9 - 1, axis(kVoxelBits) + k / 3 % 3 - 1, axis(0) + k % 3 - 1));
+    around.push_back(VoxelKey(x + k / 9 - 1, y + k / 3 % 3 - 1, z + k % 3 - 1));
   }
   return around;
+}
+
+Eigen::AlignedBox3d BoxOf(Voxel voxel) {
+  const auto at = [voxel](int shift) { return kVoxelM * static_cast<double>(Axis(voxel, shift)); };
+  const Eigen::Vector3d corner(at(2 * kVoxelBits), at(kVoxelBits), at(0));
+  return {corner, corner.array() + kVoxelM};
 }
 
 double PlaneMixture::CellLog(const MixtureCell& cell, const MixturePlane& plane) const {

@@ -16,6 +16,7 @@
 
 #include "absl/status/status.h"
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "core/common/hash_map.h"
 #include "core/common/stop.h"
@@ -26,6 +27,7 @@ namespace strata {
 using Voxel = std::uint64_t;  // a cube of kVoxelM in the frame of the cells
 inline constexpr double kVoxelM = 1.0;
 Voxel VoxelOf(const Eigen::Vector3d& point);
+Eigen::AlignedBox3d BoxOf(Voxel voxel);
 // The 27 around it, itself included.
 std::vector<Voxel> VoxelsAround(Voxel voxel);
 
