@@ -125,7 +125,7 @@ void PlaneModelFinder::State::BeginLooking() {
   for (std::uint32_t m = 0; m < joined.planes.size(); ++m) {
     const JoinedPlane& plane = joined.planes[m];
     const PlaneFrame frame = FrameOf(plane.model.plane, FitMoments(plane.sum.moments).mean);
-    FacedPlane one{{plane.model.plane, frame, PlaneRaster(square, 2.0 * square)},
+    FacedPlane one{{plane.model.plane, frame, PlaneRaster(square, 2.0 * square), {}},
                    std::max({kBandM, kBandSigmas * options.rho_m, kBandSigmas * plane.model.rms_m}),
                    0};
     for (const Voxel voxel : plane.sum.voxels) {
