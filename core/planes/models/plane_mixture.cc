@@ -23,6 +23,7 @@ constexpr std::uint64_t kVoxelMask = (std::uint64_t{1} << kVoxelBits) - 1;
 constexpr double kClutterShare = 0.1;  // of the measurements
 constexpr double kSettledGain = 1e-6;  // of the objective, a measurement
 constexpr std::size_t kMostDirections = 64;
+constexpr double kLeastShare = 1e-9;  // of a cell, or it cannot be in the plane
 constexpr int kTurns = 3;  // of planes and directions in an M-step
 
 Voxel VoxelKey(std::int64_t x, std::int64_t y, std::int64_t z) {
@@ -118,6 +119,9 @@ void PlaneMixture::Prepare() {
     for (const std::uint32_t m : found->second) members_[j].push_back({m, 0.0});
   }
   EStep();
+  for (std::vector<Membership>& members : members_) {
+    std::erase_if(members, [](const Membership& member) { return member.share < kLeastShare; });
+  }
   std::vector<double> area(planes.size(), 0.0);
   for (std::size_t j = 0; j < cells_.size(); ++j) {
     for (const Membership& member : members_[j]) {

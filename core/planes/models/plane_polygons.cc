@@ -113,7 +113,7 @@ double CrossedShare(const FlatRing& hole, const PlaneRaster& raster) {
     for (double v = box.min().y() + step / 2; v < box.max().y(); v += step) {
       if (!bg::within(FlatPoint(u, v), polygon)) continue;
       inside += 1.0;
-      if (raster.LooksAt({u, v}) > 0) crossed += 1.0;
+      if (raster.HasLook({u, v})) crossed += 1.0;
     }
   }
   return inside > 0.0 ? crossed / inside : 0.0;
