@@ -1,5 +1,6 @@
 #include "core/planes/models/plane_mixture.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <vector>
