@@ -14,7 +14,7 @@
 #include <boost/geometry/geometries/point_xy.hpp>
 #include <boost/geometry/geometries/polygon.hpp>
 
-#include "core/planes/models/alpha_shape.h"
+#include "core/planes/models/alpha_polygons.h"
 #include "core/planes/models/plane_raster.h"
 
 namespace strata {
@@ -192,7 +192,7 @@ std::vector<PlanePolygon> PolygonsOf(std::span<const SeenPlane> planes,
   const double epsilon = options.epsilon_m;
   const std::vector<MeetingLine> lines = MeetingLines(planes, i, epsilon);
   std::vector<PlanePolygon> polygons;
-  for (const FlatPolygon& shape : AlphaShape(own.raster.Outline(), epsilon)) {
+  for (const FlatPolygon& shape : AlphaPolygons(own.raster.Outline(), epsilon)) {
     if (AreaOf(shape) < options.min_area_m2) break;
     FlatPolygon snapped;
     snapped.outer = Snapped(shape.outer, lines, epsilon);

@@ -10,7 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "core/geometry/primitives.h"
-#include "core/planes/models/alpha_shape.h"
+#include "core/planes/models/alpha_polygons.h"
 #include "core/planes/models/plane_raster.h"
 #include "core/world/plane_model.h"
 

@@ -11,7 +11,7 @@
 
 #include "core/common/stop.h"
 #include "core/geometry/primitives.h"
-#include "core/planes/models/alpha_shape.h"
+#include "core/planes/models/alpha_polygons.h"
 #include "core/world/constraint.h"
 #include "core/world/plane_model.h"
 #include "tests/support/simulator.h"
@@ -57,7 +57,7 @@ TEST(AlphaShape, KeepsAHole) {
     }
   }
   grid.emplace_back(9.0, 9.0);
-  const std::vector<FlatPolygon> shapes = AlphaShape(grid, 0.25);
+  const std::vector<FlatPolygon> shapes = AlphaPolygons(grid, 0.25);
   ASSERT_EQ(shapes.size(), 1U);
   ASSERT_EQ(shapes[0].holes.size(), 1U);
   EXPECT_NEAR(SignedArea(shapes[0].outer), 16.0, 1e-3);
