@@ -48,7 +48,7 @@ PosedPoints WallAndFloor(double turn_rad) {
   return points;
 }
 
-TEST(AlphaShape, KeepsAHole) {
+TEST(AlphaPolygons, KeepAHole) {
   std::vector<Eigen::Vector2d> grid;
   for (int i = 0; i <= 40; ++i) {
     for (int j = 0; j <= 40; ++j) {
