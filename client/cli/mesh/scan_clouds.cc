@@ -9,9 +9,9 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
 #include <Eigen/Core>
 
+#include "client/cli/terminal/world_json.h"
 #include "core/api/scans.h"
 #include "core/common/status.h"
 #include "core/world/map_class.h"
@@ -70,16 +70,10 @@ absl::Status NoScans(Context& context, const MeshOptions& options) {
     return absl::FailedPreconditionError(
         absl::StrCat("map ", options.map, " has no integrated scans: there is nothing to mesh"));
   }
-  return absl::NotFoundError(absl::StrFormat(
-      "no scan of map %s with points reaches into the region; the map lies within (%.1f, %.1f, "
-      "%.1f) and (%.1f, %.1f, %.1f)",
-      options.map,
-      stats.box_min.x(),
-      stats.box_min.y(),
-      stats.box_min.z(),
-      stats.box_max.x(),
-      stats.box_max.y(),
-      stats.box_max.z()));
+  return absl::NotFoundError(absl::StrCat("no scan of map ",
+                                          options.map,
+                                          " with points reaches into the region; the map lies ",
+                                          ExtentOf(stats)));
 }
 
 }  // namespace
