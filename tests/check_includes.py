@@ -50,6 +50,7 @@ STOREYS = {
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
     "core/storage": ["sqlite", HERE],
     "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "ingest", "tiles", "scans", "map"],
+    "client/formats": [HERE, "grid"],
     "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "job", "mesh", "picture", "terminal"],
 }
 
@@ -65,7 +66,7 @@ EXTERNAL = {
     r"prometheus/.*": ["server/metrics"],
     r"pcl/.*": ["core/registration", "core/planes", "core/classification", "core/mesh", "client/formats"],
     r"libqhull_r/.*|meshoptimizer\.h": ["core/mesh"],
-    r"(geotiff/.*|tiffio\.h)": ["client/formats"],
+    r"(geotiff/.*|tiffio\.h)": ["client/formats/grid"],
     r"(thread|mutex|condition_variable)": ["core/engine", "server", "client", "core/common"],
 }
 

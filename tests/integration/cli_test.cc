@@ -74,6 +74,13 @@ TEST_F(VerbsTest, MapsAndTheirFiles) {
     const json written = Json({"map", "export", "m", "--format", format, "--out", file});
     EXPECT_EQ(std::filesystem::file_size(file), written.at("bytes").get<std::size_t>());
   }
+  for (const std::string surface : {"highest", "kalman", "ground"}) {
+    const std::string file = Path(surface + ".tif");
+    const json written =
+        Json({"map", "export", "m", "--format", "geotiff", "--surface", surface, "--out", file});
+    EXPECT_GT(written.at("cells"), 10'000);
+    EXPECT_GT(std::filesystem::file_size(file), 10'000U);
+  }
   EXPECT_EQ(Json({"map", "delete", "m"}).at("deleted"), "m");
   EXPECT_EQ(Json({"map", "list"}).size(), 0U);
 }

@@ -16,8 +16,8 @@
 #include "client/cli/terminal/json.h"
 #include "client/cli/terminal/world_json.h"
 #include "client/formats/file_bytes.h"
-#include "client/formats/local_projection.h"
-#include "client/formats/raster_writer.h"
+#include "client/formats/grid/local_projection.h"
+#include "client/formats/grid/raster_writer.h"
 #include "core/common/status.h"
 #include "core/mls/elevation/elevation_map.h"
 #include "core/mls/elevation/extended_elevation_map.h"
@@ -185,7 +185,6 @@ Json ReportOf(const Raster& raster, const HeightOptions& options) {
       {"high", high},
       {"heights", raster.projection.has_value() ? "above the WGS 84 ellipsoid" : "of the map"}};
   for (const RasterBand& band : raster.bands) report["bands"].push_back(band.name);
-  if (raster.projection.has_value()) report["projection"] = raster.projection->Wkt();
   return report;
 }
 
@@ -227,6 +226,9 @@ absl::Status ExportHeights(Context& context,
   Json report = {{"format", format}};
   STRATA_ASSIGN_OR_RETURN(report["files"], WriteRaster(raster, format, out));
   report.update(ReportOf(raster, options));
+  if (raster.projection.has_value() && context.output.json()) {
+    report["projection"] = raster.projection->Wkt();
+  }
   context.output.Object(report);
   return fetched.damage;
 }

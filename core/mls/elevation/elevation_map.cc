@@ -69,17 +69,18 @@ absl::StatusOr<ElevationMap> Rectangle(const Eigen::Array2d& low,
                                        double cell_size_m) {
   if ((low < -kMaxCell).any() || (low + size > kMaxCell).any() ||
       size.prod() > static_cast<double>(kMaxElevationCells)) {
-    return absl::OutOfRangeError(absl::StrCat("elevation map: the points span ",
-                                              size.x(),
-                                              " × ",
-                                              size.y(),
-                                              " cells from (",
-                                              low.x(),
-                                              ", ",
-                                              low.y(),
-                                              "), at most ",
-                                              kMaxElevationCells,
-                                              " within ±2^30 are made; use larger cells"));
+    return absl::OutOfRangeError(
+        absl::StrCat("elevation map: it would span ",
+                     size.x(),
+                     " × ",
+                     size.y(),
+                     " cells from (",
+                     low.x(),
+                     ", ",
+                     low.y(),
+                     "), at most ",
+                     kMaxElevationCells,
+                     " within ±2^30 are made; take a smaller region or larger cells"));
   }
   ElevationMap map;
   map.cell_size_m = cell_size_m;

@@ -1,4 +1,4 @@
-#include "client/formats/local_projection.h"
+#include "client/formats/grid/local_projection.h"
 
 #include <cmath>
 #include <numbers>

@@ -1,6 +1,6 @@
 // Where on earth the coordinates of a map are that has an origin there.
-#ifndef STRATA_CLIENT_FORMATS_LOCAL_PROJECTION_H_
-#define STRATA_CLIENT_FORMATS_LOCAL_PROJECTION_H_
+#ifndef STRATA_CLIENT_FORMATS_GRID_LOCAL_PROJECTION_H_
+#define STRATA_CLIENT_FORMATS_GRID_LOCAL_PROJECTION_H_
 
 #include <string>
 
@@ -13,8 +13,8 @@ namespace strata {
 // A map's x and y, east and north on the plane that touches the earth at its origin, as the
 // coordinates of a transverse Mercator projection of WGS 84: central meridian and latitude are the
 // origin's, so that grid north is the map's y; the scale there is 1 + altitude / radius, so that
-// lengths are those of the map and not of the ellipsoid below. 10 km from the origin both are
-// 4 mm apart; for what lies z above the origin z / 6371 km of the distance comes on top.
+// lengths are those of the map and not of the ellipsoid below. 10 km from the origin the two are
+// 7 mm apart; for what lies z above the origin z / 6371 km of the distance comes on top.
 class LocalProjection {
  public:
   explicit LocalProjection(const GeodeticOrigin& origin);
@@ -41,4 +41,4 @@ class LocalProjection {
 
 }  // namespace strata
 
-#endif  // STRATA_CLIENT_FORMATS_LOCAL_PROJECTION_H_
+#endif  // STRATA_CLIENT_FORMATS_GRID_LOCAL_PROJECTION_H_

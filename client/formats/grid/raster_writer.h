@@ -1,6 +1,6 @@
 // Numbers on a grid seen from above, as geographic information systems read them.
-#ifndef STRATA_CLIENT_FORMATS_RASTER_WRITER_H_
-#define STRATA_CLIENT_FORMATS_RASTER_WRITER_H_
+#ifndef STRATA_CLIENT_FORMATS_GRID_RASTER_WRITER_H_
+#define STRATA_CLIENT_FORMATS_GRID_RASTER_WRITER_H_
 
 #include <optional>
 #include <string>
@@ -8,7 +8,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "client/formats/local_projection.h"
+#include "client/formats/grid/local_projection.h"
 
 namespace strata {
 
@@ -39,4 +39,4 @@ std::string AscText(const Raster& raster, const RasterBand& band);
 
 }  // namespace strata
 
-#endif  // STRATA_CLIENT_FORMATS_RASTER_WRITER_H_
+#endif  // STRATA_CLIENT_FORMATS_GRID_RASTER_WRITER_H_

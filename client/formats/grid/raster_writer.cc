@@ -1,4 +1,4 @@
-#include "client/formats/raster_writer.h"
+#include "client/formats/grid/raster_writer.h"
 
 #include <array>
 #include <charconv>

@@ -18,7 +18,7 @@
 #include <geotiff/xtiffio.h>
 #include <tiffio.h>
 
-#include "client/formats/raster_writer.h"
+#include "client/formats/grid/raster_writer.h"
 
 namespace strata {
 namespace {
