@@ -1,4 +1,5 @@
-// GeoTiffBytes of raster_writer.h, by libtiff and libgeotiff.
+// GeoTiffBytes of raster_writer.h, by libtiff. The tags that make a TIFF a GeoTIFF are written
+// here: libgeotiff, which would, brings PROJ, its data and its network client.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -13,9 +14,6 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
-#include <geotiff/geotiff.h>
-#include <geotiff/geotiffio.h>
-#include <geotiff/xtiffio.h>
 #include <tiffio.h>
 
 #include "client/formats/grid/raster_writer.h"
@@ -23,9 +21,26 @@
 namespace strata {
 namespace {
 
+// OGC 19-008r4.
+constexpr std::uint32_t kTagPixelScale = 33550;
+constexpr std::uint32_t kTagTiepoint = 33922;
+constexpr std::uint32_t kTagKeys = 34735;
+constexpr std::uint32_t kTagDoubles = 34736;
+constexpr std::uint32_t kTagAscii = 34737;
 // Tags of GDAL that QGIS, rasterio and others know, too.
 constexpr std::uint32_t kTagMetadata = 42112;
 constexpr std::uint32_t kTagNoData = 42113;
+
+TIFFFieldInfo FieldOf(std::uint32_t tag, TIFFDataType type, const char* name) {
+  return {tag,
+          TIFF_VARIABLE,
+          TIFF_VARIABLE,
+          type,
+          FIELD_CUSTOM,
+          1,
+          type != TIFF_ASCII,
+          const_cast<char*>(name)};
+}
 
 // A file in memory that libtiff seeks in.
 struct MemoryFile {
@@ -64,40 +79,31 @@ toff_t SeekMemory(thandle_t handle, toff_t offset, int whence) {
 int CloseMemory(thandle_t /*handle*/) { return 0; }
 toff_t MemorySize(thandle_t handle) { return MemoryFile::Of(handle).bytes.size(); }
 
-using Tiff = std::unique_ptr<TIFF, decltype(&XTIFFClose)>;
+using Tiff = std::unique_ptr<TIFF, decltype(&TIFFClose)>;
 
 Tiff OpenMemory(MemoryFile& file) {
-  TIFF* const tiff = XTIFFClientOpen("memory",
-                                     "w",
-                                     &file,
-                                     ReadMemory,
-                                     WriteMemory,
-                                     SeekMemory,
-                                     CloseMemory,
-                                     MemorySize,
-                                     nullptr,
-                                     nullptr);
-  if (tiff != nullptr) {
-    static constexpr std::array<TIFFFieldInfo, 2> kFields = {
-        TIFFFieldInfo{kTagMetadata,
-                      TIFF_VARIABLE,
-                      TIFF_VARIABLE,
-                      TIFF_ASCII,
-                      FIELD_CUSTOM,
-                      1,
-                      0,
-                      const_cast<char*>("GDAL_METADATA")},
-        TIFFFieldInfo{kTagNoData,
-                      TIFF_VARIABLE,
-                      TIFF_VARIABLE,
-                      TIFF_ASCII,
-                      FIELD_CUSTOM,
-                      1,
-                      0,
-                      const_cast<char*>("GDAL_NODATA")}};
-    TIFFMergeFieldInfo(tiff, kFields.data(), kFields.size());
-  }
-  return Tiff(tiff, &XTIFFClose);
+  // libtiff keeps pointers to them.
+  static const std::array<TIFFFieldInfo, 7> kFields = {
+      FieldOf(kTagPixelScale, TIFF_DOUBLE, "ModelPixelScale"),
+      FieldOf(kTagTiepoint, TIFF_DOUBLE, "ModelTiepoint"),
+      FieldOf(kTagKeys, TIFF_SHORT, "GeoKeyDirectory"),
+      FieldOf(kTagDoubles, TIFF_DOUBLE, "GeoDoubleParams"),
+      FieldOf(kTagAscii, TIFF_ASCII, "GeoAsciiParams"),
+      FieldOf(kTagMetadata, TIFF_ASCII, "GDAL_METADATA"),
+      FieldOf(kTagNoData, TIFF_ASCII, "GDAL_NODATA")};
+  Tiff tiff(TIFFClientOpen("memory",
+                           "w",
+                           &file,
+                           ReadMemory,
+                           WriteMemory,
+                           SeekMemory,
+                           CloseMemory,
+                           MemorySize,
+                           nullptr,
+                           nullptr),
+            &TIFFClose);
+  if (tiff != nullptr) TIFFMergeFieldInfo(tiff.get(), kFields.data(), kFields.size());
+  return tiff;
 }
 
 std::string BandNames(const Raster& raster) {
@@ -132,41 +138,69 @@ void SetTags(const Raster& raster, TIFF* tiff) {
   TIFFSetField(tiff, kTagMetadata, BandNames(raster).c_str());
   TIFFSetField(tiff, kTagNoData, "nan");
   const std::array<double, 3> scale = {raster.cell_size_m, raster.cell_size_m, 0.0};
-  TIFFSetField(tiff, TIFFTAG_GEOPIXELSCALE, 3, scale.data());
+  TIFFSetField(tiff, kTagPixelScale, 3, scale.data());
   const double top_m = raster.y_m + raster.height * raster.cell_size_m;
   const std::array<double, 6> corner = {0.0, 0.0, 0.0, raster.x_m, top_m, 0.0};
-  TIFFSetField(tiff, TIFFTAG_GEOTIEPOINTS, 6, corner.data());
+  TIFFSetField(tiff, kTagTiepoint, 6, corner.data());
 }
+
+// The directory of geo keys, each with a code, a number or a text; by number, as the standard
+// wants.
+class GeoKeys {
+ public:
+  void Code(std::uint16_t key, std::uint16_t code) { Add(key, 0, 1, code); }
+  void Number(std::uint16_t key, double number) {
+    Add(key, kTagDoubles, 1, doubles_.size());
+    doubles_.push_back(number);
+  }
+  void Text(std::uint16_t key, const std::string& text) {
+    Add(key, kTagAscii, text.size() + 1, ascii_.size());
+    ascii_ += text + "|";
+  }
+
+  void Write(TIFF* tiff) {
+    TIFFSetField(tiff, kTagKeys, static_cast<int>(entries_.size()), entries_.data());
+    if (!doubles_.empty()) {
+      TIFFSetField(tiff, kTagDoubles, static_cast<int>(doubles_.size()), doubles_.data());
+    }
+    if (!ascii_.empty()) TIFFSetField(tiff, kTagAscii, ascii_.c_str());
+  }
+
+ private:
+  void Add(std::uint16_t key, std::uint32_t tag, std::size_t count, std::size_t value) {
+    for (const std::size_t number : {std::size_t{key}, std::size_t{tag}, count, value}) {
+      entries_.push_back(static_cast<std::uint16_t>(number));
+    }
+    ++entries_[3];
+  }
+
+  std::vector<std::uint16_t> entries_ = {1, 1, 1, 0};  // version, revision, minor, number of keys
+  std::vector<double> doubles_;
+  std::string ascii_;
+};
 
 // A transverse Mercator projection of its own, which no code stands for.
-void SetProjection(const LocalProjection& projection, GTIF* keys) {
-  const auto set_code = [keys](geokey_t key, int code) {
-    GTIFKeySet(keys, key, TYPE_SHORT, 1, code);
-  };
-  const auto set_number = [keys](geokey_t key, double number) {
-    GTIFKeySet(keys, key, TYPE_DOUBLE, 1, number);
-  };
-  set_code(GTModelTypeGeoKey, ModelTypeProjected);
-  set_code(GeographicTypeGeoKey, GCS_WGS_84);
-  set_code(GeogAngularUnitsGeoKey, Angular_Degree);
-  set_code(ProjectedCSTypeGeoKey, KvUserDefined);
-  GTIFKeySet(keys, PCSCitationGeoKey, TYPE_ASCII, 0, "Strata map");
-  set_code(ProjectionGeoKey, KvUserDefined);
-  set_code(ProjCoordTransGeoKey, CT_TransverseMercator);
-  set_code(ProjLinearUnitsGeoKey, Linear_Meter);
-  set_number(ProjNatOriginLatGeoKey, projection.latitude_deg());
-  set_number(ProjNatOriginLongGeoKey, projection.longitude_deg());
-  set_number(ProjScaleAtNatOriginGeoKey, projection.scale());
-  set_number(ProjFalseEastingGeoKey, 0.0);
-  set_number(ProjFalseNorthingGeoKey, 0.0);
-}
-
-bool SetKeys(const Raster& raster, TIFF* tiff) {
-  const std::unique_ptr<GTIF, decltype(&GTIFFree)> keys(GTIFNew(tiff), &GTIFFree);
-  if (keys == nullptr) return false;
-  GTIFKeySet(keys.get(), GTRasterTypeGeoKey, TYPE_SHORT, 1, RasterPixelIsArea);
-  if (raster.projection.has_value()) SetProjection(*raster.projection, keys.get());
-  return GTIFWriteKeys(keys.get()) != 0;
+void SetKeys(const Raster& raster, TIFF* tiff) {
+  constexpr std::uint16_t kUserDefined = 32767;
+  GeoKeys keys;
+  if (raster.projection.has_value()) keys.Code(1024, 1);  // model: projected
+  keys.Code(1025, 1);                                     // pixels are areas
+  if (raster.projection.has_value()) {
+    const LocalProjection& projection = *raster.projection;
+    keys.Code(2048, 4326);  // geodetic system: WGS 84
+    keys.Code(2054, 9102);  // of angles: degree
+    keys.Code(3072, kUserDefined);
+    keys.Text(3073, "Strata map");
+    keys.Code(3074, kUserDefined);
+    keys.Code(3075, 1);     // method: transverse Mercator
+    keys.Code(3076, 9001);  // of lengths: metre
+    keys.Number(3080, projection.longitude_deg());
+    keys.Number(3081, projection.latitude_deg());
+    keys.Number(3082, 0.0);  // false easting
+    keys.Number(3083, 0.0);  // false northing
+    keys.Number(3092, projection.scale());
+  }
+  keys.Write(tiff);
 }
 
 bool WriteBands(const Raster& raster, TIFF* tiff) {
@@ -196,7 +230,8 @@ absl::StatusOr<std::string> GeoTiffBytes(const Raster& raster) {
   Tiff tiff = OpenMemory(file);
   if (tiff == nullptr) return absl::InternalError("geotiff: libtiff does not begin a file");
   SetTags(raster, tiff.get());
-  const bool written = SetKeys(raster, tiff.get()) && WriteBands(raster, tiff.get());
+  SetKeys(raster, tiff.get());
+  const bool written = WriteBands(raster, tiff.get());
   tiff.reset();
   if (!written) return absl::InternalError("geotiff: libtiff does not write the numbers");
   return std::move(file.bytes);

@@ -155,6 +155,32 @@ TEST(ExtendedElevationMapTest, AGapWithoutGroundIsNotPassable) {
   EXPECT_FALSE(hedge.passable());
 }
 
+TEST(ExtendedElevationMapTest, WhatWasSeenFromBelowOnlyIsNoGround) {
+  SurfaceTile ceiling;
+  ceiling.key = {0, 0, 0};
+  for (int y = 0; y < 12; ++y) {
+    for (int x = 0; x < 12; ++x) {
+      const std::uint16_t cell = CellInTile({x, y});
+      const bool below = x < 6;
+      if (below) ceiling.surfaces.push_back({.cell = cell, .z_m = 0.0F, .sigma_m = 0.004F});
+      ceiling.surfaces.push_back({.cell = cell,
+                                  .traversability = Traversability::kUnderside,
+                                  .z_m = 3.0F,
+                                  .sigma_m = 0.004F});
+    }
+  }
+  ceiling.IndexRows();
+  STRATA_ASSERT_OK_AND_ASSIGN(const ExtendedElevationMap map,
+                              MakeExtendedElevationMap({ceiling}, kCell, {}));
+  EXPECT_EQ(map.Find({3, 6})->elevation_class, ElevationClass::kGap);
+  EXPECT_EQ(map.Find({3, 6})->z_m, 0.0F);
+  EXPECT_EQ(map.Find({9, 6})->elevation_class, ElevationClass::kNonTraversable);
+  const Stop stop;
+  stop.Request();
+  EXPECT_EQ(MakeExtendedElevationMap({ceiling}, kCell, {}, stop).status().code(),
+            absl::StatusCode::kCancelled);
+}
+
 // The world of Fig. 6.1: flat ground, a road under a bridge (|x| ≤ 2, along y) whose deck, 3.0 to
 // 3.4 m high, is reached by earth ramps from x = ±14, with retaining walls below its ends.
 double RoadHeight(double x) {
