@@ -66,7 +66,7 @@ EXTERNAL = {
     r"prometheus/.*": ["server/metrics"],
     r"pcl/.*": ["core/registration", "core/planes", "core/classification", "core/mesh", "client/formats"],
     r"libqhull_r/.*|meshoptimizer\.h": ["core/mesh"],
-    r"tiffio\.h": ["client/formats/grid"],
+    r"tiffio\.h|octomap/.*": ["client/formats/grid"],
     r"(thread|mutex|condition_variable)": ["core/engine", "server", "client", "core/common"],
 }
 

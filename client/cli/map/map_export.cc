@@ -16,6 +16,7 @@
 #include "client/cli/map/floor_files.h"
 #include "client/cli/map/height_files.h"
 #include "client/cli/map/map_files.h"
+#include "client/cli/map/octree_files.h"
 #include "client/cli/map/tile_source.h"
 #include "client/cli/picture/map_picture.h"
 #include "client/cli/terminal/arguments.h"
@@ -193,9 +194,12 @@ absl::Status Export(Context& context, const ExportOptions& options) {
     heights.level = options.level;
     return ExportHeights(context, options.map, heights, options.format, options.out);
   }
+  if (options.format == "bt") {
+    return ExportOctree(context, options.map, {options.level, options.heights.region}, options.out);
+  }
   if (options.heights.region.has_value()) {
     return absl::InvalidArgumentError(
-        "--region is for --format geotiff, asc; map mesh has one, too");
+        "--region is for --format geotiff, asc, bt; map mesh has one, too");
   }
   const bool points = options.format == "pcd";
   absl::Status damage;
@@ -234,7 +238,8 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
       noun,
       "export",
       "Write a map for other programs: its surfaces as a mesh (ply, obj, stl, glb), the points of "
-      "its scans (pcd), its floors as grids (nav2), or one height a cell (geotiff, asc)",
+      "its scans (pcd), its floors as grids (nav2), one height a cell (geotiff, asc), or free and "
+      "occupied space (bt)",
       "strata map export campus --format ply --out campus.ply",
       [options](Context& context) { return Export(context, *options); });
   AddMapName(app, options->map);
@@ -248,8 +253,8 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
          "and label; nav2: a picture (pgm) and a yaml file for map_server, of one floor or a pair "
          "each of all; geotiff: heights and their standard deviation as bands, on earth where the "
          "map has an origin; asc: the same as ESRI ASCII grids, FILE.asc and FILE-sigma.asc, with "
-         ".prj")
-      ->check(CLI::IsMember({"ply", "obj", "stl", "glb", "pcd", "nav2", "geotiff", "asc"}))
+         ".prj; bt: an octree of OctoMap, of what the scans' rays hit and went through")
+      ->check(CLI::IsMember({"ply", "obj", "stl", "glb", "pcd", "nav2", "geotiff", "asc", "bt"}))
       ->required();
   app->add_option("--out", options->out, "The file to write")->type_name("FILE")->required();
   AddNumbers(
@@ -282,7 +287,8 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
       ->check(CLI::IsMember({"highest", "kalman", "ground"}))
       ->capture_default_str();
   AddRegion(app, options->heights.region);
-  app->add_option("--level", options->level, "Level of detail of a mesh or heights, 0 = finest")
+  app->add_option(
+         "--level", options->level, "Level of detail of a mesh, heights or octree, 0 = finest")
       ->check(CLI::Range(0, kMaxLevel))
       ->capture_default_str();
 }

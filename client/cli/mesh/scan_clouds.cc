@@ -31,13 +31,13 @@ void DropPoints(PointCloud& cloud, const Drop& drop) {
 }
 
 absl::Status DroppedPoints(const std::string& map) {
-  return absl::FailedPreconditionError(absl::StrCat(
-      "map ",
-      map,
-      " has dropped the points of its scans: there is nothing to mesh but its surfaces, which "
-      "strata map export ",
-      map,
-      " --format ply writes"));
+  return absl::FailedPreconditionError(
+      absl::StrCat("map ",
+                   map,
+                   " has dropped the points of its scans; what is left are its surfaces, which "
+                   "strata map export ",
+                   map,
+                   " --format ply writes"));
 }
 
 // Those that are integrated and may have points in the region.
@@ -68,7 +68,7 @@ absl::Status NoScans(Context& context, const MeshOptions& options) {
                           context.database.maps().Stats(context.call, options.map));
   if (stats.scans == stats.scans_pending + stats.scans_failed) {
     return absl::FailedPreconditionError(
-        absl::StrCat("map ", options.map, " has no integrated scans: there is nothing to mesh"));
+        absl::StrCat("map ", options.map, " has no integrated scans: import some, or wait"));
   }
   return absl::NotFoundError(absl::StrCat("no scan of map ",
                                           options.map,

@@ -1,4 +1,4 @@
-// strata map export --format geotiff|asc, as its users run it.
+// strata map export --format geotiff|asc|bt, as its users run it.
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -241,6 +241,24 @@ TEST_F(MapHeightsTest, WithAnOriginHeightsAreAboveTheEllipsoid) {
   for (const auto& [x, y] : {std::pair(0.1, 0.1), std::pair(0.1, -18.1)}) {
     EXPECT_NEAR(b.values.at(b.At(x, y)), a.values.at(a.At(x, y)) + 34.0, 1e-3);
   }
+}
+
+TEST_F(MapHeightsTest, OctreesHaveFreeSpace) {
+  const json all = Export("bridge", {"--format", "bt"}, "bridge.bt");
+  EXPECT_EQ(std::filesystem::file_size(Path("bridge.bt")), all.at("bytes").get<std::size_t>());
+  EXPECT_GT(all.at("free_m3"), 10.0 * all.at("occupied_m3").get<double>());
+  // Between road and deck, both out of it.
+  const json under = Export("bridge", {"--format", "bt", "--region=-2,-2,2,2,0.5,2.7"}, "under.bt");
+  EXPECT_EQ(under.at("occupied_m3"), 0.0);
+  EXPECT_NEAR(under.at("free_m3").get<double>(), 4.0 * 4.0 * 2.2, 2.0);
+  EXPECT_NEAR(
+      Export("bridge", {"--format", "bt", "--level", "1"}, "coarse.bt").at("voxel_m").get<double>(),
+      0.4,
+      1e-9);
+  EXPECT_THAT(Refusal({"empty", "--format", "bt", "--out", Path("no.bt")}), HasSubstr("empty"));
+  EXPECT_THAT(
+      Refusal({"bridge", "--format", "bt", "--out", Path("no.bt"), "--region", "500,500,501,501"}),
+      HasSubstr("the map lies within"));
 }
 
 TEST_F(MapHeightsTest, WhatCannotBeExportedSaysWhy) {
