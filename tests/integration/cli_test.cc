@@ -81,6 +81,9 @@ TEST_F(VerbsTest, MapsAndTheirFiles) {
     EXPECT_GT(written.at("cells"), 10'000);
     EXPECT_GT(std::filesystem::file_size(file), 10'000U);
   }
+  const json octree =
+      Json({"map", "export", "m", "--format", "bt", "--region=-3,-3,3,3", "--out", Path("m.bt")});
+  EXPECT_EQ(std::filesystem::file_size(Path("m.bt")), octree.at("bytes").get<std::size_t>());
   EXPECT_EQ(Json({"map", "delete", "m"}).at("deleted"), "m");
   EXPECT_EQ(Json({"map", "list"}).size(), 0U);
 }
