@@ -35,7 +35,7 @@ ARROWS = {
                "core/common"],
     "client/sdk": ["proto", "core/api", "core/codec", "core/world", "core/mls", "core/cloud", "core/geometry",
                    "core/common"],
-    "client/formats": ["core/posegraph", "core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
+    "client/formats": ["core/posegraph", "core/world", "core/mls", "core/mesh", "core/cloud", "core/geometry", "core/common"],
     "client/cli": ["client/sdk", "client/formats", "core/api", "core/engine", "core/codec", "core/registration",
                    "core/classification", "core/posegraph", "core/world", "core/mls", "core/mesh", "core/cloud", "core/geometry",
                    "core/common"],
@@ -66,7 +66,7 @@ EXTERNAL = {
     r"prometheus/.*": ["server/metrics"],
     r"pcl/.*": ["core/registration", "core/planes", "core/classification", "core/mesh", "client/formats"],
     r"libqhull_r/.*|meshoptimizer\.h": ["core/mesh"],
-    r"tiffio\.h|octomap/.*": ["client/formats/grid"],
+    r"tiffio\.h": ["client/formats/grid"],
     r"(thread|mutex|condition_variable)": ["core/engine", "server", "client", "core/common"],
 }
 

@@ -12,6 +12,7 @@
 #include "client/formats/file_bytes.h"
 #include "client/formats/grid/octree_writer.h"
 #include "core/common/status.h"
+#include "core/mesh/occupancy_voxels.h"
 #include "core/world/map_info.h"
 
 namespace strata::cli {
@@ -26,28 +27,31 @@ absl::Status ExportOctree(Context& context,
   which.map = map;
   which.region = options.region;
   STRATA_ASSIGN_OR_RETURN(const ScanClouds clouds, ScanClouds::Find(context, which));
-  OctreeWriter octree(voxel_m, options.region);
+  OccupancyVoxelsOptions grid_options;
+  grid_options.voxel_m = voxel_m;
+  if (options.region.has_value()) grid_options.region = *options.region;
+  STRATA_RETURN_IF_ERROR(grid_options.Validate());
+  OccupancyVoxels grid(grid_options);
   Progress progress(context.output.talk(), TalksToTerminal(), "rays");
   for (std::size_t i = 0; i < clouds.size(); ++i) {
     progress.Update(static_cast<double>(i) / static_cast<double>(clouds.size()), "free space");
     STRATA_ASSIGN_OR_RETURN(const PosedCloud posed, clouds.Read(context, i));
     STRATA_RETURN_IF_ERROR(
-        octree.Add(posed.cloud, posed.T_mesh_scan, posed.sensor, context.call.stop));
+        grid.Add(posed.cloud, posed.T_mesh_scan, posed.sensor, context.call.stop));
   }
-  const OctreeWriter::Extent extent = octree.Finish();
-  if (extent.nodes == 0) {
+  const OctreeFile octree = BtFile(grid);
+  if (octree.nodes == 0) {
     return absl::NotFoundError(absl::StrCat("no ray of map ", map, " crosses the region"));
   }
-  STRATA_ASSIGN_OR_RETURN(const std::string bytes, octree.BtBytes());
-  STRATA_RETURN_IF_ERROR(WriteFileBytes(out, bytes));
+  STRATA_RETURN_IF_ERROR(WriteFileBytes(out, octree.bytes));
   context.output.Object({{"file", out},
                          {"format", "bt"},
                          {"voxel_m", voxel_m},
                          {"scans", clouds.size()},
-                         {"nodes", extent.nodes},
-                         {"occupied_m3", extent.occupied_m3},
-                         {"free_m3", extent.free_m3},
-                         {"bytes", bytes.size()}});
+                         {"nodes", octree.nodes},
+                         {"occupied_m3", octree.occupied_m3},
+                         {"free_m3", octree.free_m3},
+                         {"bytes", octree.bytes.size()}});
   return absl::OkStatus();
 }
 

@@ -19,7 +19,7 @@ struct OctreeOptions {
 };
 
 // Writes what the rays of the map's scans hit and went through; shows progress. Errors of
-// ScanClouds::Find and OctreeWriter, and NOT_FOUND for a region that no ray crosses.
+// ScanClouds::Find and OccupancyVoxels, and NOT_FOUND for a region that no ray crosses.
 absl::Status ExportOctree(Context& context,
                           const std::string& map,
                           const OctreeOptions& options,

@@ -1,191 +1,125 @@
 #include "client/formats/grid/octree_writer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <sstream>
+#include <cstdint>
 #include <utility>
+#include <vector>
 
-#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include <octomap/octomap.h>
 
-#include "core/common/status.h"
+#include "core/mesh/voxel_blocks.h"
 
 namespace strata {
 namespace {
 
-octomap::point3d PointOf(const Eigen::Vector3d& p) {
-  const Eigen::Vector3f f = p.cast<float>();
-  return {f.x(), f.y(), f.z()};
+// What two bits say of a child: an Occupancy, or that it has children itself.
+constexpr int kDivided = 3;
+
+constexpr int kLevels = 16;  // of OctoMap
+constexpr int kLevelsOfBlocks = kLevels - 3;
+
+// The ways down the octree to a block, three bits a level, x the lowest: blocks in this order are
+// in the file's.
+std::uint64_t WayTo(const BlockKey& key) {
+  constexpr int kShift = 1 << (kLevelsOfBlocks - 1);  // OctoMap counts from the corner
+  std::uint64_t way = 0;
+  for (int bit = kLevelsOfBlocks - 1; bit >= 0; --bit) {
+    const auto of = [bit](std::int32_t at) {
+      return static_cast<std::uint64_t>(at + kShift) >> bit & 1U;
+    };
+    way = way << 3 | of(key.z) << 2 | of(key.y) << 1 | of(key.x);
+  }
+  return way;
 }
 
-// The voxels whose middles lie in a region.
-struct KeyBox {
-  Eigen::Array3i low = Eigen::Array3i::Zero();
-  Eigen::Array3i high = Eigen::Array3i::Constant(65'536);  // not in it
+class BtWriter {
+ public:
+  explicit BtWriter(const OccupancyVoxels& grid) : grid_(grid) {
+    for (std::size_t i = 0; i < grid.keys().size(); ++i) {
+      blocks_.emplace_back(WayTo(grid.keys()[i]), i);
+    }
+    std::sort(blocks_.begin(), blocks_.end());
+  }
 
-  KeyBox() = default;
-  KeyBox(const Eigen::AlignedBox3d& region, double voxel_m)
-      : low(KeyAbove(region.min(), voxel_m)), high(KeyAbove(region.max(), voxel_m)) {}
-
-  bool Has(const octomap::OcTreeKey& key) const {
-    const Eigen::Array3i k(key[0], key[1], key[2]);
-    return (k >= low).all() && (k < high).all();
+  OctreeFile Write() {
+    const bool any = Above(blocks_.begin(), blocks_.end(), 0) == kDivided;
+    OctreeFile file;
+    file.nodes = any ? nodes_ + 1 : 0;
+    file.bytes =
+        absl::StrFormat("# Octomap OcTree binary file\nid OcTree\nsize %d\nres %.15g\ndata\n",
+                        file.nodes,
+                        grid_.voxel_m()) +
+        data_;
+    const double voxel_m3 = std::pow(grid_.voxel_m(), 3);
+    file.free_m3 = voxel_m3 * static_cast<double>(free_);
+    file.occupied_m3 = voxel_m3 * static_cast<double>(occupied_);
+    return file;
   }
 
  private:
-  // That of the lowest voxel whose middle is not below p.
-  static Eigen::Array3i KeyAbove(const Eigen::Vector3d& p, double voxel_m) {
-    const Eigen::Array3d key = (p.array() / voxel_m - 0.5).ceil() + 32'768.0;
-    return key.max(0.0).min(65'536.0).cast<int>();
-  }
-};
+  using Blocks = std::vector<std::pair<std::uint64_t, std::size_t>>;
+  using Place = Blocks::const_iterator;
 
-struct Ray {
-  Eigen::Vector3d from;
-  Eigen::Vector3d to;
-};
-
-// The part of the ray that lies in the box; false if none does.
-bool Clip(const Eigen::AlignedBox3d& box, Ray& ray) {
-  const Eigen::Vector3d along = ray.to - ray.from;
-  double begin = 0.0;
-  double end = 1.0;
-  for (int i = 0; i < 3; ++i) {
-    if (along[i] == 0.0) {
-      if (ray.from[i] < box.min()[i] || ray.from[i] > box.max()[i]) return false;
-      continue;
+  // A node whose children are what `child` says of each; what is to be said of it.
+  template <typename Child>
+  int Node(const Child& child) {
+    const std::size_t place = data_.size();
+    data_.append(2, '\0');
+    std::array<int, 8> kinds{};
+    for (int i = 0; i < 8; ++i) kinds[i] = child(i);
+    const bool alike = std::count(kinds.begin(), kinds.end(), kinds[0]) == 8;
+    if (alike && kinds[0] != kDivided) {
+      data_.resize(place);
+      return kinds[0];
     }
-    const double a = (box.min()[i] - ray.from[i]) / along[i];
-    const double b = (box.max()[i] - ray.from[i]) / along[i];
-    begin = std::max(begin, std::min(a, b));
-    end = std::min(end, std::max(a, b));
+    for (int i = 0; i < 8; ++i) {
+      data_[place + i / 4] = static_cast<char>(data_[place + i / 4] | kinds[i] << 2 * (i % 4));
+      nodes_ += kinds[i] != 0;
+    }
+    return kDivided;
   }
-  if (begin >= end) return false;
-  ray = {ray.from + begin * along, ray.from + end * along};
-  return true;
-}
+
+  // A node `level` below the root, over some blocks.
+  int Above(Place begin, Place end, int level) {
+    if (begin == end) return static_cast<int>(Occupancy::kUnknown);
+    if (level == kLevelsOfBlocks) {
+      block_ = grid_.block(begin->second);
+      free_ += std::count(block_.begin(), block_.end(), Occupancy::kFree);
+      occupied_ += std::count(block_.begin(), block_.end(), Occupancy::kOccupied);
+      return Within({0, 0, 0}, kBlockEdge);
+    }
+    const int shift = 3 * (kLevelsOfBlocks - 1 - level);
+    return Node([&](int i) {
+      const Place first = begin;
+      begin = std::find_if(begin, end, [&](const auto& block) {
+        return (block.first >> shift & 7U) != static_cast<std::uint64_t>(i);
+      });
+      return Above(first, begin, level + 1);
+    });
+  }
+
+  // A cube of voxels of the block at hand.
+  int Within(const Eigen::Vector3i& at, int edge) {
+    if (edge == 1) return static_cast<int>(block_[NodeInBlock(at)]);
+    const int half = edge / 2;
+    return Node([&](int i) {
+      return Within(at + half * Eigen::Vector3i(i & 1, i >> 1 & 1, i >> 2), half);
+    });
+  }
+
+  const OccupancyVoxels& grid_;
+  Blocks blocks_;  // in the file's order
+  OccupancyBlock block_{};
+  std::string data_;
+  std::size_t nodes_ = 0;
+  std::ptrdiff_t free_ = 0;
+  std::ptrdiff_t occupied_ = 0;
+};
 
 }  // namespace
 
-struct OctreeWriter::Tree {
-  Tree(double voxel_m, const std::optional<Eigen::AlignedBox3d>& box)
-      : octree(voxel_m), region(box) {
-    if (region.has_value()) inside = KeyBox(*region, voxel_m);
-  }
-
-  void Cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& p);
-  void Apply();
-  absl::Status Shrink();
-
-  octomap::OcTree octree;
-  std::optional<Eigen::AlignedBox3d> region;
-  KeyBox inside;
-  octomap::KeySet hit;  // of the scan at hand
-  octomap::KeySet missed;
-  octomap::KeySet beyond;  // where rays end outside the region
-  octomap::KeyRay ray;
-  std::size_t nodes_when_pruned = 0;
-};
-
-void OctreeWriter::Tree::Cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& p) {
-  const octomap::OcTreeKey end = octree.coordToKey(PointOf(p));
-  if (!(inside.Has(end) ? hit : beyond).insert(end).second) return;
-  Ray part = {origin, p};
-  if (region.has_value() && !Clip(*region, part)) return;
-  if (!octree.computeRayKeys(PointOf(part.from), PointOf(part.to), ray)) return;
-  for (const octomap::OcTreeKey& key : ray) {
-    if (inside.Has(key)) missed.insert(key);
-  }
-}
-
-void OctreeWriter::Tree::Apply() {
-  constexpr bool kLazy = true;  // inner nodes follow at the end
-  for (const octomap::OcTreeKey& key : missed) {
-    if (hit.count(key) == 0) octree.updateNode(key, false, kLazy);
-  }
-  for (const octomap::OcTreeKey& key : hit) octree.updateNode(key, true, kLazy);
-  for (octomap::KeySet* keys : {&hit, &missed, &beyond}) keys->clear();
-}
-
-// Puts equal voxels together once there are twice as many.
-absl::Status OctreeWriter::Tree::Shrink() {
-  if (octree.size() < std::max<std::size_t>(2 * nodes_when_pruned, kMaxOctreeNodes / 10)) {
-    return absl::OkStatus();
-  }
-  octree.updateInnerOccupancy();
-  octree.prune();
-  nodes_when_pruned = octree.size();
-  if (nodes_when_pruned <= kMaxOctreeNodes) return absl::OkStatus();
-  return absl::ResourceExhaustedError(
-      absl::StrCat("octree: ",
-                   nodes_when_pruned,
-                   " nodes; at most ",
-                   kMaxOctreeNodes,
-                   " are made: take a smaller region or larger voxels"));
-}
-
-OctreeWriter::OctreeWriter(double voxel_m, const std::optional<Eigen::AlignedBox3d>& region)
-    : tree_(std::make_unique<Tree>(voxel_m, region)) {}
-OctreeWriter::~OctreeWriter() = default;
-
-absl::Status OctreeWriter::Add(const PointCloud& cloud,
-                               const Pose& T_map_scan,
-                               const SensorModel& sensor,
-                               const Stop& stop) {
-  constexpr std::size_t kRaysBetweenStops = 4096;
-  Tree& tree = *tree_;
-  const double voxel_m = tree.octree.getResolution();
-  const double farthest_m = 32'767.0 * voxel_m;
-  const Eigen::Vector3d origin = T_map_scan * (cloud.origin + cloud.sensor_origin.cast<double>());
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    if (i % kRaysBetweenStops == 0) STRATA_RETURN_IF_ERROR(stop.status());
-    if (!cloud.points[i].allFinite()) continue;
-    if (!sensor.Takes((cloud.points[i] - cloud.sensor_origin).cast<double>().norm())) continue;
-    const Eigen::Vector3d p = T_map_scan * (cloud.origin + cloud.points[i].cast<double>());
-    if (p.cwiseAbs().maxCoeff() > farthest_m || origin.cwiseAbs().maxCoeff() > farthest_m) {
-      return absl::OutOfRangeError(absl::StrCat("octree: a point at (",
-                                                p.x(),
-                                                ", ",
-                                                p.y(),
-                                                ", ",
-                                                p.z(),
-                                                ") is beyond ",
-                                                farthest_m,
-                                                " m, which voxels of ",
-                                                voxel_m,
-                                                " m reach; take larger ones"));
-    }
-    tree.Cast(origin, p);
-  }
-  tree.Apply();
-  return tree.Shrink();
-}
-
-OctreeWriter::Extent OctreeWriter::Finish() {
-  octomap::OcTree& octree = tree_->octree;
-  octree.updateInnerOccupancy();
-  octree.toMaxLikelihood();
-  octree.prune();
-  Extent extent;
-  extent.nodes = octree.size();
-  for (auto leaf = octree.begin_leafs(); leaf != octree.end_leafs(); ++leaf) {
-    (octree.isNodeOccupied(*leaf) ? extent.occupied_m3 : extent.free_m3) +=
-        std::pow(leaf.getSize(), 3);
-  }
-  return extent;
-}
-
-// The head is written here: OctoMap's function for whole files talks on stderr.
-absl::StatusOr<std::string> OctreeWriter::BtBytes() const {
-  const octomap::OcTree& octree = tree_->octree;
-  std::ostringstream bytes;
-  bytes << absl::StrFormat("# Octomap OcTree binary file\nid OcTree\nsize %d\nres %.15g\ndata\n",
-                           octree.size(),
-                           octree.getResolution());
-  octree.writeBinaryData(bytes);
-  if (!bytes.good()) return absl::InternalError("octree: OctoMap does not write it");
-  return std::move(bytes).str();
-}
+OctreeFile BtFile(const OccupancyVoxels& grid) { return BtWriter(grid).Write(); }
 
 }  // namespace strata

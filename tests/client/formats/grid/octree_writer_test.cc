@@ -3,12 +3,9 @@
 
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <random>
-#include <set>
 #include <sstream>
 #include <string>
-#include <tuple>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -18,6 +15,7 @@
 #include "core/cloud/sensor_model.h"
 #include "core/common/stop.h"
 #include "core/geometry/pose.h"
+#include "core/mesh/occupancy_voxels.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {
@@ -47,19 +45,34 @@ PointCloud Wall() {
   return cloud;
 }
 
-void ReadBack(OctreeWriter& writer, octomap::OcTree& tree) {
-  writer.Finish();
-  STRATA_ASSERT_OK_AND_ASSIGN(const std::string bytes, writer.BtBytes());
-  EXPECT_THAT(bytes, ::testing::StartsWith("# Octomap OcTree binary file"));
-  std::istringstream file(bytes);
+OccupancyVoxels GridOf(double voxel_m) {
+  OccupancyVoxelsOptions options;
+  options.voxel_m = voxel_m;
+  return OccupancyVoxels(options);
+}
+
+void ReadBack(const OccupancyVoxels& grid, octomap::OcTree& tree) {
+  const OctreeFile written = BtFile(grid);
+  std::istringstream file(written.bytes);
   ASSERT_TRUE(tree.readBinary(file));
+  EXPECT_EQ(tree.size(), written.nodes);
+  EXPECT_EQ(tree.calcNumNodes(), written.nodes);
+  octomap::OcTree pruned(tree);
+  pruned.prune();
+  EXPECT_EQ(pruned.size(), written.nodes);  // nothing is left to put together
+  double occupied = 0.0, free = 0.0;
+  for (auto leaf = tree.begin_leafs(); leaf != tree.end_leafs(); ++leaf) {
+    (tree.isNodeOccupied(*leaf) ? occupied : free) += std::pow(leaf.getSize(), 3);
+  }
+  EXPECT_NEAR(occupied, written.occupied_m3, 1e-6 * (1.0 + occupied));
+  EXPECT_NEAR(free, written.free_m3, 1e-6 * (1.0 + free));
 }
 
 TEST(OctreeWriterTest, FreeBeforeAWallUnknownBehind) {
-  OctreeWriter writer(0.1, std::nullopt);
-  STRATA_ASSERT_OK(writer.Add(Wall(), Pose::Identity(), {}, Stop()));
+  OccupancyVoxels grid = GridOf(0.1);
+  STRATA_ASSERT_OK(grid.Add(Wall(), Pose::Identity(), {}, Stop()));
   octomap::OcTree tree(1.0);
-  ReadBack(writer, tree);
+  ReadBack(grid, tree);
   EXPECT_NEAR(tree.getResolution(), 0.1, 1e-12);
   for (const double y : {-1.5, 0.0, 1.5}) {
     EXPECT_EQ(At(tree, 4.05, y, 1.0), Space::kOccupied) << y;
@@ -71,12 +84,12 @@ TEST(OctreeWriterTest, FreeBeforeAWallUnknownBehind) {
 }
 
 TEST(OctreeWriterTest, PosesMoveSensorAndPoints) {
-  OctreeWriter writer(0.1, std::nullopt);
+  OccupancyVoxels grid = GridOf(0.1);
   const Pose T = MakePose(Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ())),
                           {100.0, 50.0, -3.0});
-  STRATA_ASSERT_OK(writer.Add(Wall(), T, {}, Stop()));
+  STRATA_ASSERT_OK(grid.Add(Wall(), T, {}, Stop()));
   octomap::OcTree tree(1.0);
-  ReadBack(writer, tree);
+  ReadBack(grid, tree);
   EXPECT_EQ(At(tree, 100.0, 54.05, -2.0), Space::kOccupied);
   EXPECT_EQ(At(tree, 100.0, 52.0, -2.0), Space::kFree);
   EXPECT_EQ(At(tree, 100.0, 54.3, -2.0), Space::kUnknown);
@@ -86,31 +99,50 @@ TEST(OctreeWriterTest, WhatWasSeenThroughOftenerThanHitIsFree) {
   PointCloud blob;
   blob.sensor_origin = {0.0F, 0.0F, 1.0F};
   blob.points = {{2.05F, 0.05F, 1.05F}};
-  OctreeWriter writer(0.1, std::nullopt);
-  STRATA_ASSERT_OK(writer.Add(blob, Pose::Identity(), {}, Stop()));
-  for (int i = 0; i < 5; ++i) STRATA_ASSERT_OK(writer.Add(Wall(), Pose::Identity(), {}, Stop()));
+  OccupancyVoxels grid = GridOf(0.1);
+  STRATA_ASSERT_OK(grid.Add(blob, Pose::Identity(), {}, Stop()));
+  for (int i = 0; i < 5; ++i) STRATA_ASSERT_OK(grid.Add(Wall(), Pose::Identity(), {}, Stop()));
   octomap::OcTree tree(1.0);
-  ReadBack(writer, tree);
+  ReadBack(grid, tree);
   EXPECT_EQ(At(tree, 2.05, 0.05, 1.05), Space::kFree);
 }
 
 TEST(OctreeWriterTest, OnlyTheRegionAndRaysThatLeaveIt) {
   const Eigen::AlignedBox3d region(Eigen::Vector3d(1.0, -0.5, 0.5), Eigen::Vector3d(3.0, 0.5, 1.5));
-  OctreeWriter writer(0.1, region);
-  STRATA_ASSERT_OK(writer.Add(Wall(), Pose::Identity(), {}, Stop()));
+  OccupancyVoxelsOptions options;
+  options.region = region;
+  OccupancyVoxels grid(options);
+  STRATA_ASSERT_OK(grid.Add(Wall(), Pose::Identity(), {}, Stop()));
   octomap::OcTree tree(1.0);
-  ReadBack(writer, tree);
+  ReadBack(grid, tree);
   EXPECT_EQ(At(tree, 2.05, 0.05, 1.05), Space::kFree);
   EXPECT_EQ(At(tree, 0.55, 0.05, 1.05), Space::kUnknown);
   EXPECT_EQ(At(tree, 3.55, 0.05, 1.05), Space::kUnknown);
   EXPECT_EQ(At(tree, 4.05, 0.05, 1.05), Space::kUnknown);
 }
 
+// More than the 15 bits that tell one scan from the next.
+TEST(OctreeWriterTest, ScansAreToldApartHoweverManyThereAre) {
+  PointCloud far_off;
+  far_off.points = {{2.05F, 0.05F, 0.05F}};
+  PointCloud near_by;
+  near_by.points = {{1.05F, 0.05F, 0.05F}};
+  OccupancyVoxels grid = GridOf(0.1);
+  for (int i = 0; i < 32'770; ++i) {
+    STRATA_ASSERT_OK(grid.Add(i < 32'760 ? far_off : near_by, Pose::Identity(), {}, Stop()));
+  }
+  octomap::OcTree tree(1.0);
+  ReadBack(grid, tree);
+  EXPECT_EQ(At(tree, 2.05, 0.05, 0.05), Space::kOccupied);
+  EXPECT_EQ(At(tree, 1.05, 0.05, 0.05), Space::kOccupied);
+  EXPECT_EQ(At(tree, 0.55, 0.05, 0.05), Space::kFree);
+}
+
 // The same scans into OctoMap's own insertion.
 TEST(OctreeWriterTest, AgreesWithOctoMap) {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> place(-1.0F, 1.0F);
-  OctreeWriter writer(0.1, std::nullopt);
+  OccupancyVoxels grid = GridOf(0.1);
   octomap::OcTree theirs(0.1);
   for (int scan = 0; scan < 4; ++scan) {
     PointCloud cloud;
@@ -121,11 +153,11 @@ TEST(OctreeWriterTest, AgreesWithOctoMap) {
       cloud.points.push_back(onto);
       points.push_back(onto.x(), onto.y(), onto.z());
     }
-    STRATA_ASSERT_OK(writer.Add(cloud, Pose::Identity(), {}, Stop()));
+    STRATA_ASSERT_OK(grid.Add(cloud, Pose::Identity(), {}, Stop()));
     theirs.insertPointCloud(points, {0, 0, 0}, -1.0, false, true);
   }
   octomap::OcTree ours(1.0);
-  ReadBack(writer, ours);
+  ReadBack(grid, ours);
   int occupied = 0, free = 0, edges = 0, differ = 0;
   for (double x = -2.35; x < 2.4; x += 0.1) {
     for (double y = -2.35; y < 2.4; y += 0.1) {
@@ -148,19 +180,19 @@ TEST(OctreeWriterTest, AgreesWithOctoMap) {
 }
 
 TEST(OctreeWriterTest, WhatDoesNotFitIsRefused) {
-  OctreeWriter writer(0.01, std::nullopt);
+  OccupancyVoxels grid = GridOf(0.01);
   PointCloud cloud;
   cloud.points = {{1.0F, 0.0F, 0.0F}};
   const Pose far_off = Pose(Eigen::Translation3d(400.0, 0.0, 0.0));
-  EXPECT_THAT(writer.Add(cloud, far_off, {}, Stop()),
-              StatusIs(absl::StatusCode::kOutOfRange, HasSubstr("take larger ones")));
+  EXPECT_THAT(grid.Add(cloud, far_off, {}, Stop()),
+              StatusIs(absl::StatusCode::kOutOfRange, HasSubstr("take larger ones or a region")));
   const Stop stop;
   stop.Request();
-  EXPECT_EQ(writer.Add(cloud, Pose::Identity(), {}, stop).code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(grid.Add(cloud, Pose::Identity(), {}, stop).code(), absl::StatusCode::kCancelled);
   cloud.points = {{std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F}, {0.0F, 0.0F, 0.0F}};
-  OctreeWriter nothing(0.1, std::nullopt);
+  OccupancyVoxels nothing = GridOf(0.1);
   STRATA_ASSERT_OK(nothing.Add(cloud, Pose::Identity(), {}, Stop()));
-  EXPECT_EQ(nothing.Finish().nodes, 0U);
+  EXPECT_EQ(BtFile(nothing).nodes, 0U);
 }
 
 }  // namespace
