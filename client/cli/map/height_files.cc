@@ -28,7 +28,7 @@
 namespace strata::cli {
 namespace {
 
-constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoHeight = std::numeric_limits<float>::quiet_NaN();
 
 // Heights and, of ground, the classes of the same cells.
 struct Heights {
@@ -42,7 +42,7 @@ ElevationRegion FromAbove(const std::optional<Eigen::AlignedBox3d>& region) {
 }
 
 // The tiles of the region, and one more around: what is ground depends on what is beside it.
-api::TileArea AreaOf(const HeightOptions& options, double cell_size_m) {
+api::TileArea TilesAround(const HeightOptions& options, double cell_size_m) {
   api::TileArea area;
   area.level = options.level;
   if (!options.region.has_value()) return area;
@@ -80,7 +80,7 @@ absl::StatusOr<Heights> GroundOf(Context& context,
                               std::move(tiles), cell_size_m, LimitsOf(profile), context.call.stop));
   Heights heights;
   STRATA_ASSIGN_OR_RETURN(heights.map, ElevationOf(ground, cell_size_m, FromAbove(options.region)));
-  heights.classes.assign(heights.map.cells.size(), kNothing);
+  heights.classes.assign(heights.map.cells.size(), kNoHeight);
   for (std::size_t i = 0; i < heights.map.cells.size(); ++i) {
     if (!heights.map.cells[i].observed()) continue;
     const auto column = static_cast<std::int32_t>(i % heights.map.width);
@@ -89,6 +89,22 @@ absl::StatusOr<Heights> GroundOf(Context& context,
         ground.Find({heights.map.corner.x + column, heights.map.corner.y + row});
     heights.classes[i] = static_cast<float>(cell->elevation_class);
   }
+  return heights;
+}
+
+absl::StatusOr<Heights> HeightsOf(Context& context,
+                                  const std::string& map,
+                                  const HeightOptions& options,
+                                  std::vector<SurfaceTile> tiles,
+                                  double cell_size_m) {
+  if (options.surface == "ground") {
+    return GroundOf(context, map, options, std::move(tiles), cell_size_m);
+  }
+  const ElevationRule rule =
+      options.surface == "kalman" ? ElevationRule::kKalman : ElevationRule::kHighest;
+  Heights heights;
+  STRATA_ASSIGN_OR_RETURN(heights.map,
+                          ElevationOf(tiles, cell_size_m, rule, FromAbove(options.region)));
   return heights;
 }
 
@@ -104,8 +120,8 @@ Raster RasterOf(Heights heights) {
   raster.bands = {{"height [m]", {}}, {"sigma [m]", {}}};
   for (RasterBand& band : raster.bands) band.values.reserve(map.cells.size());
   for (const ElevationCell& cell : map.cells) {
-    raster.bands[0].values.push_back(cell.observed() ? cell.z_m : kNothing);
-    raster.bands[1].values.push_back(cell.observed() ? cell.sigma_m : kNothing);
+    raster.bands[0].values.push_back(cell.observed() ? cell.z_m : kNoHeight);
+    raster.bands[1].values.push_back(cell.observed() ? cell.sigma_m : kNoHeight);
   }
   if (!heights.classes.empty()) {
     raster.bands.push_back({"class", std::move(heights.classes)});
@@ -127,12 +143,12 @@ void PlaceOnEarth(const GeodeticOrigin& origin, Raster& raster) {
   }
 }
 
-absl::Status NoHeights(Context& context, const std::string& map, bool somewhere_else) {
-  if (!somewhere_else) {
+absl::Status NoHeights(Context& context, const std::string& map) {
+  STRATA_ASSIGN_OR_RETURN(const MapStats stats, context.database.maps().Stats(context.call, map));
+  if (stats.patches == 0) {
     return absl::FailedPreconditionError(absl::StrCat(
         "map ", map, " has no surfaces: import scans, or wait until they are integrated"));
   }
-  STRATA_ASSIGN_OR_RETURN(const MapStats stats, context.database.maps().Stats(context.call, map));
   return absl::NotFoundError(absl::StrCat(
       "no surface of map ", map, " lies in the region; the map lies ", ExtentOf(stats)));
 }
@@ -165,7 +181,7 @@ absl::StatusOr<Json> WriteRaster(const Raster& raster,
   return Json::array({out});
 }
 
-Json ReportOf(const Raster& raster, const HeightOptions& options) {
+Json HeightReport(const Raster& raster, const HeightOptions& options) {
   const auto known = [](float value) { return !std::isnan(value); };
   const std::vector<float>& heights = raster.bands.front().values;
   float low = std::numeric_limits<float>::infinity();
@@ -195,37 +211,26 @@ absl::Status ExportHeights(Context& context,
                            const HeightOptions& options,
                            const std::string& format,
                            const std::string& out) {
-  const bool ground = options.surface == "ground";
-  if (ground && options.level > 0) {
+  if (options.surface == "ground" && options.level > 0) {
     return absl::InvalidArgumentError(
         "--surface ground judges the finest cells; leave --level out, or take --surface highest");
   }
   STRATA_ASSIGN_OR_RETURN(const MapInfo info, context.database.maps().Get(context.call, map));
   const double cell_size_m = std::ldexp(info.parameters.mls.cell_size_m, options.level);
   STRATA_ASSIGN_OR_RETURN(FetchedTiles fetched,
-                          FetchTiles(context, map, AreaOf(options, cell_size_m)));
+                          FetchTiles(context, map, TilesAround(options, cell_size_m)));
   if (options.region.has_value()) KeepHeights(*options.region, fetched.tiles);
-  Heights heights;
-  if (ground) {
-    STRATA_ASSIGN_OR_RETURN(heights,
-                            GroundOf(context, map, options, std::move(fetched.tiles), cell_size_m));
-  } else {
-    const bool fused = options.surface == "kalman";
-    STRATA_ASSIGN_OR_RETURN(heights.map,
-                            ElevationOf(fetched.tiles,
-                                        cell_size_m,
-                                        fused ? ElevationRule::kKalman : ElevationRule::kHighest,
-                                        FromAbove(options.region)));
-  }
+  STRATA_ASSIGN_OR_RETURN(Heights heights,
+                          HeightsOf(context, map, options, std::move(fetched.tiles), cell_size_m));
   if (heights.map.cells.empty()) {
     STRATA_RETURN_IF_ERROR(fetched.damage);
-    return NoHeights(context, map, options.region.has_value());
+    return NoHeights(context, map);
   }
   Raster raster = RasterOf(std::move(heights));
   if (info.parameters.origin.has_value()) PlaceOnEarth(*info.parameters.origin, raster);
   Json report = {{"format", format}};
   STRATA_ASSIGN_OR_RETURN(report["files"], WriteRaster(raster, format, out));
-  report.update(ReportOf(raster, options));
+  report.update(HeightReport(raster, options));
   if (raster.projection.has_value() && context.output.json()) {
     report["projection"] = raster.projection->Wkt();
   }

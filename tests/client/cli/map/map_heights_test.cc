@@ -265,6 +265,8 @@ TEST_F(MapHeightsTest, WhatCannotBeExportedSaysWhy) {
   const std::string out = Path("no.tif");
   RunOk({"map", "create", "empty"});
   EXPECT_THAT(Refusal({"empty", "--format", "geotiff", "--out", out}), HasSubstr("import scans"));
+  EXPECT_THAT(Refusal({"empty", "--format", "asc", "--out", out, "--region", "0,0,1,1"}),
+              HasSubstr("import scans"));
   EXPECT_THAT(Refusal({"empty", "--format", "asc", "--surface", "ground", "--out", out}),
               HasSubstr("import scans"));
   EXPECT_THAT(Refusal({"bridge", "--format", "asc", "--out", out, "--region", "500,500,501,501"}),
