@@ -48,6 +48,8 @@ RESULTS = {
                      "/usr/bin/python3 tests/experiments/localisation.py --build {build}", ("core",)),
     "posegraphs": ("Recorded pose graphs", "/usr/bin/python3 tests/experiments/pose_graphs.py --build {build}",
                    ("core/posegraph", "client/formats")),
+    "fig_6_1": ("Thesis, figure 6.1: a bridge as elevation map, extended elevation map and multi-level map",
+                "/usr/bin/python3 tests/experiments/underpass.py --build {build}", ("core/mls", "core/planning")),
     "mls": ("Points to maps beside OctoMap", "bench/mls_benchmark 5 3", ("core/mls",)),
     "registration": ("Registration beside PCL", "bench/registration_benchmark --pairs 60", ("core/registration", "core/mls")),
     "posegraph": ("Our use of Ceres beside a plain one", "bench/posegraph_benchmark 5", ("core/posegraph",)),

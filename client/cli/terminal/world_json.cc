@@ -2,9 +2,21 @@
 
 #include <string>
 
+#include "absl/strings/str_format.h"
+
 #include "client/cli/terminal/json.h"
 
 namespace strata::cli {
+
+std::string ExtentOf(const MapStats& stats) {
+  return absl::StrFormat("within (%.1f, %.1f, %.1f) and (%.1f, %.1f, %.1f)",
+                         stats.box_min.x(),
+                         stats.box_min.y(),
+                         stats.box_min.z(),
+                         stats.box_max.x(),
+                         stats.box_max.y(),
+                         stats.box_max.z());
+}
 
 std::string ToString(ConstraintOrigin origin) {
   switch (origin) {

@@ -1,4 +1,5 @@
-// Epochs, what watchers are told, and what holds scans in their places, as JSON objects.
+// Epochs, what watchers are told, and what holds scans in their places, as JSON objects; where maps
+// lie.
 #ifndef STRATA_CLIENT_CLI_TERMINAL_WORLD_JSON_H_
 #define STRATA_CLIENT_CLI_TERMINAL_WORLD_JSON_H_
 
@@ -10,6 +11,7 @@
 #include "core/world/constraint.h"
 #include "core/world/epoch.h"
 #include "core/world/localization.h"
+#include "core/world/map_info.h"
 #include "core/world/plane_model.h"
 
 namespace strata::cli {
@@ -26,6 +28,9 @@ Json ToJson(const api::PoseLookup& lookup);
 Json ToJson(const LocalizeCandidate& candidate);
 Json ToJson(const LocalizeResult& result);
 Json ToJson(const Matrix6d& matrix);  // six rows of six
+
+// "within (X, Y, Z) and (X, Y, Z)": the box around a map's surfaces [m].
+std::string ExtentOf(const MapStats& stats);
 
 std::string ToString(ConstraintOrigin origin);
 std::string ToString(PlaneKind kind);
