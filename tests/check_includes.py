@@ -35,7 +35,7 @@ ARROWS = {
                "core/common"],
     "client/sdk": ["proto", "core/api", "core/codec", "core/world", "core/mls", "core/cloud", "core/geometry",
                    "core/common"],
-    "client/formats": ["core/posegraph", "core/mls", "core/cloud", "core/geometry", "core/common"],
+    "client/formats": ["core/posegraph", "core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "client/cli": ["client/sdk", "client/formats", "core/api", "core/engine", "core/codec", "core/registration",
                    "core/classification", "core/posegraph", "core/world", "core/mls", "core/mesh", "core/cloud", "core/geometry",
                    "core/common"],
@@ -51,7 +51,8 @@ STOREYS = {
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
     "core/storage": ["sqlite", HERE],
     "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "ingest", "tiles", "scans", "map"],
-    "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "job", "mesh", "picture", "terminal"],
+    "client/formats": ["planes", HERE],
+    "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "job", "mesh", "planes", "picture", "terminal"],
 }
 
 # Sources a folder may hold.

@@ -1,0 +1,154 @@
+#include "client/formats/planes/polygon_pieces.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <boost/polygon/polygon.hpp>
+
+#include "core/common/status.h"
+
+namespace strata {
+namespace {
+
+using LatticePolygon = boost::polygon::polygon_with_holes_data<std::int32_t>;
+using LatticePiece = boost::polygon::polygon_data<std::int32_t>;
+using LatticePoint = boost::polygon::point_data<std::int32_t>;
+using LatticeRing = std::vector<LatticePoint>;
+
+constexpr double kFarthestCornerM = 1e7;
+constexpr double kFinestUnitM = 1e-5;
+constexpr double kMostUnits = 1e9;  // a polygon's extent
+
+absl::Status CheckRing(const PlaneRing& ring) {
+  if (ring.size() < 3) {
+    return absl::InvalidArgumentError(absl::StrCat("a ring of ", ring.size(), " points"));
+  }
+  for (const Eigen::Vector3d& p : ring) {
+    if (p.allFinite() && p.cwiseAbs().maxCoeff() <= kFarthestCornerM) continue;
+    return absl::InvalidArgumentError(
+        absl::StrCat("corner ", p.x(), ", ", p.y(), ", ", p.z(), " m is not within 10,000 km"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckPlane(const ModelPlane& plane) {
+  const Eigen::Vector3d& n = plane.plane.normal;
+  if (!n.allFinite() || std::abs(n.norm() - 1.0) > 1e-6) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("normal ", n.x(), ", ", n.y(), ", ", n.z(), " is not of unit length"));
+  }
+  if (!std::isfinite(plane.rms_m) || !std::isfinite(plane.sigma_m)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("rms ", plane.rms_m, " m and sigma ", plane.sigma_m, " m are not finite"));
+  }
+  for (const PlanePolygon& polygon : plane.polygons) {
+    if (!std::isfinite(polygon.area_m2)) {
+      return absl::InvalidArgumentError(absl::StrCat("area ", polygon.area_m2, " m2"));
+    }
+    STRATA_RETURN_IF_ERROR(CheckRing(polygon.outer));
+    for (const PlaneHole& hole : polygon.holes) STRATA_RETURN_IF_ERROR(CheckRing(hole.ring));
+  }
+  return absl::OkStatus();
+}
+
+// Whole units in the plane, from a corner of the polygon.
+class Lattice {
+ public:
+  Lattice(const PlanePolygon& polygon, const Eigen::Vector3d& normal)
+      : origin_(polygon.outer.front()) {
+    // One axis of a wall is level, and in a floor they are those of the map.
+    axis_u_ = std::abs(normal.z()) < 0.9
+                  ? Eigen::Vector3d(-normal.y(), normal.x(), 0.0).normalized()
+                  : Eigen::Vector3d::UnitY().cross(normal).normalized();
+    axis_v_ = normal.cross(axis_u_);
+    double farthest = 0.0;
+    for (const Eigen::Vector3d& p : polygon.outer) {
+      farthest = std::max(farthest, (p - origin_).norm());
+    }
+    for (const PlaneHole& hole : polygon.holes) {
+      for (const Eigen::Vector3d& p : hole.ring) {
+        farthest = std::max(farthest, (p - origin_).norm());
+      }
+    }
+    unit_m_ = std::max(kFinestUnitM, farthest / kMostUnits);
+  }
+
+  LatticeRing Flat(const PlaneRing& ring) const {
+    LatticeRing out;
+    out.reserve(ring.size());
+    for (const Eigen::Vector3d& p : ring) {
+      const Eigen::Vector3d d = (p - origin_) / unit_m_;
+      out.emplace_back(static_cast<std::int32_t>(std::lround(axis_u_.dot(d))),
+                       static_cast<std::int32_t>(std::lround(axis_v_.dot(d))));
+    }
+    return out;
+  }
+
+  Eigen::Vector3d Lift(const LatticePoint& p) const {
+    return origin_ + unit_m_ * (p.x() * axis_u_ + p.y() * axis_v_);
+  }
+
+ private:
+  Eigen::Vector3d origin_, axis_u_, axis_v_;
+  double unit_m_ = kFinestUnitM;
+};
+
+LatticeRing WithoutRepeats(const LatticePiece& piece) {
+  LatticeRing corners(piece.begin(), piece.end());
+  corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+  while (corners.size() > 1 && corners.front() == corners.back()) corners.pop_back();
+  return corners;
+}
+
+}  // namespace
+
+absl::Status CheckPlaneModel(const PlaneModel& model) {
+  for (const ModelPlane& plane : model.planes) {
+    STRATA_RETURN_IF_ERROR(Annotate(CheckPlane(plane), absl::StrCat("plane ", plane.id)));
+  }
+  return absl::OkStatus();
+}
+
+std::vector<FlatPiece> PiecesOf(const PlanePolygon& polygon, const Eigen::Vector3d& normal) {
+  const Lattice lattice(polygon, normal);
+  LatticePolygon flat;
+  const LatticeRing outer = lattice.Flat(polygon.outer);
+  flat.set(outer.begin(), outer.end());
+  std::vector<LatticePiece> holes;
+  for (const PlaneHole& hole : polygon.holes) {
+    const LatticeRing ring = lattice.Flat(hole.ring);
+    holes.emplace_back().set(ring.begin(), ring.end());
+  }
+  flat.set_holes(holes.begin(), holes.end());
+  boost::polygon::polygon_set_data<std::int32_t> region;
+  region.insert(flat);
+  std::vector<LatticePiece> trapezoids;
+  region.get_trapezoids(trapezoids);
+  std::vector<FlatPiece> pieces;
+  for (const LatticePiece& trapezoid : trapezoids) {
+    LatticeRing corners = WithoutRepeats(trapezoid);
+    if (corners.size() < 3 || boost::polygon::area(trapezoid) == 0.0) continue;
+    if (boost::polygon::winding(trapezoid) == boost::polygon::CLOCKWISE) {
+      std::reverse(corners.begin(), corners.end());
+    }
+    for (std::size_t i = 1; i + 1 < corners.size(); i += 2) {
+      const std::size_t last = std::min(i + 2, corners.size() - 1);
+      pieces.push_back({lattice.Lift(corners[0]),
+                        lattice.Lift(corners[i]),
+                        lattice.Lift(corners[i + 1]),
+                        lattice.Lift(corners[last])});
+    }
+  }
+  return pieces;
+}
+
+}  // namespace strata
