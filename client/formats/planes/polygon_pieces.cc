@@ -102,10 +102,33 @@ class Lattice {
   double unit_m_ = kFinestUnitM;
 };
 
-LatticeRing WithoutRepeats(const LatticePiece& piece) {
-  LatticeRing corners(piece.begin(), piece.end());
-  corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
-  while (corners.size() > 1 && corners.front() == corners.back()) corners.pop_back();
+// Twice the area of the triangle; below 2^63, since no corner is farther than kMostUnits.
+std::int64_t DoubleArea(const LatticePoint& a, const LatticePoint& b, const LatticePoint& c) {
+  const std::int64_t abx = std::int64_t{b.x()} - a.x(), aby = std::int64_t{b.y()} - a.y();
+  const std::int64_t acx = std::int64_t{c.x()} - a.x(), acy = std::int64_t{c.y()} - a.y();
+  return abx * acy - aby * acx;
+}
+
+// Counterclockwise, without those on an edge; none where it has no area.
+LatticeRing CornersOf(const LatticePiece& piece) {
+  const LatticeRing ring(piece.begin(), piece.end());
+  LatticeRing corners;
+  for (const LatticePoint& p : ring) {
+    while (corners.size() > 1 && DoubleArea(corners.end()[-2], corners.back(), p) == 0) {
+      corners.pop_back();
+    }
+    if (corners.empty() || !(corners.back() == p)) corners.push_back(p);
+  }
+  while (corners.size() > 2 && DoubleArea(corners.end()[-2], corners.back(), corners[0]) == 0) {
+    corners.pop_back();
+  }
+  while (corners.size() > 2 && DoubleArea(corners.back(), corners[0], corners[1]) == 0) {
+    corners.erase(corners.begin());
+  }
+  if (corners.size() < 3) return {};
+  if (DoubleArea(corners[0], corners[1], corners[2]) < 0) {
+    std::reverse(corners.begin(), corners.end());
+  }
   return corners;
 }
 
@@ -135,11 +158,7 @@ std::vector<FlatPiece> PiecesOf(const PlanePolygon& polygon, const Eigen::Vector
   region.get_trapezoids(trapezoids);
   std::vector<FlatPiece> pieces;
   for (const LatticePiece& trapezoid : trapezoids) {
-    LatticeRing corners = WithoutRepeats(trapezoid);
-    if (corners.size() < 3 || boost::polygon::area(trapezoid) == 0.0) continue;
-    if (boost::polygon::winding(trapezoid) == boost::polygon::CLOCKWISE) {
-      std::reverse(corners.begin(), corners.end());
-    }
+    const LatticeRing corners = CornersOf(trapezoid);
     for (std::size_t i = 1; i + 1 < corners.size(); i += 2) {
       const std::size_t last = std::min(i + 2, corners.size() - 1);
       pieces.push_back({lattice.Lift(corners[0]),
