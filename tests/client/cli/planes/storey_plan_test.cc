@@ -123,8 +123,12 @@ TEST(StoreyPlanTest, CutsOfRaggedPolygonsAreWhereThePolygonIs) {
 }
 
 TEST(StoreyPlanTest, ObstaclesAreTheOccupiedCells) {
-  OccupancyGrid grid{.width = 4, .height = 3, .resolution_m = 0.5, .x_m = 10.0, .y_m = -2.0};
-  grid.cells.assign(12, GridCell::kFree);
+  OccupancyGrid grid{.width = 4,
+                     .height = 3,
+                     .resolution_m = 0.5,
+                     .x_m = 10.0,
+                     .y_m = -2.0,
+                     .cells = std::vector<GridCell>(12, GridCell::kFree)};
   for (const int cell : {0, 1, 3, 6, 7, 8}) {
     grid.cells[static_cast<std::size_t>(cell)] = GridCell::kOccupied;
   }
@@ -157,7 +161,7 @@ TEST(StoreyPlanTest, OptionsAndModelsThatAreNoneAreRefused) {
                                        StoreyOptions{.cut_height_m = nan},
                                        StoreyOptions{.cut_height_m = 101.0}}) {
     EXPECT_THAT(PlanOfStorey(testing::DrawnRoom(), options),
-                StatusIs(absl::StatusCode::kInvalidArgument));
+                StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(" is not ")));
   }
   PlaneModel model = testing::DrawnRoom();
   model.planes[0].polygons[0].outer[0].x() = nan;
