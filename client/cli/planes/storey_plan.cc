@@ -89,24 +89,22 @@ double MeanHeight(const PlaneRing& ring) {
   return sum / static_cast<double>(ring.size());
 }
 
-std::vector<Eigen::Vector2d> FromAbove(const PlaneRing& ring) {
-  std::vector<Eigen::Vector2d> out;
-  out.reserve(ring.size());
-  for (const Eigen::Vector3d& p : ring) out.emplace_back(p.head<2>());
-  return out;
-}
-
-void AddFloors(const ModelPlane& plane, StoreyPlan& plan) {
-  for (const PlanePolygon& polygon : plane.polygons) {
-    if (std::abs(MeanHeight(polygon.outer) - plan.storey_z_m) > kFloorWithinM) continue;
-    plan.floors.push_back(FromAbove(polygon.outer));
-    for (const PlaneHole& hole : polygon.holes) plan.floors.push_back(FromAbove(hole.ring));
-  }
-}
-
 // Of a ceiling the normal points down.
 bool IsFloor(const ModelPlane& plane) {
   return plane.kind == PlaneKind::kLevel && plane.plane.normal.z() > 0.0;
+}
+
+std::vector<const PlanePolygon*> FloorsNear(const PlaneModel& model, double storey_z_m) {
+  std::vector<const PlanePolygon*> floors;
+  for (const ModelPlane& plane : model.planes) {
+    if (!IsFloor(plane)) continue;
+    for (const PlanePolygon& polygon : plane.polygons) {
+      if (std::abs(MeanHeight(polygon.outer) - storey_z_m) <= kFloorWithinM) {
+        floors.push_back(&polygon);
+      }
+    }
+  }
+  return floors;
 }
 
 absl::Status NothingThere(const PlaneModel& model, const StoreyPlan& plan) {
@@ -135,8 +133,8 @@ absl::StatusOr<StoreyPlan> PlanOfStorey(const PlaneModel& model, const StoreyOpt
   plan.cut_z_m = options.storey_z_m + options.cut_height_m;
   for (const ModelPlane& plane : model.planes) {
     if (plane.kind != PlaneKind::kLevel) CutWall(plane, plan);
-    if (IsFloor(plane)) AddFloors(plane, plan);
   }
+  plan.floors = UnionFromAbove(FloorsNear(model, options.storey_z_m));
   if (ExtentOf(plan).isEmpty()) return NothingThere(model, plan);
   return plan;
 }

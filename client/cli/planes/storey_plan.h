@@ -28,7 +28,8 @@ struct StoreyPlan {
   // seen open, as in a door.
   std::vector<PlanSegment> walls;
   std::vector<PlanSegment> unseen;  // across holes of which nothing is known
-  // Rings of floors within 0.5 m of the storey's height; a hole is a ring too.
+  // What floors within 0.5 m of the storey's height cover: borders counterclockwise, holes
+  // clockwise.
   std::vector<std::vector<Eigen::Vector2d>> floors;
   std::vector<Eigen::AlignedBox2d> obstacles;  // as added
 };

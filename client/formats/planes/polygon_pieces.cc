@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <utility>
+#include <span>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -22,6 +22,7 @@ namespace {
 using LatticePolygon = boost::polygon::polygon_with_holes_data<std::int32_t>;
 using LatticePiece = boost::polygon::polygon_data<std::int32_t>;
 using LatticePoint = boost::polygon::point_data<std::int32_t>;
+using LatticeRegion = boost::polygon::polygon_set_data<std::int32_t>;
 using LatticeRing = std::vector<LatticePoint>;
 
 constexpr double kFarthestCornerM = 1e7;
@@ -60,24 +61,23 @@ absl::Status CheckPlane(const ModelPlane& plane) {
   return absl::OkStatus();
 }
 
-// Whole units in the plane, from a corner of the polygon.
+// Whole units in the plane, from a corner of the first polygon.
 class Lattice {
  public:
-  Lattice(const PlanePolygon& polygon, const Eigen::Vector3d& normal)
-      : origin_(polygon.outer.front()) {
+  Lattice(std::span<const PlanePolygon* const> polygons, const Eigen::Vector3d& normal)
+      : origin_(polygons.front()->outer.front()) {
     // One axis of a wall is level, and in a floor they are those of the map.
     axis_u_ = std::abs(normal.z()) < 0.9
                   ? Eigen::Vector3d(-normal.y(), normal.x(), 0.0).normalized()
                   : Eigen::Vector3d::UnitY().cross(normal).normalized();
     axis_v_ = normal.cross(axis_u_);
     double farthest = 0.0;
-    for (const Eigen::Vector3d& p : polygon.outer) {
-      farthest = std::max(farthest, (p - origin_).norm());
-    }
-    for (const PlaneHole& hole : polygon.holes) {
-      for (const Eigen::Vector3d& p : hole.ring) {
-        farthest = std::max(farthest, (p - origin_).norm());
-      }
+    const auto look_at = [&](const PlaneRing& ring) {
+      for (const Eigen::Vector3d& p : ring) farthest = std::max(farthest, (p - origin_).norm());
+    };
+    for (const PlanePolygon* polygon : polygons) {
+      look_at(polygon->outer);
+      for (const PlaneHole& hole : polygon->holes) look_at(hole.ring);
     }
     unit_m_ = std::max(kFinestUnitM, farthest / kMostUnits);
   }
@@ -91,6 +91,19 @@ class Lattice {
                        static_cast<std::int32_t>(std::lround(axis_v_.dot(d))));
     }
     return out;
+  }
+
+  LatticePolygon Flat(const PlanePolygon& polygon) const {
+    LatticePolygon flat;
+    const LatticeRing outer = Flat(polygon.outer);
+    flat.set(outer.begin(), outer.end());
+    std::vector<LatticePiece> holes;
+    for (const PlaneHole& hole : polygon.holes) {
+      const LatticeRing ring = Flat(hole.ring);
+      holes.emplace_back().set(ring.begin(), ring.end());
+    }
+    flat.set_holes(holes.begin(), holes.end());
+    return flat;
   }
 
   Eigen::Vector3d Lift(const LatticePoint& p) const {
@@ -142,18 +155,10 @@ absl::Status CheckPlaneModel(const PlaneModel& model) {
 }
 
 std::vector<FlatPiece> PiecesOf(const PlanePolygon& polygon, const Eigen::Vector3d& normal) {
-  const Lattice lattice(polygon, normal);
-  LatticePolygon flat;
-  const LatticeRing outer = lattice.Flat(polygon.outer);
-  flat.set(outer.begin(), outer.end());
-  std::vector<LatticePiece> holes;
-  for (const PlaneHole& hole : polygon.holes) {
-    const LatticeRing ring = lattice.Flat(hole.ring);
-    holes.emplace_back().set(ring.begin(), ring.end());
-  }
-  flat.set_holes(holes.begin(), holes.end());
-  boost::polygon::polygon_set_data<std::int32_t> region;
-  region.insert(flat);
+  const PlanePolygon* const only = &polygon;
+  const Lattice lattice({&only, 1}, normal);
+  LatticeRegion region;
+  region.insert(lattice.Flat(polygon));
   std::vector<LatticePiece> trapezoids;
   region.get_trapezoids(trapezoids);
   std::vector<FlatPiece> pieces;
@@ -168,6 +173,29 @@ std::vector<FlatPiece> PiecesOf(const PlanePolygon& polygon, const Eigen::Vector
     }
   }
   return pieces;
+}
+
+std::vector<std::vector<Eigen::Vector2d>> UnionFromAbove(
+    std::span<const PlanePolygon* const> polygons) {
+  std::vector<std::vector<Eigen::Vector2d>> rings;
+  if (polygons.empty()) return rings;
+  const Lattice lattice(polygons, Eigen::Vector3d::UnitZ());
+  LatticeRegion region;
+  for (const PlanePolygon* polygon : polygons) region.insert(lattice.Flat(*polygon));
+  std::vector<LatticePolygon> joined;
+  region.get(joined);
+  const auto add = [&](const auto& flat, bool counterclockwise) {
+    std::vector<Eigen::Vector2d>& ring = rings.emplace_back();
+    for (const LatticePoint& p : flat) ring.emplace_back(lattice.Lift(p).head<2>());
+    if (ring.size() > 1 && ring.front() == ring.back()) ring.pop_back();
+    const bool turns_left = boost::polygon::winding(flat) == boost::polygon::COUNTERCLOCKWISE;
+    if (turns_left != counterclockwise) std::reverse(ring.begin(), ring.end());
+  };
+  for (const LatticePolygon& polygon : joined) {
+    add(polygon, true);
+    for (auto hole = polygon.begin_holes(); hole != polygon.end_holes(); ++hole) add(*hole, false);
+  }
+  return rings;
 }
 
 }  // namespace strata

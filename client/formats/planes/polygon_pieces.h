@@ -1,8 +1,9 @@
-// Polygons with holes as pieces that any program can draw.
+// Polygons with holes as pieces that any program can draw, and several as one.
 #ifndef STRATA_CLIENT_FORMATS_PLANES_POLYGON_PIECES_H_
 #define STRATA_CLIENT_FORMATS_PLANES_POLYGON_PIECES_H_
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -24,6 +25,11 @@ using FlatPiece = std::array<Eigen::Vector3d, 4>;
 // edges. Corners are right to 1e-5 m in polygons up to 10 km wide, to 1e-9 of the width beyond.
 // REQUIRES: polygon and normal as CheckPlaneModel wants them.
 std::vector<FlatPiece> PiecesOf(const PlanePolygon& polygon, const Eigen::Vector3d& normal);
+
+// What any of them covers, seen from above, as rings: borders counterclockwise, holes in them
+// clockwise. As exact as PiecesOf, of all polygons together. REQUIRES: as PiecesOf.
+std::vector<std::vector<Eigen::Vector2d>> UnionFromAbove(
+    std::span<const PlanePolygon* const> polygons);
 
 }  // namespace strata
 

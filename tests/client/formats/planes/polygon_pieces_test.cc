@@ -1,6 +1,7 @@
 #include "client/formats/planes/polygon_pieces.h"
 
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -119,6 +120,45 @@ TEST(PolygonPiecesTest, RingsThatTouchAndWidePolygonsHaveTheirArea) {
       AreaOfPieces(PiecesOf(lake.polygons[0], Vector3d::UnitZ()), Vector3d::UnitZ()) / lake.area_m2,
       1.0,
       1e-8);
+}
+
+// Places are covered where one of the polygons is, and all rings turn as they should.
+TEST(PolygonPiecesTest, TheUnionIsWhereOneOfThePolygonsIs) {
+  std::mt19937 random(8);
+  const Vector3d up = Vector3d::UnitZ(), u = Vector3d::UnitX(), v = Vector3d::UnitY();
+  EXPECT_TRUE(UnionFromAbove({}).empty());
+  for (int world = 0; world < 5; ++world) {
+    const Vector3d far(world * 100'000.0, 0, 2);
+    std::vector<ModelPlane> planes;
+    for (int i = 0; i < 4; ++i) {
+      const Vector3d middle = far + Vector3d(5.0 * i, i == 3 ? 50.0 : 0.0, 0.1 * i);
+      planes.push_back(testing::DrawnPlane(1,
+                                           PlaneKind::kLevel,
+                                           up,
+                                           Star(middle, u, v, 30, 3.0, 6.0, random),
+                                           {{Star(middle, u, v, 8, 0.5, 2.5, random), false}}));
+    }
+    std::vector<const PlanePolygon*> polygons;
+    for (const ModelPlane& plane : planes) polygons.push_back(&plane.polygons[0]);
+    const auto rings = UnionFromAbove(polygons);
+    std::uniform_real_distribution<double> x(-6.0, 21.0), y(-6.0, 6.0);
+    for (int i = 0; i < 1000; ++i) {
+      const Vector3d p = far + Vector3d(x(random), y(random) + (i % 4 == 0 ? 50.0 : 0.0), 0);
+      double turns = 0.0;
+      for (const auto& ring : rings) {
+        for (std::size_t k = 0; k < ring.size(); ++k) {
+          const Eigen::Vector2d a = ring[k] - p.head<2>();
+          const Eigen::Vector2d b = ring[(k + 1) % ring.size()] - p.head<2>();
+          turns += std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b)) / (2.0 * std::numbers::pi);
+        }
+      }
+      bool inside = false;
+      for (const PlanePolygon* polygon : polygons) {
+        inside = inside || testing::IsInside(*polygon, p, up);
+      }
+      EXPECT_NEAR(turns, inside ? 1.0 : 0.0, 1e-6);
+    }
+  }
 }
 
 TEST(PolygonPiecesTest, WhatIsNoPolygonIsRefusedByName) {
