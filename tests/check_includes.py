@@ -51,8 +51,8 @@ STOREYS = {
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
     "core/storage": ["sqlite", HERE],
     "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "models", "ingest", "tiles", "scans", "map"],
-    "client/formats": [HERE, "grid"],
-    "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "job", "mesh", "picture", "terminal"],
+    "client/formats": ["planes", HERE, "grid"],
+    "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "job", "mesh", "planes", "picture", "terminal"],
 }
 
 # Sources a folder may hold.
