@@ -227,6 +227,7 @@ void AddMapCommands(Commands& commands) {
   AddMapWatch(commands, noun);
   AddMapDiff(commands, noun);
   AddMapExport(commands, noun);
+  AddMapFloorplan(commands, noun);
   AddMapFloors(commands, noun);
   AddMapMerge(commands, noun);
   AddMapMesh(commands, noun);

@@ -10,6 +10,7 @@ void AddMapBackup(Commands& commands, CLI::App* noun);
 void AddMapClasses(Commands& commands, CLI::App* noun);
 void AddMapDiff(Commands& commands, CLI::App* noun);
 void AddMapExport(Commands& commands, CLI::App* noun);
+void AddMapFloorplan(Commands& commands, CLI::App* noun);
 void AddMapFloors(Commands& commands, CLI::App* noun);
 void AddMapMerge(Commands& commands, CLI::App* noun);
 void AddMapRender(Commands& commands, CLI::App* noun);

@@ -1,5 +1,4 @@
-// strata planes list|find|model
-#include <algorithm>
+// strata planes list|find|model|export
 #include <cstddef>
 #include <memory>
 #include <string>
@@ -10,9 +9,11 @@
 #include "absl/strings/str_format.h"
 
 #include "client/cli/job/job_runner.h"
+#include "client/cli/planes/fetched_planes.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/world_json.h"
+#include "client/formats/planes/plane_model_file.h"
 #include "core/common/status.h"
 #include "core/world/job_kinds.h"
 
@@ -23,6 +24,7 @@ struct PlanesOptions {
   std::string map;
   JobParameters parameters;
   bool wait = false;
+  std::string out;
 };
 
 absl::Status List(Context& context, const PlanesOptions& options) {
@@ -58,22 +60,25 @@ Json RowOf(Json plane) {
   return plane;
 }
 
+void PrintDirections(const PlaneModelInfo& info, Output& output) {
+  for (std::size_t k = 0; k < info.directions.size(); ++k) {
+    const MainDirection& one = info.directions[k];
+    output.Text(absl::StrFormat("direction %d: %.4f %.4f %.4f, %d planes",
+                                k,
+                                one.direction.x(),
+                                one.direction.y(),
+                                one.direction.z(),
+                                one.planes));
+  }
+}
+
 absl::Status Model(Context& context, const PlanesOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const FetchedPlanes fetched, FetchPlanes(context, options.map));
   Json planes = Json::array();
-  STRATA_ASSIGN_OR_RETURN(const PlaneModelInfo info,
-                          context.database.models().GetPlaneModel(
-                              context.call, options.map, [&](const ModelPlane& plane) {
-                                planes.push_back(ToJson(plane));
-                                return absl::OkStatus();
-                              }));
-  STRATA_ASSIGN_OR_RETURN(const std::vector<EpochInfo> epochs,
-                          context.database.maps().History(context.call, options.map));
-  const auto now = std::find_if(
-      epochs.begin(), epochs.end(), [](const EpochInfo& epoch) { return epoch.current; });
-  const bool stale = now != epochs.end() && now->epoch != info.epoch;
+  for (const ModelPlane& plane : fetched.model.planes) planes.push_back(ToJson(plane));
   if (context.output.json()) {
-    Json model = ToJson(info);
-    model["stale"] = stale;
+    Json model = ToJson(fetched.info);
+    model["stale"] = fetched.stale;
     model["planes"] = std::move(planes);
     context.output.Object(model);
     return absl::OkStatus();
@@ -90,22 +95,19 @@ absl::Status Model(Context& context, const PlanesOptions& options) {
                        {"rms_m", "RMS"},
                        {"pieces", "PIECES"},
                        {"holes", "HOLES"}});
-  for (std::size_t k = 0; k < info.directions.size(); ++k) {
-    const MainDirection& one = info.directions[k];
-    context.output.Text(absl::StrFormat("direction %d: %.4f %.4f %.4f, %d planes",
-                                        k,
-                                        one.direction.x(),
-                                        one.direction.y(),
-                                        one.direction.z(),
-                                        one.planes));
-  }
-  if (stale) {
-    context.output.Talk(absl::StrCat("these planes are of epoch ",
-                                     info.epoch,
-                                     ", the map is at ",
-                                     now->epoch,
-                                     "; planes find makes them anew"));
-  }
+  PrintDirections(fetched.info, context.output);
+  return absl::OkStatus();
+}
+
+absl::Status Export(Context& context, const PlanesOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const FetchedPlanes fetched, FetchPlanes(context, options.map));
+  STRATA_ASSIGN_OR_RETURN(const MapInfo info,
+                          context.database.maps().Get(context.call, options.map));
+  STRATA_RETURN_IF_ERROR(WritePlaneModel(options.out, fetched.model, info.parameters.origin));
+  context.output.Object({{"file", options.out},
+                         {"planes", fetched.model.planes.size()},
+                         {"epoch", fetched.info.epoch},
+                         {"stale", fetched.stale}});
   return absl::OkStatus();
 }
 
@@ -143,6 +145,14 @@ void AddPlanesCommands(Commands& commands) {
        "with holes, too",
        "strata planes model campus --output json",
        Model);
+  verb("export",
+       "These planes for CAD, GIS and viewers: GeoJSON on earth where the map has an origin, DXF "
+       "with walls, levels and slopes on layers, triangles",
+       "strata planes export campus walls.dxf",
+       Export)
+      ->add_option("FILE", options->out, "Where to, by its ending")
+      ->type_name("FILE.(geojson|dxf|ply|obj|glb)")
+      ->required();
 }
 
 }  // namespace strata::cli
