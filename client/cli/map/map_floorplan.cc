@@ -50,8 +50,8 @@ absl::Status Floorplan(Context& context, const FloorplanOptions& options) {
                          {"cut_z_m", plan.cut_z_m},
                          {"walls", plan.walls.size()},
                          {"unseen", plan.unseen.size()},
-                         {"low", ToJson(Eigen::Vector2d(extent.min()))},
-                         {"high", ToJson(Eigen::Vector2d(extent.max()))},
+                         {"low", Json::array({extent.min().x(), extent.min().y()})},
+                         {"high", Json::array({extent.max().x(), extent.max().y()})},
                          {"epoch", planes.info.epoch}});
   return absl::OkStatus();
 }
