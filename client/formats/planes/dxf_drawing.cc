@@ -52,6 +52,14 @@ void AddLineType(std::string& out, absl::string_view name, bool dashed) {
   AddGroup(out, 49, "-0.25");
 }
 
+void AddLayer(std::string& out, const DxfLayer& layer) {
+  AddGroup(out, 0, "LAYER");
+  AddGroup(out, 2, layer.name);
+  AddGroup(out, 70, 0);
+  AddGroup(out, 62, layer.colour);
+  AddGroup(out, 6, layer.dashed ? "DASHED" : "CONTINUOUS");
+}
+
 }  // namespace
 
 void DxfDrawing::AddPoint(int code, const Eigen::Vector3d& p) {
@@ -115,14 +123,9 @@ std::string DxfDrawing::Text() const {
   AddLineType(out, "CONTINUOUS", false);
   AddLineType(out, "DASHED", true);
   AddGroup(out, 0, "ENDTAB");
-  BeginTable(out, "LAYER", layers_.size());
-  for (const DxfLayer& layer : layers_) {
-    AddGroup(out, 0, "LAYER");
-    AddGroup(out, 2, layer.name);
-    AddGroup(out, 70, 0);
-    AddGroup(out, 62, layer.colour);
-    AddGroup(out, 6, layer.dashed ? "DASHED" : "CONTINUOUS");
-  }
+  BeginTable(out, "LAYER", layers_.size() + 1);
+  AddLayer(out, {"0"});  // every drawing has it
+  for (const DxfLayer& layer : layers_) AddLayer(out, layer);
   AddGroup(out, 0, "ENDTAB");
   AddGroup(out, 0, "ENDSEC");
   AddGroup(out, 0, "SECTION");
