@@ -7,11 +7,11 @@ set -euo pipefail
 packages=(
   ca-certificates ccache cmake g++ git mold ninja-build pkg-config
   libabsl-dev libboost-dev libceres-dev libcli11-dev libeigen3-dev libgoogle-glog-dev libgrpc++-dev libmeshoptimizer-dev
-  libnanoflann-dev libpcl-dev libpng-dev libprotobuf-dev libqhull-dev libsqlite3-dev libssl-dev libxxhash-dev libzstd-dev nlohmann-json3-dev prometheus-cpp-dev
+  libnanoflann-dev libpcl-dev libpng-dev libprotobuf-dev libqhull-dev libsqlite3-dev libssl-dev libtiff-dev libxxhash-dev libzstd-dev nlohmann-json3-dev prometheus-cpp-dev
   protobuf-compiler protobuf-compiler-grpc python3
 )
 if [[ "${1:-}" == --dev ]]; then
-  packages+=(clang clang-format clang-tidy coinor-libclp-dev coinor-libipopt-dev dpkg-dev file libbenchmark-dev libcgal-dev libclang-rt-dev libdlib-dev libgmock-dev libgtest-dev liboctomap-dev libtinygltf-dev mmdebstrap openssl python3-grpcio python3-numpy python3-protobuf python3-xxhash python3-zstandard sqlite3 systemd)
+  packages+=(clang clang-format clang-tidy coinor-libclp-dev coinor-libipopt-dev dpkg-dev file libbenchmark-dev libcgal-dev libclang-rt-dev libdlib-dev libgdal-dev libgmock-dev libgtest-dev liboctomap-dev libtinygltf-dev mmdebstrap openssl python3-grpcio python3-numpy python3-protobuf python3-xxhash python3-zstandard sqlite3 systemd)
 fi
 
 missing=()

@@ -36,6 +36,7 @@
 #include "server/services/classifiers_service.h"
 #include "server/services/jobs_service.h"
 #include "server/services/maps_service.h"
+#include "server/services/models_service.h"
 #include "server/services/planning_service.h"
 #include "server/services/posegraph_service.h"
 #include "server/services/scans_service.h"
@@ -43,6 +44,7 @@
 #include "strata/v1/classifiers.grpc.pb.h"
 #include "strata/v1/jobs.grpc.pb.h"
 #include "strata/v1/maps.grpc.pb.h"
+#include "strata/v1/models.grpc.pb.h"
 #include "strata/v1/planning.grpc.pb.h"
 #include "strata/v1/posegraph.grpc.pb.h"
 #include "strata/v1/scans.grpc.pb.h"
@@ -108,7 +110,15 @@ class GrpcServer final : public Server {
   // read.
   std::vector<std::shared_ptr<grpc::ServerCredentials>> Credentials();
   std::vector<grpc::Service*> Services() {
-    return {&maps_, &scans_, &tiles_, &planning_, &jobs_, &posegraph_, &classifiers_, &health_};
+    return {&maps_,
+            &scans_,
+            &tiles_,
+            &planning_,
+            &jobs_,
+            &posegraph_,
+            &classifiers_,
+            &models_,
+            &health_};
   }
 
   const ServerOptions options_;
@@ -120,6 +130,7 @@ class GrpcServer final : public Server {
   JobsService jobs_{runtime_};
   PoseGraphService posegraph_{runtime_};
   ClassifiersService classifiers_{runtime_};
+  ModelsService models_{runtime_};
   Health health_{runtime_};
   std::string address_;
   std::unique_ptr<Listener> listener_;
@@ -138,7 +149,8 @@ void SetReady(Health& health, bool ready) {
                               v1::Planning::service_full_name(),
                               v1::Jobs::service_full_name(),
                               v1::PoseGraph::service_full_name(),
-                              v1::Classifiers::service_full_name()}) {
+                              v1::Classifiers::service_full_name(),
+                              v1::Models::service_full_name()}) {
     health.Set(service, ready);
   }
 }

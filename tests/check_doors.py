@@ -14,8 +14,6 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # header: why it needs no door of ours.
 LINKED = {
     "core/mls/update.h": "single measurements as they come (thesis 6.5.3), for a robot that links strata::mls",
-    "core/mls/elevation/elevation_map.h": "waits for the exports of 2-D maps",
-    "core/mls/elevation/extended_elevation_map.h": "waits for the exports of 2-D maps",
 }
 
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.M)

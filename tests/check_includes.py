@@ -35,7 +35,7 @@ ARROWS = {
                "core/common"],
     "client/sdk": ["proto", "core/api", "core/codec", "core/world", "core/mls", "core/cloud", "core/geometry",
                    "core/common"],
-    "client/formats": ["core/posegraph", "core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
+    "client/formats": ["core/posegraph", "core/world", "core/mls", "core/mesh", "core/cloud", "core/geometry", "core/common"],
     "client/cli": ["client/sdk", "client/formats", "core/api", "core/engine", "core/codec", "core/registration",
                    "core/classification", "core/posegraph", "core/world", "core/mls", "core/mesh", "core/cloud", "core/geometry",
                    "core/common"],
@@ -50,8 +50,8 @@ STOREYS = {
     "core/planes": ["models", HERE],
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
     "core/storage": ["sqlite", HERE],
-    "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "ingest", "tiles", "scans", "map"],
-    "client/formats": ["planes", HERE],
+    "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "models", "ingest", "tiles", "scans", "map"],
+    "client/formats": ["planes", HERE, "grid"],
     "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "job", "mesh", "planes", "picture", "terminal"],
 }
 
@@ -67,6 +67,7 @@ EXTERNAL = {
     r"prometheus/.*": ["server/metrics"],
     r"pcl/.*": ["core/registration", "core/planes", "core/classification", "core/mesh", "client/formats"],
     r"libqhull_r/.*|meshoptimizer\.h": ["core/mesh"],
+    r"tiffio\.h": ["client/formats/grid"],
     r"(thread|mutex|condition_variable)": ["core/engine", "server", "client", "core/common"],
 }
 

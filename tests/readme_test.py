@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Keeps the README's console lines true.
+"""Keeps the console lines of README.md and docs/exports.md true.
 
     tests/readme_test.py --build build/release
 
-Runs every line that starts with "$ " in the README's ```console blocks, in order, in an empty folder with the built
-programs on the PATH, and compares what it prints with what the README shows. "…" in the README stands for any text
+Runs every line that starts with "$ " in a page's ```console blocks, in order, in an empty folder with the built
+programs on the PATH, and compares what it prints with what the page shows. "…" in the page stands for any text
 within a line (times, ports). Exits 1 with the difference.
 """
 import argparse
@@ -35,16 +35,11 @@ def matches(expected, printed):
     return re.fullmatch(pattern, printed.rstrip()) is not None
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
-    build = parser.parse_args().build.resolve()
-    programs = {folder: build / folder for folder in ("client/cli", "server", "tests/support")}
-    environment = dict(os.environ, PATH=os.pathsep.join([*map(str, programs.values()), os.environ["PATH"]]))
-    steps = console_lines((ROOT / "README.md").read_text(encoding="utf-8"))
+def holds(page, environment):
+    steps = console_lines((ROOT / page).read_text(encoding="utf-8"))
     if len(steps) < 5:
-        print(f"README.md shows {len(steps)} commands, at least 5 are expected", file=sys.stderr)
-        return 1
+        print(f"{page} shows {len(steps)} commands, at least 5 are expected", file=sys.stderr)
+        return False
     with tempfile.TemporaryDirectory() as folder:
         for command, expected in steps:
             done = subprocess.run(["bash", "-c", command], cwd=folder, env=environment, text=True, timeout=300,
@@ -52,11 +47,20 @@ def main():
             printed = done.stdout.splitlines()
             same = len(printed) == len(expected) and all(map(matches, expected, printed))
             if done.returncode != 0 or not same:
-                print(f"$ {command}\nexit {done.returncode}, README shows:", *expected, "printed:", done.stdout,
+                print(f"$ {command}\nexit {done.returncode}, {page} shows:", *expected, "printed:", done.stdout,
                       done.stderr, sep="\n", file=sys.stderr)
-                return 1
+                return False
             print(f"ok: {command}")
-    return 0
+    return True
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
+    build = parser.parse_args().build.resolve()
+    programs = {folder: build / folder for folder in ("client/cli", "server", "tests/support")}
+    environment = dict(os.environ, PATH=os.pathsep.join([*map(str, programs.values()), os.environ["PATH"]]))
+    return 0 if all(holds(page, environment) for page in ("README.md", "docs/exports.md")) else 1
 
 
 sys.exit(main())

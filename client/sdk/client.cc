@@ -19,6 +19,7 @@
 #include "client/sdk/remote_classifiers.h"
 #include "client/sdk/remote_jobs.h"
 #include "client/sdk/remote_maps.h"
+#include "client/sdk/remote_models.h"
 #include "client/sdk/remote_planning.h"
 #include "client/sdk/remote_posegraph.h"
 #include "client/sdk/remote_scans.h"
@@ -86,6 +87,7 @@ class RemoteDatabase final : public api::Database {
   api::Jobs& jobs() override { return jobs_; }
   api::PoseGraph& posegraph() override { return posegraph_; }
   api::Classifiers& classifiers() override { return classifiers_; }
+  api::Models& models() override { return models_; }
 
  private:
   sdk::Connection connection_;
@@ -96,6 +98,7 @@ class RemoteDatabase final : public api::Database {
   sdk::RemoteJobs jobs_{connection_};
   sdk::RemotePoseGraph posegraph_{connection_};
   sdk::RemoteClassifiers classifiers_{connection_};
+  sdk::RemoteModels models_{connection_};
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "core/api/classifiers.h"
 #include "core/api/jobs.h"
 #include "core/api/maps.h"
+#include "core/api/models.h"
 #include "core/api/planning.h"
 #include "core/api/posegraph.h"
 #include "core/api/scans.h"
@@ -25,6 +26,7 @@ class Database {
   virtual Jobs& jobs() = 0;
   virtual PoseGraph& posegraph() = 0;
   virtual Classifiers& classifiers() = 0;
+  virtual Models& models() = 0;
 };
 
 }  // namespace strata::api

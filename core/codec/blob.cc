@@ -33,6 +33,10 @@ absl::string_view NameOf(BlobKind kind) {
       return "classifier";
     case BlobKind::kLabels:
       return "labels";
+    case BlobKind::kPlaneModel:
+      return "plane model";
+    case BlobKind::kModelPlane:
+      return "plane of a model";
   }
   return "blob";
 }

@@ -18,6 +18,8 @@ enum class BlobKind : std::uint32_t {  // stored
   kScanPlanes = 0x314C5053,            // "SPL1"
   kClassifier = 0x314C4353,            // "SCL1"
   kLabels = 0x31424C53,                // "SLB1"
+  kPlaneModel = 0x314D5053,            // "SPM1"
+  kModelPlane = 0x31504D53,            // "SMP1"
 };
 
 // Bytes that the envelope adds to a body.

@@ -9,6 +9,7 @@
 #include "core/engine/doors/classifiers.h"
 #include "core/engine/doors/jobs.h"
 #include "core/engine/doors/maps.h"
+#include "core/engine/doors/models.h"
 #include "core/engine/doors/planning.h"
 #include "core/engine/doors/posegraph.h"
 #include "core/engine/doors/scans.h"
@@ -29,6 +30,7 @@ class Engine final : public api::Database, public NumbersSource {
   api::Jobs& jobs() override { return jobs_; }
   api::PoseGraph& posegraph() override { return posegraph_; }
   api::Classifiers& classifiers() override { return classifiers_; }
+  api::Models& models() override { return models_; }
   EngineNumbers Numbers() override { return maps_->Numbers(); }
   EngineHealth Health() override { return maps_->Health(); }
 
@@ -40,6 +42,7 @@ class Engine final : public api::Database, public NumbersSource {
   EngineJobs jobs_{*maps_};
   EnginePoseGraph posegraph_{*maps_};
   EngineClassifiers classifiers_{*maps_};
+  EngineModels models_{*maps_};
 };
 
 }  // namespace

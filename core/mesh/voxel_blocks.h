@@ -2,6 +2,7 @@
 #ifndef STRATA_CORE_MESH_VOXEL_BLOCKS_H_
 #define STRATA_CORE_MESH_VOXEL_BLOCKS_H_
 
+#include <algorithm>
 #include <array>
 #include <compare>
 #include <cstddef>
@@ -75,6 +76,11 @@ class VoxelBlocks {
     blocks_.emplace_back();
     last_key_ = key;
     return *(last_ = &blocks_.back());
+  }
+
+  template <typename Change>
+  void ForEach(const Change& change) {
+    for (Block& block : blocks_) std::for_each(block.begin(), block.end(), change);
   }
 
   // What they occupy, roughly.

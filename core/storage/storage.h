@@ -106,6 +106,12 @@ class StorageReader {
       const TileKey& key, absl::string_view made_of) = 0;
   // By key, without bytes.
   virtual absl::StatusOr<std::vector<PreparedTileRow>> ListPreparedTiles() = 0;
+  // What is kept of the plane model that a job made: part 0 is what holds of all of it, the others
+  // are its planes. nullopt: no such part; the model of another job, or none.
+  virtual absl::StatusOr<std::optional<std::string>> FindPlaneModelPart(std::uint64_t job,
+                                                                        std::uint64_t part) = 0;
+  // The job whose model is kept; 0: none.
+  virtual absl::StatusOr<std::uint64_t> JobOfPlaneModel() = 0;
   // Scan ↔ tile relation of integrated scans, level 0, each in ascending order.
   virtual absl::StatusOr<std::vector<ScanNumber>> ScansOfTile(const TileKey& key) = 0;
   virtual absl::StatusOr<std::vector<TileKey>> TilesOfScan(ScanNumber number) = 0;
@@ -217,6 +223,10 @@ class StorageWriter {
   // In place of whatever is kept of the tile.
   virtual absl::Status PutPreparedTile(const PreparedTileRow& row) = 0;
   virtual absl::Status DeletePreparedTile(const TileKey& key) = 0;
+  virtual absl::Status PutPlaneModelPart(std::uint64_t job,
+                                         std::uint64_t part,
+                                         absl::string_view bytes) = 0;
+  virtual absl::Status DeletePlaneModel() = 0;
   // Rows newer than the current version: an unfinished rebuild.
   virtual absl::Status DiscardUnpublished() = 0;
   virtual absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) = 0;

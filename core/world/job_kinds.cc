@@ -85,6 +85,17 @@ std::vector<JobParameter> FadeParameters() {
   };
 }
 
+std::vector<JobParameter> PlanesParameters() {
+  return {
+      {"rho_m", RealType{0.0, 1.0}, "0", "Spread about a plane [m]; 0: as the points say"},
+      {"sigma_rad", RealType{0.001, 0.5}, "0.03", "Of normals about a main direction [rad]"},
+      {"directions", FlagType(), "1", "Planes heed the main directions of all"},
+      {"max_planes", WholeType{1, 10'000}, "500", "In a square of 60 m"},
+      {"min_area_m2", RealType{0.01, 10'000.0}, "1", "Smaller planes are left out [m²]"},
+      {"epsilon_m", RealType{0.05, 5.0}, "0.25", "Points so near are one surface [m]"},
+  };
+}
+
 std::vector<JobKind> MakeJobKinds() {
   return {
       {kRebuildJob, "All derived data again from the scans.", {Threads()}},
@@ -99,6 +110,7 @@ std::vector<JobKind> MakeJobKinds() {
       {kFadeJob,
        "Points through whose place later scans looked leave the tiles.",
        FadeParameters()},
+      {kPlanesJob, "The walls, floors and slopes of the map as polygons.", PlanesParameters()},
   };
 }
 

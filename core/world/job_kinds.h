@@ -22,6 +22,7 @@ inline constexpr absl::string_view kTrainJob = "train";
 inline constexpr absl::string_view kClassifyJob = "classify";
 inline constexpr absl::string_view kEvaluateJob = "evaluate";
 inline constexpr absl::string_view kFadeJob = "fade";
+inline constexpr absl::string_view kPlanesJob = "planes";
 
 // What the text of a parameter may be: 0 or 1;
 struct FlagType {};

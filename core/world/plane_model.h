@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "absl/time/time.h"
 #include <Eigen/Core>
 
 #include "core/geometry/primitives.h"
@@ -52,6 +53,17 @@ struct MainDirection {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // unit, its largest component positive
   std::uint32_t planes = 0;                              // that have it
   double sigma_rad = 0.0;                                // of their normals about it
+};
+
+// How a map's plane model came about.
+struct PlaneModelInfo {
+  std::uint64_t job = 0;    // that found it; 0: there is none
+  std::uint64_t epoch = 0;  // whose poses it stands on
+  absl::Time made;
+  std::uint64_t scans = 0;   // looked at
+  std::uint64_t points = 0;  // of theirs
+  std::uint64_t planes = 0;
+  std::vector<MainDirection> directions;  // by falling number of planes
 };
 
 struct PlaneModel {

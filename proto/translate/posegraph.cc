@@ -99,11 +99,30 @@ absl::StatusOr<Constraint> NewConstraintFromProto(const v1::Constraint& proto) {
   return constraint;
 }
 
+v1::Plane ToProto(const Plane& plane) {
+  v1::Plane proto;
+  *proto.mutable_normal() = ToProto(plane.normal);
+  proto.set_distance(plane.distance);
+  return proto;
+}
+
+absl::StatusOr<Plane> FromProto(absl::string_view what, const v1::Plane& proto) {
+  STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d normal, FromProto(what, proto.normal()));
+  return MakePlane(normal, proto.distance());
+}
+
+absl::StatusOr<PlaneKind> FromProto(absl::string_view what, v1::PlaneKind kind) {
+  if (v1::PlaneKind_IsValid(kind) && kind != v1::PLANE_KIND_UNSPECIFIED) {
+    return static_cast<PlaneKind>(kind);
+  }
+  return absl::InvalidArgumentError(
+      absl::StrCat(what, ": kind ", static_cast<int>(kind), " is not known"));
+}
+
 v1::GlobalPlane ToProto(const GlobalPlane& plane) {
   v1::GlobalPlane proto;
   proto.set_id(plane.id);
-  *proto.mutable_plane()->mutable_normal() = ToProto(plane.plane.normal);
-  proto.mutable_plane()->set_distance(plane.plane.distance);
+  *proto.mutable_plane() = ToProto(plane.plane);
   proto.set_kind(static_cast<v1::PlaneKind>(plane.kind));
   proto.set_from_edges(plane.from_edges);
   proto.set_enabled(plane.enabled);
@@ -116,15 +135,10 @@ v1::GlobalPlane ToProto(const GlobalPlane& plane) {
 
 absl::StatusOr<GlobalPlane> FromProto(const v1::GlobalPlane& proto) {
   const std::string what = absl::StrCat("plane ", proto.id());
-  if (!v1::PlaneKind_IsValid(proto.kind()) || proto.kind() == v1::PLANE_KIND_UNSPECIFIED) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(what, ": kind ", static_cast<int>(proto.kind()), " is not known"));
-  }
   GlobalPlane plane;
   plane.id = proto.id();
-  STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d normal, FromProto(what, proto.plane().normal()));
-  STRATA_ASSIGN_OR_RETURN(plane.plane, MakePlane(normal, proto.plane().distance()));
-  plane.kind = static_cast<PlaneKind>(proto.kind());
+  STRATA_ASSIGN_OR_RETURN(plane.plane, FromProto(what, proto.plane()));
+  STRATA_ASSIGN_OR_RETURN(plane.kind, FromProto(what, proto.kind()));
   plane.from_edges = proto.from_edges();
   plane.enabled = proto.enabled();
   for (const v1::PlaneSupport& support : proto.supports()) {

@@ -12,6 +12,7 @@ namespace strata::translate {
 
 v1::PoseNode ToProto(const PoseNode& node);
 v1::Constraint ToProto(const Constraint& constraint);
+v1::Plane ToProto(const Plane& plane);
 v1::GlobalPlane ToProto(const GlobalPlane& plane);
 v1::LookupPoseResponse ToProto(const api::PoseLookup& lookup);
 
@@ -21,6 +22,8 @@ absl::StatusOr<Constraint> FromProto(const v1::Constraint& constraint);
 // A constraint to be added: without id and origin, whatever they are, and valid
 // (ValidateConstraint).
 absl::StatusOr<Constraint> NewConstraintFromProto(const v1::Constraint& constraint);
+absl::StatusOr<Plane> FromProto(absl::string_view what, const v1::Plane& plane);
+absl::StatusOr<PlaneKind> FromProto(absl::string_view what, v1::PlaneKind kind);
 absl::StatusOr<GlobalPlane> FromProto(const v1::GlobalPlane& plane);
 absl::StatusOr<api::PoseLookup> FromProto(const v1::LookupPoseResponse& lookup);
 

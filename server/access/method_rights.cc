@@ -63,6 +63,7 @@ constexpr std::array kTable = {
     MethodRight{"Classifiers.Delete", kWrite, "map"},
     MethodRight{"Classifiers.Export", kRead, "map"},
     MethodRight{"Classifiers.Import", kWrite, "start.map"},
+    MethodRight{"Models.GetPlaneModel", kRead, "map"},
 };
 
 }  // namespace

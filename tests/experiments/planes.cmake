@@ -14,3 +14,6 @@ strata_executable(
   SOURCES plane_models.cc
   DEPS strata::planes strata::simulator strata::test_support strata::test_recordings
 )
+# Table 5.1's bounds.
+add_test(NAME thesis_table_5_1 COMMAND plane_models rooms)
+set_tests_properties(thesis_table_5_1 PROPERTIES LABELS smoke TIMEOUT 120 COST 20)

@@ -84,6 +84,7 @@ const std::multimap<std::string, std::string>& Examples() {
       {"Planning/SampleSurfaces", "map: 'world' places { x: -6 y: 0.7 } places { x: 2 y: 2 }"},
       {"Planning/SetProfile", "map: 'world' name: 'slim' profile { radius_m: 0.1 height_m: 0.3 }"},
       {"Planning/ListProfiles", "map: 'world'"},
+      {"Models/GetPlaneModel", "map: 'world'"},
       {"PoseGraph/Get", "map: 'world'"},
       {"PoseGraph/SetPose",
        "map: 'world' id { trajectory: 'world' sequence: 2 } "
@@ -290,6 +291,7 @@ const std::vector<Story>& Stories() {
        {"Classifiers/Delete", "map: 'world' name: 'first'"},
        {"Jobs/Start", "map: 'world' kind: 'verify'"}},
       {{"Scans/Delete", "map: 'world' id { trajectory: 'world' sequence: 2 }"},
+       {"Models/GetPlaneModel", "map: 'world'"},
        {"PoseGraph/Get", "map: 'world'"},
        {"Jobs/Start", "map: 'world' kind: 'rebuild'"},
        {"Tiles/Fetch", "map: 'world' area { epoch: 1 }"},

@@ -74,6 +74,16 @@ TEST_F(VerbsTest, MapsAndTheirFiles) {
     const json written = Json({"map", "export", "m", "--format", format, "--out", file});
     EXPECT_EQ(std::filesystem::file_size(file), written.at("bytes").get<std::size_t>());
   }
+  for (const std::string surface : {"highest", "kalman", "ground"}) {
+    const std::string file = Path(surface + ".tif");
+    const json written =
+        Json({"map", "export", "m", "--format", "geotiff", "--surface", surface, "--out", file});
+    EXPECT_GT(written.at("cells"), 10'000);
+    EXPECT_GT(std::filesystem::file_size(file), 10'000U);
+  }
+  const json octree =
+      Json({"map", "export", "m", "--format", "bt", "--region=-3,-3,3,3", "--out", Path("m.bt")});
+  EXPECT_EQ(std::filesystem::file_size(Path("m.bt")), octree.at("bytes").get<std::size_t>());
   EXPECT_EQ(Json({"map", "delete", "m"}).at("deleted"), "m");
   EXPECT_EQ(Json({"map", "list"}).size(), 0U);
 }

@@ -37,6 +37,7 @@ class ServedDatabase final : public api::Database {
   api::Jobs& jobs() override { return client_->jobs(); }
   api::PoseGraph& posegraph() override { return client_->posegraph(); }
   api::Classifiers& classifiers() override { return client_->classifiers(); }
+  api::Models& models() override { return client_->models(); }
 
  private:
   // In the order they need each other.

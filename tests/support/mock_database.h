@@ -257,6 +257,14 @@ class MockClassifiers : public api::Classifiers {
 };
 
 // Calls nobody decided on answer UNKNOWN (gmock's default of a StatusOr).
+class MockModels : public api::Models {
+ public:
+  MOCK_METHOD(absl::StatusOr<PlaneModelInfo>,
+              GetPlaneModel,
+              (const api::Call&, absl::string_view, Sink<ModelPlane>),
+              (override));
+};
+
 class MockDatabase : public api::Database {
  public:
   ::testing::NiceMock<MockMaps>& maps() override { return maps_; }
@@ -266,6 +274,7 @@ class MockDatabase : public api::Database {
   ::testing::NiceMock<MockJobs>& jobs() override { return jobs_; }
   ::testing::NiceMock<MockPoseGraph>& posegraph() override { return posegraph_; }
   ::testing::NiceMock<MockClassifiers>& classifiers() override { return classifiers_; }
+  ::testing::NiceMock<MockModels>& models() override { return models_; }
 
  private:
   ::testing::NiceMock<MockMaps> maps_;
@@ -275,6 +284,7 @@ class MockDatabase : public api::Database {
   ::testing::NiceMock<MockJobs> jobs_;
   ::testing::NiceMock<MockPoseGraph> posegraph_;
   ::testing::NiceMock<MockClassifiers> classifiers_;
+  ::testing::NiceMock<MockModels> models_;
 };
 
 }  // namespace strata::testing

@@ -66,7 +66,7 @@ strata_library(
 # archive: a linker leaves out of an archive what nobody calls.
 add_library(
   strata_database_suite OBJECT
-  database_suite.cc database_suite_classes.cc database_suite_jobs.cc database_suite_maps.cc database_suite_planning.cc
+  database_suite.cc database_suite_classes.cc database_suite_jobs.cc database_suite_maps.cc database_suite_models.cc database_suite_planning.cc
   database_suite_posegraph.cc database_suite_scans.cc database_suite_tiles.cc database_suite_watch.cc
   database_suite_worlds.cc
 )

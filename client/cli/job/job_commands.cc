@@ -3,11 +3,9 @@
 #include <map>
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_split.h"
 
 #include "client/cli/job/job_runner.h"
 #include "client/cli/terminal/arguments.h"
@@ -30,14 +28,7 @@ struct JobOptions {
 
 absl::Status Start(Context& context, JobOptions options) {
   if (options.dry_run) options.parameters["dry_run"] = "1";
-  if (options.wait) {
-    return RunJob(context, options.map, options.kind, options.parameters);
-  }
-  STRATA_ASSIGN_OR_RETURN(
-      const JobInfo job,
-      context.database.jobs().Start(context.call, options.map, options.kind, options.parameters));
-  PrintJob(job, context.output);
-  return absl::OkStatus();
+  return StartJob(context, options.map, options.kind, options.parameters, options.wait);
 }
 
 absl::Status List(Context& context, const JobOptions& options) {
@@ -100,31 +91,12 @@ absl::Status Revert(Context& context, const JobOptions& options) {
   return ShowDecided(context, job, options);
 }
 
-void AddParameters(CLI::App* verb, JobOptions& options) {
-  const auto take = [&options](const std::vector<std::string>& texts) {
-    for (const std::string& text : texts) {
-      const std::pair<std::string, std::string> pair =
-          absl::StrSplit(text, absl::MaxSplits('=', 1));
-      if (text.find('=') == std::string::npos || pair.first.empty()) {
-        throw CLI::ValidationError("KEY=VALUE", "expected as in rounds=3, got " + text);
-      }
-      options.parameters.insert(pair);
-    }
-  };
-  constexpr char kText[] = "Parameter of the job, as in threads=4; may be given several times";
-  verb->add_option_function<std::vector<std::string>>("PARAMETER", take, kText)
-      ->type_name("KEY=VALUE");
-  verb->add_option_function<std::vector<std::string>>("--param", take, kText)
-      ->type_name("KEY=VALUE")
-      ->allow_extra_args(false);
-}
-
 void AddStart(CLI::App* start, JobOptions& options) {
   start->add_option("KIND", options.kind, JobKindNames())->required();
-  AddParameters(start, options);
+  AddJobParameters(start, options.parameters);
   start->add_flag(
       "--dry-run", options.dry_run, "optimize: only propose; see job accept and revert");
-  start->add_flag("--wait", options.wait, "Return when it has ended; exit 1 unless it succeeded");
+  AddWait(start, options.wait);
   start->footer(
       absl::StrCat(start->get_footer(), "\n\nKinds and their parameters:\n", JobKindsText()));
 }

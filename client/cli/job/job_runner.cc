@@ -3,8 +3,11 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "absl/time/clock.h"
 
 #include "client/cli/terminal/json.h"
@@ -66,6 +69,41 @@ absl::Status StatusOf(const JobInfo& job) {
   }
   return absl::FailedPreconditionError(
       absl::StrCat(job.kind, " job ", job.id, " ", ToString(job.state), ": ", job.message));
+}
+
+void AddJobParameters(CLI::App* verb, JobParameters& parameters) {
+  const auto take = [&parameters](const std::vector<std::string>& texts) {
+    for (const std::string& text : texts) {
+      const std::pair<std::string, std::string> pair =
+          absl::StrSplit(text, absl::MaxSplits('=', 1));
+      if (text.find('=') == std::string::npos || pair.first.empty()) {
+        throw CLI::ValidationError("KEY=VALUE", "expected as in rounds=3, got " + text);
+      }
+      parameters.insert(pair);
+    }
+  };
+  constexpr char kText[] = "Parameter of the job, as in threads=4; may be given several times";
+  verb->add_option_function<std::vector<std::string>>("PARAMETER", take, kText)
+      ->type_name("KEY=VALUE");
+  verb->add_option_function<std::vector<std::string>>("--param", take, kText)
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+}
+
+void AddWait(CLI::App* verb, bool& wait) {
+  verb->add_flag("--wait", wait, "Return when it has ended; exit 1 unless it succeeded");
+}
+
+absl::Status StartJob(Context& context,
+                      const std::string& map,
+                      absl::string_view kind,
+                      const JobParameters& parameters,
+                      bool wait) {
+  if (wait) return RunJob(context, map, kind, parameters);
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job,
+                          context.database.jobs().Start(context.call, map, kind, parameters));
+  PrintJob(job, context.output);
+  return absl::OkStatus();
 }
 
 absl::Status RunJob(Context& context,

@@ -18,6 +18,17 @@ namespace strata::cli {
 // Watches with progress on stderr; returns the job's last state.
 absl::StatusOr<JobInfo> FollowJob(Context& context, const std::string& map, std::uint64_t id);
 
+// Parameters as KEY=VALUE or --param KEY=VALUE, and --wait.
+void AddJobParameters(CLI::App* verb, JobParameters& parameters);
+void AddWait(CLI::App* verb, bool& wait);
+
+// Starts the job and prints it; with `wait` as RunJob() does.
+absl::Status StartJob(Context& context,
+                      const std::string& map,
+                      absl::string_view kind,
+                      const JobParameters& parameters,
+                      bool wait);
+
 // Starts, follows and prints the job; a job that did not succeed is an error with its message.
 absl::Status RunJob(Context& context,
                     const std::string& map,

@@ -65,7 +65,9 @@ absl::StatusOr<Json> WriteFloor(const FloorPlan& plan,
 }  // namespace
 
 void AddFloorOptions(CLI::App* verb, FloorOptions& options, bool with_number) {
-  verb->add_option("--profile", options.profile, "The map's robot profile whose floors they are")
+  verb->add_option("--profile",
+                   options.profile,
+                   "The map's robot profile whose floors, or whose ground, they are")
       ->capture_default_str();
   if (with_number) {
     verb->add_option("--floor", options.floor, "The floor of this number, as map floors has it")

@@ -14,7 +14,9 @@
 #include "absl/strings/str_cat.h"
 
 #include "client/cli/map/floor_files.h"
+#include "client/cli/map/height_files.h"
 #include "client/cli/map/map_files.h"
+#include "client/cli/map/octree_files.h"
 #include "client/cli/map/tile_source.h"
 #include "client/cli/picture/map_picture.h"
 #include "client/cli/terminal/arguments.h"
@@ -38,6 +40,7 @@ struct ExportOptions {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   FloorOptions floor;
   std::string mode = "trinary";
+  HeightOptions heights;
 };
 
 Colour TraversabilityColour(const Surface& surface) {
@@ -130,7 +133,7 @@ absl::StatusOr<Geometry> MeshOf(Context& context,
   STRATA_ASSIGN_OR_RETURN(const MapInfo info,
                           context.database.maps().Get(context.call, options.map));
   STRATA_ASSIGN_OR_RETURN(const FetchedTiles fetched,
-                          FetchTiles(context, options.map, options.level));
+                          FetchTiles(context, options.map, {.level = options.level}));
   damage = fetched.damage;
   const bool own_colours = options.layer == "colour";
   if (own_colours) STRATA_RETURN_IF_ERROR(ExpectColours(options.map, fetched.tiles));
@@ -185,6 +188,19 @@ absl::Status Export(Context& context, const ExportOptions& options) {
   if (options.floor.floor.has_value() || options.floor.at.has_value()) {
     return absl::InvalidArgumentError("--floor and --at are for --format nav2");
   }
+  if (options.format == "geotiff" || options.format == "asc") {
+    HeightOptions heights = options.heights;
+    heights.profile = options.floor.profile;
+    heights.level = options.level;
+    return ExportHeights(context, options.map, heights, options.format, options.out);
+  }
+  if (options.format == "bt") {
+    return ExportOctree(context, options.map, {options.level, options.heights.region}, options.out);
+  }
+  if (options.heights.region.has_value()) {
+    return absl::InvalidArgumentError(
+        "--region is for --format geotiff, asc, bt; map mesh has one, too");
+  }
   const bool points = options.format == "pcd";
   absl::Status damage;
   STRATA_ASSIGN_OR_RETURN(Geometry geometry,
@@ -222,7 +238,8 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
       noun,
       "export",
       "Write a map for other programs: its surfaces as a mesh (ply, obj, stl, glb), the points of "
-      "its scans (pcd), or its floors as grids (nav2)",
+      "its scans (pcd), its floors as grids (nav2), one height a cell (geotiff, asc), or free and "
+      "occupied space (bt)",
       "strata map export campus --format ply --out campus.ply",
       [options](Context& context) { return Export(context, *options); });
   AddMapName(app, options->map);
@@ -234,8 +251,10 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
          "triangles and colour, for viewers; pcd: all points, binary x y z and, where there are, "
          "rgb "
          "and label; nav2: a picture (pgm) and a yaml file for map_server, of one floor or a pair "
-         "each of all")
-      ->check(CLI::IsMember({"ply", "obj", "stl", "glb", "pcd", "nav2"}))
+         "each of all; geotiff: heights and their standard deviation as bands, on earth where the "
+         "map has an origin; asc: the same as ESRI ASCII grids, FILE.asc and FILE-sigma.asc, with "
+         ".prj; bt: an octree of OctoMap, of what the scans' rays hit and went through")
+      ->check(CLI::IsMember({"ply", "obj", "stl", "glb", "pcd", "nav2", "geotiff", "asc", "bt"}))
       ->required();
   app->add_option("--out", options->out, "The file to write")->type_name("FILE")->required();
   AddNumbers(
@@ -258,7 +277,18 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
                   "on which the robot cannot be")
       ->check(CLI::IsMember({"trinary", "scale"}))
       ->capture_default_str();
-  app->add_option("--level", options->level, "Level of detail of the mesh, 0 = finest")
+  app->add_option(
+         "--surface",
+         options->heights.surface,
+         "geotiff, asc: the highest surface of each cell; all of them fused (kalman), "
+         "overhangs too; or the lowest that the robot of --profile can drive on, so that "
+         "underpasses stay open (ground), with a band for what each cell is: 1 traversable, "
+         "2 not, 3 vertical, 4 traversable below or above something")
+      ->check(CLI::IsMember({"highest", "kalman", "ground"}))
+      ->capture_default_str();
+  AddRegion(app, options->heights.region);
+  app->add_option(
+         "--level", options->level, "Level of detail of a mesh, heights or octree, 0 = finest")
       ->check(CLI::Range(0, kMaxLevel))
       ->capture_default_str();
 }

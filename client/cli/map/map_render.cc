@@ -114,7 +114,7 @@ absl::Status Render(Context& context, RenderOptions options) {
   }
   const std::int32_t level =
       whole ? options.level.value_or(LevelFor(stats, cell, options.picture)) : 0;
-  STRATA_ASSIGN_OR_RETURN(FetchedTiles fetched, FetchTiles(context, options.map, level));
+  STRATA_ASSIGN_OR_RETURN(FetchedTiles fetched, FetchTiles(context, options.map, {.level = level}));
   STRATA_RETURN_IF_ERROR(KeepFloor(context, options.map, options.floor, fetched.tiles));
   if (options.layer == "class") {
     STRATA_ASSIGN_OR_RETURN(options.picture.classes, StylesOf(context, options.map, fetched.tiles));

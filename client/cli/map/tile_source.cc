@@ -33,11 +33,9 @@ absl::Status DamageOf(const std::string& map, const std::vector<TileKey>& damage
 
 absl::StatusOr<FetchedTiles> FetchTiles(Context& context,
                                         const std::string& map,
-                                        std::int32_t level) {
+                                        const api::TileArea& area) {
   FetchedTiles fetched;
   std::vector<TileKey> damaged;
-  api::TileArea area;
-  area.level = level;
   STRATA_RETURN_IF_ERROR(context.database.tiles().Fetch(
       context.call, map, area, {}, [&](const api::TileUpdate& update) {
         absl::StatusOr<SurfaceTile> tile = DecodeSurfaceTile(update.tile.bytes);

@@ -10,6 +10,7 @@
 #include "absl/status/statusor.h"
 
 #include "client/cli/terminal/command.h"
+#include "core/api/tiles.h"
 #include "core/mls/surface_tile.h"
 
 namespace strata::cli {
@@ -19,10 +20,10 @@ struct FetchedTiles {
   absl::Status damage;             // DATA_LOSS naming the tiles that cannot be read and the cure
 };
 
-// All tiles of one level of detail that can be read.
+// All tiles of the area that can be read.
 absl::StatusOr<FetchedTiles> FetchTiles(Context& context,
                                         const std::string& map,
-                                        std::int32_t level);
+                                        const api::TileArea& area);
 
 // FAILED_PRECONDITION where there are surfaces and none of them has a colour.
 absl::Status ExpectColours(const std::string& map, const std::vector<SurfaceTile>& tiles);

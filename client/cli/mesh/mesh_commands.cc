@@ -115,23 +115,7 @@ void AddMapMesh(Commands& commands, CLI::App* noun) {
   app->add_option("--method", options->method, kMethods)
       ->check(CLI::IsMember({"tsdf", "contour", "alpha"}))
       ->capture_default_str();
-  AddNumbers(
-      app,
-      "--region",
-      "X0,Y0,X1,Y1[,Z0,Z1]",
-      4,
-      6,
-      [options](const std::vector<double>& n) {
-        constexpr double kAnyHeight = 1e7;
-        const bool heights = n.size() == 6;
-        if (n.size() == 5 || n[0] >= n[2] || n[1] >= n[3] || (heights && n[4] >= n[5])) {
-          throw CLI::ValidationError("--region", "expected X0 < X1, Y0 < Y1 and Z0 < Z1");
-        }
-        options->region =
-            Eigen::AlignedBox3d(Eigen::Vector3d(n[0], n[1], heights ? n[4] : -kAnyHeight),
-                                Eigen::Vector3d(n[2], n[3], heights ? n[5] : kAnyHeight));
-      },
-      "Only this part of the map [m]; default: all of it");
+  AddRegion(app, options->region);
 }
 
 void AddScanMesh(Commands& commands, CLI::App* noun) {

@@ -9,9 +9,9 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
 #include <Eigen/Core>
 
+#include "client/cli/terminal/world_json.h"
 #include "core/api/scans.h"
 #include "core/common/status.h"
 #include "core/world/map_class.h"
@@ -31,13 +31,13 @@ void DropPoints(PointCloud& cloud, const Drop& drop) {
 }
 
 absl::Status DroppedPoints(const std::string& map) {
-  return absl::FailedPreconditionError(absl::StrCat(
-      "map ",
-      map,
-      " has dropped the points of its scans: there is nothing to mesh but its surfaces, which "
-      "strata map export ",
-      map,
-      " --format ply writes"));
+  return absl::FailedPreconditionError(
+      absl::StrCat("map ",
+                   map,
+                   " has dropped the points of its scans; what is left are its surfaces, which "
+                   "strata map export ",
+                   map,
+                   " --format ply writes"));
 }
 
 // Those that are integrated and may have points in the region.
@@ -68,18 +68,12 @@ absl::Status NoScans(Context& context, const MeshOptions& options) {
                           context.database.maps().Stats(context.call, options.map));
   if (stats.scans == stats.scans_pending + stats.scans_failed) {
     return absl::FailedPreconditionError(
-        absl::StrCat("map ", options.map, " has no integrated scans: there is nothing to mesh"));
+        absl::StrCat("map ", options.map, " has no integrated scans: import some, or wait"));
   }
-  return absl::NotFoundError(absl::StrFormat(
-      "no scan of map %s with points reaches into the region; the map lies within (%.1f, %.1f, "
-      "%.1f) and (%.1f, %.1f, %.1f)",
-      options.map,
-      stats.box_min.x(),
-      stats.box_min.y(),
-      stats.box_min.z(),
-      stats.box_max.x(),
-      stats.box_max.y(),
-      stats.box_max.z()));
+  return absl::NotFoundError(absl::StrCat("no scan of map ",
+                                          options.map,
+                                          " with points reaches into the region; the map lies ",
+                                          ExtentOf(stats)));
 }
 
 }  // namespace

@@ -78,6 +78,25 @@ CLI::Option* AddPose(CLI::App* app,
   return AddNumbers(app, name, kPoseShape, 3, 7, set_pose, description);
 }
 
+CLI::Option* AddRegion(CLI::App* app, std::optional<Eigen::AlignedBox3d>& region) {
+  const auto set = [&region](const std::vector<double>& n) {
+    constexpr double kAnyHeight = 1e7;
+    const bool heights = n.size() == 6;
+    if (n.size() == 5 || n[0] >= n[2] || n[1] >= n[3] || (heights && n[4] >= n[5])) {
+      throw CLI::ValidationError("--region", "expected X0 < X1, Y0 < Y1 and Z0 < Z1");
+    }
+    region = Eigen::AlignedBox3d(Eigen::Vector3d(n[0], n[1], heights ? n[4] : -kAnyHeight),
+                                 Eigen::Vector3d(n[2], n[3], heights ? n[5] : kAnyHeight));
+  };
+  return AddNumbers(app,
+                    "--region",
+                    "X0,Y0,X1,Y1[,Z0,Z1]",
+                    4,
+                    6,
+                    set,
+                    "Only this part of the map [m]; default: all of it");
+}
+
 void AddMapName(CLI::App* app, std::string& map) {
   app->add_option("NAME", map, "Name of the map")->required();
 }

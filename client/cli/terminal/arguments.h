@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <Eigen/Geometry>
 
 #include "core/mls/tile_key.h"
 #include "core/world/plan.h"
@@ -41,6 +42,9 @@ CLI::Option* AddPose(CLI::App* app,
                      const std::string& name,
                      std::function<void(const Pose&, std::size_t)> set,
                      const std::string& description);
+
+// Adds --region X0,Y0,X1,Y1[,Z0,Z1], a box in the map [m]; of any height without Z0 and Z1.
+CLI::Option* AddRegion(CLI::App* app, std::optional<Eigen::AlignedBox3d>& region);
 
 // The positional argument NAME.
 void AddMapName(CLI::App* app, std::string& map);

@@ -2,9 +2,21 @@
 
 #include <string>
 
+#include "absl/strings/str_format.h"
+
 #include "client/cli/terminal/json.h"
 
 namespace strata::cli {
+
+std::string ExtentOf(const MapStats& stats) {
+  return absl::StrFormat("within (%.1f, %.1f, %.1f) and (%.1f, %.1f, %.1f)",
+                         stats.box_min.x(),
+                         stats.box_min.y(),
+                         stats.box_min.z(),
+                         stats.box_max.x(),
+                         stats.box_max.y(),
+                         stats.box_max.z());
+}
 
 std::string ToString(ConstraintOrigin origin) {
   switch (origin) {
@@ -106,6 +118,50 @@ Json ToJson(const GlobalPlane& plane) {
           {"enabled", plane.enabled},
           {"note", plane.note},
           {"supports", supports}};
+}
+
+Json ToJson(const ModelPlane& plane) {
+  const auto ring = [](const PlaneRing& points) {
+    Json json = Json::array();
+    for (const Eigen::Vector3d& p : points) json.push_back(ToJson(p));
+    return json;
+  };
+  Json polygons = Json::array();
+  for (const PlanePolygon& polygon : plane.polygons) {
+    Json holes = Json::array();
+    for (const PlaneHole& hole : polygon.holes) {
+      holes.push_back({{"ring", ring(hole.ring)}, {"seen_open", hole.seen_open}});
+    }
+    polygons.push_back(
+        {{"area_m2", polygon.area_m2}, {"outer", ring(polygon.outer)}, {"holes", holes}});
+  }
+  return {{"id", plane.id},
+          {"kind", ToString(plane.kind)},
+          {"normal", ToJson(plane.plane.normal)},
+          {"distance_m", plane.plane.distance},
+          {"direction", plane.direction == kNoDirection ? Json() : Json(plane.direction)},
+          {"area_m2", plane.area_m2},
+          {"points", plane.point_count},
+          {"rms_m", plane.rms_m},
+          {"sigma_m", plane.sigma_m},
+          {"sigma_rad", plane.sigma_rad},
+          {"polygons", polygons}};
+}
+
+Json ToJson(const PlaneModelInfo& info) {
+  Json directions = Json::array();
+  for (const MainDirection& one : info.directions) {
+    directions.push_back({{"direction", ToJson(one.direction)},
+                          {"planes", one.planes},
+                          {"sigma_rad", one.sigma_rad}});
+  }
+  return {{"job", info.job},
+          {"epoch", info.epoch},
+          {"made", TimeText(info.made)},
+          {"scans", info.scans},
+          {"points", info.points},
+          {"planes", info.planes},
+          {"directions", directions}};
 }
 
 Json ToJson(const api::PoseLookup& lookup) {

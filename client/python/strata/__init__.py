@@ -10,6 +10,7 @@ from strata.database import Database, connect
 from strata.errors import (AlreadyExists, Cancelled, DataLoss, DeadlineExceeded, FailedPrecondition, InvalidArgument,
                            NotFound, PermissionDenied, ResourceExhausted, StrataError, Unauthenticated, Unavailable,
                            Unimplemented)
+from strata.heights import Heights
 from strata.job import Job
 from strata.map import Change, Map, ScanChange, Stats
 from strata.mesh import Mesh
@@ -21,6 +22,6 @@ from strata.tiles import NON_TRAVERSABLE, SURFACE, TRAVERSABLE, UNDERSIDE, UNKNO
 __all__ = [
     "AlreadyExists", "Cancelled", "DataLoss", "DeadlineExceeded", "FailedPrecondition", "InvalidArgument", "NotFound",
     "PermissionDenied", "ResourceExhausted", "StrataError", "Unauthenticated", "Unavailable", "Unimplemented",
-    "Ack", "Change", "Database", "Job", "Map", "Mesh", "NON_TRAVERSABLE", "Path", "Points", "Registration", "SURFACE", "Scan",
+    "Ack", "Change", "Database", "Heights", "Job", "Map", "Mesh", "NON_TRAVERSABLE", "Path", "Points", "Registration", "SURFACE", "Scan",
     "ScanChange", "Stats", "TRAVERSABLE", "Tile", "TileKey", "UNDERSIDE", "UNKNOWN", "connect", "decode_tile", "register",
 ]

@@ -7,10 +7,10 @@ import time as clock
 
 import numpy as np
 
-from strata import errors, floors, job, mesh, plan, poses, scan
+from strata import errors, floors, heights, job, mesh, plan, planes, poses, scan
 from strata.tiles import SURFACE, TILE_CELLS, TileKey, decode_tile
-from strata.v1 import (geometry_pb2, jobs_pb2, jobs_pb2_grpc, maps_pb2, maps_pb2_grpc, planning_pb2, planning_pb2_grpc,
-                       scans_pb2, scans_pb2_grpc, tiles_pb2, tiles_pb2_grpc)
+from strata.v1 import (geometry_pb2, jobs_pb2, jobs_pb2_grpc, maps_pb2, maps_pb2_grpc, models_pb2, models_pb2_grpc,
+                       planning_pb2, planning_pb2_grpc, scans_pb2, scans_pb2_grpc, tiles_pb2, tiles_pb2_grpc)
 
 _MAX_PLACES = 10_000
 _TILE_LIMIT = 1 << 31
@@ -81,6 +81,7 @@ class Map:
         self._tiles = tiles_pb2_grpc.TilesStub(connection.channel)
         self._planning = planning_pb2_grpc.PlanningStub(connection.channel)
         self._jobs = jobs_pb2_grpc.JobsStub(connection.channel)
+        self._models = models_pb2_grpc.ModelsStub(connection.channel)
         self._lock = threading.Lock()
         self._last_sequence = {}
 
@@ -235,6 +236,16 @@ class Map:
         return mesh.mesh(self._connection, self.name, region, voxel=voxel, method=method, of_class=of_class,
                          simplify=simplify, program=program)
 
+    def heights(self, surface="highest", region=None, *, profile=None, level=0, program="strata"):
+        """One height a cell → Heights; by the program `strata`, which must be installed.
+
+        surface: "highest"; "kalman", all of a cell fused; or "ground", the lowest that the robot of the map's `profile`
+        (its name) can drive on, so that underpasses stay open. region: (2, 2) or (2, 3) lower and upper corner [m]; None:
+        all. level: of detail; each doubles the edge of a cell. Raises ValueError, StrataError, and FileNotFoundError where
+        `program` is not installed.
+        """
+        return heights.heights(self._connection, self.name, surface, region, profile=profile, level=level, program=program)
+
     def surfaces(self, places):
         """All levels at places (n, 2) or (n, 3), map frame [m]: a list of arrays of dtype SURFACE, lowest first."""
         places = np.asarray(places, dtype=float)
@@ -280,6 +291,15 @@ class Map:
             map=self.name, at=None if at is None else plan.endpoint(at), profile=plan.profile_to_proto(profile or {}),
             min_area_m2=min_area, cells=cells)
         return floors.from_proto(self._connection.unary(self._planning.ListFloors, request))
+
+    def planes(self):
+        """PlaneModel: the walls, floors and slopes that the last job "planes" found; NotFound before there was one.
+
+            campus.job("planes", min_area_m2=4)
+            walls = [plane for plane in campus.planes().planes if plane.kind == "wall"]
+        """
+        request = models_pb2.GetPlaneModelRequest(map=self.name)
+        return planes.from_proto(self._connection.collected(self._models.GetPlaneModel, request))
 
     def _named_profile(self, name):
         profiles = self.profiles()

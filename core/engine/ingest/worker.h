@@ -46,8 +46,8 @@ class Worker {
   absl::Time WaitingSince(ScanNumber oldest);
 
   // Returns once what is derived is usable: at once, but where it is made again after an update of
-  // its format or a repair. `stop` ends the waiting, as in Execute; FAILED_PRECONDITION where making
-  // it again is in quarantine, CANCELLED once closed.
+  // its format or a repair. `stop` ends the waiting, as in Execute; FAILED_PRECONDITION where
+  // making it again is in quarantine, CANCELLED once closed.
   absl::Status AwaitDerived(const Stop& stop);
 
   // Runs `command` on the worker's thread, before the next batch, and returns its status. `stop`

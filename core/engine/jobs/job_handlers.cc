@@ -12,6 +12,7 @@
 #include "core/engine/labels/classify.h"
 #include "core/engine/labels/fade.h"
 #include "core/engine/labels/train.h"
+#include "core/engine/models/plane_models.h"
 #include "core/engine/repair/rebuild.h"
 #include "core/world/job_kinds.h"
 
@@ -23,7 +24,7 @@ absl::Status NeedsNothing(MapCore&, const JobArguments&) { return absl::OkStatus
 absl::Status NeedsPoints(MapCore& core, const JobArguments&) {
   if (core.info().parameters.keep_points) return absl::OkStatus();
   return absl::FailedPreconditionError(
-      "fade: the map drops points; what has faded is told by the rays of scans");
+      "the map drops points, and the job looks at them and along the rays to them");
 }
 
 absl::Status NeedsClassifier(MapCore& core, const JobArguments& arguments) {
@@ -81,6 +82,10 @@ absl::Status RunEvaluate(const JobRun& run) {
   return RunEvaluateJob(run.core, run.arguments.Text("model"), run.context);
 }
 
+absl::Status RunPlanes(const JobRun& run) {
+  return RunPlanesJob(run.core, run.job, run.arguments, run.context);
+}
+
 absl::Status RunFade(const JobRun& run) {
   return RunFadeJob(run.core, run.worker, run.arguments, run.context);
 }
@@ -97,6 +102,7 @@ const std::vector<JobHandler>& JobHandlers() {
       {kClassifyJob, NeedsClassifier, RunClassify},
       {kEvaluateJob, NeedsClassifier, RunEvaluate},
       {kFadeJob, NeedsPoints, RunFade},
+      {kPlanesJob, NeedsPoints, RunPlanes},
   };
   return *handlers;
 }

@@ -174,15 +174,14 @@ class Fading {
   absl::Status Skipping(const SeenScan& scan, absl::FunctionRef<absl::Status()> body) {
     const absl::Status done = body();
     if (!absl::IsDataLoss(done)) return done;
-    STRATA_ASSIGN_OR_RETURN(const bool there, IsThere(scan.placed.scan.number));
+    STRATA_ASSIGN_OR_RETURN(const bool there, StillThere(scan.placed.scan.number));
     if (!there) return absl::OkStatus();
     return Annotate(done, absl::StrCat("scan ", scan.placed.scan.header.id.ToString()));
   }
 
-  absl::StatusOr<bool> IsThere(ScanNumber number) {
+  absl::StatusOr<bool> StillThere(ScanNumber number) {
     STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-    const std::uint64_t epoch = core_.snapshots().current().epoch;
-    return !absl::IsNotFound(reader->GetScan(number, epoch).status());
+    return IsThere(*reader, number, core_.snapshots().current().epoch);
   }
 
   absl::Status LookThroughBlocks() {
@@ -231,7 +230,7 @@ class Fading {
       if (!absl::IsDataLoss(tiles.status())) return tiles;
       std::vector<PlacedScanRecord> there;
       for (const PlacedScanRecord& placed : with_points) {
-        STRATA_ASSIGN_OR_RETURN(const bool is_there, IsThere(placed.scan.number));
+        STRATA_ASSIGN_OR_RETURN(const bool is_there, StillThere(placed.scan.number));
         if (is_there) there.push_back(placed);
       }
       if (there.size() == with_points.size()) return tiles;

@@ -35,6 +35,13 @@ absl::Status ForEachPosedScan(StorageReader& reader,
   });
 }
 
+absl::StatusOr<bool> IsThere(StorageReader& reader, ScanNumber number, std::uint64_t epoch) {
+  const absl::Status found = reader.GetScan(number, epoch).status();
+  if (absl::IsNotFound(found)) return false;
+  STRATA_RETURN_IF_ERROR(found);
+  return true;
+}
+
 absl::StatusOr<PosedScan> GetScanById(StorageReader& reader,
                                       const ScanId& id,
                                       std::uint64_t epoch) {

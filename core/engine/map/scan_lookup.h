@@ -26,6 +26,9 @@ absl::Status ForEachPosedScan(StorageReader& reader,
                               std::uint64_t epoch,
                               absl::FunctionRef<void(PosedScan)> body);
 
+// False of one that was deleted.
+absl::StatusOr<bool> IsThere(StorageReader& reader, ScanNumber number, std::uint64_t epoch);
+
 // NOT_FOUND.
 absl::StatusOr<PosedScan> GetScanById(StorageReader& reader, const ScanId& id, std::uint64_t epoch);
 

@@ -11,6 +11,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/map/steady_view.h"
+#include "core/engine/models/plane_models.h"
 #include "core/engine/repair/derived_pass.h"
 #include "core/engine/repair/truth_check.h"
 #include "core/engine/tiles/staged_tiles.h"
@@ -115,6 +116,10 @@ absl::Status Verify(MapCore& core, const SteadyView& view, int threads, JobConte
   } else {
     STRATA_RETURN_IF_ERROR(kept);
   }
+  const absl::Status planes = ReadPlaneModel(core, context.stop(), [](const ModelPlane&) {
+                                return absl::OkStatus();
+                              }).status();
+  if (absl::IsDataLoss(planes)) findings.Add(std::string(planes.message()));
   context.SetMetric("tiles_checked", static_cast<double>(tiles));
   context.SetMetric("scans_checked", static_cast<double>(truth.scans()));
   context.SetMetric("pieces_checked", static_cast<double>(truth.pieces()));
@@ -138,8 +143,10 @@ absl::Status RunRebuildJob(Integrator& integrator, int threads, JobContext& cont
                     .threads = threads},
                    context);
   STRATA_RETURN_IF_ERROR(pass.Run(repairs));
-  const absl::Status published =
-      staged.Publish({}, [&](StorageWriter& writer) { return PutIndexes(writer, pass.indexes()); });
+  const absl::Status published = staged.Publish({}, [&](StorageWriter& writer) -> absl::Status {
+    STRATA_RETURN_IF_ERROR(writer.DeletePlaneModel());  // made when a person asks for it
+    return PutIndexes(writer, pass.indexes());
+  });
   integrator.store().Clear();
   STRATA_RETURN_IF_ERROR(published);
   context.SetMetric("scans", static_cast<double>(pass.scans()));

@@ -65,6 +65,9 @@ class ScanSource {
   // What the last map built from points had to leave out of them.
   const DroppedPoints& dropped() const { return dropped_; }
 
+  // For the block that ForEachBlock() gives just now: not 0 for points that have faded; empty: none
+  // has.
+  const std::vector<std::uint16_t>& faded() const { return held_faded_; }
   // The points in blocks of about a million, in order.
   absl::Status ForEachBlock(const ScanRecord& scan,
                             absl::FunctionRef<absl::Status(const PointCloud&)> body);

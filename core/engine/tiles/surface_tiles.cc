@@ -19,15 +19,10 @@
 #include "core/common/status.h"
 #include "core/engine/map/parallel.h"
 #include "core/mls/overview.h"
+#include "core/mls/traversability.h"
+#include "core/world/robot_limits.h"
 
 namespace strata {
-
-TraversabilityLimits LimitsOf(const RobotProfile& profile) {
-  return {.max_slope_rad = profile.max_slope_rad,
-          .max_step_m = profile.max_step_m,
-          .max_roughness_m = profile.max_roughness_m,
-          .clearance_m = profile.height_m};
-}
 
 absl::btree_set<TileKey> WithNeighbours(const absl::btree_set<TileKey>& keys) {
   absl::btree_set<TileKey> all;

@@ -19,15 +19,11 @@
 #include "core/engine/tiles/mls_tiles.h"
 #include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
-#include "core/mls/traversability.h"
 #include "core/storage/storage.h"
 #include "core/world/map_info.h"
 #include "core/world/robot_profile.h"
 
 namespace strata {
-
-// What the tiles of a map are annotated for.
-TraversabilityLimits LimitsOf(const RobotProfile& profile);
 
 // `keys` and their eight neighbours.
 absl::btree_set<TileKey> WithNeighbours(const absl::btree_set<TileKey>& keys);

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -63,6 +64,33 @@ absl::StatusOr<std::vector<Measurement>> Measure(const PointCloud& cloud,
   return measurements;
 }
 
+absl::StatusOr<ElevationMap> Rectangle(const Eigen::Array2d& low,
+                                       const Eigen::Array2d& size,
+                                       double cell_size_m) {
+  if ((low < -kMaxCell).any() || (low + size > kMaxCell).any() ||
+      size.prod() > static_cast<double>(kMaxElevationCells)) {
+    return absl::OutOfRangeError(
+        absl::StrCat("elevation map: it would span ",
+                     size.x(),
+                     " × ",
+                     size.y(),
+                     " cells from (",
+                     low.x(),
+                     ", ",
+                     low.y(),
+                     "), at most ",
+                     kMaxElevationCells,
+                     " within ±2^30 are made; take a smaller region or larger cells"));
+  }
+  ElevationMap map;
+  map.cell_size_m = cell_size_m;
+  map.corner = {static_cast<std::int32_t>(low.x()), static_cast<std::int32_t>(low.y())};
+  map.width = static_cast<std::int32_t>(size.x());
+  map.height = static_cast<std::int32_t>(size.y());
+  map.cells.resize(static_cast<std::size_t>(map.width) * map.height);
+  return map;
+}
+
 // An unobserved map over the cells of all measurements.
 absl::StatusOr<ElevationMap> EmptyMapAround(const std::vector<Measurement>& measurements,
                                             double cell_size_m) {
@@ -74,36 +102,15 @@ absl::StatusOr<ElevationMap> EmptyMapAround(const std::vector<Measurement>& meas
     low = low.min(Eigen::Array2d(m.x, m.y));
     high = high.max(Eigen::Array2d(m.x, m.y));
   }
-  ElevationMap map;
-  map.cell_size_m = cell_size_m;
-  if (low.x() > high.x()) return map;
+  if (low.x() > high.x())
+    return Rectangle(Eigen::Array2d::Zero(), Eigen::Array2d::Zero(), cell_size_m);
   low = low.floor();
-  const Eigen::Array2d size = high.floor() - low + 1.0;
-  if ((low < -kMaxCell).any() || (high > kMaxCell).any() ||
-      size.prod() > static_cast<double>(kMaxElevationCells)) {
-    return absl::OutOfRangeError(absl::StrCat("elevation map: the points span ",
-                                              size.x(),
-                                              " × ",
-                                              size.y(),
-                                              " cells from (",
-                                              low.x(),
-                                              ", ",
-                                              low.y(),
-                                              "), at most ",
-                                              kMaxElevationCells,
-                                              " within ±2^30 are made; use larger cells"));
-  }
-  map.corner = {static_cast<std::int32_t>(low.x()), static_cast<std::int32_t>(low.y())};
-  map.width = static_cast<std::int32_t>(size.x());
-  map.height = static_cast<std::int32_t>(size.y());
-  map.cells.resize(static_cast<std::size_t>(map.width) * map.height);
-  return map;
+  return Rectangle(low, high.floor() - low + 1.0, cell_size_m);
 }
 
 ElevationCell& CellAt(ElevationMap& map, double x, double y) {
-  const auto column = static_cast<std::size_t>(std::floor(x) - map.corner.x);
-  const auto row = static_cast<std::size_t>(std::floor(y) - map.corner.y);
-  return map.cells[row * map.width + column];
+  return map.CellAt(
+      {static_cast<std::int32_t>(std::floor(x)), static_cast<std::int32_t>(std::floor(y))});
 }
 
 bool Higher(double z_m, double variance_m2, const ElevationCell& cell) {
@@ -122,21 +129,37 @@ void KeepHighest(double z_m, double variance_m2, ElevationCell& cell) {
 struct Fusion {
   double information = 0.0;
   double weighted_z = 0.0;
+
+  void Add(double z_m, double variance_m2) {
+    information += 1.0 / variance_m2;
+    weighted_z += z_m / variance_m2;
+  }
+  // An unobserved cell of nothing.
+  ElevationCell Cell() const {
+    if (information == 0.0) return {};
+    return {.z_m = static_cast<float>(weighted_z / information),
+            .sigma_m = static_cast<float>(std::sqrt(1.0 / information))};
+  }
 };
 
 void FuseAll(const std::vector<Measurement>& measurements, ElevationMap& map) {
   std::vector<Fusion> fusions(map.cells.size());
   for (const Measurement& m : measurements) {
     if (!m.valid()) continue;
-    Fusion& fusion = fusions[&CellAt(map, m.x, m.y) - map.cells.data()];
-    fusion.information += 1.0 / m.variance_m2;
-    fusion.weighted_z += m.z_m / m.variance_m2;
+    fusions[&CellAt(map, m.x, m.y) - map.cells.data()].Add(m.z_m, m.variance_m2);
   }
-  for (std::size_t i = 0; i < fusions.size(); ++i) {
-    if (fusions[i].information == 0.0) continue;
-    map.cells[i] = {.z_m = static_cast<float>(fusions[i].weighted_z / fusions[i].information),
-                    .sigma_m = static_cast<float>(std::sqrt(1.0 / fusions[i].information))};
+  for (std::size_t i = 0; i < fusions.size(); ++i) map.cells[i] = fusions[i].Cell();
+}
+
+ElevationCell CellOfSurfaces(std::span<const Surface> surfaces, ElevationRule rule) {
+  if (rule == ElevationRule::kHighest) {
+    return {.z_m = surfaces.back().z_m, .sigma_m = surfaces.back().sigma_m};
   }
+  Fusion fusion;
+  for (const Surface& surface : surfaces) {
+    fusion.Add(surface.z_m, double{surface.sigma_m} * surface.sigma_m);
+  }
+  return fusion.Cell();
 }
 
 using Facet = std::array<const Measurement*, 3>;
@@ -183,6 +206,22 @@ void DrawFacet(const Facet& facet, ElevationMap& map) {
 }
 
 }  // namespace
+
+absl::StatusOr<ElevationMap> RectangleAround(const std::vector<CellIndex>& cells,
+                                             double cell_size_m) {
+  if (cells.empty()) return Rectangle(Eigen::Array2d::Zero(), Eigen::Array2d::Zero(), cell_size_m);
+  Eigen::Array2d low(cells.front().x, cells.front().y);
+  Eigen::Array2d high = low;
+  for (const CellIndex& cell : cells) {
+    low = low.min(Eigen::Array2d(cell.x, cell.y));
+    high = high.max(Eigen::Array2d(cell.x, cell.y));
+  }
+  return Rectangle(low, high - low + 1.0, cell_size_m);
+}
+
+bool IsInside(CellIndex cell, double cell_size_m, const ElevationRegion& region) {
+  return region.contains((Eigen::Vector2d(cell.x, cell.y).array() + 0.5).matrix() * cell_size_m);
+}
 
 ElevationCell ElevationMap::At(CellIndex cell) const {
   const std::int64_t x = std::int64_t{cell.x} - corner.x;
@@ -240,6 +279,27 @@ absl::StatusOr<ElevationMap> InterpolateBackward(const PointCloud& cloud,
       }
     }
   }
+  return map;
+}
+
+absl::StatusOr<ElevationMap> ElevationOf(const std::vector<SurfaceTile>& tiles,
+                                         double cell_size_m,
+                                         ElevationRule rule,
+                                         const ElevationRegion& region) {
+  std::vector<CellIndex> indices;
+  std::vector<ElevationCell> cells;
+  for (const SurfaceTile& tile : tiles) {
+    const std::span<const Surface> surfaces = tile.surfaces;
+    for (std::size_t begin = 0, end = 0; begin < surfaces.size(); begin = end) {
+      while (end < surfaces.size() && surfaces[end].cell == surfaces[begin].cell) ++end;
+      const CellIndex cell = CellOf(tile.key, surfaces[begin].cell);
+      if (!IsInside(cell, cell_size_m, region)) continue;
+      indices.push_back(cell);
+      cells.push_back(CellOfSurfaces(surfaces.subspan(begin, end - begin), rule));
+    }
+  }
+  STRATA_ASSIGN_OR_RETURN(ElevationMap map, RectangleAround(indices, cell_size_m));
+  for (std::size_t i = 0; i < indices.size(); ++i) map.CellAt(indices[i]) = cells[i];
   return map;
 }
 

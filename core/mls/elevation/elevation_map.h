@@ -1,13 +1,15 @@
 // Elevation maps: one height a cell (thesis 6.3). What multi-level surface maps are compared with,
-// and all a robot on open ground needs.
+// all a robot on open ground needs, and what geographic information systems read.
 #ifndef STRATA_CORE_MLS_ELEVATION_ELEVATION_MAP_H_
 #define STRATA_CORE_MLS_ELEVATION_ELEVATION_MAP_H_
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include <Eigen/Geometry>
 
 #include "core/cloud/point_cloud.h"
 #include "core/cloud/sensor_model.h"
@@ -35,11 +37,27 @@ struct ElevationMap {
 
   // An unobserved cell outside the rectangle.
   ElevationCell At(CellIndex cell) const;
+  // REQUIRES: inside the rectangle.
+  ElevationCell& CellAt(CellIndex cell) {
+    return cells[static_cast<std::size_t>(cell.y - corner.y) * width + (cell.x - corner.x)];
+  }
   std::size_t observed_count() const;
 };
 
 // Largest rectangle that is made.
 inline constexpr std::int64_t kMaxElevationCells = std::int64_t{1} << 26;
+
+// The smallest rectangle around cells, all unobserved; an empty one around none. OUT_OF_RANGE if
+// it has more than kMaxElevationCells.
+absl::StatusOr<ElevationMap> RectangleAround(const std::vector<CellIndex>& cells,
+                                             double cell_size_m);
+
+// A part of a map seen from above [m]; a cell belongs to it by its middle.
+using ElevationRegion = Eigen::AlignedBox2d;
+inline const ElevationRegion kEverywhere =
+    ElevationRegion(Eigen::Vector2d::Constant(-std::numeric_limits<double>::infinity()),
+                    Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity()));
+bool IsInside(CellIndex cell, double cell_size_m, const ElevationRegion& region);
 
 enum class ElevationRule {
   kHighest,  // the highest measurement of the cell with its σ
@@ -75,6 +93,15 @@ absl::StatusOr<ElevationMap> InterpolateBackward(const PointCloud& cloud,
                                                  const SensorModel& sensor,
                                                  double cell_size_m,
                                                  const BackwardOptions& options = {});
+
+// The elevation map of the surfaces of tiles, those of one level of detail. Each horizontal surface
+// is the fusion of its measurements (6.1, 6.2) and comes in as one, so that kKalman fuses all of
+// the cell's, but for those of vertical surfaces: of these only the highest is there (6.5.2). Cells
+// are `cell_size_m` wide. OUT_OF_RANGE as RectangleAround.
+absl::StatusOr<ElevationMap> ElevationOf(const std::vector<SurfaceTile>& tiles,
+                                         double cell_size_m,
+                                         ElevationRule rule,
+                                         const ElevationRegion& region = kEverywhere);
 
 // The observed cells as tiles of one level each, for AnnotateTraversability and MakeSurfaceMesh;
 // sorted by key.

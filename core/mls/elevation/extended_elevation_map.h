@@ -5,7 +5,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/mls/mls_map.h"
+#include "absl/status/statusor.h"
+
+#include "core/common/stop.h"
+#include "core/mls/elevation/elevation_map.h"
+#include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
 #include "core/mls/traversability.h"
 
@@ -14,8 +18,9 @@ namespace strata {
 // The four classes of 6.4.2.
 enum class ElevationClass : std::uint8_t {
   kTraversable = 1,  // horizontal, and planar enough
-  // Horizontal; too steep, rough or stepped, or too little around to tell. Also several intervals
-  // with room for the robot between two of them of which none is traversable.
+  // Horizontal; too steep, rough or stepped, seen from below only, or too little around to tell.
+  // Also several intervals with room for the robot between two of them of which none is
+  // traversable.
   kNonTraversable = 2,
   kVertical = 3,  // one interval taller than τ, or several without room for the robot between
   kGap = 4,       // several intervals with room for the robot between two of them
@@ -57,13 +62,22 @@ struct ExtendedElevationMap {
   const ExtendedElevationCell* Find(CellIndex cell) const;
 };
 
-// The extended elevation map of the measurements in `map`: the height intervals of 6.4.2 are those
-// of the multi-level surface map (same cells, γ and τ), of which one height a cell is kept. Room
-// for the robot is limits.clearance_m. Gap cells are judged by AssessSurfaces over the surfaces of
-// all levels; planarity of cells of one interval over the one height a cell, so that one next to a
-// wall, or next to a gap cell below it, has a step beside it.
-ExtendedElevationMap MakeExtendedElevationMap(const MlsMap& map,
-                                              const TraversabilityLimits& limits);
+// The extended elevation map of the surfaces of tiles: the height intervals of 6.4.2 are those of
+// the multi-level surface map (same cells, γ and τ), of which one height a cell is kept. Room for
+// the robot is limits.clearance_m. Gap cells are judged by AssessSurfaces over the surfaces of all
+// levels; planarity of cells of one interval over the one height a cell, so that one next to a
+// wall, or next to a gap cell below it, has a step beside it. What was seen from below only is no
+// ground. Tiles have one level of detail and cells of `cell_size_m`; their traversability is found
+// anew. CANCELLED and DEADLINE_EXCEEDED.
+absl::StatusOr<ExtendedElevationMap> MakeExtendedElevationMap(std::vector<SurfaceTile> tiles,
+                                                              double cell_size_m,
+                                                              const TraversabilityLimits& limits,
+                                                              const Stop& stop = Stop());
+
+// Its heights with their σ. OUT_OF_RANGE as RectangleAround.
+absl::StatusOr<ElevationMap> ElevationOf(const ExtendedElevationMap& map,
+                                         double cell_size_m,
+                                         const ElevationRegion& region = kEverywhere);
 
 }  // namespace strata
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <numeric>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -142,7 +143,10 @@ absl::StatusOr<PlaneMixture> WithDirections(const std::vector<SquarePlane>& sums
   PlaneMixture mixture(std::move(cells), mixing);
   for (std::size_t m = 0; m < sums.size(); ++m) {
     const Plane plane = FitMoments(sums[m].moments).plane;
-    mixture.planes.push_back({plane, {VoxelOf(mixture.cells()[m].mean)}, 1.0});
+    MixturePlane begun;
+    begun.plane = plane;
+    begun.voxels = {VoxelOf(mixture.cells()[m].mean)};
+    mixture.planes.push_back(std::move(begun));
     mixture.AddDirection(plane.normal);
   }
   mixture.Prepare();

@@ -31,6 +31,12 @@ constexpr double kMergeCosine = 0.9;          // between the normals of planes t
 
 double LogN(const PlaneMixture& mixture) { return std::log(std::max(2.0, mixture.measurements())); }
 
+std::vector<Voxel> Union(const std::vector<Voxel>& a, const std::vector<Voxel>& b) {
+  std::vector<Voxel> all;
+  std::set_union(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(all));
+  return all;
+}
+
 // One plane less: `gone` is left out, or goes into `into`, which becomes `plane`.
 struct Reduction {
   std::size_t gone = 0;
@@ -108,7 +114,10 @@ class LeaveOneOut {
                    cells_of_[t].begin(),
                    cells_of_[t].end(),
                    std::back_inserter(cells));
-    const MixturePlane plane{joint, {}, 1.0};
+    MixturePlane plane = mixture_.planes[m];
+    plane.plane = joint;
+    plane.chance += mixture_.planes[t].chance;
+    plane.voxels = Union(mixture_.planes[m].voxels, mixture_.planes[t].voxels);
     double change = 0.0;
     for (const std::uint32_t j : cells) {
       double rest = 1.0, now = 0.0;
@@ -168,10 +177,7 @@ void Apply(const std::vector<Reduction>& reductions, PlaneMixture& mixture) {
     if (!one.into.has_value()) continue;
     MixturePlane& into = mixture.planes[*one.into];
     into.plane = one.plane;
-    std::vector<Voxel> all;
-    std::set_union(
-        into.voxels.begin(), into.voxels.end(), more.begin(), more.end(), std::back_inserter(all));
-    into.voxels = std::move(all);
+    into.voxels = Union(into.voxels, more);
   }
 }
 

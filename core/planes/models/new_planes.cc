@@ -101,7 +101,8 @@ class PlaneQueue {
     members_ = {seed};
     HashSet<std::uint32_t> in = {seed};
     Eigen::Matrix4d sum = moments(seed);
-    MixturePlane plane{FitMoments(sum).plane, {}, 1.0};
+    MixturePlane plane;
+    plane.plane = FitMoments(sum).plane;
     for (std::size_t next = 0; next < members_.size(); ++next) {
       const Voxel own = VoxelOf(mixture_.cells()[left_[members_[next]].cell].mean);
       for (const Voxel voxel : VoxelsAround(own)) {
@@ -118,6 +119,7 @@ class PlaneQueue {
     }
     std::sort(plane.voxels.begin(), plane.voxels.end());
     plane.voxels.erase(std::unique(plane.voxels.begin(), plane.voxels.end()), plane.voxels.end());
+    plane.chance = mixture_.MeanChance(plane.voxels.size());
     return plane;
   }
 

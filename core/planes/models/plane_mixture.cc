@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -23,13 +25,19 @@ constexpr std::uint64_t kVoxelMask = (std::uint64_t{1} << kVoxelBits) - 1;
 constexpr double kClutterShare = 0.1;  // of the measurements
 constexpr double kSettledGain = 1e-6;  // of the objective, a measurement
 constexpr std::size_t kMostDirections = 64;
-constexpr int kTurns = 3;  // of planes and directions in an M-step
+constexpr double kLeastShare = 1e-9;  // of a cell, or it cannot be in the plane
+constexpr int kChanceSteps = 5;       // of chances alone, when planes came or left
+constexpr int kTurns = 3;             // of planes and directions in an M-step
 
 Voxel VoxelKey(std::int64_t x, std::int64_t y, std::int64_t z) {
   const auto bits = [](std::int64_t v) {
     return static_cast<std::uint64_t>(v + kVoxelOffset) & kVoxelMask;
   };
   return bits(x) << (2 * kVoxelBits) | bits(y) << kVoxelBits | bits(z);
+}
+
+std::int64_t Axis(Voxel voxel, int shift) {
+  return static_cast<std::int64_t>(voxel >> shift & kVoxelMask) - kVoxelOffset;
 }
 
 // ln Σ exp of two or more, by their largest.
@@ -46,23 +54,55 @@ Voxel VoxelOf(const Eigen::Vector3d& point) {
 }
 
 std::vector<Voxel> VoxelsAround(Voxel voxel) {
-  const auto axis = [voxel](int shift) {
-    return static_cast<std::int64_t>(voxel >> shift & kVoxelMask) - kVoxelOffset;
-  };
+  const std::int64_t x = Axis(voxel, 2 * kVoxelBits), y = Axis(voxel, kVoxelBits),
+                     z = Axis(voxel, 0);
   std::vector<Voxel> around;
   around.reserve(27);
   for (int k = 0; k < 27; ++k) {
-    around.push_back(VoxelKey(
-        axis(2 * kVoxelBits) + k / 9 - 1, axis(kVoxelBits) + k / 3 % 3 - 1, axis(0) + k % 3 - 1));
+    around.push_back(VoxelKey(x + k / 9 - 1, y + k / 3 % 3 - 1, z + k % 3 - 1));
   }
   return around;
+}
+
+Eigen::AlignedBox3d BoxOf(Voxel voxel) {
+  const auto at = [voxel](int shift) { return kVoxelM * static_cast<double>(Axis(voxel, shift)); };
+  const Eigen::Vector3d corner(at(2 * kVoxelBits), at(kVoxelBits), at(0));
+  return {corner, corner.array() + kVoxelM};
+}
+
+PlaneMixture::PlaneMixture(std::vector<MixtureCell> cells, const MixtureOptions& options)
+    : cells_(std::move(cells)), options_(options) {
+  HashSet<Voxel> voxels;
+  for (const MixtureCell& cell : cells_) {
+    voxels.insert(VoxelOf(cell.mean));
+    measurements_ += cell.measurements;
+  }
+  voxel_count_ = std::max<std::size_t>(1, voxels.size());
+}
+
+double PlaneMixture::MeanChance(std::size_t voxels) const {
+  return (1.0 - kClutterShare) * static_cast<double>(voxels) / static_cast<double>(voxel_count_);
+}
+
+std::optional<std::uint32_t> PlaneMixture::PlaneOf(std::size_t j) const {
+  double sum = 0.0, most = 0.0;
+  std::uint32_t plane = 0;
+  for (const Membership& member : members_[j]) {
+    sum += member.share;
+    if (member.share <= most) continue;
+    most = member.share;
+    plane = member.plane;
+  }
+  return sum > 0.5 ? std::optional(plane) : std::nullopt;
 }
 
 double PlaneMixture::CellLog(const MixtureCell& cell, const MixturePlane& plane) const {
   const Eigen::Vector3d& n = plane.plane.normal;
   const double off = n.dot(cell.mean) - plane.plane.distance;
   const double squared = off * off + n.dot(cell.covariance * n);
-  return std::log(1.0 - kClutterShare) - 0.5 * std::log(2.0 * M_PI * cell.variance_m2) -
+  const double voxels = static_cast<double>(std::max<std::size_t>(1, plane.voxels.size()));
+  const double density = plane.chance * static_cast<double>(voxel_count_) / voxels;
+  return std::log(density) - 0.5 * std::log(2.0 * M_PI * cell.variance_m2) -
          squared / (2.0 * cell.variance_m2);
 }
 
@@ -102,14 +142,24 @@ void PlaneMixture::Prepare() {
     }
   }
   members_.assign(cells_.size(), {});
-  measurements_ = 0.0;
   for (std::size_t j = 0; j < cells_.size(); ++j) {
-    measurements_ += cells_[j].measurements;
     const auto found = near.find(VoxelOf(cells_[j].mean));
     if (found == near.end()) continue;
     for (const std::uint32_t m : found->second) members_[j].push_back({m, 0.0});
   }
+  double voxels = 0.0;
+  for (const MixturePlane& plane : planes) voxels += static_cast<double>(plane.voxels.size());
+  for (MixturePlane& plane : planes) {
+    plane.chance = (1.0 - kClutterShare) * static_cast<double>(plane.voxels.size()) / voxels;
+  }
   EStep();
+  for (int i = 0; i < kChanceSteps; ++i) {
+    UpdateChances();
+    EStep();
+  }
+  for (std::vector<Membership>& members : members_) {
+    std::erase_if(members, [](const Membership& member) { return member.share < kLeastShare; });
+  }
   std::vector<double> area(planes.size(), 0.0);
   for (std::size_t j = 0; j < cells_.size(); ++j) {
     for (const Membership& member : members_[j]) {
@@ -121,6 +171,21 @@ void PlaneMixture::Prepare() {
         std::clamp(area[m] / options_.independent_area_m2, 1.0, options_.max_measurements);
   }
   EStep();
+}
+
+void PlaneMixture::UpdateChances() {
+  std::vector<double> sums(planes.size(), 1e-6);
+  double all = 1e-6 * static_cast<double>(planes.size());
+  for (std::size_t j = 0; j < cells_.size(); ++j) {
+    for (const Membership& member : members_[j]) {
+      const double measurements = member.share * cells_[j].measurements;
+      sums[member.plane] += measurements;
+      all += measurements;
+    }
+  }
+  for (std::size_t m = 0; m < planes.size(); ++m) {
+    planes[m].chance = (1.0 - kClutterShare) * sums[m] / all;
+  }
 }
 
 void PlaneMixture::EStep() {
@@ -179,6 +244,7 @@ void PlaneMixture::MStep() {
       chances[k] = (sums(static_cast<Eigen::Index>(k)) + 1.0) / all;
     }
   }
+  UpdateChances();
   const std::vector<Scatter> scatters = Scatters();
   const std::vector<MixturePlane> before = planes;
   const double prior = 1.0 / std::pow(options_.direction_sigma_rad, 2);
@@ -244,9 +310,8 @@ absl::Status PlaneMixture::Run(int max_steps, const Stop& stop) {
 void PlaneMixture::RefreshSupport() {
   for (MixturePlane& plane : planes) plane.voxels.clear();
   for (std::size_t j = 0; j < cells_.size(); ++j) {
-    for (const Membership& member : members_[j]) {
-      if (member.share > 0.5) planes[member.plane].voxels.push_back(VoxelOf(cells_[j].mean));
-    }
+    const std::optional<std::uint32_t> plane = PlaneOf(j);
+    if (plane.has_value()) planes[*plane].voxels.push_back(VoxelOf(cells_[j].mean));
   }
   for (MixturePlane& plane : planes) {
     std::sort(plane.voxels.begin(), plane.voxels.end());

@@ -11,11 +11,13 @@
 #define STRATA_CORE_PLANES_MODELS_PLANE_MIXTURE_H_
 
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "core/common/hash_map.h"
 #include "core/common/stop.h"
@@ -26,6 +28,7 @@ namespace strata {
 using Voxel = std::uint64_t;  // a cube of kVoxelM in the frame of the cells
 inline constexpr double kVoxelM = 1.0;
 Voxel VoxelOf(const Eigen::Vector3d& point);
+Eigen::AlignedBox3d BoxOf(Voxel voxel);
 // The 27 around it, itself included.
 std::vector<Voxel> VoxelsAround(Voxel voxel);
 
@@ -40,6 +43,9 @@ struct MixtureCell {
 struct MixturePlane {
   Plane plane;
   std::vector<Voxel> voxels;  // where it has support; ascending
+  // Of a measurement to be on it, spread evenly over its voxels: two planes in one place share what
+  // is there, so that they do no better than one.
+  double chance = 0.0;
   // Held during a run of EM, see PlaneMixture::Prepare().
   double weight = 1.0;  // w_m (5.20): measurements of its normal, as many as may count
 };
@@ -60,8 +66,7 @@ struct MixtureOptions {
 
 class PlaneMixture {
  public:
-  PlaneMixture(std::vector<MixtureCell> cells, const MixtureOptions& options)
-      : cells_(std::move(cells)), options_(options) {}
+  PlaneMixture(std::vector<MixtureCell> cells, const MixtureOptions& options);
 
   const std::vector<MixtureCell>& cells() const { return cells_; }
   const MixtureOptions& options() const { return options_; }
@@ -94,9 +99,14 @@ class PlaneMixture {
 
   // Of cell j those planes that it may be in. After EStep().
   const std::vector<Membership>& memberships(std::size_t j) const { return members_[j]; }
-  // ln p(cell, plane), a measurement's mean.
+  // The plane that has most of cell j, unless clutter has half of it.
+  std::optional<std::uint32_t> PlaneOf(std::size_t j) const;
+  // ln p(cell, plane), a measurement's mean, where density is counted beside that of measurements
+  // all over the cells' voxels.
   double CellLog(const MixtureCell& cell, const MixturePlane& plane) const;
   double ClutterLog() const;  // the same of clutter
+  // Of a plane whose measurements lie as close as those of all others.
+  double MeanChance(std::size_t voxels) const;
   // E[β_mk] of the last E-step; row m; the last column is "none".
   const Eigen::MatrixXd& direction_shares() const { return beta_; }
   // ln of the density of plane m's normal given direction k, K included: none.
@@ -111,12 +121,14 @@ class PlaneMixture {
     Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
   };
   std::vector<Scatter> Scatters() const;
+  void UpdateChances();
 
   std::vector<MixtureCell> cells_;
   MixtureOptions options_;
   std::vector<std::vector<Membership>> members_;
   Eigen::MatrixXd beta_;
   double measurements_ = 0.0;
+  std::size_t voxel_count_ = 1;  // that have cells
   double data_log_ = 0.0, prior_log_ = 0.0;
 };
 

@@ -32,18 +32,33 @@ constexpr double kBandM = 0.1;             // 5.4.2: how near a plane its points
 constexpr double kBandSigmas = 3.0;
 constexpr double kBeyondM = 0.3;            // that a ray has to go on behind a plane it crossed
 constexpr std::size_t kMostRays = 1000000;  // of a square; of more, every so many
+constexpr double kReachM = 20.0;            // beyond a square, of planes that its rays may cross
 constexpr std::size_t kStopEvery = 8192;
 
 struct FacedPlane {
   SeenPlane seen;
   double band_m = kBandM;
-  std::int64_t facing = 0;     // points seen from the normal's side less those from the other
-  Eigen::AlignedBox2d extent;  // in its frame
+  std::int64_t facing = 0;  // points seen from the normal's side less those from the other
 };
 
 bool Holds(const PlanSquare& square, const Eigen::Vector3d& p) {
   return (p.head<2>().array() >= square.min().array()).all() &&
          (p.head<2>().array() < square.max().array()).all();
+}
+
+// `sensor_distances`: of the sensor to each of the planes.
+void AddRay(const Eigen::Vector3d& p,
+            const Eigen::Vector3d& sensor,
+            const std::vector<double>& sensor_distances,
+            const std::vector<FacedPlane*>& planes) {
+  for (std::size_t m = 0; m < planes.size(); ++m) {
+    SeenPlane& seen = planes[m]->seen;
+    const double from = sensor_distances[m];
+    const double to = SignedDistance(p, seen.plane);
+    if (from * to >= 0.0 || std::abs(to) < std::max(kBeyondM, planes[m]->band_m)) continue;
+    const Eigen::Vector3d at = sensor + from / (from - to) * (p - sensor);
+    if (seen.box.contains(at)) seen.raster.AddLook(seen.frame.Flat(at));
+  }
 }
 
 void Flip(PlanePolygon& polygon) {
@@ -74,9 +89,8 @@ struct PlaneModelFinder::State {
   HashMap<Voxel, std::vector<std::uint32_t>> near;
 
   void AddHit(const Eigen::Vector3d& p, const Eigen::Vector3d& sensor);
-  void AddRay(const Eigen::Vector3d& p,
-              const Eigen::Vector3d& sensor,
-              const std::vector<double>& sensor_distances);
+  // The planes that rays to points in the square may cross.
+  std::vector<FacedPlane*> PlanesAround(const PlanSquare& square);
   void BeginLooking();
 };
 
@@ -111,18 +125,29 @@ void PlaneModelFinder::State::BeginLooking() {
   for (std::uint32_t m = 0; m < joined.planes.size(); ++m) {
     const JoinedPlane& plane = joined.planes[m];
     const PlaneFrame frame = FrameOf(plane.model.plane, FitMoments(plane.sum.moments).mean);
-    FacedPlane one{{plane.model.plane, frame, PlaneRaster(square, 2.0 * square)},
+    FacedPlane one{{plane.model.plane, frame, PlaneRaster(square, 2.0 * square), {}},
                    std::max({kBandM, kBandSigmas * options.rho_m, kBandSigmas * plane.model.rms_m}),
-                   0,
-                   {}};
-    faced.push_back(std::move(one));
+                   0};
     for (const Voxel voxel : plane.sum.voxels) {
+      one.seen.box.extend(BoxOf(voxel));
       for (const Voxel around : VoxelsAround(voxel)) {
         std::vector<std::uint32_t>& list = near[around];
         if (list.empty() || list.back() != m) list.push_back(m);
       }
     }
+    faced.push_back(std::move(one));
   }
+}
+
+std::vector<FacedPlane*> PlaneModelFinder::State::PlanesAround(const PlanSquare& square) {
+  const Eigen::Vector2d reach(kReachM, kReachM);
+  const PlanSquare around(square.min() - reach, square.max() + reach);
+  std::vector<FacedPlane*> planes;
+  for (FacedPlane& one : faced) {
+    const PlanSquare plan(one.seen.box.min().head<2>(), one.seen.box.max().head<2>());
+    if (around.intersects(plan)) planes.push_back(&one);
+  }
+  return planes;
 }
 
 void PlaneModelFinder::State::AddHit(const Eigen::Vector3d& p, const Eigen::Vector3d& sensor) {
@@ -137,47 +162,31 @@ void PlaneModelFinder::State::AddHit(const Eigen::Vector3d& p, const Eigen::Vect
     nearest = &faced[m];
   }
   if (nearest == nullptr) return;
-  const Eigen::Vector2d at = nearest->seen.frame.Flat(p);
-  nearest->seen.raster.AddHit(at);
-  nearest->extent.extend(at);
+  nearest->seen.raster.AddHit(nearest->seen.frame.Flat(p));
   nearest->facing += SignedDistance(sensor, nearest->seen.plane) > 0.0 ? 1 : -1;
-}
-
-void PlaneModelFinder::State::AddRay(const Eigen::Vector3d& p,
-                                     const Eigen::Vector3d& sensor,
-                                     const std::vector<double>& sensor_distances) {
-  for (std::size_t m = 0; m < faced.size(); ++m) {
-    const double from = sensor_distances[m];
-    const double to = SignedDistance(p, faced[m].seen.plane);
-    if (from * to >= 0.0 || std::abs(to) < std::max(kBeyondM, faced[m].band_m)) continue;
-    const Eigen::Vector3d at = sensor + from / (from - to) * (p - sensor);
-    const Eigen::Vector2d flat = faced[m].seen.frame.Flat(at);
-    if (faced[m].extent.contains(flat)) faced[m].seen.raster.AddLook(flat);
-  }
 }
 
 absl::Status PlaneModelFinder::Look(const PosedPoints& points,
                                     const PlanSquare& square,
                                     const Stop& stop) {
-  if (!state_->options.polygons) return absl::OkStatus();
   const Eigen::Vector3d shift = points.origin - state_->reference;
   const PlanSquare own(square.min() - state_->reference.head<2>(),
                        square.max() - state_->reference.head<2>());
   const std::size_t every = points.points.size() / kMostRays + 1;
-  for (const bool rays : {false, true}) {  // rays only where there is surface around
-    std::size_t i = 0;
-    for (const PosedPoints::View& view : points.views) {
-      const Eigen::Vector3d sensor = view.sensor.cast<double>() + shift;
-      std::vector<double> distances;
-      for (const FacedPlane& one : state_->faced) {
-        distances.push_back(SignedDistance(sensor, one.seen.plane));
-      }
-      for (; i < view.end; ++i) {
-        if (i % kStopEvery == 0) STRATA_RETURN_IF_ERROR(stop.status());
-        const Eigen::Vector3d p = points.points[i].cast<double>() + shift;
-        if (!rays && Holds(own, p)) state_->AddHit(p, sensor);
-        if (rays && i % every == 0) state_->AddRay(p, sensor, distances);
-      }
+  const std::vector<FacedPlane*> planes = state_->PlanesAround(own);
+  std::size_t i = 0;
+  for (const PosedPoints::View& view : points.views) {
+    const Eigen::Vector3d sensor = view.sensor.cast<double>() + shift;
+    std::vector<double> distances;
+    for (const FacedPlane* one : planes) {
+      distances.push_back(SignedDistance(sensor, one->seen.plane));
+    }
+    for (; i < view.end; ++i) {
+      if (i % kStopEvery == 0) STRATA_RETURN_IF_ERROR(stop.status());
+      const Eigen::Vector3d p = points.points[i].cast<double>() + shift;
+      if (!Holds(own, p)) continue;
+      state_->AddHit(p, sensor);
+      if (i % every == 0) AddRay(p, sensor, distances, planes);
     }
   }
   return absl::OkStatus();
@@ -192,7 +201,7 @@ absl::StatusOr<PlaneModel> PlaneModelFinder::Finish(const Stop& stop) {
   for (std::size_t m = 0; m < seen.size(); ++m) {
     STRATA_RETURN_IF_ERROR(stop.status());
     ModelPlane plane = state_->joined.planes[m].model;
-    if (state_->options.polygons) plane.polygons = PolygonsOf(seen, m, options);
+    plane.polygons = PolygonsOf(seen, m, options);
     if (state_->faced[m].facing < 0) {
       plane.plane = {-plane.plane.normal, -plane.plane.distance};
       for (PlanePolygon& polygon : plane.polygons) Flip(polygon);

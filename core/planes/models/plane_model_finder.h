@@ -30,11 +30,12 @@ struct PlaneModelOptions {
   double min_area_m2 = 1.0;  // of a plane's surface and of a polygon; in [0.01, 10000]
   // Points so near are one surface (ε of 5.4.2): the radius of the α-shape; in [0.05, 5].
   double epsilon_m = 0.25;
-  bool polygons = true;
 
   // INVALID_ARGUMENT naming every field out of its range.
   absl::Status Validate() const;
 };
+
+inline constexpr float kMostFromOriginM = 1000.0F;
 
 // Points of scans in the map frame, relative to `origin`.
 struct PosedPoints {
@@ -43,7 +44,7 @@ struct PosedPoints {
     std::size_t end = 0;     // its points end before this one; they begin at the last view's end
   };
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  std::vector<Eigen::Vector3f> points;  // finite, within ±1000 m
+  std::vector<Eigen::Vector3f> points;  // finite, within ±kMostFromOriginM
   std::vector<View> views;
 };
 

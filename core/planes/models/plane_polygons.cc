@@ -14,7 +14,7 @@
 #include <boost/geometry/geometries/point_xy.hpp>
 #include <boost/geometry/geometries/polygon.hpp>
 
-#include "core/planes/models/alpha_shape.h"
+#include "core/planes/models/alpha_polygons.h"
 #include "core/planes/models/plane_raster.h"
 
 namespace strata {
@@ -50,62 +50,17 @@ FlatRing WithoutRepeats(const FlatRing& ring) {
   return out;
 }
 
-// Douglas–Peucker of the open line [begin, end]; marks what stays.
-void MarkKept(const FlatRing& ring,
-              std::size_t begin,
-              std::size_t end,
-              double tolerance_m,
-              std::vector<bool>& kept) {
-  std::vector<std::pair<std::size_t, std::size_t>> open = {{begin, end}};
-  while (!open.empty()) {
-    const auto [a, b] = open.back();
-    open.pop_back();
-    const Eigen::Vector2d& p = ring[a];
-    const Eigen::Vector2d d = ring[b % ring.size()] - p;
-    double most = tolerance_m;
-    std::size_t farthest = 0;
-    for (std::size_t i = a + 1; i < b; ++i) {
-      const double t =
-          std::clamp((ring[i] - p).dot(d) / std::max(1e-18, d.squaredNorm()), 0.0, 1.0);
-      const double off = (ring[i] - p - t * d).norm();
-      if (off <= most) continue;
-      most = off;
-      farthest = i;
-    }
-    if (farthest == 0) continue;
-    kept[farthest] = true;
-    open.emplace_back(a, farthest);
-    open.emplace_back(farthest, b);
-  }
-}
-
-// From its two points that are farthest apart, nearly: those stay.
-FlatRing SimplifiedRing(const FlatRing& ring, double tolerance_m) {
-  if (ring.size() < 4) return ring;
-  const auto farthest_from = [&ring](const Eigen::Vector2d& p) {
-    return static_cast<std::size_t>(std::max_element(ring.begin(),
-                                                     ring.end(),
-                                                     [&p](const auto& a, const auto& b) {
-                                                       return (a - p).squaredNorm() <
-                                                              (b - p).squaredNorm();
-                                                     }) -
-                                    ring.begin());
+FlatPolygon FromBoost(const BoostPolygon& polygon) {
+  const auto ring_of = [](const auto& from) {
+    FlatRing ring;
+    for (const FlatPoint& p : from) ring.emplace_back(p.x(), p.y());
+    return WithoutRepeats(ring);
   };
-  FlatRing turned = ring;
-  std::rotate(turned.begin(),
-              turned.begin() + static_cast<std::ptrdiff_t>(farthest_from(ring.front())),
-              turned.end());
-  std::size_t other = 0;
-  for (std::size_t i = 1; i < turned.size(); ++i) {
-    if ((turned[i] - turned[0]).norm() > (turned[other] - turned[0]).norm()) other = i;
-  }
-  std::vector<bool> kept(turned.size(), false);
-  kept[0] = kept[other] = true;
-  MarkKept(turned, 0, other, tolerance_m, kept);
-  MarkKept(turned, other, turned.size(), tolerance_m, kept);
-  FlatRing out;
-  for (std::size_t i = 0; i < turned.size(); ++i) {
-    if (kept[i]) out.push_back(turned[i]);
+  FlatPolygon out;
+  out.outer = ring_of(polygon.outer());
+  for (const auto& inner : polygon.inners()) {
+    FlatRing hole = ring_of(inner);
+    if (hole.size() >= 3 && -SignedArea(hole) >= kNoHoleM2) out.holes.push_back(std::move(hole));
   }
   return out;
 }
@@ -158,7 +113,7 @@ double CrossedShare(const FlatRing& hole, const PlaneRaster& raster) {
     for (double v = box.min().y() + step / 2; v < box.max().y(); v += step) {
       if (!bg::within(FlatPoint(u, v), polygon)) continue;
       inside += 1.0;
-      if (raster.LooksAt({u, v}) > 0) crossed += 1.0;
+      if (raster.HasLook({u, v})) crossed += 1.0;
     }
   }
   return inside > 0.0 ? crossed / inside : 0.0;
@@ -179,7 +134,7 @@ std::vector<MeetingLine> MeetingLines(std::span<const SeenPlane> planes,
   std::vector<MeetingLine> lines;
   const SeenPlane& own = planes[i];
   for (std::size_t other = 0; other < planes.size(); ++other) {
-    if (other == i) continue;
+    if (other == i || !planes[other].box.intersects(own.box)) continue;
     const Plane& b = planes[other].plane;
     // In the own frame the other plane is a · u + c · v = rest.
     const Eigen::Vector2d across(b.normal.dot(own.frame.axis_u), b.normal.dot(own.frame.axis_v));
@@ -219,16 +174,12 @@ bool IsValid(const FlatPolygon& polygon) {
 }
 
 FlatPolygon Simplified(const FlatPolygon& polygon, double tolerance_m) {
+  const BoostPolygon whole = ToBoost(polygon);
   double tolerance = tolerance_m;
   for (int i = 0; i < kMostHalvings; ++i, tolerance /= 2.0) {
-    FlatPolygon out;
-    out.outer = SimplifiedRing(polygon.outer, tolerance);
-    for (const FlatRing& hole : polygon.holes) {
-      FlatRing simple = SimplifiedRing(hole, tolerance);
-      if (simple.size() >= 3 && -SignedArea(simple) >= kNoHoleM2) {
-        out.holes.push_back(std::move(simple));
-      }
-    }
+    BoostPolygon simple;
+    bg::simplify(whole, simple, tolerance);
+    FlatPolygon out = FromBoost(simple);
     if (IsValid(out)) return out;
   }
   return polygon;
@@ -241,7 +192,7 @@ std::vector<PlanePolygon> PolygonsOf(std::span<const SeenPlane> planes,
   const double epsilon = options.epsilon_m;
   const std::vector<MeetingLine> lines = MeetingLines(planes, i, epsilon);
   std::vector<PlanePolygon> polygons;
-  for (const FlatPolygon& shape : AlphaShape(own.raster.Outline(), epsilon)) {
+  for (const FlatPolygon& shape : AlphaPolygons(own.raster.Outline(), epsilon)) {
     if (AreaOf(shape) < options.min_area_m2) break;
     FlatPolygon snapped;
     snapped.outer = Snapped(shape.outer, lines, epsilon);

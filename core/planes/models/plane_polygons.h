@@ -7,9 +7,10 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "core/geometry/primitives.h"
-#include "core/planes/models/alpha_shape.h"
+#include "core/planes/models/alpha_polygons.h"
 #include "core/planes/models/plane_raster.h"
 #include "core/world/plane_model.h"
 
@@ -25,6 +26,7 @@ struct SeenPlane {
   Plane plane;
   PlaneFrame frame;
   PlaneRaster raster;
+  Eigen::AlignedBox3d box;  // around its surface
 };
 
 // A stretch of a line in a plane where another plane with surface begins.

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -69,14 +70,21 @@ void PlaneRaster::AddHit(const Eigen::Vector2d& at) {
   if (square.hits++ == 0) ++hit_squares_;
 }
 
-void PlaneRaster::AddLook(const Eigen::Vector2d& at) {
-  ++looks_[KeyAt(SquareOf(at.x(), look_square_m_), SquareOf(at.y(), look_square_m_))];
+std::pair<std::uint64_t, std::size_t> PlaneRaster::LookPlaceOf(const Eigen::Vector2d& at) const {
+  const std::int32_t i = SquareOf(at.x(), look_square_m_), j = SquareOf(at.y(), look_square_m_);
+  const std::int32_t bi = FloorDivide(i, kBlock), bj = FloorDivide(j, kBlock);
+  return {KeyAt(bi, bj), static_cast<std::size_t>((i - bi * kBlock) * kBlock + j - bj * kBlock)};
 }
 
-std::uint32_t PlaneRaster::LooksAt(const Eigen::Vector2d& at) const {
-  const auto found =
-      looks_.find(KeyAt(SquareOf(at.x(), look_square_m_), SquareOf(at.y(), look_square_m_)));
-  return found == looks_.end() ? 0 : found->second;
+void PlaneRaster::AddLook(const Eigen::Vector2d& at) {
+  const auto [block, bit] = LookPlaceOf(at);
+  looks_[block].set(bit);
+}
+
+bool PlaneRaster::HasLook(const Eigen::Vector2d& at) const {
+  const auto [block, bit] = LookPlaceOf(at);
+  const auto found = looks_.find(block);
+  return found != looks_.end() && found->second.test(bit);
 }
 
 bool PlaneRaster::IsDeep(std::int32_t i, std::int32_t j) const {

@@ -4,8 +4,10 @@
 #define STRATA_CORE_PLANES_MODELS_PLANE_RASTER_H_
 
 #include <array>
+#include <bitset>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -45,8 +47,8 @@ class PlaneRaster {
   // surface every third square of every third row: as far apart they bound the same α-shapes, with
   // a ninth of the points. REQUIRES: radius ≥ 3.5 squares.
   std::vector<Eigen::Vector2d> Outline() const;
-  // Rays that crossed the square that the point is in.
-  std::uint32_t LooksAt(const Eigen::Vector2d& at) const;
+  // Whether a ray crossed the square that the point is in.
+  bool HasLook(const Eigen::Vector2d& at) const;
   double look_square_m() const { return look_square_m_; }
   // Centres of squares with hits within `reach_m` of the line through `at` along unit `along`, as
   // lengths along it; unordered.
@@ -62,6 +64,8 @@ class PlaneRaster {
   };
   using Block = std::array<Square, kBlock * kBlock>;
 
+  // Block, and bit in it.
+  std::pair<std::uint64_t, std::size_t> LookPlaceOf(const Eigen::Vector2d& at) const;
   Square& At(std::int32_t i, std::int32_t j);
   const Square* Find(std::int32_t i, std::int32_t j) const;
   bool IsDeep(std::int32_t i, std::int32_t j) const;
@@ -70,7 +74,7 @@ class PlaneRaster {
   HashMap<std::uint64_t, std::size_t> index_;  // of blocks
   std::vector<std::uint64_t> keys_;
   std::vector<Block> blocks_;
-  HashMap<std::uint64_t, std::uint32_t> looks_;
+  HashMap<std::uint64_t, std::bitset<kBlock * kBlock>> looks_;  // blocks of look squares
   std::size_t hit_squares_ = 0;
 };
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -27,9 +28,9 @@ namespace {
 
 constexpr int kMostRounds = 8;
 constexpr int kMostSteps = 40;
-constexpr double kFloorM = 0.02;             // of ρ, beside what is measured: waves of a surface
-constexpr double kIndependentAreaM2 = 0.25;  // of surface for a measurement of a plane's place
-constexpr double kStartShare = 0.25;         // of min_area_m2, of a region that begins a plane
+constexpr double kFloorM = 0.02;              // of ρ, beside what is measured: waves of a surface
+constexpr double kIndependentAreaM2 = 0.125;  // of surface for a measurement of a plane's place
+constexpr double kStartShare = 0.25;          // of min_area_m2, of a region that begins a plane
 
 PlaneExtractionOptions CellOptions(const PlaneModelOptions& options) {
   PlaneExtractionOptions cells;
@@ -97,15 +98,14 @@ std::vector<SquarePlane> PlanesIn(const PlanSquare& square,
     if ((at.array() < square.min().array()).any() || (at.array() >= square.max().array()).any()) {
       continue;
     }
-    for (const Membership& member : mixture.memberships(j)) {
-      if (member.share <= 0.5) continue;
-      SquarePlane& plane = planes[member.plane];
-      plane.moments += MomentsOf(cell.area_m2, cell.mean, cell.covariance);
-      plane.measurements += cell.measurements;
-      plane.information += cell.measurements / cell.variance_m2;
-      plane.point_count += cells[j].point_count;
-      plane.voxels.push_back(VoxelOf(cell.mean));
-    }
+    const std::optional<std::uint32_t> of = mixture.PlaneOf(j);
+    if (!of.has_value()) continue;
+    SquarePlane& plane = planes[*of];
+    plane.moments += MomentsOf(cell.area_m2, cell.mean, cell.covariance);
+    plane.measurements += cell.measurements;
+    plane.information += cell.measurements / cell.variance_m2;
+    plane.point_count += cells[j].point_count;
+    plane.voxels.push_back(VoxelOf(cell.mean));
   }
   std::erase_if(planes, [](const SquarePlane& plane) { return plane.voxels.empty(); });
   for (SquarePlane& plane : planes) {

@@ -248,15 +248,20 @@ CREATE VIRTUAL TABLE derived_footprint USING rtree (
 );
 )sql";
 
-// Programs that do not know of it leave its rows, which are of no use once their tiles change, or
-// drop it with all that is derived: it takes no format version and is made where it lacks. Listings
-// read the index alone.
-constexpr char kPreparedTileTable[] = R"sql(
+// Programs that do not know of them leave their rows, which are of no use once their tiles change
+// or say what epoch they are of, or drop them with all that is derived: they take no format version
+// and are made where they lack. Listings of prepared tiles read the index alone.
+constexpr char kLaterDerivedTables[] = R"sql(
 CREATE TABLE IF NOT EXISTS derived_prepared_tile (
   x INTEGER NOT NULL, y INTEGER NOT NULL,
   made_of BLOB NOT NULL,
   bytes BLOB NOT NULL,
   PRIMARY KEY (x, y, made_of)
+) STRICT;
+CREATE TABLE IF NOT EXISTS derived_plane_model (
+  job INTEGER NOT NULL, part INTEGER NOT NULL,
+  bytes BLOB NOT NULL,
+  PRIMARY KEY (job, part)
 ) STRICT;
 )sql";
 
@@ -358,7 +363,7 @@ absl::Status ResetDerivedTables(Database& database) {
     STRATA_RETURN_IF_ERROR(database.Execute(absl::StrCat("DROP TABLE \"", table, "\"")));
   }
   STRATA_RETURN_IF_ERROR(database.Execute(kDerivedTables));
-  STRATA_RETURN_IF_ERROR(database.Execute(kPreparedTileTable));
+  STRATA_RETURN_IF_ERROR(database.Execute(kLaterDerivedTables));
   return database.Execute(
       absl::StrCat("INSERT INTO derived_state VALUES (1, ", kDerivedVersion, ", 0, 0)"));
 }
@@ -383,7 +388,7 @@ absl::Status UpgradeSchema(Database& database) {
   STRATA_RETURN_IF_ERROR(Migrate(database, kMigrations));
   STRATA_RETURN_IF_ERROR(database.Execute(kAttemptTable));
   const absl::StatusOr<bool> derived = HasDerivedTables(database);
-  if (derived.ok() && *derived) return database.Execute(kPreparedTileTable);
+  if (derived.ok() && *derived) return database.Execute(kLaterDerivedTables);
   STRATA_ASSIGN_OR_RETURN(Transaction transaction, Transaction::Begin(database, "BEGIN IMMEDIATE"));
   STRATA_RETURN_IF_ERROR(ResetDerivedTables(database));
   return transaction.Commit();

@@ -68,6 +68,9 @@ class SqliteReader final : public StorageReader {
   absl::StatusOr<std::optional<std::string>> FindPreparedTile(const TileKey& key,
                                                               absl::string_view made_of) override;
   absl::StatusOr<std::vector<PreparedTileRow>> ListPreparedTiles() override;
+  absl::StatusOr<std::optional<std::string>> FindPlaneModelPart(std::uint64_t job,
+                                                                std::uint64_t part) override;
+  absl::StatusOr<std::uint64_t> JobOfPlaneModel() override;
   absl::StatusOr<std::vector<ScanNumber>> ScansOfTile(const TileKey& key) override;
   absl::StatusOr<std::vector<TileKey>> TilesOfScan(ScanNumber number) override;
   absl::StatusOr<std::optional<Eigen::AlignedBox2d>> FootprintOfScan(ScanNumber number) override;

@@ -129,6 +129,24 @@ absl::StatusOr<std::optional<std::string>> SqliteReader::FindPreparedTile(
   return std::optional<std::string>(row.Text(0));
 }
 
+absl::StatusOr<std::optional<std::string>> SqliteReader::FindPlaneModelPart(std::uint64_t job,
+                                                                            std::uint64_t part) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT bytes FROM derived_plane_model WHERE job = ?1 AND part = ?2"));
+  row.Bind(job, part);
+  STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
+  if (!found) return std::optional<std::string>();
+  return std::optional<std::string>(row.Text(0));
+}
+
+absl::StatusOr<std::uint64_t> SqliteReader::JobOfPlaneModel() {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row, database_.Prepare("SELECT coalesce(max(job), 0) FROM derived_plane_model"));
+  STRATA_RETURN_IF_ERROR(row.Step().status());
+  return row.Unsigned(0);
+}
+
 absl::StatusOr<std::vector<PreparedTileRow>> SqliteReader::ListPreparedTiles() {
   STRATA_ASSIGN_OR_RETURN(
       Statement row,

@@ -101,6 +101,17 @@ absl::Status SqliteWriter::DeletePreparedTile(const TileKey& key) {
   return RunSql("DELETE FROM derived_prepared_tile WHERE x = ?1 AND y = ?2", key.x, key.y);
 }
 
+absl::Status SqliteWriter::PutPlaneModelPart(std::uint64_t job,
+                                             std::uint64_t part,
+                                             absl::string_view bytes) {
+  return RunSql("INSERT INTO derived_plane_model (job, part, bytes) VALUES (?1, ?2, ?3)",
+                job,
+                part,
+                Blob{bytes});
+}
+
+absl::Status SqliteWriter::DeletePlaneModel() { return RunSql("DELETE FROM derived_plane_model"); }
+
 absl::Status SqliteWriter::DiscardUnpublished() {
   STRATA_RETURN_IF_ERROR(
       RunSql("DELETE FROM derived_mls_tile WHERE version > (SELECT tile_version FROM "

@@ -75,6 +75,10 @@ class SqliteWriter final : public StorageWriter {
   absl::Status CollectAllSurfaceTiles(std::uint64_t floor) override;
   absl::Status PutPreparedTile(const PreparedTileRow& row) override;
   absl::Status DeletePreparedTile(const TileKey& key) override;
+  absl::Status PutPlaneModelPart(std::uint64_t job,
+                                 std::uint64_t part,
+                                 absl::string_view bytes) override;
+  absl::Status DeletePlaneModel() override;
   absl::Status DiscardUnpublished() override;
   absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) override;
   absl::Status SetFootprint(ScanNumber number, const Eigen::AlignedBox2d& footprint) override;

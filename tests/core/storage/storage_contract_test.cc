@@ -569,6 +569,29 @@ TEST_F(StorageContractTest, APreparedTileIsFoundOnlyByWhatItIsMadeOf) {
   EXPECT_TRUE(reader().ListPreparedTiles()->empty());
 }
 
+TEST_F(StorageContractTest, APlaneModelIsKeptUntilTheNextAndNoPartOfAnotherIsFound) {
+  EXPECT_THAT(reader().JobOfPlaneModel(), IsOkAndHolds(0U));
+  const std::string bytes("a\0b", 3);
+  const auto put = [&](std::uint64_t job, const std::string& part) {
+    return Commit([&]() -> absl::Status {
+      STRATA_RETURN_IF_ERROR(writer().DeletePlaneModel());
+      STRATA_RETURN_IF_ERROR(writer().PutPlaneModelPart(job, 0, bytes));
+      return writer().PutPlaneModelPart(job, 1, part);
+    });
+  };
+  STRATA_ASSERT_OK(put(7, "seven"));
+  STRATA_ASSERT_OK(put(9, "nine"));
+  Reopen();
+  EXPECT_THAT(reader().JobOfPlaneModel(), IsOkAndHolds(9U));
+  EXPECT_THAT(reader().FindPlaneModelPart(9, 0), IsOkAndHolds(::testing::Optional(bytes)));
+  EXPECT_THAT(reader().FindPlaneModelPart(9, 1),
+              IsOkAndHolds(::testing::Optional(std::string("nine"))));
+  EXPECT_THAT(reader().FindPlaneModelPart(9, 2), IsOkAndHolds(::testing::Eq(std::nullopt)));
+  EXPECT_THAT(reader().FindPlaneModelPart(7, 1), IsOkAndHolds(::testing::Eq(std::nullopt)));
+  STRATA_ASSERT_OK(Commit([&] { return writer().DropDerived(); }));
+  EXPECT_THAT(reader().JobOfPlaneModel(), IsOkAndHolds(0U));
+}
+
 TEST_F(StorageContractTest, FullStoreIsAnErrorAndLosesNothing) {
   Put(1);
   Reopen({.max_file_bytes = 400'000});

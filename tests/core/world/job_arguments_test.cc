@@ -74,6 +74,12 @@ std::vector<Expected> AllParameters() {
       {"fade", "rays", "10", {"1", "100000"}, {"0", "100001"}},
       {"fade", "clearance_m", "0.3", {"0.05", "10"}, {"0.04", "10.1"}},
       {"fade", "undo", "0", {"0", "1"}, kNoFlags},
+      {"planes", "rho_m", "0", {"0", "1"}, {"-0.1", "1.1", "nan"}},
+      {"planes", "sigma_rad", "0.03", {"0.001", "0.5"}, {"0", "0.6"}},
+      {"planes", "directions", "1", {"0", "1"}, kNoFlags},
+      {"planes", "max_planes", "500", {"1", "10000"}, {"0", "10001"}},
+      {"planes", "min_area_m2", "1", {"0.01", "10000"}, {"0", "10001"}},
+      {"planes", "epsilon_m", "0.25", {"0.05", "5"}, {"0.04", "5.1"}},
   };
   for (const char* kind : {"rebuild", "verify", "optimize", "fade"}) {
     all.push_back({kind, "threads", "", {"1", "64"}, {"0", "65", "-1", "two", ""}});

@@ -46,7 +46,9 @@ TEST(JobKindsTest, TextsAreLinesForAProtoAndATerminal) {
   EXPECT_THAT(lines,
               ::testing::Contains("  rounds=1..50          Most rounds of matching and "
                                   "optimising (30)"));
-  EXPECT_EQ(JobKindNames(), "rebuild, verify, optimize, revert, train, classify, evaluate or fade");
+  EXPECT_EQ(JobKindNames(),
+            "rebuild, verify, optimize, revert, train, classify, evaluate, "
+            "fade or planes");
 }
 
 TEST(JobKindsTest, NamesAreTheirOwnAndDefaultsFit) {
@@ -70,7 +72,7 @@ TEST(JobKindsTest, FindsAKindOrNamesThoseThereAre) {
   EXPECT_EQ(fade->name, kFadeJob);
   EXPECT_THAT(FindJobKind("dance"),
               testing::StatusIs(absl::StatusCode::kInvalidArgument,
-                                AllOf(HasSubstr("'dance'"), HasSubstr("evaluate or fade"))));
+                                AllOf(HasSubstr("'dance'"), HasSubstr("fade or planes"))));
   const absl::Status refused = FindJobKind(std::string(1000, 'x')).status();
   EXPECT_THAT(std::string(refused.message()), Not(HasSubstr(std::string(101, 'x'))));
 }

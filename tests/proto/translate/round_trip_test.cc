@@ -13,6 +13,7 @@
 #include "proto/translate/jobs.h"
 #include "proto/translate/localize.h"
 #include "proto/translate/maps.h"
+#include "proto/translate/models.h"
 #include "proto/translate/planning.h"
 #include "proto/translate/posegraph.h"
 #include "proto/translate/scans.h"
@@ -47,7 +48,8 @@ class Filler {
         FillMap(message, field);
       } else if (field.is_repeated()) {
         const bool matrix = field.name() == "information" || field.name() == "covariance";
-        for (int n = 0; n < (matrix ? 36 : 2); ++n) Add(message, field);
+        const int count = matrix ? 36 : field.name() == "xyz" ? 9 : 2;
+        for (int n = 0; n < count; ++n) Add(message, field);
       } else {
         Set(message, field);
       }
@@ -196,6 +198,11 @@ TEST(TranslateRoundTripTest, Tiles) {
   ExpectRoundTrip(Filled<v1::TileArea>());
   ExpectRoundTrip(Filled<v1::HeldTile>());
   ExpectRoundTrip(Filled<v1::FetchTilesResponse>());
+}
+
+TEST(TranslateRoundTripTest, Models) {
+  ExpectRoundTrip(Filled<v1::ModelPlane>());
+  ExpectRoundTrip(Filled<v1::PlaneModel>());
 }
 
 TEST(TranslateRoundTripTest, Planning) {

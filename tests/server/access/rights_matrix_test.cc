@@ -79,6 +79,7 @@ const std::map<std::string, std::optional<Right>>& Needed() {
          "Classifiers.Export",
          "Planning.CheckPath",
          "Planning.ListFloors",
+         "Models.GetPlaneModel",
          "Planning.WatchPath"});
     add(Right::kWrite,
         {"Maps.SetClass",

@@ -120,6 +120,7 @@ class FakeDatabase : public api::Database {
   api::Jobs& jobs() override { std::abort(); }
   api::PoseGraph& posegraph() override { std::abort(); }
   api::Classifiers& classifiers() override { std::abort(); }
+  api::Models& models() override { std::abort(); }
 };
 
 }  // namespace strata::cli

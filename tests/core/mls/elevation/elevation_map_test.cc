@@ -14,6 +14,9 @@
 #include "core/cloud/point_cloud.h"
 #include "core/cloud/sensor_model.h"
 #include "core/geometry/pose.h"
+#include "core/mls/build.h"
+#include "core/mls/mls_map.h"
+#include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
 #include "tests/support/status_matchers.h"
 
@@ -214,6 +217,92 @@ TEST(ElevationMapTest, TilesHoldTheObservedCells) {
   EXPECT_EQ(tiles[0].Cell(CellInTile({-1, 0})).size(), 1U);
   ASSERT_EQ(tiles[1].Cell(CellInTile({2, 1})).size(), 1U);
   EXPECT_FLOAT_EQ(tiles[1].Cell(CellInTile({2, 1}))[0].z_m, 3.0F);
+}
+
+// Three levels in one cell, one of them a wall, and a cell of one level.
+std::vector<SurfaceTile> Levels() {
+  SurfaceTile tile;
+  tile.key = TileOfCell({-1, 5});
+  const std::uint16_t column = CellInTile({-1, 5});
+  tile.surfaces = {{.cell = column, .z_m = 0.5F, .sigma_m = 0.01F},
+                   {.cell = column, .z_m = 2.0F, .sigma_m = 0.02F, .depth_m = 0.7F},
+                   {.cell = column, .z_m = 4.0F, .sigma_m = 0.05F},
+                   {.cell = CellInTile({-1, 7}), .z_m = -1.0F, .sigma_m = 0.03F}};
+  tile.IndexRows();
+  return {tile};
+}
+
+TEST(ElevationOfTest, HighestOrAllFused) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const ElevationMap highest,
+                              ElevationOf(Levels(), 0.2, ElevationRule::kHighest));
+  EXPECT_EQ(highest.corner, (CellIndex{-1, 5}));
+  EXPECT_EQ(highest.width, 1);
+  EXPECT_EQ(highest.height, 3);
+  EXPECT_EQ(highest.At({-1, 5}), (ElevationCell{4.0F, 0.05F}));
+  EXPECT_FALSE(highest.At({-1, 6}).observed());
+  EXPECT_EQ(highest.At({-1, 7}), (ElevationCell{-1.0F, 0.03F}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const ElevationMap fused,
+                              ElevationOf(Levels(), 0.2, ElevationRule::kKalman));
+  double mean = 0.5, variance = 1e-4;  // 6.1 and 6.2, one after the other
+  for (const auto& [z, s] : {std::pair(2.0, 0.02), std::pair(4.0, 0.05)}) {
+    mean = (s * s * mean + variance * z) / (variance + s * s);
+    variance = variance * s * s / (variance + s * s);
+  }
+  EXPECT_NEAR(fused.At({-1, 5}).z_m, mean, 1e-6);
+  EXPECT_NEAR(fused.At({-1, 5}).sigma_m, std::sqrt(variance), 1e-7);
+  EXPECT_EQ(fused.At({-1, 7}), (ElevationCell{-1.0F, 0.03F}));
+}
+
+// What a map's tiles say and what its points say, on bumpy ground without walls.
+TEST(ElevationOfTest, FusedSurfacesAreThePointsFused) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> place(-3.0F, 3.0F);
+  std::normal_distribution<float> noise(0.0F, 0.005F);
+  std::vector<Eigen::Vector3f> points(20'000);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float level = i % 3 == 0 ? 2.5F : 0.0F;
+    points[i] = {place(random), place(random), level + noise(random)};
+  }
+  const PointCloud cloud = CloudOf(points);
+  const SensorModel sensor = {.sigma_m = 0.01, .sigma_per_metre = 0.01};
+  STRATA_ASSERT_OK_AND_ASSIGN(const MlsBuildResult built,
+                              BuildMlsMap(cloud, Pose::Identity(), sensor, {.cell_size_m = 0.5}));
+  std::vector<SurfaceTile> tiles;
+  for (const MlsTile& tile : built.map.tiles) tiles.push_back(SurfacesOf(tile));
+  STRATA_ASSERT_OK_AND_ASSIGN(const ElevationMap from_tiles,
+                              ElevationOf(tiles, 0.5, ElevationRule::kKalman));
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const ElevationMap from_points,
+      InsertForward(cloud, Pose::Identity(), sensor, 0.5, ElevationRule::kKalman));
+  ASSERT_EQ(from_tiles.width, from_points.width);
+  ASSERT_EQ(from_tiles.height, from_points.height);
+  for (std::size_t i = 0; i < from_points.cells.size(); ++i) {
+    // σ is coded in steps of 2.2 %, which moves weights between the levels.
+    EXPECT_NEAR(from_tiles.cells[i].z_m, from_points.cells[i].z_m, 0.02);
+    EXPECT_NEAR(from_tiles.cells[i].sigma_m,
+                from_points.cells[i].sigma_m,
+                0.012 * from_points.cells[i].sigma_m);
+  }
+}
+
+TEST(ElevationOfTest, OnlyTheRegionAndNothingOfNothing) {
+  const ElevationRegion region(Eigen::Vector2d(-1.0, 1.3), Eigen::Vector2d(1.0, 9.0));
+  STRATA_ASSERT_OK_AND_ASSIGN(const ElevationMap part,
+                              ElevationOf(Levels(), 0.2, ElevationRule::kHighest, region));
+  EXPECT_EQ(part.observed_count(), 1U);
+  EXPECT_EQ(part.corner, (CellIndex{-1, 7}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const ElevationMap none,
+                              ElevationOf({}, 0.2, ElevationRule::kKalman));
+  EXPECT_TRUE(none.cells.empty());
+}
+
+TEST(ElevationOfTest, WhatIsTooFarApartIsRefused) {
+  std::vector<SurfaceTile> tiles = Levels();
+  tiles.push_back(tiles.front());
+  tiles.back().key.x += 100;
+  tiles.back().key.y += 100;
+  EXPECT_THAT(ElevationOf(tiles, 0.2, ElevationRule::kHighest),
+              StatusIs(absl::StatusCode::kOutOfRange, HasSubstr("smaller region")));
 }
 
 }  // namespace

@@ -63,6 +63,12 @@ MlsMap MapOf(const std::vector<Eigen::Vector3f>& points) {
   return map;
 }
 
+ExtendedElevationMap ExtendedOf(const MlsMap& map, const TraversabilityLimits& limits) {
+  std::vector<SurfaceTile> tiles;
+  for (const MlsTile& tile : map.tiles) tiles.push_back(SurfacesOf(tile));
+  return *MakeExtendedElevationMap(std::move(tiles), kCell, limits);
+}
+
 // The middle of `half` cells to either side that all have these heights.
 ExtendedElevationCell MiddleOf(const std::vector<float>& heights, int half, double clearance_m) {
   std::vector<Eigen::Vector3f> points;
@@ -74,7 +80,7 @@ ExtendedElevationCell MiddleOf(const std::vector<float>& heights, int half, doub
       }
     }
   }
-  return *MakeExtendedElevationMap(MapOf(points), {.clearance_m = clearance_m}).Find({0, 0});
+  return *ExtendedOf(MapOf(points), {.clearance_m = clearance_m}).Find({0, 0});
 }
 
 ElevationClass ClassOfOnly(const std::vector<float>& heights) {
@@ -118,7 +124,7 @@ ExtendedElevationCell UnderACanopy(const std::vector<float>& middle) {
       add(4.0F);
     }
   }
-  return *MakeExtendedElevationMap(MapOf(points), {}).Find({0, 0});
+  return *ExtendedOf(MapOf(points), {}).Find({0, 0});
 }
 
 TEST(ExtendedElevationMapTest, AGapIsPassableWhereItsGroundIs) {
@@ -143,10 +149,36 @@ TEST(ExtendedElevationMapTest, AGapWithoutGroundIsNotPassable) {
       points.emplace_back(at.x(), at.y(), (x + y) % 2 == 0 ? 4.0F : 4.5F);  // branches
     }
   }
-  const ExtendedElevationCell hedge = *MakeExtendedElevationMap(MapOf(points), {}).Find({0, 0});
+  const ExtendedElevationCell hedge = *ExtendedOf(MapOf(points), {}).Find({0, 0});
   EXPECT_EQ(hedge.elevation_class, ElevationClass::kNonTraversable);
   EXPECT_NEAR(hedge.z_m, 0.8, 1e-3);
   EXPECT_FALSE(hedge.passable());
+}
+
+TEST(ExtendedElevationMapTest, WhatWasSeenFromBelowOnlyIsNoGround) {
+  SurfaceTile ceiling;
+  ceiling.key = {0, 0, 0};
+  for (int y = 0; y < 12; ++y) {
+    for (int x = 0; x < 12; ++x) {
+      const std::uint16_t cell = CellInTile({x, y});
+      const bool below = x < 6;
+      if (below) ceiling.surfaces.push_back({.cell = cell, .z_m = 0.0F, .sigma_m = 0.004F});
+      ceiling.surfaces.push_back({.cell = cell,
+                                  .traversability = Traversability::kUnderside,
+                                  .z_m = 3.0F,
+                                  .sigma_m = 0.004F});
+    }
+  }
+  ceiling.IndexRows();
+  STRATA_ASSERT_OK_AND_ASSIGN(const ExtendedElevationMap map,
+                              MakeExtendedElevationMap({ceiling}, kCell, {}));
+  EXPECT_EQ(map.Find({3, 6})->elevation_class, ElevationClass::kGap);
+  EXPECT_EQ(map.Find({3, 6})->z_m, 0.0F);
+  EXPECT_EQ(map.Find({9, 6})->elevation_class, ElevationClass::kNonTraversable);
+  const Stop stop;
+  stop.Request();
+  EXPECT_EQ(MakeExtendedElevationMap({ceiling}, kCell, {}, stop).status().code(),
+            absl::StatusCode::kCancelled);
 }
 
 // The world of Fig. 6.1: flat ground, a road under a bridge (|x| ≤ 2, along y) whose deck, 3.0 to
@@ -261,7 +293,7 @@ TEST(Figure61Test, ElevationMapBlocksTheUnderpassExtendedOpensItAndMlsHasBoth) {
   EXPECT_EQ(by_elevation, (Walks{.over = true, .under = false}));
 
   const MlsMap map = MapOf(points);
-  const ExtendedElevationMap extended = MakeExtendedElevationMap(map, {});
+  const ExtendedElevationMap extended = ExtendedOf(map, {});
   const Walks by_extended = WalksOnOneLevel([&](const CellIndex& cell, double& z) {
     const ExtendedElevationCell* found = extended.Find(cell);
     if (found == nullptr) return false;
@@ -308,7 +340,7 @@ TEST(Figure61Test, ElevationMapBlocksTheUnderpassExtendedOpensItAndMlsHasBoth) {
 }
 
 TEST(Figure61Test, ClassesAreThoseOfFigure63) {
-  const ExtendedElevationMap map = MakeExtendedElevationMap(MapOf(BridgeCloud()), {});
+  const ExtendedElevationMap map = ExtendedOf(MapOf(BridgeCloud()), {});
   const auto class_at = [&](double x, double y) { return map.Find(CellAt(x, y))->elevation_class; };
   EXPECT_EQ(class_at(0.1, -6.1), ElevationClass::kTraversable);
   EXPECT_EQ(class_at(8.1, 0.1), ElevationClass::kTraversable);  // the ramp

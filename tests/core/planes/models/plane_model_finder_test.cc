@@ -13,8 +13,7 @@
 
 #include "core/common/stop.h"
 #include "core/geometry/primitives.h"
-#include "core/planes/models/alpha_shape.h"
-#include "core/planes/models/plane_mixture.h"
+#include "core/planes/models/alpha_polygons.h"
 #include "core/planes/models/plane_polygons.h"
 #include "core/world/constraint.h"
 #include "core/world/plane_model.h"
@@ -52,7 +51,7 @@ PosedPoints WallAndFloor(double turn_rad) {
   return points;
 }
 
-TEST(AlphaShape, KeepsAHole) {
+TEST(AlphaPolygons, KeepAHole) {
   std::vector<Eigen::Vector2d> grid;
   for (int i = 0; i <= 40; ++i) {
     for (int j = 0; j <= 40; ++j) {
@@ -61,7 +60,7 @@ TEST(AlphaShape, KeepsAHole) {
     }
   }
   grid.emplace_back(9.0, 9.0);
-  const std::vector<FlatPolygon> shapes = AlphaShape(grid, 0.25);
+  const std::vector<FlatPolygon> shapes = AlphaPolygons(grid, 0.25);
   ASSERT_EQ(shapes.size(), 1U);
   ASSERT_EQ(shapes[0].holes.size(), 1U);
   EXPECT_NEAR(SignedArea(shapes[0].outer), 16.0, 1e-3);
@@ -70,14 +69,14 @@ TEST(AlphaShape, KeepsAHole) {
 }
 
 // Sparse points make regions that touch themselves everywhere.
-TEST(AlphaShape, RingsComeToAPointOnce) {
+TEST(AlphaPolygons, RingsComeToAPointOnce) {
   Random random(3);
   std::vector<Eigen::Vector2d> points;
   for (int i = 0; i < 3000; ++i) {
     points.emplace_back(random.Uniform(0.0, 8.0), random.Uniform(0.0, 8.0));
   }
   std::size_t holes = 0;
-  for (const FlatPolygon& shape : AlphaShape(points, 0.12)) {
+  for (const FlatPolygon& shape : AlphaPolygons(points, 0.12)) {
     EXPECT_TRUE(IsValid(shape));
     holes += shape.holes.size();
     std::vector<FlatRing> rings = shape.holes;
@@ -132,51 +131,6 @@ TEST(FindPlaneModel, NothingGivesNothing) {
   const auto model = FindPlaneModel({}, {}, Stop());
   ASSERT_TRUE(model.ok()) << model.status();
   EXPECT_TRUE(model->planes.empty());
-}
-
-// Two slanted walls 4° apart and a floor, in cells: the likelihood never falls.
-TEST(PlaneMixture, ObjectiveNeverFalls) {
-  Random random(3);
-  std::vector<MixtureCell> cells;
-  const std::vector<Eigen::Vector3d> normals = {
-      {1.0, 0.0, 0.0}, {std::cos(0.07), std::sin(0.07), 0.0}, {0.0, 0.0, 1.0}};
-  std::vector<MixturePlane> start;
-  for (std::size_t m = 0; m < normals.size(); ++m) {
-    const Eigen::Vector3d n = normals[m];
-    const Eigen::Vector3d u = n.unitOrthogonal(), v = n.cross(u);
-    MixturePlane plane;
-    for (int i = 0; i < 80; ++i) {
-      MixtureCell cell;
-      cell.mean = (3.0 * static_cast<double>(m) + 0.02 * random.Gaussian()) * n +
-                  random.Uniform(-2.0, 2.0) * u + random.Uniform(-2.0, 2.0) * v;
-      cell.covariance = 0.01 * (u * u.transpose() + v * v.transpose());
-      cell.measurements = 4.0;
-      cell.variance_m2 = 4e-4;
-      cell.area_m2 = 0.1;
-      plane.voxels.push_back(VoxelOf(cell.mean));
-      cells.push_back(cell);
-    }
-    plane.plane.normal =
-        (n + 0.05 * Eigen::Vector3d(random.Gaussian(), random.Gaussian(), random.Gaussian()))
-            .normalized();
-    plane.plane.distance = 3.0 * static_cast<double>(m);
-    start.push_back(plane);
-  }
-  PlaneMixture mixture(cells, {});
-  mixture.planes = start;
-  for (const MixturePlane& plane : start) mixture.AddDirection(plane.plane.normal);
-  mixture.Prepare();
-  double last = mixture.LogLikelihood();
-  const double first = last;
-  for (int step = 0; step < 30; ++step) {
-    const double expected = mixture.ExpectedLogLikelihood();
-    mixture.MStep();
-    EXPECT_GE(mixture.ExpectedLogLikelihood(), expected - 1e-9 * std::abs(expected)) << step;
-    mixture.EStep();
-    EXPECT_GE(mixture.LogLikelihood(), last - 1e-9 * std::abs(last)) << step;
-    last = mixture.LogLikelihood();
-  }
-  EXPECT_GT(last, first + 1.0);
 }
 
 }  // namespace

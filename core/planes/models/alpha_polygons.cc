@@ -1,4 +1,4 @@
-#include "core/planes/models/alpha_shape.h"
+#include "core/planes/models/alpha_polygons.h"
 
 #include <algorithm>
 #include <cmath>
@@ -126,7 +126,7 @@ double AreaOf(const FlatPolygon& polygon) {
   return area;
 }
 
-std::vector<FlatPolygon> AlphaShape(std::span<const Eigen::Vector2d> points, double radius) {
+std::vector<FlatPolygon> AlphaPolygons(std::span<const Eigen::Vector2d> points, double radius) {
   std::vector<Site> sites;
   sites.reserve(points.size());
   for (const Eigen::Vector2d& p : points) {

@@ -1,7 +1,7 @@
 // α-shapes of points in a plane (thesis 4.5.3, 5.4.2): regions with holes.
 // Internal to core/planes, not installed.
-#ifndef STRATA_CORE_PLANES_MODELS_ALPHA_SHAPE_H_
-#define STRATA_CORE_PLANES_MODELS_ALPHA_SHAPE_H_
+#ifndef STRATA_CORE_PLANES_MODELS_ALPHA_POLYGONS_H_
+#define STRATA_CORE_PLANES_MODELS_ALPHA_POLYGONS_H_
 
 #include <span>
 #include <vector>
@@ -24,8 +24,8 @@ double AreaOf(const FlatPolygon& polygon);  // without the holes
 // The triangles of the points' Delaunay triangulation whose circumscribed circle has at most
 // `radius` (α of 4.5.3 is its square), joined over their edges. Points count in tenths of a
 // millimetre, within ±100 km. By falling area. Exact predicates: Boost.Polygon's Voronoi diagram.
-std::vector<FlatPolygon> AlphaShape(std::span<const Eigen::Vector2d> points, double radius);
+std::vector<FlatPolygon> AlphaPolygons(std::span<const Eigen::Vector2d> points, double radius);
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_PLANES_MODELS_ALPHA_SHAPE_H_
+#endif  // STRATA_CORE_PLANES_MODELS_ALPHA_POLYGONS_H_

@@ -1,0 +1,145 @@
+#include "core/engine/models/plane_models.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+
+#include "core/common/status.h"
+#include "core/engine/models/square_points.h"
+#include "core/planes/models/plane_model_codec.h"
+#include "core/planes/models/plane_model_finder.h"
+#include "core/storage/storage.h"
+
+namespace strata {
+namespace {
+
+PlaneModelOptions OptionsOf(const JobArguments& arguments) {
+  PlaneModelOptions options;
+  options.rho_m = arguments.Real("rho_m");
+  options.sigma_rad = arguments.Real("sigma_rad");
+  options.directions = arguments.Flag("directions");
+  options.max_planes = static_cast<int>(arguments.Whole("max_planes"));
+  options.min_area_m2 = arguments.Real("min_area_m2");
+  options.epsilon_m = arguments.Real("epsilon_m");
+  return options;
+}
+
+// Two rounds over the squares: their planes, then where those have surface.
+absl::StatusOr<PlaneModel> FindModel(SquarePoints& points,
+                                     const PlaneModelOptions& options,
+                                     JobContext& context) {
+  PlaneModelFinder finder(options);
+  const std::vector<PlanSquare>& squares = points.squares();
+  const auto count = static_cast<double>(squares.size());
+  const Stop& stop = context.stop();
+  for (std::size_t i = 0; i < squares.size(); ++i) {
+    STRATA_RETURN_IF_ERROR(
+        context.Progress(0.5 * static_cast<double>(i) / count, "finding planes"));
+    STRATA_ASSIGN_OR_RETURN(const PosedPoints own, points.Load(i, stop));
+    STRATA_RETURN_IF_ERROR(finder.FindPlanes(own, squares[i], stop));
+  }
+  STRATA_RETURN_IF_ERROR(finder.JoinPlanes(stop));
+  for (std::size_t i = 0; i < squares.size(); ++i) {
+    STRATA_RETURN_IF_ERROR(
+        context.Progress(0.5 + 0.4 * static_cast<double>(i) / count, "looking along rays"));
+    STRATA_ASSIGN_OR_RETURN(const PosedPoints own, points.Load(i, stop));
+    STRATA_RETURN_IF_ERROR(finder.Look(own, squares[i], stop));
+  }
+  STRATA_RETURN_IF_ERROR(context.Progress(0.9, "drawing polygons"));
+  return finder.Finish(stop);
+}
+
+absl::Status Keep(MapCore& core,
+                  const PlaneModelInfo& info,
+                  const PlaneModel& model,
+                  const Stop& stop) {
+  return core.writer().Run(Durability::kFull, 0, stop, [&](StorageWriter& writer) -> absl::Status {
+    STRATA_RETURN_IF_ERROR(writer.DeletePlaneModel());
+    STRATA_RETURN_IF_ERROR(writer.PutPlaneModelPart(info.job, 0, EncodePlaneModelInfo(info)));
+    for (std::size_t m = 0; m < model.planes.size(); ++m) {
+      STRATA_RETURN_IF_ERROR(
+          writer.PutPlaneModelPart(info.job, m + 1, EncodeModelPlane(model.planes[m])));
+    }
+    return absl::OkStatus();
+  });
+}
+
+absl::StatusOr<std::uint64_t> JobOfModel(MapCore& core) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  return reader->JobOfPlaneModel();
+}
+
+absl::StatusOr<std::string> ReadPart(MapCore& core, std::uint64_t job, std::uint64_t part) {
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+    STRATA_ASSIGN_OR_RETURN(std::optional<std::string> bytes,
+                            reader->FindPlaneModelPart(job, part));
+    if (bytes.has_value()) return *std::move(bytes);
+  }
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t now, JobOfModel(core));
+  if (now != job) return absl::AbortedError("another plane model took its place; try again");
+  return absl::DataLossError("it is not there");
+}
+
+}  // namespace
+
+absl::Status RunPlanesJob(MapCore& core,
+                          const JobInfo& job,
+                          const JobArguments& arguments,
+                          JobContext& context) {
+  const PlaneModelOptions options = OptionsOf(arguments);
+  STRATA_RETURN_IF_ERROR(options.Validate());
+  PlaneModelInfo info;
+  info.job = job.id;
+  info.epoch = core.snapshots().current().epoch;
+  SquarePoints points(core);
+  STRATA_RETURN_IF_ERROR(points.ListScans(info.epoch, context.stop()));
+  STRATA_ASSIGN_OR_RETURN(const PlaneModel model, FindModel(points, options, context));
+  info.made = absl::Now();
+  info.scans = points.scans();
+  info.points = points.points();
+  info.planes = model.planes.size();
+  info.directions = model.directions;
+  STRATA_RETURN_IF_ERROR(Keep(core, info, model, context.stop()));
+  context.SetMetric("planes", static_cast<double>(info.planes));
+  context.SetMetric("directions", static_cast<double>(info.directions.size()));
+  context.SetMetric("scans", static_cast<double>(info.scans));
+  context.SetMetric("scans_without_points", static_cast<double>(points.without_points()));
+  points.damaged().SetMetrics(context);
+  context.SetMessage(absl::StrCat(info.planes,
+                                  " planes with ",
+                                  info.directions.size(),
+                                  " main directions from ",
+                                  info.scans,
+                                  " scans",
+                                  points.damaged().Message()));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<PlaneModelInfo> ReadPlaneModel(
+    MapCore& core, const Stop& stop, absl::FunctionRef<absl::Status(const ModelPlane&)> sink) {
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t job, JobOfModel(core));
+  if (job == 0) return absl::NotFoundError("no plane model; job start MAP planes makes one");
+  STRATA_ASSIGN_OR_RETURN(const std::string head, ReadPart(core, job, 0));
+  STRATA_ASSIGN_OR_RETURN(const PlaneModelInfo info, DecodePlaneModelInfo(head));
+  for (std::uint64_t part = 1; part <= info.planes; ++part) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+    const auto damaged = [part](const absl::Status& why) {
+      return Annotate(why, absl::StrCat("plane model, part ", part));
+    };
+    const absl::StatusOr<std::string> bytes = ReadPart(core, job, part);
+    if (!bytes.ok()) return damaged(bytes.status());
+    const absl::StatusOr<ModelPlane> plane = DecodeModelPlane(*bytes);
+    if (!plane.ok()) return damaged(plane.status());
+    STRATA_RETURN_IF_ERROR(sink(*plane));
+  }
+  return info;
+}
+
+}  // namespace strata

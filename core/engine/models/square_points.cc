@@ -1,0 +1,149 @@
+#include "core/engine/models/square_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "absl/container/btree_set.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include <Eigen/Core>
+
+#include "core/common/status.h"
+#include "core/engine/map/scan_lookup.h"
+#include "core/engine/scans/scan_share.h"
+#include "core/engine/scans/scan_source.h"
+#include "core/mls/tile_key.h"
+
+namespace strata {
+namespace {
+
+std::int64_t SquareIndexOf(double at_m) {
+  return static_cast<std::int64_t>(std::floor(at_m / kSquareM));
+}
+
+// Keeps every second point, so that which are kept depends on their order alone.
+void KeepHalf(PosedPoints& points) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < points.points.size(); i += 2) {
+    points.points[kept++] = points.points[i];
+  }
+  points.points.resize(kept);
+  for (PosedPoints::View& view : points.views) view.end = (view.end + 1) / 2;
+}
+
+}  // namespace
+
+absl::Status SquarePoints::ListScans(std::uint64_t epoch, const Stop& stop) {
+  epoch_ = epoch;
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  ScanQuery query;
+  query.state = ScanState::kIntegrated;
+  query.skip_damaged = true;  // verify names it
+  STRATA_RETURN_IF_ERROR(ForEachPosedScan(*reader, query, epoch, [&](PosedScan posed) {
+    if (!posed.scan.has_points) {
+      ++without_points_;
+      return;
+    }
+    points_ += posed.scan.header.point_count;
+    scans_.push_back({std::move(posed.scan), posed.pose->T_map_scan});
+  }));
+  for (std::size_t i = 0; i < scans_.size(); ++i) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+    STRATA_ASSIGN_OR_RETURN(const std::vector<TileKey> tiles,
+                            reader->TilesOfScan(scans_[i].scan.number));
+    AddTiles(tiles, i);
+  }
+  for (const Place& place : places_) {
+    const Eigen::Vector2d corner(kSquareM * static_cast<double>(place.first),
+                                 kSquareM * static_cast<double>(place.second));
+    squares_.emplace_back(corner, corner + Eigen::Vector2d(kSquareM, kSquareM));
+  }
+  return absl::OkStatus();
+}
+
+void SquarePoints::AddTiles(const std::vector<TileKey>& tiles, std::size_t scan) {
+  const double edge_m = kTileCells * core_.info().parameters.mls.cell_size_m;
+  absl::btree_set<Place> around;
+  for (const TileKey& tile : tiles) {
+    const auto range = [edge_m](std::int32_t at, double margin_m) {
+      return std::pair(SquareIndexOf(at * edge_m - margin_m),
+                       SquareIndexOf((at + 1) * edge_m + margin_m - 1e-6));
+    };
+    const auto [x_first, x_last] = range(tile.x, kSquareMarginM);
+    const auto [y_first, y_last] = range(tile.y, kSquareMarginM);
+    for (std::int64_t x = x_first; x <= x_last; ++x) {
+      for (std::int64_t y = y_first; y <= y_last; ++y) around.insert({x, y});
+    }
+  }
+  for (const Place& place : around) {
+    std::vector<std::size_t>& scans = scans_around_[place];
+    if (scans.empty())
+      places_.insert(std::upper_bound(places_.begin(), places_.end(), place), place);
+    scans.push_back(scan);
+  }
+}
+
+absl::StatusOr<PosedPoints> SquarePoints::Load(std::size_t i, const Stop& stop) {
+  const PlanSquare& square = squares_[i];
+  const Eigen::Vector2d margin(kSquareMarginM, kSquareMarginM);
+  const PlanSquare around(square.min() - margin, square.max() + margin);
+  Thinned thinned;
+  PosedPoints& points = thinned.points;
+  points.origin << square.center(), 0.0;
+  for (const std::size_t scan : scans_around_.at(places_[i])) {
+    const absl::Status done = Append(scans_[scan], around, stop, thinned);
+    if (done.ok()) continue;
+    points.points.resize(points.views.empty() ? 0 : points.views.back().end);
+    STRATA_ASSIGN_OR_RETURN(const bool leave_out, MayLeaveOut(scans_[scan], done));
+    if (!leave_out) return done;
+  }
+  return std::move(thinned.points);
+}
+
+absl::StatusOr<bool> SquarePoints::MayLeaveOut(const PlacedScan& placed, const absl::Status& why) {
+  if (absl::IsFailedPrecondition(why)) return true;  // its points were dropped meanwhile
+  if (!absl::IsDataLoss(why) && !absl::IsNotFound(why)) return false;
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  STRATA_ASSIGN_OR_RETURN(const bool there, IsThere(*reader, placed.scan.number, epoch_));
+  return !there || damaged_.LeaveOut(placed.scan.number, placed.scan.header.id.ToString(), why);
+}
+
+absl::Status SquarePoints::Append(const PlacedScan& placed,
+                                  const PlanSquare& around,
+                                  const Stop& stop,
+                                  Thinned& thinned) {
+  const MapParameters parameters = core_.info().parameters;
+  const SensorModel sensor = placed.scan.header.sensor.value_or(parameters.sensor);
+  PosedPoints& points = thinned.points;
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  const ScanShare share(core_.caches(), placed.scan);
+  ScanSource source(*reader, parameters);
+  STRATA_RETURN_IF_ERROR(
+      source.ForEachBlock(placed.scan, [&](const PointCloud& block) -> absl::Status {
+        STRATA_RETURN_IF_ERROR(stop.status());
+        for (std::size_t i = 0; i < block.size(); ++i) {
+          if (!source.faded().empty() && source.faded()[i] != 0) continue;
+          if (!sensor.Takes((block.points[i] - block.sensor_origin).norm())) continue;
+          const Eigen::Vector3d p = placed.T_map_scan * block.points[i].cast<double>();
+          if (!around.contains(p.head<2>()) || thinned.inside++ % thinned.every != 0) continue;
+          if (points.points.empty()) points.origin.z() = p.z();
+          const Eigen::Vector3f at = (p - points.origin).cast<float>();
+          if (std::abs(at.z()) < kMostFromOriginM) points.points.push_back(at);
+        }
+        while (points.points.size() > kMostSquarePoints) {
+          KeepHalf(points);
+          thinned.every *= 2;
+        }
+        return absl::OkStatus();
+      }));
+  const Eigen::Vector3d at =
+      placed.T_map_scan * placed.scan.header.sensor_origin.cast<double>() - points.origin;
+  points.views.push_back({at.cast<float>(), points.points.size()});
+  return absl::OkStatus();
+}
+
+}  // namespace strata

@@ -1,0 +1,173 @@
+#include "core/mesh/occupancy_voxels.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "absl/strings/str_format.h"
+
+#include "core/common/option_checks.h"
+#include "core/common/status.h"
+
+namespace strata {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+// Log-odds times 27, with which hit and miss are to each other as they should, within 0.1 %.
+constexpr std::int16_t kHit = 23;
+constexpr std::int16_t kMiss = 11;
+constexpr std::int16_t kLeastOdds = -54;
+constexpr std::int16_t kMostOdds = 95;
+
+constexpr std::size_t kMostBytes = 2'000'000'000;
+constexpr std::uint16_t kLastScan = 32'767;
+constexpr std::size_t kRaysBetweenChecks = 1024;
+
+// The lowest voxel whose middle is not below `p`.
+Vector3i VoxelAbove(const Vector3d& p) {
+  return (p.array() - 0.5).ceil().max(-kMostNodes).min(kMostNodes).cast<int>();
+}
+
+Vector3i VoxelOf(const Vector3d& p) { return p.array().floor().cast<int>(); }
+
+}  // namespace
+
+absl::Status OccupancyVoxelsOptions::Validate() const {
+  OptionChecks checks("occupancy");
+  checks.InRange("voxel_m", voxel_m, 0.001, 1000.0);
+  for (const Vector3d& corner : {region.min(), region.max()}) {
+    for (const double x : corner) checks.InRange("region", x, -1e9, 1e9);
+  }
+  return checks.status();
+}
+
+OccupancyVoxels::OccupancyVoxels(const OccupancyVoxelsOptions& options)
+    : voxel_m_(options.voxel_m),
+      low_(VoxelAbove(options.region.min() / options.voxel_m)),
+      high_(VoxelAbove(options.region.max() / options.voxel_m)) {}
+
+void OccupancyVoxels::BeginScan() {
+  if (++scan_ <= kLastScan) return;
+  voxels_.ForEach([](Voxel& voxel) { voxel.seen = std::min<std::uint16_t>(voxel.seen, 1); });
+  scan_ = 1;
+}
+
+absl::Status OccupancyVoxels::Check(const Stop& stop) const {
+  if (voxels_.bytes() <= kMostBytes) return stop.status();
+  return absl::ResourceExhaustedError(
+      absl::StrFormat("occupancy: more than %d MB; take larger voxels or a smaller region",
+                      kMostBytes / 1'000'000));
+}
+
+// True the first time that the scan hits it.
+bool OccupancyVoxels::Hit(const Vector3i& at) {
+  Voxel& voxel = At(at);
+  const auto mark = static_cast<std::uint16_t>(2 * scan_ + 1);
+  if (voxel.seen == mark) return false;
+  voxel.seen = mark;
+  voxel.odds = std::min<std::int16_t>(voxel.odds + kHit, kMostOdds);
+  return true;
+}
+
+void OccupancyVoxels::Miss(const Vector3i& at) {
+  Voxel& voxel = At(at);
+  const auto mark = static_cast<std::uint16_t>(2 * scan_);
+  if (voxel.seen >= mark) return;
+  voxel.seen = mark;
+  voxel.odds = std::max<std::int16_t>(voxel.odds - kMiss, kLeastOdds);
+}
+
+// Leaves the part over the voxels that are kept; false if there is none.
+bool OccupancyVoxels::Clip(Ray& ray) const {
+  const Vector3d along = ray.to - ray.from;
+  double begin = 0.0;
+  double end = 1.0;
+  for (int i = 0; i < 3; ++i) {
+    if (along[i] == 0.0) {
+      if (ray.from[i] < low_[i] || ray.from[i] >= high_[i]) return false;
+      continue;
+    }
+    const double a = (low_[i] - ray.from[i]) / along[i];
+    const double b = (high_[i] - ray.from[i]) / along[i];
+    begin = std::max(begin, std::min(a, b));
+    end = std::min(end, std::max(a, b));
+  }
+  if (begin >= end) return false;
+  ray.ends = end == 1.0;
+  ray.to = ray.from + end * along;
+  ray.from += begin * along;
+  return true;
+}
+
+// From voxel to voxel (Amanatides and Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing",
+// 1987).
+void OccupancyVoxels::Cast(const Ray& ray) {
+  const Vector3d along = ray.to - ray.from;
+  Vector3i at = VoxelOf(ray.from).cwiseMax(low_).cwiseMin(high_ - Vector3i::Ones());
+  const Vector3i last = VoxelOf(ray.to);
+  Vector3i step;
+  Vector3d next, every;
+  for (int i = 0; i < 3; ++i) {
+    step[i] = along[i] > 0.0 ? 1 : -1;
+    const double edge = at[i] + (along[i] > 0.0 ? 1 : 0);
+    constexpr double kNever = std::numeric_limits<double>::infinity();
+    next[i] = along[i] == 0.0 ? kNever : (edge - ray.from[i]) / along[i];
+    every[i] = along[i] == 0.0 ? kNever : 1.0 / std::abs(along[i]);
+  }
+  while (Inside(at) && !(ray.ends && at == last)) {
+    Miss(at);
+    int nearest = 0;
+    if (next[1] < next[nearest]) nearest = 1;
+    if (next[2] < next[nearest]) nearest = 2;
+    if (next[nearest] > 1.0) return;
+    at[nearest] += step[nearest];
+    next[nearest] += every[nearest];
+  }
+}
+
+absl::Status OccupancyVoxels::Add(const PointCloud& cloud,
+                                  const Pose& T_map_scan,
+                                  const SensorModel& sensor,
+                                  const Stop& stop) {
+  BeginScan();
+  const Vector3d from = T_map_scan * (cloud.sensor_origin.cast<double>() + cloud.origin) / voxel_m_;
+  std::vector<Ray> rays;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (i % kRaysBetweenChecks == 0) STRATA_RETURN_IF_ERROR(Check(stop));
+    const Eigen::Vector3f& p = cloud.points[i];
+    if (!p.allFinite() || !sensor.Takes((p - cloud.sensor_origin).cast<double>().norm())) continue;
+    Ray ray = {from, T_map_scan * (p.cast<double>() + cloud.origin) / voxel_m_};
+    if (!Clip(ray)) continue;
+    if (std::max(ray.from.cwiseAbs().maxCoeff(), ray.to.cwiseAbs().maxCoeff()) >= kMaxVoxel) {
+      return absl::OutOfRangeError(absl::StrFormat(
+          "occupancy: a ray from (%.1f, %.1f, %.1f) leaves the %.1f m around 0 that voxels of "
+          "%g m reach; take larger ones or a region",
+          from.x() * voxel_m_,
+          from.y() * voxel_m_,
+          from.z() * voxel_m_,
+          kMaxVoxel * voxel_m_,
+          voxel_m_));
+    }
+    const Vector3i end = VoxelOf(ray.to);
+    if (!ray.ends || !Inside(end) || Hit(end)) rays.push_back(ray);
+  }
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (i % kRaysBetweenChecks == 0) STRATA_RETURN_IF_ERROR(Check(stop));
+    Cast(rays[i]);
+  }
+  return Check(stop);
+}
+
+OccupancyBlock OccupancyVoxels::block(std::size_t i) const {
+  OccupancyBlock states;
+  const auto state = [](const Voxel& voxel) {
+    if (voxel.seen == 0) return Occupancy::kUnknown;
+    return voxel.odds >= 0 ? Occupancy::kOccupied : Occupancy::kFree;
+  };
+  std::transform(voxels_.block(i).begin(), voxels_.block(i).end(), states.begin(), state);
+  return states;
+}
+
+}  // namespace strata
