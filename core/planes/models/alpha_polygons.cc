@@ -12,6 +12,7 @@
 #include <boost/polygon/voronoi.hpp>
 
 #include "core/common/disjoint_sets.h"
+#include "core/common/hash_map.h"
 
 namespace strata {
 namespace {
@@ -22,6 +23,27 @@ using Vertex = Diagram::vertex_type;
 using Site = boost::polygon::point_data<std::int32_t>;
 
 constexpr double kUnitM = 1e-4;
+
+// A border that comes to a point twice is several that touch there: the outer one of a region that
+// hangs together over edges, and holes.
+std::vector<FlatRing> SimpleRings(const FlatRing& border) {
+  std::vector<FlatRing> rings;
+  FlatRing open;
+  HashMap<std::pair<double, double>, std::size_t> places;
+  for (const Eigen::Vector2d& p : border) {
+    const auto [place, is_new] = places.try_emplace({p.x(), p.y()}, open.size());
+    if (is_new) {
+      open.push_back(p);
+      continue;
+    }
+    const auto begin = open.begin() + static_cast<std::ptrdiff_t>(place->second);
+    rings.emplace_back(begin, open.end());
+    for (auto q = begin + 1; q != open.end(); ++q) places.erase({q->x(), q->y()});
+    open.erase(begin + 1, open.end());
+  }
+  rings.push_back(std::move(open));
+  return rings;
+}
 
 // A vertex of the diagram is a face of the Delaunay triangulation, an edge crosses one of its
 // edges. The faces of the shape are those near enough to their sites.
@@ -48,12 +70,13 @@ class Shape {
     std::vector<FlatPolygon> polygons(faces_ + 1);
     for (const Edge& edge : diagram_.edges()) {
       if (edge.color() != 0 || !IsBorder(edge)) continue;
-      FlatRing ring = Follow(edge);
       FlatPolygon& polygon = polygons[regions.Root(edge.vertex0()->color())];
-      if (SignedArea(ring) > 0.0) {
-        polygon.outer = std::move(ring);
-      } else {
-        polygon.holes.push_back(std::move(ring));
+      for (FlatRing& ring : SimpleRings(Follow(edge))) {
+        if (SignedArea(ring) > 0.0) {
+          polygon.outer = std::move(ring);
+        } else {
+          polygon.holes.push_back(std::move(ring));
+        }
       }
     }
     std::erase_if(polygons, [](const FlatPolygon& polygon) { return polygon.outer.empty(); });

@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <cstddef>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -12,6 +14,7 @@
 #include "core/common/stop.h"
 #include "core/geometry/primitives.h"
 #include "core/planes/models/alpha_polygons.h"
+#include "core/planes/models/plane_polygons.h"
 #include "core/world/constraint.h"
 #include "core/world/plane_model.h"
 #include "tests/support/simulator.h"
@@ -63,6 +66,27 @@ TEST(AlphaPolygons, KeepAHole) {
   EXPECT_NEAR(SignedArea(shapes[0].outer), 16.0, 1e-3);
   // The corners of a hole are cut: a triangle of legs 0.2 m there has a circle of 0.14 m.
   EXPECT_NEAR(SignedArea(shapes[0].holes[0]), -(1.0 - 4 * 0.02), 1e-3);
+}
+
+// Sparse points make regions that touch themselves everywhere.
+TEST(AlphaPolygons, RingsComeToAPointOnce) {
+  Random random(3);
+  std::vector<Eigen::Vector2d> points;
+  for (int i = 0; i < 3000; ++i) {
+    points.emplace_back(random.Uniform(0.0, 8.0), random.Uniform(0.0, 8.0));
+  }
+  std::size_t holes = 0;
+  for (const FlatPolygon& shape : AlphaPolygons(points, 0.12)) {
+    EXPECT_TRUE(IsValid(shape));
+    holes += shape.holes.size();
+    std::vector<FlatRing> rings = shape.holes;
+    rings.push_back(shape.outer);
+    for (const FlatRing& ring : rings) {
+      std::set<std::pair<double, double>> places;
+      for (const Eigen::Vector2d& p : ring) EXPECT_TRUE(places.insert({p.x(), p.y()}).second);
+    }
+  }
+  EXPECT_GT(holes, 20U);
 }
 
 TEST(FindPlaneModel, WallWithWindowMeetsTheFloor) {
