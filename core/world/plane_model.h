@@ -40,7 +40,7 @@ struct ModelPlane {
   Plane plane;           // map frame; the normal points to where it was seen from
   PlaneKind kind = PlaneKind::kWall;
   std::uint32_t direction = kNoDirection;  // index of its main direction
-  double area_m2 = 0.0;                    // of flat surface measured in it
+  double area_m2 = 0.0;  // of its polygons; without any, of the cells of surface measured in it
   std::uint64_t point_count = 0;
   double rms_m = 0.0;                  // of its points' distance to it
   double sigma_m = 0.0;                // of its offset at the middle of its points

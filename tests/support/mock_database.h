@@ -256,7 +256,6 @@ class MockClassifiers : public api::Classifiers {
               (override));
 };
 
-// Calls nobody decided on answer UNKNOWN (gmock's default of a StatusOr).
 class MockModels : public api::Models {
  public:
   MOCK_METHOD(absl::StatusOr<PlaneModelInfo>,
@@ -265,6 +264,7 @@ class MockModels : public api::Models {
               (override));
 };
 
+// Calls nobody decided on answer UNKNOWN (gmock's default of a StatusOr).
 class MockDatabase : public api::Database {
  public:
   ::testing::NiceMock<MockMaps>& maps() override { return maps_; }

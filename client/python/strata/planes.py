@@ -44,7 +44,7 @@ class Plane:
     direction: int | None
     """Index into PlaneModel.directions; None: it has none."""
     area: float
-    """Of flat surface measured in it [m²]."""
+    """Of its polygons; without any, of flat surface measured in it [m²]."""
     rms: float
     """Of its points' distances to it [m]."""
     polygons: list

@@ -202,6 +202,10 @@ absl::StatusOr<PlaneModel> PlaneModelFinder::Finish(const Stop& stop) {
     STRATA_RETURN_IF_ERROR(stop.status());
     ModelPlane plane = state_->joined.planes[m].model;
     plane.polygons = PolygonsOf(seen, m, options);
+    double area_m2 = 0.0;
+    for (const PlanePolygon& polygon : plane.polygons) area_m2 += polygon.area_m2;
+    // A surface on the border of two layers of cells was measured in both.
+    if (area_m2 > 0.0) plane.area_m2 = area_m2;
     if (state_->faced[m].facing < 0) {
       plane.plane = {-plane.plane.normal, -plane.plane.distance};
       for (PlanePolygon& polygon : plane.polygons) Flip(polygon);
@@ -215,6 +219,10 @@ absl::StatusOr<PlaneModel> PlaneModelFinder::Finish(const Stop& stop) {
     }
     model.planes.push_back(std::move(plane));
   }
+  std::stable_sort(model.planes.begin(), model.planes.end(), [](const auto& a, const auto& b) {
+    return a.area_m2 > b.area_m2;
+  });
+  for (std::size_t m = 0; m < model.planes.size(); ++m) model.planes[m].id = m + 1;
   return model;
 }
 

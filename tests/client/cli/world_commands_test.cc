@@ -2,6 +2,8 @@
 // decides on.
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <sstream>
@@ -13,6 +15,7 @@
 
 #include "client/cli/terminal/command.h"
 #include "tests/support/mock_database.h"
+#include "tests/support/plane_room.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 
@@ -481,6 +484,56 @@ TEST_F(WorldCommandsTest, PlanesAreListedWithTheirSupporters) {
   const std::string table = RunText({"planes", "list", "m"});
   EXPECT_THAT(table, HasSubstr("wall"));
   EXPECT_THAT(table, Not(HasSubstr("b/7")));
+}
+
+TEST_F(WorldCommandsTest, PlanesOfAMapAreShownExportedAndDrawn) {
+  const PlaneModel room = ::strata::testing::DrawnRoom();
+  ON_CALL(db_.models(), GetPlaneModel(_, _, _)).WillByDefault([&](auto&, auto, auto sink) {
+    for (const ModelPlane& plane : room.planes) STRATA_EXPECT_OK(sink(plane));
+    PlaneModelInfo info;
+    info.job = 4;
+    info.epoch = 2;
+    info.planes = room.planes.size();
+    info.directions = {{Eigen::Vector3d::UnitZ(), 2, 0.01}};
+    return absl::StatusOr<PlaneModelInfo>(info);
+  });
+  std::uint64_t now = 2;
+  ON_CALL(db_.maps(), History(_, _)).WillByDefault([&](auto&, auto) {
+    EpochInfo epoch;
+    epoch.epoch = now;
+    epoch.current = true;
+    return absl::StatusOr<std::vector<EpochInfo>>({epoch});
+  });
+  ON_CALL(db_.maps(), Get(_, _)).WillByDefault([](auto&, auto) {
+    return absl::StatusOr<MapInfo>(MapInfo());
+  });
+  ON_CALL(db_.planning(), ListProfiles(_, _)).WillByDefault([](auto&, auto) {
+    return absl::StatusOr<std::map<std::string, RobotProfile>>({{"default", RobotProfile()}});
+  });
+  ON_CALL(db_.planning(), ListFloors(_, _, _)).WillByDefault([](auto&, auto, auto&) {
+    return absl::StatusOr<FloorPlan>(FloorPlan());
+  });
+  const std::string text = RunText({"planes", "model", "m"});
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1 + 6 + 1) << text;
+  EXPECT_THAT(text, HasSubstr("direction 0: 0.0000 0.0000 1.0000, 2 planes"));
+  EXPECT_EQ(RunJson({"planes", "model", "m"})["stale"], false);
+  now = 3;
+  const auto model = RunJson({"planes", "model", "m"});
+  EXPECT_EQ(model["stale"], true);
+  EXPECT_EQ(model["planes"].size(), 6U);
+  EXPECT_EQ(model["planes"][2]["polygons"][0]["holes"][0]["seen_open"], true);
+  const ::strata::testing::TempDir folder;
+  const std::string out = folder.path() / "room";
+  EXPECT_EQ(RunJson({"planes", "export", "m", out + ".dxf"})["planes"], 6);
+  EXPECT_TRUE(std::filesystem::exists(out + ".dxf"));
+  EXPECT_THAT(Run({"planes", "export", "m", out + ".txt"}),
+              StatusIs(Code::kInvalidArgument, HasSubstr("geojson")));
+  const auto drawn = RunJson({"map", "floorplan", "m", out + ".svg", "--storey", "0"});
+  EXPECT_GE(drawn["walls"], 4);
+  EXPECT_EQ(drawn["high"][0], 4.0);
+  EXPECT_TRUE(std::filesystem::exists(out + ".svg"));
+  EXPECT_THAT(Run({"map", "floorplan", "m", out + ".svg", "--storey", "50"}),
+              StatusIs(Code::kNotFound, _));
 }
 
 TEST_F(WorldCommandsTest, AScanIsSearchedForInTheFramesOfItsFile) {

@@ -299,6 +299,27 @@ class FadeTest(ServerTest):
         self.assertEqual(set(count) - {0}, {3})
 
 
+class PlanesTest(ServerTest):
+    def test_walls_and_floors_are_polygons(self):
+        world = self.db.create_map("room")
+        with self.assertRaises(strata.NotFound):
+            world.planes()
+        floor = grid((-3, 3), (-3, 3)) - (0, 0, 1)
+        _, y, z = grid((-1, 1), (-2, 2), lambda x, y: x).T
+        wall = np.stack([np.full_like(y, 2.5), y, z + 0.2], axis=1)
+        world.upload(np.concatenate([floor, wall]), align=False)
+        world.wait(timeout=60)
+        self.assertTrue(world.job("planes").metrics["planes"] == 2)
+        model = world.planes()
+        self.assertEqual([plane.kind for plane in model.planes], ["level", "wall"])
+        np.testing.assert_allclose(model.planes[0].normal, (0, 0, 1), atol=0.01)
+        self.assertAlmostEqual(model.planes[0].polygons[0].area, 36, delta=2)
+        np.testing.assert_allclose(model.planes[1].normal, (-1, 0, 0), atol=0.01)
+        self.assertAlmostEqual(model.planes[1].distance, -2.5, delta=0.01)
+        self.assertEqual(model.planes[1].polygons[0].outer.shape[1], 3)
+        self.assertEqual(model.epoch, 1)
+
+
 class ReadmeTest(ServerTest):
     def test_its_example_runs(self):
         example, = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
