@@ -19,6 +19,7 @@
 #include "proto/translate/jobs.h"
 #include "proto/translate/localize.h"
 #include "proto/translate/maps.h"
+#include "proto/translate/models.h"
 #include "proto/translate/planning.h"
 #include "proto/translate/points.h"
 #include "proto/translate/posegraph.h"

@@ -10,6 +10,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
@@ -92,6 +93,8 @@ struct PlaneModelFinder::State {
   // The planes that rays to points in the square may cross.
   std::vector<FacedPlane*> PlanesAround(const PlanSquare& square);
   void BeginLooking();
+  // RESOURCE_EXHAUSTED where what is known of the planes' surfaces takes more than it may.
+  absl::Status CheckMemory() const;
 };
 
 PlaneModelFinder::PlaneModelFinder(const PlaneModelOptions& options)
@@ -166,6 +169,19 @@ void PlaneModelFinder::State::AddHit(const Eigen::Vector3d& p, const Eigen::Vect
   nearest->facing += SignedDistance(sensor, nearest->seen.plane) > 0.0 ? 1 : -1;
 }
 
+absl::Status PlaneModelFinder::State::CheckMemory() const {
+  std::size_t bytes = 0;
+  for (const FacedPlane& one : faced) bytes += one.seen.raster.bytes();
+  if (bytes <= options.max_outline_bytes) return absl::OkStatus();
+  return absl::ResourceExhaustedError(absl::StrCat("outlines of ",
+                                                   faced.size(),
+                                                   " planes take more than ",
+                                                   options.max_outline_bytes >> 20,
+                                                   " MiB; a larger epsilon_m (it is ",
+                                                   options.epsilon_m,
+                                                   ") or min_area_m2 takes less"));
+}
+
 absl::Status PlaneModelFinder::Look(const PosedPoints& points,
                                     const PlanSquare& square,
                                     const Stop& stop) {
@@ -182,7 +198,10 @@ absl::Status PlaneModelFinder::Look(const PosedPoints& points,
       distances.push_back(SignedDistance(sensor, one->seen.plane));
     }
     for (; i < view.end; ++i) {
-      if (i % kStopEvery == 0) STRATA_RETURN_IF_ERROR(stop.status());
+      if (i % kStopEvery == 0) {
+        STRATA_RETURN_IF_ERROR(stop.status());
+        STRATA_RETURN_IF_ERROR(state_->CheckMemory());
+      }
       const Eigen::Vector3d p = points.points[i].cast<double>() + shift;
       if (!Holds(own, p)) continue;
       state_->AddHit(p, sensor);

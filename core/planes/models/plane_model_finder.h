@@ -3,6 +3,7 @@
 #ifndef STRATA_CORE_PLANES_MODELS_PLANE_MODEL_FINDER_H_
 #define STRATA_CORE_PLANES_MODELS_PLANE_MODEL_FINDER_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -30,6 +31,8 @@ struct PlaneModelOptions {
   double min_area_m2 = 1.0;  // of a plane's surface and of a polygon; in [0.01, 10000]
   // Points so near are one surface (ε of 5.4.2): the radius of the α-shape; in [0.05, 5].
   double epsilon_m = 0.25;
+  // Of memory for what is known of all planes' surfaces, by which their outlines are drawn.
+  std::size_t max_outline_bytes = std::size_t{384} << 20;
 
   // INVALID_ARGUMENT naming every field out of its range.
   absl::Status Validate() const;
@@ -66,6 +69,7 @@ class PlaneModelFinder {
   // After the last square: planes that go on in the next square are one, and get their directions.
   absl::Status JoinPlanes(const Stop& stop);
   // Second round: which of the planes the points of the square lie on, and which their rays cross.
+  // RESOURCE_EXHAUSTED beyond max_outline_bytes, naming what takes less.
   absl::Status Look(const PosedPoints& points, const PlanSquare& square, const Stop& stop);
   // Polygons on `threads` threads do not depend on their number.
   absl::StatusOr<PlaneModel> Finish(const Stop& stop);

@@ -67,7 +67,7 @@ void PlaneRaster::AddHit(const Eigen::Vector2d& at) {
   Square& square = At(i, j);
   square.u += static_cast<float>(at.x() - i * square_m_);
   square.v += static_cast<float>(at.y() - j * square_m_);
-  if (square.hits++ == 0) ++hit_squares_;
+  ++square.hits;
 }
 
 std::pair<std::uint64_t, std::size_t> PlaneRaster::LookPlaceOf(const Eigen::Vector2d& at) const {

@@ -42,7 +42,9 @@ class PlaneRaster {
   void AddHit(const Eigen::Vector2d& at);
   void AddLook(const Eigen::Vector2d& at);
 
-  std::size_t hit_squares() const { return hit_squares_; }
+  std::size_t bytes() const {
+    return blocks_.size() * (sizeof(Block) + kIndexBytes) + looks_.size() * kIndexBytes;
+  }
   // A point a square, the mean of what fell into it, in the order of their places. Deep inside of
   // surface every third square of every third row: as far apart they bound the same α-shapes, with
   // a ninth of the points. REQUIRES: radius ≥ 3.5 squares.
@@ -58,6 +60,7 @@ class PlaneRaster {
 
  private:
   static constexpr int kBlock = 16;
+  static constexpr std::size_t kIndexBytes = 64;  // of a block, about
   struct Square {
     float u = 0.0F, v = 0.0F;  // sums, relative to the square's corner
     std::uint32_t hits = 0;
@@ -75,7 +78,6 @@ class PlaneRaster {
   std::vector<std::uint64_t> keys_;
   std::vector<Block> blocks_;
   HashMap<std::uint64_t, std::bitset<kBlock * kBlock>> looks_;  // blocks of look squares
-  std::size_t hit_squares_ = 0;
 };
 
 }  // namespace strata

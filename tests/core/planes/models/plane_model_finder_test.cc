@@ -127,6 +127,14 @@ TEST(FindPlaneModel, SaysTheSameTwice) {
   }
 }
 
+TEST(FindPlaneModel, EndsWhereOutlinesTakeTooMuchMemory) {
+  PlaneModelOptions options;
+  options.max_outline_bytes = 100'000;
+  const auto model = FindPlaneModel(WallAndFloor(0.0), options, Stop());
+  EXPECT_TRUE(absl::IsResourceExhausted(model.status())) << model.status();
+  EXPECT_NE(model.status().message().find("epsilon_m"), std::string::npos);
+}
+
 TEST(FindPlaneModel, NothingGivesNothing) {
   const auto model = FindPlaneModel({}, {}, Stop());
   ASSERT_TRUE(model.ok()) << model.status();
