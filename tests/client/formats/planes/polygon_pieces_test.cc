@@ -88,7 +88,8 @@ TEST(PolygonPiecesTest, PiecesCoverRaggedPolygonsWithHolesOnce) {
     EXPECT_LT(pieces.size(), 800U);
     std::uniform_real_distribution<double> place(-9.0, 9.0);
     for (int i = 0; i < 500; ++i) {
-      const Vector3d p = middle + place(random) * u + place(random) * v;
+      const double along = place(random), across = place(random);
+      const Vector3d p = middle + along * u + across * v;
       int in = 0;
       for (const FlatPiece& piece : pieces) {
         in += testing::IsInside({piece.begin(), piece.end()}, p, normal) ? 1 : 0;
@@ -132,18 +133,17 @@ TEST(PolygonPiecesTest, TheUnionIsWhereOneOfThePolygonsIs) {
     std::vector<ModelPlane> planes;
     for (int i = 0; i < 4; ++i) {
       const Vector3d middle = far + Vector3d(5.0 * i, i == 3 ? 50.0 : 0.0, 0.1 * i);
-      planes.push_back(testing::DrawnPlane(1,
-                                           PlaneKind::kLevel,
-                                           up,
-                                           Star(middle, u, v, 30, 3.0, 6.0, random),
-                                           {{Star(middle, u, v, 8, 0.5, 2.5, random), false}}));
+      const PlaneRing outer = Star(middle, u, v, 30, 3.0, 6.0, random);
+      const PlaneRing hole = Star(middle, u, v, 8, 0.5, 2.5, random);
+      planes.push_back(testing::DrawnPlane(1, PlaneKind::kLevel, up, outer, {{hole, false}}));
     }
     std::vector<const PlanePolygon*> polygons;
     for (const ModelPlane& plane : planes) polygons.push_back(&plane.polygons[0]);
     const auto rings = UnionFromAbove(polygons);
     std::uniform_real_distribution<double> x(-6.0, 21.0), y(-6.0, 6.0);
     for (int i = 0; i < 1000; ++i) {
-      const Vector3d p = far + Vector3d(x(random), y(random) + (i % 4 == 0 ? 50.0 : 0.0), 0);
+      const double px = x(random), py = y(random);
+      const Vector3d p = far + Vector3d(px, py + (i % 4 == 0 ? 50.0 : 0.0), 0);
       double turns = 0.0;
       for (const auto& ring : rings) {
         for (std::size_t k = 0; k < ring.size(); ++k) {
@@ -154,7 +154,8 @@ TEST(PolygonPiecesTest, TheUnionIsWhereOneOfThePolygonsIs) {
       }
       bool inside = false;
       for (const PlanePolygon* polygon : polygons) {
-        inside = inside || testing::IsInside(*polygon, p, up);
+        const Vector3d in_plane(p.x(), p.y(), polygon->outer.front().z());
+        inside = inside || testing::IsInside(*polygon, in_plane, up);
       }
       EXPECT_NEAR(turns, inside ? 1.0 : 0.0, 1e-6);
     }
