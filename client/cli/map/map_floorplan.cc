@@ -4,7 +4,6 @@
 #include <string>
 
 #include "absl/status/status.h"
-#include "absl/strings/str_cat.h"
 
 #include "client/cli/map/floor_files.h"
 #include "client/cli/map/map_files.h"
