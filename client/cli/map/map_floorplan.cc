@@ -17,8 +17,6 @@
 namespace strata::cli {
 namespace {
 
-constexpr double kSameStoreyM = 0.5;
-
 struct FloorplanOptions {
   std::string map;
   std::string out;
@@ -31,7 +29,7 @@ absl::Status AddStanding(Context& context, const FloorplanOptions& options, Stor
   STRATA_ASSIGN_OR_RETURN(const FloorPlan floors,
                           FloorsOf(context, options.map, options.floors, true));
   for (const Floor& floor : floors.floors) {
-    if (std::abs(floor.mean_z_m - plan.storey_z_m) > kSameStoreyM) continue;
+    if (std::abs(floor.mean_z_m - plan.storey_z_m) > kStoreyReachM) continue;
     STRATA_ASSIGN_OR_RETURN(const OccupancyGrid grid, GridOf(floor, floors.cell_size_m));
     AddObstacles(grid, plan);
   }

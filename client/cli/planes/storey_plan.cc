@@ -22,7 +22,6 @@ namespace {
 
 constexpr double kMostHeightM = 1e6;
 constexpr double kMostCutHeightM = 100.0;
-constexpr double kFloorWithinM = 0.5;
 constexpr double kShortestM = 1e-3;
 constexpr std::size_t kMostNamedHeights = 5;
 
@@ -99,7 +98,7 @@ std::vector<const PlanePolygon*> FloorsNear(const PlaneModel& model, double stor
   for (const ModelPlane& plane : model.planes) {
     if (!IsFloor(plane)) continue;
     for (const PlanePolygon& polygon : plane.polygons) {
-      if (std::abs(MeanHeight(polygon.outer) - storey_z_m) <= kFloorWithinM) {
+      if (std::abs(MeanHeight(polygon.outer) - storey_z_m) <= kStoreyReachM) {
         floors.push_back(&polygon);
       }
     }

@@ -13,6 +13,9 @@
 
 namespace strata::cli {
 
+// Floors whose height is so near to the storey's are of it [m].
+inline constexpr double kStoreyReachM = 0.5;
+
 struct StoreyOptions {
   double storey_z_m = 0.0;    // height of its floor, map frame
   double cut_height_m = 1.2;  // above that; in (0, 100]

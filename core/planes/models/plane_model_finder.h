@@ -71,7 +71,8 @@ class PlaneModelFinder {
   // Second round: which of the planes the points of the square lie on, and which their rays cross.
   // RESOURCE_EXHAUSTED beyond max_outline_bytes, naming what takes less.
   absl::Status Look(const PosedPoints& points, const PlanSquare& square, const Stop& stop);
-  // Polygons on `threads` threads do not depend on their number.
+  // The planes with their polygons. REQUIRES: JoinPlanes(); squares that were not looked at have
+  // none.
   absl::StatusOr<PlaneModel> Finish(const Stop& stop);
 
  private:
