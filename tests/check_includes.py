@@ -52,7 +52,7 @@ STOREYS = {
     "core/storage": ["sqlite", HERE],
     "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "models", "ingest", "tiles", "scans", "map"],
     "client/formats": ["planes", HERE, "grid"],
-    "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "planes", "job", "mesh", "picture", "terminal"],
+    "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "planes", "job", "heights", "mesh", "picture", "terminal"],
 }
 
 # Sources a folder may hold.

@@ -12,6 +12,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 
 #include "client/cli/map/floor_files.h"
 #include "client/cli/map/height_files.h"
@@ -41,6 +42,7 @@ struct ExportOptions {
   FloorOptions floor;
   std::string mode = "trinary";
   HeightOptions heights;
+  const CLI::App* given = nullptr;  // what the user said of these
 };
 
 Colour TraversabilityColour(const Surface& surface) {
@@ -177,16 +179,37 @@ absl::StatusOr<std::string> BytesOf(const Geometry& geometry, const std::string&
   return MeshBytes(mesh_format, geometry);
 }
 
+constexpr std::pair<const char*, const char*> kFormatsOfOptions[] = {
+    {"--relative-to", "ply, obj, stl, glb, pcd"},
+    {"--layer", "ply, obj, glb"},
+    {"--floor", "nav2"},
+    {"--at", "nav2"},
+    {"--mode", "nav2"},
+    {"--profile", "nav2, geotiff, asc"},
+    {"--surface", "geotiff, asc"},
+    {"--region", "geotiff, asc, bt"},
+    {"--level", "ply, obj, stl, glb, geotiff, asc, bt"}};
+
+// An option that a format does not listen to would be believed to have been heard.
+absl::Status CheckOptions(const ExportOptions& options) {
+  for (const auto& [option, formats] : kFormatsOfOptions) {
+    if (options.given->count(option) == 0) continue;
+    const std::vector<std::string> listening = absl::StrSplit(formats, ", ");
+    if (std::find(listening.begin(), listening.end(), options.format) != listening.end()) continue;
+    return absl::InvalidArgumentError(absl::StrCat(
+        option, " says nothing to --format ", options.format, "; leave it out, or take ", formats));
+  }
+  return absl::OkStatus();
+}
+
 absl::Status Export(Context& context, const ExportOptions& options) {
+  STRATA_RETURN_IF_ERROR(CheckOptions(options));
   if (options.format == "nav2") {
     return ExportFloors(context,
                         options.map,
                         options.floor,
                         options.mode == "scale" ? GridMode::kScale : GridMode::kTrinary,
                         options.out);
-  }
-  if (options.floor.floor.has_value() || options.floor.at.has_value()) {
-    return absl::InvalidArgumentError("--floor and --at are for --format nav2");
   }
   if (options.format == "geotiff" || options.format == "asc") {
     HeightOptions heights = options.heights;
@@ -196,10 +219,6 @@ absl::Status Export(Context& context, const ExportOptions& options) {
   }
   if (options.format == "bt") {
     return ExportOctree(context, options.map, {options.level, options.heights.region}, options.out);
-  }
-  if (options.heights.region.has_value()) {
-    return absl::InvalidArgumentError(
-        "--region is for --format geotiff, asc, bt; map mesh has one, too");
   }
   const bool points = options.format == "pcd";
   absl::Status damage;
@@ -242,6 +261,7 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
       "occupied space (bt)",
       "strata map export campus --format ply --out campus.ply",
       [options](Context& context) { return Export(context, *options); });
+  options->given = app;
   AddMapName(app, options->map);
   app->add_option(
          "--format",

@@ -37,7 +37,7 @@ absl::Status ExportOctree(Context& context,
     progress.Update(static_cast<double>(i) / static_cast<double>(clouds.size()), "free space");
     STRATA_ASSIGN_OR_RETURN(const PosedCloud posed, clouds.Read(context, i));
     STRATA_RETURN_IF_ERROR(
-        grid.Add(posed.cloud, posed.T_mesh_scan, posed.sensor, context.call.stop));
+        grid.Add(posed.cloud, posed.T_map_scan, posed.sensor, context.call.stop));
   }
   const OctreeFile octree = BtFile(grid);
   if (octree.nodes == 0) {

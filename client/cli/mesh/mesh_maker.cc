@@ -66,11 +66,11 @@ absl::StatusOr<MadeMesh> ByDistance(Context& context,
   ScanLoop loop(context, clouds, 2);
   STRATA_RETURN_IF_ERROR(loop.ForEach("surfaces", [&](PosedCloud& posed) {
     clouds.KeepClass(posed.cloud);
-    return field.Add(posed.cloud, posed.T_mesh_scan, posed.sensor, stop);
+    return field.Add(posed.cloud, posed.T_map_scan, posed.sensor, stop);
   }));
   if (field.points() == 0) return MadeMesh();
   STRATA_RETURN_IF_ERROR(loop.ForEach("free space", [&](const PosedCloud& posed) {
-    return field.Carve(posed.cloud, posed.T_mesh_scan, posed.sensor, stop);
+    return field.Carve(posed.cloud, posed.T_map_scan, posed.sensor, stop);
   }));
   MadeMesh made;
   made.points = field.points();
@@ -90,7 +90,7 @@ absl::StatusOr<ThinnedPoints> Thin(Context& context,
   ScanLoop loop(context, clouds, 1);
   STRATA_RETURN_IF_ERROR(loop.ForEach("points", [&](PosedCloud& posed) {
     clouds.KeepClass(posed.cloud);
-    return thinner.Add(posed.cloud, posed.T_mesh_scan, posed.sensor, context.call.stop);
+    return thinner.Add(posed.cloud, posed.T_map_scan, posed.sensor, context.call.stop);
   }));
   return thinner.Points();
 }
@@ -171,7 +171,7 @@ absl::Status ColourMesh(Context& context,
   ScanLoop loop(context, clouds, 1);
   STRATA_RETURN_IF_ERROR(loop.ForEach("colours", [&](PosedCloud& posed) {
     clouds.KeepClass(posed.cloud);
-    return colours.Add(posed.cloud, posed.T_mesh_scan, context.call.stop);
+    return colours.Add(posed.cloud, posed.T_map_scan, context.call.stop);
   }));
   mesh.colour = colours.Colours();
   return absl::OkStatus();

@@ -30,16 +30,6 @@ void DropPoints(PointCloud& cloud, const Drop& drop) {
   }
 }
 
-absl::Status DroppedPoints(const std::string& map) {
-  return absl::FailedPreconditionError(
-      absl::StrCat("map ",
-                   map,
-                   " has dropped the points of its scans; what is left are its surfaces, which "
-                   "strata map export ",
-                   map,
-                   " --format ply writes"));
-}
-
 // Those that are integrated and may have points in the region.
 absl::StatusOr<std::vector<ScanInfo>> ScansOf(Context& context, const MeshOptions& options) {
   std::vector<ScanInfo> scans;
@@ -78,40 +68,29 @@ absl::Status NoScans(Context& context, const MeshOptions& options) {
 
 }  // namespace
 
-absl::StatusOr<ScanClouds> ScanClouds::Find(Context& context, const MeshOptions& options) {
-  ScanClouds clouds;
-  clouds.options_ = options;
-  STRATA_ASSIGN_OR_RETURN(const MapInfo info,
-                          context.database.maps().Get(context.call, options.map));
-  clouds.sensor_ = info.parameters.sensor;
-  if (!options.class_name.empty()) {
-    STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes,
-                            context.database.maps().ListClasses(context.call, options.map));
-    STRATA_ASSIGN_OR_RETURN(clouds.class_id_, ClassIdOf(classes, options.class_name));
-  }
-  STRATA_ASSIGN_OR_RETURN(clouds.scans_, ScansOf(context, options));
-  if (clouds.scans_.empty()) return NoScans(context, options);
-  if (!info.parameters.keep_points) return DroppedPoints(options.map);
-  return clouds;
+absl::Status DroppedPoints(const std::string& map) {
+  return absl::FailedPreconditionError(
+      absl::StrCat("map ",
+                   map,
+                   " has dropped the points of its scans; what is left are its surfaces, which "
+                   "strata map export ",
+                   map,
+                   " --format ply writes"));
 }
 
-bool ScanClouds::has_colour() const {
-  return std::any_of(
-      scans_.begin(), scans_.end(), [](const ScanInfo& scan) { return scan.header.has_colour; });
-}
-
-absl::StatusOr<PosedCloud> ScanClouds::Read(Context& context, std::size_t i) const {
-  const ScanInfo& scan = scans_[i];
+absl::StatusOr<PosedCloud> ReadPosedCloud(Context& context,
+                                          const MapInfo& map,
+                                          const ScanInfo& scan) {
   api::Scans& scans = context.database.scans();
   PosedCloud posed;
-  posed.T_mesh_scan = options_.one_scan ? Pose::Identity() : scan.T_map_scan;
-  posed.sensor = scan.header.sensor.value_or(sensor_);
+  posed.T_map_scan = scan.T_map_scan;
+  posed.sensor = scan.header.sensor.value_or(map.parameters.sensor);
   PointCloud& cloud = posed.cloud;
   cloud.sensor_origin = scan.header.sensor_origin;
   cloud.rows = scan.header.rows;
   cloud.columns = scan.header.columns;
   STRATA_RETURN_IF_ERROR(
-      scans.GetPoints(context.call, options_.map, scan.header.id, [&](const PointCloud& piece) {
+      scans.GetPoints(context.call, map.name, scan.header.id, [&](const PointCloud& piece) {
         const auto append = [](auto& to, const auto& from) {
           to.insert(to.end(), from.begin(), from.end());
         };
@@ -125,8 +104,34 @@ absl::StatusOr<PosedCloud> ScanClouds::Read(Context& context, std::size_t i) con
       }));
   if (scan.faded_points == 0) return posed;
   STRATA_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> faded,
-                          scans.GetFaded(context.call, options_.map, scan.header.id));
+                          scans.GetFaded(context.call, map.name, scan.header.id));
   DropPoints(cloud, [&](std::size_t p) { return p < faded.size() && faded[p] != 0; });
+  return posed;
+}
+
+absl::StatusOr<ScanClouds> ScanClouds::Find(Context& context, const MeshOptions& options) {
+  ScanClouds clouds;
+  clouds.options_ = options;
+  STRATA_ASSIGN_OR_RETURN(clouds.map_, context.database.maps().Get(context.call, options.map));
+  if (!options.class_name.empty()) {
+    STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes,
+                            context.database.maps().ListClasses(context.call, options.map));
+    STRATA_ASSIGN_OR_RETURN(clouds.class_id_, ClassIdOf(classes, options.class_name));
+  }
+  STRATA_ASSIGN_OR_RETURN(clouds.scans_, ScansOf(context, options));
+  if (clouds.scans_.empty()) return NoScans(context, options);
+  if (!clouds.map_.parameters.keep_points) return DroppedPoints(options.map);
+  return clouds;
+}
+
+bool ScanClouds::has_colour() const {
+  return std::any_of(
+      scans_.begin(), scans_.end(), [](const ScanInfo& scan) { return scan.header.has_colour; });
+}
+
+absl::StatusOr<PosedCloud> ScanClouds::Read(Context& context, std::size_t i) const {
+  STRATA_ASSIGN_OR_RETURN(PosedCloud posed, ReadPosedCloud(context, map_, scans_[i]));
+  if (options_.one_scan) posed.T_map_scan = Pose::Identity();
   return posed;
 }
 

@@ -7,6 +7,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 
+#include "client/cli/heights/scan_heights.h"
 #include "client/cli/mesh/mesh_commands.h"
 #include "client/cli/scan/scan_import.h"
 #include "client/cli/scan/scan_label.h"
@@ -216,6 +217,7 @@ void AddScanCommands(Commands& commands) {
   AddExport(commands, noun, options);
   AddScanLabel(commands, noun);
   AddScanMesh(commands, noun);
+  AddScanHeights(commands, noun);
   AddScanRegister(commands, noun);
   AddYes(verb("delete",
               "Take a scan and its contribution out of the map",

@@ -95,6 +95,7 @@ TEST_F(StrataTest, EveryCommandHasHelpWithAnExample) {
                                              "scan show",
                                              "scan export",
                                              "scan mesh",
+                                             "scan heights",
                                              "scan delete",
                                              "pose list",
                                              "pose export",

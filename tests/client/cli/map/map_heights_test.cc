@@ -287,9 +287,25 @@ TEST_F(MapHeightsTest, WhatCannotBeExportedSaysWhy) {
   EXPECT_THAT(
       Refusal({"bridge", "--format", "asc", "--out", out, "--surface", "ground", "--profile", "x"}),
       HasSubstr("profile"));
-  EXPECT_THAT(Refusal({"bridge", "--format", "ply", "--out", out, "--region", "0,0,1,1"}),
-              HasSubstr("--region"));
   EXPECT_THAT(Refusal({"gone", "--format", "asc", "--out", out}), HasSubstr("gone"));
+}
+
+TEST_F(MapHeightsTest, OptionsThatAFormatDoesNotHearAreRefused) {
+  const std::string out = Path("no.out");
+  const auto refusal = [&](const std::string& format, std::vector<std::string> option) {
+    std::vector<std::string> arguments = {"bridge", "--format", format, "--out", out};
+    arguments.insert(arguments.end(), option.begin(), option.end());
+    return Refusal(arguments);
+  };
+  EXPECT_THAT(refusal("ply", {"--region", "0,0,1,1"}),
+              HasSubstr("--region says nothing to --format ply; leave it out, or take geotiff"));
+  EXPECT_THAT(refusal("bt", {"--surface", "ground"}), HasSubstr("take geotiff, asc"));
+  EXPECT_THAT(refusal("pcd", {"--level", "1"}), HasSubstr("--level"));
+  EXPECT_THAT(refusal("geotiff", {"--mode", "scale"}), HasSubstr("take nav2"));
+  EXPECT_THAT(refusal("asc", {"--at", "0,0,0"}), HasSubstr("--at"));
+  EXPECT_THAT(refusal("stl", {"--layer", "colour"}), HasSubstr("ply, obj, glb"));
+  EXPECT_THAT(refusal("bt", {"--relative-to", "0,0,1"}), HasSubstr("--relative-to"));
+  EXPECT_FALSE(std::filesystem::exists(out));
 }
 
 }  // namespace

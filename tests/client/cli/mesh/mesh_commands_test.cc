@@ -1,4 +1,4 @@
-// strata map mesh and scan mesh, as their users run them.
+// strata map mesh, scan mesh and scan heights, as their users run them.
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -169,6 +169,43 @@ TEST_F(MeshCommandsTest, AScanInItsOwnFrame) {
   EXPECT_THAT(Refusal({"scan", "mesh", "room", "t/4", Path("c.ply"), "--method", "organised"}),
               HasSubstr("no rows and columns"));
   EXPECT_THAT(Refusal({"scan", "mesh", "room", "t/99", Path("c.ply")}), HasSubstr("t/99"));
+}
+
+// Thesis, 6.3.1: interpolated, the floor between two beams has a height, too.
+TEST_F(MeshCommandsTest, WhatAScanSawAsHeights) {
+  const auto heights = [](const std::string& surface) {
+    return RunOk({"scan",
+                  "heights",
+                  "grids",
+                  "t/4",
+                  "--format",
+                  "asc",
+                  "--cell-size",
+                  "0.02",
+                  "--surface",
+                  surface,
+                  "--out",
+                  Path(surface + ".asc")});
+  };
+  const json highest = heights("highest");
+  const json interpolated = heights("interpolated");
+  EXPECT_GT(interpolated["cells"].get<int>(), 2 * highest["cells"].get<int>());
+  EXPECT_GT(interpolated["cells"].get<int>(), 300 * 300);  // of 400 x 400 in the room
+  EXPECT_LT(heights("kalman")["high"], highest["high"]);   // walls fused with the floor
+  for (const json& report : {highest, interpolated}) {
+    // In the map: the scan was taken at (0, 0, 2.4).
+    EXPECT_NEAR(report["low"].get<double>(), 0.0, 0.1);
+    EXPECT_NEAR(report["high"].get<double>(), 2.0, 0.1);
+    EXPECT_NEAR(report["corner"][0].get<double>(), -4.0, 0.1);
+    EXPECT_NEAR(report["width"].get<double>() * 0.02, 8.0, 0.2);
+    EXPECT_THAT(report["files"], ::testing::SizeIs(2));
+  }
+  const std::string out = Path("no.tif");
+  EXPECT_THAT(
+      Refusal({"scan", "heights", "room", "t/4", "--surface", "interpolated", "--out", out}),
+      HasSubstr("scan t/4 has no rows and columns; take --surface highest or kalman"));
+  EXPECT_THAT(Refusal({"scan", "heights", "room", "t/99", "--out", out}), HasSubstr("t/99"));
+  EXPECT_FALSE(std::filesystem::exists(out));
 }
 
 TEST_F(MeshCommandsTest, WhatCannotBeMeshedSaysWhy) {
