@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/cord.h"
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 
@@ -36,6 +37,13 @@ std::string MessageToSend(const absl::Status& status) {
   std::size_t end = kMaxMessageBytes;
   while (end > 0 && (static_cast<unsigned char>(message[end]) & 0xC0U) == 0x80U) --end;
   return std::string(message.substr(0, end));
+}
+
+// A server that is short of memory drops streams below the calls (HTTP/2's ENHANCE_YOUR_CALM):
+// gRPC 1.51 has the code and these words, and nobody who could say when to try again.
+bool IsDroppedStream(const grpc::Status& status) {
+  return status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED &&
+         status.error_details().empty() && absl::StrContains(status.error_message(), "RST_STREAM");
 }
 
 }  // namespace
@@ -90,6 +98,10 @@ grpc::Status ToGrpcStatus(const absl::Status& status, absl::string_view request_
 
 absl::Status FromGrpcStatus(const grpc::Status& status) {
   if (status.ok()) return absl::OkStatus();
+  if (IsDroppedStream(status)) {
+    return absl::UnavailableError(absl::StrCat(
+        "the server was short of memory and dropped the call (", status.error_message(), ")"));
+  }
   absl::Status result(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
   v1::ErrorStatus error;
   v1::ErrorDetail detail;

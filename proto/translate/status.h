@@ -41,7 +41,8 @@ std::optional<absl::Duration> RetryDelayOf(const absl::Status& status);
 // Code, message and detail of `status`. A detail gains the request's id, and `retry_delay_ms` when
 // the code is RESOURCE_EXHAUSTED or UNAVAILABLE and it is not the request itself that is wrong.
 grpc::Status ToGrpcStatus(const absl::Status& status, absl::string_view request_id);
-// The reverse; a status whose details are not ours has none.
+// The reverse; a status whose details are not ours has none. UNAVAILABLE, which may be tried again,
+// for a stream that a server short of memory has dropped.
 absl::Status FromGrpcStatus(const grpc::Status& status);
 
 // The same for one scan of an Ingest stream.

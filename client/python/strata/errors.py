@@ -89,6 +89,9 @@ def _detail_of(error):
 def from_rpc(error):
     """The StrataError that a grpc.RpcError stands for."""
     detail = _detail_of(error)
+    if error.code() == grpc.StatusCode.RESOURCE_EXHAUSTED and not detail.reason and "RST_STREAM" in (error.details() or ""):
+        # Below the calls (HTTP/2's ENHANCE_YOUR_CALM), where nobody says when to try again.
+        return Unavailable(f"the server was short of memory and dropped the call ({error.details()})")
     delay = detail.metadata.get("retry_delay_ms")
     kind = _BY_CODE.get(error.code(), StrataError)
     made = kind(error.details() or error.code().name, reason=detail.reason,

@@ -2,6 +2,8 @@
 import concurrent.futures
 import contextlib
 import signal
+import socket
+import struct
 import subprocess
 import tempfile
 import threading
@@ -119,6 +121,29 @@ def serving(maps, credentials=None):
         server.stop(None).wait()
 
 
+@contextlib.contextmanager
+def dropping_streams():
+    """A server that drops every stream as gRPC's does where it is short of memory; its address and the streams."""
+    dropped = []
+
+    def serve(listener):
+        with listener.accept()[0] as peer, peer.makefile("rb") as wire:
+            wire.read(len(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"))
+            peer.sendall(struct.pack(">IBI", 4, 0, 0))  # no settings
+            while len(head := wire.read(9)) == 9:
+                size_and_kind, _, stream = struct.unpack(">IBI", head)
+                body = wire.read(size_and_kind >> 8)
+                if size_and_kind & 255 == 1:  # HEADERS
+                    dropped.append(stream)
+                    peer.sendall(struct.pack(">IBII", 4 << 8 | 3, 0, stream, 11))
+                elif size_and_kind & 255 == 6:  # PING
+                    peer.sendall(struct.pack(">IBI", 8 << 8 | 6, 1, 0) + body)
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        threading.Thread(target=serve, args=(listener,), daemon=True).start()
+        yield f"127.0.0.1:{listener.getsockname()[1]}", dropped
+
+
 class BusyTest(unittest.TestCase):
     def setUp(self):
         self.maps = ToldMaps()
@@ -129,6 +154,13 @@ class BusyTest(unittest.TestCase):
         self.assertEqual(self.db.maps(), ["nobody"])
         self.assertEqual(len(self.maps.calls), 3)
         self.assertTrue((np.diff(self.maps.calls) >= 0.7).all())
+
+    def test_a_stream_that_was_dropped_for_memory_is_tried_again(self):
+        address, dropped = self.enterContext(dropping_streams())
+        db = self.enterContext(strata.connect(address, patience=1.0))
+        with self.assertRaisesRegex(strata.Unavailable, "short of memory"):
+            db.maps()
+        self.assertGreater(len(dropped), 2)
 
     def test_what_a_server_that_ends_cancels_is_asked_for_again(self):
         self.maps.refusals = [(grpc.StatusCode.CANCELLED, "")] * 2

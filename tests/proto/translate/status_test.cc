@@ -63,6 +63,18 @@ TEST(TranslateStatusTest, DetailsOfOthersAreNoDetail) {
   EXPECT_EQ(DetailOf(status), std::nullopt);
 }
 
+// trouble_test.py has gRPC say these words.
+TEST(TranslateStatusTest, ADroppedStreamMayBeTriedAgainALargeMessageMayNot) {
+  EXPECT_THAT(FromGrpcStatus(
+                  {grpc::StatusCode::RESOURCE_EXHAUSTED, "Received RST_STREAM with error code 11"}),
+              StatusIs(absl::StatusCode::kUnavailable, ::testing::HasSubstr("short of memory")));
+  EXPECT_THAT(FromGrpcStatus({grpc::StatusCode::RESOURCE_EXHAUSTED,
+                              "Received message larger than max (5 vs. 4)"}),
+              StatusIs(absl::StatusCode::kResourceExhausted, ::testing::_));
+  EXPECT_THAT(FromGrpcStatus(ToGrpcStatus(absl::ResourceExhaustedError("RST_STREAM"), "7-1")),
+              StatusIs(absl::StatusCode::kResourceExhausted, "RST_STREAM"));
+}
+
 TEST(TranslateStatusTest, ScanErrorsCarryTheSame) {
   const absl::Status status = absl::AlreadyExistsError("scan run/1 has other content");
   const absl::Status back = FromScanError(ToScanError(status, "id-2"));
