@@ -61,6 +61,40 @@ std::vector<FloorPieces> LargeRegions(const std::vector<Piece>& pieces,
   return floors;
 }
 
+// Calls what(column, row) for each cell of the piece, within its block.
+template <typename What>
+void ForEachCell(const Piece& piece, const What& what) {
+  for (int cell = 0; cell < kFloorBlockCells * kFloorBlockCells; ++cell) {
+    if ((piece.cells >> cell & 1U) != 0) what(cell % kFloorBlockCells, cell / kFloorBlockCells);
+  }
+}
+
+// The cell nearest to the middle of the piece whose middle is nearest to that of the floor: any
+// free cell around there will do.
+Eigen::Vector3d PlaceNear(const Middle& middle,
+                          const std::vector<Piece>& pieces,
+                          const FloorPieces& members,
+                          double cell_m) {
+  const auto distance = [&](std::uint32_t i) {
+    return std::hypot(MiddleOf(pieces[i]).x - middle.x, MiddleOf(pieces[i]).y - middle.y);
+  };
+  const Piece& piece = pieces[*std::min_element(
+      members.begin(), members.end(), [&](auto i, auto j) { return distance(i) < distance(j); })];
+  Eigen::Vector3d place;
+  double nearest = std::numeric_limits<double>::max();
+  ForEachCell(piece, [&](int column, int row) {
+    const double x = column + 0.5;
+    const double y = row + 0.5;
+    const double off = std::hypot(x - piece.mean_x, y - piece.mean_y);
+    if (off >= nearest) return;
+    nearest = off;
+    place = {(piece.block_x * double{kFloorBlockCells} + x) * cell_m,
+             (piece.block_y * double{kFloorBlockCells} + y) * cell_m,
+             piece.mean_z};
+  });
+  return place;
+}
+
 Floor Describe(const std::vector<Piece>& pieces, const FloorPieces& members, double cell_m) {
   Floor floor;
   Middle middle;
@@ -69,14 +103,13 @@ Floor Describe(const std::vector<Piece>& pieces, const FloorPieces& members, dou
   floor.high.setConstant(std::numeric_limits<double>::lowest());
   for (const std::uint32_t i : members) {
     const Piece& piece = pieces[i];
-    for (int cell = 0; cell < 64; ++cell) {
-      if ((piece.cells >> cell & 1U) == 0) continue;
-      const double x = piece.block_x * double{kFloorBlockCells} + cell % kFloorBlockCells;
-      const double y = piece.block_y * double{kFloorBlockCells} + cell / kFloorBlockCells;
+    ForEachCell(piece, [&](int column, int row) {
+      const double x = piece.block_x * double{kFloorBlockCells} + column;
+      const double y = piece.block_y * double{kFloorBlockCells} + row;
       floor.low = floor.low.cwiseMin(Eigen::Vector3d(x * cell_m, y * cell_m, piece.low_z));
       floor.high =
           floor.high.cwiseMax(Eigen::Vector3d((x + 1) * cell_m, (y + 1) * cell_m, piece.high_z));
-    }
+    });
     const Middle own = MiddleOf(piece);
     cells += piece.count;
     middle.x += piece.count * own.x;
@@ -85,27 +118,7 @@ Floor Describe(const std::vector<Piece>& pieces, const FloorPieces& members, dou
   }
   floor.area_m2 = cells * cell_m * cell_m;
   floor.mean_z_m /= cells;
-  middle = {middle.x / cells, middle.y / cells};
-  // The cell nearest to the middle, of the largest pieces' nearest: any free cell of it will do.
-  double nearest = std::numeric_limits<double>::max();
-  for (const std::uint32_t i : members) {
-    const Piece& piece = pieces[i];
-    const double far = std::hypot(MiddleOf(piece).x - middle.x, MiddleOf(piece).y - middle.y);
-    if (far >= nearest) continue;
-    nearest = far;
-    double best = std::numeric_limits<double>::max();
-    for (int cell = 0; cell < 64; ++cell) {
-      if ((piece.cells >> cell & 1U) == 0) continue;
-      const double x = cell % kFloorBlockCells + 0.5;
-      const double y = cell / kFloorBlockCells + 0.5;
-      const double off = std::hypot(x - piece.mean_x, y - piece.mean_y);
-      if (off >= best) continue;
-      best = off;
-      floor.place = {(piece.block_x * double{kFloorBlockCells} + x) * cell_m,
-                     (piece.block_y * double{kFloorBlockCells} + y) * cell_m,
-                     piece.mean_z};
-    }
-  }
+  floor.place = PlaceNear({middle.x / cells, middle.y / cells}, pieces, members, cell_m);
   return floor;
 }
 
