@@ -12,6 +12,7 @@
 #include <Eigen/Eigenvalues>
 #include <nanoflann.hpp>
 
+#include "core/cloud/point_tree.h"
 #include "core/geometry/eigen_solvers.h"
 
 namespace strata {
@@ -25,24 +26,6 @@ constexpr std::size_t kFewestNeighbours = 6;
 // Below this ratio of the variances along and across, neighbours are one line of the sensor and say
 // nothing about the surface across it.
 constexpr float kLine = 0.02F;
-
-// nanoflann's view of the points; its method names are given.
-struct CentroidsView {
-  const std::vector<Vector3f>& points;
-  std::size_t kdtree_get_point_count() const { return points.size(); }
-  float kdtree_get_pt(std::size_t i, std::size_t k) const {
-    return points[i][static_cast<Eigen::Index>(k)];
-  }
-  template <typename Box>
-  bool kdtree_get_bbox(Box& /*box*/) const {
-    return false;
-  }
-};
-using CentroidTree =
-    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, CentroidsView>,
-                                        CentroidsView,
-                                        3,
-                                        std::uint32_t>;
 
 std::vector<Vector3f> Centroids(const PointCloud& cloud, double edge_m) {
   using Cube = std::array<std::int32_t, 3>;
@@ -104,8 +87,8 @@ std::vector<OrientedPoint> OrientPoints(const PointCloud& cloud, double edge_m) 
   const std::vector<Vector3f> points = Centroids(cloud, edge_m);
   std::vector<OrientedPoint> oriented;
   if (points.size() < kFewestNeighbours) return oriented;
-  const CentroidsView view{points};
-  const CentroidTree tree(3, view, nanoflann::KDTreeSingleIndexAdaptorParams(12));
+  const PointsView view{points};
+  const PointTree tree(3, view, nanoflann::KDTreeSingleIndexAdaptorParams(12));
   oriented.reserve(points.size());
   std::array<std::uint32_t, kNeighbours> neighbours;
   std::array<float, kNeighbours> squared_m2;

@@ -8,7 +8,7 @@
 #include "core/classification/features/feature_columns.h"
 #include "core/classification/features/local_shape.h"
 #include "core/classification/features/neighbours.h"
-#include "core/classification/features/point_tree.h"
+#include "core/cloud/point_tree.h"
 #include "core/common/status.h"
 
 namespace strata {

@@ -1,7 +1,7 @@
 // A kd-tree over points.
-// Internal to core/classification, not installed.
-#ifndef STRATA_CORE_CLASSIFICATION_FEATURES_POINT_TREE_H_
-#define STRATA_CORE_CLASSIFICATION_FEATURES_POINT_TREE_H_
+// Internal to core, not installed: whoever includes it links nanoflann.
+#ifndef STRATA_CORE_CLOUD_POINT_TREE_H_
+#define STRATA_CORE_CLOUD_POINT_TREE_H_
 
 #include <cstddef>
 #include <cstdint>
@@ -32,4 +32,4 @@ using PointTree =
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_CLASSIFICATION_FEATURES_POINT_TREE_H_
+#endif  // STRATA_CORE_CLOUD_POINT_TREE_H_
