@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
+#include "core/geometry/skew.h"
 #include "core/registration/column_grid.h"
 #include "core/registration/mls_registration.h"
 #include "core/registration/scan_features.h"
@@ -47,12 +48,6 @@ bool MayBeStripOnAWall(const SampledFeature& feature, const Eigen::Vector3d& sen
 bool IsLevel(const Eigen::Vector3d& normal) {
   constexpr double kLevel = 0.95;  // cosine of its inclination; roofs rise more
   return std::abs(normal.z()) > kLevel;
-}
-
-Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
 }
 
 }  // namespace

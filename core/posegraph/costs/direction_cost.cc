@@ -5,8 +5,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "core/geometry/skew.h"
 #include "core/posegraph/costs/pose_block.h"
-#include "core/posegraph/costs/skew.h"
 
 namespace strata {
 

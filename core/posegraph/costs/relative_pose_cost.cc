@@ -4,9 +4,9 @@
 
 #include <Eigen/Geometry>
 
+#include "core/geometry/skew.h"
 #include "core/posegraph/costs/information_root.h"
 #include "core/posegraph/costs/pose_block.h"
-#include "core/posegraph/costs/skew.h"
 
 namespace strata {
 namespace {

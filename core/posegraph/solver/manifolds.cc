@@ -7,6 +7,7 @@
 #include <ceres/problem.h>
 #include <ceres/types.h>
 
+#include "core/geometry/screw_motion.h"
 #include "core/posegraph/costs/planar_cost.h"
 
 namespace strata {
@@ -43,24 +44,11 @@ bool PoseManifold::Plus(const double* x, const double* step, double* moved) cons
   const Eigen::Quaterniond q = Eigen::Map<const Eigen::Quaterniond>(x);
   const Eigen::Vector3d rotation = ConstVector3(step);
   const Eigen::Vector3d velocity = ConstVector3(step + 3);
-  const double angle = rotation.norm();
-  double half = 0.5;  // sin(angle / 2) / angle
-  double a = 0.5;
-  double b = 1.0 / 6.0;
-  if (angle > 1e-4) {
-    half = std::sin(0.5 * angle) / angle;
-    a = (1.0 - std::cos(angle)) / (angle * angle);
-    b = (angle - std::sin(angle)) / (angle * angle * angle);
-  }
-  const Eigen::Vector3d across = rotation.cross(velocity);
-  const Eigen::Vector3d way = velocity + a * across + b * rotation.cross(across);
-  Eigen::Quaterniond turn;
-  turn.w() = std::cos(0.5 * angle);
-  turn.vec() = half * rotation;
+  const ScrewStep screw = ScrewMotion(rotation, velocity);
   Eigen::Map<Eigen::Quaterniond> q_moved(moved);
-  q_moved = (q * turn).normalized();
+  q_moved = (q * screw.turn).normalized();
   Vector3 t_moved(moved + 4);
-  t_moved = ConstVector3(x + 4) + q * way;
+  t_moved = ConstVector3(x + 4) + q * screw.way_m;
   return q_moved.coeffs().allFinite() && t_moved.allFinite();
 }
 

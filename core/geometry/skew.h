@@ -1,6 +1,6 @@
-// The cross product as a matrix. Internal to core/posegraph, not installed.
-#ifndef STRATA_CORE_POSEGRAPH_COSTS_SKEW_H_
-#define STRATA_CORE_POSEGRAPH_COSTS_SKEW_H_
+// The cross product as a matrix.
+#ifndef STRATA_CORE_GEOMETRY_SKEW_H_
+#define STRATA_CORE_GEOMETRY_SKEW_H_
 
 #include <Eigen/Core>
 
@@ -15,4 +15,4 @@ inline Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_POSEGRAPH_COSTS_SKEW_H_
+#endif  // STRATA_CORE_GEOMETRY_SKEW_H_
