@@ -6,9 +6,9 @@ set -euo pipefail
 
 packages=(
   ca-certificates ccache cmake g++ git mold ninja-build pkg-config
-  libabsl-dev libboost-dev libceres-dev libcli11-dev libeigen3-dev libgoogle-glog-dev libgrpc++-dev libmeshoptimizer-dev
-  liblzf-dev libnanoflann-dev libpcl-dev libpng-dev libprotobuf-dev libqhull-dev libsqlite3-dev libssl-dev libtiff-dev libxxhash-dev
-  libzstd-dev nlohmann-json3-dev prometheus-cpp-dev
+  libabsl-dev libboost-dev libceres-dev libcli11-dev libeigen3-dev libgeographiclib-dev libgoogle-glog-dev libgrpc++-dev
+  liblzf-dev libmeshoptimizer-dev libnanoflann-dev libpcl-dev libpng-dev libprotobuf-dev libqhull-dev libsqlite3-dev
+  libssl-dev libtiff-dev libxxhash-dev libyaml-cpp-dev libzstd-dev nlohmann-json3-dev prometheus-cpp-dev
   protobuf-compiler protobuf-compiler-grpc python3
 )
 if [[ "${1:-}" == --dev ]]; then

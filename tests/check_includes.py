@@ -20,6 +20,7 @@ ARROWS = {
     "core/mesh": ["core/cloud", "core/geometry", "core/common"],
     "core/mls": ["core/cloud", "core/geometry", "core/common"],
     "core/world": ["core/mls", "core/cloud", "core/geometry", "core/common"],
+    "core/egomotion": ["core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/codec": ["core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/planes": ["core/world", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/registration": ["core/mls", "core/cloud", "core/geometry", "core/common"],
@@ -35,9 +36,9 @@ ARROWS = {
                "core/common"],
     "client/sdk": ["proto", "core/api", "core/codec", "core/world", "core/mls", "core/cloud", "core/geometry",
                    "core/common"],
-    "client/formats": ["core/posegraph", "core/world", "core/mls", "core/mesh", "core/cloud", "core/geometry", "core/common"],
+    "client/formats": ["core/posegraph", "core/egomotion", "core/world", "core/mls", "core/mesh", "core/cloud", "core/geometry", "core/common"],
     "client/cli": ["client/sdk", "client/formats", "core/api", "core/engine", "core/codec", "core/registration",
-                   "core/classification", "core/posegraph", "core/world", "core/mls", "core/mesh", "core/cloud", "core/geometry",
+                   "core/classification", "core/posegraph", "core/egomotion", "core/world", "core/mls", "core/mesh", "core/cloud", "core/geometry",
                    "core/common"],
 }
 
@@ -46,13 +47,14 @@ HERE = "."
 STOREYS = {
     "core/mls": ["elevation", HERE],
     "core/classification": [HERE, "learners", "amn", "features"],
+    "core/egomotion": ["smoothing", HERE],
     "core/planning": ["floors", HERE, "ground"],
     "core/planes": ["models", HERE],
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
     "core/storage": ["sqlite", HERE],
     "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "models", "ingest", "tiles", "scans", "map"],
-    "client/formats": ["planes", HERE, "grid"],
-    "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "planes", "job", "heights", "mesh", "picture", "terminal"],
+    "client/formats": ["planes", "motion", HERE, "grid"],
+    "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "planes", "egomotion", "job", "heights", "mesh", "picture", "terminal"],
 }
 
 # Sources a folder may hold.
@@ -61,12 +63,14 @@ MOST_FILES = 40
 # external header pattern: rooms that may include it
 EXTERNAL = {
     r"sqlite3\.h": ["core/storage/sqlite"],
-    r"ceres/.*": ["core/posegraph/costs", "core/posegraph/solver"],
+    r"ceres/.*": ["core/posegraph/costs", "core/posegraph/solver", "core/egomotion/smoothing"],
     r"(grpc|grpcpp)/.*|google/protobuf/.*|.*\.pb\.h": ["proto", "server", "client/sdk"],
     r"openssl/.*": ["server"],
     r"prometheus/.*": ["server/metrics"],
     r"pcl/.*": ["core/registration", "core/planes", "core/classification", "core/mesh", "client/formats"],
     r"libqhull_r/.*|meshoptimizer\.h": ["core/mesh"],
+    r"GeographicLib/.*": ["core/egomotion"],
+    r"yaml-cpp/.*": ["client/formats/motion"],
     r"tiffio\.h": ["client/formats/grid"],
     r"(thread|mutex|condition_variable)": ["core/engine", "server", "client", "core/common"],
 }
