@@ -113,15 +113,6 @@ void AssignByIndex(const PoseList& list, const fs::path& file, std::vector<ScanF
   }
 }
 
-// The time that a file's stem is.
-std::optional<absl::Time> TimeOfName(const fs::path& path) {
-  const std::string stem = path.stem().string();
-  const std::optional<double> seconds = ParseNumber(stem);
-  if (!absl::StrContains(stem, ".") || !seconds.has_value()) return std::nullopt;
-  if (!(*seconds >= 0.0 && *seconds < 9e12)) return std::nullopt;
-  return absl::FromUnixMicros(std::llround(*seconds * 1e6));
-}
-
 void AssignByTime(const std::vector<FilePose>& sorted,
                   const fs::path& file,
                   std::vector<ScanFile>& scans) {
@@ -274,6 +265,14 @@ std::optional<std::uint64_t> SequenceOfName(const fs::path& path) {
       ParseCount(absl::string_view(stem).substr(begin, end - begin));
   if (!number.has_value() || *number > kMaxSequence) return std::nullopt;
   return *number;
+}
+
+std::optional<absl::Time> TimeOfName(const fs::path& path) {
+  const std::string stem = path.stem().string();
+  const std::optional<double> seconds = ParseNumber(stem);
+  if (!absl::StrContains(stem, ".") || !seconds.has_value()) return std::nullopt;
+  if (!(*seconds >= 0.0 && *seconds < 9e12)) return std::nullopt;
+  return absl::FromUnixMicros(std::llround(*seconds * 1e6));
 }
 
 absl::StatusOr<std::vector<ScanFile>> ListScans(const std::vector<fs::path>& paths,

@@ -47,6 +47,10 @@ struct ScanFile {
 // or beyond 2^53.
 std::optional<std::uint64_t> SequenceOfName(const std::filesystem::path& path);
 
+// The time [s since 1970] that the stem of a file's name is, with a decimal point
+// ("1432235498.028276.pcd"); nullopt for other names.
+std::optional<absl::Time> TimeOfName(const std::filesystem::path& path);
+
 // Scans of `paths`, each as ScansAt() has it, in the order of their sequence numbers.
 //
 // The sequence number is SequenceOfName where every file has one and no two are equal; else the

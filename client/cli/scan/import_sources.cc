@@ -14,6 +14,7 @@
 
 #include "client/cli/classifier/label_classes.h"
 #include "client/cli/scan/level_trajectory.h"
+#include "client/formats/motion/placed_scans.h"
 #include "client/formats/scan_list.h"
 #include "client/formats/scan_reader.h"
 #include "core/common/status.h"
@@ -27,8 +28,19 @@ absl::StatusOr<std::vector<ScanFile>> FindScans(const ImportOptions& options, Ou
   list.tell = [&output](const std::string& text) { output.Talk(text); };
   STRATA_ASSIGN_OR_RETURN(list.format, ParseScanFormat(options.format));
   STRATA_ASSIGN_OR_RETURN(list.pose_format, ParsePoseFormat(options.pose_format));
-  list.poses = options.poses;
-  return ListScans({options.paths.begin(), options.paths.end()}, list);
+  const bool on_trajectory = options.pose_format == "auto" && IsTrajectory(options.poses);
+  list.poses = on_trajectory ? kNoPoses : options.poses;
+  STRATA_ASSIGN_OR_RETURN(std::vector<ScanFile> scans,
+                          ListScans({options.paths.begin(), options.paths.end()}, list));
+  if (on_trajectory) {
+    STRATA_RETURN_IF_ERROR(
+        PlaceOnTrajectory(options.poses, options.T_body_scan.value_or(Pose::Identity()), scans));
+  } else if (options.T_body_scan.has_value()) {
+    return absl::InvalidArgumentError(
+        "--sensor needs --poses with a trajectory of strata egomotion: other poses are those of "
+        "the scans themselves");
+  }
+  return scans;
 }
 
 // What the trajectory has, by sequence.

@@ -16,6 +16,7 @@
 #include "client/cli/scan/scan_uploader.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/output.h"
+#include "core/geometry/pose.h"
 #include "core/world/scan.h"
 
 namespace strata::cli {
@@ -27,6 +28,7 @@ struct ImportOptions {
   std::string format = "auto";
   std::string poses;
   std::string pose_format = "auto";
+  std::optional<Pose> T_body_scan;  // for poses of a trajectory
   std::string trajectory;
   std::string align = "on";
   std::string classes;  // as ReadLabelClasses(); empty: labels are ids of the map's classes

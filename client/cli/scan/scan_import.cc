@@ -298,8 +298,14 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
           options->poses,
           "File with the poses T_map_scan of the scans, or a folder of .pose files; without it "
           ".pose files beside .3d files, or the one poses*.txt|tum|csv in the folder; none: every "
-          "scan is at the origin")
+          "scan is at the origin. A trajectory of strata egomotion gives each scan the pose of the "
+          "time that its name is (1432235498.028276.pcd)")
       ->type_name("FILE|none");
+  AddPose(
+      import,
+      "--sensor",
+      [options](const Pose& pose, std::size_t) { options->T_body_scan = pose; },
+      "Where the sensor sits on the robot, for poses of a trajectory [m, rad]");
   import
       ->add_option(
           "--pose-format",
