@@ -50,6 +50,8 @@ RESULTS = {
                    ("core/posegraph", "client/formats")),
     "fig_6_1": ("Thesis, figure 6.1: a bridge as elevation map, extended elevation map and multi-level map",
                 "/usr/bin/python3 tests/experiments/underpass.py --build {build}", ("core/mls", "core/planning")),
+    "husky": ("A recorded robot with IMU, wheels and GPS", "experiments/car husky", ("core/egomotion",)),
+    "dresden": ("A recorded car with IMU and GPS", "experiments/car dresden", ("core/egomotion",)),
     "mls": ("Points to maps beside OctoMap", "bench/mls_benchmark 5 3", ("core/mls",)),
     "registration": ("Registration beside PCL", "bench/registration_benchmark --pairs 60", ("core/registration", "core/mls")),
     "posegraph": ("Our use of Ceres beside a plain one", "bench/posegraph_benchmark 5", ("core/posegraph",)),
