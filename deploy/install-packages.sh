@@ -6,10 +6,10 @@ set -euo pipefail
 
 packages=(
   ca-certificates ccache cmake g++ git mold ninja-build pkg-config
-  libabsl-dev libboost-dev libceres-dev libcli11-dev libeigen3-dev libgeographiclib-dev libgoogle-glog-dev libgrpc++-dev
-  liblzf-dev libmeshoptimizer-dev libnanoflann-dev libpcl-dev libpng-dev libprotobuf-dev libqhull-dev libsqlite3-dev
-  libssl-dev libtiff-dev libxxhash-dev libyaml-cpp-dev libzstd-dev nlohmann-json3-dev prometheus-cpp-dev
-  protobuf-compiler protobuf-compiler-grpc python3
+  libabsl-dev libboost-dev libbz2-dev libceres-dev libcli11-dev libeigen3-dev libgeographiclib-dev libgoogle-glog-dev
+  libgrpc++-dev liblz4-dev liblzf-dev libmeshoptimizer-dev libnanoflann-dev libpcl-dev libpng-dev libprotobuf-dev libqhull-dev
+  libsqlite3-dev libssl-dev libtiff-dev libxxhash-dev libyaml-cpp-dev libzstd-dev nlohmann-json3-dev prometheus-cpp-dev
+  protobuf-compiler protobuf-compiler-grpc python3 zlib1g-dev
 )
 if [[ "${1:-}" == --dev ]]; then
   packages+=(clang clang-format clang-tidy coinor-libclp-dev coinor-libipopt-dev dpkg-dev file libbenchmark-dev libcgal-dev libclang-rt-dev libdlib-dev libgdal-dev libgmock-dev libgtest-dev liboctomap-dev libtinygltf-dev mmdebstrap openssl python3-grpcio python3-numpy python3-protobuf python3-xxhash python3-zstandard sqlite3 systemd)

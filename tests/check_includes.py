@@ -53,7 +53,7 @@ STOREYS = {
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
     "core/storage": ["sqlite", HERE],
     "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "models", "ingest", "tiles", "scans", "map"],
-    "client/formats": ["planes", "motion", HERE, "grid"],
+    "client/formats": ["planes", "bags", "motion", HERE, "grid"],
     "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "planes", "egomotion", "job", "heights", "mesh", "picture", "terminal"],
 }
 
@@ -62,7 +62,7 @@ MOST_FILES = 40
 
 # external header pattern: rooms that may include it
 EXTERNAL = {
-    r"sqlite3\.h": ["core/storage/sqlite"],
+    r"sqlite3\.h": ["core/storage/sqlite", "client/formats/bags"],
     r"ceres/.*": ["core/posegraph/costs", "core/posegraph/solver", "core/egomotion/smoothing"],
     r"(grpc|grpcpp)/.*|google/protobuf/.*|.*\.pb\.h": ["proto", "server", "client/sdk"],
     r"openssl/.*": ["server"],
@@ -72,6 +72,7 @@ EXTERNAL = {
     r"GeographicLib/.*": ["core/egomotion"],
     r"yaml-cpp/.*": ["client/formats/motion"],
     r"tiffio\.h": ["client/formats/grid"],
+    r"(bzlib|lz4frame|zlib)\.h": ["client/formats/bags"],
     r"(thread|mutex|condition_variable)": ["core/engine", "server", "client", "core/common"],
 }
 

@@ -20,6 +20,16 @@ strata_library(
   DEPS strata::cloud strata::geometry absl::statusor
 )
 
+# ROS messages and bags.
+strata_library(
+  bag_writer
+  NO_INSTALL
+  SOURCES bag_writer.cc
+  HEADERS bag_writer.h
+  DEPS strata::geometry absl::strings
+  PRIVATE_DEPS bz2 lz4 z PkgConfig::sqlite3 PkgConfig::zstd
+)
+
 # Recorded clouds with known classes.
 strata_library(
   labelled_clouds
