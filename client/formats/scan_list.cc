@@ -275,6 +275,10 @@ std::optional<absl::Time> TimeOfName(const fs::path& path) {
   return absl::FromUnixMicros(std::llround(*seconds * 1e6));
 }
 
+absl::StatusOr<PointCloud> ReadScanFile(const ScanFile& scan, std::size_t* at_sensor) {
+  return scan.read ? scan.read(at_sensor) : ReadScan(scan.path, scan.format, at_sensor);
+}
+
 absl::StatusOr<std::vector<ScanFile>> ListScans(const std::vector<fs::path>& paths,
                                                 const ScanListOptions& given) {
   ScanListOptions options = given;

@@ -2,6 +2,7 @@
 #ifndef STRATA_CLIENT_FORMATS_SCAN_LIST_H_
 #define STRATA_CLIENT_FORMATS_SCAN_LIST_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -15,6 +16,7 @@
 
 #include "client/formats/pose_reader.h"
 #include "client/formats/scan_reader.h"
+#include "core/cloud/point_cloud.h"
 #include "core/geometry/pose.h"
 
 namespace strata {
@@ -41,7 +43,12 @@ struct ScanFile {
   std::optional<absl::Time> time;
   Pose T_map_scan = Pose::Identity();  // identity where no poses were given
   absl::Status pose_status;            // NOT_FOUND, saying what was looked for, without a pose
+  // As ReadScanFile(), where the scan is no file of its own; may be called by several threads.
+  std::function<absl::StatusOr<PointCloud>(std::size_t* at_sensor)> read = {};
 };
+
+// By `read`, or else as ReadScan().
+absl::StatusOr<PointCloud> ReadScanFile(const ScanFile& scan, std::size_t* at_sensor = nullptr);
 
 // The last run of digits in the stem of a file's name ("scan012_3.pcd": 3); nullopt without digits
 // or beyond 2^53.

@@ -63,8 +63,8 @@ struct UnreadFormat {
 constexpr absl::string_view kSurveyCure =
     "is not read yet; convert it, for instance with 'pdal translate IN OUT.ply' or CloudCompare";
 constexpr absl::string_view kRosCure =
-    "is not read yet; play it and save its point clouds as PCD, as pcl_ros does, and the poses as "
-    "'time x y z qx qy qz qw' a line";
+    "holds messages of many topics; 'strata scan import MAP FILE --topic T --poses-from T' takes "
+    "its clouds, 'strata scan topics FILE' lists what there is";
 constexpr absl::string_view kPacketsCure =
     "holds a sensor's packets, which are not read; the sensor's own program writes PCD or CSV";
 constexpr absl::string_view kPackedCure = "is packed; unpack it first";
@@ -216,12 +216,16 @@ absl::StatusOr<PointCloud> ReadScan(const std::filesystem::path& path,
     return absl::InvalidArgumentError(absl::StrCat(path.string(), ": ", unread));
   }
   absl::StatusOr<PointCloud> cloud = Parse(bytes, format);
+  if (cloud.ok()) cloud = WithoutRangeZero(*std::move(cloud), at_sensor);
   if (!cloud.ok()) return Annotate(cloud.status(), path.string());
-  const std::size_t dropped = DropAtSensor(*cloud);
+  return cloud;
+}
+
+absl::StatusOr<PointCloud> WithoutRangeZero(PointCloud cloud, std::size_t* at_sensor) {
+  const std::size_t dropped = DropAtSensor(cloud);
   if (at_sensor != nullptr) *at_sensor = dropped;
-  if (dropped > 0 && CountFinite(*cloud) == 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(path.string(), ": all of ", dropped, " returns have range 0"));
+  if (dropped > 0 && CountFinite(cloud) == 0) {
+    return absl::InvalidArgumentError(absl::StrCat("all of ", dropped, " returns have range 0"));
   }
   return cloud;
 }

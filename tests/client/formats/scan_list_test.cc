@@ -239,7 +239,7 @@ TEST_F(ScanListTest, FilesThatAreNotReadSayWhatToDo) {
   for (const auto& [name, cure] :
        std::vector<std::pair<std::string, std::string>>{{"a.LAZ", "pdal translate"},
                                                         {"a.e57", "CloudCompare"},
-                                                        {"a.mcap", "save its point clouds as PCD"},
+                                                        {"a.mcap", "strata scan topics"},
                                                         {"a.pcap", "the sensor's own program"},
                                                         {"a.bt", "octree2pointcloud"},
                                                         {"a.bin.gz", "unpack it first"}}) {

@@ -1,0 +1,314 @@
+#include "client/formats/bags/bag_scans.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
+#include "absl/time/time.h"
+
+#include "client/formats/bags/recording.h"
+#include "client/formats/bags/ros_messages.h"
+#include "client/formats/scan_reader.h"
+#include "core/common/status.h"
+
+namespace strata {
+namespace {
+
+constexpr absl::string_view kAllTopics =
+    "'strata scan topics' with the same files lists all topics";
+
+std::string Described(const RecordedTopic& topic) {
+  return absl::StrFormat("%s (%s, %d messages, %.3g Hz)",
+                         topic.topic.name,
+                         topic.topic.type,
+                         topic.messages,
+                         topic.hertz());
+}
+
+using TopicFilter = absl::FunctionRef<bool(const RecordedTopic&)>;
+
+// "--topic /a (…) or --topic /b (…)"; empty if none fits.
+std::string Offered(const RecordingSurvey& survey, absl::string_view option, TopicFilter fits) {
+  std::vector<std::string> offers;
+  for (const RecordedTopic& topic : survey.topics) {
+    if (fits(topic)) offers.push_back(absl::StrCat(option, " ", Described(topic)));
+  }
+  return absl::StrJoin(offers, " or ");
+}
+
+bool HasClouds(const RecordedTopic& topic) { return topic.topic.type == kPointCloudType; }
+bool HasPoses(const RecordedTopic& topic) { return IsPoseType(topic.topic.type); }
+
+// The topic that is named, or else the only one that fits; null if there is none or several.
+RecordedTopic* FindTopic(RecordingSurvey& survey, const std::string& name, TopicFilter fits) {
+  RecordedTopic* found = nullptr;
+  for (RecordedTopic& topic : survey.topics) {
+    const bool named = name.empty() || topic.topic.name == name || topic.topic.name == "/" + name;
+    if (!named || !fits(topic)) continue;
+    if (found != nullptr) return nullptr;
+    found = &topic;
+  }
+  return found;
+}
+
+absl::StatusOr<RecordedTopic*> CloudTopic(RecordingSurvey& survey, const std::string& name) {
+  RecordedTopic* const topic = FindTopic(survey, name, &HasClouds);
+  const std::string offers = Offered(survey, "--topic", &HasClouds);
+  if (topic == nullptr) {
+    return absl::InvalidArgumentError(
+        offers.empty() ? absl::StrCat("no topic of type ", kPointCloudType, "; ", kAllTopics)
+        : name.empty() ? absl::StrCat("which clouds? Say ", offers)
+                       : absl::StrCat("no topic ", name, " has clouds; say ", offers));
+  }
+  if (!topic->clouds.empty()) return topic;
+  if (topic->bad > 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("no cloud of ", Described(*topic), " can be read: ", topic->why));
+  }
+  return absl::InvalidArgumentError(
+      absl::StrCat("no cloud of ", Described(*topic), " has a point"));
+}
+
+// Where the poses come from: a topic, or else transforms.
+struct PoseSource {
+  std::string name;
+  RecordedTopic* topic = nullptr;
+  std::string fixed_frame, base_frame;
+};
+
+absl::Status NoPoseSource(const RecordingSurvey& survey, const std::string& asked) {
+  std::string offers = Offered(survey, "--poses-from", &HasPoses);
+  if (!survey.transforms.empty()) {
+    absl::StrAppend(&offers,
+                    offers.empty() ? "" : " or ",
+                    "--poses-from tf:FIXED->BASE with two of the frames ",
+                    absl::StrJoin(survey.transforms.frames(), ", "));
+  }
+  if (offers.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("no topic has poses (nav_msgs/Odometry, geometry_msgs/PoseStamped) or "
+                     "transforms: record /odom or /tf, too; ",
+                     kAllTopics));
+  }
+  return absl::InvalidArgumentError(
+      asked.empty() ? absl::StrCat("which poses? Say ", offers)
+                    : absl::StrCat("'", asked, "' is no topic of poses; say ", offers));
+}
+
+absl::StatusOr<PoseSource> ChoosePoseSource(RecordingSurvey& survey, const std::string& asked) {
+  PoseSource source;
+  source.name = asked;
+  absl::string_view spec = asked;
+  if (absl::ConsumePrefix(&spec, "tf:")) {
+    const absl::string_view arrow = absl::StrContains(spec, "→") ? "→" : "->";
+    const std::size_t at = spec.find(arrow);
+    if (at == absl::string_view::npos || survey.transforms.empty()) {
+      return NoPoseSource(survey, asked);
+    }
+    source.fixed_frame = std::string(spec.substr(0, at));
+    source.base_frame = std::string(spec.substr(at + arrow.size()));
+    return source;
+  }
+  source.topic = FindTopic(survey, asked, &HasPoses);
+  if (source.topic == nullptr) return NoPoseSource(survey, asked);
+  if (source.topic->poses.size() == 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("no pose of ", Described(*source.topic), " can be read: ", source.topic->why));
+  }
+  source.name = source.topic->topic.name;
+  source.fixed_frame = source.topic->frames.front();
+  source.base_frame = source.topic->child_frame;
+  return source;
+}
+
+// A cloud's pose, and what moves its points into the frame whose pose that is.
+struct CloudPose {
+  Pose T_map_scan = Pose::Identity();
+  std::optional<Pose> T_scan_cloud;
+};
+
+// Poses of clouds, whatever their frame.
+class CloudPoses {
+ public:
+  CloudPoses(RecordingSurvey& survey, PoseSource source, const std::optional<Pose>& T_base_cloud)
+      : transforms_(survey.transforms), source_(std::move(source)), T_base_cloud_(T_base_cloud) {}
+
+  absl::StatusOr<CloudPose> At(const std::string& frame, std::int64_t stamp_ns) {
+    STRATA_ASSIGN_OR_RETURN(
+        const Pose T_map_base,
+        source_.topic != nullptr
+            ? source_.topic->poses.At(stamp_ns)
+            : transforms_.Lookup(source_.fixed_frame, source_.base_frame, stamp_ns));
+    if (T_base_cloud_.has_value()) return CloudPose{Normalized(T_map_base * *T_base_cloud_), {}};
+    if (frame == source_.fixed_frame) return CloudPose{T_map_base, T_map_base.inverse()};
+    if (source_.base_frame.empty() || frame == source_.base_frame) return CloudPose{T_map_base, {}};
+    STRATA_ASSIGN_OR_RETURN(const Pose T_base_cloud, FromBase(frame, stamp_ns));
+    if (transforms_.HangsFrom(source_.base_frame, frame))
+      return CloudPose{T_map_base, T_base_cloud};
+    return CloudPose{Normalized(T_map_base * T_base_cloud), {}};
+  }
+
+ private:
+  absl::StatusOr<Pose> FromBase(const std::string& frame, std::int64_t stamp_ns) {
+    absl::StatusOr<Pose> T = transforms_.Lookup(source_.base_frame, frame, stamp_ns);
+    if (T.ok()) return T;
+    return absl::NotFoundError(absl::StrCat("the clouds are in frame ",
+                                            frame,
+                                            ", the poses are those of ",
+                                            source_.base_frame,
+                                            ": ",
+                                            T.status().message(),
+                                            "; record /tf_static, too, or say where the sensor is "
+                                            "on the base with --mount X,Y,Z[,YAW]"));
+  }
+
+  TransformTree& transforms_;
+  const PoseSource source_;
+  const std::optional<Pose> T_base_cloud_;
+};
+
+// Floats as near to the truth as they can be: through doubles.
+PointCloud Moved(PointCloud cloud, const Pose& T) {
+  for (Eigen::Vector3f& p : cloud.points) {
+    p = (T * (cloud.origin + p.cast<double>())).cast<float>();
+  }
+  cloud.origin.setZero();
+  cloud.sensor_origin.setZero();
+  return cloud;
+}
+
+absl::StatusOr<PointCloud> ReadRecordedCloud(Recording& recording,
+                                             const RecordedCloud& cloud,
+                                             MessageEncoding encoding,
+                                             const std::optional<Pose>& T_scan_cloud,
+                                             std::size_t* at_sensor) {
+  STRATA_ASSIGN_OR_RETURN(const std::string message, recording.Read(cloud));
+  STRATA_ASSIGN_OR_RETURN(PointCloud read, ReadRosCloud(message, encoding));
+  STRATA_ASSIGN_OR_RETURN(read, WithoutRangeZero(std::move(read), at_sensor));
+  if (!T_scan_cloud.has_value()) return read;
+  PointCloud moved = Moved(std::move(read), *T_scan_cloud);
+  STRATA_RETURN_IF_ERROR(ValidateCloud(moved));
+  return moved;
+}
+
+// To the nearest microsecond, as times of files of poses come.
+absl::Time TimeOfStamp(std::int64_t stamp_ns) {
+  constexpr std::int64_t kMicrosecondNs = 1000;
+  const std::int64_t floor_us = stamp_ns / kMicrosecondNs - (stamp_ns % kMicrosecondNs < 0 ? 1 : 0);
+  const std::int64_t rest_ns = stamp_ns - floor_us * kMicrosecondNs;
+  return absl::FromUnixMicros(floor_us + (2 * rest_ns >= kMicrosecondNs ? 1 : 0));
+}
+
+// What became of the clouds of a topic.
+struct Chosen {
+  std::vector<ScanFile> scans;
+  std::size_t with_pose = 0;
+  absl::Status first_fault;  // of those without
+};
+
+Chosen ChooseKeyframes(const std::shared_ptr<Recording>& recording,
+                       RecordedTopic& topic,
+                       const KeyframeSpacing& every,
+                       CloudPoses& poses) {
+  std::stable_sort(
+      topic.clouds.begin(), topic.clouds.end(), [](const RecordedCloud& a, const RecordedCloud& b) {
+        return a.stamp_ns < b.stamp_ns;
+      });
+  Chosen chosen;
+  KeyframeChooser chooser(every);
+  for (std::size_t i = 0; i < topic.clouds.size(); ++i) {
+    const RecordedCloud& cloud = topic.clouds[i];
+    const absl::StatusOr<CloudPose> pose = poses.At(topic.frames[cloud.frame], cloud.stamp_ns);
+    if (!pose.ok()) {
+      if (chosen.first_fault.ok()) chosen.first_fault = pose.status();
+      continue;
+    }
+    ++chosen.with_pose;
+    if (!chooser.Keep(1e-9 * static_cast<double>(cloud.stamp_ns), pose->T_map_scan)) continue;
+    ScanFile& scan = chosen.scans.emplace_back();
+    scan.path = absl::StrCat(recording->files()[cloud.file], ":", topic.topic.name, ":", i);
+    scan.sequence = i;
+    scan.time = TimeOfStamp(cloud.stamp_ns);
+    scan.T_map_scan = pose->T_map_scan;
+    scan.read = [recording,
+                 cloud,
+                 encoding = topic.topic.encoding,
+                 T_scan_cloud = pose->T_scan_cloud](std::size_t* at_sensor) {
+      return ReadRecordedCloud(*recording, cloud, encoding, T_scan_cloud, at_sensor);
+    };
+  }
+  return chosen;
+}
+
+void TellOf(const RecordingSurvey& survey,
+            const RecordedTopic& topic,
+            const PoseSource& source,
+            const Chosen& chosen,
+            const std::function<void(const std::string&)>& tell) {
+  if (!tell) return;
+  for (const std::string& line : survey.damage) tell(absl::StrCat("warning: ", line));
+  for (const RecordedTopic& used : survey.topics) {
+    if (used.bad == 0 || (&used != &topic && &used != source.topic)) continue;
+    tell(absl::StrCat(
+        "warning: ", used.bad, " messages of ", used.topic.name, " are left out: ", used.why));
+  }
+  if (chosen.with_pose < topic.clouds.size()) {
+    tell(absl::StrCat("warning: ",
+                      topic.clouds.size() - chosen.with_pose,
+                      " clouds have no pose and are left out: ",
+                      chosen.first_fault.message()));
+  }
+  if (source.topic != nullptr && source.base_frame.empty()) {
+    tell(absl::StrCat(source.name, " does not say whose poses it has: taken for the clouds' own"));
+  }
+  if (topic.has_point_times) {
+    tell("the points have times, which are not used: clouds are taken as without distortion");
+  }
+  tell(absl::StrCat(chosen.scans.size(),
+                    " of ",
+                    topic.clouds.size(),
+                    " clouds of ",
+                    topic.topic.name,
+                    " with poses from ",
+                    source.name));
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<ScanFile>> ListBagScans(const std::vector<std::filesystem::path>& paths,
+                                                   const BagScanOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(std::unique_ptr<Recording> opened, Recording::Open(paths));
+  const std::shared_ptr<Recording> recording = std::move(opened);
+  STRATA_ASSIGN_OR_RETURN(RecordingSurvey survey, recording->Survey([&options](double share) {
+    return options.progress ? options.progress(share) : absl::OkStatus();
+  }));
+  STRATA_ASSIGN_OR_RETURN(RecordedTopic* const topic, CloudTopic(survey, options.topic));
+  STRATA_ASSIGN_OR_RETURN(const PoseSource source, ChoosePoseSource(survey, options.poses_from));
+  CloudPoses poses(survey, source, options.T_base_cloud);
+  Chosen chosen = ChooseKeyframes(recording, *topic, options.every, poses);
+  if (chosen.scans.empty()) {
+    return Annotate(
+        chosen.first_fault,
+        absl::StrCat("no cloud of ", topic->topic.name, " has a pose from ", source.name));
+  }
+  TellOf(survey, *topic, source, chosen, options.tell);
+  return std::move(chosen.scans);
+}
+
+}  // namespace strata
