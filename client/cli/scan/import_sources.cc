@@ -1,9 +1,16 @@
 #include "client/cli/scan/import_sources.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <iterator>
 #include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/strings/ascii.h"
@@ -14,16 +21,76 @@
 
 #include "client/cli/classifier/label_classes.h"
 #include "client/cli/scan/level_trajectory.h"
+#include "client/cli/terminal/progress.h"
+#include "client/formats/bags/bag_scans.h"
+#include "client/formats/bags/keyframes.h"
+#include "client/formats/bags/recording.h"
 #include "client/formats/motion/placed_scans.h"
 #include "client/formats/scan_list.h"
 #include "client/formats/scan_reader.h"
 #include "core/common/status.h"
+#include "core/common/stop.h"
 #include "core/world/map_class.h"
 
 namespace strata::cli {
 namespace {
 
-absl::StatusOr<std::vector<ScanFile>> FindScans(const ImportOptions& options, Output& output) {
+// What is said of a recording and not of files, or the other way round, would be passed over.
+absl::Status CheckOptionsFor(bool recording, const ImportOptions& options) {
+  const std::pair<const char*, bool> given[] = {
+      {"--topic", !options.topic.empty()},
+      {"--poses-from", !options.poses_from.empty()},
+      {"--every", !options.every.empty()},
+      {"--mount", options.mount.has_value()},
+      {"--format", options.format != "auto"},
+      {"--poses", !options.poses.empty()},
+      {"--pose-format", options.pose_format != "auto"},
+  };
+  constexpr std::size_t kOfRecordings = 4;  // the first ones
+  for (std::size_t i = 0; i < std::size(given); ++i) {
+    const auto& [name, is_given] = given[i];
+    if (!is_given || recording == (i < kOfRecordings)) continue;
+    return absl::InvalidArgumentError(
+        recording ? absl::StrCat(name,
+                                 " is for files of scans; of a recording say --topic and "
+                                 "--poses-from")
+                  : absl::StrCat(name,
+                                 " is for recordings (.mcap, .db3, .bag, folders of rosbag2), and ",
+                                 options.paths.front(),
+                                 " is none"));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<ScanFile>> FindRecordedScans(const ImportOptions& options,
+                                                        const Stop& stop,
+                                                        Output& output) {
+  Progress progress(output.talk(), TalksToTerminal(), "reading");
+  BagScanOptions bag;
+  bag.topic = options.topic;
+  bag.poses_from = options.poses_from;
+  STRATA_ASSIGN_OR_RETURN(
+      bag.every, ParseKeyframeSpacing(options.every.empty() ? kDefaultEvery : options.every));
+  bag.T_base_cloud = options.mount;
+  bag.tell = [&output, &progress](const std::string& text) {
+    progress.Clear();
+    output.Talk(text);
+  };
+  bag.progress = [&stop, &progress](double share) {
+    progress.Update(share, "the recording");
+    return stop.status();
+  };
+  return ListBagScans({options.paths.begin(), options.paths.end()}, bag);
+}
+
+absl::StatusOr<std::vector<ScanFile>> FindScans(const ImportOptions& options,
+                                                const Stop& stop,
+                                                Output& output) {
+  const bool recording = std::any_of(options.paths.begin(),
+                                     options.paths.end(),
+                                     [](const std::string& path) { return IsRecording(path); });
+  STRATA_RETURN_IF_ERROR(CheckOptionsFor(recording, options));
+  if (recording) return FindRecordedScans(options, stop, output);
   ScanListOptions list;
   list.tell = [&output](const std::string& text) { output.Talk(text); };
   STRATA_ASSIGN_OR_RETURN(list.format, ParseScanFormat(options.format));
@@ -68,7 +135,7 @@ bool Differs(const ScanFile& scan, const ScanHeader& there) {
 
 // Scans without poses and times are told apart by the points of the first one.
 bool HasOtherPoints(const ScanFile& scan, const ScanHeader& there) {
-  const absl::StatusOr<PointCloud> cloud = ReadScan(scan.path, scan.format);
+  const absl::StatusOr<PointCloud> cloud = ReadScanFile(scan);
   return cloud.ok() && cloud->size() != there.point_count;
 }
 
@@ -133,7 +200,7 @@ absl::StatusOr<PointCloud> ReadForMap(const ScanFile& scan,
                                       const LabelsToMap& labels,
                                       std::atomic<std::uint64_t>& at_sensor) {
   std::size_t dropped = 0;
-  STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScan(scan.path, scan.format, &dropped));
+  STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScanFile(scan, &dropped));
   at_sensor += dropped;
   STRATA_RETURN_IF_ERROR(labels(cloud));
   return cloud;
@@ -187,20 +254,28 @@ absl::Status CheckNear(const Eigen::Vector3d& place, const Box& world, absl::str
       distance_m / 1000.0));
 }
 
+// Where the points lie of the first scan to upload that can be read. Both in the same order.
+Eigen::Vector3d MiddleOfFirst(const std::vector<ScanFile>& scans,
+                              const std::vector<UploadSource>& sources) {
+  auto scan = scans.begin();
+  for (const UploadSource& source : sources) {
+    scan = std::find_if(scan, scans.end(), [&source](const ScanFile& file) {
+      return file.sequence == source.header.id.sequence;
+    });
+    if (scan == scans.end()) break;
+    const absl::StatusOr<PointCloud> cloud = ReadScanFile(*scan);
+    if (cloud.ok()) return cloud->origin;
+  }
+  return Eigen::Vector3d::Zero();
+}
+
 // Without --far: checks all poses, with the points of the first scan that can be read, before
 // anything is sent, and the points of each scan when it is read. `world`: what the map has; it
 // grows along the way.
 absl::Status CheckPlaces(Box world,
-                         const ImportOptions& options,
+                         const std::vector<ScanFile>& scans,
                          std::vector<UploadSource>& sources) {
-  STRATA_ASSIGN_OR_RETURN(const ScanFormat format, ParseScanFormat(options.format));
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const UploadSource& source : sources) {
-    const absl::StatusOr<PointCloud> first = ReadScan(source.file, format);
-    if (!first.ok()) continue;
-    middle = first->origin;
-    break;
-  }
+  const Eigen::Vector3d middle = MiddleOfFirst(scans, sources);
   for (const UploadSource& source : sources) {
     const Eigen::Vector3d place = source.header.T_map_scan * middle;
     const absl::Status near = CheckNear(place, world, source.file);
@@ -249,7 +324,7 @@ std::string TrajectoryOf(const std::string& path) {
     folder = folder.parent_path();
   }
   if (!std::filesystem::is_directory(folder)) {
-    folder = folder.parent_path();
+    folder = IsRecording(folder) ? folder.replace_extension() : folder.parent_path();
   }
   if (folder.filename() == "scans") {
     folder = folder.parent_path();
@@ -264,7 +339,8 @@ std::string TrajectoryOf(const std::string& path) {
 }
 
 absl::StatusOr<ImportSources> FindImportSources(Context& context, const ImportOptions& options) {
-  STRATA_ASSIGN_OR_RETURN(std::vector<ScanFile> scans, FindScans(options, context.output));
+  STRATA_ASSIGN_OR_RETURN(std::vector<ScanFile> scans,
+                          FindScans(options, context.call.stop, context.output));
   STRATA_ASSIGN_OR_RETURN(const ScansThere there, FindScansThere(context, options));
   STRATA_ASSIGN_OR_RETURN(const LabelsToMap labels, LabelsFor(context, options));
   STRATA_ASSIGN_OR_RETURN(const std::optional<double> level_rad,
@@ -274,16 +350,19 @@ absl::StatusOr<ImportSources> FindImportSources(Context& context, const ImportOp
   sources.level_rad = level_rad;
   if (options.far) return sources;
   STRATA_ASSIGN_OR_RETURN(const Box world, WorldOf(context, options.map, there));
-  STRATA_RETURN_IF_ERROR(CheckPlaces(world, options, sources.missing));
+  STRATA_RETURN_IF_ERROR(CheckPlaces(world, scans, sources.missing));
   return sources;
 }
 
-absl::StatusOr<ImportSources> FindImportSources(Output& output, const ImportOptions& options) {
-  STRATA_ASSIGN_OR_RETURN(std::vector<ScanFile> scans, FindScans(options, output));
-  STRATA_ASSIGN_OR_RETURN(const std::optional<double> level_rad, Level(scans, options, output));
+absl::StatusOr<ImportSources> FindImportSources(FileContext& context,
+                                                const ImportOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(std::vector<ScanFile> scans,
+                          FindScans(options, context.stop, context.output));
+  STRATA_ASSIGN_OR_RETURN(const std::optional<double> level_rad,
+                          Level(scans, options, context.output));
   ImportSources sources = SourcesOf(scans, {}, options, PlainLabels(options));
   sources.level_rad = level_rad;
-  if (!options.far) STRATA_RETURN_IF_ERROR(CheckPlaces(Box(), options, sources.missing));
+  if (!options.far) STRATA_RETURN_IF_ERROR(CheckPlaces(Box(), scans, sources.missing));
   return sources;
 }
 

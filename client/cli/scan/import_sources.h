@@ -15,7 +15,6 @@
 
 #include "client/cli/scan/scan_uploader.h"
 #include "client/cli/terminal/command.h"
-#include "client/cli/terminal/output.h"
 #include "core/geometry/pose.h"
 #include "core/world/scan.h"
 
@@ -38,7 +37,15 @@ struct ImportOptions {
   bool wait = false;
   std::string spool;  // a directory, if scans go there first
   bool as_local_maps = false;
+  // Of recordings, as BagScanOptions.
+  std::string topic;
+  std::string poses_from;
+  std::string every;
+  std::optional<Pose> mount;
 };
+
+// The spacing of keyframes that `every` stands for, and without one.
+inline constexpr char kDefaultEvery[] = "0.5m,30deg";
 
 struct ImportSources {
   std::size_t files = 0;
@@ -51,8 +58,8 @@ struct ImportSources {
       std::make_shared<std::atomic<std::uint64_t>>(0);
 };
 
-// The folder's name, or that of the folder around one that is only called "scans", in the letters
-// that names may have.
+// The folder's name, or that of the folder around one that is only called "scans"; of a recording
+// that of its file or folder. In the letters that names may have.
 std::string TrajectoryOf(const std::string& path);
 
 // What the paths have and the map lacks. Warns where the map has other scans under the same
@@ -62,7 +69,7 @@ std::string TrajectoryOf(const std::string& path);
 // name, here and below.
 absl::StatusOr<ImportSources> FindImportSources(Context& context, const ImportOptions& options);
 // All that the paths have, whatever a map has; labels stay as the files have them.
-absl::StatusOr<ImportSources> FindImportSources(Output& output, const ImportOptions& options);
+absl::StatusOr<ImportSources> FindImportSources(FileContext& context, const ImportOptions& options);
 
 }  // namespace strata::cli
 

@@ -17,7 +17,7 @@ constexpr int kScans = 5;
 
 // The floor's upward normal in the map, times its share of the scan's points.
 absl::StatusOr<Eigen::Vector3d> WeightedNormal(const ScanFile& scan) {
-  STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScan(scan.path, scan.format));
+  STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScanFile(scan));
   // In the axes of the map, so that a tilted mount that the pose knows of does not count as tilt.
   const Eigen::Matrix3f R_map_scan = scan.T_map_scan.linear().cast<float>();
   for (Eigen::Vector3f& p : cloud.points) {

@@ -1,4 +1,5 @@
-// strata scan list|show|export|delete; import, label, mesh and register have files of their own.
+// strata scan list|show|export|delete; import, topics, label, mesh and register have files of their
+// own.
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +13,7 @@
 #include "client/cli/scan/scan_import.h"
 #include "client/cli/scan/scan_label.h"
 #include "client/cli/scan/scan_register.h"
+#include "client/cli/scan/scan_topics.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/confirm.h"
@@ -200,6 +202,7 @@ void AddScanCommands(Commands& commands) {
   CLI::App* noun = commands.Noun(
       "scan", "Uploads of robots", "strata scan import campus scans/ --poses poses.txt --wait");
   AddScanImport(commands, noun);
+  AddScanTopics(commands, noun);
   AddList(commands, noun, options);
   const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
     CLI::App* app =

@@ -244,7 +244,7 @@ absl::Status Import(Context& context, ImportOptions options) {
 
 absl::Status ImportBySpool(FileContext& context, ImportOptions options) {
   if (options.trajectory.empty()) options.trajectory = TrajectoryOf(options.paths.front());
-  STRATA_ASSIGN_OR_RETURN(const ImportSources sources, FindImportSources(context.output, options));
+  STRATA_ASSIGN_OR_RETURN(const ImportSources sources, FindImportSources(context, options));
   Json json = {{"map", options.map},
                {"trajectory", options.trajectory},
                {"files", sources.files},
@@ -270,6 +270,40 @@ void Select(Commands& commands, const std::shared_ptr<ImportOptions>& options) {
   commands.selected = [options](Context& context) { return Import(context, *options); };
 }
 
+void AddRecordingOptions(CLI::App* import, const std::shared_ptr<ImportOptions>& options) {
+  import
+      ->add_option(
+          "--topic",
+          options->topic,
+          "Of a recording: the topic of sensor_msgs/PointCloud2; not needed where there is "
+          "one only. 'strata scan topics' lists them")
+      ->type_name("TOPIC");
+  import
+      ->add_option(
+          "--poses-from",
+          options->poses_from,
+          "Of a recording: a topic of nav_msgs/Odometry, geometry_msgs/PoseStamped or "
+          "geometry_msgs/PoseWithCovarianceStamped, or transforms as in 'tf:map->base_link'. "
+          "The pose of a cloud is interpolated at its stamp")
+      ->type_name("TOPIC|tf:A->B");
+  import
+      ->add_option(
+          "--every",
+          options->every,
+          absl::StrCat("Of a recording: keep a cloud when it lies so far from the one kept "
+                       "last, turned or later: m, deg, rad, s, with commas between; 0m: all "
+                       "[",
+                       kDefaultEvery,
+                       "]"))
+      ->type_name("DISTANCE");
+  AddPose(
+      import,
+      "--mount",
+      [options](const Pose& pose, std::size_t) { options->mount = pose; },
+      "Of a recording without the transforms: where the sensor is on what the poses are those of "
+      "[m, rad]");
+}
+
 }  // namespace
 
 void AddScanImport(Commands& commands, CLI::App* noun) {
@@ -277,12 +311,19 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
   CLI::App* import = commands.Verb(
       noun,
       "import",
-      "Upload files or folders of scans, or a folder with a folder of scans; what the trajectory "
-      "already has is skipped",
-      "strata scan import campus scans/ --poses poses.txt --trajectory segway --wait",
+      "Upload files or folders of scans, a folder with a folder of scans, or the keyframes of a "
+      "recording of ROS 1 or 2; what the trajectory already has is skipped",
+      "strata scan import campus scans/ --poses poses.txt --trajectory segway --wait\n"
+      "  strata scan import campus drive.mcap --topic /points --poses-from /odom --every 0.5m",
       [options](Context& context) { return Import(context, *options); });
   AddMapName(import, options->map);
-  import->add_option("PATH", options->paths, "Files or folders of scans")->required();
+  import
+      ->add_option("PATH",
+                   options->paths,
+                   "Files or folders of scans; or one recording: .mcap, .db3, .bag, a folder of "
+                   "rosbag2")
+      ->required();
+  AddRecordingOptions(import, options);
   import
       ->add_option(
           "--format",

@@ -1,0 +1,201 @@
+// `strata scan import` and `scan topics` of recordings: what a bag of the same clouds and poses
+// makes is what files make. The bags are written by tests/support/write_bag.py, which shares
+// nothing with what reads them.
+#include <cstddef>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/client/cli/run_strata.h"
+#include "tests/support/robot_files.h"
+#include "tests/support/status_matchers.h"
+#include "tests/support/temp_dir.h"
+#include "tests/support/worlds.h"
+
+namespace strata::cli {
+namespace {
+
+using nlohmann::json;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr std::size_t kScans = 6;
+
+class BagImportTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const testing::World world = testing::BridgeWorld();
+    testing::RobotFiles files;
+    files.max_scans = kScans;
+    files.noise.translation_sigma_m = 0.02;
+    files.sensor.columns = 360;
+    STRATA_ASSERT_OK(
+        testing::WriteRobot(world.scene, world.robots.at(0), 1, files, dir_.path() / "robot"));
+  }
+  std::string Path(const std::string& name) const { return (dir_.path() / name).string(); }
+  // A bag of the robot's scans.
+  std::string Bag(const std::string& name, const std::string& compression = "none") const {
+    const std::string command = absl::StrCat("/usr/bin/python3 " STRATA_WRITE_BAG " ",
+                                             Path("robot/scans"),
+                                             " ",
+                                             Path("robot/poses_initial.txt"),
+                                             " ",
+                                             Path(name),
+                                             " --compression ",
+                                             compression,
+                                             " > /dev/null");
+    EXPECT_EQ(std::system(command.c_str()), 0);
+    return Path(name);
+  }
+  Ran Run(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.end(), {"--embedded", Path("db"), "--output", "json"});
+    return RunStrata(arguments);
+  }
+  // Makes a map of its own of what is said, at the uploaded poses or aligned.
+  Ran Import(const std::string& map, const std::vector<std::string>& words) const {
+    EXPECT_EQ(Run({"map", "create", map, "--cell-size", "0.3"}).exit_code, 0);
+    std::vector<std::string> all = {"scan", "import", map};
+    all.insert(all.end(), words.begin(), words.end());
+    all.insert(all.end(), {"--trajectory", "t", "--wait"});
+    return Run(all);
+  }
+  std::string Bytes(const std::string& path) const {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  // All tiles and, scan by scan, points, poses and times of a map, as text and bytes.
+  std::string ContentOf(const std::string& map) const {
+    std::string content;
+    const json tiles = json::parse(Run({"tile", "list", map}).out);
+    EXPECT_GT(tiles.size(), 0U);
+    for (const json& tile : tiles) {
+      const std::string key = tile.at("key");
+      EXPECT_EQ(Run({"tile", "get", map, key, "--out", Path("tile")}).exit_code, 0);
+      content += key + Bytes(Path("tile"));
+    }
+    const json scans = json::parse(Run({"scan", "list", map}).out);
+    EXPECT_EQ(scans.size(), kScans);
+    for (const json& scan : scans) {
+      EXPECT_EQ(Run({"scan", "export", map, scan.at("id"), "--out", Path("scan.pcd")}).exit_code,
+                0);
+      content += Bytes(Path("scan.pcd"));
+      for (const char* key : {"id", "time", "content_hash", "pose_uploaded", "pose"}) {
+        content += scan.at(key).dump();
+      }
+    }
+    return content;
+  }
+
+  testing::TempDir dir_;
+};
+
+TEST_F(BagImportTest, EveryBagMakesTheMapThatItsFilesMake) {
+  const Ran files =
+      Import("files", {Path("robot/scans"), "--poses", Path("robot/poses_initial.txt")});
+  ASSERT_EQ(files.exit_code, 0) << files.err;
+  const std::string content = ContentOf("files");
+  struct Form {
+    const char* name;
+    const char* compression;
+  };
+  for (const auto& [name, compression] : {Form{"a.mcap", "none"},
+                                          Form{"b.mcap", "lz4"},
+                                          Form{"c.mcap", "zstd"},
+                                          Form{"d.db3", "none"},
+                                          Form{"f.bag", "bz2"},
+                                          Form{"g.bag", "lz4"}}) {
+    SCOPED_TRACE(absl::StrCat(name, " ", compression));
+    const std::string bag = Bag(name, compression);
+    // By a topic of poses, and by transforms.
+    const std::string source = name[0] < 'c' ? "/odom" : "tf:odom->lidar";
+    const std::string map = std::string(1, name[0]);
+    const Ran ran =
+        Import(map, {bag, "--topic", "/points", "--poses-from", source, "--every", "0m"});
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    EXPECT_THAT(ran.err, HasSubstr("6 of 6 clouds of /points with poses from " + source));
+    EXPECT_TRUE(ContentOf(map) == content);
+  }
+}
+
+TEST_F(BagImportTest, KeyframesKeepTheirNumbersAndAreNotSentTwice) {
+  const std::string bag = Bag("drive.mcap", "zstd");
+  EXPECT_EQ(Run({"map", "create", "m"}).exit_code, 0);
+  const Ran first = Run({"scan", "import", "m", bag, "--every", "1.9m", "--wait"});
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  const json summary = json::parse(first.out);
+  EXPECT_EQ(summary.at("trajectory"), "drive");
+  EXPECT_EQ(summary.at("uploaded"), 3);  // a metre from scan to scan
+  const Ran all = Run({"scan", "import", "m", bag, "--every", "0m", "--wait"});
+  EXPECT_EQ(json::parse(all.out).at("skipped"), 3) << all.err;
+  EXPECT_EQ(json::parse(all.out).at("uploaded"), 3);
+  EXPECT_THAT(all.err, Not(HasSubstr("has other scans")));
+  const Ran spooled =
+      Run({"scan", "import", "m", bag, "--trajectory", "again", "--spool", Path("spool")});
+  EXPECT_EQ(spooled.exit_code, 0) << spooled.err;
+  EXPECT_EQ(json::parse(spooled.out).at("sent"), 6) << spooled.out;
+}
+
+TEST_F(BagImportTest, TopicsAreListedForPeopleAndPrograms) {
+  const std::string bag = Bag("drive.bag", "bz2");
+  const Ran table = RunStrata({"scan", "topics", bag});
+  EXPECT_EQ(table.exit_code, 0) << table.err;
+  EXPECT_THAT(table.out,
+              AllOf(HasSubstr("TOPIC     TYPE                     MESSAGES   HZ  FRAMES"),
+                    HasSubstr("/odom     nav_msgs/Odometry               6  1.0  odom -> lidar"),
+                    HasSubstr("--topic"),
+                    HasSubstr("transforms")));
+  const json rows = json::parse(RunStrata({"scan", "topics", bag, "--output", "json"}).out);
+  ASSERT_EQ(rows.size(), 4U);
+  EXPECT_EQ(rows[2].at("topic"), "/points");
+  EXPECT_EQ(rows[2].at("messages"), 6);
+  EXPECT_EQ(rows[2].at("use"), "--topic");
+  EXPECT_EQ(rows[2].at("hz"), 1.0);
+}
+
+TEST_F(BagImportTest, WhatMakesNoSenseIsRefusedWithTheCure) {
+  const std::string bag = Bag("drive.mcap");
+  EXPECT_EQ(Run({"map", "create", "m"}).exit_code, 0);
+  const auto refused = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), {"scan", "import", "m"});
+    const Ran ran = Run(words);
+    EXPECT_EQ(ran.exit_code, 1) << ran.out;
+    return ran.err;
+  };
+  EXPECT_THAT(
+      refused({bag, "--poses", Path("robot/poses_initial.txt")}),
+      HasSubstr("--poses is for files of scans; of a recording say --topic and --poses-from"));
+  EXPECT_THAT(refused({Path("robot"), "--every", "1m"}),
+              AllOf(HasSubstr("--every is for recordings"), HasSubstr("is none")));
+  EXPECT_THAT(refused({bag, "--every", "fast"}), HasSubstr("0.5m, 20deg, 2s"));
+  EXPECT_THAT(refused({bag, "--topic", "/cloud"}), HasSubstr("say --topic /points ("));
+  EXPECT_THAT(refused({bag, "--poses-from", "tf:odom"}),
+              HasSubstr("--poses-from tf:FIXED->BASE with two of the frames lidar, odom"));
+  EXPECT_THAT(refused({bag, "--poses-from", "tf:map->lidar"}),
+              HasSubstr("no transforms lead from map"));
+  std::ofstream(Path("empty.mcap")) << "";
+  EXPECT_THAT(refused({Path("empty.mcap")}), HasSubstr("no bag by its first bytes"));
+  EXPECT_EQ(json::parse(Run({"scan", "list", "m"}).out).size(), 0U);
+}
+
+TEST_F(BagImportTest, ABagThatEndsTooEarlyGivesWhatItHas) {
+  const std::string bag = Bag("drive.mcap");
+  std::filesystem::resize_file(bag, std::filesystem::file_size(bag) * 6 / 10);
+  const Ran ran = Import("m", {bag, "--every", "0m"});
+  EXPECT_EQ(ran.exit_code, 0) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr(absl::StrCat("ends at byte ", std::filesystem::file_size(bag))));
+  const json summary = json::parse(ran.out);
+  EXPECT_GE(summary.at("uploaded"), 2);
+  EXPECT_LT(summary.at("uploaded"), 6);
+}
+
+}  // namespace
+}  // namespace strata::cli
