@@ -355,7 +355,9 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
           "file's name; kitti: 12 numbers, line 0 for index 0; 3dtk: .pose files")
       ->check(CLI::IsMember({"auto", "tum", "index-tum", "kitti", "3dtk"}))
       ->capture_default_str();
-  import->add_option("--trajectory", options->trajectory, "Its name; default: that of the folder");
+  import->add_option("--trajectory",
+                     options->trajectory,
+                     "Its name; default: that of the folder or of the recording");
   import
       ->add_option(
           "--align", options->align, "on: register each scan to the map; off: take its pose")

@@ -7,6 +7,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 
 #include "client/cli/terminal/progress.h"
 #include "client/formats/bags/recording.h"
@@ -23,12 +24,9 @@ std::string UseOf(const RecordedTopic& topic) {
   return IsTransformsType(topic.topic.type) ? "transforms" : "-";
 }
 
-// The frames of its headers, and of poses whose they are.
+// The frames of its headers, and of poses whose poses they are.
 std::string FramesOf(const RecordedTopic& topic) {
-  std::string frames;
-  for (const std::string& frame : topic.frames) {
-    absl::StrAppend(&frames, frames.empty() ? "" : " ", frame);
-  }
+  std::string frames = absl::StrJoin(topic.frames, ", ");
   if (!topic.child_frame.empty()) absl::StrAppend(&frames, " -> ", topic.child_frame);
   return frames.empty() ? "-" : frames;
 }

@@ -193,6 +193,8 @@ class Surveyor {
     absl::Status first_fault;
     for (const RosPose& transform : transforms) {
       ++poses_;
+      FrameNumber(absl::StrCat(transform.header.frame, " -> ", transform.child_frame),
+                  recorded.frames);
       const absl::Status added =
           survey_.transforms.Add(transform, absl::EndsWith(recorded.topic.name, "tf_static"));
       if (first_fault.ok()) first_fault = added;

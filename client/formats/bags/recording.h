@@ -36,7 +36,8 @@ struct RecordedTopic {
   std::uint64_t bad = 0;                   // messages that cannot be read, of a type that is,
   std::string why;                         // and why the first one cannot
 
-  // Frames that the headers name, in the order of their first message.
+  // Frames that the headers name, in the order of their first message; of transforms "odom ->
+  // base". The first hundred.
   std::vector<std::string> frames;
   // Of clouds:
   std::vector<RecordedCloud> clouds;  // in the order of the files
