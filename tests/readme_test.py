@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Keeps the console lines of README.md and docs/exports.md true.
+"""Keeps the console lines of README.md, docs/exports.md and docs/recordings.md true.
 
     tests/readme_test.py --build build/release
 
 Runs every line that starts with "$ " in a page's ```console blocks, in order, in an empty folder with the built
-programs on the PATH, and compares what it prints with what the page shows. "…" in the page stands for any text
+programs and tests/support on the PATH, and compares what it prints with what the page shows. "…" in the page stands for any text
 within a line (times, ports). Exits 1 with the difference.
 """
 import argparse
@@ -59,8 +59,9 @@ def main():
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
     build = parser.parse_args().build.resolve()
     programs = {folder: build / folder for folder in ("client/cli", "server", "tests/support")}
+    programs["scripts"] = ROOT / "tests/support"
     environment = dict(os.environ, PATH=os.pathsep.join([*map(str, programs.values()), os.environ["PATH"]]))
-    return 0 if all(holds(page, environment) for page in ("README.md", "docs/exports.md")) else 1
+    return 0 if all(holds(page, environment) for page in ("README.md", "docs/exports.md", "docs/recordings.md")) else 1
 
 
 sys.exit(main())

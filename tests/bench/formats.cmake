@@ -18,3 +18,10 @@ strata_executable(
   SOURCES formats_benchmark.cc
   DEPS strata::formats strata::formats_peers strata::test_support absl::str_format
 )
+
+strata_executable(
+  bags_benchmark bags_benchmark
+  SOURCES bags_benchmark.cc
+  DEPS strata::bag_writer strata::formats strata::test_support absl::str_format
+)
+strata_smoke(bags_benchmark --clouds 3 --points 2000 --rounds 1)
