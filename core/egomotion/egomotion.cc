@@ -158,9 +158,9 @@ std::vector<FixGap> GapsOf(const std::vector<FixOutcome>& fixes, double begin_s,
   return gaps;
 }
 
-EgomotionReport ReportOf(const LogFilter& run, const MotionLog& log, const Beginning& beginning) {
+EgomotionReport ReportOf(const LogFilter& run, const Beginning& beginning) {
   EgomotionReport report;
-  report.fixes = log.fixes.size();
+  report.fixes = run.fixes().size();
   double squares = 0.0, nis = 0.0;
   for (const FixOutcome& fix : run.fixes()) {
     if (!fix.used) {
@@ -214,7 +214,7 @@ absl::StatusOr<Egomotion> FilterLog(const MotionLog& log,
                    std::move(trajectory),
                    run.states(),
                    run.fixes(),
-                   ReportOf(run, log, beginning)};
+                   ReportOf(run, beginning)};
 }
 
 }  // namespace strata

@@ -43,7 +43,7 @@ struct FixGap {
 };
 
 struct EgomotionReport {
-  std::size_t fixes = 0, used = 0, rejected = 0;
+  std::size_t fixes = 0, used = 0, rejected = 0;  // without those before the first pose
   std::vector<Recovery> recoveries;
   std::vector<FixGap> gaps;
   double innovation_rms_m = 0.0;  // horizontal, of used fixes

@@ -213,7 +213,9 @@ int Husky(std::uint64_t seed) {
   ExpectSmoother(cuts60, "60 s");
   const Planted planted = PlantJumps(recorded, 15.0, 13, random);
   Expect(planted.rejected == planted.planted, "every fix that jumps is rejected");
-  Expect(planted.good_rejected <= 0.02 * planted.good, "at most 2 % of the others are");
+  // The receiver itself is off for ten seconds, with or without jumps.
+  Expect(planted.good_rejected <= whole.report.rejected + 0.02 * planted.good,
+         "at most 2 % more of the others are");
   EgomotionOptions wrong;
   wrong.heading_rad = whole.report.heading_at_start_rad + 2.0;
   const Egomotion recovered = Filter(recorded.log, recorded.rig, wrong);
