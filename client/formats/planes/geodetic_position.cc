@@ -5,15 +5,15 @@
 
 #include <Eigen/Core>
 
+#include "client/formats/grid/wgs84.h"
+
 namespace strata {
 namespace {
 
-// WGS 84.
-constexpr double kEquatorM = 6378137.0;
-constexpr double kFlattening = 1.0 / 298.257223563;
-constexpr double kPoleM = kEquatorM * (1.0 - kFlattening);
-constexpr double kFirst2 = kFlattening * (2.0 - kFlattening);  // squares of eccentricities
-constexpr double kSecond2 = kFirst2 / (1.0 - kFirst2);
+constexpr double kEquatorM = wgs84::kSemiMajorAxisM;
+constexpr double kPoleM = kEquatorM * (1.0 - wgs84::kFlattening);
+constexpr double kFirst2 = wgs84::kEccentricity2;
+constexpr double kSecond2 = kFirst2 / (1.0 - kFirst2);  // the second eccentricity, squared
 
 // From the middle of the earth.
 Eigen::Vector3d EarthPosition(const GeodeticOrigin& origin, const Eigen::Vector3d& p_map) {
@@ -37,7 +37,7 @@ Eigen::Vector3d GeodeticPosition(const GeodeticOrigin& origin, const Eigen::Vect
   for (int i = 0; i < 2; ++i) {
     latitude = std::atan2(p.z() + kSecond2 * kPoleM * std::pow(std::sin(beta), 3),
                           r - kFirst2 * kEquatorM * std::pow(std::cos(beta), 3));
-    beta = std::atan2((1.0 - kFlattening) * std::sin(latitude), std::cos(latitude));
+    beta = std::atan2((1.0 - wgs84::kFlattening) * std::sin(latitude), std::cos(latitude));
   }
   const double sine = std::sin(latitude);
   const double height =
