@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -25,6 +26,9 @@ constexpr std::int32_t kOffset = 1 << (kCoordinateBits - 1);
 constexpr double kMergeRatio = 1.5;
 constexpr double kMinFlatness = 9.0;    // second over first eigenvalue: 3 σ of thickness
 constexpr double kMinRoundness = 0.01;  // second over third: a single scan line is no surface
+constexpr double kSameCosine = 0.97;    // 14°: between the normals of two cells of one surface
+constexpr double kSameSigmas = 3.0;     // of both about their planes, from one to the other's plane
+constexpr double kLeastKept = 0.05;     // of a cell's area
 
 struct CodedPoint {
   std::uint64_t code;  // interleaved coordinates of the smallest cell: nodes are ranges
@@ -38,6 +42,28 @@ std::uint64_t SpreadBits(std::uint64_t v) {
   v = (v | v << 4) & 0x10C30C30C30C30C3U;
   v = (v | v << 2) & 0x1249249249249249U;
   return v;
+}
+
+// Inside of a cell whose cross section is `most_m2`, of points with this spread.
+double SpreadArea(const Eigen::Vector3d& eigenvalues, double most_m2) {
+  return std::min(12.0 * std::sqrt(eigenvalues(1) * eigenvalues(2)), most_m2);
+}
+
+double CrossSectionOf(double size_m, const Eigen::Vector3d& normal) {
+  return size_m * size_m / normal.cwiseAbs().maxCoeff();
+}
+
+// What two cells, one above the other, both cover of one surface [m²].
+double CommonArea(const PlanarCell& a, const PlanarCell& b) {
+  const double off = std::abs(a.normal.dot(b.mean - a.mean));
+  if (std::abs(a.normal.dot(b.normal)) < kSameCosine ||
+      off > kSameSigmas * std::hypot(a.rms_m, b.rms_m)) {
+    return 0.0;
+  }
+  const PlanarCell& larger = a.size_m >= b.size_m ? a : b;
+  const double joint = SpreadArea(FitMoments(a.moments + b.moments).eigenvalues,
+                                  CrossSectionOf(larger.size_m, larger.normal));
+  return std::clamp(a.area_m2 + b.area_m2 - joint, 0.0, std::min(a.area_m2, b.area_m2));
 }
 
 class CellFinder {
@@ -157,9 +183,7 @@ class CellFinder {
     }
     cell.point_count = end - begin;
     const Eigen::Vector3d& e = node.fit.eigenvalues;
-    const double cross_section =
-        cell.size_m * cell.size_m / node.fit.plane.normal.cwiseAbs().maxCoeff();
-    cell.area_m2 = std::min(12.0 * std::sqrt(e(1) * e(2)), cross_section);
+    cell.area_m2 = SpreadArea(e, CrossSectionOf(cell.size_m, node.fit.plane.normal));
     cell.sigma_m = node.sigma_m;
     cell.rms_m = node.rms_m;
     cell.mean = node.reference + node.fit.mean;
@@ -183,6 +207,28 @@ std::uint64_t KeyOf(int level, const std::array<std::int32_t, 3>& at) {
   return key;
 }
 
+using PlaceIndex = HashMap<std::uint64_t, std::uint32_t>;
+
+PlaceIndex IndexOf(std::span<const PlanarCell> cells) {
+  PlaceIndex index;
+  index.reserve(cells.size());
+  for (std::uint32_t i = 0; i < cells.size(); ++i) index[KeyOf(cells[i].level, cells[i].at)] = i;
+  return index;
+}
+
+// The cell there, of this level or larger, but not `self`.
+std::optional<std::uint32_t> CellAt(const PlaceIndex& index,
+                                    int level,
+                                    std::array<std::int32_t, 3> at,
+                                    std::uint32_t self) {
+  for (; level < kCellLevels; ++level) {
+    const auto found = index.find(KeyOf(level, at));
+    if (found != index.end() && found->second != self) return found->second;
+    for (std::int32_t& c : at) c >>= 1;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::vector<PlanarCell> FindPlanarCells(std::span<const Eigen::Vector3f> points,
@@ -191,25 +237,45 @@ std::vector<PlanarCell> FindPlanarCells(std::span<const Eigen::Vector3f> points,
   return CellFinder(points, sensor_origin, options).Run();
 }
 
+void ShareBorders(std::vector<PlanarCell>& cells) {
+  const PlaceIndex index = IndexOf(cells);
+  std::vector<double> lost_m2(cells.size(), 0.0);
+  for (std::uint32_t i = 0; i < cells.size(); ++i) {
+    Eigen::Index axis = 0;
+    cells[i].normal.cwiseAbs().maxCoeff(&axis);
+    for (const std::int32_t step : {-1, 1}) {
+      std::array<std::int32_t, 3> at = cells[i].at;
+      at[static_cast<std::size_t>(axis)] += step;
+      const std::optional<std::uint32_t> j = CellAt(index, cells[i].level, at, i);
+      // Two of one size find each other.
+      if (!j.has_value() || (cells[*j].level == cells[i].level && *j < i)) continue;
+      const double common_m2 = CommonArea(cells[i], cells[*j]);
+      if (!(common_m2 > 0.0)) continue;
+      const double own = cells[i].point_count / cells[i].area_m2;
+      const double other = cells[*j].point_count / cells[*j].area_m2;
+      lost_m2[i] += common_m2 * other / (own + other);
+      lost_m2[*j] += common_m2 * own / (own + other);
+    }
+  }
+  for (std::uint32_t i = 0; i < cells.size(); ++i) {
+    const double kept = std::max(kLeastKept, 1.0 - lost_m2[i] / cells[i].area_m2);
+    cells[i].area_m2 *= kept;
+    cells[i].moments *= kept;
+  }
+}
+
 std::vector<std::vector<std::uint32_t>> TouchingCells(std::span<const PlanarCell> cells) {
-  HashMap<std::uint64_t, std::uint32_t> index;
-  index.reserve(cells.size());
-  for (std::uint32_t i = 0; i < cells.size(); ++i) index[KeyOf(cells[i].level, cells[i].at)] = i;
+  const PlaceIndex index = IndexOf(cells);
   std::vector<std::vector<std::uint32_t>> touching(cells.size());
   // Every cell looks for those of its size or larger; the smaller ones find it.
   for (std::uint32_t i = 0; i < cells.size(); ++i) {
     for (int k = 0; k < 27; ++k) {
       std::array<std::int32_t, 3> at = {
           cells[i].at[0] + k % 3 - 1, cells[i].at[1] + k / 3 % 3 - 1, cells[i].at[2] + k / 9 - 1};
-      for (int level = cells[i].level; level < kCellLevels; ++level) {
-        const auto found = index.find(KeyOf(level, at));
-        if (found != index.end() && found->second != i) {
-          touching[i].push_back(found->second);
-          touching[found->second].push_back(i);
-          break;
-        }
-        for (std::int32_t& c : at) c >>= 1;
-      }
+      const std::optional<std::uint32_t> other = CellAt(index, cells[i].level, at, i);
+      if (!other.has_value()) continue;
+      touching[i].push_back(*other);
+      touching[*other].push_back(i);
     }
   }
   for (std::vector<std::uint32_t>& list : touching) {

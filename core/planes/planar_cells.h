@@ -34,6 +34,10 @@ std::vector<PlanarCell> FindPlanarCells(std::span<const Eigen::Vector3f> points,
                                         const Eigen::Vector3f& sensor_origin,
                                         const PlaneExtractionOptions& options);
 
+// A surface along the border of two layers of cells is in both, with all its area: of what one cell
+// covers together with one above or below it, each keeps as much as it has of the points there.
+void ShareBorders(std::vector<PlanarCell>& cells);
+
 // For every cell those that touch it, edges and corners included, ascending.
 std::vector<std::vector<std::uint32_t>> TouchingCells(std::span<const PlanarCell> cells);
 

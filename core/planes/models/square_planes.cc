@@ -138,8 +138,9 @@ absl::StatusOr<std::vector<SquarePlane>> FindSquarePlanes(const PosedPoints& poi
                                                           const Eigen::Vector3d& reference,
                                                           const PlaneModelOptions& options,
                                                           const Stop& stop) {
-  const std::vector<PlanarCell> cells =
+  std::vector<PlanarCell> cells =
       FindPlanarCells(points.points, Eigen::Vector3f::Zero(), CellOptions(options));
+  ShareBorders(cells);
   STRATA_RETURN_IF_ERROR(stop.status());
   std::vector<MixtureCell> moved;
   moved.reserve(cells.size());
