@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <iterator>
 #include <numeric>
+#include <span>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -211,17 +212,9 @@ std::vector<MainDirection> DirectionsOf(const PlaneMixture& mixture,
   return kept;
 }
 
-}  // namespace
-
-absl::StatusOr<JoinedPlanes> JoinSquares(const std::vector<std::vector<SquarePlane>>& squares,
-                                         const PlaneModelOptions& options,
-                                         const Stop& stop) {
-  STRATA_ASSIGN_OR_RETURN(std::vector<SquarePlane> sums, Joined(squares, stop));
-  std::erase_if(sums,
-                [&](const SquarePlane& sum) { return sum.moments(3, 3) < options.min_area_m2; });
-  std::stable_sort(sums.begin(), sums.end(), [](const SquarePlane& a, const SquarePlane& b) {
-    return a.moments(3, 3) > b.moments(3, 3);
-  });
+absl::StatusOr<JoinedPlanes> Modelled(std::vector<SquarePlane> sums,
+                                      const PlaneModelOptions& options,
+                                      const Stop& stop) {
   STRATA_ASSIGN_OR_RETURN(const PlaneMixture mixture, WithDirections(sums, options, stop));
   JoinedPlanes joined;
   for (std::size_t m = 0; m < sums.size(); ++m) {
@@ -233,6 +226,34 @@ absl::StatusOr<JoinedPlanes> JoinSquares(const std::vector<std::vector<SquarePla
   }
   joined.directions = DirectionsOf(mixture, joined.planes);
   return joined;
+}
+
+}  // namespace
+
+absl::StatusOr<JoinedPlanes> JoinSquares(const std::vector<std::vector<SquarePlane>>& squares,
+                                         const PlaneModelOptions& options,
+                                         const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(std::vector<SquarePlane> sums, Joined(squares, stop));
+  std::erase_if(sums,
+                [&](const SquarePlane& sum) { return sum.moments(3, 3) < options.min_area_m2; });
+  std::stable_sort(sums.begin(), sums.end(), [](const SquarePlane& a, const SquarePlane& b) {
+    return a.moments(3, 3) > b.moments(3, 3);
+  });
+  return Modelled(std::move(sums), options, stop);
+}
+
+absl::StatusOr<JoinedPlanes> WithOwned(JoinedPlanes joined,
+                                       std::span<const std::size_t> owners,
+                                       const PlaneModelOptions& options,
+                                       const Stop& stop) {
+  std::vector<SquarePlane> sums;
+  for (std::size_t m = 0; m < owners.size(); ++m) {
+    if (owners[m] != m) AddTo(joined.planes[owners[m]].sum, joined.planes[m].sum);
+  }
+  for (std::size_t m = 0; m < owners.size(); ++m) {
+    if (owners[m] == m) sums.push_back(std::move(joined.planes[m].sum));
+  }
+  return Modelled(std::move(sums), options, stop);
 }
 
 }  // namespace strata

@@ -4,6 +4,8 @@
 #ifndef STRATA_CORE_PLANES_MODELS_JOINED_PLANES_H_
 #define STRATA_CORE_PLANES_MODELS_JOINED_PLANES_H_
 
+#include <cstddef>
+#include <span>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -30,6 +32,13 @@ struct JoinedPlanes {
 absl::StatusOr<JoinedPlanes> JoinSquares(const std::vector<std::vector<SquarePlane>>& squares,
                                          const PlaneModelOptions& options,
                                          const Stop& stop);
+
+// The same planes in their order, each with those that it owns: owners[m] is m itself or another
+// one's owner. Their main directions anew.
+absl::StatusOr<JoinedPlanes> WithOwned(JoinedPlanes joined,
+                                       std::span<const std::size_t> owners,
+                                       const PlaneModelOptions& options,
+                                       const Stop& stop);
 
 }  // namespace strata
 

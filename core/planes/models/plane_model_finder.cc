@@ -18,6 +18,7 @@
 #include "core/common/option_checks.h"
 #include "core/common/status.h"
 #include "core/common/stop.h"
+#include "core/planes/models/doubled_planes.h"
 #include "core/planes/models/joined_planes.h"
 #include "core/planes/models/plane_mixture.h"
 #include "core/planes/models/plane_polygons.h"
@@ -35,12 +36,6 @@ constexpr double kBeyondM = 0.3;            // that a ray has to go on behind a 
 constexpr std::size_t kMostRays = 1000000;  // of a square; of more, every so many
 constexpr double kReachM = 20.0;            // beyond a square, of planes that its rays may cross
 constexpr std::size_t kStopEvery = 8192;
-
-struct FacedPlane {
-  SeenPlane seen;
-  double band_m = kBandM;
-  std::int64_t facing = 0;  // points seen from the normal's side less those from the other
-};
 
 bool Holds(const PlanSquare& square, const Eigen::Vector3d& p) {
   return (p.head<2>().array() >= square.min().array()).all() &&
@@ -93,6 +88,8 @@ struct PlaneModelFinder::State {
   // The planes that rays to points in the square may cross.
   std::vector<FacedPlane*> PlanesAround(const PlanSquare& square);
   void BeginLooking();
+  // Planes that are no surface of their own go into those that are.
+  absl::Status MergeDoubled(const Stop& stop);
   // RESOURCE_EXHAUSTED where what is known of the planes' surfaces takes more than it may.
   absl::Status CheckMemory() const;
 };
@@ -130,7 +127,8 @@ void PlaneModelFinder::State::BeginLooking() {
     const PlaneFrame frame = FrameOf(plane.model.plane, FitMoments(plane.sum.moments).mean);
     FacedPlane one{{plane.model.plane, frame, PlaneRaster(square, 2.0 * square), {}},
                    std::max({kBandM, kBandSigmas * options.rho_m, kBandSigmas * plane.model.rms_m}),
-                   0};
+                   0,
+                   plane.sum.moments};
     for (const Voxel voxel : plane.sum.voxels) {
       one.seen.box.extend(BoxOf(voxel));
       for (const Voxel around : VoxelsAround(voxel)) {
@@ -211,7 +209,32 @@ absl::Status PlaneModelFinder::Look(const PosedPoints& points,
   return absl::OkStatus();
 }
 
+absl::Status PlaneModelFinder::State::MergeDoubled(const Stop& stop) {
+  const std::vector<std::size_t> owners = OwnersOf(faced);
+  std::vector<FacedPlane> left;
+  for (std::size_t m = 0; m < owners.size(); ++m) {
+    if (owners[m] != m) AddSeen(faced[m], faced[owners[m]]);
+  }
+  for (std::size_t m = 0; m < owners.size(); ++m) {
+    if (owners[m] == m) left.push_back(std::move(faced[m]));
+  }
+  const bool any = left.size() < owners.size();
+  faced = std::move(left);
+  if (!any) return absl::OkStatus();
+  STRATA_ASSIGN_OR_RETURN(joined, WithOwned(std::move(joined), owners, options, stop));
+  for (std::size_t m = 0; m < faced.size(); ++m) {
+    // By less than its noise: what was seen stays where it is in the plane.
+    SeenPlane& seen = faced[m].seen;
+    Plane& plane = joined.planes[m].model.plane;
+    if (plane.normal.dot(seen.plane.normal) < 0.0) plane = {-plane.normal, -plane.distance};
+    seen.plane = plane;
+    seen.frame = TurnedInto(plane, seen.frame);
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<PlaneModel> PlaneModelFinder::Finish(const Stop& stop) {
+  STRATA_RETURN_IF_ERROR(state_->MergeDoubled(stop));
   std::vector<SeenPlane> seen;
   for (FacedPlane& one : state_->faced) seen.push_back(std::move(one.seen));
   const PolygonOptions options{state_->options.epsilon_m, state_->options.min_area_m2};

@@ -28,6 +28,9 @@ constexpr double kMinMeetingSine = 0.26;  // 15°
 constexpr int kMostHalvings = 4;          // of a tolerance that makes a polygon invalid
 constexpr double kOpenShare = 0.5;        // of a hole, crossed by rays
 constexpr double kNoHoleM2 = 0.05;        // smaller ones are gaps between points
+// A gap between points is a triangle of them with a circle just above ε, or a few such: a hole
+// without rays through it that is no larger, in ε², says no more than that.
+constexpr double kGapEpsilons2 = 4.0;
 
 BoostPolygon ToBoost(const FlatPolygon& polygon) {
   BoostPolygon out;
@@ -126,6 +129,13 @@ PlaneRing Lifted(const FlatRing& ring, const PlaneFrame& frame) {
   return out;
 }
 
+// What is known of a hole; none of what may as well be a gap between points.
+std::optional<PlaneHole> HoleOf(const FlatRing& hole, const SeenPlane& own, double epsilon_m) {
+  const bool open = CrossedShare(hole, own.raster) >= kOpenShare;
+  if (!open && -SignedArea(hole) < kGapEpsilons2 * epsilon_m * epsilon_m) return std::nullopt;
+  return PlaneHole{Lifted(hole, own.frame), open};
+}
+
 }  // namespace
 
 std::vector<MeetingLine> MeetingLines(std::span<const SeenPlane> planes,
@@ -204,10 +214,12 @@ std::vector<PlanePolygon> PolygonsOf(std::span<const SeenPlane> planes,
     if (!IsValid(simple)) simple = Simplified(shape, epsilon / 2.0);
     PlanePolygon polygon;
     polygon.outer = Lifted(simple.outer, own.frame);
-    polygon.area_m2 = AreaOf(simple);
-    for (const FlatRing& hole : simple.holes) {
-      const bool open = CrossedShare(hole, own.raster) >= kOpenShare;
-      polygon.holes.push_back({Lifted(hole, own.frame), open});
+    polygon.area_m2 = SignedArea(simple.outer);
+    for (const FlatRing& ring : simple.holes) {
+      std::optional<PlaneHole> hole = HoleOf(ring, own, epsilon);
+      if (!hole.has_value()) continue;
+      polygon.area_m2 += SignedArea(ring);
+      polygon.holes.push_back(*std::move(hole));
     }
     polygons.push_back(std::move(polygon));
   }

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
@@ -43,6 +44,15 @@ PlaneFrame FrameOf(const Plane& plane, const Eigen::Vector3d& near) {
   return frame;
 }
 
+PlaneFrame TurnedInto(const Plane& plane, const PlaneFrame& frame) {
+  PlaneFrame out;
+  out.origin = frame.origin - SignedDistance(frame.origin, plane) * plane.normal;
+  const Eigen::Vector3d& u = frame.axis_u;
+  out.axis_u = (u - u.dot(plane.normal) * plane.normal).normalized();
+  out.axis_v = plane.normal.cross(out.axis_u);
+  return out;
+}
+
 PlaneRaster::Square& PlaneRaster::At(std::int32_t i, std::int32_t j) {
   const std::int32_t bi = FloorDivide(i, kBlock), bj = FloorDivide(j, kBlock);
   const auto [found, is_new] = index_.try_emplace(KeyAt(bi, bj), blocks_.size());
@@ -62,12 +72,38 @@ const PlaneRaster::Square* PlaneRaster::Find(std::int32_t i, std::int32_t j) con
                  [static_cast<std::size_t>((i - bi * kBlock) * kBlock + j - bj * kBlock)];
 }
 
-void PlaneRaster::AddHit(const Eigen::Vector2d& at) {
+void PlaneRaster::AddHits(const Eigen::Vector2d& at, std::uint32_t hits) {
   const std::int32_t i = SquareOf(at.x(), square_m_), j = SquareOf(at.y(), square_m_);
   Square& square = At(i, j);
-  square.u += static_cast<float>(at.x() - i * square_m_);
-  square.v += static_cast<float>(at.y() - j * square_m_);
-  ++square.hits;
+  square.u += static_cast<float>(hits * (at.x() - i * square_m_));
+  square.v += static_cast<float>(hits * (at.y() - j * square_m_));
+  square.hits += hits;
+}
+
+void PlaneRaster::ForEachSquare(
+    absl::FunctionRef<void(const Eigen::Vector2d& at, std::uint32_t hits)> body) const {
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    const auto bi = static_cast<std::int32_t>(keys_[b] >> 32);
+    const auto bj = static_cast<std::int32_t>(keys_[b] & 0xFFFFFFFFU);
+    for (std::int32_t k = 0; k < kBlock * kBlock; ++k) {
+      const Square& square = blocks_[b][static_cast<std::size_t>(k)];
+      if (square.hits == 0) continue;
+      const Eigen::Vector2d corner(bi * kBlock + k / kBlock, bj * kBlock + k % kBlock);
+      body(square_m_ * corner + Eigen::Vector2d(square.u, square.v) / square.hits, square.hits);
+    }
+  }
+}
+
+std::uint64_t PlaneRaster::HitsAround(const Eigen::Vector2d& at, std::int32_t reach) const {
+  const std::int32_t i = SquareOf(at.x(), square_m_), j = SquareOf(at.y(), square_m_);
+  std::uint64_t hits = 0;
+  for (std::int32_t a = -reach; a <= reach; ++a) {
+    for (std::int32_t b = -reach; b <= reach; ++b) {
+      const Square* square = Find(i + a, j + b);
+      if (square != nullptr) hits += square->hits;
+    }
+  }
+  return hits;
 }
 
 std::pair<std::uint64_t, std::size_t> PlaneRaster::LookPlaceOf(const Eigen::Vector2d& at) const {

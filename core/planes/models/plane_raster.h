@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include <Eigen/Core>
 
 #include "core/common/hash_map.h"
@@ -33,13 +34,17 @@ struct PlaneFrame {
 // one it is x.
 PlaneFrame FrameOf(const Plane& plane, const Eigen::Vector3d& near);
 
+// The frame turned as little as possible into a plane that is nearly its own.
+PlaneFrame TurnedInto(const Plane& plane, const PlaneFrame& frame);
+
 // Squares in blocks, so that memory grows with the surface. Not thread-safe.
 class PlaneRaster {
  public:
   PlaneRaster(double square_m, double look_square_m)
       : square_m_(square_m), look_square_m_(look_square_m) {}
 
-  void AddHit(const Eigen::Vector2d& at);
+  void AddHit(const Eigen::Vector2d& at) { AddHits(at, 1); }
+  void AddHits(const Eigen::Vector2d& at, std::uint32_t hits);
   void AddLook(const Eigen::Vector2d& at);
 
   std::size_t bytes() const {
@@ -49,6 +54,11 @@ class PlaneRaster {
   // surface every third square of every third row: as far apart they bound the same α-shapes, with
   // a ninth of the points. REQUIRES: radius ≥ 3.5 squares.
   std::vector<Eigen::Vector2d> Outline() const;
+  // Each square with hits: their mean place and number.
+  void ForEachSquare(
+      absl::FunctionRef<void(const Eigen::Vector2d& at, std::uint32_t hits)> body) const;
+  // In the square that the point is in and those up to `reach` squares beside it.
+  std::uint64_t HitsAround(const Eigen::Vector2d& at, std::int32_t reach) const;
   // Whether a ray crossed the square that the point is in.
   bool HasLook(const Eigen::Vector2d& at) const;
   double look_square_m() const { return look_square_m_; }

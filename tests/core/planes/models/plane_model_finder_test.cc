@@ -115,6 +115,49 @@ TEST(FindPlaneModel, WallWithWindowMeetsTheFloor) {
   EXPECT_TRUE(floor->polygons[0].holes.empty());
 }
 
+// A wall of 6 x 3 m at x = 2 with `count` points and a round hole; rays go through it to a wall far
+// behind, or none do.
+PosedPoints WallWithPorthole(int count, double radius_m, bool seen_open) {
+  Random random(2);
+  PosedPoints points;
+  const Eigen::Vector3d sensor(0.0, 0.0, 1.5);
+  for (int i = 0; i < count; ++i) {
+    const double y = random.Uniform(-3.0, 3.0), z = random.Uniform(0.0, 3.0);
+    const double noise = 0.01 * random.Gaussian();
+    const bool hole = std::hypot(y - 0.8, z - 1.6) < radius_m;
+    if (hole && !seen_open) continue;
+    const Eigen::Vector3d way = Eigen::Vector3d(2.0 + noise, y, z) - sensor;
+    points.points.push_back((sensor + (hole ? 4.0 : 1.0) * way).cast<float>());
+  }
+  points.views = {{sensor.cast<float>(), points.points.size()}};
+  return points;
+}
+
+std::vector<PlaneHole> HolesOfWall(const PosedPoints& points) {
+  const auto model = FindPlaneModel(points, {}, Stop());
+  EXPECT_TRUE(model.ok()) << model.status();
+  std::vector<PlaneHole> holes;
+  for (const ModelPlane& plane : model->planes) {
+    if (std::abs(plane.plane.distance) > 3.0) continue;
+    double area_m2 = 0.0;
+    for (const PlanePolygon& polygon : plane.polygons) {
+      holes.insert(holes.end(), polygon.holes.begin(), polygon.holes.end());
+      area_m2 += polygon.area_m2;
+    }
+    EXPECT_NEAR(area_m2, 18.0, 2.0);
+  }
+  return holes;
+}
+
+TEST(FindPlaneModel, SmallHolesAreThoseThatRaysWentThrough) {
+  const std::vector<PlaneHole> open = HolesOfWall(WallWithPorthole(60000, 0.275, true));
+  ASSERT_EQ(open.size(), 1U);
+  EXPECT_TRUE(open[0].seen_open);
+  EXPECT_TRUE(HolesOfWall(WallWithPorthole(60000, 0.275, false)).empty());
+  // 40 points a square metre leave circles of more than 0.25 m here and there.
+  EXPECT_TRUE(HolesOfWall(WallWithPorthole(720, 0.0, false)).empty());
+}
+
 TEST(FindPlaneModel, SaysTheSameTwice) {
   const PosedPoints points = WallAndFloor(0.0);
   const auto a = FindPlaneModel(points, {}, Stop());
