@@ -70,6 +70,26 @@ absl::Status Keep(MapCore& core,
   });
 }
 
+// What a user should know of the points that the planes are from: that there were too many in a
+// square, or too few anywhere.
+std::string PointsMessage(const SquarePoints& points, const PlaneModelInfo& info) {
+  if (points.thinned_squares() > 0) {
+    return absl::StrCat("; of ",
+                        points.thinned_squares(),
+                        " squares of ",
+                        kSquareM,
+                        " m with more than ",
+                        kMostSquarePoints,
+                        " points only one of up to ",
+                        points.most_thinned(),
+                        " points was taken");
+  }
+  if (info.planes > 0 || info.points == 0) return "";
+  return absl::StrCat("; a surface has to have some ",
+                      kLeastPointsM2,
+                      " points a square metre, and min_area_m2 of it");
+}
+
 absl::StatusOr<std::uint64_t> JobOfModel(MapCore& core) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
   return reader->JobOfPlaneModel();
@@ -111,6 +131,7 @@ absl::Status RunPlanesJob(MapCore& core,
   context.SetMetric("directions", static_cast<double>(info.directions.size()));
   context.SetMetric("scans", static_cast<double>(info.scans));
   context.SetMetric("scans_without_points", static_cast<double>(points.without_points()));
+  context.SetMetric("squares_thinned", static_cast<double>(points.thinned_squares()));
   points.damaged().SetMetrics(context);
   context.SetMessage(absl::StrCat(info.planes,
                                   " planes with ",
@@ -118,6 +139,7 @@ absl::Status RunPlanesJob(MapCore& core,
                                   " main directions from ",
                                   info.scans,
                                   " scans",
+                                  PointsMessage(points, info),
                                   points.damaged().Message()));
   return absl::OkStatus();
 }

@@ -4,10 +4,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "absl/container/btree_set.h"
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
@@ -20,6 +22,10 @@
 
 namespace strata {
 namespace {
+
+// Of a scan that is kept: the first block of ScanSource::ForEachBlock() is all of it.
+constexpr std::uint64_t kMostHeldPoints = 999'999;
+constexpr std::size_t kHeldBytes = 128;  // beside its points
 
 std::int64_t SquareIndexOf(double at_m) {
   return static_cast<std::int64_t>(std::floor(at_m / kSquareM));
@@ -95,12 +101,21 @@ absl::StatusOr<PosedPoints> SquarePoints::Load(std::size_t i, const Stop& stop) 
   PosedPoints& points = thinned.points;
   points.origin << square.center(), 0.0;
   for (const std::size_t scan : scans_around_.at(places_[i])) {
-    const absl::Status done = Append(scans_[scan], around, stop, thinned);
-    if (done.ok()) continue;
+    const PlacedScan& placed = scans_[scan];
+    const absl::Status done = ForEachPart(
+        scan, stop, [&](const ScanPoints& part) { Append(placed, part, around, thinned); });
+    if (done.ok()) {
+      const Eigen::Vector3d sensor =
+          placed.T_map_scan * placed.scan.header.sensor_origin.cast<double>() - points.origin;
+      points.views.push_back({sensor.cast<float>(), points.points.size()});
+      continue;
+    }
     points.points.resize(points.views.empty() ? 0 : points.views.back().end);
-    STRATA_ASSIGN_OR_RETURN(const bool leave_out, MayLeaveOut(scans_[scan], done));
+    STRATA_ASSIGN_OR_RETURN(const bool leave_out, MayLeaveOut(placed, done));
     if (!leave_out) return done;
   }
+  if (thinned.every > 1) thinned_.insert(i);
+  most_thinned_ = std::max(most_thinned_, thinned.every);
   return std::move(thinned.points);
 }
 
@@ -112,38 +127,63 @@ absl::StatusOr<bool> SquarePoints::MayLeaveOut(const PlacedScan& placed, const a
   return !there || damaged_.LeaveOut(placed.scan.number, placed.scan.header.id.ToString(), why);
 }
 
-absl::Status SquarePoints::Append(const PlacedScan& placed,
-                                  const PlanSquare& around,
+absl::Status SquarePoints::ForEachPart(std::size_t scan,
+                                       const Stop& stop,
+                                       absl::FunctionRef<void(const ScanPoints&)> body) {
+  if (const auto held = held_.Find(scan); held != nullptr) {
+    body(*held);
+    return absl::OkStatus();
+  }
+  const bool hold = scans_[scan].scan.header.point_count <= kMostHeldPoints;
+  return Decode(scans_[scan], stop, [&](ScanPoints part) {
+    body(part);
+    if (!hold) return;  // otherwise the part is all of it
+    part.shrink_to_fit();
+    const std::size_t bytes = part.size() * sizeof(part[0]) + kHeldBytes;
+    held_.Put(scan, std::make_shared<const ScanPoints>(std::move(part)), bytes);
+  });
+}
+
+absl::Status SquarePoints::Decode(const PlacedScan& placed,
                                   const Stop& stop,
-                                  Thinned& thinned) {
+                                  absl::FunctionRef<void(ScanPoints)> body) {
   const MapParameters parameters = core_.info().parameters;
   const SensorModel sensor = placed.scan.header.sensor.value_or(parameters.sensor);
-  PosedPoints& points = thinned.points;
+  const Eigen::Matrix3d turn = placed.T_map_scan.linear();
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
   const ScanShare share(core_.caches(), placed.scan);
   ScanSource source(*reader, parameters);
-  STRATA_RETURN_IF_ERROR(
-      source.ForEachBlock(placed.scan, [&](const PointCloud& block) -> absl::Status {
-        STRATA_RETURN_IF_ERROR(stop.status());
-        for (std::size_t i = 0; i < block.size(); ++i) {
-          if (!source.faded().empty() && source.faded()[i] != 0) continue;
-          if (!sensor.Takes((block.points[i] - block.sensor_origin).norm())) continue;
-          const Eigen::Vector3d p = placed.T_map_scan * block.points[i].cast<double>();
-          if (!around.contains(p.head<2>()) || thinned.inside++ % thinned.every != 0) continue;
-          if (points.points.empty()) points.origin.z() = p.z();
-          const Eigen::Vector3f at = (p - points.origin).cast<float>();
-          if (std::abs(at.z()) < kMostFromOriginM) points.points.push_back(at);
-        }
-        while (points.points.size() > kMostSquarePoints) {
-          KeepHalf(points);
-          thinned.every *= 2;
-        }
-        return absl::OkStatus();
-      }));
-  const Eigen::Vector3d at =
-      placed.T_map_scan * placed.scan.header.sensor_origin.cast<double>() - points.origin;
-  points.views.push_back({at.cast<float>(), points.points.size()});
-  return absl::OkStatus();
+  return source.ForEachBlock(placed.scan, [&](const PointCloud& block) -> absl::Status {
+    STRATA_RETURN_IF_ERROR(stop.status());
+    ScanPoints part;
+    part.reserve(block.size());
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if (!source.faded().empty() && source.faded()[i] != 0) continue;
+      if (!sensor.Takes((block.points[i] - block.sensor_origin).norm())) continue;
+      part.push_back((turn * block.points[i].cast<double>()).cast<float>());
+    }
+    body(std::move(part));
+    return absl::OkStatus();
+  });
+}
+
+void SquarePoints::Append(const PlacedScan& placed,
+                          const ScanPoints& part,
+                          const PlanSquare& around,
+                          Thinned& thinned) const {
+  PosedPoints& points = thinned.points;
+  const Eigen::Vector3d at = placed.T_map_scan.translation();
+  for (const Eigen::Vector3f& own : part) {
+    const Eigen::Vector3d p = at + own.cast<double>();
+    if (!around.contains(p.head<2>()) || thinned.inside++ % thinned.every != 0) continue;
+    if (points.points.empty()) points.origin.z() = p.z();
+    const Eigen::Vector3f from_origin = (p - points.origin).cast<float>();
+    if (std::abs(from_origin.z()) < kMostFromOriginM) points.points.push_back(from_origin);
+  }
+  while (points.points.size() > most_points_) {
+    KeepHalf(points);
+    thinned.every *= 2;
+  }
 }
 
 }  // namespace strata

@@ -8,10 +8,14 @@
 #include <vector>
 
 #include "absl/container/btree_map.h"
+#include "absl/container/btree_set.h"
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "core/common/lru_cache.h"
 #include "core/common/stop.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/scans/damaged_scans.h"
@@ -28,11 +32,15 @@ inline constexpr double kSquareMarginM = 5.0;
 // Points of a square; of more, every second, every fourth … is taken.
 inline constexpr std::size_t kMostSquarePoints = 4'000'000;
 
-// Not thread-safe.
+// A scan is in all squares that it saw, and each is looked at twice: its points are kept for the
+// next one as long as they have room among the caches. Not thread-safe.
 class SquarePoints {
  public:
   // `core` must outlive it.
-  explicit SquarePoints(MapCore& core) : core_(core) {}
+  explicit SquarePoints(MapCore& core, std::size_t most_points = kMostSquarePoints)
+      : core_(core),
+        most_points_(most_points),
+        held_(core.caches(), core.caches()->max_bytes() / 2) {}
 
   // Finds the integrated scans of `epoch` and the squares that they are in.
   absl::Status ListScans(std::uint64_t epoch, const Stop& stop);
@@ -47,6 +55,10 @@ class SquarePoints {
   std::uint64_t points() const { return points_; }
   std::uint64_t without_points() const { return without_points_; }
   const DamagedScans& damaged() const { return damaged_; }
+  // Of the squares loaded so far those with more points than may be, and of how many points of
+  // the fullest one was taken.
+  std::uint64_t thinned_squares() const { return thinned_.size(); }
+  std::uint64_t most_thinned() const { return most_thinned_; }
 
  private:
   struct PlacedScan {
@@ -54,22 +66,32 @@ class SquarePoints {
     Pose T_map_scan;
   };
   using Place = std::pair<std::int64_t, std::int64_t>;  // of a square
+  // Points that count, turned as the map is, from where the scan was.
+  using ScanPoints = std::vector<Eigen::Vector3f>;
 
   void AddTiles(const std::vector<TileKey>& tiles, std::size_t scan);
+  // Gives the points of the scan, at once where it is small enough to be held, else in blocks.
+  absl::Status ForEachPart(std::size_t scan,
+                           const Stop& stop,
+                           absl::FunctionRef<void(const ScanPoints&)> body);
+  absl::Status Decode(const PlacedScan& placed,
+                      const Stop& stop,
+                      absl::FunctionRef<void(ScanPoints)> body);
   // Adds what is inside of `around`; counts those that were `inside` and takes one of `every`.
   struct Thinned {
     PosedPoints points;
     std::uint64_t inside = 0;
     std::uint64_t every = 1;
   };
-  absl::Status Append(const PlacedScan& placed,
-                      const PlanSquare& around,
-                      const Stop& stop,
-                      Thinned& thinned);
+  void Append(const PlacedScan& placed,
+              const ScanPoints& part,
+              const PlanSquare& around,
+              Thinned& thinned) const;
   // Whether what the scan's points could not be read for is no fault of the job.
   absl::StatusOr<bool> MayLeaveOut(const PlacedScan& placed, const absl::Status& why);
 
   MapCore& core_;
+  const std::size_t most_points_;  // of a square
   std::vector<PlacedScan> scans_;
   absl::btree_map<Place, std::vector<std::size_t>> scans_around_;
   std::vector<PlanSquare> squares_;
@@ -78,6 +100,9 @@ class SquarePoints {
   std::uint64_t without_points_ = 0;
   std::uint64_t epoch_ = 0;
   DamagedScans damaged_;
+  LruCache<std::size_t, const ScanPoints> held_;  // by index of the scan
+  absl::btree_set<std::size_t> thinned_;          // squares
+  std::uint64_t most_thinned_ = 1;
 };
 
 }  // namespace strata
