@@ -40,11 +40,7 @@ std::int64_t Axis(Voxel voxel, int shift) {
   return static_cast<std::int64_t>(voxel >> shift & kVoxelMask) - kVoxelOffset;
 }
 
-// ln Σ exp of two or more, by their largest.
-double AddLogs(double a, double b) {
-  const double most = std::max(a, b);
-  return most + std::log1p(std::exp(std::min(a, b) - most));
-}
+double PeakLog(const MixtureCell& cell) { return -0.5 * std::log(2.0 * M_PI * cell.variance_m2); }
 
 }  // namespace
 
@@ -73,9 +69,11 @@ Eigen::AlignedBox3d BoxOf(Voxel voxel) {
 PlaneMixture::PlaneMixture(std::vector<MixtureCell> cells, const MixtureOptions& options)
     : cells_(std::move(cells)), options_(options) {
   HashSet<Voxel> voxels;
+  peak_logs_.reserve(cells_.size());
   for (const MixtureCell& cell : cells_) {
     voxels.insert(VoxelOf(cell.mean));
     measurements_ += cell.measurements;
+    peak_logs_.push_back(PeakLog(cell));
   }
   voxel_count_ = std::max<std::size_t>(1, voxels.size());
 }
@@ -96,14 +94,19 @@ std::optional<std::uint32_t> PlaneMixture::PlaneOf(std::size_t j) const {
   return sum > 0.5 ? std::optional(plane) : std::nullopt;
 }
 
-double PlaneMixture::CellLog(const MixtureCell& cell, const MixturePlane& plane) const {
+double PlaneMixture::DensityLog(const MixturePlane& plane) const {
+  const double voxels = static_cast<double>(std::max<std::size_t>(1, plane.voxels.size()));
+  return std::log(plane.chance * static_cast<double>(voxel_count_) / voxels);
+}
+
+double PlaneMixture::Misfit(const MixtureCell& cell, const MixturePlane& plane) {
   const Eigen::Vector3d& n = plane.plane.normal;
   const double off = n.dot(cell.mean) - plane.plane.distance;
-  const double squared = off * off + n.dot(cell.covariance * n);
-  const double voxels = static_cast<double>(std::max<std::size_t>(1, plane.voxels.size()));
-  const double density = plane.chance * static_cast<double>(voxel_count_) / voxels;
-  return std::log(density) - 0.5 * std::log(2.0 * M_PI * cell.variance_m2) -
-         squared / (2.0 * cell.variance_m2);
+  return (off * off + n.dot(cell.covariance * n)) / (2.0 * cell.variance_m2);
+}
+
+double PlaneMixture::CellLog(const MixtureCell& cell, const MixturePlane& plane) const {
+  return DensityLog(plane) + PeakLog(cell) - Misfit(cell, plane);
 }
 
 double PlaneMixture::ClutterLog() const {
@@ -191,14 +194,23 @@ void PlaneMixture::UpdateChances() {
 void PlaneMixture::EStep() {
   data_log_ = 0.0;
   const double clutter = ClutterLog();
+  std::vector<double> densities;
+  densities.reserve(planes.size());
+  for (const MixturePlane& plane : planes) densities.push_back(DensityLog(plane));
   for (std::size_t j = 0; j < cells_.size(); ++j) {
-    double sum = clutter;
+    double most = clutter;
     for (Membership& member : members_[j]) {
-      member.share = CellLog(cells_[j], planes[member.plane]);
-      sum = AddLogs(sum, member.share);
+      member.share =
+          densities[member.plane] + peak_logs_[j] - Misfit(cells_[j], planes[member.plane]);
+      most = std::max(most, member.share);
     }
-    for (Membership& member : members_[j]) member.share = std::exp(member.share - sum);
-    data_log_ += cells_[j].measurements * sum;
+    double sum = std::exp(clutter - most);
+    for (Membership& member : members_[j]) {
+      member.share = std::exp(member.share - most);
+      sum += member.share;
+    }
+    for (Membership& member : members_[j]) member.share /= sum;
+    data_log_ += cells_[j].measurements * (most + std::log(sum));
   }
   prior_log_ = 0.0;
   if (!options_.directions) return;

@@ -122,8 +122,12 @@ class PlaneMixture {
   };
   std::vector<Scatter> Scatters() const;
   void UpdateChances();
+  // CellLog() in parts: that of the plane alone, that of the cell alone, and that of both.
+  double DensityLog(const MixturePlane& plane) const;
+  static double Misfit(const MixtureCell& cell, const MixturePlane& plane);
 
   std::vector<MixtureCell> cells_;
+  std::vector<double> peak_logs_;  // of each cell: ln of the density at its plane
   MixtureOptions options_;
   std::vector<std::vector<Membership>> members_;
   Eigen::MatrixXd beta_;
