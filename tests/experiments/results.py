@@ -54,6 +54,7 @@ RESULTS = {
     "dresden": ("A recorded car with IMU and GPS", "experiments/car dresden", ("core/egomotion",)),
     "mls": ("Points to maps beside OctoMap", "bench/mls_benchmark 5 3", ("core/mls",)),
     "registration": ("Registration beside PCL", "bench/registration_benchmark --pairs 60", ("core/registration", "core/mls")),
+    "planes": ("Planes beside PCL, CGAL and what the thesis sets before its own", "bench/planes_benchmark", ("core/planes",)),
     "posegraph": ("Our use of Ceres beside a plain one", "bench/posegraph_benchmark 5", ("core/posegraph",)),
     "planning": ("Warm plans beside boost::astar_search", "bench/planning_benchmark 60 3", ("core/planning",)),
     "cuts": ("Features, cuts, training and scans beside CGAL", "bench/classification_benchmark --rounds 3", LABELS),
