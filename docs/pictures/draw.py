@@ -3,7 +3,8 @@
 
     docs/pictures/draw.py --build build/release
 
-Writes them beside itself. The points of the simulated bridge get colours here, by what they are of. Needs python3-numpy.
+Writes them beside itself. The points of the simulated bridge get colours here, by what they are of. Needs python3-numpy and
+rsvg-convert (librsvg2-bin).
 """
 import argparse
 import pathlib
@@ -76,16 +77,26 @@ def draw_grids(paths):
     return np.repeat(np.concatenate(columns, axis=1)[..., None], 3, axis=2)
 
 
-class Bridge:
+class Maps:
+    """Of drawn worlds, a map each."""
+
     def __init__(self, build, folder):
         self.build, self.folder = build, folder
-        self.run("tests/support/strata-simulate", "bridge", folder / "world", "--seed", 1, "--labels")
-        for path in (folder / "world").glob("*/scans/*.pcd"):
-            paint(path)
-        self.strata("map", "create", "bridge")
-        for robot in ("over", "under"):
-            self.strata("scan", "import", "bridge", folder / "world" / robot / "scans", "--poses",
-                        folder / "world" / robot / "poses_truth.txt", "--trajectory", robot, "--align", "off", "--wait")
+
+    def simulate(self, name, world, *options):
+        self.run("tests/support/strata-simulate", world, self.folder / name, *options)
+        return sorted(path for path in (self.folder / name).iterdir() if path.is_dir())
+
+    def add(self, name, robots):
+        self.strata("map", "create", name)
+        for robot in robots:
+            self.strata("scan", "import", name, robot / "scans", "--poses", robot / "poses_truth.txt", "--trajectory", robot.name,
+                        "--align", "off", "--wait")
+
+    def floorplan(self, name, storey, picture, *options):
+        self.strata("planes", "find", name, "--wait")
+        self.strata("map", "floorplan", name, self.folder / f"{name}.svg", "--storey", storey, *options)
+        subprocess.run(["rsvg-convert", "--width", "900", "--output", picture, self.folder / f"{name}.svg"], check=True)
 
     def run(self, program, *words):
         subprocess.run([self.build / program, *map(str, words)], check=True, stdout=subprocess.DEVNULL)
@@ -102,12 +113,18 @@ def main():
     from strata.mesh import read_ply
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        bridge = Bridge(build, folder)
-        bridge.strata("map", "render", "bridge", HERE / "colour.png", "--layer", "colour", "--view", "oblique", "--size", "460x290")
-        bridge.strata("map", "mesh", "bridge", folder / "mesh.ply", "--region=-24,-12,24,12,-0.5,6.8", "--voxel", "0.1")
+        maps = Maps(build, folder)
+        robots = maps.simulate("bridge", "bridge", "--seed", 1, "--labels")
+        for path in folder.glob("bridge/*/scans/*.pcd"):
+            paint(path)
+        maps.add("bridge", robots)
+        maps.strata("map", "render", "bridge", HERE / "colour.png", "--layer", "colour", "--view", "oblique", "--size", "460x290")
+        maps.strata("map", "mesh", "bridge", folder / "mesh.ply", "--region=-24,-12,24,12,-0.5,6.8", "--voxel", "0.1")
         write_png(HERE / "mesh.png", draw_mesh(*read_ply(folder / "mesh.ply")))
-        bridge.strata("map", "export", "bridge", "--format", "nav2", "--out", folder / "floor")
+        maps.strata("map", "export", "bridge", "--format", "nav2", "--out", folder / "floor")
         write_png(HERE / "floors.png", draw_grids(sorted(folder.glob("floor-*.pgm"))))
+        maps.add("flat", maps.simulate("flat", "rooms", "--seed", 4, "--step", 2))
+        maps.floorplan("flat", 0, HERE / "floorplan.png")
     subprocess.run([sys.executable, HERE.parent.parent / "tests/experiments/underpass.py", "--build", build, "--seeds", "1",
                     "--picture", HERE / "underpass.png"], check=True)
 
