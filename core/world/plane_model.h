@@ -3,11 +3,13 @@
 #define STRATA_CORE_WORLD_PLANE_MODEL_H_
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "absl/time/time.h"
 #include <Eigen/Core>
 
+#include "core/cloud/point_cloud.h"
 #include "core/geometry/primitives.h"
 #include "core/world/constraint.h"
 
@@ -45,6 +47,7 @@ struct ModelPlane {
   double rms_m = 0.0;                  // of its points' distance to it
   double sigma_m = 0.0;                // of its offset at the middle of its points
   double sigma_rad = 0.0;              // of its normal
+  std::optional<Colour> colour;        // mean, where planes were told apart by colours
   std::vector<PlanePolygon> polygons;  // by falling area
 };
 

@@ -26,7 +26,8 @@ bool MayBelong(const FacedPlane& small, const FacedPlane& large) {
   if (std::abs(cosine) < kParallelCosine || !small.seen.box.intersects(large.seen.box))
     return false;
   const bool same_side = (small.facing < 0) == ((large.facing < 0) != (cosine < 0.0));
-  return same_side && RmsDistance(small.moments, large.seen.plane) <= large.band_m;
+  return same_side && AreAlike(small.colour, large.colour) &&
+         RmsDistance(small.moments, large.seen.plane) <= large.band_m;
 }
 
 std::int32_t ReachOf(const PlaneRaster& raster) {

@@ -15,12 +15,14 @@
 
 #include <Eigen/Core>
 
+#include "core/planes/models/plane_colour.h"
 #include "core/planes/models/plane_polygons.h"
 
 namespace strata {
 
 struct FacedPlane {
   SeenPlane seen;
+  LabColour colour = LabColour::Zero();
   double band_m = 0.0;      // points so near are on it
   std::int64_t facing = 0;  // points seen from the normal's side less those from the other
   Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();  // of its surface
@@ -28,7 +30,7 @@ struct FacedPlane {
 
 // Of each plane the one that it belongs to, a larger one or itself: one that lies within the
 // other's band, faces where it does, and has half of its points where the other has as many or
-// more. `planes`: by falling area.
+// more. Colours that are not alike are two surfaces' (thesis 5.5). `planes`: by falling area.
 std::vector<std::size_t> OwnersOf(std::span<const FacedPlane> planes);
 
 // What was seen on `other` was seen on `plane`.

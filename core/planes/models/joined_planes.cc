@@ -18,6 +18,7 @@
 #include "core/common/status.h"
 #include "core/common/stop.h"
 #include "core/planes/models/model_selection.h"
+#include "core/planes/models/plane_colour.h"
 #include "core/planes/models/plane_mixture.h"
 #include "core/planes/moments.h"
 
@@ -39,6 +40,7 @@ PlaneKind KindOf(const Eigen::Vector3d& normal) {
 // allowed; above 1 they are two.
 double Strain(const SquarePlane& a, const SquarePlane& b) {
   if (std::abs(a.plane.normal.dot(b.plane.normal)) < kJoinCosine) return 2.0;
+  if (!AreAlike(a.colour, b.colour)) return 2.0;
   const Plane joint = FitMoments(a.moments + b.moments).plane;
   double strain = 0.0;
   for (const SquarePlane* part : {&a, &b}) {
@@ -52,6 +54,7 @@ double Strain(const SquarePlane& a, const SquarePlane& b) {
 
 void AddTo(SquarePlane& sum, const SquarePlane& part) {
   sum.moments += part.moments;
+  sum.colour += part.moments(3, 3) / sum.moments(3, 3) * (part.colour - sum.colour);
   sum.plane = FitMoments(sum.moments).plane;
   sum.measurements += part.measurements;
   sum.information += part.information;
@@ -130,6 +133,7 @@ MixtureCell CellOf(const SquarePlane& plane, const PlaneModelOptions& options) {
   cell.variance_m2 = std::max(
       {plane.measurements / plane.information, fit.eigenvalues(0), options.rho_m * options.rho_m});
   cell.area_m2 = plane.moments(3, 3);
+  cell.colour = plane.colour;
   return cell;
 }
 
@@ -141,11 +145,13 @@ absl::StatusOr<PlaneMixture> WithDirections(const std::vector<SquarePlane>& sums
   MixtureOptions mixing;
   mixing.direction_sigma_rad = options.sigma_rad;
   mixing.directions = options.directions;
+  mixing.colour = options.colour;
   PlaneMixture mixture(std::move(cells), mixing);
   for (std::size_t m = 0; m < sums.size(); ++m) {
     const Plane plane = FitMoments(sums[m].moments).plane;
     MixturePlane begun;
     begun.plane = plane;
+    begun.colour = sums[m].colour;
     begun.voxels = {VoxelOf(mixture.cells()[m].mean)};
     mixture.planes.push_back(std::move(begun));
     mixture.AddDirection(plane.normal);
@@ -167,6 +173,7 @@ ModelPlane ModelOf(const SquarePlane& sum, const PlaneMixture& mixture, std::siz
   model.rms_m = RmsDistance(sum.moments, model.plane);
   const MomentsFit fit = FitMoments(sum.moments);
   model.sigma_m = std::sqrt(cell.variance_m2 / cell.measurements);
+  if (mixture.options().colour) model.colour = ColourOf(sum.colour);
   model.sigma_rad = model.sigma_m / std::sqrt(std::max(1e-9, fit.eigenvalues(1)));
   if (!mixture.options().directions) return model;
   Eigen::Index most = 0;

@@ -19,6 +19,7 @@
 #include "core/common/random.h"
 #include "core/common/status.h"
 #include "core/common/stop.h"
+#include "core/planes/models/plane_colour.h"
 #include "core/planes/models/plane_mixture.h"
 #include "core/planes/moments.h"
 
@@ -26,6 +27,7 @@ namespace strata {
 namespace {
 
 constexpr double kPlaneParameters = 3.0;
+constexpr double kColourParameters = 3.0;     // of a plane, where colours count
 constexpr double kDirectionParameters = 3.0;  // its chance among them
 constexpr double kMergeCosine = 0.9;          // between the normals of planes that may be one
 
@@ -42,6 +44,7 @@ struct Reduction {
   std::size_t gone = 0;
   std::optional<std::size_t> into;
   Plane plane;
+  LabColour colour = LabColour::Zero();
   double bic_change = 0.0;
 };
 
@@ -80,16 +83,21 @@ class LeaveOneOut {
   }
 
   Reduction Best(std::size_t m) const {
-    const double saved = kPlaneParameters * LogN(mixture_);
-    Reduction best{m, std::nullopt, {}, -2.0 * Without(m) - saved};
+    const double saved = PlanePrice(mixture_);
+    Reduction best;
+    best.gone = m;
+    best.bic_change = -2.0 * Without(m) - saved;
     for (const std::size_t t : Rivals(m)) {
       const Plane& a = mixture_.planes[m].plane;
       const Plane& b = mixture_.planes[t].plane;
       const Eigen::Matrix4d both = moments_[m] + moments_[t];
       if (std::abs(a.normal.dot(b.normal)) < kMergeCosine || !(both(3, 3) > 0.0)) continue;
       const Plane joint = FitMoments(both).plane;
-      const double change = -2.0 * Merged(m, t, joint) - saved;
-      if (change < best.bic_change) best = {m, t, joint, change};
+      const double share = moments_[t](3, 3) / both(3, 3);
+      const LabColour colour =
+          (1.0 - share) * mixture_.planes[m].colour + share * mixture_.planes[t].colour;
+      const double change = -2.0 * Merged(m, t, joint, colour) - saved;
+      if (change < best.bic_change) best = {m, t, joint, colour, change};
     }
     return best;
   }
@@ -107,7 +115,7 @@ class LeaveOneOut {
     return change;
   }
 
-  double Merged(std::size_t m, std::size_t t, const Plane& joint) const {
+  double Merged(std::size_t m, std::size_t t, const Plane& joint, const LabColour& colour) const {
     std::vector<std::uint32_t> cells;
     std::set_union(cells_of_[m].begin(),
                    cells_of_[m].end(),
@@ -116,6 +124,7 @@ class LeaveOneOut {
                    std::back_inserter(cells));
     MixturePlane plane = mixture_.planes[m];
     plane.plane = joint;
+    plane.colour = colour;
     plane.chance += mixture_.planes[t].chance;
     plane.voxels = Union(mixture_.planes[m].voxels, mixture_.planes[t].voxels);
     double change = 0.0;
@@ -177,6 +186,7 @@ void Apply(const std::vector<Reduction>& reductions, PlaneMixture& mixture) {
     if (!one.into.has_value()) continue;
     MixturePlane& into = mixture.planes[*one.into];
     into.plane = one.plane;
+    into.colour = one.colour;
     into.voxels = Union(into.voxels, more);
   }
 }
@@ -186,8 +196,13 @@ void Apply(const std::vector<Reduction>& reductions, PlaneMixture& mixture) {
 double Bic(const PlaneMixture& mixture) {
   const auto planes = static_cast<double>(mixture.planes.size());
   const auto directions = static_cast<double>(mixture.directions.size());
-  return -2.0 * mixture.LogLikelihood() +
-         (kPlaneParameters * planes + kDirectionParameters * directions) * LogN(mixture);
+  return -2.0 * mixture.LogLikelihood() + planes * PlanePrice(mixture) +
+         kDirectionParameters * directions * LogN(mixture);
+}
+
+double PlanePrice(const PlaneMixture& mixture) {
+  const double colour = mixture.options().colour ? kColourParameters : 0.0;
+  return (kPlaneParameters + colour) * LogN(mixture);
 }
 
 bool DropDirections(PlaneMixture& mixture) {

@@ -14,9 +14,12 @@
 
 namespace strata {
 
-// −2 L + (3 M + 2 K) ln N (5.19), N in independent measurements; of two models the one with the
-// lower is better. (Steps 4 and 5 of the thesis' sketch drop while it increases, a slip.)
+// −2 L + (3 M + 2 K) ln N (5.19), N in independent measurements, 6 M where colours count; of two
+// models the one with the lower is better. (Steps 4 and 5 of the thesis' sketch drop while it
+// increases, a slip.)
 double Bic(const PlaneMixture& mixture);
+// What a plane adds to it, whatever it explains.
+double PlanePrice(const PlaneMixture& mixture);
 
 // Leaves out main directions, the best first, while that lowers the BIC. True if any left.
 bool DropDirections(PlaneMixture& mixture);

@@ -14,6 +14,7 @@
 #include "core/common/status.h"
 #include "core/common/stop.h"
 #include "core/planes/models/model_selection.h"
+#include "core/planes/models/plane_colour.h"
 #include "core/planes/models/plane_mixture.h"
 #include "core/planes/moments.h"
 
@@ -79,18 +80,24 @@ class PlaneQueue {
 
  private:
   double Distance(std::uint32_t j) const {
+    const MixtureCell& cell = mixture_.cells()[j];
     double nearest = kDistanceCapM;
     for (const Membership& member : mixture_.memberships(j)) {
-      const Plane& plane = mixture_.planes[member.plane].plane;
-      nearest = std::min(nearest, strata::Distance(mixture_.cells()[j].mean, plane));
+      const MixturePlane& plane = mixture_.planes[member.plane];
+      // A colour's distance as the one in space that 5.24 puts beside it.
+      const double colour = (cell.colour - plane.colour).norm() / kColourSigma;
+      nearest = std::min(nearest,
+                         std::hypot(strata::Distance(cell.mean, plane.plane),
+                                    std::sqrt(cell.variance_m2) * colour));
     }
     return std::max(nearest, 1e-3);
   }
 
-  bool Fits(const Unexplained& one, const Plane& plane) const {
+  bool Fits(const Unexplained& one, const MixturePlane& plane) const {
     const MixtureCell& cell = mixture_.cells()[one.cell];
-    return one.chance > 0.0 && std::abs(one.normal.dot(plane.normal)) >= kFitCosine &&
-           strata::Distance(cell.mean, plane) <= kFitSigmas * std::sqrt(cell.variance_m2);
+    return one.chance > 0.0 && std::abs(one.normal.dot(plane.plane.normal)) >= kFitCosine &&
+           strata::Distance(cell.mean, plane.plane) <= kFitSigmas * std::sqrt(cell.variance_m2) &&
+           AreAlike(cell.colour, plane.colour);
   }
 
   MixturePlane Grow(std::uint32_t seed) {
@@ -103,13 +110,14 @@ class PlaneQueue {
     Eigen::Matrix4d sum = moments(seed);
     MixturePlane plane;
     plane.plane = FitMoments(sum).plane;
+    plane.colour = mixture_.cells()[left_[seed].cell].colour;
     for (std::size_t next = 0; next < members_.size(); ++next) {
       const Voxel own = VoxelOf(mixture_.cells()[left_[members_[next]].cell].mean);
       for (const Voxel voxel : VoxelsAround(own)) {
         const auto found = at_.find(voxel);
         if (found == at_.end()) continue;
         for (const std::uint32_t i : found->second) {
-          if (!Fits(left_[i], plane.plane) || !in.insert(i).second) continue;
+          if (!Fits(left_[i], plane) || !in.insert(i).second) continue;
           members_.push_back(i);
           sum += moments(i);
         }
@@ -137,7 +145,7 @@ absl::StatusOr<std::size_t> AddPlanes(PlaneMixture& mixture,
                                       SplitMix64& random,
                                       const Stop& stop) {
   PlaneQueue queue(mixture);
-  const double price = 3.0 * std::log(std::max(2.0, mixture.measurements()));
+  const double price = PlanePrice(mixture);
   std::vector<MixturePlane> added;
   for (int failures = 0; failures < kMostFailures && added.size() < most && !queue.empty();) {
     STRATA_RETURN_IF_ERROR(stop.status());

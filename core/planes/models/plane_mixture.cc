@@ -42,6 +42,11 @@ std::int64_t Axis(Voxel voxel, int shift) {
 
 double PeakLog(const MixtureCell& cell) { return -0.5 * std::log(2.0 * M_PI * cell.variance_m2); }
 
+// Mean of 5.23's square over the points of a cell.
+double SquaredColourDistance(const MixtureCell& cell, const MixturePlane& plane) {
+  return (cell.colour - plane.colour).squaredNorm() + cell.colour_variance;
+}
+
 }  // namespace
 
 Voxel VoxelOf(const Eigen::Vector3d& point) {
@@ -99,10 +104,11 @@ double PlaneMixture::DensityLog(const MixturePlane& plane) const {
   return std::log(plane.chance * static_cast<double>(voxel_count_) / voxels);
 }
 
-double PlaneMixture::Misfit(const MixtureCell& cell, const MixturePlane& plane) {
+double PlaneMixture::Misfit(const MixtureCell& cell, const MixturePlane& plane) const {
   const Eigen::Vector3d& n = plane.plane.normal;
   const double off = n.dot(cell.mean) - plane.plane.distance;
-  return (off * off + n.dot(cell.covariance * n)) / (2.0 * cell.variance_m2);
+  const double place = (off * off + n.dot(cell.covariance * n)) / (2.0 * cell.variance_m2);
+  return options_.colour ? place - ColourLog(SquaredColourDistance(cell, plane)) : place;
 }
 
 double PlaneMixture::CellLog(const MixtureCell& cell, const MixturePlane& plane) const {
@@ -110,7 +116,8 @@ double PlaneMixture::CellLog(const MixtureCell& cell, const MixturePlane& plane)
 }
 
 double PlaneMixture::ClutterLog() const {
-  return std::log(kClutterShare) - std::log(2.0 * options_.clutter_half_m);
+  const double place = std::log(kClutterShare) - std::log(2.0 * options_.clutter_half_m);
+  return options_.colour ? place + AnyColourLog() : place;
 }
 
 double PlaneMixture::DirectionLog(std::size_t m, std::size_t k) const {
@@ -243,6 +250,11 @@ std::vector<PlaneMixture::Scatter> PlaneMixture::Scatters() const {
       scatter.weight += w;
       scatter.first += w * x;
       scatter.second += w * (cell.covariance + x * x.transpose());
+      if (!options_.colour) continue;
+      const double u = member.share * cell.measurements *
+                       ColourWeight(SquaredColourDistance(cell, planes[member.plane]));
+      scatter.colour_weight += u;
+      scatter.colour += u * cell.colour;
     }
   }
   return scatters;
@@ -258,6 +270,10 @@ void PlaneMixture::MStep() {
   }
   UpdateChances();
   const std::vector<Scatter> scatters = Scatters();
+  for (std::size_t m = 0; m < planes.size(); ++m) {
+    if (!(scatters[m].colour_weight > 0.0)) continue;
+    planes[m].colour = scatters[m].colour / scatters[m].colour_weight;
+  }
   const std::vector<MixturePlane> before = planes;
   const double prior = 1.0 / std::pow(options_.direction_sigma_rad, 2);
   for (int turn = 0; turn < (options_.directions ? kTurns : 1); ++turn) {

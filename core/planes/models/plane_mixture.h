@@ -1,5 +1,5 @@
 // Cells of surface as a mixture of planes, whose normals are a mixture of main directions
-// (thesis 5.3, 5.4).
+// (thesis 5.3, 5.4), and whose colours may count (5.5).
 // Internal to core/planes, not installed.
 //
 // Differs from the thesis: the data are flat cells with their covariances instead of points, all
@@ -22,6 +22,7 @@
 #include "core/common/hash_map.h"
 #include "core/common/stop.h"
 #include "core/geometry/primitives.h"
+#include "core/planes/models/plane_colour.h"
 
 namespace strata {
 
@@ -38,6 +39,8 @@ struct MixtureCell {
   double measurements = 1.0;   // independent ones: n_j
   double variance_m2 = 1e-4;   // ρ² of each
   double area_m2 = 0.0;
+  LabColour colour = LabColour::Zero();  // mean
+  double colour_variance = 0.0;          // of its points about it, all three together
 };
 
 struct MixturePlane {
@@ -46,6 +49,7 @@ struct MixturePlane {
   // Of a measurement to be on it, spread evenly over its voxels: two planes in one place share what
   // is there, so that they do no better than one.
   double chance = 0.0;
+  LabColour colour = LabColour::Zero();  // c̄_m
   // Held during a run of EM, see PlaneMixture::Prepare().
   double weight = 1.0;  // w_m (5.20): measurements of its normal, as many as may count
 };
@@ -62,6 +66,7 @@ struct MixtureOptions {
   double independent_area_m2 = 0.25;  // of surface for one of those
   double clutter_half_m = 1.0;        // h: what is clutter is evenly spread over 2h
   bool directions = true;
+  bool colour = false;  // colours count (5.24)
 };
 
 class PlaneMixture {
@@ -119,12 +124,15 @@ class PlaneMixture {
     double weight = 0.0;
     Eigen::Vector3d first = Eigen::Vector3d::Zero();
     Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+    // Σ α n u (1, c), u the weight of Student's t.
+    double colour_weight = 0.0;
+    LabColour colour = LabColour::Zero();
   };
   std::vector<Scatter> Scatters() const;
   void UpdateChances();
   // CellLog() in parts: that of the plane alone, that of the cell alone, and that of both.
   double DensityLog(const MixturePlane& plane) const;
-  static double Misfit(const MixtureCell& cell, const MixturePlane& plane);
+  double Misfit(const MixtureCell& cell, const MixturePlane& plane) const;
 
   std::vector<MixtureCell> cells_;
   std::vector<double> peak_logs_;  // of each cell: ln of the density at its plane

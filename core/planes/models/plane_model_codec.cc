@@ -21,6 +21,7 @@ namespace strata {
 namespace {
 
 constexpr std::uint16_t kModelVersion = 1;
+constexpr std::uint16_t kColourVersion = 2;  // of a plane that has a colour
 constexpr double kMaxModelNumber = 1e15;
 constexpr std::size_t kPointBytes = 3 * 8;
 constexpr std::size_t kDirectionBytes = 3 * 8 + 4 + 8;
@@ -170,12 +171,16 @@ std::string EncodeModelPlane(const ModelPlane& plane) {
       Put(body, hole.ring);
     }
   }
-  return SealBlob(BlobKind::kModelPlane, kModelVersion, body);
+  if (!plane.colour.has_value()) return SealBlob(BlobKind::kModelPlane, kModelVersion, body);
+  for (const std::uint8_t channel : {plane.colour->r, plane.colour->g, plane.colour->b}) {
+    PutFixed(body, channel);
+  }
+  return SealBlob(BlobKind::kModelPlane, kColourVersion, body);
 }
 
 absl::StatusOr<ModelPlane> DecodeModelPlane(absl::string_view bytes) {
   STRATA_ASSIGN_OR_RETURN(const absl::string_view body,
-                          OpenBlob(BlobKind::kModelPlane, kModelVersion, bytes));
+                          OpenBlob(BlobKind::kModelPlane, kColourVersion, bytes));
   ModelReader in(body);
   ModelPlane plane;
   plane.id = in.Count();
@@ -191,6 +196,10 @@ absl::StatusOr<ModelPlane> DecodeModelPlane(absl::string_view bytes) {
   plane.sigma_rad = in.NotNegative();
   const std::size_t polygons = in.Sized(3 * kPointBytes);
   for (std::size_t i = 0; i < polygons && in.ok(); ++i) plane.polygons.push_back(TakePolygon(in));
+  if (VersionOfBlob(bytes) == kColourVersion) {
+    const std::uint8_t r = in.Byte(0, 255), g = in.Byte(0, 255), b = in.Byte(0, 255);
+    plane.colour = Colour{r, g, b};
+  }
   if (!in.AtEnd()) return Damaged("a plane");
   return plane;
 }

@@ -11,7 +11,8 @@
 
 namespace strata {
 
-// Little-endian numbers, doubles as their bits, in the envelope of core/codec.
+// Little-endian numbers, doubles as their bits, in the envelope of core/codec. A plane without a
+// colour is what readers of version 1 know.
 std::string EncodePlaneModelInfo(const PlaneModelInfo& info);
 std::string EncodeModelPlane(const ModelPlane& plane);
 

@@ -20,6 +20,7 @@
 #include "core/common/stop.h"
 #include "core/planes/models/doubled_planes.h"
 #include "core/planes/models/joined_planes.h"
+#include "core/planes/models/plane_colour.h"
 #include "core/planes/models/plane_mixture.h"
 #include "core/planes/models/plane_polygons.h"
 #include "core/planes/models/plane_raster.h"
@@ -32,6 +33,9 @@ namespace {
 constexpr double kSquaresInEpsilon = 4.0;  // 5.4.2: points are thinned to ε/4
 constexpr double kBandM = 0.1;             // 5.4.2: how near a plane its points are, at least
 constexpr double kBandSigmas = 3.0;
+constexpr double kHitSigmaM = 0.02;         // of a point about its plane, against colours
+constexpr double kOnePlaceCosine = 0.99;    // of planes that may be in one place
+constexpr std::uint32_t kMajority = 2;      // so many times the hits
 constexpr double kBeyondM = 0.3;            // that a ray has to go on behind a plane it crossed
 constexpr std::size_t kMostRays = 1000000;  // of a square; of more, every so many
 constexpr double kReachM = 20.0;            // beyond a square, of planes that its rays may cross
@@ -84,12 +88,16 @@ struct PlaneModelFinder::State {
   std::vector<FacedPlane> faced;  // as joined.planes
   HashMap<Voxel, std::vector<std::uint32_t>> near;
 
-  void AddHit(const Eigen::Vector3d& p, const Eigen::Vector3d& sensor);
+  // `colour`: where colours count.
+  void AddHit(const Eigen::Vector3d& p, const LabColour& colour, const Eigen::Vector3d& sensor);
   // The planes that rays to points in the square may cross.
   std::vector<FacedPlane*> PlanesAround(const PlanSquare& square);
   void BeginLooking();
   // Planes that are no surface of their own go into those that are.
   absl::Status MergeDoubled(const Stop& stop);
+  // Points whose colour is another plane's lie among those of their own: reflections, and noise. Of
+  // planes in one place each keeps where it has most.
+  void DropMinorities();
   // RESOURCE_EXHAUSTED where what is known of the planes' surfaces takes more than it may.
   absl::Status CheckMemory() const;
 };
@@ -104,6 +112,11 @@ PlaneModelFinder::~PlaneModelFinder() = default;
 absl::Status PlaneModelFinder::FindPlanes(const PosedPoints& points,
                                           const PlanSquare& square,
                                           const Stop& stop) {
+  const std::size_t colours = state_->options.colour ? points.points.size() : 0;
+  if (points.colour.size() != colours) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(points.colour.size(), " colours of points where ", colours, " are needed"));
+  }
   if (!state_->has_reference) state_->reference = points.origin;
   state_->has_reference = true;
   STRATA_ASSIGN_OR_RETURN(
@@ -126,6 +139,7 @@ void PlaneModelFinder::State::BeginLooking() {
     const JoinedPlane& plane = joined.planes[m];
     const PlaneFrame frame = FrameOf(plane.model.plane, FitMoments(plane.sum.moments).mean);
     FacedPlane one{{plane.model.plane, frame, PlaneRaster(square, 2.0 * square), {}},
+                   plane.sum.colour,
                    std::max({kBandM, kBandSigmas * options.rho_m, kBandSigmas * plane.model.rms_m}),
                    0,
                    plane.sum.moments};
@@ -151,20 +165,44 @@ std::vector<FacedPlane*> PlaneModelFinder::State::PlanesAround(const PlanSquare&
   return planes;
 }
 
-void PlaneModelFinder::State::AddHit(const Eigen::Vector3d& p, const Eigen::Vector3d& sensor) {
+void PlaneModelFinder::State::AddHit(const Eigen::Vector3d& p,
+                                     const LabColour& colour,
+                                     const Eigen::Vector3d& sensor) {
   const auto found = near.find(VoxelOf(p));
   if (found == near.end()) return;
   FacedPlane* nearest = nullptr;
   double least = 1e9;
   for (const std::uint32_t m : found->second) {
     const double off = std::abs(SignedDistance(p, faced[m].seen.plane));
-    if (off > faced[m].band_m || off >= least) continue;
-    least = off;
+    if (off > faced[m].band_m) continue;
+    // −ln of the likelihood but for what is the same of all (5.24).
+    const double misfit = 0.5 * off * off / (kHitSigmaM * kHitSigmaM) -
+                          ColourLog((colour - faced[m].colour).squaredNorm());
+    if (misfit >= least) continue;
+    least = misfit;
     nearest = &faced[m];
   }
   if (nearest == nullptr) return;
   nearest->seen.raster.AddHit(nearest->seen.frame.Flat(p));
   nearest->facing += SignedDistance(sensor, nearest->seen.plane) > 0.0 ? 1 : -1;
+}
+
+void PlaneModelFinder::State::DropMinorities() {
+  for (FacedPlane& one : faced) {
+    for (const FacedPlane& other : faced) {
+      if (&one == &other || !one.seen.box.intersects(other.seen.box) ||
+          std::abs(one.seen.plane.normal.dot(other.seen.plane.normal)) < kOnePlaceCosine) {
+        continue;
+      }
+      const PlaneFrame &own = one.seen.frame, &others = other.seen.frame;
+      one.seen.raster.DropHits([&](const Eigen::Vector2d& middle) {
+        const Eigen::Vector3d at = own.Lift(middle);
+        if (std::abs(SignedDistance(at, other.seen.plane)) > one.band_m) return false;
+        return other.seen.raster.HitsAround(others.Flat(at), 1) >
+               kMajority * one.seen.raster.HitsAround(middle, 1);
+      });
+    }
+  }
 }
 
 absl::Status PlaneModelFinder::State::CheckMemory() const {
@@ -188,6 +226,7 @@ absl::Status PlaneModelFinder::Look(const PosedPoints& points,
                        square.max() - state_->reference.head<2>());
   const std::size_t every = points.points.size() / kMostRays + 1;
   const std::vector<FacedPlane*> planes = state_->PlanesAround(own);
+  const bool coloured = !points.colour.empty();
   std::size_t i = 0;
   for (const PosedPoints::View& view : points.views) {
     const Eigen::Vector3d sensor = view.sensor.cast<double>() + shift;
@@ -202,7 +241,7 @@ absl::Status PlaneModelFinder::Look(const PosedPoints& points,
       }
       const Eigen::Vector3d p = points.points[i].cast<double>() + shift;
       if (!Holds(own, p)) continue;
-      state_->AddHit(p, sensor);
+      state_->AddHit(p, coloured ? LabOf(points.colour[i]) : LabColour(0, 0, 0), sensor);
       if (i % every == 0) AddRay(p, sensor, distances, planes);
     }
   }
@@ -235,6 +274,7 @@ absl::Status PlaneModelFinder::State::MergeDoubled(const Stop& stop) {
 
 absl::StatusOr<PlaneModel> PlaneModelFinder::Finish(const Stop& stop) {
   STRATA_RETURN_IF_ERROR(state_->MergeDoubled(stop));
+  if (state_->options.colour) state_->DropMinorities();
   std::vector<SeenPlane> seen;
   for (FacedPlane& one : state_->faced) seen.push_back(std::move(one.seen));
   const PolygonOptions options{state_->options.epsilon_m, state_->options.min_area_m2};

@@ -14,6 +14,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "core/cloud/point_cloud.h"
 #include "core/common/stop.h"
 #include "core/world/plane_model.h"
 
@@ -25,7 +26,9 @@ struct PlaneModelOptions {
   double rho_m = 0.0;
   double sigma_rad = 0.03;  // σ of 5.13, of a normal about its main direction; in [0.001, 0.5]
   bool directions = true;   // false: EM without main directions
-  int max_planes = 500;     // in one square; in [1, 10000]
+  // Planes are of one colour (thesis 5.5): a carpet is another than the floor that it lies on.
+  bool colour = false;
+  int max_planes = 500;  // in one square; in [1, 10000]
   double cell_size_m =
       0.8;  // of the largest cells of surface; the smallest are an eighth; [0.2, 20]
   double min_area_m2 = 1.0;  // of a plane's surface and of a polygon; in [0.01, 10000]
@@ -51,6 +54,7 @@ struct PosedPoints {
   };
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3f> points;  // finite, within ±kMostFromOriginM
+  std::vector<Colour> colour;           // of each, where options.colour; else empty
   std::vector<View> views;
 };
 
@@ -67,7 +71,8 @@ class PlaneModelFinder {
   ~PlaneModelFinder();
 
   // First round: the planes of a square. `points` are those of the square and of some metres around
-  // it, so that a surface at its border is seen as on its other side.
+  // it, so that a surface at its border is seen as on its other side. INVALID_ARGUMENT unless every
+  // point has a colour where options.colour asks for them, and none where it does not.
   absl::Status FindPlanes(const PosedPoints& points, const PlanSquare& square, const Stop& stop);
   // After the last square: planes that go on in the next square are one, and get their directions.
   absl::Status JoinPlanes(const Stop& stop);

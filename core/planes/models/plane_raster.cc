@@ -106,6 +106,20 @@ std::uint64_t PlaneRaster::HitsAround(const Eigen::Vector2d& at, std::int32_t re
   return hits;
 }
 
+void PlaneRaster::DropHits(absl::FunctionRef<bool(const Eigen::Vector2d& middle)> which) {
+  std::vector<Square*> dropped;
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    const auto bi = static_cast<std::int32_t>(keys_[b] >> 32);
+    const auto bj = static_cast<std::int32_t>(keys_[b] & 0xFFFFFFFFU);
+    for (std::int32_t k = 0; k < kBlock * kBlock; ++k) {
+      Square& square = blocks_[b][static_cast<std::size_t>(k)];
+      const Eigen::Vector2d at(bi * kBlock + k / kBlock + 0.5, bj * kBlock + k % kBlock + 0.5);
+      if (square.hits > 0 && which(square_m_ * at)) dropped.push_back(&square);
+    }
+  }
+  for (Square* const square : dropped) *square = Square();
+}
+
 std::pair<std::uint64_t, std::size_t> PlaneRaster::LookPlaceOf(const Eigen::Vector2d& at) const {
   const std::int32_t i = SquareOf(at.x(), look_square_m_), j = SquareOf(at.y(), look_square_m_);
   const std::int32_t bi = FloorDivide(i, kBlock), bj = FloorDivide(j, kBlock);

@@ -59,6 +59,8 @@ class PlaneRaster {
       absl::FunctionRef<void(const Eigen::Vector2d& at, std::uint32_t hits)> body) const;
   // In the square that the point is in and those up to `reach` squares beside it.
   std::uint64_t HitsAround(const Eigen::Vector2d& at, std::int32_t reach) const;
+  // Forgets the hits of squares by their middles.
+  void DropHits(absl::FunctionRef<bool(const Eigen::Vector2d& middle)> which);
   // Whether a ray crossed the square that the point is in.
   bool HasLook(const Eigen::Vector2d& at) const;
   double look_square_m() const { return look_square_m_; }

@@ -17,7 +17,9 @@
 #include "core/common/status.h"
 #include "core/common/stop.h"
 #include "core/planes/extraction.h"
+#include "core/planes/models/coloured_cells.h"
 #include "core/planes/models/model_selection.h"
+#include "core/planes/models/plane_colour.h"
 #include "core/planes/models/plane_mixture.h"
 #include "core/planes/moments.h"
 #include "core/planes/planar_cells.h"
@@ -43,6 +45,7 @@ PlaneExtractionOptions CellOptions(const PlaneModelOptions& options) {
 }
 
 MixtureCell MixtureCellOf(const PlanarCell& cell,
+                          const CellColour& colour,
                           const Eigen::Vector3d& shift,
                           const PlaneModelOptions& options) {
   MixtureCell out;
@@ -53,33 +56,63 @@ MixtureCell MixtureCellOf(const PlanarCell& cell,
   const double rho = options.rho_m > 0.0 ? options.rho_m : std::hypot(cell.rms_m, kFloorM);
   out.variance_m2 = rho * rho;
   out.area_m2 = cell.area_m2;
+  out.colour = colour.mean;
+  out.colour_variance = colour.variance;
   return out;
 }
 
-std::vector<MixturePlane> StartPlanes(const std::vector<PlanarCell>& cells,
+// What a plane begins with: cells of one colour in one region.
+struct StartGroup {
+  Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();  // of their area
+  LabColour colour = LabColour::Zero();               // mean
+  std::vector<Voxel> voxels;
+};
+
+void AddCell(const MixtureCell& cell, std::vector<StartGroup>& groups) {
+  auto group = std::find_if(groups.begin(), groups.end(), [&cell](const StartGroup& one) {
+    return AreAlike(one.colour, cell.colour);
+  });
+  if (group == groups.end()) group = groups.insert(groups.end(), StartGroup());
+  group->moments += MomentsOf(cell.area_m2, cell.mean, cell.covariance);
+  group->colour += cell.area_m2 / group->moments(3, 3) * (cell.colour - group->colour);
+  group->voxels.push_back(VoxelOf(cell.mean));
+}
+
+void SortVoxels(std::vector<Voxel>& voxels) {
+  std::sort(voxels.begin(), voxels.end());
+  voxels.erase(std::unique(voxels.begin(), voxels.end()), voxels.end());
+}
+
+// `moved`: the cells of all layers.
+std::vector<MixturePlane> StartPlanes(const std::vector<CellLayer>& layers,
                                       const std::vector<MixtureCell>& moved,
                                       const PlaneModelOptions& options) {
-  std::vector<PlanarRegion> regions = GrowRegions(cells, CellOptions(options));
-  std::erase_if(regions, [&](const PlanarRegion& region) {
-    return region.moments(3, 3) < kStartShare * options.min_area_m2;
+  std::vector<StartGroup> groups;
+  std::size_t first = 0;
+  for (const CellLayer& layer : layers) {
+    for (const PlanarRegion& region : GrowRegions(layer.cells, CellOptions(options))) {
+      std::vector<StartGroup> parts;
+      for (const std::uint32_t i : region.cells) AddCell(moved[first + i], parts);
+      groups.insert(groups.end(), parts.begin(), parts.end());
+    }
+    first += layer.cells.size();
+  }
+  std::erase_if(groups, [&](const StartGroup& group) {
+    return group.moments(3, 3) < kStartShare * options.min_area_m2;
   });
-  std::stable_sort(regions.begin(), regions.end(), [](const auto& a, const auto& b) {
+  std::stable_sort(groups.begin(), groups.end(), [](const auto& a, const auto& b) {
     return a.moments(3, 3) > b.moments(3, 3);
   });
-  if (std::ssize(regions) > options.max_planes) {
-    regions.resize(static_cast<std::size_t>(options.max_planes));
+  if (std::ssize(groups) > options.max_planes) {
+    groups.resize(static_cast<std::size_t>(options.max_planes));
   }
   std::vector<MixturePlane> planes;
-  for (const PlanarRegion& region : regions) {
+  for (StartGroup& group : groups) {
     MixturePlane plane;
-    Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
-    for (const std::uint32_t i : region.cells) {
-      moments += MomentsOf(moved[i].area_m2, moved[i].mean, moved[i].covariance);
-      plane.voxels.push_back(VoxelOf(moved[i].mean));
-    }
-    plane.plane = FitMoments(moments).plane;
-    std::sort(plane.voxels.begin(), plane.voxels.end());
-    plane.voxels.erase(std::unique(plane.voxels.begin(), plane.voxels.end()), plane.voxels.end());
+    plane.plane = FitMoments(group.moments).plane;
+    plane.colour = group.colour;
+    plane.voxels = std::move(group.voxels);
+    SortVoxels(plane.voxels);
     planes.push_back(std::move(plane));
   }
   return planes;
@@ -87,12 +120,15 @@ std::vector<MixturePlane> StartPlanes(const std::vector<PlanarCell>& cells,
 
 // Each cell to the plane that has more of it than all else.
 std::vector<SquarePlane> PlanesIn(const PlanSquare& square,
-                                  const std::vector<PlanarCell>& cells,
+                                  const std::vector<std::uint32_t>& point_counts,
                                   const PlaneMixture& mixture,
                                   const Eigen::Vector3d& reference) {
   std::vector<SquarePlane> planes(mixture.planes.size());
-  for (std::size_t m = 0; m < planes.size(); ++m) planes[m].plane = mixture.planes[m].plane;
-  for (std::size_t j = 0; j < cells.size(); ++j) {
+  for (std::size_t m = 0; m < planes.size(); ++m) {
+    planes[m].plane = mixture.planes[m].plane;
+    planes[m].colour = mixture.planes[m].colour;
+  }
+  for (std::size_t j = 0; j < point_counts.size(); ++j) {
     const MixtureCell& cell = mixture.cells()[j];
     const Eigen::Vector2d at = (cell.mean + reference).head<2>();
     if ((at.array() < square.min().array()).any() || (at.array() >= square.max().array()).any()) {
@@ -104,14 +140,11 @@ std::vector<SquarePlane> PlanesIn(const PlanSquare& square,
     plane.moments += MomentsOf(cell.area_m2, cell.mean, cell.covariance);
     plane.measurements += cell.measurements;
     plane.information += cell.measurements / cell.variance_m2;
-    plane.point_count += cells[j].point_count;
+    plane.point_count += point_counts[j];
     plane.voxels.push_back(VoxelOf(cell.mean));
   }
   std::erase_if(planes, [](const SquarePlane& plane) { return plane.voxels.empty(); });
-  for (SquarePlane& plane : planes) {
-    std::sort(plane.voxels.begin(), plane.voxels.end());
-    plane.voxels.erase(std::unique(plane.voxels.begin(), plane.voxels.end()), plane.voxels.end());
-  }
+  for (SquarePlane& plane : planes) SortVoxels(plane.voxels);
   return planes;
 }
 
@@ -138,18 +171,22 @@ absl::StatusOr<std::vector<SquarePlane>> FindSquarePlanes(const PosedPoints& poi
                                                           const Eigen::Vector3d& reference,
                                                           const PlaneModelOptions& options,
                                                           const Stop& stop) {
-  std::vector<PlanarCell> cells =
-      FindPlanarCells(points.points, Eigen::Vector3f::Zero(), CellOptions(options));
-  ShareBorders(cells);
+  const std::vector<CellLayer> layers = FindColouredCells(points, CellOptions(options));
   STRATA_RETURN_IF_ERROR(stop.status());
   std::vector<MixtureCell> moved;
-  moved.reserve(cells.size());
+  std::vector<std::uint32_t> point_counts;
   const Eigen::Vector3d shift = points.origin - reference;
-  for (const PlanarCell& cell : cells) moved.push_back(MixtureCellOf(cell, shift, options));
-  std::vector<MixturePlane> start = StartPlanes(cells, moved, options);
+  for (const CellLayer& layer : layers) {
+    for (std::size_t i = 0; i < layer.cells.size(); ++i) {
+      moved.push_back(MixtureCellOf(layer.cells[i], layer.colours[i], shift, options));
+      point_counts.push_back(layer.cells[i].point_count);
+    }
+  }
+  std::vector<MixturePlane> start = StartPlanes(layers, moved, options);
   MixtureOptions mixing;
   mixing.direction_sigma_rad = options.sigma_rad;
   mixing.directions = options.directions;
+  mixing.colour = options.colour;
   PlaneMixture mixture(std::move(moved), mixing);
   mixture.planes = std::move(start);
   for (const MixturePlane& plane : mixture.planes) {
@@ -157,7 +194,7 @@ absl::StatusOr<std::vector<SquarePlane>> FindSquarePlanes(const PosedPoints& poi
   }
   const auto most = static_cast<std::size_t>(options.max_planes);
   STRATA_RETURN_IF_ERROR(FitMixture(most, mixture, stop));
-  return PlanesIn(square, cells, mixture, reference);
+  return PlanesIn(square, point_counts, mixture, reference);
 }
 
 }  // namespace strata

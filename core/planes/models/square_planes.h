@@ -12,6 +12,7 @@
 
 #include "core/common/stop.h"
 #include "core/geometry/primitives.h"
+#include "core/planes/models/plane_colour.h"
 #include "core/planes/models/plane_mixture.h"
 #include "core/planes/models/plane_model_finder.h"
 
@@ -20,6 +21,7 @@ namespace strata {
 // Frame: the caller's reference.
 struct SquarePlane {
   Plane plane;
+  LabColour colour = LabColour::Zero();
   std::vector<Voxel> voxels;  // where it has surface, ascending
   // Σ over its cells in the square.
   Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();  // of their area
@@ -28,7 +30,8 @@ struct SquarePlane {
   std::uint64_t point_count = 0;
 };
 
-// Those with surface in the square. Cells are relative to points.origin + shift.
+// Those with surface in the square. REQUIRES: points have colours if options.colour. Cells are
+// relative to points.origin + shift.
 absl::StatusOr<std::vector<SquarePlane>> FindSquarePlanes(const PosedPoints& points,
                                                           const PlanSquare& square,
                                                           const Eigen::Vector3d& reference,

@@ -13,6 +13,7 @@
 #include "core/common/random.h"
 #include "core/common/stop.h"
 #include "core/planes/models/model_selection.h"
+#include "core/planes/models/plane_colour.h"
 #include "tests/support/simulator.h"
 #include "tests/support/status_matchers.h"
 
@@ -96,6 +97,61 @@ TEST(PlaneMixture, ObjectiveNeverFalls) {
     }
     EXPECT_GT(last, first + 1.0);
   }
+}
+
+// Two colours on one surface, and a reflection on it: each plane keeps its own.
+TEST(PlaneMixture, WithColoursTheObjectiveNeverFallsEither) {
+  for (const std::uint64_t seed : {16U, 17U}) {
+    SCOPED_TRACE(seed);
+    World world = WorldOf({{0, 0, 1}, {0, 0.02, 1}}, 0.02, seed);
+    const LabColour colours[2] = {LabOf({160, 40, 40}), LabOf({150, 150, 150})};
+    Random random(seed + 10);
+    for (std::size_t j = 0; j < world.cells.size(); ++j) {
+      MixtureCell& cell = world.cells[j];
+      const int own = cell.mean.x() > 5.0 ? 1 : 0;
+      cell.mean.x() -= 10.0 * own;  // onto the other
+      cell.colour = j % 20 == 0 ? LabOf({220, 180, 40}) : colours[own];
+      for (double& x : cell.colour) x += 4.0 * random.Gaussian();
+      cell.colour_variance = 30.0;
+    }
+    for (int m = 0; m < 2; ++m) {
+      world.planes[m].voxels = world.planes[0].voxels;
+      world.planes[m].plane = {Eigen::Vector3d::UnitZ(), 0.01 * m};
+      world.planes[m].colour = colours[m] + LabColour(5, 5, -5);
+    }
+    MixtureOptions options;
+    options.colour = true;
+    PlaneMixture mixture = MixtureOf(world, options);
+    double last = mixture.LogLikelihood();
+    for (int step = 0; step < 30; ++step) {
+      const double expected = mixture.ExpectedLogLikelihood();
+      mixture.MStep();
+      EXPECT_GE(mixture.ExpectedLogLikelihood(), expected - 1e-9 * std::abs(expected)) << step;
+      mixture.EStep();
+      EXPECT_GE(mixture.LogLikelihood(), last - 1e-9 * std::abs(last)) << step;
+      last = mixture.LogLikelihood();
+    }
+    for (int m = 0; m < 2; ++m) EXPECT_LT((mixture.planes[m].colour - colours[m]).norm(), 2.5);
+    int right = 0, of = 0;
+    for (std::size_t j = 0; j < world.cells.size(); ++j) {
+      if (j % 20 == 0) continue;
+      ++of;
+      right += mixture.PlaneOf(j) == (j < 80 ? 0U : 1U) ? 1 : 0;
+    }
+    EXPECT_GT(right, 0.95 * of);
+  }
+}
+
+// 6 M + 2 K, and a direction's chance (0132).
+TEST(ModelSelection, AColourCostsThreeParameters) {
+  const World world = WorldOf({{1, 0, 0}, {0, 0, 1}}, 0.01, 18);
+  MixtureOptions options;
+  const PlaneMixture plain = MixtureOf(world, options);
+  options.colour = true;
+  const PlaneMixture coloured = MixtureOf(world, options);
+  const double ln_n = std::log(plain.measurements());
+  EXPECT_NEAR(Bic(plain) + 2.0 * plain.LogLikelihood(), (3 * 2 + 3 * 2) * ln_n, 1e-9);
+  EXPECT_NEAR(Bic(coloured) + 2.0 * coloured.LogLikelihood(), (6 * 2 + 3 * 2) * ln_n, 1e-9);
 }
 
 // What an M-step maximises, for a solver that knows nothing of its closed form: the thesis'

@@ -61,6 +61,20 @@ TEST(PlaneModelCodecTest, TheSameValuesComeBack) {
   EXPECT_EQ(EncodePlaneModelInfo(info_back), EncodePlaneModelInfo(info));
 }
 
+TEST(PlaneModelCodecTest, AColourComesBackAndCostsANewVersionOnlyWhereThereIsOne) {
+  ModelPlane wall = WallWithAWindow();
+  EXPECT_EQ(VersionOfBlob(EncodeModelPlane(wall)), 1);
+  for (const Colour& colour : {Colour{1, 2, 254}, Colour{0, 0, 0}}) {
+    wall.colour = colour;
+    const std::string bytes = EncodeModelPlane(wall);
+    EXPECT_EQ(VersionOfBlob(bytes), 2);
+    STRATA_ASSERT_OK_AND_ASSIGN(const ModelPlane back, DecodeModelPlane(bytes));
+    EXPECT_EQ(back.colour, colour);
+    EXPECT_EQ(back.polygons, wall.polygons);
+  }
+  testing::ExpectDamageIsDataLoss(EncodeModelPlane(wall), &DecodeModelPlane, 4, 300);
+}
+
 TEST(PlaneModelCodecTest, DamageIsDataLoss) {
   testing::ExpectDamageIsDataLoss(EncodeModelPlane(WallWithAWindow()), &DecodeModelPlane, 2, 300);
 }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -11,6 +12,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
+#include "core/cloud/point_cloud.h"
 #include "core/common/stop.h"
 #include "core/geometry/primitives.h"
 #include "core/planes/models/alpha_polygons.h"
@@ -176,6 +178,58 @@ TEST(FindPlaneModel, EndsWhereOutlinesTakeTooMuchMemory) {
   const auto model = FindPlaneModel(WallAndFloor(0.0), options, Stop());
   EXPECT_TRUE(absl::IsResourceExhausted(model.status())) << model.status();
   EXPECT_NE(model.status().message().find("epsilon_m"), std::string::npos);
+}
+
+constexpr Colour kStone = {150, 150, 145}, kRed = {165, 45, 40};
+
+// A floor of 6 x 6 m under a carpet of 2 x 1.5 m that is 5 mm thick.
+PosedPoints FloorWithCarpet() {
+  Random random(6);
+  PosedPoints points;
+  for (int i = 0; i < 80000; ++i) {
+    const double x = random.Uniform(-3.0, 3.0), y = random.Uniform(-3.0, 3.0);
+    const bool carpet = std::abs(x) < 1.0 && std::abs(y) < 0.75;
+    const double z = (carpet ? 0.005 : 0.0) + 0.01 * random.Gaussian();
+    points.points.push_back(Eigen::Vector3d(x, y, z).cast<float>());
+    points.colour.push_back(carpet ? kRed : kStone);
+  }
+  points.views = {{{0.0F, 0.0F, 1.5F}, points.points.size()}};
+  return points;
+}
+
+TEST(FindPlaneModel, ByItsColourACarpetIsAPlaneOfItsOwn) {
+  PosedPoints points = FloorWithCarpet();
+  PlaneModelOptions options;
+  options.colour = true;
+  const auto model = FindPlaneModel(points, options, Stop());
+  ASSERT_TRUE(model.ok()) << model.status();
+  ASSERT_EQ(model->planes.size(), 2U);
+  const ModelPlane &floor = model->planes[0], &carpet = model->planes[1];
+  EXPECT_EQ(floor.colour, kStone);
+  EXPECT_EQ(carpet.colour, kRed);
+  EXPECT_NEAR(floor.plane.distance, 0.0, 0.001);
+  EXPECT_NEAR(carpet.plane.distance, 0.005, 0.001);
+  ASSERT_EQ(carpet.polygons.size(), 1U);
+  EXPECT_NEAR(carpet.polygons[0].area_m2, 3.0, 0.3);
+  ASSERT_EQ(floor.polygons.size(), 1U);
+  EXPECT_NEAR(floor.polygons[0].area_m2, 33.0, 1.0);
+  EXPECT_EQ(floor.polygons[0].holes.size(), 1U);
+
+  options.colour = false;
+  points.colour.clear();
+  const auto plain = FindPlaneModel(points, options, Stop());
+  ASSERT_TRUE(plain.ok()) << plain.status();
+  ASSERT_EQ(plain->planes.size(), 1U);
+  EXPECT_EQ(plain->planes[0].colour, std::nullopt);
+}
+
+TEST(FindPlaneModel, EveryPointNeedsAColourWhereTheyCount) {
+  PosedPoints points = FloorWithCarpet();
+  PlaneModelOptions options;
+  EXPECT_TRUE(absl::IsInvalidArgument(FindPlaneModel(points, options, Stop()).status()));
+  points.colour.pop_back();
+  options.colour = true;
+  EXPECT_TRUE(absl::IsInvalidArgument(FindPlaneModel(points, options, Stop()).status()));
 }
 
 TEST(FindPlaneModel, NothingGivesNothing) {

@@ -1,0 +1,40 @@
+// The flat cells of points, each of one colour where the points have colours (thesis 5.5).
+// Internal to core/planes, not installed.
+#ifndef STRATA_CORE_PLANES_MODELS_COLOURED_CELLS_H_
+#define STRATA_CORE_PLANES_MODELS_COLOURED_CELLS_H_
+
+#include <vector>
+
+#include "core/planes/extraction.h"
+#include "core/planes/models/plane_colour.h"
+#include "core/planes/models/plane_model_finder.h"
+#include "core/planes/planar_cells.h"
+
+namespace strata {
+
+struct CellColour {
+  LabColour mean = LabColour::Zero();
+  double variance = 0.0;  // of the points about it, all three together
+};
+
+struct CellLayer {
+  std::vector<PlanarCell> cells;    // which do not overlap
+  std::vector<CellColour> colours;  // of each
+};
+
+// Where a place has several colours cells of several layers may overlap; points without colours
+// make one layer. In each of the largest cells the points fall into parts wherever their colours
+// do: else a carpet and the floor around it were one cell, as flat as either alone. A part has at
+// most so much surface as its share of the points allows: those of a reflection are few, wherever
+// they lie.
+//
+// A surface along a border of the cells' grid is in cells on both sides of it, each as wide as all
+// of it; these share its area as they share its points. Else it counted twice, and the side with
+// few points drew the plane to itself as much as the other. REQUIRES: options.sensor is the same at
+// any range.
+std::vector<CellLayer> FindColouredCells(const PosedPoints& points,
+                                         const PlaneExtractionOptions& options);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_PLANES_MODELS_COLOURED_CELLS_H_
