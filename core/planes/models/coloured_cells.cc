@@ -226,15 +226,14 @@ std::vector<CellLayer> CellsByColour(const PosedPoints& points,
 
 std::vector<CellLayer> FindColouredCells(const PosedPoints& points,
                                          const PlaneExtractionOptions& options) {
-  std::vector<CellLayer> layers;
-  if (points.colour.empty()) {
-    layers.resize(1);
-    layers[0].cells = FindPlanarCells(points.points, Eigen::Vector3f::Zero(), options);
-    layers[0].colours.resize(layers[0].cells.size());
-  } else {
-    layers = CellsByColour(points, options);
+  if (!points.colour.empty()) {
+    std::vector<CellLayer> layers = CellsByColour(points, options);
+    ShareSides(layers);
+    return layers;
   }
-  ShareSides(layers);
+  std::vector<CellLayer> layers(1);
+  layers[0].cells = FindPlanarCells(points.points, Eigen::Vector3f::Zero(), options);
+  layers[0].colours.resize(layers[0].cells.size());
   return layers;
 }
 
