@@ -1,13 +1,19 @@
 #include "core/world/job_arguments.h"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 #include <variant>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "absl/strings/str_split.h"
+#include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
+#include <Eigen/Geometry>
 
 #include "core/common/status.h"
 #include "core/world/job_kinds.h"
@@ -15,6 +21,20 @@
 
 namespace strata {
 namespace {
+
+constexpr double kAnyHeightM = 1e7;
+
+std::optional<Eigen::AlignedBox3d> ParseBox(absl::string_view text) {
+  std::vector<double> n;
+  for (const absl::string_view word : absl::StrSplit(text, ',')) {
+    double value = 0.0;
+    if (!absl::SimpleAtod(word, &value) || !std::isfinite(value)) return std::nullopt;
+    n.push_back(value);
+  }
+  if (n.size() == 4) n.insert(n.end(), {-kAnyHeightM, kAnyHeightM});
+  if (n.size() != 6 || n[0] >= n[2] || n[1] >= n[3] || n[4] >= n[5]) return std::nullopt;
+  return Eigen::AlignedBox3d(Eigen::Vector3d(n[0], n[1], n[4]), Eigen::Vector3d(n[2], n[3], n[5]));
+}
 
 // Whether a text is what a type says.
 struct TypeCheck {
@@ -38,6 +58,7 @@ struct TypeCheck {
     });
   }
   bool operator()(const NameType&) const { return ValidateName("", text).ok(); }
+  bool operator()(const BoxType&) const { return ParseBox(text).has_value(); }
 };
 
 absl::Status Check(const JobKind& kind, const std::string& name, const std::string& text) {
@@ -73,6 +94,10 @@ std::int64_t JobArguments::Whole(absl::string_view name) const {
 double JobArguments::Real(absl::string_view name) const {
   double value = 0.0;
   return absl::SimpleAtod(Text(name), &value) ? value : 0.0;
+}
+
+Eigen::AlignedBox3d JobArguments::Box(absl::string_view name) const {
+  return ParseBox(Text(name)).value_or(Eigen::AlignedBox3d());
 }
 
 absl::StatusOr<JobArguments> ReadJobArguments(absl::string_view kind_name,

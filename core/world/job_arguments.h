@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include <Eigen/Geometry>
 
 #include "core/world/job.h"
 
@@ -26,6 +27,8 @@ class JobArguments {
   bool Flag(absl::string_view name) const;
   std::int64_t Whole(absl::string_view name) const;
   double Real(absl::string_view name) const;
+  // Without heights from −1e7 to 1e7 m.
+  Eigen::AlignedBox3d Box(absl::string_view name) const;
   // Of a choice or a name.
   const std::string& Text(absl::string_view name) const { return texts_.at(std::string(name)); }
 

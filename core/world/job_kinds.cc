@@ -15,6 +15,7 @@ namespace {
 
 constexpr int kSummaryColumn = 10;
 constexpr int kHelpColumn = 24;
+constexpr char kBoxShape[] = "X0,Y0,X1,Y1[,Z0,Z1]";
 
 JobParameter Threads() {
   return {"threads", WholeType{1, 64}, "", "Threads at work (the server's own number)"};
@@ -90,6 +91,8 @@ std::vector<JobParameter> PlanesParameters() {
       {"rho_m", RealType{0.0, 1.0}, "0", "Spread about a plane [m]; 0: as the points say"},
       {"sigma_rad", RealType{0.001, 0.5}, "0.03", "Of normals about a main direction [rad]"},
       {"directions", FlagType(), "1", "Planes heed the main directions of all"},
+      {"colour", FlagType(), "0", "One colour a plane; only scans that have colours"},
+      {"region", BoxType(), "", "Only this part of the map [m]; default: all of it"},
       {"max_planes", WholeType{1, 10'000}, "500", "In a square of 60 m"},
       {"min_area_m2", RealType{0.01, 10'000.0}, "1", "Smaller planes are left out [m²]"},
       {"epsilon_m", RealType{0.05, 5.0}, "0.25", "Points so near are one surface [m]"},
@@ -132,6 +135,7 @@ struct TypeWriter {
     return absl::StrJoin(choice.choices, "|");
   }
   std::string operator()(const NameType&) const { return "NAME"; }
+  std::string operator()(const BoxType&) const { return kBoxShape; }
 };
 
 struct BoundWriter {
@@ -145,6 +149,9 @@ struct BoundWriter {
   }
   std::string operator()(const ChoiceType& choice) const { return OneOf(choice.choices); }
   std::string operator()(const NameType&) const { return "1 to 100 of A-Z a-z 0-9 _ . -"; }
+  std::string operator()(const BoxType&) const {
+    return absl::StrCat(kBoxShape, " with X0 < X1, Y0 < Y1 and Z0 < Z1");
+  }
 };
 
 // `left`, and `right` from `column` on: beside it if there is room, or below.

@@ -40,9 +40,11 @@ struct RealType {
 struct ChoiceType {
   std::vector<absl::string_view> choices;
 };
-// a name as ValidateName() takes it.
+// a name as ValidateName() takes it;
 struct NameType {};
-using JobParameterType = std::variant<FlagType, WholeType, RealType, ChoiceType, NameType>;
+// a box "X0,Y0,X1,Y1" or "X0,Y0,X1,Y1,Z0,Z1" in the map [m], of finite numbers.
+struct BoxType {};
+using JobParameterType = std::variant<FlagType, WholeType, RealType, ChoiceType, NameType, BoxType>;
 
 struct JobParameter {
   absl::string_view name;

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include <Eigen/Core>
 
+#include "core/cloud/point_cloud.h"
 #include "core/common/status.h"
 #include "core/geometry/primitives.h"
 #include "proto/translate/geometry.h"
@@ -58,6 +59,7 @@ v1::ModelPlane ToProto(const ModelPlane& plane) {
   proto.set_rms_m(plane.rms_m);
   proto.set_sigma_m(plane.sigma_m);
   proto.set_sigma_rad(plane.sigma_rad);
+  if (plane.colour.has_value()) proto.set_colour(PackedRgb(*plane.colour));
   for (const PlanePolygon& polygon : plane.polygons) {
     v1::PlanePolygon& added = *proto.add_polygons();
     Put(polygon.outer, *added.mutable_outer());
@@ -82,6 +84,11 @@ absl::StatusOr<ModelPlane> FromProto(const v1::ModelPlane& proto) {
   plane.rms_m = proto.rms_m();
   plane.sigma_m = proto.sigma_m();
   plane.sigma_rad = proto.sigma_rad();
+  if (proto.colour() > 0xFFFFFF) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("colour = ", proto.colour(), " is not 0xRRGGBB"));
+  }
+  if (proto.has_colour()) plane.colour = ColourOfRgb(proto.colour());
   for (const v1::PlanePolygon& polygon : proto.polygons()) {
     STRATA_ASSIGN_OR_RETURN(PlanePolygon added, PolygonOf(polygon));
     plane.polygons.push_back(std::move(added));

@@ -1,6 +1,7 @@
 // Conformance: models of maps.
 #include <cmath>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/cloud/point_cloud.h"
 #include "core/geometry/primitives.h"
 #include "tests/support/database_suite.h"
 #include "tests/support/status_matchers.h"
@@ -103,6 +105,64 @@ TEST_P(DatabaseSuite, AnEmptyMapHasNoPlanes) {
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel model, ModelOf(db()));
   EXPECT_THAT(model.planes, SizeIs(0));
   EXPECT_EQ(model.info.scans, 0U);
+}
+
+TEST_P(DatabaseSuite, PlanesOfARegionOnly) {
+  const PointCloud room = Room();
+  STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", 1}, room), room));
+  AwaitIntegration(db(), kMap);
+  const JobInfo job = RunPlanes(db(), {{"region", "-4,-4,0,4"}});
+  ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
+  STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel half, ModelOf(db()));
+  ASSERT_THAT(half.planes, SizeIs(1));
+  EXPECT_EQ(half.planes[0].kind, PlaneKind::kLevel);
+  EXPECT_NEAR(half.planes[0].area_m2, 32.0, 1.5);
+  for (const Eigen::Vector3d& p : half.planes[0].polygons[0].outer) EXPECT_LE(p.x(), 0.01);
+  ASSERT_EQ(RunPlanes(db(), {{"region", "-4,-4,4,4,0.5,9"}}).state, JobState::kSucceeded);
+  STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel wall, ModelOf(db()));
+  ASSERT_THAT(wall.planes, SizeIs(1));
+  EXPECT_EQ(wall.planes[0].kind, PlaneKind::kWall);
+  const JobInfo nothing = RunPlanes(db(), {{"region", "1000,1000,1010,1010"}});
+  ASSERT_EQ(nothing.state, JobState::kSucceeded) << nothing.message;
+  EXPECT_THAT(nothing.message, HasSubstr("no point lies in the region"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel none, ModelOf(db()));
+  EXPECT_THAT(none.planes, SizeIs(0));
+  EXPECT_EQ(none.info.scans, 0U);
+  EXPECT_THAT(db().jobs().Start({}, kMap, "planes", {{"region", "4,0,0,1"}}),
+              StatusIs(Code::kInvalidArgument, HasSubstr("X0 < X1")));
+}
+
+TEST_P(DatabaseSuite, PlanesByColourTakeScansWithColours) {
+  const PointCloud grey = Room();
+  STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", 1}, grey), grey));
+  AwaitIntegration(db(), kMap);
+  const JobInfo refused = RunPlanes(db(), {{"colour", "1"}});
+  EXPECT_EQ(refused.state, JobState::kFailed);
+  EXPECT_THAT(refused.message, HasSubstr("none of 1 scans has colours"));
+  EXPECT_THAT(refused.message, HasSubstr("colour=1"));
+
+  PointCloud carpet = LevelFloor();
+  for (const Eigen::Vector3f& p : carpet.points) {
+    carpet.colour.push_back(p.x() < 1.0F ? Colour{165, 45, 40} : Colour{150, 150, 145});
+  }
+  STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", 2}, carpet), carpet));
+  AwaitIntegration(db(), kMap);
+  const JobInfo job = RunPlanes(db(), {{"colour", "1"}});
+  ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
+  EXPECT_EQ(job.metrics.at("scans_without_colours"), 1.0);
+  EXPECT_THAT(job.message, HasSubstr("left out 1 scans without colours"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel model, ModelOf(db()));
+  ASSERT_THAT(model.planes, SizeIs(2));
+  EXPECT_EQ(model.info.scans, 1U);
+  EXPECT_EQ(model.planes[0].colour, (Colour{165, 45, 40}));
+  EXPECT_EQ(model.planes[1].colour, (Colour{150, 150, 145}));
+  EXPECT_NEAR(model.planes[0].area_m2, 40.0, 1.5);
+  EXPECT_NEAR(model.planes[1].area_m2, 24.0, 1.5);
+
+  ASSERT_EQ(RunPlanes(db()).state, JobState::kSucceeded);
+  STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel plain, ModelOf(db()));
+  ASSERT_THAT(plain.planes, SizeIs(2));  // the floor, and the wall of the grey scan
+  EXPECT_EQ(plain.planes[0].colour, std::nullopt);
 }
 
 TEST_P(DatabaseSuite, PlanesRefuseWhatIsOutOfBoundsAndEndWithTheirSink) {

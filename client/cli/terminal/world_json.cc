@@ -145,6 +145,7 @@ Json ToJson(const ModelPlane& plane) {
           {"rms_m", plane.rms_m},
           {"sigma_m", plane.sigma_m},
           {"sigma_rad", plane.sigma_rad},
+          {"colour", plane.colour.has_value() ? ToJson(*plane.colour) : Json()},
           {"polygons", polygons}};
 }
 

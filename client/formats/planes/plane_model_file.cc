@@ -45,7 +45,7 @@ void AddPiece(const FlatPiece& piece, const ModelPlane& plane, Geometry& geometr
   for (std::size_t i = 0; i < corners; ++i) {
     geometry.vertices.push_back(piece[i]);
     geometry.normals.emplace_back(plane.plane.normal.cast<float>());
-    geometry.colour.push_back(LookOf(plane.kind).colour);
+    geometry.colour.push_back(plane.colour.value_or(LookOf(plane.kind).colour));
   }
   geometry.triangles.push_back({first, first + 1, first + 2});
   if (corners == 4) geometry.triangles.push_back({first, first + 2, first + 3});
@@ -81,7 +81,7 @@ std::string GeoJsonFeature(const ModelPlane& plane,
   }
   std::string out = absl::StrFormat(
       R"({"type":"Feature","properties":{"plane":%d,"kind":"%s","direction":%s,"area_m2":%.4f,)"
-      R"("rms_m":%.6f,"sigma_m":%.6f,"holes_seen_open":[%s]},)"
+      R"("rms_m":%.6f,"sigma_m":%.6f,"colour":%s,"holes_seen_open":[%s]},)"
       R"("geometry":{"type":"Polygon","coordinates":[)",
       plane.id,
       LookOf(plane.kind).name,
@@ -89,6 +89,7 @@ std::string GeoJsonFeature(const ModelPlane& plane,
       polygon.area_m2,
       plane.rms_m,
       plane.sigma_m,
+      plane.colour.has_value() ? absl::StrFormat("\"#%06x\"", PackedRgb(*plane.colour)) : "null",
       holes_open);
   const bool turned = plane.plane.normal.z() < 0.0;
   AddGeoJsonRing(polygon.outer, turned, origin, out);

@@ -18,8 +18,8 @@ namespace strata {
 // The polygons in the map frame. All of these: INVALID_ARGUMENT for a model that CheckPlaneModel
 // does not take; without polygons a file without any.
 
-// Triangles of each polygon on vertices of its own, with the plane's normal and the colour of its
-// kind: walls blue, level planes yellow, sloped ones red.
+// Triangles of each polygon on vertices of its own, with the plane's normal and its colour, or
+// where it has none that of its kind: walls blue, level planes yellow, sloped ones red.
 absl::StatusOr<Geometry> PlaneModelGeometry(const PlaneModel& model);
 
 // DXF in metres: layers WALL, LEVEL and SLOPED with faces and borders; borders of holes of which

@@ -49,6 +49,8 @@ class Plane:
     """Of its points' distances to it [m]."""
     polygons: list
     """By falling area."""
+    rgb: tuple | None
+    """Mean colour of its points, 0 to 255; None unless the job told planes apart by colours (colour=1)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,6 +75,7 @@ def _plane(message):
         id=message.id, normal=poses.array3(message.plane.normal), distance=message.plane.distance,
         kind=_KINDS[message.kind], direction=message.direction if message.HasField("direction") else None,
         area=message.area_m2, rms=message.rms_m,
+        rgb=tuple(message.colour.to_bytes(3, "big")) if message.HasField("colour") else None,
         polygons=[Polygon(outer=_ring(polygon.outer), area=polygon.area_m2,
                           holes=[Hole(ring=_ring(hole.ring), seen_open=hole.seen_open) for hole in polygon.holes])
                   for polygon in message.polygons])

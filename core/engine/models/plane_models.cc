@@ -24,6 +24,7 @@ PlaneModelOptions OptionsOf(const JobArguments& arguments) {
   options.rho_m = arguments.Real("rho_m");
   options.sigma_rad = arguments.Real("sigma_rad");
   options.directions = arguments.Flag("directions");
+  options.colour = arguments.Flag("colour");
   options.max_planes = static_cast<int>(arguments.Whole("max_planes"));
   options.min_area_m2 = arguments.Real("min_area_m2");
   options.epsilon_m = arguments.Real("epsilon_m");
@@ -55,19 +56,20 @@ absl::StatusOr<PlaneModel> FindModel(SquarePoints& points,
   return finder.Finish(stop);
 }
 
-absl::Status Keep(MapCore& core,
-                  const PlaneModelInfo& info,
-                  const PlaneModel& model,
-                  const Stop& stop) {
-  return core.writer().Run(Durability::kFull, 0, stop, [&](StorageWriter& writer) -> absl::Status {
-    STRATA_RETURN_IF_ERROR(writer.DeletePlaneModel());
-    STRATA_RETURN_IF_ERROR(writer.PutPlaneModelPart(info.job, 0, EncodePlaneModelInfo(info)));
-    for (std::size_t m = 0; m < model.planes.size(); ++m) {
-      STRATA_RETURN_IF_ERROR(
-          writer.PutPlaneModelPart(info.job, m + 1, EncodeModelPlane(model.planes[m])));
-    }
-    return absl::OkStatus();
-  });
+PointChoice ChoiceOf(const JobArguments& arguments) {
+  PointChoice choice;
+  choice.colour = arguments.Flag("colour");
+  if (arguments.Has("region")) choice.region = arguments.Box("region");
+  return choice;
+}
+
+// Where none of them has, planes by colour would be none at all.
+absl::Status CheckColours(const SquarePoints& points) {
+  if (points.scans() > 0 || points.without_colour() == 0) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      absl::StrCat("none of ",
+                   points.without_colour(),
+                   " scans has colours; upload scans with colours, or leave out colour=1"));
 }
 
 // What a user should know of the points that the planes are from: that there were too many in a
@@ -84,10 +86,39 @@ std::string PointsMessage(const SquarePoints& points, const PlaneModelInfo& info
                         points.most_thinned(),
                         " points was taken");
   }
-  if (info.planes > 0 || info.points == 0) return "";
+  if (info.planes > 0 || points.loaded() == 0) return "";
   return absl::StrCat("; a surface has to have some ",
                       kLeastPointsM2,
                       " points a square metre, and min_area_m2 of it");
+}
+
+std::string MessageOf(const PlaneModelInfo& info, const SquarePoints& points, bool region) {
+  std::string message = absl::StrCat(info.planes,
+                                     " planes with ",
+                                     info.directions.size(),
+                                     " main directions from ",
+                                     info.scans,
+                                     " scans");
+  if (region && points.loaded() == 0) absl::StrAppend(&message, "; no point lies in the region");
+  if (points.without_colour() > 0) {
+    absl::StrAppend(&message, "; left out ", points.without_colour(), " scans without colours");
+  }
+  return message + PointsMessage(points, info) + points.damaged().Message();
+}
+
+absl::Status Keep(MapCore& core,
+                  const PlaneModelInfo& info,
+                  const PlaneModel& model,
+                  const Stop& stop) {
+  return core.writer().Run(Durability::kFull, 0, stop, [&](StorageWriter& writer) -> absl::Status {
+    STRATA_RETURN_IF_ERROR(writer.DeletePlaneModel());
+    STRATA_RETURN_IF_ERROR(writer.PutPlaneModelPart(info.job, 0, EncodePlaneModelInfo(info)));
+    for (std::size_t m = 0; m < model.planes.size(); ++m) {
+      STRATA_RETURN_IF_ERROR(
+          writer.PutPlaneModelPart(info.job, m + 1, EncodeModelPlane(model.planes[m])));
+    }
+    return absl::OkStatus();
+  });
 }
 
 absl::StatusOr<std::uint64_t> JobOfModel(MapCore& core) {
@@ -118,8 +149,10 @@ absl::Status RunPlanesJob(MapCore& core,
   PlaneModelInfo info;
   info.job = job.id;
   info.epoch = core.snapshots().current().epoch;
-  SquarePoints points(core);
+  const PointChoice choice = ChoiceOf(arguments);
+  SquarePoints points(core, choice);
   STRATA_RETURN_IF_ERROR(points.ListScans(info.epoch, context.stop()));
+  STRATA_RETURN_IF_ERROR(CheckColours(points));
   STRATA_ASSIGN_OR_RETURN(const PlaneModel model, FindModel(points, options, context));
   info.made = absl::Now();
   info.scans = points.scans();
@@ -133,14 +166,10 @@ absl::Status RunPlanesJob(MapCore& core,
   context.SetMetric("scans_without_points", static_cast<double>(points.without_points()));
   context.SetMetric("squares_thinned", static_cast<double>(points.thinned_squares()));
   points.damaged().SetMetrics(context);
-  context.SetMessage(absl::StrCat(info.planes,
-                                  " planes with ",
-                                  info.directions.size(),
-                                  " main directions from ",
-                                  info.scans,
-                                  " scans",
-                                  PointsMessage(points, info),
-                                  points.damaged().Message()));
+  if (choice.colour) {
+    context.SetMetric("scans_without_colours", static_cast<double>(points.without_colour()));
+  }
+  context.SetMessage(MessageOf(info, points, choice.region.has_value()));
   return absl::OkStatus();
 }
 

@@ -17,8 +17,9 @@ namespace strata {
 
 // Finds the planes of all integrated scans as the current epoch has them, and keeps them in place
 // of those of before, in one commit. Scans without points, and damaged ones, are left out and
-// counted. Memory grows with the surface, and with kMostSquarePoints. Same scans, poses and
-// arguments, same planes.
+// counted; with colour=1 those without colours, too. FAILED_PRECONDITION where that leaves none. A
+// region without points is an empty model, and the job's message says so. Memory grows with the
+// surface, and with kMostSquarePoints. Same scans, poses and arguments, same planes.
 absl::Status RunPlanesJob(MapCore& core,
                           const JobInfo& job,
                           const JobArguments& arguments,

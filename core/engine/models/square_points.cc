@@ -31,13 +31,17 @@ std::int64_t SquareIndexOf(double at_m) {
   return static_cast<std::int64_t>(std::floor(at_m / kSquareM));
 }
 
+template <typename T>
+void KeepHalfOf(std::vector<T>& column) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < column.size(); i += 2) column[kept++] = column[i];
+  column.resize(kept);
+}
+
 // Keeps every second point, so that which are kept depends on their order alone.
 void KeepHalf(PosedPoints& points) {
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < points.points.size(); i += 2) {
-    points.points[kept++] = points.points[i];
-  }
-  points.points.resize(kept);
+  KeepHalfOf(points.points);
+  KeepHalfOf(points.colour);
   for (PosedPoints::View& view : points.views) view.end = (view.end + 1) / 2;
 }
 
@@ -54,14 +58,19 @@ absl::Status SquarePoints::ListScans(std::uint64_t epoch, const Stop& stop) {
       ++without_points_;
       return;
     }
-    points_ += posed.scan.header.point_count;
+    if (choice_.colour && !posed.scan.header.has_colour) {
+      ++without_colour_;
+      return;
+    }
     scans_.push_back({std::move(posed.scan), posed.pose->T_map_scan});
   }));
   for (std::size_t i = 0; i < scans_.size(); ++i) {
     STRATA_RETURN_IF_ERROR(stop.status());
     STRATA_ASSIGN_OR_RETURN(const std::vector<TileKey> tiles,
                             reader->TilesOfScan(scans_[i].scan.number));
-    AddTiles(tiles, i);
+    if (!AddTiles(tiles, i) && choice_.region.has_value()) continue;
+    ++reaching_;
+    points_ += scans_[i].scan.header.point_count;
   }
   for (const Place& place : places_) {
     const Eigen::Vector2d corner(kSquareM * static_cast<double>(place.first),
@@ -71,8 +80,16 @@ absl::Status SquarePoints::ListScans(std::uint64_t epoch, const Stop& stop) {
   return absl::OkStatus();
 }
 
-void SquarePoints::AddTiles(const std::vector<TileKey>& tiles, std::size_t scan) {
+bool SquarePoints::AddTiles(const std::vector<TileKey>& tiles, std::size_t scan) {
   const double edge_m = kTileCells * core_.info().parameters.mls.cell_size_m;
+  const auto in_region = [this](std::int64_t x, std::int64_t y) {
+    if (!choice_.region.has_value()) return true;
+    const Eigen::Vector2d corner(kSquareM * static_cast<double>(x),
+                                 kSquareM * static_cast<double>(y));
+    const PlanSquare square(corner, corner + Eigen::Vector2d(kSquareM, kSquareM));
+    return square.intersects(
+        PlanSquare(choice_.region->min().head<2>(), choice_.region->max().head<2>()));
+  };
   absl::btree_set<Place> around;
   for (const TileKey& tile : tiles) {
     const auto range = [edge_m](std::int32_t at, double margin_m) {
@@ -82,7 +99,9 @@ void SquarePoints::AddTiles(const std::vector<TileKey>& tiles, std::size_t scan)
     const auto [x_first, x_last] = range(tile.x, kSquareMarginM);
     const auto [y_first, y_last] = range(tile.y, kSquareMarginM);
     for (std::int64_t x = x_first; x <= x_last; ++x) {
-      for (std::int64_t y = y_first; y <= y_last; ++y) around.insert({x, y});
+      for (std::int64_t y = y_first; y <= y_last; ++y) {
+        if (in_region(x, y)) around.insert({x, y});
+      }
     }
   }
   for (const Place& place : around) {
@@ -91,6 +110,7 @@ void SquarePoints::AddTiles(const std::vector<TileKey>& tiles, std::size_t scan)
       places_.insert(std::upper_bound(places_.begin(), places_.end(), place), place);
     scans.push_back(scan);
   }
+  return !around.empty();
 }
 
 absl::StatusOr<PosedPoints> SquarePoints::Load(std::size_t i, const Stop& stop) {
@@ -110,12 +130,15 @@ absl::StatusOr<PosedPoints> SquarePoints::Load(std::size_t i, const Stop& stop) 
       points.views.push_back({sensor.cast<float>(), points.points.size()});
       continue;
     }
-    points.points.resize(points.views.empty() ? 0 : points.views.back().end);
+    const std::size_t before = points.views.empty() ? 0 : points.views.back().end;
+    points.points.resize(before);
+    if (choice_.colour) points.colour.resize(before);
     STRATA_ASSIGN_OR_RETURN(const bool leave_out, MayLeaveOut(placed, done));
     if (!leave_out) return done;
   }
   if (thinned.every > 1) thinned_.insert(i);
   most_thinned_ = std::max(most_thinned_, thinned.every);
+  loaded_ += points.points.size();
   return std::move(thinned.points);
 }
 
@@ -138,8 +161,10 @@ absl::Status SquarePoints::ForEachPart(std::size_t scan,
   return Decode(scans_[scan], stop, [&](ScanPoints part) {
     body(part);
     if (!hold) return;  // otherwise the part is all of it
-    part.shrink_to_fit();
-    const std::size_t bytes = part.size() * sizeof(part[0]) + kHeldBytes;
+    part.points.shrink_to_fit();
+    part.colour.shrink_to_fit();
+    const std::size_t bytes = part.points.size() * sizeof(part.points[0]) +
+                              part.colour.size() * sizeof(part.colour[0]) + kHeldBytes;
     held_.Put(scan, std::make_shared<const ScanPoints>(std::move(part)), bytes);
   });
 }
@@ -156,11 +181,12 @@ absl::Status SquarePoints::Decode(const PlacedScan& placed,
   return source.ForEachBlock(placed.scan, [&](const PointCloud& block) -> absl::Status {
     STRATA_RETURN_IF_ERROR(stop.status());
     ScanPoints part;
-    part.reserve(block.size());
+    part.points.reserve(block.size());
     for (std::size_t i = 0; i < block.size(); ++i) {
       if (!source.faded().empty() && source.faded()[i] != 0) continue;
       if (!sensor.Takes((block.points[i] - block.sensor_origin).norm())) continue;
-      part.push_back((turn * block.points[i].cast<double>()).cast<float>());
+      part.points.push_back((turn * block.points[i].cast<double>()).cast<float>());
+      if (choice_.colour) part.colour.push_back(block.colour[i]);
     }
     body(std::move(part));
     return absl::OkStatus();
@@ -173,12 +199,16 @@ void SquarePoints::Append(const PlacedScan& placed,
                           Thinned& thinned) const {
   PosedPoints& points = thinned.points;
   const Eigen::Vector3d at = placed.T_map_scan.translation();
-  for (const Eigen::Vector3f& own : part) {
-    const Eigen::Vector3d p = at + own.cast<double>();
-    if (!around.contains(p.head<2>()) || thinned.inside++ % thinned.every != 0) continue;
+  for (std::size_t i = 0; i < part.points.size(); ++i) {
+    const Eigen::Vector3d p = at + part.points[i].cast<double>();
+    if (!around.contains(p.head<2>())) continue;
+    if (choice_.region.has_value() && !choice_.region->contains(p)) continue;
+    if (thinned.inside++ % thinned.every != 0) continue;
     if (points.points.empty()) points.origin.z() = p.z();
     const Eigen::Vector3f from_origin = (p - points.origin).cast<float>();
-    if (std::abs(from_origin.z()) < kMostFromOriginM) points.points.push_back(from_origin);
+    if (std::abs(from_origin.z()) >= kMostFromOriginM) continue;
+    points.points.push_back(from_origin);
+    if (choice_.colour) points.colour.push_back(part.colour[i]);
   }
   while (points.points.size() > most_points_) {
     KeepHalf(points);

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -32,17 +33,26 @@ inline constexpr double kSquareMarginM = 5.0;
 // Points of a square; of more, every second, every fourth … is taken.
 inline constexpr std::size_t kMostSquarePoints = 4'000'000;
 
+// Which points.
+struct PointChoice {
+  bool colour = false;                        // only of scans with colours, and those, too
+  std::optional<Eigen::AlignedBox3d> region;  // in the map
+};
+
 // A scan is in all squares that it saw, and each is looked at twice: its points are kept for the
 // next one as long as they have room among the caches. Not thread-safe.
 class SquarePoints {
  public:
   // `core` must outlive it.
-  explicit SquarePoints(MapCore& core, std::size_t most_points = kMostSquarePoints)
+  SquarePoints(MapCore& core,
+               const PointChoice& choice,
+               std::size_t most_points = kMostSquarePoints)
       : core_(core),
+        choice_(choice),
         most_points_(most_points),
         held_(core.caches(), core.caches()->max_bytes() / 2) {}
 
-  // Finds the integrated scans of `epoch` and the squares that they are in.
+  // Finds the integrated scans of `epoch` and the squares of the region that they are in.
   absl::Status ListScans(std::uint64_t epoch, const Stop& stop);
   // In the order of their places.
   const std::vector<PlanSquare>& squares() const { return squares_; }
@@ -50,10 +60,15 @@ class SquarePoints {
   // meanwhile, lost their points or are damaged there are none.
   absl::StatusOr<PosedPoints> Load(std::size_t i, const Stop& stop);
 
-  std::uint64_t scans() const { return scans_.size(); }
-  // Of all scans.
+  // Those that reach into the region.
+  std::uint64_t scans() const { return reaching_; }
+  // Of those scans.
   std::uint64_t points() const { return points_; }
+  // That Load() has given.
+  std::uint64_t loaded() const { return loaded_; }
   std::uint64_t without_points() const { return without_points_; }
+  // Left out for that.
+  std::uint64_t without_colour() const { return without_colour_; }
   const DamagedScans& damaged() const { return damaged_; }
   // Of the squares loaded so far those with more points than may be, and of how many points of
   // the fullest one was taken.
@@ -67,9 +82,13 @@ class SquarePoints {
   };
   using Place = std::pair<std::int64_t, std::int64_t>;  // of a square
   // Points that count, turned as the map is, from where the scan was.
-  using ScanPoints = std::vector<Eigen::Vector3f>;
+  struct ScanPoints {
+    std::vector<Eigen::Vector3f> points;
+    std::vector<Colour> colour;  // of each, where colours count
+  };
 
-  void AddTiles(const std::vector<TileKey>& tiles, std::size_t scan);
+  // Whether any of them reaches into the region.
+  bool AddTiles(const std::vector<TileKey>& tiles, std::size_t scan);
   // Gives the points of the scan, at once where it is small enough to be held, else in blocks.
   absl::Status ForEachPart(std::size_t scan,
                            const Stop& stop,
@@ -91,13 +110,17 @@ class SquarePoints {
   absl::StatusOr<bool> MayLeaveOut(const PlacedScan& placed, const absl::Status& why);
 
   MapCore& core_;
+  const PointChoice choice_;
   const std::size_t most_points_;  // of a square
   std::vector<PlacedScan> scans_;
   absl::btree_map<Place, std::vector<std::size_t>> scans_around_;
   std::vector<PlanSquare> squares_;
   std::vector<Place> places_;
+  std::uint64_t reaching_ = 0;
   std::uint64_t points_ = 0;
+  std::uint64_t loaded_ = 0;
   std::uint64_t without_points_ = 0;
+  std::uint64_t without_colour_ = 0;
   std::uint64_t epoch_ = 0;
   DamagedScans damaged_;
   LruCache<std::size_t, const ScanPoints> held_;  // by index of the scan

@@ -487,7 +487,8 @@ TEST_F(WorldCommandsTest, PlanesAreListedWithTheirSupporters) {
 }
 
 TEST_F(WorldCommandsTest, PlanesOfAMapAreShownExportedAndDrawn) {
-  const PlaneModel room = ::strata::testing::DrawnRoom();
+  PlaneModel room = ::strata::testing::DrawnRoom();
+  room.planes[1].colour = Colour{160, 45, 40};
   ON_CALL(db_.models(), GetPlaneModel(_, _, _)).WillByDefault([&](auto&, auto, auto sink) {
     for (const ModelPlane& plane : room.planes) STRATA_EXPECT_OK(sink(plane));
     PlaneModelInfo info;
@@ -522,6 +523,8 @@ TEST_F(WorldCommandsTest, PlanesOfAMapAreShownExportedAndDrawn) {
   EXPECT_EQ(model["stale"], true);
   EXPECT_EQ(model["planes"].size(), 6U);
   EXPECT_EQ(model["planes"][2]["polygons"][0]["holes"][0]["seen_open"], true);
+  EXPECT_EQ(model["planes"][1]["colour"], "#a02d28");
+  EXPECT_TRUE(model["planes"][2]["colour"].is_null());
   const ::strata::testing::TempDir folder;
   const std::string out = folder.path() / "room";
   EXPECT_EQ(RunJson({"planes", "export", "m", out + ".dxf"})["planes"], 6);

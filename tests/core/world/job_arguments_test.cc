@@ -7,6 +7,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include <Eigen/Core>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -77,6 +78,21 @@ std::vector<Expected> AllParameters() {
       {"planes", "rho_m", "0", {"0", "1"}, {"-0.1", "1.1", "nan"}},
       {"planes", "sigma_rad", "0.03", {"0.001", "0.5"}, {"0", "0.6"}},
       {"planes", "directions", "1", {"0", "1"}, kNoFlags},
+      {"planes", "colour", "0", {"0", "1"}, kNoFlags},
+      {"planes",
+       "region",
+       "",
+       {"0,0,20,15", "-1.5,-2,1e3,4,-0.5,2.5"},
+       {"",
+        "0,0,20",
+        "0,0,20,15,3",
+        "20,0,0,15",
+        "0,0,0,1",
+        "0,0,1,1,2,2",
+        "0,0,nan,1",
+        "0,0,inf,1",
+        "a,0,1,1",
+        "0,0,1,1,0,1,2"}},
       {"planes", "max_planes", "500", {"1", "10000"}, {"0", "10001"}},
       {"planes", "min_area_m2", "1", {"0.01", "10000"}, {"0", "10001"}},
       {"planes", "epsilon_m", "0.25", {"0.05", "5"}, {"0.04", "5.1"}},
@@ -145,6 +161,17 @@ TEST(JobArgumentsTest, ValuesHaveTheTypesOfTheirParameters) {
   EXPECT_FALSE(arguments.Flag("planes"));
   EXPECT_TRUE(arguments.Flag("robust"));
   EXPECT_EQ(arguments.Text("weighting"), "covariance");
+}
+
+TEST(JobArgumentsTest, BoxesHaveTheirCornersAndAnyHeight) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobArguments flat,
+                              ReadJobArguments("planes", {{"region", "-1,2,3.5,4"}}));
+  EXPECT_EQ(flat.Box("region").min(), Eigen::Vector3d(-1, 2, -1e7));
+  EXPECT_EQ(flat.Box("region").max(), Eigen::Vector3d(3.5, 4, 1e7));
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobArguments high,
+                              ReadJobArguments("planes", {{"region", "-1,2,3.5,4,-0.5,9"}}));
+  EXPECT_EQ(high.Box("region").min(), Eigen::Vector3d(-1, 2, -0.5));
+  EXPECT_EQ(high.Box("region").max(), Eigen::Vector3d(3.5, 4, 9));
 }
 
 TEST(JobArgumentsTest, BoundsAreSaid) {

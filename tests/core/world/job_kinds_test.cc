@@ -88,6 +88,8 @@ TEST(JobKindsTest, TypesSayWhatTheyTake) {
   EXPECT_EQ(both(RealType{1e-12, 0.999999}), "1e-12..0.999999; in [1e-12, 0.999999]");
   EXPECT_EQ(both(ChoiceType{{"a", "b"}}), "a|b; a or b");
   EXPECT_EQ(both(ChoiceType{{"a", "b=N", "c"}}), "a|b=N|c; a, b=N or c");
+  EXPECT_EQ(both(BoxType()),
+            "X0,Y0,X1,Y1[,Z0,Z1]; X0,Y0,X1,Y1[,Z0,Z1] with X0 < X1, Y0 < Y1 and Z0 < Z1");
   EXPECT_EQ(both(NameType()), "NAME; 1 to 100 of A-Z a-z 0-9 _ . -");
 }
 

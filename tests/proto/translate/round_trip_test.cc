@@ -201,7 +201,16 @@ TEST(TranslateRoundTripTest, Tiles) {
 }
 
 TEST(TranslateRoundTripTest, Models) {
-  ExpectRoundTrip(Filled<v1::ModelPlane>());
+  auto plane = Filled<v1::ModelPlane>();
+  ExpectRoundTrip(plane);
+  plane.clear_colour();
+  ExpectRoundTrip(plane);
+  plane.set_colour(0);
+  ExpectRoundTrip(plane);
+  plane.set_colour(0x1000000);
+  EXPECT_THAT(
+      FromProto(plane),
+      testing::StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr("RRGGBB")));
   ExpectRoundTrip(Filled<v1::PlaneModel>());
 }
 

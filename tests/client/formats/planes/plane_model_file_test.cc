@@ -6,6 +6,7 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include "client/formats/file_bytes.h"
 #include "client/formats/planes/geodetic_position.h"
 #include "client/formats/ply_reader.h"
+#include "core/cloud/point_cloud.h"
 #include "tests/support/dxf_entities.h"
 #include "tests/support/plane_room.h"
 #include "tests/support/status_matchers.h"
@@ -57,6 +59,19 @@ TEST(PlaneModelFileTest, TrianglesHaveTheAreaAndTheNormalsOfTheirPlanes) {
     }
     EXPECT_NEAR(area, AreaOfModel(model), 1e-3);
   }
+}
+
+TEST(PlaneModelFileTest, APlaneHasItsOwnColourOrThatOfItsKind) {
+  PlaneModel model = testing::DrawnRoom();
+  model.planes[1].colour = Colour{160, 45, 40};
+  STRATA_ASSERT_OK_AND_ASSIGN(const Geometry geometry, PlaneModelGeometry(model));
+  std::set<std::uint32_t> colours;
+  for (const Colour& colour : geometry.colour) colours.insert(PackedRgb(colour));
+  EXPECT_THAT(colours, ::testing::UnorderedElementsAre(0xA02D28U, 0x3E68D6U, 0xFFD630U));
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::string text, PlaneModelGeoJson(model, std::nullopt));
+  const auto json = nlohmann::json::parse(text);
+  EXPECT_EQ(json["features"][1]["properties"]["colour"], "#a02d28");
+  EXPECT_TRUE(json["features"][0]["properties"]["colour"].is_null());
 }
 
 TEST(PlaneModelFileTest, DxfHasFacesBordersAndLayers) {
