@@ -1,7 +1,8 @@
 // Plane models (thesis 5.3 to 5.5) on drawn rooms and recorded buildings: exits 1 where a bound
 // does not hold, 77 where recorded data are absent.
 //
-// Usage: plane_models rooms [seed]|building|FOLDER   (a recording with scans and reference poses)
+// Usage: plane_models rooms|walls|rack|boxes|carpet|jacket|corridor [seed]
+//        plane_models building|FOLDER   (a recording with scans and reference poses)
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -24,6 +25,7 @@
 #include "core/planes/moments.h"
 #include "core/world/plane_model.h"
 #include "tests/experiments/mesh_cases.h"
+#include "tests/experiments/plane_cases.h"
 #include "tests/support/data_dir.h"
 #include "tests/support/pcd.h"
 #include "tests/support/scene.h"
@@ -32,20 +34,8 @@
 namespace strata::testing {
 namespace {
 
-constexpr double kDegrees = 180.0 / M_PI;
 constexpr int kNoData = 77;
 constexpr int kSmallSegment = 200;  // points
-
-int failed = 0;
-
-void Expect(bool holds, const char* what) {
-  std::printf("%s: %s\n", holds ? "holds" : "FAILS", what);
-  if (!holds) ++failed;
-}
-
-double AngleDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return kDegrees * std::acos(std::min(1.0, std::abs(a.dot(b))));
-}
 
 // ---- Table 5.1: a room with five walls, a table and a box on it ----
 
@@ -263,7 +253,7 @@ int Rooms(std::uint64_t seed) {
   Expect(*std::max_element(worse_deg.begin(), worse_deg.end()) <= 1.4,
          "no face is worse by more than 1.4 degrees");
   Expect(all[1].found >= 90, "9 of 10 faces are found");
-  return failed;
+  return failures;
 }
 
 // ---- recorded ----
@@ -381,7 +371,7 @@ int Building() {
   Expect(large_found == large, "all segments of 200 points or more");
   Expect(angles[angles.size() / 2] < 1.0, "median error of normals below 1 degree");
   Expect(right >= 0.9 * labelled, "90 % of the points are right");
-  return failed;
+  return failures;
 }
 
 int Hall(const std::string& folder) {
@@ -403,7 +393,7 @@ int Hall(const std::string& folder) {
   }
   const PlaneModel model = Find(points, {});
   Print(model, 40);
-  return failed;
+  return failures;
 }
 
 }  // namespace
@@ -412,6 +402,17 @@ int Hall(const std::string& folder) {
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "rooms";
   const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
+  const std::map<std::string, void (*)(std::uint64_t)> figures = {
+      {"walls", strata::testing::ParallelWalls},
+      {"rack", strata::testing::Rack},
+      {"boxes", strata::testing::Boxes},
+      {"carpet", strata::testing::Carpet},
+      {"jacket", strata::testing::Jacket},
+      {"corridor", strata::testing::Corridor}};
+  if (const auto figure = figures.find(what); figure != figures.end()) {
+    figure->second(seed);
+    return strata::testing::failures > 0 ? 1 : 0;
+  }
   if (what == "rooms") return strata::testing::Rooms(seed) > 0 ? 1 : 0;
   if (what == "building") return strata::testing::Building();
   return strata::testing::Hall(what);

@@ -11,9 +11,13 @@ foreach(table table_7_1 fig_7_9 directions)
 endforeach()
 strata_executable(
   plane_models plane_models
-  SOURCES plane_models.cc
+  SOURCES plane_models.cc plane_cases.h plane_colours.cc plane_directions.cc
   DEPS strata::planes strata::simulator strata::test_support strata::test_recordings
 )
-# Table 5.1's bounds.
+# Table 5.1's bounds, and those of the figures.
 add_test(NAME thesis_table_5_1 COMMAND plane_models rooms)
 set_tests_properties(thesis_table_5_1 PROPERTIES LABELS smoke TIMEOUT 120 COST 20)
+foreach(figure walls rack boxes carpet jacket corridor)
+  add_test(NAME thesis_planes_${figure} COMMAND plane_models ${figure})
+  set_tests_properties(thesis_planes_${figure} PROPERTIES LABELS smoke TIMEOUT 120 COST 20)
+endforeach()
