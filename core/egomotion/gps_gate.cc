@@ -78,7 +78,7 @@ std::optional<Relocation> Agreement(const std::deque<RejectedFix>& fixes) {
   Relocation relocation;
   relocation.pivot_m = means.predicted_m;
   relocation.target_m = means.measured_m;
-  relocation.target_m.z() = means.predicted_m.z();  // altitudes do not decide
+  relocation.target_m.z() = means.predicted_m.z();     // altitudes do not decide
   relocation.sigma_m = means.variance_m2.cwiseSqrt();  // their errors are alike: no 1/√n
   if (Chi2(fixes, means, 0.0) <= Chi2Bound(2.0 * (count - 1.0))) return relocation;
   const Turn turn = BestTurn(fixes, means);

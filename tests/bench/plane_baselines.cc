@@ -11,7 +11,7 @@
 
 #include <Eigen/Core>
 
-#include "core/classification/features/point_tree.h"
+#include "core/cloud/point_tree.h"
 #include "core/common/random.h"
 #include "core/planes/moments.h"
 

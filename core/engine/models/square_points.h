@@ -16,6 +16,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "core/cloud/point_cloud.h"
 #include "core/common/lru_cache.h"
 #include "core/common/stop.h"
 #include "core/engine/map/map_core.h"

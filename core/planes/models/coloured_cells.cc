@@ -233,6 +233,7 @@ std::vector<CellLayer> FindColouredCells(const PosedPoints& points,
   }
   std::vector<CellLayer> layers(1);
   layers[0].cells = FindPlanarCells(points.points, Eigen::Vector3f::Zero(), options);
+  ShareBorders(layers[0].cells);
   layers[0].colours.resize(layers[0].cells.size());
   return layers;
 }

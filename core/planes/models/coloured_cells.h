@@ -22,7 +22,7 @@ struct CellLayer {
   std::vector<CellColour> colours;  // of each
 };
 
-// Points without colours make one layer of FindPlanarCells(). With colours, where a place has
+// Points without colours make one layer of FindPlanarCells(), with ShareBorders(). With colours, where a place has
 // several, cells of several layers may overlap. In each of the largest cells the points fall into
 // parts wherever their colours do: else a carpet and the floor around it were one cell, as flat as
 // either alone. A part has at most so much surface as its share of the points allows: those of a

@@ -26,7 +26,8 @@ class TrajectoryFileTest : public ::testing::Test {
     std::vector<TrajectoryPose> poses(2);
     for (int i = 0; i < 2; ++i) {
       poses[i].time_s = 1432235498.028276 + i;
-      poses[i].T_map_body = MakePose(Eigen::Quaterniond(So3Exp({0.1, 0.2, 3.0})), {1.5, 1.0 * i, -2.0});
+      poses[i].T_map_body =
+          MakePose(Eigen::Quaterniond(So3Exp({0.1, 0.2, 3.0})), {1.5, 1.0 * i, -2.0});
       poses[i].covariance.setConstant(1e-5);
       poses[i].covariance.diagonal() = Vector6d::LinSpaced(0.1, 0.6);
     }

@@ -69,7 +69,7 @@ TEST_F(SquarePointsTest, SaysTheSameWithAndWithoutRoomToHoldScans) {
        {std::size_t{64} << 20, std::size_t{120} << 10, std::size_t{0}}) {
     OpenCore(cache_bytes);
     {
-      SquarePoints squares(*core_);
+      SquarePoints squares(*core_, {});
       loaded.push_back(LoadAll(squares));
       EXPECT_EQ(core_->caches()->cached_bytes() > 0, cache_bytes > 0);
       EXPECT_LE(core_->caches()->cached_bytes(), cache_bytes);
@@ -92,12 +92,12 @@ TEST_F(SquarePointsTest, SaysTheSameWithAndWithoutRoomToHoldScans) {
 
 TEST_F(SquarePointsTest, ThinsFullSquaresAndSaysSo) {
   OpenCore(std::size_t{1} << 20);
-  SquarePoints all(*core_);
+  SquarePoints all(*core_, {});
   const std::vector<PosedPoints> whole = LoadAll(all);
   EXPECT_EQ(all.thinned_squares(), 0U);
   EXPECT_EQ(all.most_thinned(), 1U);
   constexpr std::size_t kMost = 1500;
-  SquarePoints few(*core_, kMost);
+  SquarePoints few(*core_, {}, kMost);
   const std::vector<PosedPoints> thinned = LoadAll(few);
   EXPECT_GT(few.thinned_squares(), 0U);
   EXPECT_GE(few.most_thinned(), 2U);
