@@ -27,6 +27,7 @@ class EgomotionCommandTest : public ::testing::Test {
   EgomotionCommandTest() {
     options_.seconds = 60.0;
     options_.rig.R_body_imu = Eigen::Quaterniond::Identity();
+    options_.rig.imu.gyro_noise = 1e-3;
     options_.rig.imu.accelerometer_noise = 0.02;
     testing::WriteDrive(testing::SimulateDrive(options_, 5), dir_.path());
   }
