@@ -22,11 +22,11 @@ struct CellLayer {
   std::vector<CellColour> colours;  // of each
 };
 
-// Points without colours make one layer of FindPlanarCells(), with ShareBorders(). With colours, where a place has
-// several, cells of several layers may overlap. In each of the largest cells the points fall into
-// parts wherever their colours do: else a carpet and the floor around it were one cell, as flat as
-// either alone. A part has at most so much surface as its share of the points allows: those of a
-// reflection are few, wherever they lie.
+// Points without colours make one layer of FindPlanarCells(), with ShareBorders(). With colours,
+// where a place has several, cells of several layers may overlap. In each of the largest cells the
+// points fall into parts wherever their colours do: else a carpet and the floor around it were one
+// cell, as flat as either alone. A part has at most so much surface as its share of the points
+// allows: those of a reflection are few, wherever they lie.
 //
 // A surface along a border of the cells' grid is in cells on both sides of it, each as wide as all
 // of it; these share its area as they share its points. Else it counted twice, and the side with
