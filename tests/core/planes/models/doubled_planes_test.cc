@@ -10,6 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/planes/models/plane_colour.h"
 #include "core/planes/models/plane_raster.h"
 #include "core/planes/moments.h"
 
@@ -23,7 +24,9 @@ FacedPlane WallAt(double x, double turn_rad, double half_m, std::uint32_t hits) 
   const Eigen::Vector3d normal(std::cos(turn_rad), std::sin(turn_rad), 0.0);
   const Eigen::Vector3d middle(x, 0.0, 2.0);
   const Plane plane{normal, normal.dot(middle)};
-  FacedPlane wall{{plane, FrameOf(plane, middle), PlaneRaster(0.0625, 0.125), {}}, 0.12, 1000, {}};
+  FacedPlane wall{.seen = {plane, FrameOf(plane, middle), PlaneRaster(0.0625, 0.125), {}},
+                  .band_m = 0.12,
+                  .facing = 1000};
   for (double u = -half_m + 0.03; u < half_m; u += 0.0625) {
     for (double v = -1.5; v < 1.5; v += 0.0625) {
       wall.seen.raster.AddHits({u, v}, hits);
@@ -50,6 +53,16 @@ TEST(OwnersOf, OfTwoInOnePlaceThatFaceEachOtherBothStay) {
   // The same with its normal turned round, too, is on the same side.
   Plane& plane = planes[1].seen.plane;
   plane = {-plane.normal, -plane.distance};
+  EXPECT_THAT(OwnersOf(planes), ElementsAre(0, 0));
+}
+
+// Thesis 5.5: a picture on a wall, where colours count.
+TEST(OwnersOf, WhatHasAnotherColourStays) {
+  std::vector<FacedPlane> planes = {WallAt(5.0, 0.0, 8.0, 20), WallAt(5.01, 0.012, 5.0, 3)};
+  planes[0].colour = LabOf({250, 250, 250});
+  planes[1].colour = LabOf({200, 20, 20});
+  EXPECT_THAT(OwnersOf(planes), ElementsAre(0, 1));
+  planes[1].colour = LabOf({240, 240, 235});
   EXPECT_THAT(OwnersOf(planes), ElementsAre(0, 0));
 }
 
