@@ -15,9 +15,9 @@ namespace strata {
 // 2017), wheels, and all fixes, believed by Cauchy's loss: slow walks that no gate sees count less.
 // Covariances by ceres::Covariance. In the report fixes are those within kGpsGateNis of the
 // result; innovations are residuals and NIS is without the state's own uncertainty. Recoveries,
-// gaps and the start are the filter's. One thread; the same log gives the same bytes.
-// REQUIRES: `filtered` is FilterLog() of the same log and rig. INTERNAL if the solver fails;
-// CANCELLED or DEADLINE_EXCEEDED by `stop`.
+// gaps and the start are the filter's. The same log gives the same poses to the bit, and
+// covariances but for rounding. REQUIRES: `filtered` is FilterLog() of the same log and rig.
+// INTERNAL if the solver fails; CANCELLED or DEADLINE_EXCEEDED by `stop`.
 inline constexpr double kNodeS = 0.5;
 absl::StatusOr<Egomotion> SmoothLog(const MotionLog& log,
                                     const Rig& rig,
