@@ -2,8 +2,10 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
+#include <Eigen/Geometry>
 
 #include "client/cli/map/floor_files.h"
 #include "client/cli/map/map_files.h"
@@ -73,6 +75,19 @@ void AddMapFloorplan(Commands& commands, CLI::App* noun) {
   app->add_option("--cut", options->storey.cut_height_m, "Where walls are cut, above the floor [m]")
       ->check(CLI::Range(0.01, 100.0))
       ->capture_default_str();
+  AddNumbers(
+      app,
+      "--region",
+      "X0,Y0,X1,Y1",
+      4,
+      4,
+      [options](const std::vector<double>& n) {
+        if (n[0] >= n[2] || n[1] >= n[3]) {
+          throw CLI::ValidationError("--region", "expected X0 < X1 and Y0 < Y1");
+        }
+        options->storey.region.emplace(Eigen::Vector2d(n[0], n[1]), Eigen::Vector2d(n[2], n[3]));
+      },
+      "Only this part of the storey [m]; default: all of it");
 }
 
 }  // namespace strata::cli

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "client/formats/planes/polygon_pieces.h"
 #include "core/common/status.h"
@@ -54,14 +56,35 @@ void AddCrossings(const PlaneRing& ring,
   }
 }
 
+// The part of it that is in the box.
+std::optional<PlanSegment> PartWithin(const PlanSegment& segment, const Eigen::AlignedBox2d& box) {
+  const Eigen::Vector2d& a = segment[0];
+  const Eigen::Vector2d d = segment[1] - a;
+  double first = 0.0, last = 1.0;
+  for (const int axis : {0, 1}) {
+    if (d(axis) == 0.0) {
+      if (a(axis) < box.min()(axis) || a(axis) > box.max()(axis)) return std::nullopt;
+      continue;
+    }
+    const auto [enters, leaves] =
+        std::minmax({(box.min()(axis) - a(axis)) / d(axis), (box.max()(axis) - a(axis)) / d(axis)});
+    first = std::max(first, enters);
+    last = std::min(last, leaves);
+  }
+  if ((last - first) * d.norm() < kShortestM) return std::nullopt;
+  return PlanSegment{a + first * d, a + last * d};
+}
+
 // From each odd crossing to the next.
-void AddSegments(Crossings crossings, std::vector<PlanSegment>& segments) {
+void AddSegments(Crossings crossings,
+                 const Eigen::AlignedBox2d& region,
+                 std::vector<PlanSegment>& segments) {
   std::sort(crossings.begin(), crossings.end(), [](const auto& a, const auto& b) {
     return a.first < b.first;
   });
   for (std::size_t i = 0; i + 1 < crossings.size(); i += 2) {
-    if (crossings[i + 1].first - crossings[i].first < kShortestM) continue;
-    segments.push_back({crossings[i].second, crossings[i + 1].second});
+    const auto part = PartWithin({crossings[i].second, crossings[i + 1].second}, region);
+    if (part.has_value()) segments.push_back(*part);
   }
 }
 
@@ -76,9 +99,9 @@ void CutWall(const ModelPlane& plane, StoreyPlan& plan) {
       if (hole.seen_open) continue;
       Crossings across;
       AddCrossings(hole.ring, plan.cut_z_m, along, across);
-      AddSegments(std::move(across), plan.unseen);
+      AddSegments(std::move(across), plan.region, plan.unseen);
     }
-    AddSegments(std::move(crossings), plan.walls);
+    AddSegments(std::move(crossings), plan.region, plan.walls);
   }
 }
 
@@ -122,6 +145,17 @@ absl::Status NothingThere(const PlaneModel& model, const StoreyPlan& plan) {
                                       : absl::StrCat("the largest floors are at ", heights, " m")));
 }
 
+absl::Status NothingInRegion(const StoreyPlan& whole) {
+  const Eigen::AlignedBox2d extent = ExtentOf(whole);
+  return absl::NotFoundError(
+      absl::StrFormat("the storey has neither wall nor floor in the region; it lies within x %.1f "
+                      "to %.1f and y %.1f to %.1f m",
+                      extent.min().x(),
+                      extent.max().x(),
+                      extent.min().y(),
+                      extent.max().y()));
+}
+
 }  // namespace
 
 absl::StatusOr<StoreyPlan> PlanOfStorey(const PlaneModel& model, const StoreyOptions& options) {
@@ -130,12 +164,16 @@ absl::StatusOr<StoreyPlan> PlanOfStorey(const PlaneModel& model, const StoreyOpt
   StoreyPlan plan;
   plan.storey_z_m = options.storey_z_m;
   plan.cut_z_m = options.storey_z_m + options.cut_height_m;
+  plan.region = options.region.value_or(plan.region);
   for (const ModelPlane& plane : model.planes) {
     if (plane.kind != PlaneKind::kLevel) CutWall(plane, plan);
   }
-  plan.floors = UnionFromAbove(FloorsNear(model, options.storey_z_m));
-  if (ExtentOf(plan).isEmpty()) return NothingThere(model, plan);
-  return plan;
+  plan.floors = UnionFromAbove(FloorsNear(model, options.storey_z_m), plan.region);
+  if (!ExtentOf(plan).isEmpty()) return plan;
+  if (!options.region.has_value()) return NothingThere(model, plan);
+  STRATA_ASSIGN_OR_RETURN(const StoreyPlan whole,
+                          PlanOfStorey(model, {options.storey_z_m, options.cut_height_m}));
+  return NothingInRegion(whole);
 }
 
 void AddObstacles(const OccupancyGrid& grid, StoreyPlan& plan) {
@@ -149,7 +187,10 @@ void AddObstacles(const OccupancyGrid& grid, StoreyPlan& plan) {
       if (begin[column] != GridCell::kOccupied) continue;
       const int first = column;
       while (column < grid.width && begin[column] == GridCell::kOccupied) ++column;
-      plan.obstacles.emplace_back(at(first, row), at(column, row + 1));
+      const Eigen::AlignedBox2d obstacle(at(first, row), at(column, row + 1));
+      if (plan.region.intersects(obstacle)) {
+        plan.obstacles.push_back(plan.region.intersection(obstacle));
+      }
     }
   }
 }

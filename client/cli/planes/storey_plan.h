@@ -3,6 +3,7 @@
 #define STRATA_CLIENT_CLI_PLANES_STOREY_PLAN_H_
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -17,8 +18,9 @@ namespace strata::cli {
 inline constexpr double kStoreyReachM = 0.5;
 
 struct StoreyOptions {
-  double storey_z_m = 0.0;    // height of its floor, map frame
-  double cut_height_m = 1.2;  // above that; in (0, 100]
+  double storey_z_m = 0.0;                                   // height of its floor, map frame
+  double cut_height_m = 1.2;                                 // above that; in (0, 100]
+  std::optional<Eigen::AlignedBox2d> region = std::nullopt;  // only this part, map frame [m]
 };
 
 using PlanSegment = std::array<Eigen::Vector2d, 2>;
@@ -27,6 +29,8 @@ using PlanSegment = std::array<Eigen::Vector2d, 2>;
 struct StoreyPlan {
   double storey_z_m = 0.0;
   double cut_z_m = 0.0;
+  // Nothing is beyond; by default none of what a map may have.
+  Eigen::AlignedBox2d region{Eigen::Vector2d::Constant(-1e8), Eigen::Vector2d::Constant(1e8)};
   // Where walls and sloped planes are cut, along each: nothing where it ends, and where a hole was
   // seen open, as in a door.
   std::vector<PlanSegment> walls;
@@ -38,10 +42,11 @@ struct StoreyPlan {
 };
 
 // INVALID_ARGUMENT for options out of range and for a model that CheckPlaneModel does not take.
-// NOT_FOUND, naming heights at which there are floors, where there is neither wall nor floor.
+// NOT_FOUND where there is neither wall nor floor, naming heights at which there are floors, or
+// where the storey is if the region has none of it.
 absl::StatusOr<StoreyPlan> PlanOfStorey(const PlaneModel& model, const StoreyOptions& options);
 
-// Its occupied cells, those side by side along x as one.
+// Its occupied cells within the region, those side by side along x as one.
 void AddObstacles(const OccupancyGrid& grid, StoreyPlan& plan);
 
 // Around all of it; empty where there is nothing.

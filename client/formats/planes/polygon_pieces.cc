@@ -106,6 +106,18 @@ class Lattice {
     return flat;
   }
 
+  // Of a lattice seen from above; beyond kMostUnits there is no corner of a polygon.
+  boost::polygon::rectangle_data<std::int32_t> Flat(const Eigen::AlignedBox2d& box) const {
+    const auto at = [this](double m, double origin_m) {
+      return static_cast<std::int32_t>(
+          std::lround(std::clamp((m - origin_m) / unit_m_, -kMostUnits, kMostUnits)));
+    };
+    return {at(box.min().x(), origin_.x()),
+            at(box.min().y(), origin_.y()),
+            at(box.max().x(), origin_.x()),
+            at(box.max().y(), origin_.y())};
+  }
+
   Eigen::Vector3d Lift(const LatticePoint& p) const {
     return origin_ + unit_m_ * (p.x() * axis_u_ + p.y() * axis_v_);
   }
@@ -176,12 +188,14 @@ std::vector<FlatPiece> PiecesOf(const PlanePolygon& polygon, const Eigen::Vector
 }
 
 std::vector<std::vector<Eigen::Vector2d>> UnionFromAbove(
-    std::span<const PlanePolygon* const> polygons) {
+    std::span<const PlanePolygon* const> polygons, const Eigen::AlignedBox2d& within) {
   std::vector<std::vector<Eigen::Vector2d>> rings;
   if (polygons.empty()) return rings;
   const Lattice lattice(polygons, Eigen::Vector3d::UnitZ());
   LatticeRegion region;
   for (const PlanePolygon* polygon : polygons) region.insert(lattice.Flat(*polygon));
+  using boost::polygon::operators::operator&=;
+  region &= lattice.Flat(within);
   std::vector<LatticePolygon> joined;
   region.get(joined);
   const auto add = [&](const auto& flat, bool counterclockwise) {

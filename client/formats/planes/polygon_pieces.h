@@ -8,6 +8,7 @@
 
 #include "absl/status/status.h"
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "core/world/plane_model.h"
 
@@ -27,9 +28,10 @@ using FlatPiece = std::array<Eigen::Vector3d, 4>;
 std::vector<FlatPiece> PiecesOf(const PlanePolygon& polygon, const Eigen::Vector3d& normal);
 
 // What any of them covers, seen from above, as rings: borders counterclockwise, holes in them
-// clockwise. As exact as PiecesOf, of all polygons together. REQUIRES: as PiecesOf.
+// clockwise; of it what lies `within`. As exact as PiecesOf, of all polygons together. REQUIRES: as
+// PiecesOf; `within` is not empty.
 std::vector<std::vector<Eigen::Vector2d>> UnionFromAbove(
-    std::span<const PlanePolygon* const> polygons);
+    std::span<const PlanePolygon* const> polygons, const Eigen::AlignedBox2d& within);
 
 }  // namespace strata
 

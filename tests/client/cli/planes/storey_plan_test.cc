@@ -146,6 +146,35 @@ TEST(StoreyPlanTest, ObstaclesAreTheOccupiedCells) {
   EXPECT_EQ(ExtentOf(plan).max(), Vector2d(12.0, -0.5));
 }
 
+// The same places are drawn as without a region, where they are in it.
+TEST(StoreyPlanTest, ARegionLeavesOutWhatIsBeyond) {
+  const Eigen::AlignedBox2d region(Vector2d(0.7, -0.5), Vector2d(4.5, 1.75));
+  STRATA_ASSERT_OK_AND_ASSIGN(const StoreyPlan whole, PlanOfStorey(testing::DrawnRoom(), {}));
+  STRATA_ASSERT_OK_AND_ASSIGN(StoreyPlan part,
+                              PlanOfStorey(testing::DrawnRoom(), {.region = region}));
+  for (int i = 0; i < 4000; ++i) {
+    const double along = 0.0017 + 0.001 * i;
+    for (const Vector2d& p : {Vector2d(along, 0), Vector2d(4, along), Vector2d(along, 3)}) {
+      EXPECT_EQ(IsDrawn(part.walls, p), IsDrawn(whole.walls, p) && region.contains(p)) << p;
+      EXPECT_EQ(IsDrawn(part.unseen, p), IsDrawn(whole.unseen, p) && region.contains(p)) << p;
+    }
+  }
+  EXPECT_TRUE(ExtentOf(part).max().isApprox(Vector2d(4.0, 1.75), 1e-5));
+  EXPECT_TRUE(ExtentOf(part).min().isApprox(Vector2d(0.7, 0.0), 1e-5));
+  OccupancyGrid grid{.width = 2,
+                     .height = 1,
+                     .resolution_m = 1.0,
+                     .x_m = 4.0,
+                     .y_m = 0.0,
+                     .cells = {GridCell::kOccupied, GridCell::kOccupied}};
+  AddObstacles(grid, part);
+  ASSERT_EQ(part.obstacles.size(), 1U);
+  EXPECT_EQ(part.obstacles[0].max(), Vector2d(4.5, 1.0));
+  const Eigen::AlignedBox2d far(Vector2d(50, 50), Vector2d(60, 60));
+  EXPECT_THAT(PlanOfStorey(testing::DrawnRoom(), {.region = far}),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("within x 0.0 to 4.0")));
+}
+
 TEST(StoreyPlanTest, WhereNothingIsTheFloorsAreNamed) {
   EXPECT_THAT(PlanOfStorey(testing::DrawnRoom(), {.storey_z_m = 7.0}),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("the largest floors are at 0.00 m")));

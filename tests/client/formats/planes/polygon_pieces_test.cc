@@ -123,11 +123,15 @@ TEST(PolygonPiecesTest, RingsThatTouchAndWidePolygonsHaveTheirArea) {
       1e-8);
 }
 
-// Places are covered where one of the polygons is, and all rings turn as they should.
+const Eigen::AlignedBox2d kEverywhere(Eigen::Vector2d::Constant(-1e9),
+                                      Eigen::Vector2d::Constant(1e9));
+
+// Places are covered where one of the polygons is, within a window or all, and all rings turn as
+// they should.
 TEST(PolygonPiecesTest, TheUnionIsWhereOneOfThePolygonsIs) {
   std::mt19937 random(8);
   const Vector3d up = Vector3d::UnitZ(), u = Vector3d::UnitX(), v = Vector3d::UnitY();
-  EXPECT_TRUE(UnionFromAbove({}).empty());
+  EXPECT_TRUE(UnionFromAbove({}, kEverywhere).empty());
   for (int world = 0; world < 5; ++world) {
     const Vector3d far(world * 100'000.0, 0, 2);
     std::vector<ModelPlane> planes;
@@ -139,7 +143,10 @@ TEST(PolygonPiecesTest, TheUnionIsWhereOneOfThePolygonsIs) {
     }
     std::vector<const PlanePolygon*> polygons;
     for (const ModelPlane& plane : planes) polygons.push_back(&plane.polygons[0]);
-    const auto rings = UnionFromAbove(polygons);
+    const Eigen::Vector2d corner = far.head<2>() + Eigen::Vector2d(-2.5, -3.25);
+    const Eigen::AlignedBox2d window(corner, corner + Eigen::Vector2d(11.0, 55.0));
+    const Eigen::AlignedBox2d& within = world % 2 == 1 ? window : kEverywhere;
+    const auto rings = UnionFromAbove(polygons, within);
     std::uniform_real_distribution<double> x(-6.0, 21.0), y(-6.0, 6.0);
     for (int i = 0; i < 1000; ++i) {
       const double px = x(random), py = y(random);
@@ -157,6 +164,7 @@ TEST(PolygonPiecesTest, TheUnionIsWhereOneOfThePolygonsIs) {
         const Vector3d in_plane(p.x(), p.y(), polygon->outer.front().z());
         inside = inside || testing::IsInside(*polygon, in_plane, up);
       }
+      inside = inside && within.contains(Eigen::Vector2d(p.head<2>()));
       EXPECT_NEAR(turns, inside ? 1.0 : 0.0, 1e-6);
     }
   }
