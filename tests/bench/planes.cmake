@@ -14,7 +14,7 @@ target_include_directories(strata_plane_peers SYSTEM PRIVATE ${pcl_plane_peers_I
 set_source_files_properties(plane_peers_cgal.cc PROPERTIES COMPILE_DEFINITIONS CGAL_EIGEN3_ENABLED)
 # g++ 12 sees array bounds crossed and values used uninitialised inside Eigen and Boost where PCL and CGAL instantiate them.
 set_source_files_properties(
-  plane_peers.cc plane_peers_cgal.cc PROPERTIES COMPILE_OPTIONS "-Wno-array-bounds;-Wno-maybe-uninitialized"
+  plane_peers.cc plane_peers_cgal.cc PROPERTIES COMPILE_OPTIONS "-Wno-array-bounds;$<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>"
                                                 SKIP_UNITY_BUILD_INCLUSION ON
 )
 
