@@ -1,6 +1,7 @@
 #include "client/formats/bags/bag_reader.h"
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -75,6 +76,16 @@ void BagReader::AddDamage(std::string line) {
   } else if (damage_.size() == kMaxDamageLines) {
     damage_.emplace_back("and more");
   }
+}
+
+void BagReader::AddCutShort(std::uint64_t end, std::uint64_t at, std::uint64_t bytes) {
+  AddDamage(absl::StrCat("ends at byte ",
+                         end,
+                         " within the record of byte ",
+                         at,
+                         ", which says that it has ",
+                         bytes,
+                         " bytes"));
 }
 
 bool IsBagFile(const std::filesystem::path& path) {

@@ -71,6 +71,8 @@ class BagReader {
   std::size_t TopicNumber(absl::string_view name, absl::string_view type, MessageEncoding encoding);
   // The first lines only.
   void AddDamage(std::string line);
+  // The file ends at byte `end`, within the record of byte `at`, which says that it has so many.
+  void AddCutShort(std::uint64_t end, std::uint64_t at, std::uint64_t bytes);
   void ClearDamage() { damage_.clear(); }
 
  private:

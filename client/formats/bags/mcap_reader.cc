@@ -98,13 +98,7 @@ absl::Status McapReader::Visit(Visitor visit) {
     behind_ = at + kRecordHead + record->there;
     if (IsOfInterest(record->opcode)) STRATA_RETURN_IF_ERROR(VisitRecord(*record, visit));
     if (record->there < record->length) {
-      AddDamage(absl::StrCat("ends at byte ",
-                             file_.size(),
-                             " within the record of byte ",
-                             at,
-                             ", which says that it has ",
-                             record->length,
-                             " bytes"));
+      AddCutShort(file_.size(), at, record->length);
       break;
     }
     at = behind_;

@@ -116,13 +116,7 @@ absl::Status Ros1BagReader::Visit(Visitor visit) {
     behind_ = record->data_at + record->there;
     STRATA_RETURN_IF_ERROR(VisitRecord(*record, visit));
     if (record->there < record->length) {
-      AddDamage(absl::StrCat("ends at byte ",
-                             file_.size(),
-                             " within the record of byte ",
-                             at,
-                             ", which says that it has ",
-                             record->length,
-                             " bytes"));
+      AddCutShort(file_.size(), at, record->length);
       break;
     }
     at = behind_;
