@@ -11,7 +11,8 @@ namespace strata {
 struct ConvergenceOptions {
   int max_iterations = 100;  // [1, 10000]; each solves one linear system
   // Ends when a step lowers the cost, and was expected to, by less than this share of it (or
-  // than 1e-9). [0, 0.5]
+  // than 1e-9); or when all further steps together would lower it by less than this share,
+  // shrinking as the last two did. [0, 0.5]
   double cost_tolerance = 1e-7;
   // Ends when no number of a step (radians, metres) is larger. [0, 0.5]
   double step_tolerance = 1e-9;

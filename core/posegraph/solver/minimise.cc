@@ -26,6 +26,10 @@ constexpr double kFirstRadius = 1e9;
 constexpr double kMinRadius = 1e-12;
 // A χ² that tells nothing: of measurements without noise, where shares of the cost are of rounding.
 constexpr double kNegligible = 1e-9;
+// Of a decrease over the expected one, and of a decrease over the one before: Gauss-Newton near its
+// minimum.
+constexpr double kAsExpected = 0.9;
+constexpr double kFast = 0.1;
 
 // CHOLMOD asks OpenMP for four threads, whatever Ceres was told; they spin for longer than they
 // work. While this lives the calling thread gets none; others are not concerned.
@@ -50,7 +54,9 @@ class Watch final : public ceres::IterationCallback {
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& iteration) override {
     status_ = stop_.status();
     if (!status_.ok()) return ceres::SOLVER_ABORT;
-    return HasConverged(iteration) ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+    const bool done = HasConverged(iteration) || NothingIsLeft(iteration);
+    last_decrease_ = AsExpected(iteration) ? iteration.cost_change : 0.0;
+    return done ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
   }
   const absl::Status& status() const { return status_; }
 
@@ -67,9 +73,24 @@ class Watch final : public ceres::IterationCallback {
     return small && decrease <= negligible;
   }
 
+  static bool AsExpected(const ceres::IterationSummary& iteration) {
+    return iteration.step_is_successful && iteration.relative_decrease >= kAsExpected;
+  }
+
+  // Whether all steps that may follow gain too little together: they shrink at least as the last
+  // two did, which both did what was expected of them. Spares the step that would only show it.
+  bool NothingIsLeft(const ceres::IterationSummary& iteration) const {
+    if (!AsExpected(iteration)) return false;
+    const double shrinking = iteration.cost_change / last_decrease_;
+    if (!(shrinking <= kFast)) return false;
+    return iteration.cost_change * shrinking / (1.0 - shrinking) <=
+           convergence_.cost_tolerance * iteration.cost;
+  }
+
   const ConvergenceOptions& convergence_;
   const Stop& stop_;
   absl::Status status_;
+  double last_decrease_ = 0.0;  // of the step before, 0 where it disappointed
 };
 
 PoseGraphTermination TerminationOf(const ceres::Solver::Summary& summary) {
