@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <vector>
 
 #include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
 #include "core/common/status.h"
@@ -13,6 +15,8 @@ namespace strata {
 namespace {
 
 constexpr double kControlFactor = 1.4;  // the paper's
+// Weights that have changed by less leave the minimum where it is, for what is decided next.
+constexpr double kSameWeight = 0.3;
 // Solved roughly along the way: the next member moves the minimum on.
 constexpr ConvergenceOptions kAlongTheWay = {
     .max_iterations = 4, .cost_tolerance = 1e-3, .step_tolerance = 1e-6};
@@ -27,6 +31,16 @@ void SetAll(OutlierCandidates& candidates, double weight) {
   for (std::size_t k = 0; k < candidates.size(); ++k) candidates.Weight(k) = weight;
 }
 
+double LargestChange(OutlierCandidates& candidates, const std::vector<double>& weights) {
+  double largest = 0.0;
+  for (std::size_t k = 0; k < weights.size(); ++k) {
+    const double weight = candidates.Weight(k);
+    if (weight == weights[k]) continue;
+    largest = std::max(largest, std::abs(weight - weights[k]) / std::max(weight, weights[k]));
+  }
+  return largest;
+}
+
 // True if every weight is 0 or 1.
 bool SetWeights(OutlierCandidates& candidates, double max_chi2, double control) {
   bool decided = true;
@@ -36,6 +50,22 @@ bool SetWeights(OutlierCandidates& candidates, double max_chi2, double control) 
     decided = decided && (weight == 0.0 || weight == 1.0);
   }
   return decided;
+}
+
+// The family's members from the convex one on, each from the minimum of the one before.
+absl::Status Graduate(OutlierCandidates& candidates,
+                      double max_chi2,
+                      double control,
+                      absl::FunctionRef<absl::Status()> minimise) {
+  std::vector<double> solved(candidates.size(), 0.0);
+  while (!SetWeights(candidates, max_chi2, control)) {
+    if (LargestChange(candidates, solved) > kSameWeight) {
+      STRATA_RETURN_IF_ERROR(minimise());
+      for (std::size_t k = 0; k < solved.size(); ++k) solved[k] = candidates.Weight(k);
+    }
+    control *= kControlFactor;
+  }
+  return absl::OkStatus();
 }
 
 // True if a term that counts is above the bound: it counts no longer.
@@ -77,11 +107,9 @@ absl::StatusOr<Minimum> MinimiseRobustly(
   SetAll(candidates, 1.0);
   const double worst = WorstChi2(candidates);
   if (worst > max_chi2) {
-    double control = max_chi2 / (2.0 * worst - max_chi2);
-    while (!SetWeights(candidates, max_chi2, control)) {
-      STRATA_RETURN_IF_ERROR(go_down(kAlongTheWay).status());
-      control *= kControlFactor;
-    }
+    const double convex = max_chi2 / (2.0 * worst - max_chi2);
+    STRATA_RETURN_IF_ERROR(
+        Graduate(candidates, max_chi2, convex, [&] { return go_down(kAlongTheWay).status(); }));
   }
   while (true) {
     STRATA_ASSIGN_OR_RETURN(const Minimum minimum, go_down(convergence));
