@@ -1,15 +1,12 @@
 #include "core/planning/planner.h"
 
 #include <algorithm>
-#include <cstddef>
 #include <memory>
 #include <utility>
-#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
-#include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 
 #include "core/common/cache_budget.h"
@@ -20,7 +17,6 @@
 #include "core/planning/endpoint.h"
 #include "core/planning/explain.h"
 #include "core/planning/ground/profile_checks.h"
-#include "core/planning/landmarks.h"
 #include "core/planning/move_cost.h"
 #include "core/planning/path_check.h"
 #include "core/planning/route.h"
@@ -62,7 +58,6 @@ absl::Status FillRefusal(SearchSpace& space,
 
 absl::StatusOr<PlanResult> Answer(SearchSpace& space,
                                   const PlanQuery& query,
-                                  const Landmarks* landmarks,
                                   const std::shared_ptr<CacheBudget>& budget,
                                   const Stop& stop) {
   STRATA_ASSIGN_OR_RETURN(const EndpointMatch from, MatchEndpoint(space, query.from));
@@ -72,7 +67,7 @@ absl::StatusOr<PlanResult> Answer(SearchSpace& space,
   SearchWorkspace workspace(budget);
   STRATA_ASSIGN_OR_RETURN(
       const SearchOutcome outcome,
-      FindPath(space, from.patch, to.patch, landmarks, query.max_expanded, workspace, stop));
+      FindPath(space, from.patch, to.patch, query.max_expanded, workspace, stop));
   PlanResult result;
   result.expanded = outcome.expanded;
   switch (outcome.end) {
@@ -122,9 +117,8 @@ absl::StatusOr<PlanResult> Planner::Plan(TileSource& source,
   STRATA_RETURN_IF_ERROR(ValidateClassCosts(query.class_costs));
   STRATA_ASSIGN_OR_RETURN(const ProfileChecks checks,
                           MakeProfileChecks(query.profile, options_.cell_size_m));
-  const std::shared_ptr<const Landmarks> landmarks = LandmarksFor(source, query.profile);
   SearchSpace space(cache_, source, checks, ClassFactors(query.class_costs), stop);
-  absl::StatusOr<PlanResult> result = Answer(space, query, landmarks.get(), options_.budget, stop);
+  absl::StatusOr<PlanResult> result = Answer(space, query, options_.budget, stop);
   if (result.ok()) result->elapsed_ms = absl::ToDoubleMilliseconds(SteadyNow() - begin);
   return result;
 }
@@ -138,40 +132,6 @@ absl::StatusOr<PathCheck> Planner::Check(TileSource& source,
                           MakeProfileChecks(query.profile, options_.cell_size_m));
   SearchSpace space(cache_, source, checks, ClassFactors(query.class_costs), stop);
   return CheckPath(space, query.waypoints, stop);
-}
-
-absl::Status Planner::PrepareLandmarks(TileSource& source,
-                                       const RobotProfile& profile,
-                                       const std::vector<TileKey>& tiles,
-                                       int count,
-                                       const Stop& stop) {
-  STRATA_ASSIGN_OR_RETURN(const ProfileChecks checks,
-                          MakeProfileChecks(profile, options_.cell_size_m));
-  SearchSpace space(cache_, source, checks, {}, stop);
-  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const Landmarks> made,
-                          Landmarks::Make(space, tiles, count, stop));
-  absl::MutexLock lock(&mutex_);
-  landmarks_.erase(std::remove_if(landmarks_.begin(),
-                                  landmarks_.end(),
-                                  [&profile](const std::shared_ptr<const Landmarks>& landmarks) {
-                                    return landmarks->profile() == profile;
-                                  }),
-                   landmarks_.end());
-  landmarks_.push_back(std::move(made));
-  if (landmarks_.size() > kMaxLandmarkSets) landmarks_.erase(landmarks_.begin());
-  return absl::OkStatus();
-}
-
-std::shared_ptr<const Landmarks> Planner::LandmarksFor(TileSource& source,
-                                                       const RobotProfile& profile) {
-  std::shared_ptr<const Landmarks> found;
-  {
-    absl::MutexLock lock(&mutex_);
-    for (const std::shared_ptr<const Landmarks>& landmarks : landmarks_) {
-      if (landmarks->profile() == profile) found = landmarks;
-    }
-  }
-  return found != nullptr && found->Fits(source) ? found : nullptr;
 }
 
 }  // namespace strata

@@ -24,17 +24,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <vector>
 
-#include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/mutex.h"
 
 #include "core/common/cache_budget.h"
 #include "core/common/stop.h"
-#include "core/mls/tile_key.h"
 #include "core/planning/ground/rows.h"
-#include "core/planning/landmarks.h"
 #include "core/planning/tile_cache.h"
 #include "core/planning/tile_source.h"
 #include "core/world/plan.h"
@@ -79,34 +74,13 @@ class Planner {
   //   errors of `source`
   absl::StatusOr<PathCheck> Check(TileSource& source, const PathQuery& query, const Stop& stop);
 
-  // Measures landmarks for one profile over everything connected to `tiles` (usually all tiles of
-  // the map), `count` in [1, 16]. Later queries of that profile use them as long as the source has
-  // the same tiles; results do not change, only time. Replaces those of the same profile.
-  //
-  // For maps that have come to rest: with 16 landmarks a query of 100 m takes half the time or less
-  // (5 ms instead of 12), but they take 1.3 s and 64 MB a million patches on top of preparing every
-  // tile (0.7 s, 47 MB), and a single changed tile makes them useless. It takes some 300 such
-  // queries of one profile on one state of the map to earn them back. The engine's maps grow while
-  // they are planned in: it does not call this.
-  absl::Status PrepareLandmarks(TileSource& source,
-                                const RobotProfile& profile,
-                                const std::vector<TileKey>& tiles,
-                                int count,
-                                const Stop& stop);
-
   // Prepared tiles, for others that ask what a robot can do.
   TileCache& cache() { return cache_; }
   TileCache::Statistics cache_statistics() const { return cache_.statistics(); }
 
  private:
-  std::shared_ptr<const Landmarks> LandmarksFor(TileSource& source, const RobotProfile& profile);
-
-  static constexpr std::size_t kMaxLandmarkSets = 4;
-
   const PlannerOptions options_;
   TileCache cache_;
-  absl::Mutex mutex_;
-  std::vector<std::shared_ptr<const Landmarks>> landmarks_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace strata

@@ -20,7 +20,6 @@
 #include "core/planning/bucket_queue.h"
 #include "core/planning/corridor.h"
 #include "core/planning/ground/ground_window.h"
-#include "core/planning/landmarks.h"
 #include "core/planning/move_cost.h"
 #include "core/planning/patch_index.h"
 #include "core/planning/prepared_tile.h"
@@ -322,7 +321,7 @@ class Search {
   std::uint32_t Remaining(std::uint32_t place) const {
     const std::uint16_t cell = index_->CellOf(place);
     const CellIndex at = {x0_ + (cell & (kTileCells - 1)), y0_ + (cell >> kTileShift)};
-    const std::uint32_t bound = bound_(at.x, at.y, Bound::kByNumber ? index_->Number(place) : 0);
+    const std::uint32_t bound = bound_(at.x, at.y);
     return large_ && bound != kNoUse ? Weighted(bound) : bound;
   }
   // What is left out for g + 1.01 h ≥ goal lies on no path of less than goal / 1.01.
@@ -576,16 +575,9 @@ absl::StatusOr<SearchOutcome> FindInCorridor(SearchSpace& space,
 absl::StatusOr<SearchOutcome> FindPath(SearchSpace& space,
                                        PatchId start,
                                        PatchId goal,
-                                       const Landmarks* landmarks,
                                        std::uint64_t max_expanded,
                                        SearchWorkspace& workspace,
                                        const Stop& stop) {
-  if (landmarks != nullptr && LandmarkBound::Measured(space, *landmarks, start) &&
-      LandmarkBound::Measured(space, *landmarks, goal)) {
-    STRATA_RETURN_IF_ERROR(workspace.Begin(kBucketShift, stop));
-    const LandmarkBound bound(space, *landmarks, start, goal);
-    return RunSearch(space, workspace, bound, start, goal, max_expanded, stop);
-  }
   const OctileBound bound{space.CellOfPatch(goal)};
   SearchOutcome first;
   const std::uint64_t cells = bound.Outside(space.CellOfPatch(start)) / kCostPerCell;

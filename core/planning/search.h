@@ -28,8 +28,6 @@
 
 namespace strata {
 
-class Landmarks;
-
 struct SearchOutcome {
   // kLimit: of what may be expanded; kFull: of memory.
   enum class End : std::uint8_t { kFound, kExhausted, kLimit, kFull };
@@ -40,13 +38,11 @@ struct SearchOutcome {
   PatchId dearest = kNoPatchId;  // the patch expanded that was the most expensive to reach
 };
 
-// A path from `start` to `goal`, both places where the robot can stand. `landmarks`
-// (optional) must fit the space's source and profile; costs of classes only add to what they know.
+// A path from `start` to `goal`, both places where the robot can stand.
 // CANCELLED and DEADLINE_EXCEEDED by `stop`; errors of the source.
 absl::StatusOr<SearchOutcome> FindPath(SearchSpace& space,
                                        PatchId start,
                                        PatchId goal,
-                                       const Landmarks* landmarks,
                                        std::uint64_t max_expanded,
                                        SearchWorkspace& workspace,
                                        const Stop& stop);

@@ -35,7 +35,6 @@ namespace strata {
 namespace {
 
 constexpr double kCell = 0.1;
-constexpr int kLandmarks = 16;
 constexpr double kSameCost = 1e-3;
 constexpr int kCampusX = 1200;
 constexpr int kCampusY = 1000;
@@ -313,26 +312,14 @@ int Compare(testing::MemoryTiles& source, std::size_t query_count, int repetitio
   const BoostGraph graph = MakeBoostGraph(space);
   BoostSearch peer(graph);
   SearchWorkspace workspace;
-  begin = NowMs();
-  const auto landmarks = Landmarks::Make(space, source.Keys(), kLandmarks, Stop());
-  const double landmarks_ms = NowMs() - begin;
   Planner planner({.cell_size_m = kCell});
-  Planner alt({.cell_size_m = kCell});
-  if (!landmarks.ok() ||
-      !alt.PrepareLandmarks(source, profile, source.Keys(), kLandmarks, Stop()).ok()) {
-    return 1;
-  }
   const auto queries = PickQueries(space, peer, graph, query_count);
-  Column columns[] = {{"boost::astar_search"},
-                      {"search"},
-                      {"search, landmarks"},
-                      {"Plan, warm"},
-                      {"Plan, warm, landmarks"}};
+  Column columns[] = {{"boost::astar_search"}, {"search"}, {"Plan, warm"}};
   double worst = 0.0;
   for (const auto& [from, to] : queries) {
-    std::vector<double> ms[5];
+    std::vector<double> ms[3];
     std::uint32_t peer_cost = 0;
-    std::uint64_t expanded[2] = {0, 0};
+    std::uint64_t expanded = 0;
     for (int r = -1; r < repetitions; ++r) {  // the first round warms up
       const auto timed = [&](int column, auto&& work) {
         const double start = NowMs();
@@ -340,23 +327,19 @@ int Compare(testing::MemoryTiles& source, std::size_t query_count, int repetitio
         if (r >= 0) ms[column].push_back(NowMs() - start);
       };
       timed(0, [&] { peer_cost = peer.Cost(graph.vertex_of[from], graph.vertex_of[to]); });
-      for (int l = 0; l < 2; ++l) {
-        timed(1 + l, [&] {
-          const auto outcome = FindPath(
-              space, from, to, l == 0 ? nullptr : landmarks->get(), UINT64_MAX, workspace, Stop());
-          expanded[l] = outcome->expanded;
-          worst = std::max(worst, std::abs(outcome->cost / static_cast<double>(peer_cost) - 1.0));
-        });
-        timed(3 + l, [&] {
-          const PlanQuery query = {
-              .from = EndpointOf(space, from), .to = EndpointOf(space, to), .profile = profile};
-          if (!(l == 0 ? planner : alt).Plan(source, query, Stop())->found()) std::abort();
-        });
-      }
+      timed(1, [&] {
+        const auto outcome = FindPath(space, from, to, UINT64_MAX, workspace, Stop());
+        expanded = outcome->expanded;
+        worst = std::max(worst, std::abs(outcome->cost / static_cast<double>(peer_cost) - 1.0));
+      });
+      timed(2, [&] {
+        const PlanQuery query = {
+            .from = EndpointOf(space, from), .to = EndpointOf(space, to), .profile = profile};
+        if (!planner.Plan(source, query, Stop())->found()) std::abort();
+      });
     }
-    for (int c = 0; c < 5; ++c) columns[c].ms.push_back(Median(ms[c]));
-    columns[1].expanded += static_cast<double>(expanded[0]) / queries.size();
-    columns[2].expanded += static_cast<double>(expanded[1]) / queries.size();
+    for (int c = 0; c < 3; ++c) columns[c].ms.push_back(Median(ms[c]));
+    columns[1].expanded += static_cast<double>(expanded) / queries.size();
   }
   std::printf("%zu patches (%zu standable), %zu moves, %zu tiles, %zu queries of 90-110 m\n",
               patches,
@@ -369,10 +352,6 @@ int Compare(testing::MemoryTiles& source, std::size_t query_count, int repetitio
               prepare_ms * 1e6 / patches,
               static_cast<double>(cache.statistics().bytes) / patches);
   ReportPacked(space, patches);
-  std::printf("%d landmarks: %.0f ms, %.1f bytes a patch\n",
-              kLandmarks,
-              landmarks_ms,
-              static_cast<double>((*landmarks)->memory_bytes()) / patches);
   std::printf("largest difference of costs: %.5f %%\n", 100.0 * worst);
   std::printf("%-26s %10s %10s %14s\n", "", "median ms", "x faster", "expanded");
   const double reference = Median(columns[0].ms);
