@@ -16,6 +16,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -36,6 +37,9 @@ struct RelativePoseTerm {
   Pose T_i_j = Pose::Identity();
   Matrix6d information = Matrix6d::Identity();
   bool may_be_false = false;  // a loop closure, which may be rejected as a whole
+  // What a solution before made of a term that may be false. Where all have it, it stands if it
+  // still fits at the minimum; else all is decided anew.
+  std::optional<bool> believed = std::nullopt;
 };
 
 // One plane and what all scans saw of it (7.19), edge vertices and plane patches alike: the squared

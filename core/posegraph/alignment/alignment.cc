@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <map>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -120,8 +123,7 @@ class Alignment {
     STRATA_RETURN_IF_ERROR(Register(round));
     PoseGraphProblem graph = Graph(round);
     STRATA_RETURN_IF_ERROR(AddPlanes(graph, round));
-    STRATA_ASSIGN_OR_RETURN(PoseGraphSolution solution,
-                            OptimizePoseGraph(graph, options_.pose_graph, stop_));
+    STRATA_ASSIGN_OR_RETURN(PoseGraphSolution solution, Solve(graph));
     for (std::size_t k = 0; k < solution.T_map_scan.size(); ++k) {
       const Pose& after = solution.T_map_scan[k];
       round.max_shift_m =
@@ -133,6 +135,28 @@ class Alignment {
     Keep(graph, std::move(solution));
     result_.rounds.push_back(round);
     return absl::OkStatus();
+  }
+
+  // What is false is decided in the first round and where poses have settled; between, as long as
+  // the decisions fit.
+  absl::StatusOr<PoseGraphSolution> Solve(PoseGraphProblem& graph) const {
+    for (std::size_t k = 0; k < graph.relative.size(); ++k) {
+      RelativePoseTerm& term = graph.relative[k];
+      if (!term.may_be_false) continue;
+      const auto known = believed_.find(DecisionOn(graph, k));
+      if (known != believed_.end()) term.believed = known->second;
+    }
+    STRATA_ASSIGN_OR_RETURN(PoseGraphSolution solution,
+                            OptimizePoseGraph(graph, options_.pose_graph, stop_));
+    if (believed_.empty() || !IsSettled(solution.T_map_scan)) return solution;
+    for (RelativePoseTerm& term : graph.relative) term.believed.reset();
+    return OptimizePoseGraph(graph, options_.pose_graph, stop_);
+  }
+
+  // Of a term that may be false: the given ones by their place, matches by their scans.
+  using Decision = std::tuple<std::size_t, std::size_t, std::size_t>;
+  Decision DecisionOn(const PoseGraphProblem& graph, std::size_t k) const {
+    return {graph.relative[k].i, graph.relative[k].j, std::min(k, problem_.relative.size())};
   }
 
   absl::Status Register(AlignmentRound& round) {
@@ -401,11 +425,15 @@ class Alignment {
     result_.T_map_scan = std::move(solution.T_map_scan);
     result_.measured.clear();
     result_.rejected.clear();
+    believed_.clear();
     std::vector<bool> rejected(graph.relative.size(), false);
     const std::size_t given = problem_.relative.size();
     for (const auto& [k, chi2] : solution.summary.rejected_relative) {
       rejected[k] = true;
       result_.rejected.push_back({graph.relative[k], chi2, k < given});
+    }
+    for (std::size_t k = 0; k < graph.relative.size(); ++k) {
+      if (graph.relative[k].may_be_false) believed_[DecisionOn(graph, k)] = !rejected[k];
     }
     for (std::size_t k = given; k < graph.relative.size(); ++k) {
       if (!rejected[k]) result_.measured.push_back(graph.relative[k]);
@@ -438,8 +466,9 @@ class Alignment {
   std::vector<const RelativePoseTerm*> odometry_;       // of every node j; nullptr: none
   std::vector<SharedPlane> shared_;
   std::vector<SharedDirection> directions_;
-  SharedPlaneOptions gates_;      // that they were found by
-  std::size_t measured_end_ = 0;  // of the graph's relative terms: what is given or a match
+  SharedPlaneOptions gates_;           // that they were found by
+  std::map<Decision, bool> believed_;  // in the round before
+  std::size_t measured_end_ = 0;       // of the graph's relative terms: what is given or a match
   AlignmentResult result_;
 };
 

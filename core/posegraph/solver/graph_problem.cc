@@ -34,6 +34,11 @@ Eigen::Vector3d CentreOf(const PlaneTerm& term, const std::vector<Pose>& T_map_s
   return sum / weight;
 }
 
+DirectionBlock DirectionBlockOf(const DirectionTerm& term) {
+  const Eigen::Vector3d d = term.direction_map.normalized();
+  return {d.x(), d.y(), d.z()};
+}
+
 }  // namespace
 
 GraphProblem::GraphProblem(const PoseGraphProblem& graph,
@@ -91,8 +96,7 @@ void GraphProblem::AddPlanes(double factor) {
 
 void GraphProblem::AddDirections(double factor) {
   for (const DirectionTerm& term : graph_.directions) {
-    const Eigen::Vector3d d = term.direction_map.normalized();
-    directions_.push_back({d.x(), d.y(), d.z()});
+    directions_.push_back(DirectionBlockOf(term));
   }
   for (std::size_t d = 0; d < directions_.size(); ++d) {
     problem_.AddParameterBlock(directions_[d].data(), 3, &direction_manifold_);
@@ -129,6 +133,16 @@ void GraphProblem::Damp(double factor) {
     auto cost = std::make_unique<InertiaCost>(kInertia * factor * rotation[n],
                                               kInertia * factor * translation[n]);
     problem_.AddResidualBlock(cost.release(), nullptr, poses_[n].data());
+  }
+}
+
+void GraphProblem::Restart() {
+  for (std::size_t n = 0; n < poses_.size(); ++n) poses_[n] = PoseBlockOf(graph_.T_map_scan[n]);
+  for (std::size_t p = 0; p < planes_.size(); ++p) {
+    planes_[p] = PlaneBlockOf(graph_.planes[p].plane_map, centres_[p]);
+  }
+  for (std::size_t d = 0; d < directions_.size(); ++d) {
+    directions_[d] = DirectionBlockOf(graph_.directions[d]);
   }
 }
 

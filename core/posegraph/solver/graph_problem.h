@@ -34,6 +34,8 @@ class GraphProblem {
   GraphProblem& operator=(const GraphProblem&) = delete;
 
   ceres::Problem& problem() { return problem_; }
+  // Moves all blocks back to where they were built.
+  void Restart();
 
   // What the terms count, 1 at first; by PoseGraphProblem::relative.
   std::vector<double>& relative_weights() { return relative_weights_; }

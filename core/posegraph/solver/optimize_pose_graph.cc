@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -24,7 +25,8 @@ constexpr std::size_t kWorstNodes = 10;
 
 class RelativeCandidates : public OutlierCandidates {
  public:
-  RelativeCandidates(const PoseGraphProblem& problem, GraphProblem& graph) : graph_(graph) {
+  RelativeCandidates(const PoseGraphProblem& problem, GraphProblem& graph)
+      : problem_(problem), graph_(graph) {
     for (std::size_t k = 0; k < problem.relative.size(); ++k) {
       if (problem.relative[k].may_be_false) terms_.push_back(k);
     }
@@ -32,8 +34,13 @@ class RelativeCandidates : public OutlierCandidates {
   std::size_t size() const override { return terms_.size(); }
   double Chi2(std::size_t k) const override { return graph_.RelativeChi2(terms_[k]); }
   double& Weight(std::size_t k) override { return graph_.relative_weights()[terms_[k]]; }
+  std::optional<bool> Believed(std::size_t k) const override {
+    return problem_.relative[terms_[k]].believed;
+  }
+  void Restart() override { graph_.Restart(); }
 
  private:
+  const PoseGraphProblem& problem_;
   GraphProblem& graph_;
   std::vector<std::size_t> terms_;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "absl/functional/function_ref.h"
@@ -79,6 +80,24 @@ bool RejectMore(OutlierCandidates& candidates, double max_chi2) {
   return more;
 }
 
+// True if every candidate is known from before, and has its weight.
+bool WeighAsBefore(OutlierCandidates& candidates) {
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    const std::optional<bool> believed = candidates.Believed(k);
+    if (!believed.has_value()) return false;
+    candidates.Weight(k) = *believed ? 1.0 : 0.0;
+  }
+  return true;
+}
+
+// Whether exactly those that count are within the bound.
+bool Fits(OutlierCandidates& candidates, double max_chi2) {
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    if ((candidates.Weight(k) > 0.0) != (candidates.Chi2(k) <= max_chi2)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 double TruncatedWeight(double chi2, double max_chi2, double control) {
@@ -101,6 +120,11 @@ absl::StatusOr<Minimum> MinimiseRobustly(
   };
   if (candidates.size() == 0 || std::isinf(max_chi2)) return go_down(convergence);
 
+  if (WeighAsBefore(candidates)) {
+    STRATA_ASSIGN_OR_RETURN(const Minimum minimum, go_down(convergence));
+    if (Fits(candidates, max_chi2)) return minimum;
+    candidates.Restart();  // one false closure that was believed folds the graph
+  }
   // Not from the minimum of all terms, as in the paper: strong false ones fold the graph.
   SetAll(candidates, 0.0);
   STRATA_RETURN_IF_ERROR(go_down(kAlongTheWay).status());

@@ -4,6 +4,7 @@
 #define STRATA_CORE_POSEGRAPH_SOLVER_ROBUST_MINIMUM_H_
 
 #include <cstddef>
+#include <optional>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/statusor.h"
@@ -20,11 +21,17 @@ class OutlierCandidates {
   virtual std::size_t size() const = 0;
   virtual double Chi2(std::size_t k) const = 0;  // in the current state, without its weight
   virtual double& Weight(std::size_t k) = 0;
+  // What is known of it from before: whether it counts.
+  virtual std::optional<bool> Believed(std::size_t /*k*/) const { return std::nullopt; }
+  // Goes back to the state that minimising began from; of candidates known from before.
+  virtual void Restart() {}
 };
 
 // Graduated non-convexity (Yang, Antonante, Tzoumas, Carlone 2020) for truncated least squares: a
 // candidate counts min(χ², max_chi2), reached through a family of costs that begins convex. Leaves
-// the weights at 0 or 1; a candidate whose χ² at the minimum is above the bound has 0.
+// the weights at 0 or 1; a candidate whose χ² at the minimum is above the bound has 0. Where all
+// candidates are known from before, and exactly those that count are within the bound at their
+// minimum, that is it: a minimum of the truncated costs, too.
 // `minimise` goes down from the current state with the current weights.
 absl::StatusOr<Minimum> MinimiseRobustly(
     OutlierCandidates& candidates,

@@ -111,6 +111,26 @@ TEST_P(PlantedClosuresTest, AFifthOfFalseClosuresIsFoundOut) {
       robust.summary.iterations);
 }
 
+TEST_P(PlantedClosuresTest, WhatWasDecidedBeforeStandsWhereItFits) {
+  PlantFalse(true_closures_ / 4 + 3);
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto anew, OptimizePoseGraph(problem_));
+  std::set<std::size_t> rejected;
+  for (const RejectedTerm& term : anew.summary.rejected_relative) rejected.insert(term.term);
+  for (std::size_t k = 0; k < problem_.relative.size(); ++k) {
+    if (problem_.relative[k].may_be_false) problem_.relative[k].believed = !rejected.contains(k);
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto again, OptimizePoseGraph(problem_));
+  EXPECT_LT(again.summary.iterations, anew.summary.iterations);
+  EXPECT_NEAR(Error(again.T_map_scan), Error(anew.T_map_scan), 1e-4);
+  EXPECT_EQ(again.summary.rejected_relative.size(), rejected.size());
+
+  problem_.relative[*false_.begin()].believed = true;
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto decided, OptimizePoseGraph(problem_));
+  EXPECT_GT(decided.summary.iterations, again.summary.iterations);
+  EXPECT_NEAR(Error(decided.T_map_scan), Error(anew.T_map_scan), 1e-2);
+  EXPECT_EQ(decided.summary.rejected_relative.size(), rejected.size());
+}
+
 TEST_P(PlantedClosuresTest, HalfOfThemFalseIsFoundOut) {
   STRATA_ASSERT_OK_AND_ASSIGN(const auto clean, OptimizePoseGraph(problem_));
   PlantFalse(true_closures_);
