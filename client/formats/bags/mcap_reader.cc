@@ -17,6 +17,7 @@
 #include <zlib.h>
 
 #include "client/formats/bags/byte_cursor.h"
+#include "client/formats/bags/chunked_bag_reader.h"
 #include "client/formats/bags/unpack.h"
 #include "core/common/status.h"
 
@@ -34,10 +35,6 @@ constexpr std::uint64_t kRecordHead = 9;  // opcode and length
 // Of a message's record before its bytes: channel, sequence, two times.
 constexpr std::uint64_t kMessageHead = 22;
 
-bool IsOfInterest(std::uint8_t opcode) {
-  return opcode == kSchema || opcode == kChannel || opcode == kMessage || opcode == kChunk;
-}
-
 std::int64_t ClampedNanoseconds(std::uint64_t time_ns) {
   constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
   return static_cast<std::int64_t>(std::min(time_ns, kMost));
@@ -48,10 +45,6 @@ std::uint32_t Crc32Of(absl::string_view bytes) {
       crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
-std::string AtByte(std::uint64_t at, absl::string_view what) {
-  return absl::StrCat("byte ", at, ": ", what);
-}
-
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<BagReader>> McapReader::Open(const std::filesystem::path& path) {
@@ -59,14 +52,16 @@ absl::StatusOr<std::unique_ptr<BagReader>> McapReader::Open(const std::filesyste
   return std::unique_ptr<BagReader>(new McapReader(std::move(file)));
 }
 
-double McapReader::progress() const {
-  return static_cast<double>(behind_) /
-         static_cast<double>(std::max<std::uint64_t>(file_.size(), 1));
-}
+McapReader::McapReader(BagFile file)
+    : ChunkedBagReader(std::move(file),
+                       {.first_record = kMcapMagic.size(),
+                        .chunk = kChunk,
+                        .message = kMessage,
+                        .message_head = kMessageHead}) {}
 
-absl::StatusOr<std::optional<McapReader::Record>> McapReader::RecordAt(std::uint64_t at) {
+absl::StatusOr<std::optional<McapReader::Record>> McapReader::HeadAt(std::uint64_t at) {
   std::string head;
-  STRATA_RETURN_IF_ERROR(file_.Read(at, kRecordHead, head));
+  STRATA_RETURN_IF_ERROR(file().Read(at, kRecordHead, head));
   if (head.empty()) {
     AddDamage(absl::StrCat("ends at byte ", at, " without the end of its data: it was not closed"));
     return std::nullopt;
@@ -74,78 +69,37 @@ absl::StatusOr<std::optional<McapReader::Record>> McapReader::RecordAt(std::uint
   ByteCursor cursor(head);
   Record record;
   record.at = at;
-  record.opcode = cursor.Get<std::uint8_t>();
+  record.op = cursor.Get<std::uint8_t>();
+  record.content_at = at + kRecordHead;
   record.length = cursor.Get<std::uint64_t>();
   if (!cursor.ok()) {
-    AddDamage(absl::StrCat("ends at byte ", file_.size(), " in the middle of a record"));
+    AddCutHead();
     return std::nullopt;
   }
-  if (record.opcode == 0) {
-    AddDamage(AtByte(at, "no record begins here; what follows is not read"));
+  if (record.op == 0) {
+    AddNoHead(at);
     return std::nullopt;
   }
-  record.there = std::min(record.length, file_.size() - std::min(file_.size(), at + kRecordHead));
+  if (record.op == kDataEnd || record.op == kFooter) return std::nullopt;
   return record;
 }
 
-absl::Status McapReader::Visit(Visitor visit) {
-  ClearDamage();
-  loaded_.reset();
-  std::uint64_t at = kMcapMagic.size();
-  while (true) {
-    STRATA_ASSIGN_OR_RETURN(const std::optional<Record> record, RecordAt(at));
-    if (!record.has_value() || record->opcode == kDataEnd || record->opcode == kFooter) break;
-    behind_ = at + kRecordHead + record->there;
-    if (IsOfInterest(record->opcode)) STRATA_RETURN_IF_ERROR(VisitRecord(*record, visit));
-    if (record->there < record->length) {
-      AddCutShort(file_.size(), at, record->length);
-      break;
-    }
-    at = behind_;
-  }
-  behind_ = file_.size();
-  return absl::OkStatus();
+std::optional<McapReader::Piece> McapReader::NextPiece(ByteCursor& chunk) const {
+  Piece piece;
+  piece.op = chunk.Get<std::uint8_t>();
+  piece.content = chunk.TakeSized<std::uint64_t>();
+  return chunk.ok() ? std::optional<Piece>(piece) : std::nullopt;
 }
 
-absl::Status McapReader::VisitRecord(const Record& record, Visitor visit) {
-  if (record.opcode == kChunk) return VisitChunk(record, visit);
-  if (record.there < record.length) return absl::OkStatus();
-  if (record.length > kMaxBagPieceBytes) {
-    AddDamage(AtByte(record.at, absl::StrCat("a record of ", record.length, " bytes is left out")));
-    return absl::OkStatus();
-  }
-  STRATA_RETURN_IF_ERROR(file_.Read(record.at + kRecordHead, record.length, content_));
-  loaded_.reset();
-  return VisitContent(record.opcode, content_, {.chunk = 0, .at = record.at}, visit);
+bool McapReader::Wants(const Record& record) {
+  return record.op == kSchema || record.op == kChannel || record.op == kMessage;
 }
 
-absl::Status McapReader::VisitChunk(const Record& record, Visitor visit) {
-  const absl::Status loaded = LoadChunk(record);
-  if (absl::IsUnavailable(loaded)) return loaded;
-  if (!loaded.ok()) AddDamage(AtByte(record.at, absl::StrCat("a chunk ", loaded.message())));
-  ByteCursor cursor(records_);
-  while (cursor.remaining() > 0) {
-    const std::uint64_t at = cursor.position();
-    const auto opcode = cursor.Get<std::uint8_t>();
-    const absl::string_view content = cursor.TakeSized<std::uint64_t>();
-    if (!cursor.ok()) {
-      if (loaded.ok()) AddDamage(AtByte(record.at, "a chunk ends in the middle of a record"));
-      break;
-    }
-    STRATA_RETURN_IF_ERROR(VisitContent(opcode, content, {.chunk = record.at, .at = at}, visit));
-  }
-  return absl::OkStatus();
-}
-
-absl::Status McapReader::LoadChunk(const Record& record) {
-  if (loaded_ == record.at) return absl::OkStatus();
-  records_ = {};
-  loaded_.reset();
-  if (record.there > kMaxBagPieceBytes) {
-    return absl::DataLossError(absl::StrCat("of ", record.length, " bytes is left out"));
-  }
-  STRATA_RETURN_IF_ERROR(file_.Read(record.at + kRecordHead, record.there, content_));
-  ByteCursor cursor(content_);
+absl::Status McapReader::UnpackChunk(const Record& /*record*/,
+                                     absl::string_view content,
+                                     std::string& unpacked,
+                                     absl::string_view& records) const {
+  ByteCursor cursor(content);
   cursor.Take(2 * sizeof(std::uint64_t));  // first and last time
   const auto size = cursor.Get<std::uint64_t>();
   const auto crc = cursor.Get<std::uint32_t>();
@@ -156,21 +110,18 @@ absl::Status McapReader::LoadChunk(const Record& record) {
   const absl::string_view packed = cut ? cursor.TakeRest() : cursor.Take(packed_size);
   absl::Status status;
   if (method.empty()) {
-    records_ = packed;
+    records = packed;
   } else {
-    status = Unpack(method, packed, size, unpacked_);
-    records_ = unpacked_;
+    status = Unpack(method, packed, size, unpacked);
+    records = unpacked;
   }
   if (cut) return absl::DataLossError("is cut short; its first messages are read");
-  if (status.ok() && crc != 0 && Crc32Of(records_) != crc) {
+  if (status.ok() && crc != 0 && Crc32Of(records) != crc) {
     status = absl::DataLossError("has another checksum than it says");
   }
-  if (!status.ok()) {
-    records_ = {};
-    return absl::DataLossError(absl::StrCat(status.message(), ": it is left out"));
-  }
-  loaded_ = record.at;
-  return absl::OkStatus();
+  if (status.ok()) return status;
+  records = {};
+  return absl::DataLossError(absl::StrCat(status.message(), ": it is left out"));
 }
 
 void McapReader::AddSchema(absl::string_view content) {
@@ -193,52 +144,25 @@ void McapReader::AddChannel(absl::string_view content) {
                               MessageEncodingOf(encoding));
 }
 
-absl::Status McapReader::VisitContent(std::uint8_t opcode,
-                                      absl::string_view content,
-                                      const MessagePlace& place,
-                                      Visitor visit) {
-  if (opcode == kSchema) AddSchema(content);
-  if (opcode == kChannel) AddChannel(content);
-  if (opcode != kMessage) return absl::OkStatus();
-  ByteCursor cursor(content);
+absl::Status McapReader::VisitPiece(const Piece& piece, const MessagePlace& place, Visitor visit) {
+  if (piece.op == kSchema) AddSchema(piece.content);
+  if (piece.op == kChannel) AddChannel(piece.content);
+  if (piece.op != kMessage) return absl::OkStatus();
+  ByteCursor cursor(piece.content);
   const auto channel = channels_.find(cursor.Get<std::uint16_t>());
   cursor.Get<std::uint32_t>();  // sequence
   const auto log_time_ns = cursor.Get<std::uint64_t>();
   cursor.Get<std::uint64_t>();  // when it was published
   if (!cursor.ok() || channel == channels_.end()) {
-    AddDamage(AtByte(std::max(place.chunk, place.at),
-                     cursor.ok() ? "a message of no channel is left out"
-                                 : "a message is too short for its times"));
+    AddDamageAt(std::max(place.chunk, place.at),
+                cursor.ok() ? "a message of no channel is left out"
+                            : "a message is too short for its times");
     return absl::OkStatus();
   }
   return visit({.topic = channel->second,
                 .time_ns = ClampedNanoseconds(log_time_ns),
                 .bytes = cursor.TakeRest(),
                 .place = place});
-}
-
-absl::StatusOr<std::string> McapReader::Read(const MessagePlace& place) {
-  const std::uint64_t at = place.chunk == 0 ? place.at : place.chunk;
-  STRATA_ASSIGN_OR_RETURN(const std::optional<Record> record, RecordAt(at));
-  const absl::Status lost =
-      absl::DataLossError(absl::StrCat(file_.name(), ": ", AtByte(at, "no message any more")));
-  if (!record.has_value() || record->opcode != (place.chunk == 0 ? kMessage : kChunk)) return lost;
-  absl::string_view content;
-  if (place.chunk == 0) {
-    if (record->length > kMaxBagPieceBytes) return lost;
-    STRATA_RETURN_IF_ERROR(file_.Read(at + kRecordHead, record->length, content_));
-    loaded_.reset();
-    content = content_;
-  } else {
-    const absl::Status loaded = LoadChunk(*record);
-    if (absl::IsUnavailable(loaded)) return loaded;  // else what is there may have it
-    ByteCursor cursor(records_);
-    cursor.Take(place.at);
-    if (cursor.Get<std::uint8_t>() != kMessage) return lost;
-    content = cursor.TakeSized<std::uint64_t>();
-  }
-  if (content.size() < kMessageHead) return lost;
-  return std::string(content.substr(kMessageHead));
 }
 
 }  // namespace strata

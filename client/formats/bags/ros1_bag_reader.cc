@@ -15,6 +15,7 @@
 #include "absl/strings/string_view.h"
 
 #include "client/formats/bags/byte_cursor.h"
+#include "client/formats/bags/chunked_bag_reader.h"
 #include "client/formats/bags/unpack.h"
 #include "core/common/status.h"
 
@@ -40,24 +41,18 @@ std::int64_t Ros1Nanoseconds(absl::string_view bytes) {
   return seconds * 1'000'000'000 + cursor.Get<std::uint32_t>();
 }
 
-std::string AtRos1Byte(std::uint64_t at, absl::string_view what) {
-  return absl::StrCat("byte ", at, ": ", what);
-}
+// What of the fields of a record's header counts here.
+struct RecordHeader {
+  std::uint8_t op = 0;
+  std::uint32_t connection = 0;
+  std::uint64_t index_at = 0;
+  std::uint32_t size = 0;
+  std::int64_t time_ns = 0;
+  absl::string_view topic, type, compression;
+};
 
-}  // namespace
-
-absl::StatusOr<std::unique_ptr<BagReader>> Ros1BagReader::Open(const std::filesystem::path& path) {
-  STRATA_ASSIGN_OR_RETURN(BagFile file, BagFile::Open(path));
-  return std::unique_ptr<BagReader>(new Ros1BagReader(std::move(file)));
-}
-
-double Ros1BagReader::progress() const {
-  return static_cast<double>(behind_) /
-         static_cast<double>(std::max<std::uint64_t>(file_.size(), 1));
-}
-
-std::optional<Ros1BagReader::Header> Ros1BagReader::ParseHeader(absl::string_view fields) {
-  Header header;
+std::optional<RecordHeader> ParseHeader(absl::string_view fields) {
+  RecordHeader header;
   ByteCursor cursor(fields);
   while (cursor.remaining() > 0) {
     const absl::string_view field = cursor.TakeSized<std::uint32_t>();
@@ -70,161 +65,105 @@ std::optional<Ros1BagReader::Header> Ros1BagReader::ParseHeader(absl::string_vie
     if (name == "index_pos") header.index_at = NumberIn<std::uint64_t>(value);
     if (name == "size") header.size = NumberIn<std::uint32_t>(value);
     if (name == "time") header.time_ns = Ros1Nanoseconds(value);
-    if (name == "topic") header.topic = std::string(value);
-    if (name == "type") header.type = std::string(value);
-    if (name == "compression") header.compression = std::string(value);
+    if (name == "topic") header.topic = value;
+    if (name == "type") header.type = value;
+    if (name == "compression") header.compression = value;
   }
   return header;
 }
 
-absl::StatusOr<std::optional<Ros1BagReader::Record>> Ros1BagReader::RecordAt(std::uint64_t at) {
-  if (at >= file_.size()) return std::nullopt;
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<BagReader>> Ros1BagReader::Open(const std::filesystem::path& path) {
+  STRATA_ASSIGN_OR_RETURN(BagFile file, BagFile::Open(path));
+  return std::unique_ptr<BagReader>(new Ros1BagReader(std::move(file)));
+}
+
+Ros1BagReader::Ros1BagReader(BagFile file)
+    : ChunkedBagReader(
+          std::move(file),
+          {.first_record = kRos1Magic.size(), .chunk = kOpChunk, .message = kOpMessage}) {}
+
+absl::StatusOr<std::optional<Ros1BagReader::Record>> Ros1BagReader::HeadAt(std::uint64_t at) {
+  if (at >= file().size()) return std::nullopt;
   std::string bytes;
-  STRATA_RETURN_IF_ERROR(file_.Read(at, sizeof(std::uint32_t), bytes));
+  STRATA_RETURN_IF_ERROR(file().Read(at, sizeof(std::uint32_t), bytes));
   const auto header_size = NumberIn<std::uint32_t>(bytes);
-  std::optional<Header> header;
+  Record record;
   if (bytes.size() == sizeof(std::uint32_t) && header_size <= kMaxRos1Header) {
-    STRATA_RETURN_IF_ERROR(
-        file_.Read(at + sizeof(std::uint32_t), header_size + sizeof(std::uint32_t), bytes));
-    if (bytes.size() == header_size + sizeof(std::uint32_t)) {
-      header = ParseHeader(absl::string_view(bytes).substr(0, header_size));
-    } else {
-      AddDamage(absl::StrCat("ends at byte ", file_.size(), " in the middle of a record"));
+    const std::uint64_t head = header_size + sizeof(std::uint32_t);
+    STRATA_RETURN_IF_ERROR(file().Read(at + sizeof(std::uint32_t), head, bytes));
+    if (bytes.size() < head) {
+      AddCutHead();
       return std::nullopt;
     }
+    record.fields = bytes.substr(0, header_size);
   }
+  const std::optional<RecordHeader> header = ParseHeader(record.fields);
   if (!header.has_value() || header->op == 0) {
-    AddDamage(AtRos1Byte(at, "no record begins here; what follows is not read"));
+    AddNoHead(at);
     return std::nullopt;
   }
-  Record record;
+  record.op = header->op;
   record.at = at;
-  record.header = *std::move(header);
   record.length = NumberIn<std::uint32_t>(absl::string_view(bytes).substr(header_size));
-  record.data_at = at + 2 * sizeof(std::uint32_t) + header_size;
-  record.there = std::min(record.length, file_.size() - std::min(file_.size(), record.data_at));
+  record.content_at = at + 2 * sizeof(std::uint32_t) + header_size;
   return record;
 }
 
-absl::Status Ros1BagReader::Visit(Visitor visit) {
-  ClearDamage();
-  loaded_.reset();
-  std::uint64_t at = kRos1Magic.size();
-  while (true) {
-    STRATA_ASSIGN_OR_RETURN(const std::optional<Record> record, RecordAt(at));
-    if (!record.has_value()) break;
-    behind_ = record->data_at + record->there;
-    STRATA_RETURN_IF_ERROR(VisitRecord(*record, visit));
-    if (record->there < record->length) {
-      AddCutShort(file_.size(), at, record->length);
-      break;
-    }
-    at = behind_;
-  }
-  behind_ = file_.size();
-  return absl::OkStatus();
+std::optional<Ros1BagReader::Piece> Ros1BagReader::NextPiece(ByteCursor& chunk) const {
+  Piece piece;
+  piece.fields = chunk.TakeSized<std::uint32_t>();
+  piece.content = chunk.TakeSized<std::uint32_t>();
+  const std::optional<RecordHeader> header = chunk.ok() ? ParseHeader(piece.fields) : std::nullopt;
+  if (!header.has_value()) return std::nullopt;
+  piece.op = header->op;
+  return piece;
 }
 
-absl::Status Ros1BagReader::VisitRecord(const Record& record, Visitor visit) {
-  const std::uint8_t op = record.header.op;
-  if (op == kOpBagHeader && record.header.index_at == 0) AddDamage("it was not closed");
-  if (op == kOpChunk) return VisitChunk(record, visit);
-  if (op != kOpConnection && op != kOpMessage) return absl::OkStatus();
-  if (record.there < record.length) return absl::OkStatus();
-  if (record.length > kMaxBagPieceBytes) {
-    AddDamage(
-        AtRos1Byte(record.at, absl::StrCat("a record of ", record.length, " bytes is left out")));
-    return absl::OkStatus();
+bool Ros1BagReader::Wants(const Record& record) {
+  if (record.op == kOpBagHeader && ParseHeader(record.fields)->index_at == 0) {
+    AddDamage("it was not closed");
   }
-  STRATA_RETURN_IF_ERROR(file_.Read(record.data_at, record.length, content_));
-  loaded_.reset();
-  return VisitContent(record.header, content_, {.chunk = 0, .at = record.at}, visit);
+  return record.op == kOpConnection || record.op == kOpMessage;
 }
 
-absl::Status Ros1BagReader::VisitChunk(const Record& record, Visitor visit) {
-  const absl::Status loaded = LoadChunk(record);
-  if (absl::IsUnavailable(loaded)) return loaded;
-  if (!loaded.ok()) AddDamage(AtRos1Byte(record.at, absl::StrCat("a chunk ", loaded.message())));
-  ByteCursor cursor(records_);
-  while (cursor.remaining() > 0) {
-    const std::uint64_t at = cursor.position();
-    const absl::string_view fields = cursor.TakeSized<std::uint32_t>();
-    const absl::string_view data = cursor.TakeSized<std::uint32_t>();
-    const std::optional<Header> header = cursor.ok() ? ParseHeader(fields) : std::nullopt;
-    if (!header.has_value()) {
-      if (loaded.ok()) AddDamage(AtRos1Byte(record.at, "a chunk ends in the middle of a record"));
-      break;
-    }
-    STRATA_RETURN_IF_ERROR(VisitContent(*header, data, {.chunk = record.at, .at = at}, visit));
-  }
-  return absl::OkStatus();
-}
-
-absl::Status Ros1BagReader::LoadChunk(const Record& record) {
-  if (loaded_ == record.at) return absl::OkStatus();
-  records_ = {};
-  loaded_.reset();
-  if (record.there > kMaxBagPieceBytes) {
-    return absl::DataLossError(absl::StrCat("of ", record.length, " bytes is left out"));
-  }
-  STRATA_RETURN_IF_ERROR(file_.Read(record.data_at, record.there, content_));
+absl::Status Ros1BagReader::UnpackChunk(const Record& record,
+                                        absl::string_view content,
+                                        std::string& unpacked,
+                                        absl::string_view& records) const {
+  const RecordHeader header = *ParseHeader(record.fields);
   absl::Status status;
-  if (record.header.compression == "none") {
-    records_ = content_;
+  if (header.compression == "none") {
+    records = content;
   } else {
-    status = Unpack(record.header.compression, content_, record.header.size, unpacked_);
-    records_ = unpacked_;
+    status = Unpack(header.compression, content, header.size, unpacked);
+    records = unpacked;
   }
   if (record.there < record.length) {
     return absl::DataLossError("is cut short; its first messages are read");
   }
-  if (!status.ok()) {
-    return absl::DataLossError(absl::StrCat(status.message(), "; what came before it is read"));
-  }
-  loaded_ = record.at;
-  return absl::OkStatus();
+  if (status.ok()) return status;
+  return absl::DataLossError(absl::StrCat(status.message(), "; what came before it is read"));
 }
 
-absl::Status Ros1BagReader::VisitContent(const Header& header,
-                                         absl::string_view data,
-                                         const MessagePlace& place,
-                                         Visitor visit) {
-  if (header.op == kOpConnection) {
-    const std::optional<Header> about = ParseHeader(data);
+absl::Status Ros1BagReader::VisitPiece(const Piece& piece,
+                                       const MessagePlace& place,
+                                       Visitor visit) {
+  const RecordHeader header = *ParseHeader(piece.fields);
+  if (piece.op == kOpConnection) {
+    const std::optional<RecordHeader> about = ParseHeader(piece.content);
     connections_[header.connection] =
         TopicNumber(header.topic, about.has_value() ? about->type : "", MessageEncoding::kRos1);
   }
-  if (header.op != kOpMessage) return absl::OkStatus();
+  if (piece.op != kOpMessage) return absl::OkStatus();
   const auto topic = connections_.find(header.connection);
   if (topic == connections_.end()) {
-    AddDamage(AtRos1Byte(std::max(place.chunk, place.at), "a message of no topic is left out"));
+    AddDamageAt(std::max(place.chunk, place.at), "a message of no topic is left out");
     return absl::OkStatus();
   }
-  return visit({.topic = topic->second, .time_ns = header.time_ns, .bytes = data, .place = place});
-}
-
-absl::StatusOr<std::string> Ros1BagReader::Read(const MessagePlace& place) {
-  const std::uint64_t at = place.chunk == 0 ? place.at : place.chunk;
-  STRATA_ASSIGN_OR_RETURN(const std::optional<Record> record, RecordAt(at));
-  const absl::Status lost =
-      absl::DataLossError(absl::StrCat(file_.name(), ": ", AtRos1Byte(at, "no message any more")));
-  if (!record.has_value()) return lost;
-  if (place.chunk == 0) {
-    if (record->header.op != kOpMessage || record->length > kMaxBagPieceBytes) return lost;
-    loaded_.reset();
-    STRATA_RETURN_IF_ERROR(file_.Read(record->data_at, record->length, content_));
-    return content_;
-  }
-  if (record->header.op != kOpChunk) return lost;
-  const absl::Status loaded = LoadChunk(*record);
-  if (absl::IsUnavailable(loaded)) return loaded;  // else what is there may have it
-  ByteCursor cursor(records_);
-  cursor.Take(place.at);
-  const absl::string_view fields = cursor.TakeSized<std::uint32_t>();
-  const absl::string_view data = cursor.TakeSized<std::uint32_t>();
-  const std::optional<Header> header = ParseHeader(fields);
-  if (!cursor.ok() || !header.has_value() || header->op != kOpMessage) return lost;
-  return std::string(data);
+  return visit(
+      {.topic = topic->second, .time_ns = header.time_ns, .bytes = piece.content, .place = place});
 }
 
 }  // namespace strata
