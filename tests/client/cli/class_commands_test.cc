@@ -1,15 +1,14 @@
 // What commands show and ask of classes, in this process on a database that the test decides on.
 #include <algorithm>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/cli/terminal/command.h"
 #include "client/formats/scan_reader.h"
 #include "core/codec/surface_tile_codec.h"
+#include "tests/client/cli/commands_fixture.h"
 #include "tests/support/mock_database.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
@@ -39,7 +38,7 @@ SurfaceTile TwoFields() {
   return tile;
 }
 
-class ClassCommandsTest : public ::testing::Test {
+class ClassCommandsTest : public CommandsTest {
  protected:
   ClassCommandsTest() {
     ON_CALL(db_.maps(), ListClasses(_, _))
@@ -57,19 +56,6 @@ class ClassCommandsTest : public ::testing::Test {
           return sink(update);
         });
   }
-  absl::Status Run(std::vector<std::string> words, OutputFormat format = OutputFormat::kJson) {
-    data_.str("");
-    CLI::App root;
-    Commands commands{.root = root, .selected = {}, .selected_on_files = {}};
-    AddMapCommands(commands);
-    AddSurfaceCommand(commands);
-    AddPlanCommand(commands);
-    std::reverse(words.begin(), words.end());  // as CLI11 takes them
-    root.parse(words);
-    Output output(format, data_, talk_);
-    Context context{.database = db_, .call = {}, .output = output};
-    return commands.selected(context);
-  }
   absl::Status Plan(std::vector<std::string> avoid) {
     std::vector<std::string> words = {"plan", "m", "--from", "0,0", "--to", "1,0"};
     words.insert(words.end(), avoid.begin(), avoid.end());
@@ -78,8 +64,6 @@ class ClassCommandsTest : public ::testing::Test {
   std::string Path(const std::string& name) const { return (dir_.path() / name).string(); }
 
   testing::TempDir dir_;
-  ::testing::NiceMock<::strata::testing::MockDatabase> db_;
-  std::ostringstream data_, talk_;
 };
 
 TEST_F(ClassCommandsTest, PlanAvoidsClassesByNameOrId) {

@@ -1,0 +1,110 @@
+// strata surface, plan, path and profile, as their users run them.
+#include <algorithm>
+#include <filesystem>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/client/cli/run_strata.h"
+#include "tests/client/cli/strata_fixture.h"
+
+namespace strata::cli {
+namespace {
+
+class StrataPlanTest : public StrataTest {};
+
+TEST_F(StrataPlanTest, PathsAreCheckedFromTheirFiles) {
+  WriteDrive(8);
+  RunOk({"map", "create", "m"});
+  Import({"--align", "off"});
+  const std::string path = (dir_.path() / "path.ply").string();
+  const json plan = RunOk({"plan", "m", "--from", "-4,0.5,0", "--to", "3,-0.5,0", "--out", path});
+  ASSERT_EQ(plan["found"], true) << plan;
+  const json check = RunOk({"path", "check", "m", path});
+  EXPECT_EQ(check["valid"], true) << check;
+  EXPECT_NEAR(check["length_m"].get<double>(), plan["length_m"].get<double>(), 0.01);
+  const json wide = RunOk({"path", "check", "m", path, "--radius", "5"});
+  EXPECT_EQ(wide["valid"], false);
+  EXPECT_TRUE(wide.contains("where"));
+  EXPECT_EQ(Run({"path", "check", "m", path + "x"}).exit_code, 1);
+}
+
+TEST_F(StrataPlanTest, SurfacePlanRenderAndExportOfADrive) {
+  WriteDrive(8);
+  RunOk({"map", "create", "m"});
+  Import();
+  const json column = RunOk({"surface", "m", "--at", "-2.05,0.05"});
+  ASSERT_EQ(column.at("surfaces").size(), 1U);
+  EXPECT_NEAR(column.at("surfaces").at(0).at("z").get<double>(), 0.0, 0.05);
+
+  const std::string path = (dir_.path() / "path.ply").string();
+  const json plan = RunOk({"plan", "m", "--from", "-4,0.5,0", "--to", "3,-0.5,0", "--out", path});
+  ASSERT_EQ(plan.at("found"), true) << plan.dump();
+  EXPECT_NEAR(plan.at("length_m").get<double>(), 7.07, 0.5);
+  EXPECT_EQ(plan.at("waypoints").at(0).size(), 3U);
+
+  const json blocked = RunOk({"plan", "m", "--from", "-4,0,0", "--to", "900,0,0"});
+  EXPECT_EQ(blocked.at("found"), false);
+
+  const std::string queries = Write("queries.csv", "-4,0,0,3,0,0\n-4,0,0,900,0,0\n");
+  const Ran many = Run({"plan", "m", "--queries", queries});
+  EXPECT_EQ(many.exit_code, 0);
+  std::istringstream lines(many.out);
+  std::string line;
+  ASSERT_TRUE(std::getline(lines, line));
+  EXPECT_EQ(json::parse(line).at("found"), true);
+  ASSERT_TRUE(std::getline(lines, line));
+  EXPECT_EQ(json::parse(line).at("found"), false);
+
+  const std::string refused = Write("refused.csv", "1e300,0,0,3,0,0\n-4,0,0,3,0,0\n");
+  const Ran some = Run({"plan", "m", "--queries", refused});
+  EXPECT_EQ(some.exit_code, 1);
+  std::istringstream answers(some.out);
+  ASSERT_TRUE(std::getline(answers, line));
+  EXPECT_EQ(json::parse(line).at("reason"), "error");
+  EXPECT_EQ(json::parse(line).at("found"), false);
+  ASSERT_TRUE(std::getline(answers, line));
+  EXPECT_EQ(json::parse(line).at("found"), true);
+
+  const std::string places = Write("places.csv", "x,y\n-2.05,0.05\n500,0\n-3.05,0.05\n");
+  const Ran table = RunStrata({"surface", "m", "--points", places, "--embedded", database_});
+  EXPECT_EQ(std::count(table.out.begin(), table.out.end(), '\n'), 3) << table.out;
+  const Ran each = Run({"surface", "m", "--points", places});
+  EXPECT_EQ(std::count(each.out.begin(), each.out.end(), '\n'), 3) << each.out;
+
+  const std::string png = (dir_.path() / "map.png").string();
+  EXPECT_EQ(RunOk({"map", "render", "m", png, "--path", path}).at("paths"), 1);
+  EXPECT_GT(std::filesystem::file_size(png), 5000U);
+  for (const std::string format : {"ply", "obj", "stl", "glb", "pcd"}) {
+    const std::string file = (dir_.path() / ("map." + format)).string();
+    const json written = RunOk({"map", "export", "m", "--format", format, "--out", file});
+    EXPECT_EQ(std::filesystem::file_size(file), written.at("bytes").get<std::size_t>());
+    EXPECT_GT(written.at("vertices").get<std::size_t>(), 1000U);
+  }
+  const std::string far = (dir_.path() / "far.pcd").string();
+  const std::vector<std::string> shifted = {
+      "map", "export", "m", "--format", "pcd", "--out", far, "--relative-to"};
+  const auto exported = [&](const std::string& origin) {
+    std::vector<std::string> words = shifted;
+    words.push_back(origin);
+    return RunOk(words).at("coordinates");
+  };
+  EXPECT_EQ(exported("1,2,3"), "float");
+  EXPECT_EQ(exported("-500000,0,0"), "double");
+}
+
+TEST_F(StrataPlanTest, ProfilesKeepWhatIsNotGiven) {
+  RunOk({"map", "create", "m", "--height", "1.7"});
+  RunOk({"profile", "set", "m", "cart", "--radius", "0.5"});
+  for (const json& profile : RunOk({"profile", "list", "m"})) {
+    EXPECT_EQ(profile.at("height_m"), 1.7);
+    EXPECT_EQ(profile.at("radius_m"), profile.at("name") == "cart" ? 0.5 : 0.3);
+  }
+}
+
+}  // namespace
+}  // namespace strata::cli
