@@ -17,6 +17,7 @@
 #include "core/egomotion/log_checks.h"
 #include "core/egomotion/log_filter.h"
 #include "core/egomotion/mounting.h"
+#include "core/geometry/rotation_between.h"
 
 namespace strata {
 namespace {
@@ -92,7 +93,7 @@ FilterStart StartOf(const MapLog& log,
   state.time_s = log.imu.front().time_s;
   const Eigen::Vector3d up_body = *rig.R_body_imu * beginning.force;
   state.R_map_body = Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitZ()) *
-                     Eigen::Quaterniond::FromTwoVectors(up_body, Eigen::Vector3d::UnitZ());
+                     RotationBetween(up_body, Eigen::Vector3d::UnitZ());
   state.v_imu_m_s = speed * (state.R_map_body * Eigen::Vector3d::UnitX());
   state.p_imu_m = first.antenna_m - state.R_map_body * (rig.gps.antenna_body_m - rig.imu_body_m) -
                   late_s * state.v_imu_m_s;

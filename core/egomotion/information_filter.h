@@ -3,7 +3,6 @@
 #ifndef STRATA_CORE_EGOMOTION_INFORMATION_FILTER_H_
 #define STRATA_CORE_EGOMOTION_INFORMATION_FILTER_H_
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
@@ -40,24 +39,15 @@ class InformationFilter {
   // To `time_s` under `reading`; nothing where that is not later.
   void Predict(const ImuSample& reading, double time_s);
 
-  // residualᵀ (H P Hᵀ + R)⁻¹ residual and the logarithm of that matrix' determinant.
-  struct Innovation {
-    double nis = 0.0;
-    double log_determinant = 0.0;
-  };
+  using Innovation = InformationForm::Innovation;
   template <int rows>
   Innovation InnovationOf(const StateMeasurement<rows>& measurement) const {
-    using Square = Eigen::Matrix<double, rows, rows>;
-    const Square S = measurement.H * form_.information().llt().solve(measurement.H.transpose()) +
-                     measurement.covariance;
-    const Eigen::LLT<Square> root(S);
-    const Eigen::Matrix<double, rows, 1> whitened = root.matrixL().solve(measurement.residual);
-    return {whitened.squaredNorm(), 2.0 * root.matrixLLT().diagonal().array().log().sum()};
+    return form_.InnovationOf(measurement.H, measurement.residual, measurement.covariance);
   }
 
   template <int rows>
   void Add(const StateMeasurement<rows>& measurement) {
-    form_.Add<rows>(measurement.H, measurement.residual, measurement.covariance);
+    form_.Add(measurement.H, measurement.residual, measurement.covariance);
     state_ = Retract(state_, form_.Correct());
   }
 
@@ -66,7 +56,7 @@ class InformationFilter {
 
  private:
   FusedState state_;
-  InformationForm<kStateSize> form_;
+  InformationForm form_;
   const Rig* rig_;
 };
 

@@ -3,74 +3,51 @@
 #ifndef STRATA_CORE_EGOMOTION_INFORMATION_FORM_H_
 #define STRATA_CORE_EGOMOTION_INFORMATION_FORM_H_
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/LU>
 
 namespace strata {
 
-// Of errors about a linearisation point that its owner keeps.
-template <int size>
+// Of n errors about a linearisation point that its owner keeps. Its matrices have their sizes at
+// run time: of 17 rows known beforehand, Eigen takes a minute to compile them.
 class InformationForm {
  public:
-  using Vector = Eigen::Matrix<double, size, 1>;
-  using Matrix = Eigen::Matrix<double, size, size>;
+  // REQUIRES: n × n, positive definite.
+  explicit InformationForm(const Eigen::MatrixXd& covariance);
 
-  // REQUIRES: positive definite.
-  explicit InformationForm(const Matrix& covariance) : information_(Inverse(covariance)) {}
-
-  const Matrix& information() const { return information_; }
-  Matrix Covariance() const { return Inverse(information_); }
+  const Eigen::MatrixXd& information() const { return information_; }
+  Eigen::MatrixXd Covariance() const;
 
   // x ← F x + G w, where w are independent and have `variances`. Without an inverse of the
   // covariance (Maybeck 1979, 5.7): with M = F⁻ᵀ Λ F⁻¹ and K = M G (Gᵀ M G + Q⁻¹)⁻¹,
   // Λ ← (I − K Gᵀ) M (I − K Gᵀ)ᵀ + K Q⁻¹ Kᵀ, which stays positive.
-  // REQUIRES: F can be inverted, variances > 0, nothing added since Correct().
-  template <int noise>
-  void Predict(const Matrix& F,
-               const Eigen::Matrix<double, size, noise>& G,
-               const Eigen::Matrix<double, noise, 1>& variances) {
-    using Noise = Eigen::Matrix<double, noise, noise>;
-    const Matrix F_inverse = F.partialPivLu().inverse();
-    const Matrix M = F_inverse.transpose() * information_ * F_inverse;
-    const Noise Q_inverse = variances.cwiseInverse().asDiagonal();
-    const Eigen::Matrix<double, size, noise> MG = M * G;
-    const Noise inner = Symmetric<noise>(G.transpose() * MG + Q_inverse);
-    const Eigen::Matrix<double, size, noise> K = inner.llt().solve(MG.transpose()).transpose();
-    const Matrix kept = Matrix::Identity() - K * G.transpose();
-    information_ = Symmetric<size>(kept * M * kept.transpose() + K * Q_inverse * K.transpose());
-  }
+  // REQUIRES: F is n × n and can be inverted, G n × the variances, variances > 0, nothing added
+  // since Correct().
+  void Predict(const Eigen::MatrixXd& F,
+               const Eigen::MatrixXd& G,
+               const Eigen::VectorXd& variances);
 
   // A measurement with residual = H x + noise of `covariance`.
-  template <int rows>
-  void Add(const Eigen::Matrix<double, rows, size>& H,
-           const Eigen::Matrix<double, rows, 1>& residual,
-           const Eigen::Matrix<double, rows, rows>& covariance) {
-    const Eigen::Matrix<double, size, rows> weighted =
-        covariance.llt().solve(H).transpose();  // Hᵀ R⁻¹
-    information_ = Symmetric<size>(information_ + weighted * H);
-    vector_ += weighted * residual;
-  }
+  void Add(const Eigen::MatrixXd& H,
+           const Eigen::VectorXd& residual,
+           const Eigen::MatrixXd& covariance);
+
+  // residualᵀ (H P Hᵀ + R)⁻¹ residual, P the covariance and R the measurement's, and the logarithm
+  // of that matrix' determinant.
+  struct Innovation {
+    double nis = 0.0;
+    double log_determinant = 0.0;
+  };
+  Innovation InnovationOf(const Eigen::MatrixXd& H,
+                          const Eigen::VectorXd& residual,
+                          const Eigen::MatrixXd& covariance) const;
 
   // The errors that are most likely after what was added; from then on errors are counted from
   // there.
-  Vector Correct() {
-    const Vector step = information_.llt().solve(vector_);
-    vector_.setZero();
-    return step;
-  }
+  Eigen::VectorXd Correct();
 
  private:
-  template <int n>
-  static Eigen::Matrix<double, n, n> Symmetric(const Eigen::Matrix<double, n, n>& matrix) {
-    return 0.5 * (matrix + matrix.transpose());
-  }
-  static Matrix Inverse(const Matrix& matrix) {
-    return Symmetric<size>(matrix.llt().solve(Matrix::Identity()));
-  }
-
-  Matrix information_;
-  Vector vector_ = Vector::Zero();
+  Eigen::MatrixXd information_;
+  Eigen::VectorXd vector_;
 };
 
 }  // namespace strata

@@ -11,6 +11,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "core/geometry/rotation_between.h"
+
 namespace strata {
 namespace {
 
@@ -71,8 +73,7 @@ absl::StatusOr<Eigen::Quaterniond> FindMounting(const MotionLog& log, const Rig&
     return absl::FailedPreconditionError(
         absl::StrFormat("the log has no speeds to tell where the IMU's front is%s", kCure));
   }
-  const auto level =
-      Eigen::Quaterniond::FromTwoVectors(MeanForce(log.imu), Eigen::Vector3d::UnitZ());
+  const auto level = RotationBetween(MeanForce(log.imu), Eigen::Vector3d::UnitZ());
   double cross = 0.0, dot = 0.0, felt2 = 0.0, driven2 = 0.0;
   std::size_t begin = 0;
   for (std::size_t i = 1; i < log.imu.size(); ++i) {

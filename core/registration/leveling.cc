@@ -20,6 +20,7 @@
 
 #include "core/common/option_checks.h"
 #include "core/common/status.h"
+#include "core/geometry/rotation_between.h"
 #include "core/registration/thinning.h"
 
 namespace strata {
@@ -103,8 +104,7 @@ absl::StatusOr<Leveling> LevelByFloor(const PointCloud& cloud, const LevelingOpt
                                             " is needed"));
   }
   Leveling leveling;
-  leveling.R_level_scan =
-      Eigen::Quaterniond::FromTwoVectors(floor.n, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  leveling.R_level_scan = RotationBetween(floor.n, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   leveling.tilt_rad = std::acos(std::clamp(floor.n.z(), -1.0, 1.0));
   leveling.floor_z_m = floor.d;
   leveling.support = share;

@@ -11,6 +11,7 @@
 #include <Eigen/SVD>
 
 #include "core/geometry/pose.h"
+#include "core/geometry/rotation_between.h"
 
 namespace strata {
 namespace {
@@ -89,7 +90,7 @@ UmeyamaResult FitRigidTransform(std::span<const Eigen::Vector3d> x,
     const Eigen::Vector3d axis_x = spread_x.eigenvectors().col(2);
     Eigen::Vector3d axis_y = spread_y.eigenvectors().col(2);
     if (axis_y.dot(covariance_yx * axis_x) < 0.0) axis_y = -axis_y;
-    R = Eigen::Quaterniond::FromTwoVectors(axis_x, axis_y).toRotationMatrix();
+    R = RotationBetween(axis_x, axis_y).toRotationMatrix();
     result.degenerate_directions.push_back(TurnAbout(axis_x, mean_x));
   } else if (result.spread == PointSpread::kPoint) {
     for (int i = 0; i < 3; ++i) {

@@ -7,6 +7,7 @@
 
 #include "client/formats/scan_reader.h"
 #include "core/common/status.h"
+#include "core/geometry/rotation_between.h"
 #include "core/registration/leveling.h"
 
 namespace strata::cli {
@@ -48,8 +49,7 @@ absl::StatusOr<double> LevelTrajectory(std::vector<ScanFile>& scans) {
   if (normal.isZero()) {
     return Annotate(absl::FailedPreconditionError(last.message()), "no floor to level by");
   }
-  const Eigen::Quaterniond R_level_map =
-      Eigen::Quaterniond::FromTwoVectors(normal, Eigen::Vector3d::UnitZ());
+  const Eigen::Quaterniond R_level_map = RotationBetween(normal, Eigen::Vector3d::UnitZ());
   // About the first scan, so that a map far from its origin stays in place.
   const Eigen::Vector3d centre = scans.front().T_map_scan.translation();
   const Pose T_level_map = MakePose(R_level_map, centre - R_level_map * centre);

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <ceres/autodiff_cost_function.h>
 
 namespace strata {
 
@@ -20,6 +21,41 @@ InertialCost::InertialCost(const InertialDelta& delta,
   constexpr double kLeastVariance = 1e-12;
   const Eigen::LLT<Matrix9> root(delta.covariance + kLeastVariance * Matrix9::Identity());
   root_ = root.matrixL().solve(Matrix9::Identity());
+}
+
+ceres::CostFunction* InertialCost::Make(const InertialDelta& delta,
+                                        const Eigen::Quaterniond& mount,
+                                        const ImuModel& imu) {
+  return new ceres::AutoDiffCostFunction<InertialCost,
+                                         15,
+                                         kPoseBlock,
+                                         kMotionBlock,
+                                         kPoseBlock,
+                                         kMotionBlock,
+                                         kSharedBlock>(new InertialCost(delta, mount, imu));
+}
+
+ceres::CostFunction* WheelCost::Make(const WheelDelta& delta, const Eigen::Vector3d& imu_body_m) {
+  return new ceres::AutoDiffCostFunction<WheelCost, 4, kPoseBlock, kPoseBlock, kSharedBlock>(
+      new WheelCost(delta, imu_body_m));
+}
+
+template <int first, int rows>
+ceres::CostFunction* FixCost<first, rows>::Make(const FixDelta& fix) {
+  return new ceres::AutoDiffCostFunction<FixCost, rows, kPoseBlock, kMotionBlock, kSharedBlock>(
+      new FixCost(fix));
+}
+
+template class FixCost<0, 2>;
+template class FixCost<2, 1>;
+
+ceres::CostFunction* BiasPrior::Make(const Eigen::Matrix<double, 6, 1>& biases,
+                                     const Eigen::Matrix<double, 6, 1>& sigma) {
+  return new ceres::AutoDiffCostFunction<BiasPrior, 6, kMotionBlock>(new BiasPrior(biases, sigma));
+}
+
+ceres::CostFunction* SharedPrior::Make(const Eigen::Vector2d& sigma) {
+  return new ceres::AutoDiffCostFunction<SharedPrior, 2, kSharedBlock>(new SharedPrior(sigma));
 }
 
 }  // namespace strata

@@ -1,5 +1,5 @@
-// What IMU, wheels and GPS say of the nodes of a smoothed log, for Ceres to differentiate.
-// Internal to core/egomotion, not installed.
+// What IMU, wheels and GPS say of the nodes of a smoothed log, for Ceres to differentiate, which
+// Make() does. Internal to core/egomotion, not installed.
 //
 // A node is two blocks: pose [quaternion x y z w of R_map_body, place of the IMU] and motion
 // [velocity, gyroscope's bias, accelerometer's bias]; all nodes share [wheels' scale, yaw of the
@@ -11,7 +11,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <ceres/autodiff_cost_function.h>
+#include <ceres/cost_function.h>
 
 #include "core/egomotion/inertial_motion.h"
 #include "core/egomotion/smoothing/preintegration.h"
@@ -84,15 +84,7 @@ class InertialCost {
 
   static ceres::CostFunction* Make(const InertialDelta& delta,
                                    const Eigen::Quaterniond& mount,
-                                   const ImuModel& imu) {
-    return new ceres::AutoDiffCostFunction<InertialCost,
-                                           15,
-                                           kPoseBlock,
-                                           kMotionBlock,
-                                           kPoseBlock,
-                                           kMotionBlock,
-                                           kSharedBlock>(new InertialCost(delta, mount, imu));
-  }
+                                   const ImuModel& imu);
 
   template <typename T>
   bool operator()(const T* pose_i,
@@ -140,10 +132,7 @@ class WheelCost {
   WheelCost(const WheelDelta& delta, const Eigen::Vector3d& imu_body_m)
       : delta_(delta), imu_body_m_(imu_body_m) {}
 
-  static ceres::CostFunction* Make(const WheelDelta& delta, const Eigen::Vector3d& imu_body_m) {
-    return new ceres::AutoDiffCostFunction<WheelCost, 4, kPoseBlock, kPoseBlock, kSharedBlock>(
-        new WheelCost(delta, imu_body_m));
-  }
+  static ceres::CostFunction* Make(const WheelDelta& delta, const Eigen::Vector3d& imu_body_m);
 
   template <typename T>
   bool operator()(const T* pose_i, const T* pose_j, const T* shared, T* residuals) const {
@@ -197,10 +186,7 @@ class FixCost {
  public:
   explicit FixCost(const FixDelta& fix) : fix_(fix) {}
 
-  static ceres::CostFunction* Make(const FixDelta& fix) {
-    return new ceres::AutoDiffCostFunction<FixCost, rows, kPoseBlock, kMotionBlock, kSharedBlock>(
-        new FixCost(fix));
-  }
+  static ceres::CostFunction* Make(const FixDelta& fix);
 
   template <typename T>
   bool operator()(const T* pose, const T* motion, const T* shared, T* residuals) const {
@@ -222,10 +208,7 @@ class BiasPrior {
       : biases_(biases), sigma_(sigma) {}
 
   static ceres::CostFunction* Make(const Eigen::Matrix<double, 6, 1>& biases,
-                                   const Eigen::Matrix<double, 6, 1>& sigma) {
-    return new ceres::AutoDiffCostFunction<BiasPrior, 6, kMotionBlock>(
-        new BiasPrior(biases, sigma));
-  }
+                                   const Eigen::Matrix<double, 6, 1>& sigma);
 
   template <typename T>
   bool operator()(const T* motion, T* residuals) const {
@@ -241,9 +224,7 @@ class SharedPrior {
  public:
   explicit SharedPrior(const Eigen::Vector2d& sigma) : sigma_(sigma) {}
 
-  static ceres::CostFunction* Make(const Eigen::Vector2d& sigma) {
-    return new ceres::AutoDiffCostFunction<SharedPrior, 2, kSharedBlock>(new SharedPrior(sigma));
-  }
+  static ceres::CostFunction* Make(const Eigen::Vector2d& sigma);
 
   template <typename T>
   bool operator()(const T* shared, T* residuals) const {

@@ -38,25 +38,28 @@ class CovarianceFilter {
   void Predict(const ImuSample& reading, double time_s) {
     const InertialStep step =
         Move(state_, *rig_.R_body_imu, rig_.imu, reading, time_s - state_.time_s);
-    P_ = step.F * P_ * step.F.transpose() +
-         step.G * step.variances.asDiagonal() * step.G.transpose();
+    const Eigen::MatrixXd F = step.F, G = step.G, Q = step.variances.asDiagonal();
+    P_ = F * Eigen::MatrixXd(P_ * F.transpose());
+    P_ += G * Eigen::MatrixXd(Q * G.transpose());
     state_ = step.state;
     state_.time_s = time_s;
   }
   template <int rows>
   void Add(const StateMeasurement<rows>& m) {
-    const Eigen::Matrix<double, rows, rows> S = m.H * P_ * m.H.transpose() + m.covariance;
-    const Eigen::Matrix<double, kStateSize, rows> K = P_ * m.H.transpose() * S.inverse();
+    const Eigen::MatrixXd H = m.H, R = m.covariance, PH = P_ * H.transpose();
+    const Eigen::MatrixXd S = H * PH + R;
+    const Eigen::MatrixXd K = S.partialPivLu().solve(PH.transpose()).transpose();
     state_ = Retract(state_, K * m.residual);
-    const StateMatrix kept = StateMatrix::Identity() - K * m.H;
-    P_ = kept * P_ * kept.transpose() + K * m.covariance * K.transpose();
+    const Eigen::MatrixXd kept = StateMatrix::Identity() - K * H;
+    P_ = kept * Eigen::MatrixXd(P_ * kept.transpose());
+    P_ += K * Eigen::MatrixXd(R * K.transpose());
   }
   const FusedState& state() const { return state_; }
-  const StateMatrix& P() const { return P_; }
+  const Eigen::MatrixXd& P() const { return P_; }
 
  private:
   FusedState state_;
-  StateMatrix P_;
+  Eigen::MatrixXd P_;
   const Rig& rig_;
 };
 
