@@ -56,12 +56,11 @@ strata_test(
   DEPS strata::simulator strata::sweep
 )
 
-strata_library(
-  mock_database
-  NO_INSTALL
-  HEADERS mock_database.h
-  DEPS strata::api GTest::gmock
-)
+add_library(strata_mock_database STATIC mock_database.cc)
+add_library(strata::mock_database ALIAS strata_mock_database)
+target_include_directories(strata_mock_database PUBLIC ${PROJECT_SOURCE_DIR})
+target_link_libraries(strata_mock_database PUBLIC strata::api GTest::gmock PRIVATE strata_build_options)
+strata_batch(strata_mock_database strata_test_headers)
 
 # Disks beneath SQLite that fail, and one that loses what was not synced.
 strata_library(
