@@ -55,6 +55,15 @@ constexpr NamedMeaning kNames[] = {
     {"scalar_label", Meaning::kLabel},  // as CloudCompare writes them
     {"scalar_class", Meaning::kLabel},
     {"scalar_classification", Meaning::kLabel},
+    {"t", Meaning::kTime},            // Ouster
+    {"time", Meaning::kTime},         // Velodyne
+    {"timestamp", Meaning::kTime},    // Hesai, Livox, RoboSense
+    {"time_stamp", Meaning::kTime},   // Autoware
+    {"offset_time", Meaning::kTime},  // Livox
+    {"time_offset", Meaning::kTime},
+    {"point_time_offset", Meaning::kTime},  // Cartographer
+    {"scalar_time", Meaning::kTime},
+    {"scalar_timestamp", Meaning::kTime},
 };
 
 constexpr double kFarMetres = 1000.0;
@@ -168,6 +177,7 @@ void CloudBuilder::Reserve(std::size_t points) {
   if (Has(Meaning::kIntensity)) intensity_.reserve(points);
   if (has_colour_) colour_.reserve(points);
   if (Has(Meaning::kLabel)) label_.reserve(points);
+  if (Has(Meaning::kTime)) time_.reserve(points);
 }
 
 void CloudBuilder::SetGrid(std::uint32_t rows, std::uint32_t columns) {
@@ -193,6 +203,10 @@ void CloudBuilder::AddBlock(PointBlock block) {
   if (Has(Meaning::kIntensity)) {
     const std::span<const double> intensity = block.of(Meaning::kIntensity);
     intensity_.insert(intensity_.end(), intensity.begin(), intensity.end());
+  }
+  if (Has(Meaning::kTime)) {
+    const std::span<const double> time = block.of(Meaning::kTime);
+    time_.insert(time_.end(), time.begin(), time.end());
   }
   if (Has(Meaning::kLabel)) AddLabels(block.of(Meaning::kLabel));
   if (has_colour_) AddColours(block);
@@ -334,6 +348,7 @@ absl::StatusOr<PointCloud> CloudBuilder::Build() && {
   cloud.intensity = std::move(intensity_);
   cloud.colour = channels_.empty() ? std::move(colour_) : ScaledColours();
   if (whole_labels_) cloud.label = std::move(label_);
+  cloud.time = std::move(time_);
   STRATA_RETURN_IF_ERROR(ValidateCloud(cloud));
   return cloud;
 }

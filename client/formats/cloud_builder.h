@@ -29,12 +29,13 @@ enum class Meaning : std::uint8_t {
   kBlue,
   kPackedColour,  // 0x00RRGGBB, as the number or as the bits of a float
   kLabel,
+  kTime,  // of the point, in any unit
   kIgnored,
 };
-inline constexpr std::size_t kMeanings = 10;
+inline constexpr std::size_t kMeanings = 11;
 
 // By the names in use, whatever their case: x, intensity, reflectance, scalar_intensity, red, r,
-// rgb, label, class, classification, ….
+// rgb, label, class, classification, t, time, timestamp, ….
 Meaning MeaningOf(absl::string_view field_name);
 
 // The values of points that follow each other, column by column: `count` numbers for each meaning
@@ -115,6 +116,7 @@ class CloudBuilder {
   std::vector<Colour> colour_;             // as long as all channels are whole and in 0–255,
   std::vector<Eigen::Vector3f> channels_;  // else here
   std::vector<std::uint16_t> label_;
+  std::vector<double> time_;
   bool whole_labels_ = true;
   std::size_t added_ = 0;  // finite or not
   std::size_t finite_ = 0;

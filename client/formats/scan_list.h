@@ -45,6 +45,9 @@ struct ScanFile {
   absl::Status pose_status;            // NOT_FOUND, saying what was looked for, without a pose
   // As ReadScanFile(), where the scan is no file of its own; may be called by several threads.
   std::function<absl::StatusOr<PointCloud>(std::size_t* at_sensor)> read = {};
+  // T_map_scan so many seconds after `time`, where poses are known over time; may be called by
+  // several threads.
+  std::function<absl::StatusOr<Pose>(double offset_s)> pose_after = {};
 };
 
 // By `read`, or else as ReadScan().

@@ -136,6 +136,7 @@ std::size_t DropAtSensor(PointCloud& cloud) {
   Drop(dropped, cloud.intensity);
   Drop(dropped, cloud.colour);
   Drop(dropped, cloud.label);
+  Drop(dropped, cloud.time);
   return count;
 }
 

@@ -15,6 +15,7 @@ PointCloud SliceOf(const PointCloud& cloud, std::size_t begin, std::size_t end) 
   slice(cloud.intensity, part.intensity);
   slice(cloud.colour, part.colour);
   slice(cloud.label, part.label);
+  slice(cloud.time, part.time);
   return part;
 }
 

@@ -37,6 +37,7 @@ absl::Status CheckColumns(const PointCloud& cloud) {
   const std::size_t n = cloud.size();
   STRATA_RETURN_IF_ERROR(CheckColumn("intensity", cloud.intensity.size(), n));
   STRATA_RETURN_IF_ERROR(CheckColumn("colour", cloud.colour.size(), n));
+  STRATA_RETURN_IF_ERROR(CheckColumn("time", cloud.time.size(), n));
   return CheckColumn("label", cloud.label.size(), n);
 }
 

@@ -41,6 +41,9 @@ struct PointCloud {
   std::vector<float> intensity;  // sensor's own scale
   std::vector<Colour> colour;
   std::vector<std::uint16_t> label;  // class id of the map; 0 = unlabelled
+  // When each was measured, by the sensor's clock and in its unit (Deskew tells which); never
+  // stored.
+  std::vector<double> time;
   std::uint32_t rows = 0;
   std::uint32_t columns = 0;
 

@@ -204,22 +204,30 @@ std::string CloudMessage(Layout layout,
                          std::int64_t stamp_ns,
                          absl::string_view frame,
                          const std::vector<Eigen::Vector4f>& points,
-                         std::uint32_t rows) {
+                         std::uint32_t rows,
+                         const std::vector<std::uint32_t>& t_ns) {
   MessageWriter writer(layout);
   writer.Header(stamp_ns, frame).Put(rows);
   const auto columns = static_cast<std::uint32_t>(points.size() / rows);
-  writer.Put(columns).Put(std::uint32_t{4});
+  const std::uint32_t fields = t_ns.empty() ? 4 : 5;
+  writer.Put(columns).Put(fields);
   std::uint32_t offset = 0;
-  for (const char* name : {"x", "y", "z", "intensity"}) {
-    writer.Text(name).Put(offset).Put(std::uint8_t{7}).Put(std::uint32_t{1});
+  for (const char* name : {"x", "y", "z", "intensity", "t"}) {
+    const bool is_time = offset == 16;
+    if (is_time && t_ns.empty()) break;
+    writer.Text(name)
+        .Put(offset)
+        .Put(static_cast<std::uint8_t>(is_time ? 6 : 7))
+        .Put(std::uint32_t{1});
     offset += 4;
   }
-  std::string data(16 * points.size(), '\0');
+  std::string data(offset * points.size(), '\0');
   for (std::size_t i = 0; i < points.size(); ++i) {
-    std::memcpy(data.data() + 16 * i, points[i].data(), 16);
+    std::memcpy(data.data() + offset * i, points[i].data(), 16);
+    if (!t_ns.empty()) std::memcpy(data.data() + offset * i + 16, &t_ns[i], 4);
   }
   // The points stay little-endian, whatever the message.
-  writer.Put(std::uint8_t{0}).Put(std::uint32_t{16}).Put(16 * columns).Bytes(data);
+  writer.Put(std::uint8_t{0}).Put(offset).Put(offset * columns).Bytes(data);
   return writer.Put(std::uint8_t{1}).bytes();
 }
 

@@ -48,12 +48,14 @@ class MessageWriter {
   std::string bytes_;
 };
 
-// Points x, y, z and intensity, floats of 16 bytes a point; `rows` > 1 makes a grid.
+// Points x, y, z and intensity, floats of 16 bytes a point; `rows` > 1 makes a grid. With a `t_ns`
+// for each point there is a field t of four bytes more, as Ouster's driver has it.
 std::string CloudMessage(Layout layout,
                          std::int64_t stamp_ns,
                          absl::string_view frame,
                          const std::vector<Eigen::Vector4f>& points,
-                         std::uint32_t rows = 1);
+                         std::uint32_t rows = 1,
+                         const std::vector<std::uint32_t>& t_ns = {});
 std::string OdometryMessage(Layout layout,
                             std::int64_t stamp_ns,
                             absl::string_view frame,

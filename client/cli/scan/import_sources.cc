@@ -7,6 +7,7 @@
 #include <functional>
 #include <iterator>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -28,6 +29,7 @@
 #include "client/formats/motion/placed_scans.h"
 #include "client/formats/scan_list.h"
 #include "client/formats/scan_reader.h"
+#include "core/cloud/deskew.h"
 #include "core/common/status.h"
 #include "core/common/stop.h"
 #include "core/world/map_class.h"
@@ -196,12 +198,28 @@ absl::StatusOr<LabelsToMap> LabelsFor(Context& context, const ImportOptions& opt
   };
 }
 
+// Each point where it was at the scan's stamp, where times and poses say so.
+PointCloud WithoutMotion(PointCloud cloud, const ScanFile& scan, ReadCounts& counts) {
+  if (cloud.time.empty() || !scan.pose_after || !scan.time.has_value()) return cloud;
+  const double stamp_s = absl::ToDoubleSeconds(*scan.time - absl::UnixEpoch());
+  absl::StatusOr<PointCloud> deskewed = Deskew(cloud, stamp_s, scan.pose_after);
+  if (!deskewed.ok()) {
+    counts.NotDeskewed(scan.path.string(), deskewed.status());
+    return cloud;
+  }
+  ++counts.deskewed;
+  return *std::move(deskewed);
+}
+
 absl::StatusOr<PointCloud> ReadForMap(const ScanFile& scan,
                                       const LabelsToMap& labels,
-                                      std::atomic<std::uint64_t>& at_sensor) {
+                                      bool deskew,
+                                      ReadCounts& counts) {
   std::size_t dropped = 0;
   STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScanFile(scan, &dropped));
-  at_sensor += dropped;
+  counts.at_sensor += dropped;
+  if (deskew) cloud = WithoutMotion(std::move(cloud), scan, counts);
+  cloud.time.clear();
   STRATA_RETURN_IF_ERROR(labels(cloud));
   return cloud;
 }
@@ -228,8 +246,8 @@ ImportSources SourcesOf(const std::vector<ScanFile>& scans,
     source.header.time = scan.time.value_or(absl::UnixEpoch());
     source.header.T_map_scan = scan.T_map_scan;
     source.header.alignment = options.align == "on" ? Alignment::kOn : Alignment::kOff;
-    source.read = [scan, labels, at_sensor = sources.at_sensor] {
-      return ReadForMap(scan, labels, *at_sensor);
+    source.read = [scan, labels, deskew = options.deskew == "on", counts = sources.counts] {
+      return ReadForMap(scan, labels, deskew, *counts);
     };
     sources.missing.push_back(std::move(source));
   }
@@ -317,6 +335,21 @@ absl::StatusOr<std::optional<double>> Level(std::vector<ScanFile>& scans,
 }
 
 }  // namespace
+
+void ReadCounts::NotDeskewed(const std::string& file, const absl::Status& why) {
+  const std::lock_guard lock(mutex_);
+  if (++not_deskewed_ == 1) why_not_ = absl::StrCat(file, ": ", why.message());
+}
+
+std::uint64_t ReadCounts::not_deskewed() const {
+  const std::lock_guard lock(mutex_);
+  return not_deskewed_;
+}
+
+std::string ReadCounts::why_not() const {
+  const std::lock_guard lock(mutex_);
+  return why_not_;
+}
 
 std::string TrajectoryOf(const std::string& path) {
   std::filesystem::path folder = std::filesystem::absolute(path).lexically_normal();

@@ -6,11 +6,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
 #include "client/cli/scan/scan_uploader.h"
@@ -37,6 +39,7 @@ struct ImportOptions {
   bool wait = false;
   std::string spool;  // a directory, if scans go there first
   bool as_local_maps = false;
+  std::string deskew = "on";
   // Of recordings, as BagScanOptions.
   std::string topic;
   std::string poses_from;
@@ -47,15 +50,30 @@ struct ImportOptions {
 // The spacing of keyframes that `every` stands for, and without one.
 inline constexpr char kDefaultEvery[] = "0.5m,30deg";
 
+// What reading scans has found so far; by several threads.
+class ReadCounts {
+ public:
+  std::atomic<std::uint64_t> at_sensor{0};  // returns of range 0, left out
+  std::atomic<std::uint64_t> deskewed{0};   // scans
+
+  // A scan whose points have times stays as it is.
+  void NotDeskewed(const std::string& file, const absl::Status& why);
+  std::uint64_t not_deskewed() const;
+  std::string why_not() const;  // of the first one
+
+ private:
+  mutable std::mutex mutex_;
+  std::uint64_t not_deskewed_ = 0;
+  std::string why_not_;
+};
+
 struct ImportSources {
   std::size_t files = 0;
   std::vector<UploadSource> missing;  // in the map
   std::vector<ScanId> there;
   std::vector<std::pair<std::string, std::string>> errors;  // file, and why it cannot be uploaded
   std::optional<double> level_rad;                          // with --level
-  // Returns of range 0 that reading `missing` has left out so far.
-  std::shared_ptr<std::atomic<std::uint64_t>> at_sensor =
-      std::make_shared<std::atomic<std::uint64_t>>(0);
+  std::shared_ptr<ReadCounts> counts = std::make_shared<ReadCounts>();  // of `missing`
 };
 
 // The folder's name, or that of the folder around one that is only called "scans"; of a recording

@@ -40,8 +40,9 @@ struct Summary {
   std::size_t uploaded = 0;
   std::size_t skipped = 0;
   std::uint64_t points = 0;
-  std::uint64_t at_sensor = 0;        // returns of range 0, left out
-  std::uint64_t local_map_bytes = 0;  // with --local-maps
+  std::uint64_t at_sensor = 0;                   // returns of range 0, left out
+  std::uint64_t deskewed = 0, not_deskewed = 0;  // scans whose points have times
+  std::uint64_t local_map_bytes = 0;             // with --local-maps
   double seconds = 0.0;
   std::size_t integrated = 0, aligned = 0, integration_failed = 0;  // with --wait
   AlignmentHealth health;                                           // likewise
@@ -167,6 +168,8 @@ void Print(const ImportOptions& options, const Summary& summary, Output& output)
       {"failed", summary.errors.size()},
       {"points", summary.points},
       {"range_0", summary.at_sensor},
+      {"deskewed", summary.deskewed},
+      {"not_deskewed", summary.not_deskewed},
       {"seconds", summary.seconds},
       {"points_per_second",
        summary.seconds > 0.0 ? static_cast<double>(summary.points) / summary.seconds : 0.0}};
@@ -190,7 +193,9 @@ void Print(const ImportOptions& options, const Summary& summary, Output& output)
   }
   if (!output.json()) {
     json.erase("errors");
-    if (summary.at_sensor == 0) json.erase("range_0");
+    for (const char* count : {"range_0", "deskewed", "not_deskewed"}) {
+      if (json[count] == 0) json.erase(count);
+    }
     if (summary.uploaded == 0 && summary.skipped > 0) {
       json = {{"map", options.map},
               {"trajectory", options.trajectory},
@@ -220,6 +225,21 @@ absl::Status ErrorsOf(const Json& errors, std::size_t files) {
   return absl::UnknownError(absl::StrCat(errors.size(), " of ", files, " scans failed"));
 }
 
+void TalkOfMotion(const ReadCounts& counts, Output& output) {
+  if (counts.not_deskewed() == 0) return;
+  output.Talk(absl::StrCat("warning: ",
+                           counts.not_deskewed(),
+                           " scan(s) keep the distortion of their motion; the first: ",
+                           counts.why_not()));
+}
+
+void TakeCounts(const ReadCounts& counts, Summary& summary, Output& output) {
+  summary.at_sensor = counts.at_sensor;
+  summary.deskewed = counts.deskewed;
+  summary.not_deskewed = counts.not_deskewed();
+  TalkOfMotion(counts, output);
+}
+
 absl::Status Import(Context& context, ImportOptions options) {
   if (options.trajectory.empty()) options.trajectory = TrajectoryOf(options.paths.front());
   STRATA_ASSIGN_OR_RETURN(ImportSources sources, FindImportSources(context, options));
@@ -230,7 +250,7 @@ absl::Status Import(Context& context, ImportOptions options) {
   }
   Summary summary = Begun(sources);
   Upload(context, options, sources.missing, summary);
-  summary.at_sensor = *sources.at_sensor;
+  TakeCounts(*sources.counts, summary, context.output);
   const absl::Status waited =
       options.wait && !summary.interrupted ? Wait(context, options, summary) : absl::OkStatus();
   summary.interrupted = context.call.stop.requested();
@@ -251,7 +271,10 @@ absl::Status ImportBySpool(FileContext& context, ImportOptions options) {
                {"errors", Begun(sources).errors}};
   STRATA_RETURN_IF_ERROR(
       ImportIntoSpool(context, options.spool, options.map, sources.missing, json));
-  json["range_0"] = sources.at_sensor->load();
+  json["range_0"] = sources.counts->at_sensor.load();
+  json["deskewed"] = sources.counts->deskewed.load();
+  json["not_deskewed"] = sources.counts->not_deskewed();
+  TalkOfMotion(*sources.counts, context.output);
   const Json errors = json["errors"];
   TalkOf(errors, context.output);
   if (!context.output.json()) json.erase("errors");
@@ -361,6 +384,15 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
   import
       ->add_option(
           "--align", options->align, "on: register each scan to the map; off: take its pose")
+      ->check(CLI::IsMember({"on", "off"}))
+      ->capture_default_str();
+  import
+      ->add_option("--deskew",
+                   options->deskew,
+                   "on: where points have times (fields t, time, timestamp, offset_time, …) and "
+                   "poses are known over time (a recording, or --poses with a trajectory), move "
+                   "each to where it was at the scan's stamp; off: the clouds are without "
+                   "distortion already")
       ->check(CLI::IsMember({"on", "off"}))
       ->capture_default_str();
   CLI::Option* classes =

@@ -1,11 +1,13 @@
 #include "client/formats/bags/bag_scans.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -143,13 +145,20 @@ struct CloudPose {
   std::optional<Pose> T_scan_cloud;
 };
 
-// Poses of clouds, whatever their frame.
+// Poses of clouds, whatever their frame; may be asked by several threads.
 class CloudPoses {
  public:
-  CloudPoses(RecordingSurvey& survey, PoseSource source, const std::optional<Pose>& T_base_cloud)
-      : transforms_(survey.transforms), source_(std::move(source)), T_base_cloud_(T_base_cloud) {}
+  // `source` is of the survey.
+  CloudPoses(std::shared_ptr<RecordingSurvey> survey,
+             PoseSource source,
+             const std::optional<Pose>& T_base_cloud)
+      : survey_(std::move(survey)),
+        transforms_(survey_->transforms),
+        source_(std::move(source)),
+        T_base_cloud_(T_base_cloud) {}
 
   absl::StatusOr<CloudPose> At(const std::string& frame, std::int64_t stamp_ns) {
+    const std::lock_guard lock(mutex_);
     STRATA_ASSIGN_OR_RETURN(
         const Pose T_map_base,
         source_.topic != nullptr
@@ -178,6 +187,8 @@ class CloudPoses {
                                             "on the base with --mount X,Y,Z[,YAW]"));
   }
 
+  const std::shared_ptr<RecordingSurvey> survey_;
+  std::mutex mutex_;  // tracks and transforms are sorted when they are asked
   TransformTree& transforms_;
   const PoseSource source_;
   const std::optional<Pose> T_base_cloud_;
@@ -220,12 +231,24 @@ struct Chosen {
   std::vector<ScanFile> scans;
   std::size_t with_pose = 0;
   absl::Status first_fault;  // of those without
+  bool moved = false;        // clouds were in a frame in which the base moves
 };
+
+// T_map_scan after the stamp of a cloud.
+std::function<absl::StatusOr<Pose>(double)> PosesAfter(const std::shared_ptr<CloudPoses>& poses,
+                                                       const std::string& frame,
+                                                       std::int64_t stamp_ns) {
+  return [poses, frame, stamp_ns](double offset_s) -> absl::StatusOr<Pose> {
+    const auto offset_ns = static_cast<std::int64_t>(std::llround(1e9 * offset_s));
+    STRATA_ASSIGN_OR_RETURN(const CloudPose pose, poses->At(frame, stamp_ns + offset_ns));
+    return pose.T_map_scan;
+  };
+}
 
 Chosen ChooseKeyframes(const std::shared_ptr<Recording>& recording,
                        RecordedTopic& topic,
                        const KeyframeSpacing& every,
-                       CloudPoses& poses) {
+                       const std::shared_ptr<CloudPoses>& poses) {
   std::stable_sort(
       topic.clouds.begin(), topic.clouds.end(), [](const RecordedCloud& a, const RecordedCloud& b) {
         return a.stamp_ns < b.stamp_ns;
@@ -234,7 +257,7 @@ Chosen ChooseKeyframes(const std::shared_ptr<Recording>& recording,
   KeyframeChooser chooser(every);
   for (std::size_t i = 0; i < topic.clouds.size(); ++i) {
     const RecordedCloud& cloud = topic.clouds[i];
-    const absl::StatusOr<CloudPose> pose = poses.At(topic.frames[cloud.frame], cloud.stamp_ns);
+    const absl::StatusOr<CloudPose> pose = poses->At(topic.frames[cloud.frame], cloud.stamp_ns);
     if (!pose.ok()) {
       if (chosen.first_fault.ok()) chosen.first_fault = pose.status();
       continue;
@@ -246,6 +269,10 @@ Chosen ChooseKeyframes(const std::shared_ptr<Recording>& recording,
     scan.sequence = i;
     scan.time = TimeOfStamp(cloud.stamp_ns);
     scan.T_map_scan = pose->T_map_scan;
+    chosen.moved = chosen.moved || pose->T_scan_cloud.has_value();
+    if (topic.has_point_times && !pose->T_scan_cloud.has_value()) {
+      scan.pose_after = PosesAfter(poses, topic.frames[cloud.frame], cloud.stamp_ns);
+    }
     scan.read = [recording,
                  cloud,
                  encoding = topic.topic.encoding,
@@ -277,8 +304,10 @@ void TellOf(const RecordingSurvey& survey,
   if (source.topic != nullptr && source.base_frame.empty()) {
     tell(absl::StrCat(source.name, " does not say whose poses it has: taken for the clouds' own"));
   }
-  if (topic.has_point_times) {
-    tell("the points have times, which are not used: clouds are taken as without distortion");
+  if (topic.has_point_times && chosen.moved) {
+    tell(
+        "the points have times, which are not used: in the frame they are in, an odometry has put "
+        "each where it belongs");
   }
   tell(absl::StrCat(chosen.scans.size(),
                     " of ",
@@ -295,19 +324,20 @@ absl::StatusOr<std::vector<ScanFile>> ListBagScans(const std::vector<std::filesy
                                                    const BagScanOptions& options) {
   STRATA_ASSIGN_OR_RETURN(std::unique_ptr<Recording> opened, Recording::Open(paths));
   const std::shared_ptr<Recording> recording = std::move(opened);
-  STRATA_ASSIGN_OR_RETURN(RecordingSurvey survey, recording->Survey([&options](double share) {
+  STRATA_ASSIGN_OR_RETURN(RecordingSurvey surveyed, recording->Survey([&options](double share) {
     return options.progress ? options.progress(share) : absl::OkStatus();
   }));
-  STRATA_ASSIGN_OR_RETURN(RecordedTopic* const topic, CloudTopic(survey, options.topic));
-  STRATA_ASSIGN_OR_RETURN(const PoseSource source, ChoosePoseSource(survey, options.poses_from));
-  CloudPoses poses(survey, source, options.T_base_cloud);
+  const auto survey = std::make_shared<RecordingSurvey>(std::move(surveyed));
+  STRATA_ASSIGN_OR_RETURN(RecordedTopic* const topic, CloudTopic(*survey, options.topic));
+  STRATA_ASSIGN_OR_RETURN(const PoseSource source, ChoosePoseSource(*survey, options.poses_from));
+  const auto poses = std::make_shared<CloudPoses>(survey, source, options.T_base_cloud);
   Chosen chosen = ChooseKeyframes(recording, *topic, options.every, poses);
   if (chosen.scans.empty()) {
     return Annotate(
         chosen.first_fault,
         absl::StrCat("no cloud of ", topic->topic.name, " has a pose from ", source.name));
   }
-  TellOf(survey, *topic, source, chosen, options.tell);
+  TellOf(*survey, *topic, source, chosen, options.tell);
   return std::move(chosen.scans);
 }
 

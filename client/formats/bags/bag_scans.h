@@ -37,7 +37,8 @@ struct BagScanOptions {
 // is the stamp, to the microsecond; their pose is interpolated (PoseTrack::At). The points stay in
 // the frame of the sensor, whose place on the base becomes part of the pose; clouds in a frame that
 // the base moves in (the fixed one, odom), as LiDAR odometries publish them, are moved to the base.
-// What reads a cloud holds the recording open.
+// What reads a cloud holds the recording open. Poses after a cloud's stamp are known where its
+// points have times and are in the sensor's frame.
 //
 // Clouds without a pose are left out and told. INVALID_ARGUMENT, NOT_FOUND saying what there is and
 // what to type: a topic that is not there, of another type or one of several, frames that nothing

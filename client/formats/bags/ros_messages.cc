@@ -1,6 +1,5 @@
 #include "client/formats/bags/ros_messages.h"
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -35,9 +34,6 @@ constexpr ScalarType kRosTypes[] = {ScalarType::kInt8,
                                     ScalarType::kUint32,
                                     ScalarType::kFloat32,
                                     ScalarType::kFloat64};
-
-constexpr absl::string_view kPointTimes[] = {
-    "t", "time", "timestamp", "time_offset", "offset_time", "point_time_offset"};
 
 struct RosField {
   absl::string_view name;
@@ -191,9 +187,7 @@ absl::StatusOr<RosCloudHead> ReadRosCloudHead(absl::string_view bytes, MessageEn
   STRATA_ASSIGN_OR_RETURN(const RosCloud cloud, ParseCloud(bytes, encoding));
   RosCloudHead head = {.header = cloud.header, .points = cloud.points()};
   for (const RosField& field : cloud.fields) {
-    head.has_point_times = head.has_point_times ||
-                           std::find(std::begin(kPointTimes), std::end(kPointTimes), field.name) !=
-                               std::end(kPointTimes);
+    head.has_point_times = head.has_point_times || MeaningOf(field.name) == Meaning::kTime;
   }
   return head;
 }

@@ -1,7 +1,8 @@
 #include "client/formats/motion/placed_scans.h"
 
 #include <filesystem>
-#include <optional>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -23,7 +24,12 @@ bool IsTrajectory(const std::filesystem::path& path) {
 absl::Status PlaceOnTrajectory(const std::filesystem::path& trajectory,
                                const Pose& T_body_scan,
                                std::vector<ScanFile>& scans) {
-  STRATA_ASSIGN_OR_RETURN(const TrajectoryFile file, ReadTrajectory(trajectory));
+  STRATA_ASSIGN_OR_RETURN(TrajectoryFile file, ReadTrajectory(trajectory));
+  const auto way = std::make_shared<const Trajectory>(std::move(file.trajectory));
+  const auto pose_at = [way, T_body_scan](double time_s) -> absl::StatusOr<Pose> {
+    STRATA_ASSIGN_OR_RETURN(const TrajectoryPose pose, way->At(time_s));
+    return pose.T_map_body * T_body_scan;
+  };
   for (ScanFile& scan : scans) {
     scan.time = TimeOfName(scan.path);
     if (!scan.time.has_value()) {
@@ -32,10 +38,11 @@ absl::Status PlaceOnTrajectory(const std::filesystem::path& trajectory,
           ": a trajectory gives poses to scans whose names are times in seconds, as in "
           "1432235498.028276.pcd; rename them, or give their poses as index-tum"));
     }
-    const absl::StatusOr<TrajectoryPose> pose =
-        file.trajectory.At(absl::ToDoubleSeconds(*scan.time - absl::UnixEpoch()));
+    const double stamp_s = absl::ToDoubleSeconds(*scan.time - absl::UnixEpoch());
+    const absl::StatusOr<Pose> pose = pose_at(stamp_s);
     scan.pose_status = Annotate(pose.status(), trajectory.string());
-    if (pose.ok()) scan.T_map_scan = pose->T_map_body * T_body_scan;
+    if (pose.ok()) scan.T_map_scan = *pose;
+    scan.pose_after = [pose_at, stamp_s](double offset_s) { return pose_at(stamp_s + offset_s); };
   }
   return absl::OkStatus();
 }

@@ -16,9 +16,9 @@ namespace strata {
 bool IsTrajectory(const std::filesystem::path& path);
 
 // Gives each scan the time that its file's name is, in seconds since 1970 with a decimal point
-// (1432235498.028276.pcd), and as its pose the trajectory's at that time times `T_body_scan`. Times
-// that the trajectory does not hold are in the scan's `pose_status`. As ReadTrajectory();
-// INVALID_ARGUMENT naming the first file whose name is no time.
+// (1432235498.028276.pcd), as its pose the trajectory's at that time times `T_body_scan`, and the
+// poses after it. Times that the trajectory does not hold are in the scan's `pose_status`. As
+// ReadTrajectory(); INVALID_ARGUMENT naming the first file whose name is no time.
 absl::Status PlaceOnTrajectory(const std::filesystem::path& trajectory,
                                const Pose& T_body_scan,
                                std::vector<ScanFile>& scans);
