@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include <Eigen/Core>
+#include <GeographicLib/Ellipsoid.hpp>
 
 namespace strata {
 namespace {
@@ -10,6 +11,12 @@ namespace {
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 }  // namespace
+
+CurvatureRadii CurvatureAt(double latitude_rad) {
+  const GeographicLib::Ellipsoid& earth = GeographicLib::Ellipsoid::WGS84();
+  return {earth.TransverseCurvatureRadius(latitude_rad * kDegrees),
+          earth.MeridionalCurvatureRadius(latitude_rad * kDegrees)};
+}
 
 LocalFrame::LocalFrame(const GeodeticOrigin& origin)
     : origin_(origin),

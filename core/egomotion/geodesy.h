@@ -3,11 +3,23 @@
 #define STRATA_CORE_EGOMOTION_GEODESY_H_
 
 #include <Eigen/Core>
+#include <GeographicLib/Constants.hpp>
 #include <GeographicLib/LocalCartesian.hpp>
 
 #include "core/world/map_info.h"
 
 namespace strata {
+
+// The ellipsoid that stands for the earth.
+inline double EquatorRadiusM() { return GeographicLib::Constants::WGS84_a(); }
+inline double EarthFlattening() { return GeographicLib::Constants::WGS84_f(); }
+
+// Of the ellipsoid's curvature at a latitude.
+struct CurvatureRadii {
+  double east_m = 0.0;
+  double north_m = 0.0;
+};
+CurvatureRadii CurvatureAt(double latitude_rad);
 
 // By GeographicLib::LocalCartesian, exact to nanometres.
 class LocalFrame {

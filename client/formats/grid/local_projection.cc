@@ -5,16 +5,13 @@
 
 #include "absl/strings/str_format.h"
 
-#include "client/formats/grid/wgs84.h"
+#include "core/egomotion/geodesy.h"
 
 namespace strata {
 
 LocalProjection::LocalProjection(const GeodeticOrigin& origin) : altitude_m_(origin.altitude_m) {
   constexpr double kDegreesPerRad = 180.0 / std::numbers::pi;
-  const double sine = std::sin(origin.latitude_rad);
-  const double w2 = 1.0 - wgs84::kEccentricity2 * sine * sine;
-  const double east_m = wgs84::kSemiMajorAxisM / std::sqrt(w2);
-  const double north_m = east_m * (1.0 - wgs84::kEccentricity2) / w2;
+  const auto [east_m, north_m] = CurvatureAt(origin.latitude_rad);
   latitude_deg_ = origin.latitude_rad * kDegreesPerRad;
   longitude_deg_ = origin.longitude_rad * kDegreesPerRad;
   scale_ = 1.0 + altitude_m_ / std::sqrt(east_m * north_m);
@@ -34,8 +31,8 @@ std::string LocalProjection::Wkt() const {
                          R"(PARAMETER["False_Easting",0.0],PARAMETER["False_Northing",0.0],)"
                          R"(PARAMETER["Central_Meridian",%.15g],PARAMETER["Scale_Factor",%.15g],)"
                          R"(PARAMETER["Latitude_Of_Origin",%.15g],UNIT["Meter",1.0]])",
-                         wgs84::kSemiMajorAxisM,
-                         wgs84::kInverseFlattening,
+                         EquatorRadiusM(),
+                         1.0 / EarthFlattening(),
                          longitude_deg_,
                          scale_,
                          latitude_deg_);

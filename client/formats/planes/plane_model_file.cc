@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,14 +16,15 @@
 
 #include "client/formats/file_bytes.h"
 #include "client/formats/planes/dxf_drawing.h"
-#include "client/formats/planes/geodetic_position.h"
 #include "client/formats/planes/polygon_pieces.h"
 #include "core/common/status.h"
+#include "core/egomotion/geodesy.h"
 #include "core/world/constraint.h"
 
 namespace strata {
 namespace {
 
+constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr char kUnseenLayer[] = "UNSEEN";
 
 struct KindLook {
@@ -55,16 +57,20 @@ void AddPiece(const FlatPiece& piece, const ModelPlane& plane, Geometry& geometr
 // that look down are turned.
 void AddGeoJsonRing(const PlaneRing& ring,
                     bool turned,
-                    const std::optional<GeodeticOrigin>& origin,
+                    const std::optional<LocalFrame>& earth,
                     std::string& out) {
   out += '[';
   for (std::size_t i = 0; i <= ring.size(); ++i) {
     const std::size_t at = i % ring.size();
     const Eigen::Vector3d& p = ring[turned ? ring.size() - 1 - at : at];
     if (i > 0) out += ',';
-    if (origin.has_value()) {
-      const Eigen::Vector3d position = GeodeticPosition(*origin, p);
-      absl::StrAppendFormat(&out, "[%.9f,%.9f,%.4f]", position.x(), position.y(), position.z());
+    if (earth.has_value()) {
+      const GeodeticOrigin place = earth->ToEarth(p);
+      absl::StrAppendFormat(&out,
+                            "[%.9f,%.9f,%.4f]",
+                            place.longitude_rad * kDegrees,
+                            place.latitude_rad * kDegrees,
+                            place.altitude_m);
     } else {
       absl::StrAppendFormat(&out, "[%.4f,%.4f,%.4f]", p.x(), p.y(), p.z());
     }
@@ -74,7 +80,7 @@ void AddGeoJsonRing(const PlaneRing& ring,
 
 std::string GeoJsonFeature(const ModelPlane& plane,
                            const PlanePolygon& polygon,
-                           const std::optional<GeodeticOrigin>& origin) {
+                           const std::optional<LocalFrame>& earth) {
   std::string holes_open;
   for (const PlaneHole& hole : polygon.holes) {
     absl::StrAppend(&holes_open, holes_open.empty() ? "" : ",", hole.seen_open ? "true" : "false");
@@ -92,10 +98,10 @@ std::string GeoJsonFeature(const ModelPlane& plane,
       plane.colour.has_value() ? absl::StrFormat("\"#%06x\"", PackedRgb(*plane.colour)) : "null",
       holes_open);
   const bool turned = plane.plane.normal.z() < 0.0;
-  AddGeoJsonRing(polygon.outer, turned, origin, out);
+  AddGeoJsonRing(polygon.outer, turned, earth, out);
   for (const PlaneHole& hole : polygon.holes) {
     out += ',';
-    AddGeoJsonRing(hole.ring, turned, origin, out);
+    AddGeoJsonRing(hole.ring, turned, earth, out);
   }
   return out + "]}}";
 }
@@ -138,12 +144,14 @@ absl::StatusOr<std::string> PlaneModelDxf(const PlaneModel& model) {
 
 absl::StatusOr<std::string> PlaneModelGeoJson(const PlaneModel& model,
                                               const std::optional<GeodeticOrigin>& origin) {
+  std::optional<LocalFrame> earth;
+  if (origin.has_value()) earth.emplace(*origin);
   STRATA_RETURN_IF_ERROR(CheckPlaneModel(model));
   std::string features;
   for (const ModelPlane& plane : model.planes) {
     for (const PlanePolygon& polygon : plane.polygons) {
       absl::StrAppend(
-          &features, features.empty() ? "\n" : ",\n", GeoJsonFeature(plane, polygon, origin));
+          &features, features.empty() ? "\n" : ",\n", GeoJsonFeature(plane, polygon, earth));
     }
   }
   return absl::StrCat(R"({"type":"FeatureCollection","frame":")",

@@ -55,5 +55,19 @@ TEST(GeodesyTest, MapsLieOnThePlaneThatTouchesTheEarth) {
   }
 }
 
+// By arcs of a millimetre's accuracy: a step to the north or the east on the ellipsoid.
+TEST(GeodesyTest, RadiiOfCurvatureAreThoseOfArcs) {
+  for (const double latitude : {-1.5, -0.6, 0.0, 0.8}) {
+    constexpr double kStep = 1e-4;
+    const Eigen::Vector3d here = Ecef({latitude, 0.0, 0.0});
+    const auto [east_m, north_m] = CurvatureAt(latitude);
+    const double north = (Ecef({latitude + kStep, 0.0, 0.0}) - here).norm() / kStep;
+    const double east = (Ecef({latitude, kStep, 0.0}) - here).norm() / kStep / std::cos(latitude);
+    EXPECT_NEAR(north_m / north, 1.0, 1e-5);
+    EXPECT_NEAR(east_m / east, 1.0, 1e-6);
+  }
+  EXPECT_NEAR(EquatorRadiusM() * (1.0 - EarthFlattening()), 6356752.314245, 1e-6);
+}
+
 }  // namespace
 }  // namespace strata

@@ -16,7 +16,6 @@
 #include <nlohmann/json.hpp>
 
 #include "client/formats/file_bytes.h"
-#include "client/formats/planes/geodetic_position.h"
 #include "client/formats/ply_reader.h"
 #include "core/cloud/point_cloud.h"
 #include "tests/support/dxf_entities.h"
@@ -169,25 +168,6 @@ Vector3d InMap(const GeodeticOrigin& origin, double lon_deg, double lat_deg, dou
       turn.transpose() * (on_earth(lat_deg / kDegrees, lon_deg / kDegrees, height_m) -
                           on_earth(origin.latitude_rad, origin.longitude_rad, origin.altitude_m));
   return {d.y(), d.z(), d.x()};
-}
-
-TEST(GeodeticPositionTest, ComesBackByTheForwardFormula) {
-  for (const double latitude : {-89.999, -52.0, 0.0, 0.3, 48.1, 89.0}) {
-    for (const double longitude : {-179.999, 0.0, 11.5, 179.999}) {
-      const GeodeticOrigin origin{latitude / kDegrees, longitude / kDegrees, 520.0};
-      for (const Vector3d& p : {Vector3d(0, 0, 0),
-                                Vector3d(10, -20, 3),
-                                Vector3d(500'000, 300'000, 9000),
-                                Vector3d(-500'000, -2, -100)}) {
-        const Vector3d at = GeodeticPosition(origin, p);
-        EXPECT_LT((InMap(origin, at.x(), at.y(), at.z()) - p).norm(), 1e-4);
-      }
-    }
-  }
-  // A second of latitude at the equator: the radius of curvature there is b² / a = 6335439.327 m.
-  const Vector3d north =
-      GeodeticPosition({0.0, 0.0, 0.0}, {0.0, 6335439.327 / (3600.0 * kDegrees), 0.0});
-  EXPECT_NEAR(north.y(), 1.0 / 3600.0, 1e-11);
 }
 
 TEST(PlaneModelFileTest, GeoJsonOfAMapOnEarthIsLongitudeLatitudeHeight) {
