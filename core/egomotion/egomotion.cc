@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 #include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/str_format.h"
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
@@ -33,6 +35,10 @@ constexpr double kGivenHeadingSigmaRad = 0.1;
 // The way and the fixes after which the most likely of them is taken.
 constexpr double kStartWayM = 20.0;
 constexpr std::size_t kStartFixes = 10;
+constexpr double kFarthestOriginM = 1e5;
+constexpr double kTellEveryS = 1.0;
+constexpr int kRestarts = 5;
+constexpr double kSameHeadingRad = 0.02;
 constexpr double kLevelSigmaRad = 0.1;
 
 MapLog InMap(const MotionLog& log, const Rig& rig, const LocalFrame& frame) {
@@ -113,12 +119,16 @@ FilterStart StartOf(const MapLog& log,
   return start;
 }
 
+bool HasStarted(const LogFilter& filter) {
+  return filter.fixes().size() >= kStartFixes && filter.distance_m() >= kStartWayM;
+}
+
 // All headings side by side until the most likely is known.
-absl::StatusOr<LogFilter> Begin(const MapLog& log,
-                                const Rig& rig,
-                                const Beginning& beginning,
-                                const EgomotionOptions& options,
-                                const Stop& stop) {
+absl::StatusOr<LogFilter> MostLikely(const MapLog& log,
+                                     const Rig& rig,
+                                     const Beginning& beginning,
+                                     const EgomotionOptions& options,
+                                     const Stop& stop) {
   std::vector<LogFilter> filters;
   const int count = options.heading_rad.has_value() ? 1 : kHeadings;
   for (int k = 0; k < count; ++k) {
@@ -137,12 +147,46 @@ absl::StatusOr<LogFilter> Begin(const MapLog& log,
     while (!best().done()) {
       STRATA_RETURN_IF_ERROR(stop.status());
       for (LogFilter& filter : filters) filter.Step();
-      if (best().fixes().size() >= kStartFixes && best().distance_m() >= kStartWayM) break;
+      if (HasStarted(best())) break;
     }
   }
-  LogFilter result = best();
-  result.Settle();
-  return result;
+  return best();
+}
+
+// The filter is linear about its states, and those of the first metres are as far off as the
+// heading that was tried: it begins again with what it found, until that stays.
+absl::StatusOr<LogFilter> Begin(const MapLog& log,
+                                const Rig& rig,
+                                const Beginning& beginning,
+                                const EgomotionOptions& options,
+                                const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(LogFilter filter, MostLikely(log, rig, beginning, options, stop));
+  double heading_rad = filter.HeadingAtStart();
+  for (int i = 0; i < kRestarts && !options.heading_rad.has_value(); ++i) {
+    LogFilter again(log, rig, StartOf(log, rig, beginning, heading_rad, kHeadingSigmaRad));
+    while (!again.done() && !HasStarted(again)) {
+      STRATA_RETURN_IF_ERROR(stop.status());
+      again.Step();
+    }
+    const double change_rad = again.HeadingAtStart() - heading_rad;
+    filter = again;
+    heading_rad = filter.HeadingAtStart();
+    if (std::abs(std::remainder(change_rad, 2.0 * std::numbers::pi)) < kSameHeadingRad) break;
+  }
+  filter.Settle();
+  return filter;
+}
+
+absl::StatusOr<GeodeticOrigin> OriginOf(const MotionLog& log, const EgomotionOptions& options) {
+  const GpsFix& fix = log.fixes.front();
+  const GeodeticOrigin first{fix.latitude_rad, fix.longitude_rad, fix.altitude_m};
+  if (!options.origin.has_value()) return first;
+  const double away_m = LocalFrame(*options.origin).ToMap(first).norm();
+  if (away_m <= kFarthestOriginM) return *options.origin;
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "the first fix is %.0f km from the map's origin, at most %.0f km are mapped with it",
+      away_m / 1000.0,
+      kFarthestOriginM / 1000.0));
 }
 
 std::vector<FixGap> GapsOf(const std::vector<FixOutcome>& fixes, double begin_s, double end_s) {
@@ -199,16 +243,22 @@ absl::StatusOr<Egomotion> FilterLog(const MotionLog& log,
   if (!mounted.R_body_imu.has_value()) {
     STRATA_ASSIGN_OR_RETURN(mounted.R_body_imu, FindMounting(log, rig));
   }
-  const GpsFix& first = log.fixes.front();
-  const GeodeticOrigin origin{first.latitude_rad, first.longitude_rad, first.altitude_m};
+  STRATA_ASSIGN_OR_RETURN(const GeodeticOrigin origin, OriginOf(log, options));
   const MapLog map_log = InMap(log, mounted, LocalFrame(origin));
   const Beginning beginning = BeginningOf(map_log);
   STRATA_ASSIGN_OR_RETURN(LogFilter run, Begin(map_log, mounted, beginning, options, stop));
+  const double end_s = map_log.imu.back().time_s;
+  double told_s = -std::numeric_limits<double>::infinity();
   while (!run.done()) {
     STRATA_RETURN_IF_ERROR(stop.status());
+    if (options.told && run.time_s() >= told_s + kTellEveryS) {
+      STRATA_RETURN_IF_ERROR(options.told({run.poses(), run.fixes(), end_s}));
+      told_s = run.time_s();
+    }
     run.Step();
   }
   run.Record(true);
+  if (options.told) STRATA_RETURN_IF_ERROR(options.told({run.poses(), run.fixes(), end_s}));
   STRATA_ASSIGN_OR_RETURN(Trajectory trajectory, Trajectory::Make(run.poses()));
   return Egomotion{origin,
                    *mounted.R_body_imu,

@@ -3,9 +3,11 @@
 #define STRATA_CORE_EGOMOTION_EGOMOTION_H_
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -58,7 +60,7 @@ struct EgomotionReport {
 };
 
 struct Egomotion {
-  GeodeticOrigin origin;  // the first fix
+  GeodeticOrigin origin;  // as asked for, or the first fix
   Eigen::Quaterniond R_body_imu = Eigen::Quaterniond::Identity();
   Trajectory trajectory;           // 20 poses a second, and the first and the last
   std::vector<FusedState> states;  // as many, without lag
@@ -66,7 +68,19 @@ struct Egomotion {
   EgomotionReport report;
 };
 
+// What a run along a log has found so far.
+struct EgomotionSoFar {
+  const std::vector<TrajectoryPose>& poses;
+  const std::vector<FixOutcome>& fixes;
+  double end_s = 0.0;  // of the log
+};
+
 struct EgomotionOptions {
+  // Where the map's frame is on earth; nullopt: at the first fix.
+  std::optional<GeodeticOrigin> origin;
+  // Told, if set, each time a second of poses has become known, and at the end; the first time
+  // once the heading at the start is. An error of it ends the run.
+  std::function<absl::Status(const EgomotionSoFar&)> told;
   // Which way the body's x points at the start, counter-clockwise from east; nullopt: the most
   // likely of several over the first metres.
   std::optional<double> heading_rad;
@@ -75,7 +89,8 @@ struct EgomotionOptions {
 // Forward in time: a pose knows what was measured before it. Starts level by gravity; with the
 // gyroscope's mean as its bias if the robot stands for the first 2 s.
 // INVALID_ARGUMENT, naming sensor and time: no IMU or no fix, times that do not ascend, numbers
-// that are not finite, an IMU that is silent for more than a second, a rig out of range;
+// that are not finite, an IMU that is silent for more than a second, a rig out of range, an origin
+// more than 100 km from the first fix;
 // FAILED_PRECONDITION as FindMounting(); CANCELLED or DEADLINE_EXCEEDED by `stop`.
 absl::StatusOr<Egomotion> FilterLog(const MotionLog& log,
                                     const Rig& rig,

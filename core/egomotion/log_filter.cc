@@ -4,9 +4,11 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numbers>
 #include <optional>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 namespace strata {
 namespace {
@@ -18,6 +20,11 @@ constexpr double kStartNis = 50.0;
 constexpr double kStandsSpeedM_s = 0.005;
 constexpr double kStandsRateRad_s = 0.05;
 constexpr double kStandsAfterS = 0.5;
+
+double HeadingOf(const Eigen::Quaterniond& R) {
+  const Eigen::Vector3d ahead = R * Eigen::Vector3d::UnitX();
+  return std::atan2(ahead.y(), ahead.x());
+}
 
 // Of an innovation: with so much more on the measurement's own, its NIS is as much smaller.
 double VarianceOf(const InformationFilter& filter, const StateMeasurement<1>& measurement) {
@@ -54,9 +61,16 @@ ImuSample LogFilter::Reading() const {
 }
 
 void LogFilter::PredictTo(double time_s) {
-  const Eigen::Vector3d before = filter_.state().p_imu_m;
+  const FusedState before = filter_.state();
   filter_.Predict(Reading(), time_s);
-  distance_m_ += (filter_.state().p_imu_m - before).norm();
+  distance_m_ += (filter_.state().p_imu_m - before.p_imu_m).norm();
+  turned_rad_ += std::remainder(
+      HeadingOf(filter_.state().R_map_body) - HeadingOf(before.R_map_body), 2.0 * std::numbers::pi);
+}
+
+double LogFilter::HeadingAtStart() const {
+  return std::remainder(HeadingOf(filter_.state().R_map_body) - turned_rad_,
+                        2.0 * std::numbers::pi);
 }
 
 void LogFilter::Step() {

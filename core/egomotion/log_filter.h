@@ -52,6 +52,9 @@ class LogFilter {
   double time_s() const { return filter_.state().time_s; }
   double log_likelihood() const { return log_likelihood_; }  // of the fixes until now
   double distance_m() const { return distance_m_; }
+  // Which way the body's x pointed at the start by what is known now: the heading now without the
+  // turns that the gyroscope felt since. In (−π, π].
+  double HeadingAtStart() const;
   const InformationFilter& filter() const { return filter_; }
   const std::vector<TrajectoryPose>& poses() const { return poses_; }
   const std::vector<FusedState>& states() const { return states_; }
@@ -78,6 +81,7 @@ class LogFilter {
   double stands_since_s_;
   double log_likelihood_ = 0.0;
   double distance_m_ = 0.0;
+  double turned_rad_ = 0.0;  // by predictions alone
   std::vector<TrajectoryPose> poses_;
   std::vector<FusedState> states_;
   std::vector<FixOutcome> fixes_;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <numbers>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -67,6 +68,56 @@ Quality Judge(const Egomotion& run, const testing::DriveOptions& options, double
   quality.rms_m = std::sqrt(quality.rms_m / count);
   quality.nees /= count;
   return quality;
+}
+
+// Between those that are tried, too: 45 degrees lie from one to the next.
+TEST(EgomotionTest, BeginsWithTheHeadingThatTheFirstMetresShow) {
+  double squares = 0.0;
+  constexpr int kDrives = 8;
+  for (int k = 0; k < kDrives; ++k) {
+    testing::DriveOptions options = CarDrive();
+    options.seconds = 40.0;
+    options.rest_s = k % 2 == 0 ? 3.0 : 0.0;
+    const double turn_rad = 0.35 + 0.8 * k;
+    options.way = [turn_rad](double driven_s) -> Eigen::Vector3d {
+      const Eigen::Vector3d p(3.0 * driven_s, 20.0 * (1.0 - std::cos(0.1 * driven_s)), 0.0);
+      return Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ()) * p;
+    };
+    const MotionLog log = testing::SimulateDrive(options, 300 + k);
+    STRATA_ASSERT_OK_AND_ASSIGN(const Egomotion run, FilterLog(log, options.rig));
+    const double off_rad =
+        std::remainder(run.report.heading_at_start_rad - turn_rad, 2.0 * std::numbers::pi);
+    EXPECT_LT(std::abs(off_rad), 0.25) << k;
+    squares += off_rad * off_rad / kDrives;
+  }
+  EXPECT_LT(std::sqrt(squares), 0.1);
+}
+
+TEST(EgomotionTest, TellsPosesAsTheyBecomeKnown) {
+  const testing::DriveOptions options = CarDrive();
+  const MotionLog log = testing::SimulateDrive(options, 4);
+  EgomotionOptions asked;
+  asked.origin = options.origin;
+  std::size_t told = 0, poses = 0;
+  double last_s = 0.0;
+  asked.told = [&](const EgomotionSoFar& run) {
+    EXPECT_GE(run.poses.size(), poses);
+    poses = run.poses.size();
+    last_s = run.poses.back().time_s;
+    ++told;
+    return absl::OkStatus();
+  };
+  STRATA_ASSERT_OK_AND_ASSIGN(const Egomotion run, FilterLog(log, options.rig, asked));
+  EXPECT_EQ(run.origin, options.origin);
+  EXPECT_EQ(poses, run.trajectory.poses().size());
+  EXPECT_EQ(last_s, log.imu.back().time_s);
+  EXPECT_GT(told, 90U);  // of 120 s
+  asked.told = [](const EgomotionSoFar&) { return absl::UnavailableError("enough"); };
+  EXPECT_THAT(FilterLog(log, options.rig, asked),
+              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("enough")));
+  asked.origin->latitude_rad += 0.1;
+  EXPECT_THAT(FilterLog(log, options.rig, asked),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("from the map's origin")));
 }
 
 TEST(EgomotionTest, FollowsADrivenRobot) {
