@@ -70,11 +70,20 @@ std::vector<ScanFile> Ordered(std::vector<fs::path> files, ScanFormat format) {
     return NaturalLess(a.string(), b.string());
   });
   files.erase(std::unique(files.begin(), files.end()), files.end());
-  std::set<std::uint64_t> seen;
-  const bool numbered = std::all_of(files.begin(), files.end(), [&seen](const fs::path& file) {
-    const std::optional<std::uint64_t> sequence = SequenceOfName(file);
-    return sequence.has_value() && seen.insert(*sequence).second;
+  const bool timed = std::all_of(files.begin(), files.end(), [](const fs::path& file) {
+    return TimeOfName(file).has_value();
   });
+  if (timed) {
+    std::stable_sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
+      return *TimeOfName(a) < *TimeOfName(b);
+    });
+  }
+  std::set<std::uint64_t> seen;
+  const bool numbered =
+      !timed && std::all_of(files.begin(), files.end(), [&seen](const auto& file) {
+        const std::optional<std::uint64_t> sequence = SequenceOfName(file);
+        return sequence.has_value() && seen.insert(*sequence).second;
+      });
   std::vector<ScanFile> scans;
   for (const fs::path& file : files) {
     ScanFile& scan = scans.emplace_back();

@@ -43,6 +43,9 @@ struct ScanFile {
   std::optional<absl::Time> time;
   Pose T_map_scan = Pose::Identity();  // identity where no poses were given
   absl::Status pose_status;            // NOT_FOUND, saying what was looked for, without a pose
+  // Of a right-hand step [rotation, translation] of T_map_scan, where the pose is known by itself,
+  // as by GPS, and not from those before.
+  std::optional<Matrix6d> pose_covariance;
   // As ReadScanFile(), where the scan is no file of its own; may be called by several threads.
   std::function<absl::StatusOr<PointCloud>(std::size_t* at_sensor)> read = {};
   // T_map_scan so many seconds after `time`, where poses are known over time; may be called by
@@ -64,7 +67,8 @@ std::optional<absl::Time> TimeOfName(const std::filesystem::path& path);
 // Scans of `paths`, each as ScansAt() has it, in the order of their sequence numbers.
 //
 // The sequence number is SequenceOfName where every file has one and no two are equal; else the
-// files are numbered from 0 in natural order of their names (s2 before s10).
+// files are numbered from 0 in natural order of their names (s2 before s10). Files whose names are
+// all times are numbered in the order of those: the last digits of a time say nothing.
 //
 // Poses: index-tum and kitti by index = SequenceOfName. tum has no index: where every stem is a
 // time in seconds (it has a decimal point) by time, to a millisecond; else one after the other, the

@@ -75,6 +75,17 @@ TEST_F(ScanListTest, NamesWithoutOwnNumbersAreCounted) {
   EXPECT_THAT(Sequences(scans), ElementsAre(0, 1, 2));
 }
 
+// The digits behind a time's point are no number of a scan.
+TEST_F(ScanListTest, NamesThatAreTimesAreInTheirOrder) {
+  for (const char* name : {"1000.9.xyz", "1001.25.xyz", "1001.3.xyz", "1002.100000.xyz"}) {
+    Write(name);
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({dir_.path()}, {.poses = kNoPoses}));
+  EXPECT_THAT(Names(scans),
+              ElementsAre("1000.9.xyz", "1001.25.xyz", "1001.3.xyz", "1002.100000.xyz"));
+  EXPECT_THAT(Sequences(scans), ElementsAre(0, 1, 2, 3));
+}
+
 TEST_F(ScanListTest, IndexedPosesGoToTheirScansAndTheRestIsAnError) {
   const auto poses = Write("poses", "7 1.5 70 0 0 0 0 0 1\n5 1.25 50 0 0 0 0 0 1\n");
   Write("s005.xyz");
