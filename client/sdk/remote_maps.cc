@@ -106,6 +106,16 @@ absl::Status RemoteMaps::SetClass(const api::Call& call,
       .status();
 }
 
+absl::Status RemoteMaps::SetOrigin(const api::Call& call,
+                                   absl::string_view name,
+                                   const GeodeticOrigin& origin) {
+  v1::SetMapOriginRequest in;
+  in.set_name(std::string(name));
+  *in.mutable_origin() = ToProto(origin);
+  return CallUnary(connection_, *stub_, &v1::Maps::Stub::SetOrigin, call, Repeat::kOnTrouble, in)
+      .status();
+}
+
 absl::Status RemoteMaps::Watch(const api::Call& call,
                                absl::string_view name,
                                const api::WatchOptions& options,

@@ -27,6 +27,9 @@ class RemoteMaps final : public api::Maps {
                                                  absl::string_view name) override;
   absl::StatusOr<std::vector<MapClass>> ListClasses(const api::Call& call,
                                                     absl::string_view name) override;
+  absl::Status SetOrigin(const api::Call& call,
+                         absl::string_view name,
+                         const GeodeticOrigin& origin) override;
   absl::Status SetClass(const api::Call& call,
                         absl::string_view name,
                         const MapClass& map_class) override;

@@ -92,6 +92,11 @@ class Maps {
   virtual absl::Status SetClass(const Call& call,
                                 absl::string_view name,
                                 const MapClass& map_class) = 0;
+  // Says where the map's origin is on earth; its coordinates stay. INVALID_ARGUMENT
+  // (ValidateGeodeticOrigin).
+  virtual absl::Status SetOrigin(const Call& call,
+                                 absl::string_view name,
+                                 const GeodeticOrigin& origin) = 0;
   // Delivers what changes until the call is stopped, or, with `once`, what has changed. The first
   // message comes at once, even if it says nothing but where the map stands. A sink's error ends
   // the stream and is handed back.

@@ -195,6 +195,7 @@ class StorageWriter {
   virtual absl::Status ForgetEpochsBefore(std::uint64_t epoch) = 0;
   virtual absl::Status PutProfile(absl::string_view name, const RobotProfile& profile) = 0;
   // Inserts or replaces. ALREADY_EXISTS where another id has the name.
+  virtual absl::Status PutOrigin(const GeodeticOrigin& origin) = 0;
   virtual absl::Status PutClass(const MapClass& map_class) = 0;
   // Under a new id, which it returns; that of `info` is ignored. ALREADY_EXISTS for its name.
   virtual absl::StatusOr<std::uint64_t> PutClassifier(const ClassifierInfo& info,

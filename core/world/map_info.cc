@@ -27,8 +27,11 @@ absl::Status ValidateMapParameters(const MapParameters& parameters) {
                      parameters.fade_after,
                      " needs keep_points: what has faded is told by the rays of scans"));
   }
-  if (!parameters.origin.has_value()) return absl::OkStatus();
-  const GeodeticOrigin& origin = *parameters.origin;
+  return parameters.origin.has_value() ? ValidateGeodeticOrigin(*parameters.origin)
+                                       : absl::OkStatus();
+}
+
+absl::Status ValidateGeodeticOrigin(const GeodeticOrigin& origin) {
   if (std::abs(origin.latitude_rad) <= std::numbers::pi / 2 &&
       std::abs(origin.longitude_rad) <= std::numbers::pi && std::abs(origin.altitude_m) <= 1e5) {
     return absl::OkStatus();

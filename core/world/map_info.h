@@ -24,9 +24,12 @@ struct GeodeticOrigin {
   friend bool operator==(const GeodeticOrigin&, const GeodeticOrigin&) = default;
 };
 
+// INVALID_ARGUMENT with the numbers unless it is on earth.
+absl::Status ValidateGeodeticOrigin(const GeodeticOrigin& origin);
+
 inline constexpr std::uint32_t kMaxFadeAfter = 1000;
 
-// Fixed when the map is created, but for `default_profile`.
+// Fixed when the map is created, but for `default_profile` and `origin`.
 struct MapParameters {
   MlsParameters mls;
   SensorModel sensor;            // for scans that bring none of their own

@@ -69,6 +69,18 @@ SensorModel FromProto(const v1::SensorModel& proto) {
   return model;
 }
 
+v1::GeodeticOrigin ToProto(const GeodeticOrigin& origin) {
+  v1::GeodeticOrigin proto;
+  proto.set_latitude_rad(origin.latitude_rad);
+  proto.set_longitude_rad(origin.longitude_rad);
+  proto.set_altitude_m(origin.altitude_m);
+  return proto;
+}
+
+GeodeticOrigin FromProto(const v1::GeodeticOrigin& proto) {
+  return {proto.latitude_rad(), proto.longitude_rad(), proto.altitude_m()};
+}
+
 v1::MapParameters ToProto(const MapParameters& parameters) {
   v1::MapParameters proto;
   *proto.mutable_mls() = MlsToProto(parameters.mls);
@@ -76,12 +88,7 @@ v1::MapParameters ToProto(const MapParameters& parameters) {
   *proto.mutable_default_profile() = ToProto(parameters.default_profile);
   proto.set_keep_points(parameters.keep_points);
   proto.set_fade_after(parameters.fade_after);
-  if (parameters.origin.has_value()) {
-    v1::GeodeticOrigin& origin = *proto.mutable_origin();
-    origin.set_latitude_rad(parameters.origin->latitude_rad);
-    origin.set_longitude_rad(parameters.origin->longitude_rad);
-    origin.set_altitude_m(parameters.origin->altitude_m);
-  }
+  if (parameters.origin.has_value()) *proto.mutable_origin() = ToProto(*parameters.origin);
   return proto;
 }
 
@@ -92,11 +99,7 @@ MapParameters FromProto(const v1::MapParameters& proto) {
   parameters.default_profile = FromProto(proto.default_profile());
   if (proto.has_keep_points()) parameters.keep_points = proto.keep_points();
   parameters.fade_after = proto.fade_after();
-  if (proto.has_origin()) {
-    const v1::GeodeticOrigin& origin = proto.origin();
-    parameters.origin =
-        GeodeticOrigin{origin.latitude_rad(), origin.longitude_rad(), origin.altitude_m()};
-  }
+  if (proto.has_origin()) parameters.origin = FromProto(proto.origin());
   return parameters;
 }
 

@@ -18,6 +18,7 @@ namespace strata::translate {
 
 v1::RobotProfile ToProto(const RobotProfile& profile);
 v1::SensorModel ToProto(const SensorModel& model);
+v1::GeodeticOrigin ToProto(const GeodeticOrigin& origin);
 v1::MapParameters ToProto(const MapParameters& parameters);
 v1::MapInfo ToProto(const MapInfo& map);
 v1::MapStats ToProto(const MapStats& stats);
@@ -26,6 +27,7 @@ v1::BackupMapResponse ToProto(const api::BackupPiece& piece);
 
 RobotProfile FromProto(const v1::RobotProfile& profile);
 SensorModel FromProto(const v1::SensorModel& model);
+GeodeticOrigin FromProto(const v1::GeodeticOrigin& origin);
 MapParameters FromProto(const v1::MapParameters& parameters);
 absl::StatusOr<MapInfo> FromProto(const v1::MapInfo& map);
 absl::StatusOr<MapStats> FromProto(const v1::MapStats& stats);

@@ -22,6 +22,7 @@ constexpr std::array kTable = {
     MethodRight{"Maps.History", kRead, "name"},
     MethodRight{"Maps.ListClasses", kRead, "name"},
     MethodRight{"Maps.SetClass", kWrite, "name"},
+    MethodRight{"Maps.SetOrigin", kWrite, "name"},
     MethodRight{"Maps.Watch", kRead, "name"},
     MethodRight{"Maps.Backup", kAdmin, "name"},
     MethodRight{"Scans.Upload", kWrite, "start.map"},

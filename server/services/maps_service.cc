@@ -92,6 +92,18 @@ absl::Status SetClass(api::Database& db,
   return db.maps().SetClass(call, in.name(), *map_class);
 }
 
+absl::Status SetOrigin(api::Database& db,
+                       const api::Call& call,
+                       const v1::SetMapOriginRequest& in,
+                       v1::SetMapOriginResponse&) {
+  if (!in.has_origin()) {
+    return AtTheDoor(absl::InvalidArgumentError("origin is missing: say where on earth"));
+  }
+  const GeodeticOrigin origin = FromProto(in.origin());
+  STRATA_RETURN_IF_ERROR(AtTheDoor(ValidateGeodeticOrigin(origin)));
+  return db.maps().SetOrigin(call, in.name(), origin);
+}
+
 absl::Status Backup(api::Database& db,
                     const api::Call& call,
                     const v1::BackupMapRequest& in,
@@ -111,6 +123,7 @@ MapsService::MapsService(Runtime& runtime) : Service(runtime, "Maps") {
   Unary("History", &History);
   Unary("ListClasses", &ListClasses);
   Unary("SetClass", &SetClass);
+  Unary("SetOrigin", &SetOrigin);
   Poll<MapWatchReactor>("Watch");
   Stream("Backup", &Backup);
 }

@@ -46,6 +46,7 @@ const std::multimap<std::string, std::string>& Examples() {
       {"Maps/History", "name: 'world'"},
       {"Maps/ListClasses", "name: 'world'"},
       {"Maps/SetClass", "name: 'world' map_class { id: 2 name: 'box' colour: 255 }"},
+      {"Maps/SetOrigin", "name: 'world' origin { latitude_rad: 0.8 longitude_rad: 0.2 }"},
       {"Maps/Watch", "name: 'world' tiles: true once: true"},
       {"Maps/Watch", "name: 'world' since: 2 epoch: 1 trajectory: 'world'"},
       {"Maps/Backup", "name: 'world'"},

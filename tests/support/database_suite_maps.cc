@@ -36,6 +36,23 @@ TEST_P(DatabaseSuite, MapsAreCreatedFoundListedAndDeleted) {
   EXPECT_THAT(db().maps().Get({}, "campus"), StatusIs(Code::kNotFound, HasSubstr("campus")));
 }
 
+TEST_P(DatabaseSuite, AnOriginIsSetAndSetAgain) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const MapInfo before, db().maps().Get({}, kMap));
+  for (const GeodeticOrigin& origin :
+       {GeodeticOrigin{0.8, 0.1, 300.0}, GeodeticOrigin{-0.5, 3.0, -2.0}}) {
+    STRATA_ASSERT_OK(db().maps().SetOrigin({}, kMap, origin));
+    STRATA_ASSERT_OK(db().maps().SetOrigin({}, kMap, origin));
+    STRATA_ASSERT_OK_AND_ASSIGN(MapInfo after, db().maps().Get({}, kMap));
+    EXPECT_EQ(after.parameters.origin, origin);
+    after.parameters.origin = before.parameters.origin;
+    EXPECT_EQ(after.parameters, before.parameters);
+  }
+  EXPECT_THAT(db().maps().SetOrigin({}, kMap, {2.0, 0.0, 0.0}),
+              StatusIs(Code::kInvalidArgument, HasSubstr("not on earth")));
+  STRATA_ASSERT_OK_AND_ASSIGN(const MapInfo kept, db().maps().Get({}, kMap));
+  EXPECT_EQ(kept.parameters.origin, (GeodeticOrigin{-0.5, 3.0, -2.0}));
+}
+
 TEST_P(DatabaseSuite, BadAndTakenMapsAreRefused) {
   EXPECT_THAT(db().maps().Create({}, kMap, {}), StatusIs(Code::kAlreadyExists, HasSubstr(kMap)));
   EXPECT_THAT(db().maps().Create({}, "../x", {}), StatusIs(Code::kInvalidArgument, _));
@@ -82,6 +99,7 @@ TEST_P(DatabaseSuite, AnUnknownMapIsNotFoundEverywhere) {
   EXPECT_THAT(db().classifiers().Import({}, no, "c", "x"), not_found);
   EXPECT_THAT(db().maps().ListClasses({}, no), not_found);
   EXPECT_THAT(db().maps().SetClass({}, no, {1, "wall", {}}), not_found);
+  EXPECT_THAT(db().maps().SetOrigin({}, no, {}), not_found);
   EXPECT_THAT(db().maps().Watch({}, no, {.trajectory = "", .once = true}, ignore), not_found);
   EXPECT_THAT(db().posegraph().Get({}, no), not_found);
   EXPECT_THAT(db().posegraph().SetPose({}, no, {"run", 1}, Pose::Identity()), not_found);

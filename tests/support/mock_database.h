@@ -46,6 +46,10 @@ class MockMaps : public api::Maps {
               (const api::Call&, absl::string_view, const MapClass&),
               (override));
   MOCK_METHOD(absl::Status,
+              SetOrigin,
+              (const api::Call&, absl::string_view, const GeodeticOrigin&),
+              (override));
+  MOCK_METHOD(absl::Status,
               Watch,
               (const api::Call&, absl::string_view, const api::WatchOptions&, Sink<api::MapUpdate>),
               (override));

@@ -345,6 +345,20 @@ absl::Status EngineMaps::SetClass(const api::Call& call,
   });
 }
 
+absl::Status EngineMaps::SetOrigin(const api::Call& call,
+                                   absl::string_view name,
+                                   const GeodeticOrigin& origin) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(name));
+  STRATA_RETURN_IF_ERROR(ValidateGeodeticOrigin(origin));
+  STRATA_RETURN_IF_ERROR(
+      map->core().writer().Run(Durability::kFull, 0, call.stop, [&](StorageWriter& writer) {
+        return writer.PutOrigin(origin);
+      }));
+  map->core().set_origin(origin);
+  return absl::OkStatus();
+}
+
 absl::Status EngineMaps::Watch(const api::Call& call,
                                absl::string_view name,
                                const api::WatchOptions& options,

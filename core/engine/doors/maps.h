@@ -53,6 +53,9 @@ class EngineMaps final : public api::Maps {
   absl::Status SetClass(const api::Call& call,
                         absl::string_view name,
                         const MapClass& map_class) override;
+  absl::Status SetOrigin(const api::Call& call,
+                         absl::string_view name,
+                         const GeodeticOrigin& origin) override;
   absl::Status Watch(const api::Call& call,
                      absl::string_view name,
                      const api::WatchOptions& options,

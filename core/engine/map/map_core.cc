@@ -90,6 +90,11 @@ void MapCore::set_default_profile(const RobotProfile& profile) {
   info_.parameters.default_profile = profile;
 }
 
+void MapCore::set_origin(const GeodeticOrigin& origin) {
+  absl::MutexLock lock(&mutex_);
+  info_.parameters.origin = origin;
+}
+
 void MapCore::NoteUnreadable(const TileKey& key) {
   absl::MutexLock lock(&mutex_);
   unreadable_.insert(key);

@@ -45,6 +45,7 @@ class MapCore {
   const std::shared_ptr<CacheBudget>& caches() const { return caches_; }
   MapInfo info() const;
   void set_default_profile(const RobotProfile& profile);
+  void set_origin(const GeodeticOrigin& origin);
 
   absl::StatusOr<ReaderPool::Lease> Reader() { return readers_.Take(); }
   WriterThread& writer() { return writer_; }

@@ -42,6 +42,15 @@ absl::StatusOr<std::vector<MapClass>> SqliteReader::ListClasses() {
   return classes;
 }
 
+absl::Status SqliteWriter::PutOrigin(const GeodeticOrigin& origin) {
+  return RunSql(
+      "UPDATE truth_map SET has_origin = 1, latitude_rad = ?1, longitude_rad = ?2, altitude_m = ?3 "
+      "WHERE id = 1",
+      origin.latitude_rad,
+      origin.longitude_rad,
+      origin.altitude_m);
+}
+
 absl::Status SqliteWriter::PutClass(const MapClass& map_class) {
   const Colour& c = map_class.colour;
   const std::uint32_t rgb = std::uint32_t{c.r} << 16 | std::uint32_t{c.g} << 8 | c.b;

@@ -53,6 +53,7 @@ class SqliteWriter final : public StorageWriter {
   absl::Status RestoreConstraints(std::uint64_t epoch) override;
   absl::Status ForgetEpochsBefore(std::uint64_t epoch) override;
   absl::Status PutProfile(absl::string_view name, const RobotProfile& profile) override;
+  absl::Status PutOrigin(const GeodeticOrigin& origin) override;
   absl::Status PutClass(const MapClass& map_class) override;
   absl::Status PutLabels(ScanNumber number,
                          LabelOrigin origin,

@@ -83,6 +83,7 @@ const std::map<std::string, std::optional<Right>>& Needed() {
          "Planning.WatchPath"});
     add(Right::kWrite,
         {"Maps.SetClass",
+         "Maps.SetOrigin",
          "Scans.Upload",
          "Scans.Ingest",
          "Scans.UploadLocalMap",
