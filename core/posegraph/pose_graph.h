@@ -75,6 +75,8 @@ struct PriorTerm {
   std::size_t i = 0;
   Pose T_map_scan = Pose::Identity();
   Matrix6d information = Matrix6d::Identity();
+  bool may_be_false = false;                    // GPS among walls, which may be rejected as a whole
+  std::optional<bool> believed = std::nullopt;  // as of a relative pose
 };
 
 struct PoseGraphProblem {
@@ -113,7 +115,7 @@ struct PoseGraphCosts {
 
 // A term that may be false and in the end counts nothing; all others count in full.
 struct RejectedTerm {
-  std::size_t term = 0;  // index into PoseGraphProblem::relative
+  std::size_t term = 0;  // its index
   double chi2 = 0.0;     // at the solution, as max_closure_chi2 counts it
 };
 
@@ -130,6 +132,7 @@ struct PoseGraphSummary {
   PoseGraphTermination termination = PoseGraphTermination::kConverged;
   std::vector<std::size_t> held;  // nodes held only because nothing else fixes their component
   std::vector<RejectedTerm> rejected_relative;  // ascending
+  std::vector<RejectedTerm> rejected_priors;    // likewise; indices into PoseGraphProblem::priors
   std::vector<NodeResidual> worst_nodes;        // the 10 worst, worst first
 };
 

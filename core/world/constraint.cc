@@ -39,11 +39,6 @@ absl::Status ValidateConstraint(const Constraint& constraint) {
       return absl::InvalidArgumentError(absl::StrCat(
           "scan ", constraint.i.ToString(), " cannot be held against itself; name two scans"));
     }
-  } else if (constraint.may_be_false) {
-    return absl::InvalidArgumentError(absl::StrCat("a prior (of scan ",
-                                                   constraint.j.ToString(),
-                                                   ") cannot be may_be_false; only what is said of "
-                                                   "two scans can be doubted"));
   }
   STRATA_RETURN_IF_ERROR(ValidateName("trajectory name of j", constraint.j.trajectory));
   STRATA_RETURN_IF_ERROR(ValidatePose(constraint.T_i_j));

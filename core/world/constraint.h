@@ -33,16 +33,16 @@ struct Constraint {
   Matrix6d information = Matrix6d::Identity();
   ConstraintOrigin origin = ConstraintOrigin::kIngest;
   bool enabled = true;
-  // A relative pose that the graph may reject as a whole if everything else contradicts it, as the
-  // closures of a foreign front end are; false: believed as far as its information says.
+  // The graph may reject it as a whole if everything else contradicts it, as the closures of a
+  // foreign front end and GPS among walls are; false: believed as far as its information says.
   bool may_be_false = false;
   std::string note;
 
   bool is_prior() const { return i.trajectory.empty(); }
 };
 
-// INVALID_ARGUMENT naming what is wrong: a name, a scan held against itself, a prior that may be
-// false, a pose, an information matrix that is not finite, symmetric and positive semidefinite, or
+// INVALID_ARGUMENT naming what is wrong: a name, a scan held against itself, a pose, an information
+// matrix that is not finite, symmetric and positive semidefinite, or
 // a note beyond 1000 bytes.
 absl::Status ValidateConstraint(const Constraint& constraint);
 

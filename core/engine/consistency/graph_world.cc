@@ -122,7 +122,8 @@ AlignmentProblem GraphWorld::Problem(const OptimizeSettings& settings) const {
     const std::size_t j = nodes_.at(record.scan_j);
     if (constraint.is_prior()) {
       if (constraint.enabled) {
-        problem.priors.push_back({j, constraint.T_i_j, constraint.information});
+        const bool may_be_false = constraint.may_be_false && settings.robust;
+        problem.priors.push_back({j, constraint.T_i_j, constraint.information, may_be_false});
       }
       continue;
     }

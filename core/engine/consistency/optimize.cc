@@ -232,6 +232,7 @@ class Optimizer {
     const auto given = std::count_if(
         rejected.begin(), rejected.end(), [](const RejectedMatch& match) { return match.given; });
     context_.SetMetric("constraints_rejected", static_cast<double>(given));
+    context_.SetMetric("priors_rejected", static_cast<double>(result.rejected_priors));
     context_.SetMetric("matches_rejected",
                        static_cast<double>(rejected.size()) - static_cast<double>(given));
     // Constraints that a person can switch off come first.

@@ -146,10 +146,14 @@ class Alignment {
       const auto known = believed_.find(DecisionOn(graph, k));
       if (known != believed_.end()) term.believed = known->second;
     }
+    for (std::size_t k = 0; k < believed_priors_.size(); ++k) {
+      graph.priors[k].believed = believed_priors_[k];
+    }
     STRATA_ASSIGN_OR_RETURN(PoseGraphSolution solution,
                             OptimizePoseGraph(graph, options_.pose_graph, stop_));
-    if (believed_.empty() || !IsSettled(solution.T_map_scan)) return solution;
+    if (result_.rounds.empty() || !IsSettled(solution.T_map_scan)) return solution;
     for (RelativePoseTerm& term : graph.relative) term.believed.reset();
+    for (PriorTerm& term : graph.priors) term.believed.reset();
     return OptimizePoseGraph(graph, options_.pose_graph, stop_);
   }
 
@@ -435,6 +439,9 @@ class Alignment {
     for (std::size_t k = 0; k < graph.relative.size(); ++k) {
       if (graph.relative[k].may_be_false) believed_[DecisionOn(graph, k)] = !rejected[k];
     }
+    result_.rejected_priors = solution.summary.rejected_priors.size();
+    believed_priors_.assign(graph.priors.size(), true);
+    for (const auto& [k, chi2] : solution.summary.rejected_priors) believed_priors_[k] = false;
     for (std::size_t k = given; k < graph.relative.size(); ++k) {
       if (!rejected[k]) result_.measured.push_back(graph.relative[k]);
     }
@@ -468,7 +475,8 @@ class Alignment {
   std::vector<SharedDirection> directions_;
   SharedPlaneOptions gates_;           // that they were found by
   std::map<Decision, bool> believed_;  // in the round before
-  std::size_t measured_end_ = 0;       // of the graph's relative terms: what is given or a match
+  std::vector<bool> believed_priors_;
+  std::size_t measured_end_ = 0;  // of the graph's relative terms: what is given or a match
   AlignmentResult result_;
 };
 

@@ -139,6 +139,7 @@ struct AlignmentResult {
   // AlignmentProblem::relative first; `measured`: matches that did not.
   std::vector<RelativePoseTerm> measured;
   std::vector<RejectedMatch> rejected;
+  std::size_t rejected_priors = 0;
   std::vector<SharedPlane> planes;  // of the last round, at the final poses
   std::vector<NodeResidual> worst_nodes;
   // Beside T_map_scan: nodes that matches and given terms join have the same number. What only

@@ -1,5 +1,7 @@
 #include "core/posegraph/costs/prior_cost.h"
 
+#include <cmath>
+
 #include <Eigen/Core>
 
 #include "core/posegraph/costs/information_root.h"
@@ -8,16 +10,17 @@
 
 namespace strata {
 
-PriorCost::PriorCost(const Pose& T_map_scan, const Matrix6d& information)
-    : T_map_scan_(T_map_scan), root_(InformationRoot(information)) {}
+PriorCost::PriorCost(const Pose& T_map_scan, const Matrix6d& information, const double* weight)
+    : T_map_scan_(T_map_scan), root_(InformationRoot(information)), weight_(weight) {}
 
 bool PriorCost::Evaluate(double const* const* blocks, double* residuals, double** jacobians) const {
   const Pose T = PoseOf(blocks[0]);
+  const Matrix6d root = std::sqrt(*weight_) * root_;
   Eigen::Map<Vector6d> weighted(residuals);
-  weighted = root_ * RelativePoseError(Pose::Identity(), T, T_map_scan_);
+  weighted = root * RelativePoseError(Pose::Identity(), T, T_map_scan_);
   if (jacobians != nullptr && jacobians[0] != nullptr) {
     const RelativePoseDerivatives d = DifferentiateRelativePose(Pose::Identity(), T, T_map_scan_);
-    WritePoseJacobian(root_ * d.by_j, jacobians[0]);
+    WritePoseJacobian(root * d.by_j, jacobians[0]);
   }
   return weighted.allFinite();
 }

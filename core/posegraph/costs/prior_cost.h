@@ -8,15 +8,17 @@
 
 namespace strata {
 
-// eᵀΩe of a pose block, e being RelativePoseError() of the map's frame and the pose.
+// weight · eᵀΩe of a pose block, e being RelativePoseError() of the map's frame and the pose.
 class PriorCost final : public ceres::SizedCostFunction<6, 7> {
  public:
-  PriorCost(const Pose& T_map_scan, const Matrix6d& information);
+  // `weight` is read whenever this is evaluated.
+  PriorCost(const Pose& T_map_scan, const Matrix6d& information, const double* weight);
   bool Evaluate(double const* const* blocks, double* residuals, double** jacobians) const override;
 
  private:
   const Pose T_map_scan_;
   const Matrix6d root_;
+  const double* const weight_;
 };
 
 }  // namespace strata

@@ -48,6 +48,7 @@ GraphProblem::GraphProblem(const PoseGraphProblem& graph,
     : graph_(graph),
       held_(held),
       relative_weights_(graph.relative.size(), 1.0),
+      prior_weights_(graph.priors.size(), 1.0),
       problem_(KeepingManifolds()) {
   AddNodes();
   AddRelative(local_factor);
@@ -109,8 +110,10 @@ void GraphProblem::AddDirections(double factor) {
 }
 
 void GraphProblem::AddPriors(double factor) {
-  for (const PriorTerm& term : graph_.priors) {
-    auto cost = std::make_unique<PriorCost>(term.T_map_scan, factor * term.information);
+  for (std::size_t k = 0; k < graph_.priors.size(); ++k) {
+    const PriorTerm& term = graph_.priors[k];
+    auto cost =
+        std::make_unique<PriorCost>(term.T_map_scan, factor * term.information, &prior_weights_[k]);
     problem_.AddResidualBlock(cost.release(), nullptr, poses_[term.i].data());
   }
 }

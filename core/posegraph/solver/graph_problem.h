@@ -37,8 +37,9 @@ class GraphProblem {
   // Moves all blocks back to where they were built.
   void Restart();
 
-  // What the terms count, 1 at first; by PoseGraphProblem::relative.
+  // What the terms count, 1 at first; by PoseGraphProblem::relative and ::priors.
   std::vector<double>& relative_weights() { return relative_weights_; }
+  std::vector<double>& prior_weights() { return prior_weights_; }
 
   // Where the blocks are, without weights and factors.
   double RelativeChi2(std::size_t term) const;
@@ -65,7 +66,7 @@ class GraphProblem {
   std::vector<Eigen::Vector3d> centres_;  // of the planes
   std::vector<std::vector<PlaneView>> views_;
   std::vector<DirectionBlock> directions_;
-  std::vector<double> relative_weights_;
+  std::vector<double> relative_weights_, prior_weights_;
   PoseManifold pose_manifold_;
   PlaneManifold plane_manifold_;
   ceres::SphereManifold<3> direction_manifold_;

@@ -23,26 +23,37 @@ namespace {
 
 constexpr std::size_t kWorstNodes = 10;
 
-class RelativeCandidates : public OutlierCandidates {
+// Relative poses, then priors.
+class Candidates : public OutlierCandidates {
  public:
-  RelativeCandidates(const PoseGraphProblem& problem, GraphProblem& graph)
+  Candidates(const PoseGraphProblem& problem, GraphProblem& graph)
       : problem_(problem), graph_(graph) {
     for (std::size_t k = 0; k < problem.relative.size(); ++k) {
-      if (problem.relative[k].may_be_false) terms_.push_back(k);
+      if (problem.relative[k].may_be_false) relative_.push_back(k);
+    }
+    for (std::size_t k = 0; k < problem.priors.size(); ++k) {
+      if (problem.priors[k].may_be_false) priors_.push_back(k);
     }
   }
-  std::size_t size() const override { return terms_.size(); }
-  double Chi2(std::size_t k) const override { return graph_.RelativeChi2(terms_[k]); }
-  double& Weight(std::size_t k) override { return graph_.relative_weights()[terms_[k]]; }
+  std::size_t size() const override { return relative_.size() + priors_.size(); }
+  double Chi2(std::size_t k) const override {
+    return k < relative_.size() ? graph_.RelativeChi2(relative_[k])
+                                : graph_.PriorChi2(priors_[k - relative_.size()]);
+  }
+  double& Weight(std::size_t k) override {
+    return k < relative_.size() ? graph_.relative_weights()[relative_[k]]
+                                : graph_.prior_weights()[priors_[k - relative_.size()]];
+  }
   std::optional<bool> Believed(std::size_t k) const override {
-    return problem_.relative[terms_[k]].believed;
+    return k < relative_.size() ? problem_.relative[relative_[k]].believed
+                                : problem_.priors[priors_[k - relative_.size()]].believed;
   }
   void Restart() override { graph_.Restart(); }
 
  private:
   const PoseGraphProblem& problem_;
   GraphProblem& graph_;
-  std::vector<std::size_t> terms_;
+  std::vector<std::size_t> relative_, priors_;
 };
 
 PoseGraphCosts CostsOf(const PoseGraphProblem& problem, const GraphProblem& graph) {
@@ -83,7 +94,7 @@ std::vector<NodeResidual> WorstNodes(const PoseGraphProblem& problem, GraphProbl
     }
   }
   for (std::size_t k = 0; k < problem.priors.size(); ++k) {
-    nodes[problem.priors[k].i].chi2 += graph.PriorChi2(k);
+    nodes[problem.priors[k].i].chi2 += graph.prior_weights()[k] * graph.PriorChi2(k);
   }
   std::stable_sort(nodes.begin(), nodes.end(), [](const NodeResidual& a, const NodeResidual& b) {
     return a.chi2 > b.chi2;
@@ -117,7 +128,7 @@ absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& prob
       std::find(held.begin(), held.end(), false) == held.end()) {
     summary.termination = PoseGraphTermination::kNothingToDo;
   } else {
-    RelativeCandidates candidates(problem, graph);
+    Candidates candidates(problem, graph);
     STRATA_ASSIGN_OR_RETURN(const Minimum minimum,
                             MinimiseRobustly(candidates,
                                              options.max_closure_chi2,
@@ -132,6 +143,10 @@ absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& prob
   for (std::size_t k = 0; k < problem.relative.size(); ++k) {
     if (graph.relative_weights()[k] > 0.0) continue;
     summary.rejected_relative.push_back({.term = k, .chi2 = graph.RelativeChi2(k)});
+  }
+  for (std::size_t k = 0; k < problem.priors.size(); ++k) {
+    if (graph.prior_weights()[k] > 0.0) continue;
+    summary.rejected_priors.push_back({.term = k, .chi2 = graph.PriorChi2(k)});
   }
   summary.worst_nodes = WorstNodes(problem, graph);
   solution.T_map_scan = graph.poses();

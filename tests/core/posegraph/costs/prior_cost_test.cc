@@ -20,7 +20,8 @@ TEST(PriorCostTest, IsOfTheErrorFromTheMap) {
     const Matrix6d information = random.Information();
     const Pose T = random.AnyPose();
     const Pose measured = Retract(T, random.Step(0.5, 1.0));
-    const PriorCost cost(measured, information);
+    const double weight = 1.0;
+    const PriorCost cost(measured, information, &weight);
     const PoseBlock block = PoseBlockOf(T);
     const testing::Blocks blocks = {{block.begin(), block.end()}};
     testing::ExpectTrueJacobians(cost, blocks, {&manifold}, 1e-7);

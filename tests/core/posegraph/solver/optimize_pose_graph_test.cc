@@ -184,6 +184,35 @@ TEST_P(PoseGraphTest, PositionsPlaceTheMap) {
   ExpectTruth(solution, 1e-5);
 }
 
+// A chain that drifted away as a whole, with GPS of which walls reflected a part.
+TEST_P(PoseGraphTest, PriorsThatAreFalseAreRejectedAndTheOthersPlaceTheMap) {
+  MakePoses(30, 0.0, 0.0);
+  for (std::size_t n = 1; n < 30; ++n) AddRelative(n - 1, n);
+  const Pose moved = Retract(Pose::Identity(), random_.Step(0.2, 5.0));
+  for (Pose& T : problem_.T_map_scan) T = moved * T;
+  Matrix6d information = Matrix6d::Identity() * 4.0;  // 0.5 m
+  information.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() * 100.0;
+  std::vector<std::size_t> false_ones;
+  for (std::size_t n = 0; n < 30; n += 2) {
+    Pose seen = Retract(truth_[n], random_.Step(0.02, 0.1));
+    if (n % 10 == 4) {
+      false_ones.push_back(problem_.priors.size());
+      seen.pretranslate(Eigen::Vector3d(12.0, -9.0, 0.0));
+    }
+    problem_.priors.push_back(
+        {.i = n, .T_map_scan = seen, .information = information, .may_be_false = true});
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto solution, OptimizePoseGraph(problem_));
+  std::vector<std::size_t> rejected;
+  for (const RejectedTerm& term : solution.summary.rejected_priors) rejected.push_back(term.term);
+  EXPECT_EQ(rejected, false_ones);
+  ExpectTruth(solution, 0.3);
+  // Believed, they pull everything with them.
+  for (PriorTerm& prior : problem_.priors) prior.may_be_false = false;
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto trusting, OptimizePoseGraph(problem_));
+  EXPECT_GT((trusting.T_map_scan[0].translation() - truth_[0].translation()).norm(), 1.0);
+}
+
 TEST_P(PoseGraphTest, EveryComponentIsHeldOnceAndFixedPosesStay) {
   MakePoses(9, 0.1, 0.5);
   AddRelative(0, 1);
