@@ -2,5 +2,5 @@
 strata_executable(
   car car
   SOURCES car.cc
-  DEPS strata::egomotion strata::formats strata::simulator strata::test_support
+  DEPS strata::egomotion strata::formats strata::simulated_drive strata::simulator strata::test_support
 )

@@ -57,6 +57,7 @@ RESULTS = {
                 "/usr/bin/python3 tests/experiments/underpass.py --build {build}", ("core/mls", "core/planning")),
     "husky": ("A recorded robot with IMU, wheels and GPS", "experiments/car husky", ("core/egomotion",)),
     "dresden": ("A recorded car with IMU and GPS", "experiments/car dresden", ("core/egomotion",)),
+    "simulated_car": ("A simulated car among walls, with IMU, wheels and GPS", "experiments/car simulated", ("core/egomotion",)),
     "mls": ("Points to maps beside OctoMap", "bench/mls_benchmark 5 3", ("core/mls",)),
     "registration": ("Registration beside PCL", "bench/registration_benchmark --pairs 60", ("core/registration", "core/mls")),
     "planes": ("Planes beside PCL, CGAL and what the thesis sets before its own", "bench/planes_benchmark", ("core/planes",)),

@@ -26,12 +26,15 @@ double ParameterAt(const DriveOptions& options, double time_s) {
   return driven * driven / (driven + 2.0);
 }
 
-Eigen::Vector3d PlaceAt(double s) {
+Eigen::Vector3d PlaceAt(const DriveOptions& options, double s) {
   constexpr double kW = 0.05;
+  if (options.way) return options.way(s);
   return {60.0 * std::sin(kW * s), 40.0 * std::sin(2.0 * kW * s), 2.0 * std::sin(3.0 * kW * s)};
 }
 
-Eigen::Vector3d AheadAt(double s) { return (PlaceAt(s + 0.01) - PlaceAt(s - 0.01)).normalized(); }
+Eigen::Vector3d AheadAt(const DriveOptions& options, double s) {
+  return (PlaceAt(options, s + 0.01) - PlaceAt(options, s - 0.01)).normalized();
+}
 
 // Of the IMU.
 Eigen::Vector3d ImuPlace(const DriveOptions& options, double time_s) {
@@ -106,11 +109,11 @@ GpsFix SampleGps(const DriveOptions& options,
 
 Pose TrueBodyPose(const DriveOptions& options, double time_s) {
   const double s = ParameterAt(options, time_s);
-  const Eigen::Vector3d ahead = AheadAt(s);
+  const Eigen::Vector3d ahead = AheadAt(options, s);
   const Eigen::Vector3d left = Eigen::Vector3d::UnitZ().cross(ahead).normalized();
   Pose T = Pose::Identity();
   T.linear() << ahead, left, ahead.cross(left);
-  T.translation() = PlaceAt(s);
+  T.translation() = PlaceAt(options, s);
   return T;
 }
 

@@ -1,9 +1,11 @@
-// A robot that drives a figure of eight over gentle hills, and what its sensors say of it.
+// A robot that drives a figure of eight over gentle hills, or another way, and what its sensors say
+// of it.
 #ifndef STRATA_TESTS_SUPPORT_SIMULATED_DRIVE_H_
 #define STRATA_TESTS_SUPPORT_SIMULATED_DRIVE_H_
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 
 #include <Eigen/Geometry>
 
@@ -15,6 +17,9 @@
 namespace strata::testing {
 
 struct DriveOptions {
+  // Where the robot is after so many seconds at full speed; empty: on the figure of eight. Smooth,
+  // and without a place that it stands at.
+  std::function<Eigen::Vector3d(double driven_s)> way;
   double begin_s = 1000.0;
   double seconds = 120.0;
   double rest_s = 3.0;  // stands before it drives
