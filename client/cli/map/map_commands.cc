@@ -1,9 +1,8 @@
 // strata map create|list|show|delete|verify|rebuild|history|revert; backup, classes, diff, export,
-// floors, merge, render and watch have files of their own.
+// floors, georeference, merge, render and watch have files of their own.
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -19,6 +18,7 @@
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/confirm.h"
 #include "client/cli/terminal/json.h"
+#include "client/cli/terminal/on_earth.h"
 #include "client/cli/terminal/world_json.h"
 #include "core/common/status.h"
 #include "core/world/job_kinds.h"
@@ -169,19 +169,11 @@ void AddCreate(Commands& commands, CLI::App* noun, const std::shared_ptr<MapOpti
           "nothing fades")
       ->check(CLI::Range(0U, kMaxFadeAfter))
       ->capture_default_str();
-  AddNumbers(
+  AddOrigin(
       create,
-      "--origin",
-      "LAT,LON,ALT",
-      3,
-      3,
-      [options](const std::vector<double>& n) {
-        constexpr double kRadPerDegree = std::numbers::pi / 180.0;
-        options->parameters.origin = {.latitude_rad = n[0] * kRadPerDegree,
-                                      .longitude_rad = n[1] * kRadPerDegree,
-                                      .altitude_m = n[2]};
-      },
-      "Where the map's origin is on earth (WGS 84), as in 52.5,13.4,34 [degrees, degrees, m]");
+      options->parameters.origin,
+      "Where the map's origin is on earth (WGS 84), as in 52.5,13.4,34 [degrees, degrees, m]; "
+      "map georeference says it later");
   AddProfileOptions(create, options->profile);
 }
 
@@ -229,6 +221,7 @@ void AddMapCommands(Commands& commands) {
   AddMapExport(commands, noun);
   AddMapFloorplan(commands, noun);
   AddMapFloors(commands, noun);
+  AddMapGeoreference(commands, noun);
   AddMapMerge(commands, noun);
   AddMapMesh(commands, noun);
   AddMapRender(commands, noun);

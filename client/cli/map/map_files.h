@@ -12,6 +12,7 @@ void AddMapDiff(Commands& commands, CLI::App* noun);
 void AddMapExport(Commands& commands, CLI::App* noun);
 void AddMapFloorplan(Commands& commands, CLI::App* noun);
 void AddMapFloors(Commands& commands, CLI::App* noun);
+void AddMapGeoreference(Commands& commands, CLI::App* noun);
 void AddMapMerge(Commands& commands, CLI::App* noun);
 void AddMapRender(Commands& commands, CLI::App* noun);
 void AddMapWatch(Commands& commands, CLI::App* noun);

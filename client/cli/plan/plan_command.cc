@@ -18,6 +18,7 @@
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
 #include "client/cli/terminal/number_file.h"
+#include "client/cli/terminal/on_earth.h"
 #include "client/formats/path_file.h"
 #include "core/common/status.h"
 
@@ -37,7 +38,29 @@ struct PlanOptions {
 // Waypoints that people are shown; JSON and files have all.
 constexpr std::size_t kMostShown = 10;
 
-void PrintText(const PlanResult& plan, Output& output) {
+Json WithPlaces(const PlanResult& plan, const std::optional<LocalFrame>& earth) {
+  Json json = ToJson(plan);
+  if (!earth.has_value()) return json;
+  json["waypoints_on_earth"] = Json::array();
+  for (const Eigen::Vector3d& p : plan.waypoints) {
+    json["waypoints_on_earth"].push_back(PlaceOnEarth(*earth, p));
+  }
+  return json;
+}
+
+std::string LineOf(const Eigen::Vector3d& p, const std::optional<LocalFrame>& earth) {
+  std::string line = absl::StrFormat("  %.3f  %.3f  %.3f", p.x(), p.y(), p.z());
+  if (!earth.has_value()) return line;
+  const Json place = PlaceOnEarth(*earth, p);
+  absl::StrAppendFormat(&line,
+                        "  %.9f  %.9f  %.3f",
+                        place[0].get<double>(),
+                        place[1].get<double>(),
+                        place[2].get<double>());
+  return line;
+}
+
+void PrintText(const PlanResult& plan, const std::optional<LocalFrame>& earth, Output& output) {
   if (!plan.found()) {
     output.Text(absl::StrCat("no path: ",
                              plan.message.empty() ? absl::string_view(strata::ToString(plan.reason))
@@ -52,8 +75,7 @@ void PrintText(const PlanResult& plan, Output& output) {
                               plan.expanded));
   const std::size_t shown = std::min(kMostShown, plan.waypoints.size());
   for (std::size_t i = 0; i < shown; ++i) {
-    const Eigen::Vector3d& p = plan.waypoints[i];
-    output.Text(absl::StrFormat("  %.3f  %.3f  %.3f", p.x(), p.y(), p.z()));
+    output.Text(LineOf(plan.waypoints[i], earth));
   }
   if (shown < plan.waypoints.size()) {
     output.Text(absl::StrFormat("  … %d more; --out FILE.ply", plan.waypoints.size() - shown));
@@ -80,10 +102,11 @@ absl::Status PlanOne(Context& context, PlanOptions options) {
     STRATA_RETURN_IF_ERROR(WritePath(options.out, plan.waypoints));
     context.output.Talk(absl::StrCat("wrote ", options.out));
   }
+  STRATA_ASSIGN_OR_RETURN(const std::optional<LocalFrame> earth, EarthOf(context, options.map));
   if (context.output.json()) {
-    context.output.Object(ToJson(plan));
+    context.output.Object(WithPlaces(plan, earth));
   } else {
-    PrintText(plan, context.output);
+    PrintText(plan, earth, context.output);
   }
   if (!options.watch || !plan.found()) return absl::OkStatus();
   return FollowPath(
@@ -105,6 +128,7 @@ absl::Status PlanMany(Context& context, PlanOptions options) {
   STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options.map, options.driver));
   STRATA_ASSIGN_OR_RETURN(options.query.class_costs,
                           ClassCostsOf(context, options.map, options.driver));
+  STRATA_ASSIGN_OR_RETURN(const std::optional<LocalFrame> earth, EarthOf(context, options.map));
   absl::Status first_error;
   for (const std::vector<double>& row : rows) {
     options.query.from = {.x_m = row[0], .y_m = row[1], .z_m = row[2], .level = {}};
@@ -119,7 +143,7 @@ absl::Status PlanMany(Context& context, PlanOptions options) {
       }
       continue;
     }
-    context.output.JsonLine(ToJson(*plan));
+    context.output.JsonLine(WithPlaces(*plan, earth));
   }
   return first_error;
 }

@@ -1,6 +1,7 @@
 // strata surface
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
 #include "client/cli/terminal/number_file.h"
+#include "client/cli/terminal/on_earth.h"
 #include "core/common/status.h"
 #include "core/world/map_class.h"
 
@@ -36,11 +38,17 @@ void NameClasses(const std::vector<MapClass>& classes, Json& column) {
 // JSON: a line for each place. Text: one table of all surfaces; places without any have no row.
 void Print(const std::vector<SurfaceColumn>& columns,
            const std::vector<MapClass>& classes,
+           const std::optional<LocalFrame>& earth,
            Output& output) {
   Json rows = Json::array();
   for (const SurfaceColumn& column : columns) {
     Json json = ToJson(column);
     NameClasses(classes, json);
+    if (earth.has_value()) {
+      for (Json& surface : json["surfaces"]) {
+        AddPlaceOnEarth(*earth, {column.x_m, column.y_m, surface["z"].get<double>()}, surface);
+      }
+    }
     if (output.json()) {
       output.JsonLine(json);
       continue;
@@ -54,17 +62,21 @@ void Print(const std::vector<SurfaceColumn>& columns,
   if (output.json()) {
     return;
   }
-  output.List(rows,
-              {{"x", "X"},
-               {"y", "Y"},
-               {"level", "LEVEL"},
-               {"z", "Z"},
-               {"sigma_m", "SIGMA"},
-               {"depth_m", "DEPTH"},
-               {"traversability", "TRAVERSABILITY"},
-               {"class_name", "CLASS"},
-               {"confidence", "CONFIDENCE"},
-               {"cost", "COST"}});
+  std::vector<Column> shown = {{"x", "X"},
+                               {"y", "Y"},
+                               {"level", "LEVEL"},
+                               {"z", "Z"},
+                               {"sigma_m", "SIGMA"},
+                               {"depth_m", "DEPTH"},
+                               {"traversability", "TRAVERSABILITY"},
+                               {"class_name", "CLASS"},
+                               {"confidence", "CONFIDENCE"},
+                               {"cost", "COST"}};
+  if (earth.has_value()) {
+    shown.insert(shown.end(),
+                 {{"latitude", "LATITUDE"}, {"longitude", "LONGITUDE"}, {"altitude", "ALTITUDE"}});
+  }
+  output.List(rows, shown);
 }
 
 absl::Status Run(Context& context, const SurfaceOptions& options) {
@@ -80,7 +92,8 @@ absl::Status Run(Context& context, const SurfaceOptions& options) {
       context.database.planning().SampleSurfaces(context.call, options.map, places));
   STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes,
                           context.database.maps().ListClasses(context.call, options.map));
-  Print(columns, classes, context.output);
+  STRATA_ASSIGN_OR_RETURN(const std::optional<LocalFrame> earth, EarthOf(context, options.map));
+  Print(columns, classes, earth, context.output);
   return absl::OkStatus();
 }
 
@@ -88,12 +101,13 @@ absl::Status Run(Context& context, const SurfaceOptions& options) {
 
 void AddSurfaceCommand(Commands& commands) {
   auto options = std::make_shared<SurfaceOptions>();
-  CLI::App* verb =
-      commands.Verb(&commands.root,
-                    "surface",
-                    "All surfaces at a place, lowest first: height, sigma, class, cost",
-                    "strata surface campus --at -14.2,3.5",
-                    [options](Context& context) { return Run(context, *options); });
+  CLI::App* verb = commands.Verb(
+      &commands.root,
+      "surface",
+      "All surfaces at a place, lowest first: height, sigma, class, cost; where the map has an "
+      "origin, with latitude, longitude and altitude",
+      "strata surface campus --at -14.2,3.5",
+      [options](Context& context) { return Run(context, *options); });
   AddMapName(verb, options->map);
   CLI::Option_group* where = verb->add_option_group("where");
   AddNumbers(

@@ -1,16 +1,22 @@
 // strata pose list|export|set|lookup
 #include <algorithm>
+#include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_replace.h"
 
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
+#include "client/cli/terminal/on_earth.h"
 #include "client/cli/terminal/world_json.h"
 #include "client/formats/file_bytes.h"
 #include "client/formats/pose_writer.h"
@@ -55,20 +61,57 @@ absl::Status List(Context& context, const PoseOptions& options) {
   return absl::OkStatus();
 }
 
+const Pose& PoseOf(const PoseNode& node, const PoseOptions& options) {
+  return options.which == "current" ? node.T_map_scan : node.T_map_scan_uploaded;
+}
+
+absl::Status Told(Context& context, const PoseOptions& options, std::size_t poses) {
+  context.output.Object({{"file", options.out}, {"which", options.which}, {"poses", poses}});
+  return absl::OkStatus();
+}
+
+// Where the map has an origin with the sensor's place on earth.
+absl::Status WriteCsv(Context& context,
+                      const PoseOptions& options,
+                      const std::vector<PoseNode>& nodes) {
+  STRATA_ASSIGN_OR_RETURN(const std::optional<LocalFrame> earth, EarthOf(context, options.map));
+  std::string text = "id,time,x,y,z,qx,qy,qz,qw";
+  if (earth.has_value()) text += ",latitude,longitude,altitude";
+  text += '\n';
+  for (const PoseNode& node : nodes) {
+    const TimedPose pose = {node.time, PoseOf(node, options)};
+    std::string line = TumText({&pose, 1});
+    absl::StripTrailingAsciiWhitespace(&line);
+    absl::StrAppend(&text, node.id.ToString(), ",", absl::StrReplaceAll(line, {{" ", ","}}));
+    if (earth.has_value()) {
+      const Json place = PlaceOnEarth(*earth, pose.T_map_scan.translation());
+      absl::StrAppendFormat(&text,
+                            ",%.9f,%.9f,%.4f",
+                            place[0].get<double>(),
+                            place[1].get<double>(),
+                            place[2].get<double>());
+    }
+    text += '\n';
+  }
+  return WriteFileBytes(options.out, text);
+}
+
 absl::Status Export(Context& context, const PoseOptions& options) {
   STRATA_ASSIGN_OR_RETURN(std::vector<PoseNode> nodes, Nodes(context, options));
   std::sort(nodes.begin(), nodes.end(), [](const PoseNode& a, const PoseNode& b) {
     return std::tie(a.time, a.id) < std::tie(b.time, b.id);
   });
+  if (options.format == "csv") {
+    STRATA_RETURN_IF_ERROR(WriteCsv(context, options, nodes));
+    return Told(context, options, nodes.size());
+  }
   std::vector<TimedPose> poses;
   poses.reserve(nodes.size());
   for (const PoseNode& node : nodes) {
-    poses.push_back(
-        {node.time, options.which == "current" ? node.T_map_scan : node.T_map_scan_uploaded});
+    poses.push_back({node.time, PoseOf(node, options)});
   }
   STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, TumText(poses)));
-  context.output.Object({{"file", options.out}, {"which", options.which}, {"poses", nodes.size()}});
-  return absl::OkStatus();
+  return Told(context, options, nodes.size());
 }
 
 absl::Status Set(Context& context, const PoseOptions& options) {
@@ -99,8 +142,10 @@ void AddExport(Commands& commands, CLI::App* noun, const std::shared_ptr<PoseOpt
   app->add_option(
          "--format",
          options->format,
-         "tum: a line 'time x y z qx qy qz qw' for each scan, T_map_scan, seconds and metres")
-      ->check(CLI::IsMember({"tum"}))
+         "tum: a line 'time x y z qx qy qz qw' for each scan, T_map_scan, seconds and metres; csv: "
+         "with names, the scans' ids and, where the map has an origin, latitude, longitude "
+         "[degrees] and altitude [m]")
+      ->check(CLI::IsMember({"tum", "csv"}))
       ->capture_default_str();
   app->add_option("--which", options->which, "uploaded, or those of the current epoch")
       ->check(CLI::IsMember({"uploaded", "current"}))

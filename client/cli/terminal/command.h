@@ -76,6 +76,7 @@ void AddProfileCommands(Commands& commands);
 void AddJobCommands(Commands& commands);
 void AddPlanesCommands(Commands& commands);
 void AddLocalizeCommand(Commands& commands);
+void AddDriveCommand(Commands& commands);
 void AddEgomotionCommand(Commands& commands);
 void AddClassifierCommands(Commands& commands);
 void AddSpoolCommands(Commands& commands);
