@@ -175,6 +175,7 @@ int Main(int argc, char** argv) {
   AddJobCommands(commands);
   AddPlanesCommands(commands);
   AddLocalizeCommand(commands);
+  AddDriveCommand(commands);
   AddEgomotionCommand(commands);
   AddClassifierCommands(commands);
   AddSpoolCommands(commands);

@@ -18,6 +18,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/time/time.h"
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
 #include "client/cli/classifier/label_classes.h"
@@ -111,9 +112,6 @@ absl::StatusOr<std::vector<ScanFile>> FindScans(const ImportOptions& options,
   }
   return scans;
 }
-
-// What the trajectory has, by sequence.
-using ScansThere = std::map<std::uint64_t, ScanHeader>;
 
 absl::StatusOr<ScansThere> FindScansThere(Context& context, const ImportOptions& options) {
   ScansThere there;
@@ -227,8 +225,11 @@ absl::StatusOr<PointCloud> ReadForMap(const ScanFile& scan,
 ImportSources SourcesOf(const std::vector<ScanFile>& scans,
                         const ScansThere& there,
                         const ImportOptions& options,
-                        const LabelsToMap& labels) {
+                        const LabelsToMap& labels,
+                        PriorChooser& priors,
+                        std::shared_ptr<ReadCounts> counts = std::make_shared<ReadCounts>()) {
   ImportSources sources;
+  sources.counts = std::move(counts);
   sources.files = scans.size();
   for (const ScanFile& scan : scans) {
     const ScanId id = {options.trajectory, scan.sequence};
@@ -249,6 +250,7 @@ ImportSources SourcesOf(const std::vector<ScanFile>& scans,
     source.read = [scan, labels, deskew = options.deskew == "on", counts = sources.counts] {
       return ReadForMap(scan, labels, deskew, *counts);
     };
+    source.pose_information = priors.InformationOf(scan);
     sources.missing.push_back(std::move(source));
   }
   return sources;
@@ -286,6 +288,9 @@ Eigen::Vector3d MiddleOfFirst(const std::vector<ScanFile>& scans,
   }
   return Eigen::Vector3d::Zero();
 }
+
+// Errors of GPS last for tens of seconds: a pose oftener than that says nothing new.
+constexpr absl::Duration kPriorEvery = absl::Seconds(10);
 
 // Without --far: checks all poses, with the points of the first scan that can be read, before
 // anything is sent, and the points of each scan when it is read. `world`: what the map has; it
@@ -336,6 +341,28 @@ absl::StatusOr<std::optional<double>> Level(std::vector<ScanFile>& scans,
 
 }  // namespace
 
+std::optional<Matrix6d> PriorChooser::InformationOf(const ScanFile& scan) {
+  if (!scan.pose_covariance.has_value() || !scan.time.has_value()) return std::nullopt;
+  if (last_.has_value() && absl::AbsDuration(*scan.time - *last_) < kPriorEvery) {
+    return std::nullopt;
+  }
+  const Eigen::LLT<Matrix6d> root(*scan.pose_covariance);
+  if (root.info() != Eigen::Success) return std::nullopt;  // a pose without errors is none
+  last_ = scan.time;
+  const Matrix6d information = root.solve(Matrix6d::Identity());
+  return 0.5 * (information + information.transpose());
+}
+
+absl::StatusOr<ImportBatches> ImportBatches::Begin(Context& context, const ImportOptions& options) {
+  ImportBatches batches(options);
+  STRATA_ASSIGN_OR_RETURN(batches.there_, FindScansThere(context, options));
+  return batches;
+}
+
+ImportSources ImportBatches::Next(const std::vector<ScanFile>& scans) {
+  return SourcesOf(scans, there_, options_, PlainLabels(options_), priors_, counts_);
+}
+
 void ReadCounts::NotDeskewed(const std::string& file, const absl::Status& why) {
   const std::lock_guard lock(mutex_);
   if (++not_deskewed_ == 1) why_not_ = absl::StrCat(file, ": ", why.message());
@@ -379,7 +406,8 @@ absl::StatusOr<ImportSources> FindImportSources(Context& context, const ImportOp
   STRATA_ASSIGN_OR_RETURN(const std::optional<double> level_rad,
                           Level(scans, options, context.output));
   WarnOfOtherScans(scans, there, options, context.output);
-  ImportSources sources = SourcesOf(scans, there, options, labels);
+  PriorChooser priors;
+  ImportSources sources = SourcesOf(scans, there, options, labels, priors);
   sources.level_rad = level_rad;
   if (options.far) return sources;
   STRATA_ASSIGN_OR_RETURN(const Box world, WorldOf(context, options.map, there));
@@ -393,7 +421,8 @@ absl::StatusOr<ImportSources> FindImportSources(FileContext& context,
                           FindScans(options, context.stop, context.output));
   STRATA_ASSIGN_OR_RETURN(const std::optional<double> level_rad,
                           Level(scans, options, context.output));
-  ImportSources sources = SourcesOf(scans, {}, options, PlainLabels(options));
+  PriorChooser priors;
+  ImportSources sources = SourcesOf(scans, {}, options, PlainLabels(options), priors);
   sources.level_rad = level_rad;
   if (!options.far) STRATA_RETURN_IF_ERROR(CheckPlaces(Box(), scans, sources.missing));
   return sources;

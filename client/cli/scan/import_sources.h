@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -14,9 +15,11 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/time/time.h"
 
 #include "client/cli/scan/scan_uploader.h"
 #include "client/cli/terminal/command.h"
+#include "client/formats/scan_list.h"
 #include "core/geometry/pose.h"
 #include "core/world/scan.h"
 
@@ -67,13 +70,23 @@ class ReadCounts {
   std::string why_not_;
 };
 
+// Tells which poses along a drive count by themselves.
+class PriorChooser {
+ public:
+  // Of a prior for the scan; nullopt if its pose says nothing new.
+  std::optional<Matrix6d> InformationOf(const ScanFile& scan);
+
+ private:
+  std::optional<absl::Time> last_;
+};
+
 struct ImportSources {
   std::size_t files = 0;
   std::vector<UploadSource> missing;  // in the map
   std::vector<ScanId> there;
   std::vector<std::pair<std::string, std::string>> errors;  // file, and why it cannot be uploaded
   std::optional<double> level_rad;                          // with --level
-  std::shared_ptr<ReadCounts> counts = std::make_shared<ReadCounts>();  // of `missing`
+  std::shared_ptr<ReadCounts> counts;                       // of `missing`
 };
 
 // The folder's name, or that of the folder around one that is only called "scans"; of a recording
@@ -88,6 +101,25 @@ std::string TrajectoryOf(const std::string& path);
 absl::StatusOr<ImportSources> FindImportSources(Context& context, const ImportOptions& options);
 // All that the paths have, whatever a map has; labels stay as the files have them.
 absl::StatusOr<ImportSources> FindImportSources(FileContext& context, const ImportOptions& options);
+
+// What a trajectory has, by sequence.
+using ScansThere = std::map<std::uint64_t, ScanHeader>;
+
+// Scans whose poses become known bit by bit.
+class ImportBatches {
+ public:
+  static absl::StatusOr<ImportBatches> Begin(Context& context, const ImportOptions& options);
+  // What of the scans the map lacks. REQUIRES: they come in the order of their times.
+  ImportSources Next(const std::vector<ScanFile>& scans);
+  const ReadCounts& counts() const { return *counts_; }
+
+ private:
+  explicit ImportBatches(const ImportOptions& options) : options_(options) {}
+  ImportOptions options_;
+  ScansThere there_;
+  PriorChooser priors_;
+  std::shared_ptr<ReadCounts> counts_ = std::make_shared<ReadCounts>();
+};
 
 }  // namespace strata::cli
 

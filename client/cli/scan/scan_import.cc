@@ -2,243 +2,25 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
-#include "absl/strings/string_view.h"
-#include "absl/strings/strip.h"
-#include "absl/time/clock.h"
 
-#include "client/cli/scan/alignment_health.h"
+#include "client/cli/scan/import_run.h"
 #include "client/cli/scan/import_sources.h"
 #include "client/cli/scan/scan_uploader.h"
 #include "client/cli/scan/spool_commands.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/json.h"
-#include "client/cli/terminal/patience.h"
-#include "client/cli/terminal/progress.h"
 #include "core/common/status.h"
-#include "core/common/steady_time.h"
 
 namespace strata::cli {
 namespace {
-
-constexpr int kWorkers = 4;
-
-// What became of the files of one call.
-struct Summary {
-  std::size_t files = 0;
-  std::vector<ScanId> present;  // in the map now: uploaded or there before
-  std::size_t uploaded = 0;
-  std::size_t skipped = 0;
-  std::uint64_t points = 0;
-  std::uint64_t at_sensor = 0;                   // returns of range 0, left out
-  std::uint64_t deskewed = 0, not_deskewed = 0;  // scans whose points have times
-  std::uint64_t local_map_bytes = 0;             // with --local-maps
-  double seconds = 0.0;
-  std::size_t integrated = 0, aligned = 0, integration_failed = 0;  // with --wait
-  AlignmentHealth health;                                           // likewise
-  std::optional<double> level_rad;                                  // with --level
-  bool interrupted = false;                                         // by the user
-  Json errors = Json::array();
-
-  // Messages about files begin with their name, about scans with "scan ID".
-  void AddError(const std::string& where, absl::string_view message) {
-    absl::ConsumePrefix(&message, "scan ");
-    absl::ConsumePrefix(&message, where + ": ");
-    errors.push_back({{"scan", where}, {"error", std::string(message)}});
-  }
-};
-
-void Upload(Context& context,
-            const ImportOptions& options,
-            const std::vector<UploadSource>& sources,
-            Summary& summary) {
-  Progress progress(context.output.talk(), TalksToTerminal(), "uploading");
-  const absl::Time start = SteadyNow();
-  const std::vector<UploadResult> results =
-      UploadScans(context.database,
-                  context.call,
-                  options.map,
-                  sources,
-                  kWorkers,
-                  [&](const UploadProgress& done) {
-                    progress.Update(done.scans, sources.size(), done.points);
-                  });
-  progress.Clear();
-  summary.seconds = absl::ToDoubleSeconds(SteadyNow() - start);
-  summary.interrupted = context.call.stop.requested();
-  for (std::size_t i = 0; i < sources.size(); ++i) {
-    if (summary.interrupted && absl::IsCancelled(results[i].status)) {
-      continue;  // not sent
-    }
-    if (!results[i].status.ok()) {
-      summary.AddError(sources[i].file, results[i].status.message());
-      continue;
-    }
-    ++summary.uploaded;
-    summary.points += results[i].points;
-    summary.local_map_bytes += results[i].local_map_bytes;
-    summary.present.push_back(sources[i].header.id);
-  }
-}
-
-// Where a scan that is not integrated for this long is said to be stuck.
-constexpr absl::Duration kStuck = absl::Minutes(1);
-
-// The scan once it is no longer pending. A server that is away may come back: it goes on by itself.
-absl::StatusOr<ScanInfo> AwaitScan(Context& context,
-                                   const std::string& map,
-                                   const ScanId& id,
-                                   const std::function<void()>& idle) {
-  Patience patience;
-  absl::Duration pause = absl::Milliseconds(10);
-  while (true) {
-    absl::StatusOr<ScanInfo> info = context.database.scans().Get(context.call, map, id);
-    if (info.ok() && info->state != ScanState::kPending) return info;
-    if (!patience.Has(info.status())) return info;
-    STRATA_RETURN_IF_ERROR(context.call.stop.status());
-    idle();
-    absl::SleepFor(pause);
-    pause = std::min(2 * pause, absl::Milliseconds(300));
-  }
-}
-
-// Waits until no scan of the call is pending. They are integrated in order, so one after the other
-// is asked for.
-absl::Status Wait(Context& context, const ImportOptions& options, Summary& summary) {
-  Progress progress(context.output.talk(), TalksToTerminal(), "integrating");
-  std::sort(summary.present.begin(), summary.present.end());
-  absl::Time moved = SteadyNow();
-  for (std::size_t i = 0; i < summary.present.size(); ++i) {
-    const auto idle = [&] {
-      progress.Update(i, summary.present.size(), 0);
-      if (SteadyNow() - moved < kStuck) return;
-      progress.Clear();
-      context.output.Talk(absl::StrCat("no scan integrated for ",
-                                       absl::FormatDuration(kStuck),
-                                       "; the log of stratad says why (is its disk full?)"));
-      moved = SteadyNow();
-    };
-    STRATA_ASSIGN_OR_RETURN(const ScanInfo info,
-                            AwaitScan(context, options.map, summary.present[i], idle));
-    moved = SteadyNow();
-    if (info.state == ScanState::kFailed) {
-      ++summary.integration_failed;
-      summary.AddError(summary.present[i].ToString(), info.message);
-      continue;
-    }
-    ++summary.integrated;
-    summary.aligned += info.alignment.aligned ? 1 : 0;
-    summary.health.Add(info);
-    if (!info.message.empty()) {
-      progress.Clear();
-      context.output.Talk(absl::StrCat(summary.present[i].ToString(), ": ", info.message));
-    }
-  }
-  return absl::OkStatus();
-}
-
-void TalkOf(const Json& errors, Output& output) {
-  for (const Json& error : errors) {
-    output.Talk(absl::StrCat(
-        "error: ", error["scan"].get<std::string>(), ": ", error["error"].get<std::string>()));
-  }
-}
-
-constexpr absl::string_view kDoubtful =
-    "the poses are probably those of other scans, or far off; see 'map render', and 'map delete' "
-    "to begin again with other --poses";
-
-void Print(const ImportOptions& options, const Summary& summary, Output& output) {
-  Json json = {
-      {"map", options.map},
-      {"trajectory", options.trajectory},
-      {"files", summary.files},
-      {"uploaded", summary.uploaded},
-      {"skipped", summary.skipped},
-      {"failed", summary.errors.size()},
-      {"points", summary.points},
-      {"range_0", summary.at_sensor},
-      {"deskewed", summary.deskewed},
-      {"not_deskewed", summary.not_deskewed},
-      {"seconds", summary.seconds},
-      {"points_per_second",
-       summary.seconds > 0.0 ? static_cast<double>(summary.points) / summary.seconds : 0.0}};
-  if (options.as_local_maps) json["local_map_bytes"] = summary.local_map_bytes;
-  if (options.wait) {
-    json["integrated"] = summary.integrated;
-    json["aligned"] = summary.aligned;
-    json["integration_failed"] = summary.integration_failed;
-    AddHealth(summary.health, output.json(), json);
-  }
-  if (summary.level_rad.has_value()) {
-    json["level_rad"] = *summary.level_rad;
-  }
-  if (summary.interrupted) {
-    json["interrupted"] = true;
-  }
-  json["errors"] = summary.errors;
-  TalkOf(summary.errors, output);
-  if (summary.health.Doubtful()) {
-    output.Talk(absl::StrCat("warning: ", summary.health.Summary(), ": ", kDoubtful));
-  }
-  if (!output.json()) {
-    json.erase("errors");
-    for (const char* count : {"range_0", "deskewed", "not_deskewed"}) {
-      if (json[count] == 0) json.erase(count);
-    }
-    if (summary.uploaded == 0 && summary.skipped > 0) {
-      json = {{"map", options.map},
-              {"trajectory", options.trajectory},
-              {"already there", summary.skipped},
-              {"failed", summary.errors.size()}};
-      return output.Object(json);
-    }
-    json["seconds"] = absl::StrFormat("%.2f", summary.seconds);
-    json["points_per_second"] = absl::StrFormat("%.0f", json["points_per_second"].get<double>());
-  }
-  output.Object(json);
-}
-
-// What of the files is clear before any of them is sent.
-Summary Begun(const ImportSources& sources) {
-  Summary summary;
-  summary.files = sources.files;
-  summary.skipped = sources.there.size();
-  summary.present = sources.there;
-  summary.level_rad = sources.level_rad;
-  for (const auto& [file, message] : sources.errors) summary.AddError(file, message);
-  return summary;
-}
-
-absl::Status ErrorsOf(const Json& errors, std::size_t files) {
-  if (errors.empty()) return absl::OkStatus();
-  return absl::UnknownError(absl::StrCat(errors.size(), " of ", files, " scans failed"));
-}
-
-void TalkOfMotion(const ReadCounts& counts, Output& output) {
-  if (counts.not_deskewed() == 0) return;
-  output.Talk(absl::StrCat("warning: ",
-                           counts.not_deskewed(),
-                           " scan(s) keep the distortion of their motion; the first: ",
-                           counts.why_not()));
-}
-
-void TakeCounts(const ReadCounts& counts, Summary& summary, Output& output) {
-  summary.at_sensor = counts.at_sensor;
-  summary.deskewed = counts.deskewed;
-  summary.not_deskewed = counts.not_deskewed();
-  TalkOfMotion(counts, output);
-}
 
 absl::Status Import(Context& context, ImportOptions options) {
   if (options.trajectory.empty()) options.trajectory = TrajectoryOf(options.paths.front());
@@ -248,7 +30,7 @@ absl::Status Import(Context& context, ImportOptions options) {
                             context.database.maps().Get(context.call, options.map));
     for (UploadSource& source : sources.missing) source.as_local_map = map.parameters;
   }
-  Summary summary = Begun(sources);
+  ImportSummary summary = Begun(sources);
   Upload(context, options, sources.missing, summary);
   TakeCounts(*sources.counts, summary, context.output);
   const absl::Status waited =
@@ -275,6 +57,11 @@ absl::Status ImportBySpool(FileContext& context, ImportOptions options) {
   json["deskewed"] = sources.counts->deskewed.load();
   json["not_deskewed"] = sources.counts->not_deskewed();
   TalkOfMotion(*sources.counts, context.output);
+  if (std::any_of(sources.missing.begin(), sources.missing.end(), [](const UploadSource& source) {
+        return source.pose_information.has_value();
+      })) {
+    context.output.Talk("by way of a spool poses of GPS become no priors of the pose graph");
+  }
   const Json errors = json["errors"];
   TalkOf(errors, context.output);
   if (!context.output.json()) json.erase("errors");
@@ -363,7 +150,9 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
           "File with the poses T_map_scan of the scans, or a folder of .pose files; without it "
           ".pose files beside .3d files, or the one poses*.txt|tum|csv in the folder; none: every "
           "scan is at the origin. A trajectory of strata egomotion gives each scan the pose of the "
-          "time that its name is (1432235498.028276.pcd)")
+          "time that its name is (1432235498.028276.pcd); on earth, poses and their covariance "
+          "every 10 "
+          "s become priors of the pose graph, which optimize may reject")
       ->type_name("FILE|none");
   AddPose(
       import,

@@ -104,6 +104,7 @@ class Uploader {
       status = SendPatiently(index, [&] { return Send(index, header, cloud); });
     }
     if (status.ok()) result.points = cloud.size();
+    result.pose_as_said = cloud.origin.isZero(0.0);
     return status;
   }
 

@@ -24,6 +24,8 @@ struct UploadSource {
   std::string file;
   ScanHeader header;
   std::function<absl::StatusOr<PointCloud>()> read;
+  // What is known of the pose by itself, as by GPS: a prior that may be false.
+  std::optional<Matrix6d> pose_information;
   // The parameters of the map, if its points are to stay here: the local map that is made of them
   // is sent in their place.
   std::optional<MapParameters> as_local_map;
@@ -36,6 +38,7 @@ struct UploadResult {
   absl::Status status;  // of reading and uploading
   std::uint64_t points = 0;
   std::uint64_t local_map_bytes = 0;  // of what was sent in their place
+  bool pose_as_said = true;           // not moved to where the points are
 };
 
 struct UploadProgress {

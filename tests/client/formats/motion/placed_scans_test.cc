@@ -54,6 +54,36 @@ TEST_F(PlacedScansTest, ByTheTimesThatTheirNamesAre) {
               StatusIs(absl::StatusCode::kOutOfRange, HasSubstr("outside the trajectory")));
 }
 
+// The covariance of the sensor's pose is that of draws of the body's.
+TEST_F(PlacedScansTest, OnEarthWithTheCovarianceOfTheSensor) {
+  const Pose T_body_scan =
+      MakePose(Eigen::Quaterniond(0.8, 0.0, 0.6, 0.0), Eigen::Vector3d(0.7, -0.3, 1.5));
+  TrajectoryPose pose;
+  pose.time_s = 1000.0;
+  pose.T_map_body =
+      MakePose(Eigen::Quaterniond(0.6, 0.0, 0.0, 0.8), Eigen::Vector3d(5.0, 6.0, 7.0));
+  const Vector6d sigma{{0.01, 0.02, 0.03, 0.5, 0.4, 0.8}};
+  pose.covariance = sigma.cwiseAbs2().asDiagonal();
+  ScanFile scan = Named("1000.000000.pcd");
+  scan.time = absl::FromUnixSeconds(1000);
+  std::vector<ScanFile> scans = {scan};
+  STRATA_ASSERT_OK_AND_ASSIGN(Trajectory trajectory, Trajectory::Make({pose}));
+  PlaceOn(trajectory, false, T_body_scan, scans);
+  EXPECT_FALSE(scans[0].pose_covariance.has_value());
+  PlaceOn(trajectory, true, T_body_scan, scans);
+  ASSERT_TRUE(scans[0].pose_covariance.has_value());
+  Matrix6d expected = Matrix6d::Zero();
+  for (int k = 0; k < 6; ++k) {
+    constexpr double kSmall = 1e-5;
+    const Pose off = Retract(pose.T_map_body, kSmall * sigma(k) * Vector6d::Unit(k)) * T_body_scan;
+    const Pose step = scans[0].T_map_scan.inverse() * off;
+    Vector6d by;
+    by << So3Log(step.linear()), step.translation();
+    expected += by * by.transpose() / (kSmall * kSmall);
+  }
+  EXPECT_LT((*scans[0].pose_covariance - expected).norm(), 1e-4 * expected.norm());
+}
+
 TEST_F(PlacedScansTest, OtherNamesSayWhatToDo) {
   std::vector<ScanFile> scans = {Named("scans/scan0001.pcd")};
   EXPECT_THAT(PlaceOnTrajectory(file_, Pose::Identity(), scans),
