@@ -27,6 +27,9 @@ TEST_F(PlanCommandTest, ALongPlanShowsTenWaypointsAndJsonAll) {
   ON_CALL(db_.planning(), PlanPath(_, _, _)).WillByDefault([&](auto&, auto, auto&) {
     return absl::StatusOr<PlanResult>(plan);
   });
+  ON_CALL(db_.maps(), Get(_, _)).WillByDefault([](auto&, auto name) {
+    return absl::StatusOr<MapInfo>(MapInfo{std::string(name), {}, {}});
+  });
   const std::vector<std::string> words = {"plan", "m", "--from", "0,0", "--to", "772,0"};
   const std::string text = RunText(words);
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1 + 10 + 1) << text;
