@@ -38,6 +38,9 @@ constexpr std::size_t kStartFixes = 10;
 constexpr double kFarthestOriginM = 1e5;
 constexpr double kTellEveryS = 1.0;
 constexpr int kRestarts = 5;
+// They go on until the heading is so sure, or for so long.
+constexpr double kSureHeadingRad = 0.1;
+constexpr double kLongestStartM = 200.0;
 constexpr double kSameHeadingRad = 0.02;
 constexpr double kLevelSigmaRad = 0.1;
 
@@ -123,6 +126,12 @@ bool HasStarted(const LogFilter& filter) {
   return filter.fixes().size() >= kStartFixes && filter.distance_m() >= kStartWayM;
 }
 
+// A fast car has gone 20 m in two seconds, of which a receiver's errors are one and the same.
+bool KnowsHeading(const LogFilter& filter) {
+  const double sigma_rad = std::sqrt(filter.filter().Covariance()(kRotation + 2, kRotation + 2));
+  return sigma_rad < kSureHeadingRad || filter.distance_m() >= kLongestStartM;
+}
+
 // All headings side by side until the most likely is known.
 absl::StatusOr<LogFilter> MostLikely(const MapLog& log,
                                      const Rig& rig,
@@ -165,6 +174,11 @@ absl::StatusOr<LogFilter> Begin(const MapLog& log,
   for (int i = 0; i < kRestarts && !options.heading_rad.has_value(); ++i) {
     LogFilter again(log, rig, StartOf(log, rig, beginning, heading_rad, kHeadingSigmaRad));
     while (!again.done() && !HasStarted(again)) {
+      STRATA_RETURN_IF_ERROR(stop.status());
+      again.Step();
+    }
+    again.Settle();
+    while (!again.done() && !KnowsHeading(again)) {
       STRATA_RETURN_IF_ERROR(stop.status());
       again.Step();
     }
