@@ -140,21 +140,31 @@ class Alignment {
   // What is false is decided in the first round and where poses have settled; between, as long as
   // the decisions fit.
   absl::StatusOr<PoseGraphSolution> Solve(PoseGraphProblem& graph) const {
-    for (std::size_t k = 0; k < graph.relative.size(); ++k) {
-      RelativePoseTerm& term = graph.relative[k];
-      if (!term.may_be_false) continue;
-      const auto known = believed_.find(DecisionOn(graph, k));
-      if (known != believed_.end()) term.believed = known->second;
-    }
-    for (std::size_t k = 0; k < believed_priors_.size(); ++k) {
-      graph.priors[k].believed = believed_priors_[k];
-    }
+    const bool known = RecallDecisions(graph);
     STRATA_ASSIGN_OR_RETURN(PoseGraphSolution solution,
                             OptimizePoseGraph(graph, options_.pose_graph, stop_));
-    if (result_.rounds.empty() || !IsSettled(solution.T_map_scan)) return solution;
+    if (!known || !IsSettled(solution.T_map_scan)) return solution;
     for (RelativePoseTerm& term : graph.relative) term.believed.reset();
     for (PriorTerm& term : graph.priors) term.believed.reset();
     return OptimizePoseGraph(graph, options_.pose_graph, stop_);
+  }
+
+  // Whether the round before decided on any term.
+  bool RecallDecisions(PoseGraphProblem& graph) const {
+    bool any = false;
+    for (std::size_t k = 0; k < graph.relative.size(); ++k) {
+      if (!graph.relative[k].may_be_false) continue;
+      const auto known = believed_.find(DecisionOn(graph, k));
+      if (known == believed_.end()) continue;
+      graph.relative[k].believed = known->second;
+      any = true;
+    }
+    for (std::size_t k = 0; k < believed_priors_.size(); ++k) {
+      if (!graph.priors[k].may_be_false) continue;
+      graph.priors[k].believed = believed_priors_[k];
+      any = true;
+    }
+    return any;
   }
 
   // Of a term that may be false: the given ones by their place, matches by their scans.
