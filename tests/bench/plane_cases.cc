@@ -17,9 +17,9 @@
 #include "core/planes/models/plane_raster.h"
 #include "core/planes/moments.h"
 #include "core/world/plane_model.h"
-#include "tests/support/scene.h"
-#include "tests/support/simulator.h"
-#include "tests/support/worlds.h"
+#include "tests/support/simulator/scene.h"
+#include "tests/support/simulator/simulator.h"
+#include "tests/support/simulator/worlds.h"
 
 namespace strata::bench {
 namespace {

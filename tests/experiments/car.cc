@@ -22,10 +22,10 @@
 #include "core/egomotion/rig.h"
 #include "core/egomotion/smoothing/smoother.h"
 #include "core/egomotion/trajectory.h"
-#include "tests/experiments/mesh_cases.h"
+#include "tests/experiments/meshes/mesh_cases.h"
 #include "tests/support/data_dir.h"
-#include "tests/support/simulated_drive.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulated_drive.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata::testing {
 namespace {

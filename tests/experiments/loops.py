@@ -4,7 +4,7 @@
     tests/experiments/loops.py --build build/release [--seeds 1,2,3] [--only campus_loop,car_park,bridge] [--align on]
 
 Drives the command line client on an embedded database, prints a table and exits 1 if a bound does not hold. The worlds
-and robots are those of tests/support/worlds.h, the noise per step and axis is 0.03 m and 0.005 rad.
+and robots are those of tests/support/simulator/worlds.h, the noise per step and axis is 0.03 m and 0.005 rad.
 
 Each loop is optimized a second time with planted false closures: as many that they are 20 % of the closures that the
 first run found and them together, and ten at least (alignment at ingest may have closed a loop already), imported as

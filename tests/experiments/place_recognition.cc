@@ -31,8 +31,8 @@
 #include "core/registration/place_match.h"
 #include "tests/support/data_dir.h"
 #include "tests/support/pcd.h"
-#include "tests/support/simulator.h"
-#include "tests/support/worlds.h"
+#include "tests/support/simulator/simulator.h"
+#include "tests/support/simulator/worlds.h"
 
 namespace strata {
 namespace {

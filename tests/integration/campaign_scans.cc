@@ -2,8 +2,8 @@
 
 #include "core/world/scan_hash.h"
 #include "tests/integration/marked_yard.h"
-#include "tests/support/simulator.h"
-#include "tests/support/worlds.h"
+#include "tests/support/simulator/simulator.h"
+#include "tests/support/simulator/worlds.h"
 
 namespace strata::testing {
 namespace {

@@ -17,7 +17,7 @@
 #include "core/common/status.h"
 #include "tests/integration/stratad_process.h"
 #include "tests/support/asked.h"
-#include "tests/support/park.h"
+#include "tests/support/simulator/park.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 

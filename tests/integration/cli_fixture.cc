@@ -1,7 +1,7 @@
 #include "tests/integration/cli_fixture.h"
 
+#include "tests/support/simulator/worlds.h"
 #include "tests/support/status_matchers.h"
-#include "tests/support/worlds.h"
 
 namespace strata::testing {
 

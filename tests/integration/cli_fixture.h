@@ -12,7 +12,7 @@
 
 #include "tests/client/cli/run_strata.h"
 #include "tests/integration/stratad_process.h"
-#include "tests/support/robot_files.h"
+#include "tests/support/simulator/robot_files.h"
 #include "tests/support/temp_dir.h"
 
 namespace strata::testing {

@@ -4,7 +4,7 @@
 #include "client/sdk/client.h"
 #include "core/engine/engine.h"
 #include "server/server.h"
-#include "tests/support/database_suite.h"
+#include "tests/support/database_suite/database_suite.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {

@@ -9,7 +9,7 @@
 #include "absl/time/time.h"
 
 #include "tests/integration/background_work.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata::testing {
 namespace {

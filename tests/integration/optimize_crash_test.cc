@@ -21,7 +21,7 @@
 #include "tests/integration/stratad_process.h"
 #include "tests/integration/yard_clients.h"
 #include "tests/support/asked.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 

@@ -14,7 +14,7 @@
 
 #include "tests/integration/campaign_scans.h"
 #include "tests/integration/clients.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata::testing {
 namespace {

@@ -2,14 +2,14 @@
 strata_library(
   test_support
   NO_INSTALL
-  SOURCES data_dir.cc drawing.cc park.cc temp_dir.cc
-  HEADERS asked.h data_dir.h drawing.h park.h status_matchers.h temp_dir.h
+  SOURCES data_dir.cc drawing.cc simulator/park.cc temp_dir.cc
+  HEADERS asked.h data_dir.h drawing.h simulator/park.h status_matchers.h temp_dir.h
   DEPS strata::common strata::mls absl::strings GTest::gmock
 )
 target_compile_definitions(strata_test_support PRIVATE STRATA_DEFAULT_DATA_DIR="${PROJECT_SOURCE_DIR}/../shared/data")
 
 # Allocations that fail on demand.
-strata_library(failing_memory NO_INSTALL SOURCES failing_memory.cc HEADERS failing_memory.h)
+strata_library(failing_memory NO_INSTALL SOURCES faults/failing_memory.cc HEADERS faults/failing_memory.h)
 
 # Recorded scans for experiments and benchmarks.
 strata_library(
@@ -44,15 +44,15 @@ strata_library(
 strata_library(
   sweep
   NO_INSTALL
-  SOURCES sweep.cc
-  HEADERS sweep.h
+  SOURCES simulator/sweep.cc
+  HEADERS simulator/sweep.h
   DEPS strata::simulator strata::world
   PRIVATE_DEPS absl::str_format
 )
 
 strata_test(
   simulator_test
-  SOURCES scene_test.cc simulator_test.cc sweep_test.cc views_test.cc worlds_test.cc
+  SOURCES simulator/scene_test.cc simulator/simulator_test.cc simulator/sweep_test.cc simulator/views_test.cc simulator/worlds_test.cc
   DEPS strata::simulator strata::sweep
 )
 
@@ -66,8 +66,8 @@ strata_batch(strata_mock_database strata_test_headers)
 strata_library(
   faulty_disk
   NO_INSTALL
-  SOURCES disk_shim.cc faulty_disk.cc power_cut_disk.cc
-  HEADERS disk_shim.h faulty_disk.h power_cut_disk.h
+  SOURCES faults/disk_shim.cc faults/faulty_disk.cc faults/power_cut_disk.cc
+  HEADERS faults/disk_shim.h faults/faulty_disk.h faults/power_cut_disk.h
   PRIVATE_DEPS PkgConfig::sqlite3 ${CMAKE_DL_LIBS}
 )
 
@@ -75,9 +75,9 @@ strata_library(
 # archive: a linker leaves out of an archive what nobody calls.
 add_library(
   strata_database_suite OBJECT
-  database_suite.cc database_suite_classes.cc database_suite_jobs.cc database_suite_maps.cc database_suite_models.cc database_suite_planning.cc
-  database_suite_posegraph.cc database_suite_scans.cc database_suite_tiles.cc database_suite_watch.cc
-  database_suite_worlds.cc
+  database_suite/database_suite.cc database_suite/classes.cc database_suite/jobs.cc database_suite/maps.cc database_suite/models.cc database_suite/planning.cc
+  database_suite/posegraph.cc database_suite/scans.cc database_suite/tiles.cc database_suite/watch.cc
+  database_suite/worlds.cc
 )
 add_library(strata::database_suite ALIAS strata_database_suite)
 target_include_directories(strata_database_suite PUBLIC ${PROJECT_SOURCE_DIR})
@@ -93,5 +93,5 @@ if(STRATA_SANITIZER_KIND STREQUAL tsan)
 endif()
 
 # For LD_PRELOAD.
-add_library(strata_jumping_clock MODULE jumping_clock.cc)
+add_library(strata_jumping_clock MODULE faults/jumping_clock.cc)
 target_link_libraries(strata_jumping_clock PRIVATE strata_build_options ${CMAKE_DL_LIBS})

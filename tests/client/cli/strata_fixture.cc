@@ -12,8 +12,8 @@
 
 #include "client/formats/geometry_writer.h"
 #include "tests/client/cli/run_strata.h"
-#include "tests/support/simulator.h"
-#include "tests/support/worlds.h"
+#include "tests/support/simulator/simulator.h"
+#include "tests/support/simulator/worlds.h"
 
 namespace strata::cli {
 

@@ -6,7 +6,7 @@
 #include <Eigen/Geometry>
 
 #include "core/egomotion/fused_state.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata::testing {
 

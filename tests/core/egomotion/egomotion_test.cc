@@ -15,7 +15,7 @@
 #include "core/common/stop.h"
 #include "core/egomotion/geodesy.h"
 #include "core/geometry/screw_motion.h"
-#include "tests/support/simulated_drive.h"
+#include "tests/support/simulator/simulated_drive.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {

@@ -5,7 +5,7 @@
 
 #include "core/geometry/screw_motion.h"
 #include "tests/core/egomotion/drawn_state.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata {
 namespace {

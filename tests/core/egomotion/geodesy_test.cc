@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <gtest/gtest.h>
 
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata {
 namespace {

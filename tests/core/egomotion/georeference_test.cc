@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "core/egomotion/geodesy.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/core/egomotion/drawn_state.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata {
 namespace {

@@ -10,8 +10,8 @@
 #include <gtest/gtest.h>
 
 #include "tests/core/egomotion/drawn_state.h"
-#include "tests/support/simulated_drive.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulated_drive.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata {
 namespace {

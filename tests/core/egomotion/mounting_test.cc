@@ -6,8 +6,8 @@
 
 #include "core/geometry/pose.h"
 #include "tests/core/egomotion/drawn_state.h"
-#include "tests/support/simulated_drive.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulated_drive.h"
+#include "tests/support/simulator/simulator.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {

@@ -1,5 +1,5 @@
 // The conformance suite against the engine in the process.
-#include "tests/support/database_suite.h"
+#include "tests/support/database_suite/database_suite.h"
 
 #include <utility>
 

@@ -19,7 +19,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/engine.h"
-#include "tests/support/power_cut_disk.h"
+#include "tests/support/faults/power_cut_disk.h"
 
 namespace strata::testing {
 namespace {

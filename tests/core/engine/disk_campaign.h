@@ -14,7 +14,7 @@
 #include "absl/status/statusor.h"
 
 #include "tests/core/engine/disk_history.h"
-#include "tests/support/faulty_disk.h"
+#include "tests/support/faults/faulty_disk.h"
 #include "tests/support/temp_dir.h"
 
 namespace strata::testing {

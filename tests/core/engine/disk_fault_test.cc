@@ -16,7 +16,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/core/engine/engine_fixture.h"
-#include "tests/support/faulty_disk.h"
+#include "tests/support/faults/faulty_disk.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {

@@ -20,8 +20,8 @@
 #include "core/common/status.h"
 #include "core/world/scan_hash.h"
 #include "tests/core/engine/engine_fixture.h"
-#include "tests/support/scene.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/scene.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata::testing {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "core/engine/engine.h"
 #include "tests/core/engine/engine_fixture.h"
-#include "tests/support/power_cut_disk.h"
+#include "tests/support/faults/power_cut_disk.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {

@@ -27,7 +27,7 @@
 #include "core/world/scan_hash.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/asked.h"
-#include "tests/support/failing_memory.h"
+#include "tests/support/faults/failing_memory.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {

@@ -21,7 +21,7 @@
 
 #include "core/mesh/alpha_shape.h"
 #include "tests/core/mesh/shapes.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {

@@ -11,8 +11,8 @@
 
 #include "core/mesh/mesh_check.h"
 #include "tests/core/mesh/shapes.h"
-#include "tests/support/scene.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/scene.h"
+#include "tests/support/simulator/simulator.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {

@@ -10,8 +10,8 @@
 
 #include "core/mls/build.h"
 #include "core/mls/join.h"
-#include "tests/support/scene.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/scene.h"
+#include "tests/support/simulator/simulator.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {

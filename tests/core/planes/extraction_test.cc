@@ -25,8 +25,8 @@
 #include "core/planes/scan_planes.h"
 #include "tests/support/data_dir.h"
 #include "tests/support/pcd.h"
-#include "tests/support/scene.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/scene.h"
+#include "tests/support/simulator/simulator.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "core/planes/extraction.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata {
 namespace {

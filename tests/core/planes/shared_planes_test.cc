@@ -16,8 +16,8 @@
 #include "core/planes/extraction.h"
 #include "core/planes/moments.h"
 #include "core/planes/scan_planes.h"
-#include "tests/support/scene.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/scene.h"
+#include "tests/support/simulator/simulator.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {

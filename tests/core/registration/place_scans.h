@@ -9,8 +9,8 @@
 #include "core/cloud/sensor_model.h"
 #include "core/geometry/pose.h"
 #include "core/mls/build.h"
-#include "tests/support/simulator.h"
-#include "tests/support/worlds.h"
+#include "tests/support/simulator/simulator.h"
+#include "tests/support/simulator/worlds.h"
 
 namespace strata::testing {
 

@@ -10,8 +10,8 @@
 #include "core/common/random.h"
 #include "core/mls/build.h"
 #include "core/registration/mls_registration.h"
-#include "tests/support/scene.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/scene.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata::testing {
 namespace {

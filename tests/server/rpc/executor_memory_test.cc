@@ -8,7 +8,7 @@
 
 #include "core/common/blocking.h"
 #include "server/rpc/executor.h"
-#include "tests/support/failing_memory.h"
+#include "tests/support/faults/failing_memory.h"
 
 namespace strata::server {
 namespace {

@@ -14,7 +14,7 @@
 #include "client/formats/geometry_writer.h"
 #include "client/formats/scan_reader.h"
 #include "tests/client/cli/run_strata.h"
-#include "tests/support/park.h"
+#include "tests/support/simulator/park.h"
 #include "tests/support/temp_dir.h"
 
 namespace strata::cli {

@@ -14,8 +14,8 @@
 #include "client/formats/geometry_writer.h"
 #include "core/cloud/point_cloud.h"
 #include "tests/client/cli/run_strata.h"
-#include "tests/support/scene.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/scene.h"
+#include "tests/support/simulator/simulator.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/client/cli/commands_fixture.h"
-#include "tests/support/plane_room.h"
+#include "tests/support/simulator/plane_room.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 

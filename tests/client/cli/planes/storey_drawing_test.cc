@@ -13,7 +13,7 @@
 
 #include "client/formats/file_bytes.h"
 #include "tests/support/dxf_entities.h"
-#include "tests/support/plane_room.h"
+#include "tests/support/simulator/plane_room.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 

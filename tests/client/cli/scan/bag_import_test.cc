@@ -15,10 +15,10 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/client/cli/run_strata.h"
-#include "tests/support/robot_files.h"
+#include "tests/support/simulator/robot_files.h"
+#include "tests/support/simulator/worlds.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
-#include "tests/support/worlds.h"
 
 namespace strata::cli {
 namespace {

@@ -16,7 +16,7 @@
 #include "client/formats/motion/trajectory_file.h"
 #include "core/egomotion/geodesy.h"
 #include "tests/client/cli/run_strata.h"
-#include "tests/support/simulated_drive.h"
+#include "tests/support/simulator/simulated_drive.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 

@@ -8,7 +8,7 @@
 
 #include "client/formats/file_bytes.h"
 #include "tests/support/data_dir.h"
-#include "tests/support/simulated_drive.h"
+#include "tests/support/simulator/simulated_drive.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 

@@ -19,7 +19,7 @@
 #include "client/formats/ply_reader.h"
 #include "core/cloud/point_cloud.h"
 #include "tests/support/dxf_entities.h"
-#include "tests/support/plane_room.h"
+#include "tests/support/simulator/plane_room.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 

@@ -11,7 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/support/plane_room.h"
+#include "tests/support/simulator/plane_room.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {

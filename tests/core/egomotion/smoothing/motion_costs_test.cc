@@ -13,7 +13,7 @@
 #include "core/egomotion/rig.h"
 #include "core/egomotion/smoothing/preintegration.h"
 #include "tests/core/egomotion/drawn_state.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata {
 namespace {

@@ -10,7 +10,7 @@
 #include "core/egomotion/inertial_motion.h"
 #include "core/geometry/pose.h"
 #include "tests/core/egomotion/drawn_state.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata {
 namespace {

@@ -14,7 +14,7 @@
 #include "core/egomotion/egomotion.h"
 #include "core/egomotion/geodesy.h"
 #include "core/geometry/screw_motion.h"
-#include "tests/support/simulated_drive.h"
+#include "tests/support/simulator/simulated_drive.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {

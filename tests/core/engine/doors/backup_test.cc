@@ -17,7 +17,7 @@
 
 #include "core/common/checksum.h"
 #include "tests/core/engine/engine_fixture.h"
-#include "tests/support/faulty_disk.h"
+#include "tests/support/faults/faulty_disk.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {

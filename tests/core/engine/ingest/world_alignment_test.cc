@@ -10,9 +10,9 @@
 #include <gtest/gtest.h>
 
 #include "tests/core/engine/engine_fixture.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
+#include "tests/support/simulator/worlds.h"
 #include "tests/support/status_matchers.h"
-#include "tests/support/worlds.h"
 
 namespace strata::testing {
 namespace {

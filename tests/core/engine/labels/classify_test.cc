@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/core/engine/engine_fixture.h"
-#include "tests/support/park.h"
+#include "tests/support/simulator/park.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {

@@ -14,8 +14,8 @@
 #include "core/world/job_arguments.h"
 #include "core/world/job_kinds.h"
 #include "tests/core/engine/engine_fixture.h"
-#include "tests/support/scene.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/scene.h"
+#include "tests/support/simulator/simulator.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {

@@ -35,7 +35,7 @@
 #include "core/storage/sqlite/sqlite_storage.h"
 #include "core/storage/storage.h"
 #include "tests/core/engine/engine_fixture.h"
-#include "tests/support/faulty_disk.h"
+#include "tests/support/faults/faulty_disk.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {

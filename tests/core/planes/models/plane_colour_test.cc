@@ -10,7 +10,7 @@
 #include "core/cloud/point_cloud.h"
 #include "core/planes/models/coloured_cells.h"
 #include "core/planes/models/plane_model_finder.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata {
 namespace {

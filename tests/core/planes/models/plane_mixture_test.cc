@@ -14,7 +14,7 @@
 #include "core/common/stop.h"
 #include "core/planes/models/model_selection.h"
 #include "core/planes/models/plane_colour.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {

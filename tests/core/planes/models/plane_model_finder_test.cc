@@ -19,7 +19,7 @@
 #include "core/planes/models/plane_polygons.h"
 #include "core/world/constraint.h"
 #include "core/world/plane_model.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata {
 namespace {

@@ -16,9 +16,9 @@
 #include "core/mls/build.h"
 #include "core/planes/extraction.h"
 #include "tests/core/posegraph/random_poses.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
+#include "tests/support/simulator/worlds.h"
 #include "tests/support/status_matchers.h"
-#include "tests/support/worlds.h"
 
 namespace strata {
 namespace {

@@ -1,0 +1,216 @@
+// Conformance: planning.
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/database_suite/database_suite.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+using ::testing::_;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using Code = absl::StatusCode;
+
+TEST_P(DatabaseSuite, SurfacesAndPathsOnALevelFloor) {
+  PutFloor(db(), {"run", 1});
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const auto columns,
+      db().planning().SampleSurfaces({}, kMap, {Eigen::Vector2d(1.0, 1.0), {50.0, 0.0}}));
+  ASSERT_THAT(columns, SizeIs(2));
+  ASSERT_THAT(columns[0].surfaces, SizeIs(1));
+  EXPECT_NEAR(columns[0].surfaces[0].z_m, 0.0, 1e-3);
+  EXPECT_THAT(columns[1].surfaces, IsEmpty());
+
+  PlanQuery query;
+  query.from.x_m = -2.0;
+  query.to.x_m = 2.0;
+  STRATA_ASSERT_OK_AND_ASSIGN(PlanResult plan, db().planning().PlanPath({}, kMap, query));
+  EXPECT_EQ(plan.reason, PlanReason::kFound) << plan.message;
+  EXPECT_NEAR(plan.length_m, 4.0, 0.2);
+  EXPECT_GE(plan.waypoints.size(), 2U);
+  query.to.x_m = 50.0;
+  STRATA_ASSERT_OK_AND_ASSIGN(plan, db().planning().PlanPath({}, kMap, query));
+  EXPECT_EQ(plan.reason, PlanReason::kGoalNotOnSurface) << plan.message;
+  EXPECT_THAT(plan.waypoints, IsEmpty());
+  query.profile.radius_m = -1.0;
+  EXPECT_THAT(db().planning().PlanPath({}, kMap, query),
+              StatusIs(Code::kInvalidArgument, HasSubstr("radius_m")));
+}
+
+TEST_P(DatabaseSuite, PathsKeepToWhatClassesCost) {
+  PointCloud floor = LevelFloor();
+  for (const Eigen::Vector3f& p : floor.points) {
+    floor.label.push_back(std::abs(p.x()) < 0.5F && p.y() < 1.0F ? 3 : 1);
+  }
+  STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", 1}, floor, 0.0), floor));
+  AwaitIntegration(db(), kMap);
+  PlanQuery query;
+  query.from.x_m = -1.5;
+  query.to.x_m = 1.5;
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult straight, db().planning().PlanPath({}, kMap, query));
+  EXPECT_NEAR(straight.length_m, 3.0, 0.1);
+  query.class_costs = {{3, 1.5}};
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult dearer, db().planning().PlanPath({}, kMap, query));
+  EXPECT_NEAR(dearer.cost - straight.cost, 0.5, 0.2);
+  query.class_costs = {{3, kForbiddenClass}};
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult around, db().planning().PlanPath({}, kMap, query));
+  EXPECT_TRUE(around.found()) << around.message;
+  EXPECT_GT(around.length_m, straight.length_m + 0.3);
+  query.class_costs = {{3, kForbiddenClass}, {1, 0.5}};
+  EXPECT_THAT(db().planning().PlanPath({}, kMap, query),
+              StatusIs(Code::kInvalidArgument, HasSubstr("factor 0.5 of class 1")));
+}
+
+// A wall across the floor at x = 0.
+PointCloud Wall() {
+  PointCloud wall;
+  for (int y = -80; y < 80; ++y) {
+    for (int z = 0; z < 20; ++z) {
+      wall.points.emplace_back(
+          0.01F, static_cast<float>(0.05 * y), 0.05F * static_cast<float>(z + 1));
+    }
+  }
+  return wall;
+}
+
+// What the watcher of a path is told, in order.
+class Told {
+ public:
+  absl::Status Take(const PathCheck& check) {
+    absl::MutexLock lock(&mutex_);
+    told_.push_back(check);
+    return absl::OkStatus();
+  }
+  // The i-th message, once it has come.
+  PathCheck Await(std::size_t i) {
+    absl::MutexLock lock(&mutex_);
+    const auto come = [this, i]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return told_.size() > i; };
+    mutex_.Await(absl::Condition(&come));
+    return told_[i];
+  }
+  std::size_t count() {
+    absl::MutexLock lock(&mutex_);
+    return told_.size();
+  }
+
+ private:
+  absl::Mutex mutex_;
+  std::vector<PathCheck> told_ ABSL_GUARDED_BY(mutex_);
+};
+
+TEST_P(DatabaseSuite, APathHoldsUntilSomethingStandsInItsWay) {
+  PutFloor(db(), {"run", 1});
+  PlanQuery query;
+  query.from.x_m = -2.0;
+  query.to.x_m = 2.0;
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult plan, db().planning().PlanPath({}, kMap, query));
+  PathQuery asked = {plan.waypoints, query.profile};
+  STRATA_ASSERT_OK_AND_ASSIGN(const PathCheck before, db().planning().CheckPath({}, kMap, asked));
+  EXPECT_TRUE(before.valid) << before.message;
+  EXPECT_NEAR(before.length_m, plan.length_m, 1e-6);
+  EXPECT_FALSE(before.tiles.empty());
+  asked.known = before;
+  STRATA_ASSERT_OK_AND_ASSIGN(const PathCheck again, db().planning().CheckPath({}, kMap, asked));
+  EXPECT_EQ(again.message, before.message);
+  Told told;
+  const api::Call call;
+  std::thread watcher([&] {
+    EXPECT_THAT(db().planning().WatchPath(
+                    call, kMap, asked, [&](const PathCheck& check) { return told.Take(check); }),
+                StatusIs(Code::kCancelled, _));
+  });
+  EXPECT_TRUE(told.Await(0).valid);
+  PutFloor(db(), {"far", 1}, 300.0);  // says nothing about the path
+  const PointCloud wall = Wall();
+  STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"wall", 1}, wall), wall));
+  const PathCheck blocked = told.Await(1);
+  EXPECT_FALSE(blocked.valid);
+  ASSERT_TRUE(blocked.where.has_value());
+  EXPECT_NEAR(blocked.where->x(), 0.0, 0.2);
+  EXPECT_NE(blocked.obstruction, Obstruction::kNone);
+  EXPECT_NEAR(blocked.valid_m, 2.0 - query.profile.radius_m, 0.4);
+  STRATA_ASSERT_OK_AND_ASSIGN(const PathCheck known, db().planning().CheckPath({}, kMap, asked));
+  EXPECT_EQ(known.message, blocked.message);
+  STRATA_ASSERT_OK(db().scans().Delete({}, kMap, {"wall", 1}));
+  EXPECT_TRUE(told.Await(2).valid);
+  call.stop.Request();
+  watcher.join();
+  EXPECT_EQ(told.count(), 3U);
+  asked.waypoints.clear();
+  EXPECT_THAT(db().planning().CheckPath({}, kMap, asked),
+              StatusIs(Code::kInvalidArgument, HasSubstr("waypoints: 0")));
+  EXPECT_THAT(db().planning().CheckPath({}, "none", {plan.waypoints, {}}),
+              StatusIs(Code::kNotFound, _));
+}
+
+TEST_P(DatabaseSuite, AFloorIsWhatARobotCanDrive) {
+  FloorQuery query;
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan none, db().planning().ListFloors({}, kMap, query));
+  EXPECT_TRUE(none.floors.empty());
+  EXPECT_FALSE(none.at.has_value());
+  PutFloor(db(), {"run", 1});
+  query.at = PlanEndpoint{.x_m = 0.0, .y_m = 0.0};
+  query.cells = true;
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan plan, db().planning().ListFloors({}, kMap, query));
+  ASSERT_EQ(plan.floors.size(), 1U);
+  EXPECT_EQ(plan.at, 0);
+  EXPECT_TRUE(plan.links.empty());
+  EXPECT_GT(plan.commit_sequence, none.commit_sequence);
+  const Floor& floor = plan.floors[0];
+  std::size_t cells = 0;
+  for (const FloorBlock& block : floor.blocks) cells += std::popcount(block.free);
+  EXPECT_GT(cells, 100U);
+  EXPECT_NEAR(floor.area_m2, cells * plan.cell_size_m * plan.cell_size_m, 1e-6);
+  EXPECT_TRUE(((floor.high - floor.low).head<2>().array() > 0.0).all());
+  query.at = PlanEndpoint{.x_m = 500.0, .y_m = 0.0};
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan off, db().planning().ListFloors({}, kMap, query));
+  EXPECT_FALSE(off.at.has_value());
+  query.profile.radius_m = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(db().planning().ListFloors({}, kMap, query),
+              StatusIs(Code::kInvalidArgument, HasSubstr("radius")));
+  query = {.profile = {}, .min_area_m2 = -1.0};
+  EXPECT_THAT(db().planning().ListFloors({}, kMap, query),
+              StatusIs(Code::kInvalidArgument, HasSubstr("min_area_m2")));
+  EXPECT_THAT(db().planning().ListFloors({}, "none", {}), StatusIs(Code::kNotFound, _));
+}
+
+TEST_P(DatabaseSuite, AStoppedCallSaysSo) {
+  PutFloor(db(), {"run", 1});
+  PlanQuery query;
+  query.to.x_m = 2.0;
+  const api::Call cancelled;
+  cancelled.stop.Request();
+  EXPECT_THAT(db().planning().PlanPath(cancelled, kMap, query), StatusIs(Code::kCancelled, _));
+  const api::Call late{Stop(absl::UnixEpoch()), "", ""};
+  EXPECT_THAT(db().planning().PlanPath(late, kMap, query), StatusIs(Code::kDeadlineExceeded, _));
+}
+
+TEST_P(DatabaseSuite, ProfilesAreKept) {
+  RobotProfile profile;
+  profile.radius_m = 0.9;
+  profile.max_gap_m = 0.1;
+  STRATA_ASSERT_OK(db().planning().SetProfile({}, kMap, "truck", profile));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto profiles, db().planning().ListProfiles({}, kMap));
+  EXPECT_EQ(profiles.at("truck"), profile);
+  EXPECT_EQ(profiles.at(std::string(api::kDefaultProfile)), RobotProfile());
+  profile.height_m = 0.0;
+  EXPECT_THAT(db().planning().SetProfile({}, kMap, "truck", profile),
+              StatusIs(Code::kInvalidArgument, HasSubstr("height_m")));
+  EXPECT_THAT(db().planning().SetProfile({}, kMap, "", {}), StatusIs(Code::kInvalidArgument, _));
+}
+
+}  // namespace
+}  // namespace strata::testing
