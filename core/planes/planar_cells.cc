@@ -24,11 +24,9 @@ constexpr std::int32_t kOffset = 1 << (kCoordinateBits - 1);
 // A node is kept whole while its mean squared residual is at most this much above that of its
 // children: noise is the same in both, a step or a bend is not.
 constexpr double kMergeRatio = 1.5;
-constexpr double kMinFlatness = 9.0;    // second over first eigenvalue: 3 σ of thickness
-constexpr double kMinRoundness = 0.01;  // second over third: a single scan line is no surface
-constexpr double kSameCosine = 0.97;    // 14°: between the normals of two cells of one surface
-constexpr double kSameSigmas = 3.0;     // of both about their planes, from one to the other's plane
-constexpr double kLeastKept = 0.05;     // of a cell's area
+constexpr double kLeastSquaresM2 = 1e-8;  // of a spread, for points on one line
+constexpr double kMinFlatness = 9.0;      // second over first eigenvalue: 3 σ of thickness
+constexpr double kMinRoundness = 0.01;    // second over third: a single scan line is no surface
 
 struct CodedPoint {
   std::uint64_t code;  // interleaved coordinates of the smallest cell: nodes are ranges
@@ -44,36 +42,16 @@ std::uint64_t SpreadBits(std::uint64_t v) {
   return v;
 }
 
-// Inside of a cell whose cross section is `most_m2`, of points with this spread.
-double SpreadArea(const Eigen::Vector3d& eigenvalues, double most_m2) {
-  return std::min(12.0 * std::sqrt(eigenvalues(1) * eigenvalues(2)), most_m2);
-}
-
-double CrossSectionOf(double size_m, const Eigen::Vector3d& normal) {
-  return size_m * size_m / normal.cwiseAbs().maxCoeff();
-}
-
-// What two cells, one above the other, both cover of one surface [m²].
-double CommonArea(const PlanarCell& a, const PlanarCell& b) {
-  const double off = std::abs(a.normal.dot(b.mean - a.mean));
-  if (std::abs(a.normal.dot(b.normal)) < kSameCosine ||
-      off > kSameSigmas * std::hypot(a.rms_m, b.rms_m)) {
-    return 0.0;
-  }
-  const PlanarCell& larger = a.size_m >= b.size_m ? a : b;
-  const double joint = SpreadArea(FitMoments(a.moments + b.moments).eigenvalues,
-                                  CrossSectionOf(larger.size_m, larger.normal));
-  return std::clamp(a.area_m2 + b.area_m2 - joint, 0.0, std::min(a.area_m2, b.area_m2));
-}
-
 class CellFinder {
  public:
   CellFinder(std::span<const Eigen::Vector3f> points,
              const Eigen::Vector3f& sensor_origin,
-             const PlaneExtractionOptions& options)
+             const PlaneExtractionOptions& options,
+             CellCheck check)
       : points_(points),
         sensor_(sensor_origin),
         options_(options),
+        check_(check),
         smallest_m_(options.cell_size_m / (1 << (kCellLevels - 1))) {}
 
   std::vector<PlanarCell> Run() {
@@ -155,10 +133,37 @@ class CellFinder {
       Visit(b, e, level - 1);
       b = e;
     }
-    if (node.flat && !ChildrenAreFlatter(node, before, end - begin)) {
+    if (node.flat && !ChildrenAreFlatter(node, before, end - begin) &&
+        !(check_ == CellCheck::kEven && ChildrenLieAcross(node, begin, end, level))) {
       cells_.resize(before);
       Keep(node, begin, end, level);
     }
+  }
+
+  // Of the points along the node's normal, but for what the best plane through them explains.
+  static double Residual(const Node& child, const Eigen::Vector3d& normal, double count) {
+    const Eigen::Vector3d along = child.fit.eigenvectors.transpose() * normal;
+    const Eigen::Array3d squares = child.fit.eigenvalues.array() + kLeastSquaresM2;
+    return count / (count - 3.0) / (along.array().square() / squares).sum();
+  }
+
+  // Whether what the children hold, flat or not, is straighter than the node along its normal: it
+  // is then at an angle to it.
+  bool ChildrenLieAcross(const Node& node,
+                         std::uint32_t begin,
+                         std::uint32_t end,
+                         int level) const {
+    double squares = 0.0, held = 0.0;
+    for (std::uint32_t b = begin; b < end;) {
+      const std::uint32_t e = RangeEnd(b, end, level - 1);
+      if (e - b >= kMinPoints) {
+        const double count = e - b;
+        squares += count * Residual(Judge(b, e), node.fit.plane.normal, count);
+        held += count;
+      }
+      b = e;
+    }
+    return 2.0 * held >= end - begin && node.rms_m * node.rms_m * held > kMergeRatio * squares;
   }
 
   // Children that hold less than half of the points prove nothing.
@@ -196,6 +201,7 @@ class CellFinder {
   std::span<const Eigen::Vector3f> points_;
   Eigen::Vector3f sensor_;
   const PlaneExtractionOptions& options_;
+  CellCheck check_;
   double smallest_m_;
   std::vector<CodedPoint> coded_;
   std::vector<PlanarCell> cells_;
@@ -233,35 +239,17 @@ std::optional<std::uint32_t> CellAt(const PlaceIndex& index,
 
 std::vector<PlanarCell> FindPlanarCells(std::span<const Eigen::Vector3f> points,
                                         const Eigen::Vector3f& sensor_origin,
-                                        const PlaneExtractionOptions& options) {
-  return CellFinder(points, sensor_origin, options).Run();
+                                        const PlaneExtractionOptions& options,
+                                        CellCheck check) {
+  return CellFinder(points, sensor_origin, options, check).Run();
 }
 
-void ShareBorders(std::vector<PlanarCell>& cells) {
-  const PlaceIndex index = IndexOf(cells);
-  std::vector<double> lost_m2(cells.size(), 0.0);
-  for (std::uint32_t i = 0; i < cells.size(); ++i) {
-    Eigen::Index axis = 0;
-    cells[i].normal.cwiseAbs().maxCoeff(&axis);
-    for (const std::int32_t step : {-1, 1}) {
-      std::array<std::int32_t, 3> at = cells[i].at;
-      at[static_cast<std::size_t>(axis)] += step;
-      const std::optional<std::uint32_t> j = CellAt(index, cells[i].level, at, i);
-      // Two of one size find each other.
-      if (!j.has_value() || (cells[*j].level == cells[i].level && *j < i)) continue;
-      const double common_m2 = CommonArea(cells[i], cells[*j]);
-      if (!(common_m2 > 0.0)) continue;
-      const double own = cells[i].point_count / cells[i].area_m2;
-      const double other = cells[*j].point_count / cells[*j].area_m2;
-      lost_m2[i] += common_m2 * other / (own + other);
-      lost_m2[*j] += common_m2 * own / (own + other);
-    }
-  }
-  for (std::uint32_t i = 0; i < cells.size(); ++i) {
-    const double kept = std::max(kLeastKept, 1.0 - lost_m2[i] / cells[i].area_m2);
-    cells[i].area_m2 *= kept;
-    cells[i].moments *= kept;
-  }
+double SpreadArea(const Eigen::Vector3d& eigenvalues, double most_m2) {
+  return std::min(12.0 * std::sqrt(eigenvalues(1) * eigenvalues(2)), most_m2);
+}
+
+double CrossSectionOf(double size_m, const Eigen::Vector3d& normal) {
+  return size_m * size_m / normal.cwiseAbs().maxCoeff();
 }
 
 std::vector<std::vector<std::uint32_t>> TouchingCells(std::span<const PlanarCell> cells) {

@@ -28,15 +28,21 @@ struct PlanarCell {
   Eigen::Matrix4d moments;       // total weight: area_m2
 };
 
+// What is asked of a cell. kEven: that it is no plane through several strips at an angle to it,
+// which is as flat as a surface is (shelves, steps).
+enum class CellCheck { kFlat, kEven };
+
 // The flat cells of `points` in the order of their place. Smaller cells are tried where a cell is
 // not flat, or less flat than what it holds (a kerb, a recess).
 std::vector<PlanarCell> FindPlanarCells(std::span<const Eigen::Vector3f> points,
                                         const Eigen::Vector3f& sensor_origin,
-                                        const PlaneExtractionOptions& options);
+                                        const PlaneExtractionOptions& options,
+                                        CellCheck check = CellCheck::kFlat);
 
-// A surface along the border of two layers of cells is in both, with all its area: of what one cell
-// covers together with one above or below it, each keeps as much as it has of the points there.
-void ShareBorders(std::vector<PlanarCell>& cells);
+// Of points that spread so in a cell whose cross section is `most_m2`; `eigenvalues`: ascending, of
+// their covariance.
+double SpreadArea(const Eigen::Vector3d& eigenvalues, double most_m2);
+double CrossSectionOf(double size_m, const Eigen::Vector3d& normal);
 
 // For every cell those that touch it, edges and corners included, ascending.
 std::vector<std::vector<std::uint32_t>> TouchingCells(std::span<const PlanarCell> cells);

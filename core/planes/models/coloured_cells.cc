@@ -28,7 +28,10 @@ constexpr double kSurfaces = 3.0;  // in one of the largest cells, at most
 constexpr double kAnyArea = 1e9;
 constexpr double kSidesCosine = 0.97;  // between normals of two sides of one surface
 constexpr double kSidesSigmas = 3.0;   // between their means, across it
-constexpr double kSidesApart = 0.25;   // of a cell's edge, along it
+// Of the smaller of two cells, what both cover: below the one they lie side by side, above the
+// other they are two sides of one surface. Between them, the rims of what few points are in a cell.
+constexpr double kSideBySide = 0.25, kTwoSides = 0.75;
+constexpr double kLeastKept = 0.05;  // of a cell's area
 
 struct ColouredPoint {
   std::array<std::int32_t, 3> at;  // one of the largest cells
@@ -108,7 +111,8 @@ void AddCells(Part part, double most_m2, const PlaneExtractionOptions& options, 
   const CellColour colour = MeanOf(part);
   std::vector<Eigen::Vector3f> places;
   for (const ColouredPoint& point : part) places.push_back(point.place);
-  for (PlanarCell& cell : FindPlanarCells(places, Eigen::Vector3f::Zero(), options)) {
+  for (PlanarCell& cell :
+       FindPlanarCells(places, Eigen::Vector3f::Zero(), options, CellCheck::kEven)) {
     const double share = static_cast<double>(cell.point_count) / static_cast<double>(part.size());
     const double less = std::min(1.0, share * most_m2 / cell.area_m2);
     cell.area_m2 *= less;
@@ -138,11 +142,13 @@ std::vector<ColouredPoint> ByCell(const PosedPoints& points, double cell_size_m)
   return all;
 }
 
-// Cells by level and place; of several layers.
-struct CellPlace {
-  std::size_t layer = 0, index = 0;
+// A cell of any layer.
+struct SharedCell {
+  PlanarCell* cell = nullptr;
+  LabColour colour;
+  double lost_m2 = 0.0;
 };
-using CellPlaces = HashMap<std::uint64_t, std::vector<CellPlace>>;
+using CellPlaces = HashMap<std::uint64_t, std::vector<std::uint32_t>>;  // by level and place
 
 std::uint64_t PlaceKey(int level, const std::array<std::int32_t, 3>& at) {
   auto key = static_cast<std::uint64_t>(level);
@@ -150,51 +156,60 @@ std::uint64_t PlaceKey(int level, const std::array<std::int32_t, 3>& at) {
   return key;
 }
 
-// Whether they are two sides of one surface, and not two parts of it side by side.
-bool AreTwoSides(const PlanarCell& a, const PlanarCell& b) {
-  const Eigen::Vector3d apart = b.mean - a.mean;
-  const double off = apart.dot(a.normal);
-  return std::abs(a.normal.dot(b.normal)) >= kSidesCosine &&
-         std::abs(off) <= kSidesSigmas * std::hypot(a.rms_m, b.rms_m) &&
-         (apart - off * a.normal).norm() <= kSidesApart * a.size_m;
+// Half of the side of a rectangle that is spread as the cell's points are.
+double HalfSide(const PlanarCell& cell, Eigen::Index axis) {
+  const double square =
+      cell.moments(axis, axis) / cell.moments(3, 3) - std::pow(cell.mean(axis), 2);
+  return std::sqrt(3.0 * std::max(0.0, square));
 }
 
-// Points of the other sides of the surface that is in a cell.
-double PointsBeside(const PlanarCell& cell,
-                    const CellColour& colour,
-                    const std::vector<CellLayer>& layers,
-                    const CellPlaces& places) {
+// How much of the smaller of two cells is before or behind the other, seen along an axis of the
+// grid; 0 unless they are of one surface.
+double CommonShare(const PlanarCell& a, const PlanarCell& b, Eigen::Index axis) {
+  const double off = std::abs(a.normal.dot(b.mean - a.mean));
+  if (std::abs(a.normal.dot(b.normal)) < kSidesCosine ||
+      off > kSidesSigmas * std::hypot(a.rms_m, b.rms_m)) {
+    return 0.0;
+  }
+  double common_m2 = 1.0 / std::abs(a.normal(axis));
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    if (k == axis) continue;
+    const double half_a = HalfSide(a, k), half_b = HalfSide(b, k);
+    const double begin = std::max(a.mean(k) - half_a, b.mean(k) - half_b);
+    const double end = std::min(a.mean(k) + half_a, b.mean(k) + half_b);
+    common_m2 *= std::max(0.0, end - begin);
+  }
+  const double share = common_m2 / std::min(a.area_m2, b.area_m2);
+  return std::clamp((share - kSideBySide) / (kTwoSides - kSideBySide), 0.0, 1.0);
+}
+
+// `other` is as large as `one` or larger.
+void ShareBetween(SharedCell& one, SharedCell& other, Eigen::Index axis) {
+  if (!AreAlike(one.colour, other.colour)) return;
+  const double common = CommonShare(*one.cell, *other.cell, axis);
+  if (!(common > 0.0)) return;
+  const double part = std::pow(one.cell->size_m / other.cell->size_m, 2);  // of the other's
+  const double own = one.cell->point_count, others = part * other.cell->point_count;
+  one.lost_m2 += common * one.cell->area_m2 * others / (own + others);
+  other.lost_m2 += common * part * other.cell->area_m2 * own / (own + others);
+}
+
+void ShareWithNeighbours(std::uint32_t i, const CellPlaces& places, std::vector<SharedCell>& all) {
+  const PlanarCell& cell = *all[i].cell;
   Eigen::Index axis = 0;
   cell.normal.cwiseAbs().maxCoeff(&axis);
-  double points = 0.0;
-  for (const int step : {-1, 1}) {
+  for (const std::int32_t step : {-1, 1}) {
     std::array<std::int32_t, 3> at = cell.at;
     at[static_cast<std::size_t>(axis)] += step;
-    const auto found = places.find(PlaceKey(cell.level, at));
-    if (found == places.end()) continue;
-    for (const CellPlace& place : found->second) {
-      const PlanarCell& other = layers[place.layer].cells[place.index];
-      if (!AreAlike(colour.mean, layers[place.layer].colours[place.index].mean)) continue;
-      if (AreTwoSides(cell, other)) points += other.point_count;
-    }
-  }
-  return points;
-}
-
-void ShareSides(std::vector<CellLayer>& layers) {
-  CellPlaces places;
-  for (std::size_t k = 0; k < layers.size(); ++k) {
-    for (std::size_t i = 0; i < layers[k].cells.size(); ++i) {
-      places[PlaceKey(layers[k].cells[i].level, layers[k].cells[i].at)].push_back({k, i});
-    }
-  }
-  for (CellLayer& layer : layers) {
-    for (std::size_t i = 0; i < layer.cells.size(); ++i) {
-      PlanarCell& cell = layer.cells[i];
-      const double beside = PointsBeside(cell, layer.colours[i], layers, places);
-      const double share = cell.point_count / (cell.point_count + beside);
-      cell.area_m2 *= share;
-      cell.moments *= share;
+    for (int level = cell.level; level < kCellLevels; ++level) {
+      const auto found = places.find(PlaceKey(level, at));
+      for (std::int32_t& c : at) c >>= 1;
+      if (found == places.end()) continue;
+      for (const std::uint32_t j : found->second) {
+        // Two of one size find each other; a larger one may be the cell's own.
+        if (j == i || (level == cell.level && j < i)) continue;
+        ShareBetween(all[i], all[j], axis);
+      }
     }
   }
 }
@@ -228,14 +243,33 @@ std::vector<CellLayer> FindColouredCells(const PosedPoints& points,
                                          const PlaneExtractionOptions& options) {
   if (!points.colour.empty()) {
     std::vector<CellLayer> layers = CellsByColour(points, options);
-    ShareSides(layers);
+    ShareBorders(layers);
     return layers;
   }
   std::vector<CellLayer> layers(1);
-  layers[0].cells = FindPlanarCells(points.points, Eigen::Vector3f::Zero(), options);
-  ShareBorders(layers[0].cells);
+  layers[0].cells =
+      FindPlanarCells(points.points, Eigen::Vector3f::Zero(), options, CellCheck::kEven);
   layers[0].colours.resize(layers[0].cells.size());
+  ShareBorders(layers);
   return layers;
+}
+
+void ShareBorders(std::vector<CellLayer>& layers) {
+  std::vector<SharedCell> all;
+  CellPlaces places;
+  for (CellLayer& layer : layers) {
+    for (std::size_t i = 0; i < layer.cells.size(); ++i) {
+      PlanarCell& cell = layer.cells[i];
+      places[PlaceKey(cell.level, cell.at)].push_back(static_cast<std::uint32_t>(all.size()));
+      all.push_back({&cell, layer.colours[i].mean, 0.0});
+    }
+  }
+  for (std::uint32_t i = 0; i < all.size(); ++i) ShareWithNeighbours(i, places, all);
+  for (const SharedCell& one : all) {
+    const double kept = std::max(kLeastKept, 1.0 - one.lost_m2 / one.cell->area_m2);
+    one.cell->area_m2 *= kept;
+    one.cell->moments *= kept;
+  }
 }
 
 }  // namespace strata

@@ -29,6 +29,8 @@ namespace {
 constexpr double kPlaneParameters = 3.0;
 constexpr double kColourParameters = 3.0;     // of a plane, where colours count
 constexpr double kDirectionParameters = 3.0;  // its chance among them
+constexpr double kMergeSigmas = 4.0;          // of a direction, between two that may be one
+constexpr double kOnePlaneCosine = 0.99;      // the same where nothing else is in question
 constexpr double kMergeCosine = 0.9;          // between the normals of planes that may be one
 
 double LogN(const PlaneMixture& mixture) { return std::log(std::max(2.0, mixture.measurements())); }
@@ -51,8 +53,9 @@ struct Reduction {
 // The likelihood of the cells around planes, and what it would be without some of them.
 class LeaveOneOut {
  public:
-  explicit LeaveOneOut(const PlaneMixture& mixture)
+  LeaveOneOut(const PlaneMixture& mixture, PlaneReduction which)
       : mixture_(mixture),
+        which_(which),
         cells_of_(mixture.planes.size()),
         moments_(mixture.planes.size(), Eigen::Matrix4d::Zero()) {
     for (std::uint32_t j = 0; j < mixture.cells().size(); ++j) {
@@ -86,12 +89,14 @@ class LeaveOneOut {
     const double saved = PlanePrice(mixture_);
     Reduction best;
     best.gone = m;
-    best.bic_change = -2.0 * Without(m) - saved;
+    const bool any = which_ == PlaneReduction::kAny;
+    if (any) best.bic_change = -2.0 * Without(m) - saved;
+    const double min_cosine = any ? kMergeCosine : kOnePlaneCosine;
     for (const std::size_t t : Rivals(m)) {
       const Plane& a = mixture_.planes[m].plane;
       const Plane& b = mixture_.planes[t].plane;
       const Eigen::Matrix4d both = moments_[m] + moments_[t];
-      if (std::abs(a.normal.dot(b.normal)) < kMergeCosine || !(both(3, 3) > 0.0)) continue;
+      if (std::abs(a.normal.dot(b.normal)) < min_cosine || !(both(3, 3) > 0.0)) continue;
       const Plane joint = FitMoments(both).plane;
       const double share = moments_[t](3, 3) / both(3, 3);
       const LabColour colour =
@@ -148,6 +153,7 @@ class LeaveOneOut {
   double Total(std::uint32_t j) const { return totals_[j]; }
 
   const PlaneMixture& mixture_;
+  PlaneReduction which_;
   std::vector<std::vector<std::uint32_t>> cells_of_;  // that may be in it, ascending
   std::vector<double> totals_;
   std::vector<Eigen::Matrix4d> moments_;  // of what is in it, weighted n/ρ²
@@ -191,6 +197,68 @@ void Apply(const std::vector<Reduction>& reductions, PlaneMixture& mixture) {
   }
 }
 
+// Two directions as one between them, by what is more likely to have them.
+struct DirectionMerge {
+  std::size_t kept = 0, gone = 0;
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  double bic_change = 0.0;
+};
+
+// What the merge does to the BIC; the mixture is as it was. `sums`: of the rows of `density`.
+double MergeChange(const DirectionMerge& merge,
+                   const Eigen::MatrixXd& density,
+                   const Eigen::VectorXd& sums,
+                   PlaneMixture& mixture) {
+  const Eigen::Vector3d direction = mixture.directions[merge.kept];
+  const double chance = mixture.chances[merge.kept];
+  mixture.directions[merge.kept] = merge.direction;
+  mixture.chances[merge.kept] += mixture.chances[merge.gone];
+  double change = -kDirectionParameters * LogN(mixture);
+  for (Eigen::Index m = 0; m < density.rows(); ++m) {
+    const double all = sums(m);
+    const double two = density(m, static_cast<Eigen::Index>(merge.kept)) +
+                       density(m, static_cast<Eigen::Index>(merge.gone));
+    const double one = std::exp(mixture.DirectionLog(static_cast<std::size_t>(m), merge.kept));
+    change -= 2.0 * std::log((std::max(0.0, all - two) + one) / all);
+  }
+  mixture.directions[merge.kept] = direction;
+  mixture.chances[merge.kept] = chance;
+  return change;
+}
+
+// Leaving one out and keeping the other where it is may be worse than both.
+bool MergeDirections(PlaneMixture& mixture) {
+  Eigen::MatrixXd density(static_cast<Eigen::Index>(mixture.planes.size()),
+                          static_cast<Eigen::Index>(mixture.chances.size()));
+  for (Eigen::Index m = 0; m < density.rows(); ++m) {
+    for (Eigen::Index k = 0; k < density.cols(); ++k) {
+      density(m, k) =
+          std::exp(mixture.DirectionLog(static_cast<std::size_t>(m), static_cast<std::size_t>(k)));
+    }
+  }
+  const Eigen::VectorXd sums = density.rowwise().sum();
+  const double near = std::cos(kMergeSigmas * mixture.options().direction_sigma_rad);
+  DirectionMerge best;
+  for (std::size_t k = 0; k < mixture.directions.size(); ++k) {
+    for (std::size_t l = k + 1; l < mixture.directions.size(); ++l) {
+      const double cosine = mixture.directions[k].dot(mixture.directions[l]);
+      if (std::abs(cosine) < near) continue;
+      const Eigen::Vector3d other = (cosine < 0.0 ? -1.0 : 1.0) * mixture.directions[l];
+      DirectionMerge merge{k, l, mixture.chances[k] * mixture.directions[k], 0.0};
+      merge.direction = (merge.direction + mixture.chances[l] * other).normalized();
+      merge.bic_change = MergeChange(merge, density, sums, mixture);
+      if (merge.bic_change < best.bic_change) best = merge;
+    }
+  }
+  if (!(best.bic_change < 0.0)) return false;
+  mixture.directions[best.kept] = best.direction;
+  mixture.chances[best.kept] += mixture.chances[best.gone];
+  mixture.directions.erase(mixture.directions.begin() + static_cast<std::ptrdiff_t>(best.gone));
+  mixture.chances.erase(mixture.chances.begin() + static_cast<std::ptrdiff_t>(best.gone));
+  mixture.EStep();
+  return true;
+}
+
 }  // namespace
 
 double Bic(const PlaneMixture& mixture) {
@@ -206,6 +274,8 @@ double PlanePrice(const PlaneMixture& mixture) {
 }
 
 bool DropDirections(PlaneMixture& mixture) {
+  bool merged = false;
+  while (MergeDirections(mixture)) merged = true;
   const auto M = static_cast<Eigen::Index>(mixture.planes.size());
   std::vector<std::size_t> left(mixture.chances.size());  // at last none, which stays
   std::iota(left.begin(), left.end(), 0U);
@@ -239,7 +309,7 @@ bool DropDirections(PlaneMixture& mixture) {
     sums = (sums - density.col(static_cast<Eigen::Index>(left[*best]))).cwiseMax(none);
     left.erase(left.begin() + static_cast<std::ptrdiff_t>(*best));
   }
-  if (left.size() == mixture.chances.size()) return false;
+  if (left.size() == mixture.chances.size()) return merged;
   std::vector<Eigen::Vector3d> kept;
   std::vector<double> kept_chances;
   for (const std::size_t k : left) {
@@ -252,12 +322,12 @@ bool DropDirections(PlaneMixture& mixture) {
   return true;
 }
 
-absl::StatusOr<bool> DropPlanes(PlaneMixture& mixture, const Stop& stop) {
+absl::StatusOr<bool> DropPlanes(PlaneMixture& mixture, const Stop& stop, PlaneReduction which) {
   std::set<std::size_t> changed;
   for (std::size_t m = 0; m < mixture.planes.size(); ++m) changed.insert(m);
   std::map<std::size_t, Reduction> wanted;
   while (true) {
-    const LeaveOneOut models(mixture);
+    const LeaveOneOut models(mixture, which);
     for (const std::size_t m : changed) {
       STRATA_RETURN_IF_ERROR(stop.status());
       wanted.erase(m);

@@ -14,6 +14,9 @@
 
 namespace strata {
 
+// kAny: a plane is left out or goes into another one. kNearlyOne: only into one within 8°.
+enum class PlaneReduction { kAny, kNearlyOne };
+
 // −2 L + (3 M + 2 K) ln N (5.19), N in independent measurements, 6 M where colours count; of two
 // models the one with the lower is better. (Steps 4 and 5 of the thesis' sketch drop while it
 // increases, a slip.)
@@ -27,7 +30,9 @@ bool DropDirections(PlaneMixture& mixture);
 // Leaves out planes while that lowers the BIC, without running EM in between. A plane goes, or it
 // goes into another that is near: what two cells of one wall began becomes one plane. True if any
 // left; the mixture is prepared again.
-absl::StatusOr<bool> DropPlanes(PlaneMixture& mixture, const Stop& stop);
+absl::StatusOr<bool> DropPlanes(PlaneMixture& mixture,
+                                const Stop& stop,
+                                PlaneReduction which = PlaneReduction::kAny);
 
 // Draws cells that no plane explains, with a probability that grows with their distance from all
 // planes, capped at 1 m, and adds the plane of their surroundings, with its normal as a direction,
