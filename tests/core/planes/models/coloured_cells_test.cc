@@ -9,7 +9,7 @@
 
 #include "core/planes/extraction.h"
 #include "core/planes/planar_cells.h"
-#include "tests/support/simulator.h"
+#include "tests/support/simulator/simulator.h"
 
 namespace strata {
 namespace {
