@@ -164,6 +164,23 @@ class Map:
                      s.commit_sequence, s.content_digest, np.array([poses.array3(s.box_min), poses.array3(s.box_max)]),
                      s.tiles_prepared)
 
+    def origin(self):
+        """Where the map's origin is on earth (WGS 84): (latitude [°], longitude [°], altitude [m]); None: not said."""
+        info = self._connection.unary(self._maps.Get, maps_pb2.GetMapRequest(name=self.name)).map
+        if not info.parameters.HasField("origin"):
+            return None
+        origin = info.parameters.origin
+        return math.degrees(origin.latitude_rad), math.degrees(origin.longitude_rad), origin.altitude_m
+
+    def set_origin(self, latitude, longitude, altitude):
+        """Says where the map's origin is on earth [°, °, m], x pointing east and y north; its coordinates stay.
+
+        Raises InvalidArgument for a place that is not on earth.
+        """
+        origin = maps_pb2.GeodeticOrigin(latitude_rad=math.radians(latitude), longitude_rad=math.radians(longitude),
+                                         altitude_m=altitude)
+        self._connection.unary(self._maps.SetOrigin, maps_pb2.SetMapOriginRequest(name=self.name, origin=origin))
+
     def wait(self, timeout=None):
         """Returns Stats once every scan is integrated or has failed; TimeoutError after `timeout` seconds."""
         until = math.inf if timeout is None else clock.monotonic() + timeout

@@ -127,6 +127,16 @@ class UploadTest(ServerTest):
 
 
 class MapsTest(ServerTest):
+    def test_a_map_is_told_where_on_earth_it_is(self):
+        made = self.db.create_map("on_earth")
+        self.assertIsNone(made.origin())
+        for place in ((51.05, 13.73, 113.5), (-33.9, -70.6, -2.0)):
+            made.set_origin(*place)
+            np.testing.assert_allclose(self.db.map("on_earth").origin(), place, atol=1e-9)
+        with self.assertRaises(strata.InvalidArgument):
+            made.set_origin(91.0, 0.0, 0.0)
+        np.testing.assert_allclose(made.origin(), (-33.9, -70.6, -2.0), atol=1e-9)
+
     def test_maps_are_made_found_and_deleted(self):
         made = self.db.create_map("made", cell_size=0.2, gap_size=0.8, thickness=0.2, profile={"radius": 0.5})
         self.assertEqual(made.cell_size, 0.2)
