@@ -21,6 +21,9 @@ namespace {
 constexpr double kAtAnAngleCosine = 0.97;  // 14°
 constexpr double kTailBands = 1.6;         // from a plane, of a cell of its points beyond its band
 
+// Points without noise are off by rounding.
+constexpr double kLeastBandM = 0.001;
+
 }  // namespace
 
 PlanesAtPoints::PlanesAtPoints(const PlaneMixture& mixture, double band_sigmas)
@@ -36,7 +39,8 @@ PlanesAtPoints::PlanesAtPoints(const PlaneMixture& mixture, double band_sigmas)
     areas[*of] += cell.area_m2;
   }
   for (std::uint32_t m = 0; m < mixture.planes.size(); ++m) {
-    bands_m_.push_back(band_sigmas * std::sqrt(squares[m] / std::max(1e-9, areas[m])));
+    const double sigma_m = std::sqrt(squares[m] / std::max(1e-9, areas[m]));
+    bands_m_.push_back(std::max(kLeastBandM, band_sigmas * sigma_m));
     for (const Voxel voxel : mixture.planes[m].voxels) {
       for (const Voxel around : VoxelsAround(voxel)) {
         std::vector<std::uint32_t>& list = at_[around];

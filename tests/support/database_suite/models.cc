@@ -96,7 +96,9 @@ TEST_P(DatabaseSuite, PlanesAreFoundAndKeptUntilTheNext) {
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel fewer, ModelOf(db()));
   ASSERT_THAT(fewer.planes, SizeIs(1));
   EXPECT_EQ(fewer.info.job, again.id);
-  EXPECT_EQ(fewer.planes[0].polygons, floor.polygons);
+  // Its outline may differ: points at the foot of a wall that is none go to the floor.
+  ASSERT_THAT(fewer.planes[0].polygons, SizeIs(1));
+  EXPECT_NEAR(fewer.planes[0].polygons[0].area_m2, floor.polygons[0].area_m2, 0.1);
 }
 
 TEST_P(DatabaseSuite, AnEmptyMapHasNoPlanes) {
