@@ -20,6 +20,8 @@ namespace {
 // Of steps that may be loose, and of pairs that may be contradicted; a few may always be.
 constexpr double kMostDoubtful = 0.25;
 constexpr std::size_t kFew = 4;
+// Of absolute poses: walls reflect GPS for a while, not for most of a drive.
+constexpr double kMostFalse = 0.5;
 constexpr std::size_t kNamed = 3;
 // Scans that are looked at closely, spread over the map.
 constexpr std::size_t kMostLookedAt = 60;
@@ -99,9 +101,12 @@ void FindLooseSteps(const GraphWorld& world,
   }
 }
 
-bool IsTooMany(std::size_t doubtful, std::size_t all) {
-  return doubtful > kFew &&
-         static_cast<double>(doubtful) > kMostDoubtful * static_cast<double>(all);
+bool IsTooMany(std::size_t doubtful, std::size_t all, double most = kMostDoubtful) {
+  return doubtful > kFew && static_cast<double>(doubtful) > most * static_cast<double>(all);
+}
+
+bool PriorsContradict(const OptimizeVerdict& verdict) {
+  return IsTooMany(verdict.priors_rejected, verdict.priors, kMostFalse);
 }
 
 std::string StepsMessage(const GraphWorld& world, const OptimizeVerdict& verdict) {
@@ -126,7 +131,20 @@ std::string PairsMessage(const OptimizeVerdict& verdict) {
                          verdict.compared);
 }
 
+std::string PriorsMessage(const OptimizeVerdict& verdict) {
+  if (verdict.priors_rejected == 0) return "";
+  return absl::StrFormat("; %d of %d absolute poses do not fit what scans see",
+                         verdict.priors_rejected,
+                         verdict.priors);
+}
+
 absl::string_view Meaning(const OptimizeVerdict& verdict, AlignmentTermination termination) {
+  if (PriorsContradict(verdict)) {
+    return "Scans and absolute poses (GPS, landmarks) contradict each other: compare 'map render' "
+           "of "
+           "the proposal; job accept applies what the scans say, posegraph disable takes out "
+           "what is wrong.";
+  }
   if (!verdict.is_sound) {
     return "Too little to be applied by itself: scans nearer to each other, poses of this "
            "recording, "
@@ -146,10 +164,14 @@ absl::StatusOr<OptimizeVerdict> VerdictOn(const GraphWorld& world,
   OptimizeVerdict verdict;
   if (!result.parts.empty()) FindLooseSteps(world, result.parts, damaged.Scans(), verdict);
   STRATA_RETURN_IF_ERROR(Compare(world, views, result.T_map_scan, verdict));
-  verdict.is_sound = !IsTooMany(verdict.loose_steps.size(), verdict.steps) &&
+  verdict.priors = result.priors;
+  verdict.priors_rejected = result.rejected_priors;
+  verdict.is_sound = !PriorsContradict(verdict) &&
+                     !IsTooMany(verdict.loose_steps.size(), verdict.steps) &&
                      !IsTooMany(verdict.contradicted, verdict.compared);
   verdict.message = absl::StrCat(StepsMessage(world, verdict),
                                  PairsMessage(verdict),
+                                 PriorsMessage(verdict),
                                  ". ",
                                  Meaning(verdict, result.termination));
   return verdict;

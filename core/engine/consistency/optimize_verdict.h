@@ -17,8 +17,8 @@
 namespace strata {
 
 struct OptimizeVerdict {
-  // False: too little was measured to move scans by, or scans contradict each other where they end
-  // up.
+  // False: too little was measured to move scans by, or scans contradict each other or what else is
+  // known of their places where they end up.
   bool is_sound = true;
   std::size_t steps = 0;  // from scan to scan along trajectories
   // Those whose two scans no match, closure or given constraint joins, on any way: the nodes that
@@ -28,14 +28,17 @@ struct OptimizeVerdict {
   // of them where one looked through much of what the other saw.
   std::size_t compared = 0;
   std::size_t contradicted = 0;
+  std::size_t priors = 0;  // absolute poses, and those that do not fit
+  std::size_t priors_rejected = 0;
   std::string message;  // two sentences or three: what holds the scans, and what that means
 };
 
 // Planes that scans share are found at poses that are nearly right; a scan that nothing is matched
 // to is drawn to whatever wall is near. Where more than a quarter of the steps is loose, or of the
 // pairs contradicted, there is nothing that planes could be trusted with: recordings too sparse to
-// overlap, poses of another recording, scans of two places under one name. Damaged scans are left
-// out.
+// overlap, poses of another recording, scans of two places under one name. Where more than half of
+// the absolute poses do not fit, scans or GPS are wrong as a whole, and a person has to say which.
+// Damaged scans are left out.
 absl::StatusOr<OptimizeVerdict> VerdictOn(const GraphWorld& world,
                                           ScanViews& views,
                                           const AlignmentResult& result,

@@ -449,6 +449,7 @@ class Alignment {
     for (std::size_t k = 0; k < graph.relative.size(); ++k) {
       if (graph.relative[k].may_be_false) believed_[DecisionOn(graph, k)] = !rejected[k];
     }
+    result_.priors = graph.priors.size();
     result_.rejected_priors = solution.summary.rejected_priors.size();
     believed_priors_.assign(graph.priors.size(), true);
     for (const auto& [k, chi2] : solution.summary.rejected_priors) believed_priors_[k] = false;

@@ -139,8 +139,8 @@ struct AlignmentResult {
   // AlignmentProblem::relative first; `measured`: matches that did not.
   std::vector<RelativePoseTerm> measured;
   std::vector<RejectedMatch> rejected;
-  std::size_t rejected_priors = 0;
-  std::vector<SharedPlane> planes;  // of the last round, at the final poses
+  std::size_t rejected_priors = 0, priors = 0;  // of AlignmentProblem::priors
+  std::vector<SharedPlane> planes;              // of the last round, at the final poses
   std::vector<NodeResidual> worst_nodes;
   // Beside T_map_scan: nodes that matches and given terms join have the same number. What only
   // odometry, poses as they were or planes hold is a part of its own.

@@ -14,8 +14,13 @@ namespace strata {
 // The first node of each of `sets` in which no node is `held`, ascending; `held` has all nodes.
 std::vector<std::size_t> FirstUnheld(DisjointSets& sets, const std::vector<bool>& held);
 
-// The first node of each component of `problem` that nothing fixed and no prior holds.
-std::vector<std::size_t> NodesToHold(const PoseGraphProblem& problem);
+// The first node of each component of `problem` that nothing fixed and no prior of any weight
+// holds.
+std::vector<std::size_t> NodesToHold(const PoseGraphProblem& problem,
+                                     const std::vector<double>& prior_weights);
+
+// The first node of each component that only priors hold that may be false.
+std::vector<std::size_t> NodesInDoubt(const PoseGraphProblem& problem);
 
 }  // namespace strata
 

@@ -12,6 +12,7 @@
 #include "core/posegraph/costs/inertia_cost.h"
 #include "core/posegraph/costs/prior_cost.h"
 #include "core/posegraph/costs/relative_pose_cost.h"
+#include "core/posegraph/solver/gauge.h"
 
 namespace strata {
 namespace {
@@ -19,6 +20,9 @@ namespace {
 // Share of the terms of poses that only planes bind: two planes, or parallel ones, leave directions
 // open.
 constexpr double kInertia = 1e-6;
+// What keeps a component from swinging freely while no prior that places it counts [1/rad², 1/m²]:
+// a little beside one position of GPS.
+constexpr double kInertiaInDoubt = 1e-3;
 
 // The centre of all that was seen of a plane; where nothing has weight, the plane's point nearest
 // to the origin.
@@ -135,6 +139,10 @@ void GraphProblem::Damp(double factor) {
     if (bound[n] || translation[n] == 0.0) continue;
     auto cost = std::make_unique<InertiaCost>(kInertia * factor * rotation[n],
                                               kInertia * factor * translation[n]);
+    problem_.AddResidualBlock(cost.release(), nullptr, poses_[n].data());
+  }
+  for (const std::size_t n : NodesInDoubt(graph_)) {
+    auto cost = std::make_unique<InertiaCost>(kInertiaInDoubt, kInertiaInDoubt);
     problem_.AddResidualBlock(cost.release(), nullptr, poses_[n].data());
   }
 }

@@ -36,6 +36,8 @@ class GraphProblem {
   ceres::Problem& problem() { return problem_; }
   // Moves all blocks back to where they were built.
   void Restart();
+  // From now on the pose stays.
+  void Hold(std::size_t node) { problem_.SetParameterBlockConstant(poses_[node].data()); }
 
   // What the terms count, 1 at first; by PoseGraphProblem::relative and ::priors.
   std::vector<double>& relative_weights() { return relative_weights_; }

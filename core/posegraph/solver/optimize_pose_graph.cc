@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
 
@@ -48,6 +49,8 @@ class Candidates : public OutlierCandidates {
     return k < relative_.size() ? problem_.relative[relative_[k]].believed
                                 : problem_.priors[priors_[k - relative_.size()]].believed;
   }
+  // Without any prior scans that tell little of their places slide far away.
+  double FirstWeight(std::size_t k) const override { return k < relative_.size() ? 0.0 : 1.0; }
   void Restart() override { graph_.Restart(); }
 
  private:
@@ -103,6 +106,24 @@ std::vector<NodeResidual> WorstNodes(const PoseGraphProblem& problem, GraphProbl
   return nodes;
 }
 
+// Where all priors that placed a component turned out false, it stays where it began: on the way
+// they have moved it.
+absl::Status HoldWhatLostItsPlace(const PoseGraphProblem& problem,
+                                  const ConvergenceOptions& convergence,
+                                  const Stop& stop,
+                                  GraphProblem& graph,
+                                  PoseGraphSummary& summary) {
+  std::vector<std::size_t> to_hold = NodesToHold(problem, graph.prior_weights());
+  if (to_hold == summary.held) return absl::OkStatus();
+  graph.Restart();
+  for (const std::size_t node : to_hold) graph.Hold(node);
+  STRATA_ASSIGN_OR_RETURN(const Minimum minimum, Minimise(graph.problem(), convergence, stop));
+  summary.held = std::move(to_hold);
+  summary.iterations += minimum.iterations;
+  summary.termination = minimum.termination;
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& problem,
@@ -112,7 +133,7 @@ absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& prob
   STRATA_RETURN_IF_ERROR(ValidateProblem(problem));
   PoseGraphSolution solution;
   PoseGraphSummary& summary = solution.summary;
-  summary.held = NodesToHold(problem);
+  summary.held = NodesToHold(problem, std::vector<double>(problem.priors.size(), 1.0));
   std::vector<bool> held = problem.fixed;
   held.resize(problem.T_map_scan.size(), false);
   for (const std::size_t node : summary.held) held[node] = true;
@@ -138,6 +159,8 @@ absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& prob
                                              }));
     summary.iterations = minimum.iterations;
     summary.termination = minimum.termination;
+    STRATA_RETURN_IF_ERROR(
+        HoldWhatLostItsPlace(problem, options.convergence, stop, graph, summary));
   }
   summary.after = CostsOf(problem, graph);
   for (std::size_t k = 0; k < problem.relative.size(); ++k) {

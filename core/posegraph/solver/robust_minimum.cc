@@ -80,6 +80,16 @@ bool RejectMore(OutlierCandidates& candidates, double max_chi2) {
   return more;
 }
 
+// True if any counts.
+bool WeighAtFirst(OutlierCandidates& candidates) {
+  bool any = false;
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    candidates.Weight(k) = candidates.FirstWeight(k);
+    any = any || candidates.Weight(k) > 0.0;
+  }
+  return any;
+}
+
 // True if every candidate is known from before, and has its weight.
 bool WeighAsBefore(OutlierCandidates& candidates) {
   for (std::size_t k = 0; k < candidates.size(); ++k) {
@@ -126,14 +136,16 @@ absl::StatusOr<Minimum> MinimiseRobustly(
     candidates.Restart();  // one false closure that was believed folds the graph
   }
   // Not from the minimum of all terms, as in the paper: strong false ones fold the graph.
-  SetAll(candidates, 0.0);
-  STRATA_RETURN_IF_ERROR(go_down(kAlongTheWay).status());
+  const bool any_counts = WeighAtFirst(candidates);
+  // What counts from the beginning moves everything: halfway there the wrong ones seem to fit.
+  const ConvergenceOptions& along_the_way = any_counts ? convergence : kAlongTheWay;
+  STRATA_RETURN_IF_ERROR(go_down(along_the_way).status());
   SetAll(candidates, 1.0);
   const double worst = WorstChi2(candidates);
   if (worst > max_chi2) {
     const double convex = max_chi2 / (2.0 * worst - max_chi2);
     STRATA_RETURN_IF_ERROR(
-        Graduate(candidates, max_chi2, convex, [&] { return go_down(kAlongTheWay).status(); }));
+        Graduate(candidates, max_chi2, convex, [&] { return go_down(along_the_way).status(); }));
   }
   while (true) {
     STRATA_ASSIGN_OR_RETURN(const Minimum minimum, go_down(convergence));

@@ -21,6 +21,8 @@ class OutlierCandidates {
   virtual std::size_t size() const = 0;
   virtual double Chi2(std::size_t k) const = 0;  // in the current state, without its weight
   virtual double& Weight(std::size_t k) = 0;
+  // What it counts at the very beginning, 0 or 1.
+  virtual double FirstWeight(std::size_t /*k*/) const { return 0.0; }
   // What is known of it from before: whether it counts.
   virtual std::optional<bool> Believed(std::size_t /*k*/) const { return std::nullopt; }
   // Goes back to the state that minimising began from; of candidates known from before.

@@ -343,6 +343,24 @@ TEST_F(OptimizeTest, APriorMovesTheWorldWithoutBendingIt) {
   ExpectSound();
 }
 
+TEST_F(OptimizeTest, WhereGpsAndScansContradictEachOtherAPersonDecides) {
+  MakeWorld();
+  for (std::uint64_t k = 1; k <= 6; ++k) {
+    Constraint gps;
+    gps.j = {"run", k};
+    const double turn = static_cast<double>(k);
+    gps.T_i_j = PoseAt(200.0 * std::cos(turn), 200.0 * std::sin(turn)) * TruthOf(k);
+    gps.information = 1e4 * Matrix6d::Identity();
+    gps.may_be_false = true;
+    STRATA_ASSERT_OK(db().posegraph().AddConstraint({}, kMapName, gps));
+  }
+  const Pose before = PoseOf(1);
+  const JobInfo job = Optimize();
+  EXPECT_EQ(job.state, JobState::kProposed) << job.message;
+  EXPECT_THAT(job.message, HasSubstr("of 6 absolute poses do not fit"));
+  EXPECT_TRUE(PoseOf(1).isApprox(before, 0.0));
+}
+
 TEST_F(OptimizeTest, ADisabledConstraintIsNotUsed) {
   MakeWorld();
   Constraint lie;

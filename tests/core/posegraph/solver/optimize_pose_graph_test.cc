@@ -213,6 +213,26 @@ TEST_P(PoseGraphTest, PriorsThatAreFalseAreRejectedAndTheOthersPlaceTheMap) {
   EXPECT_GT((trusting.T_map_scan[0].translation() - truth_[0].translation()).norm(), 1.0);
 }
 
+// Each says something else, and nothing that is left places the map.
+TEST_P(PoseGraphTest, WhereAllPriorsAreFalseTheFirstPoseStays) {
+  MakePoses(30, 0.3, 2.0);
+  for (std::size_t n = 1; n < 30; ++n) AddRelative(n - 1, n, 0.01);
+  for (std::size_t n = 0; n < 30; n += 5) {
+    Pose seen = truth_[n];
+    seen.pretranslate(Eigen::Vector3d(0.0, 0.0, n % 2 == 0 ? 1000.0 : -1000.0));
+    seen.pretranslate(Eigen::Vector3d(50.0 * static_cast<double>(n), 0.0, 0.0));
+    problem_.priors.push_back({.i = n,
+                               .T_map_scan = seen,
+                               .information = Matrix6d::Identity() * 100.0,
+                               .may_be_false = true});
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto solution, OptimizePoseGraph(problem_));
+  EXPECT_EQ(solution.summary.rejected_priors.size(), problem_.priors.size());
+  EXPECT_THAT(solution.summary.held, ElementsAre(0));
+  EXPECT_LT((solution.T_map_scan[0].translation() - problem_.T_map_scan[0].translation()).norm(),
+            0.05);
+}
+
 TEST_P(PoseGraphTest, EveryComponentIsHeldOnceAndFixedPosesStay) {
   MakePoses(9, 0.1, 0.5);
   AddRelative(0, 1);
