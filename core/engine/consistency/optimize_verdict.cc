@@ -140,10 +140,8 @@ std::string PriorsMessage(const OptimizeVerdict& verdict) {
 
 absl::string_view Meaning(const OptimizeVerdict& verdict, AlignmentTermination termination) {
   if (PriorsContradict(verdict)) {
-    return "Scans and absolute poses (GPS, landmarks) contradict each other: compare 'map render' "
-           "of "
-           "the proposal; job accept applies what the scans say, posegraph disable takes out "
-           "what is wrong.";
+    return "Scans and absolute poses (GPS, landmarks) contradict each other: look at the proposal; "
+           "job accept applies what the scans say, posegraph disable takes out what is wrong.";
   }
   if (!verdict.is_sound) {
     return "Too little to be applied by itself: scans nearer to each other, poses of this "

@@ -69,12 +69,6 @@ std::vector<std::uint32_t> NearestPlanes(const PointsInMixture& points,
   return nearest;
 }
 
-std::uint64_t KeyOfPart(const std::array<std::int32_t, 3>& at) {
-  std::uint64_t key = 0;
-  for (const std::int32_t c : at) key = key << 20 | static_cast<std::uint64_t>(c & 0xFFFFF);
-  return key;
-}
-
 Eigen::Vector3d MiddleOf(const std::array<std::int32_t, 3>& at, double size_m) {
   return size_m * Eigen::Vector3d(at[0] + 0.5, at[1] + 0.5, at[2] + 0.5);
 }
@@ -83,7 +77,7 @@ std::vector<PlanePart> PartsOf(const PointsInMixture& points,
                                const std::vector<std::uint32_t>& nearest,
                                std::size_t planes,
                                double size_m) {
-  std::vector<HashMap<std::uint64_t, std::uint32_t>> index(planes);
+  std::vector<HashMap<std::array<std::int32_t, 3>, std::uint32_t>> index(planes);
   std::vector<PlanePart> parts;
   for (std::size_t i = 0; i < nearest.size(); ++i) {
     if (nearest[i] == kNoPlane) continue;
@@ -93,7 +87,7 @@ std::vector<PlanePart> PartsOf(const PointsInMixture& points,
       at[axis] = static_cast<std::int32_t>(std::floor(p(static_cast<Eigen::Index>(axis)) / size_m));
     }
     const auto [found, is_new] =
-        index[nearest[i]].try_emplace(KeyOfPart(at), static_cast<std::uint32_t>(parts.size()));
+        index[nearest[i]].try_emplace(at, static_cast<std::uint32_t>(parts.size()));
     if (is_new) {
       parts.emplace_back();
       parts.back().plane = nearest[i];
@@ -138,10 +132,10 @@ std::vector<CellLayer> CellsOfPlanes(const PosedPoints& points,
   PlanesAtPoints at(mixture, kOnSigmas);
   const std::vector<std::uint32_t> nearest = NearestPlanes(moved, planes, at);
   std::vector<CellLayer> layers;
-  HashMap<std::uint64_t, std::uint32_t> depth;  // by place
+  HashMap<std::array<std::int32_t, 3>, std::uint32_t> depth;  // by place
   for (const PlanePart& part : PartsOf(moved, nearest, planes, options.cell_size_m)) {
     if (part.sum(3, 3) < kLeastOfPart) continue;
-    const std::uint32_t k = depth[KeyOfPart(part.at)]++;
+    const std::uint32_t k = depth[part.at]++;
     if (layers.size() <= k) layers.resize(k + 1);
     layers[k].cells.push_back(CellOfPart(part, mixture.planes[part.plane].plane.normal, options));
     layers[k].colours.emplace_back();

@@ -51,13 +51,7 @@ Place PlaceOf(const Eigen::Vector3f& p, double cell_size_m) {
 }
 
 // `known` points by places that have enough others.
-using KnownPoints = HashMap<std::uint64_t, std::vector<Eigen::Vector3f>>;
-
-std::uint64_t KeyOfPlace(const Place& at) {
-  std::uint64_t key = 0;
-  for (const std::int32_t c : at) key = key << 20 | static_cast<std::uint64_t>(c & 0xFFFFF);
-  return key;
-}
+using KnownPoints = HashMap<Place, std::vector<Eigen::Vector3f>>;
 
 struct Peel {
   MomentsFit fit;
@@ -177,10 +171,10 @@ KnownPoints KnownNear(std::span<const PlacedPoint> left,
                       double cell_size_m) {
   KnownPoints near;
   for (std::size_t i = 0; i + kLeastOn <= left.size(); ++i) {
-    if (left[i + kLeastOn - 1].at == left[i].at) near.try_emplace(KeyOfPlace(left[i].at));
+    if (left[i + kLeastOn - 1].at == left[i].at) near.try_emplace(left[i].at);
   }
   for (const Eigen::Vector3f& p : known) {
-    const auto found = near.find(KeyOfPlace(PlaceOf(p, cell_size_m)));
+    const auto found = near.find(PlaceOf(p, cell_size_m));
     if (found != near.end()) found->second.push_back(p);
   }
   return near;
@@ -219,7 +213,7 @@ std::vector<CellLayer> PeelCells(std::span<const Eigen::Vector3f> left,
   for (auto begin = all.begin(); begin != all.end();) {
     const auto end =
         std::find_if(begin, all.end(), [&](const auto& point) { return point.at != begin->at; });
-    const auto found = near.find(KeyOfPlace(begin->at));
+    const auto found = near.find(begin->at);
     if (found != near.end()) {
       PeelPlace(Points(begin, end), found->second, options, random, layers);
     }
