@@ -25,6 +25,9 @@ namespace {
 // information: more would repeat the same measurement.
 constexpr std::size_t kMaxConstraints = 3;
 
+// The first scan of a trajectory is looked for in so many parts of the map.
+constexpr std::size_t kPartsTried = 3;
+
 // So few scans of a pass are matched whatever their height: a ramp leads from one to the next.
 constexpr std::size_t kJustBefore = 3;
 
@@ -66,14 +69,15 @@ absl::Status Aligner::Load(StorageReader& reader, std::uint64_t epoch) {
 void Aligner::Add(const ScanRecord& scan, const Placement& placement) {
   const ScanId& id = scan.header.id;
   std::map<std::uint64_t, std::size_t>& trajectory = trajectories_[id.trajectory];
+  const bool is_first = trajectory.empty();
   const std::size_t begun =
-      trajectory.empty() ? scans_.size() : scans_[trajectory.begin()->second].trajectory;
+      is_first ? scans_.size() : scans_[trajectory.begin()->second].trajectory;
   trajectory[id.sequence] = scans_.size();
   indices_[scan.number] = scans_.size();
   scans_.push_back({scan.number,
                     scan.header.T_map_scan,
                     scan.header.sensor_origin.cast<double>(),
-                    !placement.report.aligned && placement.report.iterations > 0,
+                    !is_first && !placement.report.aligned && placement.report.iterations > 0,
                     begun});
   poses_.push_back(placement.T_map_scan);
   JoinParts(placement.constraints);
@@ -208,6 +212,50 @@ std::vector<ConstraintRecord> Aligner::ConstraintsOf(ScanNumber number,
   return records;
 }
 
+std::vector<std::vector<std::size_t>> Aligner::PartsAround(const Pose& guess) {
+  const std::vector<std::size_t> believed = Believed(All());
+  std::vector<Pose> poses;
+  for (const std::size_t i : believed) poses.push_back(poses_[i]);
+  std::vector<std::size_t> near;
+  for (const std::size_t k : SelectNeighbours(poses, guess)) near.push_back(believed[k]);
+  NearestFirst(poses_, guess, near);
+  std::vector<std::size_t> roots;
+  std::vector<std::vector<std::size_t>> parts;
+  for (const std::size_t i : near) {
+    const std::size_t root = parts_.Root(scans_[i].trajectory);
+    if (parts.size() == kPartsTried || std::ranges::find(roots, root) != roots.end()) continue;
+    roots.push_back(root);
+    std::vector<std::size_t>& part = parts.emplace_back();
+    std::ranges::copy_if(believed, std::back_inserter(part), [&](std::size_t other) {
+      return parts_.Root(scans_[other].trajectory) == root;
+    });
+  }
+  return parts;
+}
+
+absl::StatusOr<Placement> Aligner::PlaceAmongOthers(ScanNumber number,
+                                                    const SeenScan& seen,
+                                                    const Pose& guess,
+                                                    StorageReader& reader,
+                                                    ScanSource& source) {
+  Placement placement;
+  placement.T_map_scan = guess;
+  placement.report.message = "no scan around to align to";
+  bool is_tried = false;
+  for (const std::vector<std::size_t>& part : PartsAround(guess)) {
+    STRATA_ASSIGN_OR_RETURN(const Neighbourhood around, NeighboursOf(guess, part, reader, source));
+    if (around.seen.empty()) continue;
+    const Link link = LinkScan(seen, around.seen, guess, Nearness::kSaid);
+    if (!is_tried || link.report.aligned) placement.report = link.report;
+    is_tried = true;
+    if (!link.report.aligned) continue;
+    placement.T_map_scan = link.T_map_scan;
+    placement.constraints = ConstraintsOf(number, link, around.indices);
+    break;
+  }
+  return placement;
+}
+
 absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
                                          const MlsMap& registration_map,
                                          StorageReader& reader,
@@ -223,22 +271,13 @@ absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
   placement.T_map_scan = guess;
   const SeenScan seen{own.get(), guess, scan.header.sensor_origin.cast<double>()};
   const std::vector<std::size_t> pass = Believed(OwnPass(scan, guess));
-  Nearness nearness = Nearness::kSamePass;
-  STRATA_ASSIGN_OR_RETURN(Neighbourhood around, NeighboursOf(guess, pass, reader, source));
-  if (around.seen.empty()) {
-    nearness = Nearness::kSaid;
-    STRATA_ASSIGN_OR_RETURN(around, NeighboursOf(guess, Believed(All()), reader, source));
-  }
-  if (around.seen.empty()) {
-    placement.report.message = "no scan around to align to";
-    return placement;
-  }
-  const Link link = LinkScan(seen, around.seen, guess, nearness);
+  STRATA_ASSIGN_OR_RETURN(const Neighbourhood around, NeighboursOf(guess, pass, reader, source));
+  if (around.seen.empty()) return PlaceAmongOthers(scan.number, seen, guess, reader, source);
+  const Link link = LinkScan(seen, around.seen, guess, Nearness::kSamePass);
   placement.report = link.report;
   if (!link.report.aligned) return placement;
   placement.T_map_scan = link.T_map_scan;
   placement.constraints = ConstraintsOf(scan.number, link, around.indices);
-  if (nearness == Nearness::kSaid) return placement;
   const std::vector<std::size_t> level = Around(link.T_map_scan, pass);
   STRATA_ASSIGN_OR_RETURN(const Neighbourhood all,
                           NeighboursOf(link.T_map_scan, level, reader, source));

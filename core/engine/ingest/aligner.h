@@ -59,7 +59,7 @@ class Aligner {
     ScanNumber number;
     Pose T_map_scan_uploaded;
     Eigen::Vector3d sensor_origin;  // scan frame
-    bool is_lost = false;           // others were around, and none said where it is
+    bool is_lost = false;           // others of its pass were around, and none said where it is
     std::size_t trajectory = 0;     // by its first scan's place in scans_
   };
   using Features = std::shared_ptr<const ScanFeatures>;
@@ -88,6 +88,15 @@ class Aligner {
   // Those of `among` around `guess`.
   absl::StatusOr<Neighbourhood> NeighboursOf(const Pose& guess,
                                              const std::vector<std::size_t>& among,
+                                             StorageReader& reader,
+                                             ScanSource& source);
+  // Scans around `guess` by the parts of the map that constraints hold together: nothing says how
+  // two of these lie. The part of the nearest scan first.
+  std::vector<std::vector<std::size_t>> PartsAround(const Pose& guess);
+  // Of a scan that no other of its pass is around: to the nearest part that shows the same.
+  absl::StatusOr<Placement> PlaceAmongOthers(ScanNumber number,
+                                             const SeenScan& seen,
+                                             const Pose& guess,
                                              StorageReader& reader,
                                              ScanSource& source);
   // What a link to `partners` says about the scan, as constraints to the nearest of them.

@@ -17,10 +17,6 @@ namespace {
 // Within these of the guess, registration and the robot say the same.
 constexpr double kSameM = 0.3;
 constexpr double kSameRad = 0.05;
-// Scans farther than these from where they were believed are looked for in vain.
-constexpr double kSearchedM = 5.0;
-constexpr double kSearchedHeightM = 1.5;
-constexpr double kSearchedRad = 0.4;
 // What is searched for a place: the nearest few.
 constexpr std::size_t kPlaceScans = 5;
 // Scans of another pass show the same at least to this share.
@@ -84,7 +80,7 @@ PlaceMatch PlaceOf(const SeenScan& scan,
                    std::span<const SeenScan> around,
                    const Pose& guess,
                    Nearness nearness) {
-  const PlaceHypothesis window{guess, kSearchedM, kSearchedHeightM, kSearchedRad};
+  const PlaceHypothesis window = SaidHypothesis(guess);
   return MatchPlace(scan, Nearest(around, guess), {&window, 1}, PlaceOptions(nearness));
 }
 
