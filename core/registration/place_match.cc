@@ -37,6 +37,10 @@ constexpr double kNoReturnCounts = 0.5;
 // Contradictions make a fit worse by e for each of this.
 constexpr double kContradictionScale = 0.05;
 constexpr double kTiltMatters = 0.03;
+// How far off frames are that are said to be one.
+constexpr double kSaidRadiusM = 5.0;
+constexpr double kSaidHeightM = 1.5;
+constexpr double kSaidHeadingRad = 0.4;
 
 // Counts over the features of one scan that another one could see at the pose.
 struct Comparison {
@@ -267,6 +271,17 @@ PlaceVerdict VerdictOn(const Fit& fit,
 }
 
 }  // namespace
+
+PlaceHypothesis SaidHypothesis(const Pose& T_target_source) {
+  return {T_target_source, kSaidRadiusM, kSaidHeightM, kSaidHeadingRad};
+}
+
+bool IsWithin(const Pose& T_target_source, const PlaceHypothesis& window) {
+  const Pose off = window.T_target_source.inverse() * T_target_source;
+  return off.translation().head<2>().norm() <= window.radius_m &&
+         std::abs(off.translation().z()) <= window.height_range_m &&
+         std::abs(std::atan2(off.linear()(1, 0), off.linear()(0, 0))) <= window.heading_range_rad;
+}
 
 std::vector<PlaceHypothesis> HypothesesOf(const PlaceSimilarity& similarity,
                                           const Pose& T_target_scan) {

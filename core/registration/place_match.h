@@ -43,6 +43,11 @@ struct PlaceHypothesis {
   double heading_range_rad = 0.1;  // to both sides; in [0, π], π: any heading
 };
 
+// Around where the frames of two robots say the source is, as far off as such frames are.
+PlaceHypothesis SaidHypothesis(const Pose& T_target_source);
+// Whether a pose lies in the window.
+bool IsWithin(const Pose& T_target_source, const PlaceHypothesis& window);
+
 // The two headings that a descriptor's comparison leaves (a: the target scan at `T_target_scan`, b:
 // the source), upright, with the default window.
 std::vector<PlaceHypothesis> HypothesesOf(const PlaceSimilarity& similarity,

@@ -127,8 +127,9 @@ class CandidateSearch {
   void AddNear(std::size_t i, const std::vector<PathUncertainty>& known) {
     std::map<Segment, ClosureCandidate> best;
     for (std::size_t j = 0; j < nodes_.size(); ++j) {
+      // Frames that nothing joins are often one all the same: then the poses are as they should be.
       const PathUncertainty& u = known[j];
-      if (j == i || !u.connected || SaysNothingNew(u)) continue;
+      if (j == i || SaysNothingNew(u)) continue;
       if (options_.sigmas * u.sigma_m > options_.max_window_m) continue;
       const double apart = Apart(i, j);
       if (!MayBeNear(apart, u)) continue;
@@ -136,7 +137,7 @@ class CandidateSearch {
       const double spread = range * range + u.sigma_m * u.sigma_m;
       const double likely = range * range / spread * std::exp(-0.5 * apart * apart / spread);
       ClosureCandidate& held = best[layout_.segments[j]];
-      const double score = likely * Telling(u.sigma_m);
+      const double score = likely * Telling(u.connected ? u.sigma_m : kInfinite);
       if (score > held.score) held = Candidate(i, j, u, ClosureReason::kNear, score);
     }
     for (auto& [segment, candidate] : best) {
@@ -156,6 +157,8 @@ class CandidateSearch {
       candidate.hypotheses = {GraphHypothesis(candidate)};
     } else {
       candidate.hypotheses = LooksHypotheses(pair, candidate);
+      // What looks alike must fit better elsewhere than as it is.
+      if (!known.connected) candidate.hypotheses.push_back(GraphHypothesis(candidate));
       if (candidate.hypotheses.empty()) return;
     }
     candidates_.push_back(std::move(candidate));
@@ -190,7 +193,9 @@ class CandidateSearch {
     return hypotheses;
   }
 
+  // As far around the current poses as the graph leaves open.
   PlaceHypothesis GraphHypothesis(const ClosureCandidate& c) const {
+    if (std::isinf(c.sigma_m)) return SaidHypothesis(c.T_i_j);
     const double reach = options_.sigmas * c.sigma_m;
     return {c.T_i_j,
             std::clamp(reach, kLeastRadiusM, options_.max_window_m),

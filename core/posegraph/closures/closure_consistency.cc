@@ -16,6 +16,7 @@
 
 #include "core/common/option_checks.h"
 #include "core/common/status.h"
+#include "core/registration/place_match.h"
 
 namespace strata {
 namespace {
@@ -88,9 +89,11 @@ class ConsistencyCheck {
     set.support.assign(closures_.size(), 0);
     for (const auto& [parts, members] : groups_) {
       const bool one_part = parts.first == parts.second;
+      const bool is_as_said =
+          !one_part && std::ranges::any_of(members, [this](std::size_t c) { return IsAsSaid(c); });
       std::vector<std::size_t> believable;
       for (const std::size_t c : members) {
-        if (!one_part || AgreesWithGraph(c)) believable.push_back(c);
+        if (one_part ? AgreesWithGraph(c) : !is_as_said || IsAsSaid(c)) believable.push_back(c);
       }
       Cliques cliques(believable.size());
       for (std::size_t a = 0; a < believable.size(); ++a) {
@@ -102,10 +105,7 @@ class ConsistencyCheck {
         set.support[believable[a]] = cliques.Degree(a);
       }
       const std::vector<std::size_t> largest = cliques.Largest();
-      if (!one_part &&
-          FewestScans(believable, largest) < static_cast<std::size_t>(options_.min_between_parts)) {
-        continue;
-      }
+      if (!one_part && !is_as_said && !AreSpread(believable, largest)) continue;
       for (const std::size_t a : largest) set.kept.push_back(believable[a]);
     }
     std::sort(set.kept.begin(), set.kept.end());
@@ -125,18 +125,35 @@ class ConsistencyCheck {
            RotationAngleRad(error) <= options_.max_sigmas * std::sqrt(variance_rad2);
   }
 
-  // Scans of the part that has fewer in these closures between two parts.
-  std::size_t FewestScans(const std::vector<std::size_t>& believable,
-                          const std::vector<std::size_t>& chosen) const {
+  // Whether these closures between two parts are of enough scans, and far enough apart.
+  bool AreSpread(const std::vector<std::size_t>& believable,
+                 const std::vector<std::size_t>& chosen) const {
     std::map<std::size_t, std::set<std::size_t>> scans;  // by part
     for (const std::size_t a : chosen) {
       const Closure& closure = closures_[believable[a]];
       scans[part_[closure.i]].insert(closure.i);
       scans[part_[closure.j]].insert(closure.j);
     }
-    std::size_t fewest = chosen.size();
-    for (const auto& [part, seen] : scans) fewest = std::min(fewest, seen.size());
-    return fewest;
+    return std::ranges::all_of(scans, [this](const auto& part) {
+      return part.second.size() >= static_cast<std::size_t>(options_.min_between_parts) &&
+             ExtentOf(part.second) >= options_.min_spread_m;
+    });
+  }
+
+  double ExtentOf(const std::set<std::size_t>& scans) const {
+    double extent = 0.0;
+    for (const std::size_t a : scans) {
+      for (const std::size_t b : scans) {
+        extent = std::max(extent, (poses_[a].translation() - poses_[b].translation()).norm());
+      }
+    }
+    return extent;
+  }
+
+  // The frames of the two parts say about the same.
+  bool IsAsSaid(std::size_t c) const {
+    const Closure& closure = closures_[c];
+    return IsWithin(closure.T_i_j, SaidHypothesis(poses_[closure.i].inverse() * poses_[closure.j]));
   }
 
   bool AgreesWithGraph(std::size_t c) const {
@@ -242,6 +259,7 @@ absl::Status ClosureConsistencyOptions::Validate() const {
   OptionChecks checks("closure consistency options");
   checks.InRange("max_sigmas", max_sigmas, 1e-6, 100.0);
   checks.InRange("min_between_parts", min_between_parts, 1, 1000);
+  checks.InRange("min_spread_m", min_spread_m, 0.0, 1000.0);
   STRATA_RETURN_IF_ERROR(checks.status());
   return drift.Validate();
 }

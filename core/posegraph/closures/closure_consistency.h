@@ -38,6 +38,9 @@ struct ClosureConsistencyOptions {
   // on both sides on: those of one scan, wherever it looks alike, agree with each other and say
   // nothing that could be checked; [1, 1000].
   int min_between_parts = 2;
+  // These scans lie so far apart, on both sides [m]: the corners of a yard look alike from all
+  // places that see nothing else. In [0, 1000].
+  double min_spread_m = 5.0;
 
   absl::Status Validate() const;
 };
@@ -51,7 +54,8 @@ struct ConsistentClosureSet {
 
 // `edges` are the relative poses in force, without the closures. Closures within one part of the
 // graph must also agree with the graph itself, as far as its σ says. Closures of two parts are
-// checked against the others of the same two parts. The set is found by growing one from every
+// checked against the others of the same two parts; where one agrees with what the frames of the
+// parts say (SaidHypothesis), it is enough, and those that do not agree are none. The set is found by growing one from every
 // closure, most consistent ones first: large, and the largest where there is little contradiction.
 // Ties prefer what comes first. A pure function; some ms a closure for 20,000 poses.
 // INVALID_ARGUMENT for invalid options, poses, σ, or closures and edges that name no nodes.

@@ -228,6 +228,20 @@ TEST(UniquePlaceTest, MatchesElsewhereMakeItNobodysPlace) {
   EXPECT_EQ(UniquePlace(weak_rival), 0U);
 }
 
+TEST(SaidHypothesisTest, IsAWindowOnAllSides) {
+  const Pose said(Eigen::Translation3d(100.0, -20.0, 3.0) *
+                  Eigen::AngleAxisd(2.5, Eigen::Vector3d::UnitZ()));
+  const PlaceHypothesis window = SaidHypothesis(said);
+  const auto off = [&](double x, double y, double z, double turn) {
+    return said * Eigen::Translation3d(x, y, z) * Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ());
+  };
+  EXPECT_TRUE(IsWithin(said, window));
+  EXPECT_TRUE(IsWithin(off(-3.0, 3.5, 1.4, 0.35), window));
+  EXPECT_FALSE(IsWithin(off(-3.0, 4.5, 0.0, 0.0), window));
+  EXPECT_FALSE(IsWithin(off(0.0, 0.0, -1.6, 0.0), window));
+  EXPECT_FALSE(IsWithin(off(0.0, 0.0, 0.0, -0.45), window));
+}
+
 TEST(PlaceMatchOptionsTest, NamesWhatIsOutOfRange) {
   PlaceMatchOptions options;
   STRATA_EXPECT_OK(options.Validate());

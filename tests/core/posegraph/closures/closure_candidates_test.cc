@@ -135,10 +135,30 @@ TEST(ClosureCandidatesTest, RobotsThatNothingConnectsAreTriedWhereTheyLookAlike)
   EXPECT_EQ(candidates[0].j, other + 10);
   EXPECT_EQ(candidates[0].reason, ClosureReason::kAlike);
   EXPECT_TRUE(std::isinf(candidates[0].sigma_m));
-  ASSERT_EQ(candidates[0].hypotheses.size(), 2U);
+  ASSERT_EQ(candidates[0].hypotheses.size(), 3U);
+  EXPECT_TRUE(candidates[0].hypotheses[2].T_target_source.isApprox(candidates[0].T_i_j))
+      << "what looks alike has to fit better than what the frames say";
   // The index compared j with i, so the heading is the other way round.
   const Eigen::Matrix3d& R = candidates[0].hypotheses[0].T_target_source.linear();
   EXPECT_NEAR(std::remainder(std::atan2(R(1, 0), R(0, 0)) + 1.0, std::numbers::pi), 0.0, 1e-9);
+}
+
+TEST(ClosureCandidatesTest, RobotsWhoseFramesSayThatTheyAreNearAreTriedThere) {
+  Graph graph;
+  graph.Drive(1, Circle(0.2));
+  const std::size_t other = graph.nodes.size();
+  graph.Drive(2, Circle(0.2, {8.0, 0.0, 0.0}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto candidates,
+                              FindClosureCandidates(graph.nodes, graph.edges, {}));
+  EXPECT_GT(candidates.size(), 5U);
+  for (const ClosureCandidate& c : candidates) {
+    EXPECT_LT(c.i, other);
+    EXPECT_GE(c.j, other);
+    EXPECT_LE(Apart(graph, c), 12.0);
+    EXPECT_EQ(c.reason, ClosureReason::kNear);
+    ASSERT_EQ(c.hypotheses.size(), 1U);
+    EXPECT_EQ(c.hypotheses[0].radius_m, SaidHypothesis(c.T_i_j).radius_m);
+  }
 }
 
 TEST(ClosureCandidatesTest, LooksThatThePosesRuleOutAreNotTried) {

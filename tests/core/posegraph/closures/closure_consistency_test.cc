@@ -111,6 +111,7 @@ TEST(ClosureConsistencyTest, OneAloneBetweenTwoRobotsIsNotBelieved) {
   EXPECT_THAT(set.kept, IsEmpty());
   ClosureConsistencyOptions trusting;
   trusting.min_between_parts = 1;
+  trusting.min_spread_m = 0.0;
   STRATA_ASSERT_OK_AND_ASSIGN(set, ConsistentClosures(robots.poses, robots.edges, one, trusting));
   EXPECT_THAT(set.kept, ElementsAre(0));
 }
@@ -125,6 +126,35 @@ TEST(ClosureConsistencyTest, ClosuresOfOneScanBetweenTwoRobotsAreNotBelieved) {
   closures.push_back(robots.True(7, TwoRobots::kScans + 8));
   STRATA_ASSERT_OK_AND_ASSIGN(set, ConsistentClosures(robots.poses, robots.edges, closures));
   EXPECT_THAT(set.kept, ElementsAre(0, 1, 2, 3));
+}
+
+TEST(ClosureConsistencyTest, ClosuresOfScansOfOneSpotBetweenTwoRobotsAreNotBelieved) {
+  TwoRobots robots(2);
+  const std::size_t other = TwoRobots::kScans;
+  std::vector<Closure> closures;
+  for (const std::size_t i : {4, 5, 6}) closures.push_back(robots.True(i, other + i));  // 4 m
+  STRATA_ASSERT_OK_AND_ASSIGN(ConsistentClosureSet set,
+                              ConsistentClosures(robots.poses, robots.edges, closures));
+  EXPECT_THAT(set.kept, IsEmpty());
+  closures.push_back(robots.True(7, other + 4));  // 6 m on one side alone
+  STRATA_ASSERT_OK_AND_ASSIGN(set, ConsistentClosures(robots.poses, robots.edges, closures));
+  EXPECT_THAT(set.kept, IsEmpty());
+  closures.push_back(robots.True(4, other + 7));
+  STRATA_ASSERT_OK_AND_ASSIGN(set, ConsistentClosures(robots.poses, robots.edges, closures));
+  EXPECT_THAT(set.kept, ElementsAre(0, 1, 2, 3, 4));
+}
+
+TEST(ClosureConsistencyTest, OneThatAgreesWithWhatTheFramesSayOutweighsManyThatDoNot) {
+  TwoRobots robots(3);
+  const std::size_t other = TwoRobots::kScans;
+  std::vector<Closure> closures;  // all agree with each other; the frames are 300 m apart
+  for (std::size_t k = 0; k < 8; ++k) closures.push_back(robots.True(7 * k, other + 7 * k + 2));
+  Closure said{30, other + 30, robots.poses[30].inverse() * robots.poses[other + 30], 0.1, 0.01};
+  said.T_i_j = said.T_i_j * Step(0.2, 2.0, 1.0, 0.5);
+  closures.push_back(said);
+  STRATA_ASSERT_OK_AND_ASSIGN(const ConsistentClosureSet set,
+                              ConsistentClosures(robots.poses, robots.edges, closures));
+  EXPECT_THAT(set.kept, ElementsAre(8));
 }
 
 TEST(ClosureConsistencyTest, WithinOneTrajectoryTheGraphItselfIsAsked) {
