@@ -25,10 +25,11 @@ struct PosedPlanes {
 // A plane of the world and what scans have in it.
 struct SharedPlane {
   struct View {
-    std::size_t scan = 0;     // index into what was given
-    Eigen::Matrix4d moments;  // Σ p̃p̃ᵀ/σ² in the scan frame, see SharedPlaneOptions
-    double weight = 0.0;      // area [m²] of its patches, or length [m] of its edges
-    double rms_m = 0.0;       // of their distance to `plane` at the given poses
+    std::size_t scan = 0;  // index into what was given
+    // Σ p̃p̃ᵀ/σ² in the scan frame, see SharedPlaneOptions.
+    Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
+    double weight = 0.0;  // area [m²] of its patches, or length [m] of its edges
+    double rms_m = 0.0;   // of their distance to `plane` at the given poses
   };
   Plane plane;                 // in the map; the normal points to where it was seen from
   bool from_edges = false;     // otherwise from patches

@@ -122,8 +122,16 @@ class Alignment {
     AlignmentRound round;
     STRATA_RETURN_IF_ERROR(Register(round));
     PoseGraphProblem graph = Graph(round);
-    STRATA_RETURN_IF_ERROR(AddPlanes(graph, round));
+    if (options_.planes && !PlanesHold()) STRATA_RETURN_IF_ERROR(FindPlanes());
+    AddPlanes(graph);
     STRATA_ASSIGN_OR_RETURN(PoseGraphSolution solution, Solve(graph));
+    if (SplitPlanes(graph, solution)) {
+      AddPlanes(graph);
+      STRATA_ASSIGN_OR_RETURN(solution, Solve(graph));
+    }
+    for (const SharedPlane& plane : shared_) round.supports += plane.views.size();
+    round.planes = shared_.size();
+    round.directions = directions_.size();
     for (std::size_t k = 0; k < solution.T_map_scan.size(); ++k) {
       const Pose& after = solution.T_map_scan[k];
       round.max_shift_m =
@@ -362,19 +370,39 @@ class Alignment {
     return std::nullopt;
   }
 
-  absl::Status AddPlanes(PoseGraphProblem& graph, AlignmentRound& round) {
-    if (!options_.planes) return absl::OkStatus();
-    if (!PlanesHold()) STRATA_RETURN_IF_ERROR(FindPlanes());
+  void AddPlanes(PoseGraphProblem& graph) const {
+    graph.planes.clear();
+    graph.directions.clear();
     for (const SharedPlane& plane : shared_) {
       graph.planes.push_back(TermOf(plane, result_.T_map_scan));
-      round.supports += plane.views.size();
     }
-    round.planes = shared_.size();
     for (const SharedDirection& direction : directions_) {
       graph.directions.push_back(TermOf(direction, result_.T_map_scan));
     }
-    round.directions = directions_.size();
-    return absl::OkStatus();
+  }
+
+  // Parts of the graph that neither relative poses nor priors join know nothing of each other. A
+  // few walls in common would let one slide along them, as far as their tilts are wrong. Whether
+  // any plane was of two parts.
+  bool SplitPlanes(const PoseGraphProblem& graph, const PoseGraphSolution& solution) {
+    std::vector<bool> rejected(graph.relative.size(), false);
+    for (const auto& [k, chi2] : solution.summary.rejected_relative) rejected[k] = true;
+    std::vector<bool> placed(graph.priors.size(), true);
+    for (const auto& [k, chi2] : solution.summary.rejected_priors) placed[k] = false;
+    DisjointSets joined = JoinedBy(graph, rejected, graph.relative.size());
+    std::optional<std::size_t> first;
+    for (std::size_t k = 0; k < placed.size(); ++k) {
+      if (placed[k]) joined.Join(first.value_or(graph.priors[k].i), graph.priors[k].i);
+      if (placed[k] && !first.has_value()) first = graph.priors[k].i;
+    }
+    const std::vector<std::size_t> parts = RootsOf(joined, graph.T_map_scan.size());
+    const bool is_split = std::ranges::any_of(shared_, [&parts](const SharedPlane& plane) {
+      return std::ranges::any_of(plane.views, [&](const SharedPlane::View& view) {
+        return parts[view.scan] != parts[plane.views[0].scan];
+      });
+    });
+    if (is_split) shared_ = SplitByPart(shared_, parts);
+    return is_split;
   }
 
   // Planes found anew at poses that differ by less than the search allows for are others by chance
@@ -456,21 +484,28 @@ class Alignment {
     for (std::size_t k = given; k < graph.relative.size(); ++k) {
       if (!rejected[k]) result_.measured.push_back(graph.relative[k]);
     }
-    result_.parts = PartsOf(graph, rejected);
+    DisjointSets joined = JoinedBy(graph, rejected, measured_end_);
+    result_.parts = RootsOf(joined, graph.T_map_scan.size());
     for (std::size_t p = 0; p < shared_.size(); ++p) shared_[p].plane = solution.planes[p];
     result_.planes = shared_;
     result_.worst_nodes = std::move(solution.summary.worst_nodes);
   }
 
-  std::vector<std::size_t> PartsOf(const PoseGraphProblem& graph,
-                                   const std::vector<bool>& rejected) const {
+  // By the first `end` relative poses.
+  static DisjointSets JoinedBy(const PoseGraphProblem& graph,
+                               const std::vector<bool>& rejected,
+                               std::size_t end) {
     DisjointSets joined;
-    for (std::size_t k = 0; k < measured_end_; ++k) {
+    for (std::size_t k = 0; k < end; ++k) {
       if (!rejected[k]) joined.Join(graph.relative[k].i, graph.relative[k].j);
     }
-    std::vector<std::size_t> parts;
-    for (std::size_t k = 0; k < graph.T_map_scan.size(); ++k) parts.push_back(joined.Root(k));
-    return parts;
+    return joined;
+  }
+
+  static std::vector<std::size_t> RootsOf(DisjointSets& joined, std::size_t nodes) {
+    std::vector<std::size_t> roots;
+    for (std::size_t k = 0; k < nodes; ++k) roots.push_back(joined.Root(k));
+    return roots;
   }
 
   const AlignmentProblem& problem_;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 
@@ -59,6 +61,25 @@ PlaneTerm TermOf(const SharedPlane& plane, const std::vector<Pose>& T_map_scan) 
     term.views.push_back({view.scan, weight * view.moments});
   }
   return term;
+}
+
+std::vector<SharedPlane> SplitByPart(const std::vector<SharedPlane>& planes,
+                                     const std::vector<std::size_t>& parts) {
+  std::vector<SharedPlane> split;
+  for (const SharedPlane& plane : planes) {
+    std::map<std::size_t, SharedPlane> of_part;
+    for (const SharedPlane::View& view : plane.views) {
+      SharedPlane& seen =
+          of_part.try_emplace(parts[view.scan], SharedPlane{plane.plane, plane.from_edges, {}, 0.0})
+              .first->second;
+      seen.views.push_back(view);
+      seen.support_value += view.weight;
+    }
+    for (auto& [part, seen] : of_part) {
+      if (seen.views.size() > 1) split.push_back(std::move(seen));
+    }
+  }
+  return split;
 }
 
 DirectionTerm TermOf(const SharedDirection& direction, const std::vector<Pose>& T_map_scan) {

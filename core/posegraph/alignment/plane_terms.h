@@ -3,6 +3,7 @@
 #ifndef STRATA_CORE_POSEGRAPH_ALIGNMENT_PLANE_TERMS_H_
 #define STRATA_CORE_POSEGRAPH_ALIGNMENT_PLANE_TERMS_H_
 
+#include <cstddef>
 #include <vector>
 
 #include "core/geometry/pose.h"
@@ -21,6 +22,11 @@ DirectionTerm TermOf(const SharedDirection& direction, const std::vector<Pose>& 
 
 // The term of a plane, as much as its views agree at these poses.
 PlaneTerm TermOf(const SharedPlane& plane, const std::vector<Pose>& T_map_scan);
+
+// The planes as each part of the graph sees them, in the order of `planes`; `parts` says of every
+// scan which it is of. Those that fewer than two scans of a part see are left out.
+std::vector<SharedPlane> SplitByPart(const std::vector<SharedPlane>& planes,
+                                     const std::vector<std::size_t>& parts);
 
 }  // namespace strata
 

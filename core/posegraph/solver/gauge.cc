@@ -34,16 +34,20 @@ std::vector<std::size_t> NodesToHold(const PoseGraphProblem& problem,
 }
 
 std::vector<std::size_t> NodesInDoubt(const PoseGraphProblem& problem) {
-  std::vector<double> weights(problem.priors.size(), 1.0);
-  const std::vector<std::size_t> to_hold = NodesToHold(problem, weights);
-  for (std::size_t k = 0; k < weights.size(); ++k) {
-    if (problem.priors[k].may_be_false) weights[k] = 0.0;
+  DisjointSets joined;
+  for (const RelativePoseTerm& term : problem.relative) {
+    if (!term.may_be_false) joined.Join(term.i, term.j);
   }
-  std::vector<std::size_t> in_doubt = NodesToHold(problem, weights);
-  std::erase_if(in_doubt, [&](std::size_t node) {
-    return std::binary_search(to_hold.begin(), to_hold.end(), node);
-  });
-  return in_doubt;
+  std::vector<bool> held = problem.fixed;
+  held.resize(problem.T_map_scan.size(), false);
+  for (const PriorTerm& term : problem.priors) {
+    if (!term.may_be_false) held[term.i] = true;
+  }
+  for (const std::size_t node :
+       NodesToHold(problem, std::vector<double>(problem.priors.size(), 1.0))) {
+    held[node] = true;
+  }
+  return FirstUnheld(joined, held);
 }
 
 }  // namespace strata

@@ -19,7 +19,8 @@ std::vector<std::size_t> FirstUnheld(DisjointSets& sets, const std::vector<bool>
 std::vector<std::size_t> NodesToHold(const PoseGraphProblem& problem,
                                      const std::vector<double>& prior_weights);
 
-// The first node of each component that only priors hold that may be false.
+// The first node of each component of the relative poses that are true for sure, where nothing else
+// that is sure holds it: planes leave directions open, and what may be false may count nothing.
 std::vector<std::size_t> NodesInDoubt(const PoseGraphProblem& problem);
 
 }  // namespace strata

@@ -20,8 +20,8 @@ namespace {
 // Share of the terms of poses that only planes bind: two planes, or parallel ones, leave directions
 // open.
 constexpr double kInertia = 1e-6;
-// What keeps a component from swinging freely while no prior that places it counts [1/rad², 1/m²]:
-// a little beside one position of GPS.
+// What keeps a component from sliding away along what nothing holds that counts [1/rad², 1/m²]: a
+// little beside one position of GPS.
 constexpr double kInertiaInDoubt = 1e-3;
 
 // The centre of all that was seen of a plane; where nothing has weight, the plane's point nearest

@@ -144,6 +144,75 @@ TEST_F(OptimizeOfTwoPlacesTest, ThatNobodyAskedForChangesNothing) {
   EXPECT_THAT(db().jobs().Accept({}, kMapName, job.id), StatusIs(Code::kFailedPrecondition, _));
 }
 
+// Robots on lanes across the yard, with sensors that see little of it from far away. Its corners
+// look alike, turned by 90°.
+class OptimizeOfLanesTest : public OptimizeTest {
+ protected:
+  static Pose Truth(int robot, std::uint64_t k) {
+    constexpr double kLanes[] = {-12.0, -10.0, -3.0, -1.5, 0.0, 2.0, 9.0, 12.0};
+    Pose truth = PoseAt(-18.0 + 2.0 * static_cast<double>(k), kLanes[robot - 1]);
+    truth.translation().z() = 1.2;
+    return truth;
+  }
+  void Drive(int robot, std::uint64_t k, std::uint64_t draw, double off_m, const std::string& map) {
+    static const Scene* const yard = new Scene(YardScene());
+    SensorOptions sensor;
+    sensor.rings = 24;
+    sensor.columns = 240;
+    const std::uint64_t seed = 1000 * k + static_cast<std::uint64_t>(robot) + 100 * draw;
+    Pose said = Truth(robot, k);
+    const PointCloud cloud = SimulateScan(*yard, sensor, said, seed);
+    said.translation().x() += off_m;
+    const ScanId id{absl::StrCat("robot", robot), k};
+    STRATA_ASSERT_OK(Upload(db(), HeaderOf(id, cloud, said, Alignment::kOn), cloud, 6000, map));
+  }
+  // The robots one after the other.
+  void DriveAll(std::vector<int> robots,
+                std::uint64_t scans,
+                double off_m,
+                const std::string& map) {
+    MakeMap(MapParameters(), map);
+    for (const int robot : robots) {
+      const double off = robot == robots.back() ? off_m : 0.0;
+      for (std::uint64_t k = 1; k <= scans; ++k) Drive(robot, k, scans, off, map);
+    }
+    WaitIntegrated(db(), map);
+  }
+};
+
+TEST_F(OptimizeOfLanesTest, RobotsWhoseFramesAreOneAreNotJoinedWhereCornersLookAlike) {
+  for (std::uint64_t draw = 0; draw < 3; ++draw) {
+    const std::string map = absl::StrCat("yard", draw);
+    SCOPED_TRACE(map);
+    MakeMap(MapParameters(), map);
+    for (const int robot : {8, 2, 1, 7, 3, 4, 5, 6}) Drive(robot, 1, draw, 0.0, map);
+    Drive(2, 2, draw, 0.0, map);
+    WaitIntegrated(db(), map);
+    const JobInfo job = RunJob(db(), "optimize", {}, map);
+    EXPECT_EQ(job.state, JobState::kSucceeded);
+    EXPECT_LT(job.metrics.at("shift_max_m"), 0.1) << job.message;
+  }
+}
+
+TEST_F(OptimizeOfLanesTest, CornersThatLookAlikeJoinNobodyWhoseFrameIsHisOwn) {
+  for (const std::uint64_t scans : {2, 5}) {
+    const std::string map = absl::StrCat("yard", scans);
+    SCOPED_TRACE(map);
+    DriveAll({8, 7, 2}, scans, 100.0, map);
+    EXPECT_LT(RunJob(db(), "optimize", {}, map).metrics.at("shift_max_m"), 0.1);
+  }
+}
+
+// The walls at both ends, which nobody's other scans tie to each other.
+TEST_F(OptimizeOfLanesTest, ARobotThatSharesOnlyWallsDoesNotSlideAlongThem) {
+  for (const std::uint64_t scans : {5, 8}) {
+    const std::string map = absl::StrCat("yard", scans);
+    SCOPED_TRACE(map);
+    DriveAll({8, 7, 2}, scans, 0.0, map);
+    EXPECT_LT(RunJob(db(), "optimize", {}, map).metrics.at("shift_max_m"), 0.1);
+  }
+}
+
 TEST_F(OptimizeTest, ScansThatNothingIsMatchedToAreNotMoved) {
   MakeMap(MapParameters());
   PointCloud cloud;  // too little to be matched

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/common/disjoint_sets.h"
+#include "core/posegraph/pose_graph.h"
 
 namespace strata {
 namespace {
@@ -28,6 +29,32 @@ TEST(GaugeTest, OneHeldNodeHoldsASet) {
   sets.Join(2, 3);
   EXPECT_THAT(FirstUnheld(sets, {false, true, false, false}), ElementsAre(2));
   EXPECT_THAT(FirstUnheld(sets, {false, true, true, true}), IsEmpty());
+}
+
+// 0-1 are joined for sure and 2-3 are, and 4 is alone; a plane and a closure are between them.
+PoseGraphProblem ThreeParts() {
+  PoseGraphProblem problem;
+  problem.T_map_scan.assign(5, Pose::Identity());
+  problem.relative = {{.i = 0, .j = 1}, {.i = 2, .j = 3}, {.i = 1, .j = 3}};
+  problem.relative[2].may_be_false = true;
+  problem.planes.push_back({.plane_map = {}, .views = {{.i = 0}, {.i = 4}}});
+  return problem;
+}
+
+TEST(GaugeTest, WhatMayCountNothingHoldsNothing) {
+  const PoseGraphProblem problem = ThreeParts();
+  EXPECT_THAT(NodesToHold(problem, {}), ElementsAre(0));
+  EXPECT_THAT(NodesInDoubt(problem), ElementsAre(2, 4));
+}
+
+TEST(GaugeTest, APriorEndsTheDoubtUnlessItMayBeFalse) {
+  PoseGraphProblem problem = ThreeParts();
+  problem.priors.push_back({.i = 3});
+  EXPECT_THAT(NodesInDoubt(problem), ElementsAre(0, 4));
+  problem.priors[0].may_be_false = true;
+  EXPECT_THAT(NodesInDoubt(problem), ElementsAre(0, 2, 4));
+  problem.fixed = {false, true, false, false, true};
+  EXPECT_THAT(NodesInDoubt(problem), ElementsAre(2));
 }
 
 }  // namespace
