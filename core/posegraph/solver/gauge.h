@@ -14,10 +14,16 @@ namespace strata {
 // The first node of each of `sets` in which no node is `held`, ascending; `held` has all nodes.
 std::vector<std::size_t> FirstUnheld(DisjointSets& sets, const std::vector<bool>& held);
 
+// What the terms of a problem count, by PoseGraphProblem::relative and ::priors.
+struct TermWeights {
+  // All that there is, 1 each.
+  static TermWeights OfAll(const PoseGraphProblem& problem);
+  std::vector<double> relative, priors;
+};
+
 // The first node of each component of `problem` that nothing fixed and no prior of any weight
-// holds.
-std::vector<std::size_t> NodesToHold(const PoseGraphProblem& problem,
-                                     const std::vector<double>& prior_weights);
+// holds. Planes and the relative poses that count join.
+std::vector<std::size_t> NodesToHold(const PoseGraphProblem& problem, const TermWeights& weights);
 
 // The first node of each component of the relative poses that are true for sure, where nothing else
 // that is sure holds it: planes leave directions open, and what may be false may count nothing.

@@ -106,14 +106,15 @@ std::vector<NodeResidual> WorstNodes(const PoseGraphProblem& problem, GraphProbl
   return nodes;
 }
 
-// Where all priors that placed a component turned out false, it stays where it began: on the way
-// they have moved it.
+// Where all priors that placed a component turned out false, or all closures that joined it to
+// others, it stays where it began: on the way they have moved it.
 absl::Status HoldWhatLostItsPlace(const PoseGraphProblem& problem,
                                   const ConvergenceOptions& convergence,
                                   const Stop& stop,
                                   GraphProblem& graph,
                                   PoseGraphSummary& summary) {
-  std::vector<std::size_t> to_hold = NodesToHold(problem, graph.prior_weights());
+  std::vector<std::size_t> to_hold =
+      NodesToHold(problem, {graph.relative_weights(), graph.prior_weights()});
   if (to_hold == summary.held) return absl::OkStatus();
   graph.Restart();
   for (const std::size_t node : to_hold) graph.Hold(node);
@@ -133,7 +134,7 @@ absl::StatusOr<PoseGraphSolution> OptimizePoseGraph(const PoseGraphProblem& prob
   STRATA_RETURN_IF_ERROR(ValidateProblem(problem));
   PoseGraphSolution solution;
   PoseGraphSummary& summary = solution.summary;
-  summary.held = NodesToHold(problem, std::vector<double>(problem.priors.size(), 1.0));
+  summary.held = NodesToHold(problem, TermWeights::OfAll(problem));
   std::vector<bool> held = problem.fixed;
   held.resize(problem.T_map_scan.size(), false);
   for (const std::size_t node : summary.held) held[node] = true;

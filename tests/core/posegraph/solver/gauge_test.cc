@@ -43,7 +43,8 @@ PoseGraphProblem ThreeParts() {
 
 TEST(GaugeTest, WhatMayCountNothingHoldsNothing) {
   const PoseGraphProblem problem = ThreeParts();
-  EXPECT_THAT(NodesToHold(problem, {}), ElementsAre(0));
+  EXPECT_THAT(NodesToHold(problem, TermWeights::OfAll(problem)), ElementsAre(0));
+  EXPECT_THAT(NodesToHold(problem, {{1.0, 1.0, 0.0}, {}}), ElementsAre(0, 2));
   EXPECT_THAT(NodesInDoubt(problem), ElementsAre(2, 4));
 }
 

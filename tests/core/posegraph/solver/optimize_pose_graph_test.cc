@@ -233,6 +233,29 @@ TEST_P(PoseGraphTest, WhereAllPriorsAreFalseTheFirstPoseStays) {
             0.05);
 }
 
+// Two chains, and closures between them of which each says something else.
+TEST_P(PoseGraphTest, WhatFalseClosuresJoinedStaysWhereItBegan) {
+  MakePoses(30, 0.05, 0.3);
+  for (std::size_t n = 1; n < 30; ++n) {
+    if (n != 15) AddRelative(n - 1, n, 0.01);
+  }
+  for (std::size_t n = 0; n < 15; n += 3) {
+    Pose seen = truth_[n].inverse() * truth_[n + 15];
+    seen.pretranslate(Eigen::Vector3d(50.0 * static_cast<double>(n), 0.0, n % 2 == 0 ? 1e3 : -1e3));
+    problem_.relative.push_back({.i = n,
+                                 .j = n + 15,
+                                 .T_i_j = seen,
+                                 .information = Matrix6d::Identity() * 100.0,
+                                 .may_be_false = true});
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto solution, OptimizePoseGraph(problem_));
+  EXPECT_EQ(solution.summary.rejected_relative.size(), 5U);
+  EXPECT_THAT(solution.summary.held, ElementsAre(0, 15));
+  for (const std::size_t n : {0, 15}) {
+    EXPECT_LT(LargestStep(problem_.T_map_scan[n], solution.T_map_scan[n]), 1e-9);
+  }
+}
+
 TEST_P(PoseGraphTest, EveryComponentIsHeldOnceAndFixedPosesStay) {
   MakePoses(9, 0.1, 0.5);
   AddRelative(0, 1);
