@@ -18,3 +18,8 @@ strata_executable(
   SOURCES crispness.cc
   DEPS strata::mls strata::test_recordings
 )
+strata_executable(
+  fleet fleet
+  SOURCES fleet.cc
+  DEPS strata::engine strata::simulator strata::test_support
+)

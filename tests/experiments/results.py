@@ -47,6 +47,8 @@ RESULTS = {
                    "/usr/bin/python3 tests/experiments/real_data.py --build {build}", ("core", "server", "client")),
     "subsets": ("Recorded drives in parts, backwards, by two robots, with more noise",
                 "/usr/bin/python3 tests/experiments/subsets.py --build {build}", ("core",)),
+    "fleet": ("Several robots in one world, with frames that agree, nearly or not", "experiments/fleet --seed 1 --draws 3",
+              ("core/posegraph", "core/registration", "core/engine/consistency", "core/engine/ingest")),
     "two_sides": ("Decks and walls seen from both sides", "/usr/bin/python3 tests/experiments/two_sides.py --build {build}",
                   ("core/registration", "core/planes", "core/engine")),
     "localisation": ("Scans asked for in maps of the same place and of others",

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/common/disjoint_sets.h"
 #include "core/registration/neighbours.h"
 
 namespace strata {
@@ -11,10 +12,24 @@ namespace {
 // Scans farther apart than this in the order of their trajectory are of different passes.
 constexpr std::size_t kSamePass = 5;
 
+// The parts of the problem that ways, relative poses of any kind, or priors hold together.
+std::vector<std::size_t> PartsOf(const AlignmentProblem& problem) {
+  DisjointSets joined;
+  for (const ScanPair& pair : problem.pairs) joined.Join(pair.i, pair.j);
+  for (const RelativePoseTerm& term : problem.relative) joined.Join(term.i, term.j);
+  for (const std::vector<std::size_t>& way : problem.trajectories) {
+    for (const std::size_t node : way) joined.Join(node, way[0]);
+  }
+  for (const PriorTerm& prior : problem.priors) joined.Join(prior.i, problem.priors[0].i);
+  std::vector<std::size_t> parts;
+  for (std::size_t k = 0; k < problem.T_map_scan.size(); ++k) parts.push_back(joined.Root(k));
+  return parts;
+}
+
 }  // namespace
 
 ScanChains::ScanChains(const AlignmentProblem& problem, const NeighbourPolicy& policy)
-    : policy_(policy) {
+    : policy_(policy), part_(PartsOf(problem)) {
   ++policy_.max_scans;  // a scan is its own nearest
   const std::size_t nodes = problem.T_map_scan.size();
   way_.resize(nodes);
@@ -44,6 +59,7 @@ std::vector<ScanChain> ScanChains::Around(std::size_t node,
   // By trajectory and place, with whether more than nearness speaks for it.
   std::vector<std::pair<std::pair<std::size_t, std::size_t>, std::pair<std::size_t, bool>>> around;
   const auto add = [&](std::size_t other, bool known) {
+    if (!known && part_[other] != part_[node]) return;
     if (other == node || excluded_.contains(std::minmax(node, other))) return;
     if (OwnPass(node, other) && way_[other].second > way_[node].second) return;
     around.push_back({way_[other], {other, known}});

@@ -24,6 +24,7 @@ namespace strata {
 namespace {
 
 using ::testing::_;
+using ::testing::Each;
 using ::testing::Gt;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -95,6 +96,9 @@ class AlignmentTest : public ::testing::Test {
       problem_.trajectories[k < YardScans::kFirst ? 0 : 1].push_back(k);
       if (k != 0 && k != YardScans::kFirst) problem_.pairs.push_back({k - 1, k});
     }
+    // Both know that they are in one frame.
+    problem_.relative.push_back(
+        {0, YardScans::kFirst, TrueStep(0, YardScans::kFirst), Matrix6d::Identity() * 1e-6});
     options_.max_rounds = 4;
     options_.registration.max_samples = 1000;
   }
@@ -333,6 +337,18 @@ TEST_F(AlignmentTest, ExcludedPairsAreNotMeasured) {
   STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align());
   for (const RelativePoseTerm& term : result.measured) {
     EXPECT_EQ(term.i < YardScans::kFirst, term.j < YardScans::kFirst) << term.i << " " << term.j;
+  }
+  EXPECT_THAT(result.parts, Each(0U));  // they are said to be in one frame
+}
+
+TEST_F(AlignmentTest, RobotsThatNothingJoinsAreNotMatchedAndStayWhereTheyAre) {
+  problem_.relative.clear();
+  for (std::size_t k = 0; k < YardScans::kFirst; ++k) {
+    problem_.T_map_scan[k].translation().x() += 0.3;
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align());
+  for (const std::size_t first : {std::size_t{0}, YardScans::kFirst}) {
+    EXPECT_TRUE(result.T_map_scan[first].isApprox(problem_.T_map_scan[first], 1e-12)) << first;
   }
   ASSERT_EQ(result.parts.size(), std::size_t{YardScans::kScans});
   for (std::size_t k = 0; k < YardScans::kScans; ++k) {

@@ -41,6 +41,7 @@ class ScanChainsTest : public ::testing::Test {
       (k < kOther ? there_and_back : k < kAway ? other : away).push_back(k);
     }
     problem_.trajectories = {there_and_back, other, away};
+    problem_.relative = {{.i = 0, .j = kOther}, {.i = 0, .j = kAway}};
     policy_.radius_m = 3.5;
     policy_.max_scans = 100;
   }
@@ -54,6 +55,17 @@ class ScanChainsTest : public ::testing::Test {
   AlignmentProblem problem_;
   NeighbourPolicy policy_;
 };
+
+TEST_F(ScanChainsTest, WhatNothingJoinsIsNotNear) {
+  problem_.relative.clear();
+  EXPECT_THAT(Around(10), SizeIs(2));
+  EXPECT_THAT(Around(kOther + 10), SizeIs(1));
+  problem_.priors = {{.i = kBack}, {.i = kOther}};  // GPS says how they lie
+  EXPECT_THAT(Around(10), SizeIs(3));
+  problem_.priors.clear();
+  problem_.pairs = {{10, kOther + 10}};
+  EXPECT_THAT(Around(30), SizeIs(3));
+}
 
 TEST_F(ScanChainsTest, OfItsOwnPassOnlyWhatIsBehindOfOthersAll) {
   const std::vector<ScanChain> chains = Around(10);
