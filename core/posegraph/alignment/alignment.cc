@@ -10,11 +10,11 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "core/common/disjoint_sets.h"
 #include "core/common/status.h"
 #include "core/posegraph/alignment/odometry_noise.h"
-#include "core/posegraph/alignment/plane_terms.h"
+#include "core/posegraph/alignment/parts.h"
 #include "core/posegraph/alignment/scan_chains.h"
+#include "core/posegraph/alignment/shared_surfaces.h"
 #include "core/posegraph/information.h"
 #include "core/posegraph/solver/optimize_pose_graph.h"
 #include "core/registration/registration_target.h"
@@ -76,7 +76,8 @@ class Alignment {
         chains_(problem, options.neighbours),
         matches_(problem.T_map_scan.size()),
         measured_(problem.T_map_scan.size()),
-        odometry_(problem.T_map_scan.size(), nullptr) {
+        odometry_(problem.T_map_scan.size(), nullptr),
+        surfaces_(problem, source, options) {
     result_.T_map_scan = problem.T_map_scan;
     for (const ScanPair& pair : problem.pairs) {
       if (pair.measured.has_value()) measured_[pair.j].push_back(&pair);
@@ -90,7 +91,7 @@ class Alignment {
       STRATA_RETURN_IF_ERROR(progress(static_cast<double>(round) / options_.max_rounds));
       std::vector<Pose> last = result_.T_map_scan;
       STRATA_RETURN_IF_ERROR(Round());
-      if (IsSettled(last) && !GatesMayNarrow()) {
+      if (IsSettled(last) && !surfaces_.MayNarrow()) {
         result_.termination = AlignmentTermination::kSettled;
         break;
       }
@@ -122,16 +123,16 @@ class Alignment {
     AlignmentRound round;
     STRATA_RETURN_IF_ERROR(Register(round));
     PoseGraphProblem graph = Graph(round);
-    if (options_.planes && !PlanesHold()) STRATA_RETURN_IF_ERROR(FindPlanes());
-    AddPlanes(graph);
+    STRATA_RETURN_IF_ERROR(surfaces_.Find(result_.T_map_scan, for_each_));
+    surfaces_.AddTo(graph);
     STRATA_ASSIGN_OR_RETURN(PoseGraphSolution solution, Solve(graph));
-    if (SplitPlanes(graph, solution)) {
-      AddPlanes(graph);
+    if (surfaces_.Split(graph, solution.summary)) {
+      surfaces_.AddTo(graph);
       STRATA_ASSIGN_OR_RETURN(solution, Solve(graph));
     }
-    for (const SharedPlane& plane : shared_) round.supports += plane.views.size();
-    round.planes = shared_.size();
-    round.directions = directions_.size();
+    for (const SharedPlane& plane : surfaces_.planes()) round.supports += plane.views.size();
+    round.planes = surfaces_.planes().size();
+    round.directions = surfaces_.directions();
     for (std::size_t k = 0; k < solution.T_map_scan.size(); ++k) {
       const Pose& after = solution.T_map_scan[k];
       round.max_shift_m =
@@ -140,6 +141,7 @@ class Alignment {
     }
     round.before = solution.summary.before;
     round.after = solution.summary.after;
+    surfaces_.Moved(round.max_shift_m, round.max_turn_rad);
     Keep(graph, std::move(solution));
     result_.rounds.push_back(round);
     return absl::OkStatus();
@@ -370,99 +372,6 @@ class Alignment {
     return std::nullopt;
   }
 
-  void AddPlanes(PoseGraphProblem& graph) const {
-    graph.planes.clear();
-    graph.directions.clear();
-    for (const SharedPlane& plane : shared_) {
-      graph.planes.push_back(TermOf(plane, result_.T_map_scan));
-    }
-    for (const SharedDirection& direction : directions_) {
-      graph.directions.push_back(TermOf(direction, result_.T_map_scan));
-    }
-  }
-
-  // Parts of the graph that neither relative poses nor priors join know nothing of each other. A
-  // few walls in common would let one slide along them, as far as their tilts are wrong. Whether
-  // any plane was of two parts.
-  bool SplitPlanes(const PoseGraphProblem& graph, const PoseGraphSolution& solution) {
-    std::vector<bool> rejected(graph.relative.size(), false);
-    for (const auto& [k, chi2] : solution.summary.rejected_relative) rejected[k] = true;
-    std::vector<bool> placed(graph.priors.size(), true);
-    for (const auto& [k, chi2] : solution.summary.rejected_priors) placed[k] = false;
-    DisjointSets joined = JoinedBy(graph, rejected, graph.relative.size());
-    std::optional<std::size_t> first;
-    for (std::size_t k = 0; k < placed.size(); ++k) {
-      if (placed[k]) joined.Join(first.value_or(graph.priors[k].i), graph.priors[k].i);
-      if (placed[k] && !first.has_value()) first = graph.priors[k].i;
-    }
-    const std::vector<std::size_t> parts = RootsOf(joined, graph.T_map_scan.size());
-    const bool is_split = std::ranges::any_of(shared_, [&parts](const SharedPlane& plane) {
-      return std::ranges::any_of(plane.views, [&](const SharedPlane::View& view) {
-        return parts[view.scan] != parts[plane.views[0].scan];
-      });
-    });
-    if (is_split) shared_ = SplitByPart(shared_, parts);
-    return is_split;
-  }
-
-  // Planes found anew at poses that differ by less than the search allows for are others by chance
-  // alone: poses would follow them for ever. Where the search allows for much, as rough poses need,
-  // what it finds is sorted out once poses have settled in it.
-  bool PlanesHold() const {
-    if (result_.rounds.empty()) return false;
-    const AlignmentRound& last = result_.rounds.back();
-    return last.max_shift_m <= gates_.pose_sigma_m && last.max_turn_rad <= gates_.pose_sigma_rad &&
-           !GatesMayNarrow();
-  }
-
-  bool GatesMayNarrow() const {
-    if (!options_.planes || result_.rounds.empty()) return false;
-    const SharedPlaneOptions narrower = GatesOfNow();
-    return narrower.pose_sigma_m < gates_.pose_sigma_m / 2.0 ||
-           narrower.pose_sigma_rad < gates_.pose_sigma_rad / 2.0;
-  }
-
-  // Poses are as far off as they still move.
-  SharedPlaneOptions GatesOfNow() const {
-    SharedPlaneOptions gates = options_.shared_planes;
-    if (result_.rounds.empty()) return gates;
-    const SharedPlaneOptions finest;
-    const AlignmentRound& last = result_.rounds.back();
-    gates.pose_sigma_m =
-        std::min(gates.pose_sigma_m, std::max(finest.pose_sigma_m, last.max_shift_m));
-    gates.pose_sigma_rad =
-        std::min(gates.pose_sigma_rad, std::max(finest.pose_sigma_rad, last.max_turn_rad));
-    return gates;
-  }
-
-  absl::Status FindPlanes() {
-    std::vector<std::shared_ptr<const ScanPlanes>> held(result_.T_map_scan.size());
-    STRATA_RETURN_IF_ERROR(for_each_(held.size(), [&](std::size_t k) -> absl::Status {
-      absl::StatusOr<std::shared_ptr<const ScanPlanes>> planes = source_.Planes(k);
-      if (absl::IsDataLoss(planes.status())) {
-        held[k] = std::make_shared<const ScanPlanes>();
-        return absl::OkStatus();
-      }
-      STRATA_RETURN_IF_ERROR(planes.status());
-      held[k] = *std::move(planes);
-      return absl::OkStatus();
-    }));
-    std::vector<PosedPlanes> posed;
-    for (std::size_t k = 0; k < held.size(); ++k) {
-      posed.push_back({held[k].get(), pose(k), source_.SensorOrigin(k)});
-    }
-    gates_ = GatesOfNow();
-    shared_ = FindSharedPlanes(posed, gates_);
-    if (options_.directions) directions_ = FindSharedDirections(posed, gates_);
-    std::erase_if(shared_, [this](const SharedPlane& plane) {
-      return std::any_of(
-          problem_.excluded_planes.begin(),
-          problem_.excluded_planes.end(),
-          [&](const ExcludedPlane& excluded) { return IsExcluded(plane, excluded); });
-    });
-    return absl::OkStatus();
-  }
-
   void Keep(const PoseGraphProblem& graph, PoseGraphSolution solution) {
     result_.T_map_scan = std::move(solution.T_map_scan);
     result_.measured.clear();
@@ -484,28 +393,11 @@ class Alignment {
     for (std::size_t k = given; k < graph.relative.size(); ++k) {
       if (!rejected[k]) result_.measured.push_back(graph.relative[k]);
     }
-    DisjointSets joined = JoinedBy(graph, rejected, measured_end_);
-    result_.parts = RootsOf(joined, graph.T_map_scan.size());
-    for (std::size_t p = 0; p < shared_.size(); ++p) shared_[p].plane = solution.planes[p];
-    result_.planes = shared_;
+    DisjointSets joined = JoinedBy(graph.relative, rejected, measured_end_);
+    result_.parts = PartsOf(joined, graph.T_map_scan.size());
+    surfaces_.Keep(solution.planes);
+    result_.planes = surfaces_.planes();
     result_.worst_nodes = std::move(solution.summary.worst_nodes);
-  }
-
-  // By the first `end` relative poses.
-  static DisjointSets JoinedBy(const PoseGraphProblem& graph,
-                               const std::vector<bool>& rejected,
-                               std::size_t end) {
-    DisjointSets joined;
-    for (std::size_t k = 0; k < end; ++k) {
-      if (!rejected[k]) joined.Join(graph.relative[k].i, graph.relative[k].j);
-    }
-    return joined;
-  }
-
-  static std::vector<std::size_t> RootsOf(DisjointSets& joined, std::size_t nodes) {
-    std::vector<std::size_t> roots;
-    for (std::size_t k = 0; k < nodes; ++k) roots.push_back(joined.Root(k));
-    return roots;
   }
 
   const AlignmentProblem& problem_;
@@ -517,9 +409,7 @@ class Alignment {
   std::vector<std::vector<Match>> matches_;             // of every node
   std::vector<std::vector<const ScanPair*>> measured_;  // of every node j
   std::vector<const RelativePoseTerm*> odometry_;       // of every node j; nullptr: none
-  std::vector<SharedPlane> shared_;
-  std::vector<SharedDirection> directions_;
-  SharedPlaneOptions gates_;           // that they were found by
+  SharedSurfaces surfaces_;
   std::map<Decision, bool> believed_;  // in the round before
   std::vector<bool> believed_priors_;
   std::size_t measured_end_ = 0;  // of the graph's relative terms: what is given or a match

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/common/disjoint_sets.h"
+#include "core/posegraph/alignment/parts.h"
 #include "core/registration/neighbours.h"
 
 namespace strata {
@@ -13,7 +14,7 @@ namespace {
 constexpr std::size_t kSamePass = 5;
 
 // The parts of the problem that ways, relative poses of any kind, or priors hold together.
-std::vector<std::size_t> PartsOf(const AlignmentProblem& problem) {
+std::vector<std::size_t> PartsOfProblem(const AlignmentProblem& problem) {
   DisjointSets joined;
   for (const ScanPair& pair : problem.pairs) joined.Join(pair.i, pair.j);
   for (const RelativePoseTerm& term : problem.relative) joined.Join(term.i, term.j);
@@ -21,15 +22,13 @@ std::vector<std::size_t> PartsOf(const AlignmentProblem& problem) {
     for (const std::size_t node : way) joined.Join(node, way[0]);
   }
   for (const PriorTerm& prior : problem.priors) joined.Join(prior.i, problem.priors[0].i);
-  std::vector<std::size_t> parts;
-  for (std::size_t k = 0; k < problem.T_map_scan.size(); ++k) parts.push_back(joined.Root(k));
-  return parts;
+  return PartsOf(joined, problem.T_map_scan.size());
 }
 
 }  // namespace
 
 ScanChains::ScanChains(const AlignmentProblem& problem, const NeighbourPolicy& policy)
-    : policy_(policy), part_(PartsOf(problem)) {
+    : policy_(policy), part_(PartsOfProblem(problem)) {
   ++policy_.max_scans;  // a scan is its own nearest
   const std::size_t nodes = problem.T_map_scan.size();
   way_.resize(nodes);

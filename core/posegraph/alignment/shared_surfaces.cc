@@ -1,0 +1,122 @@
+#include "core/posegraph/alignment/shared_surfaces.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "absl/status/statusor.h"
+
+#include "core/common/disjoint_sets.h"
+#include "core/common/status.h"
+#include "core/posegraph/alignment/parts.h"
+#include "core/posegraph/alignment/plane_terms.h"
+
+namespace strata {
+namespace {
+
+// By what counts after a solution: relative poses, and priors, which place all that they place.
+std::vector<std::size_t> PartsAfter(const PoseGraphProblem& graph,
+                                    const PoseGraphSummary& summary) {
+  std::vector<bool> rejected(graph.relative.size(), false);
+  for (const auto& [k, chi2] : summary.rejected_relative) rejected[k] = true;
+  std::vector<bool> placed(graph.priors.size(), true);
+  for (const auto& [k, chi2] : summary.rejected_priors) placed[k] = false;
+  DisjointSets joined = JoinedBy(graph.relative, rejected, graph.relative.size());
+  std::optional<std::size_t> first;
+  for (std::size_t k = 0; k < placed.size(); ++k) {
+    if (!placed[k]) continue;
+    if (!first.has_value()) first = graph.priors[k].i;
+    joined.Join(*first, graph.priors[k].i);
+  }
+  return PartsOf(joined, graph.T_map_scan.size());
+}
+
+}  // namespace
+
+absl::Status SharedSurfaces::Find(const std::vector<Pose>& T_map_scan, ForEach for_each) {
+  if (!options_.planes || Hold()) return absl::OkStatus();
+  std::vector<std::shared_ptr<const ScanPlanes>> held(T_map_scan.size());
+  STRATA_RETURN_IF_ERROR(for_each(held.size(), [&](std::size_t k) -> absl::Status {
+    absl::StatusOr<std::shared_ptr<const ScanPlanes>> planes = source_.Planes(k);
+    if (absl::IsDataLoss(planes.status())) {
+      held[k] = std::make_shared<const ScanPlanes>();
+      return absl::OkStatus();
+    }
+    STRATA_RETURN_IF_ERROR(planes.status());
+    held[k] = *std::move(planes);
+    return absl::OkStatus();
+  }));
+  std::vector<PosedPlanes> posed;
+  for (std::size_t k = 0; k < held.size(); ++k) {
+    posed.push_back({held[k].get(), T_map_scan[k], source_.SensorOrigin(k)});
+  }
+  gates_ = GatesOfNow();
+  planes_ = FindSharedPlanes(posed, gates_);
+  if (options_.directions) directions_ = FindSharedDirections(posed, gates_);
+  std::erase_if(planes_, [this](const SharedPlane& plane) { return IsExcluded(plane); });
+  return absl::OkStatus();
+}
+
+void SharedSurfaces::AddTo(PoseGraphProblem& graph) const {
+  graph.planes.clear();
+  graph.directions.clear();
+  for (const SharedPlane& plane : planes_) {
+    graph.planes.push_back(TermOf(plane, graph.T_map_scan));
+  }
+  for (const SharedDirection& direction : directions_) {
+    graph.directions.push_back(TermOf(direction, graph.T_map_scan));
+  }
+}
+
+bool SharedSurfaces::Split(const PoseGraphProblem& graph, const PoseGraphSummary& summary) {
+  const std::vector<std::size_t> parts = PartsAfter(graph, summary);
+  const bool is_split = std::ranges::any_of(planes_, [&parts](const SharedPlane& plane) {
+    return std::ranges::any_of(plane.views, [&](const SharedPlane::View& view) {
+      return parts[view.scan] != parts[plane.views[0].scan];
+    });
+  });
+  if (is_split) planes_ = SplitByPart(planes_, parts);
+  return is_split;
+}
+
+void SharedSurfaces::Keep(const std::vector<Plane>& planes) {
+  for (std::size_t p = 0; p < planes_.size(); ++p) planes_[p].plane = planes[p];
+}
+
+void SharedSurfaces::Moved(double max_shift_m, double max_turn_rad) {
+  last_ = Motion{max_shift_m, max_turn_rad};
+}
+
+// Planes found anew at poses that differ by less than the search allows for are others by chance
+// alone: poses would follow them for ever. Where the search allows for much, as rough poses need,
+// what it finds is sorted out once poses have settled in it.
+bool SharedSurfaces::Hold() const {
+  return last_.has_value() && last_->shift_m <= gates_.pose_sigma_m &&
+         last_->turn_rad <= gates_.pose_sigma_rad && !MayNarrow();
+}
+
+bool SharedSurfaces::MayNarrow() const {
+  if (!options_.planes || !last_.has_value()) return false;
+  const SharedPlaneOptions narrower = GatesOfNow();
+  return narrower.pose_sigma_m < gates_.pose_sigma_m / 2.0 ||
+         narrower.pose_sigma_rad < gates_.pose_sigma_rad / 2.0;
+}
+
+// Poses are as far off as they still move.
+SharedPlaneOptions SharedSurfaces::GatesOfNow() const {
+  SharedPlaneOptions gates = options_.shared_planes;
+  if (!last_.has_value()) return gates;
+  const SharedPlaneOptions finest;
+  gates.pose_sigma_m = std::min(gates.pose_sigma_m, std::max(finest.pose_sigma_m, last_->shift_m));
+  gates.pose_sigma_rad =
+      std::min(gates.pose_sigma_rad, std::max(finest.pose_sigma_rad, last_->turn_rad));
+  return gates;
+}
+
+bool SharedSurfaces::IsExcluded(const SharedPlane& plane) const {
+  return std::ranges::any_of(problem_.excluded_planes, [&plane](const ExcludedPlane& excluded) {
+    return strata::IsExcluded(plane, excluded);
+  });
+}
+
+}  // namespace strata
