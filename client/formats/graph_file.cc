@@ -19,7 +19,7 @@
 #include <Eigen/Geometry>
 
 #include "client/formats/file_bytes.h"
-#include "client/formats/text_cursor.h"
+#include "client/formats/parsing/text_cursor.h"
 #include "core/common/status.h"
 #include "core/geometry/euler.h"
 #include "core/posegraph/information.h"

@@ -18,8 +18,8 @@
 #include <Eigen/Geometry>
 
 #include "client/formats/file_bytes.h"
+#include "client/formats/parsing/text_cursor.h"
 #include "client/formats/plain_readers.h"
-#include "client/formats/text_cursor.h"
 #include "core/common/status.h"
 
 namespace strata {

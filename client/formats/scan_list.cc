@@ -23,9 +23,9 @@
 #include "absl/strings/str_join.h"
 #include "absl/time/time.h"
 
+#include "client/formats/parsing/text_cursor.h"
 #include "client/formats/pcd_reader.h"
 #include "client/formats/scan_folder.h"
-#include "client/formats/text_cursor.h"
 #include "core/common/status.h"
 
 namespace strata {

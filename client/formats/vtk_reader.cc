@@ -13,10 +13,10 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
-#include "client/formats/cloud_builder.h"
-#include "client/formats/point_fields.h"
-#include "client/formats/scalar.h"
-#include "client/formats/text_cursor.h"
+#include "client/formats/parsing/cloud_builder.h"
+#include "client/formats/parsing/point_fields.h"
+#include "client/formats/parsing/scalar.h"
+#include "client/formats/parsing/text_cursor.h"
 #include "core/common/status.h"
 
 namespace strata {

@@ -15,7 +15,7 @@
 #include "absl/strings/strip.h"
 
 #include "client/formats/file_bytes.h"
-#include "client/formats/text_cursor.h"
+#include "client/formats/parsing/text_cursor.h"
 #include "core/common/status.h"
 
 namespace strata::cli {

@@ -10,7 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
-#include "client/formats/bags/byte_cursor.h"
+#include "client/formats/parsing/byte_cursor.h"
 #include "core/common/status.h"
 
 namespace strata {

@@ -15,7 +15,7 @@
 
 #include "client/formats/bags/bag_file.h"
 #include "client/formats/bags/bag_reader.h"
-#include "client/formats/bags/byte_cursor.h"
+#include "client/formats/parsing/byte_cursor.h"
 
 namespace strata {
 

@@ -10,7 +10,7 @@
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 
-#include "client/formats/text_cursor.h"
+#include "client/formats/parsing/text_cursor.h"
 
 namespace strata {
 namespace {

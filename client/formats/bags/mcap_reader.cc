@@ -16,9 +16,9 @@
 #include "absl/strings/string_view.h"
 #include <zlib.h>
 
-#include "client/formats/bags/byte_cursor.h"
 #include "client/formats/bags/chunked_bag_reader.h"
 #include "client/formats/bags/unpack.h"
+#include "client/formats/parsing/byte_cursor.h"
 #include "core/common/status.h"
 
 namespace strata {

@@ -17,8 +17,8 @@
 
 #include "client/formats/bags/bag_file.h"
 #include "client/formats/bags/bag_reader.h"
-#include "client/formats/bags/byte_cursor.h"
 #include "client/formats/bags/chunked_bag_reader.h"
+#include "client/formats/parsing/byte_cursor.h"
 
 namespace strata {
 

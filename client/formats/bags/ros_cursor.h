@@ -12,7 +12,7 @@
 #include "absl/strings/string_view.h"
 
 #include "client/formats/bags/bag_reader.h"
-#include "client/formats/bags/byte_cursor.h"
+#include "client/formats/parsing/byte_cursor.h"
 
 namespace strata {
 

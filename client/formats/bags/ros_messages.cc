@@ -15,9 +15,9 @@
 #include "absl/strings/strip.h"
 
 #include "client/formats/bags/ros_cursor.h"
-#include "client/formats/cloud_builder.h"
-#include "client/formats/point_fields.h"
-#include "client/formats/scalar.h"
+#include "client/formats/parsing/cloud_builder.h"
+#include "client/formats/parsing/point_fields.h"
+#include "client/formats/parsing/scalar.h"
 #include "core/common/status.h"
 
 namespace strata {

@@ -20,7 +20,7 @@
 #include "absl/strings/string_view.h"
 
 #include "client/formats/file_bytes.h"
-#include "client/formats/text_cursor.h"
+#include "client/formats/parsing/text_cursor.h"
 #include "core/common/status.h"
 
 namespace strata {

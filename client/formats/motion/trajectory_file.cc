@@ -20,7 +20,7 @@
 #include <Eigen/Geometry>
 
 #include "client/formats/motion/csv_columns.h"
-#include "client/formats/text_cursor.h"
+#include "client/formats/parsing/text_cursor.h"
 #include "core/common/status.h"
 
 namespace strata {

@@ -1,4 +1,4 @@
-#include "client/formats/point_fields.h"
+#include "client/formats/parsing/point_fields.h"
 
 #include <algorithm>
 #include <array>
@@ -16,8 +16,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/formats/cloud_builder.h"
-#include "client/formats/scalar.h"
+#include "client/formats/parsing/cloud_builder.h"
+#include "client/formats/parsing/scalar.h"
 #include "core/common/status.h"
 #include "tests/support/status_matchers.h"
 

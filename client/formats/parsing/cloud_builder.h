@@ -1,6 +1,6 @@
 // Collects the points of a file, whatever its fields are called, and makes a PointCloud of them.
-#ifndef STRATA_CLIENT_FORMATS_CLOUD_BUILDER_H_
-#define STRATA_CLIENT_FORMATS_CLOUD_BUILDER_H_
+#ifndef STRATA_CLIENT_FORMATS_PARSING_CLOUD_BUILDER_H_
+#define STRATA_CLIENT_FORMATS_PARSING_CLOUD_BUILDER_H_
 
 #include <array>
 #include <cstddef>
@@ -127,4 +127,4 @@ class CloudBuilder {
 
 }  // namespace strata
 
-#endif  // STRATA_CLIENT_FORMATS_CLOUD_BUILDER_H_
+#endif  // STRATA_CLIENT_FORMATS_PARSING_CLOUD_BUILDER_H_

@@ -1,4 +1,4 @@
-#include "client/formats/point_fields.h"
+#include "client/formats/parsing/point_fields.h"
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 // The number types that binary point files are made of.
-#ifndef STRATA_CLIENT_FORMATS_SCALAR_H_
-#define STRATA_CLIENT_FORMATS_SCALAR_H_
+#ifndef STRATA_CLIENT_FORMATS_PARSING_SCALAR_H_
+#define STRATA_CLIENT_FORMATS_PARSING_SCALAR_H_
 
 #include <cstddef>
 #include <cstdint>
@@ -41,4 +41,4 @@ void ReadScalars(const char* first,
 
 }  // namespace strata
 
-#endif  // STRATA_CLIENT_FORMATS_SCALAR_H_
+#endif  // STRATA_CLIENT_FORMATS_PARSING_SCALAR_H_

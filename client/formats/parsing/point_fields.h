@@ -1,12 +1,12 @@
 // Fields of many points at fixed distances in a block of bytes: how binary files hold them.
-#ifndef STRATA_CLIENT_FORMATS_POINT_FIELDS_H_
-#define STRATA_CLIENT_FORMATS_POINT_FIELDS_H_
+#ifndef STRATA_CLIENT_FORMATS_PARSING_POINT_FIELDS_H_
+#define STRATA_CLIENT_FORMATS_PARSING_POINT_FIELDS_H_
 
 #include <cstddef>
 #include <span>
 
-#include "client/formats/cloud_builder.h"
-#include "client/formats/scalar.h"
+#include "client/formats/parsing/cloud_builder.h"
+#include "client/formats/parsing/scalar.h"
 
 namespace strata {
 
@@ -35,4 +35,4 @@ double PackedColourOf(double value, ScalarType type);
 
 }  // namespace strata
 
-#endif  // STRATA_CLIENT_FORMATS_POINT_FIELDS_H_
+#endif  // STRATA_CLIENT_FORMATS_PARSING_POINT_FIELDS_H_

@@ -1,4 +1,4 @@
-#include "client/formats/text_cursor.h"
+#include "client/formats/parsing/text_cursor.h"
 
 #include <charconv>
 #include <cstddef>

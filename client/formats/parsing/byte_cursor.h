@@ -1,6 +1,6 @@
 // Numbers and pieces off the front of bytes that somebody else wrote.
-#ifndef STRATA_CLIENT_FORMATS_BAGS_BYTE_CURSOR_H_
-#define STRATA_CLIENT_FORMATS_BAGS_BYTE_CURSOR_H_
+#ifndef STRATA_CLIENT_FORMATS_PARSING_BYTE_CURSOR_H_
+#define STRATA_CLIENT_FORMATS_PARSING_BYTE_CURSOR_H_
 
 #include <algorithm>
 #include <array>
@@ -59,4 +59,4 @@ class ByteCursor {
 
 }  // namespace strata
 
-#endif  // STRATA_CLIENT_FORMATS_BAGS_BYTE_CURSOR_H_
+#endif  // STRATA_CLIENT_FORMATS_PARSING_BYTE_CURSOR_H_

@@ -1,4 +1,4 @@
-#include "client/formats/cloud_builder.h"
+#include "client/formats/parsing/cloud_builder.h"
 
 #include <algorithm>
 #include <array>

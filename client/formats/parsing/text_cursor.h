@@ -1,6 +1,6 @@
 // Text files line by line, number by number, with the line at hand for error messages.
-#ifndef STRATA_CLIENT_FORMATS_TEXT_CURSOR_H_
-#define STRATA_CLIENT_FORMATS_TEXT_CURSOR_H_
+#ifndef STRATA_CLIENT_FORMATS_PARSING_TEXT_CURSOR_H_
+#define STRATA_CLIENT_FORMATS_PARSING_TEXT_CURSOR_H_
 
 #include <cstddef>
 #include <optional>
@@ -46,4 +46,4 @@ class TextCursor {
 
 }  // namespace strata
 
-#endif  // STRATA_CLIENT_FORMATS_TEXT_CURSOR_H_
+#endif  // STRATA_CLIENT_FORMATS_PARSING_TEXT_CURSOR_H_

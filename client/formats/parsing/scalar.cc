@@ -1,4 +1,4 @@
-#include "client/formats/scalar.h"
+#include "client/formats/parsing/scalar.h"
 
 #include <algorithm>
 #include <array>
