@@ -94,8 +94,8 @@ absl::Status NoScans(const fs::path& folder, ScanFormat format, const Contents& 
   }
   return absl::NotFoundError(
       absl::StrCat(where,
-                   ": no scan by its ending (.pcd .ply .bin .vtk .3d .xyz .csv .asc .pts) here or "
-                   "one folder below; say --format xyz for points in .txt files"));
+                   ": no scan by its ending (.pcd .ply .bin .vtk .3d .las .xyz .csv .asc .pts) "
+                   "here or one folder below; say --format xyz for points in .txt files"));
 }
 
 // One look one level down.

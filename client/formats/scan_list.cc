@@ -194,7 +194,14 @@ bool Assign3dtk(bool asked, const fs::path& folder, std::vector<ScanFile>& scans
   return any;
 }
 
-bool SaysWhereItStood(const ScanFile& scan) {
+bool IsOf(const ScanFile& scan, ScanFormat format) {
+  return scan.format == format ||
+         (scan.format == ScanFormat::kAuto && ScanFormatOfName(scan.path) == format);
+}
+
+// Whether its points lie in a frame of the whole survey.
+bool LiesWhereItBelongs(const ScanFile& scan) {
+  if (IsOf(scan, ScanFormat::kLas)) return true;
   if (scan.format != ScanFormat::kPcd && ScanFormatOfName(scan.path) != ScanFormat::kPcd) {
     return false;
   }
@@ -244,7 +251,7 @@ absl::StatusOr<fs::path> ChoosePoses(const std::vector<fs::path>& paths,
     if (options.tell) options.tell(absl::StrCat("poses of ", files.front().string()));
     return files.front();
   }
-  if (scans.size() == 1 || std::any_of(scans.begin(), scans.end(), SaysWhereItStood)) {
+  if (scans.size() == 1 || std::any_of(scans.begin(), scans.end(), LiesWhereItBelongs)) {
     return fs::path();
   }
   if (files.empty()) return NoPoses(paths, scans.size());

@@ -76,9 +76,9 @@ std::optional<absl::Time> TimeOfName(const std::filesystem::path& path);
 // 3dtk: the .pose file beside each scan or in the folder named.
 //
 // Where none are named: those beside 3DTK scans; else the one file of poses (PoseFilesIn) in the
-// folder that is named; else none for a single scan and for PCD files with a VIEWPOINT, whose
-// points lie in one frame already. Several scans that nothing is said of would all lie at the
-// origin.
+// folder that is named; else none for a single scan, for LAS files and for PCD files with a
+// VIEWPOINT, whose points lie in one frame already. Several scans that nothing is said of would all
+// lie at the origin.
 //
 // INVALID_ARGUMENT, NOT_FOUND: no scan at all, a path that is not there, several scans and no poses
 // or several files of them, a file of poses that cannot be read. A scan without a pose is in its

@@ -19,6 +19,7 @@
 #include "client/formats/pcd_reader.h"
 #include "client/formats/plain_readers.h"
 #include "client/formats/ply_reader.h"
+#include "client/formats/survey/las_reader.h"
 #include "client/formats/vtk_reader.h"
 #include "core/common/status.h"
 
@@ -40,6 +41,7 @@ constexpr NamedFormat kFormats[] = {
     {"vtk", ScanFormat::kVtk},
     {"xyz", ScanFormat::kXyz},
     {"oakland", ScanFormat::kOakland},
+    {"las", ScanFormat::kLas},
 };
 
 constexpr NamedFormat kEndings[] = {
@@ -48,6 +50,7 @@ constexpr NamedFormat kEndings[] = {
     {".ply", ScanFormat::kPly},
     {".bin", ScanFormat::kKitti},
     {".vtk", ScanFormat::kVtk},
+    {".las", ScanFormat::kLas},
     {".xyz_label_conf", ScanFormat::kOakland},
     {".txt", ScanFormat::kXyz},
     {".csv", ScanFormat::kXyz},
@@ -62,6 +65,9 @@ struct UnreadFormat {
 
 constexpr absl::string_view kSurveyCure =
     "is not read yet; convert it, for instance with 'pdal translate IN OUT.ply' or CloudCompare";
+constexpr absl::string_view kLazCure =
+    "is compressed, which is not read; 'laszip -i IN.laz -o OUT.las' or 'pdal translate IN.laz "
+    "OUT.las' makes LAS of it";
 constexpr absl::string_view kRosCure =
     "holds messages of many topics; 'strata scan import MAP FILE --topic T --poses-from T' takes "
     "its clouds, 'strata scan topics FILE' lists what there is";
@@ -70,8 +76,7 @@ constexpr absl::string_view kPacketsCure =
 constexpr absl::string_view kPackedCure = "is packed; unpack it first";
 
 constexpr UnreadFormat kUnread[] = {
-    {".las", kSurveyCure},
-    {".laz", kSurveyCure},
+    {".laz", kLazCure},
     {".e57", kSurveyCure},
     {".ptx", kSurveyCure},
     {".bag", kRosCure},
@@ -96,6 +101,7 @@ ScanFormat FormatOfBytes(absl::string_view bytes) {
   if (absl::StartsWith(start, "# .PCD") || absl::StartsWith(start, "VERSION ")) {
     return ScanFormat::kPcd;
   }
+  if (absl::StartsWith(start, "LASF")) return ScanFormat::kLas;
   return ScanFormat::kAuto;
 }
 
@@ -158,12 +164,14 @@ absl::StatusOr<PointCloud> Parse(absl::string_view bytes, ScanFormat format) {
       return ReadXyz(bytes);
     case ScanFormat::kOakland:
       return ReadOakland(bytes);
+    case ScanFormat::kLas:
+      return ReadLas(bytes);
     case ScanFormat::kAuto:
       break;
   }
   return absl::InvalidArgumentError(
       "unknown format; say which with --format: 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, "
-      "oakland");
+      "oakland, las");
 }
 
 }  // namespace
@@ -175,7 +183,7 @@ absl::StatusOr<ScanFormat> ParseScanFormat(absl::string_view name) {
   return absl::InvalidArgumentError(
       absl::StrCat("scan format '",
                    name.substr(0, 40),
-                   "' is none of auto, 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, oakland"));
+                   "' is none of auto, 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, oakland, las"));
 }
 
 absl::string_view ScanFormatName(ScanFormat format) {

@@ -23,25 +23,26 @@ enum class ScanFormat : std::uint8_t {
   kNuscenes,
   kVtk,
   kXyz,
-  kOakland
+  kOakland,
+  kLas
 };
 
-// "auto", "3dtk", "pcd", "ply", "kitti", "nuscenes", "vtk", "xyz", "oakland"; INVALID_ARGUMENT
-// listing them otherwise.
+// "auto", "3dtk", "pcd", "ply", "kitti", "nuscenes", "vtk", "xyz", "oakland", "las";
+// INVALID_ARGUMENT listing them otherwise.
 absl::StatusOr<ScanFormat> ParseScanFormat(absl::string_view name);
 absl::string_view ScanFormatName(ScanFormat format);
 
 // The format of a file by its name: .pcd, .ply, .bin (KITTI), .pcd.bin (nuScenes), .3d (3DTK),
-// .vtk, and .xyz…, .txt, .csv, .asc, .pts (text), and of those .xyz_label_conf (Oakland); kAuto for
-// any other.
+// .vtk, .las, and .xyz…, .txt, .csv, .asc, .pts (text), and of those .xyz_label_conf (Oakland);
+// kAuto for any other.
 ScanFormat ScanFormatOfName(const std::filesystem::path& path);
 
-// What a file is that holds points and is not read, by its ending (.las, .e57, .mcap, …), and what
+// What a file is that holds points and is not read, by its ending (.laz, .e57, .mcap, …), and what
 // makes of it one that is; empty for any other file.
 std::string WhyNotRead(const std::filesystem::path& path);
 
-// The cloud of a file, in metres, z up; kAuto goes by the first bytes (PCD, PLY and VTK say what
-// they are), else by the name. Points that are not finite are left out, but kept as NaN in
+// The cloud of a file, in metres, z up; kAuto goes by the first bytes (PCD, PLY, VTK and LAS say
+// what they are), else by the name. Points that are not finite are left out, but kept as NaN in
 // organised clouds; so are returns of range 0, at (0, 0, 0) or where the sensor stood, which are
 // counted in `at_sensor` if it is not null. Far coordinates keep their precision by
 // PointCloud::origin. Passes ValidateCloud. NOT_FOUND; UNAVAILABLE if it cannot be read;

@@ -19,7 +19,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                    ScanFormat::k3dtk,
                                    ScanFormat::kKitti,
                                    ScanFormat::kOakland,
-                                   ScanFormat::kAuto};
+                                   ScanFormat::kAuto,
+                                   ScanFormat::kLas};
   FuzzedDataProvider input(data, size);
   const ScanFormat format = input.PickValueInArray(kFormats);
   const fuzz::InputFile file(input.ConsumeRemainingBytesAsString());

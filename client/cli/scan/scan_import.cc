@@ -138,10 +138,10 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
       ->add_option(
           "--format",
           options->format,
-          "Format of the scans; auto: by content or ending (.pcd .ply .bin .pcd.bin .vtk .3d .xyz "
-          ".csv .asc .pts, .txt if named)")
+          "Format of the scans; auto: by content or ending (.pcd .ply .bin .pcd.bin .vtk .3d .las "
+          ".xyz .csv .asc .pts, .txt if named)")
       ->check(CLI::IsMember(
-          {"auto", "3dtk", "pcd", "ply", "kitti", "nuscenes", "vtk", "xyz", "oakland"}))
+          {"auto", "3dtk", "pcd", "ply", "kitti", "nuscenes", "vtk", "xyz", "oakland", "las"}))
       ->capture_default_str();
   import
       ->add_option(

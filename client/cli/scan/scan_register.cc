@@ -186,7 +186,8 @@ void AddScanRegister(Commands& commands, CLI::App* noun) {
   app->add_option("SOURCE", options->source, "The scan to move, in any format of scan import")
       ->required();
   app->add_option("TARGET", options->target, "The scan to move it onto")->required();
-  app->add_option("--format", options->format, "auto, 3dtk, pcd, ply, kitti, vtk, xyz or oakland")
+  app->add_option(
+         "--format", options->format, "auto, 3dtk, pcd, ply, kitti, vtk, xyz, oakland or las")
       ->capture_default_str();
   app->add_option(
          "--method",
