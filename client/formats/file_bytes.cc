@@ -15,6 +15,8 @@
 #include "absl/strings/str_cat.h"
 #include <unistd.h>
 
+#include "core/common/status.h"
+
 namespace strata {
 namespace {
 
@@ -39,7 +41,7 @@ absl::Status WriteInto(const fs::path& file, const fs::path& path, absl::string_
 
 }  // namespace
 
-absl::StatusOr<std::string> ReadFileBytes(const std::filesystem::path& path) {
+absl::Status CheckIsFile(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) {
     return absl::NotFoundError(absl::StrCat(path.string(), ": no such file"));
@@ -47,6 +49,12 @@ absl::StatusOr<std::string> ReadFileBytes(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path, error)) {
     return absl::InvalidArgumentError(absl::StrCat(path.string(), ": not a file"));
   }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::string> ReadFileBytes(const std::filesystem::path& path) {
+  STRATA_RETURN_IF_ERROR(CheckIsFile(path));
+  std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(path, error);
   if (error || size > kMaxFileBytes) {
     return absl::ResourceExhaustedError(

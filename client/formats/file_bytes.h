@@ -11,7 +11,10 @@
 
 namespace strata {
 
-// NOT_FOUND if there is no such file, INVALID_ARGUMENT for a folder, RESOURCE_EXHAUSTED beyond 16
+// NOT_FOUND if there is no such file, INVALID_ARGUMENT for a folder. Messages name the file.
+absl::Status CheckIsFile(const std::filesystem::path& path);
+
+// As CheckIsFile; RESOURCE_EXHAUSTED beyond 16
 // GiB, UNAVAILABLE if it cannot be read. Messages name the file.
 absl::StatusOr<std::string> ReadFileBytes(const std::filesystem::path& path);
 

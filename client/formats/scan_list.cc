@@ -97,6 +97,66 @@ std::vector<ScanFile> Ordered(std::vector<fs::path> files, ScanFormat format) {
   return scans;
 }
 
+ScanFormat FormatOf(const ScanFile& scan) {
+  return scan.format == ScanFormat::kAuto ? ScanFormatOfName(scan.path) : scan.format;
+}
+
+// One of the scans of a file.
+ScanFile ScanOf(const ScanFile& file, const Station& station, bool with_pose) {
+  ScanFile scan = file;
+  scan.format = FormatOf(file);
+  if (with_pose) scan.T_map_scan = station.T_file_scan;
+  scan.read = [path = file.path,
+               read = station.read](std::size_t* at_sensor) -> absl::StatusOr<PointCloud> {
+    absl::StatusOr<PointCloud> cloud = read();
+    if (cloud.ok()) cloud = WithoutRangeZero(*std::move(cloud), at_sensor);
+    if (!cloud.ok()) return Annotate(cloud.status(), path.string());
+    return cloud;
+  };
+  return scan;
+}
+
+// Adds the scans of a file that may hold several, or the file itself with why it holds none.
+absl::Status AddStations(const ScanFile& file,
+                         const ScanListOptions& options,
+                         std::vector<ScanFile>& scans) {
+  const auto stations = ListStations(file.path, FormatOf(file));
+  if (!stations.ok()) {
+    scans.push_back(file);
+    scans.back().pose_status = stations.status();
+    return absl::OkStatus();
+  }
+  if (stations->size() > 1 && !options.poses.empty() && options.poses != kNoPoses) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(file.path.string(),
+                     ": holds ",
+                     stations->size(),
+                     " scans with poses of their own, for which a file of poses has no names; "
+                     "leave out --poses"));
+  }
+  for (std::size_t i = 0; i < stations->size(); ++i) {
+    ScanFile& scan = scans.emplace_back(ScanOf(file, (*stations)[i], options.poses != kNoPoses));
+    if (stations->size() > 1) scan.path += absl::StrCat(":", i);
+  }
+  return absl::OkStatus();
+}
+
+// Each scan of files that hold several by itself, all numbered from 0 where there is such a file.
+absl::StatusOr<std::vector<ScanFile>> WithStations(const std::vector<ScanFile>& files,
+                                                   const ScanListOptions& options) {
+  std::vector<ScanFile> scans;
+  for (const ScanFile& file : files) {
+    if (HoldsStations(FormatOf(file))) {
+      STRATA_RETURN_IF_ERROR(AddStations(file, options, scans));
+    } else {
+      scans.push_back(file);
+    }
+  }
+  if (scans.size() == files.size()) return scans;
+  for (std::size_t i = 0; i < scans.size(); ++i) scans[i].sequence = i;
+  return scans;
+}
+
 absl::Status NoPose(const fs::path& poses, absl::string_view of) {
   return absl::NotFoundError(absl::StrCat(poses.string(), ": no pose of ", of));
 }
@@ -184,7 +244,7 @@ bool Assign3dtk(bool asked, const fs::path& folder, std::vector<ScanFile>& scans
         scan.format == ScanFormat::k3dtk || ScanFormatOfName(scan.path) == ScanFormat::k3dtk;
     const fs::path named = folder.empty() ? scan.path : folder / scan.path.filename();
     poses.push_back(asked || is_3dtk ? Read3dtkPoseOf(named)
-                                     : absl::StatusOr<Pose>(Pose::Identity()));
+                                     : absl::StatusOr<Pose>(scan.T_map_scan));
     any = any || (is_3dtk && !absl::IsNotFound(poses.back().status()));
   }
   for (std::size_t i = 0; any && i < scans.size(); ++i) {
@@ -194,14 +254,9 @@ bool Assign3dtk(bool asked, const fs::path& folder, std::vector<ScanFile>& scans
   return any;
 }
 
-bool IsOf(const ScanFile& scan, ScanFormat format) {
-  return scan.format == format ||
-         (scan.format == ScanFormat::kAuto && ScanFormatOfName(scan.path) == format);
-}
-
 // Whether its points lie in a frame of the whole survey.
 bool LiesWhereItBelongs(const ScanFile& scan) {
-  if (IsOf(scan, ScanFormat::kLas)) return true;
+  if (FormatOf(scan) == ScanFormat::kLas || HoldsStations(FormatOf(scan))) return true;
   if (scan.format != ScanFormat::kPcd && ScanFormatOfName(scan.path) != ScanFormat::kPcd) {
     return false;
   }
@@ -304,8 +359,14 @@ absl::StatusOr<std::vector<ScanFile>> ListScans(const std::vector<fs::path>& pat
     files.insert(files.end(), found.begin(), found.end());
   }
   if (files.empty()) return absl::NotFoundError("no scan: name files or folders of scans");
-  std::vector<ScanFile> scans = Ordered(std::move(files), options.format);
+  STRATA_ASSIGN_OR_RETURN(std::vector<ScanFile> scans,
+                          WithStations(Ordered(std::move(files), options.format), options));
   if (options.poses == kNoPoses) return scans;
+  if (options.poses.empty() && std::all_of(scans.begin(), scans.end(), [](const ScanFile& scan) {
+        return HoldsStations(FormatOf(scan));
+      })) {
+    return scans;
+  }
   std::error_code error;
   const bool folder =
       fs::is_directory(options.poses, error) &&

@@ -70,15 +70,19 @@ std::optional<absl::Time> TimeOfName(const std::filesystem::path& path);
 // files are numbered from 0 in natural order of their names (s2 before s10). Files whose names are
 // all times are numbered in the order of those: the last digits of a time say nothing.
 //
+// A file that holds several scans (HoldsStations) gives each of them, its path with ":0", ":1", …
+// behind it; then all scans are numbered from 0 in that order. Their poses are those in the file:
+// a file of poses can be named only for files of one scan each.
+//
 // Poses: index-tum and kitti by index = SequenceOfName. tum has no index: where every stem is a
 // time in seconds (it has a decimal point) by time, to a millisecond; else one after the other, the
 // scans in order and the poses in order of time; `tell` is told where the file has more poses.
 // 3dtk: the .pose file beside each scan or in the folder named.
 //
 // Where none are named: those beside 3DTK scans; else the one file of poses (PoseFilesIn) in the
-// folder that is named; else none for a single scan, for LAS files and for PCD files with a
-// VIEWPOINT, whose points lie in one frame already. Several scans that nothing is said of would all
-// lie at the origin.
+// folder that is named; else none for a single scan, for LAS files, for files with poses of
+// their own and for PCD files with a VIEWPOINT, whose points lie in one frame already. Several
+// scans that nothing is said of would all lie at the origin.
 //
 // INVALID_ARGUMENT, NOT_FOUND: no scan at all, a path that is not there, several scans and no poses
 // or several files of them, a file of poses that cannot be read. A scan without a pose is in its

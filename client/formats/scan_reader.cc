@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <filesystem>
+#include <fstream>
+#include <ios>
 #include <limits>
 #include <string>
 #include <utility>
@@ -20,6 +22,7 @@
 #include "client/formats/plain_readers.h"
 #include "client/formats/ply_reader.h"
 #include "client/formats/survey/las_reader.h"
+#include "client/formats/survey/ptx_reader.h"
 #include "client/formats/vtk_reader.h"
 #include "core/common/status.h"
 
@@ -42,6 +45,7 @@ constexpr NamedFormat kFormats[] = {
     {"xyz", ScanFormat::kXyz},
     {"oakland", ScanFormat::kOakland},
     {"las", ScanFormat::kLas},
+    {"ptx", ScanFormat::kPtx},
 };
 
 constexpr NamedFormat kEndings[] = {
@@ -51,6 +55,7 @@ constexpr NamedFormat kEndings[] = {
     {".bin", ScanFormat::kKitti},
     {".vtk", ScanFormat::kVtk},
     {".las", ScanFormat::kLas},
+    {".ptx", ScanFormat::kPtx},
     {".xyz_label_conf", ScanFormat::kOakland},
     {".txt", ScanFormat::kXyz},
     {".csv", ScanFormat::kXyz},
@@ -78,7 +83,6 @@ constexpr absl::string_view kPackedCure = "is packed; unpack it first";
 constexpr UnreadFormat kUnread[] = {
     {".laz", kLazCure},
     {".e57", kSurveyCure},
-    {".ptx", kSurveyCure},
     {".bag", kRosCure},
     {".db3", kRosCure},
     {".mcap", kRosCure},
@@ -94,8 +98,7 @@ std::string EndingOf(const std::filesystem::path& path) {
   return absl::AsciiStrToLower(path.extension().string());
 }
 
-ScanFormat FormatOfBytes(absl::string_view bytes) {
-  const absl::string_view start = bytes.substr(0, 64);
+ScanFormat FormatOfStart(absl::string_view start) {
   if (absl::StartsWith(start, "ply\n") || absl::StartsWith(start, "ply\r")) return ScanFormat::kPly;
   if (absl::StartsWith(start, "# vtk DataFile")) return ScanFormat::kVtk;
   if (absl::StartsWith(start, "# .PCD") || absl::StartsWith(start, "VERSION ")) {
@@ -103,6 +106,16 @@ ScanFormat FormatOfBytes(absl::string_view bytes) {
   }
   if (absl::StartsWith(start, "LASF")) return ScanFormat::kLas;
   return ScanFormat::kAuto;
+}
+
+// By its first bytes, else by its name.
+ScanFormat FormatOfFile(const std::filesystem::path& path) {
+  std::string start(64, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(start.data(), static_cast<std::streamsize>(start.size()));
+  start.resize(static_cast<std::size_t>(file.gcount()));
+  const ScanFormat format = FormatOfStart(start);
+  return format == ScanFormat::kAuto ? ScanFormatOfName(path) : format;
 }
 
 // Whether each point is a return of range 0.
@@ -166,12 +179,39 @@ absl::StatusOr<PointCloud> Parse(absl::string_view bytes, ScanFormat format) {
       return ReadOakland(bytes);
     case ScanFormat::kLas:
       return ReadLas(bytes);
+    case ScanFormat::kPtx:
     case ScanFormat::kAuto:
       break;
   }
   return absl::InvalidArgumentError(
       "unknown format; say which with --format: 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, "
-      "oakland, las");
+      "oakland, las, ptx");
+}
+
+absl::StatusOr<PointCloud> ReadWhole(const std::filesystem::path& path, ScanFormat format) {
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(path));
+  if (bytes.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(path.string(), ": the file is empty; expected a scan"));
+  }
+  absl::StatusOr<PointCloud> cloud = Parse(bytes, format);
+  if (!cloud.ok()) return Annotate(cloud.status(), path.string());
+  return cloud;
+}
+
+absl::StatusOr<PointCloud> ReadOnlyStation(const std::filesystem::path& path, ScanFormat format) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<Station> stations, ListStations(path, format));
+  if (stations.size() != 1) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(path.string(),
+                     ": holds ",
+                     stations.size(),
+                     " scans and one is expected; 'strata scan import MAP FILE' takes them all, "
+                     "'strata scan export' writes each"));
+  }
+  absl::StatusOr<PointCloud> cloud = stations.front().read();
+  if (!cloud.ok()) return Annotate(cloud.status(), path.string());
+  return cloud;
 }
 
 }  // namespace
@@ -180,10 +220,10 @@ absl::StatusOr<ScanFormat> ParseScanFormat(absl::string_view name) {
   for (const NamedFormat& named : kFormats) {
     if (named.name == name) return named.format;
   }
-  return absl::InvalidArgumentError(
-      absl::StrCat("scan format '",
-                   name.substr(0, 40),
-                   "' is none of auto, 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, oakland, las"));
+  return absl::InvalidArgumentError(absl::StrCat(
+      "scan format '",
+      name.substr(0, 40),
+      "' is none of auto, 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, oakland, las, ptx"));
 }
 
 absl::string_view ScanFormatName(ScanFormat format) {
@@ -210,22 +250,33 @@ std::string WhyNotRead(const std::filesystem::path& path) {
   return "";
 }
 
+bool HoldsStations(ScanFormat format) { return format == ScanFormat::kPtx; }
+
+absl::StatusOr<std::vector<Station>> ListStations(const std::filesystem::path& path,
+                                                  ScanFormat format) {
+  STRATA_RETURN_IF_ERROR(CheckIsFile(path));
+  if (format != ScanFormat::kPtx) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(path.string(), ": files of ", ScanFormatName(format), " hold one scan"));
+  }
+  absl::StatusOr<std::vector<Station>> stations = ListPtxStations(path);
+  if (!stations.ok()) return Annotate(stations.status(), path.string());
+  return stations;
+}
+
 absl::StatusOr<PointCloud> ReadScan(const std::filesystem::path& path,
                                     ScanFormat format,
                                     std::size_t* at_sensor) {
-  STRATA_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(path));
-  if (bytes.empty()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(path.string(), ": the file is empty; expected a scan"));
-  }
-  if (format == ScanFormat::kAuto) format = FormatOfBytes(bytes);
-  if (format == ScanFormat::kAuto) format = ScanFormatOfName(path);
+  STRATA_RETURN_IF_ERROR(CheckIsFile(path));
+  if (format == ScanFormat::kAuto) format = FormatOfFile(path);
   const std::string unread = format == ScanFormat::kAuto ? WhyNotRead(path) : "";
   if (!unread.empty()) {
     return absl::InvalidArgumentError(absl::StrCat(path.string(), ": ", unread));
   }
-  absl::StatusOr<PointCloud> cloud = Parse(bytes, format);
-  if (cloud.ok()) cloud = WithoutRangeZero(*std::move(cloud), at_sensor);
+  absl::StatusOr<PointCloud> cloud =
+      HoldsStations(format) ? ReadOnlyStation(path, format) : ReadWhole(path, format);
+  if (!cloud.ok()) return cloud;
+  cloud = WithoutRangeZero(*std::move(cloud), at_sensor);
   if (!cloud.ok()) return Annotate(cloud.status(), path.string());
   return cloud;
 }

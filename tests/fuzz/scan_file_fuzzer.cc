@@ -20,7 +20,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                    ScanFormat::kKitti,
                                    ScanFormat::kOakland,
                                    ScanFormat::kAuto,
-                                   ScanFormat::kLas};
+                                   ScanFormat::kLas,
+                                   ScanFormat::kPtx};
   FuzzedDataProvider input(data, size);
   const ScanFormat format = input.PickValueInArray(kFormats);
   const fuzz::InputFile file(input.ConsumeRemainingBytesAsString());

@@ -88,7 +88,7 @@ void AddLocalizeCommand(Commands& commands) {
   AddMapName(app, options->map);
   app->add_option("FILE", options->file, "A scan in any format that scan import takes")->required();
   app->add_option(
-         "--format", options->format, "auto, 3dtk, pcd, ply, kitti, vtk, xyz, oakland or las")
+         "--format", options->format, "auto, 3dtk, pcd, ply, kitti, vtk, xyz, oakland, las or ptx")
       ->capture_default_str();
   AddPose(
       app,

@@ -135,13 +135,22 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
       ->required();
   AddRecordingOptions(import, options);
   import
-      ->add_option(
-          "--format",
-          options->format,
-          "Format of the scans; auto: by content or ending (.pcd .ply .bin .pcd.bin .vtk .3d .las "
-          ".xyz .csv .asc .pts, .txt if named)")
-      ->check(CLI::IsMember(
-          {"auto", "3dtk", "pcd", "ply", "kitti", "nuscenes", "vtk", "xyz", "oakland", "las"}))
+      ->add_option("--format",
+                   options->format,
+                   "Format of the scans; auto: by content or ending (.pcd .ply .bin .pcd.bin .vtk "
+                   ".3d .las .ptx "
+                   ".xyz .csv .asc .pts, .txt if named)")
+      ->check(CLI::IsMember({"auto",
+                             "3dtk",
+                             "pcd",
+                             "ply",
+                             "kitti",
+                             "nuscenes",
+                             "vtk",
+                             "xyz",
+                             "oakland",
+                             "las",
+                             "ptx"}))
       ->capture_default_str();
   import
       ->add_option(

@@ -187,7 +187,7 @@ void AddScanRegister(Commands& commands, CLI::App* noun) {
       ->required();
   app->add_option("TARGET", options->target, "The scan to move it onto")->required();
   app->add_option(
-         "--format", options->format, "auto, 3dtk, pcd, ply, kitti, vtk, xyz, oakland or las")
+         "--format", options->format, "auto, 3dtk, pcd, ply, kitti, vtk, xyz, oakland, las or ptx")
       ->capture_default_str();
   app->add_option(
          "--method",
