@@ -72,6 +72,7 @@ EXTERNAL = {
     r"GeographicLib/.*": ["core/egomotion"],
     r"yaml-cpp/.*": ["client/formats/motion"],
     r"tiffio\.h": ["client/formats/grid"],
+    r"expat\.h": ["client/formats/survey"],
     r"(bzlib|lz4frame|zlib)\.h": ["client/formats/bags"],
     r"(thread|mutex|condition_variable)": ["core/engine", "server", "client", "core/common"],
 }

@@ -73,7 +73,7 @@ absl::StatusOr<Contents> ContentsOf(const fs::path& folder, ScanFormat format) {
   return contents;
 }
 
-// "7 files (.e57 .las) are not read".
+// "7 files (.bt .laz) are not read".
 std::string Unread(const std::vector<fs::path>& files) {
   std::set<std::string> endings;
   for (const fs::path& file : files) {
@@ -94,7 +94,7 @@ absl::Status NoScans(const fs::path& folder, ScanFormat format, const Contents& 
   }
   return absl::NotFoundError(absl::StrCat(
       where,
-      ": no scan by its ending (.pcd .ply .bin .vtk .3d .las .ptx .xyz .csv .asc .pts) "
+      ": no scan by its ending (.pcd .ply .bin .vtk .3d .las .ptx .e57 .xyz .csv .asc .pts) "
       "here or one folder below; say --format xyz for points in .txt files"));
 }
 

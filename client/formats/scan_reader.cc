@@ -21,6 +21,7 @@
 #include "client/formats/pcd_reader.h"
 #include "client/formats/plain_readers.h"
 #include "client/formats/ply_reader.h"
+#include "client/formats/survey/e57_reader.h"
 #include "client/formats/survey/las_reader.h"
 #include "client/formats/survey/ptx_reader.h"
 #include "client/formats/vtk_reader.h"
@@ -46,6 +47,7 @@ constexpr NamedFormat kFormats[] = {
     {"oakland", ScanFormat::kOakland},
     {"las", ScanFormat::kLas},
     {"ptx", ScanFormat::kPtx},
+    {"e57", ScanFormat::kE57},
 };
 
 constexpr NamedFormat kEndings[] = {
@@ -56,6 +58,7 @@ constexpr NamedFormat kEndings[] = {
     {".vtk", ScanFormat::kVtk},
     {".las", ScanFormat::kLas},
     {".ptx", ScanFormat::kPtx},
+    {".e57", ScanFormat::kE57},
     {".xyz_label_conf", ScanFormat::kOakland},
     {".txt", ScanFormat::kXyz},
     {".csv", ScanFormat::kXyz},
@@ -68,8 +71,6 @@ struct UnreadFormat {
   absl::string_view what;  // it is, and the cure
 };
 
-constexpr absl::string_view kSurveyCure =
-    "is not read yet; convert it, for instance with 'pdal translate IN OUT.ply' or CloudCompare";
 constexpr absl::string_view kLazCure =
     "is compressed, which is not read; 'laszip -i IN.laz -o OUT.las' or 'pdal translate IN.laz "
     "OUT.las' makes LAS of it";
@@ -82,7 +83,6 @@ constexpr absl::string_view kPackedCure = "is packed; unpack it first";
 
 constexpr UnreadFormat kUnread[] = {
     {".laz", kLazCure},
-    {".e57", kSurveyCure},
     {".bag", kRosCure},
     {".db3", kRosCure},
     {".mcap", kRosCure},
@@ -105,6 +105,7 @@ ScanFormat FormatOfStart(absl::string_view start) {
     return ScanFormat::kPcd;
   }
   if (absl::StartsWith(start, "LASF")) return ScanFormat::kLas;
+  if (absl::StartsWith(start, "ASTM-E57")) return ScanFormat::kE57;
   return ScanFormat::kAuto;
 }
 
@@ -180,12 +181,13 @@ absl::StatusOr<PointCloud> Parse(absl::string_view bytes, ScanFormat format) {
     case ScanFormat::kLas:
       return ReadLas(bytes);
     case ScanFormat::kPtx:
+    case ScanFormat::kE57:
     case ScanFormat::kAuto:
       break;
   }
   return absl::InvalidArgumentError(
       "unknown format; say which with --format: 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, "
-      "oakland, las, ptx");
+      "oakland, las, ptx, e57");
 }
 
 absl::StatusOr<PointCloud> ReadWhole(const std::filesystem::path& path, ScanFormat format) {
@@ -223,7 +225,7 @@ absl::StatusOr<ScanFormat> ParseScanFormat(absl::string_view name) {
   return absl::InvalidArgumentError(absl::StrCat(
       "scan format '",
       name.substr(0, 40),
-      "' is none of auto, 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, oakland, las, ptx"));
+      "' is none of auto, 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, oakland, las, ptx, e57"));
 }
 
 absl::string_view ScanFormatName(ScanFormat format) {
@@ -250,16 +252,19 @@ std::string WhyNotRead(const std::filesystem::path& path) {
   return "";
 }
 
-bool HoldsStations(ScanFormat format) { return format == ScanFormat::kPtx; }
+bool HoldsStations(ScanFormat format) {
+  return format == ScanFormat::kPtx || format == ScanFormat::kE57;
+}
 
 absl::StatusOr<std::vector<Station>> ListStations(const std::filesystem::path& path,
                                                   ScanFormat format) {
   STRATA_RETURN_IF_ERROR(CheckIsFile(path));
-  if (format != ScanFormat::kPtx) {
+  if (!HoldsStations(format)) {
     return absl::InvalidArgumentError(
         absl::StrCat(path.string(), ": files of ", ScanFormatName(format), " hold one scan"));
   }
-  absl::StatusOr<std::vector<Station>> stations = ListPtxStations(path);
+  absl::StatusOr<std::vector<Station>> stations =
+      format == ScanFormat::kPtx ? ListPtxStations(path) : ListE57Stations(path);
   if (!stations.ok()) return Annotate(stations.status(), path.string());
   return stations;
 }

@@ -27,24 +27,25 @@ enum class ScanFormat : std::uint8_t {
   kXyz,
   kOakland,
   kLas,
-  kPtx
+  kPtx,
+  kE57
 };
 
-// "auto", "3dtk", "pcd", "ply", "kitti", "nuscenes", "vtk", "xyz", "oakland", "las", "ptx";
+// "auto", "3dtk", "pcd", "ply", "kitti", "nuscenes", "vtk", "xyz", "oakland", "las", "ptx", "e57";
 // INVALID_ARGUMENT listing them otherwise.
 absl::StatusOr<ScanFormat> ParseScanFormat(absl::string_view name);
 absl::string_view ScanFormatName(ScanFormat format);
 
 // The format of a file by its name: .pcd, .ply, .bin (KITTI), .pcd.bin (nuScenes), .3d (3DTK),
-// .vtk, .las, .ptx, and .xyz…, .txt, .csv, .asc, .pts (text), and of those .xyz_label_conf
+// .vtk, .las, .ptx, .e57, and .xyz…, .txt, .csv, .asc, .pts (text), and of those .xyz_label_conf
 // (Oakland); kAuto for any other.
 ScanFormat ScanFormatOfName(const std::filesystem::path& path);
 
-// What a file is that holds points and is not read, by its ending (.laz, .e57, .mcap, …), and what
+// What a file is that holds points and is not read, by its ending (.laz, .mcap, .bt, …), and what
 // makes of it one that is; empty for any other file.
 std::string WhyNotRead(const std::filesystem::path& path);
 
-// Whether files of a format may hold several scans, each with its pose: PTX.
+// Whether files of a format may hold several scans, each with its pose: PTX and E57.
 bool HoldsStations(ScanFormat format);
 
 // The scans of such a file in its order; their errors name no file. Memory does not grow with the
@@ -52,8 +53,8 @@ bool HoldsStations(ScanFormat format);
 absl::StatusOr<std::vector<Station>> ListStations(const std::filesystem::path& path,
                                                   ScanFormat format);
 
-// The cloud of a file, in metres, z up; kAuto goes by the first bytes (PCD, PLY, VTK and LAS say
-// what they are), else by the name. Points that are not finite are left out, but kept as NaN in
+// The cloud of a file, in metres, z up; kAuto goes by the first bytes (PCD, PLY, VTK, LAS and E57
+// say what they are), else by the name. Points that are not finite are left out, but kept as NaN in
 // organised clouds; so are returns of range 0, at (0, 0, 0) or where the sensor stood, which are
 // counted in `at_sensor` if it is not null. Far coordinates keep their precision by
 // PointCloud::origin. Passes ValidateCloud. NOT_FOUND; UNAVAILABLE if it cannot be read;

@@ -87,8 +87,10 @@ void AddLocalizeCommand(Commands& commands) {
       [options](Context& context) { return Localize(context, *options); });
   AddMapName(app, options->map);
   app->add_option("FILE", options->file, "A scan in any format that scan import takes")->required();
-  app->add_option(
-         "--format", options->format, "auto, 3dtk, pcd, ply, kitti, vtk, xyz, oakland, las or ptx")
+  app->add_option("--format",
+                  options->format,
+                  "auto, 3dtk, pcd, ply, kitti, vtk, xyz, oakland, las, ptx or "
+                  "e57")
       ->capture_default_str();
   AddPose(
       app,

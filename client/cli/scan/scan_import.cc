@@ -138,7 +138,7 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
       ->add_option("--format",
                    options->format,
                    "Format of the scans; auto: by content or ending (.pcd .ply .bin .pcd.bin .vtk "
-                   ".3d .las .ptx "
+                   ".3d .las .ptx .e57 "
                    ".xyz .csv .asc .pts, .txt if named)")
       ->check(CLI::IsMember({"auto",
                              "3dtk",
@@ -150,7 +150,8 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
                              "xyz",
                              "oakland",
                              "las",
-                             "ptx"}))
+                             "ptx",
+                             "e57"}))
       ->capture_default_str();
   import
       ->add_option(

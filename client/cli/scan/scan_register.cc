@@ -186,8 +186,10 @@ void AddScanRegister(Commands& commands, CLI::App* noun) {
   app->add_option("SOURCE", options->source, "The scan to move, in any format of scan import")
       ->required();
   app->add_option("TARGET", options->target, "The scan to move it onto")->required();
-  app->add_option(
-         "--format", options->format, "auto, 3dtk, pcd, ply, kitti, vtk, xyz, oakland, las or ptx")
+  app->add_option("--format",
+                  options->format,
+                  "auto, 3dtk, pcd, ply, kitti, vtk, xyz, oakland, las, ptx or "
+                  "e57")
       ->capture_default_str();
   app->add_option(
          "--method",
