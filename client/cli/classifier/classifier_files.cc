@@ -35,11 +35,11 @@ double SecondsSince(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-absl::StatusOr<PointCloud> ReadLabelled(const std::string& path) {
-  STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScan(path));
+absl::StatusOr<PointCloud> ReadLabelled(const ScanFile& scan) {
+  STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadScanFile(scan));
   if (cloud.label.empty()) {
     return absl::InvalidArgumentError(
-        absl::StrCat(path,
+        absl::StrCat(scan.path.string(),
                      ": points have no label; expected a field label, class or "
                      "classification"));
   }
@@ -47,21 +47,17 @@ absl::StatusOr<PointCloud> ReadLabelled(const std::string& path) {
 }
 
 // The files, and those in the folders, in the order of import.
-absl::StatusOr<std::vector<std::string>> FilesOf(const std::vector<std::string>& data) {
-  STRATA_ASSIGN_OR_RETURN(const std::vector<ScanFile> scans,
-                          ListScans({data.begin(), data.end()}, {.poses = kNoPoses}));
-  std::vector<std::string> paths;
-  for (const ScanFile& scan : scans) paths.push_back(scan.path.string());
-  return paths;
+absl::StatusOr<std::vector<ScanFile>> FilesOf(const std::vector<std::string>& data) {
+  return ListScans({data.begin(), data.end()}, {.poses = kNoPoses});
 }
 
 absl::StatusOr<std::vector<PointCloud>> ReadAll(const std::vector<std::string>& data,
                                                 const Stop& stop) {
-  STRATA_ASSIGN_OR_RETURN(const std::vector<std::string> paths, FilesOf(data));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<ScanFile> scans, FilesOf(data));
   std::vector<PointCloud> clouds;
-  for (const std::string& path : paths) {
+  for (const ScanFile& scan : scans) {
     STRATA_RETURN_IF_ERROR(stop.status());
-    STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadLabelled(path));
+    STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadLabelled(scan));
     clouds.push_back(std::move(cloud));
   }
   return clouds;
@@ -123,17 +119,17 @@ absl::StatusOr<ConfusionMatrix> EvaluateAll(const Classifier& classifier,
                                             const LabelClasses& labels,
                                             const std::vector<std::string>& data,
                                             FileContext& context) {
-  STRATA_ASSIGN_OR_RETURN(const std::vector<std::string> paths, FilesOf(data));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<ScanFile> scans, FilesOf(data));
   Progress progress(context.output.talk(), TalksToTerminal(), "evaluate");
   ConfusionMatrix confusion(labels.classes.size());
   std::uint64_t points = 0;
-  for (std::size_t i = 0; i < paths.size(); ++i) {
-    progress.Update(i, paths.size(), points);
-    STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadLabelled(paths[i]));
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    progress.Update(i, scans.size(), points);
+    STRATA_ASSIGN_OR_RETURN(PointCloud cloud, ReadLabelled(scans[i]));
     labels.Apply(cloud);
     points += cloud.size();
     const auto counts = EvaluateClassifier(classifier, cloud, labels.classes, context.stop);
-    if (!counts.ok()) return Annotate(counts.status(), paths[i]);
+    if (!counts.ok()) return Annotate(counts.status(), scans[i].path.string());
     confusion.Add(*counts);
   }
   return confusion;

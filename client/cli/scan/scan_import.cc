@@ -130,8 +130,8 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
   import
       ->add_option("PATH",
                    options->paths,
-                   "Files or folders of scans; or one recording: .mcap, .db3, .bag, a folder of "
-                   "rosbag2")
+                   "Files or folders of scans, of .ptx and .e57 all that a file holds, with its "
+                   "poses; or one recording: .mcap, .db3, .bag, a folder of rosbag2")
       ->required();
   AddRecordingOptions(import, options);
   import
@@ -159,7 +159,8 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
           options->poses,
           "File with the poses T_map_scan of the scans, or a folder of .pose files; without it "
           ".pose files beside .3d files, or the one poses*.txt|tum|csv in the folder; none: every "
-          "scan is at the origin. A trajectory of strata egomotion gives each scan the pose of the "
+          "scan is at the origin. Not for .las, .ptx and .e57, which say where they are. A "
+          "trajectory of strata egomotion gives each scan the pose of the "
           "time that its name is (1432235498.028276.pcd); on earth, poses and their covariance "
           "every 10 "
           "s become priors of the pose graph, which optimize may reject")

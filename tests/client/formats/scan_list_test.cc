@@ -269,6 +269,14 @@ TEST_F(ScanListTest, FilesThatAreNotReadSayWhatToDo) {
   EXPECT_THAT(told, HasSubstr("6 files (.bt .gz .laz .mcap .ot .pcap) are not read: left out"));
 }
 
+TEST_F(ScanListTest, FilesOfASurveyNeedNoPoses) {
+  Write("s1.las");
+  Write("s2.las");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({dir_.path()}, {}));
+  EXPECT_THAT(Names(scans), ElementsAre("s1.las", "s2.las"));
+  for (const ScanFile& scan : scans) STRATA_EXPECT_OK(scan.pose_status);
+}
+
 TEST_F(ScanListTest, ALinkToNothingIsAScanThatCannotBeRead) {
   Write("s0.xyz");
   std::filesystem::create_symlink("/nowhere/s1.xyz", dir_.path() / "s1.xyz");
