@@ -3,6 +3,7 @@
 #define STRATA_CLIENT_FORMATS_SURVEY_E57_POINTS_H_
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <limits>

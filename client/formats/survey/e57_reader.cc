@@ -202,8 +202,12 @@ absl::StatusOr<std::vector<Station>> ListE57Stations(const std::filesystem::path
   std::vector<Station> stations;
   for (std::size_t i = 0; i < scans->children.size(); ++i) {
     absl::StatusOr<Station> station = StationOf(path, scans->children[i]);
-    if (!station.ok()) return Annotate(station.status(), absl::StrCat("scan ", i));
-    stations.push_back(*std::move(station));
+    if (station.ok()) {
+      stations.push_back(*std::move(station));
+    } else {  // the others are none the worse
+      const absl::Status fault = Annotate(station.status(), absl::StrCat("scan ", i));
+      stations.push_back({Pose::Identity(), [fault] { return fault; }});
+    }
   }
   return stations;
 }

@@ -332,6 +332,17 @@ TEST_F(E57ReaderTest, RefusalsSayWhy) {
   expect(FileOf({scan}), "scan 0: pose: expected a unit quaternion");
 }
 
+TEST_F(E57ReaderTest, AScanThatIsDescribedWronglyLeavesTheOthers) {
+  Scan bad = ThreePoints();
+  bad.columns[2].xml = "<cartesianZ type=\"Integer\" minimum=\"1\" maximum=\"0\"/>";
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto stations,
+                              ListE57Stations(Write(FileOf({bad, ThreePoints()}))));
+  ASSERT_EQ(stations.size(), 2U);
+  EXPECT_THAT(stations[0].read(),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("scan 0: 'cartesianZ'")));
+  STRATA_EXPECT_OK(stations[1].read());
+}
+
 TEST(E57NodeTest, XmlThatIsNone) {
   const auto expect = [](const std::string& xml, const std::string& message) {
     EXPECT_THAT(ParseE57Xml(xml), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(message)));
