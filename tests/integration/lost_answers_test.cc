@@ -69,19 +69,24 @@ class LostAnswersTest : public ::testing::Test {
 };
 
 TEST_F(LostAnswersTest, AScanIsStoredOnceAndTheRepeatIsToldSo) {
+  // A busy machine may pass the acknowledgement on with the frame before, and none is lost then.
+  constexpr int kMaxSweeps = 20;
   int repeats = 0;
-  const int cuts = ForEveryCut([&](std::uint64_t number, api::Database& db) {
-    STRATA_ASSERT_OK_AND_ASSIGN(const ScanAck ack, Put(db, number));
-    if (ack.already_present) ++repeats;
-  });
-  EXPECT_GE(cuts, 3);
+  std::uint64_t scans = 0;
+  for (int sweep = 0; sweep < kMaxSweeps && repeats == 0; ++sweep) {
+    const int cuts = ForEveryCut([&](std::uint64_t, api::Database& db) {
+      STRATA_ASSERT_OK_AND_ASSIGN(const ScanAck ack, Put(db, ++scans));
+      if (ack.already_present) ++repeats;
+    });
+    EXPECT_GE(cuts, 3);
+  }
   EXPECT_GE(repeats, 1);
   std::set<std::uint64_t> stored;
   STRATA_ASSERT_OK(direct_->scans().List({}, kMap, {}, [&](const ScanInfo& info) {
     EXPECT_TRUE(stored.insert(info.header.id.sequence).second);
     return absl::OkStatus();
   }));
-  EXPECT_EQ(stored.size(), static_cast<std::size_t>(cuts) + 1);
+  EXPECT_EQ(stored.size(), scans);
 }
 
 TEST_F(LostAnswersTest, AScanIsDeletedWhateverItsClientIsTold) {

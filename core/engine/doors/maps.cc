@@ -351,12 +351,13 @@ absl::Status EngineMaps::SetOrigin(const api::Call& call,
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(name));
   STRATA_RETURN_IF_ERROR(ValidateGeodeticOrigin(origin));
-  STRATA_RETURN_IF_ERROR(
-      map->core().writer().Run(Durability::kFull, 0, call.stop, [&](StorageWriter& writer) {
-        return writer.PutOrigin(origin);
-      }));
-  map->core().set_origin(origin);
-  return absl::OkStatus();
+  MapCore& core = map->core();
+  return core.writer().Run(
+      Durability::kFull,
+      0,
+      call.stop,
+      [&](StorageWriter& writer) { return writer.PutOrigin(origin); },
+      [&] { core.set_origin(origin); });
 }
 
 absl::Status EngineMaps::Watch(const api::Call& call,
