@@ -94,7 +94,8 @@ Link LinkScan(const SeenScan& scan,
   Link link = LinkOf(match);
   if (Accepted(match.termination) && Same(match.T_target_source, guess)) return link;
   const PlaceMatch place = PlaceOf(scan, around, guess, nearness);
-  if (place.matched()) {
+  // Registration may leave the window: rooms that look alike are farther apart than it is wide.
+  if (place.matched() && IsWithin(place.T_target_source, SaidHypothesis(guess))) {
     const RegistrationResult found = Register(scan, around, place.T_target_source);
     if (Accepted(found.termination) && Same(found.T_target_source, place.T_target_source)) {
       return LinkOf(found);
