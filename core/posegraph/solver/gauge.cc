@@ -1,6 +1,5 @@
 #include "core/posegraph/solver/gauge.h"
 
-#include <algorithm>
 #include <cstddef>
 #include <vector>
 
