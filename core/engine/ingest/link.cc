@@ -19,6 +19,9 @@ constexpr double kSameM = 0.3;
 constexpr double kSameRad = 0.05;
 // What is searched for a place: the nearest few.
 constexpr std::size_t kPlaceScans = 5;
+// A place that only a search found says more for itself: with one scan around, every seventh one
+// below is the next room, or the next corner of the yard.
+constexpr double kLeastConfidence = 0.25;
 // Scans of another pass show the same at least to this share.
 constexpr double kLeastAgreement = 0.5;
 
@@ -84,6 +87,31 @@ PlaceMatch PlaceOf(const SeenScan& scan,
   return MatchPlace(scan, Nearest(around, guess), {&window, 1}, PlaceOptions(nearness));
 }
 
+// Whether the scan may have been taken here: it shows what those around show, and neither looked
+// through what the other saw. That it fits elsewhere, too, is no reason to doubt what is said. Of
+// one pass that is enough; frames may be off, so there a match that may slide says nothing.
+bool MayBeHere(const SeenScan& scan,
+               std::span<const SeenScan> around,
+               const Pose& place,
+               Nearness nearness) {
+  const PlaceHypothesis here{place, 0.0, 0.0, 0.0};
+  const PlaceMatchOptions options = PlaceOptions(Nearness::kSamePass);
+  const PlaceMatch match = MatchPlace(scan, Nearest(around, place), {&here, 1}, options);
+  return Same(match.T_target_source, place) && match.overlap >= options.min_overlap &&
+         match.contradiction <= options.max_contradiction &&
+         (nearness == Nearness::kSamePass || match.matched());
+}
+
+// Whether a registration that agrees with the guess is believed. One that left directions as they
+// were guessed agrees with any guess.
+bool IsBelieved(const RegistrationResult& match,
+                const SeenScan& scan,
+                std::span<const SeenScan> around,
+                Nearness nearness) {
+  if (nearness == Nearness::kSamePass && match.termination != Termination::kDegenerate) return true;
+  return MayBeHere(scan, around, match.T_target_source, nearness);
+}
+
 }  // namespace
 
 Link LinkScan(const SeenScan& scan,
@@ -92,10 +120,12 @@ Link LinkScan(const SeenScan& scan,
               Nearness nearness) {
   const RegistrationResult match = Register(scan, around, guess);
   Link link = LinkOf(match);
-  if (Accepted(match.termination) && Same(match.T_target_source, guess)) return link;
+  const bool agrees = Accepted(match.termination) && Same(match.T_target_source, guess);
+  if (agrees && IsBelieved(match, scan, around, nearness)) return link;
   const PlaceMatch place = PlaceOf(scan, around, guess, nearness);
+  const bool is_sure = place.confidence >= kLeastConfidence;
   // Registration may leave the window: rooms that look alike are farther apart than it is wide.
-  if (place.matched() && IsWithin(place.T_target_source, SaidHypothesis(guess))) {
+  if (place.matched() && is_sure && IsWithin(place.T_target_source, SaidHypothesis(guess))) {
     const RegistrationResult found = Register(scan, around, place.T_target_source);
     if (Accepted(found.termination) && Same(found.T_target_source, place.T_target_source)) {
       return LinkOf(found);
@@ -103,10 +133,11 @@ Link LinkScan(const SeenScan& scan,
   }
   link.report.aligned = false;
   link.report.message =
-      absl::StrCat(Accepted(match.termination) ? "too far from what the robot says"
-                                               : ToString(match.termination),
+      absl::StrCat(agrees                        ? "shows something else than the scans around"
+                   : Accepted(match.termination) ? "too far from what the robot says"
+                                                 : ToString(match.termination),
                    "; as a place: ",
-                   ToString(place.verdict));
+                   place.matched() ? "doubtful" : ToString(place.verdict));
   link.T_map_scan = guess;
   return link;
 }

@@ -114,6 +114,17 @@ TEST_F(LinksTest, ARobotThatIsNotWhereItSaysIsLinkedToNothing) {
   for (const Constraint& c : graph.constraints) EXPECT_EQ(c.i.trajectory, c.j.trajectory);
 }
 
+// Its first scan fits there, by half of what it shows.
+TEST_F(LinksTest, ARobotThatStartsBesideWhereItSaysIsLinkedToNothingThere) {
+  MakeMap(MapParameters());
+  Record(yard_, "first", way_, Same);
+  const std::vector<Pose> start(way_.begin() + 4, way_.begin() + 7);
+  const Pose off = PoseAt(0.0, 5.4, 0.0);
+  Record(yard_, "second", start, [&](const Pose& T) { return off * T; });
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo info, db().scans().Get({}, kMapName, {"second", 0}));
+  EXPECT_FALSE(info.alignment.aligned) << info.alignment.message;
+}
+
 TEST_F(LinksTest, MotionThatIsWrongByMetresIsMendedByWhatTheScansShow) {
   MakeMap(MapParameters());
   Random random(3);
