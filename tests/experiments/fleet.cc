@@ -1,13 +1,14 @@
 // Several robots drive through a drawn world, each a stretch of one way, and send their scans in
 // any order. Is where they are said to be to each other right?
 //
-//   fleet [--seed 1] [--draws 10] [--worlds campus_loop,car_park,…] [--frames one,off,own]
+//   fleet [--seed 1] [--draws 10] [--worlds campus_loop,car_park,…] [--frames one,off,own,jump]
 //
 // A draw chooses the number of robots (2 to 5), their stretches (neighbours have up to 10 scans of
 // 2 m in common, or none), the sensor (rings, columns, range), and the order of uploads. Frames:
 //   one   all robots begin where the world says (noise of odometry from there on)
 //   off   each is 1 m and 0.1 rad off at its start (σ an axis, height 0.1 m)
 //   own   each has an origin and a heading of its own, 50 to 300 m from the others
+//   jump  it is one robot, whose odometry jumps by up to 6 m and 0.4 rad between its stretches
 // Two robots are right to each other if their middle scans are, to 1 m. `optimize` keeps the first
 // scan of what it joins where it was said to be. So after it a robot is
 //   joined  right to another one
@@ -16,6 +17,7 @@
 // A fleet that stays apart costs coverage, a wrong one the map: exits 1 if any robot is wrong.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -45,10 +47,13 @@ constexpr double kStepM = 2.0;
 constexpr double kSensorHeightM = 1.2;
 
 struct FleetRobot {
-  std::string name;
+  std::string name;  // of its trajectory
   std::vector<Pose> truth;
   std::vector<Pose> said;
+  std::size_t before = 0;  // scans of the trajectory, in other stretches of it
   std::size_t sent = 0;
+
+  ScanId Id(std::size_t k) const { return {name, before + k + 1}; }
 };
 
 World WorldOf(const std::string& name, std::uint64_t seed) {
@@ -60,6 +65,11 @@ World WorldOf(const std::string& name, std::uint64_t seed) {
   return CampusLoopWorld(seed);
 }
 
+Pose Upright(double x_m, double y_m, double z_m, double heading_rad) {
+  return Pose(Eigen::Translation3d(x_m, y_m, z_m) *
+              Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitZ()));
+}
+
 Pose OffOf(const std::string& frames, Random& random) {
   if (frames == "one") return Pose::Identity();
   const bool own = frames == "own";
@@ -67,7 +77,7 @@ Pose OffOf(const std::string& frames, Random& random) {
   const double x = own ? random.Uniform(50.0, 300.0) : random.Gaussian();
   const double y = own ? random.Uniform(-200.0, 200.0) : random.Gaussian();
   const double z = 0.1 * random.Gaussian();
-  return Pose(Eigen::Translation3d(x, y, z) * Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()));
+  return Upright(x, y, z, turn);
 }
 
 std::vector<FleetRobot> FleetOf(const World& world, const std::string& frames, Random& random) {
@@ -93,6 +103,36 @@ std::vector<FleetRobot> FleetOf(const World& world, const std::string& frames, R
   return robots;
 }
 
+// The stretches of one robot.
+std::vector<FleetRobot> JumpsOf(const World& world, Random& random) {
+  const Robot& driver = world.loops.empty() ? world.robots.front() : world.loops.front();
+  const std::vector<Pose> way = Drive(world.scene, driver.waypoints, kStepM, kSensorHeightM);
+  const std::vector<Pose> odometry = NoisyOdometry(way, OdometryNoise(), random.Bits());
+  const auto count = static_cast<std::size_t>(random.Uniform(2.0, 6.0));
+  std::vector<FleetRobot> stretches;
+  Pose off = Pose::Identity();
+  for (std::size_t r = 0; r < count; ++r) {
+    const std::size_t begin = r * way.size() / count;
+    const std::size_t end = (r + 1) * way.size() / count;
+    if (r > 0) {
+      const double far = random.Uniform(0.0, 6.0);
+      const double towards = random.Uniform(-M_PI, M_PI);
+      const double turn = random.Uniform(-0.4, 0.4);
+      const Pose start = off * odometry[begin];
+      off = start * Upright(far * std::cos(towards), far * std::sin(towards), 0.0, turn) *
+            start.inverse() * off;
+    }
+    FleetRobot& stretch = stretches.emplace_back();
+    stretch.name = "robot";
+    stretch.before = begin;
+    for (std::size_t k = begin; k < end; ++k) {
+      stretch.truth.push_back(way[k]);
+      stretch.said.push_back(off * odometry[k]);
+    }
+  }
+  return stretches;
+}
+
 SensorOptions SensorOf(Random& random) {
   constexpr std::array<int, 3> kRings = {16, 32, 48};
   constexpr std::array<int, 3> kColumns = {240, 360, 720};
@@ -111,7 +151,7 @@ absl::Status Send(api::Database& db,
   const std::size_t k = robot.sent++;
   const PointCloud cloud = SimulateScan(scene, sensor, robot.truth[k], seed);
   ScanHeader header;
-  header.id = {robot.name, k + 1};
+  header.id = robot.Id(k);
   header.T_map_scan = robot.said[k];
   header.point_count = cloud.size();
   STRATA_ASSIGN_OR_RETURN(const auto upload, db.scans().Upload({}, kMap, header));
@@ -142,14 +182,22 @@ struct Verdicts {
 };
 
 absl::StatusOr<Pose> PoseOf(api::Database& db, const FleetRobot& robot, std::size_t k) {
-  STRATA_ASSIGN_OR_RETURN(const ScanInfo scan, db.scans().Get({}, kMap, {robot.name, k + 1}));
+  STRATA_ASSIGN_OR_RETURN(const ScanInfo scan, db.scans().Get({}, kMap, robot.Id(k)));
   return scan.T_map_scan;
 }
 
-// How far its first scan is from where it was said to be [m].
-absl::StatusOr<double> Moved(api::Database& db, const FleetRobot& robot) {
-  STRATA_ASSIGN_OR_RETURN(const Pose first, PoseOf(db, robot, 0));
-  return (first.translation() - robot.said[0].translation()).norm();
+// How far the first scan of the r-th is from where it was said to be [m].
+absl::StatusOr<double> Moved(api::Database& db,
+                             const std::vector<FleetRobot>& robots,
+                             std::size_t r) {
+  STRATA_ASSIGN_OR_RETURN(const Pose first, PoseOf(db, robots[r], 0));
+  Pose said = robots[r].said[0];
+  if (robots[r].before > 0) {
+    const FleetRobot& before = robots[r - 1];
+    STRATA_ASSIGN_OR_RETURN(const Pose last, PoseOf(db, before, before.said.size() - 1));
+    said = last * before.said.back().inverse() * said;
+  }
+  return (first.translation() - said.translation()).norm();
 }
 
 // To each other, of their middle scans [m].
@@ -176,7 +224,7 @@ absl::StatusOr<Verdicts> Judge(api::Database& db, const std::vector<FleetRobot>&
   std::vector<bool> holds(robots.size(), false);
   std::vector<int> size(robots.size(), 0);
   for (std::size_t a = 0; a < robots.size(); ++a) {
-    STRATA_ASSIGN_OR_RETURN(const double moved, Moved(db, robots[a]));
+    STRATA_ASSIGN_OR_RETURN(const double moved, Moved(db, robots, a));
     if (moved <= kRightM) holds[right.Root(a)] = true;
     ++size[right.Root(a)];
   }
@@ -188,7 +236,7 @@ absl::StatusOr<Verdicts> Judge(api::Database& db, const std::vector<FleetRobot>&
       continue;
     }
     ++verdicts.wrong;
-    STRATA_ASSIGN_OR_RETURN(const double moved, Moved(db, robots[a]));
+    STRATA_ASSIGN_OR_RETURN(const double moved, Moved(db, robots, a));
     std::printf("    %s moved by %.2f m, errors", robots[a].name.c_str(), moved);
     for (const double error : errors[a]) std::printf(" %.2f", error);
     std::puts(" m");
@@ -201,7 +249,8 @@ absl::StatusOr<Verdicts> Draw(const std::string& name,
                               std::uint64_t seed) {
   Random random(seed);
   const World world = WorldOf(name, seed);
-  std::vector<FleetRobot> robots = FleetOf(world, frames, random);
+  const bool is_one = frames == "jump";
+  std::vector<FleetRobot> robots = is_one ? JumpsOf(world, random) : FleetOf(world, frames, random);
   const SensorOptions sensor = SensorOf(random);
   const TempDir directory;
   EngineOptions options;
@@ -215,8 +264,8 @@ absl::StatusOr<Verdicts> Draw(const std::string& name,
       if (robot.sent < robot.truth.size()) left.push_back(&robot);
     }
     if (left.empty()) break;
-    STRATA_RETURN_IF_ERROR(Send(
-        *db, world.scene, sensor, seed * 10000 + scans, *left.at(random.Bits() % left.size())));
+    FleetRobot& next = *left[is_one ? 0 : random.Bits() % left.size()];
+    STRATA_RETURN_IF_ERROR(Send(*db, world.scene, sensor, seed * 10000 + scans, next));
     ++scans;
   }
   STRATA_RETURN_IF_ERROR(AwaitIntegrated(*db));
@@ -246,11 +295,11 @@ int Main(int argc, char** argv) {
   std::uint64_t seed = 1;
   int draws = 10;
   std::vector<std::string> worlds = {"campus_loop", "car_park", "bridge", "rooms", "building"};
-  std::vector<std::string> frames = {"one", "off", "own"};
+  std::vector<std::string> frames = {"one", "off", "own", "jump"};
   app.add_option("--seed", seed, "Of the first draw");
   app.add_option("--draws", draws, "Of each world and kind of frames");
   app.add_option("--worlds", worlds, "Of strata-simulate")->delimiter(',');
-  app.add_option("--frames", frames, "one, off, own")->delimiter(',');
+  app.add_option("--frames", frames, "one, off, own, jump")->delimiter(',');
   CLI11_PARSE(app, argc, argv);
   std::map<std::string, Verdicts> all;
   for (int d = 0; d < draws; ++d, ++seed) {
