@@ -155,14 +155,7 @@ absl::Status EvaluateOnMap(Context& context, const std::string& map, const std::
 
 void AddClassifierMapVerbs(Commands& commands, CLI::App* noun) {
   auto options = std::make_shared<ClassifierVerb>();
-  const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
-    CLI::App* app =
-        commands.Verb(noun, name, description, example, [options, run](Context& context) {
-          return run(context, *options);
-        });
-    AddMapName(app, options->map);
-    return app;
-  };
+  const auto verb = MapVerbs(commands, noun, options);
   const auto with_name = [&](CLI::App* app) {
     app->add_option("MODEL", options->name, "Name of the classifier")->required();
     return app;

@@ -107,14 +107,7 @@ void AddJobCommands(Commands& commands) {
   auto options = std::make_shared<JobOptions>();
   CLI::App* noun = commands.Noun(
       "job", "Durable background work on a map", "strata job start campus verify --wait");
-  const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
-    CLI::App* app =
-        commands.Verb(noun, name, description, example, [options, run](Context& context) {
-          return run(context, *options);
-        });
-    AddMapName(app, options->map);
-    return app;
-  };
+  const auto verb = MapVerbs(commands, noun, options);
   AddStart(verb("start",
                 "Start a job; --help has its kinds and their parameters",
                 "strata job start campus optimize rounds=3 --dry-run --wait",

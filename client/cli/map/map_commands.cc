@@ -184,14 +184,7 @@ void AddMapCommands(Commands& commands) {
   CLI::App* noun = commands.Noun("map", "Whole worlds", "strata map show campus --output json");
   AddCreate(commands, noun, options);
   commands.Verb(noun, "list", "All maps", "strata map list", List);
-  const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
-    CLI::App* app =
-        commands.Verb(noun, name, description, example, [options, run](Context& context) {
-          return run(context, *options);
-        });
-    AddMapName(app, options->map);
-    return app;
-  };
+  const auto verb = MapVerbs(commands, noun, options);
   verb("show",
        "Parameters, counts, content digest, and how well scans and loops agree",
        "strata map show campus --output json",

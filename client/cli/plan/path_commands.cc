@@ -61,12 +61,9 @@ void AddPathCommands(Commands& commands) {
   auto options = std::make_shared<PathOptions>();
   CLI::App* noun =
       commands.Noun("path", "Paths that there are already", "strata path check campus route.ply");
+  const auto map_verb = MapVerbs(commands, noun, options);
   const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
-    CLI::App* app =
-        commands.Verb(noun, name, description, example, [options, run](Context& context) {
-          return run(context, *options);
-        });
-    AddMapName(app, options->map);
+    CLI::App* app = map_verb(name, description, example, run);
     app->add_option("FILE", options->file, "PLY file of the path, as plan --out writes it")
         ->type_name("FILE.ply")
         ->required();

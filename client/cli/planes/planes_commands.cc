@@ -117,14 +117,7 @@ void AddPlanesCommands(Commands& commands) {
   auto options = std::make_shared<PlanesOptions>();
   CLI::App* noun = commands.Noun(
       "planes", "Walls, floors and roofs of a map", "strata planes find campus --wait");
-  const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
-    CLI::App* app =
-        commands.Verb(noun, name, description, example, [options, run](Context& context) {
-          return run(context, *options);
-        });
-    AddMapName(app, options->map);
-    return app;
-  };
+  const auto verb = MapVerbs(commands, noun, options);
   verb("list",
        "The planes that optimize holds scans against; posegraph disable switches one off. WEIGHT "
        "is the area [m2] or length of edges [m] that the scans see",

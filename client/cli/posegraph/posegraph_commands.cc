@@ -176,14 +176,7 @@ void AddPosegraphCommands(Commands& commands) {
   auto options = std::make_shared<PoseGraphOptions>();
   CLI::App* noun = commands.Noun(
       "posegraph", "What holds the scans in their places", "strata posegraph show campus --worst");
-  const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
-    CLI::App* app =
-        commands.Verb(noun, name, description, example, [options, run](Context& context) {
-          return run(context, *options);
-        });
-    AddMapName(app, options->map);
-    return app;
-  };
+  const auto verb = MapVerbs(commands, noun, options);
   verb("show",
        "The constraints and how well the poses keep them: chi2 is about 1 where noise is all",
        "strata posegraph show campus --worst",

@@ -204,12 +204,9 @@ void AddScanCommands(Commands& commands) {
   AddScanImport(commands, noun);
   AddScanTopics(commands, noun);
   AddList(commands, noun, options);
+  const auto map_verb = MapVerbs(commands, noun, options);
   const auto verb = [&](const char* name, const char* description, const char* example, auto run) {
-    CLI::App* app =
-        commands.Verb(noun, name, description, example, [options, run](Context& context) {
-          return run(context, *options);
-        });
-    AddMapName(app, options->map);
+    CLI::App* app = map_verb(name, description, example, run);
     AddScanId(app, options->id);
     return app;
   };

@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 #include <CLI/CLI.hpp>
 
+#include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/output.h"
 #include "core/api/call.h"
 #include "core/api/database.h"
@@ -63,6 +64,21 @@ struct Commands {
                      const std::string& example,
                      FileAction action);
 };
+
+// Adds verbs under `noun` whose first argument is the NAME of a map: (name, description, example,
+// run), where run(context, *options) acts on options->map. Returns the verb's parser.
+template <typename Options>
+auto MapVerbs(Commands& commands, CLI::App* noun, const std::shared_ptr<Options>& options) {
+  return [&commands, noun, options](
+             const char* name, const char* description, const char* example, auto run) {
+    CLI::App* app =
+        commands.Verb(noun, name, description, example, [options, run](Context& context) {
+          return run(context, *options);
+        });
+    AddMapName(app, options->map);
+    return app;
+  };
+}
 
 void AddMapCommands(Commands& commands);
 void AddScanCommands(Commands& commands);

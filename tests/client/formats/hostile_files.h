@@ -1,8 +1,10 @@
-// Damaged files, for readers: whatever happens, it is a status.
+// Files made by hand, and damaged ones, for readers: whatever happens, it is a status.
 #ifndef STRATA_TESTS_CLIENT_FORMATS_HOSTILE_FILES_H_
 #define STRATA_TESTS_CLIENT_FORMATS_HOSTILE_FILES_H_
 
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <random>
 #include <string>
 
@@ -13,6 +15,13 @@
 #include "core/cloud/point_cloud.h"
 
 namespace strata::testing {
+
+// Writes a value as it is in memory; the file grows to hold it.
+template <typename T>
+void PutAt(std::string& bytes, std::size_t at, T value) {
+  if (bytes.size() < at + sizeof value) bytes.resize(at + sizeof value);
+  std::memcpy(bytes.data() + at, &value, sizeof value);
+}
 
 // Truncations at every byte and seeded changes of single bytes: the reader answers with a valid
 // cloud or with INVALID_ARGUMENT.

@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/client/cli/run_strata.h"
+#include "tests/client/cli/scan/import_of_one_file.h"
 #include "tests/support/simulator/robot_files.h"
 #include "tests/support/simulator/worlds.h"
 #include "tests/support/status_matchers.h"
@@ -30,43 +31,12 @@ using ::testing::Not;
 
 constexpr std::size_t kScans = 6;
 
-class BagImportTest : public ::testing::Test {
+class BagImportTest : public ImportOfOneFile {
  protected:
-  void SetUp() override {
-    const testing::World world = testing::BridgeWorld();
-    testing::RobotFiles files;
-    files.max_scans = kScans;
-    files.noise.translation_sigma_m = 0.02;
-    files.sensor.columns = 360;
-    STRATA_ASSERT_OK(
-        testing::WriteRobot(world.scene, world.robots.at(0), 1, files, dir_.path() / "robot"));
-  }
-  std::string Path(const std::string& name) const { return (dir_.path() / name).string(); }
+  BagImportTest() : ImportOfOneFile(kScans, 360) {}
   // A bag of the robot's scans.
   std::string Bag(const std::string& name, const std::string& compression = "none") const {
-    const std::string command = absl::StrCat("/usr/bin/python3 " STRATA_WRITE_BAG " ",
-                                             Path("robot/scans"),
-                                             " ",
-                                             Path("robot/poses_initial.txt"),
-                                             " ",
-                                             Path(name),
-                                             " --compression ",
-                                             compression,
-                                             " > /dev/null");
-    EXPECT_EQ(std::system(command.c_str()), 0);
-    return Path(name);
-  }
-  Ran Run(std::vector<std::string> arguments) const {
-    arguments.insert(arguments.end(), {"--embedded", Path("db"), "--output", "json"});
-    return RunStrata(arguments);
-  }
-  // Makes a map of its own of what is said, at the uploaded poses or aligned.
-  Ran Import(const std::string& map, const std::vector<std::string>& words) const {
-    EXPECT_EQ(Run({"map", "create", map, "--cell-size", "1"}).exit_code, 0);
-    std::vector<std::string> all = {"scan", "import", map};
-    all.insert(all.end(), words.begin(), words.end());
-    all.insert(all.end(), {"--trajectory", "t", "--wait"});
-    return Run(all);
+    return Write(STRATA_WRITE_BAG, name, "--compression " + compression);
   }
   std::string Bytes(const std::string& path) const {
     std::ifstream file(path, std::ios::binary);
@@ -90,8 +60,6 @@ class BagImportTest : public ::testing::Test {
     content += Bytes(Path("scan.pcd"));
     return content;
   }
-
-  testing::TempDir dir_;
 };
 
 TEST_F(BagImportTest, EveryBagMakesTheMapThatItsFilesMake) {

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/client/cli/run_strata.h"
+#include "tests/client/cli/scan/import_of_one_file.h"
 #include "tests/support/simulator/robot_files.h"
 #include "tests/support/simulator/worlds.h"
 #include "tests/support/status_matchers.h"
@@ -25,41 +26,14 @@ using ::testing::HasSubstr;
 
 constexpr std::size_t kScans = 4;
 
-class SurveyImportTest : public ::testing::Test {
+class SurveyImportTest : public ImportOfOneFile {
  protected:
-  void SetUp() override {
-    const testing::World world = testing::BridgeWorld();
-    testing::RobotFiles files;
-    files.max_scans = kScans;
-    files.noise.translation_sigma_m = 0.02;
-    files.sensor.columns = 180;
-    STRATA_ASSERT_OK(
-        testing::WriteRobot(world.scene, world.robots.at(0), 1, files, dir_.path() / "robot"));
-  }
-  std::string Path(const std::string& name) const { return (dir_.path() / name).string(); }
-  std::string Survey(const std::string& name) const {
-    const std::string command = absl::StrCat("/usr/bin/python3 " STRATA_WRITE_SURVEY " ",
-                                             Path("robot/scans"),
-                                             " ",
-                                             Path("robot/poses_initial.txt"),
-                                             " ",
-                                             Path(name),
-                                             " > /dev/null");
-    EXPECT_EQ(std::system(command.c_str()), 0);
-    return Path(name);
-  }
-  Ran Run(std::vector<std::string> arguments) const {
-    arguments.insert(arguments.end(), {"--embedded", Path("db"), "--output", "json"});
-    return RunStrata(arguments);
-  }
+  SurveyImportTest() : ImportOfOneFile(kScans, 180) {}
+  std::string Survey(const std::string& name) const { return Write(STRATA_WRITE_SURVEY, name); }
   // Makes a map of its own of what is said, aligned; the digest of its tiles and how many points
   // each scan has. Their hashes differ: files have times, too.
   std::string ContentOf(const std::string& map, const std::vector<std::string>& words) const {
-    EXPECT_EQ(Run({"map", "create", map, "--cell-size", "1"}).exit_code, 0);
-    std::vector<std::string> all = {"scan", "import", map};
-    all.insert(all.end(), words.begin(), words.end());
-    all.insert(all.end(), {"--trajectory", "t", "--wait"});
-    const Ran ran = Run(all);
+    const Ran ran = Import(map, words);
     EXPECT_EQ(ran.exit_code, 0) << ran.err;
     const json shown = json::parse(Run({"map", "show", map}).out);
     EXPECT_GT(shown.at("tiles"), 0);
@@ -69,8 +43,6 @@ class SurveyImportTest : public ::testing::Test {
     for (const json& scan : scans) content += scan.at("id").dump() + scan.at("points").dump();
     return content;
   }
-
-  testing::TempDir dir_;
 };
 
 TEST_F(SurveyImportTest, OneFileOfAllScansMakesTheMapThatTheirFilesMake) {

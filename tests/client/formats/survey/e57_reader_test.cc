@@ -33,15 +33,11 @@
 namespace strata {
 namespace {
 
+using ::strata::testing::PutAt;
 using ::strata::testing::StatusIs;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-template <typename T>
-void PutAt(std::string& bytes, std::size_t at, T value) {
-  if (bytes.size() < at + sizeof value) bytes.resize(at + sizeof value);
-  std::memcpy(bytes.data() + at, &value, sizeof value);
-}
 template <typename T>
 void Append(std::string& bytes, T value) {
   PutAt(bytes, bytes.size(), value);

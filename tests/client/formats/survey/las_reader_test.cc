@@ -22,15 +22,10 @@
 namespace strata {
 namespace {
 
+using ::strata::testing::PutAt;
 using ::strata::testing::StatusIs;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-template <typename T>
-void Put(std::string& bytes, std::size_t at, T value) {
-  if (bytes.size() < at + sizeof value) bytes.resize(at + sizeof value);
-  std::memcpy(bytes.data() + at, &value, sizeof value);
-}
 
 // One point as the specification has it, with what the formats may hold besides.
 struct LasPoint {
@@ -73,21 +68,21 @@ struct LasFile {
 
 void PutPoint(const LasFile& file, const LasPoint& point, std::size_t at, std::string& bytes) {
   const Layout& layout = file.layout;
-  Put(bytes, at, point.x);
-  Put(bytes, at + 4, point.y);
-  Put(bytes, at + 8, point.z);
-  Put(bytes, at + 12, point.intensity);
+  PutAt(bytes, at, point.x);
+  PutAt(bytes, at + 4, point.y);
+  PutAt(bytes, at + 8, point.z);
+  PutAt(bytes, at + 12, point.intensity);
   if (layout.format >= 6) {
-    Put<std::uint8_t>(bytes, at + 15, point.withheld ? 4 : 0);
-    Put(bytes, at + 16, point.classification);
+    PutAt<std::uint8_t>(bytes, at + 15, point.withheld ? 4 : 0);
+    PutAt(bytes, at + 16, point.classification);
   } else {
-    Put<std::uint8_t>(bytes, at + 15, point.classification | (point.withheld ? 128 : 0));
+    PutAt<std::uint8_t>(bytes, at + 15, point.classification | (point.withheld ? 128 : 0));
   }
-  if (layout.time > 0) Put(bytes, at + layout.time, point.time);
+  if (layout.time > 0) PutAt(bytes, at + layout.time, point.time);
   if (layout.red > 0) {
-    Put(bytes, at + layout.red, point.red);
-    Put(bytes, at + layout.red + 2, point.green);
-    Put(bytes, at + layout.red + 4, point.blue);
+    PutAt(bytes, at + layout.red, point.red);
+    PutAt(bytes, at + layout.red + 2, point.green);
+    PutAt(bytes, at + layout.red + 4, point.blue);
   }
 }
 
@@ -95,21 +90,21 @@ std::string BytesOf(const LasFile& file) {
   const std::uint16_t header = file.minor >= 4 ? 375 : file.minor == 3 ? 235 : 227;
   std::string bytes(header, '\0');
   std::memcpy(bytes.data(), "LASF", 4);
-  Put<std::uint8_t>(bytes, 24, 1);
-  Put(bytes, 25, file.minor);
-  Put(bytes, 94, header);
+  PutAt<std::uint8_t>(bytes, 24, 1);
+  PutAt(bytes, 25, file.minor);
+  PutAt(bytes, 94, header);
   bytes += file.records;
   const std::size_t begin = bytes.size();
-  Put(bytes, 96, static_cast<std::uint32_t>(begin));
-  Put(bytes, 100, file.record_count);
-  Put(bytes, 104, file.layout.format);
+  PutAt(bytes, 96, static_cast<std::uint32_t>(begin));
+  PutAt(bytes, 100, file.record_count);
+  PutAt(bytes, 104, file.layout.format);
   const std::size_t step = file.layout.bytes + file.extra_bytes;
-  Put(bytes, 105, static_cast<std::uint16_t>(step));
-  if (file.minor < 4) Put(bytes, 107, static_cast<std::uint32_t>(file.points.size()));
-  if (file.minor >= 4) Put(bytes, 247, static_cast<std::uint64_t>(file.points.size()));
+  PutAt(bytes, 105, static_cast<std::uint16_t>(step));
+  if (file.minor < 4) PutAt(bytes, 107, static_cast<std::uint32_t>(file.points.size()));
+  if (file.minor >= 4) PutAt(bytes, 247, static_cast<std::uint64_t>(file.points.size()));
   for (int k = 0; k < 3; ++k) {
-    Put(bytes, 131 + 8 * static_cast<std::size_t>(k), file.scale);
-    Put(bytes, 155 + 8 * static_cast<std::size_t>(k), file.offset[k]);
+    PutAt(bytes, 131 + 8 * static_cast<std::size_t>(k), file.scale);
+    PutAt(bytes, 155 + 8 * static_cast<std::size_t>(k), file.offset[k]);
   }
   bytes.resize(begin + step * file.points.size());
   for (std::size_t i = 0; i < file.points.size(); ++i) {
@@ -121,8 +116,8 @@ std::string BytesOf(const LasFile& file) {
 void AddRecord(const std::string& user, std::uint16_t id, const std::string& data, LasFile& file) {
   std::string record(54, '\0');
   std::memcpy(record.data() + 2, user.data(), user.size());
-  Put(record, 18, id);
-  Put(record, 20, static_cast<std::uint16_t>(data.size()));
+  PutAt(record, 18, id);
+  PutAt(record, 20, static_cast<std::uint16_t>(data.size()));
   file.records += record + data;
   ++file.record_count;
 }
@@ -131,11 +126,11 @@ void AddRecord(const std::string& user, std::uint16_t id, const std::string& dat
 std::string Keys(const std::vector<std::pair<std::uint16_t, std::uint16_t>>& keys) {
   std::string bytes;
   for (const std::size_t word : {std::size_t{1}, std::size_t{1}, std::size_t{0}, keys.size()}) {
-    Put(bytes, bytes.size(), static_cast<std::uint16_t>(word));
+    PutAt(bytes, bytes.size(), static_cast<std::uint16_t>(word));
   }
   for (const auto& [key, value] : keys) {
     for (const std::uint16_t word : {key, std::uint16_t{0}, std::uint16_t{1}, value}) {
-      Put(bytes, bytes.size(), word);
+      PutAt(bytes, bytes.size(), word);
     }
   }
   return bytes;
@@ -258,10 +253,10 @@ TEST(LasReaderTest, RefusalsSayWhatToDo) {
   changed[25] = 5;
   expect(changed, "version 1.5");
   changed = good;
-  Put(changed, 131, 0.0);
+  PutAt(changed, 131, 0.0);
   expect(changed, "no scale of 0");
   changed = good;
-  Put<std::uint16_t>(changed, 105, 19);
+  PutAt<std::uint16_t>(changed, 105, 19);
   expect(changed, "need 20");
   LasFile degrees = TwoPoints();
   AddRecord("LASF_Projection", 34735, Keys({{1024, 2}}), degrees);
