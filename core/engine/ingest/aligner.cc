@@ -7,6 +7,7 @@
 #include <iterator>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -54,50 +55,74 @@ absl::Status Aligner::Load(StorageReader& reader, std::uint64_t epoch) {
   trajectories_.clear();
   indices_.clear();
   parts_.clear();
+  STRATA_ASSIGN_OR_RETURN(const std::vector<ConstraintRecord> constraints,
+                          reader.ListConstraints(epoch));
+  std::map<ScanNumber, std::vector<ConstraintRecord>> to_earlier;  // of each scan
+  for (const ConstraintRecord& record : constraints) {
+    to_earlier[std::max(record.scan_i, record.scan_j)].push_back(record);
+  }
   ScanQuery query;
   query.state = ScanState::kIntegrated;
   query.skip_damaged = true;  // no neighbour, but no reason to stop either
-  STRATA_RETURN_IF_ERROR(ForEachPosedScan(reader, query, epoch, [&](const PosedScan& posed) {
-    Add(posed.scan, {posed.pose->T_map_scan, posed.pose->report, {}});
-  }));
-  STRATA_ASSIGN_OR_RETURN(const std::vector<ConstraintRecord> constraints,
-                          reader.ListConstraints(epoch));
-  JoinParts(constraints);
-  return absl::OkStatus();
+  return ForEachPosedScan(reader, query, epoch, [&](const PosedScan& posed) {
+    Add(posed.scan, {posed.pose->T_map_scan, posed.pose->report, to_earlier[posed.scan.number]});
+  });
 }
 
 void Aligner::Add(const ScanRecord& scan, const Placement& placement) {
   const ScanId& id = scan.header.id;
+  const std::size_t segment = SegmentOf(id).value_or(scans_.size());
   std::map<std::uint64_t, std::size_t>& trajectory = trajectories_[id.trajectory];
   const bool is_first = trajectory.empty();
-  const std::size_t begun =
-      is_first ? scans_.size() : scans_[trajectory.begin()->second].trajectory;
   trajectory[id.sequence] = scans_.size();
   indices_[scan.number] = scans_.size();
   scans_.push_back({scan.number,
                     scan.header.T_map_scan,
                     scan.header.sensor_origin.cast<double>(),
                     !is_first && !placement.report.aligned && placement.report.iterations > 0,
-                    begun});
+                    segment});
   poses_.push_back(placement.T_map_scan);
-  JoinParts(placement.constraints);
+  Tie(scans_.size() - 1, placement.constraints);
 }
 
-void Aligner::JoinParts(const std::vector<ConstraintRecord>& constraints) {
+void Aligner::Tie(std::size_t scan, const std::vector<ConstraintRecord>& constraints) {
+  std::vector<std::size_t> others;
   for (const ConstraintRecord& record : constraints) {
     const auto i = indices_.find(record.scan_i);
     const auto j = indices_.find(record.scan_j);
     if (i == indices_.end() || j == indices_.end()) continue;  // a prior, or a damaged scan's
-    parts_.Join(scans_[i->second].trajectory, scans_[j->second].trajectory);
+    others.push_back(i->second == scan ? j->second : i->second);
+  }
+  const auto is_lost = [&](std::size_t other) { return scans_[other].is_lost; };
+  if (!others.empty() && std::ranges::all_of(others, is_lost)) {
+    const std::size_t segment = std::ranges::min(others);
+    others.push_back(scan);
+    for (const std::size_t member : others) {
+      scans_[member].is_lost = false;
+      scans_[member].segment = segment;
+    }
+  }
+  for (const std::size_t other : others) {
+    if (!is_lost(other)) parts_.Join(scans_[other].segment, scans_[scan].segment);
   }
 }
 
-std::vector<std::size_t> Aligner::Apart(const ScanRecord& scan, std::vector<std::size_t> scans) {
-  const auto own = trajectories_.find(scan.header.id.trajectory);
-  if (own == trajectories_.end()) return scans;
-  const std::size_t trajectory = scans_[own->second.begin()->second].trajectory;
+std::optional<std::size_t> Aligner::SegmentOf(const ScanId& id) const {
+  const auto found = trajectories_.find(id.trajectory);
+  if (found == trajectories_.end() || found->second.empty()) return std::nullopt;
+  auto before = found->second.lower_bound(id.sequence);
+  while (before != found->second.begin()) {
+    const PlacedEntry& scan = scans_[(--before)->second];
+    if (!scan.is_lost) return scan.segment;
+  }
+  return scans_[found->second.begin()->second].segment;
+}
+
+std::vector<std::size_t> Aligner::Apart(const ScanId& id, std::vector<std::size_t> scans) {
+  const std::optional<std::size_t> segment = SegmentOf(id);
+  if (!segment.has_value()) return scans;
   std::erase_if(scans,
-                [&](std::size_t i) { return parts_.AreJoined(scans_[i].trajectory, trajectory); });
+                [&](std::size_t i) { return parts_.AreJoined(scans_[i].segment, *segment); });
   return scans;
 }
 
@@ -129,13 +154,14 @@ absl::StatusOr<Aligner::Features> Aligner::FeaturesOf(ScanNumber number,
   return Keep(posed.scan, map, 0);
 }
 
-std::vector<std::size_t> Aligner::OwnPass(const ScanRecord& scan, const Pose& guess) const {
+std::vector<std::size_t> Aligner::OwnPass(const ScanId& id, const Pose& guess) {
   std::vector<std::size_t> pass;
-  const auto found = trajectories_.find(scan.header.id.trajectory);
-  if (found == trajectories_.end()) return pass;
-  const std::map<std::uint64_t, std::size_t>& trajectory = found->second;
-  const auto next = trajectory.lower_bound(scan.header.id.sequence);
+  const std::optional<std::size_t> segment = SegmentOf(id);
+  if (!segment.has_value()) return pass;
+  const std::map<std::uint64_t, std::size_t>& trajectory = trajectories_.at(id.trajectory);
+  const auto next = trajectory.lower_bound(id.sequence);
   const auto add = [&](std::size_t apart, std::size_t i) {
+    if (!parts_.AreJoined(scans_[i].segment, *segment)) return;
     if (apart < kJustBefore || OnOneStorey(poses_[i], guess)) pass.push_back(i);
   };
   auto after = next;
@@ -148,6 +174,18 @@ std::vector<std::size_t> Aligner::OwnPass(const ScanRecord& scan, const Pose& gu
   }
   std::sort(pass.begin(), pass.end());
   return pass;
+}
+
+std::vector<std::size_t> Aligner::LostBefore(const ScanId& id) const {
+  std::vector<std::size_t> lost;
+  const std::map<std::uint64_t, std::size_t>& trajectory = trajectories_.at(id.trajectory);
+  auto before = trajectory.lower_bound(id.sequence);
+  while (before != trajectory.begin() && lost.size() < kOwnPass) {
+    const std::size_t i = (--before)->second;
+    if (!scans_[i].is_lost) break;
+    lost.push_back(i);
+  }
+  return lost;
 }
 
 std::vector<std::size_t> Aligner::All() const {
@@ -222,12 +260,12 @@ std::vector<std::vector<std::size_t>> Aligner::PartsAround(const Pose& guess) {
   std::vector<std::size_t> roots;
   std::vector<std::vector<std::size_t>> parts;
   for (const std::size_t i : near) {
-    const std::size_t root = parts_.Root(scans_[i].trajectory);
+    const std::size_t root = parts_.Root(scans_[i].segment);
     if (parts.size() == kPartsTried || std::ranges::find(roots, root) != roots.end()) continue;
     roots.push_back(root);
     std::vector<std::size_t>& part = parts.emplace_back();
     std::ranges::copy_if(believed, std::back_inserter(part), [&](std::size_t other) {
-      return parts_.Root(scans_[other].trajectory) == root;
+      return parts_.Root(scans_[other].segment) == root;
     });
   }
   return parts;
@@ -256,6 +294,23 @@ absl::StatusOr<Placement> Aligner::PlaceAmongOthers(ScanNumber number,
   return placement;
 }
 
+absl::StatusOr<Placement> Aligner::PlaceAmongLost(const ScanRecord& scan,
+                                                  const SeenScan& seen,
+                                                  Placement placement,
+                                                  StorageReader& reader,
+                                                  ScanSource& source) {
+  const Pose guess = placement.T_map_scan;
+  STRATA_ASSIGN_OR_RETURN(const Neighbourhood around,
+                          NeighboursOf(guess, LostBefore(scan.header.id), reader, source));
+  if (around.seen.empty()) return placement;
+  const Link link = LinkScan(seen, around.seen, guess, Nearness::kSamePass);
+  if (!link.report.aligned) return placement;
+  placement.report = link.report;
+  placement.T_map_scan = link.T_map_scan;
+  placement.constraints = ConstraintsOf(scan.number, link, around.indices);
+  return placement;
+}
+
 absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
                                          const MlsMap& registration_map,
                                          StorageReader& reader,
@@ -270,12 +325,14 @@ absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
   const Pose guess = Guess(scan);
   placement.T_map_scan = guess;
   const SeenScan seen{own.get(), guess, scan.header.sensor_origin.cast<double>()};
-  const std::vector<std::size_t> pass = Believed(OwnPass(scan, guess));
+  const std::vector<std::size_t> pass = Believed(OwnPass(scan.header.id, guess));
   STRATA_ASSIGN_OR_RETURN(const Neighbourhood around, NeighboursOf(guess, pass, reader, source));
   if (around.seen.empty()) return PlaceAmongOthers(scan.number, seen, guess, reader, source);
   const Link link = LinkScan(seen, around.seen, guess, Nearness::kSamePass);
   placement.report = link.report;
-  if (!link.report.aligned) return placement;
+  if (!link.report.aligned) {
+    return PlaceAmongLost(scan, seen, std::move(placement), reader, source);
+  }
   placement.T_map_scan = link.T_map_scan;
   placement.constraints = ConstraintsOf(scan.number, link, around.indices);
   const std::vector<std::size_t> level = Around(link.T_map_scan, pass);
@@ -284,8 +341,9 @@ absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
   if (all.indices == around.indices) return placement;
   const Link joint = AgreeingLink(seen, all.seen, link.T_map_scan);
   if (joint.report.aligned) placement.T_map_scan = joint.T_map_scan;
-  STRATA_ASSIGN_OR_RETURN(const Neighbourhood apart,
-                          NeighboursOf(placement.T_map_scan, Apart(scan, level), reader, source));
+  STRATA_ASSIGN_OR_RETURN(
+      const Neighbourhood apart,
+      NeighboursOf(placement.T_map_scan, Apart(scan.header.id, level), reader, source));
   if (apart.seen.empty()) return placement;
   const Link tie = VerifiedLink(seen, apart.seen, placement.T_map_scan);
   if (!tie.report.aligned) return placement;

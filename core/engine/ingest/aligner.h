@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -60,7 +61,7 @@ class Aligner {
     Pose T_map_scan_uploaded;
     Eigen::Vector3d sensor_origin;  // scan frame
     bool is_lost = false;           // others of its pass were around, and none said where it is
-    std::size_t trajectory = 0;     // by its first scan's place in scans_
+    std::size_t segment = 0;        // of its trajectory, by the first scan's place in scans_
   };
   using Features = std::shared_ptr<const ScanFeatures>;
   // The scans to align to.
@@ -73,7 +74,9 @@ class Aligner {
   Pose Guess(const ScanRecord& scan) const;
   // Indices into scans_, ascending: scans of its trajectory just before and after, on its storey or
   // on the way there,
-  std::vector<std::size_t> OwnPass(const ScanRecord& scan, const Pose& guess) const;
+  std::vector<std::size_t> OwnPass(const ScanId& id, const Pose& guess);
+  // those right before it that are lost, the last first,
+  std::vector<std::size_t> LostBefore(const ScanId& id) const;
   absl::StatusOr<Features> FeaturesOf(ScanNumber number, StorageReader& reader, ScanSource& source);
   // all,
   std::vector<std::size_t> All() const;
@@ -82,9 +85,12 @@ class Aligner {
   // and `pass` with the scans of others that are not on another storey, which may look the same.
   std::vector<std::size_t> Around(const Pose& T_map_scan,
                                   const std::vector<std::size_t>& pass) const;
-  // Without those of trajectories that constraints hold together with the scan's.
-  std::vector<std::size_t> Apart(const ScanRecord& scan, std::vector<std::size_t> scans);
-  void JoinParts(const std::vector<ConstraintRecord>& constraints);
+  // Without those of segments that constraints hold together with the scan's.
+  std::vector<std::size_t> Apart(const ScanId& id, std::vector<std::size_t> scans);
+  // A trajectory is one segment as long as each scan is tied to those before. What is tied to lost
+  // scans alone begins another one with them: how it lies to the ones before nobody knows.
+  std::optional<std::size_t> SegmentOf(const ScanId& id) const;
+  void Tie(std::size_t scan, const std::vector<ConstraintRecord>& constraints);
   // Those of `among` around `guess`.
   absl::StatusOr<Neighbourhood> NeighboursOf(const Pose& guess,
                                              const std::vector<std::size_t>& among,
@@ -99,6 +105,12 @@ class Aligner {
                                              const Pose& guess,
                                              StorageReader& reader,
                                              ScanSource& source);
+  // Of a scan that its segment says nothing about: to the lost ones right before it.
+  absl::StatusOr<Placement> PlaceAmongLost(const ScanRecord& scan,
+                                           const SeenScan& seen,
+                                           Placement placement,
+                                           StorageReader& reader,
+                                           ScanSource& source);
   // What a link to `partners` says about the scan, as constraints to the nearest of them.
   std::vector<ConstraintRecord> ConstraintsOf(ScanNumber number,
                                               const Link& link,

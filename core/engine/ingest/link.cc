@@ -19,15 +19,26 @@ constexpr double kSameM = 0.3;
 constexpr double kSameRad = 0.05;
 // What is searched for a place: the nearest few.
 constexpr std::size_t kPlaceScans = 5;
-// A place that only a search found says more for itself: with one scan around, every seventh one
-// below is the next room, or the next corner of the yard.
+// A place that is not about where the robot says has more to say for itself: below, some are the
+// next room, or the next corner of the yard.
 constexpr double kLeastConfidence = 0.25;
+constexpr double kAboutM = 1.0;
+constexpr double kAboutRad = 0.1;
 // Scans of another pass show the same at least to this share.
 constexpr double kLeastAgreement = 0.5;
 
-bool Same(const Pose& a, const Pose& b) {
+bool AreWithin(const Pose& a, const Pose& b, double metres, double radians) {
   const Pose T_a_b = a.inverse() * b;
-  return T_a_b.translation().norm() <= kSameM && RotationAngleRad(T_a_b) <= kSameRad;
+  return T_a_b.translation().norm() <= metres && RotationAngleRad(T_a_b) <= radians;
+}
+
+bool Same(const Pose& a, const Pose& b) { return AreWithin(a, b, kSameM, kSameRad); }
+
+bool IsSure(const PlaceMatch& place, const Pose& guess, Nearness nearness) {
+  if (!place.matched()) return false;
+  const bool is_about = nearness == Nearness::kSamePass &&
+                        AreWithin(place.T_target_source, guess, kAboutM, kAboutRad);
+  return is_about || place.confidence >= kLeastConfidence;
 }
 
 bool Accepted(Termination termination) {
@@ -108,7 +119,10 @@ bool IsBelieved(const RegistrationResult& match,
                 const SeenScan& scan,
                 std::span<const SeenScan> around,
                 Nearness nearness) {
-  if (nearness == Nearness::kSamePass && match.termination != Termination::kDegenerate) return true;
+  if (nearness == Nearness::kSamePass && match.termination != Termination::kDegenerate &&
+      match.overlap >= kLeastAgreement) {
+    return true;
+  }
   return MayBeHere(scan, around, match.T_target_source, nearness);
 }
 
@@ -123,9 +137,8 @@ Link LinkScan(const SeenScan& scan,
   const bool agrees = Accepted(match.termination) && Same(match.T_target_source, guess);
   if (agrees && IsBelieved(match, scan, around, nearness)) return link;
   const PlaceMatch place = PlaceOf(scan, around, guess, nearness);
-  const bool is_sure = place.confidence >= kLeastConfidence;
   // Registration may leave the window: rooms that look alike are farther apart than it is wide.
-  if (place.matched() && is_sure && IsWithin(place.T_target_source, SaidHypothesis(guess))) {
+  if (IsSure(place, guess, nearness) && IsWithin(place.T_target_source, SaidHypothesis(guess))) {
     const RegistrationResult found = Register(scan, around, place.T_target_source);
     if (Accepted(found.termination) && Same(found.T_target_source, place.T_target_source)) {
       return LinkOf(found);

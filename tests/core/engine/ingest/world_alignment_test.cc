@@ -135,6 +135,42 @@ TEST_F(LinksTest, MotionThatIsWrongByMetresIsMendedByWhatTheScansShow) {
   EXPECT_LT(Farthest(PosesOf("shaken"), way_), 0.05);
 }
 
+// How it lies to what was before nobody knows, but its own scans say how they lie to each other;
+// the server may end in between.
+TEST_F(LinksTest, AfterAJumpThatNothingMendsScansAreTiedToEachOther) {
+  MakeMap(MapParameters());
+  const std::size_t jump = way_.size() / 2;
+  Random random(5);
+  std::vector<Pose> said = way_;
+  for (std::size_t i = jump; i < said.size(); ++i) {
+    const double x = 0.1 * random.Gaussian();
+    const double y = 0.1 * random.Gaussian();
+    said[i] = PoseAt(1.0, 7.0, 0.3) * way_[i] * PoseAt(x, y, 0.02 * random.Gaussian());
+  }
+  for (std::size_t i = 0; i < way_.size(); ++i) {
+    if (i == jump + 2) {
+      Close();
+      Reopen();
+    }
+    const PointCloud cloud = SimulateScan(yard_, {}, way_[i], 700 + i);
+    const ScanHeader header = HeaderOf({"jumps", i}, cloud, said[i], Alignment::kOn);
+    STRATA_ASSERT_OK(Upload(db(), header, cloud, 40'000));
+    ASSERT_EQ(WaitIntegrated(db()).scans_failed, 0U);
+    STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo info, db().scans().Get({}, kMapName, header.id));
+    EXPECT_EQ(info.alignment.aligned, i != 0 && i != jump) << i << ": " << info.alignment.message;
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const api::PoseGraphState graph, db().posegraph().Get({}, kMapName));
+  for (const Constraint& c : graph.constraints) {
+    EXPECT_EQ(c.i.sequence < jump, c.j.sequence < jump) << c.i.ToString() << c.j.ToString();
+  }
+  const std::vector<Pose> poses = PosesOf("jumps");
+  for (std::size_t i = jump + 1; i < way_.size(); ++i) {
+    const Pose is = poses[jump].inverse() * poses[i];
+    const Pose truth = way_[jump].inverse() * way_[i];
+    EXPECT_LT((is.translation() - truth.translation()).norm(), 0.05) << i;
+  }
+}
+
 TEST_F(LinksTest, CellsOfTheMapDoNotChangeWhereScansAre) {
   MapParameters coarse;
   coarse.mls.cell_size_m = 0.5;
