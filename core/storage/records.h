@@ -160,6 +160,9 @@ struct MlsTileRow {
   std::uint64_t version = 0;
   std::uint64_t patches = 0;
   std::uint64_t cells = 0;
+  // Σw and Σw(z − mean)² of the level surfaces that have five measurements or more, w = 1/σ² [m⁻²].
+  double spread_weight = 0.0;
+  double spread_sum = 0.0;
   Eigen::AlignedBox3d box;  // around its surfaces [m]
   std::string digest;       // content hash of `bytes`
   std::string bytes;        // empty in listings

@@ -66,6 +66,10 @@ struct MapStats {
   std::uint64_t point_bytes = 0;     // points as stored (compressed)
   std::uint64_t epoch = 0;
   std::uint64_t commit_sequence = 0;
+  // Of heights in level surfaces around their mean, over all measurements: root of the mean square
+  // [m]. How crisp the map is: rough ground and slopes have some whatever the poses, scans that do
+  // not agree add to it. 0 where no surface has five measurements.
+  double surface_spread_m = 0.0;
   // Hash of the epoch's level-0 tiles with all their statistics; equal worlds have equal digests.
   std::string content_digest;
   // Box around all surfaces [m]; empty map: both zero.

@@ -133,6 +133,7 @@ v1::MapStats ToProto(const MapStats& stats) {
   proto.set_point_bytes(stats.point_bytes);
   proto.set_epoch(stats.epoch);
   proto.set_commit_sequence(stats.commit_sequence);
+  proto.set_surface_spread_m(stats.surface_spread_m);
   proto.set_content_digest(stats.content_digest);
   *proto.mutable_box_min() = ToProto(stats.box_min);
   *proto.mutable_box_max() = ToProto(stats.box_max);
@@ -153,6 +154,7 @@ absl::StatusOr<MapStats> FromProto(const v1::MapStats& proto) {
   stats.point_bytes = proto.point_bytes();
   stats.epoch = proto.epoch();
   stats.commit_sequence = proto.commit_sequence();
+  stats.surface_spread_m = proto.surface_spread_m();
   stats.content_digest = proto.content_digest();
   STRATA_ASSIGN_OR_RETURN(stats.box_min, FromProto("box_min", proto.box_min()));
   STRATA_ASSIGN_OR_RETURN(stats.box_max, FromProto("box_max", proto.box_max()));

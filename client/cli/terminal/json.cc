@@ -132,6 +132,7 @@ Json ToJson(const MapInfo& info, const MapStats& stats) {
   json["point_bytes"] = stats.point_bytes;
   json["epoch"] = stats.epoch;
   json["commit_sequence"] = stats.commit_sequence;
+  json["surface_spread_m"] = stats.surface_spread_m;
   json["content_digest"] = stats.content_digest;
   json["box_min"] = ToJson(stats.box_min);
   json["box_max"] = ToJson(stats.box_max);

@@ -34,6 +34,8 @@ class Stats:
     """(2, 3) lower and upper corner of the box around all surfaces, map frame [m]."""
     tiles_prepared: int
     """Of the tiles, those kept ready for plans of the default robot."""
+    surface_spread_m: float
+    """Of heights in level surfaces around their mean, root of the mean square: how crisp the map is."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -162,7 +164,7 @@ class Map:
         s = self._connection.unary(self._maps.Stats, maps_pb2.GetMapStatsRequest(name=self.name)).stats
         return Stats(s.scans, s.scans_pending, s.scans_failed, s.points, s.patches, s.tiles, s.epoch,
                      s.commit_sequence, s.content_digest, np.array([poses.array3(s.box_min), poses.array3(s.box_max)]),
-                     s.tiles_prepared)
+                     s.tiles_prepared, s.surface_spread_m)
 
     def origin(self):
         """Where the map's origin is on earth (WGS 84): (latitude [°], longitude [°], altitude [m]); None: not said."""

@@ -1,5 +1,6 @@
 #include "core/engine/doors/map_stats.h"
 
+#include <cmath>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -30,15 +31,20 @@ absl::Status AddTiles(StorageReader& reader, const MapClock& clock, MapStats& st
                           reader.ListMlsTiles(clock.tile_version));
   ContentHasher hasher;
   Eigen::AlignedBox3d box;
+  double spread_weight = 0.0;
+  double spread_sum = 0.0;
   for (const MlsTileRow& tile : tiles) {
     hasher.Add(tile.key.ToString());
     hasher.Add(tile.digest);
     stats.patches += tile.patches;
     stats.occupied_cells += tile.cells;
+    spread_weight += tile.spread_weight;
+    spread_sum += tile.spread_sum;
     box.extend(tile.box);
   }
   stats.content_digest = hasher.HexDigest();
   stats.tiles = tiles.size();
+  if (spread_weight > 0.0) stats.surface_spread_m = std::sqrt(spread_sum / spread_weight);
   if (!box.isEmpty()) {
     stats.box_min = box.min();
     stats.box_max = box.max();

@@ -127,6 +127,7 @@ absl::Status DerivedPass::CheckBlock(StorageReader& reader, const KeySet& keys, 
                               MakeMlsTileRow(*tile, stored->version, cell_size_m));
       if (row.bytes == stored->bytes && row.digest == stored->digest &&
           row.patches == stored->patches && row.cells == stored->cells &&
+          row.spread_weight == stored->spread_weight && row.spread_sum == stored->spread_sum &&
           row.box.min() == stored->box.min() && row.box.max() == stored->box.max()) {
         continue;
       }

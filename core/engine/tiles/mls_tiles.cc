@@ -52,6 +52,21 @@ Eigen::AlignedBox3d BoxOf(const MlsTile& tile, double cell_size_m) {
   return box;
 }
 
+namespace {
+
+// Fewer measurements have hardly a spread of their own.
+constexpr std::uint64_t kMeasurementsOfSpread = 5;
+
+void AddSpread(const Patch& patch, MlsTileRow& row) {
+  if (patch.vertical() || patch.count < kMeasurementsOfSpread) return;
+  const auto weight = static_cast<double>(patch.sum_w);
+  const double spread_m = patch.spread_m();
+  row.spread_weight += weight;
+  row.spread_sum += weight * spread_m * spread_m;
+}
+
+}  // namespace
+
 absl::StatusOr<MlsTileRow> MakeMlsTileRow(const MlsTile& tile,
                                           std::uint64_t version,
                                           double cell_size_m) {
@@ -60,7 +75,9 @@ absl::StatusOr<MlsTileRow> MakeMlsTileRow(const MlsTile& tile,
   row.version = version;
   row.patches = tile.patches.size();
   for (std::size_t i = 0; i < tile.patches.size(); ++i) {
-    if (i == 0 || tile.patches[i].cell != tile.patches[i - 1].cell) ++row.cells;
+    const Patch& patch = tile.patches[i];
+    if (i == 0 || patch.cell != tile.patches[i - 1].cell) ++row.cells;
+    AddSpread(patch, row);
   }
   row.box = BoxOf(tile, cell_size_m);
   STRATA_ASSIGN_OR_RETURN(row.bytes, EncodeMlsTile(tile));

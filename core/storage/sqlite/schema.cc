@@ -221,6 +221,7 @@ CREATE TABLE derived_mls_tile (
   cells INTEGER NOT NULL,
   min_x REAL NOT NULL, min_y REAL NOT NULL, min_z REAL NOT NULL,
   max_x REAL NOT NULL, max_y REAL NOT NULL, max_z REAL NOT NULL,
+  spread_weight REAL NOT NULL, spread_sum REAL NOT NULL,
   digest TEXT NOT NULL,
   bytes BLOB NOT NULL,
   PRIMARY KEY (level, x, y, version)

@@ -32,7 +32,9 @@ MlsTileRow ReadMlsTile(const Statement& row) {
   tile.cells = row.Unsigned(5);
   tile.box.min() = {row.Real(6), row.Real(7), row.Real(8)};
   tile.box.max() = {row.Real(9), row.Real(10), row.Real(11)};
-  tile.digest = row.Text(12);
+  tile.spread_weight = row.Real(12);
+  tile.spread_sum = row.Real(13);
+  tile.digest = row.Text(14);
   return tile;
 }
 
@@ -53,13 +55,14 @@ absl::StatusOr<std::optional<MlsTileRow>> SqliteReader::FindMlsTile(const TileKe
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
       database_.Prepare("SELECT level, x, y, version, patches, cells, min_x, min_y, min_z, max_x, "
-                        "max_y, max_z, digest, bytes FROM derived_mls_tile WHERE level = ?1 AND "
+                        "max_y, max_z, spread_weight, spread_sum, digest, bytes FROM "
+                        "derived_mls_tile WHERE level = ?1 AND "
                         "x = ?2 AND y = ?3 AND version <= ?4 ORDER BY version DESC LIMIT 1"));
   row.Bind(key.level, key.x, key.y, version);
   STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
   if (!found) return std::optional<MlsTileRow>();
   MlsTileRow tile = ReadMlsTile(row);
-  tile.bytes = row.Text(13);
+  tile.bytes = row.Text(15);
   return std::optional<MlsTileRow>(std::move(tile));
 }
 
@@ -82,7 +85,8 @@ absl::StatusOr<std::vector<MlsTileRow>> SqliteReader::ListMlsTiles(std::uint64_t
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
       database_.Prepare("SELECT level, x, y, version, patches, cells, min_x, min_y, min_z, max_x, "
-                        "max_y, max_z, digest FROM derived_mls_tile WHERE version <= ?1 AND "
+                        "max_y, max_z, spread_weight, spread_sum, digest FROM derived_mls_tile "
+                        "WHERE version <= ?1 AND "
                         "level BETWEEN 0 AND ?2 AND x BETWEEN ?3 AND ?4 AND y BETWEEN ?3 AND ?4 "
                         "ORDER BY level, x, y, version"));
   // A damaged key beyond them would be read as another tile's, and no repair would find its row.

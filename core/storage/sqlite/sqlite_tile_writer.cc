@@ -15,8 +15,9 @@ namespace strata {
 absl::Status SqliteWriter::PutMlsTile(const MlsTileRow& row) {
   return RunSql(
       "INSERT OR REPLACE INTO derived_mls_tile (level, x, y, version, patches, cells, min_x, "
-      "min_y, min_z, max_x, max_y, max_z, digest, bytes) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, "
-      "?9, ?10, ?11, ?12, ?13, ?14)",
+      "min_y, min_z, max_x, max_y, max_z, spread_weight, spread_sum, digest, bytes) VALUES (?1, "
+      "?2, "
+      "?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16)",
       row.key.level,
       row.key.x,
       row.key.y,
@@ -29,6 +30,8 @@ absl::Status SqliteWriter::PutMlsTile(const MlsTileRow& row) {
       row.box.max().x(),
       row.box.max().y(),
       row.box.max().z(),
+      row.spread_weight,
+      row.spread_sum,
       row.digest,
       Blob{row.bytes});
 }

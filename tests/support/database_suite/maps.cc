@@ -53,6 +53,21 @@ TEST_P(DatabaseSuite, AnOriginIsSetAndSetAgain) {
   EXPECT_EQ(kept.parameters.origin, (GeodeticOrigin{-0.5, 3.0, -2.0}));
 }
 
+TEST_P(DatabaseSuite, SurfacesThatScansDoNotAgreeOnAreLessCrisp) {
+  const auto spread_m = [&] { return db().maps().Stats({}, kMap)->surface_spread_m; };
+  const PointCloud floor = LevelFloor();
+  EXPECT_EQ(spread_m(), 0.0);
+  ScanHeader header = FloorHeader({"run", 1}, floor);
+  STRATA_ASSERT_OK(UploadScan(db(), kMap, header, floor));
+  AwaitIntegration(db(), kMap);
+  EXPECT_LT(spread_m(), 1e-3);
+  header = FloorHeader({"run", 2}, floor);
+  header.T_map_scan.translation().z() = 0.04;  // half of what was measured, 0.02 m above the mean
+  STRATA_ASSERT_OK(UploadScan(db(), kMap, header, floor));
+  AwaitIntegration(db(), kMap);
+  EXPECT_NEAR(spread_m(), 0.02, 1e-3);
+}
+
 TEST_P(DatabaseSuite, BadAndTakenMapsAreRefused) {
   EXPECT_THAT(db().maps().Create({}, kMap, {}), StatusIs(Code::kAlreadyExists, HasSubstr(kMap)));
   EXPECT_THAT(db().maps().Create({}, "../x", {}), StatusIs(Code::kInvalidArgument, _));

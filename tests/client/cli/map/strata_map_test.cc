@@ -205,6 +205,7 @@ TEST_F(StrataMapTest, MapShowHasTheKeysThatScriptsRead) {
                           "tile_bytes",
                           "point_bytes",
                           "epoch",
+                          "surface_spread_m",
                           "content_digest"}) {
     EXPECT_TRUE(shown.contains(key)) << key;
   }
