@@ -6,7 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+
+#include "core/world/floor.h"
 
 namespace strata {
 
@@ -28,6 +31,9 @@ struct OccupancyGrid {
   double y_m = 0.0;
   std::vector<GridCell> cells;  // by rows, the lowest y first
 };
+
+// RESOURCE_EXHAUSTED for a box of more than 2^28 cells. Empty for a floor without cells.
+absl::StatusOr<OccupancyGrid> GridOf(const Floor& floor, double cell_size_m);
 
 // A binary PGM, the highest y first. Trinary: 254 free, 205 unknown and ground, 0 occupied. Scale:
 // 254 free, 110 ground, and 150 unknown, for a PGM has no transparency, which alone says unknown in

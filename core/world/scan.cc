@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
+#include "core/cloud/point_cloud.h"
 #include "core/cloud/sensor_model.h"
 #include "core/common/status.h"
 #include "core/geometry/pose.h"
@@ -33,6 +34,17 @@ absl::Status ParseScanId(absl::string_view text, ScanId& id) {
   }
   id.trajectory = std::string(text.substr(0, slash));
   return ValidateName("trajectory name", id.trajectory);
+}
+
+void AnnouncePoints(const PointCloud& cloud, ScanHeader& header) {
+  header.T_map_scan.translate(cloud.origin);
+  header.sensor_origin = cloud.sensor_origin;
+  header.point_count = cloud.size();
+  header.rows = cloud.rows;
+  header.columns = cloud.columns;
+  header.has_intensity = !cloud.intensity.empty();
+  header.has_colour = !cloud.colour.empty();
+  header.has_label = !cloud.label.empty();
 }
 
 absl::Status ValidateScanHeader(const ScanHeader& header) {

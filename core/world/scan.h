@@ -12,6 +12,7 @@
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
+#include "core/cloud/point_cloud.h"
 #include "core/cloud/sensor_model.h"
 #include "core/geometry/pose.h"
 
@@ -58,6 +59,10 @@ struct ScanHeader {
   // the map says of a scan always empty: see ScanInfo.
   std::string content_hash;
 };
+
+// What of a header the points say. Its pose, that of the frame that the points came in, becomes that
+// of points relative to the cloud's origin, which whoever sends them sets to zero.
+void AnnouncePoints(const PointCloud& cloud, ScanHeader& header);
 
 // INVALID_ARGUMENT naming the field, its value and the bound.
 absl::Status ValidateScanHeader(const ScanHeader& header);

@@ -20,8 +20,6 @@
 namespace strata::cli {
 namespace {
 
-constexpr std::int64_t kMostCells = std::int64_t{1} << 28;
-
 absl::Status NoFloor(const std::string& map, const FloorPlan& plan, int asked) {
   if (plan.floors.empty()) {
     return absl::NotFoundError(absl::StrCat("map ", map, " has no floor for this robot"));
@@ -141,42 +139,6 @@ absl::Status KeepFloor(Context& context,
   }
   std::erase_if(tiles, [](const SurfaceTile& tile) { return tile.surfaces.empty(); });
   return absl::OkStatus();
-}
-
-absl::StatusOr<OccupancyGrid> GridOf(const Floor& floor, double cell_size_m) {
-  OccupancyGrid grid;
-  if (floor.blocks.empty()) return grid;
-  std::int64_t low[2] = {std::numeric_limits<std::int64_t>::max(), floor.blocks.front().y};
-  std::int64_t high[2] = {std::numeric_limits<std::int64_t>::min(), floor.blocks.back().y};
-  for (const FloorBlock& block : floor.blocks) {
-    low[0] = std::min<std::int64_t>(low[0], block.x);
-    high[0] = std::max<std::int64_t>(high[0], block.x);
-  }
-  const std::int64_t width = (high[0] - low[0] + 1) * kFloorBlockCells;
-  const std::int64_t height = (high[1] - low[1] + 1) * kFloorBlockCells;
-  if (width > kMostCells || height > kMostCells || width * height > kMostCells) {
-    return absl::ResourceExhaustedError(absl::StrCat(
-        "a grid of ", width, " x ", height, " cells; at most ", kMostCells, " are written"));
-  }
-  grid.width = static_cast<int>(width);
-  grid.height = static_cast<int>(height);
-  grid.resolution_m = cell_size_m;
-  grid.x_m = static_cast<double>(low[0] * kFloorBlockCells) * cell_size_m;
-  grid.y_m = static_cast<double>(low[1] * kFloorBlockCells) * cell_size_m;
-  grid.cells.assign(static_cast<std::size_t>(width * height), GridCell::kUnknown);
-  for (const FloorBlock& block : floor.blocks) {
-    for (int cell = 0; cell < kFloorBlockCells * kFloorBlockCells; ++cell) {
-      const auto has = [cell](std::uint64_t mask) { return (mask >> cell & 1U) != 0; };
-      const std::int64_t x = (block.x - low[0]) * kFloorBlockCells + cell % kFloorBlockCells;
-      const std::int64_t y = (block.y - low[1]) * kFloorBlockCells + cell / kFloorBlockCells;
-      grid.cells[static_cast<std::size_t>(y * width + x)] =
-          has(block.free)       ? GridCell::kFree
-          : has(block.occupied) ? GridCell::kOccupied
-          : has(block.ground)   ? GridCell::kGround
-                                : GridCell::kUnknown;
-    }
-  }
-  return grid;
 }
 
 absl::Status ExportFloors(Context& context,

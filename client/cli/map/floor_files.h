@@ -39,9 +39,6 @@ absl::Status KeepFloor(Context& context,
                        const FloorOptions& options,
                        std::vector<SurfaceTile>& tiles);
 
-// RESOURCE_EXHAUSTED for a box of more than 2^28 cells.
-absl::StatusOr<OccupancyGrid> GridOf(const Floor& floor, double cell_size_m);
-
 // Writes STEM.pgm and STEM.yaml of one floor, or STEM-N.pgm and STEM-N.yaml of all where none is
 // asked for; `out` is STEM or one of the two files.
 absl::Status ExportFloors(Context& context,

@@ -194,14 +194,7 @@ class Uploader {
 
 ScanHeader HeaderFor(const UploadSource& source, const PointCloud& cloud) {
   ScanHeader header = source.header;
-  header.T_map_scan.translate(cloud.origin);
-  header.sensor_origin = cloud.sensor_origin;
-  header.point_count = cloud.size();
-  header.rows = cloud.rows;
-  header.columns = cloud.columns;
-  header.has_intensity = !cloud.intensity.empty();
-  header.has_colour = !cloud.colour.empty();
-  header.has_label = !cloud.label.empty();
+  AnnouncePoints(cloud, header);
   return header;
 }
 

@@ -21,12 +21,10 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/string_view.h"
-#include "absl/strings/strip.h"
-#include "absl/time/time.h"
 
+#include "client/formats/bags/cloud_poses.h"
 #include "client/formats/bags/recording.h"
 #include "client/formats/bags/ros_messages.h"
-#include "client/formats/scan_reader.h"
 #include "core/common/status.h"
 
 namespace strata {
@@ -91,7 +89,7 @@ absl::StatusOr<RecordedTopic*> CloudTopic(RecordingSurvey& survey, const std::st
 struct PoseSource {
   std::string name;
   RecordedTopic* topic = nullptr;
-  std::string fixed_frame, base_frame;
+  PoseFrames frames;
 };
 
 absl::Status NoPoseSource(const RecordingSurvey& survey, const std::string& asked) {
@@ -116,15 +114,10 @@ absl::Status NoPoseSource(const RecordingSurvey& survey, const std::string& aske
 absl::StatusOr<PoseSource> ChoosePoseSource(RecordingSurvey& survey, const std::string& asked) {
   PoseSource source;
   source.name = asked;
-  absl::string_view spec = asked;
-  if (absl::ConsumePrefix(&spec, "tf:")) {
-    const absl::string_view arrow = absl::StrContains(spec, "→") ? "→" : "->";
-    const std::size_t at = spec.find(arrow);
-    if (at == absl::string_view::npos || survey.transforms.empty()) {
-      return NoPoseSource(survey, asked);
-    }
-    source.fixed_frame = std::string(spec.substr(0, at));
-    source.base_frame = std::string(spec.substr(at + arrow.size()));
+  if (absl::StartsWith(asked, "tf:")) {
+    const absl::StatusOr<PoseFrames> frames = ParseTransformPoses(asked);
+    if (!frames.ok() || survey.transforms.empty()) return NoPoseSource(survey, asked);
+    source.frames = *frames;
     return source;
   }
   source.topic = FindTopic(survey, asked, &HasPoses);
@@ -134,16 +127,10 @@ absl::StatusOr<PoseSource> ChoosePoseSource(RecordingSurvey& survey, const std::
         absl::StrCat("no pose of ", Described(*source.topic), " can be read: ", source.topic->why));
   }
   source.name = source.topic->topic.name;
-  source.fixed_frame = source.topic->frames.front();
-  source.base_frame = source.topic->child_frame;
+  source.frames.fixed = source.topic->frames.front();
+  source.frames.base = source.topic->child_frame;
   return source;
 }
-
-// A cloud's pose, and what moves its points into the frame whose pose that is.
-struct CloudPose {
-  Pose T_map_scan = Pose::Identity();
-  std::optional<Pose> T_scan_cloud;
-};
 
 // Poses of clouds, whatever their frame; may be asked by several threads.
 class CloudPoses {
@@ -163,30 +150,11 @@ class CloudPoses {
         const Pose T_map_base,
         source_.topic != nullptr
             ? source_.topic->poses.At(stamp_ns)
-            : transforms_.Lookup(source_.fixed_frame, source_.base_frame, stamp_ns));
-    if (T_base_cloud_.has_value()) return CloudPose{Normalized(T_map_base * *T_base_cloud_), {}};
-    if (frame == source_.fixed_frame) return CloudPose{T_map_base, T_map_base.inverse()};
-    if (source_.base_frame.empty() || frame == source_.base_frame) return CloudPose{T_map_base, {}};
-    STRATA_ASSIGN_OR_RETURN(const Pose T_base_cloud, FromBase(frame, stamp_ns));
-    if (transforms_.HangsFrom(source_.base_frame, frame))
-      return CloudPose{T_map_base, T_base_cloud};
-    return CloudPose{Normalized(T_map_base * T_base_cloud), {}};
+            : transforms_.Lookup(source_.frames.fixed, source_.frames.base, stamp_ns));
+    return PoseOfCloud(T_map_base, source_.frames, T_base_cloud_, frame, stamp_ns, transforms_);
   }
 
  private:
-  absl::StatusOr<Pose> FromBase(const std::string& frame, std::int64_t stamp_ns) {
-    absl::StatusOr<Pose> T = transforms_.Lookup(source_.base_frame, frame, stamp_ns);
-    if (T.ok()) return T;
-    return absl::NotFoundError(absl::StrCat("the clouds are in frame ",
-                                            frame,
-                                            ", the poses are those of ",
-                                            source_.base_frame,
-                                            ": ",
-                                            T.status().message(),
-                                            "; record /tf_static, too, or say where the sensor is "
-                                            "on the base with --mount X,Y,Z[,YAW]"));
-  }
-
   const std::shared_ptr<RecordingSurvey> survey_;
   std::mutex mutex_;  // tracks and transforms are sorted when they are asked
   TransformTree& transforms_;
@@ -194,36 +162,13 @@ class CloudPoses {
   const std::optional<Pose> T_base_cloud_;
 };
 
-// Floats as near to the truth as they can be: through doubles.
-PointCloud Moved(PointCloud cloud, const Pose& T) {
-  for (Eigen::Vector3f& p : cloud.points) {
-    p = (T * (cloud.origin + p.cast<double>())).cast<float>();
-  }
-  cloud.origin.setZero();
-  cloud.sensor_origin.setZero();
-  return cloud;
-}
-
 absl::StatusOr<PointCloud> ReadRecordedCloud(Recording& recording,
                                              const RecordedCloud& cloud,
                                              MessageEncoding encoding,
                                              const std::optional<Pose>& T_scan_cloud,
                                              std::size_t* at_sensor) {
   STRATA_ASSIGN_OR_RETURN(const std::string message, recording.Read(cloud));
-  STRATA_ASSIGN_OR_RETURN(PointCloud read, ReadRosCloud(message, encoding));
-  STRATA_ASSIGN_OR_RETURN(read, WithoutRangeZero(std::move(read), at_sensor));
-  if (!T_scan_cloud.has_value()) return read;
-  PointCloud moved = Moved(std::move(read), *T_scan_cloud);
-  STRATA_RETURN_IF_ERROR(ValidateCloud(moved));
-  return moved;
-}
-
-// To the nearest microsecond, as times of files of poses come.
-absl::Time TimeOfStamp(std::int64_t stamp_ns) {
-  constexpr std::int64_t kMicrosecondNs = 1000;
-  const std::int64_t floor_us = stamp_ns / kMicrosecondNs - (stamp_ns % kMicrosecondNs < 0 ? 1 : 0);
-  const std::int64_t rest_ns = stamp_ns - floor_us * kMicrosecondNs;
-  return absl::FromUnixMicros(floor_us + (2 * rest_ns >= kMicrosecondNs ? 1 : 0));
+  return ScanOfMessage(message, encoding, T_scan_cloud, at_sensor);
 }
 
 // What became of the clouds of a topic.
@@ -301,7 +246,7 @@ void TellOf(const RecordingSurvey& survey,
                       " clouds have no pose and are left out: ",
                       chosen.first_fault.message()));
   }
-  if (source.topic != nullptr && source.base_frame.empty()) {
+  if (source.topic != nullptr && source.frames.base.empty()) {
     tell(absl::StrCat(source.name, " does not say whose poses it has: taken for the clouds' own"));
   }
   if (topic.has_point_times && chosen.moved) {

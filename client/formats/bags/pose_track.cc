@@ -83,6 +83,17 @@ absl::StatusOr<Pose> PoseTrack::At(std::int64_t stamp_ns) {
       from + share * (to - from));
 }
 
+void PoseTrack::DropBefore(std::int64_t stamp_ns) {
+  Sort();
+  auto kept = std::lower_bound(
+      poses_.begin(), poses_.end(), stamp_ns, [](const Stamped& pose, std::int64_t stamp) {
+        return pose.stamp_ns < stamp;
+      });
+  if (kept != poses_.begin()) --kept;
+  poses_.erase(poses_.begin(), kept);
+  if (!poses_.empty()) first_ns_ = poses_.front().stamp_ns;
+}
+
 Pose PoseTrack::Last() const {
   return MakePose(UnitQuaternion(last_added_.quaternion),
                   Eigen::Vector3d(last_added_.position_m.data()));

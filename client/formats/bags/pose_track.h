@@ -31,6 +31,8 @@ class PoseTrack {
   // line, the rotation by slerp. Of several with one stamp the first counts. NOT_FOUND before the
   // first, after the last and where the neighbours are more than a second apart.
   absl::StatusOr<Pose> At(std::int64_t stamp_ns);
+  // Forgets poses before a time, but for the last of them.
+  void DropBefore(std::int64_t stamp_ns);
   // The last one that was added, whenever. REQUIRES: it has poses.
   Pose Last() const;
 

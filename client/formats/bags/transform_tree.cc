@@ -46,6 +46,15 @@ absl::Status TransformTree::Add(const RosPose& transform, bool fixed) {
   return absl::OkStatus();
 }
 
+void TransformTree::DropBefore(std::int64_t stamp_ns) {
+  size_ = 0;
+  for (auto& [child, edge] : edges_) {
+    // Of a fixed one the last that came counts, whatever its stamp.
+    edge.T_parent_child.DropBefore(stamp_ns);
+    size_ += edge.T_parent_child.size();
+  }
+}
+
 std::vector<std::string> TransformTree::frames() const {
   std::set<std::string> names;
   for (const auto& [child, edge] : edges_) {

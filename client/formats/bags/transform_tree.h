@@ -24,6 +24,9 @@ class TransformTree {
   // two a name.
   absl::Status Add(const RosPose& transform, bool fixed);
 
+  // Forgets transforms before a time, but for the last of each frame.
+  void DropBefore(std::int64_t stamp_ns);
+
   bool empty() const { return edges_.empty(); }
   std::size_t size() const { return size_; }  // transforms
   // By name.
