@@ -1,14 +1,11 @@
 #include "client/cli/connect.h"
 
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <string>
 #include <system_error>
 
 #include "absl/status/status.h"
-#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include <glog/logging.h>
 
@@ -17,25 +14,6 @@
 #include "core/engine/engine.h"
 
 namespace strata::cli {
-
-namespace {
-
-constexpr char kTokenVariable[] = "STRATA_TOKEN";
-
-absl::StatusOr<std::string> TokenOf(const Target& target) {
-  if (target.token_file.empty()) {
-    const char* token = std::getenv(kTokenVariable);
-    return std::string(token == nullptr ? "" : token);
-  }
-  std::ifstream file(target.token_file);
-  std::string token;
-  if (!std::getline(file, token) || token.empty()) {
-    return absl::NotFoundError(absl::StrCat("no token in ", target.token_file));
-  }
-  return std::string(absl::StripAsciiWhitespace(token));
-}
-
-}  // namespace
 
 absl::StatusOr<std::unique_ptr<api::Database>> OpenDirectory(const std::string& directory) {
   // What the engine does not say through a call (a map that cannot be opened), as plain talk.
@@ -57,15 +35,7 @@ absl::StatusOr<std::unique_ptr<api::Database>> OpenDatabase(const Target& target
     }
     return OpenDirectory(target.embedded);
   }
-  ClientOptions options;
-  options.target = target.server;
-  options.tls = {.ca_file = target.tls_ca,
-                 .certificate_file = target.tls_certificate,
-                 .key_file = target.tls_key,
-                 .server_name = target.tls_name};
-  STRATA_ASSIGN_OR_RETURN(options.token, TokenOf(target));
-  options.insecure = target.insecure;
-  options.connect_timeout = absl::Seconds(3);
+  STRATA_ASSIGN_OR_RETURN(const ClientOptions options, ClientOptionsOf(target.server));
   return Connect(options);
 }
 

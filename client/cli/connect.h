@@ -7,20 +7,13 @@
 
 #include "absl/status/statusor.h"
 
+#include "client/cli/terminal/server_options.h"
 #include "core/api/database.h"
 
 namespace strata::cli {
 
 struct Target {
-  std::string server = "127.0.0.1:50051";
-  std::string tls_ca;  // PEM files, see ClientTls; empty: plain text
-  std::string tls_certificate;
-  std::string tls_key;
-  std::string tls_name;
-  // First line of it is the token; empty: that of the environment's STRATA_TOKEN, if any. Never on
-  // the command line: everybody on the machine sees those.
-  std::string token_file;
-  bool insecure = false;        // a token may cross the network in plain text
+  ServerOptions server;
   std::string embedded;         // a directory: the database runs in this process
   bool make_directory = false;  // if there is none; else that is NOT_FOUND
 };

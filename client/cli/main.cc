@@ -1,22 +1,18 @@
 // strata: the command line of the map database.
 #include <csignal>
-#include <cstddef>
-#include <cstdlib>
 #include <exception>
 #include <functional>
 #include <iostream>
 #include <string>
 
 #include "absl/status/status.h"
-#include "absl/strings/match.h"
-#include "absl/strings/numbers.h"
-#include "absl/strings/str_cat.h"
 #include <CLI/CLI.hpp>
 
 #include "client/cli/connect.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/output.h"
-#include "client/cli/usage.h"
+#include "client/cli/terminal/server_options.h"
+#include "client/cli/terminal/usage.h"
 #include "core/common/status.h"
 #include "core/common/stop.h"
 
@@ -40,49 +36,10 @@ struct GlobalOptions {
   std::string output = "text";
 };
 
-// For CLI11: empty, or what is wrong.
-std::string IsAddress(const std::string& text) {
-  const std::size_t colon = text.rfind(':');
-  int port = 0;
-  const bool good = absl::StartsWith(text, "unix:") ||
-                    (colon != std::string::npos && colon > 0 &&
-                     absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port <= 65535);
-  return good ? "" : "expected HOST:PORT, as in 127.0.0.1:50051, got '" + text + "'";
-}
-
-void AddDoorOptions(CLI::App& root, Target& target) {
-  constexpr char kGroup[] = "Servers that ask who you are";
-  const auto add = [&](const char* name, std::string& value, const char* type, const char* text) {
-    root.add_option(name, value, text)->type_name(type)->group(kGroup);
-  };
-  add("--tls-ca", target.tls_ca, "FILE", "Use TLS, and trust servers of these authorities (PEM)");
-  add("--tls-cert",
-      target.tls_certificate,
-      "FILE",
-      "Certificate of yours (PEM), for servers that want one");
-  add("--tls-key", target.tls_key, "FILE", "Its key (PEM)");
-  add("--tls-name",
-      target.tls_name,
-      "NAME",
-      "Expect this name in the server's certificate, not the host's");
-  add("--token-file",
-      target.token_file,
-      "FILE",
-      "A file with your token in its first line; else the environment's STRATA_TOKEN");
-  root.add_flag("--insecure", target.insecure, "Show the token over the network in plain text")
-      ->group(kGroup);
-}
-
 void AddGlobalOptions(CLI::App& root, GlobalOptions& options) {
-  // No default of the parser's: it would exclude --embedded.
-  if (const char* server = std::getenv("STRATA_SERVER")) options.target.server = server;
   root.fallthrough();  // options of the root are taken after noun and verb too
   root.require_subcommand(1);
-  auto* server =
-      root.add_option("--server", options.target.server, "Address of stratad; else STRATA_SERVER")
-          ->type_name("HOST:PORT")
-          ->check(IsAddress)
-          ->capture_default_str();
+  CLI::Option* const server = AddServerOptions(root, options.target.server);
   root.add_option("--embedded",
                   options.target.embedded,
                   "No server: open the maps in this directory in this process")
@@ -91,23 +48,7 @@ void AddGlobalOptions(CLI::App& root, GlobalOptions& options) {
   root.add_option("--output", options.output, "text for people, json for programs")
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
-  AddDoorOptions(root, options.target);
   root.set_version_flag("--version", "strata " STRATA_VERSION);
-}
-
-// Trouble with a server says with which, and the cure.
-absl::Status Explained(const absl::Status& status, const Target& target) {
-  if (!target.embedded.empty()) return status;
-  if (absl::IsUnauthenticated(status)) {
-    return absl::UnauthenticatedError(absl::StrCat(
-        status.message(), " (from ", target.server, "; show a token with --token-file FILE)"));
-  }
-  if (!absl::IsUnavailable(status)) return status;
-  return absl::UnavailableError(
-      absl::StrCat(status.message(),
-                   " (from ",
-                   target.server,
-                   "; if stratad does not run there, start it and run the command again)"));
 }
 
 int Fail(const absl::Status& status, Output& output) {
@@ -132,7 +73,7 @@ absl::Status RunOnDatabase(const Target& target, const Action& action, Output& o
   Context context{
       .database = *database, .call = {}, .output = output, .open_directory = OpenDirectory};
   const absl::Status status = RunWithSignals(context.call.stop, [&] { return action(context); });
-  return Explained(status, target);
+  return target.embedded.empty() ? Explained(status, target.server) : status;
 }
 
 absl::Status RunOnFiles(const Target& target, const FileAction& action, Output& output) {

@@ -1,4 +1,4 @@
-#include "client/cli/usage.h"
+#include "client/cli/terminal/usage.h"
 
 #include <string>
 #include <vector>

@@ -1,6 +1,6 @@
 // What a wrong command line is answered with.
-#ifndef STRATA_CLIENT_CLI_USAGE_H_
-#define STRATA_CLIENT_CLI_USAGE_H_
+#ifndef STRATA_CLIENT_CLI_TERMINAL_USAGE_H_
+#define STRATA_CLIENT_CLI_TERMINAL_USAGE_H_
 
 #include <string>
 #include <vector>
@@ -21,4 +21,4 @@ std::string UsageMessage(const CLI::App& root, const CLI::ParseError& error);
 
 }  // namespace strata::cli
 
-#endif  // STRATA_CLIENT_CLI_USAGE_H_
+#endif  // STRATA_CLIENT_CLI_TERMINAL_USAGE_H_
