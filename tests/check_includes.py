@@ -40,6 +40,8 @@ ARROWS = {
     "client/cli": ["client/sdk", "client/formats", "core/api", "core/engine", "core/codec", "core/registration",
                    "core/classification", "core/posegraph", "core/egomotion", "core/world", "core/mls", "core/mesh", "core/cloud", "core/geometry",
                    "core/common"],
+    "client/ros2": ["client/sdk", "client/formats", "client/cli/terminal", "core/api", "core/codec", "core/world",
+                    "core/mls", "core/cloud", "core/geometry", "core/common"],
 }
 
 # room: the rooms inside it, highest first, as in core/README.md; HERE: the files of the folder itself.
@@ -73,6 +75,7 @@ EXTERNAL = {
     r"yaml-cpp/.*": ["client/formats/motion"],
     r"tiffio\.h": ["client/formats/grid"],
     r"expat\.h": ["client/formats/survey"],
+    r"dds/.*|ros_messages\.h": ["client/ros2"],
     r"(bzlib|lz4frame|zlib)\.h": ["client/formats/bags"],
     r"(thread|mutex|condition_variable)": ["core/engine", "server", "client", "core/common"],
 }

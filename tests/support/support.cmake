@@ -30,6 +30,8 @@ strata_library(
   PRIVATE_DEPS bz2 lz4 z PkgConfig::sqlite3 PkgConfig::zstd
 )
 
+add_subdirectory(ros2)
+
 # Recorded clouds with known classes.
 strata_library(
   labelled_clouds

@@ -1,0 +1,65 @@
+// A path for each goal that somebody publishes.
+#ifndef STRATA_CLIENT_ROS2_GOAL_PLANNER_H_
+#define STRATA_CLIENT_ROS2_GOAL_PLANNER_H_
+
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+#include <Eigen/Core>
+
+#include "client/formats/bags/ros_messages.h"
+#include "client/ros2/node.h"
+#include "client/ros2/server_link.h"
+#include "client/ros2/talk.h"
+#include "client/ros2/where.h"
+#include "core/api/database.h"
+#include "core/world/plan.h"
+
+namespace strata::ros2 {
+
+// A thread: the robot's place at that moment to the goal, by the map's profile. Where there is no
+// way the path is empty, and the reason is said.
+class GoalPlanner {
+ public:
+  struct Options {
+    std::string map, profile;
+  };
+  // All outlive it.
+  GoalPlanner(const Options& options,
+              const ServerLink& link,
+              const Where& where,
+              const Entity& writer,
+              Talk& talk);
+  ~GoalPlanner();
+  GoalPlanner(const GoalPlanner&) = delete;
+  GoalPlanner& operator=(const GoalPlanner&) = delete;
+
+  // In any frame that is known; one that waits gives way to it.
+  void Put(const RosPose& goal);
+
+ private:
+  void Loop();
+  absl::Status Plan(const RosPose& goal);
+  absl::StatusOr<PlanResult> PathTo(api::Database& database,
+                                    const Eigen::Vector3d& from,
+                                    const Eigen::Vector3d& to);
+
+  const Options options_;
+  const ServerLink& link_;
+  const Where& where_;
+  const Entity& writer_;
+  Talk& talk_;
+  absl::Mutex mutex_;
+  std::optional<RosPose> goal_ ABSL_GUARDED_BY(mutex_);
+  bool ending_ ABSL_GUARDED_BY(mutex_) = false;
+  std::thread thread_;
+};
+
+}  // namespace strata::ros2
+
+#endif  // STRATA_CLIENT_ROS2_GOAL_PLANNER_H_

@@ -1,0 +1,32 @@
+#include "client/ros2/where.h"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "absl/status/statusor.h"
+
+#include "core/common/status.h"
+
+namespace strata::ros2 {
+
+Pose Where::T_map_fixed() const { return Normalized(link_.correction() * T_map_fixed_at_start_); }
+
+std::optional<Pose> Where::T_map_base() const {
+  const std::optional<BasePose> base = book_.newest();
+  if (!base.has_value()) return std::nullopt;
+  return T_map_fixed() * base->T_fixed_base;
+}
+
+std::int64_t Where::stamp_ns() const {
+  const std::optional<BasePose> base = book_.newest();
+  return base.has_value() ? base->stamp_ns : 0;
+}
+
+absl::StatusOr<Pose> Where::InMap(const std::string& frame) const {
+  if (frame.empty() || frame == map_frame_) return Pose::Identity();
+  STRATA_ASSIGN_OR_RETURN(const Pose T_fixed_frame, book_.InFixed(frame));
+  return T_map_fixed() * T_fixed_frame;
+}
+
+}  // namespace strata::ros2

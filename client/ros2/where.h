@@ -1,0 +1,44 @@
+// Where the robot is in the map: its odometry, corrected by what the map made of its scans.
+#ifndef STRATA_CLIENT_ROS2_WHERE_H_
+#define STRATA_CLIENT_ROS2_WHERE_H_
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "absl/status/statusor.h"
+
+#include "client/ros2/pose_book.h"
+#include "client/ros2/server_link.h"
+#include "core/geometry/pose.h"
+
+namespace strata::ros2 {
+
+// Thread-safe; what it looks at outlives it.
+class Where {
+ public:
+  Where(PoseBook& book, const ServerLink& link, const Pose& T_map_fixed, std::string map_frame)
+      : book_(book),
+        link_(link),
+        T_map_fixed_at_start_(T_map_fixed),
+        map_frame_(std::move(map_frame)) {}
+
+  const std::string& map_frame() const { return map_frame_; }
+  // T_map_odom: of the frame that the odometry calls fixed.
+  Pose T_map_fixed() const;
+  // T_map_base at the newest stamp; nullopt before the first pose.
+  std::optional<Pose> T_map_base() const;
+  std::int64_t stamp_ns() const;  // of the newest pose, by the robot's clock; 0 before the first
+  // T_map_frame now. NOT_FOUND.
+  absl::StatusOr<Pose> InMap(const std::string& frame) const;
+
+ private:
+  PoseBook& book_;
+  const ServerLink& link_;
+  const Pose T_map_fixed_at_start_;
+  const std::string map_frame_;
+};
+
+}  // namespace strata::ros2
+
+#endif  // STRATA_CLIENT_ROS2_WHERE_H_
