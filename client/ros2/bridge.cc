@@ -19,6 +19,7 @@
 #include "client/formats/bags/ros_messages.h"
 #include "client/ros2/goal_planner.h"
 #include "client/ros2/listener.h"
+#include "client/ros2/localizer.h"
 #include "client/ros2/messages.h"
 #include "client/ros2/node.h"
 #include "client/ros2/pose_book.h"
@@ -84,6 +85,7 @@ class Pump {
        Keeper& keeper,
        GoalPlanner& planner,
        const Where& where,
+       Localizer* localizer,
        Talk& talk)
       : options_(options),
         node_(node),
@@ -92,6 +94,7 @@ class Pump {
         keeper_(keeper),
         planner_(planner),
         where_(where),
+        localizer_(localizer),
         talk_(talk),
         clouds_(options.clouds, {kPointCloudType}, kCloudDepth),
         poses_(options.poses_from,
@@ -157,8 +160,13 @@ class Pump {
            options_.poses_from,
            poses.ok() ? book_.AddPose(poses->front()) : poses.status());
     }
-    for (CdrMessage& message : clouds_.Take(kCloudDepth))
-      intake_.Add(std::move(message), SteadyNow());
+    for (CdrMessage& message : clouds_.Take(kCloudDepth)) {
+      if (localizer_ != nullptr && !localizer_->done()) {
+        localizer_->Put(std::move(message));
+      } else {
+        intake_.Add(std::move(message), SteadyNow());
+      }
+    }
     for (const CdrMessage& message : goals_.Take(1)) {
       const auto goal = ReadRosPoses(goals_.topic(), message.bytes);
       Tell("goals", options_.goals, goal.status());
@@ -170,9 +178,23 @@ class Pump {
     for (const CdrMessage& message : Node::Take(reader, kMostAtOnce)) {
       const auto transforms =
           ReadRosPoses({topic, kTransformsType, MessageEncoding::kCdr}, message.bytes);
+      if (transforms.ok()) WarnOfRival(*transforms);
       Tell(topic,
            topic,
            transforms.ok() ? book_.AddTransforms(*transforms, fixed) : transforms.status());
+    }
+  }
+
+  // Two that say where the odometry is make a robot jump.
+  void WarnOfRival(const std::vector<RosPose>& transforms) {
+    if (options_.no_tf) return;
+    const std::string fixed = book_.frames().fixed;
+    for (const RosPose& transform : transforms) {
+      if (transform.child_frame != fixed || fixed.empty()) continue;
+      talk_.SayNew("rival",
+                   absl::StrCat("somebody else says on /tf where ",
+                                fixed,
+                                " is, too: end that, or start this with --no-tf"));
     }
   }
 
@@ -208,9 +230,10 @@ class Pump {
                        clouds_.reliable() ? ": reliable" : ": best effort, some may be lost"));
     }
     talk_.SayNew("sending",
-                 spool.last_error.empty()
-                     ? ""
-                     : absl::StrCat("scans wait in ", options_.spool, ": ", spool.last_error));
+                 !spool.last_error.empty()
+                     ? absl::StrCat("scans wait in ", options_.spool, ": ", spool.last_error)
+                 : spool.sent > 0 ? "scans are sent"
+                                  : "");
     talk_.SayNew("left out",
                  intake_.counts().why.empty()
                      ? ""
@@ -231,6 +254,7 @@ class Pump {
   Keeper& keeper_;
   GoalPlanner& planner_;
   const Where& where_;
+  Localizer* const localizer_;  // or null
   Talk& talk_;
   Listener clouds_, poses_, goals_;
   Entity transforms_, static_transforms_;
@@ -268,7 +292,7 @@ absl::StatusOr<Summary> RunBridge(const Options& options, const Stop& stop, Talk
   STRATA_ASSIGN_OR_RETURN(const Writers writers, MakeWriters(*node, options));
   PoseBook book(BookOptions(options));
   const ServerLink link({options.server, client, options.map, summary.trajectory}, *spool, talk);
-  const Where where(book, link, options.start.value_or(Pose::Identity()), options.map_frame);
+  const Where where(book, link, options.map_frame);
   {
     Keeper keeper({options.map,
                    summary.trajectory,
@@ -280,7 +304,17 @@ absl::StatusOr<Summary> RunBridge(const Options& options, const Stop& stop, Talk
     GoalPlanner planner({options.map, options.profile}, link, where, writers.plan, talk);
     const WorldPublisher world(
         {options.map, options.profile}, link, where, writers.map, writers.surfaces, talk);
-    Pump pump(options, *node, writers, book, keeper, planner, where, talk);
+    std::optional<Localizer> localizer;
+    if (options.localize) localizer.emplace(options.map, options.start, book, link, talk);
+    Pump pump(options,
+              *node,
+              writers,
+              book,
+              keeper,
+              planner,
+              where,
+              localizer.has_value() ? &*localizer : nullptr,
+              talk);
     STRATA_RETURN_IF_ERROR(pump.Begin());
     talk.Say(absl::StrCat("listening in domain ",
                           options.domain,

@@ -1,5 +1,6 @@
 #include "client/ros2/goal_planner.h"
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
 
 #include "client/ros2/messages.h"
 #include "client/ros2/world_publisher.h"
@@ -16,6 +18,11 @@
 
 namespace strata::ros2 {
 namespace {
+
+// How often it looks whether the map has changed.
+constexpr absl::Duration kLook = absl::Milliseconds(500);
+// Nearer than this the robot is where it was to go.
+constexpr double kThereM = 0.5;
 
 PlanEndpoint EndpointAt(const Eigen::Vector3d& p, double z_m) {
   return {.x_m = p.x(), .y_m = p.y(), .z_m = z_m};
@@ -46,48 +53,87 @@ void GoalPlanner::Put(const RosPose& goal) {
 }
 
 void GoalPlanner::Loop() {
+  std::optional<Drive> drive;
   while (true) {
-    RosPose goal;
     {
       absl::MutexLock lock(&mutex_);
       const auto due = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
         return ending_ || goal_.has_value();
       };
-      mutex_.Await(absl::Condition(&due));
+      mutex_.AwaitWithTimeout(absl::Condition(&due),
+                              drive.has_value() ? kLook : absl::InfiniteDuration());
       if (ending_) return;
-      goal = *std::exchange(goal_, std::nullopt);
+      if (goal_.has_value()) drive = Drive{*std::exchange(goal_, std::nullopt)};
     }
-    const absl::Status planned = Plan(goal);
-    if (!planned.ok()) talk_.Say(absl::StrCat("no path: ", planned.message()));
+    Follow(drive);
   }
 }
 
-absl::Status GoalPlanner::Plan(const RosPose& goal) {
+void GoalPlanner::Follow(std::optional<Drive>& drive) {
+  if (!drive.has_value()) return;
+  if (drive->planned) {
+    const std::optional<Pose> T_map_base = where_.T_map_base();
+    if (!T_map_base.has_value()) return;
+    const double left_m = (T_map_base->translation() - drive->to).head<2>().norm();
+    if (left_m < kThereM) {
+      drive.reset();
+      return;
+    }
+    const absl::Status holds = Check(*drive);
+    if (holds.ok()) return;
+    talk_.Say(absl::StrCat("the path no longer holds: ", holds.message()));
+  }
+  const absl::Status planned = Plan(*drive);
+  if (planned.ok()) return;
+  talk_.SayNew("path", absl::StrCat("no path: ", planned.message()));
+  // A server that is away may come back.
+  if (!absl::IsUnavailable(planned)) drive.reset();
+}
+
+absl::Status GoalPlanner::Plan(Drive& drive) {
   api::Database* const database = link_.database();
   if (database == nullptr) return absl::UnavailableError("no stratad has answered yet");
   const std::optional<Pose> T_map_base = where_.T_map_base();
   if (!T_map_base.has_value()) return absl::NotFoundError("no pose of the robot has come yet");
-  STRATA_ASSIGN_OR_RETURN(const Pose T_map_goal, where_.InMap(goal.header.frame));
-  const Eigen::Vector3d to = T_map_goal * Eigen::Vector3d(goal.position_m.data());
-  STRATA_ASSIGN_OR_RETURN(const PlanResult path, PathTo(*database, T_map_base->translation(), to));
+  STRATA_ASSIGN_OR_RETURN(const Pose T_map_goal, where_.InMap(drive.goal.header.frame));
+  drive.to = T_map_goal * Eigen::Vector3d(drive.goal.position_m.data());
+  drive.changes = link_.changes();
+  STRATA_ASSIGN_OR_RETURN(drive.path.profile,
+                          FindProfile(*database, link_.call(), options_.map, options_.profile));
+  STRATA_ASSIGN_OR_RETURN(
+      const PlanResult path,
+      PathTo(*database, drive.path.profile, T_map_base->translation(), drive.to));
   STRATA_RETURN_IF_ERROR(
       WritePath(writer_, {where_.map_frame(), where_.stamp_ns()}, path.waypoints));
   if (!path.found()) return absl::NotFoundError(path.message);
-  talk_.Say(absl::StrFormat("path of %.1f m to %.2f, %.2f, %.2f in %.0f ms",
+  drive.path.waypoints = path.waypoints;
+  drive.planned = true;
+  talk_.SayNew("path", "");
+  talk_.Say(absl::StrFormat("path of %.1f m to %.2f, %.2f, %.2f",
                             path.length_m,
-                            to.x(),
-                            to.y(),
-                            to.z(),
-                            path.elapsed_ms));
+                            path.waypoints.back().x(),
+                            path.waypoints.back().y(),
+                            path.waypoints.back().z()));
   return absl::OkStatus();
 }
 
+absl::Status GoalPlanner::Check(Drive& drive) const {
+  const std::uint64_t changes = link_.changes();
+  if (changes == drive.changes) return absl::OkStatus();
+  const absl::StatusOr<PathCheck> check =
+      link_.database()->planning().CheckPath(link_.call(), options_.map, drive.path);
+  if (!check.ok()) return absl::OkStatus();  // asked again
+  drive.changes = changes;
+  drive.path.known = *check;
+  return check->valid ? absl::OkStatus() : absl::FailedPreconditionError(check->message);
+}
+
 absl::StatusOr<PlanResult> GoalPlanner::PathTo(api::Database& database,
+                                               const RobotProfile& profile,
                                                const Eigen::Vector3d& from,
-                                               const Eigen::Vector3d& to) {
+                                               const Eigen::Vector3d& to) const {
   PlanQuery query;
-  STRATA_ASSIGN_OR_RETURN(query.profile,
-                          FindProfile(database, link_.call(), options_.map, options_.profile));
+  query.profile = profile;
   query.from = EndpointAt(from, from.z());
   // RViz points at the plane of height 0, whatever storey it shows: the robot's then, if there is
   // ground at its height.

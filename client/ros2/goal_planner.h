@@ -2,6 +2,7 @@
 #ifndef STRATA_CLIENT_ROS2_GOAL_PLANNER_H_
 #define STRATA_CLIENT_ROS2_GOAL_PLANNER_H_
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <thread>
@@ -22,8 +23,9 @@
 
 namespace strata::ros2 {
 
-// A thread: the robot's place at that moment to the goal, by the map's profile. Where there is no
-// way the path is empty, and the reason is said.
+// A thread: from the robot's place at that moment to the goal, by the map's profile, and again
+// where the map changes so that the path no longer holds, until the robot is there. Where there is
+// no way the path is empty, and the reason is said.
 class GoalPlanner {
  public:
   struct Options {
@@ -43,11 +45,25 @@ class GoalPlanner {
   void Put(const RosPose& goal);
 
  private:
+  // What it is driven to, and by which path.
+  struct Drive {
+    RosPose goal;
+    bool planned = false;
+    PathQuery path = {};
+    Eigen::Vector3d to = Eigen::Vector3d::Zero();
+    std::uint64_t changes = 0;  // of the map that the path was looked at with
+  };
+
   void Loop();
-  absl::Status Plan(const RosPose& goal);
+  // Ends what there is no more to do for.
+  void Follow(std::optional<Drive>& drive);
+  absl::Status Plan(Drive& drive);
+  // OK while the path holds.
+  absl::Status Check(Drive& drive) const;
   absl::StatusOr<PlanResult> PathTo(api::Database& database,
+                                    const RobotProfile& profile,
                                     const Eigen::Vector3d& from,
-                                    const Eigen::Vector3d& to);
+                                    const Eigen::Vector3d& to) const;
 
   const Options options_;
   const ServerLink& link_;

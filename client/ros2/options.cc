@@ -56,6 +56,11 @@ void AddInputs(CLI::App& app, Options& options) {
       [&options](const Pose& pose, std::size_t) { options.start = pose; },
       "Where the odometry begins in the map [m, rad]; without it at the map's origin")
       ->group(kGroup);
+  app.add_flag("--localize",
+               options.localize,
+               "Ask the server where the first clouds were taken, near --start or anywhere, and "
+               "keep nothing before that is known")
+      ->group(kGroup);
   app.add_option("--goals", options.goals, "Goals: geometry_msgs/msg/PoseStamped")
       ->type_name("TOPIC")
       ->group(kGroup)

@@ -27,6 +27,7 @@ struct Options {
   std::string goals = "/goal_pose";
   std::string every = "0.5m,30deg";
   std::optional<Pose> mount, start;
+  bool localize = false;
   std::string align = "on";
   std::string deskew = "on";
   // Out.

@@ -28,6 +28,16 @@ absl::Status TooMany() {
 
 }  // namespace
 
+void PoseBook::SetStart(const Pose& T_map_fixed) {
+  absl::MutexLock lock(&mutex_);
+  T_map_fixed_ = T_map_fixed;
+}
+
+Pose PoseBook::start() const {
+  absl::MutexLock lock(&mutex_);
+  return T_map_fixed_;
+}
+
 absl::Status PoseBook::AddPose(const RosPose& pose) {
   absl::MutexLock lock(&mutex_);
   if (track_.size() >= kMostPoses) return TooMany();
@@ -91,8 +101,8 @@ absl::StatusOr<CloudPose> PoseBook::At(const std::string& frame, std::int64_t st
       CloudPose pose,
       PoseOfCloud(T_fixed_base, frames_, options_.T_base_cloud, frame, stamp_ns, transforms_));
   // Left alone where it is the identity: the bits of an import of the same poses.
-  if (!options_.T_map_fixed.matrix().isIdentity(0.0)) {
-    pose.T_map_scan = Normalized(options_.T_map_fixed * pose.T_map_scan);
+  if (!T_map_fixed_.matrix().isIdentity(0.0)) {
+    pose.T_map_scan = Normalized(T_map_fixed_ * pose.T_map_scan);
   }
   return pose;
 }

@@ -10,7 +10,7 @@
 
 namespace strata::ros2 {
 
-Pose Where::T_map_fixed() const { return Normalized(link_.correction() * T_map_fixed_at_start_); }
+Pose Where::T_map_fixed() const { return Normalized(link_.correction() * book_.start()); }
 
 std::optional<Pose> Where::T_map_base() const {
   const std::optional<BasePose> base = book_.newest();

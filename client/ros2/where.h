@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "absl/status/statusor.h"
 
@@ -17,11 +18,8 @@ namespace strata::ros2 {
 // Thread-safe; what it looks at outlives it.
 class Where {
  public:
-  Where(PoseBook& book, const ServerLink& link, const Pose& T_map_fixed, std::string map_frame)
-      : book_(book),
-        link_(link),
-        T_map_fixed_at_start_(T_map_fixed),
-        map_frame_(std::move(map_frame)) {}
+  Where(PoseBook& book, const ServerLink& link, std::string map_frame)
+      : book_(book), link_(link), map_frame_(std::move(map_frame)) {}
 
   const std::string& map_frame() const { return map_frame_; }
   // T_map_odom: of the frame that the odometry calls fixed.
@@ -35,7 +33,6 @@ class Where {
  private:
   PoseBook& book_;
   const ServerLink& link_;
-  const Pose T_map_fixed_at_start_;
   const std::string map_frame_;
 };
 

@@ -85,7 +85,9 @@ void WorldPublisher::Loop() {
     earliest = SteadyNow() + kLeastPause;
     if (stop_.requested()) break;
     if (absl::IsUnavailable(published)) continue;  // again; the spool's sender tells
-    talk_.SayNew("floor", std::string(published.message()));
+    talk_.SayNew("floor",
+                 published.ok() ? "the floor that the robot is on is published"
+                                : std::string(published.message()));
     place_ = place;
     changes_ = changes;
   }
@@ -108,8 +110,11 @@ absl::Status WorldPublisher::PublishFloor(api::Database& database, const Eigen::
   cell_size_m_ = plan.cell_size_m;
   if (!plan.at.has_value()) {
     return absl::NotFoundError(
-        absl::StrFormat("no floor of the map within %.2f m below the robot yet; the map that was "
-                        "published last stays",
+        absl::StrFormat("the robot is on none of the map's %d floors for profile %s: no ground "
+                        "within %.2f m of its "
+                        "height on which it can stand",
+                        plan.floors.size(),
+                        options_.profile,
                         query.profile.height_m));
   }
   const Floor& floor = plan.floors[static_cast<std::size_t>(*plan.at)];

@@ -60,8 +60,8 @@ struct ScanHeader {
   std::string content_hash;
 };
 
-// What of a header the points say. Its pose, that of the frame that the points came in, becomes that
-// of points relative to the cloud's origin, which whoever sends them sets to zero.
+// What of a header the points say. Its pose, that of the frame that the points came in, becomes
+// that of points relative to the cloud's origin, which whoever sends them sets to zero.
 void AnnouncePoints(const PointCloud& cloud, ScanHeader& header);
 
 // INVALID_ARGUMENT naming the field, its value and the bound.
