@@ -54,7 +54,7 @@ absl::StatusOr<Writers> MakeWriters(Node& node, const Options& options) {
   STRATA_ASSIGN_OR_RETURN(writers.map,
                           node.MakeWriter(options.map_topic, "nav_msgs/OccupancyGrid", kLatched));
   STRATA_ASSIGN_OR_RETURN(writers.plan,
-                          node.MakeWriter(options.plan_topic, "nav_msgs/Path", kLatched));
+                          node.MakeWriter(options.plan_topic, "nav_msgs/Path", {.depth = 1}));
   STRATA_ASSIGN_OR_RETURN(writers.surfaces,
                           node.MakeWriter(options.surfaces_topic, kPointCloudType, kLatched));
   if (!options.no_tf) {

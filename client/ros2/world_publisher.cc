@@ -108,6 +108,10 @@ absl::Status WorldPublisher::PublishFloor(api::Database& database, const Eigen::
   STRATA_ASSIGN_OR_RETURN(const FloorPlan plan,
                           database.planning().ListFloors(link_.call(), options_.map, query));
   cell_size_m_ = plan.cell_size_m;
+  if (plan.floors.empty()) {
+    return absl::NotFoundError(
+        absl::StrCat("the map has no floor for profile ", options_.profile, " yet"));
+  }
   if (!plan.at.has_value()) {
     return absl::NotFoundError(
         absl::StrFormat("the robot is on none of the map's %d floors for profile %s: no ground "

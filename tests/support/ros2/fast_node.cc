@@ -83,7 +83,12 @@ struct Reading : dds::DataReaderListener {
       if (info.valid_data) heard(cdr);
     }
   }
+  void on_subscription_matched(dds::DataReader*,
+                               const dds::SubscriptionMatchedStatus& status) override {
+    *writers = status.current_count;
+  }
   std::function<void(const std::string&)> heard;
+  std::shared_ptr<std::atomic<int>> writers = std::make_shared<std::atomic<int>>(0);
 };
 
 struct Matches : dds::DataWriterListener {
@@ -172,10 +177,12 @@ bool FastNode::Writer::Write(const std::string& cdr) {
 
 int FastNode::Writer::readers() const { return state_->matches.readers; }
 
-void FastNode::Subscribe(const std::string& topic,
-                         const std::string& type,
-                         const FastQos& wanted,
-                         std::function<void(const std::string&)> heard) {
+int FastNode::Reader::writers() const { return *writers_; }
+
+FastNode::Reader FastNode::Subscribe(const std::string& topic,
+                                     const std::string& type,
+                                     const FastQos& wanted,
+                                     std::function<void(const std::string&)> heard) {
   dds::DataReaderQos qos;
   qos.reliability().kind =
       wanted.reliable ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
@@ -188,6 +195,9 @@ void FastNode::Subscribe(const std::string& topic,
           state_->TopicOf(topic, type), qos, state_->readings.back().get()) == nullptr) {
     Fail("reader of " + topic);
   }
+  Reader reader;
+  reader.writers_ = state_->readings.back()->writers;
+  return reader;
 }
 
 // Names of sockets that are in no folder end with their processes.

@@ -3,6 +3,7 @@
 #ifndef STRATA_TESTS_SUPPORT_ROS2_FAST_NODE_H_
 #define STRATA_TESTS_SUPPORT_ROS2_FAST_NODE_H_
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -40,11 +41,19 @@ class FastNode {
   };
   // "/points", "sensor_msgs/PointCloud2".
   Writer Advertise(const std::string& topic, const std::string& type, const FastQos& qos);
+  class Reader {
+   public:
+    int writers() const;
+
+   private:
+    friend class FastNode;
+    std::shared_ptr<std::atomic<int>> writers_;
+  };
   // Each message on a thread of Fast DDS.
-  void Subscribe(const std::string& topic,
-                 const std::string& type,
-                 const FastQos& qos,
-                 std::function<void(const std::string& cdr)> heard);
+  Reader Subscribe(const std::string& topic,
+                   const std::string& type,
+                   const FastQos& qos,
+                   std::function<void(const std::string& cdr)> heard);
 
  private:
   struct State;

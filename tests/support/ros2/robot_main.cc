@@ -111,11 +111,13 @@ absl::Status DriveAlong(const RobotOptions& options) {
 class Heard {
  public:
   Heard(FastNode& node, const std::string& topic, const std::string& type, bool latched) {
-    node.Subscribe(topic, type, {.transient_local = latched}, [this](const std::string& cdr) {
+    const auto keep = [this](const std::string& cdr) {
       const std::lock_guard lock(mutex_);
       last_ = cdr;
-    });
+    };
+    reader_ = node.Subscribe(topic, type, {.transient_local = latched}, keep);
   }
+  int writers() const { return reader_.writers(); }
   std::optional<std::string> last() const {
     const std::lock_guard lock(mutex_);
     return last_;
@@ -124,6 +126,7 @@ class Heard {
  private:
   mutable std::mutex mutex_;
   std::optional<std::string> last_;
+  FastNode::Reader reader_;
 };
 
 absl::Status Hear(const RobotOptions& options) {
@@ -173,8 +176,9 @@ absl::Status AskForPath(const RobotOptions& options) {
   FastNode node(options.domain);
   auto goals = node.Advertise("/goal_pose", "geometry_msgs/PoseStamped", {});
   const Heard plans(node, "/strata/plan", "nav_msgs/Path", false);
-  STRATA_RETURN_IF_ERROR(Await([&] { return goals.readers() > 0; }, "strata-ros2 listens"));
-  absl::SleepFor(absl::Seconds(1));  // until it knows who listens
+  STRATA_RETURN_IF_ERROR(
+      Await([&] { return goals.readers() > 0 && plans.writers() > 0; }, "strata-ros2 listens"));
+  absl::SleepFor(absl::Milliseconds(500));  // until it knows of that, too
   goals.Write(PoseCdr({0, "map"}, MakePose(Eigen::Quaterniond::Identity(), goal)));
   STRATA_RETURN_IF_ERROR(Await([&] { return plans.last().has_value(); }, "path"));
   const CdrPath path = ReadPath(*plans.last());
@@ -198,7 +202,7 @@ int RobotMain(int argc, char** argv) {
   drive->add_option("--hertz", options.hertz)->capture_default_str();
   CLI::App* hear = app.add_subcommand("hear", "Say what comes on /map, /strata/surfaces and /tf");
   CLI::App* goal = app.add_subcommand("goal", "Publish a goal in the map and say the path to it");
-  goal->add_option("X,Y,Z", options.goal)->required();
+  goal->add_option("GOAL", options.goal)->type_name("X,Y,Z")->required();
   CLI11_PARSE(app, argc, argv);
   const absl::Status status = *drive  ? DriveAlong(options)
                               : *hear ? Hear(options)
