@@ -38,7 +38,7 @@ constexpr absl::Duration kTransformEvery = absl::Milliseconds(50);
 // Ahead of the robot's clock, so that it can look up its newest pose before the next one comes.
 constexpr std::int64_t kAheadNs = 200'000'000;
 constexpr absl::Duration kReportEvery = absl::Seconds(1);
-constexpr absl::Duration kPatience = absl::Seconds(5);  // before what is missing is said
+constexpr absl::Duration kBeforeSaying = absl::Seconds(5);  // before what is missing is said
 constexpr std::size_t kMostAtOnce = 200;
 // Of clouds, between two looks at them: some 20 MB.
 constexpr int kCloudDepth = 8;
@@ -132,7 +132,7 @@ class Pump {
       }
       if (now >= next_report) {
         next_report = now + kReportEvery;
-        Report(spool.status(), now - begun > kPatience);
+        Report(spool.status(), now - begun > kBeforeSaying);
       }
     }
     return absl::OkStatus();

@@ -20,7 +20,7 @@ namespace strata::ros2 {
 namespace {
 
 // How often it looks whether the map has changed.
-constexpr absl::Duration kLook = absl::Milliseconds(500);
+constexpr absl::Duration kLookAtPath = absl::Milliseconds(500);
 // Nearer than this the robot is where it was to go.
 constexpr double kThereM = 0.5;
 
@@ -61,7 +61,7 @@ void GoalPlanner::Loop() {
         return ending_ || goal_.has_value();
       };
       mutex_.AwaitWithTimeout(absl::Condition(&due),
-                              drive.has_value() ? kLook : absl::InfiniteDuration());
+                              drive.has_value() ? kLookAtPath : absl::InfiniteDuration());
       if (ending_) return;
       if (goal_.has_value()) drive = Drive{*std::exchange(goal_, std::nullopt)};
     }

@@ -25,7 +25,7 @@ namespace {
 
 // Where poses end in the middle of a scan, the rest of them is a moment away.
 constexpr absl::Duration kRestOfPoses = absl::Seconds(1);
-constexpr absl::Duration kPause = absl::Milliseconds(10);
+constexpr absl::Duration kPosePause = absl::Milliseconds(10);
 constexpr absl::Duration kDiskPause = absl::Milliseconds(200);
 
 absl::StatusOr<Pose> PoseAfter(PoseBook& book, const RosHeader& header, double offset_s) {
@@ -42,7 +42,7 @@ absl::StatusOr<PointCloud> WithoutMotion(const PointCloud& cloud,
   STRATA_ASSIGN_OR_RETURN(const std::vector<double> offsets_s, PointOffsets(cloud, stamp_s));
   const double last_s = *std::max_element(offsets_s.begin(), offsets_s.end());
   const absl::Time until = SteadyNow() + kRestOfPoses;
-  while (!PoseAfter(book, header, last_s).ok() && SteadyNow() < until) absl::SleepFor(kPause);
+  while (!PoseAfter(book, header, last_s).ok() && SteadyNow() < until) absl::SleepFor(kPosePause);
   return Deskew(cloud, stamp_s, [&](double offset_s) { return PoseAfter(book, header, offset_s); });
 }
 

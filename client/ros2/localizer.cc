@@ -21,10 +21,10 @@ namespace strata::ros2 {
 namespace {
 
 // Its pose may come after a cloud.
-constexpr absl::Duration kPatience = absl::Seconds(1);
+constexpr absl::Duration kPoseMayCome = absl::Seconds(1);
 
 absl::StatusOr<CloudPose> PatientPose(PoseBook& book, const RosHeader& header) {
-  const absl::Time until = SteadyNow() + kPatience;
+  const absl::Time until = SteadyNow() + kPoseMayCome;
   absl::StatusOr<CloudPose> pose = book.At(header.frame, header.stamp_ns);
   while (!pose.ok() && SteadyNow() < until) {
     absl::SleepFor(absl::Milliseconds(10));

@@ -17,7 +17,7 @@
 namespace strata::ros2 {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr std::uint8_t kFloat32 = 7;  // of sensor_msgs/PointField
 constexpr std::uint8_t kUint8 = 2;
 
@@ -25,8 +25,8 @@ constexpr std::uint8_t kUint8 = 2;
 char* Chars(const std::string& text) { return const_cast<char*>(text.c_str()); }
 
 builtin_interfaces_msg_dds__Time_ TimeOf(std::int64_t stamp_ns) {
-  return {static_cast<std::int32_t>(stamp_ns / kSecondNs),
-          static_cast<std::uint32_t>(stamp_ns % kSecondNs)};
+  return {static_cast<std::int32_t>(stamp_ns / kNsPerSecond),
+          static_cast<std::uint32_t>(stamp_ns % kNsPerSecond)};
 }
 
 std_msgs_msg_dds__Header_ HeaderOf(const OutHeader& header) {

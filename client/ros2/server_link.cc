@@ -19,7 +19,7 @@
 namespace strata::ros2 {
 namespace {
 
-constexpr absl::Duration kPause = absl::Seconds(1);
+constexpr absl::Duration kRetryAfter = absl::Seconds(1);
 
 }  // namespace
 
@@ -47,7 +47,7 @@ std::uint64_t ServerLink::changes() const {
 }
 
 void ServerLink::Pause() {
-  const absl::Time until = SteadyNow() + kPause;
+  const absl::Time until = SteadyNow() + kRetryAfter;
   while (SteadyNow() < until && !call_.stop.requested()) absl::SleepFor(absl::Milliseconds(20));
 }
 

@@ -28,6 +28,8 @@ namespace {
 // Floors of a large map take their time, and nobody drives by a map that is a second younger.
 constexpr absl::Duration kLeastPause = absl::Seconds(1);
 constexpr absl::Duration kLook = absl::Milliseconds(50);
+// A map that begins has no floor for a moment.
+constexpr absl::Duration kFloorMayCome = absl::Seconds(5);
 // So far it drives before it may be on another floor.
 constexpr double kStepM = 2.0;
 
@@ -72,7 +74,7 @@ bool WorldPublisher::Due(const Eigen::Vector3d& place) const {
 }
 
 void WorldPublisher::Loop() {
-  absl::Time earliest = SteadyNow();
+  absl::Time earliest = SteadyNow(), good = earliest;
   while (!stop_.requested()) {
     absl::SleepFor(kLook);
     api::Database* const database = link_.database();
@@ -85,9 +87,12 @@ void WorldPublisher::Loop() {
     earliest = SteadyNow() + kLeastPause;
     if (stop_.requested()) break;
     if (absl::IsUnavailable(published)) continue;  // again; the spool's sender tells
-    talk_.SayNew("floor",
-                 published.ok() ? "the floor that the robot is on is published"
-                                : std::string(published.message()));
+    if (published.ok()) {
+      good = SteadyNow();
+      talk_.SayNew("floor", "the floor that the robot is on is published");
+    } else if (SteadyNow() - good > kFloorMayCome) {
+      talk_.SayNew("floor", std::string(published.message()));
+    }
     place_ = place;
     changes_ = changes;
   }

@@ -416,8 +416,15 @@ TEST_F(Ros2DriveTest, ARobotThatDoesNotKnowWhereItIsAsksTheServer) {
       Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ())), {-11.0, 2.0, 3.0});
   const RobotDrive drive = DriveOver(1.0, 20, T_map_odom);
   StartBridge(address_, {"--every", "0.9m", "--localize"}, "filed");
+  const Ear transforms(robot_, "/tf", "tf2_msgs/TFMessage", {.depth = 100});
   AwaitReaders();
-  Play(drive);
+  Play(drive, [&](std::size_t sent) {
+    if (sent != 3) return;
+    EXPECT_TRUE(WaitFor([&] {
+      return transforms.count() > 0 &&
+             ReadTransforms(transforms.last()).front().pose.isApprox(T_map_odom, 0.05);
+    }));
+  });
   const auto robot_scans = [this] {
     std::vector<ScanInfo> scans;
     api::ScanFilter filter;
