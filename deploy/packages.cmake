@@ -1,10 +1,14 @@
-# Debian packages: `cpack -G DEB` in the build folder makes one each of server, client, library and Python client.
+# Debian packages: `cpack -G DEB` in the build folder makes one each of server, client, library and Python client, and of strata-ros2
+# where Cyclone DDS was there when it was built.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME strata)
 set(CPACK_PACKAGE_VENDOR "Strata")
 set(CPACK_PACKAGE_CONTACT "The founders of Strata <strata@localhost>")
 set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR}/packages)
 set(CPACK_COMPONENTS_ALL server client dev python)
+if(TARGET strata_ros2_program)
+  list(APPEND CPACK_COMPONENTS_ALL ros2)
+endif()
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_SET_DESTDIR ON) # /etc and /lib/systemd are not below the prefix
 set(CPACK_INSTALL_PREFIX /usr)
@@ -42,6 +46,12 @@ set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3-grpcio, python3-numpy, python3-
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "strata") # strata.register
 set(CPACK_COMPONENT_PYTHON_DESCRIPTION "Python client of the map database Strata
  Arrays of points in, arrays of surfaces and paths out.")
+set(CPACK_DEBIAN_ROS2_PACKAGE_NAME strata-ros2)
+set(CPACK_DEBIAN_ROS2_PACKAGE_SUGGESTS "strata")
+set(CPACK_COMPONENT_ROS2_DESCRIPTION "robots of ROS 2 in maps of Strata
+ Takes clouds and poses of a robot over DDS into a map, by way of a spool on the
+ robot's disk, and gives it the map of its floor, surfaces, paths and its place
+ in the map. ROS is not needed.")
 include(CPack)
 
 # Only in packages: an installation under a prefix must not write to /etc.

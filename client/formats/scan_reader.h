@@ -64,10 +64,6 @@ absl::StatusOr<PointCloud> ReadScan(const std::filesystem::path& path,
                                     ScanFormat format = ScanFormat::kAuto,
                                     std::size_t* at_sensor = nullptr);
 
-// The cloud without returns of range 0, as ReadScan has it and counts them. INVALID_ARGUMENT if
-// none but those are finite.
-absl::StatusOr<PointCloud> WithoutRangeZero(PointCloud cloud, std::size_t* at_sensor);
-
 }  // namespace strata
 
 #endif  // STRATA_CLIENT_FORMATS_SCAN_READER_H_

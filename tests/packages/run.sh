@@ -6,7 +6,7 @@ build=$(realpath "${1:?usage: tests/packages/run.sh BUILD_DIR}")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cpack --config "$build/CPackConfig.cmake" -G DEB -B "$work/packages" >"$work/log" 2>&1 || { cat "$work/log" >&2; exit 1; }
-for name in stratad strata libstrata-dev python3-strata; do
+for name in stratad strata libstrata-dev python3-strata strata-ros2; do
   dpkg-deb --extract "$work"/packages/"${name}"_*.deb "$work/root"
 done
 root=$work/root
@@ -21,6 +21,9 @@ faults=$(systemd-analyze verify --man=no "$work/stratad.service" 2>&1)
 [[ -z $faults ]] || { echo "packages: $faults" >&2; exit 1; }
 "$root/usr/bin/strata" --embedded "$work/maps" map create yard >/dev/null
 PYTHONPATH=$root/usr/lib/python3/dist-packages /usr/bin/python3 -c 'import strata; strata.connect'
+"$root/usr/bin/strata-ros2" --version >/dev/null
+depends=$(dpkg-deb --field "$work"/packages/strata-ros2_*.deb Depends)
+[[ $depends == *libddsc* && $depends != *libceres* ]] || { echo "packages: strata-ros2 depends on $depends" >&2; exit 1; }
 for file in lib/systemd/system/stratad.service usr/share/doc/stratad/README.md usr/include/strata/core/api/database.h; do
   [[ -s $root/$file ]] || { echo "packages: no $file" >&2; exit 1; }
 done

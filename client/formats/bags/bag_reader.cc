@@ -11,7 +11,6 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
@@ -26,7 +25,6 @@ namespace {
 // More are a file that means harm; the numbers of further ones are that of the last.
 constexpr std::size_t kMaxTopics = 10'000;
 constexpr std::size_t kMaxDamageLines = 10;
-constexpr std::size_t kMaxNameLength = 200;
 
 constexpr absl::string_view kAnyRos1 = "#ROSBAG V";
 
@@ -39,19 +37,6 @@ std::string FirstBytes(const std::filesystem::path& path) {
 }
 
 }  // namespace
-
-MessageEncoding MessageEncodingOf(absl::string_view name) {
-  if (name == "cdr") return MessageEncoding::kCdr;
-  return name == "ros1" ? MessageEncoding::kRos1 : MessageEncoding::kUnknown;
-}
-
-std::string PrintableName(absl::string_view name) {
-  std::string printable(name.substr(0, kMaxNameLength));
-  for (char& c : printable) {
-    if (!absl::ascii_isprint(static_cast<unsigned char>(c))) c = '?';
-  }
-  return printable;
-}
 
 std::size_t BagReader::TopicNumber(absl::string_view name,
                                    absl::string_view type,

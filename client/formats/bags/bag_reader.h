@@ -15,23 +15,9 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
+#include "client/formats/bags/ros_topic.h"
+
 namespace strata {
-
-// How the bytes of a message are laid out: OMG's CDR (ROS 2), or ROS 1's own.
-enum class MessageEncoding : std::uint8_t { kCdr, kRos1, kUnknown };
-MessageEncoding MessageEncodingOf(absl::string_view name);  // "cdr", "ros1"
-
-// A name out of a file, fit to be shown: at most 200 characters, '?' for those that are not
-// printable ASCII, of which names in ROS are.
-std::string PrintableName(absl::string_view name);
-
-struct BagTopic {
-  std::string name;
-  std::string type;  // "sensor_msgs/PointCloud2": without the /msg/ of ROS 2
-  MessageEncoding encoding = MessageEncoding::kUnknown;
-
-  friend bool operator==(const BagTopic&, const BagTopic&) = default;
-};
 
 // Where a message lies in its file: for its reader only.
 struct MessagePlace {

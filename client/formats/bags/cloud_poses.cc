@@ -16,7 +16,7 @@
 #include "absl/time/time.h"
 
 #include "client/formats/bags/ros_messages.h"
-#include "client/formats/scan_reader.h"
+#include "client/formats/parsing/range_zero.h"
 #include "core/common/status.h"
 
 namespace strata {

@@ -12,7 +12,7 @@
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
-#include "client/formats/bags/bag_reader.h"
+#include "client/formats/bags/ros_topic.h"
 #include "client/formats/bags/transform_tree.h"
 #include "core/cloud/point_cloud.h"
 #include "core/geometry/pose.h"

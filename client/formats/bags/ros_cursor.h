@@ -11,7 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
-#include "client/formats/bags/bag_reader.h"
+#include "client/formats/bags/ros_topic.h"
 #include "client/formats/parsing/byte_cursor.h"
 
 namespace strata {

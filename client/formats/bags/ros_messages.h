@@ -11,7 +11,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
-#include "client/formats/bags/bag_reader.h"
+#include "client/formats/bags/ros_topic.h"
 #include "core/cloud/point_cloud.h"
 
 namespace strata {
