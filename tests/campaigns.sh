@@ -30,6 +30,7 @@ subsets|~25|recordings in parts, backwards, by two robots, that end off|/usr/bin
 fleet|~15|robots of a fleet that are put where neither they nor the world are|$experiments/fleet --seed $seed --draws 4
 two_sides|~40|a thin deck or wall that is drawn together, or pulls scans to its other side|/usr/bin/python3 tests/experiments/two_sides.py --build $build --seed $seed
 localisation|~20|a scan from elsewhere that is given a place in a map|/usr/bin/python3 tests/experiments/localisation.py --build $build --seed $seed
+ros2|14|a keyframe of a robot of ROS 2 that is lost or otherwise in the map than its recording, memory of strata-ros2|$experiments/ros2_campaign
 recordings|4|recorded drives that end off|/usr/bin/python3 tests/experiments/real_data.py --build $build
 runbook|~6|a page of the runbook that does not help (as root)|/usr/bin/python3 tests/experiments/runbook.py --build $build
 LIST
