@@ -23,6 +23,7 @@
 #include "absl/strings/str_join.h"
 #include "absl/time/time.h"
 
+#include "client/formats/parsing/range_zero.h"
 #include "client/formats/parsing/text_cursor.h"
 #include "client/formats/pcd_reader.h"
 #include "client/formats/scan_folder.h"
