@@ -324,10 +324,7 @@ absl::StatusOr<Summary> RunBridge(const Options& options, const Stop& stop, Talk
                           options.map));
     STRATA_RETURN_IF_ERROR(pump.Run(stop, *spool));
     summary.intake = pump.counts();
-    while (keeper.room() < Keeper::kMostWaiting &&
-           !absl::StrContains(spool->status().last_error, "full")) {
-      absl::SleepFor(absl::Milliseconds(10));
-    }
+    keeper.Finish();
     summary.kept = keeper.counts();
   }
   summary.spool = spool->status();

@@ -79,12 +79,12 @@ absl::StatusOr<KeptScan> ScanOfKeyframe(const Keyframe& keyframe,
 Keeper::Keeper(const KeeperOptions& options, PoseBook& book, Spool& spool, Talk& talk)
     : options_(options), book_(book), spool_(spool), talk_(talk), thread_([this] { Loop(); }) {}
 
-Keeper::~Keeper() {
+void Keeper::Finish() {
   {
     absl::MutexLock lock(&mutex_);
     ending_ = true;
   }
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
 std::size_t Keeper::room() const {

@@ -54,13 +54,14 @@ class Keeper {
 
   // All outlive it.
   Keeper(const KeeperOptions& options, PoseBook& book, Spool& spool, Talk& talk);
-  // Keeps what waits, unless the disk has no room.
-  ~Keeper();
+  ~Keeper() { Finish(); }
   Keeper(const Keeper&) = delete;
   Keeper& operator=(const Keeper&) = delete;
 
   std::size_t room() const;
   void Put(Keyframe keyframe);  // REQUIRES: room()
+  // Keeps what waits, unless the disk has no room, and ends the thread.
+  void Finish();
   KeeperCounts counts() const;
 
  private:

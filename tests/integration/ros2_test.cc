@@ -409,6 +409,48 @@ TEST_F(Ros2DriveTest, WhatTheMapKnowsComesToWhoeverJoinsLate) {
   EndBridge();
 }
 
+// Whoever is in the domain may publish anything.
+TEST_F(Ros2DriveTest, BytesThatAreNoMessagesChangeNothing) {
+  const RobotDrive drive = DriveOver(6.0);
+  StartBridge(address_, {"--every", "0m"});
+  auto transforms = robot_.Advertise("/tf", "tf2_msgs/TFMessage", {.depth = 100});
+  auto goals = robot_.Advertise("/goal_pose", "geometry_msgs/PoseStamped", {});
+  AwaitReaders();
+  ASSERT_TRUE(WaitFor([&] { return transforms.readers() == 1 && goals.readers() == 1; }));
+  const std::string cloud = drive.messages.front().cdr;
+  Random random(7);
+  for (int i = 0; i < 300; ++i) {
+    std::string bytes = cloud.substr(0, 4 + random.Bits() % 200);
+    const std::size_t changed = 4 + random.Bits() % (bytes.size() - 3);
+    for (std::size_t k = changed; k < bytes.size(); ++k) {
+      bytes[k] = static_cast<char>(random.Bits());
+    }
+    for (FastNode::Writer* writer : {&clouds_, &odometry_, &mounting_, &transforms, &goals}) {
+      EXPECT_TRUE(writer->Write(bytes));
+    }
+  }
+  Play(drive);
+  EXPECT_TRUE(WaitFor([&] { return AllIntegrated("live", drive.clouds); }));
+  EXPECT_EQ(EndBridge()["kept"], drive.clouds);
+}
+
+// The robot drives where no server is, and is switched off before there is one again.
+TEST_F(Ros2DriveTest, WhatWasKeptWithoutAServerIsSentWhenThereIsOne) {
+  const RobotDrive drive = DriveOver(6.0);
+  server().Signal(SIGKILL);
+  StartBridge(address_, {"--every", "0m"});
+  AwaitReaders();
+  Play(drive);
+  absl::SleepFor(absl::Seconds(1));
+  const nlohmann::json away = EndBridge();
+  EXPECT_EQ(away["kept"], drive.clouds);
+  EXPECT_EQ(away["waiting"], drive.clouds);
+  StartServer();
+  StartBridge(address_, {"--every", "0m"});
+  EXPECT_TRUE(WaitFor([&] { return AllIntegrated("live", drive.clouds); }));
+  EXPECT_EQ(EndBridge()["sent"], drive.clouds);
+}
+
 // Its odometry begins where it was switched on, 30 m from the map's origin.
 TEST_F(Ros2DriveTest, ARobotThatDoesNotKnowWhereItIsAsksTheServer) {
   ImportAsFile(DriveOver(1.0), "0.9m");
