@@ -62,10 +62,13 @@ struct QosDelete {
 using QosPtr = std::unique_ptr<dds_qos_t, QosDelete>;
 
 QosPtr QosOf(const RosQos& wanted) {
+  // How long Write may wait. Another time than the default of 100 ms: Cyclone DDS leaves defaults
+  // out of what it announces, and not everybody who listens knows them.
+  constexpr dds_duration_t kLongestWait = DDS_MSECS(50);
   QosPtr qos(dds_create_qos());
   dds_qset_reliability(qos.get(),
                        wanted.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
-                       DDS_MSECS(100));
+                       kLongestWait);
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, wanted.depth);
   dds_qset_durability(
       qos.get(), wanted.transient_local ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);

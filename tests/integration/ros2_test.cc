@@ -273,6 +273,16 @@ std::vector<std::int8_t> ReadPgm(const std::string& path, std::uint32_t& width) 
   return values;
 }
 
+// Where a path crosses the plane x = 0; 0 where it does not.
+double HeightAtX0(const CdrPath& path) {
+  for (std::size_t i = 1; i < path.poses.size(); ++i) {
+    const Eigen::Vector3d a = path.poses[i - 1].translation();
+    const Eigen::Vector3d b = path.poses[i].translation();
+    if (a.x() * b.x() <= 0.0) return a.z() + (b.z() - a.z()) * a.x() / (a.x() - b.x());
+  }
+  return 0.0;
+}
+
 // Plays drives and looks at what comes of them.
 class Ros2DriveTest : public Ros2Test {
  protected:
@@ -310,6 +320,27 @@ class Ros2DriveTest : public Ros2Test {
     std::ofstream(Path("drive.mcap"), std::ios::binary) << BagOf(drive);
     Json({"scan", "import", "filed", Path("drive.mcap"), "--every", every, "--wait"});
     return ScansOf("filed", false).size();
+  }
+
+  // A wall across the deck, `z_m` high, in "live".
+  void ParkOnTheDeck(double z_m) {
+    ScanHeader header;
+    header.id = {"somebody", 1};
+    header.alignment = Alignment::kOff;
+    PointCloud wall;
+    for (double x = -0.3; x <= 0.3; x += 0.05) {
+      for (double y = -2.5; y <= 2.5; y += 0.05) {
+        for (double z = z_m + 0.1; z <= z_m + 1.5; z += 0.1) {
+          wall.points.emplace_back(
+              static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
+        }
+      }
+    }
+    AnnouncePoints(wall, header);
+    const auto upload = database_->scans().Upload({}, "live", header);
+    ASSERT_THAT(upload, IsOk());
+    ASSERT_THAT((*upload)->Write(wall), IsOk());
+    ASSERT_THAT((*upload)->Finish(), IsOk());
   }
 
   std::string address_;
@@ -406,6 +437,11 @@ TEST_F(Ros2DriveTest, WhatTheMapKnowsComesToWhoeverJoinsLate) {
   double highest = 0.0;
   for (const Pose& pose : path.poses) highest = std::max(highest, pose.translation().z());
   EXPECT_GT(highest, 3.0);  // over the deck
+
+  // Somebody parks there: it goes another way, or nowhere.
+  EXPECT_GT(HeightAtX0(path), 3.0);
+  ParkOnTheDeck(highest);
+  EXPECT_TRUE(WaitFor([&] { return HeightAtX0(ReadPath(plans.last())) < 2.0; }));
   EndBridge();
 }
 
