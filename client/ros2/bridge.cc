@@ -271,11 +271,7 @@ absl::Status CheckMap(const Options& options, const ClientOptions& client, Talk&
         absl::StrCat(known.message(), "; make it: strata map create ", options.map));
   }
   if (!absl::IsUnavailable(known)) return cli::Explained(known, options.server);
-  talk.Say(absl::StrCat("no stratad answers at ",
-                        options.server.server,
-                        ": scans wait in ",
-                        options.spool,
-                        " until one does"));
+  talk.SayNew("server", NobodyAnswers(options.server.server));
   return absl::OkStatus();
 }
 

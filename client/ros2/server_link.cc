@@ -23,6 +23,10 @@ constexpr absl::Duration kRetryAfter = absl::Seconds(1);
 
 }  // namespace
 
+std::string NobodyAnswers(const std::string& server) {
+  return absl::StrCat("no stratad answers at ", server, ": scans wait on disk until one does");
+}
+
 ServerLink::ServerLink(const LinkOptions& options, Spool& spool, Talk& talk)
     : options_(options), spool_(spool), talk_(talk), thread_([this] { Loop(); }) {}
 
@@ -80,8 +84,7 @@ void ServerLink::Loop() {
 
 std::string ServerLink::WhyWaiting(const absl::Status& status) const {
   if (absl::IsUnavailable(status)) {
-    return absl::StrCat(
-        "no stratad answers at ", options_.server.server, ": scans wait on disk until one does");
+    return NobodyAnswers(options_.server.server);
   }
   if (absl::IsNotFound(status)) {
     return absl::StrCat(

@@ -23,6 +23,9 @@
 
 namespace strata::ros2 {
 
+// What is said while no server answers.
+std::string NobodyAnswers(const std::string& server);
+
 struct LinkOptions {
   cli::ServerOptions server;
   ClientOptions client;
