@@ -40,8 +40,9 @@ constexpr std::int64_t kAheadNs = 200'000'000;
 constexpr absl::Duration kReportEvery = absl::Seconds(1);
 constexpr absl::Duration kBeforeSaying = absl::Seconds(5);  // before what is missing is said
 constexpr std::size_t kMostAtOnce = 200;
-// Of clouds, between two looks at them: some 20 MB.
-constexpr int kCloudDepth = 8;
+// Of clouds, between two looks at them: a second of a LiDAR, where the machine has other things to
+// do.
+constexpr int kCloudDepth = 24;
 constexpr int kPoseDepth = 500;
 
 struct Writers {
@@ -278,7 +279,6 @@ absl::Status CheckMap(const Options& options, const ClientOptions& client, Talk&
 }  // namespace
 
 absl::StatusOr<Summary> RunBridge(const Options& options, const Stop& stop, Talk& talk) {
-  STRATA_RETURN_IF_ERROR(ValidateOptions(options));
   Summary summary;
   summary.trajectory = options.trajectory.empty() ? TrajectoryAt(absl::Now()) : options.trajectory;
   STRATA_ASSIGN_OR_RETURN(const ClientOptions client, cli::ClientOptionsOf(options.server));

@@ -27,9 +27,9 @@ struct Summary {
   SpoolStatus spool;
 };
 
-// Runs until `stop`; a server that is away or comes back is nothing to end for. INVALID_ARGUMENT
-// for bad options, errors of the spool, of the token and of the network it begins with;
-// NOT_FOUND where a server answers that has no such map.
+// Runs until `stop`; a server that is away or comes back is nothing to end for. Errors of the
+// spool, of the token and of the network it begins with; NOT_FOUND where a server answers that has
+// no such map. REQUIRES: ValidateOptions.
 absl::StatusOr<Summary> RunBridge(const Options& options, const Stop& stop, Talk& talk);
 
 }  // namespace strata::ros2

@@ -83,6 +83,10 @@ int Main(int argc, char** argv) {
     std::cerr << cli::UsageMessage(app, error) << std::endl;
     return kExitUsage;
   }
+  if (const absl::Status valid = ValidateOptions(options); !valid.ok()) {
+    std::cerr << "error: " << valid.message() << std::endl;
+    return kExitUsage;
+  }
   const Stop stop;
   running = &stop;
   std::signal(SIGINT, OnSignal);
