@@ -239,6 +239,14 @@ class Pump {
                  intake_.counts().why.empty()
                      ? ""
                      : absl::StrCat("clouds are left out: ", intake_.counts().why));
+    talk_.SayNew(
+        "postponed",
+        intake_.counts().postponed == 0
+            ? ""
+            : absl::StrCat("the disk of ",
+                           options_.spool,
+                           " is slower than keyframes come: where it is busy, later clouds "
+                           "are kept"));
     talk_.SayNew("refused",
                  spool.refused + spool.damaged == 0
                      ? ""

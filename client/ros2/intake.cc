@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "absl/time/time.h"
 
 namespace strata::ros2 {
@@ -42,8 +43,9 @@ void Intake::Add(CdrMessage message, absl::Time now) {
   }
 }
 
-std::vector<Keyframe> Intake::Decide(absl::Time now, std::size_t room) {
+std::vector<Keyframe> Intake::Decide(absl::Time now, std::size_t room_bytes) {
   std::vector<Keyframe> keyframes;
+  std::size_t bytes = 0;
   while (!waiting_.empty()) {
     Waiting& next = waiting_.front();
     const std::int64_t stamp_ns = next.head.header.stamp_ns;
@@ -53,12 +55,18 @@ std::vector<Keyframe> Intake::Decide(absl::Time now, std::size_t room) {
       LeaveOut(&IntakeCounts::without_pose, pose.status());
     } else if (stamp_ns <= last_ns_) {
       LeaveOut(&IntakeCounts::back_in_time,
-               absl::InvalidArgumentError("its stamp is not after that of the cloud before; where "
-                                          "the robot's clock was set back, start again"));
+               absl::InvalidArgumentError(absl::StrFormat(
+                   "stamp %.6f s is not after that of the cloud before, %.6f s; where the robot's "
+                   "clock was set back, start again",
+                   1e-9 * static_cast<double>(stamp_ns),
+                   1e-9 * static_cast<double>(last_ns_))));
     } else {
       last_ns_ = stamp_ns;
-      if (keyframes.size() < room &&
-          chooser_.Keep(1e-9 * static_cast<double>(stamp_ns), pose->T_map_scan)) {
+      const double stamp_s = 1e-9 * static_cast<double>(stamp_ns);
+      if (bytes >= room_bytes) {
+        counts_.postponed += chooser_.WouldKeep(stamp_s, pose->T_map_scan) ? 1 : 0;
+      } else if (chooser_.Keep(stamp_s, pose->T_map_scan)) {
+        bytes += next.message.bytes.size();
         keyframes.push_back({next.message, next.head, *pose});
         ++counts_.keyframes;
       }

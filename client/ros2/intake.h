@@ -35,6 +35,7 @@ struct IntakeCounts {
   std::uint64_t without_pose = 0;  // none came within kPatience
   std::uint64_t back_in_time = 0;  // not newer than one before
   std::uint64_t crowded_out = 0;   // too many waited for their poses
+  std::uint64_t postponed = 0;     // keyframes that gave way to a later one: the disk was busy
   std::string why;                 // of the last that was left out
 };
 
@@ -50,8 +51,9 @@ class Intake {
   Intake(PoseBook& book, const KeyframeSpacing& spacing) : book_(book), chooser_(spacing) {}
 
   void Add(CdrMessage message, absl::Time now);
-  // Those that are due, `room` at most; where there is none, a later cloud becomes the keyframe.
-  std::vector<Keyframe> Decide(absl::Time now, std::size_t room);
+  // Those that are due while less than `room_bytes` are; where there is no room, a later cloud
+  // becomes the keyframe.
+  std::vector<Keyframe> Decide(absl::Time now, std::size_t room_bytes);
 
   const IntakeCounts& counts() const { return counts_; }
 

@@ -89,11 +89,12 @@ void Keeper::Finish() {
 
 std::size_t Keeper::room() const {
   absl::MutexLock lock(&mutex_);
-  return kMostWaiting - std::min(kMostWaiting, waiting_.size() + (busy_ ? 1 : 0));
+  return kMostWaitingBytes - std::min(kMostWaitingBytes, waiting_bytes_);
 }
 
 void Keeper::Put(Keyframe keyframe) {
   absl::MutexLock lock(&mutex_);
+  waiting_bytes_ += keyframe.message.bytes.size();
   waiting_.push_back(std::move(keyframe));
 }
 
@@ -112,7 +113,6 @@ void Keeper::Loop() {
     Keyframe next;
     {
       absl::MutexLock lock(&mutex_);
-      busy_ = false;
       const auto due = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
         return ending_ || !waiting_.empty();
       };
@@ -120,9 +120,10 @@ void Keeper::Loop() {
       if (waiting_.empty()) return;
       next = std::move(waiting_.front());
       waiting_.pop_front();
-      busy_ = true;
     }
     Keep(next);
+    absl::MutexLock lock(&mutex_);
+    waiting_bytes_ -= next.message.bytes.size();
   }
 }
 

@@ -49,8 +49,8 @@ absl::StatusOr<KeptScan> ScanOfKeyframe(const Keyframe& keyframe,
 // A thread. Thread-safe.
 class Keeper {
  public:
-  // Keyframes that may wait for the disk.
-  static constexpr std::size_t kMostWaiting = 4;
+  // Of keyframes that may wait for the disk; the last may go beyond.
+  static constexpr std::size_t kMostWaitingBytes = std::size_t{32} << 20;
 
   // All outlive it.
   Keeper(const KeeperOptions& options, PoseBook& book, Spool& spool, Talk& talk);
@@ -58,7 +58,7 @@ class Keeper {
   Keeper(const Keeper&) = delete;
   Keeper& operator=(const Keeper&) = delete;
 
-  std::size_t room() const;
+  std::size_t room() const;     // [bytes]
   void Put(Keyframe keyframe);  // REQUIRES: room()
   // Keeps what waits, unless the disk has no room, and ends the thread.
   void Finish();
@@ -77,7 +77,7 @@ class Keeper {
   Talk& talk_;
   mutable absl::Mutex mutex_;
   std::deque<Keyframe> waiting_ ABSL_GUARDED_BY(mutex_);
-  bool busy_ ABSL_GUARDED_BY(mutex_) = false;
+  std::size_t waiting_bytes_ ABSL_GUARDED_BY(mutex_) = 0;  // and of what is being kept
   bool ending_ ABSL_GUARDED_BY(mutex_) = false;
   KeeperCounts counts_ ABSL_GUARDED_BY(mutex_);
   std::thread thread_;

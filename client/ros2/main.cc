@@ -44,6 +44,7 @@ void Print(const Options& options, const Summary& summary) {
                           {"unreadable", summary.intake.unreadable + summary.kept.unreadable},
                           {"back_in_time", summary.intake.back_in_time},
                           {"crowded_out", summary.intake.crowded_out},
+                          {"postponed", summary.intake.postponed},
                           {"sent", summary.spool.sent},
                           {"waiting", summary.spool.waiting},
                           {"refused", summary.spool.refused},

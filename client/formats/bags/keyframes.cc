@@ -58,14 +58,16 @@ absl::StatusOr<KeyframeSpacing> ParseKeyframeSpacing(absl::string_view text) {
   return spacing;
 }
 
+bool KeyframeChooser::WouldKeep(double time_s, const Pose& pose) const {
+  if (!last_.has_value()) return true;
+  const Pose step = last_->inverse() * pose;
+  return Reaches(step.translation().norm(), spacing_.distance_m) ||
+         Reaches(RotationAngleRad(step), spacing_.angle_rad) ||
+         Reaches(time_s - last_time_s_, spacing_.time_s);
+}
+
 bool KeyframeChooser::Keep(double time_s, const Pose& pose) {
-  const auto reached = [this, time_s, &pose] {
-    const Pose step = last_->inverse() * pose;
-    return Reaches(step.translation().norm(), spacing_.distance_m) ||
-           Reaches(RotationAngleRad(step), spacing_.angle_rad) ||
-           Reaches(time_s - last_time_s_, spacing_.time_s);
-  };
-  if (last_.has_value() && !reached()) return false;
+  if (!WouldKeep(time_s, pose)) return false;
   last_ = pose;
   last_time_s_ = time_s;
   return true;

@@ -26,6 +26,8 @@ class KeyframeChooser {
   explicit KeyframeChooser(const KeyframeSpacing& spacing) : spacing_(spacing) {}
   // In the order of time; the first is kept.
   bool Keep(double time_s, const Pose& pose);
+  // Whether Keep() would.
+  bool WouldKeep(double time_s, const Pose& pose) const;
 
  private:
   KeyframeSpacing spacing_;

@@ -11,7 +11,7 @@
 namespace strata::ros2 {
 namespace {
 
-constexpr std::size_t kRoom = 100;
+constexpr std::size_t kRoom = 1'000'000;
 
 class IntakeTest : public ::testing::Test {
  protected:
@@ -82,6 +82,7 @@ TEST_F(IntakeTest, WhereThereIsNoRoomALaterCloudIsKept) {
   ASSERT_EQ(kept.size(), 1U);
   EXPECT_NEAR(kept[0].pose.T_map_scan.translation().x(), 1.1, 1e-9);
   EXPECT_EQ(intake_.counts().keyframes, 2U);
+  EXPECT_EQ(intake_.counts().postponed, 2U);
 }
 
 TEST_F(IntakeTest, WhatWaitsIsBounded) {

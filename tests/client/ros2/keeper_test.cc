@@ -73,7 +73,7 @@ TEST_F(KeeperTest, WhatIsPutIsOnDiskAtTheEnd) {
   Talk talk(said);
   {
     Keeper keeper(options_, book_, **spool, talk);
-    EXPECT_EQ(keeper.room(), Keeper::kMostWaiting);
+    EXPECT_EQ(keeper.room(), Keeper::kMostWaitingBytes);
     keeper.Put(KeyframeOf(CloudAt(1.0), book_));
     keeper.Put(KeyframeOf(CloudAt(1.5), book_));
   }
@@ -92,11 +92,11 @@ TEST_F(KeeperTest, AFullSpoolIsSaidAndWaitedFor) {
     Keeper keeper(options_, book_, **spool, talk);
     keeper.Put(KeyframeOf(CloudAt(1.0), book_));
     const absl::Time until = SteadyNow() + absl::Seconds(30);
-    while (keeper.room() == Keeper::kMostWaiting && SteadyNow() < until) {
+    while (keeper.room() == Keeper::kMostWaitingBytes && SteadyNow() < until) {
       absl::SleepFor(absl::Milliseconds(1));
     }
     absl::SleepFor(absl::Milliseconds(20));
-    EXPECT_LT(keeper.room(), Keeper::kMostWaiting);
+    EXPECT_LT(keeper.room(), Keeper::kMostWaitingBytes);
     EXPECT_EQ(keeper.counts().kept, 0U);
   }
   EXPECT_THAT(said.str(), ::testing::HasSubstr("waits for room on disk"));
