@@ -326,7 +326,9 @@ absl::StatusOr<Summary> RunBridge(const Options& options, const Stop& stop, Talk
                           summary.trajectory,
                           " of map ",
                           options.map));
-    STRATA_RETURN_IF_ERROR(pump.Run(stop, *spool));
+    const absl::Status ran = pump.Run(stop, *spool);
+    link.EndCalls();  // or a long search would be waited for
+    STRATA_RETURN_IF_ERROR(ran);
     summary.intake = pump.counts();
     keeper.Finish();
     summary.kept = keeper.counts();

@@ -44,8 +44,10 @@ class ServerLink {
 
   // Null until the server has answered once; from then on it stays.
   api::Database* database() const;
-  // Ends calls when this does.
+  // For calls of others, too.
   const api::Call& call() const { return call_; }
+  // Ends all calls but those that send what waits.
+  void EndCalls() const { call_.stop.Request(); }
   // What moves an uploaded pose of the robot, or where its odometry puts it, to where the map has
   // it: the correction of the newest scan that is in the map. The identity until there is one.
   Pose correction() const;
