@@ -94,7 +94,9 @@ absl::Status GoalPlanner::Plan(Drive& drive) {
   api::Database* const database = link_.database();
   if (database == nullptr) return absl::UnavailableError("no stratad has answered yet");
   const std::optional<Pose> T_map_base = where_.T_map_base();
-  if (!T_map_base.has_value()) return absl::NotFoundError("no pose of the robot has come yet");
+  if (!T_map_base.has_value()) {
+    return absl::NotFoundError("where the robot is in the map is not known yet");
+  }
   STRATA_ASSIGN_OR_RETURN(const Pose T_map_goal, where_.InMap(drive.goal.header.frame));
   drive.to = T_map_goal * Eigen::Vector3d(drive.goal.position_m.data());
   drive.changes = link_.changes();

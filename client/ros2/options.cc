@@ -128,6 +128,9 @@ void AddOptions(CLI::App& app, Options& options) {
 
 absl::Status ValidateOptions(const Options& options) {
   STRATA_RETURN_IF_ERROR(ValidateName("map name", options.map));
+  if (!options.trajectory.empty()) {
+    STRATA_RETURN_IF_ERROR(ValidateName("--trajectory", options.trajectory));
+  }
   STRATA_RETURN_IF_ERROR(Annotate(ParseKeyframeSpacing(options.every).status(), "--every"));
   for (const auto& [name, topic] : {std::pair{"--topic", options.clouds},
                                     {"--goals", options.goals},

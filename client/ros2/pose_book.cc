@@ -31,6 +31,12 @@ absl::Status TooMany() {
 void PoseBook::SetStart(const Pose& T_map_fixed) {
   absl::MutexLock lock(&mutex_);
   T_map_fixed_ = T_map_fixed;
+  located_ = true;
+}
+
+bool PoseBook::located() const {
+  absl::MutexLock lock(&mutex_);
+  return located_;
 }
 
 Pose PoseBook::start() const {

@@ -37,13 +37,15 @@ class PoseBook {
     std::optional<PoseFrames> transforms = {};
     std::optional<Pose> T_base_cloud = {};  // goes before what the transforms say
     Pose T_map_fixed = Pose::Identity();    // where the odometry began
+    bool located = true;                    // false: that is a guess, or nothing
   };
   explicit PoseBook(const Options& options)
-      : options_(options), T_map_fixed_(options.T_map_fixed) {}
+      : options_(options), T_map_fixed_(options.T_map_fixed), located_(options.located) {}
 
   // Where the odometry began, once that is known better.
   void SetStart(const Pose& T_map_fixed);
   Pose start() const;  // T_map_fixed as poses are uploaded with it
+  bool located() const;
 
   // Of the topic of poses. INVALID_ARGUMENT as PoseTrack::Add, and for more than it holds.
   absl::Status AddPose(const RosPose& pose);
@@ -66,6 +68,7 @@ class PoseBook {
   const Options options_;
   mutable absl::Mutex mutex_;
   Pose T_map_fixed_ ABSL_GUARDED_BY(mutex_);
+  bool located_ ABSL_GUARDED_BY(mutex_);
   PoseFrames frames_ ABSL_GUARDED_BY(mutex_);
   PoseTrack track_ ABSL_GUARDED_BY(mutex_);
   TransformTree transforms_ ABSL_GUARDED_BY(mutex_);

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
 #include "core/common/status.h"
@@ -14,7 +15,7 @@ Pose Where::T_map_fixed() const { return Normalized(link_.correction() * book_.s
 
 std::optional<Pose> Where::T_map_base() const {
   const std::optional<BasePose> base = book_.newest();
-  if (!base.has_value()) return std::nullopt;
+  if (!base.has_value() || !book_.located()) return std::nullopt;
   return T_map_fixed() * base->T_fixed_base;
 }
 
@@ -25,6 +26,8 @@ std::int64_t Where::stamp_ns() const {
 
 absl::StatusOr<Pose> Where::InMap(const std::string& frame) const {
   if (frame.empty() || frame == map_frame_) return Pose::Identity();
+  if (!book_.located())
+    return absl::NotFoundError("where the robot is in the map is not known yet");
   STRATA_ASSIGN_OR_RETURN(const Pose T_fixed_frame, book_.InFixed(frame));
   return T_map_fixed() * T_fixed_frame;
 }

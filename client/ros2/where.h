@@ -24,7 +24,9 @@ class Where {
   const std::string& map_frame() const { return map_frame_; }
   // T_map_odom: of the frame that the odometry calls fixed.
   Pose T_map_fixed() const;
-  // T_map_base at the newest stamp; nullopt before the first pose.
+  // Whether it is known where the odometry is in the map.
+  bool known() const { return book_.located() && book_.newest().has_value(); }
+  // T_map_base at the newest stamp; nullopt while it is not known.
   std::optional<Pose> T_map_base() const;
   std::int64_t stamp_ns() const;  // of the newest pose, by the robot's clock; 0 before the first
   // T_map_frame now. NOT_FOUND.
