@@ -26,6 +26,8 @@ ARROWS = {
     "core/registration": ["core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/posegraph": ["core/registration", "core/planes", "core/world", "core/mls", "core/cloud", "core/geometry",
                        "core/common"],
+    "core/tracking": ["core/posegraph", "core/registration", "core/egomotion", "core/world", "core/mls", "core/cloud",
+                      "core/geometry", "core/common"],
     "core/classification": ["core/planes", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/planning": ["core/world", "core/mls", "core/geometry", "core/common"],
     "core/storage": ["core/world", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],

@@ -3,6 +3,7 @@
 #define STRATA_CORE_API_POSEGRAPH_H_
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "core/api/call.h"
 #include "core/world/constraint.h"
 #include "core/world/localization.h"
+#include "core/world/tracking.h"
 
 namespace strata::api {
 
@@ -30,6 +32,18 @@ struct PoseLookup {
   std::string message;  // why not, for people: pending behind so many scans, failed and why
   Pose T_map_scan = Pose::Identity();  // the uploaded pose unless known
   std::uint64_t epoch = 0;
+};
+
+// A robot that is being followed. Not thread-safe; destroying it ends that. Keeps its memory of the
+// robot whatever a step answers, so that one may go on after an error.
+class Tracking {
+ public:
+  virtual ~Tracking() = default;
+
+  // Where the robot is at its next moment; steps come in the order of time. Being lost is an
+  // answer. INVALID_ARGUMENT for a step that is not valid (ValidateTrackStep), which counts for
+  // nothing; RESOURCE_EXHAUSTED for a cloud beyond the server's limit.
+  virtual absl::StatusOr<TrackedPose> Step(const TrackStep& step) = 0;
 };
 
 // Thread-safe.
@@ -68,6 +82,12 @@ class PoseGraph {
   virtual absl::StatusOr<LocalizeResult> Localize(const Call& call,
                                                   absl::string_view map,
                                                   const LocalizeQuery& query) = 0;
+  // Follows a robot by its odometry and its scans, which are matched to the surfaces that the map
+  // has at the time, points or no points; changes nothing. `call` is that of every step.
+  // INVALID_ARGUMENT (ValidateTrackStart).
+  virtual absl::StatusOr<std::unique_ptr<Tracking>> Track(const Call& call,
+                                                          absl::string_view map,
+                                                          const TrackStart& start) = 0;
 };
 
 }  // namespace strata::api

@@ -31,6 +31,7 @@ namespace {
 constexpr std::uint32_t kComparedOfClass = 1000;
 constexpr float kComparedRangeM = 30.0F;  // beyond, a scan is too sparse to have every partner
 constexpr float kPartnerM = 0.5F;
+constexpr float kCloseM = 0.2F;
 constexpr int kMinCompared = 50;
 // Glass and wet roads return nothing though they are there.
 constexpr double kNoReturnCounts = 0.5;
@@ -90,15 +91,17 @@ struct SampledPoint {
   bool upright;
 };
 
-std::vector<SampledPoint> SampleOf(const ScanFeatures& features) {
+// Of what is near `centre`.
+std::vector<SampledPoint> SampleOf(const ScanFeatures& features,
+                                   const Eigen::Vector3f& centre = Eigen::Vector3f::Zero()) {
   std::vector<SampledPoint> sample;
   SplitMix64 random(1);
   for (const auto c :
        {FeatureClass::kTraversable, FeatureClass::kNonTraversable, FeatureClass::kVertical}) {
     const std::vector<Eigen::Vector3f>& points = features.points(c);
     std::vector<Eigen::Vector3f> near;
-    std::copy_if(points.begin(), points.end(), std::back_inserter(near), [](const auto& p) {
-      return p.norm() <= kComparedRangeM;
+    std::copy_if(points.begin(), points.end(), std::back_inserter(near), [&](const auto& p) {
+      return (p - centre).norm() <= kComparedRangeM;
     });
     for (const std::uint32_t i :
          SampleIndices(static_cast<std::uint32_t>(near.size()), kComparedOfClass, random)) {
@@ -106,6 +109,47 @@ std::vector<SampledPoint> SampleOf(const ScanFeatures& features) {
     }
   }
   return sample;
+}
+
+bool HasPartner(const Eigen::Vector3f& p,
+                const RegistrationTarget& grids,
+                float within_m = kPartnerM) {
+  for (const auto c :
+       {FeatureClass::kTraversable, FeatureClass::kNonTraversable, FeatureClass::kVertical}) {
+    if (grids.grid(c).Nearest(p, within_m) != ColumnGrid::kNone) return true;
+  }
+  return false;
+}
+
+// Whether it has a partner.
+bool Count(const SampledPoint& point,
+           const Eigen::Isometry3f& to_grid,
+           const RegistrationTarget& grids,
+           float within_m,
+           Comparison& sum) {
+  Comparison::Share& share = point.upright ? sum.upright : sum.level;
+  const bool found = HasPartner(to_grid * point.p, grids, within_m);
+  ++share.all;
+  share.found += found ? 1 : 0;
+  return found;
+}
+
+// Adds what `image` and the features `grids` of the other side say about `points`.
+void Compare(const std::vector<SampledPoint>& points,
+             const Pose& T_image_points,
+             const ViewImage& image,
+             const Pose& T_grid_points,
+             const RegistrationTarget& grids,
+             Comparison& sum) {
+  const Eigen::Isometry3f to_image = T_image_points.cast<float>();
+  const Eigen::Isometry3f to_grid = T_grid_points.cast<float>();
+  for (const SampledPoint& point : points) {
+    const Eigen::Vector3f p_image = to_image * point.p;
+    const Sight sight = Look(p_image, image, sum);
+    if (sight == Sight::kUnknown || sight == Sight::kNoReturn) continue;
+    if (p_image.norm() > kComparedRangeM) continue;
+    Count(point, to_grid, grids, kPartnerM, sum);
+  }
 }
 
 bool Accepted(Termination termination) {
@@ -213,34 +257,6 @@ class Matcher {
     fit.overlap = std::min(forth.Overlap(), back.Overlap());
   }
 
-  // Adds what `image` and the features `grids` of the other side say about `points`.
-  static void Compare(const std::vector<SampledPoint>& points,
-                      const Pose& T_image_points,
-                      const ViewImage& image,
-                      const Pose& T_grid_points,
-                      const RegistrationTarget& grids,
-                      Comparison& sum) {
-    const Eigen::Isometry3f to_image = T_image_points.cast<float>();
-    const Eigen::Isometry3f to_grid = T_grid_points.cast<float>();
-    for (const SampledPoint& point : points) {
-      const Eigen::Vector3f p_image = to_image * point.p;
-      const Sight sight = Look(p_image, image, sum);
-      if (sight == Sight::kUnknown || sight == Sight::kNoReturn) continue;
-      if (p_image.norm() > kComparedRangeM) continue;
-      Comparison::Share& share = point.upright ? sum.upright : sum.level;
-      ++share.all;
-      share.found += HasPartner(to_grid * point.p, grids) ? 1 : 0;
-    }
-  }
-
-  static bool HasPartner(const Eigen::Vector3f& p, const RegistrationTarget& grids) {
-    for (const auto c :
-         {FeatureClass::kTraversable, FeatureClass::kNonTraversable, FeatureClass::kVertical}) {
-      if (grids.grid(c).Nearest(p, kPartnerM) != ColumnGrid::kNone) return true;
-    }
-    return false;
-  }
-
   const PlaceMatchOptions& options_;
   const ScanFeatures& source_;
   RegistrationTarget target_;
@@ -250,6 +266,28 @@ class Matcher {
   RegistrationTarget source_grids_;
   std::vector<View> views_;
 };
+
+// MapAgreement::held.
+Matrix6d HeldBy(const ScanFeatures& features,
+                const Eigen::Isometry3f& to_grid,
+                const RegistrationTarget& target) {
+  Matrix6d held = Matrix6d::Zero();
+  int count = 0;
+  for (const SampledFeature& feature : features.sample()) {
+    const SurfaceElement& element = feature.element;
+    if (element.normal.isZero()) continue;
+    const ColumnGrid& grid = target.grid(feature.feature_class);
+    if (grid.Nearest(to_grid * element.point, kPartnerM) == ColumnGrid::kNone) continue;
+    const Eigen::Vector3d n = element.normal.cast<double>();
+    Vector6d slope;  // of the distance along the normal
+    slope << element.point.cast<double>().cross(n), n;
+    held.selfadjointView<Eigen::Lower>().rankUpdate(slope);
+    ++count;
+  }
+  if (count == 0) return held;
+  held.triangularView<Eigen::StrictlyUpper>() = held.transpose();
+  return held / count;
+}
 
 bool SamePlace(const Pose& a, const Pose& b, const PlaceMatchOptions& options) {
   const Pose T_a_b = a.inverse() * b;
@@ -337,6 +375,28 @@ double ContradictionOf(const SeenScan& a, const SeenScan& b) {
     return sum.Contradiction();
   };
   return std::max(seen(a, b), seen(b, a));
+}
+
+MapAgreement AgreementWithMap(const SeenScan& scan,
+                              const ScanFeatures& surfaces,
+                              const RegistrationTarget& target) {
+  const ScanFeatures& features = *scan.features;
+  Pose T_grid_scan = scan.T_target_scan;
+  T_grid_scan.translation() -= target.origin();
+  const Eigen::Isometry3f to_grid = T_grid_scan.cast<float>();
+  const Eigen::Isometry3f to_scan = T_grid_scan.inverse().cast<float>();
+  const ViewImage view(features, scan.sensor_origin);
+  Comparison seen;
+  for (const SampledPoint& point : SampleOf(surfaces, to_grid.translation())) {
+    Look(to_scan * point.p, view, seen);
+  }
+  Comparison near;
+  Comparison close;
+  for (const SampledPoint& point : SampleOf(features)) {
+    const bool has_partner = Count(point, to_grid, target, kPartnerM, near);
+    if (has_partner) Count(point, to_grid, target, kCloseM, close);
+  }
+  return {near.Overlap(), close.Overlap(), seen.Contradiction(), HeldBy(features, to_grid, target)};
 }
 
 PlaceMatch MatchPlace(const SeenScan& source,

@@ -22,6 +22,7 @@
 #include "core/geometry/pose.h"
 #include "core/registration/mls_registration.h"
 #include "core/registration/place_descriptor.h"
+#include "core/registration/registration_target.h"
 #include "core/registration/scan_features.h"
 
 namespace strata {
@@ -109,6 +110,25 @@ struct PlaceMatch {
 // PlaceMatch::contradiction of two scans where they are, 0 if neither looked to where the other saw
 // anything. A pure function; costs some ms.
 double ContradictionOf(const SeenScan& a, const SeenScan& b);
+
+// How well a scan at a pose agrees with a map that many scans have made, of which nobody knows
+// which saw what. Shares count level and upright features alike, whatever their numbers: ground
+// fits in many places, walls do not. 0 where there is too little to compare.
+struct MapAgreement {
+  double overlap = 0.0;  // share of what the scan shows within 30 m that the map has, in [0, 1]
+  double close = 0.0;    // share of that which is within 0.2 m, in [0, 1]
+  // Share of what of the map the scan should see that it looked through, as PlaceMatch's.
+  double contradiction = 0.0;
+  // Mean over the scan's sampled features with a partner of g gᵀ, g being the slope of the distance
+  // along their normal over a right-hand step on the scan's pose: what surfaces hold of it, and
+  // where it may slide.
+  Matrix6d held = Matrix6d::Zero();
+};
+// `surfaces` of the map are in the coordinates of the grids of `target`, which is made of them. A
+// pure function; costs some ms.
+MapAgreement AgreementWithMap(const SeenScan& scan,
+                              const ScanFeatures& surfaces,
+                              const RegistrationTarget& target);
 
 // The best fit of `source` to the scans of `target` within the windows: images of both from above
 // are searched for the best starts, each start is registered exactly, and the fits are compared and

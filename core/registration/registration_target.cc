@@ -70,7 +70,7 @@ absl::Status TargetOptions::Validate() const {
 RegistrationTarget::RegistrationTarget(std::span<const PlacedScan> scans,
                                        const TargetOptions& options)
     : origin_(options.centre) {
-  if (scans.size() == 1) {
+  if (scans.size() == 1 && options.from_one_place) {
     sensor_ = scans[0].T_target_scan * scans[0].features->sensor_origin() - origin_;
   }
   const auto radius_m2 = static_cast<float>(options.radius_m * options.radius_m);

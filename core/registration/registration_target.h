@@ -26,6 +26,8 @@ struct TargetOptions {
   // Features of several scans that share a cube of this edge and a class are averaged into one
   // [m]; in [0, 10], 0 keeps all. A single scan is never thinned.
   double thinning_m = 0.1;
+  // A single scan was seen from its sensor; false for what many scans have made.
+  bool from_one_place = true;
   // Features farther than this (horizontally) from the centre are left out [m]; in [1, 10000].
   double radius_m = 120.0;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // target frame; usually the guess

@@ -49,6 +49,8 @@ RESULTS = {
                 "/usr/bin/python3 tests/experiments/subsets.py --build {build}", ("core",)),
     "fleet": ("Several robots in one world, with frames that agree, nearly or not", "experiments/fleet --seed 1 --draws 3",
               ("core/posegraph", "core/registration", "core/engine/consistency", "core/engine/ingest")),
+    "tracking": ("A robot followed through maps that others have made", "experiments/tracking",
+                 ("core/tracking", "core/registration", "core/engine/consistency")),
     "two_sides": ("Decks and walls seen from both sides", "/usr/bin/python3 tests/experiments/two_sides.py --build {build}",
                   ("core/registration", "core/planes", "core/engine")),
     "localisation": ("Scans asked for in maps of the same place and of others",

@@ -11,12 +11,31 @@
 #include "absl/strings/string_view.h"
 
 #include "core/common/status.h"
+#include "core/engine/consistency/followed_robot.h"
 #include "core/engine/doors/scans.h"
 #include "core/engine/map/scan_lookup.h"
 #include "core/world/names.h"
 
 namespace strata {
 namespace {
+
+class EngineTracking final : public api::Tracking {
+ public:
+  EngineTracking(std::shared_ptr<Map> map, const api::Call& call, const TrackStart& start)
+      : map_(std::move(map)),
+        call_(call),
+        robot_(map_->core(), map_->tiles(), map_->localizer(), start) {}
+
+  absl::StatusOr<TrackedPose> Step(const TrackStep& step) override {
+    STRATA_RETURN_IF_ERROR(call_.stop.status());
+    return robot_.Step(step, call_.stop);
+  }
+
+ private:
+  const std::shared_ptr<Map> map_;
+  const api::Call call_;
+  FollowedRobot robot_;
+};
 
 absl::Status AddNodes(StorageReader& reader, api::PoseGraphState& state) {
   return ForEachScan(reader, ScanQuery(), state.epoch, [&](const PosedScan& posed) {
@@ -157,6 +176,15 @@ absl::StatusOr<LocalizeResult> EnginePoseGraph::Localize(const api::Call& call,
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
   return found->localizer().Localize(query, call.stop);
+}
+
+absl::StatusOr<std::unique_ptr<api::Tracking>> EnginePoseGraph::Track(const api::Call& call,
+                                                                      absl::string_view map,
+                                                                      const TrackStart& start) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_RETURN_IF_ERROR(ValidateTrackStart(start));
+  return std::make_unique<EngineTracking>(std::move(found), call, start);
 }
 
 }  // namespace strata

@@ -3,6 +3,7 @@
 #define STRATA_CORE_ENGINE_DOORS_POSEGRAPH_H_
 
 #include <cstdint>
+#include <memory>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -38,6 +39,9 @@ class EnginePoseGraph final : public api::PoseGraph {
   absl::StatusOr<LocalizeResult> Localize(const api::Call& call,
                                           absl::string_view map,
                                           const LocalizeQuery& query) override;
+  absl::StatusOr<std::unique_ptr<api::Tracking>> Track(const api::Call& call,
+                                                       absl::string_view map,
+                                                       const TrackStart& start) override;
 
  private:
   EngineMaps& maps_;
