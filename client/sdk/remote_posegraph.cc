@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <memory>
 #include <string>
 #include <utility>
 
+#include "client/sdk/backoff.h"
+#include "client/sdk/remote_tracking.h"
 #include "core/api/scans.h"
 #include "core/common/status.h"
 #include "proto/translate/geometry.h"
@@ -161,6 +164,20 @@ absl::StatusOr<LocalizeResult> RemotePoseGraph::Localize(const api::Call& call,
         SendQuery(connection_, *stub_, call, map, query);
     if (out.ok()) return FromProto(*out);
     if (!backoff.Wait(out.status(), call.stop)) return out.status();
+  }
+}
+
+absl::StatusOr<std::unique_ptr<api::Tracking>> RemotePoseGraph::Track(const api::Call& call,
+                                                                      absl::string_view map,
+                                                                      const TrackStart& start) {
+  STRATA_RETURN_IF_ERROR(ValidateTrackStart(start));
+  Backoff backoff = connection_.NewBackoff();
+  while (true) {
+    STRATA_RETURN_IF_ERROR(call.stop.status());
+    auto tracking = std::make_unique<RemoteTracking>(connection_, *stub_, call);
+    const absl::Status opened = tracking->Open(map, start);
+    if (opened.ok()) return tracking;
+    if (!backoff.Wait(opened, call.stop)) return opened;
   }
 }
 

@@ -38,6 +38,9 @@ class RemotePoseGraph final : public api::PoseGraph {
   absl::StatusOr<LocalizeResult> Localize(const api::Call& call,
                                           absl::string_view map,
                                           const LocalizeQuery& query) override;
+  absl::StatusOr<std::unique_ptr<api::Tracking>> Track(const api::Call& call,
+                                                       absl::string_view map,
+                                                       const TrackStart& start) override;
 
  private:
   Connection& connection_;

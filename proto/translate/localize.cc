@@ -1,15 +1,14 @@
 #include "proto/translate/localize.h"
 
-#include <cstdint>
 #include <string>
 #include <utility>
 
 #include "absl/status/status.h"
-#include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
 #include "proto/translate/geometry.h"
 #include "proto/translate/maps.h"
+#include "proto/translate/points.h"
 #include "proto/translate/scans.h"
 
 namespace strata::translate {
@@ -66,16 +65,7 @@ absl::StatusOr<LocalizeQuery> FromProto(const v1::LocalizeStart& proto) {
   }
   if (proto.has_guess_radius_m()) query.guess_radius_m = proto.guess_radius_m();
   STRATA_RETURN_IF_ERROR(ValidateLocalizeGuess(query));
-  const std::uint64_t grid = std::uint64_t{proto.rows()} * proto.columns();
-  if ((proto.rows() != 0 || proto.columns() != 0) && grid != proto.point_count()) {
-    return absl::InvalidArgumentError(absl::StrCat("a grid of ",
-                                                   proto.rows(),
-                                                   " × ",
-                                                   proto.columns(),
-                                                   " does not hold ",
-                                                   proto.point_count(),
-                                                   " points"));
-  }
+  STRATA_RETURN_IF_ERROR(CheckGrid(proto.rows(), proto.columns(), proto.point_count()));
   return query;
 }
 

@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <span>
 #include <string>
@@ -76,6 +77,13 @@ absl::StatusOr<PointCloud> FromProto(const v1::PointChunk& chunk) {
   cloud.colour = Unpack<Colour>(chunk.rgb());
   cloud.label = Unpack<std::uint16_t>(chunk.label());
   return cloud;
+}
+
+absl::Status CheckGrid(std::uint32_t rows, std::uint32_t columns, std::uint64_t point_count) {
+  const std::uint64_t grid = std::uint64_t{rows} * columns;
+  if ((rows == 0 && columns == 0) || grid == point_count) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("a grid of ", rows, " × ", columns, " does not hold ", point_count, " points"));
 }
 
 void DropFirst(std::size_t points, v1::PointChunk& chunk) {

@@ -24,6 +24,9 @@ v1::PointChunk ToProto(const PointCloud& cloud);
 // api::kMaxPointsPerChunk points.
 absl::StatusOr<PointCloud> FromProto(const v1::PointChunk& chunk);
 
+// INVALID_ARGUMENT for a grid that does not hold as many points as announced; 0 × 0 is none.
+absl::Status CheckGrid(std::uint32_t rows, std::uint32_t columns, std::uint64_t point_count);
+
 // Takes the first `points` points out. REQUIRES: `chunk` is what ToProto() makes of more points.
 void DropFirst(std::size_t points, v1::PointChunk& chunk);
 

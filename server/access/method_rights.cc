@@ -52,6 +52,7 @@ constexpr std::array kTable = {
     MethodRight{"PoseGraph.EnableConstraint", kWrite, "map"},
     MethodRight{"PoseGraph.LookupPose", kRead, "map"},
     MethodRight{"PoseGraph.Localize", kRead, "start.map"},
+    MethodRight{"PoseGraph.Track", kRead, "start.map"},
     MethodRight{"Jobs.Start", kWrite, "map"},
     MethodRight{"Jobs.Get", kRead, "map"},
     MethodRight{"Jobs.List", kRead, "map"},

@@ -6,6 +6,7 @@
 #include "proto/translate/scans.h"
 #include "server/rpc/stream.h"
 #include "server/services/localize_reactor.h"
+#include "server/services/track_reactor.h"
 
 namespace strata::server {
 namespace {
@@ -102,6 +103,7 @@ PoseGraphService::PoseGraphService(Runtime& runtime) : Service(runtime, "PoseGra
   Unary("EnableConstraint", &EnableConstraint);
   Unary("LookupPose", &LookupPose);
   Receive<LocalizeReactor>("Localize");
+  Exchange<TrackReactor>("Track");
 }
 
 }  // namespace strata::server

@@ -26,6 +26,7 @@
 #include "proto/translate/scans.h"
 #include "proto/translate/status.h"
 #include "proto/translate/tiles.h"
+#include "proto/translate/track.h"
 #include "proto/translate/watch.h"
 #include "tests/fuzz/proto_mutator.h"
 #include "tests/fuzz/require.h"
@@ -90,6 +91,9 @@ const auto& Kinds() {
       KindOf<v1::Job>(),
       KindOf<v1::LocalizeStart>(),
       KindOf<v1::LocalizeResponse>(),
+      KindOf<v1::TrackStart>(),
+      KindOf<v1::TrackStep>(),
+      KindOf<v1::TrackResponse>(),
       KindOf<v1::MapInfo>(),
       KindOf<v1::MapStats>(),
       KindOf<v1::MapClass>(),

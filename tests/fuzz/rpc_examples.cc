@@ -198,6 +198,21 @@ void AddLocalize(RpcCall& call, std::minstd_rand& random) {
       translate::ToProto(SomeFloor(points, random));
 }
 
+void AddTrack(RpcCall& call, std::minstd_rand& random) {
+  v1::TrackStart& start = *AddRequest<v1::TrackRequest>(call).mutable_start();
+  start.set_map("world");
+  if (random() % 2 == 0) start.mutable_guess()->mutable_translation()->set_x(-6.0);
+  for (int k = 0; k < 3; ++k) {
+    const int points = 20 + static_cast<int>(random() % 200);
+    v1::TrackStep& step = *AddRequest<v1::TrackRequest>(call).mutable_step();
+    step.mutable_odometry()->mutable_translation()->set_x(0.5 * k);
+    if (random() % 4 == 0) continue;  // without points
+    step.set_point_count(static_cast<std::uint64_t>(points));
+    *AddRequest<v1::TrackRequest>(call).mutable_chunk() =
+        translate::ToProto(SomeFloor(points, random));
+  }
+}
+
 void AddConstraint(RpcCall& call, std::minstd_rand& random) {
   auto& request = AddRequest<v1::AddConstraintRequest>(call);
   request.set_map("world");
@@ -354,6 +369,8 @@ RpcCall AnExample(const MethodDescriptor& method, std::minstd_rand& random) {
     AddLabels(call, random);
   } else if (input == "LocalizeRequest") {
     AddLocalize(call, random);
+  } else if (input == "TrackRequest") {
+    AddTrack(call, random);
   } else if (input == "AddConstraintRequest") {
     AddConstraint(call, random);
   } else if (input == "ImportClassifierRequest") {

@@ -37,6 +37,7 @@ const Message& PrototypeOf(std::uint8_t kind) {
       &v1::StartJobRequest::default_instance(),
       &v1::AddConstraintRequest::default_instance(),
       &v1::LocalizeRequest::default_instance(),
+      &v1::TrackRequest::default_instance(),
       &v1::ImportClassifierRequest::default_instance()};
   return *prototypes[kind % prototypes.size()];
 }

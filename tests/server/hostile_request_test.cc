@@ -45,7 +45,8 @@ constexpr const char* kKinds[] = {"/strata.v1.Maps/Get",      // one request, on
                                   "/strata.v1.Scans/Upload",  // a stream of requests
                                   "/strata.v1.Scans/Ingest",  // both
                                   "/strata.v1.Scans/SetLabels",
-                                  "/strata.v1.PoseGraph/Localize"};
+                                  "/strata.v1.PoseGraph/Localize",
+                                  "/strata.v1.PoseGraph/Track"};
 
 class HostileRequestTest : public ServedMock {
  protected:

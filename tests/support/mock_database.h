@@ -250,6 +250,10 @@ class MockPoseGraph : public api::PoseGraph {
               Localize,
               (const api::Call&, absl::string_view, const LocalizeQuery&),
               (override));
+  MOCK_METHOD(absl::StatusOr<std::unique_ptr<api::Tracking>>,
+              Track,
+              (const api::Call&, absl::string_view, const TrackStart&),
+              (override));
 };
 
 class MockClassifiers : public api::Classifiers {

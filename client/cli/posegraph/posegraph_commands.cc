@@ -204,6 +204,7 @@ void AddPosegraphCommands(Commands& commands) {
            [](Context& context, const PoseGraphOptions& o) { return Enable(context, o, true); }));
   AddPosegraphExchange(commands, noun);
   AddPosegraphOptimize(commands, noun);
+  AddPosegraphTrack(commands, noun);
 }
 
 }  // namespace strata::cli

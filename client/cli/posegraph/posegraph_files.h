@@ -7,6 +7,8 @@
 namespace strata::cli {
 
 void AddPosegraphExchange(Commands& commands, CLI::App* noun);
+// The verb `track`, in track_command.cc.
+void AddPosegraphTrack(Commands& commands, CLI::App* noun);
 void AddPosegraphOptimize(Commands& commands, CLI::App* noun);
 
 }  // namespace strata::cli

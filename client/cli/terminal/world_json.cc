@@ -192,4 +192,20 @@ Json ToJson(const LocalizeResult& result) {
   return json;
 }
 
+Json ToJson(const TrackedPose& pose) {
+  Json json = {{"state", std::string(ToString(pose.state))},
+               {"score", pose.score},
+               {"overlap", pose.overlap},
+               {"contradiction", pose.contradiction},
+               {"rms_m", pose.rms_m},
+               {"found", pose.found},
+               {"epoch", pose.epoch},
+               {"message", pose.message}};
+  if (pose.known) {
+    json["pose"] = ToJson(pose.T_map_scan);
+    json["covariance"] = ToJson(pose.covariance);
+  }
+  return json;
+}
+
 }  // namespace strata::cli

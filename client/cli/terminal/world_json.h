@@ -13,6 +13,7 @@
 #include "core/world/localization.h"
 #include "core/world/map_info.h"
 #include "core/world/plane_model.h"
+#include "core/world/tracking.h"
 
 namespace strata::cli {
 
@@ -27,6 +28,7 @@ Json ToJson(const PlaneModelInfo& info);
 Json ToJson(const api::PoseLookup& lookup);
 Json ToJson(const LocalizeCandidate& candidate);
 Json ToJson(const LocalizeResult& result);
+Json ToJson(const TrackedPose& pose);
 Json ToJson(const Matrix6d& matrix);  // six rows of six
 
 // "within (X, Y, Z) and (X, Y, Z)": the box around a map's surfaces [m].

@@ -1,3 +1,5 @@
+#include <cstddef>
+#include <memory>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -125,6 +127,55 @@ TEST_F(PoseGraphTest, AScanThatIsRefusedIsNotSentAgain) {
   }
   EXPECT_THAT(client_->posegraph().Localize({}, "m", query),
               StatusIs(Code::kResourceExhausted, HasSubstr("at most 2000000")));
+}
+
+// Says of a step that the robot is where odometry has it.
+class EchoingTracking final : public api::Tracking {
+ public:
+  absl::StatusOr<TrackedPose> Step(const TrackStep& step) override {
+    points.push_back(step.cloud.size());
+    if (points.size() == 3) return absl::UnavailableError("away");
+    TrackedPose pose;
+    pose.state = TrackState::kPredicted;
+    pose.known = true;
+    pose.T_map_scan = step.T_odom_scan;
+    pose.covariance = Matrix6d::Identity();
+    return pose;
+  }
+  static inline std::vector<std::size_t> points;
+};
+
+TEST_F(PoseGraphTest, ARobotIsFollowedOnOneStreamThatIsNotRepeated) {
+  EchoingTracking::points.clear();
+  TrackStart seen;
+  EXPECT_CALL(behind_.posegraph(), Track(_, _, _))
+      .WillOnce(Return(absl::UnavailableError("away")))
+      .WillOnce([&seen](auto&,
+                        auto map,
+                        const TrackStart& start) -> absl::StatusOr<std::unique_ptr<api::Tracking>> {
+        EXPECT_EQ(map, "m");
+        seen = start;
+        return std::make_unique<EchoingTracking>();
+      });
+  TrackStart start;
+  start.T_map_scan_guess = MakePose(Eigen::Quaterniond::Identity(), {1.0, 2.0, 3.0});
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto tracking, client_->posegraph().Track({}, "m", start));
+  EXPECT_EQ(seen.T_map_scan_guess->translation().z(), 3.0);
+  TrackStep step;
+  step.T_odom_scan.translation().x() = 4.0;
+  STRATA_ASSERT_OK_AND_ASSIGN(const TrackedPose pose, tracking->Step(step));
+  EXPECT_EQ(pose.T_map_scan.translation().x(), 4.0);
+  // In pieces.
+  step.cloud = LargeQuery().cloud;
+  STRATA_EXPECT_OK(tracking->Step(step).status());
+  EXPECT_THAT(EchoingTracking::points, ::testing::ElementsAre(0U, 90'000U));
+  // What is no step is not sent.
+  TrackStep none;
+  none.T_odom_scan.linear() *= 2.0;
+  EXPECT_THAT(tracking->Step(none), StatusIs(Code::kInvalidArgument, HasSubstr("odometry")));
+  // The end of the stream is the answer from then on.
+  EXPECT_THAT(tracking->Step(step), StatusIs(Code::kUnavailable, "away"));
+  EXPECT_THAT(tracking->Step(step), StatusIs(Code::kUnavailable, "away"));
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include "proto/translate/posegraph.h"
 #include "proto/translate/scans.h"
 #include "proto/translate/tiles.h"
+#include "proto/translate/track.h"
 #include "proto/translate/watch.h"
 #include "tests/support/status_matchers.h"
 
@@ -320,6 +321,20 @@ TEST(TranslateRoundTripTest, Localize) {
   STRATA_ASSERT_OK_AND_ASSIGN(const LocalizeQuery defaults, FromProto(v1::LocalizeStart()));
   EXPECT_EQ(defaults.guess_radius_m, LocalizeQuery().guess_radius_m);
   EXPECT_EQ(defaults.T_map_scan_guess, std::nullopt);
+}
+
+TEST(TranslateRoundTripTest, Track) {
+  const auto start = Filled<v1::TrackStart>();
+  STRATA_ASSERT_OK_AND_ASSIGN(const TrackStart begun, FromProto(start));
+  ExpectSame(start, ToProto(start.map(), begun));
+  STRATA_ASSERT_OK_AND_ASSIGN(const TrackStart defaults, FromProto(v1::TrackStart()));
+  EXPECT_EQ(defaults.guess_radius_m, TrackStart().guess_radius_m);
+  v1::TrackStep step = ToProto(TrackStep());
+  step.mutable_odometry()->mutable_translation()->set_y(-2.5);
+  step.mutable_sensor_origin()->set_z(1.75);
+  for (int i = 0; i < 36; ++i) step.add_motion_covariance(i % 7 == 0 ? 0.5 + i : 0.0);
+  ExpectRoundTrip(step);
+  ExpectRoundTrip(Filled<v1::TrackResponse>());
 }
 
 TEST(TranslateRoundTripTest, Watch) {

@@ -71,6 +71,7 @@ const std::map<std::string, std::optional<Right>>& Needed() {
          "PoseGraph.Get",
          "PoseGraph.LookupPose",
          "PoseGraph.Localize",
+         "PoseGraph.Track",
          "Jobs.Get",
          "Jobs.List",
          "Jobs.Watch",

@@ -127,6 +127,7 @@ TEST_P(DatabaseSuite, AnUnknownMapIsNotFoundEverywhere) {
   LocalizeQuery query;
   query.cloud = floor;
   EXPECT_THAT(db().posegraph().Localize({}, no, query), not_found);
+  EXPECT_THAT(db().posegraph().Track({}, no, {}), not_found);
 }
 
 TEST_P(DatabaseSuite, ABackupIsTheWholeFile) {

@@ -172,6 +172,37 @@ TEST_P(DatabaseSuite, AScanIsFoundWhereItWasTaken) {
   EXPECT_THAT(Listed(db(), {}), SizeIs(1));
 }
 
+TEST_P(DatabaseSuite, ARobotIsFollowed) {
+  TrackStep step;
+  step.cloud = Corner();
+  STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", 1}, step.cloud, 6.0), step.cloud));
+  AwaitIntegration(db(), kMap);
+  TrackStart start;
+  start.T_map_scan_guess = MakePose(Eigen::Quaterniond::Identity(), {6.3, -0.2, 0.1});
+  start.guess_radius_m = 5.0;
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto tracking, db().posegraph().Track({}, kMap, start));
+  STRATA_ASSERT_OK_AND_ASSIGN(const TrackedPose found, tracking->Step(step));
+  EXPECT_EQ(found.state, TrackState::kTracked) << found.message;
+  EXPECT_TRUE(found.found);
+  EXPECT_EQ(found.epoch, 1U);
+  EXPECT_GT(found.score, 0.5);
+  EXPECT_LT((found.T_map_scan.translation() - Eigen::Vector3d(6.0, 0.0, 0.0)).norm(), 0.1);
+  EXPECT_GT(found.covariance.diagonal().minCoeff(), 0.0);
+  // Odometry goes on alone; a step that is none counts for nothing.
+  TrackStep motion;
+  motion.T_odom_scan = NanPose();
+  EXPECT_THAT(tracking->Step(motion), StatusIs(Code::kInvalidArgument, _));
+  motion.T_odom_scan = MakePose(Eigen::Quaterniond::Identity(), {0.5, 0.0, 0.0});
+  STRATA_ASSERT_OK_AND_ASSIGN(const TrackedPose moved, tracking->Step(motion));
+  EXPECT_EQ(moved.state, TrackState::kPredicted);
+  EXPECT_LT((moved.T_map_scan.translation() - Eigen::Vector3d(6.5, 0.0, 0.0)).norm(), 0.1);
+  EXPECT_GT(moved.covariance(3, 3), found.covariance(3, 3));
+  start.guess_radius_m = -1.0;
+  EXPECT_THAT(db().posegraph().Track({}, kMap, start), StatusIs(Code::kInvalidArgument, _));
+  // Following leaves no trace.
+  EXPECT_THAT(Listed(db(), {}), SizeIs(1));
+}
+
 TEST_P(DatabaseSuite, BadSearchesAreRefused) {
   LocalizeQuery query;
   EXPECT_THAT(db().posegraph().Localize({}, kMap, query), StatusIs(Code::kInvalidArgument, _));
