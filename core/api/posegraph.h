@@ -39,10 +39,10 @@ class Tracking {
  public:
   virtual ~Tracking() = default;
 
-  // Where the robot is at its next moment; steps come in the order of time. Being lost is an answer.
-  // INVALID_ARGUMENT for a step that is not valid (ValidateTrackStep), which counts for nothing.
-  // RESOURCE_EXHAUSTED for a cloud beyond the server's limit; this and other errors of a server are
-  // its last answer: one begins again then, with the last pose as the guess.
+  // Where the robot is at its next moment; steps come in the order of time. Being lost is an
+  // answer. INVALID_ARGUMENT for a step that is not valid (ValidateTrackStep), which counts for
+  // nothing. RESOURCE_EXHAUSTED for a cloud beyond the server's limit; this and other errors of a
+  // server are its last answer: one begins again then, with the last pose as the guess.
   virtual absl::StatusOr<TrackedPose> Step(const TrackStep& step) = 0;
 };
 

@@ -31,7 +31,6 @@ namespace {
 constexpr std::uint32_t kComparedOfClass = 1000;
 constexpr float kComparedRangeM = 30.0F;  // beyond, a scan is too sparse to have every partner
 constexpr float kPartnerM = 0.5F;
-constexpr float kCloseM = 0.2F;
 constexpr int kMinCompared = 50;
 // Glass and wet roads return nothing though they are there.
 constexpr double kNoReturnCounts = 0.5;
@@ -379,7 +378,8 @@ double ContradictionOf(const SeenScan& a, const SeenScan& b) {
 
 MapAgreement AgreementWithMap(const SeenScan& scan,
                               const ScanFeatures& surfaces,
-                              const RegistrationTarget& target) {
+                              const RegistrationTarget& target,
+                              double close_m) {
   const ScanFeatures& features = *scan.features;
   Pose T_grid_scan = scan.T_target_scan;
   T_grid_scan.translation() -= target.origin();
@@ -394,7 +394,7 @@ MapAgreement AgreementWithMap(const SeenScan& scan,
   Comparison close;
   for (const SampledPoint& point : SampleOf(features)) {
     const bool has_partner = Count(point, to_grid, target, kPartnerM, near);
-    if (has_partner) Count(point, to_grid, target, kCloseM, close);
+    if (has_partner) Count(point, to_grid, target, static_cast<float>(close_m), close);
   }
   return {near.Overlap(), close.Overlap(), seen.Contradiction(), HeldBy(features, to_grid, target)};
 }

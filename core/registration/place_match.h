@@ -116,7 +116,7 @@ double ContradictionOf(const SeenScan& a, const SeenScan& b);
 // fits in many places, walls do not. 0 where there is too little to compare.
 struct MapAgreement {
   double overlap = 0.0;  // share of what the scan shows within 30 m that the map has, in [0, 1]
-  double close = 0.0;    // share of that which is within 0.2 m, in [0, 1]
+  double close = 0.0;    // share of that which is within `close_m`, in [0, 1]
   // Share of what of the map the scan should see that it looked through, as PlaceMatch's.
   double contradiction = 0.0;
   // Mean over the scan's sampled features with a partner of g gᵀ, g being the slope of the distance
@@ -124,11 +124,12 @@ struct MapAgreement {
   // where it may slide.
   Matrix6d held = Matrix6d::Zero();
 };
-// `surfaces` of the map are in the coordinates of the grids of `target`, which is made of them. A
-// pure function; costs some ms.
+// `surfaces` of the map are in the coordinates of the grids of `target`, which is made of them;
+// `close_m` in (0, 0.5]. A pure function; costs some ms.
 MapAgreement AgreementWithMap(const SeenScan& scan,
                               const ScanFeatures& surfaces,
-                              const RegistrationTarget& target);
+                              const RegistrationTarget& target,
+                              double close_m);
 
 // The best fit of `source` to the scans of `target` within the windows: images of both from above
 // are searched for the best starts, each start is registered exactly, and the fits are compared and

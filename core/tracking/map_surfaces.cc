@@ -23,6 +23,7 @@ FeatureClass ClassOf(const Surface& surface) {
 
 bool MapSurfacesCollector::Add(const SurfaceTile& tile) {
   const double cell_m = std::ldexp(cell_size_m_, tile.key.level);
+  widest_cell_m_ = std::max(widest_cell_m_, cell_m);
   for (const Surface& surface : tile.surfaces) {
     if (count_ >= kMost) return false;
     const CellIndex cell = CellOf(tile.key, surface.cell);
@@ -47,6 +48,7 @@ MapSurfaces MapSurfacesCollector::Finish() && {
   options.sample_count = 0;
   MapSurfaces surfaces;
   surfaces.centre = centre_;
+  surfaces.cell_size_m = widest_cell_m_;
   surfaces.features = ScanFeatures::FromPoints(std::move(points_), options);
   Pose T_map_features = Pose::Identity();
   T_map_features.translation() = centre_;

@@ -23,6 +23,7 @@ inline constexpr double kSurfacesSlackM = 15.0;
 // Immutable, safe to share between threads.
 struct MapSurfaces {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // in the map
+  double cell_size_m = 0.1;                          // of the tiles
   ScanFeatures features;                             // relative to the centre, axes of the map
   RegistrationTarget target;                         // of the features, in the map
 };
@@ -46,6 +47,7 @@ class MapSurfacesCollector {
   const Eigen::Vector3d centre_;
   const double cell_size_m_;
   std::size_t count_ = 0;
+  double widest_cell_m_ = 0.0;
   std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points_;
 };
 

@@ -22,6 +22,9 @@ namespace {
 constexpr double kLeastOverlap = 0.5;
 constexpr double kMostContradiction = 0.25;
 constexpr double kLeastClose = 0.7;
+// What is close: in coarse maps a cell, for surfaces stand in the middle of theirs.
+constexpr double kCloseM = 0.2;
+constexpr double kMostCloseM = 0.5;
 // χ² of 6 degrees of freedom that one good scan in a million exceeds: odometry may slip, and the
 // map knows better.
 constexpr double kGate = 38.3;
@@ -30,12 +33,13 @@ constexpr double kGate = 38.3;
 constexpr double kIndependent = 100.0;
 constexpr double kSurfaceSigmaM = 0.04;
 // with others where it slides along its surfaces, half of it where this share of them holds it
-// (Look at MlsRegistrationOptions: the ratio of what normals and tangents weigh),
+// (what tangents weigh beside normals in MlsRegistrationOptions: 0.03² / 0.2²),
 constexpr double kSlideM = 0.1;
 constexpr double kHoldsHalf = 0.0225;
 // of a scan's rotation,
 constexpr double kMatchSigmaRad = 0.001;
-// and of the map around, which no number of scans makes less.
+// and of the map around, which no number of scans makes less, where its cells are that wide.
+constexpr double kUsualCellM = 0.1;
 constexpr double kMapSigmaM = 0.015;
 constexpr double kMapSigmaRad = 0.0015;
 // Those are of scans whose surfaces lie so far from the map's (root mean square), as among trees
@@ -136,10 +140,12 @@ absl::StatusOr<Tracker::Look> Tracker::LookFrom(const Pose& T_map_scan_guess,
   const MapAgreement agreement =
       AgreementWithMap({&features, match.T_target_source, features.sensor_origin()},
                        surfaces->features,
-                       surfaces->target);
+                       surfaces->target,
+                       std::clamp(surfaces->cell_size_m, kCloseM, kMostCloseM));
   look.T_map_scan = match.T_target_source;
-  look.error_scale = ErrorScale(match.rms_m);
-  look.information = InformationOf(agreement.held, look.error_scale, match.degenerate_directions);
+  const double scale = ErrorScale(match.rms_m);
+  look.map_scale = scale * std::max(1.0, surfaces->cell_size_m / kUsualCellM);
+  look.information = InformationOf(agreement.held, scale, match.degenerate_directions);
   look.overlap = agreement.overlap;
   look.contradiction = agreement.contradiction;
   look.rms_m = match.rms_m;
@@ -170,7 +176,7 @@ absl::StatusOr<Tracker::Look> Tracker::LookAhead(const ScanFeatures& features,
 
 void Tracker::Believe(const Look& look) {
   filter_->Update(look.T_map_scan, look.information);
-  error_scale_ = look.error_scale;
+  map_scale_ = look.map_scale;
   misses_ = 0;
 }
 
@@ -238,7 +244,7 @@ TrackedPose Tracker::Answer(TrackedPose pose) const {
   pose.known = filter_.has_value();
   if (!pose.known) return pose;
   pose.T_map_scan = filter_->pose();
-  pose.covariance = filter_->Covariance() + error_scale_ * error_scale_ * MapCovariance();
+  pose.covariance = filter_->Covariance() + map_scale_ * map_scale_ * MapCovariance();
   return pose;
 }
 

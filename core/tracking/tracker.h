@@ -61,7 +61,7 @@ class Tracker {
     double overlap = 0.0;
     double contradiction = 0.0;
     double rms_m = 0.0;
-    double error_scale = 1.0;  // of the map's surfaces there, beside usual ones
+    double map_scale = 1.0;  // of the map's errors there, beside usual ones
     std::string why_not;
   };
 
@@ -87,8 +87,8 @@ class Tracker {
   const MlsRegistrationOptions registration_;
   std::optional<PoseFilter> filter_;  // nullopt: never found
   std::optional<Pose> T_odom_last_;
-  double error_scale_ = 1.0;  // of the last scan that was believed
-  int misses_ = 0;            // scans in a row that did not agree
+  double map_scale_ = 1.0;  // of the last scan that was believed
+  int misses_ = 0;          // scans in a row that did not agree
 };
 
 }  // namespace strata

@@ -77,6 +77,37 @@ TEST_F(PlaceMatchTest, HeadingsOfTheDescriptorAreEnoughOfAGuess) {
   ExpectNear(T_i.inverse() * T_j, match.T_target_source, 0.1, 0.01);
 }
 
+// By a scan a pace from others that made a map; then turned, and at another place.
+TEST_F(PlaceMatchTest, AScanAgreesWithAMapWhereItWasTaken) {
+  const testing::World world = testing::CampusWorld();
+  const Pose T_map_i = StandingAt(world.scene, 0, 0, 50, 0.2);
+  const ScanFeatures surfaces = FeaturesAt(world.scene, T_map_i, 1);
+  const Pose T_i_j = T_map_i.inverse() * StandingAt(world.scene, 2, 1, 50, 1.4);
+  const ScanFeatures scan = FeaturesAt(world.scene, T_map_i * T_i_j, 2);
+  const PlacedScan placed[] = {{&surfaces, Pose::Identity()}};
+  const RegistrationTarget target(placed, {.from_one_place = false});
+  EXPECT_FALSE(target.sensor().has_value());
+  const MapAgreement there = AgreementWithMap({&scan, T_i_j}, surfaces, target, 0.2);
+  EXPECT_GT(there.overlap, 0.8);
+  EXPECT_GT(there.close, 0.7);
+  EXPECT_LT(there.contradiction, 0.05);
+  // Ground holds height and tilt, walls and trees the rest.
+  const Eigen::Matrix3d held = there.held.bottomRightCorner<3, 3>();
+  EXPECT_NEAR(held.trace(), 1.0, 1e-6);  // of unit normals
+  EXPECT_GT(held(2, 2), held(0, 0));
+  EXPECT_GT(held(0, 0), 0.01);
+  const MapAgreement turned =
+      AgreementWithMap({&scan, T_i_j * Off(0.5, 0, 0, 0)}, surfaces, target, 0.2);
+  EXPECT_LT(turned.overlap * turned.close, 0.8 * there.overlap * there.close);
+  const MapAgreement off =
+      AgreementWithMap({&scan, T_i_j * Off(2.0, 15, -9, 0)}, surfaces, target, 0.2);
+  EXPECT_LT(off.overlap, there.overlap);
+  const MapAgreement nowhere =
+      AgreementWithMap({&scan, Off(0.0, 500, 0, 0)}, surfaces, target, 0.2);
+  EXPECT_EQ(nowhere.overlap, 0.0);
+  EXPECT_TRUE(nowhere.held.isZero());
+}
+
 TEST_F(PlaceMatchTest, AnotherPlaceIsRefused) {
   const testing::World world = testing::CampusWorld();
   const ScanFeatures there = FeaturesAt(world.scene, StandingAt(world.scene, 0, 0, 50, 0), 1);

@@ -49,6 +49,7 @@ TEST(MapSurfacesTest, OverviewsHaveWiderCells) {
   EXPECT_TRUE(collector.Add(tile));
   const MapSurfaces surfaces = std::move(collector).Finish();
   EXPECT_NEAR(surfaces.features.points(FeatureClass::kTraversable).at(0).x(), 1.05F, 1e-5F);
+  EXPECT_NEAR(surfaces.cell_size_m, 0.1, 1e-12);
 }
 
 TEST(MapSurfacesTest, WhatIsFarIsLeftOutAndMemoryIsBounded) {

@@ -1,5 +1,6 @@
 #include "core/tracking/tracker.h"
 
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
