@@ -18,8 +18,8 @@ namespace strata::server {
 
 // One step at a time under way: a message is read once the one before is dealt with, and the next
 // step once the answer to the one before is on the wire. Between them it holds no thread; memory is
-// one scan, and what the database keeps of the robot. Lives from the call's arrival to its end;
-// owns itself.
+// one scan, and the little that the database keeps of the robot. Lives from the call's arrival to
+// its end; owns itself.
 class TrackReactor final
     : public grpc::ServerBidiReactor<Sealed<v1::TrackRequest>, v1::TrackResponse> {
  public:

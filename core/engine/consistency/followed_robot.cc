@@ -9,7 +9,6 @@
 
 #include "absl/status/status.h"
 
-#include "core/codec/surface_tile_codec.h"
 #include "core/common/status.h"
 #include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/matching.h"
@@ -31,34 +30,6 @@ MlsRegistrationOptions RegistrationOptions() {
   MlsRegistrationOptions options = EngineRegistrationOptions();
   options.max_samples = kSamples;
   return options;
-}
-
-// Finest tiles whose cells are about as wide as those that scans are matched with: of finer maps an
-// overview.
-std::int32_t LevelOf(double cell_size_m) {
-  std::int32_t level = 0;
-  while (level < kMaxLevel && std::ldexp(cell_size_m, level + 1) <= kRegistrationCellM) ++level;
-  return level;
-}
-
-TileRange RangeAround(const Eigen::Vector3d& centre, double cell_size_m, std::int32_t level) {
-  const double tile_m = kTileCells * std::ldexp(cell_size_m, level);
-  const double radius_m = kTrackedRangeM + kSurfacesSlackM;
-  const auto tile_of = [&](double at_m) {
-    return static_cast<std::int64_t>(std::floor(std::clamp(at_m / tile_m, -1e9, 1e9)));
-  };
-  return {level,
-          tile_of(centre.x() - radius_m),
-          tile_of(centre.x() + radius_m) + 1,
-          tile_of(centre.y() - radius_m),
-          tile_of(centre.y() + radius_m) + 1};
-}
-
-// From the centre of the tile [tiles²].
-double SquaredDistance(const TileKey& key, const Eigen::Vector3d& centre, double cell_size_m) {
-  const double tile_m = kTileCells * std::ldexp(cell_size_m, key.level);
-  const Eigen::Vector2d tile(key.x + 0.5, key.y + 0.5);
-  return (tile - centre.head<2>() / tile_m).squaredNorm();
 }
 
 }  // namespace
@@ -95,11 +66,11 @@ class FollowedRobot::MapNow final : public TrackedMap {
 };
 
 FollowedRobot::FollowedRobot(MapCore& core,
-                             ServedTiles& tiles,
+                             SurfacesAround& surfaces,
                              Localizer& localizer,
                              const TrackStart& start)
     : core_(core),
-      tiles_(tiles),
+      surfaces_(surfaces),
       localizer_(localizer),
       start_(start),
       tracker_(start, RegistrationOptions()) {}
@@ -151,48 +122,22 @@ absl::Status FollowedRobot::Carry(std::uint64_t epoch) {
 
 absl::StatusOr<std::shared_ptr<const MapSurfaces>> FollowedRobot::Around(
     const Eigen::Vector3d& p_map, const MapView& view, const Stop& stop) {
-  if (surfaces_ != nullptr && surfaces_view_.epoch == view.epoch &&
-      (p_map - surfaces_->centre).head<2>().norm() <= kSurfacesSlackM &&
-      (surfaces_view_ == view || looks_ < kLooksAtChanging)) {
-    ++looks_;
-    return surfaces_;
+  const bool stays = looks_ > 0 && seen_view_.epoch == view.epoch &&
+                     (p_map - CentreOf(seen_)).head<2>().norm() <= kSurfacesSlackM &&
+                     (seen_view_ == view || looks_ < kLooksAtChanging);
+  if (!stays) {
+    seen_ = NearestPlace(p_map);
+    seen_view_ = view;
+    looks_ = 0;
   }
-  STRATA_ASSIGN_OR_RETURN(MapSurfaces surfaces, Collect(p_map, view, stop));
-  surfaces_ = std::make_shared<const MapSurfaces>(std::move(surfaces));
-  surfaces_view_ = view;
-  looks_ = 1;
-  return surfaces_;
-}
-
-absl::StatusOr<MapSurfaces> FollowedRobot::Collect(const Eigen::Vector3d& centre,
-                                                   const MapView& view,
-                                                   const Stop& stop) {
-  const double cell_size_m = core_.info().parameters.mls.cell_size_m;
-  std::vector<SurfaceTileRow> rows;
-  {
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-    STRATA_ASSIGN_OR_RETURN(
-        rows,
-        reader->ListSurfaceTiles(RangeAround(centre, cell_size_m, LevelOf(cell_size_m)),
-                                 view.tile_version));
+  ++looks_;
+  // Of an older view of this epoch it may be gone: then as the map is now.
+  if (seen_view_ != view) {
+    if (auto held = surfaces_.FindAtHand(seen_, seen_view_); held != nullptr) return held;
+    seen_view_ = view;
+    looks_ = 1;
   }
-  std::stable_sort(rows.begin(), rows.end(), [&](const SurfaceTileRow& a, const SurfaceTileRow& b) {
-    return SquaredDistance(a.key, centre, cell_size_m) <
-           SquaredDistance(b.key, centre, cell_size_m);
-  });
-  MapSurfacesCollector collector(centre, cell_size_m);
-  for (const SurfaceTileRow& row : rows) {
-    STRATA_RETURN_IF_ERROR(stop.status());
-    const absl::StatusOr<ServedTiles::Handle> served = tiles_.Find(row.key, view);
-    if (absl::IsDataLoss(served.status())) continue;
-    STRATA_RETURN_IF_ERROR(served.status());
-    if (*served == nullptr) continue;
-    const absl::StatusOr<SurfaceTile> tile = DecodeSurfaceTile((*served)->bytes);
-    if (absl::IsDataLoss(tile.status())) continue;
-    STRATA_RETURN_IF_ERROR(tile.status());
-    if (!collector.Add(*tile)) break;
-  }
-  return std::move(collector).Finish();
+  return surfaces_.Find(seen_, view, stop);
 }
 
 absl::StatusOr<TrackedPose> FollowedRobot::Step(const TrackStep& step, const Stop& stop) {

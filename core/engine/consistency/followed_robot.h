@@ -10,9 +10,9 @@
 
 #include "core/common/stop.h"
 #include "core/engine/consistency/localizer.h"
+#include "core/engine/consistency/surfaces_around.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/map/snapshots.h"
-#include "core/engine/tiles/served_tiles.h"
 #include "core/mls/build.h"
 #include "core/registration/scan_features.h"
 #include "core/tracking/map_surfaces.h"
@@ -21,11 +21,15 @@
 
 namespace strata {
 
-// One thread at a time. Memory: the surfaces around the robot, and one scan while it is stepped.
+// One thread at a time. Memory: while it is stepped the surfaces around the robot and one scan;
+// between steps next to none.
 class FollowedRobot {
  public:
   // All must outlive it; `start` must be valid.
-  FollowedRobot(MapCore& core, ServedTiles& tiles, Localizer& localizer, const TrackStart& start);
+  FollowedRobot(MapCore& core,
+                SurfacesAround& surfaces,
+                Localizer& localizer,
+                const TrackStart& start);
 
   // By the map as it is now. INVALID_ARGUMENT for a step that is none; DATA_LOSS for no tile, those
   // that are damaged are left out.
@@ -40,19 +44,16 @@ class FollowedRobot {
   absl::StatusOr<std::shared_ptr<const MapSurfaces>> Around(const Eigen::Vector3d& p_map,
                                                             const MapView& view,
                                                             const Stop& stop);
-  absl::StatusOr<MapSurfaces> Collect(const Eigen::Vector3d& centre,
-                                      const MapView& view,
-                                      const Stop& stop);
 
   MapCore& core_;
-  ServedTiles& tiles_;
+  SurfacesAround& surfaces_;
   Localizer& localizer_;
   const TrackStart start_;
   Tracker tracker_;
   std::uint64_t epoch_ = 0;  // that the tracker's pose is of
-  std::shared_ptr<const MapSurfaces> surfaces_;
-  MapView surfaces_view_;
-  int looks_ = 0;  // at surfaces_
+  PlaceKey seen_;            // which surfaces were seen last,
+  MapView seen_view_;
+  int looks_ = 0;  // how often
   MlsScratch scratch_;
 };
 

@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/engine/consistency/localizer.h"
+#include "core/engine/consistency/surfaces_around.h"
 #include "core/engine/doors/map_planner.h"
 #include "core/engine/ingest/unfinished_uploads.h"
 #include "core/engine/ingest/worker.h"
@@ -36,6 +37,7 @@ class Map {
   MapPlanner& planner() { return *planner_; }
   ServedTiles& tiles() { return *tiles_; }
   Localizer& localizer() { return *localizer_; }
+  SurfacesAround& surfaces() { return *surfaces_; }
   Worker& worker() { return *worker_; }
   UnfinishedUploads& uploads() { return *uploads_; }
 
@@ -58,6 +60,7 @@ class Map {
   std::unique_ptr<MapPlanner> planner_;
   std::unique_ptr<ServedTiles> tiles_;
   std::unique_ptr<Localizer> localizer_;
+  std::unique_ptr<SurfacesAround> surfaces_;
   std::unique_ptr<UnfinishedUploads> uploads_;
   std::unique_ptr<Worker> worker_;
   std::unique_ptr<JobRunner> runner_;

@@ -24,7 +24,7 @@ class EngineTracking final : public api::Tracking {
   EngineTracking(std::shared_ptr<Map> map, const api::Call& call, const TrackStart& start)
       : map_(std::move(map)),
         call_(call),
-        robot_(map_->core(), map_->tiles(), map_->localizer(), start) {}
+        robot_(map_->core(), map_->surfaces(), map_->localizer(), start) {}
 
   absl::StatusOr<TrackedPose> Step(const TrackStep& step) override {
     STRATA_RETURN_IF_ERROR(call_.stop.status());
