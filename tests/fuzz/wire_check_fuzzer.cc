@@ -25,7 +25,7 @@ namespace {
 using google::protobuf::Message;
 
 const Message& PrototypeOf(std::uint8_t kind) {
-  static const std::array<const Message*, 12> prototypes = {
+  static const std::array<const Message*, 13> prototypes = {
       &v1::CreateMapRequest::default_instance(),
       &v1::SetMapClassRequest::default_instance(),
       &v1::IngestScansRequest::default_instance(),

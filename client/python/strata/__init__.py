@@ -18,10 +18,11 @@ from strata.plan import Path
 from strata.registration import Registration, register
 from strata.scan import Ack, Points, Scan
 from strata.tiles import NON_TRAVERSABLE, SURFACE, TRAVERSABLE, UNDERSIDE, UNKNOWN, Tile, TileKey, decode_tile
+from strata.tracking import TrackedPose, Tracking
 
 __all__ = [
     "AlreadyExists", "Cancelled", "DataLoss", "DeadlineExceeded", "FailedPrecondition", "InvalidArgument", "NotFound",
     "PermissionDenied", "ResourceExhausted", "StrataError", "Unauthenticated", "Unavailable", "Unimplemented",
     "Ack", "Change", "Database", "Heights", "Job", "Map", "Mesh", "NON_TRAVERSABLE", "Path", "Points", "Registration", "SURFACE", "Scan",
-    "ScanChange", "Stats", "TRAVERSABLE", "Tile", "TileKey", "UNDERSIDE", "UNKNOWN", "connect", "decode_tile", "register",
+    "ScanChange", "Stats", "TRAVERSABLE", "Tile", "TileKey", "TrackedPose", "Tracking", "UNDERSIDE", "UNKNOWN", "connect", "decode_tile", "register",
 ]

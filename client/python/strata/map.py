@@ -7,10 +7,10 @@ import time as clock
 
 import numpy as np
 
-from strata import errors, floors, heights, job, mesh, plan, planes, poses, scan
+from strata import errors, floors, heights, job, mesh, plan, planes, poses, scan, tracking
 from strata.tiles import SURFACE, TILE_CELLS, TileKey, decode_tile
 from strata.v1 import (geometry_pb2, jobs_pb2, jobs_pb2_grpc, maps_pb2, maps_pb2_grpc, models_pb2, models_pb2_grpc,
-                       planning_pb2, planning_pb2_grpc, scans_pb2, scans_pb2_grpc, tiles_pb2, tiles_pb2_grpc)
+                       planning_pb2, planning_pb2_grpc, posegraph_pb2_grpc, scans_pb2, scans_pb2_grpc, tiles_pb2, tiles_pb2_grpc)
 
 _MAX_PLACES = 10_000
 _TILE_LIMIT = 1 << 31
@@ -84,6 +84,7 @@ class Map:
         self._planning = planning_pb2_grpc.PlanningStub(connection.channel)
         self._jobs = jobs_pb2_grpc.JobsStub(connection.channel)
         self._models = models_pb2_grpc.ModelsStub(connection.channel)
+        self._posegraph = posegraph_pb2_grpc.PoseGraphStub(connection.channel)
         self._lock = threading.Lock()
         self._last_sequence = {}
 
@@ -158,6 +159,12 @@ class Map:
         """Takes a scan, its points and its contribution out of the map."""
         self._connection.once(self._scans.Delete,
                               scans_pb2.DeleteScanRequest(map=self.name, id=scan.id_of(which)))
+
+    def follow(self, guess=None, *, guess_radius=20.0):
+        """Follows a robot by its odometry and its scans → Tracking, a context manager: what step() is given comes back as
+        poses in the map, with covariance and score. guess: roughly where the first scan is taken, as every pose; None:
+        anywhere. guess_radius: not farther from it than that [m]."""
+        return tracking.Tracking(self._connection, self._posegraph.Track, tracking.start_of(self.name, guess, guess_radius))
 
     def stats(self):
         """Stats of the current epoch."""
