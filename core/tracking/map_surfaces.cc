@@ -48,7 +48,7 @@ MapSurfaces MapSurfacesCollector::Finish() && {
   options.sample_count = 0;
   MapSurfaces surfaces;
   surfaces.centre = centre_;
-  surfaces.cell_size_m = widest_cell_m_;
+  surfaces.blur_m = widest_cell_m_ * (points_kept_ ? 1.0 : 2.0);
   surfaces.features = ScanFeatures::FromPoints(std::move(points_), options);
   Pose T_map_features = Pose::Identity();
   T_map_features.translation() = centre_;

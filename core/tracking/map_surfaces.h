@@ -23,9 +23,11 @@ inline constexpr double kSurfacesSlackM = 15.0;
 // Immutable, safe to share between threads.
 struct MapSurfaces {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // in the map
-  double cell_size_m = 0.1;                          // of the tiles
-  ScanFeatures features;                             // relative to the centre, axes of the map
-  RegistrationTarget target;                         // of the features, in the map
+  // How wide the place is in which a surface was measured: a cell, two where points were dropped
+  // and patches moved as a whole.
+  double blur_m = 0.1;
+  ScanFeatures features;      // relative to the centre, axes of the map
+  RegistrationTarget target;  // of the features, in the map
 };
 
 // One feature for a level surface and points along each upright one, in the classes that
@@ -36,8 +38,8 @@ class MapSurfacesCollector {
   static constexpr std::size_t kMost = 2'000'000;
 
   // `cell_size_m` of the tiles to come.
-  MapSurfacesCollector(const Eigen::Vector3d& centre, double cell_size_m)
-      : centre_(centre), cell_size_m_(cell_size_m) {}
+  MapSurfacesCollector(const Eigen::Vector3d& centre, double cell_size_m, bool points_kept)
+      : centre_(centre), cell_size_m_(cell_size_m), points_kept_(points_kept) {}
 
   // What of the tile lies within range. False: there is no more room; nearer tiles come first.
   bool Add(const SurfaceTile& tile);
@@ -46,6 +48,7 @@ class MapSurfacesCollector {
  private:
   const Eigen::Vector3d centre_;
   const double cell_size_m_;
+  const bool points_kept_;
   std::size_t count_ = 0;
   double widest_cell_m_ = 0.0;
   std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points_;

@@ -38,8 +38,9 @@ constexpr double kSlideM = 0.1;
 constexpr double kHoldsHalf = 0.0225;
 // of a scan's rotation,
 constexpr double kMatchSigmaRad = 0.001;
-// and of the map around, which no number of scans makes less, where its cells are that wide.
-constexpr double kUsualCellM = 0.1;
+// and of the map around, which no number of scans makes less, where they are measured that
+// sharply (MapSurfaces::blur_m).
+constexpr double kUsualBlurM = 0.1;
 constexpr double kMapSigmaM = 0.015;
 constexpr double kMapSigmaRad = 0.0015;
 // Those are of scans whose surfaces lie so far from the map's (root mean square), as among trees
@@ -141,10 +142,10 @@ absl::StatusOr<Tracker::Look> Tracker::LookFrom(const Pose& T_map_scan_guess,
       AgreementWithMap({&features, match.T_target_source, features.sensor_origin()},
                        surfaces->features,
                        surfaces->target,
-                       std::clamp(surfaces->cell_size_m, kCloseM, kMostCloseM));
+                       std::clamp(surfaces->blur_m, kCloseM, kMostCloseM));
   look.T_map_scan = match.T_target_source;
   const double scale = ErrorScale(match.rms_m);
-  look.map_scale = scale * std::max(1.0, surfaces->cell_size_m / kUsualCellM);
+  look.map_scale = scale * std::max(1.0, surfaces->blur_m / kUsualBlurM);
   look.information = InformationOf(agreement.held, scale, match.degenerate_directions);
   look.overlap = agreement.overlap;
   look.contradiction = agreement.contradiction;

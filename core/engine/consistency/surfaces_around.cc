@@ -81,7 +81,8 @@ absl::StatusOr<SurfacesAround::Handle> SurfacesAround::Find(const PlaceKey& plac
 absl::StatusOr<MapSurfaces> SurfacesAround::Collect(const Eigen::Vector3d& centre,
                                                     const MapView& view,
                                                     const Stop& stop) {
-  const double cell_size_m = core_.info().parameters.mls.cell_size_m;
+  const MapParameters parameters = core_.info().parameters;
+  const double cell_size_m = parameters.mls.cell_size_m;
   std::vector<SurfaceTileRow> rows;
   {
     STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
@@ -94,7 +95,7 @@ absl::StatusOr<MapSurfaces> SurfacesAround::Collect(const Eigen::Vector3d& centr
     return SquaredDistance(a.key, centre, cell_size_m) <
            SquaredDistance(b.key, centre, cell_size_m);
   });
-  MapSurfacesCollector collector(centre, cell_size_m);
+  MapSurfacesCollector collector(centre, cell_size_m, parameters.keep_points);
   for (const SurfaceTileRow& row : rows) {
     STRATA_RETURN_IF_ERROR(stop.status());
     const absl::StatusOr<ServedTiles::Handle> served = tiles_.Find(row.key, view);

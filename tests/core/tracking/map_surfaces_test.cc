@@ -22,7 +22,7 @@ TEST(MapSurfacesTest, SurfacesAreFeaturesOfTheirClass) {
   tile.surfaces = {At(0, 0, 1.5F), At(3, 0, 4.0F, 2.0F), At(4, 0, 3.0F)};
   tile.surfaces[2].traversability = Traversability::kUnderside;
   const Eigen::Vector3d centre(30.0, -20.0, 1.0);
-  MapSurfacesCollector collector(centre, 0.1);
+  MapSurfacesCollector collector(centre, 0.1, true);
   EXPECT_TRUE(collector.Add(tile));
   const MapSurfaces surfaces = std::move(collector).Finish();
   const auto& tops = surfaces.features.points(FeatureClass::kTraversable);
@@ -45,23 +45,24 @@ TEST(MapSurfacesTest, OverviewsHaveWiderCells) {
   SurfaceTile tile;
   tile.key = {2, 0, 0};
   tile.surfaces = {At(10, 0, 0.0F)};
-  MapSurfacesCollector collector(Eigen::Vector3d::Zero(), 0.025);
+  MapSurfacesCollector collector(Eigen::Vector3d::Zero(), 0.025, true);
   EXPECT_TRUE(collector.Add(tile));
   const MapSurfaces surfaces = std::move(collector).Finish();
   EXPECT_NEAR(surfaces.features.points(FeatureClass::kTraversable).at(0).x(), 1.05F, 1e-5F);
-  EXPECT_NEAR(surfaces.cell_size_m, 0.1, 1e-12);
+  EXPECT_NEAR(surfaces.blur_m, 0.1, 1e-12);
 }
 
 TEST(MapSurfacesTest, WhatIsFarIsLeftOutAndMemoryIsBounded) {
   SurfaceTile tile;
   tile.surfaces = {At(0, 0, 0.0F)};
-  MapSurfacesCollector far(Eigen::Vector3d(kTrackedRangeM + kSurfacesSlackM + 1.0, 0.0, 0.0), 0.1);
+  MapSurfacesCollector far(
+      Eigen::Vector3d(kTrackedRangeM + kSurfacesSlackM + 1.0, 0.0, 0.0), 0.1, true);
   EXPECT_TRUE(far.Add(tile));
   EXPECT_EQ(std::move(far).Finish().features.size(), 0U);
   // A tower 32 km tall is 400 points, and the number of towers ends somewhere.
   tile.surfaces.clear();
   for (int i = 0; i < 256; ++i) tile.surfaces.push_back(At(i, 0, 32000.0F, 32000.0F));
-  MapSurfacesCollector towers(Eigen::Vector3d::Zero(), 0.1);
+  MapSurfacesCollector towers(Eigen::Vector3d::Zero(), 0.1, false);
   int tiles = 0;
   while (towers.Add(tile)) ++tiles;
   const MapSurfaces surfaces = std::move(towers).Finish();

@@ -61,7 +61,7 @@ ScanFeatures FeaturesOf(const PointCloud& cloud) {
 class FakeMap final : public TrackedMap {
  public:
   explicit FakeMap(const Yard& yard) {
-    MapSurfacesCollector collector(Eigen::Vector3d::Zero(), 0.1);
+    MapSurfacesCollector collector(Eigen::Vector3d::Zero(), 0.1, true);
     for (int k = 0; k < 6; ++k) {
       const Pose pose = At(-8.0 + 2.0 * k, -3.0 + k, 0.3 * k);
       for (const MlsTile& tile : MapOf(yard.See(pose, 100U + k), pose).tiles) {
