@@ -42,7 +42,7 @@ constexpr double kMatchSigmaRad = 0.001;
 // sharply (MapSurfaces::blur_m).
 constexpr double kUsualBlurM = 0.1;
 constexpr double kMapSigmaM = 0.015;
-constexpr double kMapSigmaRad = 0.0015;
+constexpr double kMapSigmaRad = 0.002;
 // Those are of scans whose surfaces lie so far from the map's (root mean square), as among trees
 // and on uneven ground; between walls there are smaller ones.
 constexpr double kUsualRmsM = 0.12;
