@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -24,6 +25,10 @@ constexpr std::size_t kPlaceScans = 5;
 constexpr double kLeastConfidence = 0.25;
 constexpr double kAboutM = 1.0;
 constexpr double kAboutRad = 0.1;
+// Where so little of two scans overlaps, nothing may speak against their place: wrong ones are
+// contradicted by 0.08 and more, right ones by 0.003 at most.
+constexpr double kLittleOverlap = 0.3;
+constexpr double kLittleContradiction = 0.02;
 // Scans of another pass show the same at least to this share.
 constexpr double kLeastAgreement = 0.5;
 
@@ -106,11 +111,12 @@ bool MayBeHere(const SeenScan& scan,
                const Pose& place,
                Nearness nearness) {
   const PlaceHypothesis here{place, 0.0, 0.0, 0.0};
-  const PlaceMatchOptions options = PlaceOptions(Nearness::kSamePass);
+  PlaceMatchOptions options = PlaceOptions(Nearness::kSamePass);
+  const double much = std::exchange(options.min_overlap, kLittleOverlap);
   const PlaceMatch match = MatchPlace(scan, Nearest(around, place), {&here, 1}, options);
+  const double most = match.overlap >= much ? options.max_contradiction : kLittleContradiction;
   return Same(match.T_target_source, place) && match.overlap >= options.min_overlap &&
-         match.contradiction <= options.max_contradiction &&
-         (nearness == Nearness::kSamePass || match.matched());
+         match.contradiction <= most && (nearness == Nearness::kSamePass || match.matched());
 }
 
 // Whether a registration that agrees with the guess is believed. One that left directions as they
@@ -165,9 +171,8 @@ Link AgreeingLink(const SeenScan& scan, std::span<const SeenScan> around, const 
 
 Link VerifiedLink(const SeenScan& scan, std::span<const SeenScan> around, const Pose& known) {
   Link link = AgreeingLink(scan, around, known);
-  if (!link.report.aligned) return link;
-  const PlaceMatch place = PlaceOf(scan, around, known, Nearness::kSaid);
-  link.report.aligned = place.matched() && Same(place.T_target_source, link.T_map_scan);
+  link.report.aligned =
+      link.report.aligned && MayBeHere(scan, around, link.T_map_scan, Nearness::kSaid);
   return link;
 }
 
