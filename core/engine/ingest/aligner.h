@@ -44,9 +44,10 @@ class Aligner {
 
   // `registration_map` is the scan's own. Alignment::kOff: the uploaded pose. Otherwise the guess
   // (the predecessor's pose and the uploaded motion since; the uploaded pose for the first of a
-  // trajectory), registered to the nearest scans of its own pass, which is what constraints say,
-  // and to all around where those agree with it. A match far from the guess, or to others alone, is
-  // verified as a place is; so is a constraint to a trajectory that nothing holds to its own yet.
+  // trajectory), registered to the nearest scans of its own segment, which is what constraints say,
+  // and to all around where those agree with it; where its segment says nothing, to the scans right
+  // before it that are lost, too. A match that is far from the guess, degenerate or to others alone
+  // is verified as a place is; so is a constraint to a segment that nothing holds to its own yet.
   // The guess if nothing holds.
   absl::StatusOr<Placement> Place(const ScanRecord& scan,
                                   const MlsMap& registration_map,

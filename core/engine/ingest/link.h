@@ -1,6 +1,6 @@
 // How a new scan is tied to scans in place: registered to them, and verified as a place is where
-// what the robot says of its motion does not speak for the match. A match that is believed and
-// false stays in the map as a ghost, so everything doubtful is none.
+// registration and what the robot says of its motion do not both speak for the match. A match that
+// is believed and false stays in the map as a ghost, so everything doubtful is none.
 #ifndef STRATA_CORE_ENGINE_INGEST_LINK_H_
 #define STRATA_CORE_ENGINE_INGEST_LINK_H_
 
