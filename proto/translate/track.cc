@@ -82,8 +82,6 @@ absl::StatusOr<TrackStep> FromProto(const v1::TrackStep& proto) {
     STRATA_ASSIGN_OR_RETURN(step.motion_covariance,
                             FromProto("motion_covariance", proto.motion_covariance()));
   }
-  step.cloud.rows = proto.rows();
-  step.cloud.columns = proto.columns();
   STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d sensor_origin,
                           FromProto("sensor_origin", proto.sensor_origin()));
   step.cloud.sensor_origin = sensor_origin.cast<float>();

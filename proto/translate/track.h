@@ -17,8 +17,8 @@ v1::TrackResponse ToProto(const TrackedPose& pose);
 
 // INVALID_ARGUMENT also for what ValidateTrackStart refuses.
 absl::StatusOr<TrackStart> FromProto(const v1::TrackStart& start);
-// A step without points; INVALID_ARGUMENT also for what ValidateTrackMotion refuses, and for a grid
-// that does not hold as many points as announced.
+// A step without points and their grid; INVALID_ARGUMENT also for what ValidateTrackMotion refuses,
+// and for a grid that does not hold as many points as announced.
 absl::StatusOr<TrackStep> FromProto(const v1::TrackStep& step);
 absl::StatusOr<TrackedPose> FromProto(const v1::TrackResponse& pose);
 

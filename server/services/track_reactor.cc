@@ -110,6 +110,8 @@ absl::Status TrackReactor::BeginStep(const v1::TrackStep& step) {
   shape_.point_count = step.point_count();
   shape_.rows = step.rows();
   shape_.columns = step.columns();
+  step_.cloud.rows = step.rows();
+  step_.cloud.columns = step.columns();
   step_begun_ = true;
   // All at once: a step that was begun is not refused in the middle.
   return Reserve(shape_.point_count, points_memory_, step_.cloud.points);

@@ -334,6 +334,11 @@ TEST(TranslateRoundTripTest, Track) {
   step.mutable_sensor_origin()->set_z(1.75);
   for (int i = 0; i < 36; ++i) step.add_motion_covariance(i % 7 == 0 ? 0.5 + i : 0.0);
   ExpectRoundTrip(step);
+  step.set_point_count(4);  // the points that follow bring their grid
+  step.set_rows(2);
+  step.set_columns(2);
+  STRATA_ASSERT_OK_AND_ASSIGN(const TrackStep taken, FromProto(step));
+  STRATA_EXPECT_OK(FromProto(ToProto(taken)).status());
   ExpectRoundTrip(Filled<v1::TrackResponse>());
 }
 
