@@ -1,9 +1,12 @@
+#include <atomic>
 #include <limits>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -26,8 +29,9 @@ using Code = absl::StatusCode;
 // Notes its steps, and says of the n-th that the robot is n metres ahead.
 class NotedTracking final : public api::Tracking {
  public:
-  NotedTracking(std::vector<TrackStep>& steps, bool& ended) : steps_(steps), ended_(ended) {}
-  ~NotedTracking() override { ended_ = true; }
+  NotedTracking(std::vector<TrackStep>& steps, std::shared_ptr<std::atomic<bool>> ended)
+      : steps_(steps), ended_(std::move(ended)) {}
+  ~NotedTracking() override { *ended_ = true; }
 
   absl::StatusOr<TrackedPose> Step(const TrackStep& step) override {
     steps_.push_back(step);
@@ -44,7 +48,7 @@ class NotedTracking final : public api::Tracking {
 
  private:
   std::vector<TrackStep>& steps_;
-  bool& ended_;
+  std::shared_ptr<std::atomic<bool>> ended_;
 };
 
 class TrackTest : public ServedMock {
@@ -95,7 +99,8 @@ class TrackTest : public ServedMock {
   std::string map_;
   TrackStart start_;
   std::vector<TrackStep> steps_;
-  bool ended_ = false;
+  // The call outlives its answer a little, and may outlive the test.
+  std::shared_ptr<std::atomic<bool>> ended_ = std::make_shared<std::atomic<bool>>(false);
   std::vector<v1::TrackResponse> answers_;
 };
 
@@ -126,7 +131,9 @@ TEST_F(TrackTest, EveryStepIsAnsweredOnceItsPointsAreThere) {
   EXPECT_EQ(answers_[2].covariance(7), 0.5);
   EXPECT_EQ(answers_[2].score(), 0.75);
   EXPECT_EQ(answers_[2].epoch(), 4U);
-  EXPECT_TRUE(ended_);
+  const absl::Time until = absl::Now() + absl::Seconds(30);
+  while (!*ended_ && absl::Now() < until) absl::SleepFor(absl::Milliseconds(1));
+  EXPECT_TRUE(*ended_);
 }
 
 TEST_F(TrackTest, RefusesMessagesOutOfOrder) {
