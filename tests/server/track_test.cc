@@ -110,6 +110,8 @@ TEST_F(TrackTest, EveryStepIsAnsweredOnceItsPointsAreThere) {
   start.mutable_start()->set_guess_radius_m(3.0);
   v1::TrackRequest first = Step(1.5, 5);
   first.mutable_step()->mutable_sensor_origin()->set_z(1.5);
+  first.mutable_step()->set_rows(1);
+  first.mutable_step()->set_columns(5);
   for (int i = 0; i < 36; ++i) first.mutable_step()->add_motion_covariance(i % 7 == 0 ? 0.25 : 0.0);
   EXPECT_THAT(Track({start, first, Message(Points(3)), Message(Points(2)), Step(2.5, 0)}), IsOk());
   EXPECT_EQ(map_, "campus");
@@ -117,6 +119,7 @@ TEST_F(TrackTest, EveryStepIsAnsweredOnceItsPointsAreThere) {
   EXPECT_EQ(start_.guess_radius_m, 3.0);
   ASSERT_THAT(steps_, SizeIs(2));
   EXPECT_EQ(steps_[0].cloud.size(), 5U);
+  EXPECT_EQ(steps_[0].cloud.columns, 5U);
   EXPECT_EQ(steps_[0].cloud.sensor_origin.z(), 1.5F);
   EXPECT_EQ((*steps_[0].motion_covariance)(1, 1), 0.25);
   EXPECT_EQ(steps_[0].T_odom_scan.translation().x(), 1.5);

@@ -25,8 +25,8 @@ constexpr std::size_t kPlaceScans = 5;
 constexpr double kLeastConfidence = 0.25;
 constexpr double kAboutM = 1.0;
 constexpr double kAboutRad = 0.1;
-// Where so little of two scans overlaps, nothing may speak against their place: wrong ones are
-// contradicted by 0.08 and more, right ones by 0.003 at most.
+// Where so little of two scans overlaps, nothing may speak against their place: wrong ones drawn
+// were contradicted by 0.08 and more; some right ones are lost by it.
 constexpr double kLittleOverlap = 0.3;
 constexpr double kLittleContradiction = 0.02;
 // Scans of another pass show the same at least to this share.

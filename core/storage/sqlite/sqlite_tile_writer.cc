@@ -15,9 +15,8 @@ namespace strata {
 absl::Status SqliteWriter::PutMlsTile(const MlsTileRow& row) {
   return RunSql(
       "INSERT OR REPLACE INTO derived_mls_tile (level, x, y, version, patches, cells, min_x, "
-      "min_y, min_z, max_x, max_y, max_z, spread_weight, spread_sum, digest, bytes) VALUES (?1, "
-      "?2, "
-      "?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16)",
+      "min_y, min_z, max_x, max_y, max_z, spread_weight, spread_sum, digest, bytes) VALUES "
+      "(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16)",
       row.key.level,
       row.key.x,
       row.key.y,
