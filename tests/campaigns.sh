@@ -28,6 +28,7 @@ endurance|11|memory or latency that grows|/usr/bin/python3 tests/bench/endurance
 loops|~10|simulated loops that do not close|/usr/bin/python3 tests/experiments/loops.py --build $build
 subsets|~25|recordings in parts, backwards, by two robots, that end off|/usr/bin/python3 tests/experiments/subsets.py --build $build --seed $seed
 fleet|~15|robots of a fleet that are put where neither they nor the world are|$experiments/fleet --seed $seed --draws 4
+path_uncertainty|3|a way that is known worse than the pose graph says|$experiments/path_uncertainty --seed $seed
 tracking|~6|a robot that is not where it is said to be, or not found again|$experiments/tracking --seeds 5
 two_sides|~40|a thin deck or wall that is drawn together, or pulls scans to its other side|/usr/bin/python3 tests/experiments/two_sides.py --build $build --seed $seed
 localisation|~20|a scan from elsewhere that is given a place in a map|/usr/bin/python3 tests/experiments/localisation.py --build $build --seed $seed

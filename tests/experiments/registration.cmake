@@ -23,3 +23,8 @@ strata_executable(
   SOURCES fleet.cc
   DEPS strata::engine strata::simulator strata::test_support
 )
+strata_executable(
+  path_uncertainty path_uncertainty
+  SOURCES path_uncertainty.cc
+  DEPS strata::engine strata::posegraph strata::simulator strata::test_support strata::test_recordings
+)
