@@ -2,6 +2,7 @@
 // any order. Is where they are said to be to each other right?
 //
 //   fleet [--seed 1] [--draws 10] [--worlds campus_loop,car_park,…] [--frames one,off,own,jump]
+//         [--each]
 //
 // A draw chooses the number of robots (2 to 5), their stretches (neighbours have up to 10 scans of
 // 2 m in common, or none), the sensor (rings, columns, range), and the order of uploads. Frames:
@@ -244,9 +245,30 @@ absl::StatusOr<Verdicts> Judge(api::Database& db, const std::vector<FleetRobot>&
   return verdicts;
 }
 
+// How far each step is from the truth, and what ingest said of it.
+absl::Status PrintSteps(api::Database& db, const std::vector<FleetRobot>& robots) {
+  for (const FleetRobot& robot : robots) {
+    for (std::size_t k = 1; k < robot.truth.size(); ++k) {
+      STRATA_ASSIGN_OR_RETURN(const Pose before, PoseOf(db, robot, k - 1));
+      STRATA_ASSIGN_OR_RETURN(const ScanInfo scan, db.scans().Get({}, kMap, robot.Id(k)));
+      const Pose error = (robot.truth[k - 1].inverse() * robot.truth[k]).inverse() *
+                         (before.inverse() * scan.T_map_scan);
+      std::printf("    %s %llu: %.3f m %.4f rad, overlap %.2f, %s\n",
+                  robot.name.c_str(),
+                  static_cast<unsigned long long>(robot.Id(k).sequence),
+                  error.translation().norm(),
+                  RotationAngleRad(error),
+                  scan.alignment.overlap,
+                  scan.alignment.message.c_str());
+    }
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<Verdicts> Draw(const std::string& name,
                               const std::string& frames,
-                              std::uint64_t seed) {
+                              std::uint64_t seed,
+                              bool each) {
   Random random(seed);
   const World world = WorldOf(name, seed);
   const bool is_one = frames == "jump";
@@ -269,7 +291,9 @@ absl::StatusOr<Verdicts> Draw(const std::string& name,
     ++scans;
   }
   STRATA_RETURN_IF_ERROR(AwaitIntegrated(*db));
+  if (each) STRATA_RETURN_IF_ERROR(PrintSteps(*db, robots));
   STRATA_ASSIGN_OR_RETURN(const JobInfo job, Optimize(*db));
+  if (each) STRATA_RETURN_IF_ERROR(PrintSteps(*db, robots));
   STRATA_ASSIGN_OR_RETURN(const Verdicts verdicts, Judge(*db, robots));
   std::printf(
       "%-12s %-4s seed %-6llu %zu robots %4zu scans %2d x %3d to %2.0f m: %d joined, %d alone, "
@@ -300,12 +324,14 @@ int Main(int argc, char** argv) {
   app.add_option("--draws", draws, "Of each world and kind of frames");
   app.add_option("--worlds", worlds, "Of strata-simulate")->delimiter(',');
   app.add_option("--frames", frames, "one, off, own, jump")->delimiter(',');
+  bool each = false;
+  app.add_flag("--each", each, "Every scan's error after the one before it, before and after");
   CLI11_PARSE(app, argc, argv);
   std::map<std::string, Verdicts> all;
   for (int d = 0; d < draws; ++d, ++seed) {
     for (const std::string& world : worlds) {
       for (const std::string& kind : frames) {
-        const auto verdicts = Draw(world, kind, seed);
+        const auto verdicts = Draw(world, kind, seed, each);
         if (!verdicts.ok()) {
           std::fprintf(stderr, "%s\n", verdicts.status().ToString().c_str());
           return 2;

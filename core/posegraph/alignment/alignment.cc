@@ -336,6 +336,8 @@ class Alignment {
       const std::optional<OdometryNoise> noise = NoiseOf(trajectory);
       for (const std::size_t node : trajectory) {
         if (odometry_[node] == nullptr || !known[node]) continue;
+        const std::optional<Pose> error = OdometryError(node);
+        if (noise.has_value() && error.has_value() && IsJump(*error, *noise)) continue;
         RelativePoseTerm term = *odometry_[node];
         term.information = noise.has_value()
                                ? IsotropicInformation(noise->sigma_rad, noise->sigma_m)
@@ -349,11 +351,16 @@ class Alignment {
     std::vector<std::optional<Pose>> errors;
     for (const std::size_t node : trajectory) {
       if (odometry_[node] == nullptr) continue;
-      const std::optional<Pose> T_i_j = MeasuredMotion(odometry_[node]->i, node);
-      errors.push_back(std::nullopt);
-      if (T_i_j.has_value()) errors.back() = odometry_[node]->T_i_j.inverse() * *T_i_j;
+      errors.push_back(OdometryError(node));
     }
     return EstimateOdometryNoise(errors);
+  }
+
+  // Of what is said of the motion to `node`, as registration has it.
+  std::optional<Pose> OdometryError(std::size_t node) const {
+    const std::optional<Pose> T_i_j = MeasuredMotion(odometry_[node]->i, node);
+    if (!T_i_j.has_value()) return std::nullopt;
+    return odometry_[node]->T_i_j.inverse() * *T_i_j;
   }
 
   // From scan i to scan j, as registration has it.

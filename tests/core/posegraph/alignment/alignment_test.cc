@@ -15,6 +15,7 @@
 #include "core/cloud/sensor_model.h"
 #include "core/mls/build.h"
 #include "core/planes/extraction.h"
+#include "core/posegraph/information.h"
 #include "tests/core/posegraph/random_poses.h"
 #include "tests/support/simulator/simulator.h"
 #include "tests/support/simulator/worlds.h"
@@ -353,6 +354,53 @@ TEST_F(AlignmentTest, RobotsThatNothingJoinsAreNotMatchedAndStayWhereTheyAre) {
   ASSERT_EQ(result.parts.size(), std::size_t{YardScans::kScans});
   for (std::size_t k = 0; k < YardScans::kScans; ++k) {
     EXPECT_EQ(result.parts[k], k < YardScans::kFirst ? 0U : YardScans::kFirst) << k;
+  }
+}
+
+// Drives the first robot's way forth and back, 36 scans.
+class LongWay final : public AlignmentSource {
+ public:
+  static constexpr std::size_t kScans = 36;
+
+  explicit LongWay(YardScans& yard) : yard_(yard) {}
+
+  static std::size_t At(std::size_t node) {
+    constexpr std::size_t kEnd = YardScans::kFirst - 1;
+    const std::size_t along = node % (2 * kEnd);
+    return along <= kEnd ? along : 2 * kEnd - along;
+  }
+  absl::StatusOr<std::shared_ptr<const ScanFeatures>> Features(std::size_t node) override {
+    return yard_.Features(At(node));
+  }
+  absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t node) override {
+    return yard_.Planes(At(node));
+  }
+
+ private:
+  YardScans& yard_;
+};
+
+TEST_F(AlignmentTest, AJumpOfOdometryPullsNothing) {
+  LongWay way(yard());
+  RandomPoses random(20261126);
+  problem_ = {};
+  problem_.trajectories.resize(1);
+  for (std::size_t k = 0; k < LongWay::kScans; ++k) {
+    problem_.T_map_scan.push_back(yard().truth()[LongWay::At(k)]);
+    problem_.trajectories[0].push_back(k);
+    if (k == 0) continue;
+    const Pose step = TrueStep(LongWay::At(k - 1), LongWay::At(k));
+    ScanPair& pair = problem_.pairs.emplace_back(ScanPair{k - 1, k});
+    pair.measured = MeasuredPose{step, IsotropicInformation(0.001, 0.01)};
+    RelativePoseTerm motion{k - 1, k};
+    motion.T_i_j = Retract(step, random.Step(0.001, 0.01));
+    if (k == 18) motion.T_i_j.translation().x() += 3.0;
+    problem_.odometry.push_back(motion);
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align(way));
+  for (std::size_t k = 0; k < LongWay::kScans; ++k) {
+    const Pose& truth = yard().truth()[LongWay::At(k)];
+    EXPECT_LT((result.T_map_scan[k].translation() - truth.translation()).norm(), 0.02) << k;
   }
 }
 

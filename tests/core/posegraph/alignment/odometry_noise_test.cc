@@ -83,6 +83,31 @@ TEST(OdometryNoiseTest, GapsEndWhatIsSummedAndFewStepsSayNothing) {
   EXPECT_NEAR(together->sigma_m, 0.1 * std::sqrt(10.0 / 3.0), 1e-9);
 }
 
+TEST(OdometryNoiseTest, JumpsAreNoNoise) {
+  Errors errors = Draw(200, 0.004, 0.03, Vector6d::Zero());
+  const auto without = EstimateOdometryNoise(errors);
+  ASSERT_TRUE(without.has_value());
+  for (const std::size_t k : {40U, 90U, 91U, 170U}) {
+    Vector6d jump = Vector6d::Zero();
+    jump[2] = k == 170 ? 0.3 : 0.0;
+    jump[3] = k == 170 ? 0.0 : 2.0;
+    errors[k] = *errors[k] * Retract(Pose::Identity(), jump);
+    EXPECT_TRUE(IsJump(*errors[k], *without)) << k;
+  }
+  const auto noise = EstimateOdometryNoise(errors);
+  ASSERT_TRUE(noise.has_value());
+  EXPECT_NEAR(noise->sigma_rad, without->sigma_rad, 0.1 * without->sigma_rad);
+  EXPECT_NEAR(noise->sigma_m, without->sigma_m, 0.1 * without->sigma_m);
+  for (std::size_t k = 0; k < 40; ++k) EXPECT_FALSE(IsJump(*errors[k], *noise)) << k;
+}
+
+// Twenty centimetres of one who errs by millimetres are unusual, and no restart.
+TEST(OdometryNoiseTest, WhatIsSmallIsNoJump) {
+  EXPECT_FALSE(IsJump(MakePose(Eigen::Quaterniond::Identity(), {0.2, 0.0, 0.0}), {1e-4, 1e-3}));
+  EXPECT_TRUE(IsJump(MakePose(Eigen::Quaterniond::Identity(), {0.4, 0.0, 0.0}), {1e-4, 1e-3}));
+  EXPECT_FALSE(IsJump(MakePose(Eigen::Quaterniond::Identity(), {0.4, 0.0, 0.0}), {1e-4, 0.1}));
+}
+
 TEST(OdometryNoiseTest, NobodyIsPerfect) {
   const auto noise = EstimateOdometryNoise(Draw(100, 0.0, 0.0, Vector6d::Zero()));
   ASSERT_TRUE(noise.has_value());
