@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <set>
@@ -41,13 +42,14 @@ class PatchIndex {
     }
   }
 
-  // Those that may touch the box, ascending.
-  std::vector<std::uint32_t> Near(const Eigen::AlignedBox3d& box) const {
+  // Those that may touch the box and that are wanted, ascending.
+  template <typename IsWanted>
+  std::vector<std::uint32_t> Near(const Eigen::AlignedBox3d& box, IsWanted is_wanted) const {
     std::vector<std::uint32_t> near;
     ForCubes(box, [&](const Cube& cube) {
       const auto found = cubes_.find(cube);
-      if (found != cubes_.end())
-        near.insert(near.end(), found->second.begin(), found->second.end());
+      if (found == cubes_.end()) return;
+      std::ranges::copy_if(found->second, std::back_inserter(near), is_wanted);
     });
     std::sort(near.begin(), near.end());
     near.erase(std::unique(near.begin(), near.end()), near.end());
@@ -109,7 +111,9 @@ class PatchAssociation {
         options_(options),
         index_(patches_),
         taken_(patches_.size(), false),
-        seen_by_(patches_.size(), 0) {}
+        seen_by_(patches_.size(), 0) {
+    for (const PosedPatch& patch : patches_) briefs_.push_back(BriefOf(patch, options_));
+  }
 
   std::vector<SharedPlane> Run() {
     std::vector<std::uint32_t> order(patches_.size());
@@ -142,13 +146,16 @@ class PatchAssociation {
     JointPlane joint = sum.Joint();
     for (std::size_t next = 0; next < group.size(); ++next) {
       const PosedPatch& member = patches_[group[next]];
-      for (const std::uint32_t i : index_.Near(member.box)) {
+      const auto is_open = [&](std::uint32_t i) { return !taken_[i] && seen_by_[i] != seeds_; };
+      for (const std::uint32_t i : index_.Near(member.box, is_open)) {
+        if (member.patch->area_m2 < kMinShare * briefs_[i].area_m2 ||
+            !MayFit(briefs_[i], joint, options_)) {
+          continue;
+        }
         const PosedPatch& candidate = patches_[i];
-        if (taken_[i] || seen_by_[i] == seeds_ ||
-            Distance(candidate.centroid, patches_[seed].centroid) > options_.max_extent_m ||
-            member.patch->area_m2 < kMinShare * candidate.patch->area_m2 ||
+        if (Distance(candidate.centroid, patches_[seed].centroid) > options_.max_extent_m ||
             !Fits(candidate, joint, options_) ||
-            Overlap(candidate, member) < options_.min_overlap) {
+            !Overlap(candidate, member, options_.min_overlap)) {
           continue;
         }
         seen_by_[i] = seeds_;
@@ -234,11 +241,13 @@ class PatchAssociation {
           if (patches_[i].scan != scan) sum.Add(patches_[i]);
         }
       }
+      std::map<std::size_t, JointPlane> joints;
+      for (const auto& [scan, sum] : others) joints[scan] = sum.Joint();
       std::size_t worst = group.size();
       double worst_rms = 0.0;
       for (std::size_t k = 0; k < group.size(); ++k) {
         const PosedPatch& patch = patches_[group[k]];
-        const JointPlane joint = others.at(patch.scan).Joint();
+        const JointPlane& joint = joints.at(patch.scan);
         if (Fits(patch, joint, options_)) continue;
         const double rms = RmsDistance(patch.information, joint.plane);
         if (worst == group.size() || rms > worst_rms) {
@@ -300,6 +309,7 @@ class PatchAssociation {
   std::vector<PosedPatch> patches_;
   const SharedPlaneOptions& options_;
   PatchIndex index_;
+  std::vector<PatchBrief> briefs_;  // beside patches_
   std::vector<bool> taken_;
   std::vector<std::uint32_t> seen_by_;  // the last seed that has this patch or refused it
   std::uint32_t seeds_ = 0;

@@ -41,24 +41,30 @@ bool OnFootprint(const PlanePatch& patch, const Eigen::Vector2d& at) {
   return (row >> static_cast<int>(square.y()) & 1U) != 0;
 }
 
-// Share of the squares of `a` that lie on `b`.
-double ShareOn(const PosedPatch& a, const PosedPatch& b) {
+// Whether at least this share of the squares of `a` lies on `b`.
+bool LiesOn(const PosedPatch& a, const PosedPatch& b, double share) {
+  if (a.squares == 0) return share <= 0.0;
   const Eigen::Vector3d a_v = a.plane.normal.cross(a.axis_u);
   const Eigen::Vector3d b_v = b.plane.normal.cross(b.axis_u);
-  int squares = 0;
+  const auto is_enough = [&](int squares) {
+    return static_cast<double>(squares) / a.squares >= share;
+  };
   int on = 0;
+  int left = a.squares;
   for (std::size_t i = 0; i < a.patch->footprint.size(); ++i) {
-    for (int j = 0; j < 32; ++j) {
-      if ((a.patch->footprint[i] >> j & 1U) == 0) continue;
-      ++squares;
+    for (std::uint32_t row = a.patch->footprint[i]; row != 0; row &= row - 1) {
       const Eigen::Vector2d at =
           a.patch->extent_min +
-          a.patch->footprint_cell_m * Eigen::Vector2d(static_cast<double>(i) + 0.5, j + 0.5);
+          a.patch->footprint_cell_m *
+              Eigen::Vector2d(static_cast<double>(i) + 0.5, std::countr_zero(row) + 0.5);
       const Eigen::Vector3d p = a.centroid + at.x() * a.axis_u + at.y() * a_v - b.centroid;
       on += OnFootprint(*b.patch, {b.axis_u.dot(p), b_v.dot(p)}) ? 1 : 0;
+      --left;
     }
+    if (is_enough(on)) return true;
+    if (!is_enough(on + left)) return false;
   }
-  return squares == 0 ? 0.0 : static_cast<double>(on) / squares;
+  return false;
 }
 
 }  // namespace
@@ -70,6 +76,7 @@ PosedPatch InMap(const PlanePatch& patch,
   PosedPatch posed;
   posed.patch = &patch;
   posed.scan = scan;
+  posed.squares = FootprintSize(patch);
   posed.T_map_scan = T_map_scan;
   posed.measurements =
       std::clamp(patch.area_m2 / options.independent_area_m2, 1.0, options.max_measurements);
@@ -94,11 +101,11 @@ PosedPatch InMap(const PlanePatch& patch,
   return posed;
 }
 
-double Overlap(const PosedPatch& a, const PosedPatch& b) {
+bool Overlap(const PosedPatch& a, const PosedPatch& b, double share) {
   const auto area = [](const PosedPatch& p) {
-    return FootprintSize(*p.patch) * p.patch->footprint_cell_m * p.patch->footprint_cell_m;
+    return p.squares * p.patch->footprint_cell_m * p.patch->footprint_cell_m;
   };
-  return area(a) <= area(b) ? ShareOn(a, b) : ShareOn(b, a);
+  return area(a) <= area(b) ? LiesOn(a, b, share) : LiesOn(b, a, share);
 }
 
 bool Fits(const PosedPatch& patch, const JointPlane& joint, const SharedPlaneOptions& options) {
@@ -111,6 +118,26 @@ bool Fits(const PosedPatch& patch, const JointPlane& joint, const SharedPlaneOpt
   const double joint_sigma = std::hypot(options.pose_sigma_m / std::sqrt(joint.scans),
                                         joint_tilt_sigma * Distance(patch.centroid, joint.mean));
   return Distance(patch.centroid, joint.plane) <= kGate * std::hypot(own_sigma, joint_sigma);
+}
+
+PatchBrief BriefOf(const PosedPatch& patch, const SharedPlaneOptions& options) {
+  return {.normal = patch.plane.normal,
+          .centroid = patch.centroid,
+          .tilt_sigma_rad = patch.tilt_sigma_rad,
+          .own_sigma_m =
+              patch.offset_sigma_m + options.pose_sigma_m + options.pose_sigma_rad * patch.lever_m,
+          .area_m2 = patch.patch->area_m2};
+}
+
+// A sum is at least the root of its squares' sum, and cos x at least 1 − x²/2.
+bool MayFit(const PatchBrief& patch, const JointPlane& joint, const SharedPlaneOptions& options) {
+  constexpr double kRounding = 1e-9;
+  const double tilt = kGate * (patch.tilt_sigma_rad + 2.0 * options.pose_sigma_rad);
+  if (patch.normal.dot(joint.plane.normal) < 1.0 - 0.5 * tilt * tilt - kRounding) return false;
+  const double joint_sigma =
+      options.pose_sigma_m + options.pose_sigma_rad * Distance(patch.centroid, joint.mean);
+  return Distance(patch.centroid, joint.plane) <=
+         kGate * (patch.own_sigma_m + joint_sigma) + kRounding;
 }
 
 bool Coplanar(const PosedPatch& a, const PosedPatch& b, double sigma_floor_m) {

@@ -17,6 +17,7 @@ namespace strata {
 struct PosedPatch {
   const PlanePatch* patch = nullptr;
   std::size_t scan = 0;
+  int squares = 0;  // of its footprint
   Pose T_map_scan;
   double measurements = 0.0;  // independent ones
   double variance_m2 = 0.0;   // of each
@@ -36,9 +37,9 @@ PosedPatch InMap(const PlanePatch& patch,
                  const Pose& T_map_scan,
                  const SharedPlaneOptions& options);
 
-// Share of the patch with the smaller footprint that lies on the other one when looked at along the
-// normal of that other one.
-double Overlap(const PosedPatch& a, const PosedPatch& b);
+// Whether at least this share of the patch with the smaller footprint lies on the other one when
+// looked at along the normal of that other one.
+bool Overlap(const PosedPatch& a, const PosedPatch& b, double share);
 
 // A plane through patches of `scans` scans, whose poses err independently.
 struct JointPlane {
@@ -50,6 +51,19 @@ struct JointPlane {
 // True if a patch can lie in the plane, given the accuracy of both and the errors of poses that the
 // options allow; 3σ. The normals must point to the same side.
 bool Fits(const PosedPatch& patch, const JointPlane& joint, const SharedPlaneOptions& options);
+
+// What most patches are refused by, packed densely.
+struct PatchBrief {
+  Eigen::Vector3d normal, centroid;
+  double tilt_sigma_rad = 0.0;
+  double own_sigma_m = 0.0;  // of its offset and its own pose; at least that of Fits()
+  double area_m2 = 0.0;
+};
+
+PatchBrief BriefOf(const PosedPatch& patch, const SharedPlaneOptions& options);
+
+// False only for what does not fit: Fits() by bounds of what it works out.
+bool MayFit(const PatchBrief& patch, const JointPlane& joint, const SharedPlaneOptions& options);
 
 // True if two patches of one scan can be one plane: no pose is between them. 3σ, where none is
 // known better than sigma_floor_m and 1 mrad.
