@@ -66,7 +66,7 @@ class Count:
                 self.metres.append(metres)
                 self.degrees.append(degrees)
                 return
-        self.wrong.append(answer["best"]["confidence"])
+        self.wrong.append(answer["confidence"])
 
     def print(self, name, queries):
         error = f"{np.median(self.metres):8.3f} {max(self.metres):7.3f} {np.median(self.degrees):8.2f}" \

@@ -14,6 +14,9 @@
 namespace strata {
 namespace {
 
+// Poses may be so many times as far off as the search takes them to be: its gates are of 3 σ.
+constexpr double kAllowed = 3.0;
+
 // By what counts after a solution: relative poses, and priors, which place all that they place.
 std::vector<std::size_t> PartsAfter(const PoseGraphProblem& graph,
                                     const PoseGraphSummary& summary) {
@@ -91,8 +94,8 @@ void SharedSurfaces::Moved(double max_shift_m, double max_turn_rad) {
 // alone: poses would follow them for ever. Where the search allows for much, as rough poses need,
 // what it finds is sorted out once poses have settled in it.
 bool SharedSurfaces::Hold() const {
-  return last_.has_value() && last_->shift_m <= gates_.pose_sigma_m &&
-         last_->turn_rad <= gates_.pose_sigma_rad && !MayNarrow();
+  return last_.has_value() && last_->shift_m <= kAllowed * gates_.pose_sigma_m &&
+         last_->turn_rad <= kAllowed * gates_.pose_sigma_rad && !MayNarrow();
 }
 
 bool SharedSurfaces::MayNarrow() const {
