@@ -16,6 +16,8 @@ namespace {
 
 // Poses may be so many times as far off as the search takes them to be: its gates are of 3 σ.
 constexpr double kAllowed = 3.0;
+// Poses that settle move by so much less from round to round.
+constexpr double kFalling = 0.8;
 
 // By what counts after a solution: relative poses, and priors, which place all that they place.
 std::vector<std::size_t> PartsAfter(const PoseGraphProblem& graph,
@@ -54,6 +56,7 @@ absl::Status SharedSurfaces::Find(const std::vector<Pose>& T_map_scan, ForEach f
     posed.push_back({held[k].get(), T_map_scan[k], source_.SensorOrigin(k)});
   }
   gates_ = GatesOfNow();
+  stays_ = false;
   planes_ = FindSharedPlanes(posed, gates_);
   if (options_.directions) directions_ = FindSharedDirections(posed, gates_);
   std::erase_if(planes_, [this](const SharedPlane& plane) { return IsExcluded(plane); });
@@ -87,16 +90,21 @@ void SharedSurfaces::Keep(const std::vector<Plane>& planes) {
 }
 
 void SharedSurfaces::Moved(double max_shift_m, double max_turn_rad) {
-  last_ = Motion{max_shift_m, max_turn_rad};
+  const Motion now{max_shift_m, max_turn_rad};
+  const bool falls = !last_.has_value() || now.shift_m <= kFalling * last_->shift_m;
+  stays_ = IsWithin(now, 1.0) || (IsWithin(now, kAllowed) && (stays_ || !falls));
+  last_ = now;
+}
+
+bool SharedSurfaces::IsWithin(const Motion& motion, double sigmas) const {
+  return motion.shift_m <= sigmas * gates_.pose_sigma_m &&
+         motion.turn_rad <= sigmas * gates_.pose_sigma_rad;
 }
 
 // Planes found anew at poses that differ by less than the search allows for are others by chance
 // alone: poses would follow them for ever. Where the search allows for much, as rough poses need,
 // what it finds is sorted out once poses have settled in it.
-bool SharedSurfaces::Hold() const {
-  return last_.has_value() && last_->shift_m <= kAllowed * gates_.pose_sigma_m &&
-         last_->turn_rad <= kAllowed * gates_.pose_sigma_rad && !MayNarrow();
-}
+bool SharedSurfaces::Hold() const { return stays_ && !MayNarrow(); }
 
 bool SharedSurfaces::MayNarrow() const {
   if (!options_.planes || !last_.has_value()) return false;

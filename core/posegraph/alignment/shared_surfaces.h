@@ -49,6 +49,8 @@ class SharedSurfaces {
     double shift_m = 0.0, turn_rad = 0.0;
   };
   bool Hold() const;
+  // So many σ of what the search allowed for.
+  bool IsWithin(const Motion& motion, double sigmas) const;
   SharedPlaneOptions GatesOfNow() const;
   bool IsExcluded(const SharedPlane& plane) const;
 
@@ -59,6 +61,7 @@ class SharedSurfaces {
   std::vector<SharedPlane> planes_;
   std::vector<SharedDirection> directions_;
   SharedPlaneOptions gates_;  // that they were found by
+  bool stays_ = false;        // poses have moved as little since as makes no other planes
 };
 
 }  // namespace strata
