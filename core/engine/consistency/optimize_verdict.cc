@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -23,8 +25,12 @@ constexpr std::size_t kFew = 4;
 // Of absolute poses: walls reflect GPS for a while, not for most of a drive.
 constexpr double kMostFalse = 0.5;
 constexpr std::size_t kNamed = 3;
-// Scans that are looked at closely, spread over the map.
+// Scans that are looked at closely, spread over the map, and those of every robot.
 constexpr std::size_t kMostLookedAt = 60;
+constexpr std::size_t kLeastLookedAt = 6;
+// Of the pairs of two robots, or of one: a small part of a large map may be wrong as a whole.
+constexpr double kMostOfTwo = 0.5;
+constexpr std::size_t kFewOfTwo = 2;
 // People and cars pass; a wall that another scan looked through does not.
 constexpr double kMuchContradiction = 0.1;
 // Scans of other passes as near as this see the same.
@@ -48,15 +54,35 @@ std::optional<std::size_t> NearestOfAnotherPass(const GraphWorld& world,
   return nearest;
 }
 
-// The scan before on the trajectory, and one of another pass, of scans spread over the map.
-std::set<NodePair> PairsToCompare(const GraphWorld& world, const std::vector<Pose>& T_map_scan) {
+// Spread over the map and over every trajectory, ascending.
+std::set<std::size_t> NodesToLookAt(const GraphWorld& world) {
+  std::set<std::size_t> nodes;
+  const auto stride = [](std::size_t size, std::size_t count) {
+    return (size + count - 1) / count;
+  };
+  for (std::size_t k = 0; k < world.size(); k += stride(world.size(), kMostLookedAt)) {
+    nodes.insert(k);
+  }
+  for (const std::vector<std::size_t>& trajectory : world.Trajectories()) {
+    for (std::size_t k = 0; k < trajectory.size(); k += stride(trajectory.size(), kLeastLookedAt)) {
+      nodes.insert(trajectory[k]);
+    }
+  }
+  return nodes;
+}
+
+// The scan before on the trajectory, and one of another pass. Those of two parts are where robots
+// said that they are, for which nothing here answers.
+std::set<NodePair> PairsToCompare(const GraphWorld& world, const AlignmentResult& result) {
   std::set<NodePair> pairs;
-  const std::size_t stride = (world.size() + kMostLookedAt - 1) / kMostLookedAt;
-  for (std::size_t node = 0; node < world.size(); node += stride) {
+  const auto add = [&](std::size_t a, std::size_t b) {
+    if (result.parts.empty() || result.parts[a] == result.parts[b]) pairs.insert(std::minmax(a, b));
+  };
+  for (const std::size_t node : NodesToLookAt(world)) {
     const auto& [t, index] = world.PlaceOf(node);
-    if (index > 0) pairs.insert(std::minmax(world.Trajectories()[t][index - 1], node));
-    const std::optional<std::size_t> other = NearestOfAnotherPass(world, T_map_scan, node);
-    if (other.has_value()) pairs.insert(std::minmax(*other, node));
+    if (index > 0) add(world.Trajectories()[t][index - 1], node);
+    const std::optional<std::size_t> other = NearestOfAnotherPass(world, result.T_map_scan, node);
+    if (other.has_value()) add(*other, node);
   }
   return pairs;
 }
@@ -73,18 +99,59 @@ absl::StatusOr<double> ContradictionAt(ScanViews& views,
                          {second.get(), T_map_scan[pair.second], origin(pair.second)});
 }
 
+bool IsTooMany(std::size_t doubtful,
+               std::size_t all,
+               double most = kMostDoubtful,
+               std::size_t few = kFew) {
+  return doubtful > few && static_cast<double>(doubtful) > most * static_cast<double>(all);
+}
+
 absl::Status Compare(const GraphWorld& world,
                      ScanViews& views,
-                     const std::vector<Pose>& T_map_scan,
+                     const AlignmentResult& result,
                      OptimizeVerdict& verdict) {
-  for (const NodePair& pair : PairsToCompare(world, T_map_scan)) {
-    const absl::StatusOr<double> contradiction = ContradictionAt(views, T_map_scan, pair);
+  struct Counts {
+    std::size_t compared = 0, contradicted = 0;
+  };
+  std::map<NodePair, Counts> of_two;  // trajectories
+  for (const NodePair& pair : PairsToCompare(world, result)) {
+    const absl::StatusOr<double> contradiction = ContradictionAt(views, result.T_map_scan, pair);
     if (absl::IsDataLoss(contradiction.status())) continue;
     STRATA_RETURN_IF_ERROR(contradiction.status());
-    ++verdict.compared;
-    verdict.contradicted += *contradiction > kMuchContradiction ? 1 : 0;
+    Counts& counts = of_two[std::minmax(world.PlaceOf(pair.first).trajectory,
+                                        world.PlaceOf(pair.second).trajectory)];
+    ++counts.compared;
+    counts.contradicted += *contradiction > kMuchContradiction ? 1 : 0;
+  }
+  const auto name = [&](std::size_t t) { return world.id(world.Trajectories()[t][0]).trajectory; };
+  for (const auto& [two, counts] : of_two) {
+    verdict.compared += counts.compared;
+    verdict.contradicted += counts.contradicted;
+    if (!IsTooMany(counts.contradicted, counts.compared, kMostOfTwo, kFewOfTwo)) continue;
+    verdict.at_odds.push_back(two.first == two.second
+                                  ? name(two.first)
+                                  : absl::StrCat(name(two.first), " and ", name(two.second)));
   }
   return absl::OkStatus();
+}
+
+// But for the largest, and those that a loose step leads to.
+void FindParts(const GraphWorld& world,
+               const std::vector<std::size_t>& parts,
+               const std::set<ScanNumber>& damaged,
+               OptimizeVerdict& verdict) {
+  std::map<std::size_t, std::vector<std::size_t>> nodes;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    if (!damaged.contains(world.number(k))) nodes[parts[k]].push_back(k);
+  }
+  std::vector<std::vector<std::size_t>> by_size;
+  for (auto& [part, members] : nodes) by_size.push_back(std::move(members));
+  std::ranges::stable_sort(by_size, std::greater(), &std::vector<std::size_t>::size);
+  for (std::size_t k = 1; k < by_size.size(); ++k) {
+    const std::size_t first = by_size[k][0];
+    if (std::ranges::find(verdict.loose_steps, first) != verdict.loose_steps.end()) continue;
+    verdict.apart.emplace_back(first, by_size[k].size());
+  }
 }
 
 void FindLooseSteps(const GraphWorld& world,
@@ -99,10 +166,6 @@ void FindLooseSteps(const GraphWorld& world,
       verdict.loose_steps.push_back(trajectory[k]);
     }
   }
-}
-
-bool IsTooMany(std::size_t doubtful, std::size_t all, double most = kMostDoubtful) {
-  return doubtful > kFew && static_cast<double>(doubtful) > most * static_cast<double>(all);
 }
 
 bool PriorsContradict(const OptimizeVerdict& verdict) {
@@ -126,9 +189,29 @@ std::string StepsMessage(const GraphWorld& world, const OptimizeVerdict& verdict
 
 std::string PairsMessage(const OptimizeVerdict& verdict) {
   if (verdict.contradicted == 0) return "";
-  return absl::StrFormat("; in %d of %d pairs one scan looks through what the other saw",
-                         verdict.contradicted,
-                         verdict.compared);
+  std::string message =
+      absl::StrFormat("; in %d of %d pairs one scan looks through what the other saw",
+                      verdict.contradicted,
+                      verdict.compared);
+  for (std::size_t k = 0; k < std::min(kNamed, verdict.at_odds.size()); ++k) {
+    absl::StrAppend(&message, k == 0 ? ", most of " : "; of ", verdict.at_odds[k]);
+  }
+  return message;
+}
+
+std::string PartsMessage(const GraphWorld& world, const OptimizeVerdict& verdict) {
+  if (verdict.apart.empty()) return "";
+  std::string message = "Nothing joins ";
+  for (std::size_t k = 0; k < std::min(kNamed, verdict.apart.size()); ++k) {
+    const auto& [first, count] = verdict.apart[k];
+    absl::StrAppend(&message, k == 0 ? "" : ", ", world.id(first).ToString());
+    if (count > 1) absl::StrAppend(&message, " (with ", count - 1, " more)");
+  }
+  return absl::StrCat(message,
+                      verdict.apart.size() > kNamed ? ", …" : "",
+                      " to the rest: they are where their robot",
+                      verdict.priors > 0 ? " or absolute poses say" : " said",
+                      ", until scans of places in common or posegraph add-constraint tell more. ");
 }
 
 std::string PriorsMessage(const OptimizeVerdict& verdict) {
@@ -160,17 +243,21 @@ absl::StatusOr<OptimizeVerdict> VerdictOn(const GraphWorld& world,
                                           const AlignmentResult& result,
                                           const DamagedScans& damaged) {
   OptimizeVerdict verdict;
-  if (!result.parts.empty()) FindLooseSteps(world, result.parts, damaged.Scans(), verdict);
-  STRATA_RETURN_IF_ERROR(Compare(world, views, result.T_map_scan, verdict));
+  if (!result.parts.empty()) {
+    FindLooseSteps(world, result.parts, damaged.Scans(), verdict);
+    FindParts(world, result.parts, damaged.Scans(), verdict);
+  }
+  STRATA_RETURN_IF_ERROR(Compare(world, views, result, verdict));
   verdict.priors = result.priors;
   verdict.priors_rejected = result.rejected_priors;
   verdict.is_sound = !PriorsContradict(verdict) &&
                      !IsTooMany(verdict.loose_steps.size(), verdict.steps) &&
-                     !IsTooMany(verdict.contradicted, verdict.compared);
+                     !IsTooMany(verdict.contradicted, verdict.compared) && verdict.at_odds.empty();
   verdict.message = absl::StrCat(StepsMessage(world, verdict),
                                  PairsMessage(verdict),
                                  PriorsMessage(verdict),
                                  ". ",
+                                 PartsMessage(world, verdict),
                                  Meaning(verdict, result.termination));
   return verdict;
 }

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -24,10 +25,14 @@ struct OptimizeVerdict {
   // Those whose two scans no match, closure or given constraint joins, on any way: the nodes that
   // they lead to.
   std::vector<std::size_t> loose_steps;
-  // Pairs of scans near each other, along trajectories and across, spread over the map; and those
-  // of them where one looked through much of what the other saw.
+  // Pairs of scans near each other that something joins, along trajectories and across, spread over
+  // the map; and those of them where one looked through much of what the other saw.
   std::size_t compared = 0;
   std::size_t contradicted = 0;
+  std::vector<std::string> at_odds;  // robots that most pairs of theirs speak against
+  // Parts of the map that nothing joins to the largest and that no loose step leads to: the first
+  // node and how many there are.
+  std::vector<std::pair<std::size_t, std::size_t>> apart;
   std::size_t priors = 0;  // absolute poses, and those that do not fit
   std::size_t priors_rejected = 0;
   std::string message;  // two sentences or three: what holds the scans, and what that means
@@ -35,8 +40,9 @@ struct OptimizeVerdict {
 
 // Planes that scans share are found at poses that are nearly right; a scan that nothing is matched
 // to is drawn to whatever wall is near. Where more than a quarter of the steps is loose, or of the
-// pairs contradicted, there is nothing that planes could be trusted with: recordings too sparse to
-// overlap, poses of another recording, scans of two places under one name. Where more than half of
+// pairs contradicted, or more than half of those of a robot or of two, there is nothing that planes
+// could be trusted with: recordings too sparse to overlap, poses of another recording, scans of two
+// places under one name, robots joined where they are not. Where more than half of
 // the absolute poses do not fit, scans or GPS are wrong as a whole, and a person has to say which.
 // Damaged scans are left out.
 absl::StatusOr<OptimizeVerdict> VerdictOn(const GraphWorld& world,

@@ -144,6 +144,36 @@ TEST_F(OptimizeOfTwoPlacesTest, ThatNobodyAskedForChangesNothing) {
   EXPECT_THAT(db().jobs().Accept({}, kMapName, job.id), StatusIs(Code::kFailedPrecondition, _));
 }
 
+// Too few to matter in the whole, and all of them wrong.
+TEST_F(OptimizeTest, ASmallPartThatContradictsTheRestIsProposedAndNamed) {
+  MakeWorld();
+  const Scene campus = CampusWorld().scene;
+  const auto said = [](std::uint64_t k) {
+    return TruthOf(kScans) * PoseAt(1.5 * static_cast<double>(k), 0.0);
+  };
+  for (std::uint64_t k = 1; k <= 3; ++k) {
+    const PointCloud cloud = SimulateScan(campus, SensorOptions(), said(k), k);
+    STRATA_ASSERT_OK(Upload(db(), HeaderOf({"stray", k}, cloud, said(k), Alignment::kOff), cloud));
+  }
+  WaitIntegrated(db());
+  const JobInfo apart = Optimize({{"dry_run", "1"}});
+  EXPECT_THAT(apart.message, HasSubstr("Nothing joins stray/1 (with 2 more) to the rest"));
+  EXPECT_THAT(apart.message, HasSubstr("Good."));  // where robots say that they are is their affair
+  for (std::uint64_t k = 1; k <= 3; ++k) {
+    Constraint joins;
+    joins.i = k == 1 ? ScanId{"run", kScans} : ScanId{"stray", k - 1};
+    joins.j = {"stray", k};
+    joins.T_i_j = (k == 1 ? TruthOf(kScans) : said(k - 1)).inverse() * said(k);
+    joins.information = 1e6 * Matrix6d::Identity();
+    STRATA_ASSERT_OK(db().posegraph().AddConstraint({}, kMapName, joins));
+  }
+  const JobInfo job = Optimize();
+  EXPECT_EQ(job.state, JobState::kProposed);
+  EXPECT_LE(job.metrics.at("pairs_contradicted"), 4.0);
+  EXPECT_THAT(job.message, HasSubstr("most of run and stray"));
+  EXPECT_THAT(job.message, HasSubstr("Too little to be applied by itself"));
+}
+
 // Robots on lanes across the yard, with sensors that see little of it from far away. Its corners
 // look alike, turned by 90°.
 class OptimizeOfLanesTest : public OptimizeTest {
