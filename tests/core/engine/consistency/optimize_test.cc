@@ -158,6 +158,7 @@ TEST_F(OptimizeTest, ASmallPartThatContradictsTheRestIsProposedAndNamed) {
   WaitIntegrated(db());
   const JobInfo apart = Optimize({{"dry_run", "1"}});
   EXPECT_THAT(apart.message, HasSubstr("Nothing joins stray/1 (with 2 more) to the rest"));
+  EXPECT_EQ(apart.metrics.at("parts_apart"), 1.0);
   EXPECT_THAT(apart.message, HasSubstr("Good."));  // where robots say that they are is their affair
   for (std::uint64_t k = 1; k <= 3; ++k) {
     Constraint joins;
