@@ -94,7 +94,7 @@ absl::Status NoScans(const fs::path& folder, ScanFormat format, const Contents& 
   }
   return absl::NotFoundError(absl::StrCat(
       where,
-      ": no scan by its ending (.pcd .ply .bin .vtk .3d .las .ptx .e57 .xyz .csv .asc .pts) "
+      ": no scan by its ending (.pcd .ply .bin .vtk .3d .las .laz .ptx .e57 .xyz .csv .asc .pts) "
       "here or one folder below; say --format xyz for points in .txt files"));
 }
 

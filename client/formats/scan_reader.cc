@@ -58,6 +58,7 @@ constexpr NamedFormat kEndings[] = {
     {".bin", ScanFormat::kKitti},
     {".vtk", ScanFormat::kVtk},
     {".las", ScanFormat::kLas},
+    {".laz", ScanFormat::kLas},
     {".ptx", ScanFormat::kPtx},
     {".e57", ScanFormat::kE57},
     {".xyz_label_conf", ScanFormat::kOakland},
@@ -72,9 +73,6 @@ struct UnreadFormat {
   absl::string_view what;  // it is, and the cure
 };
 
-constexpr absl::string_view kLazCure =
-    "is compressed, which is not read; 'laszip -i IN.laz -o OUT.las' or 'pdal translate IN.laz "
-    "OUT.las' makes LAS of it";
 constexpr absl::string_view kRosCure =
     "holds messages of many topics; 'strata scan import MAP FILE --topic T --poses-from T' takes "
     "its clouds, 'strata scan topics FILE' lists what there is";
@@ -83,7 +81,6 @@ constexpr absl::string_view kPacketsCure =
 constexpr absl::string_view kPackedCure = "is packed; unpack it first";
 
 constexpr UnreadFormat kUnread[] = {
-    {".laz", kLazCure},
     {".bag", kRosCure},
     {".db3", kRosCure},
     {".mcap", kRosCure},
@@ -139,7 +136,6 @@ absl::StatusOr<PointCloud> Parse(absl::string_view bytes, ScanFormat format) {
     case ScanFormat::kOakland:
       return ReadOakland(bytes);
     case ScanFormat::kLas:
-      return ReadLas(bytes);
     case ScanFormat::kPtx:
     case ScanFormat::kE57:
     case ScanFormat::kAuto:
@@ -157,6 +153,12 @@ absl::StatusOr<PointCloud> ReadWhole(const std::filesystem::path& path, ScanForm
         absl::StrCat(path.string(), ": the file is empty; expected a scan"));
   }
   absl::StatusOr<PointCloud> cloud = Parse(bytes, format);
+  if (!cloud.ok()) return Annotate(cloud.status(), path.string());
+  return cloud;
+}
+
+absl::StatusOr<PointCloud> ReadInPieces(const std::filesystem::path& path) {
+  absl::StatusOr<PointCloud> cloud = ReadLasFile(path);
   if (!cloud.ok()) return Annotate(cloud.status(), path.string());
   return cloud;
 }
@@ -238,8 +240,9 @@ absl::StatusOr<PointCloud> ReadScan(const std::filesystem::path& path,
   if (!unread.empty()) {
     return absl::InvalidArgumentError(absl::StrCat(path.string(), ": ", unread));
   }
-  absl::StatusOr<PointCloud> cloud =
-      HoldsStations(format) ? ReadOnlyStation(path, format) : ReadWhole(path, format);
+  absl::StatusOr<PointCloud> cloud = HoldsStations(format)        ? ReadOnlyStation(path, format)
+                                     : format == ScanFormat::kLas ? ReadInPieces(path)
+                                                                  : ReadWhole(path, format);
   if (!cloud.ok()) return cloud;
   cloud = WithoutRangeZero(*std::move(cloud), at_sensor);
   if (!cloud.ok()) return Annotate(cloud.status(), path.string());

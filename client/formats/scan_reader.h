@@ -37,11 +37,11 @@ absl::StatusOr<ScanFormat> ParseScanFormat(absl::string_view name);
 absl::string_view ScanFormatName(ScanFormat format);
 
 // The format of a file by its name: .pcd, .ply, .bin (KITTI), .pcd.bin (nuScenes), .3d (3DTK),
-// .vtk, .las, .ptx, .e57, and .xyz…, .txt, .csv, .asc, .pts (text), and of those .xyz_label_conf
-// (Oakland); kAuto for any other.
+// .vtk, .las, .laz (LAS, too), .ptx, .e57, and .xyz…, .txt, .csv, .asc, .pts (text), and of those
+// .xyz_label_conf (Oakland); kAuto for any other.
 ScanFormat ScanFormatOfName(const std::filesystem::path& path);
 
-// What a file is that holds points and is not read, by its ending (.laz, .mcap, .bt, …), and what
+// What a file is that holds points and is not read, by its ending (.mcap, .bt, …), and what
 // makes of it one that is; empty for any other file.
 std::string WhyNotRead(const std::filesystem::path& path);
 
@@ -59,7 +59,8 @@ absl::StatusOr<std::vector<Station>> ListStations(const std::filesystem::path& p
 // counted in `at_sensor` if it is not null. Far coordinates keep their precision by
 // PointCloud::origin. Passes ValidateCloud. NOT_FOUND; UNAVAILABLE if it cannot be read;
 // INVALID_ARGUMENT with file, line or byte and what was expected, or if no point is left or the
-// file holds several scans. Memory is bounded by about 20 times the file's size.
+// file holds several scans. Memory is bounded by about 20 times the file's size, of LAZ by what its
+// points take as LAS, of which a byte holds 100 at most.
 absl::StatusOr<PointCloud> ReadScan(const std::filesystem::path& path,
                                     ScanFormat format = ScanFormat::kAuto,
                                     std::size_t* at_sensor = nullptr);

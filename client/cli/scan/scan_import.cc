@@ -138,7 +138,7 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
       ->add_option("--format",
                    options->format,
                    "Format of the scans; auto: by content or ending (.pcd .ply .bin .pcd.bin .vtk "
-                   ".3d .las .ptx .e57 "
+                   ".3d .las .laz .ptx .e57 "
                    ".xyz .csv .asc .pts, .txt if named)")
       ->check(CLI::IsMember({"auto",
                              "3dtk",
@@ -159,7 +159,7 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
           options->poses,
           "File with the poses T_map_scan of the scans, or a folder of .pose files; without it "
           ".pose files beside .3d files, or the one poses*.txt|tum|csv in the folder; none: every "
-          "scan is at the origin. Not for .las, .ptx and .e57, which say where they are. A "
+          "scan is at the origin. Not for .las, .laz, .ptx and .e57, which say where they are. A "
           "trajectory of strata egomotion gives each scan the pose of the "
           "time that its name is (1432235498.028276.pcd); on earth, poses and their covariance "
           "every 10 "

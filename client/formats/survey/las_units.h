@@ -16,8 +16,11 @@ namespace strata {
 struct LasRecord {
   std::string user;
   std::uint16_t id = 0;
-  absl::string_view bytes;
+  std::string bytes;
 };
+// The one that says how points are compressed (LAZ).
+inline constexpr char kLazUser[] = "laszip encoded";
+inline constexpr std::uint16_t kLazId = 22204;
 
 struct LasUnits {
   double horizontal_m = 1.0;
