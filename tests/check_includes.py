@@ -57,7 +57,7 @@ STOREYS = {
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
     "core/storage": ["sqlite", HERE],
     "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "models", "ingest", "tiles", "scans", "map"],
-    "client/formats": ["planes", "bags", "motion", HERE, "survey", "laz", "parsing", "grid"],
+    "client/formats": ["planes", "bags", "motion", HERE, "packets", "survey", "laz", "parsing", "grid"],
     "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "planes", "egomotion", "job", "heights", "mesh", "picture", "terminal"],
 }
 
@@ -77,6 +77,7 @@ EXTERNAL = {
     r"yaml-cpp/.*": ["client/formats/motion"],
     r"tiffio\.h": ["client/formats/grid"],
     r"expat\.h": ["client/formats/survey"],
+    r"pcap/.*": ["client/formats/packets"],
     r"dds/.*|ros_messages\.h": ["client/ros2"],
     r"(bzlib|lz4frame|zlib)\.h": ["client/formats/bags"],
     r"(thread|mutex|condition_variable)": ["core/engine", "server", "client", "core/common"],

@@ -92,10 +92,11 @@ absl::Status NoScans(const fs::path& folder, ScanFormat format, const Contents& 
     return absl::NotFoundError(
         absl::StrCat(where, ": no scan of format ", ScanFormatName(format), " by its ending"));
   }
-  return absl::NotFoundError(absl::StrCat(
-      where,
-      ": no scan by its ending (.pcd .ply .bin .vtk .3d .las .laz .ptx .e57 .xyz .csv .asc .pts) "
-      "here or one folder below; say --format xyz for points in .txt files"));
+  return absl::NotFoundError(
+      absl::StrCat(where,
+                   ": no scan by its ending (.pcd .ply .bin .vtk .3d .las .laz .ptx .e57 .pcap "
+                   ".xyz .csv .asc .pts) "
+                   "here or one folder below; say --format xyz for points in .txt files"));
 }
 
 // One look one level down.

@@ -20,6 +20,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "absl/time/time.h"
 
@@ -102,11 +103,17 @@ ScanFormat FormatOf(const ScanFile& scan) {
   return scan.format == ScanFormat::kAuto ? ScanFormatOfName(scan.path) : scan.format;
 }
 
+// When it was taken: what the file says, else what its name does.
+std::optional<absl::Time> TimeOf(const ScanFile& scan) {
+  return scan.time.has_value() ? scan.time : TimeOfName(scan.path);
+}
+
 // One of the scans of a file.
 ScanFile ScanOf(const ScanFile& file, const Station& station, bool with_pose) {
   ScanFile scan = file;
   scan.format = FormatOf(file);
   if (with_pose) scan.T_map_scan = station.T_file_scan;
+  scan.time = station.time;
   scan.read = [path = file.path,
                read = station.read](std::size_t* at_sensor) -> absl::StatusOr<PointCloud> {
     absl::StatusOr<PointCloud> cloud = read();
@@ -127,7 +134,8 @@ absl::Status AddStations(const ScanFile& file,
     scans.back().pose_status = stations.status();
     return absl::OkStatus();
   }
-  if (stations->size() > 1 && !options.poses.empty() && options.poses != kNoPoses) {
+  if (stations->size() > 1 && StationsHavePoses(FormatOf(file)) && !options.poses.empty() &&
+      options.poses != kNoPoses) {
     return absl::InvalidArgumentError(
         absl::StrCat(file.path.string(),
                      ": holds ",
@@ -171,7 +179,8 @@ void AssignByIndex(const PoseList& list, const fs::path& file, std::vector<ScanF
   std::map<std::uint64_t, const FilePose*> by_index;
   for (const FilePose& pose : list.poses) by_index[*pose.index] = &pose;
   for (ScanFile& scan : scans) {
-    const std::optional<std::uint64_t> index = SequenceOfName(scan.path);
+    const std::optional<std::uint64_t> index =
+        FormatOf(scan) == ScanFormat::kVelodyne ? scan.sequence : SequenceOfName(scan.path);
     const auto found = index.has_value() ? by_index.find(*index) : by_index.end();
     if (found != by_index.end()) {
       Assign(*found->second, scan);
@@ -187,7 +196,7 @@ void AssignByTime(const std::vector<FilePose>& sorted,
                   const fs::path& file,
                   std::vector<ScanFile>& scans) {
   for (ScanFile& scan : scans) {
-    const absl::Time time = *TimeOfName(scan.path);
+    const absl::Time time = *TimeOf(scan);
     const auto found = std::lower_bound(
         sorted.begin(), sorted.end(), time - kSameTime, [](const FilePose& pose, absl::Time t) {
           return *pose.time < t;
@@ -195,7 +204,8 @@ void AssignByTime(const std::vector<FilePose>& sorted,
     if (found != sorted.end() && *found->time <= time + kSameTime) {
       Assign(*found, scan);
     } else {
-      scan.pose_status = NoPose(file, absl::StrCat("time ", scan.path.stem().string()));
+      scan.pose_status = NoPose(
+          file, absl::StrFormat("time %.6f", absl::ToDoubleSeconds(time - absl::UnixEpoch())));
     }
     scan.time = time;
   }
@@ -218,9 +228,8 @@ void AssignTum(PoseList list, const ScanListOptions& options, std::vector<ScanFi
   std::stable_sort(list.poses.begin(), list.poses.end(), [](const FilePose& a, const FilePose& b) {
     return *a.time < *b.time;
   });
-  const bool timed = std::all_of(scans.begin(), scans.end(), [](const ScanFile& scan) {
-    return TimeOfName(scan.path).has_value();
-  });
+  const bool timed = std::all_of(
+      scans.begin(), scans.end(), [](const ScanFile& scan) { return TimeOf(scan).has_value(); });
   if (!timed && list.poses.size() > scans.size() && options.tell) {
     options.tell(absl::StrCat("warning: ",
                               options.poses.string(),
@@ -257,7 +266,7 @@ bool Assign3dtk(bool asked, const fs::path& folder, std::vector<ScanFile>& scans
 
 // Whether its points lie in a frame of the whole survey.
 bool LiesWhereItBelongs(const ScanFile& scan) {
-  if (FormatOf(scan) == ScanFormat::kLas || HoldsStations(FormatOf(scan))) return true;
+  if (FormatOf(scan) == ScanFormat::kLas || StationsHavePoses(FormatOf(scan))) return true;
   if (scan.format != ScanFormat::kPcd && ScanFormatOfName(scan.path) != ScanFormat::kPcd) {
     return false;
   }
@@ -364,7 +373,7 @@ absl::StatusOr<std::vector<ScanFile>> ListScans(const std::vector<fs::path>& pat
                           WithStations(Ordered(std::move(files), options.format), options));
   if (options.poses == kNoPoses) return scans;
   if (options.poses.empty() && std::all_of(scans.begin(), scans.end(), [](const ScanFile& scan) {
-        return HoldsStations(FormatOf(scan));
+        return StationsHavePoses(FormatOf(scan));
       })) {
     return scans;
   }

@@ -71,8 +71,9 @@ std::optional<absl::Time> TimeOfName(const std::filesystem::path& path);
 // all times are numbered in the order of those: the last digits of a time say nothing.
 //
 // A file that holds several scans (HoldsStations) gives each of them, its path with ":0", ":1", …
-// behind it; then all scans are numbered from 0 in that order. Their poses are those in the file:
-// a file of poses can be named only for files of one scan each.
+// behind it; then all scans are numbered from 0 in that order. Their poses are those in the file,
+// if it has any (StationsHavePoses): then a file of poses can be named only for files of one scan
+// each. Else their numbers and times say whose a pose is.
 //
 // Poses: index-tum and kitti by index = SequenceOfName. tum has no index: where every stem is a
 // time in seconds (it has a decimal point) by time, to a millisecond; else one after the other, the

@@ -18,6 +18,7 @@
 #include "absl/strings/string_view.h"
 
 #include "client/formats/file_bytes.h"
+#include "client/formats/packets/velodyne_reader.h"
 #include "client/formats/parsing/range_zero.h"
 #include "client/formats/pcd_reader.h"
 #include "client/formats/plain_readers.h"
@@ -49,6 +50,7 @@ constexpr NamedFormat kFormats[] = {
     {"las", ScanFormat::kLas},
     {"ptx", ScanFormat::kPtx},
     {"e57", ScanFormat::kE57},
+    {"velodyne", ScanFormat::kVelodyne},
 };
 
 constexpr NamedFormat kEndings[] = {
@@ -61,6 +63,8 @@ constexpr NamedFormat kEndings[] = {
     {".laz", ScanFormat::kLas},
     {".ptx", ScanFormat::kPtx},
     {".e57", ScanFormat::kE57},
+    {".pcap", ScanFormat::kVelodyne},
+    {".pcapng", ScanFormat::kVelodyne},
     {".xyz_label_conf", ScanFormat::kOakland},
     {".txt", ScanFormat::kXyz},
     {".csv", ScanFormat::kXyz},
@@ -84,7 +88,6 @@ constexpr UnreadFormat kUnread[] = {
     {".bag", kRosCure},
     {".db3", kRosCure},
     {".mcap", kRosCure},
-    {".pcap", kPacketsCure},
     {".rawlog", kPacketsCure},
     {".bt", "holds voxels of an OctoMap, no scan; convert it with octree2pointcloud to PCD"},
     {".ot", "holds voxels of an OctoMap, no scan; convert it with octree2pointcloud to PCD"},
@@ -104,6 +107,10 @@ ScanFormat FormatOfStart(absl::string_view start) {
   }
   if (absl::StartsWith(start, "LASF")) return ScanFormat::kLas;
   if (absl::StartsWith(start, "ASTM-E57")) return ScanFormat::kE57;
+  for (const absl::string_view packets :
+       {"\xD4\xC3\xB2\xA1", "\xA1\xB2\xC3\xD4", "\x4D\x3C\xB2\xA1", "\x0A\x0D\x0D\x0A"}) {
+    if (absl::StartsWith(start, packets)) return ScanFormat::kVelodyne;
+  }
   return ScanFormat::kAuto;
 }
 
@@ -138,12 +145,13 @@ absl::StatusOr<PointCloud> Parse(absl::string_view bytes, ScanFormat format) {
     case ScanFormat::kLas:
     case ScanFormat::kPtx:
     case ScanFormat::kE57:
+    case ScanFormat::kVelodyne:
     case ScanFormat::kAuto:
       break;
   }
   return absl::InvalidArgumentError(
       "unknown format; say which with --format: 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, "
-      "oakland, las, ptx, e57");
+      "oakland, las, ptx, e57, velodyne");
 }
 
 absl::StatusOr<PointCloud> ReadWhole(const std::filesystem::path& path, ScanFormat format) {
@@ -184,10 +192,11 @@ absl::StatusOr<ScanFormat> ParseScanFormat(absl::string_view name) {
   for (const NamedFormat& named : kFormats) {
     if (named.name == name) return named.format;
   }
-  return absl::InvalidArgumentError(absl::StrCat(
-      "scan format '",
-      name.substr(0, 40),
-      "' is none of auto, 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, oakland, las, ptx, e57"));
+  return absl::InvalidArgumentError(
+      absl::StrCat("scan format '",
+                   name.substr(0, 40),
+                   "' is none of auto, 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, oakland, las, "
+                   "ptx, e57, velodyne"));
 }
 
 absl::string_view ScanFormatName(ScanFormat format) {
@@ -215,6 +224,10 @@ std::string WhyNotRead(const std::filesystem::path& path) {
 }
 
 bool HoldsStations(ScanFormat format) {
+  return StationsHavePoses(format) || format == ScanFormat::kVelodyne;
+}
+
+bool StationsHavePoses(ScanFormat format) {
   return format == ScanFormat::kPtx || format == ScanFormat::kE57;
 }
 
@@ -225,8 +238,10 @@ absl::StatusOr<std::vector<Station>> ListStations(const std::filesystem::path& p
     return absl::InvalidArgumentError(
         absl::StrCat(path.string(), ": files of ", ScanFormatName(format), " hold one scan"));
   }
-  absl::StatusOr<std::vector<Station>> stations =
-      format == ScanFormat::kPtx ? ListPtxStations(path) : ListE57Stations(path);
+  absl::StatusOr<std::vector<Station>> stations = format == ScanFormat::kPtx ? ListPtxStations(path)
+                                                  : format == ScanFormat::kE57
+                                                      ? ListE57Stations(path)
+                                                      : ListVelodyneStations(path);
   if (!stations.ok()) return Annotate(stations.status(), path.string());
   return stations;
 }

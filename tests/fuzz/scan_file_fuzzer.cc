@@ -38,7 +38,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                    ScanFormat::kAuto,
                                    ScanFormat::kLas,
                                    ScanFormat::kPtx,
-                                   ScanFormat::kE57};
+                                   ScanFormat::kE57,
+                                   ScanFormat::kVelodyne};
   FuzzedDataProvider input(data, size);
   const ScanFormat format = input.PickValueInArray(kFormats);
   std::string bytes = input.ConsumeRemainingBytesAsString();

@@ -89,8 +89,8 @@ void AddLocalizeCommand(Commands& commands) {
   app->add_option("FILE", options->file, "A scan in any format that scan import takes")->required();
   app->add_option("--format",
                   options->format,
-                  "auto, 3dtk, pcd, ply, kitti, vtk, xyz, oakland, las, ptx or "
-                  "e57")
+                  "auto, 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, oakland, las, ptx, e57 "
+                  "or velodyne")
       ->capture_default_str();
   AddPose(
       app,

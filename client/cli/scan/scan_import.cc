@@ -131,14 +131,15 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
       ->add_option("PATH",
                    options->paths,
                    "Files or folders of scans, of .ptx and .e57 all that a file holds, with its "
-                   "poses; or one recording: .mcap, .db3, .bag, a folder of rosbag2")
+                   "poses, of .pcap (Velodyne VLP-16, HDL-32E) all revolutions; or one recording: "
+                   ".mcap, .db3, .bag, a folder of rosbag2")
       ->required();
   AddRecordingOptions(import, options);
   import
       ->add_option("--format",
                    options->format,
                    "Format of the scans; auto: by content or ending (.pcd .ply .bin .pcd.bin .vtk "
-                   ".3d .las .laz .ptx .e57 "
+                   ".3d .las .laz .ptx .e57 .pcap "
                    ".xyz .csv .asc .pts, .txt if named)")
       ->check(CLI::IsMember({"auto",
                              "3dtk",
@@ -151,7 +152,8 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
                              "oakland",
                              "las",
                              "ptx",
-                             "e57"}))
+                             "e57",
+                             "velodyne"}))
       ->capture_default_str();
   import
       ->add_option(

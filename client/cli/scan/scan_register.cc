@@ -188,8 +188,8 @@ void AddScanRegister(Commands& commands, CLI::App* noun) {
   app->add_option("TARGET", options->target, "The scan to move it onto")->required();
   app->add_option("--format",
                   options->format,
-                  "auto, 3dtk, pcd, ply, kitti, vtk, xyz, oakland, las, ptx or "
-                  "e57")
+                  "auto, 3dtk, pcd, ply, kitti, nuscenes, vtk, xyz, oakland, las, ptx, e57 "
+                  "or velodyne")
       ->capture_default_str();
   app->add_option(
          "--method",

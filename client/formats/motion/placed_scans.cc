@@ -38,7 +38,7 @@ bool IsTrajectory(const std::filesystem::path& path) {
 
 absl::Status TimeByName(std::vector<ScanFile>& scans) {
   for (ScanFile& scan : scans) {
-    scan.time = TimeOfName(scan.path);
+    if (!scan.time.has_value()) scan.time = TimeOfName(scan.path);
     if (scan.time.has_value()) continue;
     return absl::InvalidArgumentError(
         absl::StrCat(scan.path.string(),

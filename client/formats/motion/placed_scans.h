@@ -16,8 +16,9 @@ namespace strata {
 // Whether the file begins as TrajectoryText() writes it.
 bool IsTrajectory(const std::filesystem::path& path);
 
-// Gives each scan the time that its file's name is, in seconds since 1970 with a decimal point
-// (1432235498.028276.pcd). INVALID_ARGUMENT naming the first file whose name is no time.
+// Gives each scan that has no time the one that its file's name is, in seconds since 1970 with a
+// decimal point (1432235498.028276.pcd). INVALID_ARGUMENT naming the first file whose name is no
+// time.
 absl::Status TimeByName(std::vector<ScanFile>& scans);
 
 // Gives each scan as its pose the trajectory's at its time times `T_body_scan`, the poses after it

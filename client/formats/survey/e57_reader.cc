@@ -206,7 +206,7 @@ absl::StatusOr<std::vector<Station>> ListE57Stations(const std::filesystem::path
       stations.push_back(*std::move(station));
     } else {  // the others are none the worse
       const absl::Status fault = Annotate(station.status(), absl::StrCat("scan ", i));
-      stations.push_back({Pose::Identity(), [fault] { return fault; }});
+      stations.push_back({.read = [fault] { return fault; }});
     }
   }
   return stations;

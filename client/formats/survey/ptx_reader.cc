@@ -236,9 +236,10 @@ absl::StatusOr<std::vector<Station>> ListPtxStations(const std::filesystem::path
       STRATA_ASSIGN_OR_RETURN(const bool there, lines.Next());
       if (!there) return TooFewPoints(header.points, i, lines);
     }
-    stations.push_back({header.T_file_scan, [path, place, points = header.points] {
-                          return ReadPtxPoints(path, place, points);
-                        }});
+    stations.push_back(
+        {.T_file_scan = header.T_file_scan, .read = [path, place, points = header.points] {
+           return ReadPtxPoints(path, place, points);
+         }});
   }
   if (stations.empty()) return lines.Error("expected the number of columns of a scan");
   return stations;

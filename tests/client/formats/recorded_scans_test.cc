@@ -179,7 +179,7 @@ TEST(RecordedScansTest, ColumnsComeWithTheirScans) {
 
 TEST(RecordedScansTest, WhatIsNoScanSaysSo) {
   STRATA_REQUIRE_DATA(path, "importer_samples");
-  for (const char* name : {"velodyne_hdl32.pcap"}) {
+  for (const char* name : {"mrpt_velodyne_VLP16.rawlog"}) {
     EXPECT_THAT(ReadScan(path / name),
                 testing::StatusIs(absl::StatusCode::kInvalidArgument,
                                   ::testing::AllOf(::testing::HasSubstr(name),

@@ -250,7 +250,7 @@ TEST_F(ScanListTest, FilesThatAreNotReadSayWhatToDo) {
   for (const auto& [name, cure] :
        std::vector<std::pair<std::string, std::string>>{{"a.ot", "octree2pointcloud"},
                                                         {"a.mcap", "strata scan topics"},
-                                                        {"a.pcap", "the sensor's own program"},
+                                                        {"a.rawlog", "the sensor's own program"},
                                                         {"a.bt", "octree2pointcloud"},
                                                         {"a.bin.gz", "unpack it first"}}) {
     const auto file = Write("files/" + name);
@@ -265,7 +265,7 @@ TEST_F(ScanListTest, FilesThatAreNotReadSayWhatToDo) {
   std::string told;
   const auto tell = [&told](const std::string& text) { told += text; };
   STRATA_EXPECT_OK(ListScans({dir_.path() / "files"}, {.tell = tell}));
-  EXPECT_THAT(told, HasSubstr("5 files (.bt .gz .mcap .ot .pcap) are not read: left out"));
+  EXPECT_THAT(told, HasSubstr("5 files (.bt .gz .mcap .ot .rawlog) are not read: left out"));
 }
 
 TEST_F(ScanListTest, FilesOfASurveyNeedNoPoses) {
