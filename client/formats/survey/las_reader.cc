@@ -77,6 +77,8 @@ absl::Status AddCompressed(ByteSource& source,
   STRATA_ASSIGN_OR_RETURN(const LazFormat format, LazFormatOf(header, records));
   STRATA_ASSIGN_OR_RETURN(const std::vector<LazChunk> chunks,
                           ReadChunkTable(source, header.points_at, header.points, format));
+  // More points than bytes there are hardly ever.
+  points.Reserve(static_cast<std::size_t>(std::min(header.points, source.size())));
   ChunkDecoder decoder(format);
   for (const LazChunk& chunk : chunks) {
     const absl::Status added = AddChunk(source, chunk, header, decoder, points);

@@ -10,8 +10,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/formats/file_bytes.h"
+#include "client/formats/scan_reader.h"
 #include "tests/client/formats/hostile_files.h"
 #include "tests/support/status_matchers.h"
+#include "tests/support/temp_dir.h"
 
 namespace strata {
 namespace {
@@ -126,6 +129,17 @@ TEST(NuscenesReaderTest, FiveFloatsAPoint) {
   EXPECT_THAT(ReadNuscenes(Floats({1, 2, 3, 4})),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("multiple of 20")));
   testing::ExpectSoundOnDamage(NuscenesFile().substr(0, 60), &ReadNuscenes, 1);
+}
+
+TEST(NuscenesReaderTest, TheEndingOfItsNameSaysSo) {
+  const testing::TempDir dir;
+  STRATA_ASSERT_OK(WriteFileBytes(dir.path() / "LIDAR_TOP.pcd.bin", NuscenesFile()));
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, ReadScan(dir.path() / "LIDAR_TOP.pcd.bin"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud named, ReadNuscenes(NuscenesFile()));
+  EXPECT_EQ(cloud.points, named.points);
+  STRATA_ASSERT_OK(WriteFileBytes(dir.path() / "000000.bin", NuscenesFile()));
+  EXPECT_THAT(ReadScan(dir.path() / "000000.bin"),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("--format nuscenes")));
 }
 
 // A multiple of both sizes: only the values tell.
