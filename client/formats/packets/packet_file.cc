@@ -26,6 +26,7 @@ constexpr std::uint8_t kUdp = 17;
 constexpr std::uint16_t kFragmentPlace = 0x1FFF;  // 0: the first, which has the ports
 constexpr std::size_t kAddressesBytes = 12;       // of Ethernet
 constexpr std::size_t kCookedBytes = 14;          // before the type, of Linux "any"
+constexpr std::size_t kCooked2Bytes = 18;         // behind the type, of its second version
 constexpr std::size_t kIpBytes = 20;
 constexpr std::size_t kUdpBytes = 8;
 
@@ -33,8 +34,10 @@ constexpr std::size_t kUdpBytes = 8;
 absl::string_view IpOf(int link, absl::string_view packet) {
   ByteCursor cursor(packet, true);
   if (link == DLT_RAW) return cursor.TakeRest();
-  cursor.Take(link == DLT_EN10MB ? kAddressesBytes : kCookedBytes);
+  if (link == DLT_EN10MB) cursor.Take(kAddressesBytes);
+  if (link == DLT_LINUX_SLL) cursor.Take(kCookedBytes);
   auto type = cursor.Get<std::uint16_t>();
+  if (link == DLT_LINUX_SLL2) cursor.Take(kCooked2Bytes);
   if (type == kVlan) {
     cursor.Take(sizeof(std::uint16_t));
     type = cursor.Get<std::uint16_t>();
@@ -77,11 +80,13 @@ absl::StatusOr<PacketFile> PacketFile::Open(const std::filesystem::path& path) {
   }
   PacketFile file(opened);
   file.link_ = pcap_datalink(opened);
-  if (file.link_ == DLT_EN10MB || file.link_ == DLT_LINUX_SLL || file.link_ == DLT_RAW) return file;
+  for (const int link : {DLT_EN10MB, DLT_LINUX_SLL, DLT_LINUX_SLL2, DLT_RAW}) {
+    if (file.link_ == link) return file;
+  }
   return absl::InvalidArgumentError(
       absl::StrCat("packets of link type ",
                    file.link_,
-                   "; Ethernet (1), Linux 'any' (113) and IP (101) are read"));
+                   "; Ethernet (1), Linux 'any' (113, 276) and IP (101) are read"));
 }
 
 std::optional<UdpPacket> PacketFile::Next() {

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -190,6 +191,40 @@ TEST_F(VelodyneReaderTest, PlantedPacketsAreWhatTheManualsSay) {
   ExpectOraclePoints(Write(PcapOf({.mode = 0x39, .packets = 460, .packet_us = 663}, 2)), 2);
   ExpectOraclePoints(
       Write(PcapOf({.model = kHdl32e, .packets = 550, .step = 17, .packet_us = 553}, 3)), 2);
+}
+
+// The same packets behind another header of their link.
+std::string OverLink(const std::string& pcap, std::uint16_t link, const std::string& head) {
+  std::string out = pcap.substr(0, 24);
+  PutAt(out, 20, link);
+  constexpr std::size_t kEthernet = 14;
+  for (std::size_t at = 24; at < pcap.size();) {
+    std::uint32_t size = 0;
+    std::memcpy(&size, pcap.data() + at + 8, sizeof size);
+    std::string record = pcap.substr(at, 16);
+    const auto changed = static_cast<std::uint32_t>(size - kEthernet + head.size());
+    PutAt(record, 8, changed);
+    PutAt(record, 12, changed);
+    out += record + head + pcap.substr(at + 16 + kEthernet, size - kEthernet);
+    at += 16 + size;
+  }
+  return out;
+}
+
+TEST_F(VelodyneReaderTest, PacketsAreFoundOverOtherLinks) {
+  const std::string ethernet = PcapOf({.packets = 160}, 10);
+  STRATA_ASSERT_OK_AND_ASSIGN(auto stations, ListVelodyneStations(Write(ethernet)));
+  STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud truth, stations.at(0).read());
+  const std::string type("\x08\x00", 2);
+  const std::string vlan("\x81\x00\x00\x05", 4);
+  for (const std::string& pcap : {OverLink(ethernet, 1, std::string(12, 'm') + vlan + type),
+                                  OverLink(ethernet, 113, std::string(14, 'c') + type),
+                                  OverLink(ethernet, 276, type + std::string(18, 'c')),
+                                  OverLink(ethernet, 101, "")}) {
+    STRATA_ASSERT_OK_AND_ASSIGN(stations, ListVelodyneStations(Write(pcap)));
+    STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, stations.at(0).read());
+    EXPECT_EQ(cloud.points, truth.points);
+  }
 }
 
 TEST_F(VelodyneReaderTest, TheHourOfTheSensorEnds) {
