@@ -120,6 +120,17 @@ absl::Status CheckChunk(const LazChunk& chunk, std::uint64_t end, const LazForma
                                  " a byte are read"));
 }
 
+// All that is behind the points' beginning: before LASzip 2.0 there was no table.
+absl::StatusOr<std::vector<LazChunk>> OneChunk(const ByteSource& source,
+                                               std::uint64_t points_at,
+                                               std::uint64_t points,
+                                               const LazFormat& format) {
+  if (points_at > source.size()) return TableFault(points_at, "the points lie behind the end");
+  const LazChunk chunk = {.at = points_at, .bytes = source.size() - points_at, .points = points};
+  STRATA_RETURN_IF_ERROR(CheckChunk(chunk, source.size(), format));
+  return std::vector<LazChunk>{chunk};
+}
+
 }  // namespace
 
 absl::StatusOr<std::vector<LazChunk>> ReadChunkTable(ByteSource& source,
@@ -127,6 +138,7 @@ absl::StatusOr<std::vector<LazChunk>> ReadChunkTable(ByteSource& source,
                                                      std::uint64_t points,
                                                      const LazFormat& format) {
   if (points == 0) return std::vector<LazChunk>();
+  if (!format.chunked) return OneChunk(source, points_at, points, format);
   STRATA_ASSIGN_OR_RETURN(const TableHead head, ReadTableHead(source, points_at, format));
   const bool counts_vary = format.chunk_points == 0;
   STRATA_ASSIGN_OR_RETURN(std::vector<LazChunk> chunks, ReadChunks(source, head, counts_vary));

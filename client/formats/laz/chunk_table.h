@@ -20,8 +20,8 @@ struct LazChunk {
 
 // Of a file whose `points` points begin at `points_at`; the chunks that have any, in the order of
 // the file, within it, and none with more than 100 points a byte, which bounds how long reading
-// takes and what it makes. UNAVAILABLE; INVALID_ARGUMENT naming what does not fit, and where the
-// table is missing.
+// takes and what it makes. A file that is not chunked is one chunk. UNAVAILABLE; INVALID_ARGUMENT
+// naming what does not fit, and where the table is missing.
 absl::StatusOr<std::vector<LazChunk>> ReadChunkTable(ByteSource& source,
                                                      std::uint64_t points_at,
                                                      std::uint64_t points,

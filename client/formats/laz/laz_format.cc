@@ -18,6 +18,7 @@
 namespace strata {
 namespace {
 
+constexpr std::uint16_t kPointwise = 1;
 constexpr std::uint16_t kPointwiseChunks = 2;
 constexpr std::uint16_t kLayeredChunks = 3;
 constexpr std::uint32_t kChunksVary = 0xFFFFFFFF;
@@ -36,10 +37,11 @@ struct KnownItem {
   std::uint16_t first_version, last_version;
 };
 constexpr KnownItem kKnownItems[] = {
-    {LazItemType::kByte, "BYTE", 0, 2, 2},
-    {LazItemType::kPoint10, "POINT10", 20, 2, 2},
-    {LazItemType::kGpsTime11, "GPSTIME11", 8, 2, 2},
-    {LazItemType::kRgb12, "RGB12", 6, 2, 2},
+    {LazItemType::kByte, "BYTE", 0, 1, 2},
+    {LazItemType::kPoint10, "POINT10", 20, 1, 2},
+    {LazItemType::kGpsTime11, "GPSTIME11", 8, 1, 2},
+    {LazItemType::kRgb12, "RGB12", 6, 1, 2},
+    {LazItemType::kWavePacket13, "WAVEPACKET13", 29, 1, 1},
     {LazItemType::kPoint14, "POINT14", 30, 3, 4},
     {LazItemType::kRgb14, "RGB14", 6, 3, 4},
     {LazItemType::kRgbNir14, "RGBNIR14", 8, 3, 4},
@@ -59,6 +61,10 @@ std::vector<LazItemType> ItemsOf(int point_format) {
       return {kPoint10, kRgb12};
     case 3:
       return {kPoint10, kGpsTime11, kRgb12};
+    case 4:
+      return {kPoint10, kGpsTime11, kWavePacket13};
+    case 5:
+      return {kPoint10, kGpsTime11, kRgb12, kWavePacket13};
     case 6:
       return {kPoint14};
     case 7:
@@ -106,9 +112,9 @@ absl::Status CheckItem(const LazItem& item) {
 }
 
 absl::Status CheckCoder(std::uint16_t compressor, std::uint16_t coder) {
-  if (compressor != kPointwiseChunks && compressor != kLayeredChunks) {
+  if (compressor < kPointwise || compressor > kLayeredChunks) {
     return NotRead(absl::StrCat(
-        "compressor ", compressor, "; 2 (chunks, since LASzip 2.0) and 3 (layers) are read"));
+        "compressor ", compressor, "; 1 (no chunks), 2 (chunks) and 3 (layers) are read"));
   }
   if (coder != 0) return NotRead(absl::StrCat("coder ", coder, "; 0 (arithmetic) is read"));
   return absl::OkStatus();
@@ -117,10 +123,6 @@ absl::Status CheckCoder(std::uint16_t compressor, std::uint16_t coder) {
 // Whether the items make a point of the format, with or without bytes that a program added.
 absl::Status CheckItems(const LazFormat& format, int point_format) {
   std::vector<LazItemType> expected = ItemsOf(point_format);
-  if (expected.empty()) {
-    return NotRead(absl::StrCat(
-        "packed points of record format ", point_format, " (with wave packets) are not read"));
-  }
   std::vector<LazItemType> types;
   std::size_t bytes = 0;
   for (const LazItem& item : format.items) {
@@ -154,6 +156,7 @@ absl::StatusOr<LazFormat> ReadLazFormat(absl::string_view record,
   cursor.Take(kVersionAndOptionsBytes);
   LazFormat format;
   format.layered = compressor == kLayeredChunks;
+  format.chunked = compressor != kPointwise;
   format.point_bytes = point_bytes;
   format.chunk_points = cursor.Get<std::uint32_t>();
   cursor.Take(kSpecialRecordsBytes);
@@ -169,7 +172,7 @@ absl::StatusOr<LazFormat> ReadLazFormat(absl::string_view record,
   }
   STRATA_RETURN_IF_ERROR(CheckCoder(compressor, coder));
   STRATA_RETURN_IF_ERROR(CheckItems(format, point_format));
-  if (format.chunk_points == 0) {
+  if (format.chunked && format.chunk_points == 0) {
     return absl::InvalidArgumentError("chunks of 0 points; expected some, or 4294967295 for any");
   }
   if (format.chunk_points == kChunksVary) format.chunk_points = 0;

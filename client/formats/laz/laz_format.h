@@ -34,6 +34,8 @@ struct LazItem {
 struct LazFormat {
   // Every attribute by itself, as for point record formats 6 to 10; else point by point.
   bool layered = false;
+  // In pieces that can be read by themselves, as since LASzip 2.0.
+  bool chunked = true;
   // Of every chunk but the last; 0: the chunk table says of each how many.
   std::uint32_t chunk_points = 0;
   // One behind the other they are the bytes of a point.
@@ -42,8 +44,8 @@ struct LazFormat {
 };
 
 // Of points of a record format (0 to 10) and so many bytes. INVALID_ARGUMENT naming what is not
-// read and what makes of it what is: items that do not make such a point, versions before LASzip
-// 2.0, wave packets of formats 4 and 5.
+// read and what makes of it what is: items that do not make such a point, of other versions than
+// LASzip has had.
 absl::StatusOr<LazFormat> ReadLazFormat(absl::string_view record,
                                         int point_format,
                                         std::size_t point_bytes);

@@ -9,6 +9,7 @@
 
 #include "client/formats/laz/arithmetic_decoder.h"
 #include "client/formats/laz/colour_decoder.h"
+#include "client/formats/laz/first_items.h"
 #include "client/formats/laz/gps_time_decoder.h"
 #include "client/formats/laz/integer_decoder.h"
 #include "client/formats/laz/item_bytes.h"
@@ -175,6 +176,7 @@ class ExtraBytes final : public PointwiseItem {
 }  // namespace
 
 std::unique_ptr<PointwiseItem> MakePointwiseItem(const LazItem& item, const char* first) {
+  if (item.version == 1) return MakeFirstItem(item);
   switch (item.type) {
     case LazItemType::kPoint10:
       return std::make_unique<Point10>();

@@ -1,5 +1,6 @@
 // The parts of a point that LAZ codes one behind the other, point by point: POINT10, GPSTIME11,
-// RGB12 and BYTE of version 2 (M. Isenburg, "LASzip: lossless compression of LiDAR data", 2013).
+// RGB12 and BYTE, here of version 2 (M. Isenburg, "LASzip: lossless compression of LiDAR data",
+// 2013).
 #ifndef STRATA_CLIENT_FORMATS_LAZ_POINTWISE_ITEMS_H_
 #define STRATA_CLIENT_FORMATS_LAZ_POINTWISE_ITEMS_H_
 

@@ -16,8 +16,8 @@ namespace strata {
 // file's projection, as doubles until PointCloud::origin is taken out. Feet, as the file's
 // projection says (LasUnitsOf), become metres; without a projection they are metres.
 //
-// Compressed: chunks and layers as LASzip 2.0 and later write them, formats 0 to 3 and 6 to 10, and
-// COPC, which is that: all its points, in the order of its chunks.
+// Compressed: as any LASzip writes it, and COPC, which is that: all its points, in the order of its
+// chunks.
 //
 // Intensity, colour, time (of GPS, seconds) and label are there if one of them is not zero in the
 // file. The label is the classification, and 0 for its 1, "unclassified". Points that are withheld,
@@ -27,7 +27,8 @@ namespace strata {
 // compressed otherwise than above, coordinates in degrees.
 absl::StatusOr<PointCloud> ReadLas(absl::string_view bytes);
 
-// The same of a file, of which no more is held than the points and one compressed chunk. Errors
+// The same of a file, of which no more is held than the points and one compressed chunk, of
+// LASzip before 2.0 all of them. Errors
 // name no file. UNAVAILABLE if it cannot be read.
 absl::StatusOr<PointCloud> ReadLasFile(const std::filesystem::path& path);
 
