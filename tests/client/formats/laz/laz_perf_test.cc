@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include <gtest/gtest.h>
 
@@ -39,6 +40,13 @@ void ExpectSameAsLazPerf(const fs::path& file, const std::string& modules) {
   EXPECT_TRUE(ours == theirs);
 }
 
+// It knows versions 2 and 3, without wave packets.
+bool LazPerfReads(const fs::path& file) {
+  const std::string name = file.stem().string();
+  return file.extension() == ".laz" && name != "format4" && !absl::StartsWith(name, "first_") &&
+         !absl::StartsWith(name, "version4_");
+}
+
 TEST(LazPerfTest, RecordsAreTheSame) {
   const char* const modules = std::getenv("STRATA_NODE_MODULES");
   if (modules == nullptr || !fs::exists(fs::path(modules) / "laz-perf")) {
@@ -50,7 +58,7 @@ TEST(LazPerfTest, RecordsAreTheSame) {
   STRATA_REQUIRE_DATA(samples, "importer_samples");
   for (const auto& entry : fs::directory_iterator(samples)) files.push_back(entry);
   for (const fs::path& file : files) {
-    if (file.extension() == ".laz") ExpectSameAsLazPerf(file, modules);
+    if (LazPerfReads(file)) ExpectSameAsLazPerf(file, modules);
   }
 }
 
