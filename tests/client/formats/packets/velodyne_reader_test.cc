@@ -17,11 +17,13 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "client/formats/file_bytes.h"
+#include "client/formats/motion/placed_scans.h"
 #include "client/formats/scan_list.h"
 #include "client/formats/scan_reader.h"
 #include "core/cloud/point_cloud.h"
@@ -259,6 +261,17 @@ TEST_F(VelodyneReaderTest, ScansHaveNumbersAndTimes) {
   STRATA_ASSERT_OK(WriteFileBytes(poses, "0 0 1 0 0 0 0 0 1\n1 0 2 0 0 0 0 0 1\n"));
   STRATA_ASSERT_OK_AND_ASSIGN(const auto placed, ListScans({path}, {.poses = poses}));
   EXPECT_EQ(placed[1].T_map_scan.translation().x(), 2);
+  // A trajectory goes by the times that the scans have, since their names are none.
+  auto timed = scans;
+  STRATA_ASSERT_OK(TimeByName(timed));
+  EXPECT_EQ(timed[1].time, scans[1].time);
+  const auto tum = dir_.path() / "poses.tum";
+  const double seconds = absl::ToDoubleSeconds(*scans[1].time - absl::UnixEpoch());
+  STRATA_ASSERT_OK(WriteFileBytes(tum, absl::StrFormat("%.6f 3 0 0 0 0 0 1\n", seconds + 5e-4)));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto by_time, ListScans({path}, {.poses = tum}));
+  EXPECT_EQ(by_time[1].T_map_scan.translation().x(), 3);
+  EXPECT_THAT(by_time[0].pose_status,
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("no pose of time 1700000000.")));
   EXPECT_THAT(ReadScan(path),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("holds 2 scans")));
 }
