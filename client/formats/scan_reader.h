@@ -63,7 +63,7 @@ absl::StatusOr<std::vector<Station>> ListStations(const std::filesystem::path& p
 // PointCloud::origin. Passes ValidateCloud. NOT_FOUND; UNAVAILABLE if it cannot be read;
 // INVALID_ARGUMENT with file, line or byte and what was expected, or if no point is left or the
 // file holds several scans. Memory is bounded by about 20 times the file's size, of LAZ by what its
-// points take as LAS, of which a byte holds 100 at most.
+// points take as LAS, of which a byte holds 200 at most.
 absl::StatusOr<PointCloud> ReadScan(const std::filesystem::path& path,
                                     ScanFormat format = ScanFormat::kAuto,
                                     std::size_t* at_sensor = nullptr);

@@ -24,7 +24,7 @@ constexpr std::uint64_t kPlaceBytes = 8;
 constexpr std::uint64_t kTableHeadBytes = 8;
 // No two numbers of a chunk take more: each has its length, modelled bits and 24 others.
 constexpr std::uint64_t kMostEntryBytes = 16;
-constexpr std::uint64_t kMostPointsAByte = 100;
+constexpr std::uint64_t kMostPointsAByte = 200;
 
 // Contexts of the numbers of a chunk.
 constexpr std::size_t kPointsContext = 0;

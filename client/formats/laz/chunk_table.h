@@ -19,7 +19,7 @@ struct LazChunk {
 };
 
 // Of a file whose `points` points begin at `points_at`; the chunks that have any, in the order of
-// the file, within it, and none with more than 100 points a byte, which bounds how long reading
+// the file, within it, and none with more than 200 points a byte, which bounds how long reading
 // takes and what it makes. A file that is not chunked is one chunk. UNAVAILABLE; INVALID_ARGUMENT
 // naming what does not fit, and where the table is missing.
 absl::StatusOr<std::vector<LazChunk>> ReadChunkTable(ByteSource& source,
