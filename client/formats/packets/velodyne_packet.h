@@ -16,7 +16,7 @@ namespace strata {
 inline constexpr std::size_t kVelodyneBytes = 1206;  // of a data packet's payload
 inline constexpr std::size_t kVelodyneBlocks = 12;   // shots of all lasers, or two of 16
 
-// Bytes of that length.
+// The payload of a data packet.
 class VelodynePacket {
  public:
   // REQUIRES: kVelodyneBytes of them, which outlive it.
