@@ -33,6 +33,12 @@ std_msgs_msg_dds__Header_ HeaderOf(const OutHeader& header) {
   return {TimeOf(header.stamp_ns), Chars(header.frame)};
 }
 
+geometry_msgs_msg_dds__Pose_ PoseOf(const Pose& T) {
+  const Eigen::Vector3d p = T.translation();
+  const Eigen::Quaterniond q(T.rotation());
+  return {{p.x(), p.y(), p.z()}, {q.x(), q.y(), q.z(), q.w()}};
+}
+
 geometry_msgs_msg_dds__Quaternion_ TurnTo(const Eigen::Vector3d& way) {
   const double half = 0.5 * std::atan2(way.y(), way.x());
   return {0.0, 0.0, std::sin(half), std::cos(half)};
@@ -84,6 +90,22 @@ std::string SurfaceBytes(const std::vector<SurfaceTile>& tiles, double cell_size
     }
   }
   return bytes;
+}
+
+// A right-hand step δ on T_map_scan is one of Ad(T_base_scan) δ on T_map_base.
+Matrix6d RosCovariance(const Pose& T_map_scan,
+                       const Matrix6d& covariance,
+                       const Pose& T_base_scan) {
+  const Eigen::Matrix3d R_map_scan = T_map_scan.rotation();
+  const Eigen::Matrix3d R_map_base = R_map_scan * T_base_scan.rotation().transpose();
+  const Eigen::Vector3d lever = R_map_base * T_base_scan.translation();
+  Eigen::Matrix3d across;  // v -> lever × v
+  across << 0.0, -lever.z(), lever.y(), lever.z(), 0.0, -lever.x(), -lever.y(), lever.x(), 0.0;
+  Matrix6d J = Matrix6d::Zero();
+  J.topLeftCorner<3, 3>() = across * R_map_scan;
+  J.topRightCorner<3, 3>() = R_map_scan;
+  J.bottomLeftCorner<3, 3>() = R_map_scan;
+  return J * covariance * J.transpose();
 }
 
 absl::Status WriteGrid(const Entity& writer,
@@ -139,6 +161,37 @@ absl::Status WriteSurfaces(const Entity& writer, const OutHeader& header, std::s
   message.data._buffer = reinterpret_cast<std::uint8_t*>(bytes.data());
   message.data._length = message.data._maximum = message.row_step;
   message.is_dense = true;
+  return Node::Write(writer, &message);
+}
+
+absl::Status WritePose(const Entity& writer,
+                       const OutHeader& header,
+                       const Pose& T_map_base,
+                       const Matrix6d& covariance) {
+  geometry_msgs_msg_dds__PoseWithCovarianceStamped_ message{};
+  message.header = HeaderOf(header);
+  message.pose.pose = PoseOf(T_map_base);
+  Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(message.pose.covariance) = covariance;
+  return Node::Write(writer, &message);
+}
+
+absl::Status WriteDiagnosis(const Entity& writer,
+                            const OutHeader& header,
+                            const Diagnosis& diagnosis) {
+  std::vector<diagnostic_msgs_msg_dds__KeyValue_> values;
+  for (const auto& [key, value] : diagnosis.values) values.push_back({Chars(key), Chars(value)});
+  const std::string none;
+  diagnostic_msgs_msg_dds__DiagnosticStatus_ status{};
+  status.level = static_cast<std::uint8_t>(diagnosis.level);
+  status.name = Chars(diagnosis.name);
+  status.message = Chars(diagnosis.message);
+  status.hardware_id = Chars(none);
+  status.values._buffer = values.data();
+  status.values._length = status.values._maximum = static_cast<std::uint32_t>(values.size());
+  diagnostic_msgs_msg_dds__DiagnosticArray_ message{};
+  message.header = HeaderOf(header);
+  message.status._buffer = &status;
+  message.status._length = message.status._maximum = 1;
   return Node::Write(writer, &message);
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -31,6 +32,18 @@ std::vector<std::int8_t> OccupancyOf(const OccupancyGrid& grid);
 inline constexpr std::uint32_t kSurfaceBytes = 20;
 std::string SurfaceBytes(const std::vector<SurfaceTile>& tiles, double cell_size_m);
 
+// The covariance of geometry_msgs/PoseWithCovariance: of the base's position and of a turn about
+// the map's axes, out of that of a right-hand step on T_map_scan.
+Matrix6d RosCovariance(const Pose& T_map_scan, const Matrix6d& covariance, const Pose& T_base_scan);
+
+// diagnostic_msgs/DiagnosticStatus.
+struct Diagnosis {
+  enum class Level : std::uint8_t { kOk, kWarn, kError };
+  Level level = Level::kOk;
+  std::string name, message;
+  std::vector<std::pair<std::string, std::string>> values = {};
+};
+
 // nav_msgs/OccupancyGrid, drawn at the height `z_m`.
 absl::Status WriteGrid(const Entity& writer,
                        const OutHeader& header,
@@ -42,6 +55,15 @@ absl::Status WritePath(const Entity& writer,
                        const std::vector<Eigen::Vector3d>& waypoints);
 // sensor_msgs/PointCloud2 of SurfaceBytes.
 absl::Status WriteSurfaces(const Entity& writer, const OutHeader& header, std::string& bytes);
+// geometry_msgs/PoseWithCovarianceStamped, `covariance` as of RosCovariance.
+absl::Status WritePose(const Entity& writer,
+                       const OutHeader& header,
+                       const Pose& T_map_base,
+                       const Matrix6d& covariance);
+// diagnostic_msgs/DiagnosticArray of one.
+absl::Status WriteDiagnosis(const Entity& writer,
+                            const OutHeader& header,
+                            const Diagnosis& diagnosis);
 // tf2_msgs/TFMessage with T_frame_child.
 absl::Status WriteTransform(const Entity& writer,
                             const OutHeader& header,

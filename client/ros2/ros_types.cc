@@ -33,6 +33,7 @@ constexpr NamedDescriptor kDescriptors[] = {
      &geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc},
     {"nav_msgs/OccupancyGrid", &nav_msgs_msg_dds__OccupancyGrid__desc},
     {"nav_msgs/Path", &nav_msgs_msg_dds__Path__desc},
+    {"diagnostic_msgs/DiagnosticArray", &diagnostic_msgs_msg_dds__DiagnosticArray__desc},
 };
 
 bool IsWord(absl::string_view word) {

@@ -48,6 +48,7 @@ TEST(RosTypesTest, DescriptorsHaveTheNamesOfTheirTypes) {
                            "nav_msgs/Odometry",
                            "nav_msgs/OccupancyGrid",
                            "nav_msgs/Path",
+                           "diagnostic_msgs/DiagnosticArray",
                            "geometry_msgs/PoseStamped",
                            "geometry_msgs/PoseWithCovarianceStamped"}) {
     const dds_topic_descriptor_t* const descriptor = DescriptorOf(type);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -114,6 +115,10 @@ std::string PoseCdr(const CdrHeader& header, const Pose& pose) {
   return Writing().Header(header).Place(pose).Take();
 }
 
+std::string InitialPoseCdr(const CdrHeader& header, const Pose& pose) {
+  return Writing().Header(header).Place(pose).Zeros(36).Take();
+}
+
 std::vector<CdrTransform> ReadTransforms(const std::string& cdr) {
   Reading reading(cdr);
   std::vector<CdrTransform> transforms(reading.Get<std::uint32_t>());
@@ -149,6 +154,32 @@ CdrPath ReadPath(const std::string& cdr) {
     pose = reading.Place();
   }
   return path;
+}
+
+CdrPose ReadPoseWithCovariance(const std::string& cdr) {
+  Reading reading(cdr);
+  CdrPose pose;
+  pose.header = reading.Header();
+  pose.pose = reading.Place();
+  for (double& number : pose.covariance) number = reading.Get<double>();
+  return pose;
+}
+
+CdrDiagnosis ReadDiagnosis(const std::string& cdr) {
+  Reading reading(cdr);
+  CdrDiagnosis diagnosis;
+  diagnosis.header = reading.Header();
+  reading.Get<std::uint32_t>();
+  diagnosis.level = reading.Get<std::uint8_t>();
+  diagnosis.name = reading.Get<std::string>();
+  diagnosis.message = reading.Get<std::string>();
+  reading.Get<std::string>();  // of which hardware
+  const auto values = reading.Get<std::uint32_t>();
+  for (std::uint32_t i = 0; i < values; ++i) {
+    const auto key = reading.Get<std::string>();
+    diagnosis.values[key] = reading.Get<std::string>();
+  }
+  return diagnosis;
 }
 
 CdrCloud ReadCloud(const std::string& cdr) {

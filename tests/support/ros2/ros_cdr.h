@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,8 @@ std::string CloudCdr(const CdrHeader& header, const std::string& data);
 std::string OdometryCdr(const CdrHeader& header, const std::string& child, const Pose& pose);
 std::string TransformCdr(const CdrHeader& header, const std::string& child, const Pose& pose);
 std::string PoseCdr(const CdrHeader& header, const Pose& pose);
+// geometry_msgs/PoseWithCovarianceStamped, as of RViz.
+std::string InitialPoseCdr(const CdrHeader& header, const Pose& pose);
 
 struct CdrTransform {
   CdrHeader header;
@@ -43,6 +46,22 @@ struct CdrPath {
   std::vector<Pose> poses;
 };
 CdrPath ReadPath(const std::string& cdr);
+
+struct CdrPose {
+  CdrHeader header;
+  Pose pose = Pose::Identity();
+  std::array<double, 36> covariance{};
+};
+CdrPose ReadPoseWithCovariance(const std::string& cdr);
+
+struct CdrDiagnosis {
+  CdrHeader header;
+  std::uint8_t level = 0;
+  std::string name, message;
+  std::map<std::string, std::string> values;
+};
+// Of the first status; there must be one.
+CdrDiagnosis ReadDiagnosis(const std::string& cdr);
 
 struct CdrCloud {
   CdrHeader header;
