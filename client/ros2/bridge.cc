@@ -12,8 +12,9 @@
 
 #include "client/formats/bags/cloud_poses.h"
 #include "client/formats/bags/ros_messages.h"
+#include "client/ros2/follower.h"
 #include "client/ros2/goal_planner.h"
-#include "client/ros2/localizer.h"
+#include "client/ros2/keeper.h"
 #include "client/ros2/node.h"
 #include "client/ros2/pose_book.h"
 #include "client/ros2/pump.h"
@@ -26,7 +27,7 @@ namespace strata::ros2 {
 namespace {
 
 struct Writers {
-  Entity map, plan, surfaces, transforms;
+  Entity map, plan, surfaces, pose, diagnosis, transforms;
 };
 
 absl::StatusOr<Writers> MakeWriters(Node& node, const Options& options) {
@@ -38,6 +39,12 @@ absl::StatusOr<Writers> MakeWriters(Node& node, const Options& options) {
                           node.MakeWriter(options.plan_topic, "nav_msgs/Path", {.depth = 1}));
   STRATA_ASSIGN_OR_RETURN(writers.surfaces,
                           node.MakeWriter(options.surfaces_topic, kPointCloudType, kLatched));
+  STRATA_ASSIGN_OR_RETURN(
+      writers.pose,
+      node.MakeWriter(options.pose_topic, "geometry_msgs/PoseWithCovarianceStamped", kLatched));
+  STRATA_ASSIGN_OR_RETURN(
+      writers.diagnosis,
+      node.MakeWriter("/diagnostics", "diagnostic_msgs/DiagnosticArray", {.depth = 10}));
   if (!options.no_tf) {
     STRATA_ASSIGN_OR_RETURN(writers.transforms,
                             node.MakeWriter("/tf", "tf2_msgs/TFMessage", {.depth = 100}));
@@ -53,7 +60,7 @@ PoseBook::Options BookOptions(const Options& options) {
   }
   book.T_base_cloud = options.mount;
   book.T_map_fixed = options.start.value_or(Pose::Identity());
-  book.located = !options.localize;
+  book.located = !options.localize && !options.localize_only;
   return book;
 }
 
@@ -67,8 +74,15 @@ absl::Status CheckMap(const Options& options, const ClientOptions& client, Talk&
         absl::StrCat(known.message(), "; make it: strata map create ", options.map));
   }
   if (!absl::IsUnavailable(known)) return cli::Explained(known, options.server);
-  talk.SayNew("server", NobodyAnswers(options.server.server));
+  talk.SayNew("server", NobodyAnswers(options.server.server, !options.localize_only));
   return absl::OkStatus();
+}
+
+KeeperOptions ScansAsIn(const Options& options, const std::string& trajectory) {
+  return {options.map,
+          trajectory,
+          options.align == "on" ? Alignment::kOn : Alignment::kOff,
+          options.deskew == "on"};
 }
 
 }  // namespace
@@ -77,50 +91,59 @@ absl::StatusOr<Summary> RunBridge(const Options& options, const Stop& stop, Talk
   Summary summary;
   summary.trajectory = options.trajectory.empty() ? TrajectoryAt(absl::Now()) : options.trajectory;
   STRATA_ASSIGN_OR_RETURN(const ClientOptions client, cli::ClientOptionsOf(options.server));
-  STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<Spool> spool, Spool::Open(options.spool));
+  std::unique_ptr<Spool> spool;
+  if (!options.localize_only) {
+    STRATA_ASSIGN_OR_RETURN(spool, Spool::Open(options.spool));
+  }
   STRATA_RETURN_IF_ERROR(CheckMap(options, client, talk));
   STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<Node> node, Node::Create(options.domain));
   STRATA_ASSIGN_OR_RETURN(const Writers writers, MakeWriters(*node, options));
   PoseBook book(BookOptions(options));
-  const ServerLink link({options.server, client, options.map, summary.trajectory}, *spool, talk);
-  const Where where(book, link, options.map_frame);
+  const ServerLink link(
+      {options.server, client, options.map, summary.trajectory}, spool.get(), talk);
+  Where where(book, link, options.map_frame);
+  const KeeperOptions scans = ScansAsIn(options, summary.trajectory);
   {
-    Keeper keeper({options.map,
-                   summary.trajectory,
-                   options.align == "on" ? Alignment::kOn : Alignment::kOff,
-                   options.deskew == "on"},
-                  book,
-                  *spool,
-                  talk);
+    std::optional<Keeper> keeper;
+    if (spool != nullptr) keeper.emplace(scans, book, *spool, talk);
+    // Poses that are taken as they are need no better ones.
+    Follower follower({.scans = scans, .guess = options.start, .goes_on = options.align == "on"},
+                      book,
+                      link,
+                      where,
+                      writers.pose,
+                      talk);
     GoalPlanner planner({options.map, options.profile}, link, where, writers.plan, talk);
     const WorldPublisher world(
         {options.map, options.profile}, link, where, writers.map, writers.surfaces, talk);
-    std::optional<Localizer> localizer;
-    if (options.localize) localizer.emplace(options.map, options.start, book, link, talk);
     Pump pump(options,
               {.node = *node,
                .transform_writer = writers.transforms,
+               .diagnosis_writer = writers.diagnosis,
                .book = book,
-               .keeper = keeper,
+               .keeper = keeper.has_value() ? &*keeper : nullptr,
+               .spool = spool.get(),
+               .follower = follower,
                .planner = planner,
                .where = where,
-               .localizer = localizer.has_value() ? &*localizer : nullptr,
                .talk = talk});
     STRATA_RETURN_IF_ERROR(pump.Begin());
     talk.Say(absl::StrCat("listening in domain ",
                           options.domain,
-                          "; trajectory ",
-                          summary.trajectory,
-                          " of map ",
+                          spool != nullptr ? absl::StrCat("; trajectory ", summary.trajectory) : "",
+                          spool != nullptr ? " of map " : "; map ",
                           options.map));
-    const absl::Status ran = pump.Run(stop, *spool);
+    const absl::Status ran = pump.Run(stop);
     link.EndCalls();  // or a long search would be waited for
     STRATA_RETURN_IF_ERROR(ran);
     summary.intake = pump.counts();
-    keeper.Finish();
-    summary.kept = keeper.counts();
+    summary.followed = follower.status();
+    if (keeper.has_value()) {
+      keeper->Finish();
+      summary.kept = keeper->counts();
+    }
   }
-  summary.spool = spool->status();
+  if (spool != nullptr) summary.spool = spool->status();
   return summary;
 }
 

@@ -10,6 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "client/ros2/follower.h"
 #include "client/ros2/intake.h"
 #include "client/ros2/keeper.h"
 #include "client/ros2/options.h"
@@ -24,6 +25,7 @@ struct Summary {
   std::string trajectory;
   IntakeCounts intake;
   KeeperCounts kept;
+  FollowerStatus followed;
   SpoolStatus spool;
 };
 

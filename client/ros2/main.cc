@@ -45,6 +45,9 @@ void Print(const Options& options, const Summary& summary) {
                           {"back_in_time", summary.intake.back_in_time},
                           {"crowded_out", summary.intake.crowded_out},
                           {"postponed", summary.intake.postponed},
+                          {"tracked", summary.followed.tracked},
+                          {"predicted", summary.followed.predicted},
+                          {"lost", summary.followed.lost},
                           {"sent", summary.spool.sent},
                           {"waiting", summary.spool.waiting},
                           {"refused", summary.spool.refused},
@@ -66,14 +69,16 @@ int Main(int argc, char** argv) {
   CLI::App app(
       "strata-ros2: a robot of ROS 2 in a map of Strata, without ROS on this machine. Clouds and "
       "poses come in over DDS, keyframes go to the server by way of a spool on this disk; out go "
-      "the map of the floor that the robot is on, surfaces, paths, and where its odometry is in "
-      "the map",
+      "the map of the floor that the robot is on, surfaces, paths, and where the robot and its "
+      "odometry are in the map",
       "strata-ros2");
   app.footer(
       "Lengths are in metres, angles in radians. ROS_DOMAIN_ID, ROS_LOCALHOST_ONLY=1 and "
       "CYCLONEDDS_URI count as for\nnodes of ROS 2. Ctrl-C or SIGTERM ends it. Exit code: 0 "
-      "ended so, 1 failed, 2 wrong usage.\n\nExample:\n  strata-ros2 campus --topic /ouster/points "
-      "--poses-from /odom --every 0.5m --spool /var/spool/strata");
+      "ended so, 1 failed, 2 wrong usage.\n\nExamples:\n  strata-ros2 campus --topic "
+      "/ouster/points "
+      "--poses-from /odom --every 0.5m --spool /var/spool/strata\n"
+      "  strata-ros2 campus --topic /ouster/points --localize-only");
   app.set_version_flag("--version", "strata-ros2 " STRATA_VERSION);
   Options options;
   AddOptions(app, options);

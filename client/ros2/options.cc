@@ -61,6 +61,21 @@ void AddInputs(CLI::App& app, Options& options) {
                "Ask the server where the first clouds were taken, near --start or anywhere, and "
                "keep nothing before that is known")
       ->group(kGroup);
+  app.add_flag("--localize-only",
+               options.localize_only,
+               "The same, and keep nothing at all: only say where the robot is, as amcl does")
+      ->excludes("--spool")
+      ->excludes("--trajectory")
+      ->excludes("--align")
+      ->excludes("--every")
+      ->group(kGroup);
+  app.add_option("--initial-pose",
+                 options.initial_pose,
+                 "Where somebody says that the robot is, roughly: "
+                 "geometry_msgs/msg/PoseWithCovarianceStamped")
+      ->type_name("TOPIC")
+      ->group(kGroup)
+      ->capture_default_str();
   app.add_option("--goals", options.goals, "Goals: geometry_msgs/msg/PoseStamped")
       ->type_name("TOPIC")
       ->group(kGroup)
@@ -76,6 +91,9 @@ void AddOutputs(CLI::App& app, Options& options) {
       options.map_topic,
       "The floor that the robot is on: nav_msgs/msg/OccupancyGrid");
   add("--plan-topic", options.plan_topic, "A path for each goal: nav_msgs/msg/Path");
+  add("--pose-topic",
+      options.pose_topic,
+      "Where the robot is, as it is tracked: geometry_msgs/msg/PoseWithCovarianceStamped");
   add("--surfaces-topic",
       options.surfaces_topic,
       "The surfaces around the robot: sensor_msgs/msg/PointCloud2");
@@ -101,9 +119,8 @@ void AddOptions(CLI::App& app, Options& options) {
   app.add_option("--spool",
                  options.spool,
                  "Directory where scans lie until the server has acknowledged them; made if it is "
-                 "not there")
-      ->type_name("DIR")
-      ->required();
+                 "not there. Needed but with --localize-only")
+      ->type_name("DIR");
   cli::AddServerOptions(app, options.server);
   app.add_option("--domain", options.domain, "Domain of DDS; else ROS_DOMAIN_ID")
       ->check(CLI::Range(0, kMostDomain))
@@ -128,12 +145,18 @@ void AddOptions(CLI::App& app, Options& options) {
 
 absl::Status ValidateOptions(const Options& options) {
   STRATA_RETURN_IF_ERROR(ValidateName("map name", options.map));
+  if (options.spool.empty() && !options.localize_only) {
+    return absl::InvalidArgumentError(
+        "--spool DIR is needed: where scans lie until the server has acknowledged them");
+  }
   if (!options.trajectory.empty()) {
     STRATA_RETURN_IF_ERROR(ValidateName("--trajectory", options.trajectory));
   }
   STRATA_RETURN_IF_ERROR(Annotate(ParseKeyframeSpacing(options.every).status(), "--every"));
   for (const auto& [name, topic] : {std::pair{"--topic", options.clouds},
                                     {"--goals", options.goals},
+                                    {"--initial-pose", options.initial_pose},
+                                    {"--pose-topic", options.pose_topic},
                                     {"--map-topic", options.map_topic},
                                     {"--plan-topic", options.plan_topic},
                                     {"--surfaces-topic", options.surfaces_topic}}) {

@@ -25,9 +25,11 @@ struct Options {
   std::string clouds = "/points";
   std::string poses_from = "/odom";  // or tf:odom->base_link
   std::string goals = "/goal_pose";
+  std::string initial_pose = "/initialpose";
   std::string every = "0.5m,30deg";
   std::optional<Pose> mount, start;
   bool localize = false;
+  bool localize_only = false;  // and nothing is kept
   std::string align = "on";
   std::string deskew = "on";
   // Out.
@@ -35,6 +37,7 @@ struct Options {
   std::string profile = "default";
   std::string map_topic = "/map";
   std::string plan_topic = "/strata/plan";
+  std::string pose_topic = "/amcl_pose";
   std::string surfaces_topic = "/strata/surfaces";
   bool no_tf = false;
 };

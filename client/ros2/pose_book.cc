@@ -113,6 +113,11 @@ absl::StatusOr<CloudPose> PoseBook::At(const std::string& frame, std::int64_t st
   return pose;
 }
 
+absl::StatusOr<Pose> PoseBook::Base(std::int64_t stamp_ns) {
+  absl::MutexLock lock(&mutex_);
+  return BaseAt(stamp_ns);
+}
+
 absl::StatusOr<Pose> PoseBook::InFixed(const std::string& frame) {
   absl::MutexLock lock(&mutex_);
   if (!newest_.has_value()) return absl::NotFoundError("no pose of the robot has come yet");

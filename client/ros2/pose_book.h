@@ -55,7 +55,9 @@ class PoseBook {
   // The pose of a cloud as it is uploaded. NOT_FOUND where nothing says it; it may come yet while
   // no pose as late as the stamp has.
   absl::StatusOr<CloudPose> At(const std::string& frame, std::int64_t stamp_ns);
-  // T_fixed_frame at a stamp, or now. NOT_FOUND.
+  // T_fixed_base at a stamp. NOT_FOUND.
+  absl::StatusOr<Pose> Base(std::int64_t stamp_ns);
+  // T_fixed_frame now. NOT_FOUND.
   absl::StatusOr<Pose> InFixed(const std::string& frame);
   std::optional<BasePose> newest() const;
   PoseFrames frames() const;

@@ -12,7 +12,9 @@
 #include "absl/time/time.h"
 
 #include "client/formats/bags/keyframes.h"
+#include "client/formats/bags/pose_track.h"
 #include "client/formats/bags/ros_messages.h"
+#include "client/ros2/diagnosis.h"
 #include "client/ros2/messages.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
@@ -44,6 +46,7 @@ Pump::Pump(const Options& options, const Parts& parts)
               "geometry_msgs/PoseWithCovarianceStamped"},
              kPoseDepth),
       goals_(options.goals, {"geometry_msgs/PoseStamped"}, 1),
+      guesses_(options.initial_pose, {"geometry_msgs/PoseWithCovarianceStamped"}, 1),
       intake_(parts.book, *ParseKeyframeSpacing(options.every)) {}
 
 absl::Status Pump::Begin() {
@@ -56,17 +59,16 @@ absl::Status Pump::Begin() {
   return absl::OkStatus();
 }
 
-absl::Status Pump::Run(const Stop& stop, const Spool& spool) {
+absl::Status Pump::Run(const Stop& stop) {
   const absl::Time begun = SteadyNow();
+  tracked_ = begun;
   absl::Time next_transform = begun, next_report = begun;
   while (!stop.requested()) {
     parts_.node.Wait(kTransformEvery);
     if (parts_.node.UpdateOffers()) STRATA_RETURN_IF_ERROR(Follow());
     Read();
     const absl::Time now = SteadyNow();
-    for (Keyframe& keyframe : intake_.Decide(now, parts_.keeper.room())) {
-      parts_.keeper.Put(std::move(keyframe));
-    }
+    Keep(now);
     if (now >= next_transform) {
       next_transform = now + kTransformEvery;
       SayWhere();
@@ -75,9 +77,17 @@ absl::Status Pump::Run(const Stop& stop, const Spool& spool) {
     next_report = now + kReportEvery;
     if (now - begun > kBeforeSaying) ReportMissing();
     ReportClouds();
-    ReportSpool(spool.status());
+    if (parts_.spool != nullptr) ReportSpool(parts_.spool->status());
+    Diagnose(now);
   }
   return absl::OkStatus();
+}
+
+void Pump::Keep(absl::Time now) {
+  if (parts_.keeper == nullptr) return;
+  for (Keyframe& keyframe : intake_.Decide(now, parts_.keeper->room())) {
+    parts_.keeper->Put(std::move(keyframe));
+  }
 }
 
 bool Pump::by_transforms() const { return absl::StartsWith(options_.poses_from, "tf:"); }
@@ -86,6 +96,7 @@ absl::Status Pump::Follow() {
   const std::vector<Offer> offers = parts_.node.offers();
   STRATA_RETURN_IF_ERROR(clouds_.Follow(parts_.node, offers));
   STRATA_RETURN_IF_ERROR(goals_.Follow(parts_.node, offers));
+  STRATA_RETURN_IF_ERROR(guesses_.Follow(parts_.node, offers));
   return by_transforms() ? absl::OkStatus() : poses_.Follow(parts_.node, offers);
 }
 
@@ -96,6 +107,7 @@ void Pump::Read() {
   ReadPoses();
   ReadClouds();
   ReadGoals();
+  ReadGuesses();
 }
 
 void Pump::ReadTransforms(const Entity& reader, const std::string& topic, bool fixed) {
@@ -115,11 +127,11 @@ void Pump::ReadPoses() {
   }
 }
 
+// Nothing is kept before it is known where the robot is.
 void Pump::ReadClouds() {
   for (CdrMessage& message : clouds_.Take(kCloudDepth)) {
-    if (parts_.localizer != nullptr && !parts_.localizer->done()) {
-      parts_.localizer->Put(std::move(message));
-    } else {
+    if (parts_.follower.wanted()) parts_.follower.Put(message);
+    if (parts_.keeper != nullptr && parts_.book.located()) {
       intake_.Add(std::move(message), SteadyNow());
     }
   }
@@ -130,6 +142,29 @@ void Pump::ReadGoals() {
     const auto goal = ReadRosPoses(goals_.topic(), message.bytes);
     Tell(options_.goals, goal.status());
     if (goal.ok()) parts_.planner.Put(goal->front());
+  }
+}
+
+absl::StatusOr<Pose> Pump::PoseInMap(const RosPose& pose) const {
+  PoseTrack one;
+  STRATA_RETURN_IF_ERROR(one.Add(pose.header.stamp_ns, pose.position_m, pose.quaternion));
+  STRATA_ASSIGN_OR_RETURN(const Pose T_map_frame, parts_.where.InMap(pose.header.frame));
+  Pose T_map_base = Normalized(T_map_frame * one.Last());
+  // RViz points at the plane of height 0, whatever storey it shows.
+  const std::optional<Pose> now = parts_.where.T_map_base();
+  if (now.has_value() && T_map_base.translation().z() == 0.0) {
+    T_map_base.translation().z() = now->translation().z();
+  }
+  return T_map_base;
+}
+
+void Pump::ReadGuesses() {
+  for (const CdrMessage& message : guesses_.Take(1)) {
+    const auto poses = ReadRosPoses(guesses_.topic(), message.bytes);
+    const absl::StatusOr<Pose> T_map_base =
+        poses.ok() ? PoseInMap(poses->front()) : absl::StatusOr<Pose>(poses.status());
+    Tell(options_.initial_pose, T_map_base.status());
+    if (T_map_base.ok()) parts_.follower.Guess(*T_map_base);
   }
 }
 
@@ -157,6 +192,22 @@ void Pump::SayWhere() {
                       {options_.map_frame, stamp_ns + kAheadNs},
                       fixed,
                       parts_.where.T_map_fixed()));
+}
+
+void Pump::Diagnose(absl::Time now) {
+  if (!parts_.follower.wanted()) return;
+  const FollowerStatus status = parts_.follower.status();
+  const Diagnosis diagnosis =
+      DiagnosisOf(status, parts_.keeper != nullptr, parts_.where.known(), now);
+  Tell("/diagnostics",
+       WriteDiagnosis(parts_.diagnosis_writer, {"", parts_.where.stamp_ns()}, diagnosis));
+  const bool tracked = diagnosis.level == Diagnosis::Level::kOk;
+  if (tracked) tracked_ = now;
+  // Others say that no server answers.
+  if (now - tracked_ > kBeforeSaying && !absl::IsUnavailable(status.trouble)) {
+    parts_.talk.SaySeldom("place", diagnosis.message);
+  }
+  parts_.talk.SayNew("tracked", tracked ? "the robot is tracked in the map" : "");
 }
 
 void Pump::ReportMissing() {

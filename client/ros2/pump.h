@@ -6,12 +6,13 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/time/time.h"
 
+#include "client/ros2/follower.h"
 #include "client/ros2/goal_planner.h"
 #include "client/ros2/intake.h"
 #include "client/ros2/keeper.h"
 #include "client/ros2/listener.h"
-#include "client/ros2/localizer.h"
 #include "client/ros2/node.h"
 #include "client/ros2/options.h"
 #include "client/ros2/pose_book.h"
@@ -29,11 +30,13 @@ class Pump {
   struct Parts {
     Node& node;
     const Entity& transform_writer;  // none: nothing is said on /tf
+    const Entity& diagnosis_writer;
     PoseBook& book;
-    Keeper& keeper;
+    Keeper* keeper;      // null: nothing is kept,
+    const Spool* spool;  // and there is none
+    Follower& follower;
     GoalPlanner& planner;
     const Where& where;
-    Localizer* localizer;  // or null
     Talk& talk;
   };
   // REQUIRES: ValidateOptions.
@@ -41,7 +44,7 @@ class Pump {
 
   absl::Status Begin();
   // Until `stop`.
-  absl::Status Run(const Stop& stop, const Spool& spool);
+  absl::Status Run(const Stop& stop);
   const IntakeCounts& counts() const { return intake_.counts(); }
 
  private:
@@ -53,8 +56,12 @@ class Pump {
   void ReadPoses();
   void ReadClouds();
   void ReadGoals();
+  void ReadGuesses();
+  absl::StatusOr<Pose> PoseInMap(const RosPose& pose) const;
+  void Keep(absl::Time now);
   void WarnOfRival(const std::vector<RosPose>& transforms);
   void SayWhere();
+  void Diagnose(absl::Time now);
   // To people: what is missing, and what came of the rest.
   void ReportMissing();
   void ReportClouds();
@@ -63,9 +70,10 @@ class Pump {
 
   const Options& options_;
   const Parts parts_;
-  Listener clouds_, poses_, goals_;
+  Listener clouds_, poses_, goals_, guesses_;
   Entity transforms_, static_transforms_;
   Intake intake_;
+  absl::Time tracked_;  // last
 };
 
 }  // namespace strata::ros2

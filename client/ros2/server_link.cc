@@ -23,11 +23,12 @@ constexpr absl::Duration kRetryAfter = absl::Seconds(1);
 
 }  // namespace
 
-std::string NobodyAnswers(const std::string& server) {
-  return absl::StrCat("no stratad answers at ", server, ": scans wait on disk until one does");
+std::string NobodyAnswers(const std::string& server, bool scans) {
+  return absl::StrCat(
+      "no stratad answers at ", server, scans ? ": scans wait on disk until one does" : "");
 }
 
-ServerLink::ServerLink(const LinkOptions& options, Spool& spool, Talk& talk)
+ServerLink::ServerLink(const LinkOptions& options, Spool* spool, Talk& talk)
     : options_(options), spool_(spool), talk_(talk), thread_([this] { Loop(); }) {}
 
 ServerLink::~ServerLink() {
@@ -40,7 +41,7 @@ api::Database* ServerLink::database() const {
   return database_.get();
 }
 
-Pose ServerLink::correction() const {
+Correction ServerLink::correction() const {
   absl::MutexLock lock(&mutex_);
   return correction_;
 }
@@ -58,7 +59,7 @@ void ServerLink::Pause() {
 absl::Status ServerLink::Connected() {
   absl::StatusOr<std::unique_ptr<api::Database>> database = Connect(options_.client);
   if (!database.ok()) return database.status();
-  sender_ = std::make_unique<SpoolSender>(spool_, **database);
+  if (spool_ != nullptr) sender_ = std::make_unique<SpoolSender>(*spool_, **database);
   absl::MutexLock lock(&mutex_);
   database_ = *std::move(database);
   return absl::OkStatus();
@@ -84,11 +85,13 @@ void ServerLink::Loop() {
 
 std::string ServerLink::WhyWaiting(const absl::Status& status) const {
   if (absl::IsUnavailable(status)) {
-    return NobodyAnswers(options_.server.server);
+    return NobodyAnswers(options_.server.server, spool_ != nullptr);
   }
   if (absl::IsNotFound(status)) {
-    return absl::StrCat(
-        status.message(), "; make it: strata map create ", options_.map, "; scans wait on disk");
+    return absl::StrCat(status.message(),
+                        "; make it: strata map create ",
+                        options_.map,
+                        spool_ != nullptr ? "; scans wait on disk" : "");
   }
   return std::string(cli::Explained(status, options_.server).message());
 }
@@ -103,15 +106,18 @@ absl::Status ServerLink::Take(const api::MapUpdate& update) {
     newest = &scan;
     newest_ = scan.id.sequence;
   }
-  Pose correction = Pose::Identity();
+  Correction correction;
   if (newest != nullptr) {
     const absl::StatusOr<ScanInfo> info = database()->scans().Get(call_, options_.map, newest->id);
     // Deleted since: the next update says so.
     if (!info.ok() && !absl::IsNotFound(info.status())) return info.status();
-    if (info.ok()) correction = newest->T_map_scan * info->header.T_map_scan.inverse();
+    if (info.ok()) {
+      correction = {absl::ToUnixNanos(info->header.time),
+                    Normalized(newest->T_map_scan * info->header.T_map_scan.inverse())};
+    }
   }
   absl::MutexLock lock(&mutex_);
-  if (newest != nullptr) correction_ = Normalized(correction);
+  if (newest != nullptr) correction_ = correction;
   if (update.whole || !update.tiles.empty()) ++changes_;
   return absl::OkStatus();
 }

@@ -23,8 +23,8 @@
 
 namespace strata::ros2 {
 
-// What is said while no server answers.
-std::string NobodyAnswers(const std::string& server);
+// What is said while no server answers, of scans that wait if there are any.
+std::string NobodyAnswers(const std::string& server, bool scans);
 
 struct LinkOptions {
   cli::ServerOptions server;
@@ -32,11 +32,18 @@ struct LinkOptions {
   std::string map, trajectory;
 };
 
+// What moves an uploaded pose of the robot, or where its odometry puts it, to where the map has it:
+// by its newest scan that is in the map, taken then. The identity until there is one.
+struct Correction {
+  std::int64_t stamp_ns = 0;
+  Pose T_now_uploaded = Pose::Identity();
+};
+
 // A thread that waits for the server for as long as it takes. Thread-safe.
 class ServerLink {
  public:
-  // All outlive it.
-  ServerLink(const LinkOptions& options, Spool& spool, Talk& talk);
+  // All outlive it. Without a spool nothing is sent.
+  ServerLink(const LinkOptions& options, Spool* spool, Talk& talk);
   // Ends it within the time of one message; what was not sent stays in the spool.
   ~ServerLink();
   ServerLink(const ServerLink&) = delete;
@@ -48,9 +55,7 @@ class ServerLink {
   const api::Call& call() const { return call_; }
   // Ends all calls but those that send what waits.
   void EndCalls() const { call_.stop.Request(); }
-  // What moves an uploaded pose of the robot, or where its odometry puts it, to where the map has
-  // it: the correction of the newest scan that is in the map. The identity until there is one.
-  Pose correction() const;
+  Correction correction() const;
   // Grows with every change of the map's tiles; 0 until they are known.
   std::uint64_t changes() const;
 
@@ -62,12 +67,12 @@ class ServerLink {
   void Pause();
 
   const LinkOptions options_;
-  Spool& spool_;
+  Spool* const spool_;
   Talk& talk_;
   const api::Call call_;
   mutable absl::Mutex mutex_;
   std::unique_ptr<api::Database> database_ ABSL_GUARDED_BY(mutex_);
-  Pose correction_ ABSL_GUARDED_BY(mutex_) = Pose::Identity();
+  Correction correction_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t changes_ ABSL_GUARDED_BY(mutex_) = 0;
   std::optional<std::uint64_t> newest_;  // scan of the robot that is in the map; of the thread
   std::unique_ptr<SpoolSender> sender_;  // of the thread

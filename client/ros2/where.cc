@@ -6,12 +6,25 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
 
 #include "core/common/status.h"
 
 namespace strata::ros2 {
 
-Pose Where::T_map_fixed() const { return Normalized(link_.correction() * book_.start()); }
+void Where::SetTracked(const TrackedFix& fix) {
+  absl::MutexLock lock(&mutex_);
+  tracked_ = fix;
+}
+
+Pose Where::T_map_fixed() const {
+  const Correction mapped = link_.correction();
+  {
+    absl::MutexLock lock(&mutex_);
+    if (tracked_.has_value() && tracked_->stamp_ns >= mapped.stamp_ns) return tracked_->T_map_fixed;
+  }
+  return Normalized(mapped.T_now_uploaded * book_.start());
+}
 
 std::optional<Pose> Where::T_map_base() const {
   const std::optional<BasePose> base = book_.newest();

@@ -1,4 +1,4 @@
-// Where the robot is in the map: its odometry, corrected by what the map made of its scans.
+// Where the robot is in the map: its odometry, corrected by where it was seen in the map last.
 #ifndef STRATA_CLIENT_ROS2_WHERE_H_
 #define STRATA_CLIENT_ROS2_WHERE_H_
 
@@ -7,7 +7,9 @@
 #include <string>
 #include <utility>
 
+#include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
 
 #include "client/ros2/pose_book.h"
 #include "client/ros2/server_link.h"
@@ -15,11 +17,21 @@
 
 namespace strata::ros2 {
 
-// Thread-safe; what it looks at outlives it.
+// By a scan that was tracked.
+struct TrackedFix {
+  std::int64_t stamp_ns = 0;
+  Pose T_map_fixed = Pose::Identity();
+};
+
+// The newest counts of the last scan that was tracked and the last of the robot's scans that is in
+// the map: whoever maps goes on by what it maps where it is not tracked, and who does neither stays
+// as it was. Thread-safe; what it looks at outlives it.
 class Where {
  public:
   Where(PoseBook& book, const ServerLink& link, std::string map_frame)
       : book_(book), link_(link), map_frame_(std::move(map_frame)) {}
+
+  void SetTracked(const TrackedFix& fix);
 
   const std::string& map_frame() const { return map_frame_; }
   // T_map_odom: of the frame that the odometry calls fixed.
@@ -36,6 +48,8 @@ class Where {
   PoseBook& book_;
   const ServerLink& link_;
   const std::string map_frame_;
+  mutable absl::Mutex mutex_;
+  std::optional<TrackedFix> tracked_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace strata::ros2

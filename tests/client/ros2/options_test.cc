@@ -58,6 +58,27 @@ TEST(Ros2OptionsTest, WhatIsWrongIsNamed) {
   }
 }
 
+TEST(Ros2OptionsTest, WhoOnlyWantsToKnowWhereItIsNeedsNoSpool) {
+  const auto parsed = [](std::vector<std::string> words) {
+    CLI::App app;
+    Options options;
+    AddOptions(app, options);
+    std::reverse(words.begin(), words.end());
+    app.parse(words);
+    return options;
+  };
+  const Options options = parsed({"campus", "--localize-only"});
+  EXPECT_THAT(ValidateOptions(options), IsOk());
+  EXPECT_EQ(options.pose_topic, "/amcl_pose");
+  EXPECT_THAT(std::string(ValidateOptions(parsed({"campus"})).message()),
+              ::testing::HasSubstr("--spool"));
+  // What would not be listened to is refused.
+  for (const char* more : {"--every", "--trajectory", "--align", "--spool"}) {
+    const std::string value = std::string(more) == "--align" ? "on" : "1m";
+    EXPECT_THROW(parsed({"campus", "--localize-only", more, value}), CLI::ParseError) << more;
+  }
+}
+
 TEST(Ros2OptionsTest, ARunIsCalledByItsTime) {
   EXPECT_EQ(TrajectoryAt(absl::FromUnixSeconds(1'795'713'300)), "ros2-20261126-171500");
 }
