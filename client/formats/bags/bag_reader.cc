@@ -16,6 +16,7 @@
 #include "absl/strings/string_view.h"
 
 #include "client/formats/bags/mcap_reader.h"
+#include "client/formats/bags/mcap_records.h"
 #include "client/formats/bags/ros1_bag_reader.h"
 #include "client/formats/bags/sqlite_bag_reader.h"
 

@@ -14,9 +14,9 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
-#include <zlib.h>
 
 #include "client/formats/bags/chunked_bag_reader.h"
+#include "client/formats/bags/mcap_records.h"
 #include "client/formats/bags/unpack.h"
 #include "client/formats/parsing/byte_cursor.h"
 #include "core/common/status.h"
@@ -24,25 +24,12 @@
 namespace strata {
 namespace {
 
-constexpr std::uint8_t kFooter = 0x02;
-constexpr std::uint8_t kSchema = 0x03;
-constexpr std::uint8_t kChannel = 0x04;
-constexpr std::uint8_t kMessage = 0x05;
-constexpr std::uint8_t kChunk = 0x06;
-constexpr std::uint8_t kDataEnd = 0x0F;
-
-constexpr std::uint64_t kRecordHead = 9;  // opcode and length
 // Of a message's record before its bytes: channel, sequence, two times.
 constexpr std::uint64_t kMessageHead = 22;
 
 std::int64_t ClampedNanoseconds(std::uint64_t time_ns) {
   constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
   return static_cast<std::int64_t>(std::min(time_ns, kMost));
-}
-
-std::uint32_t Crc32Of(absl::string_view bytes) {
-  return static_cast<std::uint32_t>(
-      crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
 }  // namespace
@@ -55,13 +42,13 @@ absl::StatusOr<std::unique_ptr<BagReader>> McapReader::Open(const std::filesyste
 McapReader::McapReader(BagFile file)
     : ChunkedBagReader(std::move(file),
                        {.first_record = kMcapMagic.size(),
-                        .chunk = kChunk,
-                        .message = kMessage,
+                        .chunk = kMcapChunk,
+                        .message = kMcapMessage,
                         .message_head = kMessageHead}) {}
 
 absl::StatusOr<std::optional<McapReader::Record>> McapReader::HeadAt(std::uint64_t at) {
   std::string head;
-  STRATA_RETURN_IF_ERROR(file().Read(at, kRecordHead, head));
+  STRATA_RETURN_IF_ERROR(file().Read(at, kMcapRecordHead, head));
   if (head.empty()) {
     AddDamage(absl::StrCat("ends at byte ", at, " without the end of its data: it was not closed"));
     return std::nullopt;
@@ -70,7 +57,7 @@ absl::StatusOr<std::optional<McapReader::Record>> McapReader::HeadAt(std::uint64
   Record record;
   record.at = at;
   record.op = cursor.Get<std::uint8_t>();
-  record.content_at = at + kRecordHead;
+  record.content_at = at + kMcapRecordHead;
   record.length = cursor.Get<std::uint64_t>();
   if (!cursor.ok()) {
     AddCutHead();
@@ -80,7 +67,7 @@ absl::StatusOr<std::optional<McapReader::Record>> McapReader::HeadAt(std::uint64
     AddNoHead(at);
     return std::nullopt;
   }
-  if (record.op == kDataEnd || record.op == kFooter) return std::nullopt;
+  if (record.op == kMcapDataEnd || record.op == kMcapFooter) return std::nullopt;
   return record;
 }
 
@@ -92,7 +79,7 @@ std::optional<McapReader::Piece> McapReader::NextPiece(ByteCursor& chunk) const 
 }
 
 bool McapReader::Wants(const Record& record) {
-  return record.op == kSchema || record.op == kChannel || record.op == kMessage;
+  return record.op == kMcapSchema || record.op == kMcapChannel || record.op == kMcapMessage;
 }
 
 absl::Status McapReader::UnpackChunk(const Record& /*record*/,
@@ -145,9 +132,9 @@ void McapReader::AddChannel(absl::string_view content) {
 }
 
 absl::Status McapReader::VisitPiece(const Piece& piece, const MessagePlace& place, Visitor visit) {
-  if (piece.op == kSchema) AddSchema(piece.content);
-  if (piece.op == kChannel) AddChannel(piece.content);
-  if (piece.op != kMessage) return absl::OkStatus();
+  if (piece.op == kMcapSchema) AddSchema(piece.content);
+  if (piece.op == kMcapChannel) AddChannel(piece.content);
+  if (piece.op != kMcapMessage) return absl::OkStatus();
   ByteCursor cursor(piece.content);
   const auto channel = channels_.find(cursor.Get<std::uint16_t>());
   cursor.Get<std::uint32_t>();  // sequence

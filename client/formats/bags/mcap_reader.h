@@ -22,8 +22,6 @@
 
 namespace strata {
 
-inline constexpr absl::string_view kMcapMagic("\x89MCAP0\r\n", 8);
-
 // A chunk whose CRC does not fit is left out; of one that the file ends in, what can be unpacked is
 // read. Attachments and metadata are passed over.
 class McapReader final : public ChunkedBagReader {
