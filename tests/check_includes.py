@@ -57,7 +57,7 @@ STOREYS = {
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
     "core/storage": ["sqlite", HERE],
     "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "models", "ingest", "tiles", "scans", "map"],
-    "client/formats": ["planes", "bags", "motion", HERE, "packets", "survey", "laz", "parsing", "grid"],
+    "client/formats": ["planes", "foxglove", "bags", "motion", HERE, "packets", "survey", "laz", "parsing", "grid"],
     "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "planes", "egomotion", "job", "heights", "mesh", "picture", "terminal"],
 }
 
