@@ -24,6 +24,7 @@
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
 #include "client/formats/file_bytes.h"
+#include "client/formats/foxglove/foxglove_file.h"
 #include "client/formats/geometry_writer.h"
 #include "core/common/status.h"
 #include "core/mls/surface_mesh.h"
@@ -128,6 +129,21 @@ Geometry GeometryOf(const std::vector<SurfaceTile>& tiles,
   return geometry;
 }
 
+// Points down the vertical lines, so that walls are seen where there are only points.
+void AddPointsAlongVerticals(double spacing_m, Geometry& geometry) {
+  for (const auto& [a, b] : geometry.lines) {
+    const Eigen::Vector3d from = geometry.vertices[a];
+    const Eigen::Vector3d way = geometry.vertices[b] - from;
+    if (!way.head<2>().isZero(0.0)) continue;
+    const auto pieces = static_cast<int>(std::ceil(way.norm() / spacing_m));
+    for (int i = 1; i < pieces; ++i) {
+      geometry.vertices.push_back(from + way * i / pieces);
+      geometry.colour.push_back(geometry.colour[b]);
+      if (!geometry.label.empty()) geometry.label.push_back(geometry.label[b]);
+    }
+  }
+}
+
 // What is damaged is left out and said in `damage`.
 absl::StatusOr<Geometry> MeshOf(Context& context,
                                 const ExportOptions& options,
@@ -139,7 +155,30 @@ absl::StatusOr<Geometry> MeshOf(Context& context,
   damage = fetched.damage;
   const bool own_colours = options.layer == "colour";
   if (own_colours) STRATA_RETURN_IF_ERROR(ExpectColours(options.map, fetched.tiles));
-  return GeometryOf(fetched.tiles, info.parameters.mls.cell_size_m, options.level, own_colours);
+  const double cell_size_m = info.parameters.mls.cell_size_m;
+  Geometry geometry = GeometryOf(fetched.tiles, cell_size_m, options.level, own_colours);
+  if (options.format == "mcap") {
+    AddPointsAlongVerticals(std::ldexp(cell_size_m, options.level), geometry);
+  }
+  return geometry;
+}
+
+absl::Status ExportFoxglove(Context& context, const ExportOptions& options) {
+  absl::Status damage;
+  FoxgloveScene scene;
+  STRATA_ASSIGN_OR_RETURN(scene.surfaces, MeshOf(context, options, damage));
+  STRATA_ASSIGN_OR_RETURN(const api::PoseGraphState graph,
+                          context.database.posegraph().Get(context.call, options.map));
+  scene.trajectories = TrajectoriesOf(graph.nodes, false);
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes, FoxgloveBytes(scene));
+  STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, bytes));
+  context.output.Object({{"file", options.out},
+                         {"format", options.format},
+                         {"points", scene.surfaces.vertices.size()},
+                         {"trajectories", scene.trajectories.size()},
+                         {"poses", graph.nodes.size()},
+                         {"bytes", bytes.size()}});
+  return damage;
 }
 
 // Every integrated scan's points at their poses.
@@ -181,14 +220,14 @@ absl::StatusOr<std::string> BytesOf(const Geometry& geometry, const std::string&
 
 constexpr std::pair<const char*, const char*> kFormatsOfOptions[] = {
     {"--relative-to", "ply, obj, stl, glb, pcd"},
-    {"--layer", "ply, obj, glb"},
+    {"--layer", "ply, obj, glb, mcap"},
     {"--floor", "nav2"},
     {"--at", "nav2"},
     {"--mode", "nav2"},
     {"--profile", "nav2, geotiff, asc"},
     {"--surface", "geotiff, asc"},
     {"--region", "geotiff, asc, bt"},
-    {"--level", "ply, obj, stl, glb, geotiff, asc, bt"}};
+    {"--level", "ply, obj, stl, glb, mcap, geotiff, asc, bt"}};
 
 // An option that a format does not listen to would be believed to have been heard.
 absl::Status CheckOptions(const ExportOptions& options) {
@@ -220,6 +259,7 @@ absl::Status Export(Context& context, const ExportOptions& options) {
   if (options.format == "bt") {
     return ExportOctree(context, options.map, {options.level, options.heights.region}, options.out);
   }
+  if (options.format == "mcap") return ExportFoxglove(context, options);
   const bool points = options.format == "pcd";
   absl::Status damage;
   STRATA_ASSIGN_OR_RETURN(Geometry geometry,
@@ -257,9 +297,10 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
       noun,
       "export",
       "Write a map for other programs: its surfaces as a mesh (ply, obj, stl, glb), the points of "
-      "its scans (pcd), its floors as grids (nav2), one height a cell (geotiff, asc), or free and "
-      "occupied space (bt)",
-      "strata map export campus --format ply --out campus.ply",
+      "its scans (pcd), its floors as grids (nav2), one height a cell (geotiff, asc), free and "
+      "occupied space (bt), or surfaces and trajectories for Foxglove (mcap)",
+      "strata map export campus --format ply --out campus.ply\n"
+      "  strata map export campus --format mcap --out campus.mcap",
       [options](Context& context) { return Export(context, *options); });
   options->given = app;
   AddMapName(app, options->map);
@@ -273,8 +314,11 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
          "and label; nav2: a picture (pgm) and a yaml file for map_server, of one floor or a pair "
          "each of all; geotiff: heights and their standard deviation as bands, on earth where the "
          "map has an origin; asc: the same as ESRI ASCII grids, FILE.asc and FILE-sigma.asc, with "
-         ".prj; bt: an octree of OctoMap, of what the scans' rays hit and went through")
-      ->check(CLI::IsMember({"ply", "obj", "stl", "glb", "pcd", "nav2", "geotiff", "asc", "bt"}))
+         ".prj; bt: an octree of OctoMap, of what the scans' rays hit and went through; mcap: "
+         "/surfaces as points (foxglove.PointCloud), /trajectories/NAME and /tf with the scans' "
+         "poses and times (PosesInFrame, FrameTransform), as JSON")
+      ->check(CLI::IsMember(
+          {"ply", "obj", "stl", "glb", "pcd", "nav2", "geotiff", "asc", "bt", "mcap"}))
       ->required();
   app->add_option("--out", options->out, "The file to write")->type_name("FILE")->required();
   AddNumbers(

@@ -9,6 +9,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
@@ -19,6 +20,8 @@
 #include "client/cli/terminal/json.h"
 #include "client/cli/terminal/number_file.h"
 #include "client/cli/terminal/on_earth.h"
+#include "client/formats/file_bytes.h"
+#include "client/formats/foxglove/foxglove_file.h"
 #include "client/formats/path_file.h"
 #include "core/common/status.h"
 
@@ -89,6 +92,14 @@ void PrintText(const PlanResult& plan, const std::optional<LocalFrame>& earth, O
   }
 }
 
+absl::Status WritePlan(const std::string& file, const std::vector<Eigen::Vector3d>& waypoints) {
+  if (!absl::EndsWith(file, ".mcap")) return WritePath(file, waypoints);
+  FoxgloveScene scene;
+  scene.path = waypoints;
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes, FoxgloveBytes(scene));
+  return WriteFileBytes(file, bytes);
+}
+
 absl::Status PlanOne(Context& context, PlanOptions options) {
   STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options.map, options.driver));
   STRATA_ASSIGN_OR_RETURN(options.query.class_costs,
@@ -99,7 +110,7 @@ absl::Status PlanOne(Context& context, PlanOptions options) {
       const PlanResult plan,
       context.database.planning().PlanPath(context.call, options.map, options.query));
   if (!options.out.empty() && plan.found()) {
-    STRATA_RETURN_IF_ERROR(WritePath(options.out, plan.waypoints));
+    STRATA_RETURN_IF_ERROR(WritePlan(options.out, plan.waypoints));
     context.output.Talk(absl::StrCat("wrote ", options.out));
   }
   STRATA_ASSIGN_OR_RETURN(const std::optional<LocalFrame> earth, EarthOf(context, options.map));
@@ -214,8 +225,8 @@ void AddPlanCommand(Commands& commands) {
   verb->add_option("--out",
                    options->out,
                    "Write the path, if there is one, as PLY: its waypoints as vertices in order, "
-                   "joined by edges; map render --path reads it")
-      ->type_name("FILE.ply");
+                   "joined by edges; map render --path reads it; or for Foxglove: /path")
+      ->type_name("FILE.ply|FILE.mcap");
   verb->add_flag("--watch",
                  options->watch,
                  "Then say whenever the path stops to hold or holds again, until Ctrl-C")

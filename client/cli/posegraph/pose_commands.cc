@@ -19,6 +19,7 @@
 #include "client/cli/terminal/on_earth.h"
 #include "client/cli/terminal/world_json.h"
 #include "client/formats/file_bytes.h"
+#include "client/formats/foxglove/foxglove_file.h"
 #include "client/formats/pose_writer.h"
 #include "core/common/status.h"
 
@@ -105,6 +106,13 @@ absl::Status Export(Context& context, const PoseOptions& options) {
     STRATA_RETURN_IF_ERROR(WriteCsv(context, options, nodes));
     return Told(context, options, nodes.size());
   }
+  if (options.format == "mcap") {
+    FoxgloveScene scene;
+    scene.trajectories = TrajectoriesOf(nodes, options.which == "uploaded");
+    STRATA_ASSIGN_OR_RETURN(const std::string bytes, FoxgloveBytes(scene));
+    STRATA_RETURN_IF_ERROR(WriteFileBytes(options.out, bytes));
+    return Told(context, options, nodes.size());
+  }
   std::vector<TimedPose> poses;
   poses.reserve(nodes.size());
   for (const PoseNode& node : nodes) {
@@ -144,8 +152,9 @@ void AddExport(Commands& commands, CLI::App* noun, const std::shared_ptr<PoseOpt
          options->format,
          "tum: a line 'time x y z qx qy qz qw' for each scan, T_map_scan, seconds and metres; csv: "
          "with names, the scans' ids and, where the map has an origin, latitude, longitude "
-         "[degrees] and altitude [m]")
-      ->check(CLI::IsMember({"tum", "csv"}))
+         "[degrees] and altitude [m]; mcap: for Foxglove, /tf at the scans' times and "
+         "/trajectories/NAME")
+      ->check(CLI::IsMember({"tum", "csv", "mcap"}))
       ->capture_default_str();
   app->add_option("--which", options->which, "uploaded, or those of the current epoch")
       ->check(CLI::IsMember({"uploaded", "current"}))

@@ -1,6 +1,7 @@
 // strata surface, plan, path and profile, as their users run them.
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -9,8 +10,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "client/formats/bags/bag_reader.h"
 #include "tests/client/cli/run_strata.h"
 #include "tests/client/cli/strata_fixture.h"
+#include "tests/support/status_matchers.h"
 
 namespace strata::cli {
 namespace {
@@ -95,6 +98,47 @@ TEST_F(StrataPlanTest, SurfacePlanRenderAndExportOfADrive) {
   };
   EXPECT_EQ(exported("1,2,3"), "float");
   EXPECT_EQ(exported("-500000,0,0"), "double");
+}
+
+// Topics and how many messages they have.
+std::map<std::string, int> TopicsOf(const std::string& file) {
+  std::map<std::string, int> topics;
+  const auto bag = OpenBagFile(file);
+  EXPECT_THAT(bag, testing::IsOk());
+  EXPECT_THAT((*bag)->Visit([&](const BagMessage& message) {
+    ++topics[(*bag)->topics()[message.topic].name];
+    return absl::OkStatus();
+  }),
+              testing::IsOk());
+  EXPECT_THAT((*bag)->damage(), ::testing::IsEmpty());
+  return topics;
+}
+
+TEST_F(StrataPlanTest, ADriveIsExportedForFoxglove) {
+  WriteDrive(8);
+  RunOk({"map", "create", "m"});
+  Import({"--align", "off"});
+  const auto mcap = [this](const std::string& name) { return (dir_.path() / name).string(); };
+  const std::vector<std::string> words = {"map", "export", "m", "--format", "mcap", "--out"};
+  const auto exported = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), words.begin(), words.end());
+    return RunOk(more);
+  };
+  const json map = exported({mcap("map.mcap")});
+  EXPECT_EQ(map.at("poses"), 8);
+  EXPECT_EQ(std::filesystem::file_size(mcap("map.mcap")), map.at("bytes").get<std::size_t>());
+  const json ply = RunOk({"map", "export", "m", "--format", "ply", "--out", mcap("map.ply")});
+  EXPECT_GE(map.at("points").get<int>(), ply.at("vertices").get<int>());  // and walls
+  const std::string trajectory = RunOk({"pose", "list", "m"})[0].at("id").get<std::string>();
+  const std::string drive = "/trajectories/" + trajectory.substr(0, trajectory.find('/'));
+  EXPECT_EQ(TopicsOf(mcap("map.mcap")),
+            (std::map<std::string, int>{{"/surfaces", 1}, {drive, 1}, {"/tf", 8}}));
+  EXPECT_LT(exported({mcap("coarse.mcap"), "--level", "2"}).at("points").get<int>(),
+            map.at("points").get<int>() / 4);
+  RunOk({"pose", "export", "m", "--format", "mcap", "--out", mcap("poses.mcap")});
+  EXPECT_EQ(TopicsOf(mcap("poses.mcap")), (std::map<std::string, int>{{drive, 1}, {"/tf", 8}}));
+  RunOk({"plan", "m", "--from", "-4,0.5,0", "--to", "3,-0.5,0", "--out", mcap("path.mcap")});
+  EXPECT_EQ(TopicsOf(mcap("path.mcap")), (std::map<std::string, int>{{"/path", 1}}));
 }
 
 TEST_F(StrataPlanTest, ProfilesKeepWhatIsNotGiven) {
