@@ -21,8 +21,7 @@ std::string WhyNot(const FollowerStatus& status, absl::Time now) {
   if (!status.trouble.ok() && !recent) return std::string(status.trouble.message());
   if (!status.last.has_value()) return "no cloud has been matched to the map yet";
   if (!recent) return "no cloud comes any more";
-  return status.last->state == TrackState::kLost ? absl::StrCat("lost: ", status.last->message)
-                                                 : "";
+  return status.last->state == TrackState::kLost ? status.last->message : "";
 }
 
 }  // namespace
@@ -34,11 +33,11 @@ Diagnosis DiagnosisOf(const FollowerStatus& status, bool maps, bool located, abs
   if (!why_not.empty()) {
     const bool by_scans = maps && located;
     diagnosis.level = by_scans ? Diagnosis::Level::kWarn : Diagnosis::Level::kError;
-    diagnosis.message =
-        absl::StrCat(why_not,
-                     by_scans  ? "; map -> odom is by the robot's own scans"
-                     : located ? "; map -> odom stays as it was"
-                               : "; there is no map -> odom yet, and nothing is kept");
+    diagnosis.message = absl::StrCat(by_scans || !located ? "not tracked: " : "lost: ",
+                                     why_not,
+                                     by_scans  ? "; map -> odom is by the robot's own scans"
+                                     : located ? "; map -> odom stays as it was"
+                                               : "; there is no map -> odom yet");
   } else {
     diagnosis.message = std::string(ToString(status.last->state));
     const Matrix6d& covariance = status.last->covariance;

@@ -198,16 +198,22 @@ void Pump::Diagnose(absl::Time now) {
   if (!parts_.follower.wanted()) return;
   const FollowerStatus status = parts_.follower.status();
   const Diagnosis diagnosis =
-      DiagnosisOf(status, parts_.keeper != nullptr, parts_.where.known(), now);
+      DiagnosisOf(status, parts_.keeper != nullptr, parts_.book.located(), now);
   Tell("/diagnostics",
        WriteDiagnosis(parts_.diagnosis_writer, {"", parts_.where.stamp_ns()}, diagnosis));
   const bool tracked = diagnosis.level == Diagnosis::Level::kOk;
   if (tracked) tracked_ = now;
   // Others say that no server answers.
   if (now - tracked_ > kBeforeSaying && !absl::IsUnavailable(status.trouble)) {
-    parts_.talk.SaySeldom("place", diagnosis.message);
+    // Whoever maps need not know why each second.
+    if (diagnosis.level == Diagnosis::Level::kWarn) {
+      parts_.talk.SayNew("tracked", "map -> odom is by the robot's own scans");
+    } else if (!tracked) {
+      parts_.talk.SayNew("tracked", "");
+      parts_.talk.SaySeldom("place", diagnosis.message);
+    }
   }
-  parts_.talk.SayNew("tracked", tracked ? "the robot is tracked in the map" : "");
+  if (tracked) parts_.talk.SayNew("tracked", "the robot is tracked in the map");
 }
 
 void Pump::ReportMissing() {

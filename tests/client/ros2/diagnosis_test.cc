@@ -40,7 +40,9 @@ TEST(DiagnosisTest, ALostRobotIsAnErrorAndOneThatMapsGoesOnByItsOwnScans) {
   EXPECT_THAT(lost.message, HasSubstr("lost: several places fit; map -> odom stays as it was"));
   const Diagnosis maps = DiagnosisOf(status, true, true, now);
   EXPECT_EQ(maps.level, Level::kWarn);
-  EXPECT_THAT(maps.message, HasSubstr("by the robot's own scans"));
+  EXPECT_THAT(
+      maps.message,
+      HasSubstr("not tracked: several places fit; map -> odom is by the robot's own scans"));
   EXPECT_EQ(DiagnosisOf(status, true, false, now).level, Level::kError);  // nor does it map yet
 }
 
