@@ -49,7 +49,7 @@ constexpr double kMostMegabytes = 150.0;
 constexpr double kEveryM = 0.5;
 constexpr double kSpeedMps = 0.5;
 constexpr double kHeightM = 1.2;
-constexpr int kViews = 40;         // of the yard, along the robot's way
+constexpr int kViews = 200;        // of the yard, along the robot's way
 constexpr double kWayM = 20.0;     // there and back
 constexpr int kPosesPerCloud = 4;  // none with the stamp of a cloud
 constexpr std::int64_t kSecondNs = 1'000'000'000;
@@ -87,7 +87,8 @@ class CloudSource {
       const PointCloud cloud = SimulateScan(scene, sensor, T, static_cast<std::uint64_t>(view) + 1);
       std::string data;
       for (int i = 0; i < options.points; ++i) {
-        const auto from = static_cast<std::size_t>(i) % cloud.size();
+        const std::size_t from =
+            static_cast<std::size_t>(i) * cloud.size() / static_cast<std::size_t>(options.points);
         const Eigen::Vector3f& p = cloud.points[from];
         const std::array<float, 4> point = {p.x(), p.y(), p.z(), 0.0F};
         data.append(reinterpret_cast<const char*>(point.data()), sizeof(point));
@@ -269,9 +270,7 @@ class Campaign {
                                                                 "--trajectory",
                                                                 "robot",
                                                                 "--every",
-                                                                absl::StrCat(kEveryM, "m"),
-                                                                "--align",
-                                                                "off"});
+                                                                absl::StrCat(kEveryM, "m")});
   }
   std::string EndBridge() {
     memory_mb_ = MemoryOf(bridge_->pid(), "VmHWM");

@@ -106,8 +106,9 @@ TEST_F(Ros2DriveTest, WhatARobotPublishesIsInTheMapAsItsRecordingWouldBe) {
   ExpectSameScans(live, ScansOf("filed", true));
 
   // map -> odom takes the newest scan's odometry to where the map has it.
-  const auto& [stamp_us, newest] = *live.rbegin();
-  const auto cloud = static_cast<std::size_t>((stamp_us * 1000 - kStartNs) / kCloudEveryNs);
+  const std::int64_t stamp_ns = 1000 * live.rbegin()->first;
+  const Stored& newest = live.rbegin()->second;
+  const auto cloud = static_cast<std::size_t>((stamp_ns - kStartNs) / kCloudEveryNs);
   EXPECT_TRUE(WaitFor([&] {
     const std::vector<CdrTransform> heard =
         transforms.count() == 0 ? std::vector<CdrTransform>() : ReadTransforms(transforms.last());
