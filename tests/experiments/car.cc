@@ -2,6 +2,7 @@
 // not hold, 77 where recorded data are absent.
 //
 // Usage: car husky|dresden|simulated [seed]
+//        car record FOLDER [seed]
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -23,6 +24,7 @@
 #include "core/egomotion/smoothing/smoother.h"
 #include "core/egomotion/trajectory.h"
 #include "tests/experiments/meshes/mesh_cases.h"
+#include "tests/experiments/simulated_car.h"
 #include "tests/support/data_dir.h"
 #include "tests/support/simulator/simulated_drive.h"
 #include "tests/support/simulator/simulator.h"
@@ -31,7 +33,6 @@ namespace strata::testing {
 namespace {
 
 constexpr int kNoData = 77;
-constexpr double kEarthM = 6.37e6;
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 Egomotion Filter(const MotionLog& log, const Rig& rig, const EgomotionOptions& options = {}) {
@@ -247,84 +248,6 @@ int Dresden(std::uint64_t seed) {
 
 // ---- a car whose way is known: five loops of 2.3 km on 300 × 250 m (thesis 10.3) ----
 
-// Ellipses that begin and end at one gate, each inside the one before.
-class NestedLoops {
- public:
-  explicit NestedLoops(double speed_m_s) : speed_m_s_(speed_m_s) {
-    places_.push_back(At(0.0));
-    lengths_.push_back(0.0);
-    for (int i = 1; i <= 5 * kSteps; ++i) {
-      places_.push_back(At(i / double{kSteps}));
-      lengths_.push_back(lengths_.back() + (places_[i] - places_[i - 1]).norm());
-    }
-  }
-  double length_m() const { return lengths_.back(); }
-  Eigen::Vector3d operator()(double driven_s) const {
-    const double way_m = std::clamp(speed_m_s_ * driven_s, 0.0, length_m() - 1e-6);
-    const auto after = std::upper_bound(lengths_.begin(), lengths_.end(), way_m);
-    const auto k = static_cast<std::size_t>(after - lengths_.begin());
-    const double share = (way_m - lengths_[k - 1]) / (lengths_[k] - lengths_[k - 1]);
-    // By the parameter and not by the chord, which would have corners.
-    Eigen::Vector3d place = At((static_cast<double>(k - 1) + share) / kSteps);
-    if (speed_m_s_ * driven_s < 0.0) place.x() += speed_m_s_ * driven_s;
-    if (speed_m_s_ * driven_s > length_m()) place.x() += speed_m_s_ * driven_s - length_m();
-    return place;
-  }
-
- private:
-  static constexpr int kSteps = 20'000;  // of a loop
-  static Eigen::Vector3d At(double loop) {
-    static constexpr double kSizes[] = {1.0, 0.66, 0.46, 0.32, 0.22};
-    const double size = kSizes[std::min(4, static_cast<int>(loop))];
-    const double angle = 2.0 * std::numbers::pi * (loop - std::floor(loop));
-    const double end = loop >= 5.0 ? 0.0 : 1.0;
-    return {
-        150.0 * size * std::sin(end * angle), 125.0 * size * (1.0 - std::cos(end * angle)), 0.0};
-  }
-  double speed_m_s_;
-  std::vector<Eigen::Vector3d> places_;
-  std::vector<double> lengths_;
-};
-
-struct Urban {
-  MotionLog log;
-  std::vector<bool> bad;  // which fixes are off by more than 5 m
-};
-
-// No GPS in a garage and under two bridges; beside walls fixes jump by up to 30 m for one to four
-// seconds, and one wall draws them away slowly.
-Urban AmongWalls(const DriveOptions& options, std::uint64_t seed) {
-  Urban urban;
-  urban.log = SimulateDrive(options, seed);
-  Random random(seed + 77);
-  std::vector<GpsFix> fixes;
-  double jump_until_s = 0.0;
-  Eigen::Vector2d jump_m = Eigen::Vector2d::Zero();
-  for (GpsFix fix : urban.log.fixes) {
-    const double t = fix.time_s - options.begin_s;
-    const bool hidden =
-        (t > 110.0 && t < 150.0) || (t > 60.0 && t < 65.0) || (t > 200.0 && t < 206.0);
-    if (hidden) continue;
-    Eigen::Vector2d off = Eigen::Vector2d::Zero();
-    if (t > 40.0 && fix.time_s >= jump_until_s && random.Uniform(0.0, 1.0) < 0.04) {
-      const double length_s = random.Uniform(1.0, 4.0);
-      const double direction = random.Uniform(0.0, 2.0 * std::numbers::pi);
-      const double size_m = random.Uniform(8.0, 30.0);
-      jump_until_s = fix.time_s + length_s;
-      jump_m = size_m * Eigen::Vector2d(std::cos(direction), std::sin(direction));
-    }
-    if (fix.time_s < jump_until_s) off += jump_m;
-    const bool bad = off.norm() > 5.0;
-    if (t > 230.0 && t < 250.0) off.x() += 4.0 * std::sin(std::numbers::pi * (t - 230.0) / 20.0);
-    fix.longitude_rad += off.x() / (kEarthM * std::cos(fix.latitude_rad));
-    fix.latitude_rad += off.y() / kEarthM;
-    fixes.push_back(fix);
-    urban.bad.push_back(bad);
-  }
-  urban.log.fixes = std::move(fixes);
-  return urban;
-}
-
 // Root mean square and largest horizontal distance to the true way.
 std::pair<double, double> ErrorsOfWay(const Egomotion& run, const DriveOptions& options) {
   const LocalFrame truth(options.origin), frame(run.origin);
@@ -338,43 +261,51 @@ std::pair<double, double> ErrorsOfWay(const Egomotion& run, const DriveOptions& 
   return {std::sqrt(squares / static_cast<double>(run.trajectory.poses().size())), worst};
 }
 
+// That bad fixes are rejected and good ones are not.
+void ExpectFixes(const Urban& urban, const Egomotion& run) {
+  Planted planted;
+  for (std::size_t i = 0; i < run.fixes.size(); ++i) {
+    const bool bad = urban.bad[i + urban.bad.size() - run.fixes.size()];
+    (bad ? planted.planted : planted.good) += 1;
+    if (!run.fixes[i].used) (bad ? planted.rejected : planted.good_rejected) += 1;
+  }
+  std::printf("%zu fixes off by 5 to 30 m: %zu rejected; of %zu others %zu\n",
+              planted.planted,
+              planted.rejected,
+              planted.good,
+              planted.good_rejected);
+  Expect(planted.planted > 0 && planted.rejected >= 0.95 * planted.planted,
+         "95 % of the bad fixes are rejected");
+  Expect(planted.good_rejected <= 0.02 * planted.good, "at most 2 % of the good ones are");
+}
+
 int Simulated(std::uint64_t seed) {
-  constexpr double kSpeedM_s = 8.0;
-  const NestedLoops loops(kSpeedM_s);
-  DriveOptions options;
-  options.way = [&loops](double driven_s) { return loops(driven_s); };
-  options.seconds = options.rest_s + 2.0 + loops.length_m() / kSpeedM_s;
-  options.fix_hz = 5.0;
-  options.rig.R_body_imu = Eigen::Quaterniond::Identity();
-  options.rig.imu.gyro_noise = 2e-3;
-  options.rig.imu.accelerometer_noise = 0.03;
+  const DriveOptions options = CarDrive(false);
   const Urban urban = AmongWalls(options, seed);
   const Egomotion whole = Filter(urban.log, options.rig);
   Print("simulated car", whole);
   const Egomotion smooth = OrDie(SmoothLog(urban.log, options.rig, whole));
   const auto [rms_m, worst_m] = ErrorsOfWay(whole, options);
   const auto [smooth_rms_m, smooth_worst_m] = ErrorsOfWay(smooth, options);
-  Planted planted;
-  for (std::size_t i = 0; i < whole.fixes.size(); ++i) {
-    const bool bad = urban.bad[i + urban.bad.size() - whole.fixes.size()];
-    (bad ? planted.planted : planted.good) += 1;
-    if (!whole.fixes[i].used) (bad ? planted.rejected : planted.good_rejected) += 1;
-  }
   std::printf(
-      "way of %.0f m: filter off by %.2f m RMS, %.2f m at worst; smoothed %.2f m and %.2f m\n"
-      "%zu fixes off by 5 to 30 m: %zu rejected; of %zu others %zu\n",
-      loops.length_m(),
+      "way of %.0f m: filter off by %.2f m RMS, %.2f m at worst; smoothed %.2f m and %.2f m\n",
+      CarWayM(),
       rms_m,
       worst_m,
       smooth_rms_m,
-      smooth_worst_m,
-      planted.planted,
-      planted.rejected,
-      planted.good,
-      planted.good_rejected);
-  Expect(planted.rejected >= 0.95 * planted.planted, "95 % of the bad fixes are rejected");
-  Expect(planted.good_rejected <= 0.02 * planted.good, "at most 2 % of the good ones are");
+      smooth_worst_m);
+  ExpectFixes(urban, whole);
   Expect(smooth_rms_m <= rms_m, "smoothed is no worse");
+  return failures;
+}
+
+// The same drive over hills as files, with scans: what car_maps.py makes maps of.
+int Record(const std::string& folder, std::uint64_t seed) {
+  const DriveOptions options = CarDrive(true);
+  const Urban urban = AmongWalls(options, seed);
+  ExpectFixes(urban, Filter(urban.log, options.rig));
+  const WrittenCar written = OrDie(WriteCar(options, urban, seed, folder));
+  std::printf("%zu scans, %zu points in %s\n", written.scans, written.points, folder.c_str());
   return failures;
 }
 
@@ -383,8 +314,15 @@ int Simulated(std::uint64_t seed) {
 
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "husky";
-  const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
-  const int result = what == "dresden"     ? strata::testing::Dresden(seed)
+  const bool records = what == "record";
+  if (records && argc < 3) {
+    std::printf("car record FOLDER [seed]\n");
+    return 1;
+  }
+  const char* seed_word = argc > (records ? 3 : 2) ? argv[records ? 3 : 2] : "1";
+  const std::uint64_t seed = std::strtoull(seed_word, nullptr, 10);
+  const int result = records               ? strata::testing::Record(argv[2], seed)
+                     : what == "dresden"   ? strata::testing::Dresden(seed)
                      : what == "simulated" ? strata::testing::Simulated(seed)
                                            : strata::testing::Husky(seed);
   return result == strata::testing::kNoData ? result : (result > 0 ? 1 : 0);

@@ -209,11 +209,11 @@ World CarParkWorld(double slab_m) {
   return world;
 }
 
-namespace {
-
 double CampusHeight(double x, double y) {
   return 2.0 * std::sin(x / 47.0) * std::cos(y / 61.0) + 0.8 * std::sin((x + 2.0 * y) / 29.0);
 }
+
+namespace {
 
 Vector3d OnCampus(double x, double y) { return {x, y, CampusHeight(x, y)}; }
 
@@ -228,7 +228,8 @@ double DistanceToRoute(const std::vector<Vector3d>& route, const Vector2d& place
   return nearest;
 }
 
-// Terrain with houses and trees beside the ways of `robots`.
+}  // namespace
+
 World PlantCampus(std::vector<Robot> robots,
                   const Eigen::AlignedBox2d& area,
                   int houses,
@@ -261,6 +262,8 @@ World PlantCampus(std::vector<Robot> robots,
   world.scene.Build();
   return world;
 }
+
+namespace {
 
 World PlantCampus(std::vector<Robot> robots, std::uint64_t seed) {
   return PlantCampus(

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "tests/support/simulator/scene.h"
 
@@ -60,6 +60,16 @@ World RoomsWorld(double wall_m = 0.1, std::uint64_t seed = 1);
 //   robots: "north_loop" and "south_loop", each some 500 m, sharing the street in the middle.
 //   places: "start" and "far".
 World CampusWorld(std::uint64_t seed = 1);
+
+// That terrain: z above (x, y).
+double CampusHeight(double x, double y);
+
+// Such terrain over `area` with as many houses and trees beside the ways of `robots`, built.
+World PlantCampus(std::vector<Robot> robots,
+                  const Eigen::AlignedBox2d& area,
+                  int houses,
+                  int trees,
+                  std::uint64_t seed);
 
 // The same terrain with other houses and trees.
 //   robots: "loop", 300 m round and 10 m of the way once more; shape and place by the seed.
