@@ -2,7 +2,7 @@
 // not hold, 77 where recorded data are absent.
 //
 // Usage: car husky|dresden|simulated [seed]
-//        car record FOLDER [seed]
+//        car record FOLDER [seed] [metres between scans] [step_m]
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -300,11 +300,11 @@ int Simulated(std::uint64_t seed) {
 }
 
 // The same drive over hills as files, with scans: what car_maps.py makes maps of.
-int Record(const std::string& folder, std::uint64_t seed) {
+int Record(const std::string& folder, std::uint64_t seed, double step_m) {
   const DriveOptions options = CarDrive(true);
   const Urban urban = AmongWalls(options, seed);
   ExpectFixes(urban, Filter(urban.log, options.rig));
-  const WrittenCar written = OrDie(WriteCar(options, urban, seed, folder));
+  const WrittenCar written = OrDie(WriteCar(options, urban, step_m, seed, folder));
   std::printf("%zu scans, %zu points in %s\n", written.scans, written.points, folder.c_str());
   return failures;
 }
@@ -316,12 +316,13 @@ int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "husky";
   const bool records = what == "record";
   if (records && argc < 3) {
-    std::printf("car record FOLDER [seed]\n");
+    std::printf("car record FOLDER [seed] [metres between scans]\n");
     return 1;
   }
-  const char* seed_word = argc > (records ? 3 : 2) ? argv[records ? 3 : 2] : "1";
-  const std::uint64_t seed = std::strtoull(seed_word, nullptr, 10);
-  const int result = records               ? strata::testing::Record(argv[2], seed)
+  const int at = records ? 3 : 2;
+  const std::uint64_t seed = argc > at ? std::strtoull(argv[at], nullptr, 10) : 1;
+  const double step_m = argc > at + 1 ? std::strtod(argv[at + 1], nullptr) : 4.0;
+  const int result = records               ? strata::testing::Record(argv[2], seed, step_m)
                      : what == "dresden"   ? strata::testing::Dresden(seed)
                      : what == "simulated" ? strata::testing::Simulated(seed)
                                            : strata::testing::Husky(seed);

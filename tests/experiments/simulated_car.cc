@@ -24,7 +24,6 @@ namespace strata::testing {
 namespace {
 
 constexpr double kSpeedM_s = 8.0;
-constexpr double kScanEveryM = 2.0;
 constexpr double kSensorM = 1.8;     // above the wheels
 constexpr double kOdometryS = 30.0;  // with fixes, after which there are none
 
@@ -160,14 +159,12 @@ std::string TumLine(double time_s, const Pose& T) {
                          q.w());
 }
 
-// Hundredths of a second: there are more scans than those, so that files are in the order of their
-// times and not of their fractions.
-std::vector<double> ScanTimes(const DriveOptions& options) {
+std::vector<double> ScanTimes(const DriveOptions& options, double step_m) {
   std::vector<double> times;
   Eigen::Vector3d last = Eigen::Vector3d::Constant(1e9);
   for (int k = static_cast<int>(100.0 * options.rest_s); k < 100.0 * (options.seconds - 0.5); ++k) {
     const Eigen::Vector3d place = BodyAt(options, 0.01 * k).translation();
-    if ((place - last).norm() < kScanEveryM) continue;
+    if ((place - last).norm() < step_m) continue;
     last = place;
     times.push_back(options.begin_s + 0.01 * k);
   }
@@ -226,6 +223,7 @@ Urban AmongWalls(const DriveOptions& options, std::uint64_t seed) {
 
 absl::StatusOr<WrittenCar> WriteCar(const DriveOptions& options,
                                     const Urban& urban,
+                                    double step_m,
                                     std::uint64_t seed,
                                     const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder / "scans");
@@ -237,7 +235,7 @@ absl::StatusOr<WrittenCar> WriteCar(const DriveOptions& options,
   sensor.columns = 600;
   std::string truth;
   WrittenCar written;
-  for (const double time_s : ScanTimes(options)) {
+  for (const double time_s : ScanTimes(options, step_m)) {
     const Pose T = TrueBodyPose(options, time_s) * Eigen::Translation3d(0.0, 0.0, kSensorM);
     const PointCloud cloud = SimulateScan(scene, sensor, T, seed + 1000003 * ++written.scans);
     written.points += cloud.size();

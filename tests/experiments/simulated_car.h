@@ -36,7 +36,7 @@ struct WrittenCar {
   std::size_t points = 0;
 };
 
-// A scan every 2 m along the true way of a drive on terrain, among houses and trees, and roofs
+// A scan every `step_m` along the true way of a drive on terrain, among houses and trees, and roofs
 // where GPS is hidden.
 //   FOLDER/log, FOLDER/odometry     imu.csv, odom.csv, gps.csv; in the second the fixes of the
 //   first
@@ -46,6 +46,7 @@ struct WrittenCar {
 //   FOLDER/truth.txt                TUM, of the sensor
 absl::StatusOr<WrittenCar> WriteCar(const DriveOptions& options,
                                     const Urban& urban,
+                                    double step_m,
                                     std::uint64_t seed,
                                     const std::filesystem::path& folder);
 
