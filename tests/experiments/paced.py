@@ -33,12 +33,18 @@ PATIENCE_S = 120  # for the last scan
 class Integrated:
     """When scans came into the map, by their sequence; a thread that watches."""
 
-    def __init__(self, world):
+    def __init__(self, world, errors):
         self.at, self.failed = {}, []
         self.changed = threading.Condition()
-        threading.Thread(target=self._watch, args=(world,), daemon=True).start()
+        threading.Thread(target=self._watch, args=(world, errors), daemon=True).start()
 
-    def _watch(self, world):
+    def _watch(self, world, errors):
+        try:
+            self._follow(world)
+        except errors.Cancelled:  # the connection is closed
+            pass
+
+    def _follow(self, world):
         for change in world.watch(trajectory="car", tiles=False):
             now = time.monotonic()
             with self.changed:
@@ -55,16 +61,18 @@ class Integrated:
 
 
 class Optimizer:
-    """Jobs one after the other, each as soon as the one before has ended: (started, ended, job)."""
+    """Jobs one after the other, each as soon as the one before has ended: (started, ended, job). The last one starts after
+    stop(), and knows all scans."""
 
     def __init__(self, world, errors):
-        self.jobs, self.ends = [], threading.Event()
+        self.jobs, self.ends = [], threading.Event()  # when the drive is at its end
         self._thread = threading.Thread(target=self._run, args=(world, errors))
         self._thread.start()
 
     def _run(self, world, errors):
-        while not self.ends.is_set():
-            started = time.monotonic()
+        last = False
+        while not last:
+            last, started = self.ends.is_set(), time.monotonic()
             try:
                 job = world.optimize(closures=1)
             except errors.FailedPrecondition as failure:  # nothing there yet
@@ -111,7 +119,7 @@ def quantiles(values, unit="s"):
 
 def drive(world, errors, scans, every_s):
     """Prints what was measured; whether the bound holds."""
-    integrated = Integrated(world)
+    integrated = Integrated(world, errors)
     optimizer = Optimizer(world, errors)
     try:
         sent, late = upload(world, scans, every_s)
@@ -137,8 +145,9 @@ def report_closures(optimizer, begin, end):
         print("no optimize job ended")
         return
     print(f"{len(jobs)} optimize jobs, {sum(job.state == 'succeeded' for _, _, job in jobs)} applied, "
-          f"{sum(job.metrics.get('closures', 0) > 0 for _, _, job in jobs)} found closures, "
-          f"{jobs[-1][2].metrics.get('closures', 0):.0f} in the last; each took {quantiles([b - a for a, b, _ in jobs])}")
+          f"{sum(job.metrics.get('closures', 0) for _, _, job in jobs):.0f} closures found, "
+          f"{jobs[-1][2].metrics.get('scans_moved', 0):.0f} scans moved by the last one, after the drive; each took "
+          f"{quantiles([b - a for a, b, _ in jobs])}")
     print(f"age of the last closure: {quantiles(optimizer.ages(begin, end))}")
 
 
