@@ -92,7 +92,10 @@ void SharedSurfaces::Keep(const std::vector<Plane>& planes) {
 void SharedSurfaces::Moved(double max_shift_m, double max_turn_rad) {
   const Motion now{max_shift_m, max_turn_rad};
   const bool falls = !last_.has_value() || now.shift_m <= kFalling * last_->shift_m;
-  stays_ = IsWithin(now, 1.0) || (IsWithin(now, kAllowed) && (stays_ || !falls));
+  // Only of the finest search: a wide one takes for planes what a narrower one does not.
+  const bool is_finest = gates_.pose_sigma_m <= SharedPlaneOptions().pose_sigma_m &&
+                         gates_.pose_sigma_rad <= SharedPlaneOptions().pose_sigma_rad;
+  stays_ = IsWithin(now, 1.0) || (is_finest && IsWithin(now, kAllowed) && (stays_ || !falls));
   last_ = now;
 }
 
