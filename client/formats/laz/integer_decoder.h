@@ -20,7 +20,7 @@ inline std::size_t EvenLength(std::uint32_t length, std::uint32_t most) {
 
 class IntegerDecoder {
  public:
-  // Numbers of `bits` bits, 16 or 32; how long differences are is modelled in each context.
+  // Numbers of `bits` bits, 8, 16 or 32; how long differences are is modelled in each context.
   IntegerDecoder(std::uint32_t bits, std::size_t contexts);
 
   // The number, modulo 2^bits.
