@@ -97,13 +97,19 @@ absl::Status McapWriter::AddMessage(std::uint16_t topic,
   if (!of.written) chunk_ += schemas_[of.schema - 1u] + of.record;
   of.written = true;
   index_[topic].push_back({time_ns, chunk_.size()});
-  chunk_ += RecordOf(kMcapMessage,
-                     Fields().Put(topic)
-                             .Put(static_cast<std::uint32_t>(of.messages))
-                             .Put(time_ns)
-                             .Put(time_ns)
-                             .bytes() +
-                         std::string(bytes));
+  const std::string head = Fields()
+                               .Put(topic)
+                               .Put(static_cast<std::uint32_t>(of.messages))
+                               .Put(time_ns)
+                               .Put(time_ns)
+                               .bytes();
+  // In place: a message may have hundreds of megabytes.
+  chunk_ += Fields()
+                .Put(static_cast<std::uint8_t>(kMcapMessage))
+                .Put(static_cast<std::uint64_t>(head.size() + bytes.size()))
+                .bytes();
+  chunk_ += head;
+  chunk_.append(bytes.data(), bytes.size());
   first_ns_ = messages_ == 0 ? time_ns : std::min(first_ns_, time_ns);
   last_ns_ = messages_ == 0 ? time_ns : std::max(last_ns_, time_ns);
   ++of.messages;
