@@ -21,6 +21,7 @@
 #include "core/mls/features.h"
 #include "core/mls/mls_map.h"
 #include "core/planes/creases.h"
+#include "core/planes/curvature.h"
 #include "core/planes/edge_lines.h"
 #include "core/planes/planar_cells.h"
 #include "core/planes/range_image.h"
@@ -110,7 +111,8 @@ ScanPlanes PatchesAndCreases(std::span<const Eigen::Vector3f> points,
                              const Eigen::Vector3f& sensor_origin,
                              const PlaneExtractionOptions& options) {
   const std::vector<PlanarCell> cells = FindPlanarCells(points, sensor_origin, options);
-  std::vector<PlanarRegion> regions = GrowRegions(cells, options);
+  const std::vector<std::vector<std::uint32_t>> touching = TouchingCells(cells);
+  std::vector<PlanarRegion> regions = GrowRegions(cells, touching, options);
   std::erase_if(regions,
                 [&](const PlanarRegion& r) { return r.moments(3, 3) < options.min_area_m2; });
   std::stable_sort(regions.begin(), regions.end(), [](const auto& a, const auto& b) {
@@ -121,8 +123,12 @@ ScanPlanes PatchesAndCreases(std::span<const Eigen::Vector3f> points,
   }
   ScanPlanes planes;
   for (const PlanarRegion& region : regions) {
-    planes.patches.push_back(
+    PlanePatch& patch = planes.patches.emplace_back(
         PatchOf(cells, region, sensor_origin.cast<double>(), options.cell_size_m / 4));
+    patch.curvature = CurvatureOf(cells,
+                                  AroundFew(cells, touching, region.cells, options.max_angle_rad),
+                                  patch.axis_u,
+                                  patch.plane.normal.cross(patch.axis_u));
   }
   planes.edges = FindCreases(cells, regions, options);
   return planes;

@@ -30,6 +30,9 @@ constexpr double kCubeM = 8.0;
 // same scan neither wins against it nor makes a draw.
 constexpr double kMinShare = 0.25;
 constexpr double kByFar = 2.0;
+// Surfaces bend the same way for all that see them: what that puts a view off by does not average
+// out over the scans of a plane, nor over the planes along a way. In squares.
+constexpr double kBias = 4.0;
 // A patch so many times as far from the plane as the others are is more likely none of it.
 constexpr double kOff = 2.0;
 
@@ -154,6 +157,7 @@ class PatchAssociation {
         }
         const PosedPatch& candidate = patches_[i];
         if (Distance(candidate.centroid, patches_[seed].centroid) > options_.max_extent_m ||
+            BentAway(candidate, patches_[seed].centroid) > options_.sigma_floor_m ||
             !Fits(candidate, joint, options_) ||
             !Overlap(candidate, member, options_.min_overlap)) {
           continue;
@@ -281,7 +285,8 @@ class PatchAssociation {
 
   SharedPlane PlaneOfGroup(std::span<const std::uint32_t> group) const {
     SharedPlane shared;
-    shared.plane = SumOf(group).Joint().plane;
+    const JointPlane joint = SumOf(group).Joint();
+    shared.plane = joint.plane;
     const double disagreement = Disagreement(group, shared.plane);
     std::map<std::size_t, SharedPlane::View> views;
     for (const std::uint32_t i : group) {
@@ -293,7 +298,9 @@ class PatchAssociation {
               .first->second;
       const double excess = Excess(p, shared.plane);
       const double doubt = excess > kOff * kOff * disagreement ? excess : disagreement;
-      const double weight = p.measurements / (p.variance_m2 + doubt);
+      const double bent = BentAway(p, joint.mean);
+      const double weight =
+          p.measurements / (p.variance_m2 + doubt + kBias * joint.scans * bent * bent);
       view.moments += weight / p.patch->moments(3, 3) * p.patch->moments;
       view.weight += p.patch->area_m2;
       view.rms_m += p.patch->area_m2 * std::pow(RmsDistance(p.information, shared.plane), 2);

@@ -94,8 +94,8 @@ PosedPatch InMap(const PlanePatch& patch,
     }
   }
   posed.offset_sigma_m = 1.0 / std::sqrt(weight);
-  const double spread_m = std::sqrt(FitMoments(patch.moments).eigenvalues(1));
-  posed.tilt_sigma_rad = posed.offset_sigma_m / std::max(spread_m, 0.01);
+  posed.spread_m = std::sqrt(FitMoments(patch.moments).eigenvalues(1));
+  posed.tilt_sigma_rad = posed.offset_sigma_m / std::max(posed.spread_m, 0.01);
   const double height = patch.plane.normal.dot(patch.centroid);
   posed.lever_m = std::sqrt(std::max(0.0, patch.centroid.squaredNorm() - height * height));
   return posed;
@@ -106,6 +106,16 @@ bool Overlap(const PosedPatch& a, const PosedPatch& b, double share) {
     return p.squares * p.patch->footprint_cell_m * p.patch->footprint_cell_m;
   };
   return area(a) <= area(b) ? LiesOn(a, b, share) : LiesOn(b, a, share);
+}
+
+double BentAway(const PosedPatch& patch, const Eigen::Vector3d& at) {
+  const Eigen::Vector3d& k = patch.patch->curvature;
+  Eigen::Matrix2d K;
+  K << k(0), k(1), k(1), k(2);
+  const Eigen::Vector3d away = patch.centroid - at;
+  const Eigen::Vector2d x(patch.axis_u.dot(away), patch.plane.normal.cross(patch.axis_u).dot(away));
+  const double offset = 0.5 * x.dot(K * x);
+  return std::hypot(offset, (K * x).norm() * patch.spread_m);
 }
 
 bool Fits(const PosedPatch& patch, const JointPlane& joint, const SharedPlaneOptions& options) {

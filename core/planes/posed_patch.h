@@ -29,7 +29,8 @@ struct PosedPatch {
   // σ of the plane by the patch alone: at the centroid, and of the normal.
   double offset_sigma_m = 0.0;
   double tilt_sigma_rad = 0.0;
-  double lever_m = 0.0;  // from the sensor to the centroid, along the plane
+  double spread_m = 0.0;  // of the points along its shorter side
+  double lever_m = 0.0;   // from the sensor to the centroid, along the plane
 };
 
 PosedPatch InMap(const PlanePatch& patch,
@@ -40,6 +41,10 @@ PosedPatch InMap(const PlanePatch& patch,
 // Whether at least this share of the patch with the smaller footprint lies on the other one when
 // looked at along the normal of that other one.
 bool Overlap(const PosedPatch& a, const PosedPatch& b, double share);
+
+// How far the patch lies from a plane that touches the surface at `at`, because the surface is bent
+// between there and the patch [m]; 0 for what is flat.
+double BentAway(const PosedPatch& patch, const Eigen::Vector3d& at);
 
 // A plane through patches of `scans` scans, whose poses err independently.
 struct JointPlane {

@@ -32,11 +32,13 @@ std::vector<std::uint32_t> SeedOrder(std::span<const PlanarCell> cells) {
 
 class RegionGrower {
  public:
-  RegionGrower(std::span<const PlanarCell> cells, const PlaneExtractionOptions& options)
+  RegionGrower(std::span<const PlanarCell> cells,
+               const std::vector<std::vector<std::uint32_t>>& touching,
+               const PlaneExtractionOptions& options)
       : cells_(cells),
         options_(options),
         min_cosine_(std::cos(options.max_angle_rad)),
-        touching_(TouchingCells(cells)),
+        touching_(touching),
         taken_(cells.size(), false) {}
 
   std::vector<PlanarRegion> Run() {
@@ -97,15 +99,16 @@ class RegionGrower {
   std::span<const PlanarCell> cells_;
   const PlaneExtractionOptions& options_;
   double min_cosine_;
-  std::vector<std::vector<std::uint32_t>> touching_;
+  const std::vector<std::vector<std::uint32_t>>& touching_;
   std::vector<bool> taken_;
 };
 
 }  // namespace
 
 std::vector<PlanarRegion> GrowRegions(std::span<const PlanarCell> cells,
+                                      const std::vector<std::vector<std::uint32_t>>& touching,
                                       const PlaneExtractionOptions& options) {
-  return RegionGrower(cells, options).Run();
+  return RegionGrower(cells, touching, options).Run();
 }
 
 }  // namespace strata

@@ -24,7 +24,9 @@ struct PlanarRegion {
 // Connected regions, each cell in at most one. Unlike the thesis', a region is held against the
 // plane through all of it, not against its first normal, it starts with the largest and flattest
 // cells instead of random ones, and cells that do not fit its final plane leave it.
+// `touching`: see TouchingCells().
 std::vector<PlanarRegion> GrowRegions(std::span<const PlanarCell> cells,
+                                      const std::vector<std::vector<std::uint32_t>>& touching,
                                       const PlaneExtractionOptions& options);
 
 }  // namespace strata

@@ -46,13 +46,17 @@ struct PlanePatch {
   double area_m2 = 0.0;  // of the flat cells it is made of, without the holes between them
   std::uint32_t point_count = 0;
   double rms_m = 0.0;  // of the points' distance to the plane
+  // How much the surface is bent [1/m]: k_aa, k_ab, k_bb of z = ½ (k_aa a² + 2 k_ab a b + k_bb b²),
+  // z along the normal. 0 where that is not sure.
+  Eigen::Vector3d curvature = Eigen::Vector3d::Zero();
 
   friend bool operator==(const PlanePatch& a, const PlanePatch& b) {
     return a.plane.normal == b.plane.normal && a.plane.distance == b.plane.distance &&
            a.moments == b.moments && a.centroid == b.centroid && a.axis_u == b.axis_u &&
            a.extent_min == b.extent_min && a.extent_max == b.extent_max &&
            a.footprint_cell_m == b.footprint_cell_m && a.footprint == b.footprint &&
-           a.area_m2 == b.area_m2 && a.point_count == b.point_count && a.rms_m == b.rms_m;
+           a.area_m2 == b.area_m2 && a.point_count == b.point_count && a.rms_m == b.rms_m &&
+           a.curvature == b.curvature;
   }
 };
 

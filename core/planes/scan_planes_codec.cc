@@ -68,6 +68,7 @@ void PatchNumbers(Patch& patch, Number& number) {
   Each(patch.extent_max, number);
   number(patch.rms_m);
   number(patch.footprint_cell_m);
+  Each(patch.curvature, number);
 }
 
 template <typename Edge, typename Number>

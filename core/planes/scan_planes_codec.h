@@ -12,7 +12,7 @@
 
 namespace strata {
 
-inline constexpr std::uint16_t kScanPlanesVersion = 2;
+inline constexpr std::uint16_t kScanPlanesVersion = 3;
 
 // Exact: the same value comes back. REQUIRES: values as ExtractPlanes() gives them.
 std::string EncodeScanPlanes(const ScanPlanes& planes);

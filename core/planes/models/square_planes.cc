@@ -95,7 +95,8 @@ std::vector<MixturePlane> StartPlanes(const std::vector<CellLayer>& layers,
   std::vector<StartGroup> groups;
   std::size_t first = 0;
   for (const CellLayer& layer : layers) {
-    for (const PlanarRegion& region : GrowRegions(layer.cells, CellOptions(options))) {
+    const auto touching = TouchingCells(layer.cells);
+    for (const PlanarRegion& region : GrowRegions(layer.cells, touching, CellOptions(options))) {
       std::vector<StartGroup> parts;
       for (const std::uint32_t i : region.cells) AddCell(moved[first + i], parts);
       groups.insert(groups.end(), parts.begin(), parts.end());

@@ -54,6 +54,37 @@ Pose DrawTilt(SplitMix64& random, double most_rad) {
   return Pose(Eigen::AngleAxisd(angle, axis));
 }
 
+Pose MovedBy(Pose T, const Eigen::Vector3d& by) {
+  T.pretranslate(by);
+  return T;
+}
+
+// A patch where the surface z = ½ (x² k_x + y² k_y) is at (x, y), as seen from the surface's pose.
+PosedPatch OnBowl(double k_x, double k_y, const Eigen::Vector2d& at, const Pose& T_map_bowl) {
+  SplitMix64 random(kSeed);
+  static PlanePatch patch;
+  patch = Draw(random);
+  patch.centroid = {at.x(), at.y(), 0.5 * (k_x * at.x() * at.x() + k_y * at.y() * at.y())};
+  patch.curvature = {k_x, 0.0, k_y};
+  return InMap(patch, 0, T_map_bowl, {});
+}
+
+TEST(PosedPatchTest, BentAwayIsHowFarTheSurfaceLeavesThePlane) {
+  SplitMix64 random(kSeed);
+  for (int i = 0; i < 20; ++i) {
+    const Pose T_map_bowl = MovedBy(DrawTilt(random, 3.0), DrawVector(random, 50.0));
+    const double k_x = 0.02 * (random.Uniform() - 0.5);
+    const double k_y = 0.02 * (random.Uniform() - 0.5);
+    const Eigen::Vector2d at = DrawVector(random, 8.0).head<2>();
+    const PosedPatch patch = OnBowl(k_x, k_y, at, T_map_bowl);
+    const double offset = std::abs(0.5 * (k_x * at.x() * at.x() + k_y * at.y() * at.y()));
+    const double tilt = std::hypot(k_x * at.x(), k_y * at.y());
+    EXPECT_NEAR(
+        BentAway(patch, T_map_bowl.translation()), std::hypot(offset, tilt * patch.spread_m), 1e-9);
+  }
+  EXPECT_EQ(BentAway(OnBowl(0.0, 0.0, {5.0, 5.0}, Pose::Identity()), Eigen::Vector3d::Zero()), 0.0);
+}
+
 TEST(PosedPatchTest, WhatFitsIsNotRefusedByBounds) {
   SplitMix64 random(kSeed);
   std::size_t fits = 0;

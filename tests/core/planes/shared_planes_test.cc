@@ -90,6 +90,32 @@ const std::vector<Eigen::Vector3d>& AroundTheYard() {
   return places;
 }
 
+// What a patch of a hill misses of the hill's other patches is no error of poses: held together as
+// one plane, they would flatten it. With true poses they find little wrong.
+TEST(SharedPlanesTest, HillsAreNotFlattened) {
+  Scene hills;
+  const Eigen::AlignedBox2d area(Eigen::Vector2d(-60, -60), Eigen::Vector2d(60, 60));
+  hills.SetTerrain(area, 0.25, [](double x, double) { return 1.6 * std::sin(x / 20.0); });
+  hills.Build();
+  std::vector<Eigen::Vector3d> way;
+  for (double x = -24.0; x <= 24.0; x += 2.0)
+    way.emplace_back(x, 0.0, 1.6 * std::sin(x / 20.0) + 1.7);
+  const Views views = Look(hills, way, 20261127);
+  double chi2 = 0.0;
+  int count = 0;
+  for (const SharedPlane& plane : FindSharedPlanes(views.At(views.truth))) {
+    for (const SharedPlane::View& view : plane.views) {
+      Eigen::Vector4d p;
+      p << plane.plane.normal, -plane.plane.distance;
+      const Eigen::Vector4d in_scan = views.truth[view.scan].matrix().transpose() * p;
+      chi2 += in_scan.dot(view.moments * in_scan);
+      ++count;
+    }
+  }
+  ASSERT_GT(count, 0);
+  EXPECT_LT(chi2 / count, 1.5);  // 5.6 where they are held together
+}
+
 TEST(SharedPlanesTest, FindsWallsAndFloorOfDisturbedScans) {
   const Views views = Look(Yard(), AroundTheYard(), 10);
   const std::vector<SharedPlane> planes =
