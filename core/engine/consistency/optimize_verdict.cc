@@ -232,8 +232,8 @@ absl::string_view Meaning(const OptimizeVerdict& verdict, AlignmentTermination t
            "or one map for each place would help; job accept applies it.";
   }
   if (!verdict.loose_steps.empty()) return "Usable; look at these steps.";
-  return termination == AlignmentTermination::kSettled ? "Good."
-                                                       : "Usable; run it again for the rest.";
+  if (termination != AlignmentTermination::kSettled) return "Usable; run it again for the rest.";
+  return verdict.apart.empty() ? "Good." : "Good within each part.";
 }
 
 }  // namespace
