@@ -69,6 +69,11 @@ class VoxelBlocks {
     last_key_ = key;
     return last_ = &blocks_[it->second];
   }
+  // The same for many threads at a time, while nobody adds blocks.
+  const Block* Peek(const BlockKey& key) const {
+    const auto it = index_.find(key);
+    return it == index_.end() ? nullptr : &blocks_[it->second];
+  }
   Block& FindOrAdd(const BlockKey& key) {
     if (Block* const found = Find(key)) return *found;
     index_.emplace(key, static_cast<std::uint32_t>(keys_.size()));

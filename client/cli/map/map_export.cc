@@ -43,6 +43,7 @@ struct ExportOptions {
   FloorOptions floor;
   std::string mode = "trinary";
   HeightOptions heights;
+  bool free = false;
   const CLI::App* given = nullptr;  // what the user said of these
 };
 
@@ -226,8 +227,9 @@ constexpr std::pair<const char*, const char*> kFormatsOfOptions[] = {
     {"--mode", "nav2"},
     {"--profile", "nav2, geotiff, asc"},
     {"--surface", "geotiff, asc"},
-    {"--region", "geotiff, asc, bt"},
-    {"--level", "ply, obj, stl, glb, mcap, geotiff, asc, bt"}};
+    {"--region", "geotiff, asc, octomap, bt"},
+    {"--free", "octomap"},
+    {"--level", "ply, obj, stl, glb, mcap, geotiff, asc, octomap, bt"}};
 
 // An option that a format does not listen to would be believed to have been heard.
 absl::Status CheckOptions(const ExportOptions& options) {
@@ -256,8 +258,12 @@ absl::Status Export(Context& context, const ExportOptions& options) {
     heights.level = options.level;
     return ExportHeights(context, options.map, heights, options.format, options.out);
   }
-  if (options.format == "bt") {
-    return ExportOctree(context, options.map, {options.level, options.heights.region}, options.out);
+  if (options.format == "bt" || options.format == "octomap") {
+    const bool with_free = options.format == "bt" || options.free;
+    return ExportOctree(context,
+                        options.map,
+                        {options.level, options.heights.region, options.format, with_free},
+                        options.out);
   }
   if (options.format == "mcap") return ExportFoxglove(context, options);
   const bool points = options.format == "pcd";
@@ -298,8 +304,9 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
       "export",
       "Write a map for other programs: its surfaces as a mesh (ply, obj, stl, glb), the points of "
       "its scans (pcd), its floors as grids (nav2), one height a cell (geotiff, asc), free and "
-      "occupied space (bt), or surfaces and trajectories for Foxglove (mcap)",
+      "occupied space (octomap), or surfaces and trajectories for Foxglove (mcap)",
       "strata map export campus --format ply --out campus.ply\n"
+      "  strata map export campus --format octomap --free --out campus.bt\n"
       "  strata map export campus --format mcap --out campus.mcap",
       [options](Context& context) { return Export(context, *options); });
   options->given = app;
@@ -314,11 +321,13 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
          "and label; nav2: a picture (pgm) and a yaml file for map_server, of one floor or a pair "
          "each of all; geotiff: heights and their standard deviation as bands, on earth where the "
          "map has an origin; asc: the same as ESRI ASCII grids, FILE.asc and FILE-sigma.asc, with "
-         ".prj; bt: an octree of OctoMap, of what the scans' rays hit and went through; mcap: "
+         ".prj; octomap: an octree of OctoMap (.bt) of what the scans' rays hit, with --free of "
+         "what "
+         "they went through, too; bt: the same with free space; mcap: "
          "/surfaces as points (foxglove.PointCloud), /trajectories/NAME and /tf with the scans' "
          "poses and times (PosesInFrame, FrameTransform), as JSON")
       ->check(CLI::IsMember(
-          {"ply", "obj", "stl", "glb", "pcd", "nav2", "geotiff", "asc", "bt", "mcap"}))
+          {"ply", "obj", "stl", "glb", "pcd", "nav2", "geotiff", "asc", "octomap", "bt", "mcap"}))
       ->required();
   app->add_option("--out", options->out, "The file to write")->type_name("FILE")->required();
   AddNumbers(
@@ -351,6 +360,9 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
       ->check(CLI::IsMember({"highest", "kalman", "ground"}))
       ->capture_default_str();
   AddRegion(app, options->heights.region);
+  app->add_flag("--free",
+                options->free,
+                "octomap: free space, too: what rays went through and did not end in");
   app->add_option(
          "--level", options->level, "Level of detail of a mesh, heights or octree, 0 = finest")
       ->check(CLI::Range(0, kMaxLevel))

@@ -12,7 +12,7 @@
 #include "client/formats/file_bytes.h"
 #include "client/formats/grid/octree_writer.h"
 #include "core/common/status.h"
-#include "core/mesh/occupancy_voxels.h"
+#include "core/occupancy/occupancy_voxels.h"
 #include "core/world/map_info.h"
 
 namespace strata::cli {
@@ -39,13 +39,13 @@ absl::Status ExportOctree(Context& context,
     STRATA_RETURN_IF_ERROR(
         grid.Add(posed.cloud, posed.T_map_scan, posed.sensor, context.call.stop));
   }
-  const OctreeFile octree = BtFile(grid);
+  const OctreeFile octree = BtFile(grid, options.with_free);
   if (octree.nodes == 0) {
     return absl::NotFoundError(absl::StrCat("no ray of map ", map, " crosses the region"));
   }
   STRATA_RETURN_IF_ERROR(WriteFileBytes(out, octree.bytes));
   context.output.Object({{"file", out},
-                         {"format", "bt"},
+                         {"format", options.format},
                          {"voxel_m", voxel_m},
                          {"scans", clouds.size()},
                          {"nodes", octree.nodes},

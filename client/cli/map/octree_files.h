@@ -16,6 +16,8 @@ namespace strata::cli {
 struct OctreeOptions {
   std::int32_t level = 0;  // voxels are 2^level of the map's cells wide
   std::optional<Eigen::AlignedBox3d> region;
+  std::string format = "octomap";  // as it was asked for
+  bool with_free = true;
 };
 
 // Writes what the rays of the map's scans hit and went through; shows progress. Errors of

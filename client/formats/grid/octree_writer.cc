@@ -36,7 +36,7 @@ std::uint64_t WayTo(const BlockKey& key) {
 
 class BtWriter {
  public:
-  explicit BtWriter(const OccupancyVoxels& grid) : grid_(grid) {
+  BtWriter(const OccupancyVoxels& grid, bool with_free) : grid_(grid), with_free_(with_free) {
     for (std::size_t i = 0; i < grid.keys().size(); ++i) {
       blocks_.emplace_back(WayTo(grid.keys()[i]), i);
     }
@@ -86,6 +86,9 @@ class BtWriter {
     if (begin == end) return static_cast<int>(Occupancy::kUnknown);
     if (level == kLevelsOfBlocks) {
       block_ = grid_.block(begin->second);
+      if (!with_free_) {
+        std::replace(block_.begin(), block_.end(), Occupancy::kFree, Occupancy::kUnknown);
+      }
       free_ += std::count(block_.begin(), block_.end(), Occupancy::kFree);
       occupied_ += std::count(block_.begin(), block_.end(), Occupancy::kOccupied);
       return Within({0, 0, 0}, kBlockEdge);
@@ -110,6 +113,7 @@ class BtWriter {
   }
 
   const OccupancyVoxels& grid_;
+  const bool with_free_;
   Blocks blocks_;  // in the file's order
   OccupancyBlock block_{};
   std::string data_;
@@ -120,6 +124,8 @@ class BtWriter {
 
 }  // namespace
 
-OctreeFile BtFile(const OccupancyVoxels& grid) { return BtWriter(grid).Write(); }
+OctreeFile BtFile(const OccupancyVoxels& grid, bool with_free) {
+  return BtWriter(grid, with_free).Write();
+}
 
 }  // namespace strata

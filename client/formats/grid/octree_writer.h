@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <string>
 
-#include "core/mesh/occupancy_voxels.h"
+#include "core/occupancy/occupancy_voxels.h"
 
 namespace strata {
 
@@ -17,8 +17,8 @@ struct OctreeFile {
 };
 
 // A .bt file (OctoMap 1.6 and later): each node one of free, occupied and divided, those of eight
-// alike put together; what nobody saw is not in it.
-OctreeFile BtFile(const OccupancyVoxels& grid);
+// alike put together; what nobody saw is not in it, and what is free only `with_free`.
+OctreeFile BtFile(const OccupancyVoxels& grid, bool with_free = true);
 
 }  // namespace strata
 

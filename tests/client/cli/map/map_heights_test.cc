@@ -255,6 +255,13 @@ TEST_F(MapHeightsTest, OctreesHaveFreeSpace) {
       Export("bridge", {"--format", "bt", "--level", "1"}, "coarse.bt").at("voxel_m").get<double>(),
       0.4,
       1e-9);
+  const json free = Export("bridge", {"--format", "octomap", "--free"}, "free.bt");
+  EXPECT_EQ(free.at("nodes"), all.at("nodes"));
+  const json hit = Export("bridge", {"--format", "octomap"}, "hit.bt");
+  EXPECT_EQ(hit.at("free_m3"), 0.0);
+  EXPECT_EQ(hit.at("occupied_m3"), all.at("occupied_m3"));
+  EXPECT_THAT(Refusal({"bridge", "--format", "pcd", "--free", "--out", Path("no.pcd")}),
+              HasSubstr("--free"));
   EXPECT_THAT(Refusal({"empty", "--format", "bt", "--out", Path("no.bt")}), HasSubstr("empty"));
   EXPECT_THAT(
       Refusal({"bridge", "--format", "bt", "--out", Path("no.bt"), "--region", "500,500,501,501"}),

@@ -15,7 +15,7 @@
 #include "core/cloud/sensor_model.h"
 #include "core/common/stop.h"
 #include "core/geometry/pose.h"
-#include "core/mesh/occupancy_voxels.h"
+#include "core/occupancy/occupancy_voxels.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {
@@ -81,6 +81,19 @@ TEST(OctreeWriterTest, FreeBeforeAWallUnknownBehind) {
   }
   EXPECT_EQ(At(tree, -0.5, 0.0, 1.0), Space::kUnknown);
   EXPECT_EQ(At(tree, 2.05, 0.0, 2.5), Space::kUnknown);
+}
+
+TEST(OctreeWriterTest, OccupiedAloneWhereFreeIsNotAskedFor) {
+  OccupancyVoxels grid = GridOf(0.1);
+  STRATA_ASSERT_OK(grid.Add(Wall(), Pose::Identity(), {}, Stop()));
+  const OctreeFile written = BtFile(grid, false);
+  EXPECT_EQ(written.free_m3, 0.0);
+  EXPECT_EQ(written.occupied_m3, BtFile(grid).occupied_m3);
+  std::istringstream file(written.bytes);
+  octomap::OcTree tree(1.0);
+  ASSERT_TRUE(tree.readBinary(file));
+  EXPECT_EQ(At(tree, 4.05, 0.0, 1.0), Space::kOccupied);
+  EXPECT_EQ(At(tree, 2.05, 0.0, 1.0), Space::kUnknown);
 }
 
 TEST(OctreeWriterTest, PosesMoveSensorAndPoints) {

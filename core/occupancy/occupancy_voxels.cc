@@ -1,13 +1,14 @@
-#include "core/mesh/occupancy_voxels.h"
+#include "core/occupancy/occupancy_voxels.h"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <cstdint>
 
 #include "absl/strings/str_format.h"
 
 #include "core/common/option_checks.h"
 #include "core/common/status.h"
+#include "core/occupancy/voxel_walk.h"
 
 namespace strata {
 namespace {
@@ -15,11 +16,10 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3i;
 
-// Log-odds times 27, with which hit and miss are to each other as they should, within 0.1 %.
-constexpr std::int16_t kHit = 23;
-constexpr std::int16_t kMiss = 11;
-constexpr std::int16_t kLeastOdds = -54;
-constexpr std::int16_t kMostOdds = 95;
+std::int16_t OddsOf(double probability) {
+  return static_cast<std::int16_t>(
+      std::lround(OccupancyVoxels::kOddsPerNat * std::log(probability / (1.0 - probability))));
+}
 
 constexpr std::size_t kMostBytes = 2'000'000'000;
 constexpr std::uint16_t kLastScan = 32'767;
@@ -30,13 +30,15 @@ Vector3i VoxelAbove(const Vector3d& p) {
   return (p.array() - 0.5).ceil().max(-kMostNodes).min(kMostNodes).cast<int>();
 }
 
-Vector3i VoxelOf(const Vector3d& p) { return p.array().floor().cast<int>(); }
-
 }  // namespace
 
 absl::Status OccupancyVoxelsOptions::Validate() const {
   OptionChecks checks("occupancy");
   checks.InRange("voxel_m", voxel_m, 0.001, 1000.0);
+  checks.InRange("least", model.least, 0.01, 0.49);
+  checks.InRange("most", model.most, 0.51, 0.99);
+  checks.InRange("hit", model.hit, 0.51, model.most);
+  checks.InRange("miss", model.miss, model.least, 0.49);
   for (const Vector3d& corner : {region.min(), region.max()}) {
     for (const double x : corner) checks.InRange("region", x, -1e9, 1e9);
   }
@@ -45,6 +47,10 @@ absl::Status OccupancyVoxelsOptions::Validate() const {
 
 OccupancyVoxels::OccupancyVoxels(const OccupancyVoxelsOptions& options)
     : voxel_m_(options.voxel_m),
+      hit_(OddsOf(options.model.hit)),
+      miss_(OddsOf(options.model.miss)),
+      least_(OddsOf(options.model.least)),
+      most_(OddsOf(options.model.most)),
       low_(VoxelAbove(options.region.min() / options.voxel_m)),
       high_(VoxelAbove(options.region.max() / options.voxel_m)) {}
 
@@ -67,7 +73,7 @@ bool OccupancyVoxels::Hit(const Vector3i& at) {
   const auto mark = static_cast<std::uint16_t>(2 * scan_ + 1);
   if (voxel.seen == mark) return false;
   voxel.seen = mark;
-  voxel.odds = std::min<std::int16_t>(voxel.odds + kHit, kMostOdds);
+  voxel.odds = After(voxel.odds, true);
   return true;
 }
 
@@ -76,7 +82,7 @@ void OccupancyVoxels::Miss(const Vector3i& at) {
   const auto mark = static_cast<std::uint16_t>(2 * scan_);
   if (voxel.seen >= mark) return;
   voxel.seen = mark;
-  voxel.odds = std::max<std::int16_t>(voxel.odds - kMiss, kLeastOdds);
+  voxel.odds = After(voxel.odds, false);
 }
 
 // Leaves the part over the voxels that are kept; false if there is none.
@@ -101,30 +107,16 @@ bool OccupancyVoxels::Clip(Ray& ray) const {
   return true;
 }
 
-// From voxel to voxel (Amanatides and Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing",
-// 1987).
 void OccupancyVoxels::Cast(const Ray& ray) {
-  const Vector3d along = ray.to - ray.from;
-  Vector3i at = VoxelOf(ray.from).cwiseMax(low_).cwiseMin(high_ - Vector3i::Ones());
   const Vector3i last = VoxelOf(ray.to);
-  Vector3i step;
-  Vector3d next, every;
-  for (int i = 0; i < 3; ++i) {
-    step[i] = along[i] > 0.0 ? 1 : -1;
-    const double edge = at[i] + (along[i] > 0.0 ? 1 : 0);
-    constexpr double kNever = std::numeric_limits<double>::infinity();
-    next[i] = along[i] == 0.0 ? kNever : (edge - ray.from[i]) / along[i];
-    every[i] = along[i] == 0.0 ? kNever : 1.0 / std::abs(along[i]);
-  }
-  while (Inside(at) && !(ray.ends && at == last)) {
-    Miss(at);
-    int nearest = 0;
-    if (next[1] < next[nearest]) nearest = 1;
-    if (next[2] < next[nearest]) nearest = 2;
-    if (next[nearest] > 1.0) return;
-    at[nearest] += step[nearest];
-    next[nearest] += every[nearest];
-  }
+  WalkVoxels(ray.from,
+             ray.to,
+             VoxelOf(ray.from).cwiseMax(low_).cwiseMin(high_ - Vector3i::Ones()),
+             [&](const Vector3i& at, double /*passed*/) {
+               if (!Inside(at) || (ray.ends && at == last)) return false;
+               Miss(at);
+               return true;
+             });
 }
 
 absl::Status OccupancyVoxels::Add(const PointCloud& cloud,
@@ -168,6 +160,20 @@ OccupancyBlock OccupancyVoxels::block(std::size_t i) const {
   };
   std::transform(voxels_.block(i).begin(), voxels_.block(i).end(), states.begin(), state);
   return states;
+}
+
+double OccupancyVoxels::ProbabilityOf(std::int16_t odds) {
+  return odds == kUnknownOdds ? 0.5 : 1.0 / (1.0 + std::exp(-odds / kOddsPerNat));
+}
+
+std::size_t OccupancyVoxels::CountKnown() const {
+  std::size_t known = 0;
+  for (std::size_t i = 0; i < keys().size(); ++i) {
+    known += std::count_if(voxels_.block(i).begin(),
+                           voxels_.block(i).end(),
+                           [](const Voxel& voxel) { return voxel.seen != 0; });
+  }
+  return known;
 }
 
 }  // namespace strata

@@ -1,0 +1,146 @@
+#include "core/occupancy/expected_view.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/occupancy/information.h"
+#include "core/occupancy/voxel_walk.h"
+
+namespace strata {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+// Every so many rows and columns; counted from the middle of the first such part.
+struct Strides {
+  int rows = 1;
+  int columns = 1;
+};
+
+double RowSpacing(const FieldOfView& sensor) {
+  return (sensor.up_rad + sensor.down_rad) / sensor.rows;
+}
+
+double ColumnSpacing(const FieldOfView& sensor) { return sensor.width_rad / sensor.columns; }
+
+int CountOf(int all, int stride) { return (all + stride - 1) / stride; }
+
+// Such that neighbouring beams are about as far apart in both directions.
+Strides StridesFor(const FieldOfView& sensor, int most_beams) {
+  Strides strides;
+  while (CountOf(sensor.rows, strides.rows) * CountOf(sensor.columns, strides.columns) >
+         most_beams) {
+    const bool wide = strides.columns * ColumnSpacing(sensor) <= strides.rows * RowSpacing(sensor);
+    const bool columns_left = strides.columns < sensor.columns;
+    ++((wide && columns_left) || strides.rows >= sensor.rows ? strides.columns : strides.rows);
+  }
+  return strides;
+}
+
+std::vector<Vector3d> DirectionsOf(const FieldOfView& sensor, const Strides& strides) {
+  std::vector<Vector3d> directions;
+  for (int row = (strides.rows - 1) / 2; row < sensor.rows; row += strides.rows) {
+    const double elevation = -sensor.down_rad + (row + 0.5) * RowSpacing(sensor);
+    for (int column = (strides.columns - 1) / 2; column < sensor.columns;
+         column += strides.columns) {
+      const double azimuth = -sensor.width_rad / 2 + (column + 0.5) * ColumnSpacing(sensor);
+      directions.emplace_back(std::cos(elevation) * std::cos(azimuth),
+                              std::cos(elevation) * std::sin(azimuth),
+                              std::sin(elevation));
+    }
+  }
+  return directions;
+}
+
+}  // namespace
+
+ExpectedViews::ExpectedViews(const OccupancyVoxels& grid, const FieldOfView& sensor)
+    : grid_(grid), reader_(grid), max_range_m_(sensor.max_range_m) {
+  const auto beams_of = [&sensor](int most) {
+    const Strides strides = StridesFor(sensor, most);
+    Beams beams;
+    beams.directions = DirectionsOf(sensor, strides);
+    beams.each = static_cast<double>(sensor.rows) * sensor.columns /
+                 static_cast<double>(beams.directions.size());
+    beams.solid_angle = strides.rows * RowSpacing(sensor) * strides.columns * ColumnSpacing(sensor);
+    return beams;
+  };
+  all_ = beams_of(sensor.rows * sensor.columns);
+  some_ = beams_of(kMostEstimateBeams);
+  least_odds_ = grid.least_odds();
+  for (std::int16_t odds = least_odds_; odds <= grid.most_odds(); ++odds) {
+    const double before = OccupancyVoxels::ProbabilityOf(odds);
+    const auto gain = [&](bool hit) {
+      return InformationGainBits(before, OccupancyVoxels::ProbabilityOf(grid.After(odds, hit)));
+    };
+    gain_of_hit_.push_back(gain(true));
+    gain_of_miss_.push_back(gain(false));
+  }
+}
+
+void ExpectedViews::BeginView() {
+  if (++view_ < kTaken) return;
+  seen_.ForEach([](std::uint16_t& view) { view = view == kTaken ? kTaken : std::uint16_t{0}; });
+  view_ = 1;
+}
+
+// Of so many voxels beside this one the beams that this one stands for would cross some: those of
+// the solid angle, as many in all as its volume has, of which a slanting beam crosses more.
+double ExpectedViews::WeightAt(const Beams& beams,
+                               const Vector3d& direction,
+                               double voxels_per_length,
+                               double range_m) const {
+  const double across = range_m / grid_.voxel_m();
+  const double cosine = std::hypot(direction.x(), direction.y());
+  const double beside = beams.solid_angle * cosine * across * across / voxels_per_length;
+  return std::max(1.0, std::min(beams.each, beside));
+}
+
+ViewGain ExpectedViews::Look(const Pose& T_map_sensor, const Beams& beams) {
+  BeginView();
+  const double voxel_m = grid_.voxel_m();
+  const Vector3d from = T_map_sensor.translation() / voxel_m;
+  const Vector3i first = VoxelOf(from);
+  ViewGain gain;
+  for (const Vector3d& beam : beams.directions) {
+    const Vector3d direction = T_map_sensor.linear() * beam;
+    double unknown_from_m = max_range_m_;
+    WalkVoxels(from,
+               from + direction * (max_range_m_ / voxel_m),
+               first,
+               [&](const Vector3i& at, double passed) {
+                 if (!grid_.Inside(at)) return false;
+                 const double range_m = passed * max_range_m_;
+                 std::uint16_t& mark = seen_.FindOrAdd(BlockOf(at))[NodeInBlock(at)];
+                 const std::int16_t odds = reader_.Odds(at);
+                 const bool unknown = odds == OccupancyVoxels::kUnknownOdds;
+                 if (unknown && mark != kTaken) unknown_from_m = std::min(unknown_from_m, range_m);
+                 if (range_m > unknown_from_m + kUnknownReachM) return false;
+                 const bool hit = !unknown && odds > 0;
+                 if (mark != kTaken && mark != view_) {
+                   const std::size_t number = (unknown ? 0 : odds) - least_odds_;
+                   const double weight =
+                       beams.each == 1.0 ? 1.0
+                                         : WeightAt(beams, beam, direction.lpNorm<1>(), range_m);
+                   gain.bits += weight * (hit ? gain_of_hit_ : gain_of_miss_)[number];
+                   if (unknown) gain.volume_m3 += weight * std::pow(voxel_m, 3);
+                 }
+                 if (mark != kTaken) mark = view_;
+                 return !hit;
+               });
+  }
+  return gain;
+}
+
+ViewGain ExpectedViews::Estimate(const Pose& T_map_sensor) { return Look(T_map_sensor, some_); }
+
+ViewGain ExpectedViews::Take(const Pose& T_map_sensor) {
+  const ViewGain gain = Look(T_map_sensor, all_);
+  seen_.ForEach([this](std::uint16_t& mark) {
+    if (mark == view_) mark = kTaken;
+  });
+  return gain;
+}
+
+}  // namespace strata

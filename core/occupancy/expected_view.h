@@ -1,0 +1,68 @@
+// How much a look from somewhere would tell (thesis 4.4.2).
+#ifndef STRATA_CORE_OCCUPANCY_EXPECTED_VIEW_H_
+#define STRATA_CORE_OCCUPANCY_EXPECTED_VIEW_H_
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/cloud/field_of_view.h"
+#include "core/geometry/pose.h"
+#include "core/mesh/voxel_blocks.h"
+#include "core/occupancy/occupancy_voxels.h"
+
+namespace strata {
+
+struct ViewGain {
+  double bits = 0.0;
+  double volume_m3 = 0.0;  // of voxels that are known only then
+};
+
+// Expected information gain of views of a grid (eq. 4.13) with the most likely measurement of each
+// beam: it ends in the first voxel that is occupied with more than 0.5, after kUnknownReachM
+// of unknown space, at the sensor's range, or where the grid's region ends. Unlike eq. 4.13 a
+// voxel counts once a view, however many beams cross it, and the model is the grid's. One thread at
+// a time; many may look at one grid.
+class ExpectedViews {
+ public:
+  static constexpr double kUnknownReachM = 5.0;
+  static constexpr int kMostEstimateBeams = 2000;
+
+  // `grid` must outlive it. REQUIRES: a valid sensor.
+  ExpectedViews(const OccupancyVoxels& grid, const FieldOfView& sensor);
+
+  // From kMostEstimateBeams at most; the voxels of each stand for those that the beams around it
+  // would cross.
+  ViewGain Estimate(const Pose& T_map_sensor);
+  // From all beams. What they cross is known from then on and gains nothing any more.
+  ViewGain Take(const Pose& T_map_sensor);
+
+ private:
+  static constexpr std::uint16_t kTaken = 0xFFFF;
+  struct Beams {
+    std::vector<Eigen::Vector3d> directions;
+    double each = 1.0;         // of the sensor's beams that one stands for
+    double solid_angle = 0.0;  // of one, over the cosine of its elevation
+  };
+
+  void BeginView();
+  ViewGain Look(const Pose& T_map_sensor, const Beams& beams);
+  double WeightAt(const Beams& beams,
+                  const Eigen::Vector3d& direction,
+                  double voxels_per_length,
+                  double range_m) const;
+
+  const OccupancyVoxels& grid_;
+  OccupancyReader reader_;
+  const double max_range_m_;
+  Beams all_, some_;
+  std::vector<double> gain_of_hit_, gain_of_miss_;  // by odds
+  std::int16_t least_odds_ = 0;
+  VoxelBlocks<std::uint16_t> seen_;  // the view that did last, or kTaken
+  std::uint16_t view_ = 0;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_OCCUPANCY_EXPECTED_VIEW_H_

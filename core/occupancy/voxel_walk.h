@@ -1,0 +1,46 @@
+// From voxel to voxel along a line (Amanatides and Woo, "A Fast Voxel Traversal Algorithm for Ray
+// Tracing", 1987).
+#ifndef STRATA_CORE_OCCUPANCY_VOXEL_WALK_H_
+#define STRATA_CORE_OCCUPANCY_VOXEL_WALK_H_
+
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Core>
+
+namespace strata {
+
+inline Eigen::Vector3i VoxelOf(const Eigen::Vector3d& p) { return p.array().floor().cast<int>(); }
+
+// Calls visit(voxel, share of the line before it) for each voxel that the line crosses, `at` first,
+// until that returns false or the line ends. Lengths in voxels.
+template <typename Visit>
+void WalkVoxels(const Eigen::Vector3d& from,
+                const Eigen::Vector3d& to,
+                Eigen::Vector3i at,
+                const Visit& visit) {
+  const Eigen::Vector3d along = to - from;
+  Eigen::Vector3i step;
+  Eigen::Vector3d next, every;
+  for (int i = 0; i < 3; ++i) {
+    step[i] = along[i] > 0.0 ? 1 : -1;
+    const double edge = at[i] + (along[i] > 0.0 ? 1 : 0);
+    constexpr double kNever = std::numeric_limits<double>::infinity();
+    next[i] = along[i] == 0.0 ? kNever : (edge - from[i]) / along[i];
+    every[i] = along[i] == 0.0 ? kNever : 1.0 / std::abs(along[i]);
+  }
+  double passed = 0.0;
+  while (visit(at, passed)) {
+    int nearest = 0;
+    if (next[1] < next[nearest]) nearest = 1;
+    if (next[2] < next[nearest]) nearest = 2;
+    passed = next[nearest];
+    if (passed > 1.0) return;
+    at[nearest] += step[nearest];
+    next[nearest] += every[nearest];
+  }
+}
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_OCCUPANCY_VOXEL_WALK_H_
