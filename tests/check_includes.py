@@ -30,7 +30,7 @@ ARROWS = {
     "core/tracking": ["core/posegraph", "core/registration", "core/egomotion", "core/world", "core/mls", "core/cloud",
                       "core/geometry", "core/common"],
     "core/classification": ["core/planes", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
-    "core/planning": ["core/occupancy", "core/world", "core/mls", "core/geometry", "core/common"],
+    "core/planning": ["core/occupancy", "core/mesh", "core/cloud", "core/world", "core/mls", "core/geometry", "core/common"],
     "core/storage": ["core/world", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/api": ["core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/engine": ["core/"],

@@ -112,6 +112,7 @@ int Main(int argc, char** argv) {
   AddSurfaceCommand(commands);
   AddPlanCommand(commands);
   AddPathCommands(commands);
+  AddExploreCommand(commands);
   AddProfileCommands(commands);
   AddJobCommands(commands);
   AddPlanesCommands(commands);

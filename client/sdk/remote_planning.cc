@@ -90,6 +90,19 @@ absl::StatusOr<FloorPlan> RemotePlanning::ListFloors(const api::Call& call,
   return FromProto(out);
 }
 
+absl::StatusOr<ExploreResult> RemotePlanning::Explore(const api::Call& call,
+                                                      absl::string_view map,
+                                                      const ExploreQuery& query) {
+  STRATA_ASSIGN_OR_RETURN(const v1::ExploreResponse out,
+                          CallUnary(connection_,
+                                    *stub_,
+                                    &v1::Planning::Stub::Explore,
+                                    call,
+                                    Repeat::kOnTrouble,
+                                    ToProto(map, query)));
+  return FromProto(out);
+}
+
 absl::StatusOr<std::vector<SurfaceColumn>> RemotePlanning::SampleSurfaces(
     const api::Call& call, absl::string_view map, const std::vector<Eigen::Vector2d>& places) {
   std::vector<SurfaceColumn> columns;

@@ -13,6 +13,7 @@
 #include <Eigen/Core>
 
 #include "core/api/call.h"
+#include "core/world/exploration.h"
 #include "core/world/floor.h"
 #include "core/world/plan.h"
 #include "core/world/robot_profile.h"
@@ -50,6 +51,14 @@ class Planning {
   virtual absl::StatusOr<FloorPlan> ListFloors(const Call& call,
                                                absl::string_view map,
                                                const FloorQuery& query) = 0;
+  // Where the robot should look next: views of unknown space from where it can drive, the most
+  // telling first (core/world/exploration.h). That none is worth it, or that the start is on no
+  // surface, is OK. INVALID_ARGUMENT for a bad query, or a region of too many voxels: the message
+  // says what would fit; FAILED_PRECONDITION where the map keeps no points; DATA_LOSS naming a
+  // damaged tile on the way.
+  virtual absl::StatusOr<ExploreResult> Explore(const Call& call,
+                                                absl::string_view map,
+                                                const ExploreQuery& query) = 0;
   // All levels at each place, in the order asked; a place without surfaces has an empty column.
   // DATA_LOSS naming a damaged tile where one of the places lies.
   virtual absl::StatusOr<std::vector<SurfaceColumn>> SampleSurfaces(

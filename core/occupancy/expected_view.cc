@@ -55,8 +55,13 @@ std::vector<Vector3d> DirectionsOf(const FieldOfView& sensor, const Strides& str
 
 }  // namespace
 
-ExpectedViews::ExpectedViews(const OccupancyVoxels& grid, const FieldOfView& sensor)
-    : grid_(grid), reader_(grid), max_range_m_(sensor.max_range_m) {
+ExpectedViews::ExpectedViews(const OccupancyVoxels& grid,
+                             const FieldOfView& sensor,
+                             const Eigen::AlignedBox3d& region)
+    : grid_(grid),
+      reader_(grid),
+      counted_(region, grid.voxel_m()),
+      max_range_m_(sensor.max_range_m) {
   const auto beams_of = [&sensor](int most) {
     const Strides strides = StridesFor(sensor, most);
     Beams beams;
@@ -115,10 +120,10 @@ ViewGain ExpectedViews::Look(const Pose& T_map_sensor, const Beams& beams) {
                  std::uint16_t& mark = seen_.FindOrAdd(BlockOf(at))[NodeInBlock(at)];
                  const std::int16_t odds = reader_.Odds(at);
                  const bool unknown = odds == OccupancyVoxels::kUnknownOdds;
-                 if (unknown && mark != kTaken) unknown_from_m = std::min(unknown_from_m, range_m);
+                 if (unknown) unknown_from_m = std::min(unknown_from_m, range_m);
                  if (range_m > unknown_from_m + kUnknownReachM) return false;
                  const bool hit = !unknown && odds > 0;
-                 if (mark != kTaken && mark != view_) {
+                 if (mark != kTaken && mark != view_ && counted_.Contains(at)) {
                    const std::size_t number = (unknown ? 0 : odds) - least_odds_;
                    const double weight =
                        beams.each == 1.0 ? 1.0

@@ -6,11 +6,13 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "core/cloud/field_of_view.h"
 #include "core/geometry/pose.h"
 #include "core/mesh/voxel_blocks.h"
 #include "core/occupancy/occupancy_voxels.h"
+#include "core/occupancy/voxel_walk.h"
 
 namespace strata {
 
@@ -29,13 +31,16 @@ class ExpectedViews {
   static constexpr double kUnknownReachM = 5.0;
   static constexpr int kMostEstimateBeams = 2000;
 
-  // `grid` must outlive it. REQUIRES: a valid sensor.
-  ExpectedViews(const OccupancyVoxels& grid, const FieldOfView& sensor);
+  // `grid` must outlive it; only what is in `region` counts. REQUIRES: a valid sensor.
+  ExpectedViews(const OccupancyVoxels& grid,
+                const FieldOfView& sensor,
+                const Eigen::AlignedBox3d& region = OccupancyVoxelsOptions().region);
 
   // From kMostEstimateBeams at most; the voxels of each stand for those that the beams around it
   // would cross.
   ViewGain Estimate(const Pose& T_map_sensor);
-  // From all beams. What they cross is known from then on and gains nothing any more.
+  // From all beams. What they cross gains nothing from then on, but it stays as unknown as it was
+  // for where beams end: what one only expects to see does not say what is behind it.
   ViewGain Take(const Pose& T_map_sensor);
 
  private:
@@ -55,6 +60,7 @@ class ExpectedViews {
 
   const OccupancyVoxels& grid_;
   OccupancyReader reader_;
+  const VoxelBox counted_;
   const double max_range_m_;
   Beams all_, some_;
   std::vector<double> gain_of_hit_, gain_of_miss_;  // by odds

@@ -25,11 +25,6 @@ constexpr std::size_t kMostBytes = 2'000'000'000;
 constexpr std::uint16_t kLastScan = 32'767;
 constexpr std::size_t kRaysBetweenChecks = 1024;
 
-// The lowest voxel whose middle is not below `p`.
-Vector3i VoxelAbove(const Vector3d& p) {
-  return (p.array() - 0.5).ceil().max(-kMostNodes).min(kMostNodes).cast<int>();
-}
-
 }  // namespace
 
 absl::Status OccupancyVoxelsOptions::Validate() const {
@@ -51,8 +46,7 @@ OccupancyVoxels::OccupancyVoxels(const OccupancyVoxelsOptions& options)
       miss_(OddsOf(options.model.miss)),
       least_(OddsOf(options.model.least)),
       most_(OddsOf(options.model.most)),
-      low_(VoxelAbove(options.region.min() / options.voxel_m)),
-      high_(VoxelAbove(options.region.max() / options.voxel_m)) {}
+      kept_(options.region, options.voxel_m) {}
 
 void OccupancyVoxels::BeginScan() {
   if (++scan_ <= kLastScan) return;
@@ -92,11 +86,11 @@ bool OccupancyVoxels::Clip(Ray& ray) const {
   double end = 1.0;
   for (int i = 0; i < 3; ++i) {
     if (along[i] == 0.0) {
-      if (ray.from[i] < low_[i] || ray.from[i] >= high_[i]) return false;
+      if (ray.from[i] < kept_.low[i] || ray.from[i] >= kept_.high[i]) return false;
       continue;
     }
-    const double a = (low_[i] - ray.from[i]) / along[i];
-    const double b = (high_[i] - ray.from[i]) / along[i];
+    const double a = (kept_.low[i] - ray.from[i]) / along[i];
+    const double b = (kept_.high[i] - ray.from[i]) / along[i];
     begin = std::max(begin, std::min(a, b));
     end = std::min(end, std::max(a, b));
   }
@@ -111,7 +105,7 @@ void OccupancyVoxels::Cast(const Ray& ray) {
   const Vector3i last = VoxelOf(ray.to);
   WalkVoxels(ray.from,
              ray.to,
-             VoxelOf(ray.from).cwiseMax(low_).cwiseMin(high_ - Vector3i::Ones()),
+             VoxelOf(ray.from).cwiseMax(kept_.low).cwiseMin(kept_.high - Vector3i::Ones()),
              [&](const Vector3i& at, double /*passed*/) {
                if (!Inside(at) || (ray.ends && at == last)) return false;
                Miss(at);
@@ -166,12 +160,15 @@ double OccupancyVoxels::ProbabilityOf(std::int16_t odds) {
   return odds == kUnknownOdds ? 0.5 : 1.0 / (1.0 + std::exp(-odds / kOddsPerNat));
 }
 
-std::size_t OccupancyVoxels::CountKnown() const {
+std::size_t OccupancyVoxels::CountKnown(const Eigen::AlignedBox3d& region) const {
+  const VoxelBox box(region, voxel_m_);
   std::size_t known = 0;
   for (std::size_t i = 0; i < keys().size(); ++i) {
-    known += std::count_if(voxels_.block(i).begin(),
-                           voxels_.block(i).end(),
-                           [](const Voxel& voxel) { return voxel.seen != 0; });
+    const Vector3i corner = kBlockEdge * Vector3i(keys()[i].x, keys()[i].y, keys()[i].z);
+    for (int node = 0; node < static_cast<int>(kBlockNodes); ++node) {
+      known += voxels_.block(i)[node].seen != 0 &&
+               box.Contains(corner + Vector3i(node & 7, node >> 3 & 7, node >> 6));
+    }
   }
   return known;
 }

@@ -18,6 +18,7 @@
 #include "core/common/stop.h"
 #include "core/geometry/pose.h"
 #include "core/mesh/voxel_blocks.h"
+#include "core/occupancy/voxel_walk.h"
 
 namespace strata {
 
@@ -78,9 +79,7 @@ class OccupancyVoxels {
   OccupancyBlock block(std::size_t i) const;
 
   // Whether a voxel is one of those that are kept.
-  bool Inside(const Eigen::Vector3i& at) const {
-    return (at.array() >= low_.array()).all() && (at.array() < high_.array()).all();
-  }
+  bool Inside(const Eigen::Vector3i& at) const { return kept_.Contains(at); }
   // Log-odds are whole multiples of 1/kOddsPerNat; kUnknownOdds: nothing is known.
   static constexpr double kOddsPerNat = 27.15;  // hit and miss are then as 23 to 11
   static constexpr std::int16_t kUnknownOdds = std::numeric_limits<std::int16_t>::max();
@@ -93,8 +92,8 @@ class OccupancyVoxels {
                                          : std::max(before + miss_, int{least_}));
   }
   static double ProbabilityOf(std::int16_t odds);
-  // Voxels of which something is known.
-  std::size_t CountKnown() const;
+  // Voxels of which something is known, with their middles in `region`.
+  std::size_t CountKnown(const Eigen::AlignedBox3d& region) const;
   std::size_t bytes() const { return voxels_.bytes(); }
 
  private:
@@ -118,7 +117,7 @@ class OccupancyVoxels {
 
   double voxel_m_;
   std::int16_t hit_, miss_, least_, most_;
-  Eigen::Vector3i low_, high_;  // voxels that are kept
+  VoxelBox kept_;
   VoxelBlocks<Voxel> voxels_;
   std::uint16_t scan_ = 0;
 };

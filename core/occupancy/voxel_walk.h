@@ -1,5 +1,5 @@
-// From voxel to voxel along a line (Amanatides and Woo, "A Fast Voxel Traversal Algorithm for Ray
-// Tracing", 1987).
+// Voxels in boxes, and one after the other along a line (Amanatides and Woo, "A Fast Voxel
+// Traversal Algorithm for Ray Tracing", 1987).
 #ifndef STRATA_CORE_OCCUPANCY_VOXEL_WALK_H_
 #define STRATA_CORE_OCCUPANCY_VOXEL_WALK_H_
 
@@ -7,10 +7,30 @@
 #include <limits>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "core/mesh/voxel_blocks.h"
 
 namespace strata {
 
 inline Eigen::Vector3i VoxelOf(const Eigen::Vector3d& p) { return p.array().floor().cast<int>(); }
+
+// Voxels whose middles lie in a region.
+struct VoxelBox {
+  Eigen::Vector3i low, high;  // half-open
+
+  VoxelBox(const Eigen::AlignedBox3d& region, double voxel_m)
+      : low(Above(region.min() / voxel_m)), high(Above(region.max() / voxel_m)) {}
+  bool Contains(const Eigen::Vector3i& at) const {
+    return (at.array() >= low.array()).all() && (at.array() < high.array()).all();
+  }
+
+ private:
+  // The lowest voxel whose middle is not below `p`.
+  static Eigen::Vector3i Above(const Eigen::Vector3d& p) {
+    return (p.array() - 0.5).ceil().max(-kMostNodes).min(kMostNodes).cast<int>();
+  }
+};
 
 // Calls visit(voxel, share of the line before it) for each voxel that the line crosses, `at` first,
 // until that returns false or the line ends. Lengths in voxels.

@@ -23,6 +23,8 @@
 #include "core/planning/search.h"
 #include "core/planning/search_space.h"
 #include "core/planning/search_workspace.h"
+#include "core/planning/viewpoints.h"
+#include "core/world/exploration.h"
 #include "core/world/plan.h"
 
 namespace strata {
@@ -132,6 +134,21 @@ absl::StatusOr<PathCheck> Planner::Check(TileSource& source,
                           MakeProfileChecks(query.profile, options_.cell_size_m));
   SearchSpace space(cache_, source, checks, ClassFactors(query.class_costs), stop);
   return CheckPath(space, query.waypoints, stop);
+}
+
+absl::StatusOr<ExploreResult> Planner::Explore(TileSource& source,
+                                               const ExploreQuery& query,
+                                               SpaceOf space_of,
+                                               const Stop& stop) {
+  const absl::Time begin = SteadyNow();
+  STRATA_RETURN_IF_ERROR(stop.status());
+  STRATA_RETURN_IF_ERROR(ValidateExploreQuery(query));
+  STRATA_ASSIGN_OR_RETURN(const ProfileChecks checks,
+                          MakeProfileChecks(query.profile, options_.cell_size_m));
+  SearchSpace space(cache_, source, checks, ClassFactors(query.class_costs), stop);
+  absl::StatusOr<ExploreResult> result = ChooseViews(space, query, space_of, stop);
+  if (result.ok()) result->elapsed_ms = absl::ToDoubleMilliseconds(SteadyNow() - begin);
+  return result;
 }
 
 }  // namespace strata

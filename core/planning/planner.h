@@ -32,6 +32,8 @@
 #include "core/planning/ground/rows.h"
 #include "core/planning/tile_cache.h"
 #include "core/planning/tile_source.h"
+#include "core/planning/viewpoints.h"
+#include "core/world/exploration.h"
 #include "core/world/plan.h"
 #include "core/world/robot_profile.h"
 
@@ -73,6 +75,13 @@ class Planner {
   //   CANCELLED, DEADLINE_EXCEEDED   by `stop`
   //   errors of `source`
   absl::StatusOr<PathCheck> Check(TileSource& source, const PathQuery& query, const Stop& stop);
+
+  // Where to look next; Planner's own of ExploreResult are all fields but `epoch`. Errors of
+  // ChooseViews (core/planning/viewpoints.h).
+  absl::StatusOr<ExploreResult> Explore(TileSource& source,
+                                        const ExploreQuery& query,
+                                        SpaceOf space_of,
+                                        const Stop& stop);
 
   // Prepared tiles, for others that ask what a robot can do.
   TileCache& cache() { return cache_; }

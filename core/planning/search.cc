@@ -34,7 +34,7 @@ constexpr std::uint64_t kExpansionsPerLook = 4096;  // at the clock
 // Buckets of 1/64 of a cell, measured: wide ones keep the ring in the processor's cache, but expand
 // again what a bad order within a bucket made too dear; the tighter the bound, the more that is.
 constexpr int kBucketShift = 5;
-constexpr std::uint32_t kMaxCost = 0xF0000000U;
+constexpr std::uint32_t kMaxCost = kAnyCost;
 // How far a search goes on in a tile that it comes back to, beyond what the others have come to, as
 // to come back again would cost more.
 constexpr std::uint32_t kPatience = 32 * kCostPerCell;
@@ -597,11 +597,12 @@ absl::StatusOr<SearchOutcome> FindPath(SearchSpace& space,
 absl::StatusOr<PatchId> ReachAll(SearchSpace& space,
                                  PatchId start,
                                  SearchWorkspace& workspace,
-                                 const Stop& stop) {
+                                 const Stop& stop,
+                                 std::uint32_t below) {
   STRATA_RETURN_IF_ERROR(workspace.Begin(kBucketShift, stop));
   STRATA_ASSIGN_OR_RETURN(
       const SearchOutcome outcome,
-      RunSearch(space, workspace, NoBound{}, start, kNoPatchId, UINT64_MAX, stop));
+      RunSearch(space, workspace, NoBound{}, start, kNoPatchId, UINT64_MAX, stop, below));
   return outcome.dearest;
 }
 

@@ -47,12 +47,16 @@ absl::StatusOr<SearchOutcome> FindPath(SearchSpace& space,
                                        SearchWorkspace& workspace,
                                        const Stop& stop);
 
-// Costs from `start` to everything that can be reached, left in `workspace`; returns the patch that
-// is the most expensive to reach.
+// Above all costs.
+inline constexpr std::uint32_t kAnyCost = 0xF0000000U;
+
+// Costs from `start` to everything that can be reached for less than `below`, left in `workspace`,
+// where others may have costs, too; returns the patch that is the most expensive to reach.
 absl::StatusOr<PatchId> ReachAll(SearchSpace& space,
                                  PatchId start,
                                  SearchWorkspace& workspace,
-                                 const Stop& stop);
+                                 const Stop& stop,
+                                 std::uint32_t below = kAnyCost);
 
 }  // namespace strata
 

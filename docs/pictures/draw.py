@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Makes the pictures of docs/exports.md again, from a drawn world and the built programs.
+"""Makes the pictures of docs/ again, from a drawn world and the built programs.
 
     docs/pictures/draw.py --build build/release
 
@@ -7,6 +7,7 @@ Writes them beside itself. The points of the simulated bridge get colours here, 
 rsvg-convert (librsvg2-bin).
 """
 import argparse
+import json
 import pathlib
 import subprocess
 import sys
@@ -98,6 +99,26 @@ class Maps:
         self.strata("map", "floorplan", name, self.folder / f"{name}.svg", "--storey", storey, *options)
         subprocess.run(["rsvg-convert", "--width", "900", "--output", picture, self.folder / f"{name}.svg"], check=True)
 
+    def explore(self, name, robots, start, picture):
+        """Three views of a map of the first third of the scans, and the ways to them."""
+        for robot in robots:
+            scans = sorted((robot / "scans").iterdir())
+            for scan in scans[len(scans) // 3:]:
+                scan.unlink()
+        self.add(name, robots)
+        words = ["explore", name, "--from", ",".join(map(str, start)), "--count", 3, "--range", 10, "--output", "json"]
+        told = json.loads(self.tell("client/cli/strata", "--embedded", self.folder / "maps", *words))
+        ways = []
+        for i, view in enumerate(told["views"]):
+            way = self.folder / f"way-{i}.ply"
+            self.strata("plan", name, "--from", ",".join(map(str, start)), "--to", ",".join(map(str, view["place"])), "--out", way)
+            ways += ["--path", way]
+            start = view["place"]
+        self.strata("map", "render", name, picture, "--slice=-1,1.8", "--size", "800x520", *ways)
+
+    def tell(self, program, *words):
+        return subprocess.run([self.build / program, *map(str, words)], check=True, stdout=subprocess.PIPE, text=True).stdout
+
     def run(self, program, *words):
         subprocess.run([self.build / program, *map(str, words)], check=True, stdout=subprocess.DEVNULL)
 
@@ -125,6 +146,7 @@ def main():
         write_png(HERE / "floors.png", draw_grids(sorted(folder.glob("floor-*.pgm"))))
         maps.add("flat", maps.simulate("flat", "rooms", "--seed", 4, "--step", 2))
         maps.floorplan("flat", 0, HERE / "floorplan.png")
+        maps.explore("half", maps.simulate("half", "rooms", "--seed", 4, "--step", 2), (1, -1, 0), HERE / "explore.png")
     subprocess.run([sys.executable, HERE.parent.parent / "tests/experiments/underpass.py", "--build", build, "--seeds", "1",
                     "--picture", HERE / "underpass.png"], check=True)
 

@@ -400,6 +400,124 @@ absl::StatusOr<FloorPlan> FromProto(const v1::ListFloorsResponse& proto) {
   return plan;
 }
 
+v1::ExploreRequest ToProto(absl::string_view map, const ExploreQuery& query) {
+  v1::ExploreRequest proto;
+  proto.set_map(std::string(map));
+  *proto.mutable_from() = EndpointToProto(query.from);
+  *proto.mutable_profile() = ToProto(query.profile);
+  ClassCostsToProto(query.class_costs, *proto.mutable_class_costs());
+  v1::FieldOfView& sensor = *proto.mutable_sensor();
+  sensor.set_up_rad(query.sensor.up_rad);
+  sensor.set_down_rad(query.sensor.down_rad);
+  sensor.set_width_rad(query.sensor.width_rad);
+  sensor.set_rows(query.sensor.rows);
+  sensor.set_columns(query.sensor.columns);
+  sensor.set_max_range_m(query.sensor.max_range_m);
+  proto.set_sensor_height_m(query.sensor_height_m);
+  proto.set_count(query.count);
+  proto.set_budget_m(query.budget_m);
+  proto.set_resolution_m(query.resolution_m);
+  if (query.region.has_value()) {
+    *proto.mutable_region_min() = ToProto(query.region->min());
+    *proto.mutable_region_max() = ToProto(query.region->max());
+  }
+  proto.set_bits_per_m(query.bits_per_m);
+  proto.set_horizon(query.horizon);
+  proto.set_min_bits(query.min_bits);
+  return proto;
+}
+
+absl::StatusOr<ExploreQuery> FromProto(const v1::ExploreRequest& proto) {
+  ExploreQuery query;
+  STRATA_ASSIGN_OR_RETURN(query.from, EndpointFromProto("from", proto.from()));
+  query.profile = FromProto(proto.profile());
+  STRATA_ASSIGN_OR_RETURN(query.class_costs, ClassCostsFromProto(proto.class_costs()));
+  const v1::FieldOfView& sensor = proto.sensor();
+  if (sensor.has_up_rad()) query.sensor.up_rad = sensor.up_rad();
+  if (sensor.has_down_rad()) query.sensor.down_rad = sensor.down_rad();
+  if (sensor.has_width_rad()) query.sensor.width_rad = sensor.width_rad();
+  if (sensor.has_rows()) query.sensor.rows = sensor.rows();
+  if (sensor.has_columns()) query.sensor.columns = sensor.columns();
+  if (sensor.has_max_range_m()) query.sensor.max_range_m = sensor.max_range_m();
+  if (proto.has_sensor_height_m()) query.sensor_height_m = proto.sensor_height_m();
+  if (proto.has_count()) query.count = proto.count();
+  if (proto.has_budget_m()) query.budget_m = proto.budget_m();
+  if (proto.has_resolution_m()) query.resolution_m = proto.resolution_m();
+  if (proto.has_region_min() || proto.has_region_max()) {
+    STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d low, FromProto("region_min", proto.region_min()));
+    STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d high,
+                            FromProto("region_max", proto.region_max()));
+    query.region.emplace(low, high);
+  }
+  if (proto.has_bits_per_m()) query.bits_per_m = proto.bits_per_m();
+  if (proto.has_horizon()) query.horizon = proto.horizon();
+  if (proto.has_min_bits()) query.min_bits = proto.min_bits();
+  STRATA_RETURN_IF_ERROR(ValidateExploreQuery(query));
+  return query;
+}
+
+v1::ExploreResponse ToProto(const ExploreResult& result) {
+  v1::ExploreResponse proto;
+  proto.set_reason(static_cast<v1::ExploreReason>(static_cast<int>(result.reason) + kReasonOffset));
+  proto.set_message(result.message);
+  for (const ExploreView& view : result.views) {
+    v1::ExploreView& out = *proto.add_views();
+    *out.mutable_pose() = ToProto(view.T_map_sensor);
+    *out.mutable_place() = ToProto(view.place);
+    out.set_gain_bits(view.gain_bits);
+    out.set_volume_m3(view.volume_m3);
+    out.set_cost_m(view.cost_m);
+    out.set_utility_bits(view.utility_bits);
+  }
+  proto.set_stands(result.stands);
+  if (!result.region.isEmpty()) {
+    *proto.mutable_region_min() = ToProto(result.region.min());
+    *proto.mutable_region_max() = ToProto(result.region.max());
+  }
+  proto.set_known_m3(result.known_m3);
+  proto.set_region_m3(result.region_m3);
+  proto.set_scans(result.scans);
+  proto.set_scans_left_out(result.scans_left_out);
+  if (result.nearest.has_value()) *proto.mutable_nearest() = ToProto(*result.nearest);
+  proto.set_elapsed_ms(result.elapsed_ms);
+  proto.set_epoch(result.epoch);
+  return proto;
+}
+
+absl::StatusOr<ExploreResult> FromProto(const v1::ExploreResponse& proto) {
+  ExploreResult result;
+  if (proto.reason() < v1::EXPLORE_REASON_VIEWS ||
+      proto.reason() > v1::EXPLORE_REASON_START_NOT_ON_SURFACE) {
+    return absl::InvalidArgumentError(absl::StrCat("reason: unknown value ", proto.reason()));
+  }
+  result.reason = static_cast<ExploreReason>(proto.reason() - kReasonOffset);
+  result.message = proto.message();
+  for (const v1::ExploreView& in : proto.views()) {
+    ExploreView& view = result.views.emplace_back();
+    STRATA_ASSIGN_OR_RETURN(view.T_map_sensor, FromProto("pose", in.pose()));
+    STRATA_ASSIGN_OR_RETURN(view.place, FromProto("place", in.place()));
+    view.gain_bits = in.gain_bits();
+    view.volume_m3 = in.volume_m3();
+    view.cost_m = in.cost_m();
+    view.utility_bits = in.utility_bits();
+  }
+  result.stands = proto.stands();
+  if (proto.has_region_min() && proto.has_region_max()) {
+    STRATA_ASSIGN_OR_RETURN(result.region.min(), FromProto("region_min", proto.region_min()));
+    STRATA_ASSIGN_OR_RETURN(result.region.max(), FromProto("region_max", proto.region_max()));
+  }
+  result.known_m3 = proto.known_m3();
+  result.region_m3 = proto.region_m3();
+  result.scans = proto.scans();
+  result.scans_left_out = proto.scans_left_out();
+  if (proto.has_nearest()) {
+    STRATA_ASSIGN_OR_RETURN(result.nearest, FromProto("nearest", proto.nearest()));
+  }
+  result.elapsed_ms = proto.elapsed_ms();
+  result.epoch = proto.epoch();
+  return result;
+}
+
 v1::CheckPathRequest CheckToProto(absl::string_view map, const PathQuery& query) {
   v1::CheckPathRequest proto = PathToProto<v1::CheckPathRequest>(map, query);
   if (query.known.has_value()) *proto.mutable_known() = ToProto(*query.known);

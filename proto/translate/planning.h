@@ -5,6 +5,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
+#include "core/world/exploration.h"
 #include "core/world/floor.h"
 #include "core/world/plan.h"
 #include "strata/v1/planning.pb.h"
@@ -17,6 +18,8 @@ v1::SurfaceColumn ToProto(const SurfaceColumn& column);
 v1::PathCheck ToProto(const PathCheck& check);
 v1::ListFloorsRequest ToProto(absl::string_view map, const FloorQuery& query);
 v1::ListFloorsResponse ToProto(const FloorPlan& plan);
+v1::ExploreRequest ToProto(absl::string_view map, const ExploreQuery& query);
+v1::ExploreResponse ToProto(const ExploreResult& result);
 v1::CheckPathRequest CheckToProto(absl::string_view map, const PathQuery& query);
 // Without what is known.
 v1::WatchPathRequest WatchToProto(absl::string_view map, const PathQuery& query);
@@ -29,6 +32,8 @@ absl::StatusOr<SurfaceColumn> FromProto(const v1::SurfaceColumn& column);
 absl::StatusOr<PathCheck> FromProto(const v1::PathCheck& check);
 absl::StatusOr<FloorQuery> FromProto(const v1::ListFloorsRequest& request);
 absl::StatusOr<FloorPlan> FromProto(const v1::ListFloorsResponse& plan);
+absl::StatusOr<ExploreQuery> FromProto(const v1::ExploreRequest& request);
+absl::StatusOr<ExploreResult> FromProto(const v1::ExploreResponse& result);
 absl::StatusOr<PathQuery> FromProto(const v1::CheckPathRequest& request);
 absl::StatusOr<PathQuery> FromProto(const v1::WatchPathRequest& request);
 

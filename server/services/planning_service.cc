@@ -50,6 +50,16 @@ absl::Status ListFloors(api::Database& db,
   return absl::OkStatus();
 }
 
+absl::Status Explore(api::Database& db,
+                     const api::Call& call,
+                     const v1::ExploreRequest& in,
+                     v1::ExploreResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const ExploreQuery query, AtTheDoor(FromProto(in)));
+  STRATA_ASSIGN_OR_RETURN(const ExploreResult result, db.planning().Explore(call, in.map(), query));
+  out = ToProto(result);
+  return absl::OkStatus();
+}
+
 absl::StatusOr<std::vector<Eigen::Vector2d>> PlacesOf(const v1::SampleSurfacesRequest& in) {
   std::vector<Eigen::Vector2d> places;
   places.reserve(static_cast<std::size_t>(in.places_size()));
@@ -99,6 +109,7 @@ PlanningService::PlanningService(Runtime& runtime) : Service(runtime, "Planning"
   Unary("CheckPath", &CheckPath);
   Poll<PathWatchReactor>("WatchPath");
   Unary("ListFloors", &ListFloors);
+  Unary("Explore", &Explore);
   Unary("SampleSurfaces", &SampleSurfaces);
   Unary("SetProfile", &SetProfile);
   Unary("ListProfiles", &ListProfiles);

@@ -107,6 +107,8 @@ const auto& Kinds() {
       KindOf<v1::WatchPathRequest>(),
       KindOf<v1::ListFloorsRequest>(),
       KindOf<v1::ListFloorsResponse>(),
+      KindOf<v1::ExploreRequest>(),
+      KindOf<v1::ExploreResponse>(),
       KindOf<v1::ModelPlane>(),
       KindOf<v1::PlaneModel>(),
       KindOf<v1::PointChunk>(),

@@ -168,6 +168,10 @@ class MockPlanning : public api::Planning {
               ListFloors,
               (const api::Call&, absl::string_view, const FloorQuery&),
               (override));
+  MOCK_METHOD(absl::StatusOr<ExploreResult>,
+              Explore,
+              (const api::Call&, absl::string_view, const ExploreQuery&),
+              (override));
   MOCK_METHOD(absl::StatusOr<std::vector<SurfaceColumn>>,
               SampleSurfaces,
               (const api::Call&, absl::string_view, const std::vector<Eigen::Vector2d>&),

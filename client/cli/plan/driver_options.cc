@@ -14,6 +14,12 @@
 
 namespace strata::cli {
 
+PlanEndpoint EndpointOf(const std::vector<double>& numbers) {
+  PlanEndpoint endpoint{.x_m = numbers[0], .y_m = numbers[1], .z_m = {}, .level = {}};
+  if (numbers.size() == 3) endpoint.z_m = numbers[2];
+  return endpoint;
+}
+
 void AddDriverOptions(CLI::App* verb, DriverOptions& options) {
   verb->add_option("--profile", options.profile, "The map's robot profile to start from")
       ->capture_default_str();

@@ -20,6 +20,9 @@ struct DriverOptions {
   std::vector<std::string> avoid;  // CLASS=FACTOR or CLASS=never
 };
 
+// X,Y or X,Y,Z.
+PlanEndpoint EndpointOf(const std::vector<double>& numbers);
+
 // --profile, those of AddProfileOptions, --avoid.
 void AddDriverOptions(CLI::App* verb, DriverOptions& options);
 

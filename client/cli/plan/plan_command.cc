@@ -159,14 +159,6 @@ absl::Status PlanMany(Context& context, PlanOptions options) {
   return first_error;
 }
 
-PlanEndpoint EndpointOf(const std::vector<double>& numbers) {
-  PlanEndpoint endpoint{.x_m = numbers[0], .y_m = numbers[1], .z_m = {}, .level = {}};
-  if (numbers.size() == 3) {
-    endpoint.z_m = numbers[2];
-  }
-  return endpoint;
-}
-
 void AddEndpoints(CLI::App* verb, const std::shared_ptr<PlanOptions>& options) {
   CLI::Option* from = AddNumbers(
       verb,

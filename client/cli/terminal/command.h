@@ -52,7 +52,7 @@ struct Commands {
   CLI::App* Noun(const std::string& name,
                  const std::string& description,
                  const std::string& example);
-  // A verb under `noun` (the root for `surface` and `plan`).
+  // A verb under `noun` (the root for `surface`, `plan` and `explore`).
   CLI::App* Verb(CLI::App* noun,
                  const std::string& name,
                  const std::string& description,
@@ -88,6 +88,7 @@ void AddTileCommands(Commands& commands);
 void AddSurfaceCommand(Commands& commands);
 void AddPlanCommand(Commands& commands);
 void AddPathCommands(Commands& commands);
+void AddExploreCommand(Commands& commands);
 void AddProfileCommands(Commands& commands);
 void AddJobCommands(Commands& commands);
 void AddPlanesCommands(Commands& commands);

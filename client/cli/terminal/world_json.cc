@@ -1,6 +1,7 @@
 #include "client/cli/terminal/world_json.h"
 
 #include <string>
+#include <utility>
 
 #include "absl/strings/str_format.h"
 
@@ -205,6 +206,34 @@ Json ToJson(const TrackedPose& pose) {
     json["pose"] = ToJson(pose.T_map_scan);
     json["covariance"] = ToJson(pose.covariance);
   }
+  return json;
+}
+
+Json ToJson(const ExploreResult& result) {
+  Json views = Json::array();
+  for (const ExploreView& view : result.views) {
+    views.push_back({{"pose", ToJson(view.T_map_sensor)},
+                     {"place", ToJson(view.place)},
+                     {"gain_bits", view.gain_bits},
+                     {"volume_m3", view.volume_m3},
+                     {"cost_m", view.cost_m},
+                     {"utility_bits", view.utility_bits}});
+  }
+  Json json = {{"reason", std::string(ToString(result.reason))},
+               {"message", result.message},
+               {"views", std::move(views)},
+               {"stands", result.stands},
+               {"known_m3", result.known_m3},
+               {"region_m3", result.region_m3},
+               {"scans", result.scans},
+               {"scans_left_out", result.scans_left_out},
+               {"elapsed_ms", result.elapsed_ms},
+               {"epoch", result.epoch}};
+  if (!result.region.isEmpty()) {
+    json["region"] = {ToJson(Eigen::Vector3d(result.region.min())),
+                      ToJson(Eigen::Vector3d(result.region.max()))};
+  }
+  if (result.nearest.has_value()) json["nearest"] = ToJson(*result.nearest);
   return json;
 }
 

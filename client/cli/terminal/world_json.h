@@ -10,6 +10,7 @@
 #include "core/api/posegraph.h"
 #include "core/world/constraint.h"
 #include "core/world/epoch.h"
+#include "core/world/exploration.h"
 #include "core/world/localization.h"
 #include "core/world/map_info.h"
 #include "core/world/plane_model.h"
@@ -29,6 +30,7 @@ Json ToJson(const api::PoseLookup& lookup);
 Json ToJson(const LocalizeCandidate& candidate);
 Json ToJson(const LocalizeResult& result);
 Json ToJson(const TrackedPose& pose);
+Json ToJson(const ExploreResult& result);
 Json ToJson(const Matrix6d& matrix);  // six rows of six
 
 // "within (X, Y, Z) and (X, Y, Z)": the box around a map's surfaces [m].

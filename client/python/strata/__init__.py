@@ -10,6 +10,7 @@ from strata.database import Database, connect
 from strata.errors import (AlreadyExists, Cancelled, DataLoss, DeadlineExceeded, FailedPrecondition, InvalidArgument,
                            NotFound, PermissionDenied, ResourceExhausted, StrataError, Unauthenticated, Unavailable,
                            Unimplemented)
+from strata.exploration import Exploration, View
 from strata.heights import Heights
 from strata.job import Job
 from strata.map import Change, Map, ScanChange, Stats
@@ -23,6 +24,6 @@ from strata.tracking import TrackedPose, Tracking
 __all__ = [
     "AlreadyExists", "Cancelled", "DataLoss", "DeadlineExceeded", "FailedPrecondition", "InvalidArgument", "NotFound",
     "PermissionDenied", "ResourceExhausted", "StrataError", "Unauthenticated", "Unavailable", "Unimplemented",
-    "Ack", "Change", "Database", "Heights", "Job", "Map", "Mesh", "NON_TRAVERSABLE", "Path", "Points", "Registration", "SURFACE", "Scan",
-    "ScanChange", "Stats", "TRAVERSABLE", "Tile", "TileKey", "TrackedPose", "Tracking", "UNDERSIDE", "UNKNOWN", "connect", "decode_tile", "register",
+    "Ack", "Change", "Database", "Exploration", "Heights", "Job", "Map", "Mesh", "NON_TRAVERSABLE", "Path", "Points", "Registration", "SURFACE", "Scan",
+    "ScanChange", "Stats", "TRAVERSABLE", "Tile", "TileKey", "TrackedPose", "Tracking", "UNDERSIDE", "UNKNOWN", "View", "connect", "decode_tile", "register",
 ]

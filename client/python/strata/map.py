@@ -7,7 +7,7 @@ import time as clock
 
 import numpy as np
 
-from strata import errors, floors, heights, job, mesh, plan, planes, poses, scan, tracking
+from strata import errors, exploration, floors, heights, job, mesh, plan, planes, poses, scan, tracking
 from strata.tiles import SURFACE, TILE_CELLS, TileKey, decode_tile
 from strata.v1 import (geometry_pb2, jobs_pb2, jobs_pb2_grpc, maps_pb2, maps_pb2_grpc, models_pb2, models_pb2_grpc,
                        planning_pb2, planning_pb2_grpc, posegraph_pb2_grpc, scans_pb2, scans_pb2_grpc, tiles_pb2, tiles_pb2_grpc)
@@ -317,6 +317,25 @@ class Map:
             map=self.name, at=None if at is None else plan.endpoint(at), profile=plan.profile_to_proto(profile or {}),
             min_area_m2=min_area, cells=cells)
         return floors.from_proto(self._connection.unary(self._planning.ListFloors, request))
+
+    def explore(self, start, *, count=5, profile=None, class_costs=None, region=None, **query):
+        """Exploration: where a robot at `start` should look next, as views of space that no scan has seen.
+
+            for view in campus.explore((3, -1, 0.4), count=3, max_range=15):
+                drive_to(view.place)
+
+        start, profile, class_costs: as for plan. region: (2, 3) lower and upper corner [m] of what is to be learnt; None:
+        what the sensor may see. query: budget [m], resolution [m], sensor_height [m], bits_per_m, horizon, min_bits; of the
+        sensor up, down, width [rad], rows, columns, max_range [m]; what is absent takes its default, see
+        `strata explore --help`. Raises ValueError and StrataError.
+        """
+        if isinstance(profile, str):
+            profile = self._named_profile(profile)
+        request = exploration.to_proto(self.name, count, region, query)
+        getattr(request, "from").CopyFrom(plan.endpoint(start))
+        request.profile.CopyFrom(plan.profile_to_proto(profile or {}))
+        request.class_costs.extend(plan.class_cost(of, cost) for of, cost in (class_costs or {}).items())
+        return exploration.from_proto(self._connection.unary(self._planning.Explore, request))
 
     def planes(self):
         """PlaneModel: the walls, floors and slopes that the last job "planes" found; NotFound before there was one.

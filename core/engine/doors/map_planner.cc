@@ -117,6 +117,7 @@ MapPlanner::MapPlanner(MapCore& core)
                           threads, count, [&](int /*thread*/, std::size_t i) { return body(i); });
                     },
                 .preparations = PreparationsAtATime()}),
+      spaces_(core),
       tiles_(core.caches(), core.options().cache_bytes / kDecodedShare) {}
 
 absl::StatusOr<std::shared_ptr<const TileVersionMap>> MapPlanner::VersionsOf(const MapView& view) {
@@ -205,6 +206,16 @@ absl::StatusOr<FloorPlan> MapPlanner::Floors(const FloorQuery& query, const Stop
   plan.epoch = source.epoch();
   plan.commit_sequence = now.first.last;
   return plan;
+}
+
+absl::StatusOr<ExploreResult> MapPlanner::Explore(const ExploreQuery& query, const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this));
+  const auto space_of = [&](const Eigen::AlignedBox3d& region, double voxel_m) {
+    return spaces_.Find(region, voxel_m, stop);
+  };
+  STRATA_ASSIGN_OR_RETURN(ExploreResult result, planner_.Explore(source, query, space_of, stop));
+  result.epoch = source.epoch();
+  return result;
 }
 
 absl::Status MapPlanner::Watch(const PathQuery& query,

@@ -18,11 +18,13 @@
 
 #include "core/common/lru_cache.h"
 #include "core/common/stop.h"
+#include "core/engine/doors/seen_spaces.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/tiles/kept_tiles.h"
 #include "core/mls/surface_tile.h"
 #include "core/planning/planner.h"
 #include "core/planning/tile_cache.h"
+#include "core/world/exploration.h"
 #include "core/world/floor.h"
 #include "core/world/plan.h"
 
@@ -41,6 +43,8 @@ class MapPlanner {
                      absl::FunctionRef<absl::Status(const PathCheck&)> sink);
   // As api::Planning::ListFloors. Made anew on each call, from prepared tiles as they are cached.
   absl::StatusOr<FloorPlan> Floors(const FloorQuery& query, const Stop& stop);
+  // As api::Planning::Explore.
+  absl::StatusOr<ExploreResult> Explore(const ExploreQuery& query, const Stop& stop);
   // INVALID_ARGUMENT for a place that is not finite.
   absl::StatusOr<std::vector<SurfaceColumn>> Sample(const std::vector<Eigen::Vector2d>& places,
                                                     const Stop& stop);
@@ -65,6 +69,7 @@ class MapPlanner {
   absl::Mutex mutex_;
   MapView versions_view_ ABSL_GUARDED_BY(mutex_);
   std::shared_ptr<const TileVersionMap> versions_ ABSL_GUARDED_BY(mutex_);
+  SeenSpaces spaces_;
   LruCache<TileKey, const Decoded> tiles_;  // of each what was asked for last
 };
 

@@ -43,6 +43,13 @@ absl::StatusOr<FloorPlan> EnginePlanning::ListFloors(const api::Call& call,
   return found->planner().Floors(query, call.stop);
 }
 
+absl::StatusOr<ExploreResult> EnginePlanning::Explore(const api::Call& call,
+                                                      absl::string_view map,
+                                                      const ExploreQuery& query) {
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.FindWithTiles(call, map));
+  return found->planner().Explore(query, call.stop);
+}
+
 absl::StatusOr<std::vector<SurfaceColumn>> EnginePlanning::SampleSurfaces(
     const api::Call& call, absl::string_view map, const std::vector<Eigen::Vector2d>& places) {
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.FindWithTiles(call, map));

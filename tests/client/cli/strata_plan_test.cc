@@ -36,6 +36,24 @@ TEST_F(StrataPlanTest, PathsAreCheckedFromTheirFiles) {
   EXPECT_EQ(Run({"path", "check", "m", path + "x"}).exit_code, 1);
 }
 
+TEST_F(StrataPlanTest, ExploreSaysWhereToLook) {
+  WriteDrive(8);
+  RunOk({"map", "create", "m"});
+  Import({"--align", "off"});
+  const json views = RunOk(
+      {"explore", "m", "--from", "-4,0.5,0", "--count", "2", "--range", "8", "--min-bits", "10"});
+  ASSERT_EQ(views.at("reason"), "views") << views;
+  ASSERT_EQ(views.at("views").size(), 2U);
+  EXPECT_GT(views.at("views").at(0).at("gain_bits").get<double>(), 10.0);
+  EXPECT_EQ(views.at("views").at(0).at("pose").size(), 7U);
+  const json off = RunOk({"explore", "m", "--from", "400,0.5,0"});
+  EXPECT_EQ(off.at("reason"), "start_not_on_surface");
+  EXPECT_NE(Run({"explore", "m", "--from", "-4,0.5,0", "--count", "0"}).exit_code, 0);
+  const auto huge = Run({"explore", "m", "--from", "-4,0.5,0", "--resolution", "0.01"});
+  EXPECT_EQ(huge.exit_code, 1);
+  EXPECT_THAT(huge.err, ::testing::HasSubstr("take a resolution of"));
+}
+
 TEST_F(StrataPlanTest, SurfacePlanRenderAndExportOfADrive) {
   WriteDrive(8);
   RunOk({"map", "create", "m"});

@@ -41,6 +41,7 @@ TEST_F(StrataUsageTest, EveryCommandHasHelpWithAnExample) {
                                              "tile get",
                                              "surface",
                                              "plan",
+                                             "explore",
                                              "profile set",
                                              "profile list",
                                              "job start",

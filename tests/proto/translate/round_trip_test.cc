@@ -230,6 +230,12 @@ TEST(TranslateRoundTripTest, Planning) {
   const auto floors = Filled<v1::ListFloorsRequest>();
   STRATA_ASSERT_OK_AND_ASSIGN(const FloorQuery asked, FromProto(floors));
   ExpectSame(floors, ToProto(floors.map(), asked));
+  ExpectRoundTrip(Filled<v1::ExploreResponse>());
+  auto explore = Filled<v1::ExploreRequest>();
+  explore.set_budget_m(3.0);
+  explore.mutable_sensor()->set_max_range_m(5.0);
+  STRATA_ASSERT_OK_AND_ASSIGN(const ExploreQuery explored, FromProto(explore));
+  ExpectSame(explore, ToProto(explore.map(), explored));
   const auto check = Filled<v1::CheckPathRequest>();
   STRATA_ASSERT_OK_AND_ASSIGN(const PathQuery checked, FromProto(check));
   ExpectSame(check, CheckToProto(check.map(), checked));

@@ -74,6 +74,70 @@ TEST_P(DatabaseSuite, PathsKeepToWhatClassesCost) {
               StatusIs(Code::kInvalidArgument, HasSubstr("factor 0.5 of class 1")));
 }
 
+TEST_P(DatabaseSuite, ExploresWhatNoScanSaw) {
+  PutFloor(db(), {"run", 1});
+  const PointCloud beside = LevelFloor();
+  ScanHeader low = FloorHeader({"run", 2}, beside, 8.0);
+  low.sensor_origin.z() = 0.05F;  // sees little of the space over its floor
+  STRATA_ASSERT_OK(UploadScan(db(), kMap, low, beside));
+  AwaitIntegration(db(), kMap);
+  ExploreQuery query;
+  query.from.x_m = -2.0;
+  query.count = 3;
+  query.sensor.max_range_m = 6.0;
+  query.min_bits = 20.0;
+  STRATA_ASSERT_OK_AND_ASSIGN(const ExploreResult result, db().planning().Explore({}, kMap, query));
+  EXPECT_EQ(result.reason, ExploreReason::kViews) << result.message;
+  ASSERT_THAT(result.views, SizeIs(3));
+  EXPECT_GT(result.views[0].place.x(), 0.0);
+  EXPECT_NEAR(result.views[0].place.z(), 0.0, 1e-2);
+  EXPECT_NEAR(result.views[0].T_map_sensor.translation().z(), 1.0, 1e-2);
+  EXPECT_GT(result.views[0].gain_bits, result.views[2].gain_bits);
+  EXPECT_EQ(result.scans, 2U);
+  EXPECT_EQ(result.scans_left_out, 0U);
+  EXPECT_GT(result.known_m3, 1.0);
+  EXPECT_GT(result.region_m3, result.known_m3);
+  EXPECT_TRUE(result.region.contains(result.views[0].place));
+  PlanQuery way;
+  way.from = query.from;
+  way.to.x_m = result.views[0].place.x();
+  way.to.y_m = result.views[0].place.y();
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult path, db().planning().PlanPath({}, kMap, way));
+  EXPECT_TRUE(path.found()) << path.message;
+  EXPECT_NEAR(path.graph_cost, result.views[0].cost_m, 0.05 * path.graph_cost + 0.2);
+  query.min_bits = 1e6;
+  STRATA_ASSERT_OK_AND_ASSIGN(const ExploreResult none, db().planning().Explore({}, kMap, query));
+  EXPECT_EQ(none.reason, ExploreReason::kExplored);
+  EXPECT_THAT(none.message, HasSubstr("explored"));
+}
+
+TEST_P(DatabaseSuite, ExploringWhereThatIsNotPossibleSaysWhy) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const ExploreResult empty, db().planning().Explore({}, kMap, {}));
+  EXPECT_EQ(empty.reason, ExploreReason::kStartNotOnSurface);
+  EXPECT_THAT(db().planning().Explore({}, "nowhere", {}), StatusIs(Code::kNotFound, _));
+  ExploreQuery query;
+  query.count = 0;
+  EXPECT_THAT(db().planning().Explore({}, kMap, query),
+              StatusIs(Code::kInvalidArgument, HasSubstr("count is 0")));
+  query = {};
+  query.from.x_m = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(db().planning().Explore({}, kMap, query),
+              StatusIs(Code::kInvalidArgument, HasSubstr("from")));
+  PutFloor(db(), {"run", 1});
+  query = {};
+  query.resolution_m = 0.01;
+  EXPECT_THAT(db().planning().Explore({}, kMap, query),
+              StatusIs(Code::kInvalidArgument, HasSubstr("take a resolution of")));
+  MapParameters parameters;
+  parameters.keep_points = false;
+  STRATA_ASSERT_OK(db().maps().Create({}, "bare", parameters));
+  const PointCloud floor = LevelFloor();
+  STRATA_ASSERT_OK(UploadScan(db(), "bare", FloorHeader({"run", 1}, floor), floor));
+  AwaitIntegration(db(), "bare");
+  EXPECT_THAT(db().planning().Explore({}, "bare", {}),
+              StatusIs(Code::kFailedPrecondition, HasSubstr("--drop-points")));
+}
+
 // A wall across the floor at x = 0.
 PointCloud Wall() {
   PointCloud wall;

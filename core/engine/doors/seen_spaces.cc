@@ -1,0 +1,123 @@
+#include "core/engine/doors/seen_spaces.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "absl/synchronization/mutex.h"
+#include <Eigen/Core>
+
+#include "core/cloud/point_cloud.h"
+#include "core/cloud/sensor_model.h"
+#include "core/common/status.h"
+#include "core/engine/map/scan_lookup.h"
+#include "core/engine/scans/scan_share.h"
+#include "core/engine/scans/scan_source.h"
+#include "core/occupancy/occupancy_voxels.h"
+#include "core/storage/storage.h"
+#include "core/world/map_info.h"
+
+namespace strata {
+namespace {
+
+// Around all rays of a scan, in the map.
+Eigen::AlignedBox3d HullOf(const PosedScan& posed) {
+  Eigen::AlignedBox3d hull;
+  const auto add = [&](const Eigen::Vector3f& p) {
+    hull.extend(posed.pose->T_map_scan * p.cast<double>());
+  };
+  add(posed.scan.header.sensor_origin);
+  if (posed.scan.box_scan.isEmpty()) return hull;
+  for (int i = 0; i < 8; ++i) {
+    add(posed.scan.box_scan.corner(static_cast<Eigen::AlignedBox3f::CornerType>(i)));
+  }
+  return hull;
+}
+
+// The points that cast rays; the others are made to be none.
+PointCloud RaysOf(const PointCloud& block, const std::vector<std::uint16_t>& faded) {
+  PointCloud rays;
+  rays.sensor_origin = block.sensor_origin;
+  rays.points = block.points;
+  for (std::size_t i = 0; i < faded.size() && i < rays.points.size(); ++i) {
+    if (faded[i] != 0) rays.points[i].setConstant(std::numeric_limits<float>::quiet_NaN());
+  }
+  return rays;
+}
+
+}  // namespace
+
+SeenSpaces::SeenSpaces(MapCore& core)
+    : core_(core), known_(core.caches(), core.caches()->max_bytes() / 4) {}
+
+absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Find(const Eigen::AlignedBox3d& region,
+                                                                  double voxel_m,
+                                                                  const Stop& stop) {
+  const auto [changes, pin] = core_.ChangesSince(std::numeric_limits<std::uint64_t>::max());
+  const Eigen::Vector3d low = region.min();
+  const Eigen::Vector3d high = region.max();
+  const Key key{{low.x(), low.y(), low.z(), high.x(), high.y(), high.z(), voxel_m}, changes.last};
+  if (auto known = known_.Find(key); known != nullptr) return known;
+  absl::MutexLock lock(&making_);
+  STRATA_RETURN_IF_ERROR(stop.status());
+  if (auto known = known_.Find(key); known != nullptr) return known;  // made meanwhile
+  STRATA_ASSIGN_OR_RETURN(auto made, Make(region, voxel_m, pin.view().epoch, stop));
+  known_.Put(key, made, made->voxels.bytes());
+  return made;
+}
+
+absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Make(const Eigen::AlignedBox3d& region,
+                                                                  double voxel_m,
+                                                                  std::uint64_t epoch,
+                                                                  const Stop& stop) {
+  OccupancyVoxelsOptions options;
+  options.voxel_m = voxel_m;
+  options.region = region;
+  options.model = InverseSensorModel::OfOneLook();
+  STRATA_RETURN_IF_ERROR(options.Validate());
+  auto seen = std::make_shared<SeenSpace>(SeenSpace{OccupancyVoxels(options)});
+  std::vector<PosedScan> scans;
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  ScanQuery query;
+  query.state = ScanState::kIntegrated;
+  query.skip_damaged = true;  // verify names it
+  STRATA_RETURN_IF_ERROR(ForEachPosedScan(*reader, query, epoch, [&](PosedScan posed) {
+    if (!HullOf(posed).intersects(region)) return;
+    if (posed.scan.has_points) {
+      scans.push_back(std::move(posed));
+    } else {
+      ++seen->left_out;
+    }
+  }));
+  const MapParameters parameters = core_.info().parameters;
+  ScanSource source(*reader, parameters);
+  for (const PosedScan& posed : scans) {
+    const SensorModel sensor = posed.scan.header.sensor.value_or(parameters.sensor);
+    const ScanShare share(core_.caches(), posed.scan);
+    const absl::Status added =
+        source.ForEachBlock(posed.scan, [&](const PointCloud& block) -> absl::Status {
+          return seen->voxels.Add(
+              RaysOf(block, source.faded()), posed.pose->T_map_scan, sensor, stop);
+        });
+    const bool left_out = absl::IsDataLoss(added) || absl::IsNotFound(added);
+    if (!left_out) STRATA_RETURN_IF_ERROR(added);
+    ++(left_out ? seen->left_out : seen->scans);
+  }
+  if (seen->scans == 0 && seen->left_out > 0) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "map ",
+        core_.name(),
+        ": the points of all ",
+        seen->left_out,
+        " scans around were dropped or are damaged, and without them nothing says what space was "
+        "seen; explore needs a map that keeps points (map create without --drop-points)"));
+  }
+  return std::shared_ptr<const SeenSpace>(std::move(seen));
+}
+
+}  // namespace strata

@@ -1,0 +1,57 @@
+// Free, occupied and unknown space of a map, out of its scans.
+#ifndef STRATA_CORE_ENGINE_DOORS_SEEN_SPACES_H_
+#define STRATA_CORE_ENGINE_DOORS_SEEN_SPACES_H_
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+#include <Eigen/Geometry>
+
+#include "core/common/lru_cache.h"
+#include "core/common/stop.h"
+#include "core/engine/map/map_core.h"
+#include "core/planning/viewpoints.h"
+
+namespace strata {
+
+// Thread-safe. Keeps what fits the caches of all maps; nothing of it is stored.
+class SeenSpaces {
+ public:
+  // `core` must outlive it.
+  explicit SeenSpaces(MapCore& core);
+
+  // Of the scans that are integrated, where they are now, without points that have faded; each
+  // says all that many would (InverseSensorModel::OfOneLook). FAILED_PRECONDITION: scans may have
+  // seen the region, but the points of all of them were dropped; as `stop` says.
+  absl::StatusOr<std::shared_ptr<const SeenSpace>> Find(const Eigen::AlignedBox3d& region,
+                                                        double voxel_m,
+                                                        const Stop& stop);
+
+ private:
+  struct Key {
+    std::array<double, 7> numbers;  // region, size of voxels
+    std::uint64_t commit_sequence = 0;
+    friend bool operator==(const Key&, const Key&) = default;
+    template <typename H>
+    friend H AbslHashValue(H h, const Key& key) {
+      return H::combine(std::move(h), key.numbers, key.commit_sequence);
+    }
+  };
+
+  absl::StatusOr<std::shared_ptr<const SeenSpace>> Make(const Eigen::AlignedBox3d& region,
+                                                        double voxel_m,
+                                                        std::uint64_t epoch,
+                                                        const Stop& stop);
+
+  MapCore& core_;
+  absl::Mutex making_;  // one at a time, each of them large
+  LruCache<Key, const SeenSpace> known_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_DOORS_SEEN_SPACES_H_

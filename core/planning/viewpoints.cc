@@ -1,0 +1,355 @@
+#include "core/planning/viewpoints.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include <Eigen/Core>
+
+#include "core/common/hash_map.h"
+#include "core/common/status.h"
+#include "core/geometry/pose.h"
+#include "core/mesh/voxel_blocks.h"
+#include "core/occupancy/expected_view.h"
+#include "core/planning/endpoint.h"
+#include "core/planning/move_cost.h"
+#include "core/planning/search.h"
+#include "core/planning/search_workspace.h"
+
+namespace strata {
+namespace {
+
+using Eigen::AlignedBox3d;
+using Eigen::Vector3d;
+
+constexpr int kHeadings = 8;
+// Regions that nobody asked for are of whole multiples, so that a robot that has moved a little
+// finds its own again [m].
+constexpr double kRegionStepM = 10.0;
+constexpr double kRegionStepUpM = 1.0;
+constexpr double kBelowM = 1.0;
+constexpr double kAboveM = 1.0;
+
+struct Stand {
+  PatchId patch = kNoPatchId;
+  Vector3d place = Vector3d::Zero();
+  double cost_m = 0.0;
+  double gain_bits = std::numeric_limits<double>::infinity();  // at most, as last estimated
+  int heading = 0;                                             // of that
+  bool fresh = false;                                          // estimated since a view was taken
+};
+
+// Costs in a workspace in metres.
+double MetresOf(const SearchSpace& space, std::uint32_t cost) {
+  return cost * space.checks().cell_size_m / kCostPerCell;
+}
+
+std::uint32_t CostOf(const SearchSpace& space, double cost_m) {
+  const double cost = cost_m / space.checks().cell_size_m * kCostPerCell;
+  return static_cast<std::uint32_t>(std::min(cost, static_cast<double>(kAnyCost)));
+}
+
+// All that was reached within the budget, the cheapest first.
+std::vector<Stand> ReachedPlaces(SearchSpace& space,
+                                 SearchWorkspace& workspace,
+                                 std::uint32_t budget) {
+  std::vector<Stand> places;
+  for (const int slot : workspace.at_hand()) {
+    const SearchWorkspace::Member& member = workspace.member(slot);
+    const PatchId base = space.slots()[slot].base;
+    member.tile->standing.ForEach([&](std::uint32_t place, std::uint32_t /*number*/) {
+      const std::uint32_t cost = member.costs[place];
+      if (cost > budget) return;
+      Stand& stand = places.emplace_back();
+      stand.patch = base + place;
+      stand.cost_m = MetresOf(space, cost);
+    });
+  }
+  for (Stand& stand : places) stand.place = space.Position(stand.patch);
+  std::sort(places.begin(), places.end(), [](const Stand& a, const Stand& b) {
+    return std::tuple(a.cost_m, a.place.x(), a.place.y(), a.place.z()) <
+           std::tuple(b.cost_m, b.place.x(), b.place.y(), b.place.z());
+  });
+  return places;
+}
+
+// Leaves out those that are close to one before them.
+std::vector<Stand> ThinnedOut(const std::vector<Stand>& places) {
+  HashMap<BlockKey, std::vector<Vector3d>> kept;
+  std::vector<Stand> stands;
+  for (const Stand& stand : places) {
+    const Eigen::Vector3i at = (stand.place / kStandSpacingM).array().floor().cast<int>();
+    bool alone = true;
+    for (int i = 0; i < 27 && alone; ++i) {
+      const auto found =
+          kept.find({at.x() + i % 3 - 1, at.y() + i / 3 % 3 - 1, at.z() + i / 9 - 1});
+      if (found == kept.end()) continue;
+      alone = std::none_of(found->second.begin(), found->second.end(), [&](const Vector3d& p) {
+        return (p - stand.place).norm() < kStandSpacingM;
+      });
+    }
+    if (!alone) continue;
+    kept[{at.x(), at.y(), at.z()}].push_back(stand.place);
+    stands.push_back(stand);
+  }
+  return stands;
+}
+
+// All that the sensor may see.
+AlignedBox3d SightOf(const std::vector<Stand>& stands, const ExploreQuery& query) {
+  AlignedBox3d box;
+  for (const Stand& stand : stands) {
+    box.extend(stand.place + query.sensor_height_m * Vector3d::UnitZ());
+  }
+  const Vector3d range = Vector3d::Constant(query.sensor.max_range_m);
+  return {box.min() - range, box.max() + range};
+}
+
+// The part of it that is looked at where nobody says which.
+AlignedBox3d RegionAround(const std::vector<Stand>& stands, const ExploreQuery& query) {
+  AlignedBox3d box;
+  for (const Stand& stand : stands) box.extend(stand.place);
+  const double across = query.sensor.max_range_m;
+  const double above = std::max(query.profile.height_m, query.sensor_height_m) + kAboveM;
+  const Eigen::Array3d step(kRegionStepM, kRegionStepM, kRegionStepUpM);
+  const Eigen::Array3d low = box.min().array() - Eigen::Array3d(across, across, kBelowM);
+  const Eigen::Array3d high = box.max().array() + Eigen::Array3d(across, across, above);
+  return {((low / step).floor() * step).matrix(), ((high / step).ceil() * step).matrix()};
+}
+
+absl::Status CheckVoxels(const AlignedBox3d& region, double voxel_m) {
+  const Vector3d sizes = region.sizes();
+  const double voxels = (sizes / voxel_m).prod();
+  if (voxels <= static_cast<double>(kMaxExploreVoxels)) return absl::OkStatus();
+  const double fits_m = std::cbrt(sizes.prod() / static_cast<double>(kMaxExploreVoxels));
+  return absl::InvalidArgumentError(
+      absl::StrFormat("explore: %.0f × %.0f × %.0f m have %.0f million voxels of %g m, more than "
+                      "%d million; take a "
+                      "resolution of %g m or more, a smaller budget or a region",
+                      sizes.x(),
+                      sizes.y(),
+                      sizes.z(),
+                      voxels / 1e6,
+                      voxel_m,
+                      kMaxExploreVoxels / 1'000'000,
+                      std::ceil(fits_m * 100.0 + 1e-6) / 100.0));
+}
+
+class ViewChooser {
+ public:
+  ViewChooser(SearchSpace& space,
+              const ExploreQuery& query,
+              const SeenSpace& seen,
+              const AlignedBox3d& region,
+              std::vector<Stand> stands,
+              const Stop& stop)
+      : space_(space),
+        query_(query),
+        views_(seen.voxels, query.sensor, region),
+        stands_(std::move(stands)),
+        headings_(query.sensor.width_rad < 2.0 * std::numbers::pi - 1e-3 ? kHeadings : 1),
+        stop_(stop) {}
+
+  absl::StatusOr<std::vector<ExploreView>> Choose() {
+    std::vector<ExploreView> chosen;
+    while (chosen.size() < static_cast<std::size_t>(query_.count)) {
+      STRATA_ASSIGN_OR_RETURN(const std::size_t best, Best());
+      if (best == stands_.size()) break;
+      Stand& stand = stands_[best];
+      ExploreView view;
+      view.place = stand.place;
+      view.T_map_sensor = PoseAt(stand, stand.heading);
+      const ViewGain gain = views_.Take(view.T_map_sensor);
+      for (Stand& other : stands_) other.fresh = false;
+      view.gain_bits = gain.bits;
+      view.volume_m3 = gain.volume_m3;
+      view.cost_m = stand.cost_m;
+      view.utility_bits = gain.bits - query_.bits_per_m * stand.cost_m;
+      stand.gain_bits = 0.0;  // but for what it was taken for
+      if (view.utility_bits < query_.min_bits) continue;
+      chosen.push_back(view);
+      if (chosen.size() < static_cast<std::size_t>(query_.count)) {
+        STRATA_RETURN_IF_ERROR(MoveTo(stand.patch));
+      }
+    }
+    return chosen;
+  }
+
+ private:
+  Pose PoseAt(const Stand& stand, int heading) const {
+    const double yaw = 2.0 * std::numbers::pi * heading / kHeadings;
+    return MakePose(Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Vector3d::UnitZ())),
+                    stand.place + query_.sensor_height_m * Vector3d::UnitZ());
+  }
+  double UtilityOf(const Stand& stand) const {
+    return stand.gain_bits - query_.bits_per_m * stand.cost_m;
+  }
+
+  absl::Status Estimate(Stand& stand) {
+    STRATA_RETURN_IF_ERROR(stop_.status());
+    stand.fresh = true;
+    stand.gain_bits = -1.0;
+    for (int heading = 0; heading < headings_; ++heading) {
+      const double bits = views_.Estimate(PoseAt(stand, heading)).bits;
+      if (bits <= stand.gain_bits) continue;
+      stand.gain_bits = bits;
+      stand.heading = heading;
+    }
+    return absl::OkStatus();
+  }
+
+  // The best of [begin, end) of order_ that is worth enough, else stands_.size(). What a view is
+  // worth only falls as others are taken: what is worth less than the best was before is not looked
+  // at again.
+  absl::StatusOr<std::size_t> BestOf(std::size_t begin, std::size_t end) {
+    std::vector<std::size_t> by_bound(order_.begin() + static_cast<std::ptrdiff_t>(begin),
+                                      order_.begin() + static_cast<std::ptrdiff_t>(end));
+    std::stable_sort(by_bound.begin(), by_bound.end(), [&](std::size_t a, std::size_t b) {
+      return UtilityOf(stands_[a]) > UtilityOf(stands_[b]);
+    });
+    std::size_t best = stands_.size();
+    double most = query_.min_bits;
+    for (const std::size_t i : by_bound) {
+      if (UtilityOf(stands_[i]) < most) break;
+      if (!stands_[i].fresh) STRATA_RETURN_IF_ERROR(Estimate(stands_[i]));
+      const double utility = UtilityOf(stands_[i]);
+      if (utility < most || (utility == most && best != stands_.size())) continue;
+      most = utility;
+      best = i;
+    }
+    return best;
+  }
+
+  absl::StatusOr<std::size_t> Best() {
+    order_.clear();
+    for (std::size_t i = 0; i < stands_.size(); ++i) {
+      if (std::isfinite(stands_[i].cost_m) && UtilityOf(stands_[i]) >= query_.min_bits) {
+        order_.push_back(i);
+      }
+    }
+    std::stable_sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) {
+      return stands_[a].cost_m < stands_[b].cost_m;
+    });
+    const std::size_t horizon =
+        query_.horizon == 0 ? order_.size() : static_cast<std::size_t>(query_.horizon);
+    for (std::size_t begin = 0; begin < order_.size(); begin += horizon) {
+      STRATA_ASSIGN_OR_RETURN(const std::size_t best,
+                              BestOf(begin, std::min(order_.size(), begin + horizon)));
+      if (best != stands_.size()) return best;
+    }
+    return stands_.size();
+  }
+
+  // What the others cost from there.
+  absl::Status MoveTo(PatchId patch) {
+    SearchWorkspace workspace;
+    STRATA_RETURN_IF_ERROR(
+        ReachAll(space_, patch, workspace, stop_, CostOf(space_, 2.0 * query_.budget_m)).status());
+    for (Stand& stand : stands_) {
+      const int slot = space_.SlotOf(stand.patch);
+      std::uint32_t cost = SearchWorkspace::Member::kUnreached;
+      if (workspace.AtHand(slot)) {
+        cost = workspace.member(slot).costs[stand.patch - space_.slots()[slot].base];
+      }
+      stand.cost_m = cost == SearchWorkspace::Member::kUnreached
+                         ? std::numeric_limits<double>::infinity()
+                         : MetresOf(space_, cost);
+    }
+    return absl::OkStatus();
+  }
+
+  SearchSpace& space_;
+  const ExploreQuery& query_;
+  ExpectedViews views_;
+  std::vector<Stand> stands_;
+  std::vector<std::size_t> order_;
+  const int headings_;
+  const Stop& stop_;
+};
+
+std::string MessageOf(const ExploreResult& result, const ExploreQuery& query) {
+  const double known = result.region_m3 > 0.0 ? result.known_m3 / result.region_m3 : 0.0;
+  std::string message =
+      result.views.empty()
+          ? absl::StrFormat("explored: none of %d places within %g m is worth %g bits",
+                            result.stands,
+                            query.budget_m,
+                            query.min_bits)
+          : absl::StrFormat("%d of %d places", result.views.size(), result.stands);
+  absl::StrAppend(&message, absl::StrFormat("; %.1f %% of the region is known", 100.0 * known));
+  if (result.scans_left_out > 0) {
+    absl::StrAppend(&message,
+                    "; ",
+                    result.scans_left_out,
+                    " scans left out: their points were dropped or are damaged");
+  }
+  return message;
+}
+
+}  // namespace
+
+absl::StatusOr<ExploreResult> ChooseViews(SearchSpace& space,
+                                          const ExploreQuery& query,
+                                          SpaceOf space_of,
+                                          const Stop& stop) {
+  STRATA_RETURN_IF_ERROR(ValidateExploreQuery(query));
+  STRATA_RETURN_IF_ERROR(ValidateEndpoint("from", query.from, space.checks().cell_size_m));
+  STRATA_ASSIGN_OR_RETURN(const EndpointMatch from, MatchEndpoint(space, query.from));
+  ExploreResult result;
+  if (from.patch == kNoPatchId) {
+    result.reason = ExploreReason::kStartNotOnSurface;
+    result.message = absl::StrCat("start: ", from.message);
+    result.nearest = from.nearest;
+    return result;
+  }
+  SearchWorkspace workspace;
+  const std::uint32_t budget = CostOf(space, query.budget_m);
+  STRATA_RETURN_IF_ERROR(ReachAll(space, from.patch, workspace, stop, budget).status());
+  std::vector<Stand> stands = ThinnedOut(ReachedPlaces(space, workspace, budget));
+  STRATA_RETURN_IF_ERROR(space.status());
+  result.stands = stands.size();
+  result.region = query.region.value_or(RegionAround(stands, query));
+  result.region_m3 = result.region.volume();
+  AlignedBox3d around = result.region;
+  if (query.region.has_value()) {
+    const Vector3d range = Vector3d::Constant(query.sensor.max_range_m);
+    around = SightOf(stands, query)
+                 .intersection({result.region.min() - range, result.region.max() + range});
+  }
+  if (around.isEmpty() || around.volume() <= 0.0) {
+    result.reason = ExploreReason::kExplored;
+    result.message = absl::StrFormat(
+        "the region is out of sight of all %d places within %g m; take a larger "
+        "budget or another region",
+        stands.size(),
+        query.budget_m);
+    return result;
+  }
+  STRATA_RETURN_IF_ERROR(CheckVoxels(around, query.resolution_m));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<const SeenSpace> seen,
+                          space_of(around, query.resolution_m));
+  ViewChooser chooser(space, query, *seen, result.region, std::move(stands), stop);
+  STRATA_ASSIGN_OR_RETURN(result.views, chooser.Choose());
+  STRATA_RETURN_IF_ERROR(space.status());
+  result.reason = result.views.empty() ? ExploreReason::kExplored : ExploreReason::kViews;
+  result.known_m3 =
+      static_cast<double>(seen->voxels.CountKnown(result.region)) * std::pow(query.resolution_m, 3);
+  result.scans = seen->scans;
+  result.scans_left_out = seen->left_out;
+  result.message = MessageOf(result, query);
+  if (!from.message.empty()) absl::StrAppend(&result.message, "; start ", from.message);
+  return result;
+}
+
+}  // namespace strata

@@ -1,0 +1,48 @@
+// Where a robot should look next (thesis 4.4.2), on all levels that it reaches.
+#ifndef STRATA_CORE_PLANNING_VIEWPOINTS_H_
+#define STRATA_CORE_PLANNING_VIEWPOINTS_H_
+
+#include <cstdint>
+#include <memory>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/statusor.h"
+#include <Eigen/Geometry>
+
+#include "core/common/stop.h"
+#include "core/occupancy/occupancy_voxels.h"
+#include "core/planning/search_space.h"
+#include "core/world/exploration.h"
+
+namespace strata {
+
+// What is known of a region.
+struct SeenSpace {
+  OccupancyVoxels voxels;
+  std::uint64_t scans = 0;     // whose rays cross it
+  std::uint64_t left_out = 0;  // that may, but whose points are gone or damaged
+};
+
+// Of a region that has kMaxExploreVoxels at most.
+using SpaceOf = absl::FunctionRef<absl::StatusOr<std::shared_ptr<const SeenSpace>>(
+    const Eigen::AlignedBox3d& region, double voxel_m)>;
+
+// Between stands that are compared [m].
+inline constexpr double kStandSpacingM = 1.5;
+
+// Stands are places to stand within the budget, no two closer than kStandSpacingM, the cheapest
+// first; a sensor that does not look all around is turned in eighths. Of the `horizon` nearest the
+// one of the greatest utility EI - λ · cost (eq. 4.15) is taken if it is worth min_bits, else of
+// the next ones; then the robot is thought to be there, and what it would see to be known. Fills
+// all but epoch and elapsed_ms. The same for the same tiles, scans and query.
+//   INVALID_ARGUMENT   the query; a start beyond the map's range; a region of more voxels than
+//                      kMaxExploreVoxels, with a resolution that fits
+//   errors of `space`, `space_of` and `stop`
+absl::StatusOr<ExploreResult> ChooseViews(SearchSpace& space,
+                                          const ExploreQuery& query,
+                                          SpaceOf space_of,
+                                          const Stop& stop);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_PLANNING_VIEWPOINTS_H_
