@@ -6,9 +6,9 @@ set -euo pipefail
 
 packages=(
   ca-certificates ccache cmake g++ git mold ninja-build pkg-config
-  libabsl-dev libboost-dev libbz2-dev libceres-dev libcli11-dev libeigen3-dev libexpat1-dev libgeographiclib-dev libgoogle-glog-dev
+  libabsl-dev libassimp-dev libboost-dev libbz2-dev libceres-dev libcli11-dev libeigen3-dev libexpat1-dev libfcl-dev libgeographiclib-dev libgoogle-glog-dev
   libgrpc++-dev liblz4-dev liblzf-dev libmeshoptimizer-dev libnanoflann-dev libopenblas-serial-dev libpcap-dev libpcl-dev libpng-dev libprotobuf-dev
-  libqhull-dev libsqlite3-dev libssl-dev libtiff-dev libxxhash-dev libyaml-cpp-dev libzstd-dev nlohmann-json3-dev prometheus-cpp-dev
+  libqhull-dev libsqlite3-dev libssl-dev libtiff-dev liburdfdom-dev libxxhash-dev libyaml-cpp-dev libzstd-dev nlohmann-json3-dev prometheus-cpp-dev
   protobuf-compiler protobuf-compiler-grpc python3 zlib1g-dev
 )
 # strata-ros2 is built where cyclonedds-dev and cyclonedds-tools are; libfastrtps-dev is the robot that it is tried on.

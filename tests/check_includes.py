@@ -30,6 +30,7 @@ ARROWS = {
     "core/tracking": ["core/posegraph", "core/registration", "core/egomotion", "core/world", "core/mls", "core/cloud",
                       "core/geometry", "core/common"],
     "core/classification": ["core/planes", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
+    "core/collision": ["core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/planning": ["core/occupancy", "core/mesh", "core/cloud", "core/world", "core/mls", "core/geometry", "core/common"],
     "core/storage": ["core/world", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/api": ["core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
@@ -58,7 +59,7 @@ STOREYS = {
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
     "core/storage": ["sqlite", HERE],
     "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "models", "ingest", "tiles", "scans", "map"],
-    "client/formats": ["planes", "foxglove", "bags", "motion", HERE, "packets", "survey", "laz", "parsing", "grid"],
+    "client/formats": ["planes", "foxglove", "bags", "motion", "shapes", HERE, "packets", "survey", "laz", "parsing", "grid"],
     "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "planes", "egomotion", "job", "heights", "mesh", "picture", "terminal"],
 }
 
@@ -73,6 +74,8 @@ EXTERNAL = {
     r"openssl/.*": ["server"],
     r"prometheus/.*": ["server/metrics"],
     r"pcl/.*": ["core/registration", "core/planes", "core/classification", "core/mesh", "client/formats"],
+    r"fcl/.*": ["core/collision"],
+    r"assimp/.*|urdf_.*/.*": ["client/formats/shapes"],
     r"libqhull_r/.*|meshoptimizer\.h": ["core/mesh"],
     r"GeographicLib/.*": ["core/egomotion"],
     r"yaml-cpp/.*": ["client/formats/motion"],

@@ -11,6 +11,7 @@
 #include "proto/translate/geometry.h"
 #include "proto/translate/maps.h"
 #include "proto/translate/planning.h"
+#include "proto/translate/shape.h"
 
 namespace strata::sdk {
 namespace {
@@ -101,6 +102,19 @@ absl::StatusOr<ExploreResult> RemotePlanning::Explore(const api::Call& call,
                                     Repeat::kOnTrouble,
                                     ToProto(map, query)));
   return FromProto(out);
+}
+
+absl::StatusOr<ShapeCheck> RemotePlanning::CheckShape(const api::Call& call,
+                                                      absl::string_view map,
+                                                      const ShapeQuery& query) {
+  STRATA_ASSIGN_OR_RETURN(const v1::CheckShapeResponse out,
+                          CallUnary(connection_,
+                                    *stub_,
+                                    &v1::Planning::Stub::CheckShape,
+                                    call,
+                                    Repeat::kOnTrouble,
+                                    translate::ToProto(map, query)));
+  return translate::FromProto(out);
 }
 
 absl::StatusOr<std::vector<SurfaceColumn>> RemotePlanning::SampleSurfaces(

@@ -33,6 +33,9 @@ class RemotePlanning final : public api::Planning {
   absl::StatusOr<ExploreResult> Explore(const api::Call& call,
                                         absl::string_view map,
                                         const ExploreQuery& query) override;
+  absl::StatusOr<ShapeCheck> CheckShape(const api::Call& call,
+                                        absl::string_view map,
+                                        const ShapeQuery& query) override;
   absl::StatusOr<std::vector<SurfaceColumn>> SampleSurfaces(
       const api::Call& call,
       absl::string_view map,

@@ -17,6 +17,7 @@
 #include "core/world/floor.h"
 #include "core/world/plan.h"
 #include "core/world/robot_profile.h"
+#include "core/world/shape.h"
 
 namespace strata::api {
 
@@ -59,6 +60,12 @@ class Planning {
   virtual absl::StatusOr<ExploreResult> Explore(const Call& call,
                                                 absl::string_view map,
                                                 const ExploreQuery& query) = 0;
+  // Whether a shape (a mesh, boxes, cylinders and spheres) touches anything along a way, and where
+  // and how deep it does (core/collision/shape_way.h); both are OK. INVALID_ARGUMENT for a bad
+  // query; DATA_LOSS naming a damaged tile on the way.
+  virtual absl::StatusOr<ShapeCheck> CheckShape(const Call& call,
+                                                absl::string_view map,
+                                                const ShapeQuery& query) = 0;
   // All levels at each place, in the order asked; a place without surfaces has an empty column.
   // DATA_LOSS naming a damaged tile where one of the places lies.
   virtual absl::StatusOr<std::vector<SurfaceColumn>> SampleSurfaces(

@@ -43,6 +43,7 @@ constexpr std::array kTable = {
     MethodRight{"Planning.WatchPath", kRead, "map"},
     MethodRight{"Planning.ListFloors", kRead, "map"},
     MethodRight{"Planning.Explore", kRead, "map"},
+    MethodRight{"Planning.CheckShape", kRead, "map"},
     MethodRight{"Planning.SampleSurfaces", kRead, "map"},
     MethodRight{"Planning.SetProfile", kWrite, "map"},
     MethodRight{"Planning.ListProfiles", kRead, "map"},

@@ -12,6 +12,7 @@
 #include "proto/translate/geometry.h"
 #include "proto/translate/maps.h"
 #include "proto/translate/planning.h"
+#include "proto/translate/shape.h"
 #include "server/services/path_watch_reactor.h"
 
 namespace strata::server {
@@ -57,6 +58,16 @@ absl::Status Explore(api::Database& db,
   STRATA_ASSIGN_OR_RETURN(const ExploreQuery query, AtTheDoor(FromProto(in)));
   STRATA_ASSIGN_OR_RETURN(const ExploreResult result, db.planning().Explore(call, in.map(), query));
   out = ToProto(result);
+  return absl::OkStatus();
+}
+
+absl::Status CheckShape(api::Database& db,
+                        const api::Call& call,
+                        const v1::CheckShapeRequest& in,
+                        v1::CheckShapeResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const ShapeQuery query, AtTheDoor(FromProto(in)));
+  STRATA_ASSIGN_OR_RETURN(const ShapeCheck check, db.planning().CheckShape(call, in.map(), query));
+  out = ToProto(check);
   return absl::OkStatus();
 }
 
@@ -110,6 +121,7 @@ PlanningService::PlanningService(Runtime& runtime) : Service(runtime, "Planning"
   Poll<PathWatchReactor>("WatchPath");
   Unary("ListFloors", &ListFloors);
   Unary("Explore", &Explore);
+  Unary("CheckShape", &CheckShape);
   Unary("SampleSurfaces", &SampleSurfaces);
   Unary("SetProfile", &SetProfile);
   Unary("ListProfiles", &ListProfiles);

@@ -28,3 +28,8 @@ strata_executable(
   SOURCES path_uncertainty.cc
   DEPS strata::engine strata::posegraph strata::simulator strata::test_support strata::test_recordings
 )
+strata_executable(
+  explore explore
+  SOURCES explore.cc
+  DEPS strata::occupancy strata::test_support strata::test_recordings
+)

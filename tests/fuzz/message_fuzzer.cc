@@ -24,6 +24,7 @@
 #include "proto/translate/points.h"
 #include "proto/translate/posegraph.h"
 #include "proto/translate/scans.h"
+#include "proto/translate/shape.h"
 #include "proto/translate/status.h"
 #include "proto/translate/tiles.h"
 #include "proto/translate/track.h"
@@ -109,6 +110,8 @@ const auto& Kinds() {
       KindOf<v1::ListFloorsResponse>(),
       KindOf<v1::ExploreRequest>(),
       KindOf<v1::ExploreResponse>(),
+      KindOf<v1::CheckShapeRequest>(),
+      KindOf<v1::CheckShapeResponse>(),
       KindOf<v1::ModelPlane>(),
       KindOf<v1::PlaneModel>(),
       KindOf<v1::PointChunk>(),

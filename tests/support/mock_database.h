@@ -172,6 +172,10 @@ class MockPlanning : public api::Planning {
               Explore,
               (const api::Call&, absl::string_view, const ExploreQuery&),
               (override));
+  MOCK_METHOD(absl::StatusOr<ShapeCheck>,
+              CheckShape,
+              (const api::Call&, absl::string_view, const ShapeQuery&),
+              (override));
   MOCK_METHOD(absl::StatusOr<std::vector<SurfaceColumn>>,
               SampleSurfaces,
               (const api::Call&, absl::string_view, const std::vector<Eigen::Vector2d>&),

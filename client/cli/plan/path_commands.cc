@@ -6,6 +6,7 @@
 #include "absl/status/statusor.h"
 
 #include "client/cli/plan/driver_options.h"
+#include "client/cli/plan/shape_options.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/json.h"
 #include "client/formats/path_file.h"
@@ -18,6 +19,7 @@ struct PathOptions {
   std::string map;
   std::string file;
   DriverOptions driver;
+  ShapeOptions shape;
 };
 
 absl::StatusOr<PathQuery> QueryOf(Context& context, const PathOptions& options) {
@@ -32,7 +34,17 @@ absl::Status Check(Context& context, const PathOptions& options) {
   STRATA_ASSIGN_OR_RETURN(const PathQuery query, QueryOf(context, options));
   STRATA_ASSIGN_OR_RETURN(const PathCheck check,
                           context.database.planning().CheckPath(context.call, options.map, query));
-  context.output.Object(ToJson(check));
+  Json json = ToJson(check);
+  if (!options.shape.given()) {
+    context.output.Object(json);
+    return absl::OkStatus();
+  }
+  STRATA_ASSIGN_OR_RETURN(
+      const ShapeCheck shape,
+      CheckShape(context, options.map, options.shape, query.profile, query.waypoints));
+  if (context.output.json()) json["shape"] = ToJson(shape);
+  context.output.Object(json);
+  if (!context.output.json()) PrintText(shape, context.output);
   return absl::OkStatus();
 }
 
@@ -68,11 +80,14 @@ void AddPathCommands(Commands& commands) {
         ->type_name("FILE.ply")
         ->required();
     AddDriverOptions(app, options->driver);
+    return app;
   };
-  verb("check",
-       "Whether a path may still be driven, and where it may not",
-       "strata path check campus route.ply --radius 0.4",
-       Check);
+  CLI::App* check = verb("check",
+                         "Whether a path may still be driven, and where it may not",
+                         "strata path check campus route.ply --radius 0.4\n"
+                         "  strata path check campus route.ply --shape cart.stl --clearance 0.05",
+                         Check);
+  AddShapeOptions(check, options->shape);
   verb("watch",
        "Say whether a path may be driven, and whenever that changes, until Ctrl-C",
        "strata path watch campus route.ply --output json",

@@ -15,6 +15,7 @@
 
 #include "client/cli/plan/driver_options.h"
 #include "client/cli/plan/path_commands.h"
+#include "client/cli/plan/shape_options.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
@@ -34,6 +35,7 @@ struct PlanOptions {
   std::optional<int> from_level, to_level;
   std::string queries_file;
   DriverOptions driver;
+  ShapeOptions shape;
   std::string out;
   bool watch = false;
 };
@@ -114,10 +116,19 @@ absl::Status PlanOne(Context& context, PlanOptions options) {
     context.output.Talk(absl::StrCat("wrote ", options.out));
   }
   STRATA_ASSIGN_OR_RETURN(const std::optional<LocalFrame> earth, EarthOf(context, options.map));
+  std::optional<ShapeCheck> shape;
+  if (options.shape.given() && plan.found()) {
+    STRATA_ASSIGN_OR_RETURN(
+        shape,
+        CheckShape(context, options.map, options.shape, options.query.profile, plan.waypoints));
+  }
   if (context.output.json()) {
-    context.output.Object(WithPlaces(plan, earth));
+    Json json = WithPlaces(plan, earth);
+    if (shape.has_value()) json["shape"] = ToJson(*shape);
+    context.output.Object(json);
   } else {
     PrintText(plan, earth, context.output);
+    if (shape.has_value()) PrintText(*shape, context.output);
   }
   if (!options.watch || !plan.found()) return absl::OkStatus();
   return FollowPath(
@@ -203,7 +214,8 @@ void AddPlanCommand(Commands& commands) {
                     "A path for a robot, or the reason why there is none",
                     "strata plan campus --from -14,0,0 --to 20,5,0 --radius 0.4 --out path.ply\n"
                     "  strata plan campus --from -14,0 --to 20,5 --avoid vegetation=5 "
-                    "--avoid water=never",
+                    "--avoid water=never\n"
+                    "  strata plan campus --from -14,0 --to 20,5 --shape cart.stl",
                     [options](Context& context) {
                       return options->queries_file.empty() ? PlanOne(context, *options)
                                                            : PlanMany(context, *options);
@@ -211,6 +223,7 @@ void AddPlanCommand(Commands& commands) {
   AddMapName(verb, options->map);
   AddEndpoints(verb, options);
   AddDriverOptions(verb, options->driver);
+  AddShapeOptions(verb, options->shape);
   verb->add_option("--max-expanded", options->query.max_expanded, "Search limit: patches looked at")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();

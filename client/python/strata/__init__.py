@@ -18,12 +18,13 @@ from strata.mesh import Mesh
 from strata.plan import Path
 from strata.registration import Registration, register
 from strata.scan import Ack, Points, Scan
+from strata.shape import Contact, ShapeCheck
 from strata.tiles import NON_TRAVERSABLE, SURFACE, TRAVERSABLE, UNDERSIDE, UNKNOWN, Tile, TileKey, decode_tile
 from strata.tracking import TrackedPose, Tracking
 
 __all__ = [
     "AlreadyExists", "Cancelled", "DataLoss", "DeadlineExceeded", "FailedPrecondition", "InvalidArgument", "NotFound",
     "PermissionDenied", "ResourceExhausted", "StrataError", "Unauthenticated", "Unavailable", "Unimplemented",
-    "Ack", "Change", "Database", "Exploration", "Heights", "Job", "Map", "Mesh", "NON_TRAVERSABLE", "Path", "Points", "Registration", "SURFACE", "Scan",
-    "ScanChange", "Stats", "TRAVERSABLE", "Tile", "TileKey", "TrackedPose", "Tracking", "UNDERSIDE", "UNKNOWN", "View", "connect", "decode_tile", "register",
+    "Ack", "Change", "Contact", "Database", "Exploration", "Heights", "Job", "Map", "Mesh", "NON_TRAVERSABLE", "Path", "Points", "Registration", "SURFACE", "Scan",
+    "ScanChange", "ShapeCheck", "Stats", "TRAVERSABLE", "Tile", "TileKey", "TrackedPose", "Tracking", "UNDERSIDE", "UNKNOWN", "View", "connect", "decode_tile", "register",
 ]

@@ -7,7 +7,7 @@ import time as clock
 
 import numpy as np
 
-from strata import errors, exploration, floors, heights, job, mesh, plan, planes, poses, scan, tracking
+from strata import errors, exploration, floors, heights, job, mesh, plan, planes, poses, scan, shape, tracking
 from strata.tiles import SURFACE, TILE_CELLS, TileKey, decode_tile
 from strata.v1 import (geometry_pb2, jobs_pb2, jobs_pb2_grpc, maps_pb2, maps_pb2_grpc, models_pb2, models_pb2_grpc,
                        planning_pb2, planning_pb2_grpc, posegraph_pb2_grpc, scans_pb2, scans_pb2_grpc, tiles_pb2, tiles_pb2_grpc)
@@ -336,6 +336,21 @@ class Map:
         request.profile.CopyFrom(plan.profile_to_proto(profile or {}))
         request.class_costs.extend(plan.class_cost(of, cost) for of, cost in (class_costs or {}).items())
         return exploration.from_proto(self._connection.unary(self._planning.Explore, request))
+
+    def check_shape(self, way, mesh=None, *, parts=(), clearance=0.0, ground=0.15, unknown="ignore"):
+        """ShapeCheck: whether a shape touches anything along a way, where and how deep; true if it does not.
+
+            campus.check_shape(campus.plan(start, goal), (vertices, triangles))
+            campus.check_shape(path, parts=[strata.shape.box((1.2, 0.6, 1.0), (0, 0, 0.5))], clearance=0.05)
+
+        way: a Path, or places (n, 3) on the ground, along which the shape is turned and pitched as they lead, or poses
+        (n, 4, 4) T_map_shape; swept between them. mesh: (vertices (n, 3), triangles (m, 3)) in the shape's frame: x forward,
+        z up from the ground. parts: solids, of shape.box, shape.cylinder and shape.sphere. clearance: to be kept from
+        everything [m]. ground: what is no higher over the ground that the shape stands on is ground [m]. unknown: "ignore"
+        or "blocked", cells below it where nothing was measured. Raises ValueError and StrataError.
+        """
+        request = shape.to_proto(self.name, way, mesh, parts, clearance, ground, unknown)
+        return shape.from_proto(self._connection.unary(self._planning.CheckShape, request))
 
     def planes(self):
         """PlaneModel: the walls, floors and slopes that the last job "planes" found; NotFound before there was one.

@@ -18,10 +18,13 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
 #include <glog/logging.h>
 
+#include "core/collision/shape_way.h"
 #include "core/common/log_line.h"
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "core/engine/map/change_log.h"
 #include "core/engine/map/parallel.h"
 #include "core/engine/tiles/kept_tiles.h"
@@ -216,6 +219,21 @@ absl::StatusOr<ExploreResult> MapPlanner::Explore(const ExploreQuery& query, con
   STRATA_ASSIGN_OR_RETURN(ExploreResult result, planner_.Explore(source, query, space_of, stop));
   result.epoch = source.epoch();
   return result;
+}
+
+absl::StatusOr<ShapeCheck> MapPlanner::CheckShape(const ShapeQuery& query, const Stop& stop) {
+  const absl::Time begin = SteadyNow();
+  STRATA_RETURN_IF_ERROR(stop.status());
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this));
+  STRATA_ASSIGN_OR_RETURN(
+      ShapeCheck check,
+      CheckShapeAlong([&source](const TileKey& key) { return source.Load(key); },
+                      core_.info().parameters.mls.cell_size_m,
+                      query,
+                      stop));
+  check.epoch = source.epoch();
+  check.elapsed_ms = absl::ToDoubleMilliseconds(SteadyNow() - begin);
+  return check;
 }
 
 absl::Status MapPlanner::Watch(const PathQuery& query,

@@ -27,6 +27,7 @@
 #include "core/world/exploration.h"
 #include "core/world/floor.h"
 #include "core/world/plan.h"
+#include "core/world/shape.h"
 
 namespace strata {
 
@@ -45,6 +46,8 @@ class MapPlanner {
   absl::StatusOr<FloorPlan> Floors(const FloorQuery& query, const Stop& stop);
   // As api::Planning::Explore.
   absl::StatusOr<ExploreResult> Explore(const ExploreQuery& query, const Stop& stop);
+  // As api::Planning::CheckShape.
+  absl::StatusOr<ShapeCheck> CheckShape(const ShapeQuery& query, const Stop& stop);
   // INVALID_ARGUMENT for a place that is not finite.
   absl::StatusOr<std::vector<SurfaceColumn>> Sample(const std::vector<Eigen::Vector2d>& places,
                                                     const Stop& stop);

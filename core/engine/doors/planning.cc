@@ -50,6 +50,13 @@ absl::StatusOr<ExploreResult> EnginePlanning::Explore(const api::Call& call,
   return found->planner().Explore(query, call.stop);
 }
 
+absl::StatusOr<ShapeCheck> EnginePlanning::CheckShape(const api::Call& call,
+                                                      absl::string_view map,
+                                                      const ShapeQuery& query) {
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.FindWithTiles(call, map));
+  return found->planner().CheckShape(query, call.stop);
+}
+
 absl::StatusOr<std::vector<SurfaceColumn>> EnginePlanning::SampleSurfaces(
     const api::Call& call, absl::string_view map, const std::vector<Eigen::Vector2d>& places) {
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.FindWithTiles(call, map));

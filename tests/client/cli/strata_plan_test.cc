@@ -36,6 +36,32 @@ TEST_F(StrataPlanTest, PathsAreCheckedFromTheirFiles) {
   EXPECT_EQ(Run({"path", "check", "m", path + "x"}).exit_code, 1);
 }
 
+TEST_F(StrataPlanTest, ShapesAreHeldAgainstTheMap) {
+  WriteDrive(8);
+  RunOk({"map", "create", "m"});
+  Import({"--align", "off"});
+  const std::string path = (dir_.path() / "path.ply").string();
+  const json plan = RunOk({"plan",
+                           "m",
+                           "--from",
+                           "-4,0.5,0",
+                           "--to",
+                           "3,-0.5,0",
+                           "--out",
+                           path,
+                           "--shape-box",
+                           "0.4,0.4,0.5"});
+  ASSERT_EQ(plan.at("found"), true) << plan;
+  EXPECT_EQ(plan.at("shape").at("free"), true) << plan;
+  const json wide = RunOk({"path", "check", "m", path, "--shape-box", "1,30,1"});
+  EXPECT_EQ(wide.at("valid"), true);
+  ASSERT_EQ(wide.at("shape").at("free"), false) << wide;
+  EXPECT_GE(wide.at("shape").at("contacts").at(0).at("depth_m").get<double>(), 0.0);
+  const auto refused = Run({"path", "check", "m", path, "--shape", "cart.doc"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err, ::testing::HasSubstr(".urdf"));
+}
+
 TEST_F(StrataPlanTest, ExploreSaysWhereToLook) {
   WriteDrive(8);
   RunOk({"map", "create", "m"});

@@ -17,6 +17,7 @@
 #include "proto/translate/planning.h"
 #include "proto/translate/posegraph.h"
 #include "proto/translate/scans.h"
+#include "proto/translate/shape.h"
 #include "proto/translate/tiles.h"
 #include "proto/translate/track.h"
 #include "proto/translate/watch.h"
@@ -112,6 +113,12 @@ class Filler {
     const Reflection& reflection = *message.GetReflection();
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
       return Fill(*reflection.AddMessage(&message, &field));
+    }
+    if (field.cpp_type() == FieldDescriptor::CPPTYPE_FLOAT) {
+      return reflection.AddFloat(&message, &field, static_cast<float>(Real()));
+    }
+    if (field.cpp_type() == FieldDescriptor::CPPTYPE_UINT32) {
+      return reflection.AddUInt32(&message, &field, static_cast<std::uint32_t>(++count_));
     }
     ASSERT_EQ(field.cpp_type(), FieldDescriptor::CPPTYPE_DOUBLE) << field.full_name();
     reflection.AddDouble(&message, &field, Real());
@@ -236,6 +243,17 @@ TEST(TranslateRoundTripTest, Planning) {
   explore.mutable_sensor()->set_max_range_m(5.0);
   STRATA_ASSERT_OK_AND_ASSIGN(const ExploreQuery explored, FromProto(explore));
   ExpectSame(explore, ToProto(explore.map(), explored));
+  ExpectRoundTrip(Filled<v1::CheckShapeResponse>());
+  auto by_poses = Filled<v1::CheckShapeRequest>();
+  by_poses.mutable_shape()->clear_triangles();
+  for (const std::uint32_t v : {0U, 2U, 1U}) by_poses.mutable_shape()->add_triangles(v);
+  auto by_places = by_poses;
+  by_poses.clear_waypoints();
+  by_places.clear_poses();
+  for (v1::CheckShapeRequest& shape : std::vector<v1::CheckShapeRequest>{by_poses, by_places}) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const ShapeQuery held, FromProto(shape));
+    ExpectSame(shape, ToProto(shape.map(), held));
+  }
   const auto check = Filled<v1::CheckPathRequest>();
   STRATA_ASSERT_OK_AND_ASSIGN(const PathQuery checked, FromProto(check));
   ExpectSame(check, CheckToProto(check.map(), checked));

@@ -81,6 +81,7 @@ const std::map<std::string, std::optional<Right>>& Needed() {
          "Planning.CheckPath",
          "Planning.ListFloors",
          "Planning.Explore",
+         "Planning.CheckShape",
          "Models.GetPlaneModel",
          "Planning.WatchPath"});
     add(Right::kWrite,

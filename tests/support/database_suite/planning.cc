@@ -138,6 +138,45 @@ TEST_P(DatabaseSuite, ExploringWhereThatIsNotPossibleSaysWhy) {
               StatusIs(Code::kFailedPrecondition, HasSubstr("--drop-points")));
 }
 
+TEST_P(DatabaseSuite, AShapeIsHeldAgainstTheMap) {
+  PointCloud floor = LevelFloor();
+  for (int i = 0; i < 20; ++i) {
+    floor.points.emplace_back(1.03F, 0.28F, 0.05F * static_cast<float>(i + 1));  // a post
+  }
+  STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", 1}, floor), floor));
+  AwaitIntegration(db(), kMap);
+  ShapeQuery query;
+  ShapePart cart;
+  cart.size_m = {1.0, 0.36, 0.8};
+  cart.T_shape_part = Pose(Eigen::Translation3d(0.0, 0.0, 0.4));
+  query.shape.parts = {cart};
+  query.waypoints = {{-2.0, 0.0, 0.0}, {2.5, 0.0, 0.0}};
+  STRATA_ASSERT_OK_AND_ASSIGN(const ShapeCheck by, db().planning().CheckShape({}, kMap, query));
+  EXPECT_TRUE(by.free) << by.message;
+  EXPECT_NEAR(by.length_m, 4.5, 1e-9);
+  query.shape.parts[0].size_m.y() = 0.7;
+  STRATA_ASSERT_OK_AND_ASSIGN(const ShapeCheck wide, db().planning().CheckShape({}, kMap, query));
+  EXPECT_FALSE(wide.free);
+  ASSERT_THAT(wide.contacts, SizeIs(1));
+  EXPECT_NEAR(wide.contacts[0].from_m, 2.5, 0.1);
+  EXPECT_NEAR(wide.contacts[0].where.y(), 0.28, 0.2);
+  EXPECT_EQ(wide.free_m, wide.contacts[0].from_m);
+  query.waypoints = {{3.0, 0.0, 0.0}, {6.0, 0.0, 0.0}};  // beyond the floor
+  STRATA_ASSERT_OK_AND_ASSIGN(const ShapeCheck off, db().planning().CheckShape({}, kMap, query));
+  EXPECT_TRUE(off.free);
+  query.unknown_blocks = true;
+  STRATA_ASSERT_OK_AND_ASSIGN(const ShapeCheck known, db().planning().CheckShape({}, kMap, query));
+  ASSERT_FALSE(known.free);
+  EXPECT_TRUE(known.contacts[0].unknown);
+  EXPECT_THAT(db().planning().CheckShape({}, "nowhere", query), StatusIs(Code::kNotFound, _));
+  query.poses = {Pose::Identity()};
+  EXPECT_THAT(db().planning().CheckShape({}, kMap, query),
+              StatusIs(Code::kInvalidArgument, HasSubstr("poses or waypoints")));
+  query.waypoints.clear();
+  query.poses = {NanPose()};
+  EXPECT_THAT(db().planning().CheckShape({}, kMap, query), StatusIs(Code::kInvalidArgument, _));
+}
+
 // A wall across the floor at x = 0.
 PointCloud Wall() {
   PointCloud wall;

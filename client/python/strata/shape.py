@@ -1,0 +1,116 @@
+"""Shapes of robots, arms and loads along a way."""
+import dataclasses
+
+import numpy as np
+
+from strata import plan, poses
+from strata.v1 import planning_pb2
+
+
+@dataclasses.dataclass(frozen=True)
+class Contact:
+    """A stretch of the way where the shape touches something."""
+
+    begin: float
+    """Along the way, of the shape's origin [m]."""
+    end: float
+    """Along the way [m]."""
+    where: np.ndarray
+    """(3,) where it is deepest, map frame [m]."""
+    depth: float
+    """How deep it is there [m]; of unknown ground 0."""
+    class_id: int
+    """Of the surface there; 0: none."""
+    unknown: bool
+    """Nothing but unknown ground."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ShapeCheck:
+    """Whether a shape touches anything along its way; true if it does not."""
+
+    free: bool
+    message: str
+    """The same for people, with numbers."""
+    free_length: float
+    """Along the way, up to the first contact [m]."""
+    length: float
+    """Of the way [m]."""
+    contacts: list
+    """In order along the way."""
+    looks: int
+    """Poses looked at."""
+    epoch: int
+    """Of which the answer is."""
+
+    def __bool__(self):
+        return self.free
+
+
+def _part(kind, size, pose):
+    return planning_pb2.ShapePart(kind=kind, size=poses.vector3(size), pose=poses.to_proto(_matrix(pose)))
+
+
+def _matrix(pose):
+    """A (4, 4) pose, or one that is only a place (3,)."""
+    pose = np.asarray(pose, dtype=float)
+    if pose.shape != (3,):
+        return pose
+    matrix = np.eye(4)
+    matrix[:3, 3] = pose
+    return matrix
+
+
+def box(size, pose=(0, 0, 0)):
+    """A box of edges `size` (3,) with its middle at pose, a place (3,) or (4, 4) T_shape_part."""
+    return _part(planning_pb2.SHAPE_KIND_BOX, size, pose)
+
+
+def cylinder(radius, height, pose=(0, 0, 0)):
+    """A cylinder along z with its middle at pose."""
+    return _part(planning_pb2.SHAPE_KIND_CYLINDER, (radius, 0, height), pose)
+
+
+def sphere(radius, place=(0, 0, 0)):
+    """A sphere around a place."""
+    return _part(planning_pb2.SHAPE_KIND_SPHERE, (radius, 0, 0), place)
+
+
+def _add_mesh(mesh, message):
+    vertices, triangles = np.asarray(mesh[0], dtype=np.float32), np.asarray(mesh[1])
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or triangles.ndim != 2 or triangles.shape[1] != 3:
+        raise ValueError(f"a mesh of shapes {vertices.shape} and {triangles.shape}; expected (n, 3) and (m, 3)")
+    if triangles.size and (triangles.min() < 0 or triangles.max() >= len(vertices)):
+        raise ValueError(f"a triangle has a vertex beyond the {len(vertices)} there are")
+    message.xyz.extend(vertices.ravel().tolist())
+    message.triangles.extend(triangles.ravel().tolist())
+
+
+def to_proto(name, way, mesh, parts, clearance, ground, unknown):
+    if unknown not in ("ignore", "blocked"):
+        raise ValueError(f'unknown is {unknown!r}; expected "ignore" or "blocked"')
+    request = planning_pb2.CheckShapeRequest(map=name, clearance_m=clearance, ground_m=ground,
+                                             unknown_blocks=unknown == "blocked")
+    if mesh is not None:
+        _add_mesh(mesh, request.shape)
+    request.shape.parts.extend(parts)
+    way = np.asarray(way.points if isinstance(way, plan.Path) else way, dtype=float)
+    if way.ndim == 3 and way.shape[1:] == (4, 4):
+        request.poses.extend(poses.to_proto(pose) for pose in way)
+    elif way.ndim == 2 and way.shape[1] == 3:
+        request.waypoints.extend(poses.vector3(place) for place in way)
+    else:
+        raise ValueError(f"a way of shape {way.shape}; expected places (n, 3) or poses (n, 4, 4)")
+    return request
+
+
+def from_proto(message):
+    return ShapeCheck(
+        free=message.free,
+        message=message.message,
+        free_length=message.free_m,
+        length=message.length_m,
+        contacts=[Contact(begin=c.from_m, end=c.to_m, where=poses.array3(c.where), depth=c.depth_m, class_id=c.class_id,
+                          unknown=c.unknown) for c in message.contacts],
+        looks=message.looks,
+        epoch=message.epoch)
