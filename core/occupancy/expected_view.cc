@@ -110,7 +110,6 @@ ViewGain ExpectedViews::Look(const Pose& T_map_sensor, const Beams& beams) {
   ViewGain gain;
   for (const Vector3d& beam : beams.directions) {
     const Vector3d direction = T_map_sensor.linear() * beam;
-    double unknown_from_m = max_range_m_;
     WalkVoxels(from,
                from + direction * (max_range_m_ / voxel_m),
                first,
@@ -120,8 +119,6 @@ ViewGain ExpectedViews::Look(const Pose& T_map_sensor, const Beams& beams) {
                  std::uint16_t& mark = seen_.FindOrAdd(BlockOf(at))[NodeInBlock(at)];
                  const std::int16_t odds = reader_.Odds(at);
                  const bool unknown = odds == OccupancyVoxels::kUnknownOdds;
-                 if (unknown) unknown_from_m = std::min(unknown_from_m, range_m);
-                 if (range_m > unknown_from_m + kUnknownReachM) return false;
                  const bool hit = !unknown && odds > 0;
                  if (mark != kTaken && mark != view_ && counted_.Contains(at)) {
                    const std::size_t number = (unknown ? 0 : odds) - least_odds_;

@@ -22,13 +22,12 @@ struct ViewGain {
 };
 
 // Expected information gain of views of a grid (eq. 4.13) with the most likely measurement of each
-// beam: it ends in the first voxel that is occupied with more than 0.5, after kUnknownReachM
-// of unknown space, at the sensor's range, or where the grid's region ends. Unlike eq. 4.13 a
-// voxel counts once a view, however many beams cross it, and the model is the grid's. One thread at
-// a time; many may look at one grid.
+// beam: it ends in the first voxel that is occupied with more than 0.5, at the sensor's range, or
+// where the grid's region ends. Unlike eq. 4.13 a voxel counts once a view, however many beams
+// cross it, and the model is the grid's. Unknown space hides nothing: real views gain less, the
+// order of places is what counts. One thread at a time; many may look at one grid.
 class ExpectedViews {
  public:
-  static constexpr double kUnknownReachM = 5.0;
   static constexpr int kMostEstimateBeams = 2000;
 
   // `grid` must outlive it; only what is in `region` counts. REQUIRES: a valid sensor.
@@ -39,8 +38,7 @@ class ExpectedViews {
   // From kMostEstimateBeams at most; the voxels of each stand for those that the beams around it
   // would cross.
   ViewGain Estimate(const Pose& T_map_sensor);
-  // From all beams. What they cross gains nothing from then on, but it stays as unknown as it was
-  // for where beams end: what one only expects to see does not say what is behind it.
+  // From all beams. What they cross is thought to be known from then on and gains nothing any more.
   ViewGain Take(const Pose& T_map_sensor);
 
  private:

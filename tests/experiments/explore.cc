@@ -247,7 +247,7 @@ bool Evaluate(const std::string& name, const std::vector<Scan>& scans, double vo
 int Main(int argc, char** argv) {
   CLI::App app("Where to look next, on recorded drives");
   std::string only;
-  double voxel_m = 0.3;
+  double voxel_m = 0.6;
   app.add_option("--only", only, "nclt_campus_loop or hall_livox_loop");
   app.add_option("--voxel", voxel_m, "Edge of a voxel [m]");
   CLI11_PARSE(app, argc, argv);

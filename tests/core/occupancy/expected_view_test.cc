@@ -79,15 +79,12 @@ ViewGain StepByStep(const OccupancyVoxels& grid, const FieldOfView& sensor, cons
       const Vector3d along = pose.linear() * Vector3d(std::cos(elevation) * std::cos(azimuth),
                                                       std::cos(elevation) * std::sin(azimuth),
                                                       std::sin(elevation));
-      double unknown_from = 1e9;
       for (double range = 0.0; range < sensor.max_range_m; range += kVoxelM / 60) {
         const Eigen::Vector3i at =
             ((pose.translation() + range * along) / kVoxelM).array().floor().cast<int>();
         if (!grid.Inside(at)) break;
         const double before = reader.Probability(at);
         const bool unknown = reader.Odds(at) == OccupancyVoxels::kUnknownOdds;
-        if (unknown) unknown_from = std::min(unknown_from, range);
-        if (range > unknown_from + ExpectedViews::kUnknownReachM) break;
         const bool hit = before > 0.5;
         if (counted.insert({at.x(), at.y(), at.z()}).second) {
           const double after = OccupancyVoxels::ProbabilityOf(grid.After(reader.Odds(at), hit));
