@@ -89,7 +89,8 @@ const std::multimap<std::string, std::string>& Examples() {
       {"Planning/CheckShape",
        "map: 'world' waypoints { x: -6 y: 0.7 } waypoints { x: -5 y: 1 } clearance_m: 0.1 "
        "shape { xyz: [0, 0, 0.2, 1, 0, 0.2, 0, 1, 0.5] triangles: [0, 1, 2] "
-       "parts { kind: SHAPE_KIND_CYLINDER size { x: 0.3 z: 1 } pose { translation { z: 0.6 } } } }"},
+       "parts { kind: SHAPE_KIND_CYLINDER size { x: 0.3 z: 1 } "
+       "pose { translation { z: 0.6 } } } }"},
       {"Planning/SampleSurfaces", "map: 'world' places { x: -6 y: 0.7 } places { x: 2 y: 2 }"},
       {"Planning/SetProfile", "map: 'world' name: 'slim' profile { radius_m: 0.1 height_m: 0.3 }"},
       {"Planning/ListProfiles", "map: 'world'"},
