@@ -45,6 +45,7 @@
 #include "strata/v1/jobs.grpc.pb.h"
 #include "strata/v1/maps.grpc.pb.h"
 #include "strata/v1/models.grpc.pb.h"
+#include "strata/v1/objects.grpc.pb.h"
 #include "strata/v1/planning.grpc.pb.h"
 #include "strata/v1/posegraph.grpc.pb.h"
 #include "strata/v1/scans.grpc.pb.h"
@@ -118,6 +119,7 @@ class GrpcServer final : public Server {
             &posegraph_,
             &classifiers_,
             &models_,
+            &objects_,
             &health_};
   }
 
@@ -131,6 +133,7 @@ class GrpcServer final : public Server {
   PoseGraphService posegraph_{runtime_};
   ClassifiersService classifiers_{runtime_};
   ModelsService models_{runtime_};
+  ObjectsService objects_{runtime_};
   Health health_{runtime_};
   std::string address_;
   std::unique_ptr<Listener> listener_;
@@ -150,7 +153,8 @@ void SetReady(Health& health, bool ready) {
                               v1::Jobs::service_full_name(),
                               v1::PoseGraph::service_full_name(),
                               v1::Classifiers::service_full_name(),
-                              v1::Models::service_full_name()}) {
+                              v1::Models::service_full_name(),
+                              v1::Objects::service_full_name()}) {
     health.Set(service, ready);
   }
 }

@@ -31,6 +31,8 @@ ARROWS = {
                       "core/geometry", "core/common"],
     "core/classification": ["core/planes", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/collision": ["core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
+    "core/completion": ["core/registration", "core/mesh", "core/world", "core/codec", "core/mls", "core/cloud", "core/geometry",
+                        "core/common"],
     "core/planning": ["core/occupancy", "core/mesh", "core/cloud", "core/world", "core/mls", "core/geometry", "core/common"],
     "core/storage": ["core/world", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/api": ["core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
@@ -58,9 +60,9 @@ STOREYS = {
     "core/planes": ["models", HERE],
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
     "core/storage": ["sqlite", HERE],
-    "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "models", "ingest", "tiles", "scans", "map"],
+    "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "objects", "models", "ingest", "tiles", "scans", "map"],
     "client/formats": ["planes", "foxglove", "bags", "motion", "shapes", HERE, "packets", "survey", "laz", "parsing", "grid"],
-    "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "planes", "egomotion", "job", "heights", "mesh", "picture", "terminal"],
+    "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "planes", "objects", "egomotion", "job", "heights", "mesh", "picture", "terminal"],
 }
 
 # Sources a folder may hold.

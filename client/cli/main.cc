@@ -116,6 +116,7 @@ int Main(int argc, char** argv) {
   AddProfileCommands(commands);
   AddJobCommands(commands);
   AddPlanesCommands(commands);
+  AddObjectsCommands(commands);
   AddLocalizeCommand(commands);
   AddDriveCommand(commands);
   AddEgomotionCommand(commands);

@@ -20,6 +20,7 @@
 #include "client/sdk/remote_jobs.h"
 #include "client/sdk/remote_maps.h"
 #include "client/sdk/remote_models.h"
+#include "client/sdk/remote_objects.h"
 #include "client/sdk/remote_planning.h"
 #include "client/sdk/remote_posegraph.h"
 #include "client/sdk/remote_scans.h"
@@ -88,6 +89,7 @@ class RemoteDatabase final : public api::Database {
   api::PoseGraph& posegraph() override { return posegraph_; }
   api::Classifiers& classifiers() override { return classifiers_; }
   api::Models& models() override { return models_; }
+  api::Objects& objects() override { return objects_; }
 
  private:
   sdk::Connection connection_;
@@ -99,6 +101,7 @@ class RemoteDatabase final : public api::Database {
   sdk::RemotePoseGraph posegraph_{connection_};
   sdk::RemoteClassifiers classifiers_{connection_};
   sdk::RemoteModels models_{connection_};
+  sdk::RemoteObjects objects_{connection_};
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "core/api/jobs.h"
 #include "core/api/maps.h"
 #include "core/api/models.h"
+#include "core/api/objects.h"
 #include "core/api/planning.h"
 #include "core/api/posegraph.h"
 #include "core/api/scans.h"
@@ -27,6 +28,7 @@ class Database {
   virtual PoseGraph& posegraph() = 0;
   virtual Classifiers& classifiers() = 0;
   virtual Models& models() = 0;
+  virtual Objects& objects() = 0;
 };
 
 }  // namespace strata::api

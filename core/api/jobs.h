@@ -26,9 +26,9 @@ class Jobs {
   virtual ~Jobs() = default;
 
   // Kinds and their parameters: core/world/job_kinds.h. INVALID_ARGUMENT for an unknown kind or
-  // parameter, or a value out of its bounds; NOT_FOUND, ALREADY_EXISTS for a classifier that it
-  // names; FAILED_PRECONDITION for "fade" or "planes" of a map that drops points;
-  // RESOURCE_EXHAUSTED while 100 jobs of the map wait, or 50 of this client.
+  // parameter, or a value out of its bounds; NOT_FOUND, ALREADY_EXISTS for a classifier or class
+  // that it names; FAILED_PRECONDITION for "fade", "planes" or "objects" of a map that drops
+  // points; RESOURCE_EXHAUSTED while 100 jobs of the map wait, or 50 of this client.
   virtual absl::StatusOr<JobInfo> Start(const Call& call,
                                         absl::string_view map,
                                         absl::string_view kind,

@@ -37,6 +37,10 @@ absl::string_view NameOf(BlobKind kind) {
       return "plane model";
     case BlobKind::kModelPlane:
       return "plane of a model";
+    case BlobKind::kEntities:
+      return "entities";
+    case BlobKind::kEntity:
+      return "entity";
   }
   return "blob";
 }

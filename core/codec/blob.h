@@ -20,6 +20,8 @@ enum class BlobKind : std::uint32_t {  // stored
   kLabels = 0x31424C53,                // "SLB1"
   kPlaneModel = 0x314D5053,            // "SPM1"
   kModelPlane = 0x31504D53,            // "SMP1"
+  kEntities = 0x31485345,              // "ESH1"
+  kEntity = 0x31544E45,                // "ENT1"
 };
 
 // Bytes that the envelope adds to a body.

@@ -10,6 +10,7 @@
 #include "core/engine/doors/jobs.h"
 #include "core/engine/doors/maps.h"
 #include "core/engine/doors/models.h"
+#include "core/engine/doors/objects.h"
 #include "core/engine/doors/planning.h"
 #include "core/engine/doors/posegraph.h"
 #include "core/engine/doors/scans.h"
@@ -31,6 +32,7 @@ class Engine final : public api::Database, public NumbersSource {
   api::PoseGraph& posegraph() override { return posegraph_; }
   api::Classifiers& classifiers() override { return classifiers_; }
   api::Models& models() override { return models_; }
+  api::Objects& objects() override { return objects_; }
   EngineNumbers Numbers() override { return maps_->Numbers(); }
   EngineHealth Health() override { return maps_->Health(); }
 
@@ -43,6 +45,7 @@ class Engine final : public api::Database, public NumbersSource {
   EnginePoseGraph posegraph_{*maps_};
   EngineClassifiers classifiers_{*maps_};
   EngineModels models_{*maps_};
+  EngineObjects objects_{*maps_};
 };
 
 }  // namespace

@@ -128,6 +128,12 @@ struct Attempt {
   bool under_way = false;
 };
 
+// One of the parts of what a job found.
+struct EntityPart {
+  std::uint64_t part = 0;
+  std::string bytes;
+};
+
 // What global consistency keeps of a scan in its own frame, so that it need not be made twice;
 // empty: not made yet.
 struct ScanView {

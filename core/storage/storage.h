@@ -112,6 +112,13 @@ class StorageReader {
                                                                         std::uint64_t part) = 0;
   // The job whose model is kept; 0: none.
   virtual absl::StatusOr<std::uint64_t> JobOfPlaneModel() = 0;
+  // The first part after `after` that is kept of the entities that a job found, and its number:
+  // part 0 is what holds of all of them, the others are one each. nullopt: no more, or of another
+  // job.
+  virtual absl::StatusOr<std::optional<EntityPart>> FindEntityPart(
+      std::uint64_t job, std::optional<std::uint64_t> after) = 0;
+  // The job whose entities are kept; 0: none.
+  virtual absl::StatusOr<std::uint64_t> JobOfEntities() = 0;
   // Scan ↔ tile relation of integrated scans, level 0, each in ascending order.
   virtual absl::StatusOr<std::vector<ScanNumber>> ScansOfTile(const TileKey& key) = 0;
   virtual absl::StatusOr<std::vector<TileKey>> TilesOfScan(ScanNumber number) = 0;
@@ -228,6 +235,11 @@ class StorageWriter {
                                          std::uint64_t part,
                                          absl::string_view bytes) = 0;
   virtual absl::Status DeletePlaneModel() = 0;
+  // DeleteScan() of the last of `scans` deletes it.
+  virtual absl::Status PutEntityPart(std::uint64_t job,
+                                     const EntityPart& part,
+                                     const std::vector<ScanNumber>& scans) = 0;
+  virtual absl::Status DeleteEntities() = 0;
   // Rows newer than the current version: an unfinished rebuild.
   virtual absl::Status DiscardUnpublished() = 0;
   virtual absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) = 0;

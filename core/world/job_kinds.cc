@@ -99,6 +99,16 @@ std::vector<JobParameter> PlanesParameters() {
   };
 }
 
+std::vector<JobParameter> ObjectsParameters() {
+  return {
+      {"class", NameType(), "", "Only this class, by name or number; default: all"},
+      {"region", BoxType(), "", "Only this part of the map [m]; default: all of it"},
+      {"distance_m", RealType{0.0, 4.0}, "0", "Nearer is one [m]; 0: three times the spacing"},
+      {"voxel_m", RealType{0.01, 1.0}, "0.05", "Points in such a cube count as one [m]"},
+      {"min_points", WholeType{1, 1'000'000'000}, "50", "Fewer are no entity"},
+  };
+}
+
 std::vector<JobKind> MakeJobKinds() {
   return {
       {kRebuildJob, "All derived data again from the scans.", {Threads()}},
@@ -114,6 +124,7 @@ std::vector<JobKind> MakeJobKinds() {
        "Points through whose place later scans looked leave the tiles.",
        FadeParameters()},
       {kPlanesJob, "The walls, floors and slopes of the map as polygons.", PlanesParameters()},
+      {kObjectsJob, "The things that points with a class make up.", ObjectsParameters()},
   };
 }
 

@@ -67,6 +67,13 @@ v1::Box2 ToProto(const Eigen::AlignedBox2d& box) {
   return proto;
 }
 
+v1::Box3 ToProto(const Eigen::AlignedBox3d& box) {
+  v1::Box3 proto;
+  *proto.mutable_min() = ToProto(box.min());
+  *proto.mutable_max() = ToProto(box.max());
+  return proto;
+}
+
 google::protobuf::Timestamp ToProto(absl::Time time) {
   google::protobuf::Timestamp proto;
   const timespec parts = absl::ToTimespec(time);
@@ -111,6 +118,15 @@ absl::StatusOr<Eigen::AlignedBox2d> FromProto(absl::string_view what, const v1::
   if ((min.array() <= max.array()).all()) return Eigen::AlignedBox2d(min, max);
   return absl::InvalidArgumentError(absl::StrCat(
       what, ": min (", min.x(), ", ", min.y(), ") is above max (", max.x(), ", ", max.y(), ")"));
+}
+
+absl::StatusOr<Eigen::AlignedBox3d> FromProto(absl::string_view what, const v1::Box3& box) {
+  STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d min,
+                          FromProto(absl::StrCat(what, ".min"), box.min()));
+  STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d max,
+                          FromProto(absl::StrCat(what, ".max"), box.max()));
+  if ((min.array() <= max.array()).all()) return Eigen::AlignedBox3d(min, max);
+  return absl::InvalidArgumentError(absl::StrCat(what, ": a number of min is above that of max"));
 }
 
 absl::StatusOr<absl::Time> FromProto(absl::string_view what,

@@ -21,6 +21,7 @@ v1::Vector2 ToProto(const Eigen::Vector2d& v);
 v1::Vector3 ToProto(const Eigen::Vector3d& v);
 v1::Pose ToProto(const Pose& T);
 v1::Box2 ToProto(const Eigen::AlignedBox2d& box);
+v1::Box3 ToProto(const Eigen::AlignedBox3d& box);
 google::protobuf::Timestamp ToProto(absl::Time time);
 // Row by row.
 google::protobuf::RepeatedField<double> ToProto(const Matrix6d& matrix);
@@ -32,6 +33,7 @@ absl::StatusOr<Eigen::Vector3d> FromProto(absl::string_view what, const v1::Vect
 // the bit.
 absl::StatusOr<Pose> FromProto(absl::string_view what, const v1::Pose& pose);
 absl::StatusOr<Eigen::AlignedBox2d> FromProto(absl::string_view what, const v1::Box2& box);
+absl::StatusOr<Eigen::AlignedBox3d> FromProto(absl::string_view what, const v1::Box3& box);
 absl::StatusOr<absl::Time> FromProto(absl::string_view what,
                                      const google::protobuf::Timestamp& time);
 absl::StatusOr<Matrix6d> FromProto(absl::string_view what,

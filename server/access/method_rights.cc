@@ -68,6 +68,7 @@ constexpr std::array kTable = {
     MethodRight{"Classifiers.Export", kRead, "map"},
     MethodRight{"Classifiers.Import", kWrite, "start.map"},
     MethodRight{"Models.GetPlaneModel", kRead, "map"},
+    MethodRight{"Objects.ListEntities", kRead, "map"},
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// strata.v1.Models over api::Models.
+// strata.v1.Models over api::Models, strata.v1.Objects over api::Objects.
 #ifndef STRATA_SERVER_SERVICES_MODELS_SERVICE_H_
 #define STRATA_SERVER_SERVICES_MODELS_SERVICE_H_
 
@@ -11,6 +11,12 @@ namespace strata::server {
 class ModelsService final : public Service {
  public:
   explicit ModelsService(Runtime& runtime);
+};
+
+// Thread-safe.
+class ObjectsService final : public Service {
+ public:
+  explicit ObjectsService(Runtime& runtime);
 };
 
 }  // namespace strata::server

@@ -20,6 +20,7 @@
 #include "proto/translate/localize.h"
 #include "proto/translate/maps.h"
 #include "proto/translate/models.h"
+#include "proto/translate/objects.h"
 #include "proto/translate/planning.h"
 #include "proto/translate/points.h"
 #include "proto/translate/posegraph.h"
@@ -114,6 +115,9 @@ const auto& Kinds() {
       KindOf<v1::CheckShapeResponse>(),
       KindOf<v1::ModelPlane>(),
       KindOf<v1::PlaneModel>(),
+      KindOf<v1::Entity>(),
+      KindOf<v1::EntitySearch>(),
+      KindOf<v1::ListEntitiesRequest>(),
       KindOf<v1::PointChunk>(),
       KindOf<v1::PoseNode>(),
       KindOf<v1::Constraint>(),

@@ -95,6 +95,8 @@ const std::multimap<std::string, std::string>& Examples() {
       {"Planning/SetProfile", "map: 'world' name: 'slim' profile { radius_m: 0.1 height_m: 0.3 }"},
       {"Planning/ListProfiles", "map: 'world'"},
       {"Models/GetPlaneModel", "map: 'world'"},
+      {"Objects/ListEntities",
+       "map: 'world' class_id: 2 region { min { x: -9 y: -9 z: -9 } max { x: 9 y: 9 z: 9 } }"},
       {"PoseGraph/Get", "map: 'world'"},
       {"PoseGraph/SetPose",
        "map: 'world' id { trajectory: 'world' sequence: 2 } "
@@ -317,6 +319,7 @@ const std::vector<Story>& Stories() {
        {"Jobs/Start", "map: 'world' kind: 'verify'"}},
       {{"Scans/Delete", "map: 'world' id { trajectory: 'world' sequence: 2 }"},
        {"Models/GetPlaneModel", "map: 'world'"},
+       {"Objects/ListEntities", "map: 'world'"},
        {"PoseGraph/Get", "map: 'world'"},
        {"Jobs/Start", "map: 'world' kind: 'rebuild'"},
        {"Tiles/Fetch", "map: 'world' area { epoch: 1 }"},

@@ -23,8 +23,8 @@ namespace {
 constexpr char kOtherMap[] = "other";
 constexpr std::uint64_t kLabelledScans = 12;
 constexpr absl::Duration kPatience = absl::Seconds(6);  // with one job
-constexpr std::array<const char*, 7> kKinds = {
-    "optimize", "fade", "verify", "train", "classify", "planes", "rebuild"};
+constexpr std::array<const char*, 8> kKinds = {
+    "optimize", "fade", "verify", "train", "classify", "planes", "objects", "rebuild"};
 
 // Of a scan that labels are written to; what else happens to scans leaves it alone.
 ScanId LabelledScan(std::uint64_t i) { return YardScan(1 + static_cast<int>(i % 4), 1 + i / 4); }

@@ -38,6 +38,7 @@ class ServedDatabase final : public api::Database {
   api::PoseGraph& posegraph() override { return client_->posegraph(); }
   api::Classifiers& classifiers() override { return client_->classifiers(); }
   api::Models& models() override { return client_->models(); }
+  api::Objects& objects() override { return client_->objects(); }
 
  private:
   // In the order they need each other.

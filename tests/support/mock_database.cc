@@ -35,6 +35,9 @@ MockClassifiers::~MockClassifiers() = default;
 MockModels::MockModels() = default;
 MockModels::~MockModels() = default;
 
+MockObjects::MockObjects() = default;
+MockObjects::~MockObjects() = default;
+
 MockDatabase::MockDatabase() = default;
 MockDatabase::~MockDatabase() = default;
 

@@ -305,6 +305,17 @@ class MockModels : public api::Models {
               (override));
 };
 
+class MockObjects : public api::Objects {
+ public:
+  MockObjects();
+  ~MockObjects() override;
+
+  MOCK_METHOD(absl::StatusOr<EntitiesInfo>,
+              ListEntities,
+              (const api::Call&, absl::string_view, const EntityQuery&, Sink<Entity>),
+              (override));
+};
+
 // Calls nobody decided on answer UNKNOWN (gmock's default of a StatusOr).
 class MockDatabase : public api::Database {
  public:
@@ -319,6 +330,7 @@ class MockDatabase : public api::Database {
   ::testing::NiceMock<MockPoseGraph>& posegraph() override { return posegraph_; }
   ::testing::NiceMock<MockClassifiers>& classifiers() override { return classifiers_; }
   ::testing::NiceMock<MockModels>& models() override { return models_; }
+  ::testing::NiceMock<MockObjects>& objects() override { return objects_; }
 
  private:
   ::testing::NiceMock<MockMaps> maps_;
@@ -329,6 +341,7 @@ class MockDatabase : public api::Database {
   ::testing::NiceMock<MockPoseGraph> posegraph_;
   ::testing::NiceMock<MockClassifiers> classifiers_;
   ::testing::NiceMock<MockModels> models_;
+  ::testing::NiceMock<MockObjects> objects_;
 };
 
 }  // namespace strata::testing

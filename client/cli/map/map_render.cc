@@ -20,6 +20,7 @@
 #include "client/cli/map/floor_files.h"
 #include "client/cli/map/map_files.h"
 #include "client/cli/map/tile_source.h"
+#include "client/cli/objects/fetched_entities.h"
 #include "client/cli/picture/map_picture.h"
 #include "client/cli/posegraph/graph_overlay.h"
 #include "client/cli/terminal/arguments.h"
@@ -45,6 +46,7 @@ struct RenderOptions {
   FloorOptions floor;
   bool trajectories = false;
   bool constraints = false;
+  bool objects = false;
   picture::PictureOptions picture;
 };
 
@@ -60,6 +62,11 @@ std::int32_t LevelFor(const MapStats& stats,
 
 absl::StatusOr<picture::Overlay> OverlayOf(Context& context, const RenderOptions& options) {
   picture::Overlay overlay;
+  if (options.objects) {
+    STRATA_ASSIGN_OR_RETURN(const FetchedEntities entities,
+                            FetchEntities(context, options.map, {}, ""));
+    AddEntities(entities, overlay);
+  }
   if (!options.trajectories && !options.constraints) return overlay;
   STRATA_ASSIGN_OR_RETURN(const api::PoseGraphState state,
                           context.database.posegraph().Get(context.call, options.map));
@@ -236,6 +243,9 @@ void AddMapRender(Commands& commands, CLI::App* noun) {
   render->add_flag("--constraints",
                    options->constraints,
                    "What holds the scans together, coloured by how well the poses keep it");
+  render->add_flag("--objects",
+                   options->objects,
+                   "The boxes of the things that objects find found, in the colours of classes");
   render->add_option("--layer", options->layer, "What the colours of surfaces say")
       ->check(CLI::IsMember({"traversability", "class", "colour"}))
       ->capture_default_str();

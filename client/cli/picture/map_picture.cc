@@ -362,6 +362,17 @@ void DrawAxes(Image& image, const Camera& camera) {
   }
 }
 
+// To the right of and above their places.
+void DrawNames(Image& image, const Camera& camera, int width, int height, const Overlay& overlay) {
+  for (const PlaceName& name : overlay.names) {
+    const Vector3d pixel = camera.Project(name.at);
+    const int x = static_cast<int>(std::lround(0.5 * width + pixel.x())) + 4;
+    const int y = static_cast<int>(std::lround(0.5 * height + pixel.y())) - 9;
+    if (x < 0 || y < 0 || x >= width || y + 7 >= height) continue;
+    DrawText(image, x, y, 1, name.name, kInk);
+  }
+}
+
 }  // namespace
 
 Picture DrawMap(const std::vector<SurfaceTile>& tiles,
@@ -391,6 +402,7 @@ Picture DrawMap(const std::vector<SurfaceTile>& tiles,
   const Image map = raster.Finish();
   picture.image = Image(options.width, options.height, kBackground);
   std::copy(map.pixels.begin(), map.pixels.end(), picture.image.pixels.begin());
+  DrawNames(picture.image, picture.camera, options.width, options.height - kLegendPixels, overlay);
   DrawAxes(picture.image, picture.camera);
   DrawColumnLegend(picture.image, ClassEntries(tiles, options), overlay);
   DrawLegend(picture.image, picture.camera, !options.classes.has_value() && !options.own_colours);

@@ -37,9 +37,16 @@ struct Stroke {
   bool dashed = false;
 };
 
+// A word over the map, beside a place of it; what DrawText() has letters for.
+struct PlaceName {
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();
+  std::string name;
+};
+
 // What is drawn over a map beside paths, and what it means: a column in the upper left corner.
 struct Overlay {
-  std::vector<Stroke> strokes;  // above the map, later ones above earlier ones
+  std::vector<Stroke> strokes;   // above the map, later ones above earlier ones
+  std::vector<PlaceName> names;  // above them
   std::vector<std::pair<Colour, std::string>> legend;
 };
 

@@ -92,6 +92,7 @@ void AddExploreCommand(Commands& commands);
 void AddProfileCommands(Commands& commands);
 void AddJobCommands(Commands& commands);
 void AddPlanesCommands(Commands& commands);
+void AddObjectsCommands(Commands& commands);
 void AddLocalizeCommand(Commands& commands);
 void AddDriveCommand(Commands& commands);
 void AddEgomotionCommand(Commands& commands);

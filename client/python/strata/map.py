@@ -7,10 +7,10 @@ import time as clock
 
 import numpy as np
 
-from strata import errors, exploration, floors, heights, job, mesh, plan, planes, poses, scan, shape, tracking
+from strata import errors, exploration, floors, heights, job, mesh, objects, plan, planes, poses, scan, shape, tracking
 from strata.tiles import SURFACE, TILE_CELLS, TileKey, decode_tile
 from strata.v1 import (geometry_pb2, jobs_pb2, jobs_pb2_grpc, maps_pb2, maps_pb2_grpc, models_pb2, models_pb2_grpc,
-                       planning_pb2, planning_pb2_grpc, posegraph_pb2_grpc, scans_pb2, scans_pb2_grpc, tiles_pb2, tiles_pb2_grpc)
+                       objects_pb2, objects_pb2_grpc, planning_pb2, planning_pb2_grpc, posegraph_pb2_grpc, scans_pb2, scans_pb2_grpc, tiles_pb2, tiles_pb2_grpc)
 
 _MAX_PLACES = 10_000
 _TILE_LIMIT = 1 << 31
@@ -84,6 +84,7 @@ class Map:
         self._planning = planning_pb2_grpc.PlanningStub(connection.channel)
         self._jobs = jobs_pb2_grpc.JobsStub(connection.channel)
         self._models = models_pb2_grpc.ModelsStub(connection.channel)
+        self._objects = objects_pb2_grpc.ObjectsStub(connection.channel)
         self._posegraph = posegraph_pb2_grpc.PoseGraphStub(connection.channel)
         self._lock = threading.Lock()
         self._last_sequence = {}
@@ -360,6 +361,18 @@ class Map:
         """
         request = models_pb2.GetPlaneModelRequest(map=self.name)
         return planes.from_proto(self._connection.collected(self._models.GetPlaneModel, request))
+
+    def objects(self, class_id=0, region=None):
+        """Entities: the things that the last job "objects" found; NotFound before there was one.
+
+        class_id: only those of this class; 0: of every class. region: only those that reach into (x0, y0, x1, y1) or
+        (x0, y0, z0, x1, y1, z1), map frame [m].
+
+            campus.job("objects", **{"class": "car"})
+            long = [car for car in campus.objects() if car.size[0] > 5]
+        """
+        request = objects_pb2.ListEntitiesRequest(map=self.name, class_id=class_id, region=objects.box_to_proto(region))
+        return objects.from_proto(self._connection.collected(self._objects.ListEntities, request))
 
     def _named_profile(self, name):
         profiles = self.profiles()

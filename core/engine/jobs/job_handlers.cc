@@ -13,6 +13,7 @@
 #include "core/engine/labels/fade.h"
 #include "core/engine/labels/train.h"
 #include "core/engine/models/plane_models.h"
+#include "core/engine/objects/entities.h"
 #include "core/engine/repair/rebuild.h"
 #include "core/world/job_kinds.h"
 
@@ -25,6 +26,13 @@ absl::Status NeedsPoints(MapCore& core, const JobArguments&) {
   if (core.info().parameters.keep_points) return absl::OkStatus();
   return absl::FailedPreconditionError(
       "the map drops points, and the job looks at them and along the rays to them");
+}
+
+absl::Status NeedsPointsAndClass(MapCore& core, const JobArguments& arguments) {
+  if (core.info().parameters.keep_points) return CheckObjectsJob(core, arguments);
+  return absl::FailedPreconditionError(
+      "the map drops points after their integration, and objects are found in points; make a map "
+      "that keeps them (map create without --drop-points) and import the scans again");
 }
 
 absl::Status NeedsClassifier(MapCore& core, const JobArguments& arguments) {
@@ -86,6 +94,10 @@ absl::Status RunPlanes(const JobRun& run) {
   return RunPlanesJob(run.core, run.job, run.arguments, run.context);
 }
 
+absl::Status RunObjects(const JobRun& run) {
+  return RunObjectsJob(run.core, run.job, run.arguments, run.context);
+}
+
 absl::Status RunFade(const JobRun& run) {
   return RunFadeJob(run.core, run.worker, run.arguments, run.context);
 }
@@ -103,6 +115,7 @@ const std::vector<JobHandler>& JobHandlers() {
       {kEvaluateJob, NeedsClassifier, RunEvaluate},
       {kFadeJob, NeedsPoints, RunFade},
       {kPlanesJob, NeedsPoints, RunPlanes},
+      {kObjectsJob, NeedsPointsAndClass, RunObjects},
   };
   return *handlers;
 }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -142,6 +143,36 @@ absl::StatusOr<PosedPoints> SquarePoints::Load(std::size_t i, const Stop& stop) 
   return std::move(thinned.points);
 }
 
+absl::Status SquarePoints::ForEachLabelled(
+    std::size_t i,
+    double margin_m,
+    const Stop& stop,
+    absl::FunctionRef<absl::Status(ScanNumber, std::span<const LabelledPoint>)> use) {
+  const Eigen::Vector2d margin(margin_m, margin_m);
+  const PlanSquare around(squares_[i].min() - margin, squares_[i].max() + margin);
+  for (const std::size_t scan : scans_around_.at(places_[i])) {
+    const PlacedScan& placed = scans_[scan];
+    const Eigen::Vector3d at = placed.T_map_scan.translation();
+    std::vector<LabelledPoint> points;
+    const absl::Status done = ForEachPart(scan, stop, [&](const ScanPoints& part) {
+      for (std::size_t k = 0; k < part.points.size(); ++k) {
+        const Eigen::Vector3d p = at + part.points[k].cast<double>();
+        if (!around.contains(p.head<2>())) continue;
+        if (choice_.region.has_value() && !choice_.region->contains(p)) continue;
+        points.push_back({p, part.label[k]});
+      }
+    });
+    if (!done.ok()) {
+      STRATA_ASSIGN_OR_RETURN(const bool leave_out, MayLeaveOut(placed, done));
+      if (!leave_out) return done;
+      continue;
+    }
+    loaded_ += points.size();
+    STRATA_RETURN_IF_ERROR(use(placed.scan.number, points));
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<bool> SquarePoints::MayLeaveOut(const PlacedScan& placed, const absl::Status& why) {
   if (absl::IsFailedPrecondition(why)) return true;  // its points were dropped meanwhile
   if (!absl::IsDataLoss(why) && !absl::IsNotFound(why)) return false;
@@ -163,8 +194,10 @@ absl::Status SquarePoints::ForEachPart(std::size_t scan,
     if (!hold) return;  // otherwise the part is all of it
     part.points.shrink_to_fit();
     part.colour.shrink_to_fit();
+    part.label.shrink_to_fit();
     const std::size_t bytes = part.points.size() * sizeof(part.points[0]) +
-                              part.colour.size() * sizeof(part.colour[0]) + kHeldBytes;
+                              part.colour.size() * sizeof(part.colour[0]) +
+                              part.label.size() * sizeof(part.label[0]) + kHeldBytes;
     held_.Put(scan, std::make_shared<const ScanPoints>(std::move(part)), bytes);
   });
 }
@@ -185,8 +218,10 @@ absl::Status SquarePoints::Decode(const PlacedScan& placed,
     for (std::size_t i = 0; i < block.size(); ++i) {
       if (!source.faded().empty() && source.faded()[i] != 0) continue;
       if (!sensor.Takes((block.points[i] - block.sensor_origin).norm())) continue;
+      if (choice_.labels && (block.label.empty() || block.label[i] == 0)) continue;
       part.points.push_back((turn * block.points[i].cast<double>()).cast<float>());
       if (choice_.colour) part.colour.push_back(block.colour[i]);
+      if (choice_.labels) part.label.push_back(block.label[i]);
     }
     body(std::move(part));
     return absl::OkStatus();

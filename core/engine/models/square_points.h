@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,7 @@
 #include "core/cloud/point_cloud.h"
 #include "core/common/lru_cache.h"
 #include "core/common/stop.h"
+#include "core/completion/square_voxels.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/scans/damaged_scans.h"
 #include "core/geometry/pose.h"
@@ -37,6 +39,7 @@ inline constexpr std::size_t kMostSquarePoints = 4'000'000;
 // Which points.
 struct PointChoice {
   bool colour = false;                        // only of scans with colours, and those, too
+  bool labels = false;                        // only those with a class, and that, too
   std::optional<Eigen::AlignedBox3d> region;  // in the map
 };
 
@@ -60,6 +63,14 @@ class SquarePoints {
   // The points in square `i` and around it, but those that have faded. Of scans that were deleted
   // meanwhile, lost their points or are damaged there are none.
   absl::StatusOr<PosedPoints> Load(std::size_t i, const Stop& stop);
+
+  // The same where choice.labels, scan by scan: the points in square `i` and up to `margin_m` <=
+  // kSquareMarginM around it, all of a scan at once.
+  absl::Status ForEachLabelled(
+      std::size_t i,
+      double margin_m,
+      const Stop& stop,
+      absl::FunctionRef<absl::Status(ScanNumber, std::span<const LabelledPoint>)> use);
 
   // Those that reach into the region.
   std::uint64_t scans() const { return reaching_; }
@@ -85,7 +96,8 @@ class SquarePoints {
   // Points that count, turned as the map is, from where the scan was.
   struct ScanPoints {
     std::vector<Eigen::Vector3f> points;
-    std::vector<Colour> colour;  // of each, where colours count
+    std::vector<Colour> colour;        // of each, where colours count
+    std::vector<std::uint16_t> label;  // of each, where labels count
   };
 
   // Whether any of them reaches into the region.

@@ -264,6 +264,15 @@ CREATE TABLE IF NOT EXISTS derived_plane_model (
   bytes BLOB NOT NULL,
   PRIMARY KEY (job, part)
 ) STRICT;
+CREATE TABLE IF NOT EXISTS derived_entity (
+  job INTEGER NOT NULL, part INTEGER NOT NULL,
+  bytes BLOB NOT NULL,
+  PRIMARY KEY (job, part)
+) STRICT;
+CREATE TABLE IF NOT EXISTS derived_entity_scan (
+  scan INTEGER NOT NULL, part INTEGER NOT NULL,
+  PRIMARY KEY (scan, part)
+) STRICT, WITHOUT ROWID;
 )sql";
 
 // Neither truth nor derived: what was under way when a process died (FORMAT.md). Programs that do

@@ -114,6 +114,25 @@ absl::Status SqliteWriter::PutPlaneModelPart(std::uint64_t job,
 
 absl::Status SqliteWriter::DeletePlaneModel() { return RunSql("DELETE FROM derived_plane_model"); }
 
+absl::Status SqliteWriter::PutEntityPart(std::uint64_t job,
+                                         const EntityPart& part,
+                                         const std::vector<ScanNumber>& scans) {
+  STRATA_RETURN_IF_ERROR(RunSql("INSERT INTO derived_entity (job, part, bytes) VALUES (?1, ?2, ?3)",
+                                job,
+                                part.part,
+                                Blob{part.bytes}));
+  for (const ScanNumber scan : scans) {
+    STRATA_RETURN_IF_ERROR(
+        RunSql("INSERT INTO derived_entity_scan (part, scan) VALUES (?1, ?2)", part.part, scan));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SqliteWriter::DeleteEntities() {
+  STRATA_RETURN_IF_ERROR(RunSql("DELETE FROM derived_entity_scan"));
+  return RunSql("DELETE FROM derived_entity");
+}
+
 absl::Status SqliteWriter::DiscardUnpublished() {
   STRATA_RETURN_IF_ERROR(
       RunSql("DELETE FROM derived_mls_tile WHERE version > (SELECT tile_version FROM "

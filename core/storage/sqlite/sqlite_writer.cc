@@ -192,6 +192,10 @@ absl::Status SqliteWriter::DeleteScan(ScanNumber number) {
                           "DELETE FROM truth_proposed_pose WHERE scan = ?1",
                           "DELETE FROM truth_constraint WHERE scan_i = ?1 OR scan_j = ?1",
                           "DELETE FROM truth_plane_support WHERE scan = ?1",
+                          "DELETE FROM derived_entity WHERE part IN (SELECT part FROM "
+                          "derived_entity_scan WHERE scan = ?1) AND part NOT IN (SELECT part FROM "
+                          "derived_entity_scan WHERE scan <> ?1)",
+                          "DELETE FROM derived_entity_scan WHERE scan = ?1",
                           "DELETE FROM derived_scan_view WHERE scan = ?1",
                           "DELETE FROM derived_scan_tile WHERE scan = ?1",
                           "DELETE FROM derived_footprint WHERE scan = ?1",

@@ -80,6 +80,10 @@ class SqliteWriter final : public StorageWriter {
                                  std::uint64_t part,
                                  absl::string_view bytes) override;
   absl::Status DeletePlaneModel() override;
+  absl::Status PutEntityPart(std::uint64_t job,
+                             const EntityPart& part,
+                             const std::vector<ScanNumber>& scans) override;
+  absl::Status DeleteEntities() override;
   absl::Status DiscardUnpublished() override;
   absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) override;
   absl::Status SetFootprint(ScanNumber number, const Eigen::AlignedBox2d& footprint) override;

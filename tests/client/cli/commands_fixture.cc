@@ -27,6 +27,7 @@ absl::Status CommandsTest::Run(std::vector<std::string> words, OutputFormat form
   AddJobCommands(commands);
   AddPosegraphCommands(commands);
   AddPlanesCommands(commands);
+  AddObjectsCommands(commands);
   AddLocalizeCommand(commands);
   AddPlanCommand(commands);
   AddSurfaceCommand(commands);

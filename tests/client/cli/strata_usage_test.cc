@@ -63,6 +63,10 @@ TEST_F(StrataUsageTest, EveryCommandHasHelpWithAnExample) {
                                              "pose lookup",
                                              "localize",
                                              "planes list",
+                                             "objects find",
+                                             "objects list",
+                                             "objects show",
+                                             "objects export",
                                              "posegraph show",
                                              "posegraph add-constraint",
                                              "posegraph remove-constraint",
@@ -116,8 +120,16 @@ TEST_F(StrataUsageTest, WrongUsageExitsWithTwo) {
 }
 
 TEST_F(StrataUsageTest, NounsAndTheProgramHaveHelpWithAnExample) {
-  for (const std::string noun :
-       {"map", "scan", "pose", "tile", "profile", "job", "posegraph", "planes", "path"}) {
+  for (const std::string noun : {"map",
+                                 "scan",
+                                 "pose",
+                                 "tile",
+                                 "profile",
+                                 "job",
+                                 "posegraph",
+                                 "planes",
+                                 "objects",
+                                 "path"}) {
     EXPECT_THAT(RunStrata({noun, "--help"}).out, HasSubstr("Example:\n  strata " + noun));
   }
   EXPECT_THAT(RunStrata({"--help"}).out,

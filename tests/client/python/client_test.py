@@ -334,6 +334,29 @@ class PlanesTest(ServerTest):
         self.assertEqual(model.epoch, 1)
 
 
+class ObjectsTest(ServerTest):
+    def test_things_have_boxes(self):
+        world = self.db.create_map("crates")
+        with self.assertRaises(strata.NotFound):
+            world.objects()
+        floor = grid((-3, 3), (-3, 3)) - (0, 0, 1)
+        _, y, z = grid((-0.5, 0.5), (0, 1), lambda x, y: x).T
+        crate = np.stack([np.full_like(y, 1.5), y, z], axis=1)
+        labels = np.concatenate([np.full(len(floor), 1), np.full(len(crate), 2)])
+        world.upload(np.concatenate([floor, crate]), labels=labels, align=False)
+        world.wait(timeout=60)
+        self.assertEqual(world.job("objects").metrics["entities"], 2)
+        things = world.objects()
+        self.assertEqual([thing.class_id for thing in things], [1, 2])
+        found, = world.objects(class_id=2, region=(1, -1, 2, 2))
+        self.assertAlmostEqual(found.centre[0], 1.5, delta=0.01)
+        self.assertAlmostEqual(found.size[0], 1, delta=0.1)
+        self.assertEqual(sum(found.scans.values()), found.points)
+        self.assertEqual(len(world.objects(region=(100, 100, 0, 101, 101, 1))), 0)
+        self.assertGreater(things.distances[2], 0.05)
+        self.assertEqual(things.epoch, 1)
+
+
 class ReadmeTest(ServerTest):
     def test_its_example_runs(self):
         example, = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)

@@ -592,6 +592,36 @@ TEST_F(StorageContractTest, APlaneModelIsKeptUntilTheNextAndNoPartOfAnotherIsFou
   EXPECT_THAT(reader().JobOfPlaneModel(), IsOkAndHolds(0U));
 }
 
+TEST_F(StorageContractTest, AnEntityGoesWithTheLastScanThatSawIt) {
+  EXPECT_THAT(reader().JobOfEntities(), IsOkAndHolds(0U));
+  const ScanNumber one = Put(1);
+  const ScanNumber two = Put(2);
+  const auto put = [&](std::uint64_t job) {
+    return Commit([&]() -> absl::Status {
+      STRATA_RETURN_IF_ERROR(writer().DeleteEntities());
+      STRATA_RETURN_IF_ERROR(writer().PutEntityPart(job, {0, "head"}, {}));
+      STRATA_RETURN_IF_ERROR(writer().PutEntityPart(job, {1, "both"}, {one, two}));
+      return writer().PutEntityPart(job, {2, "first"}, {one});
+    });
+  };
+  STRATA_ASSERT_OK(put(7));
+  STRATA_ASSERT_OK(put(9));
+  Reopen();
+  EXPECT_THAT(reader().JobOfEntities(), IsOkAndHolds(9U));
+  EXPECT_FALSE(reader().FindEntityPart(7, std::nullopt)->has_value());
+  EXPECT_EQ((*reader().FindEntityPart(9, std::nullopt))->bytes, "head");
+  EXPECT_EQ((*reader().FindEntityPart(9, 0))->bytes, "both");
+  EXPECT_EQ((*reader().FindEntityPart(9, 1))->bytes, "first");
+  EXPECT_FALSE(reader().FindEntityPart(9, 2)->has_value());
+  STRATA_ASSERT_OK(Commit([&] { return writer().DeleteScan(one); }));
+  EXPECT_EQ((*reader().FindEntityPart(9, std::nullopt))->bytes, "head");
+  EXPECT_EQ((*reader().FindEntityPart(9, 0))->bytes, "both");
+  EXPECT_FALSE(reader().FindEntityPart(9, 1)->has_value());
+  STRATA_ASSERT_OK(Commit([&] { return writer().DeleteScan(two); }));
+  EXPECT_FALSE(reader().FindEntityPart(9, 0)->has_value());
+  EXPECT_THAT(reader().JobOfEntities(), IsOkAndHolds(9U));
+}
+
 TEST_F(StorageContractTest, FullStoreIsAnErrorAndLosesNothing) {
   Put(1);
   Reopen({.max_file_bytes = 400'000});

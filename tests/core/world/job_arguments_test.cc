@@ -96,6 +96,11 @@ std::vector<Expected> AllParameters() {
       {"planes", "max_planes", "500", {"1", "10000"}, {"0", "10001"}},
       {"planes", "min_area_m2", "1", {"0.01", "10000"}, {"0", "10001"}},
       {"planes", "epsilon_m", "0.25", {"0.05", "5"}, {"0.04", "5.1"}},
+      {"objects", "class", "", {"car", "7"}, {"", "a b"}},
+      {"objects", "region", "", {"0,0,20,15", "-1.5,-2,1e3,4,-0.5,2.5"}, {"0,0,20", "20,0,0,15"}},
+      {"objects", "distance_m", "0", {"0", "4"}, {"-0.1", "4.1", "nan"}},
+      {"objects", "voxel_m", "0.05", {"0.01", "1"}, {"0", "1.1"}},
+      {"objects", "min_points", "50", {"1", "1000000000"}, {"0", "-1"}},
   };
   for (const char* kind : {"rebuild", "verify", "optimize", "fade"}) {
     all.push_back({kind, "threads", "", {"1", "64"}, {"0", "65", "-1", "two", ""}});

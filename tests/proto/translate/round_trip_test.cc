@@ -14,6 +14,7 @@
 #include "proto/translate/localize.h"
 #include "proto/translate/maps.h"
 #include "proto/translate/models.h"
+#include "proto/translate/objects.h"
 #include "proto/translate/planning.h"
 #include "proto/translate/posegraph.h"
 #include "proto/translate/scans.h"
@@ -220,6 +221,23 @@ TEST(TranslateRoundTripTest, Models) {
       FromProto(plane),
       testing::StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr("RRGGBB")));
   ExpectRoundTrip(Filled<v1::PlaneModel>());
+}
+
+TEST(TranslateRoundTripTest, Objects) {
+  ExpectRoundTrip(Filled<v1::Entity>());
+  ExpectRoundTrip(Filled<v1::EntitySearch>());
+  auto request = Filled<v1::ListEntitiesRequest>();
+  STRATA_ASSERT_OK_AND_ASSIGN(const EntityQuery query, FromProto(request));
+  ExpectSame(request, ToProto(request.map(), query));
+  request.set_class_id(256);
+  EXPECT_THAT(
+      FromProto(request),
+      testing::StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr("class_id")));
+  request.set_class_id(255);
+  std::swap(*request.mutable_region()->mutable_min(), *request.mutable_region()->mutable_max());
+  EXPECT_THAT(
+      FromProto(request),
+      testing::StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr("region")));
 }
 
 TEST(TranslateRoundTripTest, Planning) {

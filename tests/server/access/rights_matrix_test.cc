@@ -83,6 +83,7 @@ const std::map<std::string, std::optional<Right>>& Needed() {
          "Planning.Explore",
          "Planning.CheckShape",
          "Models.GetPlaneModel",
+         "Objects.ListEntities",
          "Planning.WatchPath"});
     add(Right::kWrite,
         {"Maps.SetClass",

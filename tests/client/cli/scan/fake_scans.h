@@ -121,6 +121,7 @@ class FakeDatabase : public api::Database {
   api::PoseGraph& posegraph() override { std::abort(); }
   api::Classifiers& classifiers() override { std::abort(); }
   api::Models& models() override { std::abort(); }
+  api::Objects& objects() override { std::abort(); }
 };
 
 }  // namespace strata::cli

@@ -1,0 +1,158 @@
+// strata objects find|list|show|export
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include <Eigen/Geometry>
+
+#include "client/cli/job/job_runner.h"
+#include "client/cli/objects/entity_files.h"
+#include "client/cli/objects/fetched_entities.h"
+#include "client/cli/terminal/arguments.h"
+#include "client/cli/terminal/command.h"
+#include "client/cli/terminal/json.h"
+#include "client/cli/terminal/on_earth.h"
+#include "core/common/status.h"
+#include "core/world/job_kinds.h"
+
+namespace strata::cli {
+namespace {
+
+struct ObjectsOptions {
+  std::string map;
+  JobParameters parameters;
+  bool wait = false;
+  std::string class_name;
+  std::optional<Eigen::AlignedBox3d> region;
+  std::uint64_t id = 0;
+  std::string out;
+};
+
+absl::StatusOr<FetchedEntities> FetchChosen(Context& context, const ObjectsOptions& options) {
+  return FetchEntities(context, options.map, {.region = options.region}, options.class_name);
+}
+
+absl::Status FindObjects(Context& context, const ObjectsOptions& options) {
+  return StartJob(context, options.map, kObjectsJob, options.parameters, options.wait);
+}
+
+Json SearchJson(const FetchedEntities& fetched) {
+  Json distances = Json::object();
+  for (const ClassReach& reach : fetched.info.reaches) {
+    distances[ClassOf(fetched.classes, reach.class_id).name] = reach.distance_m;
+  }
+  return {{"job", fetched.info.job},
+          {"epoch", fetched.info.epoch},
+          {"made", TimeText(fetched.info.made)},
+          {"stale", fetched.stale},
+          {"scans", fetched.info.scans},
+          {"points", fetched.info.points},
+          {"distance_m", distances}};
+}
+
+absl::Status ListObjects(Context& context, const ObjectsOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const FetchedEntities fetched, FetchChosen(context, options));
+  Json entities = Json::array();
+  for (const Entity& entity : fetched.entities) {
+    entities.push_back(EntityJson(entity, fetched.classes));
+  }
+  if (context.output.json()) {
+    Json all = SearchJson(fetched);
+    all["entities"] = std::move(entities);
+    context.output.Object(all);
+    return absl::OkStatus();
+  }
+  for (Json& entity : entities) entity["seen_by"] = entity["scans"].size();
+  context.output.List(entities,
+                      {{"id", "ID"},
+                       {"class", "CLASS"},
+                       {"centre", "CENTRE"},
+                       {"size_m", "SIZE"},
+                       {"yaw_rad", "YAW"},
+                       {"points", "POINTS"},
+                       {"seen_by", "SCANS"}});
+  return absl::OkStatus();
+}
+
+absl::Status ShowObject(Context& context, const ObjectsOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const FetchedEntities fetched, FetchChosen(context, options));
+  const auto found = std::find_if(fetched.entities.begin(),
+                                  fetched.entities.end(),
+                                  [&](const Entity& entity) { return entity.id == options.id; });
+  if (found == fetched.entities.end()) {
+    return absl::NotFoundError(
+        absl::StrCat("map ", options.map, ": no entity ", options.id, "; see objects list"));
+  }
+  Json entity = EntityJson(*found, fetched.classes);
+  Json base = Json::array();
+  for (const Eigen::Vector3d& p : BaseOf(found->box)) base.push_back(ToJson(p));
+  entity["base"] = std::move(base);
+  STRATA_ASSIGN_OR_RETURN(const std::optional<LocalFrame> earth, EarthOf(context, options.map));
+  if (earth.has_value()) AddPlaceOnEarth(*earth, found->box.centre, entity);
+  context.output.Object(entity);
+  return absl::OkStatus();
+}
+
+absl::Status ExportObjects(Context& context, const ObjectsOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const FetchedEntities fetched, FetchChosen(context, options));
+  STRATA_ASSIGN_OR_RETURN(const std::optional<LocalFrame> earth, EarthOf(context, options.map));
+  STRATA_RETURN_IF_ERROR(WriteEntities(options.out, fetched, earth));
+  context.output.Object({{"file", options.out},
+                         {"entities", fetched.entities.size()},
+                         {"epoch", fetched.info.epoch},
+                         {"stale", fetched.stale}});
+  return absl::OkStatus();
+}
+
+void AddChoice(CLI::App* verb, ObjectsOptions& options) {
+  verb->add_option("--class", options.class_name, "Only this class, by name or number");
+  AddRegion(verb, options.region);
+}
+
+}  // namespace
+
+void AddObjectsCommands(Commands& commands) {
+  auto options = std::make_shared<ObjectsOptions>();
+  CLI::App* noun = commands.Noun("objects",
+                                 "The things in a map: cars, benches, windows",
+                                 "strata objects find campus --wait");
+  const auto verb = MapVerbs(commands, noun, options);
+  CLI::App* find = verb("find",
+                        "Find the things that points with a class make up, across scans, in place "
+                        "of those found before (job objects); map render --objects draws them",
+                        "strata objects find campus class=car --wait",
+                        FindObjects);
+  AddJobParameters(find, options->parameters);
+  AddWait(find, options->wait);
+  find->footer(absl::StrCat(find->get_footer(),
+                            "\n\nParameters:\n",
+                            JobParametersText(*FindJobKind(kObjectsJob).value())));
+  AddChoice(verb("list",
+                 "The things that objects find found, by class and falling number of points: the "
+                 "middle and length, width and height of the box around each [m]",
+                 "strata objects list campus --class car --output json",
+                 ListObjects),
+            *options);
+  verb("show",
+       "One of them: its box, and how many points of it each scan saw",
+       "strata objects show campus 7",
+       ShowObject)
+      ->add_option("ID", options->id, "As objects list has it")
+      ->required();
+  CLI::App* out = verb("export",
+                       "Their boxes for GIS and tables: GeoJSON on earth where the map has an "
+                       "origin, or CSV",
+                       "strata objects export campus things.geojson --class car",
+                       ExportObjects);
+  out->add_option("FILE", options->out, "Where to, by its ending")
+      ->type_name("FILE.(geojson|csv)")
+      ->required();
+  AddChoice(out, *options);
+}
+
+}  // namespace strata::cli

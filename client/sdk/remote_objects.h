@@ -1,0 +1,32 @@
+// api::Objects over strata.v1.Objects.
+#ifndef STRATA_CLIENT_SDK_REMOTE_OBJECTS_H_
+#define STRATA_CLIENT_SDK_REMOTE_OBJECTS_H_
+
+#include <memory>
+
+#include "client/sdk/connection.h"
+#include "core/api/objects.h"
+#include "strata/v1/objects.grpc.pb.h"
+
+namespace strata::sdk {
+
+// Thread-safe.
+class RemoteObjects final : public api::Objects {
+ public:
+  explicit RemoteObjects(Connection& connection)
+      : connection_(connection), stub_(v1::Objects::NewStub(connection.channel())) {}
+
+  absl::StatusOr<EntitiesInfo> ListEntities(
+      const api::Call& call,
+      absl::string_view map,
+      const EntityQuery& query,
+      absl::FunctionRef<absl::Status(const Entity&)> sink) override;
+
+ private:
+  Connection& connection_;
+  const std::unique_ptr<v1::Objects::Stub> stub_;
+};
+
+}  // namespace strata::sdk
+
+#endif  // STRATA_CLIENT_SDK_REMOTE_OBJECTS_H_

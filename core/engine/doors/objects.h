@@ -1,0 +1,26 @@
+// api::Objects on the maps of an engine.
+#ifndef STRATA_CORE_ENGINE_DOORS_OBJECTS_H_
+#define STRATA_CORE_ENGINE_DOORS_OBJECTS_H_
+
+#include "core/api/objects.h"
+#include "core/engine/doors/maps.h"
+
+namespace strata {
+
+class EngineObjects final : public api::Objects {
+ public:
+  explicit EngineObjects(EngineMaps& maps) : maps_(maps) {}
+
+  absl::StatusOr<EntitiesInfo> ListEntities(
+      const api::Call& call,
+      absl::string_view map,
+      const EntityQuery& query,
+      absl::FunctionRef<absl::Status(const Entity&)> sink) override;
+
+ private:
+  EngineMaps& maps_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_DOORS_OBJECTS_H_

@@ -1,0 +1,24 @@
+// The things in maps between the core's words and the wire's. ToProto never fails; FromProto
+// answers INVALID_ARGUMENT naming the field.
+#ifndef STRATA_PROTO_TRANSLATE_OBJECTS_H_
+#define STRATA_PROTO_TRANSLATE_OBJECTS_H_
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+#include "core/world/entity.h"
+#include "strata/v1/objects.pb.h"
+
+namespace strata::translate {
+
+v1::Entity ToProto(const Entity& entity);
+v1::EntitySearch ToProto(const EntitiesInfo& info);
+v1::ListEntitiesRequest ToProto(absl::string_view map, const EntityQuery& query);
+
+absl::StatusOr<Entity> FromProto(const v1::Entity& proto);
+absl::StatusOr<EntitiesInfo> FromProto(const v1::EntitySearch& proto);
+absl::StatusOr<EntityQuery> FromProto(const v1::ListEntitiesRequest& proto);
+
+}  // namespace strata::translate
+
+#endif  // STRATA_PROTO_TRANSLATE_OBJECTS_H_
