@@ -53,7 +53,8 @@ struct FoundEntity {
 // Takes the squares of a map one after another, each twice: first for the spacing of its points,
 // then to grow regions (Alg. 2 without normals) across the borders of squares: an edge between two
 // of them is found by the second, which has what is around it. Squares may be of any size; which
-// entities there are depends neither on that nor on their order. Memory grows with the voxels.
+// entities there are depends neither on that nor on their order, but for distances that differ by
+// the rounding of floats. Memory grows with the voxels.
 // Not thread-safe.
 class EntityFinder {
  public:
