@@ -45,9 +45,9 @@ struct PlaceName {
 
 // What is drawn over a map beside paths, and what it means: a column in the upper left corner.
 struct Overlay {
-  std::vector<Stroke> strokes;   // above the map, later ones above earlier ones
-  std::vector<PlaceName> names;  // above them
+  std::vector<Stroke> strokes;  // above the map, later ones above earlier ones
   std::vector<std::pair<Colour, std::string>> legend;
+  std::vector<PlaceName> names = {};  // above the lines
 };
 
 // How surfaces of a class are drawn, and what they are called in the legend.

@@ -48,7 +48,7 @@ TEST(JobKindsTest, TextsAreLinesForAProtoAndATerminal) {
                                   "optimising (30)"));
   EXPECT_EQ(JobKindNames(),
             "rebuild, verify, optimize, revert, train, classify, evaluate, "
-            "fade or planes");
+            "fade, planes or objects");
 }
 
 TEST(JobKindsTest, NamesAreTheirOwnAndDefaultsFit) {
@@ -72,7 +72,7 @@ TEST(JobKindsTest, FindsAKindOrNamesThoseThereAre) {
   EXPECT_EQ(fade->name, kFadeJob);
   EXPECT_THAT(FindJobKind("dance"),
               testing::StatusIs(absl::StatusCode::kInvalidArgument,
-                                AllOf(HasSubstr("'dance'"), HasSubstr("fade or planes"))));
+                                AllOf(HasSubstr("'dance'"), HasSubstr("fade, planes or objects"))));
   const absl::Status refused = FindJobKind(std::string(1000, 'x')).status();
   EXPECT_THAT(std::string(refused.message()), Not(HasSubstr(std::string(101, 'x'))));
 }
