@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kLeastCells = 4;
 constexpr std::size_t kEnoughCells = 12;
-constexpr double kSigmas = 3.0;
+constexpr double kSigmas = 4.0;
 
 // Least squares for c, g and K = (k_uu, k_uv; k_uv, k_vv), in this order.
 class QuadricFit {

@@ -23,7 +23,7 @@ std::vector<std::uint32_t> AroundFew(std::span<const PlanarCell> cells,
 
 // Of the surface that the cells `members` lie on, by where they are and how they are tilted:
 // (k_uu, k_uv, k_vv) [1/m] of z = c + gᵀ x + ½ xᵀ K x over the plane of (axis_u, axis_v), unit
-// vectors at right angles. Zeros where its larger principal curvature is less than three times its
+// vectors at right angles. Zeros where its larger principal curvature is less than four times its
 // own σ, and for fewer than four cells.
 Eigen::Vector3d CurvatureOf(std::span<const PlanarCell> cells,
                             std::span<const std::uint32_t> members,
