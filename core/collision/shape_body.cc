@@ -26,7 +26,9 @@ using Eigen::Vector3d;
 using Mesh = fcl::BVHModel<fcl::OBBRSSd>;
 
 constexpr std::size_t kMostContacts = 64;  // of a part, of which the deepest counts
-constexpr int kColumns = 64;               // of a mesh, along x and y
+constexpr int kMostColumns = 64;           // of a mesh, along x and y
+// Triangles may be as large as the mesh: so many entries of columns, beyond one for each triangle.
+constexpr std::size_t kMostEntries = std::size_t{1} << 20;
 // Points asked for are moved by as much, so that no ray runs along an edge of a grid [m].
 constexpr double kAside = 1.37e-7;
 
@@ -81,25 +83,49 @@ struct ShapeBody::Geometry {
   std::shared_ptr<Mesh> mesh;  // nullptr: none
   CollisionShape shape;        // its triangles
   AlignedBox3d mesh_bounds;
-  std::vector<std::vector<std::uint32_t>> columns;  // triangles over each, of kColumns²
+  int column_count = kMostColumns;                  // along x and y
+  std::vector<std::vector<std::uint32_t>> columns;  // triangles over each
 
   int ColumnAt(double at, int axis) const {
+    if (mesh_bounds.sizes()[axis] <= 0.0) return 0;  // a plate
     const double share = (at - mesh_bounds.min()[axis]) / mesh_bounds.sizes()[axis];
-    return std::clamp(static_cast<int>(share * kColumns), 0, kColumns - 1);
+    return std::clamp(static_cast<int>(share * column_count), 0, column_count - 1);
   }
+  AlignedBox3d BoxOf(std::uint32_t triangle) const {
+    AlignedBox3d box;
+    for (const std::uint32_t v : shape.triangles[triangle]) {
+      box.extend(shape.vertices[v].cast<double>());
+    }
+    return box;
+  }
+  // Of all columns together.
+  std::size_t Entries() const;
   void SortTriangles();
   int Side(std::uint32_t triangle, const Vector3d& p) const;
 };
 
+std::size_t ShapeBody::Geometry::Entries() const {
+  const auto width = [this](const AlignedBox3d& box, int axis) {
+    return static_cast<std::size_t>(ColumnAt(box.max()[axis], axis) -
+                                    ColumnAt(box.min()[axis], axis) + 1);
+  };
+  std::size_t entries = 0;
+  for (std::uint32_t t = 0; t < shape.triangles.size(); ++t) {
+    const AlignedBox3d box = BoxOf(t);
+    entries += width(box, 0) * width(box, 1);
+  }
+  return entries;
+}
+
 void ShapeBody::Geometry::SortTriangles() {
   for (const Eigen::Vector3f& v : shape.vertices) mesh_bounds.extend(v.cast<double>());
-  columns.resize(std::size_t{kColumns} * kColumns);
+  while (column_count > 1 && Entries() > shape.triangles.size() + kMostEntries) column_count /= 2;
+  columns.resize(static_cast<std::size_t>(column_count) * column_count);
   for (std::uint32_t t = 0; t < shape.triangles.size(); ++t) {
-    AlignedBox3d box;
-    for (const std::uint32_t v : shape.triangles[t]) box.extend(shape.vertices[v].cast<double>());
+    const AlignedBox3d box = BoxOf(t);
     for (int y = ColumnAt(box.min().y(), 1); y <= ColumnAt(box.max().y(), 1); ++y) {
       for (int x = ColumnAt(box.min().x(), 0); x <= ColumnAt(box.max().x(), 0); ++x) {
-        columns[static_cast<std::size_t>(y) * kColumns + x].push_back(t);
+        columns[static_cast<std::size_t>(y) * column_count + x].push_back(t);
       }
     }
   }
@@ -144,7 +170,7 @@ bool ShapeBody::Holds(const Vector3d& p_shape) const {
   if (!g.mesh_bounds.contains(p_shape)) return false;
   const Vector3d p = p_shape + Vector3d(kAside, 1.7 * kAside, 0.0);
   const std::size_t column =
-      static_cast<std::size_t>(g.ColumnAt(p.y(), 1)) * kColumns + g.ColumnAt(p.x(), 0);
+      static_cast<std::size_t>(g.ColumnAt(p.y(), 1)) * g.column_count + g.ColumnAt(p.x(), 0);
   int above = 0, below = 0;
   for (const std::uint32_t t : g.columns[column]) {
     const int side = g.Side(t, p);

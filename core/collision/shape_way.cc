@@ -29,6 +29,8 @@ using Eigen::Vector3d;
 // Half of what a level surface is thick at least [m], and how many σ.
 constexpr double kHalfThicknessM = 0.02;
 constexpr double kSigmas = 3.0;
+// Held at once: a way may be as long as a map.
+constexpr std::size_t kMostTiles = 256;
 // Ground is looked for this far below and above the plane that the shape stands on [m].
 constexpr double kGroundReachM = 1.0;
 
@@ -85,8 +87,8 @@ class Way {
 
 class Surroundings {
  public:
-  Surroundings(TileOf tile_of, double cell_size_m, const ShapeQuery& query)
-      : tile_of_(tile_of), cell_m_(cell_size_m), query_(query), body_(query.shape) {}
+  Surroundings(TileOf tile_of, double cell_size_m, const ShapeQuery& query, const Stop& stop)
+      : tile_of_(tile_of), cell_m_(cell_size_m), query_(query), stop_(stop), body_(query.shape) {}
 
   const ShapeBody& body() const { return body_; }
 
@@ -102,6 +104,7 @@ class Surroundings {
     Look look;
     for (std::int32_t y = index(around.min().y() - margin); y <= index(around.max().y() + margin);
          ++y) {
+      STRATA_RETURN_IF_ERROR(stop_.status());  // a shape may be as wide as a map
       for (std::int32_t x = index(around.min().x() - margin); x <= index(around.max().x() + margin);
            ++x) {
         STRATA_RETURN_IF_ERROR(LookAtCell(T, around, {x, y}, look));
@@ -116,6 +119,7 @@ class Surroundings {
     if (last_ == nullptr || last_key_ != key) {
       auto found = tiles_.find(key);
       if (found == tiles_.end()) {
+        if (tiles_.size() >= kMostTiles) tiles_.clear();
         STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const SurfaceTile> tile, tile_of_(key));
         found = tiles_.emplace(key, std::move(tile)).first;
       }
@@ -182,6 +186,7 @@ class Surroundings {
   TileOf tile_of_;
   const double cell_m_;
   const ShapeQuery& query_;
+  const Stop& stop_;
   const ShapeBody body_;
   HashMap<TileKey, std::shared_ptr<const SurfaceTile>> tiles_;
   TileKey last_key_;
@@ -227,7 +232,7 @@ absl::StatusOr<ShapeCheck> CheckShapeAlong(TileOf tile_of,
                                            const ShapeQuery& query,
                                            const Stop& stop) {
   STRATA_RETURN_IF_ERROR(ValidateShapeQuery(query));
-  Surroundings around(tile_of, cell_size_m, query);
+  Surroundings around(tile_of, cell_size_m, query, stop);
   double reach_m = 0.0;
   for (int i = 0; i < 8; ++i) {
     const Vector3d corner = around.body().bounds().corner(static_cast<AlignedBox3d::CornerType>(i));
@@ -247,7 +252,7 @@ absl::StatusOr<ShapeCheck> CheckShapeAlong(TileOf tile_of,
   check.length_m = way.length_m();
   bool touched = false;
   const auto look_at = [&](const Pose& T, double along_m) -> absl::Status {
-    if (check.looks++ % 64 == 0) STRATA_RETURN_IF_ERROR(stop.status());
+    ++check.looks;
     STRATA_ASSIGN_OR_RETURN(const Look look, around.At(T));
     if (look.depth_m >= 0.0) Note(look, along_m, touched, check);
     touched = look.depth_m >= 0.0;

@@ -199,6 +199,34 @@ TEST(ShapeBodyTest, WhatIsInsideOfAClosedMeshIsTouched) {
   EXPECT_GT(inside, 0);
 }
 
+// Each of them is over all columns.
+TEST(ShapeBodyTest, ManyLargeTrianglesAreHeldAsOne) {
+  CollisionShape shape = BoxMesh(Vector3d(-1.0, -1.0, 0.0), Vector3d(1.0, 1.0, 2.0));
+  const auto sides = shape.triangles;
+  for (int copy = 0; copy < 400; ++copy) {  // odd with the first
+    shape.triangles.insert(shape.triangles.end(), sides.begin(), sides.end());
+    shape.triangles.insert(shape.triangles.end(), sides.begin(), sides.end());
+  }
+  const ShapeBody mesh(shape);
+  const Vector3d half = Vector3d::Constant(0.1);
+  const Vector3d inside(0.3, 0.2, 1.0);
+  const Vector3d beside(1.4, 0.2, 1.0);
+  EXPECT_TRUE(mesh.Touches(Pose::Identity(), {inside - half, inside + half}).has_value());
+  EXPECT_FALSE(mesh.Touches(Pose::Identity(), {beside - half, beside + half}).has_value());
+}
+
+TEST(ShapeBodyTest, APlateHasNoInside) {
+  CollisionShape shape;
+  shape.vertices = {{0, 0, 0}, {1, 0, 0}, {1, 0, 1}, {0, 0, 1}};
+  shape.triangles = {{0, 1, 2}, {0, 2, 3}};
+  const ShapeBody plate(shape);
+  const Vector3d half = Vector3d::Constant(0.1);
+  const Vector3d at(0.5, 0.05, 0.5);
+  const Vector3d behind(0.5, 0.3, 0.5);
+  EXPECT_TRUE(plate.Touches(Pose::Identity(), {at - half, at + half}).has_value());
+  EXPECT_FALSE(plate.Touches(Pose::Identity(), {behind - half, behind + half}).has_value());
+}
+
 TEST(ShapeBodyTest, CylindersAndSpheresAreRound) {
   CollisionShape shape;
   ShapePart part;
