@@ -7,13 +7,16 @@
 #include <utility>
 #include <vector>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
 #include <Eigen/Core>
 
 #include "core/cloud/point_cloud.h"
 #include "core/cloud/sensor_model.h"
+#include "core/common/blocking.h"
 #include "core/common/status.h"
 #include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/scan_share.h"
@@ -24,6 +27,8 @@
 
 namespace strata {
 namespace {
+
+constexpr absl::Duration kStopPoll = absl::Milliseconds(50);
 
 // Around all rays of a scan, in the map.
 Eigen::AlignedBox3d HullOf(const PosedScan& posed) {
@@ -63,12 +68,26 @@ absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Find(const Eigen::A
   const Eigen::Vector3d high = region.max();
   const Key key{{low.x(), low.y(), low.z(), high.x(), high.y(), high.z(), voxel_m}, changes.last};
   if (auto known = known_.Find(key); known != nullptr) return known;
-  absl::MutexLock lock(&making_);
-  STRATA_RETURN_IF_ERROR(stop.status());
+  STRATA_RETURN_IF_ERROR(AwaitTurn(stop));
+  const absl::Cleanup done = [this] {
+    const absl::MutexLock lock(&mutex_);
+    making_ = false;
+  };
   if (auto known = known_.Find(key); known != nullptr) return known;  // made meanwhile
   STRATA_ASSIGN_OR_RETURN(auto made, Make(region, voxel_m, pin.view().epoch, stop));
   known_.Put(key, made, made->voxels.bytes());
   return made;
+}
+
+absl::Status SeenSpaces::AwaitTurn(const Stop& stop) {
+  const BlockingScope blocking;
+  const absl::MutexLock lock(&mutex_);
+  const auto is_free = [this]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return !making_; };
+  while (!mutex_.AwaitWithTimeout(absl::Condition(&is_free), kStopPoll)) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+  }
+  making_ = true;
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Make(const Eigen::AlignedBox3d& region,

@@ -7,6 +7,8 @@
 #include <memory>
 #include <utility>
 
+#include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 #include <Eigen/Geometry>
@@ -42,13 +44,16 @@ class SeenSpaces {
     }
   };
 
+  // Until nobody makes one; then this does.
+  absl::Status AwaitTurn(const Stop& stop);
   absl::StatusOr<std::shared_ptr<const SeenSpace>> Make(const Eigen::AlignedBox3d& region,
                                                         double voxel_m,
                                                         std::uint64_t epoch,
                                                         const Stop& stop);
 
   MapCore& core_;
-  absl::Mutex making_;  // one at a time, each of them large
+  absl::Mutex mutex_;
+  bool making_ ABSL_GUARDED_BY(mutex_) = false;  // one at a time, each of them large
   LruCache<Key, const SeenSpace> known_;
 };
 
