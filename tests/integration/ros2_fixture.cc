@@ -164,19 +164,16 @@ std::map<std::int64_t, Stored> Ros2Test::ScansOf(const std::string& map, bool po
   return scans;
 }
 
-bool Ros2Test::AllIntegrated(const std::string& map, std::size_t count) {
+std::size_t Ros2Test::Integrated(const std::string& map) {
   const auto scans = ScansOf(map, false);
-  std::size_t integrated = 0;
-  for (const auto& [time, scan] : scans) integrated += scan.integrated ? 1 : 0;
-  return integrated == count;
+  return static_cast<std::size_t>(std::count_if(
+      scans.begin(), scans.end(), [](const auto& scan) { return scan.second.integrated; }));
 }
 
 bool Ros2Test::HasSettled(const std::string& map, std::size_t least) {
-  const auto scans = ScansOf(map, false);
-  std::size_t integrated = 0;
-  for (const auto& [time, scan] : scans) integrated += scan.integrated ? 1 : 0;
-  if (scans.size() != settling_ || integrated < scans.size()) settled_since_ = SteadyNow();
-  settling_ = scans.size();
+  const std::size_t scans = ScansOf(map, false).size();
+  if (scans != settling_ || Integrated(map) < scans) settled_since_ = SteadyNow();
+  settling_ = scans;
   return settling_ >= least && SteadyNow() - settled_since_ > absl::Seconds(2);
 }
 

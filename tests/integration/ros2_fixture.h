@@ -81,7 +81,8 @@ class Ros2Test : public CliTest {
   nlohmann::json EndBridge();
 
   std::map<std::int64_t, Stored> ScansOf(const std::string& map, bool points);
-  bool AllIntegrated(const std::string& map, std::size_t count);
+  // How many scans are in the map.
+  std::size_t Integrated(const std::string& map);
   // Whether so many scans, all there are, are in the map, and none has come for two seconds.
   bool HasSettled(const std::string& map, std::size_t least);
 

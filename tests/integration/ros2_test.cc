@@ -101,7 +101,7 @@ TEST_F(Ros2DriveTest, WhatARobotPublishesIsInTheMapAsItsRecordingWouldBe) {
     if (sent == drive.clouds / 3) server().Signal(SIGKILL);
     if (sent == 2 * drive.clouds / 3) StartServer();
   });
-  ASSERT_TRUE(WaitFor([&] { return AllIntegrated("live", keyframes); }));
+  ASSERT_TRUE(WaitFor([&] { return Integrated("live") == keyframes; }));
   const auto live = ScansOf("live", true);
   ExpectSameScans(live, ScansOf("filed", true));
 
@@ -211,7 +211,7 @@ TEST_F(Ros2DriveTest, BytesThatAreNoMessagesChangeNothing) {
     }
   }
   Play(drive);
-  EXPECT_TRUE(WaitFor([&] { return AllIntegrated("live", drive.clouds); }));
+  EXPECT_TRUE(WaitFor([&] { return Integrated("live") == drive.clouds; }));
   EXPECT_EQ(EndBridge()["kept"], drive.clouds);
 }
 
@@ -228,7 +228,7 @@ TEST_F(Ros2DriveTest, WhatWasKeptWithoutAServerIsSentWhenThereIsOne) {
   EXPECT_EQ(away["waiting"], drive.clouds);
   StartServer();
   StartMapping(address_, {"--every", "0m"});
-  EXPECT_TRUE(WaitFor([&] { return AllIntegrated("live", drive.clouds); }));
+  EXPECT_TRUE(WaitFor([&] { return Integrated("live") == drive.clouds; }));
   EXPECT_EQ(EndBridge()["sent"], drive.clouds);
 }
 
