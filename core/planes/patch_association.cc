@@ -33,8 +33,12 @@ constexpr double kByFar = 2.0;
 // Surfaces bend the same way for all that see them: what that puts a view off by does not average
 // out over the scans of a plane, nor over the planes along a way. In squares.
 constexpr double kBias = 4.0;
-// A patch so many times as far from the plane as the others are is more likely none of it.
+// A patch so many times as far from the plane as the others are is more likely none of it, and is
+// farther off than surfaces wave.
 constexpr double kOff = 2.0;
+constexpr double kFarOff = 6.0;
+// Where fewer scans see a plane nobody knows which of them is off.
+constexpr double kEnoughScans = 8.0;
 
 // Patches by the cubes of space that their boxes touch.
 class PatchIndex {
@@ -271,23 +275,61 @@ class PatchAssociation {
     return std::max(0.0, rms * rms - own * own);
   }
 
-  // Mean square of what the patches' distances to the plane exceed their own spread by.
-  double Disagreement(std::span<const std::uint32_t> group, const Plane& plane) const {
+  // A plane, and the mean square of what its patches' distances to it exceed their own spread by.
+  struct Consensus {
+    JointPlane joint;
+    double disagreement_m2 = 0.0;
+  };
+
+  Consensus ConsensusOf(std::span<const std::uint32_t> group) const {
+    Consensus consensus{.joint = SumOf(group).Joint()};
     double sum = 0.0;
     double weight = 0.0;
     for (const std::uint32_t i : group) {
-      const PosedPatch& p = patches_[i];
-      sum += p.measurements * Excess(p, plane);
-      weight += p.measurements;
+      sum += patches_[i].measurements * Excess(patches_[i], consensus.joint.plane);
+      weight += patches_[i].measurements;
     }
-    return sum / weight;
+    consensus.disagreement_m2 = sum / weight;
+    return consensus;
+  }
+
+  // Of all but what is far off, if that is less than half: it would bend the plane to itself, and
+  // all the others would seem to be off by that. Least trimmed squares (Rousseeuw 1984).
+  Consensus ConsensusOfMost(std::span<const std::uint32_t> group) const {
+    Consensus consensus = ConsensusOf(group);
+    if (consensus.joint.scans < kEnoughScans) return consensus;
+    std::vector<std::uint32_t> most;
+    for (int step = 0; step < 2; ++step) {
+      most = NearerHalf(group, consensus.joint.plane);
+      consensus = ConsensusOf(most);
+    }
+    for (;;) {
+      const double limit_m2 = std::max(kFarOff * kFarOff * consensus.disagreement_m2,
+                                       options_.sigma_floor_m * options_.sigma_floor_m);
+      std::vector<std::uint32_t> more;
+      std::ranges::copy_if(group, std::back_inserter(more), [&](std::uint32_t i) {
+        return Excess(patches_[i], consensus.joint.plane) <= limit_m2;
+      });
+      if (more.size() <= most.size()) return consensus;
+      most = std::move(more);
+      consensus = ConsensusOf(most);
+    }
+  }
+
+  std::vector<std::uint32_t> NearerHalf(std::span<const std::uint32_t> group,
+                                        const Plane& plane) const {
+    std::vector<std::pair<double, std::uint32_t>> by_excess;
+    for (const std::uint32_t i : group) by_excess.emplace_back(Excess(patches_[i], plane), i);
+    std::sort(by_excess.begin(), by_excess.end());
+    std::vector<std::uint32_t> half;
+    for (std::size_t k = 0; 2 * k < group.size(); ++k) half.push_back(by_excess[k].second);
+    return half;
   }
 
   SharedPlane PlaneOfGroup(std::span<const std::uint32_t> group) const {
     SharedPlane shared;
-    const JointPlane joint = SumOf(group).Joint();
+    const auto [joint, disagreement_m2] = ConsensusOfMost(group);
     shared.plane = joint.plane;
-    const double disagreement = Disagreement(group, shared.plane);
     std::map<std::size_t, SharedPlane::View> views;
     for (const std::uint32_t i : group) {
       const PosedPatch& p = patches_[i];
@@ -297,7 +339,7 @@ class PatchAssociation {
                            SharedPlane::View{.scan = p.scan, .moments = Eigen::Matrix4d::Zero()})
               .first->second;
       const double excess = Excess(p, shared.plane);
-      const double doubt = excess > kOff * kOff * disagreement ? excess : disagreement;
+      const double doubt = excess > kOff * kOff * disagreement_m2 ? excess : disagreement_m2;
       const double bent = BentAway(p, joint.mean);
       const double weight =
           p.measurements / (p.variance_m2 + doubt + kBias * joint.scans * bent * bent);

@@ -42,6 +42,8 @@ struct SharedPlane {
 // `independent_length_m` of an edge, at most `max_measurements`, each with the variance
 // max(rms, sigma_floor_m)² + s², where rms is the feature's own and s that of the plane's views
 // about it, or of a patch its own if that is more than twice as much: what disagrees pulls less.
+// Where a plane of patches is most of eight scans and more say: what is far off from them has no
+// say.
 struct SharedPlaneOptions {
   // Error of a scan's pose relative to the others that see a plane: what the gates of 3σ allow for
   // beside the spread of the features. Larger finds more planes and joins more that are none; in

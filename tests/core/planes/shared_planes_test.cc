@@ -310,6 +310,33 @@ TEST(SharedPlanesTest, AViewThatIsOffPullsLess) {
   }
 }
 
+// A slab's rim or underside among the views of its top.
+TEST(SharedPlanesTest, FewThatAreOffTakeNoWeightFromTheOthers) {
+  std::vector<Eigen::Vector3d> from = AroundTheYard();
+  from.insert(from.end(), {{-4, 2, 1.5}, {-6, -6, 1.5}, {2, 12, 1.5}, {14, 12, 1.5}});
+  const Views views = Look(Yard(), from, 31);
+  std::vector<Pose> poses = views.truth;
+  for (const std::size_t k : {0U, 4U}) poses[k].translation().z() += 0.08;
+  const Plane truth = {.normal = {0, 0, 1}, .distance = 0.0};
+  const std::vector<SharedPlane> off = FindSharedPlanes(views.At(poses));
+  const std::vector<SharedPlane> right = FindSharedPlanes(views.At(views.truth));
+  const SharedPlane* floor = PlaneNear(off, truth, 0.05);
+  const SharedPlane* as_it_is = PlaneNear(right, truth, 0.05);
+  ASSERT_NE(floor, nullptr);
+  ASSERT_NE(as_it_is, nullptr);
+  ASSERT_EQ(floor->views.size(), from.size());
+  ASSERT_EQ(as_it_is->views.size(), from.size());
+  EXPECT_NEAR(floor->plane.distance, 0.0, 0.002);
+  for (std::size_t k = 0; k < from.size(); ++k) {
+    const double share = floor->views[k].moments(3, 3) / as_it_is->views[k].moments(3, 3);
+    if (k == 0 || k == 4) {
+      EXPECT_LT(share, 0.1) << k;
+    } else {
+      EXPECT_GT(share, 0.8) << k;
+    }
+  }
+}
+
 TEST(SharedPlanesTest, OneScanOrNoneGivesNone) {
   const Views views = Look(Yard(), {{0, 0, 1.5}}, 50);
   EXPECT_TRUE(FindSharedPlanes(views.At(views.truth)).empty());
