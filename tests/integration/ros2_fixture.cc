@@ -29,6 +29,11 @@ Pose Between(const Pose& a, const Pose& b, double share) {
                   a.translation() + share * (b.translation() - a.translation()));
 }
 
+std::size_t CountIntegrated(const std::map<std::int64_t, Stored>& scans) {
+  return static_cast<std::size_t>(std::count_if(
+      scans.begin(), scans.end(), [](const auto& scan) { return scan.second.integrated; }));
+}
+
 }  // namespace
 
 bool WaitFor(const std::function<bool()>& condition) {
@@ -165,15 +170,15 @@ std::map<std::int64_t, Stored> Ros2Test::ScansOf(const std::string& map, bool po
 }
 
 std::size_t Ros2Test::Integrated(const std::string& map) {
-  const auto scans = ScansOf(map, false);
-  return static_cast<std::size_t>(std::count_if(
-      scans.begin(), scans.end(), [](const auto& scan) { return scan.second.integrated; }));
+  return CountIntegrated(ScansOf(map, false));
 }
 
 bool Ros2Test::HasSettled(const std::string& map, std::size_t least) {
-  const std::size_t scans = ScansOf(map, false).size();
-  if (scans != settling_ || Integrated(map) < scans) settled_since_ = SteadyNow();
-  settling_ = scans;
+  const auto scans = ScansOf(map, false);
+  if (scans.size() != settling_ || CountIntegrated(scans) < scans.size()) {
+    settled_since_ = SteadyNow();
+  }
+  settling_ = scans.size();
   return settling_ >= least && SteadyNow() - settled_since_ > absl::Seconds(2);
 }
 

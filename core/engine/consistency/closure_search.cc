@@ -28,16 +28,6 @@ constexpr int kMaxPasses = 3;
 // Errors of a match beside what its information says.
 constexpr double kMatchSigmaM = 0.05;
 constexpr double kMatchSigmaRad = 0.005;
-// So many times as far off as closures ordinarily are, one is false.
-constexpr double kFarOff = 4.0;
-
-// 0 of none.
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 class Searcher {
  public:
@@ -223,12 +213,6 @@ class Searcher {
   }
 
   absl::Status CloseLoops() {
-    STRATA_RETURN_IF_ERROR(OptimizeWithClosures());
-    if (DropContradicted() == 0) return absl::OkStatus();
-    return OptimizeWithClosures();
-  }
-
-  absl::Status OptimizeWithClosures() {
     PoseGraphProblem graph = measured_.graph;
     for (const FoundClosure& closure : search_.closures) {
       graph.relative.push_back(
@@ -237,31 +221,10 @@ class Searcher {
     STRATA_ASSIGN_OR_RETURN(PoseGraphSolution solution,
                             OptimizePoseGraph(graph, {}, context_.stop()));
     search_.T_map_scan = std::move(solution.T_map_scan);
-    return absl::OkStatus();
-  }
-
-  // Closures that do not hold where all together have put the scans, and those that are much
-  // farther from it than the others are: the graph may be stiffer than it should be, but that is
-  // the same for all. How many there were.
-  std::size_t DropContradicted() {
-    std::vector<double> metres, radians;
-    for (const FoundClosure& found : search_.closures) {
-      const Pose off = OffBy(found);
-      metres.push_back(off.translation().norm());
-      radians.push_back(RotationAngleRad(off));
-    }
-    const double limit_m = kFarOff * std::max(kMatchSigmaM, Median(metres));
-    const double limit_rad = kFarOff * std::max(kMatchSigmaRad, Median(radians));
-    return std::erase_if(search_.closures, [&](const FoundClosure& found) {
-      const Pose off = OffBy(found);
-      return !ClosureHolds(found.T_i_j, search_.T_map_scan[found.i], search_.T_map_scan[found.j]) ||
-             off.translation().norm() > limit_m || RotationAngleRad(off) > limit_rad;
+    std::erase_if(search_.closures, [this](const FoundClosure& found) {
+      return !ClosureHolds(found.T_i_j, search_.T_map_scan[found.i], search_.T_map_scan[found.j]);
     });
-  }
-
-  Pose OffBy(const FoundClosure& found) const {
-    return found.T_i_j.inverse() * search_.T_map_scan[found.i].inverse() *
-           search_.T_map_scan[found.j];
+    return absl::OkStatus();
   }
 
   const GraphWorld& world_;
