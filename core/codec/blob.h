@@ -22,6 +22,9 @@ enum class BlobKind : std::uint32_t {  // stored
   kModelPlane = 0x31504D53,            // "SMP1"
   kEntities = 0x31485345,              // "ESH1"
   kEntity = 0x31544E45,                // "ENT1"
+  kKindInfo = 0x31494B53,              // "SKI1"
+  kKindShape = 0x31444B53,             // "SKD1"
+  kKindFile = 0x31464B53,              // "SKF1"
 };
 
 // Bytes that the envelope adds to a body.

@@ -3,6 +3,7 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
@@ -12,11 +13,13 @@
 #include "core/codec/blob.h"
 #include "core/codec/bytes.h"
 #include "core/common/status.h"
+#include "core/geometry/pose.h"
 
 namespace strata {
 namespace {
 
-constexpr std::uint16_t kEntityVersion = 1;
+constexpr std::uint16_t kEntitiesVersion = 1;
+constexpr std::uint16_t kEntityVersion = 2;  // 1 had no kinds
 constexpr double kMostEntityNumber = 1e15;
 constexpr std::size_t kReachBytes = 2 + 8;
 
@@ -49,6 +52,29 @@ bool IsSound(const Entity& entity) {
          (box.size.array() >= 0.0).all() && std::isfinite(box.yaw_rad) && entity.radius_m >= 0.0;
 }
 
+void PutKind(std::string& out, const std::optional<EntityKind>& kind) {
+  PutFixed(out, kind.has_value() ? kind->id : std::uint64_t{0});
+  if (!kind.has_value()) return;
+  const Eigen::Matrix<double, 3, 4> T = kind->T_map_kind.affine();
+  for (Eigen::Index i = 0; i < T.size(); ++i) PutNumber(out, T(i / 4, i % 4));
+  PutNumber(out, kind->residual_m);
+  PutNumber(out, kind->overlap);
+}
+
+// False where it is no kind.
+bool TakeKind(ByteReader& in, std::optional<EntityKind>& kind) {
+  const auto id = in.Fixed<std::uint64_t>();
+  if (id == 0) return true;
+  kind.emplace().id = id;
+  for (Eigen::Index i = 0; i < 12; ++i) {
+    kind->T_map_kind.matrix()(i / 4, i % 4) = TakeNumber(in);
+  }
+  kind->residual_m = TakeNumber(in);
+  kind->overlap = TakeNumber(in);
+  return kind->residual_m >= 0.0 && kind->overlap >= 0.0 && kind->overlap <= 1.0 &&
+         ValidatePose(kind->T_map_kind, kMostEntityNumber).ok();
+}
+
 }  // namespace
 
 std::string EncodeEntitiesInfo(const EntitiesInfo& info) {
@@ -64,12 +90,12 @@ std::string EncodeEntitiesInfo(const EntitiesInfo& info) {
     PutFixed(body, reach.class_id);
     PutNumber(body, reach.distance_m);
   }
-  return SealBlob(BlobKind::kEntities, kEntityVersion, body);
+  return SealBlob(BlobKind::kEntities, kEntitiesVersion, body);
 }
 
 absl::StatusOr<EntitiesInfo> DecodeEntitiesInfo(absl::string_view bytes) {
   STRATA_ASSIGN_OR_RETURN(const absl::string_view body,
-                          OpenBlob(BlobKind::kEntities, kEntityVersion, bytes));
+                          OpenBlob(BlobKind::kEntities, kEntitiesVersion, bytes));
   ByteReader in(body);
   EntitiesInfo info;
   info.job = in.Varint();
@@ -105,6 +131,7 @@ std::string EncodeEntity(const StoredEntity& stored) {
     PutVarint(body, seen.scan);
     PutVarint(body, seen.points);
   }
+  PutKind(body, entity.kind);
   return SealBlob(BlobKind::kEntity, kEntityVersion, body);
 }
 
@@ -127,6 +154,8 @@ absl::StatusOr<StoredEntity> DecodeEntity(absl::string_view bytes) {
     stored.scans.push_back({scan, in.Varint()});
     entity.points += stored.scans.back().points;
   }
+  const bool has_kind = VersionOfBlob(bytes) >= 2;
+  if (has_kind && !TakeKind(in, entity.kind)) return DamagedEntity("an entity's kind");
   if (!in.ok() || in.remaining() != 0 || !IsSound(entity)) return DamagedEntity("an entity");
   return stored;
 }

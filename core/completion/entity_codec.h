@@ -21,11 +21,12 @@ struct StoredEntity {
 
     friend bool operator==(const Seen&, const Seen&) = default;
   };
-  Entity entity;            // without its scans
+  Entity entity;            // without its scans and the name of its kind
   std::vector<Seen> scans;  // by number
 };
 
-// Little-endian numbers, doubles as their bits, in the envelope of core/codec.
+// Little-endian numbers, doubles as their bits, in the envelope of core/codec. Entities of before
+// there were kinds are read, too: they have none.
 std::string EncodeEntitiesInfo(const EntitiesInfo& info);
 std::string EncodeEntity(const StoredEntity& stored);
 

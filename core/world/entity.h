@@ -4,12 +4,14 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "absl/time/time.h"
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "core/geometry/pose.h"
 #include "core/world/scan.h"
 
 namespace strata {
@@ -35,14 +37,24 @@ struct EntityScan {
   friend bool operator==(const EntityScan&, const EntityScan&) = default;
 };
 
+// Which kind of thing an entity is, and how that stands in the map.
+struct EntityKind {
+  std::uint64_t id = 0;
+  std::string name;  // empty: nobody has named it
+  Pose T_map_kind = Pose::Identity();
+  double residual_m = 0.0;  // of the entity's points that lie on the kind's
+  double overlap = 0.0;     // their share of the entity's points, in [0, 1]
+};
+
 // A car, a window, a bench.
 struct Entity {
   std::uint64_t id = 0;  // counts from 1: by class, then by falling number of points
   std::uint16_t class_id = 0;
   UprightBox box;
-  double radius_m = 0.0;          // largest distance of a point from the middle of its points
-  std::uint64_t points = 0;       // in all scans there are
-  std::vector<EntityScan> scans;  // by commit order
+  double radius_m = 0.0;           // largest distance of a point from the middle of its points
+  std::uint64_t points = 0;        // in all scans there are
+  std::vector<EntityScan> scans;   // by commit order
+  std::optional<EntityKind> kind;  // none: it is like no other, or there was too little of it
 };
 
 // How near points of a class are one thing.
@@ -68,7 +80,9 @@ struct EntitiesInfo {
 struct EntityQuery {
   std::optional<Eigen::AlignedBox3d> region = std::nullopt;  // their boxes reach into it
   std::uint16_t class_id = 0;                                // 0: of every class
+  std::string kind = {};  // name of one, or digits of its id (KindCalled); empty: of any or none
 
+  // Whether it takes the entity, whatever its kind.
   bool Takes(const Entity& entity) const;
 };
 

@@ -1,0 +1,388 @@
+#include "core/completion/kinds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include <Eigen/Core>
+
+#include "core/common/option_checks.h"
+#include "core/common/status.h"
+#include "core/completion/kind_codec.h"
+#include "core/completion/kind_model.h"
+#include "core/completion/thing_points.h"
+#include "core/completion/upright_box.h"
+
+namespace strata {
+namespace {
+
+constexpr std::size_t kMostModelPoints = 2'000;
+constexpr std::size_t kMostModels = 2'000;  // of a class
+constexpr std::size_t kMostAlike = 4;       // kinds that an entity is compared with
+constexpr std::size_t kMostWhole = 12;      // that it may be a part of, by voxels
+constexpr std::size_t kMostRegistered = 3;
+constexpr double kMostFeatureDistance = 3.0;  // of kinds that are alike, in standard deviations
+constexpr double kToleranceSpacings = 0.4;
+// Standard deviations are not taken for smaller, or noise would part what is alike.
+const Eigen::Array3d kLeastDeviation(0.3, 0.08, 0.1);
+constexpr double kSizeSlack = 0.05;  // share of an edge
+constexpr std::size_t kNoEntity = std::numeric_limits<std::size_t>::max();
+
+Eigen::Array3d ArrayOf(const KindFeatures& f) { return {f.log_volume, f.ratio, f.log_radius}; }
+
+// An entity, or what is known of a kind.
+struct Candidate {
+  std::size_t entity = kNoEntity;
+  Eigen::Vector3d size = Eigen::Vector3d::Zero();
+  Eigen::Array3d features = Eigen::Array3d::Zero();
+  std::size_t support = 0;  // voxels
+};
+
+Candidate CandidateOf(const FoundEntity& entity, std::size_t index) {
+  return {index,
+          entity.box.size,
+          ArrayOf(KindFeaturesOf(entity.box.size, entity.radius_m)),
+          entity.voxels.size()};
+}
+
+Candidate CandidateOf(const KindShape& shape) {
+  std::vector<Eigen::Vector3d> points;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3f& p : shape.points) {
+    points.push_back(p.cast<double>());
+    mean += points.back() / static_cast<double>(shape.points.size());
+  }
+  double radius = 0.0;
+  for (const Eigen::Vector3d& p : points) radius = std::max(radius, (p - mean).norm());
+  const Eigen::Vector3d size = UprightBoxOf(points).size;
+  return {kNoEntity, size, ArrayOf(KindFeaturesOf(size, radius)), kNoEntity};
+}
+
+// A kind of the library, or an entity that may become the reference of one.
+struct Reference {
+  Candidate of;
+  std::uint64_t id = 0;  // of the library; 0: not known yet
+  std::unique_ptr<KindModel> model;
+  Pose T_map_model = Pose::Identity();  // of the entity
+  bool alone = true;                    // no other entity is of it
+  bool dropped = false;                 // it is a part of another
+};
+
+struct Match {
+  std::size_t reference = 0;
+  KindFit fit;
+};
+
+// Where points are sparse, their normals are less sure.
+double ToleranceFor(const std::vector<Eigen::Vector3f>& points, double tolerance_m) {
+  return std::max(tolerance_m, kToleranceSpacings * ThingPoints(points).spacing_m());
+}
+
+std::unique_ptr<KindModel> ModelOf(std::vector<Eigen::Vector3f> points, double tolerance_m) {
+  const double tolerance = ToleranceFor(points, tolerance_m);
+  return std::make_unique<KindModel>(std::move(points), tolerance);
+}
+
+// The kinds of one class.
+class ClassSorter {
+ public:
+  ClassSorter(std::span<const FoundEntity> entities,
+              const KindOptions& options,
+              const Stop& stop,
+              absl::FunctionRef<absl::Status(std::size_t)> done)
+      : entities_(entities), options_(options), stop_(stop), done_(done) {}
+
+  void AddKnown(const Kind& kind) {
+    Reference reference;
+    reference.of = CandidateOf(kind.shape);
+    reference.id = kind.info.id;
+    std::vector<Eigen::Vector3d> points;
+    for (const Eigen::Vector3f& p : kind.shape.points) points.push_back(p.cast<double>());
+    reference.model =
+        ModelOf(ThinnedInFrame(points, Pose::Identity(), kMostModelPoints), options_.tolerance_m);
+    references_.push_back(std::move(reference));
+  }
+
+  // `indexes`: of the entities of the class, the largest first.
+  absl::Status Sort(const std::vector<std::size_t>& indexes) {
+    for (const std::size_t i : indexes) things_.push_back(CandidateOf(entities_[i], i));
+    MeasureDeviation();
+    for (const Candidate& thing : things_) {
+      STRATA_RETURN_IF_ERROR(stop_.status());
+      SortAlike(thing);
+      STRATA_RETURN_IF_ERROR(done_(1));
+    }
+    for (const Candidate& thing : things_) {
+      STRATA_RETURN_IF_ERROR(stop_.status());
+      SortPart(thing);
+      STRATA_RETURN_IF_ERROR(done_(1));
+    }
+    return absl::OkStatus();
+  }
+
+  // Of entities by index.
+  const std::map<std::size_t, Match>& matches() const { return matches_; }
+  const std::vector<Reference>& references() const { return references_; }
+
+ private:
+  void MeasureDeviation();
+  std::unique_ptr<ThingPoints> PointsOf(const Candidate& thing, Pose& T_map_thing) const;
+  bool IsAlike(const Candidate& thing, const Reference& reference) const;
+  bool MayBePartOf(const Candidate& thing, const Reference& reference) const;
+  double DistanceOf(const Candidate& thing, const Reference& reference) const {
+    return ((thing.features - reference.of.features) / deviation_).matrix().norm();
+  }
+  // The nearest by features that `takes`.
+  template <typename Takes>
+  std::vector<std::size_t> NearestOf(const Candidate& thing, std::size_t most, Takes takes) const;
+  std::optional<Match> BestOf(const ThingPoints& points,
+                              const std::vector<std::size_t>& nearest,
+                              KindStarts starts) const;
+  bool Accepts(const Reference& reference, const KindFit& fit, KindStarts starts) const;
+  void SortAlike(const Candidate& thing);
+  void SortPart(const Candidate& thing);
+  void Assign(const Candidate& thing, const Match& match);
+
+  std::span<const FoundEntity> entities_;
+  const KindOptions& options_;
+  const Stop& stop_;
+  const absl::FunctionRef<absl::Status(std::size_t)> done_;
+  std::vector<Candidate> things_;
+  std::vector<Reference> references_;
+  std::map<std::size_t, std::size_t> own_;  // reference that an entity is itself
+  std::map<std::size_t, Match> matches_;
+  Eigen::Array3d deviation_ = kLeastDeviation;
+};
+
+void ClassSorter::MeasureDeviation() {
+  Eigen::Array3d mean = Eigen::Array3d::Zero(), squares = Eigen::Array3d::Zero();
+  for (const Candidate& thing : things_) mean += thing.features;
+  mean /= static_cast<double>(things_.size());
+  for (const Candidate& thing : things_) squares += (thing.features - mean).square();
+  deviation_ = (squares / static_cast<double>(things_.size())).sqrt().max(kLeastDeviation);
+}
+
+std::unique_ptr<ThingPoints> ClassSorter::PointsOf(const Candidate& thing,
+                                                   Pose& T_map_thing) const {
+  const FoundEntity& entity = entities_[thing.entity];
+  T_map_thing = BaseFrameOf(entity.box);
+  std::vector<Eigen::Vector3f> points =
+      ThinnedInFrame(entity.voxels, T_map_thing, kMostModelPoints);
+  if (points.size() < kMinKindPoints) return nullptr;
+  return std::make_unique<ThingPoints>(std::move(points));
+}
+
+bool ClassSorter::IsAlike(const Candidate& thing, const Reference& reference) const {
+  const Eigen::Array3d slack =
+      2.0 * reference.model->tolerance_m() + kSizeSlack * reference.of.size.array();
+  return ((thing.size - reference.of.size).array().abs() <= slack).all() &&
+         DistanceOf(thing, reference) <= kMostFeatureDistance;
+}
+
+bool ClassSorter::MayBePartOf(const Candidate& thing, const Reference& reference) const {
+  const double slack = 2.0 * reference.model->tolerance_m();
+  const bool larger = reference.of.support == kNoEntity || reference.of.support >= thing.support;
+  return larger && reference.of.entity != thing.entity && !reference.dropped &&
+         thing.size.z() <= reference.of.size.z() + slack &&
+         thing.size.x() <= reference.of.size.head<2>().norm() + slack;
+}
+
+template <typename Takes>
+std::vector<std::size_t> ClassSorter::NearestOf(const Candidate& thing,
+                                                std::size_t most,
+                                                Takes takes) const {
+  std::vector<std::pair<double, std::size_t>> near;
+  for (std::size_t i = 0; i < references_.size(); ++i) {
+    if (takes(references_[i])) near.emplace_back(DistanceOf(thing, references_[i]), i);
+  }
+  const auto end = near.begin() + static_cast<std::ptrdiff_t>(std::min(most, near.size()));
+  std::partial_sort(near.begin(), end, near.end());
+  std::vector<std::size_t> indexes;
+  for (auto i = near.begin(); i != end; ++i) indexes.push_back(i->second);
+  return indexes;
+}
+
+bool ClassSorter::Accepts(const Reference& reference, const KindFit& fit, KindStarts starts) const {
+  const double cover =
+      starts == KindStarts::kCentred ? options_.min_cover : options_.min_part_cover;
+  return fit.overlap >= options_.min_overlap && fit.cover >= cover &&
+         fit.residual_m <= options_.max_residual * reference.model->tolerance_m();
+}
+
+std::optional<Match> ClassSorter::BestOf(const ThingPoints& points,
+                                         const std::vector<std::size_t>& nearest,
+                                         KindStarts starts) const {
+  struct Tried {
+    std::size_t reference = 0;
+    std::vector<KindModel::Start> starts;
+  };
+  std::vector<Tried> tried;
+  for (const std::size_t i : nearest) {
+    Tried one{i, references_[i].model->StartsOf(points, starts)};
+    if (!one.starts.empty()) tried.push_back(std::move(one));
+  }
+  std::stable_sort(tried.begin(), tried.end(), [](const Tried& a, const Tried& b) {
+    return a.starts.front().share > b.starts.front().share;
+  });
+  if (tried.size() > kMostRegistered) tried.resize(kMostRegistered);
+  std::optional<Match> best;
+  for (const Tried& one : tried) {
+    const Reference& reference = references_[one.reference];
+    const std::optional<KindFit> fit = reference.model->Register(points, one.starts);
+    if (!fit.has_value() || !Accepts(reference, *fit, starts)) continue;
+    // What the library has goes before what is found.
+    const auto badness = [&](const Match& match) {
+      const Reference& of = references_[match.reference];
+      return std::make_pair(of.id == 0, match.fit.Badness(of.model->tolerance_m()));
+    };
+    const Match match{one.reference, *fit};
+    if (!best.has_value() || badness(match) < badness(*best)) best = match;
+  }
+  return best;
+}
+
+void ClassSorter::Assign(const Candidate& thing, const Match& match) {
+  references_[match.reference].alone = false;
+  matches_[thing.entity] = match;
+}
+
+void ClassSorter::SortAlike(const Candidate& thing) {
+  Pose T_map_thing = Pose::Identity();
+  std::unique_ptr<ThingPoints> points = PointsOf(thing, T_map_thing);
+  if (points == nullptr) return;
+  const auto nearest = NearestOf(
+      thing, kMostAlike, [&](const Reference& reference) { return IsAlike(thing, reference); });
+  const std::optional<Match> match = BestOf(*points, nearest, KindStarts::kCentred);
+  if (match.has_value()) return Assign(thing, *match);
+  if (own_.size() == kMostModels) return;
+  Reference reference;
+  reference.of = thing;
+  reference.model = ModelOf(points->points(), options_.tolerance_m);
+  reference.T_map_model = T_map_thing;
+  own_[thing.entity] = references_.size();
+  references_.push_back(std::move(reference));
+}
+
+void ClassSorter::SortPart(const Candidate& thing) {
+  const auto own = own_.find(thing.entity);
+  if (own == own_.end() || !references_[own->second].alone) return;
+  const auto nearest = NearestOf(
+      thing, kMostWhole, [&](const Reference& reference) { return MayBePartOf(thing, reference); });
+  const std::optional<Match> match =
+      BestOf(references_[own->second].model->thing(), nearest, KindStarts::kSideOnSide);
+  if (!match.has_value()) return;
+  references_[own->second].dropped = true;
+  Assign(thing, *match);
+}
+
+// Gathers the kinds of all classes.
+class KindGatherer {
+ public:
+  KindGatherer(std::span<const FoundEntity> entities, SortedKinds& sorted)
+      : entities_(entities), sorted_(sorted) {}
+
+  void Add(const ClassSorter& sorter) {
+    std::vector<std::optional<EntityKind>> own(sorter.references().size());
+    for (std::size_t i = 0; i < sorter.references().size(); ++i) {
+      const Reference& reference = sorter.references()[i];
+      if (reference.dropped || (reference.id == 0 && reference.alone)) continue;
+      if (reference.id != 0) {
+        own[i].emplace().id = reference.id;
+      } else if (sorted_.found.size() < kMaxFoundKinds) {
+        own[i] = Found(reference);
+        sorted_.of_entity[reference.of.entity] = own[i];
+      } else {
+        ++sorted_.left_out;
+      }
+    }
+    for (const auto& [entity, match] : sorter.matches()) {
+      std::optional<EntityKind> kind = own[match.reference];
+      if (!kind.has_value()) continue;
+      kind->T_map_kind = BaseFrameOf(entities_[entity].box) * match.fit.T_kind_thing.inverse();
+      kind->residual_m = match.fit.residual_m;
+      kind->overlap = match.fit.overlap;
+      sorted_.of_entity[entity] = kind;
+    }
+  }
+
+ private:
+  // The reference's own place.
+  EntityKind Found(const Reference& reference) {
+    const FoundEntity& entity = entities_[reference.of.entity];
+    Kind kind;
+    kind.shape.points = ThinnedInFrame(entity.voxels, reference.T_map_model, kMaxKindPoints);
+    kind.info.id = KindIdOf(kind.shape);
+    kind.info.class_id = entity.class_id;
+    kind.info.size = entity.box.size;
+    kind.info.points = kind.shape.points.size();
+    EntityKind own;
+    own.id = kind.info.id;
+    own.T_map_kind = reference.T_map_model;
+    own.overlap = 1.0;
+    sorted_.found.push_back(std::move(kind));
+    return own;
+  }
+
+  std::span<const FoundEntity> entities_;
+  SortedKinds& sorted_;
+};
+
+// Indexes of the entities of each class, the largest first.
+std::map<std::uint16_t, std::vector<std::size_t>> LargestFirst(
+    std::span<const FoundEntity> entities) {
+  std::map<std::uint16_t, std::vector<std::size_t>> by_class;
+  for (std::size_t i = 0; i < entities.size(); ++i) by_class[entities[i].class_id].push_back(i);
+  for (auto& [class_id, indexes] : by_class) {
+    std::stable_sort(indexes.begin(), indexes.end(), [&](std::size_t a, std::size_t b) {
+      return entities[a].voxels.size() > entities[b].voxels.size();
+    });
+  }
+  return by_class;
+}
+
+}  // namespace
+
+absl::Status KindOptions::Validate() const {
+  OptionChecks checks("kinds");
+  checks.InRange("tolerance_m", tolerance_m, 0.005, 1.0);
+  checks.InRange("min_overlap", min_overlap, 1e-6, 1.0);
+  checks.InRange("min_cover", min_cover, 1e-6, 1.0);
+  checks.InRange("min_part_cover", min_part_cover, 1e-6, 1.0);
+  checks.InRange("max_residual", max_residual, 1e-6, 1.0);
+  return checks.status();
+}
+
+absl::StatusOr<SortedKinds> SortIntoKinds(std::span<const FoundEntity> entities,
+                                          std::span<const Kind> library,
+                                          const KindOptions& options,
+                                          const Stop& stop,
+                                          absl::FunctionRef<absl::Status(double)> progress) {
+  SortedKinds sorted;
+  sorted.of_entity.resize(entities.size());
+  KindGatherer gatherer(entities, sorted);
+  std::size_t done = 0;
+  const auto count = [&](std::size_t more) {
+    done += more;
+    return progress(
+        std::min(1.0, 0.5 * static_cast<double>(done) / static_cast<double>(entities.size())));
+  };
+  for (auto& [class_id, indexes] : LargestFirst(entities)) {
+    if (indexes.size() > kMostSortedEntities) {
+      sorted.left_out += indexes.size() - kMostSortedEntities;
+      indexes.resize(kMostSortedEntities);
+    }
+    ClassSorter sorter(entities, options, stop, count);
+    for (const Kind& kind : library) {
+      if (kind.info.class_id == class_id) sorter.AddKnown(kind);
+    }
+    STRATA_RETURN_IF_ERROR(sorter.Sort(indexes));
+    gatherer.Add(sorter);
+  }
+  return sorted;
+}
+
+}  // namespace strata
