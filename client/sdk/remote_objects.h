@@ -3,6 +3,7 @@
 #define STRATA_CLIENT_SDK_REMOTE_OBJECTS_H_
 
 #include <memory>
+#include <vector>
 
 #include "client/sdk/connection.h"
 #include "core/api/objects.h"
@@ -21,6 +22,22 @@ class RemoteObjects final : public api::Objects {
       absl::string_view map,
       const EntityQuery& query,
       absl::FunctionRef<absl::Status(const Entity&)> sink) override;
+
+  absl::StatusOr<std::vector<KindInfo>> ListKinds(const api::Call& call,
+                                                  absl::string_view map) override;
+  absl::StatusOr<Kind> GetKind(const api::Call& call,
+                               absl::string_view map,
+                               absl::string_view kind) override;
+  absl::StatusOr<KindInfo> RenameKind(const api::Call& call,
+                                      absl::string_view map,
+                                      absl::string_view kind,
+                                      absl::string_view name) override;
+  absl::StatusOr<KindInfo> ImportKind(const api::Call& call,
+                                      absl::string_view map,
+                                      const NewKind& kind) override;
+  absl::Status DeleteKind(const api::Call& call,
+                          absl::string_view map,
+                          absl::string_view kind) override;
 
  private:
   Connection& connection_;

@@ -41,6 +41,12 @@ absl::string_view NameOf(BlobKind kind) {
       return "entities";
     case BlobKind::kEntity:
       return "entity";
+    case BlobKind::kKindInfo:
+      return "kind head";
+    case BlobKind::kKindShape:
+      return "kind shape";
+    case BlobKind::kKindFile:
+      return "kind file";
   }
   return "blob";
 }

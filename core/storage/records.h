@@ -128,6 +128,14 @@ struct Attempt {
   bool under_way = false;
 };
 
+// A kind of things, without its shape.
+struct KindRow {
+  std::uint64_t id = 0;
+  std::string name;         // empty: nobody has named it
+  bool in_library = false;  // truth; otherwise a job found it
+  std::string info;         // core/completion's kind head
+};
+
 // One of the parts of what a job found.
 struct EntityPart {
   std::uint64_t part = 0;

@@ -119,6 +119,11 @@ class StorageReader {
       std::uint64_t job, std::optional<std::uint64_t> after) = 0;
   // The job whose entities are kept; 0: none.
   virtual absl::StatusOr<std::uint64_t> JobOfEntities() = 0;
+  // Without shapes: those of the library, then those that the job found and the library has not,
+  // each by id.
+  virtual absl::StatusOr<std::vector<KindRow>> ListKinds() = 0;
+  // The library's, or else the one that a job found; nullopt: there is none.
+  virtual absl::StatusOr<std::optional<std::string>> FindKindShape(std::uint64_t id) = 0;
   // Scan ↔ tile relation of integrated scans, level 0, each in ascending order.
   virtual absl::StatusOr<std::vector<ScanNumber>> ScansOfTile(const TileKey& key) = 0;
   virtual absl::StatusOr<std::vector<TileKey>> TilesOfScan(ScanNumber number) = 0;
@@ -208,6 +213,11 @@ class StorageWriter {
   virtual absl::StatusOr<std::uint64_t> PutClassifier(const ClassifierInfo& info,
                                                       absl::string_view bytes) = 0;
   virtual absl::Status DeleteClassifier(std::uint64_t id) = 0;
+  // Into the library; `row.in_library` is ignored. ALREADY_EXISTS for its id and for its name.
+  virtual absl::Status PutKind(const KindRow& row, absl::string_view shape) = 0;
+  // Of the library. ALREADY_EXISTS; nothing happens where there is no such kind.
+  virtual absl::Status RenameKind(std::uint64_t id, absl::string_view name) = 0;
+  virtual absl::Status DeleteKind(std::uint64_t id) = 0;
   // Inserts or replaces.
   virtual absl::Status PutJob(const JobInfo& job) = 0;
   virtual absl::Status DeleteJob(std::uint64_t id) = 0;
@@ -239,7 +249,10 @@ class StorageWriter {
   virtual absl::Status PutEntityPart(std::uint64_t job,
                                      const EntityPart& part,
                                      const std::vector<ScanNumber>& scans) = 0;
+  // And the kinds that a job found.
   virtual absl::Status DeleteEntities() = 0;
+  // In place of one with this id; its name is ignored.
+  virtual absl::Status PutFoundKind(const KindRow& row, absl::string_view shape) = 0;
   // Rows newer than the current version: an unfinished rebuild.
   virtual absl::Status DiscardUnpublished() = 0;
   virtual absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) = 0;

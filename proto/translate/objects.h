@@ -7,6 +7,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/world/entity.h"
+#include "core/world/kind.h"
 #include "strata/v1/objects.pb.h"
 
 namespace strata::translate {
@@ -15,9 +16,17 @@ v1::Entity ToProto(const Entity& entity);
 v1::EntitySearch ToProto(const EntitiesInfo& info);
 v1::ListEntitiesRequest ToProto(absl::string_view map, const EntityQuery& query);
 
+v1::KindInfo ToProto(const KindInfo& info);
+v1::KindShape ToProto(const KindShape& shape);
+v1::ImportKindRequest ToProto(absl::string_view map, const NewKind& kind);
+
 absl::StatusOr<Entity> FromProto(const v1::Entity& proto);
 absl::StatusOr<EntitiesInfo> FromProto(const v1::EntitySearch& proto);
 absl::StatusOr<EntityQuery> FromProto(const v1::ListEntitiesRequest& proto);
+absl::StatusOr<KindInfo> FromProto(const v1::KindInfo& proto);
+// As ValidateKindShape() takes it.
+absl::StatusOr<KindShape> FromProto(const v1::KindShape& proto);
+absl::StatusOr<NewKind> FromProto(const v1::ImportKindRequest& proto);
 
 }  // namespace strata::translate
 

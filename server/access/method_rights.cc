@@ -69,6 +69,11 @@ constexpr std::array kTable = {
     MethodRight{"Classifiers.Import", kWrite, "start.map"},
     MethodRight{"Models.GetPlaneModel", kRead, "map"},
     MethodRight{"Objects.ListEntities", kRead, "map"},
+    MethodRight{"Objects.ListKinds", kRead, "map"},
+    MethodRight{"Objects.GetKind", kRead, "map"},
+    MethodRight{"Objects.RenameKind", kWrite, "map"},
+    MethodRight{"Objects.ImportKind", kWrite, "map"},
+    MethodRight{"Objects.DeleteKind", kWrite, "map"},
 };
 
 }  // namespace

@@ -1,12 +1,15 @@
 #include "core/engine/doors/objects.h"
 
+#include <algorithm>
 #include <memory>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
 #include "core/common/status.h"
 #include "core/engine/objects/entities.h"
+#include "core/engine/objects/kind_library.h"
 
 namespace strata {
 
@@ -18,6 +21,51 @@ absl::StatusOr<EntitiesInfo> EngineObjects::ListEntities(
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
   return ReadEntities(found->core(), query, call.stop, sink);
+}
+
+absl::StatusOr<std::vector<KindInfo>> EngineObjects::ListKinds(const api::Call& call,
+                                                               absl::string_view map) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  return CountKinds(found->core(), call.stop);
+}
+
+absl::StatusOr<Kind> EngineObjects::GetKind(const api::Call& call,
+                                            absl::string_view map,
+                                            absl::string_view kind) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(Kind read, ReadKind(found->core(), kind));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<KindInfo> kinds, CountKinds(found->core(), call.stop));
+  const auto counted = std::find_if(
+      kinds.begin(), kinds.end(), [&](const KindInfo& info) { return info.id == read.info.id; });
+  if (counted != kinds.end()) read.info.entities = counted->entities;
+  return read;
+}
+
+absl::StatusOr<KindInfo> EngineObjects::RenameKind(const api::Call& call,
+                                                   absl::string_view map,
+                                                   absl::string_view kind,
+                                                   absl::string_view name) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  return strata::RenameKind(found->core(), kind, name, call.stop);
+}
+
+absl::StatusOr<KindInfo> EngineObjects::ImportKind(const api::Call& call,
+                                                   absl::string_view map,
+                                                   const NewKind& kind) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  return strata::ImportKind(found->core(), kind, call.stop);
+}
+
+absl::Status EngineObjects::DeleteKind(const api::Call& call,
+                                       absl::string_view map,
+                                       absl::string_view kind) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  return strata::DeleteKind(found->core(), kind, call.stop);
 }
 
 }  // namespace strata

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <iterator>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -19,7 +20,10 @@
 #include "core/common/status.h"
 #include "core/completion/entities.h"
 #include "core/completion/entity_codec.h"
+#include "core/completion/kind_codec.h"
+#include "core/completion/kinds.h"
 #include "core/engine/models/square_points.h"
+#include "core/engine/objects/kind_library.h"
 #include "core/storage/storage.h"
 #include "core/world/map_class.h"
 
@@ -125,8 +129,15 @@ class EntitySearch {
   std::uint64_t of_any_class_ = 0;
 };
 
-StoredEntity StoredFormOf(const FoundEntity& found, std::uint64_t id, const EntitySearch& search) {
+// A library that changes more often while entities are sorted is left as it was.
+constexpr int kMostSortings = 3;
+
+StoredEntity StoredFormOf(const FoundEntity& found,
+                          std::uint64_t id,
+                          const std::optional<EntityKind>& kind,
+                          const EntitySearch& search) {
   StoredEntity stored;
+  stored.entity.kind = kind;
   stored.entity.id = id;
   stored.entity.class_id = found.class_id;
   stored.entity.box = found.box;
@@ -141,12 +152,33 @@ StoredEntity StoredFormOf(const FoundEntity& found, std::uint64_t id, const Enti
   return stored;
 }
 
-absl::Status KeepEntities(MapCore& core,
-                          const EntitiesInfo& info,
-                          const std::vector<StoredEntity>& entities,
-                          const Stop& stop) {
-  return core.writer().Run(Durability::kFull, 0, stop, [&](StorageWriter& writer) -> absl::Status {
+absl::Status PutFoundKinds(StorageWriter& writer,
+                           const std::vector<Kind>& found,
+                           const EntitiesInfo& info) {
+  for (const Kind& kind : found) {
+    KindInfo head = kind.info;
+    head.made = info.made;
+    STRATA_RETURN_IF_ERROR(writer.PutFoundKind({head.id, "", false, EncodeKindInfo(head)},
+                                               EncodeKindShape(kind.shape)));
+  }
+  return absl::OkStatus();
+}
+
+// False, and nothing is kept, where a person has changed the library meanwhile.
+absl::StatusOr<bool> KeepEntities(MapCore& core,
+                                  const EntitiesInfo& info,
+                                  const std::vector<StoredEntity>& entities,
+                                  const SortedKinds& kinds,
+                                  const std::vector<Kind>* library,
+                                  const Stop& stop) {
+  bool same = true;
+  const auto keep = [&](StorageWriter& writer) -> absl::Status {
+    if (library != nullptr) {
+      STRATA_ASSIGN_OR_RETURN(same, IsLibrary(writer.reader(), *library));
+      if (!same) return absl::OkStatus();
+    }
     STRATA_RETURN_IF_ERROR(writer.DeleteEntities());
+    STRATA_RETURN_IF_ERROR(PutFoundKinds(writer, kinds.found, info));
     STRATA_RETURN_IF_ERROR(writer.PutEntityPart(info.job, {0, EncodeEntitiesInfo(info)}, {}));
     for (const StoredEntity& stored : entities) {
       std::vector<ScanNumber> scans;
@@ -155,7 +187,51 @@ absl::Status KeepEntities(MapCore& core,
           writer.PutEntityPart(info.job, {stored.entity.id, EncodeEntity(stored)}, scans));
     }
     return absl::OkStatus();
-  });
+  };
+  STRATA_RETURN_IF_ERROR(core.writer().Run(Durability::kFull, 0, stop, keep));
+  return same;
+}
+
+// Sorts entities into kinds by the library as it is, and keeps both.
+absl::StatusOr<SortedKinds> SortAndKeep(MapCore& core,
+                                        const std::vector<FoundEntity>& found,
+                                        const EntitySearch& search,
+                                        EntitiesInfo& info,
+                                        JobContext& context) {
+  for (int sorting = 1;; ++sorting) {
+    STRATA_ASSIGN_OR_RETURN(const std::vector<Kind> library, LoadLibrary(core, context.stop()));
+    const auto progress = [&](double share) {
+      return context.Progress(0.92 + 0.07 * share, "sorting entities into kinds");
+    };
+    STRATA_ASSIGN_OR_RETURN(SortedKinds kinds,
+                            SortIntoKinds(found, library, {}, context.stop(), progress));
+    std::vector<StoredEntity> entities;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      entities.push_back(StoredFormOf(found[i], i + 1, kinds.of_entity[i], search));
+    }
+    info.made = absl::FromUnixMicros(absl::ToUnixMicros(absl::Now()));
+    const std::vector<Kind>* const expected = sorting < kMostSortings ? &library : nullptr;
+    STRATA_ASSIGN_OR_RETURN(const bool kept,
+                            KeepEntities(core, info, entities, kinds, expected, context.stop()));
+    if (kept) return kinds;
+  }
+}
+
+// How many entities are of one, and which are of none for want of room.
+void ReportKinds(const SortedKinds& kinds, JobContext& context, std::string& message) {
+  std::size_t sorted = 0;
+  std::set<std::uint64_t> ids;
+  for (const std::optional<EntityKind>& kind : kinds.of_entity) {
+    if (!kind.has_value()) continue;
+    ++sorted;
+    ids.insert(kind->id);
+  }
+  context.SetMetric("kinds", static_cast<double>(ids.size()));
+  context.SetMetric("kinds_found", static_cast<double>(kinds.found.size()));
+  context.SetMetric("entities_of_a_kind", static_cast<double>(sorted));
+  absl::StrAppend(&message, ", ", sorted, " of ", ids.size(), " kinds");
+  if (kinds.left_out > 0)
+    absl::StrAppend(&message, " (", kinds.left_out, " were too many to sort)");
 }
 
 // Why there is no entity, where that is so; empty otherwise.
@@ -179,7 +255,10 @@ void ReportEntities(const EntitiesInfo& info,
                     const SquarePoints& points,
                     const EntitySearch& search,
                     const JobArguments& arguments,
+                    const SortedKinds& kinds,
                     JobContext& context) {
+  std::string of_kinds;
+  ReportKinds(kinds, context, of_kinds);
   context.SetMetric("entities", static_cast<double>(info.entities));
   context.SetMetric("scans", static_cast<double>(info.scans));
   context.SetMetric("points", static_cast<double>(info.points));
@@ -194,6 +273,7 @@ void ReportEntities(const EntitiesInfo& info,
                                   " classes from ",
                                   info.scans,
                                   " scans",
+                                  info.entities > 0 ? of_kinds : "",
                                   WhyNone(info, search, arguments),
                                   points.damaged().Message()));
 }
@@ -212,6 +292,11 @@ absl::Status CheckLabels(const SquarePoints& points,
                    "model=NAME) or upload labels (scan label) first"));
 }
 
+absl::StatusOr<std::vector<KindInfo>> KindsOf(MapCore& core) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  return KindsIn(*reader);
+}
+
 absl::StatusOr<std::uint64_t> JobOfKept(MapCore& core) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
   return reader->JobOfEntities();
@@ -220,8 +305,10 @@ absl::StatusOr<std::uint64_t> JobOfKept(MapCore& core) {
 // Reads what is kept of one job's entities, part by part.
 class EntityReader {
  public:
-  EntityReader(MapCore& core, std::uint64_t job)
-      : core_(core), job_(job), epoch_(core.snapshots().current().epoch) {}
+  EntityReader(MapCore& core, std::uint64_t job, const std::vector<KindInfo>& kinds)
+      : core_(core), job_(job), epoch_(core.snapshots().current().epoch) {
+    for (const KindInfo& kind : kinds) kind_names_[kind.id] = kind.name;
+  }
 
   // nullopt: that was all.
   absl::StatusOr<std::optional<EntityPart>> Next() {
@@ -247,10 +334,22 @@ class EntityReader {
         entity.points -= seen.points;
       }
     }
+    NameKind(entity.kind);
     return entity;
   }
 
  private:
+  // Kinds that were deleted since are none.
+  void NameKind(std::optional<EntityKind>& kind) const {
+    if (!kind.has_value()) return;
+    const auto found = kind_names_.find(kind->id);
+    if (found == kind_names_.end()) {
+      kind.reset();
+    } else {
+      kind->name = found->second;
+    }
+  }
+
   // nullopt: it was deleted.
   absl::StatusOr<std::optional<ScanId>> IdOf(ScanNumber number) {
     const auto [found, added] = ids_.try_emplace(number, std::nullopt);
@@ -268,6 +367,7 @@ class EntityReader {
   MapCore& core_;
   const std::uint64_t job_;
   const std::uint64_t epoch_;
+  HashMap<std::uint64_t, std::string> kind_names_;
   std::optional<std::uint64_t> last_;
   HashMap<ScanNumber, std::optional<ScanId>> ids_;
 };
@@ -296,17 +396,12 @@ absl::Status RunObjectsJob(MapCore& core,
   EntitySearch search(points, options, class_id, context);
   STRATA_ASSIGN_OR_RETURN(const std::vector<FoundEntity> found, search.Run());
   STRATA_RETURN_IF_ERROR(CheckLabels(points, search, arguments));
-  std::vector<StoredEntity> entities;
-  for (const FoundEntity& entity : found) {
-    entities.push_back(StoredFormOf(entity, entities.size() + 1, search));
-  }
-  info.made = absl::Now();
   info.scans = points.scans();
   info.points = search.labelled();
-  info.entities = entities.size();
+  info.entities = found.size();
   info.reaches = search.Reaches();
-  STRATA_RETURN_IF_ERROR(KeepEntities(core, info, entities, context.stop()));
-  ReportEntities(info, points, search, arguments, context);
+  STRATA_ASSIGN_OR_RETURN(const SortedKinds kinds, SortAndKeep(core, found, search, info, context));
+  ReportEntities(info, points, search, arguments, kinds, context);
   return absl::OkStatus();
 }
 
@@ -316,7 +411,13 @@ absl::StatusOr<EntitiesInfo> ReadEntities(MapCore& core,
                                           absl::FunctionRef<absl::Status(const Entity&)> sink) {
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t job, JobOfKept(core));
   if (job == 0) return absl::NotFoundError("no entities; objects find (job objects) finds them");
-  EntityReader reader(core, job);
+  STRATA_ASSIGN_OR_RETURN(const std::vector<KindInfo> kinds, KindsOf(core));
+  std::uint64_t kind = 0;
+  if (!query.kind.empty()) {
+    STRATA_ASSIGN_OR_RETURN(const KindInfo asked, KindCalled(kinds, query.kind));
+    kind = asked.id;
+  }
+  EntityReader reader(core, job, kinds);
   EntitiesInfo info;
   while (true) {
     STRATA_RETURN_IF_ERROR(stop.status());
@@ -335,10 +436,26 @@ absl::StatusOr<EntitiesInfo> ReadEntities(MapCore& core,
                                               "; objects find finds them anew"));
     }
     STRATA_RETURN_IF_ERROR(entity.status());
+    if (kind != 0 && (!entity->kind.has_value() || entity->kind->id != kind)) continue;
     if (query.Takes(*entity)) STRATA_RETURN_IF_ERROR(sink(*entity));
   }
   if (info.job != job) return absl::DataLossError("entities: their head is not there");
   return info;
+}
+
+absl::StatusOr<std::vector<KindInfo>> CountKinds(MapCore& core, const Stop& stop) {
+  HashMap<std::uint64_t, std::uint64_t> counts;
+  const absl::Status read = ReadEntities(core, {}, stop, [&](const Entity& entity) {
+                              if (entity.kind.has_value()) ++counts[entity.kind->id];
+                              return absl::OkStatus();
+                            }).status();
+  if (!absl::IsNotFound(read) && !absl::IsDataLoss(read)) STRATA_RETURN_IF_ERROR(read);
+  STRATA_ASSIGN_OR_RETURN(std::vector<KindInfo> kinds, KindsOf(core));
+  for (KindInfo& kind : kinds) {
+    const auto found = counts.find(kind.id);
+    if (found != counts.end()) kind.entities = found->second;
+  }
+  return kinds;
 }
 
 }  // namespace strata

@@ -13,6 +13,7 @@
 #include "core/engine/map/steady_view.h"
 #include "core/engine/models/plane_models.h"
 #include "core/engine/objects/entities.h"
+#include "core/engine/objects/kind_library.h"
 #include "core/engine/repair/derived_pass.h"
 #include "core/engine/repair/truth_check.h"
 #include "core/engine/tiles/staged_tiles.h"
@@ -125,6 +126,8 @@ absl::Status Verify(MapCore& core, const SteadyView& view, int threads, JobConte
                                   return absl::OkStatus();
                                 }).status();
   if (absl::IsDataLoss(entities)) findings.Add(std::string(entities.message()));
+  const absl::Status kinds = CheckKinds(core, context.stop());
+  if (absl::IsDataLoss(kinds)) findings.Add(std::string(kinds.message()));
   context.SetMetric("tiles_checked", static_cast<double>(tiles));
   context.SetMetric("scans_checked", static_cast<double>(truth.scans()));
   context.SetMetric("pieces_checked", static_cast<double>(truth.pieces()));
@@ -150,7 +153,7 @@ absl::Status RunRebuildJob(Integrator& integrator, int threads, JobContext& cont
   STRATA_RETURN_IF_ERROR(pass.Run(repairs));
   const absl::Status published = staged.Publish({}, [&](StorageWriter& writer) -> absl::Status {
     STRATA_RETURN_IF_ERROR(writer.DeletePlaneModel());  // made when a person asks for it
-    STRATA_RETURN_IF_ERROR(writer.DeleteEntities());    // as well
+    STRATA_RETURN_IF_ERROR(writer.DeleteEntities());    // as well, with their kinds
     return PutIndexes(writer, pass.indexes());
   });
   integrator.store().Clear();

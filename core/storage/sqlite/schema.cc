@@ -273,6 +273,22 @@ CREATE TABLE IF NOT EXISTS derived_entity_scan (
   scan INTEGER NOT NULL, part INTEGER NOT NULL,
   PRIMARY KEY (scan, part)
 ) STRICT, WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS derived_kind (
+  id INTEGER PRIMARY KEY,
+  info BLOB NOT NULL,
+  shape BLOB NOT NULL CHECK (length(shape) <= 1048576)
+) STRICT;
+)sql";
+
+// Programs that do not know of it leave it alone: things are sorted without it, and nothing else
+// stands on it. So it takes no format version and is made where it lacks.
+constexpr char kKindTable[] = R"sql(
+CREATE TABLE IF NOT EXISTS truth_kind (
+  id INTEGER PRIMARY KEY,
+  name TEXT NOT NULL UNIQUE,
+  info BLOB NOT NULL,
+  shape BLOB NOT NULL CHECK (length(shape) <= 1048576)
+) STRICT;
 )sql";
 
 // Neither truth nor derived: what was under way when a process died (FORMAT.md). Programs that do
@@ -397,6 +413,7 @@ absl::Status UpgradeSchema(Database& database) {
   if (version == 2) STRATA_RETURN_IF_ERROR(CompleteVersion2(database));
   STRATA_RETURN_IF_ERROR(Migrate(database, kMigrations));
   STRATA_RETURN_IF_ERROR(database.Execute(kAttemptTable));
+  STRATA_RETURN_IF_ERROR(database.Execute(kKindTable));
   const absl::StatusOr<bool> derived = HasDerivedTables(database);
   if (derived.ok() && *derived) return database.Execute(kLaterDerivedTables);
   STRATA_ASSIGN_OR_RETURN(Transaction transaction, Transaction::Begin(database, "BEGIN IMMEDIATE"));

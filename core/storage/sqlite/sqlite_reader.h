@@ -74,6 +74,8 @@ class SqliteReader final : public StorageReader {
   absl::StatusOr<std::optional<EntityPart>> FindEntityPart(
       std::uint64_t job, std::optional<std::uint64_t> after) override;
   absl::StatusOr<std::uint64_t> JobOfEntities() override;
+  absl::StatusOr<std::vector<KindRow>> ListKinds() override;
+  absl::StatusOr<std::optional<std::string>> FindKindShape(std::uint64_t id) override;
   absl::StatusOr<std::vector<ScanNumber>> ScansOfTile(const TileKey& key) override;
   absl::StatusOr<std::vector<TileKey>> TilesOfScan(ScanNumber number) override;
   absl::StatusOr<std::optional<Eigen::AlignedBox2d>> FootprintOfScan(ScanNumber number) override;

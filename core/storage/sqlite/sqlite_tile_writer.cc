@@ -129,6 +129,7 @@ absl::Status SqliteWriter::PutEntityPart(std::uint64_t job,
 }
 
 absl::Status SqliteWriter::DeleteEntities() {
+  STRATA_RETURN_IF_ERROR(RunSql("DELETE FROM derived_kind"));
   STRATA_RETURN_IF_ERROR(RunSql("DELETE FROM derived_entity_scan"));
   return RunSql("DELETE FROM derived_entity");
 }

@@ -62,6 +62,9 @@ class SqliteWriter final : public StorageWriter {
   absl::StatusOr<std::uint64_t> PutClassifier(const ClassifierInfo& info,
                                               absl::string_view bytes) override;
   absl::Status DeleteClassifier(std::uint64_t id) override;
+  absl::Status PutKind(const KindRow& row, absl::string_view shape) override;
+  absl::Status RenameKind(std::uint64_t id, absl::string_view name) override;
+  absl::Status DeleteKind(std::uint64_t id) override;
   absl::Status PutJob(const JobInfo& job) override;
   absl::Status DeleteJob(std::uint64_t id) override;
   absl::Status PutAttempt(const Attempt& attempt) override;
@@ -84,6 +87,7 @@ class SqliteWriter final : public StorageWriter {
                              const EntityPart& part,
                              const std::vector<ScanNumber>& scans) override;
   absl::Status DeleteEntities() override;
+  absl::Status PutFoundKind(const KindRow& row, absl::string_view shape) override;
   absl::Status DiscardUnpublished() override;
   absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) override;
   absl::Status SetFootprint(ScanNumber number, const Eigen::AlignedBox2d& footprint) override;

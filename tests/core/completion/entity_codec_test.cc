@@ -51,6 +51,32 @@ TEST(EntityCodecTest, ComesBack) {
   testing::ExpectDamageIsDataLoss(EncodeEntitiesInfo(info), &DecodeEntitiesInfo, 5, 300);
 }
 
+TEST(EntityCodecTest, OfBeforeThereWereKindsIsRead) {
+  StoredEntity car = Car();
+  EntityKind& kind = car.entity.kind.emplace();
+  kind.id = 0x123456789abc;
+  kind.T_map_kind.translation() = Eigen::Vector3d(1.0, 2.0, 3.0);
+  kind.residual_m = 0.02;
+  kind.overlap = 0.9;
+  STRATA_ASSERT_OK_AND_ASSIGN(const StoredEntity back, DecodeEntity(EncodeEntity(car)));
+  ASSERT_TRUE(back.entity.kind.has_value());
+  EXPECT_EQ(back.entity.kind->id, kind.id);
+  EXPECT_TRUE(back.entity.kind->T_map_kind.isApprox(kind.T_map_kind));
+  EXPECT_EQ(back.entity.kind->overlap, 0.9);
+  EXPECT_EQ(EncodeEntity(back), EncodeEntity(car));
+
+  const std::string without = EncodeEntity(Car());
+  STRATA_ASSERT_OK_AND_ASSIGN(const absl::string_view body,
+                              OpenBlob(BlobKind::kEntity, 2, without));
+  const std::string first_version = SealBlob(BlobKind::kEntity, 1, body.substr(0, body.size() - 8));
+  STRATA_ASSERT_OK_AND_ASSIGN(const StoredEntity old, DecodeEntity(first_version));
+  EXPECT_EQ(old.entity.points, 345U);
+  EXPECT_FALSE(old.entity.kind.has_value());
+  car.entity.kind->overlap = 1.5;
+  EXPECT_THAT(DecodeEntity(EncodeEntity(car)),
+              StatusIs(absl::StatusCode::kDataLoss, HasSubstr("kind")));
+}
+
 TEST(EntityCodecTest, DamageIsDataLoss) {
   testing::ExpectDamageIsDataLoss(EncodeEntity(Car()), &DecodeEntity, 2, 300);
   const int accepted =
