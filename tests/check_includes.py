@@ -43,7 +43,7 @@ ARROWS = {
     "client/sdk": ["proto", "core/api", "core/codec", "core/world", "core/mls", "core/cloud", "core/geometry",
                    "core/common"],
     "client/formats": ["core/occupancy", "core/posegraph", "core/egomotion", "core/world", "core/mls", "core/mesh", "core/cloud", "core/geometry", "core/common"],
-    "client/cli": ["client/sdk", "client/formats", "core/api", "core/engine", "core/codec", "core/registration",
+    "client/cli": ["client/sdk", "client/formats", "core/api", "core/engine", "core/completion", "core/codec", "core/registration",
                    "core/classification", "core/posegraph", "core/egomotion", "core/occupancy", "core/world", "core/mls", "core/mesh", "core/cloud", "core/geometry",
                    "core/common"],
     "client/ros2": ["client/sdk", "client/formats", "client/cli/terminal", "core/api", "core/codec", "core/world",

@@ -117,6 +117,7 @@ int Main(int argc, char** argv) {
   AddJobCommands(commands);
   AddPlanesCommands(commands);
   AddObjectsCommands(commands);
+  AddKindCommands(commands);
   AddLocalizeCommand(commands);
   AddDriveCommand(commands);
   AddEgomotionCommand(commands);

@@ -16,6 +16,7 @@
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/checksum.h"
 #include "core/completion/entity_codec.h"
+#include "core/completion/kind_codec.h"
 #include "core/mls/mls_map.h"
 #include "core/planes/models/plane_model_codec.h"
 #include "core/planes/scan_planes_codec.h"
@@ -61,6 +62,12 @@ void TryKind(int kind, const std::string& body, std::uint16_t version) {
       return TryBytes(sealed(BlobKind::kEntities), DecodeEntitiesInfo, EncodeEntitiesInfo);
     case 13:
       return TryBytes(sealed(BlobKind::kEntity), DecodeEntity, EncodeEntity);
+    case 15:
+      return TryBytes(sealed(BlobKind::kKindInfo), DecodeKindInfo, EncodeKindInfo);
+    case 16:
+      return TryBytes(sealed(BlobKind::kKindShape), DecodeKindShape, EncodeKindShape);
+    case 17:
+      return TryBytes(sealed(BlobKind::kKindFile), DecodeKindFile, EncodeKindFile);
     case 3:
       return TryBytes(sealed(BlobKind::kClassifier), DecodeClassifier, EncodeClassifier);
     case 4:
@@ -97,7 +104,7 @@ void TryKind(int kind, const std::string& body, std::uint16_t version) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace strata;
   FuzzedDataProvider input(data, size);
-  const int kind = input.ConsumeIntegralInRange(0, 14);
+  const int kind = input.ConsumeIntegralInRange(0, 17);
   const auto version = input.ConsumeIntegralInRange<std::uint16_t>(0, 3);
   const std::string bytes = input.ConsumeRemainingBytesAsString();
   fuzz::TryKind(kind, bytes, version);

@@ -118,6 +118,8 @@ const auto& Kinds() {
       KindOf<v1::Entity>(),
       KindOf<v1::EntitySearch>(),
       KindOf<v1::ListEntitiesRequest>(),
+      KindOf<v1::KindInfo>(),
+      KindOf<v1::KindShape>(),
       KindOf<v1::PointChunk>(),
       KindOf<v1::PoseNode>(),
       KindOf<v1::Constraint>(),

@@ -97,6 +97,16 @@ const std::multimap<std::string, std::string>& Examples() {
       {"Models/GetPlaneModel", "map: 'world'"},
       {"Objects/ListEntities",
        "map: 'world' class_id: 2 region { min { x: -9 y: -9 z: -9 } max { x: 9 y: 9 z: 9 } }"},
+      {"Objects/ListKinds", "map: 'world'"},
+      {"Objects/GetKind", "map: 'world' kind: 'box'"},
+      {"Objects/RenameKind", "map: 'world' kind: 'box' name: 'crate'"},
+      {"Objects/ImportKind",
+       "map: 'world' name: 'box' class_name: 'thing' "
+       "shape { points: [0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1, "
+       "0.5, 0, 0, 0, 0.5, 0, 0.5, 1, 0, 1, 0.5, 0, 0.5, 0, 1, 0, 0.5, 1, 0.5, 1, 1, 1, 0.5, 1, "
+       "0, 0, 0.5, 1, 0, 0.5, 0, 1, 0.5, 1, 1, 0.5] "
+       "vertices: [0, 0, 0, 1, 0, 0, 0, 1, 0] triangles: [0, 1, 2] }"},
+      {"Objects/DeleteKind", "map: 'world' kind: 'box'"},
       {"PoseGraph/Get", "map: 'world'"},
       {"PoseGraph/SetPose",
        "map: 'world' id { trajectory: 'world' sequence: 2 } "
@@ -312,6 +322,18 @@ const std::vector<Story>& Stories() {
        {"Maps/Watch", "name: 'world' since: 3 epoch: 2 tiles: true once: true"},
        {"Jobs/Start", "map: 'world' kind: 'revert' parameters { key: 'epoch' value: '1' }"},
        {"Tiles/List", "map: 'world' area { epoch: 1 }"}},
+      {{"Objects/ImportKind",
+        "map: 'world' name: 'box' class_name: 'thing' "
+        "shape { points: [0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1, "
+        "0.5, 0, 0, 0, 0.5, 0, 0.5, 1, 0, 1, 0.5, 0, 0.5, 0, 1, 0, 0.5, 1, 0.5, 1, 1, 1, 0.5, 1, "
+        "0, 0, 0.5, 1, 0, 0.5, 0, 1, 0.5, 1, 1, 0.5] }"},
+       {"Jobs/Start", "map: 'world' kind: 'objects'"},
+       {"Jobs/Watch", kNextJob},
+       {"Objects/RenameKind", "map: 'world' kind: 'box' name: 'crate'"},
+       {"Objects/GetKind", "map: 'world' kind: 'crate'"},
+       {"Objects/ListEntities", "map: 'world' kind: 'crate'"},
+       {"Objects/DeleteKind", "map: 'world' kind: 'crate'"},
+       {"Objects/ListKinds", "map: 'world'"}},
       {{"Jobs/Start", "map: 'world' kind: 'classify' parameters { key: 'model' value: 'first' }"},
        {"Jobs/Watch", kNextJob},
        {"Scans/GetPoints", "map: 'world' id { trajectory: 'world' sequence: 1 }"},

@@ -314,6 +314,26 @@ class MockObjects : public api::Objects {
               ListEntities,
               (const api::Call&, absl::string_view, const EntityQuery&, Sink<Entity>),
               (override));
+  MOCK_METHOD(absl::StatusOr<std::vector<KindInfo>>,
+              ListKinds,
+              (const api::Call&, absl::string_view),
+              (override));
+  MOCK_METHOD(absl::StatusOr<Kind>,
+              GetKind,
+              (const api::Call&, absl::string_view, absl::string_view),
+              (override));
+  MOCK_METHOD(absl::StatusOr<KindInfo>,
+              RenameKind,
+              (const api::Call&, absl::string_view, absl::string_view, absl::string_view),
+              (override));
+  MOCK_METHOD(absl::StatusOr<KindInfo>,
+              ImportKind,
+              (const api::Call&, absl::string_view, const NewKind&),
+              (override));
+  MOCK_METHOD(absl::Status,
+              DeleteKind,
+              (const api::Call&, absl::string_view, absl::string_view),
+              (override));
 };
 
 // Calls nobody decided on answer UNKNOWN (gmock's default of a StatusOr).

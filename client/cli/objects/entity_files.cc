@@ -11,6 +11,7 @@
 
 #include "client/cli/terminal/json.h"
 #include "client/formats/file_bytes.h"
+#include "core/world/kind.h"
 
 namespace strata::cli {
 namespace {
@@ -26,12 +27,28 @@ Json GeoJsonPlace(const Eigen::Vector3d& p_map, const std::optional<LocalFrame>&
           place.altitude_m};
 }
 
+// null: of none.
+Json EntityKindJson(const std::optional<EntityKind>& kind) {
+  if (!kind.has_value()) return nullptr;
+  return {{"id", KindIdText(kind->id)},
+          {"name", kind->name},
+          {"T_map_kind", ToJson(kind->T_map_kind)},
+          {"residual_m", kind->residual_m},
+          {"overlap", kind->overlap}};
+}
+
 }  // namespace
+
+std::string KindText(const Entity& entity) {
+  if (!entity.kind.has_value()) return "";
+  return entity.kind->name.empty() ? KindIdText(entity.kind->id) : entity.kind->name;
+}
 
 Json EntityJson(const Entity& entity, const std::vector<MapClass>& classes) {
   Json scans = Json::object();
   for (const EntityScan& seen : entity.scans) scans[seen.scan.ToString()] = seen.points;
   return {{"id", entity.id},
+          {"kind", EntityKindJson(entity.kind)},
           {"class", ClassOf(classes, entity.class_id).name},
           {"class_id", entity.class_id},
           {"centre", ToJson(entity.box.centre)},
@@ -60,11 +77,11 @@ std::string EntitiesGeoJson(const FetchedEntities& fetched,
 }
 
 std::string EntitiesCsv(const FetchedEntities& fetched) {
-  std::string out = "id,class,x,y,z,length,width,height,yaw,points,scans\n";
+  std::string out = "id,class,x,y,z,length,width,height,yaw,points,scans,kind\n";
   for (const Entity& entity : fetched.entities) {
     const UprightBox& box = entity.box;
     absl::StrAppendFormat(&out,
-                          "%d,%s,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.4f,%d,%d\n",
+                          "%d,%s,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.4f,%d,%d,%s\n",
                           entity.id,
                           ClassOf(fetched.classes, entity.class_id).name,
                           box.centre.x(),
@@ -75,7 +92,8 @@ std::string EntitiesCsv(const FetchedEntities& fetched) {
                           box.size.z(),
                           box.yaw_rad,
                           entity.points,
-                          entity.scans.size());
+                          entity.scans.size(),
+                          KindText(entity));
   }
   return out;
 }

@@ -14,13 +14,17 @@
 
 namespace strata::cli {
 
-// {"id", "class", …, "scans": {"run/1": points}}.
+// What people call its kind: its name, or its id while it has none; empty: of none.
+std::string KindText(const Entity& entity);
+
+// {"id", "kind", "class", …, "scans": {"run/1": points}}.
 Json EntityJson(const Entity& entity, const std::vector<MapClass>& classes);
 
 // A FeatureCollection (RFC 7946), a Feature with the base of its box as Polygon for each entity;
 // coordinates as in those of planes (client/formats/planes), "frame" says which.
 std::string EntitiesGeoJson(const FetchedEntities& fetched, const std::optional<LocalFrame>& earth);
-// A head and a line for each: id,class,x,y,z,length,width,height,yaw,points,scans; metres, radians.
+// A head and a line for each: id,class,x,y,z,length,width,height,yaw,points,scans,kind; metres,
+// radians.
 std::string EntitiesCsv(const FetchedEntities& fetched);
 
 // By the ending of the file's name: .geojson, .csv. INVALID_ARGUMENT naming these for another one,

@@ -1,5 +1,6 @@
 // strata objects find|list|show|export
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -28,13 +29,15 @@ struct ObjectsOptions {
   JobParameters parameters;
   bool wait = false;
   std::string class_name;
+  std::string kind;
   std::optional<Eigen::AlignedBox3d> region;
   std::uint64_t id = 0;
   std::string out;
 };
 
 absl::StatusOr<FetchedEntities> FetchChosen(Context& context, const ObjectsOptions& options) {
-  return FetchEntities(context, options.map, {.region = options.region}, options.class_name);
+  return FetchEntities(
+      context, options.map, {.region = options.region, .kind = options.kind}, options.class_name);
 }
 
 absl::Status FindObjects(Context& context, const ObjectsOptions& options) {
@@ -67,10 +70,14 @@ absl::Status ListObjects(Context& context, const ObjectsOptions& options) {
     context.output.Object(all);
     return absl::OkStatus();
   }
-  for (Json& entity : entities) entity["seen_by"] = entity["scans"].size();
+  for (std::size_t i = 0; i < entities.size(); ++i) {
+    entities[i]["seen_by"] = entities[i]["scans"].size();
+    entities[i]["kind"] = KindText(fetched.entities[i]);
+  }
   context.output.List(entities,
                       {{"id", "ID"},
                        {"class", "CLASS"},
+                       {"kind", "KIND"},
                        {"centre", "CENTRE"},
                        {"size_m", "SIZE"},
                        {"yaw_rad", "YAW"},
@@ -111,6 +118,8 @@ absl::Status ExportObjects(Context& context, const ObjectsOptions& options) {
 
 void AddChoice(CLI::App* verb, ObjectsOptions& options) {
   verb->add_option("--class", options.class_name, "Only this class, by name or number");
+  verb->add_option(
+      "--kind", options.kind, "Only those of this kind, by name or first digits of id");
   AddRegion(verb, options.region);
 }
 
@@ -124,7 +133,8 @@ void AddObjectsCommands(Commands& commands) {
   const auto verb = MapVerbs(commands, noun, options);
   CLI::App* find = verb("find",
                         "Find the things that points with a class make up, across scans, in place "
-                        "of those found before (job objects); map render --objects draws them",
+                        "of those found before, and which of them are the same (job objects); map "
+                        "render --objects draws them",
                         "strata objects find campus class=car --wait",
                         FindObjects);
   AddJobParameters(find, options->parameters);

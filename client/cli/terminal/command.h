@@ -93,6 +93,7 @@ void AddProfileCommands(Commands& commands);
 void AddJobCommands(Commands& commands);
 void AddPlanesCommands(Commands& commands);
 void AddObjectsCommands(Commands& commands);
+void AddKindCommands(Commands& commands);
 void AddLocalizeCommand(Commands& commands);
 void AddDriveCommand(Commands& commands);
 void AddEgomotionCommand(Commands& commands);

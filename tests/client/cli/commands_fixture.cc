@@ -28,6 +28,7 @@ absl::Status CommandsTest::Run(std::vector<std::string> words, OutputFormat form
   AddPosegraphCommands(commands);
   AddPlanesCommands(commands);
   AddObjectsCommands(commands);
+  AddKindCommands(commands);
   AddLocalizeCommand(commands);
   AddPlanCommand(commands);
   AddSurfaceCommand(commands);

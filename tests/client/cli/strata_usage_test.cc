@@ -67,6 +67,11 @@ TEST_F(StrataUsageTest, EveryCommandHasHelpWithAnExample) {
                                              "objects list",
                                              "objects show",
                                              "objects export",
+                                             "kind list",
+                                             "kind rename",
+                                             "kind export",
+                                             "kind import",
+                                             "kind delete",
                                              "posegraph show",
                                              "posegraph add-constraint",
                                              "posegraph remove-constraint",
@@ -129,6 +134,7 @@ TEST_F(StrataUsageTest, NounsAndTheProgramHaveHelpWithAnExample) {
                                  "posegraph",
                                  "planes",
                                  "objects",
+                                 "kind",
                                  "path"}) {
     EXPECT_THAT(RunStrata({noun, "--help"}).out, HasSubstr("Example:\n  strata " + noun));
   }

@@ -122,7 +122,7 @@ TEST(KindCodecTest, KindsAreCalledByNameOrByDigits) {
   EXPECT_EQ(KindCalled(kinds, KindIdText(golf.id))->id, golf.id);
   EXPECT_THAT(KindCalled(kinds, "abcd"), StatusIs(Code::kInvalidArgument, HasSubstr("2 kinds")));
   EXPECT_THAT(KindCalled(kinds, "abc"), StatusIs(Code::kNotFound, HasSubstr("kind list")));
-  EXPECT_THAT(KindCalled(kinds, ""), StatusIs(Code::kNotFound));
+  EXPECT_THAT(KindCalled(kinds, ""), StatusIs(Code::kNotFound, HasSubstr("kind list")));
 }
 
 }  // namespace

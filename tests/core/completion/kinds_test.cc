@@ -159,7 +159,7 @@ TEST(KindsTest, ItStopsWhenAsked) {
         EXPECT_LE(done, 1.0);
         return ++calls < 3 ? absl::OkStatus() : absl::CancelledError("enough");
       });
-  EXPECT_THAT(sorted, StatusIs(absl::StatusCode::kCancelled));
+  EXPECT_THAT(sorted, StatusIs(absl::StatusCode::kCancelled, HasSubstr("enough")));
   EXPECT_EQ(calls, 3);
   EXPECT_THAT(KindOptions{.tolerance_m = 0.0}.Validate(),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("tolerance_m")));
@@ -180,7 +180,7 @@ TEST(KindsTest, ManyThingsThatAreUnlikeTakeSecondsEach) {
       low.z() = std::max(0.0, low.z());
       solid.emplace_back(low, low + size);
     }
-    entities.push_back(EntityOf(3, testing::SeenOf(solid, false, {}, random)));
+    entities.push_back(testing::EntityOf(3, testing::SeenOf(solid, false, {}, random)));
   }
   const SortedKinds sorted = Sort(entities);
   std::size_t kinds = 0;

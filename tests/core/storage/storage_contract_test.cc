@@ -10,6 +10,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -620,6 +621,48 @@ TEST_F(StorageContractTest, AnEntityGoesWithTheLastScanThatSawIt) {
   STRATA_ASSERT_OK(Commit([&] { return writer().DeleteScan(two); }));
   EXPECT_FALSE(reader().FindEntityPart(9, 0)->has_value());
   EXPECT_THAT(reader().JobOfEntities(), IsOkAndHolds(9U));
+}
+
+TEST_F(StorageContractTest, KindsOfTheLibraryAreKeptAndFoundOnesGoWithTheEntities) {
+  const auto ids = [&] {
+    std::vector<std::string> names;
+    const auto kinds = reader().ListKinds();
+    STRATA_EXPECT_OK(kinds);
+    if (!kinds.ok()) return names;
+    for (const KindRow& row : *kinds) {
+      names.push_back(absl::StrCat(row.id, row.in_library ? " " : " found", row.name, row.info));
+    }
+    return names;
+  };
+  EXPECT_THAT(ids(), ElementsAre());
+  STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(writer().PutKind({9, "golf", true, "+"}, std::string("s\0h", 3)));
+    STRATA_RETURN_IF_ERROR(writer().PutFoundKind({4, "", false, "-"}, "found"));
+    return writer().PutFoundKind({9, "", false, "-"}, "hidden");
+  }));
+  Reopen();
+  EXPECT_THAT(ids(), ElementsAre("9 golf+", "4 found-"));
+  EXPECT_EQ(**reader().FindKindShape(9), std::string("s\0h", 3));
+  EXPECT_EQ(**reader().FindKindShape(4), "found");
+  EXPECT_FALSE(reader().FindKindShape(5)->has_value());
+  const auto put = [&](std::uint64_t id, const std::string& name) {
+    return Commit([&] { return writer().PutKind({id, name, true, "+"}, "x"); });
+  };
+  EXPECT_THAT(put(9, "other"), StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("other")));
+  EXPECT_THAT(put(10, "golf"), StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("golf")));
+  STRATA_ASSERT_OK(put(4, "van"));
+  EXPECT_THAT(Commit([&] { return writer().RenameKind(4, "golf"); }),
+              StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("golf")));
+  STRATA_ASSERT_OK(Commit([&] { return writer().RenameKind(4, "bus"); }));
+  EXPECT_THAT(ids(), ElementsAre("4 bus+", "9 golf+"));
+  STRATA_ASSERT_OK(Commit([&] { return writer().DeleteKind(9); }));
+  EXPECT_THAT(ids(), ElementsAre("4 bus+", "9 found-"));
+  STRATA_ASSERT_OK(Commit([&] { return writer().DeleteEntities(); }));
+  EXPECT_THAT(ids(), ElementsAre("4 bus+"));
+  STRATA_ASSERT_OK(Commit([&] { return writer().PutFoundKind({5, "", false, "-"}, "found"); }));
+  STRATA_ASSERT_OK(Commit([&] { return writer().DropDerived(); }));
+  EXPECT_THAT(ids(), ElementsAre("4 bus+"));
+  EXPECT_EQ(**reader().FindKindShape(4), "x");
 }
 
 TEST_F(StorageContractTest, FullStoreIsAnErrorAndLosesNothing) {

@@ -2,6 +2,7 @@
 // so that a field that is added and forgotten in the translation fails here.
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -226,6 +227,12 @@ TEST(TranslateRoundTripTest, Models) {
 TEST(TranslateRoundTripTest, Objects) {
   ExpectRoundTrip(Filled<v1::Entity>());
   ExpectRoundTrip(Filled<v1::EntitySearch>());
+  ExpectRoundTrip(Filled<v1::KindInfo>());
+  auto unsaid = Filled<v1::KindInfo>();
+  unsaid.set_origin(v1::KIND_ORIGIN_UNSPECIFIED);
+  EXPECT_THAT(
+      FromProto(unsaid),
+      testing::StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr("origin")));
   auto request = Filled<v1::ListEntitiesRequest>();
   STRATA_ASSERT_OK_AND_ASSIGN(const EntityQuery query, FromProto(request));
   ExpectSame(request, ToProto(request.map(), query));
@@ -238,6 +245,33 @@ TEST(TranslateRoundTripTest, Objects) {
   EXPECT_THAT(
       FromProto(request),
       testing::StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr("region")));
+}
+
+TEST(TranslateRoundTripTest, ShapesOfKinds) {
+  NewKind kind{"box", "thing", {}};
+  for (int i = 0; i < 25; ++i) kind.shape.points.emplace_back(0.1F * static_cast<float>(i), 1, 2);
+  kind.shape.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  kind.shape.triangles = {{0, 1, 2}};
+  const v1::ImportKindRequest request = ToProto("m", kind);
+  STRATA_ASSERT_OK_AND_ASSIGN(const NewKind back, FromProto(request));
+  EXPECT_EQ(back.name, kind.name);
+  EXPECT_EQ(back.class_name, kind.class_name);
+  EXPECT_EQ(back.shape, kind.shape);
+  const auto refused = [](v1::KindShape shape, const char* why) {
+    EXPECT_THAT(FromProto(shape),
+                testing::StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr(why)));
+  };
+  v1::KindShape odd = request.shape();
+  odd.add_points(1.0F);
+  refused(odd, "shape.points has 76 numbers");
+  v1::KindShape hostile = request.shape();
+  hostile.set_points(7, 1e30F);
+  refused(hostile, "point 2");
+  hostile.set_points(7, std::numeric_limits<float>::quiet_NaN());
+  refused(hostile, "point 2");
+  v1::KindShape large = request.shape();
+  for (int i = 0; i < 60'000; ++i) large.add_vertices(0.0F);
+  refused(large, "vertices");
 }
 
 TEST(TranslateRoundTripTest, Planning) {

@@ -84,6 +84,8 @@ const std::map<std::string, std::optional<Right>>& Needed() {
          "Planning.CheckShape",
          "Models.GetPlaneModel",
          "Objects.ListEntities",
+         "Objects.ListKinds",
+         "Objects.GetKind",
          "Planning.WatchPath"});
     add(Right::kWrite,
         {"Maps.SetClass",
@@ -102,6 +104,9 @@ const std::map<std::string, std::optional<Right>>& Needed() {
          "Jobs.Cancel",
          "Jobs.Accept",
          "Jobs.Revert",
+         "Objects.RenameKind",
+         "Objects.ImportKind",
+         "Objects.DeleteKind",
          "Classifiers.Delete",
          "Classifiers.Import"});
     add(Right::kAdmin, {"Maps.Create", "Maps.Delete", "Maps.Backup"});

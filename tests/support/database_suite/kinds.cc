@@ -1,0 +1,255 @@
+// Conformance: the kinds of things in maps.
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/cloud/point_cloud.h"
+#include "core/world/entity.h"
+#include "core/world/kind.h"
+#include "tests/support/database_suite/database_suite.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using Code = absl::StatusCode;
+
+constexpr std::uint16_t kGroundClass = 1;
+constexpr std::uint16_t kThingClass = 2;
+
+// The sides and the top of a block that stands on the floor.
+void AddBlock(const Eigen::Vector3f& low, const Eigen::Vector3f& size, PointCloud& cloud) {
+  constexpr float kStep = 0.05F;
+  for (float x = 0.0F; x <= size.x(); x += kStep) {
+    for (float y = 0.0F; y <= size.y(); y += kStep) {
+      for (float z = 0.1F; z <= size.z(); z += kStep) {
+        const bool side = x < kStep || y < kStep || x + kStep > size.x() || y + kStep > size.y();
+        if (!side && z + kStep <= size.z()) continue;
+        cloud.points.emplace_back(low + Eigen::Vector3f(x, y, z));
+        cloud.label.push_back(kThingClass);
+      }
+    }
+  }
+}
+
+// Of each of two kinds two, and one that is like no other.
+PointCloud FloorWithThings() {
+  PointCloud cloud = LevelFloor();
+  cloud.label.assign(cloud.size(), kGroundClass);
+  AddBlock({-3.0F, -3.0F, 0.0F}, {0.8F, 0.6F, 1.0F}, cloud);
+  AddBlock({2.0F, -2.0F, 0.0F}, {0.8F, 0.6F, 1.0F}, cloud);
+  AddBlock({-3.0F, 2.0F, 0.0F}, {1.6F, 0.4F, 0.5F}, cloud);
+  AddBlock({1.0F, 2.0F, 0.0F}, {1.6F, 0.4F, 0.5F}, cloud);
+  AddBlock({-0.5F, -0.5F, 0.0F}, {0.3F, 0.3F, 1.8F}, cloud);
+  return cloud;
+}
+
+void PutThings(api::Database& db, const std::string& map = kMap) {
+  const PointCloud cloud = FloorWithThings();
+  STRATA_ASSERT_OK(UploadScan(db, map, FloorHeader({"run", 1}, cloud), cloud));
+  AwaitIntegration(db, map);
+  STRATA_ASSERT_OK(db.maps().SetClass({}, map, {kThingClass, "thing", {200, 90, 20}}));
+}
+
+JobInfo FindKinds(api::Database& db, const std::string& map = kMap) {
+  JobInfo last;
+  const auto job = db.jobs().Start({}, map, "objects", {{"class", "thing"}});
+  STRATA_EXPECT_OK(job);
+  if (!job.ok()) return last;
+  STRATA_EXPECT_OK(db.jobs().Watch({}, map, job->id, [&last](const JobInfo& now) {
+    last = now;
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(last.state, JobState::kSucceeded) << last.message;
+  return last;
+}
+
+std::vector<Entity> EntitiesWith(api::Database& db,
+                                 const EntityQuery& query = {},
+                                 const std::string& map = kMap) {
+  std::vector<Entity> entities;
+  STRATA_EXPECT_OK(db.objects().ListEntities({}, map, query, [&](const Entity& entity) {
+    entities.push_back(entity);
+    return absl::OkStatus();
+  }));
+  return entities;
+}
+
+NewKind Crate(float height) {
+  NewKind kind{"crate", "thing", {}};
+  PointCloud cloud;
+  AddBlock({-0.4F, -0.3F, 0.0F}, {0.8F, 0.6F, height}, cloud);
+  kind.shape.points = cloud.points;
+  kind.shape.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  kind.shape.triangles = {{0, 1, 2}};
+  return kind;
+}
+
+TEST_P(DatabaseSuite, ThingsAreSortedIntoKindsThatPeopleName) {
+  EXPECT_THAT(*db().objects().ListKinds({}, kMap), IsEmpty());
+  PutThings(db());
+  const JobInfo job = FindKinds(db());
+  EXPECT_EQ(job.metrics.at("kinds"), 2.0);
+  EXPECT_THAT(job.message, HasSubstr("4 of 2 kinds"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::vector<KindInfo> found,
+                              db().objects().ListKinds({}, kMap));
+  ASSERT_THAT(found, SizeIs(2));
+  for (const KindInfo& kind : found) {
+    EXPECT_EQ(kind.origin, KindOrigin::kFound);
+    EXPECT_EQ(kind.class_id, kThingClass);
+    EXPECT_EQ(kind.entities, 2U);
+    EXPECT_EQ(kind.name, "");
+  }
+  const std::vector<Entity> all = EntitiesWith(db());
+  ASSERT_THAT(all, SizeIs(5));
+  EXPECT_EQ(std::count_if(all.begin(), all.end(), [](const Entity& e) { return !e.kind; }), 1);
+
+  const std::string id = KindIdText(found[0].id);
+  STRATA_ASSERT_OK_AND_ASSIGN(const KindInfo named,
+                              db().objects().RenameKind({}, kMap, id.substr(0, 8), "low.box"));
+  EXPECT_EQ(named.id, found[0].id);
+  EXPECT_EQ(named.origin, KindOrigin::kNamed);
+  ASSERT_THAT(EntitiesWith(db(), {.kind = "low.box"}), SizeIs(2));
+  EXPECT_EQ(EntitiesWith(db(), {.kind = "low.box"})[0].kind->name, "low.box");
+  EXPECT_THAT(db().objects().RenameKind({}, kMap, KindIdText(found[1].id), "low.box"),
+              StatusIs(Code::kAlreadyExists, HasSubstr("low.box")));
+  EXPECT_THAT(db().objects().RenameKind({}, kMap, id, "no name"),
+              StatusIs(Code::kInvalidArgument, HasSubstr("kind name")));
+  // It keeps id and name over runs, restarts and rebuilds.
+  Reopen();
+  FindKinds(db());
+  EXPECT_EQ(db().objects().ListKinds({}, kMap)->at(0).name, "low.box");
+  ASSERT_THAT(EntitiesWith(db(), {.kind = "low.box"}), SizeIs(2));
+  EXPECT_THAT(db().objects().DeleteKind({}, kMap, KindIdText(found[1].id)),
+              StatusIs(Code::kFailedPrecondition, HasSubstr("no name")));
+  STRATA_ASSERT_OK(db().objects().DeleteKind({}, kMap, "low.box"));
+  EXPECT_THAT(db().objects().DeleteKind({}, kMap, "low.box"),
+              StatusIs(Code::kNotFound, HasSubstr("low.box")));
+  EXPECT_EQ(std::ssize(EntitiesWith(db())), 5);
+  FindKinds(db());
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::vector<KindInfo> again,
+                              db().objects().ListKinds({}, kMap));
+  ASSERT_THAT(again, SizeIs(2));
+  EXPECT_EQ(again[0].id, found[0].id);
+  EXPECT_EQ(again[0].name, "");
+}
+
+TEST_P(DatabaseSuite, FoundKindsComeBackBitForBitAfterARebuild) {
+  PutThings(db());
+  FindKinds(db());
+  const auto shapes = [&] {
+    std::vector<KindShape> all;
+    for (const KindInfo& kind : *db().objects().ListKinds({}, kMap)) {
+      all.push_back(db().objects().GetKind({}, kMap, KindIdText(kind.id))->shape);
+    }
+    return all;
+  };
+  const std::vector<KindShape> before = shapes();
+  const std::vector<Entity> entities = EntitiesWith(db());
+  const auto rebuild = db().jobs().Start({}, kMap, "rebuild", {});
+  STRATA_ASSERT_OK(rebuild);
+  STRATA_ASSERT_OK(
+      db().jobs().Watch({}, kMap, rebuild->id, [](const JobInfo&) { return absl::OkStatus(); }));
+  EXPECT_THAT(*db().objects().ListKinds({}, kMap), IsEmpty());
+  FindKinds(db());
+  EXPECT_EQ(shapes(), before);
+  const std::vector<Entity> after = EntitiesWith(db());
+  ASSERT_EQ(after.size(), entities.size());
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    ASSERT_EQ(after[i].kind.has_value(), entities[i].kind.has_value());
+    if (!after[i].kind.has_value()) continue;
+    EXPECT_EQ(after[i].kind->id, entities[i].kind->id);
+    EXPECT_EQ(after[i].kind->T_map_kind.matrix(), entities[i].kind->T_map_kind.matrix());
+    EXPECT_EQ(after[i].kind->residual_m, entities[i].kind->residual_m);
+  }
+}
+
+TEST_P(DatabaseSuite, AnImportedKindIsRecognised) {
+  PutThings(db());
+  const NewKind crate = Crate(1.0F);
+  STRATA_ASSERT_OK_AND_ASSIGN(const KindInfo info, db().objects().ImportKind({}, kMap, crate));
+  EXPECT_EQ(info.class_id, kThingClass);
+  EXPECT_EQ(info.points, crate.shape.points.size());
+  EXPECT_EQ(info.triangles, 1U);
+  EXPECT_THAT(db().objects().ImportKind({}, kMap, crate),
+              StatusIs(Code::kAlreadyExists, HasSubstr("crate")));
+  EXPECT_EQ(FindKinds(db()).metrics.at("kinds_found"), 1.0);
+  const std::vector<Entity> crates = EntitiesWith(db(), {.kind = "crate"});
+  ASSERT_THAT(crates, SizeIs(2));
+  for (const Entity& entity : crates) {
+    EXPECT_NEAR(entity.kind->T_map_kind.translation().z(), 0.0, 0.06);
+    EXPECT_LT((entity.kind->T_map_kind.translation() - entity.box.centre).head<2>().norm(), 0.1);
+    EXPECT_GT(entity.kind->overlap, 0.9);
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const Kind read, db().objects().GetKind({}, kMap, "crate"));
+  EXPECT_EQ(read.shape, crate.shape);
+  EXPECT_EQ(read.info.entities, 2U);
+  // In another map it has the same id.
+  STRATA_ASSERT_OK(db().maps().Create({}, "other", {}));
+  NewKind there{"box", "furniture", read.shape};
+  STRATA_ASSERT_OK_AND_ASSIGN(const KindInfo other, db().objects().ImportKind({}, "other", there));
+  EXPECT_EQ(other.id, info.id);
+  EXPECT_EQ(db().maps().ListClasses({}, "other")->back().name, "furniture");
+  const auto verify = db().jobs().Start({}, kMap, "verify", {});
+  STRATA_ASSERT_OK(verify);
+  JobInfo last;
+  STRATA_ASSERT_OK(db().jobs().Watch({}, kMap, verify->id, [&last](const JobInfo& now) {
+    last = now;
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(last.state, JobState::kSucceeded) << last.message;
+}
+
+TEST_P(DatabaseSuite, KindsThatCannotBeAreRefused) {
+  const auto refused = [&](const NewKind& kind, const char* why) {
+    EXPECT_THAT(db().objects().ImportKind({}, kMap, kind),
+                StatusIs(Code::kInvalidArgument, HasSubstr(why)));
+  };
+  NewKind kind = Crate(1.0F);
+  kind.shape.points[5].z() = std::numeric_limits<float>::quiet_NaN();
+  refused(kind, "point 5");
+  kind = Crate(1.0F);
+  kind.shape.points[6].x() = 1e30F;
+  refused(kind, "point 6");
+  kind = Crate(1.0F);
+  kind.shape.points.resize(kMaxKindPoints + 1, Eigen::Vector3f::Zero());
+  refused(kind, "points");
+  kind = Crate(1.0F);
+  kind.name = std::string(101, 'a');
+  refused(kind, "kind name");
+  kind = Crate(1.0F);
+  kind.class_name = "";
+  refused(kind, "class name");
+  EXPECT_THAT(db().objects().GetKind({}, kMap, "none"),
+              StatusIs(Code::kNotFound, HasSubstr("kind list")));
+  EXPECT_THAT(db().objects().ListKinds({}, "none"), StatusIs(Code::kNotFound, HasSubstr("none")));
+  EXPECT_THAT(*db().objects().ListKinds({}, kMap), IsEmpty());
+}
+
+TEST_P(DatabaseSuite, ALibraryHasABound) {
+  NewKind kind = Crate(1.0F);
+  kind.shape.points.resize(kMinKindPoints);
+  kind.shape.vertices.clear();
+  kind.shape.triangles.clear();
+  for (std::size_t i = 0; i < kMaxKinds; ++i) {
+    kind.name = "kind" + std::to_string(i);
+    kind.shape.points[0].x() = static_cast<float>(i) * 0.01F;
+    STRATA_ASSERT_OK(db().objects().ImportKind({}, kMap, kind));
+  }
+  kind.name = "more";
+  kind.shape.points[0].x() = 50.0F;
+  EXPECT_THAT(db().objects().ImportKind({}, kMap, kind),
+              StatusIs(Code::kResourceExhausted, HasSubstr("at most 256")));
+}
+
+}  // namespace
+}  // namespace strata::testing
