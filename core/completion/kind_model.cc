@@ -16,7 +16,8 @@ namespace {
 
 constexpr int kTurns = 8;
 constexpr std::size_t kStartSamples = 100;
-constexpr std::size_t kMostStarts = 3;
+constexpr std::size_t kMostMeasured = 16;
+constexpr std::size_t kMostStarts = 4;
 constexpr double kLeastShare = 0.5;
 constexpr int kMostVoxelsAlong = 48;
 constexpr double kReachSpacings = 1.5;
@@ -124,44 +125,68 @@ bool KindModel::HasVoxelAt(const Eigen::Vector3f& p) const {
   return voxels_[static_cast<std::size_t>((k.z() * counts_.y() + k.y()) * counts_.x() + k.x())];
 }
 
-std::vector<KindModel::Start> KindModel::StartsOf(const ThingPoints& thing,
-                                                  KindStarts starts) const {
-  const std::vector<Eigen::Vector3f> samples = SamplesOf(thing, kStartSamples);
-  const bool sides = starts == KindStarts::kSideOnSide;
+void KindModel::AddStarts(const ThingPoints& thing,
+                          const std::vector<Eigen::Vector3f>& samples,
+                          double angle,
+                          bool sides,
+                          std::vector<Start>& starts) const {
+  const Eigen::Matrix3d R = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  std::vector<Eigen::Vector3f> turned;
+  for (const Eigen::Vector3f& p : samples) turned.push_back(R.cast<float>() * p);
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& p : thing.points()) box.extend(R.cast<float>() * p);
   const Eigen::AlignedBox3f& own = thing_.bounds();
-  std::vector<Start> best(kTurns);
-  for (int turn = 0; turn < kTurns; ++turn) {
-    const double angle = 2.0 * std::numbers::pi * turn / kTurns;
-    const Eigen::Matrix3d R = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-    std::vector<Eigen::Vector3f> turned;
-    for (const Eigen::Vector3f& p : samples) turned.push_back(R.cast<float>() * p);
-    Eigen::AlignedBox3f box;
-    for (const Eigen::Vector3f& p : thing.points()) box.extend(R.cast<float>() * p);
-    const auto shifts = [&](int k) {
-      return ShiftsAlong(box.min()[k], box.max()[k], own.min()[k], own.max()[k], sides);
-    };
-    std::vector<float> rises = {own.min().z() - box.min().z()};
-    if (sides) rises.push_back(own.max().z() - box.max().z());
-    Start& start = best[static_cast<std::size_t>(turn)];
-    for (const float x : shifts(0)) {
-      for (const float y : shifts(1)) {
-        for (const float z : rises) {
-          const Eigen::Vector3f shift(x, y, z);
-          const auto within = std::count_if(
-              turned.begin(), turned.end(), [&](const auto& p) { return HasVoxelAt(p + shift); });
-          const double share = static_cast<double>(within) / static_cast<double>(turned.size());
-          if (share <= start.share) continue;
-          start.share = share;
-          start.T_kind_thing.linear() = R;
-          start.T_kind_thing.translation() = shift.cast<double>();
-        }
+  const auto shifts = [&](int k) {
+    return ShiftsAlong(box.min()[k], box.max()[k], own.min()[k], own.max()[k], sides);
+  };
+  std::vector<float> rises = {own.min().z() - box.min().z()};
+  if (sides) rises.push_back(own.max().z() - box.max().z());
+  for (const float x : shifts(0)) {
+    for (const float y : shifts(1)) {
+      for (const float z : rises) {
+        const Eigen::Vector3f shift(x, y, z);
+        const auto within = std::count_if(
+            turned.begin(), turned.end(), [&](const auto& p) { return HasVoxelAt(p + shift); });
+        Start start;
+        start.share = static_cast<double>(within) / static_cast<double>(turned.size());
+        if (start.share < kLeastShare) continue;
+        start.T_kind_thing.linear() = R;
+        start.T_kind_thing.translation() = shift.cast<double>();
+        starts.push_back(start);
       }
     }
   }
+}
+
+// Mean distance of the points from the kind's, no farther than where its voxels end.
+double KindModel::DistanceFrom(const Pose& T_kind_thing,
+                               const std::vector<Eigen::Vector3f>& samples) const {
+  double sum = 0.0;
+  for (const Eigen::Vector3f& p : samples) {
+    const Eigen::Vector3f moved = (T_kind_thing * p.cast<double>()).cast<float>();
+    const auto nearest = thing_.NearestTo(moved, voxel_m_);
+    sum += nearest.has_value() ? (moved - thing_.points()[*nearest]).norm() : voxel_m_;
+  }
+  return sum / static_cast<double>(samples.size());
+}
+
+std::vector<KindModel::Start> KindModel::StartsOf(const ThingPoints& thing,
+                                                  KindStarts starts) const {
+  const std::vector<Eigen::Vector3f> samples = SamplesOf(thing, kStartSamples);
+  std::vector<Start> best;
+  for (int turn = 0; turn < kTurns; ++turn) {
+    const double angle = 2.0 * std::numbers::pi * turn / kTurns;
+    AddStarts(thing, samples, angle, starts == KindStarts::kSideOnSide, best);
+  }
   std::stable_sort(
       best.begin(), best.end(), [](const Start& a, const Start& b) { return a.share > b.share; });
-  best.resize(kMostStarts);
-  std::erase_if(best, [](const Start& start) { return start.share < kLeastShare; });
+  if (best.size() > kMostMeasured) best.resize(kMostMeasured);
+  // Voxels are coarse, and many starts may have all points within them.
+  for (Start& start : best) start.distance_m = DistanceFrom(start.T_kind_thing, samples);
+  std::stable_sort(best.begin(), best.end(), [](const Start& a, const Start& b) {
+    return a.distance_m < b.distance_m;
+  });
+  if (best.size() > kMostStarts) best.resize(kMostStarts);
   return best;
 }
 

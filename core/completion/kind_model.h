@@ -45,12 +45,14 @@ class KindModel {
   double tolerance_m() const { return tolerance_m_; }
 
   // Whether a registration may be worth its time: the share of some points of the thing that lie
-  // within voxels of the kind, from the best of the starts.
+  // within voxels of the kind.
   struct Start {
     Pose T_kind_thing = Pose::Identity();
     double share = 0.0;
+    double distance_m = 0.0;  // mean of the points from the kind's
   };
-  // Turned about z by eighths, the best three, falling; those below a half are left out.
+  // Turned about z by eighths, the best four, the nearest first; those with less than a half are
+  // left out.
   std::vector<Start> StartsOf(const ThingPoints& thing, KindStarts starts) const;
 
   // The best registration from these; nullopt where none of them has the thing on the kind, or it
@@ -58,6 +60,12 @@ class KindModel {
   std::optional<KindFit> Register(const ThingPoints& thing, const std::vector<Start>& starts) const;
 
  private:
+  void AddStarts(const ThingPoints& thing,
+                 const std::vector<Eigen::Vector3f>& samples,
+                 double angle,
+                 bool sides,
+                 std::vector<Start>& starts) const;
+  double DistanceFrom(const Pose& T_kind_thing, const std::vector<Eigen::Vector3f>& samples) const;
   bool HasVoxelAt(const Eigen::Vector3f& p) const;
   void FillVoxels();
   void FillNormals();

@@ -25,6 +25,8 @@ constexpr std::size_t kMostModels = 2'000;  // of a class
 constexpr std::size_t kMostAlike = 4;       // kinds that an entity is compared with
 constexpr std::size_t kMostWhole = 12;      // that it may be a part of, by voxels
 constexpr std::size_t kMostRegistered = 3;
+// Others that a reference may have and be a part of another kind all the same, with them.
+constexpr std::size_t kMostLikeParts = 1;
 constexpr double kMostFeatureDistance = 3.0;  // of kinds that are alike, in standard deviations
 constexpr double kToleranceSpacings = 0.4;
 // Standard deviations are not taken for smaller, or noise would part what is alike.
@@ -68,7 +70,7 @@ struct Reference {
   std::uint64_t id = 0;  // of the library; 0: not known yet
   std::unique_ptr<KindModel> model;
   Pose T_map_model = Pose::Identity();  // of the entity
-  bool alone = true;                    // no other entity is of it
+  std::vector<std::size_t> members;     // other entities that are of it
   bool dropped = false;                 // it is a part of another
 };
 
@@ -145,7 +147,9 @@ class ClassSorter {
   bool Accepts(const Reference& reference, const KindFit& fit, KindStarts starts) const;
   void SortAlike(const Candidate& thing);
   void SortPart(const Candidate& thing);
-  void Assign(const Candidate& thing, const Match& match);
+  // The kind that a reference, and the one that is like it, are parts of.
+  std::optional<Match> WholeOf(const Reference& reference, std::optional<Match>& other) const;
+  void Assign(std::size_t entity, const Match& match);
 
   std::span<const FoundEntity> entities_;
   const KindOptions& options_;
@@ -226,7 +230,7 @@ std::optional<Match> ClassSorter::BestOf(const ThingPoints& points,
     if (!one.starts.empty()) tried.push_back(std::move(one));
   }
   std::stable_sort(tried.begin(), tried.end(), [](const Tried& a, const Tried& b) {
-    return a.starts.front().share > b.starts.front().share;
+    return a.starts.front().distance_m < b.starts.front().distance_m;
   });
   if (tried.size() > kMostRegistered) tried.resize(kMostRegistered);
   std::optional<Match> best;
@@ -245,9 +249,9 @@ std::optional<Match> ClassSorter::BestOf(const ThingPoints& points,
   return best;
 }
 
-void ClassSorter::Assign(const Candidate& thing, const Match& match) {
-  references_[match.reference].alone = false;
-  matches_[thing.entity] = match;
+void ClassSorter::Assign(std::size_t entity, const Match& match) {
+  references_[match.reference].members.push_back(entity);
+  matches_[entity] = match;
 }
 
 void ClassSorter::SortAlike(const Candidate& thing) {
@@ -257,7 +261,7 @@ void ClassSorter::SortAlike(const Candidate& thing) {
   const auto nearest = NearestOf(
       thing, kMostAlike, [&](const Reference& reference) { return IsAlike(thing, reference); });
   const std::optional<Match> match = BestOf(*points, nearest, KindStarts::kCentred);
-  if (match.has_value()) return Assign(thing, *match);
+  if (match.has_value()) return Assign(thing.entity, *match);
   if (own_.size() == kMostModels) return;
   Reference reference;
   reference.of = thing;
@@ -267,16 +271,35 @@ void ClassSorter::SortAlike(const Candidate& thing) {
   references_.push_back(std::move(reference));
 }
 
+std::optional<Match> ClassSorter::WholeOf(const Reference& reference,
+                                          std::optional<Match>& other) const {
+  const bool pair = !reference.members.empty();
+  const auto nearest = NearestOf(reference.of, kMostWhole, [&](const Reference& whole) {
+    // Two that were seen from the same side are like each other before anything else.
+    const bool more = whole.id != 0 || whole.members.size() > reference.members.size();
+    return (!pair || more) && MayBePartOf(reference.of, whole);
+  });
+  const std::optional<Match> match =
+      BestOf(reference.model->thing(), nearest, KindStarts::kSideOnSide);
+  if (!match.has_value() || !pair) return match;
+  Pose T_map_other = Pose::Identity();
+  const auto points =
+      PointsOf(CandidateOf(entities_[reference.members[0]], reference.members[0]), T_map_other);
+  other = BestOf(*points, {match->reference}, KindStarts::kSideOnSide);
+  return other.has_value() ? match : std::nullopt;
+}
+
 void ClassSorter::SortPart(const Candidate& thing) {
   const auto own = own_.find(thing.entity);
-  if (own == own_.end() || !references_[own->second].alone) return;
-  const auto nearest = NearestOf(
-      thing, kMostWhole, [&](const Reference& reference) { return MayBePartOf(thing, reference); });
-  const std::optional<Match> match =
-      BestOf(references_[own->second].model->thing(), nearest, KindStarts::kSideOnSide);
+  if (own == own_.end()) return;
+  Reference& reference = references_[own->second];
+  if (reference.members.size() > kMostLikeParts) return;
+  std::optional<Match> other;
+  const std::optional<Match> match = WholeOf(reference, other);
   if (!match.has_value()) return;
-  references_[own->second].dropped = true;
-  Assign(thing, *match);
+  reference.dropped = true;
+  Assign(thing.entity, *match);
+  if (other.has_value()) Assign(reference.members[0], *other);
 }
 
 // Gathers the kinds of all classes.
@@ -289,7 +312,7 @@ class KindGatherer {
     std::vector<std::optional<EntityKind>> own(sorter.references().size());
     for (std::size_t i = 0; i < sorter.references().size(); ++i) {
       const Reference& reference = sorter.references()[i];
-      if (reference.dropped || (reference.id == 0 && reference.alone)) continue;
+      if (reference.dropped || (reference.id == 0 && reference.members.empty())) continue;
       if (reference.id != 0) {
         own[i].emplace().id = reference.id;
       } else if (sorted_.found.size() < kMaxFoundKinds) {
