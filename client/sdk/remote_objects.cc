@@ -64,9 +64,9 @@ absl::StatusOr<std::vector<KindInfo>> RemoteObjects::ListKinds(const api::Call& 
   return kinds;
 }
 
-absl::StatusOr<Kind> RemoteObjects::GetKind(const api::Call& call,
-                                            absl::string_view map,
-                                            absl::string_view kind) {
+absl::StatusOr<ThingKind> RemoteObjects::GetKind(const api::Call& call,
+                                                 absl::string_view map,
+                                                 absl::string_view kind) {
   STRATA_ASSIGN_OR_RETURN(const v1::GetKindResponse out,
                           CallUnary(connection_,
                                     *stub_,
@@ -74,7 +74,7 @@ absl::StatusOr<Kind> RemoteObjects::GetKind(const api::Call& call,
                                     call,
                                     Repeat::kOnTrouble,
                                     NamingKind<v1::GetKindRequest>(map, kind)));
-  Kind read;
+  ThingKind read;
   STRATA_ASSIGN_OR_RETURN(read.info, FromProto(out.kind()));
   STRATA_ASSIGN_OR_RETURN(read.shape, FromProto(out.shape()));
   return read;

@@ -25,9 +25,9 @@ class RemoteObjects final : public api::Objects {
 
   absl::StatusOr<std::vector<KindInfo>> ListKinds(const api::Call& call,
                                                   absl::string_view map) override;
-  absl::StatusOr<Kind> GetKind(const api::Call& call,
-                               absl::string_view map,
-                               absl::string_view kind) override;
+  absl::StatusOr<ThingKind> GetKind(const api::Call& call,
+                                    absl::string_view map,
+                                    absl::string_view kind) override;
   absl::StatusOr<KindInfo> RenameKind(const api::Call& call,
                                       absl::string_view map,
                                       absl::string_view kind,

@@ -38,9 +38,9 @@ class Objects {
                                                           absl::string_view map) = 0;
   // `kind`, here and below: its name, or first digits of its id (KindCalled). NOT_FOUND,
   // INVALID_ARGUMENT where several begin so; otherwise as ListKinds.
-  virtual absl::StatusOr<Kind> GetKind(const Call& call,
-                                       absl::string_view map,
-                                       absl::string_view kind) = 0;
+  virtual absl::StatusOr<ThingKind> GetKind(const Call& call,
+                                            absl::string_view map,
+                                            absl::string_view kind) = 0;
   // Gives it a name; one that a job found is in the library from then on. Its entities are not
   // counted. NOT_FOUND; INVALID_ARGUMENT for a bad name; ALREADY_EXISTS where another kind has it;
   // RESOURCE_EXHAUSTED beyond kMaxKinds.

@@ -14,13 +14,14 @@
 namespace strata {
 namespace {
 
-constexpr int kTurns = 8;
+constexpr int kTurns = 16;
 constexpr std::size_t kStartSamples = 100;
-constexpr std::size_t kMostMeasured = 16;
-constexpr std::size_t kMostStarts = 4;
-constexpr double kLeastShare = 0.5;
+constexpr std::size_t kMostMeasured = 8;
+constexpr std::size_t kMostStarts = 3;
+constexpr double kLeastShare = 0.65;  // of the points within voxels, and on the kind at last
 constexpr int kMostVoxelsAlong = 48;
 constexpr double kReachSpacings = 1.5;
+constexpr double kToleranceSpacings = 0.4;  // where points are sparse, their normals are less sure
 constexpr std::size_t kNormalNeighbours = 9;
 // Registration: first few points from every start, then more from the best.
 constexpr std::size_t kCoarseSamples = 120;
@@ -79,8 +80,8 @@ NormalStep StepOf(std::vector<Pair>& pairs, const Pose& T, double radius_m, doub
 
 KindModel::KindModel(std::vector<Eigen::Vector3f> points, double tolerance_m)
     : thing_(std::move(points)),
-      tolerance_m_(tolerance_m),
-      reach_m_(std::max(kReachSpacings * thing_.spacing_m(), tolerance_m)) {
+      tolerance_m_(std::max(tolerance_m, kToleranceSpacings * thing_.spacing_m())),
+      reach_m_(std::max(kReachSpacings * thing_.spacing_m(), tolerance_m_)) {
   FillNormals();
   FillVoxels();
 }

@@ -37,7 +37,8 @@ enum class KindStarts {
 // A kind's shape, ready for things to be registered to it. Safe to read from several threads.
 class KindModel {
  public:
-  // Points that are so near to a surface lie on it. REQUIRES: at least kMinKindPoints points,
+  // Points that are so near to a surface lie on it; where points are sparse, it grows with their
+  // spacing. REQUIRES: at least kMinKindPoints points,
   // finite.
   KindModel(std::vector<Eigen::Vector3f> points, double tolerance_m);
 
@@ -51,8 +52,8 @@ class KindModel {
     double share = 0.0;
     double distance_m = 0.0;  // mean of the points from the kind's
   };
-  // Turned about z by eighths, the best four, the nearest first; those with less than a half are
-  // left out.
+  // Turned about z by sixteenths, the best three, the nearest first; those with less than two
+  // thirds are left out.
   std::vector<Start> StartsOf(const ThingPoints& thing, KindStarts starts) const;
 
   // The best registration from these; nullopt where none of them has the thing on the kind, or it

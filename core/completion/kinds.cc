@@ -23,12 +23,11 @@ namespace {
 constexpr std::size_t kMostModelPoints = 2'000;
 constexpr std::size_t kMostModels = 2'000;  // of a class
 constexpr std::size_t kMostAlike = 4;       // kinds that an entity is compared with
-constexpr std::size_t kMostWhole = 12;      // that it may be a part of, by voxels
+constexpr std::size_t kMostWhole = 8;       // that it may be a part of, by voxels
 constexpr std::size_t kMostRegistered = 3;
 // Others that a reference may have and be a part of another kind all the same, with them.
 constexpr std::size_t kMostLikeParts = 1;
 constexpr double kMostFeatureDistance = 3.0;  // of kinds that are alike, in standard deviations
-constexpr double kToleranceSpacings = 0.4;
 // Standard deviations are not taken for smaller, or noise would part what is alike.
 const Eigen::Array3d kLeastDeviation(0.3, 0.08, 0.1);
 constexpr double kSizeSlack = 0.05;  // share of an edge
@@ -79,16 +78,6 @@ struct Match {
   KindFit fit;
 };
 
-// Where points are sparse, their normals are less sure.
-double ToleranceFor(const std::vector<Eigen::Vector3f>& points, double tolerance_m) {
-  return std::max(tolerance_m, kToleranceSpacings * ThingPoints(points).spacing_m());
-}
-
-std::unique_ptr<KindModel> ModelOf(std::vector<Eigen::Vector3f> points, double tolerance_m) {
-  const double tolerance = ToleranceFor(points, tolerance_m);
-  return std::make_unique<KindModel>(std::move(points), tolerance);
-}
-
 // The kinds of one class.
 class ClassSorter {
  public:
@@ -98,14 +87,14 @@ class ClassSorter {
               absl::FunctionRef<absl::Status(std::size_t)> done)
       : entities_(entities), options_(options), stop_(stop), done_(done) {}
 
-  void AddKnown(const Kind& kind) {
+  void AddKnown(const ThingKind& kind) {
     Reference reference;
     reference.of = CandidateOf(kind.shape);
     reference.id = kind.info.id;
     std::vector<Eigen::Vector3d> points;
     for (const Eigen::Vector3f& p : kind.shape.points) points.push_back(p.cast<double>());
-    reference.model =
-        ModelOf(ThinnedInFrame(points, Pose::Identity(), kMostModelPoints), options_.tolerance_m);
+    reference.model = std::make_unique<KindModel>(
+        ThinnedInFrame(points, Pose::Identity(), kMostModelPoints), options_.tolerance_m);
     references_.push_back(std::move(reference));
   }
 
@@ -265,7 +254,7 @@ void ClassSorter::SortAlike(const Candidate& thing) {
   if (own_.size() == kMostModels) return;
   Reference reference;
   reference.of = thing;
-  reference.model = ModelOf(points->points(), options_.tolerance_m);
+  reference.model = std::make_unique<KindModel>(points->points(), options_.tolerance_m);
   reference.T_map_model = T_map_thing;
   own_[thing.entity] = references_.size();
   references_.push_back(std::move(reference));
@@ -336,7 +325,7 @@ class KindGatherer {
   // The reference's own place.
   EntityKind Found(const Reference& reference) {
     const FoundEntity& entity = entities_[reference.of.entity];
-    Kind kind;
+    ThingKind kind;
     kind.shape.points = ThinnedInFrame(entity.voxels, reference.T_map_model, kMaxKindPoints);
     kind.info.id = KindIdOf(kind.shape);
     kind.info.class_id = entity.class_id;
@@ -380,7 +369,7 @@ absl::Status KindOptions::Validate() const {
 }
 
 absl::StatusOr<SortedKinds> SortIntoKinds(std::span<const FoundEntity> entities,
-                                          std::span<const Kind> library,
+                                          std::span<const ThingKind> library,
                                           const KindOptions& options,
                                           const Stop& stop,
                                           absl::FunctionRef<absl::Status(double)> progress) {
@@ -399,7 +388,7 @@ absl::StatusOr<SortedKinds> SortIntoKinds(std::span<const FoundEntity> entities,
       indexes.resize(kMostSortedEntities);
     }
     ClassSorter sorter(entities, options, stop, count);
-    for (const Kind& kind : library) {
+    for (const ThingKind& kind : library) {
       if (kind.info.class_id == class_id) sorter.AddKnown(kind);
     }
     STRATA_RETURN_IF_ERROR(sorter.Sort(indexes));

@@ -44,7 +44,7 @@ struct SortedKinds {
   // Of each entity; nullopt: none.
   std::vector<std::optional<EntityKind>> of_entity;
   // Those that no library had, by class, then the largest reference first; without entities.
-  std::vector<Kind> found;
+  std::vector<ThingKind> found;
   std::size_t left_out = 0;  // entities beyond kMostSortedEntities, and kMaxFoundKinds
 };
 
@@ -57,7 +57,7 @@ struct SortedKinds {
 // entities and library, same kinds, bit for bit; one thread. `progress` takes shares in [0, 1]; its
 // error, and that of `stop`, ends the work. REQUIRES: valid options, library of valid shapes.
 absl::StatusOr<SortedKinds> SortIntoKinds(std::span<const FoundEntity> entities,
-                                          std::span<const Kind> library,
+                                          std::span<const ThingKind> library,
                                           const KindOptions& options,
                                           const Stop& stop,
                                           absl::FunctionRef<absl::Status(double)> progress);

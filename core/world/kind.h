@@ -63,7 +63,7 @@ struct KindInfo {
   bool in_library() const { return origin != KindOrigin::kFound; }
 };
 
-struct Kind {
+struct ThingKind {
   KindInfo info;
   KindShape shape;
 };

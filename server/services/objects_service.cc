@@ -44,7 +44,7 @@ absl::Status GetKind(api::Database& db,
                      const api::Call& call,
                      const v1::GetKindRequest& in,
                      v1::GetKindResponse& out) {
-  STRATA_ASSIGN_OR_RETURN(const Kind kind, db.objects().GetKind(call, in.map(), in.kind()));
+  STRATA_ASSIGN_OR_RETURN(const ThingKind kind, db.objects().GetKind(call, in.map(), in.kind()));
   *out.mutable_kind() = ToProto(kind.info);
   *out.mutable_shape() = ToProto(kind.shape);
   return absl::OkStatus();

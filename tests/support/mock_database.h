@@ -318,7 +318,7 @@ class MockObjects : public api::Objects {
               ListKinds,
               (const api::Call&, absl::string_view),
               (override));
-  MOCK_METHOD(absl::StatusOr<Kind>,
+  MOCK_METHOD(absl::StatusOr<ThingKind>,
               GetKind,
               (const api::Call&, absl::string_view, absl::string_view),
               (override));

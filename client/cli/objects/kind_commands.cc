@@ -78,7 +78,7 @@ absl::Status RenameKind(Context& context, const KindOptionsOfVerb& options) {
 
 absl::Status ExportKind(Context& context, const KindOptionsOfVerb& options) {
   STRATA_ASSIGN_OR_RETURN(
-      Kind kind, context.database.objects().GetKind(context.call, options.map, options.kind));
+      ThingKind kind, context.database.objects().GetKind(context.call, options.map, options.kind));
   STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes,
                           context.database.maps().ListClasses(context.call, options.map));
   const NewKind exported{

@@ -30,12 +30,12 @@ absl::StatusOr<std::vector<KindInfo>> EngineObjects::ListKinds(const api::Call& 
   return CountKinds(found->core(), call.stop);
 }
 
-absl::StatusOr<Kind> EngineObjects::GetKind(const api::Call& call,
-                                            absl::string_view map,
-                                            absl::string_view kind) {
+absl::StatusOr<ThingKind> EngineObjects::GetKind(const api::Call& call,
+                                                 absl::string_view map,
+                                                 absl::string_view kind) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
-  STRATA_ASSIGN_OR_RETURN(Kind read, ReadKind(found->core(), kind));
+  STRATA_ASSIGN_OR_RETURN(ThingKind read, ReadKind(found->core(), kind));
   STRATA_ASSIGN_OR_RETURN(const std::vector<KindInfo> kinds, CountKinds(found->core(), call.stop));
   const auto counted = std::find_if(
       kinds.begin(), kinds.end(), [&](const KindInfo& info) { return info.id == read.info.id; });

@@ -153,9 +153,9 @@ StoredEntity StoredFormOf(const FoundEntity& found,
 }
 
 absl::Status PutFoundKinds(StorageWriter& writer,
-                           const std::vector<Kind>& found,
+                           const std::vector<ThingKind>& found,
                            const EntitiesInfo& info) {
-  for (const Kind& kind : found) {
+  for (const ThingKind& kind : found) {
     KindInfo head = kind.info;
     head.made = info.made;
     STRATA_RETURN_IF_ERROR(writer.PutFoundKind({head.id, "", false, EncodeKindInfo(head)},
@@ -169,7 +169,7 @@ absl::StatusOr<bool> KeepEntities(MapCore& core,
                                   const EntitiesInfo& info,
                                   const std::vector<StoredEntity>& entities,
                                   const SortedKinds& kinds,
-                                  const std::vector<Kind>* library,
+                                  const std::vector<ThingKind>* library,
                                   const Stop& stop) {
   bool same = true;
   const auto keep = [&](StorageWriter& writer) -> absl::Status {
@@ -199,7 +199,8 @@ absl::StatusOr<SortedKinds> SortAndKeep(MapCore& core,
                                         EntitiesInfo& info,
                                         JobContext& context) {
   for (int sorting = 1;; ++sorting) {
-    STRATA_ASSIGN_OR_RETURN(const std::vector<Kind> library, LoadLibrary(core, context.stop()));
+    STRATA_ASSIGN_OR_RETURN(const std::vector<ThingKind> library,
+                            LoadLibrary(core, context.stop()));
     const auto progress = [&](double share) {
       return context.Progress(0.92 + 0.07 * share, "sorting entities into kinds");
     };
@@ -210,7 +211,7 @@ absl::StatusOr<SortedKinds> SortAndKeep(MapCore& core,
       entities.push_back(StoredFormOf(found[i], i + 1, kinds.of_entity[i], search));
     }
     info.made = absl::FromUnixMicros(absl::ToUnixMicros(absl::Now()));
-    const std::vector<Kind>* const expected = sorting < kMostSortings ? &library : nullptr;
+    const std::vector<ThingKind>* const expected = sorting < kMostSortings ? &library : nullptr;
     STRATA_ASSIGN_OR_RETURN(const bool kept,
                             KeepEntities(core, info, entities, kinds, expected, context.stop()));
     if (kept) return kinds;

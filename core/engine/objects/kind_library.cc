@@ -85,9 +85,9 @@ absl::StatusOr<std::vector<KindInfo>> KindsIn(StorageReader& reader) {
   return kinds;
 }
 
-absl::StatusOr<std::vector<Kind>> LoadLibrary(MapCore& core, const Stop& stop) {
+absl::StatusOr<std::vector<ThingKind>> LoadLibrary(MapCore& core, const Stop& stop) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-  std::vector<Kind> library;
+  std::vector<ThingKind> library;
   STRATA_RETURN_IF_ERROR(reader->Snapshot([&]() -> absl::Status {
     STRATA_ASSIGN_OR_RETURN(const std::vector<KindInfo> kinds, KindsIn(*reader));
     for (const KindInfo& info : kinds) {
@@ -101,19 +101,20 @@ absl::StatusOr<std::vector<Kind>> LoadLibrary(MapCore& core, const Stop& stop) {
   return library;
 }
 
-absl::StatusOr<bool> IsLibrary(StorageReader& reader, const std::vector<Kind>& library) {
+absl::StatusOr<bool> IsLibrary(StorageReader& reader, const std::vector<ThingKind>& library) {
   STRATA_ASSIGN_OR_RETURN(std::vector<KindRow> rows, reader.ListKinds());
   std::erase_if(rows, [](const KindRow& row) { return !row.in_library; });
-  return std::equal(rows.begin(),
-                    rows.end(),
-                    library.begin(),
-                    library.end(),
-                    [](const KindRow& row, const Kind& kind) { return row.id == kind.info.id; });
+  return std::equal(
+      rows.begin(),
+      rows.end(),
+      library.begin(),
+      library.end(),
+      [](const KindRow& row, const ThingKind& kind) { return row.id == kind.info.id; });
 }
 
-absl::StatusOr<Kind> ReadKind(MapCore& core, absl::string_view kind) {
+absl::StatusOr<ThingKind> ReadKind(MapCore& core, absl::string_view kind) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-  Kind read;
+  ThingKind read;
   STRATA_RETURN_IF_ERROR(reader->Snapshot([&]() -> absl::Status {
     STRATA_ASSIGN_OR_RETURN(read.info, KindIn(*reader, kind));
     STRATA_ASSIGN_OR_RETURN(read.shape, ShapeOf(*reader, read.info.id));

@@ -18,12 +18,12 @@ namespace strata {
 // Without entities counted: the library by id, then those found. DATA_LOSS naming the damaged one.
 absl::StatusOr<std::vector<KindInfo>> KindsIn(StorageReader& reader);
 // The library with its shapes.
-absl::StatusOr<std::vector<Kind>> LoadLibrary(MapCore& core, const Stop& stop);
+absl::StatusOr<std::vector<ThingKind>> LoadLibrary(MapCore& core, const Stop& stop);
 // Whether the library is made of the same shapes as it was; names do not count.
-absl::StatusOr<bool> IsLibrary(StorageReader& reader, const std::vector<Kind>& library);
+absl::StatusOr<bool> IsLibrary(StorageReader& reader, const std::vector<ThingKind>& library);
 
 // As of api::Objects; entities are not counted.
-absl::StatusOr<Kind> ReadKind(MapCore& core, absl::string_view kind);
+absl::StatusOr<ThingKind> ReadKind(MapCore& core, absl::string_view kind);
 absl::StatusOr<KindInfo> RenameKind(MapCore& core,
                                     absl::string_view kind,
                                     absl::string_view name,

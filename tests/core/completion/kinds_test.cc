@@ -34,7 +34,8 @@ std::vector<FoundEntity> EntitiesOf(const std::vector<PlantedThing>& things) {
   return entities;
 }
 
-SortedKinds Sort(const std::vector<FoundEntity>& entities, const std::vector<Kind>& library = {}) {
+SortedKinds Sort(const std::vector<FoundEntity>& entities,
+                 const std::vector<ThingKind>& library = {}) {
   auto sorted =
       SortIntoKinds(entities, library, {}, Stop(), [](double) { return absl::OkStatus(); });
   STRATA_EXPECT_OK(sorted);
@@ -99,14 +100,14 @@ TEST_P(PlantedKindsTest, StandWhereTheyWerePlanted) {
 TEST_P(PlantedKindsTest, AreRecognisedByALibraryInAnotherMap) {
   SCOPED_TRACE(GetParam());
   const std::vector<PlantedThing> here = PlantThings(PlantedClasses(), {}, GetParam());
-  const std::vector<Kind> library = Sort(EntitiesOf(here)).found;
+  const std::vector<ThingKind> library = Sort(EntitiesOf(here)).found;
   const std::vector<PlantedThing> there =
       PlantThings(PlantedClasses(), {.of_each = 2, .partial = 1}, GetParam() + 1000);
   const SortedKinds sorted = Sort(EntitiesOf(there), library);
   EXPECT_EQ(WronglySorted(there, sorted), 0U);
   EXPECT_THAT(sorted.found, IsEmpty());
   std::set<std::uint64_t> known;
-  for (const Kind& kind : library) known.insert(kind.info.id);
+  for (const ThingKind& kind : library) known.insert(kind.info.id);
   for (const auto& kind : sorted.of_entity) {
     EXPECT_TRUE(kind.has_value() && known.count(kind->id) == 1);
   }
@@ -145,8 +146,8 @@ TEST(KindsTest, OrderOfPointsDoesNotMatterAndTheSameComesOutAgain) {
 
 TEST(KindsTest, KindsOfAnotherClassAreNotTaken) {
   std::vector<PlantedThing> things = PlantThings(PlantedClasses(), {.of_each = 2, .partial = 0}, 6);
-  std::vector<Kind> library = Sort(EntitiesOf(things)).found;
-  for (Kind& kind : library) kind.info.class_id = 99;
+  std::vector<ThingKind> library = Sort(EntitiesOf(things)).found;
+  for (ThingKind& kind : library) kind.info.class_id = 99;
   const SortedKinds sorted = Sort(EntitiesOf(things), library);
   EXPECT_THAT(sorted.found, SizeIs(8));
 }

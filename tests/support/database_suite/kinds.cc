@@ -148,8 +148,9 @@ TEST_P(DatabaseSuite, FoundKindsComeBackBitForBitAfterARebuild) {
   FindKinds(db());
   const auto shapes = [&] {
     std::vector<KindShape> all;
-    for (const KindInfo& kind : *db().objects().ListKinds({}, kMap)) {
-      all.push_back(db().objects().GetKind({}, kMap, KindIdText(kind.id))->shape);
+    const std::vector<KindInfo> kinds = db().objects().ListKinds({}, kMap).value();
+    for (const KindInfo& kind : kinds) {
+      all.push_back(db().objects().GetKind({}, kMap, KindIdText(kind.id)).value().shape);
     }
     return all;
   };
@@ -190,7 +191,7 @@ TEST_P(DatabaseSuite, AnImportedKindIsRecognised) {
     EXPECT_LT((entity.kind->T_map_kind.translation() - entity.box.centre).head<2>().norm(), 0.1);
     EXPECT_GT(entity.kind->overlap, 0.9);
   }
-  STRATA_ASSERT_OK_AND_ASSIGN(const Kind read, db().objects().GetKind({}, kMap, "crate"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const ThingKind read, db().objects().GetKind({}, kMap, "crate"));
   EXPECT_EQ(read.shape, crate.shape);
   EXPECT_EQ(read.info.entities, 2U);
   // In another map it has the same id.
