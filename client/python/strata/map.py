@@ -362,17 +362,49 @@ class Map:
         request = models_pb2.GetPlaneModelRequest(map=self.name)
         return planes.from_proto(self._connection.collected(self._models.GetPlaneModel, request))
 
-    def objects(self, class_id=0, region=None):
+    def objects(self, class_id=0, region=None, kind=""):
         """Entities: the things that the last job "objects" found; NotFound before there was one.
 
         class_id: only those of this class; 0: of every class. region: only those that reach into (x0, y0, x1, y1) or
-        (x0, y0, z0, x1, y1, z1), map frame [m].
+        (x0, y0, z0, x1, y1, z1), map frame [m]. kind: only those of this kind, by name or first digits of its id.
 
             campus.job("objects", **{"class": "car"})
             long = [car for car in campus.objects() if car.size[0] > 5]
         """
-        request = objects_pb2.ListEntitiesRequest(map=self.name, class_id=class_id, region=objects.box_to_proto(region))
+        request = objects_pb2.ListEntitiesRequest(map=self.name, class_id=class_id, region=objects.box_to_proto(region),
+                                                  kind=kind)
         return objects.from_proto(self._connection.collected(self._objects.ListEntities, request))
+
+    def kinds(self):
+        """The kinds of things that the map knows, without their shapes: its library, then those found, without names."""
+        answer = self._connection.unary(self._objects.ListKinds, objects_pb2.ListKindsRequest(map=self.name))
+        return [objects.kind_from_proto(kind) for kind in answer.kinds]
+
+    def kind(self, kind):
+        """One of them with its shape, by name or first digits of its id; NotFound."""
+        answer = self._connection.unary(self._objects.GetKind, objects_pb2.GetKindRequest(map=self.name, kind=kind))
+        return objects.kind_from_proto(answer.kind, answer.shape)
+
+    def rename_kind(self, kind, name):
+        """Names a kind; it is in the map's library from then on, and later jobs recognise things of it."""
+        answer = self._connection.once(self._objects.RenameKind, objects_pb2.RenameKindRequest(
+            map=self.name, kind=kind, name=name))
+        return objects.kind_from_proto(answer.kind)
+
+    def import_kind(self, name, class_name, points, vertices=None, triangles=None):
+        """Puts a kind into the library: (n, 3) points of its surface, and its mesh if there is one; z up [m].
+
+            golf = campus.kind("golf")
+            harbour.import_kind("golf", "car", golf.points)
+        """
+        answer = self._connection.once(self._objects.ImportKind, objects_pb2.ImportKindRequest(
+            map=self.name, name=name, class_name=class_name,
+            shape=objects.shape_to_proto(points, vertices, triangles)))
+        return objects.kind_from_proto(answer.kind)
+
+    def delete_kind(self, kind):
+        """Takes a kind out of the library; things of it are of none then."""
+        self._connection.once(self._objects.DeleteKind, objects_pb2.DeleteKindRequest(map=self.name, kind=kind))
 
     def _named_profile(self, name):
         profiles = self.profiles()

@@ -5,9 +5,49 @@ import dataclasses
 import numpy as np
 
 from strata import errors, poses
-from strata.v1 import geometry_pb2
+from strata.v1 import geometry_pb2, objects_pb2
 
 _ANY_HEIGHT = 1e7
+_ORIGINS = {objects_pb2.KIND_ORIGIN_FOUND: "found", objects_pb2.KIND_ORIGIN_NAMED: "named",
+            objects_pb2.KIND_ORIGIN_IMPORTED: "imported"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Kind:
+    """A kind of things, of which a map may have several entities."""
+
+    id: str
+    """Twelve hexadecimal digits of its shape, the same in every map."""
+    name: str
+    """Empty: nobody has named it."""
+    class_id: int
+    origin: str
+    """"found" by the last job, "named" by a person, or "imported"; found ones are not in the library."""
+    size: np.ndarray
+    """(3,) length, width and height of the box around its points [m]."""
+    entities: int
+    """Of the map that are of it; 0 where they were not counted."""
+    points: np.ndarray = None
+    """(n, 3) of its shape, in its own frame [m]; None where it was not asked for."""
+    vertices: np.ndarray = None
+    """(n, 3) of its surface, or None."""
+    triangles: np.ndarray = None
+    """(n, 3) of vertices, or None."""
+
+
+@dataclasses.dataclass(frozen=True)
+class EntityKind:
+    """Which kind of thing an entity is."""
+
+    id: str
+    name: str
+    """Empty: nobody has named it."""
+    pose: np.ndarray
+    """(4, 4) from the kind's frame into the map's."""
+    residual: float
+    """RMS distance of the entity's points that lie on the kind from its surface [m]."""
+    overlap: float
+    """Their share of the entity's points."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,6 +68,8 @@ class Entity:
     points: int
     scans: dict
     """(trajectory, sequence) of each scan that saw it: how many points it saw."""
+    kind: EntityKind = None
+    """None: it is like no other, or too little of it was seen."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,11 +103,38 @@ def box_to_proto(region):
     return geometry_pb2.Box3(min=low, max=high)
 
 
+def kind_from_proto(message, shape=None):
+    arrays = {}
+    if shape is not None:
+        arrays = {"points": np.reshape(np.asarray(shape.points, dtype=np.float32), (-1, 3)),
+                  "vertices": np.reshape(np.asarray(shape.vertices, dtype=np.float32), (-1, 3)),
+                  "triangles": np.reshape(np.asarray(shape.triangles, dtype=np.uint32), (-1, 3))}
+    return Kind(id=f"{message.id:012x}", name=message.name, class_id=message.class_id,
+                origin=_ORIGINS.get(message.origin, "unknown"), size=poses.array3(message.size),
+                entities=message.entities, **arrays)
+
+
+def shape_to_proto(points, vertices=None, triangles=None):
+    def flat(array, dtype):
+        array = np.asarray([] if array is None else array, dtype=dtype)
+        if array.size and (array.ndim != 2 or array.shape[1] != 3):
+            raise ValueError(f"array of shape {array.shape}; expected (n, 3)")
+        return array.ravel().tolist()
+    return objects_pb2.KindShape(points=flat(points, np.float32), vertices=flat(vertices, np.float32),
+                                 triangles=flat(triangles, np.uint32))
+
+
+def _entity_kind(message):
+    return EntityKind(id=f"{message.id:012x}", name=message.name, pose=poses.from_proto(message.t_map_kind),
+                      residual=message.residual_m, overlap=message.overlap)
+
+
 def _entity(message):
     return Entity(
         id=message.id, class_id=message.class_id, centre=poses.array3(message.box.centre),
         size=poses.array3(message.box.size), yaw=message.box.yaw_rad, radius=message.radius_m, points=message.points,
-        scans={(seen.scan.trajectory, seen.scan.sequence): seen.points for seen in message.scans})
+        scans={(seen.scan.trajectory, seen.scan.sequence): seen.points for seen in message.scans},
+        kind=_entity_kind(message.kind) if message.HasField("kind") else None)
 
 
 def from_proto(answers):

@@ -236,6 +236,40 @@ TEST_P(DatabaseSuite, KindsThatCannotBeAreRefused) {
   EXPECT_THAT(*db().objects().ListKinds({}, kMap), IsEmpty());
 }
 
+// Whatever a person does to the library while things are sorted stays done, and the job succeeds.
+TEST_P(DatabaseSuite, AJobNeitherLosesNorUndoesWhatAPersonDoesMeanwhile) {
+  PutThings(db());
+  FindKinds(db());
+  const std::vector<KindInfo> found = db().objects().ListKinds({}, kMap).value();
+  ASSERT_THAT(found, SizeIs(2));
+  for (int round = 0; round < 6; ++round) {
+    const auto job = db().jobs().Start({}, kMap, "objects", {{"class", "thing"}});
+    STRATA_ASSERT_OK(job);
+    NewKind kind = Crate(3.0F + 0.1F * static_cast<float>(round));
+    kind.name = "tall" + std::to_string(round);
+    int calls = 0;
+    JobInfo last;
+    // Each report of the job is answered by a change.
+    STRATA_ASSERT_OK(db().jobs().Watch({}, kMap, job->id, [&](const JobInfo& now) {
+      last = now;
+      if (calls == 0) STRATA_EXPECT_OK(db().objects().ImportKind({}, kMap, kind));
+      if (calls == 1) STRATA_EXPECT_OK(db().objects().RenameKind({}, kMap, kind.name, "t"));
+      if (calls == 2) STRATA_EXPECT_OK(db().objects().DeleteKind({}, kMap, "t"));
+      ++calls;
+      return absl::OkStatus();
+    }));
+    EXPECT_EQ(last.state, JobState::kSucceeded) << last.message;
+    const std::string name = calls == 1 ? kind.name : "t";
+    EXPECT_EQ(db().objects().GetKind({}, kMap, name).ok(), calls < 3) << calls;
+    if (calls < 3) STRATA_EXPECT_OK(db().objects().DeleteKind({}, kMap, name));
+    if (round == 2) {
+      STRATA_EXPECT_OK(db().objects().RenameKind({}, kMap, KindIdText(found[0].id), "low.box"));
+    }
+  }
+  ASSERT_THAT(EntitiesWith(db(), {.kind = "low.box"}), SizeIs(2));
+  EXPECT_THAT(db().objects().ListKinds({}, kMap).value(), SizeIs(2));
+}
+
 TEST_P(DatabaseSuite, ALibraryHasABound) {
   NewKind kind = Crate(1.0F);
   kind.shape.points.resize(kMinKindPoints);

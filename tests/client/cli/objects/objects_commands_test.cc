@@ -29,6 +29,7 @@ class ObjectsCommandsTest : public CommandsTest {
     car.scans = {{{"run", 1}, 300}, {{"run", 4}, 45}};
     Entity bench = car;
     bench.id = 2;
+    car.kind = EntityKind{0xabcdef012345, "golf", Pose::Identity(), 0.02, 0.9};
     bench.class_id = 9;
     entities_ = {car, bench};
     ON_CALL(db_.objects(), ListEntities(_, _, _, _))
@@ -69,6 +70,10 @@ TEST_F(ObjectsCommandsTest, AreListedAndShown) {
   EXPECT_EQ(all["entities"][0]["size_m"], Json({4.0, 2.0, 1.5}));
   EXPECT_EQ(all["entities"][0]["scans"]["run/4"], 45);
   EXPECT_EQ(all["entities"][1]["class"], "9");
+  EXPECT_EQ(all["entities"][0]["kind"]["name"], "golf");
+  EXPECT_EQ(all["entities"][0]["kind"]["id"], "abcdef012345");
+  EXPECT_TRUE(all["entities"][1]["kind"].is_null());
+  EXPECT_THAT(RunText({"objects", "list", "m"}), HasSubstr("golf"));
   EXPECT_EQ(all["distance_m"]["car"], 0.4);
   EXPECT_EQ(all["stale"], false);
   now_ = 3;
@@ -96,7 +101,7 @@ TEST_F(ObjectsCommandsTest, AreExported) {
   EXPECT_EQ(features["features"][0]["properties"]["class"], "car");
   EXPECT_EQ(RunJson({"objects", "export", "m", out + ".csv", "--class", "7"})["entities"], 1);
   STRATA_ASSERT_OK_AND_ASSIGN(const std::string csv, ReadFileBytes(out + ".csv"));
-  EXPECT_THAT(csv, HasSubstr("1,car,10.000,20.000,0.750,4.000,2.000,1.500,0.0000,345,2\n"));
+  EXPECT_THAT(csv, HasSubstr("1,car,10.000,20.000,0.750,4.000,2.000,1.500,0.0000,345,2,golf\n"));
   EXPECT_THAT(Run({"objects", "export", "m", out + ".txt"}),
               StatusIs(Code::kInvalidArgument, HasSubstr("map render --objects")));
 }
