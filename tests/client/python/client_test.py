@@ -356,6 +356,23 @@ class ObjectsTest(ServerTest):
         self.assertGreater(things.distances[2], 0.05)
         self.assertEqual(things.epoch, 1)
 
+    def test_kinds_go_into_the_library(self):
+        world = self.db.create_map("kinds")
+        self.assertEqual(world.kinds(), [])
+        points = grid((0, 1), (0, 1))
+        box = world.import_kind("box", "crate", points, [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        self.assertEqual((box.name, box.origin, len(box.id)), ("box", "imported", 12))
+        read = world.kind(box.id[:6])
+        np.testing.assert_allclose(read.points, points, atol=1e-6)
+        self.assertEqual(read.triangles.tolist(), [[0, 1, 2]])
+        self.assertEqual(world.rename_kind("box", "tray").id, box.id)
+        self.assertEqual([kind.name for kind in world.kinds()], ["tray"])
+        with self.assertRaises(strata.InvalidArgument):
+            world.import_kind("far", "crate", points + (1e9, 0, 0))
+        world.delete_kind("tray")
+        with self.assertRaises(strata.NotFound):
+            world.kind("tray")
+
 
 class ReadmeTest(ServerTest):
     def test_its_example_runs(self):
