@@ -54,6 +54,7 @@ ARROWS = {
 HERE = "."
 STOREYS = {
     "core/mls": ["elevation", HERE],
+    "core/world": [HERE, "things"],
     "core/classification": [HERE, "learners", "amn", "features"],
     "core/egomotion": ["smoothing", HERE],
     "core/planning": ["floors", HERE, "ground"],

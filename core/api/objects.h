@@ -11,7 +11,7 @@
 
 #include "core/api/call.h"
 #include "core/world/entity.h"
-#include "core/world/kind.h"
+#include "core/world/things/kind.h"
 
 namespace strata::api {
 

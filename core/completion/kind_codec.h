@@ -8,7 +8,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
-#include "core/world/kind.h"
+#include "core/world/things/kind.h"
 
 namespace strata {
 

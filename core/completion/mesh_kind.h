@@ -9,7 +9,7 @@
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
 
-#include "core/world/kind.h"
+#include "core/world/things/kind.h"
 
 namespace strata {
 

@@ -7,7 +7,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/world/entity.h"
-#include "core/world/kind.h"
+#include "core/world/things/kind.h"
 #include "strata/v1/objects.pb.h"
 
 namespace strata::translate {

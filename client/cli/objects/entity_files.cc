@@ -11,7 +11,7 @@
 
 #include "client/cli/terminal/json.h"
 #include "client/formats/file_bytes.h"
-#include "core/world/kind.h"
+#include "core/world/things/kind.h"
 
 namespace strata::cli {
 namespace {

@@ -13,8 +13,8 @@
 #include "client/cli/terminal/confirm.h"
 #include "client/cli/terminal/json.h"
 #include "core/common/status.h"
-#include "core/world/kind.h"
 #include "core/world/map_class.h"
+#include "core/world/things/kind.h"
 
 namespace strata::cli {
 namespace {

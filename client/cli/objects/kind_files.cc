@@ -1,6 +1,8 @@
 #include "client/cli/objects/kind_files.h"
 
+#include <cstdint>
 #include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "absl/strings/ascii.h"

@@ -7,7 +7,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "core/world/kind.h"
+#include "core/world/things/kind.h"
 
 namespace strata::cli {
 

@@ -14,7 +14,7 @@
 #include "core/world/entity.h"
 #include "core/world/job.h"
 #include "core/world/job_arguments.h"
-#include "core/world/kind.h"
+#include "core/world/things/kind.h"
 
 namespace strata {
 

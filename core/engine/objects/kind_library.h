@@ -11,7 +11,7 @@
 #include "core/common/stop.h"
 #include "core/engine/map/map_core.h"
 #include "core/storage/storage.h"
-#include "core/world/kind.h"
+#include "core/world/things/kind.h"
 
 namespace strata {
 

@@ -11,7 +11,7 @@
 
 #include "core/completion/entities.h"
 #include "core/geometry/pose.h"
-#include "core/world/kind.h"
+#include "core/world/things/kind.h"
 
 namespace strata::testing {
 

@@ -11,7 +11,7 @@
 
 #include "core/cloud/point_cloud.h"
 #include "core/world/entity.h"
-#include "core/world/kind.h"
+#include "core/world/things/kind.h"
 #include "tests/support/database_suite/database_suite.h"
 #include "tests/support/status_matchers.h"
 
@@ -134,7 +134,7 @@ TEST_P(DatabaseSuite, ThingsAreSortedIntoKindsThatPeopleName) {
   STRATA_ASSERT_OK(db().objects().DeleteKind({}, kMap, "low.box"));
   EXPECT_THAT(db().objects().DeleteKind({}, kMap, "low.box"),
               StatusIs(Code::kNotFound, HasSubstr("low.box")));
-  EXPECT_EQ(std::ssize(EntitiesWith(db())), 5);
+  EXPECT_EQ(EntitiesWith(db()).size(), 5U);
   FindKinds(db());
   STRATA_ASSERT_OK_AND_ASSIGN(const std::vector<KindInfo> again,
                               db().objects().ListKinds({}, kMap));

@@ -1,7 +1,7 @@
 // Kinds of things: what a class of a map has several entities of, with one shape (thesis 11.2.1,
 // 11.4).
-#ifndef STRATA_CORE_WORLD_KIND_H_
-#define STRATA_CORE_WORLD_KIND_H_
+#ifndef STRATA_CORE_WORLD_THINGS_KIND_H_
+#define STRATA_CORE_WORLD_THINGS_KIND_H_
 
 #include <array>
 #include <cstddef>
@@ -88,4 +88,4 @@ absl::StatusOr<KindInfo> KindCalled(const std::vector<KindInfo>& kinds, absl::st
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_WORLD_KIND_H_
+#endif  // STRATA_CORE_WORLD_THINGS_KIND_H_

@@ -1,4 +1,4 @@
-#include "core/world/kind.h"
+#include "core/world/things/kind.h"
 
 #include <cmath>
 #include <utility>
