@@ -54,9 +54,9 @@ class Planning {
                                                absl::string_view map,
                                                const FloorQuery& query) = 0;
   // Rooms, corridors and doorways of one floor (core/classification/places); a map without floors
-  // has none, which is OK. INVALID_ARGUMENT for a bad query; NOT_FOUND where no floor has the number
-  // or is at the place; RESOURCE_EXHAUSTED for a floor or a map too large; DATA_LOSS naming a damaged
-  // tile.
+  // has none, which is OK. INVALID_ARGUMENT for a bad query; NOT_FOUND where no floor has the
+  // number or is at the place; RESOURCE_EXHAUSTED for a floor or a map too large; DATA_LOSS naming
+  // a damaged tile.
   virtual absl::StatusOr<FloorPlaces> ListPlaces(const Call& call,
                                                  absl::string_view map,
                                                  const PlaceQuery& query) = 0;

@@ -57,7 +57,8 @@ absl::Status ListPlaces(api::Database& db,
                         const v1::ListPlacesRequest& in,
                         v1::ListPlacesResponse& out) {
   STRATA_ASSIGN_OR_RETURN(const PlaceQuery query, AtTheDoor(FromProto(in)));
-  STRATA_ASSIGN_OR_RETURN(const FloorPlaces places, db.planning().ListPlaces(call, in.map(), query));
+  STRATA_ASSIGN_OR_RETURN(const FloorPlaces places,
+                          db.planning().ListPlaces(call, in.map(), query));
   out = ToProto(places);
   return absl::OkStatus();
 }

@@ -1,15 +1,19 @@
 // Written by tests/experiments/classification/learn_places.cc: learn_places FILE.
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+
 #include "core/classification/places/place_model.h"
 
 namespace strata {
 namespace {
 
-constexpr int kColumns = 40;
-constexpr std::uint32_t kColumn[kColumns] = {123, 7,   101, 105, 132, 70,  131, 114, 6,   125,
-                                             104, 134, 129, 120, 115, 108, 109, 127, 11,  69,
-                                             112, 110, 133, 124, 27,  10,  9,   117, 107, 130,
-                                             136, 100, 66,  106, 135, 96,  77,  71,  21,  103};
-constexpr float kMean[kColumns] = {
+constexpr int kPlaceColumns = 40;
+constexpr std::uint32_t kPlaceColumn[kPlaceColumns] = {
+    123, 7,   101, 105, 132, 70,  131, 114, 6,   125, 104, 134, 129, 120,
+    115, 108, 109, 127, 11,  69,  112, 110, 133, 124, 27,  10,  9,   117,
+    107, 130, 136, 100, 66,  106, 135, 96,  77,  71,  21,  103};
+constexpr float kPlaceMean[kPlaceColumns] = {
     1.32428408F,   0.0224700421F, 3.33847737F,    2.79894733F,  0.127287388F,  24.4905128F,
     0.138261005F,  9.07618904F,   0.00556035899F, 0.155780941F, 10.1659565F,   0.0858734399F,
     0.315248668F,  83.9524307F,   12.9982405F,    3.95586967F,  4.42902422F,   1.82193971F,
@@ -17,7 +21,7 @@ constexpr float kMean[kColumns] = {
     0.439679772F,  0.0262060948F, 0.461623132F,   39.0291214F,  3.52913022F,   0.209616467F,
     0.0673761070F, 2.66100025F,   39.7484474F,    3.14804602F,  0.0724976137F, 1.12069213F,
     60.0326004F,   22.2974186F,   1.39958858F,    5.59633112F};
-constexpr float kDeviation[kColumns] = {
+constexpr float kPlaceDeviation[kPlaceColumns] = {
     0.658631742F,  0.0202823840F, 1.06566143F,    1.21476889F,   0.0837766826F, 10.8350821F,
     0.0825303718F, 2.95605993F,   0.00506678317F, 0.0435460694F, 3.42967129F,   0.0585564785F,
     0.156733915F,  75.7089386F,   4.86059761F,    1.45735753F,   1.49429417F,   0.547066152F,
@@ -25,7 +29,7 @@ constexpr float kDeviation[kColumns] = {
     0.194425359F,  0.0133683002F, 0.204112738F,   18.8385429F,   1.40263009F,   0.117016174F,
     0.0465344079F, 0.967979074F,  13.5716209F,    1.32585359F,   0.0486509912F, 0.643370509F,
     36.0661049F,   28.7827339F,   0.296245247F,   1.65128362F};
-constexpr double kNode[][kColumns + 1] = {
+constexpr double kPlaceNode[][kPlaceColumns + 1] = {
     {-0.401406182, -0.457052384, 0.11694011,   0.0600958937,  -0.270880297,  -0.446716858,
      -0.08763252,  0.573237364,  0.366561771,  -0.14953185,   -0.167502613,  -0.233535264,
      0.252560003,  0.298679615,  0.109899705,  -0.0379058041, 0.119251387,   -0.75957793,
@@ -48,26 +52,26 @@ constexpr double kNode[][kColumns + 1] = {
      0.0256019821,  -0.0826520562, -0.0327481482, -0.0591307043, 0.0606793931,  0.170501634,
      -0.294035103,  -0.0705005423, 0.145349652,   -0.0427974337, 0.857956103},
 };
-constexpr double kEdge[] = {2.85269645, 2.27095205, 0.686827762};
+constexpr double kPlaceEdge[] = {2.85269645, 2.27095205, 0.686827762};
 
-PlaceModel Model() {
+PlaceModel LearnedModel() {
   PlaceModel model;
-  model.columns.assign(kColumn, kColumn + kColumns);
-  model.mean = Eigen::Map<const Eigen::RowVectorXf>(kMean, kColumns);
-  model.deviation = Eigen::Map<const Eigen::RowVectorXf>(kDeviation, kColumns);
-  model.weights.node.resize(std::size(kNode), kColumns + 1);
-  for (std::size_t k = 0; k < std::size(kNode); ++k) {
+  model.columns.assign(kPlaceColumn, kPlaceColumn + kPlaceColumns);
+  model.mean = Eigen::Map<const Eigen::RowVectorXf>(kPlaceMean, kPlaceColumns);
+  model.deviation = Eigen::Map<const Eigen::RowVectorXf>(kPlaceDeviation, kPlaceColumns);
+  model.weights.node.resize(std::size(kPlaceNode), kPlaceColumns + 1);
+  for (std::size_t k = 0; k < std::size(kPlaceNode); ++k) {
     model.weights.node.row(static_cast<Eigen::Index>(k)) =
-        Eigen::Map<const Eigen::RowVectorXd>(kNode[k], kColumns + 1);
+        Eigen::Map<const Eigen::RowVectorXd>(kPlaceNode[k], kPlaceColumns + 1);
   }
-  model.weights.edge = Eigen::Map<const Eigen::VectorXd>(kEdge, std::size(kEdge));
+  model.weights.edge = Eigen::Map<const Eigen::VectorXd>(kPlaceEdge, std::size(kPlaceEdge));
   return model;
 }
 
 }  // namespace
 
 const PlaceModel& LearnedPlaceModel() {
-  static const PlaceModel model = Model();
+  static const PlaceModel model = LearnedModel();
   return model;
 }
 

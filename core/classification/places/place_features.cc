@@ -15,8 +15,7 @@
 namespace strata {
 namespace {
 
-constexpr int kSide = kFloorBlockCells;
-constexpr std::uint32_t kStopInterval = 32;  // samples, some 2 ms
+constexpr std::uint32_t kSamplesAStop = 32;  // samples, some 2 ms
 
 int FloorMod(std::int64_t value, int by) { return static_cast<int>(((value % by) + by) % by); }
 
@@ -27,8 +26,8 @@ struct BlockBox {
   std::int64_t high_x = std::numeric_limits<std::int32_t>::min();
   std::int64_t high_y = std::numeric_limits<std::int32_t>::min();
 
-  std::int64_t width() const { return (high_x - low_x + 1) * kSide; }
-  std::int64_t height() const { return (high_y - low_y + 1) * kSide; }
+  std::int64_t width() const { return (high_x - low_x + 1) * kFloorBlockCells; }
+  std::int64_t height() const { return (high_y - low_y + 1) * kFloorBlockCells; }
 };
 
 BlockBox BoxOf(std::span<const FloorBlock> blocks) {
@@ -59,15 +58,16 @@ absl::StatusOr<FreeSpace> OpenSpace(std::span<const FloorBlock> blocks, double c
                         cell_size_m));
   }
   const Eigen::Vector2d low(static_cast<double>(box.low_x), static_cast<double>(box.low_y));
-  FreeSpace space(kSide * cell_size_m * low,
+  FreeSpace space(kFloorBlockCells * cell_size_m * low,
                   cell_size_m,
                   static_cast<int>(box.width()),
                   static_cast<int>(box.height()));
   for (const FloorBlock& block : blocks) {
-    const int column = static_cast<int>(block.x - box.low_x) * kSide;
-    const int row = static_cast<int>(block.y - box.low_y) * kSide;
-    for (int cell = 0; cell < kSide * kSide; ++cell) {
-      std::uint8_t& at = space.At(space.Index(column + cell % kSide, row + cell / kSide));
+    const int column = static_cast<int>(block.x - box.low_x) * kFloorBlockCells;
+    const int row = static_cast<int>(block.y - box.low_y) * kFloorBlockCells;
+    for (int cell = 0; cell < kFloorBlockCells * kFloorBlockCells; ++cell) {
+      std::uint8_t& at =
+          space.At(space.Index(column + cell % kFloorBlockCells, row + cell / kFloorBlockCells));
       if ((block.free >> cell & 1U) != 0) {
         at = kOpenFree;
       } else if ((block.ground >> cell & 1U) != 0) {
@@ -142,7 +142,7 @@ absl::StatusOr<FeatureMatrix> PlaceFeatures(const FreeSpace& space,
   std::vector<float> ranges(kPlaceBeams);
   FeatureMatrix matrix;
   for (std::uint32_t i = 0; i < samples.size(); ++i) {
-    if (i % kStopInterval == 0) STRATA_RETURN_IF_ERROR(stop.status());
+    if (i % kSamplesAStop == 0) STRATA_RETURN_IF_ERROR(stop.status());
     const Eigen::Vector2d from = space.min_m() + space.cell_m() * (samples.cell(i).cast<double>() +
                                                                    Eigen::Vector2d(0.5, 0.5));
     for (int k = 0; k < kPlaceBeams; ++k) {

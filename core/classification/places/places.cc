@@ -17,7 +17,6 @@
 namespace strata {
 namespace {
 
-constexpr int kSide = kFloorBlockCells;
 constexpr double kLeastPlaceM2 = 1.0;  // but doorways
 
 // Samples of one kind that hang together: the first of them, for each.
@@ -177,16 +176,16 @@ class PlaceList {
   }
 
   void FillBlocks(std::vector<Place>& places) const {
-    const auto first_x =
-        static_cast<std::int32_t>(std::lround(space_.min_m().x() / space_.cell_m()) / kSide);
-    const auto first_y =
-        static_cast<std::int32_t>(std::lround(space_.min_m().y() / space_.cell_m()) / kSide);
-    for (int y = 0; y < space_.rows() / kSide; ++y) {
-      for (int x = 0; x < space_.columns() / kSide; ++x) {
+    const auto first_x = static_cast<std::int32_t>(
+        std::lround(space_.min_m().x() / space_.cell_m()) / kFloorBlockCells);
+    const auto first_y = static_cast<std::int32_t>(
+        std::lround(space_.min_m().y() / space_.cell_m()) / kFloorBlockCells);
+    for (int y = 0; y < space_.rows() / kFloorBlockCells; ++y) {
+      for (int x = 0; x < space_.columns() / kFloorBlockCells; ++x) {
         std::map<std::uint32_t, std::uint64_t> cells;
-        for (int bit = 0; bit < kSide * kSide; ++bit) {
-          const int column = x * kSide + bit % kSide;
-          const int row = y * kSide + bit / kSide;
+        for (int bit = 0; bit < kFloorBlockCells * kFloorBlockCells; ++bit) {
+          const int column = x * kFloorBlockCells + bit % kFloorBlockCells;
+          const int row = y * kFloorBlockCells + bit / kFloorBlockCells;
           if (space_.cells()[space_.Index(column, row)] != kOpenFree) continue;
           cells[place_of_[samples_.SampleOf(column, row)]] |= std::uint64_t{1} << bit;
         }

@@ -233,8 +233,7 @@ absl::StatusOr<FloorPlaces> MapPlanner::Places(const PlaceQuery& query, const St
   places.commit_sequence = plan.commit_sequence;
   if (largest && plan.floors.empty()) return places;
   places.floor = query.at.has_value() ? plan.at : floors.floor;
-  if (!places.floor.has_value() ||
-      static_cast<std::size_t>(*places.floor) >= plan.floors.size()) {
+  if (!places.floor.has_value() || static_cast<std::size_t>(*places.floor) >= plan.floors.size()) {
     return NoSuchFloor(query, plan.floors.size());
   }
   STRATA_ASSIGN_OR_RETURN(places.places,

@@ -117,39 +117,40 @@ std::string Source(const PlaceModel& model) {
       "// Written by tests/experiments/classification/learn_places.cc: learn_places FILE.\n"
       "#include \"core/classification/places/place_model.h\"\n\n"
       "namespace strata {\nnamespace {\n\n"
-      "constexpr int kColumns = ",
+      "constexpr int kPlaceColumns = ",
       model.columns.size(),
       ";\n"
-      "constexpr std::uint32_t kColumn[kColumns] = {",
+      "constexpr std::uint32_t kPlaceColumn[kPlaceColumns] = {",
       Numbers(model.columns, "%.0f"),
       "};\n"
-      "constexpr float kMean[kColumns] = {",
+      "constexpr float kPlaceMean[kPlaceColumns] = {",
       Numbers(model.mean, "%#.9gF"),
       "};\n"
-      "constexpr float kDeviation[kColumns] = {",
+      "constexpr float kPlaceDeviation[kPlaceColumns] = {",
       Numbers(model.deviation, "%#.9gF"),
       "};\n"
-      "constexpr double kNode[][kColumns + 1] = {\n",
+      "constexpr double kPlaceNode[][kPlaceColumns + 1] = {\n",
       weights,
       "};\n"
-      "constexpr double kEdge[] = {",
+      "constexpr double kPlaceEdge[] = {",
       Numbers(model.weights.edge, "%.9g"),
       "};\n\n"
-      "PlaceModel Model() {\n"
+      "PlaceModel LearnedModel() {\n"
       "  PlaceModel model;\n"
-      "  model.columns.assign(kColumn, kColumn + kColumns);\n"
-      "  model.mean = Eigen::Map<const Eigen::RowVectorXf>(kMean, kColumns);\n"
-      "  model.deviation = Eigen::Map<const Eigen::RowVectorXf>(kDeviation, kColumns);\n"
-      "  model.weights.node.resize(std::size(kNode), kColumns + 1);\n"
-      "  for (std::size_t k = 0; k < std::size(kNode); ++k) {\n"
+      "  model.columns.assign(kPlaceColumn, kPlaceColumn + kPlaceColumns);\n"
+      "  model.mean = Eigen::Map<const Eigen::RowVectorXf>(kPlaceMean, kPlaceColumns);\n"
+      "  model.deviation = Eigen::Map<const Eigen::RowVectorXf>(kPlaceDeviation, kPlaceColumns);\n"
+      "  model.weights.node.resize(std::size(kPlaceNode), kPlaceColumns + 1);\n"
+      "  for (std::size_t k = 0; k < std::size(kPlaceNode); ++k) {\n"
       "    model.weights.node.row(static_cast<Eigen::Index>(k)) =\n"
-      "        Eigen::Map<const Eigen::RowVectorXd>(kNode[k], kColumns + 1);\n"
+      "        Eigen::Map<const Eigen::RowVectorXd>(kPlaceNode[k], kPlaceColumns + 1);\n"
       "  }\n"
-      "  model.weights.edge = Eigen::Map<const Eigen::VectorXd>(kEdge, std::size(kEdge));\n"
+      "  model.weights.edge = Eigen::Map<const Eigen::VectorXd>(kPlaceEdge, "
+      "std::size(kPlaceEdge));\n"
       "  return model;\n}\n\n"
       "}  // namespace\n\n"
       "const PlaceModel& LearnedPlaceModel() {\n"
-      "  static const PlaceModel model = Model();\n"
+      "  static const PlaceModel model = LearnedModel();\n"
       "  return model;\n}\n\n"
       "}  // namespace strata\n");
 }
