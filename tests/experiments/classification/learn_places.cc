@@ -115,6 +115,7 @@ std::string Source(const PlaceModel& model) {
   }
   return absl::StrCat(
       "// Written by tests/experiments/classification/learn_places.cc: learn_places FILE.\n"
+      "#include <cstddef>\n#include <cstdint>\n#include <iterator>\n\n"
       "#include \"core/classification/places/place_model.h\"\n\n"
       "namespace strata {\nnamespace {\n\n"
       "constexpr int kPlaceColumns = ",
