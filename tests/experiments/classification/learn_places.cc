@@ -3,8 +3,9 @@
 //   learn_places [FILE]     judges a new one, and writes it to FILE:
 //                           core/classification/places/learned_places.cc
 //
-// Prints how many cells of storeys that nothing was learned from are right, kind by kind. Ends with
-// 1 if fewer than nine of ten are.
+// Of 184,148 samples in 48 storeys; some ten minutes of a processor. Prints how many cells of
+// storeys that nothing was learned from are right, kind by kind. Ends with 1 if fewer than nine of
+// ten are.
 #include <cstddef>
 #include <cstdio>
 #include <fstream>
@@ -30,10 +31,9 @@ namespace {
 using testing::Wing;
 
 constexpr std::uint64_t kFirstTraining = 20001, kFirstTest = 30001;
-constexpr int kStoreys = 16, kTestStoreys = 8;
+constexpr int kStoreys = 48, kTestStoreys = 16;
 constexpr double kCellsM[] = {0.1, 0.1, 0.05, 0.2};  // in turns
 constexpr std::size_t kFeatures = 40;
-constexpr std::uint32_t kDoorwayCount = 4;
 
 template <typename T>
 T Checked(absl::StatusOr<T> result) {
@@ -73,16 +73,10 @@ PlaceModel Learn(Wing training) {
   const testing::FeatureChoice choice = testing::ChooseFeatures(training, kFeatures);
   testing::Apply(choice, training);
   const FeatureMatrix features = testing::WithConstant(training.data.features);
-  // Doorways are few; unless they count for more, a network has hardly any.
-  std::vector<std::uint32_t> counts;
-  for (const ClassIndex label : training.data.labels) {
-    counts.push_back(kPlaceKinds[label] == PlaceKind::kDoorway ? kDoorwayCount : 1);
-  }
-  const std::vector<std::uint32_t> inner_edges(counts.size(), 0);
-  const AmnLearning learned = Checked(LearnByCuttingPlanes(
-      {features, training.edges, training.data.labels, training.data.classes, counts, inner_edges},
-      {.slack_weight = 1000.0, .tolerance = 1e-2, .max_iterations = 300},
-      Stop()));
+  const AmnLearning learned = Checked(
+      LearnByCuttingPlanes({features, training.edges, training.data.labels, training.data.classes},
+                           {.slack_weight = 1000.0, .tolerance = 3e-3, .max_iterations = 2000},
+                           Stop()));
   std::fprintf(stderr, "%d cutting planes, %zu cells\n", learned.iterations, training.data.size());
   return {choice.columns, choice.mean, choice.deviation, learned.weights};
 }
