@@ -54,6 +54,7 @@ ARROWS = {
 HERE = "."
 STOREYS = {
     "core/mls": ["elevation", HERE],
+    "core/world": ["robots", HERE],
     "core/classification": [HERE, "places", "learners", "amn", "features"],
     "core/egomotion": ["smoothing", HERE],
     "core/planning": ["floors", HERE, "ground"],
