@@ -317,7 +317,7 @@ TEST_P(DatabaseSuite, PlacesAreOfOneFloor) {
   }
   EXPECT_NEAR(area_m2, plan.floors[0].area_m2, 1e-6);
   for (const FloorBlock& block : plan.floors[0].blocks) {
-    if (block.free != 0) EXPECT_EQ((cells[{block.x, block.y}]), block.free);
+    EXPECT_EQ((cells[{block.x, block.y}]), block.free);
   }
   query = {.profile = {}, .floor = {}, .at = PlanEndpoint{.x_m = 0.0, .y_m = 0.0}};
   STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlaces there, db().planning().ListPlaces({}, kMap, query));

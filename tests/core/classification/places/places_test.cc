@@ -77,7 +77,7 @@ TEST(PlacesTest, PlacesAreWhatTheirCellsSay) {
   ASSERT_GT(places.size(), 2U);
   for (std::size_t k = 0; k < places.size(); ++k) {
     const Place& place = places[k];
-    if (k > 0) EXPECT_LE(place.area_m2, places[k - 1].area_m2);
+    EXPECT_LE(place.area_m2, places[k > 0 ? k - 1 : 0].area_m2);
     if (place.kind != PlaceKind::kDoorway && !place.neighbours.empty()) {
       EXPECT_GE(place.area_m2, 1.0 - 1e-9);
     }
