@@ -122,6 +122,9 @@ class Filler {
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_UINT32) {
       return reflection.AddUInt32(&message, &field, static_cast<std::uint32_t>(++count_));
     }
+    if (field.cpp_type() == FieldDescriptor::CPPTYPE_INT32) {
+      return reflection.AddInt32(&message, &field, ++count_);
+    }
     ASSERT_EQ(field.cpp_type(), FieldDescriptor::CPPTYPE_DOUBLE) << field.full_name();
     reflection.AddDouble(&message, &field, Real());
   }
