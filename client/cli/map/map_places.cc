@@ -24,7 +24,7 @@ struct PlacesOptions {
   FloorOptions floor;
 };
 
-Json ToJson(const Eigen::Vector2d& p) { return {p.x(), p.y()}; }
+Json PairOf(const Eigen::Vector2d& p) { return {p.x(), p.y()}; }
 
 Json PlaceRows(const FloorPlaces& found) {
   Json rows = Json::array();
@@ -33,9 +33,9 @@ Json PlaceRows(const FloorPlaces& found) {
     rows.push_back({{"place", i},
                     {"kind", std::string(ToString(place.kind))},
                     {"area_m2", place.area_m2},
-                    {"low", ToJson(place.low)},
-                    {"high", ToJson(place.high)},
-                    {"middle", ToJson(place.middle)},
+                    {"low", PairOf(place.low)},
+                    {"high", PairOf(place.high)},
+                    {"middle", PairOf(place.middle)},
                     {"neighbours", place.neighbours}});
   }
   return rows;

@@ -486,7 +486,7 @@ double LinearRate(const FeatureMatrix& x,
   const FeatureMatrix features = testing::WithConstant(x);
   const AmnLearning learned =
       Checked(LearnByCuttingPlanes({features, {}, training.data.labels, 2}, {}, Stop()));
-  const AmnProblem problem = MakeAmnProblem(learned.weights, WithConstant(test_x), {});
+  const AmnProblem problem = MakeAmnProblem(learned.weights, testing::WithConstant(test_x), {});
   ConfusionMatrix matrix(2);
   matrix.Add(test.data.labels, LargestScores(problem.node_scores));
   return matrix.Accuracy();
