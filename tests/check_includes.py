@@ -29,7 +29,7 @@ ARROWS = {
                        "core/common"],
     "core/tracking": ["core/posegraph", "core/registration", "core/egomotion", "core/world", "core/mls", "core/cloud",
                       "core/geometry", "core/common"],
-    "core/classification": ["core/planes", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
+    "core/classification": ["core/planes", "core/world", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/collision": ["core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/completion": ["core/registration", "core/mesh", "core/world", "core/codec", "core/mls", "core/cloud", "core/geometry",
                         "core/common"],
@@ -54,8 +54,8 @@ ARROWS = {
 HERE = "."
 STOREYS = {
     "core/mls": ["elevation", HERE],
-    "core/world": [HERE, "things"],
-    "core/classification": [HERE, "learners", "amn", "features"],
+    "core/world": ["robots", HERE],
+    "core/classification": [HERE, "places", "learners", "amn", "features"],
     "core/egomotion": ["smoothing", HERE],
     "core/planning": ["floors", HERE, "ground"],
     "core/planes": ["models", HERE],

@@ -10,6 +10,7 @@
 #include "core/common/status.h"
 #include "proto/translate/geometry.h"
 #include "proto/translate/maps.h"
+#include "proto/translate/places.h"
 #include "proto/translate/planning.h"
 #include "proto/translate/shape.h"
 
@@ -89,6 +90,19 @@ absl::StatusOr<FloorPlan> RemotePlanning::ListFloors(const api::Call& call,
                                     Repeat::kOnTrouble,
                                     ToProto(map, query)));
   return FromProto(out);
+}
+
+absl::StatusOr<FloorPlaces> RemotePlanning::ListPlaces(const api::Call& call,
+                                                       absl::string_view map,
+                                                       const PlaceQuery& query) {
+  STRATA_ASSIGN_OR_RETURN(const v1::ListPlacesResponse out,
+                          CallUnary(connection_,
+                                    *stub_,
+                                    &v1::Planning::Stub::ListPlaces,
+                                    call,
+                                    Repeat::kOnTrouble,
+                                    translate::ToProto(map, query)));
+  return translate::FromProto(out);
 }
 
 absl::StatusOr<ExploreResult> RemotePlanning::Explore(const api::Call& call,

@@ -15,6 +15,7 @@
 #include "core/api/call.h"
 #include "core/world/exploration.h"
 #include "core/world/floor.h"
+#include "core/world/place.h"
 #include "core/world/plan.h"
 #include "core/world/robot_profile.h"
 #include "core/world/shape.h"
@@ -52,6 +53,13 @@ class Planning {
   virtual absl::StatusOr<FloorPlan> ListFloors(const Call& call,
                                                absl::string_view map,
                                                const FloorQuery& query) = 0;
+  // Rooms, corridors and doorways of one floor (core/classification/places); a map without floors
+  // has none, which is OK. INVALID_ARGUMENT for a bad query; NOT_FOUND where no floor has the
+  // number or is at the place; RESOURCE_EXHAUSTED for a floor or a map too large; DATA_LOSS naming
+  // a damaged tile.
+  virtual absl::StatusOr<FloorPlaces> ListPlaces(const Call& call,
+                                                 absl::string_view map,
+                                                 const PlaceQuery& query) = 0;
   // Where the robot should look next: views of unknown space from where it can drive, the most
   // telling first (core/world/exploration.h). That none is worth it, or that the start is on no
   // surface, is OK. INVALID_ARGUMENT for a bad query, or a region of too many voxels: the message

@@ -53,7 +53,8 @@ struct FloorQuery {
   RobotProfile profile;
   std::optional<PlanEndpoint> at = std::nullopt;  // whose floor is asked for
   double min_area_m2 = 10.0;                      // smaller ones are left out; finite, ≥ 0
-  bool cells = false;  // fills Floor::blocks: of the floor at `at`, or of all
+  bool cells = false;  // fills Floor::blocks: of the floor at `at`, of number `floor`, or of all
+  std::optional<int> floor = std::nullopt;  // of which the cells are told; not beside `at`
 };
 
 struct FloorPlan {

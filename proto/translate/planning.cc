@@ -31,33 +31,6 @@ static_assert(v1::TRAVERSABILITY_NON_TRAVERSABLE ==
               static_cast<int>(Traversability::kNonTraversable));
 static_assert(v1::TRAVERSABILITY_UNDERSIDE == static_cast<int>(Traversability::kUnderside));
 
-v1::PlanEndpoint EndpointToProto(const PlanEndpoint& endpoint) {
-  v1::PlanEndpoint proto;
-  proto.set_x_m(endpoint.x_m);
-  proto.set_y_m(endpoint.y_m);
-  if (endpoint.level.has_value()) proto.set_level(*endpoint.level);
-  if (endpoint.z_m.has_value()) proto.set_z_m(*endpoint.z_m);
-  return proto;
-}
-
-absl::StatusOr<PlanEndpoint> EndpointFromProto(const char* what, const v1::PlanEndpoint& proto) {
-  PlanEndpoint endpoint;
-  endpoint.x_m = proto.x_m();
-  endpoint.y_m = proto.y_m();
-  if (proto.has_z_m()) endpoint.z_m = proto.z_m();
-  if (proto.has_level()) endpoint.level = proto.level();
-  const double z = endpoint.z_m.value_or(0.0);
-  if (!std::isfinite(endpoint.x_m) || !std::isfinite(endpoint.y_m) || !std::isfinite(z)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(what, ": (", endpoint.x_m, ", ", endpoint.y_m, ", ", z, ") is not finite"));
-  }
-  if (endpoint.level.value_or(0) < 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(what, ": level ", *endpoint.level, " is below 0"));
-  }
-  return endpoint;
-}
-
 using ClassCostFields = google::protobuf::RepeatedPtrField<v1::ClassCost>;
 
 absl::StatusOr<ClassCosts> ClassCostsFromProto(const ClassCostFields& fields) {
@@ -184,6 +157,33 @@ absl::Status ReasonsFromProto(const v1::PlanPathResponse& proto, PlanResult& res
 }
 
 }  // namespace
+
+v1::PlanEndpoint EndpointToProto(const PlanEndpoint& endpoint) {
+  v1::PlanEndpoint proto;
+  proto.set_x_m(endpoint.x_m);
+  proto.set_y_m(endpoint.y_m);
+  if (endpoint.level.has_value()) proto.set_level(*endpoint.level);
+  if (endpoint.z_m.has_value()) proto.set_z_m(*endpoint.z_m);
+  return proto;
+}
+
+absl::StatusOr<PlanEndpoint> EndpointFromProto(const char* what, const v1::PlanEndpoint& proto) {
+  PlanEndpoint endpoint;
+  endpoint.x_m = proto.x_m();
+  endpoint.y_m = proto.y_m();
+  if (proto.has_z_m()) endpoint.z_m = proto.z_m();
+  if (proto.has_level()) endpoint.level = proto.level();
+  const double z = endpoint.z_m.value_or(0.0);
+  if (!std::isfinite(endpoint.x_m) || !std::isfinite(endpoint.y_m) || !std::isfinite(z)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(what, ": (", endpoint.x_m, ", ", endpoint.y_m, ", ", z, ") is not finite"));
+  }
+  if (endpoint.level.value_or(0) < 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(what, ": level ", *endpoint.level, " is below 0"));
+  }
+  return endpoint;
+}
 
 v1::PlanPathRequest ToProto(absl::string_view map, const PlanQuery& query) {
   v1::PlanPathRequest proto;
@@ -323,6 +323,7 @@ v1::ListFloorsRequest ToProto(absl::string_view map, const FloorQuery& query) {
   if (query.at.has_value()) *proto.mutable_at() = EndpointToProto(*query.at);
   proto.set_min_area_m2(query.min_area_m2);
   proto.set_cells(query.cells);
+  if (query.floor.has_value()) proto.set_floor(*query.floor);
   return proto;
 }
 
@@ -335,6 +336,7 @@ absl::StatusOr<FloorQuery> FromProto(const v1::ListFloorsRequest& proto) {
   }
   if (proto.has_min_area_m2()) query.min_area_m2 = proto.min_area_m2();
   query.cells = proto.cells();
+  if (proto.has_floor()) query.floor = proto.floor();
   return query;
 }
 

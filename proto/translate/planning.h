@@ -12,6 +12,10 @@
 
 namespace strata::translate {
 
+v1::PlanEndpoint EndpointToProto(const PlanEndpoint& endpoint);
+// INVALID_ARGUMENT, named `what`, for coordinates that are not finite and a negative level.
+absl::StatusOr<PlanEndpoint> EndpointFromProto(const char* what, const v1::PlanEndpoint& endpoint);
+
 v1::PlanPathRequest ToProto(absl::string_view map, const PlanQuery& query);
 v1::PlanPathResponse ToProto(const PlanResult& result);
 v1::SurfaceColumn ToProto(const SurfaceColumn& column);

@@ -42,6 +42,7 @@ constexpr std::array kTable = {
     MethodRight{"Planning.CheckPath", kRead, "map"},
     MethodRight{"Planning.WatchPath", kRead, "map"},
     MethodRight{"Planning.ListFloors", kRead, "map"},
+    MethodRight{"Planning.ListPlaces", kRead, "map"},
     MethodRight{"Planning.Explore", kRead, "map"},
     MethodRight{"Planning.CheckShape", kRead, "map"},
     MethodRight{"Planning.SampleSurfaces", kRead, "map"},

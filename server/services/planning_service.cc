@@ -11,6 +11,7 @@
 #include "core/world/plan.h"
 #include "proto/translate/geometry.h"
 #include "proto/translate/maps.h"
+#include "proto/translate/places.h"
 #include "proto/translate/planning.h"
 #include "proto/translate/shape.h"
 #include "server/services/path_watch_reactor.h"
@@ -48,6 +49,17 @@ absl::Status ListFloors(api::Database& db,
   STRATA_ASSIGN_OR_RETURN(const FloorQuery query, AtTheDoor(FromProto(in)));
   STRATA_ASSIGN_OR_RETURN(const FloorPlan plan, db.planning().ListFloors(call, in.map(), query));
   out = ToProto(plan);
+  return absl::OkStatus();
+}
+
+absl::Status ListPlaces(api::Database& db,
+                        const api::Call& call,
+                        const v1::ListPlacesRequest& in,
+                        v1::ListPlacesResponse& out) {
+  STRATA_ASSIGN_OR_RETURN(const PlaceQuery query, AtTheDoor(FromProto(in)));
+  STRATA_ASSIGN_OR_RETURN(const FloorPlaces places,
+                          db.planning().ListPlaces(call, in.map(), query));
+  out = ToProto(places);
   return absl::OkStatus();
 }
 
@@ -120,6 +132,7 @@ PlanningService::PlanningService(Runtime& runtime) : Service(runtime, "Planning"
   Unary("CheckPath", &CheckPath);
   Poll<PathWatchReactor>("WatchPath");
   Unary("ListFloors", &ListFloors);
+  Unary("ListPlaces", &ListPlaces);
   Unary("Explore", &Explore);
   Unary("CheckShape", &CheckShape);
   Unary("SampleSurfaces", &SampleSurfaces);

@@ -42,6 +42,7 @@ RESULTS = {
     "meshes": ("Meshes of recorded scans", "experiments/mesh_methods recorded", ("core/mesh",)),
     **{f"thesis_{what}": (f"Thesis, 9.3 and 9.4: {what}", f"experiments/classification_thesis {what}", LABELS)
        for what in ("facade", "depths", "transform", "objects", "people", "places")},
+    "recorded_places": ("Thesis, 9.4.4: places of a recorded building", "experiments/recorded_places", LABELS),
     "oakland": ("Recorded streets named", "experiments/labelled_clouds --data oakland", LABELS),
     "recordings": ("Recorded drives through a real server",
                    "/usr/bin/python3 tests/experiments/real_data.py --build {build}", ("core", "server", "client")),

@@ -109,6 +109,8 @@ const auto& Kinds() {
       KindOf<v1::WatchPathRequest>(),
       KindOf<v1::ListFloorsRequest>(),
       KindOf<v1::ListFloorsResponse>(),
+      KindOf<v1::ListPlacesRequest>(),
+      KindOf<v1::ListPlacesResponse>(),
       KindOf<v1::ExploreRequest>(),
       KindOf<v1::ExploreResponse>(),
       KindOf<v1::CheckShapeRequest>(),

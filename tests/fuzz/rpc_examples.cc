@@ -82,6 +82,9 @@ const std::multimap<std::string, std::string>& Examples() {
       {"Planning/ListFloors",
        "map: 'world' at { x_m: -6 y_m: 0.7 } min_area_m2: 0 cells: true "
        "profile { radius_m: 0.1 height_m: 0.3 max_step_m: 2 max_gap_m: 1 max_roughness_m: 5 }"},
+      {"Planning/ListPlaces",
+       "map: 'world' at { x_m: -6 y_m: 0.7 } cells: true "
+       "profile { radius_m: 0.1 height_m: 0.3 max_step_m: 2 max_gap_m: 1 max_roughness_m: 5 }"},
       {"Planning/Explore",
        "map: 'world' from { x_m: -6 y_m: 0.7 } count: 2 resolution_m: 0.5 min_bits: 1 "
        "sensor { rows: 4 columns: 90 max_range_m: 6 } "

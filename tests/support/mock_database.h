@@ -168,6 +168,10 @@ class MockPlanning : public api::Planning {
               ListFloors,
               (const api::Call&, absl::string_view, const FloorQuery&),
               (override));
+  MOCK_METHOD(absl::StatusOr<FloorPlaces>,
+              ListPlaces,
+              (const api::Call&, absl::string_view, const PlaceQuery&),
+              (override));
   MOCK_METHOD(absl::StatusOr<ExploreResult>,
               Explore,
               (const api::Call&, absl::string_view, const ExploreQuery&),

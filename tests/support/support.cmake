@@ -52,6 +52,15 @@ strata_library(
   PRIVATE_DEPS absl::str_format
 )
 
+# Storeys as floor grids, with what every cell is.
+strata_library(
+  floor_plans
+  NO_INSTALL
+  SOURCES simulator/floor_plans.cc
+  HEADERS simulator/floor_plans.h
+  DEPS strata::simulator strata::world
+)
+
 strata_test(
   simulator_test
   SOURCES simulator/scene_test.cc simulator/simulator_test.cc simulator/sweep_test.cc simulator/views_test.cc simulator/worlds_test.cc

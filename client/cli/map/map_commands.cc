@@ -1,5 +1,5 @@
 // strata map create|list|show|delete|verify|rebuild|history|revert; backup, classes, diff, export,
-// floors, georeference, merge, render and watch have files of their own.
+// floors, georeference, merge, places, render and watch have files of their own.
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -214,6 +214,7 @@ void AddMapCommands(Commands& commands) {
   AddMapExport(commands, noun);
   AddMapFloorplan(commands, noun);
   AddMapFloors(commands, noun);
+  AddMapPlaces(commands, noun);
   AddMapGeoreference(commands, noun);
   AddMapMerge(commands, noun);
   AddMapMesh(commands, noun);

@@ -14,6 +14,7 @@ void AddMapFloorplan(Commands& commands, CLI::App* noun);
 void AddMapFloors(Commands& commands, CLI::App* noun);
 void AddMapGeoreference(Commands& commands, CLI::App* noun);
 void AddMapMerge(Commands& commands, CLI::App* noun);
+void AddMapPlaces(Commands& commands, CLI::App* noun);
 void AddMapRender(Commands& commands, CLI::App* noun);
 void AddMapWatch(Commands& commands, CLI::App* noun);
 

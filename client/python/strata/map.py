@@ -7,7 +7,7 @@ import time as clock
 
 import numpy as np
 
-from strata import errors, exploration, floors, heights, job, mesh, objects, plan, planes, poses, scan, shape, tracking
+from strata import errors, exploration, floors, heights, job, mesh, objects, places, plan, planes, poses, scan, shape, tracking
 from strata.tiles import SURFACE, TILE_CELLS, TileKey, decode_tile
 from strata.v1 import (geometry_pb2, jobs_pb2, jobs_pb2_grpc, maps_pb2, maps_pb2_grpc, models_pb2, models_pb2_grpc,
                        objects_pb2, objects_pb2_grpc, planning_pb2, planning_pb2_grpc, posegraph_pb2_grpc, scans_pb2, scans_pb2_grpc, tiles_pb2, tiles_pb2_grpc)
@@ -318,6 +318,19 @@ class Map:
             map=self.name, at=None if at is None else plan.endpoint(at), profile=plan.profile_to_proto(profile or {}),
             min_area_m2=min_area, cells=cells)
         return floors.from_proto(self._connection.unary(self._planning.ListFloors, request))
+
+    def places(self, floor=None, *, at=None, profile=None, cells=False):
+        """Places: rooms, corridors and doorways of one floor, the largest first, and which of them touch.
+
+        floor: its number as floors() has them; at: (x, y, z) or (x, y) on it [m]; without both, the largest. profile: as for
+        plan. cells: also which cell is of which place. NotFound: no such floor. ResourceExhausted: it is too large.
+        """
+        if isinstance(profile, str):
+            profile = self._named_profile(profile)
+        request = planning_pb2.ListPlacesRequest(
+            map=self.name, floor=floor, at=None if at is None else plan.endpoint(at),
+            profile=plan.profile_to_proto(profile or {}), cells=cells)
+        return places.from_proto(self._connection.unary(self._planning.ListPlaces, request))
 
     def explore(self, start, *, count=5, profile=None, class_costs=None, region=None, **query):
         """Exploration: where a robot at `start` should look next, as views of space that no scan has seen.

@@ -21,6 +21,7 @@
 #include "absl/time/time.h"
 #include <glog/logging.h>
 
+#include "core/classification/places/places.h"
 #include "core/collision/shape_way.h"
 #include "core/common/log_line.h"
 #include "core/common/status.h"
@@ -60,6 +61,16 @@ bool StillKnown(const PathCheck& known,
   return std::none_of(changes.tiles.begin(), changes.tiles.end(), [&](const auto& change) {
     return around.contains(change.first);
   });
+}
+
+absl::Status NoSuchFloor(const PlaceQuery& query, std::size_t floors) {
+  if (query.at.has_value()) {
+    return absl::NotFoundError(
+        absl::StrCat("no floor of 10 m² or more at ", query.at->x_m, ", ", query.at->y_m));
+  }
+  if (floors == 0) return absl::NotFoundError("the map has no floor for this robot");
+  return absl::NotFoundError(
+      absl::StrCat("no floor ", *query.floor, "; the map has 0 to ", floors - 1));
 }
 
 }  // namespace
@@ -209,6 +220,28 @@ absl::StatusOr<FloorPlan> MapPlanner::Floors(const FloorQuery& query, const Stop
   plan.epoch = source.epoch();
   plan.commit_sequence = now.first.last;
   return plan;
+}
+
+absl::StatusOr<FloorPlaces> MapPlanner::Places(const PlaceQuery& query, const Stop& stop) {
+  FloorQuery floors{.profile = query.profile, .at = query.at, .cells = true, .floor = query.floor};
+  const bool largest = !query.at.has_value() && !query.floor.has_value();
+  if (largest) floors.floor = 0;
+  STRATA_ASSIGN_OR_RETURN(const FloorPlan plan, Floors(floors, stop));
+  FloorPlaces places;
+  places.cell_size_m = plan.cell_size_m;
+  places.epoch = plan.epoch;
+  places.commit_sequence = plan.commit_sequence;
+  if (largest && plan.floors.empty()) return places;
+  places.floor = query.at.has_value() ? plan.at : floors.floor;
+  if (!places.floor.has_value() || static_cast<std::size_t>(*places.floor) >= plan.floors.size()) {
+    return NoSuchFloor(query, plan.floors.size());
+  }
+  STRATA_ASSIGN_OR_RETURN(places.places,
+                          FindPlaces(plan.floors[static_cast<std::size_t>(*places.floor)].blocks,
+                                     plan.cell_size_m,
+                                     query.cells,
+                                     stop));
+  return places;
 }
 
 absl::StatusOr<ExploreResult> MapPlanner::Explore(const ExploreQuery& query, const Stop& stop) {

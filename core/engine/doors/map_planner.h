@@ -26,6 +26,7 @@
 #include "core/planning/tile_cache.h"
 #include "core/world/exploration.h"
 #include "core/world/floor.h"
+#include "core/world/place.h"
 #include "core/world/plan.h"
 #include "core/world/shape.h"
 
@@ -44,6 +45,8 @@ class MapPlanner {
                      absl::FunctionRef<absl::Status(const PathCheck&)> sink);
   // As api::Planning::ListFloors. Made anew on each call, from prepared tiles as they are cached.
   absl::StatusOr<FloorPlan> Floors(const FloorQuery& query, const Stop& stop);
+  // As api::Planning::ListPlaces. Made anew on each call.
+  absl::StatusOr<FloorPlaces> Places(const PlaceQuery& query, const Stop& stop);
   // As api::Planning::Explore.
   absl::StatusOr<ExploreResult> Explore(const ExploreQuery& query, const Stop& stop);
   // As api::Planning::CheckShape.

@@ -43,6 +43,13 @@ absl::StatusOr<FloorPlan> EnginePlanning::ListFloors(const api::Call& call,
   return found->planner().Floors(query, call.stop);
 }
 
+absl::StatusOr<FloorPlaces> EnginePlanning::ListPlaces(const api::Call& call,
+                                                       absl::string_view map,
+                                                       const PlaceQuery& query) {
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.FindWithTiles(call, map));
+  return found->planner().Places(query, call.stop);
+}
+
 absl::StatusOr<ExploreResult> EnginePlanning::Explore(const api::Call& call,
                                                       absl::string_view map,
                                                       const ExploreQuery& query) {

@@ -32,6 +32,9 @@ class EnginePlanning final : public api::Planning {
   absl::StatusOr<FloorPlan> ListFloors(const api::Call& call,
                                        absl::string_view map,
                                        const FloorQuery& query) override;
+  absl::StatusOr<FloorPlaces> ListPlaces(const api::Call& call,
+                                         absl::string_view map,
+                                         const PlaceQuery& query) override;
   absl::StatusOr<ExploreResult> Explore(const api::Call& call,
                                         absl::string_view map,
                                         const ExploreQuery& query) override;

@@ -174,6 +174,10 @@ absl::StatusOr<std::optional<int>> FloorAt(SearchSpace& space,
 
 absl::Status Validate(const FloorQuery& query, double cell_size_m) {
   if (query.at.has_value()) STRATA_RETURN_IF_ERROR(ValidateEndpoint("at", *query.at, cell_size_m));
+  if (query.floor.has_value() && (*query.floor < 0 || query.at.has_value())) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("floor ", *query.floor, ": give a number of 0 or more, or a place, not both"));
+  }
   if (std::isfinite(query.min_area_m2) && query.min_area_m2 >= 0.0) return absl::OkStatus();
   return absl::InvalidArgumentError(
       absl::StrCat("min_area_m2 ", query.min_area_m2, " is not a finite area of 0 or more"));
@@ -209,7 +213,9 @@ absl::StatusOr<FloorPlan> FindFloors(TileCache& cache,
   }
   if (!query.cells) return plan;
   for (std::size_t i = 0; i < floors.size(); ++i) {
-    if (query.at.has_value() && plan.at != static_cast<int>(i)) continue;
+    const std::optional<int> told = query.at.has_value() ? plan.at : query.floor;
+    const bool one = query.at.has_value() || query.floor.has_value();
+    if (one && told != static_cast<int>(i)) continue;
     STRATA_ASSIGN_OR_RETURN(plan.floors[i].blocks, FloorGrid(space, tiles, cut, floors[i], stop));
   }
   return plan;

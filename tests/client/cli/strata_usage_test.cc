@@ -57,6 +57,7 @@ TEST_F(StrataUsageTest, EveryCommandHasHelpWithAnExample) {
                                              "map diff",
                                              "map backup",
                                              "map merge",
+                                             "map places",
                                              "map mesh",
                                              "path check",
                                              "path watch",

@@ -4,6 +4,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/classification/places/free_space.h"
 #include "tests/experiments/classification/classification_cases.h"
 #include "tests/experiments/classification/classification_scenes.h"
 #include "tests/support/simulator/simulator.h"
@@ -31,16 +32,16 @@ class Grid {
   static constexpr double kCellM = 0.05;
 
   Grid(const Vector2d& min, const Vector2d& max)
-      : min_(min),
-        columns_(static_cast<int>((max - min).x() / kCellM)),
-        rows_(static_cast<int>((max - min).y() / kCellM)),
-        free_(static_cast<std::size_t>(columns_ * rows_), 0),
-        label_(free_.size(), 0) {}
+      : space_(min,
+               kCellM,
+               static_cast<int>((max - min).x() / kCellM),
+               static_cast<int>((max - min).y() / kCellM)),
+        label_(space_.cells().size(), 0) {}
 
   template <typename Inside>
   void Fill(const Inside& inside) {
     ForEach([&](std::size_t cell, const Vector2d& p) {
-      if (inside(p)) free_[cell] = 0;
+      if (inside(p)) space_.At(cell) = 0;
     });
   }
   // `label` 0: free, but nothing that is asked about, as a doorway is.
@@ -48,68 +49,56 @@ class Grid {
     const Eigen::AlignedBox2d box(a.cwiseMin(b), a.cwiseMax(b));
     ForEach([&](std::size_t cell, const Vector2d& p) {
       if (!box.contains(p)) return;
-      free_[cell] = 1;
+      space_.At(cell) = 1;
       label_[cell] = label;
     });
   }
   void Wear(Random& random) {
-    const std::vector<std::uint8_t> before = free_;
-    for (int row = 1; row + 1 < rows_; ++row) {
-      for (int column = 1; column + 1 < columns_; ++column) {
-        const std::size_t cell = Index(column, row);
-        const auto wide = static_cast<std::size_t>(columns_);
+    const std::vector<std::uint8_t> before = space_.cells();
+    for (int row = 1; row + 1 < space_.rows(); ++row) {
+      for (int column = 1; column + 1 < space_.columns(); ++column) {
+        const std::size_t cell = space_.Index(column, row);
+        const auto wide = static_cast<std::size_t>(space_.columns());
         const bool edge =
             before[cell - 1] + before[cell + 1] + before[cell - wide] + before[cell + wide] > 0;
-        if (before[cell] == 0 && edge && random.Uniform(0, 1) < kWornCells) free_[cell] = 1;
+        if (before[cell] == 0 && edge && random.Uniform(0, 1) < kWornCells) space_.At(cell) = 1;
       }
     }
   }
 
-  bool IsFree(const Vector2d& p) const { return At(free_, p) != 0; }
-  std::uint16_t LabelAt(const Vector2d& p) const { return At(label_, p); }
+  std::uint16_t LabelAt(const Vector2d& p) const {
+    const int column = static_cast<int>(std::floor((p - min()).x() / kCellM));
+    const int row = static_cast<int>(std::floor((p - min()).y() / kCellM));
+    const bool inside = column >= 0 && column < space_.columns() && row >= 0 && row < space_.rows();
+    return inside ? label_[space_.Index(column, row)] : std::uint16_t{0};
+  }
   bool IsClear(const Vector2d& p) const {
     for (double angle = 0.0; angle < kTurn; angle += kTurn / 32) {
       const Vector2d along(std::cos(angle), std::sin(angle));
       for (double r = 0.0; r <= kClearanceM; r += kCellM) {
-        if (!IsFree(p + r * along)) return false;
+        if (!space_.IsOpen(p + r * along)) return false;
       }
     }
     return true;
   }
   double Cast(const Vector2d& from, double angle, double most) const {
-    const Vector2d along(std::cos(angle), std::sin(angle));
-    double range = 0.0;
-    while (range < most && IsFree(from + range * along)) range += 0.5 * kCellM;
-    return std::min(range, most);
+    return space_.Cast(from, angle, most);
   }
 
-  const Vector2d& min() const { return min_; }
-  Vector2d max() const { return min_ + kCellM * Vector2d(columns_, rows_); }
+  const Vector2d& min() const { return space_.min_m(); }
+  Vector2d max() const { return min() + kCellM * Vector2d(space_.columns(), space_.rows()); }
 
  private:
-  std::size_t Index(int column, int row) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-           static_cast<std::size_t>(column);
-  }
-  template <typename T>
-  T At(const std::vector<T>& values, const Vector2d& p) const {
-    const int column = static_cast<int>(std::floor((p - min_).x() / kCellM));
-    const int row = static_cast<int>(std::floor((p - min_).y() / kCellM));
-    const bool inside = column >= 0 && column < columns_ && row >= 0 && row < rows_;
-    return inside ? values[Index(column, row)] : T{0};
-  }
   template <typename Use>
   void ForEach(const Use& use) {
-    for (int row = 0; row < rows_; ++row) {
-      for (int column = 0; column < columns_; ++column) {
-        use(Index(column, row), min_ + kCellM * Vector2d(column + 0.5, row + 0.5));
+    for (int row = 0; row < space_.rows(); ++row) {
+      for (int column = 0; column < space_.columns(); ++column) {
+        use(space_.Index(column, row), min() + kCellM * Vector2d(column + 0.5, row + 0.5));
       }
     }
   }
 
-  Vector2d min_;
-  int columns_, rows_;
-  std::vector<std::uint8_t> free_;
+  FreeSpace space_;
   std::vector<std::uint16_t> label_;
 };
 

@@ -32,17 +32,23 @@
 #include "core/classification/features/neighbours.h"
 #include "core/classification/learners/adaboost.h"
 #include "core/classification/learners/instances.h"
+#include "core/classification/places/range_scan_features.h"
 #include "core/classification/training.h"
 #include "core/common/stop.h"
 #include "tests/experiments/classification/classification_cases.h"
 #include "tests/experiments/classification/classification_scenes.h"
-#include "tests/experiments/classification/range_scan_features.h"
+#include "tests/experiments/classification/place_methods.h"
 #include "tests/experiments/planes/signed_ranks.h"
 #include "tests/support/simulator/simulator.h"
 
 namespace strata {
 namespace {
 
+using testing::kAmn;
+using testing::kInstanceAmn;
+using testing::kMethodNames;
+using testing::kNearest;
+using testing::Method;
 using testing::ScanSeed;
 using testing::ScanSet;
 using Clock = std::chrono::steady_clock;
@@ -137,9 +143,6 @@ ConfusionMatrix Judge(const Classifier& classifier, std::span<const PointCloud> 
 }
 
 // --- Table 9.1 and Fig. 9.6: three methods, world by world -----------------------------------
-
-enum Method { kNearest, kAmn, kInstanceAmn };
-constexpr const char* kMethodNames[] = {"NN", "AMN", "iAMN"};
 
 // Shares of right points: method by method, world by world.
 struct Rates {
@@ -249,18 +252,15 @@ void People(Seeds seeds) {
 
 // --- Places ------------------------------------------------------------------------------------
 
-// One wing's cells with the features of their scans.
-struct Wing {
-  LabelledFeatures data;
-  std::vector<NetworkEdge> edges;
-};
+using testing::Wing;
 
 Wing MakeWing(std::uint64_t building, std::uint64_t seed) {
   const testing::Places places = testing::ScanPlaces(building, seed);
   Wing wing;
   wing.data.classes = testing::PlaceClasses().size();
+  const RangeScanFeatures scans(360);
   for (std::size_t i = 0; i < places.cells.size(); ++i) {
-    const std::vector<float> features = testing::RangeScanFeatures(places.ranges_m[i]);
+    const std::vector<float> features = scans.Of(places.ranges_m[i]);
     const auto columns = static_cast<Eigen::Index>(features.size());
     if (i == 0) wing.data.features.resize(static_cast<Eigen::Index>(places.cells.size()), columns);
     wing.data.features.row(static_cast<Eigen::Index>(i)) =
@@ -271,60 +271,6 @@ Wing MakeWing(std::uint64_t building, std::uint64_t seed) {
   return wing;
 }
 
-// Those columns that boosting on the training wing found most useful, to mean 0 and variance 1 of
-// the training wing.
-void SelectFeatures(Wing& training, Wing& test) {
-  const AdaBoost boosted = Checked(LearnAdaBoost(training.data, {.rounds = 100}, Stop()));
-  std::vector<std::size_t> columns = FeaturesByWeight(boosted);
-  columns.resize(std::min<std::size_t>(columns.size(), testing::kPlaceFeatures));
-  const FeatureMatrix chosen = training.data.features(Eigen::all, columns);
-  const Eigen::RowVectorXf mean = chosen.colwise().mean();
-  const Eigen::RowVectorXf deviation =
-      ((chosen.rowwise() - mean).colwise().squaredNorm() / static_cast<float>(chosen.rows()))
-          .cwiseSqrt()
-          .cwiseMax(1e-6F);
-  for (Wing* wing : {&training, &test}) {
-    FeatureMatrix features = wing->data.features(Eigen::all, columns);
-    features.rowwise() -= mean;
-    features.array().rowwise() /= deviation.array();
-    wing->data.features = std::move(features);
-  }
-}
-
-FeatureMatrix WithConstant(FeatureMatrix features) {
-  features.conservativeResize(Eigen::NoChange, features.cols() + 1);
-  features.rightCols(1).setOnes();
-  return features;
-}
-
-std::vector<ClassIndex> LearnAndLabel(const Wing& training,
-                                      const FeatureMatrix& training_features,
-                                      const Wing& test,
-                                      const FeatureMatrix& test_features) {
-  const AmnLearning learned = Checked(LearnByCuttingPlanes(
-      {training_features, training.edges, training.data.labels, training.data.classes},
-      {.tolerance = 1e-3},
-      Stop()));
-  return Checked(MaximizeScore(MakeAmnProblem(learned.weights, test_features, test.edges), Stop()))
-      .labels;
-}
-
-std::vector<ClassIndex> LabelPlaces(const Wing& training, const Wing& test, Method method) {
-  const Instances instances(training.data);
-  if (method == kNearest) {
-    return LargestScores(instances.Votes(test.data.features, testing::kNearestNeighbours));
-  }
-  if (method == kAmn) {
-    return LearnAndLabel(
-        training, WithConstant(training.data.features), test, WithConstant(test.data.features));
-  }
-  return LearnAndLabel(
-      training,
-      InstanceFeatures(instances.DistancesWithin(testing::kInstanceNeighbours)),
-      test,
-      InstanceFeatures(instances.Distances(test.data.features, testing::kInstanceNeighbours)));
-}
-
 Rates LabelWings(Seeds seeds, bool other_building) {
   Rates rates;
   for (const std::uint64_t world : seeds) {
@@ -332,10 +278,12 @@ Rates LabelWings(Seeds seeds, bool other_building) {
     const std::uint64_t second = ScanSeed(world, ScanSet::kPlacesTest, 0);
     Wing training = MakeWing(first, first);
     Wing test = MakeWing(other_building ? second : first, second);
-    SelectFeatures(training, test);
+    const testing::FeatureChoice choice =
+        testing::ChooseFeatures(training, testing::kPlaceFeatures);
+    for (Wing* wing : {&training, &test}) testing::Apply(choice, *wing);
     for (const Method method : {kNearest, kAmn, kInstanceAmn}) {
       ConfusionMatrix matrix(test.data.classes);
-      matrix.Add(test.data.labels, LabelPlaces(training, test, method));
+      matrix.Add(test.data.labels, testing::LabelPlaces(training, test, method));
       rates.of[method].push_back(matrix.Accuracy());
       std::fprintf(stderr,
                    "world %d %s: %.1f %%\n",
@@ -535,10 +483,10 @@ double LinearRate(const FeatureMatrix& x,
                   const FeatureMatrix& test_x,
                   const PlaneSamples& training,
                   const PlaneSamples& test) {
-  const FeatureMatrix features = WithConstant(x);
+  const FeatureMatrix features = testing::WithConstant(x);
   const AmnLearning learned =
       Checked(LearnByCuttingPlanes({features, {}, training.data.labels, 2}, {}, Stop()));
-  const AmnProblem problem = MakeAmnProblem(learned.weights, WithConstant(test_x), {});
+  const AmnProblem problem = MakeAmnProblem(learned.weights, testing::WithConstant(test_x), {});
   ConfusionMatrix matrix(2);
   matrix.Add(test.data.labels, LargestScores(problem.node_scores));
   return matrix.Accuracy();

@@ -16,6 +16,7 @@
 #include "proto/translate/maps.h"
 #include "proto/translate/models.h"
 #include "proto/translate/objects.h"
+#include "proto/translate/places.h"
 #include "proto/translate/planning.h"
 #include "proto/translate/posegraph.h"
 #include "proto/translate/scans.h"
@@ -121,6 +122,9 @@ class Filler {
     }
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_UINT32) {
       return reflection.AddUInt32(&message, &field, static_cast<std::uint32_t>(++count_));
+    }
+    if (field.cpp_type() == FieldDescriptor::CPPTYPE_INT32) {
+      return reflection.AddInt32(&message, &field, ++count_);
     }
     ASSERT_EQ(field.cpp_type(), FieldDescriptor::CPPTYPE_DOUBLE) << field.full_name();
     reflection.AddDouble(&message, &field, Real());
@@ -289,6 +293,10 @@ TEST(TranslateRoundTripTest, Planning) {
   const auto floors = Filled<v1::ListFloorsRequest>();
   STRATA_ASSERT_OK_AND_ASSIGN(const FloorQuery asked, FromProto(floors));
   ExpectSame(floors, ToProto(floors.map(), asked));
+  ExpectRoundTrip(Filled<v1::ListPlacesResponse>());
+  const auto places = Filled<v1::ListPlacesRequest>();
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlaceQuery of_floor, FromProto(places));
+  ExpectSame(places, ToProto(places.map(), of_floor));
   ExpectRoundTrip(Filled<v1::ExploreResponse>());
   auto explore = Filled<v1::ExploreRequest>();
   explore.set_budget_m(3.0);

@@ -80,6 +80,7 @@ const std::map<std::string, std::optional<Right>>& Needed() {
          "Classifiers.Export",
          "Planning.CheckPath",
          "Planning.ListFloors",
+         "Planning.ListPlaces",
          "Planning.Explore",
          "Planning.CheckShape",
          "Models.GetPlaneModel",

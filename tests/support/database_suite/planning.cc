@@ -1,9 +1,12 @@
 // Conformance: planning.
 #include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <map>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
@@ -288,6 +291,65 @@ TEST_P(DatabaseSuite, AFloorIsWhatARobotCanDrive) {
   EXPECT_THAT(db().planning().ListFloors({}, kMap, query),
               StatusIs(Code::kInvalidArgument, HasSubstr("min_area_m2")));
   EXPECT_THAT(db().planning().ListFloors({}, "none", {}), StatusIs(Code::kNotFound, _));
+}
+
+TEST_P(DatabaseSuite, PlacesAreOfOneFloor) {
+  PlaceQuery query;
+  query.cells = true;
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlaces none, db().planning().ListPlaces({}, kMap, query));
+  EXPECT_TRUE(none.places.empty());
+  EXPECT_FALSE(none.floor.has_value());
+  query.floor = 0;
+  EXPECT_THAT(db().planning().ListPlaces({}, kMap, query),
+              StatusIs(Code::kNotFound, HasSubstr("no floor")));
+  PutFloor(db(), {"run", 1});
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlaces found, db().planning().ListPlaces({}, kMap, query));
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan plan,
+                              db().planning().ListFloors({}, kMap, {.profile = {}, .cells = true}));
+  ASSERT_EQ(plan.floors.size(), 1U);
+  EXPECT_EQ(found.floor, 0);
+  EXPECT_EQ(found.commit_sequence, plan.commit_sequence);
+  double area_m2 = 0.0;
+  std::map<std::pair<std::int32_t, std::int32_t>, std::uint64_t> cells;
+  for (const Place& place : found.places) {
+    area_m2 += place.area_m2;
+    for (const PlaceBlock& block : place.blocks) cells[{block.x, block.y}] += block.cells;
+  }
+  EXPECT_NEAR(area_m2, plan.floors[0].area_m2, 1e-6);
+  for (const FloorBlock& block : plan.floors[0].blocks) {
+    EXPECT_EQ((cells[{block.x, block.y}]), block.free);
+  }
+  query = {.profile = {}, .floor = {}, .at = PlanEndpoint{.x_m = 0.0, .y_m = 0.0}};
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlaces there, db().planning().ListPlaces({}, kMap, query));
+  EXPECT_EQ(there.places.size(), found.places.size());
+  EXPECT_TRUE(there.places[0].blocks.empty());
+}
+
+TEST_P(DatabaseSuite, PlacesThatAreNoneAreNamed) {
+  PutFloor(db(), {"run", 1});
+  PlaceQuery query;
+  query.floor = 3;
+  EXPECT_THAT(db().planning().ListPlaces({}, kMap, query),
+              StatusIs(Code::kNotFound, HasSubstr("no floor 3")));
+  query.floor = -1;
+  EXPECT_THAT(db().planning().ListPlaces({}, kMap, query),
+              StatusIs(Code::kInvalidArgument, HasSubstr("floor -1")));
+  query.floor = 0;
+  query.at = PlanEndpoint{.x_m = 0.0, .y_m = 0.0};
+  EXPECT_THAT(db().planning().ListPlaces({}, kMap, query),
+              StatusIs(Code::kInvalidArgument, HasSubstr("not both")));
+  query.floor.reset();
+  query.at->x_m = 500.0;
+  EXPECT_THAT(db().planning().ListPlaces({}, kMap, query),
+              StatusIs(Code::kNotFound, HasSubstr("500")));
+  query.at.reset();
+  query.profile.radius_m = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(db().planning().ListPlaces({}, kMap, query),
+              StatusIs(Code::kInvalidArgument, HasSubstr("radius")));
+  EXPECT_THAT(db().planning().ListPlaces({}, "none", {}), StatusIs(Code::kNotFound, _));
+  const api::Call cancelled;
+  cancelled.stop.Request();
+  EXPECT_THAT(db().planning().ListPlaces(cancelled, kMap, {}), StatusIs(Code::kCancelled, _));
 }
 
 TEST_P(DatabaseSuite, AStoppedCallSaysSo) {

@@ -1,5 +1,6 @@
 // strata map, on a database that the test decides on.
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "tests/client/cli/commands_fixture.h"
 #include "tests/support/mock_database.h"
 #include "tests/support/status_matchers.h"
+#include "tests/support/temp_dir.h"
 
 namespace strata::cli {
 namespace {
@@ -196,6 +198,39 @@ TEST_F(MapCommandsTest, AMapSaysHowWellItsScansAndLoopsAgree) {
   listed = absl::UnavailableError("gone");
   EXPECT_FALSE(RunJson({"map", "show", "m"}).contains("median_overlap"));
   EXPECT_THAT(talk_.str(), HasSubstr("its quality is unknown: gone"));
+}
+
+TEST_F(MapCommandsTest, PlacesAreToldAndDrawn) {
+  FloorPlaces found;
+  ON_CALL(db_.planning(), ListPlaces(_, _, _)).WillByDefault([&](auto&, auto, auto&) {
+    return absl::StatusOr<FloorPlaces>(found);
+  });
+  FloorPlan plan;
+  ON_CALL(db_.planning(), ListFloors(_, _, _)).WillByDefault([&](auto&, auto, const FloorQuery& q) {
+    EXPECT_EQ(q.floor, found.floor);
+    return absl::StatusOr<FloorPlan>(plan);
+  });
+  const ::strata::testing::TempDir dir;
+  const std::string file = (dir.path() / "places.png").string();
+  EXPECT_THAT(RunText({"map", "places", "m"}), HasSubstr("no place"));
+  EXPECT_TRUE(RunJson({"map", "places", "m"})["places"].empty());
+  EXPECT_THAT(Run({"map", "places", "m", file}), StatusIs(Code::kNotFound, HasSubstr("no floor")));
+  EXPECT_THAT(Run({"map", "places", "m", "--profile", "giant"}), StatusIs(Code::kNotFound, _));
+  found.floor = 0;
+  found.cell_size_m = 0.1;
+  found.places = {
+      {PlaceKind::kRoom, 12.5, {0, 0}, {4, 3}, {2, 1}, {1}, {{0, 0, 0x0FFFFFFFFFFFFFFF}}},
+      {PlaceKind::kDoorway, 0.5, {4, 0}, {5, 1}, {4, 1}, {0}, {{0, 0, 0xF000000000000000}}}};
+  const auto json = RunJson({"map", "places", "m", "--floor", "0"});
+  EXPECT_EQ(json["floor"], 0);
+  EXPECT_EQ(json["places"][0]["kind"], "room");
+  EXPECT_EQ(json["places"][1]["neighbours"][0], 0);
+  EXPECT_EQ(json["places"][0]["high"][1], 3.0);
+  EXPECT_THAT(Run({"map", "places", "m", file}), StatusIs(Code::kAborted, _));
+  plan.floors.resize(1);
+  plan.floors[0].blocks = {{0, 0, ~std::uint64_t{0}, 0, 0}, {1, 0, 0, 0xFF, 0xFF00}};
+  EXPECT_THAT(Run({"map", "places", "m", file}), IsOk());
+  EXPECT_GT(std::filesystem::file_size(file), 100U);
 }
 
 }  // namespace

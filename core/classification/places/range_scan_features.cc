@@ -1,4 +1,4 @@
-#include "tests/experiments/classification/range_scan_features.h"
+#include "core/classification/places/range_scan_features.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,19 +10,20 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
-namespace strata::testing {
+namespace strata {
 namespace {
 
 using Eigen::Vector2d;
 
+constexpr int kMagnitudes = 12;  // of Fourier, beside the first
+
 class Features {
  public:
-  explicit Features(std::span<const float> ranges) : r_(ranges.begin(), ranges.end()) {
-    for (std::size_t i = 0; i < r_.size(); ++i) {
-      const double angle =
-          2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(r_.size());
-      ends_.emplace_back(r_[i] * std::cos(angle), r_[i] * std::sin(angle));
-    }
+  Features(std::span<const float> ranges,
+           std::span<const Vector2d> directions,
+           std::span<const std::complex<double>> frequencies)
+      : r_(ranges.begin(), ranges.end()), frequencies_(frequencies) {
+    for (std::size_t i = 0; i < r_.size(); ++i) ends_.emplace_back(r_[i] * directions[i]);
   }
 
   std::vector<float> Take() {
@@ -135,29 +136,37 @@ class Features {
   }
 
   void PutFourier() {
-    constexpr int kMagnitudes = 12;
     double first = 1.0;
-    for (int k = 0; k <= kMagnitudes; ++k) {
+    for (std::size_t k = 0; k <= kMagnitudes; ++k) {
       std::complex<double> sum = 0.0;
-      for (std::size_t i = 0; i < r_.size(); ++i) {
-        const double angle =
-            -2.0 * std::numbers::pi * k * static_cast<double>(i) / static_cast<double>(r_.size());
-        sum += std::polar(r_[i], angle);
-      }
+      for (std::size_t i = 0; i < r_.size(); ++i) sum += r_[i] * frequencies_[k * r_.size() + i];
       if (k == 0) first = std::abs(sum);
       if (k > 0) Put(std::abs(sum) / std::max(first, 1e-6));
     }
   }
 
   std::vector<double> r_;
+  std::span<const std::complex<double>> frequencies_;
   std::vector<Vector2d> ends_;
   std::vector<float> out_;
 };
 
 }  // namespace
 
-std::vector<float> RangeScanFeatures(std::span<const float> ranges_m) {
-  return Features(ranges_m).Take();
+RangeScanFeatures::RangeScanFeatures(int beams) {
+  for (int i = 0; i < beams; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / beams;
+    directions_.emplace_back(std::cos(angle), std::sin(angle));
+  }
+  for (int k = 0; k <= kMagnitudes; ++k) {
+    for (int i = 0; i < beams; ++i) {
+      frequencies_.push_back(std::polar(1.0, -2.0 * std::numbers::pi * k * i / beams));
+    }
+  }
 }
 
-}  // namespace strata::testing
+std::vector<float> RangeScanFeatures::Of(std::span<const float> ranges_m) const {
+  return Features(ranges_m, directions_, frequencies_).Take();
+}
+
+}  // namespace strata
