@@ -1,6 +1,6 @@
 // The things in a map: what points of one class that lie together are (thesis 11.2).
-#ifndef STRATA_CORE_WORLD_ENTITY_H_
-#define STRATA_CORE_WORLD_ENTITY_H_
+#ifndef STRATA_CORE_WORLD_THINGS_ENTITY_H_
+#define STRATA_CORE_WORLD_THINGS_ENTITY_H_
 
 #include <cstdint>
 #include <optional>
@@ -88,4 +88,4 @@ struct EntityQuery {
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_WORLD_ENTITY_H_
+#endif  // STRATA_CORE_WORLD_THINGS_ENTITY_H_

@@ -1,4 +1,4 @@
-#include "core/world/entity.h"
+#include "core/world/things/entity.h"
 
 #include <cmath>
 

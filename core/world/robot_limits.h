@@ -1,6 +1,6 @@
 // What ground a robot can take.
-#ifndef STRATA_CORE_WORLD_ROBOTS_ROBOT_LIMITS_H_
-#define STRATA_CORE_WORLD_ROBOTS_ROBOT_LIMITS_H_
+#ifndef STRATA_CORE_WORLD_ROBOT_LIMITS_H_
+#define STRATA_CORE_WORLD_ROBOT_LIMITS_H_
 
 #include "core/mls/traversability.h"
 #include "core/world/robot_profile.h"
@@ -12,4 +12,4 @@ TraversabilityLimits LimitsOf(const RobotProfile& profile);
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_WORLD_ROBOTS_ROBOT_LIMITS_H_
+#endif  // STRATA_CORE_WORLD_ROBOT_LIMITS_H_

@@ -1,4 +1,4 @@
-#include "core/world/robots/robot_limits.h"
+#include "core/world/robot_limits.h"
 
 namespace strata {
 
