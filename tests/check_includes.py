@@ -31,7 +31,7 @@ ARROWS = {
                       "core/geometry", "core/common"],
     "core/classification": ["core/planes", "core/world", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "core/collision": ["core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
-    "core/completion": ["core/registration", "core/mesh", "core/world", "core/codec", "core/mls", "core/cloud", "core/geometry",
+    "core/completion": ["core/registration", "core/occupancy", "core/mesh", "core/world", "core/codec", "core/mls", "core/cloud", "core/geometry",
                         "core/common"],
     "core/planning": ["core/occupancy", "core/mesh", "core/cloud", "core/world", "core/mls", "core/geometry", "core/common"],
     "core/storage": ["core/world", "core/codec", "core/mls", "core/cloud", "core/geometry", "core/common"],
@@ -54,7 +54,7 @@ ARROWS = {
 HERE = "."
 STOREYS = {
     "core/mls": ["elevation", HERE],
-    "core/world": ["robots", HERE],
+    "core/world": ["things", HERE],
     "core/classification": [HERE, "places", "learners", "amn", "features"],
     "core/egomotion": ["smoothing", HERE],
     "core/planning": ["floors", HERE, "ground"],

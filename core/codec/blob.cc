@@ -41,6 +41,10 @@ absl::string_view NameOf(BlobKind kind) {
       return "entities";
     case BlobKind::kEntity:
       return "entity";
+    case BlobKind::kInferredHead:
+      return "inferred parts";
+    case BlobKind::kInferred:
+      return "inferred part";
     case BlobKind::kKindInfo:
       return "kind head";
     case BlobKind::kKindShape:

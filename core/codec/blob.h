@@ -25,6 +25,8 @@ enum class BlobKind : std::uint32_t {  // stored
   kKindInfo = 0x31494B53,              // "SKI1"
   kKindShape = 0x31444B53,             // "SKD1"
   kKindFile = 0x31464B53,              // "SKF1"
+  kInferredHead = 0x31484953,          // "SIH1"
+  kInferred = 0x314E4953,              // "SIN1"
 };
 
 // Bytes that the envelope adds to a body.

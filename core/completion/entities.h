@@ -15,7 +15,7 @@
 
 #include "core/common/stop.h"
 #include "core/completion/square_voxels.h"
-#include "core/world/entity.h"
+#include "core/world/things/entity.h"
 
 namespace strata {
 

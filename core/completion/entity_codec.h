@@ -9,7 +9,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
-#include "core/world/entity.h"
+#include "core/world/things/entity.h"
 
 namespace strata {
 

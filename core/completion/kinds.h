@@ -14,7 +14,7 @@
 
 #include "core/common/stop.h"
 #include "core/completion/entities.h"
-#include "core/world/entity.h"
+#include "core/world/things/entity.h"
 #include "core/world/things/kind.h"
 
 namespace strata {

@@ -14,7 +14,7 @@
 
 #include "core/cloud/point_tree.h"
 #include "core/geometry/pose.h"
-#include "core/world/entity.h"
+#include "core/world/things/entity.h"
 
 namespace strata {
 

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "core/world/entity.h"
+#include "core/world/things/entity.h"
 
 namespace strata {
 

@@ -16,6 +16,7 @@
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/checksum.h"
 #include "core/completion/entity_codec.h"
+#include "core/completion/inferred_codec.h"
 #include "core/completion/kind_codec.h"
 #include "core/mls/mls_map.h"
 #include "core/planes/models/plane_model_codec.h"
@@ -68,6 +69,10 @@ void TryKind(int kind, const std::string& body, std::uint16_t version) {
       return TryBytes(sealed(BlobKind::kKindShape), DecodeKindShape, EncodeKindShape);
     case 17:
       return TryBytes(sealed(BlobKind::kKindFile), DecodeKindFile, EncodeKindFile);
+    case 18:
+      return TryBytes(sealed(BlobKind::kInferredHead), DecodeInferredInfo, EncodeInferredInfo);
+    case 19:
+      return TryBytes(sealed(BlobKind::kInferred), DecodeInferredPart, EncodeInferredPart);
     case 3:
       return TryBytes(sealed(BlobKind::kClassifier), DecodeClassifier, EncodeClassifier);
     case 4:
@@ -104,7 +109,7 @@ void TryKind(int kind, const std::string& body, std::uint16_t version) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace strata;
   FuzzedDataProvider input(data, size);
-  const int kind = input.ConsumeIntegralInRange(0, 17);
+  const int kind = input.ConsumeIntegralInRange(0, 19);
   const auto version = input.ConsumeIntegralInRange<std::uint16_t>(0, 3);
   const std::string bytes = input.ConsumeRemainingBytesAsString();
   fuzz::TryKind(kind, bytes, version);
