@@ -119,6 +119,10 @@ class StorageReader {
       std::uint64_t job, std::optional<std::uint64_t> after) = 0;
   // The job whose entities are kept; 0: none.
   virtual absl::StatusOr<std::uint64_t> JobOfEntities() = 0;
+  // The same of what was inferred of them.
+  virtual absl::StatusOr<std::optional<EntityPart>> FindInferredPart(
+      std::uint64_t job, std::optional<std::uint64_t> after) = 0;
+  virtual absl::StatusOr<std::uint64_t> JobOfInferred() = 0;
   // Without shapes: those of the library, then those that the job found and the library has not,
   // each by id.
   virtual absl::StatusOr<std::vector<KindRow>> ListKinds() = 0;
@@ -249,7 +253,14 @@ class StorageWriter {
   virtual absl::Status PutEntityPart(std::uint64_t job,
                                      const EntityPart& part,
                                      const std::vector<ScanNumber>& scans) = 0;
-  // And the kinds that a job found.
+  // What was inferred of the entity that has the part's number, by others of its kind.
+  virtual absl::Status PutInferredPart(std::uint64_t job,
+                                       std::uint64_t kind,
+                                       const EntityPart& part) = 0;
+  // DeleteScan() deletes all parts of the kinds that the scan has seen.
+  virtual absl::Status PutInferredScan(std::uint64_t kind, ScanNumber scan) = 0;
+  virtual absl::Status DeleteInferred() = 0;
+  // And the kinds that a job found, and what was inferred.
   virtual absl::Status DeleteEntities() = 0;
   // In place of one with this id; its name is ignored.
   virtual absl::Status PutFoundKind(const KindRow& row, absl::string_view shape) = 0;

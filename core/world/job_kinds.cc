@@ -109,6 +109,13 @@ std::vector<JobParameter> ObjectsParameters() {
   };
 }
 
+std::vector<JobParameter> CompleteParameters() {
+  return {
+      {"kind", NameType(), "", "Only this kind, by name or id; default: all"},
+      {"voxel_m", RealType{0.01, 1.0}, "0.05", "Spacing of what is inferred [m]"},
+  };
+}
+
 std::vector<JobKind> MakeJobKinds() {
   return {
       {kRebuildJob, "All derived data again from the scans.", {Threads()}},
@@ -125,6 +132,7 @@ std::vector<JobKind> MakeJobKinds() {
        FadeParameters()},
       {kPlanesJob, "The walls, floors and slopes of the map as polygons.", PlanesParameters()},
       {kObjectsJob, "The things that points with a class make up.", ObjectsParameters()},
+      {kCompleteJob, "What nobody saw of things, by others of their kinds.", CompleteParameters()},
   };
 }
 

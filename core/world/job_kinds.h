@@ -24,6 +24,7 @@ inline constexpr absl::string_view kEvaluateJob = "evaluate";
 inline constexpr absl::string_view kFadeJob = "fade";
 inline constexpr absl::string_view kPlanesJob = "planes";
 inline constexpr absl::string_view kObjectsJob = "objects";
+inline constexpr absl::string_view kCompleteJob = "complete";
 
 // What the text of a parameter may be: 0 or 1;
 struct FlagType {};

@@ -8,6 +8,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/common/status.h"
+#include "core/engine/objects/completion.h"
 #include "core/engine/objects/entities.h"
 #include "core/engine/objects/kind_library.h"
 
@@ -66,6 +67,16 @@ absl::Status EngineObjects::DeleteKind(const api::Call& call,
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
   return strata::DeleteKind(found->core(), kind, call.stop);
+}
+
+absl::StatusOr<InferredInfo> EngineObjects::ListInferred(
+    const api::Call& call,
+    absl::string_view map,
+    const EntityQuery& query,
+    absl::FunctionRef<absl::Status(const InferredPart&)> sink) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  return ReadInferred(found->core(), query, call.stop, sink);
 }
 
 }  // namespace strata

@@ -35,6 +35,12 @@ class EngineObjects final : public api::Objects {
                           absl::string_view map,
                           absl::string_view kind) override;
 
+  absl::StatusOr<InferredInfo> ListInferred(
+      const api::Call& call,
+      absl::string_view map,
+      const EntityQuery& query,
+      absl::FunctionRef<absl::Status(const InferredPart&)> sink) override;
+
  private:
   EngineMaps& maps_;
 };

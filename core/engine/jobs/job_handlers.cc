@@ -13,6 +13,7 @@
 #include "core/engine/labels/fade.h"
 #include "core/engine/labels/train.h"
 #include "core/engine/models/plane_models.h"
+#include "core/engine/objects/completion.h"
 #include "core/engine/objects/entities.h"
 #include "core/engine/repair/rebuild.h"
 #include "core/world/job_kinds.h"
@@ -98,6 +99,10 @@ absl::Status RunObjects(const JobRun& run) {
   return RunObjectsJob(run.core, run.job, run.arguments, run.context);
 }
 
+absl::Status RunComplete(const JobRun& run) {
+  return RunCompleteJob(run.core, run.job, run.arguments, run.context);
+}
+
 absl::Status RunFade(const JobRun& run) {
   return RunFadeJob(run.core, run.worker, run.arguments, run.context);
 }
@@ -116,6 +121,7 @@ const std::vector<JobHandler>& JobHandlers() {
       {kFadeJob, NeedsPoints, RunFade},
       {kPlanesJob, NeedsPoints, RunPlanes},
       {kObjectsJob, NeedsPointsAndClass, RunObjects},
+      {kCompleteJob, NeedsPoints, RunComplete},
   };
   return *handlers;
 }

@@ -11,9 +11,9 @@
 #include "core/common/stop.h"
 #include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
-#include "core/world/entity.h"
 #include "core/world/job.h"
 #include "core/world/job_arguments.h"
+#include "core/world/things/entity.h"
 #include "core/world/things/kind.h"
 
 namespace strata {

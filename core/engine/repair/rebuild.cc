@@ -12,6 +12,7 @@
 #include "core/common/status.h"
 #include "core/engine/map/steady_view.h"
 #include "core/engine/models/plane_models.h"
+#include "core/engine/objects/completion.h"
 #include "core/engine/objects/entities.h"
 #include "core/engine/objects/kind_library.h"
 #include "core/engine/repair/derived_pass.h"
@@ -126,6 +127,10 @@ absl::Status Verify(MapCore& core, const SteadyView& view, int threads, JobConte
                                   return absl::OkStatus();
                                 }).status();
   if (absl::IsDataLoss(entities)) findings.Add(std::string(entities.message()));
+  const absl::Status inferred = ReadInferred(core, {}, context.stop(), [](const InferredPart&) {
+                                  return absl::OkStatus();
+                                }).status();
+  if (absl::IsDataLoss(inferred)) findings.Add(std::string(inferred.message()));
   const absl::Status kinds = CheckKinds(core, context.stop());
   if (absl::IsDataLoss(kinds)) findings.Add(std::string(kinds.message()));
   context.SetMetric("tiles_checked", static_cast<double>(tiles));

@@ -20,7 +20,7 @@
 #include "core/engine/map/parallel.h"
 #include "core/mls/overview.h"
 #include "core/mls/traversability.h"
-#include "core/world/robots/robot_limits.h"
+#include "core/world/robot_limits.h"
 
 namespace strata {
 

@@ -74,6 +74,9 @@ class SqliteReader final : public StorageReader {
   absl::StatusOr<std::optional<EntityPart>> FindEntityPart(
       std::uint64_t job, std::optional<std::uint64_t> after) override;
   absl::StatusOr<std::uint64_t> JobOfEntities() override;
+  absl::StatusOr<std::optional<EntityPart>> FindInferredPart(
+      std::uint64_t job, std::optional<std::uint64_t> after) override;
+  absl::StatusOr<std::uint64_t> JobOfInferred() override;
   absl::StatusOr<std::vector<KindRow>> ListKinds() override;
   absl::StatusOr<std::optional<std::string>> FindKindShape(std::uint64_t id) override;
   absl::StatusOr<std::vector<ScanNumber>> ScansOfTile(const TileKey& key) override;
@@ -85,6 +88,11 @@ class SqliteReader final : public StorageReader {
   absl::Status ReadJobDetails(JobInfo& job);
   absl::Status ReadClassifierDetails(ClassifierInfo& info);
   absl::Status ReadSupports(PlaneRecord& record);
+  // Of tables that hold the result of one job, in parts.
+  absl::StatusOr<std::optional<EntityPart>> FindPartAfter(const char* sql,
+                                                          std::uint64_t job,
+                                                          std::optional<std::uint64_t> after);
+  absl::StatusOr<std::uint64_t> LastJob(const char* sql);
 
   std::shared_ptr<Database> connection_;
   Database& database_ = *connection_;

@@ -145,29 +145,47 @@ absl::StatusOr<std::optional<std::string>> SqliteReader::FindPlaneModelPart(std:
 }
 
 absl::StatusOr<std::uint64_t> SqliteReader::JobOfPlaneModel() {
-  STRATA_ASSIGN_OR_RETURN(
-      Statement row, database_.Prepare("SELECT coalesce(max(job), 0) FROM derived_plane_model"));
-  STRATA_RETURN_IF_ERROR(row.Step().status());
-  return row.Unsigned(0);
+  return LastJob("SELECT coalesce(max(job), 0) FROM derived_plane_model");
 }
 
-absl::StatusOr<std::optional<EntityPart>> SqliteReader::FindEntityPart(
-    std::uint64_t job, std::optional<std::uint64_t> after) {
-  STRATA_ASSIGN_OR_RETURN(
-      Statement row,
-      database_.Prepare("SELECT part, bytes FROM derived_entity WHERE job = ?1 AND part >= ?2 "
-                        "ORDER BY part LIMIT 1"));
+absl::StatusOr<std::optional<EntityPart>> SqliteReader::FindPartAfter(
+    const char* sql, std::uint64_t job, std::optional<std::uint64_t> after) {
+  STRATA_ASSIGN_OR_RETURN(Statement row, database_.Prepare(sql));
   row.Bind(job, after.has_value() ? *after + 1 : 0);
   STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
   if (!found) return std::optional<EntityPart>();
   return std::optional<EntityPart>({row.Unsigned(0), row.Text(1)});
 }
 
-absl::StatusOr<std::uint64_t> SqliteReader::JobOfEntities() {
-  STRATA_ASSIGN_OR_RETURN(Statement row,
-                          database_.Prepare("SELECT coalesce(max(job), 0) FROM derived_entity"));
+absl::StatusOr<std::uint64_t> SqliteReader::LastJob(const char* sql) {
+  STRATA_ASSIGN_OR_RETURN(Statement row, database_.Prepare(sql));
   STRATA_RETURN_IF_ERROR(row.Step().status());
   return row.Unsigned(0);
+}
+
+absl::StatusOr<std::optional<EntityPart>> SqliteReader::FindEntityPart(
+    std::uint64_t job, std::optional<std::uint64_t> after) {
+  return FindPartAfter(
+      "SELECT part, bytes FROM derived_entity WHERE job = ?1 AND part >= ?2 ORDER BY part LIMIT 1",
+      job,
+      after);
+}
+
+absl::StatusOr<std::uint64_t> SqliteReader::JobOfEntities() {
+  return LastJob("SELECT coalesce(max(job), 0) FROM derived_entity");
+}
+
+absl::StatusOr<std::optional<EntityPart>> SqliteReader::FindInferredPart(
+    std::uint64_t job, std::optional<std::uint64_t> after) {
+  return FindPartAfter(
+      "SELECT part, bytes FROM derived_inferred WHERE job = ?1 AND part >= ?2 "
+      "ORDER BY part LIMIT 1",
+      job,
+      after);
+}
+
+absl::StatusOr<std::uint64_t> SqliteReader::JobOfInferred() {
+  return LastJob("SELECT coalesce(max(job), 0) FROM derived_inferred");
 }
 
 absl::StatusOr<std::vector<PreparedTileRow>> SqliteReader::ListPreparedTiles() {

@@ -128,7 +128,27 @@ absl::Status SqliteWriter::PutEntityPart(std::uint64_t job,
   return absl::OkStatus();
 }
 
+absl::Status SqliteWriter::PutInferredPart(std::uint64_t job,
+                                           std::uint64_t kind,
+                                           const EntityPart& part) {
+  return RunSql("INSERT INTO derived_inferred (job, part, kind, bytes) VALUES (?1, ?2, ?3, ?4)",
+                job,
+                part.part,
+                kind,
+                Blob{part.bytes});
+}
+
+absl::Status SqliteWriter::PutInferredScan(std::uint64_t kind, ScanNumber scan) {
+  return RunSql("INSERT INTO derived_inferred_scan (kind, scan) VALUES (?1, ?2)", kind, scan);
+}
+
+absl::Status SqliteWriter::DeleteInferred() {
+  STRATA_RETURN_IF_ERROR(RunSql("DELETE FROM derived_inferred_scan"));
+  return RunSql("DELETE FROM derived_inferred");
+}
+
 absl::Status SqliteWriter::DeleteEntities() {
+  STRATA_RETURN_IF_ERROR(DeleteInferred());
   STRATA_RETURN_IF_ERROR(RunSql("DELETE FROM derived_kind"));
   STRATA_RETURN_IF_ERROR(RunSql("DELETE FROM derived_entity_scan"));
   return RunSql("DELETE FROM derived_entity");

@@ -196,6 +196,9 @@ absl::Status SqliteWriter::DeleteScan(ScanNumber number) {
                           "derived_entity_scan WHERE scan = ?1) AND part NOT IN (SELECT part FROM "
                           "derived_entity_scan WHERE scan <> ?1)",
                           "DELETE FROM derived_entity_scan WHERE scan = ?1",
+                          "DELETE FROM derived_inferred WHERE kind IN (SELECT kind FROM "
+                          "derived_inferred_scan WHERE scan = ?1)",
+                          "DELETE FROM derived_inferred_scan WHERE scan = ?1",
                           "DELETE FROM derived_scan_view WHERE scan = ?1",
                           "DELETE FROM derived_scan_tile WHERE scan = ?1",
                           "DELETE FROM derived_footprint WHERE scan = ?1",

@@ -87,6 +87,11 @@ class SqliteWriter final : public StorageWriter {
                              const EntityPart& part,
                              const std::vector<ScanNumber>& scans) override;
   absl::Status DeleteEntities() override;
+  absl::Status PutInferredPart(std::uint64_t job,
+                               std::uint64_t kind,
+                               const EntityPart& part) override;
+  absl::Status PutInferredScan(std::uint64_t kind, ScanNumber scan) override;
+  absl::Status DeleteInferred() override;
   absl::Status PutFoundKind(const KindRow& row, absl::string_view shape) override;
   absl::Status DiscardUnpublished() override;
   absl::Status SetTilesOfScan(ScanNumber number, const std::vector<TileKey>& tiles) override;

@@ -623,6 +623,34 @@ TEST_F(StorageContractTest, AnEntityGoesWithTheLastScanThatSawIt) {
   EXPECT_THAT(reader().JobOfEntities(), IsOkAndHolds(9U));
 }
 
+TEST_F(StorageContractTest, WhatWasInferredGoesWithAnyScanThatItsKindWasSeenBy) {
+  EXPECT_THAT(reader().JobOfInferred(), IsOkAndHolds(0U));
+  const ScanNumber one = Put(1);
+  const ScanNumber two = Put(2);
+  const auto put = [&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(writer().DeleteInferred());
+    STRATA_RETURN_IF_ERROR(writer().PutInferredPart(9, 0, {0, "head"}));
+    STRATA_RETURN_IF_ERROR(writer().PutInferredPart(9, 70, {4, "car"}));
+    STRATA_RETURN_IF_ERROR(writer().PutInferredPart(9, 71, {5, "bench"}));
+    STRATA_RETURN_IF_ERROR(writer().PutInferredScan(70, one));
+    STRATA_RETURN_IF_ERROR(writer().PutInferredScan(70, two));
+    return writer().PutInferredScan(71, two);
+  };
+  STRATA_ASSERT_OK(Commit(put));
+  STRATA_ASSERT_OK(Commit(put));
+  Reopen();
+  EXPECT_THAT(reader().JobOfInferred(), IsOkAndHolds(9U));
+  EXPECT_EQ((*reader().FindInferredPart(9, std::nullopt))->bytes, "head");
+  EXPECT_EQ((*reader().FindInferredPart(9, 0))->bytes, "car");
+  EXPECT_EQ((*reader().FindInferredPart(9, 4))->bytes, "bench");
+  EXPECT_FALSE(reader().FindInferredPart(9, 5)->has_value());
+  STRATA_ASSERT_OK(Commit([&] { return writer().DeleteScan(one); }));
+  EXPECT_EQ((*reader().FindInferredPart(9, std::nullopt))->bytes, "head");
+  EXPECT_EQ((*reader().FindInferredPart(9, 0))->bytes, "bench");
+  STRATA_ASSERT_OK(Commit([&] { return writer().DeleteEntities(); }));
+  EXPECT_THAT(reader().JobOfInferred(), IsOkAndHolds(0U));
+}
+
 TEST_F(StorageContractTest, KindsOfTheLibraryAreKeptAndFoundOnesGoWithTheEntities) {
   const auto ids = [&] {
     std::vector<std::string> names;

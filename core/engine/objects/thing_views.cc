@@ -1,0 +1,159 @@
+#include "core/engine/objects/thing_views.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/container/btree_map.h"
+#include "absl/status/status.h"
+
+#include "core/common/status.h"
+#include "core/engine/map/scan_lookup.h"
+#include "core/engine/scans/scan_share.h"
+#include "core/engine/scans/scan_source.h"
+#include "core/geometry/pose.h"
+
+namespace strata {
+namespace {
+
+using Eigen::Vector3d;
+
+// Around what was measured: what else of a thing may be there.
+constexpr double kMarginM = 0.2;
+constexpr double kLeastMarginM = 0.025;  // of a thing's own points around its box
+
+// The scans that saw most of each thing, with which things those are.
+absl::btree_map<ScanId, std::vector<std::size_t>> ScansOf(std::span<const Entity> things) {
+  absl::btree_map<ScanId, std::vector<std::size_t>> scans;
+  for (std::size_t i = 0; i < things.size(); ++i) {
+    std::vector<EntityScan> seen = things[i].scans;
+    std::stable_sort(seen.begin(), seen.end(), [](const EntityScan& a, const EntityScan& b) {
+      return a.points > b.points;
+    });
+    seen.resize(std::min(seen.size(), kMostScansOfThing));
+    for (const EntityScan& scan : seen) scans[scan.scan].push_back(i);
+  }
+  return scans;
+}
+
+// Where in its box a point of the map is.
+bool IsInBox(const UprightBox& box, const Vector3d& p, double margin_m) {
+  const Vector3d from = Eigen::AngleAxisd(-box.yaw_rad, Vector3d::UnitZ()) * (p - box.centre);
+  return (from.cwiseAbs().array() <= box.size.array() / 2.0 + margin_m).all();
+}
+
+absl::StatusOr<PosedScan> FindScan(MapCore& core, const ScanId& id, std::uint64_t epoch) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  return GetScanById(*reader, id, epoch);
+}
+
+// Adds scans to the views of the things that they saw.
+class ViewReader {
+ public:
+  ViewReader(MapCore& core, std::span<const Entity> things, ThingViews& out)
+      : core_(core), things_(things), out_(out) {}
+
+  absl::Status Add(const PosedScan& posed, const std::vector<std::size_t>& seen, const Stop& stop) {
+    const MapParameters parameters = core_.info().parameters;
+    const SensorModel sensor = posed.scan.header.sensor.value_or(parameters.sensor);
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    const ScanShare share(core_.caches(), posed.scan);
+    ScanSource source(*reader, parameters);
+    return source.ForEachBlock(posed.scan, [&](const PointCloud& block) -> absl::Status {
+      const PointCloud cloud = Lasting(block, source.faded());
+      for (const std::size_t i : seen) {
+        STRATA_RETURN_IF_ERROR(AddTo(i, cloud, posed.pose->T_map_scan, sensor, stop));
+      }
+      return absl::OkStatus();
+    });
+  }
+
+ private:
+  // Without the points that have faded.
+  static PointCloud Lasting(const PointCloud& block, const std::vector<std::uint16_t>& faded) {
+    PointCloud cloud;
+    cloud.origin = block.origin;
+    cloud.sensor_origin = block.sensor_origin;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if (!faded.empty() && faded[i] != 0) continue;
+      cloud.points.push_back(block.points[i]);
+      cloud.label.push_back(block.label.empty() ? std::uint16_t{0} : block.label[i]);
+    }
+    return cloud;
+  }
+
+  absl::Status AddTo(std::size_t i,
+                     const PointCloud& cloud,
+                     const Pose& T_map_scan,
+                     const SensorModel& sensor,
+                     const Stop& stop) {
+    const Entity& thing = things_[i];
+    ShapeView& view = out_.views[i];
+    const Pose T_kind_map = thing.kind->T_map_kind.inverse();
+    const double margin_m = std::max(kLeastMarginM, view.voxel_m());
+    std::vector<Vector3d> points;
+    for (std::size_t k = 0; k < cloud.size(); ++k) {
+      if (cloud.label[k] != thing.class_id) continue;
+      const Vector3d p = T_map_scan * (cloud.points[k].cast<double>() + cloud.origin);
+      if (IsInBox(thing.box, p, margin_m)) points.push_back(T_kind_map * p);
+    }
+    view.AddPoints(points);
+    return view.AddScan(cloud, T_kind_map * T_map_scan, sensor, stop);
+  }
+
+  MapCore& core_;
+  const std::span<const Entity> things_;
+  ThingViews& out_;
+};
+
+}  // namespace
+
+Eigen::AlignedBox3d BoxOfKind(std::span<const Entity> things) {
+  Eigen::AlignedBox3d box;
+  for (const Entity& thing : things) {
+    const Pose T_kind_map = thing.kind->T_map_kind.inverse();
+    const double half_height_m = thing.box.size.z() / 2.0;
+    for (const Vector3d& corner : BaseOf(thing.box)) {
+      const Vector3d middle(corner.x(), corner.y(), thing.box.centre.z());
+      box.extend(T_kind_map * (middle - half_height_m * Vector3d::UnitZ()));
+      box.extend(T_kind_map * (middle + half_height_m * Vector3d::UnitZ()));
+    }
+  }
+  return {box.min() - Vector3d::Constant(kMarginM), box.max() + Vector3d::Constant(kMarginM)};
+}
+
+double ShapeVoxelM(const Eigen::AlignedBox3d& box, double voxel_m) {
+  // Borders of voxels are not those of the box.
+  const double most = 0.9 * kMostShapeVoxels;
+  while ((box.sizes() / voxel_m).array().ceil().prod() > most) voxel_m *= 1.1;
+  return voxel_m;
+}
+
+absl::StatusOr<ThingViews> ReadThingViews(MapCore& core,
+                                          std::uint64_t epoch,
+                                          std::span<const Entity> things,
+                                          const Eigen::AlignedBox3d& box,
+                                          double voxel_m,
+                                          DamagedScans& damaged,
+                                          const Stop& stop) {
+  ThingViews out;
+  for (std::size_t i = 0; i < things.size(); ++i) {
+    STRATA_ASSIGN_OR_RETURN(ShapeView view, ShapeView::Over(box, voxel_m));
+    out.views.push_back(std::move(view));
+  }
+  ViewReader views(core, things, out);
+  for (const auto& [id, seen] : ScansOf(things)) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+    const absl::StatusOr<PosedScan> posed = FindScan(core, id, epoch);
+    if (absl::IsNotFound(posed.status())) continue;  // deleted meanwhile
+    STRATA_RETURN_IF_ERROR(posed.status());
+    if (!posed->pose.has_value() || !posed->scan.has_points) continue;
+    const absl::Status added = views.Add(*posed, seen, stop);
+    if (added.ok()) out.scans.insert(posed->scan.number);
+    if (absl::IsFailedPrecondition(added)) continue;  // its points were dropped meanwhile
+    if (!added.ok() && !damaged.LeaveOut(posed->scan.number, id.ToString(), added)) return added;
+  }
+  return out;
+}
+
+}  // namespace strata
