@@ -117,4 +117,27 @@ absl::Status RemoteObjects::DeleteKind(const api::Call& call,
       .status();
 }
 
+absl::StatusOr<InferredInfo> RemoteObjects::ListInferred(
+    const api::Call& call,
+    absl::string_view map,
+    const EntityQuery& query,
+    absl::FunctionRef<absl::Status(const InferredPart&)> sink) {
+  InferredInfo info;
+  const auto take = [&](const v1::ListInferredResponse& out) -> absl::Status {
+    if (out.has_search()) {
+      STRATA_ASSIGN_OR_RETURN(info, FromProto(out.search()));
+      return absl::OkStatus();
+    }
+    STRATA_ASSIGN_OR_RETURN(const InferredPart part, FromProto(out.inferred()));
+    return sink(part);
+  };
+  STRATA_RETURN_IF_ERROR(CallStream(connection_,
+                                    *stub_,
+                                    &v1::Objects::Stub::ListInferred,
+                                    call,
+                                    translate::ToInferredRequest(map, query),
+                                    take));
+  return info;
+}
+
 }  // namespace strata::sdk

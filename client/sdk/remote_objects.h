@@ -39,6 +39,12 @@ class RemoteObjects final : public api::Objects {
                           absl::string_view map,
                           absl::string_view kind) override;
 
+  absl::StatusOr<InferredInfo> ListInferred(
+      const api::Call& call,
+      absl::string_view map,
+      const EntityQuery& query,
+      absl::FunctionRef<absl::Status(const InferredPart&)> sink) override;
+
  private:
   Connection& connection_;
   const std::unique_ptr<v1::Objects::Stub> stub_;

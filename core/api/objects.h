@@ -10,7 +10,8 @@
 #include "absl/strings/string_view.h"
 
 #include "core/api/call.h"
-#include "core/world/entity.h"
+#include "core/world/things/entity.h"
+#include "core/world/things/inferred.h"
 #include "core/world/things/kind.h"
 
 namespace strata::api {
@@ -59,6 +60,16 @@ class Objects {
   virtual absl::Status DeleteKind(const Call& call,
                                   absl::string_view map,
                                   absl::string_view kind) = 0;
+
+  // What the last job `complete` inferred of the entities that the query takes, by id: each to
+  // `sink`, whose error ends the call. Returns how it came about. Deleting a scan takes with it
+  // all that was inferred of the kinds it had seen. NOT_FOUND where nothing was inferred; ABORTED,
+  // DATA_LOSS as ListEntities.
+  virtual absl::StatusOr<InferredInfo> ListInferred(
+      const Call& call,
+      absl::string_view map,
+      const EntityQuery& query,
+      absl::FunctionRef<absl::Status(const InferredPart&)> sink) = 0;
 };
 
 }  // namespace strata::api

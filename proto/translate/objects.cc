@@ -82,6 +82,27 @@ std::vector<Eigen::Vector3f> PlacesFrom(const google::protobuf::RepeatedField<fl
   return places;
 }
 
+template <typename Request>
+Request QueryToProto(absl::string_view map, const EntityQuery& query) {
+  Request proto;
+  proto.set_map(std::string(map));
+  if (query.region.has_value()) *proto.mutable_region() = ToProto(*query.region);
+  proto.set_class_id(query.class_id);
+  proto.set_kind(query.kind);
+  return proto;
+}
+
+template <typename Request>
+absl::StatusOr<EntityQuery> QueryFromProto(const Request& proto) {
+  EntityQuery query;
+  if (proto.has_region()) {
+    STRATA_ASSIGN_OR_RETURN(query.region, FromProto("region", proto.region()));
+  }
+  STRATA_ASSIGN_OR_RETURN(query.class_id, ClassIdFrom(proto.class_id()));
+  query.kind = proto.kind();
+  return query;
+}
+
 }  // namespace
 
 static_assert(v1::KIND_ORIGIN_FOUND == static_cast<int>(KindOrigin::kFound));
@@ -121,11 +142,37 @@ v1::EntitySearch ToProto(const EntitiesInfo& info) {
 }
 
 v1::ListEntitiesRequest ToProto(absl::string_view map, const EntityQuery& query) {
-  v1::ListEntitiesRequest proto;
-  proto.set_map(std::string(map));
-  if (query.region.has_value()) *proto.mutable_region() = ToProto(*query.region);
-  proto.set_class_id(query.class_id);
-  proto.set_kind(query.kind);
+  return QueryToProto<v1::ListEntitiesRequest>(map, query);
+}
+
+v1::ListInferredRequest ToInferredRequest(absl::string_view map, const EntityQuery& query) {
+  return QueryToProto<v1::ListInferredRequest>(map, query);
+}
+
+v1::InferredPart ToProto(const InferredPart& part) {
+  v1::InferredPart proto;
+  proto.set_entity(part.entity);
+  proto.set_kind(part.kind);
+  proto.set_agreeing(part.agreeing);
+  proto.set_contradicting(part.contradicting);
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : part.points)
+    middle += p / static_cast<double>(part.points.size());
+  *proto.mutable_middle() = ToProto(middle);
+  std::vector<Eigen::Vector3f> offsets;
+  for (const Eigen::Vector3d& p : part.points) offsets.emplace_back((p - middle).cast<float>());
+  PlacesToProto(offsets, *proto.mutable_points());
+  return proto;
+}
+
+v1::InferredSearch ToProto(const InferredInfo& info) {
+  v1::InferredSearch proto;
+  proto.set_job(info.job);
+  proto.set_epoch(info.epoch);
+  *proto.mutable_made() = ToProto(info.made);
+  proto.set_kinds(info.kinds);
+  proto.set_entities(info.entities);
+  proto.set_points(info.points);
   return proto;
 }
 
@@ -195,13 +242,36 @@ absl::StatusOr<EntitiesInfo> FromProto(const v1::EntitySearch& proto) {
 }
 
 absl::StatusOr<EntityQuery> FromProto(const v1::ListEntitiesRequest& proto) {
-  EntityQuery query;
-  if (proto.has_region()) {
-    STRATA_ASSIGN_OR_RETURN(query.region, FromProto("region", proto.region()));
+  return QueryFromProto(proto);
+}
+
+absl::StatusOr<EntityQuery> FromProto(const v1::ListInferredRequest& proto) {
+  return QueryFromProto(proto);
+}
+
+absl::StatusOr<InferredPart> FromProto(const v1::InferredPart& proto) {
+  STRATA_RETURN_IF_ERROR(CheckTriples("points", proto.points_size(), kMostInferredPoints));
+  InferredPart part;
+  part.entity = proto.entity();
+  part.kind = proto.kind();
+  part.agreeing = proto.agreeing();
+  part.contradicting = proto.contradicting();
+  STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d middle, FromProto("middle", proto.middle()));
+  for (const Eigen::Vector3f& offset : PlacesFrom(proto.points())) {
+    part.points.emplace_back(middle + offset.cast<double>());
   }
-  STRATA_ASSIGN_OR_RETURN(query.class_id, ClassIdFrom(proto.class_id()));
-  query.kind = proto.kind();
-  return query;
+  return part;
+}
+
+absl::StatusOr<InferredInfo> FromProto(const v1::InferredSearch& proto) {
+  InferredInfo info;
+  info.job = proto.job();
+  info.epoch = proto.epoch();
+  STRATA_ASSIGN_OR_RETURN(info.made, FromProto("made", proto.made()));
+  info.kinds = proto.kinds();
+  info.entities = proto.entities();
+  info.points = proto.points();
+  return info;
 }
 
 absl::StatusOr<KindInfo> FromProto(const v1::KindInfo& proto) {

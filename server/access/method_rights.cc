@@ -75,6 +75,7 @@ constexpr std::array kTable = {
     MethodRight{"Objects.RenameKind", kWrite, "map"},
     MethodRight{"Objects.ImportKind", kWrite, "map"},
     MethodRight{"Objects.DeleteKind", kWrite, "map"},
+    MethodRight{"Objects.ListInferred", kRead, "map"},
 };
 
 }  // namespace

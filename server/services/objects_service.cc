@@ -77,6 +77,22 @@ absl::Status DeleteKind(api::Database& db,
   return db.objects().DeleteKind(call, in.map(), in.kind());
 }
 
+absl::Status ListInferred(api::Database& db,
+                          const api::Call& call,
+                          const v1::ListInferredRequest& in,
+                          StreamSink<v1::ListInferredResponse> sink) {
+  STRATA_ASSIGN_OR_RETURN(const EntityQuery query, FromProto(in));
+  v1::ListInferredResponse out;
+  STRATA_ASSIGN_OR_RETURN(
+      const InferredInfo info,
+      db.objects().ListInferred(call, in.map(), query, [&](const InferredPart& part) {
+        *out.mutable_inferred() = ToProto(part);
+        return sink(out);
+      }));
+  *out.mutable_search() = ToProto(info);
+  return sink(out);
+}
+
 }  // namespace
 
 ObjectsService::ObjectsService(Runtime& runtime) : Service(runtime, "Objects") {
@@ -86,6 +102,7 @@ ObjectsService::ObjectsService(Runtime& runtime) : Service(runtime, "Objects") {
   Unary("RenameKind", &RenameKind);
   Unary("ImportKind", &ImportKind);
   Unary("DeleteKind", &DeleteKind);
+  Stream("ListInferred", &ListInferred);
 }
 
 }  // namespace strata::server

@@ -110,6 +110,8 @@ const std::multimap<std::string, std::string>& Examples() {
        "0, 0, 0.5, 1, 0, 0.5, 0, 1, 0.5, 1, 1, 0.5] "
        "vertices: [0, 0, 0, 1, 0, 0, 0, 1, 0] triangles: [0, 1, 2] }"},
       {"Objects/DeleteKind", "map: 'world' kind: 'box'"},
+      {"Objects/ListInferred",
+       "map: 'world' class_id: 2 region { min { x: -9 y: -9 z: -9 } max { x: 9 y: 9 z: 9 } }"},
       {"PoseGraph/Get", "map: 'world'"},
       {"PoseGraph/SetPose",
        "map: 'world' id { trajectory: 'world' sequence: 2 } "
@@ -335,6 +337,9 @@ const std::vector<Story>& Stories() {
        {"Objects/RenameKind", "map: 'world' kind: 'box' name: 'crate'"},
        {"Objects/GetKind", "map: 'world' kind: 'crate'"},
        {"Objects/ListEntities", "map: 'world' kind: 'crate'"},
+       {"Jobs/Start", "map: 'world' kind: 'complete'"},
+       {"Jobs/Watch", kNextJob},
+       {"Objects/ListInferred", "map: 'world' kind: 'crate'"},
        {"Objects/DeleteKind", "map: 'world' kind: 'crate'"},
        {"Objects/ListKinds", "map: 'world'"}},
       {{"Jobs/Start", "map: 'world' kind: 'classify' parameters { key: 'model' value: 'first' }"},

@@ -338,6 +338,10 @@ class MockObjects : public api::Objects {
               DeleteKind,
               (const api::Call&, absl::string_view, absl::string_view),
               (override));
+  MOCK_METHOD(absl::StatusOr<InferredInfo>,
+              ListInferred,
+              (const api::Call&, absl::string_view, const EntityQuery&, Sink<InferredPart>),
+              (override));
 };
 
 // Calls nobody decided on answer UNKNOWN (gmock's default of a StatusOr).

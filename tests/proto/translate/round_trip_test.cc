@@ -232,6 +232,7 @@ TEST(TranslateRoundTripTest, Objects) {
   ExpectRoundTrip(Filled<v1::Entity>());
   ExpectRoundTrip(Filled<v1::EntitySearch>());
   ExpectRoundTrip(Filled<v1::KindInfo>());
+  ExpectRoundTrip(Filled<v1::InferredSearch>());
   auto unsaid = Filled<v1::KindInfo>();
   unsaid.set_origin(v1::KIND_ORIGIN_UNSPECIFIED);
   EXPECT_THAT(
@@ -249,6 +250,23 @@ TEST(TranslateRoundTripTest, Objects) {
   EXPECT_THAT(
       FromProto(request),
       testing::StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr("region")));
+}
+
+TEST(TranslateRoundTripTest, InferredParts) {
+  const InferredPart part{3, 0x123456789abc, 500, 7, {{1e6, 2.0, 3.0}, {1e6 + 1.0, 2.5, 3.25}}};
+  v1::InferredPart proto = ToProto(part);
+  STRATA_ASSERT_OK_AND_ASSIGN(const InferredPart back, FromProto(proto));
+  EXPECT_EQ(back, part);
+  STRATA_ASSERT_OK_AND_ASSIGN(const InferredPart none, FromProto(ToProto(InferredPart())));
+  EXPECT_TRUE(none.points.empty());
+  proto.add_points(1.0F);
+  EXPECT_THAT(FromProto(proto), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("points")));
+  v1::ListInferredRequest request;
+  request.set_kind("golf");
+  request.set_class_id(7);
+  STRATA_ASSERT_OK_AND_ASSIGN(const EntityQuery query, FromProto(request));
+  EXPECT_EQ(query.kind, "golf");
+  EXPECT_EQ(ToInferredRequest("", query).SerializeAsString(), request.SerializeAsString());
 }
 
 TEST(TranslateRoundTripTest, ShapesOfKinds) {

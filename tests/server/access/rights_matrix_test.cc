@@ -87,6 +87,7 @@ const std::map<std::string, std::optional<Right>>& Needed() {
          "Objects.ListEntities",
          "Objects.ListKinds",
          "Objects.GetKind",
+         "Objects.ListInferred",
          "Planning.WatchPath"});
     add(Right::kWrite,
         {"Maps.SetClass",

@@ -1,16 +1,18 @@
 // Conformance: the kinds of things in maps.
 #include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/cloud/point_cloud.h"
-#include "core/world/entity.h"
+#include "core/world/things/entity.h"
 #include "core/world/things/kind.h"
 #include "tests/support/database_suite/database_suite.h"
 #include "tests/support/status_matchers.h"
@@ -245,29 +247,155 @@ TEST_P(DatabaseSuite, AJobNeitherLosesNorUndoesWhatAPersonDoesMeanwhile) {
   for (int round = 0; round < 6; ++round) {
     const auto job = db().jobs().Start({}, kMap, "objects", {{"class", "thing"}});
     STRATA_ASSERT_OK(job);
-    NewKind kind = Crate(3.0F + 0.1F * static_cast<float>(round));
-    kind.name = "tall" + std::to_string(round);
+    NewKind kind = Crate(1.0F);
+    PointCloud cube;  // that nothing there is a part of
+    AddBlock({-1.2F, -1.2F, 0.0F}, {2.4F, 2.4F, 2.0F + 0.1F * static_cast<float>(round)}, cube);
+    kind.shape.points = cube.points;
+    kind.name = "cube" + std::to_string(round);
     int calls = 0;
     JobInfo last;
     // Each report of the job is answered by a change.
     STRATA_ASSERT_OK(db().jobs().Watch({}, kMap, job->id, [&](const JobInfo& now) {
       last = now;
-      if (calls == 0) STRATA_EXPECT_OK(db().objects().ImportKind({}, kMap, kind));
-      if (calls == 1) STRATA_EXPECT_OK(db().objects().RenameKind({}, kMap, kind.name, "t"));
-      if (calls == 2) STRATA_EXPECT_OK(db().objects().DeleteKind({}, kMap, "t"));
+      if (calls == 0) {
+        STRATA_EXPECT_OK(db().objects().ImportKind({}, kMap, kind));
+      }
+      if (calls == 1) {
+        STRATA_EXPECT_OK(db().objects().RenameKind({}, kMap, kind.name, "t"));
+      }
+      if (calls == 2) {
+        STRATA_EXPECT_OK(db().objects().DeleteKind({}, kMap, "t"));
+      }
       ++calls;
       return absl::OkStatus();
     }));
     EXPECT_EQ(last.state, JobState::kSucceeded) << last.message;
     const std::string name = calls == 1 ? kind.name : "t";
     EXPECT_EQ(db().objects().GetKind({}, kMap, name).ok(), calls < 3) << calls;
-    if (calls < 3) STRATA_EXPECT_OK(db().objects().DeleteKind({}, kMap, name));
+    if (calls < 3) {
+      STRATA_EXPECT_OK(db().objects().DeleteKind({}, kMap, name));
+    }
     if (round == 2) {
       STRATA_EXPECT_OK(db().objects().RenameKind({}, kMap, KindIdText(found[0].id), "low.box"));
     }
   }
   ASSERT_THAT(EntitiesWith(db(), {.kind = "low.box"}), SizeIs(2));
   EXPECT_THAT(db().objects().ListKinds({}, kMap).value(), SizeIs(2));
+}
+
+// Whether the box is in the way of the ray from where the sensor of FloorHeader() is.
+bool IsBehind(const Eigen::AlignedBox3f& box, const Eigen::Vector3f& p) {
+  for (float share = 0.0F; share < 0.999F; share += 0.002F) {
+    const Eigen::Vector3f on = Eigen::Vector3f::UnitZ() + share * (p - Eigen::Vector3f::UnitZ());
+    if (box.contains(on)) return true;
+  }
+  return false;
+}
+
+// Two of a kind, a scan each: of the second, what is away from the sensor was not seen.
+const Eigen::Vector3f kHalfLow(2.0F, -2.0F, 0.0F);
+const Eigen::Vector3f kHalfSize(0.8F, 0.6F, 1.0F);
+
+void PutWholeAndHalf(api::Database& db) {
+  PointCloud whole = LevelFloor();
+  whole.label.assign(whole.size(), kGroundClass);
+  AddBlock({-3.0F, -3.0F, 0.0F}, kHalfSize, whole);
+  STRATA_ASSERT_OK(UploadScan(db, kMap, FloorHeader({"run", 1}, whole), whole));
+  PointCloud half = LevelFloor();
+  const Eigen::AlignedBox3f box(kHalfLow, kHalfLow + kHalfSize);
+  std::erase_if(half.points, [&](const Eigen::Vector3f& p) { return IsBehind(box, p); });
+  half.label.assign(half.size(), kGroundClass);
+  PointCloud block;
+  AddBlock(kHalfLow, kHalfSize, block);
+  for (const Eigen::Vector3f& p : block.points) {
+    if (p.x() > 2.5F) continue;
+    half.points.push_back(p);
+    half.label.push_back(kThingClass);
+  }
+  STRATA_ASSERT_OK(UploadScan(db, kMap, FloorHeader({"run", 2}, half), half));
+  AwaitIntegration(db, kMap);
+  STRATA_ASSERT_OK(db.maps().SetClass({}, kMap, {kThingClass, "thing", {200, 90, 20}}));
+}
+
+JobInfo Complete(api::Database& db, const JobParameters& parameters = {}) {
+  JobInfo last;
+  const auto job = db.jobs().Start({}, kMap, "complete", parameters);
+  STRATA_EXPECT_OK(job);
+  if (!job.ok()) return last;
+  STRATA_EXPECT_OK(db.jobs().Watch({}, kMap, job->id, [&last](const JobInfo& now) {
+    last = now;
+    return absl::OkStatus();
+  }));
+  return last;
+}
+
+absl::StatusOr<std::vector<InferredPart>> InferredOf(api::Database& db,
+                                                     const EntityQuery& query = {}) {
+  std::vector<InferredPart> parts;
+  STRATA_RETURN_IF_ERROR(db.objects()
+                             .ListInferred({},
+                                           kMap,
+                                           query,
+                                           [&](const InferredPart& part) {
+                                             parts.push_back(part);
+                                             return absl::OkStatus();
+                                           })
+                             .status());
+  return parts;
+}
+
+TEST_P(DatabaseSuite, WhatNobodySawIsInferredFromOthersOfTheKind) {
+  EXPECT_THAT(InferredOf(db()), StatusIs(Code::kNotFound, HasSubstr("objects complete")));
+  EXPECT_THAT(Complete(db()).message, HasSubstr("objects find"));
+  PutWholeAndHalf(db());
+  FindKinds(db());
+  const std::vector<Entity> things = EntitiesWith(db());
+  ASSERT_THAT(things, SizeIs(2));
+  ASSERT_TRUE(things[0].kind.has_value() && things[1].kind.has_value());
+  const JobInfo job = Complete(db());
+  ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
+  EXPECT_EQ(job.metrics.at("entities"), 2.0);
+  EXPECT_EQ(job.metrics.at("kinds"), 1.0);
+  EXPECT_EQ(job.metrics.at("contradicted"), 0.0) << job.message;
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::vector<InferredPart> parts, InferredOf(db()));
+  ASSERT_THAT(parts, SizeIs(2));
+  EXPECT_EQ(parts[1].entity, things[1].id);
+  EXPECT_EQ(parts[1].kind, things[1].kind->id);
+  EXPECT_GT(parts[1].points.size(), 200U);
+  EXPECT_LT(parts[0].points.size(), parts[1].points.size() / 5);
+  const Eigen::AlignedBox3d block(kHalfLow.cast<double>(), (kHalfLow + kHalfSize).cast<double>());
+  for (const Eigen::Vector3d& p : parts[1].points) {
+    EXPECT_GT(p.x(), 2.45);
+    EXPECT_LT(block.exteriorDistance(p), 0.06) << p.transpose();
+    EXPECT_LT(std::min((p - block.min()).minCoeff(), (block.max() - p).minCoeff()), 0.1);
+  }
+  Reopen();
+  EXPECT_EQ(InferredOf(db()).value(), parts);
+  EXPECT_EQ(Complete(db()).metrics.at("points"), job.metrics.at("points"));
+  EXPECT_EQ(InferredOf(db()).value(), parts);
+  const Eigen::AlignedBox3d east(Eigen::Vector3d(1, -3, 0), Eigen::Vector3d(3, 3, 3));
+  EXPECT_THAT(InferredOf(db(), {.region = east}).value(), SizeIs(1));
+  // Coarser where one says so, and of one kind.
+  const std::string kind = KindIdText(parts[0].kind);
+  EXPECT_LT(Complete(db(), {{"voxel_m", "0.1"}, {"kind", kind}}).metrics.at("points"),
+            job.metrics.at("points"));
+}
+
+TEST_P(DatabaseSuite, WhatWasInferredGoesWithTheScansItIsFrom) {
+  PutWholeAndHalf(db());
+  FindKinds(db());
+  ASSERT_EQ(Complete(db()).state, JobState::kSucceeded);
+  STRATA_ASSERT_OK(db().scans().Delete({}, kMap, {"run", 1}));
+  EXPECT_THAT(InferredOf(db()).value(), IsEmpty());
+  // The next entities are others.
+  FindKinds(db());
+  EXPECT_THAT(InferredOf(db()), StatusIs(Code::kNotFound, HasSubstr("objects complete")));
+  const JobInfo alone = Complete(db());
+  EXPECT_EQ(alone.state, JobState::kFailed);
+  EXPECT_THAT(alone.message, HasSubstr("no entity has a kind"));
+  EXPECT_THAT(db().objects().ListInferred(
+                  {}, "none", {}, [](const InferredPart&) { return absl::OkStatus(); }),
+              StatusIs(Code::kNotFound, HasSubstr("none")));
 }
 
 TEST_P(DatabaseSuite, ALibraryHasABound) {

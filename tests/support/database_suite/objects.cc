@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "core/cloud/point_cloud.h"
-#include "core/world/entity.h"
+#include "core/world/things/entity.h"
 #include "tests/support/database_suite/database_suite.h"
 #include "tests/support/status_matchers.h"
 
