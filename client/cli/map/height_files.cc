@@ -18,7 +18,7 @@
 #include "core/mls/elevation/extended_elevation_map.h"
 #include "core/mls/surface_tile.h"
 #include "core/world/map_info.h"
-#include "core/world/robots/robot_limits.h"
+#include "core/world/robot_limits.h"
 
 namespace strata::cli {
 namespace {

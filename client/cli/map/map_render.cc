@@ -21,6 +21,7 @@
 #include "client/cli/map/map_files.h"
 #include "client/cli/map/tile_source.h"
 #include "client/cli/objects/fetched_entities.h"
+#include "client/cli/objects/fetched_inferred.h"
 #include "client/cli/picture/map_picture.h"
 #include "client/cli/posegraph/graph_overlay.h"
 #include "client/cli/terminal/arguments.h"
@@ -47,6 +48,7 @@ struct RenderOptions {
   bool trajectories = false;
   bool constraints = false;
   bool objects = false;
+  bool inferred = false;
   picture::PictureOptions picture;
 };
 
@@ -66,6 +68,11 @@ absl::StatusOr<picture::Overlay> OverlayOf(Context& context, const RenderOptions
     STRATA_ASSIGN_OR_RETURN(const FetchedEntities entities,
                             FetchEntities(context, options.map, {}, ""));
     AddEntities(entities, overlay);
+  }
+  if (options.inferred) {
+    STRATA_ASSIGN_OR_RETURN(const FetchedInferred inferred,
+                            FetchInferred(context, options.map, {}, ""));
+    AddInferred(inferred, overlay);
   }
   if (!options.trajectories && !options.constraints) return overlay;
   STRATA_ASSIGN_OR_RETURN(const api::PoseGraphState state,
@@ -246,6 +253,8 @@ void AddMapRender(Commands& commands, CLI::App* noun) {
   render->add_flag("--objects",
                    options->objects,
                    "The boxes of the things that objects find found, in the colours of classes");
+  render->add_flag(
+      "--inferred", options->inferred, "What objects complete inferred of them, hatched");
   render->add_option("--layer", options->layer, "What the colours of surfaces say")
       ->check(CLI::IsMember({"traversability", "class", "colour"}))
       ->capture_default_str();

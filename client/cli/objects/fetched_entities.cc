@@ -21,6 +21,21 @@ constexpr double kEntityWidthPixels = 2.5;
 
 }  // namespace
 
+absl::StatusOr<bool> IsOfEarlierEpoch(Context& context,
+                                      const std::string& map,
+                                      std::uint64_t epoch,
+                                      absl::string_view what,
+                                      absl::string_view cure) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<EpochInfo> epochs,
+                          context.database.maps().History(context.call, map));
+  const auto now = std::find_if(
+      epochs.begin(), epochs.end(), [](const EpochInfo& each) { return each.current; });
+  if (now == epochs.end() || now->epoch == epoch) return false;
+  context.output.Talk(
+      absl::StrCat(what, " of epoch ", epoch, ", the map is at ", now->epoch, "; ", cure));
+  return true;
+}
+
 absl::StatusOr<FetchedEntities> FetchEntities(Context& context,
                                               const std::string& map,
                                               EntityQuery query,
@@ -36,18 +51,10 @@ absl::StatusOr<FetchedEntities> FetchEntities(Context& context,
         fetched.entities.push_back(entity);
         return absl::OkStatus();
       }));
-  STRATA_ASSIGN_OR_RETURN(const std::vector<EpochInfo> epochs,
-                          context.database.maps().History(context.call, map));
-  const auto now = std::find_if(
-      epochs.begin(), epochs.end(), [](const EpochInfo& epoch) { return epoch.current; });
-  fetched.stale = now != epochs.end() && now->epoch != fetched.info.epoch;
-  if (fetched.stale) {
-    context.output.Talk(absl::StrCat("these entities are of epoch ",
-                                     fetched.info.epoch,
-                                     ", the map is at ",
-                                     now->epoch,
-                                     "; objects find finds them anew"));
-  }
+  STRATA_ASSIGN_OR_RETURN(
+      fetched.stale,
+      IsOfEarlierEpoch(
+          context, map, fetched.info.epoch, "these entities are", "objects find finds them anew"));
   return fetched;
 }
 

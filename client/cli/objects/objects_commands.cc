@@ -1,4 +1,4 @@
-// strata objects find|list|show|export
+// strata objects find|list|show|complete|export
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -14,12 +14,14 @@
 #include "client/cli/job/job_runner.h"
 #include "client/cli/objects/entity_files.h"
 #include "client/cli/objects/fetched_entities.h"
+#include "client/cli/objects/fetched_inferred.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
 #include "client/cli/terminal/on_earth.h"
 #include "core/common/status.h"
 #include "core/world/job_kinds.h"
+#include "core/world/things/kind.h"
 
 namespace strata::cli {
 namespace {
@@ -33,6 +35,7 @@ struct ObjectsOptions {
   std::optional<Eigen::AlignedBox3d> region;
   std::uint64_t id = 0;
   std::string out;
+  bool inferred = false;
 };
 
 absl::StatusOr<FetchedEntities> FetchChosen(Context& context, const ObjectsOptions& options) {
@@ -42,6 +45,10 @@ absl::StatusOr<FetchedEntities> FetchChosen(Context& context, const ObjectsOptio
 
 absl::Status FindObjects(Context& context, const ObjectsOptions& options) {
   return StartJob(context, options.map, kObjectsJob, options.parameters, options.wait);
+}
+
+absl::Status CompleteObjects(Context& context, const ObjectsOptions& options) {
+  return StartJob(context, options.map, kCompleteJob, options.parameters, options.wait);
 }
 
 Json SearchJson(const FetchedEntities& fetched) {
@@ -105,7 +112,31 @@ absl::Status ShowObject(Context& context, const ObjectsOptions& options) {
   return absl::OkStatus();
 }
 
+absl::Status ExportInferred(Context& context, const ObjectsOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(const FetchedInferred fetched,
+                          FetchInferred(context,
+                                        options.map,
+                                        {.region = options.region, .kind = options.kind},
+                                        options.class_name));
+  STRATA_RETURN_IF_ERROR(WriteInferred(options.out, fetched));
+  Json parts = Json::array();
+  for (const InferredPart& part : fetched.parts) {
+    parts.push_back({{"entity", part.entity},
+                     {"kind", KindIdText(part.kind)},
+                     {"points", part.points.size()},
+                     {"agreeing", part.agreeing},
+                     {"contradicting", part.contradicting}});
+  }
+  context.output.Object({{"file", options.out},
+                         {"points", fetched.points},
+                         {"epoch", fetched.info.epoch},
+                         {"stale", fetched.stale},
+                         {"parts", std::move(parts)}});
+  return absl::OkStatus();
+}
+
 absl::Status ExportObjects(Context& context, const ObjectsOptions& options) {
+  if (options.inferred) return ExportInferred(context, options);
   STRATA_ASSIGN_OR_RETURN(const FetchedEntities fetched, FetchChosen(context, options));
   STRATA_ASSIGN_OR_RETURN(const std::optional<LocalFrame> earth, EarthOf(context, options.map));
   STRATA_RETURN_IF_ERROR(WriteEntities(options.out, fetched, earth));
@@ -142,6 +173,17 @@ void AddObjectsCommands(Commands& commands) {
   find->footer(absl::StrCat(find->get_footer(),
                             "\n\nParameters:\n",
                             JobParametersText(*FindJobKind(kObjectsJob).value())));
+  CLI::App* complete = verb("complete",
+                            "Infer what nobody saw of things by what others of their kinds look "
+                            "like, after objects find (job complete); objects export --inferred "
+                            "and map render --inferred show it",
+                            "strata objects complete campus --wait",
+                            CompleteObjects);
+  AddJobParameters(complete, options->parameters);
+  AddWait(complete, options->wait);
+  complete->footer(absl::StrCat(complete->get_footer(),
+                                "\n\nParameters:\n",
+                                JobParametersText(*FindJobKind(kCompleteJob).value())));
   AddChoice(verb("list",
                  "The things that objects find found, by class and falling number of points: the "
                  "middle and length, width and height of the box around each [m]",
@@ -156,12 +198,14 @@ void AddObjectsCommands(Commands& commands) {
       ->required();
   CLI::App* out = verb("export",
                        "Their boxes for GIS and tables: GeoJSON on earth where the map has an "
-                       "origin, or CSV",
+                       "origin, or CSV; with --inferred the points that objects complete added, "
+                       "the entity's id as label",
                        "strata objects export campus things.geojson --class car",
                        ExportObjects);
   out->add_option("FILE", options->out, "Where to, by its ending")
-      ->type_name("FILE.(geojson|csv)")
+      ->type_name("FILE.(geojson|csv|ply|pcd)")
       ->required();
+  out->add_flag("--inferred", options->inferred, "What was inferred, as PLY or PCD");
   AddChoice(out, *options);
 }
 

@@ -419,6 +419,20 @@ class Map:
         """Takes a kind out of the library; things of it are of none then."""
         self._connection.once(self._objects.DeleteKind, objects_pb2.DeleteKindRequest(map=self.name, kind=kind))
 
+    def inferred(self, class_id=0, region=None, kind=""):
+        """What the last job "complete" inferred of things by others of their kinds, by entity: where nobody looked.
+
+        Arguments as of objects(). NotFound where nothing was inferred since the last job "objects".
+
+            campus.job("complete")
+            for part in campus.inferred():
+                print(part.entity, len(part.points))
+        """
+        request = objects_pb2.ListInferredRequest(map=self.name, class_id=class_id, region=objects.box_to_proto(region),
+                                                  kind=kind)
+        answers = self._connection.collected(self._objects.ListInferred, request)
+        return objects.inferred_from_proto(answers)
+
     def _named_profile(self, name):
         profiles = self.profiles()
         if name not in profiles:

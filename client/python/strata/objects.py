@@ -91,6 +91,22 @@ class Entities(collections.abc.Sequence):
         return self.entities[index]
 
 
+@dataclasses.dataclass(frozen=True)
+class InferredPart:
+    """What nobody saw of one entity, by what others of its kind look like."""
+
+    entity: int
+    """Its id."""
+    kind: str
+    """Its kind's id."""
+    points: np.ndarray
+    """(n, 3) where no ray went, map frame [m]."""
+    agreeing: int
+    """Voxels of its kind's shape where it was measured."""
+    contradicting: int
+    """Voxels of its kind's shape that rays went through."""
+
+
 def box_to_proto(region):
     if region is None:
         return None
@@ -143,3 +159,13 @@ def from_proto(answers):
     search = answers[-1].search
     return Entities(entities=[_entity(answer.entity) for answer in answers[:-1]], epoch=search.epoch, job=search.job,
                     distances={reach.class_id: reach.distance_m for reach in search.reaches})
+
+
+def inferred_from_proto(answers):
+    if not answers or not answers[-1].HasField("search"):
+        raise errors.DataLoss("the answer ended before its last message")
+    parts = [answer.inferred for answer in answers[:-1]]
+    return [InferredPart(entity=part.entity, kind=f"{part.kind:012x}", agreeing=part.agreeing,
+                         contradicting=part.contradicting,
+                         points=poses.array3(part.middle) + np.reshape(np.asarray(part.points, dtype=float), (-1, 3)))
+            for part in parts]

@@ -68,6 +68,7 @@ TEST_F(StrataUsageTest, EveryCommandHasHelpWithAnExample) {
                                              "objects list",
                                              "objects show",
                                              "objects export",
+                                             "objects complete",
                                              "kind list",
                                              "kind rename",
                                              "kind export",

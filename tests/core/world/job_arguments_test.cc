@@ -101,6 +101,8 @@ std::vector<Expected> AllParameters() {
       {"objects", "distance_m", "0", {"0", "4"}, {"-0.1", "4.1", "nan"}},
       {"objects", "voxel_m", "0.05", {"0.01", "1"}, {"0", "1.1"}},
       {"objects", "min_points", "50", {"1", "1000000000"}, {"0", "-1"}},
+      {"complete", "kind", "", {"golf", "0123456789ab"}, {"", "a b"}},
+      {"complete", "voxel_m", "0.05", {"0.01", "1"}, {"0", "1.1", "nan"}},
   };
   for (const char* kind : {"rebuild", "verify", "optimize", "fade"}) {
     all.push_back({kind, "threads", "", {"1", "64"}, {"0", "65", "-1", "two", ""}});

@@ -48,7 +48,7 @@ TEST(JobKindsTest, TextsAreLinesForAProtoAndATerminal) {
                                   "optimising (30)"));
   EXPECT_EQ(JobKindNames(),
             "rebuild, verify, optimize, revert, train, classify, evaluate, "
-            "fade, planes or objects");
+            "fade, planes, objects or complete");
 }
 
 TEST(JobKindsTest, NamesAreTheirOwnAndDefaultsFit) {
@@ -71,8 +71,9 @@ TEST(JobKindsTest, FindsAKindOrNamesThoseThereAre) {
   STRATA_ASSERT_OK_AND_ASSIGN(const JobKind* const fade, FindJobKind("fade"));
   EXPECT_EQ(fade->name, kFadeJob);
   EXPECT_THAT(FindJobKind("dance"),
-              testing::StatusIs(absl::StatusCode::kInvalidArgument,
-                                AllOf(HasSubstr("'dance'"), HasSubstr("fade, planes or objects"))));
+              testing::StatusIs(
+                  absl::StatusCode::kInvalidArgument,
+                  AllOf(HasSubstr("'dance'"), HasSubstr("fade, planes, objects or complete"))));
   const absl::Status refused = FindJobKind(std::string(1000, 'x')).status();
   EXPECT_THAT(std::string(refused.message()), Not(HasSubstr(std::string(101, 'x'))));
 }

@@ -106,5 +106,34 @@ TEST_F(ObjectsCommandsTest, AreExported) {
               StatusIs(Code::kInvalidArgument, HasSubstr("map render --objects")));
 }
 
+TEST_F(ObjectsCommandsTest, WhatWasInferredIsWritten) {
+  ON_CALL(db_.objects(), ListInferred(_, _, _, _))
+      .WillByDefault([&](auto&, auto, const EntityQuery& query, auto sink) {
+        EXPECT_EQ(query.class_id, 7);
+        STRATA_EXPECT_OK(sink(InferredPart{1, 0xabcdef012345, 40, 2, {{1, 2, 3}, {4, 5, 6}}}));
+        InferredInfo info;
+        info.epoch = 2;
+        return absl::StatusOr<InferredInfo>(info);
+      });
+  const ::strata::testing::TempDir directory;
+  const std::string out = (directory.path() / "hidden").string();
+  const auto write = [&](const std::string& ending) {
+    return std::vector<std::string>{
+        "objects", "export", "m", out + ending, "--inferred", "--class", "car"};
+  };
+  const Json ply = RunJson(write(".ply"));
+  EXPECT_EQ(ply["points"], 2);
+  EXPECT_EQ(ply["stale"], false);
+  EXPECT_EQ(ply["parts"][0]["kind"], "abcdef012345");
+  EXPECT_EQ(ply["parts"][0]["agreeing"], 40);
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::string text, ReadFileBytes(out + ".ply"));
+  EXPECT_THAT(text, HasSubstr("element vertex 2"));
+  now_ = 3;
+  EXPECT_EQ(RunJson(write(".pcd"))["stale"], true);
+  EXPECT_THAT(talk_.str(), HasSubstr("objects complete"));
+  EXPECT_THAT(Run(write(".geojson")),
+              StatusIs(Code::kInvalidArgument, HasSubstr("map render --inferred")));
+}
+
 }  // namespace
 }  // namespace strata::cli
