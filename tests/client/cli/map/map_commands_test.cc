@@ -201,6 +201,9 @@ TEST_F(MapCommandsTest, AMapSaysHowWellItsScansAndLoopsAgree) {
 }
 
 TEST_F(MapCommandsTest, PlacesAreToldAndDrawn) {
+  ON_CALL(db_.planning(), ListProfiles(_, _)).WillByDefault([](auto&, auto) {
+    return absl::StatusOr<std::map<std::string, RobotProfile>>({{"default", RobotProfile()}});
+  });
   FloorPlaces found;
   ON_CALL(db_.planning(), ListPlaces(_, _, _)).WillByDefault([&](auto&, auto, auto&) {
     return absl::StatusOr<FloorPlaces>(found);
