@@ -254,8 +254,11 @@ TEST_F(RightsMatrixTest, WhoIsNotKnownGetsNowhere) {
   const std::string unknown = NewToken()->ToString();
   // The id is no secret: with it alone nobody comes in.
   const std::string forged = good.substr(0, good.size() - 43) + unknown.substr(unknown.size() - 43);
-  ServeWithTokens();
+  // Hundreds of refused calls within a second are cut off: each server hears less than that.
+  constexpr int kMethodsOfServer = 25;
+  int knocked = 0;
   for (const MethodDescriptor* method : AllMethods()) {
+    if (knocked++ % kMethodsOfServer == 0) ServeWithTokens();
     SCOPED_TRACE(NameOf(*method));
     constexpr Code kUnknown = Code::kUnauthenticated;
     ExpectRefused(*method, std::nullopt, kUnknown, "wants a token");
