@@ -236,7 +236,8 @@ Inference InferHidden(const Prototype& prototype, const ShapeView& view) {
     if (sight == ShapeSight::kEmpty) ++hidden.contradicting;
     if (sight == ShapeSight::kHidden) hidden.points.push_back(voxel.mean);
   }
-  if (!hidden.IsOfKind()) hidden.points.clear();
+  hidden.voxels = prototype.voxels.size();
+  if (!hidden.IsOfKind() || !hidden.IsSeenEnough()) hidden.points.clear();
   return hidden;
 }
 

@@ -50,14 +50,17 @@ struct Inference {
   std::vector<Eigen::Vector3d> points;  // where nobody looked; frame of the kind [m]
   std::uint64_t agreeing = 0;           // voxels of the prototype where the thing was measured
   std::uint64_t contradicting = 0;      // those that were seen empty
+  std::uint64_t voxels = 0;             // of the prototype
 
-  // Without agreement, or with a quarter as much contradiction, it is of another kind: `points` is
-  // empty.
-  bool IsOfKind() const { return agreeing > 0 && 4 * contradicting <= agreeing; }
+  // Otherwise rays contradict a quarter as much as agrees: it is of another kind.
+  bool IsOfKind() const { return 4 * contradicting <= agreeing; }
+  // Otherwise less than a fifth of the shape was seen: a wall is a part of many houses.
+  bool IsSeenEnough() const { return agreeing > 0 && 5 * agreeing >= voxels; }
 };
 
 // The thesis puts the prototype in place of every thing, what was measured of it included. Here
-// measurements stay, and only that is added which no ray contradicts. `view` as the prototype's.
+// measurements stay, and only that is added which no ray contradicts, and nothing to a thing that
+// is not of the kind, or of which too little was seen to tell. `view` as the prototype's.
 Inference InferHidden(const Prototype& prototype, const ShapeView& view);
 
 }  // namespace strata

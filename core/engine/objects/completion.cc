@@ -69,6 +69,7 @@ struct Inferred {
   absl::btree_map<std::uint64_t, InferredPart> parts;                 // by entity
   absl::btree_map<std::uint64_t, absl::btree_set<ScanNumber>> scans;  // that a kind was seen by
   std::uint64_t of_other_kind = 0;  // entities that rays contradict
+  std::uint64_t too_little = 0;     // entities of which too little was seen
   std::uint64_t symmetric = 0;      // kinds
   std::uint64_t too_large = 0;      // kinds
   DamagedScans damaged;
@@ -147,6 +148,7 @@ class Completer {
         part.points.emplace_back(things[i].kind->T_map_kind * p);
       }
       out_.of_other_kind += inference.IsOfKind() ? 0 : 1;
+      out_.too_little += inference.IsOfKind() && !inference.IsSeenEnough() ? 1 : 0;
       out_.info.points += part.points.size();
       ++out_.info.entities;
     }
@@ -201,6 +203,7 @@ void ReportInferred(const Inferred& inferred, JobContext& context) {
   context.SetMetric("entities", static_cast<double>(info.entities));
   context.SetMetric("points", static_cast<double>(info.points));
   context.SetMetric("contradicted", static_cast<double>(inferred.of_other_kind));
+  context.SetMetric("too_little_seen", static_cast<double>(inferred.too_little));
   context.SetMetric("symmetric", static_cast<double>(inferred.symmetric));
   context.SetMetric("too_large", static_cast<double>(inferred.too_large));
   inferred.damaged.SetMetrics(context);
@@ -209,6 +212,9 @@ void ReportInferred(const Inferred& inferred, JobContext& context) {
   if (inferred.of_other_kind > 0) {
     absl::StrAppend(
         &message, "; ", inferred.of_other_kind, " look different and were left as they are");
+  }
+  if (inferred.too_little > 0) {
+    absl::StrAppend(&message, "; of ", inferred.too_little, " too little was seen");
   }
   if (inferred.too_large > 0) {
     absl::StrAppend(&message, "; ", inferred.too_large, " kinds are too large");

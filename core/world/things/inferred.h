@@ -20,7 +20,8 @@ struct InferredPart {
   std::uint64_t entity = 0;  // its id
   std::uint64_t kind = 0;    // its kind's id
   // Voxels of its kind's shape where it was measured, and where rays went through; beyond a quarter
-  // of those nothing is inferred, and it is probably of another kind.
+  // of those nothing is inferred, and it is probably of another kind; neither below a fifth of
+  // the shape.
   std::uint64_t agreeing = 0;
   std::uint64_t contradicting = 0;
   std::vector<Eigen::Vector3d> points;  // where no ray went, map frame [m]

@@ -214,7 +214,7 @@ TEST(PrototypeTest, AnotherKindIsNotCompleted) {
 
 TEST(PrototypeTest, WhatStandsInFrontHidesAndDoesNotContradict) {
   Scene behind_a_wall;
-  behind_a_wall.others = {Box({-0.5, 1.2, 0.0}, {2.6, 1.3, 2.2})};
+  behind_a_wall.others = {Box({0.3, 1.2, 0.0}, {2.6, 1.3, 2.2})};
   std::vector<ShapeView> views;
   for (const Vector3d& from : {kLeft, kFront}) views.push_back(SeenFrom({from, kRight}, Scene()));
   views.push_back(SeenFrom({kLeft}, behind_a_wall));
@@ -223,7 +223,23 @@ TEST(PrototypeTest, WhatStandsInFrontHidesAndDoesNotContradict) {
   const Inference hidden = InferHidden(*prototype, views.back());
   EXPECT_TRUE(hidden.IsOfKind());
   EXPECT_LT(hidden.contradicting, hidden.agreeing / 20);
-  EXPECT_GT(Covered(hidden.points, Box({0.4, 0.89, 0.4}, {2.0, 0.91, 1.0})), 0.9);
+  EXPECT_GT(Covered(hidden.points, Box({1.0, 0.89, 0.4}, {2.0, 0.91, 1.0})), 0.9);
+}
+
+// A corner may be one of many things.
+TEST(PrototypeTest, WhatTooLittleWasSeenOfIsNotCompleted) {
+  Scene nearly_hidden;
+  nearly_hidden.others = {Box({-1.6, 1.2, 0.0}, {2.6, 1.3, 2.2})};
+  std::vector<ShapeView> views;
+  for (const Vector3d& from : {kLeft, kFront}) views.push_back(SeenFrom({from, kRight}, Scene()));
+  views.push_back(SeenFrom({kLeft}, nearly_hidden));
+  const auto prototype = BuildPrototype(views, Stop());
+  STRATA_ASSERT_OK(prototype.status());
+  const Inference hidden = InferHidden(*prototype, views.back());
+  EXPECT_TRUE(hidden.IsOfKind());
+  EXPECT_GT(hidden.agreeing, 0u);
+  EXPECT_FALSE(hidden.IsSeenEnough());
+  EXPECT_TRUE(hidden.points.empty());
 }
 
 TEST(ShapeViewTest, RefusesBoxesItCannotHold) {
