@@ -21,6 +21,7 @@
 #include "proto/translate/maps.h"
 #include "proto/translate/models.h"
 #include "proto/translate/objects.h"
+#include "proto/translate/places.h"
 #include "proto/translate/planning.h"
 #include "proto/translate/points.h"
 #include "proto/translate/posegraph.h"
