@@ -2,12 +2,10 @@
 #ifndef STRATA_CLIENT_CLI_OBJECTS_FETCHED_ENTITIES_H_
 #define STRATA_CLIENT_CLI_OBJECTS_FETCHED_ENTITIES_H_
 
-#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "absl/strings/string_view.h"
 
 #include "client/cli/picture/map_picture.h"
 #include "client/cli/terminal/command.h"
@@ -15,14 +13,6 @@
 #include "core/world/things/entity.h"
 
 namespace strata::cli {
-
-// Whether the map has another epoch now, which is said on stderr: "WHAT of epoch 3, the map is at
-// 4; CURE".
-absl::StatusOr<bool> IsOfEarlierEpoch(Context& context,
-                                      const std::string& map,
-                                      std::uint64_t epoch,
-                                      absl::string_view what,
-                                      absl::string_view cure);
 
 struct FetchedEntities {
   EntitiesInfo info;

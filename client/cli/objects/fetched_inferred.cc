@@ -7,7 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include <Eigen/Core>
 
-#include "client/cli/objects/fetched_entities.h"
+#include "client/cli/terminal/stale.h"
 #include "client/formats/file_bytes.h"
 #include "client/formats/geometry_writer.h"
 #include "core/common/status.h"
