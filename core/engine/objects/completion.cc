@@ -110,10 +110,11 @@ class Completer {
       ++out_.too_large;
       return absl::OkStatus();
     }
+    const std::size_t most = ThingsAtATime(box, voxel_m);
     std::optional<Prototype> prototype;
-    for (std::size_t begin = 0; begin < things.size(); begin += kMostThingViews) {
+    for (std::size_t begin = 0; begin < things.size(); begin += most) {
       const std::span<const Entity> some =
-          things.subspan(begin, std::min(kMostThingViews, things.size() - begin));
+          things.subspan(begin, std::min(most, things.size() - begin));
       STRATA_ASSIGN_OR_RETURN(
           ThingViews views,
           ReadThingViews(core_, epoch_, some, box, voxel_m, out_.damaged, context_.stop()));

@@ -36,7 +36,7 @@ absl::btree_map<ScanId, std::vector<std::size_t>> ScansOf(std::span<const Entity
   return scans;
 }
 
-// Where in its box a point of the map is.
+// Whether a point of the map is in the box, or so near to it.
 bool IsInBox(const UprightBox& box, const Vector3d& p, double margin_m) {
   const Vector3d from = Eigen::AngleAxisd(-box.yaw_rad, Vector3d::UnitZ()) * (p - box.centre);
   return (from.cwiseAbs().array() <= box.size.array() / 2.0 + margin_m).all();
@@ -60,7 +60,9 @@ class ViewReader {
     const ScanShare share(core_.caches(), posed.scan);
     ScanSource source(*reader, parameters);
     return source.ForEachBlock(posed.scan, [&](const PointCloud& block) -> absl::Status {
-      const PointCloud cloud = Lasting(block, source.faded());
+      PointCloud lasting;
+      if (!source.faded().empty()) lasting = Lasting(block, source.faded());
+      const PointCloud& cloud = source.faded().empty() ? block : lasting;
       for (const std::size_t i : seen) {
         STRATA_RETURN_IF_ERROR(AddTo(i, cloud, posed.pose->T_map_scan, sensor, stop));
       }
@@ -75,9 +77,9 @@ class ViewReader {
     cloud.origin = block.origin;
     cloud.sensor_origin = block.sensor_origin;
     for (std::size_t i = 0; i < block.size(); ++i) {
-      if (!faded.empty() && faded[i] != 0) continue;
+      if (faded[i] != 0) continue;
       cloud.points.push_back(block.points[i]);
-      cloud.label.push_back(block.label.empty() ? std::uint16_t{0} : block.label[i]);
+      if (!block.label.empty()) cloud.label.push_back(block.label[i]);
     }
     return cloud;
   }
@@ -92,7 +94,7 @@ class ViewReader {
     const Pose T_kind_map = thing.kind->T_map_kind.inverse();
     const double margin_m = std::max(kLeastMarginM, view.voxel_m());
     std::vector<Vector3d> points;
-    for (std::size_t k = 0; k < cloud.size(); ++k) {
+    for (std::size_t k = 0; k < cloud.label.size(); ++k) {
       if (cloud.label[k] != thing.class_id) continue;
       const Vector3d p = T_map_scan * (cloud.points[k].cast<double>() + cloud.origin);
       if (IsInBox(thing.box, p, margin_m)) points.push_back(T_kind_map * p);
@@ -122,6 +124,12 @@ Eigen::AlignedBox3d BoxOfKind(std::span<const Entity> things) {
   return {box.min() - Vector3d::Constant(kMarginM), box.max() + Vector3d::Constant(kMarginM)};
 }
 
+std::size_t ThingsAtATime(const Eigen::AlignedBox3d& box, double voxel_m) {
+  const double voxels = (box.sizes() / voxel_m).array().ceil().prod();
+  const double most = static_cast<double>(kMostThingViews);
+  return static_cast<std::size_t>(std::clamp(kMostVoxelsAtATime / voxels, 1.0, most));
+}
+
 double ShapeVoxelM(const Eigen::AlignedBox3d& box, double voxel_m) {
   // Borders of voxels are not those of the box.
   const double most = 0.9 * kMostShapeVoxels;
@@ -148,10 +156,12 @@ absl::StatusOr<ThingViews> ReadThingViews(MapCore& core,
     if (absl::IsNotFound(posed.status())) continue;  // deleted meanwhile
     STRATA_RETURN_IF_ERROR(posed.status());
     if (!posed->pose.has_value() || !posed->scan.has_points) continue;
+    // Also of one that breaks off: what it has added stays.
+    out.scans.insert(posed->scan.number);
     const absl::Status added = views.Add(*posed, seen, stop);
-    if (added.ok()) out.scans.insert(posed->scan.number);
+    if (added.ok()) continue;
     if (absl::IsFailedPrecondition(added)) continue;  // its points were dropped meanwhile
-    if (!added.ok() && !damaged.LeaveOut(posed->scan.number, id.ToString(), added)) return added;
+    if (!damaged.LeaveOut(posed->scan.number, id.ToString(), added)) return added;
   }
   return out;
 }

@@ -21,8 +21,9 @@ namespace strata {
 
 // Of each thing, those that saw most of it.
 inline constexpr std::size_t kMostScansOfThing = 24;
-// That are in memory at a time, some megabytes each.
+// That are in memory at a time, and voxels of theirs: some hundreds of megabytes at most.
 inline constexpr std::size_t kMostThingViews = 64;
+inline constexpr double kMostVoxelsAtATime = 4e7;
 
 // What all of the things reach, in the frame of their kind, and a little around it. REQUIRES: all
 // have a kind, the same.
@@ -31,6 +32,9 @@ Eigen::AlignedBox3d BoxOfKind(std::span<const Entity> things);
 // The least edge of voxels, from `voxel_m` on, that a view of the box can have [m].
 double ShapeVoxelM(const Eigen::AlignedBox3d& box, double voxel_m);
 
+// How many views of such a box may be in memory at a time; in [1, kMostThingViews].
+std::size_t ThingsAtATime(const Eigen::AlignedBox3d& box, double voxel_m);
+
 struct ThingViews {
   std::vector<ShapeView> views;       // one a thing
   absl::btree_set<ScanNumber> scans;  // what they are from
@@ -38,7 +42,7 @@ struct ThingViews {
 
 // Reads the scans that saw them, each once, with the poses of `epoch`; points that have faded are
 // left out, and scans that were deleted, lost their points or are damaged. REQUIRES: at most
-// kMostThingViews things; box and edge as ShapeView::Over() takes them. Errors of the store;
+// ThingsAtATime() things; box and edge as ShapeView::Over() takes them. Errors of the store;
 // CANCELLED, DEADLINE_EXCEEDED; RESOURCE_EXHAUSTED where rays fill too many voxels.
 absl::StatusOr<ThingViews> ReadThingViews(MapCore& core,
                                           std::uint64_t epoch,
