@@ -74,19 +74,10 @@ std::map<int, int> SurfaceClasses(api::Database& db) {
   return classes;
 }
 
-JobInfo RunJob(api::Database& db,
-               const std::string& kind,
-               const std::map<std::string, std::string>& parameters) {
-  JobInfo last;
-  const absl::StatusOr<JobInfo> job = db.jobs().Start({}, kMap, kind, parameters);
-  STRATA_EXPECT_OK(job);
-  if (!job.ok()) return last;
-  STRATA_EXPECT_OK(db.jobs().Watch({}, kMap, job->id, [&last](const JobInfo& now) {
-    last = now;
-    return absl::OkStatus();
-  }));
-  EXPECT_EQ(last.state, JobState::kSucceeded) << last.message;
-  return last;
+JobInfo RunJob(api::Database& db, const std::string& kind, const JobParameters& parameters) {
+  const JobInfo job = EndOfJob(db, kind, parameters);
+  EXPECT_EQ(job.state, JobState::kSucceeded) << job.message;
+  return job;
 }
 
 void PutPark(api::Database& db, std::uint64_t sequence, bool labels) {

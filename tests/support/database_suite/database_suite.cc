@@ -122,4 +122,19 @@ void PutFloor(api::Database& db, const ScanId& id, double x_m) {
   AwaitIntegration(db, kMap);
 }
 
+JobInfo EndOfJob(api::Database& database,
+                 const std::string& kind,
+                 const JobParameters& parameters,
+                 const std::string& map) {
+  JobInfo last;
+  const absl::StatusOr<JobInfo> job = database.jobs().Start({}, map, kind, parameters);
+  STRATA_EXPECT_OK(job);
+  if (!job.ok()) return last;
+  STRATA_EXPECT_OK(database.jobs().Watch({}, map, job->id, [&last](const JobInfo& now) {
+    last = now;
+    return absl::OkStatus();
+  }));
+  return last;
+}
+
 }  // namespace strata::testing

@@ -66,6 +66,11 @@ void PutFloor(api::Database& db, const ScanId& id, double x_m = 0.0);
 std::vector<ScanId> Listed(api::Database& db, const api::ScanFilter& filter);
 // Returns once no scan of the map is pending.
 void AwaitIntegration(api::Database& database, const std::string& map);
+// Starts a job and waits for its end, which it returns.
+JobInfo EndOfJob(api::Database& database,
+                 const std::string& kind,
+                 const JobParameters& parameters = {},
+                 const std::string& map = kMap);
 
 }  // namespace strata::testing
 

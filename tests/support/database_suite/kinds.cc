@@ -63,16 +63,9 @@ void PutThings(api::Database& db, const std::string& map = kMap) {
 }
 
 JobInfo FindKinds(api::Database& db, const std::string& map = kMap) {
-  JobInfo last;
-  const auto job = db.jobs().Start({}, map, "objects", {{"class", "thing"}});
-  STRATA_EXPECT_OK(job);
-  if (!job.ok()) return last;
-  STRATA_EXPECT_OK(db.jobs().Watch({}, map, job->id, [&last](const JobInfo& now) {
-    last = now;
-    return absl::OkStatus();
-  }));
-  EXPECT_EQ(last.state, JobState::kSucceeded) << last.message;
-  return last;
+  const JobInfo job = EndOfJob(db, "objects", {{"class", "thing"}}, map);
+  EXPECT_EQ(job.state, JobState::kSucceeded) << job.message;
+  return job;
 }
 
 std::vector<Entity> EntitiesWith(api::Database& db,
@@ -158,10 +151,8 @@ TEST_P(DatabaseSuite, FoundKindsComeBackBitForBitAfterARebuild) {
   };
   const std::vector<KindShape> before = shapes();
   const std::vector<Entity> entities = EntitiesWith(db());
-  const auto rebuild = db().jobs().Start({}, kMap, "rebuild", {});
-  STRATA_ASSERT_OK(rebuild);
-  STRATA_ASSERT_OK(
-      db().jobs().Watch({}, kMap, rebuild->id, [](const JobInfo&) { return absl::OkStatus(); }));
+  const JobInfo rebuild = EndOfJob(db(), "rebuild");
+  EXPECT_EQ(rebuild.state, JobState::kSucceeded) << rebuild.message;
   EXPECT_THAT(*db().objects().ListKinds({}, kMap), IsEmpty());
   FindKinds(db());
   EXPECT_EQ(shapes(), before);
@@ -202,14 +193,8 @@ TEST_P(DatabaseSuite, AnImportedKindIsRecognised) {
   STRATA_ASSERT_OK_AND_ASSIGN(const KindInfo other, db().objects().ImportKind({}, "other", there));
   EXPECT_EQ(other.id, info.id);
   EXPECT_EQ(db().maps().ListClasses({}, "other")->back().name, "furniture");
-  const auto verify = db().jobs().Start({}, kMap, "verify", {});
-  STRATA_ASSERT_OK(verify);
-  JobInfo last;
-  STRATA_ASSERT_OK(db().jobs().Watch({}, kMap, verify->id, [&last](const JobInfo& now) {
-    last = now;
-    return absl::OkStatus();
-  }));
-  EXPECT_EQ(last.state, JobState::kSucceeded) << last.message;
+  const JobInfo verify = EndOfJob(db(), "verify");
+  EXPECT_EQ(verify.state, JobState::kSucceeded) << verify.message;
 }
 
 TEST_P(DatabaseSuite, KindsThatCannotBeAreRefused) {
@@ -317,18 +302,6 @@ void PutWholeAndHalf(api::Database& db) {
   STRATA_ASSERT_OK(db.maps().SetClass({}, kMap, {kThingClass, "thing", {200, 90, 20}}));
 }
 
-JobInfo Complete(api::Database& db, const JobParameters& parameters = {}) {
-  JobInfo last;
-  const auto job = db.jobs().Start({}, kMap, "complete", parameters);
-  STRATA_EXPECT_OK(job);
-  if (!job.ok()) return last;
-  STRATA_EXPECT_OK(db.jobs().Watch({}, kMap, job->id, [&last](const JobInfo& now) {
-    last = now;
-    return absl::OkStatus();
-  }));
-  return last;
-}
-
 absl::StatusOr<std::vector<InferredPart>> InferredOf(api::Database& db,
                                                      const EntityQuery& query = {}) {
   std::vector<InferredPart> parts;
@@ -346,13 +319,13 @@ absl::StatusOr<std::vector<InferredPart>> InferredOf(api::Database& db,
 
 TEST_P(DatabaseSuite, WhatNobodySawIsInferredFromOthersOfTheKind) {
   EXPECT_THAT(InferredOf(db()), StatusIs(Code::kNotFound, HasSubstr("objects complete")));
-  EXPECT_THAT(Complete(db()).message, HasSubstr("objects find"));
+  EXPECT_THAT(EndOfJob(db(), "complete").message, HasSubstr("objects find"));
   PutWholeAndHalf(db());
   FindKinds(db());
   const std::vector<Entity> things = EntitiesWith(db());
   ASSERT_THAT(things, SizeIs(2));
   ASSERT_TRUE(things[0].kind.has_value() && things[1].kind.has_value());
-  const JobInfo job = Complete(db());
+  const JobInfo job = EndOfJob(db(), "complete");
   ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
   EXPECT_EQ(job.metrics.at("entities"), 2.0);
   EXPECT_EQ(job.metrics.at("kinds"), 1.0);
@@ -371,26 +344,26 @@ TEST_P(DatabaseSuite, WhatNobodySawIsInferredFromOthersOfTheKind) {
   }
   Reopen();
   EXPECT_EQ(InferredOf(db()).value(), parts);
-  EXPECT_EQ(Complete(db()).metrics.at("points"), job.metrics.at("points"));
+  EXPECT_EQ(EndOfJob(db(), "complete").metrics.at("points"), job.metrics.at("points"));
   EXPECT_EQ(InferredOf(db()).value(), parts);
   const Eigen::AlignedBox3d east(Eigen::Vector3d(1, -3, 0), Eigen::Vector3d(3, 3, 3));
   EXPECT_THAT(InferredOf(db(), {.region = east}).value(), SizeIs(1));
   // Coarser where one says so, and of one kind.
   const std::string kind = KindIdText(parts[0].kind);
-  EXPECT_LT(Complete(db(), {{"voxel_m", "0.1"}, {"kind", kind}}).metrics.at("points"),
+  EXPECT_LT(EndOfJob(db(), "complete", {{"voxel_m", "0.1"}, {"kind", kind}}).metrics.at("points"),
             job.metrics.at("points"));
 }
 
 TEST_P(DatabaseSuite, WhatWasInferredGoesWithTheScansItIsFrom) {
   PutWholeAndHalf(db());
   FindKinds(db());
-  ASSERT_EQ(Complete(db()).state, JobState::kSucceeded);
+  ASSERT_EQ(EndOfJob(db(), "complete").state, JobState::kSucceeded);
   STRATA_ASSERT_OK(db().scans().Delete({}, kMap, {"run", 1}));
   EXPECT_THAT(InferredOf(db()).value(), IsEmpty());
   // The next entities are others.
   FindKinds(db());
   EXPECT_THAT(InferredOf(db()), StatusIs(Code::kNotFound, HasSubstr("objects complete")));
-  const JobInfo alone = Complete(db());
+  const JobInfo alone = EndOfJob(db(), "complete");
   EXPECT_EQ(alone.state, JobState::kFailed);
   EXPECT_THAT(alone.message, HasSubstr("no entity has a kind"));
   EXPECT_THAT(db().objects().ListInferred(

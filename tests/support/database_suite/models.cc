@@ -37,18 +37,6 @@ absl::StatusOr<FoundModel> ModelOf(api::Database& db) {
   return model;
 }
 
-JobInfo RunPlanes(api::Database& db, const JobParameters& parameters = {}) {
-  JobInfo last;
-  const auto job = db.jobs().Start({}, kMap, "planes", parameters);
-  STRATA_EXPECT_OK(job);
-  if (!job.ok()) return last;
-  STRATA_EXPECT_OK(db.jobs().Watch({}, kMap, job->id, [&last](const JobInfo& now) {
-    last = now;
-    return absl::OkStatus();
-  }));
-  return last;
-}
-
 // A floor of 8 x 8 m and a wall at x = 3 with a hole of 1 x 1 m, through which nothing was seen.
 PointCloud Room() {
   PointCloud cloud = LevelFloor();
@@ -66,7 +54,7 @@ TEST_P(DatabaseSuite, PlanesAreFoundAndKeptUntilTheNext) {
   const PointCloud room = Room();
   STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", 1}, room), room));
   AwaitIntegration(db(), kMap);
-  const JobInfo job = RunPlanes(db());
+  const JobInfo job = EndOfJob(db(), "planes");
   ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
   EXPECT_EQ(job.metrics.at("planes"), 2.0);
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel model, ModelOf(db()));
@@ -91,7 +79,7 @@ TEST_P(DatabaseSuite, PlanesAreFoundAndKeptUntilTheNext) {
   Reopen();
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel kept, ModelOf(db()));
   EXPECT_EQ(kept.planes[1].polygons, wall.polygons);
-  const JobInfo again = RunPlanes(db(), {{"min_area_m2", "30"}});
+  const JobInfo again = EndOfJob(db(), "planes", {{"min_area_m2", "30"}});
   ASSERT_EQ(again.state, JobState::kSucceeded) << again.message;
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel fewer, ModelOf(db()));
   ASSERT_THAT(fewer.planes, SizeIs(1));
@@ -102,7 +90,7 @@ TEST_P(DatabaseSuite, PlanesAreFoundAndKeptUntilTheNext) {
 }
 
 TEST_P(DatabaseSuite, AnEmptyMapHasNoPlanes) {
-  const JobInfo job = RunPlanes(db());
+  const JobInfo job = EndOfJob(db(), "planes");
   ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel model, ModelOf(db()));
   EXPECT_THAT(model.planes, SizeIs(0));
@@ -113,18 +101,18 @@ TEST_P(DatabaseSuite, PlanesOfARegionOnly) {
   const PointCloud room = Room();
   STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", 1}, room), room));
   AwaitIntegration(db(), kMap);
-  const JobInfo job = RunPlanes(db(), {{"region", "-4,-4,0,4"}});
+  const JobInfo job = EndOfJob(db(), "planes", {{"region", "-4,-4,0,4"}});
   ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel half, ModelOf(db()));
   ASSERT_THAT(half.planes, SizeIs(1));
   EXPECT_EQ(half.planes[0].kind, PlaneKind::kLevel);
   EXPECT_NEAR(half.planes[0].area_m2, 32.0, 1.5);
   for (const Eigen::Vector3d& p : half.planes[0].polygons[0].outer) EXPECT_LE(p.x(), 0.01);
-  ASSERT_EQ(RunPlanes(db(), {{"region", "-4,-4,4,4,0.5,9"}}).state, JobState::kSucceeded);
+  ASSERT_EQ(EndOfJob(db(), "planes", {{"region", "-4,-4,4,4,0.5,9"}}).state, JobState::kSucceeded);
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel wall, ModelOf(db()));
   ASSERT_THAT(wall.planes, SizeIs(1));
   EXPECT_EQ(wall.planes[0].kind, PlaneKind::kWall);
-  const JobInfo nothing = RunPlanes(db(), {{"region", "1000,1000,1010,1010"}});
+  const JobInfo nothing = EndOfJob(db(), "planes", {{"region", "1000,1000,1010,1010"}});
   ASSERT_EQ(nothing.state, JobState::kSucceeded) << nothing.message;
   EXPECT_THAT(nothing.message, HasSubstr("no point lies in the region"));
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel none, ModelOf(db()));
@@ -138,7 +126,7 @@ TEST_P(DatabaseSuite, PlanesByColourTakeScansWithColours) {
   const PointCloud grey = Room();
   STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", 1}, grey), grey));
   AwaitIntegration(db(), kMap);
-  const JobInfo refused = RunPlanes(db(), {{"colour", "1"}});
+  const JobInfo refused = EndOfJob(db(), "planes", {{"colour", "1"}});
   EXPECT_EQ(refused.state, JobState::kFailed);
   EXPECT_THAT(refused.message, HasSubstr("none of 1 scans has colours"));
   EXPECT_THAT(refused.message, HasSubstr("colour=1"));
@@ -149,7 +137,7 @@ TEST_P(DatabaseSuite, PlanesByColourTakeScansWithColours) {
   }
   STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", 2}, carpet), carpet));
   AwaitIntegration(db(), kMap);
-  const JobInfo job = RunPlanes(db(), {{"colour", "1"}});
+  const JobInfo job = EndOfJob(db(), "planes", {{"colour", "1"}});
   ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
   EXPECT_EQ(job.metrics.at("scans_without_colours"), 1.0);
   EXPECT_THAT(job.message, HasSubstr("left out 1 scans without colours"));
@@ -161,7 +149,7 @@ TEST_P(DatabaseSuite, PlanesByColourTakeScansWithColours) {
   EXPECT_NEAR(model.planes[0].area_m2, 40.0, 1.5);
   EXPECT_NEAR(model.planes[1].area_m2, 24.0, 1.5);
 
-  ASSERT_EQ(RunPlanes(db()).state, JobState::kSucceeded);
+  ASSERT_EQ(EndOfJob(db(), "planes").state, JobState::kSucceeded);
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundModel plain, ModelOf(db()));
   ASSERT_THAT(plain.planes, SizeIs(2));  // the floor, and the wall of the grey scan
   EXPECT_EQ(plain.planes[0].colour, std::nullopt);
@@ -171,7 +159,7 @@ TEST_P(DatabaseSuite, PlanesRefuseWhatIsOutOfBoundsAndEndWithTheirSink) {
   EXPECT_THAT(db().jobs().Start({}, kMap, "planes", {{"rho_m", "nan"}}),
               StatusIs(Code::kInvalidArgument, HasSubstr("rho_m")));
   PutFloor(db(), {"run", 1});
-  ASSERT_EQ(RunPlanes(db()).state, JobState::kSucceeded);
+  ASSERT_EQ(EndOfJob(db(), "planes").state, JobState::kSucceeded);
   EXPECT_THAT(db().models().GetPlaneModel(
                   {}, kMap, [](const ModelPlane&) { return absl::CancelledError("enough"); }),
               StatusIs(Code::kCancelled, HasSubstr("enough")));

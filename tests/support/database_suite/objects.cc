@@ -38,18 +38,6 @@ absl::StatusOr<FoundThings> ThingsOf(api::Database& db, const EntityQuery& query
   return things;
 }
 
-JobInfo RunObjects(api::Database& db, const JobParameters& parameters = {}) {
-  JobInfo last;
-  const auto job = db.jobs().Start({}, kMap, "objects", parameters);
-  STRATA_EXPECT_OK(job);
-  if (!job.ok()) return last;
-  STRATA_EXPECT_OK(db.jobs().Watch({}, kMap, job->id, [&last](const JobInfo& now) {
-    last = now;
-    return absl::OkStatus();
-  }));
-  return last;
-}
-
 // The front of a crate of 1 × 1 m.
 void AddCrate(float x, float y, PointCloud& cloud) {
   for (float across = 0.0F; across < 1.0F; across += 0.04F) {
@@ -79,7 +67,7 @@ TEST_P(DatabaseSuite, ThingsAreFoundAcrossScansAndKeptUntilTheNext) {
   PutCrates(db(), 1, {{-2.0F, -2.0F}, {2.0F, 1.0F}});
   PutCrates(db(), 2, {{-2.0F, -2.0F}});
   STRATA_ASSERT_OK(db().maps().SetClass({}, kMap, {kCrateClass, "crate", {200, 90, 20}}));
-  const JobInfo job = RunObjects(db());
+  const JobInfo job = EndOfJob(db(), "objects");
   ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
   EXPECT_EQ(job.metrics.at("entities"), 3.0);
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundThings things, ThingsOf(db()));
@@ -103,7 +91,7 @@ TEST_P(DatabaseSuite, ThingsAreFoundAcrossScansAndKeptUntilTheNext) {
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundThings kept, ThingsOf(db()));
   EXPECT_EQ(kept.entities[1].box, crate.box);
   EXPECT_EQ(kept.entities[1].scans, crate.scans);
-  const JobInfo again = RunObjects(db(), {{"class", "crate"}});
+  const JobInfo again = EndOfJob(db(), "objects", {{"class", "crate"}});
   ASSERT_EQ(again.state, JobState::kSucceeded) << again.message;
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundThings crates, ThingsOf(db()));
   ASSERT_THAT(crates.entities, SizeIs(2));
@@ -113,7 +101,7 @@ TEST_P(DatabaseSuite, ThingsAreFoundAcrossScansAndKeptUntilTheNext) {
 
 TEST_P(DatabaseSuite, ThingsOfAClassOrARegionAlone) {
   PutCrates(db(), 1, {{-2.0F, -2.0F}, {2.0F, 1.0F}});
-  ASSERT_EQ(RunObjects(db()).state, JobState::kSucceeded);
+  ASSERT_EQ(EndOfJob(db(), "objects").state, JobState::kSucceeded);
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundThings crates, ThingsOf(db(), {.class_id = kCrateClass}));
   EXPECT_THAT(crates.entities, SizeIs(2));
   const Eigen::AlignedBox3d east(Eigen::Vector3d(1, 0, 0.2), Eigen::Vector3d(3, 3, 3));
@@ -121,20 +109,20 @@ TEST_P(DatabaseSuite, ThingsOfAClassOrARegionAlone) {
   ASSERT_THAT(one.entities, SizeIs(1));
   EXPECT_GT(one.entities[0].box.centre.x(), 0.0);
 
-  const JobInfo nothing = RunObjects(db(), {{"region", "1000,1000,1010,1010"}});
+  const JobInfo nothing = EndOfJob(db(), "objects", {{"region", "1000,1000,1010,1010"}});
   ASSERT_EQ(nothing.state, JobState::kSucceeded) << nothing.message;
   EXPECT_THAT(nothing.message, HasSubstr("no point in the region has a class"));
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundThings none, ThingsOf(db()));
   EXPECT_THAT(none.entities, SizeIs(0));
-  const JobInfo sparse = RunObjects(db(), {{"min_points", "1000000"}});
+  const JobInfo sparse = EndOfJob(db(), "objects", {{"min_points", "1000000"}});
   EXPECT_THAT(sparse.message, HasSubstr("smaller min_points"));
 }
 
 TEST_P(DatabaseSuite, WithoutLabelsThereAreNoThingsAndTheJobSaysWhatToDo) {
-  const JobInfo empty = RunObjects(db());
+  const JobInfo empty = EndOfJob(db(), "objects");
   EXPECT_EQ(empty.state, JobState::kSucceeded) << empty.message;
   PutFloor(db(), {"run", 1});
-  const JobInfo job = RunObjects(db());
+  const JobInfo job = EndOfJob(db(), "objects");
   EXPECT_EQ(job.state, JobState::kFailed);
   EXPECT_THAT(job.message, HasSubstr("no point of 1 scans has a class"));
   EXPECT_THAT(job.message, HasSubstr("classify"));
@@ -147,7 +135,7 @@ TEST_P(DatabaseSuite, WithoutLabelsThereAreNoThingsAndTheJobSaysWhatToDo) {
 TEST_P(DatabaseSuite, WhatOnlyADeletedScanSawIsForgotten) {
   PutCrates(db(), 1, {{-2.0F, -2.0F}, {2.0F, 1.0F}});
   PutCrates(db(), 2, {{-2.0F, -2.0F}});
-  ASSERT_EQ(RunObjects(db(), {{"class", "2"}}).state, JobState::kSucceeded);
+  ASSERT_EQ(EndOfJob(db(), "objects", {{"class", "2"}}).state, JobState::kSucceeded);
   STRATA_ASSERT_OK_AND_ASSIGN(const FoundThings before, ThingsOf(db()));
   ASSERT_THAT(before.entities, SizeIs(2));
   STRATA_ASSERT_OK(db().scans().Delete({}, kMap, {"run", 1}));
@@ -161,7 +149,7 @@ TEST_P(DatabaseSuite, WhatOnlyADeletedScanSawIsForgotten) {
 
 TEST_P(DatabaseSuite, ThingsEndWithTheirSinkAndARebuildForgetsThem) {
   PutCrates(db(), 1, {{1.0F, 1.0F}});
-  ASSERT_EQ(RunObjects(db()).state, JobState::kSucceeded);
+  ASSERT_EQ(EndOfJob(db(), "objects").state, JobState::kSucceeded);
   EXPECT_THAT(db().objects().ListEntities(
                   {}, kMap, {}, [](const Entity&) { return absl::CancelledError("enough"); }),
               StatusIs(Code::kCancelled, HasSubstr("enough")));
