@@ -31,7 +31,8 @@ constexpr std::array<const char*, 9> kKinds = {
 // Whether a job may fail for want of labels, or of what other jobs make of them.
 bool MayLackLabels(absl::string_view kind, absl::string_view message) {
   if (kind == "objects") return absl::StrContains(message, "has a class");
-  return kind == "train" || kind == "classify" || kind == "complete";
+  if (kind == "complete") return absl::StrContains(message, "objects find");
+  return kind == "train" || kind == "classify";
 }
 
 // Of a scan that labels are written to; what else happens to scans leaves it alone.

@@ -356,6 +356,32 @@ class ObjectsTest(ServerTest):
         self.assertGreater(things.distances[2], 0.05)
         self.assertEqual(things.epoch, 1)
 
+    def test_what_nobody_saw_is_inferred_from_others_of_the_kind(self):
+        def side(count, step=0.05):
+            return np.arange(count + 1) * step
+        x, y, z = np.meshgrid(side(16), side(12), 0.1 + side(18), indexing="ij")
+        block = np.stack([x, y, z], axis=-1).reshape(-1, 3)
+        on_it = (block[:, :2] < 0.001).any(axis=1) | (block[:, 0] > 0.799) | (block[:, 1] > 0.599) | (block[:, 2] > 0.999)
+        block = block[on_it]
+        world = self.db.create_map("halves")
+        with self.assertRaises(strata.NotFound):
+            world.inferred()
+        points = np.concatenate([block + (2, 2, 0), block[block[:, 0] < 0.55] + (2, -3, 0)])
+        world.upload(points, labels=np.full(len(points), 2), align=False)
+        world.wait(timeout=60)
+        world.job("objects")
+        whole, part = world.objects()
+        self.assertEqual(whole.kind.id, part.kind.id)
+        self.assertEqual(world.job("complete").metrics["entities"], 2)
+        parts = world.inferred()
+        self.assertEqual([each.entity for each in parts], [whole.id, part.id])
+        self.assertEqual({each.kind for each in parts}, {whole.kind.id})
+        added = parts[1].points
+        self.assertGreater(len(added), 100)
+        self.assertTrue(((added > (2.5, -3.1, 0)) & (added < (2.9, -2.3, 1.1))).all())
+        self.assertGreater(parts[1].agreeing, 4 * parts[1].contradicting)
+        self.assertEqual(len(world.inferred(region=(1, 1, 3, 3))), 1)
+
     def test_kinds_go_into_the_library(self):
         world = self.db.create_map("kinds")
         self.assertEqual(world.kinds(), [])
