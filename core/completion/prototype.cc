@@ -46,6 +46,11 @@ bool SeenEmpty(std::span<const ShapeView> views, const Vector3i& at) {
   });
 }
 
+bool AmidEmpty(std::span<const ShapeView> views, const Vector3i& at) {
+  return std::any_of(
+      views.begin(), views.end(), [&](const ShapeView& view) { return view.IsAmidEmpty(at); });
+}
+
 // Voxels where any view measured the thing, with the mean of its means.
 std::vector<PrototypeVoxel> AnyMeasured(std::span<const ShapeView> views) {
   std::vector<PrototypeVoxel> all;
@@ -193,8 +198,8 @@ void AddImages(const MirrorPlane& plane,
   for (const PrototypeVoxel& voxel : prototype.voxels) {
     const Vector3d image = plane.Image(voxel.mean);
     const Vector3i at = VoxelOf(image / prototype.voxel_m);
-    if (!views.front().box().contains(image) || search.IsNear(at) || SeenEmpty(views, at)) continue;
-    images.push_back({at, image, 0, 0});
+    if (!views.front().box().contains(image) || search.IsNear(at)) continue;
+    if (!SeenEmpty(views, at) && !AmidEmpty(views, at)) images.push_back({at, image, 0, 0});
   }
   std::stable_sort(images.begin(), images.end(), ByPlace);
   const auto same = [](const auto& a, const auto& b) { return a.at == b.at; };
@@ -234,7 +239,8 @@ Inference InferHidden(const Prototype& prototype, const ShapeView& view) {
     }
     const ShapeSight sight = view.At(voxel.at);
     if (sight == ShapeSight::kEmpty) ++hidden.contradicting;
-    if (sight == ShapeSight::kHidden) hidden.points.push_back(voxel.mean);
+    if (sight != ShapeSight::kHidden || view.IsAmidEmpty(voxel.at)) continue;
+    hidden.points.push_back(voxel.mean);
   }
   hidden.voxels = prototype.voxels.size();
   if (!hidden.IsOfKind() || !hidden.IsSeenEnough()) hidden.points.clear();

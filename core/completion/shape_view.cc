@@ -12,6 +12,13 @@ namespace strata {
 using Eigen::Vector3d;
 using Eigen::Vector3i;
 
+namespace {
+
+// The voxel itself, 13, and the 26 around it.
+Vector3i Around(int i) { return {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1}; }
+
+}  // namespace
+
 absl::StatusOr<ShapeView> ShapeView::Over(const Eigen::AlignedBox3d& box, double voxel_m) {
   if (!(voxel_m >= 0.005 && voxel_m <= 1.0)) {
     return absl::InvalidArgumentError(
@@ -83,9 +90,17 @@ bool ShapeView::IsThing(const Vector3i& voxel) const {
 
 bool ShapeView::IsNear(const Vector3i& voxel) const {
   for (int i = 0; i < 27; ++i) {
-    if (IsThing(voxel + Vector3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1))) return true;
+    if (IsThing(voxel + Around(i))) return true;
   }
   return false;
+}
+
+bool ShapeView::IsAmidEmpty(const Vector3i& voxel) const {
+  int empty = 0;
+  for (int i = 0; i < 27; ++i) {
+    empty += i != 13 && At(voxel + Around(i)) == ShapeSight::kEmpty ? 1 : 0;
+  }
+  return 3 * empty >= 2 * 26;
 }
 
 ShapeSight ShapeView::At(const Vector3i& voxel) const {

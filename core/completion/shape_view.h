@@ -59,6 +59,8 @@ class ShapeView {
   ShapeSight At(const Eigen::Vector3i& voxel) const;
   // Whether the thing was measured in it or next to it: poses err by some centimetres.
   bool IsNear(const Eigen::Vector3i& voxel) const;
+  // Whether rays went through two thirds of the 26 around it: between them it was only missed.
+  bool IsAmidEmpty(const Eigen::Vector3i& voxel) const;
 
  private:
   struct Sum {

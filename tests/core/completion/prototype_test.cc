@@ -186,6 +186,21 @@ TEST(PrototypeTest, WhatIsSymmetricIsCompletedByItsImage) {
   }
 }
 
+// Nor is all of a symmetric thing: what stands out on one side is not put on the other.
+TEST(PrototypeTest, AnImageIsNotPutWhereRaysWent) {
+  Scene with_locker;
+  with_locker.thing.push_back(Box({-0.3, 0.9, 0.5}, {0.3, 1.2, 0.9}));
+  std::vector<ShapeView> views;
+  views.push_back(SeenFrom({kLeft, kFront, kRight}, with_locker));
+  const auto prototype = BuildPrototype(views, Stop());
+  STRATA_ASSERT_OK(prototype.status());
+  ASSERT_TRUE(prototype->mirror.has_value());
+  EXPECT_NEAR(std::abs(std::sin(prototype->mirror->heading_rad)), 1.0, 0.001);
+  for (const PrototypeVoxel& voxel : prototype->voxels) {
+    EXPECT_GT(voxel.mean.y(), -1.0) << voxel.mean.transpose();
+  }
+}
+
 // One whose other side was seen to be different is none.
 TEST(PrototypeTest, WhatRaysContradictIsNotSymmetric) {
   Scene lorry;
