@@ -54,6 +54,7 @@ build() {
 
 start_server() {
   step "server"
+  : >"$work/listening" # it is read before a busy machine lets the server open it
   stratad --data "$work/data" --listen 127.0.0.1:0 --optimize-every 0 >"$work/listening" 2>"$out/stratad.log" &
   server=$!
   local address=

@@ -60,7 +60,7 @@ stage "README"
 stage "recorded data through a real server"
 /usr/bin/python3 tests/experiments/real_data.py --build build/release || [[ $? == 77 ]]
 
-stage "clang: sanitized builds, fuzzers, warnings and thread-safety analysis of the rest"
+stage "clang: sanitized builds, fuzzers"
 end_clang
 
 stage "sanitizers"

@@ -7,6 +7,7 @@ target_compile_options(
   strata_build_options
   INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
             -ffp-contract=off # derived bytes must not depend on whether a machine fuses a · b + c
+            -ffile-prefix-map=${PROJECT_SOURCE_DIR}/= # so that every checkout compiles to the same, once (ccache)
             $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety> $<$<BOOL:${STRATA_WARNINGS_AS_ERRORS}>:-Werror>
 )
 set(STRATA_SANITIZER_KIND "")
@@ -114,11 +115,13 @@ function(strata_library name)
   endif()
 endfunction()
 
+set(STRATA_SHARED_HEADERS strata_large_headers) # of the folder's programs
+
 # strata_executable(NAME OUTPUT SOURCES... DEPS... [SHARED_HEADERS NAME of strata_shared_headers])
 function(strata_executable name output)
   cmake_parse_arguments(ARG "" "SHARED_HEADERS" "SOURCES;DEPS" ${ARGN})
   if(NOT ARG_SHARED_HEADERS)
-    set(ARG_SHARED_HEADERS strata_large_headers)
+    set(ARG_SHARED_HEADERS ${STRATA_SHARED_HEADERS})
   endif()
   add_executable(${name} ${ARG_SOURCES})
   set_target_properties(${name} PROPERTIES OUTPUT_NAME ${output})
