@@ -24,7 +24,6 @@ namespace {
 // Its pose may come after a cloud.
 constexpr absl::Duration kPoseMayCome = absl::Seconds(1);
 constexpr absl::Duration kPosePause = absl::Milliseconds(10);
-constexpr absl::Duration kRetryAfter = absl::Seconds(1);
 constexpr absl::Duration kLeastPause = absl::Milliseconds(100);
 constexpr absl::Duration kMostPause = absl::Seconds(1);
 constexpr double kMovedM = 0.1;

@@ -17,11 +17,6 @@
 #include "core/world/scan.h"
 
 namespace strata::ros2 {
-namespace {
-
-constexpr absl::Duration kRetryAfter = absl::Seconds(1);
-
-}  // namespace
 
 std::string NobodyAnswers(const std::string& server, bool scans) {
   return absl::StrCat(

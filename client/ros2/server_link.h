@@ -11,6 +11,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
 
 #include "client/cli/terminal/server_options.h"
 #include "client/ros2/talk.h"
@@ -22,6 +23,10 @@
 #include "core/geometry/pose.h"
 
 namespace strata::ros2 {
+
+// How long a server that failed is left alone. Jittered backoff is for fleets that call; this is one
+// robot that asks whether it is back.
+inline constexpr absl::Duration kRetryAfter = absl::Seconds(1);
 
 // What is said while no server answers, of scans that wait if there are any.
 std::string NobodyAnswers(const std::string& server, bool scans);

@@ -25,14 +25,12 @@
 #include "core/engine/doors/backup.h"
 #include "core/engine/doors/map_stats.h"
 #include "core/engine/doors/map_watch.h"
+#include "core/engine/map/engine_options.h"
 #include "core/world/job_kinds.h"
 #include "core/world/names.h"
 
 namespace strata {
 namespace {
-
-// Between two tries to open a map.
-constexpr absl::Duration kRetryDelay = absl::Seconds(1);
 
 // Whether it was no fault of the file that it did not open.
 bool MayOpenLater(const absl::Status& status) {

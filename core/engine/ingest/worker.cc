@@ -18,13 +18,12 @@
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/common/this_thread.h"
+#include "core/engine/map/engine_options.h"
 
 namespace strata {
 namespace {
 
 constexpr absl::Duration kStopPoll = absl::Milliseconds(50);
-// After an error of the store (a full disk, say): how long until the next try.
-constexpr absl::Duration kRetryDelay = absl::Seconds(1);
 // So often a scan is tried again alone when there was no memory.
 constexpr int kMemoryTries = 10;
 

@@ -19,14 +19,13 @@
 #include "core/common/this_thread.h"
 #include "core/engine/jobs/job_handlers.h"
 #include "core/engine/labels/fade.h"
+#include "core/engine/map/engine_options.h"
 #include "core/world/job_arguments.h"
 #include "core/world/job_kinds.h"
 
 namespace strata {
 namespace {
 
-// After an error of the store (a full disk, say): how long until the next try.
-constexpr absl::Duration kRetryDelay = absl::Seconds(1);
 // Who starts jobs that nobody asked for.
 constexpr absl::string_view kServer = "server";
 

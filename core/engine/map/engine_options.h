@@ -11,6 +11,9 @@
 
 namespace strata {
 
+// How long the store is left alone after an error of it (a full disk, say), until the next try.
+inline constexpr absl::Duration kRetryDelay = absl::Seconds(1);
+
 struct EngineOptions {
   // Where the maps lie, one file each; made if it is not there. Owned by one engine at a time.
   std::filesystem::path directory;
