@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
 #include <tuple>
 #include <utility>
@@ -119,8 +120,10 @@ class MirrorSearch {
   }
 
  private:
+  enum class Empty : std::uint8_t { kNotAsked, kNo, kYes };
   struct Node {
     bool near = false;  // something was measured in it or next to it
+    Empty empty = Empty::kNotAsked;
     Eigen::Vector3f mean = Eigen::Vector3f::Constant(1e9F);  // in it
   };
 
@@ -129,6 +132,14 @@ class MirrorSearch {
     for (int i = 0; i < 27; ++i) visit(at + Vector3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
   }
   Node& At(const Vector3i& at) { return nodes_.FindOrAdd(BlockOf(at))[NodeInBlock(at)]; }
+
+  // Asks every view once: thousands of planes are tried.
+  bool IsEmpty(const Vector3d& image, const Vector3i& at) {
+    if (!views_.front().box().contains(image)) return false;
+    Empty& empty = At(at).empty;
+    if (empty == Empty::kNotAsked) empty = SeenEmpty(views_, at) ? Empty::kYes : Empty::kNo;
+    return empty == Empty::kYes;
+  }
 
   double Along(double heading_rad) const {
     return std::cos(heading_rad) * middle_.x() + std::sin(heading_rad) * middle_.y();
@@ -167,8 +178,10 @@ class MirrorSearch {
       if (IsNear(at)) {
         ++agreeing;
         score += fine ? Nearness(image, at) : 1.0;
-      } else if (SeenEmpty(views_, at)) {
+      } else if (IsEmpty(image, at)) {
         ++contradicting;
+        // Whatever else agrees.
+        if (kAgreeingPerContradicting * contradicting > samples_.size()) return;
       }
     }
     if (static_cast<double>(agreeing) < kLeastAgreement * static_cast<double>(samples_.size()) ||

@@ -8,6 +8,7 @@
 #include "absl/status/status.h"
 
 #include "core/common/status.h"
+#include "core/completion/beams_by_azimuth.h"
 #include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/scan_share.h"
 #include "core/engine/scans/scan_source.h"
@@ -61,29 +62,20 @@ class ViewReader {
     ScanSource source(*reader, parameters);
     return source.ForEachBlock(posed.scan, [&](const PointCloud& block) -> absl::Status {
       PointCloud lasting;
-      if (!source.faded().empty()) lasting = Lasting(block, source.faded());
+      if (!source.faded().empty()) {
+        lasting = PointsOf(block, [&](std::size_t i) { return source.faded()[i] == 0; });
+      }
       const PointCloud& cloud = source.faded().empty() ? block : lasting;
+      const BeamsByAzimuth beams(cloud, posed.pose->T_map_scan);
       for (const std::size_t i : seen) {
-        STRATA_RETURN_IF_ERROR(AddTo(i, cloud, posed.pose->T_map_scan, sensor, stop));
+        const PointCloud part = beams.Towards(out_.views[i].box(), things_[i].kind->T_map_kind);
+        STRATA_RETURN_IF_ERROR(AddTo(i, part, posed.pose->T_map_scan, sensor, stop));
       }
       return absl::OkStatus();
     });
   }
 
  private:
-  // Without the points that have faded.
-  static PointCloud Lasting(const PointCloud& block, const std::vector<std::uint16_t>& faded) {
-    PointCloud cloud;
-    cloud.origin = block.origin;
-    cloud.sensor_origin = block.sensor_origin;
-    for (std::size_t i = 0; i < block.size(); ++i) {
-      if (faded[i] != 0) continue;
-      cloud.points.push_back(block.points[i]);
-      if (!block.label.empty()) cloud.label.push_back(block.label[i]);
-    }
-    return cloud;
-  }
-
   absl::Status AddTo(std::size_t i,
                      const PointCloud& cloud,
                      const Pose& T_map_scan,
