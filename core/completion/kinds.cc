@@ -78,6 +78,12 @@ struct Match {
   KindFit fit;
 };
 
+// Where a thing of a kind is.
+struct Placed {
+  std::size_t reference = 0;
+  Pose T_map_kind = Pose::Identity();
+};
+
 // The kinds of one class.
 class ClassSorter {
  public:
@@ -112,7 +118,7 @@ class ClassSorter {
       SortPart(thing);
       STRATA_RETURN_IF_ERROR(done_(1));
     }
-    return absl::OkStatus();
+    return JoinPieces();
   }
 
   // Of entities by index.
@@ -138,6 +144,10 @@ class ClassSorter {
   void SortPart(const Candidate& thing);
   // The kind that a reference, and the one that is like it, are parts of.
   std::optional<Match> WholeOf(const Reference& reference, std::optional<Match>& other) const;
+  // Of a thing that something hides the middle of, there are several entities; what of them is
+  // small looks like a part of many kinds. It is where the larger ones say that the thing is.
+  absl::Status JoinPieces();
+  std::optional<Match> PieceOf(const Candidate& thing, const std::vector<Placed>& placed) const;
   void Assign(std::size_t entity, const Match& match);
 
   std::span<const FoundEntity> entities_;
@@ -289,6 +299,58 @@ void ClassSorter::SortPart(const Candidate& thing) {
   reference.dropped = true;
   Assign(thing.entity, *match);
   if (other.has_value()) Assign(reference.members[0], *other);
+}
+
+std::optional<Match> ClassSorter::PieceOf(const Candidate& thing,
+                                          const std::vector<Placed>& placed) const {
+  std::optional<Match> best;
+  std::unique_ptr<ThingPoints> points;
+  Pose T_map_thing = Pose::Identity();
+  for (const Placed& whole : placed) {
+    const KindModel& model = *references_[whole.reference].model;
+    const Eigen::Vector3d middle = whole.T_map_kind.inverse() * entities_[thing.entity].box.centre;
+    if (!model.thing().bounds().contains(middle.cast<float>())) continue;
+    if (points == nullptr) points = PointsOf(thing, T_map_thing);
+    if (points == nullptr) return std::nullopt;
+    const Pose T_kind_thing = whole.T_map_kind.inverse() * T_map_thing;
+    const std::optional<KindFit> fit = model.Register(*points, {{T_kind_thing}});
+    if (!fit.has_value() || fit->overlap < options_.min_overlap ||
+        fit->residual_m > options_.max_residual * model.tolerance_m()) {
+      continue;
+    }
+    const Pose moved = T_kind_thing.inverse() * fit->T_kind_thing;
+    if (moved.translation().norm() > 2.0 * model.tolerance_m()) continue;
+    const double badness = fit->Badness(model.tolerance_m());
+    if (best.has_value() && badness >= best->fit.Badness(model.tolerance_m())) continue;
+    best = {whole.reference, *fit};
+  }
+  return best;
+}
+
+absl::Status ClassSorter::JoinPieces() {
+  std::vector<Placed> placed;
+  for (const Candidate& thing : things_) {
+    STRATA_RETURN_IF_ERROR(stop_.status());
+    const auto own = own_.find(thing.entity);
+    if (own != own_.end() && !references_[own->second].members.empty() &&
+        !references_[own->second].dropped) {
+      placed.push_back({own->second, references_[own->second].T_map_model});
+      continue;
+    }
+    const std::optional<Match> whole = PieceOf(thing, placed);
+    auto match = matches_.find(thing.entity);
+    if (whole.has_value()) {
+      if (match != matches_.end())
+        std::erase(references_[match->second.reference].members, thing.entity);
+      Assign(thing.entity, *whole);
+      match = matches_.find(thing.entity);
+    }
+    if (match == matches_.end()) continue;
+    placed.push_back(
+        {match->second.reference,
+         BaseFrameOf(entities_[thing.entity].box) * match->second.fit.T_kind_thing.inverse()});
+  }
+  return absl::OkStatus();
 }
 
 // Gathers the kinds of all classes.

@@ -123,6 +123,45 @@ TEST(KindsTest, AThingThatIsLikeNoOtherHasNone) {
   for (const auto& kind : sorted.of_entity) EXPECT_FALSE(kind.has_value());
 }
 
+// A tree stands before the middle of a window: what is to the right of it looks like a small one.
+TEST(KindsTest, PiecesOfOneThingAreOfItsKindAndInItsPlace) {
+  const auto box = [](double x0, double y0, double z0, double x1, double y1, double z1) {
+    return Eigen::AlignedBox3d(Eigen::Vector3d(x0, y0, z0), Eigen::Vector3d(x1, y1, z1));
+  };
+  const testing::Solid large = {box(-0.95, -0.1, 0.0, 0.95, 0.1, 1.5),
+                                box(-1.0, -0.25, 0.0, 1.0, -0.1, 0.1)};
+  const testing::Solid small = {box(-0.3, -0.1, 0.0, 0.3, 0.1, 0.5),
+                                box(-0.35, -0.25, 0.0, 0.35, -0.1, 0.1)};
+  std::mt19937_64 random(7);
+  PlantedOptions options;
+  options.noise_m = 0.005;
+  std::vector<FoundEntity> entities;
+  const auto put = [&](const testing::Solid& solid, const Eigen::Vector3d& at, const auto& sees) {
+    std::vector<Eigen::Vector3d> points;
+    for (const Eigen::Vector3d& p : testing::SeenOf(solid, /*partial=*/false, options, random)) {
+      if (sees(p)) points.push_back(p + at);
+    }
+    entities.push_back(testing::EntityOf(1, points));
+  };
+  const auto all = [](const Eigen::Vector3d&) { return true; };
+  for (int k = 0; k < 4; ++k) {
+    put(large, {3.0 * k, 0.0, 2.0}, all);
+    put(small, {3.0 * k, 0.0, 0.5}, all);
+  }
+  const Eigen::Vector3d hidden(12.0, 0.0, 2.0);
+  put(large, hidden, [](const Eigen::Vector3d& p) { return p.x() < 0.1; });
+  put(large, hidden, [](const Eigen::Vector3d& p) { return p.x() > 0.4 && p.z() < 0.5; });
+  const SortedKinds sorted = Sort(entities);
+  EXPECT_THAT(sorted.found, SizeIs(2));
+  ASSERT_TRUE(sorted.of_entity[0] && sorted.of_entity[8] && sorted.of_entity[9]);
+  EXPECT_EQ(sorted.of_entity[8]->id, sorted.of_entity[0]->id);
+  EXPECT_EQ(sorted.of_entity[9]->id, sorted.of_entity[0]->id);
+  EXPECT_LT((sorted.of_entity[8]->T_map_kind.translation() -
+             sorted.of_entity[9]->T_map_kind.translation())
+                .norm(),
+            0.1);
+}
+
 TEST(KindsTest, OrderOfPointsDoesNotMatterAndTheSameComesOutAgain) {
   const std::vector<PlantedThing> things = PlantThings(PlantedClasses(), {.of_each = 2}, 5);
   std::vector<FoundEntity> entities = EntitiesOf(things);
