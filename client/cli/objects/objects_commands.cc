@@ -119,6 +119,11 @@ absl::Status ExportInferred(Context& context, const ObjectsOptions& options) {
                                         {.region = options.region, .kind = options.kind},
                                         options.class_name));
   STRATA_RETURN_IF_ERROR(WriteInferred(options.out, fetched));
+  Json exported = {{"file", options.out},
+                   {"points", fetched.points},
+                   {"entities", fetched.parts.size()},
+                   {"epoch", fetched.info.epoch},
+                   {"stale", fetched.stale}};
   Json parts = Json::array();
   for (const InferredPart& part : fetched.parts) {
     parts.push_back({{"entity", part.entity},
@@ -127,11 +132,9 @@ absl::Status ExportInferred(Context& context, const ObjectsOptions& options) {
                      {"agreeing", part.agreeing},
                      {"contradicting", part.contradicting}});
   }
-  context.output.Object({{"file", options.out},
-                         {"points", fetched.points},
-                         {"epoch", fetched.info.epoch},
-                         {"stale", fetched.stale},
-                         {"parts", std::move(parts)}});
+  // Hundreds, which nobody reads on a line.
+  if (context.output.json()) exported["parts"] = std::move(parts);
+  context.output.Object(exported);
   return absl::OkStatus();
 }
 

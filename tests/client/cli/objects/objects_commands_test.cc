@@ -15,7 +15,9 @@ namespace {
 
 using ::strata::testing::StatusIs;
 using ::testing::_;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using Code = absl::StatusCode;
 
 class ObjectsCommandsTest : public CommandsTest {
@@ -126,6 +128,8 @@ TEST_F(ObjectsCommandsTest, WhatWasInferredIsWritten) {
   EXPECT_EQ(ply["stale"], false);
   EXPECT_EQ(ply["parts"][0]["kind"], "abcdef012345");
   EXPECT_EQ(ply["parts"][0]["agreeing"], 40);
+  EXPECT_EQ(ply["entities"], 1);
+  EXPECT_THAT(RunText(write(".ply")), AllOf(HasSubstr("entities"), Not(HasSubstr("agreeing"))));
   STRATA_ASSERT_OK_AND_ASSIGN(const std::string text, ReadFileBytes(out + ".ply"));
   EXPECT_THAT(text, HasSubstr("element vertex 2"));
   now_ = 3;
