@@ -1,9 +1,7 @@
 // Classifiers learn from and label a map that robots upload to, and the server is killed under
 // them.
-#include <csignal>
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <random>
 #include <string>
 #include <vector>
@@ -13,13 +11,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/sdk/client.h"
 #include "core/common/status.h"
-#include "tests/integration/stratad_process.h"
+#include "tests/integration/killed_server.h"
 #include "tests/support/asked.h"
 #include "tests/support/simulator/park.h"
 #include "tests/support/status_matchers.h"
-#include "tests/support/temp_dir.h"
 
 namespace strata::testing {
 namespace {
@@ -33,17 +29,10 @@ struct Outcome {
   std::string digest;
 };
 
-// One server on a folder of its own.
-class World {
+class World : public KilledServer {
  public:
-  World() { Start(); }
+  World() : KilledServer(kMap) {}
 
-  api::Database& db() { return *client_; }
-  void Kill() {
-    process_->Signal(SIGKILL);
-    EXPECT_EQ(process_->Wait(), -SIGKILL);
-    Start();
-  }
   // Every second of the first scans is labelled.
   absl::Status Put(std::uint64_t i) {
     PointCloud park = MakePark(i);
@@ -58,20 +47,6 @@ class World {
     STRATA_ASSIGN_OR_RETURN(const auto upload, db().scans().Upload({}, kMap, header));
     STRATA_RETURN_IF_ERROR(upload->Write(park));
     return upload->Finish().status();
-  }
-  JobInfo Follow(std::uint64_t id) {
-    JobInfo last;
-    STRATA_EXPECT_OK(db().jobs().Watch({}, kMap, id, [&last](const JobInfo& now) {
-      last = now;
-      return absl::OkStatus();
-    }));
-    EXPECT_EQ(last.state, JobState::kSucceeded) << last.kind << ": " << last.message;
-    return last;
-  }
-  JobInfo Run(const std::string& kind, const std::map<std::string, std::string>& parameters) {
-    const auto job = db().jobs().Start({}, kMap, kind, parameters);
-    STRATA_EXPECT_OK(job);
-    return job.ok() ? Follow(job->id) : JobInfo();
   }
   // A map of the first scans and a classifier of them.
   void Prepare() {
@@ -103,34 +78,13 @@ class World {
         return absl::OkStatus();
       }));
     }
-    while (true) {
-      const auto stats = db().maps().Stats({}, kMap);
-      STRATA_EXPECT_OK(stats);
-      if (!stats.ok() || stats->scans_pending == 0) {
-        outcome.digest = stats.ok() ? stats->content_digest : "";
-        break;
-      }
-      absl::SleepFor(absl::Milliseconds(5));
-    }
-    Run("verify", {});
+    AwaitIntegrated();
+    const auto stats = db().maps().Stats({}, kMap);
+    STRATA_EXPECT_OK(stats);
+    if (stats.ok()) outcome.digest = stats->content_digest;
+    Run("verify");
     return outcome;
   }
-
- private:
-  void Start() {
-    process_ = std::make_unique<StratadProcess>(
-        std::vector<std::string>{"--data", data_, "--listen", "127.0.0.1:0"});
-    ClientOptions options;
-    options.target = process_->Address();
-    auto client = Connect(options);
-    STRATA_EXPECT_OK(client);
-    if (client.ok()) client_ = *std::move(client);
-  }
-
-  TempDir directory_;
-  const std::string data_ = (directory_.path() / "maps").string();
-  std::unique_ptr<StratadProcess> process_;
-  std::unique_ptr<api::Database> client_;
 };
 
 class ClassifyCrashTest : public ::testing::Test {
