@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Strata's tests: installs what they need, builds, checks and runs them. A second run skips what is there.
 #   tests/run.sh            everything the gate runs
-#   tests/run.sh --full     also clang-tidy, a whole build by clang, every header alone (an hour more)
+#   tests/run.sh --full     also clang's warnings of all, clang-tidy, a whole build by clang, every header alone (an hour more)
 # Recorded data are read from $STRATA_DATA (default ../shared/data); tests that need them skip where they are absent.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -70,6 +70,9 @@ stage "fuzzers"
 tests/fuzz/run.sh 60
 
 if [[ "${1:-}" == --full ]]; then
+  stage "clang's warnings and thread-safety analysis of the whole product"
+  python3 tests/check_clang.py
+
   stage "clang-tidy"
   python3 tests/check_clang.py --tidy
 
