@@ -25,6 +25,11 @@ struct KindFit {
   double Badness(double tolerance_m) const {
     return residual_m / tolerance_m + 2.0 * (1.0 - overlap) + 0.5 * (1.0 - cover);
   }
+  // The same of a thing that was seen in part: what it lacks may be hidden, but what of it lies
+  // beside the kind says that it is of another.
+  double BadnessOfPart(double tolerance_m) const {
+    return residual_m / tolerance_m + 6.0 * (1.0 - overlap) + 0.1 * (1.0 - cover);
+  }
 };
 
 // Where a thing may stand on a kind before it is registered.

@@ -27,6 +27,9 @@ constexpr std::size_t kMostWhole = 8;       // that it may be a part of, by voxe
 constexpr std::size_t kMostRegistered = 3;
 // Others that a reference may have and be a part of another kind all the same, with them.
 constexpr std::size_t kMostLikeParts = 1;
+// Of a thing that is of a kind so much lies on it; another kind has to be so much less bad.
+constexpr double kSurelyOn = 0.98;
+constexpr double kClearlyBetter = 0.1;
 constexpr double kMostFeatureDistance = 3.0;  // of kinds that are alike, in standard deviations
 // Standard deviations are not taken for smaller, or noise would part what is alike.
 const Eigen::Array3d kLeastDeviation(0.3, 0.08, 0.1);
@@ -138,10 +141,14 @@ class ClassSorter {
   std::vector<std::size_t> NearestOf(const Candidate& thing, std::size_t most, Takes takes) const;
   std::optional<Match> BestOf(const ThingPoints& points,
                               const std::vector<std::size_t>& nearest,
-                              KindStarts starts) const;
-  bool Accepts(const Reference& reference, const KindFit& fit, KindStarts starts) const;
+                              KindStarts starts,
+                              double min_cover) const;
+  bool Accepts(const Reference& reference, const KindFit& fit, double min_cover) const;
   void SortAlike(const Candidate& thing);
   void SortPart(const Candidate& thing);
+  // One that is as large as what it was taken for, and sticks out: is it rather a part of a larger
+  // kind?
+  void SortAnew(const Candidate& thing);
   // The kind that a reference, and the one that is like it, are parts of.
   std::optional<Match> WholeOf(const Reference& reference, std::optional<Match>& other) const;
   // Of a thing that something hides the middle of, there are several entities; what of them is
@@ -209,16 +216,15 @@ std::vector<std::size_t> ClassSorter::NearestOf(const Candidate& thing,
   return indexes;
 }
 
-bool ClassSorter::Accepts(const Reference& reference, const KindFit& fit, KindStarts starts) const {
-  const double cover =
-      starts == KindStarts::kCentred ? options_.min_cover : options_.min_part_cover;
-  return fit.overlap >= options_.min_overlap && fit.cover >= cover &&
+bool ClassSorter::Accepts(const Reference& reference, const KindFit& fit, double min_cover) const {
+  return fit.overlap >= options_.min_overlap && fit.cover >= min_cover &&
          fit.residual_m <= options_.max_residual * reference.model->tolerance_m();
 }
 
 std::optional<Match> ClassSorter::BestOf(const ThingPoints& points,
                                          const std::vector<std::size_t>& nearest,
-                                         KindStarts starts) const {
+                                         KindStarts starts,
+                                         double min_cover) const {
   struct Tried {
     std::size_t reference = 0;
     std::vector<KindModel::Start> starts;
@@ -236,11 +242,14 @@ std::optional<Match> ClassSorter::BestOf(const ThingPoints& points,
   for (const Tried& one : tried) {
     const Reference& reference = references_[one.reference];
     const std::optional<KindFit> fit = reference.model->Register(points, one.starts);
-    if (!fit.has_value() || !Accepts(reference, *fit, starts)) continue;
+    if (!fit.has_value() || !Accepts(reference, *fit, min_cover)) continue;
     // What the library has goes before what is found.
     const auto badness = [&](const Match& match) {
       const Reference& of = references_[match.reference];
-      return std::make_pair(of.id == 0, match.fit.Badness(of.model->tolerance_m()));
+      const double tolerance_m = of.model->tolerance_m();
+      return std::make_pair(of.id == 0,
+                            starts == KindStarts::kCentred ? match.fit.Badness(tolerance_m)
+                                                           : match.fit.BadnessOfPart(tolerance_m));
     };
     const Match match{one.reference, *fit};
     if (!best.has_value() || badness(match) < badness(*best)) best = match;
@@ -259,7 +268,8 @@ void ClassSorter::SortAlike(const Candidate& thing) {
   if (points == nullptr) return;
   const auto nearest = NearestOf(
       thing, kMostAlike, [&](const Reference& reference) { return IsAlike(thing, reference); });
-  const std::optional<Match> match = BestOf(*points, nearest, KindStarts::kCentred);
+  const std::optional<Match> match =
+      BestOf(*points, nearest, KindStarts::kCentred, options_.min_cover);
   if (match.has_value()) return Assign(thing.entity, *match);
   if (own_.size() == kMostModels) return;
   Reference reference;
@@ -279,18 +289,42 @@ std::optional<Match> ClassSorter::WholeOf(const Reference& reference,
     return (!pair || more) && MayBePartOf(reference.of, whole);
   });
   const std::optional<Match> match =
-      BestOf(reference.model->thing(), nearest, KindStarts::kSideOnSide);
+      BestOf(reference.model->thing(), nearest, KindStarts::kSideOnSide, options_.min_part_cover);
   if (!match.has_value() || !pair) return match;
   Pose T_map_other = Pose::Identity();
   const auto points =
       PointsOf(CandidateOf(entities_[reference.members[0]], reference.members[0]), T_map_other);
-  other = BestOf(*points, {match->reference}, KindStarts::kSideOnSide);
+  // It is the smaller of both.
+  other =
+      BestOf(*points, {match->reference}, KindStarts::kSideOnSide, 0.5 * options_.min_part_cover);
   return other.has_value() ? match : std::nullopt;
+}
+
+void ClassSorter::SortAnew(const Candidate& thing) {
+  const auto match = matches_.find(thing.entity);
+  if (match == matches_.end() || match->second.fit.overlap >= kSurelyOn) return;
+  Reference& taken = references_[match->second.reference];
+  if (taken.id != 0) return;
+  Pose T_map_thing = Pose::Identity();
+  const std::unique_ptr<ThingPoints> points = PointsOf(thing, T_map_thing);
+  const auto nearest = NearestOf(thing, kMostWhole, [&](const Reference& whole) {
+    return &whole != &taken && !whole.members.empty() && MayBePartOf(thing, whole);
+  });
+  const std::optional<Match> part =
+      BestOf(*points, nearest, KindStarts::kSideOnSide, options_.min_part_cover);
+  if (!part.has_value()) return;
+  const double tolerance_m = taken.model->tolerance_m();
+  if (part->fit.BadnessOfPart(tolerance_m) + kClearlyBetter >=
+      match->second.fit.BadnessOfPart(tolerance_m)) {
+    return;
+  }
+  std::erase(taken.members, thing.entity);
+  Assign(thing.entity, *part);
 }
 
 void ClassSorter::SortPart(const Candidate& thing) {
   const auto own = own_.find(thing.entity);
-  if (own == own_.end()) return;
+  if (own == own_.end()) return SortAnew(thing);
   Reference& reference = references_[own->second];
   if (reference.members.size() > kMostLikeParts) return;
   std::optional<Match> other;
@@ -320,8 +354,8 @@ std::optional<Match> ClassSorter::PieceOf(const Candidate& thing,
     }
     const Pose moved = T_kind_thing.inverse() * fit->T_kind_thing;
     if (moved.translation().norm() > 2.0 * model.tolerance_m()) continue;
-    const double badness = fit->Badness(model.tolerance_m());
-    if (best.has_value() && badness >= best->fit.Badness(model.tolerance_m())) continue;
+    const double badness = fit->BadnessOfPart(model.tolerance_m());
+    if (best.has_value() && badness >= best->fit.BadnessOfPart(model.tolerance_m())) continue;
     best = {whole.reference, *fit};
   }
   return best;
