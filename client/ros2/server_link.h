@@ -24,8 +24,8 @@
 
 namespace strata::ros2 {
 
-// How long a server that failed is left alone. Jittered backoff is for fleets that call; this is one
-// robot that asks whether it is back.
+// How long a server that failed is left alone. Jittered backoff is for fleets that call; this is
+// one robot that asks whether it is back.
 inline constexpr absl::Duration kRetryAfter = absl::Seconds(1);
 
 // What is said while no server answers, of scans that wait if there are any.
