@@ -8,8 +8,8 @@
 #include "absl/random/random.h"
 #include "absl/time/clock.h"
 
+#include "core/common/retry_delay.h"
 #include "core/common/steady_time.h"
-#include "proto/translate/status.h"
 
 namespace strata::sdk {
 namespace {
@@ -30,7 +30,7 @@ Backoff::Backoff(const BackoffOptions& options, std::function<double()> uniform)
 Backoff::Backoff(const BackoffOptions& options) : Backoff(options, DrawByChance()) {}
 
 std::optional<absl::Duration> Backoff::NextPause(const absl::Status& status) {
-  const std::optional<absl::Duration> asked = translate::RetryDelayOf(status);
+  const std::optional<absl::Duration> asked = RetryDelayOf(status);
   // A server that ends cancels what comes in last; what the caller cancelled, Wait() sees by
   // `stop`.
   const bool gone = absl::IsUnavailable(status) || absl::IsCancelled(status);

@@ -7,16 +7,13 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
 namespace strata {
 
-// `status` with `where` and ": " in front of its message; an OK status stays as it is.
-inline absl::Status Annotate(const absl::Status& status, absl::string_view where) {
-  if (status.ok()) return status;
-  return absl::Status(status.code(), absl::StrCat(where, ": ", status.message()));
-}
+// `status` with `where` and ": " in front of its message, and its payloads; an OK status stays as
+// it is.
+absl::Status Annotate(const absl::Status& status, absl::string_view where);
 
 }  // namespace strata
 

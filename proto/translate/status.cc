@@ -8,25 +8,27 @@
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/time/time.h"
+
+#include "core/common/retry_delay.h"
 
 namespace strata::translate {
 namespace {
 
 constexpr char kDetailUrl[] = "type.googleapis.com/strata.v1.ErrorDetail";
 constexpr char kRequestId[] = "request_id";
-constexpr char kRetryDelay[] = "retry_delay_ms";
-constexpr int kDefaultRetryDelayMs = 200;
+constexpr char kDelay[] = "retry_delay_ms";
+constexpr absl::Duration kDefaultDelay = absl::Milliseconds(200);
 
 v1::ErrorDetail DetailToSend(const absl::Status& status, absl::string_view request_id) {
   v1::ErrorDetail detail = DetailOf(status).value_or(v1::ErrorDetail());
   if (detail.reason().empty()) detail.set_reason(std::string(kDatabaseReason));
   auto& metadata = *detail.mutable_metadata();
   metadata[kRequestId] = std::string(request_id);
+  std::optional<absl::Duration> delay = RetryDelayOf(status);
   const bool passes = absl::IsResourceExhausted(status) || absl::IsUnavailable(status);
-  if (passes && detail.reason() != kRequestReason) {
-    // insert() keeps a delay that is already there.
-    metadata.insert({kRetryDelay, absl::StrCat(kDefaultRetryDelayMs)});
-  }
+  if (!delay.has_value() && passes && detail.reason() != kRequestReason) delay = kDefaultDelay;
+  if (delay.has_value()) metadata[kDelay] = absl::StrCat(absl::ToInt64Milliseconds(*delay));
   return detail;
 }
 
@@ -46,6 +48,16 @@ bool IsDroppedStream(const grpc::Status& status) {
          status.error_details().empty() && absl::StrContains(status.error_message(), "RST_STREAM");
 }
 
+// `status` with what a peer sent of it.
+absl::Status WithSent(absl::Status status, const v1::ErrorDetail& detail) {
+  const auto delay = detail.metadata().find(kDelay);
+  std::int64_t ms = 0;
+  if (delay != detail.metadata().end() && absl::SimpleAtoi(delay->second, &ms) && ms >= 0) {
+    status = WithRetryDelay(std::move(status), absl::Milliseconds(ms));
+  }
+  return WithDetail(std::move(status), detail);
+}
+
 }  // namespace
 
 absl::Status WithDetail(absl::Status status, const v1::ErrorDetail& detail) {
@@ -60,31 +72,11 @@ absl::Status WithReason(absl::Status status, absl::string_view reason) {
   return WithDetail(std::move(status), detail);
 }
 
-absl::Status WithRetryDelay(absl::Status status, absl::string_view reason, absl::Duration delay) {
-  v1::ErrorDetail detail;
-  detail.set_reason(std::string(reason));
-  const std::int64_t ms = absl::ToInt64Milliseconds(absl::Ceil(delay, absl::Milliseconds(1)));
-  (*detail.mutable_metadata())[kRetryDelay] = absl::StrCat(ms);
-  return WithDetail(std::move(status), detail);
-}
-
 std::optional<v1::ErrorDetail> DetailOf(const absl::Status& status) {
   const auto payload = status.GetPayload(kDetailUrl);
   v1::ErrorDetail detail;
   if (!payload.has_value() || !detail.ParseFromString(std::string(*payload))) return std::nullopt;
   return detail;
-}
-
-std::optional<absl::Duration> RetryDelayOf(const absl::Status& status) {
-  const std::optional<v1::ErrorDetail> detail = DetailOf(status);
-  if (!detail.has_value()) return std::nullopt;
-  const auto delay = detail->metadata().find(kRetryDelay);
-  int milliseconds = 0;
-  if (delay == detail->metadata().end() || !absl::SimpleAtoi(delay->second, &milliseconds) ||
-      milliseconds < 0) {
-    return std::nullopt;
-  }
-  return absl::Milliseconds(milliseconds);
 }
 
 grpc::Status ToGrpcStatus(const absl::Status& status, absl::string_view request_id) {
@@ -107,7 +99,7 @@ absl::Status FromGrpcStatus(const grpc::Status& status) {
   v1::ErrorDetail detail;
   if (error.ParseFromString(status.error_details()) && error.details_size() == 1 &&
       error.details(0).UnpackTo(&detail)) {
-    return WithDetail(std::move(result), detail);
+    return WithSent(std::move(result), detail);
   }
   return result;
 }
@@ -124,7 +116,7 @@ absl::Status FromScanError(const v1::ScanError& error) {
   auto code = static_cast<absl::StatusCode>(error.code());
   // Else a scan that was not taken would seem to be.
   if (code == absl::StatusCode::kOk) code = absl::StatusCode::kUnknown;
-  return WithDetail(absl::Status(code, error.message()), error.detail());
+  return WithSent(absl::Status(code, error.message()), error.detail());
 }
 
 }  // namespace strata::translate

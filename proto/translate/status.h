@@ -6,7 +6,6 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
-#include "absl/time/time.h"
 #include <grpcpp/support/status.h>
 
 #include "strata/v1/error.pb.h"
@@ -31,18 +30,15 @@ inline constexpr std::size_t kMaxMessageBytes = 1024;
 absl::Status WithDetail(absl::Status status, const v1::ErrorDetail& detail);
 // `status` with a detail of this reason, unless it has one or is OK.
 absl::Status WithReason(absl::Status status, absl::string_view reason);
-// The same for a status that passes, with how long to wait before the same call is tried again.
-absl::Status WithRetryDelay(absl::Status status, absl::string_view reason, absl::Duration delay);
 // The attached detail; nullopt without one.
 std::optional<v1::ErrorDetail> DetailOf(const absl::Status& status);
-// The detail's retry_delay_ms; nullopt when trying again makes no sense.
-std::optional<absl::Duration> RetryDelayOf(const absl::Status& status);
 
-// Code, message and detail of `status`. A detail gains the request's id, and `retry_delay_ms` when
-// the code is RESOURCE_EXHAUSTED or UNAVAILABLE and it is not the request itself that is wrong.
+// Code, message and detail of `status`. A detail gains the request's id and, as `retry_delay_ms`,
+// the status' RetryDelayOf(); without one 200 when the code is RESOURCE_EXHAUSTED or UNAVAILABLE
+// and it is not the request itself that is wrong.
 grpc::Status ToGrpcStatus(const absl::Status& status, absl::string_view request_id);
-// The reverse; a status whose details are not ours has none. UNAVAILABLE, which may be tried again,
-// for a stream that a server short of memory has dropped.
+// The reverse, with the delay; a status whose details are not ours has none. UNAVAILABLE, which may
+// be tried again, for a stream that a server short of memory has dropped.
 absl::Status FromGrpcStatus(const grpc::Status& status);
 
 // The same for one scan of an Ingest stream.

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/common/retry_delay.h"
 #include "proto/translate/status.h"
 
 namespace strata::server {
@@ -14,8 +15,8 @@ namespace {
 constexpr absl::Duration kLookAgain = absl::Milliseconds(500);
 
 absl::Status TooMuch(absl::string_view message, absl::Duration delay) {
-  return translate::WithRetryDelay(
-      absl::ResourceExhaustedError(message), translate::kClientLimitReason, delay);
+  return translate::WithReason(WithRetryDelay(absl::ResourceExhaustedError(message), delay),
+                               translate::kClientLimitReason);
 }
 
 }  // namespace
@@ -112,14 +113,13 @@ absl::Status ClientLimits::Hold(absl::string_view name, std::size_t more, std::s
                    kLookAgain);
   }
   if (held_ + more > max_bytes_) {
-    return translate::WithRetryDelay(
+    const absl::Status full =
         absl::ResourceExhaustedError(absl::StrCat("the calls under way hold ",
                                                   held_,
                                                   " bytes of memory, of ",
                                                   max_bytes_,
-                                                  " they may; try again later")),
-        translate::kServerBusyReason,
-        kLookAgain);
+                                                  " they may; try again later"));
+    return translate::WithReason(WithRetryDelay(full, kLookAgain), translate::kServerBusyReason);
   }
   found->second.bytes += more;
   held_ += more;

@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/common/retry_delay.h"
 #include "core/common/status.h"
 #include "proto/translate/status.h"
 
@@ -29,10 +30,11 @@ absl::Status Take(ClientLimits& limits, absl::string_view name, absl::Time now) 
     limits.Leave(name, ClientLimits::Kind::kCall);
     return status;
   }
-  return translate::WithRetryDelay(absl::ResourceExhaustedError(absl::StrCat(
-                                       "without a token of this server: ", status.message())),
-                                   translate::kClientLimitReason,
-                                   translate::RetryDelayOf(status).value_or(kLogInterval));
+  const absl::Status refused = absl::ResourceExhaustedError(
+      absl::StrCat("without a token of this server: ", status.message()));
+  return translate::WithReason(
+      WithRetryDelay(refused, RetryDelayOf(status).value_or(kLogInterval)),
+      translate::kClientLimitReason);
 }
 
 }  // namespace

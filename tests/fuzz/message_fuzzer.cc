@@ -15,6 +15,7 @@
 #include <google/protobuf/message.h>
 #include <grpcpp/support/status.h>
 
+#include "core/common/retry_delay.h"
 #include "proto/translate/classifiers.h"
 #include "proto/translate/jobs.h"
 #include "proto/translate/localize.h"
@@ -64,7 +65,7 @@ void TryScanError(const Message& message) {
   const auto& error = static_cast<const v1::ScanError&>(message);
   const absl::Status status = translate::FromScanError(error);
   Require(!status.ok(), "an error is one");
-  translate::RetryDelayOf(status);
+  RetryDelayOf(status);
 }
 
 // As details of a status, where they need not be of our kind.
@@ -74,7 +75,7 @@ void TryDetail(const Message& message) {
       grpc::StatusCode::RESOURCE_EXHAUSTED, "full", detail.SerializePartialAsString());
   const absl::Status understood = translate::FromGrpcStatus(status);
   Require(absl::IsResourceExhausted(understood), "a status keeps its code");
-  translate::RetryDelayOf(understood);
+  RetryDelayOf(understood);
   translate::ToGrpcStatus(understood, "request");
 }
 

@@ -17,6 +17,7 @@
 #include "strata/v1/posegraph.grpc.pb.h"
 #include "strata/v1/scans.grpc.pb.h"
 #include "strata/v1/tiles.grpc.pb.h"
+#include "core/common/retry_delay.h"
 #include "tests/server/new_grant.h"
 #include "tests/server/served_mock.h"
 #include "tests/support/temp_dir.h"
@@ -208,7 +209,7 @@ TEST_F(ClientLimitTest, WhoAsksTooOftenIsToldWhenToComeBack) {
   for (int i = 0; i < 10 && status.ok(); ++i) status = ListMaps();
   EXPECT_THAT(status, StatusIs(Code::kResourceExhausted, HasSubstr("5 calls/s")));
   EXPECT_EQ(ReasonOf(status), "CLIENT_LIMIT");
-  absl::SleepFor(translate::RetryDelayOf(status).value() + absl::Milliseconds(5));
+  absl::SleepFor(RetryDelayOf(status).value() + absl::Milliseconds(5));
   EXPECT_THAT(ListMaps(), IsOk());
 }
 

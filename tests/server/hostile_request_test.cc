@@ -21,6 +21,7 @@
 #include "strata/v1/planning.grpc.pb.h"
 #include "strata/v1/scans.grpc.pb.h"
 #include "strata/v1/tiles.grpc.pb.h"
+#include "core/common/retry_delay.h"
 #include "tests/server/new_grant.h"
 #include "tests/server/raw_call.h"
 #include "tests/server/scan_sink.h"
@@ -162,7 +163,7 @@ TEST_F(SmallBudgetTest, WhatOneClientsOpenStreamsKeepIsBounded) {
   for (const absl::Status& status : ended) {
     if (status.code() == Code::kCancelled) continue;
     EXPECT_THAT(status, StatusIs(Code::kResourceExhausted, HasSubstr("bytes of memory")));
-    EXPECT_NE(translate::RetryDelayOf(status), std::nullopt);
+    EXPECT_NE(RetryDelayOf(status), std::nullopt);
   }
 }
 
@@ -174,15 +175,15 @@ TEST_F(SmallBudgetTest, AnAnswerThatIsTooLargeIsRefused) {
   ON_CALL(db_.jobs(), List(_, _)).WillByDefault(Return(jobs));
   const absl::Status status = Say("/strata.v1.Jobs/List", "");
   EXPECT_THAT(status, StatusIs(Code::kResourceExhausted, HasSubstr("--client-memory")));
-  EXPECT_EQ(translate::RetryDelayOf(status), std::nullopt);
+  EXPECT_EQ(RetryDelayOf(status), std::nullopt);
   // Nothing stays booked.
   jobs[0].message = std::string(1 << 20, 'x');
   ON_CALL(db_.jobs(), List(_, _)).WillByDefault(Return(jobs));
   for (int i = 0; i < 10; ++i) {
     // gRPC tells a little later that the answer before was taken.
     absl::Status again = Say("/strata.v1.Jobs/List", "");
-    while (translate::RetryDelayOf(again).has_value()) {
-      absl::SleepFor(*translate::RetryDelayOf(again));
+    while (RetryDelayOf(again).has_value()) {
+      absl::SleepFor(*RetryDelayOf(again));
       again = Say("/strata.v1.Jobs/List", "");
     }
     EXPECT_THAT(again, IsOk());

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "strata/v1/posegraph.grpc.pb.h"
+#include "core/common/retry_delay.h"
 #include "tests/server/scan_sink.h"
 #include "tests/server/served_mock.h"
 
@@ -143,7 +144,7 @@ TEST_F(LocalizeTest, RefusesWhatIsWrongInItself) {
 TEST_F(LocalizeTest, TooLargeAScanIsNotToBeSentAgain) {
   const absl::Status status = Localize({Start(2'000'001)});
   EXPECT_THAT(status, StatusIs(Code::kResourceExhausted, HasSubstr("2000001 points announced")));
-  EXPECT_EQ(translate::RetryDelayOf(status), std::nullopt);
+  EXPECT_EQ(RetryDelayOf(status), std::nullopt);
 }
 
 TEST_F(LocalizeTest, AClientThatGoesAwayIsNotSearchedFor) {

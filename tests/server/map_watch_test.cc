@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "strata/v1/maps.grpc.pb.h"
+#include "core/common/retry_delay.h"
 #include "tests/server/served_mock.h"
 
 namespace strata::server {
@@ -238,7 +239,7 @@ TEST_F(WatchLimitTest, WatchersAreNoCallsAndHaveALimitOfTheirOwn) {
   const absl::Status status = translate::FromGrpcStatus(third->Finish());
   EXPECT_THAT(status, StatusIs(Code::kResourceExhausted, HasSubstr("2 watches under way")));
   EXPECT_EQ(ReasonOf(status), "SERVER_BUSY");
-  EXPECT_NE(translate::RetryDelayOf(status), std::nullopt);
+  EXPECT_NE(RetryDelayOf(status), std::nullopt);
 
   other.TryCancel();
   second->Finish();

@@ -1,3 +1,4 @@
+#include "core/common/retry_delay.h"
 #include "server/server.h"
 
 #include <chrono>
@@ -244,7 +245,7 @@ TEST_F(ServerTest, AFullServerSaysWhenToComeBack) {
   const absl::Status status = ListMaps();
   EXPECT_THAT(status, StatusIs(Code::kResourceExhausted, HasSubstr("1 calls under way")));
   EXPECT_EQ(ReasonOf(status), "SERVER_BUSY");
-  EXPECT_NE(translate::RetryDelayOf(status), std::nullopt);
+  EXPECT_NE(RetryDelayOf(status), std::nullopt);
   context.TryCancel();
   holder.join();
 }

@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -18,6 +19,8 @@
 #include "absl/time/time.h"
 
 #include "client/cli/terminal/patience.h"
+#include "client/sdk/backoff.h"
+#include "client/sdk/client.h"
 #include "core/cloud/cloud_slice.h"
 #include "core/codec/local_map_codec.h"
 #include "core/common/status.h"
@@ -28,12 +31,13 @@
 namespace strata::cli {
 namespace {
 
-constexpr absl::Duration kFirstDelay = absl::Milliseconds(100);
-constexpr absl::Duration kLongestDelay = absl::Seconds(5);
+// kPatience bounds the attempts.
+constexpr BackoffOptions kBackoff = {.max_attempts = 0};
 
-bool WorthRetrying(const absl::Status& status) {
-  return absl::IsUnavailable(status) || absl::IsResourceExhausted(status) ||
-         absl::IsAborted(status);
+// What says whether an upload is sent anew: as any call, and if it broke off and has to begin
+// again.
+absl::Status Reason(const absl::Status& sent) {
+  return absl::IsAborted(sent) ? absl::UnavailableError(sent.message()) : sent;
 }
 
 // The local map of the points relative to the cloud's origin.
@@ -109,25 +113,22 @@ class Uploader {
   }
 
   absl::Status SendPatiently(std::size_t index, absl::FunctionRef<absl::Status()> send) {
-    absl::Time since = SteadyNow();
-    absl::Duration delay = kFirstDelay;
-    absl::Status status = send();
-    while (WorthRetrying(status)) {
+    sdk::Backoff backoff(kBackoff);
+    absl::Time since = absl::InfiniteFuture();
+    while (true) {
+      const absl::Status status = send();
+      const std::optional<absl::Duration> pause = backoff.NextPause(Reason(status));
+      if (!pause.has_value()) return status;
       // Only the first in line counts time: the others wait for it anyway.
       WaitForTurn(index);
       STRATA_RETURN_IF_ERROR(lost_server());
-      if (delay == kFirstDelay) {
-        since = SteadyNow();
-      }
+      since = std::min(since, SteadyNow());
       if (SteadyNow() - since > kPatience) {
         SetLostServer(status);
         return status;
       }
-      STRATA_RETURN_IF_ERROR(Pause(delay));
-      delay = std::min(2 * delay, kLongestDelay);
-      status = send();
+      STRATA_RETURN_IF_ERROR(Pause(*pause));
     }
-    return status;
   }
 
   absl::Status Send(std::size_t index, const ScanHeader& header, const PointCloud& cloud) {

@@ -15,6 +15,7 @@
 #include "core/common/blocking.h"
 #include "core/common/guarded.h"
 #include "core/common/log_line.h"
+#include "core/common/retry_delay.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/common/this_thread.h"
@@ -24,6 +25,8 @@ namespace strata {
 namespace {
 
 constexpr absl::Duration kStopPoll = absl::Milliseconds(50);
+// After which a sender may ask whether there is room again: some scans are integrated by then.
+constexpr absl::Duration kQueueDelay = absl::Milliseconds(200);
 // So often a scan is tried again alone when there was no memory.
 constexpr int kMemoryTries = 10;
 
@@ -68,8 +71,10 @@ absl::Status Worker::CheckRoom() const {
   absl::MutexLock lock(&mutex_);
   const std::uint64_t most = core_.options().max_pending_scans;
   if (pending_ < most) return absl::OkStatus();
-  return absl::ResourceExhaustedError(
-      absl::StrCat(pending_, " scans wait for integration, at most ", most, "; retry later"));
+  return WithRetryDelay(
+      absl::ResourceExhaustedError(
+          absl::StrCat(pending_, " scans wait for integration, at most ", most, "; retry later")),
+      kQueueDelay);
 }
 
 void Worker::ScanCommitted(ScanNumber number) {

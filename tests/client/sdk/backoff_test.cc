@@ -2,15 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include "proto/translate/status.h"
+#include "core/common/retry_delay.h"
 
 namespace strata::sdk {
 namespace {
 
-absl::Status WithDelay(const char* milliseconds) {
-  v1::ErrorDetail detail;
-  (*detail.mutable_metadata())["retry_delay_ms"] = milliseconds;
-  return translate::WithDetail(absl::ResourceExhaustedError("full"), detail);
+absl::Status WithDelay(int ms) {
+  return WithRetryDelay(absl::ResourceExhaustedError("full"), absl::Milliseconds(ms));
 }
 
 const BackoffOptions kOptions = {
@@ -33,8 +31,8 @@ TEST(BackoffTest, ChanceShortensAPauseByUpToAHalf) {
 
 TEST(BackoffTest, TheServersLongerPauseCounts) {
   Backoff backoff(kOptions, [] { return 0.0; });
-  EXPECT_EQ(backoff.NextPause(WithDelay("900")), absl::Milliseconds(900));
-  EXPECT_EQ(backoff.NextPause(WithDelay("1")), absl::Milliseconds(200));
+  EXPECT_EQ(backoff.NextPause(WithDelay(900)), absl::Milliseconds(900));
+  EXPECT_EQ(backoff.NextPause(WithDelay(1)), absl::Milliseconds(200));
 }
 
 TEST(BackoffTest, OtherErrorsAreNotRepeated) {

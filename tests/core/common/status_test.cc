@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/common/retry_delay.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {
@@ -21,6 +22,11 @@ TEST(StatusTest, AnnotateKeepsTheCodeAndPutsWhereInFront) {
   EXPECT_THAT(Annotate(absl::DataLossError("checksum differs"), "tile 0/3/-1"),
               StatusIs(absl::StatusCode::kDataLoss, "tile 0/3/-1: checksum differs"));
   STRATA_EXPECT_OK(Annotate(absl::OkStatus(), "tile"));
+}
+
+TEST(StatusTest, AnnotateKeepsWhatComesWithAStatus) {
+  const absl::Status full = WithRetryDelay(absl::ResourceExhaustedError("full"), absl::Seconds(2));
+  EXPECT_EQ(RetryDelayOf(Annotate(full, "scan robot/3")), absl::Seconds(2));
 }
 
 absl::Status Pass(const absl::Status& first, int& reached) {

@@ -1,3 +1,4 @@
+#include "core/common/retry_delay.h"
 #include "proto/translate/status.h"
 
 #include <string>
@@ -36,9 +37,10 @@ TEST(TranslateStatusTest, OnlyWhatMayHelpNamesARetryDelay) {
   EXPECT_EQ(delay(absl::InternalError("x")), std::nullopt);
   EXPECT_GT(delay(absl::ResourceExhaustedError("x")), absl::ZeroDuration());
   EXPECT_GT(delay(absl::UnavailableError("x")), absl::ZeroDuration());
-  v1::ErrorDetail detail;
-  (*detail.mutable_metadata())["retry_delay_ms"] = "4321";
-  EXPECT_EQ(delay(WithDetail(absl::UnavailableError("x"), detail)), absl::Milliseconds(4321));
+  // One that is said goes along, whatever the code.
+  const absl::Duration said = absl::Milliseconds(4321);
+  EXPECT_EQ(delay(WithRetryDelay(absl::UnavailableError("x"), said)), said);
+  EXPECT_EQ(delay(WithRetryDelay(absl::AbortedError("x"), said)), said);
   // The same too large request is too large another time.
   EXPECT_EQ(delay(WithReason(absl::ResourceExhaustedError("x"), kRequestReason)), std::nullopt);
 }

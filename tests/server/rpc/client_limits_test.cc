@@ -1,3 +1,4 @@
+#include "core/common/retry_delay.h"
 #include "server/rpc/client_limits.h"
 
 #include <cstddef>
@@ -30,7 +31,7 @@ TEST(ClientLimitsTest, OneClientsCallsLeaveRoomForAnothers) {
   const absl::Status full = limits.Enter("a", Kind::kCall, kStart);
   EXPECT_THAT(full, StatusIs(Code::kResourceExhausted, HasSubstr("client a has 2 calls")));
   EXPECT_EQ(translate::DetailOf(full)->reason(), "CLIENT_LIMIT");
-  EXPECT_GT(translate::RetryDelayOf(full), absl::ZeroDuration());
+  EXPECT_GT(RetryDelayOf(full), absl::ZeroDuration());
   EXPECT_THAT(limits.Enter("a", Kind::kWatch, kStart), IsOk());
   EXPECT_THAT(limits.Enter("a", Kind::kWatch, kStart),
               StatusIs(Code::kResourceExhausted, HasSubstr("1 watches")));
@@ -50,7 +51,7 @@ TEST(ClientLimitsTest, TheRateHoldsInTheLongRunAndABurstAtOnce) {
   for (int i = 0; i < 100; ++i) passed += begun(kStart).ok() ? 1 : 0;
   EXPECT_EQ(passed, 5);
   // Whoever waits as long as he is told gets in, and not much sooner.
-  const absl::Duration wait = translate::RetryDelayOf(begun(kStart)).value();
+  const absl::Duration wait = RetryDelayOf(begun(kStart)).value();
   EXPECT_EQ(wait, absl::Milliseconds(100));
   EXPECT_THAT(begun(kStart + wait / 2), StatusIs(Code::kResourceExhausted, HasSubstr("10 calls")));
   EXPECT_THAT(begun(kStart + wait), IsOk());
@@ -89,11 +90,11 @@ TEST(ClientLimitsTest, MemoryIsBookedForAClientAndForAll) {
     const absl::Status full = second.Resize(41);
     EXPECT_THAT(full, StatusIs(Code::kResourceExhausted, HasSubstr("client a hold 60 bytes")));
     EXPECT_EQ(translate::DetailOf(full)->reason(), "CLIENT_LIMIT");
-    EXPECT_GT(translate::RetryDelayOf(full), absl::ZeroDuration());
+    EXPECT_GT(RetryDelayOf(full), absl::ZeroDuration());
     EXPECT_THAT(second.Resize(40), IsOk());
     const absl::Status busy = others.Resize(51);
     EXPECT_EQ(translate::DetailOf(busy)->reason(), "SERVER_BUSY");
-    EXPECT_GT(translate::RetryDelayOf(busy), absl::ZeroDuration());
+    EXPECT_GT(RetryDelayOf(busy), absl::ZeroDuration());
     EXPECT_THAT(others.Resize(50), IsOk());
     EXPECT_EQ(limits.held_bytes(), 150U);
     EXPECT_THAT(first.Resize(10), IsOk());

@@ -1,3 +1,4 @@
+#include "core/common/retry_delay.h"
 #include "server/rpc/strangers.h"
 
 #include <optional>
@@ -25,7 +26,7 @@ TEST(StrangersTest, AnAddressThatAsksTooOftenIsToldToWaitAndOthersAreNot) {
   const absl::Status refused = strangers.Enter("here", kStart);
   EXPECT_THAT(refused, StatusIs(Code::kResourceExhausted, HasSubstr("without a token")));
   EXPECT_EQ(translate::DetailOf(refused)->reason(), "CLIENT_LIMIT");
-  EXPECT_EQ(translate::RetryDelayOf(refused), absl::Seconds(1));
+  EXPECT_EQ(RetryDelayOf(refused), absl::Seconds(1));
   EXPECT_THAT(strangers.Enter("there", kStart), IsOk());
   EXPECT_THAT(strangers.Enter("here", kStart + absl::Seconds(1)), IsOk());
 }

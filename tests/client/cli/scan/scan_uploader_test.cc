@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/common/retry_delay.h"
 #include "tests/client/cli/scan/fake_scans.h"
 #include "tests/support/status_matchers.h"
 
@@ -105,8 +106,10 @@ TEST(ScanUploaderTest, ABadFileIsReportedAndTheRestGoesOn) {
 
 TEST(ScanUploaderTest, ABusyServerIsTriedAgainAndTheOrderKept) {
   FakeDatabase database;
-  database.fake_scans.troubles[3] = {absl::ResourceExhaustedError("queue full"),
-                                     absl::UnavailableError("gone")};
+  const absl::Status full = absl::ResourceExhaustedError("queue full");
+  database.fake_scans.troubles[3] = {WithRetryDelay(full, absl::Milliseconds(1)),
+                                     absl::UnavailableError("gone"),
+                                     absl::AbortedError("broke off; begin it again")};
   for (const UploadResult& result : UploadAll(database, Sources(8))) {
     STRATA_EXPECT_OK(result.status);
   }
@@ -117,9 +120,12 @@ TEST(ScanUploaderTest, ABusyServerIsTriedAgainAndTheOrderKept) {
 TEST(ScanUploaderTest, AnErrorThatLastsIsNotTriedAgain) {
   FakeDatabase database;
   database.fake_scans.troubles[1] = {absl::AlreadyExistsError("other content")};
-  const auto results = UploadAll(database, Sources(3));
+  database.fake_scans.troubles[2] = {absl::ResourceExhaustedError("the disk is full")};
+  const auto results = UploadAll(database, Sources(4));
   EXPECT_THAT(results[1].status,
               StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("other content")));
+  EXPECT_THAT(results[2].status,
+              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("the disk is full")));
   EXPECT_EQ(database.fake_scans.finished.size(), 2U);
 }
 

@@ -6,10 +6,12 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/time/clock.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/codec/surface_tile_codec.h"
+#include "core/common/retry_delay.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/status_matchers.h"
 
@@ -92,6 +94,28 @@ TEST_F(EngineScansTest, ManyRobotsAtOnce) {
   for (std::thread& robot : robots) robot.join();
   EXPECT_EQ(WaitIntegrated(db()).scans, 24U);
   ExpectSound();
+}
+
+TEST_F(EngineScansTest, WhoComesWhileTooManyWaitIsToldWhenToComeAgain) {
+  EngineOptions options = Options();
+  options.max_pending_scans = 1;
+  Reopen(options);
+  MakeMap();
+  int refused = 0;
+  for (std::uint64_t i = 1; i <= 10; ++i) {
+    const PointCloud cloud = MakeRoom(i, 100'000);
+    const ScanHeader header = HeaderOf({"robot", i}, cloud, RoomPose(i));
+    absl::Status sent = Upload(db(), header, cloud).status();
+    for (; absl::IsResourceExhausted(sent); sent = Upload(db(), header, cloud).status()) {
+      ASSERT_THAT(sent.message(), HasSubstr("scans wait for integration, at most 1"));
+      ASSERT_NE(RetryDelayOf(sent), std::nullopt);
+      absl::SleepFor(*RetryDelayOf(sent));
+      ++refused;
+    }
+    STRATA_EXPECT_OK(sent);
+  }
+  EXPECT_GT(refused, 0);
+  EXPECT_EQ(WaitIntegrated(db()).scans, 10U);
 }
 
 TEST_F(EngineScansTest, AScanThatLeavesTheMapIsNotLostInSilence) {
