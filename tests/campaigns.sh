@@ -58,6 +58,7 @@ if ((${#names[@]} == 0)); then
 fi
 [[ ${names[0]} != all ]] || mapfile -t names < <(campaigns | cut -d'|' -f1)
 
+cmake --build "$build" --target experiments
 found=0
 rows=()
 for name in "${names[@]}"; do

@@ -1,11 +1,15 @@
 #!/usr/bin/env bash
 # Strata's tests: installs what they need, builds, checks and runs them. A second run skips what is there.
 #   tests/run.sh            everything the gate runs
-#   tests/run.sh --full     also clang's warnings of all, clang-tidy, a whole build by clang, every header alone (an hour more)
+#   tests/run.sh --full     also all sanitized tests and fuzzers, clang's warnings of all, clang-tidy, a whole build by clang,
+#                           every header alone (some two hours more)
 # Recorded data are read from $STRATA_DATA (default ../shared/data); tests that need them skip where they are absent.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-[[ "${1:-}" == "" || "${1:-}" == --full ]] || { sed -n '2,5p' "$0" >&2; exit 2; }
+[[ "${1:-}" == "" || "${1:-}" == --full ]] || { sed -n '2,6p' "$0" >&2; exit 2; }
+
+# Fuzzers of what is made of few sources; --full has all.
+byte_fuzzers="bag_file_fuzzer message_fuzzer mls_tile_fuzzer scan_file_fuzzer surface_tile_fuzzer wire_check_fuzzer"
 
 stage() { printf '\n== %s (%s s)\n' "$1" "$SECONDS"; }
 
@@ -13,7 +17,7 @@ stage() { printf '\n== %s (%s s)\n' "$1" "$SECONDS"; }
 # clocks: it takes only what they leave.
 begin_clang() {
   set -m # a group of processes, that ends as a whole
-  CMAKE_BUILD_PARALLEL_LEVEL=$(nproc) nice -n 19 tests/build_clang.sh >build/clang.log 2>&1 &
+  CMAKE_BUILD_PARALLEL_LEVEL=$(nproc) nice -n 19 tests/build_clang.sh $byte_fuzzers >build/clang.log 2>&1 &
   clang=$!
   set +m
   trap 'kill -- -$clang 2>/dev/null || true' EXIT
@@ -64,12 +68,19 @@ stage "clang: sanitized builds, fuzzers"
 end_clang
 
 stage "sanitizers"
-tests/run_sanitizers.sh
+tests/run_sanitizers.sh bytes
 
 stage "fuzzers"
-tests/fuzz/run.sh 60
+tests/fuzz/run.sh 60 $byte_fuzzers
 
 if [[ "${1:-}" == --full ]]; then
+  stage "all sanitized tests, all fuzzers"
+  tests/run_sanitizers.sh
+  tests/fuzz/run.sh 120
+
+  stage "experiments"
+  cmake --build --preset release --target experiments
+
   stage "clang's warnings and thread-safety analysis of the whole product"
   python3 tests/check_clang.py
 

@@ -20,11 +20,13 @@ if(STRATA_SANITIZER)
   target_compile_options(strata_build_options INTERFACE -fsanitize=${STRATA_SANITIZER} -fno-omit-frame-pointer)
   target_link_options(strata_build_options INTERFACE -fsanitize=${STRATA_SANITIZER})
   if(STRATA_SANITIZER MATCHES "undefined")
-    # These four take a third of the build time and find little that the address sanitizer does not.
+    # These four take a third of the build time and find little that the address sanitizer does not. The list's path does not
+    # say where the checkout lies: another's compilations are found (ccache).
+    file(RELATIVE_PATH ignores ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR}/deploy/cmake/sanitizer_ignores.txt)
     target_compile_options(
       strata_build_options
       INTERFACE -fno-sanitize=null,alignment,object-size,vptr -fno-sanitize-recover=undefined
-                $<$<CXX_COMPILER_ID:Clang>:-fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/deploy/cmake/sanitizer_ignores.txt>
+                $<$<CXX_COMPILER_ID:Clang>:-fsanitize-ignorelist=${ignores}>
     )
   endif()
 endif()
@@ -47,10 +49,13 @@ function(strata_shared_headers name)
   target_precompile_headers(${name} PRIVATE ${ARG_HEADERS})
 endfunction()
 
-# strata_batch(TARGET HEADERS): the target's sources use what strata_shared_headers made of HEADERS, and each other's.
+# strata_batch(TARGET HEADERS): the target's sources use what strata_shared_headers made of HEADERS, and each other's. Not by
+# clang: what it makes of headers holds the checkout's path, and no other checkout would find what it compiled (ccache).
 function(strata_batch target headers)
   if(STRATA_BATCHES)
-    target_precompile_headers(${target} REUSE_FROM ${headers})
+    if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+      target_precompile_headers(${target} REUSE_FROM ${headers})
+    endif()
     target_compile_options(${target} PRIVATE $<TARGET_PROPERTY:${headers},COMPILE_OPTIONS>)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
     set_property(GLOBAL APPEND PROPERTY STRATA_BATCHED ${target})
@@ -132,8 +137,8 @@ endfunction()
 
 # strata_test(NAME SOURCES... DEPS... [LABELS...] [TIMEOUT seconds])
 #
-# A GoogleTest program; every TEST becomes a ctest test with the labels (default: unit). The labels asan and tsan also
-# make it part of what tests/run_sanitizers.sh builds and runs.
+# A GoogleTest program; every TEST becomes a ctest test with the labels (default: unit). The labels asan, bytes and
+# tsan also make it part of what tests/run_sanitizers.sh builds and runs.
 function(strata_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
   if(NOT ARG_LABELS)
@@ -151,9 +156,9 @@ function(strata_test name)
   if(TARGET strata_tsan_absl)
     target_link_libraries(${name} PRIVATE strata_tsan_absl)
   endif()
-  foreach(kind asan tsan)
-    if(kind IN_LIST ARG_LABELS AND STRATA_SANITIZER_KIND STREQUAL kind)
-      add_dependencies(sanitized_tests ${name})
+  foreach(label asan bytes tsan)
+    if(TARGET ${label}_tests AND label IN_LIST ARG_LABELS)
+      add_dependencies(${label}_tests ${name})
     endif()
   endforeach()
   list(JOIN ARG_LABELS "-" labels) # gtest_discover_tests takes one word; ctest -L looks for a part of it

@@ -155,6 +155,7 @@ def main():
     if options.check:
         print("\n".join(old_results()) or "all results are as new as their sources")
         return 0
+    subprocess.run(["cmake", "--build", options.build, "--target", "experiments"], check=True)
     sections = {name: match[0] for name, match in read().items()}
     holds = True
     for name in options.names or RESULTS:
