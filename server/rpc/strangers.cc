@@ -32,9 +32,8 @@ absl::Status Take(ClientLimits& limits, absl::string_view name, absl::Time now) 
   }
   const absl::Status refused = absl::ResourceExhaustedError(
       absl::StrCat("without a token of this server: ", status.message()));
-  return translate::WithReason(
-      WithRetryDelay(refused, RetryDelayOf(status).value_or(kLogInterval)),
-      translate::kClientLimitReason);
+  return translate::WithReason(WithRetryDelay(refused, RetryDelayOf(status).value_or(kLogInterval)),
+                               translate::kClientLimitReason);
 }
 
 }  // namespace

@@ -15,13 +15,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/common/retry_delay.h"
 #include "strata/v1/classifiers.grpc.pb.h"
 #include "strata/v1/jobs.grpc.pb.h"
 #include "strata/v1/maps.grpc.pb.h"
 #include "strata/v1/planning.grpc.pb.h"
 #include "strata/v1/scans.grpc.pb.h"
 #include "strata/v1/tiles.grpc.pb.h"
-#include "core/common/retry_delay.h"
 #include "tests/server/new_grant.h"
 #include "tests/server/raw_call.h"
 #include "tests/server/scan_sink.h"

@@ -5,8 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "strata/v1/posegraph.grpc.pb.h"
 #include "core/common/retry_delay.h"
+#include "strata/v1/posegraph.grpc.pb.h"
 #include "tests/server/scan_sink.h"
 #include "tests/server/served_mock.h"
 

@@ -9,8 +9,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "strata/v1/maps.grpc.pb.h"
 #include "core/common/retry_delay.h"
+#include "strata/v1/maps.grpc.pb.h"
 #include "tests/server/served_mock.h"
 
 namespace strata::server {

@@ -1,4 +1,3 @@
-#include "core/common/retry_delay.h"
 #include "server/server.h"
 
 #include <chrono>
@@ -14,6 +13,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/common/retry_delay.h"
 #include "strata/v1/maps.grpc.pb.h"
 #include "strata/v1/planning.grpc.pb.h"
 #include "strata/v1/posegraph.grpc.pb.h"

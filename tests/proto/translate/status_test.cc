@@ -1,4 +1,3 @@
-#include "core/common/retry_delay.h"
 #include "proto/translate/status.h"
 
 #include <string>
@@ -6,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/common/retry_delay.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::translate {

@@ -1,4 +1,3 @@
-#include "core/common/retry_delay.h"
 #include "server/rpc/client_limits.h"
 
 #include <cstddef>
@@ -9,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/common/retry_delay.h"
 #include "proto/translate/status.h"
 #include "tests/support/status_matchers.h"
 

@@ -1,4 +1,3 @@
-#include "core/common/retry_delay.h"
 #include "server/rpc/strangers.h"
 
 #include <optional>
@@ -7,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/common/retry_delay.h"
 #include "proto/translate/status.h"
 #include "tests/support/status_matchers.h"
 
