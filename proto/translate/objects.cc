@@ -19,6 +19,8 @@
 namespace strata::translate {
 namespace {
 
+constexpr double kMostInferredM = 1e8;  // as far as poses
+
 absl::StatusOr<std::uint16_t> ClassIdFrom(std::uint32_t class_id) {
   if (class_id <= kMaxClassId) return static_cast<std::uint16_t>(class_id);
   return absl::InvalidArgumentError(
@@ -258,7 +260,17 @@ absl::StatusOr<InferredPart> FromProto(const v1::InferredPart& proto) {
   part.contradicting = proto.contradicting();
   STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d middle, FromProto("middle", proto.middle()));
   for (const Eigen::Vector3f& offset : PlacesFrom(proto.points())) {
-    part.points.emplace_back(middle + offset.cast<double>());
+    const Eigen::Vector3d p = middle + offset.cast<double>();
+    if (!(p.array().abs() <= kMostInferredM).all()) {
+      return absl::InvalidArgumentError(absl::StrCat("points[",
+                                                     part.points.size(),
+                                                     "] of what is inferred of entity ",
+                                                     part.entity,
+                                                     " is not within ",
+                                                     kMostInferredM,
+                                                     " m of the map's origin"));
+    }
+    part.points.push_back(p);
   }
   return part;
 }

@@ -261,6 +261,12 @@ TEST(TranslateRoundTripTest, InferredParts) {
   EXPECT_TRUE(none.points.empty());
   proto.add_points(1.0F);
   EXPECT_THAT(FromProto(proto), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("points")));
+  for (const float beyond : {std::numeric_limits<float>::infinity(), std::nanf(""), -1e9F}) {
+    proto = ToProto(part);
+    proto.set_points(4, beyond);
+    EXPECT_THAT(FromProto(proto),
+                StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("points[1] of what is")));
+  }
   v1::ListInferredRequest request;
   request.set_kind("golf");
   request.set_class_id(7);
