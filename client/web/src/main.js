@@ -6,7 +6,7 @@ import { Stage } from "./stage.js";
 
 const LAYERS = ["traversability", "height", "class", "confidence", "sigma"];
 const TRAVERSABILITY = { TRAVERSABILITY_TRAVERSABLE: "drivable", TRAVERSABILITY_NON_TRAVERSABLE: "not drivable", TRAVERSABILITY_UNDERSIDE: "underside" };
-const RUNS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#d55e00", "#56b4e9"];
+const RUNS = ["#0b3c75", "#e69f00", "#00664a", "#b0447f", "#d55e00", "#7a6a00"];
 
 const el = (id) => document.getElementById(id);
 const stage = new Stage(el("stage"));
@@ -83,7 +83,7 @@ async function drawRuns(name) {
       runs.get(run).push((node.current ?? node.uploaded)?.translation ?? {});
     }
   }
-  [...runs].forEach(([run, places], i) => stage.line(`run ${run}`, places, RUNS[i % RUNS.length], 0.06));
+  [...runs].forEach(([run, places], i) => stage.line(`run ${run}`, places, RUNS[i % RUNS.length], 0.1, false));
   state.runs = runs.size;
 }
 
@@ -98,7 +98,7 @@ function fit() {
 function setCut(height) {
   const slider = el("cut");
   if (height !== null) slider.value = height;
-  const all = Number(slider.value) >= Number(slider.max);
+  const all = Number(slider.value) > Number(slider.max) - Number(slider.step); // its last stop
   shared.cut.value = all ? 1e9 : Number(slider.value);
   el("cut-value").textContent = all ? "nothing" : `${Number(slider.value).toFixed(2)} m`;
   stage.redraw();
@@ -138,7 +138,7 @@ async function plan(from, to) {
   const found = path.waypoints?.length > 0;
   state.plan = { from, to, found, length: path.length_m ?? 0, message: path.message, waypoints: path.waypoints ?? [] };
   if (found) {
-    stage.line("path", path.waypoints, getComputedStyle(document.body).getPropertyValue("--path"), 0.15);
+    stage.line("path", path.waypoints, getComputedStyle(document.body).getPropertyValue("--path"), 0.15, true);
     say(`${path.length_m.toFixed(1)} m in ${(path.elapsed_ms ?? 0).toFixed(0)} ms`);
   } else {
     const where = path.where ?? path.nearest;

@@ -27,12 +27,12 @@ vec3 wheel(int id) {
   float h = fract(float(id) * .618034);
   return clamp(abs(fract(h + vec3(0., .667, .333)) * 6. - 3.) - 1., .15, .9);
 }
-vec3 paint(ivec4 d, int trav, bool wall, float z) {
+vec3 paint(ivec4 d, int trav, bool side, bool wall, float z) {
   if (layer == 1) return ramp((z - low) / (high - low));
   if (layer == 2) { int id = d.x >> 20; return id == 0 ? vec3(.6) : wheel(id); }
   if (layer == 3) return ramp(float(d.w & 255) / 100.);
   if (layer == 4) return ramp(float((d.w >> 8) & 255) / 180.);
-  if (trav == 1) return vec3(.34, .71, .91);
+  if (trav == 1 && !side) return vec3(.34, .71, .91);
   if (wall) return vec3(.45, .43, .42);
   return trav == 2 ? vec3(.84, .37, 0.) : trav == 3 ? vec3(.8, .47, .65) : vec3(.7);
 }
@@ -50,7 +50,7 @@ void main() {
     p = face == 1 ? vec3(q.x, 0., down) : face == 2 ? vec3(q.x, 1., down)
       : face == 3 ? vec3(0., q.x, down) : vec3(1., q.x, down);
   }
-  colour = paint(d, trav, wall, z) * shade;
+  colour = paint(d, trav, face > 0, wall, z) * shade;
   kind = float(trav); world = vec3(origin + (cell + p.xy) * size, z + p.z);
   gl_Position = z > cut ? vec4(2., 2., 2., 1.) : projectionMatrix * modelViewMatrix * vec4(world, 1.);
 }`;

@@ -91,13 +91,14 @@ export class Stage {
     mesh.position.set(x, y, z);
     this.put(name, mesh);
   }
-  line(name, points, colour, radius) {
+  // `through`: seen through what is before it.
+  line(name, points, colour, radius, through) {
     const curve = new THREE.CurvePath();
     const corners = points.map((p) => new THREE.Vector3(p.x ?? 0, p.y ?? 0, (p.z ?? 0) + 0.25));
     for (let i = 1; i < corners.length; ++i) curve.add(new THREE.LineCurve3(corners[i - 1], corners[i]));
     if (!curve.curves.length) return;
     const geometry = new THREE.TubeGeometry(curve, Math.min(4000, 2 * corners.length + 62), radius, 5);
-    this.put(name, new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ color: colour, depthTest: false })));
+    this.put(name, new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ color: colour, depthTest: !through })));
   }
   put(name, mesh) {
     this.remove(name);
