@@ -38,6 +38,8 @@ using Parser = http::request_parser<http::string_body>;
 // nobody would notice when it goes.
 constexpr std::size_t kAheadBytes = 64 << 10;
 constexpr std::size_t kAheadRead = 512;
+// An answer, or a piece of one, of more is booked until it is written.
+constexpr std::size_t kSmallAnswerBytes = 16 << 10;
 // After a connection's last answer: what is still on its way in is thrown away, since closing
 // before would throw away the answer.
 constexpr absl::Duration kLingerTime = absl::Seconds(2);
@@ -146,6 +148,7 @@ class HttpSession final : public Session,
     std::string text;
     std::function<void()> taken;
     bool last = false;
+    std::size_t booked = 0;
   };
 
   static Stream MakeStream(tcp::socket socket, net::ssl::context* tls) {
@@ -192,7 +195,9 @@ class HttpSession final : public Session,
   void OnAhead(error_code error, std::size_t bytes);
   void Refuse(Answer answer);
   void SendNow(Answer answer);
+  bool BookAnswer(std::size_t bytes);
   void Queue(std::string text, std::function<void()> taken, bool last);
+  void Push(Piece piece);
   void WriteFirst();
   void OnWritten();
   void OnAnswered();
@@ -402,16 +407,40 @@ void HttpSession<Stream>::Refuse(Answer answer) {
 
 template <typename Stream>
 void HttpSession<Stream>::SendNow(Answer answer) {
+  // Answers that nobody takes are memory; the services' own books end when the door has them.
+  if (!BookAnswer(answer.body.size())) {
+    answer = ErrorAnswer(translate::ToGrpcStatus(
+        translate::WithReason(
+            absl::ResourceExhaustedError("too many answers wait to be taken; try again later"),
+            translate::kServerBusyReason),
+        ""));
+  }
   const bool bare = answer.status == 304;
   std::string text = HeadText(
       answer, bare ? "" : absl::StrCat("Content-Length: ", answer.body.size(), "\r\n"), keep_);
   if (!head_only_ && !bare) text += answer.body;
-  Queue(std::move(text), {}, true);
+  Push({std::move(text), {}, true, std::exchange(booked_, 0)});
 }
 
 template <typename Stream>
+bool HttpSession<Stream>::BookAnswer(std::size_t bytes) {
+  GiveBytes();
+  if (bytes <= kSmallAnswerBytes) return true;
+  if (!shared_.sessions.TakeBytes(bytes)) return false;
+  booked_ = bytes;
+  return true;
+}
+
+// A piece of a stream; what was told before is no answer without it.
+template <typename Stream>
 void HttpSession<Stream>::Queue(std::string text, std::function<void()> taken, bool last) {
-  pieces_.push_back({std::move(text), std::move(taken), last});
+  if (!BookAnswer(text.size())) return CloseNow();
+  Push({std::move(text), std::move(taken), last, std::exchange(booked_, 0)});
+}
+
+template <typename Stream>
+void HttpSession<Stream>::Push(Piece piece) {
+  pieces_.push_back(std::move(piece));
   if (pieces_.size() == 1) WriteFirst();
 }
 
@@ -433,6 +462,7 @@ void HttpSession<Stream>::OnWritten() {
   Disarm();
   const Piece piece = std::move(pieces_.front());
   pieces_.pop_front();
+  if (piece.booked > 0) shared_.sessions.GiveBytes(piece.booked);
   if (!pieces_.empty()) WriteFirst();
   if (piece.taken) piece.taken();
   if (piece.last) OnAnswered();
@@ -466,7 +496,11 @@ void HttpSession<Stream>::CloseNow() {
   Lowest().shutdown(tcp::socket::shutdown_both, ignored);
   Lowest().close(ignored);
   if (exchange_ != nullptr) std::exchange(exchange_, nullptr)->Cancel();
-  if (pieces_.size() > 1) pieces_.erase(pieces_.begin() + 1, pieces_.end());
+  for (Piece& piece : pieces_) {
+    if (piece.booked > 0) shared_.sessions.GiveBytes(std::exchange(piece.booked, 0));
+  }
+  if (pieces_.size() > 1)
+    pieces_.erase(pieces_.begin() + 1, pieces_.end());  // one is being written
   GiveBytes();
   shared_.sessions.Remove(this);
 }

@@ -26,7 +26,7 @@ class SessionBase {
 // nobody out. Thread-safe.
 class Sessions {
  public:
-  // `most_bytes`: of large bodies that are on their way in, all together.
+  // `most_bytes`: of large bodies that are on their way in or out, all together.
   Sessions(std::size_t most, std::size_t most_bytes) : most_(most), most_bytes_(most_bytes) {}
 
   // Takes it in as one that waits; false: there is no room, since all are being answered, or the

@@ -25,7 +25,8 @@ struct WebServerOptions {
   std::filesystem::path viewer;    // folder of the viewer's files; empty: none
   TlsFiles tls;
   std::size_t max_body_bytes = 4 << 20;
-  std::size_t max_bodies_bytes = std::size_t{160} << 20;  // of all large bodies on their way in
+  std::size_t max_bodies_bytes = std::size_t{160}
+                                 << 20;  // of all large bodies on their way in or out
   std::size_t max_connections = 4096;
   absl::Duration slow_sender_timeout = absl::Seconds(60);  // for a body
   absl::Duration slow_reader_timeout = absl::Seconds(30);

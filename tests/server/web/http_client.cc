@@ -23,9 +23,12 @@ constexpr char kHttp[] = "http://127.0.0.1:";
 
 }  // namespace
 
-HttpConnection::HttpConnection(const std::string& url)
+HttpConnection::HttpConnection(const std::string& url, int receive_bytes)
     : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)),
       host_(absl::StripPrefix(url, "http://")) {
+  if (receive_bytes > 0) {
+    setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &receive_bytes, sizeof(receive_bytes));
+  }
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);

@@ -23,8 +23,9 @@ struct HttpAnswer {
 // One connection, blocking.
 class HttpConnection {
  public:
-  // `url`: http://127.0.0.1:PORT.
-  explicit HttpConnection(const std::string& url);
+  // `url`: http://127.0.0.1:PORT. `receive_bytes`: what the system takes in that was not read; 0:
+  // as much as it likes.
+  explicit HttpConnection(const std::string& url, int receive_bytes = 0);
   ~HttpConnection();
   HttpConnection(const HttpConnection&) = delete;
   HttpConnection& operator=(const HttpConnection&) = delete;

@@ -498,6 +498,34 @@ TEST_F(WebServerTest, HalfOpenConnectionsStopNobody) {
   EXPECT_TRUE(half_open.front()->IsClosed(absl::Seconds(5))) << "it made room";
 }
 
+TEST_F(WebServerTest, AnswersThatNobodyTakesAreBounded) {
+  constexpr std::size_t kTileBytes = 8 << 20;
+  ON_CALL(db_.tiles(), Get(_, _, _)).WillByDefault([](auto&, auto, const TileKey& key) {
+    return absl::StatusOr<api::EncodedTile>(
+        api::EncodedTile{.key = key, .version = 1, .bytes = std::string(kTileBytes, 'x')});
+  });
+  ServerOptions options;
+  options.max_call_bytes = 5 * kTileBytes;
+  ServeWeb(options);
+  std::vector<std::unique_ptr<HttpConnection>> idle;
+  for (int i = 0; i < 6; ++i) {
+    idle.push_back(std::make_unique<HttpConnection>(url_, 4096));
+    idle.back()->Ask("GET", "/v1/maps/campus/tiles/0/0/0");
+    absl::SleepFor(absl::Milliseconds(100));
+  }
+  const HttpAnswer refused = Get("/v1/maps/campus/tiles/0/0/0");
+  EXPECT_EQ(refused.status, 429);
+  EXPECT_EQ(json::parse(refused.body)["details"][0]["debug"]["reason"], "SERVER_BUSY");
+  EXPECT_EQ(Get("/healthz").status, 200);
+  idle.clear();
+  const absl::Time until = absl::Now() + absl::Seconds(5);
+  int status = 0;
+  while (status != 200 && absl::Now() < until) {
+    status = Get("/v1/maps/campus/tiles/0/0/0").status;
+  }
+  EXPECT_EQ(status, 200);
+}
+
 TEST_F(WebServerTest, SlowHeadersAndBodiesEnd) {
   ServerOptions options;
   options.slow_sender_timeout = absl::Milliseconds(300);
