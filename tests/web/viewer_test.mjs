@@ -49,7 +49,8 @@ async function within(ms, what, holds) {
 
 // A server on free ports: its addresses, and its log so far.
 async function serve(name, ...more) {
-  const args = ["--data", path.join(work, name), "--listen", "127.0.0.1:0", "--web", "127.0.0.1:0", "--web-viewer", viewer, ...more];
+  const at = more.includes("--listen") ? [] : ["--listen", "127.0.0.1:0", "--web", "127.0.0.1:0"];
+  const args = ["--data", path.join(work, name), "--web-viewer", viewer, ...at, ...more];
   const child = spawn(path.join(build, "server/stratad"), args);
   const server = { log: "", out: "", child };
   child.stdout.on("data", (text) => (server.out += text));
@@ -76,7 +77,7 @@ async function open(browser, url) {
   const page = await browser.newPage();
   await page.setViewport({ width: 1280, height: 800 });
   page.on("pageerror", (error) => expect(false, `no error in the page: ${error.message}`));
-  page.on("console", (line) => line.type() === "error" && !/401/.test(line.text()) && expect(false, `no error on the console: ${line.text()}`));
+  page.on("console", (line) => line.type() === "error" && !/401|ERR_/.test(line.text()) && expect(false, `no error on the console: ${line.text()}`));
   await page.goto(url);
   await page.waitForFunction("window.strata?.begun", { timeout: 60000 });
   return page;
@@ -211,6 +212,15 @@ async function testLive(server, page) {
   await done;
 }
 
+async function testRestart(server, page) {
+  server.child.kill();
+  await new Promise((end) => server.child.on("exit", end));
+  await within(5000, "that the server has gone is said", async () => /trying again/.test(await message(page)));
+  const again = await serve("maps", "--listen", server.address, "--web", server.url.replace("http://", ""));
+  await within(8000, "after its restart the page follows again", () => page.evaluate("strata.view.watching === true"));
+  return again;
+}
+
 async function testClosedTab(server, page) {
   const watches = () => (server.log.match(/method=Maps.Watch code=CANCELLED/g) ?? []).length;
   const before = watches();
@@ -242,7 +252,7 @@ try {
   await testPlans(server, page);
   await testLink(server, browser, page);
   await testLive(server, page);
-  await testClosedTab(server, page);
+  await testClosedTab(await testRestart(server, page), page);
   await testToken(browser);
 } catch (error) {
   expect(false, error.stack);

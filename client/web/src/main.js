@@ -13,6 +13,7 @@ const stage = new Stage(el("stage"));
 const hash = new URLSearchParams(location.hash.slice(1));
 let view = null;
 let start = null;
+let runsDue = null;
 // What tests look at.
 const state = (window.strata = { stage, plan: null, levels: null, ready: false });
 
@@ -47,8 +48,14 @@ async function listMaps() {
   return maps;
 }
 
-function showState() {
+function showState(scansToo) {
   if (!view) return;
+  if (scansToo && state.ready && !runsDue) {
+    runsDue = setTimeout(() => {
+      runsDue = null;
+      drawRuns(view.name).catch((error) => say(error.message));
+    }, 1000);
+  }
   const detail = view.level ? `, level of detail ${view.level}` : "";
   el("state").textContent = `${view.held.size} tiles, ${view.surfaces().toLocaleString("en")} surfaces, epoch ${view.epoch ?? "0"}${detail}`;
 }
@@ -83,6 +90,7 @@ async function drawRuns(name) {
       runs.get(run).push((node.current ?? node.uploaded)?.translation ?? {});
     }
   }
+  stage.remove("run");
   [...runs].forEach(([run, places], i) => stage.line(`run ${run}`, places, RUNS[i % RUNS.length], 0.1, false));
   state.runs = runs.size;
 }

@@ -11,7 +11,7 @@ const keyOf = ({ level = 0, x = 0, y = 0 }) => `${level}/${x}/${y}`;
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 
 export class MapView {
-  // `changed` is called after tiles have; `told` with what a person should know.
+  // `changed` is called when anything has, with whether scans have; `told` with what a person should know.
   constructor(name, stage, { changed, told }) {
     Object.assign(this, { name, stage, changed, told });
     this.held = new Map();
@@ -52,7 +52,7 @@ export class MapView {
       for (let next = wanted.pop(); next; next = wanted.pop()) await this.fetch(...next);
     };
     await Promise.all(Array.from({ length: AT_ONCE }, fetcher));
-    this.changed();
+    this.changed(false);
   }
   async fetch(key, { key: tile, version }) {
     try {
@@ -77,6 +77,11 @@ export class MapView {
     this.held.delete(key);
     this.stage.redraw();
   }
+  // Whether these tiles of level 0 are others than those that are drawn, or may be.
+  isStale(tiles) {
+    if (this.level) return tiles.length > 0;
+    return tiles.some(({ key, version, gone }) => this.held.get(keyOf(key ?? {}))?.version !== (gone ? undefined : version));
+  }
   // As long as the page is seen: a watch holds one of the browser's few connections.
   async follow() {
     let since = "0";
@@ -89,15 +94,16 @@ export class MapView {
       try {
         const request = { name: this.name, since };
         for await (const news of stream("Maps/Watch", request, watch.signal)) {
-          const first = since === "0";
           since = news.commit_sequence ?? since;
           this.epoch = news.epoch;
-          if (news.tiles?.length && !first) await this.sync();
-          this.changed();
+          this.watching = true;
+          if (this.isStale(news.tiles ?? [])) await this.sync();
+          this.changed(news.scans?.length > 0);
         }
       } catch (error) {
         if (!watch.signal.aborted) this.told(`${error.message}; trying again`);
       }
+      this.watching = false;
       this.stop.signal.removeEventListener("abort", end);
       document.removeEventListener("visibilitychange", hide);
       await pause(1000);
