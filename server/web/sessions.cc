@@ -1,5 +1,7 @@
 #include "server/web/sessions.h"
 
+#include <iterator>
+#include <utility>
 #include <vector>
 
 namespace strata::server::web {

@@ -17,6 +17,9 @@ let runsDue = null;
 // What tests look at.
 const state = (window.strata = { stage, plan: null, levels: null, ready: false });
 
+// JSON leaves out what is 0, and nobody wants to read -0.00.
+const metres = (value) => ((Math.round((value ?? 0) * 100) || 0) / 100).toFixed(2);
+
 function say(text) {
   el("message").textContent = text;
 }
@@ -134,7 +137,7 @@ async function showLevels({ x, y }) {
     const item = document.createElement("li");
     const what = surface.depth_m ? `wall, ${surface.depth_m.toFixed(2)} m deep` : TRAVERSABILITY[surface.traversability] ?? "unknown";
     const label = surface.class_id ? `, class ${surface.class_id} (${surface.confidence ?? 0} %)` : "";
-    item.textContent = `z ${(surface.z_m ?? 0).toFixed(2)} m ± ${(surface.sigma_m ?? 0).toFixed(3)}: ${what}${label}`;
+    item.textContent = `z ${metres(surface.z_m)} m ± ${(surface.sigma_m ?? 0).toFixed(3)}: ${what}${label}`;
     return item;
   }));
 }
@@ -195,6 +198,7 @@ function savePicture() {
 
 function setDark(dark) {
   document.body.classList.toggle("dark", dark);
+  shared.dark.value = Number(dark);
   stage.background(dark ? "#14171a" : "#fbfbf7");
 }
 

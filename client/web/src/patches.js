@@ -11,16 +11,17 @@ export const shared = {
   cut: { value: 1e9 },
   layer: { value: 0 },
   picking: { value: 0 },
+  dark: { value: 0 },
 };
 
 // Traversability in colours of Okabe and Ito, which colour-blind people tell apart and which differ
 // in lightness; heights and others from dark blue to yellow (cividis, likewise).
 const VERTEX = `
 uniform highp isampler2D data; uniform int faces, layer; uniform vec2 origin;
-uniform float size, low, high, cut; flat out vec3 colour; flat out float kind; out vec3 world;
+uniform float size, low, high, cut, dark; flat out vec3 colour; flat out float kind; out vec3 world;
 vec3 ramp(float t) {
   t = clamp(t, 0., 1.);
-  vec3 a = vec3(0., .13, .3), b = vec3(.49, .48, .47), c = vec3(1., .92, .27);
+  vec3 a = mix(vec3(0., .13, .3), vec3(.16, .38, .66), dark), b = vec3(.49, .48, .47), c = vec3(1., .92, .27);
   return t < .5 ? mix(a, b, 2. * t) : mix(b, c, 2. * t - 1.);
 }
 vec3 wheel(int id) {
