@@ -418,7 +418,7 @@ TEST_F(WebServerTest, AClosedTabFreesItsStream) {
   ServerOptions options;
   options.client.max_watches = 1;
   ServeWeb(options);
-  const auto watch = [this](HttpConnection& connection) {
+  const auto watch = [](HttpConnection& connection) {
     connection.Ask("POST", kWatch, kJsonStream, Envelope(0, R"({"name":"campus"})"));
     return connection.TakeBytes(700, absl::Milliseconds(700));
   };
