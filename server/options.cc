@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <system_error>
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
@@ -10,7 +11,15 @@ namespace strata::server {
 namespace {
 
 constexpr std::uint64_t kMebi = std::uint64_t{1} << 20;
-constexpr char kInstalledViewer[] = STRATA_VIEWER_DIR;
+
+// Where the viewer is installed, beside this program; empty: it is not.
+std::filesystem::path InstalledViewer() {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::filesystem::path folder =
+      self.parent_path().parent_path() / STRATA_DATA_FOLDER / "strata" / "web";
+  return std::filesystem::exists(folder, error) ? folder : std::filesystem::path();
+}
 
 // As they are written; in the units of their texts.
 struct Written {
@@ -264,9 +273,7 @@ absl::StatusOr<ProgramOptions> Read(const Written& o) {
   options.engine.max_map_bytes = o.max_map_mib * kMebi;
   options.engine.optimize_interval = absl::Seconds(o.optimize_every_s);
   options.engine.upload_keep = absl::Seconds(o.upload_keep_s);
-  if (options.server.web_viewer.empty() && std::filesystem::exists(kInstalledViewer)) {
-    options.server.web_viewer = kInstalledViewer;
-  }
+  if (options.server.web_viewer.empty()) options.server.web_viewer = InstalledViewer();
   options.server.drain_timeout = absl::Seconds(o.drain_s);
   options.server.max_query_time = absl::Seconds(o.max_query_s);
   options.server.slow_sender_timeout = absl::Seconds(o.upload_idle_s);
