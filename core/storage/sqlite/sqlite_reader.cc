@@ -121,18 +121,6 @@ absl::StatusOr<PosedScan> SqliteReader::GetScan(ScanNumber number, std::uint64_t
   return *std::move(scan);
 }
 
-absl::StatusOr<std::optional<PosedScan>> SqliteReader::FindPredecessor(absl::string_view trajectory,
-                                                                       std::uint64_t sequence,
-                                                                       std::uint64_t epoch) {
-  STRATA_ASSIGN_OR_RETURN(
-      Statement row,
-      database_.Prepare(STRATA_SELECT_POSED_SCAN
-                        "WHERE s.trajectory = ?2 AND s.sequence < ?3 AND s.state = 2 "
-                        "ORDER BY s.sequence DESC LIMIT 1"));
-  row.Bind(epoch, trajectory, sequence);
-  return ReadOne(row);
-}
-
 absl::StatusOr<std::vector<ScanNumber>> SqliteReader::ListScanNumbers() {
   STRATA_ASSIGN_OR_RETURN(Statement row,
                           database_.Prepare("SELECT number FROM truth_scan ORDER BY number"));
