@@ -274,6 +274,7 @@ absl::Status Connection::StatusOf(const pg_result* result) {
   const char* state = result == nullptr ? nullptr : PQresultErrorField(result, PG_DIAG_SQLSTATE);
   const absl::string_view code = state == nullptr ? "" : state;
   may_be_redone_ = may_be_redone_ || MayBeRedone(code);
+  outdated_ = outdated_ || code == "0A000";
   const char* primary =
       result == nullptr ? nullptr : PQresultErrorField(result, PG_DIAG_MESSAGE_PRIMARY);
   const std::string message = OneLine(primary == nullptr ? PQerrorMessage(connection_) : primary);
@@ -351,7 +352,7 @@ bool Connection::InTransaction() const {
 bool Connection::IsBroken() const { return PQstatus(connection_) != CONNECTION_OK; }
 
 bool Connection::IsFresh() {
-  if (IsBroken() || PQtransactionStatus(connection_) != PQTRANS_IDLE) return false;
+  if (outdated_ || IsBroken() || PQtransactionStatus(connection_) != PQTRANS_IDLE) return false;
   // Nothing is asked, so whatever has come is the server's farewell.
   struct pollfd socket = {PQsocket(connection_), POLLIN, 0};
   return poll(&socket, 1, 0) == 0;

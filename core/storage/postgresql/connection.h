@@ -148,6 +148,7 @@ class Connection {
   pg_conn* connection_;
   std::map<const char*, std::string> statements_;
   bool may_be_redone_ = false;
+  bool outdated_ = false;  // a table has changed beneath its prepared statements
 };
 
 }  // namespace strata
