@@ -61,6 +61,16 @@ std::string PostgresCluster::AddressOf(absl::string_view database) const {
   return absl::StrCat("host=", directory_.path().string(), " user=strata dbname=", database);
 }
 
+std::string PostgresCluster::AddressOfOwn(absl::string_view owner) {
+  const auto [it, inserted] = databases_.try_emplace(std::string(owner));
+  if (!inserted) return it->second;
+  const auto connection = Connection::Open(Address());
+  const std::string name = absl::StrCat("own", databases_.size());
+  const std::string sql = absl::StrCat("CREATE DATABASE ", name);
+  if (connection.ok() && (*connection)->Execute(sql.c_str()).ok()) it->second = AddressOf(name);
+  return it->second;
+}
+
 pid_t PostgresCluster::Spawn(const std::vector<std::string>& command) const {
   const passwd* user = geteuid() == 0 ? UserWithoutRights() : nullptr;
   const std::string log = directory_.path() / "log";
@@ -112,7 +122,7 @@ absl::Status PostgresCluster::Restart() {
                    "-c",
                    "shared_buffers=64MB",
                    "-c",
-                   "max_connections=60"});
+                   "max_connections=200"});
   absl::Status answer;
   for (const absl::Time end = absl::Now() + absl::Seconds(60); absl::Now() < end;) {
     answer = Connection::Open(Address()).status();

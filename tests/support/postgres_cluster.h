@@ -3,6 +3,7 @@
 #ifndef STRATA_TESTS_SUPPORT_POSTGRES_CLUSTER_H_
 #define STRATA_TESTS_SUPPORT_POSTGRES_CLUSTER_H_
 
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -29,6 +30,9 @@ class PostgresCluster {
   // Of its first database, for PostgresOptions::where.
   std::string Address() const { return AddressOf("postgres"); }
   std::string AddressOf(absl::string_view database) const;
+  // Of a database that belongs to `owner`, a name or path; made when it is first asked for. Empty
+  // if that fails.
+  std::string AddressOfOwn(absl::string_view owner);
   // Ends it as a loss of power would but for what the kernel holds: no process finishes what it
   // does (pg_ctl -m immediate).
   void Crash();
@@ -44,6 +48,7 @@ class PostgresCluster {
   TempDir directory_;
   Disk disk_;
   pid_t server_ = -1;
+  std::map<std::string, std::string> databases_;  // by their owners
 };
 
 // One for the program, unsynced, started when it is first asked for.

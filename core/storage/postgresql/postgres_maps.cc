@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/functional/function_ref.h"
+#include "absl/random/random.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
@@ -30,25 +31,22 @@ constexpr int kGoing = 2;
 
 class PostgresStorage final : public MapStorage {
  public:
-  PostgresStorage(std::shared_ptr<ConnectionPool> pool, std::int64_t map, std::string name)
-      : pool_(pool), map_(map), name_(name), writer_(std::move(pool), map, std::move(name)) {}
+  PostgresStorage(std::shared_ptr<ConnectionPool> pool, const OpenedMap& map)
+      : pool_(pool), map_(map), writer_(std::move(pool), map) {}
 
   absl::StatusOr<std::unique_ptr<StorageReader>> NewReader() override {
-    return std::make_unique<PostgresReader>(pool_, map_);
+    return std::make_unique<PostgresReader>(pool_, map_.number);
   }
   StorageWriter& writer() override { return writer_; }
   absl::Status CheckInPlace() const override {
     STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
-    STRATA_ASSIGN_OR_RETURN(Rows map, lease->Query("SELECT 1 FROM truth_map WHERE map = $1", map_));
-    if (map.Next()) return absl::OkStatus();
-    return absl::UnavailableError(
-        absl::StrCat("store: map ", name_, " was removed while it was open"));
+    return CheckOwner(lease->Query("SELECT owner FROM truth_map WHERE map = $1", map_.number),
+                      map_);
   }
 
  private:
   std::shared_ptr<ConnectionPool> pool_;
-  std::int64_t map_;
-  std::string name_;
+  OpenedMap map_;
   PostgresWriter writer_;
 };
 
@@ -74,9 +72,11 @@ absl::Status InsertMap(Connection& connection,
           .Change("INSERT INTO truth_map (map, created_us, cell_size_m, gap_size_m, thickness_m, "
                   "sensor_sigma_m, sensor_sigma_per_metre, sensor_min_range_m, sensor_max_range_m, "
                   "keep_points, has_origin, latitude_rad, longitude_rad, altitude_m, "
-                  "commit_sequence, epoch, last_constraint, oldest_epoch, fade_after, last_model) "
-                  "VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, 1, 0, "
-                  "1, $16, 0)",
+                  "commit_sequence, epoch, last_constraint, oldest_epoch, fade_after, last_model, "
+                  "owner, last_commit) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, "
+                  "$13, $14, "
+                  "$15, 1, 0, "
+                  "1, $16, 0, 0, 0)",
                   map,
                   absl::ToUnixMicros(created),
                   parameters.mls.cell_size_m,
@@ -197,12 +197,42 @@ absl::Status PostgresMaps::Create(absl::string_view name,
   });
 }
 
-absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::Open(absl::string_view name) const {
-  STRATA_ASSIGN_OR_RETURN(const std::int64_t map, Find(name));
-  PostgresWriter writer(pool_, map, std::string(name));
-  STRATA_RETURN_IF_ERROR(Annotate(DropOtherDerived(writer, *pool_, map), name));
+absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenAs(absl::string_view name,
+                                                                 std::int64_t owner) const {
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
+  const OpenedMap map{number, std::string(name), owner};
+  if (owner != 0) STRATA_RETURN_IF_ERROR(TakeOver(map));
+  PostgresWriter writer(pool_, map);
+  STRATA_RETURN_IF_ERROR(Annotate(DropOtherDerived(writer, *pool_, number), name));
   STRATA_RETURN_IF_ERROR(Annotate(writer.reader().GetMapInfo().status(), name));
-  return std::make_unique<PostgresStorage>(pool_, map, std::string(name));
+  return std::make_unique<PostgresStorage>(pool_, map);
+}
+
+absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::Open(absl::string_view name) const {
+  return OpenAs(name, 0);
+}
+
+absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenAlone(absl::string_view name) const {
+  absl::BitGen random;
+  return OpenAs(name, absl::Uniform<std::int64_t>(random, 1, std::int64_t{1} << 62));
+}
+
+// The lock waits for commits of the owner before, relaxed ones too: what those have staged is there
+// when the new one clears it away.
+absl::Status PostgresMaps::TakeOver(const OpenedMap& map) const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  return InTransaction(*lease, [&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(
+        lease->Query("SELECT 1 FROM truth_map WHERE map = $1 FOR UPDATE", map.number).status());
+    return lease->Change("UPDATE truth_map SET owner = $2 WHERE map = $1", map.number, map.owner)
+        .status();
+  });
+}
+
+absl::StatusOr<std::uint64_t> PostgresMaps::RemovedClock() const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  STRATA_ASSIGN_OR_RETURN(Rows row, lease->Query("SELECT max(removed_clock) FROM strata_format"));
+  return row.Next() ? row.Unsigned(0) : 0;
 }
 
 // Whoever writes holds the map's row, so this waits for commits under way, and later ones find
@@ -219,6 +249,12 @@ absl::Status PostgresMaps::Delete(absl::string_view name) const {
                         kGoing,
                         kThere));
       if (taken == 0) return NoSuchMap(name);
+      STRATA_RETURN_IF_ERROR(
+          lease
+              ->Change("UPDATE strata_format SET removed_clock = greatest(removed_clock, (SELECT "
+                       "commit_sequence FROM truth_map WHERE map = $1))",
+                       map)
+              .status());
       return lease->Change("DELETE FROM truth_map WHERE map = $1", map).status();
     }));
   }

@@ -15,6 +15,7 @@
 #include "absl/time/time.h"
 
 #include "core/storage/postgresql/connection_pool.h"
+#include "core/storage/postgresql/postgres_writer.h"
 #include "core/storage/storage.h"
 #include "core/world/map_info.h"
 
@@ -27,8 +28,7 @@ struct PostgresOptions {
   std::size_t max_connections = 32;
 };
 
-// Thread-safe. Every map may be open once in all processes together: nothing here keeps a second
-// one out (docs/decisions/0196).
+// Thread-safe.
 class PostgresMaps {
  public:
   // Carries out deletions that were cut short, too. The errors of Connection::Open();
@@ -42,8 +42,14 @@ class PostgresMaps {
                       const MapParameters& parameters,
                       absl::Time created,
                       std::uint64_t clock = 0) const;
-  // NOT_FOUND; DATA_LOSS if the map's own row is damaged. Outlives this object.
+  // NOT_FOUND; DATA_LOSS if the map's own row is damaged. Outlives this object. Others may have the
+  // map open, too, and write it between two commits.
   absl::StatusOr<std::unique_ptr<MapStorage>> Open(absl::string_view name) const;
+  // The same, alone: whoever had opened it so before can not write any more (UNAVAILABLE), since
+  // every commit asks.
+  absl::StatusOr<std::unique_ptr<MapStorage>> OpenAlone(absl::string_view name) const;
+  // The latest clock of a map that was deleted; 0: none was.
+  absl::StatusOr<std::uint64_t> RemovedClock() const;
   // Whoever has it open can neither read nor write it any more. Its rows go after its name, so that
   // what is left when this ends with an error is deleted by the next Connect(). NOT_FOUND.
   absl::Status Delete(absl::string_view name) const;
@@ -51,6 +57,9 @@ class PostgresMaps {
  private:
   explicit PostgresMaps(std::shared_ptr<ConnectionPool> pool) : pool_(std::move(pool)) {}
   absl::StatusOr<std::int64_t> Find(absl::string_view name) const;
+  absl::StatusOr<std::unique_ptr<MapStorage>> OpenAs(absl::string_view name,
+                                                     std::int64_t owner) const;
+  absl::Status TakeOver(const OpenedMap& map) const;
   absl::Status DeleteRows(std::int64_t map) const;
 
   std::shared_ptr<ConnectionPool> pool_;

@@ -27,6 +27,14 @@ namespace {
 
 constexpr int kMostRuns = 6;
 constexpr absl::Duration kFirstPause = absl::Milliseconds(10);
+// As long as a server takes to come back from its log, or a replica to take its place.
+constexpr absl::Duration kLongestLook = absl::Seconds(60);
+constexpr absl::Duration kPauseBetweenLooks = absl::Milliseconds(200);
+
+std::int64_t NumberOfCommit() {
+  absl::BitGen random;
+  return absl::Uniform<std::int64_t>(random, 1, std::int64_t{1} << 62);
+}
 
 // Longer each time, and of no two writers the same.
 void PauseBeforeRun(int run) {
@@ -35,12 +43,18 @@ void PauseBeforeRun(int run) {
   absl::SleepFor(kFirstPause * (1 << run) * share);
 }
 
-absl::Status TakenAway(absl::string_view name) {
-  return absl::UnavailableError(absl::StrCat(
-      "store: map ", name, " was removed while it was open: nothing more is taken into it"));
-}
-
 }  // namespace
+
+absl::Status CheckOwner(absl::StatusOr<Rows> owner, const OpenedMap& map) {
+  STRATA_RETURN_IF_ERROR(owner.status());
+  const bool there = owner->Next();
+  if (there && (map.owner == 0 || owner->Int(0) == map.owner)) return absl::OkStatus();
+  return absl::UnavailableError(
+      absl::StrCat("store: map ",
+                   map.name,
+                   there ? " was opened by another process" : " was removed",
+                   " while it was open: nothing more is taken into it here"));
+}
 
 absl::Status PostgresWriter::Commit(Durability durability, absl::FunctionRef<absl::Status()> body) {
   for (int run = 1;; ++run) {
@@ -70,30 +84,33 @@ absl::Status PostgresWriter::CommitOnce(Durability durability,
   reader_.ReadThrough(connection_);
   durability_ = durability;
   broken_ = absl::OkStatus();
-  absl::Status done = LockMap(durability);
-  const bool never_began = !done.ok() && lease->IsBroken();  // the server had hung up before
+  const std::int64_t commit = durability == Durability::kFull ? NumberOfCommit() : 0;
+  absl::Status done = LockMap(durability, commit);
+  again = !done.ok() && lease->IsBroken();  // the server had hung up before
   if (done.ok()) done = RunBody(body);
   if (done.ok() && !lease->may_be_redone()) {
-    done = EndCommit();
+    done = EndCommit(commit, again);
   } else if (!lease->IsBroken()) {
     lease->Execute("ROLLBACK").IgnoreError();
   }
-  again = never_began || (lease->may_be_redone() && !lease->IsBroken());
+  again = again || (lease->may_be_redone() && !lease->IsBroken());
   if (done.ok() && again) done = absl::AbortedError("store: a part met another's commit");
   lease->ForgetError();
   return done;
 }
 
-absl::Status PostgresWriter::LockMap(Durability durability) {
-  const bool full = durability == Durability::kFull;
-  STRATA_RETURN_IF_ERROR(
-      connection_->Execute(full ? "BEGIN" : "BEGIN; SET LOCAL synchronous_commit = off"));
-  absl::StatusOr<Rows> map =
-      connection_->Query(full ? "SELECT 1 FROM truth_map WHERE map = $1 FOR NO KEY UPDATE"
-                              : "SELECT 1 FROM truth_map WHERE map = $1 FOR KEY SHARE",
-                         map_);
-  STRATA_RETURN_IF_ERROR(map.status());
-  return map->Next() ? absl::OkStatus() : TakenAway(name_);
+absl::Status PostgresWriter::LockMap(Durability durability, std::int64_t commit) {
+  if (durability == Durability::kRelaxed) {
+    STRATA_RETURN_IF_ERROR(connection_->Execute("BEGIN; SET LOCAL synchronous_commit = off"));
+    return CheckOwner(
+        connection_->Query("SELECT owner FROM truth_map WHERE map = $1 FOR KEY SHARE", map_),
+        opened_);
+  }
+  STRATA_RETURN_IF_ERROR(connection_->Execute("BEGIN"));
+  return CheckOwner(
+      connection_->Query(
+          "UPDATE truth_map SET last_commit = $2 WHERE map = $1 RETURNING owner", map_, commit),
+      opened_);
 }
 
 absl::Status PostgresWriter::RunBody(absl::FunctionRef<absl::Status()> body) {
@@ -104,12 +121,42 @@ absl::Status PostgresWriter::RunBody(absl::FunctionRef<absl::Status()> body) {
 }
 
 // The server may wait for its replica as long as it takes: a statement's time that ran out would
-// end the wait, not the commit. Where the connection ends with the answer, nobody knows.
-absl::Status PostgresWriter::EndCommit() {
+// end the wait, not the commit.
+absl::Status PostgresWriter::EndCommit(std::int64_t commit, bool& again) {
   const absl::Status committed = connection_->Execute("SET LOCAL statement_timeout = 0; COMMIT");
   if (committed.ok() || !connection_->IsBroken()) return committed;
+  const absl::StatusOr<bool> there =
+      commit == 0 ? absl::UnknownError("a relaxed commit") : WasCommitted(commit);
+  if (there.ok() && *there) return absl::OkStatus();
+  again = there.ok();
+  if (again) return committed;
   return absl::UnavailableError(
       absl::StrCat(committed.message(), "; outcome unknown: it went away in the commit"));
+}
+
+absl::StatusOr<bool> PostgresWriter::WasCommitted(std::int64_t commit) {
+  const absl::Time end = absl::Now() + kLongestLook;
+  while (true) {
+    const absl::StatusOr<bool> there = LookForCommit(commit);
+    const bool away =
+        absl::IsUnavailable(there.status()) || absl::IsResourceExhausted(there.status());
+    if (!away || absl::Now() >= end) return there;
+    absl::SleepFor(kPauseBetweenLooks);
+  }
+}
+
+// The lock waits for the commit, should the server still be at it. Whoever has the map alone knows
+// that nobody else has committed since.
+absl::StatusOr<bool> PostgresWriter::LookForCommit(std::int64_t commit) {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row,
+      lease->Query("SELECT last_commit, owner FROM truth_map WHERE map = $1 FOR NO KEY UPDATE",
+                   map_));
+  if (!row.Next()) return absl::UnknownError("the map was removed");
+  if (row.Int(0) == commit) return true;
+  if (opened_.owner != 0 && row.Int(1) == opened_.owner) return false;
+  return absl::UnknownError("others have written since");
 }
 
 absl::Status PostgresWriter::Part(absl::FunctionRef<absl::Status()> body) {

@@ -21,10 +21,19 @@
 
 namespace strata {
 
+struct OpenedMap {
+  std::int64_t number = 0;
+  std::string name;
+  std::int64_t owner = 0;  // 0: anybody's
+};
+
+// Of the map's own row, its owner: UNAVAILABLE where there is no row or `map` has lost it.
+absl::Status CheckOwner(absl::StatusOr<Rows> owner, const OpenedMap& map);
+
 class PostgresWriter final : public StorageWriter {
  public:
-  PostgresWriter(std::shared_ptr<ConnectionPool> pool, std::int64_t map, std::string name)
-      : pool_(pool), map_(map), name_(std::move(name)), reader_(std::move(pool), map) {}
+  PostgresWriter(std::shared_ptr<ConnectionPool> pool, const OpenedMap& map)
+      : pool_(pool), opened_(map), map_(map.number), reader_(std::move(pool), map.number) {}
 
   absl::Status Commit(Durability durability, absl::FunctionRef<absl::Status()> body) override;
   absl::Status Part(absl::FunctionRef<absl::Status()> body) override;
@@ -108,9 +117,14 @@ class PostgresWriter final : public StorageWriter {
                           bool& again);
   // Takes the map's row: alone in a full commit, so that decisions follow each other; beside others
   // in a relaxed one, which decides nothing, so that only a deletion of the map waits.
-  absl::Status LockMap(Durability durability);
+  // `commit`: a number that no other commit has, which a full one leaves there.
+  absl::Status LockMap(Durability durability, std::int64_t commit);
   absl::Status RunBody(absl::FunctionRef<absl::Status()> body);
-  absl::Status EndCommit();
+  absl::Status EndCommit(std::int64_t commit, bool& again);
+  // Whether the full commit with that number took place, as soon as the store answers. An error:
+  // nobody knows.
+  absl::StatusOr<bool> WasCommitted(std::int64_t commit);
+  absl::StatusOr<bool> LookForCommit(std::int64_t commit);
   // The number of rows that a statement, whose $1 is the map, changed.
   template <typename... Values>
   absl::StatusOr<std::uint64_t> Change(const char* sql, const Values&... values);
@@ -130,8 +144,8 @@ class PostgresWriter final : public StorageWriter {
                                   absl::string_view bytes);
 
   std::shared_ptr<ConnectionPool> pool_;
+  OpenedMap opened_;
   std::int64_t map_;
-  std::string name_;
   PostgresReader reader_;
   Connection* connection_ = nullptr;  // in a commit
   Durability durability_ = Durability::kFull;

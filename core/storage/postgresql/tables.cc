@@ -43,7 +43,9 @@ CREATE TABLE truth_map (
   last_constraint bigint NOT NULL,
   oldest_epoch bigint NOT NULL,
   fade_after bigint NOT NULL,
-  last_model bigint NOT NULL
+  last_model bigint NOT NULL,
+  owner bigint NOT NULL,
+  last_commit bigint NOT NULL
 ) WITH (fillfactor = 50);
 CREATE TABLE truth_scan (
   map bigint NOT NULL, number bigint NOT NULL,
@@ -356,7 +358,8 @@ constexpr std::array<const char*, 22> kTruth = {
 
 absl::Status MakeInTransaction(Connection& connection) {
   STRATA_RETURN_IF_ERROR(connection.Execute(
-      "BEGIN; CREATE TABLE IF NOT EXISTS strata_format (version bigint NOT NULL); "
+      "BEGIN; CREATE TABLE IF NOT EXISTS strata_format (version bigint NOT NULL, "
+      "removed_clock bigint NOT NULL); "
       "LOCK TABLE strata_format IN ACCESS EXCLUSIVE MODE"));
   STRATA_ASSIGN_OR_RETURN(Rows found,
                           connection.Query("SELECT coalesce(max(version), 0) FROM strata_format"));
@@ -364,7 +367,9 @@ absl::Status MakeInTransaction(Connection& connection) {
   if (found.Int(0) == 0) {
     STRATA_RETURN_IF_ERROR(connection.Execute(kTables));
     STRATA_RETURN_IF_ERROR(
-        connection.Change("INSERT INTO strata_format (version) VALUES ($1)", kDatabaseVersion)
+        connection
+            .Change("INSERT INTO strata_format (version, removed_clock) VALUES ($1, 0)",
+                    kDatabaseVersion)
             .status());
   }
   return connection.Execute("COMMIT");

@@ -7,6 +7,7 @@
 #include <random>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -30,8 +31,8 @@ namespace {
 // One robot: scans that its store has acknowledged, refused, or left in the dark.
 struct Ledger {
   std::vector<std::uint64_t> acknowledged;
-  std::vector<std::uint64_t> unknown;
   std::vector<std::uint64_t> numbers;  // of the acknowledged ones
+  std::uint64_t unknown = 0;
 };
 
 absl::Status PutScan(StorageWriter& writer,
@@ -51,61 +52,56 @@ absl::Status PutScan(StorageWriter& writer,
   });
 }
 
-void Drive(const PostgresMaps& maps,
+void Drive(StorageWriter& writer,
            std::uint64_t robot,
            const std::atomic<bool>& stop,
            Ledger& ledger) {
-  auto storage = maps.Open("map");
-  while (!storage.ok() && !stop) storage = maps.Open("map");
-  if (!storage.ok()) return;
   const std::string bytes(20'000, static_cast<char>('a' + robot));
   for (std::uint64_t sequence = 1; !stop; ++sequence) {
     std::uint64_t number = 0;
-    const absl::Status put = PutScan((*storage)->writer(), robot, sequence, bytes, number);
+    const absl::Status put = PutScan(writer, robot, sequence, bytes, number);
     if (put.ok()) {
       ledger.acknowledged.push_back(sequence);
       ledger.numbers.push_back(number);
       continue;
     }
     EXPECT_THAT(put, StatusIs(absl::StatusCode::kUnavailable, ::testing::_));
-    if (absl::StrContains(put.message(), "outcome unknown")) ledger.unknown.push_back(sequence);
+    if (absl::StrContains(put.message(), "outcome unknown")) ++ledger.unknown;
     absl::SleepFor(absl::Milliseconds(5));
   }
 }
 
-// Everything acknowledged is there with its bytes, nothing is there that was refused, and no number
-// was given twice.
-void Check(const PostgresMaps& maps, const std::vector<Ledger>& ledgers) {
-  STRATA_ASSERT_OK_AND_ASSIGN(const auto storage, maps.Open("map"));
-  STRATA_ASSERT_OK_AND_ASSIGN(const auto reader, storage->NewReader());
-  std::uint64_t known = 0;
-  std::uint64_t unknown = 0;
-  for (std::uint64_t robot = 0; robot < ledgers.size(); ++robot) {
-    const std::string bytes(20'000, static_cast<char>('a' + robot));
-    const Ledger& ledger = ledgers[robot];
-    unknown += ledger.unknown.size();
-    for (std::size_t i = 0; i < ledger.acknowledged.size(); ++i) {
-      const std::uint64_t sequence = ledger.acknowledged[i];
-      STRATA_ASSERT_OK_AND_ASSIGN(const std::optional<PosedScan> found,
-                                  reader->FindScan({absl::StrCat("robot ", robot), sequence}, 1));
-      ASSERT_TRUE(found.has_value()) << "robot " << robot << " scan " << sequence << " is lost";
-      EXPECT_EQ(found->scan.number, ledger.numbers[i]);
-      EXPECT_THAT(reader->GetChunk(robot * 1'000'000 + sequence, 0), IsOkAndHolds(bytes));
-      ++known;
-    }
+// Everything acknowledged is there with its bytes, and nothing is there that was refused.
+void Check(StorageReader& reader, std::uint64_t robot, const Ledger& ledger) {
+  const std::string bytes(20'000, static_cast<char>('a' + robot));
+  for (std::size_t i = 0; i < ledger.acknowledged.size(); ++i) {
+    const std::uint64_t sequence = ledger.acknowledged[i];
+    STRATA_ASSERT_OK_AND_ASSIGN(const std::optional<PosedScan> found,
+                                reader.FindScan({absl::StrCat("robot ", robot), sequence}, 1));
+    ASSERT_TRUE(found.has_value()) << "robot " << robot << " scan " << sequence << " is lost";
+    EXPECT_EQ(found->scan.number, ledger.numbers[i]);
+    EXPECT_THAT(reader.GetChunk(robot * 1'000'000 + sequence, 0), IsOkAndHolds(bytes));
   }
-  STRATA_ASSERT_OK_AND_ASSIGN(const ScanTotals totals, reader->GetScanTotals());
-  EXPECT_GE(totals.scans, known);
-  EXPECT_LE(totals.scans, known + unknown);
-  EXPECT_GT(known, 20U);
-  ::testing::Test::RecordProperty("acknowledged", static_cast<int>(known));
-  std::printf("%d acknowledged, %d unknown, %d of those there\n",
-              static_cast<int>(known),
-              static_cast<int>(unknown),
-              static_cast<int>(totals.scans - known));
 }
 
-TEST(PostgresCrashTest, NothingAcknowledgedIsLostWhenTheServerDies) {
+struct Case {
+  const char* name;
+  bool alone;  // a map a robot, open once; otherwise all write one
+};
+
+class PostgresCrashTest : public ::testing::TestWithParam<Case> {
+ protected:
+  absl::StatusOr<std::unique_ptr<MapStorage>> Open(const PostgresMaps& maps,
+                                                   std::uint64_t robot) const {
+    const bool alone = GetParam().alone;
+    const std::string name = absl::StrCat("map ", alone ? robot : 0);
+    const absl::Status made = maps.Create(name, MapParameters(), absl::Now());
+    if (!made.ok() && !absl::IsAlreadyExists(made)) return made;
+    return alone ? maps.OpenAlone(name) : maps.Open(name);
+  }
+};
+
+TEST_P(PostgresCrashTest, NothingAcknowledgedIsLostWhenTheServerDies) {
   auto started = PostgresCluster::Start(PostgresCluster::Disk::kSynced);
   if (absl::IsFailedPrecondition(started.status())) GTEST_SKIP() << started.status().message();
   STRATA_ASSERT_OK(started);
@@ -113,7 +109,6 @@ TEST(PostgresCrashTest, NothingAcknowledgedIsLostWhenTheServerDies) {
   PostgresOptions options;
   options.where = cluster.Address();
   STRATA_ASSERT_OK_AND_ASSIGN(const PostgresMaps maps, PostgresMaps::Connect(options));
-  STRATA_ASSERT_OK(maps.Create("map", MapParameters(), absl::Now()));
 
   constexpr std::uint64_t kRobots = 4;
   constexpr int kCrashes = 3;
@@ -121,11 +116,17 @@ TEST(PostgresCrashTest, NothingAcknowledgedIsLostWhenTheServerDies) {
   std::printf("seed %u\n", seed);
   std::mt19937 random(seed);
   std::uniform_int_distribution<int> pause_ms(100, 500);
+  std::vector<std::unique_ptr<MapStorage>> storages;
+  for (std::uint64_t robot = 0; robot < kRobots; ++robot) {
+    STRATA_ASSERT_OK_AND_ASSIGN(std::unique_ptr<MapStorage> storage, Open(maps, robot));
+    storages.push_back(std::move(storage));
+  }
   std::atomic<bool> stop = false;
   std::vector<Ledger> ledgers(kRobots);
   std::vector<std::thread> robots;
   for (std::uint64_t robot = 0; robot < kRobots; ++robot) {
-    robots.emplace_back([&, robot] { Drive(maps, robot, stop, ledgers[robot]); });
+    robots.emplace_back(
+        [&, robot] { Drive(storages[robot]->writer(), robot, stop, ledgers[robot]); });
   }
   absl::Status restarted;
   for (int crash = 0; crash < kCrashes && restarted.ok(); ++crash) {
@@ -137,8 +138,33 @@ TEST(PostgresCrashTest, NothingAcknowledgedIsLostWhenTheServerDies) {
   stop = true;
   for (std::thread& robot : robots) robot.join();
   STRATA_ASSERT_OK(restarted);
-  Check(maps, ledgers);
+
+  std::uint64_t known = 0;
+  std::uint64_t unknown = 0;
+  std::uint64_t there = 0;
+  for (std::uint64_t robot = 0; robot < kRobots; ++robot) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const auto reader, storages[robot]->NewReader());
+    Check(*reader, robot, ledgers[robot]);
+    known += ledgers[robot].acknowledged.size();
+    unknown += ledgers[robot].unknown;
+    if (robot == 0 || GetParam().alone) there += reader->GetScanTotals()->scans;
+  }
+  std::printf("%d acknowledged, %d unknown, %d of those there\n",
+              static_cast<int>(known),
+              static_cast<int>(unknown),
+              static_cast<int>(there - known));
+  EXPECT_GT(known, 20U);
+  EXPECT_GE(there, known);
+  EXPECT_LE(there, known + unknown);
+  if (GetParam().alone) {
+    EXPECT_EQ(unknown, 0U);
+  }
 }
+
+INSTANTIATE_TEST_SUITE_P(Writers,
+                         PostgresCrashTest,
+                         ::testing::Values(Case{"Shared", false}, Case{"Alone", true}),
+                         [](const auto& tested) { return std::string(tested.param.name); });
 
 }  // namespace
 }  // namespace strata::testing

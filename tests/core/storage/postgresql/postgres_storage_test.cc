@@ -189,10 +189,22 @@ TEST_F(PostgresStorageTest, AConnectionCutInTheCommitSaysThatNobodyKnows) {
       "PERFORM pg_terminate_backend(pg_backend_pid()); PERFORM pg_sleep(1); RETURN NULL; END $f$; "
       "CREATE CONSTRAINT TRIGGER late_fault AFTER INSERT ON truth_chunk DEFERRABLE INITIALLY "
       "DEFERRED FOR EACH ROW EXECUTE FUNCTION fail_late()"));
+  EXPECT_THAT(storage_->writer().Commit(Durability::kRelaxed,
+                                        [&] { return storage_->writer().PutChunk(1, 0, "a"); }),
+              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("outcome unknown")));
+  // Of a full one nothing was committed, and another may have written since.
   int runs = 0;
   EXPECT_THAT(PutPiece(2, &runs),
               StatusIs(absl::StatusCode::kUnavailable, HasSubstr("outcome unknown")));
   EXPECT_EQ(runs, 1);
+  // Nobody else has: it is known, and made again.
+  STRATA_ASSERT_OK_AND_ASSIGN(storage_, maps_->OpenAlone(name_));
+  runs = 0;
+  EXPECT_THAT(PutPiece(2, &runs),
+              StatusIs(absl::StatusCode::kUnavailable, Not(HasSubstr("outcome unknown"))));
+  EXPECT_EQ(runs, 6);
+  STRATA_ASSERT_OK(other_->Execute("DROP TRIGGER late_fault ON truth_chunk"));
+  STRATA_EXPECT_OK(PutPiece(2));
 }
 
 TEST_F(PostgresStorageTest, WhoeverWaitsForTheMapsRowForTooLongIsTold) {
@@ -223,6 +235,34 @@ TEST_F(PostgresStorageTest, NamesAreValuesNeverSql) {
   EXPECT_EQ(Reader()->ListEpochs()->front().reason, evil);
   STRATA_EXPECT_OK(maps_->Delete(evil));
   EXPECT_THAT(maps_->Delete(evil), StatusIs(absl::StatusCode::kNotFound, HasSubstr(evil)));
+}
+
+TEST_F(PostgresStorageTest, WhoeverOpensAMapAloneKeepsOthersOut) {
+  STRATA_ASSERT_OK_AND_ASSIGN(storage_, maps_->OpenAlone(name_));
+  STRATA_EXPECT_OK(PutPiece(1));
+  STRATA_EXPECT_OK(storage_->CheckInPlace());
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto later, maps_->OpenAlone(name_));
+  const auto refused = StatusIs(absl::StatusCode::kUnavailable, HasSubstr("another process"));
+  EXPECT_THAT(PutPiece(2), refused);
+  EXPECT_THAT(storage_->writer().Commit(Durability::kRelaxed,
+                                        [&] { return storage_->writer().PutChunk(2, 0, "a"); }),
+              refused);
+  EXPECT_THAT(storage_->CheckInPlace(), refused);
+  STRATA_EXPECT_OK(later->writer().Commit(Durability::kFull,
+                                          [&] { return later->writer().PutChunk(3, 0, "b"); }));
+  EXPECT_THAT(Reader()->LastUpload(), IsOkAndHolds(3U));
+}
+
+TEST_F(PostgresStorageTest, TheClockOfADeletedMapIsRemembered) {
+  STRATA_ASSERT_OK(storage_->writer().Commit(Durability::kFull, [&]() -> absl::Status {
+    std::uint64_t number = 0;
+    while (number < 1000) {
+      STRATA_ASSIGN_OR_RETURN(number, storage_->writer().NextCommitSequence());
+    }
+    return absl::OkStatus();
+  }));
+  STRATA_ASSERT_OK(maps_->Delete(name_));
+  EXPECT_GE(*maps_->RemovedClock(), 1000U);
 }
 
 TEST_F(PostgresStorageTest, ADeletedMapLeavesItsNameAndNoRows) {
