@@ -21,6 +21,7 @@
 
 namespace strata {
 
+// A map as it was opened.
 struct OpenedMap {
   std::int64_t number = 0;
   std::string name;
