@@ -7,13 +7,13 @@ set -euo pipefail
 packages=(
   ca-certificates ccache cmake g++ git mold ninja-build pkg-config
   libabsl-dev libassimp-dev libboost-dev libbz2-dev libceres-dev libcli11-dev libeigen3-dev libexpat1-dev libfcl-dev libgeographiclib-dev libgoogle-glog-dev
-  libgrpc++-dev liblz4-dev liblzf-dev libmeshoptimizer-dev libnanoflann-dev libopenblas-serial-dev libpcap-dev libpcl-dev libpng-dev libprotobuf-dev
+  libgrpc++-dev liblz4-dev liblzf-dev libmeshoptimizer-dev libnanoflann-dev libopenblas-serial-dev libpcap-dev libpcl-dev libpng-dev libpq-dev libprotobuf-dev
   libqhull-dev libsqlite3-dev libssl-dev libtiff-dev liburdfdom-dev libxxhash-dev libyaml-cpp-dev libzstd-dev nlohmann-json3-dev prometheus-cpp-dev
   protobuf-compiler protobuf-compiler-grpc python3 zlib1g-dev
 )
 # strata-ros2 is built where cyclonedds-dev and cyclonedds-tools are; libfastrtps-dev is the robot that it is tried on.
 if [[ "${1:-}" == --dev ]]; then
-  packages+=(clang clang-format clang-tidy coinor-libclp-dev coinor-libipopt-dev cyclonedds-dev cyclonedds-tools dpkg-dev file libbenchmark-dev libcgal-dev libclang-rt-dev libdlib-dev libfastrtps-dev libgdal-dev libgmock-dev libgtest-dev liboctomap-dev libtinygltf-dev mmdebstrap openssl python3-grpcio python3-numpy python3-protobuf python3-xxhash python3-zstandard sqlite3 systemd)
+  packages+=(clang clang-format clang-tidy coinor-libclp-dev coinor-libipopt-dev cyclonedds-dev cyclonedds-tools dpkg-dev file libbenchmark-dev libcgal-dev libclang-rt-dev libdlib-dev libfastrtps-dev libgdal-dev libgmock-dev libgtest-dev liboctomap-dev libtinygltf-dev mmdebstrap openssl postgresql-15 python3-grpcio python3-numpy python3-protobuf python3-xxhash python3-zstandard sqlite3 systemd)
 fi
 
 missing=()

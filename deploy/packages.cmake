@@ -36,7 +36,7 @@ set(CPACK_COMPONENT_DEV_DESCRIPTION "headers and libraries of the map database S
  For find_package(strata): the database in a program, or its client.")
 set(CPACK_DEBIAN_DEV_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
-    "libabsl-dev, libassimp-dev, libboost-dev, libbz2-dev, libceres-dev, libeigen3-dev, libexpat1-dev, libfcl-dev, libgeographiclib-dev, libgoogle-glog-dev, libgrpc++-dev, liblz4-dev, liblzf-dev, libmeshoptimizer-dev, libnanoflann-dev, libopenblas-serial-dev, libpcap-dev, libpcl-dev, libprotobuf-dev, libqhull-dev, libsqlite3-dev, libtiff-dev, liburdfdom-dev, libxxhash-dev, libyaml-cpp-dev, libzstd-dev, zlib1g-dev"
+    "libabsl-dev, libassimp-dev, libboost-dev, libbz2-dev, libceres-dev, libeigen3-dev, libexpat1-dev, libfcl-dev, libgeographiclib-dev, libgoogle-glog-dev, libgrpc++-dev, liblz4-dev, liblzf-dev, libmeshoptimizer-dev, libnanoflann-dev, libopenblas-serial-dev, libpcap-dev, libpcl-dev, libpq-dev, libprotobuf-dev, libqhull-dev, libsqlite3-dev, libtiff-dev, liburdfdom-dev, libxxhash-dev, libyaml-cpp-dev, libzstd-dev, zlib1g-dev"
 )
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-strata)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_ARCHITECTURE all)

@@ -65,6 +65,12 @@ void Add(CLI::App& app,
 void AddPlaces(CLI::App& app, Written& o) {
   app.add_option("--data", o.data, "Directory that holds the maps; made if absent")
       ->type_name("DIR");
+  app.add_option(
+         "--store",
+         o.engine.store,
+         "Database that holds the maps instead (PostgreSQL 15), as libpq takes it; passwords "
+         "belong in a file (PGPASSFILE), not here. --data is then for files under way")
+      ->type_name("postgresql://USER@HOST/DATABASE");
   app.add_option("--listen", o.server.listen, "Address to listen on; port 0 takes a free one")
       ->type_name("HOST:PORT")
       ->capture_default_str();

@@ -60,7 +60,7 @@ STOREYS = {
     "core/planning": ["floors", HERE, "ground"],
     "core/planes": ["models", HERE],
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
-    "core/storage": ["sqlite", HERE],
+    "core/storage": ["postgresql", "sqlite", HERE],
     "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "objects", "models", "ingest", "tiles", "scans", "map"],
     "client/formats": ["planes", "foxglove", "bags", "motion", "shapes", HERE, "packets", "survey", "laz", "parsing", "grid"],
     "client/cli": [HERE, "map", "scan", "posegraph", "plan", "classifier", "planes", "objects", "egomotion", "job", "heights", "mesh", "picture", "terminal"],
@@ -72,6 +72,7 @@ MOST_FILES = 40
 # external header pattern: rooms that may include it
 EXTERNAL = {
     r"sqlite3\.h": ["core/storage/sqlite", "client/formats/bags"],
+    r"libpq-fe\.h": ["core/storage/postgresql"],
     r"ceres/.*": ["core/posegraph/costs", "core/posegraph/solver", "core/egomotion/smoothing"],
     r"(grpc|grpcpp)/.*|google/protobuf/.*|.*\.pb\.h": ["proto", "server", "client/sdk"],
     r"openssl/.*": ["server"],

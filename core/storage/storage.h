@@ -1,5 +1,6 @@
-// What is durable for one map, whoever keeps it. core/storage/sqlite implements it on one file; a
-// networked database can implement it later. Blobs are opaque here; codecs check them.
+// What is durable for one map, whoever keeps it: core/storage/sqlite in one file,
+// core/storage/postgresql in a database with other maps. Blobs are opaque here; codecs check them.
+// Texts are UTF-8 without zero bytes; a store may refuse others with INVALID_ARGUMENT.
 #ifndef STRATA_CORE_STORAGE_STORAGE_H_
 #define STRATA_CORE_STORAGE_STORAGE_H_
 
@@ -57,10 +58,6 @@ class StorageReader {
   // By number.
   virtual absl::StatusOr<std::vector<PosedScan>> ListScans(const ScanQuery& query,
                                                            std::uint64_t epoch) = 0;
-  // The integrated scan of `trajectory` with the largest sequence below `sequence`.
-  virtual absl::StatusOr<std::optional<PosedScan>> FindPredecessor(absl::string_view trajectory,
-                                                                   std::uint64_t sequence,
-                                                                   std::uint64_t epoch) = 0;
   virtual absl::StatusOr<UploadState> GetUploadState(absl::string_view trajectory) = 0;
   virtual absl::StatusOr<ScanTotals> GetScanTotals() = 0;
   // Largest upload number in use, of scans and of chunks without one.
@@ -148,7 +145,12 @@ class StorageWriter {
  public:
   virtual ~StorageWriter() = default;
 
-  // Runs `body` in one transaction: all of it or, on an error, nothing.
+  // Runs `body` in one transaction: all of it or, on an error, nothing. A store that others write
+  // to as well may run `body` again, a few times, each time on the state that it then finds: what
+  // it leaves in the memory of its caller must be what its last run left alone. ABORTED: others
+  // were in the way each time. UNAVAILABLE with "outcome unknown" in the message where the store
+  // went away while it committed: the caller looks, later, whether what it wrote is there, or
+  // writes it again in a form that does no harm twice.
   virtual absl::Status Commit(Durability durability, absl::FunctionRef<absl::Status()> body) = 0;
   // A part of a commit that fails alone: on an error only what `body` did is undone.
   virtual absl::Status Part(absl::FunctionRef<absl::Status()> body) = 0;
@@ -236,8 +238,6 @@ class StorageWriter {
   virtual absl::Status DeleteMlsTile(const TileKey& key) = 0;
   // Older rows of one tile.
   virtual absl::Status DeleteOlderMlsTiles(const TileKey& key, std::uint64_t version) = 0;
-  // Older rows of all tiles.
-  virtual absl::Status DeleteAllMlsTilesBelow(std::uint64_t version) = 0;
   // Rows of one tile that nobody who reads at `floor` or later can see.
   virtual absl::Status CollectSurfaceTile(const TileKey& key, std::uint64_t floor) = 0;
   // The same for all tiles.

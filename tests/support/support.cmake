@@ -106,3 +106,12 @@ endif()
 # For LD_PRELOAD.
 add_library(strata_jumping_clock MODULE faults/jumping_clock.cc)
 target_link_libraries(strata_jumping_clock PRIVATE strata_build_options ${CMAKE_DL_LIBS})
+
+# PostgreSQL servers of a test's own.
+strata_library(
+  postgres_cluster
+  NO_INSTALL
+  SOURCES postgres_cluster.cc
+  HEADERS postgres_cluster.h
+  DEPS strata::storage_postgresql strata::test_support
+)

@@ -18,8 +18,17 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
                                                const std::filesystem::path& file,
                                                const EngineOptions& options,
                                                std::shared_ptr<CacheBudget> caches) {
+  STRATA_ASSIGN_OR_RETURN(StoredMap stored, OpenMapFile(file, options));
+  return Open(name, std::move(stored), options, std::move(caches));
+}
+
+absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
+                                               StoredMap stored,
+                                               const EngineOptions& options,
+                                               std::shared_ptr<CacheBudget> caches) {
   std::shared_ptr<Map> map(new Map());
-  STRATA_ASSIGN_OR_RETURN(map->core_, MapCore::Open(name, file, options, std::move(caches)));
+  STRATA_ASSIGN_OR_RETURN(map->core_,
+                          MapCore::Open(name, std::move(stored), options, std::move(caches)));
   STRATA_ASSIGN_OR_RETURN(map->quarantine_, Quarantine::Open(*map->core_));
   STRATA_ASSIGN_OR_RETURN(map->jobs_, JobBoard::Open(*map->core_, *map->quarantine_));
   STRATA_ASSIGN_OR_RETURN(map->uploads_, UnfinishedUploads::Open(*map->core_));

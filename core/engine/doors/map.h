@@ -18,6 +18,7 @@
 #include "core/engine/jobs/job_board.h"
 #include "core/engine/jobs/job_runner.h"
 #include "core/engine/map/map_core.h"
+#include "core/engine/map/map_stores.h"
 #include "core/engine/map/quarantine.h"
 #include "core/engine/tiles/served_tiles.h"
 
@@ -26,6 +27,11 @@ namespace strata {
 // Thread-safe.
 class Map {
  public:
+  static absl::StatusOr<std::shared_ptr<Map>> Open(const std::string& name,
+                                                   StoredMap stored,
+                                                   const EngineOptions& options,
+                                                   std::shared_ptr<CacheBudget> caches);
+  // A map in a file.
   static absl::StatusOr<std::shared_ptr<Map>> Open(const std::string& name,
                                                    const std::filesystem::path& file,
                                                    const EngineOptions& options,

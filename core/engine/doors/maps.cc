@@ -57,7 +57,9 @@ absl::Duration PendingAge(Map& map, StorageReader& reader) {
 MapNumbers NumbersOfMap(Map& map, const std::filesystem::path& file) {
   MapNumbers numbers;
   numbers.map = map.core().name();
+  // A database does not say what a map takes of it.
   for (const char* suffix : {"", "-wal"}) {
+    if (file.empty()) break;
     std::error_code error;
     const std::uintmax_t bytes = std::filesystem::file_size(file.string() + suffix, error);
     if (error) continue;
@@ -104,7 +106,7 @@ EngineNumbers EngineMaps::Numbers() const {
   }
   for (const std::shared_ptr<Map>& map : open) {
     const std::string& name = map->core().name();
-    numbers.maps.push_back(NumbersOfMap(*map, directory_.FileOf(name)));
+    numbers.maps.push_back(NumbersOfMap(*map, stores_->FileOf(name)));
     absl::MutexLock lock(&mutex_);
     const auto backed_up = backed_up_.find(name);
     if (backed_up != backed_up_.end()) numbers.maps.back().backed_up = backed_up->second;
@@ -166,17 +168,22 @@ class EngineMaps::CopyTurn {
 };
 
 absl::StatusOr<std::unique_ptr<EngineMaps>> EngineMaps::Open(const EngineOptions& options) {
-  STRATA_ASSIGN_OR_RETURN(MapDirectory directory, MapDirectory::Open(options.directory));
-  STRATA_ASSIGN_OR_RETURN(const std::vector<std::string> names, directory.ListNames());
-  std::unique_ptr<EngineMaps> maps(new EngineMaps(options, std::move(directory)));
+  STRATA_ASSIGN_OR_RETURN(MapDirectory owned, MapDirectory::Open(options.directory));
+  auto directory = std::make_unique<const MapDirectory>(std::move(owned));
+  STRATA_ASSIGN_OR_RETURN(std::unique_ptr<const MapStores> stores,
+                          OpenMapStores(options, *directory));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<std::string> names, stores->List());
+  std::unique_ptr<EngineMaps> maps(
+      new EngineMaps(options, std::move(directory), std::move(stores)));
   absl::MutexLock lock(&maps->mutex_);
   for (const std::string& name : names) maps->maps_.emplace(name, maps->OpenMap(name));
   return maps;
 }
 
 absl::StatusOr<std::shared_ptr<Map>> EngineMaps::OpenMap(const std::string& name) const {
+  absl::StatusOr<StoredMap> stored = stores_->Open(name);
   absl::StatusOr<std::shared_ptr<Map>> map =
-      Map::Open(name, directory_.FileOf(name), options_, caches_);
+      stored.ok() ? Map::Open(name, *std::move(stored), options_, caches_) : stored.status();
   if (!map.ok()) {
     LOG(ERROR) << LogLine("map").Add("map", name).Add("not_opened", map.status().message());
   }
@@ -223,10 +230,10 @@ absl::StatusOr<MapInfo> EngineMaps::Create(const api::Call& call,
   const std::string key(name);
   STRATA_RETURN_IF_ERROR(Reserve(key));
   // Without the lock: every call looks for its map, and this waits for the disk.
-  const absl::Status made = directory_.CreateFile(key, parameters, absl::Now());
+  const absl::Status made = stores_->Create(key, parameters, absl::Now());
   const absl::StatusOr<std::shared_ptr<Map>> map = made.ok() ? OpenMap(key) : made;
   // Nobody has put anything into one that does not open.
-  const bool stays = map.ok() || (made.ok() && !directory_.RemoveFile(key, 0).ok());
+  const bool stays = map.ok() || (made.ok() && !stores_->Delete(key, 0).ok());
   absl::MutexLock lock(&mutex_);
   if (stays) {
     maps_.insert_or_assign(key, map);
@@ -276,7 +283,7 @@ absl::StatusOr<std::shared_ptr<Map>> EngineMaps::Withdraw(absl::string_view name
   } else if (opening_.contains(it->first)) {
     return absl::AbortedError(absl::StrCat("map ", it->first, " is being opened; retry"));
   } else {
-    STRATA_RETURN_IF_ERROR(directory_.CheckRemovable(name));
+    STRATA_RETURN_IF_ERROR(stores_->CheckRemovable(name));
   }
   it->second = absl::AbortedError(absl::StrCat("map ", it->first, " is being deleted"));
   return map;
@@ -295,7 +302,7 @@ absl::Status EngineMaps::Delete(const api::Call& call, absl::string_view name) {
   absl::Status removed;
   {
     absl::MutexLock lock(&removing_);
-    removed = directory_.RemoveFile(name, clock);
+    removed = stores_->Delete(name, clock);
   }
   absl::MutexLock lock(&mutex_);
   maps_.erase(std::string(name));
@@ -379,8 +386,9 @@ absl::Status EngineMaps::Backup(const api::Call& call,
     return absl::ResourceExhaustedError(
         absl::StrCat("map ", name, ": another backup of it runs; try again later"));
   }
-  const absl::Status done = BackUp(map->core(), directory_.CopyOf(name), call.stop, sink);
-  directory_.RemoveCopy(name).IgnoreError();  // its journal, too; if this fails the next start does
+  const absl::Status done = BackUp(map->core(), directory_->CopyOf(name), call.stop, sink);
+  directory_->RemoveCopy(name)
+      .IgnoreError();  // its journal, too; if this fails the next start does
   STRATA_RETURN_IF_ERROR(done);
   absl::MutexLock lock(&mutex_);
   backed_up_[std::string(name)] = absl::Now();

@@ -1,4 +1,4 @@
-// The maps of a directory, by name: api::Maps.
+// The maps of an engine, by name: api::Maps.
 #ifndef STRATA_CORE_ENGINE_DOORS_MAPS_H_
 #define STRATA_CORE_ENGINE_DOORS_MAPS_H_
 
@@ -20,13 +20,14 @@
 #include "core/engine/doors/map.h"
 #include "core/engine/map/directory.h"
 #include "core/engine/map/engine_options.h"
+#include "core/engine/map/map_stores.h"
 #include "core/engine/map/numbers.h"
 
 namespace strata {
 
 class EngineMaps final : public api::Maps {
  public:
-  // Opens every map of the directory; one that does not open is kept with the reason.
+  // Opens every map of the store; one that does not open is kept with the reason.
   static absl::StatusOr<std::unique_ptr<EngineMaps>> Open(const EngineOptions& options);
 
   // NOT_FOUND; or why its file did not open. Where that was for want of room or of a disk that
@@ -65,9 +66,12 @@ class EngineMaps final : public api::Maps {
                       absl::FunctionRef<absl::Status(const api::BackupPiece&)> sink) override;
 
  private:
-  EngineMaps(const EngineOptions& options, MapDirectory directory)
+  EngineMaps(const EngineOptions& options,
+             std::unique_ptr<const MapDirectory> directory,
+             std::unique_ptr<const MapStores> stores)
       : options_(options),
         directory_(std::move(directory)),
+        stores_(std::move(stores)),
         caches_(std::make_shared<CacheBudget>(options.cache_bytes)) {}
   absl::StatusOr<std::shared_ptr<Map>> OpenMap(const std::string& name) const;
   // The map if it can be opened now.
@@ -80,7 +84,8 @@ class EngineMaps final : public api::Maps {
   class CopyTurn;
 
   const EngineOptions options_;
-  const MapDirectory directory_;
+  const std::unique_ptr<const MapDirectory> directory_;
+  const std::unique_ptr<const MapStores> stores_;
   const std::shared_ptr<CacheBudget> caches_;  // of all maps
   absl::Mutex removing_;                       // one map's file is removed at a time
   mutable absl::Mutex mutex_;

@@ -14,6 +14,9 @@ namespace strata {
 absl::Status EngineOptions::Validate() const {
   std::vector<std::string> faults;
   if (directory.empty()) faults.emplace_back("directory is empty");
+  if (!store.empty() && max_map_bytes > 0) {
+    faults.emplace_back("max_map_bytes is set, but the maps are in a database");
+  }
   if (queue_bytes < (std::size_t{1} << 20)) faults.emplace_back("queue_bytes is below 1 MiB");
   if (max_points_per_scan == 0) faults.emplace_back("max_points_per_scan is 0");
   if (max_maps == 0) faults.emplace_back("max_maps is 0");

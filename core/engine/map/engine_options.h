@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 
 #include "absl/status/status.h"
 #include "absl/time/time.h"
@@ -17,6 +18,10 @@ inline constexpr absl::Duration kRetryDelay = absl::Seconds(1);
 struct EngineOptions {
   // Where the maps lie, one file each; made if it is not there. Owned by one engine at a time.
   std::filesystem::path directory;
+  // The database that the maps are in instead, "postgresql://USER@HOST/DATABASE"; the directory
+  // then holds copies while they are sent. Empty: none. A map is written by the engine that opened
+  // it last.
+  std::string store;
   // Larger scans are refused.
   std::uint64_t max_points_per_scan = 100'000'000;
   // Acknowledged scans of a map that may wait for integration; more are refused until it caught up.
@@ -28,7 +33,7 @@ struct EngineOptions {
   std::size_t cache_bytes = std::size_t{160} << 20;
   // Maps there may be; one more is refused with RESOURCE_EXHAUSTED.
   std::uint64_t max_maps = 10'000;
-  // Largest size of a map's file; 0: none.
+  // Largest size of a map's file; 0: none. Not with `store`.
   std::uint64_t max_map_bytes = 0;
   // Threads that each map uses for integration, edits, plans, the search for places and, where a
   // job says no other number, for jobs; in [1, 64]. Results do not depend on it. No flag of a

@@ -15,7 +15,6 @@
 
 #include "core/common/status.h"
 #include "core/common/stop.h"
-#include "core/storage/sqlite/sqlite_storage.h"
 #include "core/storage/storage.h"
 
 namespace strata {
@@ -36,20 +35,25 @@ absl::StatusOr<std::unique_ptr<MapCore>> MapCore::Open(const std::string& name,
                                                        const std::filesystem::path& file,
                                                        const EngineOptions& options,
                                                        std::shared_ptr<CacheBudget> caches) {
-  STRATA_ASSIGN_OR_RETURN(
-      std::unique_ptr<MapStorage> storage,
-      OpenSqliteStorage(file, SqliteOptions{.max_file_bytes = options.max_map_bytes}));
-  StorageWriter& writer = storage->writer();
+  STRATA_ASSIGN_OR_RETURN(StoredMap stored, OpenMapFile(file, options));
+  return Open(name, std::move(stored), options, std::move(caches));
+}
+
+absl::StatusOr<std::unique_ptr<MapCore>> MapCore::Open(const std::string& name,
+                                                       StoredMap stored,
+                                                       const EngineOptions& options,
+                                                       std::shared_ptr<CacheBudget> caches) {
+  StorageWriter& writer = stored.storage->writer();
   STRATA_RETURN_IF_ERROR(ClearLeftovers(writer));
   STRATA_ASSIGN_OR_RETURN(MapInfo info, writer.reader().GetMapInfo());
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t last_upload, writer.reader().LastUpload());
   info.name = name;
   return std::unique_ptr<MapCore>(new MapCore(name,
-                                              file,
+                                              stored.file,
                                               options,
                                               std::move(caches),
-                                              std::move(storage),
+                                              std::move(stored.storage),
                                               std::move(info),
                                               clock,
                                               last_upload));

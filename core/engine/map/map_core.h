@@ -21,6 +21,7 @@
 #include "core/engine/map/change_log.h"
 #include "core/engine/map/disk_space.h"
 #include "core/engine/map/engine_options.h"
+#include "core/engine/map/map_stores.h"
 #include "core/engine/map/reader_pool.h"
 #include "core/engine/map/snapshots.h"
 #include "core/engine/map/writer.h"
@@ -33,7 +34,12 @@ namespace strata {
 // Thread-safe.
 class MapCore {
  public:
-  // Opens the file and clears what a crash left half-done in it. `caches`: of all maps.
+  // Clears what a crash left half-done in the map. `caches`: of all maps.
+  static absl::StatusOr<std::unique_ptr<MapCore>> Open(const std::string& name,
+                                                       StoredMap stored,
+                                                       const EngineOptions& options,
+                                                       std::shared_ptr<CacheBudget> caches);
+  // The same of a map in a file.
   static absl::StatusOr<std::unique_ptr<MapCore>> Open(const std::string& name,
                                                        const std::filesystem::path& file,
                                                        const EngineOptions& options,

@@ -125,8 +125,6 @@ std::int64_t Statement::Int(int column) const { return sqlite3_column_int64(stat
 
 double Statement::Real(int column) const { return sqlite3_column_double(statement_, column); }
 
-std::string Statement::Text(int column) const { return std::string(Bytes(column)); }
-
 absl::string_view Statement::Bytes(int column) const {
   const void* data = sqlite3_column_blob(statement_, column);
   const int size = sqlite3_column_bytes(statement_, column);

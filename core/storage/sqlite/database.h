@@ -15,6 +15,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/common/stop.h"
+#include "core/storage/row.h"
 
 struct sqlite3;
 struct sqlite3_stmt;
@@ -28,10 +29,10 @@ struct Blob {
 
 // A prepared statement on loan from its connection; goes back, reset, when it is destroyed. The
 // first error of a bind is kept and answered by Step() or Run().
-class Statement {
+class Statement final : public Row {
  public:
   explicit Statement(sqlite3_stmt* statement) : statement_(statement) {}
-  ~Statement();
+  ~Statement() override;
   Statement(Statement&& other) noexcept : statement_(std::exchange(other.statement_, nullptr)) {}
   Statement& operator=(Statement&&) = delete;
 
@@ -57,12 +58,9 @@ class Statement {
   // Steps to the end.
   absl::Status Run();
 
-  std::int64_t Int(int column) const;
-  std::uint64_t Unsigned(int column) const { return static_cast<std::uint64_t>(Int(column)); }
-  double Real(int column) const;
-  std::string Text(int column) const;
-  // Valid until the next step.
-  absl::string_view Bytes(int column) const;
+  std::int64_t Int(int column) const override;
+  double Real(int column) const override;
+  absl::string_view Bytes(int column) const override;
 
  private:
   void Keep(int code);

@@ -13,6 +13,7 @@
 #include "absl/types/span.h"
 
 #include "core/common/status.h"
+#include "core/storage/format.h"
 #include "core/storage/sqlite/database.h"
 
 namespace strata {

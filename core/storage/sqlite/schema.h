@@ -15,8 +15,6 @@ namespace strata {
 inline constexpr std::int32_t kApplicationId = 0x53545241;
 // Newest format of the truth tables this program reads and writes.
 inline constexpr std::int32_t kTruthVersion = 3;
-// Format of the derived tables and of what is in them; any other is dropped and rebuilt.
-inline constexpr std::int32_t kDerivedVersion = 7;
 
 // Brings a file from its user_version to `migrations.size()`: migration i makes version i + 1 out
 // of version i, each in one transaction with the change of user_version. FAILED_PRECONDITION for a

@@ -6,6 +6,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/common/status.h"
+#include "core/storage/rows.h"
 #include "core/storage/sqlite/database.h"
 #include "core/storage/sqlite/sqlite_reader.h"
 #include "core/storage/sqlite/sqlite_writer.h"
@@ -18,9 +19,7 @@ absl::StatusOr<std::vector<Attempt>> SqliteReader::ListAttempts() {
       database_.Prepare("SELECT kind, id, deaths, under_way FROM attempt ORDER BY kind, id"));
   std::vector<Attempt> attempts;
   STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
-    attempts.push_back({{static_cast<WorkKind>(row.Int(0)), row.Unsigned(1)},
-                        static_cast<std::uint32_t>(row.Unsigned(2)),
-                        row.Int(3) != 0});
+    attempts.push_back(ReadAttempt(row));
     return absl::OkStatus();
   }));
   return attempts;

@@ -13,6 +13,7 @@
 #include "absl/time/time.h"
 
 #include "core/common/status.h"
+#include "core/storage/rows.h"
 #include "core/storage/sqlite/database.h"
 #include "core/storage/sqlite/sqlite_reader.h"
 #include "core/storage/sqlite/sqlite_writer.h"
@@ -22,12 +23,6 @@ namespace {
 
 constexpr std::size_t kPieceBytes = std::size_t{1} << 20;
 
-Colour ColourFrom(std::uint64_t rgb) {
-  return {static_cast<std::uint8_t>(rgb >> 16 & 0xFF),
-          static_cast<std::uint8_t>(rgb >> 8 & 0xFF),
-          static_cast<std::uint8_t>(rgb & 0xFF)};
-}
-
 }  // namespace
 
 absl::StatusOr<std::vector<MapClass>> SqliteReader::ListClasses() {
@@ -35,8 +30,7 @@ absl::StatusOr<std::vector<MapClass>> SqliteReader::ListClasses() {
       Statement row, database_.Prepare("SELECT id, name, colour FROM truth_class ORDER BY id"));
   std::vector<MapClass> classes;
   STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
-    classes.push_back(
-        {static_cast<std::uint16_t>(row.Int(0)), row.Text(1), ColourFrom(row.Unsigned(2))});
+    classes.push_back(ReadMapClass(row));
     return absl::OkStatus();
   }));
   return classes;
@@ -52,14 +46,12 @@ absl::Status SqliteWriter::PutOrigin(const GeodeticOrigin& origin) {
 }
 
 absl::Status SqliteWriter::PutClass(const MapClass& map_class) {
-  const Colour& c = map_class.colour;
-  const std::uint32_t rgb = std::uint32_t{c.r} << 16 | std::uint32_t{c.g} << 8 | c.b;
   const absl::Status put = RunSql(
       "INSERT INTO truth_class (id, name, colour) VALUES (?1, ?2, ?3) "
       "ON CONFLICT (id) DO UPDATE SET name = ?2, colour = ?3",
       std::uint32_t{map_class.id},
       map_class.name,
-      rgb);
+      ColourToColumn(map_class.colour));
   if (!absl::IsAlreadyExists(put)) return put;
   return absl::AlreadyExistsError(
       absl::StrCat("class name ", map_class.name, " is another class's; choose another"));
@@ -104,18 +96,10 @@ absl::Status SqliteWriter::PutLabels(ScanNumber number,
 absl::StatusOr<std::vector<ClassifierInfo>> SqliteReader::ListClassifiers() {
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
-      database_.Prepare("SELECT id, name, created_us, job, description, size_bytes FROM "
-                        "truth_model ORDER BY id"));
+      database_.Prepare("SELECT " STRATA_CLASSIFIER_COLUMNS " FROM truth_model ORDER BY id"));
   std::vector<ClassifierInfo> classifiers;
   STRATA_RETURN_IF_ERROR(ForEachRow(row, [&]() -> absl::Status {
-    ClassifierInfo info;
-    info.id = row.Unsigned(0);
-    info.name = row.Text(1);
-    info.created = absl::FromUnixMicros(row.Int(2));
-    info.job = row.Unsigned(3);
-    info.description = row.Text(4);
-    info.bytes = row.Unsigned(5);
-    classifiers.push_back(std::move(info));
+    classifiers.push_back(ReadClassifier(row));
     return ReadClassifierDetails(classifiers.back());
   }));
   return classifiers;

@@ -1,8 +1,6 @@
 // Truth about poses beyond the poses: constraints, planes, epochs, and what jobs propose.
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +13,8 @@
 #include "absl/time/time.h"
 
 #include "core/common/status.h"
+#include "core/storage/epoch_difference.h"
+#include "core/storage/rows.h"
 #include "core/storage/sqlite/database.h"
 #include "core/storage/sqlite/sqlite_reader.h"
 #include "core/storage/sqlite/sqlite_writer.h"
@@ -22,58 +22,6 @@
 
 namespace strata {
 namespace {
-
-absl::StatusOr<ConstraintRecord> ReadConstraint(const Statement& row) {
-  ConstraintRecord record;
-  Constraint& constraint = record.constraint;
-  constraint.id = row.Unsigned(0);
-  record.scan_i = row.Unsigned(1);
-  record.scan_j = row.Unsigned(2);
-  const std::string what = absl::StrCat("constraint ", constraint.id);
-  absl::StatusOr<Pose> pose = DecodePose(row.Bytes(3));
-  if (!pose.ok()) return Annotate(pose.status(), what);
-  constraint.T_i_j = *pose;
-  absl::StatusOr<Matrix6d> information = DecodeMatrix6(row.Bytes(4));
-  if (!information.ok()) return Annotate(information.status(), what);
-  constraint.information = *information;
-  constraint.origin = static_cast<ConstraintOrigin>(row.Int(5));
-  constraint.enabled = row.Int(6) != 0;
-  constraint.note = row.Text(7);
-  constraint.i = {row.Text(8), row.Unsigned(9)};
-  constraint.j = {row.Text(10), row.Unsigned(11)};
-  constraint.may_be_false = row.Int(12) != 0;
-  return record;
-}
-
-PlaneRecord ReadPlane(const Statement& row) {
-  PlaneRecord record;
-  GlobalPlane& plane = record.plane;
-  plane.id = row.Unsigned(0);
-  plane.plane.normal = {row.Real(1), row.Real(2), row.Real(3)};
-  plane.plane.distance = row.Real(4);
-  plane.kind = static_cast<PlaneKind>(row.Int(5));
-  plane.from_edges = row.Int(6) != 0;
-  plane.enabled = row.Int(7) != 0;
-  plane.note = row.Text(8);
-  return record;
-}
-
-std::uint64_t IdOf(const ConstraintRecord& record) { return record.constraint.id; }
-std::uint64_t IdOf(const PlaneRecord& record) { return record.plane.id; }
-
-// Calls `body` with the records of `a` that are not in `b`; both by id.
-template <typename Record, typename Body>
-absl::Status Difference(const std::vector<Record>& a, const std::vector<Record>& b, Body body) {
-  std::vector<Record> missing;
-  std::set_difference(a.begin(),
-                      a.end(),
-                      b.begin(),
-                      b.end(),
-                      std::back_inserter(missing),
-                      [](const Record& x, const Record& y) { return IdOf(x) < IdOf(y); });
-  for (const Record& record : missing) STRATA_RETURN_IF_ERROR(body(record));
-  return absl::OkStatus();
-}
 
 absl::Status NoSuchConstraint(std::uint64_t id) {
   return absl::NotFoundError(absl::StrCat("constraint ", id, " does not exist"));
@@ -84,9 +32,7 @@ absl::Status NoSuchConstraint(std::uint64_t id) {
 absl::StatusOr<std::vector<ConstraintRecord>> SqliteReader::ListConstraints(std::uint64_t epoch) {
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
-      database_.Prepare("SELECT c.id, c.scan_i, c.scan_j, c.pose, c.information, c.origin, "
-                        "c.enabled, c.note, coalesce(i.trajectory, ''), coalesce(i.sequence, 0), "
-                        "j.trajectory, j.sequence, c.may_be_false FROM truth_constraint AS c "
+      database_.Prepare("SELECT " STRATA_CONSTRAINT_COLUMNS " FROM truth_constraint AS c "
                         "LEFT JOIN truth_scan AS i ON i.number = c.scan_i "
                         "JOIN truth_scan AS j ON j.number = c.scan_j "
                         "WHERE c.since_epoch <= ?1 AND c.until_epoch > ?1 AND c.proposed_by = 0 "
@@ -102,11 +48,10 @@ absl::StatusOr<std::vector<ConstraintRecord>> SqliteReader::ListConstraints(std:
 }
 
 absl::StatusOr<std::vector<PlaneRecord>> SqliteReader::ListPlanes(std::uint64_t epoch) {
-  STRATA_ASSIGN_OR_RETURN(
-      Statement row,
-      database_.Prepare("SELECT id, normal_x, normal_y, normal_z, distance, kind, from_edges, "
-                        "enabled, note FROM truth_plane WHERE since_epoch <= ?1 AND "
-                        "until_epoch > ?1 AND proposed_by = 0 ORDER BY id"));
+  STRATA_ASSIGN_OR_RETURN(Statement row,
+                          database_.Prepare("SELECT " STRATA_PLANE_COLUMNS
+                                            " FROM truth_plane WHERE since_epoch <= ?1 AND "
+                                            "until_epoch > ?1 AND proposed_by = 0 ORDER BY id"));
   row.Bind(epoch);
   std::vector<PlaneRecord> planes;
   STRATA_RETURN_IF_ERROR(ForEachRow(row, [&]() -> absl::Status {
@@ -124,8 +69,7 @@ absl::Status SqliteReader::ReadSupports(PlaneRecord& record) {
                         "WHERE p.plane = ?1 ORDER BY p.scan"));
   row.Bind(record.plane.id);
   return ForEachRow(row, [&] {
-    record.scans.push_back(row.Unsigned(0));
-    record.plane.supports.push_back({{row.Text(3), row.Unsigned(4)}, row.Real(1), row.Real(2)});
+    AddSupport(row, record);
     return absl::OkStatus();
   });
 }
@@ -156,15 +100,7 @@ absl::StatusOr<std::vector<EpochInfo>> SqliteReader::ListEpochs() {
                         "ORDER BY e.epoch DESC"));
   std::vector<EpochInfo> epochs;
   STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
-    EpochInfo info;
-    info.epoch = row.Unsigned(0);
-    info.created = absl::FromUnixMicros(row.Int(1));
-    info.reason = row.Text(2);
-    info.job = row.Unsigned(3);
-    info.decided = row.Unsigned(4);
-    info.current = info.epoch == row.Unsigned(5);
-    info.kept = info.epoch >= row.Unsigned(6);
-    epochs.push_back(std::move(info));
+    epochs.push_back(ReadEpoch(row));
     return absl::OkStatus();
   }));
   return epochs;
@@ -323,26 +259,23 @@ absl::StatusOr<std::uint64_t> SqliteWriter::BeginEpoch(absl::string_view reason,
 
 absl::Status SqliteWriter::RestoreConstraints(std::uint64_t epoch) {
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader_.GetClock());
-  STRATA_ASSIGN_OR_RETURN(const std::vector<ConstraintRecord> then, reader_.ListConstraints(epoch));
-  STRATA_ASSIGN_OR_RETURN(const std::vector<ConstraintRecord> now,
-                          reader_.ListConstraints(clock.epoch));
-  STRATA_RETURN_IF_ERROR(Difference(now, then, [&](const ConstraintRecord& record) {
-    if (record.constraint.origin != ConstraintOrigin::kOptimize) return absl::OkStatus();
-    return RunSql(
-        "UPDATE truth_constraint SET until_epoch = ?2 WHERE id = ?1", IdOf(record), clock.epoch);
-  }));
-  STRATA_RETURN_IF_ERROR(Difference(then, now, [&](const ConstraintRecord& record) {
-    return InsertConstraint(record, 0).status();
-  }));
-  STRATA_ASSIGN_OR_RETURN(const std::vector<PlaneRecord> planes_then, reader_.ListPlanes(epoch));
-  STRATA_ASSIGN_OR_RETURN(const std::vector<PlaneRecord> planes_now,
-                          reader_.ListPlanes(clock.epoch));
-  STRATA_RETURN_IF_ERROR(Difference(planes_now, planes_then, [&](const PlaneRecord& record) {
-    return RunSql(
-        "UPDATE truth_plane SET until_epoch = ?2 WHERE id = ?1", IdOf(record), clock.epoch);
-  }));
-  return Difference(
-      planes_then, planes_now, [&](const PlaneRecord& record) { return InsertPlane(record, 0); });
+  STRATA_ASSIGN_OR_RETURN(const EpochDifference difference,
+                          DifferenceOfEpochs(reader_, epoch, clock.epoch));
+  for (const std::uint64_t id : difference.ended_constraints) {
+    STRATA_RETURN_IF_ERROR(
+        RunSql("UPDATE truth_constraint SET until_epoch = ?2 WHERE id = ?1", id, clock.epoch));
+  }
+  for (const ConstraintRecord& record : difference.restored_constraints) {
+    STRATA_RETURN_IF_ERROR(InsertConstraint(record, 0).status());
+  }
+  for (const std::uint64_t id : difference.ended_planes) {
+    STRATA_RETURN_IF_ERROR(
+        RunSql("UPDATE truth_plane SET until_epoch = ?2 WHERE id = ?1", id, clock.epoch));
+  }
+  for (const PlaneRecord& record : difference.restored_planes) {
+    STRATA_RETURN_IF_ERROR(InsertPlane(record, 0));
+  }
+  return absl::OkStatus();
 }
 
 absl::Status SqliteWriter::ForgetEpochsBefore(std::uint64_t epoch) {

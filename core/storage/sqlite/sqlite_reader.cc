@@ -17,42 +17,25 @@
 #include "absl/time/time.h"
 
 #include "core/common/status.h"
+#include "core/storage/rows.h"
 #include "core/storage/sqlite/database.h"
-#include "core/storage/sqlite/scan_rows.h"
 #include "core/world/value_codec.h"
+
+// A scan with its pose of epoch ?1; needs a WHERE.
+#define STRATA_SELECT_POSED_SCAN                                                            \
+  "SELECT " STRATA_POSED_SCAN_COLUMNS                                                       \
+  " FROM truth_scan AS s LEFT JOIN truth_pose AS p ON "                                     \
+  "p.scan = s.number AND p.epoch = (SELECT max(epoch) FROM truth_pose AS e WHERE e.scan = " \
+  "s.number AND e.epoch <= ?1) "
 
 namespace strata {
 namespace {
-
-RobotProfile ReadProfile(const Statement& row, int column) {
-  RobotProfile profile;
-  profile.radius_m = row.Real(column);
-  profile.height_m = row.Real(column + 1);
-  profile.max_step_m = row.Real(column + 2);
-  profile.max_slope_rad = row.Real(column + 3);
-  profile.max_gap_m = row.Real(column + 4);
-  profile.max_roughness_m = row.Real(column + 5);
-  return profile;
-}
 
 absl::StatusOr<std::optional<PosedScan>> ReadOne(Statement& row) {
   STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
   if (!found) return std::optional<PosedScan>();
   STRATA_ASSIGN_OR_RETURN(PosedScan scan, ReadPosedScan(row));
   return std::optional<PosedScan>(std::move(scan));
-}
-
-JobInfo ReadJob(const Statement& row) {
-  JobInfo job;
-  job.id = row.Unsigned(0);
-  job.kind = row.Text(1);
-  job.state = static_cast<JobState>(row.Int(2));
-  job.progress = row.Real(3);
-  job.phase = row.Text(4);
-  job.message = row.Text(5);
-  job.created = absl::FromUnixMicros(row.Int(6));
-  job.updated = absl::FromUnixMicros(row.Int(7));
-  return job;
 }
 
 }  // namespace
@@ -78,29 +61,13 @@ absl::StatusOr<MapClock> SqliteReader::GetClock() {
 }
 
 absl::StatusOr<MapInfo> SqliteReader::GetMapInfo() {
-  STRATA_ASSIGN_OR_RETURN(
-      Statement row,
-      database_.Prepare(
-          "SELECT m.created_us, m.cell_size_m, m.gap_size_m, m.thickness_m, m.sensor_sigma_m, "
-          "m.sensor_sigma_per_metre, m.sensor_min_range_m, m.sensor_max_range_m, m.keep_points, "
-          "m.has_origin, m.latitude_rad, m.longitude_rad, m.altitude_m, p.radius_m, p.height_m, "
-          "p.max_step_m, p.max_slope_rad, p.max_gap_m, p.max_roughness_m, m.fade_after FROM "
-          "truth_map AS m, "
-          "truth_profile AS p WHERE m.id = 1 AND p.name = 'default'"));
+  STRATA_ASSIGN_OR_RETURN(Statement row,
+                          database_.Prepare("SELECT " STRATA_MAP_INFO_COLUMNS
+                                            " FROM truth_map AS m, truth_profile AS p "
+                                            "WHERE m.id = 1 AND p.name = 'default'"));
   STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
   if (!found) return absl::DataLossError("store: the map's parameters are missing");
-  MapInfo info;
-  info.created = absl::FromUnixMicros(row.Int(0));
-  info.parameters.mls = {row.Real(1), row.Real(2), row.Real(3)};
-  info.parameters.sensor = {row.Real(4), row.Real(5), row.Real(6), row.Real(7)};
-  info.parameters.keep_points = row.Int(8) != 0;
-  if (row.Int(9) != 0) info.parameters.origin = {row.Real(10), row.Real(11), row.Real(12)};
-  info.parameters.default_profile = ReadProfile(row, 13);
-  info.parameters.fade_after = static_cast<std::uint32_t>(row.Int(19));
-  if (const absl::Status valid = ValidateMapParameters(info.parameters); !valid.ok()) {
-    return absl::DataLossError(absl::StrCat("store: ", valid.message()));
-  }
-  return info;
+  return ReadMapInfo(row);
 }
 
 absl::StatusOr<std::optional<PosedScan>> SqliteReader::FindScan(const ScanId& id,
@@ -121,18 +88,6 @@ absl::StatusOr<PosedScan> SqliteReader::GetScan(ScanNumber number, std::uint64_t
   return *std::move(scan);
 }
 
-absl::StatusOr<std::optional<PosedScan>> SqliteReader::FindPredecessor(absl::string_view trajectory,
-                                                                       std::uint64_t sequence,
-                                                                       std::uint64_t epoch) {
-  STRATA_ASSIGN_OR_RETURN(
-      Statement row,
-      database_.Prepare(STRATA_SELECT_POSED_SCAN
-                        "WHERE s.trajectory = ?2 AND s.sequence < ?3 AND s.state = 2 "
-                        "ORDER BY s.sequence DESC LIMIT 1"));
-  row.Bind(epoch, trajectory, sequence);
-  return ReadOne(row);
-}
-
 absl::StatusOr<std::vector<ScanNumber>> SqliteReader::ListScanNumbers() {
   STRATA_ASSIGN_OR_RETURN(Statement row,
                           database_.Prepare("SELECT number FROM truth_scan ORDER BY number"));
@@ -145,23 +100,13 @@ absl::StatusOr<std::vector<ScanNumber>> SqliteReader::ListScanNumbers() {
 }
 
 absl::Status SqliteReader::CheckScanRow(ScanNumber number) {
-  STRATA_ASSIGN_OR_RETURN(Statement row,
-                          database_.Prepare("SELECT trajectory, sequence, header, points, time_us "
-                                            "FROM truth_scan WHERE number = ?1"));
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT " STRATA_SCAN_CHECK_COLUMNS " FROM truth_scan WHERE number = ?1"));
   row.Bind(number);
   STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
   if (!found) return absl::NotFoundError(absl::StrCat("scan number ", number, " does not exist"));
-  STRATA_ASSIGN_OR_RETURN(const ScanHeader header,
-                          DecodeScanHeader({row.Text(0), row.Unsigned(1)}, row.Bytes(2)));
-  if (row.Unsigned(3) != header.point_count) {
-    return absl::DataLossError(
-        absl::StrCat("counted with ", row.Unsigned(3), " points instead of ", header.point_count));
-  }
-  const std::int64_t time_us = absl::ToUnixMicros(header.time);
-  if (row.Int(4) != time_us) {
-    return absl::DataLossError(
-        absl::StrCat("found by time ", row.Int(4), " us instead of ", time_us));
-  }
+  STRATA_RETURN_IF_ERROR(CheckScanColumns(row));
   STRATA_ASSIGN_OR_RETURN(
       Statement pose,
       database_.Prepare("SELECT epoch, pose FROM truth_pose WHERE scan = ?1 ORDER BY epoch"));
@@ -249,12 +194,7 @@ absl::StatusOr<std::vector<UnfinishedUpload>> SqliteReader::ListUnfinishedUpload
                         "ORDER BY u.upload"));
   std::vector<UnfinishedUpload> uploads;
   STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
-    uploads.push_back({.upload = row.Unsigned(0),
-                       .id = {row.Text(1), row.Unsigned(2)},
-                       .content_hash = row.Text(3),
-                       .touched = absl::FromUnixMicros(row.Int(4)),
-                       .chunks = static_cast<std::uint32_t>(row.Int(5)),
-                       .bytes = row.Unsigned(6)});
+    uploads.push_back(ReadUnfinishedUpload(row));
     return absl::OkStatus();
   }));
   return uploads;
@@ -282,8 +222,7 @@ absl::StatusOr<std::string> SqliteReader::GetLocalMap(ScanNumber number) {
 absl::StatusOr<std::map<std::string, RobotProfile>> SqliteReader::ListProfiles() {
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
-      database_.Prepare("SELECT name, radius_m, height_m, max_step_m, max_slope_rad, max_gap_m, "
-                        "max_roughness_m FROM truth_profile ORDER BY name"));
+      database_.Prepare("SELECT " STRATA_PROFILE_COLUMNS " FROM truth_profile ORDER BY name"));
   std::map<std::string, RobotProfile> profiles;
   STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
     profiles[row.Text(0)] = ReadProfile(row, 1);
@@ -314,8 +253,7 @@ absl::Status SqliteReader::ReadJobDetails(JobInfo& job) {
 absl::StatusOr<std::optional<JobInfo>> SqliteReader::FindJob(std::uint64_t id) {
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
-      database_.Prepare("SELECT id, kind, state, progress, phase, message, created_us, updated_us "
-                        "FROM truth_job WHERE id = ?1"));
+      database_.Prepare("SELECT " STRATA_JOB_COLUMNS " FROM truth_job WHERE id = ?1"));
   row.Bind(id);
   STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
   if (!found) return std::optional<JobInfo>();
@@ -326,9 +264,7 @@ absl::StatusOr<std::optional<JobInfo>> SqliteReader::FindJob(std::uint64_t id) {
 
 absl::StatusOr<std::vector<JobInfo>> SqliteReader::ListJobs() {
   STRATA_ASSIGN_OR_RETURN(
-      Statement row,
-      database_.Prepare("SELECT id, kind, state, progress, phase, message, created_us, updated_us "
-                        "FROM truth_job ORDER BY id"));
+      Statement row, database_.Prepare("SELECT " STRATA_JOB_COLUMNS " FROM truth_job ORDER BY id"));
   std::vector<JobInfo> jobs;
   STRATA_RETURN_IF_ERROR(ForEachRow(row, [&]() -> absl::Status {
     jobs.push_back(ReadJob(row));

@@ -35,9 +35,6 @@ class SqliteReader final : public StorageReader {
   absl::Status CheckScanRow(ScanNumber number) override;
   absl::StatusOr<std::vector<PosedScan>> ListScans(const ScanQuery& query,
                                                    std::uint64_t epoch) override;
-  absl::StatusOr<std::optional<PosedScan>> FindPredecessor(absl::string_view trajectory,
-                                                           std::uint64_t sequence,
-                                                           std::uint64_t epoch) override;
   absl::StatusOr<UploadState> GetUploadState(absl::string_view trajectory) override;
   absl::StatusOr<ScanTotals> GetScanTotals() override;
   absl::StatusOr<std::uint64_t> LastUpload() override;

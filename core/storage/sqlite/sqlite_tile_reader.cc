@@ -12,51 +12,17 @@
 
 #include "core/common/status.h"
 #include "core/mls/tile_key.h"
+#include "core/storage/rows.h"
 #include "core/storage/sqlite/database.h"
 #include "core/storage/sqlite/sqlite_reader.h"
 
 namespace strata {
-namespace {
-
-TileKey ReadKey(const Statement& row) {
-  return {static_cast<std::int32_t>(row.Int(0)),
-          static_cast<std::int32_t>(row.Int(1)),
-          static_cast<std::int32_t>(row.Int(2))};
-}
-
-MlsTileRow ReadMlsTile(const Statement& row) {
-  MlsTileRow tile;
-  tile.key = ReadKey(row);
-  tile.version = row.Unsigned(3);
-  tile.patches = row.Unsigned(4);
-  tile.cells = row.Unsigned(5);
-  tile.box.min() = {row.Real(6), row.Real(7), row.Real(8)};
-  tile.box.max() = {row.Real(9), row.Real(10), row.Real(11)};
-  tile.spread_weight = row.Real(12);
-  tile.spread_sum = row.Real(13);
-  tile.digest = row.Text(14);
-  return tile;
-}
-
-SurfaceTileRow ReadSurfaceTile(const Statement& row) {
-  SurfaceTileRow tile;
-  tile.key = ReadKey(row);
-  tile.version = row.Unsigned(3);
-  tile.gone = row.Int(4) != 0;
-  tile.patches = row.Unsigned(5);
-  tile.size_bytes = row.Unsigned(6);
-  return tile;
-}
-
-}  // namespace
-
 absl::StatusOr<std::optional<MlsTileRow>> SqliteReader::FindMlsTile(const TileKey& key,
                                                                     std::uint64_t version) {
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
-      database_.Prepare("SELECT level, x, y, version, patches, cells, min_x, min_y, min_z, max_x, "
-                        "max_y, max_z, spread_weight, spread_sum, digest, bytes FROM "
-                        "derived_mls_tile WHERE level = ?1 AND "
+      database_.Prepare("SELECT " STRATA_MLS_TILE_COLUMNS
+                        ", bytes FROM derived_mls_tile WHERE level = ?1 AND "
                         "x = ?2 AND y = ?3 AND version <= ?4 ORDER BY version DESC LIMIT 1"));
   row.Bind(key.level, key.x, key.y, version);
   STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
@@ -70,9 +36,10 @@ absl::StatusOr<std::optional<SurfaceTileRow>> SqliteReader::FindSurfaceTile(cons
                                                                             std::uint64_t version) {
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
-      database_.Prepare("SELECT level, x, y, version, gone, patches, size_bytes, bytes FROM "
-                        "derived_surface_tile WHERE level = ?1 AND x = ?2 AND y = ?3 AND "
-                        "version <= ?4 ORDER BY version DESC LIMIT 1"));
+      database_.Prepare(
+          "SELECT " STRATA_SURFACE_TILE_COLUMNS
+          ", bytes FROM derived_surface_tile WHERE level = ?1 AND x = ?2 AND y = ?3 AND "
+          "version <= ?4 ORDER BY version DESC LIMIT 1"));
   row.Bind(key.level, key.x, key.y, version);
   STRATA_ASSIGN_OR_RETURN(const bool found, row.Step());
   if (!found || row.Int(4) != 0) return std::optional<SurfaceTileRow>();
@@ -84,8 +51,7 @@ absl::StatusOr<std::optional<SurfaceTileRow>> SqliteReader::FindSurfaceTile(cons
 absl::StatusOr<std::vector<MlsTileRow>> SqliteReader::ListMlsTiles(std::uint64_t version) {
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
-      database_.Prepare("SELECT level, x, y, version, patches, cells, min_x, min_y, min_z, max_x, "
-                        "max_y, max_z, spread_weight, spread_sum, digest FROM derived_mls_tile "
+      database_.Prepare("SELECT " STRATA_MLS_TILE_COLUMNS " FROM derived_mls_tile "
                         "WHERE version <= ?1 AND "
                         "level BETWEEN 0 AND ?2 AND x BETWEEN ?3 AND ?4 AND y BETWEEN ?3 AND ?4 "
                         "ORDER BY level, x, y, version"));
@@ -96,7 +62,7 @@ absl::StatusOr<std::vector<MlsTileRow>> SqliteReader::ListMlsTiles(std::uint64_t
            std::numeric_limits<std::int32_t>::max());
   std::vector<MlsTileRow> tiles;
   STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
-    if (!tiles.empty() && tiles.back().key == ReadKey(row)) tiles.pop_back();
+    if (!tiles.empty() && tiles.back().key == ReadTileKey(row)) tiles.pop_back();
     tiles.push_back(ReadMlsTile(row));
     return absl::OkStatus();
   }));
@@ -107,13 +73,13 @@ absl::StatusOr<std::vector<SurfaceTileRow>> SqliteReader::ListSurfaceTiles(const
                                                                            std::uint64_t version) {
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
-      database_.Prepare("SELECT level, x, y, version, gone, patches, size_bytes FROM "
-                        "derived_surface_tile WHERE level = ?1 AND x >= ?2 AND x < ?3 AND "
+      database_.Prepare("SELECT " STRATA_SURFACE_TILE_COLUMNS
+                        " FROM derived_surface_tile WHERE level = ?1 AND x >= ?2 AND x < ?3 AND "
                         "y >= ?4 AND y < ?5 AND version <= ?6 ORDER BY level, x, y, version"));
   row.Bind(range.level, range.x_min, range.x_max, range.y_min, range.y_max, version);
   std::vector<SurfaceTileRow> tiles;
   STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
-    if (!tiles.empty() && tiles.back().key == ReadKey(row)) tiles.pop_back();
+    if (!tiles.empty() && tiles.back().key == ReadTileKey(row)) tiles.pop_back();
     tiles.push_back(ReadSurfaceTile(row));
     return absl::OkStatus();
   }));
@@ -194,7 +160,7 @@ absl::StatusOr<std::vector<PreparedTileRow>> SqliteReader::ListPreparedTiles() {
       database_.Prepare("SELECT 0, x, y, made_of FROM derived_prepared_tile ORDER BY x, y"));
   std::vector<PreparedTileRow> tiles;
   STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
-    tiles.push_back({ReadKey(row), row.Text(3), ""});
+    tiles.push_back({ReadTileKey(row), row.Text(3), ""});
     return absl::OkStatus();
   }));
   return tiles;
@@ -221,7 +187,7 @@ absl::StatusOr<std::vector<TileKey>> SqliteReader::TilesOfScan(ScanNumber number
   row.Bind(number);
   std::vector<TileKey> tiles;
   STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
-    tiles.push_back(ReadKey(row));
+    tiles.push_back(ReadTileKey(row));
     return absl::OkStatus();
   }));
   return tiles;

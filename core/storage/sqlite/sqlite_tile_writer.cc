@@ -65,10 +65,6 @@ absl::Status SqliteWriter::DeleteOlderMlsTiles(const TileKey& key, std::uint64_t
       version);
 }
 
-absl::Status SqliteWriter::DeleteAllMlsTilesBelow(std::uint64_t version) {
-  return RunSql("DELETE FROM derived_mls_tile WHERE version < ?1", version);
-}
-
 absl::Status SqliteWriter::CollectSurfaceTile(const TileKey& key, std::uint64_t floor) {
   return RunSql(
       "DELETE FROM derived_surface_tile WHERE level = ?1 AND x = ?2 AND y = ?3 AND version < "

@@ -74,7 +74,6 @@ class SqliteWriter final : public StorageWriter {
   absl::Status PutSurfaceTile(const SurfaceTileRow& row) override;
   absl::Status DeleteMlsTile(const TileKey& key) override;
   absl::Status DeleteOlderMlsTiles(const TileKey& key, std::uint64_t version) override;
-  absl::Status DeleteAllMlsTilesBelow(std::uint64_t version) override;
   absl::Status CollectSurfaceTile(const TileKey& key, std::uint64_t floor) override;
   absl::Status CollectAllSurfaceTiles(std::uint64_t floor) override;
   absl::Status PutPreparedTile(const PreparedTileRow& row) override;

@@ -1,0 +1,106 @@
+#include "core/engine/map/map_stores.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "absl/time/time.h"
+
+#include "core/common/status.h"
+#include "core/engine/map/directory.h"
+#include "core/storage/postgresql/postgres_maps.h"
+#include "core/storage/sqlite/sqlite_storage.h"
+#include "core/world/names.h"
+
+namespace strata {
+namespace {
+
+class FileStores final : public MapStores {
+ public:
+  FileStores(const EngineOptions& options, const MapDirectory& directory)
+      : options_(options), directory_(directory) {}
+
+  absl::StatusOr<std::vector<std::string>> List() const override { return directory_.ListNames(); }
+  absl::Status Create(absl::string_view name,
+                      const MapParameters& parameters,
+                      absl::Time created) const override {
+    return directory_.CreateFile(name, parameters, created);
+  }
+  absl::StatusOr<StoredMap> Open(absl::string_view name) const override {
+    return OpenMapFile(FileOf(name), options_);
+  }
+  absl::Status CheckRemovable(absl::string_view name) const override {
+    return directory_.CheckRemovable(name);
+  }
+  absl::Status Delete(absl::string_view name, std::uint64_t clock) const override {
+    return directory_.RemoveFile(name, clock);
+  }
+  std::filesystem::path FileOf(absl::string_view name) const override {
+    return directory_.FileOf(name);
+  }
+
+ private:
+  const EngineOptions options_;
+  const MapDirectory& directory_;
+};
+
+class PostgresStores final : public MapStores {
+ public:
+  explicit PostgresStores(PostgresMaps maps) : maps_(std::move(maps)) {}
+
+  // Names that others put there are no maps of ours.
+  absl::StatusOr<std::vector<std::string>> List() const override {
+    STRATA_ASSIGN_OR_RETURN(std::vector<std::string> names, maps_.List());
+    std::erase_if(names,
+                  [](const std::string& name) { return !ValidateName("map name", name).ok(); });
+    return names;
+  }
+  absl::Status Create(absl::string_view name,
+                      const MapParameters& parameters,
+                      absl::Time created) const override {
+    STRATA_ASSIGN_OR_RETURN(const std::uint64_t removed, maps_.RemovedClock());
+    return maps_.Create(name, parameters, created, removed == 0 ? 0 : removed + 1);
+  }
+  absl::StatusOr<StoredMap> Open(absl::string_view name) const override {
+    STRATA_ASSIGN_OR_RETURN(std::unique_ptr<MapStorage> storage, maps_.OpenAlone(name));
+    return StoredMap{std::move(storage), {}};
+  }
+  absl::Status CheckRemovable(absl::string_view) const override { return absl::OkStatus(); }
+  absl::Status Delete(absl::string_view name, std::uint64_t) const override {
+    const absl::Status deleted = maps_.Delete(name);
+    return absl::IsNotFound(deleted) ? absl::OkStatus() : deleted;
+  }
+  std::filesystem::path FileOf(absl::string_view) const override { return {}; }
+
+ private:
+  PostgresMaps maps_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<MapStores>> OpenMapStores(const EngineOptions& options,
+                                                         const MapDirectory& directory) {
+  if (options.store.empty()) return std::make_unique<FileStores>(options, directory);
+  PostgresOptions database;
+  database.where = options.store;
+  STRATA_ASSIGN_OR_RETURN(PostgresMaps maps, PostgresMaps::Connect(database));
+  return std::make_unique<PostgresStores>(std::move(maps));
+}
+
+absl::StatusOr<StoredMap> OpenMapFile(const std::filesystem::path& file,
+                                      const EngineOptions& options) {
+  SqliteOptions sqlite;
+  sqlite.max_file_bytes = options.max_map_bytes;
+  STRATA_ASSIGN_OR_RETURN(std::unique_ptr<MapStorage> storage, OpenSqliteStorage(file, sqlite));
+  return StoredMap{std::move(storage), file};
+}
+
+}  // namespace strata

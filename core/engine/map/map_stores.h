@@ -1,0 +1,61 @@
+// Where an engine keeps its maps: files in its directory, or a database.
+#ifndef STRATA_CORE_ENGINE_MAP_MAP_STORES_H_
+#define STRATA_CORE_ENGINE_MAP_MAP_STORES_H_
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/time/time.h"
+
+#include "core/engine/map/directory.h"
+#include "core/engine/map/engine_options.h"
+#include "core/storage/storage.h"
+#include "core/world/map_info.h"
+
+namespace strata {
+
+// A map's store, and where its bytes lie; an empty path: not on a disk of this machine.
+struct StoredMap {
+  std::unique_ptr<MapStorage> storage;
+  std::filesystem::path file;
+};
+
+// Thread-safe. Names must be valid (ValidateName).
+class MapStores {
+ public:
+  virtual ~MapStores() = default;
+
+  // Sorted.
+  virtual absl::StatusOr<std::vector<std::string>> List() const = 0;
+  // All or nothing, also when the power fails. ALREADY_EXISTS. The map's clock begins behind those
+  // of all maps that were removed, so that nobody takes it for one of them.
+  virtual absl::Status Create(absl::string_view name,
+                              const MapParameters& parameters,
+                              absl::Time created) const = 0;
+  // For this engine alone: whoever had it open in another can write it no more.
+  virtual absl::StatusOr<StoredMap> Open(absl::string_view name) const = 0;
+  // FAILED_PRECONDITION for what is no map; OK also where there is nothing.
+  virtual absl::Status CheckRemovable(absl::string_view name) const = 0;
+  // The map must be closed. `clock`: where it stood; 0: unknown. OK also where there is nothing.
+  virtual absl::Status Delete(absl::string_view name, std::uint64_t clock) const = 0;
+  // As of StoredMap, of a map that need not be there.
+  virtual std::filesystem::path FileOf(absl::string_view name) const = 0;
+};
+
+// Those of options.store; `directory`, which must outlive them, is where files lie.
+absl::StatusOr<std::unique_ptr<MapStores>> OpenMapStores(const EngineOptions& options,
+                                                         const MapDirectory& directory);
+
+// A map in a file of any name.
+absl::StatusOr<StoredMap> OpenMapFile(const std::filesystem::path& file,
+                                      const EngineOptions& options);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_MAP_MAP_STORES_H_

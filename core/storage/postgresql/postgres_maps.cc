@@ -1,0 +1,278 @@
+#include "core/storage/postgresql/postgres_maps.h"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/random/random.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "absl/time/time.h"
+
+#include "core/common/status.h"
+#include "core/storage/format.h"
+#include "core/storage/postgresql/connection.h"
+#include "core/storage/postgresql/connection_pool.h"
+#include "core/storage/postgresql/postgres_reader.h"
+#include "core/storage/postgresql/postgres_writer.h"
+#include "core/storage/postgresql/tables.h"
+
+namespace strata {
+namespace {
+
+// States of map_place.
+constexpr int kThere = 1;
+constexpr int kGoing = 2;
+
+class PostgresStorage final : public MapStorage {
+ public:
+  PostgresStorage(std::shared_ptr<ConnectionPool> pool, const OpenedMap& map)
+      : pool_(pool), map_(map), writer_(std::move(pool), map) {}
+
+  absl::StatusOr<std::unique_ptr<StorageReader>> NewReader() override {
+    return std::make_unique<PostgresReader>(pool_, map_.number);
+  }
+  StorageWriter& writer() override { return writer_; }
+  absl::Status CheckInPlace() const override {
+    STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+    return CheckOwner(lease->Query("SELECT owner FROM truth_map WHERE map = $1", map_.number),
+                      map_);
+  }
+
+ private:
+  std::shared_ptr<ConnectionPool> pool_;
+  OpenedMap map_;
+  PostgresWriter writer_;
+};
+
+absl::Status NoSuchMap(absl::string_view name) {
+  return absl::NotFoundError(absl::StrCat("map ", name, " does not exist"));
+}
+
+// All or nothing; a connection that is left in a transaction is closed by its pool.
+absl::Status InTransaction(Connection& connection, absl::FunctionRef<absl::Status()> body) {
+  STRATA_RETURN_IF_ERROR(connection.Execute("BEGIN"));
+  STRATA_RETURN_IF_ERROR(body());
+  return connection.Execute("COMMIT");
+}
+
+absl::Status InsertMap(Connection& connection,
+                       std::int64_t map,
+                       const MapParameters& parameters,
+                       absl::Time created,
+                       std::uint64_t clock) {
+  const GeodeticOrigin origin = parameters.origin.value_or(GeodeticOrigin());
+  STRATA_RETURN_IF_ERROR(
+      connection
+          .Change("INSERT INTO truth_map (map, created_us, cell_size_m, gap_size_m, thickness_m, "
+                  "sensor_sigma_m, sensor_sigma_per_metre, sensor_min_range_m, sensor_max_range_m, "
+                  "keep_points, has_origin, latitude_rad, longitude_rad, altitude_m, "
+                  "commit_sequence, epoch, last_constraint, oldest_epoch, fade_after, last_model, "
+                  "owner, last_commit) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, "
+                  "$13, $14, "
+                  "$15, 1, 0, "
+                  "1, $16, 0, 0, 0)",
+                  map,
+                  absl::ToUnixMicros(created),
+                  parameters.mls.cell_size_m,
+                  parameters.mls.gap_size_m,
+                  parameters.mls.thickness_m,
+                  parameters.sensor.sigma_m,
+                  parameters.sensor.sigma_per_metre,
+                  parameters.sensor.min_range_m,
+                  parameters.sensor.max_range_m,
+                  parameters.keep_points,
+                  parameters.origin.has_value(),
+                  origin.latitude_rad,
+                  origin.longitude_rad,
+                  origin.altitude_m,
+                  clock,
+                  parameters.fade_after)
+          .status());
+  STRATA_RETURN_IF_ERROR(
+      connection
+          .Change("INSERT INTO truth_epoch (map, epoch, created_us, reason, job) VALUES ($1, 1, "
+                  "$2, 'created', 0)",
+                  map,
+                  absl::ToUnixMicros(created))
+          .status());
+  return connection
+      .Change(
+          "INSERT INTO derived_state (map, schema, tile_version, complete) VALUES ($1, $2, 0, "
+          "1)",
+          map,
+          kDerivedVersion)
+      .status();
+}
+
+absl::Status InsertDefaultProfile(Connection& connection,
+                                  std::int64_t map,
+                                  const RobotProfile& profile) {
+  return connection
+      .Change(
+          "INSERT INTO truth_profile (map, name, radius_m, height_m, max_step_m, "
+          "max_slope_rad, max_gap_m, max_roughness_m) VALUES ($1, 'default', $2, $3, $4, $5, "
+          "$6, $7)",
+          map,
+          profile.radius_m,
+          profile.height_m,
+          profile.max_step_m,
+          profile.max_slope_rad,
+          profile.max_gap_m,
+          profile.max_roughness_m)
+      .status();
+}
+
+// Tiles of another format than this program's are made again, as in a file.
+absl::Status DropOtherDerived(PostgresWriter& writer, ConnectionPool& pool, std::int64_t map) {
+  {
+    STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool.Take());
+    STRATA_ASSIGN_OR_RETURN(
+        Rows state,
+        lease->Query(
+            "SELECT 1 FROM derived_state WHERE map = $1 AND schema = $2", map, kDerivedVersion));
+    if (state.Next()) return absl::OkStatus();
+  }
+  return writer.Commit(Durability::kFull, [&] { return writer.DropDerived(); });
+}
+
+}  // namespace
+
+absl::StatusOr<PostgresMaps> PostgresMaps::Connect(const PostgresOptions& options) {
+  PostgresMaps maps(ConnectionPool::Make(options.where, options.max_connections));
+  std::vector<std::int64_t> going;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, maps.pool_->Take());
+    STRATA_RETURN_IF_ERROR(MakeTables(*lease));
+    STRATA_ASSIGN_OR_RETURN(Rows rows,
+                            lease->Query("SELECT map FROM map_place WHERE state = $1", kGoing));
+    while (rows.Next()) going.push_back(rows.Int(0));
+  }
+  for (const std::int64_t map : going) STRATA_RETURN_IF_ERROR(maps.DeleteRows(map));
+  return maps;
+}
+
+absl::StatusOr<std::vector<std::string>> PostgresMaps::List() const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row,
+      lease->Query("SELECT name FROM map_place WHERE state = $1 ORDER BY name COLLATE \"C\"",
+                   kThere));
+  std::vector<std::string> names;
+  while (row.Next()) names.push_back(row.Text(0));
+  return names;
+}
+
+absl::StatusOr<std::int64_t> PostgresMaps::Find(absl::string_view name) const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row,
+      lease->Query("SELECT map FROM map_place WHERE name = $1 AND state = $2", name, kThere));
+  if (!row.Next()) return NoSuchMap(name);
+  return row.Int(0);
+}
+
+absl::Status PostgresMaps::Create(absl::string_view name,
+                                  const MapParameters& parameters,
+                                  absl::Time created,
+                                  std::uint64_t clock) const {
+  STRATA_RETURN_IF_ERROR(ValidateMapParameters(parameters));
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  return InTransaction(*lease, [&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(
+        Rows place,
+        lease->Query("INSERT INTO map_place (name, state) VALUES ($1, $2) ON CONFLICT DO NOTHING "
+                     "RETURNING map",
+                     name,
+                     kThere));
+    if (!place.Next()) return absl::AlreadyExistsError(absl::StrCat("map ", name, " exists"));
+    const std::int64_t map = place.Int(0);
+    STRATA_RETURN_IF_ERROR(InsertMap(*lease, map, parameters, created, clock));
+    return InsertDefaultProfile(*lease, map, parameters.default_profile);
+  });
+}
+
+absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenAs(absl::string_view name,
+                                                                 std::int64_t owner) const {
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
+  const OpenedMap map{number, std::string(name), owner};
+  if (owner != 0) STRATA_RETURN_IF_ERROR(TakeOver(map));
+  PostgresWriter writer(pool_, map);
+  STRATA_RETURN_IF_ERROR(Annotate(DropOtherDerived(writer, *pool_, number), name));
+  STRATA_RETURN_IF_ERROR(Annotate(writer.reader().GetMapInfo().status(), name));
+  return std::make_unique<PostgresStorage>(pool_, map);
+}
+
+absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::Open(absl::string_view name) const {
+  return OpenAs(name, 0);
+}
+
+absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenAlone(absl::string_view name) const {
+  absl::BitGen random;
+  return OpenAs(name, absl::Uniform<std::int64_t>(random, 1, std::int64_t{1} << 62));
+}
+
+// The lock waits for commits of the owner before, relaxed ones too: what those have staged is there
+// when the new one clears it away.
+absl::Status PostgresMaps::TakeOver(const OpenedMap& map) const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  return InTransaction(*lease, [&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(
+        lease->Query("SELECT 1 FROM truth_map WHERE map = $1 FOR UPDATE", map.number).status());
+    return lease->Change("UPDATE truth_map SET owner = $2 WHERE map = $1", map.number, map.owner)
+        .status();
+  });
+}
+
+absl::StatusOr<std::uint64_t> PostgresMaps::RemovedClock() const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  STRATA_ASSIGN_OR_RETURN(Rows row, lease->Query("SELECT max(removed_clock) FROM strata_format"));
+  return row.Next() ? row.Unsigned(0) : 0;
+}
+
+// Whoever writes holds the map's row, so this waits for commits under way, and later ones find
+// none.
+absl::Status PostgresMaps::Delete(absl::string_view name) const {
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t map, Find(name));
+  {
+    STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+    STRATA_RETURN_IF_ERROR(InTransaction(*lease, [&]() -> absl::Status {
+      STRATA_ASSIGN_OR_RETURN(
+          const std::uint64_t taken,
+          lease->Change("UPDATE map_place SET state = $2 WHERE map = $1 AND state = $3",
+                        map,
+                        kGoing,
+                        kThere));
+      if (taken == 0) return NoSuchMap(name);
+      STRATA_RETURN_IF_ERROR(
+          lease
+              ->Change("UPDATE strata_format SET removed_clock = greatest(removed_clock, (SELECT "
+                       "commit_sequence FROM truth_map WHERE map = $1))",
+                       map)
+              .status());
+      return lease->Change("DELETE FROM truth_map WHERE map = $1", map).status();
+    }));
+  }
+  return DeleteRows(map);
+}
+
+absl::Status PostgresMaps::DeleteRows(std::int64_t map) const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  STRATA_RETURN_IF_ERROR(lease->Execute("BEGIN; SET LOCAL statement_timeout = 0"));
+  for (const char* sql : DeletionsOfDerived()) {
+    STRATA_RETURN_IF_ERROR(lease->Change(sql, map).status());
+  }
+  for (const char* sql : DeletionsOfTruth()) {
+    STRATA_RETURN_IF_ERROR(lease->Change(sql, map).status());
+  }
+  STRATA_RETURN_IF_ERROR(lease->Change("DELETE FROM derived_state WHERE map = $1", map).status());
+  STRATA_RETURN_IF_ERROR(lease->Change("DELETE FROM map_place WHERE map = $1", map).status());
+  return lease->Execute("COMMIT");
+}
+
+}  // namespace strata

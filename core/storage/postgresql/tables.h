@@ -1,0 +1,28 @@
+// The tables of a database of maps; FORMAT.md describes them.
+#ifndef STRATA_CORE_STORAGE_POSTGRESQL_TABLES_H_
+#define STRATA_CORE_STORAGE_POSTGRESQL_TABLES_H_
+
+#include <cstdint>
+
+#include "absl/status/status.h"
+#include "absl/types/span.h"
+
+#include "core/storage/postgresql/connection.h"
+
+namespace strata {
+
+// Newest format of the tables this program reads and writes.
+inline constexpr std::int64_t kDatabaseVersion = 1;
+
+// Makes the tables where there are none; safe when others do so at the same time.
+// FAILED_PRECONDITION for a newer format.
+absl::Status MakeTables(Connection& connection);
+
+// "DELETE FROM … WHERE map = $1" for every table of derived data but derived_state, and for every
+// table of all else but truth_map.
+absl::Span<const char* const> DeletionsOfDerived();
+absl::Span<const char* const> DeletionsOfTruth();
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_STORAGE_POSTGRESQL_TABLES_H_

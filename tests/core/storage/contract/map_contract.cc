@@ -1,0 +1,168 @@
+// The map's own row: its parameters and its clock; profiles, jobs and attempts.
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/common/status.h"
+#include "core/storage/storage.h"
+#include "tests/core/storage/contract/storage_contract.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class MapContractTest : public StorageContractTest {};
+
+TEST_F(MapContractTest, ParametersComeBackToTheBit) {
+  EXPECT_EQ(reader().GetMapInfo()->parameters, MapParameters());
+  EXPECT_EQ(reader().GetMapInfo()->created, absl::FromUnixSeconds(1000));
+  MapParameters parameters;
+  parameters.mls.cell_size_m = 0.1 + 1e-17;
+  parameters.sensor = {0.01, 0.002, 0.3, 77.7};
+  parameters.default_profile.max_slope_rad = 1.0 / 3.0;
+  parameters.fade_after = 7;
+  parameters.origin = GeodeticOrigin{0.9, -0.1, 540.25};
+  TempDir elsewhere;
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto store, MakeTestStore(elsewhere.path()));
+  STRATA_ASSERT_OK(store->Create(parameters, absl::FromUnixMicros(1'234'567), 40));
+  EXPECT_THAT(store->Create(parameters, absl::Now(), 0),
+              StatusIs(absl::StatusCode::kAlreadyExists, ::testing::_));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto storage, store->Open());
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto reader, storage->NewReader());
+  STRATA_ASSERT_OK_AND_ASSIGN(const MapInfo info, reader->GetMapInfo());
+  EXPECT_EQ(info.parameters, parameters);
+  EXPECT_EQ(info.created, absl::FromUnixMicros(1'234'567));
+  STRATA_ASSERT_OK_AND_ASSIGN(const MapClock clock, reader->GetClock());
+  EXPECT_EQ(clock.commit_sequence, 40U);
+  EXPECT_EQ(clock.epoch, 1U);
+  EXPECT_EQ(clock.tile_version, 0U);
+  EXPECT_TRUE(clock.derived_complete);
+}
+
+TEST_F(MapContractTest, AMapIsRefusedWithParametersThatAreNone) {
+  TempDir elsewhere;
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto store, MakeTestStore(elsewhere.path()));
+  MapParameters bad;
+  bad.mls.cell_size_m = -1.0;
+  EXPECT_THAT(store->Create(bad, absl::Now(), 0),
+              StatusIs(absl::StatusCode::kInvalidArgument, ::testing::_));
+  EXPECT_THAT(store->Open(), StatusIs(absl::StatusCode::kNotFound, ::testing::_));
+}
+
+TEST_F(MapContractTest, TheClockTicksAndNeverInACommitThatMayBeLost) {
+  STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(const std::uint64_t first, writer().NextCommitSequence());
+    STRATA_ASSIGN_OR_RETURN(const std::uint64_t second, writer().NextCommitSequence());
+    EXPECT_EQ(first, 1U);
+    EXPECT_EQ(second, 2U);
+    EXPECT_EQ(writer().reader().GetClock()->commit_sequence, 2U);
+    EXPECT_EQ(reader().GetClock()->commit_sequence, 0U);  // not committed yet
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(reader().GetClock()->commit_sequence, 2U);
+  const absl::Status relaxed =
+      writer().Commit(Durability::kRelaxed, [&] { return writer().NextCommitSequence().status(); });
+  EXPECT_THAT(relaxed, StatusIs(absl::StatusCode::kInternal, HasSubstr("may be lost")));
+  Reopen();
+  EXPECT_EQ(reader().GetClock()->commit_sequence, 2U);
+}
+
+TEST_F(MapContractTest, WhatWasTakenAwayTakesNoMore) {
+  STRATA_EXPECT_OK(storage().CheckInPlace());
+  Put(1);
+  STRATA_ASSERT_OK(store().TakeAway());
+  EXPECT_THAT(storage().CheckInPlace(), StatusIs(absl::StatusCode::kUnavailable, ::testing::_));
+  EXPECT_THAT(Commit([&] { return writer().PutChunk(9, 0, "lost"); }),
+              StatusIs(absl::StatusCode::kUnavailable, HasSubstr("removed")));
+}
+
+TEST_F(MapContractTest, ProfilesAndTheOriginAreReplaced) {
+  RobotProfile profile;
+  profile.radius_m = 0.1 + 0.2;
+  STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(writer().PutProfile("cart", RobotProfile()));
+    STRATA_RETURN_IF_ERROR(writer().PutProfile("cart", profile));
+    return writer().PutOrigin({0.5, -1.5, 12.25});
+  }));
+  Reopen();
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto profiles, reader().ListProfiles());
+  ASSERT_EQ(profiles.size(), 2U);
+  EXPECT_EQ(profiles.at("cart"), profile);
+  EXPECT_EQ(profiles.at("default"), RobotProfile());
+  EXPECT_EQ(reader().GetMapInfo()->parameters.origin, (GeodeticOrigin{0.5, -1.5, 12.25}));
+}
+
+TEST_F(MapContractTest, JobsAreReplacedAndGoWithTheirDetails) {
+  JobInfo job;
+  job.id = 7;
+  job.kind = "optimize";
+  job.parameters = {{"dry_run", "1"}};
+  job.state = JobState::kRunning;
+  job.progress = 1.0 / 3.0;
+  job.phase = "matching";
+  job.created = absl::FromUnixMicros(5);
+  job.updated = absl::FromUnixMicros(6);
+  const auto put = [&] { return Commit([&] { return writer().PutJob(job); }); };
+  STRATA_ASSERT_OK(put());
+  job.state = JobState::kFailed;
+  job.message = "gänzlich";
+  job.metrics = {{"scans", 0.1}};
+  STRATA_ASSERT_OK(put());
+  job.metrics["scans"] = 0.3;
+  STRATA_ASSERT_OK(put());
+  Reopen();
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::vector<JobInfo> jobs, reader().ListJobs());
+  ASSERT_EQ(jobs.size(), 1U);
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::optional<JobInfo> found, reader().FindJob(7));
+  ASSERT_TRUE(found.has_value());
+  EXPECT_EQ(found->kind, job.kind);
+  EXPECT_EQ(found->state, job.state);
+  EXPECT_EQ(found->progress, job.progress);
+  EXPECT_EQ(found->phase, job.phase);
+  EXPECT_EQ(found->message, job.message);
+  EXPECT_EQ(found->parameters, job.parameters);
+  EXPECT_EQ(found->metrics, job.metrics);
+  EXPECT_EQ(found->created, job.created);
+  EXPECT_EQ(jobs[0].updated, job.updated);
+  EXPECT_FALSE(reader().FindJob(8)->has_value());
+  STRATA_ASSERT_OK(Commit([&] { return writer().DeleteJob(7); }));
+  EXPECT_FALSE(reader().FindJob(7)->has_value());
+  job.parameters.clear();
+  job.metrics.clear();
+  STRATA_ASSERT_OK(put());
+  EXPECT_TRUE(reader().FindJob(7)->value().metrics.empty());
+  EXPECT_TRUE(reader().FindJob(7)->value().parameters.empty());
+}
+
+TEST_F(MapContractTest, AttemptsAreKeptByTheirWork) {
+  const WorkId scan{WorkKind::kScan, 9};
+  const WorkId job{WorkKind::kJob, 9};
+  STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(writer().PutAttempt({job, 0, true}));
+    STRATA_RETURN_IF_ERROR(writer().PutAttempt({scan, 0, true}));
+    return writer().PutAttempt({scan, 2, false});
+  }));
+  Reopen();
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::vector<Attempt> attempts, reader().ListAttempts());
+  ASSERT_EQ(attempts.size(), 2U);
+  EXPECT_EQ(attempts[0].work, scan);
+  EXPECT_EQ(attempts[0].deaths, 2U);
+  EXPECT_FALSE(attempts[0].under_way);
+  EXPECT_TRUE(attempts[1].under_way);
+  STRATA_ASSERT_OK(Commit([&] { return writer().DeleteAttempt(scan); }));
+  EXPECT_EQ(reader().ListAttempts()->size(), 1U);
+}
+
+}  // namespace
+}  // namespace strata::testing

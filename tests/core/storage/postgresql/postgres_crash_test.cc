@@ -1,0 +1,170 @@
+// A server that dies at any moment of its commits.
+#include <atomic>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/common/status.h"
+#include "core/storage/postgresql/postgres_maps.h"
+#include "core/storage/storage.h"
+#include "tests/support/postgres_cluster.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+// One robot: scans that its store has acknowledged, refused, or left in the dark.
+struct Ledger {
+  std::vector<std::uint64_t> acknowledged;
+  std::vector<std::uint64_t> numbers;  // of the acknowledged ones
+  std::uint64_t unknown = 0;
+};
+
+absl::Status PutScan(StorageWriter& writer,
+                     std::uint64_t robot,
+                     std::uint64_t sequence,
+                     const std::string& bytes,
+                     std::uint64_t& number) {
+  return writer.Commit(Durability::kFull, [&]() -> absl::Status {
+    ScanRecord scan;
+    scan.header.id = {absl::StrCat("robot ", robot), sequence};
+    scan.upload = robot * 1'000'000 + sequence;
+    scan.chunks = 1;
+    STRATA_ASSIGN_OR_RETURN(scan.number, writer.NextCommitSequence());
+    number = scan.number;
+    STRATA_RETURN_IF_ERROR(writer.PutChunk(scan.upload, 0, bytes));
+    return writer.PutScan(scan);
+  });
+}
+
+void Drive(StorageWriter& writer,
+           std::uint64_t robot,
+           const std::atomic<bool>& stop,
+           Ledger& ledger) {
+  const std::string bytes(20'000, static_cast<char>('a' + robot));
+  for (std::uint64_t sequence = 1; !stop; ++sequence) {
+    std::uint64_t number = 0;
+    const absl::Status put = PutScan(writer, robot, sequence, bytes, number);
+    if (put.ok()) {
+      ledger.acknowledged.push_back(sequence);
+      ledger.numbers.push_back(number);
+      continue;
+    }
+    EXPECT_THAT(put, StatusIs(absl::StatusCode::kUnavailable, ::testing::_));
+    if (absl::StrContains(put.message(), "outcome unknown")) ++ledger.unknown;
+    absl::SleepFor(absl::Milliseconds(5));
+  }
+}
+
+// Everything acknowledged is there with its bytes, and nothing is there that was refused.
+void Check(StorageReader& reader, std::uint64_t robot, const Ledger& ledger) {
+  const std::string bytes(20'000, static_cast<char>('a' + robot));
+  for (std::size_t i = 0; i < ledger.acknowledged.size(); ++i) {
+    const std::uint64_t sequence = ledger.acknowledged[i];
+    STRATA_ASSERT_OK_AND_ASSIGN(const std::optional<PosedScan> found,
+                                reader.FindScan({absl::StrCat("robot ", robot), sequence}, 1));
+    ASSERT_TRUE(found.has_value()) << "robot " << robot << " scan " << sequence << " is lost";
+    EXPECT_EQ(found->scan.number, ledger.numbers[i]);
+    EXPECT_THAT(reader.GetChunk(robot * 1'000'000 + sequence, 0), IsOkAndHolds(bytes));
+  }
+}
+
+struct Case {
+  const char* name;
+  bool alone;  // a map a robot, open once; otherwise all write one
+};
+
+class PostgresCrashTest : public ::testing::TestWithParam<Case> {
+ protected:
+  absl::StatusOr<std::unique_ptr<MapStorage>> Open(const PostgresMaps& maps,
+                                                   std::uint64_t robot) const {
+    const bool alone = GetParam().alone;
+    const std::string name = absl::StrCat("map ", alone ? robot : 0);
+    const absl::Status made = maps.Create(name, MapParameters(), absl::Now());
+    if (!made.ok() && !absl::IsAlreadyExists(made)) return made;
+    return alone ? maps.OpenAlone(name) : maps.Open(name);
+  }
+};
+
+TEST_P(PostgresCrashTest, NothingAcknowledgedIsLostWhenTheServerDies) {
+  auto started = PostgresCluster::Start(PostgresCluster::Disk::kSynced);
+  if (absl::IsFailedPrecondition(started.status())) GTEST_SKIP() << started.status().message();
+  STRATA_ASSERT_OK(started);
+  PostgresCluster& cluster = **started;
+  PostgresOptions options;
+  options.where = cluster.Address();
+  STRATA_ASSERT_OK_AND_ASSIGN(const PostgresMaps maps, PostgresMaps::Connect(options));
+
+  constexpr std::uint64_t kRobots = 4;
+  constexpr int kCrashes = 3;
+  const std::uint32_t seed = std::random_device{}();
+  std::printf("seed %u\n", seed);
+  std::mt19937 random(seed);
+  std::uniform_int_distribution<int> pause_ms(100, 500);
+  std::vector<std::unique_ptr<MapStorage>> storages;
+  for (std::uint64_t robot = 0; robot < kRobots; ++robot) {
+    STRATA_ASSERT_OK_AND_ASSIGN(std::unique_ptr<MapStorage> storage, Open(maps, robot));
+    storages.push_back(std::move(storage));
+  }
+  std::atomic<bool> stop = false;
+  std::vector<Ledger> ledgers(kRobots);
+  std::vector<std::thread> robots;
+  for (std::uint64_t robot = 0; robot < kRobots; ++robot) {
+    robots.emplace_back(
+        [&, robot] { Drive(storages[robot]->writer(), robot, stop, ledgers[robot]); });
+  }
+  absl::Status restarted;
+  for (int crash = 0; crash < kCrashes && restarted.ok(); ++crash) {
+    absl::SleepFor(absl::Milliseconds(pause_ms(random)));
+    cluster.Crash();
+    restarted = cluster.Restart();
+  }
+  absl::SleepFor(absl::Milliseconds(300));
+  stop = true;
+  for (std::thread& robot : robots) robot.join();
+  STRATA_ASSERT_OK(restarted);
+
+  std::uint64_t known = 0;
+  std::uint64_t unknown = 0;
+  std::uint64_t there = 0;
+  for (std::uint64_t robot = 0; robot < kRobots; ++robot) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const auto reader, storages[robot]->NewReader());
+    Check(*reader, robot, ledgers[robot]);
+    known += ledgers[robot].acknowledged.size();
+    unknown += ledgers[robot].unknown;
+    if (robot == 0 || GetParam().alone) there += reader->GetScanTotals()->scans;
+  }
+  std::printf("%d acknowledged, %d unknown, %d of those there\n",
+              static_cast<int>(known),
+              static_cast<int>(unknown),
+              static_cast<int>(there - known));
+  EXPECT_GT(known, 20U);
+  EXPECT_GE(there, known);
+  EXPECT_LE(there, known + unknown);
+  if (GetParam().alone) {
+    EXPECT_EQ(unknown, 0U);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Writers,
+                         PostgresCrashTest,
+                         ::testing::Values(Case{"Shared", false}, Case{"Alone", true}),
+                         [](const auto& tested) { return std::string(tested.param.name); });
+
+}  // namespace
+}  // namespace strata::testing
