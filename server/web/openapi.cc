@@ -1,6 +1,8 @@
 #include "server/web/openapi.h"
 
+#include <cstdint>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
