@@ -1,5 +1,6 @@
 #include "server/web/openapi.h"
 
+#include <cstdint>
 #include <set>
 #include <vector>
 
