@@ -2,6 +2,7 @@
 #ifndef STRATA_SERVER_WEB_CONTRACT_H_
 #define STRATA_SERVER_WEB_CONTRACT_H_
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>

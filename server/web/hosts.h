@@ -2,6 +2,7 @@
 #ifndef STRATA_SERVER_WEB_HOSTS_H_
 #define STRATA_SERVER_WEB_HOSTS_H_
 
+#include <functional>
 #include <set>
 #include <string>
 #include <vector>
