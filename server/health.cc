@@ -51,7 +51,7 @@ class HealthReactor final : public grpc::ServerBidiReactor<Sealed<Asked>, Told> 
   using Kind = ClientLimits::Kind;
 
   HealthReactor(Health& health, grpc::CallbackServerContext& context, Kind kind)
-      : health_(health), context_(context), kind_(kind), host_(HostOf(context.peer())) {
+      : health_(health), context_(context), kind_(kind), host_(HostOf(PeerOf(context))) {
     health_.runtime_.ArrivalsOf(PathOf(kind_)).Begin(PathOf(kind_), SteadyNow());
     const absl::Status entered = Enter();
     if (entered.ok()) {

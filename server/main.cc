@@ -122,6 +122,7 @@ absl::Status Serve(const ProgramOptions& options) {
                           Server::Start(*database, options.server, {LogCheck(log)}));
   // Before any other line with an address, for scripts that read both streams as one.
   std::cout << "listening " << server->address() << std::endl;
+  if (!server->web_url().empty()) std::cout << "web " << server->web_url() << std::endl;
   LOG(INFO) << StartLine(options, server->address());
   const int signal = AwaitSignal(signals);
   LOG(INFO) << LogLine("shutdown").Add("signal", signal);
@@ -149,7 +150,7 @@ int Exit(const absl::Status& status) {
 int Main(int argc, char** argv) {
   CLI::App app("stratad, the server of Strata, a map database for robots.");
   app.footer(
-      "Once it serves, it prints one line on stdout: listening HOST:PORT\n\n"
+      "Once it serves, it prints on stdout: listening HOST:PORT, and with --web then: web URL\n\n"
       "Example:\n  stratad --data ./maps --listen 127.0.0.1:50051");
   app.set_version_flag("--version", absl::StrCat("stratad ", STRATA_VERSION));
   const std::function<absl::StatusOr<ProgramOptions>()> read_options = AddServeOptions(app);

@@ -1,6 +1,8 @@
 #include "server/options.h"
 
+#include <filesystem>
 #include <memory>
+#include <system_error>
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
@@ -9,6 +11,15 @@ namespace strata::server {
 namespace {
 
 constexpr std::uint64_t kMebi = std::uint64_t{1} << 20;
+
+// Where the viewer is installed, beside this program; empty: it is not.
+std::filesystem::path InstalledViewer() {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::filesystem::path folder =
+      self.parent_path().parent_path() / STRATA_DATA_FOLDER / "strata" / "web";
+  return std::filesystem::exists(folder, error) ? folder : std::filesystem::path();
+}
 
 // As they are written; in the units of their texts.
 struct Written {
@@ -68,6 +79,27 @@ void AddPlaces(CLI::App& app, Written& o) {
                  "Address that answers Prometheus at /metrics, in plain text and to anybody; none: "
                  "no metrics")
       ->type_name("HOST:PORT");
+  app.add_option("--web",
+                 o.server.web_listen,
+                 "Address of the viewer and of the API as JSON, for browsers; under the same rules "
+                 "as --listen, with its certificate and tokens; none: no web")
+      ->type_name("HOST:PORT");
+}
+
+void AddWeb(CLI::App& app, Written& o) {
+  constexpr char kGroup[] = "Doors";
+  app.add_option("--web-name",
+                 o.server.web_names,
+                 "Name by which browsers reach --web, beside localhost and IP addresses; again for "
+                 "more")
+      ->type_name("HOST")
+      ->group(kGroup);
+  app.add_option_function<std::string>(
+         "--web-viewer",
+         [&o](const std::string& value) { o.server.web_viewer = value; },
+         "Folder of the viewer that --web shows; by default the installed one, if there is one")
+      ->type_name("DIR")
+      ->group(kGroup);
 }
 
 void AddDoors(CLI::App& app, Written& o) {
@@ -247,6 +279,7 @@ absl::StatusOr<ProgramOptions> Read(const Written& o) {
   options.engine.max_map_bytes = o.max_map_mib * kMebi;
   options.engine.optimize_interval = absl::Seconds(o.optimize_every_s);
   options.engine.upload_keep = absl::Seconds(o.upload_keep_s);
+  if (options.server.web_viewer.empty()) options.server.web_viewer = InstalledViewer();
   options.server.drain_timeout = absl::Seconds(o.drain_s);
   options.server.max_query_time = absl::Seconds(o.max_query_s);
   options.server.slow_sender_timeout = absl::Seconds(o.upload_idle_s);
@@ -267,6 +300,7 @@ std::function<absl::StatusOr<ProgramOptions>()> AddServeOptions(CLI::App& app) {
   app.allow_config_extras(CLI::config_extras_mode::error);
   AddPlaces(app, *written);
   AddDoors(app, *written);
+  AddWeb(app, *written);
   AddClientLimits(app, *written);
   AddServerLimits(app, *written);
   AddMapLimits(app, *written);

@@ -26,12 +26,12 @@
 #include "server/access/grant_table.h"
 #include "server/door.h"
 #include "server/health.h"
-#include "server/listener.h"
 #include "server/metrics/engine_metrics.h"
 #include "server/metrics/metrics.h"
 #include "server/readiness.h"
 #include "server/reflection.h"
 #include "server/rpc/connections.h"
+#include "server/rpc/listener.h"
 #include "server/rpc/runtime.h"
 #include "server/services/classifiers_service.h"
 #include "server/services/jobs_service.h"
@@ -41,6 +41,7 @@
 #include "server/services/posegraph_service.h"
 #include "server/services/scans_service.h"
 #include "server/services/tiles_service.h"
+#include "server/web/web_server.h"
 #include "strata/v1/classifiers.grpc.pb.h"
 #include "strata/v1/jobs.grpc.pb.h"
 #include "strata/v1/maps.grpc.pb.h"
@@ -101,7 +102,9 @@ class GrpcServer final : public Server {
 
   absl::Status Listen(HostPort address);
   const std::string& address() const override { return address_; }
+  std::string web_url() const override { return web_ == nullptr ? "" : web_->url(); }
   // After Listen().
+  absl::Status OpenWeb();
   absl::Status OpenMetrics();
   void WatchReadiness(std::vector<ReadinessCheck> checks);
   void Shutdown() override;
@@ -142,21 +145,25 @@ class GrpcServer final : public Server {
       acceptors_;  // a lane
   std::unique_ptr<grpc::Server> server_;
   std::unique_ptr<Readiness> readiness_;
+  std::unique_ptr<web::WebServer> web_;
   std::unique_ptr<MetricsEndpoint> metrics_;
 };
 
+// Full names of the contract's services.
+std::vector<std::string> ContractServices() {
+  return {v1::Maps::service_full_name(),
+          v1::Scans::service_full_name(),
+          v1::Tiles::service_full_name(),
+          v1::Planning::service_full_name(),
+          v1::Jobs::service_full_name(),
+          v1::PoseGraph::service_full_name(),
+          v1::Classifiers::service_full_name(),
+          v1::Models::service_full_name(),
+          v1::Objects::service_full_name()};
+}
+
 void SetReady(Health& health, bool ready) {
-  for (const char* service : {v1::Maps::service_full_name(),
-                              v1::Scans::service_full_name(),
-                              v1::Tiles::service_full_name(),
-                              v1::Planning::service_full_name(),
-                              v1::Jobs::service_full_name(),
-                              v1::PoseGraph::service_full_name(),
-                              v1::Classifiers::service_full_name(),
-                              v1::Models::service_full_name(),
-                              v1::Objects::service_full_name()}) {
-    health.Set(service, ready);
-  }
+  for (const std::string& service : ContractServices()) health.Set(service, ready);
 }
 
 std::string WhyNoDisk(const EngineHealth& health) {
@@ -254,6 +261,19 @@ void AddPools(MetricFamilies& families, const Runtime& runtime) {
             rows);
 }
 
+void AddWeb(MetricFamilies& families, const web::WebServer& web) {
+  AddFamily(families,
+            prometheus::MetricType::Gauge,
+            "strata_web_connections",
+            "Connections of --web",
+            {{{}, static_cast<double>(web.connections())}});
+  AddFamily(families,
+            prometheus::MetricType::Counter,
+            "strata_web_refused_connections_total",
+            "Connections of --web that were ended for want of room",
+            {{{}, static_cast<double>(web.refused())}});
+}
+
 void AddDisk(MetricFamilies& families, const EngineHealth& health) {
   constexpr auto kGauge = prometheus::MetricType::Gauge;
   AddFamily(families,
@@ -348,6 +368,33 @@ void GrpcServer::WatchReadiness(std::vector<ReadinessCheck> checks) {
       std::move(checks), kReadinessInterval, [this](bool ready) { SetReady(health_, ready); });
 }
 
+absl::Status GrpcServer::OpenWeb() {
+  if (options_.web_listen.empty()) return absl::OkStatus();
+  STRATA_ASSIGN_OR_RETURN(const HostPort listen, ParseHostPort(options_.web_listen));
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(-1);
+  STRATA_ASSIGN_OR_RETURN(
+      web_,
+      web::WebServer::Open(
+          {.listen = listen,
+           .names = options_.web_names,
+           .viewer = options_.web_viewer,
+           .tls = options_.tls,
+           .max_body_bytes = static_cast<std::size_t>(options_.max_message_bytes),
+           .max_bodies_bytes = options_.max_call_bytes,
+           .max_connections = static_cast<std::size_t>(options_.max_calls + options_.max_watches),
+           .slow_sender_timeout = options_.slow_sender_timeout,
+           .slow_reader_timeout = options_.slow_reader_timeout,
+           .services = ContractServices(),
+           .known =
+               [this](absl::string_view authorization) {
+                 return runtime_.access.Authenticate(authorization, "").status();
+               }},
+          server_->InProcessChannel(arguments)));
+  LOG(INFO) << LogLine("web").Add("listen", web_->url());
+  return absl::OkStatus();
+}
+
 absl::Status GrpcServer::OpenMetrics() {
   if (options_.metrics_listen.empty()) return absl::OkStatus();
   const auto gauges = [this, started = SteadyNow()](MetricFamilies& families) {
@@ -357,6 +404,7 @@ absl::Status GrpcServer::OpenMetrics() {
     AddPools(families, runtime_);
     AddCertificate(families, options_.tls);
     AddDoor(families, *listener_, connections_, *readiness_);
+    if (web_ != nullptr) AddWeb(families, *web_);
     AddEngine(families, NumbersOf(runtime_.db));
     AddDisk(families, HealthOf(runtime_.db));
   };
@@ -371,11 +419,13 @@ void GrpcServer::Shutdown() {
   metrics_.reset();  // it looks at the database
   readiness_.reset();
   health_.Shutdown();
+  if (web_ != nullptr) web_->StopAccepting();
   // gRPC's own draining would also wait for clients that keep an idle connection.
   const absl::Time drained = SteadyNow() + options_.drain_timeout;
   runtime_.calls.AwaitEmpty(options_.drain_timeout);
   runtime_.watches.AwaitEmpty(drained - SteadyNow());
   listener_->Close();
+  if (web_ != nullptr) web_->Close();
   server_->Shutdown(absl::ToChronoTime(absl::Now()));
   server_->Wait();
   // The last calls may still be giving back what they hold.
@@ -434,18 +484,11 @@ absl::Status ServerOptions::Validate() const {
   return absl::InvalidArgumentError(absl::StrCat("server: ", absl::StrJoin(faults, "; ")));
 }
 
-absl::Status CheckExposure(const ServerOptions& options) {
-  STRATA_RETURN_IF_ERROR(options.Validate());
-  if (!options.metrics_listen.empty()) {
-    STRATA_ASSIGN_OR_RETURN(const HostPort metrics, ParseHostPort(options.metrics_listen));
-    if (!metrics.loopback() && !options.insecure) {
-      return absl::FailedPreconditionError(absl::StrCat(
-          "will not serve metrics on ",
-          metrics.ToString(),
-          ": they are for anybody and name the maps; use a loopback address or --insecure"));
-    }
-  }
-  STRATA_ASSIGN_OR_RETURN(const HostPort address, ParseHostPort(options.listen));
+namespace {
+
+// Of an address that gRPC or HTTP is to be offered at.
+absl::Status CheckListener(const ServerOptions& options, const std::string& listen) {
+  STRATA_ASSIGN_OR_RETURN(const HostPort address, ParseHostPort(listen));
   if (address.loopback() || options.insecure) return absl::OkStatus();
   const auto refused = [&address](absl::string_view why) {
     return absl::FailedPreconditionError(
@@ -465,6 +508,23 @@ absl::Status CheckExposure(const ServerOptions& options) {
   return absl::OkStatus();
 }
 
+}  // namespace
+
+absl::Status CheckExposure(const ServerOptions& options) {
+  STRATA_RETURN_IF_ERROR(options.Validate());
+  if (!options.metrics_listen.empty()) {
+    STRATA_ASSIGN_OR_RETURN(const HostPort metrics, ParseHostPort(options.metrics_listen));
+    if (!metrics.loopback() && !options.insecure) {
+      return absl::FailedPreconditionError(absl::StrCat(
+          "will not serve metrics on ",
+          metrics.ToString(),
+          ": they are for anybody and name the maps; use a loopback address or --insecure"));
+    }
+  }
+  STRATA_RETURN_IF_ERROR(CheckListener(options, options.listen));
+  return options.web_listen.empty() ? absl::OkStatus() : CheckListener(options, options.web_listen);
+}
+
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(api::Database& database,
                                                       const ServerOptions& options,
                                                       std::vector<ReadinessCheck> checks) {
@@ -480,6 +540,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(api::Database& database,
   auto server = std::make_unique<GrpcServer>(database, std::move(grants), options);
   STRATA_RETURN_IF_ERROR(server->Listen(address));
   server->WatchReadiness(std::move(checks));
+  STRATA_RETURN_IF_ERROR(server->OpenWeb());
   STRATA_RETURN_IF_ERROR(server->OpenMetrics());
   return server;
 }

@@ -26,8 +26,12 @@ struct ServerOptions {
   std::filesystem::path token_file;  // who may do what (token_file.h); empty: everybody everything
   // HOST:PORT that answers Prometheus at /metrics, in plain text and to anybody; empty: none.
   std::string metrics_listen;
-  int query_threads = 8;   // calls answered at a time; in [1, 1000]
-  int stream_threads = 8;  // listings and downloads served at a time; in [1, 1000]
+  // HTTP, for browsers and JSON; see docs/web.md.
+  std::string web_listen;              // HOST:PORT; empty: none
+  std::vector<std::string> web_names;  // by which browsers may reach it, beside localhost and IPs
+  std::filesystem::path web_viewer;    // folder of the viewer's files; empty: none
+  int query_threads = 8;               // calls answered at a time; in [1, 1000]
+  int stream_threads = 8;              // listings and downloads served at a time; in [1, 1000]
   // A unary call that only reads ends after so long, whatever its caller allows (Localize is none).
   absl::Duration max_query_time = absl::Seconds(30);
   int upload_threads = 16;  // scans taken in at a time; in [1, 1000]
@@ -51,9 +55,9 @@ struct ServerOptions {
   absl::Status Validate() const;
 };
 
-// Whether what is offered at options.listen is safe to offer there: FAILED_PRECONDITION for an
-// address beyond loopback without TLS or without tokens (or client certificates), unless
-// `insecure`; INVALID_ARGUMENT for bad options.
+// Whether what is offered at options.listen and web_listen is safe to offer there:
+// FAILED_PRECONDITION for an address beyond loopback without TLS or without tokens (or client
+// certificates), unless `insecure`; INVALID_ARGUMENT for bad options.
 absl::Status CheckExposure(const ServerOptions& options);
 
 // Serves from Start() to Shutdown(): strata.v1, grpc.health.v1 (for anybody) and reflection (for
@@ -72,6 +76,8 @@ class Server {
 
   // HOST:PORT with the true port.
   virtual const std::string& address() const = 0;
+  // http://HOST:PORT, or https, of web_listen; empty without it.
+  virtual std::string web_url() const = 0;
   // Health says NOT_SERVING, new calls are refused, those under way end or are cancelled after
   // drain_timeout. Returns when all have ended. Again: nothing.
   virtual void Shutdown() = 0;

@@ -76,6 +76,7 @@ EXTERNAL = {
     r"ceres/.*": ["core/posegraph/costs", "core/posegraph/solver", "core/egomotion/smoothing"],
     r"(grpc|grpcpp)/.*|google/protobuf/.*|.*\.pb\.h": ["proto", "server", "client/sdk"],
     r"openssl/.*": ["server"],
+    r"boost/(asio|beast)/.*": ["server/web"],
     r"prometheus/.*": ["server/metrics"],
     r"pcl/.*": ["core/registration", "core/planes", "core/classification", "core/mesh", "client/formats"],
     r"fcl/.*": ["core/collision"],

@@ -86,7 +86,8 @@ def main():
     environment = dict(os.environ, PATH=os.pathsep.join([*map(str, programs.values()), os.environ["PATH"]]))
     # Domains of DDS from 201 on are those of no test.
     own = {"STRATA_SERVER": free_address(), "ROS_LOCALHOST_ONLY": "1", "ROS_DOMAIN_ID": str(201 + os.getpid() % 30)}
-    pages = {"README.md": {}, "docs/exports.md": {}, "docs/recordings.md": {}, "docs/ros2.md": own}
+    web = {"STRATA_SERVER": free_address(), "STRATA_WEB": free_address()}
+    pages = {"README.md": {}, "docs/exports.md": {}, "docs/recordings.md": {}, "docs/ros2.md": own, "docs/web.md": web}
     return 0 if all(holds(page, {**environment, **more}) for page, more in pages.items()) else 1
 
 

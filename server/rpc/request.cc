@@ -24,6 +24,8 @@ namespace strata::server {
 namespace {
 
 constexpr std::size_t kMaxLoggedName = 100;
+// What gRPC calls the other end of a channel within the process; that of a socket has an address.
+constexpr absl::string_view kNoPeer = "unknown";
 constexpr std::size_t kMaxLoggedMessage = 300;
 
 // Unique among the calls of this process and, very likely, of all others.
@@ -68,6 +70,13 @@ absl::Status NobodyMay(absl::string_view method) {
 
 }  // namespace
 
+std::string PeerOf(const grpc::CallbackServerContext& context) {
+  std::string peer = context.peer();
+  if (peer != kNoPeer) return peer;
+  const absl::string_view told = MetadataOf(context, kWebPeerKey);
+  return told.empty() ? peer : std::string(told);
+}
+
 std::string HostOf(absl::string_view peer) {
   return std::string(absl::StartsWith(peer, "ipv") ? peer.substr(0, peer.rfind(':')) : peer);
 }
@@ -81,7 +90,7 @@ Request::Request(Runtime& runtime,
       context_(context),
       kind_(kind),
       method_(method),
-      peer_(context.peer()),
+      peer_(PeerOf(context)),
       started_(SteadyNow()),
       limit_(limit) {
   call_.stop = Stop(std::min(DeadlineOf(context), started_ + limit));

@@ -28,6 +28,9 @@ namespace strata::server {
 // Metadata key of the call's id, in requests (chosen by the client: 1 to 64 printable characters
 // without spaces; otherwise the server chooses) and in the answer's initial metadata.
 inline constexpr char kRequestIdKey[] = "x-request-id";
+// Metadata of a call that the web door makes within this process: whose it is, as gRPC names a
+// peer.
+inline constexpr char kWebPeerKey[] = "x-strata-web-peer";
 // In the metrics: who was refused because nobody knows him.
 inline constexpr absl::string_view kStranger = "STRANGER";
 
@@ -128,6 +131,9 @@ class Request final : public Revocable {
   std::atomic<std::size_t> bytes_sent_ = 0;
 };
 
+// gRPC's name of whoever calls; of a call of the web door's, what that says. From elsewhere the
+// metadata are not looked at.
+std::string PeerOf(const grpc::CallbackServerContext& context);
 // gRPC's name of a peer without its port: a client that comes by many connections is one.
 std::string HostOf(absl::string_view peer);
 

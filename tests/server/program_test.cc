@@ -85,6 +85,31 @@ TEST(OptionsTest, AFileSaysTheSameAsTheCommandLineWhichGoesFirst) {
               StatusIs(Code::kInvalidArgument, HasSubstr("conf")));
 }
 
+TEST(OptionsTest, TheWebHasAnAddressNamesAndAViewer) {
+  const testing::TempDir dir;
+  STRATA_ASSERT_OK_AND_ASSIGN(const ProgramOptions none, Parsed({"--data", "maps"}));
+  EXPECT_EQ(none.server.web_listen, "");
+  STRATA_ASSERT_OK_AND_ASSIGN(const ProgramOptions options,
+                              Parsed({"--data",
+                                      "maps",
+                                      "--web",
+                                      "127.0.0.1:8080",
+                                      "--web-name",
+                                      "a.example",
+                                      "--web-name",
+                                      "b.example",
+                                      "--web-viewer",
+                                      "/srv/viewer"}));
+  EXPECT_EQ(options.server.web_listen, "127.0.0.1:8080");
+  EXPECT_THAT(options.server.web_names, ::testing::ElementsAre("a.example", "b.example"));
+  EXPECT_EQ(options.server.web_viewer, "/srv/viewer");
+  const std::string file = (dir.path() / "stratad.conf").string();
+  std::ofstream(file) << "data = maps\nweb = 127.0.0.1:0\nweb-name = maps.example\n";
+  STRATA_ASSERT_OK_AND_ASSIGN(const ProgramOptions written, Parsed({"--config", file}));
+  EXPECT_EQ(written.server.web_listen, "127.0.0.1:0");
+  EXPECT_THAT(written.server.web_names, ::testing::ElementsAre("maps.example"));
+}
+
 TEST(OptionsTest, NamesWhatIsOutOfRange) {
   const auto status = [](const char* option, const char* value) {
     return Parsed({"--data", "maps", option, value}).status();

@@ -1,6 +1,6 @@
 // Where connections come in.
-#ifndef STRATA_SERVER_LISTENER_H_
-#define STRATA_SERVER_LISTENER_H_
+#ifndef STRATA_SERVER_RPC_LISTENER_H_
+#define STRATA_SERVER_RPC_LISTENER_H_
 
 #include <atomic>
 #include <cstdint>
@@ -67,4 +67,4 @@ class Listener {
 
 }  // namespace strata::server
 
-#endif  // STRATA_SERVER_LISTENER_H_
+#endif  // STRATA_SERVER_RPC_LISTENER_H_

@@ -1,0 +1,19 @@
+// Makes of src/ what stratad --web-viewer serves: node build.mjs [FOLDER].
+import { build } from "esbuild";
+import { cp, mkdir } from "node:fs/promises";
+import path from "node:path";
+import { fileURLToPath } from "node:url";
+
+const here = path.dirname(fileURLToPath(import.meta.url));
+const out = path.resolve(process.argv[2] ?? path.join(here, "dist"));
+await mkdir(out, { recursive: true });
+await build({
+  entryPoints: [path.join(here, "src/main.js")],
+  outfile: path.join(out, "viewer.js"),
+  bundle: true,
+  minify: true,
+  format: "iife",
+  target: "es2022",
+  legalComments: "eof",
+});
+for (const file of ["index.html", "viewer.css", "icon.svg"]) await cp(path.join(here, "src", file), path.join(out, file));

@@ -1,0 +1,135 @@
+// Camera, drawing on demand, and what is under the pointer.
+import * as THREE from "three";
+import { MapControls } from "three/examples/jsm/controls/MapControls.js";
+import { shared } from "./patches.js";
+
+const LOOK = 9; // pixels around the pointer, across
+
+export class Stage {
+  constructor(parent) {
+    this.renderer = new THREE.WebGLRenderer({ preserveDrawingBuffer: true });
+    this.canvas = this.renderer.domElement;
+    this.canvas.tabIndex = 0;
+    parent.append(this.canvas);
+    this.scene = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera(50, 1, 0.3, 6000);
+    this.camera.up.set(0, 0, 1);
+    this.controls = new MapControls(this.camera, this.canvas);
+    this.controls.listenToKeyEvents(window);
+    this.controls.addEventListener("change", () => this.redraw());
+    this.tiles = new THREE.Group();
+    this.overlay = new THREE.Group();
+    this.scene.add(this.tiles, this.overlay);
+    this.renderer.getContext().getExtension("EXT_color_buffer_float");
+    this.target = new THREE.WebGLRenderTarget(LOOK, LOOK, { type: THREE.FloatType });
+    this.frameMs = [];
+    addEventListener("resize", () => this.fit());
+    this.fit();
+    requestAnimationFrame(() => this.loop());
+  }
+  redraw() {
+    this.dirty = true;
+  }
+  fit() {
+    this.renderer.setSize(innerWidth, innerHeight);
+    this.camera.aspect = innerWidth / innerHeight;
+    this.camera.updateProjectionMatrix();
+    this.redraw();
+  }
+  loop() {
+    requestAnimationFrame(() => this.loop());
+    if (!this.dirty) return;
+    this.dirty = false;
+    const begun = performance.now();
+    this.renderer.render(this.scene, this.camera);
+    const gl = this.renderer.getContext();
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // until it is drawn
+    this.frameMs.push(performance.now() - begun);
+    if (this.frameMs.length > 20) this.frameMs.shift();
+  }
+  background(colour) {
+    this.scene.background = new THREE.Color(colour);
+    this.redraw();
+  }
+  look(view) {
+    this.camera.position.set(view[0], view[1], view[2]);
+    this.controls.target.set(view[3], view[4], view[5]);
+    this.controls.update();
+    this.redraw();
+  }
+  view() {
+    return [...this.camera.position.toArray(), ...this.controls.target.toArray()];
+  }
+  // {x, y, z} of the surface near the pixel, one to drive on before others; null: none.
+  pick(x, y) {
+    const background = this.scene.background;
+    this.camera.setViewOffset(innerWidth, innerHeight, x - (LOOK >> 1), y - (LOOK >> 1), LOOK, LOOK);
+    this.scene.background = null;
+    this.overlay.visible = false;
+    shared.picking.value = 1;
+    this.renderer.setRenderTarget(this.target);
+    this.renderer.setClearColor(0, 0);
+    this.renderer.clear();
+    this.renderer.render(this.scene, this.camera);
+    const pixels = new Float32Array(4 * LOOK * LOOK);
+    this.renderer.readRenderTargetPixels(this.target, 0, 0, LOOK, LOOK, pixels);
+    this.renderer.setRenderTarget(null);
+    shared.picking.value = 0;
+    this.overlay.visible = true;
+    this.scene.background = background;
+    this.camera.clearViewOffset();
+    return nearestOf(pixels);
+  }
+  // Pixel of a place, for tests and labels.
+  pixelOf({ x, y, z }) {
+    const p = new THREE.Vector3(x, y, z).project(this.camera);
+    return [((p.x + 1) / 2) * innerWidth, ((1 - p.y) / 2) * innerHeight];
+  }
+  ball(name, { x, y, z }, colour) {
+    const material = new THREE.MeshBasicMaterial({ color: colour, depthTest: false });
+    const mesh = new THREE.Mesh(new THREE.SphereGeometry(0.4), material);
+    mesh.position.set(x, y, z);
+    this.put(name, mesh);
+  }
+  // `through`: seen through what is before it.
+  line(name, points, colour, radius, through) {
+    const curve = new THREE.CurvePath();
+    const corners = points.map((p) => new THREE.Vector3(p.x ?? 0, p.y ?? 0, (p.z ?? 0) + 0.25));
+    for (let i = 1; i < corners.length; ++i) curve.add(new THREE.LineCurve3(corners[i - 1], corners[i]));
+    if (!curve.curves.length) return;
+    const geometry = new THREE.TubeGeometry(curve, Math.min(4000, 2 * corners.length + 62), radius, 5);
+    this.put(name, new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ color: colour, depthTest: !through })));
+  }
+  put(name, mesh) {
+    this.remove(name);
+    mesh.name = name;
+    mesh.renderOrder = 2;
+    this.overlay.add(mesh);
+    this.redraw();
+  }
+  remove(prefix) {
+    for (const mesh of [...this.overlay.children]) {
+      if (!mesh.name.startsWith(prefix)) continue;
+      this.overlay.remove(mesh);
+      mesh.geometry.dispose();
+      mesh.material.dispose();
+    }
+    this.redraw();
+  }
+}
+
+function nearestOf(pixels) {
+  let best = null;
+  let least = Infinity;
+  for (let i = 0; i < LOOK * LOOK; ++i) {
+    const kind = pixels[4 * i + 3];
+    if (kind < 0.5) continue;
+    const middle = LOOK >> 1;
+    const off = Math.hypot((i % LOOK) - middle, Math.floor(i / LOOK) - middle);
+    const cost = off + (Math.round(kind) === 2 ? 0 : 20); // 2: traversable
+    if (cost >= least) continue;
+    least = cost;
+    best = { x: pixels[4 * i], y: pixels[4 * i + 1], z: pixels[4 * i + 2] };
+  }
+  return best;
+}

@@ -1,0 +1,263 @@
+// The viewer in a real browser, by mouse and key, on a server with the bridge that two robots mapped.
+//
+//   node tests/web/viewer_test.mjs --build build/release [--pictures DIR]
+//
+// Exits 77, which ctest counts as skipped, where Chromium or the viewer's packages are not there.
+import { execFileSync, spawn } from "node:child_process";
+import fs from "node:fs";
+import os from "node:os";
+import path from "node:path";
+import { pathToFileURL } from "node:url";
+
+const options = Object.fromEntries(process.argv.slice(2).map((word, i, all) => [word, all[i + 1]]));
+const build = path.resolve(options["--build"] ?? "build/release");
+const viewer = path.join(build, "client/web/viewer");
+const packages = path.join(build, "client/web/npm/node_modules");
+const chromium = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"].find((file) => fs.existsSync(file));
+
+function skip(why) {
+  console.log(`skipped: ${why}`);
+  process.exit(77);
+}
+if (!chromium) skip("no Chromium (apt install chromium)");
+try {
+  execFileSync("cmake", ["--build", build, "--target", "viewer"], { stdio: "pipe" });
+} catch {
+  // Without npm or the network; what was built before will do.
+}
+if (!fs.existsSync(path.join(viewer, "viewer.js"))) skip("no viewer (cmake --build --preset release --target viewer; needs npm)");
+const { default: puppeteer } = await import(pathToFileURL(path.join(packages, "puppeteer-core/lib/puppeteer/puppeteer-core.js")));
+
+const work = fs.mkdtempSync(path.join(os.tmpdir(), "strata-viewer-"));
+const pictures = options["--pictures"];
+const ended = [];
+let failures = 0;
+
+function expect(holds, what) {
+  console.log(`${holds ? "ok  " : "FAIL"} ${what}`);
+  if (!holds) ++failures;
+}
+const pause = (ms) => new Promise((done) => setTimeout(done, ms));
+async function within(ms, what, holds) {
+  const begun = Date.now();
+  for (;;) {
+    if (await holds()) return expect(true, `${what} (${Date.now() - begun} ms)`);
+    if (Date.now() - begun > ms) return expect(false, `${what}: not within ${ms} ms`);
+    await pause(50);
+  }
+}
+
+// A server on free ports: its addresses, and its log so far.
+async function serve(name, ...more) {
+  const at = more.includes("--listen") ? [] : ["--listen", "127.0.0.1:0", "--web", "127.0.0.1:0"];
+  const args = ["--data", path.join(work, name), "--web-viewer", viewer, ...at, ...more];
+  const child = spawn(path.join(build, "server/stratad"), args);
+  const server = { log: "", out: "", child };
+  child.stdout.on("data", (text) => (server.out += text));
+  child.stderr.on("data", (text) => (server.log += text));
+  ended.push(() => child.kill());
+  for (let i = 0; i < 200 && !server.out.includes("\nweb "); ++i) await pause(50);
+  [, server.address] = server.out.match(/listening (\S+)/);
+  [, server.url] = server.out.match(/web (\S+)/);
+  server.strata = (...words) => execFileSync(path.join(build, "client/cli/strata"), ["--server", server.address, ...words], { encoding: "utf8", maxBuffer: 1 << 28, env: { ...process.env, STRATA_TOKEN: server.token ?? "" } });
+  return server;
+}
+
+async function mapTheBridge() {
+  const simulate = path.join(build, "tests/support/strata-simulate");
+  execFileSync(simulate, ["bridge", path.join(work, "world"), "--seed", "1", "--noise-m", "0.02", "--noise-rad", "0.003"]);
+  const server = await serve("maps");
+  server.strata("map", "create", "bridge", "--cell-size", "0.1");
+  server.import = (robot, as) => server.strata("scan", "import", "bridge", path.join(work, "world", robot, "scans"), "--poses", path.join(work, "world", robot, "poses_initial.txt"), "--pose-format", "index-tum", "--trajectory", as, "--align", "on", "--wait");
+  for (const robot of ["over", "under"]) server.import(robot, robot);
+  return server;
+}
+
+async function open(browser, url) {
+  const page = await browser.newPage();
+  await page.setViewport({ width: 1280, height: 800 });
+  page.on("pageerror", (error) => expect(false, `no error in the page: ${error.message}`));
+  page.on("console", (line) => line.type() === "error" && !/401|ERR_/.test(line.text()) && expect(false, `no error on the console: ${line.text()}`));
+  await page.goto(url);
+  await page.waitForFunction("window.strata?.begun", { timeout: 60000 });
+  return page;
+}
+const drawn = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+const picture = (page, name) => pictures && page.screenshot({ path: path.join(pictures, `${name}.png`) });
+async function click(page, place) {
+  const [x, y] = await page.evaluate((p) => strata.stage.pixelOf(p), place);
+  await page.mouse.click(x, y);
+}
+const message = (page) => page.$eval("#message", (node) => node.textContent);
+
+// Two clicks, and what the CLI says between the same places.
+async function planBothWays(server, page, camera, from, to, name) {
+  await page.evaluate((c) => strata.stage.look(c), camera);
+  await drawn(page);
+  await page.keyboard.press("Escape");
+  await click(page, from);
+  await page.waitForFunction("strata.levels !== null", { timeout: 20000 });
+  const levels = await page.evaluate("strata.levels");
+  await click(page, to);
+  await page.waitForFunction("strata.plan !== null", { timeout: 20000 });
+  await drawn(page);
+  const plan = await page.evaluate("strata.plan");
+  await picture(page, name);
+  const at = ({ x, y, z }) => `${x},${y},${z}`;
+  const told = JSON.parse(server.strata("--output", "json", "plan", "bridge", "--from", at(plan.from), "--to", at(plan.to)));
+  expect(plan.found, `${name}: a path of ${plan.length.toFixed(2)} m (${await message(page)})`);
+  expect(Math.abs(plan.length - told.length_m) < 0.1, `${name}: that of the CLI, ${told.length_m.toFixed(2)} m`);
+  expect(Math.hypot(plan.from.x - from.x, plan.from.y - from.y) < 0.5, `${name}: it begins where the click was`);
+  return { plan, levels };
+}
+
+async function testDecoder(server) {
+  const tile = path.join(work, "tile.bin");
+  server.strata("tile", "get", "bridge", "0/0/0", "--out", tile);
+  const told = JSON.parse(server.strata("--output", "json", "tile", "get", "bridge", "0/0/0", "--surfaces")).surfaces;
+  const { decodeTile } = await import(pathToFileURL(path.join(build, "client/web/npm/src/tile.js")));
+  const bytes = new Uint8Array(fs.readFileSync(tile));
+  const begun = performance.now();
+  const ours = decodeTile(bytes);
+  const ms = performance.now() - begun;
+  let off = 0;
+  for (let i = 0; i < told.length; ++i) {
+    if (Math.abs(ours.height[i] / 512 - told[i].z) > 1e-3 || Math.abs(ours.depth[i] / 512 - (told[i].depth_m ?? 0)) > 1e-3) ++off;
+  }
+  expect(ours.size === told.length && ours.size > 10000 && off === 0, `${ours.size} surfaces decoded as the CLI does, ${off} differ (${ms.toFixed(0)} ms)`);
+  for (const cut of [3, 20, 200, bytes.length - 40]) {
+    let refused = false;
+    try {
+      decodeTile(bytes.subarray(0, cut));
+    } catch {
+      refused = true;
+    }
+    expect(refused, `a tile of ${cut} bytes is refused`);
+  }
+}
+
+async function testMap(server, page) {
+  expect((await page.$eval("#maps", (node) => node.textContent)).includes("bridge"), "the list has the map");
+  const state = await page.$eval("#state", (node) => node.textContent);
+  expect(/\d+ tiles, 2\d\d,\d{3} surfaces, epoch 1/.test(state), state);
+  await within(5000, "two trajectories are drawn", () => page.evaluate("strata.runs === 2"));
+  await drawn(page);
+  await picture(page, "bridge");
+  const frames = await page.evaluate("strata.stage.frameMs");
+  console.log(`     frames of [ms] ${frames.map((ms) => ms.toFixed(0)).join(" ")}`);
+  const pixels = () => page.evaluate(() => strata.stage.canvas.toDataURL().length);
+  const before = await pixels();
+  await page.keyboard.press("2");
+  await drawn(page);
+  expect((await pixels()) !== before && (await page.$eval("body", (node) => node.dataset.layer)) === "height", "the key 2 colours by height");
+  await picture(page, "height");
+  await page.keyboard.press("d");
+  await drawn(page);
+  await picture(page, "dark");
+  await page.keyboard.press("1");
+  await page.keyboard.press("d");
+}
+
+async function testPlans(server, page) {
+  const above = [0, -30, 30, 0, 0, 0];
+  const { levels } = await planBothWays(server, page, above, { x: 0, y: 0, z: 3.4 }, { x: 24, y: 0, z: 0 }, "over");
+  const heights = levels.map((surface) => surface.z_m ?? 0); // JSON leaves out what is 0
+  expect(heights[0] > 3 && heights.at(-1) < 0.5, `on the deck there are levels at ${heights.map((z) => z.toFixed(2)).join(" and ")} m`);
+  await planBothWays(server, page, above, { x: 0, y: -14, z: 0 }, { x: 0, y: 14, z: 0 }, "under");
+  // Under the deck, seen with the deck cut off.
+  await page.$eval("#cut", (slider) => {
+    slider.value = 1.5;
+    slider.dispatchEvent(new Event("input"));
+  });
+  await page.evaluate((c) => strata.stage.look(c), above);
+  await drawn(page);
+  const place = await page.evaluate(() => strata.stage.pick(...strata.stage.pixelOf({ x: 0, y: 0, z: 0 })));
+  expect(place && Math.abs(place.z) < 0.2, "with the deck cut off the road under it is picked");
+  await picture(page, "cut");
+  await page.keyboard.press("Escape");
+  await page.evaluate((c) => strata.stage.look(c), [0, -30, 60, 0, 0, 0]);
+  await drawn(page);
+  await click(page, { x: 0, y: -14, z: 0 });
+  await page.waitForFunction("strata.levels !== null");
+  // Out there are single rings of the scanner only.
+  const far = await page.evaluate(() => {
+    for (let x = 330; x < innerWidth; x += 23) for (let y = 10; y < innerHeight; y += 61) {
+      const at = strata.stage.pick(x, y);
+      if (at && Math.hypot(at.x, at.y) > 45) return [x, y];
+    }
+    return null;
+  });
+  await page.mouse.click(...far);
+  await page.waitForFunction("strata.plan !== null", { timeout: 20000 });
+  const said = await message(page);
+  expect(said.startsWith("no path: ") && said.length > 20, said);
+  await picture(page, "no_path");
+}
+
+async function testLink(server, browser, page) {
+  await page.keyboard.press("3");
+  await page.keyboard.press("l");
+  const url = await page.evaluate("location.href");
+  const other = await open(browser, url);
+  const [a, b] = await Promise.all([page, other].map((p) => p.evaluate("[...strata.stage.view(), document.body.dataset.layer, document.getElementById('cut-value').textContent].join()")));
+  expect(a.split(",").slice(6).join() === b.split(",").slice(6).join() && url.includes("map=bridge"), `a link shows the same view: ${url.slice(0, 110)}`);
+  await other.close();
+}
+
+async function testLive(server, page) {
+  const before = await page.evaluate("strata.view.updates");
+  const upload = spawn(path.join(build, "client/cli/strata"), ["--server", server.address, "scan", "import", "bridge", path.join(work, "world/over/scans"), "--poses", path.join(work, "world/over/poses_initial.txt"), "--pose-format", "index-tum", "--trajectory", "third"]);
+  const done = new Promise((end) => upload.on("exit", end));
+  await within(20000, "tiles change while a robot uploads", async () => (await page.evaluate("strata.view.updates")) > before);
+  await done;
+}
+
+async function testRestart(server, page) {
+  server.child.kill();
+  await new Promise((end) => server.child.on("exit", end));
+  await within(5000, "that the server has gone is said", async () => /trying again/.test(await message(page)));
+  const again = await serve("maps", "--listen", server.address, "--web", server.url.replace("http://", ""));
+  await within(8000, "after its restart the page follows again", () => page.evaluate("strata.view.watching === true"));
+  return again;
+}
+
+async function testClosedTab(server, page) {
+  const watches = () => (server.log.match(/method=Maps.Watch code=CANCELLED/g) ?? []).length;
+  const before = watches();
+  await page.close();
+  await within(5000, "a closed tab frees its watch", () => watches() > before);
+}
+
+async function testToken(browser) {
+  const tokens = path.join(work, "tokens");
+  const token = execFileSync(path.join(build, "server/stratad"), ["token", "add", "--tokens", tokens, "viewer", "--right", "read", "--all-maps"], { encoding: "utf8" }).trim();
+  const server = await serve("guarded", "--tokens", tokens);
+  const page = await open(browser, server.url);
+  expect(await page.$eval("#token-form", (form) => !form.hidden), "a server with tokens asks for one");
+  await page.type("#token", token);
+  await page.keyboard.press("Enter");
+  await within(5000, "a token opens it", () => page.$eval("#token-form", (form) => form.hidden));
+  await page.close();
+}
+
+try {
+  const server = await mapTheBridge();
+  await testDecoder(server);
+  const browser = await puppeteer.launch({ executablePath: chromium, headless: true, userDataDir: path.join(work, "profile"), args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"] });
+  ended.push(() => browser.close());
+  const begun = Date.now();
+  const page = await open(browser, server.url);
+  expect(true, `the map is open after ${Date.now() - begun} ms`);
+  await testMap(server, page);
+  await testPlans(server, page);
+  await testLink(server, browser, page);
+  await testLive(server, page);
+  await testClosedTab(await testRestart(server, page), page);
+  await testToken(browser);
+} catch (error) {
+  expect(false, error.stack);
+} finally {
+  for (const end of ended.reverse()) await end();
+  fs.rmSync(work, { recursive: true, force: true });
+}
+process.exit(failures ? 1 : 0);
