@@ -5,8 +5,4 @@ strata_executable(
   SOURCES ros2_campaign.cc ${PROJECT_SOURCE_DIR}/tests/integration/stratad_process.cc
   DEPS strata::bag_writer strata::fast_node strata::sdk strata::simulator strata::test_support absl::str_format CLI11::CLI11
 )
-target_compile_definitions(
-  ros2_campaign PRIVATE STRATA_STRATAD="$<TARGET_FILE:stratad>" STRATA_PROGRAM="$<TARGET_FILE:strata_cli>"
-                        STRATA_ROS2="$<TARGET_FILE:strata_ros2_program>"
-)
 add_dependencies(ros2_campaign stratad strata_cli strata_ros2_program)

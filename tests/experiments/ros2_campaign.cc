@@ -36,6 +36,7 @@
 #include "core/geometry/pose.h"
 #include "tests/integration/stratad_process.h"
 #include "tests/support/bag_writer.h"
+#include "tests/support/paths.h"
 #include "tests/support/ros2/fast_node.h"
 #include "tests/support/ros2/ros_cdr.h"
 #include "tests/support/simulator/simulator.h"
@@ -259,7 +260,7 @@ class Campaign {
   }
   void StartBridge() {
     bridge_ =
-        std::make_unique<ChildProcess>(STRATA_ROS2,
+        std::make_unique<ChildProcess>(Ros2Program(),
                                        std::vector<std::string>{"live",
                                                                 "--server",
                                                                 address_,
@@ -286,7 +287,7 @@ class Campaign {
   // `strata` with the server, which must take it.
   void Strata(std::vector<std::string> arguments) const {
     arguments.insert(arguments.end(), {"--server", address_, "--output", "json"});
-    ChildProcess strata(STRATA_PROGRAM, arguments);
+    ChildProcess strata(StrataProgram(), arguments);
     while (!strata.ReadLine().empty()) continue;
     if (strata.Wait() != 0) throw std::runtime_error("strata " + arguments[0] + " failed");
   }

@@ -24,6 +24,7 @@
 #include "core/common/steady_time.h"
 #include "tests/integration/campaign_scans.h"
 #include "tests/integration/numbered_scans.h"
+#include "tests/support/paths.h"
 
 namespace strata::testing {
 namespace {
@@ -42,7 +43,7 @@ class SetClock {
     if (page == MAP_FAILED) std::abort();
     offset_ = static_cast<std::atomic<std::int64_t>*>(page);
     setenv("STRATA_CLOCK_FILE", file.c_str(), 1);
-    setenv("LD_PRELOAD", STRATA_JUMPING_CLOCK, 1);
+    setenv("LD_PRELOAD", BuiltPath("tests/support/libstrata_jumping_clock.so").c_str(), 1);
   }
   ~SetClock() {
     unsetenv("LD_PRELOAD");

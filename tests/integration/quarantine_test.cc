@@ -20,6 +20,7 @@
 #include "core/cloud/cloud_slice.h"
 #include "core/common/status.h"
 #include "tests/integration/stratad_process.h"
+#include "tests/support/paths.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 
@@ -74,7 +75,7 @@ class ServerQuarantineTest : public ::testing::Test {
   }
   // The server must be down: what `stratad quarantine list` says of `work` behind its name.
   std::string Listed(const std::string& work) {
-    ChildProcess list(STRATA_STRATAD, {"quarantine", "list", kMap, "--data", data_});
+    ChildProcess list(StratadProgram(), {"quarantine", "list", kMap, "--data", data_});
     std::string found;
     for (std::string line = list.ReadLine(); !line.empty(); line = list.ReadLine()) {
       absl::string_view rest = line;
@@ -86,7 +87,7 @@ class ServerQuarantineTest : public ::testing::Test {
   void Release(const std::vector<std::string>& work) {
     std::vector<std::string> arguments = {"quarantine", "release", kMap, "--data", data_};
     arguments.insert(arguments.end(), work.begin(), work.end());
-    EXPECT_EQ(ChildProcess(STRATA_STRATAD, arguments).Wait(), 0);
+    EXPECT_EQ(ChildProcess(StratadProgram(), arguments).Wait(), 0);
   }
   ScanInfo AwaitEnd(const ScanId& id) {
     while (true) {

@@ -10,6 +10,7 @@
 #include "absl/time/clock.h"
 
 #include "tests/integration/marked_yard.h"
+#include "tests/support/paths.h"
 
 namespace strata::testing {
 
@@ -36,7 +37,8 @@ void RobotKeeper::Loop() {
     ChildProcess* process = nullptr;
     {
       absl::MutexLock lock(&mutex_);
-      process_ = std::make_unique<ChildProcess>(STRATA_SPOOL_ROBOT, Arguments());
+      process_ =
+          std::make_unique<ChildProcess>(BuiltPath("tests/integration/spool_robot"), Arguments());
       process = process_.get();
     }
     // Its stdout ends when it does.

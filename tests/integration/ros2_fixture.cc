@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/bag_writer.h"
+#include "tests/support/paths.h"
 #include "tests/support/ros2/ros_cdr.h"
 #include "tests/support/simulator/worlds.h"
 #include "tests/support/status_matchers.h"
@@ -129,7 +130,7 @@ void Ros2Test::StartMapping(const std::string& address,
 void Ros2Test::StartBridge(const std::vector<std::string>& arguments) {
   std::vector<std::string> all = {"--domain", absl::StrCat(domain_.number()), "--output", "json"};
   all.insert(all.begin(), arguments.begin(), arguments.end());
-  bridge_ = std::make_unique<ChildProcess>(STRATA_ROS2, all);
+  bridge_ = std::make_unique<ChildProcess>(Ros2Program(), all);
 }
 
 nlohmann::json Ros2Test::EndBridge() {

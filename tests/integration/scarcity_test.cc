@@ -23,6 +23,7 @@
 #include "core/common/host_port.h"
 #include "strata/v1/maps.grpc.pb.h"
 #include "tests/integration/stratad_process.h"
+#include "tests/support/paths.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 
@@ -45,8 +46,11 @@ int ConnectTo(int port) {
 class ScarcityTest : public ::testing::Test {
  protected:
   std::vector<std::string> Stratad() const {
-    return {
-        STRATA_STRATAD, "--data", (directory_.path() / "maps").string(), "--listen", "127.0.0.1:0"};
+    return {StratadProgram(),
+            "--data",
+            (directory_.path() / "maps").string(),
+            "--listen",
+            "127.0.0.1:0"};
   }
   static std::unique_ptr<v1::Maps::Stub> NewClient(StratadProcess& stratad) {
     grpc::ChannelArguments own;

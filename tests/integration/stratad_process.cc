@@ -12,6 +12,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/support/paths.h"
+
 namespace strata::testing {
 
 ChildProcess::ChildProcess(const std::string& program, const std::vector<std::string>& arguments) {
@@ -52,7 +54,7 @@ std::string ChildProcess::ReadLine() {
 }
 
 StratadProcess::StratadProcess(const std::vector<std::string>& arguments)
-    : ChildProcess(STRATA_STRATAD, arguments) {}
+    : ChildProcess(StratadProgram(), arguments) {}
 
 const std::string& StratadProcess::Address() {
   const std::string prefix = "listening ";

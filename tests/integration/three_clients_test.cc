@@ -15,6 +15,7 @@
 #include "client/sdk/client.h"
 #include "core/codec/surface_tile_codec.h"
 #include "tests/integration/cli_fixture.h"
+#include "tests/support/paths.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {
@@ -33,12 +34,15 @@ class ThreeClientsTest : public CliTest {
 
   // What three_clients.py prints.
   json Python(const std::string& what) {
-    const std::string command =
-        absl::StrCat("PYTHONPATH=" STRATA_PYTHON_PATH " /usr/bin/python3 " STRATA_PYTHON_SCRIPT " ",
-                     what,
-                     " ",
-                     server().Address(),
-                     " m");
+    const std::string command = absl::StrCat("PYTHONPATH=",
+                                             BuiltPath("client/python"),
+                                             " /usr/bin/python3 ",
+                                             SourcePath("tests/integration/three_clients.py"),
+                                             " ",
+                                             what,
+                                             " ",
+                                             server().Address(),
+                                             " m");
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(popen(command.c_str(), "r"), pclose);
     std::string printed;
     std::array<char, 4096> buffer{};

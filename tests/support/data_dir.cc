@@ -5,12 +5,14 @@
 #include <optional>
 #include <string>
 
+#include "tests/support/paths.h"
+
 namespace strata::testing {
 
 std::optional<std::filesystem::path> FindData(const std::string& folder) {
   const char* root = std::getenv("STRATA_DATA");
   const std::filesystem::path path =
-      std::filesystem::path(root != nullptr ? root : STRATA_DEFAULT_DATA_DIR) / folder;
+      std::filesystem::path(root != nullptr ? root : SourcePath("../shared/data")) / folder;
   if (!std::filesystem::exists(path)) return std::nullopt;
   return path;
 }

@@ -1,12 +1,23 @@
+# The only library that is compiled with places of this machine.
+strata_library(
+  test_paths
+  NO_INSTALL
+  SOURCES paths.cc
+  HEADERS paths.h
+  DEPS absl::strings
+)
+target_compile_definitions(
+  strata_test_paths PRIVATE STRATA_SOURCE_DIR="${PROJECT_SOURCE_DIR}" STRATA_BUILD_DIR="${PROJECT_BINARY_DIR}"
+)
+
 # What several test programs share. Never linked into the product.
 strata_library(
   test_support
   NO_INSTALL
   SOURCES data_dir.cc drawing.cc simulator/park.cc temp_dir.cc
   HEADERS asked.h data_dir.h drawing.h simulator/park.h status_matchers.h temp_dir.h
-  DEPS strata::common strata::mls absl::strings GTest::gmock
+  DEPS strata::common strata::mls strata::test_paths absl::strings GTest::gmock
 )
-target_compile_definitions(strata_test_support PRIVATE STRATA_DEFAULT_DATA_DIR="${PROJECT_SOURCE_DIR}/../shared/data")
 
 # Allocations that fail on demand.
 strata_library(failing_memory NO_INSTALL SOURCES faults/failing_memory.cc HEADERS faults/failing_memory.h)

@@ -10,6 +10,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/support/paths.h"
 #include "tests/support/temp_dir.h"
 
 namespace strata::cli {
@@ -28,7 +29,7 @@ Ran RunStrata(const std::vector<std::string>& arguments) {
   const testing::TempDir dir;
   const std::string out = (dir.path() / "out").string();
   const std::string err = (dir.path() / "err").string();
-  std::vector<std::string> words = {STRATA_PROGRAM};
+  std::vector<std::string> words = {testing::StrataProgram()};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) {
@@ -42,7 +43,7 @@ Ran RunStrata(const std::vector<std::string>& arguments) {
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, err.c_str(), kFlags, 0600);
   pid_t child = 0;
   Ran ran;
-  if (posix_spawn(&child, STRATA_PROGRAM, &actions, nullptr, argv.data(), environ) == 0) {
+  if (posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ) == 0) {
     int status = 0;
     waitpid(child, &status, 0);
     ran.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;

@@ -16,6 +16,7 @@
 #include "core/engine/map/map_check.h"
 #include "core/storage/sqlite/schema.h"
 #include "tests/core/engine/engine_fixture.h"
+#include "tests/support/paths.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {
@@ -47,7 +48,7 @@ class OldMapTest : public EngineTest, public ::testing::WithParamInterface<OldMa
   void SetUp() override {
     const std::string name = std::string(GetParam().name) + ".strata.zst";
     std::ofstream(MapFile(), std::ios::binary)
-        << Unpacked(std::filesystem::path(STRATA_OLD_MAPS) / name);
+        << Unpacked(std::filesystem::path(SourcePath("tests/core/engine/old_maps")) / name);
   }
   std::int64_t Format() const {
     const auto checks = CheckMapFiles(MapFile().parent_path());

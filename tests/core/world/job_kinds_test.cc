@@ -14,6 +14,7 @@
 #include <gtest/gtest.h>
 
 #include "core/world/job_arguments.h"
+#include "tests/support/paths.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {
@@ -26,7 +27,7 @@ using ::testing::Not;
 using ::testing::SizeIs;
 
 // Comment lines of a proto file, as text.
-std::string CommentsOf(const char* proto) {
+std::string CommentsOf(const std::string& proto) {
   std::ifstream file(proto);
   const std::string all(std::istreambuf_iterator<char>(file), {});
   std::string comments;
@@ -37,7 +38,8 @@ std::string CommentsOf(const char* proto) {
 }
 
 TEST(JobKindsTest, TheProtoHasEveryKindParameterBoundAndDefault) {
-  EXPECT_THAT(CommentsOf(STRATA_JOBS_PROTO), HasSubstr(JobKindsText()));
+  EXPECT_THAT(CommentsOf(testing::SourcePath("proto/strata/v1/jobs.proto")),
+              HasSubstr(JobKindsText()));
 }
 
 TEST(JobKindsTest, TextsAreLinesForAProtoAndATerminal) {

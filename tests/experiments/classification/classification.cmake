@@ -22,7 +22,6 @@ strata_executable(
   SOURCES classification/recorded_places.cc
   DEPS strata::classification strata::place_methods strata::test_support bz2
 )
-target_compile_definitions(recorded_places PRIVATE STRATA_EXPERIMENTS_DIR="${PROJECT_SOURCE_DIR}/tests/experiments")
 strata_executable(
   learn_places learn_places
   SOURCES classification/learn_places.cc

@@ -33,6 +33,7 @@
 #include "tests/experiments/classification/classification_cases.h"
 #include "tests/experiments/classification/place_methods.h"
 #include "tests/support/data_dir.h"
+#include "tests/support/paths.h"
 
 namespace strata {
 namespace {
@@ -346,7 +347,7 @@ int Main() {
         "posegraphs\n");
     return 77;
   }
-  const Drawing drawing = ReadDrawing(std::filesystem::path(STRATA_EXPERIMENTS_DIR) /
+  const Drawing drawing = ReadDrawing(std::filesystem::path(SourcePath("tests/experiments")) /
                                       "classification/fr079_places.txt");
   const std::vector<std::vector<double>> ranges =
       ReadRanges(Unzipped(*recording / "fr079.clf.bz2"));

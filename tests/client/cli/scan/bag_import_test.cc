@@ -16,6 +16,7 @@
 
 #include "tests/client/cli/run_strata.h"
 #include "tests/client/cli/scan/import_of_one_file.h"
+#include "tests/support/paths.h"
 #include "tests/support/simulator/robot_files.h"
 #include "tests/support/simulator/worlds.h"
 #include "tests/support/status_matchers.h"
@@ -36,7 +37,8 @@ class BagImportTest : public ImportOfOneFile {
   BagImportTest() : ImportOfOneFile(kScans, 360) {}
   // A bag of the robot's scans.
   std::string Bag(const std::string& name, const std::string& compression = "none") const {
-    return Write(STRATA_WRITE_BAG, name, "--compression " + compression);
+    return Write(
+        testing::SourcePath("tests/support/write_bag.py"), name, "--compression " + compression);
   }
   std::string Bytes(const std::string& path) const {
     std::ifstream file(path, std::ios::binary);

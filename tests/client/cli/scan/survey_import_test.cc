@@ -13,6 +13,7 @@
 
 #include "tests/client/cli/run_strata.h"
 #include "tests/client/cli/scan/import_of_one_file.h"
+#include "tests/support/paths.h"
 #include "tests/support/simulator/robot_files.h"
 #include "tests/support/simulator/worlds.h"
 #include "tests/support/status_matchers.h"
@@ -29,7 +30,9 @@ constexpr std::size_t kScans = 4;
 class SurveyImportTest : public ImportOfOneFile {
  protected:
   SurveyImportTest() : ImportOfOneFile(kScans, 180) {}
-  std::string Survey(const std::string& name) const { return Write(STRATA_WRITE_SURVEY, name); }
+  std::string Survey(const std::string& name) const {
+    return Write(testing::SourcePath("tests/support/write_survey.py"), name);
+  }
   // Makes a map of its own of what is said, aligned; the digest of its tiles and how many points
   // each scan has. Their hashes differ: files have times, too.
   std::string ContentOf(const std::string& map, const std::vector<std::string>& words) const {

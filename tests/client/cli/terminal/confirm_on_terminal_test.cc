@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "tests/client/cli/run_strata.h"
+#include "tests/support/paths.h"
 #include "tests/support/temp_dir.h"
 
 namespace strata::cli {
@@ -19,7 +20,7 @@ using ::testing::HasSubstr;
 // Runs the program on a terminal of its own, where somebody types `answer`; `out` has all that the
 // terminal shows.
 Ran RunOnTerminal(std::vector<std::string> arguments, const std::string& answer) {
-  arguments.insert(arguments.begin(), STRATA_PROGRAM);
+  arguments.insert(arguments.begin(), testing::StrataProgram());
   std::vector<char*> argv;
   for (std::string& word : arguments) argv.push_back(word.data());
   argv.push_back(nullptr);
@@ -27,7 +28,7 @@ Ran RunOnTerminal(std::vector<std::string> arguments, const std::string& answer)
   int terminal = -1;
   const pid_t child = forkpty(&terminal, nullptr, nullptr, nullptr);
   if (child == 0) {
-    execv(STRATA_PROGRAM, argv.data());
+    execv(argv[0], argv.data());
     _exit(127);
   }
   if (child < 0) return ran;

@@ -21,6 +21,7 @@
 #include "tests/client/formats/hostile_files.h"
 #include "tests/client/formats/laz/laz_records.h"
 #include "tests/support/data_dir.h"
+#include "tests/support/paths.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {
@@ -48,9 +49,11 @@ constexpr std::array kPacked = {"first_format3_extra",
                                 "version4_format8_extra_channels"};
 constexpr std::size_t kPackedPoints = 200;
 
-std::string Packed(const std::string& name) {
-  return ReadFileBytes(fs::path(STRATA_PACKED_POINTS) / name).value();
+fs::path PackedFile(const std::string& name) {
+  return fs::path(testing::SourcePath("tests/client/formats/laz/packed")) / name;
 }
+
+std::string Packed(const std::string& name) { return ReadFileBytes(PackedFile(name)).value(); }
 
 // Of an uncompressed file, whose points are the last it has.
 std::string RecordsOfLas(const std::string& file) {
@@ -88,8 +91,7 @@ TEST(LazFilesTest, WhatWasPackedComesOut) {
 TEST(LazFilesTest, AFileIsReadAsItsBytesAre) {
   for (const std::string name : {"format3_extra.laz", "format7_chunks_vary.laz", "format1.las"}) {
     SCOPED_TRACE(name);
-    STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud file,
-                                ReadScan(fs::path(STRATA_PACKED_POINTS) / name));
+    STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud file, ReadScan(PackedFile(name)));
     STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud bytes, ReadLas(Packed(name)));
     ExpectSame(file, bytes);
   }

@@ -11,6 +11,7 @@
 #include "client/formats/file_bytes.h"
 #include "tests/client/formats/laz/laz_records.h"
 #include "tests/support/data_dir.h"
+#include "tests/support/paths.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 
@@ -23,15 +24,16 @@ void ExpectSameAsLazPerf(const fs::path& file, const std::string& modules) {
   SCOPED_TRACE(file.filename().string());
   const testing::TempDir dir;
   const fs::path out = dir.path() / "records";
-  const std::string command = absl::StrCat("node '",
-                                           STRATA_LAZ_PERF_RECORDS,
-                                           "' '",
-                                           modules,
-                                           "' '",
-                                           file.string(),
-                                           "' '",
-                                           out.string(),
-                                           "'");
+  const std::string command =
+      absl::StrCat("node '",
+                   testing::SourcePath("tests/client/formats/laz/laz_perf_records.cjs"),
+                   "' '",
+                   modules,
+                   "' '",
+                   file.string(),
+                   "' '",
+                   out.string(),
+                   "'");
   ASSERT_EQ(std::system(command.c_str()), 0);
   STRATA_ASSERT_OK_AND_ASSIGN(const std::string theirs, ReadFileBytes(out));
   STRATA_ASSERT_OK_AND_ASSIGN(const std::string bytes, ReadFileBytes(file));
@@ -54,7 +56,8 @@ TEST(LazPerfTest, RecordsAreTheSame) {
                     "to DIR/node_modules";
   }
   std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(STRATA_PACKED_POINTS)) files.push_back(entry);
+  const std::string packed = testing::SourcePath("tests/client/formats/laz/packed");
+  for (const auto& entry : fs::directory_iterator(packed)) files.push_back(entry);
   STRATA_REQUIRE_DATA(samples, "importer_samples");
   for (const auto& entry : fs::directory_iterator(samples)) files.push_back(entry);
   for (const fs::path& file : files) {

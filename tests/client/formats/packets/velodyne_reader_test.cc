@@ -29,6 +29,7 @@
 #include "core/cloud/point_cloud.h"
 #include "tests/client/formats/hostile_files.h"
 #include "tests/support/data_dir.h"
+#include "tests/support/paths.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 
@@ -132,8 +133,11 @@ struct OraclePoint {
 };
 
 std::vector<OraclePoint> OraclePoints(const std::filesystem::path& path) {
-  const std::string command =
-      absl::StrCat("/usr/bin/python3 ", STRATA_VELODYNE_POINTS, " '", path.string(), "'");
+  const std::string command = absl::StrCat("/usr/bin/python3 ",
+                                           testing::SourcePath("tests/support/velodyne_points.py"),
+                                           " '",
+                                           path.string(),
+                                           "'");
   const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(command.c_str(), "r"), &pclose);
   std::vector<OraclePoint> points;
   OraclePoint point;

@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/core/engine/engine_fixture.h"
+#include "tests/support/paths.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {
@@ -136,7 +137,7 @@ TEST_F(EngineMapsTest, ANewerFileIsLeftAsItIs) {
 }
 
 TEST_F(EngineMapsTest, AFileOfVersion1HasAllItHad) {
-  Sql(Contents(STRATA_MAP_V1));
+  Sql(Contents(SourcePath("tests/core/engine/map_v1.sql")));
   Reopen();
   ExpectSound();
   const MapStats stats = WaitIntegrated(db());
