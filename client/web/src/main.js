@@ -24,7 +24,7 @@ let layersDue = null;
 // What tests look at.
 const state = (window.strata = { stage, plan: null, levels: null, measure: null, ready: false });
 const clicks = new Clicks(stage, state);
-const hover = new Hover(stage);
+const hover = (state.hover = new Hover(stage));
 const switches = new Switches(el("switches"));
 const jobs = new Jobs(() => layersSoon());
 
