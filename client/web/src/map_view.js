@@ -117,7 +117,9 @@ export class MapView {
     this.drop(id);
     const group = groupOf(decoded, this.cell, this.floorOf);
     group.visible = shown;
-    this.held.set(id, { version, group, decoded, at: Date.now() });
+    const tile = { version, group, decoded, at: Date.now(), seenAt: null };
+    this.held.set(id, tile);
+    this.stage.afterFrame.push(() => (tile.seenAt = Date.now()));
     for (let i = 0; i < decoded.size; ++i) {
       const z = decoded.height[i] / 512;
       if (z < this.low) this.low = z;

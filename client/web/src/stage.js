@@ -28,6 +28,7 @@ export class Stage {
     this.renderer.getContext().getExtension("EXT_color_buffer_float");
     this.target = new THREE.WebGLRenderTarget(LOOK, LOOK, { type: THREE.FloatType });
     this.frameMs = [];
+    this.afterFrame = []; // called once the next frame is drawn
     this.onView = null; // called when the camera has moved
     addEventListener("resize", () => this.fit());
     this.fit();
@@ -52,7 +53,7 @@ export class Stage {
     const gl = this.renderer.getContext();
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // until it is drawn
     this.frameMs.push(performance.now() - begun);
-    this.drawnAt = Date.now();
+    for (const drawn of this.afterFrame.splice(0)) drawn();
     if (this.frameMs.length > 20) this.frameMs.shift();
   }
   background(colour) {
