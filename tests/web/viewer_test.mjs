@@ -310,6 +310,26 @@ async function testPanels(server, page) {
   await page.keyboard.press("1");
 }
 
+// A map whose points have classes: boxes around its things, and what is inferred of them.
+async function testObjects(server, browser) {
+  const labelled = path.join(work, "labelled");
+  execFileSync(path.join(build, "tests/support/strata-simulate"), ["bridge", labelled, "--seed", "1", "--labels", "--scans", "8"]);
+  server.strata("map", "create", "things");
+  server.strata("scan", "import", "things", path.join(labelled, "over/scans"), "--poses", path.join(labelled, "over/poses_truth.txt"), "--trajectory", "over", "--align", "off", "--wait");
+  for (const kind of ["objects", "complete"]) server.strata("job", "start", "things", kind, "--wait");
+  const page = await open(browser, `${server.url}#map=things`);
+  const told = server.strata("--output", "json", "objects", "list", "things");
+  await within(20000, "objects have a switch", () => layerSwitch(page, "objects"));
+  await press(page, '#switches input[data-layer="objects"]');
+  const boxes = await page.evaluate(() => strata.stage.overlay.children.find(({ name }) => name === "objects").geometry.attributes.position.count / 24);
+  expect(boxes === JSON.parse(told).entities.length && boxes > 0, `${boxes} boxes, as many as the CLI lists`);
+  if (await layerSwitch(page, "inferred")) await press(page, '#switches input[data-layer="inferred"]');
+  console.log(`     inferred: ${await page.evaluate("strata.counts.inferred")}`);
+  await drawn(page);
+  await picture(page, "objects");
+  await page.close();
+}
+
 async function testMeasure(page) {
   await page.evaluate(() => strata.stage.look([0, -30, 30, 0, 0, 0]));
   await drawn(page);
@@ -460,6 +480,8 @@ try {
   await testLink(server, browser, page);
   await testLevels(page);
   await testPanels(server, page);
+  await testObjects(server, browser);
+  await page.bringToFront();
   await testMeasure(page);
   await testTouchAndKeys(page);
   await testLatency(server, page);
