@@ -33,7 +33,11 @@ function lookup(floors, cell) {
 
 function showFloor(floor, stage) {
   shared.bottom.value = floor ? (floor.low?.z ?? 0) - BELOW : -1e9;
-  shared.cut.value = floor ? (floor.high?.z ?? 0) + ABOVE : 1e9;
+  el("cut").dispatchEvent(new Event("input")); // what the slider says
+  if (floor) {
+    shared.cut.value = (floor.high?.z ?? 0) + ABOVE;
+    el("cut-value").textContent = `${metres(shared.cut.value)} m, of the floor`;
+  }
   stage.redraw();
 }
 

@@ -60,6 +60,7 @@ async function openMap(name, camera) {
   state.ready = true;
   jobs.open(view);
   layersSoon(0);
+  if (document.body.dataset.layer === "floor") await floors();
 }
 
 // What lies over the surfaces, once for several changes.
