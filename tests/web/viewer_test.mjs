@@ -374,6 +374,7 @@ async function testTouchAndKeys(page) {
   await within(5000, "Enter clicks in the middle", () => page.evaluate("strata.levels?.length > 0"));
   await picture(page, "keyboard");
   await page.keyboard.press("Escape");
+  await page.$eval("#jobs", (jobs) => (jobs.open = true));
   const reached = new Set();
   for (let i = 0; i < 60; ++i) {
     await page.keyboard.press("Tab");
@@ -411,9 +412,10 @@ async function testLatency(server, page) {
   const upload = spawn(path.join(build, "client/cli/strata"), ["--server", server.address, "scan", "import", "bridge", one, "--poses", path.join(work, "world/over/poses_initial.txt"), "--pose-format", "index-tum", "--trajectory", "single", "--align", "off"]);
   await new Promise((end) => upload.on("exit", end));
   await within(5000, "the upload is acknowledged", () => acknowledged > 0);
-  await pause(3000);
-  await page.waitForFunction("strata.view.settled", { timeout: 20000 });
-  const times = await page.evaluate((since) => strata.view.shown().filter(({ at }) => at >= since).map(({ seenAt }) => seenAt ?? Infinity), asked);
+  const fresh = () => page.evaluate((since) => strata.view.shown().filter(({ at }) => at >= since).map(({ seenAt }) => seenAt ?? Infinity), asked);
+  await within(30000, "tiles of the scan come", async () => (await fresh()).length > 0);
+  await pause(2000); // for the last of them
+  const times = await fresh();
   const seen = Math.max(...times);
   expect(times.length > 0 && seen - acknowledged <= 2000, `seen ${seen - acknowledged} ms after its acknowledgement, ${times.length} tiles`);
 }
