@@ -21,6 +21,7 @@ const stage = new Stage(el("stage"));
 const hash = new URLSearchParams(location.hash.slice(1));
 let view = null;
 let layersDue = null;
+let layersDrawn = Promise.resolve();
 // What tests look at.
 const state = (window.strata = { stage, plan: null, levels: null, measure: null, ready: false });
 const clicks = new Clicks(stage, state);
@@ -68,7 +69,8 @@ function layersSoon(ms = 1000) {
   if (!state.ready || layersDue) return;
   layersDue = setTimeout(() => {
     layersDue = null;
-    drawLayers(view).catch((error) => error.name !== "AbortError" && say(error.message));
+    // One after the other: an earlier answer that comes late would take away what a later one drew.
+    layersDrawn = layersDrawn.then(() => drawLayers(view)).catch((error) => error.name !== "AbortError" && say(error.message));
   }, ms);
 }
 
