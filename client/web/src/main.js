@@ -1,74 +1,50 @@
-// The page: list of maps, one map, what is at a place, and paths by two clicks.
+// The page: list of maps, one map, and what is shown of it.
+import { Clicks } from "./clicks.js";
+import { el, say } from "./dom.js";
+import { listEpochs } from "./epochs.js";
+import { findFloors, forgetFloors } from "./floors.js";
+import { drawGraph } from "./graph.js";
+import { Hover } from "./hover.js";
+import { Jobs } from "./jobs.js";
+import { listMaps } from "./map_list.js";
 import { MapView } from "./map_view.js";
+import { drawModels } from "./models.js";
 import { shared } from "./patches.js";
-import { call, setToken, stream } from "./rpc.js";
+import { setToken } from "./rpc.js";
 import { Stage } from "./stage.js";
+import { Switches } from "./switches.js";
 
-const LAYERS = ["traversability", "height", "class", "confidence", "sigma"];
-const TRAVERSABILITY = { TRAVERSABILITY_TRAVERSABLE: "drivable", TRAVERSABILITY_NON_TRAVERSABLE: "not drivable", TRAVERSABILITY_UNDERSIDE: "underside" };
-const RUNS = ["#0b3c75", "#e69f00", "#00664a", "#b0447f", "#d55e00", "#7a6a00"];
+const LAYERS = ["traversability", "height", "class", "confidence", "sigma", "floor"];
+const NARROW = 600; // pixels; there the panel is closed at first
 
-const el = (id) => document.getElementById(id);
 const stage = new Stage(el("stage"));
 const hash = new URLSearchParams(location.hash.slice(1));
 let view = null;
-let start = null;
-let runsDue = null;
+let layersDue = null;
+let layersDrawn = Promise.resolve();
 // What tests look at.
-const state = (window.strata = { stage, plan: null, levels: null, ready: false });
+const state = (window.strata = { stage, plan: null, levels: null, measure: null, ready: false });
+const clicks = new Clicks(stage, state);
+const hover = (state.hover = new Hover(stage));
+const switches = new Switches(el("switches"));
+const jobs = new Jobs(() => layersSoon());
 
-// JSON leaves out what is 0, and nobody wants to read -0.00.
-const metres = (value) => ((Math.round((value ?? 0) * 100) || 0) / 100).toFixed(2);
-
-function say(text) {
-  el("message").textContent = text;
-}
-
-function ageOf(created) {
-  const days = (Date.now() - Date.parse(created)) / 86_400_000;
-  return days < 1 / 24 ? `${Math.max(1, Math.round(days * 1440))} min` : days < 1 ? `${Math.round(days * 24)} h` : `${Math.round(days)} d`;
-}
-
-async function listMaps() {
-  const maps = (await call("Maps/List", {})).maps ?? [];
-  const rows = await Promise.all(maps.map(async (map) => {
-    const { stats } = await call("Maps/Stats", { name: map.name });
-    return [map.name, stats.scans ?? "0", ((stats.tile_bytes ?? 0) / 1e6).toFixed(1), ageOf(map.created)];
-  }));
-  el("maps").tBodies[0].replaceChildren(...rows.map((cells) => {
-    const row = document.createElement("tr");
-    cells.forEach((text, i) => {
-      const cell = row.insertCell();
-      if (i) return void (cell.textContent = text);
-      const button = document.createElement("button");
-      button.textContent = text;
-      button.onclick = () => openMap(text);
-      cell.append(button);
-    });
-    return row;
-  }));
-  if (!maps.length) say("no map yet: strata map create NAME");
-  return maps;
-}
-
-function showState(scansToo) {
+function showState({ scans, epoch } = {}) {
   if (!view) return;
-  if (scansToo && state.ready && !runsDue) {
-    runsDue = setTimeout(() => {
-      runsDue = null;
-      drawRuns(view.name).catch((error) => say(error.message));
-    }, 1000);
-  }
-  const detail = view.level ? `, level of detail ${view.level}` : "";
-  el("state").textContent = `${view.held.size} tiles, ${view.surfaces().toLocaleString("en")} surfaces, epoch ${view.epoch ?? "0"}${detail}`;
+  if (scans || epoch) layersSoon();
+  const levels = [...new Set(view.shown().map(({ decoded }) => decoded.level))].sort((a, b) => a - b);
+  const detail = levels.length > 1 || levels[0] ? `, levels of detail ${levels.join(" ")}` : "";
+  el("state").textContent = `${view.shown().length} tiles, ${view.surfaces().toLocaleString("en")} surfaces, epoch ${view.epoch ?? "0"}${detail}`;
 }
 
 async function openMap(name, camera) {
   view?.close();
   state.ready = false;
-  clearPlan();
-  stage.remove("run");
-  view = state.view = new MapView(name, stage, { changed: showState, told: say });
+  clicks.clear();
+  hover.clear();
+  switches.clear();
+  forgetFloors(stage);
+  view = state.view = clicks.view = new MapView(name, stage, { changed: showState, told: say });
   say(`opening ${name} …`);
   el("name").textContent = name;
   await view.open();
@@ -79,23 +55,30 @@ async function openMap(name, camera) {
   setCut(hash.has("cut") && camera ? Number(hash.get("cut")) : null);
   if (camera) stage.look(camera);
   else fit();
-  say("click a start, then a goal");
+  view.look();
+  el("of-map").hidden = false;
+  clicks.prompt();
   state.ready = true;
-  drawRuns(name).catch((error) => say(error.message));
+  jobs.open(view);
+  layersSoon(0);
+  if (document.body.dataset.layer === "floor") await floors();
 }
 
-async function drawRuns(name) {
-  const runs = new Map();
-  for await (const part of stream("PoseGraph/Get", { map: name }, view.stop.signal)) {
-    for (const node of part.nodes ?? []) {
-      const run = node.id?.trajectory ?? "";
-      if (!runs.has(run)) runs.set(run, []);
-      runs.get(run).push((node.current ?? node.uploaded)?.translation ?? {});
-    }
-  }
-  stage.remove("run");
-  [...runs].forEach(([run, places], i) => stage.line(`run ${run}`, places, RUNS[i % RUNS.length], 0.1, false));
-  state.runs = runs.size;
+// What lies over the surfaces, once for several changes.
+function layersSoon(ms = 1000) {
+  if (!state.ready || layersDue) return;
+  layersDue = setTimeout(() => {
+    layersDue = null;
+    // One after the other: an earlier answer that comes late would take away what a later one drew.
+    layersDrawn = layersDrawn.then(() => drawLayers(view)).catch((error) => error.name !== "AbortError" && say(error.message));
+  }, ms);
+}
+
+async function drawLayers(of) {
+  jobs.setCurrent(await listEpochs(of, stage, jobs));
+  const graph = await drawGraph(of, stage, switches, hover);
+  state.runs = graph.runs;
+  state.counts = { ...graph, ...(await drawModels(of, stage, switches, hover)) };
 }
 
 function fit() {
@@ -115,64 +98,18 @@ function setCut(height) {
   stage.redraw();
 }
 
-function setLayer(index) {
+async function setLayer(index) {
   shared.layer.value = index;
   el("layer").value = String(index);
   document.body.dataset.layer = LAYERS[index];
   stage.redraw();
+  if (LAYERS[index] === "floor" && view && !view.floorOf) await floors();
 }
 
-function clearPlan() {
-  start = null;
-  state.plan = state.levels = null;
-  for (const name of ["start", "goal", "path", "where"]) stage.remove(name);
-  el("levels").replaceChildren();
-}
-
-async function showLevels({ x, y }) {
-  const { columns } = await call("Planning/SampleSurfaces", { map: view.name, places: [{ x, y }] });
-  const levels = (columns?.[0]?.surfaces ?? []).slice().reverse();
-  state.levels = levels;
-  el("levels").replaceChildren(...levels.map((surface) => {
-    const item = document.createElement("li");
-    const what = surface.depth_m ? `wall, ${surface.depth_m.toFixed(2)} m deep` : TRAVERSABILITY[surface.traversability] ?? "unknown";
-    const label = surface.class_id ? `, class ${surface.class_id} (${surface.confidence ?? 0} %)` : "";
-    item.textContent = `z ${metres(surface.z_m)} m ± ${(surface.sigma_m ?? 0).toFixed(3)}: ${what}${label}`;
-    return item;
-  }));
-}
-
-const endpoint = ({ x, y, z }) => ({ x_m: x, y_m: y, z_m: z });
-
-async function plan(from, to) {
-  const path = await call("Planning/PlanPath", { map: view.name, from: endpoint(from), to: endpoint(to) });
-  const found = path.waypoints?.length > 0;
-  state.plan = { from, to, found, length: path.length_m ?? 0, message: path.message, waypoints: path.waypoints ?? [] };
-  if (found) {
-    stage.line("path", path.waypoints, getComputedStyle(document.body).getPropertyValue("--path"), 0.15, true);
-    say(`${path.length_m.toFixed(1)} m in ${(path.elapsed_ms ?? 0).toFixed(0)} ms`);
-  } else {
-    const where = path.where ?? path.nearest;
-    if (where) stage.ball("where", { x: 0, y: 0, z: 0, ...where }, "#d55e00");
-    say(`no path: ${path.message}`);
-  }
-}
-
-async function clickAt(x, y) {
-  const place = view && stage.pick(x, y);
-  if (!place) return say("nothing is there");
+async function floors() {
+  say("looking for floors …");
   try {
-    if (!start) {
-      clearPlan();
-      start = place;
-      stage.ball("start", place, "#009e73");
-      say(`start (${place.x.toFixed(2)}, ${place.y.toFixed(2)}, ${place.z.toFixed(2)}); click a goal`);
-      return await showLevels(place);
-    }
-    const from = start;
-    start = null;
-    stage.ball("goal", place, "#cc79a7");
-    await Promise.all([showLevels(place), plan(from, place)]);
+    state.floors = await findFloors(view, stage);
   } catch (error) {
     say(error.message);
   }
@@ -205,51 +142,85 @@ function setDark(dark) {
 const KEYS = {
   "[": () => setCut(Number(el("cut").value) - 0.25),
   "]": () => setCut(Number(el("cut").value) + 0.25),
+  "+": () => stage.zoom(0.8),
+  "-": () => stage.zoom(1.25),
   f: () => view && fit(),
   l: () => view && linkToView(),
+  m: () => view && clicks.setMeasuring(!clicks.measuring),
   p: savePicture,
   d: () => setDark(!document.body.classList.contains("dark")),
-  Escape: () => (clearPlan(), say("click a start, then a goal")),
+  Escape: () => clicks.setMeasuring(false),
 };
 
-function wire() {
+// Keys that a control takes for itself.
+const takes = (target) => target instanceof HTMLSelectElement || (target instanceof HTMLInputElement && ["password", "text"].includes(target.type));
+
+function wireKeys() {
   LAYERS.forEach((layer, i) => {
     el("layer").add(new Option(layer, i));
     KEYS[i + 1] = () => setLayer(i);
   });
+  addEventListener("keydown", (event) => {
+    if (takes(event.target) || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.key === "Enter" && event.target === stage.canvas) clicks.at(innerWidth / 2, innerHeight / 2);
+    else KEYS[event.key]?.();
+  });
+}
+
+// A click or tap: one pointer that stays where it came down.
+function wirePointer() {
+  let downs = 0;
+  let at = null;
+  stage.canvas.addEventListener("pointerdown", (event) => {
+    at = ++downs === 1 && event.button === 0 ? [event.clientX, event.clientY] : null;
+  });
+  const up = (event) => {
+    downs = Math.max(0, downs - 1);
+    const tapped = at && event.type === "pointerup" && Math.hypot(event.clientX - at[0], event.clientY - at[1]) <= 6;
+    at = null;
+    if (!tapped) return;
+    stage.canvas.focus({ preventScroll: true });
+    clicks.at(event.clientX, event.clientY);
+  };
+  stage.canvas.addEventListener("pointerup", up);
+  stage.canvas.addEventListener("pointercancel", up);
+}
+
+function wirePanel() {
   el("layer").onchange = () => setLayer(Number(el("layer").value));
   el("cut").oninput = () => setCut(null);
-  el("link").onclick = () => view && linkToView();
+  el("link").onclick = () => KEYS.l();
+  el("measure").onclick = () => KEYS.m();
+  el("floors").onclick = () => view && setLayer(LAYERS.indexOf("floor"));
   el("picture").onclick = savePicture;
   el("dark").onclick = KEYS.d;
-  addEventListener("keydown", (event) => {
-    if (event.target instanceof HTMLInputElement || event.ctrlKey || event.metaKey) return;
-    KEYS[event.key]?.();
-  });
-  let down = null;
-  stage.canvas.addEventListener("pointerdown", (event) => (down = [event.clientX, event.clientY]));
-  stage.canvas.addEventListener("pointerup", (event) => {
-    if (!down || Math.hypot(event.clientX - down[0], event.clientY - down[1]) > 4) return;
-    stage.canvas.focus();
-    clickAt(event.clientX, event.clientY);
-  });
+  el("panel").open = innerWidth > NARROW;
   el("token-form").onsubmit = (event) => {
     event.preventDefault();
     setToken(el("token").value.trim());
+    el("token").value = "";
     begin();
   };
+  addEventListener("unauthenticated", () => {
+    if (!el("token-form").hidden) return;
+    el("token-form").hidden = false;
+    el("panel").open = true;
+    el("token").focus();
+    say(view ? "the token holds no longer: enter another" : "this server asks for a token");
+  });
 }
 
+// Also after a new token: a map that is open stays, and follows again by itself.
 async function begin() {
   try {
-    const maps = await listMaps();
+    const maps = await listMaps(openMap);
     el("token-form").hidden = true;
     const name = hash.get("map") ?? (maps.length === 1 ? maps[0].name : null);
     const camera = hash.get("cam")?.split(",").map(Number);
-    if (name) await openMap(name, camera?.length === 6 && camera.every(Number.isFinite) ? camera : null);
+    if (view && state.ready) clicks.prompt();
+    else if (name) await openMap(name, camera?.length === 6 && camera.every(Number.isFinite) ? camera : null);
     else if (maps.length) say("choose a map");
   } catch (error) {
-    if (error.code === "unauthenticated") el("token-form").hidden = false;
     say(error.message);
   }
   state.begun = true;
@@ -260,7 +231,9 @@ if (hash.has("token")) {
   hash.delete("token");
   history.replaceState(null, "", `#${hash}`);
 }
-wire();
+wireKeys();
+wirePointer();
+wirePanel();
 setDark(matchMedia("(prefers-color-scheme: dark)").matches);
 setLayer(Math.min(Math.max(Number(hash.get("layer") ?? 0) || 0, 0), LAYERS.length - 1));
 begin();

@@ -1,86 +1,182 @@
-// One map on the stage: its tiles of one level of detail, kept as they are on the server.
+// One map on the stage: the tiles that the view needs, kept as they are on the server.
 import { decodeTile } from "./tile.js";
 import { disposeOf, groupOf } from "./patches.js";
 import { call, stream, tileBytes } from "./rpc.js";
+import { TileTree, choose, cover, idOf } from "./tile_tree.js";
 
-const MOST_PATCHES = 300_000; // of the finest level that is drawn
-const LEVELS = 12;
-const AT_ONCE = 4; // of a browser's six connections
+const MOST_PATCHES = 200_000; // in sight
+const MOST_HELD = 1_000_000;
+const AT_ONCE = 3; // of a browser's six connections; two are for watches
+const LEVELS = 13;
+const CHOOSE_EVERY_MS = 150;
 
-const keyOf = ({ level = 0, x = 0, y = 0 }) => `${level}/${x}/${y}`;
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 
 export class MapView {
-  // `changed` is called when anything has, with whether scans have; `told` with what a person should know.
+  // `changed` is called when anything has, with {scans, epoch} of what else has; `told` with what a
+  // person should know.
   constructor(name, stage, { changed, told }) {
     Object.assign(this, { name, stage, changed, told });
     this.held = new Map();
+    this.failed = new Map();
+    this.fetching = new Set();
+    this.queue = [];
+    this.cut = { leaves: new Map(), inner: new Map(), patches: 0 };
     this.stop = new AbortController();
     this.updates = 0;
+    this.low = Infinity;
+    this.high = -Infinity;
+    this.floorOf = null;
   }
+  // Returns when the map is there coarsely; look() then makes it finer.
   async open() {
     const info = (await call("Maps/Get", { name: this.name }, this.stop.signal)).map;
     this.cell = info.parameters.mls.cell_size_m;
     this.created = info.created;
-    this.level = await this.finestLevel();
-    await this.sync();
+    this.tree = new TileTree(this.cell);
+    await this.listAll();
+    await Promise.all(this.tree.roots().map((root) => this.fetch(root)));
+    this.stage.onView = () => this.lookSoon();
     this.follow();
   }
   close() {
     this.stop.abort();
-    for (const key of [...this.held.keys()]) this.drop(key);
+    this.stage.onView = null;
+    for (const id of [...this.held.keys()]) this.drop(id);
   }
-  async list(level) {
+  async list(level, area) {
     const tiles = [];
-    const request = { map: this.name, area: { level } };
+    const box = area && { x_min: area.x0, x_max: area.x1, y_min: area.y0, y_max: area.y1 };
+    const request = { map: this.name, area: { level, ...box } };
     for await (const part of stream("Tiles/List", request, this.stop.signal)) tiles.push(...(part.tiles ?? []));
-    return tiles;
+    this.tree.set(level, tiles, area);
   }
-  async finestLevel() {
-    for (let level = 0; level < LEVELS; ++level) {
-      const patches = (await this.list(level)).reduce((sum, tile) => sum + Number(tile.patches ?? 0), 0);
-      if (patches <= MOST_PATCHES) return level;
+  async listAll() {
+    await Promise.all(Array.from({ length: LEVELS }, (_, i) => this.list(LEVELS - 1 - i)));
+    this.tree.setTop();
+  }
+  // Looks again at what there is around the tiles of level 0 that have changed.
+  async sync(tiles) {
+    const xs = tiles.map(({ key }) => key?.x ?? 0);
+    const ys = tiles.map(({ key }) => key?.y ?? 0);
+    const least = (all) => all.reduce((a, b) => Math.min(a, b), Infinity);
+    const most = (all) => all.reduce((a, b) => Math.max(a, b), -Infinity);
+    const box = [least(xs), most(xs), least(ys), most(ys)];
+    this.failed.clear();
+    await Promise.all(Array.from({ length: this.tree.top + 1 }, (_, level) => {
+      const [x0, x1, y0, y1] = box.map((at) => Math.floor(at / 2 ** level));
+      return this.list(level, { x0, x1: x1 + 1, y0, y1: y1 + 1 });
+    }));
+    if (this.tree.roots().length > 4) await this.listAll();
+    for (const id of [...this.held.keys()]) if (!this.tree.find(id)) this.drop(id);
+    this.look();
+  }
+  lookSoon() {
+    this.due ??= setTimeout(() => this.look(), CHOOSE_EVERY_MS);
+  }
+  // Chooses tiles for the view, coarse ones first.
+  look() {
+    clearTimeout(this.due);
+    this.due = null;
+    if (this.stop.signal.aborted) return;
+    this.cut = choose(this.tree, this.stage.eye(this.low, this.high), MOST_PATCHES);
+    const wanted = [...this.cut.inner.values(), ...this.cut.leaves.values()];
+    this.queue = wanted
+      .filter(({ id, version }) => this.held.get(id)?.version !== version && this.failed.get(id) !== version)
+      .sort((a, b) => b.level - a.level || b.pixels - a.pixels);
+    this.evict();
+    this.show();
+    this.pump();
+  }
+  pump() {
+    while (this.fetching.size < AT_ONCE && this.queue.length) {
+      const node = this.queue.shift();
+      if (this.fetching.has(node.id)) continue;
+      this.fetch(node).then(() => {
+        if (this.stop.signal.aborted) return;
+        this.show();
+        this.pump();
+      });
     }
-    return LEVELS;
+    this.settled = !this.fetching.size && !this.queue.length;
   }
-  // Gets what is new or changed, and drops what is gone.
-  async sync() {
-    const now = new Map((await this.list(this.level)).map((tile) => [keyOf(tile.key), tile]));
-    for (const key of [...this.held.keys()]) if (!now.has(key)) this.drop(key);
-    const wanted = [...now].filter(([key, tile]) => this.held.get(key)?.version !== tile.version);
-    const fetcher = async () => {
-      for (let next = wanted.pop(); next; next = wanted.pop()) await this.fetch(...next);
-    };
-    await Promise.all(Array.from({ length: AT_ONCE }, fetcher));
-    this.changed(false);
-  }
-  async fetch(key, { key: tile, version }) {
+  async fetch(node) {
+    const { id, version } = node;
+    this.fetching.add(id);
     try {
-      const bytes = await tileBytes(this.name, this.created, tile, version);
-      if (this.stop.signal.aborted) return;
-      const decoded = decodeTile(bytes);
-      this.drop(key);
-      const group = groupOf(decoded, this.cell);
-      this.held.set(key, { version, group, decoded });
-      this.stage.tiles.add(group);
-      this.stage.redraw();
-      ++this.updates;
+      const bytes = await tileBytes(this.name, this.created, node, version);
+      if (!this.stop.signal.aborted) this.hold(node, decodeTile(bytes));
     } catch (error) {
-      if (error.code !== "not_found") this.told(`tile ${key}: ${error.message}`);
+      this.failed.set(id, version);
+      if (error.code !== "not_found" && !this.stop.signal.aborted) this.told(`tile ${id}: ${error.message}`);
+    }
+    this.fetching.delete(id);
+  }
+  hold({ id, version, level }, decoded) {
+    const shown = this.held.get(id)?.group.visible ?? level === this.tree.top;
+    this.drop(id);
+    const group = groupOf(decoded, this.cell, this.floorOf);
+    group.visible = shown;
+    const tile = { version, group, decoded, at: Date.now(), seenAt: null };
+    this.held.set(id, tile);
+    this.stage.afterFrame.push(() => (tile.seenAt = Date.now()));
+    for (let i = 0; i < decoded.size; ++i) {
+      const z = decoded.height[i] / 512;
+      if (z < this.low) this.low = z;
+      if (z > this.high) this.high = z;
+    }
+    this.stage.tiles.add(group);
+    this.stage.redraw();
+    ++this.updates;
+  }
+  // Makes all that is held anew, with the floors that `floorOf` tells.
+  setFloors(floorOf) {
+    this.floorOf = floorOf;
+    for (const tile of this.held.values()) {
+      const group = groupOf(tile.decoded, this.cell, floorOf);
+      group.visible = tile.group.visible;
+      this.stage.tiles.remove(tile.group);
+      disposeOf(tile.group);
+      this.stage.tiles.add((tile.group = group));
+    }
+    this.stage.redraw();
+  }
+  show() {
+    const shown = new Set(cover(this.tree, this.cut, (id) => this.held.has(id)).map(({ id }) => id));
+    for (const [id, tile] of this.held) {
+      if (tile.group.visible === shown.has(id)) continue;
+      tile.group.visible = shown.has(id);
+      this.stage.redraw();
+    }
+    this.changed({});
+  }
+  // Lets go of tiles that no view has needed for longest.
+  evict() {
+    for (const id of [...this.cut.inner.keys(), ...this.cut.leaves.keys()]) {
+      const tile = this.held.get(id);
+      if (!tile) continue;
+      this.held.delete(id); // and to the end
+      this.held.set(id, tile);
+    }
+    let size = [...this.held.values()].reduce((sum, { decoded }) => sum + decoded.size, 0);
+    for (const [id, { decoded, group }] of [...this.held]) {
+      if (size <= MOST_HELD) return;
+      if (this.cut.inner.has(id) || this.cut.leaves.has(id) || group.visible) continue;
+      size -= decoded.size;
+      this.drop(id);
     }
   }
-  drop(key) {
-    const tile = this.held.get(key);
+  drop(id) {
+    const tile = this.held.get(id);
     if (!tile) return;
     this.stage.tiles.remove(tile.group);
     disposeOf(tile.group);
-    this.held.delete(key);
+    this.held.delete(id);
     this.stage.redraw();
   }
-  // Whether these tiles of level 0 are others than those that are drawn, or may be.
-  isStale(tiles) {
-    if (this.level) return tiles.length > 0;
-    return tiles.some(({ key, version, gone }) => this.held.get(keyOf(key ?? {}))?.version !== (gone ? undefined : version));
+  // Those of level 0 that are others than those that are known.
+  newOf(tiles) {
+    return tiles.filter(({ key, version, gone }) => this.tree.find(idOf(key ?? {}))?.version !== (gone ? undefined : version));
   }
   // As long as the page is seen: a watch holds one of the browser's few connections.
   async follow() {
@@ -94,14 +190,16 @@ export class MapView {
       try {
         const request = { name: this.name, since };
         for await (const news of stream("Maps/Watch", request, watch.signal)) {
+          const epoch = this.epoch !== undefined && this.epoch !== news.epoch;
           since = news.commit_sequence ?? since;
           this.epoch = news.epoch;
           this.watching = true;
-          if (this.isStale(news.tiles ?? [])) await this.sync();
-          this.changed(news.scans?.length > 0);
+          const fresh = this.newOf(news.tiles ?? []);
+          if (fresh.length) await this.sync(fresh);
+          this.changed({ scans: news.scans?.length > 0, epoch });
         }
       } catch (error) {
-        if (!watch.signal.aborted) this.told(`${error.message}; trying again`);
+        if (!watch.signal.aborted && error.code !== "unauthenticated") this.told(`${error.message}; trying again`);
       }
       this.watching = false;
       this.stop.signal.removeEventListener("abort", end);
@@ -110,13 +208,16 @@ export class MapView {
       while (document.hidden && !this.stop.signal.aborted) await pause(500);
     }
   }
+  shown() {
+    return [...this.held.values()].filter(({ group }) => group.visible);
+  }
   surfaces() {
-    return [...this.held.values()].reduce((sum, tile) => sum + tile.decoded.size, 0);
+    return this.shown().reduce((sum, tile) => sum + tile.decoded.size, 0);
   }
   // Box without the outermost hundredth on each side: outliers are far away.
   box() {
     const places = [[], [], []];
-    for (const { decoded } of this.held.values()) {
+    for (const { decoded } of this.shown()) {
       const size = this.cell * 2 ** decoded.level;
       const step = Math.max(1, decoded.size >> 9);
       for (let i = 0; i < decoded.size; i += step) {

@@ -9,6 +9,7 @@ export const shared = {
   low: { value: 0 },
   high: { value: 10 },
   cut: { value: 1e9 },
+  bottom: { value: -1e9 },
   layer: { value: 0 },
   picking: { value: 0 },
   dark: { value: 0 },
@@ -18,7 +19,7 @@ export const shared = {
 // in lightness; heights and others from dark blue to yellow (cividis, likewise).
 const VERTEX = `
 uniform highp isampler2D data; uniform int faces, layer; uniform vec2 origin;
-uniform float size, low, high, cut, dark; flat out vec3 colour; flat out float kind; out vec3 world;
+uniform float size, low, high, cut, bottom, dark; flat out vec3 colour; flat out float kind; out vec3 world;
 vec3 ramp(float t) {
   t = clamp(t, 0., 1.);
   vec3 a = mix(vec3(0., .13, .3), vec3(.16, .38, .66), dark), b = vec3(.49, .48, .47), c = vec3(1., .92, .27);
@@ -28,11 +29,18 @@ vec3 wheel(int id) {
   float h = fract(float(id) * .618034);
   return clamp(abs(fract(h + vec3(0., .667, .333)) * 6. - 3.) - 1., .15, .9);
 }
+vec3 floorColour(int id) {
+  if (id == 0) return vec3(.6);
+  id = (id - 1) % 7;
+  return id == 0 ? vec3(.9, .62, 0.) : id == 1 ? vec3(.34, .71, .91) : id == 2 ? vec3(0., .62, .45) : id == 3 ? vec3(.94, .89, .26)
+    : id == 4 ? vec3(0., .45, .7) : id == 5 ? vec3(.84, .37, 0.) : vec3(.8, .47, .65);
+}
 vec3 paint(ivec4 d, int trav, bool side, bool wall, float z) {
   if (layer == 1) return ramp((z - low) / (high - low));
   if (layer == 2) { int id = d.x >> 20; return id == 0 ? vec3(.6) : wheel(id); }
   if (layer == 3) return ramp(float(d.w & 255) / 100.);
   if (layer == 4) return ramp(float((d.w >> 8) & 255) / 180.);
+  if (layer == 5) return floorColour((d.w >> 16) & 255);
   if (trav == 1 && !side) return vec3(.34, .71, .91);
   if (wall) return vec3(.45, .43, .42);
   return trav == 2 ? vec3(.84, .37, 0.) : trav == 3 ? vec3(.8, .47, .65) : vec3(.7);
@@ -53,20 +61,23 @@ void main() {
   }
   colour = paint(d, trav, face > 0, wall, z) * shade;
   kind = float(trav); world = vec3(origin + (cell + p.xy) * size, z + p.z);
-  gl_Position = z > cut ? vec4(2., 2., 2., 1.) : projectionMatrix * modelViewMatrix * vec4(world, 1.);
+  gl_Position = z > cut || z < bottom ? vec4(2., 2., 2., 1.) : projectionMatrix * modelViewMatrix * vec4(world, 1.);
 }`;
 const FRAGMENT = `
 uniform int picking; flat in vec3 colour; flat in float kind; in vec3 world; out vec4 result;
 void main() { result = picking == 1 ? vec4(world, kind + 1.) : vec4(colour, 1.); }`;
 
-function rowsOf(tile, vertical) {
+// `floorOf(x, y, z)`: number of the floor there, counted from 1, or 0; null: floors are not known.
+function rowsOf(tile, vertical, origin, size, floorOf) {
+  const floorAt = (i) => floorOf(origin.x + ((tile.cell[i] & 255) + 0.5) * size, origin.y + ((tile.cell[i] >> 8) + 0.5) * size, tile.height[i] / 512);
   const chosen = [];
   for (let i = 0; i < tile.size; ++i) if ((tile.kind[i] & 1) === vertical) chosen.push(i);
   const rows = new Int32Array(4 * ROW * Math.ceil(chosen.length / ROW));
   chosen.forEach((i, k) => {
     const what = (tile.kind[i] >> 1) | (vertical << 2) | (tile.classId[i] << 4);
+    const storey = floorOf && !vertical ? Math.min(floorAt(i), 255) : 0;
     rows.set([tile.cell[i] | (what << 16), tile.height[i], vertical ? tile.depth[i] : 0,
-      tile.confidence[i] | (tile.sigma[i] << 8)], 4 * k);
+      tile.confidence[i] | ((tile.sigma[i] & 255) << 8) | (storey << 16)], 4 * k);
   });
   return [rows, chosen.length];
 }
@@ -90,12 +101,12 @@ function meshOf(rows, count, faces, origin, size) {
 }
 
 // What is drawn of a decoded tile; `cell` is the map's cell size [m].
-export function groupOf(tile, cell) {
+export function groupOf(tile, cell, floorOf) {
   const size = cell * 2 ** tile.level;
   const origin = new THREE.Vector2(tile.x * 256 * size, tile.y * 256 * size);
   const group = new THREE.Group();
   for (const vertical of [0, 1]) {
-    const [rows, count] = rowsOf(tile, vertical);
+    const [rows, count] = rowsOf(tile, vertical, origin, size, floorOf);
     if (count) group.add(meshOf(rows, count, vertical ? 5 : 1, origin, size));
   }
   return group;

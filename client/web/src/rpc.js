@@ -21,13 +21,22 @@ function headersOf(type) {
   return headers;
 }
 
+// What a call failed with. That the server wants a token, or another, concerns the whole page.
+function failure(error, status) {
+  const failed = new CallError(error, status);
+  if (failed.code === "unauthenticated" || status === 401) dispatchEvent(new CustomEvent("unauthenticated"));
+  return failed;
+}
+
 async function errorOf(response) {
   const text = await response.text();
+  let error = { message: text };
   try {
-    return new CallError(JSON.parse(text), response.status);
+    error = JSON.parse(text);
   } catch {
-    return new CallError({ message: text }, response.status);
+    // Not a call's answer.
   }
+  return failure(error, response.status);
 }
 
 // `method` as in "Maps/List".
@@ -82,7 +91,7 @@ export async function* stream(method, request, signal) {
   for await (const [flags, text] of envelopes(response.body)) {
     const message = JSON.parse(text);
     if (!(flags & 2)) yield message;
-    else if (message.error) throw new CallError(message.error, response.status);
+    else if (message.error) throw failure(message.error, response.status);
     else return;
   }
   throw new CallError({ code: "unavailable", message: "the connection broke off" }, 0);

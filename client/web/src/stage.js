@@ -10,19 +10,26 @@ export class Stage {
     this.renderer = new THREE.WebGLRenderer({ preserveDrawingBuffer: true });
     this.canvas = this.renderer.domElement;
     this.canvas.tabIndex = 0;
+    this.canvas.setAttribute("role", "application");
+    this.canvas.setAttribute("aria-label", "the map: arrows move, Enter clicks in the middle");
     parent.append(this.canvas);
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(50, 1, 0.3, 6000);
     this.camera.up.set(0, 0, 1);
     this.controls = new MapControls(this.camera, this.canvas);
-    this.controls.listenToKeyEvents(window);
-    this.controls.addEventListener("change", () => this.redraw());
+    this.controls.listenToKeyEvents(this.canvas);
+    this.controls.addEventListener("change", () => {
+      this.redraw();
+      this.onView?.();
+    });
     this.tiles = new THREE.Group();
     this.overlay = new THREE.Group();
     this.scene.add(this.tiles, this.overlay);
     this.renderer.getContext().getExtension("EXT_color_buffer_float");
     this.target = new THREE.WebGLRenderTarget(LOOK, LOOK, { type: THREE.FloatType });
     this.frameMs = [];
+    this.afterFrame = []; // called once the next frame is drawn
+    this.onView = null; // called when the camera has moved
     addEventListener("resize", () => this.fit());
     this.fit();
     requestAnimationFrame(() => this.loop());
@@ -35,6 +42,7 @@ export class Stage {
     this.camera.aspect = innerWidth / innerHeight;
     this.camera.updateProjectionMatrix();
     this.redraw();
+    this.onView?.();
   }
   loop() {
     requestAnimationFrame(() => this.loop());
@@ -45,6 +53,7 @@ export class Stage {
     const gl = this.renderer.getContext();
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // until it is drawn
     this.frameMs.push(performance.now() - begun);
+    for (const drawn of this.afterFrame.splice(0)) drawn();
     if (this.frameMs.length > 20) this.frameMs.shift();
   }
   background(colour) {
@@ -56,6 +65,28 @@ export class Stage {
     this.controls.target.set(view[3], view[4], view[5]);
     this.controls.update();
     this.redraw();
+    this.onView?.();
+  }
+  // Nearer to what is looked at, or farther.
+  zoom(factor) {
+    const { position } = this.camera;
+    const { target } = this.controls;
+    this.look([...position.clone().sub(target).multiplyScalar(factor).add(target).toArray(), ...target.toArray()]);
+  }
+  // What tile_tree.js chooses by.
+  eye(low, high) {
+    this.camera.updateMatrixWorld();
+    const matrix = new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
+    const frustum = new THREE.Frustum().setFromProjectionMatrix(matrix);
+    const box = new THREE.Box3();
+    const sees = (x, y, side) => {
+      box.min.set(x, y, low);
+      box.max.set(x + side, y + side, high);
+      return frustum.intersectsBox(box);
+    };
+    const pixels = innerHeight / 2 / Math.tan((this.camera.fov * Math.PI) / 360);
+    const { x, y, z } = this.camera.position;
+    return { x, y, z, low, high, pixels, sees };
   }
   view() {
     return [...this.camera.position.toArray(), ...this.controls.target.toArray()];
@@ -80,10 +111,10 @@ export class Stage {
     this.camera.clearViewOffset();
     return nearestOf(pixels);
   }
-  // Pixel of a place, for tests and labels.
+  // Pixel of a place, and its depth (below 1 before the eye), for tests and labels.
   pixelOf({ x, y, z }) {
     const p = new THREE.Vector3(x, y, z).project(this.camera);
-    return [((p.x + 1) / 2) * innerWidth, ((1 - p.y) / 2) * innerHeight];
+    return [((p.x + 1) / 2) * innerWidth, ((1 - p.y) / 2) * innerHeight, p.z];
   }
   ball(name, { x, y, z }, colour) {
     const material = new THREE.MeshBasicMaterial({ color: colour, depthTest: false });
@@ -100,16 +131,26 @@ export class Stage {
     const geometry = new THREE.TubeGeometry(curve, Math.min(4000, 2 * corners.length + 62), radius, 5);
     this.put(name, new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ color: colour, depthTest: !through })));
   }
+  // Pairs of places, six numbers each.
+  segments(name, places, colour) {
+    const geometry = new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(places, 3));
+    this.put(name, new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour, depthTest: false })));
+  }
+  dots(name, places, colour, pixels) {
+    const geometry = new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(places, 3));
+    this.put(name, new THREE.Points(geometry, new THREE.PointsMaterial({ color: colour, size: pixels, sizeAttenuation: false })));
+  }
   put(name, mesh) {
-    this.remove(name);
+    this.remove(name, true);
     mesh.name = name;
     mesh.renderOrder = 2;
     this.overlay.add(mesh);
     this.redraw();
   }
-  remove(prefix) {
+  // All whose names begin so, or only that one.
+  remove(prefix, exact) {
     for (const mesh of [...this.overlay.children]) {
-      if (!mesh.name.startsWith(prefix)) continue;
+      if (exact ? mesh.name !== prefix : !mesh.name.startsWith(prefix)) continue;
       this.overlay.remove(mesh);
       mesh.geometry.dispose();
       mesh.material.dispose();
