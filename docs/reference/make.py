@@ -68,7 +68,7 @@ def command_section(name, words, text):
     usage = re.sub(r"\n{3,}", "\n\n", usage).strip()
     shown = "\n".join(map(wrapped, usage.splitlines()))
     heading = "#" * min(len(words) + 1, 3) + " " + " ".join((name, *words))
-    return f"{heading}\n\n{escaped(' '.join(about.split()))}\n\n```text\n{shown}\n```\n"
+    return f"{heading}\n\n{prose(about)}\n\n```text\n{shown}\n```\n"
 
 
 def command_page(name, program, above):
@@ -87,9 +87,19 @@ def escaped(text):
     return "`".join(pieces)
 
 
-def flowing(comment):
-    """The comment's paragraphs, each on a line."""
-    return "\n\n".join(" ".join(part.split()) for part in comment.strip().split("\n\n"))
+def prose(comment):
+    """A comment's paragraphs as Markdown; one with columns stays as it is written."""
+    paragraphs = []
+    for part in filter(str.strip, comment.split("\n\n")):
+        if re.search(r"^ {3,}\S", part, re.MULTILINE):
+            paragraphs.append(f"```text\n{textwrap.dedent(part).strip()}\n```")
+        else:
+            paragraphs.append(textwrap.fill(escaped(" ".join(part.split())), 140, break_long_words=False, break_on_hyphens=False))
+    return "\n\n".join(paragraphs)
+
+
+def cell(comment):
+    return "<br>".join(escaped(" ".join(part.split())) for part in comment.strip().split("\n\n"))
 
 
 def descriptors():
@@ -102,15 +112,14 @@ def descriptors():
 
 
 def comments_of(file):
-    return {tuple(place.path): flowing(escaped(place.leading_comments)) for place in file.source_code_info.location
-            if place.leading_comments}
+    return {tuple(place.path): place.leading_comments for place in file.source_code_info.location if place.leading_comments}
 
 
 def head_of(file):
     """The comment that the file begins with."""
     for place in file.source_code_info.location:
         if tuple(place.path) == (12,):
-            return flowing(escaped(place.leading_comments or "".join(place.leading_detached_comments)))
+            return prose(place.leading_comments or "".join(place.leading_detached_comments))
     return ""
 
 
@@ -133,18 +142,18 @@ def type_of(field, maps):
 
 
 def row(*cells):
-    return "| " + " | ".join(cell.replace("\n\n", "<br>") for cell in cells) + " |\n"
+    return "| " + " | ".join(cells) + " |\n"
 
 
 def message_section(name, message, path, comments):
     maps = {f".strata.v1.{name}.{nested.name}": nested for nested in message.nested_type if nested.options.map_entry}
-    text = f"#### {name}\n\n{comments.get(path, '')}\n\n"
+    text = f"#### {name}\n\n{prose(comments.get(path, ''))}\n\n"
     if message.field:
         text += row("field", "type", "what") + "|---|---|---|\n"
     for index, field in enumerate(message.field):
         one_of = field.HasField("oneof_index") and not field.proto3_optional
         kind = type_of(field, maps) + (f", one of *{message.oneof_decl[field.oneof_index].name}*" if one_of else "")
-        text += row(f"`{field.name}`", kind, comments.get((*path, 2, index), ""))
+        text += row(f"`{field.name}`", kind, cell(comments.get((*path, 2, index), "")))
     for index, nested in enumerate(message.nested_type):
         if not nested.options.map_entry:
             text += "\n" + message_section(f"{name}.{nested.name}", nested, (*path, 3, index), comments)
@@ -154,18 +163,18 @@ def message_section(name, message, path, comments):
 
 
 def enum_section(name, enum, path, comments):
-    text = f"#### {name}\n\n{comments.get(path, '')}\n\n" + row("value", "", "what") + "|---|---|---|\n"
+    text = f"#### {name}\n\n{prose(comments.get(path, ''))}\n\n" + row("value", "", "what") + "|---|---|---|\n"
     for index, value in enumerate(enum.value):
-        text += row(f"`{value.name}`", str(value.number), comments.get((*path, 2, index), ""))
+        text += row(f"`{value.name}`", str(value.number), cell(comments.get((*path, 2, index), "")))
     return text
 
 
 def service_section(service, path, comments):
-    text = f"### {service.name}\n\n{comments.get(path, '')}\n\n" + row("call", "takes, answers", "what") + "|---|---|---|\n"
+    text = f"### {service.name}\n\n{prose(comments.get(path, ''))}\n\n" + row("call", "takes, answers", "what") + "|---|---|---|\n"
     for index, call in enumerate(service.method):
         takes = ("stream of " if call.client_streaming else "") + linked(call.input_type)
         answers = ("stream of " if call.server_streaming else "") + linked(call.output_type)
-        text += row(f"`{call.name}`", f"{takes}, {answers}", comments.get((*path, 2, index), ""))
+        text += row(f"`{call.name}`", f"{takes}, {answers}", cell(comments.get((*path, 2, index), "")))
     return text
 
 
