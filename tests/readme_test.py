@@ -5,8 +5,10 @@
 
 Runs every line that starts with "$ " in a page's ```console blocks, in order, in an empty folder with the built
 programs and tests/support on the PATH, and compares what it prints with what the page shows. "…" in the page stands for any text
-within a line (times, ports). What a page starts in the background and leaves the number of in a .pid file ends with the
-page. Exits 1 with the difference.
+within a line (times, ports). Pages of one tour go on in one folder, with the maps of those before. What is started in the background
+and leaves its number in a .pid file ends with the folder. Exits 1 with the difference.
+
+    tests/readme_test.py --build build/release --only docs/quickstart.md    that page, with the rest of its tour
 """
 import argparse
 import os
@@ -19,13 +21,16 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+TOUR = ["docs/quickstart.md", "docs/concepts.md", "docs/profiles.md", "docs/howto/georeference.md", "docs/howto/floorplan.md",
+        "docs/howto/label.md", "docs/howto/fleet.md", "docs/errors.md"]
 
 
 def console_lines(text):
     """[(command, expected lines)] of all console blocks."""
     steps = []
-    for block in re.findall(r"```console\n(.*?)```", text, re.DOTALL):
+    for indent, block in re.findall(r"^( *)```console\n(.*?)^ *```", text, re.DOTALL | re.MULTILINE):
         for line in block.splitlines():
+            line = line.removeprefix(indent)
             if line.startswith("$ "):
                 steps.append((line[2:], []))
             else:
@@ -52,16 +57,20 @@ def end_what_was_begun(folder):
             pass
 
 
-def holds(page, environment):
-    steps = console_lines((ROOT / page).read_text(encoding="utf-8"))
-    if len(steps) < 5:
-        print(f"{page} shows {len(steps)} commands, at least 5 are expected", file=sys.stderr)
-        return False
+def holds(tour, environment):
     with tempfile.TemporaryDirectory() as folder:
         try:
-            return all(step_holds(page, command, expected, folder, environment) for command, expected in steps)
+            return all(page_holds(page, folder, environment) for page in tour)
         finally:
             end_what_was_begun(folder)
+
+
+def page_holds(page, folder, environment):
+    steps = console_lines((ROOT / page).read_text(encoding="utf-8"))
+    if len(steps) < 3:
+        print(f"{page} shows {len(steps)} commands, at least 3 are expected", file=sys.stderr)
+        return False
+    return all(step_holds(page, command, expected, folder, environment) for command, expected in steps)
 
 
 def step_holds(page, command, expected, folder, environment):
@@ -80,15 +89,20 @@ def step_holds(page, command, expected, folder, environment):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
-    build = parser.parse_args().build.resolve()
+    parser.add_argument("--only", metavar="PAGE", help="only the tour that has this page")
+    options = parser.parse_args()
+    build = options.build.resolve()
     programs = {folder: build / folder for folder in ("client/cli", "client/ros2", "server", "tests/support", "tests/support/ros2")}
     programs["scripts"] = ROOT / "tests/support"
     environment = dict(os.environ, PATH=os.pathsep.join([*map(str, programs.values()), os.environ["PATH"]]))
     # Domains of DDS from 201 on are those of no test.
     own = {"STRATA_SERVER": free_address(), "ROS_LOCALHOST_ONLY": "1", "ROS_DOMAIN_ID": str(201 + os.getpid() % 30)}
     web = {"STRATA_SERVER": free_address(), "STRATA_WEB": free_address()}
-    pages = {"README.md": {}, "docs/exports.md": {}, "docs/recordings.md": {}, "docs/ros2.md": own, "docs/web.md": web}
-    return 0 if all(holds(page, {**environment, **more}) for page, more in pages.items()) else 1
+    tours = [(["README.md"], {}), (TOUR, {"STRATA_SERVER": free_address()}), (["docs/exports.md"], {}), (["docs/recordings.md"], {}),
+             (["docs/ros2.md"], own), (["docs/web.md"], web)]
+    if options.only:
+        tours = [(tour, more) for tour, more in tours if options.only in tour]
+    return 0 if tours and all(holds(tour, {**environment, **more}) for tour, more in tours) else 1
 
 
 sys.exit(main())

@@ -37,6 +37,7 @@ stage "includes"
 python3 tests/check_includes.py
 python3 tests/check_names.py
 python3 tests/check_doors.py
+python3 tests/check_pages.py
 python3 tests/experiments/results.py --check
 
 stage "format"
@@ -58,7 +59,8 @@ stage "install, consumer and packages"
 tests/consumer/run.sh build/release
 tests/packages/run.sh build/release
 
-stage "README"
+stage "README and pages"
+/usr/bin/python3 docs/reference/make.py --build build/release --check
 /usr/bin/python3 tests/readme_test.py --build build/release
 
 stage "recorded data through a real server"

@@ -116,6 +116,22 @@ class Maps:
             start = view["place"]
         self.strata("map", "render", name, picture, "--slice=-1,1.8", "--size", "800x520", *ways)
 
+    def tour(self):
+        """The bridge of the quickstart, with its two paths, and the floor of its deck for two robots."""
+        robots = self.simulate("yard", "bridge", "--step", 2, "--noise-m", 0.02, "--noise-rad", 0.003)
+        self.strata("map", "create", "yard")
+        for robot in robots:
+            self.strata("scan", "import", "yard", robot / "scans", "--poses", robot / "poses_initial.txt", "--trajectory", robot.name,
+                        "--wait")
+        ways = []
+        for name, start, goal in (("over", "-26,0,0", "26,0,0"), ("under", "0,-20,0", "0,20,0")):
+            ways += ["--path", self.folder / f"{name}.ply"]
+            self.strata("plan", "yard", "--from", start, "--to", goal, "--out", ways[-1])
+        self.strata("map", "render", "yard", HERE / "quickstart.png", "--view", "oblique", "--size", "460x300", *ways)
+        self.strata("profile", "set", "yard", "wheelchair", "--radius", 0.35, "--max-step", 0.03, "--max-slope", 0.1, "--height", 1.5)
+        for profile in ("default", "wheelchair"):
+            self.strata("map", "render", "yard", HERE / f"floor-{profile}.png", "--profile", profile, "--at", "0,0,3.4", "--size", "560x300")
+
     def tell(self, program, *words):
         return subprocess.run([self.build / program, *map(str, words)], check=True, stdout=subprocess.PIPE, text=True).stdout
 
@@ -146,6 +162,7 @@ def main():
         write_png(HERE / "floors.png", draw_grids(sorted(folder.glob("floor-*.pgm"))))
         maps.add("flat", maps.simulate("flat", "rooms", "--seed", 4, "--step", 2))
         maps.floorplan("flat", 0, HERE / "floorplan.png")
+        maps.tour()
         maps.explore("half", maps.simulate("half", "rooms", "--seed", 4, "--step", 2), (1, -1, 0), HERE / "explore.png")
     subprocess.run([sys.executable, HERE.parent.parent / "tests/experiments/underpass.py", "--build", build, "--seeds", "1",
                     "--picture", HERE / "underpass.png"], check=True)
