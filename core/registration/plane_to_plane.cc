@@ -38,10 +38,11 @@ bool OppositeSides(const Eigen::Vector3d& p,
 
 // Where beams draw lines on a wall, a cell wide and far apart, neighbours lie on a level strip. Its
 // height goes with the distance of the sensor: held against each other such strips lift whatever is
-// in front of a robot, and a chain of scans bends upwards. So features that look level from 3.4°
-// below the sensor's horizon upwards, and are no undersides, only count as overlap.
+// in front of a robot, and a chain of scans bends upwards. So features more than 3° above the
+// sensor that look level, and are no undersides, only count as overlap. Below the horizon they
+// are ground, too, and all that holds a scan of a floor with little on it.
 bool MayBeStripOnAWall(const SampledFeature& feature, const Eigen::Vector3d& sensor_origin) {
-  constexpr double kSine = -0.06;
+  constexpr double kSine = 0.05;
   const Eigen::Vector3d to_point = feature.element.point.cast<double>() - sensor_origin;
   return feature.feature_class != FeatureClass::kNonTraversable &&
          to_point.z() > kSine * to_point.norm();
