@@ -335,6 +335,8 @@ async function testObjects(server, browser) {
 
 async function testMeasure(page) {
   await page.evaluate(() => strata.stage.look([0, -30, 30, 0, 0, 0]));
+  await pause(300);
+  await page.waitForFunction("strata.view.settled && !strata.view.due", { timeout: 120000 }); // finer tiles
   await drawn(page);
   await page.focus("canvas");
   await page.keyboard.press("m");
@@ -342,7 +344,7 @@ async function testMeasure(page) {
   await click(page, { x: 0, y: -14, z: 0 });
   const measure = await page.evaluate("strata.measure");
   const told = Math.hypot(measure.to.x - measure.from.x, measure.to.y - measure.from.y, measure.to.z - measure.from.z);
-  expect(Math.abs(measure.rise + 3.4) < 0.5 && Math.abs(measure.length - told) < 1e-6 && Math.abs(measure.length - 14.4) < 1, `measured: ${await message(page)}`);
+  expect(Math.abs(measure.rise + 3.4) < 0.5 && Math.abs(measure.length - told) < 1e-6 && Math.abs(measure.length - 14.4) < 1, `measured: ${await message(page)}; from ${JSON.stringify(measure.from)}`);
   await drawn(page);
   await picture(page, "measure");
   await page.keyboard.press("Escape");
