@@ -79,7 +79,7 @@ async function open(browser, url) {
   const page = await browser.newPage();
   await page.setViewport({ width: 1280, height: 800 });
   page.on("pageerror", (error) => expect(false, `no error in the page: ${error.message}`));
-  page.on("console", (line) => line.type() === "error" && !/401|ERR_/.test(line.text()) && expect(false, `no error on the console: ${line.text()}`));
+  page.on("console", (line) => line.type() === "error" && !/401|503|ERR_/.test(line.text()) && expect(false, `no error on the console: ${line.text()}`));
   await page.goto(url);
   await page.waitForFunction("window.strata?.begun", { timeout: 120000 });
   return page;
