@@ -148,7 +148,7 @@ int Exit(const absl::Status& status) {
 }
 
 int Main(int argc, char** argv) {
-  CLI::App app("stratad, the server of Strata, a map database for robots.");
+  CLI::App app("stratad, the server of Strata, a map database for robots.", "stratad");
   app.footer(
       "Once it serves, it prints on stdout: listening HOST:PORT, and with --web then: web URL\n\n"
       "Example:\n  stratad --data ./maps --listen 127.0.0.1:50051");
