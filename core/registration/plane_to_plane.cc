@@ -38,16 +38,36 @@ bool OppositeSides(const Eigen::Vector3d& p,
 
 // Where beams draw lines on a wall, a cell wide and far apart, neighbours lie on a level strip. Its
 // height goes with the distance of the sensor: held against each other such strips lift whatever is
-// in front of a robot, and a chain of scans bends upwards. So features above the sensor that look
-// level, and are no undersides, only count as overlap.
+// in front of a robot, and a chain of scans bends upwards. So features more than 3° above the
+// sensor that look level, and are no undersides, only count as overlap. Below the horizon they
+// are ground, too, and all that holds a scan of a floor with little on it.
 bool MayBeStripOnAWall(const SampledFeature& feature, const Eigen::Vector3d& sensor_origin) {
+  constexpr double kSine = 0.05;
+  const Eigen::Vector3d to_point = feature.element.point.cast<double>() - sensor_origin;
   return feature.feature_class != FeatureClass::kNonTraversable &&
-         SeenFromBelow(feature.element.point, sensor_origin.cast<float>());
+         to_point.z() > kSine * to_point.norm();
 }
 
 bool IsLevel(const Eigen::Vector3d& normal) {
   constexpr double kLevel = 0.95;  // cosine of its inclination; roofs rise more
   return std::abs(normal.z()) > kLevel;
+}
+
+// A line that a beam drew says nothing about the surface that it lies on, whose normal is zero
+// then: the other side's, if that knows better, is the normal of both.
+void ShareNormals(Eigen::Vector3d& normal_p, Eigen::Vector3d& normal_q) {
+  if (normal_p.isZero()) normal_p = normal_q;
+  if (normal_q.isZero()) normal_q = normal_p;
+}
+
+// True for matches that only count as overlap: two lines of beams, whose places on a surface go
+// with the sensor's, and what may be one.
+bool SaysNothing(const SampledFeature& feature,
+                 const Eigen::Vector3d& normal_p,
+                 const Eigen::Vector3d& normal_q,
+                 const Eigen::Vector3d& sensor_origin) {
+  if (feature.feature_class != FeatureClass::kVertical && normal_p.isZero()) return true;
+  return (IsLevel(normal_p) || IsLevel(normal_q)) && MayBeStripOnAWall(feature, sensor_origin);
 }
 
 }  // namespace
@@ -123,10 +143,10 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
       continue;
     }
     const Eigen::Vector3d r = R.transpose() * (q.point.cast<double>() - p_target);
-    const Eigen::Vector3d normal_p = sampled.element.normal.cast<double>();
-    const Eigen::Vector3d normal_q = R.transpose() * q.normal.cast<double>();
-    if ((IsLevel(normal_p) || IsLevel(normal_q)) &&
-        MayBeStripOnAWall(sampled, source_.sensor_origin())) {
+    Eigen::Vector3d normal_p = sampled.element.normal.cast<double>();
+    Eigen::Vector3d normal_q = R.transpose() * q.normal.cast<double>();
+    if (sampled.feature_class != FeatureClass::kVertical) ShareNormals(normal_p, normal_q);
+    if (SaysNothing(sampled, normal_p, normal_q, source_.sensor_origin())) {
       ++sums.inliers;
       continue;
     }

@@ -37,7 +37,8 @@ struct PlaneToPlaneSums {
 // T·Exp([ω, v]) its error is rᵀM r, its Jacobian J = [−[p]ₓ, I], and
 //   M = (C_p + Rᵀ C_q R)⁻¹,   C = σt² I − (σt² − σn²) n nᵀ
 // with n the normal of the surface element, so that a surface is known to σn across and to σt
-// along.
+// along. A line that a beam drew has no normal and takes that of the other side; two of them, and
+// what may be a line on a wall, count as overlap and pull nowhere.
 class PlaneToPlaneMatcher {
  public:
   // Keeps references.

@@ -45,13 +45,6 @@ struct SurfaceElement {
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();  // unit, sign arbitrary; zero: no surface there
 };
 
-// True if a sensor at `origin` looks up at `p` by more than 3°: what it sees there is no top of
-// anything level.
-inline bool SeenFromBelow(const Eigen::Vector3f& p, const Eigen::Vector3f& origin) {
-  constexpr float kSine = 0.05F;
-  return p.z() - origin.z() > kSine * (p - origin).norm();
-}
-
 struct SampledFeature {
   SurfaceElement element;
   FeatureClass feature_class = FeatureClass::kTraversable;

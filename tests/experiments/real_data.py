@@ -176,8 +176,8 @@ def nclt(strata, table, data):
     reference = load_poses(folder / "poses_reference.txt")
     table.row("nclt", "ATE uploaded", f"{ate([load_poses(folder / 'poses_initial.txt')[i][1] for i in indices], [reference[i][1] for i in indices]):.3f} m")
     table.row("nclt", "ATE after ingest", f"{ate([by_index[i] for i in indices], [reference[i][1] for i in indices]):.3f} m")
-    nclt_plan(strata, table, [by_index[i] for i in indices])
     after = optimized(strata, table, "nclt", [reference[i][1] for i in indices], 0.15)
+    nclt_plan(strata, table, after)
     beside(strata, table, "nclt", folder, [by_index[i] for i in indices], after)
 
 
@@ -287,7 +287,8 @@ def nclt_plan(strata, table, route, gap=0.7, step=0.25):
 
     The author of the data thinned the scans, so the ground has unobserved stretches: `gap` is what it takes to cross
     them, `step` to cross its kerbs. Ends are the driven positions; a sensor does not see the ground that it stands
-    over, so the planner may move them.
+    over, so the planner may move them. The loop has to be closed: before, where the drive begins, there is ground
+    twice, and the scans that came last are a kerb across the way.
     """
     limits = ("--max-gap", gap, "--max-step", step)
     driven = np.concatenate([[0], np.cumsum([np.linalg.norm(b[:3, 3] - a[:3, 3]) for a, b in zip(route, route[1:])])])
