@@ -143,9 +143,17 @@ void ColumnGrid::VisitNear(const Eigen::Vector3f& p,
   }
 }
 
-std::uint32_t ColumnGrid::Nearest(const Eigen::Vector3f& p, float max_distance_m) const {
+std::uint32_t ColumnGrid::Nearest(const Eigen::Vector3f& p,
+                                  float max_distance_m,
+                                  std::uint32_t hint) const {
   float best_m2 = max_distance_m * max_distance_m;
   std::uint32_t best = kNone;
+  if (hint != kNone) {
+    // The hint itself is found again, or what is visited before it and as near: as without.
+    const float just_beyond_m2 =
+        std::nextafter((points_[hint] - p).squaredNorm(), std::numeric_limits<float>::infinity());
+    best_m2 = std::min(best_m2, just_beyond_m2);
+  }
   VisitNear(p, best_m2, [&](std::uint32_t index, float squared_m2) {
     best_m2 = squared_m2;
     best = index;

@@ -28,8 +28,11 @@ class ColumnGrid {
   const std::vector<Eigen::Vector3f>& points() const { return points_; }
 
   // Index of the point nearest to `p` and closer than `max_distance_m`, or kNone; of equally near
-  // ones, one that depends only on the points and their order.
-  std::uint32_t Nearest(const Eigen::Vector3f& p, float max_distance_m) const;
+  // ones, one that depends only on the points and their order. `hint` is a guess at the answer that
+  // makes it faster, or kNone.
+  std::uint32_t Nearest(const Eigen::Vector3f& p,
+                        float max_distance_m,
+                        std::uint32_t hint = kNone) const;
 
   struct SlackMatch {
     std::uint32_t index = kNone;
@@ -38,8 +41,7 @@ class ColumnGrid {
     float slack_m = 0.0F;
   };
   // As above, with points up to `max_distance_m` + `max_slack_m` away for an answer, and how far
-  // `p` may move before one has to ask again, at most `max_slack_m`. `hint` is a guess at the
-  // answer that makes it faster, or kNone.
+  // `p` may move before one has to ask again, at most `max_slack_m`. `hint` as above.
   SlackMatch NearestWithSlack(const Eigen::Vector3f& p,
                               float max_distance_m,
                               float max_slack_m,

@@ -100,8 +100,8 @@ std::uint32_t PlaneToPlaneMatcher::Match(std::size_t sample,
                                          float gate_m,
                                          bool fine) {
   const ColumnGrid& grid = target_.grid(source_.sample()[sample].feature_class);
-  if (!fine) return grid.Nearest(p_target, gate_m);
   KnownMatch& known = known_[sample];
+  if (!fine) return known.match.index = grid.Nearest(p_target, gate_m, known.match.index);
   const float slack_m = known.match.slack_m - kRoundingM;
   if (slack_m <= 0.0F || (p_target - known.p_target).squaredNorm() >= slack_m * slack_m) {
     known.match = grid.NearestWithSlack(p_target, gate_m, kMaxSlackM, known.match.index);

@@ -21,39 +21,56 @@ namespace {
 
 constexpr float kColumnSizeM = 0.4F;
 
-// Averages points that share a cube. Open addressing over cube keys; cubes keep the order in which
-// they are first seen, so the result depends on the points and their order only.
-std::vector<Eigen::Vector3f> AverageInCubes(const std::vector<Eigen::Vector3f>& points,
-                                            float cube_m) {
-  std::vector<Eigen::Vector3f> means;
-  std::vector<float> counts;
-  std::vector<std::uint64_t> keys;
-  means.reserve(points.size() / 2);
-  counts.reserve(points.size() / 2);
-  keys.reserve(points.size() / 2);
-  const std::size_t slots = std::bit_ceil(points.size() * 2 + 1);
-  const int shift = 64 - std::countr_zero(slots);
-  std::vector<std::uint32_t> table(slots, ColumnGrid::kNone);
+// Points whose slots are fetched ahead: far enough for memory, near enough to stay in the cache.
+constexpr std::size_t kAhead = 12;
+
+struct Cube {
+  std::uint64_t key = 0;
+  Eigen::Vector3f mean = Eigen::Vector3f::Zero();
+  float count = 0.0F;
+};
+
+std::vector<std::uint64_t> CubeKeys(const std::vector<Eigen::Vector3f>& points, float cube_m) {
   const auto coordinate = [&](float v) {
     return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(v / cube_m))) & 0x1FFFFF;
   };
-  for (const Eigen::Vector3f& p : points) {
-    const std::uint64_t key = coordinate(p.x()) | coordinate(p.y()) << 21 | coordinate(p.z()) << 42;
-    std::size_t slot = (key * 0x9E3779B97F4A7C15U) >> shift;
-    while (table[slot] != ColumnGrid::kNone && keys[table[slot]] != key) {
+  std::vector<std::uint64_t> keys(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3f& p = points[i];
+    keys[i] = coordinate(p.x()) | coordinate(p.y()) << 21 | coordinate(p.z()) << 42;
+  }
+  return keys;
+}
+
+// Averages points that share a cube. Open addressing over cube keys; cubes keep the order in which
+// they are first seen, so the result depends on the points and their order only. The table is
+// larger than caches, and which slot is next does not depend on those before.
+std::vector<Eigen::Vector3f> AverageInCubes(const std::vector<Eigen::Vector3f>& points,
+                                            float cube_m) {
+  const std::vector<std::uint64_t> keys = CubeKeys(points, cube_m);
+  std::vector<Cube> cubes;
+  cubes.reserve(points.size() / 2);
+  const std::size_t slots = std::bit_ceil(points.size() * 2 + 1);
+  const int shift = 64 - std::countr_zero(slots);
+  std::vector<std::uint32_t> table(slots, ColumnGrid::kNone);
+  const auto slot_of = [&](std::uint64_t key) { return (key * 0x9E3779B97F4A7C15U) >> shift; };
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i + kAhead < points.size()) __builtin_prefetch(&table[slot_of(keys[i + kAhead])]);
+    std::size_t slot = slot_of(keys[i]);
+    while (table[slot] != ColumnGrid::kNone && cubes[table[slot]].key != keys[i]) {
       slot = (slot + 1) & (slots - 1);
     }
     if (table[slot] == ColumnGrid::kNone) {
-      table[slot] = static_cast<std::uint32_t>(means.size());
-      means.push_back(p);
-      counts.push_back(1.0F);
-      keys.push_back(key);
+      table[slot] = static_cast<std::uint32_t>(cubes.size());
+      cubes.push_back({keys[i], points[i], 1.0F});
     } else {
-      const std::uint32_t i = table[slot];
-      counts[i] += 1.0F;
-      means[i] += (p - means[i]) / counts[i];
+      Cube& cube = cubes[table[slot]];
+      cube.count += 1.0F;
+      cube.mean += (points[i] - cube.mean) / cube.count;
     }
   }
+  std::vector<Eigen::Vector3f> means(cubes.size());
+  std::transform(cubes.begin(), cubes.end(), means.begin(), [](const Cube& c) { return c.mean; });
   return means;
 }
 

@@ -83,6 +83,28 @@ TEST(ColumnGridTest, AnswersHoldWithinTheirSlack) {
   EXPECT_GT(slack_left, 100);
 }
 
+// Whatever the hint, and where many are equally near, too.
+TEST(ColumnGridTest, HintsDoNotShow) {
+  std::vector<Eigen::Vector3f> corners;
+  for (int i = 0; i < 1000; ++i) {
+    corners.emplace_back(
+        static_cast<float>(i % 10), static_cast<float>(i / 10 % 10), static_cast<float>(i / 100));
+  }
+  const ColumnGrid equal(corners, 0.4F);
+  const ColumnGrid drawn(RandomPoints(2000, 8), 0.4F);
+  std::mt19937_64 random(9);
+  for (const ColumnGrid* grid : {&equal, &drawn}) {
+    for (int i = 0; i < 500; ++i) {
+      const std::uint32_t hint = random() % grid->points().size();
+      const Eigen::Vector3f& near = grid->points()[random() % grid->points().size()];
+      const Eigen::Vector3f p = near + Eigen::Vector3f(0.5F, 0.5F, 0.5F);
+      for (const float reach : {0.3F, 2.0F}) {
+        EXPECT_EQ(grid->Nearest(p, reach, hint), grid->Nearest(p, reach));
+      }
+    }
+  }
+}
+
 TEST(ColumnGridTest, OutsideOfTheGridIsSearchedToo) {
   const std::vector<Eigen::Vector3f> points = {{0, 0, 0}, {1, 0, 0}};
   const ColumnGrid grid(points, 0.4F);
