@@ -29,7 +29,7 @@ struct SeenClosures {
 class ClosureWatch {
  public:
   // Goes on from an earlier watch of the map.
-  ClosureWatch(MapCore& core, const SeenClosures& seen) : core_(core), seen_(seen) {}
+  explicit ClosureWatch(MapCore& core, const SeenClosures& seen = {}) : core_(core), seen_(seen) {}
 
   // Whether there is anything to look at.
   bool HasNews() const { return core_.snapshots().current() != seen_.view; }

@@ -31,6 +31,9 @@ namespace strata {
 namespace {
 
 constexpr absl::Duration kPoll = absl::Milliseconds(50);
+// A start waits so long for the first look at all maps: of few, what is wrong with them and what
+// they have to do is known at once.
+constexpr absl::Duration kFirstLook = absl::Milliseconds(500);
 // Between two looks at who is idle.
 constexpr absl::Duration kInterval = absl::Seconds(1);
 
@@ -58,7 +61,10 @@ OpenMaps::OpenMaps(const EngineOptions& options,
 absl::StatusOr<std::unique_ptr<OpenMaps>> OpenMaps::Start(const EngineOptions& options,
                                                           const MapStores& stores) {
   STRATA_ASSIGN_OR_RETURN(const std::vector<std::string> names, stores.List());
-  return std::unique_ptr<OpenMaps>(new OpenMaps(options, stores, names));
+  std::unique_ptr<OpenMaps> maps(new OpenMaps(options, stores, names));
+  absl::MutexLock lock(&maps->mutex_);
+  maps->mutex_.AwaitWithTimeout(absl::Condition(maps.get(), &OpenMaps::IsSurveyed), kFirstLook);
+  return maps;
 }
 
 OpenMaps::~OpenMaps() {
@@ -312,11 +318,9 @@ absl::Status OpenMaps::Remove(const Stop& stop,
 }
 
 absl::StatusOr<std::vector<MapInfo>> OpenMaps::List(const Stop& stop) {
-  const auto surveyed = [this]()
-                            ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return surveyed_.has_value(); };
   const BlockingScope blocking;
   absl::MutexLock lock(&mutex_);
-  while (!mutex_.AwaitWithTimeout(absl::Condition(&surveyed), kPoll)) {
+  while (!mutex_.AwaitWithTimeout(absl::Condition(this, &OpenMaps::IsSurveyed), kPoll)) {
     STRATA_RETURN_IF_ERROR(Annotate(stop.status(), "waited for the first look at all maps"));
   }
   STRATA_RETURN_IF_ERROR(*surveyed_);

@@ -36,8 +36,8 @@ namespace strata {
 // until it has ended: a stream, a watch. Thread-safe.
 class OpenMaps {
  public:
-  // Those of `stores`, which must outlive it. Looks at them in the background, and opens those that
-  // have something to do.
+  // Those of `stores`, which must outlive it. Looks at them in the background, which this waits for
+  // a little, and opens those that have something to do.
   static absl::StatusOr<std::unique_ptr<OpenMaps>> Start(const EngineOptions& options,
                                                          const MapStores& stores);
   // Closes them. No call may be under way.
@@ -118,6 +118,7 @@ class OpenMaps {
     return entry.state == State::kOpen && entry.map.use_count() == 1;
   }
 
+  bool IsSurveyed() const ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return surveyed_.has_value(); }
   // The thread that nobody asks: looks at all maps once, then opens and closes.
   void Loop();
   absl::Status Survey();

@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <random>
 #include <set>
 #include <string>
 #include <utility>
@@ -259,8 +260,12 @@ TEST_F(LostAnswersTest, AtAnyCommitOfAMapsLife) {
   CheckLife("without a loss");
   ASSERT_GT(commits, 20);
   int lost = 0;
-  const int stride = OnPostgresql() ? 5 : 1;
-  for (int at = 0; at < commits; at += stride) {
+  // Some of them a run; all with STRATA_LOST_ANSWERS=1.
+  const int stride = std::getenv("STRATA_LOST_ANSWERS") != nullptr ? 1 : OnPostgresql() ? 8 : 3;
+  const std::uint32_t seed = std::random_device{}();
+  std::printf("seed %u\n", seed);
+  for (int at = static_cast<int>(seed % static_cast<std::uint32_t>(stride)); at < commits;
+       at += stride) {
     for (const bool takes_place : {true, false}) {
       loss_.LoseAfter(at, takes_place);
       Begin();
@@ -271,7 +276,7 @@ TEST_F(LostAnswersTest, AtAnyCommitOfAMapsLife) {
     }
   }
   std::printf("%d commits, %d answers lost\n", commits, lost);
-  EXPECT_GT(lost, commits / stride);
+  EXPECT_GE(lost, commits / stride);
 }
 
 }  // namespace
