@@ -94,7 +94,7 @@ absl::Status OpenMaps::AwaitSettled(const Stop& stop, absl::string_view name) co
 void OpenMaps::BeginClosing(Entry& entry, const std::string& name, Turn& turn) {
   entry.state = State::kClosing;
   turn.close = name;
-  turn.closed = std::exchange(entry.map, nullptr);
+  turn.closed = entry.map;
 }
 
 std::string OpenMaps::LeastUsed() const {
@@ -211,16 +211,27 @@ absl::StatusOr<std::shared_ptr<Map>> OpenMaps::OpenNow(const std::string& name) 
   return map;
 }
 
+void OpenMaps::NoteClosing(const std::string& name, Map& map, bool in_doubt) {
+  std::optional<MapNumbers> numbers;
+  if (!in_doubt) numbers = NumbersOfMap(map, stores_.FileOf(name));
+  absl::MutexLock lock(&mutex_);
+  Entry& entry = entries_.find(name)->second;
+  entry.info = map.core().info();
+  if (numbers.has_value() && entry.numbers.has_value()) AddCounts(*entry.numbers, *numbers);
+  if (numbers.has_value()) entry.numbers = std::move(numbers);
+}
+
 // What is in doubt is not asked for anything any more, but opened anew at once.
 void OpenMaps::CloseNow(const std::string& name, std::shared_ptr<Map> map) {
   const BlockingScope blocking;  // for what its threads are at
   const absl::Status doubt = map->core().doubt();
-  std::optional<MapNumbers> numbers;
-  if (doubt.ok()) {
-    Guarded([&] {
-      numbers = NumbersOfMap(*map, stores_.FileOf(name));
-      return absl::OkStatus();
-    }).IgnoreError();
+  Guarded([&] {
+    NoteClosing(name, *map, !doubt.ok());
+    return absl::OkStatus();
+  }).IgnoreError();
+  {
+    absl::MutexLock lock(&mutex_);
+    entries_.find(name)->second.map = nullptr;  // what is known of it is in the entry
   }
   map->Close(doubt.ok() ? absl::UnavailableError("the map was let go; ask again") : doubt);
   absl::MutexLock lock(&mutex_);
@@ -228,10 +239,7 @@ void OpenMaps::CloseNow(const std::string& name, std::shared_ptr<Map> map) {
   entry.memory = map->memory();
   entry.clock.reset();
   if (doubt.ok()) entry.clock = map->core().changes().last();
-  if (numbers.has_value() && entry.numbers.has_value()) AddCounts(*entry.numbers, *numbers);
-  if (numbers.has_value()) entry.numbers = std::move(numbers);
   const bool wanted = !doubt.ok() || map->HasWork();
-  entry.info = map->core().info();
   map.reset();
   entry.state = State::kClosed;
   open_.erase(name);
@@ -358,15 +366,12 @@ EngineNumbers OpenMaps::Numbers() const {
   numbers.maps_not_opened = failed_.size();
   for (const auto& [name, entry] : entries_) {
     const auto open = of_maps.find(name);
-    if (open == of_maps.end() && !entry.numbers.has_value()) continue;
-    if (entry.state == State::kGoing || !entry.why.ok()) continue;
-    MapNumbers& added = numbers.maps.emplace_back();
-    if (open == of_maps.end()) {
-      added = *entry.numbers;
-    } else {
-      added = std::move(open->second);
-      if (entry.numbers.has_value()) AddCounts(*entry.numbers, added);
-    }
+    // What was closed meanwhile is known better by its entry.
+    const bool is_open = entry.map != nullptr && open != of_maps.end();
+    if (entry.state == State::kGoing || !(is_open || entry.numbers.has_value())) continue;
+    if (!entry.why.ok()) continue;
+    MapNumbers& added = numbers.maps.emplace_back(is_open ? open->second : *entry.numbers);
+    if (is_open && entry.numbers.has_value()) AddCounts(*entry.numbers, added);
     added.map = name;
   }
   return numbers;
@@ -393,14 +398,21 @@ void OpenMaps::Loop() {
 }
 
 absl::Status OpenMaps::Survey() {
-  const absl::Status done = Guarded([this] {
+  const absl::Time begun = SteadyNow();
+  std::uint64_t maps = 0;
+  const absl::Status done = Guarded([&, this] {
     return stores_.Survey(closing_,
-                          [this](const std::string& name, absl::StatusOr<MapOutline> outline) {
+                          [&, this](const std::string& name, absl::StatusOr<MapOutline> outline) {
+                            ++maps;
                             Note(name, std::move(outline));
                           });
   });
   if (!done.ok() && !closing_.requested()) {
     LOG(ERROR) << LogLine("maps").Add("not_looked_at", done.message());
+  } else if (SteadyNow() - begun > kFirstLook) {
+    LOG(INFO) << LogLine("maps")
+                     .Add("looked_at", maps)
+                     .Add("ms", absl::ToInt64Milliseconds(SteadyNow() - begun));
   }
   absl::MutexLock lock(&mutex_);
   surveyed_ = done;
@@ -456,7 +468,6 @@ void OpenMaps::CloseIdle() {
     if (turn.closed->core().doubt().ok() && !turn.closed->core().CheckInPlace().ok()) {
       absl::MutexLock lock(&mutex_);
       Entry& entry = entries_.find(after)->second;
-      entry.map = std::move(turn.closed);
       entry.state = State::kOpen;
       entry.used = SteadyNow();
       continue;

@@ -73,7 +73,7 @@ class OpenMaps {
   enum class State : std::uint8_t { kClosed, kOpening, kOpen, kClosing, kMaking, kGoing };
   struct Entry {
     State state = State::kClosed;
-    std::shared_ptr<Map> map;  // of kOpen
+    std::shared_ptr<Map> map;  // of kOpen, and of kClosing at first
     absl::Status why;          // of kClosed: that it did not open the last time
     absl::Time next_try = absl::InfinitePast();
     absl::Time used;  // of kOpen: last
@@ -104,6 +104,8 @@ class OpenMaps {
   absl::Status BeginOpening(Entry& entry, const std::string& name, Turn& turn)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<std::shared_ptr<Map>> OpenNow(const std::string& name);
+  // Keeps what is known of the map before it is closed.
+  void NoteClosing(const std::string& name, Map& map, bool in_doubt);
   // Of a map whose state is kClosing.
   void CloseNow(const std::string& name, std::shared_ptr<Map> map);
   // Takes the map out, so that nobody finds it any more; its name stays taken. false: it is being

@@ -170,6 +170,7 @@ absl::StatusOr<std::vector<std::string>> PostgresMaps::List() const {
   return names;
 }
 
+// Every table from `last` on: or else a merge of them reads all there is before it.
 absl::StatusOr<Rows> PostgresMaps::SurveyAfter(std::int64_t last) const {
   STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
   return lease->Query(
@@ -178,7 +179,9 @@ absl::StatusOr<Rows> PostgresMaps::SurveyAfter(std::int64_t last) const {
       "truth_scan AS s WHERE s.map = l.map AND s.state = $4) OR EXISTS (SELECT FROM truth_job AS j "
       "WHERE j.map = l.map AND j.state < $5) FROM map_place AS l JOIN truth_map AS m ON m.map = "
       "l.map JOIN truth_profile AS p ON p.map = l.map AND p.name = 'default' JOIN derived_state AS "
-      "d ON d.map = l.map WHERE l.map > $1 AND l.state = $2 ORDER BY l.map LIMIT 1000",
+      "d ON d.map = l.map WHERE l.map > $1 AND m.map > $1 AND p.map > $1 AND d.map > $1 AND "
+      "l.state = "
+      "$2 ORDER BY l.map LIMIT 1000",
       last,
       kThere,
       kDerivedVersion,
