@@ -25,6 +25,7 @@ std::filesystem::path InstalledViewer() {
 struct Written {
   std::string data;
   double optimize_every_s = 60.0;
+  double map_idle_s = 300.0;
   double upload_keep_s = 3600.0;
   double drain_s = 5.0;
   double max_query_s = 30.0;
@@ -229,6 +230,21 @@ void AddMapLimits(CLI::App& app, Written& o) {
   Add(app, kGroup, "--max-maps", o.engine.max_maps, "Maps there may be", Between(1, 1e6, "maps"));
   Add(app,
       kGroup,
+      "--max-open-maps",
+      o.engine.max_open_maps,
+      "Maps that are open at a time, each with three threads; others are opened when they are "
+      "asked "
+      "for, in place of one that is not in use",
+      Between(1, 1e6, "maps"));
+  Add(app,
+      kGroup,
+      "--map-idle",
+      o.map_idle_s,
+      "A map that nobody has used for so long [s], and that has nothing to do, is closed until "
+      "somebody asks for it",
+      Between(0, 1e9, "s"));
+  Add(app,
+      kGroup,
       "--max-map-size",
       o.max_map_mib,
       "Size of a map's file [MiB]; 0: what the disk holds",
@@ -279,6 +295,7 @@ absl::StatusOr<ProgramOptions> Read(const Written& o) {
   options.engine.max_map_bytes = o.max_map_mib * kMebi;
   options.engine.optimize_interval = absl::Seconds(o.optimize_every_s);
   options.engine.upload_keep = absl::Seconds(o.upload_keep_s);
+  options.engine.map_idle = absl::Seconds(o.map_idle_s);
   if (options.server.web_viewer.empty()) options.server.web_viewer = InstalledViewer();
   options.server.drain_timeout = absl::Seconds(o.drain_s);
   options.server.max_query_time = absl::Seconds(o.max_query_s);

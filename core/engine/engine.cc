@@ -50,9 +50,10 @@ class Engine final : public api::Database, public NumbersSource {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<api::Database>> OpenEngine(const EngineOptions& options) {
+absl::StatusOr<std::unique_ptr<api::Database>> OpenEngine(const EngineOptions& options,
+                                                          OpenStores open) {
   STRATA_RETURN_IF_ERROR(options.Validate());
-  STRATA_ASSIGN_OR_RETURN(std::unique_ptr<EngineMaps> maps, EngineMaps::Open(options));
+  STRATA_ASSIGN_OR_RETURN(std::unique_ptr<EngineMaps> maps, EngineMaps::Open(options, open));
   return std::make_unique<Engine>(std::move(maps));
 }
 

@@ -8,14 +8,17 @@
 
 #include "core/api/database.h"
 #include "core/engine/map/engine_options.h"
+#include "core/engine/map/map_stores.h"
 
 namespace strata {
 
-// Opens the directory: unfinished uploads are dropped but for announced ones, pending scans and
-// jobs go on by themselves. FAILED_PRECONDITION while another engine has it. A map whose file is
-// damaged does not keep the others from being served: calls on it answer with what is wrong. The
-// engine ends its threads when it is destroyed; no call may be under way then.
-absl::StatusOr<std::unique_ptr<api::Database>> OpenEngine(const EngineOptions& options);
+// Opens the directory. FAILED_PRECONDITION while another engine has it. A map is opened when a call
+// needs it, and soon where pending scans or jobs have to go on by themselves; its unfinished
+// uploads are dropped then but for announced ones. One whose file is damaged does not keep the
+// others from being served: calls on it answer with what is wrong. The engine ends its threads when
+// it is destroyed; no call may be under way then. `open`: where the maps are kept.
+absl::StatusOr<std::unique_ptr<api::Database>> OpenEngine(const EngineOptions& options,
+                                                          OpenStores open = OpenMapStores);
 
 }  // namespace strata
 

@@ -60,8 +60,6 @@ class StorageReader {
                                                            std::uint64_t epoch) = 0;
   virtual absl::StatusOr<UploadState> GetUploadState(absl::string_view trajectory) = 0;
   virtual absl::StatusOr<ScanTotals> GetScanTotals() = 0;
-  // Largest upload number in use, of scans and of chunks without one.
-  virtual absl::StatusOr<std::uint64_t> LastUpload() = 0;
   // By upload number.
   virtual absl::StatusOr<std::vector<UnfinishedUpload>> ListUnfinishedUploads() = 0;
   virtual absl::StatusOr<std::string> GetChunk(std::uint64_t upload, std::uint32_t ordinal) = 0;
@@ -136,8 +134,10 @@ class StorageReader {
 
 // When a commit returns.
 enum class Durability : std::uint8_t {
-  kFull,     // once it survives loss of power
-  kRelaxed,  // once it survives the end of the process; a later kFull commit covers it too
+  kFull,  // once it survives loss of power
+  // Once it survives the end of the process. A later kFull commit covers it too; none succeeds
+  // where it was lost with the store's end.
+  kRelaxed,
 };
 
 // Writes. One thread at a time. Everything but Commit() itself is called inside its body.
@@ -148,9 +148,9 @@ class StorageWriter {
   // Runs `body` in one transaction: all of it or, on an error, nothing. A store that others write
   // to as well may run `body` again, a few times, each time on the state that it then finds: what
   // it leaves in the memory of its caller must be what its last run left alone. ABORTED: others
-  // were in the way each time. UNAVAILABLE with "outcome unknown" in the message where the store
-  // went away while it committed: the caller looks, later, whether what it wrote is there, or
-  // writes it again in a form that does no harm twice.
+  // were in the way each time. OutcomeUnknown() where the store went away while it committed, and
+  // for the first commit after one of this writer's was lost that was confirmed (a kRelaxed one
+  // with the store's end; others where a store goes back): the caller looks, later, what is there.
   virtual absl::Status Commit(Durability durability, absl::FunctionRef<absl::Status()> body) = 0;
   // A part of a commit that fails alone: on an error only what `body` did is undone.
   virtual absl::Status Part(absl::FunctionRef<absl::Status()> body) = 0;

@@ -93,6 +93,15 @@ strata_library(
   PRIVATE_DEPS PkgConfig::sqlite3 ${CMAKE_DL_LIBS}
 )
 
+# Stores that lose the answer to a commit.
+strata_library(
+  answer_loss
+  NO_INSTALL
+  SOURCES faults/answer_loss.cc
+  HEADERS faults/answer_loss.h
+  DEPS strata::engine strata::storage
+)
+
 # The conformance suite of core/api; its tests run in every program that names a database for it. Objects, not an
 # archive: a linker leaves out of an archive what nobody calls.
 add_library(

@@ -30,12 +30,13 @@ std::size_t CountFreshContacts(const GraphWorld& world, std::size_t first_new) {
 
 absl::StatusOr<std::size_t> ClosureWatch::Look(const Stop& stop) {
   const MapView view = core_.snapshots().current();
-  if (view == seen_view_) return 0;
+  if (view == seen_.view) return 0;
   STRATA_ASSIGN_OR_RETURN(const GraphWorld world, GraphWorld::Read(core_));
   const auto& scans = world.Scans();
   const auto first_new = static_cast<std::size_t>(
-      std::find_if(
-          scans.begin(), scans.end(), [this](const ScanRecord& s) { return s.number > seen_; }) -
+      std::find_if(scans.begin(),
+                   scans.end(),
+                   [this](const ScanRecord& s) { return s.number > seen_.scan; }) -
       scans.begin());
   std::size_t found = 0;
   if (first_new < scans.size()) {
@@ -50,9 +51,9 @@ absl::StatusOr<std::size_t> ClosureWatch::Look(const Stop& stop) {
                                            core_.options().worker_threads,
                                            context));
     found += search.closures.size();
-    seen_ = scans.back().number;
+    seen_.scan = scans.back().number;
   }
-  seen_view_ = view;
+  seen_.view = view;
   return found;
 }
 

@@ -19,21 +19,28 @@ namespace strata {
 // or an earlier one of their own, where the scans before them on their trajectory had joined none.
 std::size_t CountFreshContacts(const GraphWorld& world, std::size_t first_new);
 
+// What was looked at.
+struct SeenClosures {
+  MapView view;
+  ScanNumber scan = 0;  // this one and those before
+};
+
 // The scans that came in since the last look. One thread at a time: the job runner's.
 class ClosureWatch {
  public:
-  explicit ClosureWatch(MapCore& core) : core_(core) {}
+  // Goes on from an earlier watch of the map.
+  explicit ClosureWatch(MapCore& core, const SeenClosures& seen = {}) : core_(core), seen_(seen) {}
 
   // Whether there is anything to look at.
-  bool HasNews() const { return core_.snapshots().current() != seen_view_; }
+  bool HasNews() const { return core_.snapshots().current() != seen_.view; }
   // Verified closures that no job has had a chance to use: fresh contacts and matches of new scans
   // that the graph did not foresee. A look that fails, or is stopped, is repeated by the next.
   absl::StatusOr<std::size_t> Look(const Stop& stop);
+  const SeenClosures& seen() const { return seen_; }
 
  private:
   MapCore& core_;
-  MapView seen_view_;
-  ScanNumber seen_ = 0;  // this scan and those before were looked at
+  SeenClosures seen_;
 };
 
 }  // namespace strata

@@ -23,7 +23,7 @@ absl::StatusOr<ClassifierInfo> EngineClassifiers::Get(const api::Call& call,
                                                       absl::string_view map,
                                                       absl::string_view name) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
   return FindClassifier(*reader, name);
 }
@@ -31,7 +31,7 @@ absl::StatusOr<ClassifierInfo> EngineClassifiers::Get(const api::Call& call,
 absl::StatusOr<std::vector<ClassifierInfo>> EngineClassifiers::List(const api::Call& call,
                                                                     absl::string_view map) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
   return reader->ListClassifiers();
 }
@@ -40,7 +40,7 @@ absl::Status EngineClassifiers::Delete(const api::Call& call,
                                        absl::string_view map,
                                        absl::string_view name) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return found->core().writer().Run(
       Durability::kFull, 0, call.stop, [&](StorageWriter& writer) -> absl::Status {
         STRATA_ASSIGN_OR_RETURN(const ClassifierInfo info, FindClassifier(writer.reader(), name));
@@ -53,7 +53,7 @@ absl::Status EngineClassifiers::Export(const api::Call& call,
                                        absl::string_view name,
                                        absl::FunctionRef<absl::Status(absl::string_view)> sink) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   // What leaves can be read: nobody else would find out.
   STRATA_ASSIGN_OR_RETURN(const StoredClassifier stored, LoadClassifier(found->core(), name));
   const std::string bytes = EncodeClassifier(stored.classifier);
@@ -70,7 +70,7 @@ absl::StatusOr<ClassifierInfo> EngineClassifiers::Import(const api::Call& call,
                                                          absl::string_view name,
                                                          absl::string_view bytes) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateName("classifier name", name));
   ClassifierInfo info;
   info.name = std::string(name);

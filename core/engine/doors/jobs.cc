@@ -49,7 +49,7 @@ absl::StatusOr<JobInfo> EngineJobs::Start(const api::Call& call,
                                           absl::string_view kind,
                                           const std::map<std::string, std::string>& parameters) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_ASSIGN_OR_RETURN(const JobArguments arguments, ReadJobArguments(kind, parameters));
   STRATA_ASSIGN_OR_RETURN(const JobHandler* const handler, FindJobHandler(kind));
   STRATA_RETURN_IF_ERROR(handler->check(found->core(), arguments));
@@ -63,14 +63,14 @@ absl::StatusOr<JobInfo> EngineJobs::Get(const api::Call& call,
                                         absl::string_view map,
                                         std::uint64_t id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return found->jobs().Get(id);
 }
 
 absl::StatusOr<std::vector<JobInfo>> EngineJobs::List(const api::Call& call,
                                                       absl::string_view map) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return found->jobs().List();
 }
 
@@ -78,7 +78,7 @@ absl::StatusOr<JobInfo> EngineJobs::Cancel(const api::Call& call,
                                            absl::string_view map,
                                            std::uint64_t id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return found->jobs().Cancel(id);
 }
 
@@ -86,7 +86,7 @@ absl::StatusOr<JobInfo> EngineJobs::Accept(const api::Call& call,
                                            absl::string_view map,
                                            std::uint64_t id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_ASSIGN_OR_RETURN(JobInfo info, found->jobs().Accept(id));
   found->JobQueued();
   return info;
@@ -96,7 +96,7 @@ absl::StatusOr<JobInfo> EngineJobs::Revert(const api::Call& call,
                                            absl::string_view map,
                                            std::uint64_t id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_ASSIGN_OR_RETURN(const JobInfo job, found->jobs().Get(id));
   if (job.state == JobState::kProposed) return found->jobs().Discard(id);
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t epoch,
@@ -112,7 +112,7 @@ absl::Status EngineJobs::Watch(const api::Call& call,
                                absl::string_view map,
                                std::uint64_t id,
                                absl::FunctionRef<absl::Status(const JobInfo&)> sink) {
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return found->jobs().Watch(call.stop, id, sink);
 }
 

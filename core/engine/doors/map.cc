@@ -25,11 +25,12 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
 absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
                                                StoredMap stored,
                                                const EngineOptions& options,
-                                               std::shared_ptr<CacheBudget> caches) {
+                                               std::shared_ptr<CacheBudget> caches,
+                                               const MapMemory& memory) {
   std::shared_ptr<Map> map(new Map());
   STRATA_ASSIGN_OR_RETURN(map->core_,
                           MapCore::Open(name, std::move(stored), options, std::move(caches)));
-  STRATA_ASSIGN_OR_RETURN(map->quarantine_, Quarantine::Open(*map->core_));
+  STRATA_ASSIGN_OR_RETURN(map->quarantine_, Quarantine::Open(*map->core_, !memory.opened_before));
   STRATA_ASSIGN_OR_RETURN(map->jobs_, JobBoard::Open(*map->core_, *map->quarantine_));
   STRATA_ASSIGN_OR_RETURN(map->uploads_, UnfinishedUploads::Open(*map->core_));
   std::uint64_t pending = 0;
@@ -43,15 +44,21 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
   map->localizer_ = std::make_unique<Localizer>(*map->core_);
   map->surfaces_ = std::make_unique<SurfacesAround>(*map->core_, *map->tiles_);
   map->worker_ = std::make_unique<Worker>(*map->core_, *map->quarantine_, &RecoverDerived, pending);
-  map->runner_ =
-      std::make_unique<JobRunner>(*map->core_, *map->quarantine_, *map->jobs_, *map->worker_);
+  map->runner_ = std::make_unique<JobRunner>(
+      *map->core_, *map->quarantine_, *map->jobs_, *map->worker_, memory.seen);
   return map;
 }
 
-void Map::Close() {
+bool Map::HasWork() const {
+  return worker_->HasWork() || jobs_->AnyIn(JobState::kQueued) || jobs_->AnyIn(JobState::kRunning);
+}
+
+bool Map::AtRest() const { return !HasWork() && worker_->AtRest() && runner_->AtRest(); }
+
+void Map::Close(const absl::Status& why) {
   if (runner_ != nullptr) runner_->Close();
-  if (worker_ != nullptr) worker_->Close();
-  if (core_ != nullptr) core_->Close();
+  if (worker_ != nullptr) worker_->Close(why);
+  if (core_ != nullptr) core_->Close(why);
 }
 
 }  // namespace strata

@@ -10,6 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/engine/consistency/closure_watch.h"
 #include "core/engine/consistency/localizer.h"
 #include "core/engine/consistency/surfaces_around.h"
 #include "core/engine/doors/map_planner.h"
@@ -24,13 +25,20 @@
 
 namespace strata {
 
+// What one opening of a map leaves to the next in the same process.
+struct MapMemory {
+  bool opened_before = false;
+  SeenClosures seen;
+};
+
 // Thread-safe.
 class Map {
  public:
   static absl::StatusOr<std::shared_ptr<Map>> Open(const std::string& name,
                                                    StoredMap stored,
                                                    const EngineOptions& options,
-                                                   std::shared_ptr<CacheBudget> caches);
+                                                   std::shared_ptr<CacheBudget> caches,
+                                                   const MapMemory& memory = {});
   // A map in a file.
   static absl::StatusOr<std::shared_ptr<Map>> Open(const std::string& name,
                                                    const std::filesystem::path& file,
@@ -54,8 +62,16 @@ class Map {
   // A job was queued.
   void JobQueued() { runner_->JobQueued(); }
 
-  // Ends all threads, waiting for what they do now, and closes the file.
-  void Close();
+  // Scans or jobs wait, or are under way. After Close(): whether the next opening has them to do.
+  bool HasWork() const;
+  // No work, and nothing else that it does by itself is under way or due.
+  bool AtRest() const;
+  // For the next opening.
+  MapMemory memory() const { return {true, runner_->seen()}; }
+
+  // Ends all threads, waiting for what they do now, and closes the file. Calls that are under way
+  // and need more of it end with `why`.
+  void Close(const absl::Status& why = absl::CancelledError("the map is being closed"));
 
  private:
   Map() = default;

@@ -6,9 +6,11 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
@@ -16,8 +18,9 @@
 #include "absl/time/time.h"
 
 #include "core/api/maps.h"
-#include "core/common/cache_budget.h"
+#include "core/common/stop.h"
 #include "core/engine/doors/map.h"
+#include "core/engine/doors/open_maps.h"
 #include "core/engine/map/directory.h"
 #include "core/engine/map/engine_options.h"
 #include "core/engine/map/map_stores.h"
@@ -27,12 +30,14 @@ namespace strata {
 
 class EngineMaps final : public api::Maps {
  public:
-  // Opens every map of the store; one that does not open is kept with the reason.
-  static absl::StatusOr<std::unique_ptr<EngineMaps>> Open(const EngineOptions& options);
+  // Opens no map yet; those that have something to do soon.
+  static absl::StatusOr<std::unique_ptr<EngineMaps>> Open(const EngineOptions& options,
+                                                          OpenStores open = OpenMapStores);
 
-  // NOT_FOUND; or why its file did not open. Where that was for want of room or of a disk that
-  // answers, it is tried again, once a second at most.
-  absl::StatusOr<std::shared_ptr<Map>> Find(absl::string_view name);
+  // As OpenMaps::Find().
+  absl::StatusOr<std::shared_ptr<Map>> Find(const Stop& stop, absl::string_view name) {
+    return maps_->Find(stop, name);
+  }
 
   // The same for those who read its tiles: waits while they are made again (Worker::AwaitDerived).
   absl::StatusOr<std::shared_ptr<Map>> FindWithTiles(const api::Call& call, absl::string_view name);
@@ -68,31 +73,21 @@ class EngineMaps final : public api::Maps {
  private:
   EngineMaps(const EngineOptions& options,
              std::unique_ptr<const MapDirectory> directory,
-             std::unique_ptr<const MapStores> stores)
+             std::unique_ptr<const MapStores> stores,
+             std::unique_ptr<OpenMaps> maps)
       : options_(options),
         directory_(std::move(directory)),
         stores_(std::move(stores)),
-        caches_(std::make_shared<CacheBudget>(options.cache_bytes)) {}
-  absl::StatusOr<std::shared_ptr<Map>> OpenMap(const std::string& name) const;
-  // The map if it can be opened now.
-  absl::StatusOr<std::shared_ptr<Map>> OpenAgain(const std::string& name);
-  // Takes a name for a map that is being made.
-  absl::Status Reserve(const std::string& name);
-  // Takes the map out of the list, so that nobody finds it any more; its name stays taken.
-  absl::StatusOr<std::shared_ptr<Map>> Withdraw(absl::string_view name);
+        maps_(std::move(maps)) {}
 
   class CopyTurn;
 
   const EngineOptions options_;
   const std::unique_ptr<const MapDirectory> directory_;
   const std::unique_ptr<const MapStores> stores_;
-  const std::shared_ptr<CacheBudget> caches_;  // of all maps
-  absl::Mutex removing_;                       // one map's file is removed at a time
+  const std::unique_ptr<OpenMaps> maps_;
+  absl::Mutex removing_;  // one map's file is removed at a time
   mutable absl::Mutex mutex_;
-  std::map<std::string, absl::StatusOr<std::shared_ptr<Map>>, std::less<>> maps_
-      ABSL_GUARDED_BY(mutex_);
-  std::set<std::string, std::less<>> opening_ ABSL_GUARDED_BY(mutex_);  // those opened again
-  std::map<std::string, absl::Time, std::less<>> next_try_ ABSL_GUARDED_BY(mutex_);
   std::set<std::string, std::less<>> copied_
       ABSL_GUARDED_BY(mutex_);  // maps with a copy being made
   std::map<std::string, absl::Time, std::less<>> backed_up_ ABSL_GUARDED_BY(mutex_);

@@ -15,7 +15,7 @@ absl::StatusOr<PlaneModelInfo> EngineModels::GetPlaneModel(
     absl::string_view map,
     absl::FunctionRef<absl::Status(const ModelPlane&)> sink) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return ReadPlaneModel(found->core(), call.stop, sink);
 }
 

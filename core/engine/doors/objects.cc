@@ -20,14 +20,14 @@ absl::StatusOr<EntitiesInfo> EngineObjects::ListEntities(
     const EntityQuery& query,
     absl::FunctionRef<absl::Status(const Entity&)> sink) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return ReadEntities(found->core(), query, call.stop, sink);
 }
 
 absl::StatusOr<std::vector<KindInfo>> EngineObjects::ListKinds(const api::Call& call,
                                                                absl::string_view map) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return CountKinds(found->core(), call.stop);
 }
 
@@ -35,7 +35,7 @@ absl::StatusOr<ThingKind> EngineObjects::GetKind(const api::Call& call,
                                                  absl::string_view map,
                                                  absl::string_view kind) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_ASSIGN_OR_RETURN(ThingKind read, ReadKind(found->core(), kind));
   STRATA_ASSIGN_OR_RETURN(const std::vector<KindInfo> kinds, CountKinds(found->core(), call.stop));
   const auto counted = std::find_if(
@@ -49,7 +49,7 @@ absl::StatusOr<KindInfo> EngineObjects::RenameKind(const api::Call& call,
                                                    absl::string_view kind,
                                                    absl::string_view name) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return strata::RenameKind(found->core(), kind, name, call.stop);
 }
 
@@ -57,7 +57,7 @@ absl::StatusOr<KindInfo> EngineObjects::ImportKind(const api::Call& call,
                                                    absl::string_view map,
                                                    const NewKind& kind) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return strata::ImportKind(found->core(), kind, call.stop);
 }
 
@@ -65,7 +65,7 @@ absl::Status EngineObjects::DeleteKind(const api::Call& call,
                                        absl::string_view map,
                                        absl::string_view kind) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return strata::DeleteKind(found->core(), kind, call.stop);
 }
 
@@ -75,7 +75,7 @@ absl::StatusOr<InferredInfo> EngineObjects::ListInferred(
     const EntityQuery& query,
     absl::FunctionRef<absl::Status(const InferredPart&)> sink) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return ReadInferred(found->core(), query, call.stop, sink);
 }
 

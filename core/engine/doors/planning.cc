@@ -75,7 +75,7 @@ absl::Status EnginePlanning::SetProfile(const api::Call& call,
                                         absl::string_view name,
                                         const RobotProfile& profile) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateName("profile name", name));
   STRATA_RETURN_IF_ERROR(ValidateRobotProfile(profile));
   if (name == api::kDefaultProfile) {
@@ -91,7 +91,7 @@ absl::Status EnginePlanning::SetProfile(const api::Call& call,
 absl::StatusOr<std::map<std::string, RobotProfile>> EnginePlanning::ListProfiles(
     const api::Call& call, absl::string_view map) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
   return reader->ListProfiles();
 }

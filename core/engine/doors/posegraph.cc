@@ -55,7 +55,7 @@ absl::StatusOr<ScanNumber> NumberOf(StorageReader& reader, const ScanId& id) {
 absl::StatusOr<api::PoseGraphState> EnginePoseGraph::Get(const api::Call& call,
                                                          absl::string_view map) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
   api::PoseGraphState state;
   MapClock clock;
@@ -73,7 +73,7 @@ absl::StatusOr<api::PoseGraphState> EnginePoseGraph::Get(const api::Call& call,
     return absl::OkStatus();
   });
   STRATA_RETURN_IF_ERROR(read);
-  found->core().snapshots().AwaitPublished(clock.tile_version);
+  STRATA_RETURN_IF_ERROR(found->core().snapshots().AwaitPublished(clock.tile_version, call.stop));
   return state;
 }
 
@@ -82,7 +82,7 @@ absl::Status EnginePoseGraph::SetPose(const api::Call& call,
                                       const ScanId& id,
                                       const Pose& T_map_scan) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", id.trajectory));
   if (const absl::Status valid = ValidatePose(T_map_scan); !valid.ok()) {
     return Annotate(valid, absl::StrCat("scan ", id.ToString()));
@@ -100,7 +100,7 @@ absl::StatusOr<Constraint> EnginePoseGraph::AddConstraint(const api::Call& call,
                                                           absl::string_view map,
                                                           const Constraint& constraint) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateConstraint(constraint));
   ConstraintRecord record;
   record.constraint = constraint;
@@ -121,7 +121,7 @@ absl::Status EnginePoseGraph::RemoveConstraint(const api::Call& call,
                                                absl::string_view map,
                                                std::uint64_t id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return found->core().writer().Run(
       Durability::kFull, 0, call.stop, [&](StorageWriter& writer) -> absl::Status {
         STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
@@ -141,7 +141,7 @@ absl::Status EnginePoseGraph::EnableConstraint(const api::Call& call,
                                                std::uint64_t id,
                                                bool enabled) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return found->core().writer().Run(Durability::kFull, 0, call.stop, [&](StorageWriter& writer) {
     return writer.EnableConstraint(id, enabled);
   });
@@ -151,7 +151,7 @@ absl::StatusOr<api::PoseLookup> EnginePoseGraph::LookupPose(const api::Call& cal
                                                             absl::string_view map,
                                                             const ScanId& id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", id.trajectory));
   const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
@@ -174,7 +174,7 @@ absl::StatusOr<LocalizeResult> EnginePoseGraph::Localize(const api::Call& call,
                                                          absl::string_view map,
                                                          const LocalizeQuery& query) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   return found->localizer().Localize(query, call.stop);
 }
 
@@ -182,7 +182,7 @@ absl::StatusOr<std::unique_ptr<api::Tracking>> EnginePoseGraph::Track(const api:
                                                                       absl::string_view map,
                                                                       const TrackStart& start) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateTrackStart(start));
   return std::make_unique<EngineTracking>(std::move(found), call, start);
 }

@@ -31,6 +31,7 @@ absl::Status CheckId(const ScanId& id) { return ValidateName("trajectory name", 
 // Reads one state of the store and returns once its tiles are what readers get: who is told that a
 // scan is integrated finds it in the tiles.
 absl::Status ReadVisible(Map& map,
+                         const Stop& stop,
                          absl::FunctionRef<absl::Status(StorageReader&, const MapClock&)> body) {
   MapClock clock;
   {
@@ -40,15 +41,14 @@ absl::Status ReadVisible(Map& map,
       return body(*reader, clock);
     }));
   }
-  map.core().snapshots().AwaitPublished(clock.tile_version);
-  return absl::OkStatus();
+  return map.core().snapshots().AwaitPublished(clock.tile_version, stop);
 }
 
-absl::StatusOr<PosedScan> FindScan(Map& map, const ScanId& id) {
+absl::StatusOr<PosedScan> FindScan(Map& map, const Stop& stop, const ScanId& id) {
   STRATA_RETURN_IF_ERROR(CheckId(id));
   PosedScan posed;
   STRATA_RETURN_IF_ERROR(
-      ReadVisible(map, [&](StorageReader& reader, const MapClock& clock) -> absl::Status {
+      ReadVisible(map, stop, [&](StorageReader& reader, const MapClock& clock) -> absl::Status {
         STRATA_ASSIGN_OR_RETURN(posed, GetScanById(reader, id, clock.epoch));
         return absl::OkStatus();
       }));
@@ -106,7 +106,7 @@ absl::StatusOr<std::unique_ptr<api::ScanUpload>> EngineScans::Upload(const api::
                                                                      absl::string_view map,
                                                                      const ScanHeader& header) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateScanHeader(header));
   const std::uint64_t most = found->core().options().max_points_per_scan;
   if (header.point_count > most) {
@@ -127,7 +127,7 @@ absl::StatusOr<ScanAck> EngineScans::UploadLocalMap(const api::Call& call,
                                                     const MlsParameters& parameters,
                                                     absl::string_view local_map) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateScanHeader(header));
   absl::StatusOr<ScanAck> ack = strata::UploadLocalMap(*found, call, header, parameters, local_map);
   if (ack.ok()) return ack;
@@ -138,7 +138,7 @@ absl::StatusOr<UploadState> EngineScans::GetUploadState(const api::Call& call,
                                                         absl::string_view map,
                                                         absl::string_view trajectory) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", trajectory));
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
   return reader->GetUploadState(trajectory);
@@ -148,8 +148,8 @@ absl::StatusOr<ScanInfo> EngineScans::Get(const api::Call& call,
                                           absl::string_view map,
                                           const ScanId& id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
-  STRATA_ASSIGN_OR_RETURN(const PosedScan scan, FindScan(*found, id));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan scan, FindScan(*found, call.stop, id));
   return ToScanInfo(scan);
 }
 
@@ -157,7 +157,7 @@ absl::Status EngineScans::List(const api::Call& call,
                                absl::string_view map,
                                const api::ScanFilter& filter,
                                absl::FunctionRef<absl::Status(const ScanInfo&)> sink) {
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_ASSIGN_OR_RETURN(ScanQuery query, ToQuery(filter));
   const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
   absl::Status damaged;  // the first that cannot be read; it hides no other
@@ -165,7 +165,7 @@ absl::Status EngineScans::List(const api::Call& call,
     STRATA_RETURN_IF_ERROR(call.stop.status());
     std::vector<PosedScan> page;
     STRATA_RETURN_IF_ERROR(
-        ReadVisible(*found, [&](StorageReader& reader, const MapClock&) -> absl::Status {
+        ReadVisible(*found, call.stop, [&](StorageReader& reader, const MapClock&) -> absl::Status {
           absl::StatusOr<std::vector<PosedScan>> read = reader.ListScans(query, pin.view().epoch);
           if (absl::IsDataLoss(read.status()) && !query.skip_damaged) {
             damaged = read.status();
@@ -185,8 +185,8 @@ absl::Status EngineScans::GetPoints(const api::Call& call,
                                     absl::string_view map,
                                     const ScanId& id,
                                     absl::FunctionRef<absl::Status(const PointCloud&)> sink) {
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
-  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(*found, id));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(*found, call.stop, id));
   const std::string what = absl::StrCat("scan ", id.ToString());
   if (!posed.scan.has_points) {
     return absl::FailedPreconditionError(
@@ -201,7 +201,7 @@ absl::Status EngineScans::GetPoints(const api::Call& call,
     const absl::StatusOr<PointCloud> piece = ReadPiece(*found, posed.scan, ordinal, labels);
     if (!piece.ok()) {
       // Deleted or dropped while we were reading?
-      STRATA_ASSIGN_OR_RETURN(const PosedScan now, FindScan(*found, id));
+      STRATA_ASSIGN_OR_RETURN(const PosedScan now, FindScan(*found, call.stop, id));
       if (!now.scan.has_points)
         return absl::FailedPreconditionError(absl::StrCat(what, ": points dropped"));
       return Annotate(piece.status(), absl::StrCat(what, ", piece ", ordinal));
@@ -215,8 +215,8 @@ absl::StatusOr<std::vector<std::uint16_t>> EngineScans::GetFaded(const api::Call
                                                                  absl::string_view map,
                                                                  const ScanId& id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
-  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(*found, id));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(*found, call.stop, id));
   if (posed.scan.faded_points == 0) return std::vector<std::uint16_t>();
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
   absl::StatusOr<std::vector<std::uint16_t>> faded =
@@ -231,11 +231,11 @@ absl::Status EngineScans::SetLabels(const api::Call& call,
                                     const std::vector<std::uint16_t>& labels,
                                     api::LabelMode mode) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   STRATA_RETURN_IF_ERROR(CheckId(id));
   STRATA_RETURN_IF_ERROR(Annotate(ValidateLabels(labels), absl::StrCat("scan ", id.ToString())));
   // Here, too: to hear of it nobody waits behind what the worker is at.
-  STRATA_RETURN_IF_ERROR(FindScan(*found, id).status());
+  STRATA_RETURN_IF_ERROR(FindScan(*found, call.stop, id).status());
   return found->worker().Execute(call.stop, [&](Integrator& integrator) {
     return integrator.SetPersonLabels(id, labels, mode == api::LabelMode::kUpdate);
   });
@@ -243,8 +243,8 @@ absl::Status EngineScans::SetLabels(const api::Call& call,
 
 absl::Status EngineScans::Delete(const api::Call& call, absl::string_view map, const ScanId& id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
-  STRATA_RETURN_IF_ERROR(FindScan(*found, id).status());
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_RETURN_IF_ERROR(FindScan(*found, call.stop, id).status());
   return found->worker().Execute(call.stop,
                                  [&](Integrator& integrator) { return integrator.DeleteScan(id); });
 }

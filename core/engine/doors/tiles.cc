@@ -142,7 +142,7 @@ absl::StatusOr<std::optional<api::EncodedTile>> EngineTiles::GetAtHand(const api
                                                                        absl::string_view map,
                                                                        const TileKey& key) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(map));
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
   const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
   const ServedTiles::Handle tile = found->tiles().FindAtHand(key, pin.view());
   if (tile == nullptr) return std::nullopt;

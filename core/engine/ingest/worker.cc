@@ -92,7 +92,7 @@ absl::Status Worker::Execute(const Stop& stop, Command command, absl::string_vie
   Task task{command, what, absl::OkStatus()};
   const BlockingScope blocking;  // for as long as the pass under way takes
   absl::MutexLock lock(&mutex_);
-  if (closed_) return absl::CancelledError("the map is being closed");
+  if (closed_) return why_closed_;
   if (refuses_) return Refusal();
   tasks_.push_back(&task);
   while (!mutex_.AwaitWithTimeout(absl::Condition(&task.done), kStopPoll)) {
@@ -119,19 +119,33 @@ absl::Status Worker::AwaitDerived(const Stop& stop) {
                     absl::StrCat("waited for the tiles of map ", core_.name(), ", made again"));
   }
   if (derived_usable_) return absl::OkStatus();
-  return refuses_ ? Refusal() : absl::CancelledError("the map is being closed");
+  return refuses_ ? Refusal() : why_closed_;
 }
 
-bool Worker::HasWork() const { return closed_ || !tasks_.empty() || pending_ > 0; }
+bool Worker::HasStep() const { return closed_ || !tasks_.empty() || pending_ > 0; }
+
+bool Worker::HasWork() const {
+  absl::MutexLock lock(&mutex_);
+  return pending_ > 0;
+}
+
+bool Worker::AtRest() const {
+  absl::MutexLock lock(&mutex_);
+  return refuses_ || (pending_ == 0 && tasks_.empty() && !steps_ && keeper_.AtRest());
+}
 
 // Commands go first, since somebody waits for them.
 Worker::Step Worker::NextStep() {
   absl::MutexLock lock(&mutex_);
+  steps_ = false;
   while (
-      !mutex_.AwaitWithTimeout(absl::Condition(this, &Worker::HasWork), next_rest_ - SteadyNow())) {
+      !mutex_.AwaitWithTimeout(absl::Condition(this, &Worker::HasStep), next_rest_ - SteadyNow())) {
     // A clock that is set forward ends a wait early.
-    if (SteadyNow() >= next_rest_) return Step::kRest;
+    if (SteadyNow() < next_rest_) continue;
+    steps_ = true;
+    return Step::kRest;
   }
+  steps_ = true;
   if (closed_) return Step::kClosed;
   return tasks_.empty() ? Step::kBatch : Step::kCommand;
 }
@@ -274,12 +288,13 @@ void Worker::Refuse() {
   mutex_.Await(absl::Condition(&closed_));
 }
 
-void Worker::Close() {
+void Worker::Close(const absl::Status& why) {
   {
     absl::MutexLock lock(&mutex_);
+    if (!closed_) why_closed_ = why;
     closed_ = true;
     for (Task* task : tasks_) {
-      task->status = absl::CancelledError("the map is being closed");
+      task->status = why;
       task->done = true;
     }
     tasks_.clear();

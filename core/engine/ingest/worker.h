@@ -55,8 +55,13 @@ class Worker {
   // command is waited for. `what`, for those that wait for it: "job 3 (rebuild)".
   absl::Status Execute(const Stop& stop, Command command, absl::string_view what = "an edit");
 
-  // Ends the thread after the step it is in. What waits is answered CANCELLED. Safe to call again.
-  void Close();
+  // Whether scans wait.
+  bool HasWork() const;
+  // Nothing waits, is under way or is left to be prepared.
+  bool AtRest() const;
+
+  // Ends the thread after the step it is in. What waits is answered `why`. Safe to call again.
+  void Close(const absl::Status& why = absl::CancelledError("the map is being closed"));
 
  private:
   struct Task {
@@ -74,7 +79,7 @@ class Worker {
   // Answers all commands with why nothing can be done, until the worker is closed.
   void Refuse();
   Step NextStep() ABSL_LOCKS_EXCLUDED(mutex_);
-  bool HasWork() const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
+  bool HasStep() const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
   // Runs one step so that whatever it throws is an error of it alone.
   absl::Status GuardedStep(absl::FunctionRef<absl::Status()> step);
   // What there is time for when nothing else is to be done.
@@ -102,6 +107,8 @@ class Worker {
   std::uint64_t pending_ ABSL_GUARDED_BY(mutex_);
   WaitingScans waiting_ ABSL_GUARDED_BY(mutex_);
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+  absl::Status why_closed_ ABSL_GUARDED_BY(mutex_);
+  bool steps_ ABSL_GUARDED_BY(mutex_) = true;  // the thread is at one
   bool refuses_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };

@@ -318,11 +318,13 @@ absl::Status JobBoard::Watch(const Stop& stop,
       const auto ended = [&entry] { return IsFinal(entry.info.state); };
       while (SteadyNow() < next && !ended()) {
         STRATA_RETURN_IF_ERROR(stop.status());
+        STRATA_RETURN_IF_ERROR(core_.closed());
         mutex_.AwaitWithTimeout(absl::Condition(&ended), std::min(kPoll, next - SteadyNow()));
       }
       const auto changed = [&entry, &seen, first] { return first || entry.changes != seen; };
       while (!mutex_.AwaitWithTimeout(absl::Condition(&changed), kPoll)) {
         STRATA_RETURN_IF_ERROR(stop.status());
+        STRATA_RETURN_IF_ERROR(core_.closed());
       }
       seen = entry.changes;
       info = entry.info;

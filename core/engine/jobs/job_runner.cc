@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
@@ -54,12 +55,14 @@ absl::StatusOr<bool> HasMadeItsEpoch(MapCore& core, const JobInfo& job, JobConte
 
 }  // namespace
 
-JobRunner::JobRunner(MapCore& core, Quarantine& quarantine, JobBoard& jobs, Worker& worker)
+JobRunner::JobRunner(
+    MapCore& core, Quarantine& quarantine, JobBoard& jobs, Worker& worker, const SeenClosures& seen)
     : core_(core),
       quarantine_(quarantine),
       jobs_(jobs),
       worker_(worker),
-      closures_(core),
+      closures_(core, seen),
+      seen_(seen),
       job_waits_(jobs.AnyIn(JobState::kQueued)),
       next_look_(core.options().optimize_interval > absl::ZeroDuration()
                      ? SteadyNow() + core.options().optimize_interval
@@ -84,6 +87,9 @@ absl::Status JobRunner::Run(const JobInfo& job, JobContext& context) {
 
 JobRunner::Step JobRunner::NextStep() {
   absl::MutexLock lock(&mutex_);
+  steps_ = false;
+  seen_ = closures_.seen();
+  const absl::Cleanup goes_on = [this]() ABSL_NO_THREAD_SAFETY_ANALYSIS { steps_ = true; };
   // A clock that is set forward ends a wait early.
   while (!mutex_.AwaitWithTimeout(absl::Condition(this, &JobRunner::HasWork),
                                   next_look_ - SteadyNow()) &&
@@ -161,8 +167,10 @@ void JobRunner::Look() {
     STRATA_RETURN_IF_ERROR(quarantine_.End(look));
     return started;
   });
-  if (!done.ok() && !absl::IsCancelled(done)) LogError("look", core_.name(), done);
+  const bool failed = !done.ok() && !absl::IsCancelled(done);
+  if (failed) LogError("look", core_.name(), done);
   absl::MutexLock lock(&mutex_);
+  look_failed_ = failed;
   job_waits_ = jobs_.AnyIn(JobState::kQueued);
 }
 
@@ -172,6 +180,19 @@ void JobRunner::PlanNextLook(absl::Time begun) {
   const absl::Time now = SteadyNow();
   absl::MutexLock lock(&mutex_);
   next_look_ = now + std::max(interval, now - begun);
+}
+
+bool JobRunner::AtRest() const {
+  const bool looks = core_.options().optimize_interval > absl::ZeroDuration() &&
+                     !quarantine_.IsHeld({WorkKind::kLook, 0});
+  const MapView now = core_.snapshots().current();
+  absl::MutexLock lock(&mutex_);
+  return !steps_ && !job_waits_ && (!looks || look_failed_ || seen_.view == now);
+}
+
+SeenClosures JobRunner::seen() const {
+  absl::MutexLock lock(&mutex_);
+  return seen_;
 }
 
 void JobRunner::Close() {

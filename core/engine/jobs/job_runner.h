@@ -25,11 +25,21 @@ class JobRunner {
  public:
   // All must outlive the runner. Jobs that are queued begin at once, but for one that the process
   // may have died of: after the scans of which that is true.
-  JobRunner(MapCore& core, Quarantine& quarantine, JobBoard& jobs, Worker& worker);
+  // `seen`: by an earlier runner of the map.
+  JobRunner(MapCore& core,
+            Quarantine& quarantine,
+            JobBoard& jobs,
+            Worker& worker,
+            const SeenClosures& seen = {});
   ~JobRunner() { Close(); }
 
   // A job was queued.
   void JobQueued();
+
+  // Nothing is under way or due: no job, and no look at scans that came in.
+  bool AtRest() const;
+  // What has been looked at.
+  SeenClosures seen() const;
 
   // Ends the thread; a running job goes back to the queue. Before the worker is closed. Safe to
   // call again.
@@ -59,7 +69,10 @@ class JobRunner {
   Worker& worker_;
   ClosureWatch closures_;  // the thread's
   const Stop closing_;
-  absl::Mutex mutex_;
+  mutable absl::Mutex mutex_;
+  bool steps_ ABSL_GUARDED_BY(mutex_) = true;  // the thread is at one
+  bool look_failed_ ABSL_GUARDED_BY(mutex_) = false;
+  SeenClosures seen_ ABSL_GUARDED_BY(mutex_);  // of closures_, between two steps
   bool job_waits_ ABSL_GUARDED_BY(mutex_);
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   absl::Time next_look_ ABSL_GUARDED_BY(mutex_);

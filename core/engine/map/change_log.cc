@@ -54,12 +54,18 @@ std::uint64_t ChangeLog::last() const {
 absl::Status ChangeLog::Await(std::uint64_t commit_sequence, const Stop& stop) const {
   constexpr absl::Duration kPoll = absl::Milliseconds(50);
   absl::MutexLock lock(&mutex_);
-  const auto newer = [this, commit_sequence]()
-                         ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return last_ > commit_sequence; };
+  const auto newer = [this, commit_sequence]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
+    return !closed_.ok() || last_ > commit_sequence;
+  };
   while (!mutex_.AwaitWithTimeout(absl::Condition(&newer), kPoll)) {
     STRATA_RETURN_IF_ERROR(stop.status());
   }
-  return absl::OkStatus();
+  return last_ > commit_sequence ? absl::OkStatus() : closed_;
+}
+
+void ChangeLog::Close(const absl::Status& why) {
+  absl::MutexLock lock(&mutex_);
+  if (closed_.ok()) closed_ = why;
 }
 
 }  // namespace strata

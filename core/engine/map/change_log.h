@@ -40,8 +40,10 @@ class ChangeLog {
   ChangeSet Since(std::uint64_t commit_sequence) const;
   // The newest number.
   std::uint64_t last() const;
-  // Returns once there is something newer; CANCELLED, DEADLINE_EXCEEDED.
+  // Returns once there is something newer; CANCELLED, DEADLINE_EXCEEDED; the status of Close().
   absl::Status Await(std::uint64_t commit_sequence, const Stop& stop) const;
+  // Nothing more comes: whoever waits for it, or will, gets `why`.
+  void Close(const absl::Status& why);
 
  private:
   struct Change {
@@ -57,6 +59,7 @@ class ChangeLog {
   std::deque<Change> changes_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t floor_ ABSL_GUARDED_BY(mutex_);  // changes after it are all here
   std::uint64_t last_ ABSL_GUARDED_BY(mutex_);
+  absl::Status closed_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace strata

@@ -20,6 +20,10 @@ absl::Status EngineOptions::Validate() const {
   if (queue_bytes < (std::size_t{1} << 20)) faults.emplace_back("queue_bytes is below 1 MiB");
   if (max_points_per_scan == 0) faults.emplace_back("max_points_per_scan is 0");
   if (max_maps == 0) faults.emplace_back("max_maps is 0");
+  if (max_open_maps == 0) faults.emplace_back("max_open_maps is 0");
+  if (map_idle < absl::ZeroDuration()) {
+    faults.push_back(absl::StrCat("map_idle = ", absl::FormatDuration(map_idle), " is negative"));
+  }
   if (max_pending_scans == 0) faults.emplace_back("max_pending_scans is 0");
   if (worker_threads < 1 || worker_threads > 64) {
     faults.push_back(absl::StrCat("worker_threads = ", worker_threads, " is not in [1, 64]"));

@@ -33,6 +33,12 @@ struct EngineOptions {
   std::size_t cache_bytes = std::size_t{160} << 20;
   // Maps there may be; one more is refused with RESOURCE_EXHAUSTED.
   std::uint64_t max_maps = 10'000;
+  // Maps that are open at a time, each with three threads and some files. One more is opened where
+  // another one is not in use and has nothing to do; otherwise it is refused with
+  // RESOURCE_EXHAUSTED. At least 1.
+  std::uint64_t max_open_maps = 1'000;
+  // A map that nobody has used for so long, and that has nothing to do, is let go.
+  absl::Duration map_idle = absl::Minutes(5);
   // Largest size of a map's file; 0: none. Not with `store`.
   std::uint64_t max_map_bytes = 0;
   // Threads that each map uses for integration, edits, plans, the search for places and, where a

@@ -1,5 +1,6 @@
 #include "core/engine/map/map_core.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -9,9 +10,12 @@
 
 #include "absl/container/btree_set.h"
 #include "absl/functional/function_ref.h"
+#include "absl/random/random.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 
 #include "core/common/status.h"
 #include "core/common/stop.h"
@@ -47,7 +51,6 @@ absl::StatusOr<std::unique_ptr<MapCore>> MapCore::Open(const std::string& name,
   STRATA_RETURN_IF_ERROR(ClearLeftovers(writer));
   STRATA_ASSIGN_OR_RETURN(MapInfo info, writer.reader().GetMapInfo());
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
-  STRATA_ASSIGN_OR_RETURN(const std::uint64_t last_upload, writer.reader().LastUpload());
   info.name = name;
   return std::unique_ptr<MapCore>(new MapCore(name,
                                               stored.file,
@@ -55,8 +58,7 @@ absl::StatusOr<std::unique_ptr<MapCore>> MapCore::Open(const std::string& name,
                                               std::move(caches),
                                               std::move(stored.storage),
                                               std::move(info),
-                                              clock,
-                                              last_upload));
+                                              clock));
 }
 
 MapCore::MapCore(std::string name,
@@ -65,8 +67,7 @@ MapCore::MapCore(std::string name,
                  std::shared_ptr<CacheBudget> caches,
                  std::unique_ptr<MapStorage> storage,
                  MapInfo info,
-                 const MapClock& clock,
-                 std::uint64_t last_upload)
+                 const MapClock& clock)
     : name_(std::move(name)),
       disk_(file),
       options_(options),
@@ -76,8 +77,7 @@ MapCore::MapCore(std::string name,
       snapshots_({clock.epoch, clock.tile_version}),
       changes_(clock.commit_sequence),
       readers_(*storage_),
-      writer_(storage_->writer(), disk_, options.queue_bytes),
-      last_upload_(last_upload) {}
+      writer_(storage_->writer(), disk_, options.queue_bytes) {}
 
 MapInfo MapCore::info() const {
   absl::MutexLock lock(&mutex_);
@@ -141,9 +141,29 @@ void MapCore::Show(const MapClock& clock,
   changes_.Add(clock.commit_sequence, scans, tiles);
 }
 
-void MapCore::Close() {
+std::uint64_t MapCore::NextUpload() {
+  constexpr int kRandomBits = 22;  // 41 are left to the time, until 2039
+  thread_local absl::BitGen random;
+  const auto ms = static_cast<std::uint64_t>(absl::ToUnixMillis(absl::Now()));
+  const auto low = absl::Uniform<std::uint64_t>(random, 0, std::uint64_t{1} << kRandomBits);
+  constexpr std::uint64_t kMost = (std::uint64_t{1} << 63) - 1;  // as columns hold it
+  return std::max<std::uint64_t>(1, (ms << kRandomBits | low) & kMost);
+}
+
+absl::Status MapCore::closed() const {
+  absl::MutexLock lock(&mutex_);
+  return closed_;
+}
+
+void MapCore::Close(const absl::Status& why) {
+  {
+    absl::MutexLock lock(&mutex_);
+    if (closed_.ok()) closed_ = why;
+  }
   writer_.Close();
-  readers_.Close();
+  snapshots_.Close(why);
+  changes_.Close(why);
+  readers_.Close(why);
   absl::MutexLock lock(&mutex_);
   storage_.reset();
 }

@@ -77,11 +77,18 @@ class MapCore {
   void NoteUnreadable(const TileKey& key);
   // Those noted since the last call.
   absl::btree_set<TileKey> TakeUnreadable();
-  // A number for the chunks of one more upload.
-  std::uint64_t NextUpload() { return last_upload_.fetch_add(1) + 1; }
+  // A number for the chunks of one more upload, such that no process has another of it: the time in
+  // milliseconds, so that those of one map lie beside each other, then random bits.
+  static std::uint64_t NextUpload();
 
-  // Ends the writer and closes all connections, waiting for reads under way.
-  void Close();
+  // OK, or that the store may hold what nobody here knows (IsOutcomeUnknown()): the map has to be
+  // closed and opened anew.
+  absl::Status doubt() const { return writer_.doubt(); }
+  // OK, or the status of Close(). For those who wait for what is in memory.
+  absl::Status closed() const;
+  // Ends the writer and closes all connections, waiting for reads under way; what is asked for
+  // later gets `why`. Safe to call again.
+  void Close(const absl::Status& why = absl::CancelledError("the map is being closed"));
 
  private:
   MapCore(std::string name,
@@ -90,8 +97,7 @@ class MapCore {
           std::shared_ptr<CacheBudget> caches,
           std::unique_ptr<MapStorage> storage,
           MapInfo info,
-          const MapClock& clock,
-          std::uint64_t last_upload);
+          const MapClock& clock);
   // On the writer's thread, so that it happens in the order of commits.
   void Show(const MapClock& clock,
             const std::vector<ScanId>& scans,
@@ -103,6 +109,7 @@ class MapCore {
   const std::shared_ptr<CacheBudget> caches_;
   mutable absl::Mutex mutex_;
   MapInfo info_ ABSL_GUARDED_BY(mutex_);
+  absl::Status closed_ ABSL_GUARDED_BY(mutex_);
   absl::btree_set<TileKey> unreadable_ ABSL_GUARDED_BY(mutex_);
   std::unique_ptr<MapStorage> storage_;
   absl::Mutex publishing_;  // what snapshots_ and changes_ say is of one commit
@@ -110,7 +117,6 @@ class MapCore {
   ChangeLog changes_;
   ReaderPool readers_;
   WriterThread writer_;
-  std::atomic<std::uint64_t> last_upload_;
   std::atomic<bool> tiles_staged_ = false;
 };
 

@@ -23,12 +23,35 @@
 namespace strata {
 namespace {
 
+absl::StatusOr<MapOutline> ReadOutline(StorageReader& reader) {
+  MapOutline outline;
+  STRATA_ASSIGN_OR_RETURN(outline.info, reader.GetMapInfo());
+  STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader.GetClock());
+  outline.clock = clock.commit_sequence;
+  MapNumbers& numbers = outline.numbers.emplace();
+  STRATA_ASSIGN_OR_RETURN(const std::vector<JobInfo> jobs, reader.ListJobs());
+  AddJobs(jobs, numbers);
+  STRATA_RETURN_IF_ERROR(AddContents(reader, clock.tile_version, numbers));
+  outline.has_work =
+      !clock.derived_complete || numbers.scans_pending > 0 ||
+      std::any_of(jobs.begin(), jobs.end(), [](const JobInfo& job) { return !IsFinal(job.state); });
+  return outline;
+}
+
 class FileStores final : public MapStores {
  public:
   FileStores(const EngineOptions& options, const MapDirectory& directory)
       : options_(options), directory_(directory) {}
 
   absl::StatusOr<std::vector<std::string>> List() const override { return directory_.ListNames(); }
+  absl::Status Survey(const Stop& stop, TellOutline tell) const override {
+    STRATA_ASSIGN_OR_RETURN(const std::vector<std::string> names, List());
+    for (const std::string& name : names) {
+      STRATA_RETURN_IF_ERROR(stop.status());
+      tell(name, OutlineOf(FileOf(name)));
+    }
+    return absl::OkStatus();
+  }
   absl::Status Create(absl::string_view name,
                       const MapParameters& parameters,
                       absl::Time created) const override {
@@ -48,6 +71,13 @@ class FileStores final : public MapStores {
   }
 
  private:
+  static absl::StatusOr<MapOutline> OutlineOf(const std::filesystem::path& file) {
+    STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<StorageReader> reader, ReadSqliteMapAtRest(file));
+    STRATA_ASSIGN_OR_RETURN(MapOutline outline, ReadOutline(*reader));
+    AddFileBytes(file, *outline.numbers);
+    return outline;
+  }
+
   const EngineOptions options_;
   const MapDirectory& directory_;
 };
@@ -62,6 +92,13 @@ class PostgresStores final : public MapStores {
     std::erase_if(names,
                   [](const std::string& name) { return !ValidateName("map name", name).ok(); });
     return names;
+  }
+  absl::Status Survey(const Stop& stop, TellOutline tell) const override {
+    return maps_.Survey(stop, [&tell](absl::StatusOr<MapAtRest> map, const std::string& name) {
+      if (!ValidateName("map name", name).ok()) return;
+      if (!map.ok()) return tell(name, map.status());
+      tell(name, MapOutline{std::move(map->info), map->clock, map->has_work, std::nullopt});
+    });
   }
   absl::Status Create(absl::string_view name,
                       const MapParameters& parameters,

@@ -5,16 +5,20 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
+#include "core/common/stop.h"
 #include "core/engine/map/directory.h"
 #include "core/engine/map/engine_options.h"
+#include "core/engine/map/numbers.h"
 #include "core/storage/storage.h"
 #include "core/world/map_info.h"
 
@@ -26,13 +30,30 @@ struct StoredMap {
   std::filesystem::path file;
 };
 
+// What is known of a map that is not open.
+struct MapOutline {
+  MapInfo info;
+  std::uint64_t clock = 0;  // the last commit sequence
+  // Scans or jobs wait, or what is derived has to be made again.
+  bool has_work = false;
+  // As they are at rest, but for `map`; nullopt where they would cost much to read.
+  std::optional<MapNumbers> numbers;
+};
+
 // Thread-safe. Names must be valid (ValidateName).
 class MapStores {
  public:
+  // An error: more is known only once the map is opened.
+  using TellOutline =
+      absl::FunctionRef<void(const std::string& name, absl::StatusOr<MapOutline> outline)>;
+
   virtual ~MapStores() = default;
 
   // Sorted.
   virtual absl::StatusOr<std::vector<std::string>> List() const = 0;
+  // Looks at every map without opening it; what it says of one that is open meanwhile is worth
+  // nothing. CANCELLED, DEADLINE_EXCEEDED by `stop`.
+  virtual absl::Status Survey(const Stop& stop, TellOutline tell) const = 0;
   // All or nothing, also when the power fails. ALREADY_EXISTS. The map's clock begins behind those
   // of all maps that were removed, so that nobody takes it for one of them.
   virtual absl::Status Create(absl::string_view name,
@@ -51,6 +72,10 @@ class MapStores {
 // Those of options.store; `directory`, which must outlive them, is where files lie.
 absl::StatusOr<std::unique_ptr<MapStores>> OpenMapStores(const EngineOptions& options,
                                                          const MapDirectory& directory);
+
+// How an engine comes to its stores.
+using OpenStores = absl::FunctionRef<absl::StatusOr<std::unique_ptr<MapStores>>(
+    const EngineOptions& options, const MapDirectory& directory)>;
 
 // A map in a file of any name.
 absl::StatusOr<StoredMap> OpenMapFile(const std::filesystem::path& file,

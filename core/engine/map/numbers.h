@@ -4,11 +4,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/time/time.h"
 
 #include "core/api/database.h"
@@ -16,7 +18,9 @@
 
 namespace strata {
 
-// What is measured of one open map. Counts of what happened begin with the engine.
+class StorageReader;
+
+// What is measured of one map. Counts of what happened begin with the engine.
 struct MapNumbers {
   std::string map;
   std::uint64_t file_bytes = 0;                 // with its journal
@@ -35,8 +39,16 @@ struct MapNumbers {
   std::map<std::pair<std::string, JobState>, std::uint64_t> jobs;  // by kind and state
 };
 
+// Parts of them: of all jobs of a map; of its scans, and its tiles up to `tile_version`; of the
+// file that it lies in, if any.
+void AddJobs(const std::vector<JobInfo>& jobs, MapNumbers& numbers);
+absl::Status AddContents(StorageReader& reader, std::uint64_t tile_version, MapNumbers& numbers);
+void AddFileBytes(const std::filesystem::path& file, MapNumbers& numbers);
+
 struct EngineNumbers {
-  std::vector<MapNumbers> maps;       // by name
+  // By name: those that are open, and those that are not as they were last known; in a database
+  // only those that were open once.
+  std::vector<MapNumbers> maps;
   std::uint64_t maps_not_opened = 0;  // files that are damaged or of another version
 };
 

@@ -142,7 +142,7 @@ absl::Status Release(StorageWriter& writer, const WorkId& work) {
   return writer.DeleteAttempt(work);
 }
 
-absl::StatusOr<std::unique_ptr<Quarantine>> Quarantine::Open(MapCore& core) {
+absl::StatusOr<std::unique_ptr<Quarantine>> Quarantine::Open(MapCore& core, bool died) {
   std::unique_ptr<Quarantine> quarantine(new Quarantine(core));
   {
     STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
@@ -152,18 +152,18 @@ absl::StatusOr<std::unique_ptr<Quarantine>> Quarantine::Open(MapCore& core) {
     STRATA_RETURN_IF_ERROR(attempts.status());
     if (attempts->empty()) return quarantine;
   }
-  STRATA_RETURN_IF_ERROR(
-      core.writer().Run(Durability::kRelaxed, 0, Stop(), [&quarantine](StorageWriter& writer) {
-        return quarantine->CountDeaths(writer);
+  STRATA_RETURN_IF_ERROR(core.writer().Run(
+      Durability::kRelaxed, 0, Stop(), [&quarantine, died](StorageWriter& writer) {
+        return quarantine->CountDeaths(writer, died);
       }));
   return quarantine;
 }
 
-absl::Status Quarantine::CountDeaths(StorageWriter& writer) {
+absl::Status Quarantine::CountDeaths(StorageWriter& writer, bool process_died) {
   STRATA_ASSIGN_OR_RETURN(std::vector<Attempt> attempts, writer.reader().ListAttempts());
   std::map<WorkId, std::uint32_t> deaths;
   for (Attempt& attempt : attempts) {
-    const bool died = std::exchange(attempt.under_way, false);
+    const bool died = std::exchange(attempt.under_way, false) && process_died;
     // Whom somebody else killed may have had innocent work: it becomes a suspect, no more.
     if (died && (attempt.deaths == 0 || !core_.options().killed_from_outside)) ++attempt.deaths;
     STRATA_ASSIGN_OR_RETURN(const bool matters, Matters(writer, attempt));

@@ -39,8 +39,9 @@ absl::Status Release(StorageWriter& writer, const WorkId& work);
 // Thread-safe.
 class Quarantine {
  public:
-  // Counts what the last process died of.
-  static absl::StatusOr<std::unique_ptr<Quarantine>> Open(MapCore& core);
+  // Counts what the last process died of. `died`: whether one may have; not where this one has had
+  // the map open before.
+  static absl::StatusOr<std::unique_ptr<Quarantine>> Open(MapCore& core, bool died = true);
 
   // How many of the scans that wait may be integrated together now, at most `most`: they are under
   // way from now on, those of the last call no longer.
@@ -71,7 +72,7 @@ class Quarantine {
 
  private:
   explicit Quarantine(MapCore& core) : core_(core) {}
-  absl::Status CountDeaths(StorageWriter& writer);
+  absl::Status CountDeaths(StorageWriter& writer, bool process_died);
   std::uint32_t DeathsOf(const WorkId& work) const;
   absl::Status PutScansUnderWay(std::set<WorkId> scans);
 

@@ -9,6 +9,7 @@
 #include "absl/synchronization/mutex.h"
 
 #include "core/common/guarded.h"
+#include "core/common/status.h"
 #include "core/storage/storage.h"
 
 namespace strata {
@@ -16,7 +17,7 @@ namespace strata {
 absl::StatusOr<ReaderPool::Lease> ReaderPool::Take() {
   {
     absl::MutexLock lock(&mutex_);
-    if (closed_) return absl::CancelledError("the map is being closed");
+    STRATA_RETURN_IF_ERROR(closed_);
     ++on_loan_;
     if (!idle_.empty()) {
       Lease lease(*this, std::move(idle_.back()));
@@ -35,14 +36,14 @@ absl::StatusOr<ReaderPool::Lease> ReaderPool::Take() {
 
 void ReaderPool::Return(std::unique_ptr<StorageReader> reader) {
   absl::MutexLock lock(&mutex_);
-  if (!closed_ && idle_.size() < kMaxIdle) idle_.push_back(std::move(reader));
+  if (closed_.ok() && idle_.size() < kMaxIdle) idle_.push_back(std::move(reader));
   reader.reset();  // a connection is closed before Close() can see it returned
   --on_loan_;
 }
 
-void ReaderPool::Close() {
+void ReaderPool::Close(const absl::Status& why) {
   absl::MutexLock lock(&mutex_);
-  closed_ = true;
+  if (closed_.ok()) closed_ = why;
   idle_.clear();
   const auto all_back = [this]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return on_loan_ == 0; };
   mutex_.Await(absl::Condition(&all_back));

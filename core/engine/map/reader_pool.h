@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 
@@ -40,10 +41,10 @@ class ReaderPool {
     idle_.reserve(kMaxIdle);  // a reader goes back without a need for memory
   }
 
-  // CANCELLED once closed.
+  // The status of Close() once closed.
   absl::StatusOr<Lease> Take();
-  // Refuses new leases, waits for those on loan and closes every connection.
-  void Close();
+  // Refuses new leases with `why`, waits for those on loan and closes every connection.
+  void Close(const absl::Status& why);
 
  private:
   static constexpr std::size_t kMaxIdle = 8;
@@ -54,7 +55,7 @@ class ReaderPool {
   absl::Mutex mutex_;
   std::vector<std::unique_ptr<StorageReader>> idle_ ABSL_GUARDED_BY(mutex_);
   int on_loan_ ABSL_GUARDED_BY(mutex_) = 0;
-  bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+  absl::Status closed_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace strata

@@ -4,8 +4,10 @@
 #include <cstdint>
 
 #include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
 
 #include "core/common/blocking.h"
+#include "core/common/status.h"
 
 namespace strata {
 
@@ -25,13 +27,22 @@ void Snapshots::Publish(MapView view) {
   current_ = view;
 }
 
-void Snapshots::AwaitPublished(std::uint64_t tile_version) const {
+absl::Status Snapshots::AwaitPublished(std::uint64_t tile_version, const Stop& stop) const {
+  constexpr absl::Duration kPoll = absl::Milliseconds(50);
   const BlockingScope blocking;
   absl::MutexLock lock(&mutex_);
   const auto published = [this, tile_version]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
-    return current_.tile_version >= tile_version;
+    return !closed_.ok() || current_.tile_version >= tile_version;
   };
-  mutex_.Await(absl::Condition(&published));
+  while (!mutex_.AwaitWithTimeout(absl::Condition(&published), kPoll)) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+  }
+  return current_.tile_version >= tile_version ? absl::OkStatus() : closed_;
+}
+
+void Snapshots::Close(const absl::Status& why) {
+  absl::MutexLock lock(&mutex_);
+  if (closed_.ok()) closed_ = why;
 }
 
 std::uint64_t Snapshots::Floor() const {

@@ -7,7 +7,10 @@
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
 #include "absl/synchronization/mutex.h"
+
+#include "core/common/stop.h"
 
 namespace strata {
 
@@ -44,8 +47,11 @@ class Snapshots {
   // Called after the commit that made `view` the current one.
   void Publish(MapView view);
   // Returns once tiles of `tile_version`, which must be committed, are what readers get: whoever
-  // saw a commit in the store must not find older tiles afterwards.
-  void AwaitPublished(std::uint64_t tile_version) const;
+  // saw a commit in the store must not find older tiles afterwards. CANCELLED, DEADLINE_EXCEEDED by
+  // `stop`; the status of Close().
+  absl::Status AwaitPublished(std::uint64_t tile_version, const Stop& stop) const;
+  // Nothing more is published: whoever waits for it, or will, gets `why`.
+  void Close(const absl::Status& why);
   // Oldest tile version that somebody reads or may begin to read.
   std::uint64_t Floor() const;
 
@@ -55,6 +61,7 @@ class Snapshots {
   mutable absl::Mutex mutex_;
   MapView current_ ABSL_GUARDED_BY(mutex_);
   std::multiset<std::uint64_t> pinned_ ABSL_GUARDED_BY(mutex_);
+  absl::Status closed_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace strata

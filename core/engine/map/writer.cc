@@ -10,10 +10,13 @@
 
 #include "core/common/blocking.h"
 #include "core/common/guarded.h"
+#include "core/common/retry_delay.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/common/stop.h"
 #include "core/common/this_thread.h"
+#include "core/engine/map/engine_options.h"
+#include "core/storage/outcome.h"
 #include "core/storage/storage.h"
 
 namespace strata {
@@ -44,7 +47,7 @@ absl::Status WriterThread::Run(
   const BlockingScope blocking;
   absl::MutexLock lock(&mutex_);
   const auto has_room = [this, bytes]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
-    return closed_ || queued_bytes_ == 0 || queued_bytes_ + bytes <= queue_bytes_;
+    return closed_ || !doubt_.ok() || queued_bytes_ == 0 || queued_bytes_ + bytes <= queue_bytes_;
   };
   while (!mutex_.AwaitWithTimeout(absl::Condition(&has_room), kStopPoll)) {
     STRATA_RETURN_IF_ERROR(stop.status());
@@ -59,6 +62,7 @@ absl::Status WriterThread::RunBehind(Work work, Tell tell) {
 }
 
 absl::Status WriterThread::Await(Task& task, Queue& queue) {
+  STRATA_RETURN_IF_ERROR(doubt_);
   if (closed_) return absl::CancelledError("the map is being closed");
   queue.push_back(&task);
   queued_bytes_ += task.bytes;
@@ -76,6 +80,25 @@ WriterNumbers WriterThread::numbers() const {
 absl::Status WriterThread::FailedWithin(absl::Duration time) const {
   absl::MutexLock lock(&mutex_);
   return SteadyNow() - last_commit_at_ <= time ? last_commit_ : absl::OkStatus();
+}
+
+absl::Status WriterThread::doubt() const {
+  absl::MutexLock lock(&mutex_);
+  return doubt_;
+}
+
+void WriterThread::NoteDoubt(const absl::Status& doubt) {
+  doubt_ = WithRetryDelay(
+      Annotate(doubt, "the store may hold what this server does not know; the map is opened anew"),
+      kRetryDelay);
+  for (Queue* queue : {&full_, &behind_}) {
+    for (Task* task : *queue) {
+      queued_bytes_ -= task->bytes;
+      task->status = doubt_;
+      task->done = true;
+    }
+    queue->clear();
+  }
 }
 
 bool WriterThread::HasWorkOrClosed() const { return closed_ || !full_.empty() || !behind_.empty(); }
@@ -139,7 +162,13 @@ absl::StatusOr<bool> WriterThread::RunNext() {
   }
   const absl::Time begun = SteadyNow();
   absl::Status committed = CommitBatch(durability, batch);
+  // Work that saw the store's end may say so alone.
+  absl::Status doubt = committed;
+  for (const Task* task : batch) {
+    if (IsOutcomeUnknown(task->status)) doubt = task->status;
+  }
   absl::MutexLock lock(&mutex_);
+  if (IsOutcomeUnknown(doubt) && doubt_.ok()) NoteDoubt(doubt);
   last_commit_ = std::move(committed);
   last_commit_at_ = SteadyNow();
   ++numbers_.commits;

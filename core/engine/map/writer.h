@@ -58,6 +58,9 @@ class WriterThread {
   WriterNumbers numbers() const;
   // Why the last commit failed, if it did, and not longer ago; otherwise OK.
   absl::Status FailedWithin(absl::Duration time) const;
+  // OK, or why nobody knows what the store holds (IsOutcomeUnknown()): nothing is written any more,
+  // and all is refused with it.
+  absl::Status doubt() const;
 
   // Carries out what is queued, then refuses everything with CANCELLED. Safe to call again.
   void Close();
@@ -84,6 +87,8 @@ class WriterThread {
   // One commit; whether there is none any more.
   absl::StatusOr<bool> RunNext();
   bool HasWorkOrClosed() const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
+  // Refuses what waits and what comes.
+  void NoteDoubt(const absl::Status& doubt) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   StorageWriter& storage_;
   const DiskSpace& disk_;
@@ -96,6 +101,7 @@ class WriterThread {
   Queue behind_ ABSL_GUARDED_BY(mutex_);  // one a commit, once full_ is empty
   std::size_t queued_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+  absl::Status doubt_ ABSL_GUARDED_BY(mutex_);
   std::thread thread_;
 };
 

@@ -66,7 +66,7 @@ absl::StatusOr<bool> EpochTiles::Read(StorageReader& reader,
   STRATA_RETURN_IF_ERROR(CheckEpochKept(reader, epoch));
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader.GetClock());
   if (clock.tile_version != view().tile_version || clock.epoch != view().epoch) {
-    core_.snapshots().AwaitPublished(clock.tile_version);
+    STRATA_RETURN_IF_ERROR(core_.snapshots().AwaitPublished(clock.tile_version, stop));
     return false;
   }
   ScanQuery integrated;

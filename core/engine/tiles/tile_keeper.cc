@@ -89,12 +89,16 @@ class TileKeeper::Source final : public TileSource {
 };
 
 TileKeeper::TileKeeper(MapCore& core, Quarantine& quarantine)
-    : core_(core), quarantine_(quarantine), quiet_(core.options().prepare_after) {}
+    : core_(core),
+      quarantine_(quarantine),
+      quiet_(core.options().prepare_after),
+      at_rest_(quiet_ == absl::InfiniteDuration()) {}
 
 absl::Duration TileKeeper::Step() {
   const absl::StatusOr<absl::Duration> next = Guarded([this] { return TryStep(); });
   if (next.ok()) return *next;
   Pause();
+  at_rest_ = true;
   if (!std::exchange(failed_, true)) {
     Guarded([&] {
       LOG(WARNING)
@@ -107,6 +111,7 @@ absl::Duration TileKeeper::Step() {
 
 absl::StatusOr<absl::Duration> TileKeeper::TryStep() {
   if (quiet_ == absl::InfiniteDuration() || quarantine_.IsHeld(kWork)) {
+    at_rest_ = true;
     return absl::InfiniteDuration();
   }
   STRATA_RETURN_IF_ERROR(Look());
@@ -114,6 +119,7 @@ absl::StatusOr<absl::Duration> TileKeeper::TryStep() {
   if (!due.has_value()) {
     STRATA_RETURN_IF_ERROR(End());
     failed_ = false;
+    at_rest_ = stale_.empty();
     return std::max(quiet_, kShortestLook);
   }
   const Turn turn;
@@ -205,6 +211,7 @@ absl::Status TileKeeper::End() {
 }
 
 void TileKeeper::Pause() {
+  at_rest_ = quiet_ == absl::InfiniteDuration();
   decoded_.clear();
   if (!under_way_) return;
   // Where that cannot be written down, it counts if the process is killed now.

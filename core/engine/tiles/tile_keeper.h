@@ -2,6 +2,7 @@
 #ifndef STRATA_CORE_ENGINE_TILES_TILE_KEEPER_H_
 #define STRATA_CORE_ENGINE_TILES_TILE_KEEPER_H_
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -33,6 +34,9 @@ class TileKeeper {
   // Looks what is to be done, and does it for one tile: some 50 ms. Returns when to call it again.
   // What fails is told in the log, once until something succeeds, and tried again later.
   absl::Duration Step();
+  // Whether Step() found nothing to do that it can do, since Pause() or before it: what it waits
+  // for is that tiles change, or that what fails goes better. Thread-safe.
+  bool AtRest() const { return at_rest_; }
   // Other work begins, or the map is closed: what the process dies of now is not preparing tiles.
   void Pause();
 
@@ -63,6 +67,7 @@ class TileKeeper {
   absl::btree_map<TileKey, std::shared_ptr<const SurfaceTile>> decoded_;
   bool under_way_ = false;  // as the quarantine knows
   bool failed_ = false;     // as the log knows
+  std::atomic<bool> at_rest_;
 };
 
 }  // namespace strata

@@ -21,6 +21,7 @@
 #include "core/storage/postgresql/postgres_reader.h"
 #include "core/storage/postgresql/postgres_writer.h"
 #include "core/storage/postgresql/tables.h"
+#include "core/storage/rows.h"
 
 namespace strata {
 namespace {
@@ -40,8 +41,9 @@ class PostgresStorage final : public MapStorage {
   StorageWriter& writer() override { return writer_; }
   absl::Status CheckInPlace() const override {
     STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
-    return CheckOwner(lease->Query("SELECT owner FROM truth_map WHERE map = $1", map_.number),
-                      map_);
+    absl::StatusOr<Rows> owner =
+        lease->Query("SELECT owner FROM truth_map WHERE map = $1", map_.number);
+    return CheckOwner(owner, map_);
   }
 
  private:
@@ -129,7 +131,7 @@ absl::Status InsertDefaultProfile(Connection& connection,
 }
 
 // Tiles of another format than this program's are made again, as in a file.
-absl::Status DropOtherDerived(PostgresWriter& writer, ConnectionPool& pool, std::int64_t map) {
+absl::Status DropOtherDerived(StorageWriter& writer, ConnectionPool& pool, std::int64_t map) {
   {
     STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool.Take());
     STRATA_ASSIGN_OR_RETURN(
@@ -168,6 +170,49 @@ absl::StatusOr<std::vector<std::string>> PostgresMaps::List() const {
   return names;
 }
 
+// Every table from `last` on: or else a merge of them reads all there is before it.
+absl::StatusOr<Rows> PostgresMaps::SurveyAfter(std::int64_t last) const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  return lease->Query(
+      "SELECT " STRATA_MAP_INFO_COLUMNS
+      ", l.map, l.name, m.commit_sequence, d.complete = 0 OR d.schema <> $3 OR EXISTS (SELECT FROM "
+      "truth_scan AS s WHERE s.map = l.map AND s.state = $4) OR EXISTS (SELECT FROM truth_job AS j "
+      "WHERE j.map = l.map AND j.state < $5) FROM map_place AS l JOIN truth_map AS m ON m.map = "
+      "l.map JOIN truth_profile AS p ON p.map = l.map AND p.name = 'default' JOIN derived_state AS "
+      "d ON d.map = l.map WHERE l.map > $1 AND m.map > $1 AND p.map > $1 AND d.map > $1 AND "
+      "l.state = "
+      "$2 ORDER BY l.map LIMIT 1000",
+      last,
+      kThere,
+      kDerivedVersion,
+      static_cast<int>(ScanState::kPending),
+      static_cast<int>(JobState::kSucceeded));
+}
+
+absl::Status PostgresMaps::Survey(
+    const Stop& stop,
+    absl::FunctionRef<void(absl::StatusOr<MapAtRest> map, const std::string& name)> tell) const {
+  constexpr int kFirstColumn = 20;  // after those of STRATA_MAP_INFO_COLUMNS
+  std::int64_t last = 0;
+  while (true) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+    STRATA_ASSIGN_OR_RETURN(Rows row, SurveyAfter(last));
+    if (row.size() == 0) return absl::OkStatus();
+    while (row.Next()) {
+      last = row.Int(kFirstColumn);
+      const std::string name = row.Text(kFirstColumn + 1);
+      absl::StatusOr<MapInfo> info = ReadMapInfo(row);
+      if (!info.ok()) {
+        tell(info.status(), name);
+        continue;
+      }
+      info->name = name;
+      tell(MapAtRest{*std::move(info), row.Unsigned(kFirstColumn + 2), row.Bool(kFirstColumn + 3)},
+           name);
+    }
+  }
+}
+
 absl::StatusOr<std::int64_t> PostgresMaps::Find(absl::string_view name) const {
   STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
   STRATA_ASSIGN_OR_RETURN(
@@ -200,12 +245,13 @@ absl::Status PostgresMaps::Create(absl::string_view name,
 absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenAs(absl::string_view name,
                                                                  std::int64_t owner) const {
   STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
-  const OpenedMap map{number, std::string(name), owner};
+  OpenedMap map{number, std::string(name), owner};
   if (owner != 0) STRATA_RETURN_IF_ERROR(TakeOver(map));
-  PostgresWriter writer(pool_, map);
+  auto storage = std::make_unique<PostgresStorage>(pool_, map);
+  StorageWriter& writer = storage->writer();
   STRATA_RETURN_IF_ERROR(Annotate(DropOtherDerived(writer, *pool_, number), name));
   STRATA_RETURN_IF_ERROR(Annotate(writer.reader().GetMapInfo().status(), name));
-  return std::make_unique<PostgresStorage>(pool_, map);
+  return storage;
 }
 
 absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::Open(absl::string_view name) const {
@@ -219,11 +265,13 @@ absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenAlone(absl::string
 
 // The lock waits for commits of the owner before, relaxed ones too: what those have staged is there
 // when the new one clears it away.
-absl::Status PostgresMaps::TakeOver(const OpenedMap& map) const {
+absl::Status PostgresMaps::TakeOver(OpenedMap& map) const {
   STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
   return InTransaction(*lease, [&]() -> absl::Status {
-    STRATA_RETURN_IF_ERROR(
-        lease->Query("SELECT 1 FROM truth_map WHERE map = $1 FOR UPDATE", map.number).status());
+    STRATA_ASSIGN_OR_RETURN(
+        Rows row,
+        lease->Query("SELECT last_commit FROM truth_map WHERE map = $1 FOR UPDATE", map.number));
+    if (row.Next()) map.last_commit = row.Int(0);
     return lease->Change("UPDATE truth_map SET owner = $2 WHERE map = $1", map.number, map.owner)
         .status();
   });

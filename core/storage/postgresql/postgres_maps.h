@@ -9,11 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
+#include "core/common/stop.h"
 #include "core/storage/postgresql/connection_pool.h"
 #include "core/storage/postgresql/postgres_writer.h"
 #include "core/storage/storage.h"
@@ -28,6 +30,14 @@ struct PostgresOptions {
   std::size_t max_connections = 32;
 };
 
+// What a map's rows say of it, whether somebody has it open or not.
+struct MapAtRest {
+  MapInfo info;  // with its name
+  std::uint64_t clock = 0;
+  // Scans or jobs wait, or what is derived is incomplete or of another format.
+  bool has_work = false;
+};
+
 // Thread-safe.
 class PostgresMaps {
  public:
@@ -37,6 +47,11 @@ class PostgresMaps {
 
   // Sorted.
   absl::StatusOr<std::vector<std::string>> List() const;
+  // All maps, a thousand a query, in no order; an error of one of them is of its rows. CANCELLED,
+  // DEADLINE_EXCEEDED by `stop`.
+  absl::Status Survey(
+      const Stop& stop,
+      absl::FunctionRef<void(absl::StatusOr<MapAtRest> map, const std::string& name)> tell) const;
   // All or nothing, its clock at `clock`. ALREADY_EXISTS.
   absl::Status Create(absl::string_view name,
                       const MapParameters& parameters,
@@ -56,10 +71,12 @@ class PostgresMaps {
 
  private:
   explicit PostgresMaps(std::shared_ptr<ConnectionPool> pool) : pool_(std::move(pool)) {}
+  // The thousand rows behind the map with the number `last`.
+  absl::StatusOr<Rows> SurveyAfter(std::int64_t last) const;
   absl::StatusOr<std::int64_t> Find(absl::string_view name) const;
   absl::StatusOr<std::unique_ptr<MapStorage>> OpenAs(absl::string_view name,
                                                      std::int64_t owner) const;
-  absl::Status TakeOver(const OpenedMap& map) const;
+  absl::Status TakeOver(OpenedMap& map) const;
   absl::Status DeleteRows(std::int64_t map) const;
 
   std::shared_ptr<ConnectionPool> pool_;

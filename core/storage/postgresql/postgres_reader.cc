@@ -251,13 +251,6 @@ absl::StatusOr<ScanTotals> PostgresReader::GetScanTotals() {
       row.Unsigned(0), row.Unsigned(1), row.Unsigned(2), row.Unsigned(3), row.Unsigned(4)};
 }
 
-absl::StatusOr<std::uint64_t> PostgresReader::LastUpload() {
-  return AskForNumber(
-      Ask("SELECT greatest(coalesce((SELECT max(upload) FROM truth_scan WHERE map = $1), 0), "
-          "coalesce((SELECT max(upload) FROM truth_chunk WHERE map = $1), 0), "
-          "coalesce((SELECT max(upload) FROM truth_upload WHERE map = $1), 0))"));
-}
-
 absl::StatusOr<std::vector<UnfinishedUpload>> PostgresReader::ListUnfinishedUploads() {
   STRATA_ASSIGN_OR_RETURN(
       Rows row,

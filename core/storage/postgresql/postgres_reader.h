@@ -43,7 +43,6 @@ class PostgresReader final : public StorageReader {
                                                    std::uint64_t epoch) override;
   absl::StatusOr<UploadState> GetUploadState(absl::string_view trajectory) override;
   absl::StatusOr<ScanTotals> GetScanTotals() override;
-  absl::StatusOr<std::uint64_t> LastUpload() override;
   absl::StatusOr<std::vector<UnfinishedUpload>> ListUnfinishedUploads() override;
   absl::StatusOr<std::string> GetChunk(std::uint64_t upload, std::uint32_t ordinal) override;
   absl::StatusOr<std::string> GetLocalMap(ScanNumber number) override;

@@ -19,6 +19,7 @@
 #include "absl/types/span.h"
 
 #include "core/common/status.h"
+#include "core/storage/outcome.h"
 #include "core/storage/postgresql/connection.h"
 #include "core/world/value_codec.h"
 
@@ -45,7 +46,7 @@ void PauseBeforeRun(int run) {
 
 }  // namespace
 
-absl::Status CheckOwner(absl::StatusOr<Rows> owner, const OpenedMap& map) {
+absl::Status CheckOwner(absl::StatusOr<Rows>& owner, const OpenedMap& map) {
   STRATA_RETURN_IF_ERROR(owner.status());
   const bool there = owner->Next();
   if (there && (map.owner == 0 || owner->Int(0) == map.owner)) return absl::OkStatus();
@@ -84,7 +85,7 @@ absl::Status PostgresWriter::CommitOnce(Durability durability,
   reader_.ReadThrough(connection_);
   durability_ = durability;
   broken_ = absl::OkStatus();
-  const std::int64_t commit = durability == Durability::kFull ? NumberOfCommit() : 0;
+  const std::int64_t commit = durability == Durability::kFull || alone() ? NumberOfCommit() : 0;
   absl::Status done = LockMap(durability, commit);
   again = !done.ok() && lease->IsBroken();  // the server had hung up before
   if (done.ok()) done = RunBody(body);
@@ -100,17 +101,30 @@ absl::Status PostgresWriter::CommitOnce(Durability durability,
 }
 
 absl::Status PostgresWriter::LockMap(Durability durability, std::int64_t commit) {
-  if (durability == Durability::kRelaxed) {
-    STRATA_RETURN_IF_ERROR(connection_->Execute("BEGIN; SET LOCAL synchronous_commit = off"));
-    return CheckOwner(
-        connection_->Query("SELECT owner FROM truth_map WHERE map = $1 FOR KEY SHARE", map_),
-        opened_);
-  }
-  STRATA_RETURN_IF_ERROR(connection_->Execute("BEGIN"));
-  return CheckOwner(
-      connection_->Query(
-          "UPDATE truth_map SET last_commit = $2 WHERE map = $1 RETURNING owner", map_, commit),
-      opened_);
+  const bool relaxed = durability == Durability::kRelaxed;
+  STRATA_RETURN_IF_ERROR(
+      connection_->Execute(relaxed ? "BEGIN; SET LOCAL synchronous_commit = off" : "BEGIN"));
+  if (alone()) return LockOwnMap(commit);
+  absl::StatusOr<Rows> owner =
+      relaxed ? connection_->Query("SELECT owner FROM truth_map WHERE map = $1 FOR KEY SHARE", map_)
+              : connection_->Query(
+                    "UPDATE truth_map SET last_commit = $2 WHERE map = $1 RETURNING owner",
+                    map_,
+                    commit);
+  return CheckOwner(owner, opened_);
+}
+
+absl::Status PostgresWriter::LockOwnMap(std::int64_t commit) {
+  absl::StatusOr<Rows> row = connection_->Query(
+      "UPDATE truth_map AS m SET last_commit = $2 FROM (SELECT last_commit FROM truth_map WHERE "
+      "map = $1 FOR NO KEY UPDATE) AS before WHERE m.map = $1 RETURNING m.owner, "
+      "before.last_commit",
+      map_,
+      commit);
+  STRATA_RETURN_IF_ERROR(CheckOwner(row, opened_));
+  if (!last_commit_.has_value() || row->Int(1) == *last_commit_) return absl::OkStatus();
+  return OutcomeUnknown(
+      absl::StrCat("store: what was written to map ", opened_.name, " last is not there any more"));
 }
 
 absl::Status PostgresWriter::RunBody(absl::FunctionRef<absl::Status()> body) {
@@ -124,14 +138,18 @@ absl::Status PostgresWriter::RunBody(absl::FunctionRef<absl::Status()> body) {
 // end the wait, not the commit.
 absl::Status PostgresWriter::EndCommit(std::int64_t commit, bool& again) {
   const absl::Status committed = connection_->Execute("SET LOCAL statement_timeout = 0; COMMIT");
-  if (committed.ok() || !connection_->IsBroken()) return committed;
-  const absl::StatusOr<bool> there =
-      commit == 0 ? absl::UnknownError("a relaxed commit") : WasCommitted(commit);
-  if (there.ok() && *there) return absl::OkStatus();
+  if (!committed.ok() && !connection_->IsBroken()) return committed;
+  const absl::StatusOr<bool> there = committed.ok() ? absl::StatusOr<bool>(true)
+                                     : commit == 0  ? absl::UnknownError("a relaxed commit")
+                                                    : WasCommitted(commit);
+  if (there.ok() && *there) {
+    if (alone()) last_commit_ = commit;
+    return absl::OkStatus();
+  }
   again = there.ok();
   if (again) return committed;
-  return absl::UnavailableError(
-      absl::StrCat(committed.message(), "; outcome unknown: it went away in the commit"));
+  last_commit_.reset();
+  return OutcomeUnknown(absl::StrCat(committed.message(), ", in a commit"));
 }
 
 absl::StatusOr<bool> PostgresWriter::WasCommitted(std::int64_t commit) {
@@ -155,7 +173,7 @@ absl::StatusOr<bool> PostgresWriter::LookForCommit(std::int64_t commit) {
                    map_));
   if (!row.Next()) return absl::UnknownError("the map was removed");
   if (row.Int(0) == commit) return true;
-  if (opened_.owner != 0 && row.Int(1) == opened_.owner) return false;
+  if (alone() && row.Int(1) == opened_.owner) return false;
   return absl::UnknownError("others have written since");
 }
 

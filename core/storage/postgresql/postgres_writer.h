@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,16 +26,22 @@ namespace strata {
 struct OpenedMap {
   std::int64_t number = 0;
   std::string name;
-  std::int64_t owner = 0;  // 0: anybody's
+  std::int64_t owner = 0;        // 0: anybody's
+  std::int64_t last_commit = 0;  // when `owner` took it
 };
 
-// Of the map's own row, its owner: UNAVAILABLE where there is no row or `map` has lost it.
-absl::Status CheckOwner(absl::StatusOr<Rows> owner, const OpenedMap& map);
+// The map's own row, which begins with its owner: UNAVAILABLE where there is no row or `map` has
+// lost it.
+absl::Status CheckOwner(absl::StatusOr<Rows>& owner, const OpenedMap& map);
 
 class PostgresWriter final : public StorageWriter {
  public:
   PostgresWriter(std::shared_ptr<ConnectionPool> pool, const OpenedMap& map)
-      : pool_(pool), opened_(map), map_(map.number), reader_(std::move(pool), map.number) {}
+      : pool_(pool),
+        opened_(map),
+        map_(map.number),
+        last_commit_(map.last_commit),
+        reader_(std::move(pool), map.number) {}
 
   absl::Status Commit(Durability durability, absl::FunctionRef<absl::Status()> body) override;
   absl::Status Part(absl::FunctionRef<absl::Status()> body) override;
@@ -116,13 +123,17 @@ class PostgresWriter final : public StorageWriter {
   absl::Status CommitOnce(Durability durability,
                           absl::FunctionRef<absl::Status()> body,
                           bool& again);
-  // Takes the map's row: alone in a full commit, so that decisions follow each other; beside others
-  // in a relaxed one, which decides nothing, so that only a deletion of the map waits.
-  // `commit`: a number that no other commit has, which a full one leaves there.
+  bool alone() const { return opened_.owner != 0; }
+  // Takes the map's row, so that decisions follow each other; in a relaxed commit beside others,
+  // which decides nothing, it only keeps the map from being deleted. `commit`: a number that no
+  // other commit has, which is left there; 0: none is.
   absl::Status LockMap(Durability durability, std::int64_t commit);
+  // The same for whoever has the map alone: its commit before is there, or else a confirmed one was
+  // lost.
+  absl::Status LockOwnMap(std::int64_t commit);
   absl::Status RunBody(absl::FunctionRef<absl::Status()> body);
   absl::Status EndCommit(std::int64_t commit, bool& again);
-  // Whether the full commit with that number took place, as soon as the store answers. An error:
+  // Whether the commit with that number took place, as soon as the store answers. An error:
   // nobody knows.
   absl::StatusOr<bool> WasCommitted(std::int64_t commit);
   absl::StatusOr<bool> LookForCommit(std::int64_t commit);
@@ -147,6 +158,8 @@ class PostgresWriter final : public StorageWriter {
   std::shared_ptr<ConnectionPool> pool_;
   OpenedMap opened_;
   std::int64_t map_;
+  // The number of the last commit, if this writer has the map alone; nullopt: it is not known.
+  std::optional<std::int64_t> last_commit_;
   PostgresReader reader_;
   Connection* connection_ = nullptr;  // in a commit
   Durability durability_ = Durability::kFull;

@@ -10,7 +10,9 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "absl/strings/string_view.h"
 #include <sqlite3.h>
 
@@ -72,6 +74,19 @@ void CloseToOthers(const std::filesystem::path& file) {
   namespace fs = std::filesystem;
   std::error_code error;  // of a file system without modes
   fs::permissions(file, fs::perms::others_all, fs::perm_options::remove, error);
+}
+
+// sqlite.org/uri.html
+std::string UriAtRest(const std::filesystem::path& file) {
+  std::string uri = "file:";
+  for (const char c : std::filesystem::absolute(file).string()) {
+    if (absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '/' || c == '.') {
+      uri += c;
+    } else {
+      absl::StrAppendFormat(&uri, "%%%02X", static_cast<unsigned>(static_cast<unsigned char>(c)));
+    }
+  }
+  return uri + "?immutable=1";
 }
 
 }  // namespace
@@ -142,13 +157,16 @@ absl::StatusOr<Database> Database::Open(const std::filesystem::path& file, Mode 
     return absl::NotFoundError(absl::StrCat("file ", file.filename().string(), " is not there"));
   }
   int flags = SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE;
-  if (mode == Mode::kRead) {
+  if (mode == Mode::kRead || mode == Mode::kReadAtRest) {
     flags |= SQLITE_OPEN_READONLY;
   } else {
     flags |= SQLITE_OPEN_READWRITE | (mode == Mode::kCreate ? SQLITE_OPEN_CREATE : 0);
   }
   sqlite3* connection = nullptr;
-  const int code = sqlite3_open_v2(file.c_str(), &connection, flags, nullptr);
+  const bool at_rest = mode == Mode::kReadAtRest;
+  if (at_rest) flags |= SQLITE_OPEN_URI;
+  const std::string name = at_rest ? UriAtRest(file) : file.string();
+  const int code = sqlite3_open_v2(name.c_str(), &connection, flags, nullptr);
   Database database(connection);
   STRATA_RETURN_IF_ERROR(StatusOf(code, connection));
   if (mode == Mode::kCreate) CloseToOthers(file);

@@ -72,10 +72,11 @@ class Statement final : public Row {
 // A connection; one thread at a time.
 class Database {
  public:
-  enum class Mode { kCreate, kWrite, kRead };
+  enum class Mode { kCreate, kWrite, kRead, kReadAtRest };
 
   // kCreate makes a new file, closed to others than user and group, and fails with ALREADY_EXISTS
-  // if there is one; the others want one.
+  // if there is one; the others want one. kReadAtRest reads the file alone, and leaves nothing
+  // beside it: it must have no log, and nobody may write it meanwhile.
   static absl::StatusOr<Database> Open(const std::filesystem::path& file, Mode mode);
   ~Database();
   Database(Database&& other) noexcept

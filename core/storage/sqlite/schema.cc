@@ -413,6 +413,17 @@ absl::Status CreateSchema(Database& database) {
   return UpgradeSchema(database);
 }
 
+absl::StatusOr<bool> HasCurrentSchema(Database& database) {
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t version, database.Pragma("PRAGMA user_version"));
+  if (version != kTruthVersion) return false;
+  // Those that were added without another version.
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t tables,
+                          database.Pragma("SELECT count(*) FROM sqlite_schema WHERE name IN "
+                                          "('attempt', 'truth_kind')"));
+  if (tables != 2) return false;
+  return HasDerivedTables(database);
+}
+
 absl::Status UpgradeSchema(Database& database) {
   const absl::StatusOr<std::int64_t> application = database.Pragma("PRAGMA application_id");
   if (!application.ok()) return application.status();

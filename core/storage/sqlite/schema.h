@@ -28,6 +28,9 @@ absl::Status CreateSchema(Database& database);
 // FAILED_PRECONDITION for another program's file or a newer format; DATA_LOSS for no database.
 absl::Status UpgradeSchema(Database& database);
 
+// Whether UpgradeSchema() would change nothing. The same errors; reads only.
+absl::StatusOr<bool> HasCurrentSchema(Database& database);
+
 // Drops all derived tables and makes them anew, empty and marked incomplete. Inside a transaction.
 absl::Status ResetDerivedTables(Database& database);
 

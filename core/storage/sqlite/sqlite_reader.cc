@@ -176,15 +176,6 @@ absl::StatusOr<ScanTotals> SqliteReader::GetScanTotals() {
       row.Unsigned(0), row.Unsigned(1), row.Unsigned(2), row.Unsigned(3), row.Unsigned(4)};
 }
 
-absl::StatusOr<std::uint64_t> SqliteReader::LastUpload() {
-  STRATA_ASSIGN_OR_RETURN(
-      const std::int64_t last,
-      database_.Pragma("SELECT max(coalesce((SELECT max(upload) FROM truth_scan), 0), "
-                       "coalesce((SELECT max(upload) FROM truth_chunk), 0), "
-                       "coalesce((SELECT max(upload) FROM truth_upload), 0))"));
-  return static_cast<std::uint64_t>(last);
-}
-
 absl::StatusOr<std::vector<UnfinishedUpload>> SqliteReader::ListUnfinishedUploads() {
   STRATA_ASSIGN_OR_RETURN(
       Statement row,

@@ -120,7 +120,27 @@ std::string KindOf(const std::filesystem::path& file) {
   return absl::StrCat("a database file of another application (application_id ", application, ")");
 }
 
+// Whether what was written last may lie beside the file.
+bool HasLog(const std::filesystem::path& file) {
+  for (const char* suffix : {"-wal", "-journal"}) {
+    std::error_code error;
+    const std::uintmax_t bytes = std::filesystem::file_size(file.string() + suffix, error);
+    if (!error && bytes > 0) return true;
+  }
+  return false;
+}
+
 }  // namespace
+
+absl::StatusOr<std::unique_ptr<StorageReader>> ReadSqliteMapAtRest(
+    const std::filesystem::path& file) {
+  STRATA_RETURN_IF_ERROR(CheckIsSqliteMap(file));
+  if (HasLog(file)) return absl::FailedPreconditionError("store: the file was not closed well");
+  STRATA_ASSIGN_OR_RETURN(Database database, Database::Open(file, Database::Mode::kReadAtRest));
+  STRATA_ASSIGN_OR_RETURN(const bool current, HasCurrentSchema(database));
+  if (!current) return absl::FailedPreconditionError("store: the file has another format");
+  return std::make_unique<SqliteReader>(std::make_shared<Database>(std::move(database)));
+}
 
 absl::Status CheckIsSqliteMap(const std::filesystem::path& file) {
   const std::string kind = KindOf(file);

@@ -33,6 +33,12 @@ absl::Status CreateSqliteMap(const std::filesystem::path& file,
 absl::StatusOr<std::unique_ptr<MapStorage>> OpenSqliteStorage(const std::filesystem::path& file,
                                                               const SqliteOptions& options);
 
+// Reads a file that nobody has open and that was closed well; nobody may open it while the reader
+// lives. FAILED_PRECONDITION where that is not so, and for another program's file or another format
+// than the newest: it has to be opened. NOT_FOUND, DATA_LOSS as above.
+absl::StatusOr<std::unique_ptr<StorageReader>> ReadSqliteMapAtRest(
+    const std::filesystem::path& file);
+
 // OK for a file that was made as a map, damaged or newer as it may be; FAILED_PRECONDITION saying
 // what else the file is.
 absl::Status CheckIsSqliteMap(const std::filesystem::path& file);

@@ -169,7 +169,7 @@ TEST_F(PostgresStorageTest, AFullDiskIsSaidAndLosesNothing) {
   EXPECT_THAT(PutPiece(2, &runs),
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("53100")));
   EXPECT_EQ(runs, 1);
-  EXPECT_THAT(Reader()->LastUpload(), IsOkAndHolds(1U));
+  EXPECT_FALSE(Reader()->GetChunk(2, 0).ok());
   STRATA_ASSERT_OK(other_->Execute("DROP TRIGGER fault ON truth_chunk"));
   STRATA_EXPECT_OK(PutPiece(2));
 }
@@ -179,7 +179,7 @@ TEST_F(PostgresStorageTest, AConnectionCutInTheBodyLeavesNothing) {
   EXPECT_THAT(PutPiece(2),
               StatusIs(absl::StatusCode::kUnavailable, Not(HasSubstr("outcome unknown"))));
   STRATA_ASSERT_OK(other_->Execute("DROP TRIGGER fault ON truth_chunk"));
-  EXPECT_THAT(Reader()->LastUpload(), IsOkAndHolds(0U));
+  EXPECT_FALSE(Reader()->GetChunk(2, 0).ok());
   STRATA_EXPECT_OK(PutPiece(2));
 }
 
@@ -250,7 +250,8 @@ TEST_F(PostgresStorageTest, WhoeverOpensAMapAloneKeepsOthersOut) {
   EXPECT_THAT(storage_->CheckInPlace(), refused);
   STRATA_EXPECT_OK(later->writer().Commit(Durability::kFull,
                                           [&] { return later->writer().PutChunk(3, 0, "b"); }));
-  EXPECT_THAT(Reader()->LastUpload(), IsOkAndHolds(3U));
+  EXPECT_THAT(Reader()->GetChunk(3, 0), IsOk());
+  EXPECT_FALSE(Reader()->GetChunk(2, 0).ok());
 }
 
 TEST_F(PostgresStorageTest, TheClockOfADeletedMapIsRemembered) {
@@ -274,7 +275,7 @@ TEST_F(PostgresStorageTest, ADeletedMapLeavesItsNameAndNoRows) {
   STRATA_ASSERT_OK(maps_->Create(name_, MapParameters(), absl::Now(), 30));
   EXPECT_THAT(PutPiece(2), StatusIs(absl::StatusCode::kUnavailable, HasSubstr("removed")));
   storage_ = Opened();
-  EXPECT_THAT(Reader()->LastUpload(), IsOkAndHolds(0U));
+  EXPECT_FALSE(Reader()->GetChunk(1, 0).ok());
   EXPECT_EQ(Reader()->GetClock()->commit_sequence, 30U);
   // All tables with a map are emptied, those too that somebody adds later.
   STRATA_ASSERT_OK(maps_->Delete(name_));

@@ -1,0 +1,152 @@
+// The maps of an engine by name: opened when somebody needs them, or when they have something to do
+// by themselves, and let go when that is over.
+#ifndef STRATA_CORE_ENGINE_DOORS_OPEN_MAPS_H_
+#define STRATA_CORE_ENGINE_DOORS_OPEN_MAPS_H_
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+
+#include "core/common/cache_budget.h"
+#include "core/common/stop.h"
+#include "core/engine/doors/map.h"
+#include "core/engine/map/engine_options.h"
+#include "core/engine/map/map_stores.h"
+#include "core/engine/map/numbers.h"
+
+namespace strata {
+
+// A map that is not open costs its entry, some hundred bytes: no thread, no file, no connection.
+// Whether one is in use is seen by who holds it, so whoever works on a map holds what Find() gave
+// until it has ended: a stream, a watch. Thread-safe.
+class OpenMaps {
+ public:
+  // Those of `stores`, which must outlive it. Looks at them in the background, which this waits for
+  // a little, and opens those that have something to do.
+  static absl::StatusOr<std::unique_ptr<OpenMaps>> Start(const EngineOptions& options,
+                                                         const MapStores& stores);
+  // Closes them. No call may be under way.
+  ~OpenMaps();
+
+  // The map, opened if it is not. NOT_FOUND; RESOURCE_EXHAUSTED where as many are open as may be,
+  // and all have something to do; or why it did not open. Where that was for want of room or of a
+  // disk that answers, it is tried again, once a second at most. `stop` ends the wait for another
+  // who opens or closes it.
+  absl::StatusOr<std::shared_ptr<Map>> Find(const Stop& stop, absl::string_view name);
+  // Has `make` make a map, and opens it. ALREADY_EXISTS; RESOURCE_EXHAUSTED for one more than there
+  // may be.
+  absl::Status Make(const Stop& stop,
+                    const std::string& name,
+                    absl::FunctionRef<absl::Status()> make);
+  // Closes the map and has `remove` remove it, which is told where its clock stood, if known;
+  // nobody finds it meanwhile, and afterwards it is forgotten. NOT_FOUND.
+  absl::Status Remove(const Stop& stop,
+                      absl::string_view name,
+                      absl::FunctionRef<absl::Status(std::uint64_t clock)> remove);
+
+  // By name, without opening any; those that do not open are left out. Waits until each was looked
+  // at once, which `stop` ends.
+  absl::StatusOr<std::vector<MapInfo>> List(const Stop& stop);
+  // Those that are open now.
+  std::vector<std::shared_ptr<Map>> Open() const;
+  // Of open maps, then as last known of others.
+  EngineNumbers Numbers() const;
+  // Those that do not open, but for such as are being made or removed.
+  std::vector<std::string> NotOpened() const;
+
+ private:
+  enum class State : std::uint8_t { kClosed, kOpening, kOpen, kClosing, kMaking, kGoing };
+  struct Entry {
+    State state = State::kClosed;
+    std::shared_ptr<Map> map;  // of kOpen, and of kClosing at first
+    absl::Status why;          // of kClosed: that it did not open the last time
+    absl::Time next_try = absl::InfinitePast();
+    absl::Time used;  // of kOpen: last
+    MapMemory memory;
+    std::optional<std::uint64_t> clock;  // of kClosed, where known
+    std::optional<MapInfo> info;         // as it was last known
+    std::optional<MapNumbers> numbers;
+  };
+  using Entries = std::map<std::string, Entry, std::less<>>;
+  // What a call has to do before it has its map.
+  struct Turn {
+    std::shared_ptr<Map> found;
+    bool open = false;            // the map, whose state is kOpening
+    std::string close;            // another one, or this, whose state is kClosing
+    std::shared_ptr<Map> closed;  // of that
+  };
+
+  OpenMaps(const EngineOptions& options,
+           const MapStores& stores,
+           const std::vector<std::string>& names);
+
+  // Waits while the map is being opened or closed.
+  absl::Status AwaitSettled(const Stop& stop, absl::string_view name) const;
+  absl::StatusOr<Turn> TakeTurn(const std::string& name);
+  void BeginClosing(Entry& entry, const std::string& name, Turn& turn)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Where there is no room, another is closed first.
+  absl::Status BeginOpening(Entry& entry, const std::string& name, Turn& turn)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::StatusOr<std::shared_ptr<Map>> OpenNow(const std::string& name);
+  // Keeps what is known of the map before it is closed.
+  void NoteClosing(const std::string& name, Map& map, bool in_doubt);
+  // Of a map whose state is kClosing.
+  void CloseNow(const std::string& name, std::shared_ptr<Map> map);
+  // Takes the map out, so that nobody finds it any more; its name stays taken. false: it is being
+  // opened or closed, or its clock is not known.
+  absl::StatusOr<bool> Withdraw(const std::string& name,
+                                std::shared_ptr<Map>& map,
+                                std::uint64_t& clock);
+  // The one used longest ago of those that nobody uses and that have nothing to do; empty: none.
+  std::string LeastUsed() const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
+  // Whether nobody uses it, and nobody can but by Find().
+  static bool IsFree(const Entry& entry) {
+    return entry.state == State::kOpen && entry.map.use_count() == 1;
+  }
+
+  bool IsSurveyed() const ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return surveyed_.has_value(); }
+  // The thread that nobody asks: looks at all maps once, then opens and closes.
+  void Loop();
+  absl::Status Survey();
+  void Note(const std::string& name, absl::StatusOr<MapOutline> outline);
+  // Whether there was room.
+  bool OpenWanted(const std::string& name);
+  void OpenAllWanted();
+  // Lets go what is idle, and closes what has to be opened anew.
+  void CloseIdle();
+  // Begins to close the next such one; nullopt: there is none behind `after`.
+  std::optional<std::string> NextIdle(const std::string& after, Turn& turn);
+
+  const EngineOptions options_;
+  const MapStores& stores_;
+  const std::shared_ptr<CacheBudget> caches_;  // of all maps
+  const Stop closing_;
+  mutable absl::Mutex mutex_;
+  Entries entries_ ABSL_GUARDED_BY(mutex_);
+  std::set<std::string> open_ ABSL_GUARDED_BY(mutex_);    // of kOpening, kOpen and kClosing
+  std::set<std::string> wanted_ ABSL_GUARDED_BY(mutex_);  // to be opened without being asked for
+  std::set<std::string> failed_ ABSL_GUARDED_BY(mutex_);  // whose `why` is not OK
+  std::optional<absl::Status> surveyed_ ABSL_GUARDED_BY(mutex_);  // how the last look at all ended
+  bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+  std::thread thread_;
+};
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_DOORS_OPEN_MAPS_H_
