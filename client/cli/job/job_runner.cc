@@ -52,7 +52,7 @@ absl::StatusOr<JobInfo> FollowJob(Context& context, const std::string& map, std:
 
 void PrintJob(const JobInfo& job, Output& output) {
   Json json = ToJson(job);
-  if (output.json() || job.metrics.empty()) {
+  if (!output.text() || job.metrics.empty()) {
     output.Object(json);
     return;
   }

@@ -70,7 +70,7 @@ absl::Status Show(Context& context, const MapOptions& options) {
   Json json = ToJson(info, stats);
   const absl::StatusOr<MapQuality> quality = QualityOf(context.database, context.call, options.map);
   if (quality.ok()) {
-    AddQuality(*quality, context.output.json(), json);
+    AddQuality(*quality, !context.output.text(), json);
   } else {
     context.output.Talk(absl::StrCat("its quality is unknown: ", quality.status().message()));
   }
@@ -139,7 +139,7 @@ void AddCreate(Commands& commands, CLI::App* noun, const std::shared_ptr<MapOpti
                     "strata map create campus --cell-size 0.1",
                     [options](Context& context) { return Create(context, *options); });
   create->parse_complete_callback([&commands] { commands.creates = true; });
-  AddMapName(create, options->map);
+  create->add_option("NAME", options->map, "Name of the map")->required();
   MapParameters& parameters = options->parameters;
   create->add_option("--cell-size", parameters.mls.cell_size_m, "Edge of a cell [m]")
       ->capture_default_str();

@@ -11,6 +11,7 @@
 
 #include "client/cli/posegraph/constraint_residual.h"
 #include "client/cli/posegraph/posegraph_files.h"
+#include "client/cli/terminal/angles.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/world_json.h"
@@ -161,7 +162,8 @@ void AddAddConstraint(Commands& commands,
   app->add_option("--sigma-m", options->sigma_m, "Standard deviation of the place [m]")
       ->check(CLI::Range(1e-6, 1e6))
       ->capture_default_str();
-  app->add_option("--sigma-rad", options->sigma_rad, "Standard deviation of the rotation [rad]")
+  TakesAngle(app->add_option(
+                 "--sigma-rad", options->sigma_rad, "Standard deviation of the rotation [rad]"))
       ->check(CLI::Range(1e-6, 10.0))
       ->capture_default_str();
   app->add_flag("--may-be-false",
