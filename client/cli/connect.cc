@@ -51,8 +51,8 @@ absl::StatusOr<std::unique_ptr<api::Database>> OpenDatabase(const SavedContext& 
   }
   STRATA_ASSIGN_OR_RETURN(const ClientOptions options, ClientOptionsOf(target.server));
   auto database = Connect(options);
-  if (!database.ok()) return Explained(database.status(), target.server);
-  return database;
+  if (database.ok() || target.server.context.empty()) return database;
+  return Annotate(database.status(), absl::StrCat("context ", target.server.context));
 }
 
 absl::Status WithNearestMap(const absl::Status& status, api::Database& database) {

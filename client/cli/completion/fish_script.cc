@@ -73,18 +73,20 @@ function __strata_complete
         end
     end
     if test -n "$option"
-        __strata_value "$(__strata_taken "$path" $option)" $current else if string
-                                   match-- quiet-- '--*=*' $current set -
-                               l parts(string split-- max 1 = --$current) __strata_value
-                               "$(__strata_taken " $path " $parts[1])" $parts[2] |
-                           string replace-- regex '^' --"$parts[1]=" else if string
-                                   match-- quiet-- '-*' $current __strata_rows __strata_options
-                               "$path" test -
-                               n "$path";
-and __strata_rows __strata_options '' else if __strata_rows __strata_below "$path" >
-    / dev / null __strata_rows __strata_below "$path" else set -
-        l arguments(__strata_rows __strata_arguments "$path") if test (count $arguments) - gt 0;
-and test "$arguments[-1]" = ... set - e arguments[-1] test $place - gt(count $arguments); and set place (count $arguments)
+        __strata_value "$(__strata_taken "$path" $option)" $current
+    else if string match --quiet -- '--*=*' $current
+        set -l parts (string split --max 1 = -- $current)
+        __strata_value "$(__strata_taken "$path" $parts[1])" $parts[2] | string replace --regex '^' -- "$parts[1]="
+    else if string match --quiet -- '-*' $current
+        __strata_rows __strata_options "$path"
+        test -n "$path"; and __strata_rows __strata_options ''
+    else if __strata_rows __strata_below "$path" >/dev/null
+        __strata_rows __strata_below "$path"
+    else
+        set -l arguments (__strata_rows __strata_arguments "$path")
+        if test (count $arguments) -gt 0; and test "$arguments[-1]" = ...
+            set -e arguments[-1]
+            test $place -gt (count $arguments); and set place (count $arguments)
         end
         __strata_value "$arguments[$place]" $current
     end

@@ -19,9 +19,10 @@ namespace {
 
 // A line that a shell can show beside a word.
 std::string FirstSentence(const std::string& text) {
-  std::size_t end = std::min({text.find('\n'), text.find("; "), text.find(": "), text.size()});
-  const std::size_t stop = text.find(". ");
-  end = std::min(end, stop);
+  std::size_t end = std::min({text.find('\n'), text.find("; "), text.find(". "), text.size()});
+  const std::size_t colon = text.find(": ");
+  // Not the first of several choices, as in "ply: points; obj: …".
+  if (colon < end && text.find(' ') < colon) end = colon;
   return text.substr(0, end);
 }
 

@@ -31,8 +31,21 @@ _strata_value() {
   done
 }
 
+# What an option of the verb at $where, or else of the program, takes.
+_strata_taken() {
+  local key
+  for key in "$where $1" " $1"; do
+    if (( ${+_strata_values[$key]} )); then
+      taken=$_strata_values[$key]
+      return 0
+    fi
+  done
+  taken=""
+  return 1
+}
+
 _strata() {
-  local program=$words[1] word option="" place=1 map="" where="" i
+  local program=$words[1] taken="" word option="" place=1 map="" where="" i
   local -a target arguments shown
   for ((i = 2; i < CURRENT; i++)); do
     word=${(Q)words[i]}
@@ -43,7 +56,7 @@ _strata() {
       case $word in --server=* | --embedded=* | --context=* | --token-file=* | --tls-*) target+=("$word") ;; esac
     elif [[ $word == -?* ]]; then
       [[ $word == --insecure ]] && target+=("$word")
-      (( ${+_strata_values[$where $word]} || ${+_strata_values[ $word]} )) && option=$word
+      _strata_taken $word && option=$word
     elif [[ $'\n'${_strata_below[$where.]-} == *$'\n'$word:* ]]; then
       where+=${where:+ }$word
     else
@@ -55,7 +68,8 @@ _strata() {
     compset -P '*='
   fi
   if [[ -n $option ]]; then
-    _strata_value "${_strata_values[$where $option]-${_strata_values[ $option]-}}"
+    _strata_taken $option
+    _strata_value "$taken"
   elif [[ $words[CURRENT] == -* ]]; then
     shown=(${(f)_strata_options[$where.]-} ${(f)_strata_options[.]})
     _describe -o option shown
@@ -83,7 +97,7 @@ std::string ZshEntry(const std::string& table,
                      const std::string& key,
                      const std::vector<std::string>& lines) {
   if (lines.empty()) return "";
-  return absl::StrCat(table, "[", Quoted(key), "]=", Quoted(absl::StrJoin(lines, "\n")), "\n");
+  return absl::StrCat(table, "+=(", Quoted(key), " ", Quoted(absl::StrJoin(lines, "\n")), ")\n");
 }
 
 std::string ZshTablesOf(const GrammarCommand& command) {
