@@ -16,7 +16,10 @@ import textwrap
 
 import help_text
 
-LISTS = {"Positionals": "ARGUMENTS", "Options": "OPTIONS", "Subcommands": "COMMANDS"}
+LISTS = {"Positionals": "ARGUMENTS", "Options": "OPTIONS", "Subcommands": "COMMANDS",
+         "Group Positionals": "ARGUMENTS OF WHICH ONE, OR ONE SUCH OPTION, IS REQUIRED",
+         "Group Options": "OPTIONS OF WHICH ONE IS REQUIRED"}
+GROUP = re.compile(r"^\[Option Group: .*\]\n\s*\n  \[Exactly 1 .*\]\n((?:  .*\n)*)", re.MULTILINE)
 
 
 def escaped(text):
@@ -29,8 +32,14 @@ def filled(text):
     return escaped(textwrap.fill(text, 76, break_long_words=False, break_on_hyphens=False))
 
 
+def ungrouped(group):
+    """What CLI11 lists of an option group, as lists of their own."""
+    return re.sub(r"^(\w+:)$", r"Group \1", re.sub(r"^  ", "", group[1], flags=re.MULTILINE), flags=re.MULTILINE)
+
+
 def sections(text):
     """(what it is, its usage, [(heading, lines)], the rest) of a help text."""
+    text = GROUP.sub(ungrouped, text)
     about, _, rest = text.partition("Usage: ")
     usage, _, rest = rest.partition("\n")
     listed = []
@@ -67,18 +76,18 @@ def item(heading, name, said):
     return f".TP\n\\fB{escaped(words[0])}\\fR{rest}\n{filled(said) or '.br'}\n"
 
 
-def verbatim(lines):
-    """Paragraphs of a footer: those with columns or examples stay as they are."""
-    page = ""
+def footer_of(lines):
+    """(notes, examples) of a footer: what has columns stays as it is written."""
+    notes = examples = ""
     for paragraph in re.split(r"\n\n+", "\n".join(lines).strip()):
         head, _, rest = paragraph.partition("\n")
         if head == "Example:":
-            page += ".SH EXAMPLES\n.nf\n" + escaped("\n".join(line.strip() for line in rest.splitlines())) + "\n.fi\n"
-        elif "\n" in paragraph:
-            page += ".PP\n" + escaped(head) + "\n.PP\n.nf\n" + escaped(rest) + "\n.fi\n" if rest else ".PP\n" + escaped(head) + "\n"
-        elif paragraph:
-            page += ".PP\n" + filled(paragraph) + "\n"
-    return page
+            examples = ".SH EXAMPLES\n.nf\n" + escaped("\n".join(line.strip() for line in rest.splitlines())) + "\n.fi\n"
+        elif rest:
+            notes += f".PP\n{filled(head)}\n.PP\n.nf\n{escaped(rest)}\n.fi\n"
+        elif head:
+            notes += f".PP\n{filled(head)}\n"
+    return notes, examples
 
 
 def first_sentence(text):
@@ -105,12 +114,10 @@ def page_of(name, words, text, all_words, options):
     lists = [(heading, items(lines)) for heading, lines in listed if lines]
     for heading, found in lists:
         page += f'.SH "{escaped(LISTS.get(heading, heading.upper()))}"\n' + "".join(item(heading, *each) for each in found)
-    rest = verbatim(footer)
-    notes, examples, example = rest.partition(".SH EXAMPLES\n")
+    notes, examples = footer_of(footer)
     if notes:
         page += ".SH NOTES\n" + notes.removeprefix(".PP\n")
-    page += examples + example
-    return page + see_also(name, words, all_words, options.section)
+    return page + examples + see_also(name, words, all_words, options.section)
 
 
 def main():

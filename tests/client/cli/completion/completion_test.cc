@@ -48,7 +48,7 @@ Words Listed(const std::string& help, const std::string& heading) {
 // All options that a help text shows, whatever they stand below.
 std::set<std::string> OptionsOf(const std::string& help) {
   std::set<std::string> options;
-  static const std::regex kOption("\n  (-[^ ]+)");
+  static const std::regex kOption("\n  +(-[^ ]+)");
   for (std::sregex_iterator at(help.begin(), help.end(), kOption), end; at != end; ++at) {
     std::istringstream names((*at)[1]);
     for (std::string name; std::getline(names, name, ',');) options.insert(name);
@@ -194,7 +194,7 @@ TEST_F(CompletionTest, ZshOffersTheSame) {
   // What the script tells the completion system of zsh, which is on terminals only.
   const std::string system =
       "compdef() { :; }\n"
-      "compadd() { shift; print -rl -- $@; }\n"
+      "compadd() { shift; (( $# )) && print -rl -- $@; }\n"
       "_files() { print files $*; }\n"
       "_describe() { local name=$argv[-1]; print -rl -- ${(P)name}; }\n"
       "compset() { words[CURRENT]=${words[CURRENT]#*=}; }\n"
@@ -220,7 +220,7 @@ TEST_F(CompletionTest, FishOffersTheSame) {
   RunOk({"map", "create", "campus"});
   const auto offered = [&](const std::string& line) {
     return RunShell("fish -N",
-                    "function strata; end\nsource " + script + "\ncomplete -C '" + line + "'");
+                    "source " + script + "\ncomplete -C '" + line + "'");
   };
   setenv("PATH",
          (std::filesystem::path(testing::StrataProgram()).parent_path().string() + ":" +

@@ -47,8 +47,8 @@ TEST(FilledTest, WordsStayWholeAndGoOnBelowTheIndent) {
 }
 
 TEST(FilledTest, HelpGoesOnBelowItsLastColumn) {
-  EXPECT_EQ(FilledHelp("  --a FLOAT   Edge of a cell\n\nEnd", 22),
-            "  --a FLOAT   Edge of a\n              cell\n\nEnd");
+  EXPECT_EQ(FilledHelp("  --a FLOAT   Edge of a cell of the map\n\nEnd", 32),
+            "  --a FLOAT   Edge of a cell of\n              the map\n\nEnd");
   EXPECT_EQ(FilledHelp("  --a FLOAT   Edge", 0), "  --a FLOAT   Edge");
 }
 
