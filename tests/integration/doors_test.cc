@@ -94,7 +94,7 @@ TEST_F(DoorsTest, AContextHoldsServerAuthorityAndToken) {
   EXPECT_EQ(elsewhere.exit_code, 1);
   EXPECT_THAT(elsewhere.err, HasSubstr("--token-file"));
   EXPECT_THAT(elsewhere.err, Not(HasSubstr("context ada")));
-  std::ofstream(Path("guest")) << "of nobody\n";
+  std::ofstream(Path("guest")) << "ofnobody\n";
   EXPECT_THAT(RunStrata({"map", "list", "--context", "guest"}).err, HasSubstr("of context guest"));
   unsetenv("XDG_CONFIG_HOME");
 }

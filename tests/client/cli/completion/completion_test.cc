@@ -201,7 +201,8 @@ TEST_F(CompletionTest, ZshOffersTheSame) {
       "source " +
       script + "\n";
   const auto offered = [&](const std::string& words) {
-    return RunShell("zsh -f", system + "words=($PROGRAM " + words + "); CURRENT=$#words; _strata");
+    return RunShell("zsh -f",
+                    system + "words=($PROGRAM " + words + "); CURRENT=$#words; _strata; true");
   };
   EXPECT_EQ(offered("map ver"), offered("map ''"));  // zsh itself chooses
   EXPECT_THAT(offered("map ''"), ::testing::HasSubstr("create:Create a map\n"));
@@ -219,8 +220,7 @@ TEST_F(CompletionTest, FishOffersTheSame) {
   RunShell("fish -n", Contents(script));
   RunOk({"map", "create", "campus"});
   const auto offered = [&](const std::string& line) {
-    return RunShell("fish -N",
-                    "source " + script + "\ncomplete -C '" + line + "'");
+    return RunShell("fish -N", "source " + script + "\ncomplete -C '" + line + "'");
   };
   setenv("PATH",
          (std::filesystem::path(testing::StrataProgram()).parent_path().string() + ":" +
