@@ -8,8 +8,6 @@ comments of proto/strata/v1.
 Needs protoc and python3-protobuf. A program that is not built (strata-ros2, where there is no cyclonedds-dev) is left out.
 """
 import argparse
-import concurrent.futures
-import os
 import pathlib
 import re
 import subprocess
@@ -18,6 +16,8 @@ import tempfile
 import textwrap
 
 from google.protobuf import descriptor_pb2
+
+import help_text
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -32,25 +32,6 @@ MADE = "<!-- Made by docs/reference/make.py; do not edit. -->\n"
 
 
 # Commands
-
-def help_of(program, words):
-    clean = {key: value for key, value in os.environ.items() if not key.startswith(("STRATA_", "ROS_"))}
-    return subprocess.run([program, *words, "--help"], env=clean, text=True, check=True, timeout=60,
-                          stdout=subprocess.PIPE).stdout
-
-
-def subcommands(text):
-    listed = re.search(r"^Subcommands:\n((?:  .*\n)*)", text, re.MULTILINE)
-    return re.findall(r"^  (\S+)", listed.group(1), re.MULTILINE) if listed else []
-
-
-def walk(program, words=()):
-    """[(words, help)] of a program and all that is below it, as it lists them."""
-    text = help_of(program, words)
-    with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        below = list(pool.map(lambda word: walk(program, (*words, word)), subcommands(text)))
-    return [(words, text), *(entry for entries in below for entry in entries)]
-
 
 def wrapped(line):
     """A line of --help no wider than the page, its rest below its own last column."""
@@ -72,7 +53,7 @@ def command_section(name, words, text):
 
 
 def command_page(name, program, above):
-    sections = [command_section(name, words, text) for words, text in walk(str(program))]
+    sections = [command_section(name, words, text) for words, text in help_text.walk(str(program))]
     title, rest = sections[0].split("\n", 1)
     return f"{title}\n\n{MADE}\n{above}\n{rest}\n" + "\n".join(sections[1:])
 

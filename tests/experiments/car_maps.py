@@ -83,7 +83,7 @@ class Car:
     def make(self, name, log, priors):
         """A map of the scans at the poses that egomotion gives; what import said."""
         run = self.maps.work / f"{name}.csv"
-        self.maps.run("egomotion", self.drive / log, "-o", run, "--rig", self.drive / "rig.yaml", "--smooth")
+        self.maps.run("egomotion", self.drive / log, "--out", run, "--rig", self.drive / "rig.yaml", "--smooth")
         if not priors:  # without an origin on earth poses are not known by themselves
             run.write_text("".join(line for line in open(run, encoding="utf-8") if not line.startswith("# origin")))
         return self.maps.make(name, self.drive / "scans", *self.placed(name))

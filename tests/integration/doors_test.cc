@@ -1,5 +1,6 @@
 // A stratad with TLS and tokens, and `strata` as its user has it.
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -69,6 +70,34 @@ class DoorsTest : public ::testing::Test {
   TempDir dir_;
   const TestAuthority authority_{dir_.path(), "authority"};
 };
+
+TEST_F(DoorsTest, AContextHoldsServerAuthorityAndToken) {
+  Give("ada", {"--right", "admin", "--all-maps"});
+  Give("guest", {"--right", "read", "--map", "harbour"});
+  StratadProcess stratad(ServeOptions());
+  setenv("XDG_CONFIG_HOME", Path("config").c_str(), 1);
+  for (const char* who : {"ada", "guest"}) {
+    const Ran added = Strata(stratad, who, {"context", "add", who});
+    EXPECT_EQ(added.exit_code, 0) << added.err;
+  }
+  EXPECT_EQ(RunStrata({"context", "use", "ada"}).exit_code, 0);
+  EXPECT_EQ(RunStrata({"map", "create", "campus"}).exit_code, 0);
+  EXPECT_EQ(RunStrata({"map", "create", "harbour"}).exit_code, 0);
+  EXPECT_EQ(RunStrata({"complete", "maps"}).out, "campus\nharbour\n");
+  EXPECT_EQ(RunStrata({"complete", "profiles", "campus"}).out, "default\n");
+  // The guest sees one map, and is named with its context where it may not do something.
+  EXPECT_EQ(RunStrata({"complete", "maps", "--context", "guest"}).out, "harbour\n");
+  EXPECT_EQ(RunStrata({"map", "delete", "harbour", "--context", "guest"}).exit_code, 1);
+  // The current context has the token of its own server only: elsewhere nothing is shown.
+  const Ran elsewhere =
+      RunStrata({"map", "list", "--server", stratad.Address(), "--tls-ca", Path("authority.pem")});
+  EXPECT_EQ(elsewhere.exit_code, 1);
+  EXPECT_THAT(elsewhere.err, HasSubstr("--token-file"));
+  EXPECT_THAT(elsewhere.err, Not(HasSubstr("context ada")));
+  std::ofstream(Path("guest")) << "ofnobody\n";
+  EXPECT_THAT(RunStrata({"map", "list", "--context", "guest"}).err, HasSubstr("of context guest"));
+  unsetenv("XDG_CONFIG_HOME");
+}
 
 TEST_F(DoorsTest, TheCommandLineComesInWithATokenAndDoesWhatItMay) {
   Give("ada", {"--right", "admin", "--all-maps"});

@@ -24,7 +24,20 @@ PYTHONPATH=$root/usr/lib/python3/dist-packages /usr/bin/python3 -c 'import strat
 "$root/usr/bin/strata-ros2" --version >/dev/null
 depends=$(dpkg-deb --field "$work"/packages/strata-ros2_*.deb Depends)
 [[ $depends == *libddsc* && $depends != *libceres* ]] || { echo "packages: strata-ros2 depends on $depends" >&2; exit 1; }
-for file in lib/systemd/system/stratad.service usr/share/doc/stratad/README.md usr/include/strata/core/api/database.h; do
+# What shells want: pages that man shows without a complaint, scripts where they look for them that complete a word.
+for page in man1/strata.1 man1/strata-map-create.1 man1/strata-plan.1 man1/strata-ros2.1 man8/stratad.8 man8/stratad-token-add.8; do
+  [[ -s $root/usr/share/man/$page.gz ]] || { echo "packages: no page $page" >&2; exit 1; }
+done
+if command -v mandoc >/dev/null; then
+  for page in "$root"/usr/share/man/man?/strata*; do
+    faults=$(zcat "$page" | mandoc -Tlint -W warning 2>&1) || { echo "packages: ${page##*/}: $faults" >&2; exit 1; }
+  done
+fi
+completed=$(PATH=$root/usr/bin:$PATH bash -c "source $root/usr/share/bash-completion/completions/strata
+  COMP_LINE='strata --embedded $work/maps map show y'
+  COMP_POINT=\${#COMP_LINE}; _strata; echo \"\${COMPREPLY[*]}\"")
+[[ $completed == yard ]] || { echo "packages: bash completes '$completed', not yard" >&2; exit 1; }
+for file in usr/share/zsh/vendor-completions/_strata usr/share/fish/vendor_completions.d/strata.fish lib/systemd/system/stratad.service usr/share/doc/stratad/README.md usr/include/strata/core/api/database.h; do
   [[ -s $root/$file ]] || { echo "packages: no $file" >&2; exit 1; }
 done
 echo "packages: $(cd "$work/packages" && ls ./*.deb | wc -l), unpacked and run"

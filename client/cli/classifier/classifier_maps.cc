@@ -16,6 +16,7 @@
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/confirm.h"
 #include "client/cli/terminal/json.h"
+#include "client/cli/terminal/names.h"
 #include "client/formats/file_bytes.h"
 #include "core/classification/classifier.h"
 #include "core/classification/evaluation.h"
@@ -157,7 +158,8 @@ void AddClassifierMapVerbs(Commands& commands, CLI::App* noun) {
   auto options = std::make_shared<ClassifierVerb>();
   const auto verb = MapVerbs(commands, noun, options);
   const auto with_name = [&](CLI::App* app) {
-    app->add_option("MODEL", options->name, "Name of the classifier")->required();
+    TakesName(app->add_option("MODEL", options->name, "Name of the classifier")->required(),
+              kClassifierNames);
     return app;
   };
   verb("list", "The classifiers of a map", "strata classifier list campus", List);

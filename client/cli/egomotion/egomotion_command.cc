@@ -81,10 +81,10 @@ void AddEgomotionCommand(Commands& commands) {
       "information filter. LOGDIR holds imu.csv (stamp,wx,wy,wz,ax,ay,az), gps.csv "
       "(stamp,lat,lon,alt,var_e,var_n,var_u) and odom.csv (stamp,vx,wz), or a log of another "
       "layout that is known",
-      "strata egomotion drives/monday -o monday.csv --rig car.yaml --report monday.json",
+      "strata egomotion drives/monday --out monday.csv --rig car.yaml --report monday.json",
       [options](FileContext& context) { return Run(context, *options); });
   app->add_option("LOGDIR", options->log, "The folder of the log")->required();
-  app->add_option("-o,--out",
+  app->add_option("--out",
                   options->out,
                   "The CSV to write: time, pose, covariance of [rotation, translation]")
       ->type_name("FILE.csv")

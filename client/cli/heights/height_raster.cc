@@ -114,7 +114,7 @@ absl::Status WriteHeights(Context& context,
   Json report = {{"format", file.format}};
   STRATA_ASSIGN_OR_RETURN(report["files"], WriteRaster(raster, file));
   report.update(ReportOf(raster, file.surface));
-  if (raster.projection.has_value() && context.output.json()) {
+  if (raster.projection.has_value() && !context.output.text()) {
     report["projection"] = raster.projection->Wkt();
   }
   context.output.Object(report);

@@ -11,6 +11,7 @@
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
+#include "client/cli/terminal/names.h"
 #include "core/common/status.h"
 #include "core/world/job_kinds.h"
 
@@ -92,7 +93,9 @@ absl::Status Revert(Context& context, const JobOptions& options) {
 }
 
 void AddStart(CLI::App* start, JobOptions& options) {
-  start->add_option("KIND", options.kind, JobKindNames())->required();
+  std::vector<std::string> kinds;
+  for (const JobKind& kind : JobKinds()) kinds.emplace_back(kind.name);
+  TakesWord(start->add_option("KIND", options.kind, JobKindNames())->required(), kinds);
   AddJobParameters(start, options.parameters);
   start->add_flag(
       "--dry-run", options.dry_run, "optimize: only propose; see job accept and revert");
@@ -115,7 +118,10 @@ void AddJobCommands(Commands& commands) {
            *options);
   verb("list", "All jobs of a map", "strata job list campus", List);
   const auto with_id = [&](CLI::App* app) {
-    app->add_option("ID", options->id, "Number of the job")->check(CLI::PositiveNumber)->required();
+    TakesName(app->add_option("ID", options->id, "Number of the job")
+                  ->check(CLI::PositiveNumber)
+                  ->required(),
+              kJobNames);
   };
   with_id(verb("show", "One job", "strata job show campus 3", Show));
   with_id(verb("watch",

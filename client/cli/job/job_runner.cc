@@ -1,5 +1,6 @@
 #include "client/cli/job/job_runner.h"
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -13,6 +14,7 @@
 #include "client/cli/terminal/json.h"
 #include "client/cli/terminal/patience.h"
 #include "client/cli/terminal/progress.h"
+#include "client/cli/terminal/values.h"
 #include "core/common/status.h"
 
 namespace strata::cli {
@@ -52,16 +54,31 @@ absl::StatusOr<JobInfo> FollowJob(Context& context, const std::string& map, std:
 
 void PrintJob(const JobInfo& job, Output& output) {
   Json json = ToJson(job);
-  if (output.json() || job.metrics.empty()) {
+  if (!output.text() || job.metrics.empty()) {
     output.Object(json);
     return;
   }
-  const Json metrics = json["metrics"];
+  const Json metrics = Shortest(json["metrics"]);
   json.erase("metrics");
   output.Object(json);
   output.Text("");
   output.Object(metrics);
 }
+
+namespace {
+
+// What came of a job that somebody waited for: its sentences, not all its numbers.
+void PrintEnded(const std::string& map, const JobInfo& job, Output& output) {
+  constexpr std::size_t kFewMetrics = 8;
+  if (!output.text() || job.metrics.size() <= kFewMetrics) return PrintJob(job, output);
+  JobInfo brief = job;
+  brief.metrics.clear();
+  Json json = ToJson(brief);
+  json["metrics"] = absl::StrCat(job.metrics.size(), " numbers; see job show ", map, " ", job.id);
+  output.Object(json);
+}
+
+}  // namespace
 
 absl::Status StatusOf(const JobInfo& job) {
   if (job.state == JobState::kSucceeded || job.state == JobState::kProposed) {
@@ -113,7 +130,7 @@ absl::Status RunJob(Context& context,
   STRATA_ASSIGN_OR_RETURN(JobInfo started,
                           context.database.jobs().Start(context.call, map, kind, parameters));
   STRATA_ASSIGN_OR_RETURN(JobInfo job, FollowJob(context, map, started.id));
-  PrintJob(job, context.output);
+  PrintEnded(map, job, context.output);
   return StatusOf(job);
 }
 

@@ -14,6 +14,7 @@
 #include "client/cli/plan/driver_options.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/json.h"
+#include "client/cli/terminal/names.h"
 #include "client/formats/file_bytes.h"
 #include "core/common/status.h"
 
@@ -63,10 +64,11 @@ absl::StatusOr<Json> WriteFloor(const FloorPlan& plan,
 }  // namespace
 
 void AddFloorOptions(CLI::App* verb, FloorOptions& options, bool with_number) {
-  verb->add_option("--profile",
-                   options.profile,
-                   "The map's robot profile whose floors, or whose ground, they are")
-      ->capture_default_str();
+  TakesName(verb->add_option("--profile",
+                             options.profile,
+                             "The map's robot profile whose floors, or whose ground, they are")
+                ->capture_default_str(),
+            kProfileNames);
   if (with_number) {
     verb->add_option("--floor", options.floor, "The floor of this number, as map floors has it")
         ->check(CLI::Range(0, std::numeric_limits<int>::max()));

@@ -1,14 +1,19 @@
 // strata map create|list|show|delete|verify|rebuild|history|revert; backup, classes, diff, export,
 // floors, georeference, merge, places, render and watch have files of their own.
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/time/time.h"
 
 #include "client/cli/job/job_runner.h"
 #include "client/cli/map/map_files.h"
@@ -21,10 +26,14 @@
 #include "client/cli/terminal/on_earth.h"
 #include "client/cli/terminal/world_json.h"
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
+#include "core/common/stop.h"
 #include "core/world/job_kinds.h"
 
 namespace strata::cli {
 namespace {
+
+constexpr absl::Duration kCounting = absl::Seconds(5);  // what is in all maps of a list
 
 struct MapOptions {
   std::string map;
@@ -46,18 +55,52 @@ absl::Status Create(Context& context, MapOptions options) {
   return absl::OkStatus();
 }
 
+// As people say it: three digits and a decimal unit.
+std::string SizeText(std::uint64_t bytes) {
+  double size = static_cast<double>(bytes);
+  constexpr std::array<const char*, 5> kUnits = {"B", "kB", "MB", "GB", "TB"};
+  std::size_t unit = 0;
+  while (size >= 999.5 && unit + 1 < kUnits.size()) {
+    size /= 1000.0;
+    ++unit;
+  }
+  const int decimals = unit == 0 || size >= 99.95 ? 0 : 1;
+  return absl::StrFormat("%.*f %s", decimals, size, kUnits[unit]);
+}
+
+// How much of a map there is; unknown where it is damaged, not to be read by who asks, or has more
+// to do before it can be counted than there is time until `until`.
+void AddCounts(Context& context, const std::string& map, absl::Time until, Json& row) {
+  for (const char* key : {"scans", "points", "bytes", "epoch"}) row[key] = Json();
+  if (context.call.stop.requested()) return;
+  api::Call call = context.call;
+  call.stop = Stop(until);
+  const absl::StatusOr<MapStats> stats = context.database.maps().Stats(call, map);
+  if (!stats.ok()) return;
+  row["scans"] = stats->scans;
+  row["points"] = stats->points;
+  row["bytes"] = stats->point_bytes + stats->tile_bytes;
+  row["epoch"] = stats->epoch;
+  if (context.output.text()) row["size"] = SizeText(stats->point_bytes + stats->tile_bytes);
+}
+
 absl::Status List(Context& context) {
   STRATA_ASSIGN_OR_RETURN(const std::vector<MapInfo> maps,
                           context.database.maps().List(context.call));
+  const absl::Time until = SteadyNow() + kCounting;
   Json rows = Json::array();
   for (const MapInfo& map : maps) {
-    rows.push_back(ToJson(map));
+    Json row = ToJson(map);
+    AddCounts(context, map.name, until, row);
+    rows.push_back(std::move(row));
   }
   context.output.List(rows,
                       {{"name", "NAME"},
+                       {"scans", "SCANS"},
+                       {"points", "POINTS"},
+                       {context.output.text() ? "size" : "bytes", "SIZE"},
+                       {"epoch", "EPOCH"},
                        {"cell_size_m", "CELL SIZE"},
-                       {"gap_size_m", "GAP SIZE"},
-                       {"thickness_m", "THICKNESS"},
                        {"created", "CREATED"}});
   return absl::OkStatus();
 }
@@ -70,7 +113,7 @@ absl::Status Show(Context& context, const MapOptions& options) {
   Json json = ToJson(info, stats);
   const absl::StatusOr<MapQuality> quality = QualityOf(context.database, context.call, options.map);
   if (quality.ok()) {
-    AddQuality(*quality, context.output.json(), json);
+    AddQuality(*quality, !context.output.text(), json);
   } else {
     context.output.Talk(absl::StrCat("its quality is unknown: ", quality.status().message()));
   }
@@ -139,7 +182,7 @@ void AddCreate(Commands& commands, CLI::App* noun, const std::shared_ptr<MapOpti
                     "strata map create campus --cell-size 0.1",
                     [options](Context& context) { return Create(context, *options); });
   create->parse_complete_callback([&commands] { commands.creates = true; });
-  AddMapName(create, options->map);
+  create->add_option("NAME", options->map, "Name of the map")->required();
   MapParameters& parameters = options->parameters;
   create->add_option("--cell-size", parameters.mls.cell_size_m, "Edge of a cell [m]")
       ->capture_default_str();

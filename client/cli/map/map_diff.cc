@@ -21,6 +21,7 @@
 #include "client/cli/picture/map_picture.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
+#include "client/cli/terminal/names.h"
 #include "client/formats/file_bytes.h"
 #include "client/formats/geometry_writer.h"
 #include "core/codec/surface_tile_codec.h"
@@ -367,8 +368,8 @@ absl::Status Diff(Context& context, const DiffOptions& options) {
   }
   context.output.Object(json);
   constexpr std::size_t kWorst = 10;
-  if (rows.size() > kWorst) rows.erase(rows.begin() + kWorst, rows.end());
-  if (rows.empty()) return absl::OkStatus();
+  if (rows.size() > kWorst && context.output.text()) rows.erase(rows.begin() + kWorst, rows.end());
+  if (rows.empty() && context.output.text()) return absl::OkStatus();
   context.output.Text("");
   context.output.List(rows,
                       {{"key", "TILE"},
@@ -392,10 +393,12 @@ void AddMapDiff(Commands& commands, CLI::App* noun) {
       "strata map diff campus@3 campus --out diff.png",
       [options](Context& context) { return Diff(context, *options); });
   const auto add = [&](const char* name, State& state, const char* description) {
-    diff->add_option_function<std::string>(
-            name, [&state](const std::string& text) { state = ParseState(text); }, description)
-        ->type_name("MAP[@EPOCH]")
-        ->required();
+    TakesName(
+        diff->add_option_function<std::string>(
+                name, [&state](const std::string& text) { state = ParseState(text); }, description)
+            ->type_name("MAP[@EPOCH]")
+            ->required(),
+        kMapNames);
   };
   add("EARLIER", options->earlier, "A map, or one of its epochs; see map history");
   add("LATER", options->later, "What it is compared with");

@@ -58,7 +58,7 @@ absl::Status Floors(Context& context, const FloorsOptions& options) {
                            {"commit_sequence", plan.commit_sequence}});
     return absl::OkStatus();
   }
-  if (plan.floors.empty()) {
+  if (plan.floors.empty() && context.output.text()) {
     context.output.Text("no floor: this robot can stand nowhere on 10 m² or more");
     return absl::OkStatus();
   }

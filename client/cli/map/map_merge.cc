@@ -23,6 +23,7 @@
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
+#include "client/cli/terminal/names.h"
 #include "client/cli/terminal/progress.h"
 #include "core/common/status.h"
 
@@ -356,14 +357,16 @@ void AddMapMerge(Commands& commands, CLI::App* noun) {
       "strata map merge all campus forest.strata",
       [options](Context& context) { return Merge(context, *options); });
   AddMapName(merge, options->map);
-  merge
-      ->add_option("SOURCE",
-                   options->sources,
-                   "Maps, and files of maps that nobody has open (with a / or ending in .strata), "
-                   "as map backup writes them; of equal parameters")
-      ->type_name("MAP|FILE.strata")
-      ->expected(1, 1000)
-      ->required();
+  TakesName(merge
+                ->add_option(
+                    "SOURCE",
+                    options->sources,
+                    "Maps, and files of maps that nobody has open (with a / or ending in .strata), "
+                    "as map backup writes them; of equal parameters")
+                ->type_name("MAP|FILE.strata")
+                ->expected(1, 1000)
+                ->required(),
+            kMapNames);
   merge->add_flag("--rename-clashes",
                   options->rename_clashes,
                   "A trajectory whose name another map has already gets its own map's in front");

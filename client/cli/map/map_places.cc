@@ -86,7 +86,7 @@ absl::Status Places(Context& context, const PlacesOptions& options) {
                            {"commit_sequence", found.commit_sequence}});
     return absl::OkStatus();
   }
-  if (found.places.empty()) {
+  if (found.places.empty() && context.output.text()) {
     context.output.Text("no place: this robot can stand nowhere on 10 m² or more");
     return absl::OkStatus();
   }
@@ -97,7 +97,9 @@ absl::Status Places(Context& context, const PlacesOptions& options) {
                        {"low", "LOW"},
                        {"high", "HIGH"},
                        {"neighbours", "NEIGHBOURS"}});
-  context.output.Text(absl::StrFormat("of floor %d", *found.floor));
+  if (found.floor.has_value()) {
+    context.output.Text(absl::StrFormat("of floor %d", *found.floor));
+  }
   return absl::OkStatus();
 }
 

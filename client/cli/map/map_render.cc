@@ -24,6 +24,7 @@
 #include "client/cli/objects/fetched_inferred.h"
 #include "client/cli/picture/map_picture.h"
 #include "client/cli/posegraph/graph_overlay.h"
+#include "client/cli/terminal/angles.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
@@ -192,9 +193,11 @@ void AddViewOptions(CLI::App* render, const std::shared_ptr<RenderOptions>& opti
   render->add_option("--view", options->view, "top, or oblique from above and aside")
       ->check(CLI::IsMember({"top", "oblique"}))
       ->capture_default_str();
-  render->add_option("--azimuth", options->azimuth_rad, "Where an oblique view looks from [rad]")
+  TakesAngle(render->add_option(
+                 "--azimuth", options->azimuth_rad, "Where an oblique view looks from [rad]"))
       ->capture_default_str();
-  render->add_option("--elevation", options->elevation_rad, "Its angle above the ground [rad]")
+  TakesAngle(
+      render->add_option("--elevation", options->elevation_rad, "Its angle above the ground [rad]"))
       ->check(CLI::Range(0.05, 1.57))
       ->capture_default_str();
   render

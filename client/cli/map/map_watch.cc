@@ -38,7 +38,7 @@ std::string TextOf(const api::TileChangeNotice& tile) {
 }
 
 void Print(const api::MapUpdate& update, Output& output) {
-  if (output.json()) {
+  if (!output.text()) {
     output.JsonLine(ToJson(update));
     return;
   }

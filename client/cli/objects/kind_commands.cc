@@ -12,6 +12,7 @@
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/confirm.h"
 #include "client/cli/terminal/json.h"
+#include "client/cli/terminal/names.h"
 #include "core/common/status.h"
 #include "core/world/map_class.h"
 #include "core/world/things/kind.h"
@@ -117,7 +118,9 @@ absl::Status DeleteKind(Context& context, const KindOptionsOfVerb& options) {
 }
 
 void AddKindArgument(CLI::App* verb, KindOptionsOfVerb& options) {
-  verb->add_option("KIND", options.kind, "Its name, or the first digits of its id")->required();
+  TakesName(
+      verb->add_option("KIND", options.kind, "Its name, or the first digits of its id")->required(),
+      kKindNames);
 }
 
 template <typename MapVerb>

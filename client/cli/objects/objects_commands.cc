@@ -18,6 +18,7 @@
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
+#include "client/cli/terminal/names.h"
 #include "client/cli/terminal/on_earth.h"
 #include "core/common/status.h"
 #include "core/world/job_kinds.h"
@@ -152,8 +153,9 @@ absl::Status ExportObjects(Context& context, const ObjectsOptions& options) {
 
 void AddChoice(CLI::App* verb, ObjectsOptions& options) {
   verb->add_option("--class", options.class_name, "Only this class, by name or number");
-  verb->add_option(
-      "--kind", options.kind, "Only those of this kind, by name or first digits of id");
+  TakesName(verb->add_option(
+                "--kind", options.kind, "Only those of this kind, by name or first digits of id"),
+            kKindNames);
   AddRegion(verb, options.region);
 }
 

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 
+#include "client/cli/terminal/names.h"
 #include "core/common/status.h"
 #include "core/world/map_class.h"
 
@@ -21,8 +22,9 @@ PlanEndpoint EndpointOf(const std::vector<double>& numbers) {
 }
 
 void AddDriverOptions(CLI::App* verb, DriverOptions& options) {
-  verb->add_option("--profile", options.profile, "The map's robot profile to start from")
-      ->capture_default_str();
+  TakesName(verb->add_option("--profile", options.profile, "The map's robot profile to start from")
+                ->capture_default_str(),
+            kProfileNames);
   AddProfileOptions(verb, options.overrides);
   verb->add_option("--avoid",
                    options.avoid,

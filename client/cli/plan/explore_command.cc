@@ -35,7 +35,7 @@ void PrintText(const ExploreResult& result, Output& output) {
     output.Text(
         absl::StrFormat("nearest place to stand: %.2f,%.2f,%.2f (--from)", p.x(), p.y(), p.z()));
   }
-  if (result.views.empty()) return;
+  if (result.views.empty() && output.text()) return;
   Json rows = Json::array();
   for (const ExploreView& view : result.views) {
     rows.push_back(

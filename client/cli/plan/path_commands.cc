@@ -42,9 +42,9 @@ absl::Status Check(Context& context, const PathOptions& options) {
   STRATA_ASSIGN_OR_RETURN(
       const ShapeCheck shape,
       CheckShape(context, options.map, options.shape, query.profile, query.waypoints));
-  if (context.output.json()) json["shape"] = ToJson(shape);
+  if (!context.output.text()) json["shape"] = ToJson(shape);
   context.output.Object(json);
-  if (!context.output.json()) PrintText(shape, context.output);
+  if (context.output.text()) PrintText(shape, context.output);
   return absl::OkStatus();
 }
 
@@ -58,10 +58,10 @@ absl::Status Watch(Context& context, const PathOptions& options) {
 absl::Status FollowPath(Context& context, const std::string& map, const PathQuery& query) {
   const absl::Status ended = context.database.planning().WatchPath(
       context.call, map, query, [&context](const PathCheck& check) {
-        if (context.output.json()) {
-          context.output.JsonLine(ToJson(check));
+        if (context.output.text()) {
+          context.output.Verdict(check.message, check.valid);
         } else {
-          context.output.Text(check.message);
+          context.output.JsonLine(ToJson(check));
         }
         return absl::OkStatus();
       });

@@ -67,17 +67,17 @@ std::string LineOf(const Eigen::Vector3d& p, const std::optional<LocalFrame>& ea
 
 void PrintText(const PlanResult& plan, const std::optional<LocalFrame>& earth, Output& output) {
   if (!plan.found()) {
-    output.Text(absl::StrCat("no path: ",
-                             plan.message.empty() ? absl::string_view(strata::ToString(plan.reason))
-                                                  : absl::string_view(plan.message)));
+    const absl::string_view reason = strata::ToString(plan.reason);
+    output.Verdict(absl::StrCat("no path: ", plan.message.empty() ? reason : plan.message), false);
     return;
   }
-  output.Text(absl::StrFormat("path of %.2f m, cost %.2f, %d waypoints (%.1f ms, %d expanded)",
-                              plan.length_m,
-                              plan.cost,
-                              plan.waypoints.size(),
-                              plan.elapsed_ms,
-                              plan.expanded));
+  output.Verdict(absl::StrFormat("path of %.2f m, cost %.2f, %d waypoints (%.1f ms, %d expanded)",
+                                 plan.length_m,
+                                 plan.cost,
+                                 plan.waypoints.size(),
+                                 plan.elapsed_ms,
+                                 plan.expanded),
+                 true);
   const std::size_t shown = std::min(kMostShown, plan.waypoints.size());
   for (std::size_t i = 0; i < shown; ++i) {
     output.Text(LineOf(plan.waypoints[i], earth));
@@ -92,6 +92,15 @@ void PrintText(const PlanResult& plan, const std::optional<LocalFrame>& earth, O
                                 gap.from.y(),
                                 gap.from.z()));
   }
+}
+
+void ListWaypoints(const PlanResult& plan, Output& output) {
+  if (!plan.found()) output.Talk(absl::StrCat("no path: ", plan.message));
+  Json rows = Json::array();
+  for (const Eigen::Vector3d& p : plan.waypoints) {
+    rows.push_back({{"x", p.x()}, {"y", p.y()}, {"z", p.z()}});
+  }
+  output.List(rows, {{"x", "X"}, {"y", "Y"}, {"z", "Z"}});
 }
 
 absl::Status WritePlan(const std::string& file, const std::vector<Eigen::Vector3d>& waypoints) {
@@ -126,6 +135,8 @@ absl::Status PlanOne(Context& context, PlanOptions options) {
     Json json = WithPlaces(plan, earth);
     if (shape.has_value()) json["shape"] = ToJson(*shape);
     context.output.Object(json);
+  } else if (context.output.csv()) {
+    ListWaypoints(plan, context.output);
   } else {
     PrintText(plan, earth, context.output);
     if (shape.has_value()) PrintText(*shape, context.output);

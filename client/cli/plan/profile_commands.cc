@@ -8,6 +8,7 @@
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/json.h"
+#include "client/cli/terminal/names.h"
 #include "core/common/status.h"
 
 namespace strata::cli {
@@ -72,7 +73,8 @@ void AddProfileCommands(Commands& commands) {
                     "strata profile set campus segway --radius 0.35 --max-step 0.1",
                     [options](Context& context) { return Set(context, *options); });
   AddMapName(set, options->map);
-  set->add_option("PROFILE", options->profile, "Name of the profile")->required();
+  TakesName(set->add_option("PROFILE", options->profile, "Name of the profile")->required(),
+            kProfileNames);
   AddProfileOptions(set, options->overrides);
   CLI::App* list = commands.Verb(noun,
                                  "list",

@@ -11,8 +11,10 @@
 
 #include "client/cli/posegraph/constraint_residual.h"
 #include "client/cli/posegraph/posegraph_files.h"
+#include "client/cli/terminal/angles.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
+#include "client/cli/terminal/confirm.h"
 #include "client/cli/terminal/world_json.h"
 #include "core/common/status.h"
 
@@ -30,6 +32,7 @@ struct PoseGraphOptions {
   bool position_only = false;
   double sigma_m = 0.05;
   double sigma_rad = 0.01;
+  bool yes = false;
 };
 
 Json Row(const ConstraintResidual& residual) {
@@ -108,6 +111,9 @@ absl::Status AddConstraint(Context& context, PoseGraphOptions options) {
 }
 
 absl::Status RemoveConstraint(Context& context, const PoseGraphOptions& options) {
+  STRATA_RETURN_IF_ERROR(Confirm(
+      options.yes,
+      absl::StrCat("take constraint ", options.id, " out of map ", options.map, " for good?")));
   STRATA_RETURN_IF_ERROR(
       context.database.posegraph().RemoveConstraint(context.call, options.map, options.id));
   context.output.Object({{"removed", options.id}});
@@ -161,7 +167,8 @@ void AddAddConstraint(Commands& commands,
   app->add_option("--sigma-m", options->sigma_m, "Standard deviation of the place [m]")
       ->check(CLI::Range(1e-6, 1e6))
       ->capture_default_str();
-  app->add_option("--sigma-rad", options->sigma_rad, "Standard deviation of the rotation [rad]")
+  TakesAngle(app->add_option(
+                 "--sigma-rad", options->sigma_rad, "Standard deviation of the rotation [rad]"))
       ->check(CLI::Range(1e-6, 10.0))
       ->capture_default_str();
   app->add_flag("--may-be-false",
@@ -187,11 +194,13 @@ void AddPosegraphCommands(Commands& commands) {
     app->add_option("ID", options->id, "Number of the constraint or plane")
         ->check(CLI::PositiveNumber)
         ->required();
+    return app;
   };
-  with_id(verb("remove-constraint",
-               "Take a constraint out for good",
-               "strata posegraph remove-constraint campus 17",
-               RemoveConstraint));
+  AddYes(with_id(verb("remove-constraint",
+                      "Take a constraint out for good",
+                      "strata posegraph remove-constraint campus 17",
+                      RemoveConstraint)),
+         options->yes);
   with_id(
       verb("disable",
            "Switch a constraint or a plane off for the jobs to come",

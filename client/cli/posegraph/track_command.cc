@@ -55,7 +55,7 @@ absl::StatusOr<std::vector<ScanFile>> ScansOf(Context& context, const TrackOptio
 
 void Print(const ScanFile& scan, const TrackedPose& pose, Output& output) {
   const std::string name = scan.path.filename().string();
-  if (output.json()) {
+  if (!output.text()) {
     Json json = {{"scan", name}};
     json.update(ToJson(pose));
     output.JsonLine(json);
@@ -132,7 +132,7 @@ void AddPosegraphTrack(Commands& commands, CLI::App* noun) {
       "track",
       "Follow a robot through a map by its odometry and its scans, scan by scan: where it was, how "
       "sure that is and how well the scan agrees with the map; exit 0 also when it is lost",
-      "strata posegraph track campus scans/ --poses odometry.txt -o run.csv",
+      "strata posegraph track campus scans/ --poses odometry.txt --out run.csv",
       [options](Context& context) { return Track(context, *options); });
   AddMapName(app, options->map);
   app->add_option("PATH", options->paths, "Scans, or folders of them, as scan import takes them")
@@ -150,7 +150,7 @@ void AddPosegraphTrack(Commands& commands, CLI::App* noun) {
   app->add_option("--radius", options->start.guess_radius_m, "Only places so near to the guess [m]")
       ->capture_default_str();
   app->add_option(
-      "-o,--out", options->out, "Write the poses with covariance, as strata egomotion does (CSV)");
+      "--out", options->out, "Write the poses with covariance, as strata egomotion does (CSV)");
 }
 
 }  // namespace strata::cli

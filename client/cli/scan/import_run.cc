@@ -193,7 +193,7 @@ void Print(const ImportOptions& options,
     json["integrated"] = summary.integrated;
     json["aligned"] = summary.aligned;
     json["integration_failed"] = summary.integration_failed;
-    AddHealth(summary.health, output.json(), json);
+    AddHealth(summary.health, !output.text(), json);
   }
   if (summary.level_rad.has_value()) {
     json["level_rad"] = *summary.level_rad;
@@ -207,7 +207,7 @@ void Print(const ImportOptions& options,
   if (summary.health.Doubtful()) {
     output.Talk(absl::StrCat("warning: ", summary.health.Summary(), ": ", kDoubtful));
   }
-  if (!output.json()) {
+  if (output.text()) {
     json.erase("errors");
     for (const char* count : {"range_0", "gps_priors", "deskewed", "not_deskewed"}) {
       if (json[count] == 0) json.erase(count);

@@ -37,7 +37,7 @@ LocalizeQuery QueryOf(PointCloud cloud, const LocalizeOptions& options) {
 }
 
 void PrintText(const LocalizeResult& result, Output& output) {
-  output.Text(result.found ? "found: " + result.message : "not found: " + result.message);
+  output.Verdict((result.found ? "found: " : "not found: ") + result.message, result.found);
   if (result.found) {
     const Json best = ToJson(result.best);
     output.Object(best);
@@ -66,10 +66,10 @@ absl::Status Localize(Context& context, const LocalizeOptions& options) {
                               context.call, options.map, QueryOf(std::move(cloud), options)));
   result.best.T_map_scan.translate(-origin);
   for (LocalizeCandidate& other : result.others) other.T_map_scan.translate(-origin);
-  if (context.output.json()) {
-    context.output.Object(ToJson(result));
-  } else {
+  if (context.output.text()) {
     PrintText(result, context.output);
+  } else {
+    context.output.Object(ToJson(result));
   }
   return absl::OkStatus();
 }

@@ -64,7 +64,7 @@ absl::Status ImportBySpool(FileContext& context, ImportOptions options) {
   }
   const Json errors = json["errors"];
   TalkOf(errors, context.output);
-  if (!context.output.json()) json.erase("errors");
+  if (context.output.text()) json.erase("errors");
   context.output.Object(json);
   return ErrorsOf(errors, sources.files);
 }

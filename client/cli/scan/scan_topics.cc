@@ -54,7 +54,7 @@ absl::Status List(FileContext& context, const std::vector<std::string>& paths) {
   progress.Clear();
   Json rows = Json::array();
   for (const RecordedTopic& topic : survey.topics) {
-    rows.push_back(RowOf(topic, context.output.json()));
+    rows.push_back(RowOf(topic, !context.output.text()));
     if (topic.bad == 0) continue;
     context.output.Talk(absl::StrCat(
         "warning: ", topic.bad, " messages of ", topic.topic.name, " cannot be read: ", topic.why));

@@ -15,6 +15,9 @@
 #include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
 
+#include "client/cli/terminal/angles.h"
+#include "client/cli/terminal/names.h"
+
 namespace strata::cli {
 namespace {
 
@@ -24,11 +27,17 @@ constexpr char kPoseShape[] = "X,Y,Z[,YAW|,QX,QY,QZ,QW]";
 
 std::optional<std::vector<double>> ParseNumbers(const std::string& text,
                                                 std::size_t min_count,
-                                                std::size_t max_count) {
+                                                std::size_t max_count,
+                                                std::size_t angle) {
   std::vector<double> numbers;
   for (const absl::string_view part : absl::StrSplit(text, ',')) {
     double number = 0.0;
-    if (!absl::SimpleAtod(absl::StripAsciiWhitespace(part), &number) || !std::isfinite(number)) {
+    if (numbers.size() == angle) {
+      const std::optional<double> turn = ParseAngle(part);
+      if (!turn.has_value()) return std::nullopt;
+      number = *turn;
+    } else if (!absl::SimpleAtod(absl::StripAsciiWhitespace(part), &number) ||
+               !std::isfinite(number)) {
       return std::nullopt;
     }
     numbers.push_back(number);
@@ -43,12 +52,13 @@ CLI::Option* AddNumbers(CLI::App* app,
                         std::size_t min_count,
                         std::size_t max_count,
                         std::function<void(const std::vector<double>&)> set,
-                        const std::string& description) {
+                        const std::string& description,
+                        std::size_t angle) {
   return app
       ->add_option_function<std::string>(
           name,
           [=, set = std::move(set)](const std::string& text) {
-            const auto numbers = ParseNumbers(text, min_count, max_count);
+            const auto numbers = ParseNumbers(text, min_count, max_count, angle);
             if (!numbers.has_value()) {
               throw CLI::ValidationError(name, absl::StrCat("expected ", shape, ", got ", text));
             }
@@ -75,7 +85,8 @@ CLI::Option* AddPose(CLI::App* app,
     }
     set(MakePose(rotation, {n[0], n[1], n[2]}), n.size());
   };
-  return AddNumbers(app, name, kPoseShape, 3, 7, set_pose, description);
+  constexpr std::size_t kYaw = 3;
+  return AddNumbers(app, name, kPoseShape, 3, 7, set_pose, description, kYaw);
 }
 
 CLI::Option* AddRegion(CLI::App* app, std::optional<Eigen::AlignedBox3d>& region) {
@@ -98,7 +109,7 @@ CLI::Option* AddRegion(CLI::App* app, std::optional<Eigen::AlignedBox3d>& region
 }
 
 void AddMapName(CLI::App* app, std::string& map) {
-  app->add_option("NAME", map, "Name of the map")->required();
+  TakesName(app->add_option("NAME", map, "Name of the map")->required(), kMapNames);
 }
 
 void AddScanId(CLI::App* app, ScanId& id) {
@@ -142,7 +153,7 @@ void AddProfileOptions(CLI::App* app, ProfileOverrides& overrides) {
   app->add_option("--radius", overrides.radius_m, "Radius of the robot's footprint [m]");
   app->add_option("--height", overrides.height_m, "Height the robot needs above a surface [m]");
   app->add_option("--max-step", overrides.max_step_m, "Highest step between cells [m]");
-  app->add_option("--max-slope", overrides.max_slope_rad, "Steepest ground [rad]");
+  TakesAngle(app->add_option("--max-slope", overrides.max_slope_rad, "Steepest ground [rad]"));
   app->add_option("--max-gap", overrides.max_gap_m, "Longest unobserved stretch to bridge [m]");
   app->add_option(
       "--max-roughness", overrides.max_roughness_m, "Largest sigma around the local plane [m]");

@@ -21,11 +21,15 @@
 
 namespace strata::cli {
 
+// No number is an angle.
+inline constexpr std::size_t kNoAngle = static_cast<std::size_t>(-1);
+
 // Numbers separated by commas, `min_count` to `max_count` of them, all finite; nullopt for anything
-// else.
+// else. The one at the index `angle` may also be given in degrees, as in 90deg.
 std::optional<std::vector<double>> ParseNumbers(const std::string& text,
                                                 std::size_t min_count,
-                                                std::size_t max_count);
+                                                std::size_t max_count,
+                                                std::size_t angle = kNoAngle);
 
 // Adds an option that takes such numbers; `shape` is shown in the help, as in "X,Y,Z".
 CLI::Option* AddNumbers(CLI::App* app,
@@ -34,10 +38,12 @@ CLI::Option* AddNumbers(CLI::App* app,
                         std::size_t min_count,
                         std::size_t max_count,
                         std::function<void(const std::vector<double>&)> set,
-                        const std::string& description);
+                        const std::string& description,
+                        std::size_t angle = kNoAngle);
 
-// Adds an option that takes a pose as a place, a place and a turn about z, or a place and a
-// quaternion, which is normalised. `set` also gets how many numbers there were: 3, 4 or 7.
+// Adds an option that takes a pose as a place, a place and a turn about z (1.57 or 90deg), or a
+// place and a quaternion, which is normalised. `set` also gets how many numbers there were: 3, 4
+// or 7.
 CLI::Option* AddPose(CLI::App* app,
                      const std::string& name,
                      std::function<void(const Pose&, std::size_t)> set,

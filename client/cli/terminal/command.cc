@@ -8,7 +8,8 @@ namespace strata::cli {
 namespace {
 
 constexpr char kGlobalOptions[] =
-    "Also --server HOST:PORT, --embedded DIR, --output text|json: see strata --help.\n\n";
+    "Also --server HOST:PORT, --embedded DIR, --context NAME, -o text|json|csv: see strata "
+    "--help.\n\n";
 
 }  // namespace
 
@@ -38,7 +39,7 @@ CLI::App* Commands::FileVerb(CLI::App* noun,
                              const std::string& example,
                              FileAction action) {
   CLI::App* verb = noun->add_subcommand(name, description);
-  verb->footer("Also --output text|json; no server is asked.\n\nExample:\n  " + example);
+  verb->footer("Also -o text|json|csv; no server is asked.\n\nExample:\n  " + example);
   verb->callback([this, action = std::move(action)] { selected_on_files = action; });
   return verb;
 }

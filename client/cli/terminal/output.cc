@@ -1,52 +1,27 @@
 #include "client/cli/terminal/output.h"
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <cstddef>
 #include <ostream>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "absl/strings/str_format.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "absl/strings/str_split.h"
+#include "absl/strings/string_view.h"
 
 namespace strata::cli {
 namespace {
 
-// At most six decimals (a micrometre) and at least one; what is smaller is zero.
-std::string Decimal(double value) {
-  constexpr double kMost = 1e15;
-  if (!(std::abs(value) < kMost)) return absl::StrFormat("%g", value);
-  std::string text = absl::StrFormat("%.6f", value);
-  const std::size_t last = text.find_last_not_of('0');
-  text.erase(std::max(last, text.find('.') + 1) + 1);
-  return text == "-0.0" ? "0.0" : text;
-}
-
-std::string TextOf(const Json& value) {
-  if (value.is_null()) return "-";
-  if (value.is_string()) return value.get<std::string>();
-  if (value.is_number_float()) return Decimal(value.get<double>());
-  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
-  if (value.is_array()) {
-    std::string text;
-    for (const Json& element : value) {
-      if (!text.empty()) text += value.front().is_object() ? "; " : ", ";
-      text += TextOf(element);
-    }
-    return text.empty() ? "-" : text;
-  }
-  if (value.is_object()) {
-    std::string text;
-    for (const auto& [key, element] : value.items()) {
-      text += (text.empty() ? "" : ", ") + key + " " + TextOf(element);
-    }
-    return text.empty() ? "-" : text;
-  }
-  return value.dump();
-}
+constexpr std::size_t kFewestRows = 10;     // of a table on a low terminal
+constexpr std::size_t kNarrowestCell = 20;  // of one whose text goes on in further lines
 
 std::string Padded(const std::string& text, std::size_t width, bool right) {
-  const std::string blank(width - std::min(width, text.size()), ' ');
+  const std::string blank(width - std::min(width, ShownWidth(text)), ' ');
   return right ? blank + text : text + blank;
 }
 
@@ -55,53 +30,173 @@ std::string StripEnd(std::string line) {
   return line;
 }
 
+// How good it is what a verdict says; other values have no colour.
+Hue HueOf(const std::string& key, const std::string& text) {
+  constexpr std::array<absl::string_view, 4> kVerdicts = {"state", "found", "valid", "aligned"};
+  constexpr std::array<absl::string_view, 3> kGood = {"integrated", "succeeded", "yes"};
+  constexpr std::array<absl::string_view, 2> kBad = {"failed", "no"};
+  constexpr std::array<absl::string_view, 5> kDoubtful = {
+      "cancelled", "pending", "proposed", "queued", "running"};
+  const auto in = [](const auto& words, const std::string& word) {
+    return std::find(words.begin(), words.end(), word) != words.end();
+  };
+  if (!in(kVerdicts, key)) return Hue::kPlain;
+  if (in(kGood, text)) return Hue::kGood;
+  if (in(kBad, text)) return Hue::kBad;
+  return in(kDoubtful, text) ? Hue::kDoubtful : Hue::kPlain;
+}
+
+// A table of text: cells, widths, and what stands right.
+struct Table {
+  std::vector<std::string> keys;
+  std::vector<std::vector<std::string>> lines;  // of cells; the first has the titles
+  std::vector<std::size_t> widths;
+  std::vector<bool> right;  // numbers stand below each other
+};
+
+Table TableOf(const Json& rows, const std::vector<Column>& columns, std::size_t shown) {
+  Table table;
+  table.lines.resize(shown + 1);
+  for (const Column& column : columns) {
+    table.keys.push_back(column.key);
+    table.lines[0].push_back(column.title);
+    std::size_t width = ShownWidth(column.title);
+    for (std::size_t r = 0; r < shown; ++r) {
+      table.lines[r + 1].push_back(TextOf(rows[r].value(column.key, Json())));
+      width = std::max(width, ShownWidth(table.lines[r + 1].back()));
+    }
+    table.widths.push_back(width);
+    table.right.push_back(!rows.empty() && rows.front().value(column.key, Json()).is_number());
+  }
+  return table;
+}
+
+std::string LineOf(const Table& table, std::size_t r, const Screen& screen) {
+  std::string line;
+  std::size_t left = 0;  // columns before the last
+  for (std::size_t c = 0; c < table.widths.size(); ++c) {
+    std::string cell = table.lines[r][c];
+    const Hue hue = r == 0 ? Hue::kTitle : HueOf(table.keys[c], cell);
+    if (c + 1 < table.widths.size()) {
+      left += table.widths[c] + 2;
+      cell = Padded(cell, table.widths[c], table.right[c]) + "  ";
+    } else if (left + kNarrowestCell <= screen.columns) {
+      cell = Filled(Padded(cell, table.widths[c], table.right[c]), screen.columns - left, 0);
+      cell = absl::StrJoin(absl::StrSplit(cell, '\n'), "\n" + std::string(left, ' '));
+    } else {
+      cell = Padded(cell, table.widths[c], table.right[c]);
+    }
+    line += Painted(cell, hue, screen);
+  }
+  return StripEnd(line);
+}
+
 }  // namespace
+
+OutputFormat ParseOutputFormat(const std::string& text) {
+  if (text == "json") return OutputFormat::kJson;
+  return text == "csv" ? OutputFormat::kCsv : OutputFormat::kText;
+}
 
 void Output::Object(const Json& object) {
   if (json()) {
-    data_ << object.dump(2) << std::endl;
+    data_ << Shortest(object).dump(2) << std::endl;
+    return;
+  }
+  if (csv()) {
+    csv_object_ = object;
     return;
   }
   std::size_t width = 0;
   for (const auto& item : object.items()) width = std::max(width, item.key().size());
   for (const auto& [key, value] : object.items()) {
-    data_ << StripEnd(Padded(key, width + 2, false) + TextOf(value)) << '\n';
+    const std::string text = TextOf(value);
+    const std::string head = Padded(key, width + 2, false);
+    const Hue hue = HueOf(key, text);
+    data_ << (hue == Hue::kPlain ? Filled(StripEnd(head + text), data_screen_.columns, width + 2)
+                                 : head + Painted(text, hue, data_screen_))
+          << '\n';
   }
   data_.flush();
 }
 
 void Output::List(const Json& rows, const std::vector<Column>& columns) {
   if (json()) {
-    data_ << rows.dump(2) << std::endl;
+    data_ << Shortest(rows).dump(2) << std::endl;
     return;
   }
-  std::vector<std::vector<std::string>> table(columns.size());
-  std::vector<std::size_t> widths;
-  std::vector<bool> right;  // numbers stand below each other
-  for (std::size_t c = 0; c < columns.size(); ++c) {
-    table[c].push_back(columns[c].title);
-    for (const Json& row : rows) table[c].push_back(TextOf(row.value(columns[c].key, Json())));
-    right.push_back(!rows.empty() && rows.front().value(columns[c].key, Json()).is_number());
-    std::size_t width = 0;
-    for (const std::string& cell : table[c]) width = std::max(width, cell.size());
-    widths.push_back(width);
+  if (csv()) {
+    if (csv_printed_) return;
+    std::vector<std::string> keys;
+    for (const Column& column : columns) keys.push_back(column.key);
+    return Csv(rows, keys);
   }
-  for (std::size_t r = 0; r <= rows.size(); ++r) {
-    std::string line;
-    for (std::size_t c = 0; c < columns.size(); ++c) {
-      line += (c == 0 ? "" : "  ") + Padded(table[c][r], widths[c], right[c]);
-    }
-    data_ << StripEnd(line) << '\n';
+  const std::size_t fit = std::max(kFewestRows, data_screen_.rows) - 4;
+  const bool cut = data_screen_.terminal() && rows.size() > fit + 2;
+  const std::size_t shown = cut ? fit : rows.size();
+  const Table table = TableOf(rows, columns, shown);
+  for (std::size_t r = 0; r <= shown; ++r) data_ << LineOf(table, r, data_screen_) << '\n';
+  if (cut) {
+    data_ << "… and " << rows.size() - shown
+          << " more; all of them through a pipe, or with -o csv\n";
   }
   data_.flush();
 }
 
-void Output::JsonLine(const Json& value) { data_ << value.dump() << std::endl; }
-
-void Output::Text(const std::string& line) {
-  if (!json()) data_ << line << std::endl;
+// `keys` are the columns of a table without rows.
+void Output::Csv(const Json& rows, const std::vector<std::string>& keys) {
+  std::vector<std::vector<std::pair<std::string, Json>>> lines;
+  for (const Json& row : rows) {
+    lines.push_back(LeavesOf(row));
+    if (csv_printed_) continue;  // a line with the keys stands already
+    for (const auto& [key, value] : lines.back()) {
+      if (std::find(csv_keys_.begin(), csv_keys_.end(), key) == csv_keys_.end()) {
+        csv_keys_.push_back(key);
+      }
+    }
+  }
+  if (csv_keys_.empty()) csv_keys_ = keys;
+  if (!csv_printed_) data_ << absl::StrJoin(csv_keys_, ",") << '\n';
+  csv_printed_ = true;
+  for (const auto& line : lines) {
+    std::vector<std::string> cells;
+    for (const std::string& key : csv_keys_) {
+      const auto found = std::find_if(
+          line.begin(), line.end(), [&](const auto& leaf) { return leaf.first == key; });
+      cells.push_back(found == line.end() ? "" : CsvCell(found->second));
+    }
+    data_ << absl::StrJoin(cells, ",") << '\n';
+  }
+  data_.flush();
 }
 
-void Output::Talk(const std::string& line) { talk_ << line << std::endl; }
+void Output::JsonLine(const Json& value) {
+  if (csv()) return Csv(Json::array({value}), {});
+  data_ << Shortest(value).dump() << std::endl;
+}
+
+void Output::Text(const std::string& line) {
+  if (text()) data_ << line << std::endl;
+}
+
+void Output::Verdict(const std::string& line, bool good) {
+  Text(Painted(line, good ? Hue::kGood : Hue::kBad, data_screen_));
+}
+
+void Output::Talk(const std::string& line) {
+  for (const auto& [word, hue] :
+       {std::pair<absl::string_view, Hue>("error:", Hue::kBad), {"warning:", Hue::kDoubtful}}) {
+    if (!absl::StartsWith(line, word)) continue;
+    talk_ << Painted(word, hue, talk_screen_) << line.substr(word.size()) << std::endl;
+    return;
+  }
+  talk_ << line << std::endl;
+}
+
+void Output::Finish() {
+  if (!csv() || csv_printed_) return;
+  if (csv_object_.is_null()) return Talk("nothing of this is a table; --output json tells all");
+  Csv(Json::array({std::exchange(csv_object_, Json())}), {});
+}
 
 }  // namespace strata::cli

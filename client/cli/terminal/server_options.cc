@@ -18,21 +18,10 @@
 namespace strata::cli {
 namespace {
 
-constexpr char kTokenVariable[] = "STRATA_TOKEN";
-constexpr char kServerVariable[] = "STRATA_SERVER";
-
-// For CLI11: empty, or what is wrong.
-std::string IsAddress(const std::string& text) {
-  const std::size_t colon = text.rfind(':');
-  int port = 0;
-  const bool good = absl::StartsWith(text, "unix:") ||
-                    (colon != std::string::npos && colon > 0 &&
-                     absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port <= 65535);
-  return good ? "" : "expected HOST:PORT, as in 127.0.0.1:50051, got '" + text + "'";
-}
-
-absl::StatusOr<std::string> TokenOf(const std::string& token_file) {
+absl::StatusOr<std::string> TokenOf(const ServerOptions& options) {
+  const std::string& token_file = options.token_file;
   if (token_file.empty()) {
+    if (!options.token.empty()) return options.token;
     const char* token = std::getenv(kTokenVariable);
     return std::string(token == nullptr ? "" : token);
   }
@@ -67,7 +56,21 @@ void AddDoorOptions(CLI::App& app, ServerOptions& options) {
       ->group(kGroup);
 }
 
+std::string Where(const ServerOptions& options) {
+  return options.context.empty() ? options.server
+                                 : absl::StrCat(options.server, " of context ", options.context);
+}
+
 }  // namespace
+
+std::string IsAddress(const std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  int port = 0;
+  const bool good = absl::StartsWith(text, "unix:") ||
+                    (colon != std::string::npos && colon > 0 &&
+                     absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port <= 65535);
+  return good ? "" : "expected HOST:PORT, as in 127.0.0.1:50051, got '" + text + "'";
+}
 
 CLI::Option* AddServerOptions(CLI::App& app, ServerOptions& options) {
   // No default of the parser's: it would exclude --embedded.
@@ -88,22 +91,22 @@ absl::StatusOr<ClientOptions> ClientOptionsOf(const ServerOptions& options) {
                 .certificate_file = options.tls_certificate,
                 .key_file = options.tls_key,
                 .server_name = options.tls_name};
-  STRATA_ASSIGN_OR_RETURN(client.token, TokenOf(options.token_file));
+  STRATA_ASSIGN_OR_RETURN(client.token, TokenOf(options));
   client.insecure = options.insecure;
-  client.connect_timeout = absl::Seconds(3);
+  client.connect_timeout = options.connect_timeout;
   return client;
 }
 
 absl::Status Explained(const absl::Status& status, const ServerOptions& options) {
   if (absl::IsUnauthenticated(status)) {
     return absl::UnauthenticatedError(absl::StrCat(
-        status.message(), " (from ", options.server, "; show a token with --token-file FILE)"));
+        status.message(), " (from ", Where(options), "; show a token with --token-file FILE)"));
   }
   if (!absl::IsUnavailable(status)) return status;
   return absl::UnavailableError(
       absl::StrCat(status.message(),
                    " (from ",
-                   options.server,
+                   Where(options),
                    "; if stratad does not run there, start it and run the command again)"));
 }
 

@@ -6,6 +6,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/time/time.h"
 #include <CLI/CLI.hpp>
 
 #include "client/sdk/client.h"
@@ -21,8 +22,19 @@ struct ServerOptions {
   // First line of it is the token; empty: that of the environment's STRATA_TOKEN, if any. Never on
   // the command line: everybody on the machine sees those.
   std::string token_file;
+  std::string token;      // that of a context that keeps one; after token_file
   bool insecure = false;  // a token may cross the network in plain text
+  std::string context;    // the name of the context that this is of; empty: none
+  // How long a server may take to answer.
+  absl::Duration connect_timeout = absl::Seconds(3);
 };
+
+// The environment that is asked where the command line is silent.
+inline constexpr char kTokenVariable[] = "STRATA_TOKEN";
+inline constexpr char kServerVariable[] = "STRATA_SERVER";
+
+// For CLI11: empty, or what is wrong with HOST:PORT.
+std::string IsAddress(const std::string& text);
 
 // Adds --server, whose default is the environment's STRATA_SERVER if there is one, and the options
 // of servers that ask who one is. Returns --server.

@@ -31,11 +31,11 @@ std::size_t Distance(absl::string_view a, absl::string_view b) {
   return d[a.size()][b.size()];
 }
 
-// The commands below `app` that have a name: option groups have none.
+// The commands below `app` that have a name and are shown: option groups have none.
 std::vector<std::string> CommandsOf(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::App* command : app.get_subcommands({})) {
-    if (!command->get_name().empty()) {
+    if (!command->get_name().empty() && !command->get_group().empty()) {
       names.push_back(command->get_name());
     }
   }
@@ -72,6 +72,20 @@ std::vector<const CLI::App*> Chosen(const CLI::App& root) {
   }
 }
 
+// "scan import or kind import" of verbs with that name below the nouns of `app`.
+std::string VerbsCalled(const CLI::App& app, const std::string& name) {
+  std::vector<std::string> verbs;
+  for (const CLI::App* noun : app.get_subcommands({})) {
+    for (const std::string& verb : CommandsOf(*noun)) {
+      if (verb == name) verbs.push_back(absl::StrCat(noun->get_name(), " ", verb));
+    }
+  }
+  if (verbs.size() < 2) return absl::StrJoin(verbs, "");
+  const std::string last = verbs.back();
+  verbs.pop_back();
+  return absl::StrCat(absl::StrJoin(verbs, ", "), " or ", last);
+}
+
 std::string DidYouMean(const std::string& nearest) {
   return nearest.empty() ? "" : absl::StrCat("; did you mean ", nearest, "?");
 }
@@ -104,14 +118,16 @@ std::string Complaint(const std::vector<const CLI::App*>& chosen,
     const std::string nearest = Nearest(unknown, commands);
     const std::string list =
         absl::StrCat("one of these is needed: ", absl::StrJoin(commands, ", "));
+    const std::string below = nearest.empty() ? VerbsCalled(*chosen.back(), unknown) : "";
     if (unknown.empty()) {
       return absl::StrCat("after '", command, "' ", list);
     }
-    return absl::StrCat("'",
-                        command,
-                        "' has no command ",
-                        unknown,
-                        nearest.empty() ? "; " + list : DidYouMean(nearest));
+    return absl::StrCat(
+        "'",
+        command,
+        "' has no command ",
+        unknown,
+        nearest.empty() && below.empty() ? "; " + list : DidYouMean(nearest + below));
   }
   if (!unknown.empty()) {
     return absl::StrCat("'", command, "' does not expect the word '", unknown, "'");

@@ -39,7 +39,7 @@ class EgomotionCommandTest : public ::testing::Test {
 TEST_F(EgomotionCommandTest, WritesTheWayAndAReport) {
   const Ran ran = RunStrata({"egomotion",
                              dir_.path().string(),
-                             "-o",
+                             "--out",
                              Path("run.csv"),
                              "--report",
                              Path("run.json"),
@@ -63,7 +63,7 @@ TEST_F(EgomotionCommandTest, WritesTheWayAndAReport) {
 
 // From the log to a map: scans named by their times stand where the robot was.
 TEST_F(EgomotionCommandTest, ScansAreImportedOnIt) {
-  ASSERT_EQ(RunStrata({"egomotion", dir_.path().string(), "-o", Path("run.csv")}).exit_code, 0);
+  ASSERT_EQ(RunStrata({"egomotion", dir_.path().string(), "--out", Path("run.csv")}).exit_code, 0);
   std::filesystem::create_directory(dir_.path() / "scans");
   std::string floor;
   for (int i = 0; i < 100; ++i) {
@@ -107,7 +107,7 @@ TEST_F(EgomotionCommandTest, TakesARigAndSmooths) {
   STRATA_ASSERT_OK(WriteFileBytes(Path("rig.yaml"), "imu: {orientation: [0, 0, 0]}\n"));
   const Ran ran = RunStrata({"egomotion",
                              dir_.path().string(),
-                             "-o",
+                             "--out",
                              Path("run.csv"),
                              "--rig",
                              Path("rig.yaml"),
@@ -119,14 +119,14 @@ TEST_F(EgomotionCommandTest, TakesARigAndSmooths) {
 }
 
 TEST_F(EgomotionCommandTest, SaysWhatToDoNext) {
-  const Ran nothing = RunStrata({"egomotion", Path("none"), "-o", Path("run.csv")});
+  const Ran nothing = RunStrata({"egomotion", Path("none"), "--out", Path("run.csv")});
   EXPECT_EQ(nothing.exit_code, 1);
   EXPECT_THAT(nothing.err, HasSubstr("is no folder; name the one that holds the log's files"));
   const Ran silent = RunStrata({"egomotion", dir_.path().string()});
   EXPECT_EQ(silent.exit_code, 2);
   EXPECT_THAT(silent.err, HasSubstr("--out is required"));
   const Ran help = RunStrata({"egomotion", "--help"});
-  EXPECT_THAT(help.out, HasSubstr("strata egomotion drives/monday -o monday.csv"));
+  EXPECT_THAT(help.out, HasSubstr("strata egomotion drives/monday --out monday.csv"));
 }
 
 }  // namespace

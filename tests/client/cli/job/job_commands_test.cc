@@ -1,5 +1,8 @@
 // strata job, on a database that the test decides on.
 
+#include <cstdint>
+#include <string>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -53,6 +56,21 @@ TEST_F(JobCommandsTest, TheReportOfAJobHasALineANumber) {
   EXPECT_THAT(RunText({"job", "show", "m", "7"}),
               HasSubstr("\n\ncost_after   3.25\ncost_before  12.5\n"));
   EXPECT_EQ(RunJson({"job", "show", "m", "7"})["metrics"]["cost_after"], 3.25);
+}
+
+TEST_F(JobCommandsTest, WhoWaitsGetsSentencesAndWhereTheNumbersAre) {
+  ON_CALL(db_.jobs(), Start(_, _, _, _)).WillByDefault(Return(Job(7, JobState::kQueued)));
+  JobInfo ended = Job(7, JobState::kSucceeded);
+  ended.message = "settled";
+  for (int i = 0; i < 9; ++i) ended.metrics["n" + std::to_string(i)] = i;
+  ON_CALL(db_.jobs(), Get(_, _, _)).WillByDefault(Return(Job(7, JobState::kQueued)));
+  ON_CALL(db_.jobs(), Watch(_, _, _, _)).WillByDefault([&](auto&, auto, std::uint64_t, auto sink) {
+    return sink(ended);
+  });
+  const std::string brief = RunText({"job", "start", "m", "optimize", "--wait"});
+  EXPECT_THAT(brief, HasSubstr("\nmessage     settled\n"));
+  EXPECT_THAT(brief, HasSubstr("\nmetrics     9 numbers; see job show m 7\n"));
+  EXPECT_EQ(RunJson({"job", "start", "m", "optimize", "--wait"})["metrics"]["n8"], 8);
 }
 
 TEST_F(JobCommandsTest, ProposalsAreAcceptedAndForgotten) {

@@ -76,7 +76,7 @@ TEST_F(TrackCommandTest, FollowsTheScansOfAFolder) {
                         "1,2,3,0.5",
                         "--radius",
                         "7",
-                        "-o",
+                        "--out",
                         out}));
   EXPECT_EQ(start_.guess_radius_m, 7.0);
   EXPECT_EQ(start_.T_map_scan_guess->translation().y(), 2.0);

@@ -145,7 +145,7 @@ TEST_F(DriveCommandTest, WhatIsMissingIsSaid) {
 
 // A map made at the run's poses, but from another place on, is found on earth.
 TEST_F(DriveCommandTest, AMapIsPutOnEarthByItsDrive) {
-  ASSERT_EQ(RunStrata({"egomotion", Path("log"), "-o", Path("run.csv")}).exit_code, 0);
+  ASSERT_EQ(RunStrata({"egomotion", Path("log"), "--out", Path("run.csv")}).exit_code, 0);
   ASSERT_EQ(Run({"map", "create", "m", "--cell-size", "0.5"}).exit_code, 0);
   STRATA_ASSERT_OK_AND_ASSIGN(const TrajectoryFile run, ReadTrajectory(Path("run.csv")));
   std::string tum;

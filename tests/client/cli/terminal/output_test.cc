@@ -1,6 +1,8 @@
 #include "client/cli/terminal/output.h"
 
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -44,6 +46,92 @@ TEST(OutputTest, TextHasNoMoreDecimalsThanMeanSomething) {
                {"h", 120.0}});
   EXPECT_EQ(data.str(),
             "a  -59.3\nb  0.0\nc  0.0\nd  5412345.678901\ne  1e+300\nf  2.0\ng  0.35\nh  120.0\n");
+}
+
+TEST(OutputTest, NumbersOfJsonAreShort) {
+  std::ostringstream data;
+  std::ostringstream talk;
+  Output(OutputFormat::kJson, data, talk)
+      .JsonLine({{"a", -24.150000000000002},
+                 {"b", 6.0},
+                 {"c", 0.1 + 0.2},
+                 {"d", 1.0 / 3.0},
+                 {"e", 1e300},
+                 {"f", -0.0},
+                 {"g", 5412345.678901},
+                 {"h", {1.0, 2.5}},
+                 {"i", 18446744073709551615U}});
+  EXPECT_EQ(data.str(),
+            "{\"a\":-24.15,\"b\":6,\"c\":0.3,\"d\":0.333333333333333,\"e\":1e+300,\"f\":0,"
+            "\"g\":5412345.678901,\"h\":[1,2.5],\"i\":18446744073709551615}\n");
+}
+
+TEST(OutputTest, CsvHasAColumnForEachKeyOfAnyRow) {
+  std::ostringstream data;
+  std::ostringstream talk;
+  Output output(OutputFormat::kCsv, data, talk);
+  output.Object({{"summary", 1}});
+  output.List({{{"n", "a,b"}, {"at", {1.0, 2.5}}, {"in", {{"x", 1.5}}}},
+               {{"n", "say \"hi\""}, {"late", true}, {"none", Json()}}},
+              {{"n", "NAME"}});
+  output.List({{{"second", 1}}}, {{"second", "SECOND"}});
+  output.Text("text");
+  output.Finish();
+  EXPECT_EQ(data.str(),
+            "n,at,in.x,late,none\n\"a,b\",\"[1,2.5]\",1.5,,\n\"say \"\"hi\"\"\",,,true,\n");
+}
+
+TEST(OutputTest, CsvOfOneThingIsARowAndOfNothingItsTitles) {
+  std::ostringstream data;
+  std::ostringstream talk;
+  Output one(OutputFormat::kCsv, data, talk);
+  one.Object({{"name", "m"}, {"scans", 3}});
+  one.Finish();
+  EXPECT_EQ(data.str(), "name,scans\nm,3\n");
+  data.str("");
+  Output none(OutputFormat::kCsv, data, talk);
+  none.List(Json::array(), {{"name", "NAME"}, {"scans", "SCANS"}});
+  none.Finish();
+  EXPECT_EQ(data.str(), "name,scans\n");
+  data.str("");
+  Output lines(OutputFormat::kCsv, data, talk);
+  lines.JsonLine({{"a", 1}, {"b", "x"}});
+  lines.JsonLine({{"b", "y"}, {"c", 2}});
+  lines.Finish();
+  EXPECT_EQ(data.str(), "a,b\n1,x\n,y\n");
+  EXPECT_EQ(talk.str(), "");
+  Output(OutputFormat::kCsv, data, talk).Finish();
+  EXPECT_NE(talk.str().find("--output json"), std::string::npos);
+}
+
+TEST(OutputTest, ATerminalGetsWhatItShowsAndAPipeGetsAll) {
+  Json rows = Json::array();
+  for (int i = 0; i < 100; ++i)
+    rows.push_back({{"id", i}, {"note", "one two three four five six"}});
+  const std::vector<Column> columns = {{"id", "ID"}, {"note", "NOTE"}};
+  std::ostringstream data;
+  std::ostringstream talk;
+  Output(OutputFormat::kText, data, talk, {.columns = 24, .rows = 12, .colour = false})
+      .List(rows, columns);
+  EXPECT_EQ(data.str().substr(0, 51), "ID  NOTE\n 0  one two three four\n    five six\n 1  on");
+  EXPECT_NE(data.str().find("… and 92 more"), std::string::npos) << data.str();
+  data.str("");
+  Output(OutputFormat::kText, data, talk).List(rows, columns);
+  EXPECT_EQ(data.str().find("…"), std::string::npos);
+  EXPECT_NE(data.str().find("99  one two three four five six\n"), std::string::npos);
+}
+
+TEST(OutputTest, VerdictsWarningsAndErrorsHaveColour) {
+  const Screen colour{.columns = 0, .rows = 0, .colour = true};
+  std::ostringstream data;
+  std::ostringstream talk;
+  Output output(OutputFormat::kText, data, talk, colour, colour);
+  output.Object({{"state", "failed"}, {"name", "failed"}});
+  output.Verdict("no path", false);
+  output.Talk("error: broken");
+  output.Talk("warning: odd");
+  EXPECT_EQ(data.str(), "state  \x1b[31mfailed\x1b[0m\nname   failed\n\x1b[31mno path\x1b[0m\n");
+  EXPECT_EQ(talk.str(), "\x1b[31merror:\x1b[0m broken\n\x1b[33mwarning:\x1b[0m odd\n");
 }
 
 TEST(OutputTest, JsonModeKeepsTextOffStdout) {

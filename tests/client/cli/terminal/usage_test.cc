@@ -61,6 +61,9 @@ TEST_F(UsageMessageTest, NamesTheNearestCommandOrAllOfThem) {
   EXPECT_EQ(MessageFor("map fly"),
             "error: 'strata map' has no command fly; one of these is needed: create, list\n"
             "Run 'strata map --help' for what it takes and an example.");
+  EXPECT_EQ(MessageFor("create x"),
+            "error: 'strata' has no command create; did you mean map create?\n"
+            "Run 'strata --help' for what it takes and an example.");
   EXPECT_EQ(MessageFor("map"),
             "error: after 'strata map' one of these is needed: create, list\n"
             "Run 'strata map --help' for what it takes and an example.");
