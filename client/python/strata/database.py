@@ -1,6 +1,7 @@
 """A server of maps."""
 import os
 from types import TracebackType
+from typing import Any
 
 from strata import aio
 from strata.blocking import BlockingConnection, blocking, blocking_made
@@ -37,6 +38,11 @@ class Database:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
         self.close()
+
+    @property
+    def channel(self) -> Any:
+        """gRPC's channel, for the stubs of strata.v1; calls on it carry no token by themselves."""
+        return self._asynchronous.channel
 
     create_map = blocking_made(aio.Database.create_map, Map)
     map = blocking_made(aio.Database.map, Map)

@@ -34,7 +34,7 @@ class TileTest(ServerTest):
                  "--trajectory", robot, "--align", "off"], check=True, stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL)
         cls.map.wait(timeout=120)
-        stub = tiles_pb2_grpc.TilesStub(cls.map._connection.channel)
+        stub = tiles_pb2_grpc.TilesStub(cls.db.channel)
         cls.encoded = {level: [answer.tile.bytes for answer in stub.Fetch(tiles_pb2.FetchTilesRequest(
             map="drive", area=tiles_pb2.TileArea(level=level)))] for level in (0, 2, 5)}
 

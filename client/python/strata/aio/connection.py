@@ -41,6 +41,7 @@ class AsyncioConnection(Connection):
         super().__init__(options, grpc.aio.secure_channel(options.target, credentials, CHANNEL_OPTIONS) if credentials
                          else grpc.aio.insecure_channel(options.target, CHANNEL_OPTIONS))
         self._closed = asyncio.Event()
+        self._calls: set[Any] = set()  # under way; gRPC 1.51 itself does not find all that it should end
 
     async def ready(self) -> None:
         """Waits for the server; Unavailable."""
@@ -52,6 +53,8 @@ class AsyncioConnection(Connection):
 
     async def close(self) -> None:
         self._closed.set()
+        for call in tuple(self._calls):
+            call.cancel()
         await self.channel.close()
 
     def _closed_by_us(self) -> bool:
@@ -59,14 +62,18 @@ class AsyncioConnection(Connection):
         return self._closed.is_set() and not (task and task.cancelling())
 
     async def _answer(self, method: Any, request: Any) -> Any:
+        call = method(request, timeout=self.options.timeout, metadata=self.metadata)
+        self._calls.add(call)
         try:
-            return await method(request, timeout=self.options.timeout, metadata=self.metadata)
+            return await call
         except grpc.RpcError as error:
             raise errors.from_rpc(error) from None
         except asyncio.CancelledError:
             if self._closed_by_us():
                 raise errors.Cancelled("the connection was closed") from None
             raise
+        finally:
+            self._calls.discard(call)
 
     async def once(self, method: UnaryUnary[Q, A], request: Q) -> A:
         return typing.cast(A, await self._answer(method, request))
@@ -76,6 +83,7 @@ class AsyncioConnection(Connection):
 
     async def _answers(self, method: Any, request: Any, timeout: float | None) -> AsyncGenerator[Any, None]:
         call = method(request, timeout=timeout, metadata=self.metadata)
+        self._calls.add(call)
         try:
             async for answer in call:
                 yield answer
@@ -86,6 +94,7 @@ class AsyncioConnection(Connection):
                 raise errors.Cancelled("the connection was closed") from None
             raise
         finally:
+            self._calls.discard(call)
             call.cancel()
 
     def stream(self, method: UnaryStream[Q, A], request: Q, *, endless: bool = False) -> AsyncGenerator[A, None]:

@@ -2,6 +2,7 @@
 import os
 from collections.abc import Mapping
 from types import TracebackType
+from typing import Any
 
 from strata import plan
 from strata.aio.connection import AsyncioConnection
@@ -34,6 +35,11 @@ class Database:
     async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None,
                         trace: TracebackType | None) -> None:
         await self.close()
+
+    @property
+    def channel(self) -> Any:
+        """gRPC's channel, for the stubs of strata.v1; calls on it carry no token by themselves."""
+        return self._connection.channel
 
     async def close(self) -> None:
         """Ends all calls, with Cancelled."""
