@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import xxhash
 
+from strata import native
 from strata.arrays import Array
 from strata.columns import ByteReader, numbers_of
 from strata.errors import DataLoss, Unimplemented
@@ -320,8 +321,16 @@ def decode_tile(data: bytes | memoryview, cell_size: float) -> Tile:
     """The tile that `data` holds (as served, or written by `strata tile get --out`).
 
     cell_size: that of the map [m]. Raises DataLoss for bytes that are no intact tile, Unimplemented for those of a
-    later format.
+    later format. By the server's own decoder where it is installed (strata.native), else by numpy; both say the same.
     """
+    if native.LIBRARY is None:
+        return decode_tile_in_numpy(data, cell_size)
+    key, version, surfaces = native.decode(data, cell_size, SURFACE)
+    return Tile(TileKey(*key), version, cell_size * 2.0**key[0], surfaces)
+
+
+def decode_tile_in_numpy(data: bytes | memoryview, cell_size: float) -> Tile:
+    """decode_tile without any library of our own."""
     oldest_reader, body = _opened(data)
     reader = ByteReader(body)
     key = TileKey(reader.fixed(1), reader.fixed(4, signed=True), reader.fixed(4, signed=True))
