@@ -7,7 +7,7 @@
 Metres, radians, seconds; right-handed, z up. T_a_b maps coordinates in frame b into frame a: p_a = T_a_b · p_b.
 strata.aio has the same for asyncio.
 """
-from strata import aio, shape
+from strata import aio, convert, shape
 from strata.classifiers import Classifier
 from strata.database import Database, connect
 from strata.errors import (AlreadyExists, Cancelled, DataLoss, DeadlineExceeded, FailedPrecondition, InvalidArgument,
@@ -39,5 +39,5 @@ __all__ = [
     "Floors", "Heights", "Job", "Kind", "Localization", "Map", "MapClass", "Mesh", "NON_TRAVERSABLE", "POINT", "POSE",
     "Path", "PathCheck", "Places", "PlaneModel", "Points", "PoseGraph", "Registration", "SURFACE", "Scan", "ScanChange",
     "ScanPose", "ShapeCheck", "Stats", "TRAVERSABLE", "Tile", "TileInfo", "TileKey", "TrackedPose", "Tracking",
-    "UNDERSIDE", "UNKNOWN", "View", "aio", "connect", "decode_tile", "poses_of", "register", "shape",
+    "UNDERSIDE", "UNKNOWN", "View", "aio", "connect", "convert", "decode_tile", "poses_of", "register", "shape",
 ]
