@@ -23,6 +23,7 @@ set(CPACK_COMPONENT_SERVER_DESCRIPTION "map database server for robots in three 
  Robots upload laser scans over gRPC; stratad aligns them into one multi-level
  map, keeps it consistent, and answers where things are and how to get there.")
 set(CPACK_DEBIAN_SERVER_PACKAGE_DEPENDS "adduser")
+set(CPACK_DEBIAN_SERVER_PACKAGE_RECOMMENDS "strata") # the nightly copies of maps (strata-backup.timer)
 set(CPACK_DEBIAN_SERVER_PACKAGE_CONTROL_EXTRA
     ${CMAKE_CURRENT_SOURCE_DIR}/debian/conffiles;${CMAKE_CURRENT_SOURCE_DIR}/debian/postinst;${CMAKE_CURRENT_SOURCE_DIR}/debian/prerm;${CMAKE_CURRENT_SOURCE_DIR}/debian/postrm
 )
@@ -39,9 +40,7 @@ set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
     "libabsl-dev, libassimp-dev, libboost-dev, libbz2-dev, libceres-dev, libeigen3-dev, libexpat1-dev, libfcl-dev, libgeographiclib-dev, libgoogle-glog-dev, libgrpc++-dev, liblz4-dev, liblzf-dev, libmeshoptimizer-dev, libnanoflann-dev, libopenblas-serial-dev, libpcap-dev, libpcl-dev, libpq-dev, libprotobuf-dev, libqhull-dev, libsqlite3-dev, libtiff-dev, liburdfdom-dev, libxxhash-dev, libyaml-cpp-dev, libzstd-dev, zlib1g-dev"
 )
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-strata)
-set(CPACK_DEBIAN_PYTHON_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
-set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3-grpcio, python3-numpy, python3-protobuf, python3-xxhash, python3-zstandard")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "strata") # strata.register
 set(CPACK_COMPONENT_PYTHON_DESCRIPTION "Python client of the map database Strata
@@ -61,8 +60,13 @@ install(
   COMPONENT server EXCLUDE_FROM_ALL
 )
 install(
-  FILES systemd/stratad.service
+  FILES systemd/stratad.service systemd/strata-backup.service systemd/strata-backup.timer
   DESTINATION /lib/systemd/system
+  COMPONENT server EXCLUDE_FROM_ALL
+)
+install(
+  PROGRAMS backup/backup-maps
+  DESTINATION /usr/lib/strata
   COMPONENT server EXCLUDE_FROM_ALL
 )
 install(

@@ -40,6 +40,7 @@ ARROWS = {
     "proto": ["core/api", "core/world", "core/mls", "core/cloud", "core/geometry", "core/common"],
     "server": ["proto", "core/api", "core/engine", "core/world", "core/mls", "core/cloud", "core/geometry",
                "core/common"],
+    "client/python": ["core/codec", "core/mls"],
     "client/sdk": ["proto", "core/api", "core/codec", "core/world", "core/mls", "core/cloud", "core/geometry",
                    "core/common"],
     "client/formats": ["core/occupancy", "core/posegraph", "core/egomotion", "core/world", "core/mls", "core/mesh", "core/cloud", "core/geometry", "core/common"],

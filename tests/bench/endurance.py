@@ -49,11 +49,13 @@ def robot(world, seed, tell):
 
 def reader(world, seed, tell):
     held = {}  # versions only: decoding would measure this program
+    from strata.blocking import iterate
     from strata.v1 import tiles_pb2
+    calls = world._asynchronous
     while True:
         request = tiles_pb2.FetchTilesRequest(map=MAP, held=held.values())
         begun = time.monotonic()
-        for answer in world._connection.stream(world._tiles.Fetch, request):
+        for answer in iterate(calls._connection.stream(calls._tiles.Fetch, request)):
             held[answer.tile.key.SerializeToString()] = tiles_pb2.HeldTile(key=answer.tile.key,
                                                                           version=answer.tile.version)
         tell("fetch", begun)

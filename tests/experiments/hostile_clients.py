@@ -45,9 +45,9 @@ PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 def good_client(kind, build, address, token, seed, period_s, told, over):
     sys.path.append(str(build / "client/python"))
     import strata
-    import strata.map
+    import strata.aio.surfaces
     # Decoding is work of the client's own machine, which here is the server's, too.
-    strata.map.decode_tile = lambda data, cell_size: data
+    strata.aio.surfaces.decode_tile = lambda data, cell_size: data
     random = np.random.default_rng(seed)
     with strata.connect(address, token=token) as db:
         world = db.map(MAP)

@@ -58,6 +58,7 @@ def main():
     build = options.build.resolve()
     sys.path.append(str(build / "client/python"))
     import strata
+    from strata.blocking import run
     print(f"seed {options.seed}", file=sys.stderr)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -66,8 +67,9 @@ def main():
             world = db.create_map(MAP)
 
             def send(sequence, count):
-                world._connection.once(world._scans.Upload,
-                                       messages(options.seed + sequence, sequence, count, options.align))
+                calls = world._asynchronous
+                run(calls._connection.send(calls._scans.Upload,
+                                           messages(options.seed + sequence, sequence, count, options.align)))
 
             def step(name, body):
                 server.forget_peak()

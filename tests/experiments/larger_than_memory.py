@@ -105,9 +105,11 @@ def make(db, out, street, mb):
 
 def fetch(world, area, level=0):
     """(tiles, bytes): decoding would measure this program."""
+    from strata.blocking import iterate
     from strata.v1 import tiles_pb2
-    request = tiles_pb2.FetchTilesRequest(map=MAP, area=world._area(area, level))
-    sizes = [len(answer.tile.bytes) for answer in world._connection.stream(world._tiles.Fetch, request)]
+    calls = world._asynchronous
+    request = tiles_pb2.FetchTilesRequest(map=MAP, area=calls._area(area, level))
+    sizes = [len(answer.tile.bytes) for answer in iterate(calls._connection.stream(calls._tiles.Fetch, request))]
     return len(sizes), sum(sizes)
 
 

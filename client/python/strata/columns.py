@@ -2,6 +2,7 @@
 import numpy as np
 import zstandard
 
+from strata.arrays import Array
 from strata.errors import DataLoss
 
 _STORED, _REPEATED, _ZSTD = 0, 1, 2
@@ -10,19 +11,19 @@ _STORED, _REPEATED, _ZSTD = 0, 1, 2
 class ByteReader:
     """Takes little-endian numbers from the front of some bytes; DataLoss beyond their end."""
 
-    def __init__(self, data):
+    def __init__(self, data: bytes | memoryview) -> None:
         self._data = memoryview(data)
 
-    def take(self, size):
+    def take(self, size: int) -> memoryview:
         if size > len(self._data):
             raise DataLoss("tile: cut short")
         taken, self._data = self._data[:size], self._data[size:]
         return taken
 
-    def fixed(self, size, signed=False):
+    def fixed(self, size: int, signed: bool = False) -> int:
         return int.from_bytes(self.take(size), "little", signed=signed)
 
-    def varint(self):
+    def varint(self) -> int:
         value = 0
         for shift in range(0, 64, 7):
             byte = self.fixed(1)
@@ -31,7 +32,7 @@ class ByteReader:
                 return value & 0xFFFFFFFFFFFFFFFF
         raise DataLoss("tile: a number of more than 64 bits")
 
-    def column(self, max_size):
+    def column(self, max_size: int) -> Array:
         """Bytes of a column as an array of uint8; `max_size` bounds what a hostile one may make it allocate."""
         packing = self.fixed(1)
         size = self.varint()
@@ -46,11 +47,11 @@ class ByteReader:
         raise DataLoss(f"column: unknown packing {packing}")
 
     @property
-    def remaining(self):
+    def remaining(self) -> int:
         return len(self._data)
 
 
-def _decompressed(packed, size):
+def _decompressed(packed: memoryview, size: int) -> bytes:
     try:
         announced = zstandard.frame_content_size(packed)  # else it is what would be allocated
         if announced not in (-1, size):
@@ -63,7 +64,7 @@ def _decompressed(packed, size):
     return result
 
 
-def _bits_at(raw, starts, counts):
+def _bits_at(raw: Array, starts: Array, counts: Array) -> Array:
     """Numbers of `counts` ≤ 62 bits that begin at bit `starts`, lowest bit first."""
     padded = np.concatenate([raw, np.zeros(9, np.uint8)])
     first_byte, offset = starts >> 3, (starts & 7).astype(np.uint64)
@@ -71,10 +72,11 @@ def _bits_at(raw, starts, counts):
     high = padded[first_byte + 8].astype(np.uint64)
     # A shift by 64 is undefined, so the high byte goes up in two steps.
     bits = (low >> offset) | (high << (np.uint64(63) - offset) << np.uint64(1))
-    return bits & ((np.uint64(1) << counts.astype(np.uint64)) - np.uint64(1))
+    masked: Array = bits & ((np.uint64(1) << counts.astype(np.uint64)) - np.uint64(1))
+    return masked
 
 
-def numbers_of(tokens, raw):
+def numbers_of(tokens: Array, raw: Array) -> Array:
     """Signed numbers of an array of one-byte tokens, in the order of coding, and the raw bits they share."""
     values = tokens.astype(np.uint64)
     large = np.flatnonzero(tokens >= 128)
@@ -88,4 +90,5 @@ def numbers_of(tokens, raw):
         raise DataLoss(f"column: {len(raw)} bytes of raw bits, expected {(used + 7) // 8}")
     leading = (2 | large_tokens & 1).astype(np.uint64) << raw_counts.astype(np.uint64)
     values[large] = leading | _bits_at(raw, ends - raw_counts, raw_counts)
-    return (values >> np.uint64(1)).view(np.int64) ^ -(values & np.uint64(1)).view(np.int64)
+    result: Array = (values >> np.uint64(1)).view(np.int64) ^ -(values & np.uint64(1)).view(np.int64)
+    return result

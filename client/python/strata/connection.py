@@ -1,17 +1,27 @@
-"""The channel to a server, and calls that are made again while it is away or busy."""
+"""Calls on a channel to a server, made again while it is away or busy. Everything here is asynchronous in form; whether a
+call blocks the thread or the task is settled by two small classes below Connection: strata.blocking.BlockingConnection and
+strata.aio.connection.AsyncioConnection. See docs/decisions/0203."""
+import abc
+import dataclasses
+import os
 import random
-import threading
 import time
+from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable
+from typing import Any, Protocol, TypeVar
 
 import grpc
 
 from strata import errors
+from strata.methods import A, Q, StreamStream, StreamUnary, UnaryStream, UnaryUnary
+
+T = TypeVar("T")
 
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.1, 5.0
 _CONNECT_TIMEOUT_S = 10.0
 _SYSTEM_ROOTS = "/etc/ssl/certs/ca-certificates.crt"
-_CHANNEL_OPTIONS = [
-    ("grpc.max_receive_message_length", 64 << 20),
+_MAX_MESSAGE_BYTES = 64 << 20
+CHANNEL_OPTIONS = [
+    ("grpc.max_receive_message_length", _MAX_MESSAGE_BYTES),
     ("grpc.max_reconnect_backoff_ms", 1000),
     ("grpc.initial_reconnect_backoff_ms", 100),
     ("grpc.enable_retries", 0),  # Backoff repeats; beside it, gRPC 1.51's own lost a call made while a server ended
@@ -19,116 +29,158 @@ _CHANNEL_OPTIONS = [
 ]
 
 
+def is_passing(failure: errors.StrataError) -> bool:
+    """The same call may succeed after a while."""
+    busy = isinstance(failure, errors.ResourceExhausted) and failure.retry_delay is not None
+    # A server that ends cancels what comes in last.
+    return busy or isinstance(failure, (errors.Unavailable, errors.Cancelled))
+
+
 class Backoff:
-    """Pauses between the attempts of one call, until `patience` seconds have passed since its first failure or the
-    event `closed` is set."""
+    """Pauses between the attempts of one call, until `patience` seconds have passed since its first failure."""
 
-    def __init__(self, patience, closed):
+    def __init__(self, patience: float) -> None:
         self._patience = patience
-        self._closed = closed
         self._pause = _FIRST_PAUSE_S
-        self._until = None
+        self._until: float | None = None
 
-    def wait(self, failure):
-        """Sleeps if `failure` may be gone after a while; raises it otherwise."""
-        busy = isinstance(failure, errors.ResourceExhausted) and failure.retry_delay is not None
-        # A server that ends cancels what comes in last.
-        gone = isinstance(failure, (errors.Unavailable, errors.Cancelled))
-        if self._closed.is_set() or not (busy or gone):
+    def next_pause(self, failure: errors.StrataError) -> float:
+        """Seconds to wait if `failure` may be gone then; raises it otherwise."""
+        if not is_passing(failure):
             raise failure
         now = time.monotonic()
         self._until = self._until or now + self._patience
         pause = max(self._pause * random.uniform(0.5, 1.0), failure.retry_delay or 0.0)
         if now + pause > self._until:
             raise failure
-        if self._closed.wait(pause):
-            raise failure
         self._pause = min(2 * self._pause, _LONGEST_PAUSE_S)
+        return pause
 
 
-def _read(path):
+def _read(path: str | os.PathLike[str]) -> bytes:
     with open(path, "rb") as file:
         return file.read()
 
 
-def open_channel(target, ca, certificate, key):
-    if ca is None:
-        if certificate is not None or key is not None:
-            raise ValueError("certificate and key are for TLS: name the roots to trust as ca")
-        return grpc.insecure_channel(target, _CHANNEL_OPTIONS)
-    if (certificate is None) != (key is None):
-        raise ValueError("certificate and key go together: one of them is missing")
-    credentials = grpc.ssl_channel_credentials(
-        None if ca is True else _read(ca), _read(key) if key else None, _read(certificate) if certificate else None)
-    return grpc.secure_channel(target, credentials, _CHANNEL_OPTIONS)
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """How to reach a server, as strata.connect describes it."""
+
+    target: str
+    token: str | None = None
+    ca: str | os.PathLike[str] | bool | None = None
+    certificate: str | os.PathLike[str] | None = None
+    key: str | os.PathLike[str] | None = None
+    timeout: float | None = None
+    patience: float = 60.0
+
+    def credentials(self) -> Any:
+        """Of a TLS channel; None: no TLS."""
+        if self.ca is None or self.ca is False:
+            if self.certificate is not None or self.key is not None:
+                raise ValueError("certificate and key are for TLS: name the roots to trust as ca")
+            return None
+        if (self.certificate is None) != (self.key is None):
+            raise ValueError("certificate and key go together: one of them is missing")
+        return grpc.ssl_channel_credentials(
+            None if self.ca is True else _read(self.ca), _read(self.key) if self.key else None,
+            _read(self.certificate) if self.certificate else None)
+
+    @property
+    def connect_timeout(self) -> float:
+        """Seconds."""
+        return min(_CONNECT_TIMEOUT_S, self.timeout or _CONNECT_TIMEOUT_S)
+
+    def nobody_answers(self) -> errors.Unavailable:
+        return errors.Unavailable(f"no server answers at {self.target} within {self.connect_timeout:g} s; "
+                                  "is stratad running there, with or without TLS as here?")
 
 
-class Connection:
-    """Calls on one channel. Thread-safe."""
+Sent = TypeVar("Sent", contravariant=True)
 
-    def __init__(self, target, *, token=None, ca=None, certificate=None, key=None, timeout=None, patience=60.0):
-        self._program = [target, token, ca, certificate, key]
-        self._metadata = (("authorization", f"Bearer {token}"),) if token else ()
-        self._timeout = timeout
-        self._patience = patience
-        self._closed = threading.Event()
-        self.channel = open_channel(target, ca, certificate, key)
-        connect_timeout = min(_CONNECT_TIMEOUT_S, timeout or _CONNECT_TIMEOUT_S)
-        try:
-            grpc.channel_ready_future(self.channel).result(timeout=connect_timeout)
-        except grpc.FutureTimeoutError:
-            self.channel.close()
-            raise errors.Unavailable(f"no server answers at {target} within {connect_timeout:g} s; "
-                                     "is stratad running there, with or without TLS as here?") from None
 
-    def program_options(self):
-        """What makes the program `strata` speak to the same server as the same user: options, and its environment."""
-        target, token, ca, certificate, key = self._program
-        files = {"--tls-ca": _SYSTEM_ROOTS if ca is True else ca, "--tls-cert": certificate, "--tls-key": key}
-        options = ["--server", target]
-        for option, file in files.items():
-            options += [option, str(file)] if file else []
-        # Whoever gave a token here without TLS has accepted that it can be read.
-        options += ["--insecure"] if token and ca is None else []
-        return options, {"STRATA_TOKEN": token} if token else {}
+class Pipe(Protocol[Sent]):
+    """Requests of a stream, given one by one."""
 
-    def close(self):
+    @property
+    def requests(self) -> Any:
+        """What gRPC takes as the requests."""
+
+    def put(self, request: Sent) -> None: ...
+
+    def end(self) -> None: ...
+
+
+class Connection(abc.ABC):
+    """Calls on one channel. Methods of stubs go in, and messages; StrataErrors come out."""
+
+    def __init__(self, options: Options, channel: Any) -> None:
+        self.options = options
+        self.channel = channel
+        self.metadata = (("authorization", f"Bearer {options.token}"),) if options.token else ()
+
+    @abc.abstractmethod
+    async def once(self, method: UnaryUnary[Q, A], request: Q) -> A:
+        """One attempt of a call."""
+
+    @abc.abstractmethod
+    async def send(self, method: StreamUnary[Q, A], requests: Iterable[Q]) -> A:
+        """One attempt of a call with many requests."""
+
+    @abc.abstractmethod
+    def stream(self, method: UnaryStream[Q, A], request: Q, *, endless: bool = False) -> AsyncGenerator[A, None]:
+        """The answers of one attempt; leaving it ends the call. `endless`: no timeout."""
+
+    @abc.abstractmethod
+    def pipe(self, method: StreamStream[Q, A]) -> tuple[Pipe[Q], AsyncGenerator[A, None]]:
+        """Requests and answers of one attempt, without timeout."""
+
+    @abc.abstractmethod
+    async def sleep(self, seconds: float) -> bool:
+        """Whether the connection was closed meanwhile."""
+
+    @abc.abstractmethod
+    async def work(self, function: Callable[[], T]) -> T:
+        """What a function returns that may take its time."""
+
+    @abc.abstractmethod
+    async def close(self) -> None:
         """Ends all calls, with Cancelled."""
-        self._closed.set()
-        self.channel.close()
 
-    def new_backoff(self):
-        return Backoff(self._patience, self._closed)
+    def new_backoff(self) -> Backoff:
+        return Backoff(self.options.patience)
 
-    def once(self, method, request):
-        """One attempt of a call with one answer; `request` is a message, or an iterator of messages."""
-        try:
-            return method(request, timeout=self._timeout, metadata=self._metadata)
-        except grpc.RpcError as error:
-            raise errors.from_rpc(error) from None
+    async def wait(self, backoff: Backoff, failure: errors.StrataError) -> None:
+        """Sleeps until the next attempt; raises `failure` if there should be none."""
+        if await self.sleep(backoff.next_pause(failure)):
+            raise failure
 
-    def repeated(self, attempt):
+    async def repeated(self, attempt: Callable[[], Awaitable[T]]) -> T:
         """What attempt() returns, which is made again after trouble that may pass."""
         backoff = self.new_backoff()
         while True:
             try:
-                return attempt()
+                return await attempt()
             except errors.StrataError as failure:
-                backoff.wait(failure)
+                await self.wait(backoff, failure)
 
-    def unary(self, method, request):
-        return self.repeated(lambda: self.once(method, request))
+    async def unary(self, method: UnaryUnary[Q, A], request: Q) -> A:
+        return await self.repeated(lambda: self.once(method, request))
 
-    def stream(self, method, request, *, endless=False):
-        """Generator over the answers of one attempt; leaving it ends the call. `endless`: no timeout."""
-        call = method(request, timeout=None if endless else self._timeout, metadata=self._metadata)
-        try:
-            yield from call
-        except grpc.RpcError as error:
-            raise errors.from_rpc(error) from None
-        finally:
-            call.cancel()
-
-    def collected(self, method, request):
+    async def collected(self, method: UnaryStream[Q, A], request: Q) -> list[A]:
         """All answers of a stream."""
-        return self.repeated(lambda: list(self.stream(method, request)))
+        async def attempt() -> list[A]:
+            return [answer async for answer in self.stream(method, request)]
+
+        return await self.repeated(attempt)
+
+    def program_options(self) -> tuple[list[str], dict[str, str]]:
+        """What makes the program `strata` speak to the same server as the same user: options, and its environment."""
+        of = self.options
+        files = {"--tls-ca": _SYSTEM_ROOTS if of.ca is True else of.ca, "--tls-cert": of.certificate, "--tls-key": of.key}
+        options = ["--server", of.target]
+        for option, file in files.items():
+            options += [option, str(file)] if file else []
+        # Whoever gave a token here without TLS has accepted that it can be read.
+        options += ["--insecure"] if of.token and of.ca is None else []
+        return options, {"STRATA_TOKEN": of.token} if of.token else {}

@@ -1,12 +1,18 @@
 """A server of maps."""
-from strata import plan
-from strata.connection import Connection
-from strata.errors import AlreadyExists
+import os
+from types import TracebackType
+from typing import Any
+
+from strata import aio
+from strata.blocking import BlockingConnection, blocking, blocking_made
+from strata.connection import Options
 from strata.map import Map
-from strata.v1 import maps_pb2, maps_pb2_grpc
 
 
-def connect(target="127.0.0.1:50051", **options):
+def connect(target: str = "127.0.0.1:50051", *, token: str | None = None,
+            ca: str | os.PathLike[str] | bool | None = None, certificate: str | os.PathLike[str] | None = None,
+            key: str | os.PathLike[str] | None = None, timeout: float | None = None,
+            patience: float = 60.0) -> "Database":
     """The Database at target, HOST:PORT. A context manager: leaving it closes the connection.
 
     token: the bearer token that the server's owner gave you. Without TLS anybody on the way can read it.
@@ -17,58 +23,29 @@ def connect(target="127.0.0.1:50051", **options):
 
     Raises Unavailable if nobody answers within ten seconds, or `timeout`.
     """
-    return Database(Connection(target, **options))
+    return Database(aio.Database(BlockingConnection(Options(target, token, ca, certificate, key, timeout, patience))))
 
 
 class Database:
     """Thread-safe."""
 
-    def __init__(self, connection):
-        self._connection = connection
-        self._stub = maps_pb2_grpc.MapsStub(connection.channel)
+    def __init__(self, asynchronous: aio.Database) -> None:
+        self._asynchronous = asynchronous
 
-    def __enter__(self):
+    def __enter__(self) -> "Database":
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
         self.close()
 
-    def close(self):
-        self._connection.close()
+    @property
+    def channel(self) -> Any:
+        """gRPC's channel, for the stubs of strata.v1; calls on it carry no token by themselves."""
+        return self._asynchronous.channel
 
-    def create_map(self, name, *, cell_size=None, gap_size=None, thickness=None, profile=None, keep_points=True,
-                   fade_after=0, exist_ok=False):
-        """A new, empty map.
-
-        cell_size, gap_size, thickness: of its surfaces [m]; None: 0.1, 1 and 0.1. profile: {"radius": 0.3, …} of the
-        robot whose traversability the tiles carry, see Map.plan. keep_points False: points are dropped once a scan is
-        in the tiles. fade_after: later scans that must have looked through a place for what was there to fade by itself;
-        0: nothing does. exist_ok: a map of that name is taken as it is. Raises AlreadyExists, InvalidArgument.
-        """
-        mls = {"cell_size_m": cell_size, "gap_size_m": gap_size, "thickness_m": thickness}
-        parameters = maps_pb2.MapParameters(
-            mls=maps_pb2.MlsParameters(**{field: value for field, value in mls.items() if value is not None}),
-            default_profile=plan.profile_to_proto(profile or {}), keep_points=keep_points,
-            fade_after=fade_after)
-        request = maps_pb2.CreateMapRequest(name=name, parameters=parameters)
-        call = self._connection.unary if exist_ok else self._connection.once
-        try:
-            call(self._stub.Create, request)
-        except AlreadyExists:
-            if not exist_ok:
-                raise
-        return self.map(name)
-
-    def map(self, name):
-        """The map of that name; NotFound."""
-        answer = self._connection.unary(self._stub.Get, maps_pb2.GetMapRequest(name=name))
-        return Map(self._connection, name, answer.map.parameters.mls.cell_size_m)
-
-    def maps(self):
-        """Names of all maps, sorted."""
-        answer = self._connection.unary(self._stub.List, maps_pb2.ListMapsRequest())
-        return [info.name for info in answer.maps]
-
-    def delete_map(self, name):
-        """Deletes the map with all it holds, for good."""
-        self._connection.once(self._stub.Delete, maps_pb2.DeleteMapRequest(name=name))
+    create_map = blocking_made(aio.Database.create_map, Map)
+    map = blocking_made(aio.Database.map, Map)
+    close = blocking(aio.Database.close)
+    maps = blocking(aio.Database.maps)
+    delete_map = blocking(aio.Database.delete_map)

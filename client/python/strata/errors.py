@@ -1,4 +1,6 @@
 """What goes wrong, as exceptions."""
+from typing import Any
+
 import grpc
 
 from strata.v1 import error_pb2
@@ -7,9 +9,9 @@ from strata.v1 import error_pb2
 class StrataError(Exception):
     """A call that did not succeed. `str()` is the message: the thing, its value, the bound or the cure."""
 
-    code = grpc.StatusCode.UNKNOWN
+    code: grpc.StatusCode = grpc.StatusCode.UNKNOWN
 
-    def __init__(self, message, *, reason="", retry_delay=None, request_id=""):
+    def __init__(self, message: str, *, reason: str = "", retry_delay: float | None = None, request_id: str = "") -> None:
         super().__init__(message)
         self.reason = reason
         """Who refused: REQUEST, DATABASE, SERVER_BUSY, SHUTTING_DOWN, SLOW_READER; "" if nobody said."""
@@ -76,7 +78,7 @@ class Unimplemented(StrataError):
 _BY_CODE = {kind.code: kind for kind in StrataError.__subclasses__()}
 
 
-def _detail_of(error):
+def _detail_of(error: Any) -> error_pb2.ErrorDetail:
     for key, value in error.trailing_metadata() or ():
         if key == "grpc-status-details-bin":
             status = error_pb2.ErrorStatus.FromString(value)
@@ -86,15 +88,20 @@ def _detail_of(error):
     return error_pb2.ErrorDetail()
 
 
-def from_rpc(error):
+def from_detail(code: grpc.StatusCode, message: str, detail: error_pb2.ErrorDetail) -> StrataError:
+    """The StrataError of a canonical code and what a server says of it."""
+    delay = detail.metadata.get("retry_delay_ms")
+    kind = _BY_CODE.get(code, StrataError)
+    made = kind(message or code.name, reason=detail.reason, retry_delay=int(delay) / 1000 if delay else None,
+                request_id=detail.metadata.get("request_id", ""))
+    made.code = code
+    return made
+
+
+def from_rpc(error: Any) -> StrataError:
     """The StrataError that a grpc.RpcError stands for."""
     detail = _detail_of(error)
     if error.code() == grpc.StatusCode.RESOURCE_EXHAUSTED and not detail.reason and "RST_STREAM" in (error.details() or ""):
         # Below the calls (HTTP/2's ENHANCE_YOUR_CALM), where nobody says when to try again.
         return Unavailable(f"the server was short of memory and dropped the call ({error.details()})")
-    delay = detail.metadata.get("retry_delay_ms")
-    kind = _BY_CODE.get(error.code(), StrataError)
-    made = kind(error.details() or error.code().name, reason=detail.reason,
-                retry_delay=int(delay) / 1000 if delay else None, request_id=detail.metadata.get("request_id", ""))
-    made.code = error.code()
-    return made
+    return from_detail(error.code(), error.details() or "", detail)

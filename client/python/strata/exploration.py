@@ -1,9 +1,12 @@
 """Where a robot should look next."""
 import dataclasses
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from strata import poses
+from strata.arrays import Array, ArrayLike
 from strata.v1 import planning_pb2
 
 
@@ -11,9 +14,9 @@ from strata.v1 import planning_pb2
 class View:
     """From where to look."""
 
-    pose: np.ndarray
+    pose: Array
     """(4, 4) T_map_sensor, upright."""
-    place: np.ndarray
+    place: Array
     """(3,) below it, on the surface, map frame [m]."""
     gain_bits: float
     """Expected to be learnt, after the views before."""
@@ -33,10 +36,10 @@ class Exploration:
     """views, explored or start_not_on_surface."""
     message: str
     """The same for people, with numbers."""
-    views: list
+    views: list[View]
     stands: int
     """Places that were compared."""
-    region: np.ndarray | None
+    region: Array | None
     """(2, 3) lower and upper corner of what was looked at, map frame [m]; None: the start is on no surface."""
     known_volume: float
     """Of the region, free or occupied [m³]."""
@@ -46,22 +49,22 @@ class Exploration:
     """Whose rays it is known by."""
     scans_left_out: int
     """That may have seen it, but whose points are gone or damaged."""
-    nearest: np.ndarray | None
+    nearest: Array | None
     """(3,) start not on a surface: the nearest place where this robot could stand."""
     epoch: int
     """Of which the answer is."""
 
-    def __bool__(self):
+    def __bool__(self) -> bool:
         return bool(self.views)
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[View]:
         return iter(self.views)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.views)
 
 
-def _numbers(message, skip):
+def _numbers(message: Any, skip: set[str]) -> dict[str, str]:
     return {field.name.removesuffix("_m").removesuffix("_rad"): field.name
             for field in message.DESCRIPTOR.fields if field.type != field.TYPE_MESSAGE and field.name not in skip}
 
@@ -71,7 +74,7 @@ _QUERY.pop("bits_per", None)
 _SENSOR = _numbers(planning_pb2.FieldOfView, set())
 
 
-def to_proto(name, count, region, query):
+def to_proto(name: str, count: int, region: ArrayLike | None, query: Mapping[str, float]) -> planning_pb2.ExploreRequest:
     """What is no number of the query or its sensor is a ValueError."""
     unknown = sorted(set(query) - set(_QUERY) - set(_SENSOR))
     if unknown:
@@ -92,7 +95,7 @@ def to_proto(name, count, region, query):
     return request
 
 
-def from_proto(message):
+def from_proto(message: planning_pb2.ExploreResponse) -> Exploration:
     has_region = message.HasField("region_min") and message.HasField("region_max")
     return Exploration(
         reason=planning_pb2.ExploreReason.Name(message.reason).removeprefix("EXPLORE_REASON_").lower(),

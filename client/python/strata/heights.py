@@ -5,6 +5,8 @@ import tempfile
 
 import numpy as np
 
+from strata.arrays import Array, ArrayLike
+from strata.connection import Connection
 from strata import program as strata_program
 
 _SURFACES = ("highest", "kalman", "ground")
@@ -15,15 +17,15 @@ TRAVERSABLE, NON_TRAVERSABLE, VERTICAL, GAP = 1, 2, 3, 4  # GAP: traversable bel
 class Heights:
     """A grid seen from above: row 0 in the south, column 0 in the west; NaN where nothing is known."""
 
-    z: np.ndarray  # (rows, columns) [m]; of the map, or above the ellipsoid where the map has an origin on earth
-    sigma: np.ndarray  # (rows, columns), standard deviation of z [m]
-    classes: np.ndarray  # (rows, columns) of uint8, 0 where nothing is known; None but of ground
-    origin: np.ndarray  # (2,), lower left corner, map frame [m]
+    z: Array  # (rows, columns) [m]; of the map, or above the ellipsoid where the map has an origin on earth
+    sigma: Array  # (rows, columns), standard deviation of z [m]
+    classes: Array | None  # (rows, columns) of uint8, 0 where nothing is known; None but of ground
+    origin: Array  # (2,), lower left corner, map frame [m]
     cell_size: float  # [m]
-    projection: str  # where that is on earth, WKT of a map with an origin there; else None
+    projection: str | None  # where that is on earth, WKT of a map with an origin there; else None
 
 
-def read_asc(path):
+def read_asc(path: str | os.PathLike[str]) -> tuple[Array, Array, float]:
     """(values, corner, cell size) of an ESRI ASCII grid that strata wrote."""
     with open(path, encoding="ascii") as file:
         head = dict(file.readline().split() for _ in range(6))
@@ -33,7 +35,8 @@ def read_asc(path):
     return values, np.array([float(head["xllcorner"]), float(head["yllcorner"])]), float(head["cellsize"])
 
 
-def heights(connection, name, surface, region, *, profile, level, program):
+def heights(connection: Connection, name: str, surface: str, region: ArrayLike | None, *, profile: str | None,
+            level: int, program: str) -> Heights:
     if surface not in _SURFACES:
         raise ValueError(f"surface {surface!r}; expected one of {', '.join(_SURFACES)}")
     arguments = ["--format", "asc", "--surface", surface, "--level", str(int(level))]

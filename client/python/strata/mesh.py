@@ -5,6 +5,8 @@ import tempfile
 
 import numpy as np
 
+from strata.arrays import Array, ArrayLike
+from strata.connection import Connection
 from strata import program as strata_program
 
 _METHODS = ("tsdf", "contour", "alpha")
@@ -14,20 +16,21 @@ _METHODS = ("tsdf", "contour", "alpha")
 class Mesh:
     """Triangles that face outwards."""
 
-    vertices: np.ndarray  # (n, 3) float64, map frame [m]
-    normals: np.ndarray  # (n, 3) float32, unit
-    triangles: np.ndarray  # (m, 3) uint32, indices of vertices, counter-clockwise seen from outside
+    vertices: Array  # (n, 3) float64, map frame [m]
+    normals: Array  # (n, 3) float32, unit
+    triangles: Array  # (m, 3) uint32, indices of vertices, counter-clockwise seen from outside
     area_m2: float
     closed: bool  # without a border
     boundary_edges: int
 
 
-def read_ply(path):
+def read_ply(path: str | os.PathLike[str]) -> tuple[Array, Array, Array]:
     """(vertices, normals, triangles) of a binary PLY file that strata wrote."""
     with open(path, "rb") as file:
         data = file.read()
     header, _, body = data.partition(b"end_header\n")
-    counts, columns = {}, []
+    counts: dict[str, int] = {}
+    columns: list[tuple[str, str]] = []
     for line in header.decode().splitlines():
         words = line.split()
         if words[0] == "element":
@@ -41,7 +44,8 @@ def read_ply(path):
     return vertices, normals, faces["indices"].copy()
 
 
-def mesh(connection, name, region, *, voxel, method, of_class, simplify, program):
+def mesh(connection: Connection, name: str, region: ArrayLike | None, *, voxel: float, method: str,
+         of_class: str | int | None, simplify: int | None, program: str) -> Mesh:
     if method not in _METHODS:
         raise ValueError(f"method {method!r}; expected one of {', '.join(_METHODS)}")
     arguments = ["--voxel", repr(float(voxel)), "--method", method]

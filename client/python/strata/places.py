@@ -3,7 +3,8 @@ import dataclasses
 
 import numpy as np
 
-from strata.floors import _BLOCK, _bits
+from strata.arrays import Array
+from strata.floors import BLOCK, bits
 from strata.v1 import planning_pb2
 
 _KINDS = {planning_pb2.PLACE_KIND_ROOM: "room", planning_pb2.PLACE_KIND_CORRIDOR: "corridor",
@@ -20,13 +21,13 @@ class Place:
     """"room", "corridor" or "doorway"."""
     area: float
     """Of the free cells [m²]."""
-    low: np.ndarray
+    low: Array
     """(2,) lower corner of the box around the free cells, map frame [m]."""
-    high: np.ndarray
+    high: Array
     """(2,) its upper corner."""
-    middle: np.ndarray
+    middle: Array
     """(2,) a place to stand, near the middle."""
-    neighbours: tuple
+    neighbours: tuple[int, ...]
     """Indices into Places.places of those that it touches, rising."""
 
 
@@ -34,12 +35,12 @@ class Place:
 class Places:
     """The places of one floor, the largest first."""
 
-    places: list
+    places: list[Place]
     floor: int | None
     """Number of the floor; None: the map has none."""
-    grid: np.ndarray | None
+    grid: Array | None
     """(ny, nx) int32: index of the place of each cell or NO_PLACE, row 0 the lowest y; None unless cells were asked for."""
-    origin: tuple | None
+    origin: tuple[float, float] | None
     """(x, y) of the grid's lower left corner, map frame [m]."""
     cell_size: float
     """Of the map and of the grid [m]."""
@@ -49,20 +50,20 @@ class Places:
     """The state of the map that the answer is of."""
 
 
-def _grid(message):
+def _grid(message: planning_pb2.ListPlacesResponse) -> tuple[Array, tuple[float, float]] | tuple[None, None]:
     blocks = [(b.x, b.y, b.cells, number) for number, place in enumerate(message.places) for b in place.blocks]
     if not blocks:
         return None, None
     x0, y0 = min(b[0] for b in blocks), min(b[1] for b in blocks)
     nx, ny = max(b[0] for b in blocks) - x0 + 1, max(b[1] for b in blocks) - y0 + 1
-    grid = np.full((ny * _BLOCK, nx * _BLOCK), NO_PLACE, np.int32)
+    grid = np.full((ny * BLOCK, nx * BLOCK), NO_PLACE, np.int32)
     for x, y, cells, number in blocks:
-        row, column = (y - y0) * _BLOCK, (x - x0) * _BLOCK
-        grid[row:row + _BLOCK, column:column + _BLOCK][_bits(cells)] = number
-    return grid, (x0 * _BLOCK * message.cell_size_m, y0 * _BLOCK * message.cell_size_m)
+        row, column = (y - y0) * BLOCK, (x - x0) * BLOCK
+        grid[row:row + BLOCK, column:column + BLOCK][bits(cells)] = number
+    return grid, (x0 * BLOCK * message.cell_size_m, y0 * BLOCK * message.cell_size_m)
 
 
-def from_proto(message):
+def from_proto(message: planning_pb2.ListPlacesResponse) -> Places:
     grid, origin = _grid(message)
     return Places(
         places=[Place(kind=_KINDS.get(place.kind, "unknown"), area=place.area_m2,

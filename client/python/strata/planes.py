@@ -1,10 +1,12 @@
 """The flat surfaces of a map as polygons."""
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
 from strata import errors, poses
-from strata.v1 import posegraph_pb2
+from strata.arrays import Array
+from strata.v1 import models_pb2, posegraph_pb2
 
 _KINDS = {posegraph_pb2.PLANE_KIND_WALL: "wall", posegraph_pb2.PLANE_KIND_LEVEL: "level",
           posegraph_pb2.PLANE_KIND_SLOPED: "sloped"}
@@ -14,7 +16,7 @@ _KINDS = {posegraph_pb2.PLANE_KIND_WALL: "wall", posegraph_pb2.PLANE_KIND_LEVEL:
 class Hole:
     """What a polygon leaves out."""
 
-    ring: np.ndarray
+    ring: Array
     """(n, 3) closed line, map frame [m]; the last point is joined to the first."""
     seen_open: bool
     """Rays passed through most of it: a window or a door. False: nothing is known about it."""
@@ -24,9 +26,9 @@ class Hole:
 class Polygon:
     """A connected piece of a plane's surface."""
 
-    outer: np.ndarray
+    outer: Array
     """(n, 3) closed line, counterclockwise when looked at against the normal, map frame [m]."""
-    holes: list
+    holes: list[Hole]
     area: float
     """Without the holes [m²]."""
 
@@ -36,7 +38,7 @@ class Plane:
     """The points x with normal · x = distance."""
 
     id: int
-    normal: np.ndarray
+    normal: Array
     """(3,) unit, to where the plane was seen from."""
     distance: float
     kind: str
@@ -47,9 +49,9 @@ class Plane:
     """Of its polygons; without any, of flat surface measured in it [m²]."""
     rms: float
     """Of its points' distances to it [m]."""
-    polygons: list
+    polygons: list[Polygon]
     """By falling area."""
-    rgb: tuple | None
+    rgb: tuple[int, ...] | None
     """Mean colour of its points, 0 to 255; None unless the job told planes apart by colours (colour=1)."""
 
 
@@ -57,8 +59,8 @@ class Plane:
 class PlaneModel:
     """The planes of a map by falling area, and their main directions by falling number of planes."""
 
-    planes: list
-    directions: np.ndarray
+    planes: list[Plane]
+    directions: Array
     """(k, 3) unit vectors."""
     epoch: int
     """Whose poses they stand on."""
@@ -66,11 +68,11 @@ class PlaneModel:
     """That found them."""
 
 
-def _ring(message):
+def _ring(message: models_pb2.PlaneRing) -> Array:
     return np.asarray(message.xyz, dtype=float).reshape(-1, 3)
 
 
-def _plane(message):
+def _plane(message: models_pb2.ModelPlane) -> Plane:
     return Plane(
         id=message.id, normal=poses.array3(message.plane.normal), distance=message.plane.distance,
         kind=_KINDS[message.kind], direction=message.direction if message.HasField("direction") else None,
@@ -81,7 +83,7 @@ def _plane(message):
                   for polygon in message.polygons])
 
 
-def from_proto(answers):
+def from_proto(answers: Sequence[models_pb2.GetPlaneModelResponse]) -> PlaneModel:
     if not answers or not answers[-1].HasField("model"):
         raise errors.DataLoss("the answer ended before its last message")
     model = answers[-1].model

@@ -1,19 +1,24 @@
 """Poses T_a_b (p_a = T_a_b * p_b) as 4 × 4 matrices of doubles; metres."""
 import numpy as np
 
+from strata.arrays import Array, ArrayLike
 from strata.v1 import geometry_pb2
 
 _TOLERANCE = 1e-3  # of a rotation, as the server's
 
 
-def _matrix_of_quaternion(quaternion):
+PoseLike = ArrayLike | tuple[ArrayLike, ArrayLike] | None
+"""A pose as users write it: a 4 × 4 matrix, (translation, quaternion x y z w), or None for the identity."""
+
+
+def _matrix_of_quaternion(quaternion: Array | tuple[float, float, float, float]) -> Array:
     x, y, z, w = quaternion
     return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
                      [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
 
 
-def _quaternion_of_matrix(r):
+def _quaternion_of_matrix(r: Array) -> Array:
     """(x, y, z, w) by Shepperd's method: from the largest of the four, so that nothing is lost."""
     four_squares = 1 + np.array([[1, -1, -1], [-1, 1, -1], [-1, -1, 1], [1, 1, 1]]) @ np.diag(r)
     largest = int(np.argmax(four_squares))
@@ -27,12 +32,12 @@ def _quaternion_of_matrix(r):
     return q / np.linalg.norm(q)
 
 
-def matrix(pose):
+def matrix(pose: PoseLike) -> Array:
     """A pose as users write it: a 4 × 4 matrix, (translation, quaternion x y z w), or None for the identity.
 
     Raises ValueError for what is no rigid pose.
     """
-    result = np.eye(4)
+    result: Array = np.eye(4)
     if pose is None:
         return result
     if isinstance(pose, (tuple, list)) and len(pose) == 2:
@@ -57,14 +62,14 @@ def matrix(pose):
     return result
 
 
-def to_proto(pose):
+def to_proto(pose: Array) -> geometry_pb2.Pose:
     """The message of a 4 × 4 matrix."""
     x, y, z, w = _quaternion_of_matrix(pose[:3, :3])
     return geometry_pb2.Pose(translation=vector3(pose[:3, 3]),
                              rotation=geometry_pb2.Quaternion(x=x, y=y, z=z, w=w))
 
 
-def from_proto(message):
+def from_proto(message: geometry_pb2.Pose) -> Array:
     """The 4 × 4 matrix of a message."""
     result = np.eye(4)
     if message.HasField("rotation"):
@@ -74,10 +79,19 @@ def from_proto(message):
     return result
 
 
-def vector3(numbers):
-    x, y, z = (float(number) for number in numbers)
+def vector3(numbers: ArrayLike) -> geometry_pb2.Vector3:
+    x, y, z = np.asarray(numbers, dtype=float).tolist()
     return geometry_pb2.Vector3(x=x, y=y, z=z)
 
 
-def array3(message):
+def array3(message: geometry_pb2.Vector3) -> Array:
     return np.array([message.x, message.y, message.z])
+
+
+def six_by_six(numbers: ArrayLike, name: str) -> list[float]:
+    """The 36 numbers of a covariance or information matrix, row by row."""
+    array = np.asarray(numbers, dtype=float)
+    if array.shape != (6, 6):
+        raise ValueError(f"{name} of shape {array.shape}; expected (6, 6)")
+    numbers_of_rows: list[float] = array.ravel().tolist()
+    return numbers_of_rows

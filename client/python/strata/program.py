@@ -3,11 +3,13 @@ import json
 import os
 import shutil
 import subprocess
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from strata import errors
 
 
-def run(program, arguments, environment=None):
+def run(program: str, arguments: Sequence[str], environment: Mapping[str, str] | None = None) -> Any:
     """The JSON that `program` prints for `arguments`; `environment`: added to this process's. Raises StrataError in its
     words, and FileNotFoundError where it is not installed."""
     found = shutil.which(program)

@@ -3,10 +3,13 @@ import dataclasses
 import os
 import pathlib
 import tempfile
+from typing import Any
 
 import numpy as np
 
 from strata import poses
+from strata.arrays import Array, ArrayLike
+from strata.poses import PoseLike
 from strata import program as strata_program
 
 _METHODS = ("mls", "icp", "plane", "trimmed", "gicp")
@@ -16,7 +19,7 @@ _METHODS = ("mls", "icp", "plane", "trimmed", "gicp")
 class Registration:
     """Where a scan was found to be."""
 
-    T_target_source: np.ndarray  # 4 × 4
+    T_target_source: Array  # 4 × 4
     converged: bool
     termination: str  # why it ended, in words
     overlap: float  # share of the source that lies on the target, in [0, 1]
@@ -27,7 +30,11 @@ class Registration:
     iterations: int
 
 
-def _file(points, folder, name):
+PointsLike = ArrayLike | os.PathLike[str]
+"""(N, 3), or a file."""
+
+
+def _file(points: PointsLike, folder: str, name: str) -> str:
     """The path of a scan: its own, or that of a PCD file of an N × 3 array."""
     if isinstance(points, (str, os.PathLike)):
         return os.fspath(points)
@@ -42,14 +49,16 @@ def _file(points, folder, name):
     return path
 
 
-def _guess(pose):
+def _guess(pose: PoseLike) -> str:
     """x,y,z,qx,qy,qz,qw: what a command line takes, without losing a digit."""
     message = poses.to_proto(poses.matrix(pose))
     t, q = message.translation, message.rotation
     return ",".join(repr(number) for number in (t.x, t.y, t.z, q.x, q.y, q.z, q.w))
 
 
-def register(source, target, guess=None, *, method="mls", picture=None, max_distance=None, program="strata"):
+def register(source: PointsLike, target: PointsLike, guess: PoseLike = None, *, method: str = "mls",
+             picture: str | os.PathLike[str] | None = None, max_distance: float | None = None,
+             program: str = "strata") -> Registration:
     """Where `source` is in the frame of `target` → Registration; both N × 3 arrays of metres, or files that
     `strata scan import` reads.
 
@@ -67,6 +76,7 @@ def register(source, target, guess=None, *, method="mls", picture=None, max_dist
         if picture is not None:
             arguments += ["--picture", os.fspath(pathlib.Path(picture).absolute())]
         answer = strata_program.run(program, arguments)
-    fields = {field.name: answer[field.name] for field in dataclasses.fields(Registration)}
+    fields: dict[str, Any] = {field.name: answer[field.name] for field in dataclasses.fields(Registration)}
     pose = fields["T_target_source"]
-    return Registration(**{**fields, "T_target_source": poses.matrix((pose[:3], pose[3:]))})
+    fields["T_target_source"] = poses.matrix((pose[:3], pose[3:]))
+    return Registration(**fields)

@@ -1,9 +1,11 @@
 """Shapes of robots, arms and loads along a way."""
 import dataclasses
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from strata import plan, poses
+from strata.arrays import Array, ArrayLike
 from strata.v1 import planning_pb2
 
 
@@ -15,7 +17,7 @@ class Contact:
     """Along the way, of the shape's origin [m]."""
     end: float
     """Along the way [m]."""
-    where: np.ndarray
+    where: Array
     """(3,) where it is deepest, map frame [m]."""
     depth: float
     """How deep it is there [m]; of unknown ground 0."""
@@ -36,22 +38,22 @@ class ShapeCheck:
     """Along the way, up to the first contact [m]."""
     length: float
     """Of the way [m]."""
-    contacts: list
+    contacts: list[Contact]
     """In order along the way."""
     looks: int
     """Poses looked at."""
     epoch: int
     """Of which the answer is."""
 
-    def __bool__(self):
+    def __bool__(self) -> bool:
         return self.free
 
 
-def _part(kind, size, pose):
+def _part(kind: planning_pb2.ShapeKind, size: ArrayLike, pose: ArrayLike) -> planning_pb2.ShapePart:
     return planning_pb2.ShapePart(kind=kind, size=poses.vector3(size), pose=poses.to_proto(_matrix(pose)))
 
 
-def _matrix(pose):
+def _matrix(pose: ArrayLike) -> Array:
     """A (4, 4) pose, or one that is only a place (3,)."""
     pose = np.asarray(pose, dtype=float)
     if pose.shape != (3,):
@@ -61,22 +63,22 @@ def _matrix(pose):
     return matrix
 
 
-def box(size, pose=(0, 0, 0)):
+def box(size: ArrayLike, pose: ArrayLike = (0, 0, 0)) -> planning_pb2.ShapePart:
     """A box of edges `size` (3,) with its middle at pose, a place (3,) or (4, 4) T_shape_part."""
     return _part(planning_pb2.SHAPE_KIND_BOX, size, pose)
 
 
-def cylinder(radius, height, pose=(0, 0, 0)):
+def cylinder(radius: float, height: float, pose: ArrayLike = (0, 0, 0)) -> planning_pb2.ShapePart:
     """A cylinder along z with its middle at pose."""
     return _part(planning_pb2.SHAPE_KIND_CYLINDER, (radius, 0, height), pose)
 
 
-def sphere(radius, place=(0, 0, 0)):
+def sphere(radius: float, place: ArrayLike = (0, 0, 0)) -> planning_pb2.ShapePart:
     """A sphere around a place."""
     return _part(planning_pb2.SHAPE_KIND_SPHERE, (radius, 0, 0), place)
 
 
-def _add_mesh(mesh, message):
+def _add_mesh(mesh: Sequence[ArrayLike], message: planning_pb2.CollisionShape) -> None:
     vertices, triangles = np.asarray(mesh[0], dtype=np.float32), np.asarray(mesh[1])
     if vertices.ndim != 2 or vertices.shape[1] != 3 or triangles.ndim != 2 or triangles.shape[1] != 3:
         raise ValueError(f"a mesh of shapes {vertices.shape} and {triangles.shape}; expected (n, 3) and (m, 3)")
@@ -86,7 +88,9 @@ def _add_mesh(mesh, message):
     message.triangles.extend(triangles.ravel().tolist())
 
 
-def to_proto(name, way, mesh, parts, clearance, ground, unknown):
+def to_proto(name: str, way: plan.Path | ArrayLike, mesh: Sequence[ArrayLike] | None,
+             parts: Iterable[planning_pb2.ShapePart], clearance: float, ground: float,
+             unknown: str) -> planning_pb2.CheckShapeRequest:
     if unknown not in ("ignore", "blocked"):
         raise ValueError(f'unknown is {unknown!r}; expected "ignore" or "blocked"')
     request = planning_pb2.CheckShapeRequest(map=name, clearance_m=clearance, ground_m=ground,
@@ -104,7 +108,7 @@ def to_proto(name, way, mesh, parts, clearance, ground, unknown):
     return request
 
 
-def from_proto(message):
+def from_proto(message: planning_pb2.CheckShapeResponse) -> ShapeCheck:
     return ShapeCheck(
         free=message.free,
         message=message.message,

@@ -5,13 +5,18 @@ a number is in, so they are read one by one. All else is read at once, and the d
 surfaces of the cells with equal x + 2 y depend on earlier waves only.
 """
 import dataclasses
+import operator
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import xxhash
 
+from strata import native
+from strata.arrays import Array
 from strata.columns import ByteReader, numbers_of
 from strata.errors import DataLoss, Unimplemented
+from strata.v1 import tiles_pb2
 
 SURFACE = np.dtype([
     ("x", "f8"), ("y", "f8"),  # middle of the cell, map frame [m]
@@ -55,7 +60,7 @@ class TileKey(NamedTuple):
     y: int
     """Row, growing with y."""
 
-    def __str__(self):
+    def __str__(self) -> str:
         return f"{self.level}/{self.x}/{self.y}"
 
 
@@ -68,13 +73,32 @@ class Tile:
     """Commit sequence of the content; same key and version, same content."""
     cell_size: float
     """Edge of a cell of this level [m]."""
-    surfaces: np.ndarray
+    surfaces: Array
     """(n,) of dtype SURFACE, by cell (rows of growing y, x grows along a row), lowest first."""
 
 
-def _opened(data):
+@dataclasses.dataclass(frozen=True)
+class TileInfo:
+    """A tile in a listing."""
+
+    version: int
+    """Commit sequence of the content."""
+    bytes: int
+    """Size as served."""
+    surfaces: int
+
+
+def key_from_proto(message: tiles_pb2.TileKey) -> TileKey:
+    return TileKey(message.level, message.x, message.y)
+
+
+def key_to_proto(key: TileKey) -> tiles_pb2.TileKey:
+    return tiles_pb2.TileKey(level=key.level, x=key.x, y=key.y)
+
+
+def _opened(blob: bytes | memoryview) -> tuple[int, memoryview]:
     """Version and body of a blob."""
-    data = memoryview(data)
+    data = memoryview(blob)
     if len(data) < _OVERHEAD_BYTES:
         raise DataLoss(f"surface tile: {len(data)} bytes, fewer than an empty one has")
     if bytes(data[:4]) != b"SST1":
@@ -91,17 +115,17 @@ def _opened(data):
     return oldest_reader, data[12:-8]
 
 
-def _counts(reader):
+def _counts(reader: ByteReader) -> Array:
     """(65536,) numbers of surfaces by cell."""
     blocks = reader.column(_CELLS // 4)
     if len(blocks) != _CELLS // 4:
         raise DataLoss(f"occupancy of {4 * len(blocks)} cells")
     blocks = blocks.reshape(TILE_CELLS // 2, TILE_CELLS // 2)
-    counts = np.empty((TILE_CELLS, TILE_CELLS), np.int64)
+    counts: Array = np.empty((TILE_CELLS, TILE_CELLS), np.int64)
     for shift, (y, x) in ((0, (0, 0)), (2, (0, 1)), (4, (1, 0)), (6, (1, 1))):
         counts[y::2, x::2] = blocks >> shift & 3
     counts = counts.ravel()
-    rest = ByteReader(reader.column(5 * _CELLS))
+    rest = ByteReader(reader.column(5 * _CELLS).data)
     for cell in np.flatnonzero(counts == 3):
         counts[cell] += min(rest.varint(), _MAX_SURFACES)
     if rest.remaining:
@@ -111,7 +135,7 @@ def _counts(reader):
     return counts
 
 
-def _beside(cells, counts):
+def _beside(cells: Array, counts: Array) -> Array:
     """(n, 4) indices of the surfaces left, up, up right and up left of each; _NOBODY where none is."""
     first = np.cumsum(counts) - counts
     layer = np.arange(len(cells)) - first[cells]
@@ -125,7 +149,7 @@ def _beside(cells, counts):
     return beside
 
 
-def _kinds(beside, columns):
+def _kinds(beside: Array, columns: Sequence[Array]) -> Array:
     """(n,) kinds: traversability · 2 + vertical."""
     same = [iter(np.unpackbits(column, bitorder="little").tobytes()) for column in columns[_SAME_KIND:_KIND]]
     told = iter(columns[_KIND].tobytes())
@@ -150,12 +174,12 @@ def _kinds(beside, columns):
                 i += 1
     except StopIteration:
         raise DataLoss("column: fewer numbers than the tile needs") from None
-    if any(bits.__length_hint__() >= 8 for bits in same) or told.__length_hint__():
+    if any(operator.length_hint(bits) >= 8 for bits in same) or operator.length_hint(told):
         raise DataLoss("column: more numbers than the tile needs")
     return np.frombuffer(kinds, np.uint8)[:-1]
 
 
-def _scattered(columns, route):
+def _scattered(columns: Mapping[int, Array], route: Array) -> Array:
     """(n,) bytes, each the next of the column that `route` names; 0 where that is _NOBODY."""
     result = np.zeros(len(route), np.uint8)
     for index, column in columns.items():
@@ -166,7 +190,7 @@ def _scattered(columns, route):
     return result
 
 
-def _check(good, what="surface tile: a surface is out of range"):
+def _check(good: object, what: str = "surface tile: a surface is out of range") -> None:
     if not good:
         raise DataLoss(what)
 
@@ -174,7 +198,7 @@ def _check(good, what="surface tile: a surface is out of range"):
 class _Surroundings:
     """Which of the surfaces beside tell what to expect of a surface: (n, 4) indices, and how many they are."""
 
-    def __init__(self, beside, kinds):
+    def __init__(self, beside: Array, kinds: Array) -> None:
         vertical, traversability = kinds & 1, kinds >> 1
         nobody = 255
         same_shape = np.append(vertical, nobody)[beside] == vertical[:, None]
@@ -188,7 +212,7 @@ class _Surroundings:
         self.cost_count = np.maximum(same_cost.sum(axis=1), 1)
 
 
-def _waves(cells):
+def _waves(cells: Array) -> tuple[Array, Array, list[slice]]:
     """The order of surfaces in which they depend on earlier waves only, their places in it, and each wave's slice."""
     n = len(cells)
     wave = cells % TILE_CELLS + 2 * (cells // TILE_CELLS)
@@ -196,11 +220,11 @@ def _waves(cells):
     rank = np.empty(n + 1, np.int32)
     rank[order] = np.arange(n)
     rank[_NOBODY] = n  # a row of zeros
-    ends = np.append(np.flatnonzero(np.diff(wave[order])) + 1, n) if n else []
-    return order, rank, [slice(begin, end) for begin, end in zip([0, *ends], ends)]
+    ends = np.append(np.flatnonzero(np.diff(wave[order])) + 1, n) if n else np.empty(0, int)
+    return order, rank, [slice(begin, end) for begin, end in zip([0, *ends.tolist()], ends.tolist())]
 
 
-def _summed(cells, around, vertical, differences):
+def _summed(cells: Array, around: _Surroundings, vertical: Array, differences: Array) -> Array:
     """(n, 4) codes of height, depth, sigma and cost out of their differences to what is expected."""
     n = len(cells)
     order, rank, waves = _waves(cells)
@@ -221,7 +245,7 @@ def _summed(cells, around, vertical, differences):
     return result
 
 
-def _colours(cells, counts, columns):
+def _colours(cells: Array, counts: Array, columns: Sequence[Array]) -> Array:
     """(n, 3) colours; zeros where none is known."""
     n = len(cells)
     if len(columns) <= _COLOURED:
@@ -250,7 +274,7 @@ def _colours(cells, counts, columns):
     return colours
 
 
-def _checked(codes, vertical):
+def _checked(codes: Array, vertical: Array) -> Array:
     height, depth, sigma, cost = codes.T
     _check((np.abs(height) <= _MAX_HEIGHT).all())
     _check(((depth >= vertical) & (depth <= _MAX_HEIGHT)).all())
@@ -258,7 +282,7 @@ def _checked(codes, vertical):
     return codes
 
 
-def _codes(cells, counts, columns, raw):
+def _codes(cells: Array, counts: Array, columns: Sequence[Array], raw: Array) -> tuple[Array, Array, Array, Array]:
     """kinds, classes, confidences, and (n, 4) codes of height, depth, sigma and cost."""
     beside = _beside(cells, counts)
     kinds = _kinds(beside, columns)
@@ -293,12 +317,20 @@ _COSTS = np.stack([np.exp2((_STEPS / np.float32(k)).astype(float)).astype(np.flo
 _COSTS[:, 255] = np.inf
 
 
-def decode_tile(data, cell_size):
+def decode_tile(data: bytes | memoryview, cell_size: float) -> Tile:
     """The tile that `data` holds (as served, or written by `strata tile get --out`).
 
     cell_size: that of the map [m]. Raises DataLoss for bytes that are no intact tile, Unimplemented for those of a
-    later format.
+    later format. By the server's own decoder where it is installed (strata.native), else by numpy; both say the same.
     """
+    if native.LIBRARY is None:
+        return decode_tile_in_numpy(data, cell_size)
+    key, version, surfaces = native.decode(data, cell_size, SURFACE)
+    return Tile(TileKey(*key), version, cell_size * 2.0**key[0], surfaces)
+
+
+def decode_tile_in_numpy(data: bytes | memoryview, cell_size: float) -> Tile:
+    """decode_tile without any library of our own."""
     oldest_reader, body = _opened(data)
     reader = ByteReader(body)
     key = TileKey(reader.fixed(1), reader.fixed(4, signed=True), reader.fixed(4, signed=True))

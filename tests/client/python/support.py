@@ -15,15 +15,17 @@ import strata
 class Stratad:
     """stratad on a folder; started again, it is at the same address."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, *arguments):
         self.address = "127.0.0.1:0"
         self._folder = folder
+        self._arguments = list(map(str, arguments))
         self._process = None
 
     def start(self):
         with contextlib.ExitStack() as stack:
             self._process = stack.enter_context(subprocess.Popen(
-                [os.environ["STRATA_STRATAD"], "--data", self._folder, "--listen", self.address],
+                [os.environ["STRATA_STRATAD"], "--data", self._folder, "--listen", self.address,
+                 *self._arguments],
                 stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True))
             line = self._process.stdout.readline()
             assert line.startswith("listening "), line

@@ -1,13 +1,15 @@
-"""Tiles decoded in numpy beside the server's own decoder, and what hostile bytes come to."""
+"""Tiles decoded by numpy, and by the library, beside what the server says; and what hostile bytes come to."""
 import os
 import random
 import subprocess
 import unittest
+from unittest import mock
 
 import numpy as np
 import xxhash
 
 import strata
+from strata import native, tiles
 from strata.v1 import tiles_pb2, tiles_pb2_grpc
 from support import ServerTest
 
@@ -17,7 +19,7 @@ def sealed(blob):
     return blob[:-8] + xxhash.xxh3_64_intdigest(blob[:-8]).to_bytes(8, "little")
 
 
-class TileTest(ServerTest):
+class TileWorld(ServerTest):
     """A simulated drive under and over a bridge, with labels, imported by the command line."""
 
     @classmethod
@@ -34,10 +36,12 @@ class TileTest(ServerTest):
                  "--trajectory", robot, "--align", "off"], check=True, stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL)
         cls.map.wait(timeout=120)
-        stub = tiles_pb2_grpc.TilesStub(cls.map._connection.channel)
+        stub = tiles_pb2_grpc.TilesStub(cls.db.channel)
         cls.encoded = {level: [answer.tile.bytes for answer in stub.Fetch(tiles_pb2.FetchTilesRequest(
             map="drive", area=tiles_pb2.TileArea(level=level)))] for level in (0, 2, 5)}
 
+
+class TileTest(TileWorld):
     def test_equal_the_servers_decoder_bit_for_bit(self):
         tiles = self.map.fetch()
         decoded = np.concatenate([tile.surfaces for tile in tiles.values()])
@@ -76,6 +80,22 @@ class TileTest(ServerTest):
         expected = np.column_stack([20 * (decoded["x"] + 6), 10 * (decoded["y"] + 6), np.full(len(decoded), 40)])
         self.assertLess(np.abs(decoded["rgb"][bright] - expected[bright]).max(), 8)
 
+    def test_the_library_says_what_numpy_says(self):
+        self.assertIsNotNone(native.LIBRARY)
+        for blobs in self.encoded.values():
+            for blob in blobs:
+                by_library, by_numpy = strata.decode_tile(blob, 0.1), tiles.decode_tile_in_numpy(blob, 0.1)
+                self.assertEqual((by_library.key, by_library.version, by_library.cell_size),
+                                 (by_numpy.key, by_numpy.version, by_numpy.cell_size))
+                np.testing.assert_array_equal(by_library.surfaces, by_numpy.surfaces)
+                self.assertTrue(by_library.surfaces.flags.writeable)
+
+    def test_without_the_library_numpy_does_it(self):
+        blob = self.encoded[0][0]
+        expected = strata.decode_tile(blob, 0.1)
+        with mock.patch.object(native, "LIBRARY", None):
+            np.testing.assert_array_equal(strata.decode_tile(memoryview(blob), 0.1).surfaces, expected.surfaces)
+
     def test_coarse_levels_are_read_too(self):
         for level in (2, 5):
             tile = strata.decode_tile(self.encoded[level][0], 0.1)
@@ -83,24 +103,32 @@ class TileTest(ServerTest):
             inside = tile.surfaces["x"] / (256 * tile.cell_size)
             self.assertTrue(((inside > tile.key.x) & (inside < tile.key.x + 1)).all())
 
+
+class HostileTest(TileWorld):
+    """Bytes that are no tile, for either decoder."""
+
+    @staticmethod
+    def decode(blob, cell_size):
+        return tiles.decode_tile_in_numpy(blob, cell_size)
+
     def test_every_cut_and_every_changed_byte_is_data_loss(self):
         blob = min(self.encoded[0], key=len)
         for size in range(len(blob)):
             with self.assertRaises(strata.DataLoss):
-                strata.decode_tile(blob[:size], 0.1)
+                self.decode(blob[:size], 0.1)
         for place in range(len(blob)):
             changed = bytearray(blob)
             changed[place] ^= 0x40
             with self.assertRaises(strata.DataLoss):
-                strata.decode_tile(bytes(changed), 0.1)
+                self.decode(bytes(changed), 0.1)
         with self.assertRaises(strata.DataLoss):
-            strata.decode_tile(blob + b"\0", 0.1)
+            self.decode(blob + b"\0", 0.1)
 
     def test_later_formats_are_unimplemented(self):
         later = bytearray(self.encoded[0][0])
         later[6] = 200
         with self.assertRaises(strata.Unimplemented):
-            strata.decode_tile(sealed(bytes(later)), 0.1)
+            self.decode(sealed(bytes(later)), 0.1)
 
     def test_hostile_bytes_with_a_good_checksum_raise_nothing_but_data_loss(self):
         seed = random.randrange(1 << 32)
@@ -121,7 +149,7 @@ class TileTest(ServerTest):
                     blob[begin:begin] = draw.randbytes(draw.randrange(1, 9))
             blob[8:12] = (len(blob) - 20).to_bytes(4, "little")
             try:
-                tile = strata.decode_tile(sealed(bytes(blob)), 0.1)
+                tile = self.decode(sealed(bytes(blob)), 0.1)
                 self.assertTrue(np.isfinite(tile.surfaces["z"]).all())
             except strata.DataLoss:
                 refused += 1
@@ -141,14 +169,21 @@ class TileTest(ServerTest):
 
         full = column(1, 16384, 0xFF)
         with self.assertRaisesRegex(strata.DataLoss, "more than 4194304 surfaces"):
-            strata.decode_tile(blob(full, column(1, 65536, 127)), 0.1)
+            self.decode(blob(full, column(1, 65536, 127)), 0.1)
         with self.assertRaisesRegex(strata.DataLoss, "at most 16384 can be"):
-            strata.decode_tile(blob(column(1, 1 << 40, 0)), 0.1)
+            self.decode(blob(column(1, 1 << 40, 0)), 0.1)
         announced = bytes([0x28, 0xB5, 0x2F, 0xFD, 0xE0, *(1 << 50).to_bytes(8, "little"), 1, 0, 0])
-        with self.assertRaisesRegex(strata.DataLoss, f"{1 << 50} bytes in a zstd frame"):
-            strata.decode_tile(blob(column(2, 16384, len(announced), *announced)), 0.1)
+        with self.assertRaisesRegex(strata.DataLoss, "zstd frame"):
+            self.decode(blob(column(2, 16384, len(announced), *announced)), 0.1)
         empty = blob(column(1, 16384, 0), *[column(0, 0)] * 18, bytes(1))
-        self.assertEqual(len(strata.decode_tile(empty, 0.1).surfaces), 0)
+        self.assertEqual(len(self.decode(empty, 0.1).surfaces), 0)
+
+
+
+class HostileToLibraryTest(HostileTest):
+    @staticmethod
+    def decode(blob, cell_size):
+        return strata.decode_tile(blob, cell_size)
 
 
 if __name__ == "__main__":

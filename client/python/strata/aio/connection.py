@@ -1,0 +1,114 @@
+"""Calls that leave the event loop free."""
+import asyncio
+import typing
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterable
+from typing import Any, TypeVar
+
+import grpc
+import grpc.aio
+
+from strata import errors
+from strata.connection import CHANNEL_OPTIONS, Connection, Options, Pipe
+from strata.methods import A, Q, StreamStream, StreamUnary, UnaryStream, UnaryUnary
+
+T = TypeVar("T")
+
+
+class _QueuedRequests(Pipe[Q]):
+    def __init__(self) -> None:
+        self._queue: asyncio.Queue[Q | None] = asyncio.Queue()
+
+    @property
+    def requests(self) -> Any:
+        return self._taken()
+
+    async def _taken(self) -> AsyncIterator[Q]:
+        while (request := await self._queue.get()) is not None:
+            yield request
+
+    def put(self, request: Q) -> None:
+        self._queue.put_nowait(request)
+
+    def end(self) -> None:
+        self._queue.put_nowait(None)
+
+
+class AsyncioConnection(Connection):
+    """Calls of the tasks of one event loop."""
+
+    def __init__(self, options: Options) -> None:
+        credentials = options.credentials()
+        super().__init__(options, grpc.aio.secure_channel(options.target, credentials, CHANNEL_OPTIONS) if credentials
+                         else grpc.aio.insecure_channel(options.target, CHANNEL_OPTIONS))
+        self._closed = asyncio.Event()
+        self._calls: set[Any] = set()  # under way; gRPC 1.51 itself does not find all that it should end
+
+    async def ready(self) -> None:
+        """Waits for the server; Unavailable."""
+        try:
+            await asyncio.wait_for(self.channel.channel_ready(), self.options.connect_timeout)
+        except asyncio.TimeoutError:
+            await self.channel.close()
+            raise self.options.nobody_answers() from None
+
+    async def close(self) -> None:
+        self._closed.set()
+        for call in tuple(self._calls):
+            call.cancel()
+        await self.channel.close()
+
+    def _closed_by_us(self) -> bool:
+        task = asyncio.current_task()
+        return self._closed.is_set() and not (task and task.cancelling())
+
+    async def _answer(self, method: Any, request: Any) -> Any:
+        call = method(request, timeout=self.options.timeout, metadata=self.metadata)
+        self._calls.add(call)
+        try:
+            return await call
+        except grpc.RpcError as error:
+            raise errors.from_rpc(error) from None
+        except asyncio.CancelledError:
+            if self._closed_by_us():
+                raise errors.Cancelled("the connection was closed") from None
+            raise
+        finally:
+            self._calls.discard(call)
+
+    async def once(self, method: UnaryUnary[Q, A], request: Q) -> A:
+        return typing.cast(A, await self._answer(method, request))
+
+    async def send(self, method: StreamUnary[Q, A], requests: Iterable[Q]) -> A:
+        return typing.cast(A, await self._answer(method, iter(requests)))
+
+    async def _answers(self, method: Any, request: Any, timeout: float | None) -> AsyncGenerator[Any, None]:
+        call = method(request, timeout=timeout, metadata=self.metadata)
+        self._calls.add(call)
+        try:
+            async for answer in call:
+                yield answer
+        except grpc.RpcError as error:
+            raise errors.from_rpc(error) from None
+        except asyncio.CancelledError:
+            if self._closed_by_us():
+                raise errors.Cancelled("the connection was closed") from None
+            raise
+        finally:
+            self._calls.discard(call)
+            call.cancel()
+
+    def stream(self, method: UnaryStream[Q, A], request: Q, *, endless: bool = False) -> AsyncGenerator[A, None]:
+        return self._answers(method, request, None if endless else self.options.timeout)
+
+    def pipe(self, method: StreamStream[Q, A]) -> tuple[Pipe[Q], AsyncGenerator[A, None]]:
+        pipe: Pipe[Q] = _QueuedRequests()
+        return pipe, self._answers(method, pipe.requests, None)
+
+    async def sleep(self, seconds: float) -> bool:
+        try:
+            return await asyncio.wait_for(self._closed.wait(), seconds)
+        except asyncio.TimeoutError:
+            return False
+
+    async def work(self, function: Callable[[], T]) -> T:
+        return await asyncio.to_thread(function)
