@@ -201,12 +201,14 @@ absl::StatusOr<std::shared_ptr<Map>> OpenMaps::OpenNow(const std::string& name) 
     failed_.erase(name);
     return map;
   }
+  const bool told = entry.why == map.status();
   entry.state = State::kClosed;
   entry.why = map.status();
   entry.next_try = SteadyNow() + kRetryDelay;
   open_.erase(name);
   if (!MayOpenLater(entry.why)) wanted_.erase(name);
   failed_.insert(name);
+  if (told) return map;
   LOG(ERROR) << LogLine("map").Add("map", name).Add("not_opened", entry.why.message());
   return map;
 }

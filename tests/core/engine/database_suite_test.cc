@@ -30,6 +30,18 @@ std::unique_ptr<api::Database> Open(const std::filesystem::path& directory) {
   return engine.ok() ? *std::move(engine) : nullptr;
 }
 
+// Where there is no PostgreSQL 15 to run.
+class NeedsStore : public ::testing::Environment {
+ public:
+  void SetUp() override {
+    const char* store = std::getenv("STRATA_STORE");
+    if (store == nullptr || *store == '\0') return;
+    const auto cluster = SharedPostgresCluster();
+    if (absl::IsFailedPrecondition(cluster.status())) GTEST_SKIP() << cluster.status().message();
+  }
+};
+const auto* const kNeedsStore = ::testing::AddGlobalTestEnvironment(new NeedsStore());
+
 INSTANTIATE_TEST_SUITE_P(Engine,
                          DatabaseSuite,
                          ::testing::Values(DatabaseMaker{"InProcess", Open}),

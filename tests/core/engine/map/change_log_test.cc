@@ -25,6 +25,17 @@ api::TileChangeNotice Tile(std::int32_t x, std::uint64_t version, bool gone = fa
   return {.key = {0, x, 0}, .version = version, .gone = gone};
 }
 
+TEST(ChangeLogTest, TheEndOfTheMapEndsTheWait) {
+  ChangeLog log(10);
+  std::thread closer([&] {
+    absl::SleepFor(absl::Milliseconds(100));
+    log.Close(absl::UnavailableError("gone"));
+  });
+  EXPECT_THAT(log.Await(10, Stop()), StatusIs(Code::kUnavailable, _));
+  closer.join();
+  STRATA_EXPECT_OK(log.Await(9, Stop()));
+}
+
 TEST(ChangeLogTest, TellsWhatIsNewer) {
   ChangeLog log(10);
   log.Add(12, {{"run", 1}}, {Tile(1, 12)});

@@ -254,6 +254,58 @@ TEST_F(PostgresStorageTest, WhoeverOpensAMapAloneKeepsOthersOut) {
   EXPECT_FALSE(Reader()->GetChunk(2, 0).ok());
 }
 
+// Of a thousand and some maps two have something to do.
+TEST_F(PostgresStorageTest, ASurveyTellsOfEveryMapOnce) {
+  STRATA_ASSERT_OK(other_->Execute("CREATE DATABASE survey"));
+  STRATA_ASSERT_OK_AND_ASSIGN(PostgresCluster* const cluster, SharedPostgresCluster());
+  PostgresOptions options;
+  options.where = cluster->AddressOf("survey");
+  STRATA_ASSERT_OK_AND_ASSIGN(const PostgresMaps maps, PostgresMaps::Connect(options));
+  constexpr int kMaps = 1050;
+  MapParameters parameters;
+  parameters.mls.cell_size_m = 0.25;
+  for (int i = 0; i < kMaps; ++i) {
+    STRATA_ASSERT_OK(maps.Create(
+        absl::StrCat("m", i), parameters, absl::UnixEpoch(), static_cast<std::uint64_t>(i)));
+  }
+  STRATA_ASSERT_OK(maps.Delete("m3"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto pending, maps.Open("m5"));
+  STRATA_ASSERT_OK(pending->writer().Commit(Durability::kFull, [&]() -> absl::Status {
+    ScanRecord scan;
+    scan.header.id = {"run", 1};
+    scan.upload = 1;
+    STRATA_ASSIGN_OR_RETURN(scan.number, pending->writer().NextCommitSequence());
+    return pending->writer().PutScan(scan);
+  }));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto working, maps.Open("m1040"));
+  STRATA_ASSERT_OK(working->writer().Commit(Durability::kFull, [&]() -> absl::Status {
+    JobInfo ended;
+    ended.id = 1;
+    ended.state = JobState::kFailed;
+    JobInfo waits;
+    waits.id = 2;
+    waits.state = JobState::kQueued;
+    STRATA_RETURN_IF_ERROR(working->writer().PutJob(ended));
+    return working->writer().PutJob(waits);
+  }));
+  std::set<std::string> seen;
+  std::set<std::string> with_work;
+  STRATA_ASSERT_OK(maps.Survey(Stop(), [&](absl::StatusOr<MapAtRest> map, const std::string& name) {
+    STRATA_ASSERT_OK(map);
+    EXPECT_TRUE(seen.insert(name).second) << name;
+    EXPECT_EQ(map->info.name, name);
+    EXPECT_EQ(map->info.parameters, parameters);
+    if (map->has_work) with_work.insert(name);
+    EXPECT_TRUE(name != "m7" || map->clock == 7U);
+  }));
+  EXPECT_EQ(seen.size(), std::size_t{kMaps - 1});
+  EXPECT_THAT(with_work, ::testing::ElementsAre("m1040", "m5"));
+  const Stop stop;
+  stop.Request();
+  EXPECT_THAT(maps.Survey(stop, [](const auto&, const auto&) {}),
+              StatusIs(absl::StatusCode::kCancelled, ::testing::_));
+}
+
 TEST_F(PostgresStorageTest, TheClockOfADeletedMapIsRemembered) {
   STRATA_ASSERT_OK(storage_->writer().Commit(Durability::kFull, [&]() -> absl::Status {
     std::uint64_t number = 0;
