@@ -44,7 +44,7 @@ void TalkOf(const Egomotion& egomotion, const MotionOptions& options, Output& ou
 }
 
 absl::Status WriteReport(const Json& json, const std::string& path) {
-  return WriteFileBytes(path, json.dump(2) + "\n");
+  return WriteFileBytes(path, Shortest(json).dump(2) + "\n");
 }
 
 absl::Status Run(FileContext& context, const MotionOptions& options) {

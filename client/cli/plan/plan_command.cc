@@ -1,5 +1,6 @@
 // strata plan
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -103,6 +104,31 @@ void ListWaypoints(const PlanResult& plan, Output& output) {
   output.List(rows, {{"x", "X"}, {"y", "Y"}, {"z", "Z"}});
 }
 
+void Print(const PlanResult& plan,
+           const std::optional<LocalFrame>& earth,
+           const std::optional<ShapeCheck>& shape,
+           Output& output) {
+  if (output.csv()) return ListWaypoints(plan, output);
+  if (output.text()) {
+    PrintText(plan, earth, output);
+    if (shape.has_value()) PrintText(*shape, output);
+    return;
+  }
+  Json json = WithPlaces(plan, earth);
+  if (shape.has_value()) json["shape"] = ToJson(*shape);
+  output.Object(json);
+}
+
+// Rings of a sparse lidar lie farther apart than a careful robot's max gap: which would do.
+void TellOfGap(const PlanResult& plan, const RobotProfile& profile, Output& output) {
+  const double gap_m = plan.obstruction_value;
+  if (plan.found() || plan.obstruction != Obstruction::kUnknown || gap_m <= profile.max_gap_m)
+    return;
+  constexpr double kCentimetres = 100.0;
+  output.Talk(absl::StrFormat("a robot that may cross that unseen needs at least --max-gap %.2f",
+                              std::ceil(gap_m * kCentimetres) / kCentimetres));
+}
+
 absl::Status WritePlan(const std::string& file, const std::vector<Eigen::Vector3d>& waypoints) {
   if (!absl::EndsWith(file, ".mcap")) return WritePath(file, waypoints);
   FoxgloveScene scene;
@@ -131,16 +157,8 @@ absl::Status PlanOne(Context& context, PlanOptions options) {
         shape,
         CheckShape(context, options.map, options.shape, options.query.profile, plan.waypoints));
   }
-  if (context.output.json()) {
-    Json json = WithPlaces(plan, earth);
-    if (shape.has_value()) json["shape"] = ToJson(*shape);
-    context.output.Object(json);
-  } else if (context.output.csv()) {
-    ListWaypoints(plan, context.output);
-  } else {
-    PrintText(plan, earth, context.output);
-    if (shape.has_value()) PrintText(*shape, context.output);
-  }
+  Print(plan, earth, shape, context.output);
+  if (context.output.text()) TellOfGap(plan, options.query.profile, context.output);
   if (!options.watch || !plan.found()) return absl::OkStatus();
   return FollowPath(
       context, options.map, {plan.waypoints, options.query.profile, options.query.class_costs});

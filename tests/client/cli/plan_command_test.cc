@@ -31,10 +31,24 @@ TEST_F(PlanCommandTest, ALongPlanShowsTenWaypointsAndJsonAll) {
     return absl::StatusOr<MapInfo>(MapInfo{std::string(name), {}, {}});
   });
   const std::vector<std::string> words = {"plan", "m", "--from", "0,0", "--to", "772,0"};
+  const auto rows = [&] {
+    EXPECT_TRUE(Run(words, OutputFormat::kCsv).ok());
+    return data_.str();
+  };
+  EXPECT_THAT(rows(), HasSubstr("x,y,z\n0,0.5,0.25\n1,0.5,0.25\n"));
   const std::string text = RunText(words);
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1 + 10 + 1) << text;
   EXPECT_THAT(text, HasSubstr("9.000  0.500  0.250\n  … 763 more; --out"));
   EXPECT_EQ(RunJson(words)["waypoints"].size(), 773U);
+  EXPECT_EQ(talk_.str(), "");
+  plan.reason = PlanReason::kBlocked;
+  plan.obstruction = Obstruction::kUnknown;
+  plan.obstruction_value = 0.401;
+  RunText(words);
+  EXPECT_THAT(talk_.str(), HasSubstr("at least --max-gap 0.41"));
+  plan.obstruction_value = 0.2;  // less than this robot's
+  RunText(words);
+  EXPECT_EQ(talk_.str(), "");
 }
 
 }  // namespace
