@@ -15,17 +15,17 @@ import unittest
 import yaml
 
 CHART = pathlib.Path(__file__).resolve().parents[2] / "deploy/helm/strata"
-ACTION = re.compile(r"(\s*)\{\{(-?)\s*(.*?)\s*(-?)\}\}(\s*)", re.S)
+ACTION = re.compile(r"(\s*)\{\{(-?)\s*(.*?)\s*\}\}", re.S)
 
 
 def tokens(text):
-    """Text and actions in turn; "-" takes the white space beside an action."""
+    """Text and actions in turn; "-" takes the white space before an action."""
     at = 0
     for found in ACTION.finditer(text):
-        before, trim_left, action, trim_right, after = found.groups()
-        yield "text", text[at:found.start()] + ("" if trim_left else before)
+        before, trims, action = found.groups()
+        yield "text", text[at:found.start()] + ("" if trims else before)
         yield "action", action
-        at = found.end() - (0 if trim_right else len(after))
+        at = found.end()
     yield "text", text[at:]
 
 
