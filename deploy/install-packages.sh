@@ -13,7 +13,7 @@ packages=(
 )
 # strata-ros2 is built where cyclonedds-dev and cyclonedds-tools are; libfastrtps-dev is the robot that it is tried on.
 if [[ "${1:-}" == --dev ]]; then
-  packages+=(clang clang-format clang-tidy coinor-libclp-dev coinor-libipopt-dev cyclonedds-dev cyclonedds-tools dpkg-dev file fish libbenchmark-dev libcgal-dev libclang-rt-dev libdlib-dev libfastrtps-dev libgdal-dev libgmock-dev libgtest-dev liboctomap-dev libtinygltf-dev mandoc mmdebstrap openssl postgresql-15 python3-grpcio python3-numpy python3-protobuf python3-xxhash python3-zstandard sqlite3 systemd zsh)
+  packages+=(clang clang-format clang-tidy coinor-libclp-dev coinor-libipopt-dev cyclonedds-dev cyclonedds-tools dpkg-dev file fish libbenchmark-dev libcgal-dev libclang-rt-dev libdlib-dev libfastrtps-dev libgdal-dev libgmock-dev libgtest-dev liboctomap-dev libtinygltf-dev mandoc mmdebstrap mypy openssl postgresql-15 prometheus python3-grpcio python3-numpy python3-pip python3-protobuf python3-setuptools python3-venv python3-wheel python3-xarray python3-xxhash python3-yaml python3-zstandard sqlite3 systemd zsh)
 fi
 
 missing=()

@@ -17,10 +17,28 @@ echo "of another program" >"$work/maps/foreign.strata"
 sed "s|/usr/bin|$root/usr/bin|; s|/etc/strata|$root/etc/strata|" "$root/lib/systemd/system/stratad.service" >"$work/stratad.service"
 before=$(sed -n 's/^ExecStartPre=//p' "$work/stratad.service")
 timeout 60 $before || { echo "packages: ExecStartPre=$before ends with $?" >&2; exit 1; }
-faults=$(systemd-analyze verify --man=no "$work/stratad.service" 2>&1)
+# The nightly copies: off by default, and their command does what the unit says.
+for unit in strata-backup.service strata-backup.timer; do
+  sed "s|/usr/lib/strata|$root/usr/lib/strata|" "$root/lib/systemd/system/$unit" >"$work/$unit"
+done
+[[ ! -e $root/etc/systemd/system/timers.target.wants/strata-backup.timer ]] || { echo "packages: the backup timer is on" >&2; exit 1; }
+faults=$(systemd-analyze verify --man=no "$work/stratad.service" "$work/strata-backup.service" "$work/strata-backup.timer" 2>&1)
 [[ -z $faults ]] || { echo "packages: $faults" >&2; exit 1; }
 "$root/usr/bin/strata" --embedded "$work/maps" map create yard >/dev/null
-PYTHONPATH=$root/usr/lib/python3/dist-packages /usr/bin/python3 -c 'import strata; strata.connect'
+PYTHONPATH=$root/usr/lib/python3/dist-packages /usr/bin/python3 -c 'import strata, strata.native; strata.connect; assert strata.native.LIBRARY, "_tiles.so does not load"'
+backup=$(sed -n 's/^ExecStart=//p' "$work/strata-backup.service")
+mkdir "$work/copies"
+coproc server { exec "$root/usr/bin/stratad" --data "$work/maps" --listen 127.0.0.1:0 2>"$work/stratad.log"; }
+server_pid=$!
+read -r _ address <&"${server[0]}"
+STRATA_PROGRAM=$root/usr/bin/strata STRATA_SERVER=$address STRATA_BACKUP_DIR=$work/copies $backup >"$work/backup.log" 2>&1 || {
+  cat "$work/backup.log" >&2
+  exit 1
+}
+kill "$server_pid"
+[[ $(ls "$work/copies") == yard@*.strata ]] || { echo "packages: $backup made $(ls "$work/copies")" >&2; exit 1; }
+depends=$(dpkg-deb --field "$work"/packages/python3-strata_*.deb Depends)
+[[ $depends == *python3-grpcio* && $depends == *libzstd1* ]] || { echo "packages: python3-strata depends on $depends" >&2; exit 1; }
 "$root/usr/bin/strata-ros2" --version >/dev/null
 depends=$(dpkg-deb --field "$work"/packages/strata-ros2_*.deb Depends)
 [[ $depends == *libddsc* && $depends != *libceres* ]] || { echo "packages: strata-ros2 depends on $depends" >&2; exit 1; }

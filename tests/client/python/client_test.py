@@ -401,13 +401,15 @@ class ObjectsTest(ServerTest):
 
 
 class ReadmeTest(ServerTest):
-    def test_its_example_runs(self):
-        example, = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
-        example = example.replace("127.0.0.1:50051", self.server.address)
+    def test_its_examples_run(self):
+        examples = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed):
-            exec(compile(example, str(README), "exec"), {})
-        self.assertEqual(printed.getvalue().splitlines(), ["durable", "10000 surfaces, 0.00 to 0.00 m", "8.5 m"])
+            for example in examples:
+                exec(compile(example.replace("127.0.0.1:50051", self.server.address), str(README), "exec"), {})
+        lines = printed.getvalue().splitlines()
+        self.assertEqual(lines[:4], ["durable", "10000 surfaces, 0.00 to 0.00 m", "8.5 m", "1 found"])
+        self.assertTrue(all(line.isdigit() for line in lines[4:]), lines)
 
 
 if __name__ == "__main__":
