@@ -10,6 +10,7 @@
 
 #include "client/cli/egomotion/egomotion_report.h"
 #include "client/cli/terminal/command.h"
+#include "client/cli/terminal/values.h"
 #include "client/formats/file_bytes.h"
 #include "client/formats/motion/recorded_log.h"
 #include "client/formats/motion/rig_file.h"

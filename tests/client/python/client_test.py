@@ -408,7 +408,7 @@ class ReadmeTest(ServerTest):
             for example in examples:
                 exec(compile(example.replace("127.0.0.1:50051", self.server.address), str(README), "exec"), {})
         lines = printed.getvalue().splitlines()
-        self.assertEqual(lines[:4], ["durable", "10000 surfaces, 0.00 to 0.00 m", "8.5 m", "1 found"])
+        self.assertEqual(lines[:4], ["durable", "10000 surfaces, 0.00 to 0.00 m", "8.5 m", "2 found"])
         self.assertTrue(all(line.isdigit() for line in lines[4:]), lines)
 
 
