@@ -21,12 +21,12 @@ namespace strata {
 namespace {
 
 // A row of strata.SURFACE.
-struct __attribute__((packed)) Row {
+struct __attribute__((packed)) SurfaceRow {
   double x, y;
   float z, sigma, depth, cost;
   std::uint8_t traversability, class_id, confidence, rgb[3];
 };
-static_assert(sizeof(Row) == 38);
+static_assert(sizeof(SurfaceRow) == 38);
 
 // Begins as strata.native.Tile.
 struct Decoded {
@@ -36,7 +36,7 @@ struct Decoded {
   SurfaceTile tile;
 };
 
-Row RowOf(const Surface& surface, const TileKey& key, double cell_size_m) {
+SurfaceRow RowOf(const Surface& surface, const TileKey& key, double cell_size_m) {
   const double x_m =
       (static_cast<double>(key.x) * kTileCells + surface.cell % kTileCells + 0.5) * cell_size_m;
   const double y_m =
@@ -100,7 +100,7 @@ __attribute__((visibility("default"))) void StrataTileRows(const strata::Decoded
                                                            double cell_size_m,
                                                            char* rows) {
   for (const strata::Surface& surface : tile->tile.surfaces) {
-    const strata::Row row = strata::RowOf(surface, tile->tile.key, cell_size_m);
+    const strata::SurfaceRow row = strata::RowOf(surface, tile->tile.key, cell_size_m);
     std::memcpy(rows, &row, sizeof(row));
     rows += sizeof(row);
   }
