@@ -95,6 +95,7 @@ def main():
     build = options.build.resolve()
     programs = {folder: build / folder for folder in ("client/cli", "client/ros2", "server", "tests/support", "tests/support/ros2")}
     programs["scripts"] = ROOT / "tests/support"
+    programs["backup"] = ROOT / "deploy/backup"
     environment = dict(os.environ, PATH=os.pathsep.join([*map(str, programs.values()), os.environ["PATH"]]))
     # Domains of DDS from 201 on are those of no test.
     own = {"STRATA_SERVER": free_address(), "ROS_LOCALHOST_ONLY": "1", "ROS_DOMAIN_ID": str(201 + os.getpid() % 30)}
