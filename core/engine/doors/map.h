@@ -62,7 +62,8 @@ class Map {
   // A job was queued.
   void JobQueued() { runner_->JobQueued(); }
 
-  // Scans or jobs wait, or are under way. After Close(): whether the next opening has them to do.
+  // Scans or jobs wait or are under way, or what is derived has to be made again. After Close():
+  // whether the next opening has them to do.
   bool HasWork() const;
   // No work, and nothing else that it does by itself is under way or due.
   bool AtRest() const;

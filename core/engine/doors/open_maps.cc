@@ -1,6 +1,7 @@
 #include "core/engine/doors/open_maps.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -31,9 +32,11 @@ namespace strata {
 namespace {
 
 constexpr absl::Duration kPoll = absl::Milliseconds(50);
-// A start waits so long for the first look at all maps: of few, what is wrong with them and what
-// they have to do is known at once.
+// A start waits so long for the first look at all maps: of few it is known from the beginning what
+// is wrong with them, and what they have to do has begun.
 constexpr absl::Duration kFirstLook = absl::Milliseconds(500);
+constexpr absl::Duration kFirstLookAtFew = absl::Seconds(10);
+constexpr std::size_t kFew = 100;
 // Between two looks at who is idle.
 constexpr absl::Duration kInterval = absl::Seconds(1);
 
@@ -63,7 +66,8 @@ absl::StatusOr<std::unique_ptr<OpenMaps>> OpenMaps::Start(const EngineOptions& o
   STRATA_ASSIGN_OR_RETURN(const std::vector<std::string> names, stores.List());
   std::unique_ptr<OpenMaps> maps(new OpenMaps(options, stores, names));
   absl::MutexLock lock(&maps->mutex_);
-  maps->mutex_.AwaitWithTimeout(absl::Condition(maps.get(), &OpenMaps::IsSurveyed), kFirstLook);
+  maps->mutex_.AwaitWithTimeout(absl::Condition(maps.get(), &OpenMaps::IsSurveyed),
+                                names.size() <= kFew ? kFirstLookAtFew : kFirstLook);
   return maps;
 }
 

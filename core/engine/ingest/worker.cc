@@ -126,7 +126,7 @@ bool Worker::HasStep() const { return closed_ || !tasks_.empty() || pending_ > 0
 
 bool Worker::HasWork() const {
   absl::MutexLock lock(&mutex_);
-  return pending_ > 0;
+  return pending_ > 0 || !(derived_usable_ || refuses_);
 }
 
 bool Worker::AtRest() const {

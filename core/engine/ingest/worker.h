@@ -55,7 +55,7 @@ class Worker {
   // command is waited for. `what`, for those that wait for it: "job 3 (rebuild)".
   absl::Status Execute(const Stop& stop, Command command, absl::string_view what = "an edit");
 
-  // Whether scans wait.
+  // Whether scans wait, or what is derived has to be made again.
   bool HasWork() const;
   // Nothing waits, is under way or is left to be prepared.
   bool AtRest() const;
