@@ -71,13 +71,9 @@ class TileReasons {
   // REQUIRES: the tile has no move from surface i in `direction`.
   Explanation WhyNoMove(std::uint32_t i, int direction) const {
     const WindowSurface& surface = window_.surface(i);
-    const int next = static_cast<int>(surface.cell) + window_.Step(direction);
     int cells = 0;
     const std::uint32_t target = ground_.Target(i, direction, &cells);
-    if (target == GroundChecks::kNoSurface) {
-      return {
-          Obstruction::kUnknown, ground_.HoleWidth(next, surface.z_m), Place(next, surface.z_m)};
-    }
+    if (target == GroundChecks::kNoSurface) return OfEdge(EndOfMove(i, direction), surface.z_m);
     Explanation reason = WhyNotStand(target);
     if (reason.kind != Obstruction::kNone) return reason;
     for (int n = 1; n < cells; ++n) {
@@ -101,6 +97,29 @@ class TileReasons {
     const int x = slot_.x0 + cell % window_.width() - window_.margin();
     const int y = slot_.y0 + cell / window_.width() - window_.margin();
     return {(x + 0.5) * checks_.cell_size_m, (y + 0.5) * checks_.cell_size_m, z};
+  }
+
+  // What a move that leads nowhere meets, also behind a hole that would be tolerated.
+  GroundEdge EndOfMove(std::uint32_t i, int direction) const {
+    const WindowSurface& surface = window_.surface(i);
+    GroundEdge end = {.cell = static_cast<int>(surface.cell), .seen_from_m = surface.z_m};
+    for (int n = 1; n <= checks_.GapCells(direction) + 1; ++n) {
+      end.cell += window_.Step(direction);
+      const float rise =
+          n == 1 ? checks_.step_m : checks_.RiseOver(n * checks_.StepLength(direction));
+      const Footing met = ground_.Meet(end.cell, surface.z_m, rise);
+      const bool up = met.above != Footing::kNone;
+      if (up || met.below != Footing::kNone) {
+        const float z = window_.surface(up ? met.above : met.below).z_m;
+        end.kind = up ? Obstruction::kObstacle : Obstruction::kDrop;
+        end.value = std::abs(z - surface.z_m);
+        return end;
+      }
+      if (met.ground != Footing::kNone) break;  // from there it does not lead back
+    }
+    end.cell = static_cast<int>(surface.cell) + window_.Step(direction);
+    end.kind = Obstruction::kUnknown;
+    return end;
   }
 
   Explanation OfEdge(const GroundEdge& edge, float z) const {
@@ -216,10 +235,13 @@ class Frontier {
         unknown = unknown || (even && unobserved > unknown_limit);
         continue;
       }
-      // Slopes under a hole count as ground that was not seen; behind a wall it must be level.
+      // Behind a hole that would be bridged anything counts that would count without it; slopes
+      // under a wider one count as ground that was not seen; behind a wall it must be level.
+      const bool bridged = unobserved <= checks.GapCells(move.direction);
       const float rise =
-          wall ? checks.step_m
-               : checks.RiseOver((unobserved + 1) * checks.StepLength(move.direction));
+          wall      ? checks.step_m
+          : bridged ? checks.height_m
+                    : checks.RiseOver((unobserved + 1) * checks.StepLength(move.direction));
       if (unobserved > 0 && std::abs(space_.Height(next) - level) > rise) break;
       if (Reached(space_, from_goal_, next)) return Beyond::kGoalsGround;
       if (Reached(space_, reached_, next)) return Beyond::kOther;  // another way leads there

@@ -37,8 +37,8 @@ absl::StatusOr<Explanation> WhyTooNear(SearchSpace& space, PatchId patch, double
 
 // Why the last search of `workspace` did not get on towards `goal`: the refused move nearest to it
 //   - that leads, straight on for at most kLookAheadM, from cell to cell within the robot's height,
-//     over holes within a slope that it takes and behind walls within a step, to
-//     ground connected to the goal; or,
+//     over holes wider than max_gap within a slope that it takes and behind walls within a step,
+//     to ground connected to the goal; or,
 //     if there is none,
 //   - that leads to unobserved ground; or, if there is none,
 //   - at all: its end is the top of a wall, say, or another storey.

@@ -254,6 +254,21 @@ TEST(PlannerTest, BridgesAnUnobservedStretchUpToTheLimitAndListsIt) {
   EXPECT_NEAR(wide.obstruction_value, 0.4, 1e-6);
 }
 
+// A hole that alone would be bridged; what is behind it stops, and is told.
+TEST(PlannerTest, NamesTheDropBehindAHoleThatWouldBeBridged) {
+  DrawnMap map = MapFromDrawing("........\n........", {{'.', {{0.0}}}}, 10);
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 40; x < 43; ++x) map.Erase({x, y});
+    for (int x = 43; x < 80; ++x) map[{x, y}] = {{-0.4}};
+  }
+  const PlanResult result = PlanIn(map, At(1.05, 1.05, 0), At(7.05, 1.05, -0.4));
+  EXPECT_EQ(result.reason, PlanReason::kBlocked) << result.message;
+  EXPECT_EQ(result.obstruction, Obstruction::kDrop) << result.message;
+  EXPECT_NEAR(result.obstruction_value, 0.4, 1e-6);
+  ASSERT_TRUE(result.where.has_value());
+  EXPECT_NEAR(result.where->x(), 4.35, 1e-6);
+}
+
 TEST(PlannerTest, StartAndGoalOffTheMapNameTheNearestPlace) {
   const DrawnMap map = MapFromDrawing("....\n....", {{'.', {{0.0}}}}, 10);
   const PlanResult start = PlanIn(map, At(-1.0, 1.05, 0), At(2.05, 1.05, 0));
