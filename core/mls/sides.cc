@@ -47,7 +47,7 @@ struct Moments {
 
 // Which side of what its points span is seen from the origin. What spans no surface, or one that is
 // not level, is taken for a top: leaves, a hillside, the lines that beams draw on a wall.
-Side SideOf(const Moments& m) {
+Side SideOf(const Moments& m, const Eigen::Vector3d& up) {
   if (m.n < kMinSurfacePoints) return Side::kUnknown;
   const Eigen::Vector3d mean = m.sum / m.n;
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
@@ -57,7 +57,7 @@ Side SideOf(const Moments& m) {
   if (variances[1] < kMaxSpreadM * kMaxSpreadM) return Side::kUnknown;  // a line
   Eigen::Vector3d normal = eigen.eigenvectors().col(0);
   if (normal.dot(m.first + mean) > 0.0) normal = -normal;
-  return normal.z() < -kLevel ? Side::kUnderside : Side::kTop;
+  return normal.dot(up) < -kLevel ? Side::kUnderside : Side::kTop;
 }
 
 // Heights at which a scan shows undersides.
@@ -81,18 +81,20 @@ class Ceilings {
 // Horizontal patches above the sensor, from it, and the cubes that they lie in.
 class Overhead {
  public:
+  explicit Overhead(const Eigen::Vector3d& up) : up_(up) {}
+
   void Add(std::uint32_t patch, const Eigen::Vector3f& p) {
     const auto number = static_cast<std::uint32_t>(cubes_.size());
     const std::uint32_t cube = numbers_.try_emplace(CubeOf(p), number).first->second;
     if (cube == number) cubes_.emplace_back();
     cubes_[cube].Add(p.cast<double>());
-    points_.push_back({patch, cube, p.z()});
+    points_.push_back({patch, cube, static_cast<float>(up_.dot(p.cast<double>()))});
   }
 
   void Judge(std::vector<Side>& sides) const {
     std::vector<Side> of_cubes;
     of_cubes.reserve(cubes_.size());
-    for (const Moments& moments : cubes_) of_cubes.push_back(SideOf(moments));
+    for (const Moments& moments : cubes_) of_cubes.push_back(SideOf(moments, up_));
     Ceilings ceilings;
     for (const Point& point : points_) {
       if (of_cubes[point.cube] == Side::kUnderside) ceilings.Add(point.z_m);
@@ -117,9 +119,10 @@ class Overhead {
 
   struct Point {
     std::uint32_t patch, cube;
-    float z_m;
+    float z_m;  // along up_
   };
 
+  const Eigen::Vector3d up_;
   HashMap<std::uint64_t, std::uint32_t> numbers_;
   std::vector<Moments> cubes_;
   std::vector<Point> points_;
@@ -211,15 +214,19 @@ class Floor {
 
 }  // namespace
 
-std::vector<Side> SidesOf(const MlsMap& map, const Eigen::Vector3d& p_sensor, double max_range_m) {
+std::vector<Side> SidesOf(const MlsMap& map,
+                          const Eigen::Vector3d& p_sensor,
+                          double max_range_m,
+                          const Eigen::Vector3d& up) {
   std::vector<Side> sides;
   sides.reserve(map.patch_count());
-  Overhead overhead;
+  Overhead overhead(up);
   for (const MlsTile& tile : map.tiles) {
     for (const Patch& patch : tile.patches) {
-      const bool below = patch.top_m() <= p_sensor.z() || patch.mean_m() <= p_sensor.z();
+      const Eigen::Vector3d p = PlaceOf(map, tile, patch);
+      const Eigen::Vector3d lowest(p.x(), p.y(), std::min(p.z(), patch.top_m()));
+      const bool below = up.dot(lowest - p_sensor) <= 0.0;
       if (!below && !patch.vertical()) {
-        const Eigen::Vector3d p = PlaceOf(map, tile, patch);
         if (p.head<2>().norm() <= max_range_m) {
           overhead.Add(static_cast<std::uint32_t>(sides.size()), (p - p_sensor).cast<float>());
         }

@@ -21,14 +21,16 @@ enum class Side : std::uint8_t {
 };
 
 // The side of every patch, tile by tile, of the map of one scan that was taken from `p_sensor`, in
-// the map's frame [m]. What is not above the sensor is seen from above. Of the horizontal patches
-// above it the planes of cubes of 1 m are judged: those that are level (within 26°) and face the
-// sensor from above it are undersides, all that spans a surface of another kind, or none, is a top.
+// the map's frame [m], of which the unit vector `up` is the vertical: a scan taken on a ramp has
+// its own. What is not above the sensor is seen from above. Of the horizontal patches above it the
+// planes of cubes of 1 m are judged: those that are level (within 26°) and face the sensor from
+// above it are undersides, all that spans a surface of another kind, or none, is a top.
 // What lies horizontally farther than `max_range_m` from the map's origin is left out: kUnknown.
 // A pure function of its arguments.
 std::vector<Side> SidesOf(const MlsMap& map,
                           const Eigen::Vector3d& p_sensor,
-                          double max_range_m = std::numeric_limits<double>::infinity());
+                          double max_range_m = std::numeric_limits<double>::infinity(),
+                          const Eigen::Vector3d& up = Eigen::Vector3d::UnitZ());
 
 // Sets Patch::sides to what SidesOf() says, but for seen from below only of what the sensor looked
 // up to by more than 3° and under which, within 1 to 2 m around, something lies 1.5 m lower or

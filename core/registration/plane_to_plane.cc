@@ -41,11 +41,11 @@ bool OppositeSides(const Eigen::Vector3d& p,
 // in front of a robot, and a chain of scans bends upwards. So features more than 3° above the
 // sensor that look level, and are no undersides, only count as overlap. Below the horizon they
 // are ground, too, and all that holds a scan of a floor with little on it.
-bool MayBeStripOnAWall(const SampledFeature& feature, const Eigen::Vector3d& sensor_origin) {
+bool MayBeStripOnAWall(const SampledFeature& feature, const ScanFeatures& scan) {
   constexpr double kSine = 0.05;
-  const Eigen::Vector3d to_point = feature.element.point.cast<double>() - sensor_origin;
+  const Eigen::Vector3d to_point = feature.element.point.cast<double>() - scan.sensor_origin();
   return feature.feature_class != FeatureClass::kNonTraversable &&
-         to_point.z() > kSine * to_point.norm();
+         to_point.dot(scan.up()) > kSine * to_point.norm();
 }
 
 bool IsLevel(const Eigen::Vector3d& normal) {
@@ -65,9 +65,9 @@ void ShareNormals(Eigen::Vector3d& normal_p, Eigen::Vector3d& normal_q) {
 bool SaysNothing(const SampledFeature& feature,
                  const Eigen::Vector3d& normal_p,
                  const Eigen::Vector3d& normal_q,
-                 const Eigen::Vector3d& sensor_origin) {
+                 const ScanFeatures& scan) {
   if (feature.feature_class != FeatureClass::kVertical && normal_p.isZero()) return true;
-  return (IsLevel(normal_p) || IsLevel(normal_q)) && MayBeStripOnAWall(feature, sensor_origin);
+  return (IsLevel(normal_p) || IsLevel(normal_q)) && MayBeStripOnAWall(feature, scan);
 }
 
 }  // namespace
@@ -146,7 +146,7 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
     Eigen::Vector3d normal_p = sampled.element.normal.cast<double>();
     Eigen::Vector3d normal_q = R.transpose() * q.normal.cast<double>();
     if (sampled.feature_class != FeatureClass::kVertical) ShareNormals(normal_p, normal_q);
-    if (SaysNothing(sampled, normal_p, normal_q, source_.sensor_origin())) {
+    if (SaysNothing(sampled, normal_p, normal_q, source_)) {
       ++sums.inliers;
       continue;
     }

@@ -64,6 +64,7 @@ absl::Status ScanFeatureOptions::Validate() const {
   checks.InRange("neighbours", neighbours, 4, ColumnGrid::kMaxNeighbours);
   checks.InRange("neighbour_radius_m", neighbour_radius_m, 0.01, 100.0);
   checks.InRange("|sensor_origin|", sensor_origin.norm(), 0.0, 1e8);
+  checks.InRange("|up|", up.norm(), 0.999, 1.001);
   return checks.status();
 }
 
@@ -99,7 +100,8 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const ScanFeatureOpt
   for (const FeatureClass c : {FeatureClass::kTraversable, FeatureClass::kVertical}) {
     ListOf(c, points).reserve(local_map.patch_count());
   }
-  const std::vector<Side> sides = SidesOf(local_map, options.sensor_origin, options.max_range_m);
+  const std::vector<Side> sides =
+      SidesOf(local_map, options.sensor_origin, options.max_range_m, options.up);
   // Tops above the sensor, behind the others: samples are drawn by place, and recorded figures with
   // them.
   std::vector<Eigen::Vector3f> overhead;
@@ -143,6 +145,7 @@ ScanFeatures ScanFeatures::FromPoints(ClassPoints points, const ScanFeatureOptio
   ScanFeatures features;
   features.points_ = std::move(points);
   features.sensor_origin_ = options.sensor_origin;
+  features.up_ = options.up;
   std::array<ColumnGrid, kFeatureClasses> grids;
   if (options.sample_count == 0) return features;
   for (int c = 0; c < kFeatureClasses; ++c) {

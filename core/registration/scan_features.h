@@ -32,6 +32,9 @@ struct ScanFeatureOptions {
   // Where the scan was taken from, in its frame; finite. What it saw from one side is not what
   // another scan saw from the other.
   Eigen::Vector3d sensor_origin = Eigen::Vector3d::Zero();
+  // The vertical in its frame, as far as anybody knows; of length 1. A robot on a ramp looks up to
+  // the underside of a deck that lies below its own horizon.
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
 
   // INVALID_ARGUMENT naming every field out of its range.
   absl::Status Validate() const;
@@ -83,11 +86,14 @@ class ScanFeatures {
   const std::vector<SampledFeature>& sample() const { return sample_; }
   // ScanFeatureOptions::sensor_origin.
   const Eigen::Vector3d& sensor_origin() const { return sensor_origin_; }
+  // ScanFeatureOptions::up.
+  const Eigen::Vector3d& up() const { return up_; }
   std::size_t size() const;
   std::size_t memory_bytes() const;
 
  private:
   Eigen::Vector3d sensor_origin_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d up_ = Eigen::Vector3d::UnitZ();
   std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points_;
   std::vector<SampledFeature> sample_;
 };

@@ -347,7 +347,7 @@ int Main() {
         "posegraphs\n");
     return 77;
   }
-  const Drawing drawing = ReadDrawing(std::filesystem::path(SourcePath("tests/experiments")) /
+  const Drawing drawing = ReadDrawing(std::filesystem::path(testing::SourcePath("tests/experiments")) /
                                       "classification/fr079_places.txt");
   const std::vector<std::vector<double>> ranges =
       ReadRanges(Unzipped(*recording / "fr079.clf.bz2"));
