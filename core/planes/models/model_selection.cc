@@ -60,15 +60,12 @@ class LeaveOneOut {
         moments_(mixture.planes.size(), Eigen::Matrix4d::Zero()) {
     for (std::uint32_t j = 0; j < mixture.cells().size(); ++j) {
       const MixtureCell& cell = mixture.cells()[j];
-      double sum = std::exp(mixture.ClutterLog());
       for (const Membership& member : mixture.memberships(j)) {
-        sum += std::exp(mixture.CellLog(cell, mixture.planes[member.plane]));
         cells_of_[member.plane].push_back(j);
         if (member.share < 1e-3) continue;
         const double weight = member.share * cell.measurements / cell.variance_m2;
         moments_[member.plane] += MomentsOf(weight, cell.mean, cell.covariance);
       }
-      totals_.push_back(std::log(sum));
     }
   }
 
@@ -132,13 +129,14 @@ class LeaveOneOut {
     plane.colour = colour;
     plane.chance += mixture_.planes[t].chance;
     plane.voxels = Union(mixture_.planes[m].voxels, mixture_.planes[t].voxels);
+    const double density = mixture_.PlaceDensity(plane);
     double change = 0.0;
     for (const std::uint32_t j : cells) {
-      double rest = 1.0, now = 0.0;
+      double rest = 1.0;
       for (const Membership& member : mixture_.memberships(j)) {
         if (member.plane == m || member.plane == t) rest -= member.share;
       }
-      now = std::exp(mixture_.CellLog(mixture_.cells()[j], plane) - Total(j));
+      const double now = density * mixture_.Odds(j, plane) / mixture_.odds_sum(j);
       change += Measurements(j) * std::log(std::max(1e-300, Rest(j, rest) + now));
     }
     return change;
@@ -147,16 +145,13 @@ class LeaveOneOut {
   double Measurements(std::uint32_t j) const { return mixture_.cells()[j].measurements; }
   // Shares sum to 1 with clutter, which never has less than this.
   double Rest(std::uint32_t j, double share) const {
-    return std::max(share, std::exp(mixture_.ClutterLog() - Total(j)));
+    return std::max(share, 1.0 / mixture_.odds_sum(j));
   }
-  // ln of the sum over planes and clutter.
-  double Total(std::uint32_t j) const { return totals_[j]; }
 
   const PlaneMixture& mixture_;
   PlaneReduction which_;
   std::vector<std::vector<std::uint32_t>> cells_of_;  // that may be in it, ascending
-  std::vector<double> totals_;
-  std::vector<Eigen::Matrix4d> moments_;  // of what is in it, weighted n/ρ²
+  std::vector<Eigen::Matrix4d> moments_;              // of what is in it, weighted n/ρ²
 };
 
 // Those of the reductions, best first, that do not touch planes around an earlier one; `touched`
@@ -197,6 +192,18 @@ void Apply(const std::vector<Reduction>& reductions, PlaneMixture& mixture) {
   }
 }
 
+// Of the log-likelihood, where a column goes.
+double LossWithout(const Eigen::MatrixXd::ConstColXpr& column,
+                   const Eigen::VectorXd& sums,
+                   const Eigen::VectorXd& none) {
+  double loss = 0.0;
+  for (Eigen::Index m = 0; m < column.size(); ++m) {
+    if (column(m) == 0.0) continue;
+    loss += std::log(sums(m) / std::max(none(m), sums(m) - column(m)));
+  }
+  return loss;
+}
+
 // Two directions as one between them, by what is more likely to have them.
 struct DirectionMerge {
   std::size_t kept = 0, gone = 0;
@@ -218,7 +225,8 @@ double MergeChange(const DirectionMerge& merge,
     const double all = sums(m);
     const double two = density(m, static_cast<Eigen::Index>(merge.kept)) +
                        density(m, static_cast<Eigen::Index>(merge.gone));
-    const double one = std::exp(mixture.DirectionLog(static_cast<std::size_t>(m), merge.kept));
+    const double one = mixture.DirectionDensity(static_cast<std::size_t>(m), merge.kept);
+    if (two == 0.0 && one == 0.0) continue;
     change -= 2.0 * std::log((std::max(0.0, all - two) + one) / all);
   }
   mixture.directions[merge.kept] = direction;
@@ -226,16 +234,22 @@ double MergeChange(const DirectionMerge& merge,
   return change;
 }
 
-// Leaving one out and keeping the other where it is may be worse than both.
-bool MergeDirections(PlaneMixture& mixture) {
+// Of each plane and direction, at last none.
+Eigen::MatrixXd DirectionDensities(const PlaneMixture& mixture) {
   Eigen::MatrixXd density(static_cast<Eigen::Index>(mixture.planes.size()),
                           static_cast<Eigen::Index>(mixture.chances.size()));
-  for (Eigen::Index m = 0; m < density.rows(); ++m) {
-    for (Eigen::Index k = 0; k < density.cols(); ++k) {
+  for (Eigen::Index k = 0; k < density.cols(); ++k) {
+    for (Eigen::Index m = 0; m < density.rows(); ++m) {
       density(m, k) =
-          std::exp(mixture.DirectionLog(static_cast<std::size_t>(m), static_cast<std::size_t>(k)));
+          mixture.DirectionDensity(static_cast<std::size_t>(m), static_cast<std::size_t>(k));
     }
   }
+  return density;
+}
+
+// Leaving one out and keeping the other where it is may be worse than both.
+bool MergeDirections(PlaneMixture& mixture) {
+  const Eigen::MatrixXd density = DirectionDensities(mixture);
   const Eigen::VectorXd sums = density.rowwise().sum();
   const double near = std::cos(kMergeSigmas * mixture.options().direction_sigma_rad);
   DirectionMerge best;
@@ -255,7 +269,7 @@ bool MergeDirections(PlaneMixture& mixture) {
   mixture.chances[best.kept] += mixture.chances[best.gone];
   mixture.directions.erase(mixture.directions.begin() + static_cast<std::ptrdiff_t>(best.gone));
   mixture.chances.erase(mixture.chances.begin() + static_cast<std::ptrdiff_t>(best.gone));
-  mixture.EStep();
+  mixture.DirectionEStep();
   return true;
 }
 
@@ -279,13 +293,7 @@ bool DropDirections(PlaneMixture& mixture) {
   const auto M = static_cast<Eigen::Index>(mixture.planes.size());
   std::vector<std::size_t> left(mixture.chances.size());  // at last none, which stays
   std::iota(left.begin(), left.end(), 0U);
-  Eigen::MatrixXd density(M, static_cast<Eigen::Index>(left.size()));
-  for (Eigen::Index m = 0; m < M; ++m) {
-    for (std::size_t k = 0; k < left.size(); ++k) {
-      density(m, static_cast<Eigen::Index>(k)) =
-          std::exp(mixture.DirectionLog(static_cast<std::size_t>(m), k));
-    }
-  }
+  const Eigen::MatrixXd density = DirectionDensities(mixture);
   const Eigen::VectorXd none = density.rightCols<1>();
   Eigen::VectorXd sums = density.rowwise().sum();
   double chances = 1.0;  // of those that are left
@@ -293,9 +301,7 @@ bool DropDirections(PlaneMixture& mixture) {
     double best_change = 0.0;
     std::optional<std::size_t> best;
     for (std::size_t i = 0; i + 1 < left.size(); ++i) {
-      const auto column = density.col(static_cast<Eigen::Index>(left[i])).array();
-      const double loss =
-          (sums.array().log() - (sums.array() - column).max(none.array()).log()).sum();
+      const double loss = LossWithout(density.col(static_cast<Eigen::Index>(left[i])), sums, none);
       // Those that stay share its chance.
       const double rise = std::log(chances / (chances - mixture.chances[left[i]]));
       const double change =
@@ -318,7 +324,7 @@ bool DropDirections(PlaneMixture& mixture) {
   }
   mixture.directions = std::move(kept);
   mixture.chances = std::move(kept_chances);
-  mixture.EStep();
+  mixture.DirectionEStep();
   return true;
 }
 
