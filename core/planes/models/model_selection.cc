@@ -41,6 +41,18 @@ std::vector<Voxel> Union(const std::vector<Voxel>& a, const std::vector<Voxel>& 
   return all;
 }
 
+std::size_t UnionSize(const std::vector<Voxel>& a, const std::vector<Voxel>& b) {
+  std::size_t both = 0;
+  auto i = a.begin();
+  for (auto j = b.begin(); i != a.end() && j != b.end();) {
+    if (*i == *j) ++both;
+    const bool step_a = *i <= *j, step_b = *j <= *i;
+    if (step_a) ++i;
+    if (step_b) ++j;
+  }
+  return a.size() + b.size() - both;
+}
+
 // One plane less: `gone` is left out, or goes into `into`, which becomes `plane`.
 struct Reduction {
   std::size_t gone = 0;
@@ -61,7 +73,7 @@ class LeaveOneOut {
     for (std::uint32_t j = 0; j < mixture.cells().size(); ++j) {
       const MixtureCell& cell = mixture.cells()[j];
       for (const Membership& member : mixture.memberships(j)) {
-        cells_of_[member.plane].push_back(j);
+        cells_of_[member.plane].push_back({j, member.share});
         if (member.share < 1e-3) continue;
         const double weight = member.share * cell.measurements / cell.variance_m2;
         moments_[member.plane] += MomentsOf(weight, cell.mean, cell.covariance);
@@ -72,13 +84,16 @@ class LeaveOneOut {
   // The planes that compete for cells with m, ascending.
   std::vector<std::size_t> Rivals(std::size_t m) const {
     std::vector<std::size_t> rivals;
-    for (const std::uint32_t j : cells_of_[m]) {
-      for (const Membership& other : mixture_.memberships(j)) {
-        if (other.plane != m) rivals.push_back(other.plane);
+    std::vector<bool> known(mixture_.planes.size(), false);
+    known[m] = true;
+    for (const SharedCell& shared : cells_of_[m]) {
+      for (const Membership& other : mixture_.memberships(shared.cell)) {
+        if (known[other.plane]) continue;
+        known[other.plane] = true;
+        rivals.push_back(other.plane);
       }
     }
     std::sort(rivals.begin(), rivals.end());
-    rivals.erase(std::unique(rivals.begin(), rivals.end()), rivals.end());
     return rivals;
   }
 
@@ -105,39 +120,41 @@ class LeaveOneOut {
   }
 
  private:
+  struct SharedCell {
+    std::uint32_t cell = 0;
+    double share = 0.0;
+  };
+
   // Change of the log-likelihood.
   double Without(std::size_t m) const {
     double change = 0.0;
-    for (const std::uint32_t j : cells_of_[m]) {
-      for (const Membership& member : mixture_.memberships(j)) {
-        if (member.plane != m) continue;
-        change += Measurements(j) * std::log(std::max(1e-300, Rest(j, 1.0 - member.share)));
-      }
+    for (const auto& [j, share] : cells_of_[m]) {
+      change += Measurements(j) * std::log(std::max(1e-300, Rest(j, 1.0 - share)));
     }
     return change;
   }
 
   double Merged(std::size_t m, std::size_t t, const Plane& joint, const LabColour& colour) const {
-    std::vector<std::uint32_t> cells;
-    std::set_union(cells_of_[m].begin(),
-                   cells_of_[m].end(),
-                   cells_of_[t].begin(),
-                   cells_of_[t].end(),
-                   std::back_inserter(cells));
-    MixturePlane plane = mixture_.planes[m];
+    const MixturePlane &one = mixture_.planes[m], &other = mixture_.planes[t];
+    MixturePlane plane;
     plane.plane = joint;
     plane.colour = colour;
-    plane.chance += mixture_.planes[t].chance;
-    plane.voxels = Union(mixture_.planes[m].voxels, mixture_.planes[t].voxels);
-    const double density = mixture_.PlaceDensity(plane);
+    const double density =
+        mixture_.PlaceDensity(one.chance + other.chance, UnionSize(one.voxels, other.voxels));
     double change = 0.0;
-    for (const std::uint32_t j : cells) {
-      double rest = 1.0;
-      for (const Membership& member : mixture_.memberships(j)) {
-        if (member.plane == m || member.plane == t) rest -= member.share;
-      }
+    const auto add = [&](std::uint32_t j, double shares) {
       const double now = density * mixture_.Odds(j, plane) / mixture_.odds_sum(j);
-      change += Measurements(j) * std::log(std::max(1e-300, Rest(j, rest) + now));
+      change += Measurements(j) * std::log(std::max(1e-300, Rest(j, 1.0 - shares) + now));
+    };
+    auto a = cells_of_[m].begin(), b = cells_of_[t].begin();
+    const auto a_end = cells_of_[m].end(), b_end = cells_of_[t].end();
+    while (a != a_end || b != b_end) {
+      const bool in_a = a != a_end && (b == b_end || a->cell <= b->cell);
+      const bool in_b = b != b_end && (a == a_end || b->cell <= a->cell);
+      const std::uint32_t j = in_a ? a->cell : b->cell;
+      add(j, (in_a ? a->share : 0.0) + (in_b ? b->share : 0.0));
+      if (in_a) ++a;
+      if (in_b) ++b;
     }
     return change;
   }
@@ -150,8 +167,8 @@ class LeaveOneOut {
 
   const PlaneMixture& mixture_;
   PlaneReduction which_;
-  std::vector<std::vector<std::uint32_t>> cells_of_;  // that may be in it, ascending
-  std::vector<Eigen::Matrix4d> moments_;              // of what is in it, weighted n/ρ²
+  std::vector<std::vector<SharedCell>> cells_of_;  // that may be in it, ascending
+  std::vector<Eigen::Matrix4d> moments_;           // of what is in it, weighted n/ρ²
 };
 
 // Those of the reductions, best first, that do not touch planes around an earlier one; `touched`

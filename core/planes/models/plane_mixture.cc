@@ -123,9 +123,8 @@ std::optional<std::uint32_t> PlaneMixture::PlaneOf(std::size_t j) const {
   return sum > 0.5 ? std::optional(plane) : std::nullopt;
 }
 
-double PlaneMixture::PlaceDensity(const MixturePlane& plane) const {
-  const double voxels = static_cast<double>(std::max<std::size_t>(1, plane.voxels.size()));
-  return plane.chance * VoxelCount(voxel_ids_) / voxels;
+double PlaneMixture::PlaceDensity(double chance, std::size_t voxels) const {
+  return chance * VoxelCount(voxel_ids_) / static_cast<double>(std::max<std::size_t>(1, voxels));
 }
 
 double PlaneMixture::Misfit(const MixtureCell& cell, const MixturePlane& plane) const {
@@ -204,8 +203,7 @@ std::vector<double> PlaneMixture::FindMembers() {
   const double clutter = ClutterLog();
   std::vector<double> most_logs;  // of each plane's density, were it the only one
   for (const MixturePlane& plane : planes) {
-    const double voxels = static_cast<double>(std::max<std::size_t>(1, plane.voxels.size()));
-    most_logs.push_back(std::log(VoxelCount(voxel_ids_) / voxels));
+    most_logs.push_back(std::log(PlaceDensity(1.0, plane.voxels.size())));
   }
   members_.clear();
   std::vector<double> odds;
@@ -372,7 +370,8 @@ void PlaneMixture::FitPlanes(const std::vector<Scatter>& scatters,
       if (share == 0.0) continue;
       squares -= prior * planes[m].weight * share * directions[k] * directions[k].transpose();
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(squares);
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+    solver.computeDirect(squares);
     Plane& plane = planes[m].plane;
     const Eigen::Vector3d normal = solver.eigenvectors().col(0);
     plane.normal = normal.dot(before[m].plane.normal) < 0.0 ? Eigen::Vector3d(-normal) : normal;
@@ -391,7 +390,9 @@ void PlaneMixture::FitDirections() {
       sum += planes[m].weight * share * n * n.transpose();
     }
     if (!(sum.trace() > 1e-9)) continue;
-    directions[k] = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(sum).eigenvectors().col(2);
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+    solver.computeDirect(sum);
+    directions[k] = solver.eigenvectors().col(2);
   }
 }
 

@@ -119,7 +119,10 @@ class PlaneMixture {
   // How many times as likely cell j is on the plane as it is clutter, but for PlaceDensity().
   double Odds(std::size_t j, const MixturePlane& plane) const;
   // Of the plane's measurements in its voxels to those of all in theirs.
-  double PlaceDensity(const MixturePlane& plane) const;
+  double PlaceDensity(const MixturePlane& plane) const {
+    return PlaceDensity(plane.chance, plane.voxels.size());
+  }
+  double PlaceDensity(double chance, std::size_t voxels) const;
   // Of cell j, all planes' odds with their densities, and 1 for clutter, at the last E-step.
   double odds_sum(std::size_t j) const { return odds_sums_[j]; }
   // Of a plane whose measurements lie as close as those of all others.
