@@ -36,6 +36,7 @@ RESULTS = {
        for what, title in (("walls", "figure 5.3: parallel walls"), ("rack", "figures 5.4 and 5.5: a rack"),
                            ("boxes", "figure 5.7: two boxes"), ("corridor", "figure 5.9: doors by their colours"),
                            ("jacket", "figure 5.10: a jacket on a desk"), ("carpet", "figure 5.11: a carpet"))},
+    "planes_thin": ("Planes of partitions of 8 to 15 cm between rooms", f"experiments/plane_models thin {PLANES_SEED}", ("core/planes/models",)),
     "building": ("Planes of a recorded building", "experiments/plane_models building", ("core/planes/models",)),
     "table_4_1": ("Thesis, table 4.1: triangulations of a piano stool", "experiments/mesh_methods stool", ("core/mesh",)),
     "table_4_2": ("Thesis, table 4.2: bytes of representations", "experiments/mesh_methods memory", ("core/mesh", "core/mls")),

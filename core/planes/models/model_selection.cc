@@ -41,6 +41,18 @@ std::vector<Voxel> Union(const std::vector<Voxel>& a, const std::vector<Voxel>& 
   return all;
 }
 
+std::size_t UnionSize(const std::vector<Voxel>& a, const std::vector<Voxel>& b) {
+  std::size_t both = 0;
+  auto i = a.begin();
+  for (auto j = b.begin(); i != a.end() && j != b.end();) {
+    if (*i == *j) ++both;
+    const bool step_a = *i <= *j, step_b = *j <= *i;
+    if (step_a) ++i;
+    if (step_b) ++j;
+  }
+  return a.size() + b.size() - both;
+}
+
 // One plane less: `gone` is left out, or goes into `into`, which becomes `plane`.
 struct Reduction {
   std::size_t gone = 0;
@@ -60,28 +72,28 @@ class LeaveOneOut {
         moments_(mixture.planes.size(), Eigen::Matrix4d::Zero()) {
     for (std::uint32_t j = 0; j < mixture.cells().size(); ++j) {
       const MixtureCell& cell = mixture.cells()[j];
-      double sum = std::exp(mixture.ClutterLog());
       for (const Membership& member : mixture.memberships(j)) {
-        sum += std::exp(mixture.CellLog(cell, mixture.planes[member.plane]));
-        cells_of_[member.plane].push_back(j);
+        cells_of_[member.plane].push_back({j, member.share});
         if (member.share < 1e-3) continue;
         const double weight = member.share * cell.measurements / cell.variance_m2;
         moments_[member.plane] += MomentsOf(weight, cell.mean, cell.covariance);
       }
-      totals_.push_back(std::log(sum));
     }
   }
 
   // The planes that compete for cells with m, ascending.
   std::vector<std::size_t> Rivals(std::size_t m) const {
     std::vector<std::size_t> rivals;
-    for (const std::uint32_t j : cells_of_[m]) {
-      for (const Membership& other : mixture_.memberships(j)) {
-        if (other.plane != m) rivals.push_back(other.plane);
+    std::vector<bool> known(mixture_.planes.size(), false);
+    known[m] = true;
+    for (const SharedCell& shared : cells_of_[m]) {
+      for (const Membership& other : mixture_.memberships(shared.cell)) {
+        if (known[other.plane]) continue;
+        known[other.plane] = true;
+        rivals.push_back(other.plane);
       }
     }
     std::sort(rivals.begin(), rivals.end());
-    rivals.erase(std::unique(rivals.begin(), rivals.end()), rivals.end());
     return rivals;
   }
 
@@ -108,38 +120,41 @@ class LeaveOneOut {
   }
 
  private:
+  struct SharedCell {
+    std::uint32_t cell = 0;
+    double share = 0.0;
+  };
+
   // Change of the log-likelihood.
   double Without(std::size_t m) const {
     double change = 0.0;
-    for (const std::uint32_t j : cells_of_[m]) {
-      for (const Membership& member : mixture_.memberships(j)) {
-        if (member.plane != m) continue;
-        change += Measurements(j) * std::log(std::max(1e-300, Rest(j, 1.0 - member.share)));
-      }
+    for (const auto& [j, share] : cells_of_[m]) {
+      change += Measurements(j) * std::log(std::max(1e-300, Rest(j, 1.0 - share)));
     }
     return change;
   }
 
   double Merged(std::size_t m, std::size_t t, const Plane& joint, const LabColour& colour) const {
-    std::vector<std::uint32_t> cells;
-    std::set_union(cells_of_[m].begin(),
-                   cells_of_[m].end(),
-                   cells_of_[t].begin(),
-                   cells_of_[t].end(),
-                   std::back_inserter(cells));
-    MixturePlane plane = mixture_.planes[m];
+    const MixturePlane &one = mixture_.planes[m], &other = mixture_.planes[t];
+    MixturePlane plane;
     plane.plane = joint;
     plane.colour = colour;
-    plane.chance += mixture_.planes[t].chance;
-    plane.voxels = Union(mixture_.planes[m].voxels, mixture_.planes[t].voxels);
+    const double density =
+        mixture_.PlaceDensity(one.chance + other.chance, UnionSize(one.voxels, other.voxels));
     double change = 0.0;
-    for (const std::uint32_t j : cells) {
-      double rest = 1.0, now = 0.0;
-      for (const Membership& member : mixture_.memberships(j)) {
-        if (member.plane == m || member.plane == t) rest -= member.share;
-      }
-      now = std::exp(mixture_.CellLog(mixture_.cells()[j], plane) - Total(j));
-      change += Measurements(j) * std::log(std::max(1e-300, Rest(j, rest) + now));
+    const auto add = [&](std::uint32_t j, double shares) {
+      const double now = density * mixture_.Odds(j, plane) / mixture_.odds_sum(j);
+      change += Measurements(j) * std::log(std::max(1e-300, Rest(j, 1.0 - shares) + now));
+    };
+    auto a = cells_of_[m].begin(), b = cells_of_[t].begin();
+    const auto a_end = cells_of_[m].end(), b_end = cells_of_[t].end();
+    while (a != a_end || b != b_end) {
+      const bool in_a = a != a_end && (b == b_end || a->cell <= b->cell);
+      const bool in_b = b != b_end && (a == a_end || b->cell <= a->cell);
+      const std::uint32_t j = in_a ? a->cell : b->cell;
+      add(j, (in_a ? a->share : 0.0) + (in_b ? b->share : 0.0));
+      if (in_a) ++a;
+      if (in_b) ++b;
     }
     return change;
   }
@@ -147,16 +162,13 @@ class LeaveOneOut {
   double Measurements(std::uint32_t j) const { return mixture_.cells()[j].measurements; }
   // Shares sum to 1 with clutter, which never has less than this.
   double Rest(std::uint32_t j, double share) const {
-    return std::max(share, std::exp(mixture_.ClutterLog() - Total(j)));
+    return std::max(share, 1.0 / mixture_.odds_sum(j));
   }
-  // ln of the sum over planes and clutter.
-  double Total(std::uint32_t j) const { return totals_[j]; }
 
   const PlaneMixture& mixture_;
   PlaneReduction which_;
-  std::vector<std::vector<std::uint32_t>> cells_of_;  // that may be in it, ascending
-  std::vector<double> totals_;
-  std::vector<Eigen::Matrix4d> moments_;  // of what is in it, weighted n/ρ²
+  std::vector<std::vector<SharedCell>> cells_of_;  // that may be in it, ascending
+  std::vector<Eigen::Matrix4d> moments_;           // of what is in it, weighted n/ρ²
 };
 
 // Those of the reductions, best first, that do not touch planes around an earlier one; `touched`
@@ -197,6 +209,18 @@ void Apply(const std::vector<Reduction>& reductions, PlaneMixture& mixture) {
   }
 }
 
+// Of the log-likelihood, where a column goes.
+double LossWithout(const Eigen::MatrixXd::ConstColXpr& column,
+                   const Eigen::VectorXd& sums,
+                   const Eigen::VectorXd& none) {
+  double loss = 0.0;
+  for (Eigen::Index m = 0; m < column.size(); ++m) {
+    if (column(m) == 0.0) continue;
+    loss += std::log(sums(m) / std::max(none(m), sums(m) - column(m)));
+  }
+  return loss;
+}
+
 // Two directions as one between them, by what is more likely to have them.
 struct DirectionMerge {
   std::size_t kept = 0, gone = 0;
@@ -218,7 +242,8 @@ double MergeChange(const DirectionMerge& merge,
     const double all = sums(m);
     const double two = density(m, static_cast<Eigen::Index>(merge.kept)) +
                        density(m, static_cast<Eigen::Index>(merge.gone));
-    const double one = std::exp(mixture.DirectionLog(static_cast<std::size_t>(m), merge.kept));
+    const double one = mixture.DirectionDensity(static_cast<std::size_t>(m), merge.kept);
+    if (two == 0.0 && one == 0.0) continue;
     change -= 2.0 * std::log((std::max(0.0, all - two) + one) / all);
   }
   mixture.directions[merge.kept] = direction;
@@ -226,16 +251,22 @@ double MergeChange(const DirectionMerge& merge,
   return change;
 }
 
-// Leaving one out and keeping the other where it is may be worse than both.
-bool MergeDirections(PlaneMixture& mixture) {
+// Of each plane and direction, at last none.
+Eigen::MatrixXd DirectionDensities(const PlaneMixture& mixture) {
   Eigen::MatrixXd density(static_cast<Eigen::Index>(mixture.planes.size()),
                           static_cast<Eigen::Index>(mixture.chances.size()));
-  for (Eigen::Index m = 0; m < density.rows(); ++m) {
-    for (Eigen::Index k = 0; k < density.cols(); ++k) {
+  for (Eigen::Index k = 0; k < density.cols(); ++k) {
+    for (Eigen::Index m = 0; m < density.rows(); ++m) {
       density(m, k) =
-          std::exp(mixture.DirectionLog(static_cast<std::size_t>(m), static_cast<std::size_t>(k)));
+          mixture.DirectionDensity(static_cast<std::size_t>(m), static_cast<std::size_t>(k));
     }
   }
+  return density;
+}
+
+// Leaving one out and keeping the other where it is may be worse than both.
+bool MergeDirections(PlaneMixture& mixture) {
+  const Eigen::MatrixXd density = DirectionDensities(mixture);
   const Eigen::VectorXd sums = density.rowwise().sum();
   const double near = std::cos(kMergeSigmas * mixture.options().direction_sigma_rad);
   DirectionMerge best;
@@ -255,7 +286,7 @@ bool MergeDirections(PlaneMixture& mixture) {
   mixture.chances[best.kept] += mixture.chances[best.gone];
   mixture.directions.erase(mixture.directions.begin() + static_cast<std::ptrdiff_t>(best.gone));
   mixture.chances.erase(mixture.chances.begin() + static_cast<std::ptrdiff_t>(best.gone));
-  mixture.EStep();
+  mixture.DirectionEStep();
   return true;
 }
 
@@ -279,13 +310,7 @@ bool DropDirections(PlaneMixture& mixture) {
   const auto M = static_cast<Eigen::Index>(mixture.planes.size());
   std::vector<std::size_t> left(mixture.chances.size());  // at last none, which stays
   std::iota(left.begin(), left.end(), 0U);
-  Eigen::MatrixXd density(M, static_cast<Eigen::Index>(left.size()));
-  for (Eigen::Index m = 0; m < M; ++m) {
-    for (std::size_t k = 0; k < left.size(); ++k) {
-      density(m, static_cast<Eigen::Index>(k)) =
-          std::exp(mixture.DirectionLog(static_cast<std::size_t>(m), k));
-    }
-  }
+  const Eigen::MatrixXd density = DirectionDensities(mixture);
   const Eigen::VectorXd none = density.rightCols<1>();
   Eigen::VectorXd sums = density.rowwise().sum();
   double chances = 1.0;  // of those that are left
@@ -293,9 +318,7 @@ bool DropDirections(PlaneMixture& mixture) {
     double best_change = 0.0;
     std::optional<std::size_t> best;
     for (std::size_t i = 0; i + 1 < left.size(); ++i) {
-      const auto column = density.col(static_cast<Eigen::Index>(left[i])).array();
-      const double loss =
-          (sums.array().log() - (sums.array() - column).max(none.array()).log()).sum();
+      const double loss = LossWithout(density.col(static_cast<Eigen::Index>(left[i])), sums, none);
       // Those that stay share its chance.
       const double rise = std::log(chances / (chances - mixture.chances[left[i]]));
       const double change =
@@ -318,7 +341,7 @@ bool DropDirections(PlaneMixture& mixture) {
   }
   mixture.directions = std::move(kept);
   mixture.chances = std::move(kept_chances);
-  mixture.EStep();
+  mixture.DirectionEStep();
   return true;
 }
 

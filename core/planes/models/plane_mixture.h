@@ -10,8 +10,10 @@
 #ifndef STRATA_CORE_PLANES_MODELS_PLANE_MIXTURE_H_
 #define STRATA_CORE_PLANES_MODELS_PLANE_MIXTURE_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -89,6 +91,8 @@ class PlaneMixture {
   // and the E-step. To be called whenever planes came, left or grew; within a run of EM it holds.
   void Prepare();
   void EStep();
+  // The part of an E-step that is of normals and main directions: what those change.
+  void DirectionEStep();
   // The planes and directions that maximise the expected log-likelihood for the expectations of
   // the last E-step, one given the others in turns, each in closed form.
   void MStep();
@@ -103,19 +107,30 @@ class PlaneMixture {
   double measurements() const { return measurements_; }
 
   // Of cell j those planes that it may be in. After EStep().
-  const std::vector<Membership>& memberships(std::size_t j) const { return members_[j]; }
+  std::span<const Membership> memberships(std::size_t j) const {
+    return std::span(members_).subspan(begins_[j], begins_[j + 1] - begins_[j]);
+  }
   // The plane that has most of cell j, unless clutter has half of it.
   std::optional<std::uint32_t> PlaneOf(std::size_t j) const;
   // ln p(cell, plane), a measurement's mean, where density is counted beside that of measurements
   // all over the cells' voxels.
   double CellLog(const MixtureCell& cell, const MixturePlane& plane) const;
   double ClutterLog() const;  // the same of clutter
+  // How many times as likely cell j is on the plane as it is clutter, but for PlaceDensity().
+  double Odds(std::size_t j, const MixturePlane& plane) const;
+  // Of the plane's measurements in its voxels to those of all in theirs.
+  double PlaceDensity(const MixturePlane& plane) const {
+    return PlaceDensity(plane.chance, plane.voxels.size());
+  }
+  double PlaceDensity(double chance, std::size_t voxels) const;
+  // Of cell j, all planes' odds with their densities, and 1 for clutter, at the last E-step.
+  double odds_sum(std::size_t j) const { return odds_sums_[j]; }
   // Of a plane whose measurements lie as close as those of all others.
   double MeanChance(std::size_t voxels) const;
   // E[β_mk] of the last E-step; row m; the last column is "none".
   const Eigen::MatrixXd& direction_shares() const { return beta_; }
-  // ln of the density of plane m's normal given direction k, K included: none.
-  double DirectionLog(std::size_t m, std::size_t k) const;
+  // Density of plane m's normal with direction k and its chance; K is none.
+  double DirectionDensity(std::size_t m, std::size_t k) const;
   // Voxels of the cells that are more of the plane than of anything else.
   void RefreshSupport();
 
@@ -130,17 +145,33 @@ class PlaneMixture {
   };
   std::vector<Scatter> Scatters() const;
   void UpdateChances();
-  // CellLog() in parts: that of the plane alone, that of the cell alone, and that of both.
-  double DensityLog(const MixturePlane& plane) const;
+  void UpdateDirectionChances();
+  void FitPlanes(const std::vector<Scatter>& scatters, const std::vector<MixturePlane>& before);
+  void FitDirections();
+  // Shares from what the planes' densities make of the odds of each cell's members.
+  void ShareOut(std::span<const double> odds);
   double Misfit(const MixtureCell& cell, const MixturePlane& plane) const;
+  // ln of DirectionDensity(), however small that is.
+  double DirectionLog(std::size_t m, std::size_t k) const;
+  // Of each of the cells' voxels the planes with support in it or beside it, ascending.
+  std::vector<std::vector<std::uint32_t>> PlanesByVoxel() const;
+  // All cells' possible members, and the odds of each.
+  std::vector<double> FindMembers();
+  void DropLeast();
+  void WeighNormals();
 
   std::vector<MixtureCell> cells_;
   std::vector<double> peak_logs_;  // of each cell: ln of the density at its plane
   MixtureOptions options_;
-  std::vector<std::vector<Membership>> members_;
+  HashMap<Voxel, std::uint32_t> voxel_ids_;             // those that have cells
+  std::vector<std::uint32_t> voxel_of_;                 // of each cell
+  std::vector<std::vector<std::uint32_t>> neighbours_;  // of each voxel, itself included
+  std::vector<Membership> members_;                     // cell by cell
+  std::vector<std::size_t> begins_;                     // of each cell's, and the end
+  std::vector<double> odds_sums_;
+  std::vector<double> plane_measurements_;  // Σ share n
   Eigen::MatrixXd beta_;
   double measurements_ = 0.0;
-  std::size_t voxel_count_ = 1;  // that have cells
   double data_log_ = 0.0, prior_log_ = 0.0;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -46,20 +47,47 @@ bool Holds(const PlanSquare& square, const Eigen::Vector3d& p) {
          (p.head<2>().array() < square.max().array()).all();
 }
 
-// `sensor_distances`: of the sensor to each of the planes.
-void AddRay(const Eigen::Vector3d& p,
-            const Eigen::Vector3d& sensor,
-            const std::vector<double>& sensor_distances,
-            const std::vector<FacedPlane*>& planes) {
-  for (std::size_t m = 0; m < planes.size(); ++m) {
-    SeenPlane& seen = planes[m]->seen;
-    const double from = sensor_distances[m];
-    const double to = SignedDistance(p, seen.plane);
-    if (from * to >= 0.0 || std::abs(to) < std::max(kBeyondM, planes[m]->band_m)) continue;
-    const Eigen::Vector3d at = sensor + from / (from - to) * (p - sensor);
-    if (seen.box.contains(at)) seen.raster.AddLook(seen.frame.Flat(at));
+// The planes that rays may cross, in columns, so that a ray is held against several at once.
+class RayPlanes {
+ public:
+  explicit RayPlanes(std::vector<FacedPlane*> planes)
+      : planes_(std::move(planes)),
+        normals_(std::ssize(planes_), 3),
+        distances_(std::ssize(planes_)) {
+    for (Eigen::Index m = 0; m < distances_.size(); ++m) {
+      const Plane& plane = planes_[static_cast<std::size_t>(m)]->seen.plane;
+      normals_.row(m) = plane.normal.transpose();
+      distances_(m) = plane.distance;
+    }
   }
-}
+
+  void SetSensor(const Eigen::Vector3d& sensor) {
+    sensor_ = sensor;
+    from_ = DistancesOf(sensor);
+  }
+
+  void AddRay(const Eigen::Vector3d& p) {
+    to_ = DistancesOf(p);
+    for (Eigen::Index m = 0; m < to_.size(); ++m) {
+      if (from_(m) * to_(m) >= 0.0) continue;
+      FacedPlane& plane = *planes_[static_cast<std::size_t>(m)];
+      if (std::abs(to_(m)) < std::max(kBeyondM, plane.band_m)) continue;
+      const Eigen::Vector3d at = sensor_ + from_(m) / (from_(m) - to_(m)) * (p - sensor_);
+      if (plane.seen.box.contains(at)) plane.seen.raster.AddLook(plane.seen.frame.Flat(at));
+    }
+  }
+
+ private:
+  Eigen::ArrayXd DistancesOf(const Eigen::Vector3d& p) const {
+    return normals_.col(0) * p.x() + normals_.col(1) * p.y() + normals_.col(2) * p.z() - distances_;
+  }
+
+  std::vector<FacedPlane*> planes_;
+  Eigen::ArrayX3d normals_;
+  Eigen::ArrayXd distances_;
+  Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();
+  Eigen::ArrayXd from_, to_;  // of sensor and point, signed
+};
 
 void Flip(PlanePolygon& polygon) {
   std::reverse(polygon.outer.begin(), polygon.outer.end());
@@ -135,6 +163,7 @@ absl::Status PlaneModelFinder::JoinPlanes(const Stop& stop) {
 
 void PlaneModelFinder::State::BeginLooking() {
   const double square = options.epsilon_m / kSquaresInEpsilon;
+  faced.reserve(joined.planes.size());
   for (std::uint32_t m = 0; m < joined.planes.size(); ++m) {
     const JoinedPlane& plane = joined.planes[m];
     const PlaneFrame frame = FrameOf(plane.model.plane, FitMoments(plane.sum.moments).mean);
@@ -225,15 +254,12 @@ absl::Status PlaneModelFinder::Look(const PosedPoints& points,
   const PlanSquare own(square.min() - state_->reference.head<2>(),
                        square.max() - state_->reference.head<2>());
   const std::size_t every = points.points.size() / kMostRays + 1;
-  const std::vector<FacedPlane*> planes = state_->PlanesAround(own);
+  RayPlanes planes(state_->PlanesAround(own));
   const bool coloured = !points.colour.empty();
   std::size_t i = 0;
   for (const PosedPoints::View& view : points.views) {
     const Eigen::Vector3d sensor = view.sensor.cast<double>() + shift;
-    std::vector<double> distances;
-    for (const FacedPlane* one : planes) {
-      distances.push_back(SignedDistance(sensor, one->seen.plane));
-    }
+    planes.SetSensor(sensor);
     for (; i < view.end; ++i) {
       if (i % kStopEvery == 0) {
         STRATA_RETURN_IF_ERROR(stop.status());
@@ -242,7 +268,7 @@ absl::Status PlaneModelFinder::Look(const PosedPoints& points,
       const Eigen::Vector3d p = points.points[i].cast<double>() + shift;
       if (!Holds(own, p)) continue;
       state_->AddHit(p, coloured ? LabOf(points.colour[i]) : LabColour(0, 0, 0), sensor);
-      if (i % every == 0) AddRay(p, sensor, distances, planes);
+      if (i % every == 0) planes.AddRay(p);
     }
   }
   return absl::OkStatus();
@@ -251,6 +277,7 @@ absl::Status PlaneModelFinder::Look(const PosedPoints& points,
 absl::Status PlaneModelFinder::State::MergeDoubled(const Stop& stop) {
   const std::vector<std::size_t> owners = OwnersOf(faced);
   std::vector<FacedPlane> left;
+  left.reserve(owners.size());  // to move one would be to copy it
   for (std::size_t m = 0; m < owners.size(); ++m) {
     if (owners[m] != m) AddSeen(faced[m], faced[owners[m]]);
   }
@@ -276,6 +303,7 @@ absl::StatusOr<PlaneModel> PlaneModelFinder::Finish(const Stop& stop) {
   STRATA_RETURN_IF_ERROR(state_->MergeDoubled(stop));
   if (state_->options.colour) state_->DropMinorities();
   std::vector<SeenPlane> seen;
+  seen.reserve(state_->faced.size());
   for (FacedPlane& one : state_->faced) seen.push_back(std::move(one.seen));
   const PolygonOptions options{state_->options.epsilon_m, state_->options.min_area_m2};
   PlaneModel model;

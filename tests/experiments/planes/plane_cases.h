@@ -42,6 +42,7 @@ void Boxes(std::uint64_t seed);          // figure 5.7
 void Corridor(std::uint64_t seed);       // figures 5.8 and 5.9
 void Jacket(std::uint64_t seed);         // figure 5.10
 void Carpet(std::uint64_t seed);         // figure 5.11
+void ThinWalls(std::uint64_t seed);      // partitions between rooms
 
 }  // namespace strata::testing
 

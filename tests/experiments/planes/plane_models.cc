@@ -1,7 +1,7 @@
 // Plane models (thesis 5.3 to 5.5) on drawn rooms and recorded buildings: exits 1 where a bound
 // does not hold, 77 where recorded data are absent.
 //
-// Usage: plane_models rooms|walls|rack|boxes|carpet|jacket|corridor [seed]
+// Usage: plane_models rooms|walls|rack|boxes|carpet|jacket|corridor|thin [seed]
 //        plane_models building|FOLDER   (a recording with scans and reference poses)
 #include <algorithm>
 #include <chrono>
@@ -408,7 +408,8 @@ int main(int argc, char** argv) {
       {"boxes", strata::testing::Boxes},
       {"carpet", strata::testing::Carpet},
       {"jacket", strata::testing::Jacket},
-      {"corridor", strata::testing::Corridor}};
+      {"corridor", strata::testing::Corridor},
+      {"thin", strata::testing::ThinWalls}};
   if (const auto figure = figures.find(what); figure != figures.end()) {
     figure->second(seed);
     return strata::testing::failures > 0 ? 1 : 0;

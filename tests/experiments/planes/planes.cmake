@@ -14,12 +14,13 @@ endforeach()
 strata_executable(
   plane_models plane_models
   SOURCES planes/plane_models.cc planes/plane_cases.h planes/plane_colours.cc planes/plane_directions.cc
+          planes/plane_thin_walls.cc
   DEPS strata::planes strata::simulator strata::test_support strata::test_recordings
 )
 # Table 5.1's bounds, and those of the figures.
 add_test(NAME thesis_table_5_1 COMMAND plane_models rooms)
 set_tests_properties(thesis_table_5_1 PROPERTIES LABELS smoke TIMEOUT 120 COST 20)
-foreach(figure walls rack boxes carpet jacket corridor)
+foreach(figure walls rack boxes carpet jacket corridor thin)
   add_test(NAME thesis_planes_${figure} COMMAND plane_models ${figure})
   set_tests_properties(thesis_planes_${figure} PROPERTIES LABELS smoke TIMEOUT 120 COST 20)
 endforeach()
