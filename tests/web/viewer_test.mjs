@@ -148,12 +148,22 @@ async function testMap(server, page) {
   await picture(page, "bridge");
   const frames = await page.evaluate("strata.stage.frameMs");
   console.log(`     frames of [ms] ${frames.map((ms) => ms.toFixed(0)).join(" ")}`);
-  const pixels = () => page.evaluate(() => strata.stage.canvas.toDataURL().length);
+  const pixels = () => page.evaluate(() => (strata.stage.draw(), strata.stage.canvas.toDataURL().length));
   const before = await pixels();
   await page.keyboard.press("2");
   await drawn(page);
   expect((await pixels()) !== before && (await page.$eval("body", (node) => node.dataset.layer)) === "height", "the key 2 colours by height");
   await picture(page, "height");
+  await page.keyboard.press("7");
+  await within(3000, "the key 7 colours by time, and says of when", () => page.$eval("#time-first", (node) => /^\d{4}-\d\d-\d\d /.test(node.textContent)));
+  const codes = await page.evaluate(() => {
+    const seen = new Set();
+    for (const { group } of strata.view.shown()) for (const { userData: { rows, count } } of group.children) for (let i = 0; i < count; ++i) seen.add(rows[4 * i + 3] >>> 24);
+    return [...seen];
+  });
+  expect(codes.length > 20 && Math.min(...codes) === 1 && Math.max(...codes) === 255, `${codes.length} times of surfaces, from the first to the last`);
+  await drawn(page);
+  await picture(page, "time");
   await page.keyboard.press("d");
   await drawn(page);
   await picture(page, "dark");
@@ -425,7 +435,8 @@ async function testLatency(server, page) {
   await pause(2000); // for the last of them
   const times = await fresh();
   const seen = Math.max(...times);
-  expect(times.length > 0 && seen < Infinity, `seen ${seen - acknowledged} ms after its acknowledgement, ${times.length} tiles`);
+  const told = await page.evaluate("strata.view.newsAt");
+  expect(times.length > 0 && seen < Infinity, `seen ${seen - acknowledged} ms after its acknowledgement (${seen - told} after the server tells of it), ${times.length} tiles`);
 }
 
 async function testLive(server, page) {

@@ -208,6 +208,7 @@ export class MapView {
           this.epoch = news.epoch;
           this.watching = true;
           const fresh = this.newOf(news.tiles ?? []);
+          if (fresh.length) this.newsAt = Date.now();
           if (fresh.length) await this.sync(fresh);
           this.changed({ scans: news.scans?.length > 0, epoch });
         }

@@ -8,6 +8,9 @@
 export const VERTEX = `
 uniform highp isampler2D data; uniform vec2 origin; uniform float size, cut, bottom, greySides; uniform mat4 toScreen; uniform vec3 eye;
 flat out vec3 colour; out vec2 at;
+#ifdef FAR
+flat out float top; // share of the face that is the box's upper one
+#endif
 #ifdef PICK
 flat out float kind; out vec3 world;
 #else
@@ -32,7 +35,8 @@ void main() {
   vec2 before = (eye.xy - middle) * inversesqrt(dot(eye.xy - middle, eye.xy - middle) + 1e-6) * size;
   vec2 across = vec2(-before.y, before.x) * (at.x - .5);
   world = vec3(middle + across + before * (eye.z > z - .5 * depth ? at.y - .5 : .5 - at.y), z - at.y * depth);
-  colour *= .8;
+  vec2 upper = vec2(size * max(eye.z - z, 0.), depth * length(eye.xy - middle));
+  top = upper.x / (upper.x + upper.y + 1e-6);
 #else
   int face = v / 3;
   v -= face * 3;
@@ -58,6 +62,9 @@ void main() {
 // A little beyond the square, or neighbours might leave a line between them.
 export const FRAGMENT = `
 flat in vec3 colour; in vec2 at; out vec4 result;
+#ifdef FAR
+flat in float top;
+#endif
 #ifdef PICK
 flat in float kind; in vec3 world;
 #endif
@@ -65,6 +72,8 @@ void main() {
   if (max(at.x, at.y) > 1.001) discard;
 #ifdef PICK
   result = vec4(world, kind + 1.);
+#elif defined(FAR)
+  result = vec4(at.y < top ? colour : colour * .74, 1.);
 #else
   result = vec4(colour, 1.);
 #endif

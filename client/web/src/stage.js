@@ -37,12 +37,12 @@ export class Stage {
   redraw() {
     this.dirty = true;
   }
-  // For what comes by itself: leaves as much time between frames as one takes.
+  // For what comes by itself: leaves twice the time between frames that one takes.
   redrawSoon() {
     this.due ??= setTimeout(() => {
       this.due = null;
       this.redraw();
-    }, this.frameMs.at(-1) ?? 0);
+    }, 2 * (this.frameMs.at(-1) ?? 0));
   }
   fit() {
     this.renderer.setSize(innerWidth, innerHeight);
