@@ -70,6 +70,7 @@ export class MapView {
       const [x0, x1, y0, y1] = box.map((at) => Math.floor(at / 2 ** level));
       return this.list(level, { x0, x1: x1 + 1, y0, y1: y1 + 1 });
     }));
+    this.listedAt = Date.now();
     if (this.tree.roots().length > 4) await this.listAll();
     for (const id of [...this.held.keys()]) if (!this.tree.find(id)) this.drop(id);
     this.look();
