@@ -68,7 +68,7 @@ async function serve(name, ...more) {
 
 async function mapTheBridge() {
   const simulate = path.join(build, "tests/support/strata-simulate");
-  execFileSync(simulate, ["bridge", path.join(work, "world"), "--seed", "1", "--noise-m", "0.02", "--noise-rad", "0.003"]);
+  execFileSync(simulate, ["bridge", path.join(work, "world"), "--seed", "1", "--step", "2", "--noise-m", "0.02", "--noise-rad", "0.003"]);
   const server = await serve("maps");
   server.strata("map", "create", "bridge", "--cell-size", "0.1");
   server.import = (robot, as) => server.strata("scan", "import", "bridge", path.join(work, "world", robot, "scans"), "--poses", path.join(work, "world", robot, "poses_initial.txt"), "--pose-format", "index-tum", "--trajectory", as, "--align", "on", "--wait");

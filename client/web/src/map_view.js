@@ -123,9 +123,8 @@ export class MapView {
     const shown = this.held.get(id)?.group.visible ?? level === this.tree.top;
     this.drop(id);
     const group = groupOf(decoded, this.cell);
-    for (const [name, codeOf] of this.codes) setCodes(group, SHIFT[name], codeOf);
     group.visible = shown;
-    const tile = { version, group, decoded, painter: null, at: Date.now(), seenAt: null };
+    const tile = { version, group, decoded, painter: null, codes: {}, at: Date.now(), seenAt: null };
     this.held.set(id, tile);
     if (shown) this.paintTile(tile);
     this.stage.afterFrame.push(() => (tile.seenAt = Date.now()));
@@ -136,8 +135,13 @@ export class MapView {
     ++this.updates;
   }
   paintTile(tile) {
-    if (tile.painter !== this.painter) paintGroup(tile.group, this.painter);
+    const { layer } = this.painter;
+    const codeOf = this.codes.get(layer);
+    if (codeOf && tile.codes[layer] !== codeOf) setCodes(tile.group, SHIFT[layer], codeOf);
+    else if (tile.painter === this.painter) return;
+    tile.codes[layer] = codeOf;
     tile.painter = this.painter;
+    paintGroup(tile.group, this.painter);
   }
   // Colours of all that is shown, now and later.
   paint(painter) {
@@ -145,13 +149,9 @@ export class MapView {
     for (const tile of this.shown()) this.paintTile(tile);
     this.stage.redraw();
   }
-  // Of all surfaces, those to come, too, the code that `codeOf(x, y, z, wall)` tells, 0 to 255; `name`: of floors or times.
+  // Of all surfaces the code that `codeOf(x, y, z, wall)` tells, 0 to 255, asked for where it is seen; `name`: of floors or times.
   setCodes(name, codeOf) {
     this.codes.set(name, codeOf);
-    for (const tile of this.held.values()) {
-      setCodes(tile.group, SHIFT[name], codeOf);
-      tile.painter = null;
-    }
     this.paint(this.painter);
   }
   show() {

@@ -31,7 +31,7 @@ function wheel(id) {
 const CLASSES = Int32Array.from({ length: 256 }, (_, id) => (id ? wheel(id) : NONE));
 const STOREYS = Int32Array.from({ length: 256 }, (_, id) => (id ? parse(FLOORS[(id - 1) % FLOORS.length]) : NONE));
 
-// Function of the four numbers of a surface to its colour, of a layer by name. `low`, `high` [m]: of the map.
+// Function of the four numbers of a surface to its colour, of a layer by name, which it has as `layer`, too. `low`, `high` [m]: of the map.
 export function painterOf(layer, { low, high, dark }) {
   const ramp = rampOf(dark);
   const scale = 255 / (high - low);
@@ -47,5 +47,5 @@ export function painterOf(layer, { low, high, dark }) {
       return x & (1 << 18) && kind !== 1 ? WALL : TRAVERSABILITY[kind];
     },
   };
-  return painters[layer];
+  return Object.assign(painters[layer], { layer });
 }

@@ -3,7 +3,8 @@ import * as THREE from "three";
 import { MapControls } from "three/examples/jsm/controls/MapControls.js";
 import { aim, shared } from "./patches.js";
 
-const LOOK = 9; // pixels around the pointer, across
+const LOOK = 25; // pixels around the pointer, across: what is sparse has gaps
+const PREFER = 5.7; // pixels from it in which a surface to drive on comes before all others
 
 export class Stage {
   constructor(parent) {
@@ -188,7 +189,7 @@ function nearestOf(pixels) {
     if (kind < 0.5) continue;
     const middle = LOOK >> 1;
     const off = Math.hypot((i % LOOK) - middle, Math.floor(i / LOOK) - middle);
-    const cost = off + (Math.round(kind) === 2 ? 0 : 20); // 2: traversable
+    const cost = off + (Math.round(kind) === 2 && off <= PREFER ? 0 : LOOK); // 2: traversable
     if (cost >= least) continue;
     least = cost;
     best = { x: pixels[4 * i], y: pixels[4 * i + 1], z: pixels[4 * i + 2] };
