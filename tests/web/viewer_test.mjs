@@ -172,6 +172,43 @@ async function testMap(server, page) {
   await page.keyboard.press("d");
 }
 
+// By mouse: turned, brought nearer, moved; and the picture that the key p saves.
+async function testMouse(page) {
+  const view = () => page.evaluate(() => strata.stage.view());
+  const before = await view();
+  const drag = async (button) => {
+    await page.mouse.move(700, 400);
+    await page.mouse.down({ button });
+    await page.mouse.move(800, 440, { steps: 4 });
+    await page.mouse.up({ button });
+    await drawn(page);
+  };
+  await drag("right");
+  const turned = await view();
+  expect(Math.hypot(turned[0] - before[0], turned[1] - before[1]) > 1 && Math.hypot(turned[3] - before[3], turned[4] - before[4]) < 0.01, "the right button turns about what is looked at");
+  await page.mouse.wheel({ deltaY: -400 });
+  await drawn(page);
+  const far = ([x, y, z, u, v, w]) => Math.hypot(x - u, y - v, z - w);
+  expect(far(await view()) < 0.95 * far(turned), "the wheel brings it nearer");
+  await drag("left");
+  const moved = await view();
+  expect(Math.hypot(moved[3] - turned[3], moved[4] - turned[4]) > 1, "the left button moves it");
+  for (const [key, layer] of [["3", "class"], ["4", "confidence"], ["5", "sigma"]]) {
+    await page.keyboard.press(key);
+    expect((await page.$eval("body", (body) => body.dataset.layer)) === layer, `the key ${key} colours by ${layer}`);
+  }
+  await page.keyboard.press("1");
+  const client = await page.createCDPSession();
+  await client.send("Browser.setDownloadBehavior", { behavior: "allow", downloadPath: work });
+  await page.keyboard.press("p");
+  const file = path.join(work, "bridge.png");
+  await within(3000, "the key p saves a picture", () => fs.existsSync(file) && fs.statSync(file).size > 0);
+  const bytes = fs.readFileSync(file);
+  expect(bytes.subarray(1, 4).toString() === "PNG" && bytes.readUInt32BE(16) === 1280 && bytes.readUInt32BE(20) === 800 && bytes.length > 20000, `a PNG of 1280 × 800 in ${bytes.length} bytes`);
+  await page.keyboard.press("f");
+  await page.keyboard.press("Escape");
+}
+
 async function testPlans(server, page) {
   const above = [0, -30, 30, 0, 0, 0];
   const { levels } = await planBothWays(server, page, above, { x: 0, y: 0, z: 3.4 }, { x: 24, y: 0, z: 0 }, "over");
@@ -546,6 +583,7 @@ try {
   expect(await page.evaluate("strata.view.surfaces() > 0"), `the map is seen after ${Date.now() - begun} ms`);
   if (!options["--quick"]) {
     await testMap(server, page);
+    await testMouse(page);
     await testPlans(server, page);
     await testLink(server, browser, page);
     await testLevels(page);
