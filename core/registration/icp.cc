@@ -13,6 +13,7 @@
 #include <Eigen/Core>
 #include <pcl/common/transforms.h>
 #include <pcl/correspondence.h>
+#include <pcl/features/impl/normal_3d.hpp>  // of no library: PCL's of features takes 57,600 relocations a start
 #include <pcl/features/normal_3d.h>
 #include <pcl/memory.h>
 #include <pcl/point_cloud.h>

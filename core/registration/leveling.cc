@@ -9,14 +9,12 @@
 #include "absl/strings/str_cat.h"
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <pcl/ModelCoefficients.h>
-#include <pcl/PointIndices.h>
 #include <pcl/memory.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
-#include <pcl/sample_consensus/method_types.h>
-#include <pcl/sample_consensus/model_types.h>
-#include <pcl/segmentation/sac_segmentation.h>
+#include <pcl/sample_consensus/ransac.h>
+#include <pcl/sample_consensus/sac_model_perpendicular_plane.h>
+#include <pcl/types.h>
 
 #include "core/common/option_checks.h"
 #include "core/common/status.h"
@@ -53,26 +51,28 @@ struct FloorPlane {
 };
 
 FloorPlane BestPlane(const Cloud::Ptr& points, const LevelingOptions& options) {
-  pcl::SACSegmentation<pcl::PointXYZ> segmentation;  // draws alike each time
-  segmentation.setModelType(pcl::SACMODEL_PERPENDICULAR_PLANE);
-  segmentation.setMethodType(pcl::SAC_RANSAC);
-  segmentation.setAxis(Eigen::Vector3f::UnitZ());
-  segmentation.setEpsAngle(options.max_tilt_rad);
-  segmentation.setDistanceThreshold(options.thickness_m);
-  segmentation.setMaxIterations(options.hypotheses);
-  segmentation.setProbability(0.9999);
-  segmentation.setOptimizeCoefficients(true);
-  segmentation.setInputCloud(points);
-  pcl::PointIndices inliers;
-  pcl::ModelCoefficients plane;
-  segmentation.segment(inliers, plane);
+  // Draws alike each time.
+  const auto model =
+      pcl::make_shared<pcl::SampleConsensusModelPerpendicularPlane<pcl::PointXYZ>>(points);
+  model->setAxis(Eigen::Vector3f::UnitZ());
+  model->setEpsAngle(options.max_tilt_rad);
+  pcl::RandomSampleConsensus<pcl::PointXYZ> search(model, options.thickness_m);
+  search.setMaxIterations(options.hypotheses);
+  search.setProbability(0.9999);
   FloorPlane floor;
-  floor.support = inliers.indices.size();
-  if (floor.support == 0) return floor;
-  floor.n = Eigen::Vector3f(plane.values[0], plane.values[1], plane.values[2]).cast<double>();
+  if (!search.computeModel()) return floor;
+  pcl::Indices inliers;
+  Eigen::VectorXf drawn;
+  Eigen::VectorXf plane;
+  search.getInliers(inliers);
+  search.getModelCoefficients(drawn);
+  model->optimizeModelCoefficients(inliers, drawn, plane);
+  model->selectWithinDistance(plane, options.thickness_m, inliers);
+  floor.support = inliers.size();
+  floor.n = plane.head<3>().cast<double>();
   const double length = floor.n.z() < 0.0 ? -floor.n.norm() : floor.n.norm();
   floor.n /= length;
-  floor.d = -plane.values[3] / length;
+  floor.d = -plane[3] / length;
   return floor;
 }
 

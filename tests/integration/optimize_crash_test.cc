@@ -174,7 +174,7 @@ class OptimizeCrashTest : public ::testing::Test {
 };
 
 TEST_F(OptimizeCrashTest, TheJobEndsAfterEveryRestartAndNoAnswerMixesEpochs) {
-  const std::uint64_t kills = Asked("STRATA_KILLS", 4);
+  const std::uint64_t kills = Asked("STRATA_KILLS", 2);
   const std::uint64_t seed = Asked("STRATA_SEED", 20261122);
   SCOPED_TRACE(absl::StrCat("seed ", seed));
   Random random(seed);

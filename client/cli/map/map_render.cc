@@ -30,6 +30,7 @@
 #include "client/cli/terminal/json.h"
 #include "client/formats/file_bytes.h"
 #include "client/formats/path_file.h"
+#include "core/api/planning.h"
 #include "core/common/status.h"
 #include "core/world/map_class.h"
 
@@ -126,6 +127,10 @@ absl::Status Render(Context& context, RenderOptions options) {
   const bool whole = !options.floor.floor.has_value() && !options.floor.at.has_value();
   if (!whole && options.level.value_or(0) != 0) {
     return absl::InvalidArgumentError("floors are of level 0; leave --level out");
+  }
+  if (whole && options.floor.profile != api::kDefaultProfile) {
+    return absl::InvalidArgumentError(
+        "--profile goes with --floor or --at; a whole map is coloured for its default profile");
   }
   const std::int32_t level =
       whole ? options.level.value_or(LevelFor(stats, cell, options.picture)) : 0;

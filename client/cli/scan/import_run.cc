@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,8 @@ namespace strata::cli {
 namespace {
 
 constexpr int kWorkers = 4;
+// Scans of which the same is told one by one.
+constexpr std::size_t kSaidAlike = 3;
 
 // What is known of a scan's pose by itself, for optimize to weigh.
 absl::Status AddPrior(Context& context,
@@ -163,9 +166,15 @@ absl::Status Wait(Context& context, const ImportOptions& options, ImportSummary&
 }
 
 void TalkOf(const Json& errors, Output& output) {
+  std::map<std::string, std::size_t> said;
   for (const Json& error : errors) {
-    output.Talk(absl::StrCat(
-        "error: ", error["scan"].get<std::string>(), ": ", error["error"].get<std::string>()));
+    const auto message = error["error"].get<std::string>();
+    if (++said[message] > kSaidAlike) continue;
+    output.Talk(absl::StrCat("error: ", error["scan"].get<std::string>(), ": ", message));
+  }
+  for (const auto& [message, times] : said) {
+    if (times <= kSaidAlike) continue;
+    output.Talk(absl::StrCat("error: ", times - kSaidAlike, " scans more: ", message));
   }
 }
 

@@ -34,6 +34,11 @@ namespace {
 // kPatience bounds the attempts.
 constexpr BackoffOptions kBackoff = {.max_attempts = 0};
 
+// What the next scan would be told, too.
+bool EndsTheImport(const absl::Status& sent) {
+  return absl::IsPermissionDenied(sent) || absl::IsUnauthenticated(sent);
+}
+
 // What says whether an upload is sent anew: as any call, and if it broke off and has to begin
 // again.
 absl::Status Reason(const absl::Status& sent) {
@@ -94,7 +99,7 @@ class Uploader {
  private:
   absl::Status Upload(std::size_t index, UploadResult& result) {
     STRATA_RETURN_IF_ERROR(call_.stop.status());
-    STRATA_RETURN_IF_ERROR(lost_server());
+    STRATA_RETURN_IF_ERROR(ended());
     const UploadSource& source = sources_[index];
     STRATA_ASSIGN_OR_RETURN(const PointCloud cloud, source.read());
     absl::Status status;
@@ -117,14 +122,15 @@ class Uploader {
     absl::Time since = absl::InfiniteFuture();
     while (true) {
       const absl::Status status = send();
+      if (EndsTheImport(status)) End(status);
       const std::optional<absl::Duration> pause = backoff.NextPause(Reason(status));
       if (!pause.has_value()) return status;
       // Only the first in line counts time: the others wait for it anyway.
       WaitForTurn(index);
-      STRATA_RETURN_IF_ERROR(lost_server());
+      STRATA_RETURN_IF_ERROR(ended());
       since = std::min(since, SteadyNow());
       if (SteadyNow() - since > kPatience) {
-        SetLostServer(status);
+        End(status);
         return status;
       }
       STRATA_RETURN_IF_ERROR(Pause(*pause));
@@ -140,6 +146,7 @@ class Uploader {
       STRATA_RETURN_IF_ERROR(upload->Write(SliceOf(cloud, begin, end)));
     }
     WaitForTurn(index);
+    STRATA_RETURN_IF_ERROR(ended());
     return upload->Finish().status();
   }
 
@@ -169,13 +176,13 @@ class Uploader {
     return absl::OkStatus();
   }
 
-  absl::Status lost_server() {
+  absl::Status ended() {
     const std::lock_guard lock(mutex_);
-    return lost_server_;
+    return ended_;
   }
-  void SetLostServer(const absl::Status& status) {
+  void End(const absl::Status& status) {
     const std::lock_guard lock(mutex_);
-    lost_server_ = status;
+    ended_ = status;
   }
 
   api::Database& database_;
@@ -187,7 +194,7 @@ class Uploader {
   std::condition_variable changed_;
   std::size_t next_ = 0;
   UploadProgress done_;
-  absl::Status lost_server_;
+  absl::Status ended_;
   std::vector<UploadResult> results_;
 };
 

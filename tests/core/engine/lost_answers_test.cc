@@ -261,7 +261,7 @@ TEST_F(LostAnswersTest, AtAnyCommitOfAMapsLife) {
   ASSERT_GT(commits, 20);
   int lost = 0;
   // Some of them a run; all with STRATA_LOST_ANSWERS=1.
-  const int stride = std::getenv("STRATA_LOST_ANSWERS") != nullptr ? 1 : OnPostgresql() ? 8 : 3;
+  const int stride = std::getenv("STRATA_LOST_ANSWERS") != nullptr ? 1 : OnPostgresql() ? 24 : 9;
   const std::uint32_t seed = std::random_device{}();
   std::printf("seed %u\n", seed);
   for (int at = static_cast<int>(seed % static_cast<std::uint32_t>(stride)); at < commits;

@@ -1,7 +1,7 @@
 // The thesis' experiments on local and global constraints (7.4.4), ours beside the thesis' numbers:
 //
 //   global_constraints table_7_1      the small house, 4 views, low and high noise, 10 starts each
-//   global_constraints fig_7_9        the same with 2 to 6 views
+//   global_constraints fig_7_9 [N]    the same with 2 to 6 views, or with N
 //   global_constraints directions     two and three views, ten worlds each
 //   global_constraints sigma_alpha    edges' deviation from their planes on the large building
 //   global_constraints facade [STEP]  recorded facade (eth_facade_tls), every STEP-th scan
@@ -290,14 +290,14 @@ void Table71() {
          "low noise: with planes as good as the thesis");
 }
 
-void Fig79() {
+void Fig79(int first_views, int last_views) {
   std::printf(
       "Fig. 7.9: mean errors of %zu starts with low noise, angle [rad] / position [m]\n"
       "| views |",
       testing::kStartSeeds.size());
   for (const char* name : kMethodNames) std::printf(" %s |", name);
   std::printf("\n|---|---|---|---|---|---|---|\n");
-  for (int views = testing::kMinViews; views <= testing::kMaxViews; ++views) {
+  for (int views = first_views; views <= last_views; ++views) {
     const Campaign c = Run(views, testing::kStartNoise[0]);
     std::printf("| %d |", views);
     for (const testing::PoseErrors& mean : c.mean) {
@@ -506,7 +506,10 @@ int Main(int argc, char** argv) {
   if (what == "table_7_1") {
     Table71();
   } else if (what == "fig_7_9") {
-    Fig79();
+    const int views = argc > 2 ? std::atoi(argv[2]) : 0;
+    Fig79(
+        std::clamp(views, testing::kMinViews, testing::kMaxViews),
+        views > 0 ? std::clamp(views, testing::kMinViews, testing::kMaxViews) : testing::kMaxViews);
   } else if (what == "directions") {
     Directions();
   } else if (what == "sigma_alpha") {
@@ -516,7 +519,7 @@ int Main(int argc, char** argv) {
   } else {
     std::fprintf(
         stderr,
-        "usage: global_constraints table_7_1|fig_7_9|directions|sigma_alpha|facade [STEP]\n");
+        "usage: global_constraints table_7_1|fig_7_9 [N]|directions|sigma_alpha|facade [STEP]\n");
     return 2;
   }
   return failures == 0 ? 0 : 1;

@@ -123,6 +123,13 @@ TEST_F(StrataMapTest, APictureOfAnotherFormatIsRefused) {
   EXPECT_THAT(ran.err, HasSubstr("pictures are written as PNG"));
 }
 
+TEST_F(StrataMapTest, AProfileThatWouldChangeNothingOfAPictureIsRefused) {
+  RunOk({"map", "create", "m"});
+  const Ran ran = Run({"map", "render", "m", "/nonexistent/x.png", "--profile", "lifter"});
+  EXPECT_EQ(ran.exit_code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("--profile goes with --floor or --at"));
+}
+
 TEST_F(StrataMapTest, UnknownMapExitsWithOneAndKeepsStdoutEmpty) {
   RunOk({"map", "create", "m"});
   const Ran ran = Run({"map", "show", "nowhere"});

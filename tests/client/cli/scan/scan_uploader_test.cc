@@ -129,6 +129,17 @@ TEST(ScanUploaderTest, AnErrorThatLastsIsNotTriedAgain) {
   EXPECT_EQ(database.fake_scans.finished.size(), 2U);
 }
 
+TEST(ScanUploaderTest, WhoHasNoRightIsToldOnceAndSendsNoMore) {
+  FakeDatabase database;
+  database.fake_scans.troubles[1] = {absl::PermissionDeniedError("needs the right to write")};
+  const auto results = UploadAll(database, Sources(20));
+  for (std::size_t i = 1; i < results.size(); ++i) {
+    EXPECT_THAT(results[i].status,
+                StatusIs(absl::StatusCode::kPermissionDenied, HasSubstr("right")));
+  }
+  EXPECT_EQ(database.fake_scans.finished.size(), 1U);
+}
+
 TEST(ScanUploaderTest, AStopEndsTheUploads) {
   FakeDatabase database;
   const api::Call call;
