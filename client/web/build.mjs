@@ -8,8 +8,8 @@ const here = path.dirname(fileURLToPath(import.meta.url));
 const out = path.resolve(process.argv[2] ?? path.join(here, "dist"));
 await mkdir(out, { recursive: true });
 await build({
-  entryPoints: [path.join(here, "src/main.js")],
-  outfile: path.join(out, "viewer.js"),
+  entryPoints: { viewer: path.join(here, "src/main.js"), worker: path.join(here, "src/worker.js") },
+  outdir: out,
   bundle: true,
   minify: true,
   format: "iife",

@@ -43,8 +43,9 @@ struct Asset {
   const char* file;
   const char* type;
 };
-constexpr std::array<Asset, 4> kAssets = {{{"/", "index.html", "text/html; charset=utf-8"},
+constexpr std::array<Asset, 5> kAssets = {{{"/", "index.html", "text/html; charset=utf-8"},
                                            {"/viewer.js", "viewer.js", "text/javascript"},
+                                           {"/worker.js", "worker.js", "text/javascript"},
                                            {"/viewer.css", "viewer.css", "text/css"},
                                            {"/icon.svg", "icon.svg", "image/svg+xml"}}};
 

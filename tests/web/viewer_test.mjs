@@ -8,6 +8,7 @@ import fs from "node:fs";
 import os from "node:os";
 import path from "node:path";
 import { pathToFileURL } from "node:url";
+import { gzipSync } from "node:zlib";
 
 const options = Object.fromEntries(process.argv.slice(2).map((word, i, all) => [word, all[i + 1]]));
 const build = path.resolve(options["--build"] ?? "build/release");
@@ -67,7 +68,7 @@ async function serve(name, ...more) {
 
 async function mapTheBridge() {
   const simulate = path.join(build, "tests/support/strata-simulate");
-  execFileSync(simulate, ["bridge", path.join(work, "world"), "--seed", "1", "--noise-m", "0.02", "--noise-rad", "0.003"]);
+  execFileSync(simulate, ["bridge", path.join(work, "world"), "--seed", "1", "--step", "2", "--noise-m", "0.02", "--noise-rad", "0.003"]);
   const server = await serve("maps");
   server.strata("map", "create", "bridge", "--cell-size", "0.1");
   server.import = (robot, as) => server.strata("scan", "import", "bridge", path.join(work, "world", robot, "scans"), "--poses", path.join(work, "world", robot, "poses_initial.txt"), "--pose-format", "index-tum", "--trajectory", as, "--align", "on", "--wait");
@@ -148,17 +149,64 @@ async function testMap(server, page) {
   await picture(page, "bridge");
   const frames = await page.evaluate("strata.stage.frameMs");
   console.log(`     frames of [ms] ${frames.map((ms) => ms.toFixed(0)).join(" ")}`);
-  const pixels = () => page.evaluate(() => strata.stage.canvas.toDataURL().length);
+  const pixels = () => page.evaluate(() => (strata.stage.draw(), strata.stage.canvas.toDataURL().length));
   const before = await pixels();
   await page.keyboard.press("2");
   await drawn(page);
   expect((await pixels()) !== before && (await page.$eval("body", (node) => node.dataset.layer)) === "height", "the key 2 colours by height");
   await picture(page, "height");
+  await page.keyboard.press("7");
+  await within(3000, "the key 7 colours by time, and says of when", () => page.$eval("#time-first", (node) => /^\d{4}-\d\d-\d\d /.test(node.textContent)));
+  const codes = await page.evaluate(() => {
+    const seen = new Set();
+    for (const { group } of strata.view.shown()) for (const { userData: { rows, count } } of group.children) for (let i = 0; i < count; ++i) seen.add(rows[4 * i + 3] >>> 24);
+    return [...seen];
+  });
+  expect(codes.length > 20 && Math.min(...codes) === 1 && Math.max(...codes) === 255, `${codes.length} times of surfaces, from the first to the last`);
+  await drawn(page);
+  await picture(page, "time");
   await page.keyboard.press("d");
   await drawn(page);
   await picture(page, "dark");
   await page.keyboard.press("1");
   await page.keyboard.press("d");
+}
+
+// By mouse: turned, brought nearer, moved; and the picture that the key p saves.
+async function testMouse(page) {
+  const view = () => page.evaluate(() => strata.stage.view());
+  const before = await view();
+  const drag = async (button) => {
+    await page.mouse.move(700, 400);
+    await page.mouse.down({ button });
+    await page.mouse.move(800, 440, { steps: 4 });
+    await page.mouse.up({ button });
+    await drawn(page);
+  };
+  await drag("right");
+  const turned = await view();
+  expect(Math.hypot(turned[0] - before[0], turned[1] - before[1]) > 1 && Math.hypot(turned[3] - before[3], turned[4] - before[4]) < 0.01, "the right button turns about what is looked at");
+  await page.mouse.wheel({ deltaY: -400 });
+  await drawn(page);
+  const far = ([x, y, z, u, v, w]) => Math.hypot(x - u, y - v, z - w);
+  expect(far(await view()) < 0.95 * far(turned), "the wheel brings it nearer");
+  await drag("left");
+  const moved = await view();
+  expect(Math.hypot(moved[3] - turned[3], moved[4] - turned[4]) > 1, "the left button moves it");
+  for (const [key, layer] of [["3", "class"], ["4", "confidence"], ["5", "sigma"]]) {
+    await page.keyboard.press(key);
+    expect((await page.$eval("body", (body) => body.dataset.layer)) === layer, `the key ${key} colours by ${layer}`);
+  }
+  await page.keyboard.press("1");
+  const client = await page.createCDPSession();
+  await client.send("Browser.setDownloadBehavior", { behavior: "allow", downloadPath: work });
+  await page.keyboard.press("p");
+  const file = path.join(work, "bridge.png");
+  await within(3000, "the key p saves a picture", () => fs.existsSync(file) && fs.statSync(file).size > 0);
+  const bytes = fs.readFileSync(file);
+  expect(bytes.subarray(1, 4).toString() === "PNG" && bytes.readUInt32BE(16) === 1280 && bytes.readUInt32BE(20) === 800 && bytes.length > 20000, `a PNG of 1280 × 800 in ${bytes.length} bytes`);
+  await page.keyboard.press("f");
+  await page.keyboard.press("Escape");
 }
 
 async function testPlans(server, page) {
@@ -242,6 +290,57 @@ async function testTree() {
   expect(all, "so does what is drawn while they come, in any order");
 }
 
+// What the machine itself takes, in a context of its own: a clear and 200,000 plain triangles of a
+// few pixels. Runs in the page.
+function makeBaseline() {
+  const gl = Object.assign(document.createElement("canvas"), { width: 1280, height: 800 }).getContext("webgl2", { antialias: false });
+  const program = gl.createProgram();
+  for (const [kind, source] of [[gl.VERTEX_SHADER, `#version 300 es
+    precision highp float; flat out vec3 c;
+    void main() { int i = gl_VertexID / 3, v = gl_VertexID - 3 * i; c = vec3(float(i & 255) / 255.);
+      gl_Position = vec4((vec2(i % 500, i / 500) + vec2(v == 1, v == 2)) * vec2(.004, .005) - 1., 0., 1.); }`], [gl.FRAGMENT_SHADER, `#version 300 es
+    precision highp float; flat in vec3 c; out vec4 o; void main() { o = vec4(c, 1.); }`]]) {
+    const shader = gl.createShader(kind);
+    gl.shaderSource(shader, source);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program);
+  gl.useProgram(program);
+  gl.enable(gl.DEPTH_TEST);
+  window.baseline = () => {
+    const begun = performance.now();
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.drawArrays(gl.TRIANGLES, 0, 600_000);
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+    return performance.now() - begun;
+  };
+}
+
+// A frame, beside what the machine takes in the same second.
+async function testFrames(page) {
+  await page.evaluate(makeBaseline);
+  const pairs = await page.evaluate(async () => {
+    const found = [];
+    for (let i = 0; i < 8; ++i) {
+      strata.stage.draw();
+      found.push([strata.stage.frameMs.at(-1), baseline()]);
+      await new Promise(requestAnimationFrame);
+    }
+    return found.slice(1);
+  });
+  const median = (all) => all.sort((a, b) => a - b)[all.length >> 1];
+  const [ms, plain, ratio] = [pairs.map(([a]) => a), pairs.map(([, b]) => b), pairs.map(([a, b]) => a / b)].map(median);
+  const seen = await page.evaluate("strata.view.cut.patches");
+  expect(ratio < 3.5, `${seen} surfaces in sight: a frame of ${ms.toFixed(0)} ms (250 on a quiet machine), 200,000 plain triangles ${plain.toFixed(0)} ms, ratio ${ratio.toFixed(2)}`);
+}
+
+// What a browser has to load before it shows anything.
+function testBundle() {
+  const bytes = ["index.html", "viewer.js", "worker.js", "viewer.css"].reduce((sum, file) => sum + gzipSync(fs.readFileSync(path.join(viewer, file)), { level: 9 }).length, 0);
+  expect(bytes <= 250_000, `the viewer has ${(bytes / 1000).toFixed(0)} kB, packed by gzip`);
+}
+
 // Near the ground far tiles are coarse, and no place is drawn twice.
 async function testLevels(page) {
   await page.evaluate(() => strata.stage.look([-22, -22, 3, 10, 10, 0]));
@@ -253,13 +352,7 @@ async function testLevels(page) {
   const covered = tiles.some((a) => tiles.some((b) => a.level > b.level && b.x >> (a.level - b.level) === a.x && b.y >> (a.level - b.level) === a.y));
   const seen = await page.evaluate("strata.view.cut.patches");
   expect(levels.size > 1 && levels.has(0) && !covered && seen <= 200000, `from near the ground: levels ${[...levels].join(" ")}, ${seen} surfaces in sight, none over another`);
-  await page.evaluate(() => (strata.stage.frameMs = []));
-  for (let i = 0; i < 5; ++i) {
-    await page.evaluate((z) => strata.stage.look([-22, -22, z, 10, 10, 0]), 3 + 0.01 * i);
-    await drawn(page);
-  }
-  const frames = await page.evaluate("strata.stage.frameMs");
-  console.log(`     frames of [ms] ${frames.map((ms) => ms.toFixed(0)).join(" ")}`);
+  await testFrames(page);
   await picture(page, "levels");
 }
 
@@ -425,7 +518,8 @@ async function testLatency(server, page) {
   await pause(2000); // for the last of them
   const times = await fresh();
   const seen = Math.max(...times);
-  expect(times.length > 0 && seen < Infinity, `seen ${seen - acknowledged} ms after its acknowledgement, ${times.length} tiles`);
+  const [told, listed, held] = await page.evaluate((since) => [strata.view.newsAt, strata.view.listedAt, strata.view.shown().reduce((last, { at }) => (at >= since ? Math.max(last, at) : last), 0)], asked);
+  expect(times.length > 0 && seen < Infinity, `seen ${seen - acknowledged} ms after its acknowledgement (the server told after ${told - acknowledged}, tiles were listed ${listed - told} later, all there ${held - listed}, seen ${seen - held}), ${times.length} tiles`);
 }
 
 async function testLive(server, page) {
@@ -482,12 +576,14 @@ try {
   await testDecoder(server);
   const browser = await puppeteer.launch({ executablePath: chromium, headless: true, userDataDir: path.join(work, "profile"), args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"] });
   ended.push(() => browser.close());
+  testBundle();
   await testTree();
   const begun = Date.now();
   const page = await open(browser, server.url);
   expect(await page.evaluate("strata.view.surfaces() > 0"), `the map is seen after ${Date.now() - begun} ms`);
   if (!options["--quick"]) {
     await testMap(server, page);
+    await testMouse(page);
     await testPlans(server, page);
     await testLink(server, browser, page);
     await testLevels(page);

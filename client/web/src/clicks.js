@@ -31,7 +31,7 @@ export class Clicks {
   // A click at that pixel.
   async at(x, y) {
     const place = this.view && this.stage.pick(x, y);
-    if (!place) return say("nothing is there");
+    if (!place) return say(`nothing is there: click ${this.start ? (this.measuring ? "the other end" : "a goal") : "a place"} on a surface`);
     const first = this.start;
     if (!first) this.clear();
     this.start = first ? null : place;

@@ -1,9 +1,9 @@
 // Floors, as the server finds them when asked: to colour by, and to see one alone.
 import { el, metres, node, say } from "./dom.js";
+import { FLOORS } from "./paint.js";
 import { shared } from "./patches.js";
 import { call } from "./rpc.js";
 
-const COLOURS = ["#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"]; // as in patches.js
 const BELOW = 0.3; // of a floor's lowest cell that is shown with it [m]
 const ABOVE = 1.8; // and of its highest: walls, but no ceiling [m]
 const NEAR = 0.5; // of a surface to the heights of its floor [m]
@@ -50,11 +50,12 @@ export async function findFloors(view, stage) {
   choice.onchange = () => showFloor(floors[choice.value === "" ? -1 : Number(choice.value)], stage);
   el("floor-legend").replaceChildren(...names.map((name, i) => {
     const mark = node("i");
-    mark.style.background = COLOURS[i % COLOURS.length];
+    mark.style.background = FLOORS[i % FLOORS.length];
     return node("span", mark, ` ${name} `);
   }));
   el("floor-choice").hidden = !floors.length;
-  if (floors.length) view.setFloors(lookup(floors, cell_size_m));
+  const floorOf = lookup(floors, cell_size_m);
+  if (floors.length) view.setCodes("floor", (x, y, z, wall) => (wall ? 0 : Math.min(floorOf(x, y, z), 255)));
   say(floors.length ? `${floors.length} floors` : "no floor: the robot can stand nowhere");
   return floors.length;
 }

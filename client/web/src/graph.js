@@ -50,11 +50,12 @@ function drawRuns(nodes, stage, switches) {
   return runs.size;
 }
 
-// Draws it, and returns how many of each there are.
+// Draws it; returns how many runs there are, the scans {x, y, z, time}, and counts of all that is drawn.
 export async function drawGraph(view, stage, switches, hover) {
   const { nodes, constraints } = await getGraph(view);
   const places = new Map(nodes.map(({ id, current, uploaded }) => [keyOf(id), placeOf((current ?? uploaded)?.translation)]));
-  const counts = { runs: drawRuns(nodes, stage, switches), scans: nodes.length };
+  const runs = drawRuns(nodes, stage, switches);
+  const counts = { scans: nodes.length };
   hover.set("scans", nodes.map(({ id, time, state }) => {
     const [x, y, z] = places.get(keyOf(id));
     const when = time ? `, ${time.replace("T", " ").slice(0, 19)} UTC` : "";
@@ -72,5 +73,9 @@ export async function drawGraph(view, stage, switches, hover) {
       if (on) stage.segments(name, at, colour);
     });
   }
-  return counts;
+  const scans = nodes.map(({ id, time }) => {
+    const [x, y, z] = places.get(keyOf(id));
+    return { x, y, z, time };
+  });
+  return { runs, scans, counts };
 }

@@ -1,20 +1,20 @@
 // The page: list of maps, one map, and what is shown of it.
 import { Clicks } from "./clicks.js";
+import { Colours } from "./colours.js";
 import { el, say } from "./dom.js";
 import { listEpochs } from "./epochs.js";
-import { findFloors, forgetFloors } from "./floors.js";
 import { drawGraph } from "./graph.js";
 import { Hover } from "./hover.js";
 import { Jobs } from "./jobs.js";
 import { listMaps } from "./map_list.js";
 import { MapView } from "./map_view.js";
 import { drawModels } from "./models.js";
+import { LAYERS } from "./paint.js";
 import { shared } from "./patches.js";
 import { setToken } from "./rpc.js";
 import { Stage } from "./stage.js";
 import { Switches } from "./switches.js";
 
-const LAYERS = ["traversability", "height", "class", "confidence", "sigma", "floor"];
 const NARROW = 600; // pixels; there the panel is closed at first
 
 const stage = new Stage(el("stage"));
@@ -25,6 +25,7 @@ let layersDrawn = Promise.resolve();
 // What tests look at.
 const state = (window.strata = { stage, plan: null, levels: null, measure: null, ready: false });
 const clicks = new Clicks(stage, state);
+const colours = new Colours(stage, state);
 const hover = (state.hover = new Hover(stage));
 const switches = new Switches(el("switches"));
 const jobs = new Jobs(() => layersSoon());
@@ -43,14 +44,12 @@ async function openMap(name, camera) {
   clicks.clear();
   hover.clear();
   switches.clear();
-  forgetFloors(stage);
-  view = state.view = clicks.view = new MapView(name, stage, { changed: showState, told: say });
+  view = state.view = clicks.view = new MapView(name, stage, { changed: showState, told: say, painter: colours.painter() });
+  colours.setView(view);
   say(`opening ${name} …`);
   el("name").textContent = name;
   await view.open();
   const { low, high } = view.box();
-  shared.low.value = low[2];
-  shared.high.value = Math.max(high[2], low[2] + 0.1);
   Object.assign(el("cut"), { min: low[2] - 0.5, max: high[2] + 1, value: high[2] + 1 });
   setCut(hash.has("cut") && camera ? Number(hash.get("cut")) : null);
   if (camera) stage.look(camera);
@@ -61,7 +60,7 @@ async function openMap(name, camera) {
   state.ready = true;
   jobs.open(view);
   layersSoon(0);
-  if (document.body.dataset.layer === "floor") await floors();
+  await colours.setHeights(low[2], high[2]);
 }
 
 // What lies over the surfaces, once for several changes.
@@ -78,7 +77,8 @@ async function drawLayers(of) {
   jobs.setCurrent(await listEpochs(of, stage, jobs));
   const graph = await drawGraph(of, stage, switches, hover);
   state.runs = graph.runs;
-  state.counts = { ...graph, ...(await drawModels(of, stage, switches, hover)) };
+  colours.setScans(graph.scans);
+  state.counts = { ...graph.counts, ...(await drawModels(of, stage, switches, hover)) };
 }
 
 function fit() {
@@ -98,23 +98,6 @@ function setCut(height) {
   stage.redraw();
 }
 
-async function setLayer(index) {
-  shared.layer.value = index;
-  el("layer").value = String(index);
-  document.body.dataset.layer = LAYERS[index];
-  stage.redraw();
-  if (LAYERS[index] === "floor" && view && !view.floorOf) await floors();
-}
-
-async function floors() {
-  say("looking for floors …");
-  try {
-    state.floors = await findFloors(view, stage);
-  } catch (error) {
-    say(error.message);
-  }
-}
-
 function linkToView() {
   const link = new URLSearchParams({ map: view.name, cam: stage.view().map((v) => v.toFixed(2)).join(","), layer: el("layer").value });
   if (shared.cut.value < 1e9) link.set("cut", shared.cut.value.toFixed(2));
@@ -124,6 +107,7 @@ function linkToView() {
 }
 
 function savePicture() {
+  stage.draw(); // what is drawn is kept until the next task only
   stage.canvas.toBlob((blob) => {
     const link = document.createElement("a");
     link.href = URL.createObjectURL(blob);
@@ -135,7 +119,7 @@ function savePicture() {
 
 function setDark(dark) {
   document.body.classList.toggle("dark", dark);
-  shared.dark.value = Number(dark);
+  colours.setDark(dark);
   stage.background(dark ? "#14171a" : "#fbfbf7");
 }
 
@@ -156,10 +140,7 @@ const KEYS = {
 const takes = (target) => target instanceof HTMLSelectElement || (target instanceof HTMLInputElement && ["password", "text"].includes(target.type));
 
 function wireKeys() {
-  LAYERS.forEach((layer, i) => {
-    el("layer").add(new Option(layer, i));
-    KEYS[i + 1] = () => setLayer(i);
-  });
+  LAYERS.forEach((_, i) => (KEYS[i + 1] = () => colours.set(i)));
   addEventListener("keydown", (event) => {
     if (takes(event.target) || event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.key === "Enter" && event.target === stage.canvas) clicks.at(innerWidth / 2, innerHeight / 2);
@@ -187,11 +168,9 @@ function wirePointer() {
 }
 
 function wirePanel() {
-  el("layer").onchange = () => setLayer(Number(el("layer").value));
   el("cut").oninput = () => setCut(null);
   el("link").onclick = () => KEYS.l();
   el("measure").onclick = () => KEYS.m();
-  el("floors").onclick = () => view && setLayer(LAYERS.indexOf("floor"));
   el("picture").onclick = savePicture;
   el("dark").onclick = KEYS.d;
   el("panel").open = innerWidth > NARROW;
@@ -235,5 +214,5 @@ wireKeys();
 wirePointer();
 wirePanel();
 setDark(matchMedia("(prefers-color-scheme: dark)").matches);
-setLayer(Math.min(Math.max(Number(hash.get("layer") ?? 0) || 0, 0), LAYERS.length - 1));
+colours.set(Number(hash.get("layer") ?? 0));
 begin();

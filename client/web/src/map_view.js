@@ -1,6 +1,6 @@
 // One map on the stage: the tiles that the view needs, kept as they are on the server.
-import { decodeTile } from "./tile.js";
-import { disposeOf, groupOf } from "./patches.js";
+import { Decoder } from "./decoder.js";
+import { disposeOf, groupOf, paintGroup, setCodes, visitPlaces } from "./patches.js";
 import { call, stream, tileBytes } from "./rpc.js";
 import { TileTree, choose, cover, idOf } from "./tile_tree.js";
 
@@ -8,15 +8,18 @@ const MOST_PATCHES = 200_000; // in sight
 const MOST_HELD = 1_000_000;
 const AT_ONCE = 3; // of a browser's six connections; two are for watches
 const LEVELS = 13;
+const SHIFT = { floor: 16, time: 24 }; // of codes in a surface's last number
+const SAMPLES = 512; // of a tile, for the box
 const CHOOSE_EVERY_MS = 150;
 
+const decoder = new Decoder();
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 
 export class MapView {
   // `changed` is called when anything has, with {scans, epoch} of what else has; `told` with what a
   // person should know.
-  constructor(name, stage, { changed, told }) {
-    Object.assign(this, { name, stage, changed, told });
+  constructor(name, stage, { changed, told, painter }) {
+    Object.assign(this, { name, stage, changed, told, painter });
     this.held = new Map();
     this.failed = new Map();
     this.fetching = new Set();
@@ -26,7 +29,7 @@ export class MapView {
     this.updates = 0;
     this.low = Infinity;
     this.high = -Infinity;
-    this.floorOf = null;
+    this.codes = new Map();
   }
   // Returns when the map is there coarsely; look() then makes it finer.
   async open() {
@@ -67,6 +70,7 @@ export class MapView {
       const [x0, x1, y0, y1] = box.map((at) => Math.floor(at / 2 ** level));
       return this.list(level, { x0, x1: x1 + 1, y0, y1: y1 + 1 });
     }));
+    this.listedAt = Date.now();
     if (this.tree.roots().length > 4) await this.listAll();
     for (const id of [...this.held.keys()]) if (!this.tree.find(id)) this.drop(id);
     this.look();
@@ -105,7 +109,10 @@ export class MapView {
     this.fetching.add(id);
     try {
       const bytes = await tileBytes(this.name, this.created, node, version);
-      if (!this.stop.signal.aborted) this.hold(node, decodeTile(bytes));
+      if (!this.stop.signal.aborted) {
+        const tile = await decoder.decode(bytes);
+        if (!this.stop.signal.aborted) this.hold(node, tile);
+      }
     } catch (error) {
       this.failed.set(id, version);
       if (error.code !== "not_found" && !this.stop.signal.aborted) this.told(`tile ${id}: ${error.message}`);
@@ -115,38 +122,45 @@ export class MapView {
   hold({ id, version, level }, decoded) {
     const shown = this.held.get(id)?.group.visible ?? level === this.tree.top;
     this.drop(id);
-    const group = groupOf(decoded, this.cell, this.floorOf);
+    const group = groupOf(decoded, this.cell);
     group.visible = shown;
-    const tile = { version, group, decoded, at: Date.now(), seenAt: null };
+    const tile = { version, group, decoded, painter: null, codes: {}, at: Date.now(), seenAt: null };
     this.held.set(id, tile);
+    if (shown) this.paintTile(tile);
     this.stage.afterFrame.push(() => (tile.seenAt = Date.now()));
-    for (let i = 0; i < decoded.size; ++i) {
-      const z = decoded.height[i] / 512;
-      if (z < this.low) this.low = z;
-      if (z > this.high) this.high = z;
-    }
+    this.low = Math.min(this.low, decoded.low);
+    this.high = Math.max(this.high, decoded.high);
     this.stage.tiles.add(group);
-    this.stage.redraw();
+    this.stage.redrawSoon();
     ++this.updates;
   }
-  // Makes all that is held anew, with the floors that `floorOf` tells.
-  setFloors(floorOf) {
-    this.floorOf = floorOf;
-    for (const tile of this.held.values()) {
-      const group = groupOf(tile.decoded, this.cell, floorOf);
-      group.visible = tile.group.visible;
-      this.stage.tiles.remove(tile.group);
-      disposeOf(tile.group);
-      this.stage.tiles.add((tile.group = group));
-    }
+  paintTile(tile) {
+    const { layer } = this.painter;
+    const codeOf = this.codes.get(layer);
+    if (codeOf && tile.codes[layer] !== codeOf) setCodes(tile.group, SHIFT[layer], codeOf);
+    else if (tile.painter === this.painter) return;
+    tile.codes[layer] = codeOf;
+    tile.painter = this.painter;
+    paintGroup(tile.group, this.painter);
+  }
+  // Colours of all that is shown, now and later.
+  paint(painter) {
+    this.painter = painter;
+    for (const tile of this.shown()) this.paintTile(tile);
     this.stage.redraw();
+  }
+  // Of all surfaces the code that `codeOf(x, y, z, wall)` tells, 0 to 255, asked for where it is seen; `name`: of floors or times.
+  setCodes(name, codeOf) {
+    this.codes.set(name, codeOf);
+    this.paint(this.painter);
   }
   show() {
     const shown = new Set(cover(this.tree, this.cut, (id) => this.held.has(id)).map(({ id }) => id));
     for (const [id, tile] of this.held) {
       if (tile.group.visible === shown.has(id)) continue;
       tile.group.visible = shown.has(id);
-      this.stage.redraw();
+      if (tile.group.visible) this.paintTile(tile);
+      this.stage.redrawSoon();
     }
     this.changed({});
   }
@@ -172,7 +186,7 @@ export class MapView {
     this.stage.tiles.remove(tile.group);
     disposeOf(tile.group);
     this.held.delete(id);
-    this.stage.redraw();
+    this.stage.redrawSoon();
   }
   // Those of level 0 that are others than those that are known.
   newOf(tiles) {
@@ -195,6 +209,7 @@ export class MapView {
           this.epoch = news.epoch;
           this.watching = true;
           const fresh = this.newOf(news.tiles ?? []);
+          if (fresh.length) this.newsAt = Date.now();
           if (fresh.length) await this.sync(fresh);
           this.changed({ scans: news.scans?.length > 0, epoch });
         }
@@ -217,14 +232,8 @@ export class MapView {
   // Box without the outermost hundredth on each side: outliers are far away.
   box() {
     const places = [[], [], []];
-    for (const { decoded } of this.shown()) {
-      const size = this.cell * 2 ** decoded.level;
-      const step = Math.max(1, decoded.size >> 9);
-      for (let i = 0; i < decoded.size; i += step) {
-        places[0].push((decoded.x * 256 + (decoded.cell[i] & 255)) * size);
-        places[1].push((decoded.y * 256 + (decoded.cell[i] >> 8)) * size);
-        places[2].push(decoded.height[i] / 512);
-      }
+    for (const { decoded, group } of this.shown()) {
+      visitPlaces(group, Math.max(1, Math.ceil(decoded.size / SAMPLES)), (...place) => place.forEach((at, i) => places[i].push(at)));
     }
     if (!places[0].length) return { low: [-10, -10, 0], high: [10, 10, 5] };
     for (const axis of places) axis.sort((a, b) => a - b);

@@ -1,13 +1,14 @@
 // Camera, drawing on demand, and what is under the pointer.
 import * as THREE from "three";
 import { MapControls } from "three/examples/jsm/controls/MapControls.js";
-import { shared } from "./patches.js";
+import { aim, shared } from "./patches.js";
 
-const LOOK = 9; // pixels around the pointer, across
+const LOOK = 25; // pixels around the pointer, across: what is sparse has gaps
+const PREFER = 5.7; // pixels from it in which a surface to drive on comes before all others
 
 export class Stage {
   constructor(parent) {
-    this.renderer = new THREE.WebGLRenderer({ preserveDrawingBuffer: true });
+    this.renderer = new THREE.WebGLRenderer();
     this.canvas = this.renderer.domElement;
     this.canvas.tabIndex = 0;
     this.canvas.setAttribute("role", "application");
@@ -37,6 +38,13 @@ export class Stage {
   redraw() {
     this.dirty = true;
   }
+  // For what comes by itself: leaves twice the time between frames that one takes.
+  redrawSoon() {
+    this.due ??= setTimeout(() => {
+      this.due = null;
+      this.redraw();
+    }, 2 * (this.frameMs.at(-1) ?? 0));
+  }
   fit() {
     this.renderer.setSize(innerWidth, innerHeight);
     this.camera.aspect = innerWidth / innerHeight;
@@ -46,15 +54,33 @@ export class Stage {
   }
   loop() {
     requestAnimationFrame(() => this.loop());
-    if (!this.dirty) return;
+    if (this.dirty) this.draw();
+  }
+  draw() {
     this.dirty = false;
     const begun = performance.now();
+    this.aim(false);
     this.renderer.render(this.scene, this.camera);
     const gl = this.renderer.getContext();
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // until it is drawn
     this.frameMs.push(performance.now() - begun);
     for (const drawn of this.afterFrame.splice(0)) drawn();
     if (this.frameMs.length > 20) this.frameMs.shift();
+  }
+  frustum() {
+    this.camera.updateMatrixWorld();
+    const matrix = new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
+    return new THREE.Frustum().setFromProjectionMatrix(matrix);
+  }
+  // Pixels a radian.
+  pixels() {
+    return innerHeight / 2 / Math.tan((this.camera.fov * Math.PI) / 360);
+  }
+  aim(picking) {
+    const frustum = this.frustum();
+    shared.toScreen.value.multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
+    shared.eye.value.copy(this.camera.position);
+    for (const group of this.tiles.children) aim(group, frustum, this.pixels(), picking);
   }
   background(colour) {
     this.scene.background = new THREE.Color(colour);
@@ -75,18 +101,15 @@ export class Stage {
   }
   // What tile_tree.js chooses by.
   eye(low, high) {
-    this.camera.updateMatrixWorld();
-    const matrix = new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
-    const frustum = new THREE.Frustum().setFromProjectionMatrix(matrix);
+    const frustum = this.frustum();
     const box = new THREE.Box3();
     const sees = (x, y, side) => {
       box.min.set(x, y, low);
       box.max.set(x + side, y + side, high);
       return frustum.intersectsBox(box);
     };
-    const pixels = innerHeight / 2 / Math.tan((this.camera.fov * Math.PI) / 360);
     const { x, y, z } = this.camera.position;
-    return { x, y, z, low, high, pixels, sees };
+    return { x, y, z, low, high, pixels: this.pixels(), sees };
   }
   view() {
     return [...this.camera.position.toArray(), ...this.controls.target.toArray()];
@@ -97,7 +120,7 @@ export class Stage {
     this.camera.setViewOffset(innerWidth, innerHeight, x - (LOOK >> 1), y - (LOOK >> 1), LOOK, LOOK);
     this.scene.background = null;
     this.overlay.visible = false;
-    shared.picking.value = 1;
+    this.aim(true);
     this.renderer.setRenderTarget(this.target);
     this.renderer.setClearColor(0, 0);
     this.renderer.clear();
@@ -105,7 +128,6 @@ export class Stage {
     const pixels = new Float32Array(4 * LOOK * LOOK);
     this.renderer.readRenderTargetPixels(this.target, 0, 0, LOOK, LOOK, pixels);
     this.renderer.setRenderTarget(null);
-    shared.picking.value = 0;
     this.overlay.visible = true;
     this.scene.background = background;
     this.camera.clearViewOffset();
@@ -167,7 +189,7 @@ function nearestOf(pixels) {
     if (kind < 0.5) continue;
     const middle = LOOK >> 1;
     const off = Math.hypot((i % LOOK) - middle, Math.floor(i / LOOK) - middle);
-    const cost = off + (Math.round(kind) === 2 ? 0 : 20); // 2: traversable
+    const cost = off + (Math.round(kind) === 2 && off <= PREFER ? 0 : LOOK); // 2: traversable
     if (cost >= least) continue;
     least = cost;
     best = { x: pixels[4 * i], y: pixels[4 * i + 1], z: pixels[4 * i + 2] };

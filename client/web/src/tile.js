@@ -121,7 +121,7 @@ class Surfaces {
     this.cost = new Int32Array(size + 1);
     this.classId = numbers.columns[5];
     this.confidence = new Uint8Array(size);
-    this.beside = [0, 0, 0, 0];
+    this.beside = new Uint32Array(4);
   }
   // The surface of that layer in another cell, or one that is not there.
   at(cell, x, y, layer) {
@@ -145,18 +145,20 @@ class Surfaces {
     return this;
   }
   decodeKind() {
-    const [left, up, upRight, upLeft] = this.beside.map((other) => this.kind[other]);
-    const expected = left !== NONE ? left : up !== NONE ? up : NONE;
-    const share =
-      expected === NONE ? 0 : (up === expected) + (upLeft === expected) + (upRight === expected);
-    const as = this.numbers.flag(share);
-    return as ? (expected === NONE ? 0 : expected) : this.numbers.byte(4);
+    const { kind, beside } = this;
+    const left = kind[beside[0]];
+    const up = kind[beside[1]];
+    const expected = left !== NONE ? left : up;
+    if (expected === NONE) return this.numbers.flag(0) ? 0 : this.numbers.byte(4);
+    const share = (up === expected) + (kind[beside[3]] === expected) + (kind[beside[2]] === expected);
+    return this.numbers.flag(share) ? expected : this.numbers.byte(4);
   }
   decodeOne(i) {
     const kind = this.decodeKind();
     const vertical = kind & 1;
     let alike = 0, height = 0, depth = 0, sigma = 0, costs = 0, cost = 0;
-    for (const other of this.beside) {
+    for (let k = 0; k < 4; ++k) {
+      const other = this.beside[k];
       const its = this.kind[other];
       if (its === NONE) continue;
       if ((its & 1) === vertical) {

@@ -305,7 +305,8 @@ TEST_F(WebServerTest, PagesSayWhatBrowsersMayDoWithThem) {
 }
 
 TEST_F(WebServerTest, TheViewerIsAFixedTableOfFiles) {
-  for (const char* file : {"index.html", "viewer.js", "viewer.css", "icon.svg", "secret.txt"}) {
+  for (const char* file :
+       {"index.html", "viewer.js", "worker.js", "viewer.css", "icon.svg", "secret.txt"}) {
     std::ofstream(dir_.path() / file) << file;
   }
   ServerOptions options;
