@@ -17,8 +17,10 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 
+#include "core/common/retry_delay.h"
 #include "core/common/status.h"
 #include "core/common/stop.h"
+#include "core/storage/outcome.h"
 #include "core/storage/storage.h"
 
 namespace strata {
@@ -87,6 +89,17 @@ MapInfo MapCore::info() const {
 absl::Status MapCore::CheckInPlace() const {
   absl::MutexLock lock(&mutex_);
   return storage_ == nullptr ? absl::OkStatus() : storage_->CheckInPlace();
+}
+
+absl::Status MapCore::CheckHeld() const {
+  absl::MutexLock lock(&mutex_);
+  return storage_ == nullptr ? absl::OkStatus() : storage_->CheckHeld();
+}
+
+absl::Status MapCore::doubt() const {
+  STRATA_RETURN_IF_ERROR(writer_.doubt());
+  const absl::Status held = CheckHeld();
+  return MustBeOpenedAnew(held) ? WithRetryDelay(held, kRetryDelay) : absl::OkStatus();
 }
 
 void MapCore::set_default_profile(const RobotProfile& profile) {

@@ -81,9 +81,11 @@ class MapCore {
   // milliseconds, so that those of one map lie beside each other, then random bits.
   static std::uint64_t NextUpload();
 
-  // OK, or that the store may hold what nobody here knows (IsOutcomeUnknown()): the map has to be
+  // OK, or that the store may hold what nobody here knows (MustBeOpenedAnew()): the map has to be
   // closed and opened anew.
-  absl::Status doubt() const { return writer_.doubt(); }
+  absl::Status doubt() const;
+  // As MapStorage::CheckHeld(); not of a map that is closed.
+  absl::Status CheckHeld() const;
   // OK, or the status of Close(). For those who wait for what is in memory.
   absl::Status closed() const;
   // Ends the writer and closes all connections, waiting for reads under way; what is asked for

@@ -59,8 +59,16 @@ class MapStores {
   virtual absl::Status Create(absl::string_view name,
                               const MapParameters& parameters,
                               absl::Time created) const = 0;
-  // For this engine alone: whoever had it open in another can write it no more.
+  // For this engine alone. UNAVAILABLE with MapOwnerOf() while another engine has it, which can be
+  // where IsShared() only.
   virtual absl::StatusOr<StoredMap> Open(absl::string_view name) const = 0;
+  // Whether other engines use the same stores: maps may come, go and change beside this one.
+  virtual bool IsShared() const { return false; }
+  // Of shared ones: whether the map is there; maps whose engine went without closing them.
+  virtual absl::StatusOr<bool> Has(absl::string_view) const { return false; }
+  virtual absl::StatusOr<std::vector<std::string>> ListAbandoned() const {
+    return std::vector<std::string>();
+  }
   // FAILED_PRECONDITION for what is no map; OK also where there is nothing.
   virtual absl::Status CheckRemovable(absl::string_view name) const = 0;
   // The map must be closed. `clock`: where it stood; 0: unknown. OK also where there is nothing.

@@ -49,8 +49,10 @@ void PauseBeforeRun(int run) {
 absl::Status CheckOwner(absl::StatusOr<Rows>& owner, const OpenedMap& map) {
   STRATA_RETURN_IF_ERROR(owner.status());
   const bool there = owner->Next();
-  if (there && (map.owner == 0 || owner->Int(0) == map.owner)) return absl::OkStatus();
-  return absl::UnavailableError(
+  if (there && (map.owner == 0 || !map.fenced || owner->Int(0) == map.owner)) {
+    return absl::OkStatus();
+  }
+  return TakenAway(
       absl::StrCat("store: map ",
                    map.name,
                    there ? " was opened by another process" : " was removed",
@@ -122,7 +124,9 @@ absl::Status PostgresWriter::LockOwnMap(std::int64_t commit) {
       map_,
       commit);
   STRATA_RETURN_IF_ERROR(CheckOwner(row, opened_));
-  if (!last_commit_.has_value() || row->Int(1) == *last_commit_) return absl::OkStatus();
+  if (!opened_.fenced || !last_commit_.has_value() || row->Int(1) == *last_commit_) {
+    return absl::OkStatus();
+  }
   return OutcomeUnknown(
       absl::StrCat("store: what was written to map ", opened_.name, " last is not there any more"));
 }

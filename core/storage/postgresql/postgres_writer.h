@@ -26,11 +26,12 @@ namespace strata {
 struct OpenedMap {
   std::int64_t number = 0;
   std::string name;
-  std::int64_t owner = 0;        // 0: anybody's
+  std::int64_t owner = 0;        // the token of its lease; 0: anybody's
   std::int64_t last_commit = 0;  // when `owner` took it
+  bool fenced = true;            // false: commits do not ask whose it is
 };
 
-// The map's own row, which begins with its owner: UNAVAILABLE where there is no row or `map` has
+// The map's own row, which begins with its owner: TakenAway() where there is no row or `map` has
 // lost it.
 absl::Status CheckOwner(absl::StatusOr<Rows>& owner, const OpenedMap& map);
 

@@ -12,9 +12,9 @@
 namespace strata {
 
 // Newest format of the tables this program reads and writes.
-inline constexpr std::int64_t kDatabaseVersion = 1;
+inline constexpr std::int64_t kDatabaseVersion = 2;
 
-// Makes the tables where there are none; safe when others do so at the same time.
+// Makes the tables where there are none, or adds what those of version 1 lack; safe when others do so at the same time.
 // FAILED_PRECONDITION for a newer format.
 absl::Status MakeTables(Connection& connection);
 
