@@ -49,8 +49,8 @@ std::optional<absl::Duration> Backoff::NextPause(const absl::Status& status) {
   elsewhere_ = 0;
   const absl::Time now = SteadyNow();
   if (!until_.has_value()) {
-    until_ = now + options_.retry_for.value_or(servers_ > 1 ? kClusterPatience
-                                                            : absl::ZeroDuration());
+    until_ =
+        now + options_.retry_for.value_or(servers_ > 1 ? kClusterPatience : absl::ZeroDuration());
   }
   const bool exhausted = options_.max_attempts > 0 && attempts_ >= options_.max_attempts;
   if (exhausted && now >= *until_) return std::nullopt;

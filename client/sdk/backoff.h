@@ -34,7 +34,7 @@ class Backoff {
   std::function<double()> uniform_;
   int servers_ = 1;
   int attempts_ = 1;
-  int elsewhere_ = 0;               // servers in a row that had not the map
+  int elsewhere_ = 0;                // servers in a row that had not the map
   std::optional<absl::Time> until_;  // attempts are not counted
 };
 

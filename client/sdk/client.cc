@@ -162,7 +162,8 @@ absl::Status ClientOptions::Validate() const {
   if (servers.size() > 1) {
     for (const std::string& server : servers) {
       if (const absl::Status valid = ParseHostPort(server).status(); !valid.ok()) {
-        faults.push_back(absl::StrCat("target: of several servers each is HOST:PORT, not ", server));
+        faults.push_back(
+            absl::StrCat("target: of several servers each is HOST:PORT, not ", server));
       }
     }
   }

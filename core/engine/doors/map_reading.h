@@ -8,12 +8,20 @@
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 
 #include "core/common/stop.h"
 #include "core/engine/doors/map.h"
 #include "core/storage/storage.h"
 
 namespace strata {
+
+// For bodies that read one thing.
+template <typename T>
+absl::Status AssignTo(absl::StatusOr<T> read, T& to) {
+  if (read.ok()) to = *std::move(read);
+  return read.status();
+}
 
 // For one call; one thread at a time.
 class MapReading {

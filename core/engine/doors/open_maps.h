@@ -156,7 +156,7 @@ class OpenMaps {
   std::optional<absl::Status> surveyed_ ABSL_GUARDED_BY(mutex_);  // how the last look at all ended
   absl::Time surveyed_at_ ABSL_GUARDED_BY(mutex_) = absl::InfinitePast();
   absl::Duration survey_took_ ABSL_GUARDED_BY(mutex_);
-  bool surveying_ ABSL_GUARDED_BY(mutex_) = false;  // one thread looks at all maps
+  bool surveying_ ABSL_GUARDED_BY(mutex_) = false;       // one thread looks at all maps
   std::uint64_t maps_lost_ ABSL_GUARDED_BY(mutex_) = 0;  // to other engines, while they were open
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;

@@ -70,6 +70,9 @@ class MapCore {
                        const std::vector<api::TileChangeNotice>& tiles,
                        bool awaited,
                        absl::FunctionRef<absl::Status(StorageWriter&)> work);
+  // Where others read the same store: returns once this process shows what they may have seen.
+  // Costs nothing unless something is just being published.
+  absl::Status AwaitShown(const Stop& stop);
   // Whether the store may hold tiles that were staged and neither published nor discarded.
   bool tiles_staged() const { return tiles_staged_; }
   void set_tiles_staged(bool staged) { tiles_staged_ = staged; }
@@ -119,6 +122,7 @@ class MapCore {
   ChangeLog changes_;
   ReaderPool readers_;
   WriterThread writer_;
+  std::atomic<int> in_publication_ = 0;  // committed perhaps, and not shown
   std::atomic<bool> tiles_staged_ = false;
 };
 

@@ -108,6 +108,9 @@ class PostgresStores final : public MapStores {
     STRATA_ASSIGN_OR_RETURN(std::unique_ptr<MapStorage> storage, maps_.OpenAlone(name));
     return StoredMap{std::move(storage), {}};
   }
+  absl::StatusOr<std::unique_ptr<MapStorage>> OpenToRead(absl::string_view name) const override {
+    return maps_.OpenToRead(name);
+  }
   bool IsShared() const override { return true; }
   absl::StatusOr<bool> Has(absl::string_view name) const override { return maps_.Has(name); }
   absl::StatusOr<std::vector<std::string>> ListAbandoned() const override {

@@ -118,10 +118,22 @@ absl::StatusOr<std::shared_ptr<MapLease>> MapLeases::Take(Connection& connection
   return HeldBy(name, "that has just left");
 }
 
+absl::Status MapLeases::HeldUp(absl::string_view name) const {
+  return WithRetryDelay(
+      WithMapOwner(absl::UnavailableError(absl::StrCat(
+                       "map ",
+                       name,
+                       ": its last server does not answer and is in the middle of a commit, which "
+                       "the database ends soon")),
+                   "that does not answer"),
+      kRetry);
+}
+
 void MapLeases::Hold(std::shared_ptr<MapLease> lease) {
   absl::MutexLock lock(&mutex_);
   const std::int64_t token = lease->token();
   held_[token] = std::move(lease);
+  taken_ = true;
 }
 
 void MapLeases::GiveUp(const MapLease& lease) {
@@ -214,6 +226,7 @@ void MapLeases::Loop() {
       mutex_.AwaitWithTimeout(absl::Condition(this, &MapLeases::HasToAct), options_.time / 3);
       for (const auto& [token, lease] : held_) leases.push_back(lease);
       closed = closed_;
+      taken_ = false;
       if (closed && given_up_.empty()) return;
       if (leases.empty() && given_up_.empty()) continue;
     }

@@ -66,7 +66,7 @@ class MapLeases {
   // Gives up what is held.
   ~MapLeases();
 
-  const std::string& holder() const { return options_.holder; }
+  absl::Duration time() const { return options_.time; }
 
   // In the open transaction of `connection`: takes the map if nobody else has it. UNAVAILABLE with
   // MapOwnerOf() and a retry delay where somebody has. Held once the transaction is committed and
@@ -74,6 +74,8 @@ class MapLeases {
   absl::StatusOr<std::shared_ptr<MapLease>> Take(Connection& connection,
                                                  std::int64_t map,
                                                  absl::string_view name) const;
+  // That the map's last server, whose lease has ended, holds its row in the middle of a commit.
+  absl::Status HeldUp(absl::string_view name) const;
   // The same refusal, without taking or waiting for anything.
   absl::Status CheckFree(Connection& connection, std::int64_t map, absl::string_view name) const;
   void Hold(std::shared_ptr<MapLease> lease);
@@ -84,7 +86,9 @@ class MapLeases {
   using Leases = std::vector<std::shared_ptr<MapLease>>;
 
   void Loop();
-  bool HasToAct() const ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return closed_ || !given_up_.empty(); }
+  bool HasToAct() const ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
+    return closed_ || taken_ || !given_up_.empty();
+  }
   absl::Status DropGivenUp(Connection& connection);
   absl::Status Renew(Connection& connection, const Leases& leases) const;
   // Of those that could not be renewed: which are another's by now.
@@ -96,7 +100,8 @@ class MapLeases {
   std::unique_ptr<Connection> connection_;  // the thread's
   absl::Mutex mutex_;
   std::map<std::int64_t, std::shared_ptr<MapLease>> held_ ABSL_GUARDED_BY(mutex_);  // by token
-  std::map<std::int64_t, std::int64_t> given_up_ ABSL_GUARDED_BY(mutex_);  // maps by token
+  std::map<std::int64_t, std::int64_t> given_up_ ABSL_GUARDED_BY(mutex_);           // maps by token
+  bool taken_ ABSL_GUARDED_BY(mutex_) = false;  // one that may be old already: it was waited for
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };

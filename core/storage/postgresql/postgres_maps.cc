@@ -1,5 +1,6 @@
 #include "core/storage/postgresql/postgres_maps.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -296,9 +297,17 @@ absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::Open(absl::string_view
 absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenAlone(absl::string_view name) const {
   STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
   OpenedMap map{.number = number, .name = std::string(name), .fenced = fenced_};
+  map.patience = std::max(leases_->time(), absl::Seconds(1));
   STRATA_ASSIGN_OR_RETURN(std::shared_ptr<MapLease> lease, TakeOver(map));
   leases_->Hold(lease);
   return OpenAs(map, std::move(lease));
+}
+
+absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenToRead(absl::string_view name) const {
+  constexpr std::int64_t kNobody = -1;  // no token is negative
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
+  const OpenedMap map{.number = number, .name = std::string(name), .owner = kNobody};
+  return std::make_unique<PostgresStorage>(pool_, map, leases_, nullptr);
 }
 
 // The lock waits for commits of the owner before, relaxed ones too: what those have staged is there
@@ -310,12 +319,13 @@ absl::StatusOr<std::shared_ptr<MapLease>> PostgresMaps::TakeOver(OpenedMap& map)
   STRATA_RETURN_IF_ERROR(InTransaction(*connection, [&]() -> absl::Status {
     STRATA_ASSIGN_OR_RETURN(lease, leases_->Take(*connection, map.number, map.name));
     map.owner = lease->token();
-    STRATA_ASSIGN_OR_RETURN(
-        Rows row,
-        connection->Query("SELECT last_commit FROM truth_map WHERE map = $1 FOR UPDATE",
-                          map.number));
-    if (!row.Next()) return NoSuchMap(map.name);
-    map.last_commit = row.Int(0);
+    STRATA_RETURN_IF_ERROR(connection->Execute("SET LOCAL lock_timeout = '3s'"));
+    absl::StatusOr<Rows> row = connection->Query(
+        "SELECT last_commit FROM truth_map WHERE map = $1 FOR UPDATE", map.number);
+    if (absl::IsResourceExhausted(row.status())) return leases_->HeldUp(map.name);
+    STRATA_RETURN_IF_ERROR(row.status());
+    if (!row->Next()) return NoSuchMap(map.name);
+    map.last_commit = row->Int(0);
     return connection
         ->Change("UPDATE truth_map SET owner = $2 WHERE map = $1", map.number, map.owner)
         .status();
@@ -337,10 +347,8 @@ absl::Status PostgresMaps::DeleteName(Connection& connection,
   STRATA_RETURN_IF_ERROR(leases_->Take(connection, map, name).status());
   STRATA_ASSIGN_OR_RETURN(
       const std::uint64_t taken,
-      connection.Change("UPDATE map_place SET state = $2 WHERE map = $1 AND state = $3",
-                        map,
-                        kGoing,
-                        kThere));
+      connection.Change(
+          "UPDATE map_place SET state = $2 WHERE map = $1 AND state = $3", map, kGoing, kThere));
   if (taken == 0) return NoSuchMap(name);
   STRATA_RETURN_IF_ERROR(
       connection

@@ -72,6 +72,8 @@ class PostgresMaps {
   // while another process has it so. Whoever had it so before, and let its lease end, can not write
   // any more (TakenAway()), since every commit asks.
   absl::StatusOr<std::unique_ptr<MapStorage>> OpenAlone(absl::string_view name) const;
+  // For reading only, whoever has it: every commit is refused. NOT_FOUND.
+  absl::StatusOr<std::unique_ptr<MapStorage>> OpenToRead(absl::string_view name) const;
   // The latest clock of a map that was deleted; 0: none was.
   absl::StatusOr<std::uint64_t> RemovedClock() const;
   // UNAVAILABLE with MapOwnerOf() while another process has it alone; whoever has it open otherwise

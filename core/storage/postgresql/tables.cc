@@ -389,7 +389,8 @@ absl::Status MakeInTransaction(Connection& connection) {
   return connection.Execute("COMMIT");
 }
 
-// 0: there are none.
+}  // namespace
+
 absl::StatusOr<std::int64_t> VersionOfTables(Connection& connection) {
   STRATA_ASSIGN_OR_RETURN(Rows there,
                           connection.Query("SELECT to_regclass('strata_format') IS NOT NULL"));
@@ -400,7 +401,13 @@ absl::StatusOr<std::int64_t> VersionOfTables(Connection& connection) {
   return found.Int(0);
 }
 
-}  // namespace
+absl::Status OtherFormat(std::int64_t version) {
+  return absl::FailedPreconditionError(absl::StrCat("store: the tables have format ",
+                                                    version,
+                                                    ", this program reads ",
+                                                    kDatabaseVersion,
+                                                    "; update the older of the two"));
+}
 
 absl::Status MakeTables(Connection& connection) {
   constexpr int kMostAttempts = 5;
@@ -414,12 +421,7 @@ absl::Status MakeTables(Connection& connection) {
     if (!absl::IsAlreadyExists(done) || attempt == kMostAttempts) return done;
   }
   STRATA_ASSIGN_OR_RETURN(const std::int64_t version, VersionOfTables(connection));
-  if (version == kDatabaseVersion) return absl::OkStatus();
-  return absl::FailedPreconditionError(absl::StrCat("store: the tables have format ",
-                                                    version,
-                                                    ", this program reads ",
-                                                    kDatabaseVersion,
-                                                    "; update the older of the two"));
+  return version == kDatabaseVersion ? absl::OkStatus() : OtherFormat(version);
 }
 
 absl::Span<const char* const> DeletionsOfDerived() { return kDerived; }

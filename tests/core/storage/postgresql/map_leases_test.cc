@@ -39,8 +39,8 @@ class MapLeasesTest : public ::testing::Test {
     const auto cluster = SharedPostgresCluster();
     if (absl::IsFailedPrecondition(cluster.status())) GTEST_SKIP() << cluster.status().message();
     STRATA_ASSERT_OK(cluster);
-    address_ = (*cluster)->AddressOfOwn(
-        ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    address_ =
+        (*cluster)->AddressOfOwn(::testing::UnitTest::GetInstance()->current_test_info()->name());
     STRATA_ASSERT_OK(Server("any").Create(kName, MapParameters(), absl::Now()));
     STRATA_ASSERT_OK_AND_ASSIGN(sql_, Connection::Open(address_));
   }
@@ -158,9 +158,9 @@ TEST_F(MapLeasesTest, ItIsRenewedUntilAnotherHasIt) {
   absl::SleepFor(absl::Milliseconds(300));
   STRATA_EXPECT_OK(held->CheckHeld());
   // Taken, it is known here at the next renewal.
-  STRATA_ASSERT_OK(sql_->Execute(
-      "UPDATE map_lease SET token = 1, holder = 'x', server = 'server x', expires = "
-      "clock_timestamp() + interval '1 hour'"));
+  STRATA_ASSERT_OK(
+      sql_->Execute("UPDATE map_lease SET token = 1, holder = 'x', server = 'server x', expires = "
+                    "clock_timestamp() + interval '1 hour'"));
   absl::SleepFor(absl::Milliseconds(300));
   EXPECT_TRUE(MustBeOpenedAnew(held->CheckHeld()));
   EXPECT_EQ(MapOwnerOf(held->CheckHeld()), "server x");
