@@ -29,7 +29,7 @@ struct BackoffOptions {
   absl::Duration max = absl::Seconds(5);
   // Goes on beyond max_attempts until so long after the first attempt failed; as long as a database
   // takes to move to its replica. By default zero, with several servers two minutes.
-  std::optional<absl::Duration> retry_for;
+  std::optional<absl::Duration> retry_for = std::nullopt;
 };
 
 // PEM files; nothing of them: plain text.
