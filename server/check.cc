@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include "absl/time/clock.h"
 #include <nlohmann/json.hpp>
 #include <sys/stat.h>
@@ -113,6 +114,29 @@ Finding CheckDirectory(const fs::path& directory) {
   return free_mib < kFewMebi ? Warning("data", text + ", which is little") : Ok("data", text);
 }
 
+// Who has how many of its maps open, too.
+Finding CheckDatabase(const std::string& store) {
+  const absl::StatusOr<StoreCheck> check = CheckStore(store);
+  if (!check.ok()) return Error("store", check.status());
+  std::string message = check->format == 0
+                            ? std::string("no tables yet; the first start makes them")
+                            : absl::StrFormat("tables of format %d, %d map%s",
+                                              check->format,
+                                              check->maps,
+                                              check->maps == 1 ? "" : "s");
+  const char* before = "; open: ";
+  for (const auto& [server, maps] : check->open) {
+    absl::StrAppend(&message, before, server, " ", maps);
+    before = ", ";
+  }
+  if (check->faults.empty()) return Ok("store", message);
+  return Warning("store",
+                 absl::StrCat(message,
+                              "; ",
+                              absl::StrJoin(check->faults, ", "),
+                              ": it may lose what was acknowledged"));
+}
+
 const char* NameOf(Verdict verdict) {
   switch (verdict) {
     case Verdict::kOk:
@@ -137,6 +161,7 @@ std::vector<Finding> CheckInstallation(const ProgramOptions& options) {
     findings.push_back(CheckTokens(options.server.token_file));
   }
   findings.push_back(CheckDirectory(options.engine.directory));
+  if (!options.engine.store.empty()) findings.push_back(CheckDatabase(options.engine.store));
   return findings;
 }
 

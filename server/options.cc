@@ -1,11 +1,15 @@
 #include "server/options.h"
 
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <system_error>
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include <unistd.h>
+
+#include "core/common/host_port.h"
 
 namespace strata::server {
 namespace {
@@ -26,6 +30,7 @@ struct Written {
   std::string data;
   double optimize_every_s = 60.0;
   double map_idle_s = 300.0;
+  double map_lease_s = 10.0;
   double upload_keep_s = 3600.0;
   double drain_s = 5.0;
   double max_query_s = 30.0;
@@ -284,6 +289,32 @@ void AddMapLimits(CLI::App& app, Written& o) {
       Between(0, 86400, "s"));
 }
 
+void AddSharing(CLI::App& app, Written& o) {
+  constexpr char kGroup[] = "Several servers on one --store";
+  app.add_option("--server-name",
+                 o.engine.server_name,
+                 "What other servers call this one to people; by default the machine's name and "
+                 "the port of --listen")
+      ->type_name("NAME")
+      ->group(kGroup);
+  Add(app,
+      kGroup,
+      "--map-lease",
+      o.map_lease_s,
+      "How long this server, once it is dead or cut off from the store, keeps its maps from the "
+      "others [s]",
+      Between(1, 3600, "s"));
+}
+
+// Names that tell servers apart.
+std::string DefaultServerName(const std::string& listen) {
+  std::array<char, 256> host{};
+  if (gethostname(host.data(), host.size() - 1) != 0) host.front() = 0;
+  const absl::StatusOr<HostPort> address = ParseHostPort(listen);
+  if (address.ok() && address->port != 0) return absl::StrCat(host.data(), ":", address->port);
+  return absl::StrCat(host.data(), " process ", getpid());
+}
+
 absl::StatusOr<ProgramOptions> Read(const Written& o) {
   if (o.data.empty()) {
     return absl::InvalidArgumentError("--data is missing: the directory that holds the maps");
@@ -296,6 +327,10 @@ absl::StatusOr<ProgramOptions> Read(const Written& o) {
   options.engine.optimize_interval = absl::Seconds(o.optimize_every_s);
   options.engine.upload_keep = absl::Seconds(o.upload_keep_s);
   options.engine.map_idle = absl::Seconds(o.map_idle_s);
+  options.engine.map_lease = absl::Seconds(o.map_lease_s);
+  if (options.engine.server_name.empty()) {
+    options.engine.server_name = DefaultServerName(o.server.listen);
+  }
   if (options.server.web_viewer.empty()) options.server.web_viewer = InstalledViewer();
   options.server.drain_timeout = absl::Seconds(o.drain_s);
   options.server.max_query_time = absl::Seconds(o.max_query_s);
@@ -321,6 +356,7 @@ std::function<absl::StatusOr<ProgramOptions>()> AddServeOptions(CLI::App& app) {
   AddClientLimits(app, *written);
   AddServerLimits(app, *written);
   AddMapLimits(app, *written);
+  AddSharing(app, *written);
   return [written] { return Read(*written); };
 }
 

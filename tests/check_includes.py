@@ -90,7 +90,7 @@ EXTERNAL = {
     r"pcap/.*": ["client/formats/packets"],
     r"dds/.*|ros_messages\.h": ["client/ros2"],
     r"(bzlib|lz4frame|zlib)\.h": ["client/formats/bags"],
-    r"(thread|mutex|condition_variable)": ["core/engine", "server", "client", "core/common"],
+    r"(thread|mutex|condition_variable)": ["core/engine", "server", "client", "core/common", "core/storage/postgresql"],
 }
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)

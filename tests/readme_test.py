@@ -9,6 +9,8 @@ within a line (times, ports). Pages of one tour go on in one folder, with the ma
 and leaves its number in a .pid file ends with the folder. Exits 1 with the difference.
 
     tests/readme_test.py --build build/release --only docs/quickstart.md    that page, with the rest of its tour
+
+Pages that name STRATA_DATABASE get a PostgreSQL server of their own; without PostgreSQL 15 on the machine they are left out.
 """
 import argparse
 import os
@@ -41,6 +43,40 @@ def console_lines(text):
 def matches(expected, printed):
     pattern = ".*".join(re.escape(piece) for piece in expected.rstrip().split("…"))
     return re.fullmatch(pattern, printed.rstrip()) is not None
+
+
+class Database:
+    """An empty database in a folder, on a unix socket there; None as its address where PostgreSQL 15 is not installed."""
+
+    PROGRAMS = pathlib.Path("/usr/lib/postgresql/15/bin")
+
+    def __enter__(self):
+        self.address = None
+        self.folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        if not (self.PROGRAMS / "initdb").exists():
+            return self
+        self.user = {"user": "postgres", "group": "postgres", "extra_groups": []} if os.geteuid() == 0 else {}
+        os.chmod(self.folder.name, 0o777)
+        self.run("initdb", "-D", "db", "-E", "UTF8", "-A", "trust", "-U", "strata")
+        self.run("pg_ctl", "-D", "db", "-w", "-l", "log", "-o", f"-k {self.folder.name} -c listen_addresses=''", "start")
+        self.address = f"postgresql://strata@/postgres?host={self.folder.name}"
+        return self
+
+    def run(self, program, *arguments):
+        subprocess.run([self.PROGRAMS / program, *arguments], cwd=self.folder.name, check=True, stdout=subprocess.DEVNULL, **self.user)
+
+    def __exit__(self, *_):
+        if self.address:
+            self.run("pg_ctl", "-D", "db", "-m", "immediate", "stop")
+        self.folder.cleanup()
+
+
+def page_with_database_holds(page, environment):
+    with Database() as database:
+        if database.address is None:
+            print(f"{page}: left out, PostgreSQL 15 is not installed")
+            return True
+        return holds([page], {**environment, "STRATA_DATABASE": database.address, "ONE": free_address(), "TWO": free_address()})
 
 
 def free_address():
@@ -102,9 +138,14 @@ def main():
     web = {"STRATA_SERVER": free_address(), "STRATA_WEB": free_address()}
     tours = [(["README.md"], {}), (TOUR, {"STRATA_SERVER": free_address()}), (["docs/exports.md"], {}), (["docs/command-line.md"], {}), (["docs/recordings.md"], {}),
              (["docs/ros2.md"], own), (["docs/web.md"], web)]
+    database_page = "docs/howto/postgresql.md"
+    if options.only == database_page:
+        return 0 if page_with_database_holds(database_page, environment) else 1
     if options.only:
         tours = [(tour, more) for tour, more in tours if options.only in tour]
-    return 0 if tours and all(holds(tour, {**environment, **more}) for tour, more in tours) else 1
+    if not tours or not all(holds(tour, {**environment, **more}) for tour, more in tours):
+        return 1
+    return 0 if options.only or page_with_database_holds(database_page, environment) else 1
 
 
 sys.exit(main())

@@ -18,8 +18,8 @@ class Backoff {
  public:
   // `uniform` draws from [0, 1).
   Backoff(const BackoffOptions& options, std::function<double()> uniform);
-  // Draws from a generator seeded by chance.
-  explicit Backoff(const BackoffOptions& options);
+  // Draws from a generator seeded by chance. `servers`: that may have what one has not.
+  explicit Backoff(const BackoffOptions& options, int servers = 1);
 
   // The pause before the next attempt after one that ended with `status`; nullopt if it is not to
   // be repeated: another error, or no attempts left. CANCELLED is: callers know whether they
@@ -32,7 +32,10 @@ class Backoff {
  private:
   BackoffOptions options_;
   std::function<double()> uniform_;
+  int servers_ = 1;
   int attempts_ = 1;
+  int elsewhere_ = 0;                // servers in a row that had not the map
+  std::optional<absl::Time> until_;  // attempts are not counted
 };
 
 }  // namespace strata::sdk

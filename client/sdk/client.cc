@@ -1,6 +1,7 @@
 #include "client/sdk/client.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <fstream>
 #include <iterator>
@@ -11,9 +12,14 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "absl/strings/str_split.h"
 #include "absl/time/clock.h"
+#include <arpa/inet.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 
 #include "client/sdk/connection.h"
 #include "client/sdk/remote_classifiers.h"
@@ -36,10 +42,47 @@ constexpr int kMaxReceiveBytes = 64 << 20;
 // A server that comes back is found again within a second.
 constexpr int kMaxReconnectMs = 1000;
 
-bool OnThisMachine(const std::string& target) {
-  if (absl::StartsWith(target, "unix:")) return true;
-  const absl::StatusOr<HostPort> address = ParseHostPort(target);
+std::vector<std::string> ServersOf(const std::string& target) {
+  return absl::StrSplit(target, ',');
+}
+
+bool IsOnThisMachine(const std::string& server) {
+  if (absl::StartsWith(server, "unix:")) return true;
+  const absl::StatusOr<HostPort> address = ParseHostPort(server);
   return address.ok() && address->loopback();
+}
+
+bool OnThisMachine(const std::string& target) {
+  const std::vector<std::string> servers = ServersOf(target);
+  return std::all_of(servers.begin(), servers.end(), IsOnThisMachine);
+}
+
+// The first IPv4 address of a server, with its port.
+absl::StatusOr<std::string> AddressOf(const std::string& server) {
+  STRATA_ASSIGN_OR_RETURN(const HostPort named, ParseHostPort(server));
+  addrinfo wanted{};
+  wanted.ai_family = AF_INET;
+  wanted.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  if (getaddrinfo(named.host.c_str(), nullptr, &wanted, &found) != 0 || found == nullptr) {
+    return absl::UnavailableError(absl::StrCat("no IPv4 address is known of ", server));
+  }
+  std::array<char, INET_ADDRSTRLEN> text{};
+  const auto* const address = reinterpret_cast<const sockaddr_in*>(found->ai_addr);
+  inet_ntop(AF_INET, &address->sin_addr, text.data(), text.size());
+  freeaddrinfo(found);
+  return absl::StrCat(text.data(), ":", named.port);
+}
+
+// As gRPC takes it.
+absl::StatusOr<std::string> ChannelTarget(const std::string& target) {
+  const std::vector<std::string> servers = ServersOf(target);
+  if (servers.size() == 1) return target;
+  std::vector<std::string> addresses;
+  for (const std::string& server : servers) {
+    STRATA_ASSIGN_OR_RETURN(addresses.emplace_back(), AddressOf(server));
+  }
+  return absl::StrCat("ipv4:", absl::StrJoin(addresses, ","));
 }
 
 absl::StatusOr<std::string> ReadFile(const std::string& path) {
@@ -70,16 +113,22 @@ grpc::ChannelArguments ArgumentsOf(const ClientOptions& options) {
   // Backoff repeats calls; beside it, gRPC 1.51's own way lost some made while a server ended.
   arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
   arguments.SetUserAgentPrefix("strata");
-  if (!options.tls.server_name.empty()) {
-    arguments.SetSslTargetNameOverride(options.tls.server_name);
+  const std::vector<std::string> servers = ServersOf(options.target);
+  std::string server_name = options.tls.server_name;
+  if (servers.size() > 1) {
+    arguments.SetLoadBalancingPolicyName("round_robin");
+    const absl::StatusOr<HostPort> first = ParseHostPort(servers.front());
+    if (server_name.empty() && options.tls.enabled() && first.ok()) server_name = first->host;
   }
+  if (!server_name.empty()) arguments.SetSslTargetNameOverride(server_name);
   return arguments;
 }
 
 class RemoteDatabase final : public api::Database {
  public:
   RemoteDatabase(std::shared_ptr<grpc::Channel> channel, const ClientOptions& options)
-      : connection_(std::move(channel), options) {}
+      : connection_(
+            std::move(channel), options, static_cast<int>(ServersOf(options.target).size())) {}
 
   api::Maps& maps() override { return maps_; }
   api::Scans& scans() override { return scans_; }
@@ -109,6 +158,15 @@ class RemoteDatabase final : public api::Database {
 absl::Status ClientOptions::Validate() const {
   std::vector<std::string> faults;
   if (target.empty()) faults.emplace_back("target is empty; write HOST:PORT");
+  const std::vector<std::string> servers = ServersOf(target);
+  if (servers.size() > 1) {
+    for (const std::string& server : servers) {
+      if (const absl::Status valid = ParseHostPort(server).status(); !valid.ok()) {
+        faults.push_back(
+            absl::StrCat("target: of several servers each is HOST:PORT, not ", server));
+      }
+    }
+  }
   if (!(connect_timeout > absl::ZeroDuration())) {
     faults.emplace_back("connect_timeout is not positive");
   }
@@ -143,7 +201,8 @@ absl::StatusOr<std::unique_ptr<api::Database>> Connect(const ClientOptions& opti
         " in plain text, for anyone to copy; connect with TLS (name the server's authority)"));
   }
   STRATA_ASSIGN_OR_RETURN(const auto credentials, CredentialsOf(options.tls));
-  auto channel = grpc::CreateCustomChannel(options.target, credentials, ArgumentsOf(options));
+  STRATA_ASSIGN_OR_RETURN(const std::string target, ChannelTarget(options.target));
+  auto channel = grpc::CreateCustomChannel(target, credentials, ArgumentsOf(options));
   if (!channel->WaitForConnected(absl::ToChronoTime(absl::Now() + options.connect_timeout))) {
     return absl::UnavailableError(absl::StrCat(
         "no server answers at ",

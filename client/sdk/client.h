@@ -6,6 +6,7 @@
 #define STRATA_CLIENT_SDK_CLIENT_H_
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "absl/status/status.h"
@@ -26,6 +27,9 @@ struct BackoffOptions {
   // random so that clients do not come back together. A server that names a longer pause gets it.
   absl::Duration initial = absl::Milliseconds(100);
   absl::Duration max = absl::Seconds(5);
+  // Goes on beyond max_attempts until so long after the first attempt failed; as long as a database
+  // takes to move to its replica. By default zero, with several servers two minutes.
+  std::optional<absl::Duration> retry_for = std::nullopt;
 };
 
 // PEM files; nothing of them: plain text.
@@ -33,14 +37,18 @@ struct ClientTls {
   std::string ca_file;           // authorities whose servers are trusted; asks for TLS
   std::string certificate_file;  // the client's own, for servers that want one
   std::string key_file;          // of the certificate
-  // The name to expect in the server's certificate; empty: the host of the target.
+  // The name to expect in the server's certificate; empty: the host of the target, of several
+  // servers of the first.
   std::string server_name;
 
   bool enabled() const { return !ca_file.empty(); }
 };
 
 struct ClientOptions {
-  std::string target = "127.0.0.1:50051";  // HOST:PORT or unix:PATH
+  // HOST:PORT or unix:PATH; several HOST:PORT with commas between them are servers on one store:
+  // calls go to one after the other, and to the next where one is gone or has not the map. Their
+  // names are looked up once.
+  std::string target = "127.0.0.1:50051";
   ClientTls tls;
   // Shown with every call (stratad token add); empty: none.
   std::string token;
@@ -67,7 +75,8 @@ struct ClientOptions {
 // lookups, Localize, Cancel, SetPose and
 //   EnableConstraint repeat themselves as `backoff` says (an upload keeps its points until they are
 //   acknowledged); Create, Start, Accept, Revert, AddConstraint, RemoveConstraint and the two
-//   Deletes do not, since their effect may have happened: look before calling them again. A stream
+//   Deletes do not, since their effect may have happened: look before calling them again (where
+//   another server has the map nothing has happened, and all of them go there). A stream
 //   repeats itself only while nothing of it was delivered; but Maps.Watch waits for its server
 //   until the call is stopped, however many attempts that takes, and resumes where it was (with
 //   `once` it waits as other calls do).

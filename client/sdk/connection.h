@@ -14,6 +14,7 @@
 #include "client/sdk/canceller.h"
 #include "client/sdk/client.h"
 #include "core/api/call.h"
+#include "core/common/map_owner.h"
 #include "core/common/status.h"
 #include "proto/translate/status.h"
 
@@ -22,23 +23,25 @@ namespace strata::sdk {
 // Thread-safe.
 class Connection {
  public:
-  Connection(std::shared_ptr<grpc::Channel> channel, const ClientOptions& options)
-      : channel_(std::move(channel)), options_(options) {}
+  // `servers`: that the channel goes to.
+  Connection(std::shared_ptr<grpc::Channel> channel, const ClientOptions& options, int servers)
+      : channel_(std::move(channel)), options_(options), servers_(servers) {}
 
   const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
   Canceller& canceller() { return canceller_; }
   const std::string& token() const { return options_.token; }
-  Backoff NewBackoff() const { return Backoff(options_.backoff); }
+  Backoff NewBackoff() const { return Backoff(options_.backoff, servers_); }
   // For one who waits for the server as long as it takes.
   Backoff NewEndlessBackoff() const {
     BackoffOptions endless = options_.backoff;
     endless.max_attempts = 0;
-    return Backoff(endless);
+    return Backoff(endless, servers_);
   }
 
  private:
   std::shared_ptr<grpc::Channel> channel_;
   ClientOptions options_;
+  int servers_;
   Canceller canceller_;
 };
 
@@ -57,6 +60,7 @@ class AttemptContext {
 // so, whatever gRPC made of it.
 absl::Status StatusOf(const grpc::Status& status, const api::Call& call);
 
+// What was refused because another server has the map is sent there either way.
 enum class Repeat { kNever, kOnTrouble };
 
 // One request, one answer: `method` is a member of the generated stub.
@@ -74,7 +78,8 @@ absl::StatusOr<Out> CallUnary(Connection& connection,
     Out out;
     absl::Status status = StatusOf((stub.*method)(context.get(), in, &out), call);
     if (status.ok()) return out;
-    if (repeat == Repeat::kNever || !backoff.Wait(status, call.stop)) return status;
+    const bool again = repeat == Repeat::kOnTrouble || MapOwnerOf(status).has_value();
+    if (!again || !backoff.Wait(status, call.stop)) return status;
   }
 }
 

@@ -287,6 +287,10 @@ class MapStorage {
   virtual StorageWriter& writer() = 0;
   // UNAVAILABLE once what it was opened from was removed or replaced. Thread-safe.
   virtual absl::Status CheckInPlace() const = 0;
+  // OK while nobody else can be writing it, as far as this process was to have it alone; from
+  // memory, for every request. UNAVAILABLE with a retry delay: the store was not asked for too
+  // long, others may write by now. MustBeOpenedAnew(): they do. Thread-safe.
+  virtual absl::Status CheckHeld() const { return absl::OkStatus(); }
 };
 
 }  // namespace strata

@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/time/time.h"
 
+#include "core/common/map_owner.h"
 #include "core/common/retry_delay.h"
 
 namespace strata::translate {
@@ -18,12 +19,17 @@ namespace {
 constexpr char kDetailUrl[] = "type.googleapis.com/strata.v1.ErrorDetail";
 constexpr char kRequestId[] = "request_id";
 constexpr char kDelay[] = "retry_delay_ms";
+constexpr char kOwner[] = "owner";
 constexpr absl::Duration kDefaultDelay = absl::Milliseconds(200);
 
 v1::ErrorDetail DetailToSend(const absl::Status& status, absl::string_view request_id) {
   v1::ErrorDetail detail = DetailOf(status).value_or(v1::ErrorDetail());
-  if (detail.reason().empty()) detail.set_reason(std::string(kDatabaseReason));
+  const std::optional<std::string> owner = MapOwnerOf(status);
+  if (detail.reason().empty()) {
+    detail.set_reason(std::string(owner.has_value() ? kOtherServerReason : kDatabaseReason));
+  }
   auto& metadata = *detail.mutable_metadata();
+  if (owner.has_value()) metadata[kOwner] = *owner;
   metadata[kRequestId] = std::string(request_id);
   std::optional<absl::Duration> delay = RetryDelayOf(status);
   const bool passes = absl::IsResourceExhausted(status) || absl::IsUnavailable(status);
@@ -55,6 +61,8 @@ absl::Status WithSent(absl::Status status, const v1::ErrorDetail& detail) {
   if (delay != detail.metadata().end() && absl::SimpleAtoi(delay->second, &ms) && ms >= 0) {
     status = WithRetryDelay(std::move(status), absl::Milliseconds(ms));
   }
+  const auto owner = detail.metadata().find(kOwner);
+  if (owner != detail.metadata().end()) status = WithMapOwner(std::move(status), owner->second);
   return WithDetail(std::move(status), detail);
 }
 

@@ -22,6 +22,7 @@ inline constexpr absl::string_view kSlowReaderReason = "SLOW_READER";
 inline constexpr absl::string_view kSlowSenderReason = "SLOW_SENDER";
 inline constexpr absl::string_view kAccessReason = "ACCESS";
 inline constexpr absl::string_view kClientLimitReason = "CLIENT_LIMIT";
+inline constexpr absl::string_view kOtherServerReason = "OTHER_SERVER";
 
 // Longest message that is sent; the rest is cut off [bytes].
 inline constexpr std::size_t kMaxMessageBytes = 1024;
@@ -35,9 +36,9 @@ std::optional<v1::ErrorDetail> DetailOf(const absl::Status& status);
 
 // Code, message and detail of `status`. A detail gains the request's id and, as `retry_delay_ms`,
 // the status' RetryDelayOf(); without one 200 when the code is RESOURCE_EXHAUSTED or UNAVAILABLE
-// and it is not the request itself that is wrong.
+// and it is not the request itself that is wrong. One with MapOwnerOf() has kOtherServerReason.
 grpc::Status ToGrpcStatus(const absl::Status& status, absl::string_view request_id);
-// The reverse, with the delay; a status whose details are not ours has none. UNAVAILABLE, which may
+// The reverse, with delay and owner; a status whose details are not ours has none. UNAVAILABLE, which may
 // be tried again, for a stream that a server short of memory has dropped.
 absl::Status FromGrpcStatus(const grpc::Status& status);
 

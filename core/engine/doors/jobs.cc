@@ -13,6 +13,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/common/status.h"
+#include "core/engine/doors/map_reading.h"
 #include "core/engine/jobs/job_handlers.h"
 #include "core/world/job_arguments.h"
 #include "core/world/job_kinds.h"
@@ -42,6 +43,14 @@ absl::StatusOr<std::uint64_t> EpochBefore(const JobInfo& job, std::uint64_t curr
   return static_cast<std::uint64_t>(before->second);
 }
 
+// Of a map that another engine has: as it last wrote them.
+absl::StatusOr<std::vector<JobInfo>> StoredJobs(const MapReading& map) {
+  std::vector<JobInfo> jobs;
+  STRATA_RETURN_IF_ERROR(map.ReadState(
+      [&](StorageReader& reader, const MapClock&) { return AssignTo(reader.ListJobs(), jobs); }));
+  return jobs;
+}
+
 }  // namespace
 
 absl::StatusOr<JobInfo> EngineJobs::Start(const api::Call& call,
@@ -62,16 +71,19 @@ absl::StatusOr<JobInfo> EngineJobs::Start(const api::Call& call,
 absl::StatusOr<JobInfo> EngineJobs::Get(const api::Call& call,
                                         absl::string_view map,
                                         std::uint64_t id) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return found->jobs().Get(id);
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
+  if (found.map() != nullptr) return found.map()->jobs().Get(id);
+  STRATA_ASSIGN_OR_RETURN(const std::vector<JobInfo> jobs, StoredJobs(found));
+  for (const JobInfo& job : jobs) {
+    if (job.id == id) return job;
+  }
+  return absl::NotFoundError(absl::StrCat("job ", id, " does not exist"));
 }
 
 absl::StatusOr<std::vector<JobInfo>> EngineJobs::List(const api::Call& call,
                                                       absl::string_view map) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return found->jobs().List();
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
+  return found.map() != nullptr ? found.map()->jobs().List() : StoredJobs(found);
 }
 
 absl::StatusOr<JobInfo> EngineJobs::Cancel(const api::Call& call,

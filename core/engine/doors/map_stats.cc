@@ -64,16 +64,12 @@ absl::Status AddTiles(StorageReader& reader, const MapClock& clock, MapStats& st
 
 }  // namespace
 
-absl::StatusOr<MapStats> CollectStats(StorageReader& reader) {
+absl::StatusOr<MapStats> CollectStats(StorageReader& reader, const MapClock& clock) {
   MapStats stats;
-  const absl::Status read = reader.Snapshot([&]() -> absl::Status {
-    STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader.GetClock());
-    stats.epoch = clock.epoch;
-    stats.commit_sequence = clock.commit_sequence;
-    STRATA_RETURN_IF_ERROR(AddScans(reader, stats));
-    return AddTiles(reader, clock, stats);
-  });
-  STRATA_RETURN_IF_ERROR(read);
+  stats.epoch = clock.epoch;
+  stats.commit_sequence = clock.commit_sequence;
+  STRATA_RETURN_IF_ERROR(AddScans(reader, stats));
+  STRATA_RETURN_IF_ERROR(AddTiles(reader, clock, stats));
   return stats;
 }
 

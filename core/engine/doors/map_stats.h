@@ -9,9 +9,9 @@
 
 namespace strata {
 
-// All of one committed state. The content digest is the hash over key and content hash of every
-// level-0 tile with all its statistics, in key order.
-absl::StatusOr<MapStats> CollectStats(StorageReader& reader);
+// Of one committed state, in whose snapshot it is called. The content digest is the hash over key
+// and content hash of every level-0 tile with all its statistics, in key order.
+absl::StatusOr<MapStats> CollectStats(StorageReader& reader, const MapClock& clock);
 
 }  // namespace strata
 

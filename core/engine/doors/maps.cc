@@ -16,6 +16,7 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 
+#include "core/common/map_owner.h"
 #include "core/common/status.h"
 #include "core/engine/doors/backup.h"
 #include "core/engine/doors/map_stats.h"
@@ -93,6 +94,30 @@ absl::StatusOr<std::unique_ptr<EngineMaps>> EngineMaps::Open(const EngineOptions
       new EngineMaps(options, std::move(directory), std::move(stores), std::move(maps)));
 }
 
+absl::StatusOr<std::shared_ptr<Map>> EngineMaps::Find(const Stop& stop, absl::string_view name) {
+  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<Map> map, maps_->Find(stop, name));
+  if (stores_->IsShared()) STRATA_RETURN_IF_ERROR(map->core().AwaitShown(stop));
+  return map;
+}
+
+absl::StatusOr<MapReading> EngineMaps::FindToRead(const api::Call& call, absl::string_view name) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  absl::StatusOr<std::shared_ptr<Map>> map = Find(call.stop, name);
+  if (map.ok()) return MapReading(*std::move(map));
+  if (!MapOwnerOf(map.status()).has_value()) return map.status();
+  STRATA_ASSIGN_OR_RETURN(std::unique_ptr<MapStorage> store, stores_->OpenToRead(name));
+  return MapReading(std::move(store), map.status());
+}
+
+absl::StatusOr<MapReading> EngineMaps::FindTilesToRead(const api::Call& call,
+                                                       absl::string_view name) {
+  STRATA_ASSIGN_OR_RETURN(MapReading found, FindToRead(call, name));
+  if (found.map() != nullptr) {
+    STRATA_RETURN_IF_ERROR(found.map()->worker().AwaitDerived(call.stop));
+  }
+  return found;
+}
+
 absl::StatusOr<std::shared_ptr<Map>> EngineMaps::FindWithTiles(const api::Call& call,
                                                                absl::string_view name) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
@@ -125,8 +150,13 @@ absl::StatusOr<MapInfo> EngineMaps::Create(const api::Call& call,
 
 absl::StatusOr<MapInfo> EngineMaps::Get(const api::Call& call, absl::string_view name) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(call.stop, name));
-  return map->core().info();
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, FindToRead(call, name));
+  if (found.map() != nullptr) return found.map()->core().info();
+  MapInfo info;
+  STRATA_RETURN_IF_ERROR(found.ReadState(
+      [&](StorageReader& reader, const MapClock&) { return AssignTo(reader.GetMapInfo(), info); }));
+  info.name = std::string(name);
+  return info;
 }
 
 absl::StatusOr<std::vector<MapInfo>> EngineMaps::List(const api::Call& call) {
@@ -149,31 +179,39 @@ absl::Status EngineMaps::Delete(const api::Call& call, absl::string_view name) {
 
 absl::StatusOr<MapStats> EngineMaps::Stats(const api::Call& call, absl::string_view name) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(call.stop, name));
-  // It counts tiles, but says what there is of a map in quarantine, too.
-  const absl::Status made = map->worker().AwaitDerived(call.stop);
-  if (!absl::IsFailedPrecondition(made)) STRATA_RETURN_IF_ERROR(made);
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map->core().Reader());
-  STRATA_ASSIGN_OR_RETURN(MapStats stats, CollectStats(*reader));
-  STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());
-  STRATA_RETURN_IF_ERROR(map->core().snapshots().AwaitPublished(clock.tile_version, call.stop));
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, FindToRead(call, name));
+  if (found.map() != nullptr) {
+    // It counts tiles, but says what there is of a map in quarantine, too.
+    const absl::Status made = found.map()->worker().AwaitDerived(call.stop);
+    if (!absl::IsFailedPrecondition(made)) STRATA_RETURN_IF_ERROR(made);
+  }
+  MapStats stats;
+  STRATA_RETURN_IF_ERROR(found.Read(call.stop, [&](StorageReader& reader, const MapClock& clock) {
+    return AssignTo(CollectStats(reader, clock), stats);
+  }));
   return stats;
 }
 
 absl::StatusOr<std::vector<EpochInfo>> EngineMaps::History(const api::Call& call,
                                                            absl::string_view name) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(call.stop, name));
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map->core().Reader());
-  return reader->ListEpochs();
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, FindToRead(call, name));
+  std::vector<EpochInfo> epochs;
+  STRATA_RETURN_IF_ERROR(found.ReadState([&](StorageReader& reader, const MapClock&) {
+    return AssignTo(reader.ListEpochs(), epochs);
+  }));
+  return epochs;
 }
 
 absl::StatusOr<std::vector<MapClass>> EngineMaps::ListClasses(const api::Call& call,
                                                               absl::string_view name) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(call.stop, name));
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map->core().Reader());
-  return reader->ListClasses();
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, FindToRead(call, name));
+  std::vector<MapClass> classes;
+  STRATA_RETURN_IF_ERROR(found.ReadState([&](StorageReader& reader, const MapClock&) {
+    return AssignTo(reader.ListClasses(), classes);
+  }));
+  return classes;
 }
 
 absl::Status EngineMaps::SetClass(const api::Call& call,

@@ -20,6 +20,7 @@
 #include "core/api/maps.h"
 #include "core/common/stop.h"
 #include "core/engine/doors/map.h"
+#include "core/engine/doors/map_reading.h"
 #include "core/engine/doors/open_maps.h"
 #include "core/engine/map/directory.h"
 #include "core/engine/map/engine_options.h"
@@ -34,13 +35,17 @@ class EngineMaps final : public api::Maps {
   static absl::StatusOr<std::unique_ptr<EngineMaps>> Open(const EngineOptions& options,
                                                           OpenStores open = OpenMapStores);
 
-  // As OpenMaps::Find().
-  absl::StatusOr<std::shared_ptr<Map>> Find(const Stop& stop, absl::string_view name) {
-    return maps_->Find(stop, name);
-  }
+  // As OpenMaps::Find(); of shared stores the map shows what others may have seen of it.
+  absl::StatusOr<std::shared_ptr<Map>> Find(const Stop& stop, absl::string_view name);
 
   // The same for those who read its tiles: waits while they are made again (Worker::AwaitDerived).
   absl::StatusOr<std::shared_ptr<Map>> FindWithTiles(const api::Call& call, absl::string_view name);
+
+  // As FindToRead(), and waits as FindWithTiles() where the map is here.
+  absl::StatusOr<MapReading> FindTilesToRead(const api::Call& call, absl::string_view name);
+  // For calls that only read, and that the store itself can answer where another engine has the
+  // map.
+  absl::StatusOr<MapReading> FindToRead(const api::Call& call, absl::string_view name);
 
   EngineNumbers Numbers() const;
   EngineHealth Health() const;

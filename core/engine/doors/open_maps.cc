@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,6 +21,7 @@
 #include "core/common/blocking.h"
 #include "core/common/guarded.h"
 #include "core/common/log_line.h"
+#include "core/common/map_owner.h"
 #include "core/common/retry_delay.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
@@ -39,6 +41,9 @@ constexpr absl::Duration kFirstLookAtFew = absl::Seconds(10);
 constexpr std::size_t kFew = 100;
 // Between two looks at who is idle.
 constexpr absl::Duration kInterval = absl::Seconds(1);
+// Of shared stores: how old may be what a list says; how often all maps are looked at unasked.
+constexpr absl::Duration kListAge = absl::Seconds(2);
+constexpr absl::Duration kSurveyInterval = absl::Minutes(1);
 
 // Whether it was no fault of the map that it did not open.
 bool MayOpenLater(const absl::Status& status) {
@@ -129,11 +134,13 @@ absl::StatusOr<OpenMaps::Turn> OpenMaps::TakeTurn(const std::string& name) {
       return turn;
     case State::kOpen:
       entry.used = SteadyNow();
-      if (entry.map->core().doubt().ok()) {
-        turn.found = entry.map;
-      } else {
+      if (!entry.map->core().doubt().ok()) {
         BeginClosing(entry, name, turn);
+        return turn;
       }
+      // What is in memory may be older than what others have seen meanwhile.
+      STRATA_RETURN_IF_ERROR(entry.map->core().CheckHeld());
+      turn.found = entry.map;
       return turn;
     case State::kClosed:
       break;
@@ -171,7 +178,13 @@ absl::StatusOr<std::shared_ptr<Map>> OpenMaps::Find(const Stop& stop, absl::stri
   STRATA_RETURN_IF_ERROR(ValidateName("map name", name));
   const std::string key(name);
   while (true) {
-    STRATA_ASSIGN_OR_RETURN(Turn turn, TakeTurn(key));
+    absl::StatusOr<Turn> taken = TakeTurn(key);
+    if (absl::IsNotFound(taken.status()) && stores_.IsShared()) {
+      STRATA_ASSIGN_OR_RETURN(const bool there, Adopt(key));
+      if (there) taken = TakeTurn(key);
+    }
+    STRATA_RETURN_IF_ERROR(taken.status());
+    Turn turn = *std::move(taken);
     if (turn.found != nullptr) return std::move(turn.found);
     if (turn.open) return OpenNow(key);
     if (turn.closed != nullptr) {
@@ -180,6 +193,19 @@ absl::StatusOr<std::shared_ptr<Map>> OpenMaps::Find(const Stop& stop, absl::stri
       STRATA_RETURN_IF_ERROR(AwaitSettled(stop, key));
     }
   }
+}
+
+absl::StatusOr<bool> OpenMaps::Adopt(const std::string& name) {
+  STRATA_ASSIGN_OR_RETURN(const bool there, stores_.Has(name));
+  if (!there) return false;
+  absl::MutexLock lock(&mutex_);
+  if (entries_.size() < options_.max_maps || entries_.contains(name)) {
+    // Whoever asks for a list next finds it there, too.
+    if (entries_.try_emplace(name).second) surveyed_at_ = absl::InfinitePast();
+    return true;
+  }
+  return absl::ResourceExhaustedError(
+      absl::StrCat("there are ", entries_.size(), " maps, the most this server holds"));
 }
 
 absl::StatusOr<std::shared_ptr<Map>> OpenMaps::OpenNow(const std::string& name) {
@@ -205,16 +231,33 @@ absl::StatusOr<std::shared_ptr<Map>> OpenMaps::OpenNow(const std::string& name) 
     failed_.erase(name);
     return map;
   }
-  const bool told = entry.why == map.status();
-  entry.state = State::kClosed;
-  entry.why = map.status();
-  entry.next_try = SteadyNow() + kRetryDelay;
   open_.erase(name);
-  if (!MayOpenLater(entry.why)) wanted_.erase(name);
-  failed_.insert(name);
-  if (told) return map;
-  LOG(ERROR) << LogLine("map").Add("map", name).Add("not_opened", entry.why.message());
+  if (absl::IsNotFound(map.status()) && stores_.IsShared()) {  // another has removed it
+    wanted_.erase(name);
+    failed_.erase(name);
+    entries_.erase(name);
+    return map;
+  }
+  NoteNotOpened(name, entry, map.status());
   return map;
+}
+
+void OpenMaps::NoteNotOpened(const std::string& name, Entry& entry, const absl::Status& why) {
+  const bool told = entry.why == why;
+  const bool elsewhere = MapOwnerOf(why).has_value();
+  entry.state = State::kClosed;
+  entry.why = why;
+  entry.next_try = SteadyNow() + kRetryDelay;
+  // Whoever has it does what there is to do; TakeAbandoned() sees that he is gone.
+  if (elsewhere || !MayOpenLater(why)) wanted_.erase(name);
+  if (elsewhere) {
+    failed_.erase(name);
+  } else {
+    failed_.insert(name);
+  }
+  if (told) return;
+  LOG_IF(ERROR, !elsewhere) << LogLine("map").Add("map", name).Add("not_opened", why.message());
+  LOG_IF(INFO, elsewhere) << LogLine("map").Add("map", name).Add("owner", *MapOwnerOf(why));
 }
 
 void OpenMaps::NoteClosing(const std::string& name, Map& map, bool in_doubt) {
@@ -241,6 +284,7 @@ void OpenMaps::CloseNow(const std::string& name, std::shared_ptr<Map> map) {
   }
   map->Close(doubt.ok() ? absl::UnavailableError("the map was let go; ask again") : doubt);
   absl::MutexLock lock(&mutex_);
+  if (MustBeOpenedAnew(doubt) && !IsOutcomeUnknown(doubt)) ++maps_lost_;
   Entry& entry = entries_.find(name)->second;
   entry.memory = map->memory();
   entry.clock.reset();
@@ -290,7 +334,8 @@ absl::StatusOr<bool> OpenMaps::Withdraw(const std::string& name,
   Entry& entry = it->second;
   if (entry.state == State::kMaking || entry.state == State::kGoing) return NoSuchMap(name);
   if (entry.state == State::kOpening || entry.state == State::kClosing) return false;
-  const bool known = entry.map != nullptr || entry.clock.has_value() || !entry.why.ok();
+  const bool known = entry.map != nullptr || entry.clock.has_value() ||
+                     (!entry.why.ok() && !MapOwnerOf(entry.why).has_value());
   if (!known) return false;
   clock = entry.clock.value_or(0);
   map = std::exchange(entry.map, nullptr);
@@ -311,7 +356,9 @@ absl::Status OpenMaps::Remove(const Stop& stop,
     // Where its clock stands is read by opening it; where that fails it goes without.
     const absl::Status opened = Find(stop, key).status();
     STRATA_RETURN_IF_ERROR(stop.status());
-    if (absl::IsResourceExhausted(opened)) return opened;
+    const bool elsewhere = MapOwnerOf(opened).has_value();
+    const bool gone = absl::IsNotFound(opened);
+    if (elsewhere || gone || absl::IsResourceExhausted(opened)) return opened;
   }
   if (map != nullptr) {
     const BlockingScope blocking;  // for what its threads are at
@@ -321,7 +368,8 @@ absl::Status OpenMaps::Remove(const Stop& stop,
   const absl::Status removed = remove(clock);
   absl::MutexLock lock(&mutex_);
   open_.erase(key);
-  if (absl::IsFailedPrecondition(removed)) {  // it is no map
+  // It is no map, or another engine has just opened it.
+  if (absl::IsFailedPrecondition(removed) || MapOwnerOf(removed).has_value()) {
     entries_.find(key)->second.state = State::kClosed;
     return removed;
   }
@@ -338,10 +386,17 @@ absl::StatusOr<std::vector<MapInfo>> OpenMaps::List(const Stop& stop) {
     STRATA_RETURN_IF_ERROR(Annotate(stop.status(), "waited for the first look at all maps"));
   }
   STRATA_RETURN_IF_ERROR(*surveyed_);
+  if (stores_.IsShared()) {
+    mutex_.Unlock();
+    const absl::Status looked = SurveyAgain(kListAge);
+    mutex_.Lock();
+    STRATA_RETURN_IF_ERROR(looked);
+  }
   std::vector<MapInfo> infos;
   infos.reserve(entries_.size());
   for (const auto& [name, entry] : entries_) {
-    if (entry.state == State::kMaking || entry.state == State::kGoing || !entry.why.ok()) continue;
+    if (entry.state == State::kMaking || entry.state == State::kGoing) continue;
+    if (!entry.why.ok() && !MapOwnerOf(entry.why).has_value()) continue;
     if (entry.map != nullptr) {
       infos.push_back(entry.map->core().info());
     } else if (entry.info.has_value()) {
@@ -370,14 +425,16 @@ EngineNumbers OpenMaps::Numbers() const {
   }
   absl::MutexLock lock(&mutex_);
   numbers.maps_not_opened = failed_.size();
+  numbers.maps_lost = maps_lost_;
   for (const auto& [name, entry] : entries_) {
     const auto open = of_maps.find(name);
     // What was closed meanwhile is known better by its entry.
     const bool is_open = entry.map != nullptr && open != of_maps.end();
     if (entry.state == State::kGoing || !(is_open || entry.numbers.has_value())) continue;
-    if (!entry.why.ok()) continue;
+    if (!entry.why.ok() && !MapOwnerOf(entry.why).has_value()) continue;
     MapNumbers& added = numbers.maps.emplace_back(is_open ? open->second : *entry.numbers);
     if (is_open && entry.numbers.has_value()) AddCounts(*entry.numbers, added);
+    if (is_open && stores_.IsShared()) added.owner = options_.server_name;
     added.map = name;
   }
   return numbers;
@@ -393,7 +450,11 @@ void OpenMaps::Loop() {
   bool surveyed = false;
   while (true) {
     Guarded([&]() -> absl::Status {
-      if (!surveyed) surveyed = Survey().ok();
+      if (!surveyed) surveyed = SurveyAgain(absl::ZeroDuration()).ok();
+      if (surveyed && stores_.IsShared()) {
+        SurveyAgain(kSurveyInterval).IgnoreError();  // the next one may succeed
+        TakeAbandoned();
+      }
       OpenAllWanted();
       CloseIdle();
       return absl::OkStatus();
@@ -406,10 +467,13 @@ void OpenMaps::Loop() {
 absl::Status OpenMaps::Survey() {
   const absl::Time begun = SteadyNow();
   std::uint64_t maps = 0;
+  std::set<std::string> names;  // of shared stores
+  const bool shared = stores_.IsShared();
   const absl::Status done = Guarded([&, this] {
     return stores_.Survey(closing_,
                           [&, this](const std::string& name, absl::StatusOr<MapOutline> outline) {
                             ++maps;
+                            if (shared) names.insert(name);
                             Note(name, std::move(outline));
                           });
   });
@@ -420,18 +484,77 @@ absl::Status OpenMaps::Survey() {
                      .Add("looked_at", maps)
                      .Add("ms", absl::ToInt64Milliseconds(SteadyNow() - begun));
   }
+  if (done.ok() && shared) ForgetClosedBut(names);
   absl::MutexLock lock(&mutex_);
-  surveyed_ = done;
+  if (!surveyed_.has_value() || !surveyed_->ok()) surveyed_ = done;
+  surveyed_at_ = SteadyNow();
+  survey_took_ = surveyed_at_ - begun;
   return done;
 }
 
-void OpenMaps::Note(const std::string& name, absl::StatusOr<MapOutline> outline) {
+absl::Status OpenMaps::SurveyAgain(absl::Duration age) {
   {
     absl::MutexLock lock(&mutex_);
+    const bool young = SteadyNow() - surveyed_at_ < std::max(age, 10 * survey_took_);
+    if (surveying_ || young) return absl::OkStatus();
+    surveying_ = true;
+  }
+  const absl::Status done = Survey();
+  absl::MutexLock lock(&mutex_);
+  surveying_ = false;
+  return done;
+}
+
+// Those that were opened or made meanwhile are not closed, or were not at the time.
+void OpenMaps::ForgetClosedBut(const std::set<std::string>& names) {
+  std::vector<std::string> unseen;
+  {
+    absl::MutexLock lock(&mutex_);
+    for (const auto& [name, entry] : entries_) {
+      if (entry.state == State::kClosed && !names.contains(name)) unseen.push_back(name);
+    }
+  }
+  for (const std::string& name : unseen) {
+    const absl::StatusOr<bool> there = stores_.Has(name);
+    if (!there.ok() || *there) continue;
+    absl::MutexLock lock(&mutex_);
+    const auto it = entries_.find(name);
+    if (it == entries_.end() || it->second.state != State::kClosed) continue;
+    wanted_.erase(name);
+    failed_.erase(name);
+    entries_.erase(it);
+  }
+}
+
+void OpenMaps::TakeAbandoned() {
+  const absl::StatusOr<std::vector<std::string>> names = stores_.ListAbandoned();
+  if (!names.ok()) return;  // the store is away; what it holds stays where it is
+  for (const std::string& name : *names) {
+    {
+      absl::MutexLock lock(&mutex_);
+      if (entries_.size() < options_.max_maps) entries_.try_emplace(name);
+      const auto it = entries_.find(name);
+      if (it == entries_.end() || it->second.state != State::kClosed) continue;
+      it->second.why = absl::OkStatus();
+      wanted_.insert(name);
+    }
+    OpenWanted(name);
+  }
+}
+
+void OpenMaps::Note(const std::string& name, absl::StatusOr<MapOutline> outline) {
+  bool first = false;
+  {
+    absl::MutexLock lock(&mutex_);
+    first = !surveyed_.has_value();
+    const bool shared = stores_.IsShared();
+    if (shared && outline.ok() && entries_.size() < options_.max_maps) entries_.try_emplace(name);
     const auto it = entries_.find(name);
     if (it == entries_.end()) return;
     Entry& entry = it->second;
-    if (entry.state != State::kClosed || entry.memory.opened_before || !entry.why.ok()) return;
+    const bool elsewhere = MapOwnerOf(entry.why).has_value();
+    if (entry.state != State::kClosed || !(entry.why.ok() || elsewhere)) return;
+    if (entry.memory.opened_before && !shared) return;
     if (outline.ok()) {
       entry.info = std::move(outline->info);
       entry.info->name = name;
@@ -441,7 +564,7 @@ void OpenMaps::Note(const std::string& name, absl::StatusOr<MapOutline> outline)
     }
     wanted_.insert(name);
   }
-  OpenWanted(name);
+  if (first) OpenWanted(name);  // others can wait, whoever asks for a list cannot
 }
 
 bool OpenMaps::OpenWanted(const std::string& name) {

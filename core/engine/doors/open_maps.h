@@ -44,7 +44,8 @@ class OpenMaps {
   ~OpenMaps();
 
   // The map, opened if it is not. NOT_FOUND; RESOURCE_EXHAUSTED where as many are open as may be,
-  // and all have something to do; or why it did not open. Where that was for want of room or of a
+  // and all have something to do; UNAVAILABLE with MapOwnerOf() where another engine has it; or why
+  // it did not open. Where that was for want of room or of a
   // disk that answers, it is tried again, once a second at most. `stop` ends the wait for another
   // who opens or closes it.
   absl::StatusOr<std::shared_ptr<Map>> Find(const Stop& stop, absl::string_view name);
@@ -60,7 +61,8 @@ class OpenMaps {
                       absl::FunctionRef<absl::Status(std::uint64_t clock)> remove);
 
   // By name, without opening any; those that do not open are left out. Waits until each was looked
-  // at once, which `stop` ends.
+  // at once, which `stop` ends; of shared stores some seconds ago at most, or as long as that takes
+  // ten times.
   absl::StatusOr<std::vector<MapInfo>> List(const Stop& stop);
   // Those that are open now.
   std::vector<std::shared_ptr<Map>> Open() const;
@@ -108,6 +110,10 @@ class OpenMaps {
   void NoteClosing(const std::string& name, Map& map, bool in_doubt);
   // Of a map whose state is kClosing.
   void CloseNow(const std::string& name, std::shared_ptr<Map> map);
+  // Of shared stores: a map that another engine made; whether there is one.
+  absl::StatusOr<bool> Adopt(const std::string& name);
+  void NoteNotOpened(const std::string& name, Entry& entry, const absl::Status& why)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Takes the map out, so that nobody finds it any more; its name stays taken. false: it is being
   // opened or closed, or its clock is not known.
   absl::StatusOr<bool> Withdraw(const std::string& name,
@@ -124,6 +130,11 @@ class OpenMaps {
   // The thread that nobody asks: looks at all maps once, then opens and closes.
   void Loop();
   absl::Status Survey();
+  // Of shared stores, whose maps others make, remove and change: once it is so long ago.
+  absl::Status SurveyAgain(absl::Duration age);
+  void ForgetClosedBut(const std::set<std::string>& names);
+  // Opens what engines that are gone left.
+  void TakeAbandoned();
   void Note(const std::string& name, absl::StatusOr<MapOutline> outline);
   // Whether there was room.
   bool OpenWanted(const std::string& name);
@@ -143,6 +154,10 @@ class OpenMaps {
   std::set<std::string> wanted_ ABSL_GUARDED_BY(mutex_);  // to be opened without being asked for
   std::set<std::string> failed_ ABSL_GUARDED_BY(mutex_);  // whose `why` is not OK
   std::optional<absl::Status> surveyed_ ABSL_GUARDED_BY(mutex_);  // how the last look at all ended
+  absl::Time surveyed_at_ ABSL_GUARDED_BY(mutex_) = absl::InfinitePast();
+  absl::Duration survey_took_ ABSL_GUARDED_BY(mutex_);
+  bool surveying_ ABSL_GUARDED_BY(mutex_) = false;       // one thread looks at all maps
+  std::uint64_t maps_lost_ ABSL_GUARDED_BY(mutex_) = 0;  // to other engines, while they were open
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -12,6 +13,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/consistency/followed_robot.h"
+#include "core/engine/doors/map_reading.h"
 #include "core/engine/doors/scans.h"
 #include "core/engine/map/scan_lookup.h"
 #include "core/world/names.h"
@@ -50,30 +52,40 @@ absl::StatusOr<ScanNumber> NumberOf(StorageReader& reader, const ScanId& id) {
   return posed.scan.number;
 }
 
+// In the epoch that `lookup` names.
+absl::Status LookUp(StorageReader& reader, const ScanId& id, api::PoseLookup& lookup) {
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, GetScanById(reader, id, lookup.epoch));
+  const ScanInfo info = ToScanInfo(posed);
+  lookup.T_map_scan = info.T_map_scan;
+  lookup.known = info.state == ScanState::kIntegrated;
+  if (info.state == ScanState::kFailed) {
+    lookup.message = absl::StrCat("could not be integrated: ", info.message);
+  } else if (!lookup.known) {
+    STRATA_ASSIGN_OR_RETURN(const ScanTotals totals, reader.GetScanTotals());
+    lookup.message = absl::StrCat("waits for integration, one of ", totals.pending, " scans");
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::StatusOr<api::PoseGraphState> EnginePoseGraph::Get(const api::Call& call,
                                                          absl::string_view map) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
   api::PoseGraphState state;
-  MapClock clock;
-  const absl::Status read = reader->Snapshot([&]() -> absl::Status {
-    STRATA_ASSIGN_OR_RETURN(clock, reader->GetClock());
+  const auto read = [&](StorageReader& reader, const MapClock& clock) -> absl::Status {
     state.epoch = clock.epoch;
-    STRATA_RETURN_IF_ERROR(AddNodes(*reader, state));
+    STRATA_RETURN_IF_ERROR(AddNodes(reader, state));
     STRATA_ASSIGN_OR_RETURN(std::vector<ConstraintRecord> records,
-                            reader->ListConstraints(clock.epoch));
+                            reader.ListConstraints(clock.epoch));
     for (ConstraintRecord& record : records) {
       state.constraints.push_back(std::move(record.constraint));
     }
-    STRATA_ASSIGN_OR_RETURN(std::vector<PlaneRecord> planes, reader->ListPlanes(clock.epoch));
+    STRATA_ASSIGN_OR_RETURN(std::vector<PlaneRecord> planes, reader.ListPlanes(clock.epoch));
     for (PlaneRecord& record : planes) state.planes.push_back(std::move(record.plane));
     return absl::OkStatus();
-  });
-  STRATA_RETURN_IF_ERROR(read);
-  STRATA_RETURN_IF_ERROR(found->core().snapshots().AwaitPublished(clock.tile_version, call.stop));
+  };
+  STRATA_RETURN_IF_ERROR(found.Read(call.stop, read));
   return state;
 }
 
@@ -150,23 +162,15 @@ absl::Status EnginePoseGraph::EnableConstraint(const api::Call& call,
 absl::StatusOr<api::PoseLookup> EnginePoseGraph::LookupPose(const api::Call& call,
                                                             absl::string_view map,
                                                             const ScanId& id) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
   STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", id.trajectory));
-  const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
-  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, GetScanById(*reader, id, pin.view().epoch));
-  const ScanInfo info = ToScanInfo(posed);
+  std::optional<Snapshots::Pin> pin;
+  if (found.map() != nullptr) pin.emplace(found.map()->core().snapshots().PinCurrent());
   api::PoseLookup lookup;
-  lookup.epoch = pin.view().epoch;
-  lookup.T_map_scan = info.T_map_scan;
-  lookup.known = info.state == ScanState::kIntegrated;
-  if (info.state == ScanState::kFailed) {
-    lookup.message = absl::StrCat("could not be integrated: ", info.message);
-  } else if (!lookup.known) {
-    STRATA_ASSIGN_OR_RETURN(const ScanTotals totals, reader->GetScanTotals());
-    lookup.message = absl::StrCat("waits for integration, one of ", totals.pending, " scans");
-  }
+  STRATA_RETURN_IF_ERROR(found.ReadState([&](StorageReader& reader, const MapClock& clock) {
+    lookup.epoch = pin.has_value() ? pin->view().epoch : clock.epoch;
+    return LookUp(reader, id, lookup);
+  }));
   return lookup;
 }
 

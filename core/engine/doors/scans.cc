@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,6 +15,7 @@
 
 #include "core/common/status.h"
 #include "core/engine/doors/local_map_upload.h"
+#include "core/engine/doors/map_reading.h"
 #include "core/engine/doors/upload.h"
 #include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/scan_labels.h"
@@ -28,27 +30,11 @@ constexpr std::uint32_t kPageScans = 256;
 
 absl::Status CheckId(const ScanId& id) { return ValidateName("trajectory name", id.trajectory); }
 
-// Reads one state of the store and returns once its tiles are what readers get: who is told that a
-// scan is integrated finds it in the tiles.
-absl::Status ReadVisible(Map& map,
-                         const Stop& stop,
-                         absl::FunctionRef<absl::Status(StorageReader&, const MapClock&)> body) {
-  MapClock clock;
-  {
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map.core().Reader());
-    STRATA_RETURN_IF_ERROR(reader->Snapshot([&]() -> absl::Status {
-      STRATA_ASSIGN_OR_RETURN(clock, reader->GetClock());
-      return body(*reader, clock);
-    }));
-  }
-  return map.core().snapshots().AwaitPublished(clock.tile_version, stop);
-}
-
-absl::StatusOr<PosedScan> FindScan(Map& map, const Stop& stop, const ScanId& id) {
+absl::StatusOr<PosedScan> FindScan(const MapReading& map, const Stop& stop, const ScanId& id) {
   STRATA_RETURN_IF_ERROR(CheckId(id));
   PosedScan posed;
   STRATA_RETURN_IF_ERROR(
-      ReadVisible(map, stop, [&](StorageReader& reader, const MapClock& clock) -> absl::Status {
+      map.Read(stop, [&](StorageReader& reader, const MapClock& clock) -> absl::Status {
         STRATA_ASSIGN_OR_RETURN(posed, GetScanById(reader, id, clock.epoch));
         return absl::OkStatus();
       }));
@@ -73,15 +59,27 @@ absl::StatusOr<ScanQuery> ToQuery(const api::ScanFilter& filter) {
   return query;
 }
 
-absl::StatusOr<PointCloud> ReadPiece(Map& map,
+absl::StatusOr<PointCloud> ReadPiece(const MapReading& map,
                                      const ScanRecord& scan,
                                      std::uint32_t ordinal,
                                      ScanLabels& labels) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map.core().Reader());
-  STRATA_ASSIGN_OR_RETURN(PointCloud piece, ReadPoints(*reader, scan, ordinal));
-  STRATA_RETURN_IF_ERROR(labels.Apply(*reader, piece));
+  PointCloud piece;
+  STRATA_RETURN_IF_ERROR(map.ReadState([&](StorageReader& reader, const MapClock&) -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(piece, ReadPoints(reader, scan, ordinal));
+    return labels.Apply(reader, piece);
+  }));
   piece.sensor_origin = scan.header.sensor_origin;
   return piece;
+}
+
+absl::Status WithoutPoints(const MapReading& map, absl::string_view what) {
+  MapInfo info;
+  STRATA_RETURN_IF_ERROR(map.ReadState(
+      [&](StorageReader& reader, const MapClock&) { return AssignTo(reader.GetMapInfo(), info); }));
+  return absl::FailedPreconditionError(absl::StrCat(
+      what,
+      info.parameters.keep_points ? ": it was sent as a local map, without points"
+                                  : ": the map drops points once a scan is integrated"));
 }
 
 }  // namespace
@@ -137,19 +135,20 @@ absl::StatusOr<ScanAck> EngineScans::UploadLocalMap(const api::Call& call,
 absl::StatusOr<UploadState> EngineScans::GetUploadState(const api::Call& call,
                                                         absl::string_view map,
                                                         absl::string_view trajectory) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
   STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", trajectory));
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
-  return reader->GetUploadState(trajectory);
+  UploadState state;
+  STRATA_RETURN_IF_ERROR(found.ReadState([&](StorageReader& reader, const MapClock&) {
+    return AssignTo(reader.GetUploadState(trajectory), state);
+  }));
+  return state;
 }
 
 absl::StatusOr<ScanInfo> EngineScans::Get(const api::Call& call,
                                           absl::string_view map,
                                           const ScanId& id) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  STRATA_ASSIGN_OR_RETURN(const PosedScan scan, FindScan(*found, call.stop, id));
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan scan, FindScan(found, call.stop, id));
   return ToScanInfo(scan);
 }
 
@@ -157,20 +156,23 @@ absl::Status EngineScans::List(const api::Call& call,
                                absl::string_view map,
                                const api::ScanFilter& filter,
                                absl::FunctionRef<absl::Status(const ScanInfo&)> sink) {
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
   STRATA_ASSIGN_OR_RETURN(ScanQuery query, ToQuery(filter));
-  const Snapshots::Pin pin = found->core().snapshots().PinCurrent();
+  std::optional<Snapshots::Pin> pin;
+  if (found.map() != nullptr) pin.emplace(found.map()->core().snapshots().PinCurrent());
+  std::uint64_t epoch = pin.has_value() ? pin->view().epoch : 0;
   absl::Status damaged;  // the first that cannot be read; it hides no other
   while (true) {
     STRATA_RETURN_IF_ERROR(call.stop.status());
     std::vector<PosedScan> page;
     STRATA_RETURN_IF_ERROR(
-        ReadVisible(*found, call.stop, [&](StorageReader& reader, const MapClock&) -> absl::Status {
-          absl::StatusOr<std::vector<PosedScan>> read = reader.ListScans(query, pin.view().epoch);
+        found.Read(call.stop, [&](StorageReader& reader, const MapClock& clock) -> absl::Status {
+          if (epoch == 0) epoch = clock.epoch;
+          absl::StatusOr<std::vector<PosedScan>> read = reader.ListScans(query, epoch);
           if (absl::IsDataLoss(read.status()) && !query.skip_damaged) {
             damaged = read.status();
             query.skip_damaged = true;
-            read = reader.ListScans(query, pin.view().epoch);
+            read = reader.ListScans(query, epoch);
           }
           STRATA_ASSIGN_OR_RETURN(page, std::move(read));
           return absl::OkStatus();
@@ -185,23 +187,17 @@ absl::Status EngineScans::GetPoints(const api::Call& call,
                                     absl::string_view map,
                                     const ScanId& id,
                                     absl::FunctionRef<absl::Status(const PointCloud&)> sink) {
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(*found, call.stop, id));
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(found, call.stop, id));
   const std::string what = absl::StrCat("scan ", id.ToString());
-  if (!posed.scan.has_points) {
-    return absl::FailedPreconditionError(
-        absl::StrCat(what,
-                     found->core().info().parameters.keep_points
-                         ? ": it was sent as a local map, without points"
-                         : ": the map drops points once a scan is integrated"));
-  }
+  if (!posed.scan.has_points) return WithoutPoints(found, what);
   ScanLabels labels(posed.scan, {});
   for (std::uint32_t ordinal = 0; ordinal < posed.scan.chunks; ++ordinal) {
     STRATA_RETURN_IF_ERROR(call.stop.status());
-    const absl::StatusOr<PointCloud> piece = ReadPiece(*found, posed.scan, ordinal, labels);
+    const absl::StatusOr<PointCloud> piece = ReadPiece(found, posed.scan, ordinal, labels);
     if (!piece.ok()) {
       // Deleted or dropped while we were reading?
-      STRATA_ASSIGN_OR_RETURN(const PosedScan now, FindScan(*found, call.stop, id));
+      STRATA_ASSIGN_OR_RETURN(const PosedScan now, FindScan(found, call.stop, id));
       if (!now.scan.has_points)
         return absl::FailedPreconditionError(absl::StrCat(what, ": points dropped"));
       return Annotate(piece.status(), absl::StrCat(what, ", piece ", ordinal));
@@ -214,14 +210,14 @@ absl::Status EngineScans::GetPoints(const api::Call& call,
 absl::StatusOr<std::vector<std::uint16_t>> EngineScans::GetFaded(const api::Call& call,
                                                                  absl::string_view map,
                                                                  const ScanId& id) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(*found, call.stop, id));
-  if (posed.scan.faded_points == 0) return std::vector<std::uint16_t>();
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
-  absl::StatusOr<std::vector<std::uint16_t>> faded =
-      ReadLabels(*reader, posed.scan, LabelOrigin::kFaded);
-  if (!faded.ok()) return Annotate(faded.status(), absl::StrCat("scan ", id.ToString()));
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
+  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(found, call.stop, id));
+  std::vector<std::uint16_t> faded;
+  if (posed.scan.faded_points == 0) return faded;
+  const absl::Status read = found.ReadState([&](StorageReader& reader, const MapClock&) {
+    return AssignTo(ReadLabels(reader, posed.scan, LabelOrigin::kFaded), faded);
+  });
+  if (!read.ok()) return Annotate(read, absl::StrCat("scan ", id.ToString()));
   return faded;
 }
 
@@ -235,7 +231,7 @@ absl::Status EngineScans::SetLabels(const api::Call& call,
   STRATA_RETURN_IF_ERROR(CheckId(id));
   STRATA_RETURN_IF_ERROR(Annotate(ValidateLabels(labels), absl::StrCat("scan ", id.ToString())));
   // Here, too: to hear of it nobody waits behind what the worker is at.
-  STRATA_RETURN_IF_ERROR(FindScan(*found, call.stop, id).status());
+  STRATA_RETURN_IF_ERROR(FindScan(MapReading(found), call.stop, id).status());
   return found->worker().Execute(call.stop, [&](Integrator& integrator) {
     return integrator.SetPersonLabels(id, labels, mode == api::LabelMode::kUpdate);
   });
@@ -244,7 +240,7 @@ absl::Status EngineScans::SetLabels(const api::Call& call,
 absl::Status EngineScans::Delete(const api::Call& call, absl::string_view map, const ScanId& id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  STRATA_RETURN_IF_ERROR(FindScan(*found, call.stop, id).status());
+  STRATA_RETURN_IF_ERROR(FindScan(MapReading(found), call.stop, id).status());
   return found->worker().Execute(call.stop,
                                  [&](Integrator& integrator) { return integrator.DeleteScan(id); });
 }

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/random/random.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/match.h"
@@ -38,6 +39,7 @@ constexpr char kMakingPrefix[] = ".making-";
 constexpr char kCopyPrefix[] = ".copy-";
 constexpr char kLockName[] = ".lock";
 constexpr char kClockName[] = ".clock";
+constexpr char kIdentityName[] = ".identity";
 // Endings of the files of a map, its own first.
 constexpr std::array<const char*, 4> kSuffixes = {"", "-wal", "-shm", "-journal"};
 
@@ -126,6 +128,18 @@ MapDirectory::~MapDirectory() {
 
 fs::path MapDirectory::FileIn(const fs::path& directory, absl::string_view name) {
   return directory / absl::StrCat(name, kSuffix);
+}
+
+absl::StatusOr<std::string> MapDirectory::Identity() const {
+  const fs::path file = path_ / kIdentityName;
+  std::string identity;
+  if (std::ifstream(file) >> identity) return identity;
+  absl::BitGen random;
+  identity = absl::StrCat(absl::Hex(absl::Uniform<std::uint64_t>(random), absl::kZeroPad16));
+  std::ofstream(file, std::ios::trunc) << identity << '\n';
+  std::string kept;
+  if (std::ifstream(file) >> kept && kept == identity) return identity;
+  return absl::UnavailableError(absl::StrCat("cannot write ", file.string()));
 }
 
 fs::path MapDirectory::CopyOf(absl::string_view name) const {

@@ -34,6 +34,9 @@ class MapDirectory {
   static absl::StatusOr<std::vector<std::string>> NamesIn(const std::filesystem::path& directory);
   std::filesystem::path FileOf(absl::string_view name) const { return FileIn(path_, name); }
   absl::StatusOr<std::vector<std::string>> ListNames() const { return NamesIn(path_); }
+  // A name that no other directory has, made when it is first asked for and kept in it: whoever has
+  // the directory is the successor of whoever had it before.
+  absl::StatusOr<std::string> Identity() const;
   // Where a copy of the map is made: no map's file, and removed by the next Open().
   std::filesystem::path CopyOf(absl::string_view name) const;
   // What is left of one that is not made any more.

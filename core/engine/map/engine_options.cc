@@ -17,6 +17,10 @@ absl::Status EngineOptions::Validate() const {
   if (!store.empty() && max_map_bytes > 0) {
     faults.emplace_back("max_map_bytes is set, but the maps are in a database");
   }
+  if (map_lease < absl::Seconds(1) || map_lease > absl::Hours(1)) {
+    faults.push_back(
+        absl::StrCat("map_lease = ", absl::FormatDuration(map_lease), " is not in [1s, 1h]"));
+  }
   if (queue_bytes < (std::size_t{1} << 20)) faults.emplace_back("queue_bytes is below 1 MiB");
   if (max_points_per_scan == 0) faults.emplace_back("max_points_per_scan is 0");
   if (max_maps == 0) faults.emplace_back("max_maps is 0");

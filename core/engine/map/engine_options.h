@@ -19,9 +19,13 @@ struct EngineOptions {
   // Where the maps lie, one file each; made if it is not there. Owned by one engine at a time.
   std::filesystem::path directory;
   // The database that the maps are in instead, "postgresql://USER@HOST/DATABASE"; the directory
-  // then holds copies while they are sent. Empty: none. A map is written by the engine that opened
-  // it last.
+  // then holds copies while they are sent. Empty: none. Other engines may have the same one; a map
+  // is open in one of them at a time.
   std::string store;
+  // What other engines on `store` tell people of this one; empty: its directory's identity.
+  std::string server_name;
+  // How long an engine that does not answer keeps its maps from others on `store`; in [1 s, 1 h].
+  absl::Duration map_lease = absl::Seconds(10);
   // Larger scans are refused.
   std::uint64_t max_points_per_scan = 100'000'000;
   // Acknowledged scans of a map that may wait for integration; more are refused until it caught up.

@@ -10,6 +10,8 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/storage/postgresql/store_check.h"  // EngineOptions::store, looked at
+
 namespace strata {
 
 struct MapFileCheck {

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/container/btree_set.h"
 #include "absl/functional/function_ref.h"
 #include "absl/random/random.h"
@@ -17,8 +18,10 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 
+#include "core/common/retry_delay.h"
 #include "core/common/status.h"
 #include "core/common/stop.h"
+#include "core/storage/outcome.h"
 #include "core/storage/storage.h"
 
 namespace strata {
@@ -89,6 +92,17 @@ absl::Status MapCore::CheckInPlace() const {
   return storage_ == nullptr ? absl::OkStatus() : storage_->CheckInPlace();
 }
 
+absl::Status MapCore::CheckHeld() const {
+  absl::MutexLock lock(&mutex_);
+  return storage_ == nullptr ? absl::OkStatus() : storage_->CheckHeld();
+}
+
+absl::Status MapCore::doubt() const {
+  STRATA_RETURN_IF_ERROR(writer_.doubt());
+  const absl::Status held = CheckHeld();
+  return MustBeOpenedAnew(held) ? WithRetryDelay(held, kRetryDelay) : absl::OkStatus();
+}
+
 void MapCore::set_default_profile(const RobotProfile& profile) {
   absl::MutexLock lock(&mutex_);
   info_.parameters.default_profile = profile;
@@ -128,9 +142,21 @@ absl::Status MapCore::Publish(const std::vector<ScanId>& scans,
     return absl::OkStatus();
   };
   const auto show = [&] { Show(clock, scans, tiles); };
+  ++in_publication_;
+  const absl::Cleanup shown = [this] { --in_publication_; };
   // Durable: what a reader saw of a version must not be given again with other bytes.
   return awaited ? writer_.Run(Durability::kFull, 0, Stop(), publish, show)
                  : writer_.RunBehind(publish, show);
+}
+
+absl::Status MapCore::AwaitShown(const Stop& stop) {
+  if (in_publication_ == 0) return absl::OkStatus();
+  MapClock clock;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, Reader());
+    STRATA_ASSIGN_OR_RETURN(clock, reader->GetClock());
+  }
+  return snapshots_.AwaitPublished(clock.tile_version, stop);
 }
 
 void MapCore::Show(const MapClock& clock,

@@ -70,6 +70,9 @@ class MapCore {
                        const std::vector<api::TileChangeNotice>& tiles,
                        bool awaited,
                        absl::FunctionRef<absl::Status(StorageWriter&)> work);
+  // Where others read the same store: returns once this process shows what they may have seen.
+  // Costs nothing unless something is just being published.
+  absl::Status AwaitShown(const Stop& stop);
   // Whether the store may hold tiles that were staged and neither published nor discarded.
   bool tiles_staged() const { return tiles_staged_; }
   void set_tiles_staged(bool staged) { tiles_staged_ = staged; }
@@ -81,9 +84,11 @@ class MapCore {
   // milliseconds, so that those of one map lie beside each other, then random bits.
   static std::uint64_t NextUpload();
 
-  // OK, or that the store may hold what nobody here knows (IsOutcomeUnknown()): the map has to be
+  // OK, or that the store may hold what nobody here knows (MustBeOpenedAnew()): the map has to be
   // closed and opened anew.
-  absl::Status doubt() const { return writer_.doubt(); }
+  absl::Status doubt() const;
+  // As MapStorage::CheckHeld(); not of a map that is closed.
+  absl::Status CheckHeld() const;
   // OK, or the status of Close(). For those who wait for what is in memory.
   absl::Status closed() const;
   // Ends the writer and closes all connections, waiting for reads under way; what is asked for
@@ -117,6 +122,7 @@ class MapCore {
   ChangeLog changes_;
   ReaderPool readers_;
   WriterThread writer_;
+  std::atomic<int> in_publication_ = 0;  // committed perhaps, and not shown
   std::atomic<bool> tiles_staged_ = false;
 };
 

@@ -86,11 +86,9 @@ class PostgresStores final : public MapStores {
  public:
   explicit PostgresStores(PostgresMaps maps) : maps_(std::move(maps)) {}
 
-  // Names that others put there are no maps of ours.
   absl::StatusOr<std::vector<std::string>> List() const override {
     STRATA_ASSIGN_OR_RETURN(std::vector<std::string> names, maps_.List());
-    std::erase_if(names,
-                  [](const std::string& name) { return !ValidateName("map name", name).ok(); });
+    EraseStrange(names);
     return names;
   }
   absl::Status Survey(const Stop& stop, TellOutline tell) const override {
@@ -110,6 +108,16 @@ class PostgresStores final : public MapStores {
     STRATA_ASSIGN_OR_RETURN(std::unique_ptr<MapStorage> storage, maps_.OpenAlone(name));
     return StoredMap{std::move(storage), {}};
   }
+  absl::StatusOr<std::unique_ptr<MapStorage>> OpenToRead(absl::string_view name) const override {
+    return maps_.OpenToRead(name);
+  }
+  bool IsShared() const override { return true; }
+  absl::StatusOr<bool> Has(absl::string_view name) const override { return maps_.Has(name); }
+  absl::StatusOr<std::vector<std::string>> ListAbandoned() const override {
+    STRATA_ASSIGN_OR_RETURN(std::vector<std::string> names, maps_.ListAbandoned());
+    EraseStrange(names);
+    return names;
+  }
   absl::Status CheckRemovable(absl::string_view) const override { return absl::OkStatus(); }
   absl::Status Delete(absl::string_view name, std::uint64_t) const override {
     const absl::Status deleted = maps_.Delete(name);
@@ -118,6 +126,12 @@ class PostgresStores final : public MapStores {
   std::filesystem::path FileOf(absl::string_view) const override { return {}; }
 
  private:
+  // Names that others put there are no maps of ours.
+  static void EraseStrange(std::vector<std::string>& names) {
+    std::erase_if(names,
+                  [](const std::string& name) { return !ValidateName("map name", name).ok(); });
+  }
+
   PostgresMaps maps_;
 };
 
@@ -128,6 +142,9 @@ absl::StatusOr<std::unique_ptr<MapStores>> OpenMapStores(const EngineOptions& op
   if (options.store.empty()) return std::make_unique<FileStores>(options, directory);
   PostgresOptions database;
   database.where = options.store;
+  STRATA_ASSIGN_OR_RETURN(database.lease.holder, directory.Identity());
+  database.lease.server = options.server_name;
+  database.lease.time = options.map_lease;
   STRATA_ASSIGN_OR_RETURN(PostgresMaps maps, PostgresMaps::Connect(database));
   return std::make_unique<PostgresStores>(std::move(maps));
 }

@@ -12,6 +12,7 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
@@ -59,8 +60,20 @@ class MapStores {
   virtual absl::Status Create(absl::string_view name,
                               const MapParameters& parameters,
                               absl::Time created) const = 0;
-  // For this engine alone: whoever had it open in another can write it no more.
+  // For this engine alone. UNAVAILABLE with MapOwnerOf() while another engine has it, which can be
+  // where IsShared() only.
   virtual absl::StatusOr<StoredMap> Open(absl::string_view name) const = 0;
+  // Of shared ones: for reading only, whoever has it.
+  virtual absl::StatusOr<std::unique_ptr<MapStorage>> OpenToRead(absl::string_view name) const {
+    return absl::UnimplementedError(absl::StrCat("map ", name, ": its store is not shared"));
+  }
+  // Whether other engines use the same stores: maps may come, go and change beside this one.
+  virtual bool IsShared() const { return false; }
+  // Of shared ones: whether the map is there; maps whose engine went without closing them.
+  virtual absl::StatusOr<bool> Has(absl::string_view) const { return false; }
+  virtual absl::StatusOr<std::vector<std::string>> ListAbandoned() const {
+    return std::vector<std::string>();
+  }
   // FAILED_PRECONDITION for what is no map; OK also where there is nothing.
   virtual absl::Status CheckRemovable(absl::string_view name) const = 0;
   // The map must be closed. `clock`: where it stood; 0: unknown. OK also where there is nothing.

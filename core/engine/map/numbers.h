@@ -23,7 +23,8 @@ class StorageReader;
 // What is measured of one map. Counts of what happened begin with the engine.
 struct MapNumbers {
   std::string map;
-  std::uint64_t file_bytes = 0;                 // with its journal
+  std::string owner;             // of a map in a shared store that is open here: this server's name
+  std::uint64_t file_bytes = 0;  // with its journal
   std::uint64_t journal_bytes = 0;              // of that
   absl::Time verified = absl::InfinitePast();   // the last time that all was found sound
   absl::Time backed_up = absl::InfinitePast();  // the last whole backup since the engine began
@@ -50,6 +51,7 @@ struct EngineNumbers {
   // only those that were open once.
   std::vector<MapNumbers> maps;
   std::uint64_t maps_not_opened = 0;  // files that are damaged or of another version
+  std::uint64_t maps_lost = 0;        // to other servers on the store, while they were open here
 };
 
 // Whether an engine can do its work.

@@ -88,9 +88,9 @@ absl::Status WriterThread::doubt() const {
 }
 
 void WriterThread::NoteDoubt(const absl::Status& doubt) {
-  doubt_ = WithRetryDelay(
-      Annotate(doubt, "the store may hold what this server does not know; the map is opened anew"),
-      kRetryDelay);
+  constexpr char kUnknown[] =
+      "the store may hold what this server does not know; the map is opened anew";
+  doubt_ = WithRetryDelay(IsOutcomeUnknown(doubt) ? Annotate(doubt, kUnknown) : doubt, kRetryDelay);
   for (Queue* queue : {&full_, &behind_}) {
     for (Task* task : *queue) {
       queued_bytes_ -= task->bytes;
@@ -165,10 +165,10 @@ absl::StatusOr<bool> WriterThread::RunNext() {
   // Work that saw the store's end may say so alone.
   absl::Status doubt = committed;
   for (const Task* task : batch) {
-    if (IsOutcomeUnknown(task->status)) doubt = task->status;
+    if (MustBeOpenedAnew(task->status)) doubt = task->status;
   }
   absl::MutexLock lock(&mutex_);
-  if (IsOutcomeUnknown(doubt) && doubt_.ok()) NoteDoubt(doubt);
+  if (MustBeOpenedAnew(doubt) && doubt_.ok()) NoteDoubt(doubt);
   last_commit_ = std::move(committed);
   last_commit_at_ = SteadyNow();
   ++numbers_.commits;

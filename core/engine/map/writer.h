@@ -58,8 +58,8 @@ class WriterThread {
   WriterNumbers numbers() const;
   // Why the last commit failed, if it did, and not longer ago; otherwise OK.
   absl::Status FailedWithin(absl::Duration time) const;
-  // OK, or why nobody knows what the store holds (IsOutcomeUnknown()): nothing is written any more,
-  // and all is refused with it.
+  // OK, or why what the store holds is not known here (MustBeOpenedAnew()): nothing is written any
+  // more, and all is refused with it.
   absl::Status doubt() const;
 
   // Carries out what is queued, then refuses everything with CANCELLED. Safe to call again.

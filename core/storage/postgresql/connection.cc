@@ -245,7 +245,7 @@ absl::StatusOr<std::unique_ptr<Connection>> Connection::Open(const std::string& 
   // Ends those that wait for something frozen, and lets nobody's freezing hold a lock for long.
   STRATA_RETURN_IF_ERROR(connection->Execute(
       "SET lock_timeout = '10s'; SET statement_timeout = '5min'; "
-      "SET idle_in_transaction_session_timeout = '1min'; SET default_transaction_isolation = "
+      "SET idle_in_transaction_session_timeout = '20s'; SET default_transaction_isolation = "
       "'read committed'; SET bytea_output = 'hex'; SET extra_float_digits = 3; "
       "SET synchronous_commit = on"));
   return connection;

@@ -1,5 +1,6 @@
 #include "core/storage/postgresql/postgres_maps.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -7,7 +8,6 @@
 #include <vector>
 
 #include "absl/functional/function_ref.h"
-#include "absl/random/random.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
@@ -32,23 +32,42 @@ constexpr int kGoing = 2;
 
 class PostgresStorage final : public MapStorage {
  public:
-  PostgresStorage(std::shared_ptr<ConnectionPool> pool, const OpenedMap& map)
-      : pool_(pool), map_(map), writer_(std::move(pool), map) {}
+  // `lease`: nullptr if others may write it, too.
+  PostgresStorage(std::shared_ptr<ConnectionPool> pool,
+                  const OpenedMap& map,
+                  std::shared_ptr<MapLeases> leases,
+                  std::shared_ptr<MapLease> lease)
+      : pool_(pool),
+        map_(map),
+        leases_(std::move(leases)),
+        lease_(std::move(lease)),
+        writer_(std::move(pool), map) {}
+  ~PostgresStorage() override {
+    if (lease_ != nullptr) leases_->GiveUp(*lease_);
+  }
+  PostgresStorage(const PostgresStorage&) = delete;
+  PostgresStorage& operator=(const PostgresStorage&) = delete;
 
   absl::StatusOr<std::unique_ptr<StorageReader>> NewReader() override {
     return std::make_unique<PostgresReader>(pool_, map_.number);
   }
   StorageWriter& writer() override { return writer_; }
   absl::Status CheckInPlace() const override {
+    STRATA_RETURN_IF_ERROR(CheckHeld());
     STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
     absl::StatusOr<Rows> owner =
         lease->Query("SELECT owner FROM truth_map WHERE map = $1", map_.number);
     return CheckOwner(owner, map_);
   }
+  absl::Status CheckHeld() const override {
+    return lease_ == nullptr ? absl::OkStatus() : lease_->Check();
+  }
 
  private:
   std::shared_ptr<ConnectionPool> pool_;
   OpenedMap map_;
+  std::shared_ptr<MapLeases> leases_;
+  std::shared_ptr<MapLease> lease_;
   PostgresWriter writer_;
 };
 
@@ -146,7 +165,7 @@ absl::Status DropOtherDerived(StorageWriter& writer, ConnectionPool& pool, std::
 }  // namespace
 
 absl::StatusOr<PostgresMaps> PostgresMaps::Connect(const PostgresOptions& options) {
-  PostgresMaps maps(ConnectionPool::Make(options.where, options.max_connections));
+  PostgresMaps maps(ConnectionPool::Make(options.where, options.max_connections), options);
   std::vector<std::int64_t> going;
   {
     STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, maps.pool_->Take());
@@ -222,6 +241,25 @@ absl::StatusOr<std::int64_t> PostgresMaps::Find(absl::string_view name) const {
   return row.Int(0);
 }
 
+absl::StatusOr<bool> PostgresMaps::Has(absl::string_view name) const {
+  const absl::Status found = Find(name).status();
+  if (absl::IsNotFound(found)) return false;
+  STRATA_RETURN_IF_ERROR(found);
+  return true;
+}
+
+absl::StatusOr<std::vector<std::string>> PostgresMaps::ListAbandoned() const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row,
+      lease->Query("SELECT p.name FROM map_lease AS l JOIN map_place AS p ON p.map = l.map WHERE "
+                   "l.expires <= clock_timestamp() AND p.state = $1",
+                   kThere));
+  std::vector<std::string> names;
+  while (row.Next()) names.emplace_back(row.Text(0));
+  return names;
+}
+
 absl::Status PostgresMaps::Create(absl::string_view name,
                                   const MapParameters& parameters,
                                   absl::Time created,
@@ -242,39 +280,57 @@ absl::Status PostgresMaps::Create(absl::string_view name,
   });
 }
 
-absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenAs(absl::string_view name,
-                                                                 std::int64_t owner) const {
-  STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
-  OpenedMap map{number, std::string(name), owner};
-  if (owner != 0) STRATA_RETURN_IF_ERROR(TakeOver(map));
-  auto storage = std::make_unique<PostgresStorage>(pool_, map);
+absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenAs(
+    const OpenedMap& map, std::shared_ptr<MapLease> lease) const {
+  auto storage = std::make_unique<PostgresStorage>(pool_, map, leases_, std::move(lease));
   StorageWriter& writer = storage->writer();
-  STRATA_RETURN_IF_ERROR(Annotate(DropOtherDerived(writer, *pool_, number), name));
-  STRATA_RETURN_IF_ERROR(Annotate(writer.reader().GetMapInfo().status(), name));
+  STRATA_RETURN_IF_ERROR(Annotate(DropOtherDerived(writer, *pool_, map.number), map.name));
+  STRATA_RETURN_IF_ERROR(Annotate(writer.reader().GetMapInfo().status(), map.name));
   return storage;
 }
 
 absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::Open(absl::string_view name) const {
-  return OpenAs(name, 0);
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
+  return OpenAs({.number = number, .name = std::string(name)}, nullptr);
 }
 
 absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenAlone(absl::string_view name) const {
-  absl::BitGen random;
-  return OpenAs(name, absl::Uniform<std::int64_t>(random, 1, std::int64_t{1} << 62));
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
+  OpenedMap map{.number = number, .name = std::string(name), .fenced = fenced_};
+  map.patience = std::max(leases_->time(), absl::Seconds(1));
+  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<MapLease> lease, TakeOver(map));
+  leases_->Hold(lease);
+  return OpenAs(map, std::move(lease));
+}
+
+absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenToRead(absl::string_view name) const {
+  constexpr std::int64_t kNobody = -1;  // no token is negative
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
+  const OpenedMap map{.number = number, .name = std::string(name), .owner = kNobody};
+  return std::make_unique<PostgresStorage>(pool_, map, leases_, nullptr);
 }
 
 // The lock waits for commits of the owner before, relaxed ones too: what those have staged is there
-// when the new one clears it away.
-absl::Status PostgresMaps::TakeOver(OpenedMap& map) const {
-  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
-  return InTransaction(*lease, [&]() -> absl::Status {
-    STRATA_ASSIGN_OR_RETURN(
-        Rows row,
-        lease->Query("SELECT last_commit FROM truth_map WHERE map = $1 FOR UPDATE", map.number));
-    if (row.Next()) map.last_commit = row.Int(0);
-    return lease->Change("UPDATE truth_map SET owner = $2 WHERE map = $1", map.number, map.owner)
+// when the new one clears it away. The lease is locked before the map here and wherever both are.
+absl::StatusOr<std::shared_ptr<MapLease>> PostgresMaps::TakeOver(OpenedMap& map) const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease connection, pool_->Take());
+  STRATA_RETURN_IF_ERROR(leases_->CheckFree(*connection, map.number, map.name));
+  std::shared_ptr<MapLease> lease;
+  STRATA_RETURN_IF_ERROR(InTransaction(*connection, [&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(lease, leases_->Take(*connection, map.number, map.name));
+    map.owner = lease->token();
+    STRATA_RETURN_IF_ERROR(connection->Execute("SET LOCAL lock_timeout = '3s'"));
+    absl::StatusOr<Rows> row = connection->Query(
+        "SELECT last_commit FROM truth_map WHERE map = $1 FOR UPDATE", map.number);
+    if (absl::IsResourceExhausted(row.status())) return leases_->HeldUp(map.name);
+    STRATA_RETURN_IF_ERROR(row.status());
+    if (!row->Next()) return NoSuchMap(map.name);
+    map.last_commit = row->Int(0);
+    return connection
+        ->Change("UPDATE truth_map SET owner = $2 WHERE map = $1", map.number, map.owner)
         .status();
-  });
+  }));
+  return lease;
 }
 
 absl::StatusOr<std::uint64_t> PostgresMaps::RemovedClock() const {
@@ -285,26 +341,29 @@ absl::StatusOr<std::uint64_t> PostgresMaps::RemovedClock() const {
 
 // Whoever writes holds the map's row, so this waits for commits under way, and later ones find
 // none.
+absl::Status PostgresMaps::DeleteName(Connection& connection,
+                                      std::int64_t map,
+                                      absl::string_view name) const {
+  STRATA_RETURN_IF_ERROR(leases_->Take(connection, map, name).status());
+  STRATA_ASSIGN_OR_RETURN(
+      const std::uint64_t taken,
+      connection.Change(
+          "UPDATE map_place SET state = $2 WHERE map = $1 AND state = $3", map, kGoing, kThere));
+  if (taken == 0) return NoSuchMap(name);
+  STRATA_RETURN_IF_ERROR(
+      connection
+          .Change("UPDATE strata_format SET removed_clock = greatest(removed_clock, (SELECT "
+                  "commit_sequence FROM truth_map WHERE map = $1))",
+                  map)
+          .status());
+  return connection.Change("DELETE FROM truth_map WHERE map = $1", map).status();
+}
+
 absl::Status PostgresMaps::Delete(absl::string_view name) const {
   STRATA_ASSIGN_OR_RETURN(const std::int64_t map, Find(name));
   {
     STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
-    STRATA_RETURN_IF_ERROR(InTransaction(*lease, [&]() -> absl::Status {
-      STRATA_ASSIGN_OR_RETURN(
-          const std::uint64_t taken,
-          lease->Change("UPDATE map_place SET state = $2 WHERE map = $1 AND state = $3",
-                        map,
-                        kGoing,
-                        kThere));
-      if (taken == 0) return NoSuchMap(name);
-      STRATA_RETURN_IF_ERROR(
-          lease
-              ->Change("UPDATE strata_format SET removed_clock = greatest(removed_clock, (SELECT "
-                       "commit_sequence FROM truth_map WHERE map = $1))",
-                       map)
-              .status());
-      return lease->Change("DELETE FROM truth_map WHERE map = $1", map).status();
-    }));
+    STRATA_RETURN_IF_ERROR(InTransaction(*lease, [&] { return DeleteName(*lease, map, name); }));
   }
   return DeleteRows(map);
 }
@@ -319,6 +378,7 @@ absl::Status PostgresMaps::DeleteRows(std::int64_t map) const {
     STRATA_RETURN_IF_ERROR(lease->Change(sql, map).status());
   }
   STRATA_RETURN_IF_ERROR(lease->Change("DELETE FROM derived_state WHERE map = $1", map).status());
+  STRATA_RETURN_IF_ERROR(lease->Change("DELETE FROM map_lease WHERE map = $1", map).status());
   STRATA_RETURN_IF_ERROR(lease->Change("DELETE FROM map_place WHERE map = $1", map).status());
   return lease->Execute("COMMIT");
 }

@@ -17,6 +17,7 @@
 
 #include "core/common/stop.h"
 #include "core/storage/postgresql/connection_pool.h"
+#include "core/storage/postgresql/map_leases.h"
 #include "core/storage/postgresql/postgres_writer.h"
 #include "core/storage/storage.h"
 #include "core/world/map_info.h"
@@ -28,6 +29,10 @@ struct PostgresOptions {
   // they lack, in the first schema of the search path.
   std::string where;
   std::size_t max_connections = 32;
+  LeaseOptions lease = {};
+  // false: a commit does not ask whether its map was taken away, and corrupts it if so. For tests
+  // that must fail then.
+  bool fenced = true;
 };
 
 // What a map's rows say of it, whether somebody has it open or not.
@@ -47,6 +52,9 @@ class PostgresMaps {
 
   // Sorted.
   absl::StatusOr<std::vector<std::string>> List() const;
+  absl::StatusOr<bool> Has(absl::string_view name) const;
+  // Whose lease has ended without having been given up: the process that had them died, say.
+  absl::StatusOr<std::vector<std::string>> ListAbandoned() const;
   // All maps, a thousand a query, in no order; an error of one of them is of its rows. CANCELLED,
   // DEADLINE_EXCEEDED by `stop`.
   absl::Status Survey(
@@ -60,26 +68,37 @@ class PostgresMaps {
   // NOT_FOUND; DATA_LOSS if the map's own row is damaged. Outlives this object. Others may have the
   // map open, too, and write it between two commits.
   absl::StatusOr<std::unique_ptr<MapStorage>> Open(absl::string_view name) const;
-  // The same, alone: whoever had opened it so before can not write any more (UNAVAILABLE), since
-  // every commit asks.
+  // The same, alone: with a lease, renewed until the storage goes. UNAVAILABLE with MapOwnerOf()
+  // while another process has it so. Whoever had it so before, and let its lease end, can not write
+  // any more (TakenAway()), since every commit asks.
   absl::StatusOr<std::unique_ptr<MapStorage>> OpenAlone(absl::string_view name) const;
+  // For reading only, whoever has it: every commit is refused. NOT_FOUND.
+  absl::StatusOr<std::unique_ptr<MapStorage>> OpenToRead(absl::string_view name) const;
   // The latest clock of a map that was deleted; 0: none was.
   absl::StatusOr<std::uint64_t> RemovedClock() const;
-  // Whoever has it open can neither read nor write it any more. Its rows go after its name, so that
+  // UNAVAILABLE with MapOwnerOf() while another process has it alone; whoever has it open otherwise
+  // can neither read nor write it any more. Its rows go after its name, so that
   // what is left when this ends with an error is deleted by the next Connect(). NOT_FOUND.
   absl::Status Delete(absl::string_view name) const;
 
  private:
-  explicit PostgresMaps(std::shared_ptr<ConnectionPool> pool) : pool_(std::move(pool)) {}
+  PostgresMaps(std::shared_ptr<ConnectionPool> pool, const PostgresOptions& options)
+      : pool_(std::move(pool)),
+        leases_(std::make_shared<MapLeases>(options.where, options.lease)),
+        fenced_(options.fenced) {}
   // The thousand rows behind the map with the number `last`.
   absl::StatusOr<Rows> SurveyAfter(std::int64_t last) const;
   absl::StatusOr<std::int64_t> Find(absl::string_view name) const;
-  absl::StatusOr<std::unique_ptr<MapStorage>> OpenAs(absl::string_view name,
-                                                     std::int64_t owner) const;
-  absl::Status TakeOver(OpenedMap& map) const;
+  absl::StatusOr<std::unique_ptr<MapStorage>> OpenAs(const OpenedMap& map,
+                                                     std::shared_ptr<MapLease> lease) const;
+  absl::StatusOr<std::shared_ptr<MapLease>> TakeOver(OpenedMap& map) const;
+  // In a transaction: takes name and truth of the map.
+  absl::Status DeleteName(Connection& connection, std::int64_t map, absl::string_view name) const;
   absl::Status DeleteRows(std::int64_t map) const;
 
   std::shared_ptr<ConnectionPool> pool_;
+  std::shared_ptr<MapLeases> leases_;
+  bool fenced_ = true;
 };
 
 }  // namespace strata

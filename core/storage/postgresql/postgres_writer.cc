@@ -46,15 +46,23 @@ void PauseBeforeRun(int run) {
 
 }  // namespace
 
+// Whoever is frozen in a commit holds the map's row, for which his successor waits.
+std::string BeginOf(const OpenedMap& map) {
+  if (map.owner == 0) return "BEGIN";
+  return absl::StrCat("BEGIN; SET LOCAL idle_in_transaction_session_timeout = ",
+                      absl::ToInt64Milliseconds(map.patience));
+}
+
 absl::Status CheckOwner(absl::StatusOr<Rows>& owner, const OpenedMap& map) {
   STRATA_RETURN_IF_ERROR(owner.status());
   const bool there = owner->Next();
-  if (there && (map.owner == 0 || owner->Int(0) == map.owner)) return absl::OkStatus();
-  return absl::UnavailableError(
-      absl::StrCat("store: map ",
-                   map.name,
-                   there ? " was opened by another process" : " was removed",
-                   " while it was open: nothing more is taken into it here"));
+  if (there && (map.owner == 0 || !map.fenced || owner->Int(0) == map.owner)) {
+    return absl::OkStatus();
+  }
+  return TakenAway(absl::StrCat("store: map ",
+                                map.name,
+                                there ? " was opened by another process" : " was removed",
+                                " while it was open: nothing more is taken into it here"));
 }
 
 absl::Status PostgresWriter::Commit(Durability durability, absl::FunctionRef<absl::Status()> body) {
@@ -102,8 +110,9 @@ absl::Status PostgresWriter::CommitOnce(Durability durability,
 
 absl::Status PostgresWriter::LockMap(Durability durability, std::int64_t commit) {
   const bool relaxed = durability == Durability::kRelaxed;
-  STRATA_RETURN_IF_ERROR(
-      connection_->Execute(relaxed ? "BEGIN; SET LOCAL synchronous_commit = off" : "BEGIN"));
+  STRATA_RETURN_IF_ERROR(connection_->Execute(
+      relaxed ? absl::StrCat(begin_, "; SET LOCAL synchronous_commit = off").c_str()
+              : begin_.c_str()));
   if (alone()) return LockOwnMap(commit);
   absl::StatusOr<Rows> owner =
       relaxed ? connection_->Query("SELECT owner FROM truth_map WHERE map = $1 FOR KEY SHARE", map_)
@@ -122,7 +131,9 @@ absl::Status PostgresWriter::LockOwnMap(std::int64_t commit) {
       map_,
       commit);
   STRATA_RETURN_IF_ERROR(CheckOwner(row, opened_));
-  if (!last_commit_.has_value() || row->Int(1) == *last_commit_) return absl::OkStatus();
+  if (!opened_.fenced || !last_commit_.has_value() || row->Int(1) == *last_commit_) {
+    return absl::OkStatus();
+  }
   return OutcomeUnknown(
       absl::StrCat("store: what was written to map ", opened_.name, " last is not there any more"));
 }

@@ -13,6 +13,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "absl/time/time.h"
 #include "absl/types/span.h"
 
 #include "core/storage/postgresql/connection.h"
@@ -26,11 +27,17 @@ namespace strata {
 struct OpenedMap {
   std::int64_t number = 0;
   std::string name;
-  std::int64_t owner = 0;        // 0: anybody's
+  std::int64_t owner = 0;        // the token of its lease; 0: anybody's
   std::int64_t last_commit = 0;  // when `owner` took it
+  bool fenced = true;            // false: commits do not ask whose it is
+  // How long its owner may do nothing within a commit; then the database ends it.
+  absl::Duration patience = absl::Seconds(20);
 };
 
-// The map's own row, which begins with its owner: UNAVAILABLE where there is no row or `map` has
+// What begins a commit into it.
+std::string BeginOf(const OpenedMap& map);
+
+// The map's own row, which begins with its owner: TakenAway() where there is no row or `map` has
 // lost it.
 absl::Status CheckOwner(absl::StatusOr<Rows>& owner, const OpenedMap& map);
 
@@ -40,6 +47,7 @@ class PostgresWriter final : public StorageWriter {
       : pool_(pool),
         opened_(map),
         map_(map.number),
+        begin_(BeginOf(map)),
         last_commit_(map.last_commit),
         reader_(std::move(pool), map.number) {}
 
@@ -158,6 +166,7 @@ class PostgresWriter final : public StorageWriter {
   std::shared_ptr<ConnectionPool> pool_;
   OpenedMap opened_;
   std::int64_t map_;
+  std::string begin_;
   // The number of the last commit, if this writer has the map alone; nullopt: it is not known.
   std::optional<std::int64_t> last_commit_;
   PostgresReader reader_;

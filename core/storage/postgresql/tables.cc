@@ -315,6 +315,17 @@ CREATE TABLE derived_scan_cell (
 CREATE INDEX derived_scan_cell_scan ON derived_scan_cell (map, scan);
 )sql";
 
+// Since version 2: who has which map. Small, changed all the time, looked up by map.
+constexpr char kLeases[] = R"sql(
+CREATE TABLE map_lease (
+  map bigint PRIMARY KEY,
+  token bigint NOT NULL,
+  holder text NOT NULL,
+  server text NOT NULL,
+  expires timestamptz NOT NULL
+) WITH (fillfactor = 50);
+)sql";
+
 constexpr std::array<const char*, 13> kDerived = {
     "DELETE FROM derived_mls_tile WHERE map = $1",
     "DELETE FROM derived_surface_tile WHERE map = $1",
@@ -364,45 +375,53 @@ absl::Status MakeInTransaction(Connection& connection) {
   STRATA_ASSIGN_OR_RETURN(Rows found,
                           connection.Query("SELECT coalesce(max(version), 0) FROM strata_format"));
   found.Next();
-  if (found.Int(0) == 0) {
+  const std::int64_t version = found.Int(0);
+  if (version == 0) {
     STRATA_RETURN_IF_ERROR(connection.Execute(kTables));
     STRATA_RETURN_IF_ERROR(
-        connection
-            .Change("INSERT INTO strata_format (version, removed_clock) VALUES ($1, 0)",
-                    kDatabaseVersion)
+        connection.Change("INSERT INTO strata_format (version, removed_clock) VALUES (1, 0)")
             .status());
+  }
+  if (version < 2) {
+    STRATA_RETURN_IF_ERROR(connection.Execute(kLeases));
+    STRATA_RETURN_IF_ERROR(connection.Execute("UPDATE strata_format SET version = 2"));
   }
   return connection.Execute("COMMIT");
 }
 
-absl::StatusOr<bool> HasTables(Connection& connection) {
-  STRATA_ASSIGN_OR_RETURN(Rows found,
+}  // namespace
+
+absl::StatusOr<std::int64_t> VersionOfTables(Connection& connection) {
+  STRATA_ASSIGN_OR_RETURN(Rows there,
                           connection.Query("SELECT to_regclass('strata_format') IS NOT NULL"));
-  return found.Next() && found.Bool(0);
+  if (!there.Next() || !there.Bool(0)) return 0;
+  STRATA_ASSIGN_OR_RETURN(Rows found,
+                          connection.Query("SELECT coalesce(max(version), 0) FROM strata_format"));
+  found.Next();
+  return found.Int(0);
 }
 
-}  // namespace
+absl::Status OtherFormat(std::int64_t version) {
+  return absl::FailedPreconditionError(absl::StrCat("store: the tables have format ",
+                                                    version,
+                                                    ", this program reads ",
+                                                    kDatabaseVersion,
+                                                    "; update the older of the two"));
+}
 
 absl::Status MakeTables(Connection& connection) {
   constexpr int kMostAttempts = 5;
   for (int attempt = 1;; ++attempt) {
-    STRATA_ASSIGN_OR_RETURN(const bool made, HasTables(connection));
-    if (made) break;
+    STRATA_ASSIGN_OR_RETURN(const std::int64_t version, VersionOfTables(connection));
+    if (version >= kDatabaseVersion) break;
     const absl::Status done = MakeInTransaction(connection);
     if (done.ok()) continue;
     STRATA_RETURN_IF_ERROR(connection.Execute("ROLLBACK"));
     // Another made the same table at the same moment.
     if (!absl::IsAlreadyExists(done) || attempt == kMostAttempts) return done;
   }
-  STRATA_ASSIGN_OR_RETURN(Rows found,
-                          connection.Query("SELECT coalesce(max(version), 0) FROM strata_format"));
-  found.Next();
-  if (found.Int(0) == kDatabaseVersion) return absl::OkStatus();
-  return absl::FailedPreconditionError(absl::StrCat("store: the tables have format ",
-                                                    found.Int(0),
-                                                    ", this program reads ",
-                                                    kDatabaseVersion,
-                                                    "; update the older of the two"));
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t version, VersionOfTables(connection));
+  return version == kDatabaseVersion ? absl::OkStatus() : OtherFormat(version);
 }
 
 absl::Span<const char* const> DeletionsOfDerived() { return kDerived; }

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/types/span.h"
 
 #include "core/storage/postgresql/connection.h"
@@ -12,11 +13,16 @@
 namespace strata {
 
 // Newest format of the tables this program reads and writes.
-inline constexpr std::int64_t kDatabaseVersion = 1;
+inline constexpr std::int64_t kDatabaseVersion = 2;
 
-// Makes the tables where there are none; safe when others do so at the same time.
-// FAILED_PRECONDITION for a newer format.
+// Makes the tables where there are none, or adds what those of version 1 lack; safe when others do
+// so at the same time. FAILED_PRECONDITION for a newer format.
 absl::Status MakeTables(Connection& connection);
+
+// The format of the tables; 0: there are none.
+absl::StatusOr<std::int64_t> VersionOfTables(Connection& connection);
+// FAILED_PRECONDITION: that this program does not read tables of `version`.
+absl::Status OtherFormat(std::int64_t version);
 
 // "DELETE FROM … WHERE map = $1" for every table of derived data but derived_state, and for every
 // table of all else but truth_map.

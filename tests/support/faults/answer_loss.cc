@@ -187,6 +187,7 @@ class LosingStorage final : public MapStorage {
   }
   StorageWriter& writer() override { return writer_; }
   absl::Status CheckInPlace() const override { return inner_->CheckInPlace(); }
+  absl::Status CheckHeld() const override { return inner_->CheckHeld(); }
 
  private:
   std::unique_ptr<MapStorage> inner_;

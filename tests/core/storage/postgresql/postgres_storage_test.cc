@@ -335,7 +335,7 @@ TEST_F(PostgresStorageTest, ADeletedMapLeavesItsNameAndNoRows) {
       Rows tables,
       other_->Query("SELECT c.table_name::text FROM information_schema.columns AS c WHERE "
                     "c.column_name = 'map' AND c.table_schema = 'public'"));
-  EXPECT_EQ(tables.size(), 38);
+  EXPECT_EQ(tables.size(), 39);
   while (tables.Next()) {
     const std::string sql =
         absl::StrCat("SELECT count(*) FROM ",

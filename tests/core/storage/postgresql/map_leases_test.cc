@@ -1,0 +1,178 @@
+// Leases of maps: who has one, who gets it when, and that whoever lost it writes nothing more.
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/common/map_owner.h"
+#include "core/common/retry_delay.h"
+#include "core/storage/outcome.h"
+#include "core/storage/postgresql/connection.h"
+#include "core/storage/postgresql/postgres_maps.h"
+#include "core/storage/storage.h"
+#include "tests/support/postgres_cluster.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+constexpr char kName[] = "leased";
+
+// Nobody renews so soon that a test meets it.
+constexpr absl::Duration kLong = absl::Hours(1);
+
+class MapLeasesTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto cluster = SharedPostgresCluster();
+    if (absl::IsFailedPrecondition(cluster.status())) GTEST_SKIP() << cluster.status().message();
+    STRATA_ASSERT_OK(cluster);
+    address_ =
+        (*cluster)->AddressOfOwn(::testing::UnitTest::GetInstance()->current_test_info()->name());
+    STRATA_ASSERT_OK(Server("any").Create(kName, MapParameters(), absl::Now()));
+    STRATA_ASSERT_OK_AND_ASSIGN(sql_, Connection::Open(address_));
+  }
+  PostgresMaps Server(const std::string& name, absl::Duration time = kLong, bool fenced = true) {
+    PostgresOptions options;
+    options.where = address_;
+    options.lease = {.holder = name, .server = absl::StrCat("server ", name), .time = time};
+    options.fenced = fenced;
+    auto maps = PostgresMaps::Connect(options);
+    STRATA_EXPECT_OK(maps);
+    return *std::move(maps);
+  }
+  // As if its owner had been frozen for longer than it lasts.
+  void LetLapse() {
+    absl::SleepFor(absl::Milliseconds(500));  // it is renewed once, right after it was taken
+    STRATA_ASSERT_OK(sql_->Execute(
+        "UPDATE map_lease SET expires = clock_timestamp() - interval '1 microsecond'"));
+  }
+  static absl::StatusOr<std::uint64_t> Tick(MapStorage& map) {
+    std::uint64_t number = 0;
+    const absl::Status done = map.writer().Commit(Durability::kFull, [&]() -> absl::Status {
+      auto next = map.writer().NextCommitSequence();
+      number = next.value_or(0);
+      return next.status();
+    });
+    if (!done.ok()) return done;
+    return number;
+  }
+  static absl::Status Stage(MapStorage& map, std::uint64_t upload) {
+    return map.writer().Commit(Durability::kRelaxed,
+                               [&] { return map.writer().PutChunk(upload, 0, "bytes"); });
+  }
+
+  std::string address_;
+  std::unique_ptr<Connection> sql_;
+};
+
+TEST_F(MapLeasesTest, OneHasItAtATime) {
+  const PostgresMaps a = Server("a");
+  const PostgresMaps b = Server("b");
+  STRATA_ASSERT_OK_AND_ASSIGN(std::unique_ptr<MapStorage> held, a.OpenAlone(kName));
+  const absl::Status refused = b.OpenAlone(kName).status();
+  EXPECT_THAT(refused, StatusIs(absl::StatusCode::kUnavailable, ::testing::HasSubstr("server a")));
+  EXPECT_EQ(MapOwnerOf(refused), "server a");
+  EXPECT_TRUE(RetryDelayOf(refused).has_value());
+  EXPECT_EQ(MapOwnerOf(b.Delete(kName)), "server a");
+  EXPECT_THAT(b.ListAbandoned(), IsOkAndHolds(IsEmpty()));
+  STRATA_EXPECT_OK(Tick(*held));
+  STRATA_EXPECT_OK(held->CheckHeld());
+  // Whoever goes gives it up at once.
+  held.reset();
+  const absl::Time end = absl::Now() + absl::Seconds(10);
+  absl::Status taken;
+  do {
+    taken = b.OpenAlone(kName).status();
+  } while (!taken.ok() && absl::Now() < end);
+  STRATA_EXPECT_OK(taken);
+}
+
+// Of the same server, started again before its lease has ended.
+TEST_F(MapLeasesTest, ItsSuccessorGetsItAtOnce) {
+  const PostgresMaps dead = Server("a");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto before, dead.OpenAlone(kName));
+  const PostgresMaps started = Server("a");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto after, started.OpenAlone(kName));
+  STRATA_EXPECT_OK(Tick(*after));
+  EXPECT_TRUE(MustBeOpenedAnew(Tick(*before).status()));
+}
+
+TEST_F(MapLeasesTest, WhoeverLostItWritesNothingMore) {
+  const PostgresMaps a = Server("a");
+  const PostgresMaps b = Server("b");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto frozen, a.OpenAlone(kName));
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::uint64_t first, Tick(*frozen));
+  LetLapse();
+  EXPECT_THAT(b.ListAbandoned(), IsOkAndHolds(ElementsAre(kName)));
+  STRATA_EXPECT_OK(Tick(*frozen));  // nobody else has it yet
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto taken, b.OpenAlone(kName));
+  for (const absl::Status& done : {Tick(*frozen).status(), Stage(*frozen, 7)}) {
+    EXPECT_THAT(done, StatusIs(absl::StatusCode::kUnavailable, ::testing::_));
+    EXPECT_TRUE(MustBeOpenedAnew(done));
+    EXPECT_FALSE(IsOutcomeUnknown(done));
+  }
+  EXPECT_THAT(Tick(*taken), IsOkAndHolds(first + 2));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto reader, taken->NewReader());
+  EXPECT_FALSE(reader->GetChunk(7, 0).ok());
+}
+
+// That the test above can fail: with the check off, two write beside each other.
+TEST_F(MapLeasesTest, WithoutTheFenceItWouldWrite) {
+  const PostgresMaps a = Server("a", kLong, /*fenced=*/false);
+  const PostgresMaps b = Server("b");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto frozen, a.OpenAlone(kName));
+  STRATA_EXPECT_OK(Tick(*frozen));
+  LetLapse();
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto taken, b.OpenAlone(kName));
+  STRATA_EXPECT_OK(Tick(*frozen));
+  STRATA_EXPECT_OK(Stage(*frozen, 7));
+}
+
+TEST_F(MapLeasesTest, ItIsRenewedUntilAnotherHasIt) {
+  const PostgresMaps a = Server("a", absl::Milliseconds(300));
+  const PostgresMaps b = Server("b");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto held, a.OpenAlone(kName));
+  for (int i = 0; i < 20; ++i) {
+    absl::SleepFor(absl::Milliseconds(50));
+    EXPECT_NE(MapOwnerOf(b.OpenAlone(kName).status()), std::nullopt) << i;
+  }
+  // A row that somebody holds who looks at it is not waited for, and its lease ends meanwhile.
+  STRATA_ASSERT_OK(sql_->Execute("BEGIN; SELECT 1 FROM map_lease FOR UPDATE"));
+  absl::SleepFor(absl::Milliseconds(500));
+  const absl::Status unsure = held->CheckHeld();
+  EXPECT_THAT(unsure, StatusIs(absl::StatusCode::kUnavailable, ::testing::_));
+  EXPECT_FALSE(MustBeOpenedAnew(unsure));
+  STRATA_ASSERT_OK(sql_->Execute("COMMIT"));
+  absl::SleepFor(absl::Milliseconds(300));
+  STRATA_EXPECT_OK(held->CheckHeld());
+  // Taken, it is known here at the next renewal.
+  STRATA_ASSERT_OK(
+      sql_->Execute("UPDATE map_lease SET token = 1, holder = 'x', server = 'server x', expires = "
+                    "clock_timestamp() + interval '1 hour'"));
+  absl::SleepFor(absl::Milliseconds(300));
+  EXPECT_TRUE(MustBeOpenedAnew(held->CheckHeld()));
+  EXPECT_EQ(MapOwnerOf(held->CheckHeld()), "server x");
+}
+
+TEST_F(MapLeasesTest, TablesOfTheVersionBeforeGetLeases) {
+  STRATA_ASSERT_OK(sql_->Execute("DROP TABLE map_lease; UPDATE strata_format SET version = 1"));
+  const PostgresMaps a = Server("a");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto held, a.OpenAlone(kName));
+  STRATA_EXPECT_OK(Tick(*held));
+}
+
+}  // namespace
+}  // namespace strata::testing

@@ -1,0 +1,414 @@
+// Two real servers on one database: one has a map, the other says which; where it dies or freezes
+// the other takes over, and nothing that was acknowledged by either is lost or there twice.
+#include <array>
+#include <atomic>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/sdk/client.h"
+#include "core/common/map_owner.h"
+#include "core/common/retry_delay.h"
+#include "core/common/status.h"
+#include "core/common/steady_time.h"
+#include "tests/integration/numbered_scans.h"
+#include "tests/integration/stratad_process.h"
+#include "tests/support/postgres_cluster.h"
+#include "tests/support/status_matchers.h"
+#include "tests/support/temp_dir.h"
+
+namespace strata::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr char kMap[] = "shared";
+constexpr std::size_t kPoints = 100;
+constexpr absl::Duration kPatience = absl::Seconds(30);
+
+class SharingServer {
+ public:
+  SharingServer(std::string name, std::string store)
+      : name_(std::move(name)), store_(std::move(store)) {}
+
+  void Start() {
+    process_ = std::make_unique<StratadProcess>(std::vector<std::string>{"--data",
+                                                                         data_.path().string(),
+                                                                         "--listen",
+                                                                         "127.0.0.1:0",
+                                                                         "--store",
+                                                                         store_,
+                                                                         "--map-lease",
+                                                                         "1",
+                                                                         "--server-name",
+                                                                         name_,
+                                                                         "--optimize-every",
+                                                                         "0"});
+    ClientOptions options;
+    options.target = process_->Address();
+    options.backoff.max_attempts = 1;  // whoever asks goes to another server
+    auto connected = Connect(options);
+    STRATA_ASSERT_OK(connected);
+    absl::MutexLock lock(&mutex_);
+    db_ = *std::move(connected);
+  }
+  void Kill() {
+    process_->Signal(SIGKILL);
+    process_->Wait();
+  }
+  void Signal(int signal) { process_->Signal(signal); }
+  const std::string& address() { return process_->Address(); }
+  std::shared_ptr<api::Database> db() {
+    absl::MutexLock lock(&mutex_);
+    return db_;
+  }
+
+ private:
+  const std::string name_;
+  const std::string store_;
+  const TempDir data_;
+  std::unique_ptr<StratadProcess> process_;
+  absl::Mutex mutex_;
+  std::shared_ptr<api::Database> db_;
+};
+
+absl::StatusOr<ScanAck> Put(api::Database& db, const char* map, std::uint64_t sequence) {
+  api::Call call;
+  call.stop = Stop(SteadyNow() + absl::Seconds(4));
+  const PointCloud cloud = NumberedCloud(sequence, kPoints);
+  STRATA_ASSIGN_OR_RETURN(const auto upload,
+                          db.scans().Upload(call, map, NumberedHeader(sequence, cloud)));
+  if (upload->points_held() < cloud.size()) STRATA_RETURN_IF_ERROR(upload->Write(cloud));
+  return upload->Finish();
+}
+
+class TwoServersTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto cluster = SharedPostgresCluster();
+    if (absl::IsFailedPrecondition(cluster.status())) GTEST_SKIP() << cluster.status().message();
+    STRATA_ASSERT_OK(cluster);
+    store_ =
+        (*cluster)->AddressOfOwn(::testing::UnitTest::GetInstance()->current_test_info()->name());
+    for (const char* name : {"a", "b"}) {
+      servers_.push_back(std::make_unique<SharingServer>(name, store_));
+      servers_.back()->Start();
+    }
+    STRATA_ASSERT_OK(servers_[0]->db()->maps().Create({}, kMap, MapParameters()));
+  }
+  api::Database& db(int server) {
+    held_.push_back(servers_[server]->db());
+    return *held_.back();
+  }
+  // Until `call` is not refused for who asks whom any more.
+  static absl::Status Insist(const std::function<absl::Status()>& call) {
+    const absl::Time end = absl::Now() + kPatience;
+    while (true) {
+      absl::Status done = call();
+      const bool again =
+          absl::IsUnavailable(done) || absl::IsDeadlineExceeded(done) || absl::IsCancelled(done);
+      if (!again || absl::Now() >= end) return done;
+      absl::SleepFor(absl::Milliseconds(20));
+    }
+  }
+  // Sends a scan to one server after the other until one acknowledges it.
+  void PutSomewhere(std::uint64_t sequence, std::size_t first) {
+    std::size_t server = first;
+    STRATA_EXPECT_OK(Insist([&] {
+      const auto ack = Put(*servers_[server++ % 2]->db(), kMap, sequence);
+      if (ack.ok()) Note(sequence, ack->commit_sequence);
+      return ack.status();
+    }));
+  }
+  void Note(std::uint64_t sequence, std::uint64_t number) {
+    absl::MutexLock lock(&mutex_);
+    numbers_[sequence] = number;
+  }
+  std::size_t acknowledged() {
+    absl::MutexLock lock(&mutex_);
+    return numbers_.size();
+  }
+  // All that was acknowledged is there once, joined, and as if one server had taken it in.
+  void CheckAll(int server);
+
+  std::string store_;
+  std::vector<std::unique_ptr<SharingServer>> servers_;
+  std::vector<std::shared_ptr<api::Database>> held_;
+  absl::Mutex mutex_;
+  std::map<std::uint64_t, std::uint64_t> numbers_;  // of acknowledged scans
+};
+
+absl::StatusOr<MapStats> AtRest(api::Database& db, const char* map) {
+  while (true) {
+    STRATA_ASSIGN_OR_RETURN(MapStats stats, db.maps().Stats({}, map));
+    if (stats.scans_pending == 0) return stats;
+    absl::SleepFor(absl::Milliseconds(20));
+  }
+}
+
+absl::Status Verify(api::Database& db, const char* map) {
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job, db.jobs().Start({}, map, "verify", {}));
+  JobInfo last;
+  STRATA_RETURN_IF_ERROR(db.jobs().Watch({}, map, job.id, [&last](const JobInfo& now) {
+    last = now;
+    return absl::OkStatus();
+  }));
+  if (last.state == JobState::kSucceeded) return absl::OkStatus();
+  return absl::InternalError(absl::StrCat("verify: ", last.message));
+}
+
+void TwoServersTest::CheckAll(int server) {
+  api::Database& found = db(server);
+  MapStats stats;
+  STRATA_ASSERT_OK(Insist([&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(stats, AtRest(found, kMap));
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(stats.scans, numbers_.size());
+  for (const auto& [sequence, number] : numbers_) {
+    const auto info = found.scans().Get({}, kMap, {"run", sequence});
+    STRATA_ASSERT_OK(info);
+    EXPECT_EQ(info->commit_sequence, number) << sequence;
+    EXPECT_EQ(info->state, ScanState::kIntegrated) << sequence;
+  }
+  STRATA_EXPECT_OK(Insist([&] { return Verify(found, kMap); }));
+  STRATA_ASSERT_OK(found.maps().Create({}, "alone", MapParameters()));
+  for (const auto& [sequence, number] : numbers_) STRATA_ASSERT_OK(Put(found, "alone", sequence));
+  STRATA_ASSERT_OK_AND_ASSIGN(const MapStats alone, AtRest(found, "alone"));
+  EXPECT_EQ(stats.content_digest, alone.content_digest);
+}
+
+TEST_F(TwoServersTest, TheOneWithoutTheMapSaysWhoHasIt) {
+  STRATA_ASSERT_OK(Put(db(0), kMap, 1));
+  const absl::Status refused = Put(db(1), kMap, 2).status();
+  EXPECT_THAT(refused, StatusIs(absl::StatusCode::kUnavailable, HasSubstr("server a")));
+  EXPECT_EQ(MapOwnerOf(refused), "a");
+  EXPECT_TRUE(RetryDelayOf(refused).has_value());
+  EXPECT_EQ(MapOwnerOf(db(1).maps().Delete({}, kMap)), "a");
+  const auto names = db(1).maps().List({});
+  STRATA_ASSERT_OK(names);
+  ASSERT_EQ(names->size(), 1U);
+  EXPECT_EQ(names->front().name, kMap);
+  // Other maps are other matters, and what one server removes the other has no more.
+  STRATA_ASSERT_OK(db(1).maps().Create({}, "other", MapParameters()));
+  EXPECT_EQ(MapOwnerOf(Put(db(0), "other", 1).status()), "b");
+  STRATA_EXPECT_OK(db(1).maps().Delete({}, "other"));
+  STRATA_EXPECT_OK(Insist([&] {
+    const absl::Status gone = db(0).maps().Get({}, "other").status();
+    return absl::IsNotFound(gone) ? absl::OkStatus() : gone;
+  }));
+  // A server that ends gives its maps up at once.
+  servers_[0]->Signal(SIGTERM);
+  const absl::Time ended = absl::Now();
+  STRATA_EXPECT_OK(Insist([&] { return Put(db(1), kMap, 2).status(); }));
+  std::printf("taken over after %s\n", absl::FormatDuration(absl::Now() - ended).c_str());
+}
+
+// All that calls say of the map which the store itself can answer.
+struct Told {
+  std::string digest;
+  std::uint64_t scans = 0;
+  std::map<TileKey, std::pair<std::uint64_t, std::string>> tiles;  // version and bytes
+  std::vector<std::string> fetched;
+  std::vector<std::uint64_t> listed;  // numbers of scans
+  std::size_t points = 0;
+  std::size_t nodes = 0;
+  std::size_t epochs = 0;
+  std::size_t jobs = 0;
+  friend bool operator==(const Told&, const Told&) = default;
+};
+
+absl::StatusOr<Told> Ask(api::Database& db) {
+  Told told;
+  STRATA_ASSIGN_OR_RETURN(const MapStats stats, db.maps().Stats({}, kMap));
+  told.digest = stats.content_digest;
+  told.scans = stats.scans;
+  STRATA_RETURN_IF_ERROR(db.maps().Get({}, kMap).status());
+  STRATA_ASSIGN_OR_RETURN(const auto epochs, db.maps().History({}, kMap));
+  told.epochs = epochs.size();
+  STRATA_ASSIGN_OR_RETURN(const auto tiles, db.tiles().List({}, kMap, api::TileArea()));
+  for (const api::TileInfo& info : tiles) {
+    STRATA_ASSIGN_OR_RETURN(const api::EncodedTile tile, db.tiles().Get({}, kMap, info.key));
+    told.tiles[info.key] = {tile.version, tile.bytes};
+  }
+  const std::vector<api::HeldTile> held = {{TileKey{0, 999, 999}, 1}};  // which is gone
+  STRATA_RETURN_IF_ERROR(
+      db.tiles().Fetch({}, kMap, api::TileArea(), held, [&](const api::TileUpdate& update) {
+        told.fetched.push_back(absl::StrCat(static_cast<int>(update.kind),
+                                            update.tile.key.ToString(),
+                                            " ",
+                                            update.tile.version,
+                                            update.tile.bytes));
+        return absl::OkStatus();
+      }));
+  STRATA_RETURN_IF_ERROR(db.scans().List({}, kMap, {}, [&](const ScanInfo& info) {
+    told.listed.push_back(info.commit_sequence);
+    return absl::OkStatus();
+  }));
+  STRATA_RETURN_IF_ERROR(db.scans().GetPoints({}, kMap, {"run", 1}, [&](const PointCloud& piece) {
+    told.points += piece.size();
+    return absl::OkStatus();
+  }));
+  STRATA_ASSIGN_OR_RETURN(const auto graph, db.posegraph().Get({}, kMap));
+  told.nodes = graph.nodes.size();
+  STRATA_RETURN_IF_ERROR(db.posegraph().LookupPose({}, kMap, {"run", 1}).status());
+  STRATA_ASSIGN_OR_RETURN(const auto jobs, db.jobs().List({}, kMap));
+  told.jobs = jobs.size();
+  return told;
+}
+
+TEST_F(TwoServersTest, EveryServerAnswersReadsAlsoAfterTheOwnerDied) {
+  for (std::uint64_t sequence = 1; sequence <= 5; ++sequence) {
+    STRATA_ASSERT_OK(Put(db(0), kMap, sequence));
+  }
+  STRATA_ASSERT_OK(AtRest(db(0), kMap));
+  STRATA_ASSERT_OK(Verify(db(0), kMap));
+  STRATA_ASSERT_OK_AND_ASSIGN(const Told owner, Ask(db(0)));
+  EXPECT_EQ(owner.scans, 5U);
+  EXPECT_GT(owner.tiles.size(), 0U);
+  EXPECT_EQ(owner.fetched.size(), owner.tiles.size() + 1);
+  EXPECT_EQ(owner.points, kPoints);
+  STRATA_ASSERT_OK_AND_ASSIGN(const Told other, Ask(db(1)));
+  EXPECT_EQ(owner, other);
+  EXPECT_EQ(MapOwnerOf(db(1).jobs().Start({}, kMap, "verify", {}).status()), "a");
+  servers_[0]->Kill();
+  STRATA_ASSERT_OK_AND_ASSIGN(const Told alone, Ask(db(1)));
+  EXPECT_EQ(owner, alone);
+}
+
+// Whoever asks one server and then the other, in whatever order, never goes back.
+TEST_F(TwoServersTest, NobodySeesOlderTilesThanHeHasSeen) {
+  std::atomic<bool> stop = false;
+  std::thread robot([&] {
+    for (std::uint64_t sequence = 1; sequence <= 25; ++sequence) {
+      PutSomewhere(sequence, 0);
+      STRATA_EXPECT_OK(AtRest(*servers_[1]->db(), kMap));
+    }
+    stop = true;
+  });
+  std::atomic<int> changes = 0;
+  std::vector<std::thread> readers;
+  for (std::size_t reader = 0; reader < 2; ++reader) {
+    readers.emplace_back([&, reader] {
+      std::uint64_t seen = 0;
+      std::uint64_t scans = 0;
+      for (std::size_t i = reader; !stop; ++i) {
+        const auto tile = servers_[i % 2]->db()->tiles().Get({}, kMap, TileKey{0, 0, 0});
+        if (absl::IsNotFound(tile.status()) && seen == 0) continue;
+        STRATA_ASSERT_OK(tile);
+        ASSERT_GE(tile->version, seen) << "server " << i % 2;
+        if (tile->version > seen) ++changes;
+        seen = tile->version;
+        const auto stats = servers_[i % 2]->db()->maps().Stats({}, kMap);
+        STRATA_ASSERT_OK(stats);
+        ASSERT_GE(stats->scans - stats->scans_pending, scans);
+        scans = stats->scans - stats->scans_pending;
+      }
+    });
+  }
+  robot.join();
+  for (std::thread& reader : readers) reader.join();
+  std::printf("%d changes seen\n", changes.load());
+  EXPECT_GT(changes, 5);
+}
+
+TEST_F(TwoServersTest, AClientWithBothAddressesFindsTheServerThatHasTheMap) {
+  ClientOptions options;
+  options.target = absl::StrCat(servers_[0]->address(), ",", servers_[1]->address());
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::unique_ptr<api::Database> both, Connect(options));
+  STRATA_ASSERT_OK(both->maps().Create({}, "other", MapParameters()));
+  for (std::uint64_t sequence = 1; sequence <= 6; ++sequence) {
+    STRATA_ASSERT_OK(Put(*both, kMap, sequence));
+    STRATA_ASSERT_OK(Put(*both, "other", sequence));
+  }
+  STRATA_EXPECT_OK(Verify(*both, kMap));
+  servers_[0]->Kill();
+  for (std::uint64_t sequence = 7; sequence <= 9; ++sequence) {
+    STRATA_ASSERT_OK(Put(*both, kMap, sequence));
+    STRATA_ASSERT_OK(Put(*both, "other", sequence));
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const MapStats stats, AtRest(*both, kMap));
+  EXPECT_EQ(stats.scans, 9U);
+}
+
+TEST_F(TwoServersTest, WhenTheOwnerIsKilledTheOtherTakesOverAndNothingIsLost) {
+  constexpr std::uint64_t kRobots = 3;
+  constexpr std::size_t kKills = 2;
+  std::atomic<bool> stop = false;
+  std::vector<std::thread> robots;
+  for (std::uint64_t robot = 0; robot < kRobots; ++robot) {
+    robots.emplace_back([&, robot] {
+      for (std::uint64_t i = 0; !stop; ++i) PutSomewhere(1 + robot + kRobots * i, robot + i);
+    });
+  }
+  for (std::size_t kill = 0; kill < kKills; ++kill) {
+    const std::size_t before = acknowledged();
+    const absl::Time end = absl::Now() + kPatience;
+    while (acknowledged() < before + 10 && absl::Now() < end) absl::SleepFor(absl::Milliseconds(5));
+    EXPECT_GE(acknowledged(), before + 10) << "nobody took over";
+    servers_[kill % 2]->Kill();
+    absl::SleepFor(absl::Milliseconds(1500));
+    servers_[kill % 2]->Start();
+  }
+  stop = true;
+  for (std::thread& robot : robots) robot.join();
+  std::printf("%zu acknowledged\n", acknowledged());
+  CheckAll(static_cast<int>(kKills % 2));
+}
+
+TEST_F(TwoServersTest, AFrozenOwnerThatWakesUpWritesNothingMore) {
+  PutSomewhere(1, 0);
+  std::uint64_t sequence = 2;
+  for (int round = 0; round < 3; ++round) {
+    const int owner = round % 2;
+    const int other = 1 - owner;
+    // Uploads are on their way at the moment it freezes, and go on where it stopped.
+    std::vector<std::thread> robots;
+    for (int robot = 0; robot < 4; ++robot) {
+      const std::uint64_t mine = sequence++;
+      robots.emplace_back([&, mine] {
+        const auto ack = Put(*servers_[owner]->db(), kMap, mine);
+        if (ack.ok()) Note(mine, ack->commit_sequence);
+      });
+    }
+    absl::SleepFor(absl::Milliseconds(3));
+    servers_[owner]->Signal(SIGSTOP);
+    PutSomewhere(sequence++, static_cast<std::size_t>(other));
+    STRATA_EXPECT_OK(Put(db(other), kMap, sequence).status());
+    Note(sequence, Put(db(other), kMap, sequence)->commit_sequence);
+    ++sequence;
+    servers_[owner]->Signal(SIGCONT);
+    for (std::thread& robot : robots) robot.join();
+    // Awake, it does not answer from what it remembers.
+    const std::size_t known = acknowledged();
+    STRATA_EXPECT_OK(Insist([&]() -> absl::Status {
+      STRATA_ASSIGN_OR_RETURN(const MapStats stats, db(owner).maps().Stats({}, kMap));
+      EXPECT_GE(stats.scans, known);
+      return absl::OkStatus();
+    }));
+  }
+  // Whatever was not acknowledged then is sent again.
+  for (std::uint64_t again = 1; again < sequence; ++again) PutSomewhere(again, 0);
+  EXPECT_EQ(acknowledged(), sequence - 1);
+  CheckAll(1);
+}
+
+}  // namespace
+}  // namespace strata::testing
