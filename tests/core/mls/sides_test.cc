@@ -1,11 +1,13 @@
 #include "core/mls/sides.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <random>
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -116,6 +118,25 @@ TEST(SidesTest, FewPointsAsHighAsACeilingAreDoubtfulAndCountAsUndersides) {
   const Counts counts = CountSides(Marked(sparse, {0.0, 0.0, 1.0}));
   EXPECT_EQ(counts.unknown, 20);
   EXPECT_GT(counts.below, static_cast<int>(ceiling) * 9 / 10);
+}
+
+// A robot on a ramp looks up to what lies below its own horizon.
+TEST(SidesTest, AScanTakenOnARampKnowsACeilingByTheVertical) {
+  const Eigen::Matrix3d R_scan_map(Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()));
+  const auto undersides = [&](double ceiling_m, const Eigen::Vector3d& up) {
+    PointCloud room;
+    AddSquare([&](double, double) { return ceiling_m; }, 0.1, room);
+    for (Eigen::Vector3f& p : room.points) p = R_scan_map.cast<float>() * p;
+    const MlsMap map = BuildMlsMap(room, Pose::Identity(), {}, {}).value().map;
+    const Eigen::Vector3d p_sensor = R_scan_map * Eigen::Vector3d(-2.5, 0.3, 2.0);
+    const std::vector<Side> sides = SidesOf(map, p_sensor, 100.0, up);
+    const auto count = std::count(sides.begin(), sides.end(), Side::kUnderside);
+    return static_cast<double>(count) / static_cast<double>(sides.size());
+  };
+  const Eigen::Vector3d up = R_scan_map * Eigen::Vector3d::UnitZ();
+  EXPECT_GT(undersides(2.5, up), 0.95);
+  EXPECT_LT(undersides(2.5, Eigen::Vector3d::UnitZ()), 0.6);  // so it can tell
+  EXPECT_EQ(undersides(0.0, up), 0.0);                        // a floor
 }
 
 // A deck of 0.2 m, seen from below by one scan and from above by the other.
