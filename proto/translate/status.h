@@ -38,8 +38,8 @@ std::optional<v1::ErrorDetail> DetailOf(const absl::Status& status);
 // the status' RetryDelayOf(); without one 200 when the code is RESOURCE_EXHAUSTED or UNAVAILABLE
 // and it is not the request itself that is wrong. One with MapOwnerOf() has kOtherServerReason.
 grpc::Status ToGrpcStatus(const absl::Status& status, absl::string_view request_id);
-// The reverse, with delay and owner; a status whose details are not ours has none. UNAVAILABLE, which may
-// be tried again, for a stream that a server short of memory has dropped.
+// The reverse, with delay and owner; a status whose details are not ours has none. UNAVAILABLE,
+// which may be tried again, for a stream that a server short of memory has dropped.
 absl::Status FromGrpcStatus(const grpc::Status& status);
 
 // The same for one scan of an Ingest stream.

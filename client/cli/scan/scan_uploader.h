@@ -49,7 +49,8 @@ struct UploadProgress {
 // One result a source, in the same order. Scans are read and sent by `workers` threads but finished
 // one after the other, so that their commit order, and with it what alignment makes of them, is
 // that of the sources. A busy or unreachable server is tried again for kPatience without progress;
-// after that, or where the caller has no right to upload, the rest fails at once. `report` is called some ten times a second on this thread.
+// after that, or where the caller has no right to upload, the rest fails at once. `report` is
+// called some ten times a second on this thread.
 std::vector<UploadResult> UploadScans(api::Database& database,
                                       const api::Call& call,
                                       const std::string& map,

@@ -347,8 +347,9 @@ int Main() {
         "posegraphs\n");
     return 77;
   }
-  const Drawing drawing = ReadDrawing(std::filesystem::path(testing::SourcePath("tests/experiments")) /
-                                      "classification/fr079_places.txt");
+  const Drawing drawing =
+      ReadDrawing(std::filesystem::path(testing::SourcePath("tests/experiments")) /
+                  "classification/fr079_places.txt");
   const std::vector<std::vector<double>> ranges =
       ReadRanges(Unzipped(*recording / "fr079.clf.bz2"));
   const std::vector<PlanarPose> poses = ReadPoses(*graphs / "reference/FR079_P_toro.graph.opt.txt");
