@@ -138,14 +138,18 @@ endfunction()
 # strata_test(NAME SOURCES... DEPS... [LABELS...] [TIMEOUT seconds])
 #
 # A GoogleTest program; every TEST becomes a ctest test with the labels (default: unit). The labels asan, bytes and
-# tsan also make it part of what tests/run_sanitizers.sh builds and runs.
+# tsan also make it part of what tests/run_sanitizers.sh builds and runs. PROCESSORS: of those that ctest has, as many as a
+# test takes that goes by the clock.
 function(strata_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "" "PROCESSORS;TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
   if(NOT ARG_LABELS)
     set(ARG_LABELS unit)
   endif()
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
+  endif()
+  if(NOT ARG_PROCESSORS)
+    set(ARG_PROCESSORS 1)
   endif()
   if(STRATA_SANITIZER)
     math(EXPR ARG_TIMEOUT "${ARG_TIMEOUT} * 4")
@@ -165,6 +169,7 @@ function(strata_test name)
   gtest_discover_tests(
     ${name}
     DISCOVERY_TIMEOUT 60
-    PROPERTIES LABELS "${labels}" TIMEOUT ${ARG_TIMEOUT} COST ${ARG_TIMEOUT} # what may take long begins first
+    PROPERTIES LABELS "${labels}" TIMEOUT ${ARG_TIMEOUT} PROCESSORS ${ARG_PROCESSORS}
+               COST ${ARG_TIMEOUT} # what may take long begins first
   )
 endfunction()

@@ -9,6 +9,7 @@
 #include <map>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -288,7 +289,13 @@ TEST_F(Ros2TrackingTest, WhereTheServerIsAwayMapToOdomStaysAndGoesOnWithIt) {
     if (sent == away) {
       server().Signal(SIGKILL);
       server().Wait();
-      absl::SleepFor(absl::Milliseconds(300));
+      // What was on its way comes; on a busy machine late.
+      Pose T_before = Pose::Identity();
+      ASSERT_TRUE(WaitFor([&] {
+        const Pose T_last = std::exchange(T_before, heard.Last(heard.transforms).pose);
+        absl::SleepFor(absl::Milliseconds(500));
+        return heard.Last(heard.transforms).pose.isApprox(T_last, 1e-12);
+      }));
       first_away = heard.Count(heard.transforms);
     }
     if (sent == back) {
