@@ -40,12 +40,14 @@ bool OppositeSides(const Eigen::Vector3d& p,
 // height goes with the distance of the sensor: held against each other such strips lift whatever is
 // in front of a robot, and a chain of scans bends upwards. So features more than 3° above the
 // sensor that look level, and are no undersides, only count as overlap. Below the horizon they
-// are ground, too, and all that holds a scan of a floor with little on it.
+// are ground, too, and all that holds a scan of a floor with little on it. On a ramp that is both
+// the robot's own horizon and that of the vertical: what lies between them, the ramp ahead and the
+// floor behind, is seen as flat as strips are.
 bool MayBeStripOnAWall(const SampledFeature& feature, const ScanFeatures& scan) {
   constexpr double kSine = 0.05;
   const Eigen::Vector3d to_point = feature.element.point.cast<double>() - scan.sensor_origin();
-  return feature.feature_class != FeatureClass::kNonTraversable &&
-         to_point.dot(scan.up()) > kSine * to_point.norm();
+  const double above = std::max(to_point.z(), to_point.dot(scan.up()));
+  return feature.feature_class != FeatureClass::kNonTraversable && above > kSine * to_point.norm();
 }
 
 bool IsLevel(const Eigen::Vector3d& normal) {

@@ -13,6 +13,7 @@ ScanFeatureOptions FeatureOptionsOf(const ScanRecord& scan) {
   ScanFeatureOptions options;
   options.sample_count = kSamples;
   options.sensor_origin = scan.header.sensor_origin.cast<double>();
+  options.up = scan.header.T_map_scan.linear().transpose() * Eigen::Vector3d::UnitZ();
   return options;
 }
 
