@@ -56,6 +56,7 @@ absl::Status PutScan(StorageWriter& writer,
 void Drive(StorageWriter& writer,
            std::uint64_t robot,
            const std::atomic<bool>& stop,
+           std::atomic<std::uint64_t>& acknowledged,
            Ledger& ledger) {
   const std::string bytes(20'000, static_cast<char>('a' + robot));
   for (std::uint64_t sequence = 1; !stop; ++sequence) {
@@ -64,10 +65,20 @@ void Drive(StorageWriter& writer,
     if (put.ok()) {
       ledger.acknowledged.push_back(sequence);
       ledger.numbers.push_back(number);
+      ++acknowledged;
       continue;
     }
     EXPECT_THAT(put, StatusIs(absl::StatusCode::kUnavailable, ::testing::_));
     if (IsOutcomeUnknown(put)) ++ledger.unknown;
+    absl::SleepFor(absl::Milliseconds(5));
+  }
+}
+
+// However slow the disk is.
+void AwaitMore(const std::atomic<std::uint64_t>& acknowledged, std::uint64_t more) {
+  const std::uint64_t enough = acknowledged + more;
+  for (const absl::Time end = absl::Now() + absl::Seconds(30); absl::Now() < end;) {
+    if (acknowledged >= enough) return;
     absl::SleepFor(absl::Milliseconds(5));
   }
 }
@@ -123,19 +134,22 @@ TEST_P(PostgresCrashTest, NothingAcknowledgedIsLostWhenTheServerDies) {
     storages.push_back(std::move(storage));
   }
   std::atomic<bool> stop = false;
+  std::atomic<std::uint64_t> acknowledged = 0;
   std::vector<Ledger> ledgers(kRobots);
   std::vector<std::thread> robots;
   for (std::uint64_t robot = 0; robot < kRobots; ++robot) {
-    robots.emplace_back(
-        [&, robot] { Drive(storages[robot]->writer(), robot, stop, ledgers[robot]); });
+    robots.emplace_back([&, robot] {
+      Drive(storages[robot]->writer(), robot, stop, acknowledged, ledgers[robot]);
+    });
   }
   absl::Status restarted;
   for (int crash = 0; crash < kCrashes && restarted.ok(); ++crash) {
+    AwaitMore(acknowledged, 8);
     absl::SleepFor(absl::Milliseconds(pause_ms(random)));
     cluster.Crash();
     restarted = cluster.Restart();
   }
-  absl::SleepFor(absl::Milliseconds(300));
+  AwaitMore(acknowledged, 8);
   stop = true;
   for (std::thread& robot : robots) robot.join();
   STRATA_ASSERT_OK(restarted);
