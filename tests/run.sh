@@ -13,20 +13,23 @@ byte_fuzzers="bag_file_fuzzer message_fuzzer mls_tile_fuzzer scan_file_fuzzer su
 
 stage() { printf '\n== %s (%s s)\n' "$1" "$SECONDS"; }
 
-# What clang compiles. The stages behind the release build leave processors idle while they wait for packages, disks and
-# clocks: it takes only what they leave.
-begin_clang() {
+# A bare machine, and what clang compiles. Tests leave processors idle while they wait for disks and clocks: clang takes only
+# what they leave.
+begin_beside() {
   set -m # a group of processes, that ends as a whole
-  CMAKE_BUILD_PARALLEL_LEVEL=$(nproc) nice -n 19 tests/build_clang.sh $byte_fuzzers >build/clang.log 2>&1 &
-  clang=$!
+  {
+    nice -n 5 tests/bare/run.sh
+    CMAKE_BUILD_PARALLEL_LEVEL=$(nproc) nice -n 19 tests/build_clang.sh $byte_fuzzers
+  } >build/beside.log 2>&1 &
+  beside=$!
   set +m
-  trap 'kill -- -$clang 2>/dev/null || true' EXIT
+  trap 'kill -- -$beside 2>/dev/null || true' EXIT
 }
-end_clang() {
+end_beside() {
   local status=0
-  wait "$clang" || status=$?
+  wait "$beside" || status=$?
   trap - EXIT
-  cat build/clang.log
+  cat build/beside.log
   return "$status"
 }
 
@@ -47,10 +50,7 @@ stage "release build"
 cmake --preset release -DSTRATA_BUILD_TESTS=ON -DSTRATA_BUILD_BENCHMARKS=ON >/dev/null
 cmake --build --preset release
 
-begin_clang
-
-stage "a bare machine"
-tests/bare/run.sh
+begin_beside
 
 stage "tests"
 ctest --preset release -LE browser
@@ -66,8 +66,8 @@ stage "README and pages"
 stage "recorded data through a real server"
 /usr/bin/python3 tests/experiments/real_data.py --build build/release || [[ $? == 77 ]]
 
-stage "clang: sanitized builds, fuzzers"
-end_clang
+stage "beside the tests: a bare machine; clang: sanitized builds, fuzzers"
+end_beside
 
 stage "sanitizers"
 tests/run_sanitizers.sh bytes
