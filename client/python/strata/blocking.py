@@ -12,7 +12,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import grpc
 
 from strata import errors
-from strata.connection import CHANNEL_OPTIONS, Connection, Options, Pipe
+from strata.connection import Connection, Options, Pipe
 from strata.methods import A, Q, StreamStream, StreamUnary, UnaryStream, UnaryUnary
 
 P = ParamSpec("P")
@@ -105,8 +105,9 @@ class BlockingConnection(Connection):
 
     def __init__(self, options: Options) -> None:
         credentials = options.credentials()
-        super().__init__(options, grpc.secure_channel(options.target, credentials, CHANNEL_OPTIONS) if credentials
-                         else grpc.insecure_channel(options.target, CHANNEL_OPTIONS))
+        address, arguments = options.address(), options.channel_options()
+        super().__init__(options, grpc.secure_channel(address, credentials, arguments) if credentials
+                         else grpc.insecure_channel(address, arguments))
         self._closed = threading.Event()
         try:
             grpc.channel_ready_future(self.channel).result(timeout=options.connect_timeout)
@@ -124,7 +125,7 @@ class BlockingConnection(Connection):
         except grpc.RpcError as error:
             raise errors.from_rpc(error) from None
 
-    async def once(self, method: UnaryUnary[Q, A], request: Q) -> A:
+    async def attempt(self, method: UnaryUnary[Q, A], request: Q) -> A:
         return typing.cast(A, self._answer(method, request))
 
     async def send(self, method: StreamUnary[Q, A], requests: Iterable[Q]) -> A:

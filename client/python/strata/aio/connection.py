@@ -8,7 +8,7 @@ import grpc
 import grpc.aio
 
 from strata import errors
-from strata.connection import CHANNEL_OPTIONS, Connection, Options, Pipe
+from strata.connection import Connection, Options, Pipe
 from strata.methods import A, Q, StreamStream, StreamUnary, UnaryStream, UnaryUnary
 
 T = TypeVar("T")
@@ -36,10 +36,10 @@ class _QueuedRequests(Pipe[Q]):
 class AsyncioConnection(Connection):
     """Calls of the tasks of one event loop."""
 
-    def __init__(self, options: Options) -> None:
-        credentials = options.credentials()
-        super().__init__(options, grpc.aio.secure_channel(options.target, credentials, CHANNEL_OPTIONS) if credentials
-                         else grpc.aio.insecure_channel(options.target, CHANNEL_OPTIONS))
+    def __init__(self, options: Options, address: str) -> None:
+        credentials, arguments = options.credentials(), options.channel_options()
+        super().__init__(options, grpc.aio.secure_channel(address, credentials, arguments) if credentials
+                         else grpc.aio.insecure_channel(address, arguments))
         self._closed = asyncio.Event()
         self._calls: set[Any] = set()  # under way; gRPC 1.51 itself does not find all that it should end
 
@@ -75,7 +75,7 @@ class AsyncioConnection(Connection):
         finally:
             self._calls.discard(call)
 
-    async def once(self, method: UnaryUnary[Q, A], request: Q) -> A:
+    async def attempt(self, method: UnaryUnary[Q, A], request: Q) -> A:
         return typing.cast(A, await self._answer(method, request))
 
     async def send(self, method: StreamUnary[Q, A], requests: Iterable[Q]) -> A:
