@@ -49,7 +49,7 @@ class PostgresStorage final : public MapStorage {
   PostgresStorage& operator=(const PostgresStorage&) = delete;
 
   absl::StatusOr<std::unique_ptr<StorageReader>> NewReader() override {
-    return std::make_unique<PostgresReader>(pool_, map_.number);
+    return std::make_unique<PostgresReader>(pool_, map_.number, map_.fenced ? lease_ : nullptr);
   }
   StorageWriter& writer() override { return writer_; }
   absl::Status CheckInPlace() const override {
