@@ -12,13 +12,14 @@ from typing import Any, Protocol, TypeVar
 
 import grpc
 
-from strata import errors
+from strata import errors, routes
 from strata.methods import A, Q, StreamStream, StreamUnary, UnaryStream, UnaryUnary
 
 T = TypeVar("T")
 
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.1, 5.0
 _NEXT_SERVER_S = 0.001
+CONNECTING_S, _AWAY_S = 2.0, 5.0  # a server that was named; its name may mean nothing here
 _CONNECT_TIMEOUT_S = 10.0
 _SYSTEM_ROOTS = "/etc/ssl/certs/ca-certificates.crt"
 _MAX_MESSAGE_BYTES = 64 << 20
@@ -52,6 +53,10 @@ class Backoff:
         self._elsewhere = 0  # servers in a row that had not the map
         self._pause = _FIRST_PAUSE_S
         self._until: float | None = None
+
+    def note_server_named(self) -> None:
+        """The next attempt goes to a server that the one before has named."""
+        self._servers = max(self._servers, 2)
 
     def next_pause(self, failure: errors.StrataError) -> float:
         """Seconds to wait if `failure` may be gone then; raises it otherwise."""
@@ -108,12 +113,21 @@ class Options:
         """The target as gRPC takes it: names of several servers are looked up, which takes its time."""
         return self.target if len(self.servers) == 1 else "ipv4:" + ",".join(map(_ipv4_of, self.servers))
 
-    def channel_options(self) -> list[tuple[str, Any]]:
-        if len(self.servers) == 1:
-            return CHANNEL_OPTIONS
-        first = self.servers[0].rpartition(":")[0]
-        name = [("grpc.ssl_target_name_override", first)] if self.ca not in (None, False) else []
-        return [*CHANNEL_OPTIONS, ("grpc.lb_policy_name", "round_robin"), *name]
+    def channel_options(self, named: bool = False) -> list[tuple[str, Any]]:
+        """`named`: of a server that one of the target has named. With TLS all show a certificate for the first."""
+        options = [*CHANNEL_OPTIONS]
+        if len(self.servers) > 1:
+            options.append(("grpc.lb_policy_name", "round_robin"))
+        if (named or len(self.servers) > 1) and self.ca not in (None, False):
+            options.append(("grpc.ssl_target_name_override", self.servers[0].rpartition(":")[0]))
+        return options
+
+    def may_go_to(self, owner: str) -> bool:
+        """Whether a server that was named is asked: several servers are asked in their turn, a name may be no address, and
+        a token goes in plain text to nobody who was not given it."""
+        host, _, port = owner.rpartition(":")
+        secret = self.token is not None and self.ca in (None, False) and host not in ("localhost", "127.0.0.1", "[::1]")
+        return len(self.servers) == 1 and bool(host) and port.isdigit() and 0 < int(port) < 65536 and not secret
 
     def credentials(self) -> Any:
         """Of a TLS channel; None: no TLS."""
@@ -158,7 +172,41 @@ class Connection(abc.ABC):
     def __init__(self, options: Options, channel: Any) -> None:
         self.options = options
         self.channel = channel
+        self.stubs = routes.RoutedChannel(channel)
+        """What stubs are made with."""
+        self._owners: dict[str, Any] = {}  # channels to servers that were named
+        self._answered: set[str] = set()  # those that have taken a connection
+        self._away: dict[str, float] = {}  # until when those that did not answer are left alone
+        self._owner: str | None = None  # to whom calls go; None: to the connection's own
         self.metadata = (("authorization", f"Bearer {options.token}"),) if options.token else ()
+
+    @abc.abstractmethod
+    def _channel_to(self, address: str) -> Any:
+        """A channel to one more server."""
+
+    def here(self, method: Any) -> Any:
+        """gRPC's callable of a stub's method, where calls go now."""
+        return method.on(self._owners.get(self._owner) if self._owner else None)
+
+    @abc.abstractmethod
+    async def _connects(self, channel: Any) -> bool:
+        """Whether somebody answers on a channel within CONNECTING_S."""
+
+    async def _follow(self, failure: errors.StrataError, backoff: Backoff) -> None:
+        """To the server that has the map, if `failure` names it, and back from one that is away."""
+        if self._owner is not None and failure.owner is None:
+            self._away[self._owner] = time.monotonic() + _AWAY_S
+        owner, self._owner = failure.owner, None
+        if owner is None or not self.options.may_go_to(owner) or time.monotonic() < self._away.get(owner, 0):
+            return
+        if owner not in self._owners:
+            self._owners[owner] = self._channel_to(owner)
+        if owner not in self._answered and not await self._connects(self._owners[owner]):
+            self._away[owner] = time.monotonic() + _AWAY_S
+            return
+        self._answered.add(owner)
+        self._owner = owner
+        backoff.note_server_named()
 
     @abc.abstractmethod
     async def attempt(self, method: UnaryUnary[Q, A], request: Q) -> A:
@@ -193,6 +241,7 @@ class Connection(abc.ABC):
 
     async def wait(self, backoff: Backoff, failure: errors.StrataError) -> None:
         """Sleeps until the next attempt; raises `failure` if there should be none."""
+        await self._follow(failure, backoff)
         if await self.sleep(backoff.next_pause(failure)):
             raise failure
 

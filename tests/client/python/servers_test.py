@@ -74,8 +74,36 @@ class OwnerTest(unittest.TestCase):
         self.assertGreater(self.a.asked, 0)
         self.assertEqual(self.b.deleted, 6)
 
+    def test_who_knows_one_server_is_sent_to_the_one_that_has_the_map(self):
+        one, other = self.addresses.split(",")
+        self.a.owner = other
+        with strata.connect(one, patience=5) as db:
+            for _ in range(3):
+                self.assertEqual(db.maps(), ["b"])
+                db.delete_map("any")
+            self.assertEqual((self.a.asked, self.b.deleted), (1, 3))
+            self.b.owner, self.a.owner = one, "a"  # it has moved
+            self.assertEqual(db.maps(), ["a"])
+
+    def test_one_that_is_named_and_away_holds_up_nobody(self):
+        self.a.owner = "127.0.0.1:1"
+        with strata.connect(self.addresses.split(",")[0], patience=20) as db:
+            with concurrent.futures.ThreadPoolExecutor() as pool:
+                asking = pool.submit(db.maps)
+                while self.a.asked < 2:
+                    time.sleep(0.01)
+                self.a.owner = "a"
+                self.assertEqual(asking.result(), ["a"])
+
+    def test_a_token_is_not_carried_in_plain_text_to_whoever_is_named(self):
+        self.a.owner = "192.0.2.1:50051"  # an address of nobody
+        with strata.connect(self.addresses.split(",")[0], token="secret", patience=0.5) as db:
+            with self.assertRaises(strata.Unavailable) as caught:
+                db.maps()
+        self.assertEqual(caught.exception.owner, self.a.owner)
+
     def test_one_that_nobody_has_is_told_of(self):
-        self.b.owner = "c"
+        self.a.owner = self.b.owner = "c"
         with strata.connect(self.addresses, patience=0) as db:
             with self.assertRaises(strata.Unavailable) as caught:
                 db.delete_map("any")
@@ -98,6 +126,16 @@ class AioOwnerTest(unittest.IsolatedAsyncioTestCase):
                     await db.delete_map("any")
         self.assertGreater(a.asked, 0)
         self.assertEqual(b.deleted, 6)
+
+
+    async def test_who_knows_one_server_is_sent_to_the_one_that_has_the_map(self):
+        a, b = OwningMaps("a", "b"), OwningMaps("b", "b")
+        with serving(a) as one, serving(b) as other:
+            a.owner = other
+            async with await aio.connect(one) as db:
+                self.assertEqual(await db.maps(), ["b"])
+                await db.delete_map("any")
+        self.assertEqual((a.asked, b.deleted), (1, 1))
 
 
 class TwoServersTest(unittest.TestCase):

@@ -29,7 +29,7 @@ class Database:
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
-        self._stub = maps_pb2_grpc.MapsStub(connection.channel)
+        self._stub = maps_pb2_grpc.MapsStub(connection.stubs)
 
     async def __aenter__(self) -> "Database":
         return self
