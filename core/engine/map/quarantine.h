@@ -25,7 +25,7 @@ namespace strata {
 inline constexpr std::uint32_t kMostDeaths = 2;
 // The same where others may have the map: whoever takes it over from one that does not answer can
 // not tell whether that one has died, of what, or is frozen, cut off or being moved.
-inline constexpr std::uint32_t kMostDeathsOfMany = 5;
+inline constexpr std::uint32_t kMostDeathsOfMany = 10;
 
 // Messages of scans and jobs in quarantine begin so.
 inline constexpr absl::string_view kQuarantined = "quarantined: ";

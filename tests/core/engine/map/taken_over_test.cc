@@ -19,7 +19,7 @@ namespace {
 
 using ::testing::StartsWith;
 
-constexpr std::uint64_t kDeathsToHold = 5;
+constexpr std::uint64_t kDeathsToHold = 10;
 
 class TakenOverTest : public ::testing::Test {
  protected:
@@ -81,7 +81,7 @@ TEST_F(TakenOverTest, ButIfTooManyDiedOfIt) {
   LetLeaseOfAnotherLapse();
   const ScanInfo found = TakeOver();
   EXPECT_EQ(found.state, ScanState::kFailed);
-  EXPECT_THAT(found.message, StartsWith("quarantined: the server died 5 times"));
+  EXPECT_THAT(found.message, StartsWith("quarantined: the server died 10 times"));
 }
 
 TEST_F(TakenOverTest, WhoeverGaveTheMapUpHasNotDied) {
