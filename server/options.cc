@@ -291,10 +291,12 @@ void AddMapLimits(CLI::App& app, Written& o) {
 
 void AddSharing(CLI::App& app, Written& o) {
   constexpr char kGroup[] = "Several servers on one --store";
-  app.add_option("--server-name",
-                 o.engine.server_name,
-                 "What other servers call this one to people; by default the machine's name and "
-                 "the port of --listen")
+  app.add_option(
+         "--server-name",
+         o.engine.server_name,
+         "What other servers call this one; where it is HOST:PORT, clients that know one of "
+         "them only go there for the maps that this one has. By default the machine's name "
+         "and the port of --listen")
       ->type_name("NAME")
       ->group(kGroup);
   Add(app,
@@ -306,12 +308,13 @@ void AddSharing(CLI::App& app, Written& o) {
       Between(1, 3600, "s"));
 }
 
-// Names that tell servers apart.
+// Names that tell servers apart, and are no addresses: whether clients reach the machine by its
+// name is not known here.
 std::string DefaultServerName(const std::string& listen) {
   std::array<char, 256> host{};
   if (gethostname(host.data(), host.size() - 1) != 0) host.front() = 0;
   const absl::StatusOr<HostPort> address = ParseHostPort(listen);
-  if (address.ok() && address->port != 0) return absl::StrCat(host.data(), ":", address->port);
+  if (address.ok() && address->port != 0) return absl::StrCat(host.data(), "/", address->port);
   return absl::StrCat(host.data(), " process ", getpid());
 }
 

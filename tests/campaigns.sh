@@ -17,6 +17,9 @@ kills|35|an acknowledged scan, deletion or label that is lost or there twice aft
 aligned_kills|10|the same where scans are aligned|$experiments/kill_campaign --seed $seed --align kills --server-kills 30 --robot-kills 20
 terms|~5|the same after SIGTERM|$experiments/kill_campaign --seed $seed terms
 clocks|~2|the same where the wall clock is set back and forward|$experiments/kill_campaign --seed $seed clock
+cluster|~6|the same where servers of one database are killed and frozen, and it crashes|$experiments/kill_campaign --seed $seed --robots 2 --period-ms 150 --columns 320 cluster
+cluster_work|~8|the same with jobs, deletions, labels and backups|$experiments/kill_campaign --seed $seed --robots 2 --period-ms 150 --columns 320 cluster --work
+cluster_unfenced|~4|a campaign that does not notice servers that write maps of others|$experiments/kill_campaign --seed $seed --robots 4 --period-ms 60 --columns 160 cluster --faults 30 --no-fence
 disks|90|a broken promise on a disk that fails, fills up or loses power|env TMPDIR=/dev/shm $experiments/disk_campaign --every 40 --seed $seed
 flips|~10|a flipped bit of a map's file that nobody notices|env TMPDIR=/dev/shm $experiments/disk_campaign --flips 60 --seed $seed
 watchers|~20|a change that a watcher is not told of|env STRATA_RUNS=1000 $build/tests/core/engine/engine_watch_model_test

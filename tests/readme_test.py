@@ -23,6 +23,10 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tests/support"))
+
+from postgres_database import Database  # noqa: E402, from the folder above
+
 TOUR = ["docs/quickstart.md", "docs/concepts.md", "docs/profiles.md", "docs/howto/georeference.md", "docs/howto/floorplan.md",
         "docs/howto/label.md", "docs/howto/fleet.md", "docs/errors.md"]
 
@@ -43,32 +47,6 @@ def console_lines(text):
 def matches(expected, printed):
     pattern = ".*".join(re.escape(piece) for piece in expected.rstrip().split("…"))
     return re.fullmatch(pattern, printed.rstrip()) is not None
-
-
-class Database:
-    """An empty database in a folder, on a unix socket there; None as its address where PostgreSQL 15 is not installed."""
-
-    PROGRAMS = pathlib.Path("/usr/lib/postgresql/15/bin")
-
-    def __enter__(self):
-        self.address = None
-        self.folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
-        if not (self.PROGRAMS / "initdb").exists():
-            return self
-        self.user = {"user": "postgres", "group": "postgres", "extra_groups": []} if os.geteuid() == 0 else {}
-        os.chmod(self.folder.name, 0o777)
-        self.run("initdb", "-D", "db", "-E", "UTF8", "-A", "trust", "-U", "strata")
-        self.run("pg_ctl", "-D", "db", "-w", "-l", "log", "-o", f"-k {self.folder.name} -c listen_addresses=''", "start")
-        self.address = f"postgresql://strata@/postgres?host={self.folder.name}"
-        return self
-
-    def run(self, program, *arguments):
-        subprocess.run([self.PROGRAMS / program, *arguments], cwd=self.folder.name, check=True, stdout=subprocess.DEVNULL, **self.user)
-
-    def __exit__(self, *_):
-        if self.address:
-            self.run("pg_ctl", "-D", "db", "-m", "immediate", "stop")
-        self.folder.cleanup()
 
 
 def page_with_database_holds(page, environment):

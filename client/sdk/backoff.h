@@ -2,6 +2,7 @@
 #ifndef STRATA_CLIENT_SDK_BACKOFF_H_
 #define STRATA_CLIENT_SDK_BACKOFF_H_
 
+#include <algorithm>
 #include <functional>
 #include <optional>
 
@@ -25,6 +26,10 @@ class Backoff {
   // be repeated: another error, or no attempts left. CANCELLED is: callers know whether they
   // cancelled.
   std::optional<absl::Duration> NextPause(const absl::Status& status);
+
+  // The next attempt goes to a server that the one before has named: that there are several is
+  // known now.
+  void NoteServerNamed() { servers_ = std::max(servers_, 2); }
 
   // Sleeps the next pause. False if there is none, or `stop` comes first.
   bool Wait(const absl::Status& status, const Stop& stop);

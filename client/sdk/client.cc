@@ -41,6 +41,8 @@ namespace {
 constexpr int kMaxReceiveBytes = 64 << 20;
 // A server that comes back is found again within a second.
 constexpr int kMaxReconnectMs = 1000;
+constexpr absl::Duration kShortestKeepalive = absl::Seconds(10);
+constexpr absl::Duration kLongestKeepalive = absl::Hours(1);
 
 std::vector<std::string> ServersOf(const std::string& target) {
   return absl::StrSplit(target, ',');
@@ -112,6 +114,10 @@ grpc::ChannelArguments ArgumentsOf(const ClientOptions& options) {
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kMaxReconnectMs / 10);
   // Backoff repeats calls; beside it, gRPC 1.51's own way lost some made while a server ended.
   arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
+  const auto keepalive_ms = static_cast<int>(absl::ToInt64Milliseconds(options.keepalive));
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, keepalive_ms);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, keepalive_ms / 2);
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // as many as a long call takes
   arguments.SetUserAgentPrefix("strata");
   const std::vector<std::string> servers = ServersOf(options.target);
   std::string server_name = options.tls.server_name;
@@ -124,11 +130,25 @@ grpc::ChannelArguments ArgumentsOf(const ClientOptions& options) {
   return arguments;
 }
 
+// Of a server that one of `options.target` has named: it shows a certificate as that one does.
+grpc::ChannelArguments ArgumentsOfNamed(const ClientOptions& options) {
+  ClientOptions named = options;
+  const absl::StatusOr<HostPort> first = ParseHostPort(options.target);
+  if (named.tls.enabled() && named.tls.server_name.empty() && first.ok()) {
+    named.tls.server_name = first->host;
+  }
+  return ArgumentsOf(named);
+}
+
 class RemoteDatabase final : public api::Database {
  public:
-  RemoteDatabase(std::shared_ptr<grpc::Channel> channel, const ClientOptions& options)
-      : connection_(
-            std::move(channel), options, static_cast<int>(ServersOf(options.target).size())) {}
+  RemoteDatabase(std::shared_ptr<grpc::Channel> channel,
+                 const ClientOptions& options,
+                 sdk::Connection::MakeChannel make_channel)
+      : connection_(std::move(channel),
+                    options,
+                    static_cast<int>(ServersOf(options.target).size()),
+                    std::move(make_channel)) {}
 
   api::Maps& maps() override { return maps_; }
   api::Scans& scans() override { return scans_; }
@@ -169,6 +189,15 @@ absl::Status ClientOptions::Validate() const {
   }
   if (!(connect_timeout > absl::ZeroDuration())) {
     faults.emplace_back("connect_timeout is not positive");
+  }
+  if (keepalive < kShortestKeepalive || keepalive > kLongestKeepalive) {
+    faults.push_back(absl::StrCat("keepalive = ",
+                                  absl::FormatDuration(keepalive),
+                                  " is not in [",
+                                  absl::FormatDuration(kShortestKeepalive),
+                                  ", ",
+                                  absl::FormatDuration(kLongestKeepalive),
+                                  "]"));
   }
   if (backoff.max_attempts < 0 || backoff.max_attempts > 100) {
     faults.push_back(
@@ -213,7 +242,10 @@ absl::StatusOr<std::unique_ptr<api::Database>> Connect(const ClientOptions& opti
                                 "for that name, and does it take ours?"
                               : "; is stratad running there, and without TLS?"));
   }
-  return std::make_unique<RemoteDatabase>(std::move(channel), options);
+  return std::make_unique<RemoteDatabase>(
+      std::move(channel), options, [credentials, options](const std::string& address) {
+        return grpc::CreateCustomChannel(address, credentials, ArgumentsOfNamed(options));
+      });
 }
 
 }  // namespace strata

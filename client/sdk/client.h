@@ -54,6 +54,10 @@ struct ClientOptions {
   std::string token;
   // Show the token in plain text to a server that is not on this machine.
   bool insecure = false;
+  // A server that says nothing for so long, while a call waits for it, is asked whether it is
+  // there, and without an answer within half of that the call ends as if it were gone: a machine
+  // that lost its power says nothing either. At least 10 s: servers send away who asks more often.
+  absl::Duration keepalive = absl::Seconds(20);
   // How long Connect() waits for the server; > 0.
   absl::Duration connect_timeout = absl::Seconds(10);
   // For calls that may be repeated, when the server was not there (UNAVAILABLE) or said that it was

@@ -23,6 +23,30 @@ Request Naming(absl::string_view map, absl::string_view name) {
   return in;
 }
 
+// One attempt.
+absl::StatusOr<ClassifierInfo> SendClassifier(Connection& connection,
+                                              v1::Classifiers::Stub& stub,
+                                              const api::Call& call,
+                                              absl::string_view map,
+                                              absl::string_view name,
+                                              absl::string_view bytes) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  AttemptContext context(connection, call);
+  v1::ImportClassifierResponse out;
+  const auto writer = stub.Import(context.get(), &out);
+  v1::ImportClassifierRequest message;
+  *message.mutable_start() = Naming<v1::ImportClassifierStart>(map, name);
+  bool goes_on = writer->Write(message);
+  for (std::size_t begin = 0; goes_on && begin < bytes.size(); begin += kPieceBytes) {
+    message.set_bytes(std::string(bytes.substr(begin, kPieceBytes)));
+    goes_on = writer->Write(message);
+  }
+  // The server refuses early by ending the stream; why is in its status.
+  if (goes_on) writer->WritesDone();
+  STRATA_RETURN_IF_ERROR(StatusOf(writer->Finish(), call));
+  return FromProto(out.classifier());
+}
+
 }  // namespace
 
 absl::StatusOr<ClassifierInfo> RemoteClassifiers::Get(const api::Call& call,
@@ -77,25 +101,20 @@ absl::Status RemoteClassifiers::Export(const api::Call& call,
                     [&sink](const v1::ExportClassifierResponse& out) { return sink(out.bytes()); });
 }
 
+// Again only where another server has the map: nothing has happened then.
 absl::StatusOr<ClassifierInfo> RemoteClassifiers::Import(const api::Call& call,
                                                          absl::string_view map,
                                                          absl::string_view name,
                                                          absl::string_view bytes) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  AttemptContext context(connection_, call);
-  v1::ImportClassifierResponse out;
-  const auto writer = stub_->Import(context.get(), &out);
-  v1::ImportClassifierRequest message;
-  *message.mutable_start() = Naming<v1::ImportClassifierStart>(map, name);
-  bool goes_on = writer->Write(message);
-  for (std::size_t begin = 0; goes_on && begin < bytes.size(); begin += kPieceBytes) {
-    message.set_bytes(std::string(bytes.substr(begin, kPieceBytes)));
-    goes_on = writer->Write(message);
+  Backoff backoff = connection_.NewBackoff();
+  Route<v1::Classifiers::Stub> route(connection_, *stub_);
+  while (true) {
+    const absl::StatusOr<ClassifierInfo> made =
+        SendClassifier(connection_, route.stub(), call, map, name, bytes);
+    if (!MapOwnerOf(made.status()).has_value()) return made;
+    route.Follow(made.status(), backoff);
+    if (!backoff.Wait(made.status(), call.stop)) return made;
   }
-  // The server refuses early by ending the stream; why is in its status.
-  if (goes_on) writer->WritesDone();
-  STRATA_RETURN_IF_ERROR(StatusOf(writer->Finish(), call));
-  return FromProto(out.classifier());
 }
 
 }  // namespace strata::sdk

@@ -125,6 +125,7 @@ absl::Status RemoteMaps::Watch(const api::Call& call,
     return options.once ? connection_.NewBackoff() : connection_.NewEndlessBackoff();
   };
   Backoff backoff = new_backoff();
+  Route<v1::Maps::Stub> route(connection_, *stub_);
   while (true) {
     STRATA_RETURN_IF_ERROR(call.stop.status());
     absl::Status taken;
@@ -138,10 +139,11 @@ absl::Status RemoteMaps::Watch(const api::Call& call,
     AttemptContext context(connection_, call);
     bool delivered = false;
     const std::unique_ptr<grpc::ClientReader<v1::WatchMapResponse>> reader =
-        stub_->Watch(context.get(), in);
+        route.stub().Watch(context.get(), in);
     const absl::Status ended = ReadStream(context, *reader, call, deliver, delivered);
     if (delivered) backoff = new_backoff();
     if (ended.ok() || !taken.ok()) return ended;
+    route.Follow(ended, backoff);
     if (!backoff.Wait(ended, call.stop)) return call.stop.requested() ? call.stop.status() : ended;
   }
 }

@@ -58,6 +58,7 @@ absl::Status RemotePlanning::WatchPath(const api::Call& call,
   const v1::WatchPathRequest in = translate::WatchToProto(map, query);
   std::optional<bool> told;
   Backoff backoff = connection_.NewEndlessBackoff();
+  Route<v1::Planning::Stub> route(connection_, *stub_);
   while (true) {
     STRATA_RETURN_IF_ERROR(call.stop.status());
     absl::Status taken;
@@ -71,10 +72,11 @@ absl::Status RemotePlanning::WatchPath(const api::Call& call,
     AttemptContext context(connection_, call);
     bool delivered = false;
     const std::unique_ptr<grpc::ClientReader<v1::WatchPathResponse>> reader =
-        stub_->WatchPath(context.get(), in);
+        route.stub().WatchPath(context.get(), in);
     const absl::Status ended = ReadStream(context, *reader, call, deliver, delivered);
     if (delivered) backoff = connection_.NewEndlessBackoff();
     if (ended.ok() || !taken.ok()) return ended;
+    route.Follow(ended, backoff);
     if (!backoff.Wait(ended, call.stop)) return call.stop.requested() ? call.stop.status() : ended;
   }
 }

@@ -159,10 +159,12 @@ absl::StatusOr<LocalizeResult> RemotePoseGraph::Localize(const api::Call& call,
                                                          const LocalizeQuery& query) {
   STRATA_RETURN_IF_ERROR(ValidateLocalizeQuery(query));
   Backoff backoff = connection_.NewBackoff();
+  Route<v1::PoseGraph::Stub> route(connection_, *stub_);
   while (true) {
     const absl::StatusOr<v1::LocalizeResponse> out =
-        SendQuery(connection_, *stub_, call, map, query);
+        SendQuery(connection_, route.stub(), call, map, query);
     if (out.ok()) return FromProto(*out);
+    route.Follow(out.status(), backoff);
     if (!backoff.Wait(out.status(), call.stop)) return out.status();
   }
 }
@@ -172,11 +174,13 @@ absl::StatusOr<std::unique_ptr<api::Tracking>> RemotePoseGraph::Track(const api:
                                                                       const TrackStart& start) {
   STRATA_RETURN_IF_ERROR(ValidateTrackStart(start));
   Backoff backoff = connection_.NewBackoff();
+  Route<v1::PoseGraph::Stub> route(connection_, *stub_);
   while (true) {
     STRATA_RETURN_IF_ERROR(call.stop.status());
-    auto tracking = std::make_unique<RemoteTracking>(connection_, *stub_, call);
+    auto tracking = std::make_unique<RemoteTracking>(connection_, route.stub(), call);
     const absl::Status opened = tracking->Open(map, start);
     if (opened.ok()) return tracking;
+    route.Follow(opened, backoff);
     if (!backoff.Wait(opened, call.stop)) return opened;
   }
 }

@@ -93,9 +93,12 @@ absl::StatusOr<ScanAck> RemoteScans::UploadLocalMap(const api::Call& call,
   start.set_gap_size_m(parameters.gap_size_m);
   start.set_thickness_m(parameters.thickness_m);
   Backoff backoff = connection_.NewBackoff();
+  Route<v1::Scans::Stub> route(connection_, *stub_);
   while (true) {
     STRATA_RETURN_IF_ERROR(call.stop.status());
-    const absl::StatusOr<ScanAck> ack = SendLocalMap(connection_, *stub_, call, request, local_map);
+    const absl::StatusOr<ScanAck> ack =
+        SendLocalMap(connection_, route.stub(), call, request, local_map);
+    route.Follow(ack.status(), backoff);
     if (ack.ok() || !backoff.Wait(ack.status(), call.stop)) return ack;
   }
 }
@@ -178,9 +181,11 @@ absl::Status RemoteScans::SetLabels(const api::Call& call,
                                     const std::vector<std::uint16_t>& labels,
                                     api::LabelMode mode) {
   Backoff backoff = connection_.NewBackoff();
+  Route<v1::Scans::Stub> route(connection_, *stub_);
   while (true) {
     STRATA_RETURN_IF_ERROR(call.stop.status());
-    const absl::Status sent = SendLabels(connection_, *stub_, call, map, id, labels, mode);
+    const absl::Status sent = SendLabels(connection_, route.stub(), call, map, id, labels, mode);
+    route.Follow(sent, backoff);
     if (sent.ok() || !backoff.Wait(sent, call.stop)) return sent;
   }
 }

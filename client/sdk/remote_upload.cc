@@ -30,7 +30,7 @@ RemoteUpload::RemoteUpload(Connection& connection,
                            absl::string_view map,
                            const ScanHeader& header)
     : connection_(connection),
-      stub_(stub),
+      route_(connection, stub),
       call_(call),
       header_(header),
       backoff_(connection.NewBackoff()) {
@@ -114,7 +114,7 @@ bool RemoteUpload::Send(const Chunk& chunk) {
 absl::Status RemoteUpload::OpenStream() {
   STRATA_RETURN_IF_ERROR(call_.stop.status());
   stream_ = std::make_unique<Stream>(connection_, call_);
-  stream_->writer = stub_.Upload(stream_->context.get(), &stream_->response);
+  stream_->writer = route_.stub().Upload(stream_->context.get(), &stream_->response);
   if (!stream_->writer->Write(start_)) return CloseStream();
   stream_->writer->WaitForInitialMetadata();
   const auto& metadata = stream_->context.get()->GetServerInitialMetadata();
@@ -157,6 +157,7 @@ absl::Status RemoteUpload::CloseStream() {
 }
 
 bool RemoteUpload::MayRepeat(const absl::Status& status) {
+  route_.Follow(status, backoff_);
   return backoff_.Wait(status, call_.stop);
 }
 

@@ -73,7 +73,7 @@ class RemoteUpload final : public api::ScanUpload {
   bool MayRepeat(const absl::Status& status);
 
   Connection& connection_;
-  v1::Scans::Stub& stub_;
+  Route<v1::Scans::Stub> route_;
   const api::Call call_;
   const ScanHeader header_;
   v1::UploadScanRequest start_;

@@ -277,6 +277,13 @@ class StorageWriter {
   virtual absl::Status DropDerived() = 0;
 };
 
+// Who had a map alone before it was opened.
+enum class LastOwner : std::uint8_t {
+  kNobody,  // it was given up: no process died with it
+  kSelf,    // this process, or the one before it in the same place
+  kOther,   // another one, which has died, or is frozen or cut off: nobody here can tell
+};
+
 // One map's durable store.
 class MapStorage {
  public:
@@ -291,6 +298,7 @@ class MapStorage {
   // memory, for every request. UNAVAILABLE with a retry delay: the store was not asked for too
   // long, others may write by now. MustBeOpenedAnew(): they do. Thread-safe.
   virtual absl::Status CheckHeld() const { return absl::OkStatus(); }
+  virtual LastOwner last_owner() const { return LastOwner::kSelf; }
 };
 
 }  // namespace strata

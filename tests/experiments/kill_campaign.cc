@@ -13,11 +13,14 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/integration/clock_campaign.h"
+#include "tests/integration/cluster_campaign.h"
 #include "tests/integration/term_campaign.h"
 #include "tests/support/temp_dir.h"
 
 namespace strata::testing {
 namespace {
+
+constexpr int kLeftOut = 77;
 
 int Print(const std::string& campaign, const CampaignOptions& world, const CampaignReport& report) {
   nlohmann::ordered_json out;
@@ -44,6 +47,7 @@ int Main(int argc, char** argv) {
   app.fallthrough();
   app.require_subcommand(1);
   std::function<int()> run;
+  int several_servers = 3;
 
   KillOptions kills;
   CLI::App* kill = app.add_subcommand("kills", "Server and robots are killed (SIGKILL)");
@@ -75,6 +79,28 @@ int Main(int argc, char** argv) {
     run = [&] {
       jumps.world = world;
       return Print("clock", world, RunClockCampaign(jumps));
+    };
+  });
+
+  ClusterOptions several;
+  CLI::App* cluster = app.add_subcommand(
+      "cluster", "Servers of one database are killed and frozen, and the database crashes");
+  cluster->add_option("--servers", several_servers, "")->capture_default_str();
+  cluster->add_option("--faults", several.faults, "")->capture_default_str();
+  cluster->add_option("--robot-kills", several.robot_kills, "")->capture_default_str();
+  cluster->add_flag(
+      "--work", several.work, "Jobs, deletions, labels, backups, another map meanwhile");
+  cluster->add_flag(
+      "!--no-fence", several.fenced, "Commits do not ask whose the map is; 1 unless that is found");
+  cluster->callback([&] {
+    run = [&] {
+      several.world = world;
+      several.world.servers = several_servers;
+      const auto report = RunClusterCampaign(several);
+      if (absl::IsFailedPrecondition(report.status())) return kLeftOut;
+      const int found = Print(
+          "cluster", world, report.value_or(CampaignReport{{}, {report.status().ToString()}}));
+      return several.fenced ? found : 1 - found;
     };
   });
 

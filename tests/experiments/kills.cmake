@@ -4,5 +4,5 @@ strata_executable(
   kill_campaign
   kill_campaign
   SOURCES kill_campaign.cc
-  DEPS strata::campaigns CLI11::CLI11 nlohmann_json::nlohmann_json
+  DEPS strata::cluster_campaign CLI11::CLI11 nlohmann_json::nlohmann_json
 )

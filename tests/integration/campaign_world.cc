@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 
@@ -19,6 +20,7 @@ namespace strata::testing {
 namespace {
 
 constexpr int kReplayThreads = 2;
+constexpr int kMostLists = 20;
 
 absl::Status UploadAgain(api::Database& db, const ScanHeader& header, const PointCloud& cloud) {
   STRATA_ASSIGN_OR_RETURN(const auto upload, db.scans().Upload({}, kCampaignMap, header));
@@ -50,8 +52,11 @@ std::unique_ptr<api::Database> ConnectTo(const std::string& target) {
   return client.ok() ? *std::move(client) : nullptr;
 }
 
-CampaignWorld::CampaignWorld(const CampaignOptions& options) : options_(options) {
-  StartServer();
+CampaignWorld::CampaignWorld(const CampaignOptions& options)
+    : options_(options), addresses_(options.servers, "127.0.0.1:0"), servers_(options.servers) {
+  for (std::size_t i = 0; i < servers(); ++i) LaunchServer(i);  // all at once
+  for (std::size_t i = 0; i < servers(); ++i) AwaitServing(i);
+  if (servers() > 1) db_ = ConnectTo(address());
   if (db_ != nullptr) {
     violations_.Check("create", db_->maps().Create({}, kCampaignMap, {}).status());
   }
@@ -65,7 +70,7 @@ void CampaignWorld::StartRobots() {
   for (int number = 1; number <= options_.robots; ++number) {
     RobotOptions robot;
     robot.spool = options_.folder / absl::StrCat("spool", number);
-    robot.server = address_;
+    robot.server = address();
     robot.number = number;
     robot.period_ms = options_.period_ms;
     robot.columns = options_.columns;
@@ -74,30 +79,52 @@ void CampaignWorld::StartRobots() {
   }
 }
 
-std::vector<std::string> CampaignWorld::ServerArguments(const char* maps,
+std::string CampaignWorld::address() const { return absl::StrJoin(addresses_, ","); }
+
+std::vector<std::string> CampaignWorld::ServerArguments(const std::string& maps,
                                                         const std::string& listen) const {
   return {"--data", (options_.folder / maps).string(), "--listen", listen, "--optimize-every", "0"};
 }
 
-void CampaignWorld::LaunchServer() {
-  server_ = std::make_unique<StratadProcess>(ServerArguments("maps", address_));
+void CampaignWorld::LaunchServer(std::size_t i) {
+  const std::string maps = i == 0 ? "maps" : absl::StrCat("maps", i);
+  std::vector<std::string> arguments = ServerArguments(maps, addresses_[i]);
+  const auto add = [&arguments](const char* option, const std::string& value) {
+    arguments.insert(arguments.end(), {option, value});
+  };
+  if (!options_.store.empty()) {
+    add("--store", options_.store);
+    add("--server-name", NameOf(i));
+  }
+  if (options_.lease > absl::ZeroDuration()) {
+    add("--map-lease", absl::StrCat(absl::ToDoubleSeconds(options_.lease)));
+  }
+  servers_[i] = options_.server_program.empty()
+                    ? std::make_unique<StratadProcess>(arguments)
+                    : std::make_unique<StratadProcess>(options_.server_program, arguments);
 }
 
-void CampaignWorld::StartServer() {
-  LaunchServer();
-  address_ = server_->Address();
-  db_ = ConnectTo(address_);
-  if (db_ == nullptr) violations_.Add("the server does not answer");
+void CampaignWorld::AwaitServing(std::size_t i) {
+  addresses_[i] = servers_[i]->Address();
+  std::unique_ptr<api::Database> answers = ConnectTo(addresses_[i]);
+  if (answers == nullptr) violations_.Add(absl::StrCat(NameOf(i), " does not answer"));
+  // Clients of several find one that comes back by themselves.
+  if (servers() == 1) db_ = std::move(answers);
 }
 
-void CampaignWorld::KillServer() {
-  server_->Signal(SIGKILL);
-  if (const int end = AwaitServerEnd(); end != -SIGKILL) {
+void CampaignWorld::StartServer(std::size_t i) {
+  LaunchServer(i);
+  AwaitServing(i);
+}
+
+void CampaignWorld::KillServer(std::size_t i) {
+  server(i).Signal(SIGKILL);
+  if (const int end = AwaitServerEnd(i); end != -SIGKILL) {
     violations_.Add(absl::StrCat("the server ended with ", end, " before it was killed"));
   }
 }
 
-int CampaignWorld::AwaitServerEnd() { return server_->Wait(); }
+int CampaignWorld::AwaitServerEnd(std::size_t i) { return server(i).Wait(); }
 
 void CampaignWorld::MayBeGone(const ScanId& id) {
   absl::MutexLock lock(&mutex_);
@@ -126,22 +153,28 @@ bool CampaignWorld::AwaitAcknowledged(std::size_t more, absl::Duration longest) 
   return false;
 }
 
-std::map<ScanId, std::string> CampaignWorld::StoredHashes() {
+std::map<ScanId, std::string> CampaignWorld::StoredHashes(api::Database& db) {
   std::map<ScanId, std::string> stored;
-  const absl::Status listed = db().scans().List({}, kCampaignMap, {}, [&](const ScanInfo& info) {
-    const bool fresh = stored.emplace(info.header.id, info.content_hash).second;
-    if (!fresh) violations_.Add(absl::StrCat(info.header.id.ToString(), " is there twice"));
-    return absl::OkStatus();
-  });
+  absl::Status listed;
+  for (int attempt = 0; attempt < kMostLists; ++attempt) {
+    stored.clear();
+    listed = db.scans().List({}, kCampaignMap, {}, [&](const ScanInfo& info) {
+      const bool fresh = stored.emplace(info.header.id, info.content_hash).second;
+      if (!fresh) violations_.Add(absl::StrCat(info.header.id.ToString(), " is there twice"));
+      return absl::OkStatus();
+    });
+    if (!absl::IsUnavailable(listed)) break;  // what broke off is not asked again by the client
+    absl::SleepFor(absl::Milliseconds(200));
+  }
   violations_.Check("list of scans", listed);
   return stored;
 }
 
-void CampaignWorld::CheckAcknowledged() {
+void CampaignWorld::CheckAcknowledged(api::Database& db) {
   const std::set<ScanId> acknowledged = Acknowledged();
   std::map<ScanId, std::string> added;
   for (const auto& robot : robots_) added.merge(robot->Added());
-  const std::map<ScanId, std::string> stored = StoredHashes();
+  const std::map<ScanId, std::string> stored = StoredHashes(db);
   for (const ScanId& id : acknowledged) {
     const auto found = stored.find(id);
     if (found == stored.end()) {
@@ -241,9 +274,13 @@ std::string CampaignWorld::UndisturbedDigest(const std::map<ScanId, std::string>
 }
 
 std::size_t CampaignWorld::CheckContent(bool compare) {
-  server_->Signal(SIGTERM);
-  AwaitServerEnd();
-  StartServer();
+  for (std::size_t i = 0; i < servers(); ++i) server(i).Signal(SIGTERM);
+  for (std::size_t i = 0; i < servers(); ++i) {
+    if (const int end = AwaitServerEnd(i); servers() > 1 && end != 0) {
+      violations_.Add(absl::StrCat(NameOf(i), " ended with ", end, " after SIGTERM"));
+    }
+  }
+  for (std::size_t i = 0; i < servers(); ++i) StartServer(i);
   const std::map<ScanId, std::string> stored = StoredHashes();
   std::cerr << stored.size() << " scans; verify, rebuild" << std::endl;
   const std::string digest = CheckDerived();

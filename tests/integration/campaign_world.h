@@ -1,8 +1,9 @@
-// A stratad with robots that upload to one map of it, to be disturbed, and what must hold all the
-// same.
+// A stratad, or several of one database, with robots that upload to one map, to be disturbed, and
+// what must hold all the same.
 #ifndef STRATA_TESTS_INTEGRATION_CAMPAIGN_WORLD_H_
 #define STRATA_TESTS_INTEGRATION_CAMPAIGN_WORLD_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -15,6 +16,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
 
 #include "core/api/database.h"
 #include "tests/integration/robot_keeper.h"
@@ -29,6 +31,10 @@ struct CampaignOptions {
   int period_ms = 500;           // of a robot, between scans
   int columns = 640;             // of CampaignCloud
   bool align = false;
+  std::string store;           // the address of a database; empty: maps are files
+  int servers = 1;             // more than one: of `store`
+  absl::Duration lease = {};   // of a map; zero: as the program has it
+  std::string server_program;  // another one than stratad
 };
 
 struct CampaignReport {
@@ -51,23 +57,29 @@ class Violations {
 
 class CampaignWorld {
  public:
-  // Starts the server and makes the map.
+  // Starts the servers and makes the map.
   explicit CampaignWorld(const CampaignOptions& options);
   ~CampaignWorld();
 
   void StartRobots();
-  // Starts the server and waits until it serves, at the address of its first start.
-  void StartServer();
+  // Starts a server and waits until it serves, at the address of its first start.
+  void StartServer(std::size_t i = 0);
   // Starts it and does not wait.
-  void LaunchServer();
+  void LaunchServer(std::size_t i = 0);
   // Kills the server.
-  void KillServer();
+  void KillServer(std::size_t i = 0);
   // Waits for the server's end after a signal to it: its exit code, or minus the signal.
-  int AwaitServerEnd();
-  StratadProcess& server() { return *server_; }
+  int AwaitServerEnd(std::size_t i = 0);
+  StratadProcess& server(std::size_t i = 0) { return *servers_[i]; }
+  std::size_t servers() const { return servers_.size(); }
+  // --server-name of a server.
+  static std::string NameOf(std::size_t i) { return "server" + std::to_string(i); }
 
+  // By all servers.
   api::Database& db() { return *db_; }
-  const std::string& address() const { return address_; }
+  // Of all servers.
+  std::string address() const;
+  const std::string& address_of(std::size_t i) const { return addresses_[i]; }
   const std::filesystem::path& folder() const { return options_.folder; }
   Violations& violations() { return violations_; }
   RobotKeeper& robot(std::size_t i) { return *robots_[i]; }
@@ -80,10 +92,12 @@ class CampaignWorld {
   // Waits until robots have seen so many more of them. False if that takes longer.
   bool AwaitAcknowledged(std::size_t more, absl::Duration longest) const;
 
-  // By the server's list, which must have each scan once.
-  std::map<ScanId, std::string> StoredHashes();
+  // By the list of a server, or of any of them, which must have each scan once.
+  std::map<ScanId, std::string> StoredHashes() { return StoredHashes(db()); }
+  std::map<ScanId, std::string> StoredHashes(api::Database& db);
   // All that is acknowledged is there, with its content.
-  void CheckAcknowledged();
+  void CheckAcknowledged() { CheckAcknowledged(db()); }
+  void CheckAcknowledged(api::Database& db);
   // Robots go home; then every scan that any of them added is there and integrated.
   void RetireRobotsAndCheck();
   // Runs a job to its end; what it ends with must be success.
@@ -94,7 +108,9 @@ class CampaignWorld {
   std::size_t CheckContent(bool compare);
 
  private:
-  std::vector<std::string> ServerArguments(const char* maps, const std::string& listen) const;
+  std::vector<std::string> ServerArguments(const std::string& maps,
+                                           const std::string& listen) const;
+  void AwaitServing(std::size_t i);
   MapStats AwaitIntegrated(api::Database& db);
   // Returns the digest.
   std::string CheckDerived();
@@ -102,8 +118,8 @@ class CampaignWorld {
 
   const CampaignOptions options_;
   Violations violations_;
-  std::string address_ = "127.0.0.1:0";
-  std::unique_ptr<StratadProcess> server_;
+  std::vector<std::string> addresses_;
+  std::vector<std::unique_ptr<StratadProcess>> servers_;
   std::unique_ptr<api::Database> db_;
   std::vector<std::unique_ptr<RobotKeeper>> robots_;
   mutable absl::Mutex mutex_;

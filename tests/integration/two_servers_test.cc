@@ -8,6 +8,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -48,11 +49,16 @@ class SharingServer {
   SharingServer(std::string name, std::string store)
       : name_(std::move(name)), store_(std::move(store)) {}
 
+  // From its next start on its name is its address.
+  void NameByAddress() {
+    listen_ = process_->Address();
+    name_ = listen_;
+  }
   void Start() {
     process_ = std::make_unique<StratadProcess>(std::vector<std::string>{"--data",
                                                                          data_.path().string(),
                                                                          "--listen",
-                                                                         "127.0.0.1:0",
+                                                                         listen_,
                                                                          "--store",
                                                                          store_,
                                                                          "--map-lease",
@@ -74,6 +80,7 @@ class SharingServer {
     process_->Wait();
   }
   void Signal(int signal) { process_->Signal(signal); }
+  void Await() { process_->Wait(); }
   const std::string& address() { return process_->Address(); }
   std::shared_ptr<api::Database> db() {
     absl::MutexLock lock(&mutex_);
@@ -81,7 +88,8 @@ class SharingServer {
   }
 
  private:
-  const std::string name_;
+  std::string name_;
+  std::string listen_ = "127.0.0.1:0";
   const std::string store_;
   const TempDir data_;
   std::unique_ptr<StratadProcess> process_;
@@ -348,6 +356,68 @@ TEST_F(TwoServersTest, AClientWithBothAddressesFindsTheServerThatHasTheMap) {
   }
   STRATA_ASSERT_OK_AND_ASSIGN(const MapStats stats, AtRest(*both, kMap));
   EXPECT_EQ(stats.scans, 9U);
+}
+
+// Servers whose names are their addresses: whoever knows one of them is sent to the other.
+TEST_F(TwoServersTest, AClientOfOneServerUploadsAndWatchesWhereverTheMapIs) {
+  for (const auto& server : servers_) {
+    server->NameByAddress();
+    server->Signal(SIGTERM);
+    server->Await();
+    server->Start();
+  }
+  STRATA_ASSERT_OK(Insist([&] { return Put(db(0), kMap, 1).status(); }));
+  ClientOptions options;
+  options.target = servers_[1]->address();
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::unique_ptr<api::Database> one, Connect(options));
+  const api::Call watching;
+  std::set<std::uint64_t> seen;
+  std::uint64_t last = 0;
+  absl::Mutex mutex;
+  std::thread watcher([&] {
+    const absl::Status ended =
+        one->maps().Watch(watching, kMap, {}, [&](const api::MapUpdate& update) {
+          absl::MutexLock lock(&mutex);
+          EXPECT_GE(update.commit_sequence, last);
+          last = update.commit_sequence;
+          for (const api::ScanChange& scan : update.scans) {
+            if (scan.state == ScanState::kIntegrated) seen.insert(scan.id.sequence);
+          }
+          return absl::OkStatus();
+        });
+    EXPECT_TRUE(absl::IsCancelled(ended)) << ended;
+  });
+  const auto all = [&](std::size_t scans) {
+    const auto there = [&] { return seen.size() == scans; };
+    absl::MutexLock lock(&mutex);
+    return mutex.AwaitWithTimeout(absl::Condition(&there), kPatience);
+  };
+  for (std::uint64_t sequence = 2; sequence <= 5; ++sequence) {
+    STRATA_EXPECT_OK(Put(*one, kMap, sequence));
+  }
+  STRATA_EXPECT_OK(Verify(*one, kMap));
+  EXPECT_TRUE(all(5)) << seen.size();
+  // The one that was named is gone: home again.
+  servers_[0]->Kill();
+  STRATA_EXPECT_OK(Insist([&] { return Put(*one, kMap, 6).status(); }));
+  EXPECT_TRUE(all(6)) << seen.size();
+  watching.stop.Request();
+  watcher.join();
+}
+
+// A machine that lost its power, or its network, answers nothing and closes nothing.
+TEST_F(TwoServersTest, AServerThatSaysNothingAnyMoreHoldsUpNobodyForLong) {
+  ClientOptions options;
+  options.target = absl::StrCat(servers_[0]->address(), ",", servers_[1]->address());
+  options.keepalive = absl::Seconds(10);
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::unique_ptr<api::Database> both, Connect(options));
+  STRATA_ASSERT_OK(Put(*both, kMap, 1));
+  servers_[0]->Signal(SIGSTOP);
+  for (int asked = 0; asked < 2; ++asked) {  // one of them is for the silent one
+    STRATA_ASSERT_OK_AND_ASSIGN(const MapStats stats, both->maps().Stats({}, kMap));
+    EXPECT_EQ(stats.scans, 1U);
+  }
+  servers_[0]->Signal(SIGCONT);
 }
 
 TEST_F(TwoServersTest, WhenTheOwnerIsKilledTheOtherTakesOverAndNothingIsLost) {

@@ -12,7 +12,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import grpc
 
 from strata import errors
-from strata.connection import CHANNEL_OPTIONS, Connection, Options, Pipe
+from strata.connection import CONNECTING_S, Connection, Options, Pipe
 from strata.methods import A, Q, StreamStream, StreamUnary, UnaryStream, UnaryUnary
 
 P = ParamSpec("P")
@@ -104,9 +104,8 @@ class BlockingConnection(Connection):
     """Calls that block their thread. Thread-safe."""
 
     def __init__(self, options: Options) -> None:
-        credentials = options.credentials()
-        super().__init__(options, grpc.secure_channel(options.target, credentials, CHANNEL_OPTIONS) if credentials
-                         else grpc.insecure_channel(options.target, CHANNEL_OPTIONS))
+        self._credentials = options.credentials()
+        super().__init__(options, self._open(options.address(), options.channel_options()))
         self._closed = threading.Event()
         try:
             grpc.channel_ready_future(self.channel).result(timeout=options.connect_timeout)
@@ -114,24 +113,39 @@ class BlockingConnection(Connection):
             self.channel.close()
             raise options.nobody_answers() from None
 
+    def _open(self, address: str, arguments: list[tuple[str, Any]]) -> Any:
+        return (grpc.secure_channel(address, self._credentials, arguments) if self._credentials
+                else grpc.insecure_channel(address, arguments))
+
+    def _channel_to(self, address: str) -> Any:
+        return self._open(address, self.options.channel_options(named=True))
+
+    async def _connects(self, channel: Any) -> bool:
+        try:
+            grpc.channel_ready_future(channel).result(timeout=CONNECTING_S)
+        except grpc.FutureTimeoutError:
+            return False
+        return True
+
     async def close(self) -> None:
         self._closed.set()
-        self.channel.close()
+        for channel in (self.channel, *self._owners.values()):
+            channel.close()
 
     def _answer(self, method: Any, request: Any) -> Any:
         try:
-            return method(request, timeout=self.options.timeout, metadata=self.metadata)
+            return self.here(method)(request, timeout=self.options.timeout, metadata=self.metadata)
         except grpc.RpcError as error:
             raise errors.from_rpc(error) from None
 
-    async def once(self, method: UnaryUnary[Q, A], request: Q) -> A:
+    async def attempt(self, method: UnaryUnary[Q, A], request: Q) -> A:
         return typing.cast(A, self._answer(method, request))
 
     async def send(self, method: StreamUnary[Q, A], requests: Iterable[Q]) -> A:
         return typing.cast(A, self._answer(method, iter(requests)))
 
     async def _answers(self, method: Any, request: Any, timeout: float | None) -> AsyncGenerator[Any, None]:
-        call = method(request, timeout=timeout, metadata=self.metadata)
+        call = self.here(method)(request, timeout=timeout, metadata=self.metadata)
         try:
             for answer in call:
                 yield answer

@@ -15,6 +15,8 @@ def connect(target: str = "127.0.0.1:50051", *, token: str | None = None,
             patience: float = 60.0) -> "Database":
     """The Database at target, HOST:PORT. A context manager: leaving it closes the connection.
 
+    target: several HOST:PORT with commas between them are servers on one store: calls go to one after the other, and to the
+    next where one is gone or has not the map. Names are looked up once; with TLS all show a certificate for the first.
     token: the bearer token that the server's owner gave you. Without TLS anybody on the way can read it.
     ca: file of the root certificates to trust, PEM, or True for those of the system; None: no TLS.
     certificate, key: files of this client's own certificate and its key, PEM, for servers that ask for it.

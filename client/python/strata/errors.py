@@ -11,14 +11,17 @@ class StrataError(Exception):
 
     code: grpc.StatusCode = grpc.StatusCode.UNKNOWN
 
-    def __init__(self, message: str, *, reason: str = "", retry_delay: float | None = None, request_id: str = "") -> None:
+    def __init__(self, message: str, *, reason: str = "", retry_delay: float | None = None, request_id: str = "",
+                 owner: str | None = None) -> None:
         super().__init__(message)
         self.reason = reason
-        """Who refused: REQUEST, DATABASE, SERVER_BUSY, SHUTTING_DOWN, SLOW_READER; "" if nobody said."""
+        """Who refused: REQUEST, DATABASE, SERVER_BUSY, SHUTTING_DOWN, SLOW_READER, OTHER_SERVER; "" if nobody said."""
         self.retry_delay = retry_delay
         """Seconds after which the same call may succeed; None where the server named none."""
         self.request_id = request_id
         """Of the call in the server's log."""
+        self.owner = owner
+        """With OTHER_SERVER: what the server calls itself that has the map; nothing has happened here."""
 
 
 class InvalidArgument(StrataError, ValueError):
@@ -93,7 +96,7 @@ def from_detail(code: grpc.StatusCode, message: str, detail: error_pb2.ErrorDeta
     delay = detail.metadata.get("retry_delay_ms")
     kind = _BY_CODE.get(code, StrataError)
     made = kind(message or code.name, reason=detail.reason, retry_delay=int(delay) / 1000 if delay else None,
-                request_id=detail.metadata.get("request_id", ""))
+                request_id=detail.metadata.get("request_id", ""), owner=detail.metadata.get("owner"))
     made.code = code
     return made
 

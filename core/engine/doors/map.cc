@@ -14,6 +14,23 @@
 
 namespace strata {
 
+namespace {
+
+// Whether the process may have died that had the map before.
+bool MayHaveDied(const MapCore& core, const MapMemory& memory) {
+  switch (core.last_owner()) {
+    case LastOwner::kNobody:
+      return false;
+    case LastOwner::kSelf:
+      return !memory.opened_before;
+    case LastOwner::kOther:
+      break;
+  }
+  return true;
+}
+
+}  // namespace
+
 absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
                                                const std::filesystem::path& file,
                                                const EngineOptions& options,
@@ -30,7 +47,8 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
   std::shared_ptr<Map> map(new Map());
   STRATA_ASSIGN_OR_RETURN(map->core_,
                           MapCore::Open(name, std::move(stored), options, std::move(caches)));
-  STRATA_ASSIGN_OR_RETURN(map->quarantine_, Quarantine::Open(*map->core_, !memory.opened_before));
+  STRATA_ASSIGN_OR_RETURN(map->quarantine_,
+                          Quarantine::Open(*map->core_, MayHaveDied(*map->core_, memory)));
   STRATA_ASSIGN_OR_RETURN(map->jobs_, JobBoard::Open(*map->core_, *map->quarantine_));
   STRATA_ASSIGN_OR_RETURN(map->uploads_, UnfinishedUploads::Open(*map->core_));
   std::uint64_t pending = 0;

@@ -461,8 +461,17 @@ absl::Status JobBoard::RunNext(const Stop& closing,
   if (!job.has_value()) return absl::OkStatus();
   if (closing.requested()) stop.Request();  // whoever closes may have looked before it ran
   Running context(*this, job->id, stop, closing);
-  const absl::Status ended = Guarded([&] { return body(*job, context); });
+  absl::Status ended = Guarded([&] { return body(*job, context); });
   if (closing.requested() && !ended.ok()) return Requeue(job->id);
+  // The store was away, which is no fault of the job; its runner tries again in a while.
+  if (absl::IsUnavailable(ended)) {
+    if (stop.requested()) {
+      ended = absl::CancelledError(ended.message());
+    } else {
+      STRATA_RETURN_IF_ERROR(Requeue(job->id));
+      return ended;
+    }
+  }
   absl::Status stored = Guarded([&] { return Finish(job->id, ended, context); });
   // If that cannot be, it did not end.
   if (!stored.ok()) STRATA_RETURN_IF_ERROR(Requeue(job->id));

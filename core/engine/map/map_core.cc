@@ -72,6 +72,7 @@ MapCore::MapCore(std::string name,
                  MapInfo info,
                  const MapClock& clock)
     : name_(std::move(name)),
+      last_owner_(storage->last_owner()),
       disk_(file),
       options_(options),
       caches_(std::move(caches)),

@@ -87,6 +87,7 @@ class MapCore {
   // OK, or that the store may hold what nobody here knows (MustBeOpenedAnew()): the map has to be
   // closed and opened anew.
   absl::Status doubt() const;
+  LastOwner last_owner() const { return last_owner_; }
   // As MapStorage::CheckHeld(); not of a map that is closed.
   absl::Status CheckHeld() const;
   // OK, or the status of Close(). For those who wait for what is in memory.
@@ -109,6 +110,7 @@ class MapCore {
             const std::vector<api::TileChangeNotice>& tiles);
 
   const std::string name_;
+  const LastOwner last_owner_;
   const DiskSpace disk_;
   const EngineOptions options_;
   const std::shared_ptr<CacheBudget> caches_;

@@ -15,6 +15,7 @@
 #include "absl/time/time.h"
 
 #include "core/common/status.h"
+#include "core/engine/map/database_stores.h"
 #include "core/engine/map/directory.h"
 #include "core/storage/postgresql/postgres_maps.h"
 #include "core/storage/sqlite/sqlite_storage.h"
@@ -140,12 +141,22 @@ class PostgresStores final : public MapStores {
 absl::StatusOr<std::unique_ptr<MapStores>> OpenMapStores(const EngineOptions& options,
                                                          const MapDirectory& directory) {
   if (options.store.empty()) return std::make_unique<FileStores>(options, directory);
+  STRATA_ASSIGN_OR_RETURN(const PostgresOptions database, DatabaseOf(options, directory));
+  return OpenDatabaseStores(database);
+}
+
+absl::StatusOr<PostgresOptions> DatabaseOf(const EngineOptions& options,
+                                           const MapDirectory& directory) {
   PostgresOptions database;
   database.where = options.store;
   STRATA_ASSIGN_OR_RETURN(database.lease.holder, directory.Identity());
   database.lease.server = options.server_name;
   database.lease.time = options.map_lease;
-  STRATA_ASSIGN_OR_RETURN(PostgresMaps maps, PostgresMaps::Connect(database));
+  return database;
+}
+
+absl::StatusOr<std::unique_ptr<MapStores>> OpenDatabaseStores(const PostgresOptions& options) {
+  STRATA_ASSIGN_OR_RETURN(PostgresMaps maps, PostgresMaps::Connect(options));
   return std::make_unique<PostgresStores>(std::move(maps));
 }
 

@@ -130,10 +130,13 @@ bool IsQuarantined(const JobInfo& job) {
   return job.state == JobState::kFailed && absl::StartsWith(job.message, kQuarantined);
 }
 
-absl::Status Hold(StorageWriter& writer, const WorkId& work, absl::string_view why) {
+absl::Status Hold(StorageWriter& writer,
+                  const WorkId& work,
+                  absl::string_view why,
+                  std::uint32_t deaths) {
   if (work.kind == WorkKind::kScan) STRATA_RETURN_IF_ERROR(HoldScan(writer, work.id, why));
   if (work.kind == WorkKind::kJob) STRATA_RETURN_IF_ERROR(HoldJob(writer, work.id, why));
-  return writer.PutAttempt({work, kMostDeaths, false});
+  return writer.PutAttempt({work, deaths, false});
 }
 
 absl::Status Release(StorageWriter& writer, const WorkId& work) {
@@ -165,7 +168,9 @@ absl::Status Quarantine::CountDeaths(StorageWriter& writer, bool process_died) {
   for (Attempt& attempt : attempts) {
     const bool died = std::exchange(attempt.under_way, false) && process_died;
     // Whom somebody else killed may have had innocent work: it becomes a suspect, no more.
-    if (died && (attempt.deaths == 0 || !core_.options().killed_from_outside)) ++attempt.deaths;
+    const bool innocent =
+        core_.options().killed_from_outside && core_.last_owner() == LastOwner::kSelf;
+    if (died && (attempt.deaths == 0 || !innocent)) ++attempt.deaths;
     STRATA_ASSIGN_OR_RETURN(const bool matters, Matters(writer, attempt));
     if (!matters || attempt.deaths == 0) {
       STRATA_RETURN_IF_ERROR(writer.DeleteAttempt(attempt.work));
@@ -173,8 +178,8 @@ absl::Status Quarantine::CountDeaths(StorageWriter& writer, bool process_died) {
     }
     deaths[attempt.work] = attempt.deaths;
     // What is so damaged that it cannot be put aside is not begun either.
-    if (died && attempt.deaths >= kMostDeaths &&
-        Hold(writer, attempt.work, Why(attempt.work, attempt.deaths)).ok()) {
+    if (died && attempt.deaths >= most_deaths_ &&
+        Hold(writer, attempt.work, Why(attempt.work, attempt.deaths), attempt.deaths).ok()) {
       LOG(ERROR) << LogLine("quarantine")
                         .Add("map", core_.name())
                         .Add("work", NameOf(attempt.work))

@@ -23,6 +23,9 @@ namespace strata {
 // So often the process may die while the same work is under way, but for what killed it from
 // outside (EngineOptions::killed_from_outside).
 inline constexpr std::uint32_t kMostDeaths = 2;
+// The same where others may have the map: whoever takes it over from one that does not answer can
+// not tell whether that one has died, of what, or is frozen, cut off or being moved.
+inline constexpr std::uint32_t kMostDeathsOfMany = 10;
 
 // Messages of scans and jobs in quarantine begin so.
 inline constexpr absl::string_view kQuarantined = "quarantined: ";
@@ -30,7 +33,10 @@ bool IsQuarantined(const JobInfo& job);
 
 // Puts a scan or job aside, or takes it back: it waits again. Inside a commit. `why` completes the
 // message. NOT_FOUND; FAILED_PRECONDITION for what has ended, or is not in quarantine.
-absl::Status Hold(StorageWriter& writer, const WorkId& work, absl::string_view why);
+absl::Status Hold(StorageWriter& writer,
+                  const WorkId& work,
+                  absl::string_view why,
+                  std::uint32_t deaths = kMostDeaths);
 absl::Status Release(StorageWriter& writer, const WorkId& work);
 
 // What is under way is written down before it begins; what a start finds written down was under way
@@ -66,17 +72,19 @@ class Quarantine {
 
   // The process died while it was under way.
   bool IsSuspect(const WorkId& work) const { return DeathsOf(work) > 0; }
-  bool IsHeld(const WorkId& work) const { return DeathsOf(work) >= kMostDeaths; }
+  bool IsHeld(const WorkId& work) const { return DeathsOf(work) >= most_deaths_; }
   // A scan that the process may have died of has not had its turn yet.
   absl::StatusOr<bool> SuspectScanWaits() const;
 
  private:
-  explicit Quarantine(MapCore& core) : core_(core) {}
+  explicit Quarantine(MapCore& core)
+      : core_(core), most_deaths_(core.options().store.empty() ? kMostDeaths : kMostDeathsOfMany) {}
   absl::Status CountDeaths(StorageWriter& writer, bool process_died);
   std::uint32_t DeathsOf(const WorkId& work) const;
   absl::Status PutScansUnderWay(std::set<WorkId> scans);
 
   MapCore& core_;
+  const std::uint32_t most_deaths_;
   mutable absl::Mutex mutex_;
   std::map<WorkId, std::uint32_t> deaths_ ABSL_GUARDED_BY(mutex_);
   std::set<WorkId> scans_under_way_;  // the worker's

@@ -95,6 +95,13 @@ absl::Status MapLeases::CheckFree(Connection& connection,
   return row.Next() ? HeldBy(name, row.Text(0)) : absl::OkStatus();
 }
 
+absl::StatusOr<LastOwner> MapLeases::LastOwnerOf(Connection& connection, std::int64_t map) const {
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row, connection.Query("SELECT holder FROM map_lease WHERE map = $1 FOR UPDATE", map));
+  if (!row.Next()) return LastOwner::kNobody;
+  return row.Text(0) == options_.holder ? LastOwner::kSelf : LastOwner::kOther;
+}
+
 // Whoever is second waits for the first one's row, and then finds that it has not expired.
 absl::StatusOr<std::shared_ptr<MapLease>> MapLeases::Take(Connection& connection,
                                                           std::int64_t map,

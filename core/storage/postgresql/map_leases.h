@@ -19,6 +19,7 @@
 #include "absl/time/time.h"
 
 #include "core/storage/postgresql/connection.h"
+#include "core/storage/storage.h"
 
 namespace strata {
 
@@ -68,6 +69,8 @@ class MapLeases {
 
   absl::Duration time() const { return options_.time; }
 
+  // Whose lease there is, in whatever state.
+  absl::StatusOr<LastOwner> LastOwnerOf(Connection& connection, std::int64_t map) const;
   // In the open transaction of `connection`: takes the map if nobody else has it. UNAVAILABLE with
   // MapOwnerOf() and a retry delay where somebody has. Held once the transaction is committed and
   // Hold() called.

@@ -49,7 +49,7 @@ class PostgresStorage final : public MapStorage {
   PostgresStorage& operator=(const PostgresStorage&) = delete;
 
   absl::StatusOr<std::unique_ptr<StorageReader>> NewReader() override {
-    return std::make_unique<PostgresReader>(pool_, map_.number);
+    return std::make_unique<PostgresReader>(pool_, map_.number, map_.fenced ? lease_ : nullptr);
   }
   StorageWriter& writer() override { return writer_; }
   absl::Status CheckInPlace() const override {
@@ -59,6 +59,7 @@ class PostgresStorage final : public MapStorage {
         lease->Query("SELECT owner FROM truth_map WHERE map = $1", map_.number);
     return CheckOwner(owner, map_);
   }
+  LastOwner last_owner() const override { return map_.last_owner; }
   absl::Status CheckHeld() const override {
     return lease_ == nullptr ? absl::OkStatus() : lease_->Check();
   }
@@ -317,6 +318,7 @@ absl::StatusOr<std::shared_ptr<MapLease>> PostgresMaps::TakeOver(OpenedMap& map)
   STRATA_RETURN_IF_ERROR(leases_->CheckFree(*connection, map.number, map.name));
   std::shared_ptr<MapLease> lease;
   STRATA_RETURN_IF_ERROR(InTransaction(*connection, [&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(map.last_owner, leases_->LastOwnerOf(*connection, map.number));
     STRATA_ASSIGN_OR_RETURN(lease, leases_->Take(*connection, map.number, map.name));
     map.owner = lease->token();
     STRATA_RETURN_IF_ERROR(connection->Execute("SET LOCAL lock_timeout = '3s'"));

@@ -30,8 +30,8 @@ struct PostgresOptions {
   std::string where;
   std::size_t max_connections = 32;
   LeaseOptions lease = {};
-  // false: a commit does not ask whether its map was taken away, and corrupts it if so. For tests
-  // that must fail then.
+  // false: commits and reads do not ask whether their map was taken away, and corrupt it if so. For
+  // tests that must fail then.
   bool fenced = true;
 };
 

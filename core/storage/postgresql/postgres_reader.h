@@ -18,6 +18,7 @@
 
 #include "core/storage/postgresql/connection.h"
 #include "core/storage/postgresql/connection_pool.h"
+#include "core/storage/postgresql/map_leases.h"
 #include "core/storage/storage.h"
 
 namespace strata {
@@ -25,8 +26,11 @@ namespace strata {
 // Holds a connection for the time of a call or of a snapshot only.
 class PostgresReader final : public StorageReader {
  public:
-  PostgresReader(std::shared_ptr<ConnectionPool> pool, std::int64_t map)
-      : pool_(std::move(pool)), map_(map) {}
+  // `lease`: of one who has the map alone, and reads what nobody else may collect beneath him.
+  PostgresReader(std::shared_ptr<ConnectionPool> pool,
+                 std::int64_t map,
+                 std::shared_ptr<const MapLease> lease = nullptr)
+      : pool_(std::move(pool)), map_(map), lease_(std::move(lease)) {}
 
   // Reads go through `connection`, in its transaction, until this is called with nullptr.
   void ReadThrough(Connection* connection) { held_ = connection; }
@@ -89,6 +93,8 @@ class PostgresReader final : public StorageReader {
  private:
   // What `body` reads is of one state, which a snapshot or transaction around it may be.
   absl::Status OneState(absl::FunctionRef<absl::Status()> body);
+  // What was read of a version, once it has been read: as MapLease::Check().
+  absl::Status CheckKept() const { return lease_ == nullptr ? absl::OkStatus() : lease_->Check(); }
   // The rows of a statement whose $1 is the map.
   template <typename... Values>
   absl::StatusOr<Rows> Ask(const char* sql, const Values&... values);
@@ -105,6 +111,7 @@ class PostgresReader final : public StorageReader {
 
   std::shared_ptr<ConnectionPool> pool_;
   std::int64_t map_;
+  std::shared_ptr<const MapLease> lease_;
   Connection* held_ = nullptr;
 };
 

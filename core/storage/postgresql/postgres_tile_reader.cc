@@ -18,6 +18,8 @@
 
 namespace strata {
 
+// A version is kept for its readers by whoever has the map. One whose lease has ended, a frozen
+// server that woke up, would take what his successor has collected for what was never there.
 absl::StatusOr<std::optional<MlsTileRow>> PostgresReader::FindMlsTile(const TileKey& key,
                                                                       std::uint64_t version) {
   STRATA_ASSIGN_OR_RETURN(
@@ -28,6 +30,7 @@ absl::StatusOr<std::optional<MlsTileRow>> PostgresReader::FindMlsTile(const Tile
           key.x,
           key.y,
           version));
+  STRATA_RETURN_IF_ERROR(CheckKept());
   if (!row.Next()) return std::optional<MlsTileRow>();
   MlsTileRow tile = ReadMlsTile(row);
   tile.bytes = row.Text(15);
@@ -44,6 +47,7 @@ absl::StatusOr<std::optional<SurfaceTileRow>> PostgresReader::FindSurfaceTile(
           key.x,
           key.y,
           version));
+  STRATA_RETURN_IF_ERROR(CheckKept());
   if (!row.Next() || row.Bool(4)) return std::optional<SurfaceTileRow>();
   SurfaceTileRow tile = ReadSurfaceTile(row);
   tile.bytes = row.Text(7);
@@ -62,6 +66,7 @@ absl::StatusOr<std::vector<MlsTileRow>> PostgresReader::ListMlsTiles(std::uint64
           kMaxLevel,
           std::numeric_limits<std::int32_t>::min(),
           std::numeric_limits<std::int32_t>::max()));
+  STRATA_RETURN_IF_ERROR(CheckKept());
   std::vector<MlsTileRow> tiles;
   while (row.Next()) tiles.push_back(ReadMlsTile(row));
   return tiles;
@@ -80,6 +85,7 @@ absl::StatusOr<std::vector<SurfaceTileRow>> PostgresReader::ListSurfaceTiles(
           range.y_min,
           range.y_max,
           version));
+  STRATA_RETURN_IF_ERROR(CheckKept());
   std::vector<SurfaceTileRow> tiles;
   while (row.Next()) {
     if (!row.Bool(4)) tiles.push_back(ReadSurfaceTile(row));

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/common/map_owner.h"
 #include "core/common/retry_delay.h"
 
 namespace strata::sdk {
@@ -51,6 +52,40 @@ TEST(BackoffTest, WhatTheCallerDidNotCancelIsRepeated) {
   const Stop stopped;
   stopped.Request();
   EXPECT_FALSE(backoff.Wait(absl::CancelledError("CANCELLED"), stopped));
+}
+
+absl::Status Elsewhere() {
+  return WithRetryDelay(WithMapOwner(absl::UnavailableError("elsewhere"), "b"), absl::Seconds(1));
+}
+
+// Twice round the servers without a pause, then as long as they ask for.
+TEST(BackoffTest, OfSeveralServersTheNextIsAskedAtOnce) {
+  Backoff backoff(kOptions, 3);
+  for (int round = 0; round < 2; ++round) {
+    for (int i = 0; i < 4; ++i) {
+      EXPECT_LT(*backoff.NextPause(Elsewhere()), absl::Milliseconds(10)) << i;
+    }
+    EXPECT_GE(*backoff.NextPause(Elsewhere()), absl::Seconds(1));
+  }
+  Backoff alone(kOptions, 1);
+  EXPECT_GE(*alone.NextPause(Elsewhere()), absl::Seconds(1));
+  alone.NoteServerNamed();
+  EXPECT_LT(*alone.NextPause(Elsewhere()), absl::Milliseconds(10));
+}
+
+TEST(BackoffTest, SeveralServersGetMoreTimeThanAttempts) {
+  BackoffOptions options = kOptions;
+  options.max_attempts = 2;
+  const absl::Status away = absl::UnavailableError("away");
+  Backoff one(options, 1);
+  EXPECT_NE(one.NextPause(away), std::nullopt);
+  EXPECT_EQ(one.NextPause(away), std::nullopt);
+  Backoff several(options, 2);
+  for (int i = 0; i < 20; ++i) EXPECT_NE(several.NextPause(away), std::nullopt) << i;
+  options.retry_for = absl::ZeroDuration();
+  Backoff hasty(options, 2);
+  EXPECT_NE(hasty.NextPause(away), std::nullopt);
+  EXPECT_EQ(hasty.NextPause(away), std::nullopt);
 }
 
 TEST(BackoffTest, NoPauseOutlivesItsCall) {

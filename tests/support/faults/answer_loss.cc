@@ -188,6 +188,7 @@ class LosingStorage final : public MapStorage {
   StorageWriter& writer() override { return writer_; }
   absl::Status CheckInPlace() const override { return inner_->CheckInPlace(); }
   absl::Status CheckHeld() const override { return inner_->CheckHeld(); }
+  LastOwner last_owner() const override { return inner_->last_owner(); }
 
  private:
   std::unique_ptr<MapStorage> inner_;

@@ -18,7 +18,7 @@ class MapCalls:
         self.trajectory = f"run-{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}-{secrets.token_hex(3)}"
         """Of uploads that name none; this object's own."""
         self._connection = connection
-        channel = connection.channel
+        channel = connection.stubs
         self._maps = maps_pb2_grpc.MapsStub(channel)
         self._scans = scans_pb2_grpc.ScansStub(channel)
         self._tiles = tiles_pb2_grpc.TilesStub(channel)

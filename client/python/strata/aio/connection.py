@@ -8,7 +8,7 @@ import grpc
 import grpc.aio
 
 from strata import errors
-from strata.connection import CHANNEL_OPTIONS, Connection, Options, Pipe
+from strata.connection import CONNECTING_S, Connection, Options, Pipe
 from strata.methods import A, Q, StreamStream, StreamUnary, UnaryStream, UnaryUnary
 
 T = TypeVar("T")
@@ -36,12 +36,25 @@ class _QueuedRequests(Pipe[Q]):
 class AsyncioConnection(Connection):
     """Calls of the tasks of one event loop."""
 
-    def __init__(self, options: Options) -> None:
-        credentials = options.credentials()
-        super().__init__(options, grpc.aio.secure_channel(options.target, credentials, CHANNEL_OPTIONS) if credentials
-                         else grpc.aio.insecure_channel(options.target, CHANNEL_OPTIONS))
+    def __init__(self, options: Options, address: str) -> None:
+        self._credentials = options.credentials()
+        super().__init__(options, self._open(address, options.channel_options()))
         self._closed = asyncio.Event()
         self._calls: set[Any] = set()  # under way; gRPC 1.51 itself does not find all that it should end
+
+    def _open(self, address: str, arguments: list[tuple[str, Any]]) -> Any:
+        return (grpc.aio.secure_channel(address, self._credentials, arguments) if self._credentials
+                else grpc.aio.insecure_channel(address, arguments))
+
+    def _channel_to(self, address: str) -> Any:
+        return self._open(address, self.options.channel_options(named=True))
+
+    async def _connects(self, channel: Any) -> bool:
+        try:
+            await asyncio.wait_for(channel.channel_ready(), CONNECTING_S)
+        except asyncio.TimeoutError:
+            return False
+        return True
 
     async def ready(self) -> None:
         """Waits for the server; Unavailable."""
@@ -55,14 +68,15 @@ class AsyncioConnection(Connection):
         self._closed.set()
         for call in tuple(self._calls):
             call.cancel()
-        await self.channel.close()
+        for channel in (self.channel, *self._owners.values()):
+            await channel.close()
 
     def _closed_by_us(self) -> bool:
         task = asyncio.current_task()
         return self._closed.is_set() and not (task and task.cancelling())
 
     async def _answer(self, method: Any, request: Any) -> Any:
-        call = method(request, timeout=self.options.timeout, metadata=self.metadata)
+        call = self.here(method)(request, timeout=self.options.timeout, metadata=self.metadata)
         self._calls.add(call)
         try:
             return await call
@@ -75,14 +89,14 @@ class AsyncioConnection(Connection):
         finally:
             self._calls.discard(call)
 
-    async def once(self, method: UnaryUnary[Q, A], request: Q) -> A:
+    async def attempt(self, method: UnaryUnary[Q, A], request: Q) -> A:
         return typing.cast(A, await self._answer(method, request))
 
     async def send(self, method: StreamUnary[Q, A], requests: Iterable[Q]) -> A:
         return typing.cast(A, await self._answer(method, iter(requests)))
 
     async def _answers(self, method: Any, request: Any, timeout: float | None) -> AsyncGenerator[Any, None]:
-        call = method(request, timeout=timeout, metadata=self.metadata)
+        call = self.here(method)(request, timeout=timeout, metadata=self.metadata)
         self._calls.add(call)
         try:
             async for answer in call:

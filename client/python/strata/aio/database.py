@@ -1,4 +1,5 @@
 """A server of maps."""
+import asyncio
 import os
 from collections.abc import Mapping
 from types import TracebackType
@@ -16,8 +17,9 @@ async def connect(target: str = "127.0.0.1:50051", *, token: str | None = None,
                   ca: str | os.PathLike[str] | bool | None = None, certificate: str | os.PathLike[str] | None = None,
                   key: str | os.PathLike[str] | None = None, timeout: float | None = None,
                   patience: float = 60.0) -> "Database":
-    """The Database at target, HOST:PORT; as strata.connect, for `async with`."""
-    connection = AsyncioConnection(Options(target, token, ca, certificate, key, timeout, patience))
+    """The Database at target, HOST:PORT or several with commas between them; as strata.connect, for `async with`."""
+    options = Options(target, token, ca, certificate, key, timeout, patience)
+    connection = AsyncioConnection(options, await asyncio.to_thread(options.address))
     await connection.ready()
     return Database(connection)
 
@@ -27,7 +29,7 @@ class Database:
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
-        self._stub = maps_pb2_grpc.MapsStub(connection.channel)
+        self._stub = maps_pb2_grpc.MapsStub(connection.stubs)
 
     async def __aenter__(self) -> "Database":
         return self

@@ -48,9 +48,12 @@ class Map(Scans, Surfaces, Planning, Objects, PoseGraphCalls, Jobs):
         """
         request = maps_pb2.BackupMapRequest(name=self.name)
         with maps.backup_file(path, force) as file:
-            async with contextlib.aclosing(self._connection.stream(self._maps.Backup, request)) as answers:
-                async for answer in answers:
-                    file.write(answer)
+            async def attempt() -> None:
+                async with contextlib.aclosing(self._connection.stream(self._maps.Backup, request)) as answers:
+                    async for answer in answers:
+                        file.write(answer)
+
+            await self._connection.where_the_map_is(attempt)
 
     async def origin(self) -> tuple[float, float, float] | None:
         """Where the map's origin is on earth (WGS 84): (latitude [°], longitude [°], altitude [m]); None: not said."""

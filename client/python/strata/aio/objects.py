@@ -108,4 +108,8 @@ class Objects(MapCalls):
         start = classifiers_pb2.ImportClassifierStart(map=self.name, name=name)
         requests = [classifiers_pb2.ImportClassifierRequest(start=start)]
         requests += [classifiers_pb2.ImportClassifierRequest(bytes=part) for part in pieces(content)]
-        return classifiers.from_proto((await self._connection.send(self._classifiers.Import, requests)).classifier)
+
+        async def attempt() -> classifiers_pb2.ImportClassifierResponse:
+            return await self._connection.send(self._classifiers.Import, requests)
+
+        return classifiers.from_proto((await self._connection.where_the_map_is(attempt)).classifier)

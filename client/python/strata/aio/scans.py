@@ -185,6 +185,10 @@ class Scans(MapCalls):
         start = posegraph_pb2.TrackStart(map=self.name, guess_radius_m=guess_radius)
         if guess is not None:
             start.guess.CopyFrom(poses.to_proto(poses.matrix(guess)))
-        tracking = Tracking(*self._connection.pipe(self._posegraph.Track))
-        await tracking.begin(start)
-        return tracking
+
+        async def attempt() -> Tracking:
+            tracking = Tracking(*self._connection.pipe(self._posegraph.Track))
+            await tracking.begin(start)
+            return tracking
+
+        return await self._connection.where_the_map_is(attempt)

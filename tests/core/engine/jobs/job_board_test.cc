@@ -101,6 +101,21 @@ TEST_F(JobBoardTest, OfManyWhoDecideAboutAProposalOneWins) {
   }
 }
 
+TEST_F(JobBoardTest, AJobWhoseStoreWasAwayGoesOnLater) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo job, Start("a"));
+  const auto away = [](const JobInfo&, JobContext&) {
+    return absl::UnavailableError("store: the server closed the connection");
+  };
+  EXPECT_THAT(Run(away), StatusIs(absl::StatusCode::kUnavailable, HasSubstr("closed")));
+  EXPECT_EQ(board_->Get(job.id)->state, JobState::kQueued);
+  // Unless somebody has had enough of it.
+  STRATA_EXPECT_OK(Run([&](const JobInfo&, JobContext&) {
+    STRATA_EXPECT_OK(board_->Cancel(job.id));
+    return absl::UnavailableError("store: the server closed the connection");
+  }));
+  EXPECT_EQ(board_->Get(job.id)->state, JobState::kCancelled);
+}
+
 TEST_F(JobBoardTest, WhoeverIsToldCancelledSeesNoJobRun) {
   constexpr int kJobs = 60;
   std::set<std::uint64_t> ran;
