@@ -15,7 +15,6 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 
-#include "core/codec/local_map_codec.h"
 #include "core/common/status.h"
 #include "core/engine/scans/scan_losses.h"
 #include "core/engine/scans/scan_share.h"
@@ -139,36 +138,20 @@ absl::Status Integrator::Commit(const TileChange& change,
   return absl::OkStatus();
 }
 
-absl::StatusOr<Placement> Integrator::Placed(const ScanRecord& scan,
-                                             const MlsMap& local_map,
-                                             StorageReader& reader,
-                                             ScanSource& source) {
-  if (!source.IsTooCoarse(scan)) return aligner_.Place(scan, local_map, reader, source);
-  STRATA_ASSIGN_OR_RETURN(const MlsMap finer, source.RegistrationMap(scan));
-  return aligner_.Place(scan, finer, reader, source);
-}
-
 absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
+                                       absl::StatusOr<ReadyScan> ready,
                                        StorageReader& reader,
-                                       ScanSource& source,
                                        MlsTileMap& tiles,
                                        Batch& batch) {
-  const ScanShare share(core_.caches(), scan);
+  STRATA_RETURN_IF_ERROR(ready.status());
+  ScanSource& source = *ready->source;
   Integrated done;
   done.scan = scan;
-  const MapParameters parameters = core_.info().parameters;
-  const SensorModel sensor = scan.header.sensor.value_or(parameters.sensor);
-  {
-    STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
-    STRATA_RETURN_IF_ERROR(CheckContributes(local_map, source.dropped(), scan, sensor));
-    if (!parameters.keep_points) {
-      STRATA_RETURN_IF_ERROR(CheckRoomInTiles(local_map, {}));
-      STRATA_ASSIGN_OR_RETURN(done.local_map, EncodeLocalMap(local_map));
-    }
-    STRATA_ASSIGN_OR_RETURN(done.placement, Placed(scan, local_map, reader, source));
-  }
+  done.local_map = std::move(ready->local_map);
+  STRATA_ASSIGN_OR_RETURN(done.placement, aligner_.Place(scan, ready->features, reader, source));
   STRATA_ASSIGN_OR_RETURN(MlsMap contribution,
                           source.Contribution(scan, done.placement.T_map_scan));
+  const SensorModel sensor = scan.header.sensor.value_or(core_.info().parameters.sensor);
   STRATA_RETURN_IF_ERROR(CheckContributes(contribution, source.dropped(), scan, sensor));
   done.losses = DescribeLosses(source.dropped(), scan.header, sensor);
   const std::uint64_t version = core_.snapshots().current().tile_version;
@@ -196,28 +179,29 @@ absl::StatusOr<int> Integrator::IntegrateBatch(int most_scans) {
   if (pending.empty()) return 0;
   STRATA_RETURN_IF_ERROR(core_.disk().CheckForIntegration(0));
   STRATA_RETURN_IF_ERROR(LoadAlignerOnce(*reader));
-  const MapParameters parameters = core_.info().parameters;
-  std::optional<ScanSource> source(std::in_place, *reader, parameters);
+  std::optional<ScansAhead> scans(std::in_place, core_, pending);
   TileChange change;
   Batch batch;
   std::uint64_t points = 0;
   int count = 0;
-  for (const PosedScan& posed : pending) {
-    if (count > 0 && (points + posed.scan.header.point_count > kBatchPoints ||
+  for (std::size_t i = 0; i < pending.size(); ++i) {
+    const ScanRecord& scan = pending[i].scan;
+    if (count > 0 && (points + scan.header.point_count > kBatchPoints ||
                       MemoryBytes(change.tiles) > kBatchBytes)) {
       break;
     }
-    points += posed.scan.header.point_count;
+    points += scan.header.point_count;
     ++count;
-    const absl::Status done = IntegrateScan(posed.scan, *reader, *source, change.tiles, batch);
+    const ScanShare share(core_.caches(), scan);
+    const absl::Status done = IntegrateScan(scan, scans->Take(i), *reader, change.tiles, batch);
     if (done.ok()) continue;
     if (!IsFaultOfScan(done)) {
       aligner_loaded_ = false;
       return done;
     }
-    batch.failed.push_back({posed.scan.number, posed.scan.header.id, std::string(done.message())});
+    batch.failed.push_back({scan.number, scan.header.id, std::string(done.message())});
   }
-  source.reset();  // its memory
+  scans.reset();  // its memory
   STRATA_ASSIGN_OR_RETURN(change.version, NextVersion());
   absl::Status made = MakeServed(*reader, change);
   if (made.ok()) made = CommitBatch(batch, change);

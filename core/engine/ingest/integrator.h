@@ -17,6 +17,7 @@
 #include "core/common/stop.h"
 #include "core/engine/ingest/aligner.h"
 #include "core/engine/ingest/scan_mover.h"
+#include "core/engine/ingest/scans_ahead.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/scans/scan_labels.h"
 #include "core/engine/tiles/mls_tiles.h"
@@ -103,13 +104,9 @@ class Integrator {
   };
 
   absl::Status LoadAlignerOnce(StorageReader& reader);
-  absl::StatusOr<Placement> Placed(const ScanRecord& scan,
-                                   const MlsMap& local_map,
-                                   StorageReader& reader,
-                                   ScanSource& source);
   absl::Status IntegrateScan(const ScanRecord& scan,
+                             absl::StatusOr<ReadyScan> ready,
                              StorageReader& reader,
-                             ScanSource& source,
                              MlsTileMap& tiles,
                              Batch& batch);
   absl::Status CommitBatch(const Batch& batch, const TileChange& change);
