@@ -81,7 +81,8 @@ absl::Status Integrator::ChangeLabels(StorageReader& reader,
   }
   if (tiles.tiles.empty()) return core_.writer().Run(Durability::kFull, 0, Stop(), put);
   STRATA_ASSIGN_OR_RETURN(tiles.version, NextVersion());
-  STRATA_RETURN_IF_ERROR(MakeServed(reader, tiles, /*geometry=*/false));
+  STRATA_RETURN_IF_ERROR(
+      MakeServed(reader, tiles, core_.options().worker_threads, /*geometry=*/false));
   return Commit(tiles, {}, put);
 }
 

@@ -30,7 +30,7 @@ absl::Status Integrator::DeleteScan(const ScanId& id) {
   STRATA_ASSIGN_OR_RETURN(change.tiles,
                           TilesWithout(*reader, {tiles.begin(), tiles.end()}, number));
   STRATA_ASSIGN_OR_RETURN(change.version, NextVersion());
-  STRATA_RETURN_IF_ERROR(MakeServed(*reader, change));
+  STRATA_RETURN_IF_ERROR(MakeServed(*reader, change, core_.options().worker_threads));
   STRATA_RETURN_IF_ERROR(
       Commit(change, {id}, [&](StorageWriter& writer) { return writer.DeleteScan(number); }));
   aligner_loaded_ = false;
