@@ -30,16 +30,15 @@ struct Cube {
   float count = 0.0F;
 };
 
-std::vector<std::uint64_t> CubeKeys(const std::vector<Eigen::Vector3f>& points, float cube_m) {
-  const auto coordinate = [&](float v) {
-    return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(v / cube_m))) & 0x1FFFFF;
+// The point's cube: 21 bits an axis.
+std::uint64_t KeyOf(const Eigen::Vector3f& p, float cube_m) {
+  const auto coordinate = [cube_m](float v) {
+    const float cubes = v / cube_m;
+    auto floor = static_cast<std::int64_t>(cubes);  // towards zero
+    if (static_cast<float>(floor) > cubes) --floor;
+    return static_cast<std::uint64_t>(floor) & 0x1FFFFF;
   };
-  std::vector<std::uint64_t> keys(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3f& p = points[i];
-    keys[i] = coordinate(p.x()) | coordinate(p.y()) << 21 | coordinate(p.z()) << 42;
-  }
-  return keys;
+  return coordinate(p.x()) | coordinate(p.y()) << 21 | coordinate(p.z()) << 42;
 }
 
 // Averages points that share a cube. Open addressing over cube keys; cubes keep the order in which
@@ -47,7 +46,10 @@ std::vector<std::uint64_t> CubeKeys(const std::vector<Eigen::Vector3f>& points, 
 // larger than caches, and which slot is next does not depend on those before.
 std::vector<Eigen::Vector3f> AverageInCubes(const std::vector<Eigen::Vector3f>& points,
                                             float cube_m) {
-  const std::vector<std::uint64_t> keys = CubeKeys(points, cube_m);
+  std::vector<std::uint64_t> keys(points.size());
+  std::transform(points.begin(), points.end(), keys.begin(), [cube_m](const Eigen::Vector3f& p) {
+    return KeyOf(p, cube_m);
+  });
   std::vector<Cube> cubes;
   cubes.reserve(points.size() / 2);
   const std::size_t slots = std::bit_ceil(points.size() * 2 + 1);
@@ -93,6 +95,11 @@ RegistrationTarget::RegistrationTarget(std::span<const PlacedScan> scans,
   const auto radius_m2 = static_cast<float>(options.radius_m * options.radius_m);
   for (int c = 0; c < kFeatureClasses; ++c) {
     std::vector<Eigen::Vector3f> points;
+    std::size_t most = 0;
+    for (const PlacedScan& scan : scans) {
+      most += scan.features->points(static_cast<FeatureClass>(c)).size();
+    }
+    points.reserve(most);
     for (const PlacedScan& scan : scans) {
       const Eigen::Matrix3f R = scan.T_target_scan.linear().cast<float>();
       const Eigen::Vector3f t = (scan.T_target_scan.translation() - origin_).cast<float>();

@@ -1,3 +1,4 @@
+find_package(CLI11 REQUIRED)
 strata_executable(
   durable_upload_benchmark durable_upload_benchmark
   SOURCES durable_upload_benchmark.cc
@@ -9,5 +10,11 @@ strata_executable(
   SOURCES tile_read_benchmark.cc
   DEPS strata::engine strata::proto strata::server strata::test_support gRPC::grpc++ PkgConfig::glog
 )
+strata_executable(
+  ingest_benchmark ingest_benchmark
+  SOURCES ingest_benchmark.cc
+  DEPS strata::engine strata::test_recordings strata::test_support PkgConfig::glog CLI11::CLI11
+)
 strata_smoke(durable_upload_benchmark 16 1 smoke)
 strata_smoke(tile_read_benchmark 0.1 1 smoke)
+strata_smoke(ingest_benchmark --scans 40 --repeats 1)

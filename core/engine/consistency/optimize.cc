@@ -291,9 +291,20 @@ absl::Status RunOptimizeJob(MapCore& core,
     context.SetProposed();
   } else {
     PartOfJob part(context, accepted ? 0.0 : kAlignmentEnd, 1.0);
+    TilesAhead ahead(core);
+    const bool made =
+        MakeAhead(
+            core, job, proposed.base_epoch, settings.tolerance, threads, context.stop(), ahead)
+            .ok();
     const auto apply = [&](Integrator& integrator) {
-      return ApplyProposal(
-          integrator, job, proposed.base_epoch, settings.tolerance, threads, damaged, part);
+      return ApplyProposal(integrator,
+                           job,
+                           proposed.base_epoch,
+                           settings.tolerance,
+                           threads,
+                           damaged,
+                           made ? &ahead : nullptr,
+                           part);
     };
     STRATA_RETURN_IF_ERROR(
         worker.Execute(context.stop(), apply, absl::StrCat("job ", job.id, " (", job.kind, ")")));

@@ -42,12 +42,24 @@ absl::StatusOr<PoseChange> ReadChange(MapCore& core, const JobInfo& job, std::ui
 
 }  // namespace
 
+absl::Status MakeAhead(MapCore& core,
+                       const JobInfo& job,
+                       std::uint64_t base_epoch,
+                       const MoveTolerance& tolerance,
+                       int threads,
+                       const Stop& stop,
+                       TilesAhead& ahead) {
+  STRATA_ASSIGN_OR_RETURN(const PoseChange change, ReadChange(core, job, base_epoch));
+  return ahead.Make(change.Resolve(tolerance).moves, threads, stop);
+}
+
 absl::Status ApplyProposal(Integrator& integrator,
                            const JobInfo& job,
                            std::uint64_t base_epoch,
                            const MoveTolerance& tolerance,
                            int threads,
                            DamagedScans& damaged,
+                           const TilesAhead* ahead,
                            JobContext& context) {
   MapCore& core = integrator.core();
   STRATA_ASSIGN_OR_RETURN(const PoseChange change, ReadChange(core, job, base_epoch));
@@ -67,6 +79,7 @@ absl::Status ApplyProposal(Integrator& integrator,
     moves.reason = absl::StrCat(job.kind, ", job ", job.id);
     moves.job = job.id;
     moves.damaged = &damaged;
+    moves.ahead = ahead;
     STRATA_ASSIGN_OR_RETURN(moved, integrator.MoveScans(moves, threads, context, adopt));
   }
   context.SetMetric("epoch", static_cast<double>(moved.epoch));

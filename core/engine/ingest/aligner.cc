@@ -137,12 +137,8 @@ Pose Aligner::Guess(const ScanRecord& scan) const {
                     header.T_map_scan);
 }
 
-Aligner::Features Aligner::Keep(const ScanRecord& scan, const MlsMap& map, int samples) {
-  ScanFeatureOptions options = FeatureOptionsOf(scan);
-  options.sample_count = samples;
-  auto features = std::make_shared<const ScanFeatures>(ScanFeatures::FromMap(map, options));
-  features_.Put(scan.number, features, features->memory_bytes());
-  return features;
+void Aligner::Keep(ScanNumber number, const Features& features) {
+  features_.Put(number, features, features->memory_bytes());
 }
 
 absl::StatusOr<Aligner::Features> Aligner::FeaturesOf(ScanNumber number,
@@ -151,7 +147,11 @@ absl::StatusOr<Aligner::Features> Aligner::FeaturesOf(ScanNumber number,
   if (Features held = features_.Find(number); held != nullptr) return held;
   STRATA_ASSIGN_OR_RETURN(const PosedScan posed, reader.GetScan(number, 0));
   STRATA_ASSIGN_OR_RETURN(const MlsMap map, source.RegistrationMap(posed.scan));
-  return Keep(posed.scan, map, 0);
+  ScanFeatureOptions options = FeatureOptionsOf(posed.scan);
+  options.sample_count = 0;  // others are matched to it, it is not matched itself
+  const auto features = std::make_shared<const ScanFeatures>(ScanFeatures::FromMap(map, options));
+  Keep(number, features);
+  return features;
 }
 
 std::vector<std::size_t> Aligner::OwnPass(const ScanId& id, const Pose& guess) {
@@ -312,12 +312,12 @@ absl::StatusOr<Placement> Aligner::PlaceAmongLost(const ScanRecord& scan,
 }
 
 absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
-                                         const MlsMap& registration_map,
+                                         const Features& own,
                                          StorageReader& reader,
                                          ScanSource& source) {
   Placement placement;
   placement.T_map_scan = scan.header.T_map_scan;
-  const Features own = Keep(scan, registration_map, FeatureOptionsOf(scan).sample_count);
+  Keep(scan.number, own);
   if (scan.header.alignment == Alignment::kOff) {
     placement.report.message = "alignment off: pose as uploaded";
     return placement;

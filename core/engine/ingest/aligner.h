@@ -18,7 +18,6 @@
 #include "core/common/lru_cache.h"
 #include "core/engine/ingest/link.h"
 #include "core/engine/scans/scan_source.h"
-#include "core/mls/mls_map.h"
 #include "core/registration/place_match.h"
 #include "core/registration/scan_features.h"
 #include "core/storage/storage.h"
@@ -42,7 +41,9 @@ class Aligner {
   // Forgets everything and reads the integrated scans of `epoch`.
   absl::Status Load(StorageReader& reader, std::uint64_t epoch);
 
-  // `registration_map` is the scan's own. Alignment::kOff: the uploaded pose. Otherwise the guess
+  using Features = std::shared_ptr<const ScanFeatures>;
+
+  // `own`: the scan's, with a sample. Alignment::kOff: the uploaded pose. Otherwise the guess
   // (the predecessor's pose and the uploaded motion since; the uploaded pose for the first of a
   // trajectory), registered to the nearest scans of its own segment, which is what constraints say,
   // and to all around where those agree with it; where its segment says nothing, to the scans right
@@ -50,7 +51,7 @@ class Aligner {
   // is verified as a place is; so is a constraint to a segment that nothing holds to its own yet.
   // The guess if nothing holds.
   absl::StatusOr<Placement> Place(const ScanRecord& scan,
-                                  const MlsMap& registration_map,
+                                  const Features& own,
                                   StorageReader& reader,
                                   ScanSource& source);
   // The scan is integrated at this pose.
@@ -64,7 +65,6 @@ class Aligner {
     bool is_lost = false;           // others of its pass were around, and none said where it is
     std::size_t segment = 0;        // of its trajectory, by the first scan's place in scans_
   };
-  using Features = std::shared_ptr<const ScanFeatures>;
   // The scans to align to.
   struct Neighbourhood {
     std::vector<Features> held;  // keeps alive what `seen` points to
@@ -116,8 +116,7 @@ class Aligner {
   std::vector<ConstraintRecord> ConstraintsOf(ScanNumber number,
                                               const Link& link,
                                               std::vector<std::size_t> partners) const;
-  // `samples`: 0 for a scan that others are matched to, and that is not matched itself.
-  Features Keep(const ScanRecord& scan, const MlsMap& map, int samples);
+  void Keep(ScanNumber number, const Features& features);
 
   // By commit order.
   std::vector<PlacedEntry> scans_;

@@ -14,6 +14,8 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/engine/ingest/changed_scans.h"
+#include "core/engine/ingest/tiles_ahead.h"
 #include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/scans/damaged_scans.h"
@@ -26,14 +28,6 @@
 
 namespace strata {
 
-// A scan as it will be.
-struct ChangedScan {
-  ScanRecord scan;
-  Pose T_map_scan = Pose::Identity();
-  std::vector<TileKey> tiles;  // that it touches from now on
-};
-using ChangedScans = absl::btree_map<ScanNumber, ChangedScan>;
-
 struct ChangedTilesOptions {
   std::uint64_t version = 0;
   int threads = 1;
@@ -42,6 +36,8 @@ struct ChangedTilesOptions {
   double annotating = 0.5;
   // Takes what is damaged; nullptr: DATA_LOSS.
   DamagedScans* damaged = nullptr;
+  // Tiles that are made already; nullptr: none are. Not together with `change_of`.
+  const TilesAhead* ahead = nullptr;
   // What is said of a changed scan from now on; nullopt: what is stored.
   std::optional<absl::FunctionRef<LabelChange(const ScanRecord&)>> change_of;
 };
@@ -70,10 +66,19 @@ class ChangedTiles {
   absl::StatusOr<KeySet> Stage(StorageReader& reader);
 
  private:
-  absl::StatusOr<KeySet> Touched(StorageReader& reader) const;
   // All scans of the tiles, as they will be; `changes` gets what is said of them.
   absl::StatusOr<std::vector<PlacedScanRecord>> ScansOfBlock(
       StorageReader& reader, const KeySet& keys, std::map<ScanNumber, LabelChange>& changes) const;
+  // A block of tiles of `scans`; `gone` gets those where nothing is any more.
+  absl::Status StageBlock(const std::vector<PlacedScanRecord>& scans,
+                          const KeySet& keys,
+                          MlsTileMap& gone);
+  // The same where some of it is made: the tiles of `scans` out of `ahead`, with those that are not
+  // in it.
+  absl::Status StageAhead(const TilesAhead::Block& ahead,
+                          const std::vector<PlacedScanRecord>& scans,
+                          const KeySet& keys,
+                          MlsTileMap& gone);
   // Returns the tiles where nothing is any more.
   absl::StatusOr<MlsTileMap> StageMlsTiles(StorageReader& reader, const KeySet& keys);
   absl::Status StageSurfaces(StorageReader& reader, const KeySet& keys, const MlsTileMap& gone);

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/container/btree_map.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
@@ -159,6 +160,7 @@ class FadingPass {
 
 absl::StatusOr<std::size_t> Integrator::SetFaded(const FadingRequest& request,
                                                  JobContext& context) {
+  const absl::Cleanup edited = [this] { core_.NoteEdit(); };
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, NextVersion());
   // Decoded tiles are kept by key alone: those to come must not outlive a failure.
   store_.Clear();

@@ -4,7 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,8 +17,8 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 
-#include "core/codec/local_map_codec.h"
 #include "core/common/status.h"
+#include "core/engine/map/aside.h"
 #include "core/engine/scans/scan_losses.h"
 #include "core/engine/scans/scan_share.h"
 #include "core/engine/scans/scan_source.h"
@@ -26,8 +28,8 @@ namespace strata {
 namespace {
 
 constexpr std::uint64_t kBatchPoints = 8'000'000;
-// Tiles of a batch, beyond which no scan joins it: they are in memory until it is committed.
-constexpr std::size_t kBatchBytes = std::size_t{96} << 20;
+// Tiles of a batch, beyond which no scan joins it: those of two batches are in memory at once.
+constexpr std::size_t kBatchBytes = std::size_t{48} << 20;
 
 std::size_t MemoryBytes(const MlsTileMap& tiles) {
   std::size_t bytes = 0;
@@ -85,15 +87,17 @@ absl::Status Integrator::LoadAlignerOnce(StorageReader& reader) {
   return absl::OkStatus();
 }
 
-absl::Status Integrator::MakeServed(StorageReader& reader, TileChange& change, bool geometry) {
+absl::Status Integrator::MakeServed(StorageReader& reader,
+                                    TileChange& change,
+                                    int threads,
+                                    bool geometry) {
   const MapParameters parameters = core_.info().parameters;
-  SurfaceTileMaker maker(core_,
-                         reader,
-                         store_,
-                         change.tiles,
-                         {.version = change.version,
-                          .threads = core_.options().worker_threads,
-                          .profile = parameters.default_profile});
+  SurfaceTileMaker maker(
+      core_,
+      reader,
+      store_,
+      change.tiles,
+      {.version = change.version, .threads = threads, .profile = parameters.default_profile});
   absl::btree_set<TileKey> changed;
   for (const auto& [key, tile] : change.tiles) changed.insert(key);
   // A tile's annotation looks beyond its border, at heights only.
@@ -123,60 +127,52 @@ absl::Status Integrator::Commit(const TileChange& change,
   if (!awaited) {
     STRATA_RETURN_IF_ERROR(core_.disk().CheckForIntegration(BytesOf(rows, change)));
   }
-  absl::Status committed = core_.Publish(
+  STRATA_RETURN_IF_ERROR(core_.Publish(
       scans, NoticesOf(change.surfaces), awaited, [&](StorageWriter& writer) -> absl::Status {
         // First what may free pages: a scan can be deleted from a file that may not grow.
         STRATA_RETURN_IF_ERROR(decision(writer));
         STRATA_RETURN_IF_ERROR(RetireTileRows(writer, keys, change.version, floor));
         STRATA_RETURN_IF_ERROR(PutTileRows(writer, rows, change.surfaces));
         return writer.PublishTiles(change.version, true);
-      });
-  if (!committed.ok()) {
-    aligner_loaded_ = false;  // it may know of scans that were not committed
-    return committed;
-  }
+      }));
   store_.Replace(change.tiles);
   return absl::OkStatus();
 }
 
-absl::StatusOr<Placement> Integrator::Placed(const ScanRecord& scan,
-                                             const MlsMap& local_map,
-                                             StorageReader& reader,
-                                             ScanSource& source) {
-  if (!source.IsTooCoarse(scan)) return aligner_.Place(scan, local_map, reader, source);
-  STRATA_ASSIGN_OR_RETURN(const MlsMap finer, source.RegistrationMap(scan));
-  return aligner_.Place(scan, finer, reader, source);
+absl::StatusOr<MlsTilePtr> Integrator::TileOf(const TileKey& key,
+                                              StorageReader& reader,
+                                              std::uint64_t version,
+                                              const Batch* behind) {
+  if (behind != nullptr) {
+    const auto found = behind->change.tiles.find(key);
+    if (found != behind->change.tiles.end()) return found->second;
+  }
+  return store_.Load(reader, key, version);
 }
 
 absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
+                                       absl::StatusOr<ReadyScan> ready,
                                        StorageReader& reader,
-                                       ScanSource& source,
-                                       MlsTileMap& tiles,
+                                       const Batch* behind,
                                        Batch& batch) {
-  const ScanShare share(core_.caches(), scan);
+  STRATA_RETURN_IF_ERROR(ready.status());
+  ScanSource& source = *ready->source;
   Integrated done;
   done.scan = scan;
-  const MapParameters parameters = core_.info().parameters;
-  const SensorModel sensor = scan.header.sensor.value_or(parameters.sensor);
-  {
-    STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
-    STRATA_RETURN_IF_ERROR(CheckContributes(local_map, source.dropped(), scan, sensor));
-    if (!parameters.keep_points) {
-      STRATA_RETURN_IF_ERROR(CheckRoomInTiles(local_map, {}));
-      STRATA_ASSIGN_OR_RETURN(done.local_map, EncodeLocalMap(local_map));
-    }
-    STRATA_ASSIGN_OR_RETURN(done.placement, Placed(scan, local_map, reader, source));
-  }
+  done.local_map = std::move(ready->local_map);
+  STRATA_ASSIGN_OR_RETURN(done.placement, aligner_.Place(scan, ready->features, reader, source));
   STRATA_ASSIGN_OR_RETURN(MlsMap contribution,
                           source.Contribution(scan, done.placement.T_map_scan));
+  const SensorModel sensor = scan.header.sensor.value_or(core_.info().parameters.sensor);
   STRATA_RETURN_IF_ERROR(CheckContributes(contribution, source.dropped(), scan, sensor));
   done.losses = DescribeLosses(source.dropped(), scan.header, sensor);
+  MlsTileMap& tiles = batch.change.tiles;
   const std::uint64_t version = core_.snapshots().current().tile_version;
   for (const MlsTile& tile : contribution.tiles) {
     if (tile.patches.empty()) continue;
     done.tiles.push_back(tile.key);
     if (tiles.contains(tile.key)) continue;
-    STRATA_ASSIGN_OR_RETURN(MlsTilePtr held, store_.Load(reader, tile.key, version));
+    STRATA_ASSIGN_OR_RETURN(MlsTilePtr held, TileOf(tile.key, reader, version, behind));
     tiles[tile.key] = std::move(held);
   }
   STRATA_RETURN_IF_ERROR(CheckRoomInTiles(contribution, tiles));
@@ -186,49 +182,99 @@ absl::Status Integrator::IntegrateScan(const ScanRecord& scan,
   return absl::OkStatus();
 }
 
-absl::StatusOr<int> Integrator::IntegrateBatch(int most_scans) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-  ScanQuery query;
-  query.state = ScanState::kPending;
-  query.skip_damaged = true;  // it stays pending, and verify names it
-  query.limit = static_cast<std::uint32_t>(most_scans);
-  STRATA_ASSIGN_OR_RETURN(const std::vector<PosedScan> pending, reader->ListScans(query, epoch()));
-  if (pending.empty()) return 0;
+absl::Status Integrator::Fill(std::span<const PosedScan> pending,
+                              std::size_t first,
+                              const Batch* behind,
+                              ScansAhead& scans,
+                              Batch& batch) {
   STRATA_RETURN_IF_ERROR(core_.disk().CheckForIntegration(0));
-  STRATA_RETURN_IF_ERROR(LoadAlignerOnce(*reader));
-  const MapParameters parameters = core_.info().parameters;
-  std::optional<ScanSource> source(std::in_place, *reader, parameters);
-  TileChange change;
-  Batch batch;
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  const auto most = static_cast<std::size_t>(core_.options().max_batch_scans);
   std::uint64_t points = 0;
-  int count = 0;
-  for (const PosedScan& posed : pending) {
-    if (count > 0 && (points + posed.scan.header.point_count > kBatchPoints ||
-                      MemoryBytes(change.tiles) > kBatchBytes)) {
+  for (std::size_t i = first; i < pending.size() && batch.scans < most; ++i) {
+    const ScanRecord& scan = pending[i].scan;
+    if (batch.scans > 0 && (points + scan.header.point_count > kBatchPoints ||
+                            MemoryBytes(batch.change.tiles) > kBatchBytes)) {
       break;
     }
-    points += posed.scan.header.point_count;
-    ++count;
-    const absl::Status done = IntegrateScan(posed.scan, *reader, *source, change.tiles, batch);
+    points += scan.header.point_count;
+    ++batch.scans;
+    const ScanShare share(core_.caches(), scan);
+    const absl::Status done = IntegrateScan(scan, scans.Take(i), *reader, behind, batch);
     if (done.ok()) continue;
-    if (!IsFaultOfScan(done)) {
-      aligner_loaded_ = false;
-      return done;
-    }
-    batch.failed.push_back({posed.scan.number, posed.scan.header.id, std::string(done.message())});
+    if (!IsFaultOfScan(done)) return done;
+    batch.failed.push_back({scan.number, scan.header.id, std::string(done.message())});
   }
-  source.reset();  // its memory
-  STRATA_ASSIGN_OR_RETURN(change.version, NextVersion());
-  absl::Status made = MakeServed(*reader, change);
-  if (made.ok()) made = CommitBatch(batch, change);
-  if (!made.ok()) {
-    aligner_loaded_ = false;
-    return made;
-  }
-  return count;
+  return absl::OkStatus();
 }
 
-absl::Status Integrator::CommitBatch(const Batch& batch, const TileChange& change) {
+absl::Status Integrator::PublishBatch(Batch& batch, int threads) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  STRATA_ASSIGN_OR_RETURN(batch.change.version, NextVersion());
+  STRATA_RETURN_IF_ERROR(MakeServed(*reader, batch.change, threads));
+  return CommitBatch(batch);
+}
+
+absl::StatusOr<int> Integrator::IntegratePending(int most_scans,
+                                                 absl::FunctionRef<bool()> goes_on) {
+  std::vector<PosedScan> pending;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    ScanQuery query;
+    query.state = ScanState::kPending;
+    query.skip_damaged = true;  // it stays pending, and verify names it
+    query.limit = static_cast<std::uint32_t>(most_scans);
+    STRATA_ASSIGN_OR_RETURN(pending, reader->ListScans(query, epoch()));
+    if (pending.empty()) return 0;
+    STRATA_RETURN_IF_ERROR(LoadAlignerOnce(*reader));
+  }
+  std::size_t count = 0;
+  const absl::Status done = IntegrateBatches(pending, goes_on, count);
+  if (!done.ok()) ForgetCaches();  // they may know of scans that were not committed
+  // Whatever it was comes again with the scans that are left.
+  if (!done.ok() && count == 0) return done;
+  return static_cast<int>(count);
+}
+
+absl::Status Integrator::IntegrateBatches(std::span<const PosedScan> pending,
+                                          absl::FunctionRef<bool()> goes_on,
+                                          std::size_t& count) {
+  const int threads = core_.options().worker_threads;
+  // Points that go with a commit must not be read meanwhile.
+  const bool overlap = threads > 1 && core_.info().parameters.keep_points;
+  std::optional<ScansAhead> scans(std::in_place, core_, pending);
+  std::unique_ptr<Batch> behind;
+  std::optional<Aside> publication;  // of what is behind
+  const auto settle = [&]() -> absl::Status {
+    if (!publication.has_value()) return absl::OkStatus();
+    const absl::Status published = publication->Await();
+    publication.reset();
+    if (published.ok()) count += behind->scans;
+    behind.reset();
+    return published;
+  };
+  for (std::size_t next = 0; next < pending.size() && (next == 0 || goes_on());) {
+    auto batch = std::make_unique<Batch>();
+    const absl::Status filled = Fill(pending, next, behind.get(), *scans, *batch);
+    STRATA_RETURN_IF_ERROR(settle());
+    STRATA_RETURN_IF_ERROR(filled);
+    next += batch->scans;
+    behind = std::move(batch);
+    if (overlap && next < pending.size()) {
+      publication.emplace("worker tiles", [this, &made = *behind, threads] {
+        return PublishBatch(made, threads - 1);
+      });
+      continue;
+    }
+    if (next == pending.size()) scans.reset();  // its memory
+    STRATA_RETURN_IF_ERROR(PublishBatch(*behind, threads));
+    count += behind->scans;
+    behind.reset();
+  }
+  return settle();
+}
+
+absl::Status Integrator::CommitBatch(const Batch& batch) {
   std::vector<ScanId> scans;
   for (const Failed& failed : batch.failed) scans.push_back(failed.id);
   for (const Integrated& done : batch.integrated) scans.push_back(done.scan.header.id);
@@ -255,7 +301,7 @@ absl::Status Integrator::CommitBatch(const Batch& batch, const TileChange& chang
     }
     return absl::OkStatus();
   };
-  return Commit(change, scans, decision, /*awaited=*/false);
+  return Commit(batch.change, scans, decision, /*awaited=*/false);
 }
 
 }  // namespace strata

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include "core/common/stop.h"
 #include "core/engine/ingest/aligner.h"
 #include "core/engine/ingest/scan_mover.h"
+#include "core/engine/ingest/scans_ahead.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/scans/scan_labels.h"
 #include "core/engine/tiles/mls_tiles.h"
@@ -44,10 +46,12 @@ class Integrator {
  public:
   explicit Integrator(MapCore& core) : core_(core), aligner_(core.caches()), store_(core) {}
 
-  // Integrates pending scans in commit order, as many as make a good transaction, at most
-  // `most_scans`; returns how many (0: none is left). A scan that cannot be integrated is marked
-  // failed and counted; an error is one of the store, and nothing has changed then.
-  absl::StatusOr<int> IntegrateBatch(int most_scans);
+  // Integrates pending scans in commit order, at most `most_scans`, in transactions of
+  // EngineOptions::max_batch_scans at most; after each it ends unless `goes_on`. Returns how many
+  // (0: none is left). A scan that cannot be integrated is marked failed and counted; an error is
+  // one of the store, and nothing has changed then. With more than one thread tiles of a
+  // transaction are made and written while the scans of the next one are placed.
+  absl::StatusOr<int> IntegratePending(int most_scans, absl::FunctionRef<bool()> goes_on);
 
   // In any state. NOT_FOUND.
   absl::Status DeleteScan(const ScanId& id);
@@ -97,22 +101,37 @@ class Integrator {
     ScanId id;
     std::string message;
   };
+  // Of one transaction.
   struct Batch {
+    std::size_t scans = 0;
     std::vector<Integrated> integrated;
     std::vector<Failed> failed;
+    TileChange change;
   };
 
   absl::Status LoadAlignerOnce(StorageReader& reader);
-  absl::StatusOr<Placement> Placed(const ScanRecord& scan,
-                                   const MlsMap& local_map,
-                                   StorageReader& reader,
-                                   ScanSource& source);
+  // Counts the scans of the batches that were committed.
+  absl::Status IntegrateBatches(std::span<const PosedScan> pending,
+                                absl::FunctionRef<bool()> goes_on,
+                                std::size_t& count);
+  // With scans from `first` on. `behind`: the batch before, being published; or nullptr.
+  absl::Status Fill(std::span<const PosedScan> pending,
+                    std::size_t first,
+                    const Batch* behind,
+                    ScansAhead& scans,
+                    Batch& batch);
   absl::Status IntegrateScan(const ScanRecord& scan,
+                             absl::StatusOr<ReadyScan> ready,
                              StorageReader& reader,
-                             ScanSource& source,
-                             MlsTileMap& tiles,
+                             const Batch* behind,
                              Batch& batch);
-  absl::Status CommitBatch(const Batch& batch, const TileChange& change);
+  absl::StatusOr<MlsTilePtr> TileOf(const TileKey& key,
+                                    StorageReader& reader,
+                                    std::uint64_t version,
+                                    const Batch* behind);
+  // These two beside all of the above.
+  absl::Status PublishBatch(Batch& batch, int threads);
+  absl::Status CommitBatch(const Batch& batch);
   // Stores the labels, and has the tiles of the scan count them.
   absl::Status ChangeLabels(StorageReader& reader,
                             const PosedScan& posed,
@@ -122,7 +141,10 @@ class Integrator {
                                      const PosedScan& posed,
                                      const LabelChange& change);
   // Fills in what is served of change.tiles, and of their neighbours if geometry changed.
-  absl::Status MakeServed(StorageReader& reader, TileChange& change, bool geometry = true);
+  absl::Status MakeServed(StorageReader& reader,
+                          TileChange& change,
+                          int threads,
+                          bool geometry = true);
   // Publishes `change` together with whatever `decision` writes; watchers learn of it and of
   // `scans`. As MapCore::Publish().
   absl::Status Commit(const TileChange& change,

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
@@ -70,6 +71,7 @@ absl::StatusOr<MlsTileMap> Integrator::Revoted(StorageReader& reader,
 absl::Status Integrator::ChangeLabels(StorageReader& reader,
                                       const PosedScan& posed,
                                       const LabelChange& change) {
+  const absl::Cleanup edited = [this] { core_.NoteEdit(); };
   STRATA_RETURN_IF_ERROR(CheckLabels(posed.scan, change.labels.size()));
   const std::vector<std::string> pieces = EncodeLabelChange(change);
   const auto put = [&](StorageWriter& writer) {
@@ -81,7 +83,8 @@ absl::Status Integrator::ChangeLabels(StorageReader& reader,
   }
   if (tiles.tiles.empty()) return core_.writer().Run(Durability::kFull, 0, Stop(), put);
   STRATA_ASSIGN_OR_RETURN(tiles.version, NextVersion());
-  STRATA_RETURN_IF_ERROR(MakeServed(reader, tiles, /*geometry=*/false));
+  STRATA_RETURN_IF_ERROR(
+      MakeServed(reader, tiles, core_.options().worker_threads, /*geometry=*/false));
   return Commit(tiles, {}, put);
 }
 

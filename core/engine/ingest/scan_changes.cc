@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/container/btree_set.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -22,6 +23,7 @@ absl::StatusOr<MlsTileMap> Integrator::TilesWithout(StorageReader& reader,
 }
 
 absl::Status Integrator::DeleteScan(const ScanId& id) {
+  const absl::Cleanup edited = [this] { core_.NoteEdit(); };
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
   STRATA_ASSIGN_OR_RETURN(const PosedScan posed, GetScanById(*reader, id, epoch()));
   const ScanNumber number = posed.scan.number;
@@ -30,7 +32,7 @@ absl::Status Integrator::DeleteScan(const ScanId& id) {
   STRATA_ASSIGN_OR_RETURN(change.tiles,
                           TilesWithout(*reader, {tiles.begin(), tiles.end()}, number));
   STRATA_ASSIGN_OR_RETURN(change.version, NextVersion());
-  STRATA_RETURN_IF_ERROR(MakeServed(*reader, change));
+  STRATA_RETURN_IF_ERROR(MakeServed(*reader, change, core_.options().worker_threads));
   STRATA_RETURN_IF_ERROR(
       Commit(change, {id}, [&](StorageWriter& writer) { return writer.DeleteScan(number); }));
   aligner_loaded_ = false;

@@ -6,13 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "absl/strings/str_cat.h"
-
 #include "core/common/status.h"
+#include "core/engine/ingest/changed_tiles.h"
 #include "core/engine/map/parallel.h"
-#include "core/engine/scans/scan_losses.h"
-#include "core/engine/scans/scan_share.h"
-#include "core/engine/scans/scan_source.h"
 
 namespace strata {
 namespace {
@@ -26,39 +22,26 @@ double Share(std::size_t i, std::size_t count) {
 
 }  // namespace
 
-absl::StatusOr<ChangedScan> ScanMover::Move(const ProposedPose& pose) const {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-  STRATA_ASSIGN_OR_RETURN(PosedScan posed, reader->GetScan(pose.scan, epoch_));
-  const ScanHeader& header = posed.scan.header;
-  const MapParameters parameters = core_.info().parameters;
-  const ScanShare share(core_.caches(), posed.scan);
-  ScanSource source(*reader, parameters);
-  ChangedScan moved;
-  moved.T_map_scan = pose.T_map_scan;
-  const absl::StatusOr<MlsMap> contribution = source.Contribution(posed.scan, pose.T_map_scan);
-  if (moves_.damaged != nullptr &&
-      moves_.damaged->LeaveOut(pose.scan, header.id.ToString(), contribution.status())) {
-    moved.scan = std::move(posed.scan);
-    return moved;
-  }
-  if (!contribution.ok()) {
-    return Annotate(contribution.status(), absl::StrCat("scan ", header.id.ToString()));
-  }
-  STRATA_RETURN_IF_ERROR(CheckContributes(
-      *contribution, source.dropped(), posed.scan, header.sensor.value_or(parameters.sensor)));
-  moved.tiles = TilesOf(*contribution);
-  moved.scan = std::move(posed.scan);
-  return moved;
+const TilesAhead* ScanMover::Ahead() const {
+  return moves_.ahead != nullptr && moves_.ahead->IsOfNow() ? moves_.ahead : nullptr;
 }
 
 absl::Status ScanMover::MoveAll() {
   std::vector<ChangedScan> list(moves_.poses.size());
+  const TilesAhead* const ahead = Ahead();
   STRATA_RETURN_IF_ERROR(
       ParallelFor(threads_, list.size(), [&](int thread, std::size_t i) -> absl::Status {
         if (thread == 0) {
           STRATA_RETURN_IF_ERROR(context_.Progress(0.2 * Share(i, list.size()), "moving scans"));
         }
-        STRATA_ASSIGN_OR_RETURN(list[i], Move(moves_.poses[i]));
+        const ProposedPose& move = moves_.poses[i];
+        const ChangedScan* const moved =
+            ahead == nullptr ? nullptr : ahead->FindScan(move.scan, move.T_map_scan);
+        if (moved != nullptr) {
+          list[i] = *moved;
+          return absl::OkStatus();
+        }
+        STRATA_ASSIGN_OR_RETURN(list[i], MovedScan(core_, move, epoch_, moves_.damaged));
         return absl::OkStatus();
       }));
   for (ChangedScan& scan : list) {
@@ -109,6 +92,7 @@ absl::StatusOr<MoveOutcome> ScanMover::Run(
                         .joining = 0.2,
                         .annotating = 0.7,
                         .damaged = moves_.damaged,
+                        .ahead = Ahead(),
                         .change_of = std::nullopt},
                        context_);
     STRATA_ASSIGN_OR_RETURN(const auto made, tiles.Stage(*reader));

@@ -13,7 +13,8 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "core/engine/ingest/changed_tiles.h"
+#include "core/engine/ingest/changed_scans.h"
+#include "core/engine/ingest/tiles_ahead.h"
 #include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/scans/damaged_scans.h"
@@ -32,6 +33,7 @@ struct ScanMoves {
   // Takes what is damaged: such scans get their poses, but are in no tile that is made again.
   // nullptr: one of them is DATA_LOSS, and nothing moves.
   DamagedScans* damaged = nullptr;
+  const TilesAhead* ahead = nullptr;  // of these moves or most of them; nullptr: none
 };
 
 struct MoveOutcome {
@@ -64,7 +66,8 @@ class ScanMover {
   absl::StatusOr<MoveOutcome> Run(absl::FunctionRef<absl::Status(StorageWriter&)> decision);
 
  private:
-  absl::StatusOr<ChangedScan> Move(const ProposedPose& pose) const;
+  // What is ahead, if it still holds.
+  const TilesAhead* Ahead() const;
   absl::Status MoveAll();
   // Keeps the tiles of damaged scans that stay where they are: all but those made again.
   absl::Status KeepOtherTiles(StorageReader& reader, const absl::btree_set<TileKey>& made);

@@ -27,6 +27,9 @@ namespace {
 constexpr absl::Duration kStopPoll = absl::Milliseconds(50);
 // After which a sender may ask whether there is room again: some scans are integrated by then.
 constexpr absl::Duration kQueueDelay = absl::Milliseconds(200);
+// Transactions of scans, as long as nothing else is to be done: each is written while the next one
+// is filled.
+constexpr int kBatchesInARow = 4;
 // So often a scan is tried again alone when there was no memory.
 constexpr int kMemoryTries = 10;
 
@@ -238,9 +241,13 @@ void Worker::RunBatch() {
 
 absl::StatusOr<int> Worker::Integrate() {
   // What memory or the disk has no room for all at once, it may have room for one by one.
-  const int most = after_failure_ ? 1 : core_.options().max_batch_scans;
+  const int most = after_failure_ ? 1 : kBatchesInARow * core_.options().max_batch_scans;
   STRATA_ASSIGN_OR_RETURN(const int begun, quarantine_.BeginScans(most));
-  return begun == 0 ? 0 : integrator_.IntegrateBatch(begun);
+  if (begun == 0) return 0;
+  return integrator_.IntegratePending(begun, [this] {
+    absl::MutexLock lock(&mutex_);
+    return !closed_ && tasks_.empty();
+  });
 }
 
 // Somebody else may have the memory just now; a scan that never gets enough of it holds up those

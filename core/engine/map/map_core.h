@@ -76,6 +76,11 @@ class MapCore {
   // Whether the store may hold tiles that were staged and neither published nor discarded.
   bool tiles_staged() const { return tiles_staged_; }
   void set_tiles_staged(bool staged) { tiles_staged_ = staged; }
+  // How often what scans are has been edited: labels, what has faded, scans that are gone. Poses
+  // and new scans are none.
+  std::uint64_t edits() const { return edits_; }
+  // After the edit was committed, if it was.
+  void NoteEdit() { ++edits_; }
   // A prepared tile that the store keeps is damaged.
   void NoteUnreadable(const TileKey& key);
   // Those noted since the last call.
@@ -126,6 +131,7 @@ class MapCore {
   WriterThread writer_;
   std::atomic<int> in_publication_ = 0;  // committed perhaps, and not shown
   std::atomic<bool> tiles_staged_ = false;
+  std::atomic<std::uint64_t> edits_ = 0;
 };
 
 }  // namespace strata

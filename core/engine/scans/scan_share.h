@@ -17,6 +17,8 @@ namespace strata {
 // it, and wait for no other thread's meanwhile.
 class ScanShare {
  public:
+  // Whether the scan takes nothing.
+  static bool IsSmall(const ScanRecord& scan);
   // Waits for its turn.
   ScanShare(const std::shared_ptr<CacheBudget>& budget, const ScanRecord& scan);
   ~ScanShare();

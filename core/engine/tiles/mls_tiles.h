@@ -73,7 +73,8 @@ absl::StatusOr<MlsTileMap> MakeTiles(MapCore& core,
                                      DamagedScans* damaged = nullptr,
                                      const SteadyView* view = nullptr);
 
-// Stored tiles, decoded ones kept. One thread at a time.
+// Stored tiles, decoded ones kept. Two threads may load at once, and load what is not replaced
+// while Replace() runs.
 class MlsTileStore {
  public:
   explicit MlsTileStore(MapCore& core) : core_(core), cache_(core.caches()) {}

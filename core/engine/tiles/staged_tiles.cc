@@ -35,6 +35,17 @@ absl::Status StagedTiles::Put(const MlsTileMap& tiles, const SurfaceTileMaker::R
   });
 }
 
+absl::Status StagedTiles::PutRows(std::vector<MlsTileRow> rows) {
+  if (rows.empty()) return absl::OkStatus();
+  for (MlsTileRow& row : rows) {
+    row.version = version_;
+    keys_.tiles.insert(row.key);
+  }
+  return core_.writer().Run(Durability::kRelaxed, 0, Stop(), [&](StorageWriter& writer) {
+    return PutTileRows(writer, rows, {});
+  });
+}
+
 absl::Status StagedTiles::Publish(const std::vector<ScanId>& scans,
                                   absl::FunctionRef<absl::Status(StorageWriter&)> decision) {
   const std::uint64_t floor = core_.snapshots().Floor();

@@ -29,6 +29,8 @@ class StagedTiles {
   StagedTiles& operator=(const StagedTiles&) = delete;
 
   absl::Status Put(const MlsTileMap& tiles, const SurfaceTileMaker::Rows& surfaces);
+  // The same of tiles that are encoded, whatever their version says.
+  absl::Status PutRows(std::vector<MlsTileRow> rows);
 
   // Makes all of it what readers see, together with what `decision` writes; watchers learn of it
   // and of `scans`. As MapCore::Publish().
