@@ -34,6 +34,8 @@ constexpr double kMostFeatureDistance = 3.0;  // of kinds that are alike, in sta
 // Standard deviations are not taken for smaller, or noise would part what is alike.
 const Eigen::Array3d kLeastDeviation(0.3, 0.08, 0.1);
 constexpr double kSizeSlack = 0.05;  // share of an edge
+// What lies flat is as high as it is rough: borders of ground that scan lines leave have no shape.
+constexpr double kLeastHeightM = 0.1;
 constexpr std::size_t kNoEntity = std::numeric_limits<std::size_t>::max();
 
 Eigen::Array3d ArrayOf(const KindFeatures& f) { return {f.log_volume, f.ratio, f.log_radius}; }
@@ -266,12 +268,14 @@ void ClassSorter::SortAlike(const Candidate& thing) {
   Pose T_map_thing = Pose::Identity();
   std::unique_ptr<ThingPoints> points = PointsOf(thing, T_map_thing);
   if (points == nullptr) return;
-  const auto nearest = NearestOf(
-      thing, kMostAlike, [&](const Reference& reference) { return IsAlike(thing, reference); });
+  const bool flat = thing.size.z() < kLeastHeightM;
+  const auto nearest = NearestOf(thing, kMostAlike, [&](const Reference& reference) {
+    return (!flat || reference.id != 0) && IsAlike(thing, reference);
+  });
   const std::optional<Match> match =
       BestOf(*points, nearest, KindStarts::kCentred, options_.min_cover);
   if (match.has_value()) return Assign(thing.entity, *match);
-  if (own_.size() == kMostModels) return;
+  if (flat || own_.size() == kMostModels) return;
   Reference reference;
   reference.of = thing;
   reference.model = std::make_unique<KindModel>(points->points(), options_.tolerance_m);

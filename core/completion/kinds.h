@@ -54,9 +54,10 @@ struct SortedKinds {
 // left, the one with most points is the reference of a kind to come, which the others are matched
 // to: those of its size both ways, then those that may be parts of it one way. At last what lies on
 // the kind of a larger entity, where that stands, is a piece of it. A reference that nobody was
-// matched to is no kind. Linear in the entities but for distances of features and places. Same
-// entities and library, same kinds, bit for bit; one thread. `progress` takes shares in [0, 1]; its
-// error, and that of `stop`, ends the work. REQUIRES: valid options, library of valid shapes.
+// matched to is no kind. Of what is lower than 10 cm only a library has kinds. Linear in the
+// entities but for distances of features and places. Same entities and library, same kinds, bit for
+// bit; one thread. `progress` takes shares in [0, 1]; its error, and that of `stop`, ends the work.
+// REQUIRES: valid options, library of valid shapes.
 absl::StatusOr<SortedKinds> SortIntoKinds(std::span<const FoundEntity> entities,
                                           std::span<const ThingKind> library,
                                           const KindOptions& options,

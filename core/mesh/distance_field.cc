@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -40,6 +41,8 @@ constexpr double kRough = 0.5;
 constexpr double kFullWeight = 256.0;
 // Nodes that have less are at the fringe of what was seen.
 constexpr std::uint16_t kLeastWeight = 48;
+// Of points whose neighbours count the farthest is nearer: they are kMostReach apart at most.
+constexpr double kAroundPart = 60.0;
 // Surfaces seen flatter than this are the streaks of beams that two things share.
 constexpr double kGrazing = 0.08;
 // So much of a ray before its point is not called free: noise, and poses that are not exact.
@@ -48,7 +51,6 @@ constexpr double kMargin = 4.0;
 constexpr double kRayWeight = 96.0;
 // A distance grows by one from node to node, by noise a little more.
 constexpr float kSteepest = 2.0F;
-constexpr int kSmallPart = 100;  // triangles; less is noise
 
 struct Node {
   float sum = 0.0F;          // of weight · distance [voxels]
@@ -112,6 +114,12 @@ class DistanceField::Field {
  public:
   explicit Field(const DistanceFieldOptions& options) : options_(options) {
     grid_.spacing_m = options.voxel_m;
+    if (!options.part.has_value()) return;
+    grid_.origin = options.part->origin;
+    placed_ = true;
+    const auto [low, high] = options.part->blocks;
+    low_ = kBlockEdge * Vector3i(low.x, low.y, low.z);
+    high_ = kBlockEdge * Vector3i(high.x, high.y, high.z);
   }
 
   absl::Status Add(const PointCloud& cloud,
@@ -121,7 +129,8 @@ class DistanceField::Field {
     Place(cloud, T_map_scan);
     points_ += CountInRegion(cloud, T_map_scan);
     std::size_t done = 0;
-    for (const OrientedPoint& point : OrientPoints(cloud, options_.voxel_m)) {
+    const std::optional<PointCloud> near = NearPart(cloud, T_map_scan);
+    for (const OrientedPoint& point : OrientPoints(near.value_or(cloud), options_.voxel_m)) {
       if (done++ % 1024 == 0) STRATA_RETURN_IF_ERROR(Check(stop));
       const double range_m = (point.position - cloud.sensor_origin).norm();
       if (!sensor.Takes(range_m)) continue;
@@ -151,10 +160,10 @@ class DistanceField::Field {
                      const Stop& stop) {
     const Vector3d from =
         grid_.InNodes(T_map_scan * (cloud.sensor_origin.cast<double>() + cloud.origin));
-    const Eigen::AlignedBox3d region =
-        Eigen::AlignedBox3d(grid_.InNodes(options_.region.min()),
-                            grid_.InNodes(options_.region.max()))
-            .intersection({Vector3d::Constant(-kMostNodes), Vector3d::Constant(kMostNodes)});
+    const Eigen::AlignedBox3d region = Eigen::AlignedBox3d(grid_.InNodes(options_.region.min()),
+                                                           grid_.InNodes(options_.region.max()))
+                                           .intersection({low_.cast<double>() - Vector3d::Ones(),
+                                                          high_.cast<double>() + Vector3d::Ones()});
     for (std::size_t i = 0; i < cloud.size(); ++i) {
       if (i % 1024 == 0) STRATA_RETURN_IF_ERROR(stop.status());
       const Eigen::Vector3f& p = cloud.points[i];
@@ -177,8 +186,9 @@ class DistanceField::Field {
             std::numeric_limits<float>::quiet_NaN(),
             kSteepest,
             grid_,
-            stop));
-    DropSmallParts(kSmallPart, mesh);
+            stop,
+            options_.part.has_value() ? &options_.part->blocks : nullptr));
+    if (!options_.part.has_value()) DropSmallParts(kLeastMeshPart, mesh);
     return mesh;
   }
 
@@ -189,8 +199,7 @@ class DistanceField::Field {
   // The first scan says where the nodes are, so that they are whole numbers anywhere.
   void Place(const PointCloud& cloud, const Pose& T_map_scan) {
     if (placed_) return;
-    grid_.origin =
-        (T_map_scan * cloud.origin / options_.voxel_m).array().round() * options_.voxel_m;
+    grid_.origin = OriginFor(cloud, T_map_scan, options_.voxel_m);
     placed_ = true;
   }
 
@@ -200,6 +209,24 @@ class DistanceField::Field {
           return p.allFinite() &&
                  options_.region.contains(T_map_scan * (p.cast<double>() + cloud.origin));
         }));
+  }
+
+  // Of a part what its surface may depend on; nullopt: all of the cloud.
+  std::optional<PointCloud> NearPart(const PointCloud& cloud, const Pose& T_map_scan) const {
+    if (!options_.part.has_value()) return std::nullopt;
+    const Eigen::AlignedBox3d around(low_.cast<double>() - Vector3d::Constant(kAroundPart),
+                                     high_.cast<double>() + Vector3d::Constant(kAroundPart));
+    PointCloud near;
+    near.origin = cloud.origin;
+    near.sensor_origin = cloud.sensor_origin;
+    std::copy_if(cloud.points.begin(),
+                 cloud.points.end(),
+                 std::back_inserter(near.points),
+                 [&](const Eigen::Vector3f& p) {
+                   return p.allFinite() && around.contains(grid_.InNodes(
+                                               T_map_scan * (p.cast<double>() + cloud.origin)));
+                 });
+    return near;
   }
 
   absl::Status TooFar() const {
@@ -226,8 +253,8 @@ class DistanceField::Field {
     const Vector3d half = (kTruncation * normal.cwiseAbs().array() +
                            reach * (1.0 - normal.array().square()).max(0.0).sqrt())
                               .matrix();
-    const Vector3i low = (at - half).array().ceil().cast<int>();
-    const Vector3i high = (at + half).array().floor().cast<int>();
+    const Vector3i low = (at - half).array().ceil().cast<int>().max(low_.array());
+    const Vector3i high = (at + half).array().floor().cast<int>().min(high_.array());
     const double across = 2.0 / (reach * reach);
     for (int z = low.z(); z <= high.z(); ++z) {
       for (int y = low.y(); y <= high.y(); ++y) {
@@ -245,9 +272,10 @@ class DistanceField::Field {
     }
   }
 
-  // Tells nodes behind a surface that a ray went through them.
+  // Tells nodes behind a surface that a ray went through them. Looks at whole voxels from the
+  // sensor, so that neither blocks nor parts decide where.
   void CarveRay(const Vector3d& from, const Vector3d& along, const Stretch& stretch) {
-    for (double t = stretch.begin; t < stretch.end;) {
+    for (double t = std::ceil(stretch.begin); t < stretch.end;) {
       const Vector3d at = from + t * along;
       const Vector3i node = at.array().round().cast<int>();
       const BlockKey key = BlockOf(node);
@@ -260,7 +288,7 @@ class DistanceField::Field {
         }
         t += 1.0;
       } else {
-        t += ToNextBlock(at, along, key);
+        t = std::max(t + 1.0, std::ceil(t + ToNextBlock(at, along, key)));
       }
     }
   }
@@ -273,12 +301,15 @@ class DistanceField::Field {
       const double border = along[k] > 0.0 ? low[k] + kBlockEdge : low[k];
       step = std::min(step, (border - at[k]) / along[k]);
     }
-    return std::max(step, 0.0) + 1e-3;
+    return step;
   }
 
   const DistanceFieldOptions options_;
   NodeGrid grid_;
   bool placed_ = false;
+  // Nodes beyond are not represented, or of no interest.
+  Vector3i low_ = Vector3i::Constant(static_cast<int>(-kMostNodes));
+  Vector3i high_ = Vector3i::Constant(static_cast<int>(kMostNodes));
   VoxelBlocks<Node> voxels_;
   std::uint64_t points_ = 0;
 };
@@ -302,6 +333,11 @@ absl::Status DistanceField::Carve(const PointCloud& cloud,
 }
 std::uint64_t DistanceField::points() const { return field_->points(); }
 std::size_t DistanceField::bytes() const { return field_->bytes(); }
+Eigen::Vector3d DistanceField::OriginFor(const PointCloud& cloud,
+                                         const Pose& T_map_scan,
+                                         double voxel_m) {
+  return (T_map_scan * cloud.origin / voxel_m).array().round() * voxel_m;
+}
 absl::StatusOr<TriangleMesh> DistanceField::Mesh(const Stop& stop) const {
   return field_->Mesh(stop);
 }

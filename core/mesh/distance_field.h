@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -16,8 +17,18 @@
 #include "core/common/stop.h"
 #include "core/geometry/pose.h"
 #include "core/mesh/triangle_mesh.h"
+#include "core/mesh/voxel_blocks.h"
 
 namespace strata {
+
+// Parts of the surface that have fewer triangles are noise.
+inline constexpr std::size_t kLeastMeshPart = 100;
+
+// Of a field that would be too large, the blocks that one takes.
+struct FieldPart {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // of the whole field's nodes
+  BlockBox blocks;
+};
 
 struct DistanceFieldOptions {
   // Edge of a voxel [m]; in [0.001, 10]. Things thinner than two voxels are lost.
@@ -26,6 +37,9 @@ struct DistanceFieldOptions {
   Eigen::AlignedBox3d region{Eigen::Vector3d::Constant(-1e7), Eigen::Vector3d::Constant(1e7)};
   // Of the voxels, 8 bytes each where a surface is near; the mesh takes half as much beside them.
   std::size_t max_bytes = std::size_t{640} << 20;
+  // Only the surface in there: with the same scans, that of the whole field bit for bit, but for
+  // small parts, which only who joins it knows (mesh_parts.h).
+  std::optional<FieldPart> part = std::nullopt;
 
   absl::Status Validate() const;
 };
@@ -56,6 +70,8 @@ class DistanceField {
   // That were added and lie in the region.
   std::uint64_t points() const;
   std::size_t bytes() const;
+  // Where node (0, 0, 0) is in a field whose first scan is this one.
+  static Eigen::Vector3d OriginFor(const PointCloud& cloud, const Pose& T_map_scan, double voxel_m);
 
   // Open where nothing was seen. Without triangles where no points were. RESOURCE_EXHAUSTED for
   // 2³¹ vertices and more.

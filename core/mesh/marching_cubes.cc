@@ -81,8 +81,9 @@ class CubeMarcher {
               NodeReader read,
               float outside,
               float steepest,
-              const NodeGrid& grid)
-      : read_(read), outside_(outside), steepest_(steepest), grid_(grid) {
+              const NodeGrid& grid,
+              const BlockBox* only)
+      : read_(read), outside_(outside), steepest_(steepest), grid_(grid), only_(only) {
     for (std::size_t i = 0; i < keys.size(); ++i) source_.emplace(keys[i], i);
     bases_ = keys;
     if (!std::isnan(outside)) AddBlocksBefore();
@@ -105,7 +106,7 @@ class CubeMarcher {
     }
     for (std::size_t i = 0; i < bases_.size(); ++i) {
       if (i % 256 == 0) STRATA_RETURN_IF_ERROR(stop.status());
-      AddTriangles(i);
+      if (only_ == nullptr || only_->Contains(bases_[i])) AddTriangles(i);
     }
     DropUnusedVertices(mesh_);
     return std::move(mesh_);
@@ -214,6 +215,7 @@ class CubeMarcher {
   const float outside_;
   const float steepest_;
   const NodeGrid& grid_;
+  const BlockBox* const only_;
   HashMap<BlockKey, std::size_t> source_;  // index of the keys given
   std::vector<BlockKey> bases_;            // blocks that own cubes and edges, in order
   HashMap<BlockKey, std::size_t> base_;
@@ -229,8 +231,9 @@ absl::StatusOr<TriangleMesh> MarchCubes(const std::vector<BlockKey>& keys,
                                         float outside,
                                         float steepest,
                                         const NodeGrid& grid,
-                                        const Stop& stop) {
-  return CubeMarcher(keys, read, outside, steepest, grid).March(stop);
+                                        const Stop& stop,
+                                        const BlockBox* only) {
+  return CubeMarcher(keys, read, outside, steepest, grid, only).March(stop);
 }
 
 }  // namespace strata

@@ -22,14 +22,15 @@ using NodeReader = absl::FunctionRef<float(std::size_t i, std::size_t node)>;
 // `outside`; where that is a number, the surface is closed. Where the value goes from one node to
 // the next by more than `steepest` through zero there is no surface but two things side by side.
 // Each vertex stands once, between two nodes; vertices and triangles come in the order of the
-// blocks' keys, whatever the order given. RESOURCE_EXHAUSTED for 2³¹ vertices and more; the stop's
-// status.
+// blocks' keys, whatever the order given. `only`: cubes from nodes of these blocks, all if null.
+// RESOURCE_EXHAUSTED for 2³¹ vertices and more; the stop's status.
 absl::StatusOr<TriangleMesh> MarchCubes(const std::vector<BlockKey>& keys,
                                         NodeReader read,
                                         float outside,
                                         float steepest,
                                         const NodeGrid& grid,
-                                        const Stop& stop);
+                                        const Stop& stop,
+                                        const BlockBox* only = nullptr);
 
 }  // namespace strata
 

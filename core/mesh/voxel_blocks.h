@@ -31,6 +31,16 @@ struct BlockKey {
   }
 };
 
+// Blocks [low, high) along each axis.
+struct BlockBox {
+  BlockKey low, high;
+
+  bool Contains(const BlockKey& key) const {
+    return key.x >= low.x && key.y >= low.y && key.z >= low.z && key.x < high.x && key.y < high.y &&
+           key.z < high.z;
+  }
+};
+
 inline BlockKey BlockOf(const Eigen::Vector3i& node) {
   return {node.x() >> 3, node.y() >> 3, node.z() >> 3};
 }

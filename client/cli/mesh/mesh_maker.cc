@@ -5,17 +5,16 @@
 #include <optional>
 #include <utility>
 
-#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include <Eigen/Core>
 
-#include "client/cli/terminal/progress.h"
+#include "client/cli/mesh/distance_mesh.h"
+#include "client/cli/mesh/scan_loop.h"
 #include "core/common/status.h"
 #include "core/mesh/alpha_shape.h"
 #include "core/mesh/density_contour.h"
-#include "core/mesh/distance_field.h"
 #include "core/mesh/organised_mesh.h"
 #include "core/mesh/point_thinner.h"
 #include "core/mesh/vertex_colours.h"
@@ -25,58 +24,6 @@ namespace {
 
 // Voxels within which a point colours a vertex: a contour lies two before its points.
 constexpr double kColourReach = 2.5;
-
-// Goes over all scans, `rounds` times in all.
-class ScanLoop {
- public:
-  ScanLoop(Context& context, const ScanClouds& clouds, std::size_t rounds)
-      : context_(context),
-        clouds_(clouds),
-        rounds_(rounds),
-        progress_(context.output.talk(), TalksToTerminal(), "mesh") {}
-
-  absl::Status ForEach(const char* phase, absl::FunctionRef<absl::Status(PosedCloud&)> body) {
-    for (std::size_t i = 0; i < clouds_.size(); ++i) {
-      STRATA_RETURN_IF_ERROR(context_.call.stop.status());
-      progress_.Update(static_cast<double>(done_++) / static_cast<double>(rounds_ * clouds_.size()),
-                       phase);
-      STRATA_ASSIGN_OR_RETURN(PosedCloud posed, clouds_.Read(context_, i));
-      STRATA_RETURN_IF_ERROR(body(posed));
-    }
-    return absl::OkStatus();
-  }
-
- private:
-  Context& context_;
-  const ScanClouds& clouds_;
-  const std::size_t rounds_;
-  std::size_t done_ = 0;
-  Progress progress_;
-};
-
-absl::StatusOr<MadeMesh> ByDistance(Context& context,
-                                    const ScanClouds& clouds,
-                                    const MeshOptions& options) {
-  DistanceFieldOptions field_options;
-  field_options.voxel_m = options.voxel_m;
-  if (options.region.has_value()) field_options.region = *options.region;
-  STRATA_RETURN_IF_ERROR(field_options.Validate());
-  DistanceField field(field_options);
-  const Stop& stop = context.call.stop;
-  ScanLoop loop(context, clouds, 2);
-  STRATA_RETURN_IF_ERROR(loop.ForEach("surfaces", [&](PosedCloud& posed) {
-    clouds.KeepClass(posed.cloud);
-    return field.Add(posed.cloud, posed.T_map_scan, posed.sensor, stop);
-  }));
-  if (field.points() == 0) return MadeMesh();
-  STRATA_RETURN_IF_ERROR(loop.ForEach("free space", [&](const PosedCloud& posed) {
-    return field.Carve(posed.cloud, posed.T_map_scan, posed.sensor, stop);
-  }));
-  MadeMesh made;
-  made.points = field.points();
-  STRATA_ASSIGN_OR_RETURN(made.mesh, field.Mesh(stop));
-  return made;
-}
 
 absl::StatusOr<ThinnedPoints> Thin(Context& context,
                                    const ScanClouds& clouds,
@@ -135,7 +82,7 @@ absl::StatusOr<MadeMesh> ByMethod(Context& context,
   if (options.method == "organised") return ByGrid(context, clouds);
   if (options.method == "contour") return ByContour(context, clouds, options);
   if (options.method == "alpha") return ByAlphaShape(context, clouds, options);
-  return ByDistance(context, clouds, options);
+  return MakeDistanceMesh(context, clouds, options);
 }
 
 }  // namespace

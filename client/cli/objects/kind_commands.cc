@@ -8,12 +8,17 @@
 #include "absl/strings/str_cat.h"
 
 #include "client/cli/objects/kind_files.h"
+#include "client/cli/objects/kind_mesh.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/command.h"
 #include "client/cli/terminal/confirm.h"
 #include "client/cli/terminal/json.h"
 #include "client/cli/terminal/names.h"
+#include "client/formats/file_bytes.h"
+#include "client/formats/geometry_writer.h"
 #include "core/common/status.h"
+#include "core/mesh/mesh_check.h"
+#include "core/mesh/triangle_mesh.h"
 #include "core/world/map_class.h"
 #include "core/world/things/kind.h"
 
@@ -27,6 +32,7 @@ struct KindOptionsOfVerb {
   std::string class_name;
   std::string file;
   double scale = 1.0;
+  double voxel_m = 0.05;
   bool yes = false;
 };
 
@@ -77,9 +83,35 @@ absl::Status RenameKind(Context& context, const KindOptionsOfVerb& options) {
   return ShowKind(context, options, kind);
 }
 
+absl::Status ExportMesh(Context& context, const KindOptionsOfVerb& options, const ThingKind& kind) {
+  STRATA_ASSIGN_OR_RETURN(const MeshFormat format, MeshFormatOf(options.file));
+  STRATA_ASSIGN_OR_RETURN(KindMesh made, MeshOfKind(context, options.map, kind, options.voxel_m));
+  Json json = {{"file", options.file},
+               {"id", KindIdText(kind.info.id)},
+               {"name", kind.info.name},
+               {"method", made.method},
+               {"things", made.things},
+               {"scans", made.scans},
+               {"vertices", made.mesh.vertices.size()},
+               {"triangles", made.mesh.triangles.size()},
+               {"area_m2", AreaOf(made.mesh)},
+               {"closed", CheckMesh(made.mesh).closed()}};
+  Geometry geometry;
+  geometry.normals = VertexNormals(made.mesh);
+  geometry.vertices = std::move(made.mesh.vertices);
+  geometry.triangles = std::move(made.mesh.triangles);
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes, MeshBytes(format, geometry));
+  STRATA_RETURN_IF_ERROR(WriteFileBytes(options.file, bytes));
+  context.output.Object(json);
+  return absl::OkStatus();
+}
+
 absl::Status ExportKind(Context& context, const KindOptionsOfVerb& options) {
+  const bool mesh = MeshFormatOf(options.file).ok();
+  if (!mesh) STRATA_RETURN_IF_ERROR(CheckKindFile(options.file));
   STRATA_ASSIGN_OR_RETURN(
       ThingKind kind, context.database.objects().GetKind(context.call, options.map, options.kind));
+  if (mesh) return ExportMesh(context, options, kind);
   STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes,
                           context.database.maps().ListClasses(context.call, options.map));
   const NewKind exported{
@@ -159,13 +191,20 @@ void AddKindCommands(Commands& commands) {
            "strata kind rename campus 3f09a1 golf",
            RenameKind);
   AddKindArgument(rename, *options);
-  rename->add_option("NAME", options->name, "What it is called from now on")->required();
+  rename->add_option("NEW_NAME", options->name, "What it is called from now on")->required();
   CLI::App* out = verb("export",
-                       "Write a kind to a file, for kind import into another map",
-                       "strata kind export campus golf golf.kind",
+                       "Write a kind to a file, for kind import into another map, or as a mesh of "
+                       "what the scans saw of all its things",
+                       "strata kind export campus golf golf.kind\n"
+                       "  strata kind export campus golf golf.glb --voxel 0.04",
                        ExportKind);
   AddKindArgument(out, *options);
-  out->add_option("FILE", options->file, "Where to")->type_name("FILE.kind")->required();
+  out->add_option("FILE", options->file, "Where to, by its ending")
+      ->type_name("FILE.(kind|ply|obj|stl|glb)")
+      ->required();
+  out->add_option("--voxel", options->voxel_m, "Edge of a voxel of the mesh [m]")
+      ->check(CLI::Range(0.005, 1.0))
+      ->capture_default_str();
   AddImport(verb, *options);
   CLI::App* remove = verb("delete",
                           "Take a kind out of the library; its things are of none then",

@@ -59,10 +59,14 @@ absl::StatusOr<NewKind> ReadKindFile(const std::string& file, double scale) {
       absl::StrCat(file, ": kinds are .kind files of kind export, or meshes (.stl, .obj, .ply)"));
 }
 
+absl::Status CheckKindFile(const std::string& file) {
+  if (EndingOf(file) == ".kind") return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "kinds are written as .kind, or as meshes (.ply, .obj, .stl, .glb); got ", file));
+}
+
 absl::Status WriteKindFile(const std::string& file, const NewKind& kind) {
-  if (EndingOf(file) != ".kind") {
-    return absl::InvalidArgumentError(absl::StrCat("kinds are written as .kind; got ", file));
-  }
+  STRATA_RETURN_IF_ERROR(CheckKindFile(file));
   return WriteFileBytes(file, EncodeKindFile(kind));
 }
 

@@ -16,6 +16,9 @@ namespace strata::cli {
 // NOT_FOUND.
 absl::StatusOr<NewKind> ReadKindFile(const std::string& file, double scale);
 
+// INVALID_ARGUMENT for another ending than .kind, naming those of meshes, too.
+absl::Status CheckKindFile(const std::string& file);
+
 // INVALID_ARGUMENT for another ending than .kind; FAILED_PRECONDITION if it cannot be written.
 absl::Status WriteKindFile(const std::string& file, const NewKind& kind);
 

@@ -12,6 +12,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
@@ -129,14 +130,22 @@ std::vector<const PlanePolygon*> FloorsNear(const PlaneModel& model, double stor
   return floors;
 }
 
-absl::Status NothingThere(const PlaneModel& model, const StoreyPlan& plan) {
-  std::string heights;
-  std::size_t named = 0;
+// Of the largest floors, each height once, without a minus before 0.
+std::string HeightsOfFloors(const PlaneModel& model) {
+  std::vector<std::string> heights;
   for (const ModelPlane& plane : model.planes) {
-    if (!IsFloor(plane) || plane.polygons.empty() || named++ == kMostNamedHeights) continue;
-    absl::StrAppendFormat(
-        &heights, "%s%.2f", heights.empty() ? "" : ", ", MeanHeight(plane.polygons.front().outer));
+    if (!IsFloor(plane) || plane.polygons.empty()) continue;
+    const double z_m = std::round(MeanHeight(plane.polygons.front().outer) * 10.0) / 10.0 + 0.0;
+    std::string height = absl::StrFormat("%.1f", z_m);
+    if (std::find(heights.begin(), heights.end(), height) != heights.end()) continue;
+    heights.push_back(std::move(height));
+    if (heights.size() == kMostNamedHeights) break;
   }
+  return absl::StrJoin(heights, ", ");
+}
+
+absl::Status NothingThere(const PlaneModel& model, const StoreyPlan& plan) {
+  const std::string heights = HeightsOfFloors(model);
   return absl::NotFoundError(
       absl::StrFormat("no wall at z = %.2f m and no floor near z = %.2f m; %s",
                       plan.cut_z_m,

@@ -102,7 +102,9 @@ class Completer {
 
   // The prototype is of as many things as fit into memory, those that were seen best, and of
   // `known`, what the library has of the kind's shape.
-  absl::Status Complete(std::span<const Entity> things, const std::vector<Eigen::Vector3d>& known) {
+  absl::Status Complete(std::span<const Entity> entities,
+                        const std::vector<Eigen::Vector3d>& known) {
+    const std::vector<WholeThing> things = WholeThingsOf(entities);
     Eigen::AlignedBox3d box = BoxOfKind(things);
     for (const Eigen::Vector3d& p : known) box.extend(p);
     const double voxel_m = ShapeVoxelM(box, voxel_m_);
@@ -113,12 +115,12 @@ class Completer {
     const std::size_t most = ThingsAtATime(box, voxel_m);
     std::optional<Prototype> prototype;
     for (std::size_t begin = 0; begin < things.size(); begin += most) {
-      const std::span<const Entity> some =
-          things.subspan(begin, std::min(most, things.size() - begin));
+      const std::span<const WholeThing> some =
+          std::span(things).subspan(begin, std::min(most, things.size() - begin));
       STRATA_ASSIGN_OR_RETURN(
           ThingViews views,
           ReadThingViews(core_, epoch_, some, box, voxel_m, out_.damaged, context_.stop()));
-      out_.scans[things[0].kind->id].insert(views.scans.begin(), views.scans.end());
+      out_.scans[entities[0].kind->id].insert(views.scans.begin(), views.scans.end());
       if (!prototype.has_value()) {
         STRATA_ASSIGN_OR_RETURN(ShapeView view, ShapeView::Over(box, voxel_m));
         view.AddPoints(known);
@@ -134,19 +136,20 @@ class Completer {
 
  private:
   absl::Status AddParts(const Prototype& prototype,
-                        std::span<const Entity> things,
+                        std::span<const WholeThing> things,
                         const std::vector<ShapeView>& views) {
     for (std::size_t i = 0; i < things.size(); ++i) {
       STRATA_RETURN_IF_ERROR(context_.stop().status());
       Inference inference = InferHidden(prototype, views[i]);
       ThinOut(inference.points);
-      InferredPart& part = out_.parts[things[i].id];
-      part.entity = things[i].id;
-      part.kind = things[i].kind->id;
+      const Entity& entity = things[i].entity;
+      InferredPart& part = out_.parts[entity.id];
+      part.entity = entity.id;
+      part.kind = entity.kind->id;
       part.agreeing = inference.agreeing;
       part.contradicting = inference.contradicting;
       for (const Eigen::Vector3d& p : inference.points) {
-        part.points.emplace_back(things[i].kind->T_map_kind * p);
+        part.points.emplace_back(entity.kind->T_map_kind * p);
       }
       out_.of_other_kind += inference.IsOfKind() ? 0 : 1;
       out_.too_little += inference.IsOfKind() && !inference.IsSeenEnough() ? 1 : 0;

@@ -22,12 +22,42 @@ using Eigen::Vector3d;
 // Around what was measured: what else of a thing may be there.
 constexpr double kMarginM = 0.2;
 constexpr double kLeastMarginM = 0.025;  // of a thing's own points around its box
+// Pieces of one thing say so differently where it stands at most, also as a share of its length:
+// two things are farther apart.
+constexpr double kMostApartM = 0.2;
+constexpr double kMostApartShare = 0.25;
+
+// Whether what both say about where their kind stands is the same at both of them.
+bool StandInOnePlace(const Entity& a, const Entity& b, double length_m) {
+  if ((a.box.centre - b.box.centre).norm() > 2.0 * length_m) return false;
+  const Pose T_kind_a = a.kind->T_map_kind.inverse();
+  const Pose T_b_a = b.kind->T_map_kind * T_kind_a;
+  const double most_m = std::min(kMostApartM, kMostApartShare * length_m);
+  return (T_b_a * a.box.centre - a.box.centre).norm() <= most_m &&
+         (T_b_a * b.box.centre - b.box.centre).norm() <= most_m;
+}
+
+// Counts the piece's points and scans as the thing's.
+void AddPiece(const Entity& piece, WholeThing& thing) {
+  thing.boxes.push_back(piece.box);
+  thing.entity.points += piece.points;
+  for (const EntityScan& seen : piece.scans) {
+    std::vector<EntityScan>& scans = thing.entity.scans;
+    const auto same = std::find_if(
+        scans.begin(), scans.end(), [&](const EntityScan& s) { return s.scan == seen.scan; });
+    if (same == scans.end()) {
+      scans.push_back(seen);
+    } else {
+      same->points += seen.points;
+    }
+  }
+}
 
 // The scans that saw most of each thing, with which things those are.
-absl::btree_map<ScanId, std::vector<std::size_t>> ScansOf(std::span<const Entity> things) {
+absl::btree_map<ScanId, std::vector<std::size_t>> ScansOf(std::span<const WholeThing> things) {
   absl::btree_map<ScanId, std::vector<std::size_t>> scans;
   for (std::size_t i = 0; i < things.size(); ++i) {
-    std::vector<EntityScan> seen = things[i].scans;
+    std::vector<EntityScan> seen = things[i].entity.scans;
     std::stable_sort(seen.begin(), seen.end(), [](const EntityScan& a, const EntityScan& b) {
       return a.points > b.points;
     });
@@ -51,7 +81,7 @@ absl::StatusOr<PosedScan> FindScan(MapCore& core, const ScanId& id, std::uint64_
 // Adds scans to the views of the things that they saw.
 class ViewReader {
  public:
-  ViewReader(MapCore& core, std::span<const Entity> things, ThingViews& out)
+  ViewReader(MapCore& core, std::span<const WholeThing> things, ThingViews& out)
       : core_(core), things_(things), out_(out) {}
 
   absl::Status Add(const PosedScan& posed, const std::vector<std::size_t>& seen, const Stop& stop) {
@@ -68,7 +98,8 @@ class ViewReader {
       const PointCloud& cloud = source.faded().empty() ? block : lasting;
       const BeamsByAzimuth beams(cloud, posed.pose->T_map_scan);
       for (const std::size_t i : seen) {
-        const PointCloud part = beams.Towards(out_.views[i].box(), things_[i].kind->T_map_kind);
+        const PointCloud part =
+            beams.Towards(out_.views[i].box(), things_[i].entity.kind->T_map_kind);
         STRATA_RETURN_IF_ERROR(AddTo(i, part, posed.pose->T_map_scan, sensor, stop));
       }
       return absl::OkStatus();
@@ -81,7 +112,8 @@ class ViewReader {
                      const Pose& T_map_scan,
                      const SensorModel& sensor,
                      const Stop& stop) {
-    const Entity& thing = things_[i];
+    const Entity& thing = things_[i].entity;
+    const std::vector<UprightBox>& boxes = things_[i].boxes;
     ShapeView& view = out_.views[i];
     const Pose T_kind_map = thing.kind->T_map_kind.inverse();
     const double margin_m = std::max(kLeastMarginM, view.voxel_m());
@@ -89,31 +121,56 @@ class ViewReader {
     for (std::size_t k = 0; k < cloud.label.size(); ++k) {
       if (cloud.label[k] != thing.class_id) continue;
       const Vector3d p = T_map_scan * (cloud.points[k].cast<double>() + cloud.origin);
-      if (IsInBox(thing.box, p, margin_m)) points.push_back(T_kind_map * p);
+      if (std::any_of(boxes.begin(), boxes.end(), [&](const UprightBox& box) {
+            return IsInBox(box, p, margin_m);
+          })) {
+        points.push_back(T_kind_map * p);
+      }
     }
     view.AddPoints(points);
     return view.AddScan(cloud, T_kind_map * T_map_scan, sensor, stop);
   }
 
   MapCore& core_;
-  const std::span<const Entity> things_;
+  const std::span<const WholeThing> things_;
   ThingViews& out_;
 };
 
 }  // namespace
 
-Eigen::AlignedBox3d BoxOfKind(std::span<const Entity> things) {
-  Eigen::AlignedBox3d box;
-  for (const Entity& thing : things) {
-    const Pose T_kind_map = thing.kind->T_map_kind.inverse();
-    const double half_height_m = thing.box.size.z() / 2.0;
-    for (const Vector3d& corner : BaseOf(thing.box)) {
-      const Vector3d middle(corner.x(), corner.y(), thing.box.centre.z());
-      box.extend(T_kind_map * (middle - half_height_m * Vector3d::UnitZ()));
-      box.extend(T_kind_map * (middle + half_height_m * Vector3d::UnitZ()));
+std::vector<WholeThing> WholeThingsOf(std::span<const Entity> entities) {
+  double length_m = 0.0;
+  for (const Entity& entity : entities) {
+    length_m = std::max(length_m, entity.box.size.maxCoeff());
+  }
+  std::vector<WholeThing> things;
+  for (const Entity& entity : entities) {
+    const auto whole = std::find_if(things.begin(), things.end(), [&](const WholeThing& thing) {
+      return StandInOnePlace(thing.entity, entity, length_m);
+    });
+    if (whole == things.end()) {
+      things.push_back({entity, {entity.box}});
+    } else {
+      AddPiece(entity, *whole);
     }
   }
-  return {box.min() - Vector3d::Constant(kMarginM), box.max() + Vector3d::Constant(kMarginM)};
+  return things;
+}
+
+Eigen::AlignedBox3d BoxOfKind(std::span<const WholeThing> things) {
+  Eigen::AlignedBox3d bounds;
+  for (const WholeThing& thing : things) {
+    const Pose T_kind_map = thing.entity.kind->T_map_kind.inverse();
+    for (const UprightBox& box : thing.boxes) {
+      const double half_height_m = box.size.z() / 2.0;
+      for (const Vector3d& corner : BaseOf(box)) {
+        const Vector3d middle(corner.x(), corner.y(), box.centre.z());
+        bounds.extend(T_kind_map * (middle - half_height_m * Vector3d::UnitZ()));
+        bounds.extend(T_kind_map * (middle + half_height_m * Vector3d::UnitZ()));
+      }
+    }
+  }
+  return {bounds.min() - Vector3d::Constant(kMarginM), bounds.max() + Vector3d::Constant(kMarginM)};
 }
 
 std::size_t ThingsAtATime(const Eigen::AlignedBox3d& box, double voxel_m) {
@@ -131,7 +188,7 @@ double ShapeVoxelM(const Eigen::AlignedBox3d& box, double voxel_m) {
 
 absl::StatusOr<ThingViews> ReadThingViews(MapCore& core,
                                           std::uint64_t epoch,
-                                          std::span<const Entity> things,
+                                          std::span<const WholeThing> things,
                                           const Eigen::AlignedBox3d& box,
                                           double voxel_m,
                                           DamagedScans& damaged,

@@ -25,9 +25,18 @@ inline constexpr std::size_t kMostScansOfThing = 24;
 inline constexpr std::size_t kMostThingViews = 64;
 inline constexpr double kMostVoxelsAtATime = 4e7;
 
-// What all of the things reach, in the frame of their kind, and a little around it. REQUIRES: all
-// have a kind, the same.
-Eigen::AlignedBox3d BoxOfKind(std::span<const Entity> things);
+// A thing whose middle is hidden is several entities (SortIntoKinds); it is completed once.
+struct WholeThing {
+  Entity entity;                  // the one with most points, with the scans and points of all
+  std::vector<UprightBox> boxes;  // of all, its own first
+};
+
+// Entities that stand in one place are one thing. REQUIRES: all have a kind, the same; those with
+// most points first, which is the order of the things, too.
+std::vector<WholeThing> WholeThingsOf(std::span<const Entity> entities);
+
+// What all of the things reach, in the frame of their kind, and a little around it.
+Eigen::AlignedBox3d BoxOfKind(std::span<const WholeThing> things);
 
 // The least edge of voxels, from `voxel_m` on, that a view of the box can have [m].
 double ShapeVoxelM(const Eigen::AlignedBox3d& box, double voxel_m);
@@ -46,7 +55,7 @@ struct ThingViews {
 // CANCELLED, DEADLINE_EXCEEDED; RESOURCE_EXHAUSTED where rays fill too many voxels.
 absl::StatusOr<ThingViews> ReadThingViews(MapCore& core,
                                           std::uint64_t epoch,
-                                          std::span<const Entity> things,
+                                          std::span<const WholeThing> things,
                                           const Eigen::AlignedBox3d& box,
                                           double voxel_m,
                                           DamagedScans& damaged,

@@ -76,6 +76,30 @@ TEST_P(PlantedKindsTest, AreFoundAsTheyWerePlanted) {
   }
 }
 
+TEST(KindsTest, WhatLiesFlatIsOfNone) {
+  // Lines that a scanner draws on the ground.
+  std::mt19937_64 random(20);
+  std::uniform_real_distribution<double> shake(-0.01, 0.01);
+  std::vector<FoundEntity> entities;
+  for (int i = 0; i < 4; ++i) {
+    std::vector<Eigen::Vector3d> points;
+    for (int k = 0; k < 400; ++k) {
+      points.emplace_back(
+          20.0 * i + 0.1 * (k % 80), 0.3 * (k / 80) + shake(random), 0.3 * shake(random));
+    }
+    entities.push_back(testing::EntityOf(1, points));
+  }
+  SortedKinds sorted = Sort(entities);
+  EXPECT_THAT(sorted.found, IsEmpty());
+  for (const auto& kind : sorted.of_entity) EXPECT_FALSE(kind.has_value());
+  // Upright they are fences.
+  for (FoundEntity& entity : entities) {
+    for (Eigen::Vector3d& p : entity.voxels) std::swap(p.y(), p.z());
+    entity = testing::EntityOf(1, entity.voxels);
+  }
+  EXPECT_THAT(Sort(entities).found, SizeIs(1));
+}
+
 // Where one thing of a kind stands is where the kind's other things say it does: the kind's frame,
 // moved to each, is the planted one moved by the same.
 TEST_P(PlantedKindsTest, StandWhereTheyWerePlanted) {

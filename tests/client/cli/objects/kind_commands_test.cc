@@ -95,6 +95,32 @@ TEST_F(KindCommandsTest, GoFromMapToMapAsFiles) {
               StatusIs(Code::kInvalidArgument, HasSubstr(".kind")));
 }
 
+TEST_F(KindCommandsTest, AreWrittenAsMeshes) {
+  ON_CALL(db_.objects(), ListEntities(_, _, _, _)).WillByDefault([](auto&, auto, auto&, auto) {
+    return absl::StatusOr<EntitiesInfo>(absl::NotFoundError("no entities"));
+  });
+  ON_CALL(db_.maps(), Get(_, _)).WillByDefault([](auto&, auto) {
+    return absl::StatusOr<MapInfo>(MapInfo());
+  });
+  golf_.shape.points.clear();
+  for (int i = 0; i < 900; ++i) {
+    golf_.shape.points.emplace_back(
+        0.03F * static_cast<float>(i % 30), 0.03F * static_cast<float>(i / 30), 0.0F);
+  }
+  const std::string file = (directory_.path() / "golf.ply").string();
+  const Json contour = RunJson({"kind", "export", "m", "golf", file});
+  EXPECT_EQ(contour["method"], "contour");
+  EXPECT_EQ(contour["closed"], true);
+  EXPECT_GT(contour["area_m2"].get<double>(), 1.5);  // of both sides
+  golf_.shape.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  golf_.shape.triangles = {{0, 1, 2}};
+  const Json imported = RunJson({"kind", "export", "m", "golf", file});
+  EXPECT_EQ(imported["method"], "imported");
+  EXPECT_EQ(imported["triangles"], 1);
+  EXPECT_THAT(Run({"kind", "export", "m", "golf", file + ".fbx"}),
+              StatusIs(Code::kInvalidArgument, HasSubstr(".glb")));
+}
+
 TEST_F(KindCommandsTest, MeshesAreKinds) {
   const std::string file = (directory_.path() / "cube.obj").string();
   STRATA_ASSERT_OK(WriteFileBytes(file, kCubeObj));

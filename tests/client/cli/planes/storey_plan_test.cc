@@ -177,7 +177,13 @@ TEST(StoreyPlanTest, ARegionLeavesOutWhatIsBeyond) {
 
 TEST(StoreyPlanTest, WhereNothingIsTheFloorsAreNamed) {
   EXPECT_THAT(PlanOfStorey(testing::DrawnRoom(), {.storey_z_m = 7.0}),
-              StatusIs(absl::StatusCode::kNotFound, HasSubstr("the largest floors are at 0.00 m")));
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("the largest floors are at 0.0 m")));
+  PlaneModel many = testing::DrawnRoom();
+  for (int i = 0; i < 20; ++i) {
+    for (ModelPlane plane : testing::DrawnRoom().planes) many.planes.push_back(std::move(plane));
+  }
+  EXPECT_THAT(PlanOfStorey(many, {.storey_z_m = 7.0}),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("the largest floors are at 0.0 m")));
   EXPECT_THAT(PlanOfStorey({}, {}),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("the model has no floors")));
 }
