@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <span>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "absl/status/status.h"
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 
 #include "core/common/option_checks.h"
 #include "core/common/random.h"
@@ -65,32 +67,39 @@ absl::Status ScanFeatureOptions::Validate() const {
   checks.InRange("neighbour_radius_m", neighbour_radius_m, 0.01, 100.0);
   checks.InRange("|sensor_origin|", sensor_origin.norm(), 0.0, 1e8);
   checks.InRange("|up|", up.norm(), 0.999, 1.001);
+  checks.InRange("map_turn_rad", map_turn_rad, -std::numbers::pi, std::numbers::pi);
   return checks.status();
 }
 
-SurfaceElement FitSurfaceElement(const ColumnGrid& grid,
-                                 const Eigen::Vector3f& p,
-                                 int neighbours,
-                                 float radius_m) {
+float NeighbourMoments::SpreadAlong(const Eigen::Vector3f& direction) const {
+  const float along = direction.dot(mean());
+  const float square = direction.dot(squares * direction) / static_cast<float>(n);
+  return std::sqrt(std::max(0.0F, square - along * along));
+}
+
+SurfaceElement ElementAt(const Eigen::Vector3f& p, const NeighbourMoments& neighbours) {
   SurfaceElement element{p, Eigen::Vector3f::Zero()};
-  std::array<std::uint32_t, ColumnGrid::kMaxNeighbours> indices;
-  const int n = grid.Nearest(p, neighbours, radius_m, indices.data());
-  if (n < 4) return element;
-  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-  Eigen::Matrix3f moments = Eigen::Matrix3f::Zero();
-  for (int i = 0; i < n; ++i) {
-    const Eigen::Vector3f d = grid.points()[indices[i]] - p;  // small numbers: float suffices
-    sum += d;
-    moments += d * d.transpose();
-  }
-  const Eigen::Vector3f mean = sum / static_cast<float>(n);
-  const Eigen::Matrix3d covariance = (moments - sum * mean.transpose()).cast<double>();
+  if (neighbours.n < 4) return element;
+  const Eigen::Vector3f mean = neighbours.mean();
+  const Eigen::Matrix3d covariance =
+      (neighbours.squares - neighbours.sum * mean.transpose()).cast<double>();
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
   eigen.computeDirect(covariance);
   if (eigen.eigenvalues()[1] < 1e-3 * eigen.eigenvalues()[2]) return element;
   element.normal = eigen.eigenvectors().col(0).cast<float>();
   element.point += element.normal.dot(mean) * element.normal;
   return element;
+}
+
+SurfaceElement FitSurfaceElement(const ColumnGrid& grid,
+                                 const Eigen::Vector3f& p,
+                                 int neighbours,
+                                 float radius_m) {
+  std::array<std::uint32_t, ColumnGrid::kMaxNeighbours> indices;
+  const int n = grid.Nearest(p, neighbours, radius_m, indices.data());
+  NeighbourMoments moments;
+  for (int i = 0; i < n; ++i) moments.Add(grid.points()[indices[i]] - p);
+  return ElementAt(p, moments);
 }
 
 ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const ScanFeatureOptions& options) {
@@ -100,8 +109,9 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const ScanFeatureOpt
   for (const FeatureClass c : {FeatureClass::kTraversable, FeatureClass::kVertical}) {
     ListOf(c, points).reserve(local_map.patch_count());
   }
+  const Eigen::AngleAxisd turn(options.map_turn_rad, Eigen::Vector3d::UnitZ());
   const std::vector<Side> sides =
-      SidesOf(local_map, options.sensor_origin, options.max_range_m, options.up);
+      SidesOf(local_map, turn * options.sensor_origin, options.max_range_m, turn * options.up);
   // Tops above the sensor, behind the others: samples are drawn by place, and recorded figures with
   // them.
   std::vector<Eigen::Vector3f> overhead;
@@ -126,6 +136,12 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const ScanFeatureOpt
   }
   std::vector<Eigen::Vector3f>& tops = ListOf(FeatureClass::kTraversable, points);
   tops.insert(tops.end(), overhead.begin(), overhead.end());
+  if (options.map_turn_rad != 0.0) {
+    const Eigen::Matrix3f back = turn.inverse().toRotationMatrix().cast<float>();
+    for (auto& list : points) {
+      for (Eigen::Vector3f& p : list) p = back * p;
+    }
+  }
   for (auto& list : points) list.shrink_to_fit();
   return FromPoints(std::move(points), options);
 }

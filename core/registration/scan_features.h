@@ -35,6 +35,9 @@ struct ScanFeatureOptions {
   // The vertical in its frame, as far as anybody knows; of length 1. A robot on a ramp looks up to
   // the underside of a deck that lies below its own horizon.
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  // FromMap: how far the map's frame is turned about z from the scan's, p_map = Rz(turn) p_scan; in
+  // [−π, π]. Features come in the scan's frame whatever it is.
+  double map_turn_rad = 0.0;
 
   // INVALID_ARGUMENT naming every field out of its range.
   absl::Status Validate() const;
@@ -52,6 +55,25 @@ struct SampledFeature {
   SurfaceElement element;
   FeatureClass feature_class = FeatureClass::kTraversable;
 };
+
+// Of points around p, relative to it: small numbers, for which float suffices.
+struct NeighbourMoments {
+  int n = 0;
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  Eigen::Matrix3f squares = Eigen::Matrix3f::Zero();
+
+  void Add(const Eigen::Vector3f& d) {
+    ++n;
+    sum += d;
+    squares += d * d.transpose();
+  }
+  Eigen::Vector3f mean() const { return sum / static_cast<float>(n); }
+  // Standard deviation along a unit vector.
+  float SpreadAlong(const Eigen::Vector3f& direction) const;
+};
+
+// Their plane at p. With fewer than four, or if they span none, the normal is zero and the point p.
+SurfaceElement ElementAt(const Eigen::Vector3f& p, const NeighbourMoments& neighbours);
 
 // The plane through up to `neighbours` points of `grid` around its feature `p`. When fewer than
 // four lie within `radius_m`, or they do not span a plane, the normal is zero and the point `p`.

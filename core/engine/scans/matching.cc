@@ -1,5 +1,7 @@
 #include "core/engine/scans/matching.h"
 
+#include "core/engine/scans/scan_source.h"
+
 namespace strata {
 namespace {
 
@@ -13,6 +15,7 @@ ScanFeatureOptions FeatureOptionsOf(const ScanRecord& scan) {
   ScanFeatureOptions options;
   options.sample_count = kSamples;
   options.sensor_origin = scan.header.sensor_origin.cast<double>();
+  if (scan.has_points) options.map_turn_rad = kRegistrationTurnRad;
   options.up = scan.header.T_map_scan.linear().transpose() * Eigen::Vector3d::UnitZ();
   return options;
 }

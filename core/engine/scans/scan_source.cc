@@ -12,6 +12,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include <Eigen/Geometry>
 
 #include "core/codec/local_map_codec.h"
 #include "core/codec/point_codec.h"
@@ -205,11 +206,17 @@ absl::StatusOr<MlsMap> ScanSource::LocalMap(const ScanRecord& scan) {
 }
 
 absl::StatusOr<MlsMap> ScanSource::RegistrationMap(const ScanRecord& scan) {
-  if (!IsTooCoarse(scan)) return LocalMap(scan);
+  if (!scan.has_points) return LocalMap(scan);
   STRATA_RETURN_IF_ERROR(CheckSpread(scan));
   MlsParameters finer = parameters_.mls;
-  finer.cell_size_m = kRegistrationCellM;
-  return Build(scan, Pose::Identity(), finer, Faded::kWith, kMaxScanPatches);
+  finer.cell_size_m = std::min(finer.cell_size_m, kRegistrationCellM);
+  const bool is_finer = finer.cell_size_m < parameters_.mls.cell_size_m;
+  const Pose turned(Eigen::AngleAxisd(kRegistrationTurnRad, Eigen::Vector3d::UnitZ()));
+  return Build(scan,
+               turned,
+               finer,
+               Faded::kWith,
+               is_finer || scan.state == ScanState::kPending ? kMaxScanPatches : kAnyPatches);
 }
 
 absl::StatusOr<MlsMap> ScanSource::Contribution(const ScanRecord& scan, const Pose& T_map_scan) {
