@@ -35,7 +35,9 @@ struct Candidate {
 
 }  // namespace
 
-ColumnGrid::ColumnGrid(std::span<const Eigen::Vector3f> points, float column_size_m)
+ColumnGrid::ColumnGrid(std::span<const Eigen::Vector3f> points,
+                       float column_size_m,
+                       std::vector<std::uint32_t>* order)
     : column_size_m_(column_size_m) {
   if (points.empty()) return;
   Eigen::Vector2f low = points[0].head<2>();
@@ -63,25 +65,37 @@ ColumnGrid::ColumnGrid(std::span<const Eigen::Vector3f> points, float column_siz
   for (std::uint32_t& count : begin_) sum += std::exchange(count, sum);
   points_.resize(points.size());
   std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
-  for (std::size_t i = 0; i < points.size(); ++i) points_[next[column[i]]++] = points[i];
-  SortColumns();
+  if (order != nullptr) order->resize(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::uint32_t place = next[column[i]]++;
+    points_[place] = points[i];
+    if (order != nullptr) (*order)[place] = static_cast<std::uint32_t>(i);
+  }
+  SortColumns(order);
 }
 
-void ColumnGrid::SortColumns() {
-  std::vector<std::uint64_t> order;
+void ColumnGrid::SortColumns(std::vector<std::uint32_t>* order) {
+  std::vector<std::uint64_t> ranks;
   std::vector<Eigen::Vector3f> column;
+  std::vector<std::uint32_t> places;
   for (std::size_t c = 0; c + 1 < begin_.size(); ++c) {
     const std::uint32_t size = begin_[c + 1] - begin_[c];
     if (size < kLongRun) continue;
     const auto first = points_.begin() + begin_[c];
     column.assign(first, first + size);
-    order.resize(size);
+    ranks.resize(size);
     for (std::uint32_t i = 0; i < size; ++i) {
-      order[i] = std::uint64_t{Ascending(column[i].z())} << 32 | i;
+      ranks[i] = std::uint64_t{Ascending(column[i].z())} << 32 | i;
     }
-    std::sort(order.begin(), order.end());
-    std::transform(order.begin(), order.end(), first, [&column](std::uint64_t place) {
-      return column[static_cast<std::uint32_t>(place)];
+    std::sort(ranks.begin(), ranks.end());
+    std::transform(ranks.begin(), ranks.end(), first, [&column](std::uint64_t rank) {
+      return column[static_cast<std::uint32_t>(rank)];
+    });
+    if (order == nullptr) continue;
+    const auto first_place = order->begin() + begin_[c];
+    places.assign(first_place, first_place + size);
+    std::transform(ranks.begin(), ranks.end(), first_place, [&places](std::uint64_t rank) {
+      return places[static_cast<std::uint32_t>(rank)];
     });
   }
 }

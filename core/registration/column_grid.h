@@ -22,7 +22,10 @@ class ColumnGrid {
   ColumnGrid() = default;
   // REQUIRES: finite points, `column_size_m` > 0. Columns become wider where the points' extent
   // would need more than 2²² of them.
-  ColumnGrid(std::span<const Eigen::Vector3f> points, float column_size_m);
+  // `order`, if any, becomes the place in `points` of each of points().
+  ColumnGrid(std::span<const Eigen::Vector3f> points,
+             float column_size_m,
+             std::vector<std::uint32_t>* order = nullptr);
 
   // In the grid's own order; indices below are into this.
   const std::vector<Eigen::Vector3f>& points() const { return points_; }
@@ -76,7 +79,7 @@ class ColumnGrid {
                 const Eigen::Vector3f& p,
                 const float& bound_m2,
                 const Offer& offer) const;
-  void SortColumns();
+  void SortColumns(std::vector<std::uint32_t>* order);
 
   float column_size_m_ = 1.0F;
   Eigen::Vector2f origin_ = Eigen::Vector2f::Zero();

@@ -10,6 +10,7 @@
 
 #include "core/geometry/skew.h"
 #include "core/registration/column_grid.h"
+#include "core/registration/faces.h"
 #include "core/registration/mls_registration.h"
 #include "core/registration/scan_features.h"
 
@@ -84,17 +85,26 @@ PlaneToPlaneMatcher::PlaneToPlaneMatcher(const ScanFeatures& source,
   }
 }
 
-const SurfaceElement& PlaneToPlaneMatcher::TargetElement(FeatureClass c, std::uint32_t index) {
+const PlaneToPlaneMatcher::TargetSurface& PlaneToPlaneMatcher::SurfaceAt(
+    FeatureClass c,
+    std::uint32_t index,
+    const Eigen::Vector3f& sensor,
+    const Eigen::Vector3f& normal) {
   std::uint32_t& known = element_index_[static_cast<std::size_t>(c)][index];
-  if (known == 0) {
-    const ColumnGrid& grid = target_.grid(c);
-    elements_.push_back(FitSurfaceElement(grid,
-                                          grid.points()[index],
-                                          options_.neighbours,
-                                          static_cast<float>(options_.neighbour_radius_m)));
-    known = static_cast<std::uint32_t>(elements_.size());
+  if (known != 0) return surfaces_[known - 1];
+  const ColumnGrid& grid = target_.grid(c);
+  const auto radius_m = static_cast<float>(options_.neighbour_radius_m);
+  TargetSurface surface{
+      FitSurfaceElement(grid, grid.points()[index], options_.neighbours, radius_m)};
+  if (c == FeatureClass::kVertical && !target_.upright_sides().empty() && !normal.isZero()) {
+    surface.is_other_face =
+        FaceTowards(
+            target_, index, sensor, normal, options_.neighbours, radius_m, surface.element) ==
+        Face::kOther;
   }
-  return elements_[known - 1];
+  surfaces_.push_back(surface);
+  known = static_cast<std::uint32_t>(surfaces_.size());
+  return surfaces_.back();
 }
 
 std::uint32_t PlaneToPlaneMatcher::Match(std::size_t sample,
@@ -137,9 +147,12 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
     const Eigen::Vector3d p_target = R * p + t;
     const std::uint32_t j = Match(i, p_target.cast<float>(), static_cast<float>(gate_m), fine);
     if (j == ColumnGrid::kNone) continue;
-    const SurfaceElement q =
-        fine ? TargetElement(sampled.feature_class, j)
-             : SurfaceElement{grid.points()[j], R.cast<float>() * sampled.element.normal};
+    const Eigen::Vector3f normal = R.cast<float>() * sampled.element.normal;
+    const TargetSurface surface =
+        fine ? SurfaceAt(sampled.feature_class, j, sensor.cast<float>(), normal)
+             : TargetSurface{{grid.points()[j], normal}};
+    if (surface.is_other_face) continue;
+    const SurfaceElement& q = surface.element;
     if (target_.sensor().has_value() &&
         OppositeSides(q.point.cast<double>(), q.normal.cast<double>(), sensor, *target_.sensor())) {
       continue;

@@ -47,20 +47,29 @@ class PlaneToPlaneMatcher {
                       const MlsRegistrationOptions& options);
 
   // `fine` uses `max_samples` and both sides' normals; otherwise `coarse_samples` and only the
-  // source's, which are at hand. Two sides of a thin wall are no match where the target is one
-  // scan. Normals of the target are computed at its first match and kept.
+  // source's, which are at hand. Two sides of a thin wall are no match: of a target that is one
+  // scan by where it was seen from, otherwise by FaceTowards(). Normals of the target are computed
+  // at its first match and kept.
   PlaneToPlaneSums Linearise(const Pose& T_target_source, double gate_m, bool fine);
 
  private:
   // The nearest feature of the class and closer than the gate, or kNone.
   std::uint32_t Match(std::size_t sample, const Eigen::Vector3f& p_target, float gate_m, bool fine);
-  const SurfaceElement& TargetElement(FeatureClass c, std::uint32_t index);
+  // A scan at `sensor` sees a surface with this normal there.
+  struct TargetSurface {
+    SurfaceElement element;
+    bool is_other_face = false;
+  };
+  const TargetSurface& SurfaceAt(FeatureClass c,
+                                 std::uint32_t index,
+                                 const Eigen::Vector3f& sensor,
+                                 const Eigen::Vector3f& normal);
 
   const ScanFeatures& source_;
   const RegistrationTarget& target_;
   const MlsRegistrationOptions& options_;
   std::array<std::vector<std::uint32_t>, kFeatureClasses> element_index_;  // 0: not computed yet
-  std::vector<SurfaceElement> elements_;
+  std::vector<TargetSurface> surfaces_;
   struct KnownMatch {
     Eigen::Vector3f p_target = Eigen::Vector3f::Zero();  // it was looked up for
     ColumnGrid::SlackMatch match;

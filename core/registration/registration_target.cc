@@ -41,11 +41,17 @@ std::uint64_t KeyOf(const Eigen::Vector3f& p, float cube_m) {
   return coordinate(p.x()) | coordinate(p.y()) << 21 | coordinate(p.z()) << 42;
 }
 
+struct Averages {
+  std::vector<Eigen::Vector3f> means;
+  std::vector<std::uint32_t> mean_of;  // each point
+};
+
 // Averages points that share a cube. Open addressing over cube keys; cubes keep the order in which
 // they are first seen, so the result depends on the points and their order only. The table is
 // larger than caches, and which slot is next does not depend on those before.
-std::vector<Eigen::Vector3f> AverageInCubes(const std::vector<Eigen::Vector3f>& points,
-                                            float cube_m) {
+Averages AverageInCubes(const std::vector<Eigen::Vector3f>& points, float cube_m) {
+  Averages averages;
+  averages.mean_of.resize(points.size());
   std::vector<std::uint64_t> keys(points.size());
   std::transform(points.begin(), points.end(), keys.begin(), [cube_m](const Eigen::Vector3f& p) {
     return KeyOf(p, cube_m);
@@ -70,10 +76,67 @@ std::vector<Eigen::Vector3f> AverageInCubes(const std::vector<Eigen::Vector3f>& 
       cube.count += 1.0F;
       cube.mean += (points[i] - cube.mean) / cube.count;
     }
+    averages.mean_of[i] = table[slot];
   }
-  std::vector<Eigen::Vector3f> means(cubes.size());
-  std::transform(cubes.begin(), cubes.end(), means.begin(), [](const Cube& c) { return c.mean; });
-  return means;
+  averages.means.resize(cubes.size());
+  std::transform(
+      cubes.begin(), cubes.end(), averages.means.begin(), [](const Cube& c) { return c.mean; });
+  return averages;
+}
+
+// Features of one class in the grids' coordinates, scan after scan.
+struct PlacedPoints {
+  std::vector<Eigen::Vector3f> points;
+  std::vector<Eigen::Vector3f> toward;  // unit vectors to their sensors; empty if not asked for
+};
+
+PlacedPoints PlacePoints(std::span<const PlacedScan> scans,
+                         FeatureClass c,
+                         const Eigen::Vector3d& origin,
+                         double radius_m,
+                         bool with_sensors) {
+  PlacedPoints placed;
+  std::size_t most = 0;
+  for (const PlacedScan& scan : scans) most += scan.features->points(c).size();
+  placed.points.reserve(most);
+  if (with_sensors) placed.toward.reserve(most);
+  const auto radius_m2 = static_cast<float>(radius_m * radius_m);
+  for (const PlacedScan& scan : scans) {
+    const Eigen::Matrix3f R = scan.T_target_scan.linear().cast<float>();
+    const Eigen::Vector3f t = (scan.T_target_scan.translation() - origin).cast<float>();
+    const Eigen::Vector3f sensor =
+        (scan.T_target_scan * scan.features->sensor_origin() - origin).cast<float>();
+    for (const Eigen::Vector3f& p : scan.features->points(c)) {
+      const Eigen::Vector3f moved = R * p + t;
+      if (moved.head<2>().squaredNorm() > radius_m2) continue;
+      placed.points.push_back(moved);
+      if (with_sensors) placed.toward.push_back((sensor - moved).normalized());
+    }
+  }
+  return placed;
+}
+
+// The first point of a cube says which side is the first.
+void AddTo(SeenSides& sides, const Eigen::Vector3f& p, const Eigen::Vector3f& toward) {
+  const bool is_first = sides[0].count == 0.0F || sides[0].toward.dot(toward) >= 0.0F;
+  SeenSide& side = sides[is_first ? 0 : 1];
+  side.count += 1.0F;
+  side.mean += (p - side.mean) / side.count;
+  side.toward += toward;
+}
+
+// In the order of a grid.
+std::vector<SeenSides> UprightSidesOf(const PlacedPoints& placed,
+                                      const Averages& averages,
+                                      const std::vector<std::uint32_t>& order) {
+  std::vector<SeenSides> sides(averages.means.size());
+  for (std::size_t i = 0; i < placed.points.size(); ++i) {
+    AddTo(sides[averages.mean_of[i]], placed.points[i], placed.toward[i]);
+  }
+  std::vector<SeenSides> ordered;
+  ordered.reserve(sides.size());
+  for (const std::uint32_t i : order) ordered.push_back(sides[i]);
+  return ordered;
 }
 
 }  // namespace
@@ -92,26 +155,21 @@ RegistrationTarget::RegistrationTarget(std::span<const PlacedScan> scans,
   if (scans.size() == 1 && options.from_one_place) {
     sensor_ = scans[0].T_target_scan * scans[0].features->sensor_origin() - origin_;
   }
-  const auto radius_m2 = static_cast<float>(options.radius_m * options.radius_m);
+  const bool averaged = scans.size() > 1 && options.thinning_m > 0.0;
   for (int c = 0; c < kFeatureClasses; ++c) {
-    std::vector<Eigen::Vector3f> points;
-    std::size_t most = 0;
-    for (const PlacedScan& scan : scans) {
-      most += scan.features->points(static_cast<FeatureClass>(c)).size();
+    const auto feature_class = static_cast<FeatureClass>(c);
+    const bool sided =
+        averaged && options.from_one_place && feature_class == FeatureClass::kVertical;
+    const PlacedPoints placed = PlacePoints(scans, feature_class, origin_, options.radius_m, sided);
+    if (!averaged) {
+      grids_[c] = std::make_shared<const ColumnGrid>(placed.points, kColumnSizeM);
+      continue;
     }
-    points.reserve(most);
-    for (const PlacedScan& scan : scans) {
-      const Eigen::Matrix3f R = scan.T_target_scan.linear().cast<float>();
-      const Eigen::Vector3f t = (scan.T_target_scan.translation() - origin_).cast<float>();
-      for (const Eigen::Vector3f& p : scan.features->points(static_cast<FeatureClass>(c))) {
-        const Eigen::Vector3f moved = R * p + t;
-        if (moved.head<2>().squaredNorm() <= radius_m2) points.push_back(moved);
-      }
-    }
-    if (scans.size() > 1 && options.thinning_m > 0.0) {
-      points = AverageInCubes(points, static_cast<float>(options.thinning_m));
-    }
-    grids_[c] = std::make_shared<const ColumnGrid>(points, kColumnSizeM);
+    const Averages averages = AverageInCubes(placed.points, static_cast<float>(options.thinning_m));
+    std::vector<std::uint32_t> order;
+    grids_[c] =
+        std::make_shared<const ColumnGrid>(averages.means, kColumnSizeM, sided ? &order : nullptr);
+    if (sided) upright_sides_ = UprightSidesOf(placed, averages, order);
   }
 }
 
@@ -122,7 +180,7 @@ std::size_t RegistrationTarget::size() const {
 }
 
 std::size_t RegistrationTarget::memory_bytes() const {
-  std::size_t bytes = sizeof(*this);
+  std::size_t bytes = sizeof(*this) + upright_sides_.capacity() * sizeof(SeenSides);
   for (const auto& grid : grids_) bytes += grid->memory_bytes();
   return bytes;
 }

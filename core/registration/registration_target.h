@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "core/geometry/pose.h"
 #include "core/mls/features.h"
@@ -35,6 +36,15 @@ struct TargetOptions {
   absl::Status Validate() const;
 };
 
+// What several scans saw of a cube, apart by the side they saw it from: both faces of a thin wall
+// may lie in one.
+struct SeenSide {
+  Eigen::Vector3f mean = Eigen::Vector3f::Zero();
+  Eigen::Vector3f toward = Eigen::Vector3f::Zero();  // sum of unit vectors to the sensors
+  float count = 0.0F;                                // 0: nothing was seen from here
+};
+using SeenSides = std::array<SeenSide, 2>;
+
 // Class-wise search structure over the union. A pure function of its arguments and their order.
 // Coordinates are kept relative to the centre, so that the target frame may be far away. Immutable,
 // safe to share between threads.
@@ -47,6 +57,8 @@ class RegistrationTarget {
   // Where all of it was seen from, in the grids' coordinates: of a single scan; of several nobody
   // knows which saw what.
   const std::optional<Eigen::Vector3d>& sensor() const { return sensor_; }
+  // Of each of grid(kVertical).points() if several scans were averaged; empty otherwise.
+  const std::vector<SeenSides>& upright_sides() const { return upright_sides_; }
   // Origin of the grids' coordinates, in the target frame.
   const Eigen::Vector3d& origin() const { return origin_; }
   std::size_t size() const;
@@ -55,6 +67,7 @@ class RegistrationTarget {
  private:
   std::array<std::shared_ptr<const ColumnGrid>, kFeatureClasses> grids_;  // never null
   std::optional<Eigen::Vector3d> sensor_;
+  std::vector<SeenSides> upright_sides_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
 };
 

@@ -1,0 +1,188 @@
+// Two rooms with a thin wall between them: each face of it is a thing of its own.
+#include "core/registration/faces.h"
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "core/cloud/sensor_model.h"
+#include "core/mls/build.h"
+#include "core/registration/column_grid.h"
+#include "core/registration/mls_registration.h"
+#include "tests/support/simulator/scene.h"
+#include "tests/support/simulator/simulator.h"
+
+namespace strata::testing {
+namespace {
+
+constexpr double kTurnRad = 0.6;
+constexpr double kHalfWallM = 0.04;
+
+// Rooms on both sides of x = 0, with a door in the middle.
+Scene TwoRooms() {
+  Scene scene;
+  scene.Add(Box({-7.0, -5.0, -1.0}, {7.0, 5.0, 0.0}));
+  scene.Add(Box({-7.0, -5.0, 2.8}, {7.0, 5.0, 3.0}));
+  for (const double side : {-1.0, 1.0}) {
+    const Eigen::Vector2d x(side * 6.13, side * 6.4);
+    scene.Add(Box({x.minCoeff(), -5.0, 0.0}, {x.maxCoeff(), 5.0, 2.8}));
+    const Eigen::Vector2d y(side * 4.07, side * 4.3);
+    scene.Add(Box({-6.4, y.minCoeff(), 0.0}, {6.4, y.maxCoeff(), 2.8}));
+    const Eigen::Vector2d wall(side * 0.6, side * 4.2);
+    scene.Add(Box({-kHalfWallM, wall.minCoeff(), 0.0}, {kHalfWallM, wall.maxCoeff(), 2.8}));
+    scene.Add(Box({side * 4.0 - 0.5, side * 2.1, 0.0}, {side * 4.0 + 0.5, side * 2.1 + 0.7, 1.2}));
+  }
+  scene.Add(Box({-kHalfWallM, -0.6, 2.1}, {kHalfWallM, 0.6, 2.8}));
+  scene.Build();
+  return scene;
+}
+
+Pose At(double x, double y) {
+  Pose T = Pose::Identity();
+  T.translation() = Eigen::Vector3d(x, y, 1.1);
+  return T;
+}
+
+ScanFeatures FeaturesFrom(const Scene& scene, const Pose& T_world_scan, double turn_rad) {
+  SensorOptions sensor;
+  sensor.rings = 48;
+  sensor.columns = 720;
+  const auto seed = static_cast<std::uint64_t>(1000.0 * (10.0 + T_world_scan.translation().x()));
+  const Pose turned(Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ()));
+  return ScanFeatures::FromMap(
+      BuildMlsMap(
+          SimulateScan(scene, sensor, T_world_scan, seed), turned, SensorModel(), MlsParameters())
+          ->map,
+      {.sample_count = 4000, .map_turn_rad = turn_rad});
+}
+
+// Mean offset, across the wall, of what the scans see in the second room when it is driven into.
+double BiasOfTheSecondRoom(double turn_rad) {
+  const Scene scene = TwoRooms();
+  std::vector<ScanFeatures> seen;
+  std::vector<PlacedScan> placed;
+  seen.reserve(20);
+  double bias_m = 0.0;
+  int scans = 0;
+  for (double x = -4.0; x < 4.0; x += 0.75) {
+    const Pose truth = At(x, 0.1);
+    seen.push_back(FeaturesFrom(scene, truth, turn_rad));
+    if (x > 0.0) {
+      const RegistrationTarget target(placed, {.centre = truth.translation()});
+      MlsRegistrationOptions options;
+      options.max_samples = 4000;
+      bias_m +=
+          RegisterScan(seen.back(), target, truth, options).T_target_source.translation().x() - x;
+      ++scans;
+    }
+    placed.push_back({&seen.back(), truth});
+  }
+  return bias_m / scans;
+}
+
+TEST(FacesOfWallsTest, DoNotPullTheNextRoomOntoTheirOtherSide) {
+  const double bias_m = BiasOfTheSecondRoom(kTurnRad);
+  std::printf("%.1f mm\n", 1000.0 * bias_m);
+  EXPECT_LT(std::abs(bias_m), 0.006);  // 0.0135 where faces are not told apart
+}
+
+class FacesTest : public ::testing::Test {
+ protected:
+  // What a scan at `sensor` finds of the wall in what was seen from `places`.
+  Face Seen(const std::vector<Pose>& places, const Eigen::Vector3f& sensor) {
+    std::vector<ScanFeatures> seen;
+    seen.reserve(places.size());
+    std::vector<PlacedScan> placed;
+    for (const Pose& place : places) {
+      seen.push_back(FeaturesFrom(scene_, place, kTurnRad));
+      placed.push_back({&seen.back(), place});
+    }
+    const RegistrationTarget target(placed);
+    const auto& points = target.grid(FeatureClass::kVertical).points();
+    std::uint32_t nearest = 0;
+    const Eigen::Vector3f wall(0.0F, 2.0F, 1.2F);
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+      if ((points[i] - wall).norm() < (points[nearest] - wall).norm()) nearest = i;
+    }
+    element_ = SurfaceElement();
+    return FaceTowards(target, nearest, sensor, Eigen::Vector3f::UnitX(), 16, 1.5F, element_);
+  }
+
+  const Scene scene_ = TwoRooms();
+  const std::vector<Pose> first_room_ = {At(-2.0, 1.0), At(-2.5, 2.5), At(-1.5, 3.0)};
+  const std::vector<Pose> second_room_ = {At(2.0, 1.0), At(2.5, 2.5), At(1.5, 3.0)};
+  const Eigen::Vector3f in_the_first_{-3.0F, 1.5F, 1.1F};
+  const Eigen::Vector3f in_the_second_{3.0F, 1.5F, 1.1F};
+  SurfaceElement element_;
+};
+
+TEST_F(FacesTest, OfAWallThatWasSeenFromBothRoomsAScanGetsItsOwnFace) {
+  std::vector<Pose> both = first_room_;
+  both.insert(both.end(), second_room_.begin(), second_room_.end());
+  ASSERT_EQ(Seen(both, in_the_first_), Face::kOne);
+  EXPECT_NEAR(element_.point.x(), -kHalfWallM, 0.02);
+  EXPECT_GT(std::abs(element_.normal.x()), 0.85F);
+  ASSERT_EQ(Seen(both, in_the_second_), Face::kOne);
+  EXPECT_NEAR(element_.point.x(), kHalfWallM, 0.02);
+}
+
+TEST_F(FacesTest, OfAWallThatWasSeenFromTheOtherRoomOnlyAScanGetsNothing) {
+  EXPECT_EQ(Seen(first_room_, in_the_second_), Face::kOther);
+  EXPECT_EQ(Seen(first_room_, in_the_first_), Face::kWhole);
+}
+
+// A post is seen from all around, and says from any side where it is.
+TEST(FacesOfPostsTest, AreNotToldApart) {
+  Scene scene;
+  scene.Add(Box({-9.0, -9.0, -1.0}, {9.0, 9.0, 0.0}));
+  scene.Add(Box({-0.1, -0.1, 0.0}, {0.1, 0.1, 3.0}));
+  scene.Build();
+  const std::vector<Pose> places = {At(-2.0, 0.3), At(-3.0, -0.2)};
+  std::vector<ScanFeatures> seen;
+  seen.reserve(places.size());
+  std::vector<PlacedScan> placed;
+  for (const Pose& place : places) {
+    seen.push_back(FeaturesFrom(scene, place, kTurnRad));
+    placed.push_back({&seen.back(), place});
+  }
+  const RegistrationTarget target(placed);
+  ASSERT_GT(target.grid(FeatureClass::kVertical).points().size(), 20U);
+  for (std::uint32_t i = 0; i < target.grid(FeatureClass::kVertical).points().size(); ++i) {
+    SurfaceElement element;
+    EXPECT_EQ(FaceTowards(target,
+                          i,
+                          Eigen::Vector3f(3.0F, 0.0F, 1.1F),
+                          Eigen::Vector3f::UnitX(),
+                          16,
+                          1.5F,
+                          element),
+              Face::kWhole);
+  }
+}
+
+// Features are centres of cells: along the cells a wall would lie off them.
+TEST(FacesOfWallsTest, AreWhereTheyAreInATurnedMap) {
+  const Scene scene = TwoRooms();
+  const auto off = [&](double turn_rad) {
+    const ScanFeatures features = FeaturesFrom(scene, At(-3.0, 0.0), turn_rad);
+    double sum_m = 0.0;
+    int n = 0;
+    for (const Eigen::Vector3f& p : features.points(FeatureClass::kVertical)) {
+      if (std::abs(p.y() + 4.07F) > 0.2F || std::abs(p.x()) > 2.0F) continue;
+      sum_m += p.y() + 4.07;
+      ++n;
+    }
+    return std::abs(sum_m / n);
+  };
+  EXPECT_GT(off(0.0), 0.015);
+  EXPECT_LT(off(kTurnRad), 0.008);
+}
+
+}  // namespace
+}  // namespace strata::testing
