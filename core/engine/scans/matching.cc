@@ -1,6 +1,6 @@
 #include "core/engine/scans/matching.h"
 
-#include "core/engine/scans/scan_source.h"
+#include <Eigen/Geometry>
 
 namespace strata {
 namespace {
@@ -9,13 +9,18 @@ namespace {
 // (core/registration/neighbours.h has numbers).
 constexpr int kSamples = 4000;
 
+// At right angles and at 45° to cells walls resonate with them.
+constexpr double kTurnRad = 0.6;
+
 }  // namespace
+
+Pose MatchingFrame() { return Pose(Eigen::AngleAxisd(kTurnRad, Eigen::Vector3d::UnitZ())); }
 
 ScanFeatureOptions FeatureOptionsOf(const ScanRecord& scan) {
   ScanFeatureOptions options;
   options.sample_count = kSamples;
   options.sensor_origin = scan.header.sensor_origin.cast<double>();
-  if (scan.has_points) options.map_turn_rad = kRegistrationTurnRad;
+  if (scan.has_points) options.map_turn_rad = kTurnRad;
   options.up = scan.header.T_map_scan.linear().transpose() * Eigen::Vector3d::UnitZ();
   return options;
 }

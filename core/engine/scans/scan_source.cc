@@ -12,12 +12,12 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
-#include <Eigen/Geometry>
 
 #include "core/codec/local_map_codec.h"
 #include "core/codec/point_codec.h"
 #include "core/common/hash_map.h"
 #include "core/common/status.h"
+#include "core/engine/scans/matching.h"
 #include "core/mls/build.h"
 #include "core/mls/join.h"
 #include "core/mls/patch.h"
@@ -211,9 +211,8 @@ absl::StatusOr<MlsMap> ScanSource::RegistrationMap(const ScanRecord& scan) {
   MlsParameters finer = parameters_.mls;
   finer.cell_size_m = std::min(finer.cell_size_m, kRegistrationCellM);
   const bool is_finer = finer.cell_size_m < parameters_.mls.cell_size_m;
-  const Pose turned(Eigen::AngleAxisd(kRegistrationTurnRad, Eigen::Vector3d::UnitZ()));
   return Build(scan,
-               turned,
+               MatchingFrame(),
                finer,
                Faded::kWith,
                is_finer || scan.state == ScanState::kPending ? kMaxScanPatches : kAnyPatches);

@@ -32,10 +32,6 @@ inline constexpr std::size_t kMaxScanPatches = std::size_t{1} << 22;
 // At 0.2 m matches err twice as much (core/registration/neighbours.h).
 inline constexpr double kRegistrationCellM = 0.1;
 
-// Robots drive along walls and through doors at right angles to them: a wall along the cells lies
-// up to half a cell off its features, all of them on one side.
-inline constexpr double kRegistrationTurnRad = 0.6;
-
 // Piece `ordinal` of the points of `scan`, with the labels it was uploaded with. DATA_LOSS, naming
 // the piece, unless it is intact and has the columns that the header announces.
 absl::StatusOr<PointCloud> ReadPoints(StorageReader& reader,
@@ -54,9 +50,8 @@ class ScanSource {
   // points in more than kMaxScanTiles tiles and, of a scan that waits for integration, more than
   // kMaxScanPatches.
   absl::StatusOr<MlsMap> LocalMap(const ScanRecord& scan);
-  // What scans are matched by. Where points are there, the same in a frame that is turned by
-  // kRegistrationTurnRad about z, p_map = Rz(turn) p_scan, with cells of kRegistrationCellM at
-  // most, whatever the map's; LocalMap() otherwise.
+  // What scans are matched by: where points are there, the same in MatchingFrame() and with cells
+  // of kRegistrationCellM at most, whatever the map's; LocalMap() otherwise.
   absl::StatusOr<MlsMap> RegistrationMap(const ScanRecord& scan);
   // What the scan adds to the map at this pose, without points that have faded: a pure function of
   // the scan, what is said of its points, the pose and the map's parameters, before and after

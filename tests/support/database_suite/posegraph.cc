@@ -159,6 +159,7 @@ TEST_P(DatabaseSuite, AScanIsFoundWhereItWasTaken) {
   ASSERT_TRUE(result.found) << result.message;
   EXPECT_EQ(result.best.place, (ScanId{"run", 1}));
   EXPECT_LT((result.best.T_map_scan.translation() - Eigen::Vector3d(6.0, 0.0, 0.0)).norm(), 0.1);
+  EXPECT_LT(RotationAngleRad(result.best.T_map_scan), 0.05);
   EXPECT_GT(result.best.confidence, 0.0);
   EXPECT_LE(result.best.confidence, 1.0);
   EXPECT_GT(result.covariance.diagonal().minCoeff(), 0.0);
