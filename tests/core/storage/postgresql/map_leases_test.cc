@@ -57,9 +57,10 @@ class MapLeasesTest : public ::testing::Test {
     STRATA_ASSERT_OK(Server("any").Create(kName, MapParameters(), absl::Now()));
     STRATA_ASSERT_OK_AND_ASSIGN(sql_, Connection::Open(address_));
     STRATA_ASSERT_OK(sql_->Execute(
-        "CREATE SEQUENCE renewals; CREATE FUNCTION count() RETURNS trigger LANGUAGE plpgsql AS $f$ "
+        "CREATE SEQUENCE renewals; CREATE FUNCTION count_renewal() RETURNS trigger LANGUAGE "
+        "plpgsql AS $f$ "
         "BEGIN PERFORM nextval('renewals'); RETURN NEW; END $f$; CREATE TRIGGER renewal BEFORE "
-        "UPDATE ON map_lease FOR EACH ROW EXECUTE FUNCTION count()"));
+        "UPDATE ON map_lease FOR EACH ROW EXECUTE FUNCTION count_renewal()"));
   }
   PostgresMaps Server(const std::string& name, absl::Duration time = kLong, bool fenced = true) {
     PostgresOptions options;
