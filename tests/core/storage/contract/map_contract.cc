@@ -81,6 +81,7 @@ TEST_F(MapContractTest, TheClockTicksAndNeverInACommitThatMayBeLost) {
 TEST_F(MapContractTest, WhatWasTakenAwayTakesNoMore) {
   STRATA_EXPECT_OK(storage().CheckInPlace());
   STRATA_EXPECT_OK(storage().CheckHeld());
+  EXPECT_NE(storage().last_owner(), LastOwner::kOther);
   Put(1);
   STRATA_ASSERT_OK(store().TakeAway());
   EXPECT_THAT(storage().CheckInPlace(), StatusIs(absl::StatusCode::kUnavailable, ::testing::_));
