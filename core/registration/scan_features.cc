@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <numbers>
 #include <span>
 #include <utility>
 #include <vector>
@@ -14,7 +13,6 @@
 #include "absl/status/status.h"
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
 
 #include "core/common/option_checks.h"
 #include "core/common/random.h"
@@ -67,7 +65,6 @@ absl::Status ScanFeatureOptions::Validate() const {
   checks.InRange("neighbour_radius_m", neighbour_radius_m, 0.01, 100.0);
   checks.InRange("|sensor_origin|", sensor_origin.norm(), 0.0, 1e8);
   checks.InRange("|up|", up.norm(), 0.999, 1.001);
-  checks.InRange("map_turn_rad", map_turn_rad, -std::numbers::pi, std::numbers::pi);
   return checks.status();
 }
 
@@ -109,9 +106,8 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const ScanFeatureOpt
   for (const FeatureClass c : {FeatureClass::kTraversable, FeatureClass::kVertical}) {
     ListOf(c, points).reserve(local_map.patch_count());
   }
-  const Eigen::AngleAxisd turn(options.map_turn_rad, Eigen::Vector3d::UnitZ());
   const std::vector<Side> sides =
-      SidesOf(local_map, turn * options.sensor_origin, options.max_range_m, turn * options.up);
+      SidesOf(local_map, options.sensor_origin, options.max_range_m, options.up);
   // Tops above the sensor, behind the others: samples are drawn by place, and recorded figures with
   // them.
   std::vector<Eigen::Vector3f> overhead;
@@ -136,12 +132,6 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const ScanFeatureOpt
   }
   std::vector<Eigen::Vector3f>& tops = ListOf(FeatureClass::kTraversable, points);
   tops.insert(tops.end(), overhead.begin(), overhead.end());
-  if (options.map_turn_rad != 0.0) {
-    const Eigen::Matrix3f back = turn.inverse().toRotationMatrix().cast<float>();
-    for (auto& list : points) {
-      for (Eigen::Vector3f& p : list) p = back * p;
-    }
-  }
   for (auto& list : points) list.shrink_to_fit();
   return FromPoints(std::move(points), options);
 }

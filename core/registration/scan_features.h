@@ -35,9 +35,6 @@ struct ScanFeatureOptions {
   // The vertical in its frame, as far as anybody knows; of length 1. A robot on a ramp looks up to
   // the underside of a deck that lies below its own horizon.
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-  // FromMap: how far the map's frame is turned about z from the scan's, p_map = Rz(turn) p_scan; in
-  // [−π, π]. Features come in the scan's frame whatever it is.
-  double map_turn_rad = 0.0;
 
   // INVALID_ARGUMENT naming every field out of its range.
   absl::Status Validate() const;

@@ -17,7 +17,6 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
-#include <Eigen/Geometry>
 
 #include "core/cloud/sensor_model.h"
 #include "core/mls/build.h"
@@ -108,7 +107,6 @@ std::vector<Pose> Place(const Recording& recording, const Settings& settings) {
   double target_ms = 0.0;
   double register_ms = 0.0;
   double worst_overlap = 1.0;
-  const Pose turned(Eigen::AngleAxisd(settings.features.map_turn_rad, Eigen::Vector3d::UnitZ()));
   const auto now = [] {
     return std::chrono::duration<double, std::milli>(
                std::chrono::steady_clock::now().time_since_epoch())
@@ -117,7 +115,9 @@ std::vector<Pose> Place(const Recording& recording, const Settings& settings) {
   for (std::size_t i = 0; i < recording.clouds.size(); ++i) {
     const double start = now();
     const MlsMap map =
-        BuildMlsMap(recording.clouds[i], turned, SensorModel(), settings.mls, scratch).value().map;
+        BuildMlsMap(recording.clouds[i], Pose::Identity(), SensorModel(), settings.mls, scratch)
+            .value()
+            .map;
     features.push_back(ScanFeatures::FromMap(map, settings.features));
     features_ms += now() - start;
     if (i == 0) {
@@ -233,8 +233,6 @@ int Main(int argc, char** argv) {
   app.add_option("--neighbour-radius", settings.registration.neighbour_radius_m);
   app.add_option("--thinning", settings.target.thinning_m);
   app.add_option("--range", settings.features.max_range_m);
-  settings.features.map_turn_rad = 0.6;
-  app.add_option("--turn", settings.features.map_turn_rad);
   CLI11_PARSE(app, argc, argv);
   settings.features.sample_count = settings.registration.max_samples;
   settings.features.neighbours = settings.registration.neighbours;

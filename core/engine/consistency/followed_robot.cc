@@ -81,7 +81,7 @@ absl::StatusOr<ScanFeatures> FollowedRobot::FeaturesOf(const PointCloud& cloud) 
   parameters.cell_size_m = std::min(parameters.cell_size_m, kRegistrationCellM);
   STRATA_ASSIGN_OR_RETURN(const MlsBuildResult built,
                           BuildMlsMap(cloud,
-                                      MatchingFrame(),
+                                      Pose::Identity(),
                                       start_.sensor.value_or(core_.info().parameters.sensor),
                                       parameters,
                                       scratch_));

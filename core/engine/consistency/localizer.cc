@@ -90,21 +90,21 @@ class Localizer::Search {
  private:
   absl::Status Describe() {
     MlsParameters parameters = core_.info().parameters.mls;
-    STRATA_ASSIGN_OR_RETURN(const MlsMap seen, Seen(parameters, Pose::Identity()));
+    STRATA_ASSIGN_OR_RETURN(const MlsMap seen, Seen(parameters));
     place_ = DescribePlace(seen);
     parameters.cell_size_m = std::min(parameters.cell_size_m, kRegistrationCellM);
-    STRATA_ASSIGN_OR_RETURN(const MlsMap finer, Seen(parameters, MatchingFrame()));
+    STRATA_ASSIGN_OR_RETURN(const MlsMap finer, Seen(parameters));
     ScanRecord scan;
     scan.header.sensor_origin = query_.cloud.sensor_origin;
     features_ = ScanFeatures::FromMap(finer, FeatureOptionsOf(scan));
     return absl::OkStatus();
   }
 
-  absl::StatusOr<MlsMap> Seen(const MlsParameters& parameters, const Pose& T_map_scan) const {
+  absl::StatusOr<MlsMap> Seen(const MlsParameters& parameters) const {
     MlsScratch scratch;
     STRATA_ASSIGN_OR_RETURN(MlsBuildResult built,
                             BuildMlsMap(query_.cloud,
-                                        T_map_scan,
+                                        Pose::Identity(),
                                         query_.sensor.value_or(core_.info().parameters.sensor),
                                         parameters,
                                         scratch));

@@ -31,16 +31,18 @@ absl::Status ScansAhead::Make(std::size_t i) {
   }
   const ScanRecord& scan = scans_[i].scan;
   ScanSource& source = *slot.source;
+  STRATA_ASSIGN_OR_RETURN(MlsMap local_map, source.LocalMap(scan));
+  STRATA_RETURN_IF_ERROR(CheckContributes(
+      local_map, source.dropped(), scan, scan.header.sensor.value_or(parameters_.sensor)));
   if (!parameters_.keep_points) {
-    STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
     STRATA_RETURN_IF_ERROR(CheckRoomInTiles(local_map, {}));
     STRATA_ASSIGN_OR_RETURN(slot.made.local_map, EncodeLocalMap(local_map));
   }
-  STRATA_ASSIGN_OR_RETURN(const MlsMap seen, source.RegistrationMap(scan));
-  STRATA_RETURN_IF_ERROR(CheckContributes(
-      seen, source.dropped(), scan, scan.header.sensor.value_or(parameters_.sensor)));
-  slot.made.features =
-      std::make_shared<const ScanFeatures>(ScanFeatures::FromMap(seen, FeatureOptionsOf(scan)));
+  if (source.IsTooCoarse(scan)) {
+    STRATA_ASSIGN_OR_RETURN(local_map, source.RegistrationMap(scan));
+  }
+  slot.made.features = std::make_shared<const ScanFeatures>(
+      ScanFeatures::FromMap(local_map, FeatureOptionsOf(scan)));
   slot.made.source = &source;
   return absl::OkStatus();
 }

@@ -17,7 +17,6 @@
 #include "core/codec/point_codec.h"
 #include "core/common/hash_map.h"
 #include "core/common/status.h"
-#include "core/engine/scans/matching.h"
 #include "core/mls/build.h"
 #include "core/mls/join.h"
 #include "core/mls/patch.h"
@@ -206,16 +205,11 @@ absl::StatusOr<MlsMap> ScanSource::LocalMap(const ScanRecord& scan) {
 }
 
 absl::StatusOr<MlsMap> ScanSource::RegistrationMap(const ScanRecord& scan) {
-  if (!scan.has_points) return LocalMap(scan);
+  if (!IsTooCoarse(scan)) return LocalMap(scan);
   STRATA_RETURN_IF_ERROR(CheckSpread(scan));
   MlsParameters finer = parameters_.mls;
-  finer.cell_size_m = std::min(finer.cell_size_m, kRegistrationCellM);
-  const bool is_finer = finer.cell_size_m < parameters_.mls.cell_size_m;
-  return Build(scan,
-               MatchingFrame(),
-               finer,
-               Faded::kWith,
-               is_finer || scan.state == ScanState::kPending ? kMaxScanPatches : kAnyPatches);
+  finer.cell_size_m = kRegistrationCellM;
+  return Build(scan, Pose::Identity(), finer, Faded::kWith, kMaxScanPatches);
 }
 
 absl::StatusOr<MlsMap> ScanSource::Contribution(const ScanRecord& scan, const Pose& T_map_scan) {

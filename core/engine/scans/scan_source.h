@@ -50,9 +50,13 @@ class ScanSource {
   // points in more than kMaxScanTiles tiles and, of a scan that waits for integration, more than
   // kMaxScanPatches.
   absl::StatusOr<MlsMap> LocalMap(const ScanRecord& scan);
-  // What scans are matched by: where points are there, the same in MatchingFrame() and with cells
-  // of kRegistrationCellM at most, whatever the map's; LocalMap() otherwise.
+  // The same with cells of kRegistrationCellM at most, whatever the map's, where points are there:
+  // what scans are matched by.
   absl::StatusOr<MlsMap> RegistrationMap(const ScanRecord& scan);
+  // Whether that is another than LocalMap().
+  bool IsTooCoarse(const ScanRecord& scan) const {
+    return scan.has_points && parameters_.mls.cell_size_m > kRegistrationCellM;
+  }
   // What the scan adds to the map at this pose, without points that have faded: a pure function of
   // the scan, what is said of its points, the pose and the map's parameters, before and after
   // points were dropped.
