@@ -3,8 +3,3 @@ strata_executable(
   SOURCES objects/hidden_windows.cc objects/facade.cc
   DEPS strata::cloud strata::database_suite strata::engine strata::simulator strata::test_support CLI11::CLI11
 )
-strata_executable(
-  explore_worlds explore_worlds
-  SOURCES explore_worlds.cc
-  DEPS strata::cloud strata::database_suite strata::engine strata::simulator strata::test_support CLI11::CLI11
-)
