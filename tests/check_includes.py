@@ -60,6 +60,7 @@ STOREYS = {
     "core/egomotion": ["smoothing", HERE],
     "core/planning": ["floors", HERE, "ground"],
     "core/planes": ["models", HERE],
+    "core/registration": ["clouds", HERE],
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
     "core/storage": ["postgresql", "sqlite", HERE],
     "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "objects", "models", "ingest", "tiles", "scans", "map"],

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/cloud/point_cloud.h"
-#include "core/registration/thinning.h"
+#include "core/registration/clouds/thinning.h"
 
 namespace strata {
 namespace {

@@ -8,7 +8,7 @@
 #include "client/formats/scan_reader.h"
 #include "core/common/status.h"
 #include "core/geometry/rotation_between.h"
-#include "core/registration/leveling.h"
+#include "core/registration/clouds/leveling.h"
 
 namespace strata::cli {
 namespace {

@@ -22,9 +22,9 @@
 #include "client/formats/scan_reader.h"
 #include "core/common/status.h"
 #include "core/mls/build.h"
-#include "core/registration/icp.h"
+#include "core/registration/clouds/icp.h"
 #include "core/registration/mls_registration.h"
-#include "core/registration/thinning.h"
+#include "core/registration/clouds/thinning.h"
 
 namespace strata::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "core/registration/leveling.h"
+#include "core/registration/clouds/leveling.h"
 
 #include <cmath>
 #include <cstdint>

@@ -1,6 +1,6 @@
 // Finds the floor of a scan whose sensor was not level.
-#ifndef STRATA_CORE_REGISTRATION_LEVELING_H_
-#define STRATA_CORE_REGISTRATION_LEVELING_H_
+#ifndef STRATA_CORE_REGISTRATION_CLOUDS_LEVELING_H_
+#define STRATA_CORE_REGISTRATION_CLOUDS_LEVELING_H_
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -36,4 +36,4 @@ absl::StatusOr<Leveling> LevelByFloor(const PointCloud& cloud, const LevelingOpt
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_REGISTRATION_LEVELING_H_
+#endif  // STRATA_CORE_REGISTRATION_CLOUDS_LEVELING_H_

@@ -1,4 +1,4 @@
-#include "core/registration/projection_image.h"
+#include "core/registration/clouds/projection_image.h"
 
 #include <algorithm>
 #include <cmath>

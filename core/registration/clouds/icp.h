@@ -1,8 +1,8 @@
 // The Iterative Closest Point algorithm on plain point sets (thesis Alg. 3) with the choices of
 // 7.2.2 (Rusinkiewicz and Levoy 2001), put together of PCL's parts. For local maps use
 // mls_registration.h: it is faster and drifts less; this one takes any points.
-#ifndef STRATA_CORE_REGISTRATION_ICP_H_
-#define STRATA_CORE_REGISTRATION_ICP_H_
+#ifndef STRATA_CORE_REGISTRATION_CLOUDS_ICP_H_
+#define STRATA_CORE_REGISTRATION_CLOUDS_ICP_H_
 
 #include <cstdint>
 
@@ -93,4 +93,4 @@ absl::StatusOr<RegistrationResult> RegisterClouds(const PointCloud& source,
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_REGISTRATION_ICP_H_
+#endif  // STRATA_CORE_REGISTRATION_CLOUDS_ICP_H_

@@ -1,4 +1,4 @@
-#include "core/registration/icp.h"
+#include "core/registration/clouds/icp.h"
 
 #include <algorithm>
 #include <cmath>
@@ -26,8 +26,8 @@
 #include "core/common/option_checks.h"
 #include "core/common/random.h"
 #include "core/common/status.h"
-#include "core/registration/extrapolation.h"
-#include "core/registration/projection_image.h"
+#include "core/registration/clouds/extrapolation.h"
+#include "core/registration/clouds/projection_image.h"
 #include "core/registration/umeyama.h"
 
 namespace strata {

@@ -1,4 +1,4 @@
-#include "core/registration/leveling.h"
+#include "core/registration/clouds/leveling.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +19,7 @@
 #include "core/common/option_checks.h"
 #include "core/common/status.h"
 #include "core/geometry/rotation_between.h"
-#include "core/registration/thinning.h"
+#include "core/registration/clouds/thinning.h"
 
 namespace strata {
 namespace {

@@ -1,4 +1,4 @@
-#include "core/registration/icp.h"
+#include "core/registration/clouds/icp.h"
 
 #include <cmath>
 #include <cstdint>
@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/registration/extrapolation.h"
+#include "core/registration/clouds/extrapolation.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata {

@@ -1,6 +1,6 @@
 // Fewer points of a cloud, evenly over space.
-#ifndef STRATA_CORE_REGISTRATION_THINNING_H_
-#define STRATA_CORE_REGISTRATION_THINNING_H_
+#ifndef STRATA_CORE_REGISTRATION_CLOUDS_THINNING_H_
+#define STRATA_CORE_REGISTRATION_CLOUDS_THINNING_H_
 
 #include "core/cloud/point_cloud.h"
 
@@ -14,4 +14,4 @@ PointCloud ThinCloud(const PointCloud& cloud, double edge_m);
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_REGISTRATION_THINNING_H_
+#endif  // STRATA_CORE_REGISTRATION_CLOUDS_THINNING_H_

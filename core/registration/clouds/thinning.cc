@@ -1,4 +1,4 @@
-#include "core/registration/thinning.h"
+#include "core/registration/clouds/thinning.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "core/registration/extrapolation.h"
+#include "core/registration/clouds/extrapolation.h"
 
 #include <algorithm>
 #include <cstddef>

@@ -1,7 +1,7 @@
 // Longer steps for ICP along a steady direction (Besl and McKay 1992, thesis 7.2.2).
 // Internal to core/registration, not installed.
-#ifndef STRATA_CORE_REGISTRATION_EXTRAPOLATION_H_
-#define STRATA_CORE_REGISTRATION_EXTRAPOLATION_H_
+#ifndef STRATA_CORE_REGISTRATION_CLOUDS_EXTRAPOLATION_H_
+#define STRATA_CORE_REGISTRATION_CLOUDS_EXTRAPOLATION_H_
 
 #include <vector>
 
@@ -31,4 +31,4 @@ class StepExtrapolator {
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_REGISTRATION_EXTRAPOLATION_H_
+#endif  // STRATA_CORE_REGISTRATION_CLOUDS_EXTRAPOLATION_H_

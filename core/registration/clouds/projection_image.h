@@ -1,6 +1,6 @@
 // The partner of a point by where a sensor saw it. Internal to core/registration, not installed.
-#ifndef STRATA_CORE_REGISTRATION_PROJECTION_IMAGE_H_
-#define STRATA_CORE_REGISTRATION_PROJECTION_IMAGE_H_
+#ifndef STRATA_CORE_REGISTRATION_CLOUDS_PROJECTION_IMAGE_H_
+#define STRATA_CORE_REGISTRATION_CLOUDS_PROJECTION_IMAGE_H_
 
 #include <cstddef>
 #include <vector>
@@ -43,4 +43,4 @@ class ProjectionImage {
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_REGISTRATION_PROJECTION_IMAGE_H_
+#endif  // STRATA_CORE_REGISTRATION_CLOUDS_PROJECTION_IMAGE_H_
