@@ -20,6 +20,7 @@
 #include "core/mls/mls_map.h"
 #include "core/mls/sides.h"
 #include "core/registration/column_grid.h"
+#include "core/registration/upright_offsets.h"
 
 namespace strata {
 namespace {
@@ -34,13 +35,19 @@ std::vector<Eigen::Vector3f>& ListOf(FeatureClass c, ClassPoints& points) {
   return points[static_cast<std::size_t>(c)];
 }
 
-void AppendVertical(
-    const Patch& patch, float x, float y, double samples_per_metre, ClassPoints& points) {
+// `place` of a patch of the map that `offsets`, if any, are of.
+void AppendVertical(const Patch& patch,
+                    const Eigen::Vector2f& middle,
+                    double samples_per_metre,
+                    const UprightOffsets* offsets,
+                    std::size_t place,
+                    ClassPoints& points) {
   const double depth = patch.depth_m();
-  const int n = std::max(1, static_cast<int>(std::lround(depth * samples_per_metre)));
+  const int n = SamplesOf(patch, samples_per_metre);
   for (int i = 0; i < n; ++i) {
+    const Eigen::Vector2f p = offsets == nullptr ? middle : middle + offsets->Of(place, i);
     ListOf(FeatureClass::kVertical, points)
-        .emplace_back(x, y, static_cast<float>(patch.bottom_m() + (i + 0.5) * depth / n));
+        .emplace_back(p.x(), p.y(), static_cast<float>(patch.bottom_m() + (i + 0.5) * depth / n));
   }
 }
 
@@ -99,7 +106,9 @@ SurfaceElement FitSurfaceElement(const ColumnGrid& grid,
   return ElementAt(p, moments);
 }
 
-ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const ScanFeatureOptions& options) {
+ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map,
+                                   const ScanFeatureOptions& options,
+                                   const UprightOffsets* offsets) {
   ClassPoints points;
   const double cell_size = local_map.parameters.cell_size_m;
   const double max_range_m2 = options.max_range_m * options.max_range_m;
@@ -114,14 +123,15 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map, const ScanFeatureOpt
   std::size_t place = 0;
   for (const MlsTile& tile : local_map.tiles) {
     for (const Patch& patch : tile.patches) {
-      const Side side = sides[place++];
+      const std::size_t here = place++;
+      const Side side = sides[here];
       const CellIndex cell = CellOf(tile.key, static_cast<std::uint16_t>(patch.cell));
       const double x = (cell.x + 0.5) * cell_size;
       const double y = (cell.y + 0.5) * cell_size;
       if (x * x + y * y > max_range_m2) continue;
       const Eigen::Vector3f p = Eigen::Vector3d(x, y, patch.mean_m()).cast<float>();
       if (patch.vertical()) {
-        AppendVertical(patch, p.x(), p.y(), options.samples_per_metre, points);
+        AppendVertical(patch, p.head<2>(), options.samples_per_metre, offsets, here, points);
       } else if (side == Side::kUnderside) {
         ListOf(FeatureClass::kNonTraversable, points).push_back(p);
       } else if (side != Side::kDoubtful) {  // taken for a top it pulls a storey down onto it

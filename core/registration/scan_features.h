@@ -17,6 +17,7 @@
 namespace strata {
 
 class ColumnGrid;  // internal
+class UprightOffsets;
 
 struct ScanFeatureOptions {
   double samples_per_metre = 4.0;  // FromMap: points along a vertical patch; in [0.1, 100]
@@ -89,7 +90,11 @@ class ScanFeatures {
   ScanFeatures() = default;
   // A pure function of its arguments. `options` must be valid. A map without patches gives features
   // without points, which overlap with nothing.
-  static ScanFeatures FromMap(const MlsMap& local_map, const ScanFeatureOptions& options = {});
+  // `offsets`, of this map and options.samples_per_metre, put upright ones where their points are;
+  // without, they are in the middles of their cells, too.
+  static ScanFeatures FromMap(const MlsMap& local_map,
+                              const ScanFeatureOptions& options = {},
+                              const UprightOffsets* offsets = nullptr);
   // The same of what ExtractFeatures() gave, in the scan's frame: with the traversability of the
   // patches there are three classes instead of two. Source and target need the same classes.
   static ScanFeatures FromFeatures(std::span<const Feature> features,

@@ -23,6 +23,7 @@
 #include "core/registration/mls_registration.h"
 #include "core/registration/neighbours.h"
 #include "core/registration/umeyama.h"
+#include "core/registration/upright_offsets.h"
 #include "tests/support/data_dir.h"
 #include "tests/support/pcd.h"
 
@@ -118,7 +119,9 @@ std::vector<Pose> Place(const Recording& recording, const Settings& settings) {
         BuildMlsMap(recording.clouds[i], Pose::Identity(), SensorModel(), settings.mls, scratch)
             .value()
             .map;
-    features.push_back(ScanFeatures::FromMap(map, settings.features));
+    UprightOffsets offsets(map, settings.features.samples_per_metre);
+    offsets.Add(recording.clouds[i].points);
+    features.push_back(ScanFeatures::FromMap(map, settings.features, &offsets));
     features_ms += now() - start;
     if (i == 0) {
       poses.push_back(recording.uploaded[0]);

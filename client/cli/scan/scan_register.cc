@@ -23,8 +23,9 @@
 #include "core/common/status.h"
 #include "core/mls/build.h"
 #include "core/registration/clouds/icp.h"
-#include "core/registration/mls_registration.h"
 #include "core/registration/clouds/thinning.h"
+#include "core/registration/mls_registration.h"
+#include "core/registration/upright_offsets.h"
 
 namespace strata::cli {
 namespace {
@@ -58,12 +59,15 @@ Pose FromZero(const PointCloud& source, const PointCloud& target, const Pose& T)
 }
 
 absl::StatusOr<ScanFeatures> FeaturesOf(const PointCloud& cloud, const MlsParameters& parameters) {
+  const PointCloud near = AtZero(cloud);
   STRATA_ASSIGN_OR_RETURN(const MlsBuildResult built,
-                          BuildMlsMap(AtZero(cloud), Pose::Identity(), SensorModel(), parameters));
+                          BuildMlsMap(near, Pose::Identity(), SensorModel(), parameters));
   ScanFeatureOptions options;
   options.sample_count = kSamples;
   options.sensor_origin = cloud.sensor_origin.cast<double>();
-  return ScanFeatures::FromMap(built.map, options);
+  UprightOffsets offsets(built.map, options.samples_per_metre);
+  offsets.Add(near.points);
+  return ScanFeatures::FromMap(built.map, options, &offsets);
 }
 
 absl::StatusOr<RegistrationResult> RegisterMaps(const PointCloud& source,

@@ -15,6 +15,7 @@
 #include "core/engine/scans/scan_source.h"
 #include "core/engine/tiles/epoch_tiles.h"
 #include "core/registration/mls_registration.h"
+#include "core/registration/upright_offsets.h"
 #include "core/storage/storage.h"
 
 namespace strata {
@@ -90,7 +91,9 @@ absl::StatusOr<ScanFeatures> FollowedRobot::FeaturesOf(const PointCloud& cloud) 
   ScanFeatureOptions options = FeatureOptionsOf(scan);
   options.max_range_m = kTrackedRangeM;
   options.sample_count = kSamples;
-  return ScanFeatures::FromMap(built.map, options);
+  UprightOffsets offsets(built.map, options.samples_per_metre);
+  offsets.Add(cloud.points);
+  return ScanFeatures::FromMap(built.map, options, &offsets);
 }
 
 absl::Status FollowedRobot::Carry(std::uint64_t epoch) {

@@ -24,6 +24,7 @@
 #include "core/registration/neighbours.h"
 #include "core/registration/place_index.h"
 #include "core/registration/place_match.h"
+#include "core/registration/upright_offsets.h"
 
 namespace strata {
 namespace {
@@ -96,7 +97,10 @@ class Localizer::Search {
     STRATA_ASSIGN_OR_RETURN(const MlsMap finer, Seen(parameters));
     ScanRecord scan;
     scan.header.sensor_origin = query_.cloud.sensor_origin;
-    features_ = ScanFeatures::FromMap(finer, FeatureOptionsOf(scan));
+    const ScanFeatureOptions options = FeatureOptionsOf(scan);
+    UprightOffsets offsets(finer, options.samples_per_metre);
+    offsets.Add(query_.cloud.points);
+    features_ = ScanFeatures::FromMap(finer, options, &offsets);
     return absl::OkStatus();
   }
 

@@ -149,7 +149,8 @@ absl::StatusOr<Aligner::Features> Aligner::FeaturesOf(ScanNumber number,
   STRATA_ASSIGN_OR_RETURN(const MlsMap map, source.RegistrationMap(posed.scan));
   ScanFeatureOptions options = FeatureOptionsOf(posed.scan);
   options.sample_count = 0;  // others are matched to it, it is not matched itself
-  const auto features = std::make_shared<const ScanFeatures>(ScanFeatures::FromMap(map, options));
+  STRATA_ASSIGN_OR_RETURN(ScanFeatures made, source.Features(posed.scan, map, options));
+  const auto features = std::make_shared<const ScanFeatures>(std::move(made));
   Keep(number, features);
   return features;
 }

@@ -41,8 +41,9 @@ absl::Status ScansAhead::Make(std::size_t i) {
   if (source.IsTooCoarse(scan)) {
     STRATA_ASSIGN_OR_RETURN(local_map, source.RegistrationMap(scan));
   }
-  slot.made.features = std::make_shared<const ScanFeatures>(
-      ScanFeatures::FromMap(local_map, FeatureOptionsOf(scan)));
+  STRATA_ASSIGN_OR_RETURN(ScanFeatures features,
+                          source.Features(scan, local_map, FeatureOptionsOf(scan)));
+  slot.made.features = std::make_shared<const ScanFeatures>(std::move(features));
   slot.made.source = &source;
   return absl::OkStatus();
 }

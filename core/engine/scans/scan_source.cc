@@ -22,6 +22,7 @@
 #include "core/mls/patch.h"
 #include "core/mls/sides.h"
 #include "core/mls/tile_key.h"
+#include "core/registration/upright_offsets.h"
 
 namespace strata {
 namespace {
@@ -210,6 +211,19 @@ absl::StatusOr<MlsMap> ScanSource::RegistrationMap(const ScanRecord& scan) {
   MlsParameters finer = parameters_.mls;
   finer.cell_size_m = kRegistrationCellM;
   return Build(scan, Pose::Identity(), finer, Faded::kWith, kMaxScanPatches);
+}
+
+absl::StatusOr<ScanFeatures> ScanSource::Features(const ScanRecord& scan,
+                                                  const MlsMap& map,
+                                                  const ScanFeatureOptions& options) {
+  // Where points are dropped all comes from the local map from the first moment.
+  if (!scan.has_points || !parameters_.keep_points) return ScanFeatures::FromMap(map, options);
+  UprightOffsets offsets(map, options.samples_per_metre);
+  STRATA_RETURN_IF_ERROR(ForEachBlock(scan, [&offsets](const PointCloud& block) {
+    offsets.Add(block.points);
+    return absl::OkStatus();
+  }));
+  return ScanFeatures::FromMap(map, options, &offsets);
 }
 
 absl::StatusOr<MlsMap> ScanSource::Contribution(const ScanRecord& scan, const Pose& T_map_scan) {

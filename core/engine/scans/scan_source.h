@@ -16,6 +16,7 @@
 #include "core/mls/build.h"
 #include "core/mls/measurement.h"
 #include "core/mls/mls_map.h"
+#include "core/registration/scan_features.h"
 #include "core/storage/storage.h"
 #include "core/world/map_info.h"
 
@@ -57,6 +58,11 @@ class ScanSource {
   bool IsTooCoarse(const ScanRecord& scan) const {
     return scan.has_points && parameters_.mls.cell_size_m > kRegistrationCellM;
   }
+  // What the scan is matched by, of RegistrationMap(): upright surfaces where their points are, in
+  // a map that keeps points.
+  absl::StatusOr<ScanFeatures> Features(const ScanRecord& scan,
+                                        const MlsMap& map,
+                                        const ScanFeatureOptions& options);
   // What the scan adds to the map at this pose, without points that have faded: a pure function of
   // the scan, what is said of its points, the pose and the map's parameters, before and after
   // points were dropped.

@@ -57,7 +57,9 @@ absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::MakeFeatures(
   const MapParameters parameters = core_.info().parameters;
   ScanSource source(*reader, parameters);
   STRATA_ASSIGN_OR_RETURN(const MlsMap map, source.RegistrationMap(scan));
-  return std::make_shared<const ScanFeatures>(ScanFeatures::FromMap(map, FeatureOptionsOf(scan)));
+  STRATA_ASSIGN_OR_RETURN(ScanFeatures features,
+                          source.Features(scan, map, FeatureOptionsOf(scan)));
+  return std::make_shared<const ScanFeatures>(std::move(features));
 }
 
 absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::Features(std::size_t node) {

@@ -73,6 +73,7 @@ TEST_F(LocalMapUploadTest, MakesTheMapThatItsPointsMakeWhereTheyAreDropped) {
 TEST_F(LocalMapUploadTest, IsAlignedMovedAndDeletedLikeAnyScan) {
   MapParameters parameters = SmallMap();
   parameters.mls.cell_size_m = 0.1;  // of which points are matched, too
+  parameters.keep_points = false;    // all comes from the local map from the first moment
   MakeMap(parameters);
   const Pose first = PoseAt(0.0, 0.0);
   const Pose second = PoseAt(2.0, 1.0, 0.3);

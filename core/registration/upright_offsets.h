@@ -1,0 +1,56 @@
+// Where in their cells the points of upright surfaces lie.
+#ifndef STRATA_CORE_REGISTRATION_UPRIGHT_OFFSETS_H_
+#define STRATA_CORE_REGISTRATION_UPRIGHT_OFFSETS_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/mls/mls_map.h"
+#include "core/mls/patch.h"
+#include "core/mls/tile_key.h"
+
+namespace strata {
+
+// A local map says of a wall in which cells it is; its points say where in them, ten times closer.
+// A wall along the cells, as robots see them that drive along walls and through doors, is otherwise
+// off to one side by up to half a cell everywhere. One thread at a time.
+class UprightOffsets {
+ public:
+  // `local_map` must outlive it. `samples_per_metre`: as in ScanFeatureOptions.
+  UprightOffsets(const MlsMap& local_map, double samples_per_metre);
+
+  // Some of the points that the map was made of, in its frame.
+  void Add(std::span<const Eigen::Vector3f> points);
+
+  // From the middle of the cell to the mean of the points of sample `i`, from below, of a vertical
+  // patch, the `place`th patch of the map in its order [m]. Zero unless they lie on a face: the few
+  // points of a sparse cell show the lines of beams, those of a hedge where it was seen from.
+  Eigen::Vector2f Of(std::size_t place, int i) const;
+
+ private:
+  struct Moments {
+    Eigen::Vector2f sum = Eigen::Vector2f::Zero();
+    float xx = 0.0F, xy = 0.0F, yy = 0.0F;
+    std::uint32_t n = 0;
+  };
+
+  // All patches of a cell with a vertical one, else none. `tile`: the last one, or nullptr.
+  std::span<const Patch> UprightIn(CellIndex cell, const MlsTile*& tile) const;
+  void AddTo(const Patch& patch, std::size_t place, std::int32_t z_ticks, const Eigen::Vector2f& d);
+
+  const MlsMap& map_;
+  std::vector<std::size_t> tile_first_;  // place of each tile's first patch
+  std::vector<std::uint32_t> first_;     // of each patch's samples; one more
+  std::vector<Moments> samples_;
+};
+
+// Into how many samples a vertical patch of a map is divided, evenly from its bottom to its top.
+int SamplesOf(const Patch& patch, double samples_per_metre);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_REGISTRATION_UPRIGHT_OFFSETS_H_
