@@ -109,6 +109,9 @@ class MapLeases {
   std::thread thread_;
 };
 
+// UNAVAILABLE with MapOwnerOf() while a process has the map alone.
+absl::Status CheckNobodyHas(Connection& connection, std::int64_t map, absl::string_view name);
+
 }  // namespace strata
 
 #endif  // STRATA_CORE_STORAGE_POSTGRESQL_MAP_LEASES_H_

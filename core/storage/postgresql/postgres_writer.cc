@@ -21,6 +21,7 @@
 #include "core/common/status.h"
 #include "core/storage/outcome.h"
 #include "core/storage/postgresql/connection.h"
+#include "core/storage/postgresql/map_leases.h"
 #include "core/world/value_codec.h"
 
 namespace strata {
@@ -120,7 +121,9 @@ absl::Status PostgresWriter::LockMap(Durability durability, std::int64_t commit)
                     "UPDATE truth_map SET last_commit = $2 WHERE map = $1 RETURNING owner",
                     map_,
                     commit);
-  return CheckOwner(owner, opened_);
+  STRATA_RETURN_IF_ERROR(CheckOwner(owner, opened_));
+  // Whoever takes it now waits for the row that this commit holds.
+  return opened_.idle ? CheckNobodyHas(*connection_, map_, opened_.name) : absl::OkStatus();
 }
 
 absl::Status PostgresWriter::LockOwnMap(std::int64_t commit) {

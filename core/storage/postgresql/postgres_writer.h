@@ -30,6 +30,7 @@ struct OpenedMap {
   std::int64_t owner = 0;        // the token of its lease; 0: anybody's
   std::int64_t last_commit = 0;  // when `owner` took it
   bool fenced = true;            // false: commits do not ask whose it is
+  bool idle = false;             // commits are refused while somebody has it alone
   LastOwner last_owner = LastOwner::kSelf;
   // How long its owner may do nothing within a commit; then the database ends it.
   absl::Duration patience = absl::Seconds(20);
