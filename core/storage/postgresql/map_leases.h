@@ -67,6 +67,7 @@ class MapLeases {
   // Gives up what is held.
   ~MapLeases();
 
+  const std::string& holder() const { return options_.holder; }
   absl::Duration time() const { return options_.time; }
 
   // Whose lease there is, in whatever state.

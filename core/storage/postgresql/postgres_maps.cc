@@ -15,6 +15,7 @@
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
+#include "core/common/map_owner.h"
 #include "core/common/status.h"
 #include "core/storage/format.h"
 #include "core/storage/postgresql/connection.h"
@@ -312,6 +313,35 @@ absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenIdle(absl::string_
     STRATA_RETURN_IF_ERROR(CheckNobodyHas(*lease, number, name));
   }
   return OpenAs({.number = number, .name = std::string(name), .idle = true}, nullptr);
+}
+
+absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenToAdd(
+    absl::string_view name, std::uint64_t most_waiting) const {
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
+  {
+    STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+    const absl::Status held = CheckNobodyHas(*lease, number, name);
+    if (held.ok()) return absl::UnavailableError(absl::StrCat("nobody has map ", name));
+    if (!MapOwnerOf(held).has_value()) return held;
+  }
+  OpenedMap map{.number = number, .name = std::string(name), .beside = most_waiting};
+  map.patience = std::max(leases_->time(), absl::Seconds(1));
+  return std::make_unique<PostgresStorage>(pool_, map, leases_, nullptr);
+}
+
+absl::StatusOr<std::vector<std::string>> PostgresMaps::ListWaiting() const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row,
+      lease->Query("SELECT p.name FROM map_lease AS l JOIN map_place AS p ON p.map = l.map WHERE "
+                   "l.holder = $1 AND p.state = $2 AND EXISTS (SELECT FROM truth_scan AS s WHERE "
+                   "s.map = l.map AND s.state = $3)",
+                   leases_->holder(),
+                   kThere,
+                   static_cast<int>(ScanState::kPending)));
+  std::vector<std::string> names;
+  while (row.Next()) names.emplace_back(row.Text(0));
+  return names;
 }
 
 // The name is taken last, or others who would make such a map had to wait.

@@ -77,6 +77,14 @@ class PostgresMaps {
   // The same, while nobody has it alone: else commits are UNAVAILABLE with MapOwnerOf(). Takes no
   // lease, so that the next to have it alone still learns who had it last.
   absl::StatusOr<std::unique_ptr<MapStorage>> OpenIdle(absl::string_view name) const;
+  // For scans beside whoever has it alone, whose commits they do not disturb: PutScan() is
+  // RESOURCE_EXHAUSTED while `most_waiting` (at least 1) wait for integration, and UNAVAILABLE if
+  // chunks of the scan are gone. UNAVAILABLE while nobody has it alone: then whoever would add
+  // takes it. NOT_FOUND.
+  absl::StatusOr<std::unique_ptr<MapStorage>> OpenToAdd(absl::string_view name,
+                                                        std::uint64_t most_waiting) const;
+  // Those that this process has alone in which scans wait, whoever added them.
+  absl::StatusOr<std::vector<std::string>> ListWaiting() const;
   // Makes a map of a map file that nobody has open, all or nothing: of the current format and
   // closed well (FAILED_PRECONDITION). Its clock begins behind those of all maps that were removed.
   // A row is in memory at a time. ALREADY_EXISTS; DATA_LOSS for a damaged file; INVALID_ARGUMENT
