@@ -26,10 +26,12 @@
 #include <gtest/gtest.h>
 
 #include "client/sdk/client.h"
+#include "core/codec/local_map_codec.h"
 #include "core/common/map_owner.h"
 #include "core/common/retry_delay.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
+#include "core/mls/build.h"
 #include "tests/integration/numbered_scans.h"
 #include "tests/integration/stratad_process.h"
 #include "tests/support/postgres_cluster.h"
@@ -280,7 +282,24 @@ TEST_F(TwoServersTest, ScansAreTakenInByServersThatHaveNotGotTheMap) {
     return absl::OkStatus();
   }));
   EXPECT_EQ(points, kLargePoints);
+  // Ready local maps.
+  const MapParameters parameters;
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const auto built,
+      BuildMlsMap(NumberedCloud(1, kPoints), Pose::Identity(), parameters.sensor, parameters.mls));
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::string local_map, EncodeLocalMap(built.map));
+  ScanHeader ready;
+  ready.id = {"run", kLarge + 1};
+  ready.alignment = Alignment::kOff;
+  for (const int server : {1, 0}) {
+    STRATA_ASSERT_OK_AND_ASSIGN(
+        const ScanAck taken,
+        db(server).scans().UploadLocalMap({}, kMap, ready, parameters.mls, local_map));
+    EXPECT_EQ(taken.already_present, server == 0);
+  }
   STRATA_EXPECT_OK(AtRest(db(0), kMap));
+  EXPECT_EQ(db(0).scans().Get({}, kMap, ready.id)->state, ScanState::kIntegrated);
+  STRATA_EXPECT_OK(db(0).scans().Delete({}, kMap, ready.id));
   STRATA_EXPECT_OK(db(0).scans().Delete({}, kMap, {"run", kLarge}));  // CheckAll() has others
   EXPECT_EQ(MapOwnerOf(Verify(db(1), kMap)), "a");
   CheckAll(0);

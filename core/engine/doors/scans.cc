@@ -17,7 +17,7 @@
 #include "core/engine/doors/local_map_upload.h"
 #include "core/engine/doors/map_reading.h"
 #include "core/engine/doors/upload.h"
-#include "core/engine/doors/upload_beside.h"
+#include "core/engine/ingest/upload_beside.h"
 #include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/scan_labels.h"
 #include "core/engine/scans/scan_source.h"
@@ -127,9 +127,11 @@ absl::StatusOr<ScanAck> EngineScans::UploadLocalMap(const api::Call& call,
                                                     const MlsParameters& parameters,
                                                     absl::string_view local_map) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place found, maps_.FindToAdd(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateScanHeader(header));
-  absl::StatusOr<ScanAck> ack = strata::UploadLocalMap(*found, call, header, parameters, local_map);
+  absl::StatusOr<ScanAck> ack =
+      found.map != nullptr ? strata::UploadLocalMap(*found.map, call, header, parameters, local_map)
+                           : UploadLocalMapBeside(*found.store, header, parameters, local_map);
   if (ack.ok()) return ack;
   return Annotate(ack.status(), absl::StrCat("scan ", header.id.ToString()));
 }

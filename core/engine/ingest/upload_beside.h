@@ -1,7 +1,7 @@
 // One stream of a scan into a map that another engine has: acknowledged by the store they share,
 // integrated by the other.
-#ifndef STRATA_CORE_ENGINE_DOORS_UPLOAD_BESIDE_H_
-#define STRATA_CORE_ENGINE_DOORS_UPLOAD_BESIDE_H_
+#ifndef STRATA_CORE_ENGINE_INGEST_UPLOAD_BESIDE_H_
+#define STRATA_CORE_ENGINE_INGEST_UPLOAD_BESIDE_H_
 
 #include <cstdint>
 #include <memory>
@@ -51,4 +51,4 @@ class UploadBeside final : public api::ScanUpload {
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_ENGINE_DOORS_UPLOAD_BESIDE_H_
+#endif  // STRATA_CORE_ENGINE_INGEST_UPLOAD_BESIDE_H_

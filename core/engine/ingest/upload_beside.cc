@@ -1,4 +1,4 @@
-#include "core/engine/doors/upload_beside.h"
+#include "core/engine/ingest/upload_beside.h"
 
 #include <cstdint>
 #include <memory>
