@@ -137,6 +137,19 @@ Finding CheckDatabase(const std::string& store) {
                               ": it may lose what was acknowledged"));
 }
 
+std::vector<Finding> CheckMapsOf(const std::string& store) {
+  const auto maps = CheckDatabaseMaps(store);
+  if (!maps.ok()) return {Error("maps", maps.status())};
+  std::vector<Finding> findings;
+  for (const DatabaseMapCheck& map : *maps) {
+    const std::string what = "map " + map.name;
+    const double mib = static_cast<double>(map.bytes) / kMebi;
+    findings.push_back(map.status.ok() ? Ok(what, absl::StrFormat("read, %.1f MiB", mib))
+                                       : Error(what, map.status));
+  }
+  return findings;
+}
+
 const char* NameOf(Verdict verdict) {
   switch (verdict) {
     case Verdict::kOk:
@@ -165,7 +178,9 @@ std::vector<Finding> CheckInstallation(const ProgramOptions& options) {
   return findings;
 }
 
-std::vector<Finding> CheckMaps(const fs::path& directory) {
+std::vector<Finding> CheckMaps(const EngineOptions& engine) {
+  if (!engine.store.empty()) return CheckMapsOf(engine.store);
+  const fs::path& directory = engine.directory;
   std::error_code error;
   if (!fs::exists(directory, error)) return {};
   const auto maps = CheckMapFiles(directory);

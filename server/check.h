@@ -2,10 +2,10 @@
 #ifndef STRATA_SERVER_CHECK_H_
 #define STRATA_SERVER_CHECK_H_
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
+#include "core/engine/engine.h"
 #include "server/options.h"
 
 namespace strata::server {
@@ -23,9 +23,9 @@ struct Finding {
 // a warning. Changes nothing but for a file of its own in the data directory, which goes again.
 std::vector<Finding> CheckInstallation(const ProgramOptions& options);
 
-// Reads every page of every map file. One that would not be served is an error, though the server
-// starts and serves the others.
-std::vector<Finding> CheckMaps(const std::filesystem::path& directory);
+// Reads every page of every map file, or every row of every map of the database. One that would not
+// be served is an error, though the server starts and serves the others.
+std::vector<Finding> CheckMaps(const EngineOptions& engine);
 
 // "ok      listen: …", one a line.
 std::string ToText(const std::vector<Finding>& findings);

@@ -24,6 +24,7 @@
 #include "core/common/status.h"
 #include "core/engine/engine.h"
 #include "server/check.h"
+#include "server/import_command.h"
 #include "server/last_end.h"
 #include "server/log_writer.h"
 #include "server/options.h"
@@ -133,7 +134,7 @@ absl::Status Serve(const ProgramOptions& options) {
 int Check(const ProgramOptions& options, bool maps, bool json) {
   std::vector<Finding> findings = CheckInstallation(options);
   if (maps) {
-    for (Finding& finding : CheckMaps(options.engine.directory)) {
+    for (Finding& finding : CheckMaps(options.engine)) {
       findings.push_back(std::move(finding));
     }
   }
@@ -163,7 +164,10 @@ int Main(int argc, char** argv) {
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
   bool maps = false;
-  check->add_flag("--maps", maps, "Read every page of every map, too; takes as long as the disk");
+  check->add_flag(
+      "--maps",
+      maps,
+      "Read every page of every map, too, with --store every row; takes as long as the disk");
   check->footer(
       "Takes the options of serving. Exit code: 0 it could, 1 something is an error; a map that "
       "is\n"
@@ -171,6 +175,7 @@ int Main(int argc, char** argv) {
       "Example:\n  stratad check --config /etc/strata/stratad.conf");
   CommandAction action;
   AddTokenCommands(app, action);
+  AddImportCommand(app, action);
   AddQuarantineCommands(app, action);
   try {
     app.parse(argc, argv);

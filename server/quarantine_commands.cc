@@ -11,6 +11,7 @@
 #include "absl/strings/str_join.h"
 
 #include "core/common/status.h"
+#include "core/engine/map/idle_map.h"
 #include "core/engine/map/quarantine_file.h"
 
 namespace strata::server {
@@ -18,8 +19,11 @@ namespace {
 
 struct Written {
   std::string directory;
+  std::string store;
   std::string map;
   std::vector<std::string> work;  // "scan" "robot/7"
+
+  MapPlace place() const { return {directory, store}; }
 };
 
 const char* StateOf(const QuarantineEntry& entry) {
@@ -29,7 +33,7 @@ const char* StateOf(const QuarantineEntry& entry) {
 
 absl::Status List(const Written& written, std::ostream& out) {
   STRATA_ASSIGN_OR_RETURN(const std::vector<QuarantineEntry> entries,
-                          ListQuarantine(written.directory, written.map));
+                          ListQuarantine(written.place(), written.map));
   constexpr char kRow[] = "%-32s %-12s %-7s %s\n";
   out << absl::StreamFormat(kRow, "work", "state", "deaths", "message");
   for (const QuarantineEntry& entry : entries) {
@@ -45,9 +49,15 @@ CLI::App* AddVerb(CLI::App& quarantine,
                   Written& written) {
   CLI::App* verb = quarantine.add_subcommand(name, help);
   verb->add_option("MAP", written.map, "Name of the map")->required();
-  verb->add_option("--data", written.directory, "The directory that stratad --data names")
-      ->type_name("DIR")
-      ->required();
+  CLI::Option_group* place = verb->add_option_group("Where the map lies, one of");
+  place->add_option("--data", written.directory, "The directory that stratad --data names")
+      ->type_name("DIR");
+  place
+      ->add_option("--store",
+                   written.store,
+                   "The database that stratad --store names; no server may have the map open")
+      ->type_name("postgresql://USER@HOST/DATABASE");
+  place->require_option(1);
   return verb;
 }
 
@@ -76,7 +86,7 @@ void AddQuarantineCommands(CLI::App& app, CommandAction& selected) {
   add->footer("Example:\n  stratad quarantine add campus scan robot/7 --data ./maps");
   add->callback([written, &selected] {
     selected = [written](std::ostream&) {
-      return AddToQuarantine(written->directory, written->map, absl::StrJoin(written->work, " "));
+      return AddToQuarantine(written->place(), written->map, absl::StrJoin(written->work, " "));
     };
   });
   CLI::App* release = AddVerb(*quarantine,
@@ -88,7 +98,7 @@ void AddQuarantineCommands(CLI::App& app, CommandAction& selected) {
   release->callback([written, &selected] {
     selected = [written](std::ostream&) {
       return ReleaseFromQuarantine(
-          written->directory, written->map, absl::StrJoin(written->work, " "));
+          written->place(), written->map, absl::StrJoin(written->work, " "));
     };
   });
 }

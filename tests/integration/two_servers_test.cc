@@ -3,6 +3,7 @@
 #include <array>
 #include <atomic>
 #include <csignal>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <functional>
@@ -25,10 +26,12 @@
 #include <gtest/gtest.h>
 
 #include "client/sdk/client.h"
+#include "core/codec/local_map_codec.h"
 #include "core/common/map_owner.h"
 #include "core/common/retry_delay.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
+#include "core/mls/build.h"
 #include "tests/integration/numbered_scans.h"
 #include "tests/integration/stratad_process.h"
 #include "tests/support/postgres_cluster.h"
@@ -207,7 +210,7 @@ void TwoServersTest::CheckAll(int server) {
 
 TEST_F(TwoServersTest, TheOneWithoutTheMapSaysWhoHasIt) {
   STRATA_ASSERT_OK(Put(db(0), kMap, 1));
-  const absl::Status refused = Put(db(1), kMap, 2).status();
+  const absl::Status refused = Verify(db(1), kMap);
   EXPECT_THAT(refused, StatusIs(absl::StatusCode::kUnavailable, HasSubstr("server a")));
   EXPECT_EQ(MapOwnerOf(refused), "a");
   EXPECT_TRUE(RetryDelayOf(refused).has_value());
@@ -218,7 +221,7 @@ TEST_F(TwoServersTest, TheOneWithoutTheMapSaysWhoHasIt) {
   EXPECT_EQ(names->front().name, kMap);
   // Other maps are other matters, and what one server removes the other has no more.
   STRATA_ASSERT_OK(db(1).maps().Create({}, "other", MapParameters()));
-  EXPECT_EQ(MapOwnerOf(Put(db(0), "other", 1).status()), "b");
+  EXPECT_EQ(MapOwnerOf(Verify(db(0), "other")), "b");
   STRATA_EXPECT_OK(db(1).maps().Delete({}, "other"));
   STRATA_EXPECT_OK(Insist([&] {
     const absl::Status gone = db(0).maps().Get({}, "other").status();
@@ -227,8 +230,90 @@ TEST_F(TwoServersTest, TheOneWithoutTheMapSaysWhoHasIt) {
   // A server that ends gives its maps up at once.
   servers_[0]->Signal(SIGTERM);
   const absl::Time ended = absl::Now();
-  STRATA_EXPECT_OK(Insist([&] { return Put(db(1), kMap, 2).status(); }));
+  STRATA_EXPECT_OK(Insist([&] { return Verify(db(1), kMap); }));
   std::printf("taken over after %s\n", absl::FormatDuration(absl::Now() - ended).c_str());
+}
+
+// Acknowledged by whichever is asked, integrated by the one that has the map, and the same map.
+TEST_F(TwoServersTest, ScansAreTakenInByServersThatHaveNotGotTheMap) {
+  STRATA_ASSERT_OK(Put(db(0), kMap, 1));
+  Note(1, Put(db(0), kMap, 1)->commit_sequence);
+  std::vector<std::thread> robots;
+  for (std::uint64_t robot = 0; robot < 4; ++robot) {
+    robots.emplace_back([&, robot] {
+      for (std::uint64_t i = 0; i < 8; ++i) {
+        const std::uint64_t sequence = 2 + robot + 4 * i;
+        const auto ack = Put(*servers_[(robot + i) % 2]->db(), kMap, sequence);
+        STRATA_ASSERT_OK(ack);  // none is refused
+        EXPECT_FALSE(ack->already_present);
+        Note(sequence, ack->commit_sequence);
+        const auto again = Put(*servers_[(robot + i + 1) % 2]->db(), kMap, sequence);
+        STRATA_ASSERT_OK(again);
+        EXPECT_TRUE(again->already_present);
+        EXPECT_EQ(again->commit_sequence, ack->commit_sequence);
+      }
+    });
+  }
+  for (std::thread& robot : robots) robot.join();
+  // In pieces, and others' under the same id.
+  constexpr std::uint64_t kLarge = 100;
+  constexpr std::size_t kLargePoints = 400'000;
+  const auto put = [&](api::Database& there, std::uint64_t content) -> absl::StatusOr<ScanAck> {
+    const PointCloud cloud = NumberedCloud(content, kLargePoints);
+    ScanHeader header = NumberedHeader(kLarge, cloud);
+    header.content_hash.clear();
+    STRATA_ASSIGN_OR_RETURN(const auto upload, there.scans().Upload({}, kMap, header));
+    for (std::size_t begin = 0; begin < cloud.size(); begin += 40'000) {
+      PointCloud piece;
+      const auto first = cloud.points.begin() + static_cast<std::ptrdiff_t>(begin);
+      piece.points.assign(first, first + 40'000);
+      STRATA_RETURN_IF_ERROR(upload->Write(piece));
+    }
+    return upload->Finish();
+  };
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanAck ack, put(db(1), kLarge));
+  EXPECT_FALSE(ack.already_present);
+  EXPECT_TRUE(absl::IsAlreadyExists(put(db(1), kLarge + 1).status()));
+  EXPECT_TRUE(absl::IsAlreadyExists(put(db(0), kLarge + 1).status()));
+  EXPECT_TRUE(put(db(0), kLarge)->already_present);
+  std::size_t points = 0;
+  STRATA_EXPECT_OK(db(0).scans().GetPoints({}, kMap, {"run", kLarge}, [&](const PointCloud& piece) {
+    points += piece.size();
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(points, kLargePoints);
+  // Ready local maps.
+  const MapParameters parameters;
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const auto built,
+      BuildMlsMap(NumberedCloud(1, kPoints), Pose::Identity(), parameters.sensor, parameters.mls));
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::string local_map, EncodeLocalMap(built.map));
+  ScanHeader ready;
+  ready.id = {"run", kLarge + 1};
+  ready.alignment = Alignment::kOff;
+  for (const int server : {1, 0}) {
+    STRATA_ASSERT_OK_AND_ASSIGN(
+        const ScanAck taken,
+        db(server).scans().UploadLocalMap({}, kMap, ready, parameters.mls, local_map));
+    EXPECT_EQ(taken.already_present, server == 0);
+  }
+  STRATA_EXPECT_OK(AtRest(db(0), kMap));
+  EXPECT_EQ(db(0).scans().Get({}, kMap, ready.id)->state, ScanState::kIntegrated);
+  STRATA_EXPECT_OK(db(0).scans().Delete({}, kMap, ready.id));
+  STRATA_EXPECT_OK(db(0).scans().Delete({}, kMap, {"run", kLarge}));  // CheckAll() has others
+  EXPECT_EQ(MapOwnerOf(Verify(db(1), kMap)), "a");
+  CheckAll(0);
+}
+
+// While the dead one's lease lasts, too.
+TEST_F(TwoServersTest, ScansAreTakenInWhileNobodyCanIntegrateThem) {
+  STRATA_ASSERT_OK(Put(db(0), kMap, 1));
+  Note(1, Put(db(0), kMap, 1)->commit_sequence);
+  STRATA_ASSERT_OK(Put(db(1), kMap, 2));
+  Note(2, Put(db(1), kMap, 2)->commit_sequence);
+  servers_[0]->Kill();
+  PutSomewhere(3, 1);
+  CheckAll(1);
 }
 
 // All that calls say of the map which the store itself can answer.

@@ -233,7 +233,7 @@ class CheckTest : public ::testing::Test {
   // The one finding about `what`.
   Finding Of(const std::string& what) {
     std::vector<Finding> findings = CheckInstallation(options_);
-    for (Finding& map : CheckMaps(options_.engine.directory)) findings.push_back(std::move(map));
+    for (Finding& map : CheckMaps(options_.engine)) findings.push_back(std::move(map));
     for (const Finding& finding : findings) {
       if (finding.what == what) return finding;
     }
@@ -259,7 +259,7 @@ TEST_F(CheckTest, ASoundInstallationIsSound) {
   EXPECT_THAT(findings, Each(Field(&Finding::verdict, ::testing::Ne(Verdict::kError))))
       << ToText(findings);
   EXPECT_FALSE(AnyError(findings));
-  const std::vector<Finding> maps = CheckMaps(options_.engine.directory);
+  const std::vector<Finding> maps = CheckMaps(options_.engine);
   EXPECT_THAT(ToText(maps), HasSubstr("ok      map campus: sound, format 3"));
   EXPECT_THAT(ToJson(maps), AllOf(HasSubstr("\"ok\": true"), HasSubstr("\"map campus\"")));
 }
@@ -306,7 +306,7 @@ TEST_F(CheckTest, FindsDamageInAMap) {
   EXPECT_EQ(Of("map moon").verdict, Verdict::kOk);
   std::ofstream(file) << "no database";
   EXPECT_THAT(Of("map campus").message, HasSubstr("not a Strata map"));
-  EXPECT_TRUE(AnyError(CheckMaps(options_.engine.directory)));
+  EXPECT_TRUE(AnyError(CheckMaps(options_.engine)));
   EXPECT_FALSE(AnyError(CheckInstallation(options_)));  // the server starts and serves the moon
 }
 

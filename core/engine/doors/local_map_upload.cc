@@ -12,6 +12,8 @@
 #include "core/codec/local_map_codec.h"
 #include "core/common/checksum.h"
 #include "core/common/status.h"
+#include "core/engine/ingest/scan_draft.h"
+#include "core/engine/map/map_core.h"
 #include "core/engine/scans/scan_source.h"
 #include "core/engine/tiles/mls_tiles.h"
 #include "core/storage/storage.h"
@@ -86,10 +88,31 @@ std::string ContentHashOf(const ScanHeader& header, absl::string_view bytes) {
   return all.HexDigest();
 }
 
-absl::StatusOr<ScanAck> Commit(Map& map,
+absl::StatusOr<ScanRecord> RecordOf(const MlsParameters& of_map,
+                                    const ScanHeader& header,
+                                    const MlsParameters& parameters,
+                                    absl::string_view bytes) {
+  STRATA_RETURN_IF_ERROR(CheckHeader(header));
+  STRATA_RETURN_IF_ERROR(CheckParameters(of_map, parameters));
+  STRATA_RETURN_IF_ERROR(CheckSize(bytes));
+  ScanRecord record;
+  record.header = header;
+  record.upload = MapCore::NextUpload();
+  record.content_hash = ContentHashOf(header, bytes);
+  STRATA_ASSIGN_OR_RETURN(record.box_scan, BoxOf(bytes, parameters));
+  if (!header.content_hash.empty() && header.content_hash != record.content_hash) {
+    return absl::InvalidArgumentError(absl::StrCat("content_hash of what arrived is ",
+                                                   record.content_hash,
+                                                   ", but the header announced ",
+                                                   header.content_hash));
+  }
+  return record;
+}
+
+absl::StatusOr<ScanAck> Commit(StorageWriter& writer,
                                ScanRecord record,
                                absl::string_view bytes,
-                               StorageWriter& writer) {
+                               ScanDraft::CheckRoom check_room) {
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
   STRATA_ASSIGN_OR_RETURN(const std::optional<PosedScan> present,
                           writer.reader().FindScan(record.header.id, clock.epoch));
@@ -99,7 +122,7 @@ absl::StatusOr<ScanAck> Commit(Map& map,
     }
     return ScanAck{record.header.id, present->scan.number, true, record.content_hash};
   }
-  STRATA_RETURN_IF_ERROR(map.CheckRoomForPending());
+  STRATA_RETURN_IF_ERROR(check_room());
   STRATA_ASSIGN_OR_RETURN(record.number, writer.NextCommitSequence());
   STRATA_RETURN_IF_ERROR(writer.PutScan(record));
   STRATA_RETURN_IF_ERROR(writer.DropPoints(record.number, bytes));
@@ -115,27 +138,16 @@ absl::StatusOr<ScanAck> UploadLocalMap(Map& map,
                                        const ScanHeader& header,
                                        const MlsParameters& parameters,
                                        absl::string_view bytes) {
-  STRATA_RETURN_IF_ERROR(CheckHeader(header));
-  STRATA_RETURN_IF_ERROR(CheckParameters(map.core().info().parameters.mls, parameters));
-  STRATA_RETURN_IF_ERROR(CheckSize(bytes));
-  ScanRecord record;
-  record.header = header;
-  record.upload = map.core().NextUpload();
-  record.content_hash = ContentHashOf(header, bytes);
-  STRATA_ASSIGN_OR_RETURN(record.box_scan, BoxOf(bytes, parameters));
-  if (!header.content_hash.empty() && header.content_hash != record.content_hash) {
-    return absl::InvalidArgumentError(absl::StrCat("content_hash of what arrived is ",
-                                                   record.content_hash,
-                                                   ", but the header announced ",
-                                                   header.content_hash));
-  }
+  STRATA_ASSIGN_OR_RETURN(const ScanRecord record,
+                          RecordOf(map.core().info().parameters.mls, header, parameters, bytes));
+  const auto check_room = [&map] { return map.CheckRoomForPending(); };
   ScanAck ack;
   STRATA_RETURN_IF_ERROR(map.core().writer().Run(
       Durability::kFull,
       bytes.size(),
       call.stop,
       [&](StorageWriter& writer) -> absl::Status {
-        STRATA_ASSIGN_OR_RETURN(ack, Commit(map, record, bytes, writer));
+        STRATA_ASSIGN_OR_RETURN(ack, Commit(writer, record, bytes, check_room));
         return absl::OkStatus();
       },
       [&] {
@@ -143,6 +155,23 @@ absl::StatusOr<ScanAck> UploadLocalMap(Map& map,
         map.core().changes().Add(ack.commit_sequence, {ack.id}, {});
         map.ScanCommitted(ack.commit_sequence);
       }));
+  return ack;
+}
+
+absl::StatusOr<ScanAck> UploadLocalMapBeside(MapStorage& store,
+                                             const ScanHeader& header,
+                                             const MlsParameters& parameters,
+                                             absl::string_view bytes) {
+  StorageWriter& writer = store.writer();
+  STRATA_ASSIGN_OR_RETURN(const MapInfo info, writer.reader().GetMapInfo());
+  STRATA_ASSIGN_OR_RETURN(const ScanRecord record,
+                          RecordOf(info.parameters.mls, header, parameters, bytes));
+  const auto has_room = [] { return absl::OkStatus(); };  // PutScan() asks
+  ScanAck ack;
+  STRATA_RETURN_IF_ERROR(writer.Commit(Durability::kFull, [&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(ack, Commit(writer, record, bytes, has_room));
+    return absl::OkStatus();
+  }));
   return ack;
 }
 

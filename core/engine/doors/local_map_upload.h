@@ -8,6 +8,7 @@
 #include "core/api/call.h"
 #include "core/engine/doors/map.h"
 #include "core/mls/mls_parameters.h"
+#include "core/storage/storage.h"
 #include "core/world/scan.h"
 
 namespace strata {
@@ -18,6 +19,12 @@ absl::StatusOr<ScanAck> UploadLocalMap(Map& map,
                                        const ScanHeader& header,
                                        const MlsParameters& parameters,
                                        absl::string_view bytes);
+
+// The same into a map that another engine has; `store` as of MapStores::OpenToAdd().
+absl::StatusOr<ScanAck> UploadLocalMapBeside(MapStorage& store,
+                                             const ScanHeader& header,
+                                             const MlsParameters& parameters,
+                                             absl::string_view bytes);
 
 }  // namespace strata
 

@@ -59,6 +59,8 @@ class Map {
   absl::Status CheckRoomForPending() const { return worker_->CheckRoom(); }
   // A scan became durable.
   void ScanCommitted(ScanNumber number) { worker_->ScanCommitted(number); }
+  // Scans became durable elsewhere.
+  void ScansWait() { worker_->ScansWait(); }
   // A job was queued.
   void JobQueued() { runner_->JobQueued(); }
 

@@ -109,6 +109,22 @@ absl::StatusOr<MapReading> EngineMaps::FindToRead(const api::Call& call, absl::s
   return MapReading(std::move(store), map.status());
 }
 
+absl::StatusOr<EngineMaps::Place> EngineMaps::FindToAdd(const Stop& stop, absl::string_view name) {
+  Place place;
+  absl::StatusOr<std::shared_ptr<Map>> map = Find(stop, name);
+  if (map.ok()) {
+    place.map = *std::move(map);
+    return place;
+  }
+  if (!MapOwnerOf(map.status()).has_value()) return map.status();
+  absl::StatusOr<std::unique_ptr<MapStorage>> store =
+      stores_->OpenToAdd(name, options_.max_pending_scans);
+  // Nobody has it any more: this engine will, a moment later.
+  if (absl::IsUnavailable(store.status())) return map.status();
+  STRATA_ASSIGN_OR_RETURN(place.store, std::move(store));
+  return place;
+}
+
 absl::StatusOr<MapReading> EngineMaps::FindTilesToRead(const api::Call& call,
                                                        absl::string_view name) {
   STRATA_ASSIGN_OR_RETURN(MapReading found, FindToRead(call, name));

@@ -47,6 +47,15 @@ class EngineMaps final : public api::Maps {
   // map.
   absl::StatusOr<MapReading> FindToRead(const api::Call& call, absl::string_view name);
 
+  // The map where it is here; else its store, for scans that come in here while another engine has
+  // the map (MapStores::OpenToAdd()).
+  struct Place {
+    std::shared_ptr<Map> map;
+    std::unique_ptr<MapStorage> store;
+  };
+  absl::StatusOr<Place> FindToAdd(const Stop& stop, absl::string_view name);
+  const EngineOptions& options() const { return options_; }
+
   EngineNumbers Numbers() const;
   EngineHealth Health() const;
 

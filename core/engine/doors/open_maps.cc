@@ -454,6 +454,7 @@ void OpenMaps::Loop() {
       if (surveyed && stores_.IsShared()) {
         SurveyAgain(kSurveyInterval).IgnoreError();  // the next one may succeed
         TakeAbandoned();
+        TellOfArrivals();
       }
       OpenAllWanted();
       CloseIdle();
@@ -539,6 +540,20 @@ void OpenMaps::TakeAbandoned() {
       wanted_.insert(name);
     }
     OpenWanted(name);
+  }
+}
+
+void OpenMaps::TellOfArrivals() {
+  const absl::StatusOr<std::vector<std::string>> names = stores_.ListWaiting();
+  if (!names.ok()) return;  // the store is away; what waits there goes on waiting
+  for (const std::string& name : *names) {
+    std::shared_ptr<Map> map;
+    {
+      absl::MutexLock lock(&mutex_);
+      const auto it = entries_.find(name);
+      if (it != entries_.end() && it->second.state == State::kOpen) map = it->second.map;
+    }
+    if (map != nullptr) map->ScansWait();
   }
 }
 

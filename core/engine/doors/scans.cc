@@ -17,6 +17,7 @@
 #include "core/engine/doors/local_map_upload.h"
 #include "core/engine/doors/map_reading.h"
 #include "core/engine/doors/upload.h"
+#include "core/engine/ingest/upload_beside.h"
 #include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/scan_labels.h"
 #include "core/engine/scans/scan_source.h"
@@ -104,9 +105,9 @@ absl::StatusOr<std::unique_ptr<api::ScanUpload>> EngineScans::Upload(const api::
                                                                      absl::string_view map,
                                                                      const ScanHeader& header) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(EngineMaps::Place found, maps_.FindToAdd(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateScanHeader(header));
-  const std::uint64_t most = found->core().options().max_points_per_scan;
+  const std::uint64_t most = maps_.options().max_points_per_scan;
   if (header.point_count > most) {
     return absl::InvalidArgumentError(absl::StrCat("scan ",
                                                    header.id.ToString(),
@@ -116,7 +117,8 @@ absl::StatusOr<std::unique_ptr<api::ScanUpload>> EngineScans::Upload(const api::
                                                    most,
                                                    ", split it"));
   }
-  return EngineUpload::Begin(std::move(found), call, header);
+  if (found.map != nullptr) return EngineUpload::Begin(std::move(found.map), call, header);
+  return UploadBeside::Begin(std::move(found.store), call, header);
 }
 
 absl::StatusOr<ScanAck> EngineScans::UploadLocalMap(const api::Call& call,
@@ -125,9 +127,11 @@ absl::StatusOr<ScanAck> EngineScans::UploadLocalMap(const api::Call& call,
                                                     const MlsParameters& parameters,
                                                     absl::string_view local_map) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place found, maps_.FindToAdd(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateScanHeader(header));
-  absl::StatusOr<ScanAck> ack = strata::UploadLocalMap(*found, call, header, parameters, local_map);
+  absl::StatusOr<ScanAck> ack =
+      found.map != nullptr ? strata::UploadLocalMap(*found.map, call, header, parameters, local_map)
+                           : UploadLocalMapBeside(*found.store, header, parameters, local_map);
   if (ack.ok()) return ack;
   return Annotate(ack.status(), absl::StrCat("scan ", header.id.ToString()));
 }

@@ -6,9 +6,7 @@
 
 #include <cstdint>
 #include <optional>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/functional/function_ref.h"
@@ -19,10 +17,10 @@
 
 #include "core/cloud/point_cloud.h"
 #include "core/common/stop.h"
+#include "core/engine/ingest/scan_draft.h"
 #include "core/engine/map/map_core.h"
 #include "core/storage/records.h"
 #include "core/world/scan.h"
-#include "core/world/scan_hash.h"
 
 namespace strata {
 
@@ -30,7 +28,7 @@ namespace strata {
 class ScanIntake {
  public:
   // OK if the map takes one more scan.
-  using CheckRoom = absl::FunctionRef<absl::Status()>;
+  using CheckRoom = ScanDraft::CheckRoom;
 
   // `header` must be valid.
   ScanIntake(MapCore& core, ScanHeader header, std::optional<UnfinishedUpload> parked)
@@ -59,19 +57,9 @@ class ScanIntake {
   absl::Status CheckTicket(std::uint64_t ticket) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Reads the pieces of parked_ back. If they are damaged or not of this header, begins anew.
   absl::Status Load() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::Status LoadPieces(StorageReader& reader, const UnfinishedUpload& parked)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void BeginAnew() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // Adds points of `chunk` to the piece under way.
-  void Append(const PointCloud& chunk, std::size_t begin, std::size_t end)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // Encodes the piece under way.
-  absl::Status SealPiece() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Sends the encoded pieces to disk.
   absl::Status StagePieces(const Stop& stop) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::Status CheckWhole() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::StatusOr<ScanAck> Commit(StorageWriter& writer, CheckRoom check_room)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Abandon() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool announced() const { return !header_.content_hash.empty(); }
   UnfinishedUpload Unfinished() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -81,15 +69,9 @@ class ScanIntake {
   mutable absl::Mutex mutex_;
   std::optional<UnfinishedUpload> parked_ ABSL_GUARDED_BY(mutex_);  // not read back yet
   std::uint64_t ticket_ ABSL_GUARDED_BY(mutex_) = 0;
-  bool dead_ ABSL_GUARDED_BY(mutex_) = false;  // finished, or refused for good
-  ScanRecord record_ ABSL_GUARDED_BY(mutex_);
-  std::optional<ScanHasher> hasher_ ABSL_GUARDED_BY(mutex_);
-  PointCloud piece_ ABSL_GUARDED_BY(mutex_);                 // less than kMaxEncodedPoints
-  std::vector<std::string> pieces_ ABSL_GUARDED_BY(mutex_);  // encoded, not on disk yet
-  std::size_t pieces_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
-  std::uint32_t staged_ ABSL_GUARDED_BY(mutex_) = 0;  // pieces on disk
-  std::uint64_t points_ ABSL_GUARDED_BY(mutex_) = 0;
-  absl::Time touched_ ABSL_GUARDED_BY(mutex_);  // when points last went to disk
+  bool dead_ ABSL_GUARDED_BY(mutex_) = false;               // finished, or refused for good
+  std::optional<ScanDraft> draft_ ABSL_GUARDED_BY(mutex_);  // once a stream has begun
+  absl::Time touched_ ABSL_GUARDED_BY(mutex_);              // when points last went to disk
 };
 
 }  // namespace strata

@@ -86,6 +86,14 @@ void Worker::ScanCommitted(ScanNumber number) {
   waiting_.Add(number, SteadyNow());
 }
 
+// Where some are known to wait, all are found that there are.
+void Worker::ScansWait() {
+  absl::MutexLock lock(&mutex_);
+  if (pending_ > 0) return;
+  pending_ = 1;
+  waiting_.Add(ScanNumber{1}, SteadyNow());  // which no other is below
+}
+
 absl::Time Worker::WaitingSince(ScanNumber oldest) {
   absl::MutexLock lock(&mutex_);
   return waiting_.Since(oldest);

@@ -42,6 +42,8 @@ class Worker {
   absl::Status CheckRoom() const;
   // One more scan waits. Takes no memory.
   void ScanCommitted(ScanNumber number);
+  // Scans may wait that came in elsewhere: they are looked for.
+  void ScansWait();
   // Since when the scan waits that is the first of those that do; as of this process at most.
   absl::Time WaitingSince(ScanNumber oldest);
 

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/random/random.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -25,6 +26,7 @@
 #include <unistd.h>
 
 #include "core/common/status.h"
+#include "core/storage/sqlite/map_file.h"
 #include "core/storage/sqlite/sqlite_storage.h"
 #include "core/world/names.h"
 
@@ -164,9 +166,9 @@ absl::StatusOr<std::vector<std::string>> MapDirectory::NamesIn(const fs::path& d
   return names;
 }
 
-absl::Status MapDirectory::CreateFile(absl::string_view name,
-                                      const MapParameters& parameters,
-                                      absl::Time created) const {
+absl::Status MapDirectory::MakeFile(
+    absl::string_view name,
+    absl::FunctionRef<absl::Status(const fs::path& file, std::uint64_t clock)> make) const {
   const fs::path file = FileOf(name);
   std::error_code error;
   if (fs::exists(file, error)) {
@@ -175,8 +177,7 @@ absl::Status MapDirectory::CreateFile(absl::string_view name,
   const fs::path making = path_ / absl::StrCat(kMakingPrefix, name, kSuffix);
   STRATA_RETURN_IF_ERROR(RemoveWithJournals(making));
   const std::uint64_t removed = RemovedClock();
-  const std::uint64_t clock = removed == 0 ? 0 : removed + 1;
-  absl::Status made = CreateSqliteMap(making, parameters, created, clock);
+  absl::Status made = make(making, removed == 0 ? 0 : removed + 1);
   if (made.ok()) {
     fs::rename(making, file, error);
     if (error) made = absl::UnavailableError(error.message());
@@ -188,6 +189,22 @@ absl::Status MapDirectory::CreateFile(absl::string_view name,
   absl::Status synced = SyncDirectory(path_);
   if (!synced.ok()) RemoveWithJournals(file).IgnoreError();
   return synced;
+}
+
+absl::Status MapDirectory::CreateFile(absl::string_view name,
+                                      const MapParameters& parameters,
+                                      absl::Time created) const {
+  return MakeFile(name, [&](const fs::path& file, std::uint64_t clock) {
+    return CreateSqliteMap(file, parameters, created, clock);
+  });
+}
+
+absl::Status MapDirectory::ImportFile(absl::string_view name,
+                                      const fs::path& from,
+                                      const Stop& stop) const {
+  return MakeFile(name, [&](const fs::path& file, std::uint64_t clock) {
+    return CopySqliteMap(from, file, clock, stop);
+  });
 }
 
 absl::Status MapDirectory::CheckRemovable(absl::string_view name) const {

@@ -8,11 +8,13 @@
 #include <utility>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
+#include "core/common/stop.h"
 #include "core/world/map_info.h"
 
 namespace strata {
@@ -46,6 +48,10 @@ class MapDirectory {
   absl::Status CreateFile(absl::string_view name,
                           const MapParameters& parameters,
                           absl::Time created) const;
+  // The same of a copy of the map file `from`, whoever has that open, as of CopySqliteMap().
+  absl::Status ImportFile(absl::string_view name,
+                          const std::filesystem::path& from,
+                          const Stop& stop) const;
   // FAILED_PRECONDITION for a file that no map was ever in; OK also where there is none.
   absl::Status CheckRemovable(absl::string_view name) const;
   // No connection may be open; one thread at a time. `clock`: where the map's stood; 0: unknown.
@@ -53,6 +59,10 @@ class MapDirectory {
 
  private:
   MapDirectory(std::filesystem::path path, int lock) : path_(std::move(path)), lock_(lock) {}
+  // Has `make` make a file in the directory, its clock at least at `clock`, and gives it its name.
+  absl::Status MakeFile(absl::string_view name,
+                        absl::FunctionRef<absl::Status(const std::filesystem::path& file,
+                                                       std::uint64_t clock)> make) const;
   // The latest clock of a map that was removed; 0: none was.
   std::uint64_t RemovedClock() const;
   absl::Status NoteRemovedClock(std::uint64_t clock) const;

@@ -112,6 +112,13 @@ class PostgresStores final : public MapStores {
   absl::StatusOr<std::unique_ptr<MapStorage>> OpenToRead(absl::string_view name) const override {
     return maps_.OpenToRead(name);
   }
+  absl::StatusOr<std::unique_ptr<MapStorage>> OpenToAdd(absl::string_view name,
+                                                        std::uint64_t most_waiting) const override {
+    return maps_.OpenToAdd(name, most_waiting);
+  }
+  absl::StatusOr<std::vector<std::string>> ListWaiting() const override {
+    return maps_.ListWaiting();
+  }
   bool IsShared() const override { return true; }
   absl::StatusOr<bool> Has(absl::string_view name) const override { return maps_.Has(name); }
   absl::StatusOr<std::vector<std::string>> ListAbandoned() const override {

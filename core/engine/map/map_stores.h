@@ -67,6 +67,17 @@ class MapStores {
   virtual absl::StatusOr<std::unique_ptr<MapStorage>> OpenToRead(absl::string_view name) const {
     return absl::UnimplementedError(absl::StrCat("map ", name, ": its store is not shared"));
   }
+  // Of shared ones: for scans that come in here while another engine has the map alone: PutScan()
+  // is RESOURCE_EXHAUSTED while `most_waiting` wait for integration, and UNAVAILABLE where chunks
+  // of the scan have gone, which have to be sent again. UNAVAILABLE while nobody has it alone.
+  virtual absl::StatusOr<std::unique_ptr<MapStorage>> OpenToAdd(absl::string_view name,
+                                                                std::uint64_t) const {
+    return absl::UnimplementedError(absl::StrCat("map ", name, ": its store is not shared"));
+  }
+  // Of shared ones: maps that this engine has alone and in which scans wait for integration.
+  virtual absl::StatusOr<std::vector<std::string>> ListWaiting() const {
+    return std::vector<std::string>();
+  }
   // Whether other engines use the same stores: maps may come, go and change beside this one.
   virtual bool IsShared() const { return false; }
   // Of shared ones: whether the map is there; maps whose engine went without closing them.

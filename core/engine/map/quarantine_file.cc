@@ -1,15 +1,11 @@
 #include "core/engine/map/quarantine_file.h"
 
 #include <cstdint>
-#include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <vector>
 
-#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/numbers.h"
@@ -18,12 +14,10 @@
 #include "absl/strings/strip.h"
 
 #include "core/common/status.h"
-#include "core/engine/map/directory.h"
+#include "core/engine/map/idle_map.h"
 #include "core/engine/map/quarantine.h"
 #include "core/engine/map/scan_lookup.h"
-#include "core/storage/sqlite/sqlite_storage.h"
 #include "core/storage/storage.h"
-#include "core/world/names.h"
 
 namespace strata {
 namespace {
@@ -36,23 +30,6 @@ constexpr absl::string_view kPrepare = "prepare";
 absl::string_view NameOfKind(WorkKind kind) {
   if (kind == WorkKind::kRecovery) return kRebuild;
   return kind == WorkKind::kLook ? kLook : kPrepare;
-}
-
-// Runs `body` in one durable transaction on the file.
-absl::Status OnFile(const std::filesystem::path& directory,
-                    absl::string_view name,
-                    absl::FunctionRef<absl::Status(StorageWriter&)> body) {
-  STRATA_RETURN_IF_ERROR(ValidateName("map name", name));
-  std::error_code error;
-  if (!std::filesystem::exists(MapDirectory::FileIn(directory, name), error)) {
-    return absl::NotFoundError(
-        absl::StrCat("map ", name, " does not exist in ", directory.string()));
-  }
-  STRATA_ASSIGN_OR_RETURN(const MapDirectory owned, MapDirectory::Open(directory));
-  STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<MapStorage> storage,
-                          OpenSqliteStorage(owned.FileOf(name), SqliteOptions()));
-  StorageWriter& writer = storage->writer();
-  return writer.Commit(Durability::kFull, [&] { return body(writer); });
 }
 
 absl::StatusOr<ScanId> ParseScan(absl::string_view text) {
@@ -119,10 +96,10 @@ absl::Status DescribeJob(StorageReader& reader, QuarantineEntry& entry, bool& ma
 
 }  // namespace
 
-absl::StatusOr<std::vector<QuarantineEntry>> ListQuarantine(const std::filesystem::path& directory,
+absl::StatusOr<std::vector<QuarantineEntry>> ListQuarantine(const MapPlace& place,
                                                             absl::string_view name) {
   std::vector<QuarantineEntry> entries;
-  STRATA_RETURN_IF_ERROR(OnFile(directory, name, [&](StorageWriter& writer) -> absl::Status {
+  STRATA_RETURN_IF_ERROR(OnIdleMap(place, name, [&](StorageWriter& writer) -> absl::Status {
     StorageReader& reader = writer.reader();
     STRATA_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, reader.ListAttempts());
     for (const Attempt& attempt : attempts) {
@@ -145,19 +122,19 @@ absl::StatusOr<std::vector<QuarantineEntry>> ListQuarantine(const std::filesyste
   return entries;
 }
 
-absl::Status AddToQuarantine(const std::filesystem::path& directory,
+absl::Status AddToQuarantine(const MapPlace& place,
                              absl::string_view name,
                              absl::string_view what) {
-  return OnFile(directory, name, [&](StorageWriter& writer) -> absl::Status {
+  return OnIdleMap(place, name, [&](StorageWriter& writer) -> absl::Status {
     STRATA_ASSIGN_OR_RETURN(const WorkId work, ParseWork(writer.reader(), what));
     return Hold(writer, work, "put aside by hand; stratad quarantine release takes it back");
   });
 }
 
-absl::Status ReleaseFromQuarantine(const std::filesystem::path& directory,
+absl::Status ReleaseFromQuarantine(const MapPlace& place,
                                    absl::string_view name,
                                    absl::string_view what) {
-  return OnFile(directory, name, [&](StorageWriter& writer) -> absl::Status {
+  return OnIdleMap(place, name, [&](StorageWriter& writer) -> absl::Status {
     STRATA_ASSIGN_OR_RETURN(const WorkId work, ParseWork(writer.reader(), what));
     return Release(writer, work);
   });

@@ -2,7 +2,6 @@
 #ifndef STRATA_CORE_ENGINE_MAP_QUARANTINE_FILE_H_
 #define STRATA_CORE_ENGINE_MAP_QUARANTINE_FILE_H_
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -10,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
+#include "core/engine/map/idle_map.h"
 #include "core/storage/records.h"
 
 namespace strata {
@@ -22,15 +22,12 @@ struct QuarantineEntry {
   std::string message;  // of the scan or job
 };
 
-// All of them act on the file of the map `name` in `directory`. FAILED_PRECONDITION while an engine
-// has the directory; NOT_FOUND.
-absl::StatusOr<std::vector<QuarantineEntry>> ListQuarantine(const std::filesystem::path& directory,
+// All of them act on the map `name` of `place`, as OnIdleMap() does.
+absl::StatusOr<std::vector<QuarantineEntry>> ListQuarantine(const MapPlace& place,
                                                             absl::string_view name);
 // `what`: "scan TRAJECTORY/SEQUENCE" or "job ID", that wait; to take back also "rebuild", "look".
-absl::Status AddToQuarantine(const std::filesystem::path& directory,
-                             absl::string_view name,
-                             absl::string_view what);
-absl::Status ReleaseFromQuarantine(const std::filesystem::path& directory,
+absl::Status AddToQuarantine(const MapPlace& place, absl::string_view name, absl::string_view what);
+absl::Status ReleaseFromQuarantine(const MapPlace& place,
                                    absl::string_view name,
                                    absl::string_view what);
 

@@ -340,6 +340,71 @@ absl::Status Connection::Stream(const char* sql,
   }
 }
 
+void CopiedRow::AddSize(std::size_t size) {
+  too_large_ = too_large_ || size > INT_MAX / 2;
+  AppendBigEndian(static_cast<std::uint32_t>(size), bytes_);
+  ++columns_;
+}
+
+void CopiedRow::Add(std::int64_t value) {
+  AddSize(8);
+  AppendBigEndian(static_cast<std::uint64_t>(value), bytes_);
+}
+
+void CopiedRow::Add(double value) {
+  AddSize(8);
+  AppendBigEndian(std::bit_cast<std::uint64_t>(value), bytes_);
+}
+
+void CopiedRow::Add(absl::string_view text_or_bytes) {
+  AddSize(text_or_bytes.size());
+  bytes_.append(text_or_bytes.data(), text_or_bytes.size());
+}
+
+absl::Status CopySink::Send(absl::string_view bytes) {
+  if (PQputCopyData(connection_, bytes.data(), static_cast<int>(bytes.size())) == 1) {
+    return absl::OkStatus();
+  }
+  return absl::UnavailableError(absl::StrCat("store: ", OneLine(PQerrorMessage(connection_))));
+}
+
+absl::Status CopySink::Flush() {
+  STRATA_RETURN_IF_ERROR(Send(waiting_));
+  waiting_.clear();
+  return absl::OkStatus();
+}
+
+absl::Status CopySink::Put(const CopiedRow& row) {
+  constexpr std::size_t kMostWaiting = std::size_t{64} << 10;
+  if (row.too_large_) return absl::ResourceExhaustedError("store: a value of more than 1 GiB");
+  AppendBigEndian(static_cast<std::uint16_t>(row.columns_), waiting_);
+  waiting_.append(row.bytes_);
+  return waiting_.size() < kMostWaiting ? absl::OkStatus() : Flush();
+}
+
+// The format: postgresql.org/docs/15/sql-copy.html#id-1.9.3.55.9.4; no flags, no header extension.
+absl::Status Connection::CopyIn(const char* sql, absl::FunctionRef<absl::Status(CopySink&)> rows) {
+  {
+    const Result begun(PQexec(connection_, sql));
+    if (PQresultStatus(begun.get()) != PGRES_COPY_IN) return StatusOf(begun.get());
+  }
+  CopySink sink(connection_);
+  sink.waiting_.assign("PGCOPY\n\377\r\n\0\0\0\0\0\0\0\0\0", 19);
+  absl::Status put = rows(sink);
+  AppendBigEndian(std::uint16_t{0xFFFF}, sink.waiting_);
+  if (put.ok()) put = sink.Flush();
+  PQputCopyEnd(connection_, put.ok() ? nullptr : "given up");
+  absl::Status copied;
+  while (true) {
+    const Result result(PQgetResult(connection_));
+    if (result == nullptr) break;
+    if (copied.ok()) copied = StatusOf(result.get());
+  }
+  if (put.ok() && !IsBroken()) return copied;
+  // What the server says of rows that it got is the better reason, unless it only repeats ours.
+  return put.ok() ? StatusOf(nullptr) : put;
+}
+
 bool Connection::InFailedTransaction() const {
   return PQtransactionStatus(connection_) == PQTRANS_INERROR;
 }

@@ -95,6 +95,40 @@ class Rows final : public Row {
   int row_ = -1;
 };
 
+// A row on its way into a table, column by column, the map first.
+class CopiedRow {
+ public:
+  explicit CopiedRow(std::int64_t map) { Add(map); }
+
+  void Add(std::int64_t value);
+  void Add(double value);
+  void Add(absl::string_view text_or_bytes);
+
+ private:
+  friend class CopySink;
+  void AddSize(std::size_t size);
+
+  std::int16_t columns_ = 0;
+  std::string bytes_;  // as COPY takes them
+  bool too_large_ = false;
+};
+
+// Takes the rows of one COPY.
+class CopySink {
+ public:
+  // Waits while the server takes them; of what the table refuses it may hear later.
+  absl::Status Put(const CopiedRow& row);
+
+ private:
+  friend class Connection;
+  explicit CopySink(pg_conn* connection) : connection_(connection) {}
+  absl::Status Send(absl::string_view bytes);
+  absl::Status Flush();
+
+  pg_conn* connection_;
+  std::string waiting_;  // a few rows
+};
+
 // One thread at a time.
 class Connection {
  public:
@@ -126,6 +160,10 @@ class Connection {
   absl::Status Stream(const char* sql,
                       const Parameters& parameters,
                       absl::FunctionRef<absl::Status(const Row&)> row);
+
+  // Runs `sql`, "COPY … FROM STDIN (FORMAT binary)", on the rows that `rows` puts. An error of
+  // either undoes all of it; the connection can be used.
+  absl::Status CopyIn(const char* sql, absl::FunctionRef<absl::Status(CopySink&)> rows);
 
   // Of the last call that failed: whether its transaction, begun anew, may do better.
   bool may_be_redone() const { return may_be_redone_; }

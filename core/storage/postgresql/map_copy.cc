@@ -1,158 +1,36 @@
 #include "core/storage/postgresql/map_copy.h"
 
-#include <array>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include <Eigen/Geometry>
 
 #include "core/common/status.h"
+#include "core/storage/postgresql/cells.h"
+#include "core/storage/postgresql/copied_tables.h"
 #include "core/storage/row.h"
-#include "core/storage/sqlite/database.h"
 #include "core/storage/sqlite/schema.h"
-
-// `types`: a letter a column: integer, real, text, bytes.
-#define STRATA_COPIED(table, columns, marks, types, order)              \
-  {                                                                     \
-    "SELECT " columns " FROM " table " WHERE map = $1 ORDER BY " order, \
-        "INSERT INTO " table " (" columns ") VALUES (" marks ")", types \
-  }
 
 namespace strata {
 namespace {
 
-struct CopiedTable {
-  const char* select;  // of the database
-  const char* insert;  // into the file
-  const char* types;
-};
-
-constexpr std::array<CopiedTable, 35> kTables = {{
-    STRATA_COPIED("truth_scan",
-                  "number, trajectory, sequence, time_us, header, points, state, upload, chunks, "
-                  "has_points, point_bytes, has_box, min_x, min_y, min_z, max_x, max_y, max_z, "
-                  "content_hash, message, person_labels, label_model, faded_points",
-                  "?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, "
-                  "?18, ?19, ?20, ?21, ?22, ?23",
-                  "itiibiiiiiiirrrrrrttiii",
-                  "number"),
-    STRATA_COPIED("truth_chunk", "upload, ordinal, bytes", "?1, ?2, ?3", "iib", "upload, ordinal"),
-    STRATA_COPIED("truth_upload",
-                  "upload, trajectory, sequence, content_hash, touched_us",
-                  "?1, ?2, ?3, ?4, ?5",
-                  "ititi",
-                  "upload"),
-    STRATA_COPIED("truth_local_map", "scan, bytes", "?1, ?2", "ib", "scan"),
-    STRATA_COPIED(
-        "truth_epoch", "epoch, created_us, reason, job", "?1, ?2, ?3, ?4", "iiti", "epoch"),
-    STRATA_COPIED("truth_pose",
-                  "scan, epoch, pose, origin, aligned, message, overlap, rms_m, iterations",
-                  "?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9",
-                  "iibiitrri",
-                  "scan, epoch"),
-    STRATA_COPIED("truth_constraint",
-                  "id, scan_i, scan_j, pose, information, origin, enabled, note, since_epoch, "
-                  "until_epoch, proposed_by, may_be_false",
-                  "?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12",
-                  "iiibbiitiiii",
-                  "id"),
-    STRATA_COPIED("truth_plane",
-                  "id, normal_x, normal_y, normal_z, distance, kind, from_edges, enabled, note, "
-                  "since_epoch, until_epoch, proposed_by",
-                  "?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12",
-                  "irrrriiitiii",
-                  "id"),
-    STRATA_COPIED("truth_plane_support",
-                  "plane, scan, weight, rms_m",
-                  "?1, ?2, ?3, ?4",
-                  "iirr",
-                  "plane, scan"),
-    STRATA_COPIED("truth_proposed_pose", "job, scan, pose", "?1, ?2, ?3", "iib", "job, scan"),
-    STRATA_COPIED("truth_profile",
-                  "name, radius_m, height_m, max_step_m, max_slope_rad, max_gap_m, max_roughness_m",
-                  "?1, ?2, ?3, ?4, ?5, ?6, ?7",
-                  "trrrrrr",
-                  "name"),
-    STRATA_COPIED("truth_label",
-                  "scan, origin, piece, bytes",
-                  "?1, ?2, ?3, ?4",
-                  "iiib",
-                  "scan, origin, piece"),
-    STRATA_COPIED("truth_model",
-                  "id, name, created_us, job, description, size_bytes",
-                  "?1, ?2, ?3, ?4, ?5, ?6",
-                  "itiiti",
-                  "id"),
-    STRATA_COPIED(
-        "truth_model_parameter", "model, name, value", "?1, ?2, ?3", "itt", "model, name"),
-    STRATA_COPIED("truth_model_score", "model, name, value", "?1, ?2, ?3", "itr", "model, name"),
-    STRATA_COPIED("truth_model_piece", "model, piece, bytes", "?1, ?2, ?3", "iib", "model, piece"),
-    STRATA_COPIED("truth_class", "id, name, colour", "?1, ?2, ?3", "iti", "id"),
-    STRATA_COPIED("truth_kind", "id, name, info, shape", "?1, ?2, ?3, ?4", "itbb", "id"),
-    STRATA_COPIED("truth_job",
-                  "id, kind, state, progress, phase, message, created_us, updated_us",
-                  "?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8",
-                  "itirttii",
-                  "id"),
-    STRATA_COPIED("truth_job_parameter", "job, name, value", "?1, ?2, ?3", "itt", "job, name"),
-    STRATA_COPIED("truth_job_metric", "job, name, value", "?1, ?2, ?3", "itr", "job, name"),
-    STRATA_COPIED("attempt", "kind, id, deaths, under_way", "?1, ?2, ?3, ?4", "iiii", "kind, id"),
-    STRATA_COPIED("derived_mls_tile",
-                  "level, x, y, version, patches, cells, min_x, min_y, min_z, max_x, max_y, max_z, "
-                  "spread_weight, spread_sum, digest, bytes",
-                  "?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16",
-                  "iiiiiirrrrrrrrtb",
-                  "level, x, y, version"),
-    STRATA_COPIED("derived_surface_tile",
-                  "level, x, y, version, gone, patches, size_bytes, bytes",
-                  "?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8",
-                  "iiiiiiib",
-                  "level, x, y, version"),
-    STRATA_COPIED(
-        "derived_prepared_tile", "x, y, made_of, bytes", "?1, ?2, ?3, ?4", "iibb", "x, y, made_of"),
-    STRATA_COPIED("derived_plane_model", "job, part, bytes", "?1, ?2, ?3", "iib", "job, part"),
-    STRATA_COPIED("derived_entity", "job, part, bytes", "?1, ?2, ?3", "iib", "job, part"),
-    STRATA_COPIED("derived_entity_scan", "scan, part", "?1, ?2", "ii", "scan, part"),
-    STRATA_COPIED(
-        "derived_inferred", "job, part, kind, bytes", "?1, ?2, ?3, ?4", "iiib", "job, part"),
-    STRATA_COPIED("derived_inferred_scan", "scan, kind", "?1, ?2", "ii", "scan, kind"),
-    STRATA_COPIED("derived_kind", "id, info, shape", "?1, ?2, ?3", "ibb", "id"),
-    STRATA_COPIED("derived_scan_view", "scan, place, planes", "?1, ?2, ?3", "ibb", "scan"),
-    STRATA_COPIED("derived_scan_tile", "scan, x, y", "?1, ?2, ?3", "iii", "scan, x, y"),
-    {"SELECT scan, min_x, max_x, min_y, max_y FROM derived_footprint WHERE map = $1 ORDER BY scan",
-     "INSERT INTO derived_footprint (scan, min_x, max_x, min_y, max_y, exact_min_x, exact_max_x, "
-     "exact_min_y, exact_max_y) VALUES (?1, ?2, ?3, ?4, ?5, ?2, ?3, ?4, ?5)",
-     "irrrr"},
-    {"SELECT tile_version, complete FROM derived_state WHERE map = $1",
-     "UPDATE derived_state SET tile_version = ?1, complete = ?2 WHERE id = 1",
-     "ii"},
-}};
-
-// The last, so that a copy that broke off is no map.
-constexpr CopiedTable kMap = {
-    "SELECT created_us, cell_size_m, gap_size_m, thickness_m, sensor_sigma_m, "
-    "sensor_sigma_per_metre, sensor_min_range_m, sensor_max_range_m, keep_points, has_origin, "
-    "latitude_rad, longitude_rad, altitude_m, commit_sequence, epoch, last_constraint, "
-    "oldest_epoch, fade_after FROM truth_map WHERE map = $1",
-    "INSERT INTO truth_map (id, created_us, cell_size_m, gap_size_m, thickness_m, sensor_sigma_m, "
-    "sensor_sigma_per_metre, sensor_min_range_m, sensor_max_range_m, keep_points, has_origin, "
-    "latitude_rad, longitude_rad, altitude_m, commit_sequence, epoch, last_constraint, "
-    "oldest_epoch, fade_after) VALUES (1, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, "
-    "?14, ?15, ?16, ?17, ?18)",
-    "irrrrrrriirrriiiii"};
-
 // Ids of classifiers that were deleted are not given again.
 constexpr CopiedTable kLastModel = {
+    "truth_map",
     "SELECT last_model FROM truth_map WHERE map = $1",
     "INSERT INTO sqlite_sequence (name, seq) VALUES ('truth_model', ?1)",
+    nullptr,
+    nullptr,
     "i"};
 
 absl::Status Insert(Database& file, const CopiedTable& table, const Row& row) {
   STRATA_ASSIGN_OR_RETURN(Statement insert, file.Prepare(table.insert));
-  const int columns = static_cast<int>(std::strlen(table.types));
+  const int columns = insert.parameters();
   for (int i = 0; i < columns; ++i) {
     switch (table.types[i]) {
       case 'i':
@@ -171,6 +49,18 @@ absl::Status Insert(Database& file, const CopiedTable& table, const Row& row) {
   return insert.Run();
 }
 
+absl::Status ForEachCopied(Connection& connection,
+                           std::int64_t map,
+                           const CopiedTable& table,
+                           const Stop& stop,
+                           absl::FunctionRef<absl::Status(const Row&)> tell) {
+  return connection.Stream(
+      table.select, Parameters(map), [&stop, tell](const Row& row) -> absl::Status {
+        STRATA_RETURN_IF_ERROR(stop.status());
+        return tell(row);
+      });
+}
+
 // Rows that were copied.
 absl::StatusOr<std::uint64_t> CopyTable(Connection& connection,
                                         std::int64_t map,
@@ -178,13 +68,83 @@ absl::StatusOr<std::uint64_t> CopyTable(Connection& connection,
                                         const CopiedTable& table,
                                         const Stop& stop) {
   std::uint64_t rows = 0;
-  STRATA_RETURN_IF_ERROR(
-      connection.Stream(table.select, Parameters(map), [&](const Row& row) -> absl::Status {
-        STRATA_RETURN_IF_ERROR(stop.status());
-        ++rows;
-        return Insert(file, table, row);
-      }));
+  STRATA_RETURN_IF_ERROR(ForEachCopied(connection, map, table, stop, [&](const Row& row) {
+    ++rows;
+    return Insert(file, table, row);
+  }));
   return rows;
+}
+
+absl::Status NoMap() { return absl::NotFoundError("store: the map is not there any more"); }
+
+void AddColumns(const Row& row, const CopiedTable& table, CopiedRow& copied) {
+  for (int i = 0; table.types[i] != 0; ++i) {
+    switch (table.types[i]) {
+      case 'i':
+        copied.Add(row.Int(i));
+        break;
+      case 'r':
+        copied.Add(row.Real(i));
+        break;
+      default:
+        copied.Add(row.Bytes(i));
+    }
+  }
+}
+
+// Rows that were copied.
+absl::StatusOr<std::uint64_t> FillTable(Statement& rows,
+                                        Connection& connection,
+                                        std::int64_t map,
+                                        const CopiedTable& table,
+                                        const Stop& stop) {
+  std::uint64_t copied = 0;
+  STRATA_RETURN_IF_ERROR(connection.CopyIn(table.copy, [&](CopySink& sink) {
+    return ForEachRow(rows, [&]() -> absl::Status {
+      STRATA_RETURN_IF_ERROR(stop.status());
+      ++copied;
+      CopiedRow row(map);
+      AddColumns(rows, table, row);
+      return sink.Put(row);
+    });
+  }));
+  return copied;
+}
+
+absl::Status PutCells(CopySink& sink, std::int64_t map, const Row& footprint) {
+  const std::int64_t scan = footprint.Int(0);
+  const Eigen::AlignedBox2d box(Eigen::Vector2d(footprint.Real(1), footprint.Real(3)),
+                                Eigen::Vector2d(footprint.Real(2), footprint.Real(4)));
+  if (box.isEmpty()) return absl::OkStatus();
+  const CellRange cells = CellsOf(box);
+  if (IsWide(cells)) {
+    CopiedRow row(map);
+    for (const std::int64_t value : {std::int64_t{1}, std::int64_t{0}, std::int64_t{0}, scan}) {
+      row.Add(value);
+    }
+    return sink.Put(row);
+  }
+  for (std::int64_t x = cells.x_min; x <= cells.x_max; ++x) {
+    for (std::int64_t y = cells.y_min; y <= cells.y_max; ++y) {
+      CopiedRow row(map);
+      for (const std::int64_t value : {std::int64_t{0}, x, y, scan}) row.Add(value);
+      STRATA_RETURN_IF_ERROR(sink.Put(row));
+    }
+  }
+  return absl::OkStatus();
+}
+
+// What only the database has: by which cells scans are found.
+absl::Status FillCells(Database& file, Connection& connection, std::int64_t map, const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(Statement rows, file.Prepare(kFootprintsOfFile));
+  return connection.CopyIn(
+      "COPY derived_scan_cell (map, wide, cx, cy, scan) FROM STDIN (FORMAT binary)",
+      [&](CopySink& sink) {
+        return ForEachRow(rows, [&]() -> absl::Status {
+          STRATA_RETURN_IF_ERROR(stop.status());
+          return PutCells(sink, map, rows);
+        });
+      });
 }
 
 }  // namespace
@@ -198,17 +158,68 @@ absl::Status CopyMapToFile(Connection& connection,
   STRATA_RETURN_IF_ERROR(CreateSchema(copy));
   {
     STRATA_ASSIGN_OR_RETURN(Transaction transaction, Transaction::Begin(copy, "BEGIN IMMEDIATE"));
-    for (const CopiedTable& table : kTables) {
+    for (const CopiedTable& table : kCopiedTables) {
       STRATA_RETURN_IF_ERROR(CopyTable(connection, map, copy, table, stop).status());
     }
     STRATA_RETURN_IF_ERROR(copy.Execute("DELETE FROM sqlite_sequence WHERE name = 'truth_model'"));
     STRATA_RETURN_IF_ERROR(CopyTable(connection, map, copy, kLastModel, stop).status());
-    STRATA_ASSIGN_OR_RETURN(const std::uint64_t maps, CopyTable(connection, map, copy, kMap, stop));
-    if (maps == 0) return absl::NotFoundError("store: the map is not there any more");
+    STRATA_ASSIGN_OR_RETURN(const std::uint64_t maps,
+                            CopyTable(connection, map, copy, kCopiedMap, stop));
+    if (maps == 0) return NoMap();
     STRATA_RETURN_IF_ERROR(transaction.Commit());
   }
   STRATA_RETURN_IF_ERROR(copy.Execute("PRAGMA journal_mode = DELETE"));  // one file is the whole
   return copy.CheckPages(stop);
+}
+
+absl::Status CopyFileToMap(Database& file,
+                           Connection& connection,
+                           std::int64_t map,
+                           std::uint64_t least_clock,
+                           const Stop& stop) {
+  // One state, should somebody write the file after all.
+  STRATA_ASSIGN_OR_RETURN(const Transaction transaction, Transaction::Begin(file, "BEGIN"));
+  for (const CopiedTable& table : kCopiedTables) {
+    STRATA_ASSIGN_OR_RETURN(Statement rows, file.Prepare(table.read));
+    const auto filled = FillTable(rows, connection, map, table, stop);
+    STRATA_RETURN_IF_ERROR(Annotate(filled.status(), table.name));
+  }
+  STRATA_RETURN_IF_ERROR(FillCells(file, connection, map, stop));
+  STRATA_ASSIGN_OR_RETURN(Statement row, file.Prepare(kCopiedMap.read));
+  row.Bind(least_clock);
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t maps,
+                          FillTable(row, connection, map, kCopiedMap, stop));
+  return maps == 1 ? absl::OkStatus() : absl::DataLossError("store: the file has no map's row");
+}
+
+absl::StatusOr<std::uint64_t> ReadWholeMap(Connection& connection,
+                                           std::int64_t map,
+                                           const Stop& stop) {
+  std::uint64_t bytes = 0;
+  std::uint64_t rows = 0;
+  const auto count = [&](const CopiedTable& table) {
+    rows = 0;
+    return Annotate(ForEachCopied(connection,
+                                  map,
+                                  table,
+                                  stop,
+                                  [&](const Row& row) {
+                                    ++rows;
+                                    for (int i = 0; table.types[i] != 0; ++i) {
+                                      const bool number =
+                                          table.types[i] == 'i' || table.types[i] == 'r';
+                                      if (!number) bytes += row.Bytes(i).size();
+                                    }
+                                    return absl::OkStatus();
+                                  }),
+                    table.name);
+  };
+  for (const CopiedTable& table : kCopiedTables) STRATA_RETURN_IF_ERROR(count(table));
+  CopiedTable own = kCopiedMap;
+  own.types = "";  // those of a file
+  STRATA_RETURN_IF_ERROR(count(own));
+  if (rows == 0) return NoMap();
+  return bytes;
 }
 
 }  // namespace strata

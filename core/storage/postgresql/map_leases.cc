@@ -66,6 +66,14 @@ void MapLease::Lost(const absl::Status& why) {
   if (lost_.ok()) lost_ = why;
 }
 
+absl::Status CheckNobodyHas(Connection& connection, std::int64_t map, absl::string_view name) {
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row,
+      connection.Query(
+          "SELECT server FROM map_lease WHERE map = $1 AND expires > clock_timestamp()", map));
+  return row.Next() ? HeldBy(name, row.Text(0)) : absl::OkStatus();
+}
+
 MapLeases::MapLeases(std::string where, const LeaseOptions& options)
     : where_(std::move(where)), options_(options) {
   if (options_.holder.empty()) options_.holder = absl::StrCat(RandomToken());

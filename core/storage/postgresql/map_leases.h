@@ -67,6 +67,7 @@ class MapLeases {
   // Gives up what is held.
   ~MapLeases();
 
+  const std::string& holder() const { return options_.holder; }
   absl::Duration time() const { return options_.time; }
 
   // Whose lease there is, in whatever state.
@@ -108,6 +109,9 @@ class MapLeases {
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
+
+// UNAVAILABLE with MapOwnerOf() while a process has the map alone.
+absl::Status CheckNobodyHas(Connection& connection, std::int64_t map, absl::string_view name);
 
 }  // namespace strata
 

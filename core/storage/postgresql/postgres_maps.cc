@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <utility>
@@ -14,14 +15,19 @@
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
+#include "core/common/map_owner.h"
 #include "core/common/status.h"
 #include "core/storage/format.h"
 #include "core/storage/postgresql/connection.h"
 #include "core/storage/postgresql/connection_pool.h"
+#include "core/storage/postgresql/map_copy.h"
+#include "core/storage/postgresql/map_leases.h"
 #include "core/storage/postgresql/postgres_reader.h"
 #include "core/storage/postgresql/postgres_writer.h"
 #include "core/storage/postgresql/tables.h"
 #include "core/storage/rows.h"
+#include "core/storage/sqlite/database.h"
+#include "core/storage/sqlite/map_file.h"
 
 namespace strata {
 namespace {
@@ -29,6 +35,7 @@ namespace {
 // States of map_place.
 constexpr int kThere = 1;
 constexpr int kGoing = 2;
+constexpr int kMaking = 3;  // inside a transaction only
 
 class PostgresStorage final : public MapStorage {
  public:
@@ -74,6 +81,10 @@ class PostgresStorage final : public MapStorage {
 
 absl::Status NoSuchMap(absl::string_view name) {
   return absl::NotFoundError(absl::StrCat("map ", name, " does not exist"));
+}
+
+absl::Status MapExists(absl::string_view name) {
+  return absl::AlreadyExistsError(absl::StrCat("map ", name, " exists"));
 }
 
 // All or nothing; a connection that is left in a transaction is closed by its pool.
@@ -274,7 +285,7 @@ absl::Status PostgresMaps::Create(absl::string_view name,
                      "RETURNING map",
                      name,
                      kThere));
-    if (!place.Next()) return absl::AlreadyExistsError(absl::StrCat("map ", name, " exists"));
+    if (!place.Next()) return MapExists(name);
     const std::int64_t map = place.Int(0);
     STRATA_RETURN_IF_ERROR(InsertMap(*lease, map, parameters, created, clock));
     return InsertDefaultProfile(*lease, map, parameters.default_profile);
@@ -293,6 +304,77 @@ absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenAs(
 absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::Open(absl::string_view name) const {
   STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
   return OpenAs({.number = number, .name = std::string(name)}, nullptr);
+}
+
+absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenIdle(absl::string_view name) const {
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
+  {
+    STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+    STRATA_RETURN_IF_ERROR(CheckNobodyHas(*lease, number, name));
+  }
+  return OpenAs({.number = number, .name = std::string(name), .idle = true}, nullptr);
+}
+
+absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenToAdd(
+    absl::string_view name, std::uint64_t most_waiting) const {
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
+  {
+    STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+    const absl::Status held = CheckNobodyHas(*lease, number, name);
+    if (held.ok()) return absl::UnavailableError(absl::StrCat("nobody has map ", name));
+    if (!MapOwnerOf(held).has_value()) return held;
+  }
+  OpenedMap map{.number = number, .name = std::string(name), .beside = most_waiting};
+  map.patience = std::max(leases_->time(), absl::Seconds(1));
+  return std::make_unique<PostgresStorage>(pool_, map, leases_, nullptr);
+}
+
+absl::StatusOr<std::vector<std::string>> PostgresMaps::ListWaiting() const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row,
+      lease->Query("SELECT p.name FROM map_lease AS l JOIN map_place AS p ON p.map = l.map WHERE "
+                   "l.holder = $1 AND p.state = $2 AND EXISTS (SELECT FROM truth_scan AS s WHERE "
+                   "s.map = l.map AND s.state = $3)",
+                   leases_->holder(),
+                   kThere,
+                   static_cast<int>(ScanState::kPending)));
+  std::vector<std::string> names;
+  while (row.Next()) names.emplace_back(row.Text(0));
+  return names;
+}
+
+// The name is taken last, or others who would make such a map had to wait.
+absl::Status PostgresMaps::ImportRows(Connection& connection,
+                                      Database& file,
+                                      absl::string_view name,
+                                      const Stop& stop) const {
+  STRATA_RETURN_IF_ERROR(connection.Execute("SET LOCAL statement_timeout = 0"));
+  STRATA_ASSIGN_OR_RETURN(
+      Rows place,
+      connection.Query("INSERT INTO map_place (name, state) VALUES ($1, $2) RETURNING map, (SELECT "
+                       "max(removed_clock) FROM strata_format)",
+                       name,
+                       kMaking));
+  place.Next();
+  const std::uint64_t removed = place.Unsigned(1);
+  STRATA_RETURN_IF_ERROR(
+      CopyFileToMap(file, connection, place.Int(0), removed == 0 ? 0 : removed + 1, stop));
+  const absl::Status named =
+      connection.Change("UPDATE map_place SET state = $2 WHERE map = $1", place.Int(0), kThere)
+          .status();
+  return absl::IsAlreadyExists(named) ? MapExists(name) : named;
+}
+
+absl::Status PostgresMaps::Import(absl::string_view name,
+                                  const std::filesystem::path& file,
+                                  const Stop& stop) const {
+  STRATA_ASSIGN_OR_RETURN(const bool there, Has(name));
+  if (there) return MapExists(name);
+  STRATA_ASSIGN_OR_RETURN(Database database, OpenSqliteMapAtRest(file));
+  STRATA_RETURN_IF_ERROR(database.CheckPages(stop));
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  return InTransaction(*lease, [&] { return ImportRows(*lease, database, name, stop); });
 }
 
 absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenAlone(absl::string_view name) const {

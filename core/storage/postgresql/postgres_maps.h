@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <utility>
@@ -19,6 +20,7 @@
 #include "core/storage/postgresql/connection_pool.h"
 #include "core/storage/postgresql/map_leases.h"
 #include "core/storage/postgresql/postgres_writer.h"
+#include "core/storage/sqlite/database.h"
 #include "core/storage/storage.h"
 #include "core/world/map_info.h"
 
@@ -72,6 +74,24 @@ class PostgresMaps {
   // while another process has it so. Whoever had it so before, and let its lease end, can not write
   // any more (TakenAway()), since every commit asks.
   absl::StatusOr<std::unique_ptr<MapStorage>> OpenAlone(absl::string_view name) const;
+  // The same, while nobody has it alone: else commits are UNAVAILABLE with MapOwnerOf(). Takes no
+  // lease, so that the next to have it alone still learns who had it last.
+  absl::StatusOr<std::unique_ptr<MapStorage>> OpenIdle(absl::string_view name) const;
+  // For scans beside whoever has it alone, whose commits they do not disturb: PutScan() is
+  // RESOURCE_EXHAUSTED while `most_waiting` (at least 1) wait for integration, and UNAVAILABLE if
+  // chunks of the scan are gone. UNAVAILABLE while nobody has it alone: then whoever would add
+  // takes it. NOT_FOUND.
+  absl::StatusOr<std::unique_ptr<MapStorage>> OpenToAdd(absl::string_view name,
+                                                        std::uint64_t most_waiting) const;
+  // Those that this process has alone in which scans wait, whoever added them.
+  absl::StatusOr<std::vector<std::string>> ListWaiting() const;
+  // Makes a map of a map file that nobody has open, all or nothing: of the current format and
+  // closed well (FAILED_PRECONDITION). Its clock begins behind those of all maps that were removed.
+  // A row is in memory at a time. ALREADY_EXISTS; DATA_LOSS for a damaged file; INVALID_ARGUMENT
+  // for values that a database does not take; CANCELLED, DEADLINE_EXCEEDED by `stop`.
+  absl::Status Import(absl::string_view name,
+                      const std::filesystem::path& file,
+                      const Stop& stop) const;
   // For reading only, whoever has it: every commit is refused. NOT_FOUND.
   absl::StatusOr<std::unique_ptr<MapStorage>> OpenToRead(absl::string_view name) const;
   // The latest clock of a map that was deleted; 0: none was.
@@ -91,6 +111,10 @@ class PostgresMaps {
   absl::StatusOr<std::int64_t> Find(absl::string_view name) const;
   absl::StatusOr<std::unique_ptr<MapStorage>> OpenAs(const OpenedMap& map,
                                                      std::shared_ptr<MapLease> lease) const;
+  absl::Status ImportRows(Connection& connection,
+                          Database& file,
+                          absl::string_view name,
+                          const Stop& stop) const;
   absl::StatusOr<std::shared_ptr<MapLease>> TakeOver(OpenedMap& map) const;
   // In a transaction: takes name and truth of the map.
   absl::Status DeleteName(Connection& connection, std::int64_t map, absl::string_view name) const;

@@ -18,9 +18,11 @@
 #include "absl/time/time.h"
 #include "absl/types/span.h"
 
+#include "core/common/retry_delay.h"
 #include "core/common/status.h"
 #include "core/storage/outcome.h"
 #include "core/storage/postgresql/connection.h"
+#include "core/storage/postgresql/map_leases.h"
 #include "core/world/value_codec.h"
 
 namespace strata {
@@ -48,7 +50,7 @@ void PauseBeforeRun(int run) {
 
 // Whoever is frozen in a commit holds the map's row, for which his successor waits.
 std::string BeginOf(const OpenedMap& map) {
-  if (map.owner == 0) return "BEGIN";
+  if (map.owner == 0 && map.beside == 0) return "BEGIN";
   return absl::StrCat("BEGIN; SET LOCAL idle_in_transaction_session_timeout = ",
                       absl::ToInt64Milliseconds(map.patience));
 }
@@ -93,7 +95,8 @@ absl::Status PostgresWriter::CommitOnce(Durability durability,
   reader_.ReadThrough(connection_);
   durability_ = durability;
   broken_ = absl::OkStatus();
-  const std::int64_t commit = durability == Durability::kFull || alone() ? NumberOfCommit() : 0;
+  const bool numbered = alone() || (durability == Durability::kFull && opened_.beside == 0);
+  const std::int64_t commit = numbered ? NumberOfCommit() : 0;
   absl::Status done = LockMap(durability, commit);
   again = !done.ok() && lease->IsBroken();  // the server had hung up before
   if (done.ok()) done = RunBody(body);
@@ -114,12 +117,23 @@ absl::Status PostgresWriter::LockMap(Durability durability, std::int64_t commit)
       relaxed ? absl::StrCat(begin_, "; SET LOCAL synchronous_commit = off").c_str()
               : begin_.c_str()));
   if (alone()) return LockOwnMap(commit);
+  if (opened_.beside > 0) return LockOthersMap(relaxed);
   absl::StatusOr<Rows> owner =
       relaxed ? connection_->Query("SELECT owner FROM truth_map WHERE map = $1 FOR KEY SHARE", map_)
               : connection_->Query(
                     "UPDATE truth_map SET last_commit = $2 WHERE map = $1 RETURNING owner",
                     map_,
                     commit);
+  STRATA_RETURN_IF_ERROR(CheckOwner(owner, opened_));
+  // Whoever takes it now waits for the row that this commit holds.
+  return opened_.idle ? CheckNobodyHas(*connection_, map_, opened_.name) : absl::OkStatus();
+}
+
+absl::Status PostgresWriter::LockOthersMap(bool relaxed) {
+  absl::StatusOr<Rows> owner =
+      relaxed ? connection_->Query("SELECT owner FROM truth_map WHERE map = $1 FOR KEY SHARE", map_)
+              : connection_->Query("SELECT owner FROM truth_map WHERE map = $1 FOR NO KEY UPDATE",
+                                   map_);
   return CheckOwner(owner, opened_);
 }
 
@@ -251,8 +265,34 @@ absl::Status PostgresWriter::AbandonOrphans() {
       "WHERE u.map = $1 AND u.upload = c.upload)");
 }
 
+// The next to have the map alone clears away what belongs to no scan, and no number tells of a
+// relaxed commit here that the store's end took with it.
+absl::Status PostgresWriter::CheckAdded(const ScanRecord& scan) {
+  absl::StatusOr<Rows> found = connection_->Query(
+      "SELECT (SELECT count(*) FROM truth_chunk WHERE map = $1 AND upload = $2), (SELECT count(*) "
+      "FROM (SELECT FROM truth_scan WHERE map = $1 AND state = $3 LIMIT $4) AS waiting)",
+      map_,
+      scan.upload,
+      static_cast<int>(ScanState::kPending),
+      opened_.beside);
+  if (!found.ok() && broken_.ok()) broken_ = found.status();
+  STRATA_RETURN_IF_ERROR(found.status());
+  found->Next();
+  if (found->Unsigned(0) != scan.chunks) {
+    return WithRetryDelay(absl::UnavailableError("store: pieces of the scan were cleared away by "
+                                                 "another process; send it again"),
+                          absl::ZeroDuration());
+  }
+  if (found->Unsigned(1) < opened_.beside) return absl::OkStatus();
+  return WithRetryDelay(
+      absl::ResourceExhaustedError(absl::StrCat(
+          "map ", opened_.name, ": ", opened_.beside, " scans wait for integration; retry later")),
+      absl::Seconds(1));
+}
+
 // A conflict is no error of the transaction, so that its caller may go on as with other stores.
 absl::Status PostgresWriter::PutScan(const ScanRecord& scan) {
+  if (opened_.beside > 0) STRATA_RETURN_IF_ERROR(CheckAdded(scan));
   const bool has_box = !scan.box_scan.isEmpty();
   const Eigen::Vector3d low = has_box ? Eigen::Vector3d(scan.box_scan.min().cast<double>())
                                       : Eigen::Vector3d(Eigen::Vector3d::Zero());

@@ -30,6 +30,9 @@ struct OpenedMap {
   std::int64_t owner = 0;        // the token of its lease; 0: anybody's
   std::int64_t last_commit = 0;  // when `owner` took it
   bool fenced = true;            // false: commits do not ask whose it is
+  bool idle = false;             // commits are refused while somebody has it alone
+  // Scans are added beside whoever has it alone, while less than so many wait; 0: not so.
+  std::uint64_t beside = 0;
   LastOwner last_owner = LastOwner::kSelf;
   // How long its owner may do nothing within a commit; then the database ends it.
   absl::Duration patience = absl::Seconds(20);
@@ -140,6 +143,11 @@ class PostgresWriter final : public StorageWriter {
   // The same for whoever has the map alone: its commit before is there, or else a confirmed one was
   // lost.
   absl::Status LockOwnMap(std::int64_t commit);
+  // Of a map that somebody else has alone: it is there; in a full commit nobody else writes it
+  // until the end. Leaves no number, which its owner would not know.
+  absl::Status LockOthersMap(bool relaxed);
+  // What lets a scan in beside the map's owner.
+  absl::Status CheckAdded(const ScanRecord& scan);
   absl::Status RunBody(absl::FunctionRef<absl::Status()> body);
   absl::Status EndCommit(std::int64_t commit, bool& again);
   // Whether the commit with that number took place, as soon as the store answers. An error:

@@ -3,13 +3,16 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
+#include "core/common/stop.h"
 #include "core/storage/postgresql/connection.h"
+#include "core/storage/postgresql/map_copy.h"
 #include "core/storage/postgresql/tables.h"
 
 namespace strata {
@@ -37,7 +40,34 @@ absl::Status AddMaps(Connection& connection, StoreCheck& check) {
   return absl::OkStatus();
 }
 
+// A connection of its own: whatever cannot be read breaks it.
+absl::StatusOr<std::uint64_t> ReadMap(const std::string& where, std::int64_t map) {
+  STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<Connection> connection, Connection::Open(where));
+  STRATA_RETURN_IF_ERROR(
+      connection->Execute("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY; "
+                          "SET LOCAL statement_timeout = 0"));
+  return ReadWholeMap(*connection, map, Stop());
+}
+
 }  // namespace
+
+absl::StatusOr<std::vector<DatabaseMapCheck>> CheckDatabaseMaps(const std::string& where) {
+  STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<Connection> connection, Connection::Open(where));
+  std::vector<DatabaseMapCheck> checks;
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t format, VersionOfTables(*connection));
+  if (format == 0) return checks;
+  if (format > kDatabaseVersion) return OtherFormat(format);
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row,
+      connection->Query(
+          "SELECT map, name FROM map_place WHERE state = 1 ORDER BY name COLLATE \"C\""));
+  while (row.Next()) {
+    const absl::StatusOr<std::uint64_t> bytes = ReadMap(where, row.Int(0));
+    if (absl::IsNotFound(bytes.status())) continue;  // removed meanwhile
+    checks.push_back({row.Text(1), bytes.value_or(0), bytes.status()});
+  }
+  return checks;
+}
 
 absl::StatusOr<StoreCheck> CheckStore(const std::string& where) {
   STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<Connection> connection, Connection::Open(where));

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
 namespace strata {
@@ -21,6 +22,15 @@ struct StoreCheck {
 // Changes nothing. The errors of Connection::Open(); FAILED_PRECONDITION for tables of a format
 // that this program neither reads nor updates.
 absl::StatusOr<StoreCheck> CheckStore(const std::string& where);
+
+struct DatabaseMapCheck {
+  std::string name;
+  std::uint64_t bytes = 0;  // of its blobs and texts
+  absl::Status status;      // the error names the table that can not be read
+};
+
+// Reads every row of every map, each map as it is at one moment, whoever has it open; by name.
+absl::StatusOr<std::vector<DatabaseMapCheck>> CheckDatabaseMaps(const std::string& where);
 
 }  // namespace strata
 

@@ -101,6 +101,8 @@ void Statement::Keep(int code) {
   if (bind_error_ == SQLITE_OK) bind_error_ = code;
 }
 
+int Statement::parameters() const { return sqlite3_bind_parameter_count(statement_); }
+
 void Statement::BindOne(int index, std::int64_t value) {
   Keep(sqlite3_bind_int64(statement_, index, value));
 }

@@ -53,6 +53,9 @@ class Statement final : public Row {
   void BindOne(int index, const std::string& text) { BindOne(index, absl::string_view(text)); }
   void BindOne(int index, Blob blob);
 
+  // How many there are.
+  int parameters() const;
+
   // True with a row, false at the end.
   absl::StatusOr<bool> Step();
   // Steps to the end.

@@ -18,6 +18,7 @@
 #include "core/common/status.h"
 #include "core/storage/sqlite/database.h"
 #include "core/storage/sqlite/file_state.h"
+#include "core/storage/sqlite/map_file.h"
 #include "core/storage/sqlite/schema.h"
 #include "core/storage/sqlite/sqlite_reader.h"
 #include "core/storage/sqlite/sqlite_writer.h"
@@ -88,13 +89,6 @@ absl::Status InsertMap(Database& database,
   return epoch.Bind(absl::ToUnixMicros(created)).Run();
 }
 
-// Leaves all there is in the file itself. Closing does so too, but tells nobody where it fails.
-absl::Status EmptyLog(Database& database) {
-  STRATA_ASSIGN_OR_RETURN(const std::int64_t busy,
-                          database.Pragma("PRAGMA wal_checkpoint(TRUNCATE)"));
-  return busy == 0 ? absl::OkStatus() : absl::UnavailableError("store: the log is in use");
-}
-
 absl::Status LimitSize(Database& database, std::uint64_t max_file_bytes) {
   if (max_file_bytes == 0) return absl::OkStatus();
   STRATA_ASSIGN_OR_RETURN(const std::int64_t page_bytes, database.Pragma("PRAGMA page_size"));
@@ -120,25 +114,11 @@ std::string KindOf(const std::filesystem::path& file) {
   return absl::StrCat("a database file of another application (application_id ", application, ")");
 }
 
-// Whether what was written last may lie beside the file.
-bool HasLog(const std::filesystem::path& file) {
-  for (const char* suffix : {"-wal", "-journal"}) {
-    std::error_code error;
-    const std::uintmax_t bytes = std::filesystem::file_size(file.string() + suffix, error);
-    if (!error && bytes > 0) return true;
-  }
-  return false;
-}
-
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<StorageReader>> ReadSqliteMapAtRest(
     const std::filesystem::path& file) {
-  STRATA_RETURN_IF_ERROR(CheckIsSqliteMap(file));
-  if (HasLog(file)) return absl::FailedPreconditionError("store: the file was not closed well");
-  STRATA_ASSIGN_OR_RETURN(Database database, Database::Open(file, Database::Mode::kReadAtRest));
-  STRATA_ASSIGN_OR_RETURN(const bool current, HasCurrentSchema(database));
-  if (!current) return absl::FailedPreconditionError("store: the file has another format");
+  STRATA_ASSIGN_OR_RETURN(Database database, OpenSqliteMapAtRest(file));
   return std::make_unique<SqliteReader>(std::make_shared<Database>(std::move(database)));
 }
 

@@ -64,7 +64,7 @@ class QuarantineTest : public EngineTest {
     return absl::StrCat("scan ", Info(room).header.id.ToString());
   }
   std::vector<QuarantineEntry> Listed() {
-    const auto listed = ListQuarantine(directory_.path(), kMapName);
+    const auto listed = ListQuarantine({directory_.path()}, kMapName);
     STRATA_EXPECT_OK(listed);
     return listed.value_or(std::vector<QuarantineEntry>());
   }
@@ -102,7 +102,7 @@ TEST_F(QuarantineTest, AScanThatDiedTwiceIsNamedAndTheOthersGoOn) {
     EXPECT_EQ(Info(room).state, ScanState::kIntegrated) << room;
   }
   ExpectSound();
-  EXPECT_THAT(AddToQuarantine(directory_.path(), kMapName, name),
+  EXPECT_THAT(AddToQuarantine({directory_.path()}, kMapName, name),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("in use")));
   // Every further start leaves it there.
   Reopen();
@@ -112,8 +112,8 @@ TEST_F(QuarantineTest, AScanThatDiedTwiceIsNamedAndTheOthersGoOn) {
   EXPECT_EQ(Listed()[0].name, name);
   EXPECT_TRUE(Listed()[0].held);
 
-  STRATA_ASSERT_OK(ReleaseFromQuarantine(directory_.path(), kMapName, name));
-  EXPECT_THAT(ReleaseFromQuarantine(directory_.path(), kMapName, name),
+  STRATA_ASSERT_OK(ReleaseFromQuarantine({directory_.path()}, kMapName, name));
+  EXPECT_THAT(ReleaseFromQuarantine({directory_.path()}, kMapName, name),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("not in quarantine")));
   EXPECT_THAT(Listed(), IsEmpty());
   Reopen();
@@ -125,10 +125,10 @@ TEST_F(QuarantineTest, AScanThatWaitsIsPutAsideByHand) {
   Reopen();
   const std::string name = NameOf(2);
   Close();
-  EXPECT_THAT(AddToQuarantine(directory_.path(), kMapName, name),
+  EXPECT_THAT(AddToQuarantine({directory_.path()}, kMapName, name),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("does not wait")));
   ForgetIntegration();
-  STRATA_ASSERT_OK(AddToQuarantine(directory_.path(), kMapName, name));
+  STRATA_ASSERT_OK(AddToQuarantine({directory_.path()}, kMapName, name));
   Reopen();
   EXPECT_EQ(WaitIntegrated(db()).scans_failed, 1U);
   EXPECT_THAT(Info(2).message, HasSubstr("quarantined: put aside by hand"));
@@ -136,11 +136,11 @@ TEST_F(QuarantineTest, AScanThatWaitsIsPutAsideByHand) {
   STRATA_ASSERT_OK(db().scans().Delete({}, kMapName, Info(2).header.id));
   Close();
   EXPECT_THAT(Listed(), IsEmpty());
-  EXPECT_THAT(AddToQuarantine(directory_.path(), kMapName, "scan nobody/1"),
+  EXPECT_THAT(AddToQuarantine({directory_.path()}, kMapName, "scan nobody/1"),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("nobody/1")));
-  EXPECT_THAT(AddToQuarantine(directory_.path(), kMapName, "dog 1"),
+  EXPECT_THAT(AddToQuarantine({directory_.path()}, kMapName, "dog 1"),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("dog 1")));
-  EXPECT_THAT(AddToQuarantine(directory_.path(), "nomap", "job 1"),
+  EXPECT_THAT(AddToQuarantine({directory_.path()}, "nomap", "job 1"),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("nomap")));
 }
 
@@ -171,7 +171,7 @@ TEST_F(QuarantineTest, ARebuildThatDiedTwiceIsNotBegun) {
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("quarantined")));
   STRATA_EXPECT_OK(db().maps().Stats({}, kMapName));
   Close();
-  STRATA_ASSERT_OK(ReleaseFromQuarantine(directory_.path(), kMapName, "rebuild"));
+  STRATA_ASSERT_OK(ReleaseFromQuarantine({directory_.path()}, kMapName, "rebuild"));
   Reopen();
   ExpectSound();
   EXPECT_EQ(Digest(), digest_);

@@ -408,11 +408,11 @@ TEST_F(TileKeeperTest, WhatKilledTheProcessTwiceIsNotBegun) {
   EXPECT_EQ(Rows(), 2U);
   CloseKeeper();
   EXPECT_GT(PlanAnew(74.0).statistics.prepared, 0U);  // as ever
-  STRATA_ASSERT_OK_AND_ASSIGN(const auto held, ListQuarantine(directory_.path(), kMapName));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto held, ListQuarantine({directory_.path()}, kMapName));
   ASSERT_EQ(held.size(), 1U);
   EXPECT_EQ(held[0].name, "prepare");
   EXPECT_TRUE(held[0].held);
-  STRATA_ASSERT_OK(ReleaseFromQuarantine(directory_.path(), kMapName, "prepare"));
+  STRATA_ASSERT_OK(ReleaseFromQuarantine({directory_.path()}, kMapName, "prepare"));
   ExpectAllKept();
 }
 

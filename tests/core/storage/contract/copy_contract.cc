@@ -1,6 +1,7 @@
 // A copy holds all that its map holds.
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -25,10 +26,14 @@
 namespace strata::testing {
 namespace {
 
+using ::testing::Not;
+
 class CopyContractTest : public StorageContractTest {
  protected:
   absl::Status FillTruth();
   absl::Status FillDerived();
+  // Has `lines` to say, and goes on as the map would.
+  void CheckCopy(MapStorage& copy, const std::vector<std::string>& lines);
 };
 
 absl::Status CopyContractTest::FillTruth() {
@@ -250,6 +255,32 @@ std::vector<std::string> Describe(StorageReader& reader) {
   return lines;
 }
 
+void CopyContractTest::CheckCopy(MapStorage& copy, const std::vector<std::string>& lines) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto copied, copy.NewReader());
+  EXPECT_EQ(Describe(*copied), lines);
+  EXPECT_EQ(copied->GetMapInfo()->parameters, reader().GetMapInfo()->parameters);
+  // Where scans lie is found again.
+  ScanQuery there;
+  there.box = Eigen::AlignedBox2d(Eigen::Vector2d(69.0, 0.0), Eigen::Vector2d(71.0, 1.0));
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::vector<PosedScan> found, copied->ListScans(there, 2));
+  EXPECT_THAT(found, ::testing::SizeIs(1));
+  // What a job has proposed, and ids that are not given again, come along.
+  STRATA_ASSERT_OK(copy.writer().Commit(Durability::kFull, [&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(copy.writer().AdoptProposal(5));
+    STRATA_RETURN_IF_ERROR(copy.writer().DeleteClassifier(1));
+    ClassifierInfo info;
+    info.name = "next";
+    STRATA_ASSIGN_OR_RETURN(const std::uint64_t id, copy.writer().PutClassifier(info, "x"));
+    EXPECT_EQ(id, 2U);
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(copied->ListConstraints(2)->size(), reader().ListConstraints(2)->size() + 1);
+  STRATA_ASSERT_OK(
+      copy.writer().Commit(Durability::kFull, [&] { return copy.writer().DeleteScan(1); }));
+  EXPECT_FALSE(copied->FindInferredPart(6, std::nullopt)->has_value());
+  EXPECT_EQ((*copied->FindEntityPart(6, 0))->bytes, (*reader().FindEntityPart(6, 0))->bytes);
+}
+
 TEST_F(CopyContractTest, ACopyHoldsAllThatItsMapHolds) {
   Put(1);
   Put(2);
@@ -257,29 +288,32 @@ TEST_F(CopyContractTest, ACopyHoldsAllThatItsMapHolds) {
   STRATA_ASSERT_OK(Commit([&] { return FillDerived(); }));
   const std::filesystem::path file = directory_.path() / "copy.strata";
   STRATA_ASSERT_OK(reader().CopyTo(file, Stop()));
-  STRATA_ASSERT_OK_AND_ASSIGN(const auto copy, OpenSqliteStorage(file, {}));
-  STRATA_ASSERT_OK_AND_ASSIGN(const auto copied, copy->NewReader());
+  // The file as a map of the store, then the file itself: whatever is done to it afterwards.
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto imported, store().Import(file));
   const std::vector<std::string> lines = Describe(reader());
   EXPECT_GT(lines.size(), 40U);
-  EXPECT_EQ(Describe(*copied), lines);
-  EXPECT_EQ(copied->GetMapInfo()->parameters, reader().GetMapInfo()->parameters);
-  // What a job has proposed, and ids that are not given again, come along.
-  STRATA_ASSERT_OK(copy->writer().Commit(Durability::kFull, [&]() -> absl::Status {
-    STRATA_RETURN_IF_ERROR(copy->writer().AdoptProposal(5));
-    STRATA_RETURN_IF_ERROR(copy->writer().DeleteClassifier(1));
-    ClassifierInfo info;
-    info.name = "next";
-    STRATA_ASSIGN_OR_RETURN(const std::uint64_t id, copy->writer().PutClassifier(info, "x"));
-    EXPECT_EQ(id, 2U);
-    return absl::OkStatus();
-  }));
-  EXPECT_EQ(copied->ListConstraints(2)->size(), reader().ListConstraints(2)->size() + 1);
+  CheckCopy(*imported, lines);
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto copy, OpenSqliteStorage(file, {}));
+  CheckCopy(*copy, lines);
   STRATA_ASSERT_OK(Commit([&] { return writer().DeleteScan(1); }));
   EXPECT_FALSE(reader().FindInferredPart(6, std::nullopt)->has_value());
-  STRATA_ASSERT_OK(
-      copy->writer().Commit(Durability::kFull, [&] { return copy->writer().DeleteScan(1); }));
-  EXPECT_FALSE(copied->FindInferredPart(6, std::nullopt)->has_value());
-  EXPECT_EQ((*copied->FindEntityPart(6, 0))->bytes, (*reader().FindEntityPart(6, 0))->bytes);
+}
+
+TEST_F(CopyContractTest, WhatIsNoMapIsNotImported) {
+  EXPECT_THAT(store().Import(directory_.path() / "nothing"), Not(IsOk()));
+  const std::filesystem::path text = directory_.path() / "text";
+  std::ofstream(text) << "not a map";
+  EXPECT_THAT(store().Import(text), StatusIs(absl::StatusCode::kFailedPrecondition, ::testing::_));
+  Put(1);
+  const std::filesystem::path file = directory_.path() / "copy.strata";
+  STRATA_ASSERT_OK(reader().CopyTo(file, Stop()));
+  std::fstream damaged(file, std::ios::in | std::ios::out | std::ios::binary);
+  for (int page = 1; page < 6; ++page) {
+    damaged.seekp(8192 * page);
+    damaged.write("\xff\xff\xff\xff\xff\xff\xff\xff", 8);
+  }
+  damaged.close();
+  EXPECT_THAT(store().Import(file), StatusIs(absl::StatusCode::kDataLoss, ::testing::_));
 }
 
 }  // namespace

@@ -24,6 +24,8 @@ class TestStore {
                               absl::Time created,
                               std::uint64_t clock) = 0;
   virtual absl::StatusOr<std::unique_ptr<MapStorage>> Open() = 0;
+  // Another map beside it, made of a map file and opened.
+  virtual absl::StatusOr<std::unique_ptr<MapStorage>> Import(const std::filesystem::path& file) = 0;
   // Takes the map away, or puts another in its place, whether it is open or not.
   virtual absl::Status TakeAway() = 0;
   // Sets the pose or the header of all scans to `bytes`, past the interface.

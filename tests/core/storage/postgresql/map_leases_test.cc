@@ -16,6 +16,7 @@
 
 #include "core/common/map_owner.h"
 #include "core/common/retry_delay.h"
+#include "core/common/status.h"
 #include "core/storage/outcome.h"
 #include "core/storage/postgresql/connection.h"
 #include "core/storage/postgresql/postgres_maps.h"
@@ -186,6 +187,61 @@ TEST_F(MapLeasesTest, TablesOfTheVersionBeforeGetLeases) {
   const PostgresMaps a = Server("a");
   STRATA_ASSERT_OK_AND_ASSIGN(const auto held, a.OpenAlone(kName));
   STRATA_EXPECT_OK(Tick(*held));
+}
+
+ScanRecord ScanOf(std::uint64_t sequence, std::uint64_t number, std::uint32_t chunks) {
+  ScanRecord scan;
+  scan.header.id = {"run", sequence};
+  scan.number = number;
+  scan.upload = 1000 + sequence;
+  scan.chunks = chunks;
+  scan.content_hash = "h";
+  return scan;
+}
+
+// Puts a scan of one chunk, whose other chunks were staged before.
+absl::Status PutScanOf(MapStorage& storage, std::uint64_t sequence, std::uint32_t staged = 0) {
+  StorageWriter& writer = storage.writer();
+  return writer.Commit(Durability::kFull, [&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(const std::uint64_t number, writer.NextCommitSequence());
+    STRATA_RETURN_IF_ERROR(writer.PutChunk(1000 + sequence, staged, "points"));
+    return writer.PutScan(ScanOf(sequence, number, staged + 1));
+  });
+}
+
+absl::Status StageChunk(MapStorage& storage, std::uint64_t sequence) {
+  StorageWriter& writer = storage.writer();
+  return writer.Commit(Durability::kRelaxed,
+                       [&] { return writer.PutChunk(1000 + sequence, 0, "points"); });
+}
+
+TEST_F(MapLeasesTest, ScansAreAddedBesideTheOneWhoHasTheMap) {
+  const PostgresMaps a = Server("a");
+  const PostgresMaps b = Server("b");
+  EXPECT_THAT(b.OpenToAdd(kName, 3), StatusIs(absl::StatusCode::kUnavailable, ::testing::_))
+      << "nobody has it";
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto owner, a.OpenAlone(kName));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto beside, b.OpenToAdd(kName, 3));
+  // By turns, full and relaxed: neither takes the other's commit for a lost one of its own.
+  STRATA_ASSERT_OK(PutScanOf(*owner, 1));
+  EXPECT_THAT(a.ListWaiting(), IsOkAndHolds(ElementsAre(kName)));
+  STRATA_ASSERT_OK(StageChunk(*beside, 2));
+  STRATA_ASSERT_OK(PutScanOf(*beside, 2, 1));
+  STRATA_ASSERT_OK(StageChunk(*owner, 3));
+  STRATA_ASSERT_OK(PutScanOf(*owner, 3, 1));
+  EXPECT_THAT(b.ListWaiting(), IsOkAndHolds(IsEmpty())) << "who only adds has nothing to do";
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto reader, owner->NewReader());
+  EXPECT_THAT(reader->ListScanNumbers(), IsOkAndHolds(ElementsAre(1, 2, 3)));
+  // There is room for as many as were said to be let wait.
+  EXPECT_THAT(PutScanOf(*beside, 4), StatusIs(absl::StatusCode::kResourceExhausted, ::testing::_));
+  STRATA_ASSERT_OK(PutScanOf(*owner, 4)) << "whose engine counts itself";
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto patient, b.OpenToAdd(kName, 100));
+  // The next owner clears away what belongs to no scan, so the scan is not made without it.
+  STRATA_ASSERT_OK(StageChunk(*patient, 5));
+  STRATA_ASSERT_OK(
+      owner->writer().Commit(Durability::kFull, [&] { return owner->writer().AbandonOrphans(); }));
+  EXPECT_THAT(PutScanOf(*patient, 5, 1), StatusIs(absl::StatusCode::kUnavailable, ::testing::_));
+  STRATA_ASSERT_OK(PutScanOf(*patient, 6));
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "absl/time/time.h"
 
 #include "core/common/status.h"
+#include "core/common/stop.h"
 #include "core/storage/postgresql/connection.h"
 #include "core/storage/postgresql/postgres_maps.h"
 #include "tests/core/storage/contract/test_store.h"
@@ -32,6 +33,11 @@ class PostgresTestStore final : public TestStore {
     return maps_.Create(name_, parameters, created, clock);
   }
   absl::StatusOr<std::unique_ptr<MapStorage>> Open() override { return maps_.Open(name_); }
+  absl::StatusOr<std::unique_ptr<MapStorage>> Import(const std::filesystem::path& file) override {
+    const std::string imported = absl::StrCat(name_, " imported");
+    STRATA_RETURN_IF_ERROR(maps_.Import(imported, file, Stop()));
+    return maps_.Open(imported);
+  }
   absl::Status TakeAway() override { return maps_.Delete(name_); }
   absl::Status DamagePoses(absl::string_view bytes) override {
     return Update(

@@ -10,7 +10,9 @@
 #include "absl/time/time.h"
 
 #include "core/common/status.h"
+#include "core/common/stop.h"
 #include "core/storage/sqlite/database.h"
+#include "core/storage/sqlite/map_file.h"
 #include "core/storage/sqlite/sqlite_storage.h"
 #include "tests/core/storage/contract/test_store.h"
 
@@ -28,6 +30,12 @@ class SqliteTestStore final : public TestStore {
   }
   absl::StatusOr<std::unique_ptr<MapStorage>> Open() override {
     return OpenSqliteStorage(file_, {});
+  }
+  absl::StatusOr<std::unique_ptr<MapStorage>> Import(const std::filesystem::path& file) override {
+    std::filesystem::path imported = file_;
+    imported += ".imported";
+    STRATA_RETURN_IF_ERROR(CopySqliteMap(file, imported, 0, Stop()));
+    return OpenSqliteStorage(imported, {});
   }
   absl::Status TakeAway() override {
     std::filesystem::remove(file_);
