@@ -20,7 +20,7 @@ FILE = pathlib.Path(__file__).with_name("RESULTS.md")
 
 POSES = ("core/posegraph", "core/planes", "core/registration")
 LABELS = ("core/classification",)
-PLANES_SEED = 38391338  # drawn after the last change of what it judges
+PLANES_SEED = 1105530  # drawn after the last change of what it judges
 
 # name: (title, command, sources that it measures)
 RESULTS = {
