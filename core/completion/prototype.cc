@@ -253,6 +253,7 @@ Inference InferHidden(const Prototype& prototype, const ShapeView& view) {
     const ShapeSight sight = view.At(voxel.at);
     if (sight == ShapeSight::kEmpty) ++hidden.contradicting;
     if (sight != ShapeSight::kHidden || view.IsAmidEmpty(voxel.at)) continue;
+    if (view.IsBesideEmpty(voxel.mean)) continue;
     hidden.points.push_back(voxel.mean);
   }
   hidden.voxels = prototype.voxels.size();

@@ -14,6 +14,9 @@ using Eigen::Vector3i;
 
 namespace {
 
+constexpr double kBeamM = 0.01;  // half of a beam's width, some metres away
+constexpr double kMostOfVoxel = 0.34;
+
 // The voxel itself, 13, and the 26 around it.
 Vector3i Around(int i) { return {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1}; }
 
@@ -101,6 +104,15 @@ bool ShapeView::IsAmidEmpty(const Vector3i& voxel) const {
     empty += i != 13 && At(voxel + Around(i)) == ShapeSight::kEmpty ? 1 : 0;
   }
   return 3 * empty >= 2 * 26;
+}
+
+bool ShapeView::IsBesideEmpty(const Vector3d& p) const {
+  const double reach = std::min(kBeamM, kMostOfVoxel * voxel_m());
+  for (int i = 0; i < 8; ++i) {
+    const Vector3d corner(i & 1 ? reach : -reach, i & 2 ? reach : -reach, i & 4 ? reach : -reach);
+    if (At(VoxelOf((p + corner) / voxel_m())) == ShapeSight::kEmpty) return true;
+  }
+  return false;
 }
 
 ShapeSight ShapeView::At(const Vector3i& voxel) const {

@@ -61,6 +61,8 @@ class ShapeView {
   bool IsNear(const Eigen::Vector3i& voxel) const;
   // Whether rays went through two thirds of the 26 around it: between them it was only missed.
   bool IsAmidEmpty(const Eigen::Vector3i& voxel) const;
+  // Whether a ray may have gone by as near as a beam is wide, in frame of the kind [m].
+  bool IsBesideEmpty(const Eigen::Vector3d& p) const;
 
  private:
   struct Sum {

@@ -27,6 +27,7 @@ constexpr double kMergeRatio = 1.5;
 constexpr double kLeastSquaresM2 = 1e-8;  // of a spread, for points on one line
 constexpr double kMinFlatness = 9.0;      // second over first eigenvalue: 3 σ of thickness
 constexpr double kMinRoundness = 0.01;    // second over third: a single scan line is no surface
+constexpr double kFacesRatio = 2.0;       // as kMergeRatio, of two faces
 
 struct CodedPoint {
   std::uint64_t code;  // interleaved coordinates of the smallest cell: nodes are ranges
@@ -47,11 +48,13 @@ class CellFinder {
   CellFinder(std::span<const Eigen::Vector3f> points,
              const Eigen::Vector3f& sensor_origin,
              const PlaneExtractionOptions& options,
-             CellCheck check)
+             CellCheck check,
+             const SensorOfPoint& sensor_of)
       : points_(points),
         sensor_(sensor_origin),
         options_(options),
         check_(check),
+        sensor_of_(sensor_of),
         smallest_m_(options.cell_size_m / (1 << (kCellLevels - 1))) {}
 
   std::vector<PlanarCell> Run() {
@@ -120,9 +123,33 @@ class CellFinder {
     return node;
   }
 
+  // Whether a plane for what was seen from before it and another for what was seen from behind
+  // are straighter: those may be at an angle to it, with a strip of either face.
+  bool HasTwoFaces(const Node& node, std::uint32_t begin, std::uint32_t end) const {
+    if (!sensor_of_ || node.rms_m <= node.sigma_m) return false;
+    const Eigen::Vector3d normal = node.fit.plane.normal;
+    const Eigen::Vector3d mean = node.reference + node.fit.mean;
+    Eigen::Matrix4d sums[2] = {Eigen::Matrix4d::Zero(), Eigen::Matrix4d::Zero()};
+    for (std::uint32_t i = begin; i < end; ++i) {
+      const std::uint32_t index = coded_[i].index;
+      const bool before = normal.dot(sensor_of_(index).cast<double>() - mean) > 0.0;
+      const Eigen::Vector4d p = (points_[index].cast<double>() - mean).homogeneous();
+      sums[before ? 1 : 0] += p * p.transpose();
+    }
+    double squares = 0.0, count = 0.0;
+    for (const Eigen::Matrix4d& sum : sums) {
+      const double n = sum(3, 3);
+      if (n < 1.0) return false;
+      squares += n * FitMoments(sum).eigenvalues(0);
+      count += std::max(0.0, n - 3.0);
+    }
+    return node.rms_m * node.rms_m * count > kFacesRatio * squares;
+  }
+
   void Visit(std::uint32_t begin, std::uint32_t end, int level) {
     if (end - begin < kMinPoints) return;
-    const Node node = Judge(begin, end);
+    Node node = Judge(begin, end);
+    node.flat = node.flat && !HasTwoFaces(node, begin, end);
     if (level == 0 || (node.flat && node.rms_m <= node.sigma_m)) {
       if (node.flat) Keep(node, begin, end, level);
       return;
@@ -202,6 +229,7 @@ class CellFinder {
   Eigen::Vector3f sensor_;
   const PlaneExtractionOptions& options_;
   CellCheck check_;
+  const SensorOfPoint& sensor_of_;
   double smallest_m_;
   std::vector<CodedPoint> coded_;
   std::vector<PlanarCell> cells_;
@@ -240,8 +268,9 @@ std::optional<std::uint32_t> CellAt(const PlaceIndex& index,
 std::vector<PlanarCell> FindPlanarCells(std::span<const Eigen::Vector3f> points,
                                         const Eigen::Vector3f& sensor_origin,
                                         const PlaneExtractionOptions& options,
-                                        CellCheck check) {
-  return CellFinder(points, sensor_origin, options, check).Run();
+                                        CellCheck check,
+                                        const SensorOfPoint& sensor_of) {
+  return CellFinder(points, sensor_origin, options, check, sensor_of).Run();
 }
 
 double SpreadArea(const Eigen::Vector3d& eigenvalues, double most_m2) {

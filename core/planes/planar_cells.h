@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -32,12 +33,17 @@ struct PlanarCell {
 // which is as flat as a surface is (shelves, steps).
 enum class CellCheck { kFlat, kEven };
 
+// Where a point was seen from, by its index.
+using SensorOfPoint = std::function<Eigen::Vector3f(std::uint32_t)>;
+
 // The flat cells of `points` in the order of their place. Smaller cells are tried where a cell is
-// not flat, or less flat than what it holds (a kerb, a recess).
+// not flat, or less flat than what it holds (a kerb, a recess). With `sensor_of` no cell holds both
+// faces of a thin wall, which are as flat as one surface where most points are on one of them.
 std::vector<PlanarCell> FindPlanarCells(std::span<const Eigen::Vector3f> points,
                                         const Eigen::Vector3f& sensor_origin,
                                         const PlaneExtractionOptions& options,
-                                        CellCheck check = CellCheck::kFlat);
+                                        CellCheck check = CellCheck::kFlat,
+                                        const SensorOfPoint& sensor_of = {});
 
 // Of points that spread so in a cell whose cross section is `most_m2`; `eigenvalues`: ascending, of
 // their covariance.

@@ -20,7 +20,7 @@ FILE = pathlib.Path(__file__).with_name("RESULTS.md")
 
 POSES = ("core/posegraph", "core/planes", "core/registration")
 LABELS = ("core/classification",)
-PLANES_SEED = 38391338  # drawn after the last change of what it judges
+PLANES_SEED = 1105530  # drawn after the last change of what it judges
 
 # name: (title, command, sources that it measures)
 RESULTS = {
@@ -38,6 +38,7 @@ RESULTS = {
                            ("jacket", "figure 5.10: a jacket on a desk"), ("carpet", "figure 5.11: a carpet"))},
     "planes_thin": ("Planes of partitions of 8 to 15 cm between rooms", f"experiments/plane_models thin {PLANES_SEED}", ("core/planes/models",)),
     "building": ("Planes of a recorded building", "experiments/plane_models building", ("core/planes/models",)),
+    "planes_hall": ("Planes of a recorded hall", "experiments/plane_models hall", ("core/planes/models",)),
     "table_4_1": ("Thesis, table 4.1: triangulations of a piano stool", "experiments/mesh_methods stool", ("core/mesh",)),
     "table_4_2": ("Thesis, table 4.2: bytes of representations", "experiments/mesh_methods memory", ("core/mesh", "core/mls")),
     "meshes": ("Meshes of recorded scans", "experiments/mesh_methods recorded", ("core/mesh",)),

@@ -247,8 +247,15 @@ std::vector<CellLayer> FindColouredCells(const PosedPoints& points,
     return layers;
   }
   std::vector<CellLayer> layers(1);
+  const SensorOfPoint sensor_of = [&points](std::uint32_t i) {
+    const auto view = std::upper_bound(
+        points.views.begin(), points.views.end(), i, [](std::size_t k, const auto& one) {
+          return k < one.end;
+        });
+    return view->sensor;
+  };
   layers[0].cells =
-      FindPlanarCells(points.points, Eigen::Vector3f::Zero(), options, CellCheck::kEven);
+      FindPlanarCells(points.points, Eigen::Vector3f::Zero(), options, CellCheck::kEven, sensor_of);
   layers[0].colours.resize(layers[0].cells.size());
   ShareBorders(layers);
   return layers;

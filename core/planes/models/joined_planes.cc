@@ -28,6 +28,9 @@ namespace {
 constexpr double kJoinCosine = 0.99;   // 8°: beyond that one plane cannot fit both
 constexpr double kJoinFloorM = 0.02;   // by which a surface may bend
 constexpr double kStraightRad = 0.17;  // of a wall or floor, as of global planes
+// Of an owner's rms and so much, how far off it a plane may be that counts for its place.
+constexpr double kOwnedSigmas = 3.0;
+constexpr double kOwnedFloorM = 0.02;
 constexpr int kSteps = 50;
 
 PlaneKind KindOf(const Eigen::Vector3d& normal) {
@@ -255,7 +258,13 @@ absl::StatusOr<JoinedPlanes> WithOwned(JoinedPlanes joined,
                                        const Stop& stop) {
   std::vector<SquarePlane> sums;
   for (std::size_t m = 0; m < owners.size(); ++m) {
-    if (owners[m] != m) AddTo(joined.planes[owners[m]].sum, joined.planes[m].sum);
+    if (owners[m] == m) continue;
+    JoinedPlane& owner = joined.planes[owners[m]];
+    const double off = RmsDistance(joined.planes[m].sum.moments, owner.model.plane);
+    // Farther off it holds strips of two surfaces, as of both faces of a thin wall.
+    if (off <= kOwnedSigmas * std::hypot(owner.model.rms_m, kOwnedFloorM)) {
+      AddTo(owner.sum, joined.planes[m].sum);
+    }
   }
   for (std::size_t m = 0; m < owners.size(); ++m) {
     if (owners[m] == m) sums.push_back(std::move(joined.planes[m].sum));

@@ -257,6 +257,27 @@ TEST(PrototypeTest, WhatTooLittleWasSeenOfIsNotCompleted) {
   EXPECT_TRUE(hidden.points.empty());
 }
 
+// One ray, through the row of voxels beside; what lies 5 mm from that row may be in its beam.
+TEST(PrototypeTest, NothingIsPutIntoTheBeamThatGoesByNextToIt) {
+  ShapeView view = *ShapeView::Over(kAround, kVoxelM);
+  const Vector3d thing(0.025, 0.325, 1.025), near(1.025, 0.495, 1.025), off(1.325, 0.475, 1.025);
+  view.AddPoints({{thing}});
+  PointCloud cloud;
+  cloud.points.emplace_back(10.0F, 0.0F, 0.0F);
+  const Pose T(Eigen::Translation3d(-5.0, 0.525, 1.025));
+  STRATA_ASSERT_OK(view.AddScan(cloud, T, {}, Stop()));
+  Prototype prototype;
+  prototype.voxel_m = kVoxelM;
+  for (const Vector3d& p : {thing, near, off}) {
+    prototype.voxels.push_back({VoxelOf(p / kVoxelM), p, 2, 2});
+  }
+  const Inference inference = InferHidden(prototype, view);
+  EXPECT_EQ(inference.agreeing, 1U);
+  EXPECT_EQ(inference.contradicting, 0U);
+  ASSERT_EQ(inference.points.size(), 1U);
+  EXPECT_EQ(inference.points[0], off);
+}
+
 TEST(ShapeViewTest, RefusesBoxesItCannotHold) {
   const auto over = [](const AlignedBox3d& box, double voxel_m) {
     return ShapeView::Over(box, voxel_m).status();

@@ -1,6 +1,7 @@
 #include "core/planes/planar_cells.h"
 
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
@@ -50,6 +51,29 @@ TEST(FindPlanarCells, AnEvenCellIsNoPlaneThroughStrips) {
   const Eigen::Vector3f origin = Eigen::Vector3f::Zero();
   EXPECT_GT(AreaUpright(FindPlanarCells(points, origin, options)), 0.3);
   EXPECT_LT(AreaUpright(FindPlanarCells(points, origin, options, CellCheck::kEven)), 0.1);
+}
+
+// Few points of one face, seen from one side, more of the other: together as flat as a rough wall.
+TEST(FindPlanarCells, NoCellHoldsBothFacesOfAThinWall) {
+  Random random(11);
+  std::vector<Eigen::Vector3f> points;
+  for (int i = 0; i < 40; ++i) {
+    const double x = random.Uniform(0.0, 0.8), z = random.Uniform(0.0, 0.8);
+    const double y = (i < 30 ? 0.48 : 0.56) + 0.005 * random.Gaussian();
+    points.push_back(Eigen::Vector3d(x, y, z).cast<float>());
+  }
+  const Eigen::Vector3f origin = Eigen::Vector3f::Zero();
+  const PlaneExtractionOptions options = CellOptions();
+  const auto rough = FindPlanarCells(points, origin, options, CellCheck::kEven);
+  ASSERT_EQ(rough.size(), 1U);
+  EXPECT_GT(rough[0].rms_m, 0.03);
+  const auto sensor_of = [](std::uint32_t i) {
+    return Eigen::Vector3f(0.4F, i < 30 ? -2.0F : 3.0F, 0.4F);
+  };
+  for (const PlanarCell& cell :
+       FindPlanarCells(points, origin, options, CellCheck::kEven, sensor_of)) {
+    EXPECT_LT(cell.rms_m, 0.02);
+  }
 }
 
 // A wall of 0.8 x 0.8 m is even, sparse or dense.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <string>
 
 #include <Eigen/Core>
 
@@ -43,6 +44,10 @@ void Corridor(std::uint64_t seed);       // figures 5.8 and 5.9
 void Jacket(std::uint64_t seed);         // figure 5.10
 void Carpet(std::uint64_t seed);         // figure 5.11
 void ThinWalls(std::uint64_t seed);      // partitions between rooms
+// Failures, or 77 where the data are absent; `folder`: of any recording, whose planes are printed.
+int RecordedBuilding();
+int RecordedHall();
+int Recording(const std::string& folder);
 
 }  // namespace strata::testing
 

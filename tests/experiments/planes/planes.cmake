@@ -14,7 +14,7 @@ endforeach()
 strata_executable(
   plane_models plane_models
   SOURCES planes/plane_models.cc planes/plane_cases.h planes/plane_colours.cc planes/plane_directions.cc
-          planes/plane_thin_walls.cc
+          planes/plane_recorded.cc planes/plane_thin_walls.cc
   DEPS strata::planes strata::simulator strata::test_support strata::test_recordings
 )
 # Table 5.1's bounds, and those of the figures.
@@ -23,4 +23,9 @@ set_tests_properties(thesis_table_5_1 PROPERTIES LABELS smoke TIMEOUT 120 COST 2
 foreach(figure walls rack boxes carpet jacket corridor thin)
   add_test(NAME thesis_planes_${figure} COMMAND plane_models ${figure})
   set_tests_properties(thesis_planes_${figure} PROPERTIES LABELS smoke TIMEOUT 120 COST 20)
+endforeach()
+# Recorded ones, where they are.
+foreach(recording building hall)
+  add_test(NAME thesis_planes_${recording} COMMAND plane_models ${recording})
+  set_tests_properties(thesis_planes_${recording} PROPERTIES LABELS smoke TIMEOUT 300 COST 60 SKIP_RETURN_CODE 77)
 endforeach()

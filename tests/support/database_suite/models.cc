@@ -122,6 +122,26 @@ TEST_P(DatabaseSuite, PlanesOfARegionOnly) {
               StatusIs(Code::kInvalidArgument, HasSubstr("X0 < X1")));
 }
 
+// Surfaces are left of it, so floors are still told.
+TEST_P(DatabaseSuite, WhatLooksAtPointsSaysWhereTheyWereDropped) {
+  MapParameters parameters;
+  parameters.keep_points = false;
+  STRATA_ASSERT_OK(db().maps().Create({}, "bare", parameters));
+  const PointCloud floor = LevelFloor();
+  STRATA_ASSERT_OK(UploadScan(db(), "bare", FloorHeader({"run", 1}, floor), floor));
+  AwaitIntegration(db(), "bare");
+  for (const char* kind : {"planes", "objects", "complete"}) {
+    SCOPED_TRACE(kind);
+    EXPECT_THAT(db().jobs().Start({}, "bare", kind, {}),
+                StatusIs(Code::kFailedPrecondition, HasSubstr("drops points")));
+  }
+  const auto sink = [](const ModelPlane&) { return absl::OkStatus(); };
+  EXPECT_THAT(db().models().GetPlaneModel({}, "bare", sink),
+              StatusIs(Code::kNotFound, HasSubstr("no plane model")));
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan plan, db().planning().ListFloors({}, "bare", {}));
+  EXPECT_THAT(plan.floors, SizeIs(1));
+}
+
 TEST_P(DatabaseSuite, PlanesByColourTakeScansWithColours) {
   const PointCloud grey = Room();
   STRATA_ASSERT_OK(UploadScan(db(), kMap, FloorHeader({"run", 1}, grey), grey));

@@ -284,9 +284,19 @@ TEST_P(DatabaseSuite, AFloorIsWhatARobotCanDrive) {
   query.at = PlanEndpoint{.x_m = 500.0, .y_m = 0.0};
   STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan off, db().planning().ListFloors({}, kMap, query));
   EXPECT_FALSE(off.at.has_value());
-  query.profile.radius_m = std::numeric_limits<double>::quiet_NaN();
+  query.at->y_m = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(db().planning().ListFloors({}, kMap, query),
-              StatusIs(Code::kInvalidArgument, HasSubstr("radius")));
+              StatusIs(Code::kInvalidArgument, HasSubstr("at")));
+  query.at.reset();
+  for (double RobotProfile::*field : {&RobotProfile::radius_m,
+                                      &RobotProfile::height_m,
+                                      &RobotProfile::max_step_m,
+                                      &RobotProfile::max_slope_rad}) {
+    query.profile = {};
+    query.profile.*field = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_THAT(db().planning().ListFloors({}, kMap, query),
+                StatusIs(Code::kInvalidArgument, HasSubstr("nan")));
+  }
   query = {.profile = {}, .min_area_m2 = -1.0};
   EXPECT_THAT(db().planning().ListFloors({}, kMap, query),
               StatusIs(Code::kInvalidArgument, HasSubstr("min_area_m2")));

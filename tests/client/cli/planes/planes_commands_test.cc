@@ -99,5 +99,35 @@ TEST_F(PlanesCommandsTest, PlanesOfAMapAreShownExportedAndDrawn) {
               StatusIs(Code::kNotFound, _));
 }
 
+// What is written says that it has nothing; a plan of nothing is refused.
+TEST_F(PlanesCommandsTest, AModelWithoutPlanesIsWrittenAsOne) {
+  ON_CALL(db_.models(), GetPlaneModel(_, _, _)).WillByDefault([](auto&, auto, auto) {
+    return absl::StatusOr<PlaneModelInfo>(PlaneModelInfo());
+  });
+  ON_CALL(db_.maps(), History(_, _)).WillByDefault([](auto&, auto) {
+    return absl::StatusOr<std::vector<EpochInfo>>(std::vector<EpochInfo>());
+  });
+  ON_CALL(db_.maps(), Get(_, _)).WillByDefault([](auto&, auto) {
+    return absl::StatusOr<MapInfo>(MapInfo());
+  });
+  ON_CALL(db_.planning(), ListProfiles(_, _)).WillByDefault([](auto&, auto) {
+    return absl::StatusOr<std::map<std::string, RobotProfile>>({{"default", RobotProfile()}});
+  });
+  ON_CALL(db_.planning(), ListFloors(_, _, _)).WillByDefault([](auto&, auto, auto&) {
+    return absl::StatusOr<FloorPlan>(FloorPlan());
+  });
+  EXPECT_TRUE(RunJson({"planes", "model", "m"})["planes"].empty());
+  const ::strata::testing::TempDir folder;
+  for (const char* ending : {"dxf", "geojson", "glb", "ply", "obj"}) {
+    const std::string out = folder.path() / (std::string("none.") + ending);
+    EXPECT_EQ(RunJson({"planes", "export", "m", out})["planes"], 0) << ending;
+    EXPECT_TRUE(std::filesystem::exists(out)) << ending;
+  }
+  const std::string plan = folder.path() / "none.svg";
+  EXPECT_THAT(Run({"map", "floorplan", "m", plan, "--storey", "0"}),
+              StatusIs(Code::kNotFound, HasSubstr("the model has no floors")));
+  EXPECT_FALSE(std::filesystem::exists(plan));
+}
+
 }  // namespace
 }  // namespace strata::cli
