@@ -1,0 +1,28 @@
+# Two servers on a database of the test's own.
+strata_executable(
+  two_servers_test two_servers_test
+  SOURCES stratad_process.cc cluster/two_servers_test.cc
+  DEPS strata::postgres_cluster strata::sdk strata::test_support GTest::gmock_main
+  SHARED_HEADERS strata_test_headers
+)
+add_dependencies(two_servers_test stratad)
+add_test(NAME two_servers_test COMMAND two_servers_test)
+set_tests_properties(two_servers_test PROPERTIES LABELS integration TIMEOUT 300)
+
+# The same with several servers of one database.
+strata_executable(unfenced_stratad unfenced_stratad SOURCES cluster/unfenced_stratad.cc DEPS strata::server_program)
+strata_library(
+  cluster_campaign
+  NO_INSTALL
+  SOURCES cluster/cluster_campaign.cc cluster/cluster_readers.cc
+  HEADERS cluster/cluster_campaign.h cluster/cluster_readers.h
+  DEPS strata::campaigns strata::postgres_cluster
+)
+add_dependencies(strata_cluster_campaign unfenced_stratad)
+strata_test(
+  cluster_campaign_test
+  SOURCES cluster/cluster_campaign_test.cc
+  DEPS strata::cluster_campaign
+  LABELS integration
+  TIMEOUT 300
+)
