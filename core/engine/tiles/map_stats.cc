@@ -1,4 +1,4 @@
-#include "core/engine/doors/map_stats.h"
+#include "core/engine/tiles/map_stats.h"
 
 #include <cmath>
 #include <vector>

@@ -1,6 +1,6 @@
 // Counts of a map.
-#ifndef STRATA_CORE_ENGINE_DOORS_MAP_STATS_H_
-#define STRATA_CORE_ENGINE_DOORS_MAP_STATS_H_
+#ifndef STRATA_CORE_ENGINE_TILES_MAP_STATS_H_
+#define STRATA_CORE_ENGINE_TILES_MAP_STATS_H_
 
 #include "absl/status/statusor.h"
 
@@ -15,4 +15,4 @@ absl::StatusOr<MapStats> CollectStats(StorageReader& reader, const MapClock& clo
 
 }  // namespace strata
 
-#endif  // STRATA_CORE_ENGINE_DOORS_MAP_STATS_H_
+#endif  // STRATA_CORE_ENGINE_TILES_MAP_STATS_H_
