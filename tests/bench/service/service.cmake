@@ -17,4 +17,4 @@ strata_executable(
 )
 strata_smoke(durable_upload_benchmark 16 1 smoke)
 strata_smoke(tile_read_benchmark 0.1 1 smoke)
-strata_smoke(ingest_benchmark --scans 40 --repeats 1)
+strata_smoke(ingest_benchmark --scans 16 --repeats 1)

@@ -41,11 +41,13 @@ std::vector<std::string> CliTest::ImportArguments(const std::string& map,
           "--wait"};
 }
 
-std::uint64_t CliTest::WriteDrive(const std::string& robot, const RobotFiles& files) const {
+std::uint64_t CliTest::WriteDriveTo(const std::string& folder,
+                                    const std::string& robot,
+                                    const RobotFiles& files) {
   const World world = BridgeWorld();
   for (const Robot& driver : world.robots) {
     if (driver.name != robot) continue;
-    const auto written = WriteRobot(world.scene, driver, 1, files, Path(robot));
+    const auto written = WriteRobot(world.scene, driver, 1, files, folder);
     EXPECT_THAT(written, IsOk());
     if (written.ok()) return written->scans;
   }

@@ -33,7 +33,12 @@ class CliTest : public ::testing::Test {
   // `strata scan import` of the drive in Path(robot) with its exact poses, taken as they are.
   std::vector<std::string> ImportArguments(const std::string& map, const std::string& robot) const;
   // Writes the drive of a robot of the bridge world to Path(robot); its number of scans.
-  std::uint64_t WriteDrive(const std::string& robot, const RobotFiles& files) const;
+  std::uint64_t WriteDrive(const std::string& robot, const RobotFiles& files) const {
+    return WriteDriveTo(Path(robot), robot, files);
+  }
+  static std::uint64_t WriteDriveTo(const std::string& folder,
+                                    const std::string& robot,
+                                    const RobotFiles& files);
 
  private:
   TempDir directory_;

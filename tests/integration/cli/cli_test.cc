@@ -26,7 +26,7 @@ class VerbsTest : public CliTest {
     StartServer();
     Json({"map", "create", "m", "--cell-size", "0.1", "--gap-size", "1.0", "--thickness", "0.1"});
     RobotFiles files;
-    files.step_m = 1.5;
+    files.step_m = 2.5;
     files.sensor.columns = 480;
     for (const char* robot : {"over", "under"}) {
       const std::uint64_t scans = WriteDrive(robot, files);
