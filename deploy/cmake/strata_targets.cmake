@@ -169,7 +169,7 @@ function(strata_test name)
   list(JOIN ARG_LABELS "-" labels) # gtest_discover_tests takes one word; ctest -L looks for a part of it
   set(alone "*")
   if(ARG_TOGETHER)
-    math(EXPR together_timeout "3 * ${ARG_TIMEOUT}")
+    math(EXPR together_timeout "5 * ${ARG_TIMEOUT}")
     set(alone "*-")
     foreach(suite ${ARG_TOGETHER})
       set(test ${suite})
