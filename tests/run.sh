@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Strata's tests: installs what they need, builds, checks and runs them. A second run skips what is there.
 #   tests/run.sh            everything the gate runs
-#   tests/run.sh --full     also the viewer in a browser, all sanitized tests and fuzzers, clang's warnings of all, clang-tidy,
-#                           a whole build by clang, every header alone (some two hours more)
+#   tests/run.sh --full     also the viewer in a browser, long tests, all sanitized tests and fuzzers, clang's warnings of
+#                           all, clang-tidy, a whole build by clang, every header alone (some two hours more)
 # Recorded data are read from $STRATA_DATA (default ../shared/data); tests that need them skip where they are absent.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -53,7 +53,7 @@ cmake --build --preset release
 begin_beside
 
 stage "tests"
-ctest --preset release -LE browser
+ctest --preset release -LE "browser|long"
 
 stage "install, consumer and packages"
 tests/consumer/run.sh build/release
@@ -79,6 +79,9 @@ if [[ "${1:-}" == --full ]]; then
   stage "the viewer in a browser"
   cmake --build --preset release --target viewer
   ctest --preset release -L browser
+
+  stage "long tests"
+  ctest --preset release -L long
 
   stage "all sanitized tests, all fuzzers"
   tests/run_sanitizers.sh

@@ -135,13 +135,14 @@ function(strata_executable name output)
   strata_batch(${name} ${ARG_SHARED_HEADERS})
 endfunction()
 
-# strata_test(NAME SOURCES... DEPS... [LABELS...] [TIMEOUT seconds])
+# strata_test(NAME SOURCES... DEPS... [LABELS...] [TIMEOUT seconds] [PROCESSORS n] [TOGETHER suites...])
 #
 # A GoogleTest program; every TEST becomes a ctest test with the labels (default: unit). The labels asan, bytes and
 # tsan also make it part of what tests/run_sanitizers.sh builds and runs. PROCESSORS: of those that ctest has, as many as a
-# test takes that goes by the clock.
+# test takes that goes by the clock. TOGETHER: each of these suites is one ctest test, and one process, for which what its
+# tests share is made once; ALL: the program is, whose many short tests would take longer to start than to run.
 function(strata_test name)
-  cmake_parse_arguments(ARG "" "PROCESSORS;TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "" "PROCESSORS;TIMEOUT" "SOURCES;DEPS;LABELS;TOGETHER" ${ARGN})
   if(NOT ARG_LABELS)
     set(ARG_LABELS unit)
   endif()
@@ -166,9 +167,31 @@ function(strata_test name)
     endif()
   endforeach()
   list(JOIN ARG_LABELS "-" labels) # gtest_discover_tests takes one word; ctest -L looks for a part of it
+  set(alone "*")
+  if(ARG_TOGETHER)
+    math(EXPR together_timeout "5 * ${ARG_TIMEOUT}")
+    set(alone "*-")
+    foreach(suite ${ARG_TOGETHER})
+      set(test ${suite})
+      set(tests "${suite}.*:*/${suite}.*")
+      if(suite STREQUAL ALL)
+        set(test ${name})
+        set(tests "*")
+      endif()
+      string(APPEND alone "${tests}:")
+      add_test(NAME ${test} COMMAND ${name} --gtest_filter=${tests})
+      set_tests_properties(
+        ${test} PROPERTIES LABELS "${labels}" TIMEOUT ${together_timeout} PROCESSORS ${ARG_PROCESSORS} COST ${together_timeout}
+      )
+    endforeach()
+    if(ALL IN_LIST ARG_TOGETHER)
+      return()
+    endif()
+  endif()
   gtest_discover_tests(
     ${name}
     DISCOVERY_TIMEOUT 60
+    TEST_FILTER "${alone}"
     PROPERTIES LABELS "${labels}" TIMEOUT ${ARG_TIMEOUT} PROCESSORS ${ARG_PROCESSORS}
                COST ${ARG_TIMEOUT} # what may take long begins first
   )

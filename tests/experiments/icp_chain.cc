@@ -13,7 +13,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "tests/bench/registration_peers.h"
+#include "tests/bench/poses/registration_peers.h"
 #include "tests/support/pcd.h"
 
 namespace strata {

@@ -1,6 +1,6 @@
 // Processes that are killed under load: what was acknowledged must be there, once and whole.
 // Numbers and what did not hold as JSON on stdout; 1 if anything did not.
-#include "tests/integration/kill_campaign.h"
+#include "tests/integration/campaigns/kill_campaign.h"
 
 #include <cstdlib>
 #include <filesystem>
@@ -12,9 +12,9 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "tests/integration/clock_campaign.h"
-#include "tests/integration/cluster_campaign.h"
-#include "tests/integration/term_campaign.h"
+#include "tests/integration/campaigns/clock_campaign.h"
+#include "tests/integration/campaigns/term_campaign.h"
+#include "tests/integration/cluster/cluster_campaign.h"
 #include "tests/support/temp_dir.h"
 
 namespace strata::testing {

@@ -19,9 +19,9 @@
 #include "core/common/map_owner.h"
 #include "core/common/status.h"
 #include "core/engine/doors/backup.h"
-#include "core/engine/doors/map_stats.h"
 #include "core/engine/doors/map_watch.h"
 #include "core/engine/map/engine_options.h"
+#include "core/engine/tiles/map_stats.h"
 #include "core/world/names.h"
 
 namespace strata {

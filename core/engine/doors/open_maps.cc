@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,7 +24,6 @@
 #include "core/common/retry_delay.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
-#include "core/common/this_thread.h"
 #include "core/engine/doors/map_numbers.h"
 #include "core/storage/outcome.h"
 #include "core/world/names.h"
@@ -39,11 +37,8 @@ constexpr absl::Duration kPoll = absl::Milliseconds(50);
 constexpr absl::Duration kFirstLook = absl::Milliseconds(500);
 constexpr absl::Duration kFirstLookAtFew = absl::Seconds(10);
 constexpr std::size_t kFew = 100;
-// Between two looks at who is idle.
-constexpr absl::Duration kInterval = absl::Seconds(1);
-// Of shared stores: how old may be what a list says; how often all maps are looked at unasked.
+// Of shared stores: how old may be what a list says.
 constexpr absl::Duration kListAge = absl::Seconds(2);
-constexpr absl::Duration kSurveyInterval = absl::Minutes(1);
 
 // Whether it was no fault of the map that it did not open.
 bool MayOpenLater(const absl::Status& status) {
@@ -443,198 +438,6 @@ EngineNumbers OpenMaps::Numbers() const {
 std::vector<std::string> OpenMaps::NotOpened() const {
   absl::MutexLock lock(&mutex_);
   return {failed_.begin(), failed_.end()};
-}
-
-void OpenMaps::Loop() {
-  NameThisThread("maps");
-  bool surveyed = false;
-  while (true) {
-    Guarded([&]() -> absl::Status {
-      if (!surveyed) surveyed = SurveyAgain(absl::ZeroDuration()).ok();
-      if (surveyed && stores_.IsShared()) {
-        SurveyAgain(kSurveyInterval).IgnoreError();  // the next one may succeed
-        TakeAbandoned();
-        TellOfArrivals();
-      }
-      OpenAllWanted();
-      CloseIdle();
-      return absl::OkStatus();
-    }).IgnoreError();  // without memory it is done later
-    absl::MutexLock lock(&mutex_);
-    if (mutex_.AwaitWithTimeout(absl::Condition(&closed_), kInterval)) return;
-  }
-}
-
-absl::Status OpenMaps::Survey() {
-  const absl::Time begun = SteadyNow();
-  std::uint64_t maps = 0;
-  std::set<std::string> names;  // of shared stores
-  const bool shared = stores_.IsShared();
-  const absl::Status done = Guarded([&, this] {
-    return stores_.Survey(closing_,
-                          [&, this](const std::string& name, absl::StatusOr<MapOutline> outline) {
-                            ++maps;
-                            if (shared) names.insert(name);
-                            Note(name, std::move(outline));
-                          });
-  });
-  if (!done.ok() && !closing_.requested()) {
-    LOG(ERROR) << LogLine("maps").Add("not_looked_at", done.message());
-  } else if (SteadyNow() - begun > kFirstLook) {
-    LOG(INFO) << LogLine("maps")
-                     .Add("looked_at", maps)
-                     .Add("ms", absl::ToInt64Milliseconds(SteadyNow() - begun));
-  }
-  if (done.ok() && shared) ForgetClosedBut(names);
-  absl::MutexLock lock(&mutex_);
-  if (!surveyed_.has_value() || !surveyed_->ok()) surveyed_ = done;
-  surveyed_at_ = SteadyNow();
-  survey_took_ = surveyed_at_ - begun;
-  return done;
-}
-
-absl::Status OpenMaps::SurveyAgain(absl::Duration age) {
-  {
-    absl::MutexLock lock(&mutex_);
-    const bool young = SteadyNow() - surveyed_at_ < std::max(age, 10 * survey_took_);
-    if (surveying_ || young) return absl::OkStatus();
-    surveying_ = true;
-  }
-  const absl::Status done = Survey();
-  absl::MutexLock lock(&mutex_);
-  surveying_ = false;
-  return done;
-}
-
-// Those that were opened or made meanwhile are not closed, or were not at the time.
-void OpenMaps::ForgetClosedBut(const std::set<std::string>& names) {
-  std::vector<std::string> unseen;
-  {
-    absl::MutexLock lock(&mutex_);
-    for (const auto& [name, entry] : entries_) {
-      if (entry.state == State::kClosed && !names.contains(name)) unseen.push_back(name);
-    }
-  }
-  for (const std::string& name : unseen) {
-    const absl::StatusOr<bool> there = stores_.Has(name);
-    if (!there.ok() || *there) continue;
-    absl::MutexLock lock(&mutex_);
-    const auto it = entries_.find(name);
-    if (it == entries_.end() || it->second.state != State::kClosed) continue;
-    wanted_.erase(name);
-    failed_.erase(name);
-    entries_.erase(it);
-  }
-}
-
-void OpenMaps::TakeAbandoned() {
-  const absl::StatusOr<std::vector<std::string>> names = stores_.ListAbandoned();
-  if (!names.ok()) return;  // the store is away; what it holds stays where it is
-  for (const std::string& name : *names) {
-    {
-      absl::MutexLock lock(&mutex_);
-      if (entries_.size() < options_.max_maps) entries_.try_emplace(name);
-      const auto it = entries_.find(name);
-      if (it == entries_.end() || it->second.state != State::kClosed) continue;
-      it->second.why = absl::OkStatus();
-      wanted_.insert(name);
-    }
-    OpenWanted(name);
-  }
-}
-
-void OpenMaps::TellOfArrivals() {
-  const absl::StatusOr<std::vector<std::string>> names = stores_.ListWaiting();
-  if (!names.ok()) return;  // the store is away; what waits there goes on waiting
-  for (const std::string& name : *names) {
-    std::shared_ptr<Map> map;
-    {
-      absl::MutexLock lock(&mutex_);
-      const auto it = entries_.find(name);
-      if (it != entries_.end() && it->second.state == State::kOpen) map = it->second.map;
-    }
-    if (map != nullptr) map->ScansWait();
-  }
-}
-
-void OpenMaps::Note(const std::string& name, absl::StatusOr<MapOutline> outline) {
-  bool first = false;
-  {
-    absl::MutexLock lock(&mutex_);
-    first = !surveyed_.has_value();
-    const bool shared = stores_.IsShared();
-    if (shared && outline.ok() && entries_.size() < options_.max_maps) entries_.try_emplace(name);
-    const auto it = entries_.find(name);
-    if (it == entries_.end()) return;
-    Entry& entry = it->second;
-    const bool elsewhere = MapOwnerOf(entry.why).has_value();
-    if (entry.state != State::kClosed || !(entry.why.ok() || elsewhere)) return;
-    if (entry.memory.opened_before && !shared) return;
-    if (outline.ok()) {
-      entry.info = std::move(outline->info);
-      entry.info->name = name;
-      entry.clock = outline->clock;
-      entry.numbers = std::move(outline->numbers);
-      if (!outline->has_work) return;
-    }
-    wanted_.insert(name);
-  }
-  if (first) OpenWanted(name);  // others can wait, whoever asks for a list cannot
-}
-
-bool OpenMaps::OpenWanted(const std::string& name) {
-  if (closing_.requested()) return false;
-  const absl::Status opened = Find(closing_, name).status();
-  if (opened.ok() || !absl::IsResourceExhausted(opened)) return true;
-  absl::MutexLock lock(&mutex_);
-  return open_.size() < options_.max_open_maps;
-}
-
-void OpenMaps::OpenAllWanted() {
-  std::vector<std::string> wanted;
-  {
-    absl::MutexLock lock(&mutex_);
-    wanted.assign(wanted_.begin(), wanted_.end());
-  }
-  for (const std::string& name : wanted) {
-    if (!OpenWanted(name)) return;
-  }
-}
-
-void OpenMaps::CloseIdle() {
-  std::string after;
-  while (!closing_.requested()) {
-    Turn turn;
-    const std::optional<std::string> next = NextIdle(after, turn);
-    if (!next.has_value()) return;
-    after = *next;
-    // What was taken away from under it says so for as long as it is open.
-    if (turn.closed->core().doubt().ok() && !turn.closed->core().CheckInPlace().ok()) {
-      absl::MutexLock lock(&mutex_);
-      Entry& entry = entries_.find(after)->second;
-      entry.state = State::kOpen;
-      entry.used = SteadyNow();
-      continue;
-    }
-    CloseNow(turn.close, std::move(turn.closed));
-  }
-}
-
-std::optional<std::string> OpenMaps::NextIdle(const std::string& after, Turn& turn) {
-  absl::MutexLock lock(&mutex_);
-  const absl::Time now = SteadyNow();
-  for (auto it = open_.upper_bound(after); it != open_.end(); ++it) {
-    Entry& entry = entries_.find(*it)->second;
-    if (entry.state != State::kOpen) continue;
-    if (entry.map->core().doubt().ok()) {
-      if (!IsFree(entry)) entry.used = now;
-      if (now - entry.used < options_.map_idle || !IsFree(entry) || !entry.map->AtRest()) continue;
-    }
-    const std::string name = *it;
-    BeginClosing(entry, name, turn);
-    return name;
-  }
-  return std::nullopt;
 }
 
 }  // namespace strata

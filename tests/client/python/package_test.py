@@ -98,14 +98,16 @@ class TypesTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.cache = cls.enterClassContext(tempfile.TemporaryDirectory())
+        # Kept beside the package: mypy looks again only at what has changed.
+        cls.cache = TREE / ".mypy_cache"
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
 
     def test_the_package_passes_mypy_strict(self):
         checked = self.check("--strict", "-p", "strata")
         self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
 
     def test_programs_that_use_it_are_checked(self):
-        program = pathlib.Path(self.cache) / "program.py"
+        program = self.folder / "program.py"
         program.write_text(textwrap.dedent("""
             import strata
             async def main() -> None:

@@ -24,9 +24,19 @@ constexpr std::uint64_t kSeed = 20261122;
 
 class DiskCampaignTest : public ::testing::Test {
  protected:
+  static void SetUpTestSuite() {
+    FLAGS_minloglevel = google::GLOG_FATAL;  // errors are what this is about
+    auto prepared = DiskCampaign::Prepare();
+    STRATA_ASSERT_OK(prepared);
+    disks_ = new DiskCampaign(*std::move(prepared));
+  }
+  static void TearDownTestSuite() {
+    delete disks_;
+    disks_ = nullptr;
+  }
   void SetUp() override {
     RecordProperty("seed", std::to_string(kSeed));
-    FLAGS_minloglevel = google::GLOG_FATAL;  // errors are what this is about
+    ASSERT_NE(disks_, nullptr);
   }
   // About `trials` of them, at moments that the seed chooses.
   static Sweep SampleOf(std::int64_t moments, std::int64_t trials) {
@@ -41,26 +51,28 @@ class DiskCampaignTest : public ::testing::Test {
     EXPECT_EQ(result.restarts, 0) << what;
     EXPECT_THAT(result.violations, IsEmpty()) << what;
   }
+
+  static inline DiskCampaign* disks_ = nullptr;
 };
 
 TEST_F(DiskCampaignTest, WhatIsAcknowledgedOutlivesDisksThatFail) {
-  STRATA_ASSERT_OK_AND_ASSIGN(const DiskCampaign disks, DiskCampaign::Prepare());
+  const DiskCampaign& disks = *disks_;
   for (const DiskFault fault : {DiskFault::kWrite, DiskFault::kSync}) {
     const std::int64_t moments = disks.moments(fault);
-    ExpectKept(disks.FailOnce(fault, SampleOf(moments, 2)), "once");
-    ExpectKept(disks.FailUntilMended(fault, SampleOf(moments, 2)), "until mended");
+    ExpectKept(disks.FailOnce(fault, SampleOf(moments, 1)), "once");
+    ExpectKept(disks.FailUntilMended(fault, SampleOf(moments, 1)), "until mended");
   }
   for (const DiskFault fault : {DiskFault::kWrite, DiskFault::kRead, DiskFault::kShm}) {
     // Most writes of an opening come at its close, where nobody is told of them.
-    ExpectKept(disks.FailOnOpening(fault, SampleOf(disks.moments_of_opening(fault), 6)),
+    ExpectKept(disks.FailOnOpening(fault, SampleOf(disks.moments_of_opening(fault), 3)),
                absl::StrCat("opening, fault ", static_cast<int>(fault)));
   }
-  ExpectKept(disks.FillUp(SampleOf(disks.bytes(), 3)), "full");
+  ExpectKept(disks.FillUp(SampleOf(disks.bytes(), 2)), "full");
 }
 
 TEST_F(DiskCampaignTest, WhatIsAcknowledgedOutlivesThePower) {
-  STRATA_ASSERT_OK_AND_ASSIGN(const DiskCampaign disks, DiskCampaign::Prepare());
-  ExpectKept(disks.CutPower(false, SampleOf(disks.cuts(), 5)), "power");
+  const DiskCampaign& disks = *disks_;
+  ExpectKept(disks.CutPower(false, SampleOf(disks.cuts(), 3)), "power");
   // It could tell.
   EXPECT_THAT(disks.CutPower(true, SampleOf(disks.cuts(), 2)).violations, Not(IsEmpty()));
 }

@@ -24,7 +24,7 @@
 #include "core/classification/evaluation.h"
 #include "core/classification/features/neighbours.h"
 #include "core/classification/training.h"
-#include "tests/bench/classification_peers.h"
+#include "tests/bench/classification/classification_peers.h"
 
 namespace strata {
 namespace {

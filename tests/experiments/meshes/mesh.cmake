@@ -22,6 +22,7 @@ strata_executable(
   SOURCES meshes/mesh_methods.cc meshes/mesh_recorded.cc
   DEPS strata::mesh strata::mesh_peers strata::mls strata::test_support strata::test_recordings nanoflann::nanoflann
 )
-# Table 4.1's bounds: what is closed, and how near meshes come with noise. The whole table is the campaign `thesis`.
+# Table 4.1's bounds: what is closed, and how near meshes come with noise. Not of the gate, where mesh_test holds what is
+# closed; the whole table is the campaign `thesis`.
 add_test(NAME thesis_table_4_1 COMMAND mesh_methods stool 5)
-set_tests_properties(thesis_table_4_1 PROPERTIES LABELS smoke TIMEOUT 300 COST 100)
+set_tests_properties(thesis_table_4_1 PROPERTIES LABELS "smoke;long" TIMEOUT 300 COST 100)

@@ -306,11 +306,16 @@ double Scene::CastTerrain(const Vector3d& origin, const Vector3d& direction, dou
     next[axis] = direction[i] == 0.0 ? kNothing : (border - origin[i]) / direction[i];
     width[axis] = direction[i] == 0.0 ? kNothing : terrain.cell / std::abs(direction[i]);
   }
+  double z = start.z();
   while (cell[0] >= 0 && cell[0] < size[0] && cell[1] >= 0 && cell[1] < size[1]) {
-    const double hit = CastTerrainCell(cell[0], cell[1], origin, direction, limit);
-    if (hit != kNothing) return hit;
     const std::size_t axis = next[0] < next[1] ? 0 : 1;
+    const double z_behind = origin.z() + next[axis] * direction.z();
+    if (terrain.Reaches(cell[0], cell[1], std::min(z, z_behind), std::max(z, z_behind))) {
+      const double hit = CastTerrainCell(cell[0], cell[1], origin, direction, limit);
+      if (hit != kNothing) return hit;
+    }
     if (next[axis] >= limit) break;
+    z = z_behind;
     cell[axis] += direction[static_cast<Eigen::Index>(axis)] > 0.0 ? 1 : -1;
     next[axis] += width[axis];
   }

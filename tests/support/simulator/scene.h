@@ -3,6 +3,7 @@
 #ifndef STRATA_TESTS_SUPPORT_SIMULATOR_SCENE_H_
 #define STRATA_TESTS_SUPPORT_SIMULATOR_SCENE_H_
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -94,6 +95,13 @@ class Scene {
     double At(int column, int row) const {
       return heights[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns + 1) +
                      static_cast<std::size_t>(column)];
+    }
+    // Whether some of the cell's ground may lie between the heights.
+    bool Reaches(int column, int row, double low, double high) const {
+      constexpr double kSlack = 1e-6;
+      const auto [least, most] = std::minmax(
+          {At(column, row), At(column + 1, row), At(column, row + 1), At(column + 1, row + 1)});
+      return least <= high + kSlack && most >= low - kSlack;
     }
   };
 

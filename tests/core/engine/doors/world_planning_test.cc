@@ -215,7 +215,7 @@ TEST_F(WorldPlanningTest, CampusPathsGoAroundBuildings) {
   SCOPED_TRACE(kSeed);
   sensor_.columns = 360;  // enough for the larger cells, and a third of the time
   MakeMapOf(CampusWorld(), 0.2);
-  DriveAll(3.0);
+  DriveAll(4.0);
   Driven("start", "far");
   std::vector<Vector3d> driven;
   for (const Robot& robot : world_.robots) {

@@ -1,0 +1,39 @@
+# Two servers on a database of the test's own.
+strata_executable(
+  two_servers_test two_servers_test
+  SOURCES stratad_process.cc cluster/two_servers_test.cc
+  DEPS strata::codec strata::mls strata::postgres_cluster strata::sdk strata::test_support GTest::gmock_main
+  SHARED_HEADERS strata_test_headers
+)
+add_dependencies(two_servers_test stratad)
+add_test(NAME two_servers_test COMMAND two_servers_test)
+set_tests_properties(two_servers_test PROPERTIES LABELS integration TIMEOUT 300)
+
+# Maps between files and a database.
+strata_executable(
+  map_import_test map_import_test
+  SOURCES cluster/map_import_test.cc stratad_process.cc
+  DEPS strata::engine strata::postgres_cluster strata::sdk strata::storage_postgresql strata::test_support GTest::gmock_main
+  SHARED_HEADERS strata_test_headers
+)
+add_dependencies(map_import_test stratad)
+add_test(NAME map_import_test COMMAND map_import_test)
+set_tests_properties(map_import_test PROPERTIES LABELS integration TIMEOUT 300)
+
+# The kill campaign with several servers of one database.
+strata_executable(unfenced_stratad unfenced_stratad SOURCES cluster/unfenced_stratad.cc DEPS strata::server_program)
+strata_library(
+  cluster_campaign
+  NO_INSTALL
+  SOURCES cluster/cluster_campaign.cc cluster/cluster_readers.cc
+  HEADERS cluster/cluster_campaign.h cluster/cluster_readers.h
+  DEPS strata::campaigns strata::postgres_cluster
+)
+add_dependencies(strata_cluster_campaign unfenced_stratad)
+strata_test(
+  cluster_campaign_test
+  SOURCES cluster/cluster_campaign_test.cc
+  DEPS strata::cluster_campaign
+  LABELS integration
+  TIMEOUT 300
+)
