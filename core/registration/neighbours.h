@@ -3,15 +3,15 @@
 // What was measured to work without loop closing (tests/experiments/ingest_chain.cc):
 //   - predict: last corrected pose of the trajectory · uploaded relative motion;
 //   - features from a map of the scan in its own frame with cells of 0.1 m, whatever the world's:
-//     at 0.2 m the error nearly doubles;
+//     at 0.2 m the error nearly doubles; walls where their points are (upright_offsets.h);
 //   - target: SelectNeighbours() with the defaults, TargetOptions::centre at the prediction;
 //   - accept kConverged, kMaxIterations and kDegenerate (not moved where undetermined); with
 //     kTooLittleOverlap or kDiverged keep the prediction. The least overlap of an accepted scan was
 //     0.46 (facade), so min_overlap of 0.3 leaves room.
 //   - 4000 samples: with 2000 the campus closes 0.1 to 1 m off, by the seed.
-// Sample seeds 1 and 2: NCLT campus, 636 m, off by 0.77 and 0.69 m, 0.8° and 0.9°, at its closure
-// (uploaded 17.9 m), KITTI drive with noisy steps ATE 10 to 12 mm, hall 13 mm (uploaded 61), facade
-// 6 mm (35). Surface elements of 20 features, or σt of 0.5 m, let the campus drift by 1 m and more.
+// Sample seeds 1 and 2: NCLT campus, 636 m, off by 0.75 and 0.60 m, 0.7° and 0.9°, at its closure
+// (uploaded 17.9 m), KITTI drive with noisy steps ATE 9 to 12 mm, hall 13 mm (uploaded 61), facade
+// 4 mm (35). Surface elements of 20 features, or σt of 0.5 m, let the campus drift by 1 m and more.
 #ifndef STRATA_CORE_REGISTRATION_NEIGHBOURS_H_
 #define STRATA_CORE_REGISTRATION_NEIGHBOURS_H_
 
