@@ -73,7 +73,8 @@ TEST(UprightOffsetsTest, AWallAlongTheCellsIsWhereItIsInThem) {
 }
 
 TEST(UprightOffsetsTest, HedgesAndSparseCellsStayInTheMiddle) {
-  for (const PointCloud& cloud : {WallAt(3.05, 0.3, 200000), WallAt(3.02, 0.01, 150)}) {
+  // The hedge fills its cells, of which half a one would pass for a face.
+  for (const PointCloud& cloud : {WallAt(3.0, 0.3, 200000), WallAt(3.02, 0.01, 150)}) {
     const std::vector<Eigen::Vector3f> features = UprightOf(cloud);
     ASSERT_GE(features.size(), 20U);
     int moved = 0;
