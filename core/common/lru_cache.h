@@ -86,7 +86,6 @@ class LruCache {
   void Insert(const Key& key, Handle value, std::size_t bytes)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(budget_->mutex_) {
     // What may fail for want of memory comes first, so that a failure changes nothing.
-    index_.reserve(index_.size() + 1);
     Order entry;
     entry.push_front({key, std::move(value), {}});
     const auto it = entry.begin();
@@ -94,10 +93,10 @@ class LruCache {
     const auto evict = [this, it]() ABSL_NO_THREAD_SAFETY_ANALYSIS { EraseAt(it); };
     CacheBudget::Order item;
     item.push_front({bytes, evict});
+    index_.emplace(key, it);
     order_.splice(order_.begin(), entry);
     budget_->order_.splice(budget_->order_.begin(), item);
     it->item = budget_->order_.begin();
-    index_[key] = it;
     bytes_ += bytes;
     budget_->cached_ += bytes;
   }
