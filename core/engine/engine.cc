@@ -15,6 +15,7 @@
 #include "core/engine/doors/posegraph.h"
 #include "core/engine/doors/scans.h"
 #include "core/engine/doors/tiles.h"
+#include "core/engine/map/map_core.h"
 #include "core/engine/map/numbers.h"
 
 namespace strata {
@@ -53,6 +54,10 @@ class Engine final : public api::Database, public NumbersSource {
 absl::StatusOr<std::unique_ptr<api::Database>> OpenEngine(const EngineOptions& options,
                                                           OpenStores open) {
   STRATA_RETURN_IF_ERROR(options.Validate());
+  // Made while there is memory. Abseil gathers randomness at its first use; where memory ended just
+  // then, all later ones would wait for it forever.
+  MapCore::NextUpload();
+  BeingClosed();
   STRATA_ASSIGN_OR_RETURN(std::unique_ptr<EngineMaps> maps, EngineMaps::Open(options, open));
   return std::make_unique<Engine>(std::move(maps));
 }

@@ -74,7 +74,7 @@ class Map {
 
   // Ends all threads, waiting for what they do now, and closes the file. Calls that are under way
   // and need more of it end with `why`.
-  void Close(const absl::Status& why = absl::CancelledError("the map is being closed"));
+  void Close(const absl::Status& why = BeingClosed());
 
  private:
   Map() = default;

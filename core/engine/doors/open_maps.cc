@@ -96,8 +96,8 @@ absl::Status OpenMaps::AwaitSettled(const Stop& stop, absl::string_view name) co
 }
 
 void OpenMaps::BeginClosing(Entry& entry, const std::string& name, Turn& turn) {
+  turn.close = name;  // may want memory, and nobody would end what had begun
   entry.state = State::kClosing;
-  turn.close = name;
   turn.closed = entry.map;
 }
 
@@ -204,13 +204,14 @@ absl::StatusOr<bool> OpenMaps::Adopt(const std::string& name) {
 }
 
 absl::StatusOr<std::shared_ptr<Map>> OpenMaps::OpenNow(const std::string& name) {
-  MapMemory memory;
-  {
-    absl::MutexLock lock(&mutex_);
-    memory = entries_.find(name)->second.memory;
-  }
   const BlockingScope blocking;
+  // All that may fail for want of memory: whoever waits for the map waits until its state is set.
   absl::StatusOr<std::shared_ptr<Map>> map = Guarded([&]() -> absl::StatusOr<std::shared_ptr<Map>> {
+    MapMemory memory;
+    {
+      absl::MutexLock lock(&mutex_);
+      memory = entries_.find(name)->second.memory;
+    }
     STRATA_ASSIGN_OR_RETURN(StoredMap stored, stores_.Open(name));
     return Map::Open(name, std::move(stored), options_, caches_, memory);
   });
@@ -277,11 +278,16 @@ void OpenMaps::CloseNow(const std::string& name, std::shared_ptr<Map> map) {
     absl::MutexLock lock(&mutex_);
     entries_.find(name)->second.map = nullptr;  // what is known of it is in the entry
   }
-  map->Close(doubt.ok() ? absl::UnavailableError("the map was let go; ask again") : doubt);
+  map->Close(doubt.ok() ? let_go_ : doubt);
+  Guarded([&] {
+    MapMemory memory = map->memory();
+    absl::MutexLock lock(&mutex_);
+    entries_.find(name)->second.memory = std::move(memory);
+    return absl::OkStatus();
+  }).IgnoreError();
   absl::MutexLock lock(&mutex_);
   if (MustBeOpenedAnew(doubt) && !IsOutcomeUnknown(doubt)) ++maps_lost_;
   Entry& entry = entries_.find(name)->second;
-  entry.memory = map->memory();
   entry.clock.reset();
   if (doubt.ok()) entry.clock = map->core().changes().last();
   const bool wanted = !doubt.ok() || map->HasWork();

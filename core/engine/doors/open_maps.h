@@ -150,6 +150,8 @@ class OpenMaps {
   const MapStores& stores_;
   const std::shared_ptr<CacheBudget> caches_;  // of all maps
   const Stop closing_;
+  // Made beforehand, for want of memory is one of the reasons to let a map go.
+  const absl::Status let_go_ = absl::UnavailableError("the map was let go; ask again");
   mutable absl::Mutex mutex_;
   Entries entries_ ABSL_GUARDED_BY(mutex_);
   std::set<std::string> open_ ABSL_GUARDED_BY(mutex_);    // of kOpening, kOpen and kClosing

@@ -63,7 +63,7 @@ class Worker {
   bool AtRest() const;
 
   // Ends the thread after the step it is in. What waits is answered `why`. Safe to call again.
-  void Close(const absl::Status& why = absl::CancelledError("the map is being closed"));
+  void Close(const absl::Status& why = BeingClosed());
 
  private:
   struct Task {

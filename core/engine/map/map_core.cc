@@ -25,6 +25,12 @@
 #include "core/storage/storage.h"
 
 namespace strata {
+
+const absl::Status& BeingClosed() {
+  static const auto* const closed =
+      new absl::Status(absl::StatusCode::kCancelled, "the map is being closed");
+  return *closed;
+}
 namespace {
 
 absl::Status ClearLeftovers(StorageWriter& writer) {

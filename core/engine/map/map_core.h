@@ -31,6 +31,10 @@
 
 namespace strata {
 
+// What calls of a map that is being closed end with. Made once: want of memory closes maps, too,
+// and destructors do.
+const absl::Status& BeingClosed();
+
 // Thread-safe.
 class MapCore {
  public:
@@ -99,7 +103,7 @@ class MapCore {
   absl::Status closed() const;
   // Ends the writer and closes all connections, waiting for reads under way; what is asked for
   // later gets `why`. Safe to call again.
-  void Close(const absl::Status& why = absl::CancelledError("the map is being closed"));
+  void Close(const absl::Status& why = BeingClosed());
 
  private:
   MapCore(std::string name,

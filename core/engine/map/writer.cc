@@ -90,7 +90,13 @@ absl::Status WriterThread::doubt() const {
 void WriterThread::NoteDoubt(const absl::Status& doubt) {
   constexpr char kUnknown[] =
       "the store may hold what this server does not know; the map is opened anew";
-  doubt_ = WithRetryDelay(IsOutcomeUnknown(doubt) ? Annotate(doubt, kUnknown) : doubt, kRetryDelay);
+  doubt_ = doubt;
+  Guarded([&] {  // the words may want memory, and whoever waits for the batch waits for this
+    doubt_ =
+        WithRetryDelay(IsOutcomeUnknown(doubt) ? Annotate(doubt, kUnknown) : doubt, kRetryDelay);
+    return absl::OkStatus();
+  })
+      .IgnoreError();
   for (Queue* queue : {&full_, &behind_}) {
     for (Task* task : *queue) {
       queued_bytes_ -= task->bytes;
