@@ -27,6 +27,7 @@ optimize_crash|8|a map that an optimize job leaves half done|env STRATA_KILLS=30
 classify_crash|8|the same for jobs that learn and label|env STRATA_KILLS=30 STRATA_SEED=$seed $build/tests/integration/classify_crash_test
 thesis|~4|a table or figure of the thesis whose bounds no longer hold (the gate has samples of some)|tests/experiments/results.py --build $build table_7_1 fig_7_9 directions table_5_1 planes_walls planes_rack planes_boxes planes_corridor planes_jacket planes_carpet table_4_1 table_4_2 fig_6_1
 lost_answers|~3|a commit whose lost answer leaves something else than was said|env STRATA_LOST_ANSWERS=1 $build/tests/core/engine/engine_lost_answers_test
+memory|~3|an allocation that fails and ends or hangs more than its work|env STRATA_MEMORY_FAULTS=200 STRATA_SEED=$seed $build/tests/core/engine/engine_memory_fault_test
 hostile|9|an attack that slows others down, takes memory or stops the server|/usr/bin/python3 tests/experiments/hostile_clients.py --build $build --seconds 12 --seed $seed
 fuzzers|15|an input that a decoder, reader or call does not survive|tests/fuzz/run.sh 720
 endurance|11|memory or latency that grows|/usr/bin/python3 tests/bench/endurance.py --build $build
