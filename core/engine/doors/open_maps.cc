@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -270,7 +271,9 @@ void OpenMaps::NoteClosing(const std::string& name, Map& map, bool in_doubt) {
 void OpenMaps::CloseNow(const std::string& name, std::shared_ptr<Map> map) {
   const BlockingScope blocking;  // for what its threads are at
   const absl::Status doubt = map->core().doubt();
+  std::set<std::string> again;  // its name, if there is memory for it now
   Guarded([&] {
+    again.insert(name);
     NoteClosing(name, *map, !doubt.ok());
     return absl::OkStatus();
   }).IgnoreError();
@@ -294,7 +297,7 @@ void OpenMaps::CloseNow(const std::string& name, std::shared_ptr<Map> map) {
   map.reset();
   entry.state = State::kClosed;
   open_.erase(name);
-  if (wanted) wanted_.insert(name);
+  if (wanted) wanted_.merge(again);
 }
 
 absl::Status OpenMaps::Make(const Stop& stop,

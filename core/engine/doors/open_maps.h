@@ -143,8 +143,8 @@ class OpenMaps {
   void OpenAllWanted();
   // Lets go what is idle, and closes what has to be opened anew.
   void CloseIdle();
-  // Begins to close the next such one; nullopt: there is none behind `after`.
-  std::optional<std::string> NextIdle(const std::string& after, Turn& turn);
+  // Begins to close the next such one. False: there is none behind `after`.
+  bool NextIdle(const std::string& after, Turn& turn);
 
   const EngineOptions options_;
   const MapStores& stores_;

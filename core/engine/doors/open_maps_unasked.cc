@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -88,7 +87,7 @@ absl::Status OpenMaps::SurveyAgain(absl::Duration age) {
     if (surveying_ || young) return absl::OkStatus();
     surveying_ = true;
   }
-  const absl::Status done = Survey();
+  const absl::Status done = Guarded([this] { return Survey(); });
   absl::MutexLock lock(&mutex_);
   surveying_ = false;
   return done;
@@ -193,22 +192,21 @@ void OpenMaps::CloseIdle() {
   std::string after;
   while (!closing_.requested()) {
     Turn turn;
-    const std::optional<std::string> next = NextIdle(after, turn);
-    if (!next.has_value()) return;
-    after = *next;
+    if (!NextIdle(after, turn)) return;
     // What was taken away from under it says so for as long as it is open.
     if (turn.closed->core().doubt().ok() && !turn.closed->core().CheckInPlace().ok()) {
       absl::MutexLock lock(&mutex_);
-      Entry& entry = entries_.find(after)->second;
+      Entry& entry = entries_.find(turn.close)->second;
       entry.state = State::kOpen;
       entry.used = SteadyNow();
-      continue;
+    } else {
+      CloseNow(turn.close, std::move(turn.closed));
     }
-    CloseNow(turn.close, std::move(turn.closed));
+    after = std::move(turn.close);
   }
 }
 
-std::optional<std::string> OpenMaps::NextIdle(const std::string& after, Turn& turn) {
+bool OpenMaps::NextIdle(const std::string& after, Turn& turn) {
   absl::MutexLock lock(&mutex_);
   const absl::Time now = SteadyNow();
   for (auto it = open_.upper_bound(after); it != open_.end(); ++it) {
@@ -218,11 +216,10 @@ std::optional<std::string> OpenMaps::NextIdle(const std::string& after, Turn& tu
       if (!IsFree(entry)) entry.used = now;
       if (now - entry.used < options_.map_idle || !IsFree(entry) || !entry.map->AtRest()) continue;
     }
-    const std::string name = *it;
-    BeginClosing(entry, name, turn);
-    return name;
+    BeginClosing(entry, *it, turn);
+    return true;
   }
-  return std::nullopt;
+  return false;
 }
 
 }  // namespace strata
