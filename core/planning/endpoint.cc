@@ -21,6 +21,7 @@
 #include "core/mls/tile_key.h"
 #include "core/planning/explain.h"
 #include "core/planning/ground/profile_checks.h"
+#include "core/planning/prepared_tile.h"
 #include "core/planning/search_space.h"
 #include "core/world/plan.h"
 
@@ -28,6 +29,10 @@ namespace strata {
 namespace {
 
 constexpr double kMaxCell = 1 << 30;
+
+// So far around an endpoint, and in so many tiles, the nearest place to stand is looked for.
+constexpr int kNearestRings = 64;
+constexpr int kNearestTiles = 64;
 
 CellIndex CellAt(const PlanEndpoint& endpoint, double cell_size_m) {
   return {static_cast<std::int32_t>(std::floor(endpoint.x_m / cell_size_m)),
@@ -144,37 +149,72 @@ PatchId Snap(SearchSpace& space, const PlanEndpoint& endpoint, PatchId named) {
   return best;
 }
 
-// Nearest place to stand, ring by ring; in height too where the endpoint names one.
-std::optional<Eigen::Vector3d> NearestStandable(SearchSpace& space,
-                                                const PlanEndpoint& endpoint,
-                                                std::optional<double> z) {
-  const double cell_size = space.checks().cell_size_m;
-  const CellIndex middle = CellAt(endpoint, cell_size);
-  const int reach = std::max(1, static_cast<int>(std::min(kNearestReachM / cell_size, 256.0)));
-  std::optional<Eigen::Vector3d> best;
-  double best_distance = std::numeric_limits<double>::infinity();
-  const auto look_at = [&](int dx, int dy) {
-    for (const PatchId patch : space.FindCell({middle.x + dx, middle.y + dy})) {
-      if (space.Danger(patch) < 0.0F) continue;
-      const Eigen::Vector3d p = space.Position(patch);
-      const Eigen::Vector3d wanted(endpoint.x_m, endpoint.y_m, z.value_or(p.z()));
-      const double distance = (p - wanted).norm();
-      if (distance >= best_distance) continue;
-      best_distance = distance;
-      best = p;
+// Nearest place to stand, tiles ring by ring; in height too where the endpoint names one.
+class NearestStandable {
+ public:
+  NearestStandable(SearchSpace& space, const PlanEndpoint& endpoint, std::optional<double> z)
+      : space_(space),
+        endpoint_(endpoint),
+        z_(z),
+        middle_(TileOfCell(CellAt(endpoint, space.checks().cell_size_m))) {}
+
+  // Nothing where none of the tiles looked at has a place.
+  std::optional<Eigen::Vector3d> Find() {
+    for (int ring = 0; ring <= kNearestRings; ++ring) {
+      is_nearer_possible_ = false;
+      for (int d = -ring; d <= ring; ++d) {
+        LookAt(d, -ring);
+        if (ring > 0) LookAt(d, ring);
+        if (std::abs(d) == ring) continue;
+        LookAt(-ring, d);
+        LookAt(ring, d);
+      }
+      if (!is_nearer_possible_) break;
     }
-  };
-  for (int r = 0; r <= reach && (r - 1) * cell_size < best_distance; ++r) {
-    for (int d = -r; d <= r; ++d) {
-      look_at(d, -r);
-      if (r > 0) look_at(d, r);
-      if (std::abs(d) == r) continue;
-      look_at(-r, d);
-      look_at(r, d);
+    return best_;
+  }
+
+ private:
+  // From the endpoint to the tile, on the plane.
+  double DistanceTo(const TileKey& key) const {
+    const double size_m = kTileCells * space_.checks().cell_size_m;
+    const double dx =
+        std::max({key.x * size_m - endpoint_.x_m, endpoint_.x_m - (key.x + 1) * size_m, 0.0});
+    const double dy =
+        std::max({key.y * size_m - endpoint_.y_m, endpoint_.y_m - (key.y + 1) * size_m, 0.0});
+    return std::hypot(dx, dy);
+  }
+
+  void LookAt(int dx, int dy) {
+    const TileKey key{middle_.level, middle_.x + dx, middle_.y + dy};
+    if (tiles_ == kNearestTiles || DistanceTo(key) >= distance_) return;
+    is_nearer_possible_ = true;
+    if (space_.source().Version(key) == 0) return;
+    const int slot = space_.SlotOf(key);
+    ++tiles_;
+    if (slot < 0) return;
+    const SearchSpace::Slot at = space_.At(slot);
+    for (std::uint32_t place = 0; place < at.tile->standing.places(); ++place) {
+      const PatchId patch = at.base + place;
+      if (!at.tile->CanStand(place) || space_.Danger(patch) < 0.0F) continue;
+      const Eigen::Vector3d p = space_.Position(patch);
+      const double distance =
+          (p - Eigen::Vector3d(endpoint_.x_m, endpoint_.y_m, z_.value_or(p.z()))).norm();
+      if (distance >= distance_) continue;
+      distance_ = distance;
+      best_ = p;
     }
   }
-  return best;
-}
+
+  SearchSpace& space_;
+  const PlanEndpoint& endpoint_;
+  const std::optional<double> z_;
+  const TileKey middle_;
+  int tiles_ = 0;
+  bool is_nearer_possible_ = true;
+  double distance_ = std::numeric_limits<double>::infinity();
+  std::optional<Eigen::Vector3d> best_;
+};
 
 }  // namespace
 
@@ -236,7 +276,7 @@ absl::StatusOr<EndpointMatch> MatchEndpoint(SearchSpace& space, const PlanEndpoi
                                     match.message);
     return match;
   }
-  match.nearest = NearestStandable(space, endpoint, z);
+  match.nearest = NearestStandable(space, endpoint, z).Find();
   STRATA_RETURN_IF_ERROR(space.status());
   if (match.nearest.has_value()) {
     absl::StrAppend(

@@ -16,9 +16,6 @@
 
 namespace strata {
 
-// How far around an endpoint a place to stand is looked for [m].
-inline constexpr double kNearestReachM = 10.0;
-
 struct EndpointMatch {
   PatchId patch = kNoPatchId;  // kNoPatchId: the robot cannot be there, and
   Explanation reason;          //   why (kUnknown: no surface there at all)
@@ -40,7 +37,8 @@ absl::Status ValidateEndpoint(absl::string_view name,
 //   with neither   on the lowest surface of its cell.
 // Failing that, with z, the highest surface of the cell at or below z on which the robot can stand
 // and reaches z: z may be a sensor's, and a ceiling nearer to it than the floor. Never another
-// storey: `message` then says where the nearest place to stand is and how far from z.
+// storey: `message` then says where the nearest place to stand is, of the 64 tiles around with
+// anything in them, and how far from z.
 absl::StatusOr<EndpointMatch> MatchEndpoint(SearchSpace& space, const PlanEndpoint& endpoint);
 
 }  // namespace strata
