@@ -70,13 +70,22 @@ BlockColours ColoursOf(const Surface& surface, bool cut, const PictureOptions& o
   return {top, surface.vertical() ? kVerticalColour : top};
 }
 
+bool HasTops(const std::vector<SurfaceTile>& tiles) {
+  return std::ranges::any_of(tiles, [](const SurfaceTile& tile) {
+    return !std::ranges::all_of(tile.surfaces, &Surface::underside);
+  });
+}
+
 std::vector<Block> BlocksOf(const std::vector<SurfaceTile>& tiles,
                             double cell,
                             const PictureOptions& options) {
   const auto [low, high] = options.slice_m.value_or(std::make_pair(-1e9, 1e9));
+  // Whoever looks from above sees no ceiling, but the floor that it would hide.
+  const bool skip_undersides = !options.slice_m.has_value() && HasTops(tiles);
   std::vector<Block> blocks;
   for (const SurfaceTile& tile : tiles) {
     for (const Surface& surface : tile.surfaces) {
+      if (skip_undersides && surface.underside()) continue;
       if (surface.z_m < low || surface.bottom_m() > high ||
           (!surface.vertical() && surface.z_m > high)) {
         continue;

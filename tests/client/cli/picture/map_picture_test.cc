@@ -127,6 +127,29 @@ TEST(MapPictureTest, UpperLevelHidesTheLowerAndASliceShowsIt) {
   EXPECT_TRUE(IsRed(PixelAt(DrawMap({tile}, 0.1, {}, options), {2, 2, 0})));
 }
 
+TEST(MapPictureTest, ACeilingHidesNoFloor) {
+  SurfaceTile tile;
+  for (int cell = 0; cell < 60 * 60; ++cell) {
+    Surface floor = Ground(Traversability::kTraversable);
+    Surface ceiling = Ground(Traversability::kUnderside, 3.0F);
+    floor.cell = ceiling.cell = CellInTile({cell % 60, cell / 60});
+    if (cell % 60 < 30) tile.surfaces.push_back(floor);
+    tile.surfaces.push_back(ceiling);
+  }
+  tile.IndexRows();
+  const PictureOptions options{.width = 400, .height = 444};
+  const Picture whole = DrawMap({tile}, 0.1, {}, options);
+  EXPECT_TRUE(IsYellow(PixelAt(whole, {1.0, 3.0, 0.0})));
+  PictureOptions slice = options;
+  slice.slice_m = {2.0, 4.0};
+  const Colour asked_for = PixelAt(DrawMap({tile}, 0.1, {}, slice), {1.0, 3.0, 3.0});
+  EXPECT_FALSE(IsYellow(asked_for));
+  EXPECT_LT(asked_for.r, 220);  // grey, not the background
+  std::erase_if(tile.surfaces, [](const Surface& s) { return !s.underside(); });
+  tile.IndexRows();
+  EXPECT_LT(PixelAt(DrawMap({tile}, 0.1, {}, options), {1.0, 3.0, 3.0}).r, 220);
+}
+
 TEST(MapPictureTest, ObliqueViewShowsTheFacingSideOfAWallAndItsDrivableTop) {
   const SurfaceTile tile = TileOf(60, [](int x, int y) {
     Surface surface = Ground(Traversability::kTraversable);
