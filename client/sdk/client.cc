@@ -21,6 +21,7 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
+#include "client/sdk/answering.h"
 #include "client/sdk/connection.h"
 #include "client/sdk/remote_classifiers.h"
 #include "client/sdk/remote_jobs.h"
@@ -140,6 +141,15 @@ grpc::ChannelArguments ArgumentsOfNamed(const ClientOptions& options) {
   return ArgumentsOf(named);
 }
 
+// Why no server answers: the first that it can be asked of.
+std::string WhyNone(const ClientOptions& options) {
+  for (const std::string& server : ServersOf(options.target)) {
+    const absl::StatusOr<HostPort> address = ParseHostPort(server);
+    if (address.ok()) return sdk::WhatAnswers(*address, options.tls.enabled());
+  }
+  return "is stratad running there?";
+}
+
 class RemoteDatabase final : public api::Database {
  public:
   RemoteDatabase(std::shared_ptr<grpc::Channel> channel,
@@ -233,14 +243,12 @@ absl::StatusOr<std::unique_ptr<api::Database>> Connect(const ClientOptions& opti
   STRATA_ASSIGN_OR_RETURN(const std::string target, ChannelTarget(options.target));
   auto channel = grpc::CreateCustomChannel(target, credentials, ArgumentsOf(options));
   if (!channel->WaitForConnected(absl::ToChronoTime(absl::Now() + options.connect_timeout))) {
-    return absl::UnavailableError(absl::StrCat(
-        "no server answers at ",
-        options.target,
-        " within ",
-        absl::FormatDuration(options.connect_timeout),
-        options.tls.enabled() ? "; is stratad running there, with a certificate of that authority "
-                                "for that name, and does it take ours?"
-                              : "; is stratad running there, and without TLS?"));
+    return absl::UnavailableError(absl::StrCat("no server answers at ",
+                                               options.target,
+                                               " within ",
+                                               absl::FormatDuration(options.connect_timeout),
+                                               "; ",
+                                               WhyNone(options)));
   }
   return std::make_unique<RemoteDatabase>(
       std::move(channel), options, [credentials, options](const std::string& address) {
