@@ -9,9 +9,9 @@
 //     kTooLittleOverlap or kDiverged keep the prediction. The least overlap of an accepted scan was
 //     0.46 (facade), so min_overlap of 0.3 leaves room.
 //   - 4000 samples: with 2000 the campus closes 0.1 to 1 m off, by the seed.
-// Sample seeds 1 and 2: NCLT campus, 636 m, off by 0.75 and 0.60 m, 0.7° and 0.9°, at its closure
-// (uploaded 17.9 m), KITTI drive with noisy steps ATE 9 to 12 mm, hall 13 mm (uploaded 61), facade
-// 4 mm (35). Surface elements of 20 features, or σt of 0.5 m, let the campus drift by 1 m and more.
+// Sample seeds 1 and 2: NCLT campus, 636 m, off by 0.75 and 0.73 m, 1.1° and 1.0°, at its closure
+// (uploaded 17.9 m), KITTI drive with noisy steps ATE 11 to 13 mm, hall 13 mm (uploaded 61), facade
+// 3 mm (35). Surface elements of 20 features, or σt of 0.5 m, let the campus drift by 1 m and more.
 #ifndef STRATA_CORE_REGISTRATION_NEIGHBOURS_H_
 #define STRATA_CORE_REGISTRATION_NEIGHBOURS_H_
 

@@ -35,17 +35,19 @@ std::vector<Eigen::Vector3f>& ListOf(FeatureClass c, ClassPoints& points) {
   return points[static_cast<std::size_t>(c)];
 }
 
-// `place` of a patch of the map that `offsets`, if any, are of.
+// `cell` and `place` of a patch of the map that `offsets`, if any, are of.
 void AppendVertical(const Patch& patch,
                     const Eigen::Vector2f& middle,
                     double samples_per_metre,
                     const UprightOffsets* offsets,
+                    CellIndex cell,
                     std::size_t place,
                     ClassPoints& points) {
   const double depth = patch.depth_m();
   const int n = SamplesOf(patch, samples_per_metre);
   for (int i = 0; i < n; ++i) {
-    const Eigen::Vector2f p = offsets == nullptr ? middle : middle + offsets->Of(place, i);
+    const Eigen::Vector2f p =
+        offsets == nullptr ? middle : middle + offsets->Of(cell, patch, place, i);
     ListOf(FeatureClass::kVertical, points)
         .emplace_back(p.x(), p.y(), static_cast<float>(patch.bottom_m() + (i + 0.5) * depth / n));
   }
@@ -131,7 +133,7 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map,
       if (x * x + y * y > max_range_m2) continue;
       const Eigen::Vector3f p = Eigen::Vector3d(x, y, patch.mean_m()).cast<float>();
       if (patch.vertical()) {
-        AppendVertical(patch, p.head<2>(), options.samples_per_metre, offsets, here, points);
+        AppendVertical(patch, p.head<2>(), options.samples_per_metre, offsets, cell, here, points);
       } else if (side == Side::kUnderside) {
         ListOf(FeatureClass::kNonTraversable, points).push_back(p);
       } else if (side != Side::kDoubtful) {  // taken for a top it pulls a storey down onto it

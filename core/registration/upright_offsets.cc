@@ -1,9 +1,11 @@
 #include "core/registration/upright_offsets.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include <Eigen/Core>
@@ -17,6 +19,7 @@ namespace strata {
 namespace {
 
 constexpr std::uint32_t kLeastPoints = 3;
+constexpr std::array<std::array<int, 2>, 4> kBeside = {{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
 // Standard deviation across a face, of a sensor's noise; that of a cell full of points is twice as
 // much at 0.1 m.
 constexpr float kMaxFaceSigmaM = 0.015F;
@@ -50,18 +53,21 @@ UprightOffsets::UprightOffsets(const MlsMap& local_map, double samples_per_metre
   samples_.resize(samples);
 }
 
-void UprightOffsets::AddTo(const Patch& patch,
-                           std::size_t place,
-                           std::int32_t z_ticks,
-                           const Eigen::Vector2f& d) {
-  const auto count = static_cast<std::int64_t>(first_[place + 1] - first_[place]);
-  const std::int64_t along = (z_ticks - patch.z_min) * count / std::max(1, patch.height_ticks());
-  Moments& moments = samples_[first_[place] + std::min(along, count - 1)];
-  moments.sum += d;
-  moments.xx += d.x() * d.x();
-  moments.xy += d.x() * d.y();
-  moments.yy += d.y() * d.y();
-  ++moments.n;
+void UprightOffsets::Moments::Add(const Eigen::Vector2f& p) {
+  sum += p;
+  xx += p.x() * p.x();
+  xy += p.x() * p.y();
+  yy += p.y() * p.y();
+  ++n;
+}
+
+void UprightOffsets::Moments::Add(const Moments& others, const Eigen::Vector2f& moved) {
+  const auto count = static_cast<float>(others.n);
+  xx += others.xx + moved.x() * (2.0F * others.sum.x() + count * moved.x());
+  xy += others.xy + moved.x() * others.sum.y() + moved.y() * (others.sum.x() + count * moved.x());
+  yy += others.yy + moved.y() * (2.0F * others.sum.y() + count * moved.y());
+  sum += others.sum + count * moved;
+  n += others.n;
 }
 
 std::span<const Patch> UprightOffsets::UprightIn(CellIndex cell, const MlsTile*& tile) const {
@@ -72,44 +78,78 @@ std::span<const Patch> UprightOffsets::UprightIn(CellIndex cell, const MlsTile*&
   return std::ranges::any_of(patches, &Patch::vertical) ? patches : std::span<const Patch>();
 }
 
+std::uint32_t UprightOffsets::SampleAt(CellIndex cell,
+                                       std::int32_t z_ticks,
+                                       const MlsTile*& tile) const {
+  const std::span<const Patch> patches = UprightIn(cell, tile);
+  const auto patch = std::ranges::find_if(
+      patches, [z_ticks](const Patch& at) { return at.z_min <= z_ticks && z_ticks <= at.z_max; });
+  if (patch == patches.end() || !patch->vertical()) return kNone;
+  const std::size_t place = tile_first_[static_cast<std::size_t>(tile - map_.tiles.data())] +
+                            static_cast<std::size_t>(&*patch - tile->patches.data());
+  const auto count = static_cast<std::int64_t>(first_[place + 1] - first_[place]);
+  const std::int64_t along = (z_ticks - patch->z_min) * count / std::max(1, patch->height_ticks());
+  return first_[place] + static_cast<std::uint32_t>(std::min(along, count - 1));
+}
+
 void UprightOffsets::Add(std::span<const Eigen::Vector3f> points) {
   const double cell_size = map_.parameters.cell_size_m;
   const double cells_per_metre = 1.0 / cell_size;
-  const MlsTile* tile = nullptr;  // the next point lies most often in the same, even in this cell
-  CellIndex last{-kMaxCellIndex - 1, 0};
-  std::span<const Patch> patches;
+  const MlsTile* tile = nullptr;  // the next point lies most often in the same
   for (const Eigen::Vector3f& p : points) {
     const double x = p.x() * cells_per_metre;
     const double y = p.y() * cells_per_metre;
-    if (!(std::abs(x) < kMaxCellIndex && std::abs(y) < kMaxCellIndex)) continue;
+    if (!(std::abs(x) < kMaxCellIndex && std::abs(y) < kMaxCellIndex) ||
+        !(std::abs(p.z()) * kTicksPerMetre < kMaxZTicks)) {
+      continue;
+    }
     const CellIndex cell{FloorOf(x), FloorOf(y)};
-    if (cell != last) patches = UprightIn(last = cell, tile);
-    if (patches.empty() || !(std::abs(p.z()) * kTicksPerMetre < kMaxZTicks)) continue;
     const std::int32_t z_ticks = FloorOf(p.z() * double{kTicksPerMetre} + 0.5);
-    const auto patch = std::ranges::find_if(
-        patches, [z_ticks](const Patch& at) { return at.z_min <= z_ticks && z_ticks <= at.z_max; });
-    if (patch == patches.end() || !patch->vertical()) continue;
-    const std::size_t place = tile_first_[static_cast<std::size_t>(tile - map_.tiles.data())] +
-                              static_cast<std::size_t>(&*patch - tile->patches.data());
-    AddTo(*patch,
-          place,
-          z_ticks,
-          Eigen::Vector2f(static_cast<float>((x - cell.x - 0.5) * cell_size),
-                          static_cast<float>((y - cell.y - 0.5) * cell_size)));
+    const std::uint32_t sample = SampleAt(cell, z_ticks, tile);
+    if (sample == kNone) continue;
+    samples_[sample].Add(Eigen::Vector2f(static_cast<float>((x - cell.x - 0.5) * cell_size),
+                                         static_cast<float>((y - cell.y - 0.5) * cell_size)));
   }
 }
 
-Eigen::Vector2f UprightOffsets::Of(std::size_t place, int i) const {
-  const Moments& moments = samples_[first_[place] + static_cast<std::uint32_t>(i)];
-  if (moments.n < kLeastPoints) return Eigen::Vector2f::Zero();
+std::optional<UprightOffsets::Face> UprightOffsets::FaceOf(const Moments& moments) {
+  if (moments.n < kLeastPoints) return std::nullopt;
   const auto n = static_cast<float>(moments.n);
   const Eigen::Vector2f mean = moments.sum / n;
   const float xx = moments.xx / n - mean.x() * mean.x();
   const float xy = moments.xy / n - mean.x() * mean.y();
   const float yy = moments.yy / n - mean.y() * mean.y();
   const float across = 0.5F * (xx + yy) - std::hypot(0.5F * (xx - yy), xy);  // smaller eigenvalue
-  if (across > kMaxFaceSigmaM * kMaxFaceSigmaM) return Eigen::Vector2f::Zero();
-  return mean;
+  if (across > kMaxFaceSigmaM * kMaxFaceSigmaM) return std::nullopt;
+  const float turn_rad = 0.5F * std::atan2(2.0F * xy, xx - yy);  // of the other's direction
+  return Face{mean, {-std::sin(turn_rad), std::cos(turn_rad)}};
+}
+
+Eigen::Vector2f UprightOffsets::Of(CellIndex cell,
+                                   const Patch& patch,
+                                   std::size_t place,
+                                   int i) const {
+  const std::uint32_t first = first_[place];
+  const auto count = static_cast<std::int64_t>(first_[place + 1] - first);
+  const Moments& own = samples_[first + static_cast<std::uint32_t>(i)];
+  const auto cell_size = static_cast<float>(map_.parameters.cell_size_m);
+  const auto z_ticks =
+      static_cast<std::int32_t>(patch.z_min + (2 * i + 1) * patch.height_ticks() / (2 * count));
+  Moments around = own;
+  const MlsTile* tile = nullptr;
+  for (const auto& [dx, dy] : kBeside) {
+    const std::uint32_t sample = SampleAt({cell.x + dx, cell.y + dy}, z_ticks, tile);
+    if (sample != kNone) {
+      around.Add(samples_[sample], cell_size * Eigen::Vector2f(dx, dy));
+    }
+  }
+  if (const std::optional<Face> face = FaceOf(around); face.has_value()) {
+    Eigen::Vector2f mean = Eigen::Vector2f::Zero();
+    if (own.n > 0) mean = own.sum / static_cast<float>(own.n);
+    return mean + face->normal.dot(face->mean - mean) * face->normal;
+  }
+  const std::optional<Face> face = FaceOf(own);
+  return face.has_value() ? face->mean : Eigen::Vector2f::Zero();
 }
 
 }  // namespace strata

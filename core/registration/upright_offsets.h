@@ -4,6 +4,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,21 +28,35 @@ class UprightOffsets {
   // Some of the points that the map was made of, in its frame.
   void Add(std::span<const Eigen::Vector3f> points);
 
-  // From the middle of the cell to the mean of the points of sample `i`, from below, of a vertical
-  // patch, the `place`th patch of the map in its order [m]. Zero unless they lie on a face: the few
-  // points of a sparse cell show the lines of beams, those of a hedge where it was seen from.
-  Eigen::Vector2f Of(std::size_t place, int i) const;
+  // From the middle of `cell` to where sample `i`, from below, of its vertical patch `patch` lies,
+  // the `place`th patch of the map in its order [m]: the mean of the sample's points, moved onto
+  // the face that they and those at its height in the four cells around lie on. A face seldom keeps
+  // to one cell: of the few points beyond the border neither the mean nor the cell's middle is on
+  // it. Zero where there is no face: what is seen of a hedge goes with where it was seen from.
+  Eigen::Vector2f Of(CellIndex cell, const Patch& patch, std::size_t place, int i) const;
 
  private:
   struct Moments {
     Eigen::Vector2f sum = Eigen::Vector2f::Zero();
     float xx = 0.0F, xy = 0.0F, yy = 0.0F;
     std::uint32_t n = 0;
+
+    void Add(const Eigen::Vector2f& p);
+    // The points of others, each moved.
+    void Add(const Moments& others, const Eigen::Vector2f& moved);
+  };
+  struct Face {
+    Eigen::Vector2f mean;
+    Eigen::Vector2f normal;
   };
 
+  static std::optional<Face> FaceOf(const Moments& moments);
   // All patches of a cell with a vertical one, else none. `tile`: the last one, or nullptr.
   std::span<const Patch> UprightIn(CellIndex cell, const MlsTile*& tile) const;
-  void AddTo(const Patch& patch, std::size_t place, std::int32_t z_ticks, const Eigen::Vector2f& d);
+  // The sample of a cell's vertical patch at a height; kNone if there is none.
+  std::uint32_t SampleAt(CellIndex cell, std::int32_t z_ticks, const MlsTile*& tile) const;
+
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
   const MlsMap& map_;
   std::vector<std::size_t> tile_first_;  // place of each tile's first patch
