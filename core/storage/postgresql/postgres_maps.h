@@ -57,6 +57,10 @@ class PostgresMaps {
   absl::StatusOr<bool> Has(absl::string_view name) const;
   // Whose lease has ended without having been given up: the process that had them died, say.
   absl::StatusOr<std::vector<std::string>> ListAbandoned() const;
+  // Where those of `names` that are there stand, in one statement. Names must be valid
+  // (ValidateName).
+  absl::StatusOr<std::vector<std::pair<std::string, MapClock>>> ListClocks(
+      const std::vector<std::string>& names) const;
   // All maps, a thousand a query, in no order; an error of one of them is of its rows. CANCELLED,
   // DEADLINE_EXCEEDED by `stop`.
   absl::Status Survey(

@@ -183,10 +183,17 @@ TEST_F(MapLeasesTest, ItIsRenewedUntilAnotherHasIt) {
 }
 
 TEST_F(MapLeasesTest, TablesOfTheVersionBeforeGetLeases) {
-  STRATA_ASSERT_OK(sql_->Execute("DROP TABLE map_lease; UPDATE strata_format SET version = 1"));
+  STRATA_ASSERT_OK(
+      sql_->Execute("DROP TABLE map_lease; DROP TABLE map_change; ALTER TABLE derived_state DROP "
+                    "COLUMN changes_after; UPDATE strata_format SET version = 1"));
   const PostgresMaps a = Server("a");
   STRATA_ASSERT_OK_AND_ASSIGN(const auto held, a.OpenAlone(kName));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto reader, held->NewReader());
+  const std::uint64_t before = reader->GetClock()->commit_sequence;
   STRATA_EXPECT_OK(Tick(*held));
+  // What changed before nobody has kept.
+  EXPECT_TRUE(reader->ListChanges(before)->complete);
+  EXPECT_TRUE(before == 0 || !reader->ListChanges(before - 1)->complete);
 }
 
 ScanRecord ScanOf(std::uint64_t sequence, std::uint64_t number, std::uint32_t chunks) {
