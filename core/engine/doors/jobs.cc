@@ -1,8 +1,10 @@
 #include "core/engine/doors/jobs.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,8 +13,11 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "core/engine/doors/map_reading.h"
 #include "core/engine/jobs/job_handlers.h"
 #include "core/world/job_arguments.h"
@@ -51,6 +56,24 @@ absl::StatusOr<std::vector<JobInfo>> StoredJobs(const MapReading& map) {
   return jobs;
 }
 
+absl::StatusOr<JobInfo> StoredJob(const MapReading& map, std::uint64_t id) {
+  std::optional<JobInfo> job;
+  STRATA_RETURN_IF_ERROR(map.ReadState(
+      [&](StorageReader& reader, const MapClock&) { return AssignTo(reader.FindJob(id), job); }));
+  if (job.has_value()) return *std::move(job);
+  return absl::NotFoundError(absl::StrCat("job ", id, " does not exist"));
+}
+
+absl::Status Pause(absl::Duration pause, const Stop& stop) {
+  constexpr absl::Duration kPoll = absl::Milliseconds(50);
+  const absl::Time end = SteadyNow() + pause;
+  while (SteadyNow() < end) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+    absl::SleepFor(std::min(kPoll, end - SteadyNow()));
+  }
+  return stop.status();
+}
+
 }  // namespace
 
 absl::StatusOr<JobInfo> EngineJobs::Start(const api::Call& call,
@@ -73,11 +96,7 @@ absl::StatusOr<JobInfo> EngineJobs::Get(const api::Call& call,
                                         std::uint64_t id) {
   STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
   if (found.map() != nullptr) return found.map()->jobs().Get(id);
-  STRATA_ASSIGN_OR_RETURN(const std::vector<JobInfo> jobs, StoredJobs(found));
-  for (const JobInfo& job : jobs) {
-    if (job.id == id) return job;
-  }
-  return absl::NotFoundError(absl::StrCat("job ", id, " does not exist"));
+  return StoredJob(found, id);
 }
 
 absl::StatusOr<std::vector<JobInfo>> EngineJobs::List(const api::Call& call,
@@ -124,8 +143,16 @@ absl::Status EngineJobs::Watch(const api::Call& call,
                                absl::string_view map,
                                std::uint64_t id,
                                absl::FunctionRef<absl::Status(const JobInfo&)> sink) {
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return found->jobs().Watch(call.stop, id, sink);
+  absl::Time told = absl::InfinitePast();
+  while (true) {
+    STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
+    if (found.map() != nullptr) return found.map()->jobs().Watch(call.stop, id, sink);
+    STRATA_ASSIGN_OR_RETURN(const JobInfo job, StoredJob(found, id));
+    if (job.updated != told) STRATA_RETURN_IF_ERROR(sink(job));
+    if (IsFinal(job.state)) return absl::OkStatus();
+    told = job.updated;
+    STRATA_RETURN_IF_ERROR(Pause(api::kWatchLag, call.stop));
+  }
 }
 
 }  // namespace strata

@@ -119,6 +119,10 @@ class PostgresStores final : public MapStores {
   absl::StatusOr<std::vector<std::string>> ListWaiting() const override {
     return maps_.ListWaiting();
   }
+  absl::StatusOr<std::vector<std::pair<std::string, MapClock>>> ListClocks(
+      const std::vector<std::string>& names) const override {
+    return maps_.ListClocks(names);
+  }
   bool IsShared() const override { return true; }
   absl::StatusOr<bool> Has(absl::string_view name) const override { return maps_.Has(name); }
   absl::StatusOr<std::vector<std::string>> ListAbandoned() const override {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/functional/function_ref.h"
@@ -84,6 +85,11 @@ class MapStores {
   virtual absl::StatusOr<bool> Has(absl::string_view) const { return false; }
   virtual absl::StatusOr<std::vector<std::string>> ListAbandoned() const {
     return std::vector<std::string>();
+  }
+  // Of shared ones: where those of `names` that are there stand.
+  virtual absl::StatusOr<std::vector<std::pair<std::string, MapClock>>> ListClocks(
+      const std::vector<std::string>&) const {
+    return std::vector<std::pair<std::string, MapClock>>();
   }
   // FAILED_PRECONDITION for what is no map; OK also where there is nothing.
   virtual absl::Status CheckRemovable(absl::string_view name) const = 0;

@@ -9,6 +9,17 @@ add_dependencies(two_servers_test stratad)
 add_test(NAME two_servers_test COMMAND two_servers_test)
 set_tests_properties(two_servers_test PROPERTIES LABELS integration TIMEOUT 300)
 
+# Watches by the server that has not got the map.
+strata_executable(
+  watch_elsewhere_test watch_elsewhere_test
+  SOURCES stratad_process.cc cluster/watch_elsewhere_test.cc
+  DEPS strata::postgres_cluster strata::sdk strata::storage_postgresql strata::test_support GTest::gmock_main
+  SHARED_HEADERS strata_test_headers
+)
+add_dependencies(watch_elsewhere_test stratad)
+add_test(NAME watch_elsewhere_test COMMAND watch_elsewhere_test)
+set_tests_properties(watch_elsewhere_test PROPERTIES LABELS integration TIMEOUT 300)
+
 # Maps between files and a database.
 strata_executable(
   map_import_test map_import_test
