@@ -13,7 +13,6 @@
 #include "core/engine/consistency/closure_watch.h"
 #include "core/engine/consistency/localizer.h"
 #include "core/engine/consistency/surfaces_around.h"
-#include "core/engine/doors/map_planner.h"
 #include "core/engine/ingest/unfinished_uploads.h"
 #include "core/engine/ingest/worker.h"
 #include "core/engine/jobs/job_board.h"
@@ -21,6 +20,7 @@
 #include "core/engine/map/map_core.h"
 #include "core/engine/map/map_stores.h"
 #include "core/engine/map/quarantine.h"
+#include "core/engine/plans/map_planner.h"
 #include "core/engine/tiles/served_tiles.h"
 
 namespace strata {

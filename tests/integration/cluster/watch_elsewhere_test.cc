@@ -260,6 +260,49 @@ TEST_F(WatchElsewhereTest, ResumesAtTheOtherServerWhereItStopped) {
   EXPECT_EQ(picture.wholes, 1);
 }
 
+// A path is told to be blocked when a scan puts something into its way.
+TEST_F(WatchElsewhereTest, FollowsAPath) {
+  PointCloud floor;
+  for (int i = -160; i < 160; ++i) {
+    for (int j = -60; j < 60; ++j) {
+      floor.points.emplace_back(0.05F * static_cast<float>(i), 0.05F * static_cast<float>(j), 0.0F);
+    }
+  }
+  PointCloud wall;
+  for (int j = -60; j < 60; ++j) {
+    for (int k = 0; k < 16; ++k) {
+      wall.points.emplace_back(2.0F, 0.05F * static_cast<float>(j), 0.1F * static_cast<float>(k));
+    }
+  }
+  const auto put = [&](std::uint64_t sequence, const PointCloud& cloud) {
+    ScanHeader header;
+    header.id = {"path", sequence};
+    header.alignment = Alignment::kOff;
+    header.point_count = cloud.size();
+    STRATA_ASSERT_OK_AND_ASSIGN(const auto upload, db(0).scans().Upload({}, kShared, header));
+    STRATA_ASSERT_OK(upload->Write(cloud));
+    STRATA_ASSERT_OK(upload->Finish());
+  };
+  put(1, floor);
+  STRATA_ASSERT_OK(AtRest(db(0), kShared));
+  PlanQuery query;
+  query.from = {-4.0, 0.0};
+  query.to = {6.0, 0.0};
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult plan, db(1).planning().PlanPath({}, kShared, query));
+  ASSERT_TRUE(plan.found()) << plan.message;
+  const api::Call call;
+  std::vector<bool> told;
+  const absl::Status ended = db(1).planning().WatchPath(
+      call, kShared, {plan.waypoints, query.profile}, [&](const PathCheck& check) {
+        told.push_back(check.valid);
+        if (told.size() == 1) put(2, wall);
+        if (told.size() == 2) call.stop.Request();
+        return absl::OkStatus();
+      });
+  EXPECT_TRUE(absl::IsCancelled(ended)) << ended;
+  EXPECT_THAT(told, ::testing::ElementsAre(true, false));
+}
+
 // So many watchers there are, the store is asked for all of them at once.
 TEST_F(WatchElsewhereTest, IdleWatchersAskTheStoreTogether) {
   constexpr std::size_t kWatchers = 60;
