@@ -482,6 +482,10 @@ absl::Status PostgresMaps::Delete(absl::string_view name) const {
 absl::Status PostgresMaps::DeleteRows(std::int64_t map) const {
   STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
   STRATA_RETURN_IF_ERROR(lease->Execute("BEGIN; SET LOCAL statement_timeout = 0"));
+  STRATA_ASSIGN_OR_RETURN(
+      Rows mine,
+      lease->Query("SELECT 1 FROM map_place WHERE map = $1 FOR UPDATE SKIP LOCKED", map));
+  if (!mine.Next()) return lease->Execute("ROLLBACK");  // another process is at it
   for (const char* sql : DeletionsOfDerived()) {
     STRATA_RETURN_IF_ERROR(lease->Change(sql, map).status());
   }

@@ -174,6 +174,10 @@ TEST_F(PlansElsewhereTest, RefuseWhatTheOwnerRefuses) {
 TEST_F(PlansElsewhereTest, ReadNoTileASecondTime) {
   PutHalls(3);
   const PlanQuery query = FromTo(-6.0, 36.0);
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult first,
+                              db(0).planning().PlanPath({}, kShared, query));
+  STRATA_ASSERT_OK_AND_ASSIGN(const PlanResult second,
+                              db(0).planning().PlanPath({}, kShared, query));
   STRATA_ASSERT_OK_AND_ASSIGN(PlanResult cold, db(1).planning().PlanPath({}, kShared, query));
   ASSERT_TRUE(cold.found()) << cold.message;
   STRATA_ASSERT_OK(db(1).planning().SampleSurfaces({}, kShared, {{0.0, 0.0}}));
@@ -182,7 +186,11 @@ TEST_F(PlansElsewhereTest, ReadNoTileASecondTime) {
   STRATA_ASSERT_OK(connection->Execute("UPDATE derived_surface_tile SET bytes = ''"));
   STRATA_ASSERT_OK(connection->Execute("DELETE FROM derived_prepared_tile"));
   STRATA_ASSERT_OK_AND_ASSIGN(PlanResult warm, db(1).planning().PlanPath({}, kShared, query));
-  std::printf("cold %.1f ms, warm %.1f ms\n", cold.elapsed_ms, warm.elapsed_ms);
+  std::printf("cold %.1f ms, warm %.1f ms; by the owner %.1f ms and %.1f ms\n",
+              cold.elapsed_ms,
+              warm.elapsed_ms,
+              first.elapsed_ms,
+              second.elapsed_ms);
   cold.elapsed_ms = warm.elapsed_ms = 0.0;
   EXPECT_EQ(BytesOf(cold), BytesOf(warm));
   STRATA_EXPECT_OK(db(1).planning().SampleSurfaces({}, kShared, {{0.0, 0.0}}));

@@ -407,6 +407,21 @@ TEST_F(PostgresStorageTest, TablesThatAreOthersOrNewerAreNotReadAsOurs) {
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("format 99")));
 }
 
+// One that is frozen in the middle of a deletion keeps no other from starting.
+TEST_F(PostgresStorageTest, ADeletionThatAnotherIsAtIsLeftToHim) {
+  const auto going = [&]() -> std::int64_t {
+    auto rows = other_->Query("SELECT count(*) FROM map_place WHERE state = 2");
+    return rows.ok() && rows->Next() ? rows->Int(0) : -1;
+  };
+  STRATA_ASSERT_OK(other_->Execute("INSERT INTO map_place (name, state) VALUES ('going', 2)"));
+  STRATA_ASSERT_OK(other_->Execute("BEGIN; SELECT 1 FROM map_place WHERE state = 2 FOR UPDATE"));
+  STRATA_EXPECT_OK(PostgresMaps::Connect(Options()));
+  EXPECT_EQ(going(), 1);
+  STRATA_ASSERT_OK(other_->Execute("COMMIT"));
+  STRATA_EXPECT_OK(PostgresMaps::Connect(Options()));
+  EXPECT_EQ(going(), 0);
+}
+
 TEST_F(PostgresStorageTest, ChangesAreKeptForAnHour) {
   StorageWriter& writer = storage_->writer();
   std::uint64_t at = 0;
