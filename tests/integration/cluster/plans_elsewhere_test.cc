@@ -22,7 +22,6 @@
 #include "core/common/status.h"
 #include "core/storage/postgresql/connection.h"
 #include "core/world/scan_hash.h"
-#include "proto/translate/places.h"
 #include "proto/translate/planning.h"
 #include "proto/translate/shape.h"
 #include "tests/integration/cluster/sharing_servers.h"
@@ -108,9 +107,6 @@ absl::StatusOr<std::vector<std::string>> AskAll(api::Database& db, int halls) {
                           planning.ListFloors({}, kShared, {.profile = profile, .cells = true}));
   EXPECT_EQ(floors.floors.size(), 1U);
   told.push_back(BytesOf(floors));
-  STRATA_ASSIGN_OR_RETURN(const FloorPlaces places,
-                          planning.ListPlaces({}, kShared, {.profile = profile, .cells = true}));
-  told.push_back(BytesOf(places));
   ExploreQuery look;
   look.from = {0.0, -4.0};
   STRATA_ASSIGN_OR_RETURN(ExploreResult views, planning.Explore({}, kShared, look));
