@@ -44,6 +44,13 @@ struct StoredChanges {
   std::vector<StoredChange> changes;
 };
 
+// A map in which something waits for who has it.
+struct WaitingMap {
+  std::string name;
+  bool scans = false;  // for integration
+  bool jobs = false;
+};
+
 // A scan without its points.
 struct ScanRecord {
   ScanNumber number = 0;

@@ -19,6 +19,7 @@
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/engine/doors/map_reading.h"
+#include "core/engine/jobs/job_beside.h"
 #include "core/engine/jobs/job_handlers.h"
 #include "core/world/job_arguments.h"
 #include "core/world/job_kinds.h"
@@ -81,28 +82,43 @@ absl::StatusOr<JobInfo> EngineJobs::Start(const api::Call& call,
                                           absl::string_view kind,
                                           const std::map<std::string, std::string>& parameters) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
+  if (place.map == nullptr) return StartJobBeside(*place.store, kind, parameters);
+  Map& found = *place.map;
   STRATA_ASSIGN_OR_RETURN(const JobArguments arguments, ReadJobArguments(kind, parameters));
   STRATA_ASSIGN_OR_RETURN(const JobHandler* const handler, FindJobHandler(kind));
-  STRATA_RETURN_IF_ERROR(handler->check(found->core(), arguments));
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found.core().Reader());
+    STRATA_RETURN_IF_ERROR(handler->check(*reader, arguments));
+  }
   STRATA_ASSIGN_OR_RETURN(JobInfo info,
-                          found->jobs().Start(call.stop, call.principal, kind, parameters));
-  found->JobQueued();
+                          found.jobs().Start(call.stop, call.principal, kind, parameters));
+  found.JobQueued();
   return info;
+}
+
+// A job that was just queued by another engine is not known here before the next look at the store.
+absl::StatusOr<JobInfo> EngineJobs::Find(Map& map, std::uint64_t id) {
+  absl::StatusOr<JobInfo> job = map.jobs().Get(id);
+  if (!absl::IsNotFound(job.status()) || !maps_.IsShared()) return job;
+  STRATA_RETURN_IF_ERROR(map.TakeInJobs());
+  return map.jobs().Get(id);
 }
 
 absl::StatusOr<JobInfo> EngineJobs::Get(const api::Call& call,
                                         absl::string_view map,
                                         std::uint64_t id) {
   STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
-  if (found.map() != nullptr) return found.map()->jobs().Get(id);
+  if (found.map() != nullptr) return Find(*found.map(), id);
   return StoredJob(found, id);
 }
 
 absl::StatusOr<std::vector<JobInfo>> EngineJobs::List(const api::Call& call,
                                                       absl::string_view map) {
   STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
-  return found.map() != nullptr ? found.map()->jobs().List() : StoredJobs(found);
+  if (found.map() == nullptr) return StoredJobs(found);
+  if (maps_.IsShared()) STRATA_RETURN_IF_ERROR(found.map()->TakeInJobs());
+  return found.map()->jobs().List();
 }
 
 absl::StatusOr<JobInfo> EngineJobs::Cancel(const api::Call& call,
@@ -110,6 +126,7 @@ absl::StatusOr<JobInfo> EngineJobs::Cancel(const api::Call& call,
                                            std::uint64_t id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_RETURN_IF_ERROR(Find(*found, id).status());
   return found->jobs().Cancel(id);
 }
 
@@ -128,7 +145,7 @@ absl::StatusOr<JobInfo> EngineJobs::Revert(const api::Call& call,
                                            std::uint64_t id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  STRATA_ASSIGN_OR_RETURN(const JobInfo job, found->jobs().Get(id));
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job, Find(*found, id));
   if (job.state == JobState::kProposed) return found->jobs().Discard(id);
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t epoch,
                           EpochBefore(job, found->core().snapshots().current().epoch));
@@ -146,7 +163,10 @@ absl::Status EngineJobs::Watch(const api::Call& call,
   absl::Time told = absl::InfinitePast();
   while (true) {
     STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
-    if (found.map() != nullptr) return found.map()->jobs().Watch(call.stop, id, sink);
+    if (found.map() != nullptr) {
+      STRATA_RETURN_IF_ERROR(Find(*found.map(), id).status());
+      return found.map()->jobs().Watch(call.stop, id, sink);
+    }
     STRATA_ASSIGN_OR_RETURN(const JobInfo job, StoredJob(found, id));
     if (job.updated != told) STRATA_RETURN_IF_ERROR(sink(job));
     if (IsFinal(job.state)) return absl::OkStatus();

@@ -68,6 +68,12 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
   return map;
 }
 
+absl::Status Map::TakeInJobs() {
+  STRATA_ASSIGN_OR_RETURN(const bool any, jobs_->TakeIn());
+  if (any) runner_->JobQueued();
+  return absl::OkStatus();
+}
+
 bool Map::HasWork() const {
   return worker_->HasWork() || jobs_->AnyIn(JobState::kQueued) || jobs_->AnyIn(JobState::kRunning);
 }

@@ -63,6 +63,8 @@ class Map {
   void ScansWait() { worker_->ScansWait(); }
   // A job was queued.
   void JobQueued() { runner_->JobQueued(); }
+  // Jobs may have been queued elsewhere.
+  absl::Status TakeInJobs();
 
   // Scans or jobs wait or are under way, or what is derived has to be made again. After Close():
   // whether the next opening has them to do.

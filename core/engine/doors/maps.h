@@ -65,6 +65,8 @@ class EngineMaps final : public api::Maps {
   };
   absl::StatusOr<Place> FindToAdd(const Stop& stop, absl::string_view name);
   const EngineOptions& options() const { return options_; }
+  // Whether other engines use the same stores.
+  bool IsShared() const { return stores_->IsShared(); }
   // Of all maps.
   const std::shared_ptr<CacheBudget>& caches() const { return maps_->caches(); }
 

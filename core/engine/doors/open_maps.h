@@ -136,7 +136,7 @@ class OpenMaps {
   void ForgetClosedBut(const std::set<std::string>& names);
   // Opens what engines that are gone left.
   void TakeAbandoned();
-  // Has maps look for scans that came in at other engines.
+  // Has maps look for scans and jobs that came in at other engines.
   void TellOfArrivals();
   void Note(const std::string& name, absl::StatusOr<MapOutline> outline);
   // Whether there was room.

@@ -116,7 +116,7 @@ class PostgresStores final : public MapStores {
                                                         std::uint64_t most_waiting) const override {
     return maps_.OpenToAdd(name, most_waiting);
   }
-  absl::StatusOr<std::vector<std::string>> ListWaiting() const override {
+  absl::StatusOr<std::vector<WaitingMap>> ListWaiting() const override {
     return maps_.ListWaiting();
   }
   absl::StatusOr<std::vector<std::pair<std::string, MapClock>>> ListClocks(

@@ -75,9 +75,9 @@ class MapStores {
                                                                 std::uint64_t) const {
     return absl::UnimplementedError(absl::StrCat("map ", name, ": its store is not shared"));
   }
-  // Of shared ones: maps that this engine has alone and in which scans wait for integration.
-  virtual absl::StatusOr<std::vector<std::string>> ListWaiting() const {
-    return std::vector<std::string>();
+  // Of shared ones: maps that this engine has alone and in which scans or jobs wait.
+  virtual absl::StatusOr<std::vector<WaitingMap>> ListWaiting() const {
+    return std::vector<WaitingMap>();
   }
   // Whether other engines use the same stores: maps may come, go and change beside this one.
   virtual bool IsShared() const { return false; }

@@ -38,15 +38,10 @@ EntityOptions EntityOptionsOf(const JobArguments& arguments) {
   return options;
 }
 
-absl::StatusOr<std::vector<MapClass>> ClassesOf(MapCore& core) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-  return reader->ListClasses();
-}
-
 // 0: every class.
-absl::StatusOr<std::uint16_t> ClassAskedFor(MapCore& core, const JobArguments& arguments) {
+absl::StatusOr<std::uint16_t> ClassAskedFor(StorageReader& reader, const JobArguments& arguments) {
   if (!arguments.Has("class")) return std::uint16_t{0};
-  STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes, ClassesOf(core));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes, reader.ListClasses());
   return ClassIdOf(classes, arguments.Text("class"));
 }
 
@@ -375,8 +370,8 @@ class EntityReader {
 
 }  // namespace
 
-absl::Status CheckObjectsJob(MapCore& core, const JobArguments& arguments) {
-  return ClassAskedFor(core, arguments).status();
+absl::Status CheckObjectsJob(StorageReader& reader, const JobArguments& arguments) {
+  return ClassAskedFor(reader, arguments).status();
 }
 
 absl::Status RunObjectsJob(MapCore& core,
@@ -385,7 +380,11 @@ absl::Status RunObjectsJob(MapCore& core,
                            JobContext& context) {
   const EntityOptions options = EntityOptionsOf(arguments);
   STRATA_RETURN_IF_ERROR(options.Validate());
-  STRATA_ASSIGN_OR_RETURN(const std::uint16_t class_id, ClassAskedFor(core, arguments));
+  std::uint16_t class_id = 0;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+    STRATA_ASSIGN_OR_RETURN(class_id, ClassAskedFor(*reader, arguments));
+  }
   EntitiesInfo info;
   info.job = job.id;
   info.epoch = core.snapshots().current().epoch;

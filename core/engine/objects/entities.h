@@ -21,7 +21,7 @@ namespace strata {
 
 // What the job can be told before it is queued: NOT_FOUND for a class that the map does not have,
 // listing those that it has.
-absl::Status CheckObjectsJob(MapCore& core, const JobArguments& arguments);
+absl::Status CheckObjectsJob(StorageReader& reader, const JobArguments& arguments);
 
 // Finds the entities of all classified points of the integrated scans, as the current epoch has
 // them, and keeps them in place of those of before, in one commit. Scans without points, and

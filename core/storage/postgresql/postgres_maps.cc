@@ -332,19 +332,22 @@ absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenToAdd(
   return std::make_unique<PostgresStorage>(pool_, map, leases_, nullptr);
 }
 
-absl::StatusOr<std::vector<std::string>> PostgresMaps::ListWaiting() const {
+absl::StatusOr<std::vector<WaitingMap>> PostgresMaps::ListWaiting() const {
   STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
   STRATA_ASSIGN_OR_RETURN(
       Rows row,
-      lease->Query("SELECT p.name FROM map_lease AS l JOIN map_place AS p ON p.map = l.map WHERE "
-                   "l.holder = $1 AND p.state = $2 AND EXISTS (SELECT FROM truth_scan AS s WHERE "
-                   "s.map = l.map AND s.state = $3)",
+      lease->Query("SELECT * FROM (SELECT p.name, EXISTS (SELECT FROM truth_scan AS s WHERE s.map "
+                   "= l.map AND s.state = $3) AS scans, EXISTS (SELECT FROM truth_job AS j WHERE "
+                   "j.map = l.map AND j.state = $4) AS jobs FROM map_lease AS l JOIN map_place AS "
+                   "p ON p.map = l.map WHERE l.holder = $1 AND p.state = $2) AS w WHERE w.scans OR "
+                   "w.jobs",
                    leases_->holder(),
                    kThere,
-                   static_cast<int>(ScanState::kPending)));
-  std::vector<std::string> names;
-  while (row.Next()) names.emplace_back(row.Text(0));
-  return names;
+                   static_cast<int>(ScanState::kPending),
+                   static_cast<int>(JobState::kQueued)));
+  std::vector<WaitingMap> waiting;
+  while (row.Next()) waiting.push_back({row.Text(0), row.Bool(1), row.Bool(2)});
+  return waiting;
 }
 
 absl::StatusOr<std::vector<std::pair<std::string, MapClock>>> PostgresMaps::ListClocks(

@@ -145,7 +145,7 @@ TEST_F(PlansElsewhereTest, AreTheOwnersToTheByteAndGoOnWhenItDies) {
   STRATA_ASSERT_OK_AND_ASSIGN(const auto owners, AskAll(db(0), kHalls));
   STRATA_ASSERT_OK_AND_ASSIGN(const auto others, AskAll(db(1), kHalls));
   EXPECT_EQ(owners, others);
-  EXPECT_EQ(MapOwnerOf(db(1).jobs().Start({}, kShared, "verify", {}).status()), "a");
+  EXPECT_EQ(MapOwnerOf(db(1).maps().SetClass({}, kShared, {7, "wall", 0})), "a");
   servers_[0]->Kill();
   STRATA_ASSERT_OK_AND_ASSIGN(const auto orphaned, AskAll(db(1), kHalls));
   EXPECT_EQ(owners, orphaned);

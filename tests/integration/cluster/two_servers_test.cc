@@ -93,6 +93,11 @@ absl::Status RunJobOf(api::Database& db, const char* map, const char* kind) {
 
 absl::Status Verify(api::Database& db, const char* map) { return RunJobOf(db, map, "verify"); }
 
+// Something that whoever has the map decides.
+absl::Status Decide(api::Database& db, const char* map) {
+  return db.maps().SetClass({}, map, {7, "wall", 0});
+}
+
 void TwoServersTest::CheckAll(std::size_t server) {
   api::Database& found = db(server);
   MapStats stats;
@@ -118,7 +123,7 @@ void TwoServersTest::CheckAll(std::size_t server) {
 
 TEST_F(TwoServersTest, TheOneWithoutTheMapSaysWhoHasIt) {
   STRATA_ASSERT_OK(Put(db(0), kMap, 1));
-  const absl::Status refused = Verify(db(1), kMap);
+  const absl::Status refused = Decide(db(1), kMap);
   EXPECT_THAT(refused, StatusIs(absl::StatusCode::kUnavailable, HasSubstr("server a")));
   EXPECT_EQ(MapOwnerOf(refused), "a");
   EXPECT_TRUE(RetryDelayOf(refused).has_value());
@@ -129,7 +134,7 @@ TEST_F(TwoServersTest, TheOneWithoutTheMapSaysWhoHasIt) {
   EXPECT_EQ(names->front().name, kMap);
   // Other maps are other matters, and what one server removes the other has no more.
   STRATA_ASSERT_OK(db(1).maps().Create({}, "other", MapParameters()));
-  EXPECT_EQ(MapOwnerOf(Verify(db(0), "other")), "b");
+  EXPECT_EQ(MapOwnerOf(Decide(db(0), "other")), "b");
   STRATA_EXPECT_OK(db(1).maps().Delete({}, "other"));
   STRATA_EXPECT_OK(Insist([&] {
     const absl::Status gone = db(0).maps().Get({}, "other").status();
@@ -138,7 +143,7 @@ TEST_F(TwoServersTest, TheOneWithoutTheMapSaysWhoHasIt) {
   // A server that ends gives its maps up at once.
   servers_[0]->Signal(SIGTERM);
   const absl::Time ended = absl::Now();
-  STRATA_EXPECT_OK(Insist([&] { return Verify(db(1), kMap); }));
+  STRATA_EXPECT_OK(Insist([&] { return Decide(db(1), kMap); }));
   std::printf("taken over after %s\n", absl::FormatDuration(absl::Now() - ended).c_str());
 }
 
@@ -209,7 +214,7 @@ TEST_F(TwoServersTest, ScansAreTakenInByServersThatHaveNotGotTheMap) {
   EXPECT_EQ(db(0).scans().Get({}, kMap, ready.id)->state, ScanState::kIntegrated);
   STRATA_EXPECT_OK(db(0).scans().Delete({}, kMap, ready.id));
   STRATA_EXPECT_OK(db(0).scans().Delete({}, kMap, {"run", kLarge}));  // CheckAll() has others
-  EXPECT_EQ(MapOwnerOf(Verify(db(1), kMap)), "a");
+  EXPECT_EQ(MapOwnerOf(Decide(db(1), kMap)), "a");
   CheckAll(0);
 }
 
@@ -322,10 +327,52 @@ TEST_F(TwoServersTest, EveryServerAnswersReadsAlsoAfterTheOwnerDied) {
   EXPECT_EQ(owner.points, kPoints);
   STRATA_ASSERT_OK_AND_ASSIGN(const Told other, Ask(db(1)));
   EXPECT_EQ(owner, other);
-  EXPECT_EQ(MapOwnerOf(db(1).jobs().Start({}, kMap, "verify", {}).status()), "a");
+  EXPECT_EQ(MapOwnerOf(Decide(db(1), kMap)), "a");
   servers_[0]->Kill();
   STRATA_ASSERT_OK_AND_ASSIGN(const Told alone, Ask(db(1)));
   EXPECT_EQ(owner, alone);
+}
+
+// Queued by whichever is asked, run once by the one that has the map, known to all at once.
+TEST_F(TwoServersTest, JobsAreStartedAtServersThatHaveNotGotTheMap) {
+  STRATA_ASSERT_OK(Put(db(0), kMap, 1));
+  std::set<std::uint64_t> ids;
+  std::vector<std::thread> people;
+  for (std::size_t person = 0; person < 4; ++person) {
+    people.emplace_back([&, person] {
+      for (std::size_t i = 0; i < 5; ++i) {
+        const auto job =
+            servers_[(person + i) % 2]->db()->jobs().Start({}, kMap, "verify", {{"threads", "1"}});
+        STRATA_ASSERT_OK(job);
+        for (const auto& server : servers_) {
+          const auto known = server->db()->jobs().Get({}, kMap, job->id);
+          STRATA_ASSERT_OK(known);
+          EXPECT_EQ(known->parameters, job->parameters);
+        }
+        absl::MutexLock lock(&mutex_);
+        EXPECT_TRUE(ids.insert(job->id).second) << job->id;
+      }
+    });
+  }
+  for (std::thread& person : people) person.join();
+  EXPECT_EQ(MapOwnerOf(Decide(db(1), kMap)), "a");
+  for (const std::uint64_t id : ids) {
+    JobInfo last;
+    STRATA_EXPECT_OK(db(id % 2).jobs().Watch({}, kMap, id, [&last](const JobInfo& now) {
+      last = now;
+      return absl::OkStatus();
+    }));
+    EXPECT_EQ(last.state, JobState::kSucceeded) << id << ": " << last.message;
+  }
+  EXPECT_EQ(db(0).jobs().List({}, kMap)->size(), ids.size());
+  EXPECT_EQ(db(1).jobs().List({}, kMap)->size(), ids.size());
+  // What it needs is asked for at once.
+  EXPECT_TRUE(
+      absl::IsNotFound(db(1).jobs().Start({}, kMap, "classify", {{"model", "nobody"}}).status()));
+  EXPECT_TRUE(absl::IsInvalidArgument(db(1).jobs().Start({}, kMap, "dance", {}).status()));
+  // Nobody has it for a while.
+  servers_[0]->Kill();
+  STRATA_EXPECT_OK(Insist([&] { return Verify(db(1), kMap); }));
 }
 
 // Whoever asks one server and then the other, in whatever order, never goes back.
