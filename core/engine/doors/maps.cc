@@ -146,14 +146,6 @@ absl::StatusOr<MapReading> EngineMaps::FindTilesToRead(const api::Call& call,
   return found;
 }
 
-absl::StatusOr<std::shared_ptr<Map>> EngineMaps::FindWithTiles(const api::Call& call,
-                                                               absl::string_view name) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<Map> map, Find(call.stop, name));
-  STRATA_RETURN_IF_ERROR(map->worker().AwaitDerived(call.stop));
-  return map;
-}
-
 absl::StatusOr<MapInfo> EngineMaps::Create(const api::Call& call,
                                            absl::string_view name,
                                            const MapParameters& parameters) {

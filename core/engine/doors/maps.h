@@ -42,10 +42,8 @@ class EngineMaps final : public api::Maps {
   // As OpenMaps::Find(); of shared stores the map shows what others may have seen of it.
   absl::StatusOr<std::shared_ptr<Map>> Find(const Stop& stop, absl::string_view name);
 
-  // The same for those who read its tiles: waits while they are made again (Worker::AwaitDerived).
-  absl::StatusOr<std::shared_ptr<Map>> FindWithTiles(const api::Call& call, absl::string_view name);
-
-  // As FindToRead(), and waits as FindWithTiles() where the map is here.
+  // As FindToRead(), and where the map is here waits while its tiles are made again
+  // (Worker::AwaitDerived).
   absl::StatusOr<MapReading> FindTilesToRead(const api::Call& call, absl::string_view name);
   // For calls that only read, and that the store itself can answer where another engine has the
   // map.
@@ -57,8 +55,8 @@ class EngineMaps final : public api::Maps {
                          std::uint64_t epoch,
                          const Stop& stop);
 
-  // The map where it is here; else its store, for scans that come in here while another engine has
-  // the map (MapStores::OpenToAdd()).
+  // The map where it is here; else its store, for scans and jobs that come in here while another
+  // engine has the map (MapStores::OpenToAdd()).
   struct Place {
     std::shared_ptr<Map> map;
     std::unique_ptr<MapStorage> store;

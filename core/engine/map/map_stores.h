@@ -68,9 +68,10 @@ class MapStores {
   virtual absl::StatusOr<std::unique_ptr<MapStorage>> OpenToRead(absl::string_view name) const {
     return absl::UnimplementedError(absl::StrCat("map ", name, ": its store is not shared"));
   }
-  // Of shared ones: for scans that come in here while another engine has the map alone: PutScan()
-  // is RESOURCE_EXHAUSTED while `most_waiting` wait for integration, and UNAVAILABLE where chunks
-  // of the scan have gone, which have to be sent again. UNAVAILABLE while nobody has it alone.
+  // Of shared ones: for scans and jobs that come in here while another engine has the map alone:
+  // PutScan() is RESOURCE_EXHAUSTED while `most_waiting` wait for integration, and UNAVAILABLE
+  // where chunks of the scan have gone, which have to be sent again. UNAVAILABLE while nobody has
+  // it alone.
   virtual absl::StatusOr<std::unique_ptr<MapStorage>> OpenToAdd(absl::string_view name,
                                                                 std::uint64_t) const {
     return absl::UnimplementedError(absl::StrCat("map ", name, ": its store is not shared"));
