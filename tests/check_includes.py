@@ -63,7 +63,7 @@ STOREYS = {
     "core/registration": ["clouds", HERE],
     "core/posegraph": ["alignment", "closures", "solver", "costs", HERE],
     "core/storage": ["postgresql", "sqlite", HERE],
-    "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "objects", "models", "ingest", "tiles", "scans", "map"],
+    "core/engine": [HERE, "doors", "jobs", "repair", "consistency", "labels", "plans", "objects", "models", "ingest", "tiles", "scans", "map"],
     "client/formats": ["planes", "foxglove", "bags", "motion", "shapes", HERE, "packets", "survey", "laz", "parsing", "grid"],
     "client/cli": [HERE, "completion", "context", "map", "scan", "posegraph", "plan", "classifier", "planes", "objects", "egomotion", "job", "heights", "mesh", "picture", "terminal"],
 }

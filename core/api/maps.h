@@ -10,6 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "absl/time/time.h"
 
 #include "core/api/call.h"
 #include "core/mls/tile_key.h"
@@ -19,6 +20,9 @@
 #include "core/world/scan.h"
 
 namespace strata::api {
+
+// How often changes of a map that another engine has are looked for.
+inline constexpr absl::Duration kWatchLag = absl::Milliseconds(250);
 
 // From where a map is watched.
 struct WatchOptions {
@@ -30,6 +34,9 @@ struct WatchOptions {
   std::string trajectory;   // scans of this one only; empty: of all
   bool tiles = true;        // false: scans and epochs only
   bool once = false;        // end when there is nothing newer
+  // For those who look again and again: how old what they are told may be where another engine has
+  // the map. Whoever looks first sees what is there.
+  absl::Duration lag = absl::ZeroDuration();
 };
 
 // Where a scan is now; a scan that was deleted is `gone`.

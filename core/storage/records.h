@@ -30,6 +30,27 @@ struct MapClock {
   bool derived_complete = true;       // false: derived data must be rebuilt before they are used
 };
 
+// One thing that a commit made another, for those who watch the map.
+struct StoredChange {
+  std::uint64_t commit_sequence = 0;
+  ScanId scan;   // whose state or pose is another, or that is gone; empty trajectory: a tile
+  TileKey tile;  // of level 0
+  std::uint64_t version = 0;
+  bool gone = false;  // the tile
+};
+
+struct StoredChanges {
+  bool complete = false;  // false: not all of them are kept
+  std::vector<StoredChange> changes;
+};
+
+// A map in which something waits for who has it.
+struct WaitingMap {
+  std::string name;
+  bool scans = false;  // for integration
+  bool jobs = false;
+};
+
 // A scan without its points.
 struct ScanRecord {
   ScanNumber number = 0;

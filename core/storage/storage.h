@@ -39,6 +39,10 @@ class StorageReader {
 
   // All reads of `body` see one state. Keep it short: the store cannot reclaim space meanwhile.
   virtual absl::Status Snapshot(absl::FunctionRef<absl::Status()> body) = 0;
+  // The same for a body that may compute for minutes between two reads, and waits for nobody.
+  virtual absl::Status LongSnapshot(absl::FunctionRef<absl::Status()> body) {
+    return Snapshot(body);
+  }
 
   // Writes one committed state as a store of its own into `file`, which must not be there; closed
   // and whole when this returns. Commits go on meanwhile. Not inside Snapshot(). ALREADY_EXISTS;
@@ -47,6 +51,11 @@ class StorageReader {
 
   virtual absl::StatusOr<MapClock> GetClock() = 0;
   virtual absl::StatusOr<MapInfo> GetMapInfo() = 0;
+  // What changed after commit `since`, in the order of commits: what PutChanges() said, and scans
+  // that came since. Kept for an hour at least. A store that no other process reads keeps none.
+  virtual absl::StatusOr<StoredChanges> ListChanges(std::uint64_t /*since*/) {
+    return StoredChanges();
+  }
 
   virtual absl::StatusOr<std::optional<PosedScan>> FindScan(const ScanId& id,
                                                             std::uint64_t epoch) = 0;
@@ -160,6 +169,11 @@ class StorageWriter {
   // Ticks the clock of the map. In a kFull commit only: a number that somebody was told is never
   // given again.
   virtual absl::StatusOr<std::uint64_t> NextCommitSequence() = 0;
+  // What this commit, whose last number they have, changes for those who watch the map; scans that
+  // it adds are known without. Names of trajectories must be valid (ValidateName).
+  virtual absl::Status PutChanges(const std::vector<StoredChange>& /*changes*/) {
+    return absl::OkStatus();
+  }
 
   // Points of an upload that is not a scan yet; `bytes` at most 1 MiB.
   virtual absl::Status PutChunk(std::uint64_t upload,
@@ -299,6 +313,8 @@ class MapStorage {
   // long, others may write by now. MustBeOpenedAnew(): they do. Thread-safe.
   virtual absl::Status CheckHeld() const { return absl::OkStatus(); }
   virtual LastOwner last_owner() const { return LastOwner::kSelf; }
+  // Tells the map from all that its store has or had, also under its name; 0: it has no other.
+  virtual std::int64_t number() const { return 0; }
 };
 
 }  // namespace strata

@@ -3,6 +3,7 @@
 #define STRATA_SERVER_RPC_POLL_H_
 
 #include <cstddef>
+#include <optional>
 #include <utility>
 
 #include "absl/status/status.h"
@@ -68,6 +69,9 @@ class PollReactor : public grpc::ServerWriteReactor<Told> {
   virtual absl::StatusOr<News> Look(Out& out) = 0;
   // Memory that the looks have left behind, about [bytes].
   virtual std::size_t kept_bytes() const = 0;
+  // Of watches whose clients would not come back by themselves: how long looks after the first may
+  // go on to fail with UNAVAILABLE, where the store is away, say, before that ends the stream.
+  virtual absl::Duration patience() const { return absl::ZeroDuration(); }
   // What a reader should know when the server shuts down.
   virtual absl::string_view shutdown_message() const = 0;
 
@@ -92,7 +96,7 @@ class PollReactor : public grpc::ServerWriteReactor<Told> {
                                      translate::kShuttingDownReason);
       }
       STRATA_RETURN_IF_ERROR(asked_ ? request_.StillAllowed() : Open());
-      STRATA_ASSIGN_OR_RETURN(news_, Look(out_));
+      STRATA_ASSIGN_OR_RETURN(news_, LookPatiently());
       STRATA_RETURN_IF_ERROR(kept_memory_.Resize(kept_bytes()));
       return news_ == News::kNone ? absl::OkStatus() : Request::HoldAnswer(out_, out_memory_);
     });
@@ -105,6 +109,19 @@ class PollReactor : public grpc::ServerWriteReactor<Told> {
       request_.CountSent(out_);
       this->StartWrite(&out_);
     }
+  }
+
+  absl::StatusOr<News> LookPatiently() {
+    absl::StatusOr<News> news = Look(out_);
+    if (!absl::IsUnavailable(news.status())) {
+      looked_ = looked_ || news.ok();
+      failing_since_.reset();
+      return news;
+    }
+    if (!failing_since_.has_value()) failing_since_ = SteadyNow();
+    if (!looked_ || SteadyNow() - *failing_since_ >= patience()) return news;
+    out_ = Out();
+    return News::kNone;
   }
 
   absl::Status Open() {
@@ -146,6 +163,8 @@ class PollReactor : public grpc::ServerWriteReactor<Told> {
   Booking out_memory_;
   Sealed<In>& sealed_;
   bool asked_ = false;
+  bool looked_ = false;
+  std::optional<absl::Time> failing_since_;
   Out out_;
   News news_ = News::kNone;
   absl::Time next_look_ = absl::InfinitePast();

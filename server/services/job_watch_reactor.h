@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <string>
 
+#include "absl/time/time.h"
+
 #include "server/rpc/poll.h"
 #include "strata/v1/jobs.grpc.pb.h"
 
@@ -22,6 +24,7 @@ class JobWatchReactor final : public PollReactor<v1::WatchJobRequest, v1::WatchJ
   absl::Status Ask(const In& in) override;
   absl::StatusOr<News> Look(Out& out) override;
   std::size_t kept_bytes() const override { return told_.ByteSizeLong(); }
+  absl::Duration patience() const override { return absl::Seconds(10); }
   absl::string_view shutdown_message() const override;
 
   std::string map_;

@@ -41,6 +41,7 @@ absl::Status MapWatchReactor::LookAtMap() {
     options_.epoch = update.epoch;
     if (!looked_ || news) AddParts(update);
     looked_ = true;
+    options_.lag = api::kWatchLag;
     return absl::OkStatus();
   };
   const api::WatchOptions options = options_;

@@ -20,6 +20,7 @@ absl::StatusOr<bool> PathWatchReactor::Unchanged() {
   since.epoch = query_.known->epoch;
   since.tiles = false;
   since.once = true;
+  since.lag = api::kWatchLag;
   bool unchanged = false;
   const auto compare = [&](const api::MapUpdate& update) {
     unchanged = update.commit_sequence == since.since && update.epoch == since.epoch;

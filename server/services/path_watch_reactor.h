@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <string>
 
+#include "absl/time/time.h"
+
 #include "core/world/plan.h"
 #include "server/rpc/poll.h"
 #include "strata/v1/planning.grpc.pb.h"
@@ -22,6 +24,7 @@ class PathWatchReactor final : public PollReactor<v1::WatchPathRequest, v1::Watc
   absl::Status Ask(const In& in) override;
   absl::StatusOr<News> Look(Out& out) override;
   std::size_t kept_bytes() const override;
+  absl::Duration patience() const override { return absl::Seconds(10); }
   absl::string_view shutdown_message() const override;
 
   // Whether the map is as it was at the look before.

@@ -1,6 +1,8 @@
 #include <atomic>
 #include <thread>
 
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -24,6 +26,10 @@ class WatchTest : public ServedMock {
       job.id = id;
       job.created = job.updated = absl::UnixEpoch();
       const int step = step_;
+      if (step == kAway) {
+        ++looks_away_;
+        return absl::StatusOr<JobInfo>(absl::UnavailableError("store: away"));
+      }
       job.progress = 0.25 * step;
       job.state = step == 4 ? JobState::kSucceeded : JobState::kRunning;
       return absl::StatusOr<JobInfo>(job);
@@ -32,7 +38,9 @@ class WatchTest : public ServedMock {
     reader_ = stub_->Watch(&context_, v1::WatchJobRequest());
   }
 
+  static constexpr int kAway = -1;
   std::atomic<int> step_ = 1;
+  std::atomic<int> looks_away_ = 0;
   std::unique_ptr<v1::Jobs::Stub> stub_;
   grpc::ClientContext context_;
   std::unique_ptr<grpc::ClientReader<v1::WatchJobResponse>> reader_;
@@ -45,6 +53,18 @@ TEST_F(WatchTest, TellsEveryChangeOnceAndEndsWithTheJob) {
     ASSERT_TRUE(reader_->Read(&message_));
     EXPECT_EQ(message_.job().progress(), 0.25 * step);
   }
+  EXPECT_EQ(message_.job().state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_FALSE(reader_->Read(&message_));
+  EXPECT_THAT(translate::FromGrpcStatus(reader_->Finish()), IsOk());
+}
+
+// The job goes on meanwhile.
+TEST_F(WatchTest, GoesOnWhereTheStoreIsAwayForAWhile) {
+  ASSERT_TRUE(reader_->Read(&message_));
+  step_ = kAway;
+  while (looks_away_ < 3) absl::SleepFor(absl::Milliseconds(10));
+  step_ = 4;
+  ASSERT_TRUE(reader_->Read(&message_));
   EXPECT_EQ(message_.job().state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_FALSE(reader_->Read(&message_));
   EXPECT_THAT(translate::FromGrpcStatus(reader_->Finish()), IsOk());

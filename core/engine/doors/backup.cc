@@ -42,17 +42,13 @@ absl::Status Deliver(std::ifstream& file,
 
 }  // namespace
 
-absl::Status BackUp(MapCore& core,
+absl::Status BackUp(absl::FunctionRef<absl::Status(const fs::path&)> copy,
                     const fs::path& temporary,
                     const Stop& stop,
                     absl::FunctionRef<absl::Status(const api::BackupPiece&)> sink) {
   std::error_code error;
-  absl::Status copied;
-  {
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-    fs::remove(temporary, error);
-    copied = reader->CopyTo(temporary, stop);
-  }
+  fs::remove(temporary, error);
+  const absl::Status copied = copy(temporary);
   std::ifstream file;
   std::uintmax_t total_bytes = 0;
   if (copied.ok()) {

@@ -9,13 +9,13 @@
 
 #include "core/api/maps.h"
 #include "core/common/stop.h"
-#include "core/engine/map/map_core.h"
 
 namespace strata {
 
-// As api::Maps::Backup. `temporary` is where the copy lies until it is delivered, under no name as
+// As api::Maps::Backup. `copy` makes one in a file that is not there (StorageReader::CopyTo());
+// `temporary` is where the copy lies until it is delivered, under no name as
 // soon as it is whole; what a crash leaves of it, the next start of the directory removes.
-absl::Status BackUp(MapCore& core,
+absl::Status BackUp(absl::FunctionRef<absl::Status(const std::filesystem::path&)> copy,
                     const std::filesystem::path& temporary,
                     const Stop& stop,
                     absl::FunctionRef<absl::Status(const api::BackupPiece&)> sink);

@@ -4,11 +4,13 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 
 #include "core/classification/classifier_codec.h"
 #include "core/common/status.h"
+#include "core/engine/doors/map_reading.h"
 #include "core/engine/labels/classifier_store.h"
 #include "core/world/names.h"
 
@@ -22,18 +24,22 @@ constexpr std::size_t kPieceBytes = std::size_t{1} << 20;
 absl::StatusOr<ClassifierInfo> EngineClassifiers::Get(const api::Call& call,
                                                       absl::string_view map,
                                                       absl::string_view name) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
-  return FindClassifier(*reader, name);
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
+  ClassifierInfo info;
+  STRATA_RETURN_IF_ERROR(found.ReadState([&](StorageReader& reader, const MapClock&) {
+    return AssignTo(FindClassifier(reader, name), info);
+  }));
+  return info;
 }
 
 absl::StatusOr<std::vector<ClassifierInfo>> EngineClassifiers::List(const api::Call& call,
                                                                     absl::string_view map) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
-  return reader->ListClassifiers();
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
+  std::vector<ClassifierInfo> all;
+  STRATA_RETURN_IF_ERROR(found.ReadState([&](StorageReader& reader, const MapClock&) {
+    return AssignTo(reader.ListClassifiers(), all);
+  }));
+  return all;
 }
 
 absl::Status EngineClassifiers::Delete(const api::Call& call,
@@ -52,10 +58,12 @@ absl::Status EngineClassifiers::Export(const api::Call& call,
                                        absl::string_view map,
                                        absl::string_view name,
                                        absl::FunctionRef<absl::Status(absl::string_view)> sink) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
   // What leaves can be read: nobody else would find out.
-  STRATA_ASSIGN_OR_RETURN(const StoredClassifier stored, LoadClassifier(found->core(), name));
+  StoredClassifier stored;
+  STRATA_RETURN_IF_ERROR(found.ReadState([&](StorageReader& reader, const MapClock&) {
+    return AssignTo(LoadClassifier(reader, name), stored);
+  }));
   const std::string bytes = EncodeClassifier(stored.classifier);
   const absl::string_view all = bytes;
   for (std::size_t begin = 0; begin < all.size(); begin += kPieceBytes) {

@@ -1,8 +1,10 @@
 #include "core/engine/doors/jobs.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,9 +13,13 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
 #include "core/engine/doors/map_reading.h"
+#include "core/engine/jobs/job_beside.h"
 #include "core/engine/jobs/job_handlers.h"
 #include "core/world/job_arguments.h"
 #include "core/world/job_kinds.h"
@@ -51,6 +57,24 @@ absl::StatusOr<std::vector<JobInfo>> StoredJobs(const MapReading& map) {
   return jobs;
 }
 
+absl::StatusOr<JobInfo> StoredJob(const MapReading& map, std::uint64_t id) {
+  std::optional<JobInfo> job;
+  STRATA_RETURN_IF_ERROR(map.ReadState(
+      [&](StorageReader& reader, const MapClock&) { return AssignTo(reader.FindJob(id), job); }));
+  if (job.has_value()) return *std::move(job);
+  return absl::NotFoundError(absl::StrCat("job ", id, " does not exist"));
+}
+
+absl::Status Pause(absl::Duration pause, const Stop& stop) {
+  constexpr absl::Duration kPoll = absl::Milliseconds(50);
+  const absl::Time end = SteadyNow() + pause;
+  while (SteadyNow() < end) {
+    STRATA_RETURN_IF_ERROR(stop.status());
+    absl::SleepFor(std::min(kPoll, end - SteadyNow()));
+  }
+  return stop.status();
+}
+
 }  // namespace
 
 absl::StatusOr<JobInfo> EngineJobs::Start(const api::Call& call,
@@ -58,32 +82,43 @@ absl::StatusOr<JobInfo> EngineJobs::Start(const api::Call& call,
                                           absl::string_view kind,
                                           const std::map<std::string, std::string>& parameters) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
+  if (place.map == nullptr) return StartJobBeside(*place.store, kind, parameters);
+  Map& found = *place.map;
   STRATA_ASSIGN_OR_RETURN(const JobArguments arguments, ReadJobArguments(kind, parameters));
   STRATA_ASSIGN_OR_RETURN(const JobHandler* const handler, FindJobHandler(kind));
-  STRATA_RETURN_IF_ERROR(handler->check(found->core(), arguments));
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found.core().Reader());
+    STRATA_RETURN_IF_ERROR(handler->check(*reader, arguments));
+  }
   STRATA_ASSIGN_OR_RETURN(JobInfo info,
-                          found->jobs().Start(call.stop, call.principal, kind, parameters));
-  found->JobQueued();
+                          found.jobs().Start(call.stop, call.principal, kind, parameters));
+  found.JobQueued();
   return info;
+}
+
+// A job that was just queued by another engine is not known here before the next look at the store.
+absl::StatusOr<JobInfo> EngineJobs::Find(Map& map, std::uint64_t id) {
+  absl::StatusOr<JobInfo> job = map.jobs().Get(id);
+  if (!absl::IsNotFound(job.status()) || !maps_.IsShared()) return job;
+  STRATA_RETURN_IF_ERROR(map.TakeInJobs());
+  return map.jobs().Get(id);
 }
 
 absl::StatusOr<JobInfo> EngineJobs::Get(const api::Call& call,
                                         absl::string_view map,
                                         std::uint64_t id) {
   STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
-  if (found.map() != nullptr) return found.map()->jobs().Get(id);
-  STRATA_ASSIGN_OR_RETURN(const std::vector<JobInfo> jobs, StoredJobs(found));
-  for (const JobInfo& job : jobs) {
-    if (job.id == id) return job;
-  }
-  return absl::NotFoundError(absl::StrCat("job ", id, " does not exist"));
+  if (found.map() != nullptr) return Find(*found.map(), id);
+  return StoredJob(found, id);
 }
 
 absl::StatusOr<std::vector<JobInfo>> EngineJobs::List(const api::Call& call,
                                                       absl::string_view map) {
   STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
-  return found.map() != nullptr ? found.map()->jobs().List() : StoredJobs(found);
+  if (found.map() == nullptr) return StoredJobs(found);
+  if (maps_.IsShared()) STRATA_RETURN_IF_ERROR(found.map()->TakeInJobs());
+  return found.map()->jobs().List();
 }
 
 absl::StatusOr<JobInfo> EngineJobs::Cancel(const api::Call& call,
@@ -91,6 +126,7 @@ absl::StatusOr<JobInfo> EngineJobs::Cancel(const api::Call& call,
                                            std::uint64_t id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_RETURN_IF_ERROR(Find(*found, id).status());
   return found->jobs().Cancel(id);
 }
 
@@ -109,7 +145,7 @@ absl::StatusOr<JobInfo> EngineJobs::Revert(const api::Call& call,
                                            std::uint64_t id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  STRATA_ASSIGN_OR_RETURN(const JobInfo job, found->jobs().Get(id));
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job, Find(*found, id));
   if (job.state == JobState::kProposed) return found->jobs().Discard(id);
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t epoch,
                           EpochBefore(job, found->core().snapshots().current().epoch));
@@ -124,8 +160,19 @@ absl::Status EngineJobs::Watch(const api::Call& call,
                                absl::string_view map,
                                std::uint64_t id,
                                absl::FunctionRef<absl::Status(const JobInfo&)> sink) {
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return found->jobs().Watch(call.stop, id, sink);
+  absl::Time told = absl::InfinitePast();
+  while (true) {
+    STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
+    if (found.map() != nullptr) {
+      STRATA_RETURN_IF_ERROR(Find(*found.map(), id).status());
+      return found.map()->jobs().Watch(call.stop, id, sink);
+    }
+    STRATA_ASSIGN_OR_RETURN(const JobInfo job, StoredJob(found, id));
+    if (job.updated != told) STRATA_RETURN_IF_ERROR(sink(job));
+    if (IsFinal(job.state)) return absl::OkStatus();
+    told = job.updated;
+    STRATA_RETURN_IF_ERROR(Pause(api::kWatchLag, call.stop));
+  }
 }
 
 }  // namespace strata

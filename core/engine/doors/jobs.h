@@ -44,6 +44,8 @@ class EngineJobs final : public api::Jobs {
                      absl::FunctionRef<absl::Status(const JobInfo&)> sink) override;
 
  private:
+  absl::StatusOr<JobInfo> Find(Map& map, std::uint64_t id);
+
   EngineMaps& maps_;
 };
 

@@ -57,7 +57,8 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
     STRATA_ASSIGN_OR_RETURN(const ScanTotals totals, reader->GetScanTotals());
     pending = totals.pending;
   }
-  map->planner_ = std::make_unique<MapPlanner>(*map->core_);
+  map->planner_ = std::make_unique<MapPlanner>(
+      name, map->core_->info().parameters, map->core_->options(), map->core_->caches());
   map->tiles_ = std::make_unique<ServedTiles>(*map->core_);
   map->localizer_ = std::make_unique<Localizer>(*map->core_);
   map->surfaces_ = std::make_unique<SurfacesAround>(*map->core_, *map->tiles_);
@@ -65,6 +66,12 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
   map->runner_ = std::make_unique<JobRunner>(
       *map->core_, *map->quarantine_, *map->jobs_, *map->worker_, memory.seen);
   return map;
+}
+
+absl::Status Map::TakeInJobs() {
+  STRATA_ASSIGN_OR_RETURN(const bool any, jobs_->TakeIn());
+  if (any) runner_->JobQueued();
+  return absl::OkStatus();
 }
 
 bool Map::HasWork() const {

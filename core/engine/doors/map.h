@@ -13,7 +13,6 @@
 #include "core/engine/consistency/closure_watch.h"
 #include "core/engine/consistency/localizer.h"
 #include "core/engine/consistency/surfaces_around.h"
-#include "core/engine/doors/map_planner.h"
 #include "core/engine/ingest/unfinished_uploads.h"
 #include "core/engine/ingest/worker.h"
 #include "core/engine/jobs/job_board.h"
@@ -21,6 +20,7 @@
 #include "core/engine/map/map_core.h"
 #include "core/engine/map/map_stores.h"
 #include "core/engine/map/quarantine.h"
+#include "core/engine/plans/map_planner.h"
 #include "core/engine/tiles/served_tiles.h"
 
 namespace strata {
@@ -63,6 +63,8 @@ class Map {
   void ScansWait() { worker_->ScansWait(); }
   // A job was queued.
   void JobQueued() { runner_->JobQueued(); }
+  // Jobs may have been queued elsewhere.
+  absl::Status TakeInJobs();
 
   // Scans or jobs wait or are under way, or what is derived has to be made again. After Close():
   // whether the next opening has them to do.

@@ -3,7 +3,10 @@
 #ifndef STRATA_CORE_ENGINE_DOORS_MAP_READING_H_
 #define STRATA_CORE_ENGINE_DOORS_MAP_READING_H_
 
+#include <cstdint>
+#include <filesystem>
 #include <memory>
+#include <string>
 #include <utility>
 
 #include "absl/functional/function_ref.h"
@@ -12,6 +15,7 @@
 
 #include "core/common/stop.h"
 #include "core/engine/doors/map.h"
+#include "core/engine/map/map_state.h"
 #include "core/storage/storage.h"
 
 namespace strata {
@@ -30,11 +34,14 @@ class MapReading {
 
   explicit MapReading(std::shared_ptr<Map> map) : map_(std::move(map)) {}
   // `elsewhere`: why it is not open here.
-  MapReading(std::unique_ptr<MapStorage> store, absl::Status elsewhere)
-      : store_(std::move(store)), elsewhere_(std::move(elsewhere)) {}
+  MapReading(std::string name, std::unique_ptr<MapStorage> store, absl::Status elsewhere)
+      : name_(std::move(name)), store_(std::move(store)), elsewhere_(std::move(elsewhere)) {}
 
+  const std::string& name() const { return map_ != nullptr ? map_->core().name() : name_; }
   // nullptr: another engine has it.
   Map* map() const { return map_.get(); }
+  // nullptr: it is open here.
+  MapStorage* store() const { return store_.get(); }
   // For what is served by the engine that has the map only.
   const absl::Status& elsewhere() const { return elsewhere_; }
 
@@ -45,9 +52,25 @@ class MapReading {
   absl::Status ReadState(Body body) const;
   // The same where tiles are read: UNAVAILABLE while another engine makes them again.
   absl::Status ReadTiles(Body body) const;
+  // Runs `body` on the newest state, with what changed after `since`.
+  absl::Status ReadMap(std::uint64_t since, absl::FunctionRef<absl::Status(MapState&)> body) const;
+  // The same where tiles are read, UNAVAILABLE as above, by a body that may take minutes and waits
+  // for nobody.
+  absl::Status ReadMapTiles(std::uint64_t since,
+                            absl::FunctionRef<absl::Status(MapState&)> body) const;
+  // As StorageReader::CopyTo().
+  absl::Status CopyTo(const std::filesystem::path& file, const Stop& stop) const;
 
  private:
+  absl::Status CheckTiles(const MapClock& clock) const;
+  // One state of `reader`, inside its snapshot.
+  absl::Status ReadStore(StorageReader& reader,
+                         std::uint64_t since,
+                         bool tiles,
+                         absl::FunctionRef<absl::Status(MapState&)> body) const;
+
   std::shared_ptr<Map> map_;
+  std::string name_;
   std::unique_ptr<MapStorage> store_;
   absl::Status elsewhere_;
 };

@@ -14,123 +14,94 @@
 namespace strata {
 namespace {
 
-// Makes the messages of one watcher.
-class Watcher {
- public:
-  Watcher(MapCore& core, const api::WatchOptions& options)
-      : core_(core), options_(options), since_(options.since), epoch_(options.epoch) {}
-
-  // What changed since the message before; nullopt if nothing did and it is not the first.
-  absl::StatusOr<std::optional<api::MapUpdate>> Next() {
-    const std::pair<ChangeSet, Snapshots::Pin> told = core_.ChangesSince(since_);
-    const auto& [changes, pin] = told;
-    if (!first_ && changes.last == since_) return std::optional<api::MapUpdate>();
-    api::MapUpdate update;
-    update.commit_sequence = changes.last;
-    update.epoch = pin.view().epoch;
-    update.whole = since_ == 0 || !changes.complete;
-    const bool same = changes.scans.empty() && changes.tiles.empty() && since_ <= changes.last &&
-                      (epoch_ == 0 || epoch_ == update.epoch);
-    if (!same || !changes.complete) {  // a thousand idle watchers ask ten times a second
-      STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-      STRATA_RETURN_IF_ERROR(
-          reader->Snapshot([&] { return Fill(*reader, told.second, told.first, update); }));
-    }
-    since_ = update.commit_sequence;
-    epoch_ = update.epoch;
-    first_ = false;
-    return std::optional<api::MapUpdate>(std::move(update));
-  }
-  std::uint64_t since() const { return since_; }
-
- private:
-  absl::Status Fill(StorageReader& reader,
-                    const Snapshots::Pin& pin,
-                    const ChangeSet& changes,
-                    api::MapUpdate& update) const {
-    STRATA_RETURN_IF_ERROR(CheckSince(reader, update));
-    if (epoch_ != 0 && epoch_ != update.epoch) {
-      STRATA_ASSIGN_OR_RETURN(const std::vector<EpochInfo> epochs, reader.ListEpochs());
-      for (const EpochInfo& info : epochs) {
-        if (info.epoch == update.epoch) update.epoch_reason = info.reason;
-      }
-    }
-    if (update.whole) return AddEverything(reader, pin, update);
-    for (const ScanId& id : changes.scans) {
-      if (!Wanted(id)) continue;
-      STRATA_ASSIGN_OR_RETURN(const std::optional<PosedScan> posed,
-                              reader.FindScan(id, update.epoch));
-      if (posed.has_value()) {
-        AddScan(*posed, update);
-      } else {
-        update.scans.push_back({.id = id, .gone = true});
-      }
-    }
-    if (!options_.tiles) return absl::OkStatus();
-    for (const auto& [key, tile] : changes.tiles) update.tiles.push_back(tile);
-    return absl::OkStatus();
-  }
-
-  // A commit that no watcher was told of yet may be resumed from; one that the map has not come to
-  // is of another map of that name.
-  absl::Status CheckSince(StorageReader& reader, api::MapUpdate& update) const {
-    if (since_ <= update.commit_sequence) return absl::OkStatus();
-    STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader.GetClock());
-    if (since_ > clock.commit_sequence) {
-      update.whole = true;
-    } else {
-      update.commit_sequence = since_;
-    }
-    return absl::OkStatus();
-  }
-
-  absl::Status AddEverything(StorageReader& reader,
-                             const Snapshots::Pin& pin,
-                             api::MapUpdate& update) const {
-    ScanQuery query;
-    query.skip_damaged = true;
-    if (!options_.trajectory.empty()) query.trajectory = options_.trajectory;
-    STRATA_RETURN_IF_ERROR(ForEachScan(
-        reader, query, update.epoch, [&](const PosedScan& posed) { AddScan(posed, update); }));
-    if (!options_.tiles) return absl::OkStatus();
-    STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> tiles,
-                            reader.ListSurfaceTiles(TileRange(), pin.view().tile_version));
-    for (const SurfaceTileRow& tile : tiles) update.tiles.push_back({tile.key, tile.version});
-    return absl::OkStatus();
-  }
-
-  bool Wanted(const ScanId& id) const {
-    return options_.trajectory.empty() || id.trajectory == options_.trajectory;
-  }
-  static void AddScan(const PosedScan& posed, api::MapUpdate& update) {
-    const ScanHeader& header = posed.scan.header;
-    update.scans.push_back(
-        {.id = header.id,
-         .state = posed.scan.state,
-         .T_map_scan = posed.pose.has_value() ? posed.pose->T_map_scan : header.T_map_scan});
-  }
-
-  MapCore& core_;
-  const api::WatchOptions& options_;
-  std::uint64_t since_;
-  std::uint64_t epoch_;  // that the watcher knows; 0: none
-  bool first_ = true;
-};
+void AddScan(const PosedScan& posed, api::MapUpdate& update) {
+  const ScanHeader& header = posed.scan.header;
+  update.scans.push_back(
+      {.id = header.id,
+       .state = posed.scan.state,
+       .T_map_scan = posed.pose.has_value() ? posed.pose->T_map_scan : header.T_map_scan});
+}
 
 }  // namespace
 
-absl::Status WatchMap(MapCore& core,
-                      const Stop& stop,
-                      const api::WatchOptions& options,
-                      absl::FunctionRef<absl::Status(const api::MapUpdate&)> sink) {
-  Watcher watcher(core, options);
-  while (true) {
-    STRATA_RETURN_IF_ERROR(stop.status());
-    STRATA_ASSIGN_OR_RETURN(const std::optional<api::MapUpdate> update, watcher.Next());
-    if (update.has_value()) STRATA_RETURN_IF_ERROR(sink(*update));
-    if (options.once) return absl::OkStatus();
-    STRATA_RETURN_IF_ERROR(core.changes().Await(watcher.since(), stop));
+absl::StatusOr<std::optional<api::MapUpdate>> MapWatcher::Next(const MapState& state) {
+  const ChangeSet& changes = state.changes();
+  if (!first_ && changes.last == since_) return std::optional<api::MapUpdate>();
+  api::MapUpdate update;
+  update.commit_sequence = changes.last;
+  update.epoch = state.view().epoch;
+  update.whole = since_ == 0 || !changes.complete;
+  const bool same = changes.scans.empty() && changes.tiles.empty() && since_ <= changes.last &&
+                    (epoch_ == 0 || epoch_ == update.epoch);
+  if (!same || !changes.complete) {  // a thousand idle watchers ask ten times a second
+    STRATA_RETURN_IF_ERROR(
+        state.Snapshot([&](StorageReader& reader) { return Fill(reader, state, update); }));
   }
+  since_ = update.commit_sequence;
+  epoch_ = update.epoch;
+  first_ = false;
+  return std::optional<api::MapUpdate>(std::move(update));
+}
+
+api::MapUpdate MapWatcher::Nothing() const {
+  api::MapUpdate update;
+  update.commit_sequence = since_;
+  update.epoch = epoch_;
+  return update;
+}
+
+absl::Status MapWatcher::Fill(StorageReader& reader,
+                              const MapState& state,
+                              api::MapUpdate& update) const {
+  STRATA_RETURN_IF_ERROR(CheckSince(reader, update));
+  if (epoch_ != 0 && epoch_ != update.epoch) {
+    STRATA_ASSIGN_OR_RETURN(const std::vector<EpochInfo> epochs, reader.ListEpochs());
+    for (const EpochInfo& info : epochs) {
+      if (info.epoch == update.epoch) update.epoch_reason = info.reason;
+    }
+  }
+  if (update.whole) return AddEverything(reader, state, update);
+  for (const ScanId& id : state.changes().scans) {
+    if (!Wanted(id)) continue;
+    STRATA_ASSIGN_OR_RETURN(const std::optional<PosedScan> posed,
+                            reader.FindScan(id, update.epoch));
+    if (posed.has_value()) {
+      AddScan(*posed, update);
+    } else {
+      update.scans.push_back({.id = id, .gone = true});
+    }
+  }
+  if (!options_.tiles) return absl::OkStatus();
+  for (const auto& [key, tile] : state.changes().tiles) update.tiles.push_back(tile);
+  return absl::OkStatus();
+}
+
+// A commit that no watcher was told of yet may be resumed from; one that the map has not come to is
+// of another map of that name.
+absl::Status MapWatcher::CheckSince(StorageReader& reader, api::MapUpdate& update) const {
+  if (since_ <= update.commit_sequence) return absl::OkStatus();
+  STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader.GetClock());
+  if (since_ > clock.commit_sequence) {
+    update.whole = true;
+  } else {
+    update.commit_sequence = since_;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status MapWatcher::AddEverything(StorageReader& reader,
+                                       const MapState& state,
+                                       api::MapUpdate& update) const {
+  ScanQuery query;
+  query.skip_damaged = true;
+  if (!options_.trajectory.empty()) query.trajectory = options_.trajectory;
+  STRATA_RETURN_IF_ERROR(ForEachScan(
+      reader, query, update.epoch, [&](const PosedScan& posed) { AddScan(posed, update); }));
+  if (!options_.tiles) return absl::OkStatus();
+  STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> tiles,
+                          reader.ListSurfaceTiles(TileRange(), state.view().tile_version));
+  for (const SurfaceTileRow& tile : tiles) update.tiles.push_back({tile.key, tile.version});
+  return absl::OkStatus();
 }
 
 }  // namespace strata

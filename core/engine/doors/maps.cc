@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -19,7 +20,6 @@
 #include "core/common/map_owner.h"
 #include "core/common/status.h"
 #include "core/engine/doors/backup.h"
-#include "core/engine/doors/map_watch.h"
 #include "core/engine/map/engine_options.h"
 #include "core/engine/tiles/map_stats.h"
 #include "core/world/names.h"
@@ -102,11 +102,23 @@ absl::StatusOr<std::shared_ptr<Map>> EngineMaps::Find(const Stop& stop, absl::st
 
 absl::StatusOr<MapReading> EngineMaps::FindToRead(const api::Call& call, absl::string_view name) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  absl::StatusOr<std::shared_ptr<Map>> map = Find(call.stop, name);
-  if (map.ok()) return MapReading(*std::move(map));
-  if (!MapOwnerOf(map.status()).has_value()) return map.status();
+  return ToRead(name, Find(call.stop, name));
+}
+
+absl::StatusOr<MapReading> EngineMaps::ToRead(absl::string_view name,
+                                              absl::StatusOr<std::shared_ptr<Map>> here) const {
+  if (here.ok()) return MapReading(*std::move(here));
+  if (!MapOwnerOf(here.status()).has_value()) return here.status();
   STRATA_ASSIGN_OR_RETURN(std::unique_ptr<MapStorage> store, stores_->OpenToRead(name));
-  return MapReading(std::move(store), map.status());
+  return MapReading(std::string(name), std::move(store), here.status());
+}
+
+absl::Status EngineMaps::AwaitNews(const MapReading& map,
+                                   std::uint64_t commit_sequence,
+                                   std::uint64_t epoch,
+                                   const Stop& stop) {
+  if (map.map() != nullptr) return map.map()->core().changes().Await(commit_sequence, stop);
+  return clocks_.Await(map.name(), commit_sequence, epoch, stop);
 }
 
 absl::StatusOr<EngineMaps::Place> EngineMaps::FindToAdd(const Stop& stop, absl::string_view name) {
@@ -132,14 +144,6 @@ absl::StatusOr<MapReading> EngineMaps::FindTilesToRead(const api::Call& call,
     STRATA_RETURN_IF_ERROR(found.map()->worker().AwaitDerived(call.stop));
   }
   return found;
-}
-
-absl::StatusOr<std::shared_ptr<Map>> EngineMaps::FindWithTiles(const api::Call& call,
-                                                               absl::string_view name) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<Map> map, Find(call.stop, name));
-  STRATA_RETURN_IF_ERROR(map->worker().AwaitDerived(call.stop));
-  return map;
 }
 
 absl::StatusOr<MapInfo> EngineMaps::Create(const api::Call& call,
@@ -256,28 +260,53 @@ absl::Status EngineMaps::SetOrigin(const api::Call& call,
       [&] { core.set_origin(origin); });
 }
 
+absl::StatusOr<bool> EngineMaps::IsAt(absl::string_view name,
+                                      const MapWatcher& watcher,
+                                      absl::Duration lag,
+                                      const Stop& stop) {
+  if (lag <= absl::ZeroDuration()) return false;
+  STRATA_ASSIGN_OR_RETURN(const MapClock clock, clocks_.ClockOf(std::string(name), lag, stop));
+  return clock.commit_sequence == watcher.since() && clock.epoch == watcher.epoch();
+}
+
 absl::Status EngineMaps::Watch(const api::Call& call,
                                absl::string_view name,
                                const api::WatchOptions& options,
                                absl::FunctionRef<absl::Status(const api::MapUpdate&)> sink) {
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(call.stop, name));
   if (!options.trajectory.empty()) {
     STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", options.trajectory));
   }
-  return WatchMap(map->core(), call.stop, options, sink);
+  MapWatcher watcher(options);
+  while (true) {
+    STRATA_RETURN_IF_ERROR(call.stop.status());
+    absl::StatusOr<std::shared_ptr<Map>> here = Find(call.stop, name);
+    if (MapOwnerOf(here.status()).has_value()) {
+      STRATA_ASSIGN_OR_RETURN(const bool known, IsAt(name, watcher, options.lag, call.stop));
+      if (known) return sink(watcher.Nothing());
+    }
+    STRATA_ASSIGN_OR_RETURN(const MapReading found, ToRead(name, std::move(here)));
+    std::optional<api::MapUpdate> update;
+    STRATA_RETURN_IF_ERROR(found.ReadMap(
+        watcher.since(), [&](MapState& state) { return AssignTo(watcher.Next(state), update); }));
+    if (update.has_value()) STRATA_RETURN_IF_ERROR(sink(*update));
+    if (options.once) return absl::OkStatus();
+    STRATA_RETURN_IF_ERROR(AwaitNews(found, watcher.since(), watcher.epoch(), call.stop));
+  }
 }
 
 absl::Status EngineMaps::Backup(const api::Call& call,
                                 absl::string_view name,
                                 absl::FunctionRef<absl::Status(const api::BackupPiece&)> sink) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(call.stop, name));
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, FindToRead(call, name));
   const CopyTurn turn(*this, name);
   if (!turn.taken()) {
     return absl::ResourceExhaustedError(
         absl::StrCat("map ", name, ": another backup of it runs; try again later"));
   }
-  const absl::Status done = BackUp(map->core(), directory_->CopyOf(name), call.stop, sink);
+  const auto copy = [&](const std::filesystem::path& file) {
+    return found.CopyTo(file, call.stop);
+  };
+  const absl::Status done = BackUp(copy, directory_->CopyOf(name), call.stop, sink);
   directory_->RemoveCopy(name)
       .IgnoreError();  // its journal, too; if this fails the next start does
   STRATA_RETURN_IF_ERROR(done);

@@ -2,6 +2,7 @@
 #ifndef STRATA_CORE_ENGINE_DOORS_MAPS_H_
 #define STRATA_CORE_ENGINE_DOORS_MAPS_H_
 
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <set>
@@ -18,10 +19,13 @@
 #include "absl/time/time.h"
 
 #include "core/api/maps.h"
+#include "core/common/cache_budget.h"
 #include "core/common/stop.h"
 #include "core/engine/doors/map.h"
 #include "core/engine/doors/map_reading.h"
+#include "core/engine/doors/map_watch.h"
 #include "core/engine/doors/open_maps.h"
+#include "core/engine/doors/store_clocks.h"
 #include "core/engine/map/directory.h"
 #include "core/engine/map/engine_options.h"
 #include "core/engine/map/map_stores.h"
@@ -38,23 +42,31 @@ class EngineMaps final : public api::Maps {
   // As OpenMaps::Find(); of shared stores the map shows what others may have seen of it.
   absl::StatusOr<std::shared_ptr<Map>> Find(const Stop& stop, absl::string_view name);
 
-  // The same for those who read its tiles: waits while they are made again (Worker::AwaitDerived).
-  absl::StatusOr<std::shared_ptr<Map>> FindWithTiles(const api::Call& call, absl::string_view name);
-
-  // As FindToRead(), and waits as FindWithTiles() where the map is here.
+  // As FindToRead(), and where the map is here waits while its tiles are made again
+  // (Worker::AwaitDerived).
   absl::StatusOr<MapReading> FindTilesToRead(const api::Call& call, absl::string_view name);
   // For calls that only read, and that the store itself can answer where another engine has the
   // map.
   absl::StatusOr<MapReading> FindToRead(const api::Call& call, absl::string_view name);
 
-  // The map where it is here; else its store, for scans that come in here while another engine has
-  // the map (MapStores::OpenToAdd()).
+  // Returns once the map may not be at that commit and epoch any more.
+  absl::Status AwaitNews(const MapReading& map,
+                         std::uint64_t commit_sequence,
+                         std::uint64_t epoch,
+                         const Stop& stop);
+
+  // The map where it is here; else its store, for scans and jobs that come in here while another
+  // engine has the map (MapStores::OpenToAdd()).
   struct Place {
     std::shared_ptr<Map> map;
     std::unique_ptr<MapStorage> store;
   };
   absl::StatusOr<Place> FindToAdd(const Stop& stop, absl::string_view name);
   const EngineOptions& options() const { return options_; }
+  // Whether other engines use the same stores.
+  bool IsShared() const { return stores_->IsShared(); }
+  // Of all maps.
+  const std::shared_ptr<CacheBudget>& caches() const { return maps_->caches(); }
 
   EngineNumbers Numbers() const;
   EngineHealth Health() const;
@@ -96,10 +108,21 @@ class EngineMaps final : public api::Maps {
 
   class CopyTurn;
 
+  // Of a map that another engine has: whether it stands where the watcher was told, or did `lag`
+  // ago at most.
+  absl::StatusOr<bool> IsAt(absl::string_view name,
+                            const MapWatcher& watcher,
+                            absl::Duration lag,
+                            const Stop& stop);
+  // `here`: what Find() said.
+  absl::StatusOr<MapReading> ToRead(absl::string_view name,
+                                    absl::StatusOr<std::shared_ptr<Map>> here) const;
+
   const EngineOptions options_;
   const std::unique_ptr<const MapDirectory> directory_;
   const std::unique_ptr<const MapStores> stores_;
   const std::unique_ptr<OpenMaps> maps_;
+  StoreClocks clocks_{*stores_};
   absl::Mutex removing_;  // one map's file is removed at a time
   mutable absl::Mutex mutex_;
   std::set<std::string, std::less<>> copied_

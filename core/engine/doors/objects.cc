@@ -8,6 +8,8 @@
 #include "absl/status/statusor.h"
 
 #include "core/common/status.h"
+#include "core/engine/doors/map_reading.h"
+#include "core/engine/map/map_state.h"
 #include "core/engine/objects/completion.h"
 #include "core/engine/objects/entities.h"
 #include "core/engine/objects/kind_library.h"
@@ -19,25 +21,34 @@ absl::StatusOr<EntitiesInfo> EngineObjects::ListEntities(
     absl::string_view map,
     const EntityQuery& query,
     absl::FunctionRef<absl::Status(const Entity&)> sink) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return ReadEntities(found->core(), query, call.stop, sink);
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
+  EntitiesInfo info;
+  STRATA_RETURN_IF_ERROR(found.ReadMap(MapState::kNoChanges, [&](MapState& state) {
+    return AssignTo(ReadEntities(state, query, call.stop, sink), info);
+  }));
+  return info;
 }
 
 absl::StatusOr<std::vector<KindInfo>> EngineObjects::ListKinds(const api::Call& call,
                                                                absl::string_view map) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return CountKinds(found->core(), call.stop);
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
+  std::vector<KindInfo> kinds;
+  STRATA_RETURN_IF_ERROR(found.ReadMap(MapState::kNoChanges, [&](MapState& state) {
+    return AssignTo(CountKinds(state, call.stop), kinds);
+  }));
+  return kinds;
 }
 
 absl::StatusOr<ThingKind> EngineObjects::GetKind(const api::Call& call,
                                                  absl::string_view map,
                                                  absl::string_view kind) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  STRATA_ASSIGN_OR_RETURN(ThingKind read, ReadKind(found->core(), kind));
-  STRATA_ASSIGN_OR_RETURN(const std::vector<KindInfo> kinds, CountKinds(found->core(), call.stop));
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
+  ThingKind read;
+  std::vector<KindInfo> kinds;
+  STRATA_RETURN_IF_ERROR(found.ReadMap(MapState::kNoChanges, [&](MapState& state) -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(read, ReadKind(state, kind));
+    return AssignTo(CountKinds(state, call.stop), kinds);
+  }));
   const auto counted = std::find_if(
       kinds.begin(), kinds.end(), [&](const KindInfo& info) { return info.id == read.info.id; });
   if (counted != kinds.end()) read.info.entities = counted->entities;
@@ -74,9 +85,12 @@ absl::StatusOr<InferredInfo> EngineObjects::ListInferred(
     absl::string_view map,
     const EntityQuery& query,
     absl::FunctionRef<absl::Status(const InferredPart&)> sink) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return ReadInferred(found->core(), query, call.stop, sink);
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
+  InferredInfo info;
+  STRATA_RETURN_IF_ERROR(found.ReadMap(MapState::kNoChanges, [&](MapState& state) {
+    return AssignTo(ReadInferred(state, query, call.stop, sink), info);
+  }));
+  return info;
 }
 
 }  // namespace strata

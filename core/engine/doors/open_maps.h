@@ -64,6 +64,7 @@ class OpenMaps {
   // at once, which `stop` ends; of shared stores some seconds ago at most, or as long as that takes
   // ten times.
   absl::StatusOr<std::vector<MapInfo>> List(const Stop& stop);
+  const std::shared_ptr<CacheBudget>& caches() const { return caches_; }
   // Those that are open now.
   std::vector<std::shared_ptr<Map>> Open() const;
   // Of open maps, then as last known of others.
@@ -135,7 +136,7 @@ class OpenMaps {
   void ForgetClosedBut(const std::set<std::string>& names);
   // Opens what engines that are gone left.
   void TakeAbandoned();
-  // Has maps look for scans that came in at other engines.
+  // Has maps look for scans and jobs that came in at other engines.
   void TellOfArrivals();
   void Note(const std::string& name, absl::StatusOr<MapOutline> outline);
   // Whether there was room.

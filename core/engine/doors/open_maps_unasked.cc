@@ -131,16 +131,18 @@ void OpenMaps::TakeAbandoned() {
 }
 
 void OpenMaps::TellOfArrivals() {
-  const absl::StatusOr<std::vector<std::string>> names = stores_.ListWaiting();
-  if (!names.ok()) return;  // the store is away; what waits there goes on waiting
-  for (const std::string& name : *names) {
+  const absl::StatusOr<std::vector<WaitingMap>> waiting = stores_.ListWaiting();
+  if (!waiting.ok()) return;  // the store is away; what waits there goes on waiting
+  for (const WaitingMap& one : *waiting) {
     std::shared_ptr<Map> map;
     {
       absl::MutexLock lock(&mutex_);
-      const auto it = entries_.find(name);
+      const auto it = entries_.find(one.name);
       if (it != entries_.end() && it->second.state == State::kOpen) map = it->second.map;
     }
-    if (map != nullptr) map->ScansWait();
+    if (map == nullptr) continue;
+    if (one.scans) map->ScansWait();
+    if (one.jobs) map->TakeInJobs().IgnoreError();  // it is looked again
   }
 }
 

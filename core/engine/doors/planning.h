@@ -2,22 +2,29 @@
 #ifndef STRATA_CORE_ENGINE_DOORS_PLANNING_H_
 #define STRATA_CORE_ENGINE_DOORS_PLANNING_H_
 
+#include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
 #include "core/api/planning.h"
+#include "core/engine/doors/map_reading.h"
 #include "core/engine/doors/maps.h"
+#include "core/engine/map/map_state.h"
+#include "core/engine/plans/map_planner.h"
+#include "core/engine/plans/planners_elsewhere.h"
 
 namespace strata {
 
 class EnginePlanning final : public api::Planning {
  public:
-  explicit EnginePlanning(EngineMaps& maps) : maps_(maps) {}
+  explicit EnginePlanning(EngineMaps& maps)
+      : maps_(maps), elsewhere_(maps.options(), maps.caches()) {}
 
   absl::StatusOr<PlanResult> PlanPath(const api::Call& call,
                                       absl::string_view map,
@@ -53,7 +60,21 @@ class EnginePlanning final : public api::Planning {
                                                                    absl::string_view map) override;
 
  private:
+  // Asks the map's planner, whoever has the map, about its newest state with what changed after
+  // `since`.
+  absl::Status Ask(const MapReading& map,
+                   std::uint64_t since,
+                   absl::FunctionRef<absl::Status(MapPlanner&, MapState&)> body);
+  // The same for what does not ask for changes.
+  template <typename Answer>
+  absl::StatusOr<Answer> Ask(
+      const api::Call& call,
+      absl::string_view map,
+      absl::FunctionRef<absl::StatusOr<Answer>(MapPlanner&, MapState&)> body);
+  absl::StatusOr<PathCheck> Check(const MapReading& map, const PathQuery& query, const Stop& stop);
+
   EngineMaps& maps_;
+  PlannersElsewhere elsewhere_;
 };
 
 }  // namespace strata

@@ -32,6 +32,15 @@ constexpr absl::Duration kStoreInterval = absl::Seconds(2);
 
 absl::Time NowInMicros() { return absl::FromUnixMicros(absl::ToUnixMicros(absl::Now())); }
 
+// Another engine may have queued a job meanwhile.
+absl::Status TakeFreeId(StorageReader& reader, JobInfo& job) {
+  while (true) {
+    STRATA_ASSIGN_OR_RETURN(const std::optional<JobInfo> taken, reader.FindJob(job.id));
+    if (!taken.has_value()) return absl::OkStatus();
+    ++job.id;
+  }
+}
+
 absl::Status NoSuchJob(std::uint64_t id) {
   return absl::NotFoundError(absl::StrCat("job ", id, " does not exist"));
 }
@@ -211,6 +220,7 @@ absl::StatusOr<JobInfo> JobBoard::Start(const Stop& stop,
   const auto show = [&] {
     Show(info);
     absl::MutexLock lock(&mutex_);
+    last_id_ = std::max(last_id_, info.id);
     jobs_.at(info.id)->owner = std::string(owner);
     for (const std::uint64_t id : outdated) jobs_.erase(id);
   };
@@ -220,10 +230,31 @@ absl::StatusOr<JobInfo> JobBoard::Start(const Stop& stop,
       stop,
       [&](StorageWriter& writer) -> absl::Status {
         for (const std::uint64_t id : outdated) STRATA_RETURN_IF_ERROR(writer.DeleteJob(id));
+        STRATA_RETURN_IF_ERROR(TakeFreeId(writer.reader(), info));
         return writer.PutJob(info);
       },
       show));
   return info;
+}
+
+absl::StatusOr<bool> JobBoard::TakeIn() {
+  std::vector<JobInfo> stored;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    STRATA_ASSIGN_OR_RETURN(stored, reader->ListJobs());
+  }
+  bool any = false;
+  absl::MutexLock lock(&mutex_);
+  for (JobInfo& info : stored) {
+    // What has ended may have been forgotten here since it was read.
+    if (info.state != JobState::kQueued || jobs_.contains(info.id)) continue;
+    last_id_ = std::max(last_id_, info.id);
+    auto entry = std::make_shared<Entry>();
+    entry->info = std::move(info);
+    jobs_[entry->info.id] = std::move(entry);
+    any = true;
+  }
+  return any;
 }
 
 absl::StatusOr<JobInfo> JobBoard::Get(std::uint64_t id) const {

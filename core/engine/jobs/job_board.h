@@ -47,6 +47,8 @@ class JobBoard {
                                 absl::string_view owner,
                                 absl::string_view kind,
                                 const std::map<std::string, std::string>& parameters);
+  // Shows jobs that other engines have queued in the store; whether there were any.
+  absl::StatusOr<bool> TakeIn();
   absl::StatusOr<JobInfo> Get(std::uint64_t id) const;
   std::vector<JobInfo> List() const;
   absl::StatusOr<JobInfo> Cancel(std::uint64_t id);

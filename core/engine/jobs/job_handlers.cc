@@ -21,31 +21,31 @@
 namespace strata {
 namespace {
 
-absl::Status NeedsNothing(MapCore&, const JobArguments&) { return absl::OkStatus(); }
+absl::Status NeedsNothing(StorageReader&, const JobArguments&) { return absl::OkStatus(); }
 
-absl::Status NeedsPoints(MapCore& core, const JobArguments&) {
-  if (core.info().parameters.keep_points) return absl::OkStatus();
+absl::Status NeedsPoints(StorageReader& reader, const JobArguments&) {
+  STRATA_ASSIGN_OR_RETURN(const MapInfo info, reader.GetMapInfo());
+  if (info.parameters.keep_points) return absl::OkStatus();
   return absl::FailedPreconditionError(
       "the map drops points, and the job looks at them and along the rays to them");
 }
 
-absl::Status NeedsPointsAndClass(MapCore& core, const JobArguments& arguments) {
-  if (core.info().parameters.keep_points) return CheckObjectsJob(core, arguments);
+absl::Status NeedsPointsAndClass(StorageReader& reader, const JobArguments& arguments) {
+  STRATA_ASSIGN_OR_RETURN(const MapInfo info, reader.GetMapInfo());
+  if (info.parameters.keep_points) return CheckObjectsJob(reader, arguments);
   return absl::FailedPreconditionError(
       "the map drops points after their integration, and objects are found in points; make a map "
       "that keeps them (map create without --drop-points) and import the scans again");
 }
 
-absl::Status NeedsClassifier(MapCore& core, const JobArguments& arguments) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-  return FindClassifier(*reader, arguments.Text("model")).status();
+absl::Status NeedsClassifier(StorageReader& reader, const JobArguments& arguments) {
+  return FindClassifier(reader, arguments.Text("model")).status();
 }
 
-absl::Status NeedsFreeName(MapCore& core, const JobArguments& arguments) {
+absl::Status NeedsFreeName(StorageReader& reader, const JobArguments& arguments) {
   STRATA_ASSIGN_OR_RETURN(const TrainSettings settings, ParseTrainSettings(arguments));
   if (settings.name.empty()) return absl::OkStatus();
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-  if (absl::IsNotFound(FindClassifier(*reader, settings.name).status())) return absl::OkStatus();
+  if (absl::IsNotFound(FindClassifier(reader, settings.name).status())) return absl::OkStatus();
   return absl::AlreadyExistsError(
       absl::StrCat("classifier ", settings.name, " exists; choose another name, or delete it"));
 }

@@ -11,6 +11,7 @@
 #include "core/engine/ingest/worker.h"
 #include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
+#include "core/storage/storage.h"
 #include "core/world/job.h"
 #include "core/world/job_arguments.h"
 
@@ -29,7 +30,7 @@ struct JobHandler {
   absl::string_view kind;
   // What the job needs that is not there, said before it waits for its turn; INVALID_ARGUMENT for
   // arguments that do not go together.
-  absl::Status (*check)(MapCore& core, const JobArguments& arguments);
+  absl::Status (*check)(StorageReader& reader, const JobArguments& arguments);
   // On the thread of jobs.
   absl::Status (*run)(const JobRun& run);
 };

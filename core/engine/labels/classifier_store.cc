@@ -73,17 +73,21 @@ absl::StatusOr<ClassifierInfo> FindClassifier(StorageReader& reader, absl::strin
                                           names.empty() ? "none" : absl::StrJoin(names, ", ")));
 }
 
-absl::StatusOr<StoredClassifier> LoadClassifier(MapCore& core, absl::string_view name) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+absl::StatusOr<StoredClassifier> LoadClassifier(StorageReader& reader, absl::string_view name) {
   StoredClassifier stored;
-  STRATA_ASSIGN_OR_RETURN(stored.info, FindClassifier(*reader, name));
-  STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader->GetClassifier(stored.info.id));
+  STRATA_ASSIGN_OR_RETURN(stored.info, FindClassifier(reader, name));
+  STRATA_ASSIGN_OR_RETURN(const std::string bytes, reader.GetClassifier(stored.info.id));
   absl::StatusOr<Classifier> classifier = DecodeClassifier(bytes);
   if (!classifier.ok()) {
     return Annotate(classifier.status(), absl::StrCat("classifier ", stored.info.name));
   }
   stored.classifier = *std::move(classifier);
   return stored;
+}
+
+absl::StatusOr<StoredClassifier> LoadClassifier(MapCore& core, absl::string_view name) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  return LoadClassifier(*reader, name);
 }
 
 std::string ClassesText(const std::vector<ClassName>& classes) {

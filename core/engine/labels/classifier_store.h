@@ -23,6 +23,7 @@ struct StoredClassifier {
   Classifier classifier;
 };
 // NOT_FOUND; DATA_LOSS if its bytes are damaged.
+absl::StatusOr<StoredClassifier> LoadClassifier(StorageReader& reader, absl::string_view name);
 absl::StatusOr<StoredClassifier> LoadClassifier(MapCore& core, absl::string_view name);
 
 // "1=ground,2=wall", as in ClassifierInfo::parameters.

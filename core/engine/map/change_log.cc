@@ -9,6 +9,20 @@
 
 namespace strata {
 
+ChangeSet ChangesOf(const StoredChanges& stored, std::uint64_t last) {
+  ChangeSet set;
+  set.complete = stored.complete;
+  set.last = last;
+  for (const StoredChange& change : stored.changes) {
+    if (change.scan.trajectory.empty()) {
+      set.tiles[change.tile] = {change.tile, change.version, change.gone};
+    } else {
+      set.scans.insert(change.scan);
+    }
+  }
+  return set;
+}
+
 void ChangeLog::Append(Change change) {
   changes_.push_back(std::move(change));
   if (changes_.size() <= kMaxChanges) return;

@@ -15,6 +15,7 @@
 
 #include "core/api/maps.h"
 #include "core/common/stop.h"
+#include "core/storage/records.h"
 
 namespace strata {
 
@@ -25,6 +26,9 @@ struct ChangeSet {
   std::set<ScanId> scans;  // whose state or pose is another
   std::map<TileKey, api::TileChangeNotice> tiles;  // of level 0
 };
+
+// What the store says that changed up to commit `last`.
+ChangeSet ChangesOf(const StoredChanges& stored, std::uint64_t last);
 
 // Thread-safe. Kept in memory only: after a restart it begins where the map stands.
 class ChangeLog {

@@ -33,6 +33,18 @@ const absl::Status& BeingClosed() {
 }
 namespace {
 
+std::vector<StoredChange> StoredChangesOf(std::uint64_t commit_sequence,
+                                          const std::vector<ScanId>& scans,
+                                          const std::vector<api::TileChangeNotice>& tiles) {
+  std::vector<StoredChange> changes;
+  changes.reserve(scans.size() + tiles.size());
+  for (const ScanId& scan : scans) changes.push_back({commit_sequence, scan, {}, 0, false});
+  for (const api::TileChangeNotice& tile : tiles) {
+    changes.push_back({commit_sequence, {}, tile.key, tile.version, tile.gone});
+  }
+  return changes;
+}
+
 absl::Status ClearLeftovers(StorageWriter& writer) {
   return writer.Commit(Durability::kFull, [&]() -> absl::Status {
     STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
@@ -146,7 +158,7 @@ absl::Status MapCore::Publish(const std::vector<ScanId>& scans,
     // and whoever knows a number is told of later ones only.
     STRATA_RETURN_IF_ERROR(writer.NextCommitSequence().status());
     STRATA_ASSIGN_OR_RETURN(clock, writer.reader().GetClock());
-    return absl::OkStatus();
+    return writer.PutChanges(StoredChangesOf(clock.commit_sequence, scans, tiles));
   };
   const auto show = [&] { Show(clock, scans, tiles); };
   ++in_publication_;

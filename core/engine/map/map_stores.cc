@@ -116,8 +116,12 @@ class PostgresStores final : public MapStores {
                                                         std::uint64_t most_waiting) const override {
     return maps_.OpenToAdd(name, most_waiting);
   }
-  absl::StatusOr<std::vector<std::string>> ListWaiting() const override {
+  absl::StatusOr<std::vector<WaitingMap>> ListWaiting() const override {
     return maps_.ListWaiting();
+  }
+  absl::StatusOr<std::vector<std::pair<std::string, MapClock>>> ListClocks(
+      const std::vector<std::string>& names) const override {
+    return maps_.ListClocks(names);
   }
   bool IsShared() const override { return true; }
   absl::StatusOr<bool> Has(absl::string_view name) const override { return maps_.Has(name); }

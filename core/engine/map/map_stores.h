@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/functional/function_ref.h"
@@ -67,16 +68,17 @@ class MapStores {
   virtual absl::StatusOr<std::unique_ptr<MapStorage>> OpenToRead(absl::string_view name) const {
     return absl::UnimplementedError(absl::StrCat("map ", name, ": its store is not shared"));
   }
-  // Of shared ones: for scans that come in here while another engine has the map alone: PutScan()
-  // is RESOURCE_EXHAUSTED while `most_waiting` wait for integration, and UNAVAILABLE where chunks
-  // of the scan have gone, which have to be sent again. UNAVAILABLE while nobody has it alone.
+  // Of shared ones: for scans and jobs that come in here while another engine has the map alone:
+  // PutScan() is RESOURCE_EXHAUSTED while `most_waiting` wait for integration, and UNAVAILABLE
+  // where chunks of the scan have gone, which have to be sent again. UNAVAILABLE while nobody has
+  // it alone.
   virtual absl::StatusOr<std::unique_ptr<MapStorage>> OpenToAdd(absl::string_view name,
                                                                 std::uint64_t) const {
     return absl::UnimplementedError(absl::StrCat("map ", name, ": its store is not shared"));
   }
-  // Of shared ones: maps that this engine has alone and in which scans wait for integration.
-  virtual absl::StatusOr<std::vector<std::string>> ListWaiting() const {
-    return std::vector<std::string>();
+  // Of shared ones: maps that this engine has alone and in which scans or jobs wait.
+  virtual absl::StatusOr<std::vector<WaitingMap>> ListWaiting() const {
+    return std::vector<WaitingMap>();
   }
   // Whether other engines use the same stores: maps may come, go and change beside this one.
   virtual bool IsShared() const { return false; }
@@ -84,6 +86,11 @@ class MapStores {
   virtual absl::StatusOr<bool> Has(absl::string_view) const { return false; }
   virtual absl::StatusOr<std::vector<std::string>> ListAbandoned() const {
     return std::vector<std::string>();
+  }
+  // Of shared ones: where those of `names` that are there stand.
+  virtual absl::StatusOr<std::vector<std::pair<std::string, MapClock>>> ListClocks(
+      const std::vector<std::string>&) const {
+    return std::vector<std::pair<std::string, MapClock>>();
   }
   // FAILED_PRECONDITION for what is no map; OK also where there is nothing.
   virtual absl::Status CheckRemovable(absl::string_view name) const = 0;

@@ -121,19 +121,19 @@ absl::Status Keep(MapCore& core,
   });
 }
 
-absl::StatusOr<std::uint64_t> JobOfModel(MapCore& core) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+absl::StatusOr<std::uint64_t> JobOfModel(const MapState& state) {
+  STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state.Reader());
   return reader->JobOfPlaneModel();
 }
 
-absl::StatusOr<std::string> ReadPart(MapCore& core, std::uint64_t job, std::uint64_t part) {
+absl::StatusOr<std::string> ReadPart(const MapState& state, std::uint64_t job, std::uint64_t part) {
   {
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+    STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state.Reader());
     STRATA_ASSIGN_OR_RETURN(std::optional<std::string> bytes,
                             reader->FindPlaneModelPart(job, part));
     if (bytes.has_value()) return *std::move(bytes);
   }
-  STRATA_ASSIGN_OR_RETURN(const std::uint64_t now, JobOfModel(core));
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t now, JobOfModel(state));
   if (now != job) return absl::AbortedError("another plane model took its place; try again");
   return absl::DataLossError("it is not there");
 }
@@ -174,17 +174,19 @@ absl::Status RunPlanesJob(MapCore& core,
 }
 
 absl::StatusOr<PlaneModelInfo> ReadPlaneModel(
-    MapCore& core, const Stop& stop, absl::FunctionRef<absl::Status(const ModelPlane&)> sink) {
-  STRATA_ASSIGN_OR_RETURN(const std::uint64_t job, JobOfModel(core));
+    const MapState& state,
+    const Stop& stop,
+    absl::FunctionRef<absl::Status(const ModelPlane&)> sink) {
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t job, JobOfModel(state));
   if (job == 0) return absl::NotFoundError("no plane model; job start MAP planes makes one");
-  STRATA_ASSIGN_OR_RETURN(const std::string head, ReadPart(core, job, 0));
+  STRATA_ASSIGN_OR_RETURN(const std::string head, ReadPart(state, job, 0));
   STRATA_ASSIGN_OR_RETURN(const PlaneModelInfo info, DecodePlaneModelInfo(head));
   for (std::uint64_t part = 1; part <= info.planes; ++part) {
     STRATA_RETURN_IF_ERROR(stop.status());
     const auto damaged = [part](const absl::Status& why) {
       return Annotate(why, absl::StrCat("plane model, part ", part));
     };
-    const absl::StatusOr<std::string> bytes = ReadPart(core, job, part);
+    const absl::StatusOr<std::string> bytes = ReadPart(state, job, part);
     if (!bytes.ok()) return damaged(bytes.status());
     const absl::StatusOr<ModelPlane> plane = DecodeModelPlane(*bytes);
     if (!plane.ok()) return damaged(plane.status());

@@ -9,6 +9,7 @@
 #include "core/common/stop.h"
 #include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
+#include "core/engine/map/map_state.h"
 #include "core/world/job.h"
 #include "core/world/job_arguments.h"
 #include "core/world/plane_model.h"
@@ -29,7 +30,9 @@ absl::Status RunPlanesJob(MapCore& core,
 // how it came about. NOT_FOUND naming the job where there is none; ABORTED where another one took
 // its place meanwhile; DATA_LOSS naming the plane that is damaged.
 absl::StatusOr<PlaneModelInfo> ReadPlaneModel(
-    MapCore& core, const Stop& stop, absl::FunctionRef<absl::Status(const ModelPlane&)> sink);
+    const MapState& state,
+    const Stop& stop,
+    absl::FunctionRef<absl::Status(const ModelPlane&)> sink);
 
 }  // namespace strata
 

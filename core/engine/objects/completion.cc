@@ -43,7 +43,7 @@ absl::StatusOr<ThingsOfKinds> ThingsWithKinds(MapCore& core,
                                               const Stop& stop) {
   ThingsOfKinds things;
   STRATA_ASSIGN_OR_RETURN(const EntitiesInfo info,
-                          ReadEntities(core, query, stop, [&](const Entity& entity) {
+                          ReadEntities(MapState(core), query, stop, [&](const Entity& entity) {
                             if (entity.kind.has_value()) things[entity.kind->id].push_back(entity);
                             return absl::OkStatus();
                           }));
@@ -229,11 +229,11 @@ void ReportInferred(const Inferred& inferred, JobContext& context) {
 // Reads what is kept of one job, part by part.
 class InferredReader {
  public:
-  InferredReader(MapCore& core, std::uint64_t job) : core_(core), job_(job) {}
+  InferredReader(const MapState& state, std::uint64_t job) : state_(state), job_(job) {}
 
   // nullopt: that was all.
   absl::StatusOr<std::optional<EntityPart>> Next() {
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state_.Reader());
     STRATA_ASSIGN_OR_RETURN(std::optional<EntityPart> part, reader->FindInferredPart(job_, last_));
     if (part.has_value()) {
       last_ = part->part;
@@ -245,13 +245,13 @@ class InferredReader {
   }
 
  private:
-  MapCore& core_;
+  const MapState& state_;
   const std::uint64_t job_;
   std::optional<std::uint64_t> last_;
 };
 
-absl::StatusOr<std::uint64_t> JobOfKeptInferred(MapCore& core) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+absl::StatusOr<std::uint64_t> JobOfKeptInferred(const MapState& state) {
+  STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state.Reader());
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t job, reader->JobOfInferred());
   if (job != 0) return job;
   return absl::NotFoundError(
@@ -259,11 +259,11 @@ absl::StatusOr<std::uint64_t> JobOfKeptInferred(MapCore& core) {
 }
 
 // Which entities a query takes.
-absl::StatusOr<absl::btree_set<std::uint64_t>> EntitiesAskedFor(MapCore& core,
+absl::StatusOr<absl::btree_set<std::uint64_t>> EntitiesAskedFor(const MapState& state,
                                                                 const EntityQuery& query,
                                                                 const Stop& stop) {
   absl::btree_set<std::uint64_t> asked;
-  STRATA_RETURN_IF_ERROR(ReadEntities(core, query, stop, [&](const Entity& entity) {
+  STRATA_RETURN_IF_ERROR(ReadEntities(state, query, stop, [&](const Entity& entity) {
                            asked.insert(entity.id);
                            return absl::OkStatus();
                          }).status());
@@ -304,14 +304,14 @@ absl::Status RunCompleteJob(MapCore& core,
 }
 
 absl::StatusOr<InferredInfo> ReadInferred(
-    MapCore& core,
+    const MapState& state,
     const EntityQuery& query,
     const Stop& stop,
     absl::FunctionRef<absl::Status(const InferredPart&)> sink) {
-  STRATA_ASSIGN_OR_RETURN(const std::uint64_t job, JobOfKeptInferred(core));
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t job, JobOfKeptInferred(state));
   STRATA_ASSIGN_OR_RETURN(const absl::btree_set<std::uint64_t> asked,
-                          EntitiesAskedFor(core, query, stop));
-  InferredReader reader(core, job);
+                          EntitiesAskedFor(state, query, stop));
+  InferredReader reader(state, job);
   InferredInfo info;
   while (true) {
     STRATA_RETURN_IF_ERROR(stop.status());

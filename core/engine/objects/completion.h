@@ -9,6 +9,7 @@
 #include "core/common/stop.h"
 #include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
+#include "core/engine/map/map_state.h"
 #include "core/world/job.h"
 #include "core/world/job_arguments.h"
 #include "core/world/things/entity.h"
@@ -31,7 +32,7 @@ absl::Status RunCompleteJob(MapCore& core,
 // kinds it had seen. NOT_FOUND naming the job where nothing was inferred; ABORTED where another job
 // inferred or found others meanwhile; DATA_LOSS naming the entity that is damaged.
 absl::StatusOr<InferredInfo> ReadInferred(
-    MapCore& core,
+    const MapState& state,
     const EntityQuery& query,
     const Stop& stop,
     absl::FunctionRef<absl::Status(const InferredPart&)> sink);

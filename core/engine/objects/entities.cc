@@ -38,15 +38,10 @@ EntityOptions EntityOptionsOf(const JobArguments& arguments) {
   return options;
 }
 
-absl::StatusOr<std::vector<MapClass>> ClassesOf(MapCore& core) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-  return reader->ListClasses();
-}
-
 // 0: every class.
-absl::StatusOr<std::uint16_t> ClassAskedFor(MapCore& core, const JobArguments& arguments) {
+absl::StatusOr<std::uint16_t> ClassAskedFor(StorageReader& reader, const JobArguments& arguments) {
   if (!arguments.Has("class")) return std::uint16_t{0};
-  STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes, ClassesOf(core));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<MapClass> classes, reader.ListClasses());
   return ClassIdOf(classes, arguments.Text("class"));
 }
 
@@ -293,27 +288,27 @@ absl::Status CheckLabels(const SquarePoints& points,
                    "model=NAME) or upload labels (scan label) first"));
 }
 
-absl::StatusOr<std::vector<KindInfo>> KindsOf(MapCore& core) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+absl::StatusOr<std::vector<KindInfo>> KindsOf(const MapState& state) {
+  STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state.Reader());
   return KindsIn(*reader);
 }
 
-absl::StatusOr<std::uint64_t> JobOfKept(MapCore& core) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+absl::StatusOr<std::uint64_t> JobOfKept(const MapState& state) {
+  STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state.Reader());
   return reader->JobOfEntities();
 }
 
 // Reads what is kept of one job's entities, part by part.
 class EntityReader {
  public:
-  EntityReader(MapCore& core, std::uint64_t job, const std::vector<KindInfo>& kinds)
-      : core_(core), job_(job), epoch_(core.snapshots().current().epoch) {
+  EntityReader(const MapState& state, std::uint64_t job, const std::vector<KindInfo>& kinds)
+      : state_(state), job_(job), epoch_(state.view().epoch) {
     for (const KindInfo& kind : kinds) kind_names_[kind.id] = kind.name;
   }
 
   // nullopt: that was all.
   absl::StatusOr<std::optional<EntityPart>> Next() {
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state_.Reader());
     STRATA_ASSIGN_OR_RETURN(std::optional<EntityPart> part, reader->FindEntityPart(job_, last_));
     if (part.has_value()) {
       last_ = part->part;
@@ -355,7 +350,7 @@ class EntityReader {
   absl::StatusOr<std::optional<ScanId>> IdOf(ScanNumber number) {
     const auto [found, added] = ids_.try_emplace(number, std::nullopt);
     if (!added) return found->second;
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state_.Reader());
     const absl::StatusOr<PosedScan> scan = reader->GetScan(number, epoch_);
     if (scan.ok()) {
       found->second = scan->scan.header.id;
@@ -365,7 +360,7 @@ class EntityReader {
     return found->second;
   }
 
-  MapCore& core_;
+  const MapState& state_;
   const std::uint64_t job_;
   const std::uint64_t epoch_;
   HashMap<std::uint64_t, std::string> kind_names_;
@@ -375,8 +370,8 @@ class EntityReader {
 
 }  // namespace
 
-absl::Status CheckObjectsJob(MapCore& core, const JobArguments& arguments) {
-  return ClassAskedFor(core, arguments).status();
+absl::Status CheckObjectsJob(StorageReader& reader, const JobArguments& arguments) {
+  return ClassAskedFor(reader, arguments).status();
 }
 
 absl::Status RunObjectsJob(MapCore& core,
@@ -385,7 +380,11 @@ absl::Status RunObjectsJob(MapCore& core,
                            JobContext& context) {
   const EntityOptions options = EntityOptionsOf(arguments);
   STRATA_RETURN_IF_ERROR(options.Validate());
-  STRATA_ASSIGN_OR_RETURN(const std::uint16_t class_id, ClassAskedFor(core, arguments));
+  std::uint16_t class_id = 0;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+    STRATA_ASSIGN_OR_RETURN(class_id, ClassAskedFor(*reader, arguments));
+  }
   EntitiesInfo info;
   info.job = job.id;
   info.epoch = core.snapshots().current().epoch;
@@ -406,19 +405,19 @@ absl::Status RunObjectsJob(MapCore& core,
   return absl::OkStatus();
 }
 
-absl::StatusOr<EntitiesInfo> ReadEntities(MapCore& core,
+absl::StatusOr<EntitiesInfo> ReadEntities(const MapState& state,
                                           const EntityQuery& query,
                                           const Stop& stop,
                                           absl::FunctionRef<absl::Status(const Entity&)> sink) {
-  STRATA_ASSIGN_OR_RETURN(const std::uint64_t job, JobOfKept(core));
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t job, JobOfKept(state));
   if (job == 0) return absl::NotFoundError("no entities; objects find (job objects) finds them");
-  STRATA_ASSIGN_OR_RETURN(const std::vector<KindInfo> kinds, KindsOf(core));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<KindInfo> kinds, KindsOf(state));
   std::uint64_t kind = 0;
   if (!query.kind.empty()) {
     STRATA_ASSIGN_OR_RETURN(const KindInfo asked, KindCalled(kinds, query.kind));
     kind = asked.id;
   }
-  EntityReader reader(core, job, kinds);
+  EntityReader reader(state, job, kinds);
   EntitiesInfo info;
   while (true) {
     STRATA_RETURN_IF_ERROR(stop.status());
@@ -444,14 +443,14 @@ absl::StatusOr<EntitiesInfo> ReadEntities(MapCore& core,
   return info;
 }
 
-absl::StatusOr<std::vector<KindInfo>> CountKinds(MapCore& core, const Stop& stop) {
+absl::StatusOr<std::vector<KindInfo>> CountKinds(const MapState& state, const Stop& stop) {
   HashMap<std::uint64_t, std::uint64_t> counts;
-  const absl::Status read = ReadEntities(core, {}, stop, [&](const Entity& entity) {
+  const absl::Status read = ReadEntities(state, {}, stop, [&](const Entity& entity) {
                               if (entity.kind.has_value()) ++counts[entity.kind->id];
                               return absl::OkStatus();
                             }).status();
   if (!absl::IsNotFound(read) && !absl::IsDataLoss(read)) STRATA_RETURN_IF_ERROR(read);
-  STRATA_ASSIGN_OR_RETURN(std::vector<KindInfo> kinds, KindsOf(core));
+  STRATA_ASSIGN_OR_RETURN(std::vector<KindInfo> kinds, KindsOf(state));
   for (KindInfo& kind : kinds) {
     const auto found = counts.find(kind.id);
     if (found != counts.end()) kind.entities = found->second;

@@ -11,6 +11,7 @@
 #include "core/common/stop.h"
 #include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
+#include "core/engine/map/map_state.h"
 #include "core/world/job.h"
 #include "core/world/job_arguments.h"
 #include "core/world/things/entity.h"
@@ -20,7 +21,7 @@ namespace strata {
 
 // What the job can be told before it is queued: NOT_FOUND for a class that the map does not have,
 // listing those that it has.
-absl::Status CheckObjectsJob(MapCore& core, const JobArguments& arguments);
+absl::Status CheckObjectsJob(StorageReader& reader, const JobArguments& arguments);
 
 // Finds the entities of all classified points of the integrated scans, as the current epoch has
 // them, and keeps them in place of those of before, in one commit. Scans without points, and
@@ -39,13 +40,13 @@ absl::Status RunObjectsJob(MapCore& core,
 // an entity's, nor what they alone saw. NOT_FOUND naming the job where there are none, and for a
 // kind that does not exist; ABORTED where another one found others meanwhile; DATA_LOSS naming the
 // entity that is damaged.
-absl::StatusOr<EntitiesInfo> ReadEntities(MapCore& core,
+absl::StatusOr<EntitiesInfo> ReadEntities(const MapState& state,
                                           const EntityQuery& query,
                                           const Stop& stop,
                                           absl::FunctionRef<absl::Status(const Entity&)> sink);
 
 // All kinds, with their entities counted; damaged entities are not. ABORTED as ReadEntities().
-absl::StatusOr<std::vector<KindInfo>> CountKinds(MapCore& core, const Stop& stop);
+absl::StatusOr<std::vector<KindInfo>> CountKinds(const MapState& state, const Stop& stop);
 
 }  // namespace strata
 

@@ -112,12 +112,11 @@ absl::StatusOr<bool> IsLibrary(StorageReader& reader, const std::vector<ThingKin
       [](const KindRow& row, const ThingKind& kind) { return row.id == kind.info.id; });
 }
 
-absl::StatusOr<ThingKind> ReadKind(MapCore& core, absl::string_view kind) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+absl::StatusOr<ThingKind> ReadKind(const MapState& state, absl::string_view kind) {
   ThingKind read;
-  STRATA_RETURN_IF_ERROR(reader->Snapshot([&]() -> absl::Status {
-    STRATA_ASSIGN_OR_RETURN(read.info, KindIn(*reader, kind));
-    STRATA_ASSIGN_OR_RETURN(read.shape, ShapeOf(*reader, read.info.id));
+  STRATA_RETURN_IF_ERROR(state.Snapshot([&](StorageReader& reader) -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(read.info, KindIn(reader, kind));
+    STRATA_ASSIGN_OR_RETURN(read.shape, ShapeOf(reader, read.info.id));
     return absl::OkStatus();
   }));
   return read;

@@ -10,6 +10,7 @@
 
 #include "core/common/stop.h"
 #include "core/engine/map/map_core.h"
+#include "core/engine/map/map_state.h"
 #include "core/storage/storage.h"
 #include "core/world/things/kind.h"
 
@@ -23,7 +24,7 @@ absl::StatusOr<std::vector<ThingKind>> LoadLibrary(MapCore& core, const Stop& st
 absl::StatusOr<bool> IsLibrary(StorageReader& reader, const std::vector<ThingKind>& library);
 
 // As of api::Objects; entities are not counted.
-absl::StatusOr<ThingKind> ReadKind(MapCore& core, absl::string_view kind);
+absl::StatusOr<ThingKind> ReadKind(const MapState& state, absl::string_view kind);
 absl::StatusOr<KindInfo> RenameKind(MapCore& core,
                                     absl::string_view kind,
                                     absl::string_view name,

@@ -119,17 +119,18 @@ absl::Status Verify(MapCore& core, const SteadyView& view, int threads, JobConte
   } else {
     STRATA_RETURN_IF_ERROR(kept);
   }
-  const absl::Status planes = ReadPlaneModel(core, context.stop(), [](const ModelPlane&) {
+  const absl::Status planes = ReadPlaneModel(MapState(core), context.stop(), [](const ModelPlane&) {
                                 return absl::OkStatus();
                               }).status();
   if (absl::IsDataLoss(planes)) findings.Add(std::string(planes.message()));
-  const absl::Status entities = ReadEntities(core, {}, context.stop(), [](const Entity&) {
+  const absl::Status entities = ReadEntities(MapState(core), {}, context.stop(), [](const Entity&) {
                                   return absl::OkStatus();
                                 }).status();
   if (absl::IsDataLoss(entities)) findings.Add(std::string(entities.message()));
-  const absl::Status inferred = ReadInferred(core, {}, context.stop(), [](const InferredPart&) {
-                                  return absl::OkStatus();
-                                }).status();
+  const absl::Status inferred =
+      ReadInferred(MapState(core), {}, context.stop(), [](const InferredPart&) {
+        return absl::OkStatus();
+      }).status();
   if (absl::IsDataLoss(inferred)) findings.Add(std::string(inferred.message()));
   const absl::Status kinds = CheckKinds(core, context.stop());
   if (absl::IsDataLoss(kinds)) findings.Add(std::string(kinds.message()));

@@ -47,6 +47,11 @@ absl::StatusOr<std::shared_ptr<const SurfaceTile>> ReadSurfaceTile(MapCore& core
     STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
     STRATA_ASSIGN_OR_RETURN(row, reader->FindSurfaceTile(key, version));
   }
+  return DecodeStoredTile(key, row);
+}
+
+absl::StatusOr<std::shared_ptr<const SurfaceTile>> DecodeStoredTile(
+    const TileKey& key, const std::optional<SurfaceTileRow>& row) {
   if (!row.has_value()) return std::shared_ptr<const SurfaceTile>();
   absl::StatusOr<SurfaceTile> decoded = DecodeSurfaceTile(row->bytes);
   if (!decoded.ok()) return DamagedTile(key, decoded.status());

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "absl/functional/function_ref.h"
@@ -16,12 +17,16 @@
 #include "core/engine/map/steady_view.h"
 #include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
+#include "core/storage/records.h"
 
 namespace strata {
 
 // DATA_LOSS naming the tile, the cure and why it cannot be read.
 absl::Status DamagedTile(const TileKey& key, const absl::Status& why);
 
+// What FindSurfaceTile() gave for `key`; nullptr where there is none. DATA_LOSS as above.
+absl::StatusOr<std::shared_ptr<const SurfaceTile>> DecodeStoredTile(
+    const TileKey& key, const std::optional<SurfaceTileRow>& row);
 // The stored tile as readers of `version` get it; nullptr where there is none. DATA_LOSS as above.
 absl::StatusOr<std::shared_ptr<const SurfaceTile>> ReadSurfaceTile(MapCore& core,
                                                                    const TileKey& key,

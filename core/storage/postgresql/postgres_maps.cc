@@ -12,6 +12,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
@@ -67,6 +68,7 @@ class PostgresStorage final : public MapStorage {
     return CheckOwner(owner, map_);
   }
   LastOwner last_owner() const override { return map_.last_owner; }
+  std::int64_t number() const override { return map_.number; }
   absl::Status CheckHeld() const override {
     return lease_ == nullptr ? absl::OkStatus() : lease_->Check();
   }
@@ -136,10 +138,11 @@ absl::Status InsertMap(Connection& connection,
           .status());
   return connection
       .Change(
-          "INSERT INTO derived_state (map, schema, tile_version, complete) VALUES ($1, $2, 0, "
-          "1)",
+          "INSERT INTO derived_state (map, schema, tile_version, complete, changes_after) VALUES "
+          "($1, $2, 0, 1, $3)",
           map,
-          kDerivedVersion)
+          kDerivedVersion,
+          clock)
       .status();
 }
 
@@ -329,19 +332,40 @@ absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenToAdd(
   return std::make_unique<PostgresStorage>(pool_, map, leases_, nullptr);
 }
 
-absl::StatusOr<std::vector<std::string>> PostgresMaps::ListWaiting() const {
+absl::StatusOr<std::vector<WaitingMap>> PostgresMaps::ListWaiting() const {
   STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
   STRATA_ASSIGN_OR_RETURN(
       Rows row,
-      lease->Query("SELECT p.name FROM map_lease AS l JOIN map_place AS p ON p.map = l.map WHERE "
-                   "l.holder = $1 AND p.state = $2 AND EXISTS (SELECT FROM truth_scan AS s WHERE "
-                   "s.map = l.map AND s.state = $3)",
+      lease->Query("SELECT * FROM (SELECT p.name, EXISTS (SELECT FROM truth_scan AS s WHERE s.map "
+                   "= l.map AND s.state = $3) AS scans, EXISTS (SELECT FROM truth_job AS j WHERE "
+                   "j.map = l.map AND j.state = $4) AS jobs FROM map_lease AS l JOIN map_place AS "
+                   "p ON p.map = l.map WHERE l.holder = $1 AND p.state = $2) AS w WHERE w.scans OR "
+                   "w.jobs",
                    leases_->holder(),
                    kThere,
-                   static_cast<int>(ScanState::kPending)));
-  std::vector<std::string> names;
-  while (row.Next()) names.emplace_back(row.Text(0));
-  return names;
+                   static_cast<int>(ScanState::kPending),
+                   static_cast<int>(JobState::kQueued)));
+  std::vector<WaitingMap> waiting;
+  while (row.Next()) waiting.push_back({row.Text(0), row.Bool(1), row.Bool(2)});
+  return waiting;
+}
+
+absl::StatusOr<std::vector<std::pair<std::string, MapClock>>> PostgresMaps::ListClocks(
+    const std::vector<std::string>& names) const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row,
+      lease->Query("SELECT p.name, m.commit_sequence, m.epoch, d.tile_version, d.complete FROM "
+                   "map_place AS p JOIN truth_map AS m ON m.map = p.map JOIN derived_state AS d ON "
+                   "d.map = p.map WHERE p.state = $2 AND p.name = ANY (string_to_array($1, '/'))",
+                   absl::StrJoin(names, "/"),
+                   kThere));
+  std::vector<std::pair<std::string, MapClock>> clocks;
+  while (row.Next()) {
+    clocks.emplace_back(row.Text(0),
+                        MapClock{row.Unsigned(1), row.Unsigned(2), row.Unsigned(3), row.Bool(4)});
+  }
+  return clocks;
 }
 
 // The name is taken last, or others who would make such a map had to wait.
@@ -360,6 +384,12 @@ absl::Status PostgresMaps::ImportRows(Connection& connection,
   const std::uint64_t removed = place.Unsigned(1);
   STRATA_RETURN_IF_ERROR(
       CopyFileToMap(file, connection, place.Int(0), removed == 0 ? 0 : removed + 1, stop));
+  STRATA_RETURN_IF_ERROR(
+      connection
+          .Change("UPDATE derived_state AS d SET changes_after = m.commit_sequence FROM truth_map "
+                  "AS m WHERE d.map = $1 AND m.map = $1",
+                  place.Int(0))
+          .status());
   const absl::Status named =
       connection.Change("UPDATE map_place SET state = $2 WHERE map = $1", place.Int(0), kThere)
           .status();
@@ -455,12 +485,17 @@ absl::Status PostgresMaps::Delete(absl::string_view name) const {
 absl::Status PostgresMaps::DeleteRows(std::int64_t map) const {
   STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
   STRATA_RETURN_IF_ERROR(lease->Execute("BEGIN; SET LOCAL statement_timeout = 0"));
+  STRATA_ASSIGN_OR_RETURN(
+      Rows mine,
+      lease->Query("SELECT 1 FROM map_place WHERE map = $1 FOR UPDATE SKIP LOCKED", map));
+  if (!mine.Next()) return lease->Execute("ROLLBACK");  // another process is at it
   for (const char* sql : DeletionsOfDerived()) {
     STRATA_RETURN_IF_ERROR(lease->Change(sql, map).status());
   }
   for (const char* sql : DeletionsOfTruth()) {
     STRATA_RETURN_IF_ERROR(lease->Change(sql, map).status());
   }
+  STRATA_RETURN_IF_ERROR(lease->Change("DELETE FROM map_change WHERE map = $1", map).status());
   STRATA_RETURN_IF_ERROR(lease->Change("DELETE FROM derived_state WHERE map = $1", map).status());
   STRATA_RETURN_IF_ERROR(lease->Change("DELETE FROM map_lease WHERE map = $1", map).status());
   STRATA_RETURN_IF_ERROR(lease->Change("DELETE FROM map_place WHERE map = $1", map).status());

@@ -57,6 +57,10 @@ class PostgresMaps {
   absl::StatusOr<bool> Has(absl::string_view name) const;
   // Whose lease has ended without having been given up: the process that had them died, say.
   absl::StatusOr<std::vector<std::string>> ListAbandoned() const;
+  // Where those of `names` that are there stand, in one statement. Names must be valid
+  // (ValidateName).
+  absl::StatusOr<std::vector<std::pair<std::string, MapClock>>> ListClocks(
+      const std::vector<std::string>& names) const;
   // All maps, a thousand a query, in no order; an error of one of them is of its rows. CANCELLED,
   // DEADLINE_EXCEEDED by `stop`.
   absl::Status Survey(
@@ -83,8 +87,8 @@ class PostgresMaps {
   // takes it. NOT_FOUND.
   absl::StatusOr<std::unique_ptr<MapStorage>> OpenToAdd(absl::string_view name,
                                                         std::uint64_t most_waiting) const;
-  // Those that this process has alone in which scans wait, whoever added them.
-  absl::StatusOr<std::vector<std::string>> ListWaiting() const;
+  // Those that this process has alone in which scans or jobs wait, whoever added them.
+  absl::StatusOr<std::vector<WaitingMap>> ListWaiting() const;
   // Makes a map of a map file that nobody has open, all or nothing: of the current format and
   // closed well (FAILED_PRECONDITION). Its clock begins behind those of all maps that were removed.
   // A row is in memory at a time. ALREADY_EXISTS; DATA_LOSS for a damaged file; INVALID_ARGUMENT

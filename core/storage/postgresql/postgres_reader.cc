@@ -53,9 +53,20 @@ bool MeetsNothing(const Eigen::AlignedBox2d& box) {
 }  // namespace
 
 absl::Status PostgresReader::Snapshot(absl::FunctionRef<absl::Status()> body) {
+  return SnapshotOf("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY", body);
+}
+
+absl::Status PostgresReader::LongSnapshot(absl::FunctionRef<absl::Status()> body) {
+  return SnapshotOf(
+      "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY; "
+      "SET LOCAL idle_in_transaction_session_timeout = '10min'",
+      body);
+}
+
+absl::Status PostgresReader::SnapshotOf(const char* begin, absl::FunctionRef<absl::Status()> body) {
   if (held_ != nullptr) return absl::InternalError("store: a snapshot in a transaction");
   STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
-  STRATA_RETURN_IF_ERROR(lease->Execute("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY"));
+  STRATA_RETURN_IF_ERROR(lease->Execute(begin));
   const absl::Cleanup let_go = [this] { held_ = nullptr; };
   held_ = &*lease;
   const absl::Status done = body();

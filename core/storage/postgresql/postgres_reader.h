@@ -36,9 +36,11 @@ class PostgresReader final : public StorageReader {
   void ReadThrough(Connection* connection) { held_ = connection; }
 
   absl::Status Snapshot(absl::FunctionRef<absl::Status()> body) override;
+  absl::Status LongSnapshot(absl::FunctionRef<absl::Status()> body) override;
   absl::Status CopyTo(const std::filesystem::path& file, const Stop& stop) override;
   absl::StatusOr<MapClock> GetClock() override;
   absl::StatusOr<MapInfo> GetMapInfo() override;
+  absl::StatusOr<StoredChanges> ListChanges(std::uint64_t since) override;
   absl::StatusOr<std::optional<PosedScan>> FindScan(const ScanId& id, std::uint64_t epoch) override;
   absl::StatusOr<PosedScan> GetScan(ScanNumber number, std::uint64_t epoch) override;
   absl::StatusOr<std::vector<ScanNumber>> ListScanNumbers() override;
@@ -91,6 +93,8 @@ class PostgresReader final : public StorageReader {
   absl::StatusOr<ScanView> FindScanView(ScanNumber number) override;
 
  private:
+  // A snapshot that `begin` begins.
+  absl::Status SnapshotOf(const char* begin, absl::FunctionRef<absl::Status()> body);
   // What `body` reads is of one state, which a snapshot or transaction around it may be.
   absl::Status OneState(absl::FunctionRef<absl::Status()> body);
   // What was read of a version, once it has been read: as MapLease::Check().

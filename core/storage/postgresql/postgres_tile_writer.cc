@@ -258,8 +258,12 @@ absl::Status PostgresWriter::PublishTiles(std::uint64_t version, bool complete) 
                 complete);
 }
 
+// Nobody knows what becomes of the tiles: whoever watches is told everything then.
 absl::Status PostgresWriter::DropDerived() {
   for (const char* sql : DeletionsOfDerived()) STRATA_RETURN_IF_ERROR(RunSql(sql));
+  STRATA_RETURN_IF_ERROR(
+      RunSql("UPDATE derived_state AS d SET changes_after = m.commit_sequence + 1 FROM truth_map "
+             "AS m WHERE d.map = $1 AND m.map = $1"));
   return RunSql(
       "INSERT INTO derived_state (map, schema, tile_version, complete) VALUES ($1, $2, 0, 0) ON "
       "CONFLICT (map) DO UPDATE SET schema = $2, tile_version = 0, complete = 0",

@@ -59,6 +59,7 @@ class PostgresWriter final : public StorageWriter {
   absl::Status Part(absl::FunctionRef<absl::Status()> body) override;
   StorageReader& reader() override { return reader_; }
   absl::StatusOr<std::uint64_t> NextCommitSequence() override;
+  absl::Status PutChanges(const std::vector<StoredChange>& changes) override;
 
   absl::Status PutChunk(std::uint64_t upload,
                         std::uint32_t ordinal,
@@ -148,6 +149,10 @@ class PostgresWriter final : public StorageWriter {
   absl::Status LockOthersMap(bool relaxed);
   // What lets a scan in beside the map's owner.
   absl::Status CheckAdded(const ScanRecord& scan);
+  // Keeps that all after `commit_sequence` is told, and nothing before it.
+  absl::Status ForgetChanges(std::uint64_t commit_sequence);
+  // Those of more than an hour ago.
+  absl::Status TrimChanges();
   absl::Status RunBody(absl::FunctionRef<absl::Status()> body);
   absl::Status EndCommit(std::int64_t commit, bool& again);
   // Whether the commit with that number took place, as soon as the store answers. An error:
@@ -181,6 +186,7 @@ class PostgresWriter final : public StorageWriter {
   PostgresReader reader_;
   Connection* connection_ = nullptr;  // in a commit
   Durability durability_ = Durability::kFull;
+  unsigned puts_of_changes_ = 0;
   absl::Status broken_;  // the first error of a statement that no part has undone
 };
 

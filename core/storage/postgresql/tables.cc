@@ -326,6 +326,23 @@ CREATE TABLE map_lease (
 ) WITH (fillfactor = 50);
 )sql";
 
+// Since version 3: what changed, for those who watch a map at a server that has not got it. All
+// changes after `changes_after` are there; of tables of before, and where nobody has said so, none.
+constexpr char kChanges[] = R"sql(
+CREATE TABLE map_change (
+  map bigint NOT NULL, at bigint NOT NULL, n bigint NOT NULL,
+  made timestamptz NOT NULL DEFAULT clock_timestamp(),
+  trajectory text NOT NULL,
+  sequence bigint NOT NULL,
+  x bigint NOT NULL, y bigint NOT NULL,
+  version bigint NOT NULL,
+  gone bigint NOT NULL,
+  PRIMARY KEY (map, at, n)
+);
+ALTER TABLE derived_state ADD COLUMN changes_after bigint NOT NULL DEFAULT 9223372036854775807;
+UPDATE derived_state AS d SET changes_after = m.commit_sequence FROM truth_map AS m WHERE m.map = d.map;
+)sql";
+
 constexpr std::array<const char*, 13> kDerived = {
     "DELETE FROM derived_mls_tile WHERE map = $1",
     "DELETE FROM derived_surface_tile WHERE map = $1",
@@ -385,6 +402,10 @@ absl::Status MakeInTransaction(Connection& connection) {
   if (version < 2) {
     STRATA_RETURN_IF_ERROR(connection.Execute(kLeases));
     STRATA_RETURN_IF_ERROR(connection.Execute("UPDATE strata_format SET version = 2"));
+  }
+  if (version < 3) {
+    STRATA_RETURN_IF_ERROR(connection.Execute(kChanges));
+    STRATA_RETURN_IF_ERROR(connection.Execute("UPDATE strata_format SET version = 3"));
   }
   return connection.Execute("COMMIT");
 }

@@ -13,10 +13,10 @@
 namespace strata {
 
 // Newest format of the tables this program reads and writes.
-inline constexpr std::int64_t kDatabaseVersion = 2;
+inline constexpr std::int64_t kDatabaseVersion = 3;
 
-// Makes the tables where there are none, or adds what those of version 1 lack; safe when others do
-// so at the same time. FAILED_PRECONDITION for a newer format.
+// Makes the tables where there are none, or adds what those of versions 1 and 2 lack; safe when
+// others do so at the same time. FAILED_PRECONDITION for a newer format.
 absl::Status MakeTables(Connection& connection);
 
 // The format of the tables; 0: there are none.

@@ -213,7 +213,13 @@ void CampaignWorld::RetireRobotsAndCheck() {
 
 JobInfo CampaignWorld::RunJob(const std::string& kind) {
   JobInfo last;
-  const auto job = db().jobs().Start({}, kCampaignMap, kind, {});
+  const absl::Time end = absl::Now() + absl::Seconds(10);
+  auto job = db().jobs().Start({}, kCampaignMap, kind, {});
+  // A server may not know yet that its database is back; started twice it does no harm.
+  while (absl::IsUnavailable(job.status()) && absl::Now() < end) {
+    absl::SleepFor(absl::Milliseconds(200));
+    job = db().jobs().Start({}, kCampaignMap, kind, {});
+  }
   violations_.Check(kind, job.status());
   if (!job.ok()) return last;
   const auto follow = [&last](const JobInfo& now) {

@@ -9,6 +9,41 @@ add_dependencies(two_servers_test stratad)
 add_test(NAME two_servers_test COMMAND two_servers_test)
 set_tests_properties(two_servers_test PROPERTIES LABELS integration TIMEOUT 300)
 
+# The conformance suite by the server that has not got the maps. Uploads that begin there do not go on where they broke.
+strata_executable(
+  beside_suite_test beside_suite_test
+  SOURCES cluster/beside_suite_test.cc
+  DEPS strata::database_suite strata::engine strata::postgres_cluster strata::sdk strata::server strata::test_support GTest::gmock_main
+  SHARED_HEADERS strata_test_headers
+)
+add_test(
+  NAME beside_suite_test
+  COMMAND beside_suite_test --gtest_filter=-*AnAnnouncedUploadGoesOnWhereItBroke*:*TheLaterOfTwoUploadsOfAnAnnouncedScanTakesOver*
+)
+set_tests_properties(beside_suite_test PROPERTIES LABELS integration TIMEOUT 600 COST 600)
+
+# Plans by the server that has not got the map.
+strata_executable(
+  plans_elsewhere_test plans_elsewhere_test
+  SOURCES stratad_process.cc cluster/plans_elsewhere_test.cc
+  DEPS strata::postgres_cluster strata::proto_translate strata::sdk strata::storage_postgresql strata::test_support GTest::gmock_main
+  SHARED_HEADERS strata_test_headers
+)
+add_dependencies(plans_elsewhere_test stratad)
+add_test(NAME plans_elsewhere_test COMMAND plans_elsewhere_test)
+set_tests_properties(plans_elsewhere_test PROPERTIES LABELS integration TIMEOUT 300)
+
+# Watches by the server that has not got the map.
+strata_executable(
+  watch_elsewhere_test watch_elsewhere_test
+  SOURCES stratad_process.cc cluster/watch_elsewhere_test.cc
+  DEPS strata::postgres_cluster strata::sdk strata::storage_postgresql strata::test_support GTest::gmock_main
+  SHARED_HEADERS strata_test_headers
+)
+add_dependencies(watch_elsewhere_test stratad)
+add_test(NAME watch_elsewhere_test COMMAND watch_elsewhere_test)
+set_tests_properties(watch_elsewhere_test PROPERTIES LABELS integration TIMEOUT 300)
+
 # Maps between files and a database.
 strata_executable(
   map_import_test map_import_test

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <iterator>
 #include <set>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
+#include <Eigen/Core>
 
 #include "core/common/random.h"
 #include "core/common/status.h"
@@ -26,6 +28,17 @@ api::Call Patient() {
   api::Call call;
   call.stop = Stop(SteadyNow() + kPatience);
   return call;
+}
+
+// All over the world that the robots see.
+std::vector<Eigen::Vector2d> Places() {
+  constexpr int kSide = 5;
+  constexpr double kSpacingM = 4.0;
+  std::vector<Eigen::Vector2d> places;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    places.emplace_back(kSpacingM * (i % kSide - kSide / 2), kSpacingM * (i / kSide - kSide / 2));
+  }
+  return places;
 }
 
 // What servers that are killed, frozen or without their database may say.
@@ -94,6 +107,21 @@ void ServedLedger::SawIntegrated(absl::string_view who, const Newest& before, st
   newest_.integrated = std::max(newest_.integrated, scans);
 }
 
+void ServedLedger::SawSurfaces(absl::string_view who,
+                               const Newest& before,
+                               const std::set<std::size_t>& places) {
+  if (!std::includes(places.begin(), places.end(), before.places.begin(), before.places.end())) {
+    violations_.Add(absl::StrCat(who,
+                                 ": surfaces at ",
+                                 places.size(),
+                                 " places, not at all of the ",
+                                 before.places.size(),
+                                 " where there were some"));
+  }
+  absl::MutexLock lock(&mutex_);
+  newest_.places.insert(places.begin(), places.end());
+}
+
 void ServedLedger::SawPoses(absl::string_view who,
                             const Newest& before,
                             const api::PoseGraphState& graph) {
@@ -125,12 +153,15 @@ absl::Status ClusterWatcher::Take(const api::MapUpdate& update) {
   resume_.epoch = update.epoch;
   const std::map<TileKey, std::uint64_t> before = tiles_;
   if (update.whole) {
+    ++wholes_;
     scans_.clear();
     tiles_.clear();
+    integrated_.clear();
   }
   for (const api::ScanChange& scan : update.scans) {
     scans_[scan.id] = scan.state;
     if (scan.gone) scans_.erase(scan.id);
+    if (scan.state == ScanState::kIntegrated && !scan.gone) TakeIntegrated(scan.id);
   }
   for (const api::TileChangeNotice& tile : update.tiles) {
     const auto known = before.find(tile.key);
@@ -141,6 +172,11 @@ absl::Status ClusterWatcher::Take(const api::MapUpdate& update) {
     if (tile.gone) tiles_.erase(tile.key);
   }
   return absl::OkStatus();
+}
+
+void ClusterWatcher::TakeIntegrated(const ScanId& id) {
+  if (integrated_.insert(id).second || !once_) return;
+  violations_.Add(absl::StrCat(who_, ": told twice that scan ", id.ToString(), " is integrated"));
 }
 
 void ClusterWatcher::Follow(api::Database& db, const api::Call& call) {
@@ -187,8 +223,8 @@ void ClusterReaders::AddReader(const std::string& who,
     Read(db, absl::StrCat("reader of ", who), random->Next());
     absl::SleepFor(kPause);
   });
-  watchers_.push_back(
-      std::make_unique<ClusterWatcher>(absl::StrCat("watcher of ", who), world_.violations()));
+  watchers_.push_back(std::make_unique<ClusterWatcher>(
+      absl::StrCat("watcher of ", who), !deletions_, world_.violations()));
   ClusterWatcher* const watcher = watchers_.back().get();
   clients_.Add(address,
                [watcher](api::Database& db, const api::Call& call) { watcher->Follow(db, call); });
@@ -199,7 +235,9 @@ void ClusterReaders::Read(api::Database& db, const std::string& who, std::uint64
                                    FetchTiles(db, who),
                                    ReadStats(db, who),
                                    ReadScan(db, who, draw),
-                                   ReadPoses(db, who)}) {
+                                   ReadPoses(db, who),
+                                   ReadSurfaces(db, who),
+                                   ReadPlan(db, who, draw)}) {
     ++(done.ok() ? answers_ : refusals_);
     if (!IsTrouble(done)) world_.violations().Check(who, done);
   }
@@ -272,14 +310,58 @@ absl::Status ClusterReaders::ReadPoses(api::Database& db, const std::string& who
   return absl::OkStatus();
 }
 
-void ClusterReaders::Check() { watchers_.back()->CheckKnowsAll(world_.db()); }
+absl::Status ClusterReaders::ReadSurfaces(api::Database& db, const std::string& who) {
+  const ServedLedger::Newest before = ledger_.newest();
+  STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceColumn> columns,
+                          db.planning().SampleSurfaces(Patient(), kCampaignMap, Places()));
+  std::set<std::size_t> places;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    if (!columns[i].surfaces.empty()) places.insert(i);
+  }
+  if (!deletions_) ledger_.SawSurfaces(who, before, places);
+  return absl::OkStatus();
+}
+
+// What is planned holds, by any server, unless the map has changed meanwhile.
+absl::Status ClusterReaders::ReadPlan(api::Database& db,
+                                      const std::string& who,
+                                      std::uint64_t draw) {
+  const ServedLedger::Newest before = ledger_.newest();
+  const std::vector<Eigen::Vector2d> places = Places();
+  const Eigen::Vector2d& from = places[draw % places.size()];
+  const Eigen::Vector2d& to = places[draw / places.size() % places.size()];
+  PlanQuery query;
+  query.from = {from.x(), from.y()};
+  query.to = {to.x(), to.y()};
+  STRATA_ASSIGN_OR_RETURN(const PlanResult plan,
+                          db.planning().PlanPath(Patient(), kCampaignMap, query));
+  ledger_.SawEpoch(who, before, plan.epoch);
+  if (!plan.found()) return absl::OkStatus();
+  ++paths_;
+  const ServedLedger::Newest then = ledger_.newest();
+  STRATA_ASSIGN_OR_RETURN(
+      const PathCheck check,
+      db.planning().CheckPath(Patient(), kCampaignMap, {plan.waypoints, query.profile}));
+  ledger_.SawEpoch(who, then, check.epoch);
+  return absl::OkStatus();
+}
+
+void ClusterReaders::Check() {
+  for (const auto& watcher : watchers_) watcher->CheckKnowsAll(world_.db());
+}
 
 std::map<std::string, double> ClusterReaders::Numbers() const {
   int updates = 0;
-  for (const auto& watcher : watchers_) updates += watcher->updates();
+  int wholes = 0;
+  for (const auto& watcher : watchers_) {
+    updates += watcher->updates();
+    wholes += watcher->wholes();
+  }
   return {{"reads_answered", answers_},
           {"reads_refused", refusals_},
+          {"paths_planned", paths_},
           {"watch_updates", updates},
+          {"watch_wholes", wholes},
           {"tile_versions", static_cast<double>(ledger_.versions())}};
 }
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,6 +35,7 @@ class ServedLedger {
     std::map<TileKey, std::uint64_t> tiles;  // versions
     std::uint64_t epoch = 0;
     std::uint64_t integrated = 0;  // scans, where none are deleted
+    std::set<std::size_t> places;  // with surfaces, where none are deleted and none move
   };
   // To be asked before a call, and given with its answer.
   Newest newest() const;
@@ -45,6 +47,10 @@ class ServedLedger {
   void SawTile(absl::string_view who, const Newest& before, const api::EncodedTile& tile);
   void SawEpoch(absl::string_view who, const Newest& before, std::uint64_t epoch);
   void SawIntegrated(absl::string_view who, const Newest& before, std::uint64_t scans);
+  // `places`: numbers of those that have surfaces.
+  void SawSurfaces(absl::string_view who,
+                   const Newest& before,
+                   const std::set<std::size_t>& places);
   void SawPoses(absl::string_view who, const Newest& before, const api::PoseGraphState& graph);
   std::size_t versions() const;
 
@@ -61,23 +67,30 @@ class ServedLedger {
 // One call for all that happens; Thread-safe but for Follow().
 class ClusterWatcher {
  public:
-  ClusterWatcher(std::string who, Violations& violations)
-      : who_(std::move(who)), violations_(violations) {}
+  // `once`: nothing changes a scan once it is integrated, so that is told once.
+  ClusterWatcher(std::string who, bool once, Violations& violations)
+      : who_(std::move(who)), once_(once), violations_(violations) {}
   // Until the call is stopped.
   void Follow(api::Database& db, const api::Call& call);
   // After that: what is new, at once; then all it was told is what the map holds.
   void CheckKnowsAll(api::Database& db);
   int updates() const { return updates_; }
+  int wholes() const { return wholes_; }
 
  private:
   absl::Status Take(const api::MapUpdate& update);
 
+  void TakeIntegrated(const ScanId& id);
+
   const std::string who_;
+  const bool once_;
   Violations& violations_;
   api::WatchOptions resume_;
   std::map<ScanId, ScanState> scans_;
   std::map<TileKey, std::uint64_t> tiles_;  // versions
+  std::set<ScanId> integrated_;             // since it was told everything
   std::atomic<int> updates_ = 0;
+  std::atomic<int> wholes_ = 0;
 };
 
 // A reader a server and one of all, and as many watchers.
@@ -98,6 +111,8 @@ class ClusterReaders {
   absl::Status ReadStats(api::Database& db, const std::string& who);
   absl::Status ReadScan(api::Database& db, const std::string& who, std::uint64_t draw);
   absl::Status ReadPoses(api::Database& db, const std::string& who);
+  absl::Status ReadSurfaces(api::Database& db, const std::string& who);
+  absl::Status ReadPlan(api::Database& db, const std::string& who, std::uint64_t draw);
 
   CampaignWorld& world_;
   const bool deletions_;
@@ -105,6 +120,7 @@ class ClusterReaders {
   std::vector<std::unique_ptr<ClusterWatcher>> watchers_;  // the last: of all servers
   std::atomic<int> answers_ = 0;
   std::atomic<int> refusals_ = 0;
+  std::atomic<int> paths_ = 0;
   Clients clients_;
 };
 

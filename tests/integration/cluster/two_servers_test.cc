@@ -32,73 +32,17 @@
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/mls/build.h"
+#include "tests/integration/cluster/sharing_servers.h"
 #include "tests/integration/numbered_scans.h"
-#include "tests/integration/stratad_process.h"
-#include "tests/support/postgres_cluster.h"
 #include "tests/support/status_matchers.h"
-#include "tests/support/temp_dir.h"
 
 namespace strata::testing {
 namespace {
 
 using ::testing::HasSubstr;
 
-constexpr char kMap[] = "shared";
+constexpr const char* kMap = kShared;
 constexpr std::size_t kPoints = 100;
-constexpr absl::Duration kPatience = absl::Seconds(30);
-
-class SharingServer {
- public:
-  SharingServer(std::string name, std::string store)
-      : name_(std::move(name)), store_(std::move(store)) {}
-
-  // From its next start on its name is its address.
-  void NameByAddress() {
-    listen_ = process_->Address();
-    name_ = listen_;
-  }
-  void Start() {
-    process_ = std::make_unique<StratadProcess>(std::vector<std::string>{"--data",
-                                                                         data_.path().string(),
-                                                                         "--listen",
-                                                                         listen_,
-                                                                         "--store",
-                                                                         store_,
-                                                                         "--map-lease",
-                                                                         "1",
-                                                                         "--server-name",
-                                                                         name_,
-                                                                         "--optimize-every",
-                                                                         "0"});
-    ClientOptions options;
-    options.target = process_->Address();
-    options.backoff.max_attempts = 1;  // whoever asks goes to another server
-    auto connected = Connect(options);
-    STRATA_ASSERT_OK(connected);
-    absl::MutexLock lock(&mutex_);
-    db_ = *std::move(connected);
-  }
-  void Kill() {
-    process_->Signal(SIGKILL);
-    process_->Wait();
-  }
-  void Signal(int signal) { process_->Signal(signal); }
-  void Await() { process_->Wait(); }
-  const std::string& address() { return process_->Address(); }
-  std::shared_ptr<api::Database> db() {
-    absl::MutexLock lock(&mutex_);
-    return db_;
-  }
-
- private:
-  std::string name_;
-  std::string listen_ = "127.0.0.1:0";
-  const std::string store_;
-  const TempDir data_;
-  std::unique_ptr<StratadProcess> process_;
-  absl::Mutex mutex_;
-  std::shared_ptr<api::Database> db_;
-};
 
 absl::StatusOr<ScanAck> Put(api::Database& db, const char* map, std::uint64_t sequence) {
   api::Call call;
@@ -110,35 +54,8 @@ absl::StatusOr<ScanAck> Put(api::Database& db, const char* map, std::uint64_t se
   return upload->Finish();
 }
 
-class TwoServersTest : public ::testing::Test {
+class TwoServersTest : public SharingServersTest {
  protected:
-  void SetUp() override {
-    const auto cluster = SharedPostgresCluster();
-    if (absl::IsFailedPrecondition(cluster.status())) GTEST_SKIP() << cluster.status().message();
-    STRATA_ASSERT_OK(cluster);
-    store_ =
-        (*cluster)->AddressOfOwn(::testing::UnitTest::GetInstance()->current_test_info()->name());
-    for (const char* name : {"a", "b"}) {
-      servers_.push_back(std::make_unique<SharingServer>(name, store_));
-      servers_.back()->Start();
-    }
-    STRATA_ASSERT_OK(servers_[0]->db()->maps().Create({}, kMap, MapParameters()));
-  }
-  api::Database& db(int server) {
-    held_.push_back(servers_[server]->db());
-    return *held_.back();
-  }
-  // Until `call` is not refused for who asks whom any more.
-  static absl::Status Insist(const std::function<absl::Status()>& call) {
-    const absl::Time end = absl::Now() + kPatience;
-    while (true) {
-      absl::Status done = call();
-      const bool again =
-          absl::IsUnavailable(done) || absl::IsDeadlineExceeded(done) || absl::IsCancelled(done);
-      if (!again || absl::Now() >= end) return done;
-      absl::SleepFor(absl::Milliseconds(20));
-    }
-  }
   // Sends a scan to one server after the other until one acknowledges it.
   void PutSomewhere(std::uint64_t sequence, std::size_t first) {
     std::size_t server = first;
@@ -157,35 +74,31 @@ class TwoServersTest : public ::testing::Test {
     return numbers_.size();
   }
   // All that was acknowledged is there once, joined, and as if one server had taken it in.
-  void CheckAll(int server);
+  void CheckAll(std::size_t server);
 
-  std::string store_;
-  std::vector<std::unique_ptr<SharingServer>> servers_;
-  std::vector<std::shared_ptr<api::Database>> held_;
   absl::Mutex mutex_;
   std::map<std::uint64_t, std::uint64_t> numbers_;  // of acknowledged scans
 };
 
-absl::StatusOr<MapStats> AtRest(api::Database& db, const char* map) {
-  while (true) {
-    STRATA_ASSIGN_OR_RETURN(MapStats stats, db.maps().Stats({}, map));
-    if (stats.scans_pending == 0) return stats;
-    absl::SleepFor(absl::Milliseconds(20));
-  }
-}
-
-absl::Status Verify(api::Database& db, const char* map) {
-  STRATA_ASSIGN_OR_RETURN(const JobInfo job, db.jobs().Start({}, map, "verify", {}));
+absl::Status RunJobOf(api::Database& db, const char* map, const char* kind) {
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job, db.jobs().Start({}, map, kind, {}));
   JobInfo last;
   STRATA_RETURN_IF_ERROR(db.jobs().Watch({}, map, job.id, [&last](const JobInfo& now) {
     last = now;
     return absl::OkStatus();
   }));
   if (last.state == JobState::kSucceeded) return absl::OkStatus();
-  return absl::InternalError(absl::StrCat("verify: ", last.message));
+  return absl::InternalError(absl::StrCat(kind, ": ", last.message));
 }
 
-void TwoServersTest::CheckAll(int server) {
+absl::Status Verify(api::Database& db, const char* map) { return RunJobOf(db, map, "verify"); }
+
+// Something that whoever has the map decides.
+absl::Status Decide(api::Database& db, const char* map) {
+  return db.maps().SetClass({}, map, {7, "wall", 0});
+}
+
+void TwoServersTest::CheckAll(std::size_t server) {
   api::Database& found = db(server);
   MapStats stats;
   STRATA_ASSERT_OK(Insist([&]() -> absl::Status {
@@ -200,7 +113,7 @@ void TwoServersTest::CheckAll(int server) {
     EXPECT_EQ(info->state, ScanState::kIntegrated) << sequence;
   }
   // Which of them has the map is for chance to say.
-  auto next = static_cast<std::size_t>(server);
+  std::size_t next = server;
   STRATA_EXPECT_OK(Insist([&] { return Verify(*servers_[next++ % 2]->db(), kMap); }));
   STRATA_ASSERT_OK(found.maps().Create({}, "alone", MapParameters()));
   for (const auto& [sequence, number] : numbers_) STRATA_ASSERT_OK(Put(found, "alone", sequence));
@@ -210,7 +123,7 @@ void TwoServersTest::CheckAll(int server) {
 
 TEST_F(TwoServersTest, TheOneWithoutTheMapSaysWhoHasIt) {
   STRATA_ASSERT_OK(Put(db(0), kMap, 1));
-  const absl::Status refused = Verify(db(1), kMap);
+  const absl::Status refused = Decide(db(1), kMap);
   EXPECT_THAT(refused, StatusIs(absl::StatusCode::kUnavailable, HasSubstr("server a")));
   EXPECT_EQ(MapOwnerOf(refused), "a");
   EXPECT_TRUE(RetryDelayOf(refused).has_value());
@@ -221,7 +134,7 @@ TEST_F(TwoServersTest, TheOneWithoutTheMapSaysWhoHasIt) {
   EXPECT_EQ(names->front().name, kMap);
   // Other maps are other matters, and what one server removes the other has no more.
   STRATA_ASSERT_OK(db(1).maps().Create({}, "other", MapParameters()));
-  EXPECT_EQ(MapOwnerOf(Verify(db(0), "other")), "b");
+  EXPECT_EQ(MapOwnerOf(Decide(db(0), "other")), "b");
   STRATA_EXPECT_OK(db(1).maps().Delete({}, "other"));
   STRATA_EXPECT_OK(Insist([&] {
     const absl::Status gone = db(0).maps().Get({}, "other").status();
@@ -230,7 +143,7 @@ TEST_F(TwoServersTest, TheOneWithoutTheMapSaysWhoHasIt) {
   // A server that ends gives its maps up at once.
   servers_[0]->Signal(SIGTERM);
   const absl::Time ended = absl::Now();
-  STRATA_EXPECT_OK(Insist([&] { return Verify(db(1), kMap); }));
+  STRATA_EXPECT_OK(Insist([&] { return Decide(db(1), kMap); }));
   std::printf("taken over after %s\n", absl::FormatDuration(absl::Now() - ended).c_str());
 }
 
@@ -291,7 +204,7 @@ TEST_F(TwoServersTest, ScansAreTakenInByServersThatHaveNotGotTheMap) {
   ScanHeader ready;
   ready.id = {"run", kLarge + 1};
   ready.alignment = Alignment::kOff;
-  for (const int server : {1, 0}) {
+  for (const std::size_t server : {1U, 0U}) {
     STRATA_ASSERT_OK_AND_ASSIGN(
         const ScanAck taken,
         db(server).scans().UploadLocalMap({}, kMap, ready, parameters.mls, local_map));
@@ -301,7 +214,7 @@ TEST_F(TwoServersTest, ScansAreTakenInByServersThatHaveNotGotTheMap) {
   EXPECT_EQ(db(0).scans().Get({}, kMap, ready.id)->state, ScanState::kIntegrated);
   STRATA_EXPECT_OK(db(0).scans().Delete({}, kMap, ready.id));
   STRATA_EXPECT_OK(db(0).scans().Delete({}, kMap, {"run", kLarge}));  // CheckAll() has others
-  EXPECT_EQ(MapOwnerOf(Verify(db(1), kMap)), "a");
+  EXPECT_EQ(MapOwnerOf(Decide(db(1), kMap)), "a");
   CheckAll(0);
 }
 
@@ -327,8 +240,34 @@ struct Told {
   std::size_t nodes = 0;
   std::size_t epochs = 0;
   std::size_t jobs = 0;
+  std::vector<std::string> found;  // by jobs, or by people
+  std::string backup;              // hash
   friend bool operator==(const Told&, const Told&) = default;
 };
+
+// Models, objects and classifiers.
+absl::Status AskWhatWasFound(api::Database& db, std::vector<std::string>& found) {
+  STRATA_ASSIGN_OR_RETURN(const PlaneModelInfo model,
+                          db.models().GetPlaneModel({}, kMap, [&found](const ModelPlane& plane) {
+                            found.push_back(absl::StrCat(plane.area_m2));
+                            return absl::OkStatus();
+                          }));
+  found.push_back(absl::StrCat(model.job, " ", model.epoch, " ", model.scans, " ", model.points));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<KindInfo> kinds, db.objects().ListKinds({}, kMap));
+  for (const KindInfo& kind : kinds) {
+    STRATA_ASSIGN_OR_RETURN(const ThingKind read, db.objects().GetKind({}, kMap, kind.name));
+    found.push_back(read.info.name);
+  }
+  const auto none = [](const auto&) { return absl::OkStatus(); };
+  for (const absl::Status& listed : {db.objects().ListEntities({}, kMap, {}, none).status(),
+                                     db.objects().ListInferred({}, kMap, {}, none).status(),
+                                     db.classifiers().Get({}, kMap, "nobody").status()}) {
+    found.push_back(listed.ToString(absl::StatusToStringMode::kWithNoExtraData));
+  }
+  STRATA_ASSIGN_OR_RETURN(const auto classifiers, db.classifiers().List({}, kMap));
+  found.push_back(absl::StrCat(classifiers.size()));
+  return absl::OkStatus();
+}
 
 absl::StatusOr<Told> Ask(api::Database& db) {
   Told told;
@@ -366,6 +305,11 @@ absl::StatusOr<Told> Ask(api::Database& db) {
   STRATA_RETURN_IF_ERROR(db.posegraph().LookupPose({}, kMap, {"run", 1}).status());
   STRATA_ASSIGN_OR_RETURN(const auto jobs, db.jobs().List({}, kMap));
   told.jobs = jobs.size();
+  STRATA_RETURN_IF_ERROR(AskWhatWasFound(db, told.found));
+  STRATA_RETURN_IF_ERROR(db.maps().Backup({}, kMap, [&told](const api::BackupPiece& piece) {
+    told.backup = absl::StrCat(piece.total_bytes, piece.content_hash);
+    return absl::OkStatus();
+  }));
   return told;
 }
 
@@ -375,6 +319,7 @@ TEST_F(TwoServersTest, EveryServerAnswersReadsAlsoAfterTheOwnerDied) {
   }
   STRATA_ASSERT_OK(AtRest(db(0), kMap));
   STRATA_ASSERT_OK(Verify(db(0), kMap));
+  STRATA_ASSERT_OK(RunJobOf(db(0), kMap, "planes"));
   STRATA_ASSERT_OK_AND_ASSIGN(const Told owner, Ask(db(0)));
   EXPECT_EQ(owner.scans, 5U);
   EXPECT_GT(owner.tiles.size(), 0U);
@@ -382,10 +327,52 @@ TEST_F(TwoServersTest, EveryServerAnswersReadsAlsoAfterTheOwnerDied) {
   EXPECT_EQ(owner.points, kPoints);
   STRATA_ASSERT_OK_AND_ASSIGN(const Told other, Ask(db(1)));
   EXPECT_EQ(owner, other);
-  EXPECT_EQ(MapOwnerOf(db(1).jobs().Start({}, kMap, "verify", {}).status()), "a");
+  EXPECT_EQ(MapOwnerOf(Decide(db(1), kMap)), "a");
   servers_[0]->Kill();
   STRATA_ASSERT_OK_AND_ASSIGN(const Told alone, Ask(db(1)));
   EXPECT_EQ(owner, alone);
+}
+
+// Queued by whichever is asked, run once by the one that has the map, known to all at once.
+TEST_F(TwoServersTest, JobsAreStartedAtServersThatHaveNotGotTheMap) {
+  STRATA_ASSERT_OK(Put(db(0), kMap, 1));
+  std::set<std::uint64_t> ids;
+  std::vector<std::thread> people;
+  for (std::size_t person = 0; person < 4; ++person) {
+    people.emplace_back([&, person] {
+      for (std::size_t i = 0; i < 5; ++i) {
+        const auto job =
+            servers_[(person + i) % 2]->db()->jobs().Start({}, kMap, "verify", {{"threads", "1"}});
+        STRATA_ASSERT_OK(job);
+        for (const auto& server : servers_) {
+          const auto known = server->db()->jobs().Get({}, kMap, job->id);
+          STRATA_ASSERT_OK(known);
+          EXPECT_EQ(known->parameters, job->parameters);
+        }
+        absl::MutexLock lock(&mutex_);
+        EXPECT_TRUE(ids.insert(job->id).second) << job->id;
+      }
+    });
+  }
+  for (std::thread& person : people) person.join();
+  EXPECT_EQ(MapOwnerOf(Decide(db(1), kMap)), "a");
+  for (const std::uint64_t id : ids) {
+    JobInfo last;
+    STRATA_EXPECT_OK(db(id % 2).jobs().Watch({}, kMap, id, [&last](const JobInfo& now) {
+      last = now;
+      return absl::OkStatus();
+    }));
+    EXPECT_EQ(last.state, JobState::kSucceeded) << id << ": " << last.message;
+  }
+  EXPECT_EQ(db(0).jobs().List({}, kMap)->size(), ids.size());
+  EXPECT_EQ(db(1).jobs().List({}, kMap)->size(), ids.size());
+  // What it needs is asked for at once.
+  EXPECT_TRUE(
+      absl::IsNotFound(db(1).jobs().Start({}, kMap, "classify", {{"model", "nobody"}}).status()));
+  EXPECT_TRUE(absl::IsInvalidArgument(db(1).jobs().Start({}, kMap, "dance", {}).status()));
+  // Nobody has it for a while.
+  servers_[0]->Kill();
+  STRATA_EXPECT_OK(Insist([&] { return Verify(db(1), kMap); }));
 }
 
 // Whoever asks one server and then the other, in whatever order, never goes back.
@@ -527,15 +514,15 @@ TEST_F(TwoServersTest, WhenTheOwnerIsKilledTheOtherTakesOverAndNothingIsLost) {
   stop = true;
   for (std::thread& robot : robots) robot.join();
   std::printf("%zu acknowledged\n", acknowledged());
-  CheckAll(static_cast<int>(kKills % 2));
+  CheckAll(kKills % 2);
 }
 
 TEST_F(TwoServersTest, AFrozenOwnerThatWakesUpWritesNothingMore) {
   PutSomewhere(1, 0);
   std::uint64_t sequence = 2;
-  for (int round = 0; round < 3; ++round) {
-    const int owner = round % 2;
-    const int other = 1 - owner;
+  for (std::size_t round = 0; round < 3; ++round) {
+    const std::size_t owner = round % 2;
+    const std::size_t other = 1 - owner;
     // Uploads are on their way at the moment it freezes, and go on where it stopped.
     std::vector<std::thread> robots;
     for (int robot = 0; robot < 4; ++robot) {
@@ -547,7 +534,7 @@ TEST_F(TwoServersTest, AFrozenOwnerThatWakesUpWritesNothingMore) {
     }
     absl::SleepFor(absl::Milliseconds(3));
     servers_[owner]->Signal(SIGSTOP);
-    PutSomewhere(sequence++, static_cast<std::size_t>(other));
+    PutSomewhere(sequence++, other);
     STRATA_EXPECT_OK(Put(db(other), kMap, sequence).status());
     Note(sequence, Put(db(other), kMap, sequence)->commit_sequence);
     ++sequence;

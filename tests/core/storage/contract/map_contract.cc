@@ -89,6 +89,17 @@ TEST_F(MapContractTest, WhatWasTakenAwayTakesNoMore) {
               StatusIs(absl::StatusCode::kUnavailable, HasSubstr("removed")));
 }
 
+TEST_F(MapContractTest, ANumberTellsItFromAnotherOfItsName) {
+  const std::int64_t number = storage().number();
+  Reopen();
+  EXPECT_EQ(storage().number(), number);
+  if (number == 0) return;
+  STRATA_ASSERT_OK(store().TakeAway());
+  STRATA_ASSERT_OK(store().Create(MapParameters(), absl::UnixEpoch(), 0));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto another, store().Open());
+  EXPECT_NE(another->number(), number);
+}
+
 TEST_F(MapContractTest, ProfilesAndTheOriginAreReplaced) {
   RobotProfile profile;
   profile.radius_m = 0.1 + 0.2;

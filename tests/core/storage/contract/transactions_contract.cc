@@ -38,6 +38,17 @@ TEST_F(TransactionsContractTest, ASnapshotSeesOneStateAndThenTheNewest) {
   EXPECT_EQ(reader().GetScanTotals()->scans, 2U);
 }
 
+TEST_F(TransactionsContractTest, ALongSnapshotIsOne) {
+  Put(1);
+  STRATA_ASSERT_OK(reader().LongSnapshot([&]() -> absl::Status {
+    EXPECT_EQ(reader().GetScanTotals()->scans, 1U);
+    Put(2);
+    EXPECT_EQ(reader().ListScanNumbers()->size(), 1U);
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(reader().ListScanNumbers()->size(), 2U);
+}
+
 // The queue of the engine's writer is one commit of many parts.
 TEST_F(TransactionsContractTest, PartsThatFailLeaveTheOthers) {
   Put(1);

@@ -183,10 +183,22 @@ TEST_F(MapLeasesTest, ItIsRenewedUntilAnotherHasIt) {
 }
 
 TEST_F(MapLeasesTest, TablesOfTheVersionBeforeGetLeases) {
-  STRATA_ASSERT_OK(sql_->Execute("DROP TABLE map_lease; UPDATE strata_format SET version = 1"));
+  STRATA_ASSERT_OK(
+      sql_->Execute("DROP TABLE map_lease; DROP TABLE map_change; ALTER TABLE derived_state DROP "
+                    "COLUMN changes_after; UPDATE strata_format SET version = 1"));
   const PostgresMaps a = Server("a");
   STRATA_ASSERT_OK_AND_ASSIGN(const auto held, a.OpenAlone(kName));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto reader, held->NewReader());
+  const std::uint64_t before = reader->GetClock()->commit_sequence;
   STRATA_EXPECT_OK(Tick(*held));
+  // What changed before nobody has kept.
+  EXPECT_TRUE(reader->ListChanges(before)->complete);
+  EXPECT_TRUE(before == 0 || !reader->ListChanges(before - 1)->complete);
+}
+
+// What waits in kName.
+MATCHER_P2(WaitsWith, scans, jobs, "") {
+  return arg.name == kName && arg.scans == scans && arg.jobs == jobs;
 }
 
 ScanRecord ScanOf(std::uint64_t sequence, std::uint64_t number, std::uint32_t chunks) {
@@ -224,12 +236,18 @@ TEST_F(MapLeasesTest, ScansAreAddedBesideTheOneWhoHasTheMap) {
   STRATA_ASSERT_OK_AND_ASSIGN(const auto beside, b.OpenToAdd(kName, 3));
   // By turns, full and relaxed: neither takes the other's commit for a lost one of its own.
   STRATA_ASSERT_OK(PutScanOf(*owner, 1));
-  EXPECT_THAT(a.ListWaiting(), IsOkAndHolds(ElementsAre(kName)));
+  EXPECT_THAT(a.ListWaiting(), IsOkAndHolds(ElementsAre(WaitsWith(true, false))));
   STRATA_ASSERT_OK(StageChunk(*beside, 2));
   STRATA_ASSERT_OK(PutScanOf(*beside, 2, 1));
   STRATA_ASSERT_OK(StageChunk(*owner, 3));
   STRATA_ASSERT_OK(PutScanOf(*owner, 3, 1));
   EXPECT_THAT(b.ListWaiting(), IsOkAndHolds(IsEmpty())) << "who only adds has nothing to do";
+  JobInfo job;
+  job.id = 1;
+  job.kind = "verify";
+  STRATA_ASSERT_OK(
+      beside->writer().Commit(Durability::kFull, [&] { return beside->writer().PutJob(job); }));
+  EXPECT_THAT(a.ListWaiting(), IsOkAndHolds(ElementsAre(WaitsWith(true, true))));
   STRATA_ASSERT_OK_AND_ASSIGN(const auto reader, owner->NewReader());
   EXPECT_THAT(reader->ListScanNumbers(), IsOkAndHolds(ElementsAre(1, 2, 3)));
   // There is room for as many as were said to be let wait.

@@ -338,7 +338,7 @@ TEST_F(PostgresStorageTest, ADeletedMapLeavesItsNameAndNoRows) {
       Rows tables,
       other_->Query("SELECT c.table_name::text FROM information_schema.columns AS c WHERE "
                     "c.column_name = 'map' AND c.table_schema = 'public'"));
-  EXPECT_EQ(tables.size(), 39);
+  EXPECT_EQ(tables.size(), 40);
   while (tables.Next()) {
     const std::string sql =
         absl::StrCat("SELECT count(*) FROM ",
@@ -405,6 +405,47 @@ TEST_F(PostgresStorageTest, TablesThatAreOthersOrNewerAreNotReadAsOurs) {
   STRATA_ASSERT_OK(strange->Execute("UPDATE strata_format SET version = 99"));
   EXPECT_THAT(PostgresMaps::Connect(options).status(),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("format 99")));
+}
+
+// One that is frozen in the middle of a deletion keeps no other from starting.
+TEST_F(PostgresStorageTest, ADeletionThatAnotherIsAtIsLeftToHim) {
+  const auto going = [&]() -> std::int64_t {
+    auto rows = other_->Query("SELECT count(*) FROM map_place WHERE state = 2");
+    return rows.ok() && rows->Next() ? rows->Int(0) : -1;
+  };
+  STRATA_ASSERT_OK(other_->Execute("INSERT INTO map_place (name, state) VALUES ('going', 2)"));
+  STRATA_ASSERT_OK(other_->Execute("BEGIN; SELECT 1 FROM map_place WHERE state = 2 FOR UPDATE"));
+  STRATA_EXPECT_OK(PostgresMaps::Connect(Options()));
+  EXPECT_EQ(going(), 1);
+  STRATA_ASSERT_OK(other_->Execute("COMMIT"));
+  STRATA_EXPECT_OK(PostgresMaps::Connect(Options()));
+  EXPECT_EQ(going(), 0);
+}
+
+TEST_F(PostgresStorageTest, ChangesAreKeptForAnHour) {
+  StorageWriter& writer = storage_->writer();
+  std::uint64_t at = 0;
+  const auto change = [&] {
+    STRATA_ASSERT_OK(writer.Commit(Durability::kFull, [&]() -> absl::Status {
+      STRATA_ASSIGN_OR_RETURN(at, writer.NextCommitSequence());
+      return writer.PutChanges({{at, {"run", 1}, {}, 0, false}, {at, {}, {0, 1, 2}, at, false}});
+    }));
+  };
+  for (int i = 0; i < 3; ++i) change();
+  const std::uint64_t last_old = at;
+  STRATA_ASSERT_OK(
+      other_->Execute("UPDATE map_change SET made = made - interval '61 minutes' WHERE at < 3"));
+  while (Reader()->ListChanges(1)->complete) change();
+  EXPECT_LE(at, last_old + 64);
+  const auto kept = Reader()->ListChanges(2);
+  STRATA_ASSERT_OK(kept);
+  EXPECT_TRUE(kept->complete);
+  EXPECT_EQ(kept->changes.front().commit_sequence, last_old);
+  EXPECT_EQ(kept->changes.size(), 2 * (at - 2));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto clocks, maps_->ListClocks({name_, "nowhere"}));
+  ASSERT_EQ(clocks.size(), 1U);
+  EXPECT_EQ(clocks.front().first, name_);
+  EXPECT_EQ(clocks.front().second.commit_sequence, at);
 }
 
 TEST_F(PostgresStorageTest, ManyMayMakeTheTablesAtTheSameMoment) {

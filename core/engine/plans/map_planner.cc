@@ -1,10 +1,9 @@
-#include "core/engine/doors/map_planner.h"
+#include "core/engine/plans/map_planner.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -75,16 +74,16 @@ absl::Status NoSuchFloor(const PlaceQuery& query, std::size_t floors) {
 
 }  // namespace
 
-// The tiles of one pinned state.
+// The tiles of one state.
 class MapPlanner::Source final : public TileSource {
  public:
-  Source(MapPlanner& planner, Snapshots::Pin pin, std::shared_ptr<const TileVersionMap> versions)
-      : planner_(planner), pin_(std::move(pin)), versions_(std::move(versions)) {}
+  Source(MapPlanner& planner, MapState& state, std::shared_ptr<const TileVersionMap> versions)
+      : planner_(planner), state_(state), versions_(std::move(versions)) {}
 
   absl::StatusOr<std::shared_ptr<const SurfaceTile>> Load(const TileKey& key) override {
     const std::uint64_t version = Version(key);
     if (version == 0) return std::shared_ptr<const SurfaceTile>();
-    return planner_.LoadTile(key, version);
+    return planner_.LoadTile(state_, key, version);
   }
   std::uint64_t Version(const TileKey& key) override {
     const auto it = versions_->find(key);
@@ -93,9 +92,8 @@ class MapPlanner::Source final : public TileSource {
   absl::StatusOr<std::optional<std::string>> LoadPrepared(const TileKey& key,
                                                           const TileVersions& versions,
                                                           const RobotProfile& profile) override {
-    return planner_.LoadPrepared(key, MadeOf(versions, profile));
+    return planner_.LoadPrepared(state_, key, MadeOf(versions, profile));
   }
-  std::uint64_t epoch() const { return pin_.view().epoch; }
   std::vector<TileKey> Keys() const {
     std::vector<TileKey> keys;
     for (const auto& [key, version] : *versions_) {
@@ -105,43 +103,45 @@ class MapPlanner::Source final : public TileSource {
     return keys;
   }
 
-  static absl::StatusOr<Source> OfNow(MapPlanner& planner) {
-    return Of(planner, planner.core_.snapshots().PinCurrent());
-  }
-  static absl::StatusOr<Source> Of(MapPlanner& planner, Snapshots::Pin pin) {
+  static absl::StatusOr<Source> Of(MapPlanner& planner, MapState& state) {
     STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const TileVersionMap> versions,
-                            planner.VersionsOf(pin.view()));
-    return Source(planner, std::move(pin), std::move(versions));
+                            planner.VersionsOf(state));
+    return Source(planner, state, std::move(versions));
   }
 
  private:
   MapPlanner& planner_;
-  Snapshots::Pin pin_;
+  MapState& state_;
   std::shared_ptr<const TileVersionMap> versions_;
 };
 
-MapPlanner::MapPlanner(MapCore& core)
-    : core_(core),
-      planner_({.cell_size_m = core.info().parameters.mls.cell_size_m,
-                .budget = core.caches(),
+MapPlanner::MapPlanner(std::string name,
+                       const MapParameters& parameters,
+                       const EngineOptions& options,
+                       const std::shared_ptr<CacheBudget>& caches)
+    : name_(std::move(name)),
+      cell_size_m_(parameters.mls.cell_size_m),
+      planner_({.cell_size_m = cell_size_m_,
+                .budget = caches,
                 .loop =
-                    [threads = core.options().worker_threads](
+                    [threads = options.worker_threads](
                         std::size_t count, absl::FunctionRef<absl::Status(std::size_t)> body) {
                       return ParallelFor(
                           threads, count, [&](int /*thread*/, std::size_t i) { return body(i); });
                     },
                 .preparations = PreparationsAtATime()}),
-      spaces_(core),
-      tiles_(core.caches(), core.options().cache_bytes / kDecodedShare) {}
+      spaces_(name_, parameters, caches),
+      tiles_(caches, options.cache_bytes / kDecodedShare) {}
 
-absl::StatusOr<std::shared_ptr<const TileVersionMap>> MapPlanner::VersionsOf(const MapView& view) {
+absl::StatusOr<std::shared_ptr<const TileVersionMap>> MapPlanner::VersionsOf(MapState& state) {
+  const MapView& view = state.view();
   {
     absl::MutexLock lock(&mutex_);
     if (versions_ != nullptr && versions_view_ == view) return versions_;
   }
   std::shared_ptr<const TileVersionMap> versions;
   {
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state.Reader());
     STRATA_ASSIGN_OR_RETURN(const std::vector<SurfaceTileRow> rows,
                             reader->ListSurfaceTiles(TileRange{}, view.tile_version));
     versions = std::make_shared<const TileVersionMap>(VersionsOfTiles(rows));
@@ -152,12 +152,17 @@ absl::StatusOr<std::shared_ptr<const TileVersionMap>> MapPlanner::VersionsOf(con
   return versions_;
 }
 
-absl::StatusOr<std::shared_ptr<const SurfaceTile>> MapPlanner::LoadTile(const TileKey& key,
+absl::StatusOr<std::shared_ptr<const SurfaceTile>> MapPlanner::LoadTile(MapState& state,
+                                                                        const TileKey& key,
                                                                         std::uint64_t version) {
   const auto held = tiles_.Find(key);
   if (held != nullptr && held->version == version) return held->tile;
-  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const SurfaceTile> tile,
-                          ReadSurfaceTile(core_, key, version));
+  std::optional<SurfaceTileRow> row;
+  {
+    STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state.Reader());
+    STRATA_ASSIGN_OR_RETURN(row, reader->FindSurfaceTile(key, version));
+  }
+  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const SurfaceTile> tile, DecodeStoredTile(key, row));
   if (tile == nullptr) return tile;
   tiles_.Put(key,
              std::make_shared<const Decoded>(Decoded{version, tile}),
@@ -165,68 +170,66 @@ absl::StatusOr<std::shared_ptr<const SurfaceTile>> MapPlanner::LoadTile(const Ti
   return tile;
 }
 
-absl::StatusOr<std::optional<std::string>> MapPlanner::LoadPrepared(const TileKey& key,
+absl::StatusOr<std::optional<std::string>> MapPlanner::LoadPrepared(MapState& state,
+                                                                    const TileKey& key,
                                                                     const std::string& made_of) {
   std::optional<std::string> bytes;
   {
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state.Reader());
     STRATA_ASSIGN_OR_RETURN(bytes, reader->FindPreparedTile(key, made_of));
   }
   if (!bytes.has_value()) return bytes;
   absl::StatusOr<std::string> packed = UnsealTile(key, made_of, *std::move(bytes));
   if (packed.ok()) return std::optional<std::string>(*std::move(packed));
-  LOG(WARNING) << LogLine("prepare").Add("map", core_.name()).Add("damaged", key.ToString());
-  core_.NoteUnreadable(key);
+  LOG(WARNING) << LogLine("prepare").Add("map", name_).Add("damaged", key.ToString());
+  state.NoteUnreadable(key);
   return std::optional<std::string>();
 }
 
-absl::StatusOr<PlanResult> MapPlanner::Plan(const PlanQuery& query, const Stop& stop) {
-  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this));
+absl::StatusOr<PlanResult> MapPlanner::Plan(MapState& state,
+                                            const PlanQuery& query,
+                                            const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state));
   STRATA_ASSIGN_OR_RETURN(PlanResult result, planner_.Plan(source, query, stop));
-  result.epoch = source.epoch();
+  result.epoch = state.view().epoch;
   return result;
 }
 
-absl::StatusOr<PathCheck> MapPlanner::Check(const PathQuery& query, const Stop& stop) {
-  const double cell_size_m = core_.info().parameters.mls.cell_size_m;
-  const std::uint64_t since = query.known.has_value() ? query.known->commit_sequence
-                                                      : std::numeric_limits<std::uint64_t>::max();
-  std::pair<ChangeSet, Snapshots::Pin> told = core_.ChangesSince(since);
-  const ChangeSet& changes = told.first;
-  const std::uint64_t epoch = told.second.view().epoch;
+absl::StatusOr<PathCheck> MapPlanner::Check(MapState& state,
+                                            const PathQuery& query,
+                                            const Stop& stop) {
+  const ChangeSet& changes = state.changes();
   PathCheck check;
-  if (query.known.has_value() && StillKnown(*query.known, query, changes, cell_size_m)) {
+  if (query.known.has_value() && StillKnown(*query.known, query, changes, cell_size_m_)) {
     check = *query.known;
   } else {
-    STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, std::move(told.second)));
+    STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state));
     STRATA_ASSIGN_OR_RETURN(check, planner_.Check(source, query, stop));
   }
-  check.epoch = epoch;
+  check.epoch = state.view().epoch;
   check.commit_sequence = changes.last;
   return check;
 }
 
-absl::StatusOr<FloorPlan> MapPlanner::Floors(const FloorQuery& query, const Stop& stop) {
-  std::pair<ChangeSet, Snapshots::Pin> now =
-      core_.ChangesSince(std::numeric_limits<std::uint64_t>::max());
-  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, std::move(now.second)));
-  STRATA_ASSIGN_OR_RETURN(FloorPlan plan,
-                          FindFloors(planner_.cache(),
-                                     source,
-                                     source.Keys(),
-                                     core_.info().parameters.mls.cell_size_m,
-                                     query,
-                                     stop));
-  plan.epoch = source.epoch();
-  plan.commit_sequence = now.first.last;
+absl::StatusOr<FloorPlan> MapPlanner::Floors(MapState& state,
+                                             const FloorQuery& query,
+                                             const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state));
+  STRATA_ASSIGN_OR_RETURN(
+      FloorPlan plan,
+      FindFloors(planner_.cache(), source, source.Keys(), cell_size_m_, query, stop));
+  plan.epoch = state.view().epoch;
+  plan.commit_sequence = state.changes().last;
   return plan;
 }
 
-absl::StatusOr<FloorPlaces> MapPlanner::Places(const PlaceQuery& query, const Stop& stop) {
+absl::StatusOr<FloorPlaces> MapPlanner::Places(MapState& state,
+                                               const PlaceQuery& query,
+                                               const Stop& stop) {
   FloorQuery floors{.profile = query.profile, .at = query.at, .cells = true, .floor = query.floor};
   const bool largest = !query.at.has_value() && !query.floor.has_value();
   if (largest) floors.floor = 0;
-  STRATA_ASSIGN_OR_RETURN(const FloorPlan plan, Floors(floors, stop));
+  STRATA_ASSIGN_OR_RETURN(const FloorPlan plan, Floors(state, floors, stop));
   FloorPlaces places;
   places.cell_size_m = plan.cell_size_m;
   places.epoch = plan.epoch;
@@ -244,52 +247,37 @@ absl::StatusOr<FloorPlaces> MapPlanner::Places(const PlaceQuery& query, const St
   return places;
 }
 
-absl::StatusOr<ExploreResult> MapPlanner::Explore(const ExploreQuery& query, const Stop& stop) {
-  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this));
+absl::StatusOr<ExploreResult> MapPlanner::Explore(MapState& state,
+                                                  const ExploreQuery& query,
+                                                  const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state));
   const auto space_of = [&](const Eigen::AlignedBox3d& region, double voxel_m) {
-    return spaces_.Find(region, voxel_m, stop);
+    return spaces_.Find(state, region, voxel_m, stop);
   };
   STRATA_ASSIGN_OR_RETURN(ExploreResult result, planner_.Explore(source, query, space_of, stop));
-  result.epoch = source.epoch();
+  result.epoch = state.view().epoch;
   return result;
 }
 
-absl::StatusOr<ShapeCheck> MapPlanner::CheckShape(const ShapeQuery& query, const Stop& stop) {
+absl::StatusOr<ShapeCheck> MapPlanner::CheckShape(MapState& state,
+                                                  const ShapeQuery& query,
+                                                  const Stop& stop) {
   const absl::Time begin = SteadyNow();
   STRATA_RETURN_IF_ERROR(stop.status());
-  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this));
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state));
   STRATA_ASSIGN_OR_RETURN(
       ShapeCheck check,
-      CheckShapeAlong([&source](const TileKey& key) { return source.Load(key); },
-                      core_.info().parameters.mls.cell_size_m,
-                      query,
-                      stop));
-  check.epoch = source.epoch();
+      CheckShapeAlong(
+          [&source](const TileKey& key) { return source.Load(key); }, cell_size_m_, query, stop));
+  check.epoch = state.view().epoch;
   check.elapsed_ms = absl::ToDoubleMilliseconds(SteadyNow() - begin);
   return check;
 }
 
-absl::Status MapPlanner::Watch(const PathQuery& query,
-                               const Stop& stop,
-                               absl::FunctionRef<absl::Status(const PathCheck&)> sink) {
-  PathQuery asked = query;
-  asked.known.reset();
-  while (true) {
-    STRATA_RETURN_IF_ERROR(stop.status());
-    STRATA_ASSIGN_OR_RETURN(const PathCheck check, Check(asked, stop));
-    if (!asked.known.has_value() || asked.known->valid != check.valid) {
-      STRATA_RETURN_IF_ERROR(sink(check));
-    }
-    asked.known = check;
-    STRATA_RETURN_IF_ERROR(core_.changes().Await(check.commit_sequence, stop));
-  }
-}
-
 absl::StatusOr<std::vector<SurfaceColumn>> MapPlanner::Sample(
-    const std::vector<Eigen::Vector2d>& places, const Stop& stop) {
+    MapState& state, const std::vector<Eigen::Vector2d>& places, const Stop& stop) {
   constexpr std::size_t kStopInterval = 1024;
-  const double cell_size_m = core_.info().parameters.mls.cell_size_m;
-  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this));
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state));
   std::vector<SurfaceColumn> columns;
   columns.reserve(places.size());
   for (std::size_t i = 0; i < places.size(); ++i) {
@@ -300,7 +288,7 @@ absl::StatusOr<std::vector<SurfaceColumn>> MapPlanner::Sample(
     SurfaceColumn& column = columns.emplace_back();
     column.x_m = places[i].x();
     column.y_m = places[i].y();
-    const Eigen::Vector2d cell = (places[i] / cell_size_m).array().floor();
+    const Eigen::Vector2d cell = (places[i] / cell_size_m_).array().floor();
     if (cell.cwiseAbs().maxCoeff() >= kMaxCellIndex) continue;
     const CellIndex index{static_cast<std::int32_t>(cell.x()), static_cast<std::int32_t>(cell.y())};
     STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<const SurfaceTile> tile,

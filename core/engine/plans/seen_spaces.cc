@@ -1,4 +1,4 @@
-#include "core/engine/doors/seen_spaces.h"
+#include "core/engine/plans/seen_spaces.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -57,16 +57,22 @@ PointCloud RaysOf(const PointCloud& block, const std::vector<std::uint16_t>& fad
 
 }  // namespace
 
-SeenSpaces::SeenSpaces(MapCore& core)
-    : core_(core), known_(core.caches(), core.caches()->max_bytes() / 4) {}
+SeenSpaces::SeenSpaces(std::string name,
+                       const MapParameters& parameters,
+                       const std::shared_ptr<CacheBudget>& caches)
+    : name_(std::move(name)),
+      parameters_(parameters),
+      caches_(caches),
+      known_(caches, caches->max_bytes() / 4) {}
 
-absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Find(const Eigen::AlignedBox3d& region,
+absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Find(MapState& state,
+                                                                  const Eigen::AlignedBox3d& region,
                                                                   double voxel_m,
                                                                   const Stop& stop) {
-  const auto [changes, pin] = core_.ChangesSince(std::numeric_limits<std::uint64_t>::max());
   const Eigen::Vector3d low = region.min();
   const Eigen::Vector3d high = region.max();
-  const Key key{{low.x(), low.y(), low.z(), high.x(), high.y(), high.z(), voxel_m}, changes.last};
+  const Key key{{low.x(), low.y(), low.z(), high.x(), high.y(), high.z(), voxel_m},
+                state.changes().last};
   if (auto known = known_.Find(key); known != nullptr) return known;
   STRATA_RETURN_IF_ERROR(AwaitTurn(stop));
   const absl::Cleanup done = [this] {
@@ -74,7 +80,7 @@ absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Find(const Eigen::A
     making_ = false;
   };
   if (auto known = known_.Find(key); known != nullptr) return known;  // made meanwhile
-  STRATA_ASSIGN_OR_RETURN(auto made, Make(region, voxel_m, pin.view().epoch, stop));
+  STRATA_ASSIGN_OR_RETURN(auto made, Make(state, region, voxel_m, stop));
   known_.Put(key, made, made->voxels.bytes());
   return made;
 }
@@ -90,9 +96,9 @@ absl::Status SeenSpaces::AwaitTurn(const Stop& stop) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Make(const Eigen::AlignedBox3d& region,
+absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Make(MapState& state,
+                                                                  const Eigen::AlignedBox3d& region,
                                                                   double voxel_m,
-                                                                  std::uint64_t epoch,
                                                                   const Stop& stop) {
   OccupancyVoxelsOptions options;
   options.voxel_m = voxel_m;
@@ -101,11 +107,11 @@ absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Make(const Eigen::A
   STRATA_RETURN_IF_ERROR(options.Validate());
   auto seen = std::make_shared<SeenSpace>(SeenSpace{OccupancyVoxels(options)});
   std::vector<PosedScan> scans;
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state.Reader());
   ScanQuery query;
   query.state = ScanState::kIntegrated;
   query.skip_damaged = true;  // verify names it
-  STRATA_RETURN_IF_ERROR(ForEachPosedScan(*reader, query, epoch, [&](PosedScan posed) {
+  STRATA_RETURN_IF_ERROR(ForEachPosedScan(*reader, query, state.view().epoch, [&](PosedScan posed) {
     if (!HullOf(posed).intersects(region)) return;
     if (posed.scan.has_points) {
       scans.push_back(std::move(posed));
@@ -113,11 +119,10 @@ absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Make(const Eigen::A
       ++seen->left_out;
     }
   }));
-  const MapParameters parameters = core_.info().parameters;
-  ScanSource source(*reader, parameters);
+  ScanSource source(*reader, parameters_);
   for (const PosedScan& posed : scans) {
-    const SensorModel sensor = posed.scan.header.sensor.value_or(parameters.sensor);
-    const ScanShare share(core_.caches(), posed.scan);
+    const SensorModel sensor = posed.scan.header.sensor.value_or(parameters_.sensor);
+    const ScanShare share(caches_, posed.scan);
     const absl::Status added =
         source.ForEachBlock(posed.scan, [&](const PointCloud& block) -> absl::Status {
           return seen->voxels.Add(
@@ -130,7 +135,7 @@ absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Make(const Eigen::A
   if (seen->scans == 0 && seen->left_out > 0) {
     return absl::FailedPreconditionError(absl::StrCat(
         "map ",
-        core_.name(),
+        name_,
         ": the points of all ",
         seen->left_out,
         " scans around were dropped or are damaged, and without them nothing says what space was "

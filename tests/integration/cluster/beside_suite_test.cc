@@ -1,0 +1,169 @@
+// The conformance suite by a server that has not got the maps, which another one on the same
+// database has: what it cannot answer itself its client asks the other.
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include <gtest/gtest.h>
+
+#include "client/sdk/client.h"
+#include "core/engine/engine.h"
+#include "server/server.h"
+#include "tests/support/database_suite/database_suite.h"
+#include "tests/support/postgres_cluster.h"
+#include "tests/support/status_matchers.h"
+
+namespace strata::testing {
+namespace {
+
+// An engine behind a server.
+struct Served {
+  Served(const std::filesystem::path& directory,
+         const std::string& store,
+         const std::string& name,
+         const std::string& listen) {
+    EngineOptions engine_options;
+    engine_options.directory = directory;
+    engine_options.store = store;
+    engine_options.server_name = name;
+    auto opened = OpenEngine(engine_options);
+    EXPECT_THAT(opened, IsOk());
+    if (!opened.ok()) return;
+    engine = *std::move(opened);
+    server::ServerOptions server_options;
+    server_options.listen = listen;
+    auto started = server::Server::Start(*engine, server_options);
+    EXPECT_THAT(started, IsOk());
+    if (started.ok()) server = *std::move(started);
+  }
+
+  std::unique_ptr<api::Database> engine;
+  std::unique_ptr<server::Server> server;
+};
+
+// Makes maps at the owner's; all else is the client's.
+class MapsOfTheOwner final : public api::Maps {
+ public:
+  MapsOfTheOwner(api::Maps& owner, api::Maps& client) : owner_(owner), client_(client) {}
+
+  absl::StatusOr<MapInfo> Create(const api::Call& call,
+                                 absl::string_view name,
+                                 const MapParameters& parameters) override {
+    return owner_.Create(call, name, parameters);
+  }
+  absl::StatusOr<MapInfo> Get(const api::Call& call, absl::string_view name) override {
+    return client_.Get(call, name);
+  }
+  absl::StatusOr<std::vector<MapInfo>> List(const api::Call& call) override {
+    return client_.List(call);
+  }
+  absl::Status Delete(const api::Call& call, absl::string_view name) override {
+    return client_.Delete(call, name);
+  }
+  absl::StatusOr<MapStats> Stats(const api::Call& call, absl::string_view name) override {
+    return client_.Stats(call, name);
+  }
+  absl::StatusOr<std::vector<EpochInfo>> History(const api::Call& call,
+                                                 absl::string_view name) override {
+    return client_.History(call, name);
+  }
+  absl::StatusOr<std::vector<MapClass>> ListClasses(const api::Call& call,
+                                                    absl::string_view name) override {
+    return client_.ListClasses(call, name);
+  }
+  absl::Status SetClass(const api::Call& call,
+                        absl::string_view name,
+                        const MapClass& map_class) override {
+    return client_.SetClass(call, name, map_class);
+  }
+  absl::Status SetOrigin(const api::Call& call,
+                         absl::string_view name,
+                         const GeodeticOrigin& origin) override {
+    return client_.SetOrigin(call, name, origin);
+  }
+  absl::Status Watch(const api::Call& call,
+                     absl::string_view name,
+                     const api::WatchOptions& options,
+                     absl::FunctionRef<absl::Status(const api::MapUpdate&)> sink) override {
+    return client_.Watch(call, name, options, sink);
+  }
+  absl::Status Backup(const api::Call& call,
+                      absl::string_view name,
+                      absl::FunctionRef<absl::Status(const api::BackupPiece&)> sink) override {
+    return client_.Backup(call, name, sink);
+  }
+
+ private:
+  api::Maps& owner_;
+  api::Maps& client_;
+};
+
+class DatabaseBesideItsOwner final : public api::Database {
+ public:
+  explicit DatabaseBesideItsOwner(const std::filesystem::path& directory) {
+    const auto cluster = SharedPostgresCluster();
+    EXPECT_THAT(cluster, IsOk());
+    const std::string store = (*cluster)->AddressOfOwn(directory.string());
+    // An owner's name is where clients are sent, which is known once it has listened.
+    std::string address;
+    {
+      const Served unnamed(directory / "owner", store, "", "127.0.0.1:0");
+      address = unnamed.server->address();
+    }
+    owner_.emplace(directory / "owner", store, address, address);
+    const auto maps = owner_->engine->maps().List({});
+    EXPECT_THAT(maps, IsOk());
+    for (const MapInfo& map : *maps) {
+      EXPECT_THAT(owner_->engine->jobs().List({}, map.name), IsOk());  // which opens it
+    }
+    other_.emplace(directory / "other", store, "", "127.0.0.1:0");
+    ClientOptions options;
+    options.target = other_->server->address();
+    auto client = Connect(options);
+    EXPECT_THAT(client, IsOk());
+    client_ = *std::move(client);
+    maps_ = std::make_unique<MapsOfTheOwner>(owner_->engine->maps(), client_->maps());
+  }
+
+  api::Maps& maps() override { return *maps_; }
+  api::Scans& scans() override { return client_->scans(); }
+  api::Tiles& tiles() override { return client_->tiles(); }
+  api::Planning& planning() override { return client_->planning(); }
+  api::Jobs& jobs() override { return client_->jobs(); }
+  api::PoseGraph& posegraph() override { return client_->posegraph(); }
+  api::Classifiers& classifiers() override { return client_->classifiers(); }
+  api::Models& models() override { return client_->models(); }
+  api::Objects& objects() override { return client_->objects(); }
+
+ private:
+  // In the order they need each other.
+  std::optional<Served> owner_;
+  std::optional<Served> other_;
+  std::unique_ptr<api::Database> client_;
+  std::unique_ptr<api::Maps> maps_;
+};
+
+// Where there is no PostgreSQL 15 to run.
+class NeedsStore : public ::testing::Environment {
+ public:
+  void SetUp() override {
+    const auto cluster = SharedPostgresCluster();
+    if (absl::IsFailedPrecondition(cluster.status())) GTEST_SKIP() << cluster.status().message();
+  }
+};
+const auto* const kNeedsStore = ::testing::AddGlobalTestEnvironment(new NeedsStore());
+
+INSTANTIATE_TEST_SUITE_P(
+    BesideTheOwner,
+    DatabaseSuite,
+    ::testing::Values(DatabaseMaker{
+        "Beside", [](const auto& path) { return std::make_unique<DatabaseBesideItsOwner>(path); }}),
+    DatabaseMakerName);
+
+}  // namespace
+}  // namespace strata::testing

@@ -1,0 +1,132 @@
+// Servers that share a database of the test's own, for tests of what one does beside the other.
+#ifndef STRATA_TESTS_INTEGRATION_CLUSTER_SHARING_SERVERS_H_
+#define STRATA_TESTS_INTEGRATION_CLUSTER_SHARING_SERVERS_H_
+
+#include <csignal>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+#include <gtest/gtest.h>
+
+#include "client/sdk/client.h"
+#include "core/api/database.h"
+#include "core/common/status.h"
+#include "tests/integration/stratad_process.h"
+#include "tests/support/postgres_cluster.h"
+#include "tests/support/status_matchers.h"
+#include "tests/support/temp_dir.h"
+
+namespace strata::testing {
+
+inline constexpr char kShared[] = "shared";
+inline constexpr absl::Duration kPatience = absl::Seconds(30);
+
+class SharingServer {
+ public:
+  SharingServer(std::string name, std::string store)
+      : name_(std::move(name)), store_(std::move(store)) {}
+
+  // From its next start on its name is its address.
+  void NameByAddress() {
+    listen_ = process_->Address();
+    name_ = listen_;
+  }
+  void Start() {
+    process_ = std::make_unique<StratadProcess>(std::vector<std::string>{"--data",
+                                                                         data_.path().string(),
+                                                                         "--listen",
+                                                                         listen_,
+                                                                         "--store",
+                                                                         store_,
+                                                                         "--map-lease",
+                                                                         "1",
+                                                                         "--server-name",
+                                                                         name_,
+                                                                         "--optimize-every",
+                                                                         "0"});
+    ClientOptions options;
+    options.target = process_->Address();
+    options.backoff.max_attempts = 1;  // whoever asks goes to another server
+    auto connected = Connect(options);
+    STRATA_ASSERT_OK(connected);
+    absl::MutexLock lock(&mutex_);
+    db_ = *std::move(connected);
+  }
+  void Kill() {
+    process_->Signal(SIGKILL);
+    process_->Wait();
+  }
+  void Signal(int signal) { process_->Signal(signal); }
+  void Await() { process_->Wait(); }
+  const std::string& address() { return process_->Address(); }
+  std::shared_ptr<api::Database> db() {
+    absl::MutexLock lock(&mutex_);
+    return db_;
+  }
+
+ private:
+  std::string name_;
+  std::string listen_ = "127.0.0.1:0";
+  const std::string store_;
+  const TempDir data_;
+  std::unique_ptr<StratadProcess> process_;
+  absl::Mutex mutex_;
+  std::shared_ptr<api::Database> db_;
+};
+
+// Two servers, a and b, of which a has the empty map kShared.
+class SharingServersTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto cluster = SharedPostgresCluster();
+    if (absl::IsFailedPrecondition(cluster.status())) GTEST_SKIP() << cluster.status().message();
+    STRATA_ASSERT_OK(cluster);
+    store_ =
+        (*cluster)->AddressOfOwn(::testing::UnitTest::GetInstance()->current_test_info()->name());
+    for (const char* name : {"a", "b"}) {
+      servers_.push_back(std::make_unique<SharingServer>(name, store_));
+      servers_.back()->Start();
+    }
+    STRATA_ASSERT_OK(servers_[0]->db()->maps().Create({}, kShared, MapParameters()));
+  }
+  api::Database& db(std::size_t server) {
+    held_.push_back(servers_[server]->db());
+    return *held_.back();
+  }
+  // Until `call` is not refused for who asks whom any more.
+  static absl::Status Insist(const std::function<absl::Status()>& call) {
+    const absl::Time end = absl::Now() + kPatience;
+    while (true) {
+      absl::Status done = call();
+      const bool again =
+          absl::IsUnavailable(done) || absl::IsDeadlineExceeded(done) || absl::IsCancelled(done);
+      if (!again || absl::Now() >= end) return done;
+      absl::SleepFor(absl::Milliseconds(20));
+    }
+  }
+
+  std::string store_;
+  std::vector<std::unique_ptr<SharingServer>> servers_;
+  std::vector<std::shared_ptr<api::Database>> held_;
+};
+
+// Once no scan of the map is pending.
+inline absl::StatusOr<MapStats> AtRest(api::Database& db, const char* map) {
+  while (true) {
+    STRATA_ASSIGN_OR_RETURN(MapStats stats, db.maps().Stats({}, map));
+    if (stats.scans_pending == 0) return stats;
+    absl::SleepFor(absl::Milliseconds(20));
+  }
+}
+
+}  // namespace strata::testing
+
+#endif  // STRATA_TESTS_INTEGRATION_CLUSTER_SHARING_SERVERS_H_
