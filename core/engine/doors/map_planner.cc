@@ -53,6 +53,9 @@ bool StillKnown(const PathCheck& known,
                 const ChangeSet& changes,
                 double cell_size_m) {
   if (!changes.complete || known.commit_sequence > changes.last) return false;
+  if (query.inferred == InferredAs::kObstacle && changes.inferred > known.commit_sequence) {
+    return false;
+  }
   if (!ValidateWaypoints(query.waypoints, cell_size_m).ok() ||
       known.tiles != TilesUnder(query.waypoints, cell_size_m)) {
     return false;
@@ -78,8 +81,14 @@ absl::Status NoSuchFloor(const PlaceQuery& query, std::size_t floors) {
 // The tiles of one pinned state.
 class MapPlanner::Source final : public TileSource {
  public:
-  Source(MapPlanner& planner, Snapshots::Pin pin, std::shared_ptr<const TileVersionMap> versions)
-      : planner_(planner), pin_(std::move(pin)), versions_(std::move(versions)) {}
+  Source(MapPlanner& planner,
+         Snapshots::Pin pin,
+         std::shared_ptr<const TileVersionMap> versions,
+         std::shared_ptr<const InferredState> inferred)
+      : planner_(planner),
+        pin_(std::move(pin)),
+        versions_(std::move(versions)),
+        inferred_(std::move(inferred)) {}
 
   absl::StatusOr<std::shared_ptr<const SurfaceTile>> Load(const TileKey& key) override {
     const std::uint64_t version = Version(key);
@@ -95,7 +104,24 @@ class MapPlanner::Source final : public TileSource {
                                                           const RobotProfile& profile) override {
     return planner_.LoadPrepared(key, MadeOf(versions, profile));
   }
+  std::shared_ptr<const InferredTile> Inferred(const TileKey& key) override {
+    if (inferred_ == nullptr) return nullptr;
+    const auto found = inferred_->tiles.find(key);
+    return found == inferred_->tiles.end() ? nullptr : found->second;
+  }
   std::uint64_t epoch() const { return pin_.view().epoch; }
+  // What whoever asked for what was inferred should know of it, behind a message.
+  std::string RemarkOnInferred() const {
+    if (inferred_ == nullptr || inferred_->epoch == epoch()) return "";
+    if (!inferred_->epoch.has_value()) {
+      return "; nothing is inferred in this map (objects complete)";
+    }
+    return absl::StrCat("; what is inferred is of epoch ",
+                        *inferred_->epoch,
+                        ", the map's is ",
+                        epoch(),
+                        " (objects find and objects complete)");
+  }
   std::vector<TileKey> Keys() const {
     std::vector<TileKey> keys;
     for (const auto& [key, version] : *versions_) {
@@ -105,19 +131,30 @@ class MapPlanner::Source final : public TileSource {
     return keys;
   }
 
-  static absl::StatusOr<Source> OfNow(MapPlanner& planner) {
-    return Of(planner, planner.core_.snapshots().PinCurrent());
+  // What was inferred is as new as the tiles at least; it has no versions to be pinned.
+  static absl::StatusOr<Source> OfNow(MapPlanner& planner,
+                                      InferredAs as = InferredAs::kIgnore,
+                                      const Stop& stop = {}) {
+    return Of(planner, planner.core_.snapshots().PinCurrent(), as, stop);
   }
-  static absl::StatusOr<Source> Of(MapPlanner& planner, Snapshots::Pin pin) {
+  static absl::StatusOr<Source> Of(MapPlanner& planner,
+                                   Snapshots::Pin pin,
+                                   InferredAs as = InferredAs::kIgnore,
+                                   const Stop& stop = {}) {
     STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const TileVersionMap> versions,
                             planner.VersionsOf(pin.view()));
-    return Source(planner, std::move(pin), std::move(versions));
+    std::shared_ptr<const InferredState> inferred;
+    if (as == InferredAs::kObstacle) {
+      STRATA_ASSIGN_OR_RETURN(inferred, planner.inferred_.Now(stop));
+    }
+    return Source(planner, std::move(pin), std::move(versions), std::move(inferred));
   }
 
  private:
   MapPlanner& planner_;
   Snapshots::Pin pin_;
   std::shared_ptr<const TileVersionMap> versions_;
+  std::shared_ptr<const InferredState> inferred_;  // nullptr: not asked for
 };
 
 MapPlanner::MapPlanner(MapCore& core)
@@ -132,6 +169,7 @@ MapPlanner::MapPlanner(MapCore& core)
                     },
                 .preparations = PreparationsAtATime()}),
       spaces_(core),
+      inferred_(core),
       tiles_(core.caches(), core.options().cache_bytes / kDecodedShare) {}
 
 absl::StatusOr<std::shared_ptr<const TileVersionMap>> MapPlanner::VersionsOf(const MapView& view) {
@@ -181,8 +219,9 @@ absl::StatusOr<std::optional<std::string>> MapPlanner::LoadPrepared(const TileKe
 }
 
 absl::StatusOr<PlanResult> MapPlanner::Plan(const PlanQuery& query, const Stop& stop) {
-  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this));
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this, query.inferred, stop));
   STRATA_ASSIGN_OR_RETURN(PlanResult result, planner_.Plan(source, query, stop));
+  absl::StrAppend(&result.message, source.RemarkOnInferred());
   result.epoch = source.epoch();
   return result;
 }
@@ -198,8 +237,10 @@ absl::StatusOr<PathCheck> MapPlanner::Check(const PathQuery& query, const Stop& 
   if (query.known.has_value() && StillKnown(*query.known, query, changes, cell_size_m)) {
     check = *query.known;
   } else {
-    STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, std::move(told.second)));
+    STRATA_ASSIGN_OR_RETURN(Source source,
+                            Source::Of(*this, std::move(told.second), query.inferred, stop));
     STRATA_ASSIGN_OR_RETURN(check, planner_.Check(source, query, stop));
+    absl::StrAppend(&check.message, source.RemarkOnInferred());
   }
   check.epoch = epoch;
   check.commit_sequence = changes.last;
@@ -245,11 +286,12 @@ absl::StatusOr<FloorPlaces> MapPlanner::Places(const PlaceQuery& query, const St
 }
 
 absl::StatusOr<ExploreResult> MapPlanner::Explore(const ExploreQuery& query, const Stop& stop) {
-  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this));
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this, query.inferred, stop));
   const auto space_of = [&](const Eigen::AlignedBox3d& region, double voxel_m) {
     return spaces_.Find(region, voxel_m, stop);
   };
   STRATA_ASSIGN_OR_RETURN(ExploreResult result, planner_.Explore(source, query, space_of, stop));
+  absl::StrAppend(&result.message, source.RemarkOnInferred());
   result.epoch = source.epoch();
   return result;
 }
@@ -257,13 +299,15 @@ absl::StatusOr<ExploreResult> MapPlanner::Explore(const ExploreQuery& query, con
 absl::StatusOr<ShapeCheck> MapPlanner::CheckShape(const ShapeQuery& query, const Stop& stop) {
   const absl::Time begin = SteadyNow();
   STRATA_RETURN_IF_ERROR(stop.status());
-  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this));
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::OfNow(*this, query.inferred, stop));
   STRATA_ASSIGN_OR_RETURN(
       ShapeCheck check,
       CheckShapeAlong([&source](const TileKey& key) { return source.Load(key); },
                       core_.info().parameters.mls.cell_size_m,
                       query,
-                      stop));
+                      stop,
+                      [&source](const TileKey& key) { return source.Inferred(key); }));
+  absl::StrAppend(&check.message, source.RemarkOnInferred());
   check.epoch = source.epoch();
   check.elapsed_ms = absl::ToDoubleMilliseconds(SteadyNow() - begin);
   return check;

@@ -20,6 +20,7 @@
 #include "core/common/stop.h"
 #include "core/engine/doors/seen_spaces.h"
 #include "core/engine/map/map_core.h"
+#include "core/engine/objects/inferred_tiles.h"
 #include "core/engine/tiles/kept_tiles.h"
 #include "core/mls/surface_tile.h"
 #include "core/planning/planner.h"
@@ -76,6 +77,7 @@ class MapPlanner {
   MapView versions_view_ ABSL_GUARDED_BY(mutex_);
   std::shared_ptr<const TileVersionMap> versions_ ABSL_GUARDED_BY(mutex_);
   SeenSpaces spaces_;
+  InferredTiles inferred_;
   LruCache<TileKey, const Decoded> tiles_;  // of each what was asked for last
 };
 

@@ -171,7 +171,14 @@ void MapCore::Show(const MapClock& clock,
                    const std::vector<api::TileChangeNotice>& tiles) {
   absl::MutexLock lock(&publishing_);
   snapshots_.Publish({clock.epoch, clock.tile_version});
-  changes_.Add(clock.commit_sequence, scans, tiles);
+  changes_.Add(clock.commit_sequence, scans, tiles, inferred_changes_);
+  inferred_changes_ = false;  // on the writer's thread, as where it is noted
+}
+
+absl::Status MapCore::NoteInferredIfAny(StorageReader& reader) {
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t job, reader.JobOfInferred());
+  if (job != 0) NoteInferred();
+  return absl::OkStatus();
 }
 
 std::uint64_t MapCore::NextUpload() {
