@@ -88,7 +88,8 @@ TEST_F(PlanCommandTest, WhatWasInferredIsAnObstacleToEverythingThatIsAskedOfTheW
   const std::vector<std::string> words = {
       "plan", "m", "--from", "0,0", "--to", "1,0", "--shape-box", "1,1,1", "--watch"};
   const auto with = [](std::vector<std::string> all, const char* as) {
-    all.insert(all.end(), {"--inferred", as});
+    all.emplace_back("--inferred");
+    all.emplace_back(as);
     return all;
   };
   EXPECT_TRUE(Run(words, OutputFormat::kText).ok());
