@@ -63,6 +63,9 @@ struct MapUpdate {
   std::string epoch_reason;  // set when the watcher knew an epoch and this is another
   std::vector<ScanChange> scans;
   std::vector<TileChangeNotice> tiles;
+  // What Objects::ListInferred() gives may be another than before the update. Not set where all is
+  // void.
+  bool inferred = false;
 };
 
 // A part of a map's backup, in order.

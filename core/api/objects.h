@@ -62,9 +62,10 @@ class Objects {
                                   absl::string_view kind) = 0;
 
   // What the last job `complete` inferred of the entities that the query takes, by id: each to
-  // `sink`, whose error ends the call. Returns how it came about. Deleting a scan takes with it
-  // all that was inferred of the kinds it had seen. NOT_FOUND where nothing was inferred; ABORTED,
-  // DATA_LOSS as ListEntities.
+  // `sink`, whose error ends the call; of the query's region, those of which something was inferred
+  // in it. Maps::Watch says when it may be another. Returns how it came about. Deleting a scan
+  // takes with it all that was inferred of the kinds it had seen. NOT_FOUND where nothing was
+  // inferred; ABORTED, DATA_LOSS as ListEntities.
   virtual absl::StatusOr<InferredInfo> ListInferred(
       const Call& call,
       absl::string_view map,

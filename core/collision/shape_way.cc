@@ -39,6 +39,16 @@ struct Look {
   Vector3d where = Vector3d::Zero();
   int class_id = 0;
   bool unknown = false;
+  bool inferred = false;
+};
+
+// Something in a cell that the shape may touch [m].
+struct Thing {
+  double bottom = 0.0;
+  double top = 0.0;
+  int class_id = 0;
+  bool unknown = false;
+  bool inferred = false;
 };
 
 // Poses of a way, and how far along it they are.
@@ -87,8 +97,17 @@ class Way {
 
 class Surroundings {
  public:
-  Surroundings(TileOf tile_of, double cell_size_m, const ShapeQuery& query, const Stop& stop)
-      : tile_of_(tile_of), cell_m_(cell_size_m), query_(query), stop_(stop), body_(query.shape) {}
+  Surroundings(TileOf tile_of,
+               InferredOf inferred_of,
+               double cell_size_m,
+               const ShapeQuery& query,
+               const Stop& stop)
+      : tile_of_(tile_of),
+        inferred_of_(inferred_of),
+        cell_m_(cell_size_m),
+        query_(query),
+        stop_(stop),
+        body_(query.shape) {}
 
   const ShapeBody& body() const { return body_; }
 
@@ -114,24 +133,30 @@ class Surroundings {
   }
 
  private:
-  absl::StatusOr<std::span<const Surface>> SurfacesOf(CellIndex cell) {
+  struct Held {
+    std::shared_ptr<const SurfaceTile> measured;   // nullptr: none
+    std::shared_ptr<const InferredTile> inferred;  // nullptr: nothing
+  };
+
+  absl::StatusOr<const Held*> TilesAt(CellIndex cell) {
     const TileKey key = TileOfCell(cell);
     if (last_ == nullptr || last_key_ != key) {
       auto found = tiles_.find(key);
       if (found == tiles_.end()) {
         if (tiles_.size() >= kMostTiles) tiles_.clear();
         STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const SurfaceTile> tile, tile_of_(key));
-        found = tiles_.emplace(key, std::move(tile)).first;
+        found = tiles_.emplace(key, Held{std::move(tile), inferred_of_(key)}).first;
       }
       last_key_ = key;
       last_ = &found->second;
     }
-    if (*last_ == nullptr) return std::span<const Surface>();
-    return (*last_)->Cell(CellInTile(cell));
+    return last_;
   }
 
   absl::Status LookAtCell(const Pose& T, const AlignedBox3d& around, CellIndex cell, Look& look) {
-    STRATA_ASSIGN_OR_RETURN(const std::span<const Surface> surfaces, SurfacesOf(cell));
+    STRATA_ASSIGN_OR_RETURN(const Held* const held, TilesAt(cell));
+    std::span<const Surface> surfaces;
+    if (held->measured != nullptr) surfaces = held->measured->Cell(CellInTile(cell));
     const Eigen::Vector2d low(cell.x * cell_m_, cell.y * cell_m_);
     const Eigen::Vector2d high(low.x() + cell_m_, low.y() + cell_m_);
     const Eigen::Vector2d middle = (low + high) / 2.0;
@@ -146,11 +171,31 @@ class Surroundings {
       const double bottom = surface.bottom_m() - half - query_.clearance_m;
       const double top = surface.z_m + half + query_.clearance_m;
       if (bottom > around.max().z() || top < around.min().z()) continue;
-      Touch(T, low, high, bottom, top, surface.class_id, false, look);
+      Touch(T, low, high, {.bottom = bottom, .top = top, .class_id = surface.class_id}, look);
     }
+    if (held->inferred != nullptr) LookAtInferred(T, around, cell, *held->inferred, look);
     if (!query_.unknown_blocks || seen) return absl::OkStatus();
-    Touch(T, low, high, ground, std::max(ground, around.max().z()) + 1e-3, 0, true, look);
+    const double top = std::max(ground, around.max().z()) + 1e-3;
+    Touch(T, low, high, {.bottom = ground, .top = top, .unknown = true}, look);
     return absl::OkStatus();
+  }
+
+  void LookAtInferred(const Pose& T,
+                      const AlignedBox3d& around,
+                      CellIndex cell,
+                      const InferredTile& inferred,
+                      Look& look) const {
+    const Eigen::Vector2d low(cell.x * cell_m_, cell.y * cell_m_);
+    const Eigen::Vector2d high(low.x() + cell_m_, low.y() + cell_m_);
+    const double ground = GroundAt(T, (low + high) / 2.0);
+    const std::uint32_t in_tile = CellInTile(cell);
+    for (const InferredSpan& span : inferred.Cells(in_tile, in_tile + 1)) {
+      if (span.high_m - ground <= query_.ground_m) continue;
+      const double bottom = span.low_m - kHalfThicknessM - query_.clearance_m;
+      const double top = span.high_m + kHalfThicknessM + query_.clearance_m;
+      if (bottom > around.max().z() || top < around.min().z()) continue;
+      Touch(T, low, high, {.bottom = bottom, .top = top, .inferred = true}, look);
+    }
   }
 
   // Height of the plane that the shape stands on.
@@ -164,33 +209,35 @@ class Surroundings {
   void Touch(const Pose& T,
              const Eigen::Vector2d& low,
              const Eigen::Vector2d& high,
-             double bottom,
-             double top,
-             int class_id,
-             bool unknown,
+             const Thing& thing,
              Look& look) const {
-    const double margin = unknown ? 0.0 : query_.clearance_m;
-    const AlignedBox3d box(Vector3d(low.x() - margin, low.y() - margin, bottom),
-                           Vector3d(high.x() + margin, high.y() + margin, top));
+    const double margin = thing.unknown ? 0.0 : query_.clearance_m;
+    const AlignedBox3d box(Vector3d(low.x() - margin, low.y() - margin, thing.bottom),
+                           Vector3d(high.x() + margin, high.y() + margin, thing.top));
     const std::optional<ShapeTouch> touch = body_.Touches(T, box);
     if (!touch.has_value()) return;
-    const double depth = unknown ? 0.0 : touch->depth_m;
-    if (depth < look.depth_m || (depth == look.depth_m && unknown)) return;
+    const double depth = thing.unknown ? 0.0 : touch->depth_m;
+    // Of what is as deep, what was measured is told.
+    const bool measured = !thing.unknown && !thing.inferred;
+    if (depth < look.depth_m || (depth == look.depth_m && !measured)) return;
     look.depth_m = depth;
-    look.where = unknown ? Vector3d((low.x() + high.x()) / 2, (low.y() + high.y()) / 2, bottom)
-                         : touch->where;
-    look.class_id = class_id;
-    look.unknown = unknown;
+    look.where = thing.unknown
+                     ? Vector3d((low.x() + high.x()) / 2, (low.y() + high.y()) / 2, thing.bottom)
+                     : touch->where;
+    look.class_id = thing.class_id;
+    look.unknown = thing.unknown;
+    look.inferred = thing.inferred;
   }
 
   TileOf tile_of_;
+  InferredOf inferred_of_;
   const double cell_m_;
   const ShapeQuery& query_;
   const Stop& stop_;
   const ShapeBody body_;
-  HashMap<TileKey, std::shared_ptr<const SurfaceTile>> tiles_;
+  HashMap<TileKey, Held> tiles_;
   TileKey last_key_;
-  const std::shared_ptr<const SurfaceTile>* last_ = nullptr;
+  const Held* last_ = nullptr;
 };
 
 std::string MessageOf(const ShapeCheck& check) {
@@ -198,7 +245,9 @@ std::string MessageOf(const ShapeCheck& check) {
   const ShapeContact& first = check.contacts.front();
   const std::string what = first.unknown
                                ? "is over unknown ground"
-                               : absl::StrFormat("touches something, %.3f m deep,", first.depth_m);
+                               : absl::StrFormat("touches something%s, %.3f m deep,",
+                                                 first.inferred ? " that was only inferred" : "",
+                                                 first.depth_m);
   return absl::StrFormat(
       "%s at (%.2f, %.2f, %.2f), %.2f m along the way of %.2f m; %d such stretches",
       what,
@@ -223,6 +272,7 @@ void Note(const Look& look, double along_m, bool goes_on, ShapeCheck& check) {
   contact.where = look.where;
   contact.class_id = look.class_id;
   contact.unknown = look.unknown;
+  contact.inferred = look.inferred;
 }
 
 }  // namespace
@@ -230,9 +280,10 @@ void Note(const Look& look, double along_m, bool goes_on, ShapeCheck& check) {
 absl::StatusOr<ShapeCheck> CheckShapeAlong(TileOf tile_of,
                                            double cell_size_m,
                                            const ShapeQuery& query,
-                                           const Stop& stop) {
+                                           const Stop& stop,
+                                           InferredOf inferred_of) {
   STRATA_RETURN_IF_ERROR(ValidateShapeQuery(query));
-  Surroundings around(tile_of, cell_size_m, query, stop);
+  Surroundings around(tile_of, inferred_of, cell_size_m, query, stop);
   double reach_m = 0.0;
   for (int i = 0; i < 8; ++i) {
     const Vector3d corner = around.body().bounds().corner(static_cast<AlignedBox3d::CornerType>(i));

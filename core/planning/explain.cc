@@ -42,7 +42,8 @@ class TileReasons {
       : space_(space),
         checks_(space.checks()),
         slot_(slot),
-        window_(tiles, checks_.margin, checks_.cell_size_m),
+        window_(
+            tiles, checks_.margin, checks_.cell_size_m, InferredAround(space.source(), slot.key)),
         ground_(window_, checks_, GroundChecks::Edges::kAll) {}
 
   std::uint32_t SurfaceOf(PatchId patch) const {
@@ -108,6 +109,12 @@ class TileReasons {
       const float rise =
           n == 1 ? checks_.step_m : checks_.RiseOver(n * checks_.StepLength(direction));
       const Footing met = ground_.Meet(end.cell, surface.z_m, rise);
+      if (met.above == Footing::kNone && met.inferred != Footing::kNone) {
+        end.kind = Obstruction::kObstacle;
+        end.inferred = true;
+        end.value = window_.inferred(met.inferred).high_m - surface.z_m;
+        return end;
+      }
       const bool up = met.above != Footing::kNone;
       if (up || met.below != Footing::kNone) {
         const float z = window_.surface(up ? met.above : met.below).z_m;
@@ -123,9 +130,9 @@ class TileReasons {
   }
 
   Explanation OfEdge(const GroundEdge& edge, float z) const {
-    Explanation reason = {edge.kind, edge.value, Place(edge.cell, z)};
+    Explanation reason = {edge.kind, edge.value, Place(edge.cell, z), edge.inferred};
     if (edge.kind == Obstruction::kUnknown) reason.value = ground_.HoleWidth(edge.cell, z);
-    if (edge.kind == Obstruction::kObstacle && edge.value < checks_.height_m &&
+    if (edge.kind == Obstruction::kObstacle && !edge.inferred && edge.value < checks_.height_m &&
         IsPlateau(edge.cell, edge.seen_from_m + edge.value)) {
       reason.kind = Obstruction::kStep;
     }
@@ -320,7 +327,8 @@ std::string Explanation::ToString() const {
   const std::string at = absl::StrFormat("at (%.2f, %.2f, %.2f)", where.x(), where.y(), where.z());
   if (kind == Obstruction::kUnknown && value == 0.0) return "unknown ground " + at;
   if (kind == Obstruction::kClass) return absl::StrFormat("forbidden class %.0f %s", value, at);
-  return absl::StrFormat("%s of %.2f %s %s", strata::ToString(kind), value, unit, at);
+  return absl::StrFormat(
+      "%s%s of %.2f %s %s", inferred ? "inferred " : "", strata::ToString(kind), value, unit, at);
 }
 
 absl::StatusOr<Explanation> WhyNotStand(SearchSpace& space, PatchId patch) {

@@ -21,8 +21,9 @@ struct Explanation {
   Obstruction kind = Obstruction::kNone;
   double value = 0.0;  // see Obstruction
   Eigen::Vector3d where = Eigen::Vector3d::Zero();
+  bool inferred = false;  // nobody measured it
 
-  // "step of 0.31 m at (1.05, 2.15, 0.00)".
+  // "step of 0.31 m at (1.05, 2.15, 0.00)"; "inferred obstacle of …".
   std::string ToString() const;
 };
 

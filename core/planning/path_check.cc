@@ -79,6 +79,7 @@ class Checker {
     check.where = why_.where;
     check.obstruction = why_.kind;
     check.obstruction_value = why_.value;
+    check.inferred = why_.inferred;
     return check;
   }
 

@@ -37,6 +37,7 @@ PlanResult NotOnSurface(PlanReason reason, absl::string_view end, const Endpoint
   result.where = match.reason.where;
   result.obstruction = match.reason.kind;
   result.obstruction_value = match.reason.value;
+  result.inferred = match.reason.inferred;
   result.nearest = match.nearest;
   return result;
 }
@@ -55,6 +56,7 @@ absl::Status FillRefusal(SearchSpace& space,
   result->where = why.where;
   result->obstruction = why.kind;
   result->obstruction_value = why.value;
+  result->inferred = why.inferred;
   return absl::OkStatus();
 }
 

@@ -11,7 +11,9 @@
 // costs l · (1 + danger), the mean of both ends' danger (core/planning/ground/profile_checks.h),
 // plus kGapDanger over unobserved ground. A query may bring costs of classes: a move is then
 // multiplied by the mean factor of both ends' classes, and forbidden classes are no place to stand;
-// what bounds costs without classes stays a lower bound, and nothing is prepared anew.
+// what bounds costs without classes stays a lower bound, and nothing is prepared anew. Where a
+// source has what was inferred, robots are kept out of that as well; `inferred` of queries is for
+// whoever makes sources.
 //
 // What is prepared, per tile and profile, when a query first touches a tile, and kept while it fits
 // the cache: heights, dangers and which moves there are, 6 bytes a patch to stand on and some 3 of

@@ -1,11 +1,14 @@
 #include "core/planning/tile_cache.h"
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "absl/hash/hash.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
@@ -20,6 +23,24 @@
 #include "core/planning/tile_source.h"
 
 namespace strata {
+namespace {
+
+bool HasInferred(const TileVersions& versions) {
+  return std::any_of(versions.begin(), versions.end(), [](std::uint64_t version) {
+    return (version & kWithInferred) != 0;
+  });
+}
+
+// Sources keep nothing that was prepared together with what was inferred.
+absl::StatusOr<std::optional<std::string>> LoadPrepared(TileSource& source,
+                                                        const TileKey& key,
+                                                        const TileVersions& versions,
+                                                        const RobotProfile& profile) {
+  if (HasInferred(versions)) return std::optional<std::string>();
+  return source.LoadPrepared(key, versions, profile);
+}
+
+}  // namespace
 
 // One of the few preparations at a time.
 class TileCache::Turn {
@@ -48,7 +69,13 @@ class TileCache::Turn {
 
 TileVersions VersionsAround(TileSource& source, const TileKey& key) {
   TileVersions versions;
-  for (int i = 0; i < 9; ++i) versions[i] = source.Version(Neighbour(key, i));
+  for (int i = 0; i < 9; ++i) {
+    const TileKey neighbour = Neighbour(key, i);
+    versions[i] = source.Version(neighbour);
+    const std::shared_ptr<const InferredTile> inferred = source.Inferred(neighbour);
+    if (inferred == nullptr) continue;
+    versions[i] = absl::HashOf(versions[i], inferred->version) | kWithInferred;
+  }
   return versions;
 }
 
@@ -66,29 +93,38 @@ absl::StatusOr<TileNeighbourhood> LoadAround(TileSource& source, const TileKey& 
   return tiles;
 }
 
+InferredNeighbourhood InferredAround(TileSource& source, const TileKey& key) {
+  InferredNeighbourhood tiles;
+  for (int i = 0; i < 9; ++i) tiles[i] = source.Inferred(Neighbour(key, i));
+  return tiles;
+}
+
 absl::StatusOr<std::shared_ptr<const PreparedTile>> PrepareFrom(TileSource& source,
                                                                 const TileKey& key,
                                                                 const ProfileChecks& checks,
                                                                 const ParallelLoop& loop) {
   STRATA_ASSIGN_OR_RETURN(const TileNeighbourhood tiles, LoadAround(source, key));
   if (tiles[kMiddleTile] == nullptr) return std::shared_ptr<const PreparedTile>();
-  const GroundWindow window(tiles, checks.margin, checks.cell_size_m);
+  const GroundWindow window(tiles, checks.margin, checks.cell_size_m, InferredAround(source, key));
   return std::make_shared<const PreparedTile>(
       PrepareTile(*tiles[kMiddleTile], window, checks, loop));
 }
 
-TileCache::Key TileCache::KeyOf(const TileKey& key, const ProfileChecks& checks) {
+TileCache::Key TileCache::KeyOf(const TileKey& key,
+                                const TileVersions& versions,
+                                const ProfileChecks& checks) {
   const RobotProfile& p = checks.profile;
   return {key,
-          {p.radius_m, p.height_m, p.max_step_m, p.max_slope_rad, p.max_gap_m, p.max_roughness_m}};
+          {p.radius_m, p.height_m, p.max_step_m, p.max_slope_rad, p.max_gap_m, p.max_roughness_m},
+          HasInferred(versions)};
 }
 
 absl::StatusOr<std::shared_ptr<const PreparedTile>> TileCache::Get(TileSource& source,
                                                                    const TileKey& key,
                                                                    const ProfileChecks& checks) {
+  if (source.Version(key) == 0) return nullptr;
   const TileVersions versions = VersionsAround(source, key);
-  if (versions[kMiddleTile] == 0) return nullptr;
-  const Key cache_key = KeyOf(key, checks);
+  const Key cache_key = KeyOf(key, versions, checks);
   const std::shared_ptr<Entry> entry = FindOrInsert(cache_key, versions);
   absl::MutexLock lock(&entry->mutex);
   if (entry->tile == nullptr) {
@@ -108,7 +144,7 @@ std::shared_ptr<const PreparedTile> TileCache::Unpack(TileSource& source,
                                                       const TileVersions& versions,
                                                       const ProfileChecks& checks) {
   const absl::StatusOr<std::optional<std::string>> kept =
-      source.LoadPrepared(key.tile, versions, checks.profile);
+      LoadPrepared(source, key.tile, versions, checks.profile);
   if (!kept.ok() || !kept->has_value()) return nullptr;
   absl::StatusOr<PreparedTile> tile = UnpackTile(**kept, checks.cell_size_m);
   const bool usable = tile.ok() && tile->key == key.tile;
@@ -136,11 +172,11 @@ std::shared_ptr<const LeastDangers> TileCache::FindDangers(TileSource& source,
                                                            const TileKey& key,
                                                            const TileVersions& versions,
                                                            const ProfileChecks& checks) {
-  const Key cache_key = KeyOf(key, checks);
+  const Key cache_key = KeyOf(key, versions, checks);
   std::shared_ptr<const Dangers> dangers = dangers_.Find(cache_key);
   if (dangers == nullptr || dangers->versions != versions) {
     const absl::StatusOr<std::optional<std::string>> kept =
-        source.LoadPrepared(key, versions, checks.profile);
+        LoadPrepared(source, key, versions, checks.profile);
     if (!kept.ok() || !kept->has_value()) return nullptr;
     const auto unpacked = UnpackLeastDangers(**kept, checks.cell_size_m);
     if (!unpacked.ok() || unpacked->key != key) return nullptr;
@@ -159,15 +195,15 @@ std::shared_ptr<const LeastDangers> TileCache::KeptDangers(TileSource& source,
     return std::make_shared<const LeastDangers>(all);
   }();
   static const auto open = std::make_shared<const LeastDangers>();
-  const TileVersions versions = VersionsAround(source, key);
-  if (versions[kMiddleTile] == 0) return closed;
-  std::shared_ptr<const LeastDangers> kept = FindDangers(source, key, versions, checks);
+  if (source.Version(key) == 0) return closed;
+  std::shared_ptr<const LeastDangers> kept =
+      FindDangers(source, key, VersionsAround(source, key), checks);
   return kept != nullptr ? kept : open;
 }
 
 bool TileCache::IsKept(TileSource& source, const TileKey& key, const ProfileChecks& checks) {
-  const TileVersions versions = VersionsAround(source, key);
-  return versions[kMiddleTile] != 0 && FindDangers(source, key, versions, checks) != nullptr;
+  return source.Version(key) != 0 &&
+         FindDangers(source, key, VersionsAround(source, key), checks) != nullptr;
 }
 
 std::shared_ptr<TileCache::Entry> TileCache::FindOrInsert(const Key& key,

@@ -23,13 +23,14 @@
 
 namespace strata {
 
-// Tile `index` of the TileNeighbourhood and the TileVersions of `key`.
+// Tile `index` of the neighbourhoods and the TileVersions of `key`.
 inline TileKey Neighbour(const TileKey& key, int index) {
   return {key.level, key.x + index % 3 - 1, key.y + index / 3 - 1};
 }
 TileVersions VersionsAround(TileSource& source, const TileKey& key);
 // The tiles themselves; INTERNAL if the source gives another tile than asked for.
 absl::StatusOr<TileNeighbourhood> LoadAround(TileSource& source, const TileKey& key);
+InferredNeighbourhood InferredAround(TileSource& source, const TileKey& key);
 // Prepares one tile as a cache does; nullptr where the map has nothing. Takes up to some 50 MB.
 absl::StatusOr<std::shared_ptr<const PreparedTile>> PrepareFrom(TileSource& source,
                                                                 const TileKey& key,
@@ -82,10 +83,11 @@ class TileCache {
   struct Key {
     TileKey tile;
     std::array<double, 6> profile{};
+    bool inferred = false;  // who minds what was inferred does not take the place of who does not
     friend bool operator==(const Key&, const Key&) = default;
     template <typename H>
     friend H AbslHashValue(H h, const Key& key) {
-      return H::combine(std::move(h), key.tile, key.profile);
+      return H::combine(std::move(h), key.tile, key.profile, key.inferred);
     }
   };
   struct Entry {
@@ -100,7 +102,7 @@ class TileCache {
     LeastDangers least;
   };
 
-  static Key KeyOf(const TileKey& key, const ProfileChecks& checks);
+  static Key KeyOf(const TileKey& key, const TileVersions& versions, const ProfileChecks& checks);
   // nullptr if the source does not keep the tile.
   std::shared_ptr<const LeastDangers> FindDangers(TileSource& source,
                                                   const TileKey& key,

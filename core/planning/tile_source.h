@@ -13,11 +13,14 @@
 #include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
 #include "core/world/robot_profile.h"
+#include "core/world/things/inferred_tile.h"
 
 namespace strata {
 
 // What one tile's preparation was made of: the versions of the tile and of its eight neighbours.
 using TileVersions = std::array<std::uint64_t, 9>;
+// In the version of a tile together with what was inferred in it; else it is not set.
+inline constexpr std::uint64_t kWithInferred = std::uint64_t{1} << 63;
 
 // The form of prepared tiles and of their packing. Whoever changes either raises it: what a
 // map's file keeps of an earlier one is prepared again.
@@ -42,6 +45,9 @@ class TileSource {
                                                                   const RobotProfile& /*profile*/) {
     return std::optional<std::string>();
   }
+  // What was inferred in the tile, for queries that keep robots out of it; nullptr: nothing. The
+  // tile itself need not be there.
+  virtual std::shared_ptr<const InferredTile> Inferred(const TileKey& /*key*/) { return nullptr; }
 };
 
 }  // namespace strata

@@ -36,7 +36,8 @@ struct StoredChange {
   ScanId scan;   // whose state or pose is another, or that is gone; empty trajectory: a tile
   TileKey tile;  // of level 0
   std::uint64_t version = 0;
-  bool gone = false;  // the tile
+  bool gone = false;      // the tile
+  bool inferred = false;  // neither of both, but what was inferred of things
 };
 
 struct StoredChanges {

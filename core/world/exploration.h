@@ -26,6 +26,7 @@ struct ExploreQuery {
   PlanEndpoint from;  // where the robot is
   RobotProfile profile;
   ClassCosts class_costs = {};
+  InferredAs inferred = InferredAs::kIgnore;  // on the way; what is to be learnt stays unknown
   FieldOfView sensor = {};
   double sensor_height_m = 1.0;  // over the surface that the robot stands on; in [0, 100]
   int count = 5;                 // views at most; in [1, 100]

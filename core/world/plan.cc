@@ -66,4 +66,8 @@ absl::string_view ToString(Obstruction obstruction) {
   return "unknown";
 }
 
+absl::string_view ToString(InferredAs as) {
+  return as == InferredAs::kObstacle ? "obstacle" : "ignore";
+}
+
 }  // namespace strata

@@ -39,12 +39,20 @@ inline constexpr double kForbiddenClass = std::numeric_limits<double>::infinity(
 // INVALID_ARGUMENT naming the class whose id or factor is out of range.
 absl::Status ValidateClassCosts(const ClassCosts& costs);
 
+// What nobody saw of things, by what others of their kinds look like
+// (core/world/things/inferred.h), is to a robot.
+enum class InferredAs : std::uint8_t {
+  kIgnore = 0,
+  kObstacle = 1,  // as what was measured, but nobody stands on it
+};
+
 struct PlanQuery {
   PlanEndpoint from;
   PlanEndpoint to;
   RobotProfile profile;
   ClassCosts class_costs = {};
   std::uint64_t max_expanded = 50'000'000;  // search limit
+  InferredAs inferred = InferredAs::kIgnore;
 };
 
 enum class PlanReason : std::uint8_t {
@@ -95,6 +103,7 @@ struct PlanResult {
   std::optional<Eigen::Vector3d> where;
   Obstruction obstruction = Obstruction::kNone;
   double obstruction_value = 0.0;
+  bool inferred = false;  // nobody measured it: it is there by what was inferred
   std::optional<Eigen::Vector3d> nearest;
 
   bool found() const { return reason == PlanReason::kFound; }
@@ -111,6 +120,7 @@ struct PathCheck {
   std::optional<Eigen::Vector3d> where;
   Obstruction obstruction = Obstruction::kNone;
   double obstruction_value = 0.0;
+  bool inferred = false;  // as of PlanResult
   std::uint64_t epoch = 0;
   std::uint64_t commit_sequence = 0;  // the state of the map that it is about
   std::vector<TileKey> tiles;         // that the path crosses, sorted
@@ -124,6 +134,7 @@ struct PathQuery {
   // The answer to the same question before: where nothing that it stands on changed since, it is
   // the answer again, at once.
   std::optional<PathCheck> known = std::nullopt;
+  InferredAs inferred = InferredAs::kIgnore;
 };
 
 // The longest path that is checked.
@@ -141,6 +152,8 @@ struct SurfaceColumn {
 // …
 absl::string_view ToString(PlanReason reason);
 absl::string_view ToString(Obstruction obstruction);
+// "ignore", "obstacle", as the CLI has them.
+absl::string_view ToString(InferredAs as);
 
 }  // namespace strata
 

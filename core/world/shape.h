@@ -13,6 +13,7 @@
 #include <Eigen/Geometry>
 
 #include "core/geometry/pose.h"
+#include "core/world/plan.h"
 
 namespace strata {
 
@@ -51,6 +52,7 @@ struct ShapeQuery {
   // What is no higher over the ground that the shape stands on is ground; in [0, 10].
   double ground_m = 0.15;
   bool unknown_blocks = false;  // cells below it where nothing was measured are in the way
+  InferredAs inferred = InferredAs::kIgnore;
 };
 
 // Upright along the way, turned and pitched as it leads; at a bend one pose before and one after
@@ -68,6 +70,7 @@ struct ShapeContact {
   double depth_m = 0.0;                             // there; of unknown ground 0
   int class_id = 0;                                 // of the surface there; 0: none
   bool unknown = false;                             // nothing but unknown ground
+  bool inferred = false;                            // nobody measured what is there
 };
 
 struct ShapeCheck {

@@ -71,6 +71,7 @@ Request PathToProto(absl::string_view map, const PathQuery& query) {
   }
   *proto.mutable_profile() = ToProto(query.profile);
   ClassCostsToProto(query.class_costs, *proto.mutable_class_costs());
+  proto.set_inferred(ToProto(query.inferred));
   return proto;
 }
 
@@ -84,6 +85,7 @@ absl::StatusOr<PathQuery> PathFromProto(const Request& proto) {
   query.profile = FromProto(proto.profile());
   STRATA_RETURN_IF_ERROR(ValidateRobotProfile(query.profile));
   STRATA_ASSIGN_OR_RETURN(query.class_costs, ClassCostsFromProto(proto.class_costs()));
+  STRATA_ASSIGN_OR_RETURN(query.inferred, FromProto(proto.inferred()));
   return query;
 }
 
@@ -150,6 +152,7 @@ absl::Status ReasonsFromProto(const v1::PlanPathResponse& proto, PlanResult& res
   result.reason = static_cast<PlanReason>(proto.reason() - kReasonOffset);
   result.obstruction = static_cast<Obstruction>(proto.obstruction());
   result.obstruction_value = proto.obstruction_value();
+  result.inferred = proto.inferred();
   STRATA_ASSIGN_OR_RETURN(result.where, PlaceFromProto("where", proto.has_where(), proto.where()));
   STRATA_ASSIGN_OR_RETURN(result.nearest,
                           PlaceFromProto("nearest", proto.has_nearest(), proto.nearest()));
@@ -185,6 +188,18 @@ absl::StatusOr<PlanEndpoint> EndpointFromProto(const char* what, const v1::PlanE
   return endpoint;
 }
 
+v1::InferredAs ToProto(InferredAs as) {
+  return as == InferredAs::kObstacle ? v1::INFERRED_AS_OBSTACLE : v1::INFERRED_AS_IGNORE;
+}
+
+absl::StatusOr<InferredAs> FromProto(v1::InferredAs as) {
+  if (!v1::InferredAs_IsValid(as)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("inferred: unknown value ", static_cast<int>(as)));
+  }
+  return as == v1::INFERRED_AS_OBSTACLE ? InferredAs::kObstacle : InferredAs::kIgnore;
+}
+
 v1::PlanPathRequest ToProto(absl::string_view map, const PlanQuery& query) {
   v1::PlanPathRequest proto;
   proto.set_map(std::string(map));
@@ -193,6 +208,7 @@ v1::PlanPathRequest ToProto(absl::string_view map, const PlanQuery& query) {
   *proto.mutable_profile() = ToProto(query.profile);
   proto.set_max_expanded(query.max_expanded);
   ClassCostsToProto(query.class_costs, *proto.mutable_class_costs());
+  proto.set_inferred(ToProto(query.inferred));
   return proto;
 }
 
@@ -204,6 +220,7 @@ absl::StatusOr<PlanQuery> FromProto(const v1::PlanPathRequest& proto) {
   STRATA_RETURN_IF_ERROR(ValidateRobotProfile(query.profile));
   STRATA_ASSIGN_OR_RETURN(query.class_costs, ClassCostsFromProto(proto.class_costs()));
   if (proto.has_max_expanded()) query.max_expanded = proto.max_expanded();
+  STRATA_ASSIGN_OR_RETURN(query.inferred, FromProto(proto.inferred()));
   return query;
 }
 
@@ -230,6 +247,7 @@ v1::PlanPathResponse ToProto(const PlanResult& result) {
   if (result.where.has_value()) *proto.mutable_where() = ToProto(*result.where);
   proto.set_obstruction(static_cast<v1::Obstruction>(result.obstruction));
   proto.set_obstruction_value(result.obstruction_value);
+  proto.set_inferred(result.inferred);
   if (result.nearest.has_value()) *proto.mutable_nearest() = ToProto(*result.nearest);
   return proto;
 }
@@ -288,6 +306,7 @@ v1::PathCheck ToProto(const PathCheck& check) {
   if (check.where.has_value()) *proto.mutable_where() = ToProto(*check.where);
   proto.set_obstruction(static_cast<v1::Obstruction>(check.obstruction));
   proto.set_obstruction_value(check.obstruction_value);
+  proto.set_inferred(check.inferred);
   proto.set_epoch(check.epoch);
   proto.set_commit_sequence(check.commit_sequence);
   for (const TileKey& tile : check.tiles) *proto.add_tiles() = ToProto(tile);
@@ -307,6 +326,7 @@ absl::StatusOr<PathCheck> FromProto(const v1::PathCheck& proto) {
   STRATA_ASSIGN_OR_RETURN(check.where, PlaceFromProto("where", proto.has_where(), proto.where()));
   check.obstruction = static_cast<Obstruction>(proto.obstruction());
   check.obstruction_value = proto.obstruction_value();
+  check.inferred = proto.inferred();
   check.epoch = proto.epoch();
   check.commit_sequence = proto.commit_sequence();
   for (const v1::TileKey& tile : proto.tiles()) {
@@ -426,6 +446,7 @@ v1::ExploreRequest ToProto(absl::string_view map, const ExploreQuery& query) {
   proto.set_bits_per_m(query.bits_per_m);
   proto.set_horizon(query.horizon);
   proto.set_min_bits(query.min_bits);
+  proto.set_inferred(ToProto(query.inferred));
   return proto;
 }
 
@@ -454,6 +475,7 @@ absl::StatusOr<ExploreQuery> FromProto(const v1::ExploreRequest& proto) {
   if (proto.has_bits_per_m()) query.bits_per_m = proto.bits_per_m();
   if (proto.has_horizon()) query.horizon = proto.horizon();
   if (proto.has_min_bits()) query.min_bits = proto.min_bits();
+  STRATA_ASSIGN_OR_RETURN(query.inferred, FromProto(proto.inferred()));
   STRATA_RETURN_IF_ERROR(ValidateExploreQuery(query));
   return query;
 }

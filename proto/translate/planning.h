@@ -16,6 +16,10 @@ v1::PlanEndpoint EndpointToProto(const PlanEndpoint& endpoint);
 // INVALID_ARGUMENT, named `what`, for coordinates that are not finite and a negative level.
 absl::StatusOr<PlanEndpoint> EndpointFromProto(const char* what, const v1::PlanEndpoint& endpoint);
 
+v1::InferredAs ToProto(InferredAs as);
+// INVALID_ARGUMENT for a value that is not known.
+absl::StatusOr<InferredAs> FromProto(v1::InferredAs as);
+
 v1::PlanPathRequest ToProto(absl::string_view map, const PlanQuery& query);
 v1::PlanPathResponse ToProto(const PlanResult& result);
 v1::SurfaceColumn ToProto(const SurfaceColumn& column);

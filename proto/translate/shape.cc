@@ -8,6 +8,7 @@
 
 #include "core/common/status.h"
 #include "proto/translate/geometry.h"
+#include "proto/translate/planning.h"
 
 namespace strata::translate {
 namespace {
@@ -69,6 +70,7 @@ v1::CheckShapeRequest ToProto(absl::string_view map, const ShapeQuery& query) {
   proto.set_clearance_m(query.clearance_m);
   proto.set_ground_m(query.ground_m);
   proto.set_unknown_blocks(query.unknown_blocks);
+  proto.set_inferred(ToProto(query.inferred));
   return proto;
 }
 
@@ -88,6 +90,7 @@ absl::StatusOr<ShapeQuery> FromProto(const v1::CheckShapeRequest& proto) {
   query.clearance_m = proto.clearance_m();
   if (proto.has_ground_m()) query.ground_m = proto.ground_m();
   query.unknown_blocks = proto.unknown_blocks();
+  STRATA_ASSIGN_OR_RETURN(query.inferred, FromProto(proto.inferred()));
   STRATA_RETURN_IF_ERROR(ValidateShapeQuery(query));
   return query;
 }
@@ -106,6 +109,7 @@ v1::CheckShapeResponse ToProto(const ShapeCheck& check) {
     out.set_depth_m(contact.depth_m);
     out.set_class_id(contact.class_id);
     out.set_unknown(contact.unknown);
+    out.set_inferred(contact.inferred);
   }
   proto.set_looks(check.looks);
   proto.set_elapsed_ms(check.elapsed_ms);
@@ -127,6 +131,7 @@ absl::StatusOr<ShapeCheck> FromProto(const v1::CheckShapeResponse& proto) {
     contact.depth_m = in.depth_m();
     contact.class_id = in.class_id();
     contact.unknown = in.unknown();
+    contact.inferred = in.inferred();
   }
   check.looks = proto.looks();
   check.elapsed_ms = proto.elapsed_ms();

@@ -96,6 +96,7 @@ v1::WatchMapResponse ToProto(const api::MapUpdate& update) {
   proto.set_epoch(update.epoch);
   proto.set_epoch_reason(update.epoch_reason);
   proto.set_whole(update.whole);
+  proto.set_inferred(update.inferred);
   for (const api::ScanChange& scan : update.scans) *proto.add_scans() = ToProto(scan);
   for (const api::TileChangeNotice& tile : update.tiles) *proto.add_tiles() = ToProto(tile);
   return proto;
@@ -107,6 +108,7 @@ absl::StatusOr<api::MapUpdate> FromProto(const v1::WatchMapResponse& proto) {
   update.epoch = proto.epoch();
   update.epoch_reason = proto.epoch_reason();
   update.whole = proto.whole();
+  update.inferred = proto.inferred();
   for (const v1::ScanChange& scan : proto.scans()) {
     STRATA_ASSIGN_OR_RETURN(api::ScanChange added, FromProto(scan));
     update.scans.push_back(std::move(added));

@@ -64,6 +64,7 @@ void MapWatchReactor::AddParts(const api::MapUpdate& update) {
     if (scans_added == 0 && tiles_added == 0) {
       part.epoch_reason = update.epoch_reason;
       part.whole = update.whole;
+      part.inferred = update.inferred;
     }
     part.scans = next(update.scans, scans_added);
     part.tiles = next(update.tiles, tiles_added);

@@ -33,3 +33,8 @@ strata_executable(
   SOURCES explore.cc
   DEPS strata::occupancy strata::test_support strata::test_recordings
 )
+strata_executable(
+  explore_stool explore_stool
+  SOURCES explore_stool.cc
+  DEPS strata::occupancy strata::simulator strata::test_support CLI11::CLI11
+)

@@ -63,6 +63,7 @@ RESULTS = {
                      "/usr/bin/python3 tests/experiments/localisation.py --build {build}", ("core",)),
     "hidden_windows": ("Thesis, 11.3: windows that a tree hides", "experiments/hidden_windows --seed 40009711",
                        ("core/completion", "core/engine/objects")),
+    "stool": ("Thesis, 4.4.2: a piano stool explored by a manipulator", "experiments/explore_stool", ("core/occupancy",)),
     "explore": ("Where to look next, on recorded drives", "experiments/explore", ("core/occupancy",)),
     "posegraphs": ("Recorded pose graphs", "/usr/bin/python3 tests/experiments/pose_graphs.py --build {build}",
                    ("core/posegraph", "client/formats")),

@@ -106,8 +106,8 @@ strata_library(
 # archive: a linker leaves out of an archive what nobody calls.
 add_library(
   strata_database_suite OBJECT
-  database_suite/database_suite.cc database_suite/classes.cc database_suite/jobs.cc database_suite/maps.cc database_suite/models.cc database_suite/kinds.cc database_suite/objects.cc database_suite/planning.cc
-  database_suite/posegraph.cc database_suite/scans.cc database_suite/tiles.cc database_suite/watch.cc
+  database_suite/database_suite.cc database_suite/classes.cc database_suite/jobs.cc database_suite/maps.cc database_suite/models.cc database_suite/inferred.cc database_suite/kinds.cc database_suite/objects.cc database_suite/planning.cc
+  database_suite/posegraph.cc database_suite/scans.cc database_suite/things.cc database_suite/tiles.cc database_suite/watch.cc
   database_suite/worlds.cc
 )
 add_library(strata::database_suite ALIAS strata_database_suite)

@@ -419,10 +419,61 @@ async function testObjects(server, browser) {
   const boxes = () => page.evaluate(() => (strata.stage.overlay.children.find(({ name }) => name === "objects")?.geometry.attributes.position.count ?? 0) / 24);
   const listed = JSON.parse(told).entities.length;
   await within(5000, `${listed} boxes, as many as the CLI lists`, async () => listed > 0 && (await boxes()) === listed);
-  if (await layerSwitch(page, "inferred")) await press(page, '#switches input[data-layer="inferred"]');
-  console.log(`     inferred: ${await page.evaluate("strata.counts.inferred")}`);
   await drawn(page);
   await picture(page, "objects");
+  await page.close();
+}
+
+// The sides and the top of a block, of which no point is beyond `most` along x; labelled, as PLY.
+function writeBlock(file, low, most) {
+  const lines = [];
+  for (let x = 0; x <= 16; ++x) for (let y = 0; y <= 12; ++y) for (let z = 0; z <= 18; ++z) {
+    if (!(x % 16 && y % 12 && z < 18) && x <= most) lines.push(`${low[0] + x / 20} ${low[1] + y / 20} ${0.1 + z / 20} 2`);
+  }
+  fs.writeFileSync(file, ["ply", "format ascii 1.0", `element vertex ${lines.length}`, ...["x", "y", "z"].map((axis) => `property float ${axis}`), "property ushort label", "end_header", ...lines, ""].join("\n"));
+}
+
+// Two blocks, of one of which nobody saw a part: it is drawn when one says so, hatched, and goes with the scan that it is from.
+async function testInferred(server, browser) {
+  const files = ["whole", "part"].map((name) => path.join(work, `${name}.ply`));
+  writeBlock(files[0], [2, 2], 16);
+  writeBlock(files[1], [2, -3], 10);
+  server.strata("map", "create", "halves");
+  for (const file of files) server.strata("scan", "import", "halves", file, "--trajectory", path.basename(file, ".ply"), "--align", "off", "--wait");
+  const page = await open(browser, `${server.url}#map=halves`);
+  expect(!(await layerSwitch(page, "inferred")), "what was inferred, of which there is nothing, has no switch");
+  for (const kind of ["objects", "complete"]) server.strata("job", "start", "halves", kind, "--wait");
+  await within(20000, "it has one once there is something", () => layerSwitch(page, "inferred"));
+  const places = () => page.evaluate(() => strata.stage.overlay.children.find(({ name }) => name === "inferred")?.geometry.attributes.position.count ?? 0);
+  expect((await places()) === 0, "which is off");
+  const told = JSON.parse(server.strata("--output", "json", "objects", "export", "halves", path.join(work, "inferred.ply"), "--inferred"));
+  await press(page, '#switches input[data-layer="inferred"]');
+  await within(5000, `${told.points} places, as many as the CLI exports`, async () => told.points > 100 && (await places()) === told.points);
+  await drawn(page);
+  await page.evaluate(() => { // what is on the screen, as numbers
+    strata.look = () => {
+      const { canvas } = strata.stage;
+      strata.stage.draw();
+      const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
+      copy.drawImage(canvas, 0, 0);
+      return copy.getImageData(0, 0, canvas.width, canvas.height);
+    };
+    strata.seen = strata.look();
+  });
+  await picture(page, "inferred");
+  await press(page, '#switches input[data-layer="inferred"]');
+  await drawn(page);
+  const { changed, onLines } = await page.evaluate(() => {
+    const { data, width, height } = strata.look();
+    const all = Array.from({ length: width * height }, (_, i) => i);
+    const others = all.filter((i) => [0, 1, 2].some((c) => data[4 * i + c] !== strata.seen.data[4 * i + c]));
+    const lines = others.filter((i) => ((i % width) - Math.floor(i / width) + height + 8 * height) % 8 >= 4);
+    return { changed: others.length, onLines: lines.length };
+  });
+  expect(changed > 100 && onLines > 0.95 * changed, `it is drawn, hatched: ${changed} pixels, ${onLines} on every other stripe`);
+  await press(page, '#switches input[data-layer="inferred"]');
+  server.strata("scan", "delete", "halves", "whole/0", "--yes");
+  await within(20000, "it goes with the scan that it is from, on the open page", async () => !(await layerSwitch(page, "inferred")) && (await places()) === 0);
   await page.close();
 }
 
@@ -590,6 +641,7 @@ try {
     await testPanels(server, page);
   }
   await testObjects(server, browser);
+  await testInferred(server, browser);
   await page.bringToFront();
   await testMeasure(page);
   await testTouchAndKeys(page);

@@ -48,7 +48,8 @@ void Print(const api::MapUpdate& update, Output& output) {
                            " epoch ",
                            update.epoch,
                            reason ? " " + update.epoch_reason : "",
-                           update.whole ? ", everything there is:" : ""));
+                           update.whole ? ", everything there is:" : "",
+                           update.inferred ? ", what is inferred may be another" : ""));
   for (const api::ScanChange& scan : update.scans) output.Text("  " + TextOf(scan));
   for (const api::TileChangeNotice& tile : update.tiles) output.Text("  " + TextOf(tile));
 }

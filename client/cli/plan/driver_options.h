@@ -18,12 +18,13 @@ struct DriverOptions {
   std::string profile = std::string(api::kDefaultProfile);
   ProfileOverrides overrides;
   std::vector<std::string> avoid;  // CLASS=FACTOR or CLASS=never
+  InferredAs inferred = InferredAs::kIgnore;
 };
 
 // X,Y or X,Y,Z.
 PlanEndpoint EndpointOf(const std::vector<double>& numbers);
 
-// --profile, those of AddProfileOptions, --avoid.
+// --profile, those of AddProfileOptions, --avoid, --inferred.
 void AddDriverOptions(CLI::App* verb, DriverOptions& options);
 
 // The map's profile of that name with what is overridden. NOT_FOUND.

@@ -59,6 +59,7 @@ absl::Status Explore(Context& context, ExploreOptions options) {
   STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options.map, options.driver));
   STRATA_ASSIGN_OR_RETURN(options.query.class_costs,
                           ClassCostsOf(context, options.map, options.driver));
+  options.query.inferred = options.driver.inferred;
   context.output.Talk("looking at what the map's scans saw …");
   STRATA_ASSIGN_OR_RETURN(
       const ExploreResult result,

@@ -27,6 +27,7 @@ absl::StatusOr<PathQuery> QueryOf(Context& context, const PathOptions& options) 
   STRATA_ASSIGN_OR_RETURN(query.waypoints, ReadPath(options.file));
   STRATA_ASSIGN_OR_RETURN(query.profile, ProfileOf(context, options.map, options.driver));
   STRATA_ASSIGN_OR_RETURN(query.class_costs, ClassCostsOf(context, options.map, options.driver));
+  query.inferred = options.driver.inferred;
   return query;
 }
 
@@ -41,7 +42,8 @@ absl::Status Check(Context& context, const PathOptions& options) {
   }
   STRATA_ASSIGN_OR_RETURN(
       const ShapeCheck shape,
-      CheckShape(context, options.map, options.shape, query.profile, query.waypoints));
+      CheckShape(
+          context, options.map, options.shape, query.profile, query.inferred, query.waypoints));
   if (!context.output.text()) json["shape"] = ToJson(shape);
   context.output.Object(json);
   if (context.output.text()) PrintText(shape, context.output);

@@ -129,6 +129,12 @@ void TellOfGap(const PlanResult& plan, const RobotProfile& profile, Output& outp
                               std::ceil(gap_m * kCentimetres) / kCentimetres));
 }
 
+// That nothing is inferred, or of which epoch it is, which whoever minds it should know.
+void TellOfInferred(const PlanResult& plan, InferredAs inferred, Output& output) {
+  if (inferred == InferredAs::kIgnore || !absl::StartsWith(plan.message, "found; ")) return;
+  output.Talk(plan.message);
+}
+
 absl::Status WritePlan(const std::string& file, const std::vector<Eigen::Vector3d>& waypoints) {
   if (!absl::EndsWith(file, ".mcap")) return WritePath(file, waypoints);
   FoxgloveScene scene;
@@ -141,6 +147,7 @@ absl::Status PlanOne(Context& context, PlanOptions options) {
   STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options.map, options.driver));
   STRATA_ASSIGN_OR_RETURN(options.query.class_costs,
                           ClassCostsOf(context, options.map, options.driver));
+  options.query.inferred = options.driver.inferred;
   options.query.from.level = options.from_level;
   options.query.to.level = options.to_level;
   STRATA_ASSIGN_OR_RETURN(
@@ -153,15 +160,24 @@ absl::Status PlanOne(Context& context, PlanOptions options) {
   STRATA_ASSIGN_OR_RETURN(const std::optional<LocalFrame> earth, EarthOf(context, options.map));
   std::optional<ShapeCheck> shape;
   if (options.shape.given() && plan.found()) {
-    STRATA_ASSIGN_OR_RETURN(
-        shape,
-        CheckShape(context, options.map, options.shape, options.query.profile, plan.waypoints));
+    STRATA_ASSIGN_OR_RETURN(shape,
+                            CheckShape(context,
+                                       options.map,
+                                       options.shape,
+                                       options.query.profile,
+                                       options.query.inferred,
+                                       plan.waypoints));
   }
   Print(plan, earth, shape, context.output);
   if (context.output.text()) TellOfGap(plan, options.query.profile, context.output);
+  TellOfInferred(plan, options.query.inferred, context.output);
   if (!options.watch || !plan.found()) return absl::OkStatus();
-  return FollowPath(
-      context, options.map, {plan.waypoints, options.query.profile, options.query.class_costs});
+  return FollowPath(context,
+                    options.map,
+                    {.waypoints = plan.waypoints,
+                     .profile = options.query.profile,
+                     .class_costs = options.query.class_costs,
+                     .inferred = options.query.inferred});
 }
 
 // A query that was refused, with the keys of an answer.
@@ -179,6 +195,7 @@ absl::Status PlanMany(Context& context, PlanOptions options) {
   STRATA_ASSIGN_OR_RETURN(options.query.profile, ProfileOf(context, options.map, options.driver));
   STRATA_ASSIGN_OR_RETURN(options.query.class_costs,
                           ClassCostsOf(context, options.map, options.driver));
+  options.query.inferred = options.driver.inferred;
   STRATA_ASSIGN_OR_RETURN(const std::optional<LocalFrame> earth, EarthOf(context, options.map));
   absl::Status first_error;
   for (const std::vector<double>& row : rows) {

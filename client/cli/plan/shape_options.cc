@@ -95,6 +95,7 @@ absl::StatusOr<ShapeCheck> CheckShape(Context& context,
                                       const std::string& map,
                                       const ShapeOptions& options,
                                       const RobotProfile& profile,
+                                      InferredAs inferred,
                                       const std::vector<Eigen::Vector3d>& waypoints) {
   ShapeQuery query;
   STRATA_ASSIGN_OR_RETURN(query.shape, ShapeOf(options));
@@ -102,6 +103,7 @@ absl::StatusOr<ShapeCheck> CheckShape(Context& context,
   query.clearance_m = options.clearance_m;
   query.ground_m = profile.max_step_m;
   query.unknown_blocks = options.unknown == "blocked";
+  query.inferred = inferred;
   STRATA_RETURN_IF_ERROR(ValidateShapeQuery(query));
   return context.database.planning().CheckShape(context.call, map, query);
 }
@@ -114,7 +116,8 @@ Json ToJson(const ShapeCheck& check) {
                         {"where", ToJson(contact.where)},
                         {"depth_m", contact.depth_m},
                         {"class_id", contact.class_id},
-                        {"unknown", contact.unknown}});
+                        {"unknown", contact.unknown},
+                        {"inferred", contact.inferred}});
   }
   return {{"free", check.free},
           {"message", check.message},
@@ -132,10 +135,11 @@ void PrintText(const ShapeCheck& check, Output& output) {
   for (std::size_t i = 0; i < shown; ++i) {
     const ShapeContact& contact = check.contacts[i];
     output.Text(absl::StrFormat(
-        "  %.2f to %.2f m: %s at %.2f, %.2f, %.2f",
+        "  %.2f to %.2f m: %s%s at %.2f, %.2f, %.2f",
         contact.from_m,
         contact.to_m,
         contact.unknown ? "unknown ground" : absl::StrFormat("%.3f m deep", contact.depth_m),
+        contact.inferred ? ", only inferred," : "",
         contact.where.x(),
         contact.where.y(),
         contact.where.z()));

@@ -36,6 +36,7 @@ absl::StatusOr<ShapeCheck> CheckShape(Context& context,
                                       const std::string& map,
                                       const ShapeOptions& options,
                                       const RobotProfile& profile,
+                                      InferredAs inferred,
                                       const std::vector<Eigen::Vector3d>& waypoints);
 
 Json ToJson(const ShapeCheck& check);

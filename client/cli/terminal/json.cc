@@ -217,6 +217,7 @@ Json ToJson(const PlanResult& plan) {
   if (plan.obstruction != Obstruction::kNone) {
     json["obstruction"] = std::string(strata::ToString(plan.obstruction));
     json["obstruction_value"] = plan.obstruction_value;
+    json["inferred"] = plan.inferred;
   }
   if (plan.where.has_value()) json["where"] = ToJson(*plan.where);
   if (plan.nearest.has_value()) json["nearest"] = ToJson(*plan.nearest);
@@ -236,6 +237,7 @@ Json ToJson(const PathCheck& check) {
   if (check.obstruction != Obstruction::kNone) {
     json["obstruction"] = std::string(strata::ToString(check.obstruction));
     json["obstruction_value"] = check.obstruction_value;
+    json["inferred"] = check.inferred;
   }
   if (check.where.has_value()) json["where"] = ToJson(*check.where);
   return json;

@@ -75,7 +75,8 @@ Json ToJson(const api::MapUpdate& update) {
           {"epoch", update.epoch},
           {"epoch_reason", update.epoch_reason},
           {"scans", scans},
-          {"tiles", tiles}};
+          {"tiles", tiles},
+          {"inferred", update.inferred}};
 }
 
 Json ToJson(const Matrix6d& matrix) {

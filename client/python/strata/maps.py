@@ -94,6 +94,8 @@ class Change:
     """Version of the content; None of a tile that is gone."""
     whole: bool
     """This and what follows is all there is: what was known before is void."""
+    inferred: bool = False
+    """What Map.inferred() gives may be another than before."""
 
 
 def stats_from_proto(s: maps_pb2.MapStats) -> Stats:
@@ -116,7 +118,8 @@ def change_from_proto(answer: maps_pb2.WatchMapResponse) -> Change:
     scans = [ScanChange(change.id.trajectory, change.id.sequence, scan.state_name(change.state),
                         poses.from_proto(change.pose), change.gone) for change in answer.scans]
     tiles = {key_from_proto(tile.key): None if tile.gone else tile.version for tile in answer.tiles}
-    return Change(answer.commit_sequence, answer.epoch, answer.epoch_reason, scans, tiles, answer.whole)
+    return Change(answer.commit_sequence, answer.epoch, answer.epoch_reason, scans, tiles, answer.whole,
+                  answer.inferred)
 
 
 def origin_from_proto(parameters: maps_pb2.MapParameters) -> tuple[float, float, float] | None:

@@ -39,6 +39,8 @@ class Path:
     """How much of it [m, or rad of a slope]."""
     nearest: Array | None
     """(3,) start or goal not on a surface: the nearest place where this robot could stand."""
+    inferred: bool = False
+    """Nobody measured what is there: it was inferred."""
 
     def __bool__(self) -> bool:
         return self.reason == "found"
@@ -70,7 +72,8 @@ def from_proto(message: planning_pb2.PlanPathResponse) -> Path:
         where=_maybe(message, "where"),
         obstruction=_obstruction(message.obstruction),
         obstruction_value=message.obstruction_value,
-        nearest=_maybe(message, "nearest"))
+        nearest=_maybe(message, "nearest"),
+        inferred=message.inferred)
 
 
 def endpoint(place: ArrayLike) -> planning_pb2.PlanEndpoint:
@@ -126,6 +129,8 @@ class PathCheck:
     """The state of the map that the answer is of."""
     proto: planning_pb2.PathCheck = dataclasses.field(repr=False, compare=False)
     """As it came; for check_path(known=…)."""
+    inferred: bool = False
+    """Nobody measured what is there: it was inferred."""
 
     def __bool__(self) -> bool:
         return self.valid
@@ -136,7 +141,14 @@ def check_from_proto(message: planning_pb2.PathCheck) -> PathCheck:
         valid=message.valid, message=message.message, valid_length=message.valid_m, length=message.length_m,
         where=_maybe(message, "where"), obstruction=_obstruction(message.obstruction),
         obstruction_value=message.obstruction_value, epoch=message.epoch, commit_sequence=message.commit_sequence,
-        proto=message)
+        proto=message, inferred=message.inferred)
+
+
+def inferred_as(word: str) -> planning_pb2.InferredAs:
+    """"ignore" or "obstacle"."""
+    if word not in ("ignore", "obstacle"):
+        raise ValueError(f"inferred {word!r}; expected 'ignore' or 'obstacle'")
+    return planning_pb2.INFERRED_AS_OBSTACLE if word == "obstacle" else planning_pb2.INFERRED_AS_IGNORE
 
 
 def waypoints(way: Path | ArrayLike) -> list[geometry_pb2.Vector3]:

@@ -25,6 +25,8 @@ class Contact:
     """Of the surface there; 0: none."""
     unknown: bool
     """Nothing but unknown ground."""
+    inferred: bool = False
+    """Nobody measured what is there: it was inferred."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -115,6 +117,6 @@ def from_proto(message: planning_pb2.CheckShapeResponse) -> ShapeCheck:
         free_length=message.free_m,
         length=message.length_m,
         contacts=[Contact(begin=c.from_m, end=c.to_m, where=poses.array3(c.where), depth=c.depth_m, class_id=c.class_id,
-                          unknown=c.unknown) for c in message.contacts],
+                          unknown=c.unknown, inferred=c.inferred) for c in message.contacts],
         looks=message.looks,
         epoch=message.epoch)

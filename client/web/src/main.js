@@ -30,9 +30,9 @@ const hover = (state.hover = new Hover(stage));
 const switches = new Switches(el("switches"));
 const jobs = new Jobs(() => layersSoon());
 
-function showState({ scans, epoch } = {}) {
+function showState({ scans, epoch, inferred } = {}) {
   if (!view) return;
-  if (scans || epoch) layersSoon();
+  if (scans || epoch || inferred) layersSoon();
   const levels = [...new Set(view.shown().map(({ decoded }) => decoded.level))].sort((a, b) => a - b);
   const detail = levels.length > 1 || levels[0] ? `, levels of detail ${levels.join(" ")}` : "";
   el("state").textContent = `${view.shown().length} tiles, ${view.surfaces().toLocaleString("en")} surfaces, epoch ${view.epoch ?? "0"}${detail}`;

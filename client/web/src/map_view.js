@@ -16,7 +16,7 @@ const decoder = new Decoder();
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 
 export class MapView {
-  // `changed` is called when anything has, with {scans, epoch} of what else has; `told` with what a
+  // `changed` is called when anything has, with {scans, epoch, inferred} of what else has; `told` with what a
   // person should know.
   constructor(name, stage, { changed, told, painter }) {
     Object.assign(this, { name, stage, changed, told, painter });
@@ -211,7 +211,7 @@ export class MapView {
           const fresh = this.newOf(news.tiles ?? []);
           if (fresh.length) this.newsAt = Date.now();
           if (fresh.length) await this.sync(fresh);
-          this.changed({ scans: news.scans?.length > 0, epoch });
+          this.changed({ scans: news.scans?.length > 0, epoch, inferred: Boolean(news.inferred) });
         }
       } catch (error) {
         if (!watch.signal.aborted && error.code !== "unauthenticated") this.told(`${error.message}; trying again`);

@@ -31,6 +31,7 @@ absl::StatusOr<std::optional<api::MapUpdate>> MapWatcher::Next(const MapState& s
   update.commit_sequence = changes.last;
   update.epoch = state.view().epoch;
   update.whole = since_ == 0 || !changes.complete;
+  update.inferred = !update.whole && changes.inferred > since_;
   const bool same = changes.scans.empty() && changes.tiles.empty() && since_ <= changes.last &&
                     (epoch_ == 0 || epoch_ == update.epoch);
   if (!same || !changes.complete) {  // a thousand idle watchers ask ten times a second

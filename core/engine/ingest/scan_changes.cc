@@ -33,8 +33,10 @@ absl::Status Integrator::DeleteScan(const ScanId& id) {
                           TilesWithout(*reader, {tiles.begin(), tiles.end()}, number));
   STRATA_ASSIGN_OR_RETURN(change.version, NextVersion());
   STRATA_RETURN_IF_ERROR(MakeServed(*reader, change, core_.options().worker_threads));
-  STRATA_RETURN_IF_ERROR(
-      Commit(change, {id}, [&](StorageWriter& writer) { return writer.DeleteScan(number); }));
+  STRATA_RETURN_IF_ERROR(Commit(change, {id}, [&](StorageWriter& writer) -> absl::Status {
+    STRATA_RETURN_IF_ERROR(core_.NoteInferredIfAny(writer.reader()));
+    return writer.DeleteScan(number);
+  }));
   aligner_loaded_ = false;
   return absl::OkStatus();
 }

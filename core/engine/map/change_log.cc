@@ -14,7 +14,9 @@ ChangeSet ChangesOf(const StoredChanges& stored, std::uint64_t last) {
   set.complete = stored.complete;
   set.last = last;
   for (const StoredChange& change : stored.changes) {
-    if (change.scan.trajectory.empty()) {
+    if (change.inferred) {
+      set.inferred = change.commit_sequence;
+    } else if (change.scan.trajectory.empty()) {
       set.tiles[change.tile] = {change.tile, change.version, change.gone};
     } else {
       set.scans.insert(change.scan);
@@ -32,8 +34,10 @@ void ChangeLog::Append(Change change) {
 
 void ChangeLog::Add(std::uint64_t commit_sequence,
                     const std::vector<ScanId>& scans,
-                    const std::vector<api::TileChangeNotice>& tiles) {
+                    const std::vector<api::TileChangeNotice>& tiles,
+                    bool inferred) {
   absl::MutexLock lock(&mutex_);
+  if (inferred) inferred_ = std::max(inferred_, commit_sequence);
   for (const ScanId& scan : scans) Append({commit_sequence, scan, {}});
   for (const api::TileChangeNotice& tile : tiles) Append({commit_sequence, {}, tile});
   last_ = std::max(last_, commit_sequence);
@@ -43,6 +47,7 @@ ChangeSet ChangeLog::Since(std::uint64_t commit_sequence) const {
   ChangeSet set;
   absl::MutexLock lock(&mutex_);
   set.last = last_;
+  set.inferred = inferred_;
   set.complete = commit_sequence >= floor_;
   if (!set.complete) return set;
   const auto first = std::upper_bound(
@@ -63,6 +68,11 @@ ChangeSet ChangeLog::Since(std::uint64_t commit_sequence) const {
 std::uint64_t ChangeLog::last() const {
   absl::MutexLock lock(&mutex_);
   return last_;
+}
+
+std::uint64_t ChangeLog::inferred() const {
+  absl::MutexLock lock(&mutex_);
+  return inferred_;
 }
 
 absl::Status ChangeLog::Await(std::uint64_t commit_sequence, const Stop& stop) const {

@@ -25,6 +25,9 @@ struct ChangeSet {
   std::uint64_t last = 0;  // commit sequence of the newest one
   std::set<ScanId> scans;  // whose state or pose is another
   std::map<TileKey, api::TileChangeNotice> tiles;  // of level 0
+  // Commit sequence of the newest change of what is inferred, perhaps none of this set; 0: the log
+  // knows of none.
+  std::uint64_t inferred = 0;
 };
 
 // What the store says that changed up to commit `last`.
@@ -40,10 +43,13 @@ class ChangeLog {
   // every call before: whoever knows a number is told of later ones only.
   void Add(std::uint64_t commit_sequence,
            const std::vector<ScanId>& scans,
-           const std::vector<api::TileChangeNotice>& tiles);
+           const std::vector<api::TileChangeNotice>& tiles,
+           bool inferred = false);
   ChangeSet Since(std::uint64_t commit_sequence) const;
   // The newest number.
   std::uint64_t last() const;
+  // As ChangeSet::inferred: while it stays, what is inferred stays.
+  std::uint64_t inferred() const;
   // Returns once there is something newer; CANCELLED, DEADLINE_EXCEEDED; the status of Close().
   absl::Status Await(std::uint64_t commit_sequence, const Stop& stop) const;
   // Nothing more comes: whoever waits for it, or will, gets `why`.
@@ -63,6 +69,7 @@ class ChangeLog {
   std::deque<Change> changes_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t floor_ ABSL_GUARDED_BY(mutex_);  // changes after it are all here
   std::uint64_t last_ ABSL_GUARDED_BY(mutex_);
+  std::uint64_t inferred_ ABSL_GUARDED_BY(mutex_) = 0;
   absl::Status closed_ ABSL_GUARDED_BY(mutex_);
 };
 

@@ -35,13 +35,15 @@ namespace {
 
 std::vector<StoredChange> StoredChangesOf(std::uint64_t commit_sequence,
                                           const std::vector<ScanId>& scans,
-                                          const std::vector<api::TileChangeNotice>& tiles) {
+                                          const std::vector<api::TileChangeNotice>& tiles,
+                                          bool inferred) {
   std::vector<StoredChange> changes;
-  changes.reserve(scans.size() + tiles.size());
-  for (const ScanId& scan : scans) changes.push_back({commit_sequence, scan, {}, 0, false});
+  changes.reserve(scans.size() + tiles.size() + 1);
+  for (const ScanId& scan : scans) changes.push_back({commit_sequence, scan, {}, 0, false, false});
   for (const api::TileChangeNotice& tile : tiles) {
-    changes.push_back({commit_sequence, {}, tile.key, tile.version, tile.gone});
+    changes.push_back({commit_sequence, {}, tile.key, tile.version, tile.gone, false});
   }
+  if (inferred) changes.push_back({commit_sequence, {}, {}, 0, false, true});
   return changes;
 }
 
@@ -158,7 +160,8 @@ absl::Status MapCore::Publish(const std::vector<ScanId>& scans,
     // and whoever knows a number is told of later ones only.
     STRATA_RETURN_IF_ERROR(writer.NextCommitSequence().status());
     STRATA_ASSIGN_OR_RETURN(clock, writer.reader().GetClock());
-    return writer.PutChanges(StoredChangesOf(clock.commit_sequence, scans, tiles));
+    return writer.PutChanges(
+        StoredChangesOf(clock.commit_sequence, scans, tiles, inferred_changes_));
   };
   const auto show = [&] { Show(clock, scans, tiles); };
   ++in_publication_;
@@ -183,7 +186,14 @@ void MapCore::Show(const MapClock& clock,
                    const std::vector<api::TileChangeNotice>& tiles) {
   absl::MutexLock lock(&publishing_);
   snapshots_.Publish({clock.epoch, clock.tile_version});
-  changes_.Add(clock.commit_sequence, scans, tiles);
+  changes_.Add(clock.commit_sequence, scans, tiles, inferred_changes_);
+  inferred_changes_ = false;  // on the writer's thread, as where it is noted
+}
+
+absl::Status MapCore::NoteInferredIfAny(StorageReader& reader) {
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t job, reader.JobOfInferred());
+  if (job != 0) NoteInferred();
+  return absl::OkStatus();
 }
 
 std::uint64_t MapCore::NextUpload() {

@@ -85,6 +85,11 @@ class MapCore {
   std::uint64_t edits() const { return edits_; }
   // After the edit was committed, if it was.
   void NoteEdit() { ++edits_; }
+  // In the work of a Publish(): what is inferred may be another with it, of which watchers are
+  // told.
+  void NoteInferred() { inferred_changes_ = true; }
+  // The same before it takes something away, where there is something.
+  absl::Status NoteInferredIfAny(StorageReader& reader);
   // A prepared tile that the store keeps is damaged.
   void NoteUnreadable(const TileKey& key);
   // Those noted since the last call.
@@ -136,6 +141,7 @@ class MapCore {
   std::atomic<int> in_publication_ = 0;  // committed perhaps, and not shown
   std::atomic<bool> tiles_staged_ = false;
   std::atomic<std::uint64_t> edits_ = 0;
+  std::atomic<bool> inferred_changes_ = false;  // since the last Show()
 };
 
 }  // namespace strata

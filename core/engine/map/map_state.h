@@ -52,6 +52,7 @@ class MapState {
         now_(std::move(changes), std::nullopt) {}
   MapState(MapState&&) = delete;
 
+  bool open_here() const { return core_ != nullptr; }
   const MapView& view() const { return core_ != nullptr ? now_.second->view() : view_; }
   // Changes of which those that this state shows are the last.
   const ChangeSet& changes() const { return now_.first; }

@@ -15,6 +15,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "core/common/status.h"
 #include "core/completion/inferred_codec.h"
@@ -183,7 +184,9 @@ absl::Status ForgetDeleted(StorageReader& reader, Inferred& inferred) {
 }
 
 absl::Status KeepInferred(MapCore& core, Inferred& inferred, const Stop& stop) {
-  return core.writer().Run(Durability::kFull, 0, stop, [&](StorageWriter& writer) -> absl::Status {
+  return core.Publish({}, {}, true, [&](StorageWriter& writer) -> absl::Status {
+    STRATA_RETURN_IF_ERROR(stop.status());
+    core.NoteInferred();
     const std::uint64_t job = inferred.info.job;
     STRATA_RETURN_IF_ERROR(ForgetDeleted(writer.reader(), inferred));
     STRATA_RETURN_IF_ERROR(writer.DeleteInferred());
@@ -258,16 +261,25 @@ absl::StatusOr<std::uint64_t> JobOfKeptInferred(const MapState& state) {
       "nothing is inferred; objects complete (job complete) does so after objects find");
 }
 
-// Which entities a query takes.
+// Which entities a query takes, wherever they are: what nobody saw of one may be outside of its
+// box.
 absl::StatusOr<absl::btree_set<std::uint64_t>> EntitiesAskedFor(const MapState& state,
-                                                                const EntityQuery& query,
+                                                                EntityQuery query,
                                                                 const Stop& stop) {
+  query.region.reset();
   absl::btree_set<std::uint64_t> asked;
   STRATA_RETURN_IF_ERROR(ReadEntities(state, query, stop, [&](const Entity& entity) {
                            asked.insert(entity.id);
                            return absl::OkStatus();
                          }).status());
   return asked;
+}
+
+bool ReachesInto(const std::optional<Eigen::AlignedBox3d>& region, const InferredPart& part) {
+  return !region.has_value() ||
+         std::any_of(part.points.begin(), part.points.end(), [&](const Eigen::Vector3d& p) {
+           return region->contains(p);
+         });
 }
 
 }  // namespace
@@ -331,7 +343,7 @@ absl::StatusOr<InferredInfo> ReadInferred(
                                               "; objects complete infers it anew"));
     }
     STRATA_RETURN_IF_ERROR(part.status());
-    STRATA_RETURN_IF_ERROR(sink(*part));
+    if (ReachesInto(query.region, *part)) STRATA_RETURN_IF_ERROR(sink(*part));
   }
   if (info.job != job) return absl::DataLossError("inferred parts: their head is not there");
   return info;

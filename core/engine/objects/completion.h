@@ -28,9 +28,10 @@ absl::Status RunCompleteJob(MapCore& core,
                             JobContext& context);
 
 // Gives what was inferred of each entity that the query takes to `sink`, by id, one at a time in
-// memory; returns how it came about. Deleting a scan takes with it all that was inferred of the
-// kinds it had seen. NOT_FOUND naming the job where nothing was inferred; ABORTED where another job
-// inferred or found others meanwhile; DATA_LOSS naming the entity that is damaged.
+// memory; its region is that of what was inferred, not of the entity's box. Returns how it came
+// about. Deleting a scan takes with it all that was inferred of the kinds it had seen. NOT_FOUND
+// naming the job where nothing was inferred; ABORTED where another job inferred or found others
+// meanwhile; DATA_LOSS naming the entity that is damaged.
 absl::StatusOr<InferredInfo> ReadInferred(
     const MapState& state,
     const EntityQuery& query,

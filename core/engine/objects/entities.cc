@@ -168,10 +168,12 @@ absl::StatusOr<bool> KeepEntities(MapCore& core,
                                   const Stop& stop) {
   bool same = true;
   const auto keep = [&](StorageWriter& writer) -> absl::Status {
+    STRATA_RETURN_IF_ERROR(stop.status());
     if (library != nullptr) {
       STRATA_ASSIGN_OR_RETURN(same, IsLibrary(writer.reader(), *library));
       if (!same) return absl::OkStatus();
     }
+    STRATA_RETURN_IF_ERROR(core.NoteInferredIfAny(writer.reader()));
     STRATA_RETURN_IF_ERROR(writer.DeleteEntities());
     STRATA_RETURN_IF_ERROR(PutFoundKinds(writer, kinds.found, info));
     STRATA_RETURN_IF_ERROR(writer.PutEntityPart(info.job, {0, EncodeEntitiesInfo(info)}, {}));
@@ -183,7 +185,7 @@ absl::StatusOr<bool> KeepEntities(MapCore& core,
     }
     return absl::OkStatus();
   };
-  STRATA_RETURN_IF_ERROR(core.writer().Run(Durability::kFull, 0, stop, keep));
+  STRATA_RETURN_IF_ERROR(core.Publish({}, {}, true, keep));
   return same;
 }
 

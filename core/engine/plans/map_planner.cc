@@ -52,6 +52,9 @@ bool StillKnown(const PathCheck& known,
                 const ChangeSet& changes,
                 double cell_size_m) {
   if (!changes.complete || known.commit_sequence > changes.last) return false;
+  if (query.inferred == InferredAs::kObstacle && changes.inferred > known.commit_sequence) {
+    return false;
+  }
   if (!ValidateWaypoints(query.waypoints, cell_size_m).ok() ||
       known.tiles != TilesUnder(query.waypoints, cell_size_m)) {
     return false;
@@ -77,8 +80,14 @@ absl::Status NoSuchFloor(const PlaceQuery& query, std::size_t floors) {
 // The tiles of one state.
 class MapPlanner::Source final : public TileSource {
  public:
-  Source(MapPlanner& planner, MapState& state, std::shared_ptr<const TileVersionMap> versions)
-      : planner_(planner), state_(state), versions_(std::move(versions)) {}
+  Source(MapPlanner& planner,
+         MapState& state,
+         std::shared_ptr<const TileVersionMap> versions,
+         std::shared_ptr<const InferredState> inferred)
+      : planner_(planner),
+        state_(state),
+        versions_(std::move(versions)),
+        inferred_(std::move(inferred)) {}
 
   absl::StatusOr<std::shared_ptr<const SurfaceTile>> Load(const TileKey& key) override {
     const std::uint64_t version = Version(key);
@@ -94,6 +103,24 @@ class MapPlanner::Source final : public TileSource {
                                                           const RobotProfile& profile) override {
     return planner_.LoadPrepared(state_, key, MadeOf(versions, profile));
   }
+  std::shared_ptr<const InferredTile> Inferred(const TileKey& key) override {
+    if (inferred_ == nullptr) return nullptr;
+    const auto found = inferred_->tiles.find(key);
+    return found == inferred_->tiles.end() ? nullptr : found->second;
+  }
+  std::uint64_t epoch() const { return state_.view().epoch; }
+  // What whoever asked for what was inferred should know of it, behind a message.
+  std::string RemarkOnInferred() const {
+    if (inferred_ == nullptr || inferred_->epoch == epoch()) return "";
+    if (!inferred_->epoch.has_value()) {
+      return "; nothing is inferred in this map (objects complete)";
+    }
+    return absl::StrCat("; what is inferred is of epoch ",
+                        *inferred_->epoch,
+                        ", the map's is ",
+                        epoch(),
+                        " (objects find and objects complete)");
+  }
   std::vector<TileKey> Keys() const {
     std::vector<TileKey> keys;
     for (const auto& [key, version] : *versions_) {
@@ -103,16 +130,24 @@ class MapPlanner::Source final : public TileSource {
     return keys;
   }
 
-  static absl::StatusOr<Source> Of(MapPlanner& planner, MapState& state) {
+  static absl::StatusOr<Source> Of(MapPlanner& planner,
+                                   MapState& state,
+                                   InferredAs as = InferredAs::kIgnore,
+                                   const Stop& stop = {}) {
     STRATA_ASSIGN_OR_RETURN(std::shared_ptr<const TileVersionMap> versions,
                             planner.VersionsOf(state));
-    return Source(planner, state, std::move(versions));
+    std::shared_ptr<const InferredState> inferred;
+    if (as == InferredAs::kObstacle) {
+      STRATA_ASSIGN_OR_RETURN(inferred, planner.inferred_.Now(state, stop));
+    }
+    return Source(planner, state, std::move(versions), std::move(inferred));
   }
 
  private:
   MapPlanner& planner_;
   MapState& state_;
   std::shared_ptr<const TileVersionMap> versions_;
+  std::shared_ptr<const InferredState> inferred_;  // nullptr: not asked for
 };
 
 MapPlanner::MapPlanner(std::string name,
@@ -131,6 +166,7 @@ MapPlanner::MapPlanner(std::string name,
                     },
                 .preparations = PreparationsAtATime()}),
       spaces_(name_, parameters, caches),
+      inferred_(cell_size_m_, caches),
       tiles_(caches, options.cache_bytes / kDecodedShare) {}
 
 absl::StatusOr<std::shared_ptr<const TileVersionMap>> MapPlanner::VersionsOf(MapState& state) {
@@ -189,8 +225,9 @@ absl::StatusOr<std::optional<std::string>> MapPlanner::LoadPrepared(MapState& st
 absl::StatusOr<PlanResult> MapPlanner::Plan(MapState& state,
                                             const PlanQuery& query,
                                             const Stop& stop) {
-  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state));
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state, query.inferred, stop));
   STRATA_ASSIGN_OR_RETURN(PlanResult result, planner_.Plan(source, query, stop));
+  absl::StrAppend(&result.message, source.RemarkOnInferred());
   result.epoch = state.view().epoch;
   return result;
 }
@@ -203,8 +240,9 @@ absl::StatusOr<PathCheck> MapPlanner::Check(MapState& state,
   if (query.known.has_value() && StillKnown(*query.known, query, changes, cell_size_m_)) {
     check = *query.known;
   } else {
-    STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state));
+    STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state, query.inferred, stop));
     STRATA_ASSIGN_OR_RETURN(check, planner_.Check(source, query, stop));
+    absl::StrAppend(&check.message, source.RemarkOnInferred());
   }
   check.epoch = state.view().epoch;
   check.commit_sequence = changes.last;
@@ -250,11 +288,12 @@ absl::StatusOr<FloorPlaces> MapPlanner::Places(MapState& state,
 absl::StatusOr<ExploreResult> MapPlanner::Explore(MapState& state,
                                                   const ExploreQuery& query,
                                                   const Stop& stop) {
-  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state));
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state, query.inferred, stop));
   const auto space_of = [&](const Eigen::AlignedBox3d& region, double voxel_m) {
     return spaces_.Find(state, region, voxel_m, stop);
   };
   STRATA_ASSIGN_OR_RETURN(ExploreResult result, planner_.Explore(source, query, space_of, stop));
+  absl::StrAppend(&result.message, source.RemarkOnInferred());
   result.epoch = state.view().epoch;
   return result;
 }
@@ -264,11 +303,15 @@ absl::StatusOr<ShapeCheck> MapPlanner::CheckShape(MapState& state,
                                                   const Stop& stop) {
   const absl::Time begin = SteadyNow();
   STRATA_RETURN_IF_ERROR(stop.status());
-  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state));
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state, query.inferred, stop));
   STRATA_ASSIGN_OR_RETURN(
       ShapeCheck check,
-      CheckShapeAlong(
-          [&source](const TileKey& key) { return source.Load(key); }, cell_size_m_, query, stop));
+      CheckShapeAlong([&source](const TileKey& key) { return source.Load(key); },
+                      cell_size_m_,
+                      query,
+                      stop,
+                      [&source](const TileKey& key) { return source.Inferred(key); }));
+  absl::StrAppend(&check.message, source.RemarkOnInferred());
   check.epoch = state.view().epoch;
   check.elapsed_ms = absl::ToDoubleMilliseconds(SteadyNow() - begin);
   return check;

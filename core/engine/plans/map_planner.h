@@ -19,6 +19,7 @@
 #include "core/common/stop.h"
 #include "core/engine/map/engine_options.h"
 #include "core/engine/map/map_state.h"
+#include "core/engine/objects/inferred_tiles.h"
 #include "core/engine/plans/seen_spaces.h"
 #include "core/engine/tiles/kept_tiles.h"
 #include "core/mls/surface_tile.h"
@@ -84,6 +85,7 @@ class MapPlanner {
   MapView versions_view_ ABSL_GUARDED_BY(mutex_);
   std::shared_ptr<const TileVersionMap> versions_ ABSL_GUARDED_BY(mutex_);
   SeenSpaces spaces_;
+  InferredTiles inferred_;
   LruCache<TileKey, const Decoded> tiles_;  // of each what was asked for last
 };
 

@@ -159,7 +159,8 @@ absl::Status RunRebuildJob(Integrator& integrator, int threads, JobContext& cont
   STRATA_RETURN_IF_ERROR(pass.Run(repairs));
   const absl::Status published = staged.Publish({}, [&](StorageWriter& writer) -> absl::Status {
     STRATA_RETURN_IF_ERROR(writer.DeletePlaneModel());  // made when a person asks for it
-    STRATA_RETURN_IF_ERROR(writer.DeleteEntities());    // as well, with their kinds
+    STRATA_RETURN_IF_ERROR(integrator.core().NoteInferredIfAny(writer.reader()));
+    STRATA_RETURN_IF_ERROR(writer.DeleteEntities());  // as well, with their kinds
     return PutIndexes(writer, pass.indexes());
   });
   integrator.store().Clear();

@@ -15,6 +15,7 @@
 #include "core/planning/ground/profile_checks.h"
 #include "core/planning/ground/rows.h"
 #include "core/world/plan.h"
+#include "core/world/things/inferred_tile.h"
 
 namespace strata {
 namespace {
@@ -76,6 +77,9 @@ GroundChecks::GroundChecks(const GroundWindow& window,
 GroundChecks::Ground GroundChecks::GroundAround(std::uint32_t i) const {
   const WindowSurface& surface = window_.surface(i);
   if (surface.underside() || Clearance(i) < checks_.height_m) return Ground::kEnds;
+  if (MeetInferred(static_cast<int>(surface.cell), surface.z_m, checks_.step_m) != kNoSurface) {
+    return Ground::kEnds;
+  }
   unsigned holes = 0;
   bool even = true;
   for (int k = 0; k < 8; ++k) {
@@ -84,9 +88,7 @@ GroundChecks::Ground GroundChecks::GroundAround(std::uint32_t i) const {
     if (footing.ground != kNoSurface) continue;
     even = false;
     const bool counts = (k & 1) == 0 || corners_count_;
-    if (counts && (footing.above != kNoSurface || footing.below != kNoSurface)) {
-      return Ground::kEnds;
-    }
+    if (counts && !footing.IsFree()) return Ground::kEnds;
     if (counts && footing.open) holes |= 1U << k;
   }
   for (int k = 0; k < 8; ++k) {
@@ -95,6 +97,16 @@ GroundChecks::Ground GroundChecks::GroundAround(std::uint32_t i) const {
     if (!HoleIsTolerated(cell, surface.z_m)) return Ground::kEnds;
   }
   return even ? Ground::kEven : Ground::kBroken;
+}
+
+std::uint32_t GroundChecks::MeetInferred(int cell, float z, float rise_m) const {
+  if (!window_.has_inferred()) return kNoSurface;
+  for (std::uint32_t i = window_.begin_inferred(cell); i < window_.begin_inferred(cell + 1); ++i) {
+    const InferredSpan& span = window_.inferred(i);
+    if (span.low_m - z >= checks_.height_m) break;
+    if (span.high_m - z > rise_m) return i;
+  }
+  return kNoSurface;
 }
 
 float GroundChecks::Clearance(std::uint32_t i) const {
@@ -131,6 +143,9 @@ void GroundChecks::CollectEdges(std::uint32_t i, std::vector<GroundEdge>* edges)
     edges->back().kind = Obstruction::kClearance;
     edges->back().value = free;
   }
+  if (const std::uint32_t span = MeetInferred(cell, z, checks_.step_m); span != kNoSurface) {
+    CollectInferred(seen, span, edges);
+  }
   for (int k = 0; k < 8; ++k) {
     seen.cell = cell + window_.Step(k);
     const Footing footing = Meet(seen.cell, z, checks_.step_m);
@@ -164,6 +179,22 @@ void GroundChecks::CollectMet(GroundEdge seen,
     edges->back().value = dz;
     edges->back().z_low_m = std::max(seen.z_low_m, z - 0.5F * dz);
   }
+  if (footing.inferred != kNoSurface) CollectInferred(seen, footing.inferred, edges);
+}
+
+void GroundChecks::CollectInferred(GroundEdge seen,
+                                   std::uint32_t span,
+                                   std::vector<GroundEdge>* edges) const {
+  const float z = seen.seen_from_m;
+  const InferredSpan& met = window_.inferred(span);
+  const bool hangs = met.low_m - z > checks_.step_m;
+  seen.kind = hangs ? Obstruction::kClearance : Obstruction::kObstacle;
+  seen.value = hangs ? met.low_m - z : met.high_m - z;
+  seen.inferred = true;
+  // No surface of its own sees it from other levels.
+  seen.z_low_m = std::max(seen.z_low_m, met.low_m - checks_.height_m);
+  seen.z_high_m = std::min(seen.z_high_m, met.high_m - checks_.step_m);
+  edges->push_back(seen);
 }
 
 // `seen` is at a hole next to the surface that looks in `direction`.
@@ -235,7 +266,7 @@ std::uint32_t GroundChecks::Target(std::uint32_t i, int direction, int* cells) c
   return OneWayTarget(there, direction ^ 4, &cells_back) == i ? there : kNoSurface;
 }
 
-// Sorts by cell and joins what overlaps and is of one kind.
+// Sorts by cell and joins what overlaps and is of one kind; what was measured comes first.
 void GroundChecks::IndexEdges(const std::array<std::vector<GroundEdge>, kRowBands>& found) {
   std::vector<std::uint32_t> begin(static_cast<std::size_t>(window_.cell_count()) + 1, 0);
   for (const std::vector<GroundEdge>& edges : found) {
@@ -252,11 +283,12 @@ void GroundChecks::IndexEdges(const std::array<std::vector<GroundEdge>, kRowBand
     const auto first = sorted.begin() + begin[cell];
     const auto last = sorted.begin() + begin[cell + 1];
     std::sort(first, last, [](const GroundEdge& a, const GroundEdge& b) {
-      return std::tie(a.kind, a.z_low_m, a.z_high_m, a.value, a.seen_from_m) <
-             std::tie(b.kind, b.z_low_m, b.z_high_m, b.value, b.seen_from_m);
+      return std::tie(a.inferred, a.kind, a.z_low_m, a.z_high_m, a.value, a.seen_from_m) <
+             std::tie(b.inferred, b.kind, b.z_low_m, b.z_high_m, b.value, b.seen_from_m);
     });
     for (auto edge = first; edge != last; ++edge) {
       const bool joins = edges_.size() > edge_first_[cell] && edges_.back().kind == edge->kind &&
+                         edges_.back().inferred == edge->inferred &&
                          edge->z_low_m <= edges_.back().z_high_m;
       if (joins) {
         edges_.back().z_high_m = std::max(edges_.back().z_high_m, edge->z_high_m);

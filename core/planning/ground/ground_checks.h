@@ -7,12 +7,15 @@
 //   obstacle  without ground, a surface above whose underside is lower than z + height
 //   drop      without ground, a surface below
 //   hole      without ground, if nothing reaches down to z + max_step: no ground was observed
-// more than one of the last three at times. An underside is never ground, and no robot is on it:
+//   inferred  what was inferred there (core/world/things/inferred_tile.h), where that is asked for,
+//             rises above max_step and begins below z + height: ground or not
+// more than one of the last four at times. An underside is never ground, and no robot is on it:
 // within max_step of z, or up to kMaxDeckM below it, there is a deck whose top was not seen, a hole
 // that hides what lies under it. A hole is tolerated if along an axis or a diagonal through it no
 // more than max_gap is unobserved and it ends on both sides. Obstacles, drops (also those up to a
 // radius behind a hole) and holes that are not tolerated are *edges* seen from the surface; too
-// little clearance above it is an edge in its own cell.
+// little clearance above it is an edge in its own cell, and so is what was inferred over ground.
+// Nobody stands on what was inferred, and it hides no hole: it adds edges and takes none away.
 //
 // An edge concerns a robot of level z if the surface that it is seen from is nearer to z than all
 // else in that surface's cell and than the obstacle's or drop's own surface, and within the robot's
@@ -44,6 +47,7 @@ struct GroundEdge {
   float z_low_m = 0.0F;
   float z_high_m = 0.0F;
   Obstruction kind = Obstruction::kNone;  // how much: value, see plan.h
+  bool inferred = false;
   float value = 0.0F;
   float seen_from_m = 0.0F;  // height of the surface that saw it; of several the first
 };
@@ -54,8 +58,12 @@ struct Footing {
   std::uint32_t ground = kNone;
   std::uint32_t above = kNone;  // lowest obstacle above the rise
   std::uint32_t below = kNone;  // highest surface below the rise
-  bool open = true;             // nothing reaches down to where ground should be
-  bool IsFree() const { return ground == kNone && above == kNone && below == kNone; }
+  // Of what was inferred, the lowest that rises above the rise.
+  std::uint32_t inferred = kNone;
+  bool open = true;  // nothing reaches down to where ground should be
+  bool IsFree() const {
+    return ground == kNone && above == kNone && below == kNone && inferred == kNone;
+  }
 };
 
 class GroundChecks {
@@ -78,6 +86,8 @@ class GroundChecks {
   // What a robot of level z meets in `cell` if it may rise or sink by `rise_m`; what hangs higher
   // than the robot is not met.
   Footing Meet(int cell, float z, float rise_m) const;
+  // Footing::inferred alone.
+  std::uint32_t MeetInferred(int cell, float z, float rise_m) const;
 
   // The surface that one move in `direction` from surface `i` leads to, over a tolerated stretch of
   // up to max_gap if the next cell is a hole; `cells` is the length of the move. kNoSurface if the
@@ -109,6 +119,8 @@ class GroundChecks {
   GroundEdge Seen(std::uint32_t i) const;
   void CollectEdges(std::uint32_t i, std::vector<GroundEdge>* edges) const;
   void CollectMet(GroundEdge seen, const Footing& footing, std::vector<GroundEdge>* edges) const;
+  // `span`: number of what was inferred in the cell of `seen`, for the levels that meet it.
+  void CollectInferred(GroundEdge seen, std::uint32_t span, std::vector<GroundEdge>* edges) const;
   void CollectBehind(GroundEdge seen, int direction, std::vector<GroundEdge>* edges) const;
   bool DiscIsFree(int cell, float z) const;
   bool HoleIsTolerated(int cell, float z) const;
@@ -159,6 +171,7 @@ inline Footing GroundChecks::Meet(int cell, float z, float rise_m) const {
       footing.above = i;
     }
   }
+  if (window_.has_inferred()) footing.inferred = MeetInferred(cell, z, rise_m);
   return footing;
 }
 

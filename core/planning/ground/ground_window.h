@@ -11,6 +11,7 @@
 #include "core/mls/local_plane.h"
 #include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
+#include "core/world/things/inferred_tile.h"
 
 namespace strata {
 
@@ -18,6 +19,8 @@ namespace strata {
 // from the lower left; nullptr where the map has nothing.
 using TileNeighbourhood = std::array<std::shared_ptr<const SurfaceTile>, 9>;
 inline constexpr int kMiddleTile = 4;
+// What was inferred in the same tiles; nullptr where that is nothing.
+using InferredNeighbourhood = std::array<std::shared_ptr<const InferredTile>, 9>;
 
 // The eight directions of a move, counter-clockwise from east; the opposite of k is k ^ 4.
 inline constexpr std::array<int, 8> kStepX = {1, 1, 0, -1, -1, -1, 0, 1};
@@ -31,7 +34,10 @@ struct WindowSurface : HeightSample {
 class GroundWindow {
  public:
   // REQUIRES: 0 ≤ margin ≤ kTileCells; tiles[kMiddleTile] is not nullptr.
-  GroundWindow(const TileNeighbourhood& tiles, int margin, double cell_size_m);
+  GroundWindow(const TileNeighbourhood& tiles,
+               int margin,
+               double cell_size_m,
+               const InferredNeighbourhood& inferred = {});
 
   double cell_size_m() const { return cell_size_m_; }
   int margin() const { return margin_; }
@@ -43,6 +49,12 @@ class GroundWindow {
   std::uint32_t begin(int cell) const { return first_[cell]; }
   const WindowSurface& surface(std::uint32_t i) const { return surfaces_[i]; }
   std::uint32_t surface_count() const { return static_cast<std::uint32_t>(surfaces_.size()); }
+
+  // Of what was inferred in cell c, lowest first: numbers [begin_inferred(c), begin_inferred(c +
+  // 1)). REQUIRES: has_inferred(), which is false where that is nothing in the whole window.
+  bool has_inferred() const { return !inferred_.empty(); }
+  std::uint32_t begin_inferred(int cell) const { return first_inferred_[cell]; }
+  const InferredSpan& inferred(std::uint32_t i) const { return inferred_[i]; }
 
   int CellOfTile(std::uint16_t cell_in_tile) const {
     return ((cell_in_tile >> kTileShift) + margin_) * width_ + (cell_in_tile & (kTileCells - 1)) +
@@ -57,12 +69,15 @@ class GroundWindow {
 
  private:
   void AppendRow(const TileNeighbourhood& tiles, int y);
+  void AppendInferredRow(const InferredNeighbourhood& tiles, int y);
 
   double cell_size_m_;
   int margin_;
   int width_;
   std::vector<WindowSurface> surfaces_;
   std::vector<std::uint32_t> first_;
+  std::vector<InferredSpan> inferred_;  // InferredSpan::cell is not that of the window
+  std::vector<std::uint32_t> first_inferred_;
 };
 
 }  // namespace strata

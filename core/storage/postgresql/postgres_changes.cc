@@ -34,9 +34,11 @@ absl::StatusOr<StoredChanges> PostgresReader::ListChanges(std::uint64_t since) {
     if (!all.complete) return absl::OkStatus();
     STRATA_ASSIGN_OR_RETURN(
         Rows row,
-        Ask("SELECT at, trajectory, sequence, x, y, version, gone FROM (SELECT at, n, trajectory, "
-            "sequence, x, y, version, gone FROM map_change WHERE map = $1 AND at > $2 UNION ALL "
-            "SELECT number, 0, trajectory, sequence, 0, 0, 0, 0 FROM truth_scan WHERE map = $1 AND "
+        Ask("SELECT at, trajectory, sequence, x, y, version, gone, inferred FROM (SELECT at, n, "
+            "trajectory, sequence, x, y, version, gone, inferred FROM map_change WHERE map = $1 "
+            "AND at > $2 UNION ALL "
+            "SELECT number, 0, trajectory, sequence, 0, 0, 0, 0, 0 FROM truth_scan WHERE map = $1 "
+            "AND "
             "number > $2) AS c ORDER BY at, n",
             since));
     all.changes.reserve(static_cast<std::size_t>(row.size()));
@@ -48,6 +50,7 @@ absl::StatusOr<StoredChanges> PostgresReader::ListChanges(std::uint64_t since) {
           0, static_cast<std::int32_t>(row.Int(3)), static_cast<std::int32_t>(row.Int(4))};
       change.version = row.Unsigned(5);
       change.gone = row.Bool(6);
+      change.inferred = row.Bool(7);
     }
     return absl::OkStatus();
   }));
@@ -60,7 +63,7 @@ absl::Status PostgresWriter::PutChanges(const std::vector<StoredChange>& changes
   const std::uint64_t at = changes.back().commit_sequence;
   if (changes.size() > kMostChanges) return ForgetChanges(at);
   std::string trajectories;
-  std::vector<std::int64_t> sequences, x, y, versions, gone;
+  std::vector<std::int64_t> sequences, x, y, versions, gone, inferred;
   for (const StoredChange& change : changes) {
     absl::StrAppend(&trajectories, change.scan.trajectory, "\n");
     sequences.push_back(static_cast<std::int64_t>(change.scan.sequence));
@@ -68,20 +71,23 @@ absl::Status PostgresWriter::PutChanges(const std::vector<StoredChange>& changes
     y.push_back(change.tile.y);
     versions.push_back(static_cast<std::int64_t>(change.version));
     gone.push_back(change.gone ? 1 : 0);
+    inferred.push_back(change.inferred ? 1 : 0);
   }
   trajectories.pop_back();
   STRATA_RETURN_IF_ERROR(
-      RunSql("INSERT INTO map_change (map, at, n, trajectory, sequence, x, y, version, gone) "
-             "SELECT $1, $2, c.n, coalesce(c.trajectory, ''), c.sequence, c.x, c.y, c.version, "
-             "c.gone FROM unnest(string_to_array($3, E'\\n'), $4, $5, $6, $7, $8) WITH ORDINALITY "
-             "AS c (trajectory, sequence, x, y, version, gone, n)",
+      RunSql("INSERT INTO map_change (map, at, n, trajectory, sequence, x, y, version, gone, "
+             "inferred) SELECT $1, $2, c.n, coalesce(c.trajectory, ''), c.sequence, c.x, c.y, "
+             "c.version, c.gone, c.inferred FROM unnest(string_to_array($3, E'\\n'), $4, $5, $6, "
+             "$7, $8, $9) WITH ORDINALITY AS c (trajectory, sequence, x, y, version, gone, "
+             "inferred, n)",
              at,
              trajectories,
              sequences,
              x,
              y,
              versions,
-             gone));
+             gone,
+             inferred));
   return ++puts_of_changes_ % kTrimEvery == 0 ? TrimChanges() : absl::OkStatus();
 }
 

@@ -337,6 +337,7 @@ CREATE TABLE map_change (
   x bigint NOT NULL, y bigint NOT NULL,
   version bigint NOT NULL,
   gone bigint NOT NULL,
+  inferred bigint NOT NULL,
   PRIMARY KEY (map, at, n)
 );
 ALTER TABLE derived_state ADD COLUMN changes_after bigint NOT NULL DEFAULT 9223372036854775807;

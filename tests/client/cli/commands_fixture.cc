@@ -31,6 +31,7 @@ absl::Status CommandsTest::Run(std::vector<std::string> words, OutputFormat form
   AddKindCommands(commands);
   AddLocalizeCommand(commands);
   AddPlanCommand(commands);
+  AddExploreCommand(commands);
   AddSurfaceCommand(commands);
   std::reverse(words.begin(), words.end());  // as CLI11 takes them
   root.parse(words);

@@ -13,6 +13,7 @@ namespace strata::cli {
 namespace {
 
 using ::testing::_;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 class PlanCommandTest : public CommandsTest {};
@@ -49,6 +50,65 @@ TEST_F(PlanCommandTest, ALongPlanShowsTenWaypointsAndJsonAll) {
   plan.obstruction_value = 0.2;  // less than this robot's
   RunText(words);
   EXPECT_EQ(talk_.str(), "");
+}
+
+TEST_F(PlanCommandTest, WhatWasInferredIsAnObstacleToEverythingThatIsAskedOfTheWay) {
+  std::vector<InferredAs> asked;
+  PlanResult plan;
+  plan.waypoints = {{0, 0, 0}, {1, 0, 0}};
+  ON_CALL(db_.planning(), ListProfiles(_, _)).WillByDefault([](auto&, auto) {
+    return absl::StatusOr<std::map<std::string, RobotProfile>>({{"default", RobotProfile()}});
+  });
+  ON_CALL(db_.planning(), PlanPath(_, _, _))
+      .WillByDefault([&](auto&, auto, const PlanQuery& query) {
+        asked.push_back(query.inferred);
+        return absl::StatusOr<PlanResult>(plan);
+      });
+  ON_CALL(db_.planning(), CheckShape(_, _, _))
+      .WillByDefault([&](auto&, auto, const ShapeQuery& query) {
+        asked.push_back(query.inferred);
+        ShapeCheck check;
+        check.free = false;
+        check.contacts.push_back({.from_m = 0.5, .to_m = 0.6, .inferred = true});
+        return absl::StatusOr<ShapeCheck>(check);
+      });
+  ON_CALL(db_.planning(), WatchPath(_, _, _, _))
+      .WillByDefault([&](auto&, auto, const PathQuery& query, auto) {
+        asked.push_back(query.inferred);
+        return absl::OkStatus();
+      });
+  ON_CALL(db_.planning(), Explore(_, _, _))
+      .WillByDefault([&](auto&, auto, const ExploreQuery& query) {
+        asked.push_back(query.inferred);
+        return absl::StatusOr<ExploreResult>(ExploreResult());
+      });
+  ON_CALL(db_.maps(), Get(_, _)).WillByDefault([](auto&, auto name) {
+    return absl::StatusOr<MapInfo>(MapInfo{std::string(name), {}, {}});
+  });
+  const std::vector<std::string> words = {
+      "plan", "m", "--from", "0,0", "--to", "1,0", "--shape-box", "1,1,1", "--watch"};
+  const auto with = [](std::vector<std::string> all, const char* as) {
+    all.emplace_back("--inferred");
+    all.emplace_back(as);
+    return all;
+  };
+  EXPECT_TRUE(Run(words, OutputFormat::kText).ok());
+  EXPECT_THAT(asked, ElementsAre(InferredAs::kIgnore, InferredAs::kIgnore, InferredAs::kIgnore));
+  asked.clear();
+  EXPECT_THAT(RunText(with(words, "obstacle")), HasSubstr("0.000 m deep, only inferred, at"));
+  EXPECT_TRUE(Run(with({"explore", "m", "--from", "0,0"}, "obstacle"), OutputFormat::kText).ok());
+  EXPECT_THAT(asked,
+              ElementsAre(InferredAs::kObstacle,
+                          InferredAs::kObstacle,
+                          InferredAs::kObstacle,
+                          InferredAs::kObstacle));
+  plan.message = "found; nothing is inferred in this map (objects complete)";
+  RunText(with({"plan", "m", "--from", "0,0", "--to", "1,0"}, "obstacle"));
+  EXPECT_THAT(talk_.str(), HasSubstr("nothing is inferred"));
+  plan.reason = PlanReason::kBlocked;
+  plan.obstruction = Obstruction::kObstacle;
+  plan.inferred = true;
+  EXPECT_EQ(RunJson({"plan", "m", "--from", "0,0", "--to", "1,0"})["inferred"], true);
 }
 
 }  // namespace

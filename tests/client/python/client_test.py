@@ -380,7 +380,47 @@ class ObjectsTest(ServerTest):
         self.assertGreater(len(added), 100)
         self.assertTrue(((added > (2.5, -3.1, 0)) & (added < (2.9, -2.3, 1.1))).all())
         self.assertGreater(parts[1].agreeing, 4 * parts[1].contradicting)
-        self.assertEqual(len(world.inferred(region=(1, 1, 3, 3))), 1)
+        found, = world.inferred(region=(2.6, -4, 3, -2))  # beyond what was measured of it
+        self.assertEqual(found.entity, part.id)
+        self.assertEqual(world.inferred(region=(5, 5, 6, 6)), [])
+
+    def test_plans_keep_out_of_what_was_inferred_if_asked_to(self):
+        def side(count, step=0.05):
+            return np.arange(count + 1) * step
+        x, y, z = np.meshgrid(side(16), side(12), 0.1 + side(18), indexing="ij")
+        block = np.stack([x, y, z], axis=-1).reshape(-1, 3)
+        on_it = (block[:, :2] < 0.001).any(axis=1) | (block[:, 0] > 0.799) | (block[:, 1] > 0.599) | (block[:, 2] > 0.999)
+        block = block[on_it]
+        world = self.db.create_map("hidden")
+        things = np.concatenate([block + (2, 2, 0), block[block[:, 0] < 0.55] + (2, -3, 0)])
+        world.upload(things, labels=np.full(len(things), 2), align=False)
+        world.upload(grid((-1, 4), (-4, 0)), trajectory="floor", sensor_origin=(0, 0, 1), align=False)
+        world.wait(timeout=60)
+        robot = {"radius": 0.08, "height": 0.5, "max_gap": 0}
+        way = world.plan((2.75, -3.5), (2.75, -2.1), profile=robot)
+        self.assertTrue(way, way.message)
+        straight = [(2.75, -3.5, 0), (2.75, -2.1, 0)]
+        before = world.check_path(straight, profile=robot, inferred="obstacle")
+        self.assertTrue(before, before.message)
+        self.assertIn("nothing is inferred", before.message)
+        world.job("objects")
+        world.job("complete")
+        self.assertTrue(world.check_path(straight, profile=robot))
+        blocked = world.check_path(straight, profile=robot, inferred="obstacle", known=before)
+        self.assertFalse(blocked)
+        self.assertTrue(blocked.inferred)
+        self.assertIn("inferred obstacle", blocked.message)
+        goal = (2.75, -2.7)
+        self.assertTrue(world.plan((2.75, -3.5), goal, profile=robot))
+        refused = world.plan((2.75, -3.5), goal, profile=robot, inferred="obstacle")
+        self.assertFalse(refused)
+        self.assertTrue(refused.inferred, refused.message)
+        cart = [strata.shape.box((0.1, 0.1, 0.4), (0, 0, 0.3))]
+        self.assertTrue(world.check_shape(straight, parts=cart))
+        touched = world.check_shape(straight, parts=cart, inferred="obstacle")
+        self.assertTrue(touched.contacts[0].inferred, touched.message)
+        with self.assertRaises(ValueError):
+            world.plan((2.75, -3.5), goal, inferred="blocked")
 
     def test_kinds_go_into_the_library(self):
         world = self.db.create_map("kinds")

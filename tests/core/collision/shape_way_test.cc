@@ -15,6 +15,7 @@
 #include "core/common/stop.h"
 #include "core/planning/planner.h"
 #include "core/planning/search_space.h"
+#include "core/world/things/inferred_tile.h"
 #include "tests/core/planning/memory_tiles.h"
 #include "tests/support/drawing.h"
 #include "tests/support/status_matchers.h"
@@ -46,6 +47,23 @@ absl::StatusOr<ShapeCheck> Check(const DrawnMap& map, const ShapeQuery& query) {
       [&tiles](const TileKey& key) { return tiles.Load(key); }, kCell, query, Stop());
 }
 
+absl::StatusOr<ShapeCheck> CheckWithInferred(const DrawnMap& map,
+                                             const std::vector<Vector3d>& points,
+                                             const ShapeQuery& query) {
+  MemoryTiles tiles(map.Tiles());
+  InferredTileMaker maker(kCell);
+  maker.Add(points);
+  const InferredTileMap inferred = maker.Finish();
+  return CheckShapeAlong([&tiles](const TileKey& key) { return tiles.Load(key); },
+                         kCell,
+                         query,
+                         Stop(),
+                         [&inferred](const TileKey& key) {
+                           const auto found = inferred.find(key);
+                           return found == inferred.end() ? nullptr : found->second;
+                         });
+}
+
 // A cart of 1.2 m × 0.6 m × 1 m that goes from x = 1 to x = 9 in the middle of 10 m × 4 m.
 ShapeQuery Cart() {
   ShapeQuery query;
@@ -64,6 +82,31 @@ TEST(ShapeWayTest, OverLevelGroundItIsFree) {
   EXPECT_NEAR(check.length_m, 8.0, 1e-9);
   EXPECT_EQ(check.free_m, check.length_m);
   EXPECT_GE(check.looks, 8.0 / (kCell / 4));
+}
+
+TEST(ShapeWayTest, WhatWasInferredIsTouchedAndSaidToBe) {
+  const DrawnMap map = Ground(100, 40);
+  std::vector<Vector3d> post;
+  for (double z = 0.0; z < 1.2; z += 0.05) post.emplace_back(5.02, 2.05, z);
+  STRATA_ASSERT_OK_AND_ASSIGN(const ShapeCheck check, CheckWithInferred(map, post, Cart()));
+  EXPECT_FALSE(check.free);
+  ASSERT_THAT(check.contacts, SizeIs(1));
+  EXPECT_TRUE(check.contacts[0].inferred);
+  EXPECT_FALSE(check.contacts[0].unknown);
+  EXPECT_NEAR(check.contacts[0].from_m, 5.0 - 0.6 - 1.0, 0.05);
+  EXPECT_NEAR(check.contacts[0].to_m, 5.1 + 0.6 - 1.0, 0.05);
+  EXPECT_THAT(check.message, HasSubstr("touches something that was only inferred"));
+  // What is over its head, and what is ground to it, is not.
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const ShapeCheck over,
+      CheckWithInferred(map, {{5.02, 2.05, 0.1}, {5.02, 2.05, 1.05}, {5.02, 2.6, 0.5}}, Cart()));
+  EXPECT_TRUE(over.free) << over.message;
+  // A measured post in the same place is measured.
+  DrawnMap measured = map;
+  measured[{50, 20}] = {{.z_m = 1.2, .depth_m = 1.2}};
+  STRATA_ASSERT_OK_AND_ASSIGN(const ShapeCheck both, CheckWithInferred(measured, post, Cart()));
+  ASSERT_THAT(both.contacts, SizeIs(1));
+  EXPECT_FALSE(both.contacts[0].inferred);
 }
 
 TEST(ShapeWayTest, APostIsTouchedWhereItStands) {

@@ -310,6 +310,12 @@ TEST(TranslateRoundTripTest, Planning) {
     STRATA_ASSERT_OK_AND_ASSIGN(const PlanQuery query, FromProto(request));
     ExpectSame(request, ToProto(request.map(), query));
   }
+  v1::PlanPathRequest of_later;
+  EXPECT_EQ(FromProto(of_later)->inferred, InferredAs::kIgnore);
+  of_later.set_inferred(static_cast<v1::InferredAs>(9));
+  EXPECT_THAT(FromProto(of_later),
+              strata::testing::StatusIs(absl::StatusCode::kInvalidArgument,
+                                        ::testing::HasSubstr("inferred")));
   ExpectRoundTrip(Filled<v1::PlanPathResponse>());
   ExpectRoundTrip(Filled<v1::SurfaceColumn>());
   ExpectRoundTrip(Filled<v1::PathCheck>());

@@ -20,38 +20,43 @@ ClassCosts = Mapping[int, float | None] | None
 
 class Planning(MapCalls):
     async def plan(self, start: ArrayLike, goal: ArrayLike, *, profile: ProfileLike = None,
-                   class_costs: ClassCosts = None, max_expanded: int | None = None) -> Path:
+                   class_costs: ClassCosts = None, max_expanded: int | None = None,
+                   inferred: str = "ignore") -> Path:
         """A Path from start to goal for a robot; without one it is false and says why.
 
         start, goal: (x, y) stands for the lowest surface there, (x, y, z) for the one nearest in height; map frame [m].
         profile: name of one of the map's profiles, or {"radius": 0.3, "height": 1, "max_step": 0.15, "max_slope": 0.35,
         "max_gap": 0.3, "max_roughness": 0.08} [m, rad], of which what is absent takes that default; None: all of them.
         class_costs: {class id: factor ≥ 1, or None where the robot must not go}. max_expanded: patches to look at.
+        inferred: "ignore" or "obstacle": keep out of what Map.inferred() has, which nobody saw.
         """
         request = planning_pb2.PlanPathRequest(
             map=self.name, to=plan.endpoint(goal), profile=await self._profile(profile),
-            max_expanded=max_expanded, class_costs=plan.class_costs(class_costs), **{"from": plan.endpoint(start)})
+            max_expanded=max_expanded, class_costs=plan.class_costs(class_costs), inferred=plan.inferred_as(inferred), **{"from": plan.endpoint(start)})
         return plan.from_proto(await self._connection.unary(self._planning.PlanPath, request))
 
     async def check_path(self, way: Path | ArrayLike, *, profile: ProfileLike = None, class_costs: ClassCosts = None,
-                         known: PathCheck | None = None) -> PathCheck:
+                         known: PathCheck | None = None, inferred: str = "ignore") -> PathCheck:
         """PathCheck: whether a path holds, and where it does not; true if it does.
 
         way: a Path, or places (n, 3) on the surfaces, map frame [m]. profile, class_costs: as for plan; of the costs only
         what is forbidden counts. known: the answer to the same question before, given again where nothing changed since.
+        inferred: as for plan.
         """
         request = planning_pb2.CheckPathRequest(
             map=self.name, waypoints=plan.waypoints(way), profile=await self._profile(profile),
-            class_costs=plan.class_costs(class_costs), known=None if known is None else known.proto)
+            class_costs=plan.class_costs(class_costs), known=None if known is None else known.proto,
+            inferred=plan.inferred_as(inferred))
         return plan.check_from_proto((await self._connection.unary(self._planning.CheckPath, request)).check)
 
     async def watch_path(self, way: Path | ArrayLike, *, profile: ProfileLike = None,
-                         class_costs: ClassCosts = None) -> AsyncGenerator[PathCheck, None]:
+                         class_costs: ClassCosts = None,
+                         inferred: str = "ignore") -> AsyncGenerator[PathCheck, None]:
         """Generator over PathChecks: how a path stands, at once and whenever it stops to hold or holds again, until it is
         left. Comes back to a server that was away; the same may be told twice then. Arguments as of check_path."""
         request = planning_pb2.WatchPathRequest(
             map=self.name, waypoints=plan.waypoints(way), profile=await self._profile(profile),
-            class_costs=plan.class_costs(class_costs))
+            class_costs=plan.class_costs(class_costs), inferred=plan.inferred_as(inferred))
         backoff = self._connection.new_backoff()
         while True:
             try:
@@ -90,13 +95,13 @@ class Planning(MapCalls):
 
     async def explore(self, /, start: ArrayLike, *, count: int = 5, profile: ProfileLike = None,
                       class_costs: ClassCosts = None, region: ArrayLike | None = None,
-                      **query: float) -> Exploration:
+                      inferred: str = "ignore", **query: float) -> Exploration:
         """Exploration: where a robot at `start` should look next, as views of space that no scan has seen.
 
             for view in campus.explore((3, -1, 0.4), count=3, max_range=15):
                 drive_to(view.place)
 
-        start, profile, class_costs: as for plan. region: (2, 3) lower and upper corner [m] of what is to be learnt; None:
+        start, profile, class_costs, inferred: as for plan. region: (2, 3) lower and upper corner [m] of what is to be learnt; None:
         what the sensor may see. query: budget [m], resolution [m], sensor_height [m], bits_per_m, horizon, min_bits; of the
         sensor up, down, width [rad], rows, columns, max_range [m]; what is absent takes its default, see
         `strata explore --help`. Raises ValueError and StrataError.
@@ -105,11 +110,12 @@ class Planning(MapCalls):
         getattr(request, "from").CopyFrom(plan.endpoint(start))
         request.profile.CopyFrom(await self._profile(profile))
         request.class_costs.extend(plan.class_costs(class_costs))
+        request.inferred = plan.inferred_as(inferred)
         return exploration.from_proto(await self._connection.unary(self._planning.Explore, request))
 
     async def check_shape(self, way: Path | ArrayLike, mesh: Sequence[ArrayLike] | None = None, *,
                           parts: Iterable[planning_pb2.ShapePart] = (), clearance: float = 0.0, ground: float = 0.15,
-                          unknown: str = "ignore") -> ShapeCheck:
+                          unknown: str = "ignore", inferred: str = "ignore") -> ShapeCheck:
         """ShapeCheck: whether a shape touches anything along a way, where and how deep; true if it does not.
 
             campus.check_shape(campus.plan(start, goal), (vertices, triangles))
@@ -119,9 +125,10 @@ class Planning(MapCalls):
         (n, 4, 4) T_map_shape; swept between them. mesh: (vertices (n, 3), triangles (m, 3)) in the shape's frame: x forward,
         z up from the ground. parts: solids, of shape.box, shape.cylinder and shape.sphere. clearance: to be kept from
         everything [m]. ground: what is no higher over the ground that the shape stands on is ground [m]. unknown: "ignore"
-        or "blocked", cells below it where nothing was measured. Raises ValueError and StrataError.
+        or "blocked", cells below it where nothing was measured. inferred: as for plan. Raises ValueError and StrataError.
         """
         request = shape.to_proto(self.name, way, mesh, parts, clearance, ground, unknown)
+        request.inferred = plan.inferred_as(inferred)
         return shape.from_proto(await self._connection.unary(self._planning.CheckShape, request))
 
     async def _profile(self, profile: ProfileLike) -> robot_profile_pb2.RobotProfile:

@@ -60,6 +60,19 @@ TEST(ChangeLogTest, TellsWhatIsNewer) {
   }
 }
 
+TEST(ChangeLogTest, TellsWhenWhatIsInferredChangedLast) {
+  ChangeLog log(10);
+  EXPECT_EQ(log.Since(10).inferred, 0U);
+  log.Add(12, {}, {}, true);
+  log.Add(15, {{"run", 1}}, {});
+  EXPECT_EQ(log.inferred(), 12U);
+  EXPECT_EQ(log.Since(10).inferred, 12U);
+  EXPECT_EQ(log.Since(15).inferred, 12U);  // whoever knows 15 knows it
+  EXPECT_THAT(log.Since(10).tiles, IsEmpty());
+  log.Add(16, {}, {}, true);
+  EXPECT_EQ(log.Since(15).inferred, 16U);
+}
+
 TEST(ChangeLogTest, EachThingOnceAsItIsNow) {
   ChangeLog log(0);
   log.Add(1, {{"run", 1}}, {Tile(1, 1), Tile(2, 1)});

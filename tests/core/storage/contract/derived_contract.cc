@@ -52,20 +52,22 @@ TEST_F(DerivedContractTest, ChangesAreToldAfterACommit) {
   std::uint64_t at = 0;
   STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
     STRATA_ASSIGN_OR_RETURN(at, writer().NextCommitSequence());
-    return writer().PutChanges({{at, {"run", 1}, {}, 0, false},
-                                {at, {}, {0, -3, 5}, at, false},
-                                {at, {}, {0, 4, -5}, at - 1, true}});
+    return writer().PutChanges({{at, {"run", 1}, {}, 0, false, false},
+                                {at, {}, {0, -3, 5}, at, false, false},
+                                {at, {}, {0, 4, -5}, at - 1, true, false},
+                                {at, {}, {}, 0, false, true}});
   }));
-  EXPECT_FALSE(Commit([&]() -> absl::Status {
-                 STRATA_RETURN_IF_ERROR(writer().PutChanges({{at + 1, {"run", 1}, {}, 0, false}}));
-                 return absl::AbortedError("no");
-               }).ok());
+  EXPECT_FALSE(
+      Commit([&]() -> absl::Status {
+        STRATA_RETURN_IF_ERROR(writer().PutChanges({{at + 1, {"run", 1}, {}, 0, false, false}}));
+        return absl::AbortedError("no");
+      }).ok());
   const ScanNumber second = Put(2);
   STRATA_ASSERT_OK_AND_ASSIGN(const StoredChanges all, reader().ListChanges(first));
   // Who has a store alone keeps none.
   EXPECT_EQ(all.complete, storage().number() != 0);
   if (!all.complete) return;
-  ASSERT_EQ(all.changes.size(), 4U);
+  ASSERT_EQ(all.changes.size(), 5U);
   EXPECT_EQ(all.changes[0].commit_sequence, at);
   EXPECT_EQ(all.changes[0].scan, (ScanId{"run", 1}));
   EXPECT_EQ(all.changes[1].scan.trajectory, "");
@@ -74,9 +76,11 @@ TEST_F(DerivedContractTest, ChangesAreToldAfterACommit) {
   EXPECT_FALSE(all.changes[1].gone);
   EXPECT_EQ(all.changes[2].tile, (TileKey{0, 4, -5}));
   EXPECT_TRUE(all.changes[2].gone);
-  EXPECT_EQ(all.changes[3].scan, (ScanId{"run", 2}));
-  EXPECT_EQ(all.changes[3].commit_sequence, second);
-  EXPECT_EQ(reader().ListChanges(0)->changes.size(), 5U);
+  EXPECT_FALSE(all.changes[2].inferred);
+  EXPECT_TRUE(all.changes[3].inferred);
+  EXPECT_EQ(all.changes[4].scan, (ScanId{"run", 2}));
+  EXPECT_EQ(all.changes[4].commit_sequence, second);
+  EXPECT_EQ(reader().ListChanges(0)->changes.size(), 6U);
   EXPECT_EQ(reader().ListChanges(at)->changes.size(), 1U);
   Reopen();
   EXPECT_TRUE(reader().ListChanges(second)->complete);
@@ -93,7 +97,8 @@ TEST_F(DerivedContractTest, TooManyChangesAreNotKept) {
   STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
     STRATA_ASSIGN_OR_RETURN(at, writer().NextCommitSequence());
     std::vector<StoredChange> changes;
-    for (std::int32_t x = 0; x < 70'000; ++x) changes.push_back({at, {}, {0, x, 0}, at, false});
+    for (std::int32_t x = 0; x < 70'000; ++x)
+      changes.push_back({at, {}, {0, x, 0}, at, false, false});
     return writer().PutChanges(changes);
   }));
   EXPECT_FALSE(reader().ListChanges(at - 1)->complete);
