@@ -26,6 +26,7 @@
 #include "core/common/status.h"
 #include "core/engine/doors/map.h"
 #include "core/engine/map/map_core.h"
+#include "core/engine/map/map_state.h"
 #include "core/engine/map/quarantine.h"
 #include "core/engine/map/quarantine_file.h"
 #include "core/engine/tiles/tile_keeper.h"
@@ -159,7 +160,8 @@ class KeptTilesTest : public EngineTest {
     PlanQuery query;
     query.from = {.x_m = 2.0, .y_m = 3.0};
     query.to = {.x_m = to_x_m, .y_m = 3.0};
-    const auto plan = (*map)->planner().Plan(query, Stop());
+    MapState state((*map)->core());
+    const auto plan = (*map)->planner().Plan(state, query, Stop());
     EXPECT_THAT(plan, IsOk());
     EXPECT_TRUE(plan->found()) << plan->message;
     return {absl::StrCat(plan->cost, " ", plan->expanded, " ", plan->waypoints.size()),
