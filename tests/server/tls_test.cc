@@ -133,7 +133,7 @@ TEST_F(TlsTest, OnlyWhoTrustsTheServersAuthorityTalksToIt) {
   EXPECT_THAT(ListMaps(elsewhere), StatusIs(Code::kUnavailable, HasSubstr("certificate")));
   ClientOptions plain = Client();
   plain.tls = {};
-  EXPECT_THAT(ListMaps(plain), StatusIs(Code::kUnavailable, HasSubstr("without TLS")));
+  EXPECT_THAT(ListMaps(plain), StatusIs(Code::kUnavailable, HasSubstr("wants TLS")));
 }
 
 TEST_F(TlsTest, AnotherCertificateIsTakenUpWithoutARestart) {

@@ -121,7 +121,7 @@ TEST_F(DoorsTest, TheCommandLineComesInWithATokenAndDoesWhatItMay) {
 
   const Ran plain = RunStrata({"--server", stratad.Address(), "map", "list"});
   EXPECT_EQ(plain.exit_code, 1);
-  EXPECT_THAT(plain.err, HasSubstr("without TLS?"));
+  EXPECT_THAT(plain.err, HasSubstr("wants TLS"));
   stratad.Signal(SIGTERM);
   EXPECT_EQ(stratad.Wait(), 0);
 }
