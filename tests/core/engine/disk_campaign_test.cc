@@ -63,8 +63,8 @@ TEST_F(DiskCampaignTest, WhatIsAcknowledgedOutlivesDisksThatFail) {
     ExpectKept(disks.FailUntilMended(fault, SampleOf(moments, 1)), "until mended");
   }
   for (const DiskFault fault : {DiskFault::kWrite, DiskFault::kRead, DiskFault::kShm}) {
-    // Most writes of an opening come at its close, where nobody is told of them.
-    ExpectKept(disks.FailOnOpening(fault, SampleOf(disks.moments_of_opening(fault), 3)),
+    // Two thirds of the writes of an opening come at its close, where nobody is told of them.
+    ExpectKept(disks.FailOnOpening(fault, SampleOf(disks.moments_of_opening(fault), 8)),
                absl::StrCat("opening, fault ", static_cast<int>(fault)));
   }
   ExpectKept(disks.FillUp(SampleOf(disks.bytes(), 2)), "full");
