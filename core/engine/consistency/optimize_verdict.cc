@@ -13,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "core/common/disjoint_sets.h"
 #include "core/common/status.h"
 #include "core/registration/place_match.h"
 
@@ -135,22 +136,22 @@ absl::Status Compare(const GraphWorld& world,
   return absl::OkStatus();
 }
 
-// But for the largest, and those that a loose step leads to.
+// But for the largest, and those that loose steps lead to from there.
 void FindParts(const GraphWorld& world,
                const std::vector<std::size_t>& parts,
                const std::set<ScanNumber>& damaged,
                OptimizeVerdict& verdict) {
+  DisjointSets tied;
+  for (const auto& [before, node] : verdict.loose_steps) tied.Join(parts[before], parts[node]);
   std::map<std::size_t, std::vector<std::size_t>> nodes;
   for (std::size_t k = 0; k < parts.size(); ++k) {
-    if (!damaged.contains(world.number(k))) nodes[parts[k]].push_back(k);
+    if (!damaged.contains(world.number(k))) nodes[tied.Root(parts[k])].push_back(k);
   }
   std::vector<std::vector<std::size_t>> by_size;
   for (auto& [part, members] : nodes) by_size.push_back(std::move(members));
   std::ranges::stable_sort(by_size, std::greater(), &std::vector<std::size_t>::size);
   for (std::size_t k = 1; k < by_size.size(); ++k) {
-    const std::size_t first = by_size[k][0];
-    if (std::ranges::find(verdict.loose_steps, first) != verdict.loose_steps.end()) continue;
-    verdict.apart.emplace_back(first, by_size[k].size());
+    verdict.apart.emplace_back(by_size[k][0], by_size[k].size());
   }
 }
 
@@ -163,7 +164,7 @@ void FindLooseSteps(const GraphWorld& world,
     for (std::size_t k = 1; k < trajectory.size(); ++k) {
       ++verdict.steps;
       if (parts[trajectory[k - 1]] == parts[trajectory[k]]) continue;
-      verdict.loose_steps.push_back(trajectory[k]);
+      verdict.loose_steps.emplace_back(trajectory[k - 1], trajectory[k]);
     }
   }
 }
@@ -182,7 +183,7 @@ std::string StepsMessage(const GraphWorld& world, const OptimizeVerdict& verdict
                       loose.size(),
                       verdict.steps);
   for (std::size_t k = 0; k < std::min(kNamed, loose.size()); ++k) {
-    absl::StrAppend(&message, k == 0 ? "" : ", ", world.id(loose[k]).ToString());
+    absl::StrAppend(&message, k == 0 ? "" : ", ", world.id(loose[k].second).ToString());
   }
   return absl::StrCat(message, loose.size() > kNamed ? ", …)" : ")");
 }

@@ -22,16 +22,16 @@ struct OptimizeVerdict {
   // known of their places where they end up.
   bool is_sound = true;
   std::size_t steps = 0;  // from scan to scan along trajectories
-  // Those whose two scans no match, closure or given constraint joins, on any way: the nodes that
-  // they lead to.
-  std::vector<std::size_t> loose_steps;
+  // Those whose two scans no match, closure or given constraint joins, on any way: the nodes from
+  // and to which they lead.
+  std::vector<std::pair<std::size_t, std::size_t>> loose_steps;
   // Pairs of scans near each other that something joins, along trajectories and across, spread over
   // the map; and those of them where one looked through much of what the other saw.
   std::size_t compared = 0;
   std::size_t contradicted = 0;
   std::vector<std::string> at_odds;  // robots that most pairs of theirs speak against
-  // Parts of the map that nothing joins to the largest and that no loose step leads to: the first
-  // node and how many there are.
+  // Parts of the map that nothing joins to the largest, and no loose steps either: the first node
+  // and how many there are.
   std::vector<std::pair<std::size_t, std::size_t>> apart;
   std::size_t priors = 0;  // absolute poses, and those that do not fit
   std::size_t priors_rejected = 0;

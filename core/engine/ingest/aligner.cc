@@ -29,6 +29,9 @@ constexpr std::size_t kMaxConstraints = 3;
 // The first scan of a trajectory is looked for in so many parts of the map.
 constexpr std::size_t kPartsTried = 3;
 
+// Lost scans that a scan is matched to, one by one: nothing says where they are to each other.
+constexpr std::size_t kLostTried = 3;
+
 // So few scans of a pass are matched whatever their height: a ramp leads from one to the next.
 constexpr std::size_t kJustBefore = 3;
 
@@ -181,7 +184,7 @@ std::vector<std::size_t> Aligner::LostBefore(const ScanId& id) const {
   std::vector<std::size_t> lost;
   const std::map<std::uint64_t, std::size_t>& trajectory = trajectories_.at(id.trajectory);
   auto before = trajectory.lower_bound(id.sequence);
-  while (before != trajectory.begin() && lost.size() < kOwnPass) {
+  while (before != trajectory.begin() && lost.size() < kLostTried) {
     const std::size_t i = (--before)->second;
     if (!scans_[i].is_lost) break;
     lost.push_back(i);
@@ -301,14 +304,17 @@ absl::StatusOr<Placement> Aligner::PlaceAmongLost(const ScanRecord& scan,
                                                   StorageReader& reader,
                                                   ScanSource& source) {
   const Pose guess = placement.T_map_scan;
-  STRATA_ASSIGN_OR_RETURN(const Neighbourhood around,
-                          NeighboursOf(guess, LostBefore(scan.header.id), reader, source));
-  if (around.seen.empty()) return placement;
-  const Link link = LinkScan(seen, around.seen, guess, Nearness::kSamePass);
-  if (!link.report.aligned) return placement;
-  placement.report = link.report;
-  placement.T_map_scan = link.T_map_scan;
-  placement.constraints = ConstraintsOf(scan.number, link, around.indices);
+  for (const std::size_t lost : LostBefore(scan.header.id)) {
+    STRATA_ASSIGN_OR_RETURN(const Neighbourhood around,
+                            NeighboursOf(guess, {lost}, reader, source));
+    if (around.seen.empty()) continue;
+    const Link link = LinkScan(seen, around.seen, guess, Nearness::kSamePass);
+    if (!link.report.aligned) continue;
+    placement.report = link.report;
+    placement.T_map_scan = link.T_map_scan;
+    placement.constraints = ConstraintsOf(scan.number, link, around.indices);
+    break;
+  }
   return placement;
 }
 

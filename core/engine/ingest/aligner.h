@@ -106,7 +106,8 @@ class Aligner {
                                              const Pose& guess,
                                              StorageReader& reader,
                                              ScanSource& source);
-  // Of a scan that its segment says nothing about: to the lost ones right before it.
+  // Of a scan that its segment says nothing about: to the last of the lost ones right before it
+  // that shows the same.
   absl::StatusOr<Placement> PlaceAmongLost(const ScanRecord& scan,
                                            const SeenScan& seen,
                                            Placement placement,

@@ -25,6 +25,7 @@ namespace {
 // A scan registered to a chain of scans.
 struct Match {
   ScanChain chain;
+  bool tried = false;  // not where data are damaged
   bool good = false;
   // T_i_scan as measured, i being scans of the chain, nearest first.
   std::vector<std::pair<std::size_t, Pose>> T_i_scan;
@@ -77,6 +78,7 @@ class Alignment {
         matches_(problem.T_map_scan.size()),
         measured_(problem.T_map_scan.size()),
         odometry_(problem.T_map_scan.size(), nullptr),
+        loose_(problem.T_map_scan.size(), false),
         surfaces_(problem, source, options) {
     result_.T_map_scan = problem.T_map_scan;
     for (const ScanPair& pair : problem.pairs) {
@@ -188,7 +190,7 @@ class Alignment {
     STRATA_RETURN_IF_ERROR(for_each_(matches_.size(), [&](std::size_t node) -> absl::Status {
       STRATA_RETURN_IF_ERROR(stop_.status());
       std::vector<Match> before = std::exchange(matches_[node], {});
-      for (ScanChain& chain : chains_.Around(node, result_.T_map_scan)) {
+      for (ScanChain& chain : chains_.Around(node, result_.T_map_scan, loose_)) {
         if (chain.own && MeasuredHolds(node)) continue;
         const auto known = std::find_if(before.begin(), before.end(), [&](const Match& match) {
           return match.chain.nodes == chain.nodes && StillHolds(node, match);
@@ -207,7 +209,22 @@ class Alignment {
       round.registered += registered[node];
       for (const Match& match : matches_[node]) round.matches += match.good ? 1 : 0;
     }
+    FindLoose();
     return absl::OkStatus();
+  }
+
+  // Scans that neither a match to what is behind them nor anything given tells the place of.
+  void FindLoose() {
+    for (std::size_t node = 0; node < matches_.size(); ++node) {
+      const auto has = [&](bool Match::*what) {
+        return std::ranges::any_of(
+            matches_[node], [&](const Match& match) { return match.chain.own && match.*what; });
+      };
+      loose_[node] = has(&Match::tried) && !has(&Match::good) && !MeasuredHolds(node);
+    }
+    for (const RelativePoseTerm& term : problem_.relative) {
+      if (!term.may_be_false) loose_[std::max(term.i, term.j)] = false;
+    }
   }
 
   // Whether what was measured when the scan came in still tells where it is on its own way.
@@ -247,6 +264,7 @@ class Alignment {
     }
     const RegistrationTarget target(placed, {.centre = pose(node).translation()});
     const RegistrationResult result = RegisterScan(*own, target, pose(node), options_.registration);
+    match.tried = !seen.empty();
     match.good = Acceptable(result.termination) &&
                  (!match.chain.may_be_false || result.overlap >= kMinDoubtfulOverlap);
     if (!match.good) return match;
@@ -416,6 +434,7 @@ class Alignment {
   std::vector<std::vector<Match>> matches_;             // of every node
   std::vector<std::vector<const ScanPair*>> measured_;  // of every node j
   std::vector<const RelativePoseTerm*> odometry_;       // of every node j; nullptr: none
+  std::vector<bool> loose_;                             // of every node, in the round before
   SharedSurfaces surfaces_;
   std::map<Decision, bool> believed_;  // in the round before
   std::vector<bool> believed_priors_;

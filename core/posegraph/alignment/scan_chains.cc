@@ -28,7 +28,7 @@ std::vector<std::size_t> PartsOfProblem(const AlignmentProblem& problem) {
 }  // namespace
 
 ScanChains::ScanChains(const AlignmentProblem& problem, const NeighbourPolicy& policy)
-    : policy_(policy), part_(PartsOfProblem(problem)) {
+    : policy_(policy), trajectories_(problem.trajectories), part_(PartsOfProblem(problem)) {
   ++policy_.max_scans;  // a scan is its own nearest
   const std::size_t nodes = problem.T_map_scan.size();
   way_.resize(nodes);
@@ -53,10 +53,23 @@ bool ScanChains::OwnPass(std::size_t node, std::size_t other) const {
          std::max(place, other_place) - std::min(place, other_place) <= kOwnPass;
 }
 
+// Of what follows `before` on its trajectory, up to but without `end`.
+bool ScanChains::IsLooseBetween(const Place& before,
+                                std::size_t end,
+                                const std::vector<bool>& loose) const {
+  if (loose.empty()) return false;
+  const std::vector<std::size_t>& trajectory = trajectories_[before.first];
+  for (std::size_t k = before.second + 1; k < end; ++k) {
+    if (loose[trajectory[k]]) return true;
+  }
+  return false;
+}
+
 std::vector<ScanChain> ScanChains::Around(std::size_t node,
-                                          std::span<const Pose> T_map_scan) const {
-  // By trajectory and place, with whether more than nearness speaks for it.
-  std::vector<std::pair<std::pair<std::size_t, std::size_t>, std::pair<std::size_t, bool>>> around;
+                                          std::span<const Pose> T_map_scan,
+                                          const std::vector<bool>& loose) const {
+  // With whether more than nearness speaks for it.
+  std::vector<std::pair<Place, std::pair<std::size_t, bool>>> around;
   const auto add = [&](std::size_t other, bool known) {
     if (!known && part_[other] != part_[node]) return;
     if (other == node || excluded_.contains(std::minmax(node, other))) return;
@@ -71,13 +84,15 @@ std::vector<ScanChain> ScanChains::Around(std::size_t node,
   for (const Partner& partner : partners_[node]) add(partner.node, !partner.may_be_false);
   std::sort(around.begin(), around.end());
   std::vector<ScanChain> chains;
-  std::pair<std::size_t, std::size_t> last;
+  Place last;
   for (const auto& [way, other] : around) {
-    const bool same_pass =
-        !chains.empty() && way.first == last.first && way.second - last.second <= kSamePass;
+    const bool same_pass = !chains.empty() && way.first == last.first &&
+                           way.second - last.second <= kSamePass &&
+                           !IsLooseBetween(last, way.second + 1, loose);
     if (!same_pass) chains.push_back({{}, false, true});
     ScanChain& chain = chains.back();
-    chain.own = chain.own || OwnPass(node, other.first);
+    chain.own =
+        chain.own || (OwnPass(node, other.first) && !IsLooseBetween(way, way_[node].second, loose));
     if (chain.own || other.second) chain.may_be_false = false;
     if (chain.nodes.empty() || chain.nodes.back() != other.first) {
       chain.nodes.push_back(other.first);

@@ -28,11 +28,18 @@ class ScanChains {
   // Around `node` at these poses: of the scans near by and of those that the problem pairs it with,
   // one chain for every pass of a robot. Of its own pass only what is behind it, or nothing that
   // was measured about it would be independent of where it is. Scans that nothing joins to it are
-  // not near: they have a frame of their own, and what looks alike there says nothing.
-  std::vector<ScanChain> Around(std::size_t node, std::span<const Pose> T_map_scan) const;
+  // not near: they have a frame of their own, and what looks alike there says nothing. A chain ends
+  // before a node that is `loose`, one that nothing is known about from the scans before it: what
+  // matches one side of such a step says nothing of the other. Empty: none is.
+  std::vector<ScanChain> Around(std::size_t node,
+                                std::span<const Pose> T_map_scan,
+                                const std::vector<bool>& loose = {}) const;
 
  private:
+  using Place = std::pair<std::size_t, std::size_t>;  // trajectory, and the index in it
+
   bool OwnPass(std::size_t node, std::size_t other) const;
+  bool IsLooseBetween(const Place& before, std::size_t end, const std::vector<bool>& loose) const;
 
   struct Partner {
     std::size_t node = 0;
@@ -40,8 +47,9 @@ class ScanChains {
   };
 
   NeighbourPolicy policy_;
-  std::vector<std::pair<std::size_t, std::size_t>> way_;  // of every node: trajectory, place in it
-  std::vector<std::vector<Partner>> partners_;            // of every node, by the problem's pairs
+  std::span<const std::vector<std::size_t>> trajectories_;
+  std::vector<Place> way_;                      // of every node
+  std::vector<std::vector<Partner>> partners_;  // of every node, by the problem's pairs
   std::vector<std::size_t> part_;  // of every node: of what is joined or placed by priors
   std::set<std::pair<std::size_t, std::size_t>> excluded_;  // smaller node first
 };

@@ -46,8 +46,8 @@ class ScanChainsTest : public ::testing::Test {
     policy_.max_scans = 100;
   }
 
-  std::vector<ScanChain> Around(std::size_t node) const {
-    return ScanChains(problem_, policy_).Around(node, problem_.T_map_scan);
+  std::vector<ScanChain> Around(std::size_t node, const std::vector<bool>& loose = {}) const {
+    return ScanChains(problem_, policy_).Around(node, problem_.T_map_scan, loose);
   }
   // Where the way back passes x.
   static std::size_t BackAt(std::size_t x) { return kBack + kLength - 1 - x; }
@@ -65,6 +65,25 @@ TEST_F(ScanChainsTest, WhatNothingJoinsIsNotNear) {
   problem_.priors.clear();
   problem_.pairs = {{10, kOther + 10}};
   EXPECT_THAT(Around(30), SizeIs(3));
+}
+
+TEST_F(ScanChainsTest, AChainEndsBeforeALooseStep) {
+  std::vector<bool> loose(kNodes, false);
+  loose[9] = true;
+  loose[BackAt(10)] = true;
+  const std::vector<ScanChain> chains = Around(10, loose);
+  ASSERT_THAT(chains, SizeIs(5));
+  EXPECT_THAT(chains[0].nodes, ElementsAre(7, 8));
+  EXPECT_FALSE(chains[0].own);
+  EXPECT_TRUE(chains[0].may_be_false);
+  EXPECT_THAT(chains[1].nodes, ElementsAre(9));
+  EXPECT_TRUE(chains[1].own);
+  EXPECT_THAT(chains[2].nodes, ElementsAre(BackAt(12), BackAt(11)));
+  EXPECT_THAT(chains[3].nodes, ElementsAre(BackAt(10), BackAt(9), BackAt(8)));
+  // The step to a scan itself: what is behind it is what it has to be matched to.
+  ASSERT_THAT(Around(9, loose), SizeIs(4));
+  EXPECT_THAT(Around(9, loose)[0].nodes, ElementsAre(6, 7, 8));
+  EXPECT_TRUE(Around(9, loose)[0].own);
 }
 
 TEST_F(ScanChainsTest, OfItsOwnPassOnlyWhatIsBehindOfOthersAll) {
