@@ -2,7 +2,7 @@
 // any order. Is where they are said to be to each other right?
 //
 //   fleet [--seed 1] [--draws 10] [--worlds campus_loop,car_park,…] [--frames one,off,own,jump]
-//         [--each]
+//         [--mounts level,tilted,upright,handheld,cone] [--each]
 //
 // A draw chooses the number of robots (2 to 5), their stretches (neighbours have up to 10 scans of
 // 2 m in common, or none), the sensor (rings, columns, range), and the order of uploads. Frames:
@@ -10,12 +10,19 @@
 //   off   each is 1 m and 0.1 rad off at its start (σ an axis, height 0.1 m)
 //   own   each has an origin and a heading of its own, 50 to 300 m from the others
 //   jump  it is one robot, whose odometry jumps by up to 6 m and 0.4 rad between its stretches
+// and mounts, which take turns:
+//   level     on a vehicle, its rings around what is up there
+//   tilted    looks down in front, by 0.3 to 0.7 rad
+//   upright   lies on its side, so that a turn goes over the head
+//   handheld  is carried: rolls, pitches (σ 0.1 rad) and bobs (σ 0.1 m) from scan to scan
+//   cone      sees 1.4 rad in front only, as densely as solid-state sensors do
 // Two robots are right to each other if their middle scans are, to 1 m. `optimize` keeps the first
 // scan of what it joins where it was said to be. So after it a robot is
 //   joined  right to another one
 //   alone   right to nobody, and its first scan is where it was said to be, to 1 m
 //   wrong   neither it nor any robot that is right to it is where it was said to be
-// A fleet that stays apart costs coverage, a wrong one the map: exits 1 if any robot is wrong.
+// A fleet that stays apart costs coverage, a wrong one the map: exits 1 if any robot is wrong. How
+// far those that are right to each other are off at most is printed beside.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -46,6 +53,12 @@ constexpr char kMap[] = "fleet";
 constexpr double kRightM = 1.0;
 constexpr double kStepM = 2.0;
 constexpr double kSensorHeightM = 1.2;
+
+// How a drive carries its sensor.
+struct Mount {
+  std::string kind;
+  double half_view_rad = M_PI;  // of what is seen, on both sides of the front
+};
 
 struct FleetRobot {
   std::string name;  // of its trajectory
@@ -81,9 +94,28 @@ Pose OffOf(const std::string& frames, Random& random) {
   return Upright(x, y, z, turn);
 }
 
-std::vector<FleetRobot> FleetOf(const World& world, const std::string& frames, Random& random) {
+Pose Turned(double angle_rad, const Eigen::Vector3d& axis) {
+  return Pose(Eigen::AngleAxisd(angle_rad, axis));
+}
+
+std::vector<Pose> WayOf(const World& world, const Mount& mount, Random random) {
   const Robot& driver = world.loops.empty() ? world.robots.front() : world.loops.front();
-  const std::vector<Pose> way = Drive(world.scene, driver.waypoints, kStepM, kSensorHeightM);
+  std::vector<Pose> way = Drive(world.scene, driver.waypoints, kStepM, kSensorHeightM);
+  const double down_rad = random.Uniform(0.3, 0.7);
+  for (Pose& pose : way) {
+    if (mount.kind == "tilted") pose = pose * Turned(down_rad, Eigen::Vector3d::UnitY());
+    if (mount.kind == "upright") pose = pose * Turned(M_PI / 2, Eigen::Vector3d::UnitX());
+    if (mount.kind != "handheld") continue;
+    pose = Pose(Eigen::Translation3d(0.0, 0.0, 0.1 * random.Gaussian())) * pose *
+           Turned(0.1 * random.Gaussian(), Eigen::Vector3d::UnitY()) *
+           Turned(0.1 * random.Gaussian(), Eigen::Vector3d::UnitX());
+  }
+  return way;
+}
+
+std::vector<FleetRobot> FleetOf(const std::vector<Pose>& way,
+                                const std::string& frames,
+                                Random& random) {
   const auto count = static_cast<std::size_t>(random.Uniform(2.0, 6.0));
   std::vector<FleetRobot> robots;
   for (std::size_t r = 0; r < count; ++r) {
@@ -105,9 +137,7 @@ std::vector<FleetRobot> FleetOf(const World& world, const std::string& frames, R
 }
 
 // The stretches of one robot.
-std::vector<FleetRobot> JumpsOf(const World& world, Random& random) {
-  const Robot& driver = world.loops.empty() ? world.robots.front() : world.loops.front();
-  const std::vector<Pose> way = Drive(world.scene, driver.waypoints, kStepM, kSensorHeightM);
+std::vector<FleetRobot> JumpsOf(const std::vector<Pose>& way, Random& random) {
   const std::vector<Pose> odometry = NoisyOdometry(way, OdometryNoise(), random.Bits());
   const auto count = static_cast<std::size_t>(random.Uniform(2.0, 6.0));
   std::vector<FleetRobot> stretches;
@@ -144,13 +174,24 @@ SensorOptions SensorOf(Random& random) {
   return sensor;
 }
 
+PointCloud InView(const PointCloud& cloud, const Mount& mount) {
+  PointCloud seen;
+  for (const Eigen::Vector3f& point : cloud.points) {
+    if (std::abs(std::atan2(point.y(), point.x())) <= mount.half_view_rad) {
+      seen.points.push_back(point);
+    }
+  }
+  return seen;
+}
+
 absl::Status Send(api::Database& db,
                   const Scene& scene,
                   const SensorOptions& sensor,
+                  const Mount& mount,
                   std::uint64_t seed,
                   FleetRobot& robot) {
   const std::size_t k = robot.sent++;
-  const PointCloud cloud = SimulateScan(scene, sensor, robot.truth[k], seed);
+  const PointCloud cloud = InView(SimulateScan(scene, sensor, robot.truth[k], seed), mount);
   ScanHeader header;
   header.id = robot.Id(k);
   header.T_map_scan = robot.said[k];
@@ -180,6 +221,7 @@ absl::StatusOr<JobInfo> Optimize(api::Database& db) {
 
 struct Verdicts {
   int joined = 0, alone = 0, wrong = 0;
+  double off_m = 0.0;  // of those that are right to each other, at most
 };
 
 absl::StatusOr<Pose> PoseOf(api::Database& db, const FleetRobot& robot, std::size_t k) {
@@ -214,12 +256,15 @@ absl::StatusOr<double> Error(api::Database& db, const FleetRobot& a, const Fleet
 
 // Names the wrong ones.
 absl::StatusOr<Verdicts> Judge(api::Database& db, const std::vector<FleetRobot>& robots) {
+  Verdicts verdicts;
   DisjointSets right;
   std::vector<std::vector<double>> errors(robots.size());
   for (std::size_t a = 0; a < robots.size(); ++a) {
     for (std::size_t b = 0; b < robots.size(); ++b) {
       STRATA_ASSIGN_OR_RETURN(errors[a].emplace_back(), Error(db, robots[a], robots[b]));
-      if (errors[a][b] <= kRightM) right.Join(a, b);
+      if (errors[a][b] > kRightM) continue;
+      right.Join(a, b);
+      verdicts.off_m = std::max(verdicts.off_m, errors[a][b]);
     }
   }
   std::vector<bool> holds(robots.size(), false);
@@ -229,7 +274,6 @@ absl::StatusOr<Verdicts> Judge(api::Database& db, const std::vector<FleetRobot>&
     if (moved <= kRightM) holds[right.Root(a)] = true;
     ++size[right.Root(a)];
   }
-  Verdicts verdicts;
   for (std::size_t a = 0; a < robots.size(); ++a) {
     const std::size_t root = right.Root(a);
     if (holds[root]) {
@@ -267,13 +311,19 @@ absl::Status PrintSteps(api::Database& db, const std::vector<FleetRobot>& robots
 
 absl::StatusOr<Verdicts> Draw(const std::string& name,
                               const std::string& frames,
+                              const Mount& mount,
                               std::uint64_t seed,
                               bool each) {
   Random random(seed);
   const World world = WorldOf(name, seed);
+  const std::vector<Pose> way = WayOf(world, mount, Random(seed));
   const bool is_one = frames == "jump";
-  std::vector<FleetRobot> robots = is_one ? JumpsOf(world, random) : FleetOf(world, frames, random);
-  const SensorOptions sensor = SensorOf(random);
+  std::vector<FleetRobot> robots = is_one ? JumpsOf(way, random) : FleetOf(way, frames, random);
+  SensorOptions sensor = SensorOf(random);
+  if (mount.kind == "cone") {
+    sensor.rings = 48;
+    sensor.columns = 1440;
+  }
   const TempDir directory;
   EngineOptions options;
   options.directory = directory.path();
@@ -287,7 +337,7 @@ absl::StatusOr<Verdicts> Draw(const std::string& name,
     }
     if (left.empty()) break;
     FleetRobot& next = *left[is_one ? 0 : random.Bits() % left.size()];
-    STRATA_RETURN_IF_ERROR(Send(*db, world.scene, sensor, seed * 10000 + scans, next));
+    STRATA_RETURN_IF_ERROR(Send(*db, world.scene, sensor, mount, seed * 10000 + scans, next));
     ++scans;
   }
   STRATA_RETURN_IF_ERROR(AwaitIntegrated(*db));
@@ -296,10 +346,12 @@ absl::StatusOr<Verdicts> Draw(const std::string& name,
   if (each) STRATA_RETURN_IF_ERROR(PrintSteps(*db, robots));
   STRATA_ASSIGN_OR_RETURN(const Verdicts verdicts, Judge(*db, robots));
   std::printf(
-      "%-12s %-4s seed %-6llu %zu robots %4zu scans %2d x %3d to %2.0f m: %d joined, %d alone, "
-      "%d wrong; %s\n",
+      "%-12s %-4s %-8s seed %-6llu %zu robots %4zu scans %2d x %3d to %2.0f m: %d joined to %.3f "
+      "m, "
+      "%d alone, %d wrong; %s\n",
       name.c_str(),
       frames.c_str(),
+      mount.kind.c_str(),
       static_cast<unsigned long long>(seed),
       robots.size(),
       scans,
@@ -307,6 +359,7 @@ absl::StatusOr<Verdicts> Draw(const std::string& name,
       sensor.columns,
       sensor.max_range_m,
       verdicts.joined,
+      verdicts.off_m,
       verdicts.alone,
       verdicts.wrong,
       job.message.c_str());
@@ -323,15 +376,20 @@ int Main(int argc, char** argv) {
   app.add_option("--seed", seed, "Of the first draw");
   app.add_option("--draws", draws, "Of each world and kind of frames");
   app.add_option("--worlds", worlds, "Of strata-simulate")->delimiter(',');
+  std::vector<std::string> mounts = {"level", "tilted", "upright", "handheld", "cone"};
   app.add_option("--frames", frames, "one, off, own, jump")->delimiter(',');
+  app.add_option("--mounts", mounts, "level, tilted, upright, handheld, cone")->delimiter(',');
   bool each = false;
   app.add_flag("--each", each, "Every scan's error after the one before it, before and after");
   CLI11_PARSE(app, argc, argv);
   std::map<std::string, Verdicts> all;
+  std::size_t drawn = 0;
   for (int d = 0; d < draws; ++d, ++seed) {
     for (const std::string& world : worlds) {
       for (const std::string& kind : frames) {
-        const auto verdicts = Draw(world, kind, seed, each);
+        Mount mount{mounts.at((drawn++ + static_cast<std::size_t>(d)) % mounts.size())};
+        if (mount.kind == "cone") mount.half_view_rad = 0.7;
+        const auto verdicts = Draw(world, kind, mount, seed, each);
         if (!verdicts.ok()) {
           std::fprintf(stderr, "%s\n", verdicts.status().ToString().c_str());
           return 2;
@@ -339,14 +397,16 @@ int Main(int argc, char** argv) {
         all[kind].joined += verdicts->joined;
         all[kind].alone += verdicts->alone;
         all[kind].wrong += verdicts->wrong;
+        all[kind].off_m = std::max(all[kind].off_m, verdicts->off_m);
       }
     }
   }
   bool holds = true;
   for (const auto& [kind, verdicts] : all) {
-    std::printf("frames %-4s %4d robots joined, %4d alone, %4d wrong\n",
+    std::printf("frames %-4s %4d robots joined to %.3f m, %4d alone, %4d wrong\n",
                 kind.c_str(),
                 verdicts.joined,
+                verdicts.off_m,
                 verdicts.alone,
                 verdicts.wrong);
     holds = holds && verdicts.wrong == 0;
