@@ -22,6 +22,7 @@
 #include "core/registration/column_grid.h"
 #include "core/registration/place_search.h"
 #include "core/registration/registration_target.h"
+#include "core/registration/upright_frame.h"
 #include "core/registration/view_check.h"
 
 namespace strata {
@@ -69,8 +70,8 @@ struct Comparison {
 };
 
 // Adds what `image` says of a point, in the image's frame.
-Sight Look(const Eigen::Vector3f& p_image, const ViewImage& image, Comparison& sum) {
-  const Sight sight = image.At(p_image);
+Sight Look(const Eigen::Vector3f& p_image, bool upright, const ViewImage& image, Comparison& sum) {
+  const Sight sight = image.At(p_image, !upright);
   sum.no_return += sight == Sight::kNoReturn ? 1 : 0;
   sum.seen_through += sight == Sight::kSeenThrough ? 1 : 0;
   sum.visible += sight == Sight::kSeenThrough || sight == Sight::kAgreeing ? 1 : 0;
@@ -144,7 +145,7 @@ void Compare(const std::vector<SampledPoint>& points,
   const Eigen::Isometry3f to_grid = T_grid_points.cast<float>();
   for (const SampledPoint& point : points) {
     const Eigen::Vector3f p_image = to_image * point.p;
-    const Sight sight = Look(p_image, image, sum);
+    const Sight sight = Look(p_image, point.upright, image, sum);
     if (sight == Sight::kUnknown || sight == Sight::kNoReturn) continue;
     if (p_image.norm() > kComparedRangeM) continue;
     Count(point, to_grid, grids, kPartnerM, sum);
@@ -167,6 +168,7 @@ class Matcher {
           const PlaceMatchOptions& options)
       : options_(options),
         source_(*source.features),
+        T_upright_source_(UprightTurn(source_.up())),
         target_(Placed(target), {.radius_m = options.radius_m + window_m, .centre = centre}),
         search_(source_, target_),
         source_view_(source_, source.sensor_origin),
@@ -182,16 +184,18 @@ class Matcher {
 
   void Try(const PlaceHypothesis& hypothesis, std::vector<Fit>& fits) const {
     std::vector<Pose> starts = {hypothesis.T_target_source};
-    const Eigen::Matrix3d& R = hypothesis.T_target_source.linear();
-    const double tilt = TiltRad(hypothesis.T_target_source);
+    PlaceHypothesis upright = hypothesis;
+    upright.T_target_source = hypothesis.T_target_source * T_upright_source_.inverse();
+    const Eigen::Matrix3d& R = upright.T_target_source.linear();
+    const double tilt = TiltRad(upright.T_target_source);
     const Eigen::AngleAxisd untilted(std::atan2(R(1, 0), R(0, 0)), Eigen::Vector3d::UnitZ());
     for (const CoarsePlace& place :
-         search_.Search(hypothesis, static_cast<std::size_t>(options_.max_starts))) {
-      starts.push_back(place.T_target_source);
+         search_.Search(upright, static_cast<std::size_t>(options_.max_starts))) {
+      starts.push_back(place.T_target_upright * T_upright_source_);
       if (tilt < kTiltMatters) continue;
-      Pose tilted = place.T_target_source;
+      Pose tilted = place.T_target_upright;
       tilted.linear() = tilted.linear() * untilted.inverse() * R;
-      starts.push_back(tilted);
+      starts.push_back(tilted * T_upright_source_);
     }
     for (const Pose& start : starts) {
       if (std::optional<Fit> fit = FitFrom(start); fit.has_value()) fits.push_back(*fit);
@@ -208,7 +212,7 @@ class Matcher {
     int count = 0;
     for (const SampledFeature& feature : source_.sample()) {
       const Eigen::Vector3f& p = feature.element.point;
-      const Eigen::Vector3f n = feature.element.normal;
+      const Eigen::Vector3f n = T_upright_source_.linear().cast<float>() * feature.element.normal;
       if (n.isZero() || p.norm() > kComparedRangeM) continue;
       if (!HasPartner(to_grid * p, target_)) continue;
       const Eigen::Vector2d across = n.head<2>().cast<double>();
@@ -258,6 +262,7 @@ class Matcher {
 
   const PlaceMatchOptions& options_;
   const ScanFeatures& source_;
+  const Pose T_upright_source_;
   RegistrationTarget target_;
   PlaceSearch search_;
   ViewImage source_view_;
@@ -307,6 +312,47 @@ PlaceVerdict VerdictOn(const Fit& fit,
   return rival >= options.rival_share ? PlaceVerdict::kAmbiguous : PlaceVerdict::kMatched;
 }
 
+// MatchPlace() in a target frame whose z axis is the vertical.
+PlaceMatch MatchUpright(const SeenScan& source,
+                        std::span<const SeenScan> target,
+                        std::span<const PlaceHypothesis> hypotheses,
+                        const PlaceMatchOptions& options) {
+  PlaceMatch match;
+  if (hypotheses.empty() || target.empty()) return match;
+  match.T_target_source = hypotheses[0].T_target_source;
+  double window_m = 0.0;
+  for (const PlaceHypothesis& hypothesis : hypotheses) {
+    const double apart =
+        (hypothesis.T_target_source.translation() - match.T_target_source.translation()).norm();
+    window_m = std::max(window_m, apart + hypothesis.radius_m);
+  }
+  const Matcher matcher(source, target, match.T_target_source.translation(), window_m, options);
+  std::vector<Fit> fits;
+  for (const PlaceHypothesis& hypothesis : hypotheses) matcher.Try(hypothesis, fits);
+  if (fits.empty()) return match;
+  const Fit& best = *std::max_element(
+      fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.score() < b.score(); });
+  for (const Fit& fit : fits) {
+    if (SamePlace(fit.registration.T_target_source, best.registration.T_target_source, options) ||
+        best.score() <= 0.0) {
+      continue;
+    }
+    match.rival = std::max(match.rival, fit.score() / best.score());
+  }
+  match.hold = matcher.Hold(best.registration.T_target_source);
+  match.T_target_source = best.registration.T_target_source;
+  match.information = best.registration.information;
+  match.rms_m = best.registration.rms_m;
+  match.overlap = best.overlap;
+  match.contradiction = best.contradiction;
+  match.verdict = VerdictOn(best, match.hold, match.rival, options);
+  if (match.matched() && options.max_contradiction > 0.0) {
+    match.confidence = match.overlap * (1.0 - match.contradiction / options.max_contradiction) *
+                       (1.0 - match.rival);
+  }
+  return match;
+}
+
 }  // namespace
 
 PlaceHypothesis SaidHypothesis(const Pose& T_target_source) {
@@ -314,20 +360,22 @@ PlaceHypothesis SaidHypothesis(const Pose& T_target_source) {
 }
 
 bool IsWithin(const Pose& T_target_source, const PlaceHypothesis& window) {
-  const Pose off = window.T_target_source.inverse() * T_target_source;
-  return off.translation().head<2>().norm() <= window.radius_m &&
-         std::abs(off.translation().z()) <= window.height_range_m &&
-         std::abs(std::atan2(off.linear()(1, 0), off.linear()(0, 0))) <= window.heading_range_rad;
+  const Eigen::Vector3d off = T_target_source.translation() - window.T_target_source.translation();
+  const Eigen::Matrix3d turn =
+      T_target_source.linear() * window.T_target_source.linear().transpose();
+  return off.head<2>().norm() <= window.radius_m && std::abs(off.z()) <= window.height_range_m &&
+         std::abs(std::atan2(turn(1, 0), turn(0, 0))) <= window.heading_range_rad;
 }
 
 std::vector<PlaceHypothesis> HypothesesOf(const PlaceSimilarity& similarity,
-                                          const Pose& T_target_scan) {
+                                          const Eigen::Matrix3d& R_upright_target,
+                                          const Eigen::Matrix3d& R_upright_source) {
   std::vector<PlaceHypothesis> hypotheses(2);
   for (int half_turns = 0; half_turns < 2; ++half_turns) {
-    Pose& T = hypotheses[static_cast<std::size_t>(half_turns)].T_target_source;
-    T = T_target_scan;
-    T.rotate(Eigen::AngleAxisd(similarity.heading_rad + half_turns * std::numbers::pi,
-                               Eigen::Vector3d::UnitZ()));
+    const Eigen::AngleAxisd turn(similarity.heading_rad + half_turns * std::numbers::pi,
+                                 Eigen::Vector3d::UnitZ());
+    hypotheses[static_cast<std::size_t>(half_turns)].T_target_source.linear() =
+        R_upright_target.transpose() * turn * R_upright_source;
   }
   return hypotheses;
 }
@@ -369,7 +417,7 @@ double ContradictionOf(const SeenScan& a, const SeenScan& b) {
     const Eigen::Isometry3f to_image = T.cast<float>();
     Comparison sum;
     for (const SampledPoint& point : SampleOf(*looked_at.features)) {
-      Look(to_image * point.p, image, sum);
+      Look(to_image * point.p, point.upright, image, sum);
     }
     return sum.Contradiction();
   };
@@ -388,7 +436,7 @@ MapAgreement AgreementWithMap(const SeenScan& scan,
   const ViewImage view(features, scan.sensor_origin);
   Comparison seen;
   for (const SampledPoint& point : SampleOf(surfaces, to_grid.translation())) {
-    Look(to_scan * point.p, view, seen);
+    Look(to_scan * point.p, point.upright, view, seen);
   }
   Comparison near;
   Comparison close;
@@ -403,39 +451,18 @@ PlaceMatch MatchPlace(const SeenScan& source,
                       std::span<const SeenScan> target,
                       std::span<const PlaceHypothesis> hypotheses,
                       const PlaceMatchOptions& options) {
-  PlaceMatch match;
-  if (hypotheses.empty() || target.empty()) return match;
-  match.T_target_source = hypotheses[0].T_target_source;
-  double window_m = 0.0;
-  for (const PlaceHypothesis& hypothesis : hypotheses) {
-    const double apart =
-        (hypothesis.T_target_source.translation() - match.T_target_source.translation()).norm();
-    window_m = std::max(window_m, apart + hypothesis.radius_m);
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  for (const SeenScan& scan : target) up += scan.T_target_scan.linear() * scan.features->up();
+  if (up.isZero()) return PlaceMatch();
+  const Pose T_upright_target(UprightTurn(up));
+  std::vector<SeenScan> upright(target.begin(), target.end());
+  for (SeenScan& scan : upright) scan.T_target_scan = T_upright_target * scan.T_target_scan;
+  std::vector<PlaceHypothesis> windows(hypotheses.begin(), hypotheses.end());
+  for (PlaceHypothesis& window : windows) {
+    window.T_target_source = T_upright_target * window.T_target_source;
   }
-  const Matcher matcher(source, target, match.T_target_source.translation(), window_m, options);
-  std::vector<Fit> fits;
-  for (const PlaceHypothesis& hypothesis : hypotheses) matcher.Try(hypothesis, fits);
-  if (fits.empty()) return match;
-  const Fit& best = *std::max_element(
-      fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.score() < b.score(); });
-  for (const Fit& fit : fits) {
-    if (SamePlace(fit.registration.T_target_source, best.registration.T_target_source, options) ||
-        best.score() <= 0.0) {
-      continue;
-    }
-    match.rival = std::max(match.rival, fit.score() / best.score());
-  }
-  match.hold = matcher.Hold(best.registration.T_target_source);
-  match.T_target_source = best.registration.T_target_source;
-  match.information = best.registration.information;
-  match.rms_m = best.registration.rms_m;
-  match.overlap = best.overlap;
-  match.contradiction = best.contradiction;
-  match.verdict = VerdictOn(best, match.hold, match.rival, options);
-  if (match.matched() && options.max_contradiction > 0.0) {
-    match.confidence = match.overlap * (1.0 - match.contradiction / options.max_contradiction) *
-                       (1.0 - match.rival);
-  }
+  PlaceMatch match = MatchUpright(source, upright, windows, options);
+  match.T_target_source = T_upright_target.inverse() * match.T_target_source;
   return match;
 }
 

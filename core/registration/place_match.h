@@ -46,13 +46,14 @@ struct PlaceHypothesis {
 
 // Around where the frames of two robots say the source is, as far off as such frames are.
 PlaceHypothesis SaidHypothesis(const Pose& T_target_source);
-// Whether a pose lies in the window.
+// Whether a pose lies in the window. The target's z axis is the vertical.
 bool IsWithin(const Pose& T_target_source, const PlaceHypothesis& window);
 
-// The two headings that a descriptor's comparison leaves (a: the target scan at `T_target_scan`, b:
-// the source), upright, with the default window.
+// The two headings that a descriptor's comparison leaves (a: the target, b: the source), each
+// upright by how it is turned from its scan's frame (UprightTurn), with the default window.
 std::vector<PlaceHypothesis> HypothesesOf(const PlaceSimilarity& similarity,
-                                          const Pose& T_target_scan);
+                                          const Eigen::Matrix3d& R_upright_target,
+                                          const Eigen::Matrix3d& R_upright_source);
 
 enum class PlaceVerdict {
   kMatched,

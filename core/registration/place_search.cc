@@ -16,6 +16,7 @@
 #include "core/mls/features.h"
 #include "core/registration/column_grid.h"
 #include "core/registration/place_match.h"
+#include "core/registration/upright_frame.h"
 
 namespace strata {
 namespace {
@@ -56,7 +57,9 @@ std::vector<T> Sample(const std::vector<T>& all, std::uint32_t count) {
 PlaceSearch::PlaceSearch(const ScanFeatures& source, const RegistrationTarget& target)
     : origin_(target.origin()) {
   std::map<std::pair<int, int>, std::pair<Eigen::Vector2d, int>> cells;
-  for (const Eigen::Vector3f& p : source.points(FeatureClass::kVertical)) {
+  const Eigen::Matrix3f upright = UprightTurn(source.up()).cast<float>();
+  for (const Eigen::Vector3f& p_source : source.points(FeatureClass::kVertical)) {
+    const Eigen::Vector3f p = upright * p_source;
     auto& [sum, n] = cells
                          .try_emplace({static_cast<int>(std::floor(p.x() / kCellM)),
                                        static_cast<int>(std::floor(p.y() / kCellM))},
@@ -71,7 +74,8 @@ PlaceSearch::PlaceSearch(const ScanFeatures& source, const RegistrationTarget& t
     if (n >= kMinPoints) structure_.push_back({sum / n, std::min(1.0, n / kFullPoints)});
   }
   structure_ = Sample(structure_, kMaxStructure);
-  for (const Eigen::Vector3f& p : source.points(FeatureClass::kTraversable)) {
+  for (const Eigen::Vector3f& p_source : source.points(FeatureClass::kTraversable)) {
+    const Eigen::Vector3f p = upright * p_source;
     if (p.head<2>().norm() < kGroundRangeM) ground_.push_back(p.cast<double>());
   }
   ground_ = Sample(ground_, kMaxGround);

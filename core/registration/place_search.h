@@ -20,8 +20,9 @@ struct PlaceHypothesis;
 
 // A local maximum of the score.
 struct CoarsePlace {
-  Pose T_target_source = Pose::Identity();  // upright: the source's z axis is the target's
-  double score = 0.0;                       // share of the source's structure that fits, in [0, 1]
+  // Of the source turned upright (UprightTurn): its z axis is the target's.
+  Pose T_target_upright = Pose::Identity();
+  double score = 0.0;  // share of the source's structure that fits, in [0, 1]
 };
 
 // The images of one source and one target; several hypotheses may be searched.
@@ -29,8 +30,8 @@ class PlaceSearch {
  public:
   PlaceSearch(const ScanFeatures& source, const RegistrationTarget& target);
 
-  // At most `count` places within the hypothesis' window that differ by more than 3 m, 10° or a
-  // storey, best first.
+  // At most `count` places of the upright source within the hypothesis' window that differ by more
+  // than 3 m, 10° or a storey, best first.
   std::vector<CoarsePlace> Search(const PlaceHypothesis& hypothesis, std::size_t count) const;
 
  private:

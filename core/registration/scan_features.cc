@@ -117,11 +117,13 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map,
   for (const FeatureClass c : {FeatureClass::kTraversable, FeatureClass::kVertical}) {
     ListOf(c, points).reserve(local_map.patch_count());
   }
+  const Eigen::Vector3d p_map_sensor = options.R_map_scan * options.sensor_origin;
   const std::vector<Side> sides =
-      SidesOf(local_map, options.sensor_origin, options.max_range_m, options.up);
+      SidesOf(local_map, p_map_sensor, options.max_range_m, options.R_map_scan * options.up);
   // Tops above the sensor, behind the others: samples are drawn by place, and recorded figures with
   // them.
   std::vector<Eigen::Vector3f> overhead;
+  std::vector<Eigen::Vector3f> doubtful;
   std::size_t place = 0;
   for (const MlsTile& tile : local_map.tiles) {
     for (const Patch& patch : tile.patches) {
@@ -136,16 +138,29 @@ ScanFeatures ScanFeatures::FromMap(const MlsMap& local_map,
         AppendVertical(patch, p.head<2>(), options.samples_per_metre, offsets, cell, here, points);
       } else if (side == Side::kUnderside) {
         ListOf(FeatureClass::kNonTraversable, points).push_back(p);
-      } else if (side != Side::kDoubtful) {  // taken for a top it pulls a storey down onto it
-        const bool above = patch.mean_m() > options.sensor_origin.z();
+      } else if (side == Side::kDoubtful) {  // taken for a top it pulls a storey down onto it
+        doubtful.push_back(p);
+      } else {
+        const bool above = patch.mean_m() > p_map_sensor.z();
         (above ? overhead : ListOf(FeatureClass::kTraversable, points)).push_back(p);
       }
     }
   }
   std::vector<Eigen::Vector3f>& tops = ListOf(FeatureClass::kTraversable, points);
   tops.insert(tops.end(), overhead.begin(), overhead.end());
+  if (!options.R_map_scan.isIdentity(0.0)) {
+    const Eigen::Matrix3f R_scan_map = options.R_map_scan.transpose().cast<float>();
+    const auto turn_back = [&](std::vector<Eigen::Vector3f>& list) {
+      for (Eigen::Vector3f& p : list) p = R_scan_map * p;
+    };
+    std::ranges::for_each(points, turn_back);
+    turn_back(doubtful);
+  }
   for (auto& list : points) list.shrink_to_fit();
-  return FromPoints(std::move(points), options);
+  doubtful.shrink_to_fit();
+  ScanFeatures features = FromPoints(std::move(points), options);
+  features.doubtful_ = std::move(doubtful);
+  return features;
 }
 
 ScanFeatures ScanFeatures::FromFeatures(std::span<const Feature> features,
@@ -197,7 +212,8 @@ std::size_t ScanFeatures::size() const {
 }
 
 std::size_t ScanFeatures::memory_bytes() const {
-  std::size_t bytes = sizeof(*this) + sample_.capacity() * sizeof(SampledFeature);
+  std::size_t bytes = sizeof(*this) + sample_.capacity() * sizeof(SampledFeature) +
+                      doubtful_.capacity() * sizeof(Eigen::Vector3f);
   for (const auto& list : points_) bytes += list.capacity() * sizeof(Eigen::Vector3f);
   return bytes;
 }

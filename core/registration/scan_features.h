@@ -36,6 +36,9 @@ struct ScanFeatureOptions {
   // The vertical in its frame, as far as anybody knows; of length 1. A robot on a ramp looks up to
   // the underside of a deck that lies below its own horizon.
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  // FromMap: how the map's frame is turned from the scan's (upright_frame.h). Features come in the
+  // scan's frame whatever it is.
+  Eigen::Matrix3d R_map_scan = Eigen::Matrix3d::Identity();
 
   // INVALID_ARGUMENT naming every field out of its range.
   absl::Status Validate() const;
@@ -106,6 +109,8 @@ class ScanFeatures {
   const std::vector<Eigen::Vector3f>& points(FeatureClass c) const {
     return points_[static_cast<std::size_t>(c)];
   }
+  // Seen, too, from a side that is not sure: drawn to no other scan, but nothing looks through it.
+  const std::vector<Eigen::Vector3f>& doubtful() const { return doubtful_; }
   // In random order: any prefix is a uniform sample.
   const std::vector<SampledFeature>& sample() const { return sample_; }
   // ScanFeatureOptions::sensor_origin.
@@ -119,6 +124,7 @@ class ScanFeatures {
   Eigen::Vector3d sensor_origin_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d up_ = Eigen::Vector3d::UnitZ();
   std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points_;
+  std::vector<Eigen::Vector3f> doubtful_;
   std::vector<SampledFeature> sample_;
 };
 

@@ -36,8 +36,10 @@ int SamplesOf(const Patch& patch, double samples_per_metre) {
   return std::max(1, static_cast<int>(std::lround(patch.depth_m() * samples_per_metre)));
 }
 
-UprightOffsets::UprightOffsets(const MlsMap& local_map, double samples_per_metre)
-    : map_(local_map) {
+UprightOffsets::UprightOffsets(const MlsMap& local_map,
+                               double samples_per_metre,
+                               const Eigen::Matrix3d& R_map_scan)
+    : map_(local_map), R_map_scan_(R_map_scan.cast<float>()) {
   std::uint32_t samples = 0;
   first_.reserve(local_map.patch_count() + 1);
   for (const MlsTile& tile : local_map.tiles) {
@@ -96,7 +98,8 @@ void UprightOffsets::Add(std::span<const Eigen::Vector3f> points) {
   const double cell_size = map_.parameters.cell_size_m;
   const double cells_per_metre = 1.0 / cell_size;
   const MlsTile* tile = nullptr;  // the next point lies most often in the same
-  for (const Eigen::Vector3f& p : points) {
+  for (const Eigen::Vector3f& p_scan : points) {
+    const Eigen::Vector3f p = R_map_scan_ * p_scan;
     const double x = p.x() * cells_per_metre;
     const double y = p.y() * cells_per_metre;
     if (!(std::abs(x) < kMaxCellIndex && std::abs(y) < kMaxCellIndex) ||

@@ -22,10 +22,12 @@ namespace strata {
 // off to one side by up to half a cell everywhere. One thread at a time.
 class UprightOffsets {
  public:
-  // `local_map` must outlive it. `samples_per_metre`: as in ScanFeatureOptions.
-  UprightOffsets(const MlsMap& local_map, double samples_per_metre);
+  // `local_map` must outlive it. `samples_per_metre` and `R_map_scan`: as in ScanFeatureOptions.
+  UprightOffsets(const MlsMap& local_map,
+                 double samples_per_metre,
+                 const Eigen::Matrix3d& R_map_scan = Eigen::Matrix3d::Identity());
 
-  // Some of the points that the map was made of, in its frame.
+  // Some of the points that the map was made of, in the scan's frame.
   void Add(std::span<const Eigen::Vector3f> points);
 
   // From the middle of `cell` to where sample `i`, from below, of its vertical patch `patch` lies,
@@ -59,6 +61,7 @@ class UprightOffsets {
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
   const MlsMap& map_;
+  const Eigen::Matrix3f R_map_scan_;
   std::vector<std::size_t> tile_first_;  // place of each tile's first patch
   std::vector<std::uint32_t> first_;     // of each patch's samples; one more
   std::vector<Moments> samples_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -15,6 +16,7 @@ namespace {
 
 constexpr int kColumns = 180;  // 2°
 constexpr int kRows = 90;
+constexpr float kHalfWindowRad = 0.052F;  // of a cell and those around it
 constexpr float kMinRangeM = 2.0F;
 constexpr float kMaxRangeM = 40.0F;
 constexpr int kAllAround = 160;  // columns, of 180
@@ -33,13 +35,20 @@ int CellOf(const Eigen::Vector3f& p, float range) {
   return row < 1 || row >= kRows - 1 ? -1 : row * kColumns + column;
 }
 
+// Where beams in the cells around that of a point meet the level surface that it lies on, at most.
+float GroundRange(float range, float height) {
+  const float grazing_rad = std::asin(std::min(1.0F, std::abs(height) / range)) - kHalfWindowRad;
+  return grazing_rad <= 0.0F ? std::numeric_limits<float>::infinity()
+                             : std::abs(height) / std::sin(grazing_rad);
+}
+
 }  // namespace
 
 ViewImage::ViewImage(const ScanFeatures& features, const Eigen::Vector3d& sensor_origin)
-    : origin_(sensor_origin.cast<float>()) {
+    : origin_(sensor_origin.cast<float>()), up_(features.up().cast<float>()) {
   std::vector<Cell> own(kRows * kColumns);
-  for (int c = 0; c < kFeatureClasses; ++c) {
-    for (const Eigen::Vector3f& point : features.points(static_cast<FeatureClass>(c))) {
+  const auto see = [&](const std::vector<Eigen::Vector3f>& points) {
+    for (const Eigen::Vector3f& point : points) {
       const Eigen::Vector3f p = point - origin_;
       const float range = p.norm();
       if (range < 1e-3F) continue;
@@ -49,7 +58,9 @@ ViewImage::ViewImage(const ScanFeatures& features, const Eigen::Vector3d& sensor
       cell.nearest_m = cell.nearest_m == 0.0F ? range : std::min(cell.nearest_m, range);
       cell.farthest_m = std::max(cell.farthest_m, range);
     }
-  }
+  };
+  for (int c = 0; c < kFeatureClasses; ++c) see(features.points(static_cast<FeatureClass>(c)));
+  see(features.doubtful());
   cells_ = own;
   rows_.assign(kRows, false);
   columns_.assign(kColumns, false);
@@ -78,7 +89,7 @@ ViewImage::ViewImage(const ScanFeatures& features, const Eigen::Vector3d& sensor
   }
 }
 
-Sight ViewImage::At(const Eigen::Vector3f& p_scan) const {
+Sight ViewImage::At(const Eigen::Vector3f& p_scan, bool level) const {
   const Eigen::Vector3f p = p_scan - origin_;
   const float range = p.norm();
   if (cells_.empty() || !(range >= kMinRangeM && range <= kMaxRangeM)) return Sight::kUnknown;
@@ -93,7 +104,10 @@ Sight ViewImage::At(const Eigen::Vector3f& p_scan) const {
                : Sight::kUnknown;
   }
   const float margin = kMarginM + kMarginPerMetre * range;
-  if (range < cell.nearest_m - margin) return Sight::kSeenThrough;
+  if (range < cell.nearest_m - margin) {
+    const bool is_beyond = !level || cell.nearest_m - margin > GroundRange(range, up_.dot(p));
+    return is_beyond ? Sight::kSeenThrough : Sight::kUnknown;
+  }
   return range <= cell.farthest_m + margin ? Sight::kAgreeing : Sight::kUnknown;
 }
 

@@ -27,8 +27,9 @@ class ViewImage {
   ViewImage() = default;
   ViewImage(const ScanFeatures& features, const Eigen::Vector3d& sensor_origin);
 
-  // `p_scan` in the frame of the scan. Points within 2 m and beyond 40 m are unknown.
-  Sight At(const Eigen::Vector3f& p_scan) const;
+  // `p_scan` in the frame of the scan. Points within 2 m and beyond 40 m are unknown. Beams that
+  // pass just above a `level` surface meet it farther on: how far is known to an image cell.
+  Sight At(const Eigen::Vector3f& p_scan, bool level = false) const;
 
  private:
   struct Cell {
@@ -40,6 +41,7 @@ class ViewImage {
   std::vector<bool> rows_;     // measured anywhere
   std::vector<bool> columns_;  // measured anywhere
   Eigen::Vector3f origin_ = Eigen::Vector3f::Zero();
+  Eigen::Vector3f up_ = Eigen::Vector3f::UnitZ();
 };
 
 }  // namespace strata

@@ -15,6 +15,7 @@
 #include "core/engine/scans/scan_source.h"
 #include "core/engine/tiles/epoch_tiles.h"
 #include "core/registration/mls_registration.h"
+#include "core/registration/upright_frame.h"
 #include "core/registration/upright_offsets.h"
 #include "core/storage/storage.h"
 
@@ -78,20 +79,23 @@ FollowedRobot::FollowedRobot(MapCore& core,
 
 absl::StatusOr<ScanFeatures> FollowedRobot::FeaturesOf(const PointCloud& cloud) {
   if (CountFinite(cloud) == 0) return ScanFeatures();
+  ScanRecord scan;
+  scan.header.sensor_origin = cloud.sensor_origin;
+  if (tracker_.pose().has_value()) scan.header.T_map_scan = *tracker_.pose();
+  ScanFeatureOptions options = FeatureOptionsOf(scan);
+  options.max_range_m = kTrackedRangeM;
+  options.sample_count = kSamples;
+  options.up = BelievedUp(cloud.points, options.up);
+  options.R_map_scan = UprightTurn(options.up);
   MlsParameters parameters = core_.info().parameters.mls;
   parameters.cell_size_m = std::min(parameters.cell_size_m, kRegistrationCellM);
   STRATA_ASSIGN_OR_RETURN(const MlsBuildResult built,
                           BuildMlsMap(cloud,
-                                      Pose::Identity(),
+                                      Pose(options.R_map_scan),
                                       start_.sensor.value_or(core_.info().parameters.sensor),
                                       parameters,
                                       scratch_));
-  ScanRecord scan;
-  scan.header.sensor_origin = cloud.sensor_origin;
-  ScanFeatureOptions options = FeatureOptionsOf(scan);
-  options.max_range_m = kTrackedRangeM;
-  options.sample_count = kSamples;
-  UprightOffsets offsets(built.map, options.samples_per_metre);
+  UprightOffsets offsets(built.map, options.samples_per_metre, options.R_map_scan);
   offsets.Add(cloud.points);
   return ScanFeatures::FromMap(built.map, options, &offsets);
 }

@@ -24,6 +24,7 @@
 #include "core/registration/neighbours.h"
 #include "core/registration/place_index.h"
 #include "core/registration/place_match.h"
+#include "core/registration/upright_frame.h"
 #include "core/registration/upright_offsets.h"
 
 namespace strata {
@@ -49,10 +50,6 @@ struct Candidate {
   std::size_t node = 0;
   std::vector<PlaceHypothesis> hypotheses;  // in the frame of the node
 };
-
-Pose Turned(double heading_rad) {
-  return Pose(Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitZ()));
-}
 
 }  // namespace
 
@@ -90,25 +87,30 @@ class Localizer::Search {
 
  private:
   absl::Status Describe() {
-    MlsParameters parameters = core_.info().parameters.mls;
-    STRATA_ASSIGN_OR_RETURN(const MlsMap seen, Seen(parameters));
-    place_ = DescribePlace(seen);
-    parameters.cell_size_m = std::min(parameters.cell_size_m, kRegistrationCellM);
-    STRATA_ASSIGN_OR_RETURN(const MlsMap finer, Seen(parameters));
     ScanRecord scan;
     scan.header.sensor_origin = query_.cloud.sensor_origin;
-    const ScanFeatureOptions options = FeatureOptionsOf(scan);
-    UprightOffsets offsets(finer, options.samples_per_metre);
+    // Without a guess nobody knows how a sensor is held.
+    scan.header.T_map_scan = query_.T_map_scan_guess.value_or(Pose::Identity());
+    ScanFeatureOptions options = FeatureOptionsOf(scan);
+    options.up = BelievedUp(query_.cloud.points, options.up);
+    options.R_map_scan = UprightTurn(options.up);
+    MlsParameters parameters = core_.info().parameters.mls;
+    STRATA_ASSIGN_OR_RETURN(const MlsMap seen, Seen(parameters, options.R_map_scan));
+    place_ = DescribePlace(seen);
+    parameters.cell_size_m = std::min(parameters.cell_size_m, kRegistrationCellM);
+    STRATA_ASSIGN_OR_RETURN(const MlsMap finer, Seen(parameters, options.R_map_scan));
+    UprightOffsets offsets(finer, options.samples_per_metre, options.R_map_scan);
     offsets.Add(query_.cloud.points);
     features_ = ScanFeatures::FromMap(finer, options, &offsets);
     return absl::OkStatus();
   }
 
-  absl::StatusOr<MlsMap> Seen(const MlsParameters& parameters) const {
+  absl::StatusOr<MlsMap> Seen(const MlsParameters& parameters,
+                              const Eigen::Matrix3d& R_upright_scan) const {
     MlsScratch scratch;
     STRATA_ASSIGN_OR_RETURN(MlsBuildResult built,
                             BuildMlsMap(query_.cloud,
-                                        Pose::Identity(),
+                                        Pose(R_upright_scan),
                                         query_.sensor.value_or(core_.info().parameters.sensor),
                                         parameters,
                                         scratch));
@@ -145,11 +147,13 @@ class Localizer::Search {
       const auto node = static_cast<std::size_t>(alike.number);
       if (ShowsTheSame(candidates, node)) continue;
       Candidate candidate{node, {}};
-      for (const double turn : {0.0, M_PI}) {  // looks cannot tell which
-        candidate.hypotheses.push_back({Turned(alike.similarity.heading_rad + turn),
-                                        kAlikeRadiusM,
-                                        kPlace.radius_m,
-                                        kAlikeHeadingRad});
+      const Eigen::Matrix3d R_upright_node = UprightTurn(UpOf(places_.world.Poses()[node]));
+      for (PlaceHypothesis hypothesis :
+           HypothesesOf(alike.similarity, R_upright_node, UprightTurn(features_.up()))) {
+        hypothesis.radius_m = kAlikeRadiusM;
+        hypothesis.height_range_m = kPlace.radius_m;
+        hypothesis.heading_range_rad = kAlikeHeadingRad;
+        candidate.hypotheses.push_back(hypothesis);
       }
       candidates.push_back(std::move(candidate));
     }

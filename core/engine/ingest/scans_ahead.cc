@@ -38,7 +38,8 @@ absl::Status ScansAhead::Make(std::size_t i) {
     STRATA_RETURN_IF_ERROR(CheckRoomInTiles(local_map, {}));
     STRATA_ASSIGN_OR_RETURN(slot.made.local_map, EncodeLocalMap(local_map));
   }
-  if (source.IsTooCoarse(scan)) {
+  STRATA_ASSIGN_OR_RETURN(const bool otherwise, source.IsMatchedOtherwise(scan));
+  if (otherwise) {
     STRATA_ASSIGN_OR_RETURN(local_map, source.RegistrationMap(scan));
   }
   STRATA_ASSIGN_OR_RETURN(ScanFeatures features,

@@ -1,5 +1,7 @@
 #include "core/engine/scans/matching.h"
 
+#include "core/registration/upright_frame.h"
+
 namespace strata {
 namespace {
 
@@ -13,7 +15,7 @@ ScanFeatureOptions FeatureOptionsOf(const ScanRecord& scan) {
   ScanFeatureOptions options;
   options.sample_count = kSamples;
   options.sensor_origin = scan.header.sensor_origin.cast<double>();
-  options.up = scan.header.T_map_scan.linear().transpose() * Eigen::Vector3d::UnitZ();
+  options.up = UpOf(scan.header.T_map_scan);
   return options;
 }
 

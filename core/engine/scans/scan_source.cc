@@ -7,6 +7,7 @@
 #include <limits>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
@@ -22,6 +23,7 @@
 #include "core/mls/patch.h"
 #include "core/mls/sides.h"
 #include "core/mls/tile_key.h"
+#include "core/registration/upright_frame.h"
 #include "core/registration/upright_offsets.h"
 
 namespace strata {
@@ -205,20 +207,59 @@ absl::StatusOr<MlsMap> ScanSource::LocalMap(const ScanRecord& scan) {
   return map;
 }
 
+absl::StatusOr<Eigen::Vector3d> ScanSource::UpIn(const ScanRecord& scan) {
+  if (!scan.has_points || !parameters_.keep_points) return Eigen::Vector3d::UnitZ();
+  if (up_scan_ == scan.number) return up_;
+  up_scan_ = 0;
+  up_ = UpOf(scan.header.T_map_scan);
+  if (!UprightTurn(up_).isIdentity(0.0)) {
+    std::vector<Eigen::Vector3f> points;
+    STRATA_RETURN_IF_ERROR(ForEachBlock(scan, [&points](const PointCloud& block) {
+      if (points.empty()) points = block.points;
+      return absl::OkStatus();
+    }));
+    up_ = BelievedUp(points, up_);
+  }
+  up_scan_ = scan.number;
+  return up_;
+}
+
+absl::StatusOr<Eigen::Matrix3d> ScanSource::TurnOf(const ScanRecord& scan) {
+  STRATA_ASSIGN_OR_RETURN(const Eigen::Vector3d up, UpIn(scan));
+  return UprightTurn(up);
+}
+
+absl::StatusOr<bool> ScanSource::IsMatchedOtherwise(const ScanRecord& scan) {
+  if (scan.has_points && parameters_.mls.cell_size_m > kRegistrationCellM) return true;
+  STRATA_ASSIGN_OR_RETURN(const Eigen::Matrix3d R_upright_scan, TurnOf(scan));
+  return !R_upright_scan.isIdentity(0.0);
+}
+
 absl::StatusOr<MlsMap> ScanSource::RegistrationMap(const ScanRecord& scan) {
-  if (!IsTooCoarse(scan)) return LocalMap(scan);
+  STRATA_ASSIGN_OR_RETURN(const bool otherwise, IsMatchedOtherwise(scan));
+  if (!otherwise) return LocalMap(scan);
   STRATA_RETURN_IF_ERROR(CheckSpread(scan));
+  STRATA_ASSIGN_OR_RETURN(const Eigen::Matrix3d R_upright_scan, TurnOf(scan));
   MlsParameters finer = parameters_.mls;
-  finer.cell_size_m = kRegistrationCellM;
-  return Build(scan, Pose::Identity(), finer, Faded::kWith, kMaxScanPatches);
+  finer.cell_size_m = std::min(finer.cell_size_m, kRegistrationCellM);
+  return Build(scan, Pose(R_upright_scan), finer, Faded::kWith, kMaxScanPatches);
+}
+
+absl::StatusOr<MlsMap> ScanSource::PlaceMap(const ScanRecord& scan) {
+  STRATA_ASSIGN_OR_RETURN(const Eigen::Matrix3d R_upright_scan, TurnOf(scan));
+  if (R_upright_scan.isIdentity(0.0)) return LocalMap(scan);
+  STRATA_RETURN_IF_ERROR(CheckSpread(scan));
+  return Build(scan, Pose(R_upright_scan), parameters_.mls, Faded::kWith, kAnyPatches);
 }
 
 absl::StatusOr<ScanFeatures> ScanSource::Features(const ScanRecord& scan,
                                                   const MlsMap& map,
-                                                  const ScanFeatureOptions& options) {
+                                                  ScanFeatureOptions options) {
   // Where points are dropped all comes from the local map from the first moment.
   if (!scan.has_points || !parameters_.keep_points) return ScanFeatures::FromMap(map, options);
-  UprightOffsets offsets(map, options.samples_per_metre);
+  STRATA_ASSIGN_OR_RETURN(options.up, UpIn(scan));
+  STRATA_ASSIGN_OR_RETURN(options.R_map_scan, TurnOf(scan));
+  UprightOffsets offsets(map, options.samples_per_metre, options.R_map_scan);
   STRATA_RETURN_IF_ERROR(ForEachBlock(scan, [&offsets](const PointCloud& block) {
     offsets.Add(block.points);
     return absl::OkStatus();

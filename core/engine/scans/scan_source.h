@@ -51,18 +51,18 @@ class ScanSource {
   // points in more than kMaxScanTiles tiles and, of a scan that waits for integration, more than
   // kMaxScanPatches.
   absl::StatusOr<MlsMap> LocalMap(const ScanRecord& scan);
-  // The same with cells of kRegistrationCellM at most, whatever the map's, where points are there:
-  // what scans are matched by.
+  // What scans are matched by: where points are there, the same with cells of kRegistrationCellM at
+  // most, whatever the map's, and upright.
   absl::StatusOr<MlsMap> RegistrationMap(const ScanRecord& scan);
-  // Whether that is another than LocalMap().
-  bool IsTooCoarse(const ScanRecord& scan) const {
-    return scan.has_points && parameters_.mls.cell_size_m > kRegistrationCellM;
-  }
+  // What a scan is known again by: LocalMap(), upright where points are there.
+  absl::StatusOr<MlsMap> PlaceMap(const ScanRecord& scan);
+  // Whether what the scan is matched by is another map than LocalMap().
+  absl::StatusOr<bool> IsMatchedOtherwise(const ScanRecord& scan);
   // What the scan is matched by, of RegistrationMap(): upright surfaces where their points are, in
   // a map that keeps points.
   absl::StatusOr<ScanFeatures> Features(const ScanRecord& scan,
                                         const MlsMap& map,
-                                        const ScanFeatureOptions& options);
+                                        ScanFeatureOptions options);
   // What the scan adds to the map at this pose, without points that have faded: a pure function of
   // the scan, what is said of its points, the pose and the map's parameters, before and after
   // points were dropped.
@@ -80,6 +80,9 @@ class ScanSource {
 
  private:
   enum class Faded { kWith, kWithout };
+  // The vertical in the frame of the scan. Of what becomes a map in its own frame only, that is z.
+  absl::StatusOr<Eigen::Vector3d> UpIn(const ScanRecord& scan);
+  absl::StatusOr<Eigen::Matrix3d> TurnOf(const ScanRecord& scan);  // R_upright_scan
   // Looks at the scan frame: what was taken once may be moved anywhere.
   absl::Status CheckSpread(const ScanRecord& scan);
   absl::StatusOr<MlsMap> Build(const ScanRecord& scan,
@@ -97,6 +100,8 @@ class ScanSource {
   ScanNumber held_scan_ = 0;
   PointCloud held_;
   std::vector<std::uint16_t> held_faded_;  // ScanLabels::Faded() of the points held
+  ScanNumber up_scan_ = 0;
+  Eigen::Vector3d up_ = Eigen::Vector3d::UnitZ();  // UpIn() of that scan
 };
 
 }  // namespace strata

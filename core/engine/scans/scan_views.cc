@@ -19,16 +19,14 @@ constexpr std::uint64_t kMaxPlanePoints = 2'000'000;
 
 absl::StatusOr<ScanPlanes> PlanesOf(ScanSource& source,
                                     const ScanRecord& scan,
-                                    MlsMap local_map,
                                     const MapParameters& parameters) {
   PlaneExtractionOptions options;
   options.sensor = scan.header.sensor.value_or(parameters.sensor);
   options.sensor_origin = scan.header.sensor_origin;
   if (!scan.has_points || scan.header.point_count > kMaxPlanePoints) {
+    STRATA_ASSIGN_OR_RETURN(const MlsMap local_map, source.LocalMap(scan));
     return ExtractPlanes(local_map, options);
   }
-  local_map.tiles.clear();
-  local_map.tiles.shrink_to_fit();
   PointCloud cloud;
   cloud.sensor_origin = scan.header.sensor_origin;
   STRATA_RETURN_IF_ERROR(source.ForEachBlock(scan, [&cloud](const PointCloud& block) {
@@ -75,10 +73,12 @@ absl::StatusOr<ScanView> ScanViews::MakeView(StorageReader& reader, const ScanRe
   const ScanShare share(core_.caches(), scan);
   const MapParameters parameters = core_.info().parameters;
   ScanSource source(reader, parameters);
-  STRATA_ASSIGN_OR_RETURN(MlsMap local_map, source.LocalMap(scan));
-  ScanView view{.place = EncodePlace(DescribePlace(local_map)), .planes = ""};
-  STRATA_ASSIGN_OR_RETURN(const ScanPlanes planes,
-                          PlanesOf(source, scan, std::move(local_map), parameters));
+  ScanView view;
+  {
+    STRATA_ASSIGN_OR_RETURN(const MlsMap map, source.PlaceMap(scan));
+    view.place = EncodePlace(DescribePlace(map));
+  }
+  STRATA_ASSIGN_OR_RETURN(const ScanPlanes planes, PlanesOf(source, scan, parameters));
   view.planes = EncodeScanPlanes(planes);
   // Kept for the next time; a store that is full is no reason to stop.
   core_.writer()

@@ -18,6 +18,7 @@
 
 #include "core/common/option_checks.h"
 #include "core/common/status.h"
+#include "core/registration/upright_frame.h"
 
 namespace strata {
 namespace {
@@ -76,8 +77,6 @@ Layout LayOut(std::span<const ClosureNode> nodes, double segment_m) {
 double Telling(double sigma_m) {
   return std::log1p(std::min(sigma_m, kMostTellingM) / kClosureSigmaM);
 }
-
-double Heading(const Pose& T) { return std::atan2(T.linear()(1, 0), T.linear()(0, 0)); }
 
 class CandidateSearch {
  public:
@@ -184,9 +183,16 @@ class CandidateSearch {
                                                const ClosureCandidate& c) const {
     PlaceSimilarity similarity = pair.similarity;
     if (pair.i > pair.j) similarity.heading_rad *= -1.0;  // of j in i
-    std::vector<PlaceHypothesis> hypotheses = HypothesesOf(similarity, Pose::Identity());
+    const Eigen::Matrix3d R_upright_i = UprightTurn(UpOf(nodes_[c.i].T_map_scan));
+    const Eigen::Matrix3d R_upright_j = UprightTurn(UpOf(nodes_[c.j].T_map_scan));
+    // Of the upright j in the upright i.
+    const auto heading = [&](const Pose& T_i_j) {
+      const Eigen::Matrix3d R = R_upright_i * T_i_j.linear() * R_upright_j.transpose();
+      return std::atan2(R(1, 0), R(0, 0));
+    };
+    std::vector<PlaceHypothesis> hypotheses = HypothesesOf(similarity, R_upright_i, R_upright_j);
     std::erase_if(hypotheses, [&](const PlaceHypothesis& h) {
-      const double turned = Heading(h.T_target_source) - Heading(c.T_i_j);
+      const double turned = heading(h.T_target_source) - heading(c.T_i_j);
       return std::abs(std::remainder(turned, 2.0 * std::numbers::pi)) >
              options_.sigmas * c.sigma_rad + h.heading_range_rad;
     });

@@ -67,7 +67,8 @@ TEST_F(PlaceMatchTest, HeadingsOfTheDescriptorAreEnoughOfAGuess) {
   const MlsMap map_i = MapAt(world.scene, T_i, 1);
   const MlsMap map_j = MapAt(world.scene, T_j, 2);
   const PlaceSimilarity alike = ComparePlaces(DescribePlace(map_i), DescribePlace(map_j));
-  const std::vector<PlaceHypothesis> guesses = HypothesesOf(alike, Pose::Identity());
+  const std::vector<PlaceHypothesis> guesses =
+      HypothesesOf(alike, Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity());
   ASSERT_EQ(guesses.size(), 2U);
   const ScanFeatures there = ScanFeatures::FromMap(map_i);
   const ScanFeatures here = ScanFeatures::FromMap(map_j);
@@ -227,7 +228,10 @@ TEST_F(PlaceMatchTest, ClosesARecordedLoop) {
   const ScanFeatures here = ScanFeatures::FromMap(last);
   const SeenScan target[] = {{&there}};
   const PlaceSimilarity alike = ComparePlaces(DescribePlace(first), DescribePlace(last));
-  const PlaceMatch match = MatchPlace({&here}, target, HypothesesOf(alike, Pose::Identity()));
+  const PlaceMatch match =
+      MatchPlace({&here},
+                 target,
+                 HypothesesOf(alike, Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity()));
   EXPECT_TRUE(match.matched()) << ToString(match.verdict);
   ExpectNear(poses.at(0).T_world_scan.inverse() * poses.at(900).T_world_scan,
              match.T_target_source,

@@ -69,6 +69,24 @@ TEST(ViewImageTest, NothingComesBackOnlyWhereASensorLooks) {
   EXPECT_EQ(ahead.At({0.0F, 10.0F, 0.0F}), Sight::kUnknown);
 }
 
+// Rings of a sensor 1.2 m above level ground, 4° from one to the next.
+TEST(ViewImageTest, BeamsThatPassAboveGroundLookThroughNothing) {
+  std::array<std::vector<Vector3f>, kFeatureClasses> points;
+  for (double down = 0.02; down < 0.7; down += 0.07) {
+    for (double azimuth = -kPi; azimuth < kPi; azimuth += 0.01) {
+      const double range = 1.2 / std::tan(down);
+      points[static_cast<std::size_t>(FeatureClass::kTraversable)].push_back(
+          Vector3d(range * std::cos(azimuth), range * std::sin(azimuth), -1.2).cast<float>());
+    }
+  }
+  const ViewImage image(ScanFeatures::FromPoints(std::move(points)), Vector3d::Zero());
+  for (float range = 3.0F; range < 30.0F; range += 0.1F) {
+    EXPECT_NE(image.At({range, 0.0F, -1.2F}, true), Sight::kSeenThrough) << range;
+  }
+  EXPECT_EQ(image.At({2.5F, 0.0F, -0.225F}, true), Sight::kSeenThrough) << "a table";
+  EXPECT_EQ(image.At({15.0F, 0.0F, -0.3F}), Sight::kSeenThrough) << "a wall";
+}
+
 TEST(ViewImageTest, WithoutFeaturesNothingIsKnown) {
   EXPECT_EQ(ViewImage().At({5.0F, 0.0F, 0.0F}), Sight::kUnknown);
   EXPECT_EQ(ViewImage(ScanFeatures(), Vector3d::Zero()).At({5.0F, 0.0F, 0.0F}), Sight::kUnknown);
