@@ -23,6 +23,7 @@ namespace {
 
 constexpr double kHoldsM = 0.5;
 constexpr double kHoldsRad = 0.05;
+constexpr double kStoreysM = 6.0;  // one, or two low ones
 
 // Consistency as a graph over the closures of one group.
 class Cliques {
@@ -93,7 +94,10 @@ class ConsistencyCheck {
           !one_part && std::ranges::any_of(members, [this](std::size_t c) { return IsAsSaid(c); });
       std::vector<std::size_t> believable;
       for (const std::size_t c : members) {
-        if (one_part ? AgreesWithGraph(c) : !is_as_said || IsAsSaid(c)) believable.push_back(c);
+        const bool may_be_true = one_part     ? AgreesWithGraph(c)
+                                 : is_as_said ? IsAsSaid(c)
+                                              : !IsStoreyOff(c);
+        if (may_be_true) believable.push_back(c);
       }
       Cliques cliques(believable.size());
       for (std::size_t a = 0; a < believable.size(); ++a) {
@@ -153,7 +157,15 @@ class ConsistencyCheck {
   // The frames of the two parts say about the same.
   bool IsAsSaid(std::size_t c) const {
     const Closure& closure = closures_[c];
-    return IsWithin(closure.T_i_j, SaidHypothesis(poses_[closure.i].inverse() * poses_[closure.j]));
+    return IsWithin(poses_[closure.i] * closure.T_i_j, SaidHypothesis(poses_[closure.j]));
+  }
+
+  // They say so but for a height of one storey or two, and storeys look alike.
+  bool IsStoreyOff(std::size_t c) const {
+    const Closure& closure = closures_[c];
+    PlaceHypothesis window = SaidHypothesis(poses_[closure.j]);
+    window.height_range_m = kStoreysM;
+    return !IsAsSaid(c) && IsWithin(poses_[closure.i] * closure.T_i_j, window);
   }
 
   bool AgreesWithGraph(std::size_t c) const {

@@ -55,7 +55,8 @@ struct ConsistentClosureSet {
 // `edges` are the relative poses in force, without the closures. Closures within one part of the
 // graph must also agree with the graph itself, as far as its σ says. Closures of two parts are
 // checked against the others of the same two parts; where one agrees with what the frames of the
-// parts say (SaidHypothesis), it is enough, and those that do not agree are none. The set is found
+// parts say (SaidHypothesis), it is enough, and those that do not agree are none; where none does,
+// those that agree but for up to 6 m of height are none: storeys look alike. The set is found
 // by growing one from every closure, most consistent ones first: large, and the largest where there
 // is little contradiction. Ties prefer what comes first. A pure function; some ms a closure for
 // 20,000 poses. INVALID_ARGUMENT for invalid options, poses, σ, or closures and edges that name no

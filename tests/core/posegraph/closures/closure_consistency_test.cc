@@ -157,6 +157,27 @@ TEST(ClosureConsistencyTest, OneThatAgreesWithWhatTheFramesSayOutweighsManyThatD
   EXPECT_THAT(set.kept, ElementsAre(8));
 }
 
+// Frames that agree but for a storey's height, by places that look alike on every storey.
+TEST(ClosureConsistencyTest, FramesAreNotLiftedByStoreys) {
+  const TwoRobots robots(3);
+  const std::size_t other = TwoRobots::kScans;
+  const auto lifted = [&](const Eigen::Vector3d& by) {
+    std::vector<Closure> closures;
+    for (std::size_t k = 0; k < 6; ++k) {
+      const Pose T_map_j = Pose(Eigen::Translation3d(by)) * robots.poses[other + 7 * k];
+      closures.push_back(
+          {7 * k, other + 7 * k, robots.poses[7 * k].inverse() * T_map_j, 0.1, 0.01});
+    }
+    const auto set = ConsistentClosures(robots.poses, robots.edges, closures);
+    return set.ok() ? set->kept.size() : 99;
+  };
+  EXPECT_EQ(lifted({0.3, 0.2, 0.1}), 6U);
+  EXPECT_EQ(lifted({0.3, 0.2, 3.2}), 0U);
+  EXPECT_EQ(lifted({0.3, 0.2, -3.2}), 0U);
+  EXPECT_EQ(lifted({0.3, 9.0, 3.2}), 6U) << "frames that have nothing to do with each other";
+  EXPECT_EQ(lifted({0.3, 0.2, 40.0}), 6U) << "no storey";
+}
+
 TEST(ClosureConsistencyTest, WithinOneTrajectoryTheGraphItselfIsAsked) {
   TwoRobots robots(1);
   Closure fits = robots.True(0, 40);
