@@ -43,7 +43,7 @@ Pose StopAt(std::uint64_t i) {
 
 PointCloud Seen(std::uint64_t i) {
   SensorOptions sensor;
-  sensor.rings = 128;
+  sensor.rings = 64;
   sensor.columns = 720;
   return SimulateScan(Yard(i < kWithCrate), sensor, StopAt(i), i);
 }
@@ -220,9 +220,9 @@ TEST_F(EngineTest, AScanOfWhichNothingIsLeftMayBeMoved) {
 
 TEST_F(FadeTest, ACancelledJobChangesNothing) {
   const std::string before = Digest();
+  const auto tiles = AllTiles(db());
   int cancelled = 0;
   for (const double enough : {0.0, 0.2, 0.6, 0.7, 0.8, 0.9, 0.95}) {
-    const auto tiles = AllTiles(db());
     const JobInfo job = db().jobs().Start({}, kMapName, "fade", {}).value();
     JobInfo last;
     const auto cancel_when_there = [&](const JobInfo& now) -> absl::Status {
