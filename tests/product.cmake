@@ -30,3 +30,5 @@ endforeach()
 
 strata_product_test(consumer packages 100 ${CMAKE_CURRENT_SOURCE_DIR}/consumer/run.sh ${PROJECT_BINARY_DIR})
 strata_product_test(packages packages 100 ${CMAKE_CURRENT_SOURCE_DIR}/packages/run.sh ${PROJECT_BINARY_DIR})
+# An installation makes pages of the manual in the build's folder.
+set_tests_properties(consumer packages PROPERTIES RESOURCE_LOCK installation)
