@@ -9,12 +9,16 @@ within a line (times, ports); blanks of such a line may be more or fewer. Pages 
 and leaves its number in a .pid file ends with the folder. Exits 1 with the difference.
 
     tests/readme_test.py --build build/release --only docs/quickstart.md    that page, with the rest of its tour
+    tests/readme_test.py --list                                             the first page of each tour, one a line
+
+Each tour is a test of ctest's (`ctest -L pages`): they have folders, servers and addresses of their own.
 
 Pages that name STRATA_DATABASE get a PostgreSQL server of their own; without PostgreSQL 15 on the machine they are left out.
 """
 import argparse
 import os
 import pathlib
+import random
 import re
 import signal
 import socket
@@ -29,6 +33,7 @@ from postgres_database import Database  # noqa: E402, from the folder above
 
 TOUR = ["docs/quickstart.md", "docs/concepts.md", "docs/profiles.md", "docs/howto/georeference.md", "docs/howto/floorplan.md",
         "docs/howto/label.md", "docs/howto/fleet.md", "docs/errors.md"]
+DATABASE_PAGE = "docs/howto/postgresql.md"
 
 
 def console_lines(text):
@@ -60,9 +65,16 @@ def page_with_database_holds(page, environment):
 
 
 def free_address():
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return f"127.0.0.1:{free.getsockname()[1]}"
+    """One that nobody gets who asks for any: a tour's servers begin and end, and between that it has to stay free."""
+    lowest = int(pathlib.Path("/proc/sys/net/ipv4/ip_local_port_range").read_text().split()[0])
+    while True:
+        address = ("127.0.0.1", random.randrange(lowest // 2, lowest))
+        with socket.socket() as free:
+            try:
+                free.bind(address)
+                return "{}:{}".format(*address)
+            except OSError:
+                continue
 
 
 def end_what_was_begun(folder):
@@ -107,6 +119,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
     parser.add_argument("--only", metavar="PAGE", help="only the tour that has this page")
+    parser.add_argument("--list", action="store_true", help="print the first page of each tour")
     options = parser.parse_args()
     build = options.build.resolve()
     programs = {folder: build / folder for folder in ("client/cli", "client/ros2", "server", "tests/support", "tests/support/ros2")}
@@ -118,14 +131,16 @@ def main():
     web = {"STRATA_SERVER": free_address(), "STRATA_WEB": free_address()}
     tours = [(["README.md"], {}), (TOUR, {"STRATA_SERVER": free_address()}), (["docs/exports.md"], {}), (["docs/command-line.md"], {}), (["docs/recordings.md"], {}),
              (["docs/ros2.md"], own), (["docs/web.md"], web)]
-    database_page = "docs/howto/postgresql.md"
-    if options.only == database_page:
-        return 0 if page_with_database_holds(database_page, environment) else 1
+    if options.list:
+        print(*(tour[0] for tour, _ in tours), DATABASE_PAGE, sep="\n")
+        return 0
+    if options.only == DATABASE_PAGE:
+        return 0 if page_with_database_holds(DATABASE_PAGE, environment) else 1
     if options.only:
         tours = [(tour, more) for tour, more in tours if options.only in tour]
     if not tours or not all(holds(tour, {**environment, **more}) for tour, more in tours):
         return 1
-    return 0 if options.only or page_with_database_holds(database_page, environment) else 1
+    return 0 if options.only or page_with_database_holds(DATABASE_PAGE, environment) else 1
 
 
 sys.exit(main())

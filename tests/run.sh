@@ -52,19 +52,8 @@ cmake --build --preset release
 
 begin_beside
 
-stage "tests"
+stage "tests; pages, packages, recorded data through a real server"
 ctest --preset release -LE "browser|long"
-
-stage "install, consumer and packages"
-tests/consumer/run.sh build/release
-tests/packages/run.sh build/release
-
-stage "README and pages"
-/usr/bin/python3 docs/reference/make.py --build build/release --check
-/usr/bin/python3 tests/readme_test.py --build build/release
-
-stage "recorded data through a real server"
-/usr/bin/python3 tests/experiments/real_data.py --build build/release || [[ $? == 77 ]]
 
 stage "beside the tests: a bare machine; clang: sanitized builds, fuzzers"
 end_beside

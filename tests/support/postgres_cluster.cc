@@ -1,9 +1,12 @@
 #include "tests/support/postgres_cluster.h"
 
 #include <csignal>
+#include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -26,6 +29,8 @@ namespace strata::testing {
 namespace {
 
 constexpr char kPrograms[] = "/usr/lib/postgresql/15/bin/";
+constexpr char kMemory[] = "/dev/shm";
+constexpr std::uintmax_t kRoomBytes = std::uintmax_t{1} << 30;  // some four times what one takes
 
 // PostgreSQL refuses to run as root.
 const passwd* UserWithoutRights() {
@@ -55,20 +60,37 @@ absl::StatusOr<std::unique_ptr<PostgresCluster>> PostgresCluster::Start(Disk dis
   return cluster;
 }
 
-PostgresCluster::~PostgresCluster() { Crash(); }
+PostgresCluster::~PostgresCluster() {
+  Crash();
+  std::error_code ignored;
+  std::filesystem::remove_all(data_, ignored);
+}
 
 std::string PostgresCluster::AddressOf(absl::string_view database) const {
   return absl::StrCat("host=", directory_.path().string(), " user=strata dbname=", database);
 }
 
 std::string PostgresCluster::AddressOfOwn(absl::string_view owner) {
-  const auto [it, inserted] = databases_.try_emplace(std::string(owner));
-  if (!inserted) return it->second;
+  if (const auto it = databases_.find(std::string(owner)); it != databases_.end()) {
+    return AddressOf(it->second);
+  }
   const auto connection = Connection::Open(Address());
-  const std::string name = absl::StrCat("own", databases_.size());
+  if (!connection.ok()) return "";
+  DropOfGoneOwners(**connection);
+  const std::string name = absl::StrCat("own", ++databases_made_);
   const std::string sql = absl::StrCat("CREATE DATABASE ", name);
-  if (connection.ok() && (*connection)->Execute(sql.c_str()).ok()) it->second = AddressOf(name);
-  return it->second;
+  if (!(*connection)->Execute(sql.c_str()).ok()) return "";
+  databases_.emplace(owner, name);
+  return AddressOf(name);
+}
+
+void PostgresCluster::DropOfGoneOwners(Connection& connection) {
+  std::erase_if(databases_, [&](const auto& database) {
+    const auto& [owner, name] = database;
+    if (!std::filesystem::path(owner).is_absolute() || std::filesystem::exists(owner)) return false;
+    const std::string sql = absl::StrCat("DROP DATABASE ", name, " WITH (FORCE)");
+    return connection.Execute(sql.c_str()).ok();
+  });
 }
 
 pid_t PostgresCluster::Spawn(const std::vector<std::string>& command) const {
@@ -90,16 +112,29 @@ pid_t PostgresCluster::Spawn(const std::vector<std::string>& command) const {
   _exit(127);
 }
 
-absl::Status PostgresCluster::MakeFiles() {
-  if (geteuid() == 0) {
-    const passwd* user = UserWithoutRights();
-    if (user == nullptr || chown(directory_.path().c_str(), user->pw_uid, user->pw_gid) != 0) {
+absl::Status PostgresCluster::MakeFolder() {
+  std::error_code error;
+  const std::uintmax_t room = std::filesystem::space(kMemory, error).available;
+  std::string pattern = absl::StrCat(kMemory, "/strata-XXXXXX");
+  const bool in_memory = disk_ == Disk::kUnsynced && !error && room >= kRoomBytes &&
+                         mkdtemp(pattern.data()) != nullptr;
+  data_ = in_memory ? std::filesystem::path(pattern) : directory_.path() / "data";
+  std::filesystem::create_directory(data_, error);
+  if (geteuid() != 0) return absl::OkStatus();
+  const passwd* user = UserWithoutRights();
+  for (const std::filesystem::path& folder : {directory_.path(), data_}) {
+    if (user == nullptr || chown(folder.c_str(), user->pw_uid, user->pw_gid) != 0) {
       return absl::FailedPreconditionError("no user without rights to run PostgreSQL as");
     }
   }
+  return absl::OkStatus();
+}
+
+absl::Status PostgresCluster::MakeFiles() {
+  STRATA_RETURN_IF_ERROR(MakeFolder());
   return WaitFor(Spawn({absl::StrCat(kPrograms, "initdb"),
                         "--pgdata",
-                        directory_.path() / "data",
+                        data_,
                         "--auth=trust",
                         "--username=strata",
                         "--encoding=UTF8",
@@ -109,20 +144,19 @@ absl::Status PostgresCluster::MakeFiles() {
 }
 
 absl::Status PostgresCluster::Restart() {
-  const std::string fsync = disk_ == Disk::kSynced ? "fsync=on" : "fsync=off";
-  server_ = Spawn({absl::StrCat(kPrograms, "postgres"),
-                   "-D",
-                   directory_.path() / "data",
-                   "-c",
-                   "listen_addresses=",
-                   "-c",
-                   absl::StrCat("unix_socket_directories=", directory_.path().string()),
-                   "-c",
-                   fsync,
-                   "-c",
-                   "shared_buffers=64MB",
-                   "-c",
-                   "max_connections=200"});
+  std::vector<std::string> command = {absl::StrCat(kPrograms, "postgres"), "-D", data_};
+  const auto set = [&](absl::string_view setting) {
+    command.insert(command.end(), {"-c", std::string(setting)});
+  };
+  set("listen_addresses=");
+  set(absl::StrCat("unix_socket_directories=", directory_.path().string()));
+  set("shared_buffers=64MB");
+  set("max_connections=200");
+  if (disk_ == Disk::kUnsynced) {
+    set("fsync=off");
+    set("max_wal_size=128MB");  // of memory
+  }
+  server_ = Spawn(command);
   absl::Status answer;
   for (const absl::Time end = absl::Now() + absl::Seconds(60); absl::Now() < end;) {
     answer = Connection::Open(Address()).status();

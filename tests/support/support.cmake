@@ -76,6 +76,7 @@ strata_test(
   simulator_test
   SOURCES simulator/scene_test.cc simulator/simulator_test.cc simulator/sweep_test.cc simulator/views_test.cc simulator/worlds_test.cc
   DEPS strata::simulator strata::sweep
+  TOGETHER ALL
 )
 
 add_library(strata_mock_database STATIC mock_database.cc)

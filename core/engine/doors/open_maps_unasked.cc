@@ -24,8 +24,6 @@
 namespace strata {
 namespace {
 
-// Between two looks at who is idle.
-constexpr absl::Duration kInterval = absl::Seconds(1);
 // Of shared stores: how often all maps are looked at unasked.
 constexpr absl::Duration kSurveyInterval = absl::Minutes(1);
 constexpr absl::Duration kLongSurvey = absl::Milliseconds(500);  // is worth a line of the log
@@ -48,7 +46,7 @@ void OpenMaps::Loop() {
       return absl::OkStatus();
     }).IgnoreError();  // without memory it is done later
     absl::MutexLock lock(&mutex_);
-    if (mutex_.AwaitWithTimeout(absl::Condition(&closed_), kInterval)) return;
+    if (mutex_.AwaitWithTimeout(absl::Condition(&closed_), options_.look_interval)) return;
   }
 }
 

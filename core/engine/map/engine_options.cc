@@ -28,6 +28,10 @@ absl::Status EngineOptions::Validate() const {
   if (map_idle < absl::ZeroDuration()) {
     faults.push_back(absl::StrCat("map_idle = ", absl::FormatDuration(map_idle), " is negative"));
   }
+  if (look_interval <= absl::ZeroDuration()) {
+    faults.push_back(absl::StrCat(
+        "look_interval = ", absl::FormatDuration(look_interval), " is not above zero"));
+  }
   if (max_pending_scans == 0) faults.emplace_back("max_pending_scans is 0");
   if (worker_threads < 1 || worker_threads > 64) {
     faults.push_back(absl::StrCat("worker_threads = ", worker_threads, " is not in [1, 64]"));

@@ -43,6 +43,9 @@ struct EngineOptions {
   std::uint64_t max_open_maps = 1'000;
   // A map that nobody has used for so long, and that has nothing to do, is let go.
   absl::Duration map_idle = absl::Minutes(5);
+  // How often it looks for what nobody asks it: which maps are idle, and on `store` which scans and
+  // jobs for its maps came in at other engines. Above zero. No flag of a program sets it.
+  absl::Duration look_interval = absl::Seconds(1);
   // Largest size of a map's file; 0: none. Not with `store`.
   std::uint64_t max_map_bytes = 0;
   // Threads that each map uses for integration, edits, plans, the search for places and, where a

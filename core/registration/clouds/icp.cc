@@ -13,14 +13,12 @@
 #include <Eigen/Core>
 #include <pcl/common/transforms.h>
 #include <pcl/correspondence.h>
-#include <pcl/features/impl/normal_3d.hpp>  // of no library: PCL's of features takes 57,600 relocations a start
+#include <pcl/features/impl/normal_3d.hpp>
 #include <pcl/features/normal_3d.h>
 #include <pcl/memory.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 #include <pcl/registration/correspondence_estimation.h>
-#include <pcl/registration/correspondence_rejection_surface_normal.h>
-#include <pcl/registration/correspondence_rejection_trimmed.h>
 #include <pcl/registration/gicp.h>
 
 #include "core/common/option_checks.h"
@@ -95,6 +93,8 @@ class Icp {
 
  private:
   pcl::Correspondences Match(const Pose& T);
+  // Takes out pairs whose normals differ by more than is let, and then the farthest.
+  void Reject(pcl::Correspondences& pairs) const;
   pcl::Correspondences Project() const;
   double WeightOf(const pcl::Correspondence& pair) const;
   // Counts the pairs; false, with the guess as the answer, if they are too few.
@@ -155,26 +155,26 @@ pcl::Correspondences Icp::Match(const Pose& T) {
       closest_.determineCorrespondences(pairs, options_.max_distance_m);
     }
   }
-  if (options_.max_normal_angle_rad < std::numbers::pi) {
-    pcl::registration::CorrespondenceRejectorSurfaceNormal rejector;
-    rejector.initializeDataContainer<Point, Point>();
-    rejector.setInputSource<Point>(moved_);
-    rejector.setInputNormals<Point, Point>(moved_);
-    rejector.setInputTarget<Point>(target_);
-    rejector.setTargetNormals<Point, Point>(target_);
-    rejector.setThreshold(std::cos(options_.max_normal_angle_rad));
-    pcl::Correspondences kept;
-    rejector.getRemainingCorrespondences(pairs, kept);
-    pairs.swap(kept);
-  }
-  if (options_.keep_share < 1.0) {
-    pcl::registration::CorrespondenceRejectorTrimmed rejector;
-    rejector.setOverlapRatio(static_cast<float>(options_.keep_share));
-    pcl::Correspondences kept;
-    rejector.getRemainingCorrespondences(pairs, kept);
-    pairs.swap(kept);
-  }
+  Reject(pairs);
   return pairs;
+}
+
+void Icp::Reject(pcl::Correspondences& pairs) const {
+  if (options_.max_normal_angle_rad < std::numbers::pi) {
+    const double least = std::cos(options_.max_normal_angle_rad);
+    std::erase_if(pairs, [&](const pcl::Correspondence& pair) {
+      const auto normal = (*moved_)[pair.index_query].getNormalVector3fMap();
+      return !(normal.dot((*target_)[pair.index_match].getNormalVector3fMap()) > least);
+    });
+  }
+  if (options_.keep_share >= 1.0) return;
+  const auto kept = static_cast<std::ptrdiff_t>(
+      std::floor(static_cast<float>(options_.keep_share) * static_cast<float>(pairs.size())));
+  std::nth_element(
+      pairs.begin(), pairs.begin() + kept, pairs.end(), [](const auto& a, const auto& b) {
+        return a.distance < b.distance;
+      });
+  pairs.erase(pairs.begin() + kept, pairs.end());
 }
 
 pcl::Correspondences Icp::Project() const {

@@ -26,11 +26,11 @@ constexpr char kRobot[] = "over";
 
 class ImportTest : public CliTest {
  protected:
-  // 31 scans of two chunks each.
+  // 21 scans of two chunks each.
   static void SetUpTestSuite() {
     drive_ = new TempDir;
     RobotFiles files;
-    files.step_m = 2.0;
+    files.step_m = 3.0;
     files.sensor.columns = 1440;
     scans_ = WriteDriveTo((drive_->path() / kRobot).string(), kRobot, files);
   }
@@ -105,7 +105,7 @@ TEST_F(ImportTest, GoesOnWhereAnEarlierCallEnded) {
   Json({"map", "create", "m"});
   Import();
   const std::string digest = Show().at("content_digest");
-  for (const int sequence : {0, 17, 30}) {
+  for (const std::uint64_t sequence : {std::uint64_t{0}, scans_ / 2, scans_ - 1}) {
     Json({"scan", "delete", "m", std::string(kRobot) + "/" + std::to_string(sequence)});
   }
   const json summary = Import();

@@ -9,6 +9,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/time/time.h"
 #include <gtest/gtest.h>
 
 #include "client/sdk/client.h"
@@ -31,6 +32,8 @@ struct Served {
     engine_options.directory = directory;
     engine_options.store = store;
     engine_options.server_name = name;
+    // Every upload waits for the owner's next look at what came in beside it.
+    engine_options.look_interval = absl::Milliseconds(20);
     auto opened = OpenEngine(engine_options);
     EXPECT_THAT(opened, IsOk());
     if (!opened.ok()) return;

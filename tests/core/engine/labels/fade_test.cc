@@ -1,5 +1,6 @@
 // The job "fade": what has gone leaves the map, and can come back.
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "tests/support/simulator/scene.h"
 #include "tests/support/simulator/simulator.h"
 #include "tests/support/status_matchers.h"
+#include "tests/support/temp_dir.h"
 
 namespace strata::testing {
 namespace {
@@ -70,19 +72,36 @@ std::size_t SurfacesOfCrate(api::Database& db) {
   return high;
 }
 
+// A map of all scans, made once: every test has a copy of its file.
 class FadeTest : public EngineTest {
  protected:
+  static void SetUpTestSuite() { kept_ = new TempDir; }
+  static void TearDownTestSuite() {
+    delete kept_;
+    kept_ = nullptr;
+  }
   void SetUp() override {
+    const std::filesystem::path kept = kept_->path() / "map";
+    if (std::filesystem::exists(kept)) {
+      std::filesystem::copy_file(kept, MapFile(kMapName));
+      return Reopen();
+    }
     MakeMap(MapParameters());
     for (std::uint64_t i = 0; i < kScans; ++i) {
       const PointCloud cloud = ScanAt(i);
       ASSERT_THAT(Upload(db(), HeaderOf({"robot", i}, cloud, StopAt(i)), cloud), IsOk());
     }
-    WaitIntegrated(db());
+    ASSERT_EQ(WaitIntegrated(db()).scans, kScans);
+    Close();
+    std::filesystem::copy_file(MapFile(kMapName), kept);
+    Reopen();
   }
   std::vector<std::uint16_t> FadedOf(std::uint64_t i) {
     return db().scans().GetFaded({}, kMapName, {"robot", i}).value();
   }
+
+ private:
+  static inline TempDir* kept_ = nullptr;
 };
 
 TEST_F(FadeTest, WhatHasGoneLeavesTheMapAndComesBack) {
@@ -220,9 +239,9 @@ TEST_F(EngineTest, AScanOfWhichNothingIsLeftMayBeMoved) {
 
 TEST_F(FadeTest, ACancelledJobChangesNothing) {
   const std::string before = Digest();
+  const auto tiles = AllTiles(db());
   int cancelled = 0;
   for (const double enough : {0.0, 0.2, 0.6, 0.7, 0.8, 0.9, 0.95}) {
-    const auto tiles = AllTiles(db());
     const JobInfo job = db().jobs().Start({}, kMapName, "fade", {}).value();
     JobInfo last;
     const auto cancel_when_there = [&](const JobInfo& now) -> absl::Status {
