@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -68,15 +69,17 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
   return map;
 }
 
-absl::Status Map::TakeInJobs() {
-  STRATA_ASSIGN_OR_RETURN(const bool any, jobs_->TakeIn());
+absl::Status Map::TakeInJobs(std::optional<std::uint64_t> id) {
+  STRATA_ASSIGN_OR_RETURN(const bool any, jobs_->TakeIn(id));
   if (any) runner_->JobQueued();
   return absl::OkStatus();
 }
 
-bool Map::HasWork() const {
-  return worker_->HasWork() || jobs_->AnyIn(JobState::kQueued) || jobs_->AnyIn(JobState::kRunning);
+bool Map::HasJobs() const {
+  return jobs_->AnyIn(JobState::kQueued) || jobs_->AnyIn(JobState::kRunning);
 }
+
+bool Map::HasWork() const { return worker_->HasWork() || HasJobs(); }
 
 bool Map::AtRest() const { return !HasWork() && worker_->AtRest() && runner_->AtRest(); }
 
