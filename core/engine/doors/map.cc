@@ -61,7 +61,7 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
   map->planner_ = std::make_unique<MapPlanner>(
       name, map->core_->info().parameters, map->core_->options(), map->core_->caches());
   map->tiles_ = std::make_unique<ServedTiles>(*map->core_);
-  map->localizer_ = std::make_unique<Localizer>(*map->core_);
+  map->localizer_ = std::make_unique<Localizer>(ScanAccess(*map->core_));
   map->surfaces_ = std::make_unique<SurfacesAround>(*map->core_, *map->tiles_);
   map->worker_ = std::make_unique<Worker>(*map->core_, *map->quarantine_, &RecoverDerived, pending);
   map->runner_ = std::make_unique<JobRunner>(

@@ -177,9 +177,18 @@ absl::StatusOr<api::PoseLookup> EnginePoseGraph::LookupPose(const api::Call& cal
 absl::StatusOr<LocalizeResult> EnginePoseGraph::Localize(const api::Call& call,
                                                          absl::string_view map,
                                                          const LocalizeQuery& query) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return found->localizer().Localize(query, call.stop);
+  STRATA_ASSIGN_OR_RETURN(MapReading found, maps_.FindToRead(call, map));
+  if (found.map() != nullptr) return found.map()->localizer().Localize(query, call.stop);
+  const auto make = [&]() -> absl::StatusOr<std::shared_ptr<LocalizerElsewhere>> {
+    STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<StorageReader> reader,
+                            found.store()->NewReader());
+    STRATA_ASSIGN_OR_RETURN(const MapInfo info, reader->GetMapInfo());
+    return std::make_shared<LocalizerElsewhere>(
+        found.TakeStore(), info.parameters, maps_.options(), maps_.caches());
+  };
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<LocalizerElsewhere> elsewhere,
+                          elsewhere_.Find(found.name(), found.store()->number(), make));
+  return elsewhere->localizer.Localize(query, call.stop);
 }
 
 absl::StatusOr<std::unique_ptr<api::Tracking>> EnginePoseGraph::Track(const api::Call& call,

@@ -4,19 +4,23 @@
 
 #include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
 #include "core/api/posegraph.h"
+#include "core/engine/consistency/localizer.h"
+#include "core/engine/doors/kept_elsewhere.h"
 #include "core/engine/doors/maps.h"
+#include "core/engine/scans/scan_access.h"
 
 namespace strata {
 
 class EnginePoseGraph final : public api::PoseGraph {
  public:
-  explicit EnginePoseGraph(EngineMaps& maps) : maps_(maps) {}
+  explicit EnginePoseGraph(EngineMaps& maps) : maps_(maps), elsewhere_(maps.options()) {}
 
   absl::StatusOr<api::PoseGraphState> Get(const api::Call& call, absl::string_view map) override;
   absl::Status SetPose(const api::Call& call,
@@ -44,7 +48,20 @@ class EnginePoseGraph final : public api::PoseGraph {
                                                        const TrackStart& start) override;
 
  private:
+  // Of a map that another engine has.
+  struct LocalizerElsewhere {
+    LocalizerElsewhere(std::unique_ptr<MapStorage> from,
+                       const MapParameters& parameters,
+                       const EngineOptions& options,
+                       const std::shared_ptr<CacheBudget>& caches)
+        : store(std::move(from)), localizer(ScanAccess(*store, parameters, options, caches)) {}
+
+    const std::unique_ptr<MapStorage> store;
+    Localizer localizer;
+  };
+
   EngineMaps& maps_;
+  KeptElsewhere<LocalizerElsewhere> elsewhere_;
 };
 
 }  // namespace strata
