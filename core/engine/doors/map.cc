@@ -62,7 +62,8 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
       name, map->core_->info().parameters, map->core_->options(), map->core_->caches());
   map->tiles_ = std::make_unique<ServedTiles>(*map->core_);
   map->localizer_ = std::make_unique<Localizer>(ScanAccess(*map->core_));
-  map->surfaces_ = std::make_unique<SurfacesAround>(*map->core_, *map->tiles_);
+  map->surfaces_ = std::make_unique<SurfacesAround>(
+      map->core_->info().parameters, map->core_->caches(), map->tiles_.get());
   map->worker_ = std::make_unique<Worker>(*map->core_, *map->quarantine_, &RecoverDerived, pending);
   map->runner_ = std::make_unique<JobRunner>(
       *map->core_, *map->quarantine_, *map->jobs_, *map->worker_, memory.seen);

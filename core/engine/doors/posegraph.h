@@ -12,7 +12,9 @@
 
 #include "core/api/posegraph.h"
 #include "core/engine/consistency/localizer.h"
+#include "core/engine/consistency/surfaces_around.h"
 #include "core/engine/doors/kept_elsewhere.h"
+#include "core/engine/doors/map_reading.h"
 #include "core/engine/doors/maps.h"
 #include "core/engine/scans/scan_access.h"
 
@@ -48,20 +50,30 @@ class EnginePoseGraph final : public api::PoseGraph {
                                                        const TrackStart& start) override;
 
  private:
-  // Of a map that another engine has.
-  struct LocalizerElsewhere {
-    LocalizerElsewhere(std::unique_ptr<MapStorage> from,
-                       const MapParameters& parameters,
-                       const EngineOptions& options,
-                       const std::shared_ptr<CacheBudget>& caches)
-        : store(std::move(from)), localizer(ScanAccess(*store, parameters, options, caches)) {}
+  class Following;
+
+  // What is kept of a map that another engine has.
+  struct Elsewhere {
+    Elsewhere(std::unique_ptr<MapStorage> from,
+              const MapParameters& of,
+              const EngineOptions& options,
+              const std::shared_ptr<CacheBudget>& caches)
+        : store(std::move(from)),
+          parameters(of),
+          localizer(ScanAccess(*store, parameters, options, caches)),
+          surfaces(parameters, caches) {}
 
     const std::unique_ptr<MapStorage> store;
+    const MapParameters parameters;
     Localizer localizer;
+    SurfacesAround surfaces;
   };
+  // `found`: by this call.
+  absl::StatusOr<std::shared_ptr<Elsewhere>> FindElsewhere(const api::Call& call,
+                                                           const MapReading& found);
 
   EngineMaps& maps_;
-  KeptElsewhere<LocalizerElsewhere> elsewhere_;
+  KeptElsewhere<Elsewhere> elsewhere_;
 };
 
 }  // namespace strata

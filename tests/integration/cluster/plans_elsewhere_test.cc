@@ -25,6 +25,7 @@
 #include "proto/translate/localize.h"
 #include "proto/translate/planning.h"
 #include "proto/translate/shape.h"
+#include "proto/translate/track.h"
 #include "tests/integration/cluster/sharing_servers.h"
 #include "tests/support/status_matchers.h"
 
@@ -275,6 +276,43 @@ TEST_F(PlansElsewhereTest, LocalizeInTheMapAsItIsNow) {
   std::printf("localized by what is kept in %s\n",
               absl::FormatDuration(absl::Now() - begun).c_str());
   EXPECT_TRUE(kept.found) << kept.message;
+}
+
+// A robot that goes on where it is followed by a server that has not got the map, also through the
+// death of the one that has it and once this one has it.
+TEST_F(PlansElsewhereTest, ARobotIsFollowedThroughTheDeathOfTheOwner) {
+  for (std::uint64_t hall = 1; hall <= 2; ++hall) STRATA_ASSERT_OK(PutHall(db(0), hall, Corner()));
+  STRATA_ASSERT_OK(AtRest(db(0), kShared));
+  TrackStart start;
+  start.T_map_scan_guess = TakenIn(1).T_map_scan_guess;
+  start.guess_radius_m = 2.0;
+  const auto owners = db(0).posegraph().Track({}, kShared, start);
+  STRATA_ASSERT_OK(owners);
+  const auto others = db(1).posegraph().Track({}, kShared, start);
+  STRATA_ASSERT_OK(others);
+  // From the middle of the corner to a metre before it, by what it would see.
+  for (int step = 0; step < 20; ++step) {
+    const double x_m = 0.05 * step;
+    TrackStep now;
+    now.cloud = Corner();
+    for (Eigen::Vector3f& point : now.cloud.points) point.x() -= static_cast<float>(x_m);
+    now.T_odom_scan = Pose::Identity();
+    now.T_odom_scan.translation().x() = x_m;
+    const auto told = (*others)->Step(now);
+    STRATA_ASSERT_OK(told);
+    EXPECT_EQ(told->state, TrackState::kTracked) << step << ": " << told->message;
+    EXPECT_NEAR(told->T_map_scan.translation().x(), x_m, 0.1) << step;
+    if (step < 10) {
+      const auto same = (*owners)->Step(now);
+      STRATA_ASSERT_OK(same);
+      EXPECT_EQ(BytesOf(*told), BytesOf(*same)) << step;
+    }
+    if (step == 10) servers_[0]->Kill();
+    // This server takes the map over.
+    if (step == 15) {
+      STRATA_ASSERT_OK(Insist([&] { return db(1).maps().SetClass({}, kShared, {7, "wall", 0}); }));
+    }
+  }
 }
 
 // A map that was removed and made again is another one, of the same name and maybe versions.
