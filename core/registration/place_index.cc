@@ -35,6 +35,11 @@ void PlaceIndex::Add(std::uint64_t number, const PlaceDescriptor& descriptor) {
             invariants_.begin() + static_cast<std::ptrdiff_t>(entry->second * kInvariant));
 }
 
+const PlaceDescriptor* PlaceIndex::Find(std::uint64_t number) const {
+  const auto entry = index_of_.find(number);
+  return entry == index_of_.end() ? nullptr : &places_[entry->second].descriptor;
+}
+
 bool PlaceIndex::Remove(std::uint64_t number) {
   const auto entry = index_of_.find(number);
   if (entry == index_of_.end()) return false;

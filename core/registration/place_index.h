@@ -28,6 +28,8 @@ class PlaceIndex {
   // False if there is no such place.
   bool Remove(std::uint64_t number);
   std::size_t size() const { return places_.size(); }
+  // nullptr if there is no such place.
+  const PlaceDescriptor* Find(std::uint64_t number) const;
 
   // Up to `count` places most alike, best first (ties: lower number first), without those for which
   // `excluded` is true. 20,000 places take a few ms.

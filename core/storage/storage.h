@@ -238,7 +238,7 @@ class StorageWriter {
   // Of the library. ALREADY_EXISTS; nothing happens where there is no such kind.
   virtual absl::Status RenameKind(std::uint64_t id, absl::string_view name) = 0;
   virtual absl::Status DeleteKind(std::uint64_t id) = 0;
-  // Inserts or replaces.
+  // Inserts or replaces, with parameters and metrics.
   virtual absl::Status PutJob(const JobInfo& job) = 0;
   virtual absl::Status DeleteJob(std::uint64_t id) = 0;
   // Inserts or replaces.

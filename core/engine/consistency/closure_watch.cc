@@ -41,7 +41,7 @@ absl::StatusOr<std::size_t> ClosureWatch::Look(const Stop& stop) {
   std::size_t found = 0;
   if (first_new < scans.size()) {
     found = CountFreshContacts(world, first_new);
-    ScanViews views(core_, scans);
+    ScanViews views(ScanAccess(core_), scans);
     SilentContext context(stop);
     STRATA_ASSIGN_OR_RETURN(const ClosureSearch search,
                             SearchClosures(world,

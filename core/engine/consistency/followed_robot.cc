@@ -39,11 +39,14 @@ MlsRegistrationOptions RegistrationOptions() {
 // As a tracker asks it, during one step.
 class FollowedRobot::MapNow final : public TrackedMap {
  public:
-  MapNow(FollowedRobot& robot, const PointCloud& cloud, const MapView& view, const Stop& stop)
-      : robot_(robot), cloud_(cloud), view_(view), stop_(stop) {}
+  MapNow(FollowedRobot& robot,
+         const PointCloud& cloud,
+         const FollowedRobot::Around& around,
+         const Stop& stop)
+      : robot_(robot), cloud_(cloud), around_(around), stop_(stop) {}
 
   absl::StatusOr<std::shared_ptr<const MapSurfaces>> Around(const Eigen::Vector3d& p_map) override {
-    return robot_.Around(p_map, view_, stop_);
+    return robot_.Look(p_map, around_, stop_);
   }
 
   absl::StatusOr<LocalizeResult> Find(const std::optional<Pose>& guess, double radius_m) override {
@@ -52,8 +55,8 @@ class FollowedRobot::MapNow final : public TrackedMap {
     query.sensor = robot_.start_.sensor;
     query.T_map_scan_guess = guess;
     query.guess_radius_m = radius_m;
-    STRATA_ASSIGN_OR_RETURN(LocalizeResult result, robot_.localizer_.Localize(query, stop_));
-    if (result.found && result.epoch != view_.epoch) {
+    STRATA_ASSIGN_OR_RETURN(LocalizeResult result, around_.localizer.Localize(query, stop_));
+    if (result.found && result.epoch != around_.state.view().epoch) {
       result.found = false;
       result.message = "the map has just begun another epoch";
     }
@@ -63,21 +66,15 @@ class FollowedRobot::MapNow final : public TrackedMap {
  private:
   FollowedRobot& robot_;
   const PointCloud& cloud_;
-  const MapView& view_;
+  const FollowedRobot::Around& around_;
   const Stop& stop_;
 };
 
-FollowedRobot::FollowedRobot(MapCore& core,
-                             SurfacesAround& surfaces,
-                             Localizer& localizer,
-                             const TrackStart& start)
-    : core_(core),
-      surfaces_(surfaces),
-      localizer_(localizer),
-      start_(start),
-      tracker_(start, RegistrationOptions()) {}
+FollowedRobot::FollowedRobot(const TrackStart& start)
+    : start_(start), tracker_(start, RegistrationOptions()) {}
 
-absl::StatusOr<ScanFeatures> FollowedRobot::FeaturesOf(const PointCloud& cloud) {
+absl::StatusOr<ScanFeatures> FollowedRobot::FeaturesOf(const PointCloud& cloud,
+                                                       const MapParameters& map) {
   if (CountFinite(cloud) == 0) return ScanFeatures();
   ScanRecord scan;
   scan.header.sensor_origin = cloud.sensor_origin;
@@ -87,12 +84,12 @@ absl::StatusOr<ScanFeatures> FollowedRobot::FeaturesOf(const PointCloud& cloud) 
   options.sample_count = kSamples;
   options.up = BelievedUp(cloud.points, options.up);
   options.R_map_scan = UprightTurn(options.up);
-  MlsParameters parameters = core_.info().parameters.mls;
+  MlsParameters parameters = map.mls;
   parameters.cell_size_m = std::min(parameters.cell_size_m, kRegistrationCellM);
   STRATA_ASSIGN_OR_RETURN(const MlsBuildResult built,
                           BuildMlsMap(cloud,
                                       Pose(options.R_map_scan),
-                                      start_.sensor.value_or(core_.info().parameters.sensor),
+                                      start_.sensor.value_or(map.sensor),
                                       parameters,
                                       scratch_));
   UprightOffsets offsets(built.map, options.samples_per_metre, options.R_map_scan);
@@ -100,11 +97,12 @@ absl::StatusOr<ScanFeatures> FollowedRobot::FeaturesOf(const PointCloud& cloud) 
   return ScanFeatures::FromMap(built.map, options, &offsets);
 }
 
-absl::Status FollowedRobot::Carry(std::uint64_t epoch) {
+absl::Status FollowedRobot::Carry(const MapState& state) {
+  const std::uint64_t epoch = state.view().epoch;
   const std::uint64_t before = std::exchange(epoch_, epoch);
   const std::optional<Pose> pose = tracker_.pose();
   if (before == 0 || before == epoch || !pose.has_value()) return absl::OkStatus();
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state.Reader());
   std::optional<PosedScan> nearest;
   double nearest_m = std::numeric_limits<double>::infinity();
   const auto look = [&](PosedScan scan) {
@@ -127,8 +125,10 @@ absl::Status FollowedRobot::Carry(std::uint64_t epoch) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::shared_ptr<const MapSurfaces>> FollowedRobot::Around(
-    const Eigen::Vector3d& p_map, const MapView& view, const Stop& stop) {
+absl::StatusOr<std::shared_ptr<const MapSurfaces>> FollowedRobot::Look(const Eigen::Vector3d& p_map,
+                                                                       const Around& around,
+                                                                       const Stop& stop) {
+  const MapView& view = around.state.view();
   const bool stays = looks_ > 0 && seen_view_.epoch == view.epoch &&
                      (p_map - CentreOf(seen_)).head<2>().norm() <= kSurfacesSlackM &&
                      (seen_view_ == view || looks_ < kLooksAtChanging);
@@ -140,21 +140,22 @@ absl::StatusOr<std::shared_ptr<const MapSurfaces>> FollowedRobot::Around(
   ++looks_;
   // Of an older view of this epoch it may be gone: then as the map is now.
   if (seen_view_ != view) {
-    if (auto held = surfaces_.FindAtHand(seen_, seen_view_); held != nullptr) return held;
+    if (auto held = around.surfaces.FindAtHand(seen_, seen_view_); held != nullptr) return held;
     seen_view_ = view;
     looks_ = 1;
   }
-  return surfaces_.Find(seen_, view, stop);
+  return around.surfaces.Find(seen_, around.state, stop);
 }
 
-absl::StatusOr<TrackedPose> FollowedRobot::Step(const TrackStep& step, const Stop& stop) {
+absl::StatusOr<TrackedPose> FollowedRobot::Step(const TrackStep& step,
+                                                const Around& around,
+                                                const Stop& stop) {
   STRATA_RETURN_IF_ERROR(ValidateTrackStep(step));
-  const Snapshots::Pin pin = core_.snapshots().PinCurrent();
-  STRATA_RETURN_IF_ERROR(Carry(pin.view().epoch));
-  STRATA_ASSIGN_OR_RETURN(const ScanFeatures features, FeaturesOf(step.cloud));
-  MapNow map(*this, step.cloud, pin.view(), stop);
+  STRATA_RETURN_IF_ERROR(Carry(around.state));
+  STRATA_ASSIGN_OR_RETURN(const ScanFeatures features, FeaturesOf(step.cloud, around.parameters));
+  MapNow map(*this, step.cloud, around, stop);
   STRATA_ASSIGN_OR_RETURN(TrackedPose pose, tracker_.Step(step, features, map));
-  pose.epoch = pin.view().epoch;
+  pose.epoch = around.state.view().epoch;
   return pose;
 }
 

@@ -11,12 +11,13 @@
 #include "core/common/stop.h"
 #include "core/engine/consistency/localizer.h"
 #include "core/engine/consistency/surfaces_around.h"
-#include "core/engine/map/map_core.h"
+#include "core/engine/map/map_state.h"
 #include "core/engine/map/snapshots.h"
 #include "core/mls/build.h"
 #include "core/registration/scan_features.h"
 #include "core/tracking/map_surfaces.h"
 #include "core/tracking/tracker.h"
+#include "core/world/map_info.h"
 #include "core/world/tracking.h"
 
 namespace strata {
@@ -25,29 +26,32 @@ namespace strata {
 // between steps next to none.
 class FollowedRobot {
  public:
-  // All must outlive it; `start` must be valid.
-  FollowedRobot(MapCore& core,
-                SurfacesAround& surfaces,
-                Localizer& localizer,
-                const TrackStart& start);
+  // What is asked of the map that it moves in, one at a step and maybe another one, which has the
+  // same map, at the next.
+  struct Around {
+    const MapParameters parameters;
+    SurfacesAround& surfaces;
+    Localizer& localizer;
+    const MapState& state;
+  };
 
-  // By the map as it is now. INVALID_ARGUMENT for a step that is none; DATA_LOSS for no tile, those
-  // that are damaged are left out.
-  absl::StatusOr<TrackedPose> Step(const TrackStep& step, const Stop& stop);
+  // `start` must be valid.
+  explicit FollowedRobot(const TrackStart& start);
+
+  // By the map as it is in `around.state`. INVALID_ARGUMENT for a step that is none; DATA_LOSS for
+  // no tile, those that are damaged are left out.
+  absl::StatusOr<TrackedPose> Step(const TrackStep& step, const Around& around, const Stop& stop);
 
  private:
   class MapNow;
 
-  absl::StatusOr<ScanFeatures> FeaturesOf(const PointCloud& cloud);
+  absl::StatusOr<ScanFeatures> FeaturesOf(const PointCloud& cloud, const MapParameters& map);
   // Into the poses of another epoch, as the nearest scan went there.
-  absl::Status Carry(std::uint64_t epoch);
-  absl::StatusOr<std::shared_ptr<const MapSurfaces>> Around(const Eigen::Vector3d& p_map,
-                                                            const MapView& view,
-                                                            const Stop& stop);
+  absl::Status Carry(const MapState& state);
+  absl::StatusOr<std::shared_ptr<const MapSurfaces>> Look(const Eigen::Vector3d& p_map,
+                                                          const Around& around,
+                                                          const Stop& stop);
 
-  MapCore& core_;
-  SurfacesAround& surfaces_;
-  Localizer& localizer_;
   const TrackStart start_;
   Tracker tracker_;
   std::uint64_t epoch_ = 0;  // that the tracker's pose is of

@@ -83,15 +83,19 @@ absl::Status GraphWorld::FindDamagedRows(StorageReader& reader, DamagedScans& da
 }
 
 absl::StatusOr<GraphWorld> GraphWorld::Read(MapCore& core, DamagedScans* damaged) {
-  GraphWorld world;
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
-  STRATA_RETURN_IF_ERROR(reader->Snapshot([&]() -> absl::Status {
-    STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());
+  return Read(*reader, damaged);
+}
+
+absl::StatusOr<GraphWorld> GraphWorld::Read(StorageReader& reader, DamagedScans* damaged) {
+  GraphWorld world;
+  STRATA_RETURN_IF_ERROR(reader.Snapshot([&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader.GetClock());
     world.epoch_ = clock.epoch;
-    STRATA_RETURN_IF_ERROR(world.ReadScans(*reader));
-    if (damaged != nullptr) STRATA_RETURN_IF_ERROR(world.FindDamagedRows(*reader, *damaged));
-    STRATA_ASSIGN_OR_RETURN(world.constraints_, reader->ListConstraints(clock.epoch));
-    STRATA_ASSIGN_OR_RETURN(world.planes_, reader->ListPlanes(clock.epoch));
+    STRATA_RETURN_IF_ERROR(world.ReadScans(reader));
+    if (damaged != nullptr) STRATA_RETURN_IF_ERROR(world.FindDamagedRows(reader, *damaged));
+    STRATA_ASSIGN_OR_RETURN(world.constraints_, reader.ListConstraints(clock.epoch));
+    STRATA_ASSIGN_OR_RETURN(world.planes_, reader.ListPlanes(clock.epoch));
     return absl::OkStatus();
   }));
   std::erase_if(world.constraints_, [&world](const ConstraintRecord& record) {

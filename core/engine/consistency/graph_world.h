@@ -30,6 +30,7 @@ struct MeasuredGraph {
 class GraphWorld {
  public:
   // Scans whose rows are damaged are left out, and put into `damaged` unless it is nullptr.
+  static absl::StatusOr<GraphWorld> Read(StorageReader& reader, DamagedScans* damaged = nullptr);
   static absl::StatusOr<GraphWorld> Read(MapCore& core, DamagedScans* damaged = nullptr);
 
   std::uint64_t epoch() const { return epoch_; }

@@ -51,11 +51,28 @@ struct Candidate {
   std::vector<PlaceHypothesis> hypotheses;  // in the frame of the node
 };
 
+// Damaged, or deleted since it was listed.
+bool IsNoPlace(const absl::Status& status) {
+  return absl::IsDataLoss(status) || absl::IsNotFound(status);
+}
+
 }  // namespace
 
 struct Localizer::Places {
-  Places(MapCore& core, MapView of, GraphWorld read)
-      : view(of), world(std::move(read)), views(core, world.Scans()) {}
+  Places(const ScanAccess& access, MapView of, GraphWorld read)
+      : view(of), world(std::move(read)), views(access, world.Scans()) {}
+
+  // What that scan looks like; nullptr: not known.
+  const PlaceDescriptor* FindPlace(ScanNumber number) const {
+    const std::vector<ScanRecord>& scans = world.Scans();
+    const auto it = std::lower_bound(
+        scans.begin(), scans.end(), number, [](const ScanRecord& scan, ScanNumber wanted) {
+          return scan.number < wanted;
+        });
+    if (it == scans.end() || it->number != number) return nullptr;
+    const PlaceDescriptor* found = index.Find(static_cast<std::uint64_t>(it - scans.begin()));
+    return found == nullptr || found->empty() ? nullptr : found;
+  }
 
   const MapView view;
   const GraphWorld world;
@@ -68,16 +85,16 @@ Localizer::~Localizer() = default;
 // One question.
 class Localizer::Search {
  public:
-  Search(MapCore& core, Places& places, const LocalizeQuery& query, const Stop& stop)
-      : core_(core), places_(places), query_(query), stop_(stop) {}
+  Search(const ScanAccess& access, Places& places, const LocalizeQuery& query, const Stop& stop)
+      : access_(access), places_(places), query_(query), stop_(stop) {}
 
   absl::StatusOr<LocalizeResult> Run() {
     STRATA_RETURN_IF_ERROR(Describe());
     const std::vector<Candidate> candidates =
         query_.T_map_scan_guess.has_value() ? NearGuess() : Alike();
     std::vector<PlaceMatch> matches(candidates.size());
-    STRATA_RETURN_IF_ERROR(ParallelFor(
-        core_.options().worker_threads, candidates.size(), [&](int, std::size_t k) -> absl::Status {
+    STRATA_RETURN_IF_ERROR(
+        ParallelFor(access_.threads(), candidates.size(), [&](int, std::size_t k) -> absl::Status {
           STRATA_RETURN_IF_ERROR(stop_.status());
           STRATA_ASSIGN_OR_RETURN(matches[k], Try(candidates[k]));
           return absl::OkStatus();
@@ -94,7 +111,7 @@ class Localizer::Search {
     ScanFeatureOptions options = FeatureOptionsOf(scan);
     options.up = BelievedUp(query_.cloud.points, options.up);
     options.R_map_scan = UprightTurn(options.up);
-    MlsParameters parameters = core_.info().parameters.mls;
+    MlsParameters parameters = access_.parameters().mls;
     STRATA_ASSIGN_OR_RETURN(const MlsMap seen, Seen(parameters, options.R_map_scan));
     place_ = DescribePlace(seen);
     parameters.cell_size_m = std::min(parameters.cell_size_m, kRegistrationCellM);
@@ -111,7 +128,7 @@ class Localizer::Search {
     STRATA_ASSIGN_OR_RETURN(MlsBuildResult built,
                             BuildMlsMap(query_.cloud,
                                         Pose(R_upright_scan),
-                                        query_.sensor.value_or(core_.info().parameters.sensor),
+                                        query_.sensor.value_or(access_.parameters().sensor),
                                         parameters,
                                         scratch));
     return std::move(built.map);
@@ -176,7 +193,7 @@ class Localizer::Search {
     std::vector<SeenScan> target;
     for (const std::size_t k : SelectNeighbours(poses, poses[candidate.node], kPlace)) {
       absl::StatusOr<std::shared_ptr<const ScanFeatures>> features = places_.views.Features(k);
-      if (absl::IsDataLoss(features.status())) continue;
+      if (IsNoPlace(features.status())) continue;
       STRATA_RETURN_IF_ERROR(features.status());
       held.push_back(*std::move(features));
       target.push_back({held.back().get(),
@@ -202,7 +219,7 @@ class Localizer::Search {
   LocalizeResult Answer(const std::vector<Candidate>& candidates,
                         const std::vector<PlaceMatch>& matches) const {
     LocalizeResult result;
-    result.epoch = places_.view.epoch;
+    result.epoch = places_.world.epoch();
     const std::optional<std::size_t> best = UniquePlace(matches, Options());
     if (best.has_value()) {
       const PlaceMatch& match = matches[*best];
@@ -270,7 +287,7 @@ class Localizer::Search {
     }
   }
 
-  MapCore& core_;
+  const ScanAccess& access_;
   Places& places_;
   const LocalizeQuery& query_;
   const Stop& stop_;
@@ -278,26 +295,45 @@ class Localizer::Search {
   ScanFeatures features_;
 };
 
-absl::StatusOr<std::shared_ptr<Localizer::Places>> Localizer::CurrentPlaces(const Stop& stop) {
-  const MapView view = core_.snapshots().current();
-  {
-    absl::MutexLock lock(&mutex_);
-    if (places_ != nullptr && places_->view == view) return places_;
-  }
-  STRATA_ASSIGN_OR_RETURN(GraphWorld world, GraphWorld::Read(core_));
-  auto places = std::make_shared<Places>(core_, view, std::move(world));
-  std::vector<PlaceDescriptor> descriptors(places->world.size());
-  STRATA_RETURN_IF_ERROR(ParallelFor(
-      core_.options().worker_threads, descriptors.size(), [&](int, std::size_t k) -> absl::Status {
+// What a scan looks like is of its points, and stays when the map changes.
+absl::StatusOr<std::vector<PlaceDescriptor>> Localizer::Describe(Places& places,
+                                                                 const Places* before,
+                                                                 const Stop& stop) const {
+  std::vector<PlaceDescriptor> descriptors(places.world.size());
+  STRATA_RETURN_IF_ERROR(
+      ParallelFor(access_.threads(), descriptors.size(), [&](int, std::size_t k) -> absl::Status {
         STRATA_RETURN_IF_ERROR(stop.status());
-        absl::StatusOr<PlaceDescriptor> place = places->views.Place(k);
-        if (absl::IsDataLoss(place.status())) {
+        const PlaceDescriptor* const known =
+            before != nullptr ? before->FindPlace(places.world.number(k)) : nullptr;
+        if (known != nullptr) {
+          descriptors[k] = *known;
           return absl::OkStatus();
         }
+        absl::StatusOr<PlaceDescriptor> place = places.views.Place(k);
+        if (IsNoPlace(place.status())) return absl::OkStatus();
         STRATA_RETURN_IF_ERROR(place.status());
         descriptors[k] = *std::move(place);
         return absl::OkStatus();
       }));
+  return descriptors;
+}
+
+absl::StatusOr<std::shared_ptr<Localizer::Places>> Localizer::CurrentPlaces(const Stop& stop) {
+  STRATA_ASSIGN_OR_RETURN(const MapView view, access_.View());
+  std::shared_ptr<Places> before;
+  {
+    absl::MutexLock lock(&mutex_);
+    if (places_ != nullptr && places_->view == view) return places_;
+    before = places_;
+  }
+  std::shared_ptr<Places> places;
+  {
+    STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, access_.Reader());
+    STRATA_ASSIGN_OR_RETURN(GraphWorld world, GraphWorld::Read(*reader));
+    places = std::make_shared<Places>(access_, view, std::move(world));
+  }
+  STRATA_ASSIGN_OR_RETURN(const std::vector<PlaceDescriptor> descriptors,
+                          Describe(*places, before.get(), stop));
   for (std::size_t k = 0; k < descriptors.size(); ++k) places->index.Add(k, descriptors[k]);
   absl::MutexLock lock(&mutex_);
   places_ = places;
@@ -307,7 +343,7 @@ absl::StatusOr<std::shared_ptr<Localizer::Places>> Localizer::CurrentPlaces(cons
 absl::StatusOr<LocalizeResult> Localizer::Localize(const LocalizeQuery& query, const Stop& stop) {
   STRATA_RETURN_IF_ERROR(ValidateLocalizeQuery(query));
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Places> places, CurrentPlaces(stop));
-  return Search(core_, *places, query, stop).Run();
+  return Search(access_, *places, query, stop).Run();
 }
 
 }  // namespace strata

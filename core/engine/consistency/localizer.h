@@ -3,13 +3,16 @@
 #define STRATA_CORE_ENGINE_CONSISTENCY_LOCALIZER_H_
 
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 
 #include "core/common/stop.h"
-#include "core/engine/map/map_core.h"
+#include "core/engine/scans/scan_access.h"
+#include "core/registration/place_descriptor.h"
 #include "core/world/localization.h"
 
 namespace strata {
@@ -17,7 +20,7 @@ namespace strata {
 // Thread-safe. What places look like is kept between questions, until the map changes.
 class Localizer {
  public:
-  explicit Localizer(MapCore& core) : core_(core) {}
+  explicit Localizer(ScanAccess access) : access_(std::move(access)) {}
   ~Localizer();
 
   // INVALID_ARGUMENT naming the field that is wrong. Scans of the map that are damaged are no
@@ -30,8 +33,12 @@ class Localizer {
 
   // The places of the present state.
   absl::StatusOr<std::shared_ptr<Places>> CurrentPlaces(const Stop& stop);
+  // `before`: an earlier state, or nullptr.
+  absl::StatusOr<std::vector<PlaceDescriptor>> Describe(Places& places,
+                                                        const Places* before,
+                                                        const Stop& stop) const;
 
-  MapCore& core_;
+  const ScanAccess access_;
   absl::Mutex mutex_;
   std::shared_ptr<Places> places_ ABSL_GUARDED_BY(mutex_);  // nullptr: never asked for
 };

@@ -77,7 +77,7 @@ class Optimizer {
   absl::StatusOr<Proposed> Propose() {
     STRATA_RETURN_IF_ERROR(context_.Progress(0.0, "reading the pose graph"));
     STRATA_ASSIGN_OR_RETURN(GraphWorld world, GraphWorld::Read(core_, &damaged_));
-    ScanViews views(core_, world.Scans(), &damaged_);
+    ScanViews views(ScanAccess(core_), world.Scans(), &damaged_);
     std::vector<FoundClosure> closures;
     std::vector<Pose> start = world.Poses();
     if (settings_.closures) {

@@ -26,6 +26,27 @@ absl::StatusOr<PoseChange> ReadChange(MapCore& core, std::uint64_t epoch) {
 
 }  // namespace
 
+absl::StatusOr<std::uint64_t> EpochBefore(const JobInfo& job, std::uint64_t current) {
+  const auto before = job.metrics.find("epoch_before");
+  const auto made = job.metrics.find("epoch");
+  if (job.state != JobState::kSucceeded || before == job.metrics.end() ||
+      made == job.metrics.end() || made->second == before->second) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("job ", job.id, " made no epoch that could be reverted"));
+  }
+  if (made->second != static_cast<double>(current)) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("job ",
+                     job.id,
+                     " made epoch ",
+                     made->second,
+                     ", but the map is at ",
+                     current,
+                     " by now; name the epoch to go back to: map revert"));
+  }
+  return static_cast<std::uint64_t>(before->second);
+}
+
 absl::Status RunRevertJob(Integrator& integrator,
                           const JobInfo& job,
                           std::uint64_t epoch,

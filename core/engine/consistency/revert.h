@@ -5,12 +5,16 @@
 #include <cstdint>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 
 #include "core/engine/ingest/integrator.h"
 #include "core/engine/map/job_context.h"
 #include "core/world/job.h"
 
 namespace strata {
+
+// The one before the epoch that `job` made, which must be the current one. FAILED_PRECONDITION.
+absl::StatusOr<std::uint64_t> EpochBefore(const JobInfo& job, std::uint64_t current);
 
 // On the worker: makes the poses of `epoch` those of a new epoch.
 // Scans that had none then are carried by their partners. NOT_FOUND for an epoch that never was,

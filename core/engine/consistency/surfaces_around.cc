@@ -68,44 +68,54 @@ SurfacesAround::Handle SurfacesAround::FindAtHand(const PlaceKey& place, const M
 }
 
 absl::StatusOr<SurfacesAround::Handle> SurfacesAround::Find(const PlaceKey& place,
-                                                            const MapView& view,
+                                                            const MapState& state,
                                                             const Stop& stop) {
-  if (Handle known = FindAtHand(place, view); known != nullptr) return known;
-  STRATA_ASSIGN_OR_RETURN(MapSurfaces collected, Collect(CentreOf(place), view, stop));
+  if (Handle known = FindAtHand(place, state.view()); known != nullptr) return known;
+  STRATA_ASSIGN_OR_RETURN(MapSurfaces collected, Collect(CentreOf(place), state, stop));
   auto surfaces = std::make_shared<const MapSurfaces>(std::move(collected));
-  known_.Put(
-      {place, view}, surfaces, surfaces->features.memory_bytes() + surfaces->target.memory_bytes());
+  known_.Put({place, state.view()},
+             surfaces,
+             surfaces->features.memory_bytes() + surfaces->target.memory_bytes());
   return surfaces;
 }
 
+absl::StatusOr<std::optional<SurfaceTile>> SurfacesAround::ReadTile(const TileKey& key,
+                                                                    const MapState& state) {
+  if (tiles_ != nullptr && state.open_here()) {
+    STRATA_ASSIGN_OR_RETURN(const ServedTiles::Handle served, tiles_->Find(key, state.view()));
+    if (served == nullptr) return std::nullopt;
+    return DecodeSurfaceTile(served->bytes);
+  }
+  STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state.Reader());
+  STRATA_ASSIGN_OR_RETURN(const std::optional<SurfaceTileRow> row,
+                          reader->FindSurfaceTile(key, state.view().tile_version));
+  if (!row.has_value()) return std::nullopt;
+  return DecodeSurfaceTile(row->bytes);
+}
+
 absl::StatusOr<MapSurfaces> SurfacesAround::Collect(const Eigen::Vector3d& centre,
-                                                    const MapView& view,
+                                                    const MapState& state,
                                                     const Stop& stop) {
-  const MapParameters parameters = core_.info().parameters;
-  const double cell_size_m = parameters.mls.cell_size_m;
+  const double cell_size_m = parameters_.mls.cell_size_m;
   std::vector<SurfaceTileRow> rows;
   {
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+    STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state.Reader());
     STRATA_ASSIGN_OR_RETURN(
         rows,
         reader->ListSurfaceTiles(RangeAround(centre, cell_size_m, LevelOf(cell_size_m)),
-                                 view.tile_version));
+                                 state.view().tile_version));
   }
   std::stable_sort(rows.begin(), rows.end(), [&](const SurfaceTileRow& a, const SurfaceTileRow& b) {
     return SquaredDistance(a.key, centre, cell_size_m) <
            SquaredDistance(b.key, centre, cell_size_m);
   });
-  MapSurfacesCollector collector(centre, cell_size_m, parameters.keep_points);
+  MapSurfacesCollector collector(centre, cell_size_m, parameters_.keep_points);
   for (const SurfaceTileRow& row : rows) {
     STRATA_RETURN_IF_ERROR(stop.status());
-    const absl::StatusOr<ServedTiles::Handle> served = tiles_.Find(row.key, view);
-    if (absl::IsDataLoss(served.status())) continue;
-    STRATA_RETURN_IF_ERROR(served.status());
-    if (*served == nullptr) continue;
-    const absl::StatusOr<SurfaceTile> tile = DecodeSurfaceTile((*served)->bytes);
+    const absl::StatusOr<std::optional<SurfaceTile>> tile = ReadTile(row.key, state);
     if (absl::IsDataLoss(tile.status())) continue;
     STRATA_RETURN_IF_ERROR(tile.status());
-    if (!collector.Add(*tile)) break;
+    if (tile->has_value() && !collector.Add(**tile)) break;
   }
   return std::move(collector).Finish();
 }

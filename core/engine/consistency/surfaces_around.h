@@ -5,17 +5,22 @@
 #include <compare>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "absl/status/statusor.h"
 #include <Eigen/Core>
 
+#include "core/common/cache_budget.h"
 #include "core/common/lru_cache.h"
 #include "core/common/stop.h"
-#include "core/engine/map/map_core.h"
+#include "core/engine/map/map_state.h"
 #include "core/engine/map/snapshots.h"
 #include "core/engine/tiles/served_tiles.h"
+#include "core/mls/surface_tile.h"
+#include "core/mls/tile_key.h"
 #include "core/tracking/map_surfaces.h"
+#include "core/world/map_info.h"
 
 namespace strata {
 
@@ -33,13 +38,14 @@ class SurfacesAround {
  public:
   using Handle = std::shared_ptr<const MapSurfaces>;
 
-  // Both must outlive it.
-  SurfacesAround(MapCore& core, ServedTiles& tiles)
-      : core_(core), tiles_(tiles), known_(core.caches()) {}
+  // `parameters`: of the map. `tiles`, which must outlive it: of one that is open here, or nullptr.
+  SurfacesAround(const MapParameters& parameters,
+                 const std::shared_ptr<CacheBudget>& caches,
+                 ServedTiles* tiles = nullptr)
+      : parameters_(parameters), tiles_(tiles), known_(caches) {}
 
-  // As readers of `view`, which must be pinned, see it; never null. Tiles that are damaged are left
-  // out.
-  absl::StatusOr<Handle> Find(const PlaceKey& place, const MapView& view, const Stop& stop);
+  // As the map is in `state`; never null. Tiles that are damaged are left out.
+  absl::StatusOr<Handle> Find(const PlaceKey& place, const MapState& state, const Stop& stop);
   // The same where it is in memory; nullptr where it is not.
   Handle FindAtHand(const PlaceKey& place, const MapView& view);
 
@@ -60,11 +66,13 @@ class SurfacesAround {
   };
 
   absl::StatusOr<MapSurfaces> Collect(const Eigen::Vector3d& centre,
-                                      const MapView& view,
+                                      const MapState& state,
                                       const Stop& stop);
+  // nullopt: nothing is there. DATA_LOSS.
+  absl::StatusOr<std::optional<SurfaceTile>> ReadTile(const TileKey& key, const MapState& state);
 
-  MapCore& core_;
-  ServedTiles& tiles_;
+  const MapParameters parameters_;
+  ServedTiles* const tiles_;
   LruCache<Key, const MapSurfaces> known_;
 };
 

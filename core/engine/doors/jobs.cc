@@ -18,6 +18,7 @@
 
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
+#include "core/engine/consistency/revert.h"
 #include "core/engine/doors/map_reading.h"
 #include "core/engine/jobs/job_beside.h"
 #include "core/engine/jobs/job_handlers.h"
@@ -26,28 +27,6 @@
 
 namespace strata {
 namespace {
-
-// The epoch before the one that `job` made, which must be the current one.
-absl::StatusOr<std::uint64_t> EpochBefore(const JobInfo& job, std::uint64_t current) {
-  const auto before = job.metrics.find("epoch_before");
-  const auto made = job.metrics.find("epoch");
-  if (job.state != JobState::kSucceeded || before == job.metrics.end() ||
-      made == job.metrics.end() || made->second == before->second) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("job ", job.id, " made no epoch that could be reverted"));
-  }
-  if (made->second != static_cast<double>(current)) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("job ",
-                     job.id,
-                     " made epoch ",
-                     made->second,
-                     ", but the map is at ",
-                     current,
-                     " by now; name the epoch to go back to: map revert"));
-  }
-  return static_cast<std::uint64_t>(before->second);
-}
 
 // Of a map that another engine has: as it last wrote them.
 absl::StatusOr<std::vector<JobInfo>> StoredJobs(const MapReading& map) {
@@ -97,11 +76,13 @@ absl::StatusOr<JobInfo> EngineJobs::Start(const api::Call& call,
   return info;
 }
 
-// A job that was just queued by another engine is not known here before the next look at the store.
+// What another engine has just queued or decided is not known here before the next look at the
+// store.
 absl::StatusOr<JobInfo> EngineJobs::Find(Map& map, std::uint64_t id) {
   absl::StatusOr<JobInfo> job = map.jobs().Get(id);
-  if (!absl::IsNotFound(job.status()) || !maps_.IsShared()) return job;
-  STRATA_RETURN_IF_ERROR(map.TakeInJobs());
+  const bool over = job.ok() && IsFinal(job->state) && job->state != JobState::kProposed;
+  if (over || !maps_.IsShared()) return job;
+  STRATA_RETURN_IF_ERROR(map.TakeInJobs(id));
   return map.jobs().Get(id);
 }
 
@@ -125,18 +106,20 @@ absl::StatusOr<JobInfo> EngineJobs::Cancel(const api::Call& call,
                                            absl::string_view map,
                                            std::uint64_t id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  STRATA_RETURN_IF_ERROR(Find(*found, id).status());
-  return found->jobs().Cancel(id);
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
+  if (place.map == nullptr) return CancelJobBeside(*place.store, id);
+  STRATA_RETURN_IF_ERROR(Find(*place.map, id).status());
+  return place.map->jobs().Cancel(id);
 }
 
 absl::StatusOr<JobInfo> EngineJobs::Accept(const api::Call& call,
                                            absl::string_view map,
                                            std::uint64_t id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  STRATA_ASSIGN_OR_RETURN(JobInfo info, found->jobs().Accept(id));
-  found->JobQueued();
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
+  if (place.map == nullptr) return AcceptJobBeside(*place.store, id);
+  STRATA_ASSIGN_OR_RETURN(JobInfo info, place.map->jobs().Accept(id));
+  place.map->JobQueued();
   return info;
 }
 
@@ -144,15 +127,17 @@ absl::StatusOr<JobInfo> EngineJobs::Revert(const api::Call& call,
                                            absl::string_view map,
                                            std::uint64_t id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  STRATA_ASSIGN_OR_RETURN(const JobInfo job, Find(*found, id));
-  if (job.state == JobState::kProposed) return found->jobs().Discard(id);
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
+  if (place.map == nullptr) return RevertJobBeside(*place.store, id);
+  Map& found = *place.map;
+  STRATA_ASSIGN_OR_RETURN(const JobInfo job, Find(found, id));
+  if (job.state == JobState::kProposed) return found.jobs().Discard(id);
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t epoch,
-                          EpochBefore(job, found->core().snapshots().current().epoch));
+                          EpochBefore(job, found.core().snapshots().current().epoch));
   STRATA_ASSIGN_OR_RETURN(
       JobInfo revert,
-      found->jobs().Start(call.stop, call.principal, kRevertJob, {{"epoch", absl::StrCat(epoch)}}));
-  found->JobQueued();
+      found.jobs().Start(call.stop, call.principal, kRevertJob, {{"epoch", absl::StrCat(epoch)}}));
+  found.JobQueued();
   return revert;
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -60,23 +61,26 @@ absl::StatusOr<std::shared_ptr<Map>> Map::Open(const std::string& name,
   map->planner_ = std::make_unique<MapPlanner>(
       name, map->core_->info().parameters, map->core_->options(), map->core_->caches());
   map->tiles_ = std::make_unique<ServedTiles>(*map->core_);
-  map->localizer_ = std::make_unique<Localizer>(*map->core_);
-  map->surfaces_ = std::make_unique<SurfacesAround>(*map->core_, *map->tiles_);
+  map->localizer_ = std::make_unique<Localizer>(ScanAccess(*map->core_));
+  map->surfaces_ = std::make_unique<SurfacesAround>(
+      map->core_->info().parameters, map->core_->caches(), map->tiles_.get());
   map->worker_ = std::make_unique<Worker>(*map->core_, *map->quarantine_, &RecoverDerived, pending);
   map->runner_ = std::make_unique<JobRunner>(
       *map->core_, *map->quarantine_, *map->jobs_, *map->worker_, memory.seen);
   return map;
 }
 
-absl::Status Map::TakeInJobs() {
-  STRATA_ASSIGN_OR_RETURN(const bool any, jobs_->TakeIn());
+absl::Status Map::TakeInJobs(std::optional<std::uint64_t> id) {
+  STRATA_ASSIGN_OR_RETURN(const bool any, jobs_->TakeIn(id));
   if (any) runner_->JobQueued();
   return absl::OkStatus();
 }
 
-bool Map::HasWork() const {
-  return worker_->HasWork() || jobs_->AnyIn(JobState::kQueued) || jobs_->AnyIn(JobState::kRunning);
+bool Map::HasJobs() const {
+  return jobs_->AnyIn(JobState::kQueued) || jobs_->AnyIn(JobState::kRunning);
 }
+
+bool Map::HasWork() const { return worker_->HasWork() || HasJobs(); }
 
 bool Map::AtRest() const { return !HasWork() && worker_->AtRest() && runner_->AtRest(); }
 

@@ -2,8 +2,10 @@
 #ifndef STRATA_CORE_ENGINE_DOORS_MAP_H_
 #define STRATA_CORE_ENGINE_DOORS_MAP_H_
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -63,9 +65,11 @@ class Map {
   void ScansWait() { worker_->ScansWait(); }
   // A job was queued.
   void JobQueued() { runner_->JobQueued(); }
-  // Jobs may have been queued elsewhere.
-  absl::Status TakeInJobs();
+  // Jobs, or this one, may have been queued or decided elsewhere.
+  absl::Status TakeInJobs(std::optional<std::uint64_t> id = std::nullopt);
 
+  // Jobs wait or run.
+  bool HasJobs() const;
   // Scans or jobs wait or are under way, or what is derived has to be made again. After Close():
   // whether the next opening has them to do.
   bool HasWork() const;

@@ -42,6 +42,8 @@ class MapReading {
   Map* map() const { return map_.get(); }
   // nullptr: it is open here.
   MapStorage* store() const { return store_.get(); }
+  // The store, for what is kept beyond the call.
+  std::unique_ptr<MapStorage> TakeStore() { return std::move(store_); }
   // For what is served by the engine that has the map only.
   const absl::Status& elsewhere() const { return elsewhere_; }
 

@@ -2,6 +2,7 @@
 // something to do, and lets go what is idle.
 #include <algorithm>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -131,16 +132,14 @@ void OpenMaps::TakeAbandoned() {
 void OpenMaps::TellOfArrivals() {
   const absl::StatusOr<std::vector<WaitingMap>> waiting = stores_.ListWaiting();
   if (!waiting.ok()) return;  // the store is away; what waits there goes on waiting
-  for (const WaitingMap& one : *waiting) {
-    std::shared_ptr<Map> map;
-    {
-      absl::MutexLock lock(&mutex_);
-      const auto it = entries_.find(one.name);
-      if (it != entries_.end() && it->second.state == State::kOpen) map = it->second.map;
-    }
-    if (map == nullptr) continue;
-    if (one.scans) map->ScansWait();
-    if (one.jobs) map->TakeInJobs().IgnoreError();  // it is looked again
+  std::map<std::string, WaitingMap> arrived;
+  for (const WaitingMap& one : *waiting) arrived[one.name] = one;
+  for (const std::shared_ptr<Map>& map : Open()) {
+    const auto it = arrived.find(map->core().name());
+    if (it != arrived.end() && it->second.scans) map->ScansWait();
+    // What waits or runs here may have been cancelled elsewhere. An error: it is looked again.
+    const bool jobs = it != arrived.end() && it->second.jobs;
+    if (jobs || map->HasJobs()) map->TakeInJobs().IgnoreError();
   }
 }
 

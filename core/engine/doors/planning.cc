@@ -23,8 +23,14 @@ absl::Status EnginePlanning::Ask(const MapReading& map,
     return map.ReadMapTiles(since,
                             [&](MapState& state) { return body(map.map()->planner(), state); });
   }
+  const auto make = [&]() -> absl::StatusOr<std::shared_ptr<MapPlanner>> {
+    STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<StorageReader> reader, map.store()->NewReader());
+    STRATA_ASSIGN_OR_RETURN(const MapInfo info, reader->GetMapInfo());
+    return std::make_shared<MapPlanner>(
+        map.name(), info.parameters, maps_.options(), maps_.caches());
+  };
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<MapPlanner> planner,
-                          elsewhere_.Find(map.name(), *map.store()));
+                          elsewhere_.Find(map.name(), map.store()->number(), make));
   return map.ReadMapTiles(since, [&](MapState& state) { return body(*planner, state); });
 }
 

@@ -13,18 +13,17 @@
 #include "absl/strings/string_view.h"
 
 #include "core/api/planning.h"
+#include "core/engine/doors/kept_elsewhere.h"
 #include "core/engine/doors/map_reading.h"
 #include "core/engine/doors/maps.h"
 #include "core/engine/map/map_state.h"
 #include "core/engine/plans/map_planner.h"
-#include "core/engine/plans/planners_elsewhere.h"
 
 namespace strata {
 
 class EnginePlanning final : public api::Planning {
  public:
-  explicit EnginePlanning(EngineMaps& maps)
-      : maps_(maps), elsewhere_(maps.options(), maps.caches()) {}
+  explicit EnginePlanning(EngineMaps& maps) : maps_(maps), elsewhere_(maps.options()) {}
 
   absl::StatusOr<PlanResult> PlanPath(const api::Call& call,
                                       absl::string_view map,
@@ -74,7 +73,9 @@ class EnginePlanning final : public api::Planning {
   absl::StatusOr<PathCheck> Check(const MapReading& map, const PathQuery& query, const Stop& stop);
 
   EngineMaps& maps_;
-  PlannersElsewhere elsewhere_;
+  // What they keep is keyed by the versions of tiles, which belong to their bytes for ever, so none
+  // of it is ever stale; how much, the caches of all maps say together.
+  KeptElsewhere<MapPlanner> elsewhere_;
 };
 
 }  // namespace strata

@@ -21,24 +21,6 @@
 namespace strata {
 namespace {
 
-class EngineTracking final : public api::Tracking {
- public:
-  EngineTracking(std::shared_ptr<Map> map, const api::Call& call, const TrackStart& start)
-      : map_(std::move(map)),
-        call_(call),
-        robot_(map_->core(), map_->surfaces(), map_->localizer(), start) {}
-
-  absl::StatusOr<TrackedPose> Step(const TrackStep& step) override {
-    STRATA_RETURN_IF_ERROR(call_.stop.status());
-    return robot_.Step(step, call_.stop);
-  }
-
- private:
-  const std::shared_ptr<Map> map_;
-  const api::Call call_;
-  FollowedRobot robot_;
-};
-
 absl::Status AddNodes(StorageReader& reader, api::PoseGraphState& state) {
   return ForEachScan(reader, ScanQuery(), state.epoch, [&](const PosedScan& posed) {
     const ScanInfo info = ToScanInfo(posed);
@@ -68,6 +50,42 @@ absl::Status LookUp(StorageReader& reader, const ScanId& id, api::PoseLookup& lo
 }
 
 }  // namespace
+
+// Each step is by the map as it is then, whoever has it: it may come here meanwhile, or go.
+class EnginePoseGraph::Following final : public api::Tracking {
+ public:
+  Following(EnginePoseGraph& door, MapReading found, const api::Call& call, const TrackStart& start)
+      : door_(door), found_(std::move(found)), call_(call), robot_(start) {}
+
+  absl::StatusOr<TrackedPose> Step(const TrackStep& step) override {
+    STRATA_RETURN_IF_ERROR(call_.stop.status());
+    STRATA_ASSIGN_OR_RETURN(found_, door_.maps_.FindToRead(call_, found_.name()));
+    if (Map* const map = found_.map(); map != nullptr) {
+      return Step(step, map->core().info().parameters, map->surfaces(), map->localizer());
+    }
+    STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Elsewhere> elsewhere,
+                            door_.FindElsewhere(call_, found_));
+    return Step(step, elsewhere->parameters, elsewhere->surfaces, elsewhere->localizer);
+  }
+
+ private:
+  absl::StatusOr<TrackedPose> Step(const TrackStep& step,
+                                   const MapParameters& parameters,
+                                   SurfacesAround& surfaces,
+                                   Localizer& localizer) {
+    TrackedPose pose;
+    STRATA_RETURN_IF_ERROR(found_.ReadMapTiles(MapState::kNoChanges, [&](MapState& state) {
+      return AssignTo(robot_.Step(step, {parameters, surfaces, localizer, state}, call_.stop),
+                      pose);
+    }));
+    return pose;
+  }
+
+  EnginePoseGraph& door_;
+  MapReading found_;  // keeps a map that is here in use between steps
+  const api::Call call_;
+  FollowedRobot robot_;
+};
 
 absl::StatusOr<api::PoseGraphState> EnginePoseGraph::Get(const api::Call& call,
                                                          absl::string_view map) {
@@ -174,21 +192,37 @@ absl::StatusOr<api::PoseLookup> EnginePoseGraph::LookupPose(const api::Call& cal
   return lookup;
 }
 
+absl::StatusOr<std::shared_ptr<EnginePoseGraph::Elsewhere>> EnginePoseGraph::FindElsewhere(
+    const api::Call& call, const MapReading& found) {
+  const auto make = [&]() -> absl::StatusOr<std::shared_ptr<Elsewhere>> {
+    // A store of its own, which outlives the call.
+    STRATA_ASSIGN_OR_RETURN(MapReading own, maps_.FindToRead(call, found.name()));
+    if (own.map() != nullptr)
+      return absl::UnavailableError("the map was just opened here; ask again");
+    std::unique_ptr<MapStorage> store = own.TakeStore();
+    STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<StorageReader> reader, store->NewReader());
+    STRATA_ASSIGN_OR_RETURN(const MapInfo info, reader->GetMapInfo());
+    return std::make_shared<Elsewhere>(
+        std::move(store), info.parameters, maps_.options(), maps_.caches());
+  };
+  return elsewhere_.Find(found.name(), found.store()->number(), make);
+}
+
 absl::StatusOr<LocalizeResult> EnginePoseGraph::Localize(const api::Call& call,
                                                          absl::string_view map,
                                                          const LocalizeQuery& query) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return found->localizer().Localize(query, call.stop);
+  STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
+  if (found.map() != nullptr) return found.map()->localizer().Localize(query, call.stop);
+  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Elsewhere> elsewhere, FindElsewhere(call, found));
+  return elsewhere->localizer.Localize(query, call.stop);
 }
 
 absl::StatusOr<std::unique_ptr<api::Tracking>> EnginePoseGraph::Track(const api::Call& call,
                                                                       absl::string_view map,
                                                                       const TrackStart& start) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(MapReading found, maps_.FindToRead(call, map));
   STRATA_RETURN_IF_ERROR(ValidateTrackStart(start));
-  return std::make_unique<EngineTracking>(std::move(found), call, start);
+  return std::make_unique<Following>(*this, std::move(found), call, start);
 }
 
 }  // namespace strata

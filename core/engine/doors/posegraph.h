@@ -4,19 +4,25 @@
 
 #include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
 #include "core/api/posegraph.h"
+#include "core/engine/consistency/localizer.h"
+#include "core/engine/consistency/surfaces_around.h"
+#include "core/engine/doors/kept_elsewhere.h"
+#include "core/engine/doors/map_reading.h"
 #include "core/engine/doors/maps.h"
+#include "core/engine/scans/scan_access.h"
 
 namespace strata {
 
 class EnginePoseGraph final : public api::PoseGraph {
  public:
-  explicit EnginePoseGraph(EngineMaps& maps) : maps_(maps) {}
+  explicit EnginePoseGraph(EngineMaps& maps) : maps_(maps), elsewhere_(maps.options()) {}
 
   absl::StatusOr<api::PoseGraphState> Get(const api::Call& call, absl::string_view map) override;
   absl::Status SetPose(const api::Call& call,
@@ -44,7 +50,30 @@ class EnginePoseGraph final : public api::PoseGraph {
                                                        const TrackStart& start) override;
 
  private:
+  class Following;
+
+  // What is kept of a map that another engine has.
+  struct Elsewhere {
+    Elsewhere(std::unique_ptr<MapStorage> from,
+              const MapParameters& of,
+              const EngineOptions& options,
+              const std::shared_ptr<CacheBudget>& caches)
+        : store(std::move(from)),
+          parameters(of),
+          localizer(ScanAccess(*store, parameters, options, caches)),
+          surfaces(parameters, caches) {}
+
+    const std::unique_ptr<MapStorage> store;
+    const MapParameters parameters;
+    Localizer localizer;
+    SurfacesAround surfaces;
+  };
+  // `found`: by this call.
+  absl::StatusOr<std::shared_ptr<Elsewhere>> FindElsewhere(const api::Call& call,
+                                                           const MapReading& found);
+
   EngineMaps& maps_;
+  KeptElsewhere<Elsewhere> elsewhere_;
 };
 
 }  // namespace strata

@@ -1,7 +1,10 @@
-// A job that is started where another engine has the map: queued in the store they share, run by
-// the other.
+// What is asked about jobs where another engine has the map: written into the store they share, in
+// whose commits it is decided, and done by the other, which learns of it within a second or so.
+// `store` as of MapStores::OpenToAdd(). Durable when it returns.
 #ifndef STRATA_CORE_ENGINE_JOBS_JOB_BESIDE_H_
 #define STRATA_CORE_ENGINE_JOBS_JOB_BESIDE_H_
+
+#include <cstdint>
 
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
@@ -11,11 +14,15 @@
 
 namespace strata {
 
-// Durable when it returns. `store` as of MapStores::OpenToAdd(); errors of JobHandler::check.
-// RESOURCE_EXHAUSTED while too many jobs wait.
+// Errors of JobHandler::check. RESOURCE_EXHAUSTED while too many jobs wait.
 absl::StatusOr<JobInfo> StartJobBeside(MapStorage& store,
                                        absl::string_view kind,
                                        const JobParameters& parameters);
+
+// As of JobBoard, and of api::Jobs::Revert().
+absl::StatusOr<JobInfo> CancelJobBeside(MapStorage& store, std::uint64_t id);
+absl::StatusOr<JobInfo> AcceptJobBeside(MapStorage& store, std::uint64_t id);
+absl::StatusOr<JobInfo> RevertJobBeside(MapStorage& store, std::uint64_t id);
 
 }  // namespace strata
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -30,8 +31,6 @@ namespace {
 constexpr absl::Duration kReportInterval = absl::Milliseconds(100);
 constexpr absl::Duration kStoreInterval = absl::Seconds(2);
 
-absl::Time NowInMicros() { return absl::FromUnixMicros(absl::ToUnixMicros(absl::Now())); }
-
 // Another engine may have queued a job meanwhile.
 absl::Status TakeFreeId(StorageReader& reader, JobInfo& job) {
   while (true) {
@@ -41,8 +40,11 @@ absl::Status TakeFreeId(StorageReader& reader, JobInfo& job) {
   }
 }
 
-absl::Status NoSuchJob(std::uint64_t id) {
-  return absl::NotFoundError(absl::StrCat("job ", id, " does not exist"));
+// Whether other engines may have made the stored state of the shown one.
+bool DecidedElsewhere(JobState shown, JobState stored) {
+  if (shown == JobState::kQueued) return stored == JobState::kCancelled;
+  return shown == JobState::kProposed &&
+         (stored == JobState::kQueued || stored == JobState::kCancelled);
 }
 
 }  // namespace
@@ -151,12 +153,8 @@ absl::StatusOr<JobInfo> JobBoard::Change(std::uint64_t id,
       0,
       Stop(),
       [&](StorageWriter& writer) -> absl::Status {
-        STRATA_ASSIGN_OR_RETURN(std::optional<JobInfo> stored, writer.reader().FindJob(id));
-        if (!stored.has_value()) return NoSuchJob(id);
-        info = *std::move(stored);
-        STRATA_RETURN_IF_ERROR(change(info, writer));
-        info.updated = NowInMicros();
-        return writer.PutJob(info);
+        STRATA_ASSIGN_OR_RETURN(info, ChangeStoredJob(writer, id, change));
+        return absl::OkStatus();
       },
       [&] { Show(info); }));
   return info;
@@ -237,24 +235,57 @@ absl::StatusOr<JobInfo> JobBoard::Start(const Stop& stop,
   return info;
 }
 
-absl::StatusOr<bool> JobBoard::TakeIn() {
+JobBoard::AllShown JobBoard::WhatIsShown(std::optional<std::uint64_t> id) const {
+  AllShown shown;
+  absl::MutexLock lock(&mutex_);
+  const auto first = id.has_value() ? jobs_.find(*id) : jobs_.begin();
+  const auto last = id.has_value() && first != jobs_.end() ? std::next(first) : jobs_.end();
+  for (auto it = first; it != last; ++it) {
+    const Entry& entry = *it->second;
+    shown[it->first] = {entry.changes, entry.info.state, entry.stop};
+  }
+  return shown;
+}
+
+absl::StatusOr<bool> JobBoard::TakeIn(std::optional<std::uint64_t> id) {
+  const AllShown before = WhatIsShown(id);
   std::vector<JobInfo> stored;
   {
     STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-    STRATA_ASSIGN_OR_RETURN(stored, reader->ListJobs());
+    if (id.has_value()) {
+      STRATA_ASSIGN_OR_RETURN(std::optional<JobInfo> job, reader->FindJob(*id));
+      if (job.has_value()) stored.push_back(*std::move(job));
+    } else {
+      STRATA_ASSIGN_OR_RETURN(stored, reader->ListJobs());
+    }
   }
-  bool any = false;
   absl::MutexLock lock(&mutex_);
-  for (JobInfo& info : stored) {
-    // What has ended may have been forgotten here since it was read.
-    if (info.state != JobState::kQueued || jobs_.contains(info.id)) continue;
-    last_id_ = std::max(last_id_, info.id);
+  for (JobInfo& info : stored) TakeInOne(std::move(info), before);
+  return NextIdLocked().has_value();
+}
+
+// What was changed here since the store was read is newer than what was read, or will be seen at
+// the next look.
+void JobBoard::TakeInOne(JobInfo&& stored, const AllShown& before) {
+  const auto shown = before.find(stored.id);
+  const auto it = jobs_.find(stored.id);
+  if (shown == before.end() && it == jobs_.end()) {
+    last_id_ = std::max(last_id_, stored.id);
     auto entry = std::make_shared<Entry>();
-    entry->info = std::move(info);
+    entry->info = std::move(stored);
     jobs_[entry->info.id] = std::move(entry);
-    any = true;
+    return;
   }
-  return any;
+  if (shown == before.end() || it == jobs_.end()) return;
+  // The run that was under way before: no later one is meant.
+  if (shown->second.state == JobState::kRunning && IsToldToEnd(stored)) {
+    shown->second.stop.Request();
+  }
+  Entry& entry = *it->second;
+  if (entry.changes != shown->second.changes) return;
+  if (!DecidedElsewhere(entry.info.state, stored.state)) return;
+  entry.info = std::move(stored);
+  ++entry.changes;
 }
 
 absl::StatusOr<JobInfo> JobBoard::Get(std::uint64_t id) const {
@@ -279,26 +310,41 @@ absl::StatusOr<JobInfo> JobBoard::Cancel(std::uint64_t id) {
       const auto it = jobs_.find(id);
       if (it == jobs_.end()) return NoSuchJob(id);
       const Entry& entry = *it->second;
-      if (entry.info.state == JobState::kRunning) entry.stop.Request();
-      if (entry.info.state != JobState::kQueued) return entry.info;
+      if (IsFinal(entry.info.state)) return entry.info;
+      if (entry.info.state == JobState::kRunning)
+        entry.stop.Request();  // a commit may have to wait
     }
+    std::optional<Stop> run;
     absl::StatusOr<JobInfo> cancelled =
         Change(id, Durability::kFull, [&](JobInfo& job, StorageWriter&) -> absl::Status {
-          // A job that was running when the last process ended is stored so, and waits; one that
-          // has begun in this one was shown so before this commit began.
-          if (IsFinal(job.state) || !Waits(id)) return absl::AbortedError("the job has begun");
-          job.state = JobState::kCancelled;
+          if (IsFinal(job.state)) return absl::AbortedError("the job has ended");
+          run = StopOfRun(job);
+          if (run.has_value()) {
+            TellToEnd(job);
+          } else {
+            job.state = JobState::kCancelled;
+            ForgetToldToEnd(job);
+          }
           return absl::OkStatus();
         });
-    // It began meanwhile, and will be seen so.
-    if (!absl::IsAborted(cancelled.status())) return cancelled;
+    if (!absl::IsAborted(cancelled.status())) {
+      if (run.has_value()) run->Request();
+      return cancelled;
+    }
+    // It ended meanwhile, or another engine cancelled it, and will be seen so.
+    STRATA_RETURN_IF_ERROR(TakeIn(id).status());
   }
 }
 
-bool JobBoard::Waits(std::uint64_t id) const {
+// A job that was running when the last process ended is stored so, and waits; one that has begun in
+// this one was shown so before this commit began.
+std::optional<Stop> JobBoard::StopOfRun(JobInfo& job) const {
   absl::MutexLock lock(&mutex_);
-  const auto it = jobs_.find(id);
-  return it != jobs_.end() && it->second->info.state == JobState::kQueued;
+  const auto it = jobs_.find(job.id);
+  if (it == jobs_.end() || it->second->info.state != JobState::kRunning) return std::nullopt;
+  job.progress = it->second->info.progress;
+  job.phase = it->second->info.phase;
+  return it->second->stop;
 }
 
 void JobBoard::StopRunning() {
@@ -308,28 +354,12 @@ void JobBoard::StopRunning() {
   }
 }
 
-absl::StatusOr<JobInfo> JobBoard::Decide(std::uint64_t id, ChangeFunction change) {
-  return Change(id, Durability::kFull, [&](JobInfo& job, StorageWriter& writer) -> absl::Status {
-    if (job.state == JobState::kProposed) return change(job, writer);
-    return absl::FailedPreconditionError(
-        absl::StrCat("job ", id, " has no proposal that waits; start one with dry_run=1"));
-  });
-}
-
 absl::StatusOr<JobInfo> JobBoard::Accept(std::uint64_t id) {
-  return Decide(id, [](JobInfo& job, StorageWriter&) {
-    job.state = JobState::kQueued;
-    job.parameters.emplace(kAccepted, "1");
-    return absl::OkStatus();
-  });
+  return Change(id, Durability::kFull, &AcceptProposal);
 }
 
 absl::StatusOr<JobInfo> JobBoard::Discard(std::uint64_t id) {
-  return Decide(id, [id](JobInfo& job, StorageWriter& writer) {
-    job.state = JobState::kCancelled;
-    job.message = std::string("proposal discarded");
-    return writer.DiscardProposal(id);
-  });
+  return Change(id, Durability::kFull, &DiscardProposal);
 }
 
 absl::Status JobBoard::Watch(const Stop& stop,
@@ -436,12 +466,20 @@ absl::StatusOr<std::optional<JobInfo>> JobBoard::TakeNext(Stop& stop) {
     absl::StatusOr<JobInfo> taken =
         Change(id, Durability::kRelaxed, [&](JobInfo& job, StorageWriter& writer) -> absl::Status {
           if (IsFinal(job.state)) return absl::AbortedError("the job has ended");
-          job.state = JobState::kRunning;
-          return quarantine_.Begin(writer, work);
+          if (!IsToldToEnd(job)) {
+            job.state = JobState::kRunning;
+            return quarantine_.Begin(writer, work);
+          }
+          job.state = JobState::kCancelled;  // while another engine had it, or this one before
+          ForgetToldToEnd(job);
+          return quarantine_.End(writer, work);
         });
-    if (absl::IsAborted(taken.status())) continue;  // it was cancelled
+    if (absl::IsAborted(taken.status())) {  // it was cancelled, maybe by another engine
+      STRATA_RETURN_IF_ERROR(TakeIn(id).status());
+      continue;
+    }
     STRATA_RETURN_IF_ERROR(taken.status());
-    return std::optional<JobInfo>(*std::move(taken));
+    if (taken->state == JobState::kRunning) return std::optional<JobInfo>(*std::move(taken));
   }
 }
 
@@ -472,6 +510,7 @@ absl::Status JobBoard::Finish(std::uint64_t id, const absl::Status& ended, Runni
                 [&](JobInfo& job, StorageWriter& writer) {
                   for (const auto& [name, value] : context.metrics()) job.metrics[name] = value;
                   job.phase.clear();
+                  ForgetToldToEnd(job);
                   if (ended.ok()) {
                     job.state = context.proposed() ? JobState::kProposed : JobState::kSucceeded;
                     job.progress = 1.0;

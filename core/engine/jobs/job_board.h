@@ -19,6 +19,7 @@
 #include "absl/synchronization/mutex.h"
 
 #include "core/common/stop.h"
+#include "core/engine/jobs/job_changes.h"
 #include "core/engine/map/job_context.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/map/quarantine.h"
@@ -47,14 +48,15 @@ class JobBoard {
                                 absl::string_view owner,
                                 absl::string_view kind,
                                 const std::map<std::string, std::string>& parameters);
-  // Shows jobs that other engines have queued in the store; whether there were any.
-  absl::StatusOr<bool> TakeIn();
+  // Shows what other engines have queued, cancelled and decided in the store, of all jobs or of
+  // one, and ends what they have told to end; whether more waits now.
+  absl::StatusOr<bool> TakeIn(std::optional<std::uint64_t> id = std::nullopt);
   absl::StatusOr<JobInfo> Get(std::uint64_t id) const;
   std::vector<JobInfo> List() const;
+  // Durable, also of a job that runs: whoever would run it again ends it.
   absl::StatusOr<JobInfo> Cancel(std::uint64_t id);
-  // Queues a proposed job again, with the parameter kAccepted. FAILED_PRECONDITION.
+  // As AcceptProposal(), DiscardProposal().
   absl::StatusOr<JobInfo> Accept(std::uint64_t id);
-  // Ends a proposed job as cancelled and forgets its proposal. FAILED_PRECONDITION.
   absl::StatusOr<JobInfo> Discard(std::uint64_t id);
   absl::Status Watch(const Stop& stop,
                      std::uint64_t id,
@@ -82,20 +84,26 @@ class JobBoard {
     std::uint64_t changes = 0;
     std::string owner;  // of jobs of this process; empty of others
   };
-  // What a change does to a job as it is stored, inside the commit; an error leaves it.
-  using ChangeFunction = absl::FunctionRef<absl::Status(JobInfo&, StorageWriter&)>;
+  // A job as it was shown before the store was read.
+  struct Shown {
+    std::uint64_t changes = 0;
+    JobState state = JobState::kQueued;
+    Stop stop;
+  };
+  using AllShown = std::map<std::uint64_t, Shown>;
 
   JobBoard(MapCore& core, Quarantine& quarantine) : core_(core), quarantine_(quarantine) {}
   // Changes a job, in the store and then for those who look; returns it as it is then. NOT_FOUND.
   absl::StatusOr<JobInfo> Change(std::uint64_t id, Durability durability, ChangeFunction change);
-  // Changes a job that is proposed. FAILED_PRECONDITION.
-  absl::StatusOr<JobInfo> Decide(std::uint64_t id, ChangeFunction change);
   // Shows a job as it was committed.
   void Show(const JobInfo& info);
   // Progress of the running job; `durable`: also to the store.
   void Report(std::uint64_t id, double progress, const std::string& phase, bool durable);
   absl::Status CheckRoom(absl::string_view owner) const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
-  bool Waits(std::uint64_t id) const;
+  // What ends the run of a job that has begun; its progress is newer here than in the store.
+  std::optional<Stop> StopOfRun(JobInfo& job) const;
+  AllShown WhatIsShown(std::optional<std::uint64_t> id) const;
+  void TakeInOne(JobInfo&& stored, const AllShown& before) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   std::optional<std::uint64_t> NextIdLocked() const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
   // Ended jobs beyond those that are kept.
   std::vector<std::uint64_t> Outdated() const;

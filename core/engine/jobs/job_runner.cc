@@ -135,7 +135,10 @@ void JobRunner::RunJob() {
 
 absl::StatusOr<bool> JobRunner::OptimizeIsDue() {
   // Somebody has still to decide about a proposal, which another epoch would make worthless.
-  if (jobs_.AnyIn(JobState::kProposed)) return false;
+  if (jobs_.AnyIn(JobState::kProposed)) {
+    STRATA_RETURN_IF_ERROR(jobs_.TakeIn().status());  // who may have decided elsewhere
+    if (jobs_.AnyIn(JobState::kProposed)) return false;
+  }
   Stop stop;
   {
     absl::MutexLock lock(&mutex_);

@@ -34,8 +34,10 @@ inline int ThreadsOf(const JobArguments& arguments, const EngineOptions& options
                                   : options.worker_threads;
 }
 
-// Set on a job whose proposal was accepted.
+// Parameters that no kind has, set on jobs as they are stored: of one whose proposal was accepted,
+// and of one that runs and is to end.
 inline constexpr char kAccepted[] = "accepted";
+inline constexpr char kToldToEnd[] = "told_to_end";
 
 // For work that nobody follows.
 class SilentContext final : public JobContext {

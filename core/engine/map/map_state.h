@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -33,11 +34,13 @@ class MapState {
    public:
     explicit Loan(StorageReader& reader) : reader_(&reader) {}
     explicit Loan(ReaderPool::Lease lease) : lease_(std::move(lease)), reader_(&**lease_) {}
+    explicit Loan(std::unique_ptr<StorageReader> own) : own_(std::move(own)), reader_(own_.get()) {}
     StorageReader* operator->() const { return reader_; }
     StorageReader& operator*() const { return *reader_; }
 
    private:
     std::optional<ReaderPool::Lease> lease_;
+    std::unique_ptr<StorageReader> own_;
     StorageReader* reader_;
   };
 

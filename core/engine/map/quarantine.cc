@@ -22,6 +22,7 @@
 #include "core/common/guarded.h"
 #include "core/common/log_line.h"
 #include "core/common/status.h"
+#include "core/engine/map/job_context.h"
 
 namespace strata {
 namespace {
@@ -77,6 +78,7 @@ absl::StatusOr<JobInfo> GetJob(StorageWriter& writer, std::uint64_t id) {
 
 absl::Status PutJobAs(StorageWriter& writer, JobInfo job, JobState state, std::string message) {
   job.state = state;
+  job.parameters.erase(kToldToEnd);
   job.phase.clear();
   job.message = std::move(message);
   job.updated = absl::FromUnixMicros(absl::ToUnixMicros(absl::Now()));

@@ -40,8 +40,11 @@ absl::StatusOr<ScanPlanes> PlanesOf(ScanSource& source,
 
 }  // namespace
 
-ScanViews::ScanViews(MapCore& core, std::vector<ScanRecord> scans, DamagedScans* damaged)
-    : core_(core), scans_(std::move(scans)), damaged_(damaged), features_(core.caches()) {}
+ScanViews::ScanViews(ScanAccess access, std::vector<ScanRecord> scans, DamagedScans* damaged)
+    : access_(std::move(access)),
+      scans_(std::move(scans)),
+      damaged_(damaged),
+      features_(access_.caches()) {}
 
 void ScanViews::Remember(std::size_t node, const absl::Status& status) {
   if (damaged_ == nullptr) return;
@@ -50,9 +53,9 @@ void ScanViews::Remember(std::size_t node, const absl::Status& status) {
 
 absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::MakeFeatures(
     const ScanRecord& scan) {
-  const ScanShare share(core_.caches(), scan);
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
-  const MapParameters parameters = core_.info().parameters;
+  const ScanShare share(access_.caches(), scan);
+  STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, access_.Reader());
+  const MapParameters parameters = access_.parameters();
   ScanSource source(*reader, parameters);
   STRATA_ASSIGN_OR_RETURN(const MlsMap map, source.RegistrationMap(scan));
   STRATA_ASSIGN_OR_RETURN(ScanFeatures features,
@@ -70,8 +73,8 @@ absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::Features(std::siz
 }
 
 absl::StatusOr<ScanView> ScanViews::MakeView(StorageReader& reader, const ScanRecord& scan) {
-  const ScanShare share(core_.caches(), scan);
-  const MapParameters parameters = core_.info().parameters;
+  const ScanShare share(access_.caches(), scan);
+  const MapParameters parameters = access_.parameters();
   ScanSource source(reader, parameters);
   ScanView view;
   {
@@ -80,13 +83,7 @@ absl::StatusOr<ScanView> ScanViews::MakeView(StorageReader& reader, const ScanRe
   }
   STRATA_ASSIGN_OR_RETURN(const ScanPlanes planes, PlanesOf(source, scan, parameters));
   view.planes = EncodeScanPlanes(planes);
-  // Kept for the next time; a store that is full is no reason to stop.
-  core_.writer()
-      .Run(Durability::kRelaxed,
-           view.place.size() + view.planes.size(),
-           Stop(),
-           [&](StorageWriter& writer) { return writer.PutScanView(scan.number, view); })
-      .IgnoreError();
+  access_.Keep(scan.number, view);
   return view;
 }
 
@@ -97,7 +94,7 @@ absl::StatusOr<ScanView> ScanViews::View(std::size_t node) {
 }
 
 absl::StatusOr<ScanView> ScanViews::ReadView(const ScanRecord& scan) {
-  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+  STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, access_.Reader());
   STRATA_ASSIGN_OR_RETURN(ScanView view, reader->FindScanView(scan.number));
   if (DecodePlace(view.place).ok() && DecodeScanPlanes(view.planes).ok()) return view;
   return MakeView(*reader, scan);

@@ -9,8 +9,8 @@
 #include "absl/status/statusor.h"
 
 #include "core/common/lru_cache.h"
-#include "core/engine/map/map_core.h"
 #include "core/engine/scans/damaged_scans.h"
+#include "core/engine/scans/scan_access.h"
 #include "core/mls/mls_map.h"
 #include "core/posegraph/alignment/alignment.h"
 #include "core/registration/place_descriptor.h"
@@ -23,7 +23,7 @@ namespace strata {
 // that answer DATA_LOSS are put into `damaged`, unless it is nullptr.
 class ScanViews final : public AlignmentSource {
  public:
-  ScanViews(MapCore& core, std::vector<ScanRecord> scans, DamagedScans* damaged = nullptr);
+  ScanViews(ScanAccess access, std::vector<ScanRecord> scans, DamagedScans* damaged = nullptr);
 
   absl::StatusOr<std::shared_ptr<const ScanFeatures>> Features(std::size_t node) override;
   absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t node) override;
@@ -43,7 +43,7 @@ class ScanViews final : public AlignmentSource {
   absl::StatusOr<ScanView> ReadView(const ScanRecord& scan);
   absl::StatusOr<ScanView> MakeView(StorageReader& reader, const ScanRecord& scan);
 
-  MapCore& core_;
+  const ScanAccess access_;
   const std::vector<ScanRecord> scans_;
   DamagedScans* const damaged_;
   LruCache<std::size_t, const ScanFeatures> features_;

@@ -404,31 +404,28 @@ absl::Status PostgresWriter::PutOrigin(const GeodeticOrigin& origin) {
 }
 
 absl::Status PostgresWriter::PutJob(const JobInfo& job) {
-  STRATA_RETURN_IF_ERROR(RunSql(
-      "INSERT INTO truth_job (map, id, kind, state, progress, phase, message, created_us, "
-      "updated_us) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9) ON CONFLICT (map, id) DO UPDATE SET "
-      "kind = $3, state = $4, progress = $5, phase = $6, message = $7, created_us = $8, "
-      "updated_us = $9",
-      job.id,
-      job.kind,
-      static_cast<int>(job.state),
-      job.progress,
-      job.phase,
-      job.message,
-      absl::ToUnixMicros(job.created),
-      absl::ToUnixMicros(job.updated)));
+  STRATA_RETURN_IF_ERROR(DeleteJob(job.id));
+  STRATA_RETURN_IF_ERROR(
+      RunSql("INSERT INTO truth_job (map, id, kind, state, progress, phase, message, created_us, "
+             "updated_us) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9)",
+             job.id,
+             job.kind,
+             static_cast<int>(job.state),
+             job.progress,
+             job.phase,
+             job.message,
+             absl::ToUnixMicros(job.created),
+             absl::ToUnixMicros(job.updated)));
   for (const auto& [name, value] : job.parameters) {
     STRATA_RETURN_IF_ERROR(
-        RunSql("INSERT INTO truth_job_parameter (map, job, name, value) VALUES ($1, $2, $3, $4) ON "
-               "CONFLICT (map, job, name) DO UPDATE SET value = excluded.value",
+        RunSql("INSERT INTO truth_job_parameter (map, job, name, value) VALUES ($1, $2, $3, $4)",
                job.id,
                name,
                value));
   }
   for (const auto& [name, value] : job.metrics) {
     STRATA_RETURN_IF_ERROR(
-        RunSql("INSERT INTO truth_job_metric (map, job, name, value) VALUES ($1, $2, $3, $4) ON "
-               "CONFLICT (map, job, name) DO UPDATE SET value = excluded.value",
+        RunSql("INSERT INTO truth_job_metric (map, job, name, value) VALUES ($1, $2, $3, $4)",
                job.id,
                name,
                value));

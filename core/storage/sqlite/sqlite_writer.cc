@@ -238,8 +238,9 @@ absl::Status SqliteWriter::PutProfile(absl::string_view name, const RobotProfile
 }
 
 absl::Status SqliteWriter::PutJob(const JobInfo& job) {
+  STRATA_RETURN_IF_ERROR(DeleteJob(job.id));
   STRATA_RETURN_IF_ERROR(
-      RunSql("INSERT OR REPLACE INTO truth_job (id, kind, state, progress, phase, message, "
+      RunSql("INSERT INTO truth_job (id, kind, state, progress, phase, message, "
              "created_us, updated_us) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
              job.id,
              job.kind,
@@ -251,14 +252,14 @@ absl::Status SqliteWriter::PutJob(const JobInfo& job) {
              absl::ToUnixMicros(job.updated)));
   for (const auto& [name, value] : job.parameters) {
     STRATA_RETURN_IF_ERROR(
-        RunSql("INSERT OR REPLACE INTO truth_job_parameter (job, name, value) VALUES (?1, ?2, ?3)",
+        RunSql("INSERT INTO truth_job_parameter (job, name, value) VALUES (?1, ?2, ?3)",
                job.id,
                name,
                value));
   }
   for (const auto& [name, value] : job.metrics) {
     STRATA_RETURN_IF_ERROR(
-        RunSql("INSERT OR REPLACE INTO truth_job_metric (job, name, value) VALUES (?1, ?2, ?3)",
+        RunSql("INSERT INTO truth_job_metric (job, name, value) VALUES (?1, ?2, ?3)",
                job.id,
                name,
                value));

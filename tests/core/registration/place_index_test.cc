@@ -78,8 +78,11 @@ TEST(PlaceIndexTest, RemovedReplacedAndExcludedPlacesAreNotFound) {
   EXPECT_THAT(Numbers(index.Nearest(RandomPlace(1), 1, kNone)), ElementsAre(1));
   const auto not_one = [](std::uint64_t n) { return n == 1; };
   EXPECT_NE(index.Nearest(RandomPlace(1), 1, not_one)[0].number, 1U);
+  EXPECT_EQ(*index.Find(1), RandomPlace(1));
   EXPECT_TRUE(index.Remove(1));
   EXPECT_FALSE(index.Remove(1));
+  EXPECT_EQ(index.Find(1), nullptr);
+  EXPECT_EQ(*index.Find(3), RandomPlace(3));
   EXPECT_EQ(index.size(), 2U);
   EXPECT_THAT(Numbers(index.Nearest(RandomPlace(3), 1, kNone)), ElementsAre(3));
   index.Add(3, RandomPlace(9));

@@ -22,8 +22,10 @@
 #include "core/common/status.h"
 #include "core/storage/postgresql/connection.h"
 #include "core/world/scan_hash.h"
+#include "proto/translate/localize.h"
 #include "proto/translate/planning.h"
 #include "proto/translate/shape.h"
+#include "proto/translate/track.h"
 #include "tests/integration/cluster/sharing_servers.h"
 #include "tests/support/status_matchers.h"
 
@@ -47,9 +49,28 @@ PointCloud Hall() {
   return cloud;
 }
 
+// A floor of 8 × 8 m with two walls that meet, so that there is one way to lie on another.
+PointCloud Corner() {
+  PointCloud cloud;
+  cloud.sensor_origin = {0.0F, 0.0F, 1.0F};
+  for (int i = -80; i < 80; ++i) {
+    const float along = 0.05F * static_cast<float>(i);
+    for (int j = -80; j < 80; ++j) {
+      cloud.points.emplace_back(along, 0.05F * static_cast<float>(j), 0.0F);
+    }
+    for (int k = 1; k < 40; ++k) {
+      const float z = 0.05F * static_cast<float>(k);
+      cloud.points.emplace_back(along, 3.0F, z);
+      if (i > 0) cloud.points.emplace_back(2.5F, along - 1.0F, z);
+    }
+  }
+  return cloud;
+}
+
 // The halls lie beside each other along x.
-absl::StatusOr<ScanAck> PutHall(api::Database& db, std::uint64_t number) {
-  const PointCloud cloud = Hall();
+absl::StatusOr<ScanAck> PutHall(api::Database& db,
+                                std::uint64_t number,
+                                const PointCloud& cloud = Hall()) {
   ScanHeader header;
   header.id = {"run", number};
   header.alignment = Alignment::kOff;
@@ -194,6 +215,104 @@ TEST_F(PlansElsewhereTest, ReadNoTileASecondTime) {
   PlanQuery other = query;
   other.profile.radius_m = 0.2;
   STRATA_EXPECT_OK(db(1).planning().PlanPath({}, kShared, other));
+}
+
+// Taken in the hall of that number, as its robot believes.
+LocalizeQuery TakenIn(std::uint64_t number) {
+  LocalizeQuery query;
+  query.cloud = Corner();
+  query.T_map_scan_guess = Pose::Identity();
+  query.T_map_scan_guess->translation() =
+      Eigen::Vector3d(15.0 * static_cast<double>(number - 1) + 0.4, -0.3, 0.0);
+  query.guess_radius_m = 2.0;
+  return query;
+}
+
+// Answers of both servers; they are the same.
+absl::StatusOr<LocalizeResult> LocalizeAt(SharingServer& owner,
+                                          SharingServer& other,
+                                          const LocalizeQuery& query) {
+  STRATA_ASSIGN_OR_RETURN(const LocalizeResult told,
+                          other.db()->posegraph().Localize({}, kShared, query));
+  STRATA_ASSIGN_OR_RETURN(const LocalizeResult owners,
+                          owner.db()->posegraph().Localize({}, kShared, query));
+  EXPECT_EQ(BytesOf(told), BytesOf(owners));
+  return told;
+}
+
+TEST_F(PlansElsewhereTest, LocalizeInTheMapAsItIsNow) {
+  for (std::uint64_t hall = 1; hall <= 4; ++hall) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const LocalizeResult before,
+                                LocalizeAt(*servers_[0], *servers_[1], TakenIn(hall)));
+    EXPECT_FALSE(before.found) << hall;
+    STRATA_ASSERT_OK(PutHall(db(hall % 2), hall, Corner()));
+    STRATA_ASSERT_OK(AtRest(db(0), kShared));
+    STRATA_ASSERT_OK_AND_ASSIGN(const LocalizeResult there,
+                                LocalizeAt(*servers_[0], *servers_[1], TakenIn(hall)));
+    ASSERT_TRUE(there.found) << there.message;
+    EXPECT_NEAR(there.best.T_map_scan.translation().x(), 15.0 * static_cast<double>(hall - 1), 0.1);
+  }
+  LocalizeQuery anywhere = TakenIn(1);
+  anywhere.T_map_scan_guess.reset();
+  STRATA_EXPECT_OK(LocalizeAt(*servers_[0], *servers_[1], anywhere));
+  LocalizeQuery bad = TakenIn(1);
+  bad.guess_radius_m = -1.0;
+  EXPECT_EQ(Words(db(0).posegraph().Localize({}, kShared, bad).status()),
+            Words(db(1).posegraph().Localize({}, kShared, bad).status()));
+  // A scan that is gone is no place.
+  STRATA_ASSERT_OK(db(0).scans().Delete({}, kShared, {"run", 4}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const LocalizeResult gone,
+                              LocalizeAt(*servers_[0], *servers_[1], TakenIn(4)));
+  EXPECT_FALSE(gone.found);
+  STRATA_EXPECT_OK(db(1).posegraph().Localize({}, kShared, TakenIn(3)));
+  // What is kept is not read again: it is spoilt behind the server's back.
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::unique_ptr<Connection> connection,
+                              Connection::Open(store_));
+  STRATA_ASSERT_OK(connection->Execute("UPDATE derived_scan_view SET place = '', planes = ''"));
+  STRATA_ASSERT_OK(connection->Execute("UPDATE truth_chunk SET bytes = ''"));
+  const absl::Time begun = absl::Now();
+  STRATA_ASSERT_OK_AND_ASSIGN(const LocalizeResult kept,
+                              db(1).posegraph().Localize({}, kShared, TakenIn(3)));
+  std::printf("localized by what is kept in %s\n",
+              absl::FormatDuration(absl::Now() - begun).c_str());
+  EXPECT_TRUE(kept.found) << kept.message;
+}
+
+// A robot that goes on where it is followed by a server that has not got the map, also through the
+// death of the one that has it and once this one has it.
+TEST_F(PlansElsewhereTest, ARobotIsFollowedThroughTheDeathOfTheOwner) {
+  for (std::uint64_t hall = 1; hall <= 2; ++hall) STRATA_ASSERT_OK(PutHall(db(0), hall, Corner()));
+  STRATA_ASSERT_OK(AtRest(db(0), kShared));
+  TrackStart start;
+  start.T_map_scan_guess = TakenIn(1).T_map_scan_guess;
+  start.guess_radius_m = 2.0;
+  const auto owners = db(0).posegraph().Track({}, kShared, start);
+  STRATA_ASSERT_OK(owners);
+  const auto others = db(1).posegraph().Track({}, kShared, start);
+  STRATA_ASSERT_OK(others);
+  // From the middle of the corner to a metre before it, by what it would see.
+  for (int step = 0; step < 20; ++step) {
+    const double x_m = 0.05 * step;
+    TrackStep now;
+    now.cloud = Corner();
+    for (Eigen::Vector3f& point : now.cloud.points) point.x() -= static_cast<float>(x_m);
+    now.T_odom_scan = Pose::Identity();
+    now.T_odom_scan.translation().x() = x_m;
+    const auto told = (*others)->Step(now);
+    STRATA_ASSERT_OK(told);
+    EXPECT_EQ(told->state, TrackState::kTracked) << step << ": " << told->message;
+    EXPECT_NEAR(told->T_map_scan.translation().x(), x_m, 0.1) << step;
+    if (step < 10) {
+      const auto same = (*owners)->Step(now);
+      STRATA_ASSERT_OK(same);
+      EXPECT_EQ(BytesOf(*told), BytesOf(*same)) << step;
+    }
+    if (step == 10) servers_[0]->Kill();
+    // This server takes the map over.
+    if (step == 15) {
+      STRATA_ASSERT_OK(Insist([&] { return db(1).maps().SetClass({}, kShared, {7, "wall", 0}); }));
+    }
+  }
 }
 
 // A map that was removed and made again is another one, of the same name and maybe versions.

@@ -375,6 +375,48 @@ TEST_F(TwoServersTest, JobsAreStartedAtServersThatHaveNotGotTheMap) {
   STRATA_EXPECT_OK(Insist([&] { return Verify(db(1), kMap); }));
 }
 
+// Told at whichever server, true at both at once: a job that is told to be cancelled is no more,
+// and one that was running ends, or had ended.
+TEST_F(TwoServersTest, JobsAreCancelledAtServersThatHaveNotGotTheMap) {
+  for (std::uint64_t i = 1; i <= 8; ++i) STRATA_ASSERT_OK(Put(db(i % 2), kMap, i));
+  std::atomic<int> waited = 0;
+  std::atomic<int> ran = 0;
+  std::vector<std::thread> people;
+  for (std::size_t person = 0; person < 4; ++person) {
+    people.emplace_back([&, person] {
+      for (std::size_t i = 0; i < 8; ++i) {
+        api::Database& mine = *servers_[(person + i) % 2]->db();
+        api::Database& other = *servers_[(person + i + 1) % 2]->db();
+        const auto job = mine.jobs().Start({}, kMap, "rebuild", {{"threads", "1"}});
+        STRATA_ASSERT_OK(job);
+        absl::SleepFor(absl::Milliseconds(40 * ((person + 3 * i) % 5)));
+        const auto told = other.jobs().Cancel({}, kMap, job->id);
+        STRATA_ASSERT_OK(told);
+        EXPECT_NE(told->state, JobState::kQueued);
+        EXPECT_NE(told->state, JobState::kFailed) << told->message;
+        for (const auto& server : servers_) {
+          const auto known = server->db()->jobs().Get({}, kMap, job->id);
+          STRATA_ASSERT_OK(known);
+          EXPECT_TRUE(known->state == told->state || !IsFinal(told->state)) << job->id;
+        }
+        ++(told->state == JobState::kCancelled ? waited : ran);
+        STRATA_EXPECT_OK(Insist([&] {
+          const auto now = mine.jobs().Get({}, kMap, job->id);
+          if (!now.ok() || IsFinal(now->state)) return now.status();
+          return absl::UnavailableError(absl::StrCat("job ", job->id, " has not ended"));
+        }));
+      }
+    });
+  }
+  for (std::thread& person : people) person.join();
+  std::printf("%d cancelled before they began, %d later\n", waited.load(), ran.load());
+  EXPECT_GT(waited, 0);
+  EXPECT_EQ(MapOwnerOf(Decide(db(1), kMap)), "a");
+  // What nobody cancelled runs.
+  STRATA_EXPECT_OK(Verify(db(1), kMap));
+  STRATA_EXPECT_OK(Verify(db(0), kMap));
+}
+
 // Whoever asks one server and then the other, in whatever order, never goes back.
 TEST_F(TwoServersTest, NobodySeesOlderTilesThanHeHasSeen) {
   std::atomic<bool> stop = false;

@@ -19,6 +19,7 @@
 
 #include "core/common/cache_budget.h"
 #include "core/common/status.h"
+#include "core/engine/jobs/job_beside.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/map/quarantine.h"
 #include "core/storage/sqlite/sqlite_storage.h"
@@ -62,6 +63,22 @@ class JobBoardTest : public ::testing::Test {
   }
   absl::Status RunOne() {
     return Run([](const JobInfo&, JobContext&) { return absl::OkStatus(); });
+  }
+
+  // The store as another engine has it beside this one.
+  std::unique_ptr<MapStorage> Beside() const {
+    auto opened = OpenSqliteStorage(file_, {});
+    EXPECT_THAT(opened, testing::IsOk());
+    return *std::move(opened);
+  }
+  // Runs the job whose turn it is until `body` has done with it, as a process that ends does.
+  absl::Status RunUntilClosed(absl::FunctionRef<void()> body) {
+    const Stop closing;
+    return board_->RunNext(closing, [&](const JobInfo&, JobContext& context) {
+      body();
+      closing.Request();
+      return context.Progress(0.5, "half");
+    });
   }
 
   testing::TempDir directory_;
@@ -157,6 +174,110 @@ TEST_F(JobBoardTest, ACancelOfAProposalDoesNotCancelItsAcceptance) {
   STRATA_ASSERT_OK(board_->Accept(job.id));
   STRATA_ASSERT_OK(
       Run([](const JobInfo&, JobContext& context) { return context.Progress(0.5, "half"); }));
+  EXPECT_EQ(board_->Get(job.id)->state, JobState::kSucceeded);
+}
+
+absl::Status Propose(const JobInfo&, JobContext& context) {
+  context.SetProposed();
+  return absl::OkStatus();
+}
+
+// Whatever another engine writes at whatever moment: of all who decide one wins, here as there.
+TEST_F(JobBoardTest, WhoDecidesBesideTheBoardIsOneOfMany) {
+  constexpr int kRounds = 30;
+  for (int round = 0; round < kRounds; ++round) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo job, Start("a"));
+    STRATA_ASSERT_OK(Run(Propose));
+    std::atomic<int> accepted = 0;
+    std::atomic<int> discarded = 0;
+    const auto note = [](const absl::StatusOr<JobInfo>& told, std::atomic<int>& count) {
+      if (told.ok()) ++count;
+    };
+    std::vector<std::thread> threads;
+    for (int i = 0; i < 2; ++i) {
+      threads.emplace_back([&] {
+        const auto beside = Beside();
+        note(AcceptJobBeside(*beside, job.id), accepted);
+        note(RevertJobBeside(*beside, job.id), discarded);
+      });
+      threads.emplace_back([&] { note(board_->Accept(job.id), accepted); });
+      threads.emplace_back([&] { note(board_->Discard(job.id), discarded); });
+      threads.emplace_back([&] { STRATA_EXPECT_OK(board_->TakeIn()); });
+    }
+    for (std::thread& thread : threads) thread.join();
+    ASSERT_EQ(accepted + discarded, 1) << "round " << round;
+    EXPECT_THAT(board_->TakeIn(), testing::IsOkAndHolds(accepted == 1));
+    EXPECT_EQ(board_->Get(job.id)->state, accepted == 1 ? JobState::kQueued : JobState::kCancelled);
+    STRATA_ASSERT_OK(RunOne());
+    EXPECT_EQ(board_->Get(job.id)->state,
+              accepted == 1 ? JobState::kSucceeded : JobState::kCancelled);
+  }
+}
+
+TEST_F(JobBoardTest, AJobThatIsCancelledBesideTheBoardEnds) {
+  const auto beside = Beside();
+  // One that waits: at once. It is not run, also where nobody has looked.
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo waits, Start("a"));
+  EXPECT_EQ(CancelJobBeside(*beside, waits.id)->state, JobState::kCancelled);
+  STRATA_ASSERT_OK(Run([](const JobInfo& job, JobContext&) {
+    ADD_FAILURE() << "job " << job.id << " runs";
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(board_->Get(waits.id)->state, JobState::kCancelled);
+  // One that runs: once somebody looks.
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo runs, Start("a"));
+  STRATA_ASSERT_OK(Run([&](const JobInfo& job, JobContext& context) -> absl::Status {
+    EXPECT_EQ(CancelJobBeside(*beside, job.id)->state, JobState::kRunning);
+    STRATA_EXPECT_OK(context.Progress(0.5, "half"));
+    STRATA_EXPECT_OK(board_->TakeIn());
+    return context.Progress(0.6, "over");
+  }));
+  EXPECT_EQ(board_->Get(runs.id)->state, JobState::kCancelled);
+  EXPECT_TRUE(board_->Get(runs.id)->parameters.empty());
+  // One that has ended stays as it is.
+  const absl::Time updated = board_->Get(runs.id)->updated;
+  EXPECT_EQ(CancelJobBeside(*beside, runs.id)->state, JobState::kCancelled);
+  EXPECT_EQ((*(*beside->NewReader())->FindJob(runs.id))->updated, updated);
+  EXPECT_THAT(CancelJobBeside(*beside, 77).status(),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("77")));
+}
+
+// Whoever has the map next, and runs what was running, finds that it was cancelled.
+TEST_F(JobBoardTest, ACancelOutlivesTheProcessThatRunsTheJob) {
+  for (const bool here : {true, false}) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo job, Start("a"));
+    STRATA_ASSERT_OK(RunUntilClosed([&] {
+      EXPECT_EQ(here ? board_->Cancel(job.id)->state : CancelJobBeside(*Beside(), job.id)->state,
+                JobState::kRunning);
+    }));
+    Close();
+    Open();
+    EXPECT_EQ(board_->Get(job.id)->state, JobState::kQueued);
+    STRATA_ASSERT_OK(Run([](const JobInfo& ran, JobContext&) {
+      ADD_FAILURE() << "job " << ran.id << " runs again";
+      return absl::OkStatus();
+    }));
+    EXPECT_EQ(board_->Get(job.id)->state, JobState::kCancelled);
+    EXPECT_TRUE(board_->Get(job.id)->parameters.empty());
+  }
+}
+
+TEST_F(JobBoardTest, ACancelBesideMeansNoLaterRun) {
+  const auto beside = Beside();
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo job, Start("a"));
+  // Too late: it has its proposal already.
+  STRATA_ASSERT_OK(Run([&](const JobInfo& now, JobContext& context) {
+    context.SetProposed();
+    return CancelJobBeside(*beside, now.id).status();
+  }));
+  EXPECT_EQ(board_->Get(job.id)->state, JobState::kProposed);
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo accepted, AcceptJobBeside(*beside, job.id));
+  EXPECT_EQ(accepted.state, JobState::kQueued);
+  EXPECT_THAT(board_->TakeIn(), testing::IsOkAndHolds(true));
+  STRATA_ASSERT_OK(Run([&](const JobInfo&, JobContext& context) -> absl::Status {
+    STRATA_EXPECT_OK(board_->TakeIn());
+    return context.Progress(0.5, "half");
+  }));
   EXPECT_EQ(board_->Get(job.id)->state, JobState::kSucceeded);
 }
 

@@ -120,7 +120,8 @@ TEST_F(MapContractTest, JobsAreReplacedAndGoWithTheirDetails) {
   JobInfo job;
   job.id = 7;
   job.kind = "optimize";
-  job.parameters = {{"dry_run", "1"}};
+  job.parameters = {{"dry_run", "1"}, {"threads", "2"}};
+  job.metrics = {{"rounds", 1.0}};
   job.state = JobState::kRunning;
   job.progress = 1.0 / 3.0;
   job.phase = "matching";
@@ -130,6 +131,7 @@ TEST_F(MapContractTest, JobsAreReplacedAndGoWithTheirDetails) {
   STRATA_ASSERT_OK(put());
   job.state = JobState::kFailed;
   job.message = "gänzlich";
+  job.parameters.erase("threads");
   job.metrics = {{"scans", 0.1}};
   STRATA_ASSERT_OK(put());
   job.metrics["scans"] = 0.3;

@@ -1,0 +1,42 @@
+// What people decide about a job, wherever its map is open: changes of the job as it is stored,
+// inside the commit that records them.
+#ifndef STRATA_CORE_ENGINE_JOBS_JOB_CHANGES_H_
+#define STRATA_CORE_ENGINE_JOBS_JOB_CHANGES_H_
+
+#include <cstdint>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/time/time.h"
+
+#include "core/storage/storage.h"
+#include "core/world/job.h"
+
+namespace strata {
+
+// As jobs are stored.
+absl::Time NowInMicros();
+absl::Status NoSuchJob(std::uint64_t id);
+
+// An error of it leaves the job.
+using ChangeFunction = absl::FunctionRef<absl::Status(JobInfo&, StorageWriter&)>;
+// The job as it then is. NOT_FOUND.
+absl::StatusOr<JobInfo> ChangeStoredJob(StorageWriter& writer,
+                                        std::uint64_t id,
+                                        ChangeFunction change);
+
+// Queues a proposed job again, with the parameter kAccepted. FAILED_PRECONDITION.
+absl::Status AcceptProposal(JobInfo& job, StorageWriter& writer);
+// Ends a proposed job as cancelled and forgets its proposal. FAILED_PRECONDITION.
+absl::Status DiscardProposal(JobInfo& job, StorageWriter& writer);
+
+// Of a job that runs: whoever runs it, or would run it again, ends it.
+void TellToEnd(JobInfo& job);
+bool IsToldToEnd(const JobInfo& job);
+// It has ended: whoever was told meant what is over.
+void ForgetToldToEnd(JobInfo& job);
+
+}  // namespace strata
+
+#endif  // STRATA_CORE_ENGINE_JOBS_JOB_CHANGES_H_
