@@ -44,7 +44,7 @@ python3 tests/check_pages.py
 python3 tests/experiments/results.py --check
 
 stage "format"
-git ls-files '*.h' '*.cc' '*.proto' | xargs clang-format --dry-run --Werror
+git ls-files '*.h' '*.cc' '*.proto' | xargs -P "$(nproc)" -n 300 clang-format --dry-run --Werror
 
 stage "release build"
 cmake --preset release -DSTRATA_BUILD_TESTS=ON -DSTRATA_BUILD_BENCHMARKS=ON >/dev/null

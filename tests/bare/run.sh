@@ -18,7 +18,7 @@ demo='
   export CCACHE_DIR=$2 CCACHE_STATSLOG=/out/compiled HOME=/tmp
   setpriv --reuid="$3" --regid="$4" --clear-groups deploy/demo.sh --short --out /out
   ccache --show-log-stats'
-tests/bare/in_root.sh --read-only "$PWD" --bind "$work/build:$PWD/build" --bind "$work/out:/out" --bind "$compiled" \
+tests/bare/in_root.sh --after deploy/install-packages.sh --read-only "$PWD" --bind "$work/build:$PWD/build" --bind "$work/out:/out" --bind "$compiled" \
   bash -euc "cd \"\$1\"; $demo" bare "$PWD" "$compiled" "$(id -u)" "$(id -g)"
 
 for file in over.ply under.ply bridge.png; do

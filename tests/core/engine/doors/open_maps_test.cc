@@ -49,6 +49,7 @@ class OpenMapsTest : public EngineTest {
     EngineOptions options = Options();
     options.prepare_after = absl::InfiniteDuration();
     options.map_idle = idle;
+    options.look_interval = absl::Milliseconds(50);
     return options;
   }
   std::vector<std::string> Listed() {
@@ -108,6 +109,14 @@ TEST_F(OpenMapsTest, WhatIsIdleIsLetGoAndComesBackAsItWas) {
   EXPECT_GT(NumbersOf(db()).maps[0].commits, numbers.maps[0].commits);
 }
 
+TEST_F(OpenMapsTest, ItLooksAgainAndAgain) {
+  EngineOptions options = Idle(absl::ZeroDuration());
+  options.look_interval = absl::ZeroDuration();
+  EXPECT_THAT(OpenEngine(options),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       HasSubstr("look_interval = 0 is not above zero")));
+}
+
 // Whoever watches or sends holds it.
 TEST_F(OpenMapsTest, WhatIsInUseStaysOpen) {
   Reopen(Idle(absl::ZeroDuration()));
@@ -121,7 +130,7 @@ TEST_F(OpenMapsTest, WhatIsInUseStaysOpen) {
         .IgnoreError();
   });
   EXPECT_TRUE(Becomes([this] { return IsOpen(); }));
-  absl::SleepFor(absl::Seconds(3));
+  absl::SleepFor(absl::Milliseconds(500));  // ten looks
   EXPECT_TRUE(IsOpen());
   stop.Request();
   watch.join();
@@ -130,7 +139,7 @@ TEST_F(OpenMapsTest, WhatIsInUseStaysOpen) {
   STRATA_ASSERT_OK_AND_ASSIGN(
       auto upload, db().scans().Upload({}, kMapName, HeaderOf({"run", 1}, cloud, PoseAt(0, 0))));
   STRATA_ASSERT_OK(upload->Write(cloud));
-  absl::SleepFor(absl::Seconds(3));
+  absl::SleepFor(absl::Milliseconds(500));  // ten looks
   EXPECT_TRUE(IsOpen());
   STRATA_EXPECT_OK(upload->Finish());
   upload.reset();

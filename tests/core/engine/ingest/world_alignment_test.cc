@@ -201,7 +201,7 @@ double MeanRise(const std::vector<Pose>& poses, const std::vector<Pose>& truth, 
 // 0.07 m.
 TEST_F(LinksTest, AnUpperStoreyStaysWhereItIs) {
   const World world = CarParkWorld(0.25);
-  const std::vector<Pose> truth = Drive(world.scene, world.loops[0].waypoints, 4.0, 1.1);
+  const std::vector<Pose> truth = Drive(world.scene, world.loops[0].waypoints, 6.0, 1.1);
   MakeMap(MapParameters());
   Record(world.scene, "loop", truth, Same);
   EXPECT_LT(std::abs(MeanRise(PosesOf("loop"), truth, 4.0)), 0.03);

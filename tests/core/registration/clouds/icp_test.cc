@@ -173,6 +173,27 @@ TEST(IcpTest, OutliersAreTrimmed) {
   EXPECT_LT(ErrorOf(trimmed.T_target_source, truth), ErrorOf(all.T_target_source, truth));
 }
 
+TEST(IcpTest, PairsWhoseNormalsDifferAreLeftOut) {
+  PointCloud floor;
+  PointCloud wall;
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<float> u(-0.5F, 0.5F);
+  for (int i = 0; i < 1000; ++i) {
+    floor.points.emplace_back(u(random), u(random), 0.0F);
+    wall.points.emplace_back(0.0F, u(random), u(random));
+  }
+  IcpOptions options;
+  options.max_distance_m = 2.0;
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto all,
+                              RegisterClouds(wall, floor, Pose::Identity(), options));
+  EXPECT_GT(all.overlap, 0.9);
+  options.max_normal_angle_rad = 0.5;
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto none,
+                              RegisterClouds(wall, floor, Pose::Identity(), options));
+  EXPECT_EQ(none.termination, Termination::kTooLittleOverlap);
+  EXPECT_LT(none.overlap, 0.1);
+}
+
 TEST(IcpTest, PlaneLeavesThreeDirectionsUndetermined) {
   PointCloud plane;
   std::mt19937_64 random(1);
