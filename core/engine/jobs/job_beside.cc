@@ -87,6 +87,7 @@ absl::StatusOr<JobInfo> CancelJobBeside(MapStorage& store, std::uint64_t id) {
           TellToEnd(job);
         } else {
           job.state = JobState::kCancelled;
+          ForgetToldToEnd(job);
         }
         return absl::OkStatus();
       });

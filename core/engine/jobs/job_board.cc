@@ -18,7 +18,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "absl/synchronization/mutex.h"
-#include "absl/time/clock.h"
 #include "absl/time/time.h"
 
 #include "core/common/guarded.h"
@@ -463,23 +462,22 @@ absl::StatusOr<std::optional<JobInfo>> JobBoard::TakeNext(Stop& stop) {
       turns_[entry.owner] = ++turn_;
     }
     const WorkId work{WorkKind::kJob, id};
+    bool told_to_end = false;
     absl::StatusOr<JobInfo> taken =
         Change(id, Durability::kRelaxed, [&](JobInfo& job, StorageWriter& writer) -> absl::Status {
           if (IsFinal(job.state)) return absl::AbortedError("the job has ended");
-          if (!IsToldToEnd(job)) {
-            job.state = JobState::kRunning;
-            return quarantine_.Begin(writer, work);
-          }
-          job.state = JobState::kCancelled;  // while another engine had it, or this one before
-          ForgetToldToEnd(job);
-          return quarantine_.End(writer, work);
+          told_to_end = IsToldToEnd(job);
+          job.state = JobState::kRunning;
+          return quarantine_.Begin(writer, work);
         });
     if (absl::IsAborted(taken.status())) {  // it was cancelled, maybe by another engine
       STRATA_RETURN_IF_ERROR(TakeIn(id).status());
       continue;
     }
     STRATA_RETURN_IF_ERROR(taken.status());
-    if (taken->state == JobState::kRunning) return std::optional<JobInfo>(*std::move(taken));
+    // In an earlier run, of which its runner knows how far it came.
+    if (told_to_end) stop.Request();
+    return std::optional<JobInfo>(*std::move(taken));
   }
 }
 

@@ -70,8 +70,9 @@ class JobBoard {
   void StopRunning();
 
   // Runs the job whose turn it is, if any, and records how it ended. A job that ends because
-  // `closing` was requested stays queued for the next start; one whose state cannot be stored stays
-  // queued for the next call, and the error is returned.
+  // `closing` was requested stays queued for the next start, and one whose state cannot be stored
+  // for the next call, which returns the error; one that was cancelled before finds its
+  // JobContext::stop() requested.
   absl::Status RunNext(const Stop& closing,
                        absl::FunctionRef<absl::Status(const JobInfo&, JobContext&)> body);
 

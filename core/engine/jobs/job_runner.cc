@@ -78,6 +78,7 @@ void JobRunner::JobQueued() {
 absl::Status JobRunner::Run(const JobInfo& job, JobContext& context) {
   STRATA_ASSIGN_OR_RETURN(const bool done, HasMadeItsEpoch(core_, job, context));
   if (done) return absl::OkStatus();
+  STRATA_RETURN_IF_ERROR(context.stop().status());  // it was cancelled before a restart
   STRATA_ASSIGN_OR_RETURN(const JobHandler* const handler, FindJobHandler(job.kind));
   JobParameters parameters = job.parameters;
   parameters.erase(kAccepted);  // the board's, of no kind
