@@ -390,17 +390,25 @@ absl::StatusOr<std::vector<MapInfo>> OpenMaps::List(const Stop& stop) {
     STRATA_RETURN_IF_ERROR(Annotate(stop.status(), "waited for the first look at all maps"));
   }
   STRATA_RETURN_IF_ERROR(*surveyed_);
+  const auto is_listed = [](const Entry& entry) {
+    if (entry.state == State::kMaking || entry.state == State::kGoing) return false;
+    return entry.why.ok() || MapOwnerOf(entry.why).has_value();
+  };
   if (stores_.IsShared()) {
+    // Somebody asked for a map that was not there at the last look.
+    const bool is_new = std::ranges::any_of(entries_, [&](const auto& named) {
+      const Entry& entry = named.second;
+      return is_listed(entry) && entry.map == nullptr && !entry.info.has_value();
+    });
     mutex_.Unlock();
-    const absl::Status looked = SurveyAgain(kListAge);
+    const absl::Status looked = SurveyAgain(is_new ? absl::ZeroDuration() : kListAge);
     mutex_.Lock();
     STRATA_RETURN_IF_ERROR(looked);
   }
   std::vector<MapInfo> infos;
   infos.reserve(entries_.size());
   for (const auto& [name, entry] : entries_) {
-    if (entry.state == State::kMaking || entry.state == State::kGoing) continue;
-    if (!entry.why.ok() && !MapOwnerOf(entry.why).has_value()) continue;
+    if (!is_listed(entry)) continue;
     if (entry.map != nullptr) {
       infos.push_back(entry.map->core().info());
     } else if (entry.info.has_value()) {

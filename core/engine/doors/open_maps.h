@@ -128,10 +128,12 @@ class OpenMaps {
   }
 
   bool IsSurveyed() const ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return surveyed_.has_value(); }
+  bool IsNotSurveying() const ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return !surveying_; }
   // The thread that nobody asks: looks at all maps once, then opens and closes.
   void Loop();
   absl::Status Survey();
-  // Of shared stores, whose maps others make, remove and change: once it is so long ago.
+  // Of shared stores, whose maps others make, remove and change: once it is so long ago, and longer
+  // where there are many.
   absl::Status SurveyAgain(absl::Duration age);
   void ForgetClosedBut(const std::set<std::string>& names);
   // Opens what engines that are gone left.

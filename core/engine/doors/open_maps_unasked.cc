@@ -74,17 +74,19 @@ absl::Status OpenMaps::Survey() {
   if (done.ok() && shared) ForgetClosedBut(names);
   absl::MutexLock lock(&mutex_);
   if (!surveyed_.has_value() || !surveyed_->ok()) surveyed_ = done;
-  surveyed_at_ = SteadyNow();
-  survey_took_ = surveyed_at_ - begun;
+  survey_took_ = SteadyNow() - begun;
   return done;
 }
 
 absl::Status OpenMaps::SurveyAgain(absl::Duration age) {
   {
     absl::MutexLock lock(&mutex_);
+    // What another one sees may be older than what the caller knows of.
+    mutex_.Await(absl::Condition(this, &OpenMaps::IsNotSurveying));
     const bool young = SteadyNow() - surveyed_at_ < std::max(age, 10 * survey_took_);
-    if (surveying_ || young) return absl::OkStatus();
+    if (young && age > absl::ZeroDuration()) return absl::OkStatus();
     surveying_ = true;
+    surveyed_at_ = SteadyNow();
   }
   const absl::Status done = Guarded([this] { return Survey(); });
   absl::MutexLock lock(&mutex_);

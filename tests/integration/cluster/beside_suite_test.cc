@@ -9,6 +9,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
 #include "absl/time/time.h"
 #include <gtest/gtest.h>
 
@@ -18,6 +19,7 @@
 #include "tests/support/database_suite/database_suite.h"
 #include "tests/support/postgres_cluster.h"
 #include "tests/support/status_matchers.h"
+#include "tests/support/temp_dir.h"
 
 namespace strata::testing {
 namespace {
@@ -160,6 +162,29 @@ class NeedsStore : public ::testing::Environment {
   }
 };
 const auto* const kNeedsStore = ::testing::AddGlobalTestEnvironment(new NeedsStore());
+
+// While the engine looks at all maps as often as it can.
+TEST(BesideTheOwnerTest, AMapThatWasJustAskedForIsListed) {
+  const TempDir directory;
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto cluster, SharedPostgresCluster());
+  const auto open = [&](const char* name) {
+    EngineOptions options;
+    options.directory = directory.path() / name;
+    options.store = cluster->AddressOfOwn(directory.path().string());
+    options.server_name = name;
+    options.look_interval = absl::Microseconds(1);
+    return OpenEngine(options);
+  };
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto owner, open("owner"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto other, open("other"));
+  for (std::size_t k = 1; k <= 40; ++k) {
+    const std::string name = absl::StrCat("map", k);
+    STRATA_ASSERT_OK(owner->maps().Create({}, name, {}));
+    STRATA_ASSERT_OK(other->maps().Get({}, name));
+    STRATA_ASSERT_OK_AND_ASSIGN(const auto maps, other->maps().List({}));
+    EXPECT_EQ(maps.size(), k);
+  }
+}
 
 INSTANTIATE_TEST_SUITE_P(
     BesideTheOwner,
