@@ -15,7 +15,8 @@
 namespace strata {
 namespace {
 
-constexpr double kLeastTiltRad = 0.1;
+// Robots drive up ramps of 0.2; who asks where he is on one cannot say that he is tilted.
+constexpr double kLeastTiltRad = 0.25;
 // Flat pieces, cube by cube.
 constexpr float kCubeM = 1.0F;
 constexpr float kMostCubes = 1000.0F;  // from the sensor, to every side

@@ -12,8 +12,8 @@
 namespace strata {
 
 // R_upright_scan: the shortest turn from a frame in which `up` is the vertical (not 0) into one
-// whose z axis it is. Identity where that is less than 0.1 rad: sensors that are meant to be level,
-// on ground that is not. A pure function.
+// whose z axis it is. Identity where that is less than 0.25 rad: sensors that are meant to be
+// level, on ground that is not. A pure function.
 Eigen::Matrix3d UprightTurn(const Eigen::Vector3d& up);
 // The vertical in the frame of a scan.
 Eigen::Vector3d UpOf(const Pose& T_map_scan);
