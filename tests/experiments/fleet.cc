@@ -346,9 +346,8 @@ absl::StatusOr<Verdicts> Draw(const std::string& name,
   if (each) STRATA_RETURN_IF_ERROR(PrintSteps(*db, robots));
   STRATA_ASSIGN_OR_RETURN(const Verdicts verdicts, Judge(*db, robots));
   std::printf(
-      "%-12s %-4s %-8s seed %-6llu %zu robots %4zu scans %2d x %3d to %2.0f m: %d joined to %.3f "
-      "m, "
-      "%d alone, %d wrong; %s\n",
+      "%-12s %-4s %-8s seed %-6llu %zu robots %4zu scans %2d x %3d to %2.0f m: %d joined to "
+      "%.3f m, %d alone, %d wrong; %s\n",
       name.c_str(),
       frames.c_str(),
       mount.kind.c_str(),

@@ -213,12 +213,11 @@ absl::StatusOr<Eigen::Vector3d> ScanSource::UpIn(const ScanRecord& scan) {
   up_scan_ = 0;
   up_ = UpOf(scan.header.T_map_scan);
   if (!UprightTurn(up_).isIdentity(0.0)) {
-    std::vector<Eigen::Vector3f> points;
-    STRATA_RETURN_IF_ERROR(ForEachBlock(scan, [&points](const PointCloud& block) {
-      if (points.empty()) points = block.points;
+    bool is_first = true;  // which is enough of a large scan
+    STRATA_RETURN_IF_ERROR(ForEachBlock(scan, [&](const PointCloud& block) {
+      if (std::exchange(is_first, false)) up_ = BelievedUp(block.points, up_);
       return absl::OkStatus();
     }));
-    up_ = BelievedUp(points, up_);
   }
   up_scan_ = scan.number;
   return up_;
