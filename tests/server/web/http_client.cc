@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <cstdlib>
+#include <utility>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
@@ -69,9 +70,9 @@ bool HttpConnection::Ask(const std::string& verb,
   return Say(absl::StrCat(text, "\r\n", body));
 }
 
-bool HttpConnection::Receive(absl::Duration patience) {
+bool HttpConnection::Receive() {
   pollfd waited{.fd = socket_, .events = POLLIN, .revents = 0};
-  if (poll(&waited, 1, static_cast<int>(absl::ToInt64Milliseconds(patience))) != 1) return false;
+  if (poll(&waited, 1, static_cast<int>(absl::ToInt64Milliseconds(kPatience))) != 1) return false;
   std::array<char, 65536> piece{};
   const ssize_t count = recv(socket_, piece.data(), piece.size(), 0);
   if (count <= 0) return false;
@@ -79,9 +80,9 @@ bool HttpConnection::Receive(absl::Duration patience) {
   return true;
 }
 
-std::string HttpConnection::TakeLine(absl::Duration patience) {
+std::string HttpConnection::TakeLine() {
   while (!absl::StrContains(bytes_, "\r\n")) {
-    if (!Receive(patience)) return "";
+    if (!Receive()) return "";
   }
   const std::size_t end = bytes_.find("\r\n");
   std::string line = bytes_.substr(0, end);
@@ -89,21 +90,27 @@ std::string HttpConnection::TakeLine(absl::Duration patience) {
   return line;
 }
 
-std::string HttpConnection::TakeBytes(std::size_t enough, absl::Duration patience) {
-  while (bytes_.size() < enough && Receive(patience)) {
+std::string HttpConnection::TakeBytes(std::size_t count) {
+  while (bytes_.size() < count && Receive()) {
   }
-  const std::size_t size = std::min(enough, bytes_.size());
+  const std::size_t size = std::min(count, bytes_.size());
   std::string taken = bytes_.substr(0, size);
   bytes_.erase(0, size);
   return taken;
 }
 
-HttpAnswer HttpConnection::Take(absl::Duration patience, bool to_head) {
+std::string HttpConnection::TakeUntil(absl::string_view text) {
+  while (!absl::StrContains(bytes_, text) && Receive()) {
+  }
+  return std::exchange(bytes_, "");
+}
+
+HttpAnswer HttpConnection::Take(bool to_head) {
   HttpAnswer answer;
-  const std::string first = TakeLine(patience);
+  const std::string first = TakeLine();
   if (!absl::StartsWith(first, "HTTP/1.1 ")) return answer;
   answer.status = std::atoi(first.c_str() + 9);
-  for (std::string line = TakeLine(patience); !line.empty(); line = TakeLine(patience)) {
+  for (std::string line = TakeLine(); !line.empty(); line = TakeLine()) {
     const std::size_t colon = line.find(": ");
     if (colon == std::string::npos) continue;
     answer.headers[absl::AsciiStrToLower(line.substr(0, colon))] = line.substr(colon + 2);
@@ -112,15 +119,15 @@ HttpAnswer HttpConnection::Take(absl::Duration patience, bool to_head) {
   if (answer.headers["transfer-encoding"] != "chunked") {
     std::size_t length = 0;
     if (absl::SimpleAtoi(answer.headers["content-length"], &length)) {
-      answer.body = TakeBytes(length, patience);
+      answer.body = TakeBytes(length);
     }
     return answer;
   }
   while (true) {
     std::uint32_t size = 0;
-    if (!absl::SimpleHexAtoi(TakeLine(patience), &size)) break;
-    answer.body += TakeBytes(size, patience);
-    TakeLine(patience);
+    if (!absl::SimpleHexAtoi(TakeLine(), &size)) break;
+    answer.body += TakeBytes(size);
+    TakeLine();
     if (size == 0) break;
   }
   return answer;
@@ -142,7 +149,7 @@ HttpAnswer AskOnce(const std::string& url,
                    const std::string& body) {
   HttpConnection connection(url);
   connection.Ask(verb, target, headers, body);
-  return connection.Take(absl::Seconds(10), verb == "HEAD");
+  return connection.Take(verb == "HEAD");
 }
 
 }  // namespace strata::server::web

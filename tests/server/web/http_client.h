@@ -20,6 +20,10 @@ struct HttpAnswer {
   std::string body;                            // of chunks put together
 };
 
+// How long a test waits for what is to come. No promise of the server's, which is faster, but
+// longer than a loaded machine stands still.
+constexpr absl::Duration kPatience = absl::Seconds(60);
+
 // One connection, blocking.
 class HttpConnection {
  public:
@@ -37,17 +41,19 @@ class HttpConnection {
            const std::string& target,
            const Headers& headers = {},
            const std::string& body = "");
-  // The next answer, whole; after `patience` without a byte what came until then.
-  HttpAnswer Take(absl::Duration patience = absl::Seconds(10), bool to_head = false);
-  // What has come and is in no answer yet; waits for `enough` bytes.
-  std::string TakeBytes(std::size_t enough, absl::Duration patience = absl::Seconds(10));
+  // The next answer, whole; where nothing more comes what came until then.
+  HttpAnswer Take(bool to_head = false);
+  // What has come and is in no answer yet, once `text` is in it; without `text` where nothing more
+  // comes.
+  std::string TakeUntil(absl::string_view text);
   // Whether the other side closes within `patience`.
-  bool IsClosed(absl::Duration patience);
+  bool IsClosed(absl::Duration patience = kPatience);
 
  private:
   // False: nothing came, or the end.
-  bool Receive(absl::Duration patience);
-  std::string TakeLine(absl::Duration patience);
+  bool Receive();
+  std::string TakeLine();
+  std::string TakeBytes(std::size_t count);
 
   int socket_ = -1;
   std::string host_;
