@@ -1,6 +1,7 @@
 #include "core/engine/consistency/closure_search.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <set>
 #include <utility>
@@ -25,6 +26,11 @@ namespace {
 constexpr std::size_t kAlikeScans = 4;
 // Closing loops moves poses, which makes other pairs likely.
 constexpr int kMaxPasses = 3;
+// Between parts that are still apart every place in common counts: where one robot drives over
+// another, those nearest to each other show nothing in common, and some a few metres on do.
+constexpr double kFineSegmentM = 2.5;
+constexpr int kMaxFinePasses = 4;
+constexpr std::size_t kFineCandidates = 24;  // of a pass
 // Errors of a match beside what its information says.
 constexpr double kMatchSigmaM = 0.05;
 constexpr double kMatchSigmaRad = 0.005;
@@ -49,21 +55,30 @@ class Searcher {
 
   absl::StatusOr<ClosureSearch> Run() {
     STRATA_RETURN_IF_ERROR(FindAlike());
-    for (int pass = 0; pass < kMaxPasses; ++pass) {
-      pass_ = pass;
-      STRATA_ASSIGN_OR_RETURN(const std::vector<ClosureCandidate> candidates, Candidates());
-      if (candidates.empty()) break;
-      const std::size_t before = matched_.size();
-      STRATA_RETURN_IF_ERROR(Verify(candidates));
-      if (matched_.size() == before) break;
-      STRATA_RETURN_IF_ERROR(KeepConsistent());
-      STRATA_RETURN_IF_ERROR(CloseLoops());
+    for (int pass = 0; pass < kMaxPasses; ++pass, ++pass_) {
+      STRATA_ASSIGN_OR_RETURN(const bool is_any, Close());
+      if (!is_any) break;
+    }
+    is_fine_ = true;
+    for (int pass = 0; pass < kMaxFinePasses; ++pass, ++pass_) {
+      STRATA_RETURN_IF_ERROR(Close().status());
     }
     search_.matched = matched_.size();
     return std::move(search_);
   }
 
  private:
+  // Whether any candidate matched.
+  absl::StatusOr<bool> Close() {
+    STRATA_ASSIGN_OR_RETURN(const std::vector<ClosureCandidate> candidates, Candidates());
+    const std::size_t before = matched_.size();
+    STRATA_RETURN_IF_ERROR(Verify(candidates));
+    if (matched_.size() == before) return false;
+    STRATA_RETURN_IF_ERROR(KeepConsistent());
+    STRATA_RETURN_IF_ERROR(CloseLoops());
+    return true;
+  }
+
   absl::Status FindAlike() {
     std::vector<PlaceDescriptor> places(world_.size());
     STRATA_RETURN_IF_ERROR(
@@ -112,13 +127,28 @@ class Searcher {
     for (const FoundClosure& closure : search_.closures) {
       edges.push_back({closure.i, closure.j, closure.information});
     }
+    ClosureCandidateOptions options;
+    if (is_fine_) options.segment_m = kFineSegmentM;
     STRATA_ASSIGN_OR_RETURN(std::vector<ClosureCandidate> candidates,
-                            FindClosureCandidates(nodes, edges, alike_));
+                            FindClosureCandidates(nodes, edges, alike_, options));
     std::erase_if(candidates, [this](const ClosureCandidate& candidate) {
       return std::max(candidate.i, candidate.j) < first_new_ ||
-             !tried_.insert({candidate.i, candidate.j}).second;
+             (is_fine_ && std::isfinite(candidate.sigma_m)) ||
+             tried_.contains({candidate.i, candidate.j});
     });
+    if (is_fine_) candidates = Spread(std::move(candidates));
+    for (const ClosureCandidate& candidate : candidates) tried_.insert({candidate.i, candidate.j});
     return candidates;
+  }
+
+  // A few, from best to worst: what is nearest need not show most in common.
+  static std::vector<ClosureCandidate> Spread(std::vector<ClosureCandidate> candidates) {
+    std::vector<ClosureCandidate> few;
+    const std::size_t step = (candidates.size() + kFineCandidates - 1) / kFineCandidates;
+    for (std::size_t k = 0; k < candidates.size(); k += step) {
+      few.push_back(std::move(candidates[k]));
+    }
+    return few;
   }
 
   // The scans around `node` on its trajectory, in its frame: a pooled local map.
@@ -187,7 +217,7 @@ class Searcher {
           if (thread == 0) {
             const double share = static_cast<double>(k) / static_cast<double>(found.size());
             STRATA_RETURN_IF_ERROR(
-                context_.Progress(0.4 + 0.2 * (pass_ + share), "looking for loops to close"));
+                context_.Progress(0.4 + 0.08 * (pass_ + share), "looking for loops to close"));
           }
           STRATA_ASSIGN_OR_RETURN(found[k], Try(candidates[k]));
           return absl::OkStatus();
@@ -238,6 +268,7 @@ class Searcher {
   std::set<std::pair<std::size_t, std::size_t>> tried_;
   std::vector<FoundClosure> matched_;
   int pass_ = 0;
+  bool is_fine_ = false;  // only between parts that nothing joins, and closely
   ClosureSearch search_;
 };
 

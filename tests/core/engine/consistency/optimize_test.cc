@@ -175,6 +175,21 @@ TEST_F(OptimizeTest, ASmallPartThatContradictsTheRestIsProposedAndNamed) {
   EXPECT_THAT(job.message, HasSubstr("Too little to be applied by itself"));
 }
 
+TEST_F(OptimizeTest, AStepThatNobodyMeasuredIsNamedOnce) {
+  MakeMap(MapParameters());
+  for (std::uint64_t k = 1; k <= kScans; ++k) {
+    UploadScan(k, k < 4 ? TruthOf(k) : PoseAt(1.0, 7.0, 0.3) * TruthOf(k));
+  }
+  WaitIntegrated(db());
+  const JobInfo job = Optimize();
+  EXPECT_EQ(job.state, JobState::kSucceeded) << job.message;
+  EXPECT_THAT(job.message, HasSubstr("1 of 5 steps from scan to scan are the robot's word alone"))
+      << job.message;
+  EXPECT_THAT(job.message, HasSubstr("(to run/4)"));
+  EXPECT_THAT(job.message, Not(HasSubstr("Nothing joins")));
+  EXPECT_THAT(job.message, HasSubstr("Usable; look at these steps."));
+}
+
 // Robots on lanes across the yard, with sensors that see little of it from far away. Its corners
 // look alike, turned by 90°.
 class OptimizeOfLanesTest : public OptimizeTest {
@@ -242,6 +257,36 @@ TEST_F(OptimizeOfLanesTest, ARobotThatSharesOnlyWallsDoesNotSlideAlongThem) {
     SCOPED_TRACE(map);
     DriveAll({8, 7, 2}, scans, scans, 0.0, map);
     EXPECT_LT(RunJob(db(), "optimize", {}, map).metrics.at("shift_max_m"), 0.1);
+  }
+}
+
+// Where their ways cross they are nearest to each other, and one sees the deck that hides the
+// other; what both see lies beside it.
+TEST_F(OptimizeTest, ARobotUnderABridgeIsJoinedToOneThatDrivesOverIt) {
+  MakeMap(MapParameters());
+  const Scene bridge = BridgeWorld().scene;
+  const Pose off = PoseAt(0.4, -0.3, 0.02);  // the frame of the second
+  std::vector<Pose> truth;
+  const auto record =
+      [&](const std::string& robot, const std::vector<Pose>& way, const Pose& T_frame) {
+        for (std::size_t k = 0; k < way.size(); ++k) {
+          const PointCloud cloud = SimulateScan(bridge, {}, way[k], 40 + truth.size());
+          const ScanHeader header = HeaderOf({robot, k}, cloud, T_frame * way[k], Alignment::kOn);
+          STRATA_ASSERT_OK(Upload(db(), header, cloud, 40'000));
+          truth.push_back(way[k]);
+        }
+      };
+  record("over", Drive(bridge, {{-14, 0, 1.8}, {14, 0, 1.8}}, 1.0, 1.2), Pose::Identity());
+  record("under", Drive(bridge, {{0, -14, 0}, {0, 14, 0}}, 1.0, 1.2), off);
+  WaitIntegrated(db());
+  const JobInfo job = RunJob(db(), "optimize", {});
+  EXPECT_EQ(job.state, JobState::kSucceeded) << job.message;
+  EXPECT_THAT(job.message, Not(HasSubstr("Nothing joins"))) << job.message;
+  const std::vector<Pose> poses = Poses();
+  ASSERT_EQ(poses.size(), truth.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Pose is = poses[0].inverse() * poses[i];
+    EXPECT_LT((is.translation() - (truth[0].inverse() * truth[i]).translation()).norm(), 0.1) << i;
   }
 }
 
