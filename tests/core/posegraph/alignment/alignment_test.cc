@@ -404,6 +404,21 @@ TEST_F(AlignmentTest, AJumpOfOdometryPullsNothing) {
   }
 }
 
+// Scans behind the jump fit to both sides of it held as one piece, which says nothing of the jump.
+TEST_F(AlignmentTest, NothingIsPooledAcrossAStepThatNobodyMeasured) {
+  constexpr std::size_t kJump = 3;
+  const Pose off = MakePose(Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitZ())),
+                            {2.0, 5.0, 0.0});
+  for (std::size_t k = kJump; k < YardScans::kFirst; ++k) {
+    problem_.T_map_scan[k] = off * problem_.T_map_scan[k];
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align());
+  for (std::size_t k = 0; k < YardScans::kFirst; ++k) {
+    EXPECT_EQ(result.parts[k] == result.parts[0], k < kJump) << k;
+    EXPECT_EQ(result.parts[k] == result.parts[kJump], k >= kJump) << k;
+  }
+}
+
 TEST_F(AlignmentTest, TheResultDoesNotDependOnTheOrderOfWork) {
   Disturb(7);
   options_.max_rounds = 2;
