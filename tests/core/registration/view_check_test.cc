@@ -9,6 +9,9 @@
 
 #include <gtest/gtest.h>
 
+#include "core/mls/build.h"
+#include "tests/support/status_matchers.h"
+
 namespace strata {
 namespace {
 
@@ -85,6 +88,33 @@ TEST(ViewImageTest, BeamsThatPassAboveGroundLookThroughNothing) {
   }
   EXPECT_EQ(image.At({2.5F, 0.0F, -0.225F}, true), Sight::kSeenThrough) << "a table";
   EXPECT_EQ(image.At({15.0F, 0.0F, -0.3F}), Sight::kSeenThrough) << "a wall";
+}
+
+// What may be a ceiling is no feature, and stops beams all the same.
+TEST(ViewImageTest, NothingIsSeenThroughWhatIsDoubtful) {
+  PointCloud room;
+  for (float y = -3.0F; y < 3.0F; y += 0.1F) {
+    for (float x = -3.0F; x < 3.0F; x += 0.1F) {
+      room.points.emplace_back(x, y, 0.0F);
+      room.points.emplace_back(x, y, 2.5F);
+    }
+  }
+  constexpr float kFar = 8.05F;  // too few there to tell the side of
+  for (int i = 0; i < 20; ++i) {
+    for (float y = -6.0F; y < 6.0F; y += 1.5F) {
+      room.points.emplace_back(kFar + static_cast<float>(i), y, 2.5F);
+    }
+  }
+  const absl::StatusOr<MlsBuildResult> local = BuildMlsMap(room, Pose::Identity(), {}, {});
+  STRATA_ASSERT_OK(local);
+  ScanFeatureOptions options;
+  options.sensor_origin = {0.0, 0.0, 1.0};
+  const ScanFeatures features = ScanFeatures::FromMap(local->map, options);
+  ASSERT_GT(features.doubtful().size(), 50U);
+  const ViewImage image(features, options.sensor_origin);
+  for (const Vector3f& p : features.doubtful()) {
+    EXPECT_EQ(image.At(p, true), Sight::kAgreeing) << p.transpose();
+  }
 }
 
 TEST(ViewImageTest, WithoutFeaturesNothingIsKnown) {

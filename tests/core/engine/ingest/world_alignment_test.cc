@@ -171,6 +171,28 @@ TEST_F(LinksTest, AfterAJumpThatNothingMendsScansAreTiedToEachOther) {
   }
 }
 
+// Two jumps one after the other: what is seen after them lies to the scan before as it was
+// measured, and says nothing of the one between.
+TEST_F(LinksTest, ScansThatAreLostAreNoOnePiece) {
+  MakeMap(MapParameters());
+  const std::size_t jump = way_.size() / 2;
+  Record(yard_, "jumps", way_, [&](const Pose& T) {
+    const double x = T.translation().x();
+    if (x < way_[jump].translation().x() - 0.1) return T;
+    if (x < way_[jump + 1].translation().x() - 0.1) return PoseAt(1.0, 7.0, 0.3) * T;
+    return PoseAt(4.0, 16.0, -0.4) * T;
+  });
+  STRATA_ASSERT_OK_AND_ASSIGN(const api::PoseGraphState graph, db().posegraph().Get({}, kMapName));
+  for (const Constraint& c : graph.constraints) {
+    EXPECT_NE(c.i.sequence, jump) << c.j.ToString();
+    EXPECT_NE(c.j.sequence, jump) << c.i.ToString();
+    EXPECT_EQ(c.i.sequence < jump, c.j.sequence < jump) << c.i.ToString() << c.j.ToString();
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo info,
+                              db().scans().Get({}, kMapName, {"jumps", jump + 2}));
+  EXPECT_TRUE(info.alignment.aligned) << info.alignment.message;
+}
+
 TEST_F(LinksTest, CellsOfTheMapDoNotChangeWhereScansAre) {
   MapParameters coarse;
   coarse.mls.cell_size_m = 0.5;
