@@ -38,7 +38,7 @@ constexpr double kSamePlaceRad = 0.002;
 // Within these of what was measured when a scan came in, it still holds.
 constexpr double kMeasuredPlaceM = 0.1;
 constexpr double kMeasuredPlaceRad = 0.02;
-// What may be false, or was not found in all directions, must look the same at least to this share.
+// What may be false must look the same at least to this share.
 constexpr double kMinDoubtfulOverlap = 0.5;
 // A match is recorded as relative poses to the nearest few.
 constexpr std::size_t kMaxPartners = 3;
@@ -271,10 +271,8 @@ class Alignment {
     const RegistrationTarget target(placed, {.centre = pose(node).translation()});
     const RegistrationResult result = RegisterScan(*own, target, pose(node), options_.registration);
     match.tried = !seen.empty();
-    const bool is_doubtful =
-        match.chain.may_be_false || result.termination != Termination::kConverged;
-    match.good =
-        Acceptable(result.termination) && (!is_doubtful || result.overlap >= kMinDoubtfulOverlap);
+    match.good = Acceptable(result.termination) &&
+                 (!match.chain.may_be_false || result.overlap >= kMinDoubtfulOverlap);
     if (!match.good) return match;
     match.information = LoosenedInformation(
         result.information,

@@ -178,7 +178,7 @@ TEST_F(OptimizeTest, ASmallPartThatContradictsTheRestIsProposedAndNamed) {
 TEST_F(OptimizeTest, AStepThatNobodyMeasuredIsNamedOnce) {
   MakeMap(MapParameters());
   for (std::uint64_t k = 1; k <= kScans; ++k) {
-    UploadScan(k, k < 4 ? TruthOf(k) : PoseAt(1.0, 7.0, 0.3) * TruthOf(k));
+    UploadScan(k, k < 4 ? TruthOf(k) : PoseAt(5.0, 60.0, 0.3) * TruthOf(k));
   }
   WaitIntegrated(db());
   const JobInfo job = Optimize();
