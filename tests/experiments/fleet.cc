@@ -32,6 +32,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/time/clock.h"
@@ -289,14 +290,20 @@ absl::StatusOr<Verdicts> Judge(api::Database& db, const std::vector<FleetRobot>&
   return verdicts;
 }
 
-// How far each step is from the truth, and what ingest said of it.
+// How far each step is from the truth, and what ingest said of it. Of stretches of one robot, steps
+// across jumps are among them.
 absl::Status PrintSteps(api::Database& db, const std::vector<FleetRobot>& robots) {
+  ScanId last;
+  Pose T_world_last = Pose::Identity();
   for (const FleetRobot& robot : robots) {
-    for (std::size_t k = 1; k < robot.truth.size(); ++k) {
-      STRATA_ASSIGN_OR_RETURN(const Pose before, PoseOf(db, robot, k - 1));
+    for (std::size_t k = 0; k < robot.truth.size(); ++k) {
+      const ScanId before = std::exchange(last, robot.Id(k));
+      const Pose T_world_before = std::exchange(T_world_last, robot.truth[k]);
+      if (before.trajectory != robot.name) continue;
+      STRATA_ASSIGN_OR_RETURN(const ScanInfo from, db.scans().Get({}, kMap, before));
       STRATA_ASSIGN_OR_RETURN(const ScanInfo scan, db.scans().Get({}, kMap, robot.Id(k)));
-      const Pose error = (robot.truth[k - 1].inverse() * robot.truth[k]).inverse() *
-                         (before.inverse() * scan.T_map_scan);
+      const Pose error = (T_world_before.inverse() * robot.truth[k]).inverse() *
+                         (from.T_map_scan.inverse() * scan.T_map_scan);
       std::printf("    %s %llu: %.3f m %.4f rad, overlap %.2f, %s\n",
                   robot.name.c_str(),
                   static_cast<unsigned long long>(robot.Id(k).sequence),

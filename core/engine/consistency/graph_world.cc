@@ -149,7 +149,12 @@ AlignmentProblem GraphWorld::Problem(const OptimizeSettings& settings) const {
   }
   for (const std::vector<std::size_t>& trajectory : trajectories_) {
     for (std::size_t k = 1; k < trajectory.size(); ++k) {
-      if (!held[trajectory[k]]) problem.pairs.push_back({trajectory[k - 1], trajectory[k]});
+      if (held[trajectory[k]]) continue;
+      problem.pairs.push_back({trajectory[k - 1], trajectory[k]});
+      // Nothing was found where it was looked for.
+      if (scans_[trajectory[k]].header.alignment != Alignment::kOff) {
+        problem.lost.push_back(trajectory[k]);
+      }
     }
   }
   for (const std::vector<std::size_t>& trajectory : trajectories_) {

@@ -100,6 +100,7 @@ class Optimizer {
                             VerdictOn(world, views, result, damaged_));
     context_.SetMetric("steps", static_cast<double>(verdict.steps));
     context_.SetMetric("steps_loose", static_cast<double>(verdict.loose_steps.size()));
+    context_.SetMetric("steps_sliding", static_cast<double>(verdict.sliding_steps.size()));
     context_.SetMetric("parts_apart", static_cast<double>(verdict.apart.size()));
     context_.SetMetric("pairs_compared", static_cast<double>(verdict.compared));
     context_.SetMetric("pairs_contradicted", static_cast<double>(verdict.contradicted));

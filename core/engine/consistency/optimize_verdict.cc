@@ -155,16 +155,21 @@ void FindParts(const GraphWorld& world,
   }
 }
 
-void FindLooseSteps(const GraphWorld& world,
-                    const std::vector<std::size_t>& parts,
-                    const std::set<ScanNumber>& damaged,
-                    OptimizeVerdict& verdict) {
+void FindDoubtfulSteps(const GraphWorld& world,
+                       const AlignmentResult& result,
+                       const std::set<ScanNumber>& damaged,
+                       OptimizeVerdict& verdict) {
   for (std::vector<std::size_t> trajectory : world.Trajectories()) {
     std::erase_if(trajectory, [&](std::size_t k) { return damaged.contains(world.number(k)); });
     for (std::size_t k = 1; k < trajectory.size(); ++k) {
       ++verdict.steps;
-      if (parts[trajectory[k - 1]] == parts[trajectory[k]]) continue;
-      verdict.loose_steps.emplace_back(trajectory[k - 1], trajectory[k]);
+      const std::size_t before = trajectory[k - 1];
+      const std::size_t node = trajectory[k];
+      if (result.parts[before] != result.parts[node]) {
+        verdict.loose_steps.emplace_back(before, node);
+      } else if (std::ranges::binary_search(result.sliding, node)) {
+        verdict.sliding_steps.emplace_back(before, node);
+      }
     }
   }
 }
@@ -173,19 +178,32 @@ bool PriorsContradict(const OptimizeVerdict& verdict) {
   return IsTooMany(verdict.priors_rejected, verdict.priors, kMostFalse);
 }
 
+// "robot/7, robot/8, …": the scans that steps lead to.
+std::string NamesOf(const GraphWorld& world,
+                    const std::vector<std::pair<std::size_t, std::size_t>>& steps) {
+  std::string names;
+  for (std::size_t k = 0; k < std::min(kNamed, steps.size()); ++k) {
+    absl::StrAppend(&names, k == 0 ? "" : ", ", world.id(steps[k].second).ToString());
+  }
+  return absl::StrCat(names, steps.size() > kNamed ? ", …" : "");
+}
+
 std::string StepsMessage(const GraphWorld& world, const OptimizeVerdict& verdict) {
   const auto& loose = verdict.loose_steps;
-  if (loose.empty()) {
-    return absl::StrFormat("All %d steps from scan to scan are measured", verdict.steps);
-  }
+  const auto& sliding = verdict.sliding_steps;
   std::string message =
-      absl::StrFormat("%d of %d steps from scan to scan are the robot's word alone (to ",
-                      loose.size(),
-                      verdict.steps);
-  for (std::size_t k = 0; k < std::min(kNamed, loose.size()); ++k) {
-    absl::StrAppend(&message, k == 0 ? "" : ", ", world.id(loose[k].second).ToString());
-  }
-  return absl::StrCat(message, loose.size() > kNamed ? ", …)" : ")");
+      loose.empty()
+          ? absl::StrFormat("All %d steps from scan to scan are measured", verdict.steps)
+          : absl::StrFormat("%d of %d steps from scan to scan are the robot's word alone (to %s)",
+                            loose.size(),
+                            verdict.steps,
+                            NamesOf(world, loose));
+  if (sliding.empty()) return message;
+  return absl::StrFormat(
+      "%s; %d may slide along what scans see, and are as good as the robot's word (to %s)",
+      message,
+      sliding.size(),
+      NamesOf(world, sliding));
 }
 
 std::string PairsMessage(const OptimizeVerdict& verdict) {
@@ -234,6 +252,7 @@ absl::string_view Meaning(const OptimizeVerdict& verdict, AlignmentTermination t
   }
   if (!verdict.loose_steps.empty()) return "Usable; look at these steps.";
   if (termination != AlignmentTermination::kSettled) return "Usable; run it again for the rest.";
+  if (!verdict.sliding_steps.empty()) return "Good but for what may slide.";
   return verdict.apart.empty() ? "Good." : "Good within each part.";
 }
 
@@ -245,7 +264,7 @@ absl::StatusOr<OptimizeVerdict> VerdictOn(const GraphWorld& world,
                                           const DamagedScans& damaged) {
   OptimizeVerdict verdict;
   if (!result.parts.empty()) {
-    FindLooseSteps(world, result.parts, damaged.Scans(), verdict);
+    FindDoubtfulSteps(world, result, damaged.Scans(), verdict);
     FindParts(world, result.parts, damaged.Scans(), verdict);
   }
   STRATA_RETURN_IF_ERROR(Compare(world, views, result, verdict));

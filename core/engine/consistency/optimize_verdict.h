@@ -25,6 +25,9 @@ struct OptimizeVerdict {
   // Those whose two scans no match, closure or given constraint joins, on any way: the nodes from
   // and to which they lead.
   std::vector<std::pair<std::size_t, std::size_t>> loose_steps;
+  // Of the others, those whose scans show nothing that would tell where they are along what they
+  // see: open ground, a bare corridor. There it is the robot's word.
+  std::vector<std::pair<std::size_t, std::size_t>> sliding_steps;
   // Pairs of scans near each other that something joins, along trajectories and across, spread over
   // the map; and those of them where one looked through much of what the other saw.
   std::size_t compared = 0;

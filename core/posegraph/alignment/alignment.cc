@@ -78,6 +78,7 @@ class Alignment {
         matches_(problem.T_map_scan.size()),
         measured_(problem.T_map_scan.size()),
         odometry_(problem.T_map_scan.size(), nullptr),
+        lost_(problem.T_map_scan.size(), false),
         loose_(problem.T_map_scan.size(), false),
         surfaces_(problem, source, options) {
     result_.T_map_scan = problem.T_map_scan;
@@ -85,6 +86,7 @@ class Alignment {
       if (pair.measured.has_value()) measured_[pair.j].push_back(&pair);
     }
     for (const RelativePoseTerm& motion : problem.odometry) odometry_[motion.j] = &motion;
+    for (const std::size_t node : problem.lost) lost_[node] = true;
   }
 
   absl::StatusOr<AlignmentResult> Run(AlignmentProgress progress) {
@@ -355,11 +357,13 @@ class Alignment {
   // the directions that registration leaves loose.
   void AddOdometry(const std::vector<bool>& known,
                    const std::vector<Matrix6d>& information,
-                   PoseGraphProblem& graph) const {
+                   PoseGraphProblem& graph) {
+    result_.sliding.clear();
     for (const std::vector<std::size_t>& trajectory : problem_.trajectories) {
       const std::optional<OdometryNoise> noise = NoiseOf(trajectory);
       for (const std::size_t node : trajectory) {
         if (odometry_[node] == nullptr || !known[node]) continue;
+        if (Slides(node, information[node])) result_.sliding.push_back(node);
         const std::optional<Pose> error = OdometryError(node);
         if (noise.has_value() && error.has_value() && IsJump(*error, *noise)) continue;
         RelativePoseTerm term = *odometry_[node];
@@ -369,6 +373,13 @@ class Alignment {
         if (!term.information.isZero()) graph.relative.push_back(std::move(term));
       }
     }
+    std::ranges::sort(result_.sliding);
+  }
+
+  // Whether what is known of a node leaves a direction to its odometry.
+  bool Slides(std::size_t node, const Matrix6d& information) const {
+    return odometry_[node] != nullptr &&
+           !WhereLess(information, odometry_[node]->information, kLooseShare).isZero();
   }
 
   std::optional<OdometryNoise> NoiseOf(const std::vector<std::size_t>& trajectory) const {
@@ -424,6 +435,13 @@ class Alignment {
     for (std::size_t k = given; k < graph.relative.size(); ++k) {
       if (!rejected[k]) result_.measured.push_back(graph.relative[k]);
     }
+    for (std::size_t k = given; k < measured_end_; ++k) {
+      // What may slide agrees with any place: that two are near by the graph, or by the word of a
+      // robot that was found wrong, is all that joins them.
+      const RelativePoseTerm& term = graph.relative[k];
+      const bool is_doubtful = term.may_be_false || lost_[term.j];
+      if (is_doubtful && Slides(term.j, term.information)) rejected[k] = true;
+    }
     DisjointSets joined = JoinedBy(graph.relative, rejected, measured_end_);
     result_.parts = PartsOf(joined, graph.T_map_scan.size());
     surfaces_.Keep(solution.planes);
@@ -440,6 +458,7 @@ class Alignment {
   std::vector<std::vector<Match>> matches_;             // of every node
   std::vector<std::vector<const ScanPair*>> measured_;  // of every node j
   std::vector<const RelativePoseTerm*> odometry_;       // of every node j; nullptr: none
+  std::vector<bool> lost_;                              // of every node
   std::vector<bool> loose_;                             // of every node, in the round before
   SharedSurfaces surfaces_;
   std::map<Decision, bool> believed_;  // in the round before

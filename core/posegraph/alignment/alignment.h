@@ -77,6 +77,9 @@ struct AlignmentProblem {
   // Nodes of every run of a robot in the order of its way; each node once.
   std::vector<std::vector<std::size_t>> trajectories;
   std::vector<ScanPair> pairs;  // known to overlap, however far apart they seem
+  // Nodes that nothing was found of behind them when they came in: a match of theirs that leaves a
+  // direction as it was joins nothing, since it agrees with any place.
+  std::vector<std::size_t> lost;
   // That stay as they are: what a person said. Those that may be false are rejected as matches are.
   std::vector<RelativePoseTerm> relative;
   // What robots say of their motion from i to j, each the scan before j on its trajectory. Where a
@@ -145,6 +148,9 @@ struct AlignmentResult {
   // Beside T_map_scan: nodes that matches and given terms join have the same number. What only
   // odometry, poses as they were or planes hold is a part of its own.
   std::vector<std::size_t> parts;
+  // Nodes that may slide against what is behind them: matches leave a direction to what their robot
+  // says of its motion (AlignmentProblem::odometry), ascending.
+  std::vector<std::size_t> sliding;
 };
 
 // Runs body(k) for every k in [0, count), in any order, maybe from several threads.

@@ -1,6 +1,7 @@
 #include "core/posegraph/alignment/alignment.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -417,6 +418,59 @@ TEST_F(AlignmentTest, NothingIsPooledAcrossAStepThatNobodyMeasured) {
     EXPECT_EQ(result.parts[k] == result.parts[0], k < kJump) << k;
     EXPECT_EQ(result.parts[k] == result.parts[kJump], k >= kJump) << k;
   }
+}
+
+// A floor with nothing on it.
+class FloorScans final : public AlignmentSource {
+ public:
+  FloorScans() {
+    RandomPoses random(5);
+    std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points;
+    for (int x = -20; x <= 20; ++x) {
+      for (int y = -20; y <= 20; ++y) {
+        const Eigen::Vector3f shaken = random.Vector(0.05).cast<float>();
+        points[static_cast<std::size_t>(FeatureClass::kTraversable)].emplace_back(
+            0.3F * static_cast<float>(x) + shaken.x(),
+            0.3F * static_cast<float>(y) + shaken.y(),
+            -1.2F);
+      }
+    }
+    features_ = std::make_shared<const ScanFeatures>(ScanFeatures::FromPoints(std::move(points)));
+  }
+  absl::StatusOr<std::shared_ptr<const ScanFeatures>> Features(std::size_t) override {
+    return features_;
+  }
+  absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t) override {
+    return std::make_shared<const ScanPlanes>();
+  }
+
+ private:
+  std::shared_ptr<const ScanFeatures> features_;
+};
+
+TEST_F(AlignmentTest, WhatMayOnlySlideIsNamed) {
+  AlignmentProblem floor;
+  for (std::size_t k = 0; k < 3; ++k) {
+    floor.T_map_scan.push_back(
+        MakePose(Eigen::Quaterniond::Identity(), {0.5 * static_cast<double>(k), 0.0, 1.2}));
+  }
+  floor.trajectories = {{0, 1, 2}};
+  for (std::size_t k = 1; k < 3; ++k) {
+    floor.pairs.push_back({k - 1, k});
+    floor.odometry.push_back({k - 1,
+                              k,
+                              floor.T_map_scan[k - 1].inverse() * floor.T_map_scan[k],
+                              IsotropicInformation(0.005, 0.05)});
+  }
+  problem_ = floor;
+  FloorScans scans;
+  STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align(scans));
+  EXPECT_THAT(result.sliding, ::testing::ElementsAre(1, 2));
+  EXPECT_THAT(result.parts, Each(result.parts[0]));
+  problem_.lost = {2};  // then it agrees with anything
+  STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult apart, Align(scans));
+  EXPECT_EQ(apart.parts[1], apart.parts[0]);
+  EXPECT_NE(apart.parts[2], apart.parts[0]);
 }
 
 TEST_F(AlignmentTest, TheResultDoesNotDependOnTheOrderOfWork) {
