@@ -484,6 +484,11 @@ absl::Status CheckProblem(const AlignmentProblem& problem) {
           "odometry from ", motion.i, " to ", motion.j, ": not two different ones of ", nodes));
     }
   }
+  for (const std::size_t node : problem.lost) {
+    if (node >= nodes) {
+      return absl::InvalidArgumentError(absl::StrCat("lost: node ", node, " is none of ", nodes));
+    }
+  }
   std::vector<int> seen(nodes, 0);
   for (const std::vector<std::size_t>& trajectory : problem.trajectories) {
     for (const std::size_t node : trajectory) {
