@@ -138,7 +138,8 @@ endfunction()
 # strata_test(NAME SOURCES... DEPS... [LABELS...] [TIMEOUT seconds] [PROCESSORS n] [TOGETHER suites...])
 #
 # A GoogleTest program; every TEST becomes a ctest test with the labels (default: unit). The labels asan, bytes and
-# tsan also make it part of what tests/run_sanitizers.sh builds and runs. PROCESSORS: of those that ctest has, as many as a
+# tsan also make it part of what tests/run_sanitizers.sh builds and runs. TIMEOUT: what it takes at most on a machine that
+# does little else; after four times that it hangs, and is ended. PROCESSORS: of those that ctest has, as many as a
 # test takes that goes by the clock. TOGETHER: each of these suites is one ctest test, and one process, for which what its
 # tests share is made once; ALL: the program is, whose many short tests would take longer to start than to run.
 function(strata_test name)
@@ -152,8 +153,9 @@ function(strata_test name)
   if(NOT ARG_PROCESSORS)
     set(ARG_PROCESSORS 1)
   endif()
+  math(EXPR hangs "${ARG_TIMEOUT} * 4")
   if(STRATA_SANITIZER)
-    math(EXPR ARG_TIMEOUT "${ARG_TIMEOUT} * 4")
+    math(EXPR hangs "${hangs} * 4")
   endif()
   strata_executable(
     ${name} ${name} SOURCES ${ARG_SOURCES} DEPS ${ARG_DEPS} GTest::gmock_main SHARED_HEADERS strata_test_headers
@@ -169,7 +171,8 @@ function(strata_test name)
   list(JOIN ARG_LABELS "-" labels) # gtest_discover_tests takes one word; ctest -L looks for a part of it
   set(alone "*")
   if(ARG_TOGETHER)
-    math(EXPR together_timeout "5 * ${ARG_TIMEOUT}")
+    math(EXPR together_cost "5 * ${ARG_TIMEOUT}")
+    math(EXPR together_hangs "5 * ${hangs}")
     set(alone "*-")
     foreach(suite ${ARG_TOGETHER})
       set(test ${suite})
@@ -181,7 +184,7 @@ function(strata_test name)
       string(APPEND alone "${tests}:")
       add_test(NAME ${test} COMMAND ${name} --gtest_filter=${tests})
       set_tests_properties(
-        ${test} PROPERTIES LABELS "${labels}" TIMEOUT ${together_timeout} PROCESSORS ${ARG_PROCESSORS} COST ${together_timeout}
+        ${test} PROPERTIES LABELS "${labels}" TIMEOUT ${together_hangs} PROCESSORS ${ARG_PROCESSORS} COST ${together_cost}
       )
     endforeach()
     if(ALL IN_LIST ARG_TOGETHER)
@@ -192,7 +195,7 @@ function(strata_test name)
     ${name}
     DISCOVERY_TIMEOUT 60
     TEST_FILTER "${alone}"
-    PROPERTIES LABELS "${labels}" TIMEOUT ${ARG_TIMEOUT} PROCESSORS ${ARG_PROCESSORS}
+    PROPERTIES LABELS "${labels}" TIMEOUT ${hangs} PROCESSORS ${ARG_PROCESSORS}
                COST ${ARG_TIMEOUT} # what may take long begins first
   )
 endfunction()

@@ -7,7 +7,7 @@ strata_executable(
 )
 add_dependencies(two_servers_test stratad)
 add_test(NAME two_servers_test COMMAND two_servers_test)
-set_tests_properties(two_servers_test PROPERTIES LABELS integration TIMEOUT 300 COST 300)
+set_tests_properties(two_servers_test PROPERTIES LABELS integration TIMEOUT 1200 COST 300)
 
 # The conformance suite by the server that has not got the maps. Uploads that begin there do not go on where they broke.
 strata_executable(
@@ -20,7 +20,7 @@ add_test(
   NAME beside_suite_test
   COMMAND beside_suite_test --gtest_filter=-*AnAnnouncedUploadGoesOnWhereItBroke*:*TheLaterOfTwoUploadsOfAnAnnouncedScanTakesOver*
 )
-set_tests_properties(beside_suite_test PROPERTIES LABELS integration TIMEOUT 600 COST 600)
+set_tests_properties(beside_suite_test PROPERTIES LABELS integration TIMEOUT 2400 COST 600)
 
 # Plans by the server that has not got the map.
 strata_executable(
@@ -31,7 +31,7 @@ strata_executable(
 )
 add_dependencies(plans_elsewhere_test stratad)
 add_test(NAME plans_elsewhere_test COMMAND plans_elsewhere_test)
-set_tests_properties(plans_elsewhere_test PROPERTIES LABELS integration TIMEOUT 300 COST 300)
+set_tests_properties(plans_elsewhere_test PROPERTIES LABELS integration TIMEOUT 1200 COST 300)
 
 # Watches by the server that has not got the map.
 strata_executable(
@@ -42,7 +42,7 @@ strata_executable(
 )
 add_dependencies(watch_elsewhere_test stratad)
 add_test(NAME watch_elsewhere_test COMMAND watch_elsewhere_test)
-set_tests_properties(watch_elsewhere_test PROPERTIES LABELS integration TIMEOUT 300 COST 300)
+set_tests_properties(watch_elsewhere_test PROPERTIES LABELS integration TIMEOUT 1200 COST 300)
 
 # Maps between files and a database.
 strata_executable(
@@ -53,7 +53,7 @@ strata_executable(
 )
 add_dependencies(map_import_test stratad)
 add_test(NAME map_import_test COMMAND map_import_test)
-set_tests_properties(map_import_test PROPERTIES LABELS integration TIMEOUT 300 COST 300)
+set_tests_properties(map_import_test PROPERTIES LABELS integration TIMEOUT 1200 COST 300)
 
 # The kill campaign with several servers of one database.
 strata_executable(unfenced_stratad unfenced_stratad SOURCES cluster/unfenced_stratad.cc DEPS strata::server_program)
