@@ -345,6 +345,7 @@ PlaceMatch MatchUpright(const SeenScan& source,
   match.rms_m = best.registration.rms_m;
   match.overlap = best.overlap;
   match.contradiction = best.contradiction;
+  match.fit = best.score();
   match.verdict = VerdictOn(best, match.hold, match.rival, options);
   if (match.matched() && options.max_contradiction > 0.0) {
     match.confidence = match.overlap * (1.0 - match.contradiction / options.max_contradiction) *

@@ -95,6 +95,8 @@ struct PlaceMatch {
   // Share of the features the other side looked at that it looked through, and half the share of
   // near ones where it looked and nothing came back; the larger of both directions.
   double contradiction = 0.0;
+  // overlap · e^(−contradiction / 0.05): what fits are ordered by; 0 if none converged.
+  double fit = 0.0;
   // Mean of (n · d)² over the matched surfaces' normals n, d being the horizontal direction in
   // which it is least: how firmly the match is held where it may slide most. A corridor has 0.007
   // at most.

@@ -15,9 +15,10 @@
 namespace strata::testing {
 
 // The local map of a scan taken at `T_world_scan`.
-inline MlsMap MapAt(const Scene& scene, const Pose& T_world_scan, std::uint64_t seed) {
-  SensorOptions sensor;
-  sensor.columns = 480;
+inline MlsMap MapAt(const Scene& scene,
+                    const Pose& T_world_scan,
+                    std::uint64_t seed,
+                    const SensorOptions& sensor = {.columns = 480}) {
   return BuildMlsMap(SimulateScan(scene, sensor, T_world_scan, seed),
                      Pose::Identity(),
                      SensorModel(),
