@@ -136,7 +136,7 @@ class Alignment {
     STRATA_RETURN_IF_ERROR(surfaces_.Find(result_.T_map_scan, for_each_));
     surfaces_.AddTo(graph);
     STRATA_ASSIGN_OR_RETURN(PoseGraphSolution solution, Solve(graph));
-    if (surfaces_.Split(graph, solution.summary)) {
+    if (surfaces_.Split(PartsOfPlanes(graph, solution.summary))) {
       surfaces_.AddTo(graph);
       STRATA_ASSIGN_OR_RETURN(solution, Solve(graph));
     }
@@ -363,9 +363,15 @@ class Alignment {
       const std::optional<OdometryNoise> noise = NoiseOf(trajectory);
       for (const std::size_t node : trajectory) {
         if (odometry_[node] == nullptr || !known[node]) continue;
-        if (Slides(node, information[node])) result_.sliding.push_back(node);
+        const bool slides = Slides(node, information[node]);
+        if (slides) result_.sliding.push_back(node);
         const std::optional<Pose> error = OdometryError(node);
-        if (noise.has_value() && error.has_value() && IsJump(*error, *noise)) continue;
+        const bool is_jump = noise.has_value() && error.has_value() && IsJump(*error, *noise);
+        // A match that joins nothing says nothing against its robot's word.
+        const bool is_apart = result_.parts.empty()
+                                  ? lost_[node] && slides
+                                  : result_.parts[odometry_[node]->i] != result_.parts[node];
+        if (is_jump && !is_apart) continue;
         RelativePoseTerm term = *odometry_[node];
         term.information = noise.has_value()
                                ? IsotropicInformation(noise->sigma_rad, noise->sigma_m)
@@ -414,6 +420,35 @@ class Alignment {
     return std::nullopt;
   }
 
+  // By matches and what is given, as far as it is believed. What may slide agrees with any place:
+  // that two are near by the graph, or by the word of a robot that was found wrong, is all that
+  // joins them.
+  DisjointSets Joined(const PoseGraphProblem& graph, const PoseGraphSummary& summary) const {
+    std::vector<bool> joins_nothing(graph.relative.size(), false);
+    for (const auto& [k, chi2] : summary.rejected_relative) joins_nothing[k] = true;
+    for (std::size_t k = problem_.relative.size(); k < measured_end_; ++k) {
+      const RelativePoseTerm& term = graph.relative[k];
+      const bool is_doubtful = term.may_be_false || lost_[term.j];
+      if (is_doubtful && Slides(term.j, term.information)) joins_nothing[k] = true;
+    }
+    return JoinedBy(graph.relative, joins_nothing, measured_end_);
+  }
+
+  // Of nodes that may have planes in common: priors place all that they place.
+  std::vector<std::size_t> PartsOfPlanes(const PoseGraphProblem& graph,
+                                         const PoseGraphSummary& summary) const {
+    std::vector<bool> placed(graph.priors.size(), true);
+    for (const auto& [k, chi2] : summary.rejected_priors) placed[k] = false;
+    DisjointSets joined = Joined(graph, summary);
+    std::optional<std::size_t> first;
+    for (std::size_t k = 0; k < placed.size(); ++k) {
+      if (!placed[k]) continue;
+      if (!first.has_value()) first = graph.priors[k].i;
+      joined.Join(*first, graph.priors[k].i);
+    }
+    return PartsOf(joined, graph.T_map_scan.size());
+  }
+
   void Keep(const PoseGraphProblem& graph, PoseGraphSolution solution) {
     result_.T_map_scan = std::move(solution.T_map_scan);
     result_.measured.clear();
@@ -435,14 +470,7 @@ class Alignment {
     for (std::size_t k = given; k < graph.relative.size(); ++k) {
       if (!rejected[k]) result_.measured.push_back(graph.relative[k]);
     }
-    for (std::size_t k = given; k < measured_end_; ++k) {
-      // What may slide agrees with any place: that two are near by the graph, or by the word of a
-      // robot that was found wrong, is all that joins them.
-      const RelativePoseTerm& term = graph.relative[k];
-      const bool is_doubtful = term.may_be_false || lost_[term.j];
-      if (is_doubtful && Slides(term.j, term.information)) rejected[k] = true;
-    }
-    DisjointSets joined = JoinedBy(graph.relative, rejected, measured_end_);
+    DisjointSets joined = Joined(graph, solution.summary);
     result_.parts = PartsOf(joined, graph.T_map_scan.size());
     surfaces_.Keep(solution.planes);
     result_.planes = surfaces_.planes();

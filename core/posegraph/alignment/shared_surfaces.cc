@@ -6,9 +6,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/common/disjoint_sets.h"
 #include "core/common/status.h"
-#include "core/posegraph/alignment/parts.h"
 #include "core/posegraph/alignment/plane_terms.h"
 
 namespace strata {
@@ -18,23 +16,6 @@ namespace {
 constexpr double kAllowed = 3.0;
 // Poses that settle move by so much less from round to round.
 constexpr double kFalling = 0.8;
-
-// By what counts after a solution: relative poses, and priors, which place all that they place.
-std::vector<std::size_t> PartsAfter(const PoseGraphProblem& graph,
-                                    const PoseGraphSummary& summary) {
-  std::vector<bool> rejected(graph.relative.size(), false);
-  for (const auto& [k, chi2] : summary.rejected_relative) rejected[k] = true;
-  std::vector<bool> placed(graph.priors.size(), true);
-  for (const auto& [k, chi2] : summary.rejected_priors) placed[k] = false;
-  DisjointSets joined = JoinedBy(graph.relative, rejected, graph.relative.size());
-  std::optional<std::size_t> first;
-  for (std::size_t k = 0; k < placed.size(); ++k) {
-    if (!placed[k]) continue;
-    if (!first.has_value()) first = graph.priors[k].i;
-    joined.Join(*first, graph.priors[k].i);
-  }
-  return PartsOf(joined, graph.T_map_scan.size());
-}
 
 }  // namespace
 
@@ -74,8 +55,7 @@ void SharedSurfaces::AddTo(PoseGraphProblem& graph) const {
   }
 }
 
-bool SharedSurfaces::Split(const PoseGraphProblem& graph, const PoseGraphSummary& summary) {
-  const std::vector<std::size_t> parts = PartsAfter(graph, summary);
+bool SharedSurfaces::Split(const std::vector<std::size_t>& parts) {
   const bool is_split = std::ranges::any_of(planes_, [&parts](const SharedPlane& plane) {
     return std::ranges::any_of(plane.views, [&](const SharedPlane::View& view) {
       return parts[view.scan] != parts[plane.views[0].scan];

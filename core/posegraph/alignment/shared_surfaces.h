@@ -30,10 +30,10 @@ class SharedSurfaces {
   absl::Status Find(const std::vector<Pose>& T_map_scan, ForEach for_each);
   // Their terms at the poses of `graph`, instead of those that it has.
   void AddTo(PoseGraphProblem& graph) const;
-  // Parts of the graph that neither relative poses nor priors join know nothing of each other. A
-  // few walls in common would let one slide along them, as far as their tilts are wrong: each part
-  // gets its own planes. Whether any plane was of two parts.
-  bool Split(const PoseGraphProblem& graph, const PoseGraphSummary& summary);
+  // Nodes of different numbers know nothing of each other. A few walls in common would let them
+  // slide along these, as far as their tilts are wrong: each part gets its own planes. Whether any
+  // plane was of two parts.
+  bool Split(const std::vector<std::size_t>& parts);
   // Where the planes are after a solution of a graph that they were added to.
   void Keep(const std::vector<Plane>& planes);
   // What a round moved and turned poses by.

@@ -426,43 +426,51 @@ class FloorScans final : public AlignmentSource {
   FloorScans() {
     RandomPoses random(5);
     std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points;
+    std::vector<Eigen::Vector3f>& floor =
+        points[static_cast<std::size_t>(FeatureClass::kTraversable)];
     for (int x = -20; x <= 20; ++x) {
       for (int y = -20; y <= 20; ++y) {
         const Eigen::Vector3f shaken = random.Vector(0.05).cast<float>();
-        points[static_cast<std::size_t>(FeatureClass::kTraversable)].emplace_back(
-            0.3F * static_cast<float>(x) + shaken.x(),
-            0.3F * static_cast<float>(y) + shaken.y(),
-            -1.2F);
+        floor.emplace_back(0.3F * static_cast<float>(x) + shaken.x(),
+                           0.3F * static_cast<float>(y) + shaken.y(),
+                           -1.2F);
       }
     }
+    PointCloud cloud;
+    cloud.points = floor;
+    planes_ = std::make_shared<const ScanPlanes>(ExtractPlanes(cloud));
     features_ = std::make_shared<const ScanFeatures>(ScanFeatures::FromPoints(std::move(points)));
   }
   absl::StatusOr<std::shared_ptr<const ScanFeatures>> Features(std::size_t) override {
     return features_;
   }
-  absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t) override {
-    return std::make_shared<const ScanPlanes>();
-  }
+  absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t) override { return planes_; }
 
  private:
   std::shared_ptr<const ScanFeatures> features_;
+  std::shared_ptr<const ScanPlanes> planes_;
 };
 
-TEST_F(AlignmentTest, WhatMayOnlySlideIsNamed) {
+// A robot that goes straight on over it, and knows how far.
+AlignmentProblem OverTheFloor(std::size_t scans) {
   AlignmentProblem floor;
-  for (std::size_t k = 0; k < 3; ++k) {
+  floor.trajectories.emplace_back();
+  for (std::size_t k = 0; k < scans; ++k) {
+    floor.trajectories[0].push_back(k);
     floor.T_map_scan.push_back(
         MakePose(Eigen::Quaterniond::Identity(), {0.5 * static_cast<double>(k), 0.0, 1.2}));
-  }
-  floor.trajectories = {{0, 1, 2}};
-  for (std::size_t k = 1; k < 3; ++k) {
+    if (k == 0) continue;
     floor.pairs.push_back({k - 1, k});
     floor.odometry.push_back({k - 1,
                               k,
                               floor.T_map_scan[k - 1].inverse() * floor.T_map_scan[k],
                               IsotropicInformation(0.005, 0.05)});
   }
-  problem_ = floor;
+  return floor;
+}
+
+TEST_F(AlignmentTest, WhatMayOnlySlideIsNamed) {
+  problem_ = OverTheFloor(3);
   FloorScans scans;
   STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align(scans));
   EXPECT_THAT(result.sliding, ::testing::ElementsAre(1, 2));
@@ -471,6 +479,31 @@ TEST_F(AlignmentTest, WhatMayOnlySlideIsNamed) {
   STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult apart, Align(scans));
   EXPECT_EQ(apart.parts[1], apart.parts[0]);
   EXPECT_NE(apart.parts[2], apart.parts[0]);
+}
+
+// A match that agrees with any place went on agreeing with wherever planes and rounding had moved
+// it to, and spoke for that against the robot: drawn robots ended 6 m from where they said.
+TEST_F(AlignmentTest, WhatNothingJoinsIsWhereItsRobotSays) {
+  constexpr std::size_t kScans = 36;
+  constexpr std::size_t kLost = 33;
+  problem_ = OverTheFloor(kScans);
+  problem_.lost = {kLost};
+  for (ScanPair& pair : problem_.pairs) {
+    if (pair.j == kLost) continue;
+    pair.measured = {problem_.odometry[pair.i].T_i_j, IsotropicInformation(0.001, 0.01)};
+  }
+  for (std::size_t k = kLost; k < kScans; ++k) problem_.T_map_scan[k].translation().y() += 3.0;
+  FloorScans scans;
+  STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align(scans));
+  EXPECT_NE(result.parts[kLost], result.parts[kLost - 1]);
+  const Pose T_before_lost = result.T_map_scan[kLost - 1].inverse() * result.T_map_scan[kLost];
+  EXPECT_LT((T_before_lost.translation() - Eigen::Vector3d(0.5, 0.0, 0.0)).norm(), 0.05);
+  EXPECT_THAT(result.planes, Not(IsEmpty()));
+  for (const SharedPlane& plane : result.planes) {
+    for (const SharedPlane::View& view : plane.views) {
+      EXPECT_EQ(result.parts[view.scan], result.parts[plane.views[0].scan]);
+    }
+  }
 }
 
 TEST_F(AlignmentTest, TheResultDoesNotDependOnTheOrderOfWork) {
