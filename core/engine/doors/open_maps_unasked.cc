@@ -139,13 +139,28 @@ void OpenMaps::TellOfArrivals() {
   for (const std::shared_ptr<Map>& map : Open()) {
     const auto it = arrived.find(map->core().name());
     if (it != arrived.end() && it->second.scans) map->ScansWait();
+    if (it != arrived.end() && it->second.edits > 0) map->EditsWait(it->second.edits);
     // What waits or runs here may have been cancelled elsewhere. An error: it is looked again.
     const bool jobs = it != arrived.end() && it->second.jobs;
     if (jobs || map->HasJobs()) map->TakeInJobs().IgnoreError();
   }
 }
 
+// The origin of a map that is open here may be set elsewhere.
+void OpenMaps::TakeInOrigin(const std::string& name, const MapOutline& outline) {
+  std::shared_ptr<Map> map;
+  {
+    absl::MutexLock lock(&mutex_);
+    const auto it = entries_.find(name);
+    if (it != entries_.end()) map = it->second.map;
+  }
+  if (map == nullptr) return;
+  if (map->core().info().parameters.origin == outline.info.parameters.origin) return;
+  map->core().TakeInOrigin().IgnoreError();  // the next look may succeed
+}
+
 void OpenMaps::Note(const std::string& name, absl::StatusOr<MapOutline> outline) {
+  if (outline.ok() && stores_.IsShared()) TakeInOrigin(name, *outline);
   bool first = false;
   {
     absl::MutexLock lock(&mutex_);

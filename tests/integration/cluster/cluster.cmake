@@ -33,6 +33,17 @@ add_dependencies(plans_elsewhere_test stratad)
 add_test(NAME plans_elsewhere_test COMMAND plans_elsewhere_test)
 set_tests_properties(plans_elsewhere_test PROPERTIES LABELS integration TIMEOUT 300 COST 300)
 
+# Edits by the server that has not got the map.
+strata_executable(
+  edits_elsewhere_test edits_elsewhere_test
+  SOURCES stratad_process.cc cluster/edits_elsewhere_test.cc
+  DEPS strata::postgres_cluster strata::sdk strata::storage_postgresql strata::test_support GTest::gmock_main
+  SHARED_HEADERS strata_test_headers
+)
+add_dependencies(edits_elsewhere_test stratad)
+add_test(NAME edits_elsewhere_test COMMAND edits_elsewhere_test)
+set_tests_properties(edits_elsewhere_test PROPERTIES LABELS integration TIMEOUT 300 COST 300)
+
 # Watches by the server that has not got the map.
 strata_executable(
   watch_elsewhere_test watch_elsewhere_test
