@@ -199,6 +199,19 @@ TEST_F(EditsElsewhereTest, AreRefusedWithTheOwnersWords) {
     EXPECT_EQ(WordsOf(owners), WordsOf(edits[i](db(1)))) << i;
   }
   EXPECT_EQ(Epochs(0), 1U);
+  for (const std::size_t server : {0U, 1U}) {  // whatever else is wrong
+    EXPECT_TRUE(
+        absl::IsNotFound(db(server).classifiers().Import({}, "nowhere", "a", "no bytes").status()));
+  }
+}
+
+// One whose asker has died is not made after what was asked for later.
+TEST_F(EditsElsewhereTest, ThatWaitAreMadeBeforeWhatTheOwnerIsAskedForThen) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto connection, Connection::Open(store_));
+  STRATA_ASSERT_OK(
+      connection->Execute("INSERT INTO map_edit (map, kind, trajectory, sequence, value) SELECT "
+                          "map, 2, 'run', 4, '' FROM truth_map"));
+  EXPECT_TRUE(absl::IsNotFound(SetX(db(0), 4, 1.0)));
 }
 
 // It is made by whoever takes the map over, once.
