@@ -249,7 +249,7 @@ TEST_F(EditsElsewhereTest, WhoGivesUpHasChangedNothing) {
   EXPECT_EQ(Epochs(1), 3U);
 }
 
-TEST_F(EditsElsewhereTest, CostASecondWhereTheWorkerMakesThem) {
+TEST_F(EditsElsewhereTest, TakeLongerWhereTheWorkerMakesThem) {
   std::array<std::vector<double>, 2> poses, constraints;
   Constraint loop;
   loop.i = Numbered(1);
@@ -267,11 +267,15 @@ TEST_F(EditsElsewhereTest, CostASecondWhereTheWorkerMakesThem) {
       poses[server].push_back(absl::ToDoubleMilliseconds(moved - begun));
     }
   }
-  std::printf("a constraint %.2f ms elsewhere, %.2f ms at the owner; a pose %.0f and %.0f ms\n",
-              MedianMs(constraints[1]),
-              MedianMs(constraints[0]),
-              MedianMs(poses[1]),
-              MedianMs(poses[0]));
+  const double first = poses[1].front();
+  std::printf(
+      "a constraint %.2f ms elsewhere, %.2f ms at the owner; a pose %.0f ms (the first %.0f) "
+      "and %.0f ms\n",
+      MedianMs(constraints[1]),
+      MedianMs(constraints[0]),
+      MedianMs(poses[1]),
+      first,
+      MedianMs(poses[0]));
 }
 
 // Eight who ask elsewhere without end, and one who asks the owner.
