@@ -127,8 +127,10 @@ absl::Status Worker::Execute(const Stop& stop,
   absl::MutexLock lock(&mutex_);
   if (closed_) return why_closed_;
   if (refuses_) return Refusal();
-  if (!EditWaits()) edits_after_ = 0;
-  edits_until_ = std::max(edits_until_, behind);
+  if (behind > 0) {
+    if (!EditWaits()) edits_after_ = 0;
+    edits_until_ = std::max(edits_until_, behind);
+  }
   tasks_.push_back(&task);
   while (!mutex_.AwaitWithTimeout(absl::Condition(&task.done), kStopPoll)) {
     // The task must leave the queue before this frame is left, in whatever way.
